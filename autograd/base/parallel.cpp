@@ -1,0 +1,52 @@
+#include "autograd/base/parallel.h"
+
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <memory>
+#include <mutex>
+
+namespace restage {
+namespace {
+std::unique_ptr<tbb::global_control> limit;
+std::unique_ptr<tbb::task_arena> arena;
+std::mutex limit_mutex;
+int requested = 0;
+}  // namespace
+
+void set_threads(int n) {
+  const std::lock_guard lock(limit_mutex);
+  requested = n;
+  limit.reset();
+  arena.reset();
+  if (n <= 0) return;
+  limit = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
+                                                static_cast<size_t>(n));
+  // An arena of n slots, so that more threads than cores can be asked for (determinism tests do).
+  arena = std::make_unique<tbb::task_arena>(n);
+}
+
+int threads() {
+  return requested > 0 ? requested : tbb::this_task_arena::max_concurrency();
+}
+
+void parallel_for(int64_t n, int64_t grain, const std::function<void(int64_t, int64_t)>& body) {
+  if (n <= 0) return;
+  grain = std::max<int64_t>(1, grain);
+  const int64_t pieces = (n + grain - 1) / grain;
+  const auto piece = [&](int64_t i) { body(i * grain, std::min(n, (i + 1) * grain)); };
+  if (pieces == 1 || requested == 1) {
+    for (int64_t i = 0; i < pieces; ++i) piece(i);
+    return;
+  }
+  const auto work = [&] { tbb::parallel_for(int64_t{0}, pieces, piece, tbb::simple_partitioner()); };
+  if (arena) {
+    arena->execute(work);
+  } else {
+    work();
+  }
+}
+
+}  // namespace restage

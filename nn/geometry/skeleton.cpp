@@ -1,0 +1,42 @@
+#include "nn/geometry/skeleton.h"
+
+namespace restage {
+
+PosedSkeleton forward_kinematics(const Joints& rest, const Pose& pose) {
+  PosedSkeleton out;
+  out.global[0] = pose.local[0];
+  out.joints[0] = pose.root;
+  for (int j = 1; j < kJoints; ++j) {
+    const int p = kParents[j];
+    out.joints[j] = out.joints[p] + out.global[p] * (rest[j] - rest[p]);
+    out.global[j] = out.global[p] * pose.local[j];
+  }
+  return out;
+}
+
+Rotations to_local(const Rotations& global) {
+  Rotations out;
+  out[0] = global[0];
+  for (int j = 1; j < kJoints; ++j) out[j] = global[kParents[j]].transpose() * global[j];
+  return out;
+}
+
+Rotations to_global(const Rotations& local) {
+  Rotations out;
+  out[0] = local[0];
+  for (int j = 1; j < kJoints; ++j) out[j] = out[kParents[j]] * local[j];
+  return out;
+}
+
+double leg_length(const Joints& x) {
+  const auto side = [&](int hip, int knee, int ankle) {
+    return (x[hip] - x[knee]).norm() + (x[knee] - x[ankle]).norm();
+  };
+  return 0.5 * (side(1, 4, 7) + side(2, 5, 8));
+}
+
+Mat3 shortest_arc(const Vec3& a, const Vec3& b) {
+  return Quat::FromTwoVectors(a, b).toRotationMatrix();
+}
+
+}  // namespace restage
