@@ -1,0 +1,234 @@
+#include "nn/geometry/body.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "autograd/base/error.h"
+
+namespace restage {
+namespace {
+
+using Mat3f = Eigen::Matrix3f;
+using Vec4f = Eigen::Vector4f;
+
+/// Joints whose bone direction is known on both sides, and the joint at the bone's far end.
+constexpr int kLimbs[8][2] = {{1, 4},   {2, 5},   {4, 7},   {5, 8},
+                              {16, 18}, {17, 19}, {18, 20}, {19, 21}};
+
+/// Left hip-knee plus knee-ankle: trajectories are scaled by this side, as the reference tool does.
+double left_leg(const Joints& x) { return (x[1] - x[4]).norm() + (x[4] - x[7]).norm(); }
+
+/// x -> rotation x + offset, of each joint, from the rest surface to the posed one.
+struct SkinTransforms {
+  std::array<Mat3f, kJoints> rotation;
+  std::array<Point, kJoints> offset;
+};
+
+SkinTransforms skin_transforms(const Body& body, const PosedSkeleton& posed) {
+  SkinTransforms out;
+  for (int j = 0; j < kJoints; ++j) {
+    out.rotation[j] = posed.global[j].cast<float>();
+    out.offset[j] = (posed.joints[j] - posed.global[j] * body.joints[j]).cast<float>();
+  }
+  return out;
+}
+
+/// The same as unit dual quaternions, and which of each pair must change sign to blend the short
+/// way.
+struct DualTransforms {
+  std::array<Vec4f, kJoints> real, dual;  // x, y, z, w
+  float sign[kJoints][kJoints];
+};
+
+DualTransforms dual_transforms(const Body& body, const PosedSkeleton& posed) {
+  DualTransforms out;
+  for (int j = 0; j < kJoints; ++j) {
+    const Quat q(posed.global[j]);
+    const Vec3 t = posed.joints[j] - posed.global[j] * body.joints[j];
+    const Quat d = Quat(0.0, t.x(), t.y(), t.z()) * q;
+    out.real[j] = q.normalized().coeffs().cast<float>();
+    out.dual[j] = (0.5 * d.coeffs()).cast<float>();
+  }
+  for (int a = 0; a < kJoints; ++a)
+    for (int b = 0; b < kJoints; ++b)
+      out.sign[a][b] = out.real[a].dot(out.real[b]) < 0.0f ? -1.0f : 1.0f;
+  return out;
+}
+
+/// A muscle along one bone. It swells on the flexor side, about `centre` (0 near, 1 far joint).
+struct Muscle {
+  bool active = false;
+  Point origin, axis, side;  ///< near joint, unit bone direction, unit flexor direction (rest pose)
+  float length = 0, centre = 0, half_width = 0;
+  float height = 0;  ///< largest displacement in this pose, metres
+};
+using Muscles = std::array<Muscle, kJoints>;
+
+/// A hinge and the muscles beside it: heights are fractions of the bone's length at full flexion.
+struct Hinge {
+  int near, joint, far;
+  float upper_height, upper_centre, lower_height, lower_centre;
+};
+constexpr Hinge kHinges[4] = {{16, 18, 20, 0.075f, 0.58f, 0.045f, 0.28f},
+                              {17, 19, 21, 0.075f, 0.58f, 0.045f, 0.28f},
+                              {1, 4, 7, 0.050f, 0.60f, 0.060f, 0.32f},
+                              {2, 5, 8, 0.050f, 0.60f, 0.060f, 0.32f}};
+
+Muscle muscle(const Vec3& origin, const Vec3& bone, const Vec3& towards, float height,
+              float centre) {
+  Muscle out;
+  const double length = bone.norm();
+  const Vec3 axis = bone / length;
+  const Vec3 side = towards - axis * axis.dot(towards);
+  if (!(side.norm() > 1e-6)) return out;
+  out.active = true;
+  out.origin = origin.cast<float>();
+  out.axis = axis.cast<float>();
+  out.side = side.normalized().cast<float>();
+  out.length = static_cast<float>(length);
+  out.centre = centre;
+  out.half_width = 0.45f;
+  out.height = height * out.length;
+  return out;
+}
+
+/// Muscles swell with (1 - cos(flexion)) / 2, flexion being the angle beyond the rest pose's.
+Muscles flexed_muscles(const Body& body, const PosedSkeleton& posed) {
+  Muscles out;
+  for (const Hinge& hinge : kHinges) {
+    const Vec3 upper = body.joints[hinge.joint] - body.joints[hinge.near];
+    const Vec3 lower = body.joints[hinge.far] - body.joints[hinge.joint];
+    if (!(upper.norm() > 1e-6) || !(lower.norm() > 1e-6)) continue;
+    const Vec3 upper_now = posed.global[hinge.near] * upper;
+    const Vec3 lower_now = posed.global[hinge.joint] * lower;
+    const auto angle = [](const Vec3& a, const Vec3& b) {
+      return std::atan2(a.cross(b).norm(), a.dot(b));
+    };
+    const double flexion = std::max(0.0, angle(upper_now, lower_now) - angle(upper, lower));
+    if (flexion < 1e-4) continue;
+    const float swell = static_cast<float>(0.5 * (1.0 - std::cos(flexion)));
+    // The flexor side of a bone is where the other bone has moved to, seen from this bone.
+    const Vec3 to_lower = posed.global[hinge.near].transpose() * lower_now;
+    const Vec3 to_upper = -(posed.global[hinge.joint].transpose() * upper_now);
+    out[hinge.near] = muscle(body.joints[hinge.near], upper, to_lower, swell * hinge.upper_height,
+                             hinge.upper_centre);
+    out[hinge.joint] = muscle(body.joints[hinge.joint], lower, to_upper, swell * hinge.lower_height,
+                              hinge.lower_centre);
+  }
+  return out;
+}
+
+/// Displacement of a rest point by one muscle: radial, smooth, zero off the muscle.
+Point swelling(const Muscle& m, const Point& x) {
+  const Point from = x - m.origin;
+  const float along = m.axis.dot(from);
+  const float u = (along / m.length - m.centre) / m.half_width;
+  if (!(u > -1.0f && u < 1.0f)) return Point::Zero();
+  const Point radial = from - along * m.axis;
+  const float on_side = radial.dot(m.side);
+  if (!(on_side > 0.0f)) return Point::Zero();
+  const float r2 = std::max(radial.squaredNorm(), 1e-10f);
+  const float bump = (1.0f - u * u) * (1.0f - u * u);
+  // on_side^2 / r^2 is the squared cosine to the flexor side; / r again makes `radial` a direction.
+  return radial * (m.height * bump * on_side * on_side / (r2 * std::sqrt(r2)));
+}
+
+Point skin_point(const Point& rest, const float* weights, const DualTransforms& transforms,
+                 const Muscles& muscles) {
+  int strongest = 0;
+  for (int j = 1; j < kJoints; ++j)
+    if (weights[j] > weights[strongest]) strongest = j;
+  const float* sign = transforms.sign[strongest];
+  Vec4f real = Vec4f::Zero(), dual = Vec4f::Zero();
+  Point x = rest;
+  for (int j = 0; j < kJoints; ++j) {
+    const float w = weights[j];
+    if (w == 0.0f) continue;
+    const float signed_w = w * sign[j];
+    real += signed_w * transforms.real[j];
+    dual += signed_w * transforms.dual[j];
+    if (muscles[j].active) x += w * swelling(muscles[j], rest);
+  }
+  const float norm = real.norm();
+  if (!(norm > 0.0f)) return rest;  // a vertex without weights stays
+  const float inverse = 1.0f / norm;
+  real *= inverse;
+  dual *= inverse;
+  const Point r = real.head<3>(), d = dual.head<3>();
+  const Point turned = x + 2.0f * r.cross(r.cross(x) + real.w() * x);
+  return turned + 2.0f * (real.w() * d - dual.w() * r + r.cross(d));
+}
+
+void check_body(const Body& body, const char* who) {
+  if (static_cast<size_t>(body.weights.rows()) != body.rest.vertices.size())
+    throw ShapeError(std::string(who) + ": body '" + body.id + "' has " +
+                     std::to_string(body.rest.vertices.size()) + " vertices but " +
+                     std::to_string(body.weights.rows()) + " rows of weights");
+}
+
+}  // namespace
+
+Pose pose_on(const Motion& motion, const Body& body, size_t frame) {
+  if (frame >= motion.global.size() || frame >= motion.hips.size())
+    throw ShapeError("pose_on: frame " + std::to_string(frame) + " of motion '" + motion.id +
+                     "', which has " + std::to_string(motion.frames()));
+  const Joints& rest = body.joints;
+  Rotations global;
+  for (int j = 0; j < kJoints; ++j)
+    global[j] = motion.global[frame][j].cast<double>().normalized().toRotationMatrix();
+  for (const auto& limb : kLimbs) {
+    const int j = limb[0], k = limb[1];
+    const Vec3 ours = rest[k] - rest[j], theirs = motion.rest[k] - motion.rest[j];
+    if (ours.norm() > 1e-9 && theirs.norm() > 1e-9)
+      global[j] = global[j] * shortest_arc(ours, theirs);
+  }
+  const double source_leg = left_leg(motion.rest);
+  const double scale = source_leg > 1e-9 ? left_leg(rest) / source_leg : 1.0;
+  Pose pose;
+  pose.local = to_local(global);
+  pose.root = scale * motion.hips[frame].cast<double>() +
+              global[0] * (rest[0] - 0.5 * (rest[1] + rest[2])) +
+              Vec3(0.0, 0.5 * (rest[10].y() + rest[11].y()), 0.0);
+  return pose;
+}
+
+Points pose_surface(const Body& body, const Pose& pose, const std::vector<int32_t>* pick) {
+  check_body(body, "pose_surface");
+  const PosedSkeleton posed = forward_kinematics(body.joints, pose);
+  const DualTransforms transforms = dual_transforms(body, posed);
+  const Muscles muscles = flexed_muscles(body, posed);
+  const Points& rest = body.rest.vertices;
+  const float* weights = body.weights.data();
+  const size_t n = pick ? pick->size() : rest.size();
+  Points out(n);
+  for (size_t i = 0; i < n; ++i) {
+    const size_t v = pick ? static_cast<size_t>((*pick)[i]) : i;
+    if (v >= rest.size())
+      throw ShapeError("pose_surface: vertex " + std::to_string((*pick)[i]) + " of body '" +
+                       body.id + "', which has " + std::to_string(rest.size()));
+    out[i] = skin_point(rest[v], weights + v * kJoints, transforms, muscles);
+  }
+  return out;
+}
+
+Points linear_blend_skinning(const Body& body, const Pose& pose) {
+  check_body(body, "linear_blend_skinning");
+  const SkinTransforms transforms = skin_transforms(body, forward_kinematics(body.joints, pose));
+  const Points& rest = body.rest.vertices;
+  Points out(rest.size());
+  for (size_t v = 0; v < rest.size(); ++v) {
+    Mat3f rotation = Mat3f::Zero();
+    Point offset = Point::Zero();
+    for (int j = 0; j < kJoints; ++j) {
+      const float w = body.weights(static_cast<Eigen::Index>(v), j);
+      if (w == 0.0f) continue;
+      rotation += w * transforms.rotation[j];
+      offset += w * transforms.offset[j];
+    }
+    out[v] = rotation * rest[v] + offset;
+  }
+  return out;
+}
+
+}  // namespace restage
