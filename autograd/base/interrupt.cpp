@@ -1,0 +1,42 @@
+#include "autograd/base/interrupt.h"
+
+#include <signal.h>
+#include <unistd.h>
+
+#include <atomic>
+
+namespace restage {
+namespace {
+
+std::atomic<int> scopes{0};
+std::atomic<int> caught{0};
+static_assert(std::atomic<int>::is_always_lock_free, "used in a signal handler");
+
+void on_signal(int signal) {
+  int none = 0;
+  if (scopes.load() > 0 && caught.compare_exchange_strong(none, signal)) return;
+  _exit(128 + signal);
+}
+
+}  // namespace
+
+void handle_signals() {
+  struct sigaction action {};
+  action.sa_handler = on_signal;
+  sigemptyset(&action.sa_mask);
+  action.sa_flags = SA_RESTART;
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  signal(SIGPIPE, SIG_IGN);
+}
+
+StopScope::StopScope() { ++scopes; }
+StopScope::~StopScope() { --scopes; }
+
+bool stop_requested() { return caught.load() != 0; }
+
+void throw_if_stopped() {
+  if (const int signal = caught.load(); signal != 0) throw Interrupted(signal);
+}
+
+}  // namespace restage

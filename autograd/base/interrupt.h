@@ -1,0 +1,34 @@
+// SIGINT and SIGTERM. By default they end the program at once with exit code 130 or 143; inside a
+// StopScope they only set a flag, so that a training run can write a checkpoint first.
+#pragma once
+
+#include "autograd/base/error.h"
+
+namespace restage {
+
+/// The program was asked to stop; exit_code is 130 or 143.
+class Interrupted : public Error {
+ public:
+  explicit Interrupted(int signal)
+      : Error("stopped by a signal; run it again or resume it", 128 + signal) {}
+};
+
+/// Installs the handlers; writing to a closed pipe becomes an ordinary error instead of a signal.
+/// Called once by the program; a library user may leave it out.
+void handle_signals();
+
+/// While one exists, the first signal sets the flag and the second one ends the program.
+class StopScope {
+ public:
+  StopScope();
+  ~StopScope();
+  StopScope(const StopScope&) = delete;
+  StopScope& operator=(const StopScope&) = delete;
+};
+
+/// True after a signal in a StopScope.
+bool stop_requested();
+/// Throws Interrupted if stop_requested().
+void throw_if_stopped();
+
+}  // namespace restage

@@ -1,0 +1,301 @@
+#include "nn/metrics/metrics.h"
+
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "autograd/base/error.h"
+#include "autograd/base/parallel.h"
+
+namespace restage::metrics {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+Value finite(double x) { return std::isfinite(x) ? Value(x) : std::nullopt; }
+
+bool comparable(const Track& a, const Track& b) {
+  return a.present() && b.present() && a.frames > 0 && a.points > 0;
+}
+
+/// Mean of `of_frame` over frames [first, last): frames in parallel, added up in their order.
+Value mean_over_frames(int64_t first, int64_t last,
+                       const std::function<double(int64_t)>& of_frame) {
+  const int64_t n = last - first;
+  if (n <= 0) return std::nullopt;
+  std::vector<double> each(static_cast<size_t>(n));
+  parallel_for(n, 1, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) each[static_cast<size_t>(i)] = of_frame(first + i);
+  });
+  double total = 0;
+  for (const double x : each) total += x;
+  return finite(total / static_cast<double>(n));
+}
+
+Vector3d apply(const Similarity& map, const Vector3d& x) { return map.linear * x + map.shift; }
+
+/// Plain sum, then a division: rounds as the reference does, which decides whether points that
+/// coincide leave a spread of exactly 0 (undefined) or of one rounding error.
+Vector3d centre(const double* points, int64_t count) {
+  Vector3d sum = Vector3d::Zero();
+  for (int64_t i = 0; i < count; ++i) sum += Eigen::Map<const Vector3d>(points + 3 * i);
+  return sum / static_cast<double>(count);
+}
+
+Similarity undefined() {
+  Similarity map;
+  map.linear.setConstant(std::numeric_limits<double>::quiet_NaN());
+  return map;
+}
+
+}  // namespace
+
+Track Track::slice(int64_t begin, int64_t end) const {
+  if (!present()) return *this;
+  return {data + 3 * points * begin, end - begin, points};
+}
+
+Similarity procrustes(const double* source, const double* target, int64_t count, bool scale) {
+  const Vector3d from = centre(source, count), to = centre(target, count);
+  Matrix3d cross = Matrix3d::Zero();
+  double spread = 0;
+  for (int64_t i = 0; i < count; ++i) {
+    const Vector3d x = Eigen::Map<const Vector3d>(source + 3 * i) - from;
+    const Vector3d y = Eigen::Map<const Vector3d>(target + 3 * i) - to;
+    cross += x * y.transpose();
+    spread += x.squaredNorm();
+  }
+  if (!cross.allFinite()) return undefined();
+  const Eigen::JacobiSVD<Matrix3d> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double sign = svd.matrixU().determinant() * svd.matrixV().determinant() < 0 ? -1 : 1;
+  const Vector3d flip(1, 1, sign);
+  const Matrix3d rotation = svd.matrixV() * flip.asDiagonal() * svd.matrixU().transpose();
+  const double s = scale ? svd.singularValues().dot(flip) / spread : 1.0;
+  if (!std::isfinite(s)) return undefined();
+  Similarity map;
+  map.linear = s * rotation;
+  map.shift = to - map.linear * from;
+  return map;
+}
+
+std::vector<Similarity> align(const Track& pred, const Track& truth, const Alignment& how) {
+  const auto frames = static_cast<size_t>(pred.frames);
+  std::vector<Similarity> maps(frames);
+  switch (how.mode) {
+    case Alignment::Mode::none:
+      break;
+    case Alignment::Mode::root:
+      for (size_t f = 0; f < frames; ++f) {
+        const auto i = static_cast<int64_t>(f);
+        maps[f].shift = truth.at(i, 0) - pred.at(i, 0);
+      }
+      break;
+    case Alignment::Mode::sequence:
+      maps.assign(frames, procrustes(pred.data, truth.data, pred.frames * pred.points, how.scale));
+      break;
+    case Alignment::Mode::frame:
+      parallel_for(pred.frames, 1, [&](int64_t begin, int64_t end) {
+        for (int64_t f = begin; f < end; ++f)
+          maps[static_cast<size_t>(f)] = procrustes(
+              pred.slice(f, f + 1).data, truth.slice(f, f + 1).data, pred.points, how.scale);
+      });
+      break;
+  }
+  return maps;
+}
+
+Value mean_distance(const Track& pred, const Track& truth, const Alignment& how) {
+  if (!comparable(pred, truth)) return std::nullopt;
+  const auto maps = align(pred, truth, how);
+  return mean_over_frames(0, pred.frames, [&](int64_t f) {
+    double sum = 0;
+    for (int64_t i = 0; i < pred.points; ++i)
+      sum += (apply(maps[static_cast<size_t>(f)], pred.at(f, i)) - truth.at(f, i)).norm();
+    return sum / static_cast<double>(pred.points);
+  });
+}
+
+std::vector<double> mean_distance_by_point(const Track& pred, const Track& truth,
+                                           const Alignment& how) {
+  if (!comparable(pred, truth)) return {};
+  const auto maps = align(pred, truth, how);
+  std::vector<double> mean(static_cast<size_t>(pred.points), 0.0);
+  for (int64_t i = 0; i < pred.points; ++i) {
+    double sum = 0;
+    for (int64_t f = 0; f < pred.frames; ++f)
+      sum += (apply(maps[static_cast<size_t>(f)], pred.at(f, i)) - truth.at(f, i)).norm();
+    mean[static_cast<size_t>(i)] = sum / static_cast<double>(pred.frames);
+  }
+  return mean;
+}
+
+Value acceleration_error(const Track& pred, const Track& truth, const Alignment& how) {
+  if (!comparable(pred, truth) || pred.frames < 3) return std::nullopt;
+  const auto maps = align(pred, truth, how);
+  const auto moved = [&](int64_t f, int64_t i) {
+    return apply(maps[static_cast<size_t>(f)], pred.at(f, i));
+  };
+  return mean_over_frames(1, pred.frames - 1, [&](int64_t f) {
+    double sum = 0;
+    for (int64_t i = 0; i < pred.points; ++i) {
+      const Vector3d a = moved(f + 1, i) - 2 * moved(f, i) + moved(f - 1, i);
+      const Vector3d b = truth.at(f + 1, i) - 2 * truth.at(f, i) + truth.at(f - 1, i);
+      sum += (a - b).norm();
+    }
+    return sum / static_cast<double>(pred.points);
+  });
+}
+
+Value edge_length_difference_mm(const Track& pred, const Track& truth, NeighbourFrame where) {
+  if (!comparable(pred, truth) || pred.points <= kEdgeNeighbours) return std::nullopt;
+  for (int64_t i = 0; i < 3 * truth.frames * truth.points; ++i)
+    if (!std::isfinite(truth.data[i])) return std::nullopt;  // the search tree needs an order
+  std::vector<int32_t> fixed;
+  if (where == NeighbourFrame::first) fixed = nearest_neighbours(truth.data, truth.points);
+  const auto mean = mean_over_frames(0, pred.frames, [&](int64_t f) {
+    std::vector<int32_t> fresh;
+    if (fixed.empty()) fresh = nearest_neighbours(truth.slice(f, f + 1).data, truth.points);
+    const auto& near = fixed.empty() ? fresh : fixed;
+    double sum = 0;
+    for (int64_t i = 0; i < pred.points; ++i)
+      for (int k = 0; k < kEdgeNeighbours; ++k) {
+        const int64_t j = near[static_cast<size_t>(i * kEdgeNeighbours + k)];
+        sum += std::abs((pred.at(f, i) - pred.at(f, j)).norm() -
+                        (truth.at(f, i) - truth.at(f, j)).norm());
+      }
+    return sum / static_cast<double>(pred.points * kEdgeNeighbours);
+  });
+  return mean ? finite(1000 * *mean) : std::nullopt;
+}
+
+Value pmd(const Track& pred, const Track& truth) {
+  if (!comparable(pred, truth)) return std::nullopt;
+  return mean_over_frames(0, pred.frames, [&](int64_t f) {
+    double sum = 0;
+    for (int64_t i = 0; i < pred.points; ++i) sum += (pred.at(f, i) - truth.at(f, i)).squaredNorm();
+    return sum / static_cast<double>(pred.points);
+  });
+}
+
+Value pmd_npt(const Track& pred, const Track& truth) {
+  if (!comparable(pred, truth)) return std::nullopt;
+  const auto box_centre = [](const Track& track, int64_t f) {
+    Vector3d low = track.at(f, 0), high = low;
+    for (int64_t i = 1; i < track.points; ++i) {
+      low = low.cwiseMin(track.at(f, i));
+      high = high.cwiseMax(track.at(f, i));
+    }
+    return Vector3d((low + high) / 2);
+  };
+  return mean_over_frames(0, pred.frames, [&](int64_t f) {
+    const Vector3d a = box_centre(pred, f), b = box_centre(truth, f);
+    double sum = 0;
+    for (int64_t i = 0; i < pred.points; ++i)
+      sum += ((pred.at(f, i) - a) - (truth.at(f, i) - b)).squaredNorm();
+    return sum / static_cast<double>(3 * pred.points);
+  });
+}
+
+// ---- the table ---------------------------------------------------------------------------------
+
+namespace {
+
+using Mode = Alignment::Mode;
+
+template <Mode mode, bool scale = true>
+Value joint_distance(const SequenceView& s) {
+  return mean_distance(s.pred_joints, s.true_joints, {mode, scale});
+}
+template <Mode mode, bool scale = true>
+Value vertex_distance(const SequenceView& s) {
+  return mean_distance(s.pred_vertices, s.true_vertices, {mode, scale});
+}
+template <Mode mode, bool scale = true>
+Value joint_acceleration(const SequenceView& s) {
+  return acceleration_error(s.pred_joints, s.true_joints, {mode, scale});
+}
+template <NeighbourFrame where>
+Value edge_lengths(const SequenceView& s) {
+  return edge_length_difference_mm(s.pred_vertices, s.true_vertices, where);
+}
+Value squared(const SequenceView& s) { return pmd(s.pred_vertices, s.true_vertices); }
+Value squared_npt(const SequenceView& s) { return pmd_npt(s.pred_vertices, s.true_vertices); }
+
+constexpr Metric kTable[] = {
+    {"mpjpe", "MPJPE", "m", "mean joint distance", joint_distance<Mode::none>},
+    {"pa_mpjpe", "PA-MPJPE", "m", "the same, every frame aligned with scale",
+     joint_distance<Mode::frame>},
+    {"acc", "Acc", "m/frame²", "mean difference of joint accelerations",
+     joint_acceleration<Mode::none>},
+    {"pa_acc", "PA-Acc", "m/frame²", "the same, every frame aligned with scale",
+     joint_acceleration<Mode::frame>},
+    {"mpvd", "MPVD", "m", "mean vertex distance", vertex_distance<Mode::none>},
+    {"pa_mpvd", "PA-MPVD", "m", "the same, every frame aligned with scale",
+     vertex_distance<Mode::frame>},
+    {"medl", "MEDL", "mm", "mean difference of edge lengths, 6 nearest neighbours",
+     edge_lengths<NeighbourFrame::every>},
+    {"pmd", "PMD", "m²", "mean squared vertex distance", squared},
+    {"pmd_npt", "PMD (NPT)", "m²", "mean squared coordinate difference, boxes centred",
+     squared_npt},
+};
+
+constexpr Metric kVariants[] = {
+    {"mpjpe_root", "MPJPE, root", "m", "pelvis moved onto its true place in every frame",
+     joint_distance<Mode::root>},
+    {"pa_mpjpe_rigid", "PA-MPJPE, rigid", "m", "every frame aligned without scale",
+     joint_distance<Mode::frame, false>},
+    {"pa_mpjpe_sequence", "PA-MPJPE, sequence", "m", "one alignment of the sequence, with scale",
+     joint_distance<Mode::sequence>},
+    {"pa_mpjpe_sequence_rigid", "PA-MPJPE, sequence, rigid", "m",
+     "one alignment of the sequence, without scale", joint_distance<Mode::sequence, false>},
+    {"pa_acc_rigid", "PA-Acc, rigid", "m/frame²", "every frame aligned without scale",
+     joint_acceleration<Mode::frame, false>},
+    {"pa_acc_sequence", "PA-Acc, sequence", "m/frame²", "one alignment of the sequence, with scale",
+     joint_acceleration<Mode::sequence>},
+    {"pa_mpvd_rigid", "PA-MPVD, rigid", "m", "every frame aligned without scale",
+     vertex_distance<Mode::frame, false>},
+    {"pa_mpvd_sequence", "PA-MPVD, sequence", "m", "one alignment of the sequence, with scale",
+     vertex_distance<Mode::sequence>},
+    {"medl_first", "MEDL, first frame", "mm", "neighbours found in the first true frame only",
+     edge_lengths<NeighbourFrame::first>},
+};
+
+void check_pair(const Track& pred, const Track& truth, const char* what, size_t sequence) {
+  if (!pred.present() || !truth.present()) return;
+  if (pred.frames == truth.frames && pred.points == truth.points) return;
+  throw WorkError("evaluate: sequence " + std::to_string(sequence) +
+                  ": prediction and truth have " + std::to_string(pred.frames) + " x " +
+                  std::to_string(pred.points) + " and " + std::to_string(truth.frames) + " x " +
+                  std::to_string(truth.points) + " " + what);
+}
+
+}  // namespace
+
+std::span<const Metric> table() { return kTable; }
+std::span<const Metric> variants() { return kVariants; }
+
+Evaluation evaluate(std::span<const SequenceView> sequences, std::span<const Metric> metrics) {
+  Evaluation out;
+  for (const SequenceView& s : sequences) {
+    check_pair(s.pred_joints, s.true_joints, "joints", out.sequences.size());
+    check_pair(s.pred_vertices, s.true_vertices, "vertices", out.sequences.size());
+    Values& values = out.sequences.emplace_back();
+    for (const Metric& metric : metrics) values.push_back(metric.compute(s));
+  }
+  for (size_t m = 0; m < metrics.size(); ++m) {
+    double sum = 0;
+    int count = 0;
+    for (const Values& values : out.sequences)
+      if (values[m]) {
+        sum += *values[m];
+        ++count;
+      }
+    out.mean.push_back(count > 0 ? finite(sum / count) : std::nullopt);
+  }
+  return out;
+}
+
+}  // namespace restage::metrics

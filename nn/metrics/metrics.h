@@ -1,0 +1,115 @@
+// Metrics of retargeting (spec of the method, section 8) on plain float64 values, metres, no tape.
+// A metric that cannot be computed (no vertices, too few frames or points, a collapsed prediction
+// that Procrustes cannot scale, values that are not finite) is std::nullopt, never 0.
+// To add one: write a function of a SequenceView and give it a line in table() (metrics.cpp).
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace restage::metrics {
+
+/// Points over time, [frames, points, 3], row-major, metres. Does not own its memory.
+struct Track {
+  const double* data = nullptr;
+  int64_t frames = 0;
+  int64_t points = 0;
+
+  bool present() const { return data != nullptr; }
+  Eigen::Map<const Eigen::Vector3d> at(int64_t frame, int64_t point) const {
+    return Eigen::Map<const Eigen::Vector3d>(data + 3 * (frame * points + point));
+  }
+  /// Frames [begin, end) of this track; absent stays absent.
+  Track slice(int64_t begin, int64_t end) const;
+};
+
+/// One sequence: prediction beside ground truth. Either kind of points may be absent.
+struct SequenceView {
+  Track pred_joints, true_joints, pred_vertices, true_vertices;
+  int64_t frames = 0;
+};
+
+// ---- the definitions; each takes two tracks of equal shape -------------------------------------
+
+/// How a prediction is moved onto the ground truth before it is measured.
+struct Alignment {
+  enum class Mode {
+    none,
+    frame,     ///< one Procrustes map per frame (the papers' PA)
+    sequence,  ///< one Procrustes map for all frames
+    root,      ///< point 0 of every frame moved onto its true place
+  };
+  Mode mode = Mode::none;
+  bool scale = true;  ///< false: rigid
+};
+
+/// x -> linear * x + shift.
+struct Similarity {
+  Eigen::Matrix3d linear = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d shift = Eigen::Vector3d::Zero();
+};
+
+/// Best similarity (or rigid) map of `count` points [count, 3] onto others, reflections excluded.
+/// Not finite if all source points coincide (there is no scale) or a value is not finite.
+Similarity procrustes(const double* source, const double* target, int64_t count, bool scale);
+/// The map of every frame, as `how` says.
+std::vector<Similarity> align(const Track& pred, const Track& truth, const Alignment& how);
+
+using Value = std::optional<double>;
+
+/// Mean distance (MPJPE on joints, MPVD on vertices; PA-... with an alignment), metres.
+Value mean_distance(const Track& pred, const Track& truth, const Alignment& how = {});
+/// Mean distance of every point over the frames, metres (per-joint errors). Empty if no frames.
+std::vector<double> mean_distance_by_point(const Track& pred, const Track& truth,
+                                           const Alignment& how = {});
+/// Mean difference of second differences, metres per frame squared; needs 3 frames.
+Value acceleration_error(const Track& pred, const Track& truth, const Alignment& how = {});
+
+/// Where edge_length_difference looks for neighbours: anew in every true frame, or in the first.
+enum class NeighbourFrame { every, first };
+inline constexpr int kEdgeNeighbours = 6;
+/// MEDL: mean |edge length - true edge length| over the edges to the 6 nearest other points of the
+/// ground truth, millimetres; needs 7 points.
+Value edge_length_difference_mm(const Track& pred, const Track& truth,
+                                NeighbourFrame where = NeighbourFrame::every);
+/// The 6 nearest other points of every point, [count, 6], nearest first, ties to the lower index.
+/// `count` must be at least 7.
+std::vector<int32_t> nearest_neighbours(const double* points, int64_t count);
+
+/// LART equation 5: mean squared distance over frames and points, square metres.
+Value pmd(const Track& pred, const Track& truth);
+/// NPT's script: mean squared coordinate difference with bounding boxes centred, square metres.
+Value pmd_npt(const Track& pred, const Track& truth);
+
+// ---- the table ---------------------------------------------------------------------------------
+
+struct Metric {
+  const char* name;   ///< key in JSON
+  const char* title;  ///< heading in tables
+  const char* unit;
+  const char* help;
+  Value (*compute)(const SequenceView&);
+};
+
+/// The metrics of `restage eval`, in the order of its tables.
+std::span<const Metric> table();
+/// Further alignments of the same metrics (rigid, one map per sequence, root), for `--variants`.
+std::span<const Metric> variants();
+
+/// Values beside the metrics of a table, in its order.
+using Values = std::vector<Value>;
+struct Evaluation {
+  std::vector<Values> sequences;
+  Values mean;  ///< over the sequences that have a value, equal weight each
+};
+
+/// Computes all metrics of a table for every sequence. Same bits for any number of threads.
+/// Throws WorkError if prediction and truth of a sequence differ in shape.
+Evaluation evaluate(std::span<const SequenceView> sequences,
+                    std::span<const Metric> metrics = table());
+
+}  // namespace restage::metrics

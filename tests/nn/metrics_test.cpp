@@ -1,0 +1,172 @@
+// The oracle's values on small golden cases (metrics_golden.json, written by metrics_oracle.py) and
+// the behaviour at the edges of the definitions.
+#include "nn/metrics/metrics.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "autograd/base/error.h"
+#include "autograd/base/parallel.h"
+#include "autograd/base/rng.h"
+
+namespace restage::metrics {
+namespace {
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+struct Stored {
+  std::vector<double> values;
+  Track track;
+};
+
+Stored stored(const nlohmann::json& json) {
+  Stored out;
+  for (const auto& frame : json)
+    for (const auto& point : frame)
+      for (const auto& x : point) out.values.push_back(x.get<double>());
+  out.track = {out.values.data(), static_cast<int64_t>(json.size()),
+               static_cast<int64_t>(json.at(0).size())};
+  return out;
+}
+
+std::vector<double> noise(size_t count, uint64_t stream) {
+  std::vector<double> values(count);
+  Rng rng({11, stream});
+  for (double& x : values) x = rng.normal();
+  return values;
+}
+
+TEST(Metrics, AgreeWithTheOracle) {
+  std::ifstream file(std::string(RESTAGE_SOURCE_DIR) + "/tests/nn/metrics_golden.json");
+  const auto cases = nlohmann::json::parse(file);
+  ASSERT_EQ(cases.size(), 6u);
+  for (const auto& c : cases) {
+    const Stored pj = stored(c["pred_joints"]), gj = stored(c["true_joints"]),
+                 pv = stored(c["pred_vertices"]), gv = stored(c["true_vertices"]);
+    const SequenceView view{pj.track, gj.track, pv.track, gv.track, pj.track.frames};
+    for (const auto metrics : {table(), variants()})
+      for (const Metric& metric : metrics) {
+        const Value got = metric.compute(view);
+        const auto& want = c["values"].at(metric.name);
+        SCOPED_TRACE(c["name"].get<std::string>() + " " + metric.name);
+        ASSERT_EQ(got.has_value(), !want.is_null());
+        if (got) {
+          EXPECT_NEAR(*got, want.get<double>(), 1e-9);
+        }
+      }
+  }
+}
+
+TEST(Metrics, WhatCannotBeComputedHasNoValue) {
+  const auto a = noise(2 * 6 * 3, 1), b = noise(2 * 6 * 3, 2);
+  const Track x{a.data(), 2, 6}, y{b.data(), 2, 6}, absent;
+  EXPECT_TRUE(mean_distance(x, y));
+  EXPECT_FALSE(mean_distance(x, absent));
+  EXPECT_FALSE(mean_distance(absent, y));
+  EXPECT_FALSE(acceleration_error(x, y)) << "two frames";
+  EXPECT_FALSE(edge_length_difference_mm(x, y)) << "six points";
+  EXPECT_FALSE(mean_distance(x.slice(0, 0), y.slice(0, 0))) << "no frames";
+  const std::vector<double> collapsed(2 * 6 * 3, 0.5);
+  EXPECT_FALSE(mean_distance({collapsed.data(), 2, 6}, y, {Alignment::Mode::frame}));
+  EXPECT_TRUE(mean_distance({collapsed.data(), 2, 6}, y, {Alignment::Mode::frame, false}));
+}
+
+TEST(Metrics, ValuesThatAreNotFiniteGiveNoValueAndNoCrash) {
+  const auto a = noise(4 * 30 * 3, 3);
+  for (const double bad : {kNaN, HUGE_VAL, 1e200}) {
+    auto b = noise(4 * 30 * 3, 4);
+    b[17] = bad;
+    const Track x{a.data(), 4, 30}, y{b.data(), 4, 30};
+    const SequenceView forward{x, y, x, y, 4}, backward{y, x, y, x, 4};
+    for (const Metric& metric : table())
+      for (const SequenceView* view : {&forward, &backward}) {
+        const Value value = metric.compute(*view);
+        EXPECT_TRUE(!value || std::isfinite(*value)) << metric.name << " " << bad;
+      }
+  }
+}
+
+TEST(Metrics, ProcrustesFindsTheMapAndExcludesReflections) {
+  const auto a = noise(22 * 3, 5);
+  const Eigen::Matrix3d turn =
+      Eigen::AngleAxisd(1.1, Eigen::Vector3d(1, 2, -1).normalized()).toRotationMatrix();
+  std::vector<double> b(a.size()), mirrored(a);
+  for (size_t i = 0; i < 22; ++i) {
+    Eigen::Map<Eigen::Vector3d> moved(&b[3 * i]);
+    moved = 0.7 * turn * Eigen::Map<const Eigen::Vector3d>(&a[3 * i]) + Eigen::Vector3d(1, 2, 3);
+    mirrored[3 * i] *= -1;
+  }
+  const Similarity map = procrustes(a.data(), b.data(), 22, true);
+  EXPECT_LT((map.linear - 0.7 * turn).norm(), 1e-12);
+  EXPECT_LT((map.shift - Eigen::Vector3d(1, 2, 3)).norm(), 1e-12);
+  const Similarity other = procrustes(a.data(), mirrored.data(), 22, false);
+  EXPECT_NEAR(other.linear.determinant(), 1.0, 1e-12);
+}
+
+TEST(Metrics, NeighboursAreExactAndTiesGoToTheLowerIndex) {
+  std::vector<double> grid;  // 5 x 5 x 5, full of ties
+  for (int x = 0; x < 5; ++x)
+    for (int y = 0; y < 5; ++y)
+      for (int z = 0; z < 5; ++z) grid.insert(grid.end(), {double(x), double(y), double(z)});
+  for (const auto& points : {grid, noise(500 * 3, 6), std::vector<double>(40 * 3, 0.25)}) {
+    const auto count = static_cast<int64_t>(points.size() / 3);
+    const auto near = nearest_neighbours(points.data(), count);
+    ASSERT_EQ(near.size(), static_cast<size_t>(count * kEdgeNeighbours));
+    const Track track{points.data(), 1, count};
+    for (int64_t i = 0; i < count; ++i) {
+      std::vector<std::pair<double, int64_t>> all;
+      for (int64_t j = 0; j < count; ++j)
+        if (j != i) all.emplace_back((track.at(0, i) - track.at(0, j)).squaredNorm(), j);
+      std::sort(all.begin(), all.end());
+      for (size_t k = 0; k < kEdgeNeighbours; ++k)
+        ASSERT_EQ(near[static_cast<size_t>(i) * kEdgeNeighbours + k], all[k].second) << i;
+    }
+  }
+}
+
+TEST(Metrics, MeanLeavesOutSequencesWithoutAValue) {
+  const auto a = noise(7 * 22 * 3, 7), b = noise(7 * 22 * 3, 8);
+  const Track x{a.data(), 7, 22}, y{b.data(), 7, 22};
+  std::vector<SequenceView> views(2);
+  views[0] = {x.slice(0, 2), y.slice(0, 2), {}, {}, 2};
+  views[1] = {x.slice(2, 7), y.slice(2, 7), {}, {}, 5};
+  const Evaluation all = evaluate(views);
+  EXPECT_DOUBLE_EQ(*all.mean[0], (*all.sequences[0][0] + *all.sequences[1][0]) / 2);
+  EXPECT_FALSE(all.sequences[0][2]) << "acc of two frames";
+  EXPECT_EQ(*all.mean[2], *all.sequences[1][2]);
+  EXPECT_FALSE(all.mean[4]) << "no vertices";
+  views[1].true_joints = y.slice(0, 4);
+  EXPECT_THROW(evaluate(views), WorkError);
+}
+
+TEST(Metrics, SameBitsForAnyNumberOfThreads) {
+  const auto a = noise(9 * 50 * 3, 9), b = noise(9 * 50 * 3, 10);
+  const Track x{a.data(), 9, 50}, y{b.data(), 9, 50};
+  const std::vector<SequenceView> views{{x, y, x, y, 9}};
+  set_threads(1);
+  const Values one = evaluate(views).mean;
+  for (const int n : {2, 3}) {
+    set_threads(n);
+    EXPECT_EQ(evaluate(views).mean, one) << n << " threads";
+  }
+  set_threads(0);
+}
+
+TEST(Metrics, ErrorsByPointAverageToTheMeanDistance) {
+  const auto a = noise(5 * 22 * 3, 12), b = noise(5 * 22 * 3, 13);
+  const Track x{a.data(), 5, 22}, y{b.data(), 5, 22};
+  const auto each = mean_distance_by_point(x, y, {Alignment::Mode::frame});
+  ASSERT_EQ(each.size(), 22u);
+  double mean = 0;
+  for (const double e : each) mean += e / 22;
+  EXPECT_NEAR(mean, *mean_distance(x, y, {Alignment::Mode::frame}), 1e-12);
+}
+
+}  // namespace
+}  // namespace restage::metrics
