@@ -1,0 +1,129 @@
+#include "datasets/builtin/bodies.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "autograd/base/error.h"
+#include "autograd/base/parallel.h"
+#include "datasets/builtin/body_shape.h"
+#include "datasets/builtin/body_weights.h"
+#include "datasets/builtin/surface_nets.h"
+
+namespace restage {
+namespace {
+
+struct Stretch {
+  double end, spacing;  // grid lines every `spacing` up to `end`
+};
+
+std::vector<double> lines(double start, const std::vector<Stretch>& stretches) {
+  std::vector<double> out = {start};
+  for (const Stretch& s : stretches) {
+    const int steps = std::max(1, static_cast<int>(std::lround((s.end - out.back()) / s.spacing)));
+    const double from = out.back();
+    for (int i = 1; i <= steps; ++i) out.push_back(from + (s.end - from) * i / steps);
+  }
+  return out;
+}
+
+// Fine where there is detail: hands, face, feet. Symmetric in x, with a line at 0.
+GridLines grid_of(const BodyShape& s) {
+  const double wrist = wrist_x(s), arm = map_height(s, .805), chin = map_height(s, .86);
+  GridLines g;
+  const std::vector<double> half = lines(0, {{.056, .0090},
+                                             {shoulder_x(s), .0129},
+                                             {wrist - .02, .0185},
+                                             {wrist + .14 * s.hands, .0087}});
+  for (size_t i = half.size(); i-- > 1;) g[0].push_back(-half[i]);
+  g[0].insert(g[0].end(), half.begin(), half.end());
+  g[1] = lines(-.025, {{.055, .0101},
+                       {map_height(s, .45), .0213},
+                       {arm - .045, .0168},
+                       {arm + .035, .0095},
+                       {chin, .0106},
+                       {1.02, .0087}});
+  g[2] = lines(-.19, {{.23, .0114}});
+  return g;
+}
+
+// Evens out the triangles: slides vertices towards their neighbours' mean and back to the surface.
+void relax(const ImplicitSurface& surface, double longest, SurfaceMesh& mesh) {
+  const auto neighbours = vertex_neighbours(mesh.vertices.size(), mesh.faces);
+  std::vector<Vec3> next(mesh.vertices.size());
+  for (int round = 0; round < 4; ++round) {
+    for (size_t v = 0; v < next.size(); ++v) {
+      Vec3 mean = Vec3::Zero();
+      for (const int32_t u : neighbours[v]) mean += mesh.vertices[u];
+      const Vec3 p = mesh.vertices[v] +
+                     0.5 * (mean / static_cast<double>(neighbours[v].size()) - mesh.vertices[v]);
+      const Vec3 g = surface.gradient(p);
+      const double d = surface(p), slope = std::max(g.squaredNorm(), 0.25);
+      Vec3 move = -d / slope * g;
+      if (move.norm() > longest) move *= longest / move.norm();
+      next[v] = p + move;
+    }
+    mesh.vertices.swap(next);
+  }
+}
+
+RngKey body_key(uint64_t seed, const std::string& split, int index) {
+  return RngKey{seed, 0}.fold("builtin.body").fold(split).fold(static_cast<uint64_t>(index));
+}
+
+}  // namespace
+
+Body builtin_body(uint64_t seed, const std::string& split, int index) {
+  if (split != "train" && split != "validation" && split != "test")
+    throw InputError("builtin bodies", "unknown split \"" + split + "\"",
+                     "use train, validation or test");
+  if (index < 0)
+    throw InputError("builtin bodies", "negative body number " + std::to_string(index),
+                     "count from 0");
+  const BodyShape shape = draw_body_shape(body_key(seed, split, index));
+  const ImplicitSurface surface = shape_surface(shape);
+  SurfaceMesh mesh = surface_nets([&](const Vec3& p) { return surface(p); }, grid_of(shape));
+  relax(surface, .01, mesh);
+
+  Body body;
+  body.id = "builtin_" + split + "_" + std::to_string(index);
+  body.split = split;
+  body.weights = shape_weights(shape, mesh);
+  double lo = 1e9, hi = -1e9;
+  for (const Vec3& v : mesh.vertices) {
+    lo = std::min(lo, v.y());
+    hi = std::max(hi, v.y());
+  }
+  const double scale = shape.height / (hi - lo);
+  const auto place = [&](const Vec3& p) { return Vec3(scale * (p - Vec3(0, lo, 0))); };
+  for (const Vec3& v : mesh.vertices) body.rest.vertices.push_back(place(v).cast<float>());
+  body.rest.faces = std::move(mesh.faces);
+  body.joints = shape_joints(shape);
+  for (Vec3& j : body.joints) j = place(j);
+  return body;
+}
+
+std::vector<Body> builtin_bodies(uint64_t seed, int train, int validation, int test) {
+  if (train < 0 || validation < 0 || test < 0)
+    throw InputError("builtin bodies", "a negative count", "ask for 0 or more bodies per split");
+  std::vector<Body> out(static_cast<size_t>(train) + validation + test);
+  parallel_for(static_cast<int64_t>(out.size()), 1, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) {
+      if (i < train)
+        out[i] = builtin_body(seed, "train", static_cast<int>(i));
+      else if (i < train + validation)
+        out[i] = builtin_body(seed, "validation", static_cast<int>(i - train));
+      else
+        out[i] = builtin_body(seed, "test", static_cast<int>(i - train - validation));
+    }
+  });
+  return out;
+}
+
+Joints builtin_rest_joints() {
+  const BodyShape average;
+  Joints joints = shape_joints(average);
+  for (Vec3& j : joints) j *= average.height;
+  return joints;
+}
+
+}  // namespace restage

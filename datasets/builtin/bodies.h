@@ -1,0 +1,27 @@
+// The built-in bodies: parametric people, no data needed. 22 joints, one closed surface, skinning
+// weights. Every body is a function of (seed, split, number in the split) alone, so asking for more
+// bodies never changes the others, and no body is in two splits.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "nn/geometry/body.h"
+
+namespace restage {
+
+/// Body `index` of a split ("train", "validation", "test"; else InputError). T-pose facing +z, left
+/// = +x, arms along x, lowest vertex at y = 0, 1.45 to 2.0 m high, about 5,000 vertices. The
+/// surface is closed and oriented (counter-clockwise from outside); weights: at most 4 joints per
+/// vertex.
+Body builtin_body(uint64_t seed, const std::string& split, int index);
+
+/// `train` + `validation` + `test` bodies, in this order. Built in parallel. Counts must not be
+/// negative (InputError).
+std::vector<Body> builtin_bodies(uint64_t seed, int train, int validation, int test);
+
+/// Rest joints of the average built-in body in metres: the skeleton of the built-in motions.
+Joints builtin_rest_joints();
+
+}  // namespace restage
