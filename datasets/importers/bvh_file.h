@@ -1,0 +1,33 @@
+// The BVH file format: a hierarchy and a table of channel values, as written in the file.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "datasets/importers/source_motion.h"
+
+namespace restage {
+
+enum class Channel { x_position, y_position, z_position, x_rotation, y_rotation, z_rotation };
+
+struct BvhFile {
+  SourceSkeleton skeleton;                     ///< file units; the root keeps its OFFSET
+  std::vector<std::vector<Channel>> channels;  ///< per joint, in the file's order
+  std::vector<size_t> first_channel;           ///< per joint
+  size_t channel_count = 0;
+  double frame_time = 0;                    ///< seconds
+  std::vector<std::vector<double>> frames;  ///< channel_count values each; degrees, file units
+};
+
+/// Parses the text of a BVH file; `path` is for messages. Any joint order, any channel order.
+/// InputError with file:line for anything that is not BVH, not finite, or of the wrong count.
+BvhFile parse_bvh(std::string_view text, const std::string& path);
+
+/// The text of a .bvh or a .bvh.xz file (at most 1 GiB unpacked).
+std::string read_bvh_text(const std::string& path);
+
+/// Rotations and translations of all frames; translations only of joints down to `hips`.
+SourceMotion bvh_motion(const BvhFile& file, int hips);
+
+}  // namespace restage
