@@ -17,8 +17,10 @@ namespace {
 [[noreturn]] void fail(const std::string& target, int code) {
   const std::string why = std::strerror(code);
   if (code == ENOENT || code == ENOTDIR || code == EACCES || code == EISDIR || code == EROFS)
-    throw InputError(target, "cannot be written (" + why + ")", "give a path in a folder you can write to");
-  throw WorkError(target + ": could not be written (" + why + "); free some space and run it again");
+    throw InputError(target, "cannot be written (" + why + ")",
+                     "give a path in a folder you can write to");
+  throw WorkError(target + ": could not be written (" + why +
+                  "); free some space and run it again");
 }
 
 void sync_path(const std::string& path, const std::string& target, int flags) {
@@ -65,15 +67,18 @@ void write_file_atomically(const std::string& target, std::string_view content) 
 }
 
 std::string read_file(const std::string& path, uint64_t limit) {
-  struct stat info{};
+  struct stat info {};
   if (::stat(path.c_str(), &info) != 0)
-    throw InputError(path, std::string("cannot be read (") + std::strerror(errno) + ")", "check the path");
+    throw InputError(path, std::string("cannot be read (") + std::strerror(errno) + ")",
+                     "check the path");
   if (S_ISDIR(info.st_mode)) throw InputError(path, "is a folder, not a file", "give a file");
   if (static_cast<uint64_t>(info.st_size) > limit)
-    throw InputError(path, "is too large (" + std::to_string(info.st_size) + " bytes)", "give a smaller file");
+    throw InputError(path, "is too large (" + std::to_string(info.st_size) + " bytes)",
+                     "give a smaller file");
   std::FILE* in = std::fopen(path.c_str(), "rb");
   if (in == nullptr)
-    throw InputError(path, std::string("cannot be read (") + std::strerror(errno) + ")", "check the path");
+    throw InputError(path, std::string("cannot be read (") + std::strerror(errno) + ")",
+                     "check the path");
   std::string content;
   char buffer[65536];
   size_t got = 0;

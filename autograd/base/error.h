@@ -9,7 +9,8 @@ namespace restage {
 /// Base of all errors of this project; `exit_code` is what the command line returns for it.
 class Error : public std::runtime_error {
  public:
-  explicit Error(const std::string& what, int code = 1) : std::runtime_error(what), exit_code(code) {}
+  explicit Error(const std::string& what, int code = 1)
+      : std::runtime_error(what), exit_code(code) {}
   int exit_code;
 };
 

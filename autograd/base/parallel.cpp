@@ -28,9 +28,7 @@ void set_threads(int n) {
   arena = std::make_unique<tbb::task_arena>(n);
 }
 
-int threads() {
-  return requested > 0 ? requested : tbb::this_task_arena::max_concurrency();
-}
+int threads() { return requested > 0 ? requested : tbb::this_task_arena::max_concurrency(); }
 
 void parallel_for(int64_t n, int64_t grain, const std::function<void(int64_t, int64_t)>& body) {
   if (n <= 0) return;
@@ -41,7 +39,9 @@ void parallel_for(int64_t n, int64_t grain, const std::function<void(int64_t, in
     for (int64_t i = 0; i < pieces; ++i) piece(i);
     return;
   }
-  const auto work = [&] { tbb::parallel_for(int64_t{0}, pieces, piece, tbb::simple_partitioner()); };
+  const auto work = [&] {
+    tbb::parallel_for(int64_t{0}, pieces, piece, tbb::simple_partitioner());
+  };
   if (arena) {
     arena->execute(work);
   } else {

@@ -1,0 +1,52 @@
+// Every kernel of the CPU backend; backend.cpp enters them into its table.
+#pragma once
+
+#include "autograd/kernels/elementwise.h"
+#include "autograd/kernels/layout.h"
+#include "autograd/kernels/matmul.h"
+#include "autograd/kernels/norm.h"
+#include "autograd/kernels/points.h"
+#include "autograd/kernels/reduce.h"
+#include "autograd/kernels/rnn.h"
+#include "autograd/kernels/rotation.h"
+#include "autograd/kernels/update.h"
+
+namespace restage::cpu {
+
+void unary(const UnaryArgs&);
+void unary_grad(const UnaryGradArgs&);
+void binary(const BinaryArgs&);
+void accumulate(const AccumulateArgs&);
+void dropout(const DropoutArgs&);
+void expand(const ExpandArgs&);
+void non_finite(const NonFiniteArgs&);
+void sum(const SumArgs&);
+void max(const MaxArgs&);
+void max_grad(const MaxGradArgs&);
+void softmax(const SoftmaxArgs&);
+void softmax_grad(const SoftmaxGradArgs&);
+void matmul(const MatmulArgs&);
+void copy_blocks(const CopyBlocksArgs&);
+void permute(const PermuteArgs&);
+void gather(const GatherArgs&);
+void scatter_add(const ScatterAddArgs&);
+void unfold(const UnfoldArgs&);
+void fold(const FoldArgs&);
+void norm(const NormArgs&);
+void norm_grad(const NormGradArgs&);
+void gru_cell(const GruCellArgs&);
+void gru_cell_grad(const GruCellGradArgs&);
+void knn(const KnnArgs&);
+void fps(const FpsArgs&);
+void attention_pool(const AttentionPoolArgs&);
+void attention_pool_grad(const AttentionPoolGradArgs&);
+void to_matrix(const ToMatrixArgs&);
+void to_matrix_grad(const ToMatrixGradArgs&);
+void from_matrix(const FromMatrixArgs&);
+void fk(const FkArgs&);
+void fk_grad(const FkGradArgs&);
+void lbs(const LbsArgs&);
+void lbs_grad(const LbsGradArgs&);
+void adam(const AdamArgs&);
+
+}  // namespace restage::cpu

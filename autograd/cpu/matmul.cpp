@@ -1,0 +1,239 @@
+// Packed, register-tiled matrix product. Output tiles go to threads; the sum over k stays in one
+// thread and in one order.
+#include <algorithm>
+#include <vector>
+
+#include "autograd/cpu/common.h"
+#include "autograd/cpu/kernels.h"
+
+namespace restage::cpu {
+namespace {
+
+#if defined(__AVX512F__)
+constexpr int kVectorBytes = 64;
+constexpr int kRows = 12;
+#else
+constexpr int kVectorBytes = 32;
+constexpr int kRows = 6;
+#endif
+constexpr int kVectors = 2;
+constexpr int64_t kDepth = 256;     // k per packed block
+constexpr int64_t kTileRows = 288;  // multiple of kRows
+constexpr int64_t kTileCols = 512;  // multiple of every kCols
+
+template <class T>
+struct Simd {
+  typedef T Vector __attribute__((vector_size(kVectorBytes), aligned(alignof(T)), may_alias));
+  static constexpr int width = kVectorBytes / static_cast<int>(sizeof(T));
+  static constexpr int cols = width * kVectors;
+};
+
+/// A matrix with free strides.
+template <class T>
+struct Strided {
+  const T* data;
+  int64_t row, col;
+  const T& at(int64_t i, int64_t j) const { return data[i * row + j * col]; }
+};
+
+/// Panels of kRows rows, k-major inside, zero-padded.
+template <class T>
+void pack_a(const Strided<T>& a, int64_t m, int64_t k, T* out) {
+  for (int64_t i0 = 0; i0 < m; i0 += kRows) {
+    const int64_t rows = std::min<int64_t>(kRows, m - i0);
+    if (rows == kRows && a.col == 1) {
+      const T* p = a.data + i0 * a.row;
+      for (int64_t l = 0; l < k; ++l)
+        for (int i = 0; i < kRows; ++i) out[l * kRows + i] = p[i * a.row + l];
+    } else if (rows == kRows && a.row == 1) {
+      for (int64_t l = 0; l < k; ++l) std::copy_n(a.data + i0 + l * a.col, kRows, out + l * kRows);
+    } else {
+      for (int64_t l = 0; l < k; ++l)
+        for (int i = 0; i < kRows; ++i) out[l * kRows + i] = i < rows ? a.at(i0 + i, l) : T(0);
+    }
+    out += k * kRows;
+  }
+}
+
+/// Panels of `cols` columns, k-major inside, zero-padded.
+template <class T>
+void pack_b(const Strided<T>& b, int64_t k, int64_t n, T* out) {
+  constexpr int cols = Simd<T>::cols;
+  for (int64_t j0 = 0; j0 < n; j0 += cols) {
+    const int64_t width = std::min<int64_t>(cols, n - j0);
+    if (width == cols && b.col == 1) {
+      for (int64_t l = 0; l < k; ++l) std::copy_n(b.data + l * b.row + j0, cols, out + l * cols);
+    } else if (width == cols && b.row == 1) {
+      constexpr int64_t block = 16;  // columns of memory at a time: whole cache lines of both sides
+      for (int64_t l0 = 0; l0 < k; l0 += block)
+        for (int j = 0; j < cols; ++j) {
+          const T* p = b.data + (j0 + j) * b.col + l0;
+          for (int64_t l = 0; l < std::min(block, k - l0); ++l) out[(l0 + l) * cols + j] = p[l];
+        }
+    } else {
+      for (int64_t l = 0; l < k; ++l)
+        for (int j = 0; j < cols; ++j) out[l * cols + j] = j < width ? b.at(l, j0 + j) : T(0);
+    }
+    out += k * cols;
+  }
+}
+
+template <class T>
+void multiply(int64_t k, const T* a, const T* b, T* out) {
+  using V = typename Simd<T>::Vector;
+  constexpr int width = Simd<T>::width;
+  V acc[kRows][kVectors] = {};
+  for (int64_t l = 0; l < k; ++l) {
+    V bv[kVectors];
+#pragma GCC unroll 2
+    for (int v = 0; v < kVectors; ++v) bv[v] = *reinterpret_cast<const V*>(b + v * width);
+#pragma GCC unroll 12
+    for (int i = 0; i < kRows; ++i) {
+#pragma GCC unroll 2
+      for (int v = 0; v < kVectors; ++v) acc[i][v] += a[i] * bv[v];
+    }
+    a += kRows;
+    b += Simd<T>::cols;
+  }
+#pragma GCC unroll 12
+  for (int i = 0; i < kRows; ++i) {
+#pragma GCC unroll 2
+    for (int v = 0; v < kVectors; ++v)
+      *reinterpret_cast<V*>(out + i * Simd<T>::cols + v * width) = acc[i][v];
+  }
+}
+
+template <class T>
+struct Product {
+  Strided<T> a, b;
+  T* out;
+  int64_t m, n, k;
+  const T* bias;
+  Activation activation;
+  bool accumulate;
+};
+
+/// Writes a computed register tile: the first block of k overwrites (unless accumulating), later
+/// ones add; the last one applies bias and activation.
+template <class T>
+void store(const Product<T>& p, const T* tile, int64_t i0, int64_t j0, bool first, bool last) {
+  constexpr int cols = Simd<T>::cols;
+  const int64_t rows = std::min<int64_t>(kRows, p.m - i0),
+                width = std::min<int64_t>(cols, p.n - j0);
+  const bool add = !first || p.accumulate;
+  for (int64_t i = 0; i < rows; ++i) {
+    T* c = p.out + (i0 + i) * p.n + j0;
+    const T* t = tile + i * cols;
+    if (add) {
+      for (int64_t j = 0; j < width; ++j) c[j] += t[j];
+    } else {
+      for (int64_t j = 0; j < width; ++j) c[j] = t[j];
+    }
+    if (!last) continue;
+    if (p.bias)
+      for (int64_t j = 0; j < width; ++j) c[j] += p.bias[j0 + j];
+    if (p.activation == Activation::relu)
+      for (int64_t j = 0; j < width; ++j) c[j] = c[j] > T(0) ? c[j] : T(0);
+  }
+}
+
+/// Per-thread packing memory, kept between calls.
+template <class T>
+T* workspace(int which, int64_t count) {
+  thread_local std::vector<T> memory[2];
+  auto& buffer = memory[which];
+  if (static_cast<int64_t>(buffer.size()) < count) buffer.resize(static_cast<size_t>(count));
+  return buffer.data();
+}
+
+template <class T>
+void tile(const Product<T>& p, int64_t i0, int64_t i1, int64_t j0, int64_t j1) {
+  constexpr int cols = Simd<T>::cols;
+  const int64_t depth = std::min(kDepth, p.k);
+  const int64_t row_panels = (i1 - i0 + kRows - 1) / kRows,
+                col_panels = (j1 - j0 + cols - 1) / cols;
+  T* pa = workspace<T>(0, row_panels * kRows * depth);
+  T* pb = workspace<T>(1, col_panels * cols * depth);
+  T result[kRows * Simd<T>::cols];
+  for (int64_t l0 = 0; l0 < p.k; l0 += kDepth) {
+    const int64_t l = std::min(kDepth, p.k - l0);
+    pack_a<T>({&p.a.at(i0, l0), p.a.row, p.a.col}, i1 - i0, l, pa);
+    pack_b<T>({&p.b.at(l0, j0), p.b.row, p.b.col}, l, j1 - j0, pb);
+    for (int64_t jp = 0; jp < col_panels; ++jp) {
+      for (int64_t ip = 0; ip < row_panels; ++ip) {
+        multiply<T>(l, pa + ip * kRows * l, pb + jp * cols * l, result);
+        store(p, result, i0 + ip * kRows, j0 + jp * cols, l0 == 0, l0 + l == p.k);
+      }
+    }
+  }
+}
+
+/// Nothing to add up: the product is zero.
+template <class T>
+void empty_sum(const Product<T>& p) {
+  for (int64_t i = 0; i < p.m; ++i)
+    for (int64_t j = 0; j < p.n; ++j) {
+      T& c = p.out[i * p.n + j];
+      c = (p.accumulate ? c : T(0)) + (p.bias ? p.bias[j] : T(0));
+      if (p.activation == Activation::relu && !(c > T(0))) c = 0;
+    }
+}
+
+/// Tile sizes follow from the shape alone; small products are cut finer to have pieces to share.
+int64_t tile_rows(int64_t m, int64_t n) {
+  int64_t rows = kTileRows;
+  const int64_t col_tiles = (n + kTileCols - 1) / kTileCols;
+  while (rows > 4 * kRows && (m + rows - 1) / rows * col_tiles < 8) rows /= 2;
+  return std::max<int64_t>(kRows, rows / kRows * kRows);
+}
+
+int64_t tile_cols(int64_t m, int64_t n) {
+  int64_t cols = kTileCols;
+  while (cols > 128 && m < 2 * kTileRows && (n + cols - 1) / cols < 8) cols /= 2;
+  return cols;
+}
+
+template <class T>
+void run(const MatmulArgs& args) {
+  const int ra = args.a.rank(), rb = args.b.rank(), ro = args.out.rank();
+  const int64_t m = args.out.size(ro - 2), n = args.out.size(ro - 1);
+  const int64_t k = args.a.size(args.transpose_a ? ra - 2 : ra - 1);
+  const int64_t batch = args.out.shape().product(0, ro - 2);
+  const int64_t step_a = ra > 2 ? m * k : 0, step_b = rb > 2 ? n * k : 0;
+  const int64_t tr = tile_rows(m, n), tc = tile_cols(m, n);
+  const int64_t row_tiles = (m + tr - 1) / tr, col_tiles = (n + tc - 1) / tc;
+  const int64_t tiles = row_tiles * col_tiles;
+  if (m == 0 || n == 0 || batch == 0) return;
+  const T* a = args.a.data<T>();
+  const T* b = args.b.data<T>();
+  T* out = args.out.data<T>();
+  const int64_t work = 2 * std::min(tr, m) * std::min(tc, n) * std::max<int64_t>(k, 1);
+  const int64_t grain = std::max<int64_t>(1, (1 << 18) / work);
+  parallel_for(batch * tiles, grain, [&](int64_t from, int64_t to) {
+    for (int64_t t = from; t < to; ++t) {
+      const int64_t bi = t / tiles, ti = t % tiles / col_tiles, tj = t % col_tiles;
+      const Product<T> p{{a + bi * step_a, args.transpose_a ? 1 : k, args.transpose_a ? m : 1},
+                         {b + bi * step_b, args.transpose_b ? 1 : n, args.transpose_b ? k : 1},
+                         out + bi * m * n,
+                         m,
+                         n,
+                         k,
+                         args.bias ? args.bias->data<T>() : nullptr,
+                         args.activation,
+                         args.accumulate};
+      if (k == 0) {
+        if (ti == 0 && tj == 0) empty_sum(p);
+        continue;
+      }
+      tile(p, ti * tr, std::min(m, (ti + 1) * tr), tj * tc, std::min(n, (tj + 1) * tc));
+    }
+  });
+}
+
+}  // namespace
+
+void matmul(const MatmulArgs& args) {
+  dispatch(args.out.dtype(), [&](auto zero) { run<decltype(zero)>(args); });
+}
+
+}  // namespace restage::cpu

@@ -1,0 +1,79 @@
+// Element-wise kernels. f32 and f64. No output may alias an input unless said so.
+#pragma once
+
+#include "autograd/base/rng.h"
+#include "autograd/kernels/kernel.h"
+
+namespace restage {
+
+enum class Unary {
+  neg,
+  exp,
+  log,
+  sqrt,
+  square,
+  abs,
+  sigmoid,
+  tanh,
+  relu,
+  leaky_relu,
+  softplus,
+  scale,
+  add_scalar
+};
+/// out = f(x); `alpha` is the slope of leaky_relu, the factor of scale, the addend of add_scalar.
+struct UnaryArgs {
+  static constexpr std::string_view name = "unary";
+  Unary op;
+  const Tensor& x;
+  Tensor& out;
+  double alpha = 0;
+};
+/// out = gy * f'(x), with y = f(x) given. At kinks (relu, abs at 0) the derivative is 0.
+struct UnaryGradArgs {
+  static constexpr std::string_view name = "unary_grad";
+  Unary op;
+  const Tensor& x;
+  const Tensor& y;
+  const Tensor& gy;
+  Tensor& out;
+  double alpha = 0;
+};
+
+enum class Binary { add, sub, mul, div };
+/// out = f(a, b), numpy broadcasting; out has the broadcast shape.
+struct BinaryArgs {
+  static constexpr std::string_view name = "binary";
+  Binary op;
+  const Tensor& a;
+  const Tensor& b;
+  Tensor& out;
+};
+/// out += a (same shape): accumulation of gradients.
+struct AccumulateArgs {
+  static constexpr std::string_view name = "accumulate";
+  const Tensor& a;
+  Tensor& out;
+};
+/// out[i] = keep(i) ? x[i] / (1 - p) : 0, keep a function of (key, i) (see rng.h).
+struct DropoutArgs {
+  static constexpr std::string_view name = "dropout";
+  const Tensor& x;
+  Tensor& out;
+  double p;
+  RngKey key;
+};
+/// out = x repeated to out's shape (numpy broadcasting).
+struct ExpandArgs {
+  static constexpr std::string_view name = "expand";
+  const Tensor& x;
+  Tensor& out;
+};
+/// out[0] = 1 if any element of x is NaN or infinite, else 0.
+struct NonFiniteArgs {
+  static constexpr std::string_view name = "non_finite";
+  const Tensor& x;
+  Tensor& out;
+};
+
+}  // namespace restage

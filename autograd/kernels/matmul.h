@@ -1,0 +1,25 @@
+// Matrix products. Each output element is one chain of multiply-adds over k in order (per block of
+// k), whatever its position, so results do not depend on threads or on the other rows of a batch.
+#pragma once
+
+#include "autograd/kernels/kernel.h"
+
+namespace restage {
+
+enum class Activation { none, relu };
+
+/// out[b] = act(op(a[b]) op(bm[b]) + bias) (+ out if accumulate); a [batch?, m, k], bm [batch?, k,
+/// n], both transposed on request; a matrix without batch axis is shared. bias [n] or null.
+struct MatmulArgs {
+  static constexpr std::string_view name = "matmul";
+  const Tensor& a;
+  const Tensor& b;
+  Tensor& out;
+  bool transpose_a = false;
+  bool transpose_b = false;
+  const Tensor* bias = nullptr;
+  Activation activation = Activation::none;
+  bool accumulate = false;
+};
+
+}  // namespace restage

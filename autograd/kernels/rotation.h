@@ -1,0 +1,77 @@
+// Rotations and skeletons. Conversions work on rows; spec 3.4, 3.5, 5.2. f32 and f64.
+#pragma once
+
+#include <span>
+
+#include "autograd/kernels/kernel.h"
+
+namespace restage {
+
+enum class RotationForm { sixd, quaternion, axis_angle };
+
+/// x [n, 6 | 4 | 3] -> out [n, 9] (row-major 3x3).
+struct ToMatrixArgs {
+  static constexpr std::string_view name = "to_matrix";
+  RotationForm form;
+  const Tensor& x;
+  Tensor& out;
+};
+struct ToMatrixGradArgs {
+  static constexpr std::string_view name = "to_matrix_grad";
+  RotationForm form;
+  const Tensor& x;
+  const Tensor& gy;
+  Tensor& out;
+};
+/// x [n, 9] -> out [n, 4] (w >= 0) or [n, 3] (angle in [0, pi]). No gradient.
+struct FromMatrixArgs {
+  static constexpr std::string_view name = "from_matrix";
+  RotationForm form;
+  const Tensor& x;
+  Tensor& out;
+};
+/// local [n, j, 9], rest [n, j, 3], root [n, 3] -> out [n, j, 12] = rows of [G | P].
+struct FkArgs {
+  static constexpr std::string_view name = "fk";
+  const Tensor& local;
+  const Tensor& rest;
+  const Tensor& root;
+  std::span<const int> parents;
+  Tensor& out;
+};
+/// out is the gradient of local.
+struct FkGradArgs {
+  static constexpr std::string_view name = "fk_grad";
+  const Tensor& local;
+  const Tensor& rest;
+  const Tensor& transforms;
+  const Tensor& gy;
+  std::span<const int> parents;
+  Tensor& out;
+  Tensor& g_rest;
+  Tensor& g_root;
+};
+/// points [n, v, 3], weights [n, v, j], transforms [n, j, 12], rest [n, j, 3] -> out [n, v, 3].
+struct LbsArgs {
+  static constexpr std::string_view name = "lbs";
+  const Tensor& points;
+  const Tensor& weights;
+  const Tensor& transforms;
+  const Tensor& rest;
+  Tensor& out;
+};
+/// out is the gradient of points.
+struct LbsGradArgs {
+  static constexpr std::string_view name = "lbs_grad";
+  const Tensor& points;
+  const Tensor& weights;
+  const Tensor& transforms;
+  const Tensor& rest;
+  const Tensor& gy;
+  Tensor& out;
+  Tensor& g_weights;
+  Tensor& g_transforms;
+  Tensor& g_rest;
+};
+
+}  // namespace restage

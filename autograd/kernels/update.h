@@ -1,0 +1,20 @@
+// Optimiser updates in place.
+#pragma once
+
+#include "autograd/kernels/kernel.h"
+
+namespace restage {
+
+/// Adam exactly as PyTorch's (spec 7); `step` counts from 1; v_max is the AMSGrad memory or null.
+struct AdamArgs {
+  static constexpr std::string_view name = "adam";
+  const Tensor& gradient;
+  Tensor& out;  ///< the parameter
+  Tensor& m;
+  Tensor& v;
+  Tensor* v_max;
+  double lr, beta1, beta2, eps, weight_decay, gradient_scale;
+  int64_t step;
+};
+
+}  // namespace restage

@@ -1,0 +1,161 @@
+#include "autograd/ops/elementwise.h"
+
+#include "autograd/kernels/reduce.h"
+
+namespace restage {
+namespace {
+
+bool is_float(const Tensor& t) { return t.dtype() == DType::f32 || t.dtype() == DType::f64; }
+
+}  // namespace
+
+Tensor sum_to(const Tensor& t, const Shape& shape) {
+  if (t.shape() == shape) return t;
+  Tensor current = t;
+  const int lead = t.rank() - shape.rank();
+  for (int axis = t.rank() - 1; axis >= 0;) {  // neighbouring summed axes go together
+    const auto summed = [&](int i) { return i < lead || (shape[i - lead] == 1 && t.size(i) != 1); };
+    if (!summed(axis)) {
+      --axis;
+      continue;
+    }
+    int from = axis;
+    while (from > 0 && summed(from - 1)) --from;
+    Shape next = current.shape();
+    for (int i = from; i <= axis; ++i) next.set(i, 1);
+    Tensor out = Tensor::empty(next, t.dtype(), t.device());
+    launch(SumArgs{current, out, current.shape().product(0, from),
+                   current.shape().product(from, axis + 1),
+                   current.shape().product(axis + 1, t.rank())});
+    current = out;
+    axis = from - 1;
+  }
+  return current.reshape(shape);
+}
+
+Tensor binary(Binary op, const Tensor& a, const Tensor& b) {
+  bool ok = true;
+  Tensor out = Tensor::empty(broadcast_shape(a.shape(), b.shape(), &ok), a.dtype(), a.device());
+  if (!ok) shape_error(name_of(op), "a[...], b[...]", std::array{a, b}, "shapes do not broadcast");
+  launch(BinaryArgs{op, a, b, out});
+  return out;
+}
+
+template <Unary U>
+void UnaryOp<U>::check(Inputs x) const {
+  if (!is_float(x[0])) shape_error(name, letters, x, "needs float32 or float64");
+}
+
+template <Unary U>
+Tensor UnaryOp<U>::forward(Inputs x, Saved& saved) const {
+  Tensor y = Tensor::empty(x[0].shape(), x[0].dtype(), x[0].device());
+  launch(UnaryArgs{U, x[0], y, alpha});
+  saved.keep({x[0], y});
+  return y;
+}
+
+template <Unary U>
+Grads UnaryOp<U>::backward(const Saved& saved, const Tensor& gy, Needs) const {
+  Tensor gx = Tensor::empty(gy.shape(), gy.dtype(), gy.device());
+  launch(UnaryGradArgs{U, saved[0], saved[1], gy, gx, alpha});
+  return {gx};
+}
+
+template <Binary B>
+void BinaryOp<B>::check(Inputs x) const {
+  bool ok = true;
+  broadcast_shape(x[0].shape(), x[1].shape(), &ok);
+  if (!ok) shape_error(name, letters, x, "shapes do not broadcast");
+  if (!is_float(x[0]) || x[0].dtype() != x[1].dtype())
+    shape_error(name, letters, x, "needs two equal float dtypes");
+}
+
+template <Binary B>
+Tensor BinaryOp<B>::forward(Inputs x, Saved& saved) const {
+  saved.keep({x[0], x[1]});
+  return binary(B, x[0], x[1]);
+}
+
+template <Binary B>
+Grads BinaryOp<B>::backward(const Saved& saved, const Tensor& gy, Needs needs) const {
+  const Tensor &a = saved[0], &b = saved[1];
+  Grads g(2);
+  if constexpr (B == Binary::add || B == Binary::sub) {
+    if (needs[0]) g[0] = sum_to(gy, a.shape());
+    if (needs[1]) {
+      g[1] = sum_to(gy, b.shape());
+      if constexpr (B == Binary::sub) {
+        Tensor negative = Tensor::empty(b.shape(), b.dtype(), b.device());
+        launch(UnaryArgs{Unary::neg, g[1], negative});
+        g[1] = negative;
+      }
+    }
+  } else if constexpr (B == Binary::mul) {
+    if (needs[0]) g[0] = sum_to(restage::binary(Binary::mul, gy, b), a.shape());
+    if (needs[1]) g[1] = sum_to(restage::binary(Binary::mul, gy, a), b.shape());
+  } else {
+    const Tensor ga = restage::binary(Binary::div, gy, b);
+    if (needs[0]) g[0] = sum_to(ga, a.shape());
+    if (needs[1]) {
+      const Tensor q = restage::binary(Binary::div, restage::binary(Binary::mul, ga, a), b);
+      Tensor negative = Tensor::empty(q.shape(), q.dtype(), q.device());
+      launch(UnaryArgs{Unary::neg, q, negative});
+      g[1] = sum_to(negative, b.shape());
+    }
+  }
+  return g;
+}
+
+void Expand::check(Inputs x) const {
+  bool ok = true;
+  if (!(broadcast_shape(x[0].shape(), shape, &ok) == shape) || !ok)
+    shape_error(name, letters, x, "cannot be repeated to " + shape.str());
+}
+
+Tensor Expand::forward(Inputs x, Saved& saved) const {
+  Tensor y = Tensor::empty(shape, x[0].dtype(), x[0].device());
+  launch(ExpandArgs{x[0], y});
+  saved.keep({x[0]});
+  return y;
+}
+
+Grads Expand::backward(const Saved& saved, const Tensor& gy, Needs) const {
+  return {sum_to(gy, saved[0].shape())};
+}
+
+void Dropout::check(Inputs x) const {
+  if (!is_float(x[0])) shape_error(name, letters, x, "needs float32 or float64");
+  if (p < 0 || p >= 1) shape_error(name, letters, x, "p must be in [0, 1)");
+}
+
+Tensor Dropout::forward(Inputs x, Saved&) const {
+  Tensor y = Tensor::empty(x[0].shape(), x[0].dtype(), x[0].device());
+  launch(DropoutArgs{x[0], y, p, key});
+  return y;
+}
+
+Grads Dropout::backward(const Saved&, const Tensor& gy, Needs) const {
+  Tensor gx = Tensor::empty(gy.shape(), gy.dtype(), gy.device());
+  launch(DropoutArgs{gy, gx, p, key});  // the mask is drawn again, not kept
+  return {gx};
+}
+
+template struct UnaryOp<Unary::neg>;
+template struct UnaryOp<Unary::exp>;
+template struct UnaryOp<Unary::log>;
+template struct UnaryOp<Unary::sqrt>;
+template struct UnaryOp<Unary::square>;
+template struct UnaryOp<Unary::abs>;
+template struct UnaryOp<Unary::sigmoid>;
+template struct UnaryOp<Unary::tanh>;
+template struct UnaryOp<Unary::relu>;
+template struct UnaryOp<Unary::leaky_relu>;
+template struct UnaryOp<Unary::softplus>;
+template struct UnaryOp<Unary::scale>;
+template struct UnaryOp<Unary::add_scalar>;
+template struct BinaryOp<Binary::add>;
+template struct BinaryOp<Binary::sub>;
+template struct BinaryOp<Binary::mul>;
+template struct BinaryOp<Binary::div>;
+
+}  // namespace restage

@@ -1,0 +1,204 @@
+#include "autograd/ops/layout.h"
+
+#include "autograd/ops/linear.h"
+
+namespace restage {
+namespace {
+
+int positive(int axis, int rank) { return axis < 0 ? axis + rank : axis; }
+
+/// Copies along one axis between x (size nx, from offset ox) and out (size no, at offset oo).
+void copy_axis(const Tensor& x, Tensor& out, int axis, int64_t ox, int64_t oo, int64_t count) {
+  const int at = positive(axis, x.rank());
+  const int64_t inner = x.shape().product(at + 1, x.rank());
+  launch(CopyBlocksArgs{x, out, x.shape().product(0, at), count * inner, x.size(at) * inner,
+                        ox * inner, out.size(at) * inner, oo * inner});
+}
+
+}  // namespace
+
+Tensor Reshape::forward(Inputs x, Saved& saved) const {
+  saved.keep({x[0]});
+  return x[0].reshape(shape);
+}
+
+Grads Reshape::backward(const Saved& saved, const Tensor& gy, Needs) const {
+  return {gy.reshape(saved[0].shape())};
+}
+
+void Permute::check(Inputs x) const {
+  std::array<bool, Shape::kMaxRank> seen{};
+  bool ok = static_cast<int>(order.size()) == x[0].rank();
+  for (const int axis : order) {
+    if (axis < 0 || axis >= x[0].rank() || seen[static_cast<size_t>(axis)]) ok = false;
+    if (axis >= 0 && axis < Shape::kMaxRank) seen[static_cast<size_t>(axis)] = true;
+  }
+  if (!ok) shape_error(name, letters, x, "order must name every axis once");
+}
+
+Tensor Permute::forward(Inputs x, Saved&) const {
+  Shape shape;
+  PermuteArgs args{x[0], const_cast<Tensor&>(x[0]), {}};
+  for (size_t i = 0; i < order.size(); ++i) {
+    shape.push_back(x[0].size(order[i]));
+    args.order[i] = order[i];
+  }
+  Tensor y = Tensor::empty(shape, x[0].dtype(), x[0].device());
+  launch(PermuteArgs{x[0], y, args.order});
+  return y;
+}
+
+Grads Permute::backward(const Saved&, const Tensor& gy, Needs) const {
+  Permute inverse{std::vector<int>(order.size())};
+  for (size_t i = 0; i < order.size(); ++i)
+    inverse.order[static_cast<size_t>(order[i])] = static_cast<int>(i);
+  Saved nothing(false);
+  return {inverse.forward({&gy, 1}, nothing)};
+}
+
+void Slice::check(Inputs x) const {
+  if (axis >= x[0].rank() || axis < -x[0].rank())
+    shape_error(name, letters, x, "no axis " + std::to_string(axis));
+  if (from < 0 || to < from || to > x[0].size(axis))
+    shape_error(name, letters, x,
+                "range " + std::to_string(from) + ".." + std::to_string(to) + " does not fit");
+}
+
+Tensor Slice::forward(Inputs x, Saved& saved) const {
+  Shape shape = x[0].shape();
+  shape.set(axis, to - from);
+  Tensor y = Tensor::empty(shape, x[0].dtype(), x[0].device());
+  copy_axis(x[0], y, axis, from, 0, to - from);
+  saved.keep({x[0]});
+  return y;
+}
+
+Grads Slice::backward(const Saved& saved, const Tensor& gy, Needs) const {
+  Tensor gx = Tensor::zeros(saved[0].shape(), gy.dtype(), gy.device());
+  copy_axis(gy, gx, axis, 0, from, to - from);
+  return {gx};
+}
+
+void Concat::check(Inputs x) const {
+  const int at = positive(axis, x[0].rank());
+  bool ok = at >= 0 && at < x[0].rank() && x.size() <= 16;
+  for (const Tensor& t : x) {
+    if (t.rank() != x[0].rank() || t.dtype() != x[0].dtype()) ok = false;
+    for (int i = 0; ok && i < t.rank(); ++i)
+      if (i != at && t.size(i) != x[0].size(i)) ok = false;
+  }
+  if (!ok)
+    shape_error(name, letters, x, "all axes but axis " + std::to_string(axis) + " must agree");
+}
+
+Tensor Concat::forward(Inputs x, Saved& saved) const {
+  Shape shape = x[0].shape();
+  int64_t total = 0;
+  for (const Tensor& t : x) total += t.size(axis);
+  shape.set(axis, total);
+  Tensor y = Tensor::empty(shape, x[0].dtype(), x[0].device());
+  int64_t at = 0;
+  Tensor sizes = Tensor::empty({static_cast<int64_t>(x.size())}, DType::i64);
+  for (size_t i = 0; i < x.size(); ++i) {
+    copy_axis(x[i], y, axis, 0, at, x[i].size(axis));
+    sizes.data<int64_t>()[i] = x[i].size(axis);
+    at += x[i].size(axis);
+  }
+  saved.keep({sizes});
+  return y;
+}
+
+Grads Concat::backward(const Saved& saved, const Tensor& gy, Needs needs) const {
+  Grads g(needs.size());
+  int64_t at = 0;
+  for (size_t i = 0; i < needs.size(); ++i) {
+    const int64_t n = saved[0].data<int64_t>()[i];
+    if (needs[i]) {
+      Shape shape = gy.shape();
+      shape.set(axis, n);
+      g[i] = Tensor::empty(shape, gy.dtype(), gy.device());
+      copy_axis(gy, g[i], axis, at, 0, n);
+    }
+    at += n;
+  }
+  return g;
+}
+
+namespace {
+
+void check_index(const char* name, const char* letters, Inputs x, const Tensor& index,
+                 int64_t limit) {
+  if (x[0].rank() != 3 || index.rank() < 2 || index.size(0) != x[0].size(0) ||
+      index.dtype() != DType::i32)
+    shape_error(name, letters, x, "needs x[n, v, c] and int32 index " + index.shape().str());
+  const int32_t* at = index.data<int32_t>();
+  for (int64_t i = 0; i < index.numel(); ++i)
+    if (at[i] < 0 || at[i] >= limit) shape_error(name, letters, x, "an index is outside [0, v)");
+}
+
+}  // namespace
+
+void Gather::check(Inputs x) const {
+  check_index(name, letters, x, index, x[0].rank() == 3 ? x[0].size(1) : 0);
+}
+
+Tensor Gather::forward(Inputs x, Saved& saved) const {
+  Shape shape = index.shape();
+  shape.push_back(x[0].size(2));
+  Tensor y = Tensor::empty(shape, x[0].dtype(), x[0].device());
+  launch(GatherArgs{x[0], index.reshape({index.size(0), -1}), y});
+  saved.keep({x[0]});
+  return y;
+}
+
+Grads Gather::backward(const Saved& saved, const Tensor& gy, Needs) const {
+  Tensor gx = Tensor::empty(saved[0].shape(), gy.dtype(), gy.device());
+  launch(ScatterAddArgs{gy, index.reshape({index.size(0), -1}), gx});
+  return {gx};
+}
+
+void ScatterAdd::check(Inputs x) const {
+  check_index(name, letters, x, index, rows);
+  if (index.rank() != 2 || index.size(1) != x[0].size(1))
+    shape_error(name, letters, x, "one index per row is needed, not " + index.shape().str());
+}
+
+Tensor ScatterAdd::forward(Inputs x, Saved&) const {
+  Tensor y = Tensor::empty({x[0].size(0), rows, x[0].size(2)}, x[0].dtype(), x[0].device());
+  launch(ScatterAddArgs{x[0], index, y});
+  return y;
+}
+
+Grads ScatterAdd::backward(const Saved&, const Tensor& gy, Needs) const {
+  Tensor gx = Tensor::empty({gy.size(0), index.size(1), gy.size(2)}, gy.dtype(), gy.device());
+  launch(GatherArgs{gy, index, gx});
+  return {gx};
+}
+
+void Unfold::check(Inputs x) const {
+  if (x[0].rank() != 3) shape_error(name, letters, x, "needs three axes");
+  if (k < 1 || stride < 1 || steps < 0)
+    shape_error(name, letters, x, "kernel and stride must be positive");
+}
+
+Tensor Unfold::forward(Inputs x, Saved& saved) const {
+  Tensor y = Tensor::empty({x[0].size(0), steps, x[0].size(2) * k}, x[0].dtype(), x[0].device());
+  launch(UnfoldArgs{x[0], y, k, stride, pad_left});
+  saved.keep({x[0]});
+  return y;
+}
+
+Grads Unfold::backward(const Saved& saved, const Tensor& gy, Needs) const {
+  Tensor gx = Tensor::empty(saved[0].shape(), gy.dtype(), gy.device());
+  launch(FoldArgs{gy, gx, k, stride, pad_left});
+  return {gx};
+}
+
+Var conv1d(const Var& x, const Var& weight, const Var& bias, int64_t stride, int64_t pad_left,
+           int64_t steps) {
+  const int64_t k = weight.size(2);
+  const Var windows = call(Unfold{k, stride, pad_left, steps}, {x});
+  return linear(windows, reshape(weight, {weight.size(0), weight.size(1) * k}), bias);
+}
+
+}  // namespace restage

@@ -1,0 +1,54 @@
+#include "autograd/ops/points.h"
+
+#include "autograd/kernels/points.h"
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/reduce.h"
+
+namespace restage {
+
+Tensor knn(const Tensor& query, const Tensor& points, int64_t k) {
+  const bool ok = query.rank() == 3 && points.rank() == 3 && query.size(0) == points.size(0) &&
+                  query.size(2) == 3 && points.size(2) == 3 && k > 0;
+  if (!ok)
+    shape_error("knn", "query[n, m, 3], points[n, v, 3]", std::array{query, points},
+                "shapes do not fit");
+  Tensor out =
+      Tensor::empty({query.size(0), query.size(1), std::min(k, points.size(1))}, DType::i32);
+  launch(KnnArgs{query, points, out});
+  return out;
+}
+
+Tensor fps(const Tensor& points, int64_t m) {
+  if (points.rank() != 3 || points.size(2) != 3 || m < 0 || points.size(1) < 1)
+    shape_error("fps", "points[n, v, 3]", std::array{points}, "needs m >= 0 and v > 0");
+  Tensor out = Tensor::empty({points.size(0), m}, DType::i32);
+  launch(FpsArgs{points, out});
+  return out;
+}
+
+void AttentionPool::check(Inputs x) const {
+  if (x[0].rank() != 3 || !(x[0].shape() == x[1].shape()) || x[0].size(1) < 1 ||
+      x[0].dtype() != x[1].dtype())
+    shape_error(name, letters, x, "p, k and d must agree");
+}
+
+Tensor AttentionPool::forward(Inputs x, Saved& saved) const {
+  Tensor y = Tensor::empty({x[0].size(0), x[0].size(2)}, x[0].dtype(), x[0].device());
+  Tensor weights = Tensor::empty(x[0].shape(), x[0].dtype(), x[0].device());
+  launch(AttentionPoolArgs{x[0], x[1], y, weights, scale});
+  saved.keep({x[1], weights, y});
+  return y;
+}
+
+Grads AttentionPool::backward(const Saved& saved, const Tensor& gy, Needs) const {
+  Tensor g_score = Tensor::empty(saved[0].shape(), gy.dtype(), gy.device());
+  Tensor g_value = Tensor::empty(saved[0].shape(), gy.dtype(), gy.device());
+  launch(AttentionPoolGradArgs{saved[0], saved[1], saved[2], gy, g_score, g_value, scale});
+  return {g_score, g_value};
+}
+
+Var attention_pool_reference(const Var& score, const Var& value, double scale_) {
+  return sum(softmax(scale(score, scale_), 1) * value, 1);
+}
+
+}  // namespace restage

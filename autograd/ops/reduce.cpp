@@ -1,0 +1,98 @@
+#include "autograd/ops/reduce.h"
+
+#include "autograd/kernels/reduce.h"
+
+namespace restage {
+namespace {
+
+/// A shape seen as [outer, n, inner] around one axis.
+struct Around {
+  int64_t outer, n, inner;
+  Shape without;
+  Around(const Shape& s, int axis) : n(s[axis]) {
+    const int at = axis < 0 ? axis + s.rank() : axis;
+    outer = s.product(0, at);
+    inner = s.product(at + 1, s.rank());
+    for (int i = 0; i < s.rank(); ++i)
+      if (i != at) without.push_back(s[i]);
+    if (without.rank() == 0) without.push_back(1);
+  }
+};
+
+void check_axis(const char* name, const char* letters, Inputs x, int axis, bool not_empty) {
+  if (axis >= x[0].rank() || axis < -x[0].rank())
+    shape_error(name, letters, x, "there is no axis " + std::to_string(axis));
+  if (not_empty && x[0].size(axis) == 0) shape_error(name, letters, x, "the axis is empty");
+}
+
+}  // namespace
+
+void Sum::check(Inputs x) const { check_axis(name, letters, x, axis, false); }
+
+Tensor Sum::forward(Inputs x, Saved& saved) const {
+  const Around a(x[0].shape(), axis);
+  Tensor y = Tensor::empty(a.without, x[0].dtype(), x[0].device());
+  launch(SumArgs{x[0], y, a.outer, a.n, a.inner});
+  saved.keep({x[0]});
+  return y;
+}
+
+Grads Sum::backward(const Saved& saved, const Tensor& gy, Needs) const {
+  const Around a(saved[0].shape(), axis);
+  Tensor gx = Tensor::empty({a.outer, a.n, a.inner}, gy.dtype(), gy.device());
+  launch(ExpandArgs{gy.reshape({a.outer, 1, a.inner}), gx});
+  return {gx.reshape(saved[0].shape())};
+}
+
+void Max::check(Inputs x) const { check_axis(name, letters, x, axis, true); }
+
+Tensor Max::forward(Inputs x, Saved& saved) const {
+  const Around a(x[0].shape(), axis);
+  Tensor y = Tensor::empty(a.without, x[0].dtype(), x[0].device());
+  Tensor index = Tensor::empty(a.without, DType::i32, x[0].device());
+  launch(MaxArgs{x[0], y, index, a.outer, a.n, a.inner});
+  saved.keep({x[0], index});
+  return y;
+}
+
+Grads Max::backward(const Saved& saved, const Tensor& gy, Needs) const {
+  const Around a(saved[0].shape(), axis);
+  Tensor gx = Tensor::empty(saved[0].shape(), gy.dtype(), gy.device());
+  launch(MaxGradArgs{gy, saved[1], gx, a.outer, a.n, a.inner});
+  return {gx};
+}
+
+void Softmax::check(Inputs x) const { check_axis(name, letters, x, axis, true); }
+
+Tensor Softmax::forward(Inputs x, Saved& saved) const {
+  const Around a(x[0].shape(), axis);
+  Tensor y = Tensor::empty(x[0].shape(), x[0].dtype(), x[0].device());
+  launch(SoftmaxArgs{x[0], y, a.outer, a.n, a.inner});
+  saved.keep({y});
+  return y;
+}
+
+Grads Softmax::backward(const Saved& saved, const Tensor& gy, Needs) const {
+  const Around a(gy.shape(), axis);
+  Tensor gx = Tensor::empty(gy.shape(), gy.dtype(), gy.device());
+  launch(SoftmaxGradArgs{saved[0], gy, gx, a.outer, a.n, a.inner});
+  return {gx};
+}
+
+Var mean(const Var& x, int axis) {
+  return scale(sum(x, axis), 1.0 / static_cast<double>(x.size(axis)));
+}
+
+Var sum_all(const Var& x) { return sum(x.rank() == 1 ? x : call(Reshape{{-1}}, {x}), 0); }
+
+Var mean_all(const Var& x) { return scale(sum_all(x), 1.0 / static_cast<double>(x.value.numel())); }
+
+Var mse(const Var& a, const Var& b) { return mean_all(square(sub(a, b))); }
+
+Var bce_with_logits(const Var& logits, double label) {
+  if (label == 0) return mean_all(softplus(logits));
+  if (label == 1) return mean_all(softplus(neg(logits)));
+  return mean_all(sub(softplus(logits), scale(logits, label)));
+}
+
+}  // namespace restage

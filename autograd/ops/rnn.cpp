@@ -1,0 +1,121 @@
+#include "autograd/ops/rnn.h"
+
+#include "autograd/kernels/elementwise.h"
+#include "autograd/kernels/layout.h"
+#include "autograd/kernels/matmul.h"
+#include "autograd/kernels/reduce.h"
+#include "autograd/kernels/rnn.h"
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+#include "autograd/ops/linear.h"
+
+namespace restage {
+namespace {
+
+/// Row t of a [t, n, c] tensor as [n, c], sharing memory.
+Tensor step(const Tensor& x, int64_t t) { return x.rows(t, t + 1).reshape({x.size(1), x.size(2)}); }
+
+Tensor column_sum(const Tensor& g) {  // [t, n, c] -> [c]
+  Tensor out = Tensor::empty({g.size(2)}, g.dtype(), g.device());
+  launch(SumArgs{g, out, 1, g.size(0) * g.size(1), g.size(2)});
+  return out;
+}
+
+Tensor flat(const Tensor& x) { return x.reshape({x.size(0) * x.size(1), x.size(2)}); }
+
+}  // namespace
+
+void Gru::check(Inputs x) const {
+  const bool ranks = x.size() == 6 && x[0].rank() == 3 && x[1].rank() == 2 && x[2].rank() == 2 &&
+                     x[3].rank() == 2 && x[4].rank() == 1 && x[5].rank() == 1;
+  if (!ranks) shape_error(name, letters, x, "wrong number of axes");
+  const int64_t n = x[0].size(1), i = x[0].size(2), h = x[1].size(1);
+  if (x[1].size(0) != n) shape_error(name, letters, x, "n must agree");
+  if (x[2].size(1) != i) shape_error(name, letters, x, "i must agree");
+  if (x[2].size(0) != 3 * h || x[3].size(0) != 3 * h || x[3].size(1) != h ||
+      x[4].size(0) != 3 * h || x[5].size(0) != 3 * h)
+    shape_error(name, letters, x, "h must agree");
+  for (const Tensor& t : x)
+    if (t.dtype() != x[0].dtype()) shape_error(name, letters, x, "needs equal dtypes");
+}
+
+Tensor Gru::forward(Inputs in, Saved& saved) const {
+  const Tensor &x = in[0], &w_ih = in[2], &w_hh = in[3];
+  const int64_t t_count = x.size(0), n = x.size(1), h = in[1].size(1);
+  Tensor gi = Tensor::empty({t_count, n, 3 * h}, x.dtype(), x.device());
+  Tensor gi_flat = flat(gi);
+  launch(MatmulArgs{flat(x), w_ih, gi_flat, false, true, &in[4]});
+  Tensor y = Tensor::empty({t_count, n, h}, x.dtype(), x.device());
+  Tensor gates = Tensor::empty({t_count, n, 4 * h}, x.dtype(), x.device());
+  Tensor gh = Tensor::empty({n, 3 * h}, x.dtype(), x.device());
+  Tensor previous = in[1];
+  for (int64_t t = 0; t < t_count; ++t) {
+    launch(MatmulArgs{previous, w_hh, gh, false, true, &in[5]});
+    Tensor out = step(y, t), kept = step(gates, t);
+    launch(GruCellArgs{step(gi, t), gh, previous, out, kept});
+    previous = out;
+  }
+  saved.keep({x, in[1], w_ih, w_hh, y, gates});
+  return y;
+}
+
+Grads Gru::backward(const Saved& saved, const Tensor& gy, Needs needs) const {
+  const Tensor &x = saved[0], &h0 = saved[1], &w_ih = saved[2], &w_hh = saved[3], &y = saved[4],
+               &gates = saved[5];
+  const int64_t t_count = x.size(0), n = x.size(1), h = h0.size(1);
+  Tensor g_gi = Tensor::empty({t_count, n, 3 * h}, x.dtype(), x.device());
+  Tensor g_gh = Tensor::empty({t_count, n, 3 * h}, x.dtype(), x.device());
+  Tensor carry = Tensor::zeros({n, h}, x.dtype(), x.device());  // gradient of the state
+  for (int64_t t = t_count - 1; t >= 0; --t) {
+    launch(AccumulateArgs{step(gy, t), carry});
+    Tensor next = Tensor::empty({n, h}, x.dtype(), x.device());
+    Tensor gi = step(g_gi, t), gh = step(g_gh, t);
+    launch(GruCellGradArgs{step(gates, t), t > 0 ? step(y, t - 1) : h0, carry, gi, gh, next});
+    launch(MatmulArgs{gh, w_hh, next, false, false, nullptr, Activation::none, true});
+    carry = next;
+  }
+  Grads g(6);
+  if (needs[0]) {
+    g[0] = Tensor::empty(x.shape(), x.dtype(), x.device());
+    Tensor rows = flat(g[0]);
+    launch(MatmulArgs{flat(g_gi), w_ih, rows});
+  }
+  if (needs[1]) g[1] = carry;
+  if (needs[2]) {
+    g[2] = Tensor::empty(w_ih.shape(), x.dtype(), x.device());
+    launch(MatmulArgs{flat(g_gi), flat(x), g[2], true, false});
+  }
+  if (needs[3]) {
+    // States before each step: h0 followed by all but the last output.
+    Tensor before = Tensor::empty(y.shape(), x.dtype(), x.device());
+    launch(CopyBlocksArgs{h0, before, t_count > 0 ? 1 : 0, n * h, n * h, 0, n * h, 0});
+    if (t_count > 1) {
+      Tensor rest = before.rows(1, t_count);
+      launch(CopyBlocksArgs{y, rest, t_count - 1, n * h, n * h, 0, n * h, 0});
+    }
+    g[3] = Tensor::empty(w_hh.shape(), x.dtype(), x.device());
+    launch(MatmulArgs{flat(g_gh), flat(before), g[3], true, false});
+  }
+  if (needs[4]) g[4] = column_sum(g_gi);
+  if (needs[5]) g[5] = column_sum(g_gh);
+  return g;
+}
+
+Var gru_reference(const Var& x, const Var& h0, const Var& w_ih, const Var& w_hh, const Var& b_ih,
+                  const Var& b_hh) {
+  const int64_t n = x.size(1), h = h0.size(1);
+  Var state = h0, out;
+  for (int64_t t = 0; t < x.size(0); ++t) {
+    const Var gi = linear(reshape(slice(x, 0, t, t + 1), {n, x.size(2)}), w_ih, b_ih);
+    const Var gh = linear(state, w_hh, b_hh);
+    const auto part = [&](const Var& g, int64_t i) { return slice(g, 1, i * h, (i + 1) * h); };
+    const Var r = sigmoid(part(gi, 0) + part(gh, 0)), z = sigmoid(part(gi, 1) + part(gh, 1));
+    const Var candidate = tanh(part(gi, 2) + r * part(gh, 2));
+    state = candidate + z * (state - candidate);
+    const Var row = reshape(state, {1, n, h});
+    out = t == 0 ? row : concat({out, row}, 0);
+  }
+  return out;
+}
+
+}  // namespace restage

@@ -1,0 +1,28 @@
+// Recurrent layers (spec 3.2).
+#pragma once
+
+#include "autograd/tape/tape.h"
+
+namespace restage {
+
+/// One GRU layer over a whole sequence, time first, PyTorch's equations and gate order r, z, n.
+/// Input products of all steps are one matrix product, forward and backward.
+struct Gru {
+  static constexpr const char* name = "gru";
+  static constexpr const char* letters =
+      "x[t, n, i], h0[n, h], w_ih[3h, i], w_hh[3h, h], b_ih[3h], b_hh[3h]";
+  void check(Inputs x) const;
+  Tensor forward(Inputs x, Saved& saved) const;
+  Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
+};
+
+/// y [t, n, h]: hidden states of all steps.
+inline Var gru(const Var& x, const Var& h0, const Var& w_ih, const Var& w_hh, const Var& b_ih,
+               const Var& b_hh) {
+  return call(Gru{}, {x, h0, w_ih, w_hh, b_ih, b_hh});
+}
+/// The same from elementary ops: what tests compare gru() with.
+Var gru_reference(const Var& x, const Var& h0, const Var& w_ih, const Var& w_hh, const Var& b_ih,
+                  const Var& b_hh);
+
+}  // namespace restage

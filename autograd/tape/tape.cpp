@@ -1,0 +1,141 @@
+#include "autograd/tape/tape.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "autograd/kernels/elementwise.h"
+
+namespace restage {
+namespace {
+
+thread_local std::string current_path;  // of ModuleScope
+std::atomic<int> finite_checks{0};
+
+}  // namespace
+
+ModuleScope::ModuleScope(const std::string& name) : previous_(current_path.size()) {
+  if (name.empty()) return;
+  if (!current_path.empty()) current_path += '.';
+  current_path += name;
+}
+
+ModuleScope::~ModuleScope() { current_path.resize(previous_); }
+
+std::string module_path() { return current_path.empty() ? "(no module)" : current_path; }
+
+FiniteCheck::FiniteCheck() { ++finite_checks; }
+FiniteCheck::~FiniteCheck() { --finite_checks; }
+bool FiniteCheck::active() { return finite_checks > 0; }
+
+void require_finite(const Tensor& t, const char* op, const std::string& path, const char* pass) {
+  if (!t.defined() || (t.dtype() != DType::f32 && t.dtype() != DType::f64)) return;
+  Tensor found = Tensor::empty({1}, DType::i32);
+  launch(NonFiniteArgs{t, found});
+  if (found.item() != 0)
+    throw NonFiniteError(std::string("a value became infinite or NaN in the ") + pass +
+                         " pass of '" + op + "' in " + path);
+}
+
+void shape_error(const char* op, const char* letters, Inputs inputs, const std::string& why) {
+  std::string shapes;
+  for (const Tensor& t : inputs)
+    shapes += (shapes.empty() ? "" : ", ") + (t.defined() ? t.shape().str() : std::string("none")) +
+              (t.defined() ? std::string(" ") + name_of(t.dtype()) : "");
+  throw ShapeError(std::string(op) + " " + letters + ": " + why + "; got " + shapes + " in " +
+                   module_path());
+}
+
+const Tensor* Gradients::find(uint64_t id) const {
+  const auto it = by_id_.find(id);
+  return it == by_id_.end() ? nullptr : &it->second;
+}
+
+double Gradients::norm() const {
+  std::vector<uint64_t> ids;
+  for (const auto& entry : by_id_) ids.push_back(entry.first);
+  std::sort(ids.begin(), ids.end());
+  double total = 0;
+  for (const uint64_t id : ids) {
+    const Tensor& g = by_id_.at(id);
+    double part = 0;
+    if (g.dtype() == DType::f32) {
+      for (int64_t i = 0; i < g.numel(); ++i)
+        part += static_cast<double>(g.data<float>()[i]) * g.data<float>()[i];
+    } else {
+      for (int64_t i = 0; i < g.numel(); ++i) part += g.data<double>()[i] * g.data<double>()[i];
+    }
+    total += part;
+  }
+  return std::sqrt(total);
+}
+
+bool Gradients::finite() const { return std::isfinite(norm()); }
+
+Var Tape::leaf(const Tensor& value, uint64_t id) {
+  const auto [it, fresh] = leaves_.emplace(id, static_cast<int>(nodes_.size()));
+  if (fresh) {
+    Node node;
+    node.id = id;
+    nodes_.push_back(std::move(node));
+  }
+  Var v(value);
+  v.tape = this;
+  v.node = it->second;
+  return v;
+}
+
+Var Tape::record(std::unique_ptr<Function> function, std::span<const Var> inputs, Tensor output) {
+  Node node;
+  node.function = std::move(function);
+  node.path = module_path();
+  for (const Var& in : inputs) {
+    if (in.tape != nullptr && in.tape != this) throw Error("an op was given values of two tapes");
+    node.inputs.push_back(in.tape == this ? in.node : -1);
+  }
+  Var v(std::move(output));
+  v.tape = this;
+  v.node = static_cast<int>(nodes_.size());
+  nodes_.push_back(std::move(node));
+  return v;
+}
+
+Gradients Tape::backward(const Var& loss) {
+  if (loss.tape != this) throw Error("backward: the loss does not depend on anything of this tape");
+  if (loss.value.numel() != 1)
+    throw ShapeError("backward: the loss has shape " + loss.shape().str() + ", not one number");
+  std::vector<Tensor> grads(nodes_.size());
+  grads[static_cast<size_t>(loss.node)] = Tensor::full(loss.shape(), 1.0, loss.dtype());
+  Gradients result;
+  for (size_t i = static_cast<size_t>(loss.node) + 1; i-- > 0;) {
+    Node& node = nodes_[i];
+    if (!grads[i].defined()) continue;
+    if (node.function == nullptr) {
+      result.set(node.id, grads[i]);
+      continue;
+    }
+    std::array<bool, 16> needs{};
+    for (size_t k = 0; k < node.inputs.size(); ++k) needs[k] = node.inputs[k] >= 0;
+    Grads gx = node.function->backward(grads[i], Needs(needs.data(), node.inputs.size()));
+    for (size_t k = 0; k < node.inputs.size(); ++k) {
+      if (node.inputs[k] < 0 || k >= gx.size() || !gx[k].defined()) continue;
+      if (FiniteCheck::active())
+        require_finite(gx[k], node.function->name(), node.path, "backward");
+      Tensor& target = grads[static_cast<size_t>(node.inputs[k])];
+      if (target.defined()) {
+        Tensor total = target.clone();  // the first gradient may be shared with another node
+        launch(AccumulateArgs{gx[k], total});
+        target = total;
+      } else {
+        target = gx[k];
+      }
+    }
+    node.function.reset();  // frees what the op had kept
+    grads[i] = Tensor();
+  }
+  nodes_.clear();
+  leaves_.clear();
+  return result;
+}
+
+}  // namespace restage

@@ -1,0 +1,164 @@
+// The reverse-mode tape. Values are computed eagerly; an op is recorded only if one of its inputs
+// lives on a tape, so inference, which has no tape, records nothing. The tape is a vector in order
+// of execution: backward walks it in reverse and frees what it passes.
+#pragma once
+
+#include <initializer_list>
+#include <memory>
+#include <span>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "autograd/base/error.h"
+#include "autograd/tape/module_path.h"
+#include "autograd/tensor/tensor.h"
+
+namespace restage {
+
+class Tape;
+
+/// A value and, if it depends on something differentiable, its place on a tape.
+struct Var {
+  Tensor value;
+  Tape* tape = nullptr;
+  int node = -1;
+
+  Var() = default;
+  Var(Tensor v) : value(std::move(v)) {}  // NOLINT: a tensor is a constant Var
+  const Shape& shape() const { return value.shape(); }
+  int64_t size(int axis) const { return value.size(axis); }
+  int rank() const { return value.rank(); }
+  DType dtype() const { return value.dtype(); }
+  /// The same value without history.
+  Var detach() const { return Var(value); }
+};
+
+using Inputs = std::span<const Tensor>;
+/// One gradient per input; undefined where none is needed or none exists.
+using Grads = std::vector<Tensor>;
+/// needs[i]: whether the gradient of input i is wanted.
+using Needs = std::span<const bool>;
+
+/// What an op keeps for its backward pass; keeps nothing when nobody will ask.
+class Saved {
+ public:
+  explicit Saved(bool on) : on_(on) {}
+  void keep(std::initializer_list<Tensor> tensors) {
+    if (on_) tensors_.assign(tensors);
+  }
+  bool on() const { return on_; }
+  const Tensor& operator[](size_t i) const { return tensors_[i]; }
+  size_t count() const { return tensors_.size(); }
+
+ private:
+  bool on_;
+  std::vector<Tensor> tensors_;
+};
+
+/// Result of backward: a value, not a field of the parameters, so that two players of one game
+/// (generator, discriminator) cannot mix their gradients.
+class Gradients {
+ public:
+  /// Gradient of a leaf with this identity (Parameter::id), or null if it did not take part.
+  const Tensor* find(uint64_t id) const;
+  void set(uint64_t id, Tensor gradient) { by_id_[id] = std::move(gradient); }
+  /// Euclidean norm over all leaves, in double, summed in order of identity.
+  double norm() const;
+  bool finite() const;
+
+ private:
+  std::unordered_map<uint64_t, Tensor> by_id_;
+};
+
+class Tape {
+ public:
+  Tape() = default;
+  Tape(const Tape&) = delete;
+  Tape& operator=(const Tape&) = delete;
+
+  /// A differentiable leaf. The same id always gives the same node.
+  Var leaf(const Tensor& value, uint64_t id);
+  /// Gradients of all leaves of a scalar. Consumes the recorded ops.
+  Gradients backward(const Var& loss);
+  size_t size() const { return nodes_.size(); }
+
+  struct Function {
+    virtual ~Function() = default;
+    virtual Grads backward(const Tensor& gy, Needs needs) const = 0;
+    virtual const char* name() const = 0;
+  };
+  /// Used by call(): enters an op with its output.
+  Var record(std::unique_ptr<Function> function, std::span<const Var> inputs, Tensor output);
+
+ private:
+  struct Node {
+    std::unique_ptr<Function> function;  // null: leaf
+    std::vector<int> inputs;             // node of each input, -1: constant
+    uint64_t id = 0;                     // of a leaf
+    std::string path;
+  };
+  std::vector<Node> nodes_;
+  std::unordered_map<uint64_t, int> leaves_;
+};
+
+/// Checks every result of every op for NaN and infinity while alive (slow: the trainer repeats a
+/// failed step under it to name the op and module where the value appeared).
+class FiniteCheck {
+ public:
+  FiniteCheck();
+  ~FiniteCheck();
+  FiniteCheck(const FiniteCheck&) = delete;
+  FiniteCheck& operator=(const FiniteCheck&) = delete;
+  static bool active();
+};
+
+/// NonFiniteError naming `op` and the module path if t holds NaN or infinity.
+void require_finite(const Tensor& t, const char* op, const std::string& path, const char* pass);
+/// Throws ShapeError: "op: [letters] message; got shapes; in module path".
+[[noreturn]] void shape_error(const char* op, const char* letters, Inputs inputs,
+                              const std::string& why);
+
+namespace detail {
+
+template <class Op>
+struct Recorded final : Tape::Function {
+  Recorded(Op o, Saved s) : op(std::move(o)), saved(std::move(s)) {}
+  Grads backward(const Tensor& gy, Needs needs) const override {
+    return op.backward(saved, gy, needs);
+  }
+  const char* name() const override { return Op::name; }
+  Op op;
+  Saved saved;
+};
+
+}  // namespace detail
+
+/// Runs an op: checks, computes, records. The only door through which ops are called. An op is a
+/// struct with: `static constexpr const char* name`, `letters` (its dimension letters, for
+/// messages), `void check(Inputs) const` (throws through shape_error), `Tensor forward(Inputs,
+/// Saved&) const`, `Grads backward(const Saved&, const Tensor& gy, Needs) const`.
+template <class Op>
+Var call(const Op& op, std::span<const Var> inputs) {
+  std::vector<Tensor> values;
+  values.reserve(inputs.size());
+  Tape* tape = nullptr;
+  for (const Var& v : inputs) {
+    values.push_back(v.value);
+    if (v.tape != nullptr) tape = v.tape;
+  }
+  op.check(values);
+  Saved saved(tape != nullptr);
+  Tensor y = op.forward(values, saved);
+  if (FiniteCheck::active()) require_finite(y, Op::name, module_path(), "forward");
+  if (tape == nullptr) return Var(std::move(y));
+  return tape->record(std::make_unique<detail::Recorded<Op>>(op, std::move(saved)), inputs,
+                      std::move(y));
+}
+
+template <class Op>
+Var call(const Op& op, std::initializer_list<Var> inputs) {
+  return call(op, std::span<const Var>(inputs.begin(), inputs.size()));
+}
+
+}  // namespace restage

@@ -1,0 +1,83 @@
+// Tensor: a contiguous, row-major, 64-byte aligned block of numbers with shared ownership. Copies
+// are cheap handles. reshape() and rows() share memory; everything else makes a new tensor.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "autograd/tensor/shape.h"
+
+namespace restage {
+
+struct Storage;
+
+template <class T>
+struct DTypeOf;
+template <>
+struct DTypeOf<float> {
+  static constexpr DType value = DType::f32;
+};
+template <>
+struct DTypeOf<double> {
+  static constexpr DType value = DType::f64;
+};
+template <>
+struct DTypeOf<int32_t> {
+  static constexpr DType value = DType::i32;
+};
+template <>
+struct DTypeOf<int64_t> {
+  static constexpr DType value = DType::i64;
+};
+
+class Tensor {
+ public:
+  Tensor() = default;
+  static Tensor empty(const Shape& shape, DType type = DType::f32, Device device = {});
+  static Tensor zeros(const Shape& shape, DType type = DType::f32, Device device = {});
+  static Tensor full(const Shape& shape, double value, DType type = DType::f32);
+  template <class T>
+  static Tensor from(const Shape& shape, const std::vector<T>& values);
+
+  bool defined() const { return storage_ != nullptr; }
+  const Shape& shape() const { return shape_; }
+  int64_t size(int axis) const { return shape_[axis]; }
+  int rank() const { return shape_.rank(); }
+  int64_t numel() const { return numel_; }
+  DType dtype() const { return dtype_; }
+  Device device() const;
+
+  /// Host pointer; T must match the dtype (Error otherwise).
+  template <class T>
+  T* data();
+  template <class T>
+  const T* data() const;
+  void* raw() { return base_; }
+  const void* raw() const { return base_; }
+
+  Tensor reshape(const Shape& shape) const;     ///< same memory; one dimension may be -1
+  Tensor rows(int64_t from, int64_t to) const;  ///< leading-axis range, same memory
+  Tensor clone() const;
+  Tensor cast(DType type) const;         ///< the same handle if the type is equal
+  double item(int64_t index = 0) const;  ///< one element as double
+  template <class T>
+  std::vector<T> to_vector() const;
+
+ private:
+  std::shared_ptr<Storage> storage_;
+  void* base_ = nullptr;
+  Shape shape_;
+  int64_t numel_ = 0;
+  DType dtype_ = DType::f32;
+};
+
+/// Memory of the pooled allocator, bytes.
+struct MemoryStats {
+  int64_t in_use = 0;
+  int64_t peak = 0;
+  int64_t large_allocations = 0;  ///< blocks of 1 MiB or more taken from the system so far
+};
+MemoryStats memory_stats();
+void reset_peak_memory();
+
+}  // namespace restage

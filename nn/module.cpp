@@ -1,0 +1,73 @@
+#include "nn/module.h"
+
+#include <atomic>
+
+namespace restage {
+namespace {
+
+struct Collector final : Fields {
+  std::vector<StateEntry> entries;
+  std::string prefix;
+  std::string path;
+  const char* kind = "";
+
+  void operator()(const std::string& name, Parameter& p) override {
+    entries.push_back({prefix + name, &p.value, &p, path, kind});
+  }
+  void operator()(const std::string& name, Tensor& buffer) override {
+    entries.push_back({prefix + name, &buffer, nullptr, path, kind});
+  }
+  void operator()(const std::string& name, Module& child) override {
+    const std::string old_prefix = prefix, old_path = path;
+    const char* old_kind = kind;
+    path = prefix + name;
+    prefix += name + ".";
+    kind = child.kind();
+    child.visit(*this);
+    prefix = old_prefix;
+    path = old_path;
+    kind = old_kind;
+  }
+};
+
+}  // namespace
+
+uint64_t Parameter::next_id() {
+  static std::atomic<uint64_t> next{1};
+  return next++;
+}
+
+std::vector<StateEntry> state_of(Module& module, const std::string& prefix) {
+  Collector c;
+  c.prefix = prefix;
+  c.kind = module.kind();
+  module.visit(c);
+  return c.entries;
+}
+
+std::vector<Parameter*> parameters_of(Module& module) {
+  std::vector<Parameter*> out;
+  for (const StateEntry& e : state_of(module))
+    if (e.parameter != nullptr) out.push_back(e.parameter);
+  return out;
+}
+
+int64_t count_parameters(Module& module) {
+  int64_t n = 0;
+  for (const Parameter* p : parameters_of(module)) n += p->value.numel();
+  return n;
+}
+
+void cast_module(Module& module, DType type) {
+  for (const StateEntry& e : state_of(module)) *e.value = e.value->cast(type);
+}
+
+Tensor Init::uniform(const Shape& shape, double bound, const std::string& name) const {
+  const RngKey stream = key.fold(name);
+  std::vector<double> values(static_cast<size_t>(shape.numel()));
+  for (size_t i = 0; i < values.size(); ++i)
+    values[i] = bound * (2 * restage::uniform(stream, i) - 1);
+  return Tensor::from<double>(shape, values).cast(type);
+}
+
+}  // namespace restage

@@ -1,0 +1,81 @@
+// Parameters and modules. A module is a plain struct whose members are parameters, buffers and
+// modules; visit() names them once, and counting, initialising, saving, loading and optimising all
+// follow from it. Names are PyTorch's state-dict names.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "autograd/base/rng.h"
+#include "autograd/tape/tape.h"
+
+namespace restage {
+
+/// A trainable tensor. Its identity ties gradients to it (Gradients::find).
+struct Parameter {
+  Tensor value;
+  uint64_t id = next_id();
+  static uint64_t next_id();
+  Parameter() = default;
+  explicit Parameter(Tensor v) : value(std::move(v)) {}
+  Parameter(const Parameter&) = delete;  // two parameters never share an identity
+  Parameter& operator=(const Parameter&) = delete;
+};
+
+struct Module;
+
+/// Receives the members of a module, in PyTorch's order.
+class Fields {
+ public:
+  virtual ~Fields() = default;
+  virtual void operator()(const std::string& name, Parameter& parameter) = 0;
+  virtual void operator()(const std::string& name, Tensor& buffer) = 0;
+  virtual void operator()(const std::string& name, Module& child) = 0;
+};
+
+/// What a forward pass needs besides its inputs; passed down, never global.
+struct Context {
+  Tape* tape = nullptr;   ///< null: nothing is recorded
+  bool training = false;  ///< dropout on, batch statistics in batch norm
+  RngKey rng;             ///< of this step; dropout masks are functions of it and the module path
+
+  /// The parameter as a value: a leaf of the tape, or a constant without one.
+  Var bind(const Parameter& p) const { return tape ? tape->leaf(p.value, p.id) : Var(p.value); }
+};
+
+struct Module {
+  Module() = default;
+  virtual ~Module() = default;
+  Module(const Module&) = delete;
+  Module& operator=(const Module&) = delete;
+  virtual void visit(Fields& fields) = 0;
+  /// Short kind for layer tables, e.g. "Linear".
+  virtual const char* kind() const = 0;
+};
+
+/// One entry of a state dict.
+struct StateEntry {
+  std::string name;  ///< "backbone.fc1.0.weight"
+  Tensor* value;
+  Parameter* parameter;  ///< null: a buffer
+  std::string module;    ///< path of the owning module, "backbone.fc1.0"
+  const char* kind;      ///< its kind
+};
+/// All parameters and buffers, depth first in declaration order, names joined with dots.
+std::vector<StateEntry> state_of(Module& module, const std::string& prefix = "");
+std::vector<Parameter*> parameters_of(Module& module);
+int64_t count_parameters(Module& module);
+/// Casts every parameter and buffer.
+void cast_module(Module& module, DType type);
+
+/// PyTorch's default start: uniform in +-1/sqrt(fan_in) (spec 7), from a named stream.
+struct Init {
+  RngKey key;
+  DType type = DType::f32;
+  Tensor uniform(const Shape& shape, double bound, const std::string& name) const;
+  Init sub(const std::string& name) const { return {key.fold(name), type}; }
+};
+
+}  // namespace restage
