@@ -1,0 +1,125 @@
+#include "infer/writers/bvh.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <numbers>
+
+#include "autograd/base/error.h"
+
+namespace restage {
+namespace {
+
+constexpr int kCountWidth = 10;  // room for the number of frames, known only at the end
+
+std::string vector_text(const Vec3& v) {
+  char text[96];
+  std::snprintf(text, sizeof text, "%.6f %.6f %.6f", v.x(), v.y(), v.z());
+  return text;
+}
+
+bool is_leaf(int joint) {
+  return std::find(kParents.begin(), kParents.end(), joint) == kParents.end();
+}
+
+// One joint with all below it; appends to `order` what it lists.
+void list_joint(const Joints& rest, int joint, int depth, double scale, std::string& text,
+                std::array<int, kJoints>& order, int& listed) {
+  const std::string in(static_cast<size_t>(depth), '\t');
+  const int parent = kParents[joint];
+  const Vec3 offset = parent < 0 ? rest[joint] : Vec3(rest[joint] - rest[parent]);
+  order[listed++] = joint;
+  text +=
+      in + (parent < 0 ? "ROOT " : "JOINT ") + std::string(kJointNames[joint]) + "\n" + in + "{\n";
+  text += in + "\tOFFSET " + vector_text(scale * offset) + "\n";
+  text += in + (parent < 0 ? "\tCHANNELS 6 Xposition Yposition Zposition " : "\tCHANNELS 3 ") +
+          "Zrotation Yrotation Xrotation\n";
+  for (int child = joint + 1; child < kJoints; ++child)
+    if (kParents[child] == joint) list_joint(rest, child, depth + 1, scale, text, order, listed);
+  if (is_leaf(joint))  // half the bone further on: the format wants an end, the method knows none
+    text += in + "\tEnd Site\n" + in + "\t{\n" + in + "\t\tOFFSET " +
+            vector_text(0.5 * scale * offset) + "\n" + in + "\t}\n";
+  text += in + "}\n";
+}
+
+double nearest_turn(double angle, double near) {
+  constexpr double turn = 2 * std::numbers::pi;
+  return angle + turn * std::round((near - angle) / turn);
+}
+
+}  // namespace
+
+Vec3 euler_zyx(const Mat3& r, const Vec3& near) {
+  const double sine = std::clamp(-r(2, 0), -1.0, 1.0);
+  const double cosine = std::hypot(r(2, 1), r(2, 2));
+  if (cosine < 1e-9) {  // y at +-90 degrees: only z -+ x matters; x stays as it was
+    const double y = std::copysign(std::numbers::pi / 2, sine), x = near[2];
+    const double sum = std::atan2(-r(0, 1), r(1, 1));  // z - x at +90, z + x at -90
+    return {nearest_turn(sine > 0 ? sum + x : sum - x, near[0]), nearest_turn(y, near[1]), x};
+  }
+  const Vec3 first(std::atan2(r(1, 0), r(0, 0)), std::atan2(sine, cosine),
+                   std::atan2(r(2, 1), r(2, 2)));
+  const Vec3 second(first[0] + std::numbers::pi, std::numbers::pi - first[1],
+                    first[2] + std::numbers::pi);
+  Vec3 best;
+  double least = INFINITY;
+  for (const Vec3& angles : {first, second}) {
+    const Vec3 turned(nearest_turn(angles[0], near[0]), nearest_turn(angles[1], near[1]),
+                      nearest_turn(angles[2], near[2]));
+    const double distance = (turned - near).squaredNorm();
+    if (distance < least) best = turned, least = distance;
+  }
+  return best;
+}
+
+BvhWriter::BvhWriter(std::string path, const Joints& rest, BvhOptions options)
+    : path_(std::move(path)), options_(options), file_(path_) {
+  out_.reset(std::fopen(file_.path().c_str(), "wb"));
+  if (!out_) throw WorkError(path_ + ": could not be opened (" + std::strerror(errno) + ")");
+  last_.fill(Vec3::Zero());
+  std::string text = "HIERARCHY\n";
+  int listed = 0;
+  list_joint(rest, 0, 0, options_.units_per_metre, text, order_, listed);
+  text += "MOTION\nFrames: ";
+  count_at_ = static_cast<long>(text.size());
+  char line[64];
+  std::snprintf(line, sizeof line, "%*d\nFrame Time: %.16g\n", kCountWidth, 0, 1.0 / options_.fps);
+  write(text + line);
+}
+
+void BvhWriter::write(const std::string& text) {
+  if (std::fwrite(text.data(), 1, text.size(), out_.get()) != text.size())
+    throw WorkError(path_ + ": could not be written (" + std::strerror(errno) +
+                    "); free some space and run it again");
+}
+
+void BvhWriter::push(const Pose& pose) {
+  bool finite = pose.root.allFinite();
+  for (const Mat3& r : pose.local) finite = finite && r.allFinite();
+  if (!finite)
+    throw WorkError(path_ + ": the pose of frame " + std::to_string(frames_) +
+                    " is not finite; check the source and the weights");
+  std::string line = vector_text(options_.units_per_metre * pose.root);
+  for (const int joint : order_) {
+    last_[joint] = euler_zyx(pose.local[joint], last_[joint]);
+    line += ' ' + vector_text(last_[joint] * (180.0 / std::numbers::pi));
+  }
+  write(line + "\n");
+  ++frames_;
+}
+
+void BvhWriter::commit() {
+  char count[32];
+  std::snprintf(count, sizeof count, "%*zu", kCountWidth, frames_);
+  if (std::fseek(out_.get(), count_at_, SEEK_SET) != 0)
+    throw WorkError(path_ + ": could not be written (" + std::strerror(errno) + ")");
+  write(count);
+  if (std::fclose(out_.release()) != 0)
+    throw WorkError(path_ + ": could not be written (" + std::strerror(errno) +
+                    "); free some space and run it again");
+  file_.commit();
+}
+
+}  // namespace restage

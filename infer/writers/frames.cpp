@@ -1,0 +1,113 @@
+#include "infer/writers/frames.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+
+#include "autograd/base/error.h"
+
+namespace restage {
+namespace {
+
+namespace fs = std::filesystem;
+
+[[noreturn]] void fail(const std::string& target, int code) {
+  const std::string why = std::strerror(code);
+  if (code == ENOENT || code == ENOTDIR || code == EACCES || code == EROFS || code == EEXIST)
+    throw InputError(target, "cannot be written (" + why + ")",
+                     "give a path in a folder you can write to");
+  throw WorkError(target + ": could not be written (" + why +
+                  "); free some space and run it again");
+}
+
+bool is_frame(const std::string& name) {
+  if (name.size() < 16 || name.compare(0, 6, "frame_") != 0) return false;
+  const size_t dot = name.size() - 4;
+  if (name.compare(dot, 4, ".ply") != 0 && name.compare(dot, 4, ".obj") != 0) return false;
+  return name.find_first_not_of("0123456789", 6) == dot;
+}
+
+// Only what looks like our own earlier result may be replaced.
+void check_replaceable(const std::string& folder) {
+  std::error_code code;
+  if (!fs::exists(fs::symlink_status(folder, code))) return;
+  if (!fs::is_directory(folder, code) || fs::is_symlink(folder, code))
+    throw InputError(folder, "exists and is not a folder", "give another name");
+  for (fs::directory_iterator it(folder, code), end; !code && it != end; it.increment(code))
+    if (!is_frame(it->path().filename().string()))
+      throw InputError(folder, "holds other files (" + it->path().filename().string() + ")",
+                       "give a new or an empty folder");
+  if (code) fail(folder, code.value());
+}
+
+void write_plain(const std::string& path, const std::string& bytes, const std::string& target) {
+  std::FILE* out = std::fopen(path.c_str(), "wb");
+  if (out == nullptr) fail(target, errno);
+  const size_t written = std::fwrite(bytes.data(), 1, bytes.size(), out);
+  const int code = errno;
+  if (std::fclose(out) != 0) fail(target, errno);
+  if (written != bytes.size()) fail(target, code);
+}
+
+// All frames at once: one flush of the file system is far cheaper than one per file.
+void flush_folder(const std::string& folder, const std::string& target) {
+  const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) fail(target, errno);
+  const int result = ::syncfs(fd);
+  const int code = errno;
+  ::close(fd);
+  if (result != 0) fail(target, code);
+}
+
+}  // namespace
+
+FrameFolderWriter::FrameFolderWriter(std::string folder, std::vector<Triangle> faces,
+                                     MeshFormat format)
+    : folder_(std::move(folder)), faces_(std::move(faces)), format_(format) {
+  while (folder_.size() > 1 && folder_.back() == '/') folder_.pop_back();
+  if (folder_.empty() || folder_ == "/" || folder_ == "." || folder_ == "..")
+    throw InputError(folder_, "cannot be replaced by a folder of frames", "give a folder's name");
+  check_replaceable(folder_);
+  const fs::path path(folder_);
+  temporary_ =
+      (path.parent_path() / ("." + path.filename().string() + ".part" + std::to_string(::getpid())))
+          .string();
+  std::error_code code;
+  fs::remove_all(temporary_, code);
+  if (!fs::create_directory(temporary_, code) || code) fail(folder_, code ? code.value() : EEXIST);
+}
+
+FrameFolderWriter::~FrameFolderWriter() {
+  std::error_code ignored;
+  if (!done_) fs::remove_all(temporary_, ignored);
+}
+
+void FrameFolderWriter::push(const Points& vertices) {
+  char name[48];
+  std::snprintf(name, sizeof name, "/frame_%06zu.%s", frames_, extension(format_));
+  check_mesh(folder_ + name, vertices, faces_);
+  write_plain(temporary_ + name, mesh_bytes(format_, vertices, faces_), folder_);
+  ++frames_;
+}
+
+void FrameFolderWriter::commit() {
+  flush_folder(temporary_, folder_);
+  check_replaceable(folder_);
+  // rename() replaces an empty folder; frames of an earlier run swap places and are then removed
+  if (::rename(temporary_.c_str(), folder_.c_str()) != 0) {
+    if (errno != ENOTEMPTY && errno != EEXIST) fail(folder_, errno);
+    if (::renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, folder_.c_str(), RENAME_EXCHANGE) != 0)
+      fail(folder_, errno);
+    std::error_code ignored;
+    fs::remove_all(temporary_, ignored);
+  }
+  done_ = true;
+  const fs::path parent = fs::path(folder_).parent_path();
+  flush_folder(parent.empty() ? "." : parent.string(), folder_);
+}
+
+}  // namespace restage

@@ -1,0 +1,36 @@
+// Numbered folders of meshes or clouds: frame_000000.ply, frame_000001.ply, ...
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "infer/writers/mesh_file.h"
+
+namespace restage {
+
+/// Writes one file per frame into a folder that appears whole, at commit(), or not at all: frames
+/// go to a hidden folder beside it that is renamed in the end and removed when commit() is not
+/// reached. A folder of that name is replaced if it is empty or holds nothing but such frames;
+/// anything else in it is an InputError before any work. Memory: one frame. Disk full: WorkError.
+class FrameFolderWriter {
+ public:
+  /// `faces` are those of every frame; empty for clouds, whose point count may change.
+  FrameFolderWriter(std::string folder, std::vector<Triangle> faces,
+                    MeshFormat format = MeshFormat::ply);
+  ~FrameFolderWriter();
+  FrameFolderWriter(const FrameFolderWriter&) = delete;
+  FrameFolderWriter& operator=(const FrameFolderWriter&) = delete;
+
+  void push(const Points& vertices);
+  void commit();
+  size_t frames() const { return frames_; }
+
+ private:
+  std::string folder_, temporary_;
+  std::vector<Triangle> faces_;
+  MeshFormat format_;
+  size_t frames_ = 0;
+  bool done_ = false;
+};
+
+}  // namespace restage
