@@ -48,7 +48,12 @@ for clip, frames in (('07_01', (0, 40)), ('02_03', (5, 30))):
         poses.append(dict(clip=clip, frame=f, rest=r(c['rest22']), source=r(matrix_quat(source[f]), 9),
                           hips=r(hips[f]), world=r(R[f].reshape(22, 9), 8), root=r(t[f]), joints=r(J), surface=r(V)))
 
+d = B.build(model, B.row_targets(B.rows()[0]), 'female_sportsuit01')
+pick = np.linspace(0, len(d['vertices']) - 1, 40).astype(int)
+garment = dict(name='female_sportsuit01', count=len(d['vertices']), triangles=len(d['triangles']), pick=pick.tolist(),
+               vertices=r(d['vertices'][pick]))
+
 out = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'bodies.json')
-json.dump(dict(source='tools/body.py, tools/motion.py; CC0 bodies (MakeHuman), CMU motion', bodies=bodies,
+json.dump(dict(source='tools/body.py, tools/motion.py; CC0 bodies (MakeHuman), CMU motion', bodies=bodies, garment=garment,
                surface_pick=keep_pick.tolist(), poses=poses), open(out, 'w'), separators=(',', ':'))
 print(os.path.getsize(out))
