@@ -1,0 +1,461 @@
+#include "datasets/hdf5/file.h"
+
+#include <hdf5.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <limits>
+#include <type_traits>
+
+#include "autograd/base/error.h"
+#include "datasets/hdf5/detail.h"
+
+namespace restage::h5 {
+namespace {
+
+constexpr uint64_t kAlwaysAllowed = uint64_t{256} << 20;  // bytes that any data set may claim
+constexpr uint64_t kMostCompression = 2000;  // gzip reaches 1032; beyond this, a claim is a lie
+constexpr uint64_t kLargestChunk = uint64_t{256} << 20;
+constexpr uint64_t kLargestRead = uint64_t{16} << 30;
+
+template <class T>
+hid_t memory_type() {
+  if constexpr (std::is_same_v<T, double>) return H5T_NATIVE_DOUBLE;
+  if constexpr (std::is_same_v<T, float>) return H5T_NATIVE_FLOAT;
+  if constexpr (std::is_same_v<T, int64_t>) return H5T_NATIVE_INT64;
+  if constexpr (std::is_same_v<T, int32_t>) return H5T_NATIVE_INT32;
+  if constexpr (std::is_same_v<T, int16_t>) return H5T_NATIVE_INT16;
+  if constexpr (std::is_same_v<T, uint8_t>) return H5T_NATIVE_UINT8;
+}
+
+/// numpy's float16, which the library has no name for.
+Handle half_type() {
+  Handle half(H5Tcopy(H5T_IEEE_F32LE), H5Tclose);
+  H5Tset_fields(half, 15, 10, 5, 0, 10);
+  H5Tset_size(half, 2);
+  H5Tset_ebias(half, 15);
+  return half;
+}
+
+bool is_one_of(hid_t type, std::initializer_list<hid_t> known) {
+  return std::any_of(known.begin(), known.end(), [&](hid_t k) { return H5Tequal(type, k) > 0; });
+}
+
+bool is_wide_integer(hid_t type) {
+  return is_one_of(type, {H5T_STD_I64LE, H5T_STD_I64BE, H5T_STD_U64LE, H5T_STD_U64BE, H5T_STD_U32LE,
+                          H5T_STD_U32BE});
+}
+
+/// Only plain machine types: odd bit layouts exist in no honest file.
+Type classify(hid_t type, const std::string& where) {
+  const H5T_class_t kind = H5Tget_class(type);
+  if (kind == H5T_STRING) return Type::text;
+  if (kind == H5T_FLOAT &&
+      (is_one_of(type, {H5T_IEEE_F32LE, H5T_IEEE_F32BE, H5T_IEEE_F64LE, H5T_IEEE_F64BE}) ||
+       H5Tequal(type, half_type()) > 0))
+    return Type::floating;
+  if (kind == H5T_INTEGER &&
+      (is_wide_integer(type) ||
+       is_one_of(type,
+                 {H5T_STD_I8LE, H5T_STD_I8BE, H5T_STD_U8LE, H5T_STD_U8BE, H5T_STD_I16LE,
+                  H5T_STD_I16BE, H5T_STD_U16LE, H5T_STD_U16BE, H5T_STD_I32LE, H5T_STD_I32BE})))
+    return Type::integer;
+  throw InputError(where, "holds neither plain numbers nor text",
+                   "store float32, float64 or integers of 8 to 64 bits");
+}
+
+/// Only filters of our own files: others are rare, or plug-ins, or known to trip on damaged data.
+void check_filters(hid_t properties, const std::string& where) {
+  const int n = H5Pget_nfilters(properties);
+  for (int i = 0; i < n; ++i) {
+    unsigned flags = 0;
+    size_t values = 0;
+    const H5Z_filter_t filter = H5Pget_filter2(properties, static_cast<unsigned>(i), &flags,
+                                               &values, nullptr, 0, nullptr, nullptr);
+    if (filter != H5Z_FILTER_DEFLATE && filter != H5Z_FILTER_SHUFFLE &&
+        filter != H5Z_FILTER_FLETCHER32)
+      throw InputError(
+          where, "is compressed by filter " + std::to_string(filter) + ", which is not read here",
+          "repack it with: h5repack -f GZIP=4 OLD NEW");
+  }
+}
+
+void check_layout(hid_t properties, const std::string& where) {
+  const H5D_layout_t layout = H5Pget_layout(properties);
+  if (H5Pget_external_count(properties) > 0 || layout == H5D_VIRTUAL || layout < 0)
+    throw InputError(where, "keeps its values in another file",
+                     "copy it into one file with h5repack");
+  if (layout != H5D_CHUNKED) return;
+  check_filters(properties, where);
+  hsize_t chunk[H5S_MAX_RANK];
+  const int rank = H5Pget_chunk(properties, H5S_MAX_RANK, chunk);
+  double bytes = 8;
+  for (int i = 0; i < rank; ++i) bytes *= static_cast<double>(chunk[i]);
+  if (rank <= 0 || bytes <= 0 || bytes > static_cast<double>(kLargestChunk))
+    throw InputError(where, "has chunks of impossible size",
+                     "make the file again with smaller chunks");
+}
+
+Shape extent_of(hid_t space, const std::string& where) {
+  hsize_t dims[H5S_MAX_RANK];
+  const int rank = H5Sget_simple_extent_type(space) == H5S_NULL
+                       ? -1
+                       : H5Sget_simple_extent_dims(space, dims, nullptr);
+  if (rank < 0) throw InputError(where, "holds nothing", "store an array");
+  Shape shape;
+  double total = 8;
+  for (int i = 0; i < rank; ++i) {
+    // An axis of length 0 must not hide the others: products of any of them have to fit too.
+    total *= static_cast<double>(std::max<hsize_t>(dims[i], 1));
+    if (total > 4e18 || dims[i] > (hsize_t{1} << 60))
+      throw InputError(where, "claims an impossible size", "make the file again");
+    shape.push_back(static_cast<int64_t>(dims[i]));
+  }
+  return shape;
+}
+
+uint64_t file_size(const std::string& path) {
+  struct stat info {};
+  return ::stat(path.c_str(), &info) == 0 ? static_cast<uint64_t>(info.st_size) : 0;
+}
+
+int64_t product(const Shape& shape, size_t from = 0) {
+  int64_t n = 1;
+  for (size_t i = from; i < shape.size(); ++i) n *= shape[i];
+  return n;
+}
+
+}  // namespace
+
+std::string to_string(const Shape& shape) {
+  std::string text = "[";
+  for (size_t i = 0; i < shape.size(); ++i)
+    text += (i ? ", " : "") + (shape[i] < 0 ? "*" : std::to_string(shape[i]));
+  return text + "]";
+}
+
+// ---- Dataset -----------------------------------------------------------------------------------
+
+Dataset::Dataset(Dataset&& other) noexcept { *this = std::move(other); }
+
+Dataset& Dataset::operator=(Dataset&& other) noexcept {
+  std::swap(id_, other.id_);
+  std::swap(shape_, other.shape_);
+  std::swap(type_, other.type_);
+  std::swap(where_, other.where_);
+  std::swap(path_, other.path_);
+  std::swap(wide_, other.wide_);
+  return *this;
+}
+
+Dataset::~Dataset() {
+  if (id_ < 0) return;
+  const Lock lock;
+  H5Dclose(id_);
+}
+
+int64_t Dataset::row_size() const { return product(shape_, 1); }
+
+void Dataset::check_memory(int64_t values, size_t value_size) const {
+  if (static_cast<uint64_t>(values) > kLargestRead / value_size)
+    throw InputError(where_, "is too large to read at once", "split it into several files");
+}
+
+void Dataset::read_raw(int64_t first, int64_t count, int64_t type, void* out) const {
+  const Handle space(H5Dget_space(id_), H5Sclose);
+  herr_t done = -1;
+  if (shape_.empty()) {
+    done = H5Dread(id_, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, out);
+  } else {
+    std::vector<hsize_t> start(shape_.size(), 0), size(shape_.begin(), shape_.end());
+    start[0] = static_cast<hsize_t>(first);
+    size[0] = static_cast<hsize_t>(count);
+    const Handle memory(H5Screate_simple(static_cast<int>(size.size()), size.data(), nullptr),
+                        H5Sclose);
+    if (H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, size.data(), nullptr) >=
+        0)
+      done = H5Dread(id_, type, memory, space, H5P_DEFAULT, out);
+  }
+  if (done < 0) throw InputError(where_, "is damaged or cut short", "copy or make the file again");
+}
+
+template <class T>
+void Dataset::read_rows(int64_t first, int64_t count, std::vector<T>& out) const {
+  if (type_ == Type::text) throw InputError(where_, "holds text", "store numbers");
+  if (std::is_integral_v<T> && type_ != Type::integer)
+    throw InputError(where_, "holds fractions where integers are expected", "store integers");
+  if (first < 0 || count < 0 || first > rows() || count > rows() - first)
+    throw InputError(where_,
+                     "has " + std::to_string(rows()) + " rows, row " +
+                         std::to_string(first + count) + " was asked for",
+                     "make the file again");
+  const int64_t values = count * row_size();
+  const bool narrow = std::is_integral_v<T> && !std::is_same_v<T, int64_t> &&
+                      (wide_ || !std::is_same_v<T, int32_t>);
+  check_memory(values, narrow ? sizeof(int64_t) : sizeof(T));
+  out.resize(static_cast<size_t>(values));
+  if (values == 0) return;
+  const Lock lock;
+  if (!narrow) return read_raw(first, count, memory_type<T>(), out.data());
+  if constexpr (std::is_integral_v<T>) {
+    std::vector<int64_t> wide(out.size());
+    read_raw(first, count, H5T_NATIVE_INT64, wide.data());
+    for (size_t i = 0; i < wide.size(); ++i) {
+      if (wide[i] < std::numeric_limits<T>::min() || wide[i] > std::numeric_limits<T>::max())
+        throw InputError(where_, "holds " + std::to_string(wide[i]) + ", which is out of range",
+                         "correct the value");
+      out[i] = static_cast<T>(wide[i]);
+    }
+  }
+}
+
+template <class T>
+std::vector<T> Dataset::read() const {
+  std::vector<T> out;
+  read_rows(0, rows(), out);
+  return out;
+}
+
+std::vector<std::string> Dataset::read_text() const {
+  if (type_ != Type::text) throw InputError(where_, "holds no text", "store strings");
+  const Lock lock;
+  const Handle type(H5Dget_type(id_), H5Tclose);
+  const size_t n = static_cast<size_t>(rows() * row_size());
+  std::vector<std::string> out;
+  if (H5Tis_variable_str(type) > 0) {
+    check_memory(static_cast<int64_t>(n), sizeof(char*));
+    std::vector<char*> raw(n, nullptr);
+    const Handle memory(H5Tcopy(H5T_C_S1), H5Tclose);
+    H5Tset_size(memory, H5T_VARIABLE);
+    H5Tset_cset(memory, H5Tget_cset(type));
+    read_raw(0, rows(), memory, raw.data());
+    for (char* item : raw) {
+      out.emplace_back(item == nullptr ? "" : item);
+      H5free_memory(item);
+    }
+    return out;
+  }
+  const size_t width = H5Tget_size(type);
+  if (width == 0 || width > (size_t{1} << 20))
+    throw InputError(where_, "holds strings of impossible length", "make the file again");
+  check_memory(static_cast<int64_t>(n), width);
+  std::vector<char> raw(n * width);
+  read_raw(0, rows(), type, raw.data());
+  for (size_t i = 0; i < n; ++i)
+    out.emplace_back(raw.data() + i * width, ::strnlen(raw.data() + i * width, width));
+  return out;
+}
+
+template <class T>
+void Dataset::append(std::span<const T> values) {
+  const Lock lock;
+  const int64_t row = row_size(), count = row == 0 ? 0 : static_cast<int64_t>(values.size()) / row;
+  if (count * row != static_cast<int64_t>(values.size()))
+    throw ShapeError(where_ + ": " + std::to_string(values.size()) +
+                     " values are no whole rows of " + std::to_string(row));
+  std::vector<hsize_t> start(shape_.size(), 0), size(shape_.begin(), shape_.end());
+  start[0] = size[0];
+  size[0] += static_cast<hsize_t>(count);
+  if (H5Dset_extent(id_, size.data()) < 0) throw_write_error(path_);
+  size[0] = static_cast<hsize_t>(count);
+  if (!values.empty()) {
+    const Handle space(H5Dget_space(id_), H5Sclose);
+    const Handle memory(H5Screate_simple(static_cast<int>(size.size()), size.data(), nullptr),
+                        H5Sclose);
+    if (H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, size.data(), nullptr) <
+            0 ||
+        H5Dwrite(id_, memory_type<T>(), memory, space, H5P_DEFAULT, values.data()) < 0)
+      throw_write_error(path_);
+  }
+  shape_[0] += count;
+}
+
+// ---- File --------------------------------------------------------------------------------------
+
+File::File(std::unique_ptr<State> state) : state_(std::move(state)) {}
+File::File(File&&) noexcept = default;
+File& File::operator=(File&&) noexcept = default;
+File::~File() = default;
+const std::string& File::path() const { return state_->path; }
+
+File File::open(const std::string& path) {
+  struct stat info {};
+  if (::stat(path.c_str(), &info) != 0)
+    throw InputError(path, std::string("cannot be read (") + std::strerror(errno) + ")",
+                     "check the path");
+  if (!S_ISREG(info.st_mode)) throw InputError(path, "is not a file", "give an HDF5 file");
+  const Lock lock;
+  auto state = std::make_unique<State>(path);
+  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  H5Pset_fclose_degree(access, H5F_CLOSE_STRONG);
+  state->id = H5Fopen(path.c_str(), H5F_ACC_RDONLY, access);
+  if (state->id < 0) {
+    if (H5Fis_hdf5(path.c_str()) > 0)
+      throw InputError(path, "is an HDF5 file, but damaged, cut short or still being written",
+                       "copy or make the file again");
+    throw InputError(path, "is not an HDF5 file", "give an HDF5 file (.h5)");
+  }
+  return File(std::move(state));
+}
+
+File File::create(const std::string& path) {
+  const Lock lock;
+  auto state = std::make_unique<State>(path);
+  state->target = std::make_unique<AtomicFile>(path);
+  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  H5Pset_fclose_degree(access, H5F_CLOSE_STRONG);
+  // The newest layout has checksums over its structure too; no times, so equal content is equal
+  // bytes.
+  H5Pset_libver_bounds(access, H5F_LIBVER_V110, H5F_LIBVER_V110);
+  const Handle creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose);
+  H5Pset_link_creation_order(creation, H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED);
+  H5Pset_obj_track_times(creation, false);
+  state->id = H5Fcreate(state->target->path().c_str(), H5F_ACC_TRUNC, creation, access);
+  if (state->id < 0) throw_write_error(path);
+  return File(std::move(state));
+}
+
+void File::commit() {
+  const Lock lock;
+  const hid_t id = state_->id;
+  if (H5Fflush(id, H5F_SCOPE_GLOBAL) < 0) throw_write_error(state_->path);
+  state_->id = -1;
+  if (H5Fclose(id) < 0) throw_write_error(state_->path);
+  state_->target->commit();
+}
+
+bool File::has(const std::string& name) const {
+  const Lock lock;
+  return link_exists(*state_, name);
+}
+
+Dataset File::dataset(const std::string& name) const {
+  const Lock lock;
+  Dataset set;
+  set.where_ = state_->where(name);
+  set.path_ = state_->path;
+  if (!link_exists(*state_, name))
+    throw InputError(set.where_, "is missing", "give a file that has it");
+  const Handle access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);
+  H5Pset_chunk_cache(access, 521, size_t{32} << 20,
+                     1.0);  // streaming must not unpack a chunk twice
+  set.id_ = H5Dopen2(state_->id, name.c_str(), access);
+  if (set.id_ < 0)
+    throw InputError(set.where_, "is no data set or damaged",
+                     "give a file of the documented schema");
+  const Handle type(H5Dget_type(set.id_), H5Tclose), space(H5Dget_space(set.id_), H5Sclose),
+      creation(H5Dget_create_plist(set.id_), H5Pclose);
+  if (type < 0 || space < 0 || creation < 0)
+    throw InputError(set.where_, "is damaged", "copy or make the file again");
+  set.type_ = classify(type, set.where_);
+  set.wide_ = set.type_ == Type::integer && is_wide_integer(type);
+  set.shape_ = extent_of(space, set.where_);
+  check_layout(creation, set.where_);
+  const auto stored = std::min<uint64_t>(H5Dget_storage_size(set.id_), file_size(state_->path));
+  const uint64_t claimed = static_cast<uint64_t>(product(set.shape_)) * H5Tget_size(type);
+  if (claimed > kAlwaysAllowed && claimed / kMostCompression > stored)
+    throw InputError(set.where_,
+                     "claims " + std::to_string(claimed) + " bytes, far more than the file stores",
+                     "make the file again");
+  return set;
+}
+
+Dataset File::dataset(const std::string& name, const Shape& wanted) const {
+  Dataset set = dataset(name);
+  bool fits = set.shape().size() == wanted.size();
+  for (size_t i = 0; fits && i < wanted.size(); ++i)
+    fits = wanted[i] < 0 || wanted[i] == set.shape()[i];
+  if (!fits)
+    throw InputError(set.where(),
+                     "is shaped " + to_string(set.shape()) + " instead of " + to_string(wanted),
+                     "store it as documented (datasets/README.md)");
+  return set;
+}
+
+void File::create_group(const std::string& name) {
+  const Lock lock;
+  const Handle creation(H5Pcreate(H5P_GROUP_CREATE), H5Pclose);
+  H5Pset_link_creation_order(creation, H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED);
+  H5Pset_obj_track_times(creation, false);
+  for (size_t end = name.find('/', 1);; end = name.find('/', end + 1)) {
+    const std::string part = name.substr(0, end);
+    if (!part.empty() && !link_exists(*state_, part)) {
+      const Handle group(H5Gcreate2(state_->id, part.c_str(), H5P_DEFAULT, creation, H5P_DEFAULT),
+                         H5Gclose);
+      if (group < 0) throw_write_error(state_->path);
+    }
+    if (end == std::string::npos) return;
+  }
+}
+
+int64_t File::make_dataset(const std::string& name, const Shape& shape, int64_t type, bool grows) {
+  const size_t slash = name.rfind('/');
+  if (slash != std::string::npos && slash > 0) create_group(name.substr(0, slash));
+  std::vector<hsize_t> dims(shape.begin(), shape.end()), most = dims, chunk = dims;
+  const Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  H5Pset_obj_track_times(creation, false);
+  if (!dims.empty()) {
+    if (grows) most[0] = H5S_UNLIMITED;
+    // About half a megabyte: small enough to stream, large enough to compress well.
+    const uint64_t row =
+        static_cast<uint64_t>(std::max<int64_t>(product(shape, 1), 1)) * H5Tget_size(type);
+    const uint64_t rows = std::max<uint64_t>(1, (uint64_t{512} << 10) / row);
+    chunk[0] = grows ? rows : std::min<uint64_t>(rows, std::max<hsize_t>(dims[0], 1));
+    for (hsize_t& n : chunk) n = std::max<hsize_t>(n, 1);
+    H5Pset_chunk(creation, static_cast<int>(chunk.size()), chunk.data());
+    H5Pset_shuffle(creation);
+    H5Pset_deflate(creation, 3);
+    H5Pset_fletcher32(creation);
+  }
+  const Handle space(
+      dims.empty() ? H5Screate(H5S_SCALAR)
+                   : H5Screate_simple(static_cast<int>(dims.size()), dims.data(), most.data()),
+      H5Sclose);
+  const hid_t id =
+      H5Dcreate2(state_->id, name.c_str(), type, space, H5P_DEFAULT, creation, H5P_DEFAULT);
+  if (id < 0) throw_write_error(state_->path);
+  return id;
+}
+
+template <class T>
+void File::write(const std::string& name, const Shape& shape, std::span<const T> values) {
+  if (product(shape) != static_cast<int64_t>(values.size()))
+    throw ShapeError(state_->where(name) + ": " + std::to_string(values.size()) +
+                     " values for shape " + to_string(shape));
+  const Lock lock;
+  const Handle id(make_dataset(name, shape, memory_type<T>(), false), H5Dclose);
+  if (values.empty()) return;
+  if (H5Dwrite(id, memory_type<T>(), H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0)
+    throw_write_error(state_->path);
+}
+
+template <class T>
+Dataset File::create_appendable(const std::string& name, const Shape& row) {
+  const Lock lock;
+  Dataset set;
+  set.shape_ = row;
+  set.shape_.insert(set.shape_.begin(), 0);
+  set.where_ = state_->where(name);
+  set.path_ = state_->path;
+  set.type_ = std::is_integral_v<T> ? Type::integer : Type::floating;
+  set.id_ = make_dataset(name, set.shape_, memory_type<T>(), true);
+  return set;
+}
+
+#define RESTAGE_H5_TYPE(T)                                                            \
+  template std::vector<T> Dataset::read<T>() const;                                   \
+  template void Dataset::read_rows<T>(int64_t, int64_t, std::vector<T>&) const;       \
+  template void Dataset::append<T>(std::span<const T>);                               \
+  template void File::write<T>(const std::string&, const Shape&, std::span<const T>); \
+  template Dataset File::create_appendable<T>(const std::string&, const Shape&);
+RESTAGE_H5_TYPE(double)
+RESTAGE_H5_TYPE(float)
+RESTAGE_H5_TYPE(int64_t)
+RESTAGE_H5_TYPE(int32_t)
+RESTAGE_H5_TYPE(int16_t)
+RESTAGE_H5_TYPE(uint8_t)
+#undef RESTAGE_H5_TYPE
+
+}  // namespace restage::h5

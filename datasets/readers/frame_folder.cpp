@@ -1,0 +1,185 @@
+#include "datasets/readers/frame_folder.h"
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+
+#include "autograd/base/error.h"
+#include "datasets/readers/mesh_io.h"
+#include "datasets/schema.h"
+#include "datasets/schema_detail.h"
+
+namespace restage {
+namespace {
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+/// The run of digits at `at`, without leading zeros; moves `at` behind it.
+std::string take_digits(const std::string& text, size_t& at) {
+  size_t begin = at;
+  while (at < text.size() && is_digit(text[at])) ++at;
+  while (begin + 1 < at && text[begin] == '0') ++begin;
+  return text.substr(begin, at - begin);
+}
+
+/// PLY/OBJ files, one frame each.
+class FileFrames : public FrameSource {
+ public:
+  explicit FileFrames(std::vector<std::string> files) : files_(std::move(files)) {}
+  std::optional<Frame> next() override {
+    if (at_ == files_.size()) return std::nullopt;
+    Mesh mesh = read_mesh(files_[at_]);
+    return Frame{files_[at_++], std::move(mesh.vertices), std::move(mesh.faces), 0};
+  }
+  void rewind() override { at_ = 0; }
+  int64_t frames() const override { return static_cast<int64_t>(files_.size()); }
+  double fps() const override { return kFps; }
+
+ private:
+  std::vector<std::string> files_;
+  size_t at_ = 0;
+};
+
+/// What scans and predictions share: a data set of points read piece by piece.
+class Hdf5Frames : public FrameSource {
+ public:
+  Hdf5Frames(h5::File file, h5::Dataset set, int64_t frames)
+      : file_(std::move(file)), set_(std::move(set)), frames_(frames), fps_(read_fps(file_)) {
+    if (frames_ == 0)
+      throw InputError(set_.where(), "holds no frames", "give a file with at least one frame");
+    sequence_ = file_.has("/sequence_offset")
+                    ? read_offsets(file_, "/sequence_offset", frames_, true)
+                    : std::vector<int64_t>{0, frames_};
+  }
+  std::optional<Frame> next() override {
+    if (at_ == frames_) return std::nullopt;
+    Frame frame;
+    frame.source = file_.path() + ":" + std::to_string(at_);
+    const int64_t row = read(at_, values_);
+    check_finite(set_.where(), values_, std::max<int64_t>(set_.row_size(), 1), row);
+    if (values_.empty()) throw InputError(frame.source, "holds no points", "leave the frame out");
+    frame.points.resize(values_.size() / 3);
+    for (size_t i = 0; i < values_.size(); ++i)
+      frame.points[i / 3][static_cast<int>(i % 3)] = values_[i];
+    frame.faces = faces_;
+    frame.sequence =
+        std::upper_bound(sequence_.begin(), sequence_.end(), at_) - sequence_.begin() - 1;
+    ++at_;
+    return frame;
+  }
+  void rewind() override { at_ = 0; }
+  int64_t frames() const override { return frames_; }
+  double fps() const override { return fps_; }
+
+ protected:
+  /// Reads the values of a frame and returns the first row of the data set that was read.
+  virtual int64_t read(int64_t frame, std::vector<float>& values) = 0;
+  h5::File file_;
+  h5::Dataset set_;
+  std::vector<Triangle> faces_;
+
+ private:
+  int64_t frames_, at_ = 0;
+  double fps_;
+  std::vector<int64_t> sequence_;
+  std::vector<float> values_;
+};
+
+class ScanFrames : public Hdf5Frames {
+ public:
+  ScanFrames(h5::File file, h5::Dataset set, std::vector<int64_t> offset)
+      : Hdf5Frames(std::move(file), std::move(set), static_cast<int64_t>(offset.size()) - 1),
+        offset_(std::move(offset)) {}
+
+ protected:
+  int64_t read(int64_t frame, std::vector<float>& values) override {
+    const auto f = static_cast<size_t>(frame);
+    set_.read_rows(offset_[f], offset_[f + 1] - offset_[f], values);
+    return offset_[f];
+  }
+
+ private:
+  std::vector<int64_t> offset_;
+};
+
+class VertexFrames : public Hdf5Frames {
+ public:
+  VertexFrames(h5::File file, h5::Dataset set, int64_t frames)
+      : Hdf5Frames(std::move(file), std::move(set), frames) {
+    if (file_.has("/faces")) faces_ = read_faces(file_, "/faces", set_.shape()[1]);
+  }
+
+ protected:
+  int64_t read(int64_t frame, std::vector<float>& values) override {
+    set_.read_rows(frame, 1, values);
+    return frame;
+  }
+};
+
+std::unique_ptr<FrameSource> open_hdf5(const std::string& path) {
+  h5::File file = open_schema_file(path);
+  if (file.has("/points")) {
+    h5::Dataset set = file.dataset("/points", {-1, 3});
+    std::vector<int64_t> offset = read_offsets(file, "/frame_offset", set.rows(), false);
+    return std::make_unique<ScanFrames>(std::move(file), std::move(set), std::move(offset));
+  }
+  if (!file.has("/vertices"))
+    throw InputError(
+        path + ":/points", "is missing, and so is /vertices",
+        "give a file of scans (/points, /frame_offset) or surfaces (/vertices [F, V, 3])");
+  h5::Dataset set = file.dataset("/vertices", {-1, -1, 3});
+  const int64_t frames = set.rows();
+  return std::make_unique<VertexFrames>(std::move(file), std::move(set), frames);
+}
+
+std::vector<std::string> frame_files(const std::string& folder) {
+  std::vector<std::string> files;
+  std::error_code error;
+  for (std::filesystem::directory_iterator item(folder, error), end; !error && item != end;
+       item.increment(error)) {
+    const std::string name = item->path().filename().string();
+    if (name[0] != '.' && is_mesh_name(name) && !item->is_directory())
+      files.push_back(item->path().string());
+  }
+  if (error) throw InputError(folder, "cannot be read (" + error.message() + ")", "check the path");
+  if (files.empty())
+    throw InputError(folder, "holds no PLY or OBJ files", "give a folder of numbered frames");
+  std::sort(files.begin(), files.end(), natural_less);
+  return files;
+}
+
+bool is_hdf5_name(const std::string& path) {
+  const std::string extension = std::filesystem::path(path).extension().string();
+  return extension == ".h5" || extension == ".hdf5" || extension == ".H5";
+}
+
+}  // namespace
+
+bool natural_less(const std::string& a, const std::string& b) {
+  size_t i = 0, j = 0;
+  while (i < a.size() && j < b.size()) {
+    if (is_digit(a[i]) && is_digit(b[j])) {
+      const std::string x = take_digits(a, i), y = take_digits(b, j);
+      if (x.size() != y.size()) return x.size() < y.size();
+      if (x != y) return x < y;
+    } else {
+      if (a[i] != b[j]) return a[i] < b[j];
+      ++i, ++j;
+    }
+  }
+  if ((i == a.size()) != (j == b.size())) return i == a.size();
+  return a < b;  // equal but for leading zeros: any fixed order
+}
+
+std::unique_ptr<FrameSource> open_frames(const std::string& path) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error))
+    return std::make_unique<FileFrames>(frame_files(path));
+  if (is_hdf5_name(path)) return open_hdf5(path);
+  if (!std::filesystem::exists(path, error))
+    throw InputError(path, "does not exist",
+                     "give a folder of frames, a PLY or OBJ file, or an HDF5 file");
+  return std::make_unique<FileFrames>(std::vector<std::string>{path});
+}
+
+}  // namespace restage

@@ -1,0 +1,14 @@
+// OBJ from memory; used by read_mesh().
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "nn/geometry/body.h"
+
+namespace restage {
+
+/// `content` is the whole file, `path` only names it in errors.
+Mesh parse_obj(std::string_view content, const std::string& path);
+
+}  // namespace restage

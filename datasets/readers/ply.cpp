@@ -1,0 +1,328 @@
+#include "datasets/readers/ply.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+
+#include "autograd/base/error.h"
+#include "datasets/readers/text.h"
+
+namespace restage {
+namespace {
+
+const char* const kExportAgain = "export the file again";
+
+enum class Format { ascii, little, big };
+enum class Number { i8, u8, i16, u16, i32, u32, f32, f64 };
+
+struct Property {
+  std::string name;
+  Number type = Number::f32;
+  bool list = false;
+  Number count_type = Number::u8;
+};
+
+struct Element {
+  std::string name;
+  uint64_t count = 0;
+  std::vector<Property> properties;
+};
+
+struct Header {
+  Format format = Format::ascii;
+  std::vector<Element> elements;
+};
+
+size_t bytes_of(Number type) {
+  constexpr std::array<size_t, 8> sizes = {1, 1, 2, 2, 4, 4, 4, 8};
+  return sizes[static_cast<size_t>(type)];
+}
+
+bool is_integer(Number type) { return type != Number::f32 && type != Number::f64; }
+
+bool number_type(std::string_view name, Number& type) {
+  constexpr std::array<std::array<std::string_view, 2>, 8> names = {{{"char", "int8"},
+                                                                     {"uchar", "uint8"},
+                                                                     {"short", "int16"},
+                                                                     {"ushort", "uint16"},
+                                                                     {"int", "int32"},
+                                                                     {"uint", "uint32"},
+                                                                     {"float", "float32"},
+                                                                     {"double", "float64"}}};
+  for (size_t i = 0; i < names.size(); ++i)
+    if (name == names[i][0] || name == names[i][1]) {
+      type = static_cast<Number>(i);
+      return true;
+    }
+  return false;
+}
+
+std::string at_line(const std::string& path, int64_t line) {
+  return path + ":" + std::to_string(line);
+}
+
+// ---- header ------------------------------------------------------------------------------------
+
+Property parse_property(std::string_view line, const std::string& where) {
+  Property property;
+  std::string_view word = text::take_word(line);
+  if (word == "list") {
+    property.list = true;
+    const std::string_view count = text::take_word(line);
+    if (!number_type(count, property.count_type) || !is_integer(property.count_type))
+      throw InputError(where, "unknown type " + text::quote(count) + " of a list's length",
+                       kExportAgain);
+    word = text::take_word(line);
+  }
+  if (!number_type(word, property.type))
+    throw InputError(where, "unknown property type " + text::quote(word), kExportAgain);
+  property.name = text::take_word(line);
+  return property;
+}
+
+Element parse_element(std::string_view line, const std::string& where) {
+  Element element;
+  element.name = text::take_word(line);
+  const std::string_view word = text::take_word(line);
+  int64_t count = 0;
+  if (!text::parse(word, count) || count < 0)
+    throw InputError(
+        where, "impossible count " + text::quote(word) + " of element " + text::quote(element.name),
+        kExportAgain);
+  element.count = static_cast<uint64_t>(count);
+  return element;
+}
+
+Format parse_format(std::string_view line, const std::string& where) {
+  const std::string_view name = text::take_word(line);
+  if (name == "ascii") return Format::ascii;
+  if (name == "binary_little_endian") return Format::little;
+  if (name == "binary_big_endian") return Format::big;
+  throw InputError(where, "unknown PLY format " + text::quote(name),
+                   "use ascii or a binary format");
+}
+
+Header parse_header(text::Lines& lines, const std::string& path) {
+  Header header;
+  bool has_format = false;
+  std::string_view line;
+  lines.next(line);  // the magic word, checked by the caller
+  while (lines.next(line)) {
+    const std::string where = at_line(path, lines.number());
+    const std::string_view word = text::take_word(line);
+    if (word == "end_header") {
+      if (!has_format) throw InputError(where, "the PLY header names no format", kExportAgain);
+      return header;
+    }
+    if (word.empty() || word == "comment" || word == "obj_info") continue;
+    if (word == "format") {
+      header.format = parse_format(line, where);
+      has_format = true;
+    } else if (word == "element") {
+      header.elements.push_back(parse_element(line, where));
+    } else if (word == "property" && !header.elements.empty()) {
+      header.elements.back().properties.push_back(parse_property(line, where));
+    } else {
+      throw InputError(where, "unknown PLY header line " + text::quote(word), kExportAgain);
+    }
+  }
+  throw InputError(path, "is cut short inside the PLY header", kExportAgain);
+}
+
+// ---- rows --------------------------------------------------------------------------------------
+
+/// Gives the values of one element's rows, whatever the encoding.
+class Rows {
+ public:
+  Rows(text::Lines& lines, const Header& header, const std::string& path)
+      : lines_(lines), bytes_(lines.rest()), format_(header.format), path_(path) {}
+
+  /// InputError if what is left of the file cannot hold the rows of the element.
+  void begin(const Element& element) {
+    element_ = &element;
+    row_ = 0;
+    uint64_t smallest = 0;
+    for (const Property& p : element.properties)
+      smallest += format_ == Format::ascii ? 2 : bytes_of(p.list ? p.count_type : p.type);
+    const size_t left = format_ == Format::ascii ? lines_.rest().size() + 1 : bytes_.size();
+    if (element.count > 0 && smallest == 0)
+      throw InputError(path_, "element " + text::quote(element.name) + " has no properties",
+                       kExportAgain);
+    if (element.count > 0 && element.count > left / smallest) throw_short();
+  }
+
+  void begin_row() {
+    ++row_;
+    if (format_ != Format::ascii) return;
+    do {
+      if (!lines_.next(line_)) throw_short();
+    } while (line_.find_first_not_of(" \t\r") == std::string_view::npos);
+  }
+
+  void end_row() {
+    if (format_ == Format::ascii && !text::take_word(line_).empty())
+      throw InputError(where(), "has more values than the header says", kExportAgain);
+  }
+
+  double next(Number type) { return format_ == Format::ascii ? next_word() : next_bytes(type); }
+
+  /// Length of a list, checked against what is left.
+  size_t next_length(const Property& property) {
+    const double n = next(property.count_type);
+    const size_t left =
+        format_ == Format::ascii ? line_.size() : bytes_.size() / bytes_of(property.type);
+    if (!(n >= 0) || n != std::floor(n))
+      throw InputError(where(), "a list has an impossible length", kExportAgain);
+    if (n > static_cast<double>(left)) throw_short();
+    return static_cast<size_t>(n);
+  }
+
+  std::string where() const {
+    return format_ == Format::ascii
+               ? at_line(path_, lines_.number())
+               : path_ + ":" + element_->name.substr(0, 40) + " " + std::to_string(row_ - 1);
+  }
+
+ private:
+  double next_word() {
+    const std::string_view word = text::take_word(line_);
+    double value = 0;
+    if (word.empty())
+      throw InputError(where(), "has fewer values than the header says", kExportAgain);
+    if (!text::parse(word, value))
+      throw InputError(where(), text::quote(word) + " is no number", kExportAgain);
+    return value;
+  }
+
+  double next_bytes(Number type) {
+    const size_t n = bytes_of(type);
+    if (bytes_.size() < n) throw_short();
+    unsigned char raw[8];
+    std::memcpy(raw, bytes_.data(), n);
+    bytes_.remove_prefix(n);
+    if (format_ == Format::big) std::reverse(raw, raw + n);
+    switch (type) {
+      case Number::i8:
+        return as<int8_t>(raw);
+      case Number::u8:
+        return as<uint8_t>(raw);
+      case Number::i16:
+        return as<int16_t>(raw);
+      case Number::u16:
+        return as<uint16_t>(raw);
+      case Number::i32:
+        return as<int32_t>(raw);
+      case Number::u32:
+        return as<uint32_t>(raw);
+      case Number::f32:
+        return static_cast<double>(as<float>(raw));
+      case Number::f64:
+        return as<double>(raw);
+    }
+    return 0;
+  }
+
+  template <class T>
+  static T as(const unsigned char* raw) {
+    T value;
+    std::memcpy(&value, raw, sizeof value);
+    return value;
+  }
+
+  [[noreturn]] void throw_short() const {
+    throw InputError(path_,
+                     "is cut short: element " + text::quote(element_->name) + " should have " +
+                         std::to_string(element_->count) + " rows",
+                     kExportAgain);
+  }
+
+  text::Lines& lines_;
+  std::string_view bytes_, line_;
+  Format format_;
+  const std::string& path_;
+  const Element* element_ = nullptr;
+  uint64_t row_ = 0;
+};
+
+void skip_property(Rows& rows, const Property& property) {
+  const size_t n = property.list ? rows.next_length(property) : 1;
+  for (size_t i = 0; i < n; ++i) rows.next(property.type);
+}
+
+void read_vertices(Rows& rows, const Element& element, const std::string& path, Points& points) {
+  std::array<int, 3> axis_seen = {0, 0, 0};
+  std::vector<int> axis_of;  // for each property: 0, 1, 2 or -1
+  for (const Property& p : element.properties) {
+    axis_of.push_back(p.list ? -1 : p.name == "x" ? 0 : p.name == "y" ? 1 : p.name == "z" ? 2 : -1);
+    if (axis_of.back() >= 0) ++axis_seen[static_cast<size_t>(axis_of.back())];
+  }
+  if (axis_seen != std::array<int, 3>{1, 1, 1})
+    throw InputError(path, "the vertices do not have the properties x, y and z", kExportAgain);
+  points.reserve(points.size() + element.count);
+  for (uint64_t i = 0; i < element.count; ++i) {
+    rows.begin_row();
+    Point point = Point::Zero();
+    for (size_t k = 0; k < axis_of.size(); ++k) {
+      if (axis_of[k] < 0)
+        skip_property(rows, element.properties[k]);
+      else
+        point[axis_of[k]] =
+            text::coordinate(rows.next(element.properties[k].type), [&] { return rows.where(); });
+    }
+    rows.end_row();
+    points.push_back(point);
+  }
+}
+
+/// Indices are kept as they stand (checked to fit); the range is checked when all vertices are
+/// known.
+void read_faces(Rows& rows, const Element& element, std::vector<Triangle>& faces) {
+  std::vector<int32_t> corners;
+  for (uint64_t i = 0; i < element.count; ++i) {
+    rows.begin_row();
+    for (const Property& p : element.properties) {
+      if (!p.list || (p.name != "vertex_indices" && p.name != "vertex_index")) {
+        skip_property(rows, p);
+        continue;
+      }
+      const size_t n = rows.next_length(p);
+      if (n < 3) throw InputError(rows.where(), "a face has fewer than 3 corners", kExportAgain);
+      corners.clear();
+      for (size_t k = 0; k < n; ++k) {
+        const double index = rows.next(p.type);
+        if (!(index >= 0 && index < 2147483648.0) || index != std::floor(index))
+          throw InputError(rows.where(), "a face index is out of range", kExportAgain);
+        corners.push_back(static_cast<int32_t>(index));
+      }
+      text::add_fan(corners, n, faces);
+    }
+    rows.end_row();
+  }
+}
+
+}  // namespace
+
+Mesh parse_ply(std::string_view content, const std::string& path) {
+  text::Lines lines(content);
+  const Header header = parse_header(lines, path);
+  Rows rows(lines, header, path);
+  Mesh mesh;
+  for (const Element& element : header.elements) {
+    rows.begin(element);
+    if (element.name == "vertex") {
+      read_vertices(rows, element, path, mesh.vertices);
+    } else if (element.name == "face") {
+      read_faces(rows, element, mesh.faces);
+    } else {
+      for (uint64_t i = 0; i < element.count; ++i) {
+        rows.begin_row();
+        for (const Property& p : element.properties) skip_property(rows, p);
+        rows.end_row();
+      }
+    }
+  }
+  return mesh;
+}
+
+}  // namespace restage

@@ -1,0 +1,57 @@
+#include "datasets/readers/text.h"
+
+#include <charconv>
+#include <cmath>
+
+#include "autograd/base/error.h"
+
+namespace restage::text {
+namespace {
+
+bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f' || c == '\r'; }
+
+template <class T>
+bool parse_whole(std::string_view word, T& value) {
+  if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
+  const std::from_chars_result result =
+      std::from_chars(word.data(), word.data() + word.size(), value);
+  return result.ec == std::errc() && result.ptr == word.data() + word.size();
+}
+
+}  // namespace
+
+bool Lines::next(std::string_view& line) {
+  if (rest_.empty()) return false;
+  const size_t end = rest_.find('\n');
+  line = rest_.substr(0, end);
+  rest_.remove_prefix(end == std::string_view::npos ? rest_.size() : end + 1);
+  if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+  ++number_;
+  return true;
+}
+
+std::string_view take_word(std::string_view& line) {
+  size_t begin = 0;
+  while (begin < line.size() && is_blank(line[begin])) ++begin;
+  size_t end = begin;
+  while (end < line.size() && !is_blank(line[end])) ++end;
+  const std::string_view word = line.substr(begin, end - begin);
+  line.remove_prefix(end);
+  return word;
+}
+
+bool parse(std::string_view word, double& value) { return parse_whole(word, value); }
+bool parse(std::string_view word, int64_t& value) { return parse_whole(word, value); }
+
+std::string quote(std::string_view word) {
+  std::string out = "'";
+  for (const char c : word.substr(0, 40)) out += c >= 32 && c < 127 ? c : '?';
+  return out + (word.size() > 40 ? "...'" : "'");
+}
+
+void throw_no_coordinate(double value, const std::string& where) {
+  throw InputError(where, std::isnan(value) ? "a coordinate is NaN" : "a coordinate is infinite",
+                   "export the file again with finite coordinates");
+}
+
+}  // namespace restage::text

@@ -1,0 +1,49 @@
+// Lines and numbers of text formats; used by the readers of this folder.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <string_view>
+
+#include "nn/geometry/body.h"
+
+namespace restage::text {
+
+/// Walks over a text line by line ("\n", "\r\n"), counting from 1.
+class Lines {
+ public:
+  explicit Lines(std::string_view content) : rest_(content) {}
+  bool next(std::string_view& line);
+  int64_t number() const { return number_; }       ///< of the line that next() gave
+  std::string_view rest() const { return rest_; }  ///< what follows it
+
+ private:
+  std::string_view rest_;
+  int64_t number_ = 0;
+};
+
+/// Cuts the next word off `line`; empty at its end.
+std::string_view take_word(std::string_view& line);
+/// The whole word as a number (nan and inf count as numbers), independent of the locale.
+bool parse(std::string_view word, double& value);
+bool parse(std::string_view word, int64_t& value);
+/// A short, printable copy for messages.
+std::string quote(std::string_view word);
+
+[[noreturn]] void throw_no_coordinate(double value, const std::string& where);
+/// One coordinate as float; InputError at `where()` if it is NaN, infinite or beyond float.
+template <class Where>
+float coordinate(double value, const Where& where) {
+  if (!(std::abs(value) <= static_cast<double>(std::numeric_limits<float>::max())))
+    throw_no_coordinate(value, where());
+  return static_cast<float>(value);
+}
+/// Adds the fan of a polygon of n corners.
+template <class Index>
+void add_fan(const Index& corner, size_t n, std::vector<Triangle>& faces) {
+  for (size_t i = 2; i < n; ++i) faces.push_back({corner[0], corner[i - 1], corner[i]});
+}
+
+}  // namespace restage::text

@@ -1,0 +1,230 @@
+// Scan and prediction files, and what all kinds share. Bodies and motions: schema_bodies.cpp.
+#include "datasets/schema.h"
+
+#include <cmath>
+
+#include "autograd/base/error.h"
+#include "datasets/schema_detail.h"
+
+namespace restage {
+namespace {
+
+const float* floats(const Points& points) { return points.empty() ? nullptr : points[0].data(); }
+
+std::span<const float> as_floats(const Points& points) {
+  return {floats(points), points.size() * 3};
+}
+
+/// [0, end] where the file has no offsets of its own.
+std::vector<int64_t> sequence_offsets(const h5::File& file, int64_t frames) {
+  if (!file.has("/sequence_offset")) return {0, frames};
+  return read_offsets(file, "/sequence_offset", frames, true);
+}
+
+void write_sequence_offset(h5::File& file, std::vector<int64_t> offset, int64_t frames) {
+  if (offset.empty()) offset.push_back(0);
+  if (offset.back() != frames) offset.push_back(frames);
+  file.write<int64_t>("/sequence_offset", {static_cast<int64_t>(offset.size())}, offset);
+}
+
+void check_frames(const std::string& where, int64_t frames) {
+  if (frames == 0)
+    throw InputError(where, "holds no frames", "give a file with at least one frame");
+}
+
+}  // namespace
+
+h5::File create_schema_file(const std::string& path, const std::string& kind,
+                            const FileInfo& info) {
+  h5::File file = h5::File::create(path);
+  file.set_integer("/", "restage_schema", kSchemaVersion);
+  file.set_text("/", "kind", kind);
+  file.set_text("/", "units", "metres");
+  file.set_text("/", "up", "y");
+  file.set_number("/", "fps", kFps);
+  file.set_text("/", "license", info.license);
+  file.set_text("/", "provenance", info.provenance);
+  return file;
+}
+
+h5::File open_schema_file(const std::string& path) {
+  h5::File file = h5::File::open(path);
+  const std::optional<int64_t> version = file.integer("/", "restage_schema");
+  if (version && *version != kSchemaVersion)
+    throw InputError(path, "has schema version " + std::to_string(*version) + ", which is unknown",
+                     "this program reads version " + std::to_string(kSchemaVersion));
+  return file;
+}
+
+std::vector<int64_t> read_offsets(const h5::File& file, const std::string& name, int64_t end,
+                                  bool strictly) {
+  const h5::Dataset set = file.dataset(name, {-1});
+  const std::vector<int64_t> offset = set.read<int64_t>();
+  bool good = offset.size() >= 2 && offset.front() == 0 && offset.back() == end;
+  for (size_t i = 1; good && i < offset.size(); ++i)
+    good = offset[i] > offset[i - 1] || (!strictly && offset[i] == offset[i - 1]);
+  if (!good)
+    throw InputError(set.where(), "does not rise from 0 to " + std::to_string(end),
+                     "store the start of each part and the end");
+  return offset;
+}
+
+std::vector<Triangle> read_faces(const h5::File& file, const std::string& name, int64_t vertices) {
+  const h5::Dataset set = file.dataset(name, {-1, 3});
+  const std::vector<int32_t> index = set.read<int32_t>();
+  std::vector<Triangle> faces(index.size() / 3);
+  for (size_t i = 0; i < index.size(); ++i) {
+    if (index[i] < 0 || index[i] >= vertices)
+      throw InputError(set.where(),
+                       "face " + std::to_string(i / 3) + " has vertex " + std::to_string(index[i]) +
+                           " of " + std::to_string(vertices),
+                       "correct the face list");
+    faces[i / 3][i % 3] = index[i];
+  }
+  return faces;
+}
+
+void write_faces(h5::File& file, const std::string& name, const std::vector<Triangle>& faces) {
+  file.write<int32_t>(
+      name, {static_cast<int64_t>(faces.size()), 3},
+      std::span<const int32_t>(faces.empty() ? nullptr : faces[0].data(), faces.size() * 3));
+}
+
+Points read_points(const h5::File& file, const std::string& name) {
+  const std::vector<float> flat = read_finite<float>(file, name, {-1, 3});
+  Points points(flat.size() / 3);
+  for (size_t i = 0; i < points.size(); ++i)
+    points[i] = Point(flat[3 * i], flat[3 * i + 1], flat[3 * i + 2]);
+  return points;
+}
+
+void write_points(h5::File& file, const std::string& name, const Points& points) {
+  file.write<float>(name, {static_cast<int64_t>(points.size()), 3}, as_floats(points));
+}
+
+// ---- scans -------------------------------------------------------------------------------------
+
+void write_scans(const std::string& path, const Scans& scans, const FileInfo& info) {
+  h5::File file = create_schema_file(path, "scans", info);
+  file.set_number("/", "fps", scans.fps);
+  write_points(file, "/points", scans.points);
+  file.write<int64_t>("/frame_offset", {static_cast<int64_t>(scans.frame_offset.size())},
+                      scans.frame_offset);
+  write_sequence_offset(file, scans.sequence_offset, scans.frames());
+  file.commit();
+}
+
+Scans read_scans(const std::string& path) {
+  const h5::File file = open_schema_file(path);
+  Scans scans;
+  scans.points = read_points(file, "/points");
+  scans.frame_offset =
+      read_offsets(file, "/frame_offset", static_cast<int64_t>(scans.points.size()), false);
+  scans.sequence_offset = sequence_offsets(file, scans.frames());
+  scans.fps = read_fps(file);
+  return scans;
+}
+
+ScanWriter::ScanWriter(const std::string& path, const FileInfo& info, double fps)
+    : file_(create_schema_file(path, "scans", info)),
+      points_(file_.create_appendable<float>("/points", {3})) {
+  file_.set_number("/", "fps", fps);
+}
+
+void ScanWriter::append(const Points& cloud) {
+  points_.append<float>(as_floats(cloud));
+  frame_offset_.push_back(frame_offset_.back() + static_cast<int64_t>(cloud.size()));
+}
+
+void ScanWriter::end_sequence() {
+  const int64_t frames = static_cast<int64_t>(frame_offset_.size()) - 1;
+  if (sequence_offset_.back() != frames) sequence_offset_.push_back(frames);
+}
+
+void ScanWriter::commit() {
+  file_.write<int64_t>("/frame_offset", {static_cast<int64_t>(frame_offset_.size())},
+                       frame_offset_);
+  write_sequence_offset(file_, sequence_offset_, static_cast<int64_t>(frame_offset_.size()) - 1);
+  file_.commit();
+}
+
+// ---- predictions -------------------------------------------------------------------------------
+
+Prediction read_prediction(const std::string& path) {
+  const h5::File file = open_schema_file(path);
+  const bool has_joints = file.has("/joints"), has_vertices = file.has("/vertices");
+  if (!has_joints && !has_vertices)
+    throw InputError(path + ":/joints", "is missing, and so is /vertices",
+                     "give a file with /joints [F, 22, 3] or /vertices [F, V, 3]");
+  Prediction out;
+  int64_t joint_frames = -1, vertex_frames = -1;
+  if (has_joints) {
+    joint_frames = file.dataset("/joints", {-1, kJoints, 3}).rows();
+    check_frames(path + ":/joints", joint_frames);
+  }
+  if (has_vertices) {
+    const h5::Dataset set = file.dataset("/vertices", {-1, -1, 3});
+    vertex_frames = set.rows();
+    out.vertex_count = set.shape()[1];
+    check_frames(set.where(), vertex_frames);
+    if (out.vertex_count == 0)
+      throw InputError(set.where(), "holds no vertices", "leave it out or fill it");
+  }
+  if (has_joints && has_vertices && joint_frames != vertex_frames)
+    throw InputError(path + ":/vertices",
+                     "has " + std::to_string(vertex_frames) + " frames but /joints has " +
+                         std::to_string(joint_frames),
+                     "store the same frames in both");
+  out.frames = has_joints ? joint_frames : vertex_frames;
+  out.sequence_offset = sequence_offsets(file, out.frames);
+  if (has_joints) out.joints = read_finite<double>(file, "/joints", {-1, kJoints, 3});
+  if (has_vertices) out.vertices = read_finite<double>(file, "/vertices", {-1, -1, 3});
+  if (file.has("/faces"))
+    out.faces = read_faces(file, "/faces", has_vertices ? out.vertex_count : int64_t{1} << 31);
+  return out;
+}
+
+void write_prediction(const std::string& path, const Prediction& prediction, const FileInfo& info) {
+  h5::File file = create_schema_file(path, "prediction", info);
+  if (!prediction.joints.empty())
+    file.write<double>("/joints", {prediction.frames, kJoints, 3}, prediction.joints);
+  if (!prediction.vertices.empty())
+    file.write<double>("/vertices", {prediction.frames, prediction.vertex_count, 3},
+                       prediction.vertices);
+  write_sequence_offset(file, prediction.sequence_offset, prediction.frames);
+  if (!prediction.faces.empty()) write_faces(file, "/faces", prediction.faces);
+  file.commit();
+}
+
+PredictionWriter::PredictionWriter(const std::string& path, int64_t vertex_count,
+                                   const std::vector<Triangle>& faces, const FileInfo& info,
+                                   double fps)
+    : file_(create_schema_file(path, "prediction", info)),
+      vertex_count_(vertex_count),
+      joints_(file_.create_appendable<float>("/joints", {kJoints, 3})) {
+  file_.set_number("/", "fps", fps);
+  if (vertex_count > 0) vertices_ = file_.create_appendable<float>("/vertices", {vertex_count, 3});
+  if (!faces.empty()) write_faces(file_, "/faces", faces);
+}
+
+void PredictionWriter::append(const Joints& joints, const Points& vertices) {
+  if (static_cast<int64_t>(vertices.size()) != vertex_count_)
+    throw ShapeError("prediction writer: " + std::to_string(vertices.size()) +
+                     " vertices instead of " + std::to_string(vertex_count_));
+  std::array<float, kJoints * 3> flat;
+  for (size_t i = 0; i < flat.size(); ++i)
+    flat[i] = static_cast<float>(joints[i / 3][static_cast<int>(i % 3)]);
+  joints_.append<float>(flat);
+  if (vertices_) vertices_->append<float>(as_floats(vertices));
+}
+
+void PredictionWriter::end_sequence() {
+  if (sequence_offset_.back() != joints_.rows()) sequence_offset_.push_back(joints_.rows());
+}
+
+void PredictionWriter::commit() {
+  write_sequence_offset(file_, sequence_offset_, joints_.rows());
+  file_.commit();
+}
+
+}  // namespace restage

@@ -1,0 +1,144 @@
+// The project's HDF5 files as values: bodies, motions, scan sequences, predictions. The layout is
+// documented in datasets/README.md. Metres, y up, +x the body's left, 30 frames per second.
+//
+// Reading: InputError "file:/dataset: what; fix" for a data set that is missing, wrongly shaped,
+// damaged, holds NaN or infinity or breaks an invariant, and for an unknown schema version. Files
+// without any attribute are accepted. Writing: all at once or not at all; WorkError (disk full).
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "datasets/hdf5/file.h"
+#include "nn/geometry/body.h"
+
+namespace restage {
+
+inline constexpr int64_t kSchemaVersion = 1;
+
+/// Where data comes from and what may be done with it; goes into the file's attributes.
+struct FileInfo {
+  std::string license = "unknown";
+  std::string provenance = "unknown";
+};
+
+// ---- bodies and motions: one "data set file" holds either or both ------------------------------
+
+/// Equal face lists are stored once. InputError if two have the same id or an id has a '/'.
+void write_dataset(const std::string& path, const std::vector<Body>& bodies,
+                   const std::vector<Motion>& motions, const FileInfo& info);
+void write_bodies(const std::string& path, const std::vector<Body>& bodies, const FileInfo& info);
+void write_motions(const std::string& path, const std::vector<Motion>& motions,
+                   const FileInfo& info);
+/// In the order they were written; only those of `split`, if one is given. InputError if the file
+/// holds none at all.
+std::vector<Body> read_bodies(const std::string& path, const std::string& split = "");
+std::vector<Motion> read_motions(const std::string& path, const std::string& split = "");
+
+/// Writes a large data set file one by one, so that nobody has to hold it in memory.
+class DatasetWriter {
+ public:
+  DatasetWriter(const std::string& path, const FileInfo& info);
+  void add(const Body& body);
+  void add(const Motion& motion);
+  void commit();
+
+ private:
+  h5::File file_;
+  std::vector<std::vector<Triangle>> topologies_;
+  int64_t bodies_ = 0, motions_ = 0;
+};
+
+// ---- scan sequences: clouds with differing point counts
+// -------------------------------------------
+
+struct Scans {
+  Points points;                         ///< of all frames, one after the other
+  std::vector<int64_t> frame_offset;     ///< F + 1, frame f has points [f], [f + 1)
+  std::vector<int64_t> sequence_offset;  ///< S + 1 in frames; {0, F} for one sequence
+  double fps = kFps;
+  int64_t frames() const { return static_cast<int64_t>(frame_offset.size()) - 1; }
+};
+
+void write_scans(const std::string& path, const Scans& scans, const FileInfo& info);
+Scans read_scans(const std::string& path);
+
+/// Writes a scan file cloud by cloud in constant memory.
+class ScanWriter {
+ public:
+  ScanWriter(const std::string& path, const FileInfo& info, double fps = kFps);
+  void append(const Points& cloud);
+  void end_sequence();  ///< the next cloud starts another sequence; the last one ends by itself
+  void commit();
+
+ private:
+  h5::File file_;
+  h5::Dataset points_;
+  std::vector<int64_t> frame_offset_{0}, sequence_offset_{0};
+};
+
+// ---- predictions and ground truth: what `restage eval` compares
+// -----------------------------------
+
+struct Prediction {
+  int64_t frames = 0;
+  int64_t vertex_count = 0;              ///< V, 0 without vertices
+  std::vector<double> joints;            ///< F x 22 x 3; empty if absent
+  std::vector<double> vertices;          ///< F x V x 3; empty if absent
+  std::vector<int64_t> sequence_offset;  ///< S + 1, from 0 to F; {0, F} for one sequence
+  std::vector<Triangle> faces;           ///< empty if absent
+};
+
+/// /joints [F,22,3] and /vertices [F,V,3] (float32 or float64, either may be absent),
+/// /sequence_offset [S+1] and /faces [T,3] (both optional).
+Prediction read_prediction(const std::string& path);
+void write_prediction(const std::string& path, const Prediction& prediction, const FileInfo& info);
+
+/// Writes a prediction frame by frame in constant memory (float32).
+class PredictionWriter {
+ public:
+  /// `vertex_count` 0: no vertices. `faces` may be empty.
+  PredictionWriter(const std::string& path, int64_t vertex_count,
+                   const std::vector<Triangle>& faces, const FileInfo& info, double fps = kFps);
+  void append(const Joints& joints, const Points& vertices);
+  void end_sequence();  ///< the next frame starts another sequence; the last one ends by itself
+  void commit();        ///< before this nothing is under `path`
+
+ private:
+  h5::File file_;
+  int64_t vertex_count_ = 0;
+  h5::Dataset joints_;
+  std::optional<h5::Dataset> vertices_;
+  std::vector<int64_t> sequence_offset_{0};
+};
+
+// ---- any of them
+// ----------------------------------------------------------------------------------
+
+struct Inspection {
+  std::string kind;                       ///< "bodies", "motions", "dataset", "scans", "prediction"
+  std::map<std::string, int64_t> counts;  ///< e.g. {"frames": 30, "vertices": 6890}
+  std::string units, license, provenance;
+};
+
+/// What a file holds, without reading its values.
+Inspection inspect(const std::string& path);
+
+/// Reads everything and checks it: finite values, weights that sum to 1, unit quaternions, rising
+/// offsets, face indices. One line per problem ("file:/dataset: what; fix"); none: all is well.
+/// InputError only if the file cannot be opened or is of no known kind.
+std::vector<std::string> verify(const std::string& path);
+
+// ---- pieces that readers share
+// ----------------------------------------------------------------------
+
+/// Opens and checks the schema version.
+h5::File open_schema_file(const std::string& path);
+/// Reads offsets and checks that they rise (strictly, if asked) from 0 to `end`.
+std::vector<int64_t> read_offsets(const h5::File& file, const std::string& name, int64_t end,
+                                  bool strictly);
+
+}  // namespace restage

@@ -1,0 +1,48 @@
+// Shared by schema*.cpp and the readers only.
+#pragma once
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "autograd/base/error.h"
+#include "datasets/schema.h"
+
+namespace restage {
+
+/// A new file with the attributes of every kind; `kind` may be corrected before commit().
+h5::File create_schema_file(const std::string& path, const std::string& kind, const FileInfo& info);
+
+/// InputError with row and value if one is NaN or infinite.
+template <class T>
+void check_finite(const std::string& where, const std::vector<T>& values, int64_t row_size,
+                  int64_t first_row = 0) {
+  for (size_t i = 0; i < values.size(); ++i)
+    if (!std::isfinite(values[i]))
+      throw InputError(where,
+                       "row " + std::to_string(first_row + static_cast<int64_t>(i) / row_size) +
+                           " holds " + (std::isnan(values[i]) ? "NaN" : "infinity"),
+                       "store finite numbers");
+}
+
+template <class T>
+std::vector<T> read_finite(const h5::File& file, const std::string& name, const h5::Shape& wanted) {
+  const h5::Dataset set = file.dataset(name, wanted);
+  std::vector<T> values = set.read<T>();
+  check_finite(set.where(), values, std::max<int64_t>(set.row_size(), 1));
+  return values;
+}
+
+/// Faces [T,3]; every index is checked against the number of vertices.
+std::vector<Triangle> read_faces(const h5::File& file, const std::string& name, int64_t vertices);
+void write_faces(h5::File& file, const std::string& name, const std::vector<Triangle>& faces);
+Points read_points(const h5::File& file, const std::string& name);  ///< [N,3] float32, finite
+void write_points(h5::File& file, const std::string& name, const Points& points);
+/// The file's frame rate; the project's if it says none. InputError if it is not positive.
+double read_fps(const h5::File& file);
+
+/// One member of /bodies or /motions, checked.
+Body read_body(const h5::File& file, const std::string& id);
+Motion read_motion(const h5::File& file, const std::string& id);
+
+}  // namespace restage

@@ -1,0 +1,124 @@
+// What a file holds (inspect) and whether it holds together (verify).
+#include <functional>
+
+#include "autograd/base/error.h"
+#include "datasets/schema.h"
+#include "datasets/schema_detail.h"
+
+namespace restage {
+namespace {
+
+/// By what is in the file, so that a file without attributes has a kind too.
+std::string kind_of(const h5::File& file) {
+  const bool bodies = file.has("/bodies"), motions = file.has("/motions");
+  if (bodies || motions) return !motions ? "bodies" : !bodies ? "motions" : "dataset";
+  if (file.has("/points")) return "scans";
+  if (file.has("/joints") || file.has("/vertices")) return "prediction";
+  throw InputError(file.path(), "holds no bodies, motions, scans or predictions",
+                   "give a file laid out as in datasets/README.md");
+}
+
+void count_dataset(const h5::File& file, std::map<std::string, int64_t>& counts) {
+  if (file.has("/bodies")) {
+    int64_t vertices = 0;
+    const std::vector<std::string> ids = file.children("/bodies");
+    for (const std::string& id : ids)
+      vertices += file.dataset("/bodies/" + id + "/vertices", {-1, 3}).rows();
+    counts["bodies"] = static_cast<int64_t>(ids.size());
+    counts["vertices"] = vertices;
+  }
+  if (file.has("/motions")) {
+    int64_t frames = 0;
+    const std::vector<std::string> ids = file.children("/motions");
+    for (const std::string& id : ids)
+      frames += file.dataset("/motions/" + id + "/hips", {-1, 3}).rows();
+    counts["motions"] = static_cast<int64_t>(ids.size());
+    counts["frames"] = frames;
+  }
+}
+
+void count_frames(const h5::File& file, std::map<std::string, int64_t>& counts) {
+  if (file.has("/points")) {
+    counts["points"] = file.dataset("/points", {-1, 3}).rows();
+    counts["frames"] = file.dataset("/frame_offset", {-1}).rows() - 1;
+  }
+  if (file.has("/joints")) {
+    counts["frames"] = file.dataset("/joints", {-1, kJoints, 3}).rows();
+    counts["joints"] = kJoints;
+  }
+  if (file.has("/vertices")) {
+    const h5::Dataset set = file.dataset("/vertices", {-1, -1, 3});
+    counts["frames"] = set.rows();
+    counts["vertices"] = set.shape()[1];
+  }
+  if (file.has("/faces")) counts["faces"] = file.dataset("/faces", {-1, 3}).rows();
+  counts["sequences"] =
+      file.has("/sequence_offset") ? file.dataset("/sequence_offset", {-1}).rows() - 1 : 1;
+}
+
+void collect(std::vector<std::string>& problems, const std::function<void()>& check) {
+  try {
+    check();
+  } catch (const InputError& error) {
+    problems.push_back(error.what());
+  }
+}
+
+void check_split(const h5::File& file, const std::string& object, const std::string& split) {
+  if (split != "train" && split != "validation" && split != "test")
+    throw InputError(file.path() + ":" + object, "has the split '" + split + "'",
+                     "use train, validation or test");
+}
+
+void verify_members(const h5::File& file, std::vector<std::string>& problems) {
+  if (file.has("/bodies"))
+    for (const std::string& id : file.children("/bodies"))
+      collect(problems, [&] { check_split(file, "/bodies/" + id, read_body(file, id).split); });
+  if (file.has("/motions"))
+    for (const std::string& id : file.children("/motions"))
+      collect(problems, [&] { check_split(file, "/motions/" + id, read_motion(file, id).split); });
+}
+
+}  // namespace
+
+double read_fps(const h5::File& file) {
+  const double fps = file.number("/", "fps").value_or(kFps);
+  if (!(fps > 0 && fps < 1e6))
+    throw InputError(file.path(), "has an impossible frame rate (attribute fps)",
+                     "store frames per second");
+  return fps;
+}
+
+Inspection inspect(const std::string& path) {
+  const h5::File file = open_schema_file(path);
+  Inspection out;
+  out.kind = kind_of(file);
+  out.units = file.text("/", "units").value_or("metres");
+  out.license = file.text("/", "license").value_or("unknown");
+  out.provenance = file.text("/", "provenance").value_or("unknown");
+  if (out.kind == "scans" || out.kind == "prediction")
+    count_frames(file, out.counts);
+  else
+    count_dataset(file, out.counts);
+  return out;
+}
+
+std::vector<std::string> verify(const std::string& path) {
+  const h5::File file = open_schema_file(path);
+  const std::string kind = kind_of(file);
+  std::vector<std::string> problems;
+  collect(problems, [&] {
+    const std::string units = file.text("/", "units").value_or("metres");
+    if (units != "metres") throw InputError(path, "is in '" + units + "'", "convert it to metres");
+  });
+  collect(problems, [&] { read_fps(file); });
+  if (kind == "scans")
+    collect(problems, [&] { read_scans(path); });
+  else if (kind == "prediction")
+    collect(problems, [&] { read_prediction(path); });
+  else
+    collect(problems, [&] { verify_members(file, problems); });
+  return problems;
+}
+
+}  // namespace restage

@@ -1,0 +1,309 @@
+// PLY, OBJ and sequences of frames: every encoding, and one clear line for every bad file.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+
+#include "datasets/readers/frame_folder.h"
+#include "datasets/readers/mesh_io.h"
+#include "datasets/schema.h"
+#include "tests/datasets/schema_support.h"
+
+namespace restage {
+namespace {
+
+using test::error_of;
+using test::TempDir;
+
+Mesh square() {
+  Mesh mesh;
+  mesh.vertices = {{0, 0.1f, 0}, {1, 0, -2.5e-7f}, {1, 1, 1e20f}, {0, 1, 1.f / 3}};
+  mesh.faces = {{0, 1, 2}, {0, 2, 3}};
+  return mesh;
+}
+
+void expect_equal(const Mesh& a, const Mesh& b) {
+  EXPECT_EQ(a.vertices, b.vertices);
+  EXPECT_EQ(a.faces, b.faces);
+}
+
+/// Appends values in the byte order asked for.
+struct Binary {
+  std::string out;
+  bool big = false;
+  template <class T>
+  Binary& add(T value) {
+    char raw[sizeof(T)];
+    std::memcpy(raw, &value, sizeof value);
+    if (big) std::reverse(raw, raw + sizeof value);
+    out.append(raw, sizeof value);
+    return *this;
+  }
+};
+
+TEST(Readers, WritesAndReadsPlyAndObjBitForBit) {
+  const TempDir dir;
+  write_ply(dir / "a.ply", square());
+  write_obj(dir / "a.obj", square());
+  expect_equal(read_mesh(dir / "a.ply"), square());
+  expect_equal(read_mesh(dir / "a.obj"), square());
+  Mesh cloud = square();
+  cloud.faces.clear();
+  write_ply(dir / "c.PLY", cloud);
+  expect_equal(read_mesh(dir / "c.PLY"), cloud);
+  std::filesystem::rename(dir / "a.ply", dir / "no_extension");
+  std::filesystem::rename(dir / "a.obj", dir / "b.txt");
+  expect_equal(read_mesh(dir / "no_extension"), square());
+  expect_equal(read_mesh(dir / "b.txt"), square());
+}
+
+TEST(Readers, ReadsPlyOfAnyOrderTypeAndEncoding) {
+  const TempDir dir;
+  const std::string header =
+      " 1.0\r\ncomment made by hand\r\nobj_info x\r\nelement material 2\r\nproperty list uchar "
+      "short ids\r\n"
+      "element vertex 5\r\nproperty double z\r\nproperty uchar red\r\nproperty short x\r\nproperty "
+      "float32 y\r\n"
+      "element face 2\r\nproperty float quality\r\nproperty list ushort uint vertex_index\r\n"
+      "property list int8 float32 texcoord\r\nend_header\r\n";
+  const std::string ascii =
+      "2 7 -8\r\n0\r\n0 255 0 0\r\n0 1 1 0\r\n\r\n0 2 1 1\r\n+0.5 3 0 1e0\r\n1 4 -1 .5\r\n"
+      "0.5 3 0 1 2 1 0.25\r\n1 5 0 1 2 3 4 0\r\n";
+  test::write_bytes(dir / "a.ply", "ply\r\nformat ascii" + header + ascii);
+  Mesh expected;
+  expected.vertices = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0.5f}, {-1, 0.5f, 1}};
+  expected.faces = {{0, 1, 2}, {0, 1, 2}, {0, 2, 3}, {0, 3, 4}};
+  expect_equal(read_mesh(dir / "a.ply"), expected);
+
+  for (const bool big : {false, true}) {
+    Binary b;
+    b.big = big;
+    b.add<uint8_t>(2).add<int16_t>(7).add<int16_t>(-8).add<uint8_t>(0);
+    for (const Point& p : expected.vertices)
+      b.add<double>(p[2])
+          .add<uint8_t>(200)
+          .add<int16_t>(static_cast<int16_t>(p[0]))
+          .add<float>(p[1]);
+    b.add<float>(0.5f).add<uint16_t>(3).add<uint32_t>(0).add<uint32_t>(1).add<uint32_t>(2);
+    b.add<int8_t>(1).add<float>(0.25f);
+    b.add<float>(1).add<uint16_t>(5);
+    for (uint32_t i = 0; i < 5; ++i) b.add<uint32_t>(i);
+    b.add<int8_t>(0);
+    const std::string format = big ? "binary_big_endian" : "binary_little_endian";
+    test::write_bytes(dir / "b.ply", "ply\r\nformat " + format + header + b.out);
+    expect_equal(read_mesh(dir / "b.ply"), expected);
+    test::write_bytes(dir / "b.ply",
+                      "ply\r\nformat " + format + header + b.out.substr(0, b.out.size() - 1));
+    EXPECT_NE(error_of([&] { read_mesh(dir / "b.ply"); }).find("b.ply: is cut short"),
+              std::string::npos);
+  }
+}
+
+TEST(Readers, ReadsObjOfAllFlavours) {
+  const TempDir dir;
+  test::write_bytes(
+      dir / "a.obj",
+      "# comment\nmtllib x.mtl\r\no thing\nv 0 0 0 1.0\nv 1 0 0 0.5 0.5 0.5\n  v 1 1 0\nvt 0 0\n"
+      "vn 0 0 1\nf 1/1/1 2/1/1 3/1/1\ns off\nv 0 1 0\nf -4//1 -3//1 -2//1 -1//1 # four\nf 1/1 3/1 "
+      "4/1\nl 1 2");
+  Mesh expected;
+  expected.vertices = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+  expected.faces = {{0, 1, 2}, {0, 1, 2}, {0, 2, 3}, {0, 2, 3}};
+  expect_equal(read_mesh(dir / "a.obj"), expected);
+}
+
+struct BadFile {
+  const char* name;
+  std::string content;
+  const char* message;  ///< what follows the folder in the error, up to here
+};
+
+std::string ply(const std::string& elements, const std::string& rows) {
+  return "ply\nformat ascii 1.0\n" + elements + "end_header\n" + rows;
+}
+
+const std::string kVertex3 =
+    "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
+const std::string kFace1 = "element face 1\nproperty list uchar int vertex_indices\n";
+
+std::vector<BadFile> bad_files() {
+  const std::string three = "0 0 0\n1 0 0\n0 1 0\n";
+  std::string binary =
+      "ply\nformat binary_little_endian 1.0\n" + kVertex3 + "end_header\n" + std::string(36, '\0');
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  std::memcpy(&binary[binary.size() - 8], &nan, 4);
+  return {
+      {"empty.ply", "", "empty.ply: is empty and holds no points"},
+      {"text.ply", "hello", "text.ply: is not a PLY file"},
+      {"text.xyz", "hello", "text.xyz: is neither PLY nor OBJ"},
+      {"header.ply", "ply\nformat ascii 1.0\nelement vertex 3\n",
+       "header.ply: is cut short inside the PLY header"},
+      {"noformat.ply", "ply\nend_header\n", "noformat.ply:2: the PLY header names no format"},
+      {"format.ply", "ply\nformat binary_middle_endian 1.0\n", "format.ply:2: unknown PLY format"},
+      {"type.ply", ply("element vertex 1\nproperty real x\n", ""),
+       "type.ply:4: unknown property type 'real'"},
+      {"count.ply", ply("element vertex -3\n", ""),
+       "count.ply:3: impossible count '-3' of element 'vertex'"},
+      {"word.ply", "ply\nvertices 3\n", "word.ply:2: unknown PLY header line 'vertices'"},
+      {"huge.ply",
+       ply("element vertex 9000000000000000000\nproperty float x\nproperty float y\nproperty float "
+           "z\n",
+           three),
+       "huge.ply: is cut short: element 'vertex' should have 9000000000000000000 rows"},
+      {"bare.ply", ply("element junk 9000000000000000000\n" + kVertex3, three),
+       "bare.ply: element 'junk' has no prop"},
+      {"noz.ply", ply("element vertex 1\nproperty float x\nproperty float y\n", "0 0\n"),
+       "noz.ply: the vertices do not"},
+      {"rows.ply", ply(kVertex3, "0.25 0.25 0.25\n1 0 0\n"), "rows.ply: is cut short"},
+      {"fewer.ply", ply(kVertex3, "0 0.25 0\n1 0\n0 1 0\n"), "fewer.ply:9: has fewer values"},
+      {"more.ply", ply(kVertex3, "0 0 0 0\n1 0 0\n0 1 0\n"), "more.ply:8: has more values"},
+      {"word2.ply", ply(kVertex3, "0 0 zero\n1 0 0\n0 1 0\n"), "word2.ply:8: 'zero' is no number"},
+      {"nan.ply", ply(kVertex3, "0 0 0\n1 nan 0\n0 1 0\n"), "nan.ply:9: a coordinate is NaN"},
+      {"inf.ply", ply(kVertex3, "0 0 0\n1 -inf 0\n0 1 0\n"), "inf.ply:9: a coordinate is infinite"},
+      {"far.ply", ply(kVertex3, "0 0 0\n1 1e39 0\n0 1 0\n"), "far.ply:9: a coordinate is infinite"},
+      {"binary.ply", binary, "binary.ply:vertex 2: a coordinate is NaN"},
+      {"none.ply",
+       ply("element vertex 0\nproperty float x\nproperty float y\nproperty float z\n", ""),
+       "none.ply: holds no points"},
+      {"range.ply", ply(kVertex3 + kFace1, three + "3 0 1 3\n"),
+       "range.ply: triangle 0 has vertex index 3 (from 0), out of range for 3 vertices"},
+      {"minus.ply", ply(kVertex3 + kFace1, three + "3 0 1 -1\n"),
+       "minus.ply:13: a face index is out of range"},
+      {"edge.ply", ply(kVertex3 + kFace1, three + "2 0 1\n"),
+       "edge.ply:13: a face has fewer than 3 corners"},
+      {"list.ply", ply(kVertex3 + kFace1, three + "250 0 1 2\n"), "list.ply: is cut short"},
+      {"list2.ply", ply(kVertex3 + kFace1, three + "-3 0 1 2\n"),
+       "list2.ply:13: a list has an impossible length"},
+      {"none.obj", "# nothing\n", "none.obj: holds no points"},
+      {"cut.obj", "v 0 0 0\nv 1 0", "cut.obj:2: a vertex has fewer than 3 coordinates"},
+      {"word.obj", "v 0 0 0\nv 1 0 1,5\n", "word.obj:2: '1,5' is no number"},
+      {"nan.obj", "v 0 0 NaN\n", "nan.obj:1: a coordinate is NaN"},
+      {"range.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n",
+       "range.obj: triangle 0 has vertex index 3 (from 0)"},
+      {"zero.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n",
+       "zero.obj:4: face index 0 is out of range"},
+      {"minus.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 -4\n",
+       "minus.obj:4: face index -4 is out of range"},
+      {"corner.obj", "v 0 0 0\nf 1 1 99999999999999999999\n",
+       "corner.obj:2: '99999999999999999999' is no face corner"},
+      {"edge.obj", "v 0 0 0\nv 1 0 0\nf 1 2\n", "edge.obj:3: a face has fewer than 3 corners"},
+  };
+}
+
+TEST(Readers, EveryBadFileIsOneClearLine) {
+  const TempDir dir;
+  for (const BadFile& bad : bad_files()) {
+    test::write_bytes(dir / bad.name, bad.content);
+    const std::string text = error_of([&] { read_mesh(dir / bad.name); });
+    EXPECT_EQ(text.rfind(dir / bad.message, 0), 0u)
+        << text << "\nshould begin " << dir / bad.message;
+  }
+  EXPECT_NE(error_of([&] { read_mesh(dir / "absent.ply"); }).find("absent.ply: cannot be read"),
+            std::string::npos);
+  EXPECT_NE(error_of([&] { read_mesh(dir.path()); }).find("is a folder"), std::string::npos);
+}
+
+TEST(Readers, NumbersInNamesCompareAsNumbers) {
+  EXPECT_TRUE(natural_less("f2.ply", "f10.ply"));
+  EXPECT_FALSE(natural_less("f10.ply", "f2.ply"));
+  EXPECT_TRUE(natural_less("f002.ply", "f10.ply"));
+  EXPECT_TRUE(natural_less("a9b2", "a9b11"));
+  EXPECT_TRUE(natural_less("a", "a1"));
+  EXPECT_TRUE(natural_less("f01", "f1") != natural_less("f1", "f01"));
+  EXPECT_FALSE(natural_less("f1", "f1"));
+  EXPECT_TRUE(natural_less("99999999999999999999998", "99999999999999999999999"));
+}
+
+TEST(Readers, FoldersGiveFramesInOrderWithChangingCounts) {
+  const TempDir dir;
+  const char* names[] = {"f10.ply", "f2.obj", "f1.ply", "f9.PLY"};
+  for (size_t i = 0; i < 4; ++i) {
+    Mesh mesh;
+    mesh.vertices.assign(i + 1, Point(static_cast<float>(i), 0, 0));
+    if (i == 1)
+      write_obj(dir / names[i], mesh);
+    else
+      write_ply(dir / names[i], mesh);
+  }
+  test::write_bytes(dir / "readme.txt", "not a frame");
+  test::write_bytes(dir / ".f3.ply", "hidden");
+  const std::unique_ptr<FrameSource> frames = open_frames(dir.path());
+  EXPECT_EQ(frames->frames(), 4);
+  for (int pass = 0; pass < 2; ++pass) {
+    std::vector<size_t> counts;
+    while (const std::optional<Frame> frame = frames->next())
+      counts.push_back(frame->points.size());
+    EXPECT_EQ(counts, (std::vector<size_t>{3, 2, 4, 1}));
+    EXPECT_FALSE(frames->next());
+    frames->rewind();
+  }
+  EXPECT_EQ(frames->next()->source, dir / "f1.ply");
+  const std::unique_ptr<FrameSource> single = open_frames(dir / "f10.ply");
+  EXPECT_EQ(single->next()->points.size(), 1u);
+  EXPECT_FALSE(single->next());
+}
+
+TEST(Readers, Hdf5ScansAndPredictionsAreFramesToo) {
+  const TempDir dir;
+  {
+    ScanWriter writer(dir / "s.h5", {}, 60);
+    writer.append({{1, 0, 0}, {2, 0, 0}});
+    writer.append({{3, 0, 0}});
+    writer.end_sequence();
+    writer.append({{4, 0, 0}, {5, 0, 0}, {6, 0, 0}});
+    writer.commit();
+    PredictionWriter prediction(dir / "p.h5", 3, {{0, 1, 2}}, {});
+    for (int f = 0; f < 3; ++f)
+      prediction.append(Joints{}, Points(3, Point(static_cast<float>(f), 1, 2)));
+    prediction.commit();
+  }
+  const std::unique_ptr<FrameSource> scans = open_frames(dir / "s.h5");
+  EXPECT_EQ(scans->frames(), 3);
+  EXPECT_EQ(scans->fps(), 60);
+  EXPECT_EQ(scans->next()->points.size(), 2u);
+  const std::optional<Frame> second = scans->next();
+  EXPECT_EQ(second->points, (Points{{3, 0, 0}}));
+  EXPECT_EQ(second->source, dir / "s.h5:1");
+  EXPECT_EQ(second->sequence, 0);
+  const std::optional<Frame> third = scans->next();
+  EXPECT_EQ(third->points.back(), Point(6, 0, 0));
+  EXPECT_EQ(third->sequence, 1);
+  EXPECT_FALSE(scans->next());
+  scans->rewind();
+  EXPECT_EQ(scans->next()->points[0], Point(1, 0, 0));
+  const std::unique_ptr<FrameSource> prediction = open_frames(dir / "p.h5");
+  prediction->next();
+  const std::optional<Frame> posed = prediction->next();
+  EXPECT_EQ(posed->points, Points(3, Point(1, 1, 2)));
+  EXPECT_EQ(posed->faces, (std::vector<Triangle>{{0, 1, 2}}));
+}
+
+TEST(Readers, BadSequencesAreOneClearLine) {
+  const TempDir dir;
+  EXPECT_NE(error_of([&] { open_frames(dir.path()); }).find("holds no PLY or OBJ files"),
+            std::string::npos);
+  EXPECT_NE(error_of([&] { open_frames(dir / "absent"); }).find("does not exist"),
+            std::string::npos);
+  EXPECT_NE(error_of([&] { open_frames(dir / "absent.h5"); }).find("cannot be read"),
+            std::string::npos);
+  {
+    PredictionWriter joints_only(dir / "j.h5", 0, {}, {});
+    joints_only.append(Joints{}, {});
+    joints_only.commit();
+    ScanWriter gap(dir / "gap.h5", {});
+    gap.append({{1, 1, 1}});
+    gap.append({});
+    gap.append({Point(0, std::numeric_limits<float>::quiet_NaN(), 0)});
+    gap.commit();
+  }
+  EXPECT_NE(
+      error_of([&] { open_frames(dir / "j.h5"); }).find("/points: is missing, and so is /vertices"),
+      std::string::npos);
+  const std::unique_ptr<FrameSource> gap = open_frames(dir / "gap.h5");
+  gap->next();
+  EXPECT_NE(error_of([&] { gap->next(); }).find("gap.h5:1: holds no points"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace restage

@@ -1,0 +1,281 @@
+// The HDF5 wrapper: round trips, streaming, and refusal of everything that is not as it claims.
+#include <gtest/gtest.h>
+#include <hdf5.h>
+#include <sys/resource.h>
+
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+
+#include "autograd/base/error.h"
+#include "datasets/hdf5/file.h"
+#include "tests/datasets/schema_support.h"
+
+namespace restage {
+namespace {
+
+using test::error_of;
+using test::TempDir;
+
+TEST(SchemaHdf5, WritesAndReadsEveryTypeShapeAndAttribute) {
+  const TempDir dir;
+  const std::string path = dir / "a.h5";
+  {
+    h5::File file = h5::File::create(path);
+    file.write<double>("/g/h/d", {2, 1, 2}, std::vector<double>{1.5, -2, 1e300, 4});
+    file.write<float>("f", {3}, std::vector<float>{1, 2, 3});
+    file.write<int64_t>("/i64", {1}, std::vector<int64_t>{int64_t{1} << 40});
+    file.write<int16_t>("/i16", {2}, std::vector<int16_t>{-32768, 32767});
+    file.write<uint8_t>("/u8", {0, 4}, std::vector<uint8_t>{});
+    file.write<int32_t>("/scalar", {}, std::vector<int32_t>{7});
+    file.set_text("/", "note", "metres, \xc3\xa9");
+    file.set_text("/g", "empty", "");
+    file.set_number("/f", "fps", 29.97);
+    file.set_integer("/g/h", "n", -3);
+    EXPECT_FALSE(std::filesystem::exists(path)) << "nothing may appear before commit";
+    file.commit();
+  }
+  const h5::File file = h5::File::open(path);
+  EXPECT_EQ(file.read<double>("/g/h/d", {-1, 1, 2}), (std::vector<double>{1.5, -2, 1e300, 4}));
+  EXPECT_EQ(file.read<double>("/f", {3}), (std::vector<double>{1, 2, 3}));
+  EXPECT_EQ(file.read<int64_t>("/i16", {2}), (std::vector<int64_t>{-32768, 32767}));
+  EXPECT_EQ(file.read<float>("/i16", {2}), (std::vector<float>{-32768, 32767}));
+  EXPECT_TRUE(file.read<uint8_t>("/u8", {-1, 4}).empty());
+  EXPECT_EQ(file.dataset("/scalar").read<int32_t>(), std::vector<int32_t>{7});
+  EXPECT_EQ(file.children(), (std::vector<std::string>{"g", "f", "i64", "i16", "u8", "scalar"}));
+  EXPECT_EQ(file.text("/", "note"), "metres, \xc3\xa9");
+  EXPECT_EQ(file.text("/g", "empty"), "");
+  EXPECT_EQ(file.text("/", "absent"), std::nullopt);
+  EXPECT_EQ(file.number("/f", "fps"), 29.97);
+  EXPECT_EQ(file.integer("/g/h", "n"), -3);
+  EXPECT_EQ(error_of([&] { file.dataset("/i64").read<int32_t>(); }),
+            path + ":/i64: holds 1099511627776, which is out of range; correct the value");
+  EXPECT_NE(error_of([&] { file.dataset("/f").read<int32_t>(); }).find("holds fractions"),
+            std::string::npos);
+  EXPECT_NE(error_of([&] { file.integer("/", "note"); }).find("is not an integer"),
+            std::string::npos);
+}
+
+TEST(SchemaHdf5, AppendsAndReadsRowsAcrossChunks) {
+  const TempDir dir;
+  const std::string path = dir / "rows.h5";
+  const int64_t width = 30000;  // four rows to a chunk
+  {
+    h5::File file = h5::File::create(path);
+    h5::Dataset set = file.create_appendable<float>("/rows", {width});
+    for (int r = 0; r < 11; ++r) {
+      const std::vector<float> row(static_cast<size_t>(width), static_cast<float>(r));
+      set.append<float>(row);
+    }
+    EXPECT_EQ(set.rows(), 11);
+    EXPECT_THROW(set.append<float>(std::vector<float>(7)), ShapeError);
+    file.commit();
+  }
+  const h5::File file = h5::File::open(path);
+  const h5::Dataset set = file.dataset("/rows", {11, width});
+  std::vector<double> rows;
+  set.read_rows(3, 2, rows);
+  EXPECT_EQ(rows.size(), static_cast<size_t>(2 * width));
+  EXPECT_EQ(rows.front(), 3);
+  EXPECT_EQ(rows.back(), 4);
+  EXPECT_NE(error_of([&] { set.read_rows(10, 2, rows); }).find("has 11 rows"), std::string::npos);
+}
+
+TEST(SchemaHdf5, EqualContentIsEqualBytesAndAbandonedFilesLeaveNothing) {
+  const TempDir dir;
+  for (const char* name : {"a.h5", "b.h5"}) {
+    h5::File file = h5::File::create(dir / name);
+    file.write<float>("/g/x", {2}, std::vector<float>{1, 2});
+    file.set_text("/", "kind", "test");
+    file.commit();
+  }
+  EXPECT_EQ(test::bytes_of(dir / "a.h5"), test::bytes_of(dir / "b.h5"));
+  { h5::File::create(dir / "c.h5").write<float>("/x", {1}, std::vector<float>{1}); }
+  EXPECT_EQ(test::names_in(dir.path()), (std::vector<std::string>{"a.h5", "b.h5"}));
+}
+
+TEST(SchemaHdf5, SaysWhatIsWrongWithAFile) {
+  const TempDir dir;
+  EXPECT_NE(error_of([&] { h5::File::open(dir / "no.h5"); }).find("no.h5: cannot be read"),
+            std::string::npos);
+  EXPECT_NE(error_of([&] { h5::File::open(dir.path()); }).find("is not a file"), std::string::npos);
+  test::write_bytes(dir / "text.h5", "hello");
+  EXPECT_NE(error_of([&] { h5::File::open(dir / "text.h5"); }).find("is not an HDF5 file"),
+            std::string::npos);
+  EXPECT_NE(error_of([&] { h5::File::create(dir / "no/such/x.h5"); }).find("cannot be written"),
+            std::string::npos);
+
+  const std::string path = dir / "whole.h5";
+  {
+    h5::File file = h5::File::create(path);
+    file.write<float>("/joints", {1, 22, 3}, std::vector<float>(66));
+    file.commit();
+  }
+  const std::string whole = test::bytes_of(path);
+  test::write_bytes(dir / "cut.h5", whole.substr(0, whole.size() / 2));
+  EXPECT_NE(error_of([&] { h5::File::open(dir / "cut.h5"); }).find("cut short"), std::string::npos);
+  const h5::File file = h5::File::open(path);
+  EXPECT_EQ(error_of([&] { file.dataset("/bodies/x"); }),
+            path + ":/bodies/x: is missing; give a file that has it");
+  EXPECT_EQ(error_of([&] {
+              file.dataset("/joints", {-1, 21, 3});
+            }),
+            path +
+                ":/joints: is shaped [1, 22, 3] instead of [*, 21, 3]; store it as documented "
+                "(datasets/README.md)");
+  EXPECT_NE(error_of([&] { file.children("/joints"); }).find("is not a group"), std::string::npos);
+}
+
+TEST(SchemaHdf5, ChecksumFindsDamagedValues) {
+  const TempDir dir;
+  const std::string path = dir / "x.h5";
+  std::vector<double> values(5000);
+  for (size_t i = 0; i < values.size(); ++i) values[i] = std::sin(static_cast<double>(i) * 0.7);
+  {
+    h5::File file = h5::File::create(path);
+    file.write<double>("/x", {5000}, values);
+    file.commit();
+  }
+  std::string bytes = test::bytes_of(path);
+  bytes[bytes.size() / 2] ^= 1;  // the values are most of the file
+  test::write_bytes(path, bytes);
+  EXPECT_NE(
+      error_of([&] { h5::File::open(path).dataset("/x").read<double>(); }).find("/x: is damaged"),
+      std::string::npos);
+}
+
+/// A file made with the bare library, as foreign programs do.
+class RawFile {
+ public:
+  explicit RawFile(const std::string& path)
+      : id_(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT)) {}
+  ~RawFile() { H5Fclose(id_); }
+  void add(const char* name, hid_t type, std::vector<hsize_t> dims, std::vector<hsize_t> chunk,
+           int filter = 0) {
+    const hid_t space = H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr);
+    const hid_t plist = H5Pcreate(H5P_DATASET_CREATE);
+    if (!chunk.empty()) H5Pset_chunk(plist, static_cast<int>(chunk.size()), chunk.data());
+    if (filter == H5Z_FILTER_NBIT) H5Pset_nbit(plist);
+    H5Dclose(H5Dcreate2(id_, name, type, space, H5P_DEFAULT, plist, H5P_DEFAULT));
+    H5Pclose(plist);
+    H5Sclose(space);
+  }
+  hid_t id() const { return id_; }
+
+ private:
+  hid_t id_;
+};
+
+TEST(SchemaHdf5, RefusesClaimsThatTheFileCannotKeep) {
+  const TempDir dir;
+  const std::string path = dir / "claims.h5";
+  {
+    RawFile raw(path);
+    const hsize_t huge = hsize_t{1} << 40;
+    raw.add("/huge", H5T_NATIVE_FLOAT, {huge, 22, 3}, {1024, 22, 3});
+    raw.add("/overflow", H5T_NATIVE_DOUBLE, {huge, huge}, {16, 16});
+    raw.add("/hidden", H5T_NATIVE_DOUBLE, {0, huge, huge}, {1, 16, 16});
+    raw.add("/chunk", H5T_NATIVE_DOUBLE, {hsize_t{1} << 28}, {hsize_t{1} << 28});
+    raw.add("/packed", H5T_NATIVE_INT, {8}, {8}, H5Z_FILTER_NBIT);
+    raw.add("/small", H5T_NATIVE_FLOAT, {4, 3}, {4, 3});
+    const hid_t odd = H5Tcreate(H5T_COMPOUND, 8);
+    H5Tinsert(odd, "a", 0, H5T_NATIVE_DOUBLE);
+    raw.add("/compound", odd, {2}, {});
+    H5Tclose(odd);
+    H5Lcreate_external("other.h5", "/x", raw.id(), "/link", H5P_DEFAULT, H5P_DEFAULT);
+    H5Lcreate_soft("/nowhere", raw.id(), "/soft", H5P_DEFAULT, H5P_DEFAULT);
+  }
+  const h5::File file = h5::File::open(path);
+  const auto refusal = [&](const char* name) {
+    return error_of([&] { file.dataset(name).read<double>(); });
+  };
+  EXPECT_NE(refusal("/huge").find("far more than the file stores"), std::string::npos);
+  EXPECT_NE(refusal("/overflow").find("claims an impossible size"), std::string::npos);
+  EXPECT_NE(refusal("/hidden").find("claims an impossible size"), std::string::npos);
+  EXPECT_NE(refusal("/chunk").find("chunks of impossible size"), std::string::npos);
+  EXPECT_NE(refusal("/packed").find("compressed by filter 5"), std::string::npos);
+  EXPECT_NE(refusal("/compound").find("neither plain numbers nor text"), std::string::npos);
+  EXPECT_NE(refusal("/link").find("link into another file"), std::string::npos);
+  EXPECT_NE(refusal("/soft").find("is missing"), std::string::npos);
+  EXPECT_EQ(file.read<double>("/small", {4, 3}), std::vector<double>(12, 0.0));
+}
+
+TEST(SchemaHdf5, ReadsForeignByteOrdersAndText) {
+  const TempDir dir;
+  const std::string path = dir / "foreign.h5";
+  {
+    RawFile raw(path);
+    const hsize_t n = 2;
+    const hid_t space = H5Screate_simple(1, &n, nullptr);
+    const hid_t set =
+        H5Dcreate2(raw.id(), "/big", H5T_IEEE_F32BE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    const double values[2] = {0.5, -3};
+    H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values);
+    H5Dclose(set);
+    const hid_t text = H5Tcopy(H5T_C_S1);
+    H5Tset_size(text, H5T_VARIABLE);
+    H5Tset_cset(text, H5T_CSET_UTF8);
+    const char* words[2] = {"left_hip", ""};
+    const hid_t names =
+        H5Dcreate2(raw.id(), "/names", text, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    H5Dwrite(names, text, H5S_ALL, H5S_ALL, H5P_DEFAULT, words);
+    H5Dclose(names);
+    const hid_t one = H5Screate(H5S_SCALAR);
+    const hid_t attribute = H5Acreate2(raw.id(), "kind", text, one, H5P_DEFAULT, H5P_DEFAULT);
+    H5Awrite(attribute, text, &words[0]);
+    H5Aclose(attribute);
+    H5Sclose(one);
+    H5Tclose(text);
+    H5Sclose(space);
+  }
+  const h5::File file = h5::File::open(path);
+  EXPECT_EQ(file.read<double>("/big", {2}), (std::vector<double>{0.5, -3}));
+  EXPECT_EQ(file.dataset("/names").read_text(), (std::vector<std::string>{"left_hip", ""}));
+  EXPECT_EQ(file.text("/", "kind"), "left_hip");
+}
+
+/// While it lives, files cannot grow beyond `bytes`: writing fails as on a full disk.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) : old_handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &old_);
+    const rlimit small{bytes, old_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &small);
+  }
+  ~FileSizeLimit() {
+    setrlimit(RLIMIT_FSIZE, &old_);
+    std::signal(SIGXFSZ, old_handler_);
+  }
+
+ private:
+  rlimit old_{};
+  void (*old_handler_)(int);
+};
+
+TEST(SchemaHdf5, AFullDiskIsOneWorkErrorAndLeavesNothing) {
+  const TempDir dir;
+  std::vector<double> noise(40000);
+  for (size_t i = 0; i < noise.size(); ++i) noise[i] = std::sin(static_cast<double>(i * i) * 0.37);
+  for (const rlim_t limit : {1000, 50000, 150000}) {
+    const FileSizeLimit full(limit);
+    try {
+      h5::File file = h5::File::create(dir / "x.h5");
+      h5::Dataset set = file.create_appendable<double>("/rows", {40000});
+      for (int i = 0; i < 4; ++i) set.append<double>(noise);
+      file.commit();
+      ADD_FAILURE() << "written in spite of the limit";
+    } catch (const WorkError& error) {
+      EXPECT_NE(std::string(error.what()).find("x.h5: could not be written (File too large)"),
+                std::string::npos)
+          << error.what();
+    }
+  }
+  EXPECT_TRUE(test::names_in(dir.path()).empty());
+  h5::File after = h5::File::create(dir / "y.h5");  // the library is still usable
+  after.write<double>("/x", {40000}, noise);
+  after.commit();
+  EXPECT_EQ(h5::File::open(dir / "y.h5").read<double>("/x", {-1}), noise);
+}
+
+}  // namespace
+}  // namespace restage
