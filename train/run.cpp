@@ -1,0 +1,257 @@
+#include "train/run.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <ctime>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "autograd/base/atomic_file.h"
+#include "autograd/base/error.h"
+#include "autograd/base/log.h"
+#include "train/run_files.h"
+
+namespace restage {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string errno_text() { return std::strerror(errno); }
+std::string inside(const std::string& dir, const char* name) {
+  return (fs::path(dir) / name).string();
+}
+
+[[noreturn]] void disk_error(const std::string& path) {
+  throw WorkError(path + ": could not be written (" + errno_text() +
+                  "); free some space and resume the run");
+}
+
+void check_stages(const std::vector<std::string>& stages) {
+  for (const auto& stage : stages) {
+    const bool good =
+        !stage.empty() && std::all_of(stage.begin(), stage.end(),
+                                      [](unsigned char c) { return std::isalnum(c) || c == '_'; });
+    if (!good) throw Error("'" + stage + "' cannot be the name of a stage");
+  }
+}
+
+/// The lock of a run. The kernel releases it when the process ends, however it ends.
+int take_lock(const std::string& folder, const std::string& shown) {
+  const std::string path = inside(folder, ".lock");
+  const int fd = ::open(path.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644);
+  if (fd < 0)
+    throw InputError(shown, "cannot be locked (" + errno_text() + ")", "make the folder writable");
+  if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
+    ::close(fd);
+    throw InputError(shown, "another process trains in this run", "wait for it or stop it first");
+  }
+  return fd;
+}
+
+/// A folder that vanishes with its content unless it was moved to its place.
+struct Draft {
+  std::string path;
+  bool moved = false;
+  explicit Draft(std::string where) : path(std::move(where)) {
+    std::error_code error;
+    fs::remove_all(path, error);
+    if (fs::create_directories(path, error) && !error) return;
+    if (error == std::errc::no_space_on_device)
+      throw WorkError(path + ": could not be made (" + error.message() +
+                      "); free some space and run it again");
+    throw InputError(path, "the run directory cannot be made (" + error.message() + ")",
+                     "choose a folder that you can write to");
+  }
+  Draft(const Draft&) = delete;
+  Draft& operator=(const Draft&) = delete;
+  ~Draft() {
+    std::error_code ignored;
+    if (!moved) fs::remove_all(path, ignored);
+  }
+  /// False if there is something at `target` already.
+  bool move_to(const std::string& target) {
+    if (::rename(path.c_str(), target.c_str()) == 0) return moved = true;
+    if (errno == EEXIST || errno == ENOTEMPTY || errno == ENOTDIR) return false;
+    throw InputError(target, "the run directory cannot be made (" + errno_text() + ")",
+                     "choose a folder that does not exist yet");
+  }
+};
+
+/// Fills a draft beside the later place; returns its lock.
+int fill(const Draft& draft, const std::string& yaml, const std::string& provenance) {
+  if (::mkdir(inside(draft.path, "checkpoints").c_str(), 0755) != 0) disk_error(draft.path);
+  write_file_atomically(inside(draft.path, "provenance.json"), provenance);
+  write_file_atomically(inside(draft.path, "metrics.jsonl"), "");
+  write_file_atomically(inside(draft.path, "log.txt"), "");
+  write_file_atomically(inside(draft.path, "config.yaml"), yaml);
+  return take_lock(draft.path, draft.path);
+}
+
+std::string timestamp() {
+  const std::time_t now = std::time(nullptr);
+  std::tm parts{};
+  ::gmtime_r(&now, &parts);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y%m%dT%H%M%S", &parts);
+  return text;
+}
+
+}  // namespace
+
+std::string run_config_path(const std::string& dir) {
+  std::error_code ignored;
+  const std::string path = inside(dir, "config.yaml");
+  if (!fs::is_regular_file(path, ignored) || !fs::is_directory(inside(dir, "checkpoints"), ignored))
+    throw InputError(dir, "is no run directory (no config.yaml and checkpoints/ in it)",
+                     "give a folder that 'restage train' made");
+  return path;
+}
+
+std::optional<Checkpoint> latest_checkpoint(const std::string& dir,
+                                            const std::vector<std::string>& stages) {
+  run_config_path(dir);
+  const auto entries = run_files::list_checkpoints(dir, stages, false);
+  for (auto entry = entries.rbegin(); entry != entries.rend(); ++entry)
+    if (auto found = run_files::load(*entry)) return found;
+  return {};
+}
+
+std::optional<Checkpoint> best_checkpoint(const std::string& dir, const std::string& stage) {
+  run_config_path(dir);
+  const auto entries = run_files::list_checkpoints(dir, {stage}, true);
+  for (auto entry = entries.rbegin(); entry != entries.rend(); ++entry)
+    if (auto found = run_files::load(*entry)) return found;
+  return {};
+}
+
+RunDir::RunDir(std::string dir, std::vector<std::string> stages, int lock)
+    : dir_(std::move(dir)), stages_(std::move(stages)), lock_(lock) {}
+
+RunDir::RunDir(RunDir&& other) noexcept
+    : dir_(std::move(other.dir_)),
+      stages_(std::move(other.stages_)),
+      lock_(std::exchange(other.lock_, -1)),
+      metrics_(std::exchange(other.metrics_, -1)),
+      resumed_(std::move(other.resumed_)) {}
+
+RunDir::~RunDir() {
+  if (metrics_ >= 0) {
+    ::close(metrics_);
+    set_log_file("");
+  }
+  if (lock_ >= 0) ::close(lock_);
+}
+
+void RunDir::open_metrics() {
+  const std::string path = inside(dir_, "metrics.jsonl");
+  metrics_ = ::open(path.c_str(), O_CREAT | O_WRONLY | O_APPEND | O_CLOEXEC, 0644);
+  if (metrics_ < 0) disk_error(path);
+  set_log_file(inside(dir_, "log.txt"));
+}
+
+RunDir RunDir::create(const std::string& root, const std::string& name,
+                      const std::string& resolved_yaml, const std::string& provenance_json,
+                      std::vector<std::string> stages) {
+  check_stages(stages);
+  constexpr int kTries = 10000;
+  Draft draft(inside(root, (".draft-" + std::to_string(::getpid())).c_str()));
+  RunDir run("", std::move(stages), fill(draft, resolved_yaml, provenance_json));
+  const std::string stem = inside(root, name.c_str()) + "-" + timestamp() + "-";
+  for (int n = 1; n <= kTries && !draft.moved; ++n) {
+    run.dir_ = stem + std::to_string(n);
+    // rename replaces an empty folder; a run is never empty, but a user's folder might be
+    if (!fs::exists(run.dir_)) draft.move_to(run.dir_);
+  }
+  if (!draft.moved)
+    throw InputError(root, "is full of runs of this second", "choose another folder");
+  run.open_metrics();
+  return run;
+}
+
+RunDir RunDir::create_at(const std::string& dir, const std::string& resolved_yaml,
+                         const std::string& provenance_json, std::vector<std::string> stages) {
+  check_stages(stages);
+  fs::path place = fs::absolute(dir).lexically_normal();
+  if (!place.has_filename()) place = place.parent_path();  // "runs/x/"
+  const fs::path draft_path = place.parent_path() / ("." + place.filename().string() + ".draft");
+  Draft draft(draft_path.string() + std::to_string(::getpid()));
+  RunDir run(dir, std::move(stages), fill(draft, resolved_yaml, provenance_json));
+  if (!draft.move_to(place.string()))
+    throw InputError(dir, "exists already and is no empty folder",
+                     "choose another folder, or give resume=" + dir);
+  run.open_metrics();
+  return run;
+}
+
+RunDir RunDir::resume(const std::string& dir, std::vector<std::string> stages) {
+  check_stages(stages);
+  run_config_path(dir);
+  RunDir run(dir, std::move(stages), take_lock(dir, dir));
+  run_files::remove_leftovers(dir);
+  run.resumed_ = latest_checkpoint(dir, run.stages_);
+  run_files::cut_metrics(dir, run.stages_, run.resumed_);
+  // What is newer than the newest good one is damaged: away with it, it would count when pruning.
+  for (const auto& entry : run_files::list_checkpoints(dir, run.stages_, false)) {
+    const bool good = run.resumed_ && entry.path == run.resumed_->path;
+    const auto order = std::find(run.stages_.begin(), run.stages_.end(), entry.stage);
+    const auto last = !run.resumed_
+                          ? run.stages_.begin()
+                          : std::find(run.stages_.begin(), run.stages_.end(), run.resumed_->stage);
+    const bool newer =
+        !run.resumed_ || order > last || (order == last && entry.step >= run.resumed_->step);
+    std::error_code ignored;
+    if (!good && newer) fs::rename(entry.path, entry.path + ".damaged", ignored);
+  }
+  run.open_metrics();
+  return run;
+}
+
+void RunDir::metrics(const std::string& stage, int64_t step,
+                     const std::vector<std::pair<std::string, double>>& values) {
+  nlohmann::ordered_json line = {{"step", step}, {"stage", stage}};
+  for (const auto& entry : values)
+    line[entry.first] =
+        std::isfinite(entry.second) ? nlohmann::ordered_json(entry.second) : nullptr;
+  const std::string text =
+      line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  const off_t before = ::lseek(metrics_, 0, SEEK_END);
+  const ssize_t written = ::write(metrics_, text.data(), text.size());
+  if (written == static_cast<ssize_t>(text.size())) return;
+  if (written >= 0) errno = ENOSPC;
+  const int code = errno;
+  if (before >= 0 && ::ftruncate(metrics_, before) != 0)
+    log_debug("metrics.jsonl ends with a torn line");
+  errno = code;
+  disk_error(inside(dir_, "metrics.jsonl"));
+}
+
+std::string RunDir::save_checkpoint(const std::string& stage, int64_t step, std::string_view bytes,
+                                    int keep) {
+  if (::fsync(metrics_) != 0 && errno != EINVAL) disk_error(inside(dir_, "metrics.jsonl"));
+  const fs::path folder = fs::path(dir_) / "checkpoints";
+  const std::string path =
+      (folder / run_files::checkpoint_name(stage, step, false, bytes)).string();
+  write_file_atomically(path, bytes);
+  run_files::prune(run_files::list_checkpoints(dir_, stages_, false), stage, keep, path);
+  return path;
+}
+
+std::string RunDir::save_best(const std::string& stage, int64_t step, std::string_view bytes) {
+  const fs::path folder = fs::path(dir_) / "checkpoints";
+  const std::string path = (folder / run_files::checkpoint_name(stage, step, true, bytes)).string();
+  write_file_atomically(path, bytes);
+  std::error_code ignored;
+  for (const auto& entry : run_files::list_checkpoints(dir_, {stage}, true))
+    if (entry.path != path) fs::remove(entry.path, ignored);
+  return path;
+}
+
+}  // namespace restage

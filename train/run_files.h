@@ -1,0 +1,39 @@
+// Inside of train/run: names, search and pruning of checkpoints, and the cut of metrics.jsonl.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "train/run.h"
+
+namespace restage::run_files {
+
+/// A checkpoint file by its name; its bytes are not looked at.
+struct Entry {
+  std::string path, stage, checksum;
+  int64_t step = 0;
+  bool best = false;
+};
+
+std::string checkpoint_name(const std::string& stage, int64_t step, bool best,
+                            std::string_view bytes);
+/// Files in `dir`/checkpoints whose names checkpoint_name could have made, oldest first: in the
+/// order of `stages`, then of the steps. Other files and stages are ignored.
+std::vector<Entry> list_checkpoints(const std::string& dir, const std::vector<std::string>& stages,
+                                    bool best);
+/// The checkpoint, or nothing and a warning in the log if its bytes do not fit its checksum.
+std::optional<Checkpoint> load(const Entry& entry);
+/// Removes all entries but `keep_path` and the newest `keep` of `stage` and the newest of the
+/// others.
+void prune(const std::vector<Entry>& entries, const std::string& stage, int keep,
+           const std::string& keep_path);
+/// Removes temporary files that a killed process left.
+void remove_leftovers(const std::string& dir);
+/// Keeps the lines of metrics.jsonl up to `last` (none: no lines); drops torn and foreign lines.
+void cut_metrics(const std::string& dir, const std::vector<std::string>& stages,
+                 const std::optional<Checkpoint>& last);
+
+}  // namespace restage::run_files
