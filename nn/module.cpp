@@ -20,6 +20,7 @@ struct Collector final : Fields {
   void operator()(const std::string& name, Module& child) override {
     const std::string old_prefix = prefix, old_path = path;
     const char* old_kind = kind;
+    child.scope = name;
     path = prefix + name;
     prefix += name + ".";
     kind = child.kind();
@@ -43,6 +44,11 @@ std::vector<StateEntry> state_of(Module& module, const std::string& prefix) {
   c.kind = module.kind();
   module.visit(c);
   return c.entries;
+}
+
+void name_scopes(Module& root, const std::string& name) {
+  root.scope = name;
+  state_of(root);
 }
 
 std::vector<Parameter*> parameters_of(Module& module) {

@@ -53,6 +53,7 @@ struct Module {
   virtual void visit(Fields& fields) = 0;
   /// Short kind for layer tables, e.g. "Linear".
   virtual const char* kind() const = 0;
+  std::string scope;  ///< name within the parent, set by name_scopes(); for error messages
 };
 
 /// One entry of a state dict.
@@ -67,6 +68,8 @@ struct StateEntry {
 std::vector<StateEntry> state_of(Module& module, const std::string& prefix = "");
 std::vector<Parameter*> parameters_of(Module& module);
 int64_t count_parameters(Module& module);
+/// Gives every module below `root` its scope name; model factories call it once.
+void name_scopes(Module& root, const std::string& name);
 /// Casts every parameter and buffer.
 void cast_module(Module& module, DType type);
 

@@ -12,7 +12,7 @@
 namespace restage {
 
 using Point = Eigen::Vector3f;
-using Points = std::vector<Point>;              ///< metres
+using Points = std::vector<Point>;  ///< metres
 using Triangle = std::array<int32_t, 3>;
 
 /// A triangle surface, or a cloud when `faces` is empty.
@@ -24,9 +24,9 @@ struct Mesh {
 /// One person or character in T-pose: lowest point at y = 0, facing +z, left = +x.
 struct Body {
   std::string id;
-  std::string split;                            ///< "train", "validation" or "test"
+  std::string split;  ///< "train", "validation" or "test"
   Mesh rest;
-  Joints joints;                                ///< rest joints, same frame as `rest`
+  Joints joints;  ///< rest joints, same frame as `rest`
   /// Skinning weights, one row of 22 per vertex, each row sums to 1.
   Eigen::Matrix<float, Eigen::Dynamic, kJoints, Eigen::RowMajor> weights;
 };
@@ -35,9 +35,9 @@ struct Body {
 /// point a little elsewhere than a body's: pose_on() corrects for that).
 struct Motion {
   std::string id, subject, split, action;
-  Joints rest;                                  ///< 22 joints of the source skeleton, zero rotations
+  Joints rest;  ///< 22 joints of the source skeleton, zero rotations
   std::vector<std::array<Eigen::Quaternionf, kJoints>> global;  ///< world rotations per frame
-  std::vector<Point> hips;                      ///< midpoint of both hips over the floor, per frame
+  std::vector<Point> hips;  ///< midpoint of both hips over the floor, per frame
   size_t frames() const { return global.size(); }
 };
 

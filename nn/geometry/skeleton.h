@@ -13,13 +13,13 @@ namespace restage {
 inline constexpr int kJoints = 22;
 inline constexpr double kFps = 30.0;  ///< the project's frame rate
 
-inline constexpr std::array<int, kJoints> kParents = {-1, 0, 0, 0,  1,  2,  3,  4,  5,  6,  7,
+inline constexpr std::array<int, kJoints> kParents = {-1, 0, 0, 0, 1,  2,  3,  4,  5,  6,  7,
                                                       8,  9, 9, 9, 12, 13, 14, 16, 17, 18, 19};
 inline constexpr std::array<std::string_view, kJoints> kJointNames = {
-    "pelvis",     "left_hip",      "right_hip",      "spine1",     "left_knee",    "right_knee",
-    "spine2",     "left_ankle",    "right_ankle",    "spine3",     "left_foot",    "right_foot",
-    "neck",       "left_collar",   "right_collar",   "head",       "left_shoulder", "right_shoulder",
-    "left_elbow", "right_elbow",   "left_wrist",     "right_wrist"};
+    "pelvis",     "left_hip",    "right_hip",    "spine1",     "left_knee",     "right_knee",
+    "spine2",     "left_ankle",  "right_ankle",  "spine3",     "left_foot",     "right_foot",
+    "neck",       "left_collar", "right_collar", "head",       "left_shoulder", "right_shoulder",
+    "left_elbow", "right_elbow", "left_wrist",   "right_wrist"};
 /// Joint that takes this one's place in a mirrored body.
 inline constexpr std::array<int, kJoints> kMirror = {0,  2,  1,  3,  5,  4,  6,  8,  7,  9,  11,
                                                      10, 12, 14, 13, 15, 17, 16, 19, 18, 21, 20};
@@ -31,8 +31,8 @@ using Joints = std::array<Vec3, kJoints>;     ///< positions
 using Rotations = std::array<Mat3, kJoints>;  ///< local or global, said where used
 
 struct Pose {
-  Rotations local;                ///< local rotations, root = global orientation
-  Vec3 root = Vec3::Zero();       ///< world position of the pelvis
+  Rotations local;           ///< local rotations, root = global orientation
+  Vec3 root = Vec3::Zero();  ///< world position of the pelvis
 };
 
 struct PosedSkeleton {
@@ -47,7 +47,8 @@ Rotations to_local(const Rotations& global);
 Rotations to_global(const Rotations& local);
 /// Hip-knee plus knee-ankle, mean of both sides (spec 3.3), metres.
 double leg_length(const Joints& joints);
-/// Smallest rotation that takes direction a onto direction b (half turn about any axis if opposite).
+/// Smallest rotation that takes direction a onto direction b (half turn about any axis if
+/// opposite).
 Mat3 shortest_arc(const Vec3& a, const Vec3& b);
 
 }  // namespace restage

@@ -1,0 +1,61 @@
+#include "nn/layers/linear.h"
+
+#include <cmath>
+
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+
+namespace restage {
+
+Linear::Linear(int64_t in, int64_t out, const Init& init, bool with_bias, int tail)
+    : with_bias_(with_bias), tail_(tail) {
+  const double bound = 1.0 / std::sqrt(static_cast<double>(in));
+  Shape shape{out, in};
+  for (int i = 0; i < tail; ++i) shape.push_back(1);
+  weight.value = init.uniform(shape, bound, "weight");
+  if (with_bias) bias.value = init.uniform({out}, bound, "bias");
+}
+
+Var Linear::operator()(Context& ctx, const Var& x, Activation activation) const {
+  const ModuleScope path(scope);
+  Var w = ctx.bind(weight);
+  if (tail_ > 0) w = reshape(w, {w.size(0), w.size(1)});
+  if (with_bias_) return linear(x, w, ctx.bind(bias), activation);
+  return linear(x, w);
+}
+
+void Linear::visit(Fields& f) {
+  f("weight", weight);
+  if (with_bias_) f("bias", bias);
+}
+
+Conv1d::Conv1d(int64_t in, int64_t out, int64_t k, const Init& init) {
+  const double bound = 1.0 / std::sqrt(static_cast<double>(in * k));
+  weight.value = init.uniform({out, in, k}, bound, "weight");
+  bias.value = init.uniform({out}, bound, "bias");
+}
+
+Var Conv1d::same(Context& ctx, const Var& x, int64_t stride) const {
+  const ModuleScope path(scope);
+  const int64_t l = x.size(1), k = weight.value.size(2), steps = (l + stride - 1) / stride;
+  const int64_t pad = std::max<int64_t>((steps - 1) * stride + k - l, 0);
+  return conv1d(x, ctx.bind(weight), ctx.bind(bias), stride, pad / 2, steps);
+}
+
+Var Conv1d::valid(Context& ctx, const Var& x, int64_t stride) const {
+  const ModuleScope path(scope);
+  const int64_t steps = std::max<int64_t>(0, (x.size(1) - weight.value.size(2)) / stride + 1);
+  return conv1d(x, ctx.bind(weight), ctx.bind(bias), stride, 0, steps);
+}
+
+void Conv1d::visit(Fields& f) {
+  f("weight", weight);
+  f("bias", bias);
+}
+
+Var dropout(const Context& ctx, const Var& x, double p, const std::string& name) {
+  if (!ctx.training || p <= 0) return x;
+  return dropout(x, p, ctx.rng.fold(module_path() + "." + name));
+}
+
+}  // namespace restage

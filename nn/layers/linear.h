@@ -1,0 +1,40 @@
+// Linear layers and convolutions that are linear layers per point.
+#pragma once
+
+#include "autograd/ops/linear.h"
+#include "nn/module.h"
+
+namespace restage {
+
+/// y = act(W x + b) over the last axis; weight [out, in]. `tail` trailing 1-axes are kept in the
+/// weight's shape, so that PyTorch's 1x1 convolutions ([out, in, 1] or [out, in, 1, 1]) are this
+/// layer.
+struct Linear : Module {
+  Linear(int64_t in, int64_t out, const Init& init, bool with_bias = true, int tail = 0);
+  Var operator()(Context& ctx, const Var& x, Activation activation = Activation::none) const;
+  void visit(Fields& f) override;
+  const char* kind() const override {
+    return tail_ == 0 ? "Linear" : tail_ == 1 ? "Conv1d" : "Conv2d";
+  }
+  Parameter weight, bias;
+
+ private:
+  bool with_bias_;
+  int tail_;
+};
+
+/// 1-D convolution over x [n, l, c] with PyTorch's weight [out, in, k]; output length ceil(l /
+/// stride) with the larger half of the padding last ("same"), or without padding ("valid").
+struct Conv1d : Module {
+  Conv1d(int64_t in, int64_t out, int64_t k, const Init& init);
+  Var same(Context& ctx, const Var& x, int64_t stride) const;
+  Var valid(Context& ctx, const Var& x, int64_t stride) const;
+  void visit(Fields& f) override;
+  const char* kind() const override { return "Conv1d"; }
+  Parameter weight, bias;
+};
+
+/// Zeroes elements in training with probability p; the mask is a function of step and module path.
+Var dropout(const Context& ctx, const Var& x, double p, const std::string& name = "dropout");
+
+}  // namespace restage

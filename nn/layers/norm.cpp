@@ -1,0 +1,67 @@
+#include "nn/layers/norm.h"
+
+#include <cmath>
+
+#include "autograd/ops/elementwise.h"
+
+namespace restage {
+
+BatchNormLayer::BatchNormLayer(int64_t channels, const Init& init) {
+  weight.value = Tensor::full({channels}, 1, init.type);
+  bias.value = Tensor::full({channels}, 0, init.type);
+  running_mean = Tensor::full({channels}, 0, init.type);
+  running_var = Tensor::full({channels}, 1, init.type);
+}
+
+Var BatchNormLayer::operator()(Context& ctx, const Var& x) {
+  const ModuleScope path(scope);
+  if (ctx.training) {
+    BatchStatistics batch;
+    const Var y = batch_norm(x, ctx.bind(weight), ctx.bind(bias), eps, &batch);
+    update(batch);
+    return y;
+  }
+  std::vector<double> inverse;
+  for (int64_t i = 0; i < running_var.numel(); ++i)
+    inverse.push_back(1.0 / std::sqrt(running_var.item(i) + eps));
+  const Tensor rstd = Tensor::from<double>(running_var.shape(), inverse).cast(x.dtype());
+  const Var factor = mul(ctx.bind(weight), rstd);
+  return add(mul(x, factor), sub(ctx.bind(bias), mul(running_mean, factor)));
+}
+
+void BatchNormLayer::update(const BatchStatistics& batch) {
+  // The running variance takes the unbiased one (n / (n - 1)).
+  const double unbias = static_cast<double>(batch.count) / static_cast<double>(batch.count - 1);
+  const auto blend = [&](const Tensor& old, const Tensor& fresh, double factor) {
+    std::vector<double> out;
+    for (int64_t i = 0; i < old.numel(); ++i)
+      out.push_back((1 - momentum) * old.item(i) + momentum * factor * fresh.item(i));
+    return Tensor::from<double>(old.shape(), out).cast(old.dtype());
+  };
+  running_mean = blend(running_mean, batch.mean, 1.0);
+  running_var = blend(running_var, batch.variance, unbias);
+}
+
+void BatchNormLayer::visit(Fields& f) {
+  f("weight", weight);
+  f("bias", bias);
+  f("running_mean", running_mean);
+  f("running_var", running_var);
+}
+
+LayerNormLayer::LayerNormLayer(int64_t channels, const Init& init) {
+  weight.value = Tensor::full({channels}, 1, init.type);
+  bias.value = Tensor::full({channels}, 0, init.type);
+}
+
+Var LayerNormLayer::operator()(Context& ctx, const Var& x) const {
+  const ModuleScope path(scope);
+  return layer_norm(x, ctx.bind(weight), ctx.bind(bias));
+}
+
+void LayerNormLayer::visit(Fields& f) {
+  f("weight", weight);
+  f("bias", bias);
+}
+
+}  // namespace restage

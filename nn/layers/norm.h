@@ -1,0 +1,33 @@
+// Normalisation layers (spec 7).
+#pragma once
+
+#include "autograd/ops/norm.h"
+#include "nn/module.h"
+
+namespace restage {
+
+/// Per channel (last axis): batch statistics and running averages in training, running averages in
+/// evaluation. PyTorch's names; num_batches_tracked is not kept.
+struct BatchNormLayer : Module {
+  BatchNormLayer(int64_t channels, const Init& init);
+  Var operator()(Context& ctx, const Var& x);
+  void visit(Fields& f) override;
+  const char* kind() const override { return "BatchNorm"; }
+  Parameter weight, bias;
+  Tensor running_mean, running_var;
+  double eps = 1e-5, momentum = 0.1;
+
+ private:
+  void update(const BatchStatistics& batch);
+};
+
+/// Per row over the last axis.
+struct LayerNormLayer : Module {
+  LayerNormLayer(int64_t channels, const Init& init);
+  Var operator()(Context& ctx, const Var& x) const;
+  void visit(Fields& f) override;
+  const char* kind() const override { return "LayerNorm"; }
+  Parameter weight, bias;
+};
+
+}  // namespace restage

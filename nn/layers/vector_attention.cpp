@@ -1,0 +1,81 @@
+#include "nn/layers/vector_attention.h"
+
+#include <cmath>
+
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+#include "autograd/ops/points.h"
+#include "autograd/ops/reduce.h"
+
+namespace restage {
+
+Tensor pick_rows(const Tensor& points, const Tensor& index) {
+  return gather(Var(points), index).value;
+}
+
+Tensor neighbour_offsets(const Tensor& points, const Tensor& centres, const Tensor& index) {
+  const Tensor c = centres.reshape({centres.size(0), centres.size(1), 1, 3});
+  return binary(Binary::sub, pick_rows(points, index), c);
+}
+
+VectorAttention::VectorAttention(int64_t c, int64_t d, int64_t k, const Init& init)
+    : fc1(c, d, init.sub("fc1")),
+      fc2(d, c, init.sub("fc2")),
+      fc_delta({3, d, d}, init.sub("fc_delta")),
+      fc_gamma({d, d, d}, init.sub("fc_gamma")),
+      w_qs(d, d, init.sub("w_qs"), false),
+      w_ks(d, d, init.sub("w_ks"), false),
+      w_vs(d, d, init.sub("w_vs"), false),
+      d_(d),
+      k_(k) {}
+
+Var VectorAttention::operator()(Context& ctx, const Tensor& xyz, const Var& f) const {
+  const ModuleScope path(scope);
+  const int64_t n = xyz.size(0), v = xyz.size(1);
+  const Tensor index = knn(xyz, xyz, k_);
+  const int64_t k = index.size(2);
+  const Var h = fc1(ctx, f);
+  // x_i - x_j is the negative of the neighbour's offset.
+  const Var delta = fc_delta(ctx, neg(neighbour_offsets(xyz, xyz, index)));
+  const Var q = reshape(w_qs(ctx, h), {n, v, 1, d_});
+  const Var score = fc_gamma(ctx, q - gather(w_ks(ctx, h), index) + delta);
+  const Var value = gather(w_vs(ctx, h), index) + delta;
+  const Var pooled = attention_pool(reshape(score, {n * v, k, d_}), reshape(value, {n * v, k, d_}),
+                                    1.0 / std::sqrt(static_cast<double>(d_)));
+  return f + fc2(ctx, reshape(pooled, {n, v, d_}));
+}
+
+void VectorAttention::visit(Fields& f) {
+  f("fc1", fc1);
+  f("fc2", fc2);
+  f("fc_delta", fc_delta);
+  f("fc_gamma", fc_gamma);
+  f("w_qs", w_qs);
+  f("w_ks", w_ks);
+  f("w_vs", w_vs);
+}
+
+SetAbstraction::SetAbstraction(int64_t m, int64_t k, int64_t in, int64_t out, const Init& init)
+    : m_(m), k_(k) {
+  for (int i = 0; i < 2; ++i) {
+    mlp_convs.emplace(i == 0 ? in : out, out, init.sub("mlp_convs." + std::to_string(i)), true, 2);
+    mlp_bns.emplace(out, init);
+  }
+}
+
+Var SetAbstraction::operator()(Context& ctx, Tensor* xyz, const Var& f) {
+  const ModuleScope path(scope);
+  const Tensor centres = pick_rows(*xyz, fps(*xyz, m_));
+  const Tensor index = knn(centres, *xyz, k_);
+  Var g = concat({Var(neighbour_offsets(*xyz, centres, index)), gather(f, index)}, 3);
+  for (size_t i = 0; i < mlp_convs.size(); ++i) g = relu(mlp_bns[i](ctx, mlp_convs[i](ctx, g)));
+  *xyz = centres;
+  return max(g, 2);
+}
+
+void SetAbstraction::visit(Fields& f) {
+  f("mlp_convs", mlp_convs);
+  f("mlp_bns", mlp_bns);
+}
+
+}  // namespace restage

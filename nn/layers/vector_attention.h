@@ -1,0 +1,44 @@
+// The point transformer's blocks (spec 2.2).
+#pragma once
+
+#include "nn/layers/mlp.h"
+#include "nn/layers/norm.h"
+
+namespace restage {
+
+/// Vector attention over the k nearest neighbours; c channels in and out, d inside.
+struct VectorAttention : Module {
+  VectorAttention(int64_t c, int64_t d, int64_t k, const Init& init);
+  /// xyz [n, v, 3] (constant), f [n, v, c] -> [n, v, c].
+  Var operator()(Context& ctx, const Tensor& xyz, const Var& f) const;
+  void visit(Fields& f) override;
+  const char* kind() const override { return "VectorAttention"; }
+  Linear fc1, fc2;
+  ReluChain fc_delta, fc_gamma;
+  Linear w_qs, w_ks, w_vs;
+
+ private:
+  int64_t d_, k_;
+};
+
+/// Set abstraction: m farthest points, the k nearest of each, two point convolutions with batch
+/// norm and ReLU, maximum over the neighbours.
+struct SetAbstraction : Module {
+  SetAbstraction(int64_t m, int64_t k, int64_t in, int64_t out, const Init& init);
+  /// xyz [n, v, 3], f [n, v, c]; xyz becomes [n, m, 3].
+  Var operator()(Context& ctx, Tensor* xyz, const Var& f);
+  void visit(Fields& f) override;
+  const char* kind() const override { return "SetAbstraction"; }
+  ModuleList<Linear> mlp_convs;
+  ModuleList<BatchNormLayer> mlp_bns;
+
+ private:
+  int64_t m_, k_;
+};
+
+/// Offsets of neighbours: points by index minus their centre, [n, m, k, 3]. No gradient.
+Tensor neighbour_offsets(const Tensor& points, const Tensor& centres, const Tensor& index);
+/// Rows of points [n, v, 3] by index [n, m]. No gradient.
+Tensor pick_rows(const Tensor& points, const Tensor& index);
+
+}  // namespace restage

@@ -1,0 +1,48 @@
+#include "nn/losses/deformation.h"
+
+#include <cmath>
+
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+#include "autograd/ops/reduce.h"
+#include "autograd/ops/rotation.h"
+#include "nn/models/smrm.h"
+
+namespace restage {
+
+DeformationOutput deform(Context& ctx, const Mlp3& weights, const Mlp3* offsets,
+                         const DeformationBatch& b) {
+  const int64_t n = b.rest_points.size(0);
+  DeformationOutput out;
+  out.weights = weights(ctx, join_points(reshape(b.rest_joints, {n, 3 * kJoints}), b.rest_points));
+  Var x = b.rest_points;
+  if (offsets != nullptr) {
+    out.offsets = (*offsets)(ctx, join_points(b.axis_angle, b.rest_points));
+    x = x + out.offsets;
+  }
+  const Tensor origin = b.rest_joints.reshape({n, kJoints, 3});
+  const Var root = reshape(slice(origin, 1, 0, 1), {n, 3});
+  const Var transforms = forward_kinematics(b.local, b.rest_joints, root, joint_parents());
+  out.posed = linear_blend_skinning(x, out.weights, transforms, b.rest_joints);
+  return out;
+}
+
+Var squared_distance_sum(const Var& posed, const Tensor& truth) {
+  return sum_all(square(posed - Var(truth)));
+}
+
+double mean_distance(const Tensor& a, const Tensor& b) {
+  double total = 0;
+  const int64_t rows = a.numel() / 3;
+  for (int64_t i = 0; i < rows; ++i) {
+    double d2 = 0;
+    for (int64_t c = 0; c < 3; ++c) {
+      const double d = a.item(3 * i + c) - b.item(3 * i + c);
+      d2 += d * d;
+    }
+    total += std::sqrt(d2);
+  }
+  return total / static_cast<double>(rows);
+}
+
+}  // namespace restage

@@ -1,0 +1,26 @@
+// The loss of deformation (spec 5.2, 5.3).
+#pragma once
+
+#include "nn/models/deformation.h"
+
+namespace restage {
+
+/// Points of one batch; shapes [n, v, 3], [n, 22, 3], [n, 22, 3, 3], [n, 66]; all relative to the
+/// pelvis.
+struct DeformationBatch {
+  Tensor rest_points, posed_points, rest_joints, local, axis_angle;
+};
+
+struct DeformationOutput {
+  Var weights, offsets, posed;  ///< [n, v, 22], [n, v, 3] (undefined without offsets), [n, v, 3]
+};
+
+/// Eq. 3: posed points from rest points. `offsets` null: none.
+DeformationOutput deform(Context& ctx, const Mlp3& weights, const Mlp3* offsets,
+                         const DeformationBatch& batch);
+/// Eq. 4: squared distances, summed over all points and pairs.
+Var squared_distance_sum(const Var& posed, const Tensor& truth);
+/// Mean distance per point, metres (a number to report, not to differentiate).
+double mean_distance(const Tensor& a, const Tensor& b);
+
+}  // namespace restage

@@ -1,0 +1,115 @@
+#include "nn/losses/motion.h"
+
+#include <cmath>
+
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+#include "autograd/ops/reduce.h"
+#include "autograd/ops/rotation.h"
+
+namespace restage {
+namespace {
+
+/// Mean of x over everything but axis 0.
+Var per_sample(const Var& x) { return mean(reshape(x, {x.size(0), -1}), 1); }
+
+/// Sum of per-sample values [n] times mask [n], divided by max(sum of mask, 1).
+Var masked_mean(const Var& values, const Tensor& mask) {
+  double count = 0;
+  for (int64_t i = 0; i < mask.numel(); ++i) count += mask.item(i);
+  return scale(sum(values * Var(mask), 0), 1.0 / std::max(count, 1.0));
+}
+
+Var differences(const Var& joints) {
+  const int64_t t = joints.size(1);
+  return slice(joints, 1, 1, t) - slice(joints, 1, 0, t - 1);
+}
+
+Tensor complement(const Tensor& mask) {
+  std::vector<double> out;
+  for (int64_t i = 0; i < mask.numel(); ++i) out.push_back(1 - mask.item(i));
+  return Tensor::from<double>(mask.shape(), out).cast(mask.dtype());
+}
+
+/// Mean of max(0, |twist about y| - 100 degrees)^2 of local rotations (spec 4.3), as NKN.
+Var twist_loss(const Var& rotations) {
+  const int64_t rows = rotations.value.numel() / 9;
+  // The angle is a function of the matrix: e = atan2(R02, R00) for the order y-z-x; beyond the
+  // limit its gradient flows through sin and cos of e.
+  const Var flat = reshape(rotations, {rows, 9});
+  const Var s = slice(flat, 1, 2, 3), c = slice(flat, 1, 0, 1);
+  constexpr double limit = 100.0 / 180.0 * 3.14159265358979323846;
+  std::vector<double> excess(static_cast<size_t>(rows)), ds(excess), dc(excess);
+  double total = 0;
+  for (int64_t i = 0; i < rows; ++i) {
+    const double si = s.value.item(i), ci = c.value.item(i), e = std::atan2(si, ci),
+                 r = si * si + ci * ci;
+    const double over = std::max(0.0, std::abs(e) - limit), g = 2 * over * (e < 0 ? -1.0 : 1.0);
+    total += over * over;
+    if (r > 1e-12) {
+      ds[static_cast<size_t>(i)] = g * ci / r;
+      dc[static_cast<size_t>(i)] = -g * si / r;
+    }
+  }
+  const auto constant = [&](const std::vector<double>& v) {
+    return Var(Tensor::from<double>({rows, 1}, v).cast(rotations.dtype()));
+  };
+  // A linear function with the loss's value and gradient at this point.
+  const Var linear_part = sum_all(s * constant(ds) + c * constant(dc));
+  return scale(add_scalar(linear_part, total - linear_part.value.item()),
+               1.0 / static_cast<double>(rows));
+}
+
+}  // namespace
+
+Var rotation_loss(const Var& rotations, const Tensor& sixd) {
+  return mse(reshape(matrix_to_sixd(rotations), sixd.shape()), Var(sixd));
+}
+
+MotionLosses motion_losses(Context& ctx, const Smrm& net, Discriminator* discriminator,
+                           const MotionBatch& b, const MotionWeights& w) {
+  MotionLosses out;
+  SmrmState forth, back;
+  const SmrmOutput to_b = net(ctx, b.input, b.trans, b.rest_b, &forth);
+  const SmrmOutput to_a = net(ctx, to_b.joints, to_b.trans, b.rest_a, &back);
+  out.joints_b = to_b.joints;
+  out.trans_b = to_b.trans;
+  out.cycle = mse(to_a.joints, b.joints) + mse(to_a.trans, b.trans);
+  out.rotation = rotation_loss(to_a.rotations, b.sixd);
+  out.smoothness = mse(differences(to_a.joints), differences(b.joints));
+  Var self = per_sample(square(to_b.joints - Var(b.joints))) +
+             per_sample(square(to_b.trans - Var(b.trans)));
+  if (w.self_rotation > 0) {
+    const Var d = reshape(matrix_to_sixd(to_b.rotations), b.sixd.shape()) - Var(b.sixd);
+    self = self + scale(per_sample(square(d)), w.self_rotation);
+  }
+  out.self = masked_mean(self, b.self_mask);
+  out.total = scale(out.cycle, w.cycle) + scale(out.rotation, w.rotation) +
+              scale(out.smoothness, w.smoothness) + scale(out.self, w.self);
+  if (discriminator != nullptr) {
+    const Var logit =
+        (*discriminator)(ctx, discriminator_input(to_b.joints, to_b.trans), bone_vectors(b.rest_b));
+    out.adversarial = masked_mean(softplus(neg(logit)), complement(b.self_mask));
+    out.total = out.total + scale(out.adversarial, w.adversarial);
+  }
+  if (w.twist > 0)
+    out.total =
+        out.total + scale(twist_loss(to_b.rotations) + twist_loss(to_a.rotations), 0.5 * w.twist);
+  return out;
+}
+
+DiscriminatorLosses discriminator_losses(Context& ctx, Discriminator& net, const Tensor& real,
+                                         const Tensor& real_trans, const Tensor& real_rest,
+                                         const Tensor& fake, const Tensor& fake_trans,
+                                         const Tensor& fake_rest) {
+  DiscriminatorLosses out;
+  const Var on_real = net(ctx, discriminator_input(real, real_trans), bone_vectors(real_rest));
+  const Var on_fake = net(ctx, discriminator_input(fake, fake_trans), bone_vectors(fake_rest));
+  out.real = bce_with_logits(on_real, 1);
+  out.fake = bce_with_logits(on_fake, 0);
+  out.total = out.real + out.fake;
+  out.fake_score = mean_all(sigmoid(on_fake.detach())).value.item();
+  return out;
+}
+
+}  // namespace restage

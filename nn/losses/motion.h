@@ -1,0 +1,44 @@
+// The losses of motion retargeting (spec 4). All are scalars of shape [1].
+#pragma once
+
+#include "nn/models/discriminator.h"
+#include "nn/models/smrm.h"
+
+namespace restage {
+
+struct MotionWeights {
+  double cycle = 1, adversarial = 1, rotation = 0.01, smoothness = 0.1, self = 1;
+  double self_rotation = 0;  ///< rotation loss also on the first pass of self samples
+  double twist = 0;          ///< NKN's twist loss (spec 4.3)
+};
+
+/// One batch: motions of A, skeletons of both. Shapes as in Smrm; self_mask [n] is 1 where B is A.
+struct MotionBatch {
+  Tensor joints, input, trans, rest_a, rest_b, sixd, self_mask;
+};
+
+struct MotionLosses {
+  Var cycle, rotation, smoothness, adversarial, self, total;
+  Var joints_b, trans_b;  ///< the retargeted motion, for the discriminator's step
+};
+
+/// Generator side: A -> B -> A through the same network. `discriminator` null leaves the
+/// adversarial term out.
+MotionLosses motion_losses(Context& ctx, const Smrm& net, Discriminator* discriminator,
+                           const MotionBatch& batch, const MotionWeights& weights);
+
+struct DiscriminatorLosses {
+  Var real, fake, total;
+  double fake_score;  ///< mean sigmoid of the fake logits, for the balance rule
+};
+/// Discriminator side on constants; real and fake go through in separate passes.
+DiscriminatorLosses discriminator_losses(Context& ctx, Discriminator& net, const Tensor& real,
+                                         const Tensor& real_trans, const Tensor& real_rest,
+                                         const Tensor& fake, const Tensor& fake_trans,
+                                         const Tensor& fake_rest);
+
+/// Mean over rows of (6D(predicted) - target)^2, or for quaternions the sign-free difference (Q5,
+/// Q6).
+Var rotation_loss(const Var& rotations, const Tensor& sixd);
+
+}  // namespace restage

@@ -1,0 +1,55 @@
+#include "nn/models/discriminator.h"
+
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+#include "autograd/ops/reduce.h"
+#include "nn/geometry/skeleton.h"
+
+namespace restage {
+
+Discriminator::Discriminator(const DiscriminatorConfig& c, const Init& init)
+    : config(c), out(c.widths[3] + c.condition, 1, 4, init.sub("out")) {
+  int64_t in = c.in;
+  for (size_t i = 0; i < 4; ++i) {
+    convs.emplace(in, c.widths[i], 4, init.sub("convs." + std::to_string(i)));
+    if (i > 0) bns.emplace(c.widths[i], init);
+    in = c.widths[i] + (i > 0 ? c.condition : 0);
+  }
+}
+
+Var Discriminator::operator()(Context& ctx, const Var& x, const Var& condition) {
+  const ModuleScope path(scope);
+  const int64_t n = x.size(0);
+  Var h = leaky_relu(convs[0].same(ctx, x, 2), 0.2);
+  for (size_t i = 1; i < convs.size(); ++i) {
+    h = leaky_relu(bns[i - 1](ctx, convs[i].same(ctx, h, 2)), 0.2);
+    h = concat({h, expand(reshape(condition, {n, 1, condition.size(1)}),
+                          {n, h.size(1), condition.size(1)})},
+               2);
+  }
+  if (config.nkn_head) return reshape(slice(out.valid(ctx, h, 2), 1, 0, 1), {n});
+  return reshape(mean(out.same(ctx, h, 1), 1), {n});
+}
+
+void Discriminator::visit(Fields& f) {
+  f("convs", convs);
+  f("bns", bns);
+  f("out", out);
+}
+
+Var discriminator_input(const Var& joints, const Var& trans) {
+  const int64_t n = joints.size(0), t = joints.size(1), width = joints.size(2) * 3;
+  const Var flat = reshape(joints, {n, t, width});
+  return concat({slice(flat, 1, 1, t) - slice(flat, 1, 0, t - 1), slice(trans, 1, 1, t)}, 2);
+}
+
+Var bone_vectors(const Var& rest) {
+  const int64_t n = rest.size(0);
+  Tensor parents = Tensor::empty({n, kJoints - 1}, DType::i32);
+  for (int64_t i = 0; i < n; ++i)
+    for (int64_t j = 1; j < kJoints; ++j)
+      parents.data<int32_t>()[i * (kJoints - 1) + j - 1] = kParents[static_cast<size_t>(j)];
+  return reshape(slice(rest, 1, 1, kJoints) - gather(rest, parents), {n, 3 * (kJoints - 1)});
+}
+
+}  // namespace restage

@@ -1,0 +1,53 @@
+#include "nn/models/patch_transformer.h"
+
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+#include "autograd/ops/points.h"
+#include "autograd/ops/reduce.h"
+#include "nn/layers/vector_attention.h"
+
+namespace restage {
+
+PatchTransformer::PatchTransformer(const PatchTransformerConfig& c, const Init& init)
+    : config(c),
+      point({3, c.patch, c.width}, init.sub("point")),
+      position({3, c.patch, c.width}, init.sub("position")),
+      mix(c.width, c.width, init.sub("mix")),
+      norm(c.width, init),
+      vote(c.width, kJoints * 4, init.sub("vote")),
+      segment(c.width, kJoints, init.sub("segment")) {
+  for (int64_t i = 0; i < c.layers; ++i)
+    layers.emplace(c.width, c.heads, 2 * c.width, init.sub("layers." + std::to_string(i)));
+}
+
+SkeletonOutput PatchTransformer::forward(Context& ctx, const Tensor& cloud) {
+  const ModuleScope path(scope);
+  const int64_t n = cloud.size(0), t = config.centres;
+  SkeletonOutput out;
+  out.centres = fps(cloud, t);
+  const Tensor centres = pick_rows(cloud, out.centres);
+  const Tensor offsets = neighbour_offsets(cloud, centres, knn(centres, cloud, config.neighbours));
+  const Var patch = max(point(ctx, scale(offsets, config.patch_scale)), 2);
+  Var x = mix(ctx, relu(patch)) + position(ctx, scale(centres, config.centre_scale));
+  for (size_t i = 0; i < layers.size(); ++i) x = layers[i](ctx, x);
+  x = norm(ctx, x);
+  const Var head = vote(ctx, x);
+  out.votes = reshape(slice(head, 2, kJoints, 4 * kJoints), {n, t, kJoints, 3}) +
+              Var(centres.reshape({n, t, 1, 3}));
+  const Var weight = reshape(softmax(slice(head, 2, 0, kJoints), 1), {n, t, kJoints, 1});
+  out.joints = sum(weight * out.votes, 1);
+  if (ctx.training) out.segmentation = segment(ctx, x);
+  return out;
+}
+
+void PatchTransformer::visit(Fields& f) {
+  f("point", point);
+  f("position", position);
+  f("mix", mix);
+  f("layers", layers);
+  f("norm", norm);
+  f("vote", vote);
+  f("segment", segment);
+}
+
+}  // namespace restage

@@ -1,0 +1,32 @@
+// `skeleton/patch_transformer`: our own small extractor for CPUs (docs/method.md). Patches around
+// the farthest points become tokens of a transformer; every token votes for every joint.
+#pragma once
+
+#include "nn/layers/mlp.h"
+#include "nn/layers/self_attention.h"
+#include "nn/models/skeleton.h"
+
+namespace restage {
+
+struct PatchTransformerConfig {
+  int64_t points = 512, centres = 64, neighbours = 16, patch = 64, width = 128, layers = 4,
+          heads = 4;
+  double patch_scale = 10, centre_scale = 2;  ///< bring offsets and positions to order one
+};
+
+struct PatchTransformer : SkeletonModel {
+  PatchTransformer(const PatchTransformerConfig& c, const Init& init);
+  SkeletonOutput forward(Context& ctx, const Tensor& cloud) override;
+  int64_t points() const override { return config.points; }
+  void visit(Fields& f) override;
+  const char* kind() const override { return "PatchTransformer"; }
+  PatchTransformerConfig config;
+  ReluChain point, position;  ///< of each neighbour; of each centre
+  Linear mix;                 ///< after the maximum over the neighbours
+  ModuleList<EncoderLayer> layers;
+  LayerNormLayer norm;
+  Linear vote;     ///< 22 logits and 22 offsets per token
+  Linear segment;  ///< which joint moves the centre (used by the training loss only)
+};
+
+}  // namespace restage

@@ -1,0 +1,45 @@
+// `skeleton/point_transformer`: the extractor of the 3DV paper (Table 6; spec 2.2, 2.3).
+#pragma once
+
+#include "nn/layers/vector_attention.h"
+#include "nn/models/skeleton.h"
+
+namespace restage {
+
+struct PointTransformerConfig {
+  int64_t points = 1024, blocks = 4, neighbours = 16, width = 512, base = 32, head1 = 256,
+          head2 = 64;
+};
+
+struct TransitionDown : Module {
+  TransitionDown(int64_t m, int64_t k, int64_t in, int64_t out, const Init& init)
+      : sa(m, k, in, out, init.sub("sa")) {}
+  void visit(Fields& f) override { f("sa", sa); }
+  const char* kind() const override { return "TransitionDown"; }
+  SetAbstraction sa;
+};
+
+struct PointTransformerBackbone : Module {
+  PointTransformerBackbone(const PointTransformerConfig& c, const Init& init);
+  /// cloud [n, v, 3] -> features [n, v / 4^blocks, base * 2^blocks].
+  Var operator()(Context& ctx, const Tensor& cloud);
+  void visit(Fields& f) override;
+  const char* kind() const override { return "Backbone"; }
+  ReluChain fc1;
+  VectorAttention transformer1;
+  ModuleList<TransitionDown> transition_downs;
+  ModuleList<VectorAttention> transformers;
+};
+
+struct PointTransformer : SkeletonModel {
+  PointTransformer(const PointTransformerConfig& c, const Init& init);
+  SkeletonOutput forward(Context& ctx, const Tensor& cloud) override;
+  int64_t points() const override { return config.points; }
+  void visit(Fields& f) override;
+  const char* kind() const override { return "PointTransformer"; }
+  PointTransformerConfig config;
+  PointTransformerBackbone backbone;
+  ReluChain fc2;
+};
+
+}  // namespace restage

@@ -1,0 +1,23 @@
+// What every skeleton extractor is: a cloud in, 22 joints out (spec 2.1).
+#pragma once
+
+#include "nn/geometry/skeleton.h"
+#include "nn/module.h"
+
+namespace restage {
+
+struct SkeletonOutput {
+  Var joints;  ///< [n, 22, 3], in the frame of the input
+  // What a voting head offers to its training loss; undefined for the other heads.
+  Var votes;         ///< [n, c, 22, 3]: where each centre believes each joint to be
+  Var segmentation;  ///< [n, c, 22]: logits of the joint that moves each centre
+  Tensor centres;    ///< i32 [n, c]: which input points the centres are
+};
+
+struct SkeletonModel : Module {
+  /// cloud [n, points(), 3], centred on its centroid, metres.
+  virtual SkeletonOutput forward(Context& ctx, const Tensor& cloud) = 0;
+  virtual int64_t points() const = 0;
+};
+
+}  // namespace restage

@@ -1,0 +1,87 @@
+#include "nn/models/smrm.h"
+
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+#include "autograd/ops/rotation.h"
+
+namespace restage {
+namespace {
+
+int64_t rotation_width(RotationForm form) { return form == RotationForm::sixd ? 6 : 4; }
+
+Var standardise(const Var& x, const Tensor& mean, const Tensor& deviation) {
+  return (x - Var(mean)) / Var(deviation);
+}
+
+}  // namespace
+
+std::vector<int> joint_parents() { return {kParents.begin(), kParents.end()}; }
+
+Smrm::Smrm(const SmrmConfig& c, const Init& init)
+    : config(c),
+      enc(3 * (c.joints + 1), c.hidden, c.layers, c.dropout, init.sub("enc")),
+      dec(c.hidden + 3 * c.joints, c.hidden, c.layers, c.dropout, init.sub("dec")),
+      fc_rot(c.hidden, c.joints * rotation_width(c.rotation), init.sub("fc_rot")),
+      fc_trans(c.hidden, 3, init.sub("fc_trans")) {
+  if (c.rest_pose_start) {
+    const int64_t width = rotation_width(c.rotation);
+    std::vector<double> w = fc_rot.weight.value.to_vector<double>(),
+                        b(static_cast<size_t>(c.joints * width), 0.0);
+    for (double& v : w) v *= 0.01;
+    for (int64_t j = 0; j < c.joints; ++j) {
+      b[static_cast<size_t>(j * width)] = 1;
+      if (width == 6) b[static_cast<size_t>(j * width + 4)] = 1;
+    }
+    fc_rot.weight.value = Tensor::from<double>(fc_rot.weight.value.shape(), w).cast(init.type);
+    fc_rot.bias.value = Tensor::from<double>({c.joints * width}, b).cast(init.type);
+  }
+  if (c.standardise) {
+    const auto constant = [&](int64_t n, double v) { return Tensor::full({n}, v, init.type); };
+    joint_mean = constant(3 * c.joints, 0), joint_std = constant(3 * c.joints, 1);
+    rest_mean = constant(3 * c.joints, 0), rest_std = constant(3 * c.joints, 1);
+    trans_mean = constant(3, 0), trans_std = constant(3, 1);
+  }
+}
+
+SmrmOutput Smrm::operator()(Context& ctx, const Var& joints, const Var& trans, const Var& rest,
+                            SmrmState* state) const {
+  const ModuleScope path(scope);
+  const int64_t n = joints.size(0), t = joints.size(1), j = config.joints;
+  Var a = reshape(joints, {n, t, 3 * j}), v = trans, b = reshape(rest, {n, 1, 3 * j});
+  if (config.standardise) {
+    a = standardise(a, joint_mean, joint_std);
+    v = standardise(v, trans_mean, trans_std);
+    b = standardise(b, rest_mean, rest_std);
+  }
+  const Var code = enc(ctx, concat({a, v}, 2), &state->encoder);
+  const Var decoded = dec(ctx, concat({code, expand(b, {n, t, 3 * j})}, 2), &state->decoder);
+  SmrmOutput out;
+  out.raw = fc_rot(ctx, decoded);
+  out.trans = fc_trans(ctx, decoded);
+  if (config.standardise) out.trans = out.trans * Var(trans_std) + Var(trans_mean);
+  const Var rows = reshape(out.raw, {n * t, j, rotation_width(config.rotation)});
+  const Var local =
+      config.rotation == RotationForm::sixd ? sixd_to_matrix(rows) : quaternion_to_matrix(rows);
+  const Var rest_rows = reshape(expand(reshape(rest, {n, 1, j, 3}), {n, t, j, 3}), {n * t, j, 3});
+  const Tensor origin = Tensor::zeros({n * t, 3}, joints.dtype());
+  const Var posed = forward_kinematics(local, rest_rows, origin, joint_parents());
+  out.rotations = reshape(local, {n, t, j, 3, 3});
+  out.joints = reshape(joints_of(posed), {n, t, j, 3});
+  return out;
+}
+
+void Smrm::visit(Fields& f) {
+  f("enc", enc);
+  f("dec", dec);
+  f("fc_rot", fc_rot);
+  f("fc_trans", fc_trans);
+  if (!config.standardise) return;
+  f("joint_mean", joint_mean);
+  f("joint_std", joint_std);
+  f("rest_mean", rest_mean);
+  f("rest_std", rest_std);
+  f("trans_mean", trans_mean);
+  f("trans_std", trans_std);
+}
+
+}  // namespace restage
