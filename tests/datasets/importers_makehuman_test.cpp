@@ -120,8 +120,8 @@ class ImportersRecipes : public ::testing::Test {
 };
 
 TEST_F(ImportersRecipes, RowsBecomeTargetWeights) {
-  const auto recipes =
-      read(header_ + "a,train,1,.5,.5,.5,.5,.5,0,0,1,-.25\r\n\nb,test,0,0.1,1,0,0.75,1,.5,.5,1,0\n");
+  const auto recipes = read(
+      header_ + "a,train,1,.5,.5,.5,.5,.5,0,0,1,-.25\r\n\nb,test,0,0.1,1,0,0.75,1,.5,.5,1,0\n");
   ASSERT_EQ(recipes.size(), 2u);
   EXPECT_EQ(recipes[1].id, "b");
   const TargetWeights a = recipe_targets(recipes[0]);

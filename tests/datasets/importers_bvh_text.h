@@ -1,0 +1,167 @@
+// One simple motion written as BVH in many styles. Every joint turns about a fixed axis at a
+// constant rate and the hips move on a line, so slerp and linear interpolation are exact at any
+// frame rate.
+#pragma once
+
+#include <algorithm>
+#include <cstdio>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "nn/geometry/skeleton.h"
+
+namespace restage::bvh_test {
+
+inline const Joints& rest() {
+  static const Joints value = [] {
+    Joints x;
+    const double m[kJoints][3] = {
+        {0, .95, 0},     {.09, .9, 0},     {-.09, .9, 0},   {0, 1.05, 0},     {.1, .5, .01},
+        {-.1, .5, .01},  {0, 1.18, 0},     {.1, .08, -.02}, {-.1, .08, -.02}, {0, 1.3, 0},
+        {.11, .02, .12}, {-.11, .02, .12}, {0, 1.45, 0},    {.05, 1.4, 0},    {-.05, 1.4, 0},
+        {0, 1.55, .02},  {.18, 1.4, 0},    {-.18, 1.4, 0},  {.45, 1.4, 0},    {-.45, 1.4, 0},
+        {.7, 1.4, 0},    {-.7, 1.4, 0}};
+    for (int j = 0; j < kJoints; ++j) x[j] = Vec3(m[j][0], m[j][1], m[j][2]);
+    return x;
+  }();
+  return value;
+}
+
+inline constexpr const char* kMixamo[kJoints] = {
+    "mixamorig:Hips",        "mixamorig:LeftUpLeg",    "mixamorig:RightUpLeg",
+    "mixamorig:Spine",       "mixamorig:LeftLeg",      "mixamorig:RightLeg",
+    "mixamorig:Spine1",      "mixamorig:LeftFoot",     "mixamorig:RightFoot",
+    "mixamorig:Spine2",      "mixamorig:LeftToeBase",  "mixamorig:RightToeBase",
+    "mixamorig:Neck",        "mixamorig:LeftShoulder", "mixamorig:RightShoulder",
+    "mixamorig:Head",        "mixamorig:LeftArm",      "mixamorig:RightArm",
+    "mixamorig:LeftForeArm", "mixamorig:RightForeArm", "mixamorig:LeftHand",
+    "mixamorig:RightHand"};
+
+struct Style {
+  std::string rotations = "ZXY", root_rotations = "ZYX";  ///< channel order
+  bool rotations_first = false;  ///< the root's rotation channels before its positions
+  bool reversed = false;         ///< children in the opposite order
+  bool all_positions = false;    ///< every joint has position channels
+  bool wrapped = false;          ///< the hips hang from a still root joint
+  double unit = 0.01;            ///< metres per unit
+  bool z_up = false;
+  int quarter_turns = 0;  ///< the rest pose faces another way
+  double fps = 120;
+  int frames = 121;
+  bool t_pose_first = false;  ///< frame 0 is the rest pose
+  Rotations bind;             ///< global frames of the zero pose; identity: a T-pose
+  std::vector<int> without;   ///< joints left out (their children hang from their parents)
+  Style() { bind.fill(Mat3::Identity()); }
+};
+
+/// Local rotation of joint j at time t.
+inline Mat3 turn(int j, double t) {
+  const Vec3 axis = Vec3(1 + j % 3, (j * 7) % 5 - 2, j % 2 ? 1.5 : -0.7).normalized();
+  return Eigen::AngleAxisd((0.3 + 0.05 * j) * t, axis).toRotationMatrix();
+}
+inline Vec3 hips(double t) { return Vec3(0.4 * t, 0.95 - 0.1 * t, 1.1 * t); }
+
+inline PosedSkeleton truth(double t) {
+  Pose pose;
+  for (int j = 0; j < kJoints; ++j) pose.local[j] = turn(j, t);
+  pose.root = hips(t);
+  return forward_kinematics(rest(), pose);
+}
+
+/// From our axes to the file's.
+inline Mat3 to_file(const Style& style) {
+  const Mat3 yaw =
+      Eigen::AngleAxisd(style.quarter_turns * M_PI / 2, Vec3::UnitY()).toRotationMatrix();
+  Mat3 up = Mat3::Identity();
+  if (style.z_up) up << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  return up * yaw;
+}
+
+inline std::string number(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, " %.9g", value);
+  return text;
+}
+
+inline std::string vector_text(const Vec3& v) {
+  return number(v.x()) + number(v.y()) + number(v.z());
+}
+
+inline std::string text(const Style& style) {
+  const Mat3 axes = to_file(style);
+  const auto has = [&](int j) {
+    for (const int k : style.without)
+      if (j == k) return false;
+    return true;
+  };
+  const auto parent = [&](int j) {
+    int p = kParents[j];
+    while (p >= 0 && !has(p)) p = kParents[p];
+    return p;
+  };
+  std::vector<int> order;  // joints as written
+  std::string out = "HIERARCHY\n";
+  const auto channels = [](const std::string& positions, const std::string& rotations, bool first) {
+    std::string p, r;
+    for (const char c : positions) p += std::string(" ") + c + "position";
+    for (const char c : rotations) r += std::string(" ") + c + "rotation";
+    return "CHANNELS " + std::to_string(positions.size() + rotations.size()) +
+           (first ? r + p : p + r) + "\n";
+  };
+  const std::function<void(int)> write = [&](int j) {
+    order.push_back(j);
+    const bool root = j == 0;
+    const Vec3 offset = root ? Vec3::Zero()
+                             : Vec3(axes * style.bind[parent(j)].transpose() *
+                                    (rest()[j] - rest()[parent(j)]) / style.unit);
+    out += (root && !style.wrapped ? "ROOT " : "JOINT ") + std::string(kMixamo[j]) + "\n{\nOFFSET" +
+           vector_text(offset) + "\n";
+    out += channels(root || style.all_positions ? "XYZ" : "",
+                    root ? style.root_rotations : style.rotations, style.rotations_first);
+    std::vector<int> children;
+    for (int k = 1; k < kJoints; ++k)
+      if (has(k) && parent(k) == j) children.push_back(k);
+    if (style.reversed) std::reverse(children.begin(), children.end());
+    for (const int k : children) write(k);
+    if (children.empty()) {
+      const Vec3 end = j == 7 || j == 8 ? Vec3(rest()[j + 3] - rest()[j]) : Vec3(0, 0.05, 0);
+      out += "End Site\n{\nOFFSET" +
+             vector_text(axes * style.bind[j].transpose() * end / style.unit) + "\n}\n";
+    }
+    out += "}\n";
+  };
+  if (style.wrapped) out += "ROOT reference\n{\nOFFSET 0 0 0\nCHANNELS 0\n";
+  write(0);
+  if (style.wrapped) out += "}\n";
+  out += "MOTION\nFrames: " + std::to_string(style.frames) +
+         "\nFrame Time:" + number(1 / style.fps) + "\n";
+
+  const auto axis = [](char c) { return c - 'X'; };
+  for (int f = 0; f < style.frames; ++f) {
+    const bool still = style.t_pose_first && f == 0;
+    const double t = still ? 0 : (f - (style.t_pose_first ? 1 : 0)) / style.fps;
+    for (const int j : order) {
+      Mat3 local = still ? Mat3::Identity() : turn(j, t);
+      // A joint left out takes its turns with it: the next one above is written as it is.
+      const int p = parent(j);
+      const Mat3 bind_parent = p < 0 ? Mat3::Identity() : style.bind[p];
+      local = axes * bind_parent.transpose() * local * style.bind[j] * axes.transpose();
+      const std::string& wanted = j == 0 ? style.root_rotations : style.rotations;
+      const Vec3 angles =
+          local.eulerAngles(axis(wanted[0]), axis(wanted[1]), axis(wanted[2])) * 180 / M_PI;
+      std::string position;
+      if (j == 0)
+        position = vector_text(axes * (still ? rest()[0] : hips(t)) / style.unit);
+      else if (style.all_positions)
+        position =
+            vector_text(axes * style.bind[p].transpose() * (rest()[j] - rest()[p]) / style.unit);
+      out +=
+          style.rotations_first ? vector_text(angles) + position : position + vector_text(angles);
+    }
+    out += "\n";
+  }
+  return out;
+}
+
+}  // namespace restage::bvh_test

@@ -1,0 +1,97 @@
+// `restage data import` as a function: data folders, BVH files and folders into schema files.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "autograd/base/error.h"
+#include "datasets/importers/import.h"
+#include "datasets/schema.h"
+#include "tests/datasets/importers_bvh_text.h"
+
+namespace restage {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string data_folder() {
+  const char* shared = std::getenv("RESTAGE_SHARED");
+  return (shared ? std::string(shared) : RESTAGE_SOURCE_DIR "/../shared") + "/data";
+}
+
+class ImportersImport : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = ::testing::TempDir() + "importers_import";
+    fs::remove_all(folder_);
+    fs::create_directories(folder_ + "/in");
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  std::string out() const { return folder_ + "/out.h5"; }
+  std::string folder_;
+};
+
+TEST_F(ImportersImport, DataFolderBecomesOneFile) {
+  if (!fs::exists(data_folder() + "/cmu/clips30.h5"))
+    GTEST_SKIP() << "no data folder (set RESTAGE_SHARED)";
+  // Two bodies and all clips: the whole set takes seconds more and shows nothing more.
+  fs::create_directories(folder_ + "/in/body");
+  fs::create_symlink(fs::absolute(data_folder() + "/cmu"), folder_ + "/in/cmu");
+  fs::create_symlink(fs::absolute(data_folder() + "/body/makehuman.h5"),
+                     folder_ + "/in/body/makehuman.h5");
+  std::ifstream csv(data_folder() + "/body/bodies.csv");
+  std::ofstream few(folder_ + "/in/body/bodies.csv");
+  std::string line;
+  for (int i = 0; i < 3 && std::getline(csv, line); ++i) few << line << "\n";
+  few.close();
+
+  const ImportSummary summary = import_data(folder_ + "/in", out());
+  EXPECT_EQ(summary.bodies, 2u);
+  EXPECT_EQ(summary.motions, 247u);
+  EXPECT_TRUE(summary.skipped.empty());
+  EXPECT_TRUE(verify(out()).empty());
+  const std::vector<Body> bodies = read_bodies(out());
+  ASSERT_EQ(bodies.size(), 2u);
+  EXPECT_EQ(bodies[0].id, "b000");
+  EXPECT_EQ(bodies[0].rest.vertices.size(), 13380u);
+  EXPECT_EQ(bodies[1].rest.faces.size(), 26756u);
+  const std::vector<Motion> test = read_motions(out(), "test");
+  EXPECT_EQ(test.size(), 50u);
+  for (const Motion& motion : test) EXPECT_FALSE(motion.action.empty());
+  const Inspection inspection = inspect(out());
+  EXPECT_NE(inspection.license.find("CC0"), std::string::npos);
+  EXPECT_NE(inspection.provenance.find("mocap.cs.cmu.edu"), std::string::npos);
+}
+
+TEST_F(ImportersImport, FolderOfBvhFilesSkipsBadOnes) {
+  std::ofstream(folder_ + "/in/02_walk.bvh") << bvh_test::text(bvh_test::Style());
+  std::ofstream(folder_ + "/in/01_walk.BVH") << bvh_test::text(bvh_test::Style());
+  std::ofstream(folder_ + "/in/03_bad.bvh") << "HIERARCHY\n";
+  std::ofstream(folder_ + "/in/readme.txt") << "no motion\n";
+  ImportOptions options;
+  options.license = "CC0-1.0";
+  options.bvh.split = "test";
+  const ImportSummary summary = import_data(folder_ + "/in", out(), options);
+  EXPECT_EQ(summary.motions, 2u);
+  ASSERT_EQ(summary.skipped.size(), 1u);
+  EXPECT_NE(summary.skipped[0].find("03_bad.bvh:1"), std::string::npos);
+  const std::vector<Motion> motions = read_motions(out(), "test");
+  ASSERT_EQ(motions.size(), 2u);
+  EXPECT_EQ(motions[0].id, "01_walk");
+  EXPECT_EQ(motions[0].subject, "01");
+  EXPECT_EQ(inspect(out()).license, "CC0-1.0");
+}
+
+TEST_F(ImportersImport, NothingIsLeftBehindByAFailure) {
+  std::ofstream(folder_ + "/in/bad.bvh") << "no BVH";
+  EXPECT_THROW(import_data(folder_ + "/in/bad.bvh", out()), InputError);
+  EXPECT_THROW(import_data(folder_ + "/in", out()), InputError);
+  EXPECT_THROW(import_data(folder_ + "/nothing", out()), InputError);
+  fs::remove(folder_ + "/in/bad.bvh");
+  EXPECT_THROW(import_data(folder_ + "/in", out()), InputError);                           // empty
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);  // "in"
+}
+
+}  // namespace
+}  // namespace restage
