@@ -120,7 +120,7 @@ void add_arm(const BodyShape& s, const Joints& joints, ImplicitSurface& out) {
   }
   out.add_loft(0, std::move(rings), .022);
   const double deltoid = girth(s, .22, .45) * mix(.92, 1.03, s.sex);
-  out.add_ellipsoid(shoulder + Vec3(.004, -.006, 0), Vec3(.040, .037, .038) * deltoid, .025);
+  out.add_ellipsoid(shoulder + Vec3(.002, -.007, 0), Vec3(.038, .032, .035) * deltoid, .025);
   // Mitten: palm and fingers, palm down, and a thumb that points forward and outward.
   const double h = s.hands * mix(.95, 1.03, s.sex), x = wrist.x(), y = shoulder.y() - .002;
   const double z = shoulder.z() + .001;
@@ -171,8 +171,11 @@ void add_head(const BodyShape& s, ImplicitSurface& out) {
 BodyShape draw_body_shape(const RngKey& key) {
   Rng rng(key);
   BodyShape s;
-  s.sex = std::clamp((rng.uniform() < 0.5 ? 0.12 : 0.88) + 0.12 * rng.normal(), 0.0, 1.0);
-  s.height = mix(1.45, 1.80, rng.uniform()) + 0.20 * mix(0.15, 1, s.sex) * rng.uniform();
+  // One draw per statement: the order of evaluation inside an expression is not fixed.
+  const double around = rng.uniform() < 0.5 ? 0.12 : 0.88;
+  s.sex = std::clamp(around + 0.12 * rng.normal(), 0.0, 1.0);
+  s.height = rng.uniform(1.45, 1.80);
+  s.height += 0.20 * mix(0.15, 1, s.sex) * rng.uniform();
   s.fat = rng.uniform(-1, 1);
   s.muscle = rng.uniform();
   s.belly = rng.uniform();

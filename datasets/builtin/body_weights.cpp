@@ -29,7 +29,7 @@ void arm_weights(const BodyShape& s, const Joints& j, const Vec3& p, int side, R
       upper * step(x, .018, sx - .015) * (1 - step(p.y(), top + .045, top + .065));
   pass_on(w, 9, 13 + side, collar);
   pass_on(w, 12, 13 + side, collar * step(x, .035, .06));
-  pass_on(w, 13 + side, 16 + side, arm * step(x, sx - .032, sx + .034));
+  pass_on(w, 13 + side, 16 + side, arm * step(x, sx - .050, sx + .042));
   pass_on(w, 16 + side, 18 + side, step(x, elbow - .030, elbow + .030));
   pass_on(w, 18 + side, 20 + side, step(x, wrist - .022, wrist + .020));
 }
