@@ -36,12 +36,12 @@ class GlbWriterTest : public ::testing::Test {
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
-  // Twenty frames of the walk; RESTAGE_KEEP_GLB=FOLDER keeps the files for the validator.
+  // Twenty frames of the walk; RESTAGE_KEEP=FOLDER keeps the files for the validator.
   InfluenceError write(const std::string& name, const Body& body, int frames = 20) {
     GlbWriter writer(path(name), body.rest, body.joints, body.weights);
     for (int f = 0; f < frames; ++f) writer.push(toy_pose(body, f / 20.0));
     const InfluenceError error = writer.commit();
-    if (const char* keep = std::getenv("RESTAGE_KEEP_GLB"))
+    if (const char* keep = std::getenv("RESTAGE_KEEP"))
       std::filesystem::copy_file(path(name), std::filesystem::path(keep) / name,
                                  std::filesystem::copy_options::overwrite_existing);
     return error;

@@ -1,0 +1,30 @@
+// What is drawn: one row of a contact sheet, one view of a page.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "nn/geometry/body.h"
+
+namespace restage {
+
+/// Frames of one surface (same vertex count in every frame, `faces` given) or of clouds (`faces`
+/// empty; counts may change). World metres, y up. Between one and three clips are shown together,
+/// by convention source, result, truth; the first frames of all belong together.
+struct Clip {
+  std::string label;
+  std::vector<Points> frames;
+  std::vector<Triangle> faces;
+};
+
+/// InputError when there is nothing to draw (no clips, more than three, a clip without frames) or a
+/// clip breaks the rules above. Points that are not finite are allowed in clouds only and not
+/// drawn.
+void check_clips(const std::string& where, const std::vector<Clip>& clips);
+
+/// Middle of the points' bounding box, level, that the view follows; y is the middle's height.
+Point clip_centre(const Points& points);
+/// Height of the floor under a clip: lowest point over all frames, but for stray points.
+float clip_floor(const Clip& clip);
+
+}  // namespace restage

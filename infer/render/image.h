@@ -1,0 +1,35 @@
+// Pictures of 8 bits per channel, small text on them, PNG.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace restage {
+
+using Rgb = std::array<uint8_t, 3>;
+
+struct Image {
+  int width = 0, height = 0;
+  std::vector<uint8_t> rgb;  ///< rows from the top
+  Image() = default;
+  Image(int w, int h, Rgb fill);
+  Rgb at(int x, int y) const;
+};
+
+/// Copies `part` so that its upper left corner is at (x, y); what does not fit is cut off.
+void paste(Image& image, const Image& part, int x, int y);
+void fill_rectangle(Image& image, int x, int y, int width, int height, Rgb colour);
+/// Antialiased text, upper left corner at (x, y), capitals about `size` pixels high; ASCII, other
+/// characters as '?'.
+void draw_text(Image& image, int x, int y, double size, Rgb colour, std::string_view text);
+/// Pixels that the text is wide.
+int text_width(double size, std::string_view text);
+
+std::string png_bytes(const Image& image);
+/// Appears whole or not at all.
+void write_png(const std::string& path, const Image& image);
+
+}  // namespace restage

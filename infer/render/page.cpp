@@ -1,0 +1,338 @@
+#include "infer/render/page.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "autograd/base/atomic_file.h"
+#include "infer/render/sheet.h"
+
+namespace restage {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kPage =
+#include "infer/render/viewer/page.html.inc"
+    ;
+constexpr const char* kStyle =
+#include "infer/render/viewer/style.css.inc"
+    ;
+constexpr const char* kScript =
+#include "infer/render/viewer/viewer.js.inc"
+    ;
+constexpr size_t kMostStride = 4;         // of frames, before surfaces are thinned
+constexpr size_t kFewestVertices = 1200;  // a person is still one
+constexpr float kReach = 4.0f;            // metres from the middle of a cloud
+
+std::string base64(const void* data, size_t size) {
+  static constexpr char digits[] =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  const auto* bytes = static_cast<const unsigned char*>(data);
+  std::string out;
+  out.reserve((size + 2) / 3 * 4);
+  for (size_t k = 0; k < size; k += 3) {
+    const size_t left = size - k;
+    const uint32_t three = uint32_t{bytes[k]} << 16 |
+                           (left > 1 ? uint32_t{bytes[k + 1]} << 8 : 0u) |
+                           (left > 2 ? uint32_t{bytes[k + 2]} : 0u);
+    out += digits[three >> 18];
+    out += digits[three >> 12 & 63];
+    out += left > 1 ? digits[three >> 6 & 63] : '=';
+    out += left > 2 ? digits[three & 63] : '=';
+  }
+  return out;
+}
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '&')
+      out += "&amp;";
+    else if (c == '<')
+      out += "&lt;";
+    else if (c == '>')
+      out += "&gt;";
+    else if (c == '"')
+      out += "&quot;";
+    else
+      out += c;
+  }
+  return out;
+}
+
+// JSON inside a script element: no '<' may end the element.
+std::string script_json(const Json& json) {
+  std::string out;
+  for (const char c : json.dump(-1, ' ', true, Json::error_handler_t::replace))
+    if (c == '<')
+      out += "\\u003c";
+    else
+      out += c;
+  return out;
+}
+
+std::string hex(uint32_t colour) {
+  char text[8];
+  std::snprintf(text, sizeof text, "#%06x", static_cast<unsigned>(colour & 0xffffffu));
+  return text;
+}
+
+// ---- thinning
+// ------------------------------------------------------------------------------------
+
+// Which vertices of a surface are kept (empty: all), and the faces between them.
+struct Surface {
+  std::vector<int32_t> kept;
+  std::vector<Triangle> faces;
+};
+
+// One vertex per cell of a grid laid over the first frame.
+Surface cluster(const Clip& clip, float cell) {
+  Surface surface;
+  std::map<std::array<int64_t, 3>, int32_t> cells;
+  std::vector<int32_t> place(clip.frames[0].size());
+  for (size_t v = 0; v < place.size(); ++v) {
+    std::array<int64_t, 3> key;
+    for (size_t k = 0; k < 3; ++k)
+      key[k] =
+          static_cast<int64_t>(std::floor(clip.frames[0][v][static_cast<Eigen::Index>(k)] / cell));
+    const auto [found, added] = cells.emplace(key, static_cast<int32_t>(surface.kept.size()));
+    if (added) surface.kept.push_back(static_cast<int32_t>(v));
+    place[v] = found->second;
+  }
+  std::set<Triangle> seen;
+  for (const Triangle& f : clip.faces) {
+    const Triangle moved = {place[static_cast<size_t>(f[0])], place[static_cast<size_t>(f[1])],
+                            place[static_cast<size_t>(f[2])]};
+    if (moved[0] == moved[1] || moved[1] == moved[2] || moved[0] == moved[2]) continue;
+    Triangle sorted = moved;
+    std::sort(sorted.begin(), sorted.end());
+    if (seen.insert(sorted).second) surface.faces.push_back(moved);
+  }
+  return surface;
+}
+
+Surface thin(const Clip& clip, size_t vertices) {
+  if (clip.faces.empty() || clip.frames[0].size() <= vertices) return {{}, clip.faces};
+  const Point& first = clip.frames[0][0];
+  Point low = first, high = first;
+  for (const Point& p : clip.frames[0]) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  float cell = std::max(1e-6f, (high - low).norm() / 400);
+  Surface surface = cluster(clip, cell);
+  while (surface.kept.size() > vertices && cell < (high - low).norm()) {
+    cell *= 1.2f;
+    surface = cluster(clip, cell);
+  }
+  return surface;
+}
+
+struct Plan {
+  size_t stride = 1, frames = 0;
+  std::vector<Surface> surfaces;
+  bool thinned = false;
+};
+
+size_t text_bytes(const std::vector<Clip>& clips, const std::vector<Surface>& surfaces,
+                  size_t frames, size_t max_points) {
+  double bytes = 40000;
+  for (size_t c = 0; c < clips.size(); ++c) {
+    const size_t all = clips[c].frames[0].size();
+    const size_t count = clips[c].faces.empty()     ? max_points
+                         : surfaces[c].kept.empty() ? all
+                                                    : surfaces[c].kept.size();
+    bytes += 8.0 * static_cast<double>(count) * static_cast<double>(frames) +
+             16.0 * static_cast<double>(surfaces[c].faces.size()) +
+             30.0 * static_cast<double>(frames);
+  }
+  return static_cast<size_t>(bytes);
+}
+
+Plan make_plan(const std::vector<Clip>& clips, const PageOptions& options) {
+  size_t length = clips[0].frames.size();
+  for (const Clip& clip : clips) length = std::min(length, clip.frames.size());
+  Plan plan;
+  for (const Clip& clip : clips) plan.surfaces.push_back({{}, clip.faces});
+  const auto fits = [&] {
+    plan.frames = (length + plan.stride - 1) / plan.stride;
+    return text_bytes(clips, plan.surfaces, plan.frames, options.max_points) <= options.max_bytes;
+  };
+  while (!fits() && plan.stride < kMostStride) ++plan.stride;
+  for (size_t vertices = 16384; !fits() && vertices >= kFewestVertices;
+       vertices = vertices * 3 / 4) {
+    plan.thinned = true;
+    for (size_t c = 0; c < clips.size(); ++c) plan.surfaces[c] = thin(clips[c], vertices);
+  }
+  while (!fits() && plan.frames > 2) plan.stride += (plan.stride + 3) / 4;
+  return plan;
+}
+
+// ---- data
+// ----------------------------------------------------------------------------------------
+
+Points picked(const Clip& clip, const Surface& surface, size_t frame, size_t max_points) {
+  const Points& all = clip.frames[frame];
+  Points out;
+  if (!clip.faces.empty()) {
+    if (surface.kept.empty()) return all;
+    for (const int32_t v : surface.kept) out.push_back(all[static_cast<size_t>(v)]);
+    return out;
+  }
+  const Point centre = clip_centre(all);
+  for (const Point& p : all)
+    if (p.allFinite() && (p - centre).cwiseAbs().maxCoeff() < kReach) out.push_back(p);
+  if (out.empty()) out.push_back(centre);
+  if (out.size() <= max_points) return out;
+  for (size_t k = 0; k < max_points; ++k) out[k] = out[k * out.size() / max_points];
+  out.resize(max_points);
+  return out;
+}
+
+// Middles of the frames, smoothed over a quarter of a second to both sides: a calm camera.
+std::vector<Point> calm_centres(const std::vector<Points>& frames, double fps) {
+  std::vector<Point> centres, calm;
+  for (const Points& points : frames) centres.push_back(clip_centre(points));
+  const auto reach = static_cast<std::ptrdiff_t>(std::lround(std::min(fps, 240.0) / 4));
+  const auto count = static_cast<std::ptrdiff_t>(centres.size());
+  for (std::ptrdiff_t f = 0; f < count; ++f) {
+    const std::ptrdiff_t side = std::min({reach, f, count - 1 - f});
+    Point sum = Point::Zero();
+    for (std::ptrdiff_t k = f - side; k <= f + side; ++k) sum += centres[static_cast<size_t>(k)];
+    calm.push_back(sum / static_cast<float>(2 * side + 1));
+  }
+  return calm;
+}
+
+Json numbers(const Point& p) {
+  Json list = Json::array();
+  for (int k = 0; k < 3; ++k) list.push_back(std::round(double{p[k]} * 1e4) / 1e4);
+  return list;
+}
+
+struct Packed {
+  Json meta;
+  std::string elements;               // script elements with the data
+  float width = 0.5f, height = 0.5f;  // of the figure, metres
+};
+
+Packed pack(const Clip& clip, const Surface& surface, const Plan& plan, size_t number,
+            const PageOptions& options) {
+  std::vector<Points> frames;
+  for (size_t f = 0; f < plan.frames; ++f)
+    frames.push_back(picked(clip, surface, f * plan.stride, options.max_points));
+  Point low = frames[0][0], high = low;
+  for (const Points& points : frames)
+    for (const Point& p : points) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  const Eigen::Vector3d step = ((high - low).cast<double>() / 65535.0).cwiseMax(1e-9);
+  Packed packed;
+  const float floor = clip_floor(clip);
+  const std::vector<Point> centres =
+      calm_centres(frames, options.fps / static_cast<double>(plan.stride));
+  std::vector<uint16_t> data;
+  Json counts = Json::array(), middles = Json::array();
+  size_t most = 1;
+  for (size_t f = 0; f < frames.size(); ++f) {
+    counts.push_back(frames[f].size());
+    middles.push_back(numbers(centres[f]));
+    most = std::max(most, frames[f].size());
+    for (const Point& p : frames[f]) {
+      for (int k = 0; k < 3; ++k)
+        data.push_back(static_cast<uint16_t>(
+            std::lround(std::clamp((double{p[k]} - double{low[k]}) / step[k], 0.0, 65535.0))));
+      packed.height = std::max(packed.height, std::min(p.y() - floor, 3.2f));
+      const Point aside = p - centres[f];
+      packed.width = std::max(packed.width, std::min(2 * std::hypot(aside.x(), aside.z()), 3.2f));
+    }
+  }
+  const double radius = std::clamp(0.42 * std::sqrt(1.8 / static_cast<double>(most)), 0.004, 0.016);
+  packed.meta = {{"label", clip.label},
+                 {"colour", hex(kClipColours[number])},
+                 {"floor", floor},
+                 {"radius", radius},
+                 {"low", {low.x(), low.y(), low.z()}},
+                 {"step", {step.x(), step.y(), step.z()}},
+                 {"faces", surface.faces.size()},
+                 {"counts", counts},
+                 {"centres", middles}};
+  const auto element = [&](const char* name, const void* bytes, size_t size) {
+    packed.elements += "<script id=\"" + std::string(name) + std::to_string(number) +
+                       "\" type=\"text/plain\">" + base64(bytes, size) + "</script>\n";
+  };
+  element("frames", data.data(), data.size() * 2);
+  if (!surface.faces.empty()) element("faces", surface.faces.data(), surface.faces.size() * 12);
+  return packed;
+}
+
+std::string thinning_note(const Plan& plan) {
+  std::string note;
+  if (plan.stride > 1) note += " Holds one frame in " + std::to_string(plan.stride) + ".";
+  if (plan.thinned) note += " Surfaces are thinned to keep the page small.";
+  return note;
+}
+
+// One pass over the template, so that nothing in a label is taken for a name.
+std::string filled(const std::string& page, const std::map<std::string, std::string>& values) {
+  std::string out;
+  size_t at = 0;
+  while (at < page.size()) {
+    const size_t open = page.find('@', at);
+    const size_t close = open == std::string::npos ? open : page.find('@', open + 1);
+    const auto value = close == std::string::npos
+                           ? values.end()
+                           : values.find(page.substr(open + 1, close - open - 1));
+    if (value == values.end()) {
+      const size_t end = open == std::string::npos ? page.size() : open + 1;
+      out.append(page, at, end - at);
+      at = end;
+    } else {
+      out.append(page, at, open - at);
+      out += value->second;
+      at = close + 1;
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string page_html(const std::vector<Clip>& clips, const PageOptions& options) {
+  check_clips("", clips);
+  const Plan plan = make_plan(clips, options);
+  Json meta = {{"fps", options.fps}, {"stride", plan.stride}};
+  std::string data, panels, description = "Views side by side: ";
+  float width = 0, height = 0;
+  Json list = Json::array();
+  for (size_t c = 0; c < clips.size(); ++c) {
+    Packed packed = pack(clips[c], plan.surfaces[c], plan, c, options);
+    list.push_back(std::move(packed.meta));
+    data += packed.elements;
+    width = std::max(width, packed.width);
+    height = std::max(height, packed.height);
+    const std::string label = escaped(clips[c].label);
+    panels += "<div class=\"panel\" id=\"panel" + std::to_string(c) +
+              "\"><span><i style=\"background:" + hex(kClipColours[c]) + "\"></i>" + label +
+              "</span></div>\n";
+    description += (c > 0 ? "; " : "") + label;
+  }
+  meta["width"] = width;
+  meta["height"] = height;
+  meta["clips"] = std::move(list);
+  return filled(kPage, {{"TITLE", escaped(options.title)},
+                        {"STYLE", kStyle},
+                        {"DESCRIPTION", description},
+                        {"PANELS", panels},
+                        {"NOTE", thinning_note(plan)},
+                        {"META", script_json(meta)},
+                        {"DATA", data},
+                        {"SCRIPT", kScript}});
+}
+
+void write_page(const std::string& path, const std::vector<Clip>& clips,
+                const PageOptions& options) {
+  write_file_atomically(path, page_html(clips, options));
+}
+
+}  // namespace restage

@@ -1,0 +1,129 @@
+#include "infer/render/sheet.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+#include "infer/render/rasteriser.h"
+
+namespace restage {
+namespace {
+
+constexpr Rgb kPaper = {0xf7, 0xf8, 0xfa}, kInk = {0x2b, 0x30, 0x38}, kPale = {0x7a, 0x83, 0x90};
+constexpr int kMargin = 22, kLabel = 14, kTimes = 34, kTitle = 34;
+constexpr float kView = 0.36f;  // a long lens: little perspective
+
+struct Frame {
+  const Points* points;
+  Point centre;  // at half the common height over the floor
+};
+
+struct Layout {
+  std::vector<std::vector<Frame>> cells;  // [clip][column]
+  std::vector<size_t> moments;
+  std::vector<float> floors;
+  float half_width = 0.3f, low = 0,
+        high = 0.5f;  // extent of all figures about their centres, metres
+};
+
+std::vector<size_t> moments_of(const std::vector<Clip>& clips, int columns) {
+  size_t length = clips[0].frames.size();
+  for (const Clip& clip : clips) length = std::min(length, clip.frames.size());
+  const size_t count = std::min(length, static_cast<size_t>(std::max(1, columns)));
+  std::vector<size_t> moments;
+  for (size_t k = 0; k < count; ++k)
+    moments.push_back(count == 1 ? length / 2 : k * (length - 1) / (count - 1));
+  return moments;
+}
+
+Layout lay_out(const std::vector<Clip>& clips, const SheetOptions& options) {
+  Layout layout;
+  layout.moments = moments_of(clips, options.columns);
+  const double azimuth = options.azimuth * std::numbers::pi / 180;
+  const Point right(static_cast<float>(std::cos(azimuth)), 0,
+                    static_cast<float>(-std::sin(azimuth)));
+  for (const Clip& clip : clips) {
+    const float floor = clip_floor(clip);
+    layout.floors.push_back(floor);
+    layout.cells.emplace_back();
+    for (const size_t moment : layout.moments) {
+      const Points& points = clip.frames[moment];
+      const Point centre = clip_centre(points);
+      layout.cells.back().push_back({&points, centre});
+      for (const Point& p : points) {
+        if (!p.allFinite()) continue;
+        const float aside = std::abs(right.dot(p - centre)), height = p.y() - floor;
+        // stray points may lie anywhere; a person is not larger than this
+        layout.half_width = std::max(layout.half_width, std::min(aside, 1.6f));
+        layout.high = std::max(layout.high, std::min(height, 3.2f));
+      }
+    }
+  }
+  return layout;
+}
+
+Image draw_cell(const Clip& clip, const Frame& frame, float floor, uint32_t colour, int width,
+                const Layout& layout, const SheetOptions& options) {
+  Canvas canvas(width, options.cell_height);
+  Camera camera;
+  camera.azimuth = static_cast<float>(options.azimuth * std::numbers::pi / 180);
+  camera.elevation = static_cast<float>(options.elevation * std::numbers::pi / 180);
+  camera.view = kView;
+  const float tall = 1.16f * layout.high + 0.12f;
+  camera.distance = 0.5f * tall / std::tan(0.5f * kView);
+  camera.target = {frame.centre.x(), floor + 0.5f * layout.high - 0.01f * tall, frame.centre.z()};
+  canvas.begin(camera, floor, *frame.points, clip.faces);
+  if (clip.faces.empty())
+    canvas.draw_cloud(*frame.points, colour_of(colour));
+  else
+    canvas.draw_mesh(*frame.points, clip.faces, colour_of(colour));
+  return canvas.image();
+}
+
+Rgb bytes_of(uint32_t colour) {
+  return {static_cast<uint8_t>(colour >> 16), static_cast<uint8_t>(colour >> 8),
+          static_cast<uint8_t>(colour)};
+}
+
+}  // namespace
+
+Image contact_sheet(const std::vector<Clip>& clips, const SheetOptions& options) {
+  check_clips("", clips);
+  const Layout layout = lay_out(clips, options);
+  const double per_metre = options.cell_height / (1.16 * layout.high + 0.12);
+  const int cell_width = std::clamp(static_cast<int>(per_metre * (2.0 * layout.half_width + 0.16)),
+                                    options.cell_height / 2, options.cell_height * 3 / 2);
+  const int columns = static_cast<int>(layout.moments.size()),
+            rows = static_cast<int>(clips.size());
+  const int top = kMargin + (options.title.empty() ? 0 : kTitle),
+            row_height = kLabel + options.cell_height;
+  Image sheet(2 * kMargin + columns * cell_width, top + rows * row_height + kTimes, kPaper);
+  if (!options.title.empty()) draw_text(sheet, kMargin, kMargin - 4, 14, kInk, options.title);
+  for (int r = 0; r < rows; ++r) {
+    const auto clip = static_cast<size_t>(r);
+    const int y = top + r * row_height;
+    for (int c = 0; c < columns; ++c)
+      paste(sheet,
+            draw_cell(clips[clip], layout.cells[clip][static_cast<size_t>(c)], layout.floors[clip],
+                      kClipColours[clip], cell_width, layout, options),
+            kMargin + c * cell_width, y + kLabel);
+    fill_rectangle(sheet, kMargin, y + 4, 12, 12, bytes_of(kClipColours[clip]));
+    draw_text(sheet, kMargin + 20, y + 4, 12, kInk, clips[clip].label);
+  }
+  for (int c = 0; c < columns; ++c) {
+    char time[32];
+    std::snprintf(time, sizeof time, "%.2f s",
+                  static_cast<double>(layout.moments[static_cast<size_t>(c)]) / options.fps);
+    draw_text(sheet, kMargin + c * cell_width + (cell_width - text_width(10, time)) / 2,
+              top + rows * row_height + 8, 10, kPale, time);
+  }
+  return sheet;
+}
+
+void write_contact_sheet(const std::string& path, const std::vector<Clip>& clips,
+                         const SheetOptions& options) {
+  write_png(path, contact_sheet(clips, options));
+}
+
+}  // namespace restage

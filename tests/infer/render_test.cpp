@@ -1,0 +1,177 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <set>
+
+#include "autograd/base/atomic_file.h"
+#include "autograd/base/error.h"
+#include "infer/render/page.h"
+#include "infer/render/rasteriser.h"
+#include "infer/render/sheet.h"
+#include "tests/infer/toy_body.h"
+
+namespace restage {
+namespace {
+
+// Source cloud of changing size, result, truth.
+std::vector<Clip> toy_clips(size_t frames = 12) {
+  const Body body = testing::toy_body();
+  std::vector<Clip> clips = {
+      {"source cloud", {}, {}}, {"result", {}, body.rest.faces}, {"truth", {}, body.rest.faces}};
+  for (size_t f = 0; f < frames; ++f) {
+    const Points surface =
+        testing::toy_surface(body, testing::toy_pose(body, static_cast<double>(f) / 24));
+    clips[0].frames.push_back(
+        Points(surface.begin(), surface.end() - static_cast<std::ptrdiff_t>(10 * f)));
+    clips[1].frames.push_back(surface);
+    clips[2].frames.push_back(surface);
+  }
+  return clips;
+}
+
+// RESTAGE_KEEP=FOLDER keeps the files for the browser and for a look.
+void keep(const std::string& name, const std::string& bytes) {
+  if (const char* folder = std::getenv("RESTAGE_KEEP"))
+    write_file_atomically(std::string(folder) + "/" + name, bytes);
+}
+
+// Pixels of a column-row cell that are clearly coloured as the clip is (its hue, not grey).
+int coloured(const Image& image, int x0, int x1, int y0, int y1, uint32_t colour) {
+  const int want[3] = {static_cast<int>(colour >> 16), static_cast<int>(colour >> 8 & 255),
+                       static_cast<int>(colour & 255)};
+  int count = 0;
+  for (int y = y0; y < y1; ++y)
+    for (int x = x0; x < x1; ++x) {
+      const Rgb p = image.at(x, y);
+      const int spread =
+          *std::max_element(p.begin(), p.end()) - *std::min_element(p.begin(), p.end());
+      const auto most = std::max_element(p.begin(), p.end()) - p.begin();
+      count += spread > 30 && most == std::max_element(want, want + 3) - want;
+    }
+  return count;
+}
+
+TEST(Sheet, EveryCellShowsItsClip) {
+  SheetOptions options;
+  options.columns = 4;
+  options.cell_height = 160;
+  const Image sheet = contact_sheet(toy_clips(), options);
+  keep("sheet.png", png_bytes(sheet));
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column) {
+      const int w = sheet.width / 4, h = sheet.height / 3;
+      const int x = column * w, y = row * h;
+      EXPECT_GT(coloured(sheet, x, x + w, y + h / 5, y + h, kClipColours[row]), 400)
+          << row << ' ' << column;
+    }
+  EXPECT_EQ(sheet.at(1, 1), (Rgb{0xf7, 0xf8, 0xfa}));
+  EXPECT_EQ(contact_sheet(toy_clips(), options).rgb, sheet.rgb);
+}
+
+TEST(Sheet, MeshInFrontHidesWhatIsBehind) {
+  const Points square = {{-1, 0.1f, 0}, {1, 0.1f, 0}, {1, 2, 0}, {-1, 2, 0}};
+  const std::vector<Triangle> faces = {{0, 1, 2}, {0, 2, 3}};
+  Points behind = square;
+  for (Point& p : behind) p.z() -= 0.5f;
+  Camera camera;
+  camera.target = {0, 1, 0};
+  const auto middle = [&](bool back_first) {
+    Canvas canvas(32, 32, 2);
+    canvas.begin(camera, 0, {}, {});
+    if (back_first) canvas.draw_mesh(behind, faces, colour_of(0x0000ff));
+    canvas.draw_mesh(square, faces, colour_of(0xff0000));
+    if (!back_first) canvas.draw_mesh(behind, faces, colour_of(0x0000ff));
+    return canvas.image().at(16, 14);
+  };
+  EXPECT_EQ(middle(true), middle(false));
+  EXPECT_GT(middle(true)[0], middle(true)[2] + 50);
+}
+
+TEST(Sheet, AnyNumbersAreDrawnWithoutHarm) {
+  const float huge = 3e38f, nan = std::nanf("");
+  Clip cloud{
+      "stray", {{{0, 1, 0}, {nan, 0, 0}, {huge, huge, -huge}, {0, 0, 4.0f}, {0, 0.5f, 9}}}, {}};
+  Clip mesh{"spike",
+            {{{0, 0, 0}, {huge, 1, 0}, {0, 1, -huge}, {1e6f, 1e6f, 1e6f}}},
+            {{0, 1, 2}, {0, 0, 0}, {0, 2, 3}}};
+  SheetOptions options;
+  options.cell_height = 60;
+  EXPECT_GT(contact_sheet({cloud, mesh}, options).width, 0);
+  EXPECT_NE(page_html({cloud, mesh}).find("</html>"), std::string::npos);
+  const Clip nothing{"all stray", {{{nan, nan, nan}}}, {}};
+  EXPECT_GT(contact_sheet({nothing}, options).width, 0);
+  EXPECT_NE(page_html({nothing}).find("</html>"), std::string::npos);
+}
+
+TEST(Sheet, BadClipsAreRefused) {
+  EXPECT_THROW(contact_sheet({}), InputError);
+  EXPECT_THROW(contact_sheet({{"empty", {}, {}}}), InputError);
+  EXPECT_THROW(contact_sheet({{"no points", {{}}, {}}}), InputError);
+  EXPECT_THROW(page_html({{"face", {{{0, 0, 0}}}, {{0, 1, 0}}}}), InputError);
+  EXPECT_THROW(page_html({{"count", {{{0, 0, 0}}, {{0, 0, 0}, {1, 1, 1}}}, {{0, 0, 0}}}}),
+               InputError);
+  EXPECT_THROW(page_html({{"nan", {{{std::nanf(""), 0, 0}}}, {{0, 0, 0}}}}), InputError);
+}
+
+TEST(Picture, PngIsWellFormedAndTextLeavesInk) {
+  Image image(120, 24, {255, 255, 255});
+  draw_text(image, 4, 4, 12, {0, 0, 0}, "Frame 12\n\xff");
+  std::set<uint8_t> greys(image.rgb.begin(), image.rgb.end());
+  EXPECT_GT(greys.size(), 8u);  // antialiased
+  EXPECT_LT(*greys.begin(), 60);
+  EXPECT_GT(text_width(12, "mm"), text_width(12, "ii"));
+  draw_text(image, -50, 20, 12, {0, 0, 0},
+            "cut off at every edge, and far longer than the picture");
+  const std::string png = png_bytes(image);
+  ASSERT_GT(png.size(), 33u);
+  EXPECT_EQ(png.substr(0, 8), "\x89PNG\r\n\x1a\n");
+  EXPECT_EQ(png.substr(12, 4), "IHDR");
+  EXPECT_EQ(static_cast<unsigned char>(png[19]), 120);
+  EXPECT_EQ(png.substr(png.size() - 8, 4), "IEND");
+}
+
+std::string base64_of(const std::string& page, const std::string& id) {
+  const size_t open = page.find("<script id=\"" + id + "\"");
+  const size_t start = page.find('>', open) + 1;
+  return page.substr(start, page.find('<', start) - start);
+}
+
+TEST(Page, IsOneFileThatAsksForNothing) {
+  PageOptions options;
+  options.title = "walk <onto> \"another\" & body @DATA@";
+  auto clips = toy_clips();
+  clips[1].label = "</script><b>result \xff";
+  const std::string page = page_html(clips, options);
+  for (const char* word : {"http:", "https:", "src=", "href=", "@import", "url(", "fetch(",
+                           "import(", "XMLHttp", "WebSocket", "</script><b>"})
+    EXPECT_EQ(page.find(word), std::string::npos) << word;
+  EXPECT_NE(page.find("walk &lt;onto&gt; &quot;another&quot; &amp; body @DATA@"),
+            std::string::npos);
+  size_t frames = 0;
+  for (const Points& points : clips[0].frames) frames += std::min<size_t>(points.size(), 2048);
+  EXPECT_EQ(base64_of(page, "frames0").size(), (frames * 6 + 2) / 3 * 4);
+  EXPECT_EQ(base64_of(page, "faces1").size(), (clips[1].faces.size() * 12 + 2) / 3 * 4);
+  EXPECT_EQ(page, page_html(clips, options));
+  const std::string plain = page_html(toy_clips(), {});
+  keep("page.html", plain);
+}
+
+TEST(Page, LongSequencesStayBelowTheLimit) {
+  auto clips = toy_clips(60);
+  PageOptions options;
+  const size_t whole = page_html(clips, options).size();
+  for (const size_t limit : {whole / 3, whole / 10, size_t{150000}}) {
+    options.max_bytes = limit;
+    const std::string page = page_html(clips, options);
+    EXPECT_LE(page.size(), limit * 11 / 10 + 30000);
+    EXPECT_NE(page.find("Holds one frame in"), std::string::npos);
+  }
+  EXPECT_EQ(page_html(toy_clips(), {}).find("Holds one frame in"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace restage
