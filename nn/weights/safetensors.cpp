@@ -1,0 +1,269 @@
+#include "nn/weights/safetensors.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <vector>
+
+#include "autograd/base/atomic_file.h"
+#include "autograd/base/error.h"
+
+namespace restage {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr uint64_t kHeaderLimit = 100'000'000;  // as in the format's reference implementation
+constexpr int kDepthLimit = 4;                  // { name: { shape: [ ... ] } }
+constexpr const char* kFix = "give an undamaged safetensors file";
+
+static_assert(std::endian::native == std::endian::little, "the format is little-endian");
+
+enum class Coding { f32, f64, i32, i64, f16, bf16 };
+struct Kind {
+  const char* name;
+  Coding coding;
+  DType dtype;
+  uint64_t bytes;
+};
+constexpr Kind kKinds[] = {
+    {"F32", Coding::f32, DType::f32, 4}, {"F64", Coding::f64, DType::f64, 8},
+    {"I32", Coding::i32, DType::i32, 4}, {"I64", Coding::i64, DType::i64, 8},
+    {"F16", Coding::f16, DType::f32, 2}, {"BF16", Coding::bf16, DType::f32, 2},
+};
+
+struct Entry {
+  std::string name;
+  const Kind* kind = nullptr;
+  Shape shape;
+  uint64_t begin = 0, end = 0;
+};
+
+/// IEEE half precision to single: exponent and fraction moved; subnormals by scaling.
+float from_half(uint16_t h) {
+  const uint32_t sign = static_cast<uint32_t>(h & 0x8000u) << 16, exponent = (h >> 10) & 31u,
+                 fraction = h & 0x3ffu;
+  uint32_t bits = sign;
+  if (exponent == 31) {
+    bits |= 0x7f800000u | (fraction << 13);
+  } else if (exponent > 0) {
+    bits |= ((exponent + 112) << 23) | (fraction << 13);
+  } else {
+    const float small = static_cast<float>(fraction) * 0x1p-24f;
+    return sign != 0 ? -small : small;
+  }
+  float out;
+  std::memcpy(&out, &bits, 4);
+  return out;
+}
+
+float from_bfloat(uint16_t h) {
+  const uint32_t bits = static_cast<uint32_t>(h) << 16;
+  float out;
+  std::memcpy(&out, &bits, 4);
+  return out;
+}
+
+class Reader {
+ public:
+  Reader(std::string_view bytes, const std::string& where) : bytes_(bytes), where_(where) {}
+
+  TensorFile read() {
+    const Json header = parse_header();
+    TensorFile out;
+    std::vector<Entry> entries;
+    for (const auto& [name, value] : header.items()) {
+      if (name == "__metadata__")
+        read_metadata(value, &out);
+      else
+        entries.push_back(read_entry(name, value));
+    }
+    check_layout(entries);
+    for (const Entry& e : entries) out.tensors.emplace(e.name, decode(e));
+    return out;
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& wrong) const { throw InputError(where_, wrong, kFix); }
+
+  Json parse_header() {
+    if (bytes_.size() < 8) fail("is too short to be a safetensors file");
+    uint64_t length = 0;
+    std::memcpy(&length, bytes_.data(), 8);
+    if (length > bytes_.size() - 8 || length > kHeaderLimit)
+      fail("is no safetensors file or is cut off (header of " + std::to_string(length) + " bytes)");
+    data_ = bytes_.substr(8 + length);
+    std::set<std::string> keys;
+    const auto guard = [&](int depth, Json::parse_event_t event, Json& value) {
+      if (depth > kDepthLimit) fail("has a header nested too deeply");
+      if (event == Json::parse_event_t::key && depth == 1 &&
+          !keys.insert(value.get<std::string>()).second)
+        fail("names the tensor " + in_quotes(value.get<std::string>()) + " twice");
+      return true;
+    };
+    try {
+      Json header = Json::parse(bytes_.substr(8, length), guard);
+      if (!header.is_object()) fail("has a header that is no JSON object");
+      return header;
+    } catch (const Json::exception&) {
+      fail("has a header that is not JSON");
+    }
+  }
+
+  void read_metadata(const Json& value, TensorFile* out) const {
+    if (!value.is_object()) fail("has metadata that is no JSON object");
+    for (const auto& [key, text] : value.items()) {
+      if (!text.is_string()) fail("has metadata " + in_quotes(key) + " that is no text");
+      out->metadata[key] = text.get<std::string>();
+    }
+  }
+
+  Entry read_entry(const std::string& name, const Json& value) const {
+    const std::string called = "tensor " + in_quotes(name);
+    if (!value.is_object() || !value.contains("dtype") || !value.contains("shape") ||
+        !value.contains("data_offsets"))
+      fail(called + " lacks dtype, shape or data_offsets");
+    Entry e;
+    e.name = name;
+    const std::string dtype = value["dtype"].is_string() ? value["dtype"].get<std::string>() : "";
+    for (const Kind& k : kKinds)
+      if (dtype == k.name) e.kind = &k;
+    if (e.kind == nullptr)
+      throw InputError(where_, called + " has the unknown dtype " + in_quotes(dtype),
+                       "store it as F32, F64, I32, I64, F16 or BF16");
+    const Json &shape = value["shape"], &range = value["data_offsets"];
+    if (!shape.is_array() || shape.size() > static_cast<size_t>(Shape::kMaxRank))
+      fail(called + " has a shape of more than " + std::to_string(Shape::kMaxRank) + " axes");
+    uint64_t count = 1;
+    bool empty = false;
+    for (const Json& axis : shape) {
+      const uint64_t n = unsigned_number(axis, called);
+      e.shape.push_back(static_cast<int64_t>(n));
+      empty = empty || n == 0;
+      if (n != 0 && count > data_.size() / n) count = data_.size() + 1;  // cannot fit: no overflow
+      if (n != 0) count *= count > data_.size() ? 1 : n;
+    }
+    if (empty) count = 0;
+    if (!range.is_array() || range.size() != 2) fail(called + " has no pair of data offsets");
+    e.begin = unsigned_number(range[0], called);
+    e.end = unsigned_number(range[1], called);
+    if (e.begin > e.end || e.end > data_.size())
+      fail(called + " reaches beyond the end of the file");
+    if (count > data_.size() || count * e.kind->bytes != e.end - e.begin)
+      fail(called + " has " + std::to_string(e.end - e.begin) + " bytes, which do not fit " +
+           e.shape.str());
+    return e;
+  }
+
+  uint64_t unsigned_number(const Json& value, const std::string& called) const {
+    if (!value.is_number_unsigned() ||
+        value.get<uint64_t>() > static_cast<uint64_t>(std::numeric_limits<int64_t>::max()))
+      fail(called + " has a length or offset that is no whole number");
+    return value.get<uint64_t>();
+  }
+
+  /// The format allows neither gaps nor overlaps.
+  void check_layout(std::vector<Entry>& entries) const {
+    std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
+      return a.begin != b.begin ? a.begin < b.begin : a.end < b.end;
+    });
+    uint64_t at = 0;
+    for (const Entry& e : entries) {
+      if (e.begin != at)
+        fail("tensor " + in_quotes(e.name) +
+             (e.begin < at ? " overlaps another" : " follows a gap"));
+      at = e.end;
+    }
+    if (at != data_.size())
+      fail("holds " + std::to_string(data_.size() - at) + " bytes more than its tensors");
+  }
+
+  Tensor decode(const Entry& e) const {
+    Tensor out = Tensor::empty(e.shape, e.kind->dtype);
+    const char* from = data_.data() + e.begin;
+    const auto n = static_cast<size_t>(out.numel());
+    if (n == 0) return out;
+    if (e.kind->coding != Coding::f16 && e.kind->coding != Coding::bf16) {
+      std::memcpy(out.raw(), from, e.end - e.begin);
+      return out;
+    }
+    auto* to = out.data<float>();
+    for (size_t i = 0; i < n; ++i) {
+      uint16_t h;
+      std::memcpy(&h, from + 2 * i, 2);
+      to[i] = e.kind->coding == Coding::f16 ? from_half(h) : from_bfloat(h);
+    }
+    return out;
+  }
+
+  std::string_view bytes_, data_;
+  const std::string& where_;
+};
+
+const char* format_name(DType type) {
+  for (const Kind& k : kKinds)
+    if (k.dtype == type) return k.name;
+  return "";
+}
+
+}  // namespace
+
+std::string in_quotes(std::string_view name) {
+  std::string out = "'";
+  for (const char c : name.substr(0, 60)) out += c >= ' ' && c <= '~' ? c : '?';
+  return out + (name.size() > 60 ? "...'" : "'");
+}
+
+const Tensor* TensorFile::find(const std::string& name) const {
+  const auto found = tensors.find(name);
+  return found == tensors.end() ? nullptr : &found->second;
+}
+
+const Tensor& TensorFile::at(const std::string& name, const std::string& where) const {
+  if (const Tensor* t = find(name)) return *t;
+  throw InputError(where, "lacks the tensor " + in_quotes(name), "give a complete file");
+}
+
+TensorFile parse_safetensors(std::string_view bytes, const std::string& where) {
+  return Reader(bytes, where).read();
+}
+
+TensorFile read_safetensors(const std::string& path) {
+  return parse_safetensors(read_file(path), path);
+}
+
+std::string safetensors_bytes(const TensorFile& file) {
+  Json header = Json::object();
+  if (!file.metadata.empty()) header["__metadata__"] = file.metadata;
+  uint64_t at = 0;
+  for (const auto& [name, t] : file.tensors) {
+    Json shape = Json::array();
+    for (int i = 0; i < t.rank(); ++i) shape.push_back(t.size(i));
+    const uint64_t end = at + static_cast<uint64_t>(t.numel()) * size_of(t.dtype());
+    header[name] = {
+        {"dtype", format_name(t.dtype())}, {"shape", shape}, {"data_offsets", {at, end}}};
+    at = end;
+  }
+  std::string text = header.dump(-1, ' ', false, Json::error_handler_t::replace);
+  text.resize((text.size() + 7) / 8 * 8, ' ');
+  std::string out;
+  out.reserve(8 + text.size() + at);
+  const uint64_t length = text.size();
+  out.append(reinterpret_cast<const char*>(&length), 8);
+  out += text;
+  for (const auto& item : file.tensors) {
+    const Tensor& t = item.second;
+    out.append(static_cast<const char*>(t.raw()),
+               static_cast<size_t>(t.numel()) * size_of(t.dtype()));
+  }
+  return out;
+}
+
+void write_safetensors(const std::string& path, const TensorFile& file) {
+  write_file_atomically(path, safetensors_bytes(file));
+}
+
+}  // namespace restage
