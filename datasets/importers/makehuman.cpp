@@ -115,6 +115,11 @@ void MakeHuman::read_rig() {
     if (heads_[bone_index(name)].empty())
       broken(path_ + ":/rig/head_vertices", "has no head of " + std::string(name));
 
+  read_weights(joint);
+}
+
+void MakeHuman::read_weights(const std::vector<size_t>& joint_of_bone) {
+  const h5::File file = h5::File::open(path_);
   const std::vector<double> value = file.read<double>("/rig/weight_value", {-1});
   const int64_t count = static_cast<int64_t>(value.size());
   const std::vector<int32_t> bone = file.read<int32_t>("/rig/weight_bone", {count});
@@ -125,7 +130,8 @@ void MakeHuman::read_rig() {
   for (size_t i = 0; i < value.size(); ++i) {
     if (!(value[i] >= 0 && value[i] < 1e6))
       broken(path_ + ":/rig/weight_value", "holds a negative weight");
-    weights_[static_cast<size_t>(vertex[i])][joint[static_cast<size_t>(bone[i])]] += value[i];
+    weights_[static_cast<size_t>(vertex[i])][joint_of_bone[static_cast<size_t>(bone[i])]] +=
+        value[i];
   }
   for (auto& row : weights_) {
     double sum = 0;

@@ -49,6 +49,7 @@ class MakeHuman {
     size_t start, count;
   };
   void read_rig();
+  void read_weights(const std::vector<size_t>& joint_of_bone);
   void read_targets();
   std::vector<Vec3> shape(const TargetWeights& targets) const;
   Vec3 bone_head(const std::vector<Vec3>& vertices, size_t bone) const;

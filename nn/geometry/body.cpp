@@ -56,66 +56,96 @@ DualTransforms dual_transforms(const Body& body, const PosedSkeleton& posed) {
   return out;
 }
 
-/// A muscle along one bone. It swells on the flexor side, about `centre` (0 near, 1 far joint).
+/// A muscle along one bone. It swells on one side, about `centre` (0 near, 1 far joint).
 struct Muscle {
-  bool active = false;
-  Point origin, axis, side;  ///< near joint, unit bone direction, unit flexor direction (rest pose)
-  float length = 0, centre = 0, half_width = 0;
+  Point origin, axis, side;  ///< near joint, unit bone direction, unit swelling side (rest pose)
+  float length = 0, centre = 0;
   float height = 0;  ///< largest displacement in this pose, metres
 };
-using Muscles = std::array<Muscle, kJoints>;
+constexpr float kHalfWidth = 0.45f;  // of a muscle, as a fraction of its bone's length
 
-/// A hinge and the muscles beside it: heights are fractions of the bone's length at full flexion.
+/// At most two muscles move with one joint: one of the hinge below it, one of its own ball joint.
+struct JointMuscles {
+  int count = 0;
+  std::array<Muscle, 2> muscle;
+};
+using Muscles = std::array<JointMuscles, kJoints>;
+
+/// Heights are fractions of the bone's length at full swelling.
 struct Hinge {
   int near, joint, far;
-  float upper_height, upper_centre, lower_height, lower_centre;
+  double upper_height, upper_centre, lower_height, lower_centre;
 };
-constexpr Hinge kHinges[4] = {{16, 18, 20, 0.075f, 0.58f, 0.045f, 0.28f},
-                              {17, 19, 21, 0.075f, 0.58f, 0.045f, 0.28f},
-                              {1, 4, 7, 0.050f, 0.60f, 0.060f, 0.32f},
-                              {2, 5, 8, 0.050f, 0.60f, 0.060f, 0.32f}};
+constexpr Hinge kHinges[] = {{16, 18, 20, 0.10, 0.58, 0.07, 0.28},  // biceps, forearm
+                             {17, 19, 21, 0.10, 0.58, 0.07, 0.28},
+                             {1, 4, 7, 0.075, 0.60, 0.085, 0.32},  // back of the thigh, calf
+                             {2, 5, 8, 0.075, 0.60, 0.085, 0.32}};
 
-Muscle muscle(const Vec3& origin, const Vec3& bone, const Vec3& towards, float height,
-              float centre) {
-  Muscle out;
+/// A joint whose bone may swing anywhere; the muscle over it swells on the side swung away from.
+struct Ball {
+  int parent, joint, far;
+  double height, centre;
+};
+constexpr Ball kBalls[] = {{13, 16, 18, 0.09, 0.10},  // shoulder
+                           {14, 17, 19, 0.09, 0.10},
+                           {0, 1, 4, 0.07, 0.08},  // buttock
+                           {0, 2, 5, 0.07, 0.08}};
+
+double angle_between(const Vec3& a, const Vec3& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+/// Share of the full height at a joint angle: 0 at rest, half at 60 degrees, 1 from 120 on; smooth.
+double swell(double angle) {
+  return 0.5 * (1.0 - std::cos(1.5 * std::clamp(angle, 0.0, 2.0 * M_PI / 3.0)));
+}
+
+void add_muscle(JointMuscles& out, const Vec3& origin, const Vec3& bone, const Vec3& towards,
+                double height, double centre) {
   const double length = bone.norm();
   const Vec3 axis = bone / length;
   const Vec3 side = towards - axis * axis.dot(towards);
-  if (!(side.norm() > 1e-6)) return out;
-  out.active = true;
-  out.origin = origin.cast<float>();
-  out.axis = axis.cast<float>();
-  out.side = side.normalized().cast<float>();
-  out.length = static_cast<float>(length);
-  out.centre = centre;
-  out.half_width = 0.45f;
-  out.height = height * out.length;
-  return out;
+  if (!(side.norm() > 1e-6 * towards.norm())) return;
+  Muscle& m = out.muscle[static_cast<size_t>(out.count++)];
+  m.origin = origin.cast<float>();
+  m.axis = axis.cast<float>();
+  m.side = side.normalized().cast<float>();
+  m.length = static_cast<float>(length);
+  m.centre = static_cast<float>(centre);
+  m.height = static_cast<float>(height * length);
 }
 
-/// Muscles swell with (1 - cos(flexion)) / 2, flexion being the angle beyond the rest pose's.
+void add_hinge(const Hinge& hinge, const Body& body, const PosedSkeleton& posed, Muscles& out) {
+  const Vec3 upper = body.joints[hinge.joint] - body.joints[hinge.near];
+  const Vec3 lower = body.joints[hinge.far] - body.joints[hinge.joint];
+  if (!(upper.norm() > 1e-6) || !(lower.norm() > 1e-6)) return;
+  const Vec3 upper_now = posed.global[hinge.near] * upper;
+  const Vec3 lower_now = posed.global[hinge.joint] * lower;
+  const double full = swell(angle_between(upper_now, lower_now) - angle_between(upper, lower));
+  if (full < 1e-6) return;
+  // The flexor side of a bone is where the other bone has moved to, seen from this bone.
+  add_muscle(out[hinge.near], body.joints[hinge.near], upper,
+             posed.global[hinge.near].transpose() * lower_now, full * hinge.upper_height,
+             hinge.upper_centre);
+  add_muscle(out[hinge.joint], body.joints[hinge.joint], lower,
+             -(posed.global[hinge.joint].transpose() * upper_now), full * hinge.lower_height,
+             hinge.lower_centre);
+}
+
+void add_ball(const Ball& ball, const Body& body, const PosedSkeleton& posed, Muscles& out) {
+  const Vec3 bone = body.joints[ball.far] - body.joints[ball.joint];
+  if (!(bone.norm() > 1e-6)) return;
+  const Vec3 unmoved = posed.global[ball.parent] * bone, now = posed.global[ball.joint] * bone;
+  const double full = swell(angle_between(unmoved, now));
+  if (full < 1e-6) return;
+  add_muscle(out[ball.joint], body.joints[ball.joint], bone,
+             posed.global[ball.joint].transpose() * unmoved, full * ball.height, ball.centre);
+}
+
 Muscles flexed_muscles(const Body& body, const PosedSkeleton& posed) {
   Muscles out;
-  for (const Hinge& hinge : kHinges) {
-    const Vec3 upper = body.joints[hinge.joint] - body.joints[hinge.near];
-    const Vec3 lower = body.joints[hinge.far] - body.joints[hinge.joint];
-    if (!(upper.norm() > 1e-6) || !(lower.norm() > 1e-6)) continue;
-    const Vec3 upper_now = posed.global[hinge.near] * upper;
-    const Vec3 lower_now = posed.global[hinge.joint] * lower;
-    const auto angle = [](const Vec3& a, const Vec3& b) {
-      return std::atan2(a.cross(b).norm(), a.dot(b));
-    };
-    const double flexion = std::max(0.0, angle(upper_now, lower_now) - angle(upper, lower));
-    if (flexion < 1e-4) continue;
-    const float swell = static_cast<float>(0.5 * (1.0 - std::cos(flexion)));
-    // The flexor side of a bone is where the other bone has moved to, seen from this bone.
-    const Vec3 to_lower = posed.global[hinge.near].transpose() * lower_now;
-    const Vec3 to_upper = -(posed.global[hinge.joint].transpose() * upper_now);
-    out[hinge.near] = muscle(body.joints[hinge.near], upper, to_lower, swell * hinge.upper_height,
-                             hinge.upper_centre);
-    out[hinge.joint] = muscle(body.joints[hinge.joint], lower, to_upper, swell * hinge.lower_height,
-                              hinge.lower_centre);
-  }
+  for (const Hinge& hinge : kHinges) add_hinge(hinge, body, posed, out);
+  for (const Ball& ball : kBalls) add_ball(ball, body, posed, out);
   return out;
 }
 
@@ -123,7 +153,7 @@ Muscles flexed_muscles(const Body& body, const PosedSkeleton& posed) {
 Point swelling(const Muscle& m, const Point& x) {
   const Point from = x - m.origin;
   const float along = m.axis.dot(from);
-  const float u = (along / m.length - m.centre) / m.half_width;
+  const float u = (along / m.length - m.centre) / kHalfWidth;
   if (!(u > -1.0f && u < 1.0f)) return Point::Zero();
   const Point radial = from - along * m.axis;
   const float on_side = radial.dot(m.side);
@@ -148,7 +178,7 @@ Point skin_point(const Point& rest, const float* weights, const DualTransforms& 
     const float signed_w = w * sign[j];
     real += signed_w * transforms.real[j];
     dual += signed_w * transforms.dual[j];
-    if (muscles[j].active) x += w * swelling(muscles[j], rest);
+    for (int k = 0; k < muscles[j].count; ++k) x += w * swelling(muscles[j].muscle[k], rest);
   }
   const float norm = real.norm();
   if (!(norm > 0.0f)) return rest;  // a vertex without weights stays
