@@ -63,6 +63,17 @@ void flush_folder(const std::string& folder, const std::string& target) {
   if (result != 0) fail(target, code);
 }
 
+// In one step where the file system can, else in three.
+void swap_folders(const std::string& temporary, const std::string& folder) {
+  if (::renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, folder.c_str(), RENAME_EXCHANGE) == 0)
+    return;
+  const std::string old = temporary + ".old";
+  if (::rename(folder.c_str(), old.c_str()) != 0 ||
+      ::rename(temporary.c_str(), folder.c_str()) != 0 ||
+      ::rename(old.c_str(), temporary.c_str()) != 0)
+    fail(folder, errno);
+}
+
 }  // namespace
 
 FrameFolderWriter::FrameFolderWriter(std::string folder, std::vector<Triangle> faces,
@@ -100,8 +111,7 @@ void FrameFolderWriter::commit() {
   // rename() replaces an empty folder; frames of an earlier run swap places and are then removed
   if (::rename(temporary_.c_str(), folder_.c_str()) != 0) {
     if (errno != ENOTEMPTY && errno != EEXIST) fail(folder_, errno);
-    if (::renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, folder_.c_str(), RENAME_EXCHANGE) != 0)
-      fail(folder_, errno);
+    swap_folders(temporary_, folder_);
     std::error_code ignored;
     fs::remove_all(temporary_, ignored);
   }
