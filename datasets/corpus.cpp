@@ -1,0 +1,163 @@
+#include "datasets/corpus.h"
+
+#include <cstdio>
+#include <cstring>
+#include <map>
+
+#include "autograd/base/error.h"
+#include "datasets/builtin/bodies.h"
+#include "datasets/builtin/motions.h"
+#include "datasets/schema.h"
+
+namespace restage {
+namespace {
+
+void check_split(const std::string& split) {
+  if (split != "train" && split != "validation" && split != "test")
+    throw InputError("", "unknown split '" + split + "'", "use train, validation or test");
+}
+
+void check_not_empty(const Corpus& corpus, const std::string& where, const std::string& split) {
+  const char* what = corpus.bodies.empty()    ? "bodies"
+                     : corpus.motions.empty() ? "motions"
+                                              : nullptr;
+  if (!what) return;
+  const std::string wrong = split.empty() ? std::string("no ") + what
+                                          : std::string("no ") + what + " of split '" + split + "'";
+  throw InputError(where, wrong, "give data with bodies and motions of every split that is used");
+}
+
+/// A subject in two splits would let a test meet a person that training has seen.
+void check_subjects(const Corpus& corpus, const std::string& where) {
+  std::map<std::string, std::string> split_of;
+  for (const Motion& motion : corpus.motions) {
+    if (motion.subject.empty()) continue;
+    const std::string& split = split_of.emplace(motion.subject, motion.split).first->second;
+    if (split != motion.split)
+      throw InputError(
+          where,
+          "subject '" + motion.subject + "' is in the splits " + split + " and " + motion.split,
+          "put all motions of a subject into one split");
+  }
+}
+
+SplitCounts only(const SplitCounts& counts, const std::string& split) {
+  SplitCounts out = counts;
+  if (split.empty()) return out;
+  if (split != "train") out.train = 0;
+  if (split != "validation") out.validation = 0;
+  if (split != "test") out.test = 0;
+  return out;
+}
+
+std::string text(const SplitCounts& c) {
+  return std::to_string(c.train) + "/" + std::to_string(c.validation) + "/" +
+         std::to_string(c.test);
+}
+
+Corpus builtin_corpus(const CorpusSource& source, const std::string& split) {
+  const SplitCounts b = only(source.bodies, split), m = only(source.motions, split);
+  Corpus out;
+  out.bodies = builtin_bodies(source.seed, b.train, b.validation, b.test);
+  out.motions = builtin_motions(source.seed, m.train, m.validation, m.test);
+  out.description = "built-in source, seed " + std::to_string(source.seed) +
+                    ", train/validation/test bodies " + text(source.bodies) + ", motions " +
+                    text(source.motions);
+  out.license = "Apache-2.0";
+  return out;
+}
+
+Corpus file_corpus(const std::string& path, const std::string& split) {
+  Corpus out;
+  const Inspection about = inspect(path);
+  out.bodies = read_bodies(path, split);
+  out.motions = read_motions(path, split);
+  out.description = about.provenance;
+  out.license = about.license;
+  return out;
+}
+
+/// FNV-1a over 64-bit words.
+class Hash {
+ public:
+  void add(const void* data, size_t bytes) {
+    const char* p = static_cast<const char*>(data);
+    word(bytes);
+    for (; bytes >= 8; p += 8, bytes -= 8) {
+      uint64_t w = 0;
+      std::memcpy(&w, p, 8);
+      word(w);
+    }
+    if (bytes > 0) {
+      uint64_t w = 0;
+      std::memcpy(&w, p, bytes);
+      word(w);
+    }
+  }
+  void add(const std::string& s) { add(s.data(), s.size()); }
+  void add(const Joints& joints) {
+    for (const Vec3& x : joints) add(x.data(), sizeof(double) * 3);
+  }
+  uint64_t value() const { return value_; }
+
+ private:
+  void word(uint64_t w) {
+    value_ = (value_ ^ w) * 0x100000001b3ull;
+    value_ ^= value_ >> 32;  // a multiplication alone never carries high bits down
+  }
+  uint64_t value_ = 0xcbf29ce484222325ull;
+};
+
+void add(Hash& hash, const Body& body) {
+  hash.add(body.id);
+  hash.add(body.split);
+  hash.add(body.joints);
+  hash.add(body.rest.vertices.data(), body.rest.vertices.size() * sizeof(Point));
+  hash.add(body.rest.faces.data(), body.rest.faces.size() * sizeof(Triangle));
+  hash.add(body.weights.data(), static_cast<size_t>(body.weights.size()) * sizeof(float));
+}
+
+void add(Hash& hash, const Motion& motion) {
+  hash.add(motion.id);
+  hash.add(motion.split);
+  hash.add(motion.rest);
+  for (const auto& frame : motion.global)
+    for (const Eigen::Quaternionf& q : frame) hash.add(q.coeffs().data(), sizeof(float) * 4);
+  hash.add(motion.hips.data(), motion.hips.size() * sizeof(Point));
+}
+
+}  // namespace
+
+Corpus load_corpus(const CorpusSource& source, const std::string& split) {
+  if (!split.empty()) check_split(split);
+  const bool builtin = source.source == "builtin";
+  Corpus out = builtin ? builtin_corpus(source, split) : file_corpus(source.source, split);
+  const std::string where = builtin ? "built-in data" : source.source;
+  check_not_empty(out, where, split);
+  check_subjects(out, where);
+  return out;
+}
+
+Corpus subset(const Corpus& corpus, const std::string& split) {
+  check_split(split);
+  Corpus out;
+  for (const Body& body : corpus.bodies)
+    if (body.split == split) out.bodies.push_back(body);
+  for (const Motion& motion : corpus.motions)
+    if (motion.split == split) out.motions.push_back(motion);
+  out.description = corpus.description;
+  out.license = corpus.license;
+  check_not_empty(out, "data", split);
+  return out;
+}
+
+std::string checksum(const Corpus& corpus) {
+  Hash hash;
+  for (const Body& body : corpus.bodies) add(hash, body);
+  for (const Motion& motion : corpus.motions) add(hash, motion);
+  char text[24];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(hash.value()));
+  return text;
+}
+
+}  // namespace restage

@@ -1,0 +1,41 @@
+// Bodies and motions that training and evaluation draw from, of one split or of all.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "nn/geometry/body.h"
+
+namespace restage {
+
+struct Corpus {
+  std::vector<Body> bodies;
+  std::vector<Motion> motions;
+  std::string description, license;  ///< where it comes from, what may be done with it
+};
+
+struct SplitCounts {
+  int train = 0, validation = 0, test = 0;
+};
+
+/// What load_corpus() loads.
+struct CorpusSource {
+  std::string source = "builtin";  ///< "builtin" or a data set file (datasets/schema.h)
+  uint64_t seed = 0;               ///< of the built-in source; seed and counts leave files alone
+  SplitCounts bodies{24, 6, 6};
+  SplitCounts motions{120, 20, 20};
+};
+
+/// All of it, or one split ("train", "validation", "test"; else InputError). A body belongs to one
+/// split, and a motion to the split of its subject, so splits never share either. InputError if
+/// there is no body or no motion, if what is loaded has a subject in two splits, or if the file is
+/// missing or damaged.
+Corpus load_corpus(const CorpusSource& source, const std::string& split = "");
+/// The bodies and the motions of one split. InputError if either is missing.
+Corpus subset(const Corpus& corpus, const std::string& split);
+
+/// 16 hexadecimal digits that change with any number, id or split: provenance of a run.
+std::string checksum(const Corpus& corpus);
+
+}  // namespace restage

@@ -1,0 +1,135 @@
+#include "datasets/sampling/clouds.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "autograd/base/error.h"
+#include "autograd/base/parallel.h"
+
+namespace restage {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+void check(bool ok, const char* key, const char* range) {
+  if (!ok)
+    throw InputError("", std::string("cloud setting '") + key + "' is out of range",
+                     std::string("use ") + range);
+}
+
+CloudConfig checked(const CloudConfig& c) {
+  check(c.points >= 1 && c.points <= 1 << 20, "points", "1 to 1048576");
+  check(c.noise >= 0 && std::isfinite(c.noise), "noise", "metres, 0 or more");
+  check(c.tpose_share >= 0 && c.tpose_share <= 1, "tpose_share", "0 to 1");
+  check(c.tpose_heading >= 0 && c.tpose_heading <= 180, "tpose_heading", "0 to 180 degrees");
+  check(c.scale_jitter >= 0 && c.scale_jitter < 1, "scale_jitter", "0 to below 1");
+  check(c.min_fraction > 0 && c.min_fraction <= 1, "min_fraction", "above 0 to 1");
+  return c;
+}
+
+/// Numbers 0 ... distinct - 1, some of them repeated to make `n`, in random order.
+std::vector<size_t> repeat_some(const RngKey& key, size_t distinct, size_t n) {
+  std::vector<size_t> order(distinct);
+  std::iota(order.begin(), order.end(), size_t{0});
+  if (distinct == n) return order;
+  Rng rng(key);
+  while (order.size() < n) order.push_back(rng.below(distinct));
+  for (size_t i = n; i > 1; --i) std::swap(order[i - 1], order[rng.below(i)]);
+  return order;
+}
+
+/// Skin weights of sample `i`, each side under the other's name in a mirror image.
+void put_weights(const Body& body, const SurfaceSamples& samples, size_t i, bool mirror, float* to) {
+  std::fill_n(to, kJoints, 0.0f);
+  for (size_t corner = 3 * i; corner < 3 * i + 3; ++corner)
+    for (int j = 0; j < kJoints; ++j)
+      to[mirror ? kMirror[static_cast<size_t>(j)] : j] +=
+          samples.weights[corner] * body.weights(samples.vertices[corner], j);
+}
+
+}  // namespace
+
+CloudSampler::CloudSampler(const Corpus& corpus, const CloudConfig& config, uint64_t seed)
+    : corpus_(corpus),
+      config_(checked(config)),
+      key_(RngKey{seed, 0}.fold("clouds")),
+      frames_(corpus.motions),
+      surfaces_(surface_samplers(corpus.bodies)) {
+  if (surfaces_.empty()) throw InputError("", "no bodies to draw clouds from", "add bodies");
+}
+
+CloudSubject CloudSampler::subject(int64_t index) const {
+  Rng rng(key_.fold(static_cast<uint64_t>(index)).fold("subject"));
+  CloudSubject out;
+  out.rest = rng.uniform() < config_.tpose_share;
+  out.body = rng.below(corpus_.bodies.size());
+  out.at = frames_.at(rng.below(frames_.count()));
+  const double range = out.rest ? config_.tpose_heading * kPi / 180 : kPi;
+  out.augmentation = draw_augmentation(rng, config_.heading ? range : 0.0, config_.mirror);
+  out.scale = 1 + rng.uniform(-1.0, 1.0) * config_.scale_jitter;
+  return out;
+}
+
+void CloudSampler::fill(const CloudSubject& subject, const RngKey& key, float* points,
+                        float* joints, float* weights) const {
+  const Body& body = corpus_.bodies.at(subject.body);
+  const auto n = static_cast<size_t>(config_.points);
+  Rng rng(key.fold("count"));
+  const auto least = static_cast<size_t>(std::ceil(config_.min_fraction * config_.points));
+  const SurfaceSamples samples =
+      surfaces_[subject.body].draw(key.fold("surface"), least + rng.below(n - least + 1));
+
+  Points cloud;
+  Joints skeleton = body.joints;
+  if (subject.rest) {
+    cloud = samples.on_rest(body);
+  } else {
+    const Pose pose = pose_on(corpus_.motions.at(subject.at.motion), body, subject.at.frame);
+    cloud = samples.on_pose(body, pose);
+    skeleton = forward_kinematics(body.joints, pose).joints;
+  }
+  augment(subject.augmentation, cloud);
+  for (Point& p : cloud) p *= static_cast<float>(subject.scale);
+  add_noise(key.fold("noise"), config_.noise, cloud);
+  const std::vector<size_t> order = repeat_some(key.fold("repeat"), cloud.size(), n);
+  Points chosen;
+  for (const size_t i : order) chosen.push_back(cloud[i]);
+
+  const Point centre = centroid(chosen);
+  skeleton = augmented(subject.augmentation, skeleton);
+  for (size_t i = 0; i < n; ++i) Eigen::Map<Point>(points + 3 * i) = chosen[i] - centre;
+  for (size_t i = 0; weights != nullptr && i < n; ++i)
+    put_weights(body, samples, order[i], subject.augmentation.mirror, weights + i * kJoints);
+  for (int j = 0; j < kJoints; ++j)
+    Eigen::Map<Point>(joints + 3 * j) =
+        (subject.scale * skeleton[j] - centre.cast<double>()).cast<float>();
+}
+
+CloudBatch CloudSampler::make(int64_t first, int64_t n,
+                              const std::vector<CloudSubject>* subjects) const {
+  CloudBatch out;
+  out.points = Tensor::empty({n, config_.points, 3});
+  out.joints = Tensor::empty({n, kJoints, 3});
+  if (config_.skin_weights) out.weights = Tensor::empty({n, config_.points, kJoints});
+  float* weights = config_.skin_weights ? out.weights.data<float>() : nullptr;
+  float* points = out.points.data<float>();
+  float* joints = out.joints.data<float>();
+  parallel_for(n, 1, [&](int64_t from, int64_t to) {
+    for (int64_t i = from; i < to; ++i)
+      fill(subjects ? (*subjects)[static_cast<size_t>(i)] : subject(first + i),
+           key_.fold(static_cast<uint64_t>(first + i)), points + i * config_.points * 3,
+           joints + i * kJoints * 3,
+           weights != nullptr ? weights + i * config_.points * kJoints : nullptr);
+  });
+  return out;
+}
+
+CloudBatch CloudSampler::batch(int64_t first, int64_t n) const { return make(first, n, nullptr); }
+
+CloudBatch CloudSampler::clouds(const std::vector<CloudSubject>& subjects) const {
+  return make(0, static_cast<int64_t>(subjects.size()), &subjects);
+}
+
+}  // namespace restage

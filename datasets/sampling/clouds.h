@@ -1,0 +1,66 @@
+// Samples of the skeleton extractor: a point cloud of a posed body and its joints (spec 2.1, 6.1).
+#pragma once
+
+#include "autograd/tensor/tensor.h"
+#include "datasets/corpus.h"
+#include "datasets/sampling/augment.h"
+#include "datasets/sampling/frames.h"
+#include "datasets/sampling/surface.h"
+
+namespace restage {
+
+struct CloudConfig {
+  int points = 1024;
+  double noise = 0.005;       ///< standard deviation per coordinate, metres
+  bool heading = true;        ///< turn by any angle about y
+  bool mirror = true;         ///< every second sample is a mirror image
+  double tpose_share = 0.05;  ///< part of the samples that are rest poses: every target is one
+  double tpose_heading = 30;  ///< rest poses turn by up to this, degrees: targets face +z
+  double scale_jitter = 0;    ///< bodies are scaled by 1 +- this
+  double min_fraction = 1.0;  ///< below 1: as few as this part of the points are distinct, others
+                              ///< repeat them, as in a scan with too few points
+  bool skin_weights = false;  ///< also fill CloudBatch::weights
+};
+
+/// float32, metres. Points and joints are relative to the centroid of the points.
+struct CloudBatch {
+  Tensor points;  ///< [N, V, 3]
+  Tensor joints;  ///< [N, 22, 3]
+  Tensor weights;  ///< [N, V, 22] which joints move each point; only with CloudConfig::skin_weights
+};
+
+/// What a cloud shows; `rest` means the T-pose, whatever `at` says.
+struct CloudSubject {
+  size_t body = 0;
+  bool rest = false;
+  FrameRef at;
+  Augmentation augmentation;
+  double scale = 1;
+};
+
+class CloudSampler {
+ public:
+  /// Keeps a reference to `corpus`. InputError for settings out of range or bodies without surface.
+  CloudSampler(const Corpus& corpus, const CloudConfig& config, uint64_t seed);
+
+  /// Samples number first ... first + n - 1. Sample i is a function of (corpus, config, seed, i).
+  CloudBatch batch(int64_t first, int64_t n) const;
+  /// What sample i shows: a random body in a random frame of all motions, or at rest.
+  CloudSubject subject(int64_t index) const;
+  /// The clouds of given subjects, the i-th with the noise and points of sample i.
+  CloudBatch clouds(const std::vector<CloudSubject>& subjects) const;
+
+ private:
+  /// `weights` may be null.
+  void fill(const CloudSubject& subject, const RngKey& key, float* points, float* joints,
+            float* weights) const;
+  CloudBatch make(int64_t first, int64_t n, const std::vector<CloudSubject>* subjects) const;
+
+  const Corpus& corpus_;
+  CloudConfig config_;
+  RngKey key_;
+  FrameIndex frames_;
+  std::vector<SurfaceSampler> surfaces_;
+};
+
+}  // namespace restage

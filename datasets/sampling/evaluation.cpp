@@ -1,0 +1,145 @@
+#include "datasets/sampling/evaluation.h"
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include "autograd/base/error.h"
+
+namespace restage {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+/// 0 ... n - 1 in random order.
+std::vector<size_t> shuffled(Rng& rng, size_t n) {
+  std::vector<size_t> out(n);
+  std::iota(out.begin(), out.end(), size_t{0});
+  for (size_t i = n; i > 1; --i) std::swap(out[i - 1], out[rng.below(i)]);
+  return out;
+}
+
+ScanConfig checked(const ScanConfig& scan) {
+  if (scan.least < 1 || scan.most < scan.least || scan.most > 1 << 24 || !(scan.noise >= 0))
+    throw InputError("", "scan settings are out of range",
+                     "use 1 <= least <= most points and noise of 0 or more metres");
+  return scan;
+}
+
+}  // namespace
+
+std::vector<CloudSubject> evaluation_clouds(const Corpus& corpus, size_t count, uint64_t seed) {
+  const FrameIndex frames(corpus.motions);
+  Rng rng(RngKey{seed, 0}.fold("evaluation clouds"));
+  std::vector<CloudSubject> out(count);
+  for (size_t i = 0; i < count; ++i) {
+    out[i].body = i % std::max<size_t>(1, corpus.bodies.size());
+    // Strata of equal length over all frames, one random frame in each.
+    const double at = (static_cast<double>(i) + rng.uniform()) / static_cast<double>(count);
+    const auto place = static_cast<uint64_t>(at * static_cast<double>(frames.count()));
+    out[i].at = frames.at(std::min(place, frames.count() - 1));
+    out[i].augmentation = draw_augmentation(rng, kPi, false);
+  }
+  return out;
+}
+
+std::vector<CloudSubject> evaluation_tposes(const Corpus& corpus, size_t per_body, double heading,
+                                            uint64_t seed) {
+  Rng rng(RngKey{seed, 0}.fold("evaluation tposes"));
+  std::vector<CloudSubject> out;
+  for (size_t body = 0; body < corpus.bodies.size(); ++body)
+    for (size_t k = 0; k < per_body; ++k) {
+      CloudSubject subject;
+      subject.body = body;
+      subject.rest = true;
+      subject.augmentation = draw_augmentation(rng, heading * kPi / 180, false);
+      out.push_back(subject);
+    }
+  return out;
+}
+
+std::vector<EvalSequence> evaluation_sequences(const Corpus& corpus, size_t count, size_t frames,
+                                               uint64_t seed) {
+  const size_t bodies = corpus.bodies.size(), motions = corpus.motions.size();
+  if (bodies < 2 || motions == 0)
+    throw InputError("",
+                     std::to_string(bodies) + " bodies and " + std::to_string(motions) +
+                         " motions make no retargeting sequence",
+                     "give at least two bodies and one motion in this split");
+  Rng rng(RngKey{seed, 0}.fold("evaluation sequences"));
+  const std::vector<size_t> order = shuffled(rng, motions);
+  std::vector<EvalSequence> out(count);
+  for (size_t i = 0; i < count; ++i) {
+    EvalSequence& s = out[i];
+    s.motion = order[i % motions];
+    const size_t length = corpus.motions[s.motion].frames();
+    if (length == 0)
+      throw InputError("", "motion '" + corpus.motions[s.motion].id + "' has no frames",
+                       "leave it out of the data");
+    s.frames = std::clamp<size_t>(frames, 1, length);
+    s.first = rng.below(length - s.frames + 1);
+    s.body_a = rng.below(bodies);
+    s.body_b = rng.below(bodies - 1);
+    if (s.body_b >= s.body_a) ++s.body_b;
+  }
+  return out;
+}
+
+Performance::Performance(const Corpus& corpus, const EvalSequence& sequence, const ScanConfig& scan,
+                         uint64_t seed)
+    : a_(corpus.bodies.at(sequence.body_a)),
+      b_(corpus.bodies.at(sequence.body_b)),
+      motion_(corpus.motions.at(sequence.motion)),
+      sequence_(sequence),
+      scan_(checked(scan)),
+      key_(RngKey{seed, 0}
+               .fold("performance")
+               .fold(sequence.body_a)
+               .fold(sequence.body_b)
+               .fold(sequence.motion)
+               .fold(sequence.first)),
+      surface_a_(a_),
+      surface_b_(b_) {
+  if (sequence.first + sequence.frames > motion_.frames())
+    throw ShapeError("Performance: sequence ends after motion '" + motion_.id + "'");
+}
+
+size_t Performance::frame(size_t i) const {
+  if (i >= sequence_.frames)
+    throw ShapeError("Performance: frame " + std::to_string(i) + " of " +
+                     std::to_string(sequence_.frames));
+  return sequence_.first + i;
+}
+
+Pose Performance::pose_a(size_t i) const { return pose_on(motion_, a_, frame(i)); }
+Pose Performance::pose_b(size_t i) const { return pose_on(motion_, b_, frame(i)); }
+
+Joints Performance::joints_a(size_t i) const {
+  return forward_kinematics(a_.joints, pose_a(i)).joints;
+}
+
+Joints Performance::joints_b(size_t i) const {
+  return forward_kinematics(b_.joints, pose_b(i)).joints;
+}
+
+Points Performance::vertices_b(size_t i) const { return pose_surface(b_, pose_b(i)); }
+
+Points Performance::cloud(size_t i) const {
+  const RngKey key = key_.fold("frame").fold(i);
+  Rng rng(key.fold("count"));
+  const uint64_t n = static_cast<uint64_t>(scan_.least) +
+                     rng.below(static_cast<uint64_t>(scan_.most - scan_.least) + 1);
+  Points out = surface_a_.draw(key.fold("surface"), n).on_pose(a_, pose_a(i));
+  add_noise(key.fold("noise"), scan_.noise, out);
+  return out;
+}
+
+Points Performance::target_cloud(size_t points) const {
+  const RngKey key = key_.fold("target");
+  const size_t n = points > 0 ? points : static_cast<size_t>((scan_.least + scan_.most) / 2);
+  Points out = surface_b_.draw(key.fold("surface"), n).on_rest(b_);
+  add_noise(key.fold("noise"), scan_.noise, out);
+  return out;
+}
+
+}  // namespace restage

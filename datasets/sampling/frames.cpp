@@ -1,0 +1,35 @@
+#include "datasets/sampling/frames.h"
+
+#include <algorithm>
+
+#include "autograd/base/error.h"
+
+namespace restage {
+
+FrameIndex::FrameIndex(const std::vector<Motion>& motions, size_t window) {
+  uint64_t sum = 0;
+  size_t longest = 0;
+  for (size_t m = 0; m < motions.size(); ++m) {
+    longest = std::max(longest, motions[m].frames());
+    if (window == 0 || motions[m].frames() < window) continue;
+    sum += motions[m].frames() - window + 1;
+    motion_.push_back(m);
+    ends_.push_back(sum);
+  }
+  if (ends_.empty())
+    throw InputError("",
+                     "no motion has " + std::to_string(window) + " frames (" +
+                         std::to_string(motions.size()) + " motions, the longest has " +
+                         std::to_string(longest) + ")",
+                     "use shorter windows or longer motions");
+}
+
+FrameRef FrameIndex::at(uint64_t i) const {
+  const auto end = std::upper_bound(ends_.begin(), ends_.end(), i);
+  if (end == ends_.end())
+    throw ShapeError("FrameIndex: place " + std::to_string(i) + " of " + std::to_string(count()));
+  const auto k = static_cast<size_t>(end - ends_.begin());
+  return {motion_[k], static_cast<size_t>(i - (k > 0 ? ends_[k - 1] : 0))};
+}
+
+}  // namespace restage

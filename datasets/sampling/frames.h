@@ -1,0 +1,33 @@
+// Frames of a set of motions, numbered through.
+#pragma once
+
+#include <vector>
+
+#include "nn/geometry/body.h"
+
+namespace restage {
+
+struct FrameRef {
+  size_t motion = 0, frame = 0;
+};
+
+/// All places where `window` consecutive frames of one motion begin.
+class FrameIndex {
+ public:
+  /// InputError if there is none.
+  explicit FrameIndex(const std::vector<Motion>& motions, size_t window = 1);
+  uint64_t count() const { return ends_.back(); }
+  /// Place number `i` < count().
+  FrameRef at(uint64_t i) const;
+
+  /// Motions that are long enough, and how many places one has.
+  size_t motions() const { return motion_.size(); }
+  FrameRef first(size_t k) const { return {motion_.at(k), 0}; }
+  uint64_t places(size_t k) const { return ends_.at(k) - (k > 0 ? ends_[k - 1] : 0); }
+
+ private:
+  std::vector<size_t> motion_;  // the motions that are long enough
+  std::vector<uint64_t> ends_;
+};
+
+}  // namespace restage

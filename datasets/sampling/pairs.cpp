@@ -1,0 +1,86 @@
+#include "datasets/sampling/pairs.h"
+
+#include "autograd/base/error.h"
+#include "autograd/base/parallel.h"
+
+namespace restage {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+void write(float* to, const Points& points, const Vec3& origin) {
+  const Point o = origin.cast<float>();
+  for (size_t i = 0; i < points.size(); ++i) Eigen::Map<Point>(to + 3 * i) = points[i] - o;
+}
+
+}  // namespace
+
+PairSampler::PairSampler(const Corpus& corpus, const PairConfig& config, uint64_t seed)
+    : corpus_(corpus),
+      config_(config),
+      key_(RngKey{seed, 0}.fold("pairs")),
+      frames_(corpus.motions),
+      surfaces_(surface_samplers(corpus.bodies)) {
+  if (surfaces_.empty()) throw InputError("", "no bodies to draw pairs from", "add bodies");
+  if (config_.points < 1 || config_.points > 1 << 20)
+    throw InputError("", "pair setting 'points' is out of range", "use 1 to 1048576");
+}
+
+PairBatch PairSampler::make(int64_t n) const {
+  PairBatch out;
+  out.rest_points = Tensor::empty({n, config_.points, 3});
+  out.posed_points = Tensor::empty({n, config_.points, 3});
+  out.rest_joints = Tensor::empty({n, kJoints, 3});
+  out.local = Tensor::empty({n, kJoints, 3, 3});
+  out.axis_angle = Tensor::empty({n, 3 * kJoints});
+  return out;
+}
+
+void PairSampler::fill(PairBatch& batch, int64_t row, const RngKey& key, size_t body_index,
+                       const Pose& pose, const Augmentation& augmentation) const {
+  const Body& body = corpus_.bodies.at(body_index);
+  const SurfaceSamples samples =
+      surfaces_[body_index].draw(key.fold("surface"), static_cast<size_t>(config_.points));
+  Points rest = samples.on_rest(body), posed = samples.on_pose(body, pose);
+  augment({0.0, augmentation.mirror}, rest);
+  augment(augmentation, posed);
+  const Joints joints = augmented_rest(augmentation, body.joints);
+  const Pose turned = augmented(augmentation, pose);
+  write(batch.rest_points.data<float>() + row * config_.points * 3, rest, joints[0]);
+  write(batch.posed_points.data<float>() + row * config_.points * 3, posed, turned.root);
+  for (int j = 0; j < kJoints; ++j) {
+    const int64_t at = row * kJoints + j;
+    using RowMajor = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
+    Eigen::Map<RowMajor>(batch.local.data<float>() + 9 * at) = turned.local[j].cast<float>();
+    const Eigen::AngleAxisd turn{Quat(turned.local[j])};
+    Eigen::Map<Point>(batch.axis_angle.data<float>() + 3 * at) =
+        (turn.angle() * turn.axis()).cast<float>();
+    Eigen::Map<Point>(batch.rest_joints.data<float>() + 3 * at) =
+        (joints[j] - joints[0]).cast<float>();
+  }
+}
+
+PairBatch PairSampler::batch(int64_t first, int64_t n) const {
+  PairBatch out = make(n);
+  parallel_for(n, 1, [&](int64_t from, int64_t to) {
+    for (int64_t i = from; i < to; ++i) {
+      const RngKey key = key_.fold(static_cast<uint64_t>(first + i));
+      Rng rng(key.fold("subject"));
+      const size_t body = rng.below(corpus_.bodies.size());
+      const FrameRef at = frames_.at(rng.below(frames_.count()));
+      const Augmentation augmentation =
+          draw_augmentation(rng, config_.heading ? kPi : 0.0, config_.mirror);
+      const Pose pose = pose_on(corpus_.motions[at.motion], corpus_.bodies[body], at.frame);
+      fill(out, i, key, body, pose, augmentation);
+    }
+  });
+  return out;
+}
+
+PairBatch PairSampler::pair(int64_t index, size_t body, const Pose& pose) const {
+  PairBatch out = make(1);
+  fill(out, 0, key_.fold(static_cast<uint64_t>(index)), body, pose, Augmentation{});
+  return out;
+}
+
+}  // namespace restage

@@ -1,0 +1,93 @@
+// Samples of the motion retargeting network: windows of A's motion, B's skeleton, and real windows
+// of B for the discriminator (spec 3.3, 4.2: Q1 to Q4 and Q9, 6.1).
+//
+// A is a random body performing a random clip. B is another random body of the same corpus, or A
+// itself with probability `self_share` (self-reconstruction). Bodies and clips are independent
+// here, so "the same subject as B" (Q3) means: B's body performing any clip.
+#pragma once
+
+#include <string>
+
+#include "autograd/tensor/tensor.h"
+#include "datasets/corpus.h"
+#include "datasets/sampling/augment.h"
+#include "datasets/sampling/frames.h"
+
+namespace restage {
+
+/// How a path r_1 ... r_T of the pelvis is given to the network (spec 3.3).
+enum class Translation {
+  velocity,  ///< 30 (r_i - r_{i-1}) m/s, the first as the second
+  relative,  ///< r_i - r_1
+  absolute,  ///< r_i, floor at y = 0
+};
+/// By name; InputError for another.
+Translation translation_of(const std::string& name);
+
+struct WindowConfig {
+  int frames = 30;
+  double self_share = 0.2;
+  double noise = 0;              ///< on A's input joints, standard deviation per coordinate, metres
+  double noise_correlation = 0;  ///< of one frame's noise with the next's, 0 to below 1
+  bool noisy_translation = false;  ///< the pelvis' noise also goes into A's input translation
+  bool heading = true;             ///< turn every window by any angle about y
+  bool mirror = true;              ///< every second sample is a mirror image, bodies and all
+  bool per_motion = true;          ///< every motion is as likely (spec 6.1); else every frame
+  Translation translation = Translation::velocity;
+  bool remove_heading = false;  ///< every frame is turned to face +z: by A's heading as seen in its
+                                ///< input joints (real_b: by its own)
+  bool truth = false;  ///< also make the last group of WindowBatch
+};
+
+/// float32, metres. Joints are relative to their pelvis, in the world's directions. Velocities as
+/// `Translation` says. All of a sample is turned or mirrored together, so kinematics hold.
+struct WindowBatch {
+  Tensor joints_a;       ///< [N, T, 22, 3] true joints of A
+  Tensor input_a;        ///< [N, T, 22, 3] the same as an extractor may see them: with noise
+  Tensor trans_a;        ///< [N, T, 3]
+  Tensor input_trans_a;  ///< [N, T, 3] trans_a unless `noisy_translation`
+  Tensor rest_a;         ///< [N, 22, 3] rest joints
+  Tensor rest_b;         ///< [N, 22, 3] equal to rest_a for self samples
+  Tensor sixd_a;         ///< [N, T, 132] A's local rotations: per joint columns 0 and 1
+  Tensor self_mask;      ///< [N] 1 for self samples, else 0
+  Tensor real_b;         ///< [N, T, 22, 3] B's body performing some clip (discriminator)
+  Tensor real_trans_b;   ///< [N, T, 3]
+
+  // Never for training: what B performing A's clip would be. Undefined unless `truth`.
+  Tensor truth_b;        ///< [N, T, 22, 3]
+  Tensor truth_trans_b;  ///< [N, T, 3]
+  Tensor truth_sixd_b;   ///< [N, T, 132]
+  Tensor root_a;         ///< [N, T, 3] pelvis of A in the world
+  Tensor truth_root_b;   ///< [N, T, 3] pelvis of B in the world
+};
+
+/// Which bodies and clips a sample uses (indices into the corpus).
+struct WindowSubject {
+  size_t body_a = 0, body_b = 0;
+  bool self = false;
+  FrameRef clip, real;  ///< first frames of A's window and of B's own
+  Augmentation augmentation, real_augmentation;
+};
+
+class WindowSampler {
+ public:
+  /// Keeps a reference to `corpus`. InputError: settings out of range, no motion of that length.
+  WindowSampler(const Corpus& corpus, const WindowConfig& config, uint64_t seed);
+
+  /// Samples number first ... first + n - 1. Sample i is a function of (corpus, config, seed, i).
+  WindowBatch batch(int64_t first, int64_t n) const;
+  WindowSubject subject(int64_t index) const;
+  /// Motions that are long enough: samples per epoch in the paper's count.
+  int64_t motions() const { return static_cast<int64_t>(frames_.motions()); }
+
+ private:
+  FrameRef place(Rng& rng) const;
+  void fill(WindowBatch& batch, int64_t row, int64_t index) const;
+
+  const Corpus& corpus_;
+  WindowConfig config_;
+  RngKey key_;
+  FrameIndex frames_;
+};
+
+}  // namespace restage

@@ -1,0 +1,244 @@
+// Clouds for the skeleton extractor and the lists that it is judged on.
+#include "datasets/sampling/clouds.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <set>
+
+#include "autograd/base/error.h"
+#include "autograd/base/parallel.h"
+#include "datasets/sampling/evaluation.h"
+#include "tests/support/tiny_body.h"
+
+namespace restage {
+namespace {
+
+using testing::tiny_corpus;
+
+Corpus train() { return subset(tiny_corpus(), "train"); }
+
+bool same_bits(const Tensor& a, const Tensor& b) {
+  return a.shape() == b.shape() &&
+         std::memcmp(a.raw(), b.raw(), static_cast<size_t>(a.numel()) * sizeof(float)) == 0;
+}
+
+Vec3 mean(const float* x, int n) {
+  Vec3 sum = Vec3::Zero();
+  for (int i = 0; i < n; ++i) sum += Vec3(x[3 * i], x[3 * i + 1], x[3 * i + 2]);
+  return sum / n;
+}
+
+Vec3 at(const Tensor& x, int64_t row, int i) {
+  const float* p = x.data<float>() + (row * x.size(1) + i) * 3;
+  return Vec3(p[0], p[1], p[2]);
+}
+
+TEST(SamplingClouds, SameBitsForAnyThreadsAndAnyBatch) {
+  const Corpus corpus = train();
+  CloudConfig config;
+  config.points = 64;
+  config.min_fraction = 0.5;
+  const CloudSampler sampler(corpus, config, 5);
+  set_threads(1);
+  const CloudBatch one = sampler.batch(100, 9);
+  for (const int threads : {2, 3}) {
+    set_threads(threads);
+    const CloudBatch again = sampler.batch(100, 9);
+    EXPECT_TRUE(same_bits(one.points, again.points));
+    EXPECT_TRUE(same_bits(one.joints, again.joints));
+  }
+  set_threads(0);
+  EXPECT_TRUE(same_bits(one.points.rows(4, 9), sampler.batch(104, 5).points));
+  EXPECT_FALSE(same_bits(one.points, sampler.batch(101, 9).points));
+  EXPECT_FALSE(same_bits(one.points, CloudSampler(corpus, config, 6).batch(100, 9).points));
+}
+
+TEST(SamplingClouds, CentredOnThePointsWithJointsInside) {
+  const Corpus corpus = train();
+  CloudConfig config;
+  config.points = 512;
+  const CloudBatch batch = CloudSampler(corpus, config, 1).batch(0, 20);
+  EXPECT_EQ(batch.points.shape(), (Shape{20, 512, 3}));
+  EXPECT_EQ(batch.joints.shape(), (Shape{20, kJoints, 3}));
+  for (int64_t i = 0; i < 20; ++i) {
+    EXPECT_LT(mean(batch.points.data<float>() + i * 512 * 3, 512).norm(), 1e-5);
+    // Boxes run along every bone, so points are near every joint.
+    for (int j = 0; j < kJoints; ++j) {
+      double nearest = std::numeric_limits<double>::infinity();
+      for (int p = 0; p < 512; ++p)
+        nearest = std::min(nearest, (at(batch.points, i, p) - at(batch.joints, i, j)).norm());
+      EXPECT_LT(nearest, 0.15) << "joint " << j;
+    }
+  }
+}
+
+TEST(SamplingClouds, MirroredCloudsBelongToMirroredJoints) {
+  Corpus corpus = train();
+  corpus.bodies.resize(1);
+  CloudConfig config;
+  config.points = 256;
+  config.noise = 0;
+  const CloudSampler sampler(corpus, config, 1);
+  CloudSubject plain;
+  plain.at = {0, 20};
+  plain.augmentation.heading = 0.4;
+  CloudSubject image = plain;
+  image.augmentation.mirror = true;
+  // The first sample of either list draws the same points of the surface.
+  const CloudBatch a = sampler.clouds({plain}), b = sampler.clouds({image});
+  const auto flipped = [](const Vec3& x) { return Vec3(-x.x(), x.y(), x.z()); };
+  for (int p = 0; p < 256; ++p)
+    EXPECT_LT((flipped(at(a.points, 0, p)) - at(b.points, 0, p)).norm(), 1e-5);
+  for (int j = 0; j < kJoints; ++j)
+    EXPECT_LT((flipped(at(a.joints, 0, kMirror[j])) - at(b.joints, 0, j)).norm(), 1e-5);
+}
+
+TEST(SamplingClouds, SharesOfTposesMirrorsAndHeadings) {
+  const Corpus corpus = train();
+  CloudConfig config;
+  config.tpose_share = 0.2;
+  const CloudSampler sampler(corpus, config, 2);
+  const int n = 4000;
+  int rest = 0, mirrored = 0, away = 0;
+  std::set<size_t> bodies, motions;
+  for (int i = 0; i < n; ++i) {
+    const CloudSubject s = sampler.subject(i);
+    rest += s.rest;
+    mirrored += s.augmentation.mirror;
+    bodies.insert(s.body);
+    motions.insert(s.at.motion);
+    EXPECT_LT(s.at.frame, corpus.motions[s.at.motion].frames());
+    if (s.rest)
+      EXPECT_LE(std::abs(s.augmentation.heading), 30 * 3.14160 / 180);
+    else
+      away += std::abs(s.augmentation.heading) > 1.5707963;
+  }
+  const double sigma = std::sqrt(0.25 / n);
+  EXPECT_NEAR(rest / double(n), 0.2, 5 * sigma);
+  EXPECT_NEAR(mirrored / double(n), 0.5, 5 * sigma);
+  EXPECT_NEAR(away / double(n - rest), 0.5, 6 * sigma);
+  EXPECT_EQ(bodies.size(), corpus.bodies.size());
+  EXPECT_EQ(motions.size(), corpus.motions.size());
+}
+
+TEST(SamplingClouds, TposesShowTheRestJoints) {
+  const Corpus corpus = train();
+  CloudConfig config;
+  config.heading = config.mirror = false;
+  config.tpose_share = 1;
+  config.scale_jitter = 0.1;
+  const CloudSampler sampler(corpus, config, 3);
+  const CloudBatch batch = sampler.batch(0, 4);
+  for (int i = 0; i < 4; ++i) {
+    const CloudSubject s = sampler.subject(i);
+    const Joints& rest = corpus.bodies[s.body].joints;
+    EXPECT_LE(std::abs(s.scale - 1), 0.1);
+    for (int j = 1; j < kJoints; ++j) {
+      const Vec3 bone = at(batch.joints, i, j) - at(batch.joints, i, 0);
+      EXPECT_LT((bone - s.scale * (rest[j] - rest[0])).norm(), 1e-5);
+    }
+  }
+}
+
+TEST(SamplingClouds, PoorScansRepeatPoints) {
+  const Corpus corpus = train();
+  CloudConfig config;
+  config.points = 200;
+  config.min_fraction = 0.25;
+  const CloudBatch batch = CloudSampler(corpus, config, 4).batch(0, 40);
+  size_t least = 200, most = 0;
+  for (int64_t i = 0; i < 40; ++i) {
+    std::set<std::array<float, 3>> distinct;
+    const float* p = batch.points.data<float>() + i * 600;
+    for (int k = 0; k < 200; ++k) distinct.insert({p[3 * k], p[3 * k + 1], p[3 * k + 2]});
+    least = std::min(least, distinct.size());
+    most = std::max(most, distinct.size());
+  }
+  EXPECT_GE(least, 50u);
+  EXPECT_LT(least, 100u);
+  EXPECT_GT(most, 150u);
+}
+
+TEST(SamplingClouds, SettingsOutOfRangeAreErrors) {
+  const Corpus corpus = train();
+  CloudConfig config;
+  config.points = 0;
+  EXPECT_THROW(CloudSampler(corpus, config, 1), InputError);
+  config = {};
+  config.noise = -1;
+  EXPECT_THROW(CloudSampler(corpus, config, 1), InputError);
+  config = {};
+  config.min_fraction = 0;
+  EXPECT_THROW(CloudSampler(corpus, config, 1), InputError);
+  EXPECT_THROW(CloudSampler(Corpus{}, {}, 1), InputError);
+}
+
+TEST(SamplingEvaluation, ListsCoverBodiesAndMotionsAndRepeat) {
+  const Corpus corpus = subset(tiny_corpus(), "test");
+  const auto clouds = evaluation_clouds(corpus, 50, 1);
+  std::set<size_t> bodies, motions;
+  for (const CloudSubject& s : clouds) {
+    EXPECT_FALSE(s.rest);
+    bodies.insert(s.body);
+    motions.insert(s.at.motion);
+    EXPECT_LT(s.at.frame, corpus.motions[s.at.motion].frames());
+  }
+  EXPECT_EQ(bodies.size(), 2u);
+  EXPECT_EQ(motions.size(), 2u);
+  EXPECT_EQ(evaluation_clouds(corpus, 50, 1)[7].augmentation.heading,
+            clouds[7].augmentation.heading);
+  const auto tposes = evaluation_tposes(corpus, 3, 30, 1);
+  ASSERT_EQ(tposes.size(), 6u);
+  for (const CloudSubject& s : tposes) EXPECT_TRUE(s.rest);
+  const CloudBatch batch = CloudSampler(corpus, {}, 9).clouds(tposes);
+  EXPECT_EQ(batch.points.size(0), 6);
+}
+
+TEST(SamplingEvaluation, SequencesUseTwoBodiesAndFitTheirMotion) {
+  const Corpus corpus = subset(tiny_corpus(), "test");
+  const auto list = evaluation_sequences(corpus, 12, 30, 3);
+  ASSERT_EQ(list.size(), 12u);
+  std::set<size_t> motions;
+  for (const EvalSequence& s : list) {
+    EXPECT_NE(s.body_a, s.body_b);
+    EXPECT_LE(s.first + s.frames, corpus.motions[s.motion].frames());
+    EXPECT_EQ(s.frames, std::min<size_t>(30, corpus.motions[s.motion].frames()));
+    motions.insert(s.motion);
+  }
+  EXPECT_EQ(motions.size(), 2u);
+  Corpus lonely = corpus;
+  lonely.bodies.resize(1);
+  EXPECT_THROW(evaluation_sequences(lonely, 2, 30, 3), InputError);
+}
+
+TEST(SamplingEvaluation, PerformancesAreScansOfTheTruth) {
+  const Corpus corpus = subset(tiny_corpus(), "test");
+  const EvalSequence sequence = evaluation_sequences(corpus, 1, 8, 3).at(0);
+  const Performance show(corpus, sequence, {}, 11);
+  ASSERT_EQ(show.frames(), 8u);
+  std::set<size_t> counts;
+  for (size_t i = 0; i < show.frames(); ++i) {
+    const Points cloud = show.cloud(i);
+    EXPECT_GE(cloud.size(), 900u);
+    EXPECT_LE(cloud.size(), 1400u);
+    counts.insert(cloud.size());
+    EXPECT_LT((centroid(cloud).cast<double>() - show.joints_a(i)[0]).norm(), 0.5);
+  }
+  EXPECT_GT(counts.size(), 4u);
+  EXPECT_EQ(show.cloud(3), Performance(corpus, sequence, {}, 11).cloud(3));
+  const Points vertices = show.vertices_b(2);
+  EXPECT_EQ(vertices.size(), show.target().rest.vertices.size());
+  const Vec3 pelvis = show.joints_b(2)[0];
+  EXPECT_LT((vertices[0].cast<double>() - pelvis).norm(), 0.3);
+  const Joints posed = forward_kinematics(show.target().joints, show.pose_b(2)).joints;
+  EXPECT_LT((posed[21] - show.joints_b(2)[21]).norm(), 1e-12);
+  EXPECT_EQ(show.target_cloud(77).size(), 77u);
+  EXPECT_THROW(show.cloud(8), ShapeError);
+  EXPECT_THROW(Performance(corpus, sequence, {10, 5}, 1), InputError);
+}
+
+}  // namespace
+}  // namespace restage

@@ -1,0 +1,293 @@
+// Windows for motion retargeting and pairs for deformation.
+#include "datasets/sampling/windows.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <set>
+
+#include "autograd/base/error.h"
+#include "autograd/base/parallel.h"
+#include "datasets/sampling/pairs.h"
+#include "tests/support/tiny_body.h"
+
+namespace restage {
+namespace {
+
+using testing::tiny_corpus;
+
+Corpus train() { return subset(tiny_corpus(), "train"); }
+
+bool same_bits(const Tensor& a, const Tensor& b) {
+  return a.shape() == b.shape() &&
+         std::memcmp(a.raw(), b.raw(), static_cast<size_t>(a.numel()) * sizeof(float)) == 0;
+}
+
+/// Three numbers from position 3 i of row `row`.
+Vec3 at(const Tensor& x, int64_t row, int64_t i) {
+  const float* p = x.data<float>() + row * (x.numel() / x.size(0)) + 3 * i;
+  return Vec3(p[0], p[1], p[2]);
+}
+
+Joints joints_at(const Tensor& x, int64_t row, int64_t frame = 0) {
+  Joints out;
+  for (int j = 0; j < kJoints; ++j) out[j] = at(x, row, frame * kJoints + j);
+  return out;
+}
+
+/// Joints that 6D rotations give a rest skeleton.
+Joints kinematics(const Tensor& rest, const Tensor& sixd, int64_t row, int64_t frame) {
+  Pose pose;
+  for (int j = 0; j < kJoints; ++j) {
+    const Vec3 x = at(sixd, row, (frame * kJoints + j) * 2);
+    const Vec3 y = at(sixd, row, (frame * kJoints + j) * 2 + 1);
+    pose.local[j].col(0) = x;
+    pose.local[j].col(1) = y;
+    pose.local[j].col(2) = x.cross(y);
+  }
+  return forward_kinematics(joints_at(rest, row), pose).joints;
+}
+
+double largest(const Joints& a, const Joints& b) {
+  double out = 0;
+  for (int j = 0; j < kJoints; ++j) out = std::max(out, (a[j] - b[j]).norm());
+  return out;
+}
+
+TEST(SamplingWindows, SameBitsForAnyThreadsAndAnyBatch) {
+  const Corpus corpus = train();
+  WindowConfig config;
+  config.noise = 0.01;
+  const WindowSampler sampler(corpus, config, 5);
+  set_threads(1);
+  const WindowBatch one = sampler.batch(40, 7);
+  for (const int threads : {2, 3}) {
+    set_threads(threads);
+    const WindowBatch again = sampler.batch(40, 7);
+    EXPECT_TRUE(same_bits(one.input_a, again.input_a));
+    EXPECT_TRUE(same_bits(one.sixd_a, again.sixd_a));
+    EXPECT_TRUE(same_bits(one.real_b, again.real_b));
+    EXPECT_TRUE(same_bits(one.self_mask, again.self_mask));
+  }
+  set_threads(0);
+  EXPECT_TRUE(same_bits(one.real_b.rows(3, 7), sampler.batch(43, 4).real_b));
+  EXPECT_FALSE(same_bits(one.joints_a, WindowSampler(corpus, config, 6).batch(40, 7).joints_a));
+}
+
+TEST(SamplingWindows, RotationsGiveTheJointsMirroredOrNot) {
+  Corpus corpus = train();
+  for (Body& body : corpus.bodies) body.joints[4].x() += 0.03;  // sides that differ
+  WindowConfig config;
+  config.truth = true;
+  const WindowSampler sampler(corpus, config, 1);
+  const WindowBatch batch = sampler.batch(0, 12);
+  int mirrored = 0;
+  for (int64_t i = 0; i < 12; ++i) {
+    mirrored += sampler.subject(i).augmentation.mirror;
+    for (const int64_t t : {0, 13, 29}) {
+      const Joints a = kinematics(batch.rest_a, batch.sixd_a, i, t);
+      EXPECT_LT(largest(a, joints_at(batch.joints_a, i, t)), 1e-5);
+      const Joints b = kinematics(batch.rest_b, batch.truth_sixd_b, i, t);
+      EXPECT_LT(largest(b, joints_at(batch.truth_b, i, t)), 1e-5);
+      EXPECT_EQ(at(batch.joints_a, i, t * kJoints).norm(), 0.0);
+    }
+  }
+  EXPECT_GT(mirrored, 1);
+  EXPECT_LT(mirrored, 11);
+}
+
+TEST(SamplingWindows, SelfSamplesHaveOneBody) {
+  const Corpus corpus = train();
+  WindowConfig config;
+  config.self_share = 0.4;
+  config.truth = true;
+  const WindowSampler sampler(corpus, config, 2);
+  const WindowBatch batch = sampler.batch(0, 60);
+  for (int64_t i = 0; i < 60; ++i) {
+    const WindowSubject s = sampler.subject(i);
+    const bool self = batch.self_mask.item(i) == 1.0;
+    EXPECT_EQ(self, s.self);
+    EXPECT_EQ(self, s.body_a == s.body_b);
+    EXPECT_EQ(self, same_bits(batch.rest_a.rows(i, i + 1), batch.rest_b.rows(i, i + 1)));
+    EXPECT_EQ(self, same_bits(batch.joints_a.rows(i, i + 1), batch.truth_b.rows(i, i + 1)));
+  }
+  int selves = 0;
+  std::set<std::pair<size_t, size_t>> couples;
+  for (int64_t i = 0; i < 3000; ++i) {
+    const WindowSubject s = sampler.subject(i);
+    selves += s.self;
+    couples.insert({s.body_a, s.body_b});
+    // The motion of ten frames is too short.
+    EXPECT_LE(s.clip.frame + 30, corpus.motions[s.clip.motion].frames());
+    EXPECT_LE(s.real.frame + 30, corpus.motions[s.real.motion].frames());
+  }
+  EXPECT_NEAR(selves / 3000.0, 0.4, 5 * std::sqrt(0.24 / 3000));
+  EXPECT_EQ(couples.size(), 9u);
+}
+
+TEST(SamplingWindows, TheDiscriminatorsWindowHasBsBones) {
+  const Corpus corpus = train();
+  const WindowBatch batch = WindowSampler(corpus, {}, 3).batch(0, 10);
+  for (int64_t i = 0; i < 10; ++i) {
+    const Joints rest = joints_at(batch.rest_b, i), real = joints_at(batch.real_b, i, 17);
+    for (int j = 1; j < kJoints; ++j)
+      EXPECT_NEAR((real[j] - real[kParents[j]]).norm(), (rest[j] - rest[kParents[j]]).norm(), 1e-5);
+  }
+}
+
+TEST(SamplingWindows, TranslationsDescribeThePath) {
+  const Corpus corpus = train();
+  WindowConfig config;
+  config.truth = true;
+  std::vector<WindowBatch> batches;
+  for (const char* name : {"velocity", "relative", "absolute"}) {
+    config.translation = translation_of(name);
+    batches.push_back(WindowSampler(corpus, config, 4).batch(0, 5));
+  }
+  for (int64_t i = 0; i < 5; ++i)
+    for (int64_t t = 0; t < config.frames; ++t) {
+      const Vec3 root = at(batches[0].root_a, i, t);
+      const int64_t later = std::max<int64_t>(t, 1);
+      const Vec3 step = at(batches[0].root_a, i, later) - at(batches[0].root_a, i, later - 1);
+      EXPECT_LT((at(batches[0].trans_a, i, t) - 30 * step).norm(), 1e-4);
+      EXPECT_LT((at(batches[1].trans_a, i, t) - (root - at(batches[1].root_a, i, 0))).norm(), 1e-5);
+      EXPECT_LT((at(batches[2].trans_a, i, t) - root).norm(), 1e-6);
+      EXPECT_GT(root.y(), 0.5);
+    }
+  EXPECT_TRUE(same_bits(batches[0].trans_a, batches[0].input_trans_a));
+  EXPECT_THROW(translation_of("speed"), InputError);
+}
+
+TEST(SamplingWindows, NoiseIsOnTheInputOnly) {
+  const Corpus corpus = train();
+  WindowConfig config;
+  const WindowBatch clean = WindowSampler(corpus, config, 4).batch(0, 20);
+  EXPECT_TRUE(same_bits(clean.input_a, clean.joints_a));
+  config.noise = 0.02;
+  config.noise_correlation = 0.6;
+  config.noisy_translation = true;
+  const WindowBatch noisy = WindowSampler(corpus, config, 4).batch(0, 20);
+  EXPECT_TRUE(same_bits(clean.joints_a, noisy.joints_a));
+  EXPECT_TRUE(same_bits(clean.trans_a, noisy.trans_a));
+  EXPECT_FALSE(same_bits(noisy.trans_a, noisy.input_trans_a));
+  double square = 0, lagged = 0;
+  int n = 0;
+  for (int64_t i = 0; i < 20; ++i)
+    for (int64_t t = 1; t < 30; ++t)
+      for (int j = 0; j < kJoints; ++j) {
+        const auto noise = [&](int64_t frame) {
+          const int64_t k = frame * kJoints + j;
+          return Vec3(at(noisy.input_a, i, k) - at(noisy.joints_a, i, k));
+        };
+        if (j == 0) {
+          EXPECT_EQ(noise(t).norm(), 0.0);
+          continue;
+        }
+        square += noise(t).squaredNorm();
+        lagged += noise(t).dot(noise(t - 1));
+        n += 3;
+      }
+  // The pelvis' own noise adds to every other joint's.
+  EXPECT_NEAR(std::sqrt(square / n), 0.02 * std::sqrt(2.0), 0.003);
+  EXPECT_NEAR(lagged / square, 0.6, 0.1);
+}
+
+TEST(SamplingWindows, SettingsOutOfRangeAreErrors) {
+  const Corpus corpus = train();
+  WindowConfig config;
+  config.frames = 1;
+  EXPECT_THROW(WindowSampler(corpus, config, 1), InputError);
+  config.frames = 1000;
+  EXPECT_THROW(WindowSampler(corpus, config, 1), InputError);
+  config = {};
+  config.self_share = 2;
+  EXPECT_THROW(WindowSampler(corpus, config, 1), InputError);
+  Corpus lonely = corpus;
+  lonely.bodies.resize(1);
+  EXPECT_THROW(WindowSampler(lonely, {}, 1), InputError);
+  config.self_share = 1;
+  EXPECT_EQ(WindowSampler(lonely, config, 1).batch(0, 2).self_mask.item(1), 1.0);
+}
+
+TEST(SamplingPairs, SameBitsForAnyThreads) {
+  const Corpus corpus = train();
+  const PairSampler sampler(corpus, {100, true, true}, 5);
+  set_threads(1);
+  const PairBatch one = sampler.batch(10, 6);
+  for (const int threads : {2, 3}) {
+    set_threads(threads);
+    const PairBatch again = sampler.batch(10, 6);
+    EXPECT_TRUE(same_bits(one.posed_points, again.posed_points));
+    EXPECT_TRUE(same_bits(one.axis_angle, again.axis_angle));
+  }
+  set_threads(0);
+  EXPECT_TRUE(same_bits(one.rest_points.rows(2, 6), sampler.batch(12, 4).rest_points));
+}
+
+TEST(SamplingPairs, TheRestPoseGivesTheRestPoints) {
+  const Corpus corpus = train();
+  const PairSampler sampler(corpus, {200, false, false}, 1);
+  Pose rest;
+  rest.local.fill(Mat3::Identity());
+  rest.root = Vec3(3, 1, -2);
+  const PairBatch pair = sampler.pair(4, 1, rest);
+  EXPECT_EQ(pair.rest_points.shape(), (Shape{1, 200, 3}));
+  for (int i = 0; i < 200; ++i)
+    EXPECT_LT((at(pair.rest_points, 0, i) - at(pair.posed_points, 0, i)).norm(), 2e-6);
+  EXPECT_EQ(at(pair.rest_joints, 0, 0).norm(), 0.0);
+  for (int j = 0; j < kJoints; ++j) EXPECT_LT(at(pair.axis_angle, 0, j).norm(), 1e-6);
+}
+
+TEST(SamplingPairs, PointsCorrespondThroughTheBones) {
+  // A body whose vertices each follow one joint: then G (p - rest_j) + P_j takes rest onto posed.
+  Corpus corpus = train();
+  for (Body& body : corpus.bodies)
+    for (Eigen::Index v = 0; v < body.weights.rows(); ++v) {
+      const int owner = kParents[static_cast<size_t>(v / 8 + 1)];
+      body.weights.row(v).setZero();
+      body.weights(v, owner) = 1.0f;
+    }
+  const PairSampler sampler(corpus, {150, true, true}, 7);
+  const PairBatch batch = sampler.batch(0, 6);
+  for (int64_t i = 0; i < 6; ++i) {
+    Pose pose;
+    for (int j = 0; j < kJoints; ++j)
+      for (int r = 0; r < 3; ++r) pose.local[j].row(r) = at(batch.local, i, 3 * j + r);
+    const Joints rest = joints_at(batch.rest_joints, i);
+    const PosedSkeleton posed = forward_kinematics(rest, pose);
+    for (int j = 0; j < kJoints; ++j) {
+      const Vec3 v = at(batch.axis_angle, i, j);
+      const Mat3 r = Eigen::AngleAxisd(v.norm(), v.stableNormalized()).toRotationMatrix();
+      EXPECT_LT((r - pose.local[j]).norm(), 1e-5);
+      EXPECT_LE(v.norm(), 3.14160);
+    }
+    int far = 0;
+    for (int k = 0; k < 150; ++k) {
+      double best = 1e9;
+      for (int j = 0; j < kJoints; ++j) {
+        const Vec3 moved =
+            posed.global[j] * (at(batch.rest_points, i, k) - rest[j]) + posed.joints[j];
+        best = std::min(best, (moved - at(batch.posed_points, i, k)).norm());
+      }
+      far += best > 1e-4;
+    }
+    // Muscles move some points of thighs, shins and arms a little; rigid boxes hold the rest.
+    EXPECT_LT(far, 90);
+  }
+}
+
+TEST(SamplingPairs, RandomPairsMoveAndSettingsAreChecked) {
+  const Corpus corpus = train();
+  const PairBatch batch = PairSampler(corpus, {50, true, false}, 1).batch(0, 3);
+  double moved = 0;
+  for (int64_t i = 0; i < 3; ++i)
+    for (int k = 0; k < 50; ++k)
+      moved += (at(batch.rest_points, i, k) - at(batch.posed_points, i, k)).norm() / 150;
+  EXPECT_GT(moved, 0.05);
+  EXPECT_THROW(PairSampler(corpus, {0, true, false}, 1), InputError);
+  EXPECT_THROW(PairSampler(Corpus{}, {}, 1), InputError);
+}
+
+}  // namespace
+}  // namespace restage
