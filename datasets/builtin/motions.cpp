@@ -151,7 +151,8 @@ Motion builtin_motion(uint64_t seed, const std::string& split, int index) {
   const Action& action = actions()[index % actions().size()];
   const Temper temper = draw_temper(key.fold("subject").fold(subject));
   Rng r(key.fold("motion").fold(index));
-  const Performance performance = action.perform(temper, r);
+  Performance performance = action.perform(temper, r);
+  performance.seconds = std::clamp(performance.seconds, 2.0, 6.0);
 
   Motion m;
   m.id = "builtin_" + split + "_" + std::to_string(index) + "_" + action.name;
