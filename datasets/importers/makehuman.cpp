@@ -80,12 +80,11 @@ MakeHuman::MakeHuman(const std::string& folder) : folder_(folder), path_(folder 
     for (size_t k = 0; k < 4; ++k) skin_ = std::max(skin_, static_cast<size_t>(quads[i + k]) + 1);
   }
   if (quads_.empty()) broken(path_ + ":/base/body_quads", "is empty");
-  read_rig();
-  read_targets();
+  read_rig(file);
+  read_targets(file);
 }
 
-void MakeHuman::read_rig() {
-  const h5::File file = h5::File::open(path_);
+void MakeHuman::read_rig(const h5::File& file) {
   bones_ = file.dataset("/rig/bone_names").read_text();
   const int64_t n = static_cast<int64_t>(bones_.size());
   const std::vector<int32_t> parents = file.read<int32_t>("/rig/bone_parent", {n});
@@ -115,11 +114,10 @@ void MakeHuman::read_rig() {
     if (heads_[bone_index(name)].empty())
       broken(path_ + ":/rig/head_vertices", "has no head of " + std::string(name));
 
-  read_weights(joint);
+  read_weights(file, joint);
 }
 
-void MakeHuman::read_weights(const std::vector<size_t>& joint_of_bone) {
-  const h5::File file = h5::File::open(path_);
+void MakeHuman::read_weights(const h5::File& file, const std::vector<size_t>& joint_of_bone) {
   const std::vector<double> value = file.read<double>("/rig/weight_value", {-1});
   const int64_t count = static_cast<int64_t>(value.size());
   const std::vector<int32_t> bone = file.read<int32_t>("/rig/weight_bone", {count});
@@ -143,8 +141,7 @@ void MakeHuman::read_weights(const std::vector<size_t>& joint_of_bone) {
   }
 }
 
-void MakeHuman::read_targets() {
-  const h5::File file = h5::File::open(path_);
+void MakeHuman::read_targets(const h5::File& file) {
   const std::vector<std::string> names = file.dataset("/targets/names").read_text();
   const int64_t n = static_cast<int64_t>(names.size());
   const std::vector<int64_t> start = file.read<int64_t>("/targets/start", {n});

@@ -10,6 +10,10 @@
 
 namespace restage {
 
+namespace h5 {
+class File;
+}
+
 /// One row of bodies.csv. Macro columns (gender, age, ...) lie in [0, 1]; columns with a '/' are
 /// sliders in [-1, 1].
 struct BodyRecipe {
@@ -48,9 +52,9 @@ class MakeHuman {
   struct Target {
     size_t start, count;
   };
-  void read_rig();
-  void read_weights(const std::vector<size_t>& joint_of_bone);
-  void read_targets();
+  void read_rig(const h5::File& file);
+  void read_weights(const h5::File& file, const std::vector<size_t>& joint_of_bone);
+  void read_targets(const h5::File& file);
   std::vector<Vec3> shape(const TargetWeights& targets) const;
   Vec3 bone_head(const std::vector<Vec3>& vertices, size_t bone) const;
   size_t bone_index(const std::string& name) const;

@@ -32,6 +32,12 @@ const h5::File& clips_file() {
   return file;
 }
 
+/// Read once for all tests.
+const std::vector<CmuClip>& all_clips() {
+  static const std::vector<CmuClip> clips = read_cmu(data_folder() + "/cmu/clips30.h5", true);
+  return clips;
+}
+
 /// reference22 of a clip, empty if it has none.
 std::vector<float> reference(const std::string& clip) {
   const std::string name = "/clips/" + clip + "/reference22";
@@ -50,7 +56,7 @@ double largest_difference(const std::vector<Joints>& joints, const std::vector<f
 
 TEST(ImportersCmu, AllClipsGiveTheReferenceJoints) {
   NEED_DATA();
-  const std::vector<CmuClip> clips = read_cmu(data_folder() + "/cmu/clips30.h5", true);
+  const std::vector<CmuClip>& clips = all_clips();
   EXPECT_EQ(clips.size(), 247u);
   size_t compared = 0, frames = 0;
   std::map<std::string, int> splits;
@@ -71,7 +77,7 @@ TEST(ImportersCmu, AllClipsGiveTheReferenceJoints) {
 
 TEST(ImportersCmu, RestAndFloorAreThoseOfTheFile) {
   NEED_DATA();
-  for (const CmuClip& clip : read_cmu(data_folder() + "/cmu/clips30.h5", true)) {
+  for (const CmuClip& clip : all_clips()) {
     const std::string group = "/clips/" + clip.motion.id;
     const std::string skeleton = *clips_file().text(group, "skeleton");
     const auto rest = clips_file().read<double>("/skeletons/" + skeleton + "/rest22", {kJoints, 3});
@@ -130,7 +136,7 @@ TEST(ImportersCmu, OriginalSkeletonIsTheAsfOne) {
   options.drop_leading = 1;  // a T-pose before the frames of the ASF/AMC file
   options.keep_frames = 2751;
   const BvhClip bvh = read_bvh(data_folder() + "/cmu/bvh_original_skeleton/01_01.bvh.xz", options);
-  const std::vector<CmuClip> clips = read_cmu(data_folder() + "/cmu/clips30.h5", true);
+  const std::vector<CmuClip>& clips = all_clips();
   const auto clip = std::find_if(clips.begin(), clips.end(),
                                  [](const CmuClip& c) { return c.motion.id == "01_01"; });
   ASSERT_NE(clip, clips.end());
