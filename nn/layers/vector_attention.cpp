@@ -9,13 +9,8 @@
 
 namespace restage {
 
-Tensor pick_rows(const Tensor& points, const Tensor& index) {
-  return gather(Var(points), index).value;
-}
-
-Tensor neighbour_offsets(const Tensor& points, const Tensor& centres, const Tensor& index) {
-  const Tensor c = centres.reshape({centres.size(0), centres.size(1), 1, 3});
-  return binary(Binary::sub, pick_rows(points, index), c);
+Var neighbour_offsets(const Var& points, const Var& centres, const Tensor& index) {
+  return gather(points, index) - reshape(centres, {centres.size(0), centres.size(1), 1, 3});
 }
 
 VectorAttention::VectorAttention(int64_t c, int64_t d, int64_t k, const Init& init)
@@ -29,10 +24,10 @@ VectorAttention::VectorAttention(int64_t c, int64_t d, int64_t k, const Init& in
       d_(d),
       k_(k) {}
 
-Var VectorAttention::operator()(Context& ctx, const Tensor& xyz, const Var& f) const {
+Var VectorAttention::operator()(Context& ctx, const Var& xyz, const Var& f) const {
   const ModuleScope path(scope);
   const int64_t n = xyz.size(0), v = xyz.size(1);
-  const Tensor index = knn(xyz, xyz, k_);
+  const Tensor index = knn(xyz.value, xyz.value, k_);
   const int64_t k = index.size(2);
   const Var h = fc1(ctx, f);
   // x_i - x_j is the negative of the neighbour's offset.
@@ -63,11 +58,11 @@ SetAbstraction::SetAbstraction(int64_t m, int64_t k, int64_t in, int64_t out, co
   }
 }
 
-Var SetAbstraction::operator()(Context& ctx, Tensor* xyz, const Var& f) {
+Var SetAbstraction::operator()(Context& ctx, Var* xyz, const Var& f) {
   const ModuleScope path(scope);
-  const Tensor centres = pick_rows(*xyz, fps(*xyz, m_));
-  const Tensor index = knn(centres, *xyz, k_);
-  Var g = concat({Var(neighbour_offsets(*xyz, centres, index)), gather(f, index)}, 3);
+  const Var centres = gather(*xyz, fps(xyz->value, m_));
+  const Tensor index = knn(centres.value, xyz->value, k_);
+  Var g = concat({neighbour_offsets(*xyz, centres, index), gather(f, index)}, 3);
   for (size_t i = 0; i < mlp_convs.size(); ++i) g = relu(mlp_bns[i](ctx, mlp_convs[i](ctx, g)));
   *xyz = centres;
   return max(g, 2);

@@ -9,8 +9,8 @@ namespace restage {
 /// Vector attention over the k nearest neighbours; c channels in and out, d inside.
 struct VectorAttention : Module {
   VectorAttention(int64_t c, int64_t d, int64_t k, const Init& init);
-  /// xyz [n, v, 3] (constant), f [n, v, c] -> [n, v, c].
-  Var operator()(Context& ctx, const Tensor& xyz, const Var& f) const;
+  /// xyz [n, v, 3], f [n, v, c] -> [n, v, c]. Neighbourhoods are constants, offsets are not.
+  Var operator()(Context& ctx, const Var& xyz, const Var& f) const;
   void visit(Fields& f) override;
   const char* kind() const override { return "VectorAttention"; }
   Linear fc1, fc2;
@@ -26,7 +26,7 @@ struct VectorAttention : Module {
 struct SetAbstraction : Module {
   SetAbstraction(int64_t m, int64_t k, int64_t in, int64_t out, const Init& init);
   /// xyz [n, v, 3], f [n, v, c]; xyz becomes [n, m, 3].
-  Var operator()(Context& ctx, Tensor* xyz, const Var& f);
+  Var operator()(Context& ctx, Var* xyz, const Var& f);
   void visit(Fields& f) override;
   const char* kind() const override { return "SetAbstraction"; }
   ModuleList<Linear> mlp_convs;
@@ -36,9 +36,8 @@ struct SetAbstraction : Module {
   int64_t m_, k_;
 };
 
-/// Offsets of neighbours: points by index minus their centre, [n, m, k, 3]. No gradient.
-Tensor neighbour_offsets(const Tensor& points, const Tensor& centres, const Tensor& index);
-/// Rows of points [n, v, 3] by index [n, m]. No gradient.
-Tensor pick_rows(const Tensor& points, const Tensor& index);
+/// Offsets of neighbours: points [n, v, 3] by index [n, m, k] minus their centre [n, m, 3],
+/// [n, m, k, 3].
+Var neighbour_offsets(const Var& points, const Var& centres, const Tensor& index);
 
 }  // namespace restage

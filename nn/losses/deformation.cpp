@@ -11,24 +11,29 @@
 namespace restage {
 
 DeformationOutput deform(Context& ctx, const Mlp3& weights, const Mlp3* offsets,
-                         const DeformationBatch& b) {
-  const int64_t n = b.rest_points.size(0);
+                         const Var& rest_points, const Var& rest_joints, const Var& local,
+                         const Var& axis_angle) {
+  const int64_t n = rest_points.size(0);
   DeformationOutput out;
-  out.weights = weights(ctx, join_points(reshape(b.rest_joints, {n, 3 * kJoints}), b.rest_points));
-  Var x = b.rest_points;
+  out.weights = weights(ctx, join_points(reshape(rest_joints, {n, 3 * kJoints}), rest_points));
+  Var x = rest_points;
   if (offsets != nullptr) {
-    out.offsets = (*offsets)(ctx, join_points(b.axis_angle, b.rest_points));
+    out.offsets = (*offsets)(ctx, join_points(axis_angle, rest_points));
     x = x + out.offsets;
   }
-  const Tensor origin = b.rest_joints.reshape({n, kJoints, 3});
-  const Var root = reshape(slice(origin, 1, 0, 1), {n, 3});
-  const Var transforms = forward_kinematics(b.local, b.rest_joints, root, joint_parents());
-  out.posed = linear_blend_skinning(x, out.weights, transforms, b.rest_joints);
+  const Var root = reshape(slice(rest_joints, 1, 0, 1), {n, 3});
+  const Var transforms = forward_kinematics(local, rest_joints, root, joint_parents());
+  out.posed = linear_blend_skinning(x, out.weights, transforms, rest_joints);
   return out;
 }
 
-Var squared_distance_sum(const Var& posed, const Tensor& truth) {
-  return sum_all(square(posed - Var(truth)));
+DeformationOutput deform(Context& ctx, const Mlp3& weights, const Mlp3* offsets,
+                         const DeformationBatch& b) {
+  return deform(ctx, weights, offsets, b.rest_points, b.rest_joints, b.local, b.axis_angle);
+}
+
+Var squared_distance_sum(const Var& posed, const Var& truth) {
+  return sum_all(square(posed - truth));
 }
 
 double mean_distance(const Tensor& a, const Tensor& b) {

@@ -18,8 +18,12 @@ struct DeformationOutput {
 /// Eq. 3: posed points from rest points. `offsets` null: none.
 DeformationOutput deform(Context& ctx, const Mlp3& weights, const Mlp3* offsets,
                          const DeformationBatch& batch);
+/// The same with gradients to what is on a tape.
+DeformationOutput deform(Context& ctx, const Mlp3& weights, const Mlp3* offsets,
+                         const Var& rest_points, const Var& rest_joints, const Var& local,
+                         const Var& axis_angle);
 /// Eq. 4: squared distances, summed over all points and pairs.
-Var squared_distance_sum(const Var& posed, const Tensor& truth);
+Var squared_distance_sum(const Var& posed, const Var& truth);
 /// Mean distance per point, metres (a number to report, not to differentiate).
 double mean_distance(const Tensor& a, const Tensor& b);
 

@@ -20,20 +20,21 @@ PatchTransformer::PatchTransformer(const PatchTransformerConfig& c, const Init& 
     layers.emplace(c.width, c.heads, 2 * c.width, init.sub("layers." + std::to_string(i)));
 }
 
-SkeletonOutput PatchTransformer::forward(Context& ctx, const Tensor& cloud) {
+SkeletonOutput PatchTransformer::forward(Context& ctx, const Var& cloud) {
   const ModuleScope path(scope);
   const int64_t n = cloud.size(0), t = config.centres;
   SkeletonOutput out;
-  out.centres = fps(cloud, t);
-  const Tensor centres = pick_rows(cloud, out.centres);
-  const Tensor offsets = neighbour_offsets(cloud, centres, knn(centres, cloud, config.neighbours));
+  out.centres = fps(cloud.value, t);
+  const Var centres = gather(cloud, out.centres);
+  const Tensor index = knn(centres.value, cloud.value, config.neighbours);
+  const Var offsets = neighbour_offsets(cloud, centres, index);
   const Var patch = max(point(ctx, scale(offsets, config.patch_scale)), 2);
   Var x = mix(ctx, relu(patch)) + position(ctx, scale(centres, config.centre_scale));
   for (size_t i = 0; i < layers.size(); ++i) x = layers[i](ctx, x);
   x = norm(ctx, x);
   const Var head = vote(ctx, x);
   out.votes = reshape(slice(head, 2, kJoints, 4 * kJoints), {n, t, kJoints, 3}) +
-              Var(centres.reshape({n, t, 1, 3}));
+              reshape(centres, {n, t, 1, 3});
   const Var weight = reshape(softmax(slice(head, 2, 0, kJoints), 1), {n, t, kJoints, 1});
   out.joints = sum(weight * out.votes, 1);
   if (ctx.training) out.segmentation = segment(ctx, x);

@@ -16,7 +16,7 @@ struct PatchTransformerConfig {
 
 struct PatchTransformer : SkeletonModel {
   PatchTransformer(const PatchTransformerConfig& c, const Init& init);
-  SkeletonOutput forward(Context& ctx, const Tensor& cloud) override;
+  SkeletonOutput forward(Context& ctx, const Var& cloud) override;
   int64_t points() const override { return config.points; }
   void visit(Fields& f) override;
   const char* kind() const override { return "PatchTransformer"; }

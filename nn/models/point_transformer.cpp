@@ -20,9 +20,9 @@ PointTransformerBackbone::PointTransformerBackbone(const PointTransformerConfig&
   }
 }
 
-Var PointTransformerBackbone::operator()(Context& ctx, const Tensor& cloud) {
+Var PointTransformerBackbone::operator()(Context& ctx, const Var& cloud) {
   const ModuleScope path(scope);
-  Tensor xyz = cloud;
+  Var xyz = cloud;
   Var f = transformer1(ctx, xyz, fc1(ctx, cloud));
   for (size_t i = 0; i < transformers.size(); ++i) {
     f = transition_downs[i].sa(ctx, &xyz, f);
@@ -43,7 +43,7 @@ PointTransformer::PointTransformer(const PointTransformerConfig& c, const Init& 
       backbone(c, init.sub("backbone")),
       fc2({c.base << c.blocks, c.head1, c.head2, kJoints * 3}, init.sub("fc2")) {}
 
-SkeletonOutput PointTransformer::forward(Context& ctx, const Tensor& cloud) {
+SkeletonOutput PointTransformer::forward(Context& ctx, const Var& cloud) {
   const ModuleScope path(scope);
   SkeletonOutput out;
   out.joints = reshape(fc2(ctx, mean(backbone(ctx, cloud), 1)), {cloud.size(0), kJoints, 3});

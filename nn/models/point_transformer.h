@@ -22,7 +22,7 @@ struct TransitionDown : Module {
 struct PointTransformerBackbone : Module {
   PointTransformerBackbone(const PointTransformerConfig& c, const Init& init);
   /// cloud [n, v, 3] -> features [n, v / 4^blocks, base * 2^blocks].
-  Var operator()(Context& ctx, const Tensor& cloud);
+  Var operator()(Context& ctx, const Var& cloud);
   void visit(Fields& f) override;
   const char* kind() const override { return "Backbone"; }
   ReluChain fc1;
@@ -33,7 +33,7 @@ struct PointTransformerBackbone : Module {
 
 struct PointTransformer : SkeletonModel {
   PointTransformer(const PointTransformerConfig& c, const Init& init);
-  SkeletonOutput forward(Context& ctx, const Tensor& cloud) override;
+  SkeletonOutput forward(Context& ctx, const Var& cloud) override;
   int64_t points() const override { return config.points; }
   void visit(Fields& f) override;
   const char* kind() const override { return "PointTransformer"; }

@@ -65,7 +65,7 @@ PointNet::PointNet(const PointNetConfig& c, const Init& init)
       bn4(c.widths[3], init),
       bn5(c.widths[4], init) {}
 
-Var PointNet::joints(Context& ctx, const Var& cloud) {
+SkeletonOutput PointNet::forward(Context& ctx, const Var& cloud) {
   const ModuleScope path(scope);
   Var x = matmul(cloud, stn(ctx, cloud));  // points as rows: p A
   x = relu(bn1(ctx, conv1(ctx, x)));
@@ -75,12 +75,8 @@ Var PointNet::joints(Context& ctx, const Var& cloud) {
   x = max(config.relu3 ? relu(x) : x, 1);
   x = relu(bn4(ctx, fc1(ctx, x)));
   x = relu(bn5(ctx, dropout(ctx, fc2(ctx, x), config.dropout)));
-  return reshape(fc3(ctx, x), {cloud.size(0), kJoints, 3});
-}
-
-SkeletonOutput PointNet::forward(Context& ctx, const Tensor& cloud) {
   SkeletonOutput out;
-  out.joints = joints(ctx, cloud);
+  out.joints = reshape(fc3(ctx, x), {cloud.size(0), kJoints, 3});
   return out;
 }
 

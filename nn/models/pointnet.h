@@ -33,9 +33,7 @@ struct SpatialTransformer : Module {
 
 struct PointNet : SkeletonModel {
   PointNet(const PointNetConfig& c, const Init& init);
-  SkeletonOutput forward(Context& ctx, const Tensor& cloud) override;
-  /// The same with gradients to the cloud.
-  Var joints(Context& ctx, const Var& cloud);
+  SkeletonOutput forward(Context& ctx, const Var& cloud) override;
   int64_t points() const override { return config.points; }
   void visit(Fields& f) override;
   const char* kind() const override { return "PointNet"; }
