@@ -11,6 +11,7 @@
 
 #include "autograd/base/error.h"
 #include "datasets/hdf5/detail.h"
+#include "datasets/hdf5/probe.h"
 
 namespace restage::h5 {
 namespace {
@@ -290,7 +291,7 @@ File File::open(const std::string& path) {
   auto state = std::make_unique<State>(path);
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   H5Pset_fclose_degree(access, H5F_CLOSE_STRONG);
-  state->id = H5Fopen(path.c_str(), H5F_ACC_RDONLY, access);
+  if (survives_reading(path)) state->id = H5Fopen(path.c_str(), H5F_ACC_RDONLY, access);
   if (state->id < 0) {
     if (H5Fis_hdf5(path.c_str()) > 0)
       throw InputError(path, "is an HDF5 file, but damaged, cut short or still being written",
