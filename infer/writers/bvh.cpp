@@ -74,7 +74,7 @@ Vec3 euler_zyx(const Mat3& r, const Vec3& near) {
   return best;
 }
 
-BvhWriter::BvhWriter(std::string path, const Joints& rest, BvhOptions options)
+BvhWriter::BvhWriter(std::string path, const Joints& rest, BvhWriterOptions options)
     : path_(std::move(path)), options_(options), file_(path_) {
   out_.reset(std::fopen(file_.path().c_str(), "wb"));
   if (!out_) throw WorkError(path_ + ": could not be opened (" + std::strerror(errno) + ")");

@@ -11,7 +11,7 @@
 
 namespace restage {
 
-struct BvhOptions {
+struct BvhWriterOptions {
   double fps = kFps;
   double units_per_metre = 100.0;  ///< BVH knows no unit; centimetres are what most programs expect
 };
@@ -23,7 +23,7 @@ struct BvhOptions {
 /// WorkError if a pose is not finite or the disk is full.
 class BvhWriter {
  public:
-  BvhWriter(std::string path, const Joints& rest, BvhOptions options = {});
+  BvhWriter(std::string path, const Joints& rest, BvhWriterOptions options = {});
   void push(const Pose& pose);
   void commit();
   size_t frames() const { return frames_; }
@@ -35,7 +35,7 @@ class BvhWriter {
     void operator()(std::FILE* file) const { std::fclose(file); }
   };
   std::string path_;
-  BvhOptions options_;
+  BvhWriterOptions options_;
   AtomicFile file_;
   std::unique_ptr<std::FILE, Close> out_;
   std::array<int, kJoints> order_{};  ///< joints as listed in the file (depth first)

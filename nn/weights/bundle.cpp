@@ -55,7 +55,8 @@ ModelSizes sizes_of(const Json& json, const std::string& where) {
                       : std::is_same_v<T, double> ? given.is_number()
                                                   : given.is_number_integer();
     if (!fits)
-      throw InputError(where, "has no proper size " + in_quotes(name) + " in its metadata", kFix);
+      throw InputError(where, "has no proper size " + name_in_quotes(name) + " in its metadata",
+                       kFix);
     value = given.get<T>();
   });
   return out;
@@ -82,8 +83,8 @@ void check_sizes(const std::string& model, const ModelSizes& s, const TensorFile
       (!doubles || s.points <= 0 || s.layers <= 0 || (s.points >> (2 * s.layers)) > 0);
   if (!square_fits(s.hidden) || !square_fits(s.width) || !layers_fit || !points_fit ||
       !(s.dropout < 1))
-    throw InputError(where, "has sizes of " + in_quotes(model) + " that its tensors cannot fill",
-                     kFix);
+    throw InputError(
+        where, "has sizes of " + name_in_quotes(model) + " that its tensors cannot fill", kFix);
 }
 
 template <class M>
@@ -170,7 +171,7 @@ ModelSet models_of(const TensorFile& file, const NeededModels& needs, const std:
     } catch (const InputError&) {
     }
     if (net == nullptr)
-      throw InputError(where, "names " + in_quotes(name) + ", which is no model for " + stage,
+      throw InputError(where, "names " + name_in_quotes(name) + ", which is no model for " + stage,
                        kFix);
     load_state(*net, file, prefix, where);
     for (const auto& item : file.tensors)

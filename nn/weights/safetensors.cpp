@@ -101,7 +101,7 @@ class Reader {
       if (depth > kDepthLimit) fail("has a header nested too deeply");
       if (event == Json::parse_event_t::key && depth == 1 &&
           !keys.insert(value.get<std::string>()).second)
-        fail("names the tensor " + in_quotes(value.get<std::string>()) + " twice");
+        fail("names the tensor " + name_in_quotes(value.get<std::string>()) + " twice");
       return true;
     };
     try {
@@ -116,13 +116,13 @@ class Reader {
   void read_metadata(const Json& value, TensorFile* out) const {
     if (!value.is_object()) fail("has metadata that is no JSON object");
     for (const auto& [key, text] : value.items()) {
-      if (!text.is_string()) fail("has metadata " + in_quotes(key) + " that is no text");
+      if (!text.is_string()) fail("has metadata " + name_in_quotes(key) + " that is no text");
       out->metadata[key] = text.get<std::string>();
     }
   }
 
   Entry read_entry(const std::string& name, const Json& value) const {
-    const std::string called = "tensor " + in_quotes(name);
+    const std::string called = "tensor " + name_in_quotes(name);
     if (!value.is_object() || !value.contains("dtype") || !value.contains("shape") ||
         !value.contains("data_offsets"))
       fail(called + " lacks dtype, shape or data_offsets");
@@ -132,7 +132,7 @@ class Reader {
     for (const Kind& k : kKinds)
       if (dtype == k.name) e.kind = &k;
     if (e.kind == nullptr)
-      throw InputError(where_, called + " has the unknown dtype " + in_quotes(dtype),
+      throw InputError(where_, called + " has the unknown dtype " + name_in_quotes(dtype),
                        "store it as F32, F64, I32, I64, F16 or BF16");
     const Json &shape = value["shape"], &range = value["data_offsets"];
     if (!shape.is_array() || shape.size() > static_cast<size_t>(Shape::kMaxRank))
@@ -173,7 +173,7 @@ class Reader {
     uint64_t at = 0;
     for (const Entry& e : entries) {
       if (e.begin != at)
-        fail("tensor " + in_quotes(e.name) +
+        fail("tensor " + name_in_quotes(e.name) +
              (e.begin < at ? " overlaps another" : " follows a gap"));
       at = e.end;
     }
@@ -211,7 +211,7 @@ const char* format_name(DType type) {
 
 }  // namespace
 
-std::string in_quotes(std::string_view name) {
+std::string name_in_quotes(std::string_view name) {
   std::string out = "'";
   for (const char c : name.substr(0, 60)) out += c >= ' ' && c <= '~' ? c : '?';
   return out + (name.size() > 60 ? "...'" : "'");
@@ -224,7 +224,7 @@ const Tensor* TensorFile::find(const std::string& name) const {
 
 const Tensor& TensorFile::at(const std::string& name, const std::string& where) const {
   if (const Tensor* t = find(name)) return *t;
-  throw InputError(where, "lacks the tensor " + in_quotes(name), "give a complete file");
+  throw InputError(where, "lacks the tensor " + name_in_quotes(name), "give a complete file");
 }
 
 TensorFile parse_safetensors(std::string_view bytes, const std::string& where) {

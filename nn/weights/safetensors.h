@@ -31,6 +31,6 @@ std::string safetensors_bytes(const TensorFile& file);
 void write_safetensors(const std::string& path, const TensorFile& file);
 
 /// A name out of a file, fit for a message: in quotes, short, printable.
-std::string in_quotes(std::string_view name);
+std::string name_in_quotes(std::string_view name);
 
 }  // namespace restage

@@ -41,7 +41,7 @@ void describe(std::string* text, const std::vector<std::string>& names, const ch
   if (names.empty()) return;
   *text += (text->empty() ? "" : ", ") + std::to_string(names.size()) + " " + what + " (";
   for (size_t i = 0; i < std::min<size_t>(names.size(), 2); ++i)
-    *text += (i > 0 ? ", " : "") + in_quotes(names[i]);
+    *text += (i > 0 ? ", " : "") + name_in_quotes(names[i]);
   *text += names.size() > 2 ? ", ...)" : ")";
 }
 
@@ -168,7 +168,8 @@ TensorFile NameMap::apply(const TensorFile& file, const std::string& where) cons
     std::string ours;
     if (!rename(name, &ours)) continue;
     if (!out.tensors.emplace(ours, tensor).second)
-      throw InputError(where, "gets two tensors named " + in_quotes(ours), "mend the name map");
+      throw InputError(where, "gets two tensors named " + name_in_quotes(ours),
+                       "mend the name map");
   }
   return out;
 }
