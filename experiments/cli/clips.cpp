@@ -1,0 +1,69 @@
+#include "experiments/cli/clips.h"
+
+#include "autograd/base/error.h"
+#include "datasets/readers/frame_folder.h"
+#include "datasets/schema.h"
+#include "nn/geometry/skeleton.h"
+
+namespace restage::cli {
+namespace {
+
+constexpr int kPointsPerBone = 12;
+
+bool ends_with_hdf5(const std::string& path) {
+  return path.ends_with(".h5") || path.ends_with(".hdf5");
+}
+
+[[noreturn]] void no_such_sequence(const std::string& path, int64_t sequence) {
+  throw InputError(path, "has no sequence number " + std::to_string(sequence),
+                   "count sequences from 0");
+}
+
+/// Joints alone: enough points along each bone to see a stick figure.
+Clip stick_figure(const std::string& path, const std::string& label, int64_t sequence) {
+  const Prediction data = read_prediction(path);
+  const auto s = static_cast<size_t>(sequence);
+  if (s + 1 >= data.sequence_offset.size()) no_such_sequence(path, sequence);
+  Clip clip;
+  clip.label = label;
+  for (int64_t f = data.sequence_offset[s]; f < data.sequence_offset[s + 1]; ++f) {
+    const auto joint = [&](int j) {
+      return Eigen::Map<const Vec3>(data.joints.data() + 3 * (f * kJoints + j));
+    };
+    Points& points = clip.frames.emplace_back();
+    for (int j = 1; j < kJoints; ++j)
+      for (int k = 0; k <= kPointsPerBone; ++k) {
+        const double t = static_cast<double>(k) / kPointsPerBone;
+        points.push_back(((1 - t) * joint(kParents[j]) + t * joint(j)).cast<float>());
+      }
+  }
+  return clip;
+}
+
+bool has_joints_only(const std::string& path) {
+  if (!ends_with_hdf5(path)) return false;
+  const Inspection found = inspect(path);
+  return found.kind == "prediction" && found.counts.count("vertices") == 0;
+}
+
+}  // namespace
+
+Clip read_clip(const std::string& path, const std::string& label, int64_t sequence) {
+  if (has_joints_only(path)) return stick_figure(path, label, sequence);
+  const auto source = open_frames(path);
+  Clip clip;
+  clip.label = label;
+  bool surface = true;
+  while (auto frame = source->next()) {
+    if (frame->sequence != sequence) continue;
+    if (clip.frames.empty()) clip.faces = frame->faces;
+    surface = surface && frame->faces == clip.faces &&
+              (clip.frames.empty() || frame->points.size() == clip.frames[0].size());
+    clip.frames.push_back(std::move(frame->points));
+  }
+  if (clip.frames.empty()) no_such_sequence(path, sequence);
+  if (!surface) clip.faces.clear();
+  return clip;
+}
+
+}  // namespace restage::cli

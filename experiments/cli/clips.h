@@ -1,0 +1,15 @@
+// Results and scans as something that can be drawn.
+#pragma once
+
+#include <string>
+
+#include "infer/render/clip.h"
+
+namespace restage::cli {
+
+/// One sequence of a prediction or scan file (HDF5), a folder of PLY/OBJ frames, or a single mesh.
+/// A surface stays one only if all frames have the same faces; a prediction of joints alone becomes
+/// a cloud of points along the bones. InputError if there is no such sequence.
+Clip read_clip(const std::string& path, const std::string& label, int64_t sequence = 0);
+
+}  // namespace restage::cli

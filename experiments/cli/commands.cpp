@@ -1,0 +1,15 @@
+#include "experiments/cli/commands.h"
+
+namespace restage::cli {
+
+void add_commands(Program& program) {
+  add_train(program);
+  add_retarget(program);
+  add_skeleton(program);
+  add_data(program);
+  add_eval(program);
+  add_render(program);
+  add_doctor(program);
+}
+
+}  // namespace restage::cli

@@ -1,0 +1,20 @@
+// All sub-commands. A new one: a file x.cpp with `void add_x(Program&)`, a line here and one in
+// commands.cpp.
+#pragma once
+
+#include "experiments/cli/program.h"
+
+namespace restage::cli {
+
+void add_data(Program& program);
+void add_doctor(Program& program);
+void add_eval(Program& program);
+void add_render(Program& program);
+void add_retarget(Program& program);
+void add_skeleton(Program& program);
+void add_train(Program& program);
+
+/// Adds every command, in the order of `restage --help`.
+void add_commands(Program& program);
+
+}  // namespace restage::cli

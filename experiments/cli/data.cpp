@@ -1,0 +1,176 @@
+// restage data: making and looking at data files (HDF5, datasets/README.md).
+#include <map>
+#include <memory>
+
+#include "autograd/base/error.h"
+#include "autograd/base/log.h"
+#include "datasets/builtin/bodies.h"
+#include "datasets/builtin/motions.h"
+#include "datasets/importers/import.h"
+#include "datasets/schema.h"
+#include "experiments/cli/commands.h"
+#include "experiments/cli/output.h"
+
+namespace restage::cli {
+namespace {
+
+constexpr int kMostBodies = 10000;  // guards against typing errors, not a limit of the format
+
+// ---- build -------------------------------------------------------------------------------------
+
+struct BuildOptions {
+  std::string out;
+  std::vector<int> bodies{24, 4, 4}, motions{60, 20, 20};  ///< train, validation, test
+};
+
+void check_counts(const std::string& name, const std::vector<int>& counts) {
+  for (const int n : counts)
+    if (n < 0 || n > kMostBodies)
+      throw InputError("", name + " " + std::to_string(n) + " is out of range",
+                       "give three numbers from 0 to " + std::to_string(kMostBodies));
+}
+
+int total(const std::vector<int>& counts) { return counts[0] + counts[1] + counts[2]; }
+
+int run_build(const BuildOptions& options, const Common& common) {
+  const auto &b = options.bodies, &m = options.motions;
+  check_counts("--bodies", b);
+  check_counts("--motions", m);
+  if (total(b) + total(m) == 0)
+    throw InputError("", "no bodies and no motions were asked for", "give --bodies or --motions");
+  DatasetWriter writer(options.out,
+                       {"CC0-1.0", "built-in source, seed " + std::to_string(common.seed)});
+  log_info("building " + std::to_string(total(b)) + " bodies and " + std::to_string(total(m)) +
+           " motions with seed " + std::to_string(common.seed));
+  for (const Body& body : builtin_bodies(common.seed, b[0], b[1], b[2])) writer.add(body);
+  for (const Motion& motion : builtin_motions(common.seed, m[0], m[1], m[2])) writer.add(motion);
+  writer.commit();
+  if (common.json)
+    print_json({{"out", options.out}, {"bodies", b}, {"motions", m}, {"seed", common.seed}});
+  else
+    print("wrote " + options.out + "\n");
+  return 0;
+}
+
+void add_build(Program& program, CLI::App& group) {
+  const auto options = std::make_shared<BuildOptions>();
+  CLI::App& app =
+      program.add(group, "build", "make parametric bodies and motions, no data needed",
+                  "restage data build --out data.h5\n"
+                  "restage data build --bodies 40 5 5 --motions 120 20 20 --seed 1 "
+                  "--out data.h5",
+                  [options, &program] { return run_build(*options, program.common()); });
+  app.add_option("--out", options->out, "file to write")->required();
+  app.add_option("--bodies", options->bodies, "bodies for training, validation and test")
+      ->expected(3);
+  app.add_option("--motions", options->motions, "motions for training, validation and test")
+      ->expected(3);
+}
+
+// ---- import ------------------------------------------------------------------------------------
+
+struct ImportArguments {
+  std::string source, out, up = "auto";
+  ImportOptions options;
+};
+
+int run_import(ImportArguments arguments, const Common& common) {
+  static const std::map<std::string, UpAxis> axes = {
+      {"auto", UpAxis::automatic}, {"y", UpAxis::y}, {"z", UpAxis::z}};
+  const auto axis = axes.find(arguments.up);
+  if (axis == axes.end())
+    throw InputError("", "--up '" + arguments.up + "' is no axis", "give auto, y or z");
+  arguments.options.bvh.up = axis->second;
+  if (arguments.options.bvh.scale < 0 || arguments.options.bvh.fps < 0)
+    throw InputError("", "--scale and --fps cannot be negative",
+                     "leave them out to have them found");
+  const ImportSummary done = import_data(arguments.source, arguments.out, arguments.options);
+  if (common.json) {
+    print_json({{"out", arguments.out},
+                {"bodies", done.bodies},
+                {"motions", done.motions},
+                {"frames", done.frames},
+                {"skipped", done.skipped}});
+    return 0;
+  }
+  print("wrote " + arguments.out + ": " + std::to_string(done.bodies) + " bodies, " +
+        std::to_string(done.motions) + " motions, " + std::to_string(done.frames) + " frames\n");
+  for (const std::string& file : done.skipped) print("skipped " + file + "\n");
+  return 0;
+}
+
+void add_import(Program& program, CLI::App& group) {
+  const auto given = std::make_shared<ImportArguments>();
+  CLI::App& app =
+      program.add(group, "import", "turn MakeHuman bodies, CMU clips or BVH files into a data file",
+                  "restage data import DATA_FOLDER --out real.h5\n"
+                  "restage data import walk.bvh --subject ann --license CC0-1.0 --out walk.h5",
+                  [given, &program] { return run_import(*given, program.common()); });
+  app.add_option("SOURCE", given->source, "data folder, BVH file (.bvh, .bvh.xz) or folder of them")
+      ->required();
+  app.add_option("--out", given->out, "file to write")->required();
+  app.add_option("--garment", given->options.garment, "dress the bodies (a file of body/clothes)");
+  app.add_option("--license", given->options.license, "licence of the BVH files");
+  app.add_option("--subject", given->options.bvh.subject, "who moves in the BVH files");
+  app.add_option("--split", given->options.bvh.split, "train, validation or test, for BVH files");
+  app.add_option("--scale", given->options.bvh.scale, "metres per unit of the BVH files");
+  app.add_option("--fps", given->options.bvh.fps, "true frame rate of the BVH files");
+  app.add_option("--up", given->up, "up axis of the BVH files: auto, y or z");
+  app.add_option("--rest-frame", given->options.bvh.rest_frame, "T-pose frame of the BVH files");
+}
+
+// ---- inspect and verify ------------------------------------------------------------------------
+
+int run_inspect(const std::string& file, const Common& common) {
+  const Inspection found = inspect(file);
+  if (common.json) {
+    print_json({{"kind", found.kind},
+                {"counts", found.counts},
+                {"units", found.units},
+                {"license", found.license},
+                {"provenance", found.provenance}});
+    return 0;
+  }
+  std::string text = "kind        " + found.kind + "\n";
+  for (const auto& [name, count] : found.counts)
+    text += name + std::string(name.size() < 12 ? 12 - name.size() : 1, ' ') +
+            std::to_string(count) + "\n";
+  print(text + "units       " + found.units + "\nlicense     " + found.license + "\nprovenance  " +
+        found.provenance + "\n");
+  return 0;
+}
+
+int run_verify(const std::string& file, const Common& common) {
+  const std::vector<std::string> problems = verify(file);
+  if (common.json) {
+    print_json({{"file", file}, {"problems", problems}});
+  } else {
+    std::string text;
+    for (const std::string& problem : problems) text += problem + "\n";
+    print(problems.empty() ? file + ": all is well\n" : text);
+  }
+  return problems.empty() ? 0 : 1;
+}
+
+void add_file_command(Program& program, CLI::App& group, const std::string& name,
+                      const std::string& help, int (*run)(const std::string&, const Common&)) {
+  const auto file = std::make_shared<std::string>();
+  CLI::App& app =
+      program.add(group, name, help,
+                  "restage data " + name + " data.h5\nrestage data " + name + " data.h5 --json",
+                  [file, run, &program] { return run(*file, program.common()); });
+  app.add_option("FILE", *file, "bodies, motions, scans or a prediction (HDF5)")->required();
+}
+
+}  // namespace
+
+void add_data(Program& program) {
+  CLI::App& group = program.add_group("data", "make, import and check data files");
+  add_build(program, group);
+  add_import(program, group);
+  add_file_command(program, group, "inspect", "say what a file holds", run_inspect);
+  add_file_command(program, group, "verify",
+                   "read all of a file and list what is wrong (exit code 1)", run_verify);
+}
+
+}  // namespace restage::cli

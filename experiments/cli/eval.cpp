@@ -1,0 +1,216 @@
+// restage eval: metrics of a prediction beside its ground truth and beside references.
+#include <memory>
+
+#include "autograd/base/error.h"
+#include "datasets/schema.h"
+#include "experiments/cli/commands.h"
+#include "experiments/cli/eval_report.h"
+#include "nn/geometry/closed_form.h"
+
+namespace restage::cli {
+namespace {
+
+using metrics::SequenceView;
+using metrics::Track;
+
+struct EvalOptions {
+  std::string pred, truth, source, rest;
+  bool variants = false, per_joint = false;
+};
+
+struct File {
+  std::string path;
+  Prediction data;
+
+  explicit File(const std::string& name) : path(name), data(read_prediction(name)) {}
+  Track joints() const {
+    return data.joints.empty() ? Track{} : Track{data.joints.data(), data.frames, kJoints};
+  }
+  Track vertices() const {
+    return data.vertices.empty() ? Track{}
+                                 : Track{data.vertices.data(), data.frames, data.vertex_count};
+  }
+  int64_t sequences() const { return static_cast<int64_t>(data.sequence_offset.size()) - 1; }
+};
+
+std::string counted(int64_t n, const std::string& what) { return std::to_string(n) + " " + what; }
+
+void check_same_frames(const File& file, const File& truth) {
+  if (file.data.frames == truth.data.frames) return;
+  throw InputError(file.path,
+                   "has " + counted(file.data.frames, "frames, but ") + truth.path + " has " +
+                       std::to_string(truth.data.frames),
+                   "give files of the same frames");
+}
+
+void check_pair(const File& pred, const File& truth) {
+  check_same_frames(pred, truth);
+  const bool joints = pred.joints().present() && truth.joints().present();
+  const bool vertices = pred.vertices().present() && truth.vertices().present();
+  if (vertices && pred.data.vertex_count != truth.data.vertex_count)
+    throw InputError(pred.path + ":/vertices",
+                     "has " + counted(pred.data.vertex_count, "vertices, but ") + truth.path +
+                         " has " + std::to_string(truth.data.vertex_count),
+                     "give surfaces with the same vertices");
+  if (!joints && !vertices && truth.data.frames > 0)
+    throw InputError(pred.path, "has nothing in common with " + truth.path,
+                     "store /joints or /vertices in both");
+}
+
+/// Where sequences begin and end: a file without that information is taken to agree.
+std::vector<int64_t> common_sequences(const File& pred, const File& truth) {
+  const auto& a = pred.data.sequence_offset;
+  const auto& b = truth.data.sequence_offset;
+  if (a == b || truth.sequences() <= 1) return a;
+  if (pred.sequences() <= 1) return b;
+  throw InputError(pred.path + ":/sequence_offset", "differs from that of " + truth.path,
+                   "give files of the same sequences");
+}
+
+std::vector<SequenceView> cut(const std::vector<int64_t>& offset, const Track& pred_joints,
+                              const Track& pred_vertices, const File& truth) {
+  std::vector<SequenceView> views;
+  for (size_t s = 0; s + 1 < offset.size(); ++s) {
+    const int64_t begin = offset[s], end = offset[s + 1];
+    views.push_back({pred_joints.slice(begin, end), truth.joints().slice(begin, end),
+                     pred_vertices.slice(begin, end), truth.vertices().slice(begin, end),
+                     end - begin});
+  }
+  return views;
+}
+
+std::vector<Joints> joints_of(const Track& track) {
+  std::vector<Joints> frames(static_cast<size_t>(track.frames));
+  for (size_t f = 0; f < frames.size(); ++f)
+    for (int j = 0; j < kJoints; ++j) frames[f][j] = track.at(static_cast<int64_t>(f), j);
+  return frames;
+}
+
+/// The references for every sequence, as if they had been predicted.
+class References {
+ public:
+  References(const EvalOptions& options, const File& truth, const std::vector<int64_t>& offset)
+      : source_(options.source), rest_(options.rest) {
+    check_same_frames(source_, truth);
+    for (const File* file : {&source_, &rest_})
+      if (!file->joints().present())
+        throw InputError(file->path + ":/joints", "is missing",
+                         "store the joints as [frames, 22, 3]");
+    const auto sequences = static_cast<int64_t>(offset.size()) - 1;
+    if (rest_.data.frames != 1 && rest_.data.frames != sequences &&
+        rest_.data.frames != truth.data.frames)
+      throw InputError(
+          rest_.path + ":/joints",
+          "has " + counted(rest_.data.frames, "skeletons for ") + counted(sequences, "sequences"),
+          "give the rest joints of one body, or one row for every sequence");
+    for (int64_t s = 0; s < sequences; ++s) add(offset, s);
+  }
+
+  std::vector<std::pair<std::string, metrics::Evaluation>> evaluate(
+      const std::vector<int64_t>& offset, const File& truth,
+      std::span<const metrics::Metric> metrics) const {
+    const auto one = [&](const Track& joints, const Track& vertices) {
+      return metrics::evaluate(cut(offset, joints, vertices, truth), metrics);
+    };
+    const int64_t frames = source_.data.frames;
+    const bool surfaces = !rest_vertices_.empty() && truth.vertices().present() &&
+                          truth.data.vertex_count == rest_.data.vertex_count;
+    const Track carried =
+        surfaces ? Track{rest_vertices_.data(), frames, rest_.data.vertex_count} : Track{};
+    return {{"rest_pose", one({rest_pose_.data(), frames, kJoints}, carried)},
+            {"source_unchanged", one(source_.joints(), {})},
+            {"closed_form", one({closed_form_.data(), frames, kJoints}, {})}};
+  }
+
+ private:
+  void add(const std::vector<int64_t>& offset, int64_t s) {
+    const auto i = static_cast<size_t>(s);
+    const int64_t rows = rest_.data.frames;
+    const int64_t row = rows == 1 ? 0 : rows == source_.data.frames ? offset[i] : s;
+    const auto source = joints_of(source_.joints().slice(offset[i], offset[i + 1]));
+    const Joints rest = joints_of(rest_.joints().slice(row, row + 1))[0];
+    append(rest_pose_joints(source, rest), rest_pose_);
+    append(closed_form_joints(source, rest), closed_form_);
+    if (!rest_.vertices().present()) return;
+    for (const Joints& joints : rest_pose_joints(source, rest))
+      for (int64_t v = 0; v < rest_.data.vertex_count; ++v) {
+        const Vec3 moved = rest_.vertices().at(row, v) + joints[0] - rest[0];
+        rest_vertices_.insert(rest_vertices_.end(), {moved.x(), moved.y(), moved.z()});
+      }
+  }
+
+  static void append(const std::vector<Joints>& frames, std::vector<double>& values) {
+    for (const Joints& joints : frames)
+      for (const Vec3& p : joints) values.insert(values.end(), {p.x(), p.y(), p.z()});
+  }
+
+  File source_, rest_;
+  std::vector<double> rest_pose_, closed_form_, rest_vertices_;
+};
+
+std::vector<double> errors_by_joint(const File& pred, const File& truth) {
+  return metrics::mean_distance_by_point(pred.joints(), truth.joints(),
+                                         {metrics::Alignment::Mode::frame});
+}
+
+void print_per_joint(const std::vector<double>& errors) {
+  std::vector<std::vector<std::string>> rows{{"joint", "PA-MPJPE [m]"}};
+  for (size_t j = 0; j < errors.size(); ++j) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.4f", errors[j]);
+    rows.push_back({std::string(kJointNames[j]), text});
+  }
+  print("\n" + markdown_table(rows));
+}
+
+int run_eval(const EvalOptions& options, const Common& common) {
+  if (options.source.empty() != options.rest.empty())
+    throw InputError("", "--source and --rest belong together",
+                     "give both for the references, or neither");
+  const File pred(options.pred), truth(options.truth);
+  check_pair(pred, truth);
+  const std::vector<int64_t> offset = common_sequences(pred, truth);
+
+  std::vector<metrics::Metric> chosen(metrics::table().begin(), metrics::table().end());
+  if (options.variants)
+    chosen.insert(chosen.end(), metrics::variants().begin(), metrics::variants().end());
+  EvalReport report;
+  report.metrics = chosen;
+  for (size_t s = 0; s + 1 < offset.size(); ++s) report.frames.push_back(offset[s + 1] - offset[s]);
+  if (!options.source.empty())
+    report.references = References(options, truth, offset).evaluate(offset, truth, chosen);
+  report.model =
+      metrics::evaluate(cut(offset, pred.joints(), pred.vertices(), truth), report.metrics);
+
+  const auto by_joint = options.per_joint ? errors_by_joint(pred, truth) : std::vector<double>();
+  if (common.json) {
+    Json document = to_json(report);
+    for (size_t j = 0; j < by_joint.size(); ++j)
+      document["pa_mpjpe_by_joint"][std::string(kJointNames[j])] = by_joint[j];
+    print_json(document);
+    return 0;
+  }
+  print(to_markdown(report));
+  if (!by_joint.empty()) print_per_joint(by_joint);
+  return 0;
+}
+
+}  // namespace
+
+void add_eval(Program& program) {
+  const auto options = std::make_shared<EvalOptions>();
+  CLI::App& app =
+      program.add("eval", "measure a prediction against its ground truth",
+                  "restage eval --pred result.h5 --truth truth.h5\n"
+                  "restage eval --pred result.h5 --truth truth.h5 --source a.h5 --rest b.h5 --json",
+                  [options, &program] { return run_eval(*options, program.common()); });
+  app.add_option("--pred", options->pred, "predicted /joints and /vertices (HDF5)")->required();
+  app.add_option("--truth", options->truth, "true /joints and /vertices (HDF5)")->required();
+  app.add_option("--source", options->source, "joints of the source, for the references");
+  app.add_option("--rest", options->rest,
+                 "rest joints of the target (one row, or one a sequence), for the references");
+  app.add_flag("--variants", options->variants, "further alignments: rigid, sequence, root");
+  app.add_flag("--per-joint", options->per_joint, "also the aligned error of every joint");
+}
+
+}  // namespace restage::cli

@@ -1,0 +1,119 @@
+#include "experiments/cli/program.h"
+
+#include <new>
+#include <utility>
+
+#include "autograd/base/error.h"
+#include "autograd/base/interrupt.h"
+#include "autograd/base/log.h"
+#include "autograd/base/parallel.h"
+#include "experiments/cli/commands.h"
+#include "experiments/cli/output.h"
+#include "experiments/cli/usage.h"
+
+#ifndef RESTAGE_VERSION
+#define RESTAGE_VERSION "unknown"
+#endif
+
+namespace restage::cli {
+namespace {
+
+constexpr int kMaxThreads = 1024;
+
+std::string with_heading(const std::string& examples) {
+  std::string text = "Examples:\n  ";
+  for (const char c : examples) text += c == '\n' ? std::string("\n  ") : std::string(1, c);
+  return text;
+}
+
+}  // namespace
+
+Program::Program() : app_("Correspondence-free retargeting of human motion.", "restage") {
+  app_.set_version_flag("--version", "restage " RESTAGE_VERSION, "print the version");
+  app_.require_subcommand(1);
+  app_.footer(
+      with_heading("restage COMMAND --help\n"
+                   "restage eval --pred result.h5 --truth truth.h5"));
+  add_common_options(app_);
+}
+
+void Program::add_common_options(CLI::App& app) {
+  app.set_help_flag("-h,--help", "print this page");
+  app.get_formatter()->column_width(36);
+  const std::string group = "Common options";
+  app.add_option("--threads", common_.threads, "number of threads, 0 for all cores")->group(group);
+  app.add_option("--seed", common_.seed, "seed of all random numbers")
+      ->check([](const std::string& text) {
+        return text.starts_with("-") ? "is '" + text + "', but cannot be negative" : std::string();
+      })
+      ->group(group);
+  app.add_flag("--quiet", common_.quiet, "print results and errors only")->group(group);
+  app.add_flag("--verbose", common_.verbose, "print more about what is done")->group(group);
+  app.add_flag("--json", common_.json, "print one JSON document instead of text")->group(group);
+}
+
+CLI::App& Program::add(CLI::App& group, const std::string& name, const std::string& help,
+                       const std::string& examples, std::function<int()> action) {
+  CLI::App& command = *group.add_subcommand(name, help);
+  add_common_options(command);
+  command.footer(with_heading(examples));
+  command.callback([this, run = std::move(action)] { action_ = run; });
+  return command;
+}
+
+CLI::App& Program::add(const std::string& name, const std::string& help,
+                       const std::string& examples, std::function<int()> action) {
+  return add(app_, name, help, examples, std::move(action));
+}
+
+CLI::App& Program::add_group(const std::string& name, const std::string& help) {
+  CLI::App& group = *app_.add_subcommand(name, help);
+  add_common_options(group);
+  group.require_subcommand(1);
+  return group;
+}
+
+int Program::run(int argc, char** argv) {
+  try {
+    app_.parse(argc, argv);
+  } catch (const CLI::CallForVersion& version) {
+    print(std::string(version.what()) + "\n");
+    return 0;
+  } catch (const CLI::Success&) {  // --help
+    print(app_.help());
+    return 0;
+  } catch (const CLI::ParseError& error) {
+    throw usage_error(app_, error);
+  }
+  if (common_.threads < 0 || common_.threads > kMaxThreads)
+    throw InputError("", "--threads " + std::to_string(common_.threads) + " is out of range",
+                     "give a number from 0 (all cores) to " + std::to_string(kMaxThreads));
+  set_threads(common_.threads);
+  set_log_level(common_.quiet     ? LogLevel::quiet
+                : common_.verbose ? LogLevel::debug
+                                  : LogLevel::info);
+  return action_();
+}
+
+int run(int argc, char** argv) {
+  handle_signals();
+  try {
+    Program program;
+    add_commands(program);
+    const int code = program.run(argc, argv);
+    finish_output();
+    return code;
+  } catch (const Error& error) {
+    print_error(error.what());
+    return error.exit_code;
+  } catch (const std::bad_alloc&) {
+    print_error("not enough memory; give smaller input or free some memory");
+  } catch (const std::exception& error) {
+    print_error(std::string("internal error: ") + error.what() + "; please report it");
+  } catch (...) {
+    print_error("internal error of unknown kind; please report it");
+  }
+  return 1;
+}
+
+}  // namespace restage::cli

@@ -1,0 +1,111 @@
+"""What the tests of the command line share: running the program, the contract of its errors, files."""
+import json
+import os
+import random
+import shutil
+import signal
+import struct
+import subprocess
+import tempfile
+import unittest
+
+PROGRAM = os.environ["RESTAGE_PROGRAM"]
+MAKE_H5 = os.environ["RESTAGE_MAKE_H5"]
+
+
+class Result:
+    def __init__(self, done):
+        self.code, self.out, self.err = done.returncode, done.stdout, done.stderr
+
+
+class CliTest(unittest.TestCase):
+    """Every test runs in an empty folder of its own."""
+
+    def setUp(self):
+        self.folder = tempfile.mkdtemp(prefix="restage-cli-")
+        self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    # ---- running ----
+
+    def restage(self, *arguments, stdout=subprocess.PIPE, before=None, timeout=120):
+        return Result(subprocess.run([PROGRAM, *map(str, arguments)], cwd=self.folder, stdout=stdout, stderr=subprocess.PIPE,
+                                     text=True, timeout=timeout, preexec_fn=before, errors="replace"))
+
+    def done(self, *arguments):
+        """The command succeeds; its standard output."""
+        result = self.restage(*arguments)
+        self.assertEqual(result.code, 0, result.err)
+        return result.out
+
+    def json(self, *arguments):
+        """Standard output is exactly one JSON document."""
+        return json.loads(self.done(*arguments, "--json"))
+
+    def one_line(self, result, code, *contains):
+        """The contract of errors: exit code, one line on standard error, no words on standard output."""
+        self.assertEqual(result.code, code, result.err)
+        self.assertTrue(result.err.startswith("restage: "), result.err)
+        self.assertEqual(result.err.count("\n"), 1, result.err)
+        self.assertTrue(result.err.endswith("\n"), result.err)
+        self.assertLess(len(result.err.encode()), 400, result.err)
+        self.assertIn("; ", result.err)
+        for text in contains:
+            self.assertIn(text, result.err)
+
+    def bad_input(self, arguments, *contains):
+        before = sorted(os.listdir(self.folder))
+        result = self.restage(*arguments)
+        self.one_line(result, 2, *contains)
+        self.assertEqual(result.out, "")
+        self.assertEqual(sorted(os.listdir(self.folder)), before, "bad input must not leave files")
+
+    # ---- files ----
+
+    def h5(self, name, attributes=None, **datasets):
+        """h5("p.h5", joints=(shape, values)) or (shape, values, type); a single value fills the shape."""
+        description = {"datasets": {}, "attributes": attributes or {}}
+        for key, (shape, values, *kind) in datasets.items():
+            description["datasets"]["/" + key] = {"shape": shape, "values": values, "type": kind[0] if kind else "float64"}
+        made = subprocess.run([MAKE_H5, self.path(name)], input=json.dumps(description), text=True, capture_output=True)
+        self.assertEqual(made.returncode, 0, made.stderr)
+        return name
+
+    def bytes(self, name):
+        with open(self.path(name), "rb") as f:
+            return f.read()
+
+    def write(self, name, content):
+        os.makedirs(os.path.dirname(self.path(name)), exist_ok=True)
+        with open(self.path(name), "wb" if isinstance(content, bytes) else "w") as f:
+            f.write(content)
+        return name
+
+    def ply(self, name, points, faces=()):
+        """Binary little-endian PLY."""
+        head = "ply\nformat binary_little_endian 1.0\nelement vertex %d\n" % len(points)
+        head += "property float x\nproperty float y\nproperty float z\n"
+        if faces:
+            head += "element face %d\nproperty list uchar int vertex_indices\n" % len(faces)
+        body = b"".join(struct.pack("<3f", *p) for p in points)
+        body += b"".join(struct.pack("<B3i", 3, *f) for f in faces)
+        return self.write(name, (head + "end_header\n").encode() + body)
+
+
+def numbers(count, seed, scale=1.0):
+    r = random.Random(seed)
+    return [r.gauss(0, scale) for _ in range(count)]
+
+
+def points(count, seed):
+    x = numbers(3 * count, seed)
+    return [tuple(x[3 * i:3 * i + 3]) for i in range(count)]
+
+
+def small_disk():
+    """For `before`: files may not grow beyond 4 kB, as if the disk were full."""
+    import resource
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))

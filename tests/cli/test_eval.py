@@ -1,0 +1,90 @@
+"""restage eval."""
+import math
+
+from support import CliTest, numbers
+
+METRICS = ["mpjpe", "pa_mpjpe", "acc", "pa_acc", "mpvd", "pa_mpvd", "medl", "pmd", "pmd_npt"]
+F, V = 6, 12
+
+
+class Eval(CliTest):
+    def setUp(self):
+        super().setUp()
+        self.joints, self.vertices = numbers(F * 66, 1), numbers(F * V * 3, 2)
+        self.h5("truth.h5", joints=([F, 22, 3], self.joints), vertices=([F, V, 3], self.vertices))
+        self.h5("pred.h5", joints=([F, 22, 3], [x + 0.1 for x in self.joints]),
+                vertices=([F, V, 3], [x + (0.2 if i % 3 == 1 else 0) for i, x in enumerate(self.vertices)], "float64"))
+
+    def eval(self, pred, truth, *more):
+        return self.json("eval", "--pred", pred, "--truth", truth, *more)
+
+    def test_values(self):
+        result = self.eval("pred.h5", "truth.h5")
+        self.assertEqual(list(result), ["mean", "sequences"])
+        self.assertEqual(list(result["mean"]), METRICS)
+        self.assertEqual(list(result["sequences"][0]), ["frames"] + METRICS)
+        self.assertEqual(result["sequences"][0]["frames"], F)
+        for key, want in (("mpjpe", 0.1 * math.sqrt(3)), ("pa_mpjpe", 0), ("acc", 0), ("mpvd", 0.2), ("pa_mpvd", 0), ("medl", 0),
+                          ("pmd", 0.04), ("pmd_npt", 0)):
+            self.assertAlmostEqual(result["mean"][key], want, places=11, msg=key)
+
+    def test_sequences_count_equally(self):
+        offset = ([3], [0, 2, F], "int64")
+        self.h5("two.h5", joints=([F, 22, 3], [x + (0.3 if i < 2 * 66 else 0.1) for i, x in enumerate(self.joints)]), sequence_offset=offset)
+        result = self.eval("two.h5", "truth.h5")
+        self.assertEqual([s["frames"] for s in result["sequences"]], [2, F - 2])
+        self.assertAlmostEqual(result["mean"]["mpjpe"], 0.2 * math.sqrt(3), places=11)
+        self.assertIsNone(result["sequences"][0]["acc"])
+        self.assertIsNone(result["mean"]["mpvd"])
+        self.assertAlmostEqual(result["mean"]["acc"], result["sequences"][1]["acc"], places=15)
+
+    def test_what_cannot_be_computed_is_null(self):
+        self.h5("flat.h5", joints=([F, 22, 3], [0.5]), vertices=([F, V, 3], self.vertices))
+        mean = self.eval("flat.h5", "truth.h5")["mean"]
+        self.assertIsNone(mean["pa_mpjpe"])
+        self.assertIsNotNone(mean["mpjpe"])
+        self.h5("few.h5", vertices=([F, 5, 3], numbers(F * 15, 3), "float32"))
+        mean = self.eval("few.h5", "few.h5")["mean"]
+        self.assertEqual((mean["mpjpe"], mean["medl"], mean["mpvd"]), (None, None, 0))
+
+    def test_references(self):
+        self.h5("rest.h5", joints=([1, 22, 3], numbers(66, 4)))
+        references = self.eval("pred.h5", "truth.h5", "--source", "truth.h5", "--rest", "rest.h5")["references"]
+        self.assertEqual(list(references), ["rest_pose", "source_unchanged", "closed_form"])
+        self.assertEqual(references["source_unchanged"]["mpjpe"], 0)
+        self.assertGreater(references["rest_pose"]["pa_mpjpe"], 0.1)
+        self.assertIsNone(references["closed_form"]["mpvd"])
+        self.assertEqual(list(references["closed_form"]), METRICS)
+        # A body whose rest pose is the source's first frame: nothing is left to do in that frame.
+        self.h5("first.h5", joints=([1, 22, 3], self.joints[:66]))
+        self.h5("still.h5", joints=([2, 22, 3], self.joints[:66] * 2))
+        references = self.eval("still.h5", "still.h5", "--source", "still.h5", "--rest", "first.h5")["references"]
+        self.assertAlmostEqual(references["closed_form"]["mpjpe"], 0, places=9)
+        self.assertAlmostEqual(references["rest_pose"]["mpjpe"], 0, places=9)
+
+    def test_table(self):
+        self.h5("rest.h5", joints=([1, 22, 3], numbers(66, 4)))
+        text = self.done("eval", "--pred", "pred.h5", "--truth", "truth.h5", "--source", "truth.h5", "--rest", "rest.h5", "--per-joint")
+        for words in ("| prediction", "| rest pose", "| source unchanged", "| closed form", "PA-MPJPE [m]", "| left_wrist"):
+            self.assertIn(words, text)
+
+    def test_same_bits_for_any_number_of_threads(self):
+        outputs = {self.done("eval", "--pred", "pred.h5", "--truth", "truth.h5", "--json", "--variants", "--threads", n) for n in (1, 2, 3)}
+        self.assertEqual(len(outputs), 1)
+
+    def test_bad_input(self):
+        bad = lambda pred, *words: self.bad_input(["eval", "--pred", pred, "--truth", "truth.h5"], *words)
+        bad("none.h5", "none.h5")
+        bad(self.write("text.h5", "hello"), "text.h5")
+        bad(self.h5("empty.h5"), "empty.h5", "joints")
+        bad(self.h5("shape.h5", joints=([F, 21, 3], [0.0])), "shape.h5:/joints")
+        bad(self.h5("short.h5", joints=([F - 1, 22, 3], [0.0])), "frames")
+        bad(self.h5("other.h5", vertices=([F, V + 1, 3], [0.0])), "vertices")
+        bad(self.h5("nan.h5", joints=([F, 22, 3], ["nan"])), "nan.h5:/joints")
+        bad(self.h5("version.h5", {"restage_schema": 99}, joints=([F, 22, 3], [0.0])), "version")
+        bad(self.h5("offset.h5", joints=([F, 22, 3], [0.0]), sequence_offset=([2], [0, F + 1], "int64")), "sequence_offset")
+        content = self.bytes("truth.h5")
+        for part in (0.95, 0.5, 0.1):
+            bad(self.write("cut.h5", content[:int(len(content) * part)]), "cut.h5")
+        self.bad_input(["eval", "--pred", "pred.h5", "--truth", "truth.h5", "--source", "truth.h5"], "--rest")
+        self.bad_input(["eval", "--pred", ".", "--truth", "truth.h5"], "not a file")

@@ -1,0 +1,61 @@
+"""The program as a whole: usage, help, exit codes, standard output."""
+import os
+import signal
+import subprocess
+import time
+
+from support import PROGRAM, CliTest
+
+
+class Usage(CliTest):
+    def test_help_and_version(self):
+        self.assertRegex(self.done("--version"), r"^restage \d+\.\d+\.\d+\n$")
+        self.assertIn("eval", self.done("--help"))
+        for command in (["eval"], ["render"], ["doctor"], ["data", "build"], ["data", "import"], ["data", "inspect"], ["data", "verify"]):
+            text = self.done(*command, "--help")
+            self.assertIn("Examples:", text)
+            self.assertIn("restage " + " ".join(command), text)
+
+    def test_wrong_usage(self):
+        self.bad_input([], "needs a command")
+        self.bad_input(["evla"], "'evla'", "did you mean 'eval'")
+        self.bad_input(["data"], "needs a command")
+        self.bad_input(["data", "inspekt"], "did you mean 'inspect'")
+        self.bad_input(["eval", "--perd", "x"], "'--perd'", "did you mean '--pred'")
+        self.bad_input(["eval", "--pred"], "--pred")
+        self.bad_input(["eval", "--pred", "a.h5"], "--truth")
+        self.bad_input(["eval", "--pred", "a.h5", "--truth", "b.h5", "more"], "'more'")
+        self.bad_input(["doctor", "x", "--threads", "many"], "--threads")
+        self.bad_input(["doctor", "x", "--threads", "-1"], "--threads")
+        self.bad_input(["doctor", "x", "--seed", "-1"], "--seed")
+
+    def test_error_is_one_short_line_for_any_file_name(self):
+        self.bad_input(["doctor", "no\nsuch\x1b[31mfile"], "cannot be read")
+        self.bad_input(["doctor", "x" * 3000])
+        self.bad_input(["doctor", "äöü" * 80])
+        self.bad_input(["doctor", ""])
+
+
+class Streams(CliTest):
+    def test_full_standard_output_is_a_failure(self):
+        with open("/dev/full", "w") as full:
+            self.one_line(self.restage("--help", stdout=full), 1, "standard output")
+
+    def test_closed_pipe_is_a_failure_and_not_a_signal(self):
+        read, write = os.pipe()
+        os.close(read)
+        self.one_line(self.restage("--help", stdout=write), 1, "standard output")
+        os.close(write)
+
+
+class Signals(CliTest):
+    def test_exit_codes(self):
+        for number, code in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
+            with subprocess.Popen([PROGRAM, "data", "build", "--out", "big.h5", "--bodies", "500", "0", "0"], cwd=self.folder,
+                                  stderr=subprocess.PIPE) as running:
+                running.stderr.readline()  # the handlers are in place once something is logged
+                time.sleep(0.1)
+                running.send_signal(number)
+                running.stderr.read()
+                self.assertEqual(running.wait(60), code)
+            self.assertNotIn("big.h5", os.listdir(self.folder))
