@@ -1,0 +1,22 @@
+# Installs BUILD into a fresh folder, moves it (a package must not depend on where it was made), and
+# configures, builds and runs CONSUMER against it, a project that knows nothing but that folder.
+set(work ${BUILD}/tests/install)
+file(REMOVE_RECURSE ${work})
+function(run)
+  execute_process(COMMAND ${ARGV} RESULT_VARIABLE code OUTPUT_VARIABLE out ERROR_VARIABLE out)
+  if(NOT code EQUAL 0)
+    string(JOIN " " line ${ARGV})
+    message(FATAL_ERROR "${line}\nfailed: ${code}\n${out}")
+  endif()
+  set(output "${out}" PARENT_SCOPE)
+endfunction()
+run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${work}/first)
+file(RENAME ${work}/first ${work}/prefix)
+run(${CMAKE_COMMAND} -S ${CONSUMER} -B ${work}/build -G Ninja -DCMAKE_BUILD_TYPE=Release
+  -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_PREFIX_PATH=${work}/prefix)
+run(${CMAKE_COMMAND} --build ${work}/build)
+run(${work}/build/consumer)
+if(NOT output MATCHES "d/dx sum\\(x\\^2\\) = 2 4 6")
+  message(FATAL_ERROR "the consumer printed: ${output}")
+endif()
+run(${work}/prefix/bin/restage --version)
