@@ -1,0 +1,167 @@
+#include <algorithm>
+#include <cmath>
+
+#include "autograd/gradcheck/samples.h"
+#include "autograd/ops/elementwise.h"
+
+namespace restage::gradcheck {
+namespace {
+
+constexpr int64_t kMany = 50001;  // several pieces of work, the last one odd
+
+/// Where a function may be sampled: positive ones for log and sqrt, away from 0 at kinks.
+enum class Domain { all, positive, no_zero };
+
+Tensor in_domain(const Shape& shape, Rng& rng, Domain domain) {
+  Tensor t = random(shape, rng, domain == Domain::no_zero ? 0.1 : 0);
+  if (domain == Domain::positive)
+    for (int64_t i = 0; i < t.numel(); ++i)
+      t.data<double>()[i] = 0.5 + std::abs(t.data<double>()[i]);
+  return t;
+}
+
+bool all_negative(const Tensor& t) {
+  return std::all_of(t.data<double>(), t.data<double>() + t.numel(),
+                     [](double v) { return v < 0; });
+}
+
+template <Unary U>
+OpSamples unary(Domain domain, double alpha = 0) {
+  OpSamples s = samples_for<UnaryOp<U>>();
+  const Build build = [alpha](Args x) { return call(UnaryOp<U>{alpha}, {x[0]}); };
+  Rng rng(RngKey{21, 0});
+  s.add("[3, 4]", {in_domain({3, 4}, rng, domain)}, build);
+  s.add("[1]", {Tensor::full({1}, 0.7, DType::f64)}, build);
+  s.add("one number without axes", {Tensor::full({}, 0.6, DType::f64)}, build);
+  s.add("[2, 0, 3]", {Tensor::zeros({2, 0, 3}, DType::f64)}, build);
+  for (const int64_t n : {7, 8, 17, 33})  // whole vectors and rests
+    s.add("[" + std::to_string(n) + "]", {in_domain({n}, rng, domain)}, build);
+  s.large("many", {in_domain({kMany}, rng, domain)}, build);
+  s.error("integers", {i32({2}, {1, 2})}, build);
+  s.random = [build, domain](Rng& r) {
+    Sample sample{"", {in_domain(random_shape(r, 0, 4), r, domain)}, build};
+    // The only function here that is flat somewhere.
+    sample.zero_gradient = U == Unary::relu && all_negative(sample.inputs[0]);
+    return sample;
+  };
+  return s;
+}
+
+template <Binary B>
+OpSamples binary() {
+  OpSamples s = samples_for<BinaryOp<B>>();
+  const Build build = [](Args x) { return call(BinaryOp<B>{}, {x[0], x[1]}); };
+  const auto pair = [&](const Shape& a, const Shape& b) {
+    s.add(a.str() + " " + b.str(), {random(a, 31, 0.5), random(b, 32, 0.5)}, build);
+  };
+  pair({3, 4}, {3, 4});
+  pair({3, 1}, {1, 4});
+  pair({2, 3, 4}, {4});
+  pair({4}, {2, 3, 4});
+  pair({2, 3, 4}, {3, 1});
+  pair({2, 1, 4, 1}, {3, 1, 5});
+  pair({1}, {1});
+  pair({}, {2, 2});
+  pair({1, 1, 1}, {2});
+  pair({0, 3}, {3});
+  pair({0, 3}, {1, 1});
+  pair({1, 0}, {4, 1});
+  s.large("many rows", {random({700, 73}, 33, 0.5), random({73}, 34, 0.5)}, build);
+  s.error("sizes 3 and 4", {random({2, 3}, 1), random({2, 4}, 1)}, build);
+  s.error("sizes 0 and 2", {random({0}, 1), random({2}, 1)}, build);
+  s.error("two dtypes", {random({2}, 1), random({2}, 1).cast(DType::f32)}, build);
+  s.random = [build](Rng& rng) {
+    const Shape out = random_shape(rng, 1, 4);
+    const auto part = [&] {  // drops leading axes, sets others to 1
+      Shape shape;
+      for (int i = static_cast<int>(rng.below(static_cast<uint64_t>(out.rank()))); i < out.rank();
+           ++i)
+        shape.push_back(rng.below(3) == 0 ? 1 : out[i]);
+      return shape;
+    };
+    const Shape a = part(), b = part();
+    return Sample{"", {random(a, rng, 0.5), random(b, rng, 0.5)}, build};
+  };
+  return s;
+}
+
+OpSamples expand_samples() {
+  OpSamples s = samples_for<Expand>();
+  const auto to = [](const Shape& shape) {
+    return Build([shape](Args x) { return expand(x[0], shape); });
+  };
+  s.add("[3, 1] to [2, 3, 4]", {random({3, 1}, 1)}, to({2, 3, 4}));
+  s.add("[1] to [5]", {random({1}, 2)}, to({5}));
+  s.add("[] to [2, 2]", {random({}, 3)}, to({2, 2}));
+  s.add("[2, 3] to itself", {random({2, 3}, 4)}, to({2, 3}));
+  s.add("[1, 3] to [0, 3]", {random({1, 3}, 5)}, to({0, 3}));
+  s.samples.back().zero_gradient = true;
+  s.add("[0, 1] to [0, 3]", {random({0, 1}, 6)}, to({0, 3}));
+  s.large("many", {random({300, 1, 9}, 6)}, to({300, 21, 9}));
+  s.error("[3] to [4]", {random({3}, 1)}, to({4}));
+  s.error("[2, 2] to [2]", {random({2, 2}, 1)}, to({2}));
+  s.random = [to](Rng& rng) {
+    const Shape out = random_shape(rng, 1, 4);
+    Shape in;
+    for (int i = static_cast<int>(rng.below(2)); i < out.rank(); ++i)
+      in.push_back(rng.below(2) ? 1 : out[i]);
+    Sample sample{"", {random(in, rng)}, to(out)};
+    sample.zero_gradient = out.numel() == 0 && in.numel() > 0;
+    return sample;
+  };
+  return s;
+}
+
+OpSamples dropout_samples() {
+  OpSamples s = samples_for<Dropout>();
+  const auto with = [](double p) {
+    return Build([p](Args x) { return call(Dropout{p, RngKey{5, 6}}, {x[0]}); });
+  };
+  s.add("half of [5, 7]", {random({5, 7}, 1)}, with(0.5));
+  s.add("none of [1]", {random({1}, 2)}, with(0));
+  s.add("[0, 3]", {random({0, 3}, 3)}, with(0.5));
+  s.large("many", {random({kMany}, 4)}, with(0.2));
+  s.error("p = 1", {random({3}, 1)}, with(1.0));
+  s.error("p < 0", {random({3}, 1)}, with(-0.1));
+  s.error("integers", {i32({1}, {1})}, with(0.5));
+  s.random = [with](Rng& rng) {
+    Shape shape = random_shape(rng, 1, 3);
+    shape.push_back(16);  // some of sixteen survive
+    return Sample{"", {random(shape, rng)}, with(0.4)};
+  };
+  return s;
+}
+
+}  // namespace
+
+void add_elementwise(Table& t) {
+  t.push_back(unary<Unary::neg>(Domain::all));
+  t.push_back(unary<Unary::exp>(Domain::all));
+  t.push_back(unary<Unary::log>(Domain::positive));
+  t.push_back(unary<Unary::sqrt>(Domain::positive));
+  t.push_back(unary<Unary::square>(Domain::all));
+  t.push_back(unary<Unary::abs>(Domain::no_zero));
+  t.back().kink("abs at 0 has derivative 0", {f64({3}, {0.0, -0.0, 2})},
+                [](Args x) { return abs(x[0]); }, {f64({3}, {0, 0, 1})});
+  t.push_back(unary<Unary::sigmoid>(Domain::all));
+  t.back().add("far out", {f64({4}, {-700, -30, 30, 700})}, [](Args x) { return sigmoid(x[0]); });
+  t.push_back(unary<Unary::tanh>(Domain::all));
+  t.push_back(unary<Unary::relu>(Domain::no_zero));
+  t.back().kink("relu at 0 has derivative 0", {f64({4}, {0.0, -0.0, 2, -2})},
+                [](Args x) { return relu(x[0]); }, {f64({4}, {0, 0, 1, 0})});
+  t.push_back(unary<Unary::leaky_relu>(Domain::no_zero, 0.2));
+  t.back().kink("leaky relu at 0 has the slope of its negative side", {f64({3}, {0.0, 2, -2})},
+                [](Args x) { return leaky_relu(x[0], 0.2); }, {f64({3}, {0.2, 1, 0.2})});
+  t.push_back(unary<Unary::softplus>(Domain::all));
+  t.back().add("far out", {f64({4}, {-700, -30, 30, 700})}, [](Args x) { return softplus(x[0]); });
+  t.push_back(unary<Unary::scale>(Domain::all, -1.7));
+  t.push_back(unary<Unary::add_scalar>(Domain::all, 3.1));
+  t.push_back(binary<Binary::add>());
+  t.push_back(binary<Binary::sub>());
+  t.push_back(binary<Binary::mul>());
+  t.push_back(binary<Binary::div>());
+  t.push_back(expand_samples());
+  t.push_back(dropout_samples());
+}
+
+}  // namespace restage::gradcheck

@@ -1,0 +1,53 @@
+#include "autograd/gradcheck/samples.h"
+#include "autograd/ops/rnn.h"
+
+namespace restage::gradcheck {
+namespace {
+
+std::vector<Tensor> gru_inputs(int64_t t, int64_t n, int64_t i, int64_t h, Rng& rng) {
+  return {random({t, n, i}, rng),  random({n, h}, rng),  random({3 * h, i}, rng),
+          random({3 * h, h}, rng), random({3 * h}, rng), random({3 * h}, rng)};
+}
+
+}  // namespace
+
+void add_rnn(Table& table) {
+  OpSamples s = samples_for<Gru>();
+  const Build build = [](Args x) { return gru(x[0], x[1], x[2], x[3], x[4], x[5]); };
+  Rng rng(RngKey{23, 0});
+  s.add("three steps", gru_inputs(3, 2, 4, 3, rng), build);
+  s.add("one of everything", gru_inputs(1, 1, 1, 1, rng), build);
+  s.add("no step", gru_inputs(0, 2, 3, 2, rng), build);
+  s.samples.back().zero_gradient = true;
+  s.add("no sequence", gru_inputs(3, 0, 3, 2, rng), build);
+  s.samples.back().zero_gradient = true;
+  s.add("no input number", gru_inputs(2, 2, 0, 2, rng), build);
+  s.large("many sequences", gru_inputs(3, 290, 5, 32, rng), build);
+  const auto broken = [&](const std::string& title, size_t which, const Shape& shape) {
+    std::vector<Tensor> inputs = gru_inputs(2, 3, 4, 5, rng);
+    inputs[which] = random(shape, 1);
+    s.error(title, inputs, build);
+  };
+  broken("x of two axes", 0, {2, 4});
+  broken("n differs", 1, {2, 5});
+  broken("i differs", 2, {15, 3});
+  broken("h differs in w_ih", 2, {14, 4});
+  broken("h differs in w_hh", 3, {15, 4});
+  broken("h differs in b_ih", 4, {14});
+  broken("h differs in b_hh", 5, {5});
+  std::vector<Tensor> mixed = gru_inputs(2, 3, 4, 5, rng);
+  mixed[3] = mixed[3].cast(DType::f32);
+  s.error("two dtypes", mixed, build);
+  std::vector<Tensor> integers;
+  for (const Tensor& in : gru_inputs(1, 1, 1, 1, rng)) integers.push_back(in.cast(DType::i32));
+  s.error("integers", integers, build);
+  s.random = [build](Rng& r) {
+    return Sample{"",
+                  gru_inputs(random_size(r, 1, 4), random_size(r, 1, 3), random_size(r, 1, 4),
+                             random_size(r, 1, 4), r),
+                  build};
+  };
+  table.push_back(s);
+}
+
+}  // namespace restage::gradcheck
