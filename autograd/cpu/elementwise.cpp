@@ -35,7 +35,7 @@ void apply_unary(Unary op, const ConstArray<T>& x, MutableArray<T>& y, T alpha) 
       y = x.tanh();
       break;
     case Unary::relu:
-      y = (x > T(0)).select(x, T(0));
+      y = (x <= T(0)).select(T(0), x);  // NaN stays NaN
       break;
     case Unary::leaky_relu:
       y = (x > T(0)).select(x, alpha * x);
@@ -81,7 +81,7 @@ void apply_unary_grad(Unary op, const ConstArray<T>& x, const ConstArray<T>& y,
       out = g * (T(1) - y.square());
       break;
     case Unary::relu:
-      out = (x > T(0)).select(g, T(0));
+      out = (x <= T(0)).select(T(0), g);
       break;
     case Unary::leaky_relu:
       out = (x > T(0)).select(g, alpha * g);

@@ -26,6 +26,7 @@ void permute(const PermuteArgs& args) {
     step[static_cast<size_t>(i)] =
         args.x.shape().product(args.order[static_cast<size_t>(i)] + 1, rank);
   if (args.out.numel() == 0) return;
+  if (rank == 0) return copy_blocks({args.x, args.out, 1, 1, 1, 0, 1, 0});
   const int64_t inner = args.out.size(rank - 1), inner_step = step[static_cast<size_t>(rank - 1)];
   dispatch(args.out.dtype(), [&](auto zero) {
     using T = decltype(zero);

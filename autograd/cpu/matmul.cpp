@@ -133,7 +133,7 @@ void store(const Product<T>& p, const T* tile, int64_t i0, int64_t j0, bool firs
     if (p.bias)
       for (int64_t j = 0; j < width; ++j) c[j] += p.bias[j0 + j];
     if (p.activation == Activation::relu)
-      for (int64_t j = 0; j < width; ++j) c[j] = c[j] > T(0) ? c[j] : T(0);
+      for (int64_t j = 0; j < width; ++j) c[j] = c[j] <= T(0) ? T(0) : c[j];  // NaN stays
   }
 }
 
@@ -175,7 +175,7 @@ void empty_sum(const Product<T>& p) {
     for (int64_t j = 0; j < p.n; ++j) {
       T& c = p.out[i * p.n + j];
       c = (p.accumulate ? c : T(0)) + (p.bias ? p.bias[j] : T(0));
-      if (p.activation == Activation::relu && !(c > T(0))) c = 0;
+      if (p.activation == Activation::relu && c <= T(0)) c = 0;
     }
 }
 

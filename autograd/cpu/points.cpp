@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <vector>
 
@@ -24,8 +25,10 @@ int64_t first_max(const std::vector<T>& values) {
 template <class T>
 void nearest(const T* query, const T* points, int64_t v, int64_t k, std::vector<T>& distance,
              std::vector<int32_t>& order, int32_t* out) {
-  for (int64_t i = 0; i < v; ++i)
-    distance[static_cast<size_t>(i)] = squared_distance(query, points + 3 * i);
+  for (int64_t i = 0; i < v; ++i) {
+    const T d = squared_distance(query, points + 3 * i);
+    distance[static_cast<size_t>(i)] = d == d ? d : std::numeric_limits<T>::infinity();  // no NaN:
+  }  // the order below must be one
   std::iota(order.begin(), order.end(), 0);
   const auto closer = [&](int32_t a, int32_t b) {
     const T da = distance[static_cast<size_t>(a)], db = distance[static_cast<size_t>(b)];

@@ -12,6 +12,14 @@
 
 #include "autograd/tensor/tensor.h"
 
+// Under AddressSanitizer free blocks, and the slack behind a tensor, may not be touched.
+#ifdef __SANITIZE_ADDRESS__
+#include <sanitizer/asan_interface.h>
+#else
+#define ASAN_POISON_MEMORY_REGION(data, bytes)
+#define ASAN_UNPOISON_MEMORY_REGION(data, bytes)
+#endif
+
 namespace restage {
 namespace {
 
@@ -51,16 +59,20 @@ void* cpu::pool_allocate(size_t bytes) {
   const size_t size = size_class(bytes);
   Pool& p = pool();
   const std::lock_guard lock(p.mutex);
+  auto& list = p.free[size];
+  void* data = nullptr;
+  if (list.empty()) {
+    data = from_system(size);
+    if (size >= kLarge) ++p.stats.large_allocations;
+  } else {
+    data = list.back();
+    list.pop_back();
+  }
   p.stats.in_use += static_cast<int64_t>(size);
   p.stats.peak = std::max(p.stats.peak, p.stats.in_use);
-  auto& list = p.free[size];
-  if (!list.empty()) {
-    void* data = list.back();
-    list.pop_back();
-    return data;
-  }
-  if (size >= kLarge) ++p.stats.large_allocations;
-  return from_system(size);
+  ASAN_POISON_MEMORY_REGION(data, size);
+  ASAN_UNPOISON_MEMORY_REGION(data, bytes);
+  return data;
 }
 
 void cpu::pool_release(void* data, size_t bytes) {
@@ -69,6 +81,7 @@ void cpu::pool_release(void* data, size_t bytes) {
   const std::lock_guard lock(p.mutex);
   p.stats.in_use -= static_cast<int64_t>(size);
   p.free[size].push_back(data);
+  ASAN_POISON_MEMORY_REGION(data, size);
 }
 
 MemoryStats memory_stats() {

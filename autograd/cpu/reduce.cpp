@@ -76,7 +76,8 @@ void max(const MaxArgs& args) {
       for (int64_t r = 1; r < n; ++r) {
         const T* row = x + r * inner;
         for (int64_t i = 0; i < inner; ++i) {
-          const bool better = row[i] > best[i];
+          const bool better =
+              row[i] > best[i] || (row[i] != row[i] && best[i] == best[i]);  // NaN wins
           best[i] = better ? row[i] : best[i];
           at[i] = better ? static_cast<int32_t>(r) : at[i];
         }

@@ -101,9 +101,9 @@ struct Rodrigues {
       dc = T(-1) / 12;
       return;
     }
-    const T t = std::sqrt(t2);
+    const T t = std::sqrt(t2), half = std::sin(t / 2);
     s = std::sin(t) / t;
-    c = (1 - std::cos(t)) / t2;
+    c = 2 * half * half / t2;  // 1 - cos t, without cancellation
     ds = (std::cos(t) - s) / t2;
     dc = (s - 2 * c) / t2;
   }

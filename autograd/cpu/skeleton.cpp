@@ -44,6 +44,8 @@ void fk_grad_one(const FkGradArgs& args, int64_t s) {
   const T* transforms = args.transforms.data<T>() + s * joints * 12;
   T* g_rest = args.g_rest.data<T>() + s * joints * 3;
   std::vector<M34<T>> g(static_cast<size_t>(joints));
+  Eigen::Map<V3<T>> g_root(args.g_root.data<T>() + 3 * s);
+  g_root.setZero();
   for (int64_t j = 0; j < joints; ++j) {
     g[static_cast<size_t>(j)] = Eigen::Map<const M34<T>>(args.gy.data<T>() + (s * joints + j) * 12);
     Eigen::Map<V3<T>>(g_rest + 3 * j).setZero();
@@ -55,7 +57,7 @@ void fk_grad_one(const FkGradArgs& args, int64_t s) {
     const int p = args.parents[static_cast<size_t>(j)];
     if (p < 0) {
       g_local = gj.template leftCols<3>();
-      Eigen::Map<V3<T>>(args.g_root.data<T>() + 3 * s) = gj.col(3);
+      g_root += gj.col(3);  // there may be several roots, or no joint at all
       continue;
     }
     const M3<T> parent = Eigen::Map<const M34<T>>(transforms + 12 * p).template leftCols<3>();

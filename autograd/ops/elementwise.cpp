@@ -3,12 +3,6 @@
 #include "autograd/kernels/reduce.h"
 
 namespace restage {
-namespace {
-
-bool is_float(const Tensor& t) { return t.dtype() == DType::f32 || t.dtype() == DType::f64; }
-
-}  // namespace
-
 Tensor sum_to(const Tensor& t, const Shape& shape) {
   if (t.shape() == shape) return t;
   Tensor current = t;
@@ -43,7 +37,7 @@ Tensor binary(Binary op, const Tensor& a, const Tensor& b) {
 
 template <Unary U>
 void UnaryOp<U>::check(Inputs x) const {
-  if (!is_float(x[0])) shape_error(name, letters, x, "needs float32 or float64");
+  require_floats(name, letters, x);
 }
 
 template <Unary U>
@@ -66,8 +60,7 @@ void BinaryOp<B>::check(Inputs x) const {
   bool ok = true;
   broadcast_shape(x[0].shape(), x[1].shape(), &ok);
   if (!ok) shape_error(name, letters, x, "shapes do not broadcast");
-  if (!is_float(x[0]) || x[0].dtype() != x[1].dtype())
-    shape_error(name, letters, x, "needs two equal float dtypes");
+  require_floats(name, letters, x);
 }
 
 template <Binary B>
@@ -107,6 +100,7 @@ Grads BinaryOp<B>::backward(const Saved& saved, const Tensor& gy, Needs needs) c
 }
 
 void Expand::check(Inputs x) const {
+  require_floats(name, letters, x);
   bool ok = true;
   if (!(broadcast_shape(x[0].shape(), shape, &ok) == shape) || !ok)
     shape_error(name, letters, x, "cannot be repeated to " + shape.str());
@@ -124,7 +118,7 @@ Grads Expand::backward(const Saved& saved, const Tensor& gy, Needs) const {
 }
 
 void Dropout::check(Inputs x) const {
-  if (!is_float(x[0])) shape_error(name, letters, x, "needs float32 or float64");
+  require_floats(name, letters, x);
   if (p < 0 || p >= 1) shape_error(name, letters, x, "p must be in [0, 1)");
 }
 

@@ -17,6 +17,15 @@ void copy_axis(const Tensor& x, Tensor& out, int axis, int64_t ox, int64_t oo, i
 
 }  // namespace
 
+void Reshape::check(Inputs x) const {
+  int64_t known = 1;
+  int open = 0;
+  for (int i = 0; i < shape.rank(); ++i) shape[i] == -1 ? open += 1 : known *= shape[i];
+  const int64_t n = x[0].numel();
+  if (open > 1 || (open == 0 ? n != known : known == 0 ? n != 0 : n % known != 0))
+    shape_error(name, letters, x, "the numbers do not fit into " + shape.str());
+}
+
 Tensor Reshape::forward(Inputs x, Saved& saved) const {
   saved.keep({x[0]});
   return x[0].reshape(shape);
@@ -34,6 +43,7 @@ void Permute::check(Inputs x) const {
     if (axis >= 0 && axis < Shape::kMaxRank) seen[static_cast<size_t>(axis)] = true;
   }
   if (!ok) shape_error(name, letters, x, "order must name every axis once");
+  require_floats(name, letters, x);
 }
 
 Tensor Permute::forward(Inputs x, Saved&) const {
@@ -80,6 +90,7 @@ Grads Slice::backward(const Saved& saved, const Tensor& gy, Needs) const {
 }
 
 void Concat::check(Inputs x) const {
+  if (x.empty()) shape_error(name, letters, x, "needs at least one tensor");
   const int at = positive(axis, x[0].rank());
   bool ok = at >= 0 && at < x[0].rank() && x.size() <= 16;
   for (const Tensor& t : x) {
@@ -134,6 +145,7 @@ void check_index(const char* name, const char* letters, Inputs x, const Tensor& 
   const int32_t* at = index.data<int32_t>();
   for (int64_t i = 0; i < index.numel(); ++i)
     if (at[i] < 0 || at[i] >= limit) shape_error(name, letters, x, "an index is outside [0, v)");
+  require_floats(name, letters, x);
 }
 
 }  // namespace
@@ -158,6 +170,7 @@ Grads Gather::backward(const Saved& saved, const Tensor& gy, Needs) const {
 }
 
 void ScatterAdd::check(Inputs x) const {
+  if (rows < 0) shape_error(name, letters, x, "the number of rows is negative");
   check_index(name, letters, x, index, rows);
   if (index.rank() != 2 || index.size(1) != x[0].size(1))
     shape_error(name, letters, x, "one index per row is needed, not " + index.shape().str());
@@ -177,6 +190,7 @@ Grads ScatterAdd::backward(const Saved&, const Tensor& gy, Needs) const {
 
 void Unfold::check(Inputs x) const {
   if (x[0].rank() != 3) shape_error(name, letters, x, "needs three axes");
+  require_floats(name, letters, x);
   if (k < 1 || stride < 1 || steps < 0)
     shape_error(name, letters, x, "kernel and stride must be positive");
 }
@@ -196,6 +210,10 @@ Grads Unfold::backward(const Saved& saved, const Tensor& gy, Needs) const {
 
 Var conv1d(const Var& x, const Var& weight, const Var& bias, int64_t stride, int64_t pad_left,
            int64_t steps) {
+  if (weight.rank() != 3 || bias.rank() != 1 || x.rank() != 3 || weight.size(1) != x.size(2) ||
+      weight.size(0) != bias.size(0))
+    shape_error("conv1d", "x[n, l, c], W[o, c, k], b[o]",
+                std::array{x.value, weight.value, bias.value}, "c and o must agree");
   const int64_t k = weight.size(2);
   const Var windows = call(Unfold{k, stride, pad_left, steps}, {x});
   return linear(windows, reshape(weight, {weight.size(0), weight.size(1) * k}), bias);

@@ -11,7 +11,7 @@ struct Reshape {
   static constexpr const char* name = "reshape";
   static constexpr const char* letters = "x[...]";
   Shape shape;
-  void check(Inputs) const {}
+  void check(Inputs x) const;
   Tensor forward(Inputs x, Saved& saved) const;
   Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
 };

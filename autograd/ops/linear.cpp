@@ -29,9 +29,7 @@ void LinearOp::check(Inputs x) const {
     shape_error(name, letters, x, "i must agree");
   if (x.size() > 2 && (x[2].rank() != 1 || x[2].size(0) != x[1].size(0)))
     shape_error(name, letters, x, "o must agree");
-  for (const Tensor& t : x)
-    if (t.dtype() != x[0].dtype() || t.dtype() == DType::i32 || t.dtype() == DType::i64)
-      shape_error(name, letters, x, "needs equal float dtypes");
+  require_floats(name, letters, x);
 }
 
 Tensor LinearOp::forward(Inputs x, Saved& saved) const {
@@ -80,7 +78,7 @@ void Matmul::check(Inputs x) const {
     shape_error(name, letters, x, "k must agree");
   if (a.rank() == 3 && b.rank() == 3 && a.size(0) != b.size(0))
     shape_error(name, letters, x, "b must agree");
-  if (a.dtype() != b.dtype()) shape_error(name, letters, x, "needs equal dtypes");
+  require_floats(name, letters, x);
 }
 
 Tensor Matmul::forward(Inputs x, Saved& saved) const {

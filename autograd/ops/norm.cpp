@@ -45,8 +45,9 @@ Grads normalise_grad(const Saved& saved, const Tensor& gy, Needs needs, const La
 void check_affine(const char* name, const char* letters, Inputs x) {
   if (x[0].rank() < 2) shape_error(name, letters, x, "needs at least two axes");
   for (size_t i = 1; i < x.size(); ++i)
-    if (x[i].rank() != 1 || x[i].size(0) != x[0].size(-1) || x[i].dtype() != x[0].dtype())
+    if (x[i].rank() != 1 || x[i].size(0) != x[0].size(-1))
       shape_error(name, letters, x, "c must agree");
+  require_floats(name, letters, x);
 }
 
 Layout batch_layout(const Tensor& x) {
@@ -87,6 +88,7 @@ Grads BatchNorm::backward(const Saved& saved, const Tensor& gy, Needs needs) con
 void InstanceNorm::check(Inputs x) const {
   if (x[0].rank() != 3 || x[0].size(1) < 1)
     shape_error(name, letters, x, "needs three axes and v > 0");
+  require_floats(name, letters, x);
 }
 
 Tensor InstanceNorm::forward(Inputs x, Saved& saved) const {

@@ -8,7 +8,8 @@ namespace restage {
 
 Tensor knn(const Tensor& query, const Tensor& points, int64_t k) {
   const bool ok = query.rank() == 3 && points.rank() == 3 && query.size(0) == points.size(0) &&
-                  query.size(2) == 3 && points.size(2) == 3 && k > 0;
+                  query.size(2) == 3 && points.size(2) == 3 && k > 0 &&
+                  query.dtype() == points.dtype();
   if (!ok)
     shape_error("knn", "query[n, m, 3], points[n, v, 3]", std::array{query, points},
                 "shapes do not fit");
@@ -27,9 +28,10 @@ Tensor fps(const Tensor& points, int64_t m) {
 }
 
 void AttentionPool::check(Inputs x) const {
-  if (x[0].rank() != 3 || !(x[0].shape() == x[1].shape()) || x[0].size(1) < 1 ||
-      x[0].dtype() != x[1].dtype())
+  if (x[0].rank() != 3 || !(x[0].shape() == x[1].shape()) || x[0].size(1) < 1)
     shape_error(name, letters, x, "p, k and d must agree");
+  if (!(scale > 0)) shape_error(name, letters, x, "the scale must be positive");
+  require_floats(name, letters, x);
 }
 
 Tensor AttentionPool::forward(Inputs x, Saved& saved) const {

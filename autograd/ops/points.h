@@ -15,7 +15,7 @@ Tensor fps(const Tensor& points, int64_t m);
 struct AttentionPool {
   static constexpr const char* name = "attention_pool";
   static constexpr const char* letters = "score[p, k, d], value[p, k, d], k > 0";
-  double scale = 1;
+  double scale = 1;  ///< positive
   void check(Inputs x) const;
   Tensor forward(Inputs x, Saved& saved) const;
   Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;

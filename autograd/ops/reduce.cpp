@@ -23,6 +23,7 @@ void check_axis(const char* name, const char* letters, Inputs x, int axis, bool 
   if (axis >= x[0].rank() || axis < -x[0].rank())
     shape_error(name, letters, x, "there is no axis " + std::to_string(axis));
   if (not_empty && x[0].size(axis) == 0) shape_error(name, letters, x, "the axis is empty");
+  require_floats(name, letters, x);
 }
 
 }  // namespace
@@ -80,16 +81,27 @@ Grads Softmax::backward(const Saved& saved, const Tensor& gy, Needs) const {
 }
 
 Var mean(const Var& x, int axis) {
+  check_axis("mean", Sum::letters, std::array{x.value}, axis, true);
   return scale(sum(x, axis), 1.0 / static_cast<double>(x.size(axis)));
 }
 
 Var sum_all(const Var& x) { return sum(x.rank() == 1 ? x : call(Reshape{{-1}}, {x}), 0); }
 
-Var mean_all(const Var& x) { return scale(sum_all(x), 1.0 / static_cast<double>(x.value.numel())); }
+Var mean_all(const Var& x) {
+  if (x.value.numel() == 0) shape_error("mean", "x[...]", std::array{x.value}, "x is empty");
+  return scale(sum_all(x), 1.0 / static_cast<double>(x.value.numel()));
+}
 
-Var mse(const Var& a, const Var& b) { return mean_all(square(sub(a, b))); }
+Var mse(const Var& a, const Var& b) {
+  if (!(a.shape() == b.shape()) || a.value.numel() == 0)  // broadcasting here is always a mistake
+    shape_error("mse", "a[...], b[...]", std::array{a.value, b.value},
+                "needs equal shapes that are not empty");
+  return mean_all(square(sub(a, b)));
+}
 
 Var bce_with_logits(const Var& logits, double label) {
+  if (logits.value.numel() == 0)
+    shape_error("bce_with_logits", "logits[...]", std::array{logits.value}, "there are none");
   if (label == 0) return mean_all(softplus(logits));
   if (label == 1) return mean_all(softplus(neg(logits)));
   return mean_all(sub(softplus(logits), scale(logits, label)));

@@ -43,7 +43,7 @@ Var mean(const Var& x, int axis);
 /// Sum and mean of all elements, as a scalar of shape [1].
 Var sum_all(const Var& x);
 Var mean_all(const Var& x);
-/// Mean squared error over all elements (spec 7).
+/// Mean squared error over all elements of two equal shapes (spec 7).
 Var mse(const Var& a, const Var& b);
 /// Mean binary cross-entropy of logits against a constant label in [0, 1].
 Var bce_with_logits(const Var& logits, double label);

@@ -35,8 +35,7 @@ void Gru::check(Inputs x) const {
   if (x[2].size(0) != 3 * h || x[3].size(0) != 3 * h || x[3].size(1) != h ||
       x[4].size(0) != 3 * h || x[5].size(0) != 3 * h)
     shape_error(name, letters, x, "h must agree");
-  for (const Tensor& t : x)
-    if (t.dtype() != x[0].dtype()) shape_error(name, letters, x, "needs equal dtypes");
+  require_floats(name, letters, x);
 }
 
 Tensor Gru::forward(Inputs in, Saved& saved) const {

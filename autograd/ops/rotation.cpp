@@ -31,6 +31,7 @@ void ToMatrix::check(Inputs x) const {
   if (x[0].rank() < 1 || x[0].size(-1) != width_of(form))
     shape_error(name, letters, x,
                 "the last axis must have " + std::to_string(width_of(form)) + " numbers");
+  require_floats(name, letters, x);
 }
 
 Tensor ToMatrix::forward(Inputs x, Saved& saved) const {
@@ -57,6 +58,7 @@ void ForwardKinematics::check(Inputs x) const {
   for (size_t i = 0; i < parents.size(); ++i)
     if (parents[i] >= static_cast<int>(i))
       shape_error(name, letters, x, "parents must come before children");
+  require_floats(name, letters, x);
 }
 
 Tensor ForwardKinematics::forward(Inputs x, Saved& saved) const {
@@ -82,6 +84,7 @@ void LinearBlendSkinning::check(Inputs x) const {
     shape_error(name, letters, x, "n must agree");
   if (x[1].size(1) != v) shape_error(name, letters, x, "v must agree");
   if (x[1].size(2) != j || x[3].size(1) != j) shape_error(name, letters, x, "j must agree");
+  require_floats(name, letters, x);
 }
 
 Tensor LinearBlendSkinning::forward(Inputs x, Saved& saved) const {
@@ -100,6 +103,8 @@ Grads LinearBlendSkinning::backward(const Saved& saved, const Tensor& gy, Needs)
 }
 
 Var matrix_to_sixd(const Var& r) {
+  if (r.rank() < 2 || r.size(-1) != 3 || r.size(-2) != 3)
+    shape_error("matrix_to_sixd", "R[..., 3, 3]", std::array{r.value}, "needs matrices");
   const int64_t n = r.value.numel() / 9;
   const Var columns = permute(slice(reshape(r, {n, 3, 3}), 2, 0, 2), {0, 2, 1});
   return reshape(columns, with_tail(r.shape(), 2, {6}));

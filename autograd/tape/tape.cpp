@@ -9,6 +9,7 @@
 namespace restage {
 namespace {
 
+constexpr size_t kMaxInputs = 16;       // of an op
 thread_local std::string current_path;  // of ModuleScope
 std::atomic<int> finite_checks{0};
 
@@ -46,6 +47,12 @@ void shape_error(const char* op, const char* letters, Inputs inputs, const std::
                    module_path());
 }
 
+void require_floats(const char* op, const char* letters, Inputs inputs) {
+  for (const Tensor& t : inputs)
+    if (t.dtype() != inputs[0].dtype() || (t.dtype() != DType::f32 && t.dtype() != DType::f64))
+      shape_error(op, letters, inputs, "needs equal float dtypes");
+}
+
 const Tensor* Gradients::find(uint64_t id) const {
   const auto it = by_id_.find(id);
   return it == by_id_.end() ? nullptr : &it->second;
@@ -73,7 +80,7 @@ double Gradients::norm() const {
 bool Gradients::finite() const { return std::isfinite(norm()); }
 
 Var Tape::leaf(const Tensor& value, uint64_t id) {
-  const auto [it, fresh] = leaves_.emplace(id, static_cast<int>(nodes_.size()));
+  const auto [it, fresh] = leaves_.emplace(id, first_ + static_cast<int64_t>(nodes_.size()));
   if (fresh) {
     Node node;
     node.id = id;
@@ -85,17 +92,26 @@ Var Tape::leaf(const Tensor& value, uint64_t id) {
   return v;
 }
 
+void Tape::require_own(const Var& v) const {
+  if (v.tape != this) throw Error("an op was given values of two tapes");
+  if (v.node < first_)
+    throw Error("a value is used after the backward pass that consumed its tape");
+}
+
 Var Tape::record(std::unique_ptr<Function> function, std::span<const Var> inputs, Tensor output) {
   Node node;
   node.function = std::move(function);
   node.path = module_path();
+  if (inputs.size() > kMaxInputs)
+    throw Error(std::string(node.function->name()) + ": an op has at most " +
+                std::to_string(kMaxInputs) + " inputs");
   for (const Var& in : inputs) {
-    if (in.tape != nullptr && in.tape != this) throw Error("an op was given values of two tapes");
+    if (in.tape != nullptr) require_own(in);
     node.inputs.push_back(in.tape == this ? in.node : -1);
   }
   Var v(std::move(output));
   v.tape = this;
-  v.node = static_cast<int>(nodes_.size());
+  v.node = first_ + static_cast<int64_t>(nodes_.size());
   nodes_.push_back(std::move(node));
   return v;
 }
@@ -104,24 +120,26 @@ Gradients Tape::backward(const Var& loss) {
   if (loss.tape != this) throw Error("backward: the loss does not depend on anything of this tape");
   if (loss.value.numel() != 1)
     throw ShapeError("backward: the loss has shape " + loss.shape().str() + ", not one number");
+  require_own(loss);
   std::vector<Tensor> grads(nodes_.size());
-  grads[static_cast<size_t>(loss.node)] = Tensor::full(loss.shape(), 1.0, loss.dtype());
+  const auto at = [this](int64_t node) { return static_cast<size_t>(node - first_); };
+  grads[at(loss.node)] = Tensor::full(loss.shape(), 1.0, loss.dtype());
   Gradients result;
-  for (size_t i = static_cast<size_t>(loss.node) + 1; i-- > 0;) {
+  for (size_t i = at(loss.node) + 1; i-- > 0;) {
     Node& node = nodes_[i];
     if (!grads[i].defined()) continue;
     if (node.function == nullptr) {
       result.set(node.id, grads[i]);
       continue;
     }
-    std::array<bool, 16> needs{};
+    std::array<bool, kMaxInputs> needs{};
     for (size_t k = 0; k < node.inputs.size(); ++k) needs[k] = node.inputs[k] >= 0;
     Grads gx = node.function->backward(grads[i], Needs(needs.data(), node.inputs.size()));
     for (size_t k = 0; k < node.inputs.size(); ++k) {
       if (node.inputs[k] < 0 || k >= gx.size() || !gx[k].defined()) continue;
       if (FiniteCheck::active())
         require_finite(gx[k], node.function->name(), node.path, "backward");
-      Tensor& target = grads[static_cast<size_t>(node.inputs[k])];
+      Tensor& target = grads[at(node.inputs[k])];
       if (target.defined()) {
         Tensor total = target.clone();  // the first gradient may be shared with another node
         launch(AccumulateArgs{gx[k], total});
@@ -133,6 +151,7 @@ Gradients Tape::backward(const Var& loss) {
     node.function.reset();  // frees what the op had kept
     grads[i] = Tensor();
   }
+  first_ += static_cast<int64_t>(nodes_.size());
   nodes_.clear();
   leaves_.clear();
   return result;

@@ -22,7 +22,7 @@ class Tape;
 struct Var {
   Tensor value;
   Tape* tape = nullptr;
-  int node = -1;
+  int64_t node = -1;
 
   Var() = default;
   Var(Tensor v) : value(std::move(v)) {}  // NOLINT: a tensor is a constant Var
@@ -79,7 +79,8 @@ class Tape {
 
   /// A differentiable leaf. The same id always gives the same node.
   Var leaf(const Tensor& value, uint64_t id);
-  /// Gradients of all leaves of a scalar. Consumes the recorded ops.
+  /// Gradients of all leaves of a scalar. Consumes the recorded ops: values recorded before are
+  /// stale afterwards, and using one with this tape again is an Error.
   Gradients backward(const Var& loss);
   size_t size() const { return nodes_.size(); }
 
@@ -94,12 +95,15 @@ class Tape {
  private:
   struct Node {
     std::unique_ptr<Function> function;  // null: leaf
-    std::vector<int> inputs;             // node of each input, -1: constant
+    std::vector<int64_t> inputs;         // node of each input, -1: constant
     uint64_t id = 0;                     // of a leaf
     std::string path;
   };
+  void require_own(const Var& v) const;
+
   std::vector<Node> nodes_;
-  std::unordered_map<uint64_t, int> leaves_;
+  int64_t first_ = 0;  // number of nodes_[0]; grows with every backward, so stale values show
+  std::unordered_map<uint64_t, int64_t> leaves_;
 };
 
 /// Checks every result of every op for NaN and infinity while alive (slow: the trainer repeats a
@@ -118,6 +122,8 @@ void require_finite(const Tensor& t, const char* op, const std::string& path, co
 /// Throws ShapeError: "op: [letters] message; got shapes; in module path".
 [[noreturn]] void shape_error(const char* op, const char* letters, Inputs inputs,
                               const std::string& why);
+/// ShapeError unless all inputs have the same floating dtype.
+void require_floats(const char* op, const char* letters, Inputs inputs);
 
 namespace detail {
 

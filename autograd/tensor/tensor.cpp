@@ -1,5 +1,6 @@
 #include "autograd/tensor/tensor.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include "autograd/base/error.h"
@@ -69,6 +70,13 @@ struct Storage {
 };
 
 Tensor Tensor::empty(const Shape& shape, DType type, Device device) {
+  constexpr int64_t kMost = int64_t{1} << 48;  // numbers: more is a mistake, and must not overflow
+  int64_t n = 1;
+  for (int i = 0; i < shape.rank(); ++i) {
+    if (shape[i] < 0) throw ShapeError("tensor: negative size in " + shape.str());
+    if (shape[i] > kMost / n) throw ShapeError("tensor: " + shape.str() + " is too large");
+    n *= std::max<int64_t>(1, shape[i]);
+  }
   Tensor t;
   t.shape_ = shape;
   t.numel_ = shape.numel();
@@ -127,15 +135,18 @@ const T* Tensor::data() const {
 Tensor Tensor::reshape(const Shape& shape) const {
   Shape target = shape;
   int64_t known = 1;
-  int open = -1;
+  int open = -1, opens = 0;
   for (int i = 0; i < target.rank(); ++i) {
-    if (target[i] == -1)
+    if (target[i] == -1) {
       open = i;
-    else
+      ++opens;
+    } else {
       known *= target[i];
+    }
   }
-  if (open >= 0 && known > 0) target.set(open, numel_ / known);
-  if (target.numel() != numel_) throw ShapeError("reshape: " + shape_.str() + " to " + shape.str());
+  if (opens == 1) target.set(open, known > 0 ? numel_ / known : 0);
+  if (opens > 1 || target.numel() != numel_)
+    throw ShapeError("reshape: " + shape_.str() + " to " + shape.str());
   Tensor t = *this;
   t.shape_ = target;
   return t;
