@@ -41,7 +41,8 @@ std::vector<size_t> repeat_some(const RngKey& key, size_t distinct, size_t n) {
 }
 
 /// Skin weights of sample `i`, each side under the other's name in a mirror image.
-void put_weights(const Body& body, const SurfaceSamples& samples, size_t i, bool mirror, float* to) {
+void put_weights(const Body& body, const SurfaceSamples& samples, size_t i, bool mirror,
+                 float* to) {
   std::fill_n(to, kJoints, 0.0f);
   for (size_t corner = 3 * i; corner < 3 * i + 3; ++corner)
     for (int j = 0; j < kJoints; ++j)

@@ -24,8 +24,8 @@ struct CloudConfig {
 
 /// float32, metres. Points and joints are relative to the centroid of the points.
 struct CloudBatch {
-  Tensor points;  ///< [N, V, 3]
-  Tensor joints;  ///< [N, 22, 3]
+  Tensor points;   ///< [N, V, 3]
+  Tensor joints;   ///< [N, 22, 3]
   Tensor weights;  ///< [N, V, 22] which joints move each point; only with CloudConfig::skin_weights
 };
 

@@ -69,7 +69,8 @@ std::vector<Joints> noisy(const std::vector<Joints>& joints, const RngKey& key, 
 /// Headings of every frame, or zeros.
 std::vector<Mat3> turns_of(const std::vector<Joints>& seen, bool wanted) {
   std::vector<Mat3> out;
-  for (const Joints& x : seen) out.push_back(wanted ? turn_about_y(-heading_angle(x)) : Mat3(Mat3::Identity()));
+  for (const Joints& x : seen)
+    out.push_back(wanted ? turn_about_y(-heading_angle(x)) : Mat3(Mat3::Identity()));
   return out;
 }
 
@@ -100,7 +101,8 @@ void put_translation(float* to, const std::vector<Vec3>& path, Translation kind,
       const size_t later = std::max<size_t>(t, 1);
       put(to + 3 * t, kFps * turns[t] * (path[later] - path[later - 1]));
     } else {
-      put(to + 3 * t, turns[t] * (kind == Translation::relative ? Vec3(path[t] - path[0]) : path[t]));
+      put(to + 3 * t,
+          turns[t] * (kind == Translation::relative ? Vec3(path[t] - path[0]) : path[t]));
     }
   }
 }
@@ -199,8 +201,7 @@ void WindowSampler::fill(WindowBatch& batch, int64_t row, int64_t index) const {
   put_sixd(row_of(batch.sixd_a, row), a.poses, turns);
   *row_of(batch.self_mask, row) = s.self ? 1.0f : 0.0f;
   put_joints(row_of(batch.real_b, row), real.joints, own_turns);
-  put_translation(row_of(batch.real_trans_b, row), real.path(), config_.translation,
-                  own_turns);
+  put_translation(row_of(batch.real_trans_b, row), real.path(), config_.translation, own_turns);
   if (!config_.truth) return;
 
   const Window b = perform(body_b, clip, s.clip.frame, config_.frames, s.augmentation);

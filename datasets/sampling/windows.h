@@ -36,7 +36,7 @@ struct WindowConfig {
   Translation translation = Translation::velocity;
   bool remove_heading = false;  ///< every frame is turned to face +z: by A's heading as seen in its
                                 ///< input joints (real_b: by its own)
-  bool truth = false;  ///< also make the last group of WindowBatch
+  bool truth = false;           ///< also make the last group of WindowBatch
 };
 
 /// float32, metres. Joints are relative to their pelvis, in the world's directions. Velocities as

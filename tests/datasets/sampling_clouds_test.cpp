@@ -96,6 +96,38 @@ TEST(SamplingClouds, MirroredCloudsBelongToMirroredJoints) {
     EXPECT_LT((flipped(at(a.joints, 0, kMirror[j])) - at(b.joints, 0, j)).norm(), 1e-5);
 }
 
+TEST(SamplingClouds, SkinWeightsBelongToTheirPoints) {
+  const Corpus corpus = train();
+  CloudConfig config;
+  config.points = 128;
+  config.noise = 0;
+  config.min_fraction = 0.5;
+  EXPECT_FALSE(CloudSampler(corpus, config, 1).batch(0, 1).weights.defined());
+  config.skin_weights = true;
+  CloudSubject subject;
+  subject.rest = true;
+  CloudSubject image = subject;
+  image.augmentation.mirror = true;
+  const CloudBatch plain = CloudSampler(corpus, config, 1).clouds({subject});
+  const CloudBatch mirrored = CloudSampler(corpus, config, 1).clouds({image});
+  ASSERT_EQ(plain.weights.shape(), (Shape{1, 128, kJoints}));
+  for (int i = 0; i < 128; ++i) {
+    const float* w = plain.weights.data<float>() + i * kJoints;
+    const float* m = mirrored.weights.data<float>() + i * kJoints;
+    float sum = 0;
+    int strongest = 0;
+    for (int j = 0; j < kJoints; ++j) {
+      sum += w[j];
+      EXPECT_EQ(w[j], m[kMirror[j]]);
+      if (w[j] > w[strongest]) strongest = j;
+    }
+    EXPECT_NEAR(sum, 1.0f, 1e-5f);
+    // A box is moved most by the joint where its bone begins; bones are shorter than 0.6 m.
+    EXPECT_LT((at(plain.points, 0, i) - at(plain.joints, 0, strongest)).norm(), 0.6);
+    EXPECT_LT((at(mirrored.points, 0, i) - at(mirrored.joints, 0, kMirror[strongest])).norm(), 0.6);
+  }
+}
+
 TEST(SamplingClouds, SharesOfTposesMirrorsAndHeadings) {
   const Corpus corpus = train();
   CloudConfig config;

@@ -159,6 +159,31 @@ TEST(SamplingWindows, TranslationsDescribeThePath) {
   EXPECT_THROW(translation_of("speed"), InputError);
 }
 
+TEST(SamplingWindows, RemovedHeadingsFaceForwardAndKeepTheMotion) {
+  const Corpus corpus = train();
+  WindowConfig config;
+  config.truth = true;
+  const WindowBatch free = WindowSampler(corpus, config, 4).batch(0, 6);
+  config.remove_heading = true;
+  const WindowBatch faced = WindowSampler(corpus, config, 4).batch(0, 6);
+  double turned = 0;
+  for (int64_t i = 0; i < 6; ++i)
+    for (int64_t t = 0; t < config.frames; ++t) {
+      const Joints a = joints_at(faced.joints_a, i, t), before = joints_at(free.joints_a, i, t);
+      EXPECT_NEAR(heading_angle(a), 0.0, 1e-4);
+      EXPECT_NEAR(heading_angle(joints_at(faced.real_b, i, t)), 0.0, 1e-4);
+      turned = std::max(turned, std::abs(heading_angle(before)));
+      const Mat3 turn = Eigen::AngleAxisd(-heading_angle(before), Vec3::UnitY()).toRotationMatrix();
+      EXPECT_LT((turn * at(free.trans_a, i, t) - at(faced.trans_a, i, t)).norm(), 1e-4);
+      // B turns by A's heading, and rotations still give the joints.
+      const Joints b = joints_at(faced.truth_b, i, t);
+      EXPECT_LT((turn * joints_at(free.truth_b, i, t)[20] - b[20]).norm(), 1e-4);
+      EXPECT_LT(largest(kinematics(faced.rest_a, faced.sixd_a, i, t), a), 1e-5);
+      EXPECT_LT(largest(kinematics(faced.rest_b, faced.truth_sixd_b, i, t), b), 1e-5);
+    }
+  EXPECT_GT(turned, 1.0);
+}
+
 TEST(SamplingWindows, NoiseIsOnTheInputOnly) {
   const Corpus corpus = train();
   WindowConfig config;
