@@ -58,9 +58,9 @@ void for_block_rows(int64_t n, int64_t inner, bool parallel, F&& f) {
 
 /// Scale of row r, column i.
 template <class T>
-T affine_at(const Tensor* t, Affine affine, int64_t r, int64_t i, T none) {
+double affine_at(const Tensor* t, Affine affine, int64_t r, int64_t i, double none) {
   if (t == nullptr || affine == Affine::none) return none;
-  return t->data<T>()[affine == Affine::inner ? i : r];
+  return static_cast<double>(t->data<T>()[affine == Affine::inner ? i : r]);
 }
 
 template <class T>
@@ -69,8 +69,8 @@ void norm_typed(const NormArgs& args) {
   for_blocks(args.outer, n * inner, [&](int64_t o, bool parallel) {
     const T* x = args.x.data<T>() + o * n * inner;
     T* out = args.out.data<T>() + o * n * inner;
-    T* mean = args.mean.data<T>() + o * inner;
-    T* rstd = args.rstd.data<T>() + o * inner;
+    double* mean = args.mean.data<double>() + o * inner;
+    double* rstd = args.rstd.data<double>() + o * inner;
     std::vector<double> s(static_cast<size_t>(inner)), q(static_cast<size_t>(inner));
     two_sums(n, inner, s.data(), q.data(), parallel, [&](int64_t r, double* a, double*) {
       for (int64_t i = 0; i < inner; ++i) a[i] += static_cast<double>(x[r * inner + i]);
@@ -84,15 +84,15 @@ void norm_typed(const NormArgs& args) {
       }
     });
     for (int64_t i = 0; i < inner; ++i) {
-      mean[i] = static_cast<T>(s[static_cast<size_t>(i)]);
-      rstd[i] = static_cast<T>(
-          1.0 / std::sqrt(q[static_cast<size_t>(i)] / static_cast<double>(n) + args.eps));
+      mean[i] = s[static_cast<size_t>(i)];
+      rstd[i] = 1.0 / std::sqrt(q[static_cast<size_t>(i)] / static_cast<double>(n) + args.eps);
     }
     for_block_rows(n, inner, parallel, [&](int64_t r) {
       for (int64_t i = 0; i < inner; ++i)
-        out[r * inner + i] = (x[r * inner + i] - mean[i]) * rstd[i] *
-                                 affine_at<T>(args.scale, args.affine, r, i, T(1)) +
-                             affine_at<T>(args.shift, args.affine, r, i, T(0));
+        out[r * inner + i] =
+            static_cast<T>((static_cast<double>(x[r * inner + i]) - mean[i]) * rstd[i] *
+                               affine_at<T>(args.scale, args.affine, r, i, 1) +
+                           affine_at<T>(args.shift, args.affine, r, i, 0));
     });
   });
 }
@@ -103,26 +103,26 @@ void norm_grad_typed(const NormGradArgs& args) {
   for_blocks(args.outer, n * inner, [&](int64_t o, bool parallel) {
     const T* x = args.x.data<T>() + o * n * inner;
     const T* gy = args.gy.data<T>() + o * n * inner;
-    const T* mean = args.mean.data<T>() + o * inner;
-    const T* rstd = args.rstd.data<T>() + o * inner;
+    const double* mean = args.mean.data<double>() + o * inner;
+    const double* rstd = args.rstd.data<double>() + o * inner;
     T* out = args.out.data<T>() + o * n * inner;
     std::vector<double> sg(static_cast<size_t>(inner)), sgx(static_cast<size_t>(inner));
     two_sums(n, inner, sg.data(), sgx.data(), parallel, [&](int64_t r, double* a, double* b) {
       for (int64_t i = 0; i < inner; ++i) {
-        const double g = static_cast<double>(gy[r * inner + i] *
-                                             affine_at<T>(args.scale, args.affine, r, i, T(1)));
+        const double g =
+            static_cast<double>(gy[r * inner + i]) * affine_at<T>(args.scale, args.affine, r, i, 1);
         a[i] += g;
-        b[i] += g * static_cast<double>((x[r * inner + i] - mean[i]) * rstd[i]);
+        b[i] += g * (static_cast<double>(x[r * inner + i]) - mean[i]) * rstd[i];
       }
     });
-    const T inv = T(1) / static_cast<T>(n);
+    const double inv = 1.0 / static_cast<double>(n);
     for_block_rows(n, inner, parallel, [&](int64_t r) {
       for (int64_t i = 0; i < inner; ++i) {
-        const T g = gy[r * inner + i] * affine_at<T>(args.scale, args.affine, r, i, T(1));
-        const T h = (x[r * inner + i] - mean[i]) * rstd[i];
-        out[r * inner + i] =
-            rstd[i] * (g - inv * (static_cast<T>(sg[static_cast<size_t>(i)]) +
-                                  h * static_cast<T>(sgx[static_cast<size_t>(i)])));
+        const double g =
+            static_cast<double>(gy[r * inner + i]) * affine_at<T>(args.scale, args.affine, r, i, 1);
+        const double h = (static_cast<double>(x[r * inner + i]) - mean[i]) * rstd[i];
+        const auto c = static_cast<size_t>(i);
+        out[r * inner + i] = static_cast<T>(rstd[i] * (g - inv * (sg[c] + h * sgx[c])));
       }
     });
   });
@@ -140,8 +140,9 @@ void norm_grad_typed(const NormGradArgs& args) {
     for (int64_t e = 0; e < width; ++e) {
       const int64_t i = e % inner, target = by_row ? e / inner : i;
       const double g = static_cast<double>(gy[e]);
-      const T h = (x[e] - args.mean.data<T>()[o * inner + i]) * args.rstd.data<T>()[o * inner + i];
-      pa[target] += g * static_cast<double>(h);
+      const double h = (static_cast<double>(x[e]) - args.mean.data<double>()[o * inner + i]) *
+                       args.rstd.data<double>()[o * inner + i];
+      pa[target] += g * h;
       pb[target] += g;
     }
   });

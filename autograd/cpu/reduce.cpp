@@ -10,17 +10,20 @@ namespace {
 
 constexpr int64_t kPart = 512;  // terms per partial sum
 
-/// Sums rows [from, to) of x [n, inner] into out [inner] (overwritten).
+/// Sums rows [from, to) of x [n, inner] into out [inner] (overwritten), in double, since what is
+/// summed (gradients of a bias) may all but cancel.
 template <class T>
 void sum_rows(const T* x, int64_t from, int64_t to, int64_t inner, T* out) {
-  if (inner == 1) {
-    out[0] = to > from ? ConstArray<T>(x + from, to - from).sum() : T(0);
-    return;
-  }
-  std::fill_n(out, inner, T(0));
-  for (int64_t r = from; r < to; ++r) {
-    const T* row = x + r * inner;
-    for (int64_t i = 0; i < inner; ++i) out[i] += row[i];
+  constexpr int64_t kColumns = 128;  // at a time
+  double total[kColumns];
+  for (int64_t i0 = 0; i0 < inner; i0 += kColumns) {
+    const int64_t columns = std::min(kColumns, inner - i0);
+    std::fill_n(total, columns, 0.0);
+    for (int64_t r = from; r < to; ++r) {
+      const T* row = x + r * inner + i0;
+      for (int64_t i = 0; i < columns; ++i) total[i] += static_cast<double>(row[i]);
+    }
+    for (int64_t i = 0; i < columns; ++i) out[i0 + i] = static_cast<T>(total[i]);
   }
 }
 

@@ -8,7 +8,8 @@ namespace restage {
 
 enum class Affine { none, inner, middle };  ///< along which axis scale and shift run
 
-/// out = (x - mean) * rstd * scale + shift, biased variance; mean, rstd [outer, inner] are outputs.
+/// out = (x - mean) * rstd * scale + shift, biased variance; mean, rstd [outer, inner] are outputs,
+/// always f64: over few rows the gradient all but cancels and needs them exactly.
 struct NormArgs {
   static constexpr std::string_view name = "norm";
   const Tensor& x;

@@ -12,8 +12,8 @@ Tensor normalise(Inputs x, Saved& saved, const Layout& l, double eps, Tensor* me
                  Tensor* rstd_out) {
   const bool affine = l.affine != Affine::none;
   Tensor y = Tensor::empty(x[0].shape(), x[0].dtype(), x[0].device());
-  Tensor mean = Tensor::empty({l.outer, l.inner}, x[0].dtype(), x[0].device());
-  Tensor rstd = Tensor::empty({l.outer, l.inner}, x[0].dtype(), x[0].device());
+  Tensor mean = Tensor::empty({l.outer, l.inner}, DType::f64, x[0].device());
+  Tensor rstd = Tensor::empty({l.outer, l.inner}, DType::f64, x[0].device());
   launch(NormArgs{x[0], affine ? &x[1] : nullptr, affine ? &x[2] : nullptr, y, mean, rstd, l.outer,
                   l.n, l.inner, l.affine, eps});
   if (affine) {
@@ -76,7 +76,7 @@ Tensor BatchNorm::forward(Inputs x, Saved& saved) const {
     std::vector<double> variance;
     for (int64_t i = 0; i < l.inner; ++i)
       variance.push_back(1.0 / (rstd.item(i) * rstd.item(i)) - eps);
-    statistics->variance = Tensor::from<double>({l.inner}, variance).cast(x[0].dtype());
+    statistics->variance = Tensor::from<double>({l.inner}, variance);
   }
   return y;
 }

@@ -6,7 +6,8 @@
 
 namespace restage {
 
-/// Where batch norm reports its statistics for the running averages: mean and biased variance [c].
+/// Where batch norm reports its statistics for the running averages: mean and biased variance [c],
+/// f64.
 struct BatchStatistics {
   Tensor mean, variance;
   int64_t count = 0;
