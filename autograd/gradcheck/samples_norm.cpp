@@ -15,9 +15,9 @@ void affine_samples(OpSamples& s, const Build& build, int64_t least_rows) {
   for (const Shape& x :
        {Shape{5, 3}, Shape{2, 3, 4}, Shape{2, 1}, Shape{4, 0}, Shape{9, 17}, Shape{2, 1, 1, 3}})
     s.add(x.str(), affine_inputs(x, 51), build);
-  Tensor narrow = random({6, 2}, 50);
-  for (double& v : std::span<double>(narrow.data<double>(), 12)) v = 3 + 0.3 * v;
-  s.add("narrow channels far from 0", {narrow, random({2}, 1), random({2}, 2)}, build);
+  Tensor narrow = random({6, 5}, 50);
+  for (double& v : std::span<double>(narrow.data<double>(), 30)) v = 3 + 0.3 * v;
+  s.add("narrow channels far from 0", {narrow, random({5}, 1), random({5}, 2)}, build);
   s.large("many rows", affine_inputs({1301, 40}, 52), build);
   s.samples.back().f32_tolerance = 1e-2;
   s.error("one axis", affine_inputs({3}, 1), build);

@@ -1,0 +1,136 @@
+#!/usr/bin/env python3
+"""Enforces the include directions of docs/design/architecture.md.
+
+Reads every #include of the sources below the repository root (or the folder given), prints one
+line per broken rule and exits with 1 if there is any. Plain Python, no packages.
+"""
+import pathlib
+import re
+import sys
+
+SOURCES = {".h", ".hpp", ".cpp", ".inc"}
+TOP = ("autograd", "nn", "datasets", "train", "infer", "experiments")
+
+BASE, TENSOR = "autograd/base", "autograd/tensor"
+ENGINE = [BASE, TENSOR, "autograd/kernels", "autograd/tape", "autograd/ops"]
+NN = ["nn", "nn/geometry", "nn/layers", "nn/losses", "nn/metrics", "nn/models", "nn/weights"]
+
+# What a folder may include besides itself. A name covers that folder only, "name/*" all below it.
+MAY_USE = {
+    BASE: [],
+    TENSOR: [BASE],
+    "autograd/kernels": [BASE, TENSOR],
+    "autograd/cpu": [BASE, TENSOR, "autograd/kernels"],
+    "autograd/tape": [BASE, TENSOR, "autograd/kernels"],
+    "autograd/ops": [BASE, TENSOR, "autograd/kernels", "autograd/tape"],
+    "autograd/gradcheck": ENGINE,
+    "nn": ENGINE,
+    "nn/geometry": [BASE],
+    "nn/metrics": [BASE, "nn/geometry"],
+    "nn/layers": ENGINE + ["nn"],
+    "nn/models": ENGINE + ["nn", "nn/geometry", "nn/layers"],
+    "nn/losses": ENGINE + ["nn", "nn/geometry", "nn/layers", "nn/models"],
+    "nn/weights": [BASE, TENSOR, "nn", "nn/models"],
+    "datasets/*": ENGINE + NN + ["datasets/*"],
+    "infer/*": ENGINE + NN + ["infer/*"],
+    "train/stages": ENGINE + NN + ["train/*", "datasets/*"],
+    "train/*": ENGINE + NN + ["train/*"],
+    "experiments/*": ENGINE + NN + ["autograd/gradcheck", "datasets/*", "train/*", "infer/*",
+                                    "experiments/*"],
+}
+
+# Single files that may reach further: memory comes from the backend.
+ALSO = {"autograd/tensor/tensor.cpp": ["autograd/kernels/kernel.h"]}
+
+# Third-party (and a few system) headers and the only places that may know them.
+ONLY_IN = {
+    "tbb/": ["autograd/base/parallel.cpp"],
+    "spdlog/": ["autograd/base/log.cpp"],
+    "sanitizer/": ["autograd/cpu/pool.cpp"],
+    "hdf5.h": ["datasets/hdf5/"],
+    "yaml-cpp/": ["train/config_yaml.cpp", "nn/weights/"],
+    "CLI/": ["experiments/"],
+    "nanoflann.hpp": ["nn/metrics/"],
+    "nlohmann/": ["nn/weights/", "train/", "infer/", "experiments/"],
+    "stb/": ["infer/render/"],
+    "lzma.h": ["datasets/importers/"],
+    "zlib.h": ["datasets/importers/"],
+    "Eigen/": ["autograd/cpu/", "nn/", "datasets/", "train/", "infer/", "experiments/"],
+    "tiny_gltf.h": [],  # tests only: it reads what we wrote
+    "random": [],  # random numbers come from autograd/base/rng.h
+    "iostream": ["experiments/"],  # nothing below prints
+    "thread": ["autograd/base/", "experiments/", "train/run_provenance.cpp"],  # counting cores
+    "future": [],
+}
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*(?:"([^"]+)"|<([^>]+)>)', re.M)
+
+
+def folder_of(path):
+    """The layer of a file: its top folder, or top/sub if it lies deeper."""
+    parts = path.split("/")
+    return "/".join(parts[:2]) if len(parts) > 2 else parts[0]
+
+
+def covers(pattern, folder):
+    if pattern.endswith("/*"):
+        top = pattern[:-2]
+        return folder == top or folder.startswith(top + "/")
+    return folder == pattern
+
+
+def allowed_folders(folder):
+    if folder in MAY_USE:
+        return MAY_USE[folder]
+    return next((uses for key, uses in MAY_USE.items() if covers(key, folder)), None)
+
+
+def check_own(file, target):
+    """A quoted include: written from the root, along an arrow."""
+    if target.split("/")[0] not in TOP:
+        return "includes are written from the repository root"
+    here, there = folder_of(file), folder_of(target)
+    uses = allowed_folders(here)
+    if uses is None:
+        return f"{here} is no layer of the architecture: give it a row in cmake/check_layers.py"
+    if here == there or target in ALSO.get(file, []) or any(covers(u, there) for u in uses):
+        return None
+    return f"{here} may not use {there}"
+
+
+def check_foreign(file, header):
+    for prefix, places in ONLY_IN.items():
+        if header == prefix or (prefix.endswith("/") and header.startswith(prefix)):
+            if any(file.startswith(place) for place in places):
+                return None
+            return "only in " + ", ".join(places) if places else "not in the library"
+    if "/" in header and not header.startswith("sys/"):
+        return "an unknown library: name its one place in cmake/check_layers.py"
+    return None
+
+
+def violations(root):
+    for top in TOP:
+        for path in sorted((root / top).rglob("*")):
+            if path.suffix not in SOURCES or not path.is_file():
+                continue
+            file = path.relative_to(root).as_posix()
+            text = path.read_text(encoding="utf-8", errors="replace")
+            for match in INCLUDE.finditer(text):
+                own, foreign = match.groups()
+                wrong = check_own(file, own) if own else check_foreign(file, foreign)
+                if wrong:
+                    line = text.count("\n", 0, match.start(1 if own else 2)) + 1
+                    yield f"{file}:{line}: {own or foreign}: {wrong}"
+
+
+def main():
+    root = pathlib.Path(sys.argv[1]) if len(sys.argv) > 1 else pathlib.Path(__file__).parents[1]
+    found = list(violations(root))
+    for line in found:
+        print(line)
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

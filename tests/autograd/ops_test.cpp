@@ -1,0 +1,375 @@
+// Values of ops against plain loops, fused ops against their composed references.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "autograd/base/parallel.h"
+#include "autograd/gradcheck/evaluate.h"
+#include "autograd/ops/linear.h"
+#include "autograd/ops/norm.h"
+#include "autograd/ops/points.h"
+#include "autograd/ops/reduce.h"
+#include "autograd/ops/rnn.h"
+#include "autograd/ops/rotation.h"
+
+namespace restage {
+namespace {
+
+using gradcheck::Args;
+using gradcheck::Build;
+using gradcheck::evaluate;
+using gradcheck::Evaluation;
+using gradcheck::random;
+using gradcheck::same_bits;
+using gradcheck::Sample;
+
+void expect_near(const Tensor& a, const Tensor& b, double tolerance, const std::string& what) {
+  ASSERT_EQ(a.shape(), b.shape()) << what;
+  for (int64_t i = 0; i < a.numel(); ++i)
+    ASSERT_NEAR(a.item(i), b.item(i), tolerance * (1 + std::abs(b.item(i)))) << what << " " << i;
+}
+
+/// Values and gradients of two ways to compute the same.
+void expect_equal(const std::vector<Tensor>& inputs, const Build& fused, const Build& reference,
+                  double tolerance) {
+  const Sample a{"fused", inputs, fused}, b{"reference", inputs, reference};
+  const Tensor u = random(gradcheck::value_of(a, inputs).shape(), 3).cast(inputs[0].dtype());
+  const Evaluation ea = evaluate(a, u), eb = evaluate(b, u);
+  expect_near(ea.value, eb.value, tolerance, "value");
+  for (size_t k = 0; k < inputs.size(); ++k)
+    expect_near(ea.gradients[k], eb.gradients[k], tolerance, "gradient " + std::to_string(k));
+}
+
+/// The same in both precisions.
+void expect_fused(const std::vector<Tensor>& inputs, const Build& fused, const Build& reference) {
+  expect_equal(inputs, fused, reference, 1e-11);
+  std::vector<Tensor> narrow;
+  for (const Tensor& t : inputs) narrow.push_back(t.cast(DType::f32));
+  expect_equal(narrow, fused, reference, 2e-4);
+}
+
+TEST(FusedOps, GruIsItsReference) {
+  for (const int64_t h : {1, 5, 16}) {
+    expect_fused(
+        {random({7, 3, 4}, 1), random({3, h}, 2), random({3 * h, 4}, 3), random({3 * h, h}, 4),
+         random({3 * h}, 5), random({3 * h}, 6)},
+        [](Args x) { return gru(x[0], x[1], x[2], x[3], x[4], x[5]); },
+        [](Args x) { return gru_reference(x[0], x[1], x[2], x[3], x[4], x[5]); });
+  }
+}
+
+TEST(FusedOps, AttentionPoolIsItsReference) {
+  for (const int64_t d : {1, 6, 33})
+    expect_fused(
+        {random({9, 5, d}, 1), random({9, 5, d}, 2)},
+        [](Args x) { return attention_pool(x[0], x[1], 0.4); },
+        [](Args x) { return attention_pool_reference(x[0], x[1], 0.4); });
+}
+
+TEST(FusedOps, LinearWithReluIsMatmulPlusBiasAndRelu) {
+  expect_fused(
+      {random({5, 3, 7}, 1), random({11, 7}, 2), random({11}, 3)},
+      [](Args x) { return linear(x[0], x[1], x[2], Activation::relu); },
+      [](Args x) {
+        const Var flat = reshape(x[0], {15, 7});
+        return reshape(relu(matmul(flat, x[1], false, true) + x[2]), {5, 3, 11});
+      });
+}
+
+/// (x - mean) / sqrt(variance + eps) along `axis`, from elementary ops.
+Var normalised(const Var& x, int axis, double eps) {
+  Shape kept = x.shape();
+  kept.set(axis, 1);
+  const Var centred = x - reshape(mean(x, axis), kept);
+  const Var variance = reshape(mean(square(centred), axis), kept);
+  return centred / sqrt(add_scalar(variance, eps));
+}
+
+TEST(FusedOps, NormsAreTheirFormulas) {
+  expect_fused(
+      {random({6, 5}, 1), random({5}, 2), random({5}, 3)},
+      [](Args x) { return layer_norm(x[0], x[1], x[2]); },
+      [](Args x) { return normalised(x[0], 1, 1e-5) * x[1] + x[2]; });
+  expect_fused(
+      {random({600, 3}, 1), random({3}, 2), random({3}, 3)},
+      [](Args x) { return batch_norm(x[0], x[1], x[2], 1e-3); },
+      [](Args x) { return normalised(x[0], 0, 1e-3) * x[1] + x[2]; });
+  expect_fused(
+      {random({3, 520, 4}, 1)}, [](Args x) { return instance_norm(x[0]); },
+      [](Args x) { return normalised(x[0], 1, 1e-5); });
+}
+
+TEST(FusedOps, BatchNormReportsItsStatistics) {
+  const Tensor x = Tensor::from<double>({4, 2}, {1, 10, 2, 10, 3, 10, 6, 10});
+  BatchStatistics s;
+  batch_norm(Var(x), Var(Tensor::full({2}, 1, DType::f64)), Var(Tensor::zeros({2}, DType::f64)),
+             1e-5, &s);
+  EXPECT_EQ(s.count, 4);
+  EXPECT_DOUBLE_EQ(s.mean.item(0), 3);
+  EXPECT_NEAR(s.variance.item(0), 3.5, 1e-12);
+  EXPECT_DOUBLE_EQ(s.mean.item(1), 10);
+  EXPECT_NEAR(s.variance.item(1), 0, 1e-12);
+}
+
+TEST(FusedOps, Conv1dIsTheSumOverItsWindow) {
+  const int64_t n = 2, l = 9, c = 3, o = 4, k = 5, stride = 2, pad = 3, steps = 6;
+  const Tensor x = random({n, l, c}, 1), w = random({o, c, k}, 2), b = random({o}, 3);
+  const Tensor y = conv1d(Var(x), Var(w), Var(b), stride, pad, steps).value;
+  for (int64_t i = 0; i < n; ++i)
+    for (int64_t s = 0; s < steps; ++s)
+      for (int64_t q = 0; q < o; ++q) {
+        double sum = b.item(q);
+        for (int64_t j = 0; j < k; ++j) {
+          const int64_t at = s * stride - pad + j;
+          for (int64_t p = 0; at >= 0 && at < l && p < c; ++p)
+            sum += x.item((i * l + at) * c + p) * w.item((q * c + p) * k + j);
+        }
+        EXPECT_NEAR(y.item((i * steps + s) * o + q), sum, 1e-12);
+      }
+}
+
+/// Element (i, j) of matrix b of a batch, of its transpose on request; shared without batch axis.
+double element(const Tensor& t, int64_t b, int64_t i, int64_t j, bool transpose) {
+  const int64_t rows = t.size(-2), cols = t.size(-1), start = t.rank() == 3 ? b * rows * cols : 0;
+  return t.item(start + (transpose ? j * cols + i : i * cols + j));
+}
+
+void expect_naive_product(const Tensor& a, const Tensor& b, bool ta, bool tb, double tolerance) {
+  const Tensor y = matmul(Var(a), Var(b), ta, tb).value;
+  const int64_t m = y.size(-2), n = y.size(-1), k = a.size(ta ? -2 : -1);
+  const int64_t batch = y.rank() == 3 ? y.size(0) : 1;
+  for (int64_t s = 0; s < batch; ++s)
+    for (int64_t i = 0; i < m; ++i)
+      for (int64_t j = 0; j < n; ++j) {
+        double sum = 0;
+        for (int64_t l = 0; l < k; ++l) sum += element(a, s, i, l, ta) * element(b, s, l, j, tb);
+        ASSERT_NEAR(y.item((s * m + i) * n + j), sum, tolerance * std::sqrt(1.0 + k))
+            << a.shape().str() << ta << " " << b.shape().str() << tb << " at " << i << "," << j;
+      }
+}
+
+TEST(MatmulValues, AreTheTripleLoopForAllSizesAndTransposes) {
+  const auto matrix = [](int64_t batch, int64_t rows, int64_t cols, uint64_t stream) {
+    return batch < 0 ? random({rows, cols}, stream) : random({batch, rows, cols}, stream);
+  };
+  const int64_t sizes[] = {0, 1, 2, 7, 13, 33};
+  for (const bool ta : {false, true})
+    for (const bool tb : {false, true}) {
+      for (const int64_t m : sizes)
+        for (const int64_t k : sizes)
+          for (const int64_t n : sizes) {
+            const Tensor a = matrix(-1, ta ? k : m, ta ? m : k, 1),
+                         b = matrix(-1, tb ? n : k, tb ? k : n, 2);
+            expect_naive_product(a, b, ta, tb, 1e-13);
+            expect_naive_product(a.cast(DType::f32), b.cast(DType::f32), ta, tb, 1e-5);
+          }
+      for (const int64_t sa : {-1, 0, 3})
+        for (const int64_t sb : {-1, 0, 3}) {
+          if (sa >= 0 && sb >= 0 && sa != sb) continue;
+          expect_naive_product(matrix(sa, ta ? 9 : 5, ta ? 5 : 9, 3),
+                               matrix(sb, tb ? 4 : 9, tb ? 9 : 4, 4), ta, tb, 1e-13);
+        }
+      // Beyond one block in every direction.
+      expect_naive_product(matrix(-1, ta ? 300 : 310, ta ? 310 : 300, 5),
+                           matrix(-1, tb ? 530 : 300, tb ? 300 : 530, 6), ta, tb, 1e-12);
+    }
+}
+
+TEST(MatmulValues, ARowDoesNotDependOnTheOthers) {
+  const Tensor a = random({600, 40}, 1).cast(DType::f32), b = random({40, 70}, 2).cast(DType::f32);
+  const Tensor all = matmul(Var(a), Var(b)).value;
+  for (const int64_t row : {0, 5, 311, 599}) {
+    const Tensor one = matmul(Var(a.rows(row, row + 1)), Var(b)).value;
+    EXPECT_TRUE(same_bits(one, all.rows(row, row + 1))) << row;
+  }
+}
+
+/// Cloud with many equal points and equal distances.
+Tensor grid_cloud(int64_t n, int64_t v, uint64_t stream) {
+  Rng rng(RngKey{40, stream});
+  Tensor t = Tensor::empty({n, v, 3}, DType::f64);
+  for (int64_t i = 0; i < t.numel(); ++i) t.data<double>()[i] = static_cast<double>(rng.below(3));
+  return t;
+}
+
+double squared(const Tensor& a, int64_t i, const Tensor& b, int64_t j) {
+  double d = 0;
+  for (int c = 0; c < 3; ++c) d += std::pow(a.item(3 * i + c) - b.item(3 * j + c), 2);
+  return d;
+}
+
+TEST(Neighbours, AreTheBruteForceOnesTiesToTheLowerIndex) {
+  for (const int64_t v : {1, 4, 50})
+    for (const int64_t k : {1, 3, 16, 60}) {
+      const Tensor query = grid_cloud(2, 9, 1), points = grid_cloud(2, v, 2);
+      const Tensor index = knn(query, points, k);
+      const int64_t kept = std::min(k, v);
+      ASSERT_EQ(index.shape(), (Shape{2, 9, kept}));
+      EXPECT_TRUE(same_bits(index, knn(query.cast(DType::f32), points.cast(DType::f32), k)));
+      for (int64_t q = 0; q < 18; ++q) {
+        std::vector<std::pair<double, int64_t>> order;
+        for (int64_t i = 0; i < v; ++i)
+          order.emplace_back(squared(query, q, points, q / 9 * v + i), i);
+        std::sort(order.begin(), order.end());
+        for (int64_t i = 0; i < kept; ++i)
+          ASSERT_EQ(index.item(q * kept + i), order[static_cast<size_t>(i)].second)
+              << q << " " << i;
+      }
+    }
+}
+
+TEST(Neighbours, FarthestPointsAreTheBruteForceOnes) {
+  for (const int64_t v : {1, 7, 60}) {
+    const Tensor points = grid_cloud(3, v, 3);
+    const Tensor index = fps(points, v);
+    for (int64_t s = 0; s < 3; ++s) {
+      Tensor centre = Tensor::zeros({3}, DType::f64);
+      for (int64_t i = 0; i < v; ++i)
+        for (int c = 0; c < 3; ++c)
+          centre.data<double>()[c] += points.item((s * v + i) * 3 + c) / static_cast<double>(v);
+      std::vector<double> distance;
+      for (int64_t i = 0; i < v; ++i) distance.push_back(squared(points, s * v + i, centre, 0));
+      for (int64_t m = 0; m < v; ++m) {
+        const int64_t chosen = static_cast<int64_t>(index.item(s * v + m));
+        const double top = *std::max_element(distance.begin(), distance.end());
+        // Equal up to the rounding of the centroid, and the first of exactly equal ones after it.
+        ASSERT_NEAR(distance[static_cast<size_t>(chosen)], top, 1e-12);
+        if (m > 0) {
+          ASSERT_EQ(chosen, std::max_element(distance.begin(), distance.end()) - distance.begin());
+        }
+        for (int64_t i = 0; i < v; ++i) {
+          const double d = squared(points, s * v + i, points, s * v + chosen);
+          double& best = distance[static_cast<size_t>(i)];
+          best = m == 0 ? d : std::min(best, d);
+        }
+      }
+    }
+  }
+}
+
+TEST(Neighbours, SurviveNaNAndRefuseNonsense) {
+  Tensor points = grid_cloud(1, 40, 4);
+  for (int64_t i = 0; i < 60; i += 2) points.data<double>()[i] = std::nan("");
+  const Tensor index = knn(points, points, 8);
+  for (int64_t i = 0; i < index.numel(); ++i) {
+    EXPECT_GE(index.item(i), 0);
+    EXPECT_LT(index.item(i), 40);
+  }
+  fps(points, 8);
+  EXPECT_THROW(knn(points, points, 0), ShapeError);
+  EXPECT_THROW(knn(points, points.cast(DType::f32), 2), ShapeError);
+  EXPECT_THROW(knn(points, grid_cloud(2, 4, 1), 2), ShapeError);
+  EXPECT_THROW(fps(random({4, 3}, 1), 2), ShapeError);
+  EXPECT_THROW(fps(random({1, 0, 3}, 1), 1), ShapeError);
+  EXPECT_EQ(fps(points, 0).numel(), 0);
+}
+
+/// Runs f with 1, 2, 3 and 7 threads and compares the bits.
+template <class F>
+void expect_same_for_all_threads(F&& f) {
+  const int before = threads();
+  set_threads(1);
+  const Tensor first = f();
+  for (const int n : {2, 3, 7}) {
+    set_threads(n);
+    EXPECT_TRUE(same_bits(first, f())) << n << " threads";
+  }
+  set_threads(before);
+}
+
+TEST(Threads, SumsOfManyNumbersHaveTheSameBits) {
+  const Tensor x = random({1000003}, 1).cast(DType::f32);
+  expect_same_for_all_threads([&] { return sum_all(Var(x)).value; });
+  const Tensor wide = random({3001, 37}, 2).cast(DType::f32);
+  expect_same_for_all_threads([&] { return sum(Var(wide), 0).value; });
+  const Tensor index = knn(random({1, 900, 3}, 3), random({1, 50, 3}, 4), 5).reshape({1, 4500});
+  const Tensor rows = random({1, 4500, 70}, 5).cast(DType::f32);
+  expect_same_for_all_threads([&] { return scatter_add(Var(rows), index, 50).value; });
+}
+
+TEST(Threads, SumsAreAccurate) {
+  const Tensor x = Tensor::full({1 << 20}, 0.1);
+  EXPECT_NEAR(sum_all(Var(x)).value.item(), 0.1f * (1 << 20), 0.5);
+}
+
+TEST(DropoutMask, IsAFunctionOfTheKey) {
+  const Var ones(Tensor::full({100003}, 1, DType::f64));
+  const RngKey key{1, 2};
+  const Tensor a = dropout(ones, 0.3, key).value;
+  EXPECT_TRUE(same_bits(a, dropout(ones, 0.3, key).value));
+  EXPECT_FALSE(same_bits(a, dropout(ones, 0.3, key.fold(1)).value));
+  expect_same_for_all_threads([&] { return dropout(ones, 0.3, key).value; });
+  // Element i is kept or not whatever the size of the tensor.
+  const Tensor part = dropout(Var(Tensor::full({1001}, 1, DType::f64)), 0.3, key).value;
+  EXPECT_TRUE(same_bits(part, a.rows(0, 1001)));
+  const Tensor narrow = dropout(Var(ones.value.cast(DType::f32)), 0.3, key).value;
+  for (int64_t i = 0; i < 1001; ++i) EXPECT_EQ(narrow.item(i) == 0, a.item(i) == 0);
+}
+
+TEST(DropoutMask, KeepsTheShareAndTheMean) {
+  const int64_t n = 200000;
+  const Tensor y = dropout(Var(Tensor::full({n}, 1, DType::f64)), 0.3, RngKey{3, 4}).value;
+  int64_t zeros = 0;
+  for (int64_t i = 0; i < n; ++i) {
+    if (y.item(i) == 0) {
+      ++zeros;
+    } else {
+      ASSERT_DOUBLE_EQ(y.item(i), 1 / 0.7);
+    }
+  }
+  EXPECT_NEAR(static_cast<double>(zeros) / static_cast<double>(n), 0.3, 0.005);
+  const Var x(y);
+  EXPECT_EQ(dropout(x, 0, RngKey{}).value.raw(), y.raw()) << "p = 0 does nothing";
+}
+
+TEST(Rotations, GoThereAndBack) {
+  const Tensor q = random({50, 4}, 1);
+  const Tensor r = quaternion_to_matrix(Var(q)).value;
+  const Tensor unit = matrix_to_quaternion(r);
+  for (int64_t i = 0; i < 50; ++i) {
+    double norm = 0, dot = 0;
+    for (int c = 0; c < 4; ++c) {
+      norm += q.item(4 * i + c) * q.item(4 * i + c);
+      dot += q.item(4 * i + c) * unit.item(4 * i + c);
+    }
+    EXPECT_NEAR(std::abs(dot), std::sqrt(norm), 1e-12);
+    EXPECT_GE(unit.item(4 * i), 0);
+  }
+  expect_near(quaternion_to_matrix(Var(unit)).value, r, 1e-12, "quaternion");
+  expect_near(axis_angle_to_matrix(Var(matrix_to_axis_angle(r))).value, r, 1e-12, "axis angle");
+  expect_near(sixd_to_matrix(matrix_to_sixd(Var(r))).value, r, 1e-12, "6D");
+  EXPECT_THROW(matrix_to_quaternion(q), ShapeError);
+}
+
+TEST(Rotations, AreRotationsAlsoForTinyTurnsInFloat32) {
+  for (const double angle : {0.0, 1e-7, 1e-5, 1e-4, 3e-4, 1e-3, 0.1, 3.1}) {
+    const Tensor w = Tensor::from<double>({1, 3}, {angle * 0.6, 0, angle * 0.8});
+    const Tensor r = axis_angle_to_matrix(Var(w)).value,
+                 narrow = axis_angle_to_matrix(Var(w.cast(DType::f32))).value;
+    expect_near(narrow, r, 3e-7, "float32");
+    EXPECT_NEAR(r.item(0), std::cos(angle) + (1 - std::cos(angle)) * 0.36, 1e-15);
+    EXPECT_NEAR(r.item(3), std::sin(angle) * 0.8, 1e-15);
+  }
+}
+
+TEST(Skeletons, AStraightChainTurnsAtItsJoints) {
+  // Two bones of length 1 along y; the second joint turns by 90 degrees about z.
+  const Tensor rest = Tensor::from<double>({1, 3, 3}, {0, 0, 0, 0, 1, 0, 0, 2, 0});
+  const Tensor turns = Tensor::from<double>({1, 3, 3}, {0, 0, 0, 0, 0, std::acos(0.0), 0, 0, 0});
+  const Var t = forward_kinematics(axis_angle_to_matrix(Var(turns)), Var(rest),
+                                   Var(Tensor::from<double>({1, 3}, {5, 0, 0})), {-1, 0, 1});
+  expect_near(joints_of(t).value, Tensor::from<double>({1, 3, 3}, {5, 0, 0, 5, 1, 0, 4, 1, 0}),
+              1e-15, "joints");
+  expect_near(rotations_of(t).value.rows(0, 1).reshape({3, 3, 3}).rows(2, 3),
+              Tensor::from<double>({1, 3, 3}, {0, -1, 0, 1, 0, 0, 0, 0, 1}), 1e-15, "rotation");
+  // A point on the last bone, bound to the second joint, moves with it.
+  const Var skin =
+      linear_blend_skinning(Var(Tensor::from<double>({1, 1, 3}, {0, 1.5, 0})),
+                            Var(Tensor::from<double>({1, 1, 3}, {0, 1, 0})), t, Var(rest));
+  expect_near(skin.value, Tensor::from<double>({1, 1, 3}, {4.5, 1, 0}), 1e-15, "skin");
+}
+
+}  // namespace
+}  // namespace restage

@@ -1,0 +1,106 @@
+#include "autograd/tensor/tensor.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+
+#include "autograd/base/error.h"
+
+namespace restage {
+namespace {
+
+TEST(TensorShape, CountsAndPrints) {
+  const Shape s{2, 3, 4};
+  EXPECT_EQ(s.numel(), 24);
+  EXPECT_EQ(s.product(1, 3), 12);
+  EXPECT_EQ(s[-1], 4);
+  EXPECT_EQ(s.str(), "[2, 3, 4]");
+  EXPECT_EQ(Shape{}.numel(), 1);
+  EXPECT_EQ(Shape{}.str(), "[]");
+  EXPECT_EQ((Shape{2, 0}).numel(), 0);
+  EXPECT_FALSE((s == Shape{2, 3}));
+  EXPECT_THROW((Shape{1, 1, 1, 1, 1, 1, 1}), ShapeError);
+  EXPECT_THROW((Shape{-2}), ShapeError);
+}
+
+TEST(TensorShape, BroadcastsLikeNumpy) {
+  bool ok = false;
+  EXPECT_EQ(broadcast_shape({2, 1, 4}, {3, 1}, &ok), (Shape{2, 3, 4}));
+  EXPECT_TRUE(ok);
+  EXPECT_EQ(broadcast_shape({0}, {1}, &ok), (Shape{0}));
+  EXPECT_TRUE(ok);
+  broadcast_shape({2}, {3}, &ok);
+  EXPECT_FALSE(ok);
+  broadcast_shape({0}, {3}, &ok);
+  EXPECT_FALSE(ok);
+}
+
+TEST(Tensors, AreAlignedWhateverTheirSize) {
+  for (const int64_t n : {0, 1, 3, 16, 17, 1000, 70000, 300000})
+    for (const DType type : {DType::f32, DType::f64, DType::i32, DType::i64})
+      EXPECT_EQ(reinterpret_cast<uintptr_t>(Tensor::empty({n}, type).raw()) % 64, 0u);
+}
+
+TEST(Tensors, RefuseImpossibleSizes) {
+  EXPECT_THROW(Tensor::empty({-1}), ShapeError);
+  EXPECT_THROW(Tensor::empty({int64_t{1} << 40, int64_t{1} << 40}), ShapeError);
+  EXPECT_THROW(Tensor::empty({0, int64_t{1} << 40, int64_t{1} << 40}), ShapeError);
+  EXPECT_THROW(Tensor::from<float>({3}, {1, 2}), ShapeError);
+}
+
+TEST(Tensors, ReshapeAndRowsShareMemory) {
+  Tensor t = Tensor::from<float>({4, 3}, {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11});
+  const Tensor flat = t.reshape({-1}), middle = t.rows(1, 3);
+  EXPECT_EQ(flat.shape(), (Shape{12}));
+  EXPECT_EQ(middle.shape(), (Shape{2, 3}));
+  t.data<float>()[3] = 42;
+  EXPECT_EQ(flat.item(3), 42);
+  EXPECT_EQ(middle.item(0), 42);
+  const Tensor copy = middle.clone();
+  t.data<float>()[3] = 7;
+  EXPECT_EQ(copy.item(0), 42);
+  EXPECT_EQ(middle.numel(), 6);
+  EXPECT_EQ(t.rows(4, 4).numel(), 0);
+}
+
+TEST(Tensors, KeepTheirMemoryWhileAViewLives) {
+  Tensor view;
+  {
+    const Tensor t = Tensor::full({8}, 5, DType::f64);
+    view = t.rows(6, 8);
+  }
+  const Tensor other = Tensor::full({8}, 1, DType::f64);  // would take the freed block
+  EXPECT_EQ(view.item(0), 5);
+}
+
+TEST(Tensors, ReshapeKnowsOneOpenSize) {
+  const Tensor t = Tensor::zeros({2, 6});
+  EXPECT_EQ(t.reshape({3, -1}).shape(), (Shape{3, 4}));
+  EXPECT_EQ(Tensor::zeros({0, 4}).reshape({0, -1}).shape(), (Shape{0, 0}));
+  EXPECT_EQ(Tensor::zeros({0, 4}).reshape({-1, 4}).shape(), (Shape{0, 4}));
+  EXPECT_THROW(t.reshape({5, -1}), ShapeError);
+  EXPECT_THROW(t.reshape({-1, -1}), ShapeError);
+  EXPECT_THROW(t.reshape({7}), ShapeError);
+  EXPECT_THROW(t.reshape({0, -1}), ShapeError);
+  EXPECT_THROW(t.rows(1, 3), ShapeError);
+  EXPECT_THROW(t.rows(2, 1), ShapeError);
+  EXPECT_THROW(t.rows(-1, 1), ShapeError);
+}
+
+TEST(Tensors, ConvertAndGuardTheirDtype) {
+  const Tensor t = Tensor::from<double>({3}, {1.5, -2, 3});
+  EXPECT_EQ(t.cast(DType::f32).item(0), 1.5);
+  EXPECT_EQ(t.cast(DType::i32).item(1), -2);
+  EXPECT_EQ(t.cast(DType::i64).to_vector<double>(), (std::vector<double>{1, -2, 3}));
+  EXPECT_EQ(t.cast(DType::f64).raw(), t.raw());
+  EXPECT_THROW(t.data<float>(), ShapeError);
+  EXPECT_EQ(Tensor::full({2}, 7, DType::i64).item(1), 7);
+}
+
+TEST(Tensors, KnowTheirDevice) {
+  EXPECT_EQ(Tensor::zeros({1}).device(), (Device{}));
+  EXPECT_THROW(Tensor::empty({1}, DType::f32, Device{3, 0}), Error);
+}
+
+}  // namespace
+}  // namespace restage
