@@ -1,5 +1,7 @@
 #include "nn/geometry/skeleton.h"
 
+#include <cmath>
+
 namespace restage {
 
 PosedSkeleton forward_kinematics(const Joints& rest, const Pose& pose) {
@@ -34,6 +36,14 @@ double leg_length(const Joints& x) {
   };
   return 0.5 * (side(1, 4, 7) + side(2, 5, 8));
 }
+
+double heading_angle(const Joints& x) {
+  const Vec3 across = (x[16] - x[17]) + (x[1] - x[2]);
+  if (across[0] * across[0] + across[2] * across[2] < 1e-12) return 0;
+  return std::atan2(-across[2], across[0]);
+}
+
+Mat3 turn_about_y(double angle) { return Eigen::AngleAxisd(angle, Vec3::UnitY()).toRotationMatrix(); }
 
 Mat3 shortest_arc(const Vec3& a, const Vec3& b) {
   return Quat::FromTwoVectors(a, b).toRotationMatrix();

@@ -47,6 +47,11 @@ Rotations to_local(const Rotations& global);
 Rotations to_global(const Rotations& local);
 /// Hip-knee plus knee-ankle, mean of both sides (spec 3.3), metres.
 double leg_length(const Joints& joints);
+/// Angle about y by which a posed body faces away from +z (spec 3.3: across = left minus right shoulder
+/// plus left minus right hip), radians; 0 if it cannot be told.
+double heading_angle(const Joints& joints);
+/// Rotation by `angle` about y.
+Mat3 turn_about_y(double angle);
 /// Smallest rotation that takes direction a onto direction b (half turn about any axis if
 /// opposite).
 Mat3 shortest_arc(const Vec3& a, const Vec3& b);

@@ -62,8 +62,8 @@ Var twist_loss(const Var& rotations) {
 
 }  // namespace
 
-Var rotation_loss(const Var& rotations, const Tensor& sixd) {
-  return mse(reshape(matrix_to_sixd(rotations), sixd.shape()), Var(sixd));
+Var rotation_loss(const Var& rotations, const Var& sixd) {
+  return mse(reshape(matrix_to_sixd(rotations), sixd.shape()), sixd);
 }
 
 MotionLosses motion_losses(Context& ctx, const Smrm& net, Discriminator* discriminator,
@@ -74,13 +74,13 @@ MotionLosses motion_losses(Context& ctx, const Smrm& net, Discriminator* discrim
   const SmrmOutput to_a = net(ctx, to_b.joints, to_b.trans, b.rest_a, &back);
   out.joints_b = to_b.joints;
   out.trans_b = to_b.trans;
-  out.cycle = mse(to_a.joints, b.joints) + mse(to_a.trans, b.trans);
+  out.cycle = mse(to_a.joints, b.joints) + mse(to_a.trans, b.true_trans);
   out.rotation = rotation_loss(to_a.rotations, b.sixd);
   out.smoothness = mse(differences(to_a.joints), differences(b.joints));
-  Var self = per_sample(square(to_b.joints - Var(b.joints))) +
-             per_sample(square(to_b.trans - Var(b.trans)));
+  Var self = per_sample(square(to_b.joints - b.joints)) +
+             per_sample(square(to_b.trans - b.true_trans));
   if (w.self_rotation > 0) {
-    const Var d = reshape(matrix_to_sixd(to_b.rotations), b.sixd.shape()) - Var(b.sixd);
+    const Var d = reshape(matrix_to_sixd(to_b.rotations), b.sixd.shape()) - b.sixd;
     self = self + scale(per_sample(square(d)), w.self_rotation);
   }
   out.self = masked_mean(self, b.self_mask);
@@ -98,10 +98,24 @@ MotionLosses motion_losses(Context& ctx, const Smrm& net, Discriminator* discrim
   return out;
 }
 
-DiscriminatorLosses discriminator_losses(Context& ctx, Discriminator& net, const Tensor& real,
-                                         const Tensor& real_trans, const Tensor& real_rest,
-                                         const Tensor& fake, const Tensor& fake_trans,
-                                         const Tensor& fake_rest) {
+MotionLosses self_losses(Context& ctx, const Smrm& net, const MotionBatch& b, const MotionWeights& w) {
+  MotionLosses out;
+  SmrmState state;
+  const SmrmOutput to_a = net(ctx, b.input, b.trans, b.rest_a, &state);
+  out.joints_b = to_a.joints;
+  out.trans_b = to_a.trans;
+  out.cycle = mse(to_a.joints, b.joints) + mse(to_a.trans, b.true_trans);
+  out.rotation = rotation_loss(to_a.rotations, b.sixd);
+  out.smoothness = mse(differences(to_a.joints), differences(b.joints));
+  out.self = out.cycle + scale(out.rotation, w.rotation) + scale(out.smoothness, w.smoothness);
+  out.total = scale(out.self, w.self);
+  return out;
+}
+
+DiscriminatorLosses discriminator_losses(Context& ctx, Discriminator& net, const Var& real,
+                                         const Var& real_trans, const Var& real_rest,
+                                         const Var& fake, const Var& fake_trans,
+                                         const Var& fake_rest) {
   DiscriminatorLosses out;
   const Var on_real = net(ctx, discriminator_input(real, real_trans), bone_vectors(real_rest));
   const Var on_fake = net(ctx, discriminator_input(fake, fake_trans), bone_vectors(fake_rest));

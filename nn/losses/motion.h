@@ -13,8 +13,11 @@ struct MotionWeights {
 };
 
 /// One batch: motions of A, skeletons of both. Shapes as in Smrm; self_mask [n] is 1 where B is A.
+/// `input` and `trans` are what the network sees (perhaps with noise), `joints` and `true_trans` what
+/// is true.
 struct MotionBatch {
-  Tensor joints, input, trans, rest_a, rest_b, sixd, self_mask;
+  Var joints, input, true_trans, trans, rest_a, rest_b, sixd;
+  Tensor self_mask;
 };
 
 struct MotionLosses {
@@ -27,18 +30,22 @@ struct MotionLosses {
 MotionLosses motion_losses(Context& ctx, const Smrm& net, Discriminator* discriminator,
                            const MotionBatch& batch, const MotionWeights& weights);
 
+/// Self-reconstruction alone: one pass A -> A, whose answer is known. cycle and trans errors, rotation
+/// and smoothness are those of this pass; `self` is their weighted sum.
+MotionLosses self_losses(Context& ctx, const Smrm& net, const MotionBatch& batch, const MotionWeights& weights);
+
 struct DiscriminatorLosses {
   Var real, fake, total;
   double fake_score;  ///< mean sigmoid of the fake logits, for the balance rule
 };
 /// Discriminator side on constants; real and fake go through in separate passes.
-DiscriminatorLosses discriminator_losses(Context& ctx, Discriminator& net, const Tensor& real,
-                                         const Tensor& real_trans, const Tensor& real_rest,
-                                         const Tensor& fake, const Tensor& fake_trans,
-                                         const Tensor& fake_rest);
+DiscriminatorLosses discriminator_losses(Context& ctx, Discriminator& net, const Var& real,
+                                         const Var& real_trans, const Var& real_rest,
+                                         const Var& fake, const Var& fake_trans,
+                                         const Var& fake_rest);
 
 /// Mean over rows of (6D(predicted) - target)^2, or for quaternions the sign-free difference (Q5,
 /// Q6).
-Var rotation_loss(const Var& rotations, const Tensor& sixd);
+Var rotation_loss(const Var& rotations, const Var& sixd);
 
 }  // namespace restage

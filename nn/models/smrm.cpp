@@ -23,23 +23,26 @@ Smrm::Smrm(const SmrmConfig& c, const Init& init)
       dec(c.hidden + 3 * c.joints, c.hidden, c.layers, c.dropout, init.sub("dec")),
       fc_rot(c.hidden, c.joints * rotation_width(c.rotation), init.sub("fc_rot")),
       fc_trans(c.hidden, 3, init.sub("fc_trans")) {
+  const int64_t width = rotation_width(c.rotation);
+  std::vector<double> rest_pose(static_cast<size_t>(c.joints * width), 0.0);
+  for (int64_t j = 0; j < c.joints; ++j) {
+    rest_pose[static_cast<size_t>(j * width)] = 1;
+    if (width == 6) rest_pose[static_cast<size_t>(j * width + 4)] = 1;
+  }
   if (c.rest_pose_start) {
-    const int64_t width = rotation_width(c.rotation);
-    std::vector<double> w = fc_rot.weight.value.to_vector<double>(),
-                        b(static_cast<size_t>(c.joints * width), 0.0);
+    std::vector<double> w = fc_rot.weight.value.to_vector<double>();
     for (double& v : w) v *= 0.01;
-    for (int64_t j = 0; j < c.joints; ++j) {
-      b[static_cast<size_t>(j * width)] = 1;
-      if (width == 6) b[static_cast<size_t>(j * width + 4)] = 1;
-    }
     fc_rot.weight.value = Tensor::from<double>(fc_rot.weight.value.shape(), w).cast(init.type);
-    fc_rot.bias.value = Tensor::from<double>({c.joints * width}, b).cast(init.type);
+    fc_rot.bias.value = c.standardise ? Tensor::full({c.joints * width}, 0, init.type)
+                                      : Tensor::from<double>({c.joints * width}, rest_pose).cast(init.type);
   }
   if (c.standardise) {
     const auto constant = [&](int64_t n, double v) { return Tensor::full({n}, v, init.type); };
     joint_mean = constant(3 * c.joints, 0), joint_std = constant(3 * c.joints, 1);
     rest_mean = constant(3 * c.joints, 0), rest_std = constant(3 * c.joints, 1);
     trans_mean = constant(3, 0), trans_std = constant(3, 1);
+    rot_mean = Tensor::from<double>({c.joints * width}, rest_pose).cast(init.type);
+    rot_std = constant(c.joints * width, 1);
   }
 }
 
@@ -58,7 +61,10 @@ SmrmOutput Smrm::operator()(Context& ctx, const Var& joints, const Var& trans, c
   SmrmOutput out;
   out.raw = fc_rot(ctx, decoded);
   out.trans = fc_trans(ctx, decoded);
-  if (config.standardise) out.trans = out.trans * Var(trans_std) + Var(trans_mean);
+  if (config.standardise) {
+    out.raw = out.raw * Var(rot_std) + Var(rot_mean);
+    out.trans = out.trans * Var(trans_std) + Var(trans_mean);
+  }
   const Var rows = reshape(out.raw, {n * t, j, rotation_width(config.rotation)});
   const Var local =
       config.rotation == RotationForm::sixd ? sixd_to_matrix(rows) : quaternion_to_matrix(rows);
@@ -82,6 +88,8 @@ void Smrm::visit(Fields& f) {
   f("rest_std", rest_std);
   f("trans_mean", trans_mean);
   f("trans_std", trans_std);
+  f("rot_mean", rot_mean);
+  f("rot_std", rot_std);
 }
 
 }  // namespace restage

@@ -43,7 +43,7 @@ struct Smrm : Module {
   Linear fc_rot, fc_trans;
   // Standardisation (only with config.standardise): mean and deviation of joints, rest,
   // translation.
-  Tensor joint_mean, joint_std, rest_mean, rest_std, trans_mean, trans_std;
+  Tensor joint_mean, joint_std, rest_mean, rest_std, trans_mean, trans_std, rot_mean, rot_std;
 };
 
 /// Parents of the 22 joints as the kinematics op takes them.

@@ -1,0 +1,161 @@
+// restage retarget: clouds of one body in, the same motion by another body out, frame by frame.
+#include <chrono>
+#include <memory>
+
+#include "autograd/base/log.h"
+#include "datasets/readers/frame_folder.h"
+#include "datasets/readers/mesh_io.h"
+#include "datasets/schema.h"
+#include "experiments/cli/commands.h"
+#include "experiments/cli/output.h"
+#include "infer/retargeter.h"
+#include "infer/writers/bvh.h"
+#include "infer/writers/frames.h"
+#include "infer/writers/glb.h"
+
+namespace restage::cli {
+namespace {
+
+struct RetargetCommand {
+  std::string source, target, weights, out, up = "y", format = "ply";
+  double fps = 0, scale = 1;
+  bool force = false, profile = false;
+  int samples = 4;
+};
+
+/// Where results go; one class for each kind of file.
+class Sink {
+ public:
+  virtual ~Sink() = default;
+  virtual void push(const RetargetedFrame& frame) = 0;
+  virtual void commit() = 0;
+};
+
+struct GlbSink final : Sink {
+  GlbSink(const std::string& path, const Retargeter& r) : writer(path, r.target(), r.rest(), r.weights()) {}
+  void push(const RetargetedFrame& f) override { writer.push(f.pose); }
+  void commit() override {
+    const InfluenceError e = writer.commit();
+    char text[160];
+    std::snprintf(text, sizeof text, "four weights per vertex instead of 22: %.2f mm on average, at most %.2f mm",
+                  1e3 * e.mean, 1e3 * e.max);
+    log_info(text);
+  }
+  GlbWriter writer;
+};
+
+struct BvhSink final : Sink {
+  BvhSink(const std::string& path, const Retargeter& r) : writer(path, r.rest()) {}
+  void push(const RetargetedFrame& f) override { writer.push(f.pose); }
+  void commit() override { writer.commit(); }
+  BvhWriter writer;
+};
+
+struct H5Sink final : Sink {
+  H5Sink(const std::string& path, const Retargeter& r)
+      : writer(path, static_cast<int64_t>(r.target().vertices.size()), r.target().faces, FileInfo{}, kFps) {}
+  void push(const RetargetedFrame& f) override { writer.append(f.joints, f.vertices); }
+  void commit() override { writer.commit(); }
+  PredictionWriter writer;
+};
+
+struct FolderSink final : Sink {
+  FolderSink(const std::string& path, const Retargeter& r, MeshFormat format)
+      : writer(path, r.target().faces, format) {}
+  void push(const RetargetedFrame& f) override { writer.push(f.vertices); }
+  void commit() override { writer.commit(); }
+  FrameFolderWriter writer;
+};
+
+std::unique_ptr<Sink> make_sink(const RetargetCommand& c, const Retargeter& r) {
+  if (c.out.ends_with(".glb")) return std::make_unique<GlbSink>(c.out, r);
+  if (c.out.ends_with(".bvh")) return std::make_unique<BvhSink>(c.out, r);
+  if (c.out.ends_with(".h5")) return std::make_unique<H5Sink>(c.out, r);
+  return std::make_unique<FolderSink>(c.out, r, c.format == "obj" ? MeshFormat::obj : MeshFormat::ply);
+}
+
+void check(const RetargetCommand& c) {
+  if (c.up != "y" && c.up != "z") throw InputError("", "--source-up '" + c.up + "' is unknown", "use y or z");
+  if (c.format != "ply" && c.format != "obj") throw InputError("", "--format '" + c.format + "' is unknown", "use ply or obj");
+  if (!(c.scale > 0) || !std::isfinite(c.scale)) throw InputError("", "--scale must be above 0", "metres = units x scale");
+  if (c.fps < 0 || c.fps > 1000 || !std::isfinite(c.fps))
+    throw InputError("", "--fps is out of range", "give the source's frames per second");
+  if (c.samples < 1 || c.samples > 256) throw InputError("", "--samples is out of range", "give 1 to 256");
+  const auto dot = c.out.find_last_of('.');
+  const auto slash = c.out.find_last_of('/');
+  const bool extension = dot != std::string::npos && (slash == std::string::npos || dot > slash) && dot + 1 < c.out.size();
+  if (extension && !c.out.ends_with(".glb") && !c.out.ends_with(".bvh") && !c.out.ends_with(".h5"))
+    throw InputError(c.out, "is of no kind that can be written", "end it in .glb, .bvh, .h5, or / for a folder");
+}
+
+void to_metres(const RetargetCommand& c, Points& points) {
+  for (Point& p : points) {
+    if (c.up == "z") p = Point(p[0], p[2], -p[1]);
+    p *= static_cast<float>(c.scale);
+  }
+}
+
+int run_retarget(const RetargetCommand& c, const Common& common) {
+  check(c);
+  const ModelSet models = load_models(c.weights, {.skeleton = true, .smrm = true, .deformation = true});
+  const auto frames = open_frames(c.source);
+  RetargetOptions options;
+  options.fps = c.fps > 0 ? c.fps : frames->fps();
+  options.force = c.force;
+  options.seed = common.seed;
+  options.samples = c.samples;
+  Retargeter retargeter(models, read_mesh(c.target), c.target, options);
+  // The first frame is looked at before anything is written or logged.
+  auto frame = frames->next();
+  if (!frame) throw InputError(c.source, "holds no frames", "give at least one cloud");
+  const auto sink = make_sink(c, retargeter);
+  int64_t in = 0, out = 0, sequence = frame->sequence;
+  const auto start = std::chrono::steady_clock::now();
+  for (; frame; frame = frames->next()) {
+    if (frame->sequence != sequence)
+      throw InputError(c.source, "holds several sequences", "give one sequence at a time");
+    to_metres(c, frame->points);
+    for (const RetargetedFrame& f : retargeter.push(frame->points, frame->source)) {
+      sink->push(f);
+      ++out;
+    }
+    ++in;
+  }
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  sink->commit();
+  if (c.profile) {
+    char text[160];
+    std::snprintf(text, sizeof text, "%.2f ms a frame, peak of tensors %.1f MiB", 1e3 * seconds / static_cast<double>(in),
+                  static_cast<double>(memory_stats().peak) / 1048576.0);
+    log_info(text);
+  }
+  if (common.json) {
+    print_json({{"out", c.out}, {"source_frames", in}, {"frames", out}, {"fps", kFps}, {"seed", common.seed}});
+  } else {
+    print("wrote " + c.out + ": " + std::to_string(out) + " frames (seed " + std::to_string(common.seed) + ")\n");
+  }
+  return 0;
+}
+
+}  // namespace
+
+void add_retarget(Program& program) {
+  const auto c = std::make_shared<RetargetCommand>();
+  CLI::App& app = program.add("retarget", "a target performs the motion of a sequence of clouds",
+                              "restage retarget --source scans/ --target hero.obj --weights w.safetensors --out hero.glb\n"
+                              "restage retarget --source scans.h5 --target hero.ply --weights runs/demo-1 --out result.h5",
+                              [c, &program] { return run_retarget(*c, program.common()); });
+  app.add_option("--source", c->source, "folder of clouds or HDF5 file of scans")->required();
+  app.add_option("--target", c->target, "mesh or cloud in T-pose, y up, facing +z")->required();
+  app.add_option("--weights", c->weights, "weights file or run directory")->required();
+  app.add_option("--out", c->out, "X.glb, X.bvh, X.h5, or a folder for PLY or OBJ frames")->required();
+  app.add_option("--fps", c->fps, "frames per second of the source (default: the file's, else 30)");
+  app.add_option("--source-up", c->up, "the source's up axis, y or z");
+  app.add_option("--scale", c->scale, "the source's units in metres");
+  app.add_option("--format", c->format, "of a folder's frames: ply or obj");
+  app.add_option("--samples", c->samples, "random choices of points per frame to average");
+  app.add_flag("--force", c->force, "accept a target that does not look like a T-pose");
+  app.add_flag("--profile", c->profile, "say how long a frame takes");
+}
+
+}  // namespace restage::cli

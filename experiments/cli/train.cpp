@@ -1,0 +1,113 @@
+// restage train: all stages of a configuration, or the rest of an interrupted run.
+#include <filesystem>
+#include <memory>
+
+#include "autograd/base/atomic_file.h"
+#include "autograd/base/log.h"
+#include "autograd/base/parallel.h"
+#include "experiments/cli/commands.h"
+#include "experiments/cli/output.h"
+#include "train/config.h"
+#include "train/run_provenance.h"
+#include "train/stages/registry.h"
+
+namespace restage::cli {
+namespace {
+
+struct TrainOptions {
+  std::vector<std::string> arguments;
+  bool seed_given = false;
+};
+
+/// CONFIG.yaml and key=value, in any order; resume=RUN stands alone.
+struct Request {
+  std::string config, resume;
+  std::vector<std::string> overrides;
+};
+
+Request read_request(const std::vector<std::string>& arguments) {
+  Request out;
+  for (const std::string& a : arguments) {
+    if (a.starts_with("resume=")) {
+      out.resume = a.substr(7);
+    } else if (a.find('=') != std::string::npos) {
+      out.overrides.push_back(a);
+    } else if (out.config.empty()) {
+      out.config = a;
+    } else {
+      throw InputError("", "there are two configurations, '" + out.config + "' and '" + a + "'",
+                       "give one, and include: others in it");
+    }
+  }
+  if (out.config.empty() == out.resume.empty())
+    throw InputError("", out.config.empty() ? "no configuration was given" : "a resumed run has its own configuration",
+                     "use 'restage train CONFIG.yaml [key=value ...]' or 'restage train resume=RUN_DIR'");
+  if (!out.resume.empty() && !out.overrides.empty())
+    throw InputError("", "'" + out.overrides[0] + "' cannot change a resumed run", "leave it out, or train anew");
+  return out;
+}
+
+/// Everything that can be wrong with the input, found before a run directory is made.
+void check_models(const TrainConfig& c) {
+  for (const std::string& stage : c.stages) {
+    if (stage == "skeleton") make_skeleton_model(c.skeleton.model, c.skeleton.sizes, Init{});
+  }
+}
+
+int run_train(const TrainOptions& options, const Program& program, const std::vector<std::string>& command_line) {
+  const Request request = read_request(options.arguments);
+  const Common& common = program.common();
+  TrainConfig config;
+  if (request.resume.empty()) {
+    std::vector<std::string> overrides = request.overrides;
+    if (options.seed_given) overrides.push_back("seed=" + std::to_string(common.seed));
+    load_config(request.config, overrides, config);
+  } else {
+    load_config(run_config_path(request.resume), {}, config);
+  }
+  check_models(config);
+  const Corpus train_corpus = load_corpus(config.data, "train");
+  const Corpus validation = load_corpus(config.data, "validation");
+
+  RunInput input{config.seed, threads(), command_line, {}};
+  if (config.data.source != "builtin") input.data.push_back({config.data.source, checksum(train_corpus)});
+  RunDir run = request.resume.empty()
+                   ? RunDir::create(config.run_root, config.name, resolved_yaml(config), provenance_json(input), config.stages)
+                   : RunDir::resume(request.resume, config.stages);
+  if (common.json) {
+    print_json({{"run", run.dir()}, {"seed", config.seed}});
+  } else {
+    print(run.dir() + "\n");
+  }
+  finish_output();
+  log_info("seed " + std::to_string(config.seed) + ", " + std::to_string(threads()) + " threads; " +
+           std::to_string(train_corpus.bodies.size()) + " bodies and " + std::to_string(train_corpus.motions.size()) +
+           " motions to train on");
+  const ModelSet models = train(
+      run, config.stages, config.loop,
+      [&](const std::string& stage) { return make_stage(stage, config, train_corpus, validation); }, common.quiet);
+  save_models(run.dir() + "/weights.safetensors", models);
+  log_info("weights: " + run.dir() + "/weights.safetensors");
+  return 0;
+}
+
+}  // namespace
+
+void add_train(Program& program) {
+  const auto options = std::make_shared<TrainOptions>();
+  CLI::App& app = program.add("train", "train the stages of a configuration",
+                              "restage train configs/demo.yaml\n"
+                              "restage train configs/lite/all.yaml data.source=data.h5 motion.optimiser.steps=2000\n"
+                              "restage train resume=runs/demo-20260101-120000-1",
+                              [options, &program] {
+                                std::vector<std::string> line = {"restage", "train"};
+                                line.insert(line.end(), options->arguments.begin(), options->arguments.end());
+                                return run_train(*options, program, line);
+                              });
+  app.add_option("ARGUMENTS", options->arguments, "CONFIG.yaml and key=value overrides, or resume=RUN_DIR")->required();
+  app.preparse_callback([options](size_t) {});
+  if (CLI::Option* seed = app.get_option_no_throw("--seed"))
+    app.callback([options, seed] { options->seed_given = seed->count() > 0; });
+}
+
+}  // namespace restage::cli

@@ -1,0 +1,164 @@
+#include "infer/retargeter.h"
+
+#include <cmath>
+
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+#include "autograd/ops/rotation.h"
+#include "nn/losses/deformation.h"
+
+namespace restage {
+namespace {
+
+constexpr int kTargetSamples = 16;     // a target is looked at once: average many choices of points
+constexpr size_t kTargetPoints = 8192;
+constexpr double kTposeLimit = 30.0;   // degrees
+
+Tensor tensor_of(const Joints& joints, const Vec3& origin) {
+  Tensor t = Tensor::empty({1, kJoints, 3});
+  for (size_t j = 0; j < kJoints; ++j)
+    for (int c = 0; c < 3; ++c)
+      t.data<float>()[3 * j + static_cast<size_t>(c)] = static_cast<float>(joints[j][c] - origin[c]);
+  return t;
+}
+
+Joints blend(const Joints& a, const Joints& b, double t) {
+  Joints out;
+  for (size_t j = 0; j < kJoints; ++j) out[j] = (1 - t) * a[j] + t * b[j];
+  return out;
+}
+
+void require_tpose(const Joints& j, const std::string& where) {
+  for (const auto& [shoulder, wrist, side] : {std::tuple<size_t, size_t, double>{16, 20, 1.0}, {17, 21, -1.0}}) {
+    const Vec3 arm = j[wrist] - j[shoulder];
+    const double angle = std::acos(std::clamp(side * arm[0] / std::max(arm.norm(), 1e-9), -1.0, 1.0)) * 180 / M_PI;
+    if (angle <= kTposeLimit) continue;
+    char text[96];
+    std::snprintf(text, sizeof text, "is not in T-pose: the %s arm is %.0f degrees from %sx", side > 0 ? "left" : "right",
+                  angle, side > 0 ? "+" : "-");
+    throw InputError(where, text, "give the target in T-pose facing +z, y up, or add --force");
+  }
+}
+
+}  // namespace
+
+Retargeter::Retargeter(const ModelSet& models, Mesh target, const std::string& where, const RetargetOptions& options)
+    : models_(models), target_(std::move(target)), options_(options) {
+  const RngKey key = RngKey{options.seed, 0}.fold("target");
+  rest_ = extract_joints(*models.skeleton, surface_points(target_, kTargetPoints, key.fold("surface")), where, key,
+                         kTargetSamples);
+  if (!options.force) require_tpose(rest_, where);
+  prepare();
+}
+
+Retargeter::Retargeter(const ModelSet& models, Mesh target, const Joints& rest, const RetargetOptions& options)
+    : models_(models), target_(std::move(target)), options_(options), rest_(rest) {
+  prepare();
+}
+
+void Retargeter::prepare() {
+  const auto extra = [&](const char* name, const char* standard) {
+    const auto it = models_.extra.find(name);
+    return it == models_.extra.end() ? std::string(standard) : it->second;
+  };
+  velocity_ = extra("translation", "velocity") == "velocity";
+  remove_heading_ = extra("remove_heading", "false") == "true";
+  keep_root_rotation_ = extra("keep_root_rotation", "true") == "true";
+  const auto v = static_cast<int64_t>(target_.vertices.size());
+  rest_tensor_ = tensor_of(rest_, rest_[0]);
+  points_tensor_ = Tensor::empty({1, v, 3});
+  for (size_t i = 0; i < target_.vertices.size(); ++i)
+    for (int c = 0; c < 3; ++c)
+      points_tensor_.data<float>()[3 * i + static_cast<size_t>(c)] =
+          target_.vertices[i][c] - static_cast<float>(rest_[0][c]);
+  Context ctx;
+  weights_tensor_ =
+      (*models_.weights)(ctx, join_points(Var(rest_tensor_.reshape({1, 3 * kJoints})), Var(points_tensor_))).value;
+  weights_ = Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, kJoints, Eigen::RowMajor>>(
+      weights_tensor_.data<float>(), v, kJoints);
+}
+
+void Retargeter::restart() {
+  state_ = {};
+  previous_.reset();
+  received_.reset();
+  frame_ = grid_ = 0;
+}
+
+std::vector<RetargetedFrame> Retargeter::push(const Points& cloud, const std::string& source) {
+  const RngKey key = RngKey{options_.seed, 0}.fold("frame").fold(static_cast<uint64_t>(frame_));
+  return push_joints(extract_joints(*models_.skeleton, cloud, source, key, options_.samples));
+}
+
+std::vector<RetargetedFrame> Retargeter::push_joints(const Joints& joints) {
+  last_source_ = joints;
+  std::vector<RetargetedFrame> out;
+  const double now = static_cast<double>(frame_) / options_.fps;
+  // Grid frames up to this moment; positions between two source frames are interpolated.
+  while (static_cast<double>(grid_) / kFps <= now + 1e-9) {
+    const double back = (now - static_cast<double>(grid_) / kFps) * options_.fps;  // in source frames
+    out.push_back(step(received_ && back > 1e-9 ? blend(joints, *received_, std::min(back, 1.0)) : joints));
+    ++grid_;
+  }
+  received_ = joints;
+  ++frame_;
+  return out;
+}
+
+RetargetedFrame Retargeter::step(const Joints& a) {
+  const double heading = remove_heading_ ? heading_angle(a) : 0;
+  const Mat3 turn = turn_about_y(heading), back = turn.transpose();
+  Joints local;
+  for (size_t j = 0; j < kJoints; ++j) local[j] = back * (a[j] - a[0]);
+  Vec3 moved = Vec3::Zero();
+  const double height_ratio = leg_length(rest_) / std::max(leg_length(previous_ ? *previous_ : a), 1e-6);
+  if (velocity_) {
+    if (previous_) moved = back * (a[0] - (*previous_)[0]) * kFps;
+  } else {
+    moved = back * a[0];
+  }
+  Tensor trans = Tensor::empty({1, 1, 3});
+  for (int c = 0; c < 3; ++c) trans.data<float>()[c] = static_cast<float>(moved[c]);
+  Context ctx;
+  const SmrmOutput answer = (*models_.smrm)(ctx, Var(tensor_of(local, Vec3::Zero()).reshape({1, 1, kJoints, 3})),
+                                            Var(trans), Var(rest_tensor_), &state_);
+  RetargetedFrame out;
+  const float* r = answer.rotations.value.data<float>();
+  for (size_t j = 0; j < kJoints; ++j)
+    out.pose.local[j] = Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(r + 9 * j).cast<double>();
+  out.pose.local[0] = turn * out.pose.local[0];
+  const float* t = answer.trans.value.data<float>();
+  const Vec3 t_b = turn * Vec3(t[0], t[1], t[2]);
+  if (velocity_) {
+    root_b_ = previous_ ? Vec3(root_b_ + t_b / kFps) : Vec3(height_ratio * a[0]);
+  } else {
+    root_b_ = t_b;
+  }
+  previous_ = a;
+  out.pose.root = root_b_;
+  out.joints = forward_kinematics(rest_, out.pose).joints;
+  out.vertices = pose_vertices(out.pose);
+  return out;
+}
+
+Points Retargeter::pose_vertices(const Pose& pose) const {
+  Tensor local = Tensor::empty({1, kJoints, 3, 3});
+  for (size_t j = 0; j < kJoints; ++j)
+    Eigen::Map<Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(local.data<float>() + 9 * j) = pose.local[j].cast<float>();
+  Context ctx;
+  Var x = points_tensor_;
+  if (models_.offsets) {
+    Tensor angles = matrix_to_axis_angle(local).reshape({1, 3 * kJoints});
+    if (!keep_root_rotation_) std::fill_n(angles.data<float>(), 3, 0.0f);
+    x = x + (*models_.offsets)(ctx, join_points(Var(angles), x));
+  }
+  Tensor root = Tensor::empty({1, 3});
+  for (int c = 0; c < 3; ++c) root.data<float>()[c] = static_cast<float>(pose.root[c]);
+  const Var transforms = forward_kinematics(Var(local), Var(rest_tensor_), Var(root), joint_parents());
+  const Tensor posed = linear_blend_skinning(x, Var(weights_tensor_), transforms, Var(rest_tensor_)).value;
+  Points out(target_.vertices.size());
+  for (size_t i = 0; i < out.size(); ++i) out[i] = Eigen::Map<const Point>(posed.data<float>() + 3 * i);
+  return out;
+}
+
+}  // namespace restage

@@ -1,0 +1,208 @@
+#include "train/stages/motion_stage.h"
+
+#include <cmath>
+
+#include "autograd/ops/elementwise.h"
+#include "nn/metrics/metrics.h"
+
+namespace restage {
+namespace {
+
+std::unique_ptr<Smrm> make_smrm(const MotionStageConfig& c, uint64_t seed) {
+  auto module = make_model(c.model, c.sizes, Init{RngKey{seed, 0}.fold("motion.init"), DType::f32});
+  auto* smrm = dynamic_cast<Smrm*>(module.release());
+  return std::unique_ptr<Smrm>(smrm);
+}
+
+WindowConfig held_out(WindowConfig c, int64_t frames) {
+  c.frames = static_cast<int>(frames);
+  c.self_share = 0;
+  c.noise = 0;
+  c.mirror = false;
+  c.truth = true;
+  return c;
+}
+
+/// With self samples apart, the cycle's windows have none and the others are nothing else.
+WindowConfig cycle_windows(const MotionStageConfig& c) {
+  WindowConfig w = c.windows;
+  if (c.self_first_pass) w.self_share = 0;
+  return w;
+}
+WindowConfig self_windows(const MotionStageConfig& c) {
+  WindowConfig w = c.windows;
+  w.self_share = 1;
+  return w;
+}
+
+MotionBatch motion_batch(const WindowBatch& w) {
+  return {w.joints_a, w.input_a, w.trans_a, w.input_trans_a, w.rest_a, w.rest_b, w.sixd_a, w.self_mask};
+}
+
+/// Mean and deviation per column of rows of width n; deviations are at least `least`.
+void statistics(const std::vector<Tensor>& parts, int64_t n, double least, Tensor* mean, Tensor* deviation) {
+  std::vector<double> s(static_cast<size_t>(n), 0.0), q(s);
+  int64_t rows = 0;
+  for (const Tensor& t : parts) {
+    const float* x = t.data<float>();
+    for (int64_t i = 0; i < t.numel(); ++i) {
+      s[static_cast<size_t>(i % n)] += x[i];
+      q[static_cast<size_t>(i % n)] += static_cast<double>(x[i]) * x[i];
+    }
+    rows += t.numel() / n;
+  }
+  for (size_t i = 0; i < s.size(); ++i) {
+    s[i] /= static_cast<double>(rows);
+    q[i] = std::max(least, std::sqrt(std::max(0.0, q[i] / static_cast<double>(rows) - s[i] * s[i])));
+  }
+  *mean = Tensor::from<double>({n}, s).cast(DType::f32);
+  *deviation = Tensor::from<double>({n}, q).cast(DType::f32);
+}
+
+}  // namespace
+
+MotionStage::MotionStage(const MotionStageConfig& config, const Corpus& train, const Corpus& validation, uint64_t seed)
+    : config_(config),
+      model_(make_smrm(config, seed)),
+      discriminator_(std::make_unique<Discriminator>(DiscriminatorConfig{},
+                                                     Init{RngKey{seed, 0}.fold("discriminator.init"), DType::f32})),
+      adam_({{"model.", model_.get()}}, config.optimiser.adam),
+      discriminator_adam_({{"discriminator.", discriminator_.get()}}, config.discriminator_adam),
+      sampler_(train, cycle_windows(config), RngKey{seed, 0}.fold("motion.windows").stream),
+      self_sampler_(train, self_windows(config), RngKey{seed, 0}.fold("motion.self").stream),
+      validation_sampler_(validation, held_out(config.windows, config.validation_frames), 1),
+      key_(RngKey{seed, 0}.fold("motion.step")) {
+  name_scopes(*discriminator_, "smrm/discriminator");
+  if (model_->config.standardise) set_statistics();
+}
+
+void MotionStage::set_statistics() {
+  std::vector<Tensor> joints, rest, trans, rotations;
+  for (int64_t i = 0; i < 32; ++i) {
+    const WindowBatch b = sampler_.batch(i * 16, 16);
+    joints.push_back(b.joints_a);
+    rest.push_back(b.rest_a);
+    trans.push_back(b.trans_a);
+    rotations.push_back(b.sixd_a);
+  }
+  statistics(joints, 3 * kJoints, 0.01, &model_->joint_mean, &model_->joint_std);
+  statistics(rest, 3 * kJoints, 0.01, &model_->rest_mean, &model_->rest_std);
+  statistics(trans, 3, 0.05, &model_->trans_mean, &model_->trans_std);
+  if (model_->config.rotation == RotationForm::sixd)
+    statistics(rotations, 6 * kJoints, 0.01, &model_->rot_mean, &model_->rot_std);
+}
+
+void MotionStage::update_discriminator(int64_t step, const WindowBatch& batch, double rate, NamedValues* values) {
+  if (balance_ <= config_.balance_limit) return;
+  Context plain;
+  SmrmState state;
+  const SmrmOutput fake = (*model_)(plain, batch.input_a, batch.input_trans_a, batch.rest_b, &state);
+  double score = 0;
+  const Differentiated d =
+      differentiate(key_.fold("discriminator").fold(static_cast<uint64_t>(step)), [&](Context& ctx) {
+        const DiscriminatorLosses l =
+            discriminator_losses(ctx, *discriminator_, batch.real_b, batch.real_trans_b, batch.rest_b,
+                                 fake.joints.value, fake.trans.value, batch.rest_b);
+        score = l.fake_score;
+        return l.total;
+      });
+  balance_ = 0.99 * balance_ + 0.01 * score;
+  discriminator_adam_.step(d.gradients, rate, config_.optimiser.clip);
+  values->push_back({"discriminator", d.loss});
+}
+
+NamedValues MotionStage::step(int64_t step) {
+  const OptimiserConfig& o = config_.optimiser;
+  const double rate = learning_rate(o.schedule, step, o.steps);
+  const int64_t self = config_.self_first_pass ? std::llround(config_.windows.self_share * static_cast<double>(o.batch)) : 0;
+  const int64_t cycle = o.batch - self;
+  const double self_part = static_cast<double>(self) / static_cast<double>(o.batch);
+  NamedValues values;
+  MotionLosses l, s;
+  const bool adversarial = config_.weights.adversarial > 0 && cycle > 1;
+  const WindowBatch windows = cycle > 0 ? sampler_.batch(step * cycle, cycle) : WindowBatch{};
+  const WindowBatch own = self > 0 ? self_sampler_.batch(step * self, self) : WindowBatch{};
+  if (adversarial) update_discriminator(step, windows, rate, &values);
+  const Differentiated d = differentiate(key_.fold(static_cast<uint64_t>(step)), [&](Context& ctx) {
+    Var total;
+    if (self > 0) {
+      s = self_losses(ctx, *model_, motion_batch(own), config_.weights);
+      total = scale(s.total, self_part);
+    }
+    if (cycle > 0) {
+      l = motion_losses(ctx, *model_, adversarial ? discriminator_.get() : nullptr, motion_batch(windows), config_.weights);
+      const Var part = scale(l.total, 1 - self_part);
+      total = self > 0 ? total + part : part;
+    }
+    return total;
+  });
+  adam_.step(d.gradients, rate, o.clip);
+  values.insert(values.begin(), {"loss", d.loss});
+  if (adversarial) {
+    // softplus(-x) = -log sigmoid(x): the batch's mean score, recovered from the loss.
+    balance_ = 0.99 * balance_ + 0.01 * std::exp(-l.adversarial.value.item());
+    values.push_back({"adversarial", l.adversarial.value.item()});
+  }
+  if (cycle > 0) {
+    values.push_back({"cycle", l.cycle.value.item()});
+    values.push_back({"rotation", l.rotation.value.item()});
+    values.push_back({"smoothness", l.smoothness.value.item()});
+  }
+  values.push_back({"self", self > 0 ? s.self.value.item() : l.self.value.item()});
+  values.push_back({"rate", rate});
+  return values;
+}
+
+NamedValues MotionStage::validate() {
+  Context ctx;
+  double pa = 0, local = 0, cycle = 0;
+  const int64_t n = config_.validation_windows, frames = config_.validation_frames;
+  for (int64_t i = 0; i < n; i += 16) {
+    const int64_t count = std::min<int64_t>(16, n - i);
+    const WindowBatch b = validation_sampler_.batch(i, count);
+    SmrmState forth, back;
+    const SmrmOutput to_b = (*model_)(ctx, b.input_a, b.trans_a, b.rest_b, &forth);
+    const SmrmOutput to_a = (*model_)(ctx, to_b.joints, to_b.trans, b.rest_a, &back);
+    const auto error = [&](const Tensor& p, const Tensor& t, int64_t s, bool align) {
+      const Tensor pred = p.rows(s, s + 1).cast(DType::f64), truth = t.rows(s, s + 1).cast(DType::f64);
+      const metrics::Track a{pred.data<double>(), frames, kJoints}, c{truth.data<double>(), frames, kJoints};
+      return metrics::mean_distance(a, c, {align ? metrics::Alignment::Mode::frame : metrics::Alignment::Mode::none, true})
+          .value_or(std::nan(""));
+    };
+    for (int64_t s = 0; s < count; ++s) {
+      pa += error(to_b.joints.value, b.truth_b, s, true);
+      local += error(to_b.joints.value, b.truth_b, s, false);
+      cycle += error(to_a.joints.value, b.joints_a, s, false);
+    }
+  }
+  const auto mean_of = [&](double x) { return x / static_cast<double>(n); };
+  return {{"pa_mpjpe", mean_of(pa)}, {"local_mpjpe", mean_of(local)}, {"cycle_mpjpe", mean_of(cycle)}};
+}
+
+void MotionStage::save(TensorFile& file) const {
+  append(&file, *model_, "model.");
+  append(&file, *discriminator_, "discriminator.");
+  adam_.save("adam.", file);
+  discriminator_adam_.save("discriminator_adam.", file);
+  file.tensors["balance"] = Tensor::from<double>({1}, {balance_});
+}
+
+void MotionStage::load(const TensorFile& file, const std::string& where) {
+  load_state(*model_, file, "model.", where);
+  load_state(*discriminator_, file, "discriminator.", where);
+  adam_.load("adam.", file, where);
+  discriminator_adam_.load("discriminator_adam.", file, where);
+  const Tensor* balance = file.find("balance");
+  if (balance == nullptr || balance->numel() != 1)
+    throw InputError(where, "'balance' is missing", "resume from an undamaged checkpoint");
+  balance_ = balance->item();
+}
+
+void MotionStage::export_models(ModelSet& set) {
+  static const char* const names[] = {"velocity", "relative", "absolute"};
+  set.smrm = {config_.model, config_.sizes, std::move(model_)};
+  set.extra["translation"] = names[static_cast<int>(config_.windows.translation)];
+  set.extra["remove_heading"] = config_.windows.remove_heading ? "true" : "false";
+}
+
+}  // namespace restage

@@ -1,0 +1,106 @@
+#include "train/stages/skeleton_stage.h"
+
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+#include "autograd/ops/reduce.h"
+#include "nn/losses/deformation.h"
+#include "nn/models/registry.h"
+
+namespace restage {
+namespace {
+
+/// Euclidean lengths along the last axis (3), smooth at 0.
+Var lengths(const Var& d) { return sqrt(add_scalar(sum(square(d), -1), 1e-8)); }
+
+CloudConfig with_points(CloudConfig c, const SkeletonModel& model) {
+  c.points = static_cast<int>(model.points());
+  return c;
+}
+
+CloudConfig training_clouds(const SkeletonStageConfig& c, const SkeletonModel& model) {
+  CloudConfig out = with_points(c.clouds, model);
+  out.skin_weights = c.vote_weight > 0 || c.segmentation_weight > 0;
+  return out;
+}
+
+/// Held-out clouds keep the noise and count of training, without mirror images.
+CloudConfig held_out(CloudConfig c, const SkeletonModel& model) {
+  c = with_points(c, model);
+  c.mirror = false;
+  c.scale_jitter = 0;
+  return c;
+}
+
+}  // namespace
+
+SkeletonStage::SkeletonStage(const SkeletonStageConfig& config, const Corpus& train, const Corpus& validation,
+                             uint64_t seed)
+    : config_(config),
+      model_(make_skeleton_model(config.model, config.sizes, Init{RngKey{seed, 0}.fold("skeleton.init"), DType::f32})),
+      adam_({{"model.", model_.get()}}, config.optimiser.adam),
+      sampler_(train, training_clouds(config, *model_), RngKey{seed, 0}.fold("skeleton.clouds").stream),
+      validation_sampler_(validation, held_out(config.clouds, *model_), 1),
+      posed_(evaluation_clouds(validation, static_cast<size_t>(config.validation_clouds), 1)),
+      tposes_(evaluation_tposes(validation, 4, config.clouds.tpose_heading, 1)),
+      key_(RngKey{seed, 0}.fold("skeleton.step")) {}
+
+Var SkeletonStage::loss(Context& ctx, const CloudBatch& batch) const {
+  const SkeletonOutput out = model_->forward(ctx, batch.points);
+  Var total = config_.loss == SkeletonStageConfig::Loss::mse ? mse(out.joints, Var(batch.joints))
+                                                             : mean_all(lengths(out.joints - Var(batch.joints)));
+  if (!out.centres.defined()) return total;
+  const int64_t n = batch.points.size(0), c = out.centres.size(1);
+  const Var moved_by = gather(Var(batch.weights), out.centres);  // [n, c, 22] skin weights
+  if (config_.vote_weight > 0) {
+    const Var miss = lengths(out.votes - Var(batch.joints.reshape({n, 1, kJoints, 3})));
+    total = total + scale(sum_all(miss * moved_by), config_.vote_weight / static_cast<double>(n * c));
+  }
+  if (config_.segmentation_weight > 0) {
+    const Var log_share = log(add_scalar(softmax(out.segmentation), 1e-8));
+    total = total - scale(sum_all(log_share * moved_by), config_.segmentation_weight / static_cast<double>(n * c));
+  }
+  return total;
+}
+
+NamedValues SkeletonStage::step(int64_t step) {
+  const OptimiserConfig& o = config_.optimiser;
+  const CloudBatch batch = sampler_.batch(step * o.batch, o.batch);
+  const Differentiated d = differentiate(key_.fold(static_cast<uint64_t>(step)),
+                                         [&](Context& ctx) { return loss(ctx, batch); });
+  const double rate = learning_rate(o.schedule, step, o.steps);
+  adam_.step(d.gradients, rate, o.clip);
+  return {{"loss", d.loss}, {"gradient_norm", d.norm}, {"rate", rate}};
+}
+
+double joint_error(SkeletonModel& model, const CloudBatch& clouds) {
+  Context ctx;
+  double total = 0;
+  const int64_t n = clouds.points.size(0), part = 16;
+  for (int64_t i = 0; i < n; i += part) {
+    const int64_t to = std::min(n, i + part);
+    const SkeletonOutput out = model.forward(ctx, clouds.points.rows(i, to));
+    total += mean_distance(out.joints.value, clouds.joints.rows(i, to)) * static_cast<double>(to - i);
+  }
+  return total / static_cast<double>(n);
+}
+
+NamedValues SkeletonStage::validate() {
+  return {{"joint_error_mm", 1e3 * joint_error(*model_, validation_sampler_.clouds(posed_))},
+          {"tpose_joint_error_mm", 1e3 * joint_error(*model_, validation_sampler_.clouds(tposes_))}};
+}
+
+void SkeletonStage::save(TensorFile& file) const {
+  append(&file, *model_, "model.");
+  adam_.save("adam.", file);
+}
+
+void SkeletonStage::load(const TensorFile& file, const std::string& where) {
+  load_state(*model_, file, "model.", where);
+  adam_.load("adam.", file, where);
+}
+
+void SkeletonStage::export_models(ModelSet& set) {
+  set.skeleton = {config_.model, config_.sizes, std::move(model_)};
+}
+
+}  // namespace restage

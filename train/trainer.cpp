@@ -1,0 +1,89 @@
+#include "train/trainer.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+
+#include "autograd/base/interrupt.h"
+#include "autograd/base/log.h"
+
+namespace restage {
+namespace {
+
+std::string bytes_of(const Stage& stage) {
+  TensorFile file;
+  stage.save(file);
+  return safetensors_bytes(file);
+}
+
+std::string line(const NamedValues& values) {
+  std::string out;
+  for (const auto& [name, value] : values) {
+    char text[64];
+    std::snprintf(text, sizeof text, "%s%s %.5g", out.empty() ? "" : ", ", name.c_str(), value);
+    out += text;
+  }
+  return out;
+}
+
+/// Steps `first` ... of one stage.
+void run_stage(Stage& stage, int64_t first, RunDir& run, const LoopConfig& loop, bool quiet) {
+  const StopScope stop;
+  const auto start = std::chrono::steady_clock::now();
+  const int64_t steps = stage.steps(), blocks_before = memory_stats().large_allocations;
+  reset_peak_memory();
+  Progress progress(stage.name(), steps, standard_progress(quiet), first);
+  for (int64_t step = first; step < steps; ++step) {
+    const NamedValues values = stage.step(step);
+    const int64_t done = step + 1;
+    const bool last = done == steps, stopped = stop_requested();
+    if (done % loop.log_every == 0 || last) run.metrics(stage.name(), done, values);
+    progress.update(done, values);
+    if (done % loop.validate_every == 0 || last) {
+      const NamedValues scores = stage.validate();
+      run.metrics(stage.name(), done, scores);
+      progress.note(stage.name() + " after " + std::to_string(done) + " steps: " + line(scores));
+    }
+    if (done % loop.checkpoint_every == 0 || last || stopped) run.save_checkpoint(stage.name(), done, bytes_of(stage));
+    if (stopped) {
+      progress.finish();
+      throw_if_stopped();
+    }
+  }
+  progress.finish();
+  if (first >= steps) return;
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  char text[200];
+  std::snprintf(text, sizeof text, "%s: %lld steps, %.1f ms a step with validation, peak of tensors %.0f MiB, %lld large blocks taken",
+                stage.name().c_str(), static_cast<long long>(steps - first), 1e3 * seconds / static_cast<double>(steps - first),
+                static_cast<double>(memory_stats().peak) / 1048576.0,
+                static_cast<long long>(memory_stats().large_allocations - blocks_before));
+  log_info(text);
+}
+
+}  // namespace
+
+ModelSet train(RunDir& run, const std::vector<std::string>& stages, const LoopConfig& loop,
+               const std::function<std::unique_ptr<Stage>(const std::string&)>& make, bool quiet) {
+  const auto resumed = run.take_resumed();
+  const auto begin = resumed ? std::find(stages.begin(), stages.end(), resumed->stage) - stages.begin() : 0;
+  ModelSet result;
+  for (size_t i = 0; i < stages.size(); ++i) {
+    const auto stage = make(stages[i]);
+    int64_t first = 0;
+    const auto index = static_cast<std::ptrdiff_t>(i);
+    if (resumed && index <= begin) {
+      // The stage that was interrupted, or an earlier one that is complete.
+      const auto checkpoint = index == begin ? resumed : latest_checkpoint(run.dir(), {stages[i]});
+      if (!checkpoint)
+        throw InputError(run.dir(), "the checkpoint of stage '" + stages[i] + "' is missing", "train again from the start");
+      stage->load(parse_safetensors(checkpoint->bytes, checkpoint->path), checkpoint->path);
+      first = checkpoint->step;
+    }
+    run_stage(*stage, first, run, loop, quiet);
+    stage->export_models(result);
+  }
+  return result;
+}
+
+}  // namespace restage
