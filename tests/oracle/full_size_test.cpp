@@ -72,8 +72,9 @@ struct Inputs64 {
         rest(hash_fill({1, 22, 3}, 903, 0.5)),
         points(hash_fill({1, 5, 3}, 904, 0.5)),
         axis_angle(hash_fill({1, 66}, 905, 0.5)) {
-    const double size[] = {0.4, 0.9, 0.2};
-    for (int64_t i = 0; i < cloud.numel(); ++i) cloud.data<double>()[i] *= size[i % 3];
+    const float size[] = {0.4f, 0.9f, 0.2f};  // float32 in the oracle, too
+    for (int64_t i = 0; i < cloud.numel(); ++i)
+      cloud.data<double>()[i] *= static_cast<double>(size[i % 3]);
   }
 };
 
