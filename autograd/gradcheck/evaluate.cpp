@@ -49,7 +49,7 @@ void fill_free_memory_with_nan() {
   for (int64_t bytes = 64; bytes <= 16384; bytes += bytes < 1024 ? 64 : bytes / 8)
     for (int i = 0; i < 6; ++i) {
       blocks.push_back(Tensor::empty({bytes / 8}, DType::f64));
-      std::memset(blocks.back().raw(), 0xff, static_cast<size_t>(bytes));
+      std::memset(blocks.back().raw(), 0xff, static_cast<size_t>(bytes / 8 * 8));
     }
 }
 

@@ -1,13 +1,13 @@
 // Every op of autograd/ops passes the gradient harness, and no op is left out.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <regex>
 #include <set>
-
-#include <cstring>
+#include <sstream>
 
 #include "autograd/base/parallel.h"
 #include "autograd/gradcheck/gradcheck.h"
@@ -32,23 +32,29 @@ std::string content(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
+/// The text between every occurrence of `before` and the `after` that follows it.
+std::vector<std::string> between(const std::string& text, const std::string& before, char after) {
+  std::vector<std::string> found;
+  for (size_t at = text.find(before); at != std::string::npos; at = text.find(before, at)) {
+    at += before.size();
+    found.push_back(text.substr(at, text.find(after, at) - at));
+  }
+  return found;
+}
+
 /// Names of all ops: `name = "..."` in the headers, and those of the element-wise enumerations.
 std::set<std::string> names_of_ops() {
   std::set<std::string> names;
-  const std::regex quoted("constexpr const char\\* name = \"([a-z0-9_]+)\"");
-  for (const auto& file : std::filesystem::directory_iterator(RESTAGE_SOURCE_DIR "/autograd/ops")) {
-    const std::string text = content(file.path());
-    for (std::sregex_iterator it(text.begin(), text.end(), quoted), end; it != end; ++it)
-      names.insert((*it)[1]);
-  }
+  for (const auto& file : std::filesystem::directory_iterator(RESTAGE_SOURCE_DIR "/autograd/ops"))
+    for (const std::string& name : between(content(file.path()), "const char* name = \"", '"'))
+      names.insert(name);
   const std::string kernels = content(RESTAGE_SOURCE_DIR "/autograd/kernels/elementwise.h");
-  for (const char* which : {"enum class Unary ", "enum class Binary "}) {
-    const size_t from = kernels.find(which) + std::string(which).size();
-    const std::string list = kernels.substr(from, kernels.find('}', from) - from);
-    const std::regex word("[a-z0-9_]+");
-    for (std::sregex_iterator it(list.begin(), list.end(), word), end; it != end; ++it)
-      names.insert(it->str());
-  }
+  for (const char* which : {"enum class Unary {", "enum class Binary {"})
+    for (std::string list : between(kernels, which, '}')) {
+      std::replace(list.begin(), list.end(), ',', ' ');
+      std::istringstream words(list);
+      names.insert(std::istream_iterator<std::string>(words), {});
+    }
   return names;
 }
 

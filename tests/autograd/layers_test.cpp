@@ -13,10 +13,10 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Exit code of the script for a source tree, -1 if there is no Python.
-int check_layers(const std::string& root) {
+int check_layers(const std::string& root, const std::string& output = "") {
   if (std::system("python3 -c pass > /dev/null 2>&1") != 0) return -1;
   const std::string command =
-      "python3 '" RESTAGE_SOURCE_DIR "/cmake/check_layers.py' '" + root + "'";
+      "python3 '" RESTAGE_SOURCE_DIR "/cmake/check_layers.py' '" + root + "'" + output;
   return WEXITSTATUS(std::system(command.c_str()));
 }
 
@@ -34,7 +34,7 @@ TEST(Layers, ABrokenArrowIsSeen) {
     const fs::path path = fs::path(root) / file;
     fs::create_directories(path.parent_path());
     std::ofstream(path) << line << "\n";
-    return check_layers(root);
+    return check_layers(root, " > /dev/null");
   };
   const int fine = with("autograd/ops/x.h", "#include \"autograd/tape/tape.h\"");
   if (fine < 0) GTEST_SKIP() << "python3 is missing";
