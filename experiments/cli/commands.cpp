@@ -9,6 +9,8 @@ void add_commands(Program& program) {
   add_data(program);
   add_eval(program);
   add_render(program);
+  add_info(program);
+  add_weights(program);
   add_doctor(program);
 }
 

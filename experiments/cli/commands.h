@@ -9,10 +9,12 @@ namespace restage::cli {
 void add_data(Program& program);
 void add_doctor(Program& program);
 void add_eval(Program& program);
+void add_info(Program& program);
 void add_render(Program& program);
 void add_retarget(Program& program);
 void add_skeleton(Program& program);
 void add_train(Program& program);
+void add_weights(Program& program);
 
 /// Adds every command, in the order of `restage --help`.
 void add_commands(Program& program);

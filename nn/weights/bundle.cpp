@@ -1,5 +1,6 @@
 #include "nn/weights/bundle.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "nn/weights/state.h"
@@ -35,6 +36,8 @@ void each_place(Set& set, const NeededModels& needs, F f) {
   f("deformation.weights.", needs.deformation, set.weights);
   f("deformation.offsets.", false, set.offsets);
   f("deformation.root.", false, set.root);
+  f("deformation.v1_field.", false, set.v1_field);
+  f("discriminator.", false, set.discriminator);
 }
 
 std::string stage_of(const std::string& prefix) { return prefix.substr(0, prefix.size() - 1); }
@@ -112,12 +115,9 @@ Json parse_metadata(const TensorFile& file, const std::string& where) {
 
 std::string stage_prefix(const std::string& model) {
   if (model.compare(0, 9, "skeleton/") == 0) return "skeleton.";
-  if (model == "smrm/rot6d" || model == "smrm/quaternion") return "smrm.";
-  if (model == "deformation/weights" || model == "deformation/offsets" ||
-      model == "deformation/root")
-    return "deformation." + model.substr(12) + ".";
-  throw InputError("", "'" + model + "' has no place in a weights file",
-                   "name an extractor, an SMRM or deformation/weights, offsets or root");
+  if (model == "smrm/discriminator") return "discriminator.";
+  if (model.compare(0, 5, "smrm/") == 0) return "smrm.";
+  return "deformation." + model.substr(model.find('/') + 1) + ".";
 }
 
 void put_model(ModelSet* models, const std::string& name, const ModelSizes& sizes,
@@ -193,6 +193,55 @@ ModelSet models_of(const TensorFile& file, const NeededModels& needs, const std:
 
 ModelSet load_models(const std::string& path, const NeededModels& needs) {
   return models_of(read_safetensors(path), needs, path);
+}
+
+void import_model(ModelSet* models, const std::string& name, const ModelSizes& sizes,
+                  const TensorFile& state, const std::string& where) {
+  const bool known = std::any_of(::restage::models().begin(), ::restage::models().end(),
+                                 [&](const ModelInfo& info) { return info.name == name; });
+  if (known) check_sizes(name, sizes, state, "", where);
+  auto net = make_model(name, sizes, Init{});
+  load_state(*net, state, "", where);
+  put_model(models, name, sizes, std::move(net));
+}
+
+TensorFile export_model(const ModelSet& models, const std::string& which,
+                        const std::string& where) {
+  TensorFile out;
+  each_place(models, {}, [&](const std::string& prefix, bool, auto& place) {
+    if (!place || (place.name != which && stage_of(prefix) != which)) return;
+    out = to_file(*place, "");
+    const Json json = {{"format", 1}, {"model", place.name}, {"sizes", to_json(place.sizes)}};
+    out.metadata[kKey] = json.dump();
+  });
+  if (out.tensors.empty())
+    throw InputError(where, "holds no model " + name_in_quotes(which),
+                     "see 'restage weights show' for what it holds");
+  return out;
+}
+
+ModelSizes exported_sizes(const TensorFile& state, const std::string& where) {
+  const auto text = state.metadata.find(kKey);
+  if (text == state.metadata.end()) return {};
+  const Json json = Json::parse(text->second, nullptr, false);
+  const bool has_sizes = json.is_object() && json.contains("sizes") && json["sizes"].is_object();
+  return has_sizes ? sizes_of(json["sizes"], where) : ModelSizes{};
+}
+
+void set_size(ModelSizes* sizes, const std::string& name, const std::string& value) {
+  const Json given = Json::parse(value, nullptr, false);
+  bool known = false;
+  std::string names;
+  each_size(*sizes, [&](const char* candidate, auto&) {
+    known = known || name == candidate;
+    names += std::string(names.empty() ? "" : ", ") + candidate;
+  });
+  if (!known || !(given.is_number() || given.is_boolean()))
+    throw InputError("", "'" + name + "=" + value + "' is no size of a model",
+                     "give NAME=NUMBER with one of " + names);
+  Json all = to_json(*sizes);
+  all[name] = given;
+  *sizes = sizes_of(all, "--size");
 }
 
 }  // namespace restage

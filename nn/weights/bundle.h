@@ -7,6 +7,7 @@
 #include <string>
 
 #include "nn/models/deformation.h"
+#include "nn/models/discriminator.h"
 #include "nn/models/registry.h"
 #include "nn/models/skeleton.h"
 #include "nn/models/smrm.h"
@@ -33,6 +34,9 @@ struct ModelSet {
   TrainedModel<Mlp3> weights;            ///< "deformation.weights."
   TrainedModel<Mlp3> offsets;            ///< "deformation.offsets.", may be absent
   TrainedModel<Mlp3> root;               ///< "deformation.root.", may be absent
+  // Not used by either, but at home in such files:
+  TrainedModel<Mlp3> v1_field;                ///< "deformation.v1_field."
+  TrainedModel<Discriminator> discriminator;  ///< "discriminator."
   /// Whatever else belongs to the models, such as the meaning of the translation.
   std::map<std::string, std::string> extra;
 };
@@ -51,11 +55,22 @@ void save_models(const std::string& path, const ModelSet& models);
 ModelSet models_of(const TensorFile& file, const NeededModels& needs, const std::string& where);
 ModelSet load_models(const std::string& path, const NeededModels& needs);
 
-/// The prefix under which a registered model stands in a weights file; InputError for models that
-/// have no place there.
+/// The prefix under which a registered model stands in a weights file.
 std::string stage_prefix(const std::string& model);
 /// Puts a model into the set, in its place, replacing what was there.
 void put_model(ModelSet* models, const std::string& name, const ModelSizes& sizes,
                std::unique_ptr<Module> net);
+
+/// Builds a model, fills it with a plain state dict (StateError if that does not fit) and puts it
+/// into the set.
+void import_model(ModelSet* models, const std::string& name, const ModelSizes& sizes,
+                  const TensorFile& state, const std::string& where);
+/// One model as a plain state dict, with its name and sizes in the metadata. `which` is its name or
+/// its place ("smrm"); InputError if the set, read from `where`, has none.
+TensorFile export_model(const ModelSet& models, const std::string& which, const std::string& where);
+/// The sizes in the metadata of export_model(); the defaults in a file from elsewhere.
+ModelSizes exported_sizes(const TensorFile& state, const std::string& where);
+/// Sets a size by its name, from text "256" or "true"; InputError if there is no such size.
+void set_size(ModelSizes* sizes, const std::string& name, const std::string& value);
 
 }  // namespace restage

@@ -1,0 +1,143 @@
+// restage weights: what a weights file holds; single models into and out of it.
+#include <memory>
+
+#include "autograd/base/error.h"
+#include "experiments/cli/commands.h"
+#include "experiments/cli/output.h"
+#include "nn/weights/bundle.h"
+#include "nn/weights/state.h"
+
+namespace restage::cli {
+namespace {
+
+// ---- show --------------------------------------------------------------------------------------
+
+Json json_of(const std::string& text) {
+  Json json = Json::parse(text, nullptr, false);
+  return json.is_discarded() ? Json(text) : json;
+}
+
+Json shape_json(const Shape& shape) {
+  Json out = Json::array();
+  for (int i = 0; i < shape.rank(); ++i) out.push_back(shape[i]);
+  return out;
+}
+
+int run_show(const std::string& path, const Common& common) {
+  const TensorFile file = read_safetensors(path);
+  int64_t values = 0;
+  for (const auto& item : file.tensors) values += item.second.numel();
+  if (common.json) {
+    Json tensors = Json::array(), metadata = Json::object();
+    for (const auto& [name, t] : file.tensors)
+      tensors.push_back(
+          {{"name", name}, {"dtype", name_of(t.dtype())}, {"shape", shape_json(t.shape())}});
+    for (const auto& [key, text] : file.metadata) metadata[key] = json_of(text);
+    print_json({{"file", path}, {"values", values}, {"metadata", metadata}, {"tensors", tensors}});
+    return 0;
+  }
+  std::vector<std::vector<std::string>> rows = {{"tensor", "dtype", "shape"}};
+  for (const auto& [name, t] : file.tensors)
+    rows.push_back({name, name_of(t.dtype()), t.shape().str()});
+  std::string text = path + ": " + std::to_string(file.tensors.size()) + " tensors, " +
+                     std::to_string(values) + " values\n";
+  for (const auto& item : file.metadata) text += item.first + ": " + item.second + "\n";
+  print(text + "\n" + markdown_table(rows));
+  return 0;
+}
+
+// ---- import and export -------------------------------------------------------------------------
+
+struct Transfer {
+  std::string from, model, map, out, with;
+  std::vector<std::string> sizes;
+};
+
+/// All that does not fit goes to standard output, since the error has but one line.
+void print_misfits(const StateError& e, const Common& common) {
+  if (common.json)
+    print_json({{"missing", e.missing}, {"unexpected", e.unexpected}, {"unfit", e.unfit}});
+  else
+    print(e.details());
+}
+
+int report(const Transfer& t, const TensorFile& written, const Common& common) {
+  if (common.json)
+    print_json({{"out", t.out}, {"model", t.model}, {"tensors", written.tensors.size()}});
+  else
+    print("wrote " + t.out + ": " + std::to_string(written.tensors.size()) + " tensors\n");
+  return 0;
+}
+
+int run_import(const Transfer& t, const Common& common) {
+  TensorFile state = read_safetensors(t.from);
+  ModelSizes sizes = exported_sizes(state, t.from);
+  for (const std::string& size : t.sizes) {
+    const size_t equals = size.find('=');
+    set_size(&sizes, size.substr(0, equals),
+             equals == std::string::npos ? "" : size.substr(equals + 1));
+  }
+  if (!t.map.empty()) state = NameMap::read(t.map).apply(state, t.from);
+  ModelSet models = t.with.empty() ? ModelSet{} : load_models(t.with, {});
+  try {
+    import_model(&models, t.model, sizes, state, t.from);
+  } catch (const StateError& e) {
+    print_misfits(e, common);
+    throw;
+  }
+  const TensorFile out = to_file(models);
+  write_safetensors(t.out, out);
+  return report(t, out, common);
+}
+
+int run_export(const Transfer& t, const Common& common) {
+  const TensorFile out = export_model(load_models(t.from, {}), t.model, t.from);
+  write_safetensors(t.out, out);
+  return report(t, out, common);
+}
+
+void add_import(Program& program, CLI::App& group) {
+  const auto t = std::make_shared<Transfer>();
+  CLI::App& app = program.add(
+      group, "import", "put a state dict from elsewhere into a weights file",
+      "restage weights import --from pt.safetensors --model skeleton/point_transformer "
+      "--out w.safetensors\n"
+      "restage weights import --from smrm.safetensors --map names.yaml --model smrm/rot6d "
+      "--with w.safetensors --out all.safetensors",
+      [t, &program] { return run_import(*t, program.common()); });
+  app.add_option("--from", t->from, "state dict (safetensors; docs/convert_pytorch.py makes one)")
+      ->required();
+  app.add_option("--model", t->model, "which model it is, as in 'restage info'")->required();
+  app.add_option("--map", t->map, "YAML lines \"foreign name: our name\", * for any text");
+  app.add_option("--size", t->sizes, "a size unlike the paper's, such as hidden=256")
+      ->allow_extra_args(false);
+  app.add_option("--with", t->with, "weights file whose other models are kept");
+  app.add_option("--out", t->out, "weights file to write")->required();
+}
+
+void add_export(Program& program, CLI::App& group) {
+  const auto t = std::make_shared<Transfer>();
+  CLI::App& app =
+      program.add(group, "export", "take one model out of a weights file, as a plain state dict",
+                  "restage weights export --from w.safetensors --model smrm --out smrm.safetensors",
+                  [t, &program] { return run_export(*t, program.common()); });
+  app.add_option("--from", t->from, "weights file")->required();
+  app.add_option("--model", t->model, "its name (smrm/rot6d) or place (smrm)")->required();
+  app.add_option("--out", t->out, "state dict to write (safetensors)")->required();
+}
+
+}  // namespace
+
+void add_weights(Program& program) {
+  CLI::App& group = program.add_group("weights", "look into weights files, import and export");
+  const auto file = std::make_shared<std::string>();
+  CLI::App& show =
+      program.add(group, "show", "list what a safetensors file holds",
+                  "restage weights show w.safetensors\nrestage weights show w.safetensors --json",
+                  [file, &program] { return run_show(*file, program.common()); });
+  show.add_option("FILE", *file, "safetensors file")->required();
+  add_import(program, group);
+  add_export(program, group);
+}
+
+}  // namespace restage::cli
