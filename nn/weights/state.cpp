@@ -11,6 +11,7 @@
 namespace restage {
 namespace {
 
+constexpr uint64_t kLongestMap = 1 << 18;
 constexpr size_t kMostStars = 3;  // a match may try every length for every star
 
 bool ignored(const std::string& name) {
@@ -36,13 +37,14 @@ std::string misfit(const Tensor& found, const Tensor& wanted) {
   return finite ? "" : "holds NaN or infinity";
 }
 
-/// "3 missing ('a', 'b', ...)"
-void describe(std::string* text, const std::vector<std::string>& names, const char* what) {
+/// "3 missing ('a', 'b', ...)"; at most `most` names, so that all fits into one line.
+void describe(std::string* text, const std::vector<std::string>& names, const char* what,
+              size_t most) {
   if (names.empty()) return;
   *text += (text->empty() ? "" : ", ") + std::to_string(names.size()) + " " + what + " (";
-  for (size_t i = 0; i < std::min<size_t>(names.size(), 2); ++i)
+  for (size_t i = 0; i < std::min(names.size(), most); ++i)
     *text += (i > 0 ? ", " : "") + name_in_quotes(names[i]);
-  *text += names.size() > 2 ? ", ...)" : ")";
+  *text += names.size() > most ? ", ...)" : ")";
 }
 
 /// Text of the stars of `pattern` where it matches all of `text`.
@@ -61,6 +63,18 @@ bool match(std::string_view pattern, std::string_view text, std::vector<std::str
 
 size_t count_stars(const std::string& s) {
   return static_cast<size_t>(std::count(s.begin(), s.end(), '*'));
+}
+
+/// The YAML parser calls itself for every level of nesting. A map of names has one level; deeper
+/// ones come from brackets, from "- - -" on one line, or (quadratic in length) from indentation.
+bool may_nest_deeply(const std::string& yaml) {
+  const auto count = [&](char c) { return std::count(yaml.begin(), yaml.end(), c); };
+  size_t dashes = 0;
+  for (size_t i = 1; i < yaml.size(); ++i) {
+    if (yaml[i] == '\n') dashes = 0;
+    if (yaml[i] == ' ' && (yaml[i - 1] == '-' || yaml[i - 1] == '?') && ++dashes > 64) return true;
+  }
+  return count('[') + count('{') > 64;
 }
 
 }  // namespace
@@ -103,9 +117,11 @@ void load_state(Module& module, const TensorFile& file, const std::string& prefi
   }
   for (const auto& item : rest) unexpected.push_back(item.first);
   std::string text;
-  describe(&text, missing, "missing");
-  describe(&text, unexpected, "unexpected");
-  describe(&text, unfit, "unfit");
+  const int kinds = !missing.empty() + !unexpected.empty() + !unfit.empty();
+  const size_t most = kinds == 1 ? 3 : kinds == 2 ? 2 : 1;
+  describe(&text, missing, "missing", most);
+  describe(&text, unexpected, "unexpected", most);
+  describe(&text, unfit, "unfit", most);
   if (!text.empty()) {
     StateError error(where, "does not fit " + std::string(module.kind()) + ": " + text,
                      "give weights of this model");
@@ -118,10 +134,11 @@ void load_state(Module& module, const TensorFile& file, const std::string& prefi
     *to = from->dtype() == to->dtype() ? from->clone() : from->cast(to->dtype());
 }
 
-NameMap NameMap::read(const std::string& path) { return parse(read_file(path, 1 << 20), path); }
+NameMap NameMap::read(const std::string& path) { return parse(read_file(path, kLongestMap), path); }
 
 NameMap NameMap::parse(const std::string& yaml, const std::string& where) {
   constexpr const char* fix = "write lines like \"module.*: '*'\"";
+  if (may_nest_deeply(yaml)) throw InputError(where, "is no map of names", fix);
   NameMap out;
   YAML::Node root;
   try {

@@ -1,0 +1,165 @@
+// The safetensors reader and writer: round trips, foreign dtypes, and damage of every kind.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include "autograd/base/atomic_file.h"
+#include "autograd/base/error.h"
+#include "autograd/base/rng.h"
+#include "nn/weights/safetensors.h"
+
+namespace restage {
+namespace {
+
+std::string with_header(const std::string& json, const std::string& data) {
+  const uint64_t n = json.size();
+  return std::string(reinterpret_cast<const char*>(&n), 8) + json + data;
+}
+
+TensorFile sample() {
+  TensorFile f;
+  f.tensors["b"] = Tensor::from<double>({2, 2}, {1, 2, 3, 4e300});
+  f.tensors["a.weight"] = Tensor::from<float>({3}, {1.5F, -2, 0});
+  f.tensors["empty"] = Tensor::zeros({0, 4});
+  f.tensors["index"] = Tensor::from<int64_t>({1}, {int64_t{1} << 40});
+  f.tensors["small"] = Tensor::from<int32_t>({1, 1}, {-7});
+  f.metadata["note"] = "line\n\"quoted\"";
+  return f;
+}
+
+void expect_bad(const std::string& bytes, const std::string& part) {
+  try {
+    parse_safetensors(bytes, "w.safetensors");
+    ADD_FAILURE() << "accepted, expected: " << part;
+  } catch (const InputError& e) {
+    const std::string what = e.what();
+    EXPECT_NE(what.find(part), std::string::npos) << what;
+    EXPECT_EQ(what.find("w.safetensors: "), 0u) << what;
+    EXPECT_LT(what.size(), 400u);
+    EXPECT_EQ(what.find('\n'), std::string::npos);
+  }
+}
+
+TEST(WeightsSafetensors, RoundTripKeepsEverything) {
+  const TensorFile f = sample();
+  const std::string bytes = safetensors_bytes(f);
+  const TensorFile g = parse_safetensors(bytes, "x");
+  ASSERT_EQ(g.tensors.size(), f.tensors.size());
+  for (const auto& [name, t] : f.tensors) {
+    const Tensor& u = g.at(name, "x");
+    EXPECT_EQ(u.dtype(), t.dtype()) << name;
+    EXPECT_TRUE(u.shape() == t.shape()) << name;
+    for (int64_t i = 0; i < t.numel(); ++i) EXPECT_EQ(u.item(i), t.item(i)) << name;
+  }
+  EXPECT_EQ(g.metadata, f.metadata);
+  EXPECT_EQ(safetensors_bytes(g), bytes);
+  uint64_t header = 0;
+  std::memcpy(&header, bytes.data(), 8);
+  EXPECT_EQ(header % 8, 0u);
+}
+
+TEST(WeightsSafetensors, FilesAreReadAndWritten) {
+  const std::string path = testing::TempDir() + "restage_weights.safetensors";
+  write_safetensors(path, sample());
+  EXPECT_EQ(read_file(path), safetensors_bytes(sample()));
+  EXPECT_EQ(read_safetensors(path).tensors.size(), 5u);
+  std::filesystem::remove(path);
+  EXPECT_THROW(read_safetensors(path), InputError);
+}
+
+TEST(WeightsSafetensors, HalfPrecisionsBecomeFloat32) {
+  const uint16_t half[] = {0x3c00, 0xc000, 0x7bff, 0x0001, 0x8000, 0x7c00, 0x3555};
+  const uint16_t brain[] = {0x3f80, 0xc000};
+  std::string data(reinterpret_cast<const char*>(half), sizeof half);
+  data.append(reinterpret_cast<const char*>(brain), sizeof brain);
+  const TensorFile f =
+      parse_safetensors(with_header(R"({"h":{"dtype":"F16","shape":[7],"data_offsets":[0,14]},)"
+                                    R"("b":{"dtype":"BF16","shape":[2],"data_offsets":[14,18]}})",
+                                    data),
+                        "x");
+  const double want[] = {1, -2, 65504, std::ldexp(1.0, -24), 0, INFINITY, 0.333251953125};
+  for (int64_t i = 0; i < 7; ++i) EXPECT_EQ(f.at("h", "x").item(i), want[i]) << i;
+  EXPECT_EQ(f.at("b", "x").dtype(), DType::f32);
+  EXPECT_EQ(f.at("b", "x").item(0), 1);
+  EXPECT_EQ(f.at("b", "x").item(1), -2);
+}
+
+TEST(WeightsSafetensors, ScalarsHaveNoAxes) {
+  const TensorFile f =
+      parse_safetensors(with_header(R"({"s":{"dtype":"F32","shape":[],"data_offsets":[0,4]}})",
+                                    std::string("\0\0\x80\x3f", 4)),
+                        "x");
+  EXPECT_EQ(f.at("s", "x").rank(), 0);
+  EXPECT_EQ(f.at("s", "x").item(), 1);
+}
+
+TEST(WeightsSafetensors, DamagedHeadersAreNamed) {
+  const std::string four(4, '\0');
+  const auto tensor = [](const std::string& body) {
+    return with_header("{\"t\":{" + body + "}}", std::string(8, '\0'));
+  };
+  expect_bad("", "too short");
+  expect_bad("1234567", "too short");
+  expect_bad(std::string(8, '\xff') + "{}", "cut off");
+  expect_bad(with_header("[]", ""), "no JSON object");
+  expect_bad(with_header("{\"t\":", ""), "not JSON");
+  expect_bad(with_header("{\"t\":\"\xff\"}", ""), "not JSON");
+  expect_bad(with_header(R"({"__metadata__":3})", ""), "no JSON object");
+  expect_bad(with_header(R"({"__metadata__":{"a":3}})", ""), "no text");
+  expect_bad(with_header(R"({"t":3})", ""), "lacks dtype");
+  expect_bad(tensor(R"("dtype":"F8","shape":[2],"data_offsets":[0,8])"), "unknown dtype");
+  expect_bad(tensor(R"("dtype":7,"shape":[2],"data_offsets":[0,8])"), "unknown dtype");
+  expect_bad(tensor(R"("dtype":"F32","shape":[-2],"data_offsets":[0,8])"), "whole number");
+  expect_bad(tensor(R"("dtype":"F32","shape":[2.5],"data_offsets":[0,8])"), "whole number");
+  expect_bad(tensor(R"("dtype":"F32","shape":[1,1,1,1,1,1,2],"data_offsets":[0,8])"), "axes");
+  expect_bad(tensor(R"("dtype":"F32","shape":2,"data_offsets":[0,8])"), "axes");
+  expect_bad(tensor(R"("dtype":"F32","shape":[2],"data_offsets":[0])"), "pair");
+  expect_bad(tensor(R"("dtype":"F32","shape":[2],"data_offsets":[0,16])"), "beyond the end");
+  expect_bad(tensor(R"("dtype":"F32","shape":[2],"data_offsets":[8,0])"), "beyond the end");
+  expect_bad(tensor(R"("dtype":"F32","shape":[3],"data_offsets":[0,8])"), "do not fit");
+  expect_bad(tensor(R"("dtype":"F32","shape":[4611686018427387904,4],"data_offsets":[0,0])"),
+             "do not fit");
+  expect_bad(tensor(R"("dtype":"F32","shape":[4294967296,4294967296],"data_offsets":[0,0])"),
+             "do not fit");
+  expect_bad(tensor(R"("dtype":"F32","shape":[18446744073709551615],"data_offsets":[0,0])"),
+             "whole number");
+  expect_bad(tensor(R"("dtype":"F32","shape":[1],"data_offsets":[4,8])"), "gap");
+  expect_bad(tensor(R"("dtype":"F32","shape":[1],"data_offsets":[0,4])"), "4 bytes more");
+}
+
+TEST(WeightsSafetensors, OverlapsDoublesAndDepthAreRefused) {
+  const std::string one = R"({"dtype":"F32","shape":[1],"data_offsets":[0,4]})";
+  expect_bad(with_header("{\"a\":" + one + ",\"b\":" + one + "}", std::string(4, '\0')),
+             "overlaps");
+  expect_bad(with_header("{\"a\":" + one + ",\"a\":" + one + "}", std::string(4, '\0')), "twice");
+  std::string deep = "{\"a\":";
+  for (int i = 0; i < 100000; ++i) deep += "[";
+  expect_bad(with_header(deep, ""), "deeply");
+}
+
+TEST(WeightsSafetensors, RandomDamageNeverCrashes) {
+  const std::string good = safetensors_bytes(sample());
+  for (uint64_t trial = 0; trial < 3000; ++trial) {
+    std::string bytes = good;
+    Rng rng({5, trial});
+    for (uint64_t k = 0; k <= rng.below(4); ++k)
+      bytes[static_cast<size_t>(rng.below(bytes.size()))] = static_cast<char>(rng.below(256));
+    if (rng.below(4) == 0) bytes.resize(static_cast<size_t>(rng.below(bytes.size() + 1)));
+    try {
+      parse_safetensors(bytes, "x");
+    } catch (const InputError&) {
+    }
+  }
+}
+
+TEST(WeightsSafetensors, NamesInMessagesAreShortAndPrintable) {
+  EXPECT_EQ(name_in_quotes("a.b"), "'a.b'");
+  EXPECT_EQ(name_in_quotes("a\nb"), "'a?b'");
+  EXPECT_EQ(name_in_quotes(std::string(500, 'x')).size(), 65u);
+}
+
+}  // namespace
+}  // namespace restage
