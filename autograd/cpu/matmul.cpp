@@ -36,6 +36,12 @@ struct Strided {
   const T& at(int64_t i, int64_t j) const { return data[i * row + j * col]; }
 };
 
+/// A copy of known length, which becomes a few vector moves instead of a call.
+template <int N, class T>
+inline void copy_fixed(const T* from, T* to) {
+  for (int i = 0; i < N; ++i) to[i] = from[i];
+}
+
 /// Panels of kRows rows, k-major inside, zero-padded.
 template <class T>
 void pack_a(const Strided<T>& a, int64_t m, int64_t k, T* out) {
@@ -46,7 +52,7 @@ void pack_a(const Strided<T>& a, int64_t m, int64_t k, T* out) {
       for (int64_t l = 0; l < k; ++l)
         for (int i = 0; i < kRows; ++i) out[l * kRows + i] = p[i * a.row + l];
     } else if (rows == kRows && a.row == 1) {
-      for (int64_t l = 0; l < k; ++l) std::copy_n(a.data + i0 + l * a.col, kRows, out + l * kRows);
+      for (int64_t l = 0; l < k; ++l) copy_fixed<kRows>(a.data + i0 + l * a.col, out + l * kRows);
     } else {
       for (int64_t l = 0; l < k; ++l)
         for (int i = 0; i < kRows; ++i) out[l * kRows + i] = i < rows ? a.at(i0 + i, l) : T(0);
@@ -62,7 +68,7 @@ void pack_b(const Strided<T>& b, int64_t k, int64_t n, T* out) {
   for (int64_t j0 = 0; j0 < n; j0 += cols) {
     const int64_t width = std::min<int64_t>(cols, n - j0);
     if (width == cols && b.col == 1) {
-      for (int64_t l = 0; l < k; ++l) std::copy_n(b.data + l * b.row + j0, cols, out + l * cols);
+      for (int64_t l = 0; l < k; ++l) copy_fixed<cols>(b.data + l * b.row + j0, out + l * cols);
     } else if (width == cols && b.row == 1) {
       constexpr int64_t block = 16;  // columns of memory at a time: whole cache lines of both sides
       for (int64_t l0 = 0; l0 < k; l0 += block)

@@ -56,111 +56,154 @@ void for_block_rows(int64_t n, int64_t inner, bool parallel, F&& f) {
   });
 }
 
-/// Scale of row r, column i.
+/// A parameter along the inner axis as doubles, or `none` where there is no such parameter.
 template <class T>
-double affine_at(const Tensor* t, Affine affine, int64_t r, int64_t i, double none) {
-  if (t == nullptr || affine == Affine::none) return none;
-  return static_cast<double>(t->data<T>()[affine == Affine::inner ? i : r]);
+std::vector<double> along_inner(const Tensor* t, Affine affine, int64_t inner, double none) {
+  std::vector<double> out(static_cast<size_t>(inner), none);
+  if (t == nullptr || affine != Affine::inner) return out;
+  for (int64_t i = 0; i < inner; ++i)
+    out[static_cast<size_t>(i)] = static_cast<double>(t->data<T>()[i]);
+  return out;
 }
 
 template <class T>
-void norm_typed(const NormArgs& args) {
+void norm_columns(const NormArgs& args) {
   const int64_t n = args.n, inner = args.inner;
+  const std::vector<double> scale = along_inner<T>(args.scale, args.affine, inner, 1);
+  const std::vector<double> shift = along_inner<T>(args.shift, args.affine, inner, 0);
   for_blocks(args.outer, n * inner, [&](int64_t o, bool parallel) {
     const T* x = args.x.data<T>() + o * n * inner;
     T* out = args.out.data<T>() + o * n * inner;
     double* mean = args.mean.data<double>() + o * inner;
     double* rstd = args.rstd.data<double>() + o * inner;
-    std::vector<double> s(static_cast<size_t>(inner)), q(static_cast<size_t>(inner));
-    two_sums(n, inner, s.data(), q.data(), parallel, [&](int64_t r, double* a, double*) {
+    std::vector<double> sums(static_cast<size_t>(inner)), unused(sums);
+    two_sums(n, inner, sums.data(), unused.data(), parallel, [&](int64_t r, double* a, double*) {
       for (int64_t i = 0; i < inner; ++i) a[i] += static_cast<double>(x[r * inner + i]);
     });
-    for (double& v : s) v /= static_cast<double>(n);
-    std::vector<double> unused(static_cast<size_t>(inner));
-    two_sums(n, inner, q.data(), unused.data(), parallel, [&](int64_t r, double* a, double*) {
+    for (int64_t i = 0; i < inner; ++i)
+      mean[i] = sums[static_cast<size_t>(i)] / static_cast<double>(n);
+    two_sums(n, inner, sums.data(), unused.data(), parallel, [&](int64_t r, double* a, double*) {
       for (int64_t i = 0; i < inner; ++i) {
-        const double d = static_cast<double>(x[r * inner + i]) - s[static_cast<size_t>(i)];
+        const double d = static_cast<double>(x[r * inner + i]) - mean[i];
         a[i] += d * d;
       }
     });
-    for (int64_t i = 0; i < inner; ++i) {
-      mean[i] = s[static_cast<size_t>(i)];
-      rstd[i] = 1.0 / std::sqrt(q[static_cast<size_t>(i)] / static_cast<double>(n) + args.eps);
-    }
+    for (int64_t i = 0; i < inner; ++i)
+      rstd[i] = 1.0 / std::sqrt(sums[static_cast<size_t>(i)] / static_cast<double>(n) + args.eps);
+    const double *sc = scale.data(), *sh = shift.data();
     for_block_rows(n, inner, parallel, [&](int64_t r) {
       for (int64_t i = 0; i < inner; ++i)
-        out[r * inner + i] =
-            static_cast<T>((static_cast<double>(x[r * inner + i]) - mean[i]) * rstd[i] *
-                               affine_at<T>(args.scale, args.affine, r, i, 1) +
-                           affine_at<T>(args.shift, args.affine, r, i, 0));
+        out[r * inner + i] = static_cast<T>(
+            (static_cast<double>(x[r * inner + i]) - mean[i]) * rstd[i] * sc[i] + sh[i]);
     });
   });
 }
 
 template <class T>
-void norm_grad_typed(const NormGradArgs& args) {
+void norm_columns_grad(const NormGradArgs& args) {
   const int64_t n = args.n, inner = args.inner;
+  const std::vector<double> scale = along_inner<T>(args.scale, args.affine, inner, 1);
+  const double* sc = scale.data();
   for_blocks(args.outer, n * inner, [&](int64_t o, bool parallel) {
     const T* x = args.x.data<T>() + o * n * inner;
     const T* gy = args.gy.data<T>() + o * n * inner;
     const double* mean = args.mean.data<double>() + o * inner;
     const double* rstd = args.rstd.data<double>() + o * inner;
     T* out = args.out.data<T>() + o * n * inner;
-    std::vector<double> sg(static_cast<size_t>(inner)), sgx(static_cast<size_t>(inner));
+    // Sums of the output's gradient, and of it times the normalised input, per column.
+    std::vector<double> sg(static_cast<size_t>(inner)), sgx(sg);
     two_sums(n, inner, sg.data(), sgx.data(), parallel, [&](int64_t r, double* a, double* b) {
       for (int64_t i = 0; i < inner; ++i) {
-        const double g =
-            static_cast<double>(gy[r * inner + i]) * affine_at<T>(args.scale, args.affine, r, i, 1);
+        const double g = static_cast<double>(gy[r * inner + i]);
         a[i] += g;
         b[i] += g * (static_cast<double>(x[r * inner + i]) - mean[i]) * rstd[i];
       }
     });
     const double inv = 1.0 / static_cast<double>(n);
+    const double *pg = sg.data(), *pgx = sgx.data();
     for_block_rows(n, inner, parallel, [&](int64_t r) {
       for (int64_t i = 0; i < inner; ++i) {
-        const double g =
-            static_cast<double>(gy[r * inner + i]) * affine_at<T>(args.scale, args.affine, r, i, 1);
         const double h = (static_cast<double>(x[r * inner + i]) - mean[i]) * rstd[i];
-        const auto c = static_cast<size_t>(i);
-        out[r * inner + i] = static_cast<T>(rstd[i] * (g - inv * (sg[c] + h * sgx[c])));
+        const double g = static_cast<double>(gy[r * inner + i]);
+        out[r * inner + i] = static_cast<T>(sc[i] * rstd[i] * (g - inv * (pg[i] + h * pgx[i])));
       }
     });
-  });
-  if (args.g_scale == nullptr) return;
-  // Scale and shift: sums over everything else, outer blocks in order.
-  const int64_t size = args.g_scale->numel();
-  std::vector<double> a(static_cast<size_t>(size)), b(static_cast<size_t>(size));
-  const bool by_row = args.affine == Affine::middle;
-  const int64_t rows = by_row ? args.outer : args.outer * n;
-  const int64_t width = by_row ? n * inner : inner;
-  two_sums(rows, size, a.data(), b.data(), true, [&](int64_t r, double* pa, double* pb) {
-    const T* x = args.x.data<T>() + r * width;
-    const T* gy = args.gy.data<T>() + r * width;
-    const int64_t o = by_row ? r : r / n;
-    for (int64_t e = 0; e < width; ++e) {
-      const int64_t i = e % inner, target = by_row ? e / inner : i;
-      const double g = static_cast<double>(gy[e]);
-      const double h = (static_cast<double>(x[e]) - args.mean.data<double>()[o * inner + i]) *
-                       args.rstd.data<double>()[o * inner + i];
-      pa[target] += g * h;
-      pb[target] += g;
+    if (args.g_scale == nullptr) return;  // only ever with one block: batch norm
+    for (int64_t i = 0; i < inner; ++i) {
+      args.g_scale->data<T>()[i] = static_cast<T>(pgx[i]);
+      args.g_shift->data<T>()[i] = static_cast<T>(pg[i]);
     }
   });
-  for (int64_t i = 0; i < size; ++i) {
-    args.g_scale->data<T>()[i] = static_cast<T>(a[static_cast<size_t>(i)]);
-    args.g_shift->data<T>()[i] = static_cast<T>(b[static_cast<size_t>(i)]);
+}
+
+/// Layer norm: every row by itself, scale and shift along the row.
+template <class T>
+void norm_rows(const NormArgs& args) {
+  const int64_t n = args.n;
+  const Eigen::ArrayXd scale = ConstArray<T>(args.scale->data<T>(), n).template cast<double>();
+  const Eigen::ArrayXd shift = ConstArray<T>(args.shift->data<T>(), n).template cast<double>();
+  parallel_for(args.outer, row_grain(n), [&](int64_t from, int64_t to) {
+    Eigen::ArrayXd d(n);
+    for (int64_t o = from; o < to; ++o) {
+      d = ConstArray<T>(args.x.data<T>() + o * n, n).template cast<double>();
+      const double mean = d.sum() / static_cast<double>(n);
+      d -= mean;
+      const double rstd = 1.0 / std::sqrt(d.square().sum() / static_cast<double>(n) + args.eps);
+      args.mean.data<double>()[o] = mean;
+      args.rstd.data<double>()[o] = rstd;
+      MutableArray<T>(args.out.data<T>() + o * n, n) =
+          (d * rstd * scale + shift).template cast<T>();
+    }
+  });
+}
+
+template <class T>
+void norm_rows_grad(const NormGradArgs& args) {
+  const int64_t n = args.n;
+  const Eigen::ArrayXd scale = ConstArray<T>(args.scale->data<T>(), n).template cast<double>();
+  const int64_t parts = std::max<int64_t>(1, (args.outer + kPart - 1) / kPart);
+  Eigen::ArrayXXd g_scale = Eigen::ArrayXXd::Zero(n, parts), g_shift = g_scale;  // per part of rows
+  parallel_for(parts, 1, [&](int64_t from, int64_t to) {
+    Eigen::ArrayXd g(n), h(n);
+    for (int64_t o = from * kPart; o < std::min(args.outer, to * kPart); ++o) {
+      const double rstd = args.rstd.data<double>()[o];
+      g = ConstArray<T>(args.gy.data<T>() + o * n, n).template cast<double>();
+      h = (ConstArray<T>(args.x.data<T>() + o * n, n).template cast<double>() -
+           args.mean.data<double>()[o]) *
+          rstd;
+      g_scale.col(o / kPart) += g * h;
+      g_shift.col(o / kPart) += g;
+      g *= scale;
+      const double sg = g.sum() / static_cast<double>(n),
+                   sgx = (g * h).sum() / static_cast<double>(n);
+      MutableArray<T>(args.out.data<T>() + o * n, n) =
+          (rstd * (g - sg - h * sgx)).template cast<T>();
+    }
+  });
+  if (args.g_scale == nullptr) return;
+  for (int64_t p = 1; p < parts; ++p) {
+    g_scale.col(0) += g_scale.col(p);
+    g_shift.col(0) += g_shift.col(p);
   }
+  MutableArray<T>(args.g_scale->data<T>(), n) = g_scale.col(0).template cast<T>();
+  MutableArray<T>(args.g_shift->data<T>(), n) = g_shift.col(0).template cast<T>();
 }
 
 }  // namespace
 
 void norm(const NormArgs& args) {
   if (args.x.numel() == 0) return;
-  dispatch(args.out.dtype(), [&](auto zero) { norm_typed<decltype(zero)>(args); });
+  dispatch(args.out.dtype(), [&](auto zero) {
+    using T = decltype(zero);
+    args.affine == Affine::middle ? norm_rows<T>(args) : norm_columns<T>(args);
+  });
 }
 
 void norm_grad(const NormGradArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) { norm_grad_typed<decltype(zero)>(args); });
+  dispatch(args.out.dtype(), [&](auto zero) {
+    using T = decltype(zero);
+    args.affine == Affine::middle ? norm_rows_grad<T>(args) : norm_columns_grad<T>(args);
+  });
 }
 
 }  // namespace restage::cpu

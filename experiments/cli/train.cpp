@@ -95,19 +95,19 @@ int run_train(const TrainOptions& options, const Program& program, const std::ve
 
 void add_train(Program& program) {
   const auto options = std::make_shared<TrainOptions>();
+  const auto self = std::make_shared<CLI::App*>(nullptr);
   CLI::App& app = program.add("train", "train the stages of a configuration",
                               "restage train configs/demo.yaml\n"
                               "restage train configs/lite/all.yaml data.source=data.h5 motion.optimiser.steps=2000\n"
                               "restage train resume=runs/demo-20260101-120000-1",
-                              [options, &program] {
+                              [options, self, &program] {
+                                options->seed_given = (*self)->count("--seed") > 0;
                                 std::vector<std::string> line = {"restage", "train"};
                                 line.insert(line.end(), options->arguments.begin(), options->arguments.end());
                                 return run_train(*options, program, line);
                               });
   app.add_option("ARGUMENTS", options->arguments, "CONFIG.yaml and key=value overrides, or resume=RUN_DIR")->required();
-  app.preparse_callback([options](size_t) {});
-  if (CLI::Option* seed = app.get_option_no_throw("--seed"))
-    app.callback([options, seed] { options->seed_given = seed->count() > 0; });
+  *self = &app;
 }
 
 }  // namespace restage::cli
