@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "nn/models/patch_transformer.h"
+#include "nn/models/point_transformer.h"
+#include "nn/models/pointnet.h"
 #include "nn/weights/state.h"
 
 namespace restage {
@@ -42,9 +45,40 @@ void each_place(Set& set, const NeededModels& needs, F f) {
 
 std::string stage_of(const std::string& prefix) { return prefix.substr(0, prefix.size() - 1); }
 
+/// Sizes as they are in the network, so that a file does not depend on what is the default later.
+ModelSizes actual_sizes(ModelSizes s, const Module& net) {
+  if (const auto* m = dynamic_cast<const PointTransformer*>(&net)) {
+    s.points = m->config.points;
+    s.width = m->config.width;
+    s.layers = m->config.blocks;
+    s.neighbours = m->config.neighbours;
+  } else if (const auto* p = dynamic_cast<const PointNet*>(&net)) {
+    s.points = p->config.points;
+    s.dropout = p->config.dropout;
+  } else if (const auto* t = dynamic_cast<const PatchTransformer*>(&net)) {
+    s.points = t->config.points;
+    s.width = t->config.width;
+    s.layers = t->config.layers;
+    s.centres = t->config.centres;
+    s.neighbours = t->config.neighbours;
+  } else if (const auto* r = dynamic_cast<const Smrm*>(&net)) {
+    s.hidden = r->config.hidden;
+    s.standardise = r->config.standardise;
+    s.rest_pose_start = r->config.rest_pose_start;
+    s.dropout = r->config.dropout;
+  } else if (const auto* d = dynamic_cast<const Mlp3*>(&net)) {
+    s.dropout = d->dropout_rate;
+  }
+  return s;
+}
+
+/// Only those that are set.
 Json to_json(const ModelSizes& sizes) {
   Json out = Json::object();
-  each_size(sizes, [&out](const char* name, const auto& value) { out[name] = value; });
+  each_size(sizes, [&out](const char* name, const auto& value) {
+    if (value > 0 || (std::is_same_v<std::decay_t<decltype(value)>, double> && value >= 0))
+      out[name] = value;
+  });
   return out;
 }
 
@@ -137,7 +171,8 @@ TensorFile to_file(const ModelSet& models) {
   each_place(models, {}, [&](const std::string& prefix, bool, auto& place) {
     if (!place) return;
     append(&out, *place, prefix);
-    json["models"][stage_of(prefix)] = {{"model", place.name}, {"sizes", to_json(place.sizes)}};
+    json["models"][stage_of(prefix)] = {{"model", place.name},
+                                        {"sizes", to_json(actual_sizes(place.sizes, *place))}};
   });
   out.metadata[kKey] = json.dump();
   return out;
@@ -211,7 +246,9 @@ TensorFile export_model(const ModelSet& models, const std::string& which,
   each_place(models, {}, [&](const std::string& prefix, bool, auto& place) {
     if (!place || (place.name != which && stage_of(prefix) != which)) return;
     out = to_file(*place, "");
-    const Json json = {{"format", 1}, {"model", place.name}, {"sizes", to_json(place.sizes)}};
+    const Json json = {{"format", 1},
+                       {"model", place.name},
+                       {"sizes", to_json(actual_sizes(place.sizes, *place))}};
     out.metadata[kKey] = json.dump();
   });
   if (out.tensors.empty())

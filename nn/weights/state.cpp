@@ -123,8 +123,10 @@ void load_state(Module& module, const TensorFile& file, const std::string& prefi
   describe(&text, unexpected, "unexpected", most);
   describe(&text, unfit, "unfit", most);
   if (!text.empty()) {
-    StateError error(where, "does not fit " + std::string(module.kind()) + ": " + text,
-                     "give weights of this model");
+    StateError error(
+        where,
+        "does not fit " + (module.scope.empty() ? module.kind() : module.scope) + ": " + text,
+        "give weights of this model");
     error.missing = missing;
     error.unexpected = unexpected;
     error.unfit = unfit;

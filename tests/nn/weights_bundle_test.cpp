@@ -68,6 +68,7 @@ TEST(WeightsBundle, EverythingComesBack) {
   EXPECT_EQ(back.extra.at("translation"), "velocity");
   EXPECT_EQ(back.smrm->joint_mean.item(3), 0.5);
   EXPECT_FALSE(back.root);
+  EXPECT_EQ(back.smrm.sizes.dropout, 0.2);  // the default, written out
 }
 
 TEST(WeightsBundle, MissingStagesAreNamedIfNeeded) {
@@ -92,10 +93,11 @@ TEST(WeightsBundle, FilesFromElsewhereAreRefused) {
 }
 
 TEST(WeightsBundle, WrongModelsSizesAndTensorsAreRefused) {
-  expect_bad(edited("skeleton/patch_transformer", "skeleton/pointnet"), "does not fit PointNet");
+  expect_bad(edited("skeleton/patch_transformer", "skeleton/pointnet"),
+             "does not fit skeleton/pointnet");
   expect_bad(edited("skeleton/patch_transformer", "smrm/rot6d"), "no model for skeleton");
   expect_bad(edited("skeleton/patch_transformer", "skeleton/unheard_of"), "no model for skeleton");
-  expect_bad(edited("\"hidden\":8", "\"hidden\":9"), "does not fit SMRM");
+  expect_bad(edited("\"hidden\":8", "\"hidden\":9"), "does not fit smrm/rot6d");
   expect_bad(edited("\"hidden\":8", "\"hidden\":2000000000"), "cannot fill");
   expect_bad(edited("\"hidden\":8", "\"hidden\":4611686018427387904"), "cannot fill");
   expect_bad(edited("\"hidden\":8", "\"hidden\":\"x\""), "no proper size");
