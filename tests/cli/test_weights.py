@@ -1,0 +1,95 @@
+"""restage info and restage weights."""
+import json
+import os
+import random
+import struct
+
+from support import CliTest, small_disk
+
+COUNTS = {"skeleton/point_transformer": 9585730, "skeleton/pointnet": 1620811, "smrm/rot6d": 5793927, "smrm/quaternion": 5771355,
+          "smrm/discriminator": 280285, "deformation/weights": 89366, "deformation/offsets": 84483, "deformation/root": 83715,
+          "deformation/v1_field": 88598}
+OFFSETS = {"fc1.weight": [256, 69], "fc1.bias": [256], "fc2.weight": [256, 256], "fc2.bias": [256], "fc3.weight": [3, 256], "fc3.bias": [3]}
+
+
+def tensors(shapes, seed=0, prefix=""):
+    """A safetensors file of float32 numbers."""
+    r, head, data = random.Random(seed), {}, b""
+    for name, shape in shapes.items():
+        count = 1
+        for n in shape:
+            count *= n
+        blob = struct.pack("<%df" % count, *(r.uniform(-1, 1) for _ in range(count)))
+        head[prefix + name] = {"dtype": "F32", "shape": shape, "data_offsets": [len(data), len(data) + len(blob)]}
+        data += blob
+    text = json.dumps(head).encode()
+    return struct.pack("<Q", len(text)) + text + data
+
+
+class Info(CliTest):
+    def test_counts_add_up(self):
+        for model, count in COUNTS.items():
+            found = self.json("info", model)
+            self.assertEqual((found["model"], found["parameters"]), (model, count))
+            self.assertEqual(sum(m["parameters"] for m in found["modules"]), count)
+            self.assertTrue(all(m["parameters"] > 0 and set(m) == {"name", "kind", "output", "parameters"} for m in found["modules"]))
+            self.assertIn(str(count), self.done("info", model))
+
+    def test_unknown_model(self):
+        self.bad_input(["info", "smrm/rot6"], "smrm/rot6d")
+
+
+class Weights(CliTest):
+    def test_out_and_in_again(self):
+        self.write("o.safetensors", tensors(OFFSETS))
+        self.done("weights", "import", "--from", "o.safetensors", "--model", "deformation/offsets", "--out", "w.safetensors")
+        shown = self.json("weights", "show", "w.safetensors")
+        self.assertEqual(shown["metadata"]["restage"]["models"]["deformation.offsets"]["model"], "deformation/offsets")
+        self.assertEqual({t["name"]: t["shape"] for t in shown["tensors"]}, {"deformation.offsets." + k: v for k, v in OFFSETS.items()})
+        self.done("weights", "export", "--from", "w.safetensors", "--model", "deformation/offsets", "--out", "back.safetensors")
+        self.done("weights", "import", "--from", "back.safetensors", "--model", "deformation/offsets", "--out", "again.safetensors")
+        self.assertEqual(self.bytes("w.safetensors"), self.bytes("again.safetensors"))
+        self.assertIn("fc2.weight", self.done("weights", "show", "back.safetensors"))
+
+    def test_name_map_and_second_model(self):
+        self.write("o.safetensors", tensors(OFFSETS))
+        self.write("foreign.safetensors", tensors(dict(OFFSETS, step=[1]), 1, "net/"))
+        self.write("names.yaml", "net/step: ~\n'net/*': '*'\n")
+        self.done("weights", "import", "--from", "o.safetensors", "--model", "deformation/offsets", "--out", "w.safetensors")
+        wide = dict(OFFSETS, **{"fc3.weight": [22, 256], "fc3.bias": [22]})
+        self.write("w_net.safetensors", tensors(wide, 2))
+        self.done("weights", "import", "--from", "w_net.safetensors", "--model", "deformation/weights", "--with", "w.safetensors", "--out", "w.safetensors")
+        self.done("weights", "import", "--from", "foreign.safetensors", "--map", "names.yaml", "--model", "deformation/offsets",
+                  "--with", "w.safetensors", "--out", "w.safetensors")
+        self.assertEqual(len(self.json("weights", "show", "w.safetensors")["tensors"]), 12)
+
+    def test_everything_that_does_not_fit_is_listed(self):
+        shapes = dict(OFFSETS, **{"fc1.weight": [256, 68], "else": [2]})
+        del shapes["fc2.bias"], shapes["fc3.bias"]
+        self.write("o.safetensors", tensors(shapes))
+        arguments = ["weights", "import", "--from", "o.safetensors", "--model", "deformation/offsets", "--out", "w.safetensors"]
+        result = self.restage(*arguments)
+        self.one_line(result, 2, "o.safetensors", "2 missing", "1 unexpected", "1 unfit")
+        for name in ("fc2.bias", "fc3.bias", "else", "fc1.weight: [256, 68] instead of [256, 69]"):
+            self.assertIn(name, result.out)
+        listed = json.loads(self.restage(*arguments, "--json").out)
+        self.assertEqual(listed["missing"], ["fc2.bias", "fc3.bias"])
+        self.assertFalse(os.path.exists(self.path("w.safetensors")))
+
+    def test_bad_input(self):
+        good = self.write("o.safetensors", tensors(OFFSETS))
+        cut = self.write("cut.safetensors", tensors(OFFSETS)[:5000])
+        into = ["--model", "deformation/offsets", "--out", "w.safetensors"]
+        self.bad_input(["weights", "show", "none.safetensors"], "none.safetensors")
+        self.bad_input(["weights", "show", cut], cut)
+        self.bad_input(["weights", "import", "--from", cut, *into], cut)
+        self.bad_input(["weights", "import", "--from", good, "--model", "deformation/offset", "--out", "w.safetensors"], "deformation/offsets")
+        self.bad_input(["weights", "import", "--from", good, "--map", self.write("m.yaml", "[1]"), *into], "m.yaml")
+        self.bad_input(["weights", "import", "--from", good, "--size", "hidde=3", *into], "hidden")
+        self.bad_input(["weights", "export", "--from", good, "--model", "smrm", "--out", "s.safetensors"], good)
+        self.bad_input(["weights", "import", "--from", good, "--model", "deformation/offsets", "--out", "nowhere/w.safetensors"], "nowhere")
+
+    def test_full_disk(self):
+        self.write("o.safetensors", tensors(OFFSETS))
+        result = self.restage("weights", "import", "--from", "o.safetensors", "--model", "deformation/offsets", "--out", "w.safetensors", before=small_disk)
+        self.one_line(result, 1, "w.safetensors")
