@@ -30,8 +30,8 @@ class CpuBackend final : public Backend {
     add<FoldArgs, cpu::fold>();
     add<NormArgs, cpu::norm>();
     add<NormGradArgs, cpu::norm_grad>();
-    add<GruCellArgs, cpu::gru_cell>();
-    add<GruCellGradArgs, cpu::gru_cell_grad>();
+    add<GruArgs, cpu::gru>();
+    add<GruGradArgs, cpu::gru_grad>();
     add<KnnArgs, cpu::knn>();
     add<FpsArgs, cpu::fps>();
     add<AttentionPoolArgs, cpu::attention_pool>();

@@ -1,53 +1,139 @@
+// GRU layers. The rows of a batch never meet, so each thread takes some rows through all steps: no
+// waiting between steps, and the recurrent weights are packed once for the whole sequence.
+#include <vector>
+
 #include "autograd/cpu/common.h"
+#include "autograd/cpu/gemm_tile.h"
 #include "autograd/cpu/kernels.h"
 
 namespace restage::cpu {
+namespace {
 
-void gru_cell(const GruCellArgs& args) {
-  const int64_t h = args.h.size(1);
-  dispatch(args.out.dtype(), [&](auto zero) {
-    using T = decltype(zero);
-    parallel_for(args.h.size(0), row_grain(4 * h), [&](int64_t from, int64_t to) {
-      for (int64_t s = from; s < to; ++s) {
-        const T* gi = args.gi.data<T>() + s * 3 * h;
-        const T* gh = args.gh.data<T>() + s * 3 * h;
-        T* gates = args.gates.data<T>() + s * 4 * h;
-        const ConstArray<T> ir(gi, h), iz(gi + h, h), in(gi + 2 * h, h);
-        const ConstArray<T> hr(gh, h), hz(gh + h, h), hn(gh + 2 * h, h),
-            prev(args.h.data<T>() + s * h, h);
-        MutableArray<T> r(gates, h), z(gates + h, h), n(gates + 2 * h, h), kept(gates + 3 * h, h);
-        r = T(1) / (T(1) + (-(ir + hr)).exp());
-        z = T(1) / (T(1) + (-(iz + hz)).exp());
-        n = (in + r * hn).tanh();
-        kept = hn;
-        MutableArray<T>(args.out.data<T>() + s * h, h) = (T(1) - z) * n + z * prev;
-      }
-    });
+/// Rows per piece: a function of the batch alone. Fewer rows than the register tile has cost no
+/// more than a full tile, so small batches are still cut in two.
+int piece_rows(int64_t n) {
+  if (n <= 8) return 4;
+  return kRows > 8 && n <= 16 ? 8 : kRows;
+}
+
+/// [rows, k] times packed columns -> [rows, n], rows <= Rows.
+template <class T, int Rows>
+void rows_times(const T* x, int64_t rows, int64_t k, const std::vector<T>& packed, int64_t n,
+                std::vector<T>& panel, T* out) {
+  constexpr int cols = Simd<T>::cols;
+  for (int64_t l = 0; l < k; ++l)
+    for (int64_t i = 0; i < Rows; ++i)
+      panel[static_cast<size_t>(l * Rows + i)] = i < rows ? x[i * k + l] : T(0);
+  T tile[Rows * cols];
+  for (int64_t j0 = 0; j0 < n; j0 += cols) {
+    multiply<T, Rows>(k, panel.data(), packed.data() + j0 * k, tile);
+    const int64_t width = std::min<int64_t>(cols, n - j0);
+    for (int64_t i = 0; i < rows; ++i) std::copy_n(tile + i * cols, width, out + i * n + j0);
+  }
+}
+
+template <class T>
+void rows_times(int piece, const T* x, int64_t rows, int64_t k, const std::vector<T>& packed,
+                int64_t n, std::vector<T>& panel, T* out) {
+  if (piece == 4) return rows_times<T, 4>(x, rows, k, packed, n, panel, out);
+  if (piece == 8) return rows_times<T, 8>(x, rows, k, packed, n, panel, out);
+  rows_times<T, kRows>(x, rows, k, packed, n, panel, out);
+}
+
+/// A matrix [k, n] (by strides) in the layout of multiply().
+template <class T>
+std::vector<T> packed(const Strided<T>& m, int64_t k, int64_t n) {
+  constexpr int cols = Simd<T>::cols;
+  std::vector<T> out(static_cast<size_t>((n + cols - 1) / cols * cols * k));
+  pack_b(m, k, n, out.data());
+  return out;
+}
+
+template <class T>
+void cell(const T* gi, const T* gh, const T* bias, const T* previous, int64_t h, T* gates, T* out) {
+  const ConstArray<T> ir(gi, h), iz(gi + h, h), in(gi + 2 * h, h), hr(gh, h), hz(gh + h, h),
+      hn(gh + 2 * h, h);
+  const ConstArray<T> br(bias, h), bz(bias + h, h), bn(bias + 2 * h, h), prev(previous, h);
+  MutableArray<T> r(gates, h), z(gates + h, h), n(gates + 2 * h, h), kept(gates + 3 * h, h);
+  r = T(1) / (T(1) + (-(ir + hr + br)).exp());
+  z = T(1) / (T(1) + (-(iz + hz + bz)).exp());
+  kept = hn + bn;
+  n = (in + r * kept).tanh();
+  MutableArray<T>(out, h) = (T(1) - z) * n + z * prev;
+}
+
+/// g: gradient of the new state; on return `direct` holds the part that goes straight to the old
+/// one.
+template <class T>
+void cell_grad(const T* gates, const T* previous, const T* g_out, int64_t h, T* gi, T* gh,
+               T* direct) {
+  const ConstArray<T> r(gates, h), z(gates + h, h), n(gates + 2 * h, h), hn(gates + 3 * h, h);
+  const ConstArray<T> prev(previous, h), g(g_out, h);
+  MutableArray<T> ir(gi, h), iz(gi + h, h), in(gi + 2 * h, h);
+  in = g * (T(1) - z) * (T(1) - n * n);
+  iz = g * (prev - n) * z * (T(1) - z);
+  ir = in * hn * r * (T(1) - r);
+  MutableArray<T>(gh, h) = ir;
+  MutableArray<T>(gh + h, h) = iz;
+  MutableArray<T>(gh + 2 * h, h) = in * r;
+  MutableArray<T>(direct, h) = g * z;
+}
+
+template <class T>
+void forward(const GruArgs& args) {
+  const int64_t steps = args.gi.size(0), n = args.gi.size(1), h = args.h0.size(1);
+  const std::vector<T> w = packed<T>({args.w_hh.data<T>(), 1, h}, h, 3 * h);
+  const int piece = piece_rows(n);
+  parallel_for(n, piece, [&](int64_t from, int64_t to) {
+    const int64_t rows = to - from;
+    std::vector<T> panel(static_cast<size_t>(h * piece)), gh(static_cast<size_t>(rows * 3 * h));
+    const T* previous = args.h0.data<T>() + from * h;
+    for (int64_t t = 0; t < steps; ++t) {
+      rows_times(piece, previous, rows, h, w, 3 * h, panel, gh.data());
+      T* out = args.out.data<T>() + (t * n + from) * h;
+      for (int64_t i = 0; i < rows; ++i)
+        cell(args.gi.data<T>() + (t * n + from + i) * 3 * h, gh.data() + i * 3 * h,
+             args.b_hh.data<T>(), previous + i * h, h,
+             args.gates.data<T>() + (t * n + from + i) * 4 * h, out + i * h);
+      previous = out;
+    }
   });
 }
 
-void gru_cell_grad(const GruCellGradArgs& args) {
-  const int64_t h = args.h.size(1);
-  dispatch(args.out.dtype(), [&](auto zero) {
-    using T = decltype(zero);
-    parallel_for(args.h.size(0), row_grain(4 * h), [&](int64_t from, int64_t to) {
-      for (int64_t s = from; s < to; ++s) {
-        const T* gates = args.gates.data<T>() + s * 4 * h;
-        const ConstArray<T> r(gates, h), z(gates + h, h), n(gates + 2 * h, h), hn(gates + 3 * h, h);
-        const ConstArray<T> prev(args.h.data<T>() + s * h, h), g(args.gy.data<T>() + s * h, h);
-        T* gi = args.g_gi.data<T>() + s * 3 * h;
-        T* gh = args.g_gh.data<T>() + s * 3 * h;
-        MutableArray<T> ir(gi, h), iz(gi + h, h), in(gi + 2 * h, h);
-        in = g * (T(1) - z) * (T(1) - n * n);
-        iz = g * (prev - n) * z * (T(1) - z);
-        ir = in * hn * r * (T(1) - r);
-        MutableArray<T>(gh, h) = ir;
-        MutableArray<T>(gh + h, h) = iz;
-        MutableArray<T>(gh + 2 * h, h) = in * r;
-        MutableArray<T>(args.out.data<T>() + s * h, h) = g * z;
-      }
-    });
+template <class T>
+void backward(const GruGradArgs& args) {
+  const int64_t steps = args.gy.size(0), n = args.gy.size(1), h = args.h0.size(1);
+  const std::vector<T> w = packed<T>({args.w_hh.data<T>(), h, 1}, 3 * h, h);
+  const int piece = piece_rows(n);
+  parallel_for(n, piece, [&](int64_t from, int64_t to) {
+    const int64_t rows = to - from, count = rows * h;
+    std::vector<T> panel(static_cast<size_t>(3 * h * piece)),
+        carry(static_cast<size_t>(count), T(0));
+    std::vector<T> direct(static_cast<size_t>(count)), through(static_cast<size_t>(count));
+    for (int64_t t = steps - 1; t >= 0; --t) {
+      const int64_t at = t * n + from;
+      MutableArray<T>(carry.data(), count) += ConstArray<T>(args.gy.data<T>() + at * h, count);
+      const T* previous = t > 0 ? args.y.data<T>() + (at - n) * h : args.h0.data<T>() + from * h;
+      for (int64_t i = 0; i < rows; ++i)
+        cell_grad(args.gates.data<T>() + (at + i) * 4 * h, previous + i * h, carry.data() + i * h,
+                  h, args.g_gi.data<T>() + (at + i) * 3 * h, args.g_gh.data<T>() + (at + i) * 3 * h,
+                  direct.data() + i * h);
+      rows_times(piece, args.g_gh.data<T>() + at * 3 * h, rows, 3 * h, w, h, panel, through.data());
+      MutableArray<T>(carry.data(), count) =
+          ConstArray<T>(direct.data(), count) + ConstArray<T>(through.data(), count);
+    }
+    std::copy_n(carry.data(), count, args.out.data<T>() + from * h);
   });
+}
+
+}  // namespace
+
+void gru(const GruArgs& args) {
+  dispatch(args.out.dtype(), [&](auto zero) { forward<decltype(zero)>(args); });
+}
+
+void gru_grad(const GruGradArgs& args) {
+  dispatch(args.out.dtype(), [&](auto zero) { backward<decltype(zero)>(args); });
 }
 
 }  // namespace restage::cpu

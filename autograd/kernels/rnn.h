@@ -1,25 +1,30 @@
-// One step of a GRU (PyTorch's equations, spec 3.2), gates stacked r, z, n.
+// A GRU layer (PyTorch's equations, spec 3.2), gates stacked r, z, n.
 #pragma once
 
 #include "autograd/kernels/kernel.h"
 
 namespace restage {
 
-/// gi [n, 3h] = W_i x + b_i, gh [n, 3h] = W_h h + b_h, h [n, h] -> out [n, h]; gates [n, 4h] keeps
-/// r, z, n and the third part of gh for the backward pass.
-struct GruCellArgs {
-  static constexpr std::string_view name = "gru_cell";
+/// All steps of one layer. gi [t, n, 3h] = W_i x + b_i of every step, h0 [n, h], w_hh [3h, h],
+/// b_hh [3h] -> out [t, n, h]; gates [t, n, 4h] keeps r, z, n and W_hn h + b_hn of every step for
+/// the backward pass.
+struct GruArgs {
+  static constexpr std::string_view name = "gru";
   const Tensor& gi;
-  const Tensor& gh;
-  const Tensor& h;
+  const Tensor& h0;
+  const Tensor& w_hh;
+  const Tensor& b_hh;
   Tensor& out;
   Tensor& gates;
 };
-/// gy [n, h] -> g_gi [n, 3h], g_gh [n, 3h], and out [n, h] = the direct part of the gradient of h.
-struct GruCellGradArgs {
-  static constexpr std::string_view name = "gru_cell_grad";
+/// gy [t, n, h] and y = out of GruArgs -> g_gi [t, n, 3h], g_gh [t, n, 3h] (gradients of W_i x +
+/// b_i and of W_h h + b_h), out [n, h] = gradient of h0.
+struct GruGradArgs {
+  static constexpr std::string_view name = "gru_grad";
   const Tensor& gates;
-  const Tensor& h;
+  const Tensor& y;
+  const Tensor& h0;
+  const Tensor& w_hh;
   const Tensor& gy;
   Tensor& g_gi;
   Tensor& g_gh;

@@ -12,9 +12,6 @@
 namespace restage {
 namespace {
 
-/// Row t of a [t, n, c] tensor as [n, c], sharing memory.
-Tensor step(const Tensor& x, int64_t t) { return x.rows(t, t + 1).reshape({x.size(1), x.size(2)}); }
-
 Tensor column_sum(const Tensor& g) {  // [t, n, c] -> [c]
   Tensor out = Tensor::empty({g.size(2)}, g.dtype(), g.device());
   launch(SumArgs{g, out, 1, g.size(0) * g.size(1), g.size(2)});
@@ -46,14 +43,7 @@ Tensor Gru::forward(Inputs in, Saved& saved) const {
   launch(MatmulArgs{flat(x), w_ih, gi_flat, false, true, &in[4]});
   Tensor y = Tensor::empty({t_count, n, h}, x.dtype(), x.device());
   Tensor gates = Tensor::empty({t_count, n, 4 * h}, x.dtype(), x.device());
-  Tensor gh = Tensor::empty({n, 3 * h}, x.dtype(), x.device());
-  Tensor previous = in[1];
-  for (int64_t t = 0; t < t_count; ++t) {
-    launch(MatmulArgs{previous, w_hh, gh, false, true, &in[5]});
-    Tensor out = step(y, t), kept = step(gates, t);
-    launch(GruCellArgs{step(gi, t), gh, previous, out, kept});
-    previous = out;
-  }
+  launch(GruArgs{gi, in[1], w_hh, in[5], y, gates});
   saved.keep({x, in[1], w_ih, w_hh, y, gates});
   return y;
 }
@@ -64,22 +54,15 @@ Grads Gru::backward(const Saved& saved, const Tensor& gy, Needs needs) const {
   const int64_t t_count = x.size(0), n = x.size(1), h = h0.size(1);
   Tensor g_gi = Tensor::empty({t_count, n, 3 * h}, x.dtype(), x.device());
   Tensor g_gh = Tensor::empty({t_count, n, 3 * h}, x.dtype(), x.device());
-  Tensor carry = Tensor::zeros({n, h}, x.dtype(), x.device());  // gradient of the state
-  for (int64_t t = t_count - 1; t >= 0; --t) {
-    launch(AccumulateArgs{step(gy, t), carry});
-    Tensor next = Tensor::empty({n, h}, x.dtype(), x.device());
-    Tensor gi = step(g_gi, t), gh = step(g_gh, t);
-    launch(GruCellGradArgs{step(gates, t), t > 0 ? step(y, t - 1) : h0, carry, gi, gh, next});
-    launch(MatmulArgs{gh, w_hh, next, false, false, nullptr, Activation::none, true});
-    carry = next;
-  }
+  Tensor g_h0 = Tensor::empty({n, h}, x.dtype(), x.device());
+  launch(GruGradArgs{gates, y, h0, w_hh, gy, g_gi, g_gh, g_h0});
   Grads g(6);
   if (needs[0]) {
     g[0] = Tensor::empty(x.shape(), x.dtype(), x.device());
     Tensor rows = flat(g[0]);
     launch(MatmulArgs{flat(g_gi), w_ih, rows});
   }
-  if (needs[1]) g[1] = carry;
+  if (needs[1]) g[1] = g_h0;
   if (needs[2]) {
     g[2] = Tensor::empty(w_ih.shape(), x.dtype(), x.device());
     launch(MatmulArgs{flat(g_gi), flat(x), g[2], true, false});
