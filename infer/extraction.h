@@ -1,4 +1,5 @@
-// Joints of single clouds: the points are put in order, sampled, centred and given to the extractor.
+// Joints of single clouds: the points are put in order, sampled, centred and given to the
+// extractor.
 #pragma once
 
 #include "autograd/base/rng.h"
@@ -9,12 +10,12 @@ namespace restage {
 
 inline constexpr size_t kLeastDistinctPoints = 64;
 
-/// The 22 joints of a cloud, metres, in the cloud's frame. Points are sorted lexicographically first,
-/// so their order in a file does not matter to the last bit. `samples` > 1 averages the answers for
-/// several random choices of points. InputError naming `source`: fewer than 64 distinct points, values
-/// that are not finite.
-Joints extract_joints(SkeletonModel& model, const Points& cloud, const std::string& source, const RngKey& key,
-                      int samples = 1);
+/// The 22 joints of a cloud, metres, in the cloud's frame. Points are sorted lexicographically
+/// first, so their order in a file does not matter to the last bit. `samples` > 1 averages the
+/// answers for several random choices of points. InputError naming `source`: fewer than 64 distinct
+/// points, values that are not finite.
+Joints extract_joints(SkeletonModel& model, const Points& cloud, const std::string& source,
+                      const RngKey& key, int samples = 1);
 
 /// `n` points of a surface, uniform by area; of a mesh without faces, its vertices as they are.
 Points surface_points(const Mesh& mesh, size_t n, const RngKey& key);

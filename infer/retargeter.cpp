@@ -10,15 +10,16 @@
 namespace restage {
 namespace {
 
-constexpr int kTargetSamples = 16;     // a target is looked at once: average many choices of points
+constexpr int kTargetSamples = 16;  // a target is looked at once: average many choices of points
 constexpr size_t kTargetPoints = 8192;
-constexpr double kTposeLimit = 30.0;   // degrees
+constexpr double kTposeLimit = 30.0;  // degrees
 
 Tensor tensor_of(const Joints& joints, const Vec3& origin) {
   Tensor t = Tensor::empty({1, kJoints, 3});
   for (size_t j = 0; j < kJoints; ++j)
     for (int c = 0; c < 3; ++c)
-      t.data<float>()[3 * j + static_cast<size_t>(c)] = static_cast<float>(joints[j][c] - origin[c]);
+      t.data<float>()[3 * j + static_cast<size_t>(c)] =
+          static_cast<float>(joints[j][c] - origin[c]);
   return t;
 }
 
@@ -29,29 +30,34 @@ Joints blend(const Joints& a, const Joints& b, double t) {
 }
 
 void require_tpose(const Joints& j, const std::string& where) {
-  for (const auto& [shoulder, wrist, side] : {std::tuple<size_t, size_t, double>{16, 20, 1.0}, {17, 21, -1.0}}) {
+  for (const auto& [shoulder, wrist, side] :
+       {std::tuple<size_t, size_t, double>{16, 20, 1.0}, {17, 21, -1.0}}) {
     const Vec3 arm = j[wrist] - j[shoulder];
-    const double angle = std::acos(std::clamp(side * arm[0] / std::max(arm.norm(), 1e-9), -1.0, 1.0)) * 180 / M_PI;
+    const double angle =
+        std::acos(std::clamp(side * arm[0] / std::max(arm.norm(), 1e-9), -1.0, 1.0)) * 180 / M_PI;
     if (angle <= kTposeLimit) continue;
     char text[96];
-    std::snprintf(text, sizeof text, "is not in T-pose: the %s arm is %.0f degrees from %sx", side > 0 ? "left" : "right",
-                  angle, side > 0 ? "+" : "-");
+    std::snprintf(text, sizeof text, "is not in T-pose: the %s arm is %.0f degrees from %sx",
+                  side > 0 ? "left" : "right", angle, side > 0 ? "+" : "-");
     throw InputError(where, text, "give the target in T-pose facing +z, y up, or add --force");
   }
 }
 
 }  // namespace
 
-Retargeter::Retargeter(const ModelSet& models, Mesh target, const std::string& where, const RetargetOptions& options)
+Retargeter::Retargeter(const ModelSet& models, Mesh target, const std::string& where,
+                       const RetargetOptions& options)
     : models_(models), target_(std::move(target)), options_(options) {
   const RngKey key = RngKey{options.seed, 0}.fold("target");
-  rest_ = extract_joints(*models.skeleton, surface_points(target_, kTargetPoints, key.fold("surface")), where, key,
-                         kTargetSamples);
+  rest_ =
+      extract_joints(*models.skeleton, surface_points(target_, kTargetPoints, key.fold("surface")),
+                     where, key, kTargetSamples);
   if (!options.force) require_tpose(rest_, where);
   prepare();
 }
 
-Retargeter::Retargeter(const ModelSet& models, Mesh target, const Joints& rest, const RetargetOptions& options)
+Retargeter::Retargeter(const ModelSet& models, Mesh target, const Joints& rest,
+                       const RetargetOptions& options)
     : models_(models), target_(std::move(target)), options_(options), rest_(rest) {
   prepare();
 }
@@ -72,8 +78,9 @@ void Retargeter::prepare() {
       points_tensor_.data<float>()[3 * i + static_cast<size_t>(c)] =
           target_.vertices[i][c] - static_cast<float>(rest_[0][c]);
   Context ctx;
-  weights_tensor_ =
-      (*models_.weights)(ctx, join_points(Var(rest_tensor_.reshape({1, 3 * kJoints})), Var(points_tensor_))).value;
+  weights_tensor_ = (*models_.weights)(ctx, join_points(Var(rest_tensor_.reshape({1, 3 * kJoints})),
+                                                        Var(points_tensor_)))
+                        .value;
   weights_ = Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, kJoints, Eigen::RowMajor>>(
       weights_tensor_.data<float>(), v, kJoints);
 }
@@ -96,8 +103,10 @@ std::vector<RetargetedFrame> Retargeter::push_joints(const Joints& joints) {
   const double now = static_cast<double>(frame_) / options_.fps;
   // Grid frames up to this moment; positions between two source frames are interpolated.
   while (static_cast<double>(grid_) / kFps <= now + 1e-9) {
-    const double back = (now - static_cast<double>(grid_) / kFps) * options_.fps;  // in source frames
-    out.push_back(step(received_ && back > 1e-9 ? blend(joints, *received_, std::min(back, 1.0)) : joints));
+    const double back =
+        (now - static_cast<double>(grid_) / kFps) * options_.fps;  // in source frames
+    out.push_back(
+        step(received_ && back > 1e-9 ? blend(joints, *received_, std::min(back, 1.0)) : joints));
     ++grid_;
   }
   received_ = joints;
@@ -111,7 +120,8 @@ RetargetedFrame Retargeter::step(const Joints& a) {
   Joints local;
   for (size_t j = 0; j < kJoints; ++j) local[j] = back * (a[j] - a[0]);
   Vec3 moved = Vec3::Zero();
-  const double height_ratio = leg_length(rest_) / std::max(leg_length(previous_ ? *previous_ : a), 1e-6);
+  const double height_ratio =
+      leg_length(rest_) / std::max(leg_length(previous_ ? *previous_ : a), 1e-6);
   if (velocity_) {
     if (previous_) moved = back * (a[0] - (*previous_)[0]) * kFps;
   } else {
@@ -120,12 +130,14 @@ RetargetedFrame Retargeter::step(const Joints& a) {
   Tensor trans = Tensor::empty({1, 1, 3});
   for (int c = 0; c < 3; ++c) trans.data<float>()[c] = static_cast<float>(moved[c]);
   Context ctx;
-  const SmrmOutput answer = (*models_.smrm)(ctx, Var(tensor_of(local, Vec3::Zero()).reshape({1, 1, kJoints, 3})),
-                                            Var(trans), Var(rest_tensor_), &state_);
+  const SmrmOutput answer =
+      (*models_.smrm)(ctx, Var(tensor_of(local, Vec3::Zero()).reshape({1, 1, kJoints, 3})),
+                      Var(trans), Var(rest_tensor_), &state_);
   RetargetedFrame out;
   const float* r = answer.rotations.value.data<float>();
   for (size_t j = 0; j < kJoints; ++j)
-    out.pose.local[j] = Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(r + 9 * j).cast<double>();
+    out.pose.local[j] =
+        Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(r + 9 * j).cast<double>();
   out.pose.local[0] = turn * out.pose.local[0];
   const float* t = answer.trans.value.data<float>();
   const Vec3 t_b = turn * Vec3(t[0], t[1], t[2]);
@@ -144,7 +156,8 @@ RetargetedFrame Retargeter::step(const Joints& a) {
 Points Retargeter::pose_vertices(const Pose& pose) const {
   Tensor local = Tensor::empty({1, kJoints, 3, 3});
   for (size_t j = 0; j < kJoints; ++j)
-    Eigen::Map<Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(local.data<float>() + 9 * j) = pose.local[j].cast<float>();
+    Eigen::Map<Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(local.data<float>() + 9 * j) =
+        pose.local[j].cast<float>();
   Context ctx;
   Var x = points_tensor_;
   if (models_.offsets) {
@@ -154,10 +167,13 @@ Points Retargeter::pose_vertices(const Pose& pose) const {
   }
   Tensor root = Tensor::empty({1, 3});
   for (int c = 0; c < 3; ++c) root.data<float>()[c] = static_cast<float>(pose.root[c]);
-  const Var transforms = forward_kinematics(Var(local), Var(rest_tensor_), Var(root), joint_parents());
-  const Tensor posed = linear_blend_skinning(x, Var(weights_tensor_), transforms, Var(rest_tensor_)).value;
+  const Var transforms =
+      forward_kinematics(Var(local), Var(rest_tensor_), Var(root), joint_parents());
+  const Tensor posed =
+      linear_blend_skinning(x, Var(weights_tensor_), transforms, Var(rest_tensor_)).value;
   Points out(target_.vertices.size());
-  for (size_t i = 0; i < out.size(); ++i) out[i] = Eigen::Map<const Point>(posed.data<float>() + 3 * i);
+  for (size_t i = 0; i < out.size(); ++i)
+    out[i] = Eigen::Map<const Point>(posed.data<float>() + 3 * i);
   return out;
 }
 

@@ -10,10 +10,10 @@
 namespace restage {
 
 struct RetargetOptions {
-  double fps = kFps;       ///< of the source; other rates are resampled to 30
-  bool force = false;      ///< accept a target that does not look like a T-pose
-  uint64_t seed = 0;       ///< of the choice of points
-  int samples = 1;         ///< choices of points per frame that are averaged
+  double fps = kFps;   ///< of the source; other rates are resampled to 30
+  bool force = false;  ///< accept a target that does not look like a T-pose
+  uint64_t seed = 0;   ///< of the choice of points
+  int samples = 1;     ///< choices of points per frame that are averaged
 };
 
 /// B in one frame.
@@ -27,27 +27,33 @@ class Retargeter {
  public:
   /// `models` must hold all stages and outlive the object. `where` names the target in errors.
   /// InputError: a target whose shoulder-wrist lines are more than 30 degrees from +-x.
-  Retargeter(const ModelSet& models, Mesh target, const std::string& where, const RetargetOptions& options);
+  Retargeter(const ModelSet& models, Mesh target, const std::string& where,
+             const RetargetOptions& options);
   /// The same from known rest joints of the target instead of extracted ones.
-  Retargeter(const ModelSet& models, Mesh target, const Joints& rest, const RetargetOptions& options);
+  Retargeter(const ModelSet& models, Mesh target, const Joints& rest,
+             const RetargetOptions& options);
 
-  /// One frame of A. At 30 fps each gives one frame of B, else those of the 30 fps grid that it ends.
+  /// One frame of A. At 30 fps each gives one frame of B, else those of the 30 fps grid that it
+  /// ends.
   std::vector<RetargetedFrame> push(const Points& cloud, const std::string& source);
   /// The same from joints of A in the world.
   std::vector<RetargetedFrame> push_joints(const Joints& joints);
+  /// The target's surface in a pose of choice: skinning weights and offsets of the models.
+  Points pose_vertices(const Pose& pose) const;
   /// Forgets the motion so far.
   void restart();
 
   const Mesh& target() const { return target_; }
   const Joints& rest() const { return rest_; }
-  const Eigen::Matrix<float, Eigen::Dynamic, kJoints, Eigen::RowMajor>& weights() const { return weights_; }
+  const Eigen::Matrix<float, Eigen::Dynamic, kJoints, Eigen::RowMajor>& weights() const {
+    return weights_;
+  }
   /// Joints extracted from the last cloud.
   const Joints& source_joints() const { return last_source_; }
 
  private:
   void prepare();
   RetargetedFrame step(const Joints& a);
-  Points pose_vertices(const Pose& pose) const;
 
   const ModelSet& models_;
   Mesh target_;
@@ -55,13 +61,14 @@ class Retargeter {
   Joints rest_;
   Eigen::Matrix<float, Eigen::Dynamic, kJoints, Eigen::RowMajor> weights_;
   Tensor rest_tensor_, points_tensor_, weights_tensor_;  // relative to the rest pelvis
-  bool velocity_ = true, remove_heading_ = false, keep_root_rotation_ = true;  // of the trained models
+  bool velocity_ = true, remove_heading_ = false,
+       keep_root_rotation_ = true;  // of the trained models
   SmrmState state_;
   std::optional<Joints> previous_;  ///< A on the 30 fps grid, one step ago
   std::optional<Joints> received_;  ///< A as last pushed
   Joints last_source_;
   Vec3 root_b_ = Vec3::Zero();
-  int64_t frame_ = 0, grid_ = 0;    ///< source frames received, grid frames produced
+  int64_t frame_ = 0, grid_ = 0;  ///< source frames received, grid frames produced
 };
 
 }  // namespace restage

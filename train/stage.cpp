@@ -19,7 +19,8 @@ Differentiated differentiate(const RngKey& key, const std::function<Var(Context&
   if (!std::isfinite(out.loss) || !std::isfinite(out.norm)) {
     const FiniteCheck check;
     run();
-    throw NonFiniteError("the loss or the norm of its gradient became infinite or NaN by adding up finite values");
+    throw NonFiniteError(
+        "the loss or the norm of its gradient became infinite or NaN by adding up finite values");
   }
   return out;
 }

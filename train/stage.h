@@ -32,9 +32,9 @@ class Stage {
   virtual void export_models(ModelSet& set) = 0;
 };
 
-/// One differentiation: runs `loss` on a fresh tape in training mode and returns the gradients of its
-/// first result. If loss or gradient is not finite the same step is repeated under FiniteCheck, which
-/// names the op and module where the first such value appears (NonFiniteError).
+/// One differentiation: runs `loss` on a fresh tape in training mode and returns the gradients of
+/// its first result. If loss or gradient is not finite the same step is repeated under FiniteCheck,
+/// which names the op and module where the first such value appears (NonFiniteError).
 struct Differentiated {
   Gradients gradients;
   double loss = 0, norm = 0;

@@ -44,7 +44,8 @@ void run_stage(Stage& stage, int64_t first, RunDir& run, const LoopConfig& loop,
       run.metrics(stage.name(), done, scores);
       progress.note(stage.name() + " after " + std::to_string(done) + " steps: " + line(scores));
     }
-    if (done % loop.checkpoint_every == 0 || last || stopped) run.save_checkpoint(stage.name(), done, bytes_of(stage));
+    if (done % loop.checkpoint_every == 0 || last || stopped)
+      run.save_checkpoint(stage.name(), done, bytes_of(stage));
     if (stopped) {
       progress.finish();
       throw_if_stopped();
@@ -52,10 +53,14 @@ void run_stage(Stage& stage, int64_t first, RunDir& run, const LoopConfig& loop,
   }
   progress.finish();
   if (first >= steps) return;
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   char text[200];
-  std::snprintf(text, sizeof text, "%s: %lld steps, %.1f ms a step with validation, peak of tensors %.0f MiB, %lld large blocks taken",
-                stage.name().c_str(), static_cast<long long>(steps - first), 1e3 * seconds / static_cast<double>(steps - first),
+  std::snprintf(text, sizeof text,
+                "%s: %lld steps, %.1f ms a step with validation, peak of tensors %.0f MiB, %lld "
+                "large blocks taken",
+                stage.name().c_str(), static_cast<long long>(steps - first),
+                1e3 * seconds / static_cast<double>(steps - first),
                 static_cast<double>(memory_stats().peak) / 1048576.0,
                 static_cast<long long>(memory_stats().large_allocations - blocks_before));
   log_info(text);
@@ -66,7 +71,8 @@ void run_stage(Stage& stage, int64_t first, RunDir& run, const LoopConfig& loop,
 ModelSet train(RunDir& run, const std::vector<std::string>& stages, const LoopConfig& loop,
                const std::function<std::unique_ptr<Stage>(const std::string&)>& make, bool quiet) {
   const auto resumed = run.take_resumed();
-  const auto begin = resumed ? std::find(stages.begin(), stages.end(), resumed->stage) - stages.begin() : 0;
+  const auto begin =
+      resumed ? std::find(stages.begin(), stages.end(), resumed->stage) - stages.begin() : 0;
   ModelSet result;
   for (size_t i = 0; i < stages.size(); ++i) {
     const auto stage = make(stages[i]);
@@ -76,7 +82,8 @@ ModelSet train(RunDir& run, const std::vector<std::string>& stages, const LoopCo
       // The stage that was interrupted, or an earlier one that is complete.
       const auto checkpoint = index == begin ? resumed : latest_checkpoint(run.dir(), {stages[i]});
       if (!checkpoint)
-        throw InputError(run.dir(), "the checkpoint of stage '" + stages[i] + "' is missing", "train again from the start");
+        throw InputError(run.dir(), "the checkpoint of stage '" + stages[i] + "' is missing",
+                         "train again from the start");
       stage->load(parse_safetensors(checkpoint->bytes, checkpoint->path), checkpoint->path);
       first = checkpoint->step;
     }

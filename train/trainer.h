@@ -19,9 +19,9 @@ void visit(V& v, LoopConfig& c) {
   v("checkpoint_every", c.checkpoint_every, "steps between checkpoints", positive());
 }
 
-/// Runs the stages to their ends, going on from the run's checkpoint if it was resumed. `make` builds
-/// a stage when its turn comes. Throws Interrupted after writing a checkpoint when a signal came.
-/// Returns the trained models.
+/// Runs the stages to their ends, going on from the run's checkpoint if it was resumed. `make`
+/// builds a stage when its turn comes. Throws Interrupted after writing a checkpoint when a signal
+/// came. Returns the trained models.
 ModelSet train(RunDir& run, const std::vector<std::string>& stages, const LoopConfig& loop,
                const std::function<std::unique_ptr<Stage>(const std::string&)>& make, bool quiet);
 

@@ -1,11 +1,18 @@
 // restage eval: metrics of a prediction beside its ground truth and beside references.
+#include <filesystem>
 #include <memory>
 
+#include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/eval_report.h"
+#include "experiments/cli/weights_path.h"
+#include "experiments/evaluation.h"
 #include "nn/geometry/closed_form.h"
+#include "train/config.h"
+#include "train/run.h"
+#include "train/stages/skeleton_stage.h"
 
 namespace restage::cli {
 namespace {
@@ -14,7 +21,7 @@ using metrics::SequenceView;
 using metrics::Track;
 
 struct EvalOptions {
-  std::string pred, truth, source, rest;
+  std::string run, pred, truth, source, rest, out;
   bool variants = false, per_joint = false;
 };
 
@@ -163,7 +170,79 @@ void print_per_joint(const std::vector<double>& errors) {
   print("\n" + markdown_table(rows));
 }
 
+EvalReport report_of(const SystemScores& scores) {
+  EvalReport report;
+  report.model = scores.model;
+  report.frames = scores.frames;
+  report.references = scores.references;
+  return report;
+}
+
+/// Extractor alone, on held-out clouds and T-poses.
+std::pair<double, double> skeleton_errors(const ModelSet& models, const Corpus& test,
+                                          const TrainConfig& config) {
+  CloudConfig clouds = config.skeleton.clouds;
+  clouds.points = static_cast<int>(models.skeleton->points());
+  clouds.mirror = false;
+  clouds.scale_jitter = 0;
+  const CloudSampler sampler(test, clouds, 2);
+  return {joint_error(*models.skeleton, sampler.clouds(evaluation_clouds(test, 400, 2))),
+          joint_error(*models.skeleton,
+                      sampler.clouds(evaluation_tposes(test, 8, clouds.tpose_heading, 2)))};
+}
+
+int run_eval_run(const EvalOptions& options, const Common& common) {
+  const std::string folder = options.run.substr(4);
+  TrainConfig config;
+  load_config(run_config_path(folder), {}, config);
+  const ModelSet models =
+      load_models(weights_path(folder), {.skeleton = true, .smrm = true, .deformation = true});
+  const Corpus test = load_corpus(config.data, "test");
+  const auto list =
+      evaluation_sequences(test, static_cast<size_t>(config.evaluation.sequences),
+                           static_cast<size_t>(config.evaluation.frames), common.seed);
+  const SystemEvaluation scores = evaluate_system(models, test, list, common.seed);
+  const auto [joints, tposes] = skeleton_errors(models, test, config);
+  const EvalReport extracted = report_of(scores.extracted), truth = report_of(scores.truth);
+  char line[160];
+  std::snprintf(line, sizeof line,
+                "Extractor on held-out clouds: %.1f mm; on held-out T-poses: %.1f mm.\n",
+                1e3 * joints, 1e3 * tposes);
+  const std::string text = "From clouds alone (extracted skeletons), " +
+                           std::to_string(list.size()) + " held-out sequences, seed " +
+                           std::to_string(common.seed) + ":\n\n" +
+                           to_markdown(extracted, models.smrm.name) + "\nFrom true skeletons:\n\n" +
+                           to_markdown(truth, models.smrm.name) + "\n" + line;
+  if (!options.out.empty()) {
+    std::filesystem::create_directories(options.out);
+    write_file_atomically(options.out + "/metrics.md", text);
+    write_sequence(test, list[0], common.seed, options.out);
+  }
+  if (!common.json) {
+    print(text);
+    return 0;
+  }
+  Json document = to_json(extracted);
+  document["true_skeletons"] = to_json(truth);
+  document["extractor"] = {{"joint_error_mm", 1e3 * joints},
+                           {"tpose_joint_error_mm", 1e3 * tposes}};
+  document["seed"] = common.seed;
+  print_json(document);
+  return 0;
+}
+
 int run_eval(const EvalOptions& options, const Common& common) {
+  if (!options.run.empty()) {
+    if (!options.run.starts_with("run="))
+      throw InputError("", "'" + options.run + "' is not understood",
+                       "use 'run=RUN_DIR', or --pred and --truth");
+    if (!options.pred.empty() || !options.truth.empty())
+      throw InputError("", "run= and --pred do not go together", "give one of them");
+    return run_eval_run(options, common);
+  }
+  if (options.pred.empty() || options.truth.empty())
+    throw InputError("", options.pred.empty() ? "--pred is missing" : "--truth is missing",
+                     "give --pred P.h5 --truth T.h5, or run=RUN_DIR");
   if (options.source.empty() != options.rest.empty())
     throw InputError("", "--source and --rest belong together",
                      "give both for the references, or neither");
@@ -201,11 +280,15 @@ void add_eval(Program& program) {
   const auto options = std::make_shared<EvalOptions>();
   CLI::App& app =
       program.add("eval", "measure a prediction against its ground truth",
+                  "restage eval run=runs/demo-1 --out demo/\n"
                   "restage eval --pred result.h5 --truth truth.h5\n"
                   "restage eval --pred result.h5 --truth truth.h5 --source a.h5 --rest b.h5 --json",
                   [options, &program] { return run_eval(*options, program.common()); });
-  app.add_option("--pred", options->pred, "predicted /joints and /vertices (HDF5)")->required();
-  app.add_option("--truth", options->truth, "true /joints and /vertices (HDF5)")->required();
+  app.add_option("RUN", options->run, "run=RUN_DIR: the trained system on its held-out data");
+  app.add_option("--out", options->out,
+                 "with run=: folder for the table and the files of one sequence");
+  app.add_option("--pred", options->pred, "predicted /joints and /vertices (HDF5)");
+  app.add_option("--truth", options->truth, "true /joints and /vertices (HDF5)");
   app.add_option("--source", options->source, "joints of the source, for the references");
   app.add_option("--rest", options->rest,
                  "rest joints of the target (one row, or one a sequence), for the references");

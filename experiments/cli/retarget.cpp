@@ -8,6 +8,7 @@
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
+#include "experiments/cli/weights_path.h"
 #include "infer/retargeter.h"
 #include "infer/writers/bvh.h"
 #include "infer/writers/frames.h"
@@ -32,12 +33,14 @@ class Sink {
 };
 
 struct GlbSink final : Sink {
-  GlbSink(const std::string& path, const Retargeter& r) : writer(path, r.target(), r.rest(), r.weights()) {}
+  GlbSink(const std::string& path, const Retargeter& r)
+      : writer(path, r.target(), r.rest(), r.weights()) {}
   void push(const RetargetedFrame& f) override { writer.push(f.pose); }
   void commit() override {
     const InfluenceError e = writer.commit();
     char text[160];
-    std::snprintf(text, sizeof text, "four weights per vertex instead of 22: %.2f mm on average, at most %.2f mm",
+    std::snprintf(text, sizeof text,
+                  "four weights per vertex instead of 22: %.2f mm on average, at most %.2f mm",
                   1e3 * e.mean, 1e3 * e.max);
     log_info(text);
   }
@@ -53,7 +56,8 @@ struct BvhSink final : Sink {
 
 struct H5Sink final : Sink {
   H5Sink(const std::string& path, const Retargeter& r)
-      : writer(path, static_cast<int64_t>(r.target().vertices.size()), r.target().faces, FileInfo{}, kFps) {}
+      : writer(path, static_cast<int64_t>(r.target().vertices.size()), r.target().faces, FileInfo{},
+               kFps) {}
   void push(const RetargetedFrame& f) override { writer.append(f.joints, f.vertices); }
   void commit() override { writer.commit(); }
   PredictionWriter writer;
@@ -71,21 +75,28 @@ std::unique_ptr<Sink> make_sink(const RetargetCommand& c, const Retargeter& r) {
   if (c.out.ends_with(".glb")) return std::make_unique<GlbSink>(c.out, r);
   if (c.out.ends_with(".bvh")) return std::make_unique<BvhSink>(c.out, r);
   if (c.out.ends_with(".h5")) return std::make_unique<H5Sink>(c.out, r);
-  return std::make_unique<FolderSink>(c.out, r, c.format == "obj" ? MeshFormat::obj : MeshFormat::ply);
+  return std::make_unique<FolderSink>(c.out, r,
+                                      c.format == "obj" ? MeshFormat::obj : MeshFormat::ply);
 }
 
 void check(const RetargetCommand& c) {
-  if (c.up != "y" && c.up != "z") throw InputError("", "--source-up '" + c.up + "' is unknown", "use y or z");
-  if (c.format != "ply" && c.format != "obj") throw InputError("", "--format '" + c.format + "' is unknown", "use ply or obj");
-  if (!(c.scale > 0) || !std::isfinite(c.scale)) throw InputError("", "--scale must be above 0", "metres = units x scale");
+  if (c.up != "y" && c.up != "z")
+    throw InputError("", "--source-up '" + c.up + "' is unknown", "use y or z");
+  if (c.format != "ply" && c.format != "obj")
+    throw InputError("", "--format '" + c.format + "' is unknown", "use ply or obj");
+  if (!(c.scale > 0) || !std::isfinite(c.scale))
+    throw InputError("", "--scale must be above 0", "metres = units x scale");
   if (c.fps < 0 || c.fps > 1000 || !std::isfinite(c.fps))
     throw InputError("", "--fps is out of range", "give the source's frames per second");
-  if (c.samples < 1 || c.samples > 256) throw InputError("", "--samples is out of range", "give 1 to 256");
+  if (c.samples < 1 || c.samples > 256)
+    throw InputError("", "--samples is out of range", "give 1 to 256");
   const auto dot = c.out.find_last_of('.');
   const auto slash = c.out.find_last_of('/');
-  const bool extension = dot != std::string::npos && (slash == std::string::npos || dot > slash) && dot + 1 < c.out.size();
+  const bool extension = dot != std::string::npos && (slash == std::string::npos || dot > slash) &&
+                         dot + 1 < c.out.size();
   if (extension && !c.out.ends_with(".glb") && !c.out.ends_with(".bvh") && !c.out.ends_with(".h5"))
-    throw InputError(c.out, "is of no kind that can be written", "end it in .glb, .bvh, .h5, or / for a folder");
+    throw InputError(c.out, "is of no kind that can be written",
+                     "end it in .glb, .bvh, .h5, or / for a folder");
 }
 
 void to_metres(const RetargetCommand& c, Points& points) {
@@ -97,7 +108,8 @@ void to_metres(const RetargetCommand& c, Points& points) {
 
 int run_retarget(const RetargetCommand& c, const Common& common) {
   check(c);
-  const ModelSet models = load_models(c.weights, {.skeleton = true, .smrm = true, .deformation = true});
+  const ModelSet models =
+      load_models(weights_path(c.weights), {.skeleton = true, .smrm = true, .deformation = true});
   const auto frames = open_frames(c.source);
   RetargetOptions options;
   options.fps = c.fps > 0 ? c.fps : frames->fps();
@@ -121,18 +133,25 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
     }
     ++in;
   }
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   sink->commit();
   if (c.profile) {
     char text[160];
-    std::snprintf(text, sizeof text, "%.2f ms a frame, peak of tensors %.1f MiB", 1e3 * seconds / static_cast<double>(in),
+    std::snprintf(text, sizeof text, "%.2f ms a frame, peak of tensors %.1f MiB",
+                  1e3 * seconds / static_cast<double>(in),
                   static_cast<double>(memory_stats().peak) / 1048576.0);
     log_info(text);
   }
   if (common.json) {
-    print_json({{"out", c.out}, {"source_frames", in}, {"frames", out}, {"fps", kFps}, {"seed", common.seed}});
+    print_json({{"out", c.out},
+                {"source_frames", in},
+                {"frames", out},
+                {"fps", kFps},
+                {"seed", common.seed}});
   } else {
-    print("wrote " + c.out + ": " + std::to_string(out) + " frames (seed " + std::to_string(common.seed) + ")\n");
+    print("wrote " + c.out + ": " + std::to_string(out) + " frames (seed " +
+          std::to_string(common.seed) + ")\n");
   }
   return 0;
 }
@@ -141,14 +160,16 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
 
 void add_retarget(Program& program) {
   const auto c = std::make_shared<RetargetCommand>();
-  CLI::App& app = program.add("retarget", "a target performs the motion of a sequence of clouds",
-                              "restage retarget --source scans/ --target hero.obj --weights w.safetensors --out hero.glb\n"
-                              "restage retarget --source scans.h5 --target hero.ply --weights runs/demo-1 --out result.h5",
-                              [c, &program] { return run_retarget(*c, program.common()); });
+  CLI::App& app = program.add(
+      "retarget", "a target performs the motion of a sequence of clouds",
+      "restage retarget --source scans/ --target hero.obj --weights w.safetensors --out hero.glb\n"
+      "restage retarget --source scans.h5 --target hero.ply --weights runs/demo-1 --out result.h5",
+      [c, &program] { return run_retarget(*c, program.common()); });
   app.add_option("--source", c->source, "folder of clouds or HDF5 file of scans")->required();
   app.add_option("--target", c->target, "mesh or cloud in T-pose, y up, facing +z")->required();
   app.add_option("--weights", c->weights, "weights file or run directory")->required();
-  app.add_option("--out", c->out, "X.glb, X.bvh, X.h5, or a folder for PLY or OBJ frames")->required();
+  app.add_option("--out", c->out, "X.glb, X.bvh, X.h5, or a folder for PLY or OBJ frames")
+      ->required();
   app.add_option("--fps", c->fps, "frames per second of the source (default: the file's, else 30)");
   app.add_option("--source-up", c->up, "the source's up axis, y or z");
   app.add_option("--scale", c->scale, "the source's units in metres");

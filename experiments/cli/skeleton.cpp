@@ -5,6 +5,7 @@
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
+#include "experiments/cli/weights_path.h"
 #include "infer/extraction.h"
 #include "nn/weights/bundle.h"
 
@@ -26,8 +27,8 @@ std::string text_of(const Joints& joints) {
   std::string out;
   for (size_t j = 0; j < kJoints; ++j) {
     char line[100];
-    std::snprintf(line, sizeof line, "  %-15s %9.4f %9.4f %9.4f\n", std::string(kJointNames[j]).c_str(), joints[j][0],
-                  joints[j][1], joints[j][2]);
+    std::snprintf(line, sizeof line, "  %-15s %9.4f %9.4f %9.4f\n",
+                  std::string(kJointNames[j]).c_str(), joints[j][0], joints[j][1], joints[j][2]);
     out += line;
   }
   return out;
@@ -36,17 +37,19 @@ std::string text_of(const Joints& joints) {
 int run_skeleton(const SkeletonOptions& options, const Common& common) {
   if (options.samples < 1 || options.samples > 256)
     throw InputError("", "--samples is out of range", "give a number from 1 to 256");
-  const ModelSet models = load_models(options.weights, {.skeleton = true});
+  const ModelSet models = load_models(weights_path(options.weights), {.skeleton = true});
   const auto frames = open_frames(options.input);
   std::unique_ptr<PredictionWriter> writer;
   if (!options.out.empty())
-    writer = std::make_unique<PredictionWriter>(options.out, 0, std::vector<Triangle>{}, FileInfo{}, frames->fps());
+    writer = std::make_unique<PredictionWriter>(options.out, 0, std::vector<Triangle>{}, FileInfo{},
+                                                frames->fps());
   Json list = Json::array();
   std::string text;
   // The same points give the same joints wherever they stand, so every frame has the same key.
   const RngKey key = RngKey{common.seed, 0}.fold("skeleton");
   while (const auto frame = frames->next()) {
-    const Joints joints = extract_joints(*models.skeleton, frame->points, frame->source, key, options.samples);
+    const Joints joints =
+        extract_joints(*models.skeleton, frame->points, frame->source, key, options.samples);
     if (writer) writer->append(joints, {});
     if (common.json) {
       list.push_back({{"source", frame->source}, {"joints", json_of(joints)}});
@@ -67,12 +70,14 @@ int run_skeleton(const SkeletonOptions& options, const Common& common) {
 
 void add_skeleton(Program& program) {
   const auto options = std::make_shared<SkeletonOptions>();
-  CLI::App& app = program.add("skeleton", "the 22 joints of clouds",
-                              "restage skeleton --weights w.safetensors --input scan.ply --json\n"
-                              "restage skeleton --weights w.safetensors --input scans/ --out joints.h5",
-                              [options, &program] { return run_skeleton(*options, program.common()); });
+  CLI::App& app =
+      program.add("skeleton", "the 22 joints of clouds",
+                  "restage skeleton --weights w.safetensors --input scan.ply --json\n"
+                  "restage skeleton --weights w.safetensors --input scans/ --out joints.h5",
+                  [options, &program] { return run_skeleton(*options, program.common()); });
   app.add_option("--weights", options->weights, "weights file or run directory")->required();
-  app.add_option("--input", options->input, "cloud, folder of clouds, or HDF5 file of scans")->required();
+  app.add_option("--input", options->input, "cloud, folder of clouds, or HDF5 file of scans")
+      ->required();
   app.add_option("--out", options->out, "HDF5 file for the joints");
   app.add_option("--samples", options->samples, "random choices of points to average");
 }

@@ -40,10 +40,14 @@ Request read_request(const std::vector<std::string>& arguments) {
     }
   }
   if (out.config.empty() == out.resume.empty())
-    throw InputError("", out.config.empty() ? "no configuration was given" : "a resumed run has its own configuration",
-                     "use 'restage train CONFIG.yaml [key=value ...]' or 'restage train resume=RUN_DIR'");
+    throw InputError(
+        "",
+        out.config.empty() ? "no configuration was given"
+                           : "a resumed run has its own configuration",
+        "use 'restage train CONFIG.yaml [key=value ...]' or 'restage train resume=RUN_DIR'");
   if (!out.resume.empty() && !out.overrides.empty())
-    throw InputError("", "'" + out.overrides[0] + "' cannot change a resumed run", "leave it out, or train anew");
+    throw InputError("", "'" + out.overrides[0] + "' cannot change a resumed run",
+                     "leave it out, or train anew");
   return out;
 }
 
@@ -54,7 +58,8 @@ void check_models(const TrainConfig& c) {
   }
 }
 
-int run_train(const TrainOptions& options, const Program& program, const std::vector<std::string>& command_line) {
+int run_train(const TrainOptions& options, const Program& program,
+              const std::vector<std::string>& command_line) {
   const Request request = read_request(options.arguments);
   const Common& common = program.common();
   TrainConfig config;
@@ -70,9 +75,11 @@ int run_train(const TrainOptions& options, const Program& program, const std::ve
   const Corpus validation = load_corpus(config.data, "validation");
 
   RunInput input{config.seed, threads(), command_line, {}};
-  if (config.data.source != "builtin") input.data.push_back({config.data.source, checksum(train_corpus)});
+  if (config.data.source != "builtin")
+    input.data.push_back({config.data.source, checksum(train_corpus)});
   RunDir run = request.resume.empty()
-                   ? RunDir::create(config.run_root, config.name, resolved_yaml(config), provenance_json(input), config.stages)
+                   ? RunDir::create(config.run_root, config.name, resolved_yaml(config),
+                                    provenance_json(input), config.stages)
                    : RunDir::resume(request.resume, config.stages);
   if (common.json) {
     print_json({{"run", run.dir()}, {"seed", config.seed}});
@@ -81,11 +88,12 @@ int run_train(const TrainOptions& options, const Program& program, const std::ve
   }
   finish_output();
   log_info("seed " + std::to_string(config.seed) + ", " + std::to_string(threads()) + " threads; " +
-           std::to_string(train_corpus.bodies.size()) + " bodies and " + std::to_string(train_corpus.motions.size()) +
-           " motions to train on");
+           std::to_string(train_corpus.bodies.size()) + " bodies and " +
+           std::to_string(train_corpus.motions.size()) + " motions to train on");
   const ModelSet models = train(
       run, config.stages, config.loop,
-      [&](const std::string& stage) { return make_stage(stage, config, train_corpus, validation); }, common.quiet);
+      [&](const std::string& stage) { return make_stage(stage, config, train_corpus, validation); },
+      common.quiet);
   save_models(run.dir() + "/weights.safetensors", models);
   log_info("weights: " + run.dir() + "/weights.safetensors");
   return 0;
@@ -96,17 +104,20 @@ int run_train(const TrainOptions& options, const Program& program, const std::ve
 void add_train(Program& program) {
   const auto options = std::make_shared<TrainOptions>();
   const auto self = std::make_shared<CLI::App*>(nullptr);
-  CLI::App& app = program.add("train", "train the stages of a configuration",
-                              "restage train configs/demo.yaml\n"
-                              "restage train configs/lite/all.yaml data.source=data.h5 motion.optimiser.steps=2000\n"
-                              "restage train resume=runs/demo-20260101-120000-1",
-                              [options, self, &program] {
-                                options->seed_given = (*self)->count("--seed") > 0;
-                                std::vector<std::string> line = {"restage", "train"};
-                                line.insert(line.end(), options->arguments.begin(), options->arguments.end());
-                                return run_train(*options, program, line);
-                              });
-  app.add_option("ARGUMENTS", options->arguments, "CONFIG.yaml and key=value overrides, or resume=RUN_DIR")->required();
+  CLI::App& app = program.add(
+      "train", "train the stages of a configuration",
+      "restage train configs/demo.yaml\n"
+      "restage train configs/lite/all.yaml data.source=data.h5 motion.optimiser.steps=2000\n"
+      "restage train resume=runs/demo-20260101-120000-1",
+      [options, self, &program] {
+        options->seed_given = (*self)->count("--seed") > 0;
+        std::vector<std::string> line = {"restage", "train"};
+        line.insert(line.end(), options->arguments.begin(), options->arguments.end());
+        return run_train(*options, program, line);
+      });
+  app.add_option("ARGUMENTS", options->arguments,
+                 "CONFIG.yaml and key=value overrides, or resume=RUN_DIR")
+      ->required();
   *self = &app;
 }
 

@@ -77,8 +77,8 @@ MotionLosses motion_losses(Context& ctx, const Smrm& net, Discriminator* discrim
   out.cycle = mse(to_a.joints, b.joints) + mse(to_a.trans, b.true_trans);
   out.rotation = rotation_loss(to_a.rotations, b.sixd);
   out.smoothness = mse(differences(to_a.joints), differences(b.joints));
-  Var self = per_sample(square(to_b.joints - b.joints)) +
-             per_sample(square(to_b.trans - b.true_trans));
+  Var self =
+      per_sample(square(to_b.joints - b.joints)) + per_sample(square(to_b.trans - b.true_trans));
   if (w.self_rotation > 0) {
     const Var d = reshape(matrix_to_sixd(to_b.rotations), b.sixd.shape()) - b.sixd;
     self = self + scale(per_sample(square(d)), w.self_rotation);
@@ -98,7 +98,8 @@ MotionLosses motion_losses(Context& ctx, const Smrm& net, Discriminator* discrim
   return out;
 }
 
-MotionLosses self_losses(Context& ctx, const Smrm& net, const MotionBatch& b, const MotionWeights& w) {
+MotionLosses self_losses(Context& ctx, const Smrm& net, const MotionBatch& b,
+                         const MotionWeights& w) {
   MotionLosses out;
   SmrmState state;
   const SmrmOutput to_a = net(ctx, b.input, b.trans, b.rest_a, &state);

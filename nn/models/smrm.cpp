@@ -33,8 +33,9 @@ Smrm::Smrm(const SmrmConfig& c, const Init& init)
     std::vector<double> w = fc_rot.weight.value.to_vector<double>();
     for (double& v : w) v *= 0.01;
     fc_rot.weight.value = Tensor::from<double>(fc_rot.weight.value.shape(), w).cast(init.type);
-    fc_rot.bias.value = c.standardise ? Tensor::full({c.joints * width}, 0, init.type)
-                                      : Tensor::from<double>({c.joints * width}, rest_pose).cast(init.type);
+    fc_rot.bias.value = c.standardise
+                            ? Tensor::full({c.joints * width}, 0, init.type)
+                            : Tensor::from<double>({c.joints * width}, rest_pose).cast(init.type);
   }
   if (c.standardise) {
     const auto constant = [&](int64_t n, double v) { return Tensor::full({n}, v, init.type); };

@@ -4,12 +4,17 @@
 
 namespace restage {
 
-Adam::Adam(const std::vector<std::pair<std::string, Module*>>& modules, const AdamConfig& config) : config_(config) {
+Adam::Adam(const std::vector<std::pair<std::string, Module*>>& modules, const AdamConfig& config)
+    : config_(config) {
   for (const auto& [prefix, module] : modules) {
     for (const StateEntry& e : state_of(*module, prefix)) {
       if (e.parameter == nullptr) continue;
-      Slot slot{e.name, e.parameter, Tensor::zeros(e.value->shape(), e.value->dtype()),
-                Tensor::zeros(e.value->shape(), e.value->dtype()), Tensor(), 0};
+      Slot slot{e.name,
+                e.parameter,
+                Tensor::zeros(e.value->shape(), e.value->dtype()),
+                Tensor::zeros(e.value->shape(), e.value->dtype()),
+                Tensor(),
+                0};
       if (config.amsgrad) slot.v_max = Tensor::zeros(e.value->shape(), e.value->dtype());
       slots_.push_back(std::move(slot));
     }
@@ -23,8 +28,9 @@ void Adam::step(const Gradients& gradients, double rate, double clip) {
     const Tensor* g = gradients.find(s.parameter->id);
     if (g == nullptr) continue;
     ++s.steps;
-    launch(AdamArgs{*g, s.parameter->value, s.m, s.v, config_.amsgrad ? &s.v_max : nullptr, rate, config_.beta1,
-                    config_.beta2, config_.eps, config_.weight_decay, scale, s.steps});
+    launch(AdamArgs{*g, s.parameter->value, s.m, s.v, config_.amsgrad ? &s.v_max : nullptr, rate,
+                    config_.beta1, config_.beta2, config_.eps, config_.weight_decay, scale,
+                    s.steps});
   }
 }
 

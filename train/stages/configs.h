@@ -36,7 +36,8 @@ void visit(V& v, ModelSizes& c) {
   v("width", c.width, "extractors: channels; 0: the model's own", at_least(0));
   v("layers", c.layers, "extractors: blocks or layers; 0: the model's own", at_least(0));
   v("centres", c.centres, "patch transformer: tokens; 0: the model's own", at_least(0));
-  v("neighbours", c.neighbours, "extractors: neighbours of a point; 0: the model's own", at_least(0));
+  v("neighbours", c.neighbours, "extractors: neighbours of a point; 0: the model's own",
+    at_least(0));
   v("standardise", c.standardise, "SMRM: inputs in units of the training set's deviation");
   v("rest_pose_start", c.rest_pose_start, "SMRM: first output near the rest pose");
   v("dropout", c.dropout, "dropout rate; -1: the model's own", below(-1, 1));
@@ -82,7 +83,8 @@ struct SkeletonStageConfig {
 };
 
 inline EnumNames<SkeletonStageConfig::Loss> config_names(SkeletonStageConfig::Loss) {
-  return {{"mse", SkeletonStageConfig::Loss::mse}, {"distance", SkeletonStageConfig::Loss::distance}};
+  return {{"mse", SkeletonStageConfig::Loss::mse},
+          {"distance", SkeletonStageConfig::Loss::distance}};
 }
 
 template <class V>
@@ -93,14 +95,16 @@ void visit(V& v, SkeletonStageConfig& c) {
   v("clouds", c.clouds, "how training clouds are made");
   v("loss", c.loss, "mse (the paper) or mean distance");
   v("vote_weight", c.vote_weight, "voting models: weight of each centre's own votes", at_least(0));
-  v("segmentation_weight", c.segmentation_weight, "voting models: weight of naming the moving joint", at_least(0));
+  v("segmentation_weight", c.segmentation_weight,
+    "voting models: weight of naming the moving joint", at_least(0));
   v("validation_clouds", c.validation_clouds, "held-out clouds per validation", positive());
 }
 
 template <class V>
 void visit(V& v, MotionWeights& c) {
   v("cycle", c.cycle, "joints and translation after A -> B -> A", at_least(0));
-  v("adversarial", c.adversarial, "the discriminator's judgement of B; 0: no discriminator", at_least(0));
+  v("adversarial", c.adversarial, "the discriminator's judgement of B; 0: no discriminator",
+    at_least(0));
   v("rotation", c.rotation, "rotations after A -> B -> A against the data's", at_least(0));
   v("smoothness", c.smoothness, "frame differences after A -> B -> A", at_least(0));
   v("self", c.self, "reconstruction of self samples", at_least(0));
@@ -109,7 +113,9 @@ void visit(V& v, MotionWeights& c) {
 }
 
 inline EnumNames<Translation> config_names(Translation) {
-  return {{"velocity", Translation::velocity}, {"relative", Translation::relative}, {"absolute", Translation::absolute}};
+  return {{"velocity", Translation::velocity},
+          {"relative", Translation::relative},
+          {"absolute", Translation::absolute}};
 }
 
 template <class V>
@@ -146,9 +152,10 @@ void visit(V& v, MotionStageConfig& c) {
   v("windows", c.windows, "how training windows are made");
   v("weights", c.weights, "of the loss terms");
   v("discriminator_adam", c.discriminator_adam, "the discriminator's optimiser");
-  v("balance_limit", c.balance_limit, "the discriminator rests while its running score of fakes is below this",
-    between(0, 1));
-  v("self_first_pass", c.self_first_pass, "self samples do one supervised pass A -> A instead of the cycle");
+  v("balance_limit", c.balance_limit,
+    "the discriminator rests while its running score of fakes is below this", between(0, 1));
+  v("self_first_pass", c.self_first_pass,
+    "self samples do one supervised pass A -> A instead of the cycle");
   v("validation_windows", c.validation_windows, "held-out windows per validation", positive());
   v("validation_frames", c.validation_frames, "frames of each", at_least(3));
 }
@@ -173,7 +180,8 @@ template <class V>
 void visit(V& v, DeformationStageConfig& c) {
   v("optimiser", c.optimiser, "steps, batch, rate");
   v("pairs", c.pairs, "how training pairs are made");
-  v("skinning_steps", c.skinning_steps, "first steps without offsets (the paper: one epoch)", at_least(0));
+  v("skinning_steps", c.skinning_steps, "first steps without offsets (the paper: one epoch)",
+    at_least(0));
   v("offsets", c.offsets, "train pose-corrective offsets");
   v("root_net", c.root_net, "also train the third MLP (docs/method.md)");
   v("keep_root_rotation", c.keep_root_rotation, "offsets see the root's rotation (false: zero)");

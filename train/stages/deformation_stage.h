@@ -10,7 +10,8 @@ namespace restage {
 class DeformationStage final : public Stage {
  public:
   /// Keeps references to both corpora.
-  DeformationStage(const DeformationStageConfig& config, const Corpus& train, const Corpus& validation, uint64_t seed);
+  DeformationStage(const DeformationStageConfig& config, const Corpus& train,
+                   const Corpus& validation, uint64_t seed);
   std::string name() const override { return "deformation"; }
   int64_t steps() const override { return config_.optimiser.steps; }
   NamedValues step(int64_t step) override;

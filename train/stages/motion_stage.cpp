@@ -36,11 +36,13 @@ WindowConfig self_windows(const MotionStageConfig& c) {
 }
 
 MotionBatch motion_batch(const WindowBatch& w) {
-  return {w.joints_a, w.input_a, w.trans_a, w.input_trans_a, w.rest_a, w.rest_b, w.sixd_a, w.self_mask};
+  return {w.joints_a, w.input_a, w.trans_a, w.input_trans_a,
+          w.rest_a,   w.rest_b,  w.sixd_a,  w.self_mask};
 }
 
 /// Mean and deviation per column of rows of width n; deviations are at least `least`.
-void statistics(const std::vector<Tensor>& parts, int64_t n, double least, Tensor* mean, Tensor* deviation) {
+void statistics(const std::vector<Tensor>& parts, int64_t n, double least, Tensor* mean,
+                Tensor* deviation) {
   std::vector<double> s(static_cast<size_t>(n), 0.0), q(s);
   int64_t rows = 0;
   for (const Tensor& t : parts) {
@@ -53,7 +55,8 @@ void statistics(const std::vector<Tensor>& parts, int64_t n, double least, Tenso
   }
   for (size_t i = 0; i < s.size(); ++i) {
     s[i] /= static_cast<double>(rows);
-    q[i] = std::max(least, std::sqrt(std::max(0.0, q[i] / static_cast<double>(rows) - s[i] * s[i])));
+    q[i] =
+        std::max(least, std::sqrt(std::max(0.0, q[i] / static_cast<double>(rows) - s[i] * s[i])));
   }
   *mean = Tensor::from<double>({n}, s).cast(DType::f32);
   *deviation = Tensor::from<double>({n}, q).cast(DType::f32);
@@ -61,11 +64,12 @@ void statistics(const std::vector<Tensor>& parts, int64_t n, double least, Tenso
 
 }  // namespace
 
-MotionStage::MotionStage(const MotionStageConfig& config, const Corpus& train, const Corpus& validation, uint64_t seed)
+MotionStage::MotionStage(const MotionStageConfig& config, const Corpus& train,
+                         const Corpus& validation, uint64_t seed)
     : config_(config),
       model_(make_smrm(config, seed)),
-      discriminator_(std::make_unique<Discriminator>(DiscriminatorConfig{},
-                                                     Init{RngKey{seed, 0}.fold("discriminator.init"), DType::f32})),
+      discriminator_(std::make_unique<Discriminator>(
+          DiscriminatorConfig{}, Init{RngKey{seed, 0}.fold("discriminator.init"), DType::f32})),
       adam_({{"model.", model_.get()}}, config.optimiser.adam),
       discriminator_adam_({{"discriminator.", discriminator_.get()}}, config.discriminator_adam),
       sampler_(train, cycle_windows(config), RngKey{seed, 0}.fold("motion.windows").stream),
@@ -92,17 +96,19 @@ void MotionStage::set_statistics() {
     statistics(rotations, 6 * kJoints, 0.01, &model_->rot_mean, &model_->rot_std);
 }
 
-void MotionStage::update_discriminator(int64_t step, const WindowBatch& batch, double rate, NamedValues* values) {
+void MotionStage::update_discriminator(int64_t step, const WindowBatch& batch, double rate,
+                                       NamedValues* values) {
   if (balance_ <= config_.balance_limit) return;
   Context plain;
   SmrmState state;
-  const SmrmOutput fake = (*model_)(plain, batch.input_a, batch.input_trans_a, batch.rest_b, &state);
+  const SmrmOutput fake =
+      (*model_)(plain, batch.input_a, batch.input_trans_a, batch.rest_b, &state);
   double score = 0;
-  const Differentiated d =
-      differentiate(key_.fold("discriminator").fold(static_cast<uint64_t>(step)), [&](Context& ctx) {
+  const Differentiated d = differentiate(
+      key_.fold("discriminator").fold(static_cast<uint64_t>(step)), [&](Context& ctx) {
         const DiscriminatorLosses l =
-            discriminator_losses(ctx, *discriminator_, batch.real_b, batch.real_trans_b, batch.rest_b,
-                                 fake.joints.value, fake.trans.value, batch.rest_b);
+            discriminator_losses(ctx, *discriminator_, batch.real_b, batch.real_trans_b,
+                                 batch.rest_b, fake.joints.value, fake.trans.value, batch.rest_b);
         score = l.fake_score;
         return l.total;
       });
@@ -114,7 +120,9 @@ void MotionStage::update_discriminator(int64_t step, const WindowBatch& batch, d
 NamedValues MotionStage::step(int64_t step) {
   const OptimiserConfig& o = config_.optimiser;
   const double rate = learning_rate(o.schedule, step, o.steps);
-  const int64_t self = config_.self_first_pass ? std::llround(config_.windows.self_share * static_cast<double>(o.batch)) : 0;
+  const int64_t self = config_.self_first_pass
+                           ? std::llround(config_.windows.self_share * static_cast<double>(o.batch))
+                           : 0;
   const int64_t cycle = o.batch - self;
   const double self_part = static_cast<double>(self) / static_cast<double>(o.batch);
   NamedValues values;
@@ -130,7 +138,8 @@ NamedValues MotionStage::step(int64_t step) {
       total = scale(s.total, self_part);
     }
     if (cycle > 0) {
-      l = motion_losses(ctx, *model_, adversarial ? discriminator_.get() : nullptr, motion_batch(windows), config_.weights);
+      l = motion_losses(ctx, *model_, adversarial ? discriminator_.get() : nullptr,
+                        motion_batch(windows), config_.weights);
       const Var part = scale(l.total, 1 - self_part);
       total = self > 0 ? total + part : part;
     }
@@ -164,9 +173,13 @@ NamedValues MotionStage::validate() {
     const SmrmOutput to_b = (*model_)(ctx, b.input_a, b.trans_a, b.rest_b, &forth);
     const SmrmOutput to_a = (*model_)(ctx, to_b.joints, to_b.trans, b.rest_a, &back);
     const auto error = [&](const Tensor& p, const Tensor& t, int64_t s, bool align) {
-      const Tensor pred = p.rows(s, s + 1).cast(DType::f64), truth = t.rows(s, s + 1).cast(DType::f64);
-      const metrics::Track a{pred.data<double>(), frames, kJoints}, c{truth.data<double>(), frames, kJoints};
-      return metrics::mean_distance(a, c, {align ? metrics::Alignment::Mode::frame : metrics::Alignment::Mode::none, true})
+      const Tensor pred = p.rows(s, s + 1).cast(DType::f64),
+                   truth = t.rows(s, s + 1).cast(DType::f64);
+      const metrics::Track a{pred.data<double>(), frames, kJoints},
+          c{truth.data<double>(), frames, kJoints};
+      return metrics::mean_distance(
+                 a, c,
+                 {align ? metrics::Alignment::Mode::frame : metrics::Alignment::Mode::none, true})
           .value_or(std::nan(""));
     };
     for (int64_t s = 0; s < count; ++s) {
@@ -176,7 +189,8 @@ NamedValues MotionStage::validate() {
     }
   }
   const auto mean_of = [&](double x) { return x / static_cast<double>(n); };
-  return {{"pa_mpjpe", mean_of(pa)}, {"local_mpjpe", mean_of(local)}, {"cycle_mpjpe", mean_of(cycle)}};
+  return {
+      {"pa_mpjpe", mean_of(pa)}, {"local_mpjpe", mean_of(local)}, {"cycle_mpjpe", mean_of(cycle)}};
 }
 
 void MotionStage::save(TensorFile& file) const {

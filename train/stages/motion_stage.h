@@ -10,7 +10,8 @@ namespace restage {
 class MotionStage final : public Stage {
  public:
   /// Keeps references to both corpora.
-  MotionStage(const MotionStageConfig& config, const Corpus& train, const Corpus& validation, uint64_t seed);
+  MotionStage(const MotionStageConfig& config, const Corpus& train, const Corpus& validation,
+              uint64_t seed);
   std::string name() const override { return "motion"; }
   int64_t steps() const override { return config_.optimiser.steps; }
   NamedValues step(int64_t step) override;
@@ -24,7 +25,8 @@ class MotionStage final : public Stage {
  private:
   void set_statistics();
   /// Discriminator's own step, unless it is winning clearly (spec 4.4).
-  void update_discriminator(int64_t step, const WindowBatch& batch, double rate, NamedValues* values);
+  void update_discriminator(int64_t step, const WindowBatch& batch, double rate,
+                            NamedValues* values);
 
   MotionStageConfig config_;
   std::unique_ptr<Smrm> model_;

@@ -33,12 +33,14 @@ CloudConfig held_out(CloudConfig c, const SkeletonModel& model) {
 
 }  // namespace
 
-SkeletonStage::SkeletonStage(const SkeletonStageConfig& config, const Corpus& train, const Corpus& validation,
-                             uint64_t seed)
+SkeletonStage::SkeletonStage(const SkeletonStageConfig& config, const Corpus& train,
+                             const Corpus& validation, uint64_t seed)
     : config_(config),
-      model_(make_skeleton_model(config.model, config.sizes, Init{RngKey{seed, 0}.fold("skeleton.init"), DType::f32})),
+      model_(make_skeleton_model(config.model, config.sizes,
+                                 Init{RngKey{seed, 0}.fold("skeleton.init"), DType::f32})),
       adam_({{"model.", model_.get()}}, config.optimiser.adam),
-      sampler_(train, training_clouds(config, *model_), RngKey{seed, 0}.fold("skeleton.clouds").stream),
+      sampler_(train, training_clouds(config, *model_),
+               RngKey{seed, 0}.fold("skeleton.clouds").stream),
       validation_sampler_(validation, held_out(config.clouds, *model_), 1),
       posed_(evaluation_clouds(validation, static_cast<size_t>(config.validation_clouds), 1)),
       tposes_(evaluation_tposes(validation, 4, config.clouds.tpose_heading, 1)),
@@ -46,18 +48,21 @@ SkeletonStage::SkeletonStage(const SkeletonStageConfig& config, const Corpus& tr
 
 Var SkeletonStage::loss(Context& ctx, const CloudBatch& batch) const {
   const SkeletonOutput out = model_->forward(ctx, batch.points);
-  Var total = config_.loss == SkeletonStageConfig::Loss::mse ? mse(out.joints, Var(batch.joints))
-                                                             : mean_all(lengths(out.joints - Var(batch.joints)));
+  Var total = config_.loss == SkeletonStageConfig::Loss::mse
+                  ? mse(out.joints, Var(batch.joints))
+                  : mean_all(lengths(out.joints - Var(batch.joints)));
   if (!out.centres.defined()) return total;
   const int64_t n = batch.points.size(0), c = out.centres.size(1);
   const Var moved_by = gather(Var(batch.weights), out.centres);  // [n, c, 22] skin weights
   if (config_.vote_weight > 0) {
     const Var miss = lengths(out.votes - Var(batch.joints.reshape({n, 1, kJoints, 3})));
-    total = total + scale(sum_all(miss * moved_by), config_.vote_weight / static_cast<double>(n * c));
+    total =
+        total + scale(sum_all(miss * moved_by), config_.vote_weight / static_cast<double>(n * c));
   }
   if (config_.segmentation_weight > 0) {
     const Var log_share = log(add_scalar(softmax(out.segmentation), 1e-8));
-    total = total - scale(sum_all(log_share * moved_by), config_.segmentation_weight / static_cast<double>(n * c));
+    total = total - scale(sum_all(log_share * moved_by),
+                          config_.segmentation_weight / static_cast<double>(n * c));
   }
   return total;
 }
@@ -79,14 +84,16 @@ double joint_error(SkeletonModel& model, const CloudBatch& clouds) {
   for (int64_t i = 0; i < n; i += part) {
     const int64_t to = std::min(n, i + part);
     const SkeletonOutput out = model.forward(ctx, clouds.points.rows(i, to));
-    total += mean_distance(out.joints.value, clouds.joints.rows(i, to)) * static_cast<double>(to - i);
+    total +=
+        mean_distance(out.joints.value, clouds.joints.rows(i, to)) * static_cast<double>(to - i);
   }
   return total / static_cast<double>(n);
 }
 
 NamedValues SkeletonStage::validate() {
-  return {{"joint_error_mm", 1e3 * joint_error(*model_, validation_sampler_.clouds(posed_))},
-          {"tpose_joint_error_mm", 1e3 * joint_error(*model_, validation_sampler_.clouds(tposes_))}};
+  return {
+      {"joint_error_mm", 1e3 * joint_error(*model_, validation_sampler_.clouds(posed_))},
+      {"tpose_joint_error_mm", 1e3 * joint_error(*model_, validation_sampler_.clouds(tposes_))}};
 }
 
 void SkeletonStage::save(TensorFile& file) const {

@@ -10,7 +10,8 @@ namespace restage {
 class SkeletonStage final : public Stage {
  public:
   /// Keeps references to both corpora.
-  SkeletonStage(const SkeletonStageConfig& config, const Corpus& train, const Corpus& validation, uint64_t seed);
+  SkeletonStage(const SkeletonStageConfig& config, const Corpus& train, const Corpus& validation,
+                uint64_t seed);
   std::string name() const override { return "skeleton"; }
   int64_t steps() const override { return config_.optimiser.steps; }
   NamedValues step(int64_t step) override;
