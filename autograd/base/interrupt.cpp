@@ -30,7 +30,11 @@ void handle_signals() {
   signal(SIGPIPE, SIG_IGN);
 }
 
-StopScope::StopScope() { ++scopes; }
+// A signal that an earlier scope answered is no reason to stop this one.
+StopScope::StopScope() {
+  if (scopes.load() == 0) caught = 0;
+  ++scopes;
+}
 StopScope::~StopScope() { --scopes; }
 
 bool stop_requested() { return caught.load() != 0; }

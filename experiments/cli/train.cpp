@@ -51,11 +51,10 @@ Request read_request(const std::vector<std::string>& arguments) {
   return out;
 }
 
-/// Everything that can be wrong with the input, found before a run directory is made.
-void check_models(const TrainConfig& c) {
-  for (const std::string& stage : c.stages) {
-    if (stage == "skeleton") make_skeleton_model(c.skeleton.model, c.skeleton.sizes, Init{});
-  }
+/// Everything that can be wrong with the input is found before a run directory is made: models of
+/// unknown names, sizes that do not fit together, windows longer than every motion.
+void check_stages(const TrainConfig& config, const Corpus& train, const Corpus& validation) {
+  for (const std::string& stage : config.stages) make_stage(stage, config, train, validation);
 }
 
 int run_train(const TrainOptions& options, const Program& program,
@@ -70,9 +69,9 @@ int run_train(const TrainOptions& options, const Program& program,
   } else {
     load_config(run_config_path(request.resume), {}, config);
   }
-  check_models(config);
   const Corpus train_corpus = load_corpus(config.data, "train");
   const Corpus validation = load_corpus(config.data, "validation");
+  check_stages(config, train_corpus, validation);
 
   RunInput input{config.seed, threads(), command_line, {}};
   if (config.data.source != "builtin")

@@ -51,7 +51,7 @@ Var SkeletonStage::loss(Context& ctx, const CloudBatch& batch) const {
   Var total = config_.loss == SkeletonStageConfig::Loss::mse
                   ? mse(out.joints, Var(batch.joints))
                   : mean_all(lengths(out.joints - Var(batch.joints)));
-  if (!out.centres.defined()) return total;
+  if (!out.centres.defined() || !batch.weights.defined()) return total;
   const int64_t n = batch.points.size(0), c = out.centres.size(1);
   const Var moved_by = gather(Var(batch.weights), out.centres);  // [n, c, 22] skin weights
   if (config_.vote_weight > 0) {
