@@ -6,7 +6,11 @@
 
 namespace restage {
 
-enum class Affine { none, inner, middle };  ///< along which axis scale and shift run; middle needs inner = 1
+enum class Affine {
+  none,
+  inner,
+  middle
+};  ///< along which axis scale and shift run; middle needs inner = 1
 
 /// out = (x - mean) * rstd * scale + shift, biased variance; mean, rstd [outer, inner] are outputs,
 /// always f64: over few rows the gradient all but cancels and needs them exactly.

@@ -43,7 +43,9 @@ double heading_angle(const Joints& x) {
   return std::atan2(-across[2], across[0]);
 }
 
-Mat3 turn_about_y(double angle) { return Eigen::AngleAxisd(angle, Vec3::UnitY()).toRotationMatrix(); }
+Mat3 turn_about_y(double angle) {
+  return Eigen::AngleAxisd(angle, Vec3::UnitY()).toRotationMatrix();
+}
 
 Mat3 shortest_arc(const Vec3& a, const Vec3& b) {
   return Quat::FromTwoVectors(a, b).toRotationMatrix();

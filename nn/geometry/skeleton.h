@@ -47,8 +47,8 @@ Rotations to_local(const Rotations& global);
 Rotations to_global(const Rotations& local);
 /// Hip-knee plus knee-ankle, mean of both sides (spec 3.3), metres.
 double leg_length(const Joints& joints);
-/// Angle about y by which a posed body faces away from +z (spec 3.3: across = left minus right shoulder
-/// plus left minus right hip), radians; 0 if it cannot be told.
+/// Angle about y by which a posed body faces away from +z (spec 3.3: across = left minus right
+/// shoulder plus left minus right hip), radians; 0 if it cannot be told.
 double heading_angle(const Joints& joints);
 /// Rotation by `angle` about y.
 Mat3 turn_about_y(double angle);

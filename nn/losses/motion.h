@@ -13,8 +13,8 @@ struct MotionWeights {
 };
 
 /// One batch: motions of A, skeletons of both. Shapes as in Smrm; self_mask [n] is 1 where B is A.
-/// `input` and `trans` are what the network sees (perhaps with noise), `joints` and `true_trans` what
-/// is true.
+/// `input` and `trans` are what the network sees (perhaps with noise), `joints` and `true_trans`
+/// what is true.
 struct MotionBatch {
   Var joints, input, true_trans, trans, rest_a, rest_b, sixd;
   Tensor self_mask;
@@ -30,9 +30,10 @@ struct MotionLosses {
 MotionLosses motion_losses(Context& ctx, const Smrm& net, Discriminator* discriminator,
                            const MotionBatch& batch, const MotionWeights& weights);
 
-/// Self-reconstruction alone: one pass A -> A, whose answer is known. cycle and trans errors, rotation
-/// and smoothness are those of this pass; `self` is their weighted sum.
-MotionLosses self_losses(Context& ctx, const Smrm& net, const MotionBatch& batch, const MotionWeights& weights);
+/// Self-reconstruction alone: one pass A -> A, whose answer is known. cycle and trans errors,
+/// rotation and smoothness are those of this pass; `self` is their weighted sum.
+MotionLosses self_losses(Context& ctx, const Smrm& net, const MotionBatch& batch,
+                         const MotionWeights& weights);
 
 struct DiscriminatorLosses {
   Var real, fake, total;

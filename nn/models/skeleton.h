@@ -15,8 +15,8 @@ struct SkeletonOutput {
 };
 
 struct SkeletonModel : Module {
-  /// cloud [n, points(), 3], centred on its centroid, metres. A cloud on a tape gets a gradient; who
-  /// is a neighbour of whom counts as constant.
+  /// cloud [n, points(), 3], centred on its centroid, metres. A cloud on a tape gets a gradient;
+  /// who is a neighbour of whom counts as constant.
   virtual SkeletonOutput forward(Context& ctx, const Var& cloud) = 0;
   virtual int64_t points() const = 0;
 };

@@ -1,7 +1,7 @@
 // make_h5 FILE.h5 < DESCRIPTION.json: writes any HDF5 file for the tests of the command line, which
-// run on a bare Python. {"datasets": {"/joints": {"type": "float64", "shape": [..], "values": [..]}},
-// "attributes": {"name": text or integer}}; values may be numbers, "nan" or "inf"; one value fills
-// the whole data set.
+// run on a bare Python. {"datasets": {"/joints": {"type": "float64", "shape": [..], "values":
+// [..]}}, "attributes": {"name": text or integer}}; values may be numbers, "nan" or "inf"; one
+// value fills the whole data set.
 #include <iostream>
 #include <limits>
 #include <nlohmann/json.hpp>

@@ -1,5 +1,6 @@
 // What another project does with the installed library: a value, a tape, a gradient. The inspection
-// of a file that is not there makes the linker pull in HDF5, and exceptions cross the library's edge.
+// of a file that is not there makes the linker pull in HDF5, and exceptions cross the library's
+// edge.
 #include <cstdio>
 #include <vector>
 
@@ -14,7 +15,8 @@ int main() {
   const Gradients gradients = tape.backward(sum_all(square(x)));
   const Tensor* gradient = gradients.find(1);
   if (gradient == nullptr) return 1;
-  std::printf("d/dx sum(x^2) = %g %g %g\n", gradient->item(0), gradient->item(1), gradient->item(2));
+  std::printf("d/dx sum(x^2) = %g %g %g\n", gradient->item(0), gradient->item(1),
+              gradient->item(2));
   try {
     inspect("no such file.h5");
   } catch (const InputError&) {
