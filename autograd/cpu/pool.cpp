@@ -13,6 +13,11 @@
 #include "autograd/tensor/tensor.h"
 
 // Under AddressSanitizer free blocks, and the slack behind a tensor, may not be touched.
+#ifdef __has_feature
+#if __has_feature(address_sanitizer)
+#define __SANITIZE_ADDRESS__  // as GCC calls it
+#endif
+#endif
 #ifdef __SANITIZE_ADDRESS__
 #include <sanitizer/asan_interface.h>
 #else
