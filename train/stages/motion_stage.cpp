@@ -99,13 +99,13 @@ void MotionStage::set_statistics() {
 void MotionStage::update_discriminator(int64_t step, const WindowBatch& batch, double rate,
                                        NamedValues* values) {
   if (balance_ <= config_.balance_limit) return;
-  Context plain;
-  SmrmState state;
-  const SmrmOutput fake =
-      (*model_)(plain, batch.input_a, batch.input_trans_a, batch.rest_b, &state);
   double score = 0;
   const Differentiated d = differentiate(
       key_.fold("discriminator").fold(static_cast<uint64_t>(step)), [&](Context& ctx) {
+        Context plain;  // the generator gets no gradient from this step
+        SmrmState state;
+        const SmrmOutput fake =
+            (*model_)(plain, batch.input_a, batch.input_trans_a, batch.rest_b, &state);
         const DiscriminatorLosses l =
             discriminator_losses(ctx, *discriminator_, batch.real_b, batch.real_trans_b,
                                  batch.rest_b, fake.joints.value, fake.trans.value, batch.rest_b);

@@ -1,0 +1,301 @@
+// The three stages: deterministic, learning, frugal, and plain about what goes wrong.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "autograd/base/parallel.h"
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/reduce.h"
+#include "nn/layers/linear.h"
+#include "tests/train/tiny_training.h"
+
+namespace restage {
+namespace {
+
+using testing::bytes_of;
+using testing::tiny_corpora;
+using testing::tiny_stage;
+using testing::tiny_training;
+
+const char* const kStageNames[] = {"skeleton", "motion", "deformation"};
+
+double value_of(const NamedValues& values, const std::string& name) {
+  for (const auto& [key, value] : values)
+    if (key == name) return value;
+  ADD_FAILURE() << "no value '" << name << "'";
+  return 0;
+}
+
+struct Threads {
+  int before = threads();
+  ~Threads() { set_threads(before); }
+};
+
+/// Sizes at which ops are cut into several pieces.
+TrainConfig wide(int64_t steps) {
+  TrainConfig c = tiny_training(steps);
+  c.skeleton.sizes.points = 256;
+  c.skeleton.sizes.centres = 64;
+  c.skeleton.sizes.width = 64;
+  c.skeleton.optimiser.batch = c.motion.optimiser.batch = 8;
+  c.motion.sizes.hidden = 48;
+  c.motion.windows.frames = 20;
+  c.deformation.pairs.points = 128;
+  c.deformation.optimiser.batch = 2;
+  return c;
+}
+
+TEST(TrainStages, TwentyStepsWithOneTwoAndThreeThreadsGiveTheSameBits) {
+  const Threads restore;
+  for (const std::string name : kStageNames) {
+    std::string first;
+    for (const int n : {1, 2, 3}) {
+      set_threads(n);
+      const auto stage = tiny_stage(name, wide(20));
+      for (int64_t i = 0; i < 20; ++i) stage->step(i);
+      stage->validate();  // must leave no trace
+      if (n == 1) first = bytes_of(*stage);
+      EXPECT_TRUE(bytes_of(*stage) == first) << name << " with " << n << " threads";
+    }
+  }
+}
+
+TEST(TrainStages, AnotherSeedGivesOtherBits) {
+  TrainConfig a = tiny_training(2), b = a;
+  b.seed = 8;
+  for (const std::string name : kStageNames) {
+    const auto x = tiny_stage(name, a), y = tiny_stage(name, a), z = tiny_stage(name, b);
+    for (int64_t i = 0; i < 2; ++i) x->step(i), y->step(i), z->step(i);
+    EXPECT_TRUE(bytes_of(*x) == bytes_of(*y)) << name;
+    EXPECT_FALSE(bytes_of(*x) == bytes_of(*z)) << name;
+  }
+}
+
+TEST(TrainStages, StateGoesThroughAFile) {
+  for (const std::string name : kStageNames) {
+    const auto straight = tiny_stage(name, tiny_training(8));
+    for (int64_t i = 0; i < 4; ++i) straight->step(i);
+    const std::string half = bytes_of(*straight);
+    for (int64_t i = 4; i < 8; ++i) straight->step(i);
+
+    const auto resumed = tiny_stage(name, tiny_training(8));
+    resumed->load(parse_safetensors(half, "half"), "half");
+    EXPECT_TRUE(bytes_of(*resumed) == half) << name;
+    for (int64_t i = 4; i < 8; ++i) resumed->step(i);
+    EXPECT_TRUE(bytes_of(*resumed) == bytes_of(*straight)) << name;
+  }
+}
+
+TEST(TrainStages, StateOfAnotherStageIsRefused) {
+  for (const std::string name : kStageNames) {
+    const auto stage = tiny_stage(name, tiny_training(2));
+    const std::string before = bytes_of(*stage);
+    for (const std::string other : kStageNames) {
+      if (other == name) continue;
+      const std::string bytes = bytes_of(*tiny_stage(other, tiny_training(2)));
+      EXPECT_THROW(stage->load(parse_safetensors(bytes, "c"), "c"), InputError) << name;
+    }
+    EXPECT_TRUE(bytes_of(*stage) == before) << name;
+  }
+  EXPECT_THROW(tiny_stage("motions", tiny_training(2)), InputError);
+}
+
+TEST(TrainStages, SteadyStepsTakeNoLargeBlocks) {
+  TrainConfig c = wide(20);
+  c.skeleton.sizes.points = 512;  // every stage needs blocks of more than 1 MiB
+  c.skeleton.sizes.neighbours = 16;
+  c.motion.optimiser.batch = 64;
+  c.motion.windows.frames = 40;
+  c.deformation.pairs.points = 1024;
+  for (const std::string name : kStageNames) {
+    const auto stage = tiny_stage(name, c);
+    reset_peak_memory();
+    const int64_t before = memory_stats().in_use;
+    int64_t step = 0;
+    for (; step < 3; ++step) stage->step(step);
+    EXPECT_GT(memory_stats().peak - before, int64_t{4} << 20) << name << " is too small to tell";
+    // All of deformation's kinds of step: the offsets begin later.
+    if (name == "deformation") stage->step(step = c.deformation.skinning_steps);
+    const int64_t blocks = memory_stats().large_allocations;
+    for (const int64_t end = step + 6; ++step < end;) stage->step(step);
+    EXPECT_EQ(memory_stats().large_allocations, blocks) << name;
+  }
+}
+
+/// Mean loss of the first and of the last steps.
+std::pair<double, double> learn(Stage& stage, int64_t steps) {
+  const int64_t some = steps / 6;
+  double first = 0, last = 0;
+  for (int64_t i = 0; i < steps; ++i) {
+    const double loss = value_of(stage.step(i), "loss") / static_cast<double>(some);
+    EXPECT_TRUE(std::isfinite(loss));
+    if (i < some) first += loss;
+    if (i >= steps - some) last += loss;
+  }
+  return {first, last};
+}
+
+TEST(TrainStages, LossFallsInSixtySteps) {
+  for (const std::string name : kStageNames) {
+    TrainConfig c = tiny_training(60);
+    for (OptimiserConfig* o :
+         {&c.skeleton.optimiser, &c.motion.optimiser, &c.deformation.optimiser})
+      o->schedule.rate = 5e-3;
+    c.motion.sizes.hidden = 64;
+    c.motion.sizes.dropout = 0;
+    c.motion.self_first_pass = true;
+    c.motion.windows.self_share = 0.7;
+    const auto stage = tiny_stage(name, c);
+    const std::string figure = name == "skeleton" ? "joint_error_mm"
+                               : name == "motion" ? "local_mpjpe"
+                                                  : "with_offsets_mm";
+    const double before = value_of(stage->validate(), figure);
+    const auto [first, last] = learn(*stage, 60);
+    EXPECT_LT(last, 0.7 * first) << name;
+    EXPECT_LT(value_of(stage->validate(), figure), 0.8 * before) << name;
+  }
+}
+
+TEST(TrainStages, ExtractorsWithBatchNormLearn) {
+  TrainConfig c = tiny_training(12);
+  c.skeleton.model = "skeleton/point_transformer";
+  c.skeleton.sizes = {};
+  c.skeleton.sizes.points = 64;
+  c.skeleton.sizes.width = 16;
+  c.skeleton.sizes.layers = 2;
+  c.skeleton.sizes.neighbours = 6;
+  const auto transformer = tiny_stage("skeleton", c);
+  const auto [first, last] = learn(*transformer, 12);
+  EXPECT_LT(last, 0.9 * first);
+
+  c.skeleton.model = "skeleton/pointnet";
+  c.skeleton.sizes = {};
+  c.skeleton.sizes.points = 64;
+  c.skeleton.sizes.dropout = 0;
+  const auto pointnet = tiny_stage("skeleton", c);
+  const std::string start = bytes_of(*pointnet);
+  const auto [one, twelve] = learn(*pointnet, 12);
+  EXPECT_LT(twelve, 0.9 * one);
+  // The running statistics are part of the state, and move.
+  const TensorFile before = parse_safetensors(start, "b"),
+                   after = parse_safetensors(bytes_of(*pointnet), "a");
+  int moved = 0;
+  for (const auto& [name, tensor] : before.tensors)
+    if (name.ends_with("running_mean"))
+      moved += tensor.to_vector<float>() != after.at(name, "a").to_vector<float>();
+  EXPECT_GT(moved, 3);
+}
+
+TEST(TrainStages, EveryWayToTrainTheMotionNetwork) {
+  for (const bool self_first : {false, true})
+    for (const double adversarial : {0.0, 0.05}) {
+      TrainConfig c = tiny_training(4);
+      c.motion.model = adversarial > 0 ? "smrm/quaternion" : "smrm/rot6d";
+      c.motion.sizes.standardise = c.motion.model == "smrm/rot6d";
+      c.motion.self_first_pass = self_first;
+      c.motion.windows.self_share = 0.5;
+      c.motion.weights.adversarial = adversarial;
+      c.motion.windows.remove_heading = self_first;
+      c.motion.windows.translation = self_first ? Translation::relative : Translation::absolute;
+      const auto stage = tiny_stage("motion", c);
+      for (int64_t i = 0; i < 4; ++i)
+        for (const auto& [name, value] : stage->step(i)) EXPECT_TRUE(std::isfinite(value)) << name;
+      ModelSet set;
+      stage->export_models(set);
+      EXPECT_EQ(set.extra["translation"], self_first ? "relative" : "absolute");
+      EXPECT_EQ(set.extra["remove_heading"], self_first ? "true" : "false");
+    }
+}
+
+TEST(TrainStages, DiscriminatorRestsWhileItWins) {
+  TrainConfig c = tiny_training(3);
+  c.motion.balance_limit = 0;
+  EXPECT_NO_THROW(value_of(tiny_stage("motion", c)->step(0), "discriminator"));
+  c.motion.balance_limit = 1;  // a mean score is below 1
+  for (const auto& [name, value] : tiny_stage("motion", c)->step(0))
+    EXPECT_NE(name, "discriminator") << value;
+}
+
+std::string failure(const std::function<void()>& f) {
+  try {
+    f();
+  } catch (const NonFiniteError& e) {
+    EXPECT_EQ(e.exit_code, 1);
+    return e.what();
+  }
+  return "no NonFiniteError";
+}
+
+/// A checkpoint of the stage in which `name` holds the largest numbers.
+TensorFile poisoned(const Stage& stage, const std::string& name) {
+  TensorFile file = parse_safetensors(bytes_of(stage), "c");
+  Tensor t = file.at(name, "c").clone();
+  std::fill_n(t.data<float>(), t.numel(), 3e38f);
+  file.tensors[name] = t;
+  return file;
+}
+
+TEST(TrainStages, NonFiniteValuesAreNamedWithOpAndModule) {
+  const struct {
+    const char *stage, *parameter, *op, *path;
+  } cases[] = {
+      {"skeleton", "model.vote.weight", "linear", "skeleton/patch_transformer.vote"},
+      {"motion", "model.fc_rot.weight", "", "smrm/rot6d"},
+      {"deformation", "weights.fc2.weight", "linear", "deformation/weights.fc2"},
+  };
+  for (const auto& c : cases) {
+    const auto stage = tiny_stage(c.stage, tiny_training(4));
+    stage->load(poisoned(*stage, c.parameter), "c");
+    const std::string before = bytes_of(*stage);
+    const std::string what = failure([&] { stage->step(0); });
+    EXPECT_NE(what.find(c.op), std::string::npos) << what;
+    EXPECT_NE(what.find(c.path), std::string::npos) << what;
+    EXPECT_EQ(what.find('\n'), std::string::npos) << what;
+    EXPECT_FALSE(FiniteCheck::active());
+    // The parameters stand as they were before the step.
+    const TensorFile then = parse_safetensors(before, "b"),
+                     now = parse_safetensors(bytes_of(*stage), "a");
+    for (const auto& [name, tensor] : then.tensors) {
+      if (!name.starts_with("model.") && !name.starts_with("weights.")) continue;
+      EXPECT_TRUE(tensor.to_vector<float>() == now.at(name, "a").to_vector<float>()) << name;
+    }
+  }
+}
+
+TEST(TrainStages, HugeRateIsCaughtInTheStepWhereItShows) {
+  for (const std::string name : kStageNames) {
+    TrainConfig c = tiny_training(6);
+    for (OptimiserConfig* o :
+         {&c.skeleton.optimiser, &c.motion.optimiser, &c.deformation.optimiser}) {
+      o->schedule = {};
+      o->schedule.rate = 1e25;
+      o->clip = 0;
+    }
+    const auto stage = tiny_stage(name, c);
+    const std::string what = failure([&] {
+      for (int64_t i = 0; i < 6; ++i) stage->step(i);
+    });
+    EXPECT_NE(what.find(" in "), std::string::npos) << what;
+    EXPECT_EQ(what.find("no NonFiniteError"), std::string::npos) << name;
+  }
+}
+
+TEST(TrainStages, FiniteValuesWhoseSumIsNotAreCaughtToo) {
+  Linear layer(2, 1, Init{RngKey{1, 0}, DType::f32});
+  name_scopes(layer, "probe");
+  const auto loss = [&](double factor) {
+    return [&layer, factor](Context& ctx) {
+      return mean_all(scale(layer(ctx, Var(Tensor::from<float>({1, 2}, {1.0f, 2.0f}))), factor));
+    };
+  };
+  const Differentiated good = differentiate(RngKey{1, 0}, loss(2.0));
+  EXPECT_TRUE(std::isfinite(good.loss));
+  EXPECT_GT(good.norm, 0);
+  EXPECT_THROW(differentiate(RngKey{1, 0}, loss(std::numeric_limits<double>::quiet_NaN())),
+               NonFiniteError);
+}
+
+}  // namespace
+}  // namespace restage

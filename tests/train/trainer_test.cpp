@@ -1,0 +1,235 @@
+// The loop around the stages: files of a run, resume after a stop and after a kill, metrics.
+#include "train/trainer.h"
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "autograd/base/atomic_file.h"
+#include "autograd/base/interrupt.h"
+#include "autograd/base/log.h"
+#include "tests/train/tiny_training.h"
+
+namespace restage {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::tiny_stage;
+using testing::tiny_training;
+
+constexpr int64_t kSteps = 9;
+const std::vector<std::string> kAll = {"skeleton", "motion", "deformation"};
+
+/// A stage that does something of the test's own before one of its steps.
+class Disturbed final : public Stage {
+ public:
+  Disturbed(std::unique_ptr<Stage> stage, int64_t when, std::function<void()> what)
+      : stage_(std::move(stage)), when_(when), what_(std::move(what)) {}
+  std::string name() const override { return stage_->name(); }
+  int64_t steps() const override { return stage_->steps(); }
+  NamedValues step(int64_t step) override {
+    if (step == when_) what_();
+    return stage_->step(step);
+  }
+  NamedValues validate() override { return stage_->validate(); }
+  void save(TensorFile& file) const override { stage_->save(file); }
+  void load(const TensorFile& file, const std::string& where) override {
+    stage_->load(file, where);
+  }
+  void export_models(ModelSet& set) override { stage_->export_models(set); }
+
+ private:
+  std::unique_ptr<Stage> stage_;
+  int64_t when_;
+  std::function<void()> what_;
+};
+
+struct Killed : std::runtime_error {
+  Killed() : std::runtime_error("killed") {}
+};
+
+class TrainTrainer : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    root_ = ::testing::TempDir() + "restage_trainer_" + std::to_string(::getpid());
+    fs::remove_all(root_);
+    fs::create_directories(root_);
+    set_log_level(LogLevel::quiet);
+    handle_signals();
+  }
+  void TearDown() override {
+    for (const int number : {SIGINT, SIGTERM, SIGPIPE}) ::signal(number, SIG_DFL);
+    set_log_level(LogLevel::info);
+    fs::remove_all(root_);
+  }
+  std::string place(const std::string& name) const { return root_ + "/" + name; }
+  RunDir create(const std::string& name) const {
+    return RunDir::create_at(place(name), "x: 1\n", "{}\n", kAll);
+  }
+
+  using Maker = std::function<std::unique_ptr<Stage>(const std::string&)>;
+  static Maker plain() {
+    return [](const std::string& name) { return tiny_stage(name, tiny_training(kSteps)); };
+  }
+  /// `what` happens before step `when` of stage `which`.
+  static Maker disturbed(const std::string& which, int64_t when,
+                         const std::function<void()>& what) {
+    return [=](const std::string& name) -> std::unique_ptr<Stage> {
+      auto stage = tiny_stage(name, tiny_training(kSteps));
+      if (name != which) return stage;
+      return std::make_unique<Disturbed>(std::move(stage), when, what);
+    };
+  }
+  static LoopConfig loop() {
+    LoopConfig c;
+    c.log_every = 2;
+    c.validate_every = 5;
+    c.checkpoint_every = 4;
+    return c;
+  }
+  static std::string weights(const ModelSet& set) { return safetensors_bytes(to_file(set)); }
+  std::string metrics(const std::string& name) const {
+    return read_file(place(name) + "/metrics.jsonl");
+  }
+
+  /// What an undisturbed training gives, made once.
+  struct Whole {
+    std::string weights, metrics;
+  };
+  const Whole& whole() {
+    static Whole result;
+    if (result.weights.empty()) {
+      RunDir run = create("whole");
+      result.weights = weights(train(run, kAll, loop(), plain(), true));
+      result.metrics = metrics("whole");
+    }
+    return result;
+  }
+  /// Resumes `name`, which must then be the same as the undisturbed training.
+  void expect_completes(const std::string& name) {
+    RunDir run = RunDir::resume(place(name), kAll);
+    EXPECT_TRUE(weights(train(run, kAll, loop(), plain(), true)) == whole().weights) << name;
+    EXPECT_EQ(metrics(name), whole().metrics) << name;
+  }
+  std::string root_;
+};
+
+TEST_F(TrainTrainer, MetricsSayWhatHappened) {
+  std::istringstream lines(whole().metrics);
+  std::map<std::string, std::vector<int64_t>> losses, scores;
+  for (std::string line; std::getline(lines, line);) {
+    const auto json = nlohmann::json::parse(line);
+    (json.contains("loss") ? losses : scores)[json["stage"]].push_back(json["step"]);
+  }
+  for (const std::string& stage : kAll) {
+    EXPECT_EQ(losses[stage], (std::vector<int64_t>{2, 4, 6, 8, 9})) << stage;
+    EXPECT_EQ(scores[stage], (std::vector<int64_t>{5, 9})) << stage;
+  }
+}
+
+TEST_F(TrainTrainer, CheckpointsAreLeftAtTheEndsOfStages) {
+  whole();
+  RunDir run = create("a");
+  train(run, kAll, loop(), plain(), true);
+  for (const std::string& stage : kAll) {
+    const auto last = latest_checkpoint(run.dir(), {stage});
+    ASSERT_TRUE(last) << stage;
+    EXPECT_EQ(last->step, kSteps);
+  }
+  const ModelSet models =
+      models_of(parse_safetensors(whole().weights, "w"), {true, true, true}, "w");
+  EXPECT_TRUE(models.offsets);
+  EXPECT_TRUE(models.root);
+}
+
+TEST_F(TrainTrainer, StopByASignalWritesACheckpointAndResumesToTheSameBits) {
+  for (const std::string& stage : kAll) {
+    {
+      RunDir run = create(stage);
+      try {
+        train(run, kAll, loop(), disturbed(stage, 5, [] { ::raise(SIGTERM); }), true);
+        FAIL() << "not stopped in " << stage;
+      } catch (const Interrupted& stopped) {
+        EXPECT_EQ(stopped.exit_code, 143);
+      }
+    }
+    const auto last = latest_checkpoint(place(stage), kAll);
+    ASSERT_TRUE(last) << stage;
+    EXPECT_EQ(last->stage, stage);
+    EXPECT_EQ(last->step, 6);  // the step in which the signal came is finished
+    expect_completes(stage);
+  }
+}
+
+TEST_F(TrainTrainer, TwoStopsInARow) {
+  for (const int64_t when : {1, 3}) {
+    RunDir run = when == 1 ? create("twice") : RunDir::resume(place("twice"), kAll);
+    EXPECT_THROW(train(run, kAll, loop(), disturbed("motion", when, [] { ::raise(SIGINT); }), true),
+                 Interrupted);
+  }
+  expect_completes("twice");
+}
+
+TEST_F(TrainTrainer, FailureGoesBackToTheCheckpointBefore) {
+  const std::pair<const char*, int64_t> moments[] = {
+      {"skeleton", 0}, {"skeleton", 7}, {"motion", 4}, {"deformation", 0}, {"deformation", 8}};
+  for (const auto& [stage, when] : moments) {
+    const std::string name = stage + std::to_string(when);
+    {
+      RunDir run = create(name);
+      EXPECT_THROW(train(run, kAll, loop(), disturbed(stage, when, [] { throw Killed(); }), true),
+                   Killed);
+    }
+    expect_completes(name);
+  }
+}
+
+TEST_F(TrainTrainer, ResumedCompleteRunGivesItsModelsAgain) {
+  {
+    RunDir run = create("done");
+    train(run, kAll, loop(), plain(), true);
+  }
+  expect_completes("done");
+}
+
+TEST_F(TrainTrainer, MissingCheckpointOfAnEarlierStageIsSaid) {
+  {
+    RunDir run = create("gap");
+    EXPECT_THROW(train(run, kAll, loop(), disturbed("motion", 6, [] { throw Killed(); }), true),
+                 Killed);
+  }
+  fs::remove(latest_checkpoint(place("gap"), {"skeleton"})->path);
+  RunDir run = RunDir::resume(place("gap"), kAll);
+  try {
+    train(run, kAll, loop(), plain(), true);
+    FAIL();
+  } catch (const InputError& e) {
+    EXPECT_NE(std::string(e.what()).find("'skeleton'"), std::string::npos) << e.what();
+  }
+}
+
+TEST_F(TrainTrainer, DivergenceIsAFailureThatNamesThePlace) {
+  RunDir run = create("diverged");
+  const Maker make = [](const std::string& name) {
+    TrainConfig c = tiny_training(kSteps);
+    c.skeleton.optimiser.schedule = {};
+    c.skeleton.optimiser.schedule.rate = 1e25;
+    return tiny_stage(name, c);
+  };
+  try {
+    train(run, kAll, loop(), make, true);
+    FAIL();
+  } catch (const NonFiniteError& e) {
+    EXPECT_EQ(e.exit_code, 1);
+    EXPECT_NE(std::string(e.what()).find("skeleton/patch_transformer"), std::string::npos)
+        << e.what();
+  }
+}
+
+}  // namespace
+}  // namespace restage
