@@ -168,6 +168,7 @@ void add_data(Program& program) {
   CLI::App& group = program.add_group("data", "make, import and check data files");
   add_build(program, group);
   add_import(program, group);
+  add_data_perform(program, group);
   add_file_command(program, group, "inspect", "say what a file holds", run_inspect);
   add_file_command(program, group, "verify",
                    "read all of a file and list what is wrong (exit code 1)", run_verify);

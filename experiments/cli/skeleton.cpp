@@ -61,7 +61,8 @@ int run_skeleton(const SkeletonOptions& options, const Common& common) {
   if (common.json) {
     print_json({{"frames", list}, {"seed", common.seed}});
   } else {
-    print(writer ? "wrote " + options.out + " (seed " + std::to_string(common.seed) + ")\n" : text);
+    const std::string seed = "seed " + std::to_string(common.seed);
+    print(writer ? "wrote " + options.out + " (" + seed + ")\n" : text + seed + "\n");
   }
   return 0;
 }
