@@ -67,7 +67,10 @@ void Retargeter::prepare() {
     const auto it = models_.extra.find(name);
     return it == models_.extra.end() ? std::string(standard) : it->second;
   };
-  velocity_ = extra("translation", "velocity") == "velocity";
+  const std::string translation = extra("translation", "velocity");
+  path_ = translation == "velocity"   ? Path::velocity
+          : translation == "relative" ? Path::relative
+                                      : Path::absolute;
   remove_heading_ = extra("remove_heading", "false") == "true";
   keep_root_rotation_ = extra("keep_root_rotation", "true") == "true";
   const auto v = static_cast<int64_t>(target_.vertices.size());
@@ -119,14 +122,14 @@ RetargetedFrame Retargeter::step(const Joints& a) {
   const Mat3 turn = turn_about_y(heading), back = turn.transpose();
   Joints local;
   for (size_t j = 0; j < kJoints; ++j) local[j] = back * (a[j] - a[0]);
-  Vec3 moved = Vec3::Zero();
-  const double height_ratio =
-      leg_length(rest_) / std::max(leg_length(previous_ ? *previous_ : a), 1e-6);
-  if (velocity_) {
-    if (previous_) moved = back * (a[0] - (*previous_)[0]) * kFps;
-  } else {
-    moved = back * a[0];
+  if (!previous_) {  // B begins where A does, in proportion to its legs
+    start_a_ = a[0];
+    root_b_ = start_b_ = leg_length(rest_) / std::max(leg_length(a), 1e-6) * a[0];
   }
+  const Vec3 before = path_ == Path::velocity   ? (previous_ ? (*previous_)[0] : a[0])
+                      : path_ == Path::relative ? start_a_
+                                                : Vec3(Vec3::Zero());
+  const Vec3 moved = (path_ == Path::velocity ? kFps : 1.0) * (back * (a[0] - before));
   Tensor trans = Tensor::empty({1, 1, 3});
   for (int c = 0; c < 3; ++c) trans.data<float>()[c] = static_cast<float>(moved[c]);
   Context ctx;
@@ -141,10 +144,10 @@ RetargetedFrame Retargeter::step(const Joints& a) {
   out.pose.local[0] = turn * out.pose.local[0];
   const float* t = answer.trans.value.data<float>();
   const Vec3 t_b = turn * Vec3(t[0], t[1], t[2]);
-  if (velocity_) {
-    root_b_ = previous_ ? Vec3(root_b_ + t_b / kFps) : Vec3(height_ratio * a[0]);
+  if (path_ == Path::velocity) {
+    if (previous_) root_b_ += t_b / kFps;
   } else {
-    root_b_ = t_b;
+    root_b_ = path_ == Path::relative ? Vec3(start_b_ + t_b) : t_b;
   }
   previous_ = a;
   out.pose.root = root_b_;

@@ -61,12 +61,14 @@ class Retargeter {
   Joints rest_;
   Eigen::Matrix<float, Eigen::Dynamic, kJoints, Eigen::RowMajor> weights_;
   Tensor rest_tensor_, points_tensor_, weights_tensor_;  // relative to the rest pelvis
-  bool velocity_ = true, remove_heading_ = false,
-       keep_root_rotation_ = true;  // of the trained models
+  // How the models were trained:
+  enum class Path { velocity, relative, absolute } path_ = Path::velocity;
+  bool remove_heading_ = false, keep_root_rotation_ = true;
   SmrmState state_;
   std::optional<Joints> previous_;  ///< A on the 30 fps grid, one step ago
   std::optional<Joints> received_;  ///< A as last pushed
   Joints last_source_;
+  Vec3 start_a_ = Vec3::Zero(), start_b_ = Vec3::Zero();  ///< pelvis in the first frame
   Vec3 root_b_ = Vec3::Zero();
   int64_t frame_ = 0, grid_ = 0;  ///< source frames received, grid frames produced
 };

@@ -1,0 +1,147 @@
+#include "infer/extraction.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "nn/models/registry.h"
+#include "tests/support/tiny_body.h"
+
+namespace restage {
+namespace {
+
+using testing::tiny_body;
+
+std::unique_ptr<SkeletonModel> small(const std::string& name) {
+  ModelSizes sizes;
+  sizes.points = 96;
+  sizes.width = 32;
+  sizes.layers = 1;
+  sizes.centres = 24;
+  sizes.neighbours = 8;
+  if (name == "skeleton/pointnet") sizes = {}, sizes.points = 96;
+  return make_skeleton_model(name, sizes, Init{RngKey{1, 0}, DType::f32});
+}
+
+Points cloud(size_t n, uint64_t seed = 1) {
+  return surface_points(tiny_body("b", "test").rest, n, RngKey{seed, 0});
+}
+
+void shuffle(Points& points, uint64_t seed) {
+  Rng rng(RngKey{seed, 5});
+  for (size_t i = points.size(); i > 1; --i) std::swap(points[i - 1], points[rng.below(i)]);
+}
+
+std::string error(const std::function<void()>& f) {
+  try {
+    f();
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "none";
+}
+
+TEST(InferExtraction, OrderOfPointsDoesNotMatterToTheLastBit) {
+  for (const std::string name :
+       {"skeleton/point_transformer", "skeleton/pointnet", "skeleton/patch_transformer"}) {
+    const auto model = small(name);
+    for (const size_t n : {64u, 96u, 400u}) {  // repeated, all, chosen
+      Points points = cloud(n);
+      const Joints first = extract_joints(*model, points, "c", RngKey{3, 0}, 2);
+      for (uint64_t seed = 0; seed < 3; ++seed) {
+        shuffle(points, seed);
+        EXPECT_EQ(extract_joints(*model, points, "c", RngKey{3, 0}, 2), first) << name << " " << n;
+      }
+      EXPECT_NE(extract_joints(*model, cloud(n, 2), "c", RngKey{3, 0}, 2), first)
+          << name << " " << n;
+      if (n == 96) continue;  // all of them, once: nothing to choose
+      EXPECT_NE(extract_joints(*model, points, "c", RngKey{4, 0}, 2), first) << name << " " << n;
+    }
+  }
+}
+
+TEST(InferExtraction, JointsMoveWithTheCloud) {
+  const auto model = small("skeleton/patch_transformer");
+  Points points = cloud(300);
+  const Joints here = extract_joints(*model, points, "c", RngKey{});
+  const Point far(4.0f, -2.0f, 8.0f);
+  for (Point& p : points) p += far;
+  const Joints there = extract_joints(*model, points, "c", RngKey{});
+  for (size_t j = 0; j < kJoints; ++j)
+    EXPECT_LT((there[j] - here[j] - far.cast<double>()).norm(), 1e-4);
+}
+
+TEST(InferExtraction, SamplesAreAveraged) {
+  const auto model = small("skeleton/patch_transformer");
+  const Points points = cloud(300);
+  const RngKey key{9, 0};
+  const Joints both = extract_joints(*model, points, "c", key, 2);
+  // The first choice of two is the only choice of one.
+  const Joints one = extract_joints(*model, points, "c", key, 1);
+  double apart = 0;
+  for (size_t j = 0; j < kJoints; ++j) apart = std::max(apart, (both[j] - one[j]).norm());
+  EXPECT_GT(apart, 1e-6);
+  EXPECT_LT(apart, 0.1);
+}
+
+TEST(InferExtraction, TooFewDistinctPoints) {
+  const auto model = small("skeleton/patch_transformer");
+  for (const size_t n : {0u, 1u, 3u, 63u}) {
+    const std::string what = error([&] { extract_joints(*model, cloud(n), "scan.ply", RngKey{}); });
+    EXPECT_EQ(what.rfind("scan.ply: ", 0), 0u) << what;
+    EXPECT_NE(what.find(std::to_string(n) + " distinct"), std::string::npos) << what;
+  }
+  Points repeated;
+  for (int i = 0; i < 50; ++i)
+    for (const Point& p : cloud(63)) repeated.push_back(p);
+  EXPECT_NE(
+      error([&] { extract_joints(*model, repeated, "scan.ply", RngKey{}); }).find("63 distinct"),
+      std::string::npos);
+  EXPECT_EQ(error([&] { extract_joints(*model, cloud(64), "scan.ply", RngKey{}); }), "none");
+}
+
+TEST(InferExtraction, ValuesThatAreNotFinite) {
+  const auto model = small("skeleton/patch_transformer");
+  for (const float bad :
+       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
+        -std::numeric_limits<float>::infinity()}) {
+    Points points = cloud(200);
+    points[77].y() = bad;
+    const std::string what = error([&] { extract_joints(*model, points, "scan.ply", RngKey{}); });
+    EXPECT_EQ(what.rfind("scan.ply: ", 0), 0u) << what;
+    EXPECT_NE(what.find("not finite"), std::string::npos) << what;
+  }
+  Points huge = cloud(200);
+  for (Point& p : huge) p *= 1e38f;
+  EXPECT_NE(error([&] { extract_joints(*model, huge, "scan.ply", RngKey{}); }), "none");
+}
+
+TEST(InferExtraction, SurfacePointsFollowTheArea) {
+  Mesh mesh;
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {5, 0, 0}, {8, 0, 0}, {5, 1, 0}};
+  mesh.faces = {{0, 1, 2}, {3, 4, 5}};
+  const Points points = surface_points(mesh, 4000, RngKey{});
+  ASSERT_EQ(points.size(), 4000u);
+  const auto left =
+      std::count_if(points.begin(), points.end(), [](const Point& p) { return p.x() < 2; });
+  EXPECT_NEAR(static_cast<double>(left) / 4000, 0.25, 0.03);
+  for (const Point& p : points) {
+    const Point q = p.x() < 2 ? p : Point((p.x() - 5) / 3, p.y(), p.z());
+    EXPECT_GE(q.minCoeff(), -1e-5f);
+    EXPECT_LE(q.x() + q.y(), 1.0f + 1e-5f);
+    EXPECT_EQ(q.z(), 0.0f);
+  }
+  EXPECT_EQ(surface_points(mesh, 50, RngKey{7, 0}), surface_points(mesh, 50, RngKey{7, 0}));
+}
+
+TEST(InferExtraction, CloudsAndFlatMeshesGiveTheirVertices) {
+  Mesh mesh;
+  mesh.vertices = cloud(100);
+  EXPECT_EQ(surface_points(mesh, 50, RngKey{}), mesh.vertices);
+  mesh.faces = {{4, 4, 4}};
+  EXPECT_EQ(surface_points(mesh, 50, RngKey{}), mesh.vertices);
+}
+
+}  // namespace
+}  // namespace restage

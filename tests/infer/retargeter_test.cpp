@@ -1,0 +1,388 @@
+#include "infer/retargeter.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "autograd/ops/elementwise.h"
+#include "tests/support/tiny_body.h"
+
+namespace restage {
+namespace {
+
+using testing::tiny_body;
+using testing::tiny_joints;
+using testing::tiny_motion;
+
+/// Answers with the joints that it was given, at the centroid of the cloud.
+struct FixedExtractor final : SkeletonModel {
+  Joints joints = tiny_joints();
+  SkeletonOutput forward(Context&, const Var& cloud) override {
+    const int64_t n = cloud.size(0);
+    Tensor out = Tensor::empty({n, kJoints, 3});
+    for (int64_t i = 0; i < 3 * n * kJoints; ++i)
+      out.data<float>()[i] =
+          static_cast<float>(joints[static_cast<size_t>(i / 3 % kJoints)][i % 3]);
+    SkeletonOutput result;
+    result.joints = Var(out);
+    return result;
+  }
+  int64_t points() const override { return 128; }
+  void visit(Fields&) override {}
+  const char* kind() const override { return "Fixed"; }
+};
+
+/// Untrained networks, small where they can be.
+ModelSet untrained(const std::string& smrm = "smrm/rot6d") {
+  const Init init{RngKey{5, 0}, DType::f32};
+  ModelSizes sizes;
+  sizes.hidden = 32;
+  ModelSet set;
+  put_model(&set, smrm, sizes, make_model(smrm, sizes, init.sub("smrm")));
+  put_model(&set, "deformation/weights", {}, make_model("deformation/weights", {}, init.sub("w")));
+  put_model(&set, "deformation/offsets", {}, make_model("deformation/offsets", {}, init.sub("o")));
+  ModelSizes extractor;
+  extractor.points = 64;
+  extractor.width = 16;
+  extractor.layers = 1;
+  extractor.centres = 16;
+  extractor.neighbours = 4;
+  put_model(&set, "skeleton/patch_transformer", extractor,
+            make_model("skeleton/patch_transformer", extractor, init.sub("s")));
+  return set;
+}
+
+std::vector<Joints> performance(size_t frames) {
+  const Motion motion = tiny_motion("m", "s", "test", frames);
+  const Body body = tiny_body("a", "test");
+  std::vector<Joints> out;
+  for (size_t f = 0; f < frames; ++f)
+    out.push_back(forward_kinematics(body.joints, pose_on(motion, body, f)).joints);
+  return out;
+}
+
+const Body& target() {
+  static const Body body = tiny_body("b", "test", 1.1, 1.2);
+  return body;
+}
+
+std::vector<RetargetedFrame> run(Retargeter& r, const std::vector<Joints>& source) {
+  std::vector<RetargetedFrame> out;
+  for (const Joints& j : source)
+    for (RetargetedFrame& f : r.push_joints(j)) out.push_back(std::move(f));
+  return out;
+}
+
+double apart(const Joints& a, const Joints& b) {
+  double most = 0;
+  for (size_t j = 0; j < kJoints; ++j) most = std::max(most, (a[j] - b[j]).norm());
+  return most;
+}
+
+double apart(const Points& a, const Points& b) {
+  if (a.size() != b.size()) return 1e9;
+  double most = 0;
+  for (size_t i = 0; i < a.size(); ++i)
+    most = std::max(most, static_cast<double>((a[i] - b[i]).norm()));
+  return most;
+}
+
+/// The whole sequence in one forward pass of the network, velocities in the world's directions.
+std::vector<Pose> whole_sequence(const ModelSet& models, const std::vector<Joints>& source) {
+  const auto frames = static_cast<int64_t>(source.size());
+  Tensor joints = Tensor::zeros({1, frames, kJoints, 3}), trans = Tensor::zeros({1, frames, 3});
+  Tensor rest = Tensor::zeros({1, kJoints, 3});
+  for (size_t f = 0; f < source.size(); ++f)
+    for (size_t c = 0; c < 3; ++c) {
+      for (size_t j = 0; j < kJoints; ++j)
+        joints.data<float>()[(f * kJoints + j) * 3 + c] =
+            static_cast<float>(source[f][j][c] - source[f][0][c]);
+      if (f > 0)
+        trans.data<float>()[3 * f + c] =
+            static_cast<float>(kFps * (source[f][0][c] - source[f - 1][0][c]));
+    }
+  for (size_t j = 0; j < kJoints; ++j)
+    for (size_t c = 0; c < 3; ++c)
+      rest.data<float>()[3 * j + c] =
+          static_cast<float>(target().joints[j][c] - target().joints[0][c]);
+  Context ctx;
+  SmrmState state;
+  const SmrmOutput out = (*models.smrm)(ctx, Var(joints), Var(trans), Var(rest), &state);
+  std::vector<Pose> poses(source.size());
+  Vec3 root = leg_length(target().joints) / leg_length(source[0]) * source[0][0];
+  for (size_t f = 0; f < source.size(); ++f) {
+    const float* t = out.trans.value.data<float>() + 3 * f;
+    if (f > 0) root += Vec3(t[0], t[1], t[2]) / kFps;
+    poses[f].root = root;
+    for (size_t j = 0; j < kJoints; ++j)
+      poses[f].local[j] = Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(
+                              out.rotations.value.data<float>() + (f * kJoints + j) * 9)
+                              .cast<double>();
+  }
+  return poses;
+}
+
+TEST(InferRetargeter, FrameByFrameEqualsTheWholeSequence) {
+  for (const std::string name : {"smrm/rot6d", "smrm/quaternion"}) {
+    const ModelSet models = untrained(name);
+    const std::vector<Joints> source = performance(40);
+    Retargeter r(models, target().rest, target().joints, {});
+    const std::vector<RetargetedFrame> online = run(r, source);
+    const std::vector<Pose> whole = whole_sequence(models, source);
+    ASSERT_EQ(online.size(), whole.size());
+    for (size_t f = 0; f < whole.size(); ++f) {
+      for (size_t j = 0; j < kJoints; ++j)
+        EXPECT_LT((online[f].pose.local[j] - whole[f].local[j]).cwiseAbs().maxCoeff(), 1e-5)
+            << name << " frame " << f;
+      EXPECT_LT((online[f].pose.root - whole[f].root).norm(), 1e-5) << name << " frame " << f;
+      EXPECT_LT(apart(online[f].joints, forward_kinematics(target().joints, whole[f]).joints),
+                1e-5);
+    }
+    // The state is carried: a frame depends on those before it.
+    r.restart();
+    EXPECT_GT(apart(r.push_joints(source[20])[0].joints, online[20].joints), 1e-4);
+  }
+}
+
+TEST(InferRetargeter, RestartForgetsEverything) {
+  const ModelSet models = untrained();
+  const std::vector<Joints> source = performance(12);
+  Retargeter r(models, target().rest, target().joints, {});
+  const std::vector<RetargetedFrame> first = run(r, source);
+  r.restart();
+  const std::vector<RetargetedFrame> again = run(r, source);
+  ASSERT_EQ(first.size(), again.size());
+  for (size_t f = 0; f < first.size(); ++f) {
+    EXPECT_EQ(first[f].joints, again[f].joints);
+    EXPECT_EQ(first[f].vertices, again[f].vertices);
+  }
+}
+
+TEST(InferRetargeter, MemoryDoesNotGrowWithTheFrames) {
+  const ModelSet models = untrained();
+  const std::vector<Joints> source = performance(100);
+  Retargeter r(models, target().rest, target().joints, {});
+  for (int i = 0; i < 5; ++i) r.push_joints(source[0]);
+  reset_peak_memory();
+  for (int i = 0; i < 5; ++i) r.push_joints(source[1]);
+  const MemoryStats before = memory_stats();
+  for (const Joints& j : source) r.push_joints(j);
+  const MemoryStats after = memory_stats();
+  EXPECT_EQ(after.peak, before.peak);
+  EXPECT_EQ(after.in_use, before.in_use);
+  EXPECT_EQ(after.large_allocations, before.large_allocations);
+}
+
+TEST(InferRetargeter, FramesOfOtherRatesFallOnTheThirtyPerSecondGrid) {
+  const ModelSet models = untrained();
+  const std::vector<Joints> source = performance(40);
+  const auto frames = [&](double fps, size_t n) {
+    RetargetOptions options;
+    options.fps = fps;
+    Retargeter r(models, target().rest, target().joints, options);
+    return run(r, {source.begin(), source.begin() + static_cast<std::ptrdiff_t>(n)});
+  };
+  EXPECT_EQ(frames(30, 40).size(), 40u);
+  EXPECT_EQ(frames(60, 40).size(), 20u);
+  EXPECT_EQ(frames(15, 20).size(), 39u);  // the last one has no successor to lie between
+  EXPECT_EQ(frames(120, 40).size(), 10u);
+  EXPECT_EQ(frames(24, 25).size(), 31u);  // one second and its end
+  EXPECT_EQ(frames(29.97, 40).size(), 40u);
+
+  // Every second frame of 60 is a frame of 30; halves of 15 are midpoints.
+  std::vector<Joints> half, doubled;
+  for (size_t f = 0; f < 40; f += 2) half.push_back(source[f]);
+  for (size_t f = 0; f < 20; ++f) {
+    doubled.push_back(source[f]);
+    Joints middle;
+    for (size_t j = 0; j < kJoints; ++j) middle[j] = (source[f][j] + source[f + 1][j]) / 2;
+    if (f < 19) doubled.push_back(middle);
+  }
+  Retargeter plain(models, target().rest, target().joints, {});
+  const auto from60 = frames(60, 40), direct = run(plain, half);
+  plain.restart();
+  const auto from15 = frames(15, 20), midpoints = run(plain, doubled);
+  for (size_t f = 0; f < direct.size(); ++f)
+    EXPECT_LT(apart(from60[f].joints, direct[f].joints), 1e-6) << f;
+  for (size_t f = 0; f < midpoints.size(); ++f)
+    EXPECT_LT(apart(from15[f].joints, midpoints[f].joints), 1e-5) << f;
+}
+
+TEST(InferRetargeter, VerticesKeepTheTargetsOrder) {
+  const ModelSet models = untrained();
+  const std::vector<Joints> source = performance(3);
+  Mesh turned = target().rest;
+  std::reverse(turned.vertices.begin(), turned.vertices.end());
+  const auto n = static_cast<int>(turned.vertices.size());
+  for (Triangle& t : turned.faces)
+    for (int& i : t) i = n - 1 - i;
+  Retargeter a(models, target().rest, target().joints, {}), b(models, turned, target().joints, {});
+  EXPECT_EQ(b.target().faces, turned.faces);
+  ASSERT_EQ(a.weights().rows(), n);
+  for (int i = 0; i < n; ++i) {
+    EXPECT_NEAR(a.weights().row(i).sum(), 1.0f, 1e-5f);
+    EXPECT_LT((a.weights().row(i) - b.weights().row(n - 1 - i)).cwiseAbs().maxCoeff(), 1e-5f);
+  }
+  for (const Joints& j : source) {
+    const Points x = a.push_joints(j)[0].vertices;
+    Points y = b.push_joints(j)[0].vertices;
+    std::reverse(y.begin(), y.end());
+    EXPECT_LT(apart(x, y), 1e-5);
+  }
+}
+
+TEST(InferRetargeter, TargetsAwayFromTheOriginAreTheSame) {
+  const ModelSet models = untrained();
+  const std::vector<Joints> source = performance(4);
+  Mesh moved = target().rest;
+  for (Point& p : moved.vertices) p += Point(2, 0.5f, -3);
+  Joints rest = target().joints;
+  for (Vec3& j : rest) j += Vec3(2, 0.5, -3);
+  Retargeter a(models, target().rest, target().joints, {}), b(models, moved, rest, {});
+  for (const Joints& j : source) {
+    const RetargetedFrame x = a.push_joints(j)[0], y = b.push_joints(j)[0];
+    EXPECT_LT(apart(x.joints, y.joints), 1e-4);
+    EXPECT_LT(apart(x.vertices, y.vertices), 1e-4);
+  }
+}
+
+TEST(InferRetargeter, RestPoseIsTheTargetItselfWithoutOffsets) {
+  ModelSet models = untrained();
+  models.offsets.net.reset();
+  const Retargeter r(models, target().rest, target().joints, {});
+  Pose pose;
+  for (Mat3& m : pose.local) m.setIdentity();
+  pose.root = target().joints[0];
+  EXPECT_LT(apart(r.pose_vertices(pose), target().rest.vertices), 1e-5);
+  pose.root += Vec3(1, 2, 3);
+  Points there = target().rest.vertices;
+  for (Point& p : there) p += Point(1, 2, 3);
+  EXPECT_LT(apart(r.pose_vertices(pose), there), 1e-5);
+}
+
+/// Every meaning of the translation starts B at A's place in proportion to its legs, or says where
+/// it is.
+TEST(InferRetargeter, TranslationsMeanWhatTheWeightsSay) {
+  const std::vector<Joints> source = performance(6);
+  std::vector<Joints> elsewhere = source;
+  const Vec3 step(3, 0, -2);
+  for (Joints& joints : elsewhere)
+    for (Vec3& j : joints) j += step;
+  for (const std::string kind : {"velocity", "relative", "absolute"}) {
+    ModelSet models = untrained();
+    models.extra["translation"] = kind;
+    Retargeter a(models, target().rest, target().joints, {}),
+        b(models, target().rest, target().joints, {});
+    const auto x = run(a, source), y = run(b, elsewhere);
+    const double ratio = leg_length(target().joints) / leg_length(source[0]);
+    if (kind == "velocity") {
+      EXPECT_LT((x[0].pose.root - ratio * source[0][0]).norm(), 1e-5);
+    }
+    // Only the absolute path lets the network know where A is.
+    for (size_t f = 0; f < x.size(); ++f) {
+      const double rotation = (x[f].pose.local[5] - y[f].pose.local[5]).norm();
+      const double place = (y[f].pose.root - x[f].pose.root - ratio * step).norm();
+      if (kind == "absolute") {
+        EXPECT_GT(rotation, 1e-4) << f;
+      } else {
+        EXPECT_LT(rotation, 1e-5) << kind << " " << f;
+        EXPECT_LT(place, 1e-4) << kind << " " << f;
+      }
+    }
+  }
+}
+
+TEST(InferRetargeter, WithoutHeadingTheResultTurnsWithTheSource) {
+  ModelSet models = untrained();
+  models.extra["remove_heading"] = "true";
+  const std::vector<Joints> source = performance(8);
+  std::vector<Joints> turned = source;
+  const Mat3 turn = turn_about_y(1.1);
+  for (Joints& joints : turned)
+    for (Vec3& j : joints) j = turn * j;
+  Retargeter a(models, target().rest, target().joints, {}),
+      b(models, target().rest, target().joints, {});
+  const auto x = run(a, source), y = run(b, turned);
+  for (size_t f = 0; f < x.size(); ++f) {
+    Joints expected = x[f].joints;
+    for (Vec3& j : expected) j = turn * j;
+    EXPECT_LT(apart(y[f].joints, expected), 1e-4) << f;
+  }
+}
+
+ModelSet with_extractor(const Joints& joints) {
+  ModelSet models = untrained();
+  auto fixed = std::make_unique<FixedExtractor>();
+  fixed->joints = joints;
+  models.skeleton.net = std::move(fixed);
+  return models;
+}
+
+/// Rest joints whose arms hang by `degrees`, to the left or on both sides.
+Joints arms_down(double degrees, bool both) {
+  Joints joints = tiny_joints();
+  for (const auto& [shoulder, sign] : {std::pair<size_t, double>{16, -1.0}, {17, 1.0}}) {
+    if (sign > 0 && !both) continue;
+    const Mat3 turn =
+        Eigen::AngleAxisd(sign * degrees * M_PI / 180, Vec3::UnitZ()).toRotationMatrix();
+    for (const size_t j : {shoulder + 2, shoulder + 4}) {
+      const Vec3 along(joints[j].x() - joints[shoulder].x(), 0, 0);
+      joints[j] = joints[shoulder] + turn * along;
+    }
+  }
+  return joints;
+}
+
+TEST(InferRetargeter, TargetsThatAreNoTPose) {
+  RetargetOptions force;
+  force.force = true;
+  const auto refused = [&](const Joints& joints) {
+    const ModelSet models = with_extractor(joints);
+    EXPECT_NO_THROW(Retargeter(models, target().rest, "hero.obj", force));
+    try {
+      const Retargeter r(models, target().rest, "hero.obj", {});
+    } catch (const InputError& e) {
+      EXPECT_EQ(std::string(e.what()).rfind("hero.obj: is not in T-pose", 0), 0u) << e.what();
+      EXPECT_NE(std::string(e.what()).find("--force"), std::string::npos) << e.what();
+      return true;
+    }
+    return false;
+  };
+  EXPECT_FALSE(refused(arms_down(0, true)));
+  EXPECT_FALSE(refused(arms_down(29, true)));
+  EXPECT_FALSE(refused(arms_down(-29, true)));
+  EXPECT_TRUE(refused(arms_down(31, true)));
+  EXPECT_TRUE(refused(arms_down(31, false)));  // one arm is enough
+  EXPECT_TRUE(refused(arms_down(90, true)));
+  Joints behind = tiny_joints();
+  for (Vec3& j : behind) j = turn_about_y(M_PI) * j;  // facing -z: left is on the right
+  EXPECT_TRUE(refused(behind));
+  Joints none = tiny_joints();
+  none[20] = none[16];
+  EXPECT_TRUE(refused(none));
+}
+
+TEST(InferRetargeter, CloudsGoThroughTheExtractor) {
+  ModelSet models = untrained();
+  RetargetOptions options;
+  options.force = true;
+  options.samples = 2;
+  Retargeter a(models, target().rest, "hero.obj", options),
+      b(models, target().rest, "hero.obj", options);
+  EXPECT_EQ(a.rest(), b.rest());
+  for (uint64_t f = 0; f < 4; ++f) {
+    Points cloud = surface_points(target().rest, 300 + 20 * f, RngKey{f, 0});
+    const auto x = a.push(cloud, "f0.ply");
+    std::reverse(cloud.begin(), cloud.end());
+    const auto y = b.push(cloud, "f0.ply");
+    ASSERT_EQ(x.size(), 1u);
+    EXPECT_EQ(x[0].joints, y[0].joints);
+    EXPECT_EQ(x[0].vertices, y[0].vertices);
+    EXPECT_EQ(x[0].vertices.size(), target().rest.vertices.size());
+    EXPECT_EQ(a.source_joints(), b.source_joints());
+  }
+  EXPECT_THROW(a.push(Points(3, Point(0, 0, 0)), "f1.ply"), InputError);
+}
+
+}  // namespace
+}  // namespace restage
