@@ -35,6 +35,11 @@ std::unique_ptr<Module> patch_transformer(const ModelSizes& s, const Init& init)
   c.layers = or_default(s.layers, c.layers);
   c.centres = or_default(s.centres, c.centres);
   c.neighbours = or_default(s.neighbours, c.neighbours);
+  if (c.width % c.heads != 0)
+    throw InputError("",
+                     "width " + std::to_string(c.width) +
+                         " of skeleton/patch_transformer does not fit its heads",
+                     "give a multiple of " + std::to_string(c.heads));
   return std::make_unique<PatchTransformer>(c, init);
 }
 

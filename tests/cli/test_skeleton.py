@@ -1,0 +1,144 @@
+"""restage skeleton: joints of clouds."""
+import os
+import random
+import struct
+
+from support import CliTest, points, small_disk
+from tiny_run import weights
+
+
+class Skeleton(CliTest):
+    def setUp(self):
+        super().setUp()
+        self.w = weights("tiny")
+        self.cloud = points(300, 1)
+
+    def joints(self, name, *options):
+        frames = self.json("skeleton", "--weights", self.w, "--input", name, *options)["frames"]
+        for frame in frames:
+            self.assertEqual((len(frame["joints"]), {len(p) for p in frame["joints"]}), (22, {3}))
+        return [frame["joints"] for frame in frames]
+
+
+class Joints(Skeleton):
+    def test_one_cloud(self):
+        self.ply("a.ply", self.cloud)
+        found = self.json("skeleton", "--weights", self.w, "--input", "a.ply")
+        self.assertEqual([f["source"] for f in found["frames"]], ["a.ply"])
+        self.assertEqual(found["seed"], 0)
+        text = self.done("skeleton", "--weights", self.w, "--input", "a.ply")
+        self.assertIn("left_wrist", text.lower().replace(" ", "_"))
+        self.assertIn("seed 0", text)
+
+    def test_order_of_points_does_not_matter(self):
+        for count in (64, 300, 1200):
+            cloud = points(count, count)
+            self.ply("a.ply", cloud)
+            random.Random(1).shuffle(cloud)
+            self.ply("b.ply", cloud)
+            self.write("c.obj", "".join("v %r %r %r\n" % struct.unpack("<3f", struct.pack("<3f", *p)) for p in reversed(cloud)))
+            a = self.joints("a.ply")
+            self.assertEqual(a, self.joints("b.ply"))
+            self.assertEqual(a, self.joints("c.obj"))
+            self.assertNotEqual(a, self.joints("a.ply", "--seed", "1") if count != 64 else None)
+
+    def test_any_number_of_threads_and_samples(self):
+        self.ply("a.ply", self.cloud)
+        results = [self.done("skeleton", "--weights", self.w, "--input", "a.ply", "--json", "--samples", "8", "--threads", n) for n in (1, 2, 3)]
+        self.assertEqual(results[0], results[1])
+        self.assertEqual(results[0], results[2])
+
+    def test_folder_in_natural_order(self):
+        clouds = {i: points(100 + i, i) for i in (1, 2, 10)}
+        for i, cloud in clouds.items():
+            self.ply("scans/f%d.ply" % i, cloud)
+            self.ply("one%d.ply" % i, cloud)
+        found = self.json("skeleton", "--weights", self.w, "--input", "scans")["frames"]
+        self.assertEqual([os.path.basename(f["source"]) for f in found], ["f1.ply", "f2.ply", "f10.ply"])
+        for frame, i in zip(found, clouds):
+            self.assertEqual(frame["joints"], self.joints("one%d.ply" % i)[0])
+
+    def test_hdf5_in_and_out(self):
+        flat = [x for p in self.cloud for x in p]
+        self.h5("in.h5", vertices=([2, 300, 3], flat * 2, "float32"))
+        self.ply("a.ply", self.cloud)
+        self.assertEqual(self.joints("in.h5"), self.joints("a.ply") * 2)
+        self.assertIn("j.h5", self.done("skeleton", "--weights", self.w, "--input", "in.h5", "--out", "j.h5"))
+        counts = self.json("data", "inspect", "j.h5")["counts"]
+        self.assertEqual(counts["frames"], 2)
+        truth = [x for p in self.joints("a.ply")[0] for x in p]
+        self.h5("truth.h5", joints=([2, 22, 3], truth * 2))
+        self.assertLess(self.json("eval", "--pred", "j.h5", "--truth", "truth.h5")["mean"]["mpjpe"], 1e-6)
+
+    def test_run_directory_as_weights(self):
+        os.mkdir(self.path("run"))
+        with open(self.w, "rb") as f:
+            self.write("run/weights.safetensors", f.read())
+        self.ply("a.ply", self.cloud)
+        self.assertEqual(self.json("skeleton", "--weights", "run", "--input", "a.ply")["frames"],
+                         self.json("skeleton", "--weights", self.w, "--input", "a.ply")["frames"])
+
+
+class BadClouds(Skeleton):
+    def bad(self, name, *contains, w=None, more=()):
+        self.bad_input(["skeleton", "--weights", w or self.w, "--input", name, *more], *contains)
+
+    def test_clouds(self):
+        good = self.bytes(self.ply("good.ply", self.cloud, [(0, 1, 2)]))
+        bad = lambda name, *words: self.bad(name, name, *words)
+        bad("none.ply")
+        for part in (0.9, 0.2, 0.01):
+            bad(self.write("cut.ply", good[:int(len(good) * part)]))
+        bad(self.ply("empty.ply", []))
+        bad(self.ply("nan.ply", self.cloud + [(0, float("nan"), 0)]))
+        bad(self.ply("inf.ply", self.cloud + [(0, 0, float("-inf"))]))
+        bad(self.ply("three.ply", points(3, 1)), "3 distinct points")
+        bad(self.ply("same.ply", points(63, 1) * 20), "63 distinct points")
+        bad(self.ply("huge.ply", [(1e38 * x, 1e38 * y, z) for x, y, z in self.cloud]))
+        bad(self.ply("face.ply", self.cloud, [(0, 1, 300)]), "face")
+        bad(self.write("what.xyz", "1 2 3\n"))
+        self.bad("x" * 3000)
+
+    def test_later_frames(self):
+        for i in range(3):
+            self.ply("scans/%d.ply" % i, points(100, i))
+        self.ply("scans/3.ply", points(3, 1))
+        self.bad("scans", "scans/3.ply", "3 distinct")
+        self.bad("scans", "scans/3.ply", more=["--out", "j.h5"])
+        self.bad("scans", "scans/3.ply", more=["--json"])
+        os.mkdir(self.path("hollow"))
+        self.bad("hollow", "hollow")
+
+    def test_hdf5(self):
+        self.h5("joints.h5", joints=([2, 22, 3], [0.0]))
+        self.bad("joints.h5", "joints.h5")
+        self.h5("shape.h5", vertices=([2, 100, 2], [0.0]))
+        self.bad("shape.h5", "shape.h5")
+        self.bad(self.write("text.h5", "no HDF5\n"), "text.h5")
+
+    def test_weights(self):
+        self.ply("a.ply", self.cloud)
+        bad = lambda name, *words: self.bad("a.ply", name, *words, w=name)
+        bad("none.safetensors")
+        with open(self.w, "rb") as f:
+            whole = f.read()
+        bad(self.write("cut.safetensors", whole[:-100]))
+        bad(self.write("noise.safetensors", b"\xff" * 1000))
+        bad(weights("other", "stages=[deformation]"), "skeleton")
+        os.mkdir(self.path("unfinished"))
+        bad("unfinished")
+        self.bad("a.ply", w="x" * 3000)
+
+    def test_options(self):
+        self.ply("a.ply", self.cloud)
+        self.bad("a.ply", "--samples", more=["--samples", "0"])
+        self.bad("a.ply", "nowhere", more=["--out", "nowhere/j.h5"])
+        self.bad_input(["skeleton", "--input", "a.ply"], "--weights")
+        self.bad_input(["skeleton", "--weights", self.w], "--input")
+
+    def test_full_disk(self):
+        for i in range(40):
+            self.ply("scans/%d.ply" % i, points(100, i))
+        before = sorted(os.listdir(self.folder))
+        self.one_line(self.restage("skeleton", "--weights", self.w, "--input", "scans", "--out", "j.h5", before=small_disk), 1, "j.h5")
+        self.assertEqual(sorted(os.listdir(self.folder)), before)

@@ -1,0 +1,223 @@
+"""restage train: the run directory, its files, resuming, stopping, and what is wrong with inputs."""
+import json
+import os
+import random
+import signal
+import subprocess
+import time
+
+from support import PROGRAM, CliTest, small_disk
+from tiny_run import CONFIG
+
+LONG = ["stages=[skeleton]", "skeleton.optimiser.steps=1000000", "loop.checkpoint_every=1000000", "loop.validate_every=1000000"]
+
+
+class Train(CliTest):
+    def setUp(self):
+        super().setUp()
+        self.write("tiny.yaml", CONFIG)
+
+    def train(self, *arguments):
+        """A training that succeeds; its run directory."""
+        return self.done("train", *arguments, "--quiet").strip()
+
+    def weights_of(self, run):
+        return self.bytes(os.path.join(run, "weights.safetensors"))
+
+    def checkpoints(self, run):
+        return [n for n in sorted(os.listdir(self.path(run + "/checkpoints"))) if n.endswith(".safetensors")]
+
+    def start(self, *arguments):
+        """A training in the background and its run directory, which is the first that it prints."""
+        process = subprocess.Popen([PROGRAM, "train", *arguments], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(process.stderr.close)
+        self.addCleanup(process.stdout.close)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
+        return process, process.stdout.readline().strip()
+
+
+class Runs(Train):
+    def test_run_directory(self):
+        result = self.restage("train", "tiny.yaml", "seed=5", "deformation.optimiser.steps=6")
+        self.assertEqual(result.code, 0, result.err)
+        run = result.out.strip()
+        self.assertEqual(result.out, run + "\n", "the run directory and nothing else")
+        self.assertTrue(run.startswith("runs/tiny-"), run)
+        for name in ("config.yaml", "provenance.json", "metrics.jsonl", "log.txt", "checkpoints", "weights.safetensors"):
+            self.assertTrue(os.path.exists(self.path(run + "/" + name)), name)
+        self.assertEqual([n for n in os.listdir(self.folder) if n not in ("tiny.yaml", "runs")], [])
+        self.assertEqual(os.listdir(self.path("runs")), [os.path.basename(run)])
+
+        self.assertEqual(json.loads(self.bytes(run + "/provenance.json"))["seed"], 5)
+        self.assertIn("seed 5", result.err)
+        self.assertIn("seed 5", self.bytes(run + "/log.txt").decode())
+        self.assertNotIn("\x1b", result.err, "standard error is no terminal")
+        lines = [json.loads(line) for line in self.bytes(run + "/metrics.jsonl").decode().splitlines()]
+        self.assertEqual([x["step"] for x in lines if x["stage"] == "deformation" and "loss" in x], [2, 4, 6])
+        self.assertEqual([x["step"] for x in lines if x["stage"] == "skeleton" and "joint_error_mm" in x], [5, 10])
+        self.assertEqual([n.rsplit("-", 1)[0] for n in self.checkpoints(run)],
+                         ["deformation-000000004", "deformation-000000006", "motion-000000010", "skeleton-000000010"])
+
+        # The resolved configuration stands for itself: no includes, overrides or defaults are needed.
+        again = self.train(self.path(run + "/config.yaml"))
+        self.assertNotEqual(again, run)
+        self.assertEqual(self.weights_of(again), self.weights_of(run))
+        self.assertEqual(self.bytes(again + "/config.yaml"), self.bytes(run + "/config.yaml"))
+
+    def test_seeds(self):
+        a, b, c = self.train("tiny.yaml"), self.train("tiny.yaml", "--seed", "4"), self.train("tiny.yaml", "seed=4")
+        self.assertNotEqual(self.weights_of(a), self.weights_of(b))
+        self.assertEqual(self.weights_of(b), self.weights_of(c))
+
+    def test_any_number_of_threads_gives_the_same_bytes(self):
+        runs = [self.train("tiny.yaml", "--threads", n) for n in (1, 2, 3)]
+        for run in runs[1:]:
+            self.assertEqual(self.weights_of(run), self.weights_of(runs[0]))
+            self.assertEqual(self.bytes(run + "/metrics.jsonl"), self.bytes(runs[0] + "/metrics.jsonl"))
+            self.assertEqual(self.checkpoints(run), self.checkpoints(runs[0]))
+
+    def test_json(self):
+        found = self.json("train", "tiny.yaml", "stages=[deformation]")
+        self.assertEqual(found["seed"], 3)
+        self.assertTrue(os.path.isdir(self.path(found["run"])))
+
+    def test_stages_and_data_of_choice(self):
+        self.done("data", "build", "--out", "data.h5", "--bodies", "2", "2", "1", "--motions", "3", "2", "1")
+        run = self.train("tiny.yaml", "data.source=data.h5", "stages=[deformation, skeleton]", "run_root=elsewhere/deep", "name=other")
+        self.assertTrue(run.startswith("elsewhere/deep/other-"), run)
+        self.assertIn("data.h5", self.bytes(run + "/provenance.json").decode())
+        shown = self.json("weights", "show", run + "/weights.safetensors")
+        self.assertFalse([t for t in shown["tensors"] if t["name"].startswith("smrm.")])
+
+    def test_divergence_is_a_failure_that_names_op_and_module(self):
+        result = self.restage("train", "tiny.yaml", "skeleton.optimiser.schedule.rate=1e25", "--quiet")
+        self.assertEqual((result.code, result.err.count("\n")), (1, 1), result.err)
+        self.assertIn("skeleton/patch_transformer", result.err)
+        self.assertFalse(os.path.exists(self.path(result.out.strip() + "/weights.safetensors")))
+
+    def test_full_disk(self):
+        result = self.restage("train", "tiny.yaml", "--quiet", before=small_disk)
+        self.one_line(result, 1, "checkpoints")
+        run = result.out.strip()
+        self.assertEqual(os.listdir(self.path(run + "/checkpoints")), [])
+        self.done("train", "resume=" + run)  # once there is space
+        self.assertEqual(self.weights_of(run), self.weights_of(self.train("tiny.yaml")))
+
+
+class Resume(Train):
+    def test_killed_at_any_moment(self):
+        whole = self.train("tiny.yaml", "loop.checkpoint_every=1")
+        r, kills = random.Random(), 0
+        process, run = self.start("tiny.yaml", "loop.checkpoint_every=1", "--quiet")
+        while True:
+            time.sleep(r.uniform(0, 0.25))
+            process.kill()
+            code = process.wait()
+            kills += code == -signal.SIGKILL
+            if code == 0 or kills == 4:
+                break
+            process, again = self.start("resume=" + run, "--quiet")
+            self.assertEqual(again, run)
+        self.assertGreater(kills, 0)
+        self.assertEqual(self.done("train", "resume=" + run, "--quiet").strip(), run)
+        self.assertEqual(self.weights_of(run), self.weights_of(whole), "after %d kills" % kills)
+        self.assertEqual(self.bytes(run + "/metrics.jsonl"), self.bytes(whole + "/metrics.jsonl"))
+        self.assertEqual(sorted(os.listdir(self.path("runs"))), sorted(os.path.basename(r) for r in (whole, run)))
+
+    def test_signals_write_a_checkpoint(self):
+        for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
+            process, run = self.start("tiny.yaml", *LONG)
+            while "1/1000000" not in process.stderr.readline():
+                pass
+            process.send_signal(number)
+            process.stderr.read()
+            self.assertEqual(process.wait(60), code)
+            self.assertEqual(len(self.checkpoints(run)), 1)
+            self.assertFalse(os.path.exists(self.path(run + "/weights.safetensors")))
+
+    def test_stopped_and_resumed_is_the_same_as_at_one_go(self):
+        arguments = ["tiny.yaml", "stages=[skeleton]", "skeleton.optimiser.steps=400", "loop.checkpoint_every=1000", "loop.validate_every=150"]
+        whole = self.train(*arguments)
+        process, run = self.start(*arguments)
+        process.stderr.readline()
+        process.stderr.readline()
+        process.send_signal(signal.SIGTERM)
+        process.stderr.read()
+        self.assertIn(process.wait(60), (143, 0))
+        self.done("train", "resume=" + run)
+        self.assertEqual(self.weights_of(run), self.weights_of(whole))
+        self.assertEqual(self.bytes(run + "/metrics.jsonl"), self.bytes(whole + "/metrics.jsonl"))
+
+    def test_run_in_use(self):
+        process, run = self.start("tiny.yaml", *LONG)
+        self.bad_input(["train", "resume=" + run], run, "another process")
+        process.kill()
+
+    def test_damaged_checkpoint_is_passed_over(self):
+        run = self.train("tiny.yaml")
+        good = self.weights_of(run)
+        newest = self.path(run + "/checkpoints/" + [n for n in self.checkpoints(run) if n.startswith("deformation")][-1])
+        with open(newest, "r+b") as f:
+            f.seek(1000)
+            f.write(b"damage")
+        os.remove(self.path(run + "/weights.safetensors"))
+        result = self.restage("train", "resume=" + run)
+        self.assertEqual(result.code, 0, result.err)
+        self.assertIn(os.path.basename(newest), result.err)
+        self.assertEqual(self.weights_of(run), good)
+
+    def test_bad_resume(self):
+        run = self.train("tiny.yaml", "stages=[deformation]")
+        self.bad_input(["train", "resume=nowhere"], "nowhere", "run directory")
+        self.bad_input(["train", "resume=runs"], "runs", "run directory")
+        self.bad_input(["train", "resume="])
+        self.bad_input(["train", "resume=" + run, "seed=4"], "'seed=4'")
+        self.bad_input(["train", "tiny.yaml", "resume=" + run])
+        self.write(run + "/config.yaml", CONFIG + "speling: 1\n")
+        self.bad_input(["train", "resume=" + run], "config.yaml:", "'speling'")
+
+
+class BadTraining(Train):
+    def bad(self, text, *contains, overrides=()):
+        """Bad input that makes no run directory."""
+        self.write("bad.yaml", text)
+        self.bad_input(["train", "bad.yaml", *overrides], *contains)
+
+    def test_keys(self):
+        self.bad(CONFIG + "lop: {log_every: 1}\n", "bad.yaml:%d: " % (CONFIG.count("\n") + 1), "'lop'", "'loop'")
+        self.bad(CONFIG.replace("hidden: 16", "hiden: 16"), "bad.yaml:", "'hidden'")
+        line = CONFIG[:CONFIG.index("windows:")].count("\n") + 1
+        self.bad(CONFIG.replace("{frames: 10}", "{frame: 10}"), "bad.yaml:%d: " % line, "'frames'")
+        self.bad_input(["train", "tiny.yaml", "motion.window.frames=10"], "motion.window", "windows")
+        self.bad_input(["train", "tiny.yaml", "sed=1"], "'seed'")
+
+    def test_values(self):
+        self.bad(CONFIG.replace("seed: 3", "seed: three"), "bad.yaml:2: ")
+        self.bad(CONFIG.replace("batch: 4", "batch: 0"), "bad.yaml:", "batch")
+        self.bad(CONFIG.replace("batch: 4", "batch: [4]"), "bad.yaml:", "batch")
+        self.bad(CONFIG + "stages: [skelton]\n", "bad.yaml:", "skeleton")
+        self.bad(CONFIG.replace("patch_transformer", "patch_transformr"), "skeleton/patch_transformer")
+        self.bad(CONFIG.replace("skeleton/patch_transformer", "smrm/rot6d"), "smrm/rot6d")
+        self.bad(CONFIG + "seed: 4\n", "bad.yaml:")
+        self.bad("seed: [1\n", "bad.yaml:")
+        self.bad(CONFIG + "stages: []\n", "bad.yaml:", "stages")
+        self.bad(CONFIG + "stages: [motion, motion]\n", "bad.yaml:", "stages")
+
+    def test_sizes_that_do_not_go_together(self):
+        self.bad(CONFIG.replace("frames: 10}", "frames: 100000}"))
+        self.bad(CONFIG.replace("bodies: {train: 2, validation: 2", "bodies: {train: 2, validation: 0"))
+        self.bad(CONFIG.replace("width: 16", "width: 17"))
+        self.bad(CONFIG.replace("points: 64", "points: 100000000000"))
+
+    def test_files(self):
+        self.bad_input(["train", "none.yaml"], "none.yaml")
+        self.bad_input(["train"], "ARGUMENTS")
+        self.bad_input(["train", "seed=1"], "CONFIG.yaml")
+        self.bad_input(["train", "tiny.yaml", "tiny.yaml"], "two configurations")
+        self.bad_input(["train", "tiny.yaml", "data.source=none.h5"], "none.h5")
+        self.h5("p.h5", joints=([2, 22, 3], [0.0]))
+        self.bad_input(["train", "tiny.yaml", "data.source=p.h5"], "p.h5")
+        self.bad_input(["train", "tiny.yaml", "data.source=tiny.yaml"], "tiny.yaml")
+        self.bad_input(["train", "tiny.yaml", "run_root=tiny.yaml"], "tiny.yaml")
+        self.bad_input(["train", "x" * 3000])
