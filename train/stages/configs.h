@@ -1,6 +1,9 @@
 // The keys of training configurations (configs/*.yaml). Every key is listed once, here.
 #pragma once
 
+#include <set>
+#include <string>
+
 #include "datasets/corpus.h"
 #include "datasets/sampling/clouds.h"
 #include "datasets/sampling/pairs.h"
@@ -225,6 +228,10 @@ void visit(V& v, TrainConfig& c) {
   v("deformation", c.deformation, "skinning weights and offsets");
   v("loop", c.loop, "logging, validation, checkpoints");
   v("evaluation", c.evaluation, "what 'restage eval run=...' looks at");
+  const std::set<std::string> once(c.stages.begin(), c.stages.end());
+  v.check("stages", !c.stages.empty() && once.size() == c.stages.size(),
+          "must name each stage at most once, and at least one",
+          "use skeleton, motion, deformation");
 }
 
 }  // namespace restage
