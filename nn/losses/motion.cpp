@@ -31,13 +31,13 @@ Tensor complement(const Tensor& mask) {
   return Tensor::from<double>(mask.shape(), out).cast(mask.dtype());
 }
 
-/// Mean of max(0, |twist about y| - 100 degrees)^2 of local rotations (spec 4.3), as NKN.
+/// Mean of max(0, |e| - 100 degrees)^2 over joints 1 ... 21, e = atan2(-R20, R00) the angle about y
+/// for the order y-z-x (spec 4.3), as NKN.
 Var twist_loss(const Var& rotations) {
-  const int64_t rows = rotations.value.numel() / 9;
-  // The angle is a function of the matrix: e = atan2(R02, R00) for the order y-z-x; beyond the
-  // limit its gradient flows through sin and cos of e.
-  const Var flat = reshape(rotations, {rows, 9});
-  const Var s = slice(flat, 1, 2, 3), c = slice(flat, 1, 0, 1);
+  const int64_t joints = rotations.size(2), frames = rotations.value.numel() / (9 * joints);
+  const int64_t rows = frames * (joints - 1);
+  const Var flat = reshape(slice(reshape(rotations, {frames, joints, 9}), 1, 1, joints), {rows, 9});
+  const Var s = neg(slice(flat, 1, 6, 7)), c = slice(flat, 1, 0, 1);
   constexpr double limit = 100.0 / 180.0 * 3.14159265358979323846;
   std::vector<double> excess(static_cast<size_t>(rows)), ds(excess), dc(excess);
   double total = 0;
