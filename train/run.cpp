@@ -118,15 +118,7 @@ std::string run_config_path(const std::string& dir) {
 std::optional<Checkpoint> latest_checkpoint(const std::string& dir,
                                             const std::vector<std::string>& stages) {
   run_config_path(dir);
-  const auto entries = run_files::list_checkpoints(dir, stages, false);
-  for (auto entry = entries.rbegin(); entry != entries.rend(); ++entry)
-    if (auto found = run_files::load(*entry)) return found;
-  return {};
-}
-
-std::optional<Checkpoint> best_checkpoint(const std::string& dir, const std::string& stage) {
-  run_config_path(dir);
-  const auto entries = run_files::list_checkpoints(dir, {stage}, true);
+  const auto entries = run_files::list_checkpoints(dir, stages);
   for (auto entry = entries.rbegin(); entry != entries.rend(); ++entry)
     if (auto found = run_files::load(*entry)) return found;
   return {};
@@ -199,7 +191,7 @@ RunDir RunDir::resume(const std::string& dir, std::vector<std::string> stages) {
   run.resumed_ = latest_checkpoint(dir, run.stages_);
   run_files::cut_metrics(dir, run.stages_, run.resumed_);
   // What is newer than the newest good one is damaged: away with it, it would count when pruning.
-  for (const auto& entry : run_files::list_checkpoints(dir, run.stages_, false)) {
+  for (const auto& entry : run_files::list_checkpoints(dir, run.stages_)) {
     const bool good = run.resumed_ && entry.path == run.resumed_->path;
     const auto order = std::find(run.stages_.begin(), run.stages_.end(), entry.stage);
     const auto last = !run.resumed_
@@ -237,20 +229,9 @@ std::string RunDir::save_checkpoint(const std::string& stage, int64_t step, std:
                                     int keep) {
   if (::fsync(metrics_) != 0 && errno != EINVAL) disk_error(inside(dir_, "metrics.jsonl"));
   const fs::path folder = fs::path(dir_) / "checkpoints";
-  const std::string path =
-      (folder / run_files::checkpoint_name(stage, step, false, bytes)).string();
+  const std::string path = (folder / run_files::checkpoint_name(stage, step, bytes)).string();
   write_file_atomically(path, bytes);
-  run_files::prune(run_files::list_checkpoints(dir_, stages_, false), stage, keep, path);
-  return path;
-}
-
-std::string RunDir::save_best(const std::string& stage, int64_t step, std::string_view bytes) {
-  const fs::path folder = fs::path(dir_) / "checkpoints";
-  const std::string path = (folder / run_files::checkpoint_name(stage, step, true, bytes)).string();
-  write_file_atomically(path, bytes);
-  std::error_code ignored;
-  for (const auto& entry : run_files::list_checkpoints(dir_, {stage}, true))
-    if (entry.path != path) fs::remove(entry.path, ignored);
+  run_files::prune(run_files::list_checkpoints(dir_, stages_), stage, keep, path);
   return path;
 }
 

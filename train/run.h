@@ -4,7 +4,7 @@
 //   provenance.json  version, compiler, processor, data, command line (train/run_provenance.h)
 //   metrics.jsonl    one JSON object per line: {"step": 10, "stage": "smrm", "loss": 0.5, ...}
 //   log.txt          the log of every process that worked on the run
-//   checkpoints/     <stage>-<step>-<checksum>.safetensors, and <stage>-best-<step>-<checksum>...
+//   checkpoints/     <stage>-<step>-<checksum>.safetensors
 //   .lock            held (flock) by the process that trains
 //
 // A checkpoint appears by rename and carries the checksum of its bytes in its name, so it is either
@@ -32,8 +32,6 @@ struct Checkpoint {
 /// InputError if `dir` is no run directory. A single stage gives its newest one.
 std::optional<Checkpoint> latest_checkpoint(const std::string& dir,
                                             const std::vector<std::string>& stages);
-/// The checkpoint that save_best wrote for `stage`, if there is one and it is undamaged.
-std::optional<Checkpoint> best_checkpoint(const std::string& dir, const std::string& stage);
 /// `dir`/config.yaml; InputError if `dir` is no run directory.
 std::string run_config_path(const std::string& dir);
 
@@ -69,9 +67,6 @@ class RunDir {
   /// last one of each earlier stage stay. Returns the path.
   std::string save_checkpoint(const std::string& stage, int64_t step, std::string_view bytes,
                               int keep = 2);
-  /// Replaces the stage's best checkpoint. Which one is best is the caller's matter (its own state,
-  /// saved in `bytes`, so that a resumed run decides the same).
-  std::string save_best(const std::string& stage, int64_t step, std::string_view bytes);
 
  private:
   RunDir(std::string dir, std::vector<std::string> stages, int lock);

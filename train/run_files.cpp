@@ -14,7 +14,7 @@ namespace restage::run_files {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr std::string_view kSuffix = ".safetensors", kBest = "-best";
+constexpr std::string_view kSuffix = ".safetensors";
 constexpr size_t kChecksum = 16;
 
 /// The opposite of checkpoint_name.
@@ -34,8 +34,6 @@ std::optional<Entry> parse_name(const fs::path& path) {
   const auto number = std::from_chars(name.data() + first + 1, end, entry.step);
   if (number.ec != std::errc() || number.ptr != end || entry.step < 0) return {};
   entry.stage = name.substr(0, first);
-  entry.best = entry.stage.ends_with(kBest);
-  if (entry.best) entry.stage.resize(entry.stage.size() - kBest.size());
   return entry;
 }
 
@@ -64,20 +62,19 @@ void remove_file(const std::string& path) {
 
 }  // namespace
 
-std::string checkpoint_name(const std::string& stage, int64_t step, bool best,
-                            std::string_view bytes) {
+std::string checkpoint_name(const std::string& stage, int64_t step, std::string_view bytes) {
   char number[32];
   std::snprintf(number, sizeof number, "-%09lld-", static_cast<long long>(step));
-  return stage + (best ? std::string(kBest) : "") + number + checksum(bytes) + std::string(kSuffix);
+  return stage + number + checksum(bytes) + std::string(kSuffix);
 }
 
-std::vector<Entry> list_checkpoints(const std::string& dir, const std::vector<std::string>& stages,
-                                    bool best) {
+std::vector<Entry> list_checkpoints(const std::string& dir,
+                                    const std::vector<std::string>& stages) {
   std::vector<Entry> entries;
   std::error_code ignored;
   for (const auto& item : fs::directory_iterator(fs::path(dir) / "checkpoints", ignored)) {
     auto entry = parse_name(item.path());
-    if (entry && entry->best == best && order_of(stages, entry->stage) < stages.size())
+    if (entry && order_of(stages, entry->stage) < stages.size())
       entries.push_back(std::move(*entry));
   }
   std::sort(entries.begin(), entries.end(), [&stages](const Entry& a, const Entry& b) {

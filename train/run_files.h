@@ -15,15 +15,12 @@ namespace restage::run_files {
 struct Entry {
   std::string path, stage, checksum;
   int64_t step = 0;
-  bool best = false;
 };
 
-std::string checkpoint_name(const std::string& stage, int64_t step, bool best,
-                            std::string_view bytes);
+std::string checkpoint_name(const std::string& stage, int64_t step, std::string_view bytes);
 /// Files in `dir`/checkpoints whose names checkpoint_name could have made, oldest first: in the
 /// order of `stages`, then of the steps. Other files and stages are ignored.
-std::vector<Entry> list_checkpoints(const std::string& dir, const std::vector<std::string>& stages,
-                                    bool best);
+std::vector<Entry> list_checkpoints(const std::string& dir, const std::vector<std::string>& stages);
 /// The checkpoint, or nothing and a warning in the log if its bytes do not fit its checksum.
 std::optional<Checkpoint> load(const Entry& entry);
 /// Removes all entries but `keep_path` and the newest `keep` of `stage` and the newest of the

@@ -39,7 +39,8 @@ TEST(ImportersMakeHuman, BodiesEqualThoseOfTheReferenceTool) {
   const MakeHuman model(body_folder());
   const std::vector<BodyRecipe> recipes = read_recipes(body_folder() + "/bodies.csv");
   ASSERT_EQ(recipes.size(), 160u);
-  for (const json& expected : golden().at("bodies")) {
+  const json all = golden();  // outlives the loop
+  for (const json& expected : all.at("bodies")) {
     const Body body = model.build(recipes.at(expected.at("row").get<size_t>()));
     EXPECT_EQ(body.id, expected.at("id"));
     EXPECT_EQ(body.split, expected.at("split"));

@@ -127,23 +127,19 @@ TEST_F(TrainRun, NotARunDirectory) {
   std::ofstream(root + "/config.yaml") << "x";
   EXPECT_NE(error([&] { RunDir::resume(root, kStages); }), "");
   EXPECT_NE(error([&] { latest_checkpoint(root, kStages); }), "");
-  EXPECT_NE(error([&] { best_checkpoint(root + "/config.yaml", "smrm"); }), "");
 }
 
-TEST_F(TrainRun, CheckpointsKeepTheLastAndTheBest) {
+TEST_F(TrainRun, CheckpointsKeepTheLast) {
   RunDir run = make();
   for (int64_t step = 10; step <= 40; step += 10)
     run.save_checkpoint("skeleton", step, "s" + std::to_string(step));
   EXPECT_EQ(checkpoints(run.dir()),
             (std::vector<std::string>{"skeleton-000000030", "skeleton-000000040"}));
-  run.save_best("skeleton", 20, "best20");
-  run.save_best("skeleton", 30, "best30");
   // an earlier stage keeps its last one, whatever the steps of the later stage are
   for (int64_t step = 1; step <= 3; ++step)
     run.save_checkpoint("smrm", step, "m" + std::to_string(step));
   EXPECT_EQ(checkpoints(run.dir()),
-            (std::vector<std::string>{"skeleton-000000040", "skeleton-best-000000030",
-                                      "smrm-000000002", "smrm-000000003"}));
+            (std::vector<std::string>{"skeleton-000000040", "smrm-000000002", "smrm-000000003"}));
   const auto latest = latest_checkpoint(run.dir(), kStages);
   ASSERT_TRUE(latest);
   EXPECT_EQ(latest->stage, "smrm");
@@ -151,9 +147,6 @@ TEST_F(TrainRun, CheckpointsKeepTheLastAndTheBest) {
   EXPECT_EQ(latest->bytes, "m3");
   EXPECT_EQ(latest_checkpoint(run.dir(), {"skeleton"})->bytes, "s40");
   EXPECT_FALSE(latest_checkpoint(run.dir(), {"deformation"}));
-  EXPECT_EQ(best_checkpoint(run.dir(), "skeleton")->bytes, "best30");
-  EXPECT_EQ(best_checkpoint(run.dir(), "skeleton")->step, 30);
-  EXPECT_FALSE(best_checkpoint(run.dir(), "smrm"));
   // saving the same again, and one step of a stage with other bytes
   run.save_checkpoint("smrm", 3, "m3");
   EXPECT_EQ(read_file(run.save_checkpoint("smrm", 3, "other", 1)), "other");
@@ -169,12 +162,10 @@ TEST_F(TrainRun, DamagedCheckpointsArePassedOver) {
     run.save_checkpoint("skeleton", 1, std::string(1000, 'a'));
     newest = run.save_checkpoint("skeleton", 2, std::string(1000, 'b'));
     damage(newest);
-    damage(run.save_best("skeleton", 2, "xyz"));
     std::ofstream(run.dir() + "/checkpoints/notes.txt") << "mine";
     std::ofstream(run.dir() + "/checkpoints/foreign-1-0123456789abcdef.safetensors") << "mine";
     std::ofstream(run.dir() + "/checkpoints/skeleton-9-xx.safetensors") << "mine";
     EXPECT_EQ(latest_checkpoint(run.dir(), kStages)->step, 1);
-    EXPECT_FALSE(best_checkpoint(run.dir(), "skeleton"));
     EXPECT_NE(read_file(run.dir() + "/log.txt")
                   .find(newest + ": the checkpoint is damaged and passed over\n"),
               std::string::npos);
@@ -305,7 +296,6 @@ constexpr int64_t kStepsPerStage = 60;
         if (::write(pipe, "m", 1) != 1) ::_exit(3);
         if (step % 3 != 0) continue;
         run.save_checkpoint(stage, step, payload(stage, step));
-        if (step % 6 == 0) run.save_best(stage, step, payload(stage, step));
         if (::write(pipe, "c", 1) != 1) ::_exit(3);
       }
     }
@@ -373,7 +363,7 @@ TEST_F(TrainRun, ResumesAfterSigkillAtAnyMoment) {
   EXPECT_TRUE(run_child(dir, ~0ull, 0)) << "nothing is left in the way of the end";
   EXPECT_EQ(position(latest_checkpoint(dir, kStages)), 3 * kStepsPerStage);
   for (const auto& stage : kStages)
-    EXPECT_EQ(best_checkpoint(dir, stage)->bytes, payload(stage, kStepsPerStage));
+    EXPECT_EQ(latest_checkpoint(dir, {stage})->bytes, payload(stage, kStepsPerStage));
 }
 
 TEST_F(TrainRun, CreationIsWholeOrNotAtAll) {
