@@ -1,6 +1,7 @@
 // restage retarget: clouds of one body in, the same motion by another body out, frame by frame.
 #include <chrono>
 #include <memory>
+#include <optional>
 
 #include "autograd/base/log.h"
 #include "datasets/readers/frame_folder.h"
@@ -19,7 +20,8 @@ namespace {
 
 struct RetargetCommand {
   std::string source, target, weights, out, up = "y", format = "ply";
-  double fps = 0, scale = 1;
+  std::optional<double> fps;  ///< of the source
+  double scale = 1;
   bool force = false, profile = false;
   int samples = 4;
 };
@@ -86,8 +88,8 @@ void check(const RetargetCommand& c) {
     throw InputError("", "--format '" + c.format + "' is unknown", "use ply or obj");
   if (!(c.scale > 0) || !std::isfinite(c.scale))
     throw InputError("", "--scale must be above 0", "metres = units x scale");
-  if (c.fps < 0 || c.fps > 1000 || !std::isfinite(c.fps))
-    throw InputError("", "--fps is out of range", "give the source's frames per second");
+  if (c.fps && !(*c.fps >= 1 && *c.fps <= 1000))
+    throw InputError("", "--fps is out of range", "give the source's frames per second, 1 to 1000");
   if (c.samples < 1 || c.samples > 256)
     throw InputError("", "--samples is out of range", "give 1 to 256");
   const auto dot = c.out.find_last_of('.');
@@ -112,7 +114,7 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
       load_models(weights_path(c.weights), {.skeleton = true, .smrm = true, .deformation = true});
   const auto frames = open_frames(c.source);
   RetargetOptions options;
-  options.fps = c.fps > 0 ? c.fps : frames->fps();
+  options.fps = c.fps.value_or(frames->fps());
   options.force = c.force;
   options.seed = common.seed;
   options.samples = c.samples;
