@@ -1,6 +1,8 @@
 #include "infer/retargeter.h"
 
+#include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
@@ -67,6 +69,9 @@ void Retargeter::prepare() {
     const auto it = models_.extra.find(name);
     return it == models_.extra.end() ? std::string(standard) : it->second;
   };
+  if (!(options_.fps >= 1 && options_.fps <= 1000))
+    throw InputError("", "the source's frames per second are out of range",
+                     "give --fps from 1 to 1000");
   const std::string translation = extra("translation", "velocity");
   path_ = translation == "velocity"   ? Path::velocity
           : translation == "relative" ? Path::relative
@@ -153,6 +158,11 @@ RetargetedFrame Retargeter::step(const Joints& a) {
   out.pose.root = root_b_;
   out.joints = forward_kinematics(rest_, out.pose).joints;
   out.vertices = pose_vertices(out.pose);
+  const auto finite = [](const auto& x) { return x.allFinite(); };
+  if (!std::all_of(out.joints.begin(), out.joints.end(), finite) ||
+      !std::all_of(out.vertices.begin(), out.vertices.end(), finite))
+    throw InputError("", "frame " + std::to_string(grid_) + " of the result is not finite",
+                     "check that source and target are in metres");
   return out;
 }
 

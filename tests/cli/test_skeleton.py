@@ -94,7 +94,7 @@ class BadClouds(Skeleton):
         bad(self.ply("inf.ply", self.cloud + [(0, 0, float("-inf"))]))
         bad(self.ply("three.ply", points(3, 1)), "3 distinct points")
         bad(self.ply("same.ply", points(63, 1) * 20), "63 distinct points")
-        bad(self.ply("huge.ply", [(1e37 * x, 1e37 * y, z) for x, y, z in self.cloud]))
+        bad(self.ply("huge.ply", [(3e38 * (-1) ** i, 3e38, z) for i, (_, _, z) in enumerate(self.cloud)]))
         bad(self.ply("face.ply", self.cloud, [(0, 1, 300)]), "face")
         bad(self.write("what.xyz", "1 2 3\n"))
         self.bad("x" * 3000)

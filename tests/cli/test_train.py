@@ -111,7 +111,7 @@ class Resume(Train):
         r, kills = random.Random(), 0
         process, run = self.start("tiny.yaml", "loop.checkpoint_every=1", "--quiet")
         while True:
-            time.sleep(r.uniform(0, 0.25))
+            time.sleep(r.uniform(0, 0.02 + 0.06 * kills))
             process.kill()
             code = process.wait()
             kills += code == -signal.SIGKILL
@@ -188,7 +188,7 @@ class BadTraining(Train):
         self.bad(CONFIG + "lop: {log_every: 1}\n", "bad.yaml:%d: " % (CONFIG.count("\n") + 1), "'lop'", "'loop'")
         self.bad(CONFIG.replace("hidden: 16", "hiden: 16"), "bad.yaml:", "'hidden'")
         line = CONFIG[:CONFIG.index("windows:")].count("\n") + 1
-        self.bad(CONFIG.replace("{frames: 10}", "{frame: 10}"), "bad.yaml:%d: " % line, "'frames'")
+        self.bad(CONFIG.replace("{frames: 10,", "{frame: 10,"), "bad.yaml:%d: " % line, "'frames'")
         self.bad_input(["train", "tiny.yaml", "motion.window.frames=10"], "motion.window", "windows")
         self.bad_input(["train", "tiny.yaml", "sed=1"], "'seed'")
 
@@ -205,7 +205,7 @@ class BadTraining(Train):
         self.bad(CONFIG + "stages: [motion, motion]\n", "bad.yaml:", "stages")
 
     def test_sizes_that_do_not_go_together(self):
-        self.bad(CONFIG.replace("frames: 10}", "frames: 100000}"))
+        self.bad(CONFIG.replace("{frames: 10,", "{frames: 100000,"))
         self.bad(CONFIG.replace("bodies: {train: 2, validation: 2", "bodies: {train: 2, validation: 0"))
         self.bad(CONFIG.replace("width: 16", "width: 17"))
         self.bad(CONFIG.replace("points: 64", "points: 100000000000"))

@@ -1,9 +1,9 @@
 """Trainings that take a moment, and the weights that they leave."""
+import atexit
 import os
 import shutil
 import subprocess
 import tempfile
-import unittest
 
 from support import PROGRAM
 
@@ -20,7 +20,7 @@ skeleton:
 motion:
   sizes: {hidden: 16}
   optimiser: {steps: 10, batch: 4}
-  windows: {frames: 10}
+  windows: {frames: 10, self_share: 0.25}
   validation_windows: 2
   validation_frames: 10
 deformation:
@@ -35,7 +35,7 @@ TPOSES = ["skeleton.optimiser.steps=150", "skeleton.optimiser.schedule.rate=0.01
           "skeleton.clouds.tpose_heading=0", "skeleton.clouds.heading=false", "skeleton.clouds.mirror=false"]
 
 _folder = tempfile.mkdtemp(prefix="restage-weights-")
-unittest.addModuleCleanup(shutil.rmtree, _folder, ignore_errors=True)
+atexit.register(shutil.rmtree, _folder, ignore_errors=True)
 
 
 def weights(name, *overrides):

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "autograd/ops/elementwise.h"
 #include "tests/support/tiny_body.h"
@@ -360,6 +361,19 @@ TEST(InferRetargeter, TargetsThatAreNoTPose) {
   Joints none = tiny_joints();
   none[20] = none[16];
   EXPECT_TRUE(refused(none));
+}
+
+TEST(InferRetargeter, WhatCannotBeAnsweredIsSaid) {
+  const ModelSet models = untrained();
+  for (const double fps : {0.0, -30.0, 0.01, 1e9, std::nan("")}) {
+    RetargetOptions options;
+    options.fps = fps;
+    EXPECT_THROW(Retargeter(models, target().rest, target().joints, options), InputError) << fps;
+  }
+  Retargeter r(models, target().rest, target().joints, {});
+  Joints huge = tiny_joints();
+  for (Vec3& j : huge) j *= 1e60;
+  EXPECT_THROW(r.push_joints(huge), InputError);
 }
 
 TEST(InferRetargeter, CloudsGoThroughTheExtractor) {

@@ -6,7 +6,7 @@
 
 namespace restage::testing {
 
-/// Small networks on the bodies of boxes. `steps` of each stage; no rate, noise or dropout is off.
+/// Small networks on the bodies of boxes, with dropout, noise, discriminator and all.
 inline TrainConfig tiny_training(int64_t steps) {
   TrainConfig c;
   c.seed = 7;
@@ -23,6 +23,8 @@ inline TrainConfig tiny_training(int64_t steps) {
   c.motion.sizes.standardise = true;
   c.motion.windows.frames = 12;
   c.motion.windows.noise = 0.01;
+  c.motion.windows.self_share = 0.25;
+  c.motion.self_first_pass = false;
   c.motion.weights.adversarial = 0.01;
   c.motion.validation_windows = 2;
   c.motion.validation_frames = 12;

@@ -1,0 +1,239 @@
+"""restage retarget: sequences of clouds in, a moving target out."""
+import json
+import os
+import struct
+
+from support import CliTest, numbers, points, small_disk
+from tiny_run import TPOSES, weights
+
+FRAMES = 5
+TARGET = points(90, 77)
+FACES = [(i, i + 1, i + 2) for i in range(0, 88, 2)]
+
+
+class Retarget(CliTest):
+    def setUp(self):
+        super().setUp()
+        self.w = weights("tiny")
+        for i in range(FRAMES):
+            self.ply("scans/f%d.ply" % i, points(120 + 10 * i, i))
+        self.ply("hero.ply", TARGET, FACES)
+
+    def call(self, out, *more, source="scans", target="hero.ply", w=None, force=True):
+        return ["retarget", "--source", source, "--target", target, "--weights", w or self.w, "--out", out, *more] + (["--force"] if force else [])
+
+    def counts(self, name):
+        return self.json("data", "inspect", name)["counts"]
+
+
+class Outputs(Retarget):
+    def test_hdf5(self):
+        self.assertIn("out.h5", self.done(*self.call("out.h5")))
+        counts = self.counts("out.h5")
+        self.assertEqual((counts["frames"], counts["vertices"]), (FRAMES, len(TARGET)))
+        found = self.json("eval", "--pred", "out.h5", "--truth", "out.h5")
+        self.assertEqual([s["frames"] for s in found["sequences"]], [FRAMES])
+        self.assertEqual((found["mean"]["mpjpe"], found["mean"]["mpvd"]), (0, 0))
+        # Another choice of points, other joints; the same choice, the same bytes.
+        self.done(*self.call("again.h5"))
+        self.assertEqual(self.bytes("again.h5"), self.bytes("out.h5"))
+        self.done(*self.call("other.h5", "--seed", "1"))
+        self.assertGreater(self.json("eval", "--pred", "other.h5", "--truth", "out.h5")["mean"]["mpjpe"], 0)
+
+    def test_json(self):
+        found = self.json(*self.call("out.h5"))
+        self.assertEqual({k: found[k] for k in ("out", "source_frames", "frames", "seed")},
+                         {"out": "out.h5", "source_frames": FRAMES, "frames": FRAMES, "seed": 0})
+
+    def test_any_number_of_threads_gives_the_same_bytes(self):
+        for kind in ("h5", "glb"):
+            for n in (1, 2, 3):
+                self.done(*self.call("out%d.%s" % (n, kind), "--threads", n))
+            self.assertEqual(self.bytes("out1." + kind), self.bytes("out2." + kind))
+            self.assertEqual(self.bytes("out1." + kind), self.bytes("out3." + kind))
+
+    def test_glb(self):
+        self.done(*self.call("out.glb"))
+        data = self.bytes("out.glb")
+        magic, version, length, size, kind = struct.unpack("<4sIII4s", data[:20])
+        self.assertEqual((magic, version, length, kind), (b"glTF", 2, len(data), b"JSON"))
+        scene = json.loads(data[20:20 + size])
+        self.assertEqual((len(scene["skins"]), len(scene["skins"][0]["joints"]), len(scene["animations"])), (1, 22, 1))
+        primitive = scene["meshes"][0]["primitives"][0]
+        count = lambda accessor: scene["accessors"][accessor]["count"]
+        self.assertEqual((count(primitive["attributes"]["POSITION"]), count(primitive["indices"])), (len(TARGET), 3 * len(FACES)))
+        self.assertEqual({count(s["input"]) for s in scene["animations"][0]["samplers"]}, {FRAMES})
+
+    def test_bvh(self):
+        self.done(*self.call("out.bvh"))
+        text = self.bytes("out.bvh").decode()
+        self.assertEqual((text.count("JOINT"), text.count("ROOT")), (21, 1))
+        self.assertRegex(text, r"\nFrames: +%d\n" % FRAMES)
+        self.assertEqual(len(text.split("Frame Time:")[1].strip().splitlines()) - 1, FRAMES)
+
+    def test_folders_keep_vertices_order_and_faces(self):
+        self.done(*self.call("frames/"))
+        self.done(*self.call("objs/", "--format", "obj"))
+        self.done(*self.call("out.h5"))
+        names = sorted(os.listdir(self.path("frames")))
+        self.assertEqual(len(names), FRAMES)
+        first = self.bytes("frames/" + names[0])
+        self.assertIn(b"element vertex %d\n" % len(TARGET), first)
+        self.assertIn(b"element face %d\n" % len(FACES), first)
+        obj = self.bytes("objs/" + sorted(os.listdir(self.path("objs")))[0]).decode().splitlines()
+        self.assertEqual([tuple(int(i.split("/")[0]) - 1 for i in line.split()[1:]) for line in obj if line.startswith("f ")], FACES)
+        self.assertEqual(sum(line.startswith("v ") for line in obj), len(TARGET))
+        # The frames are the vertices of the HDF5 file, in its order.
+        flat = [float(x) for name in sorted(os.listdir(self.path("objs"))) for line in self.bytes("objs/" + name).decode().splitlines()
+                if line.startswith("v ") for x in line.split()[1:4]]
+        self.h5("objs.h5", vertices=([FRAMES, len(TARGET), 3], flat))
+        self.assertLess(self.json("eval", "--pred", "objs.h5", "--truth", "out.h5")["mean"]["mpvd"], 1e-5)
+        self.done(*self.call("frames/"))  # its own frames are replaced
+        self.assertEqual(sorted(os.listdir(self.path("frames"))), names)
+
+    def test_target_may_be_a_cloud(self):
+        self.ply("cloud.ply", TARGET)
+        for out in ("out.h5", "out.glb", "out.bvh", "frames/"):
+            self.done(*self.call(out, target="cloud.ply"))
+        self.assertEqual(self.counts("out.h5")["vertices"], len(TARGET))
+
+    def test_tpose_needs_no_force(self):
+        self.done(*self.call("out.h5", w=weights("tposes", *TPOSES), force=False))
+        self.assertEqual(self.counts("out.h5")["frames"], FRAMES)
+
+
+class Sources(Retarget):
+    def same(self, a, b):
+        self.assertEqual(self.bytes(a), self.bytes(b))
+
+    def test_rates(self):
+        for fps, frames in ((30, FRAMES), (60, (FRAMES + 1) // 2), (15, 2 * FRAMES - 1)):
+            found = self.json(*self.call("out.h5", "--fps", fps))
+            self.assertEqual((found["source_frames"], found["frames"]), (FRAMES, frames))
+            self.assertEqual(self.counts("out.h5")["frames"], frames)
+
+    def test_up_axis_and_scale(self):
+        for i in range(FRAMES):
+            cloud = points(120 + 10 * i, i)
+            self.ply("z/f%d.ply" % i, [(x, -z, y) for x, y, z in cloud])
+            self.ply("half/f%d.ply" % i, [(x / 2, y / 2, z / 2) for x, y, z in cloud])
+        self.done(*self.call("out.h5"))
+        self.done(*self.call("z.h5", "--source-up", "z", source="z"))
+        self.done(*self.call("half.h5", "--scale", "2", source="half"))
+        self.same("z.h5", "out.h5")
+        self.same("half.h5", "out.h5")
+
+    def test_hdf5_and_shuffled_clouds(self):
+        cloud = points(150, 3)
+        for i in range(3):
+            self.ply("same/%d.ply" % i, cloud)
+            self.ply("turned/%d.ply" % i, cloud[::-1])
+        self.h5("same.h5", vertices=([3, 150, 3], [x for p in cloud for x in p] * 3, "float32"))
+        for name in ("same", "turned", "same.h5"):
+            self.done(*self.call("out_%s.bvh" % name, source=name))
+        self.same("out_same.bvh", "out_turned.bvh")
+        self.same("out_same.bvh", "out_same.h5.bvh")
+
+    def test_one_frame(self):
+        self.done(*self.call("out.h5", source="scans/f0.ply"))
+        self.assertEqual(self.counts("out.h5")["frames"], 1)
+
+    def test_profile(self):
+        result = self.restage(*self.call("out.h5", "--profile"))
+        self.assertEqual(result.code, 0, result.err)
+        self.assertIn("ms a frame", result.err)
+        self.assertNotIn("ms a frame", result.out)
+
+
+class BadRetargeting(Retarget):
+    OUTS = ("out.h5", "out.glb", "out.bvh", "frames/")
+
+    def bad(self, *contains, outs=("out.h5",), more=(), **inputs):
+        for out in outs:
+            self.bad_input(self.call(out, *more, **inputs), *contains)
+
+    def test_targets(self):
+        self.bad("hero.ply", "T-pose", "--force", force=False, outs=self.OUTS)
+        good = self.bytes("hero.ply")
+        bad = lambda name, *words: self.bad(name, *words, target=name)
+        bad("none.ply")
+        bad(self.write("cut.ply", good[:-20]))
+        bad(self.ply("empty.ply", []))
+        bad(self.ply("three.ply", points(3, 1)), "3 distinct")
+        bad(self.ply("nan.ply", TARGET + [(0, 0, float("nan"))], FACES))
+        bad(self.ply("face.ply", TARGET, FACES + [(0, 1, len(TARGET))]), "face")
+        bad(self.write("face.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n"), "face")
+        bad("scans")
+
+    def test_first_frame(self):
+        bad = lambda name, *words: self.bad(name, *words, source=name, outs=self.OUTS)
+        bad("none")
+        os.mkdir(self.path("hollow"))
+        bad("hollow")
+        bad(self.ply("empty.ply", []))
+        bad(self.ply("three.ply", points(3, 1)), "3 distinct")
+        bad(self.ply("nan.ply", points(100, 1) + [(float("nan"), 0, 0)]))
+        self.h5("joints.h5", joints=([2, 22, 3], [0.0]))
+        bad("joints.h5")
+        self.h5("shape.h5", vertices=([2, 100], [0.0]))
+        bad("shape.h5")
+
+    def test_later_frames_leave_nothing_behind(self):
+        self.ply("scans/f7.ply", points(3, 1))
+        self.bad("f7.ply", "3 distinct", outs=self.OUTS)
+        self.ply("scans/f7.ply", points(100, 1) + [(float("nan"), 0, 0)])
+        self.bad("f7.ply", outs=self.OUTS)
+        data = self.bytes(self.ply("scans/f7.ply", points(100, 1)))
+        self.write("scans/f7.ply", data[:-30])
+        self.bad("f7.ply", outs=self.OUTS)
+
+    def test_several_sequences(self):
+        self.h5("two.h5", vertices=([4, 100, 3], numbers(1200, 1), "float32"), sequence_offset=([3], [0, 2, 4], "int64"))
+        self.bad("two.h5", "sequence", source="two.h5", outs=self.OUTS)
+
+    def test_existing_results_survive_bad_input(self):
+        for out in ("out.h5", "out.glb"):
+            self.done(*self.call(out))
+        before = {n: self.bytes(n) for n in ("out.h5", "out.glb")}
+        self.ply("scans/f7.ply", points(3, 1))
+        self.bad("f7.ply", outs=("out.h5", "out.glb"))
+        self.assertEqual({n: self.bytes(n) for n in before}, before)
+
+    def test_weights(self):
+        self.bad("none.safetensors", w="none.safetensors")
+        for stages in ("skeleton", "motion", "deformation"):
+            name = weights("only_" + stages, "stages=[%s]" % stages)
+            self.bad("only_" + stages, w=name)
+        with open(self.w, "rb") as f:
+            whole = f.read()
+        self.bad("cut.safetensors", w=self.write("cut.safetensors", whole[:len(whole) // 2]))
+
+    def test_options(self):
+        self.bad("--fps", more=["--fps", "-1"])
+        self.bad("--fps", more=["--fps", "nan"])
+        self.bad("--fps", more=["--fps", "0.001"])
+        self.bad("--scale", more=["--scale", "0"])
+        self.bad("--scale", more=["--scale", "-2"])
+        self.bad("--source-up", more=["--source-up", "x"])
+        self.bad("--format", more=["--format", "stl"])
+        self.bad("--samples", more=["--samples", "0"])
+        self.bad("out.fbx", outs=["out.fbx"])
+        self.bad("nowhere", outs=["nowhere/" + n for n in ("out.h5", "out.glb", "out.bvh")])
+        self.write("own/notes.txt", "not a frame\n")
+        self.bad("own", outs=["own/"])
+        self.assertEqual(os.listdir(self.path("own")), ["notes.txt"])
+        arguments = self.call("out.h5")
+        for i in (1, 3, 5, 7):
+            self.bad_input(arguments[:i] + arguments[i + 2:], arguments[i])
+
+    def test_full_disk(self):
+        before = sorted(os.listdir(self.folder))
+        for i in range(40):
+            self.ply("scans/f%d.ply" % i, points(100, i))
+        for out in ("out.h5", "out.glb", "out.bvh"):
+            self.one_line(self.restage(*self.call(out), before=small_disk), 1, out)
+            self.assertEqual(sorted(os.listdir(self.folder)), before)
+        self.ply("big.ply", points(600, 1))
+        before = sorted(os.listdir(self.folder))
+        self.one_line(self.restage(*self.call("frames/", target="big.ply"), before=small_disk), 1, "frames")
+        self.assertEqual(sorted(os.listdir(self.folder)), before)
