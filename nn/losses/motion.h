@@ -45,8 +45,8 @@ DiscriminatorLosses discriminator_losses(Context& ctx, Discriminator& net, const
                                          const Var& fake, const Var& fake_trans,
                                          const Var& fake_rest);
 
-/// Mean of (6D(predicted) - target)^2 over all numbers, 6D the first two columns of the matrices (Q5).
-/// Quaternion networks are compared as matrices too, which needs no choice of sign (Q6).
+/// Mean of (6D(predicted) - target)^2 over all numbers, 6D the first two columns of the matrices
+/// (Q5). Quaternion networks are compared as matrices too, which needs no choice of sign (Q6).
 Var rotation_loss(const Var& rotations, const Var& sixd);
 
 }  // namespace restage
