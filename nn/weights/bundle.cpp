@@ -76,8 +76,9 @@ ModelSizes actual_sizes(ModelSizes s, const Module& net) {
 Json to_json(const ModelSizes& sizes) {
   Json out = Json::object();
   each_size(sizes, [&out](const char* name, const auto& value) {
-    if (value > 0 || (std::is_same_v<std::decay_t<decltype(value)>, double> && value >= 0))
-      out[name] = value;
+    bool set = value > 0;
+    if constexpr (std::is_same_v<std::decay_t<decltype(value)>, double>) set = value >= 0;
+    if (set) out[name] = value;
   });
   return out;
 }
