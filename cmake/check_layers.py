@@ -55,6 +55,7 @@ ONLY_IN = {
     "stb/": ["infer/render/"],
     "lzma.h": ["datasets/importers/"],
     "zlib.h": ["datasets/importers/"],
+    "hwy/": ["autograd/cpu/"],
     "Eigen/": ["autograd/cpu/", "nn/", "datasets/", "train/", "infer/", "experiments/"],
     "tiny_gltf.h": [],  # tests only: it reads what we wrote
     "random": [],  # random numbers come from autograd/base/rng.h

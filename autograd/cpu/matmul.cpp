@@ -1,13 +1,19 @@
 // Packed, register-tiled matrix product. Output tiles go to threads; the sum over k stays in one
 // thread and in one order.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "autograd/cpu/matmul.cpp"
+#include <hwy/foreach_target.h>  // once per instruction set
+
 #include <algorithm>
 #include <vector>
 
 #include "autograd/cpu/common.h"
-#include "autograd/cpu/gemm_tile.h"
+#include "autograd/cpu/gemm_tile-inl.h"
 #include "autograd/cpu/kernels.h"
+#include "autograd/cpu/targets.h"
 
-namespace restage::cpu {
+HWY_BEFORE_NAMESPACE();
+namespace restage::cpu::HWY_NAMESPACE {
 namespace {
 
 constexpr int64_t kTileRows = 288;  // multiple of kRows
@@ -119,7 +125,7 @@ void run(const MatmulArgs& args) {
   T* out = args.out.data<T>();
   const int64_t work = 2 * std::min(tr, m) * std::min(tc, n) * std::max<int64_t>(k, 1);
   const int64_t grain = std::max<int64_t>(1, (1 << 18) / work);
-  parallel_for(batch * tiles, grain, [&](int64_t from, int64_t to) {
+  parallel_for(batch * tiles, grain, [&](int64_t from, int64_t to) HWY_ATTR {
     for (int64_t t = from; t < to; ++t) {
       const int64_t bi = t / tiles, ti = t % tiles / col_tiles, tj = t % col_tiles;
       const Product<T> p{{a + bi * step_a, args.transpose_a ? 1 : k, args.transpose_a ? m : 1},
@@ -143,7 +149,14 @@ void run(const MatmulArgs& args) {
 }  // namespace
 
 void matmul(const MatmulArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) { run<decltype(zero)>(args); });
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { run<decltype(zero)>(args); });
 }
 
+}  // namespace restage::cpu::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace restage::cpu {
+RESTAGE_KERNEL(matmul, MatmulArgs)
 }  // namespace restage::cpu
+#endif

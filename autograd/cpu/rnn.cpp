@@ -1,12 +1,19 @@
 // GRU layers. The rows of a batch never meet, so each thread takes some rows through all steps: no
 // waiting between steps, and the recurrent weights are packed once for the whole sequence.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "autograd/cpu/rnn.cpp"
+#include <hwy/foreach_target.h>  // once per instruction set
+
 #include <vector>
 
 #include "autograd/cpu/common.h"
-#include "autograd/cpu/gemm_tile.h"
+#include "autograd/cpu/gemm_tile-inl.h"
 #include "autograd/cpu/kernels.h"
+#include "autograd/cpu/math-inl.h"
+#include "autograd/cpu/targets.h"
 
-namespace restage::cpu {
+HWY_BEFORE_NAMESPACE();
+namespace restage::cpu::HWY_NAMESPACE {
 namespace {
 
 /// Rows per piece: a function of the batch alone. Fewer rows than the register tile has cost no
@@ -51,15 +58,17 @@ std::vector<T> packed(const Strided<T>& m, int64_t k, int64_t n) {
 
 template <class T>
 void cell(const T* gi, const T* gh, const T* bias, const T* previous, int64_t h, T* gates, T* out) {
-  const ConstArray<T> ir(gi, h), iz(gi + h, h), in(gi + 2 * h, h), hr(gh, h), hz(gh + h, h),
-      hn(gh + 2 * h, h);
-  const ConstArray<T> br(bias, h), bz(bias + h, h), bn(bias + 2 * h, h), prev(previous, h);
-  MutableArray<T> r(gates, h), z(gates + h, h), n(gates + 2 * h, h), kept(gates + 3 * h, h);
-  r = T(1) / (T(1) + (-(ir + hr + br)).exp());
-  z = T(1) / (T(1) + (-(iz + hz + bz)).exp());
-  kept = hn + bn;
-  n = (in + r * kept).tanh();
-  MutableArray<T>(out, h) = (T(1) - z) * n + z * prev;
+  T *r = gates, *z = gates + h, *n = gates + 2 * h, *kept = gates + 3 * h;
+  const auto gate = [](auto i, auto hidden, auto b)
+                        HWY_ATTR { return sigmoid(hn::Add(hn::Add(i, hidden), b)); };
+  map(h, r, gate, gi, gh, bias);
+  map(h, z, gate, gi + h, gh + h, bias + h);
+  map(
+      h, kept, [](auto a, auto b) HWY_ATTR { return hn::Add(a, b); }, gh + 2 * h, bias + 2 * h);
+  map(
+      h, n, [](auto i, auto reset, auto k) HWY_ATTR { return tanh(hn::MulAdd(reset, k, i)); },
+      gi + 2 * h, r, kept);
+  for (int64_t i = 0; i < h; ++i) out[i] = (T(1) - z[i]) * n[i] + z[i] * previous[i];
 }
 
 /// g: gradient of the new state; on return `direct` holds the part that goes straight to the old
@@ -67,16 +76,18 @@ void cell(const T* gi, const T* gh, const T* bias, const T* previous, int64_t h,
 template <class T>
 void cell_grad(const T* gates, const T* previous, const T* g_out, int64_t h, T* gi, T* gh,
                T* direct) {
-  const ConstArray<T> r(gates, h), z(gates + h, h), n(gates + 2 * h, h), hn(gates + 3 * h, h);
-  const ConstArray<T> prev(previous, h), g(g_out, h);
-  MutableArray<T> ir(gi, h), iz(gi + h, h), in(gi + 2 * h, h);
-  in = g * (T(1) - z) * (T(1) - n * n);
-  iz = g * (prev - n) * z * (T(1) - z);
-  ir = in * hn * r * (T(1) - r);
-  MutableArray<T>(gh, h) = ir;
-  MutableArray<T>(gh + h, h) = iz;
-  MutableArray<T>(gh + 2 * h, h) = in * r;
-  MutableArray<T>(direct, h) = g * z;
+  for (int64_t i = 0; i < h; ++i) {
+    const T r = gates[i], z = gates[h + i], n = gates[2 * h + i], hn = gates[3 * h + i];
+    const T g = g_out[i];
+    const T in = g * (T(1) - z) * (T(1) - n * n);
+    const T iz = g * (previous[i] - n) * z * (T(1) - z);
+    const T ir = in * hn * r * (T(1) - r);
+    gi[i] = gh[i] = ir;
+    gi[h + i] = gh[h + i] = iz;
+    gi[2 * h + i] = in;
+    gh[2 * h + i] = in * r;
+    direct[i] = g * z;
+  }
 }
 
 template <class T>
@@ -84,7 +95,7 @@ void forward(const GruArgs& args) {
   const int64_t steps = args.gi.size(0), n = args.gi.size(1), h = args.h0.size(1);
   const std::vector<T> w = packed<T>({args.w_hh.data<T>(), 1, h}, h, 3 * h);
   const int piece = piece_rows(n);
-  parallel_for(n, piece, [&](int64_t from, int64_t to) {
+  parallel_for(n, piece, [&](int64_t from, int64_t to) HWY_ATTR {
     const int64_t rows = to - from;
     std::vector<T> panel(static_cast<size_t>(h * piece)), gh(static_cast<size_t>(rows * 3 * h));
     const T* previous = args.h0.data<T>() + from * h;
@@ -105,22 +116,22 @@ void backward(const GruGradArgs& args) {
   const int64_t steps = args.gy.size(0), n = args.gy.size(1), h = args.h0.size(1);
   const std::vector<T> w = packed<T>({args.w_hh.data<T>(), h, 1}, 3 * h, h);
   const int piece = piece_rows(n);
-  parallel_for(n, piece, [&](int64_t from, int64_t to) {
+  parallel_for(n, piece, [&](int64_t from, int64_t to) HWY_ATTR {
     const int64_t rows = to - from, count = rows * h;
     std::vector<T> panel(static_cast<size_t>(3 * h * piece)),
         carry(static_cast<size_t>(count), T(0));
     std::vector<T> direct(static_cast<size_t>(count)), through(static_cast<size_t>(count));
     for (int64_t t = steps - 1; t >= 0; --t) {
       const int64_t at = t * n + from;
-      MutableArray<T>(carry.data(), count) += ConstArray<T>(args.gy.data<T>() + at * h, count);
+      const T* gy = args.gy.data<T>() + at * h;
+      for (int64_t i = 0; i < count; ++i) carry[static_cast<size_t>(i)] += gy[i];
       const T* previous = t > 0 ? args.y.data<T>() + (at - n) * h : args.h0.data<T>() + from * h;
       for (int64_t i = 0; i < rows; ++i)
         cell_grad(args.gates.data<T>() + (at + i) * 4 * h, previous + i * h, carry.data() + i * h,
                   h, args.g_gi.data<T>() + (at + i) * 3 * h, args.g_gh.data<T>() + (at + i) * 3 * h,
                   direct.data() + i * h);
       rows_times(piece, args.g_gh.data<T>() + at * 3 * h, rows, 3 * h, w, h, panel, through.data());
-      MutableArray<T>(carry.data(), count) =
-          ConstArray<T>(direct.data(), count) + ConstArray<T>(through.data(), count);
+      for (size_t i = 0; i < carry.size(); ++i) carry[i] = direct[i] + through[i];
     }
     std::copy_n(carry.data(), count, args.out.data<T>() + from * h);
   });
@@ -129,11 +140,19 @@ void backward(const GruGradArgs& args) {
 }  // namespace
 
 void gru(const GruArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) { forward<decltype(zero)>(args); });
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { forward<decltype(zero)>(args); });
 }
 
 void gru_grad(const GruGradArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) { backward<decltype(zero)>(args); });
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { backward<decltype(zero)>(args); });
 }
 
+}  // namespace restage::cpu::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace restage::cpu {
+RESTAGE_KERNEL(gru, GruArgs)
+RESTAGE_KERNEL(gru_grad, GruGradArgs)
 }  // namespace restage::cpu
+#endif

@@ -1,17 +1,29 @@
-// Packing and the register tile of matrix products, shared by the kernels that multiply.
-#pragma once
+// Packing and the register tile of matrix products, shared by the kernels that multiply. Compiled
+// once per instruction set (targets.h says how).
+#if defined(RESTAGE_CPU_GEMM_TILE_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef RESTAGE_CPU_GEMM_TILE_INL_H
+#undef RESTAGE_CPU_GEMM_TILE_INL_H
+#else
+#define RESTAGE_CPU_GEMM_TILE_INL_H
+#endif
 
 #include <algorithm>
 #include <cstdint>
 #include <vector>
 
-namespace restage::cpu {
+#include "autograd/cpu/targets.h"
 
-#if defined(__AVX512F__)
+HWY_BEFORE_NAMESPACE();
+namespace restage::cpu::HWY_NAMESPACE {
+
+#if HWY_TARGET == HWY_AVX3
 inline constexpr int kVectorBytes = 64;
 inline constexpr int kRows = 12;
-#else
+#elif HWY_TARGET == HWY_AVX2
 inline constexpr int kVectorBytes = 32;
+inline constexpr int kRows = 6;
+#else
+inline constexpr int kVectorBytes = 16;
 inline constexpr int kRows = 6;
 #endif
 inline constexpr int kVectors = 2;
@@ -107,4 +119,7 @@ inline void multiply(int64_t k, const T* a, const T* b, T* out) {
   }
 }
 
-}  // namespace restage::cpu
+}  // namespace restage::cpu::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // per target
