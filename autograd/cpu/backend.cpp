@@ -34,6 +34,8 @@ class CpuBackend final : public Backend {
     add<GruGradArgs, cpu::gru_grad>();
     add<KnnArgs, cpu::knn>();
     add<FpsArgs, cpu::fps>();
+    add<NeighbourAttentionArgs, cpu::neighbour_attention>();
+    add<NeighbourAttentionGradArgs, cpu::neighbour_attention_grad>();
     add<AttentionPoolArgs, cpu::attention_pool>();
     add<AttentionPoolGradArgs, cpu::attention_pool_grad>();
     add<ToMatrixArgs, cpu::to_matrix>();

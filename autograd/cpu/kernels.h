@@ -1,6 +1,7 @@
 // Every kernel of the CPU backend; backend.cpp enters them into its table.
 #pragma once
 
+#include "autograd/kernels/attention.h"
 #include "autograd/kernels/elementwise.h"
 #include "autograd/kernels/layout.h"
 #include "autograd/kernels/matmul.h"
@@ -38,6 +39,8 @@ void gru(const GruArgs&);
 void gru_grad(const GruGradArgs&);
 void knn(const KnnArgs&);
 void fps(const FpsArgs&);
+void neighbour_attention(const NeighbourAttentionArgs&);
+void neighbour_attention_grad(const NeighbourAttentionGradArgs&);
 void attention_pool(const AttentionPoolArgs&);
 void attention_pool_grad(const AttentionPoolGradArgs&);
 void to_matrix(const ToMatrixArgs&);

@@ -5,6 +5,7 @@ namespace restage::gradcheck {
 const std::vector<OpSamples>& all_samples() {
   static const Table table = [] {
     Table t;
+    add_attention(t);
     add_elementwise(t);
     add_layout(t);
     add_linear(t);

@@ -7,6 +7,7 @@ namespace restage::gradcheck {
 
 using Table = std::vector<OpSamples>;
 
+void add_attention(Table& table);
 void add_elementwise(Table& table);
 void add_layout(Table& table);
 void add_linear(Table& table);

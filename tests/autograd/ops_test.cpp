@@ -7,6 +7,8 @@
 
 #include "autograd/base/parallel.h"
 #include "autograd/gradcheck/evaluate.h"
+#include "autograd/kernels/attention.h"
+#include "autograd/ops/attention.h"
 #include "autograd/ops/linear.h"
 #include "autograd/ops/norm.h"
 #include "autograd/ops/points.h"
@@ -66,6 +68,40 @@ TEST(FusedOps, AttentionPoolIsItsReference) {
         {random({9, 5, d}, 1), random({9, 5, d}, 2)},
         [](Args x) { return attention_pool(x[0], x[1], 0.4); },
         [](Args x) { return attention_pool_reference(x[0], x[1], 0.4); });
+}
+
+TEST(FusedOps, NeighbourAttentionIsItsReference) {
+  const int64_t v = 60, k = 5, d = 33;
+  for (const double spread : {1.0, 0.05, 1e-4}) {  // most units active, some, none
+    Tensor xyz = random({2, v, 3}, 1);
+    for (int64_t i = 0; i < xyz.numel(); ++i) xyz.data<double>()[i] *= spread;
+    const Tensor index = knn(xyz, xyz, k);
+    const std::vector<Tensor> inputs = {xyz,
+                                        random({2, v, d}, 2),
+                                        random({2, v, d}, 3),
+                                        random({2, v, d}, 4),
+                                        random({d, 3}, 5),
+                                        random({d}, 6, 0.01),
+                                        random({2 * d, d}, 7),
+                                        random({d, d}, 8),
+                                        random({d}, 9)};
+    for (const bool dense : {false, true}) {
+      take_active_share();
+      expect_fused(
+          inputs,
+          [&](Args x) {
+            return neighbour_attention({x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]},
+                                       index, 0.05, dense);
+          },
+          [&](Args x) {
+            return neighbour_attention_reference(
+                {x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]}, index, 0.05);
+          });
+      const double share = take_active_share();
+      EXPECT_EQ(share > 0.9, dense || spread == 1.0);
+      EXPECT_EQ(share < 0.5, !dense && spread < 1.0);
+    }
+  }
 }
 
 TEST(FusedOps, LinearWithReluIsMatmulPlusBiasAndRelu) {

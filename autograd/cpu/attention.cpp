@@ -1,0 +1,105 @@
+// Neighbour attention, forward: tile by tile through all products, softmax and weighted sum, so
+// that nothing of the size [pairs, d] leaves the cache but the softmax, which backward wants.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "autograd/cpu/attention.cpp"
+#include <hwy/foreach_target.h>  // once per instruction set
+
+#include <atomic>
+#include <limits>
+
+#include "autograd/cpu/attention_tile-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace restage::cpu::HWY_NAMESPACE {
+namespace {
+
+/// Softmax over the k rows of e (scaled, per channel) and the sum of its product with value + t.
+/// e becomes the softmax. st: the rows [s, t] of the point's pairs.
+template <class T>
+void pool_point(const Attention<T>& a, int64_t point, T* e, const T* st, T* top, T* y) {
+  const int64_t d = a.d;
+  std::copy_n(e, d, top);
+  for (int64_t j = 1; j < a.k; ++j)
+    for (int64_t c = 0; c < d; ++c) top[c] = e[j * d + c] > top[c] ? e[j * d + c] : top[c];
+  T* total = top + d;
+  std::fill_n(total, d, T(0));
+  const auto scale = static_cast<T>(a.in.scale);
+  for (int64_t j = 0; j < a.k; ++j) {
+    T* w = e + j * d;
+    map(
+        d, w,
+        [scale](auto x, auto highest) HWY_ATTR {
+          return exp(hn::Mul(hn::Sub(x, highest), hn::Set(hn::DFromV<decltype(x)>(), scale)));
+        },
+        w, top);
+    for (int64_t c = 0; c < d; ++c) total[c] += w[c];
+  }
+  for (int64_t c = 0; c < d; ++c) total[c] = T(1) / total[c];
+  std::fill_n(y, d, T(0));
+  for (int64_t j = 0; j < a.k; ++j) {
+    T* HWY_RESTRICT w = e + j * d;
+    const T* HWY_RESTRICT value = a.value + a.neighbour(point, j) * d;
+    const T* HWY_RESTRICT t = st + j * 2 * d + d;
+    for (int64_t c = 0; c < d; ++c) {
+      w[c] *= total[c];
+      y[c] += w[c] * (value[c] + t[c]);
+    }
+  }
+}
+
+template <class T>
+void forward(const NeighbourAttentionArgs& args) {
+  const Attention<T> a(args.in);
+  Buffer<T> gamma_buffer;
+  const T* gamma = pack_right<T>({args.in.gamma.data<T>(), 1, a.d}, a.d, a.d, gamma_buffer);
+  parallel_for(a.tiles.tiles(), 1, [&](int64_t from, int64_t to) HWY_ATTR {
+    TileMemory<T>& memory = TileMemory<T>::mine();
+    for (int64_t t = from; t < to; ++t) {
+      const int64_t pairs = a.tile_rows(t) * a.k;
+      const T* r = pair_offsets(a, t, memory.offsets);
+      const T* st = pair_products(a, t, hidden_columns(a, t, r, memory), memory);
+      const T* u = score_inputs(a, t, st, memory);
+      T* e = memory.e.at_least(pairs * a.d);
+      product(pairs, a.d, a.d, pack_left<T>({u, a.d, 1}, pairs, a.d, memory.left), gamma, e, a.d);
+      T* top = memory.y.at_least(2 * a.d);
+      for (int64_t i = 0; i < a.tile_rows(t); ++i) {
+        const int64_t p = a.point(t, i), row = i * a.k;
+        pool_point(a, p, e + row * a.d, st + row * 2 * a.d, top, args.out.data<T>() + p * a.d);
+        if (args.weights != nullptr)
+          std::copy_n(e + row * a.d, a.k * a.d, args.weights->data<T>() + p * a.k * a.d);
+      }
+    }
+  });
+}
+
+}  // namespace
+
+void neighbour_attention(const NeighbourAttentionArgs& args) {
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { forward<decltype(zero)>(args); });
+}
+
+}  // namespace restage::cpu::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace restage {
+namespace {
+std::atomic<int64_t> active_units = 0, all_units = 0;
+}
+
+void add_active_units(int64_t active, int64_t all) {
+  active_units += active;
+  all_units += all;
+}
+
+double take_active_share() {
+  const auto active = static_cast<double>(active_units.exchange(0));
+  const auto all = static_cast<double>(all_units.exchange(0));
+  return all > 0 ? active / all : std::numeric_limits<double>::quiet_NaN();
+}
+
+namespace cpu {
+RESTAGE_KERNEL(neighbour_attention, NeighbourAttentionArgs)
+}
+}  // namespace restage
+#endif
