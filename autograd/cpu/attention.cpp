@@ -4,9 +4,6 @@
 #define HWY_TARGET_INCLUDE "autograd/cpu/attention.cpp"
 #include <hwy/foreach_target.h>  // once per instruction set
 
-#include <atomic>
-#include <limits>
-
 #include "autograd/cpu/attention_tile-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -82,24 +79,7 @@ void neighbour_attention(const NeighbourAttentionArgs& args) {
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace restage {
-namespace {
-std::atomic<int64_t> active_units = 0, all_units = 0;
-}
-
-void add_active_units(int64_t active, int64_t all) {
-  active_units += active;
-  all_units += all;
-}
-
-double take_active_share() {
-  const auto active = static_cast<double>(active_units.exchange(0));
-  const auto all = static_cast<double>(all_units.exchange(0));
-  return all > 0 ? active / all : std::numeric_limits<double>::quiet_NaN();
-}
-
-namespace cpu {
+namespace restage::cpu {
 RESTAGE_KERNEL(neighbour_attention, NeighbourAttentionArgs)
 }
-}  // namespace restage
 #endif

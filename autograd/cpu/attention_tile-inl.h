@@ -16,6 +16,7 @@
 #include "autograd/cpu/kernels.h"
 #include "autograd/cpu/math-inl.h"
 #include "autograd/cpu/packed_product-inl.h"
+#include "autograd/kernels/stats.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
@@ -203,7 +204,7 @@ Attention<T>::Attention(const NeighbourAttentionInputs& inputs)
     units += std::ssize(active[t]);
     any_full = any_full || full[t];
   }
-  add_active_units(units, tiles.tiles() * d);
+  count_units(units, tiles.tiles() * d);
   if (any_full) pack_right<T>({both_t.template data<T>(), 2 * d, 1}, d, 2 * d, full_right);
 }
 

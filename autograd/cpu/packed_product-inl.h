@@ -8,6 +8,7 @@
 #endif
 
 #include "autograd/cpu/gemm_tile-inl.h"
+#include "autograd/kernels/stats.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
@@ -71,6 +72,7 @@ void product(int64_t m, int64_t n, int64_t k, const T* left, const T* right, T* 
   constexpr int cols = Simd<T>::cols;
   const int64_t rows = whole_panels(m, kRows), width = whole_panels(n, cols);
   T tile[kRows * cols];
+  count_flops(2.0 * static_cast<double>(m * n * k));
   for (int64_t l0 = 0; l0 < k; l0 += kDepth) {
     const int64_t l = std::min(kDepth, k - l0);
     const bool sum = add || l0 > 0;

@@ -50,11 +50,4 @@ struct NeighbourAttentionGradArgs {
   Tensor& out;  ///< gradient of gamma
 };
 
-/// How much of the products over pairs was left to do, since the last call of this function: the
-/// share of hidden units that changed sign within their tile (1 in a tile that was done in full;
-/// NaN if no attention ran).
-double take_active_share();
-/// For backends: units that changed sign, and all units, of the tiles of one call.
-void add_active_units(int64_t active, int64_t all);
-
 }  // namespace restage

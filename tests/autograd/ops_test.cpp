@@ -7,7 +7,7 @@
 
 #include "autograd/base/parallel.h"
 #include "autograd/gradcheck/evaluate.h"
-#include "autograd/kernels/attention.h"
+#include "autograd/kernels/stats.h"
 #include "autograd/ops/attention.h"
 #include "autograd/ops/linear.h"
 #include "autograd/ops/norm.h"
@@ -86,7 +86,7 @@ TEST(FusedOps, NeighbourAttentionIsItsReference) {
                                         random({d, d}, 8),
                                         random({d}, 9)};
     for (const bool dense : {false, true}) {
-      take_active_share();
+      take_kernel_stats();
       expect_fused(
           inputs,
           [&](Args x) {
@@ -97,7 +97,7 @@ TEST(FusedOps, NeighbourAttentionIsItsReference) {
             return neighbour_attention_reference(
                 {x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]}, index, 0.05);
           });
-      const double share = take_active_share();
+      const double share = take_kernel_stats().active_share;
       EXPECT_EQ(share > 0.9, dense || spread == 1.0);
       EXPECT_EQ(share < 0.5, !dense && spread < 1.0);
     }
