@@ -44,7 +44,10 @@ void run_stage(Stage& stage, int64_t first, RunDir& run, const LoopConfig& loop,
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
     const KernelStats work = take_kernel_stats();
     throughput.add(stage.examples_per_step(), took.count(), work.flops);
-    if (std::isfinite(work.active_share)) values.emplace_back("active_share", work.active_share);
+    if (std::isfinite(work.active_share)) {
+      values.emplace_back("active_share", work.active_share);
+      values.emplace_back("active_score_share", work.active_score_share);
+    }
     const int64_t done = step + 1;
     const bool last = done == steps, stopped = stop_requested();
     if (done % loop.log_every == 0 || last) run.metrics(stage.name(), done, values);

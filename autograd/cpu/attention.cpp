@@ -10,6 +10,36 @@ HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
 namespace {
 
+/// The scores of a tile, up to what is the same for all neighbours of a point: [pairs, d].
+template <class T>
+T* scores(const Attention<T>& a, int64_t t, const T* hidden, const T* u, const T* gamma,
+          TileMemory<T>& memory) {
+  const int64_t pairs = a.tile_rows(t) * a.k, d = a.d;
+  T* e = memory.e.at_least(pairs * d);
+  if (!split_scores(a, t, memory)) {
+    count_score_units(d, d);
+    product(pairs, d, d, pack_left<T>({u, d, 1}, pairs, d, memory.left), gamma, e, d);
+    return e;
+  }
+  const int64_t m = std::ssize(memory.active), columns = a.columns(t), k = m + columns;
+  count_score_units(m, d);
+  find_others(a, t, memory);
+  const T* linear =
+      on_scores(a, on_rows(a, t, memory), columns + std::ssize(memory.others), memory);
+  const T* left =
+      pack_left<T>({score_columns(a, t, u, hidden, memory), k, 1}, pairs, k, memory.left);
+  memory.rows.clear();
+  for (const int32_t c : memory.active) memory.rows.push_back(a.gamma_t.template data<T>() + c * d);
+  for (int64_t l = 0; l < columns; ++l) memory.rows.push_back(linear + l * d);
+  product(pairs, d, k, left, pack_rows_right(memory.rows, d, memory.right), e, d);
+  for (int64_t p = 0; p < pairs; ++p) {
+    T* HWY_RESTRICT row = e + p * d;
+    const T* HWY_RESTRICT key = linear + (columns + memory.slot[static_cast<size_t>(p)]) * d;
+    for (int64_t c = 0; c < d; ++c) row[c] -= key[c];
+  }
+  return e;
+}
+
 /// Softmax over the k rows of e (scaled, per channel) and the sum of its product with value + t.
 /// e becomes the softmax. st: the rows [s, t] of the point's pairs.
 template <class T>
@@ -48,16 +78,14 @@ template <class T>
 void forward(const NeighbourAttentionArgs& args) {
   const Attention<T> a(args.in);
   Buffer<T> gamma_buffer;
-  const T* gamma = pack_right<T>({args.in.gamma.data<T>(), 1, a.d}, a.d, a.d, gamma_buffer);
+  const T* gamma = pack_right<T>({a.gamma_t.template data<T>(), a.d, 1}, a.d, a.d, gamma_buffer);
   parallel_for(a.tiles.tiles(), 1, [&](int64_t from, int64_t to) HWY_ATTR {
     TileMemory<T>& memory = TileMemory<T>::mine();
     for (int64_t t = from; t < to; ++t) {
-      const int64_t pairs = a.tile_rows(t) * a.k;
       const T* r = pair_offsets(a, t, memory.offsets);
-      const T* st = pair_products(a, t, hidden_columns(a, t, r, memory), memory);
-      const T* u = score_inputs(a, t, st, memory);
-      T* e = memory.e.at_least(pairs * a.d);
-      product(pairs, a.d, a.d, pack_left<T>({u, a.d, 1}, pairs, a.d, memory.left), gamma, e, a.d);
+      const T* hidden = hidden_columns(a, t, r, memory);
+      const T* st = pair_products(a, t, hidden, memory);
+      T* e = scores(a, t, hidden, score_inputs(a, t, st, memory), gamma, memory);
       T* top = memory.y.at_least(2 * a.d);
       for (int64_t i = 0; i < a.tile_rows(t); ++i) {
         const int64_t p = a.point(t, i), row = i * a.k;

@@ -4,6 +4,12 @@
 // the active ones, need a product. With on/off/active known for a tile,
 //   M h = [M_active, M_on W_on, M_on b_on] [relu(z_active); r; 1],
 // which is exact and has a few dozen columns instead of d.
+//
+// The units of the second ReLU, u = query_i - key_j + s_ij, are split in the same way. Those that
+// are on give the scores a part that is linear in what made u: the query's cancels in the softmax,
+// the key's is one row for each neighbour of the tile, and s has few columns already:
+//   G u = G_active relu(u_active) + (G_on M_on) [hidden columns] - (G_on key_on)_j + (same for all
+//   j)
 #if defined(RESTAGE_CPU_ATTENTION_TILE_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef RESTAGE_CPU_ATTENTION_TILE_INL_H
 #undef RESTAGE_CPU_ATTENTION_TILE_INL_H
@@ -37,6 +43,7 @@ struct Attention {
   PointTiles tiles;
   Tensor hidden;                             // [4, d]: W transposed, then b
   Tensor both_t;                             // M transposed, [d, 2d]
+  Tensor gamma_t;                            // G transposed, [d, d]
   std::vector<uint8_t> sign;                 // [tiles, d]
   std::vector<std::vector<int32_t>> active;  // of each tile; all units if it is done in full
   std::vector<char> full;                    // whether a tile is done in full
@@ -69,12 +76,29 @@ struct Attention {
 template <class T>
 struct TileMemory {
   Buffer<T> offsets, weights, left, right, hidden, st, u, e, y, more;
+  Buffer<T> range, columns, on_rows, on_scores, chosen;
   std::vector<const T*> rows;
+  std::vector<int32_t> active, on;  // units of the second ReLU
+  std::vector<int64_t> others;      // rows of the batch: the neighbours in a tile, each once
+  std::vector<int32_t> slot;        // of each pair's neighbour in `others`
+  std::vector<int32_t> place;       // of each row of the batch in `others`, or -1
   static TileMemory& mine() {
     thread_local TileMemory memory;
     return memory;
   }
 };
+
+/// out [columns, rows] = the transpose of m [rows, columns].
+template <class T>
+void transpose_matrix(const T* m, int64_t rows, int64_t columns, T* out) {
+  constexpr int64_t block = 16;
+  parallel_for(columns, block, [&](int64_t from, int64_t to) HWY_ATTR {
+    for (int64_t r0 = 0; r0 < rows; r0 += block)
+      for (int64_t u = from; u < to; ++u)
+        for (int64_t r = r0; r < std::min(rows, r0 + block); ++r)
+          out[u * rows + r] = m[r * columns + u];
+  });
+}
 
 /// r and 1 of every pair of a tile, [pairs, 4].
 template <class T>
@@ -145,12 +169,9 @@ void Attention<T>::transpose_weights() {
     for (int c = 0; c < 3; ++c) h[c * d + u] = w[3 * u + c];
     h[3 * d + u] = b[u];
   }
-  constexpr int64_t block = 16;
-  parallel_for(d, block, [&](int64_t from, int64_t to) HWY_ATTR {
-    for (int64_t r0 = 0; r0 < 2 * d; r0 += block)
-      for (int64_t u = from; u < to; ++u)
-        for (int64_t r = r0; r < std::min(2 * d, r0 + block); ++r) mt[u * 2 * d + r] = m[r * d + u];
-  });
+  transpose_matrix(m, 2 * d, d, mt);
+  gamma_t = Tensor::empty({d, d}, in.w.dtype(), in.w.device());
+  transpose_matrix(in.gamma.data<T>(), d, d, gamma_t.data<T>());
 }
 
 template <class T>
@@ -230,6 +251,16 @@ T* hidden_columns(const Attention<T>& a, int64_t t, const T* r, TileMemory<T>& m
   return out;
 }
 
+/// The rows of M transposed that belong to the hidden columns of a tile that is not done in full.
+template <class T>
+void column_rows(const Attention<T>& a, int64_t t, std::vector<const T*>* rows) {
+  rows->clear();
+  for (const int32_t u : a.active[static_cast<size_t>(t)])
+    rows->push_back(a.both_t.template data<T>() + u * 2 * a.d);
+  for (int64_t c = 0; c < 4; ++c)
+    rows->push_back(a.affine.template data<T>() + (4 * t + c) * 2 * a.d);
+}
+
 /// [s, t] of every pair of a tile, [pairs, 2d], from its hidden columns.
 template <class T>
 T* pair_products(const Attention<T>& a, int64_t t, const T* hidden, TileMemory<T>& memory) {
@@ -237,11 +268,7 @@ T* pair_products(const Attention<T>& a, int64_t t, const T* hidden, TileMemory<T
   const T* left = pack_left<T>({hidden, columns, 1}, pairs, columns, memory.left);
   const T* right = a.full_right.memory.data();
   if (!a.full[static_cast<size_t>(t)]) {
-    memory.rows.clear();
-    for (const int32_t u : a.active[static_cast<size_t>(t)])
-      memory.rows.push_back(a.both_t.template data<T>() + u * 2 * a.d);
-    for (int64_t c = 0; c < 4; ++c)
-      memory.rows.push_back(a.affine.template data<T>() + (4 * t + c) * 2 * a.d);
+    column_rows(a, t, &memory.rows);
     right = pack_rows_right(memory.rows, 2 * a.d, memory.right);
   }
   T* st = memory.st.at_least(pairs * 2 * a.d);
@@ -249,24 +276,115 @@ T* pair_products(const Attention<T>& a, int64_t t, const T* hidden, TileMemory<T
   return st;
 }
 
-/// relu(query_i - key_j + s_ij), [pairs, d].
+/// relu(query_i - key_j + s_ij), [pairs, d]; memory.range gets the least and the greatest value
+/// before the ReLU of each unit, [2, d].
 template <class T>
 T* score_inputs(const Attention<T>& a, int64_t t, const T* st, TileMemory<T>& memory) {
   T* u = memory.u.at_least(a.tile_rows(t) * a.k * a.d);
+  T* HWY_RESTRICT lo = memory.range.at_least(2 * a.d);
+  T* HWY_RESTRICT hi = lo + a.d;
+  std::fill_n(lo, a.d, std::numeric_limits<T>::infinity());
+  std::fill_n(hi, a.d, -std::numeric_limits<T>::infinity());
   T* to = u;
   for (int64_t i = 0; i < a.tile_rows(t); ++i) {
     const int64_t p = a.point(t, i);
-    const T* q = a.query + p * a.d;
+    const T* HWY_RESTRICT q = a.query + p * a.d;
     for (int64_t j = 0; j < a.k; ++j, to += a.d, st += 2 * a.d) {
       const T* HWY_RESTRICT key = a.key + a.neighbour(p, j) * a.d;
       T* HWY_RESTRICT out = to;
       for (int64_t c = 0; c < a.d; ++c) {
         const T x = q[c] - key[c] + st[c];
+        lo[c] = x < lo[c] ? x : lo[c];
+        hi[c] = x > hi[c] ? x : hi[c];
         out[c] = x <= T(0) ? T(0) : x;
       }
     }
   }
   return u;
+}
+
+/// Sorts the units of the second ReLU into memory.active and memory.on. False if the products are
+/// cheaper in full.
+template <class T>
+bool split_scores(const Attention<T>& a, int64_t t, TileMemory<T>& memory) {
+  memory.active.clear();
+  memory.on.clear();
+  if (a.full[static_cast<size_t>(t)]) return false;
+  const T *lo = memory.range.memory.data(), *hi = lo + a.d;
+  for (int64_t c = 0; c < a.d; ++c) {
+    if (lo[c] > T(0)) {
+      memory.on.push_back(static_cast<int32_t>(c));
+    } else if (!(hi[c] <= T(0))) {
+      memory.active.push_back(static_cast<int32_t>(c));
+    }
+  }
+  return 2 * (std::ssize(memory.active) + a.columns(t)) < a.d;
+}
+
+/// Finds the neighbours of a tile: memory.others and memory.slot.
+template <class T>
+void find_others(const Attention<T>& a, int64_t t, TileMemory<T>& memory) {
+  if (std::ssize(memory.place) < a.n * a.v) memory.place.resize(static_cast<size_t>(a.n * a.v), -1);
+  memory.others.clear();
+  memory.slot.clear();
+  for (int64_t i = 0; i < a.tile_rows(t); ++i)
+    for (int64_t j = 0; j < a.k; ++j) {
+      const int64_t row = a.neighbour(a.point(t, i), j);
+      int32_t& place = memory.place[static_cast<size_t>(row)];
+      if (place < 0) {
+        place = static_cast<int32_t>(memory.others.size());
+        memory.others.push_back(row);
+      }
+      memory.slot.push_back(place);
+    }
+  for (const int64_t row : memory.others) memory.place[static_cast<size_t>(row)] = -1;
+}
+
+/// Copies the chosen columns of some rows.
+template <class T>
+void choose(const T* row, const std::vector<int32_t>& columns, T* out) {
+  for (const int32_t c : columns) *out++ = row[c];
+}
+
+/// What the units that are on see: the rows of M for the hidden columns, then the keys of the
+/// tile's neighbours, both at the units that are on. [columns + others, on].
+template <class T>
+T* on_rows(const Attention<T>& a, int64_t t, TileMemory<T>& memory) {
+  const int64_t width = std::ssize(memory.on);
+  T* out = memory.on_rows.at_least((a.columns(t) + std::ssize(memory.others)) * width);
+  T* to = out;
+  column_rows(a, t, &memory.rows);
+  for (const T* row : memory.rows) choose(row, memory.on, to), to += width;
+  for (const int64_t row : memory.others) choose(a.key + row * a.d, memory.on, to), to += width;
+  return out;
+}
+
+/// The first `count` of on_rows() times G: their part of the scores, [count, d].
+template <class T>
+T* on_scores(const Attention<T>& a, const T* rows, int64_t count, TileMemory<T>& memory) {
+  const int64_t width = std::ssize(memory.on);
+  memory.rows.clear();
+  for (const int32_t c : memory.on) memory.rows.push_back(a.gamma_t.template data<T>() + c * a.d);
+  const T* right = pack_rows_right(memory.rows, a.d, memory.right);
+  T* out = memory.on_scores.at_least(count * a.d);
+  if (width == 0) std::fill_n(out, count * a.d, T(0));
+  product(count, a.d, width, pack_left<T>({rows, width, 1}, count, width, memory.left), right, out,
+          a.d);
+  return out;
+}
+
+/// relu(u) of the active units beside the hidden columns, [pairs, active + columns].
+template <class T>
+T* score_columns(const Attention<T>& a, int64_t t, const T* u, const T* hidden,
+                 TileMemory<T>& memory) {
+  const int64_t pairs = a.tile_rows(t) * a.k, m = std::ssize(memory.active), columns = a.columns(t);
+  T* out = memory.columns.at_least(pairs * (m + columns));
+  T* to = out;
+  for (int64_t p = 0; p < pairs; ++p, to += m + columns) {
+    choose(u + p * a.d, memory.active, to);
+    std::copy_n(hidden + p * columns, columns, to + m);
+  }
+  return out;
 }
 
 }  // namespace restage::cpu::HWY_NAMESPACE
