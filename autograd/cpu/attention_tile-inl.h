@@ -76,7 +76,7 @@ struct Attention {
 template <class T>
 struct TileMemory {
   Buffer<T> offsets, weights, left, right, hidden, st, u, e, y, more;
-  Buffer<T> range, columns, on_rows, on_scores, chosen;
+  Buffer<T> range, columns, on_rows, on_scores, chosen, gz;
   std::vector<const T*> rows;
   std::vector<int32_t> active, on;  // units of the second ReLU
   std::vector<int64_t> others;      // rows of the batch: the neighbours in a tile, each once

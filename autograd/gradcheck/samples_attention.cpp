@@ -8,14 +8,22 @@ struct Sizes {
   int64_t n, v, k, d;
 };
 
-/// Inputs of the attention; `spread` of the points decides how many units are active in a tile.
+/// Rows that differ by `spread`.
+Tensor alike(const Shape& shape, Rng& rng, double spread) {
+  Tensor x = random(shape, rng);
+  const int64_t d = shape[-1];
+  for (int64_t i = d; i < x.numel(); ++i)
+    x.data<double>()[i] = spread < 1 ? x.item(i % d) + spread * x.item(i) : x.item(i);
+  return x;
+}
+
+/// Inputs of the attention; `spread` of the points, queries and keys decides how many units are
+/// active in a tile.
 std::vector<Tensor> inputs(const Sizes& s, Rng& rng, double spread) {
-  Tensor xyz = random({s.n, s.v, 3}, rng);
-  for (int64_t i = 0; i < xyz.numel(); ++i) xyz.data<double>()[i] *= spread;
   const Shape rows{s.n, s.v, s.d};
-  return {xyz,
-          random(rows, rng),
-          random(rows, rng),
+  return {alike({s.n, s.v, 3}, rng, spread),
+          alike(rows, rng, spread),
+          alike(rows, rng, spread),
           random(rows, rng),
           random({s.d, 3}, rng),
           random({s.d}, rng, 0.1),
@@ -44,6 +52,9 @@ void add_attention(Table& t) {
   add("far apart", {2, 4, 3, 5}, 1, false);
   add("close together", {2, 4, 3, 5}, 0.02, false);
   add("close together, in full", {2, 4, 3, 5}, 0.02, true);
+  add("few active units", {1, 5, 3, 24}, 0.01, false);
+  add("no active unit", {2, 3, 2, 16}, 1e-5, false);
+  add("few active units, several tiles", {1, 5, 60, 16}, 0.01, false);
   add("several tiles", {1, 7, 100, 2}, 0.1, false);
   add("no cloud", {0, 3, 2, 2}, 1, false);
   const std::vector<Tensor> small = inputs({1, 2, 1, 2}, rng, 1);
@@ -53,7 +64,7 @@ void add_attention(Table& t) {
       "integers as offsets",
       {small[0], small[1], small[2], small[3], small[4], small[5], small[7], small[6], small[8]},
       with(i32({1, 2, 1}, {0, 1}), false));
-  s.large("many tiles", inputs({2, 300, 5, 9}, rng, 0.1),
+  s.large("many tiles", inputs({2, 300, 5, 9}, rng, 1),
           with(random_index({2, 300, 5}, rng, 300), false));
   s.random = [](Rng& r) {
     const Sizes z{random_size(r, 1, 2), random_size(r, 1, 5), random_size(r, 1, 4),
