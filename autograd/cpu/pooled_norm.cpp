@@ -33,7 +33,7 @@ static_assert(kSquares % kRows == 0);
 /// out = x less its mean over the rows [rows, k]; the mean [1, k].
 template <class T>
 void centre(const Tensor& x, int64_t rows, int64_t k, Tensor& mean, Tensor& out) {
-  sum(SumArgs{x, mean, 1, rows, k});
+  cpu::sum(SumArgs{x, mean, 1, rows, k});
   T* m = mean.data<T>();
   for (int64_t i = 0; i < k; ++i) m[i] /= static_cast<T>(rows);
   parallel_for(rows, row_grain(k), [&](int64_t from, int64_t to) HWY_ATTR {
@@ -50,15 +50,18 @@ void centre(const Tensor& x, int64_t rows, int64_t k, Tensor& mean, Tensor& out)
 template <class T>
 struct Peaks {
   static constexpr int cols = Simd<T>::cols;
-  T sign[cols], best[cols], at[cols], squares[cols];
-  double sum[cols];  // of squares
+  using Index = hwy::MakeSigned<T>;
+  T sign[cols], best[cols], squares[cols];
+  Index at[cols];
+  double sum[cols];  // of squares, kSquares rows at a time in T
 
-  explicit Peaks(const T* scale, int64_t channels) {
+  Peaks(const T* scale, int64_t channels) {
     for (int j = 0; j < cols; ++j) {
       const T s = j < channels ? scale[j] : T(0);
       sign[j] = T(s > 0) - T(s < 0);
       best[j] = -std::numeric_limits<T>::infinity();
-      at[j] = squares[j] = 0;
+      squares[j] = 0;
+      at[j] = 0;
       sum[j] = 0;
     }
   }
@@ -66,19 +69,21 @@ struct Peaks {
   /// Takes a register tile: `rows` points from `point` on.
   void add(const T* tile, int64_t point, int64_t rows) {
     const hn::ScalableTag<T> d;
+    const hn::RebindToSigned<decltype(d)> di;
     for (int j = 0; j < cols; j += static_cast<int>(hn::Lanes(d))) {
       const auto s = hn::LoadU(d, sign + j);
-      auto top = hn::LoadU(d, best + j), where = hn::LoadU(d, at + j);
-      auto square = hn::LoadU(d, squares + j);
+      auto top = hn::LoadU(d, best + j), square = hn::LoadU(d, squares + j);
+      auto where = hn::LoadU(di, at + j);
       for (int64_t i = 0; i < rows; ++i) {
         const auto z = hn::LoadU(d, tile + i * cols + j), value = hn::Mul(z, s);
         const auto better = hn::Gt(value, top);
         top = hn::IfThenElse(better, value, top);
-        where = hn::IfThenElse(better, hn::Set(d, static_cast<T>(point + i)), where);
+        where = hn::IfThenElse(hn::RebindMask(di, better),
+                               hn::Set(di, static_cast<Index>(point + i)), where);
         square = hn::MulAdd(z, z, square);
       }
       hn::StoreU(top, d, best + j);
-      hn::StoreU(where, d, at + j);
+      hn::StoreU(where, di, at + j);
       hn::StoreU(square, d, squares + j);
     }
     if ((point + kRows) % kSquares == 0) fold();
@@ -178,7 +183,7 @@ void forward(const PooledNormArgs& args) {
   Tensor x_mean = Tensor::empty({1, k}, args.out.dtype());
   Tensor z_mean = Tensor::empty({1, o}, args.out.dtype());
   centre<T>(args.x, n * v, k, x_mean, args.centred);
-  matmul(MatmulArgs{x_mean, args.weight, z_mean, false, true, &args.bias});
+  cpu::matmul(MatmulArgs{x_mean, args.weight, z_mean, false, true, &args.bias});
   std::vector<double> squares(static_cast<size_t>(n * o));
   find_peaks<T>(args, squares.data());
   finish<T>(args, squares.data(), z_mean.data<T>());
@@ -233,8 +238,8 @@ void weight_gradient(const PooledNormGradArgs& args, const Factors& f) {
                 k = args.centred.size(2);
   const Tensor h = args.centred.reshape({n * v, k});
   Tensor gram = Tensor::empty({k, k}, h.dtype());
-  matmul(MatmulArgs{h, h, gram, true, false});
-  matmul(MatmulArgs{args.weight, gram, args.g_weight});
+  cpu::matmul(MatmulArgs{h, h, gram, true, false});
+  cpu::matmul(MatmulArgs{args.weight, gram, args.g_weight});
   const int32_t* index = args.index.data<int32_t>();
   parallel_for(o, row_grain(k * (n + 1)), [&](int64_t from, int64_t to) HWY_ATTR {
     for (int64_t c = from; c < to; ++c) {
@@ -259,10 +264,10 @@ void input_gradient(const PooledNormGradArgs& args, const Factors& f) {
   Tensor m = Tensor::empty({k, k}, args.gy.dtype());
   Tensor everywhere = Tensor::empty({1, k}, args.gy.dtype());
   scale_rows(f.slope.data<T>(), w, o, k, scaled.data<T>());
-  matmul(MatmulArgs{args.weight, scaled, m, true, false});
-  matmul(MatmulArgs{f.constant, args.weight, everywhere});
+  cpu::matmul(MatmulArgs{args.weight, scaled, m, true, false});
+  cpu::matmul(MatmulArgs{f.constant, args.weight, everywhere});
   Tensor out = args.out.reshape({n * v, k});
-  matmul(MatmulArgs{args.centred.reshape({n * v, k}), m, out, false, false, &everywhere});
+  cpu::matmul(MatmulArgs{args.centred.reshape({n * v, k}), m, out, false, false, &everywhere});
   const int32_t* index = args.index.data<int32_t>();
   parallel_for(n, row_grain(o * k), [&](int64_t from, int64_t to) HWY_ATTR {
     for (int64_t t = from * o; t < to * o; ++t) {
