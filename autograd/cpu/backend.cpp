@@ -30,6 +30,8 @@ class CpuBackend final : public Backend {
     add<FoldArgs, cpu::fold>();
     add<NormArgs, cpu::norm>();
     add<NormGradArgs, cpu::norm_grad>();
+    add<PooledNormArgs, cpu::pooled_norm>();
+    add<PooledNormGradArgs, cpu::pooled_norm_grad>();
     add<GruArgs, cpu::gru>();
     add<GruGradArgs, cpu::gru_grad>();
     add<KnnArgs, cpu::knn>();

@@ -7,6 +7,7 @@
 #include "autograd/kernels/matmul.h"
 #include "autograd/kernels/norm.h"
 #include "autograd/kernels/points.h"
+#include "autograd/kernels/pooled_norm.h"
 #include "autograd/kernels/reduce.h"
 #include "autograd/kernels/rnn.h"
 #include "autograd/kernels/rotation.h"
@@ -35,6 +36,8 @@ void unfold(const UnfoldArgs&);
 void fold(const FoldArgs&);
 void norm(const NormArgs&);
 void norm_grad(const NormGradArgs&);
+void pooled_norm(const PooledNormArgs&);
+void pooled_norm_grad(const PooledNormGradArgs&);
 void gru(const GruArgs&);
 void gru_grad(const GruGradArgs&);
 void knn(const KnnArgs&);

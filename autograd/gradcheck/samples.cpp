@@ -11,6 +11,7 @@ const std::vector<OpSamples>& all_samples() {
     add_linear(t);
     add_norm(t);
     add_points(t);
+    add_pooled_norm(t);
     add_reduce(t);
     add_rnn(t);
     add_rotation(t);

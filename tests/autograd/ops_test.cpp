@@ -2,8 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "autograd/base/parallel.h"
 #include "autograd/gradcheck/evaluate.h"
@@ -12,6 +14,7 @@
 #include "autograd/ops/linear.h"
 #include "autograd/ops/norm.h"
 #include "autograd/ops/points.h"
+#include "autograd/ops/pooled_norm.h"
 #include "autograd/ops/reduce.h"
 #include "autograd/ops/rnn.h"
 #include "autograd/ops/rotation.h"
@@ -154,6 +157,48 @@ TEST(FusedOps, BatchNormReportsItsStatistics) {
   EXPECT_NEAR(s.variance.item(0), 3.5, 1e-12);
   EXPECT_DOUBLE_EQ(s.mean.item(1), 10);
   EXPECT_NEAR(s.variance.item(1), 0, 1e-12);
+}
+
+/// x [n, v, i] around `centre`, W [o, i], b, scale and shift.
+std::vector<Tensor> trunk(int64_t n, int64_t v, int64_t i, int64_t o, double centre) {
+  const Tensor x = add_scalar(Var(random({n, v, i}, 1)), centre).value;
+  return {x, random({o, i}, 2), random({o}, 3), random({o}, 4, 0.1), random({o}, 5)};
+}
+
+TEST(FusedOps, PooledNormIsItsReference) {
+  for (const Activation act : {Activation::none, Activation::relu})
+    for (const auto& [n, v, i, o] :
+         {std::array<int64_t, 4>{1, 9, 2, 3}, {3, 40, 7, 70}, {2, 700, 300, 33}})
+      expect_fused(
+          trunk(n, v, i, o, 3),
+          [=](Args x) { return pooled_norm(x[0], x[1], x[2], x[3], x[4], act, 1e-3); },
+          [=](Args x) { return pooled_norm_reference(x[0], x[1], x[2], x[3], x[4], act, 1e-3); });
+}
+
+TEST(FusedOps, PooledNormReportsTheStatisticsOfItsReference) {
+  std::vector<Var> x;
+  for (const Tensor& t : trunk(3, 50, 6, 40, 20)) x.emplace_back(t);
+  BatchStatistics a, b;
+  pooled_norm(x[0], x[1], x[2], x[3], x[4], Activation::relu, 1e-5, &a);
+  pooled_norm_reference(x[0], x[1], x[2], x[3], x[4], Activation::relu, 1e-5, &b);
+  EXPECT_EQ(a.count, 150);
+  EXPECT_EQ(a.count, b.count);
+  expect_near(a.mean, b.mean, 1e-12, "mean");
+  expect_near(a.variance, b.variance, 1e-12, "variance");
+}
+
+TEST(FusedOps, PooledNormShowsWhatIsNotFinite) {
+  const double bad[] = {std::nan(""), std::numeric_limits<double>::infinity()};
+  for (size_t k = 0; k < 5; ++k)
+    for (const double value : bad) {
+      std::vector<Tensor> inputs = trunk(2, 5, 3, 4, 0);
+      inputs[k].data<double>()[0] = value;
+      const std::vector<Var> x(inputs.begin(), inputs.end());
+      const Tensor y = pooled_norm(x[0], x[1], x[2], x[3], x[4], Activation::relu).value;
+      const Tensor r = pooled_norm_reference(x[0], x[1], x[2], x[3], x[4], Activation::relu).value;
+      for (int64_t i = 0; i < y.numel(); ++i)
+        EXPECT_EQ(std::isfinite(y.item(i)), std::isfinite(r.item(i))) << k << " " << i;
+    }
 }
 
 TEST(FusedOps, Conv1dIsTheSumOverItsWindow) {
