@@ -12,6 +12,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <type_traits>
 
 #include "autograd/cpu/targets.h"
 
@@ -48,6 +49,26 @@ HWY_INLINE V sigmoid(V x) {
   return hn::Div(one, hn::Add(one, exp(hn::Neg(x))));
 }
 
+/// log(0) is -infinity, that of a negative number NaN.
+template <class V>
+HWY_INLINE V log(V x) {
+  const hn::DFromV<V> d;
+  using T = Lane<V>;
+  const V zero = hn::Zero(d), infinity = hn::Set(d, std::numeric_limits<T>::infinity());
+  const V nan = hn::Set(d, std::numeric_limits<T>::quiet_NaN());
+  V y = hn::IfThenElse(hn::Lt(x, infinity), hn::Log(d, x), x);  // infinity and NaN stay
+  y = hn::IfThenElse(hn::Eq(x, zero), hn::Neg(infinity), y);
+  return hn::IfThenElse(hn::Lt(x, zero), nan, y);
+}
+
+/// log(1 + exp(x)) without overflow.
+template <class V>
+HWY_INLINE V softplus(V x) {
+  const hn::DFromV<V> d;
+  const V tail = hn::Log1p(d, exp(hn::Neg(hn::Abs(x))));
+  return keep_nan(x, hn::Add(hn::IfThenElseZero(hn::Gt(x, hn::Zero(d)), x), tail));
+}
+
 /// out[i] = f(in[i]...) for i < n, whole vectors at a time; the rest in one padded vector, so every
 /// element is computed by the same instructions. out may be one of the inputs.
 template <class T, class F, class... In>
@@ -65,6 +86,92 @@ HWY_INLINE void map(int64_t n, T* out, F f, const In*... in) {
   const auto y = f(padded(in)...);
   hn::Store(y, d, rest);
   for (int64_t j = 0; i + j < n; ++j) out[i + j] = rest[j];
+}
+
+/// Like map() for several results: f(v...) gets a vector of each array, by reference, and what it
+/// leaves in those of the arrays that are not const is stored.
+template <class F, class... Array>
+HWY_INLINE void update(int64_t n, F f, Array*... arrays) {
+  using T = std::common_type_t<std::remove_const_t<Array>...>;
+  const hn::ScalableTag<T> d;
+  const auto lanes = static_cast<int64_t>(hn::Lanes(d));
+  const auto put = [&](auto v, auto* to) HWY_ATTR {
+    if constexpr (!std::is_const_v<std::remove_pointer_t<decltype(to)>>) hn::StoreU(v, d, to);
+  };
+  const auto step = [&](Array*... at) HWY_ATTR {
+    [&](auto... v) HWY_ATTR {
+      f(v...);
+      (put(v, at), ...);
+    }(hn::LoadU(d, at)...);
+  };
+  int64_t i = 0;
+  for (; i + lanes <= n; i += lanes) step((arrays + i)...);
+  if (i == n) return;
+  struct Padded {
+    T lane[HWY_MAX_BYTES / sizeof(T)];
+  };
+  const auto padded = [&](const T* from) HWY_ATTR {
+    Padded p{};
+    for (int64_t j = 0; i + j < n; ++j) p.lane[j] = from[i + j];
+    return p;
+  };
+  const auto back = [&](const Padded& p, auto* to) HWY_ATTR {
+    if constexpr (!std::is_const_v<std::remove_pointer_t<decltype(to)>>)
+      for (int64_t j = 0; i + j < n; ++j) to[i + j] = p.lane[j];
+  };
+  [&](auto... p) HWY_ATTR {
+    step(p.lane...);
+    (back(p, arrays), ...);
+  }(padded(arrays)...);
+}
+
+/// Sum of f(in[i]...) over i < n. The order of every sum along memory: 64 bytes of lanes, lane j
+/// adding the terms j, j + lanes, ... one after the other, then the lanes folded in halves, in
+/// double. (Sums across memory, over rows, have one chain for each column.)
+template <class F, class T, class... More>
+HWY_INLINE double sum_of(int64_t n, F f, const T* in, const More*... more) {
+  constexpr int64_t lanes = 64 / sizeof(T);
+  const hn::CappedTag<T, lanes> d;
+  constexpr auto width = static_cast<int64_t>(hn::MaxLanes(hn::CappedTag<T, lanes>()));
+  constexpr int64_t parts = lanes / width;
+  hn::Vec<decltype(d)> total[parts];
+  for (auto& t : total) t = hn::Zero(d);
+  int64_t i = 0;
+  for (; i + lanes <= n; i += lanes)
+    for (int64_t p = 0; p < parts; ++p)
+      total[p] = hn::Add(
+          total[p], f(hn::LoadU(d, in + i + p * width), hn::LoadU(d, more + i + p * width)...));
+  T term[lanes] = {};
+  if (i < n) {  // terms beyond n are made zero after f
+    map(n - i, term, f, in + i, (more + i)...);
+    for (int64_t p = 0; p < parts; ++p)
+      total[p] = hn::Add(total[p], hn::LoadU(d, term + p * width));
+  }
+  double folded[lanes];
+  for (int64_t p = 0; p < parts; ++p) hn::StoreU(total[p], d, term + p * width);
+  for (int64_t j = 0; j < lanes; ++j) folded[j] = static_cast<double>(term[j]);
+  for (int64_t half = lanes / 2; half > 0; half /= 2)
+    for (int64_t j = 0; j < half; ++j) folded[j] += folded[j + half];
+  return folded[0];
+}
+
+/// The largest of n > 0 numbers, NaN left out; -infinity if there are only those.
+template <class T>
+HWY_INLINE T max_of(int64_t n, const T* x) {
+  const hn::ScalableTag<T> d;
+  const auto lanes = static_cast<int64_t>(hn::Lanes(d));
+  auto top = hn::Set(d, -std::numeric_limits<T>::infinity());
+  int64_t i = 0;
+  for (; i + lanes <= n; i += lanes) {
+    const auto v = hn::LoadU(d, x + i);
+    top = hn::IfThenElse(hn::Gt(v, top), v, top);
+  }
+  HWY_ALIGN T rest[HWY_MAX_BYTES / sizeof(T)];
+  hn::Store(top, d, rest);
+  T best = rest[0];
+  for (int64_t j = 1; j < lanes; ++j) best = rest[j] > best ? rest[j] : best;
+  for (; i < n; ++i) best = x[i] > best ? x[i] : best;
+  return best;
 }
 
 }  // namespace restage::cpu::HWY_NAMESPACE
