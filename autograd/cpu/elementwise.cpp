@@ -231,7 +231,10 @@ void dropout(const DropoutArgs& args) {
       for (int64_t i = from; i < to; i += kWords) {
         philox_words(args.key, static_cast<uint64_t>(i / 4), kWords / 4, words);
         const int64_t n = std::min(kWords, to - i);
-        for (int64_t j = 0; j < n; ++j) out[i + j] = words[j] < limit ? T(0) : x[i + j] * factor;
+        for (int64_t j = 0; j < n; ++j) {
+          const T kept = x[i + j] * factor;
+          out[i + j] = words[j] < limit ? T(0) : kept;
+        }
       }
     });
   });

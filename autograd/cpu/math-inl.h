@@ -29,17 +29,63 @@ HWY_INLINE V keep_nan(V x, V y) {
   return hn::IfThenElse(hn::Eq(x, x), y, x);
 }
 
+/// exp(x) within 2 units in the last place; below 1.7e-38 (x < -87) zero. (Highway's own gives the
+/// subnormal numbers too, and takes twice as long.)
+template <class V>
+HWY_INLINE V exp_of_float(V x) {
+  const hn::DFromV<V> d;
+  const hn::RebindToSigned<decltype(d)> di;
+  const auto number = [&](float c) HWY_ATTR { return hn::Set(d, c); };
+  // x = n ln 2 + r; adding 1.5 * 2^23 leaves the nearest whole number in the lowest bits.
+  const V magic = number(12582912.0f);
+  const V shifted = hn::MulAdd(x, number(1.44269504f), magic), n = hn::Sub(shifted, magic);
+  V r = hn::NegMulAdd(n, number(0.693359375f), x);
+  r = hn::NegMulAdd(n, number(-2.12194440e-4f), r);
+  V p = number(1.9875691500e-4f);  // exp(r) = 1 + r + r^2 p(r): Cephes' minimax polynomial
+  p = hn::MulAdd(p, r, number(1.3981999507e-3f));
+  p = hn::MulAdd(p, r, number(8.3334519073e-3f));
+  p = hn::MulAdd(p, r, number(4.1665795894e-2f));
+  p = hn::MulAdd(p, r, number(1.6666665459e-1f));
+  p = hn::MulAdd(p, r, number(5.0000001201e-1f));
+  const V y = hn::Add(hn::MulAdd(hn::Mul(r, r), p, r), number(1.0f));
+  // Times 2^(n - 1) and then 2: 2^128 is no number.
+  const auto exponent = hn::Add(hn::BitCast(di, shifted), hn::Set(di, 126 - 0x4b400000));
+  const V half = hn::Mul(y, hn::BitCast(d, hn::ShiftLeft<23>(exponent)));
+  const V small = hn::IfThenZeroElse(hn::Lt(x, number(-87.0f)), hn::Add(half, half));
+  const V infinity = number(std::numeric_limits<float>::infinity());
+  return hn::IfThenElse(hn::Gt(x, number(88.7228317f)), infinity, small);
+}
+
 template <class V>
 HWY_INLINE V exp(V x) {
-  const hn::DFromV<V> d;
   using T = Lane<V>;
+  if constexpr (sizeof(T) == sizeof(float)) return exp_of_float(x);
+  const hn::DFromV<V> d;
   const V limit = hn::Set(d, std::log(std::numeric_limits<T>::max()));
   const V infinity = hn::Set(d, std::numeric_limits<T>::infinity());
   return keep_nan(x, hn::IfThenElse(hn::Gt(x, limit), infinity, hn::Exp(d, hn::Min(x, limit))));
 }
 
+/// 1 - 2 / (exp(2 |x|) + 1), and near zero Cephes' polynomial.
+template <class V>
+HWY_INLINE V tanh_of_float(V x) {
+  const hn::DFromV<V> d;
+  const auto number = [&](float c) HWY_ATTR { return hn::Set(d, c); };
+  const V size = hn::Abs(x), one = number(1.0f), square = hn::Mul(x, x);
+  const V grown = exp_of_float(hn::Add(size, size));
+  const V large = hn::Sub(one, hn::Div(number(2.0f), hn::Add(grown, one)));
+  V p = number(-5.70498872745e-3f);
+  p = hn::MulAdd(p, square, number(2.06390887954e-2f));
+  p = hn::MulAdd(p, square, number(-5.37397155531e-2f));
+  p = hn::MulAdd(p, square, number(1.33314422036e-1f));
+  p = hn::MulAdd(p, square, number(-3.33332819422e-1f));
+  const V small = hn::MulAdd(hn::Mul(p, square), x, x);
+  return hn::IfThenElse(hn::Lt(size, number(0.625f)), small, hn::CopySign(large, x));
+}
+
 template <class V>
 HWY_INLINE V tanh(V x) {
+  if constexpr (sizeof(Lane<V>) == sizeof(float)) return tanh_of_float(x);
   return keep_nan(x, hn::Tanh(hn::DFromV<V>(), x));
 }
 

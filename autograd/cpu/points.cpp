@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <type_traits>
 #include <vector>
 
 #include "autograd/cpu/common.h"
@@ -15,7 +16,7 @@ HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
 namespace {
 
-constexpr int64_t kPadding = HWY_MAX_BYTES / sizeof(float);
+constexpr int64_t kPadding = 64 / sizeof(float);  // the widest vector
 
 /// A cloud by coordinates, which may be read kPadding numbers beyond its end.
 template <class T>
@@ -42,55 +43,79 @@ HWY_INLINE hn::Vec<D> squared_distance(D d, const Cloud<T>& c, int64_t i, const 
   return hn::MulAdd(dz, dz, hn::MulAdd(dy, dy, hn::Mul(dx, dx)));
 }
 
-/// The k nearest so far, in order; of equal ones the earlier.
+/// Memory for nearest(), kept from query to query.
 template <class T>
-struct Nearest {
-  explicit Nearest(int64_t k) : distance(static_cast<size_t>(k)), index(distance.size()) {}
-  void clear() { count = 0; }
-  bool full() const { return count == distance.size(); }
-  /// For indices in rising order.
-  void add(T d, int64_t i) {
-    size_t at = count;
-    if (full()) {
-      if (!(d < distance.back())) return;
-      --at;
-    } else {
-      ++count;
-    }
-    for (; at > 0 && d < distance[at - 1]; --at) {
-      distance[at] = distance[at - 1];
-      index[at] = index[at - 1];
-    }
-    distance[at] = d;
-    index[at] = static_cast<int32_t>(i);
-  }
-  std::vector<T> distance;
-  std::vector<int32_t> index;
-  size_t count = 0;
+struct Selection {
+  explicit Selection(int64_t points, int64_t k)
+      : distance(static_cast<size_t>(points + kPadding)),
+        candidate(distance.size()),
+        index(distance.size()),
+        best(static_cast<size_t>(k)) {}
+  using Index = std::conditional_t<sizeof(T) == 4, int32_t, int64_t>;
+  std::vector<T> distance, candidate;  ///< of all points; of those that may be among the k
+  std::vector<Index> index;            ///< of the candidates
+  std::vector<T> best;
 };
 
-/// Places below a bound are few: whole vectors are passed over, and the rest sorted in.
+/// A bound that at least k of the distances do not exceed: the points are dealt into k groups or
+/// somewhat more, and each has a nearest one.
 template <class T>
-void nearest(const T* query, const Cloud<T>& cloud, int64_t k, std::vector<T>& distance,
-             Nearest<T>& best, int32_t* out) {
+hn::Vec<hn::ScalableTag<T>> bound_of(const T* distance, int64_t v, int64_t k) {
   const hn::ScalableTag<T> d;
+  const auto lanes = static_cast<int64_t>(hn::Lanes(d));
+  const int64_t step = (k + lanes - 1) / lanes * lanes;
+  auto bound = hn::Set(d, T(0));
+  for (int64_t g = 0; g < step; g += lanes) {
+    auto least = hn::Set(d, std::numeric_limits<T>::infinity());
+    for (int64_t i = g; i < v; i += step) least = hn::Min(least, hn::LoadU(d, distance + i));
+    bound = hn::Max(bound, least);
+  }
+  return hn::MaxOfLanes(d, bound);
+}
+
+/// The k nearest points in order, of equal ones the earlier. A point with NaN is infinitely far.
+template <class T>
+void nearest(const T* query, const Cloud<T>& cloud, int64_t k, Selection<T>& s, int32_t* out) {
+  const hn::ScalableTag<T> d;
+  const hn::RebindToSigned<decltype(d)> di;
   using V = hn::Vec<decltype(d)>;
+  using Index = typename Selection<T>::Index;
   const auto lanes = static_cast<int64_t>(hn::Lanes(d));
   const V infinity = hn::Set(d, std::numeric_limits<T>::infinity());
   const int64_t v = cloud.size;
-  T* to = distance.data();
   for (int64_t i = 0; i < v; i += lanes) {
     const V far = squared_distance(d, cloud, i, query);
-    hn::StoreU(hn::IfThenElse(hn::Eq(far, far), far, infinity), d, to + i);  // NaN is far away
+    hn::StoreU(hn::IfThenElse(hn::Eq(far, far), far, infinity), d, s.distance.data() + i);
   }
-  best.clear();
-  for (int64_t i = 0; i < k; ++i) best.add(to[i], i);
-  for (int64_t i = k; i < v; i += lanes) {
-    const V bound = hn::Set(d, best.distance.back());
-    if (hn::AllFalse(d, hn::Lt(hn::LoadU(d, to + i), bound))) continue;
-    for (int64_t j = i; j < std::min(v, i + lanes); ++j) best.add(to[j], j);
+  std::fill_n(s.distance.begin() + v, kPadding, std::numeric_limits<T>::infinity());
+  const V bound = bound_of(s.distance.data(), v, k);
+  size_t candidates = 0;
+  auto here = hn::Iota(di, 0);
+  for (int64_t i = 0; i < v; i += lanes) {
+    const V far = hn::LoadU(d, s.distance.data() + i);
+    const auto close = hn::Le(far, bound);
+    hn::CompressStore(far, close, d, s.candidate.data() + candidates);
+    candidates += hn::CompressStore(here, hn::RebindMask(di, close), di, &s.index[candidates]);
+    here = hn::Add(here, hn::Set(di, static_cast<Index>(lanes)));
   }
-  std::copy_n(best.index.begin(), k, out);
+  int64_t count = 0;  // sorted so far; indices rise, so an equal one goes behind
+  for (size_t c = 0; c < candidates && s.index[c] < v; ++c) {
+    const T far = s.candidate[c];
+    int64_t at = count;
+    if (count < k) {
+      ++count;
+    } else if (far < s.best.back()) {
+      --at;
+    } else {
+      continue;
+    }
+    for (; at > 0 && far < s.best[static_cast<size_t>(at - 1)]; --at) {
+      s.best[static_cast<size_t>(at)] = s.best[static_cast<size_t>(at - 1)];
+      out[at] = out[at - 1];
+    }
+    s.best[static_cast<size_t>(at)] = far;
+    out[at] = static_cast<int32_t>(s.index[c]);
+  }
 }
 
 /// Lowers every best[i] to the squared distance from a place if that is less, and returns the first
@@ -182,11 +207,10 @@ void knn(const KnnArgs& args) {
     using T = decltype(zero);
     parallel_for(args.query.size(0) * m, 64, [&](int64_t from, int64_t to) HWY_ATTR {
       Cloud<T> cloud(v);
-      std::vector<T> distance(cloud.x.size());
-      Nearest<T> best(k);
+      Selection<T> selection(v, k);
       for (int64_t q = from; q < to; ++q) {
         if (q == from || q % m == 0) cloud.set(args.points.data<T>() + q / m * v * 3);
-        nearest(args.query.data<T>() + 3 * q, cloud, k, distance, best,
+        nearest(args.query.data<T>() + 3 * q, cloud, k, selection,
                 args.out.data<int32_t>() + q * k);
       }
     });
@@ -233,11 +257,8 @@ void attention_pool_grad(const AttentionPoolGradArgs& args) {
           const int64_t at = (p * k + j) * d;
           const T *w = args.weights.data<T>() + at, *v = args.value.data<T>() + at;
           T *g_value = args.out.data<T>() + at, *g_score = args.g_score.data<T>() + at;
-          for (int64_t i = 0; i < d; ++i) {
-            const T gw = g[i] * w[i];
-            g_value[i] = gw;
-            g_score[i] = scale * gw * (v[i] - y[i]);
-          }
+          for (int64_t i = 0; i < d; ++i) g_value[i] = g[i] * w[i];
+          for (int64_t i = 0; i < d; ++i) g_score[i] = scale * w[i] * g[i] * (v[i] - y[i]);
         }
       }
     });
