@@ -171,11 +171,20 @@ HWY_INLINE void update(int64_t n, F f, Array*... arrays) {
   }(padded(arrays)...);
 }
 
+/// t[j] += t[j + Half] for j < Half.
+template <int Half, class T>
+HWY_INLINE void add_halves(T* t) {
+  const hn::CappedTag<T, Half> d;
+  const auto width = static_cast<int64_t>(hn::Lanes(d));
+  for (int64_t j = 0; j < Half; j += width)
+    hn::StoreU(hn::Add(hn::LoadU(d, t + j), hn::LoadU(d, t + j + Half)), d, t + j);
+}
+
 /// Sum of f(in[i]...) over i < n. The order of every sum along memory: 64 bytes of lanes, lane j
-/// adding the terms j, j + lanes, ... one after the other, then the lanes folded in halves, in
-/// double. (Sums across memory, over rows, have one chain for each column.)
+/// adding the terms j, j + lanes, ... one after the other, then the lanes folded in halves. (Sums
+/// across memory, over rows, have one chain for each column.)
 template <class F, class T, class... More>
-HWY_INLINE double sum_of(int64_t n, F f, const T* in, const More*... more) {
+HWY_INLINE T sum_of(int64_t n, F f, const T* in, const More*... more) {
   constexpr int64_t lanes = 64 / sizeof(T);
   const hn::CappedTag<T, lanes> d;
   constexpr auto width = static_cast<int64_t>(hn::MaxLanes(hn::CappedTag<T, lanes>()));
@@ -193,12 +202,10 @@ HWY_INLINE double sum_of(int64_t n, F f, const T* in, const More*... more) {
     for (int64_t p = 0; p < parts; ++p)
       total[p] = hn::Add(total[p], hn::LoadU(d, term + p * width));
   }
-  double folded[lanes];
   for (int64_t p = 0; p < parts; ++p) hn::StoreU(total[p], d, term + p * width);
-  for (int64_t j = 0; j < lanes; ++j) folded[j] = static_cast<double>(term[j]);
-  for (int64_t half = lanes / 2; half > 0; half /= 2)
-    for (int64_t j = 0; j < half; ++j) folded[j] += folded[j + half];
-  return folded[0];
+  if constexpr (lanes == 16) add_halves<8>(term);
+  add_halves<4>(term);
+  return (term[0] + term[2]) + (term[1] + term[3]);
 }
 
 /// The largest of n > 0 numbers, NaN left out; -infinity if there are only those.

@@ -147,7 +147,7 @@ void norm_columns_grad(const NormGradArgs& args) {
 }
 
 /// Layer norm: every row by itself, scale and shift along the row. Rows are short, so their sums
-/// are in T (sum_of folds its lanes in double).
+/// are in T.
 template <class T>
 void norm_rows(const NormArgs& args) {
   const int64_t n = args.n;
