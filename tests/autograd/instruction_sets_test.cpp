@@ -89,5 +89,53 @@ TEST(InstructionSets, TheBaselineIsCorrectToo) {
   });
 }
 
+/// The numbers that functions are asked for: ordinary ones, tiny, huge and none.
+Tensor arguments(DType type) {
+  std::vector<double> x = {0.0,   -0.0,   HUGE_VAL, -HUGE_VAL, std::nan(""),
+                           1e-30, -1e-30, 1e30,     -1e30};
+  for (int i = -2000; i <= 2000; ++i) x.push_back(i * 0.05);
+  for (int i = 0; i < 60; ++i) x.push_back(std::pow(2.0, -2 * i) * (i % 2 ? 1.37 : -1.11));
+  Tensor t = Tensor::empty({static_cast<int64_t>(x.size())}, DType::f64);
+  std::copy(x.begin(), x.end(), t.data<double>());
+  return t.cast(type);
+}
+
+TEST(ElementaryFunctions, AreThoseOfTheStandardLibrary) {
+  struct Case {
+    const char* name;
+    std::function<Var(const Var&)> ours;
+    std::function<double(double)> theirs;
+  };
+  const std::vector<Case> cases = {
+      {"exp", [](const Var& x) { return exp(x); }, [](double x) { return std::exp(x); }},
+      {"log", [](const Var& x) { return log(x); }, [](double x) { return std::log(x); }},
+      {"tanh", [](const Var& x) { return tanh(x); }, [](double x) { return std::tanh(x); }},
+      {"sqrt", [](const Var& x) { return sqrt(x); }, [](double x) { return std::sqrt(x); }},
+      {"sigmoid", [](const Var& x) { return sigmoid(x); },
+       [](double x) { return 1 / (1 + std::exp(-x)); }},
+      {"softplus", [](const Var& x) { return softplus(x); },
+       [](double x) {
+         return std::isnan(x) ? x : std::max(x, 0.0) + std::log1p(std::exp(-std::abs(x)));
+       }},
+      {"relu", [](const Var& x) { return relu(x); }, [](double x) { return x <= 0 ? 0 : x; }}};
+  for (const std::string& set : instruction_sets())
+    for (const DType type : {DType::f32, DType::f64}) {
+      const UseSet use(set);
+      const bool narrow = type == DType::f32;
+      const double tolerance = narrow ? 6e-7 : 2e-15, smallest = narrow ? 2e-38 : 1e-307;
+      const Tensor x = arguments(type);
+      for (const Case& c : cases) {
+        const Tensor y = c.ours(Var(x)).value;
+        for (int64_t i = 0; i < x.numel(); ++i) {
+          const double exact = c.theirs(x.item(i));
+          const double want = narrow ? static_cast<float>(exact) : exact, got = y.item(i);
+          ASSERT_TRUE(want == got || (std::isnan(want) && std::isnan(got)) ||
+                      std::abs(want - got) <= tolerance * std::abs(want) + smallest)
+              << set << " " << c.name << "(" << x.item(i) << ") = " << got << ", not " << want;
+        }
+      }
+    }
+}
+
 }  // namespace
 }  // namespace restage::gradcheck
