@@ -141,6 +141,15 @@ void binary_rows(const T* a, const T* b, T* out, const BroadcastPlan& plan) {
   }
 }
 
+/// factors[i] = 0 with probability limit / 2^32 and else `kept`; one Philox call decides for four
+/// neighbours. first and count are multiples of 32.
+template <class T>
+void dropout_factors(const RngKey& key, uint32_t limit, T kept, int64_t first, int64_t count,
+                     uint32_t* words, T* factors) {
+  philox_words(key, static_cast<uint64_t>(first / 4), count / 4, words);
+  for (int64_t i = 0; i < count; ++i) factors[i] = words[i] < limit ? T(0) : kept;
+}
+
 }  // namespace
 
 void unary(const UnaryArgs& args) {
@@ -218,23 +227,21 @@ void accumulate(const AccumulateArgs& args) {
 }
 
 void dropout(const DropoutArgs& args) {
-  // One Philox call gives the decisions of four neighbours.
   const auto limit = static_cast<uint32_t>(args.p * 4294967296.0);
   dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
     using T = decltype(zero);
-    const T* x = args.x.data<T>();
-    T* out = args.out.data<T>();
-    const T factor = static_cast<T>(1.0 / (1.0 - args.p));
+    const T kept = static_cast<T>(1.0 / (1.0 - args.p));
     parallel_for(args.out.numel(), kGrain, [&](int64_t from, int64_t to) HWY_ATTR {
-      constexpr int64_t kWords = 256;  // divides kGrain
-      HWY_ALIGN uint32_t words[kWords];
-      for (int64_t i = from; i < to; i += kWords) {
-        philox_words(args.key, static_cast<uint64_t>(i / 4), kWords / 4, words);
-        const int64_t n = std::min(kWords, to - i);
-        for (int64_t j = 0; j < n; ++j) {
-          const T kept = x[i + j] * factor;
-          out[i + j] = words[j] < limit ? T(0) : kept;
-        }
+      constexpr int64_t kBlock = 256;  // divides kGrain
+      uint32_t words[kBlock];
+      T factors[kBlock];
+      const auto drop = [](auto x, auto f) HWY_ATTR {  // NaN and infinity, too
+        return hn::IfThenZeroElse(hn::Eq(f, hn::Zero(hn::DFromV<decltype(f)>())), hn::Mul(x, f));
+      };
+      for (int64_t i = from; i < to; i += kBlock) {
+        dropout_factors(args.key, limit, kept, i, kBlock, words, factors);
+        map(std::min(kBlock, to - i), args.out.data<T>() + i, drop, args.x.data<T>() + i,
+            static_cast<const T*>(factors));
       }
     });
   });

@@ -3,8 +3,9 @@
 #include <hwy/foreach_target.h>  // once per instruction set
 
 #include <algorithm>
+#include <bit>
+#include <cstring>
 #include <limits>
-#include <type_traits>
 #include <vector>
 
 #include "autograd/cpu/common.h"
@@ -43,20 +44,6 @@ HWY_INLINE hn::Vec<D> squared_distance(D d, const Cloud<T>& c, int64_t i, const 
   return hn::MulAdd(dz, dz, hn::MulAdd(dy, dy, hn::Mul(dx, dx)));
 }
 
-/// Memory for nearest(), kept from query to query.
-template <class T>
-struct Selection {
-  explicit Selection(int64_t points, int64_t k)
-      : distance(static_cast<size_t>(points + kPadding)),
-        candidate(distance.size()),
-        index(distance.size()),
-        best(static_cast<size_t>(k)) {}
-  using Index = std::conditional_t<sizeof(T) == 4, int32_t, int64_t>;
-  std::vector<T> distance, candidate;  ///< of all points; of those that may be among the k
-  std::vector<Index> index;            ///< of the candidates
-  std::vector<T> best;
-};
-
 /// A bound that at least k of the distances do not exceed: the points are dealt into k groups or
 /// somewhat more, and each has a nearest one.
 template <class T>
@@ -75,46 +62,40 @@ hn::Vec<hn::ScalableTag<T>> bound_of(const T* distance, int64_t v, int64_t k) {
 
 /// The k nearest points in order, of equal ones the earlier. A point with NaN is infinitely far.
 template <class T>
-void nearest(const T* query, const Cloud<T>& cloud, int64_t k, Selection<T>& s, int32_t* out) {
+void nearest(const T* query, const Cloud<T>& cloud, int64_t k, T* distance, T* best, int32_t* out) {
   const hn::ScalableTag<T> d;
-  const hn::RebindToSigned<decltype(d)> di;
   using V = hn::Vec<decltype(d)>;
-  using Index = typename Selection<T>::Index;
   const auto lanes = static_cast<int64_t>(hn::Lanes(d));
   const V infinity = hn::Set(d, std::numeric_limits<T>::infinity());
   const int64_t v = cloud.size;
   for (int64_t i = 0; i < v; i += lanes) {
     const V far = squared_distance(d, cloud, i, query);
-    hn::StoreU(hn::IfThenElse(hn::Eq(far, far), far, infinity), d, s.distance.data() + i);
+    hn::StoreU(hn::IfThenElse(hn::Eq(far, far), far, infinity), d, distance + i);
   }
-  std::fill_n(s.distance.begin() + v, kPadding, std::numeric_limits<T>::infinity());
-  const V bound = bound_of(s.distance.data(), v, k);
-  size_t candidates = 0;
-  auto here = hn::Iota(di, 0);
-  for (int64_t i = 0; i < v; i += lanes) {
-    const V far = hn::LoadU(d, s.distance.data() + i);
-    const auto close = hn::Le(far, bound);
-    hn::CompressStore(far, close, d, s.candidate.data() + candidates);
-    candidates += hn::CompressStore(here, hn::RebindMask(di, close), di, &s.index[candidates]);
-    here = hn::Add(here, hn::Set(di, static_cast<Index>(lanes)));
-  }
-  int64_t count = 0;  // sorted so far; indices rise, so an equal one goes behind
-  for (size_t c = 0; c < candidates && s.index[c] < v; ++c) {
-    const T far = s.candidate[c];
-    int64_t at = count;
-    if (count < k) {
-      ++count;
-    } else if (far < s.best.back()) {
-      --at;
-    } else {
-      continue;
-    }
-    for (; at > 0 && far < s.best[static_cast<size_t>(at - 1)]; --at) {
-      s.best[static_cast<size_t>(at)] = s.best[static_cast<size_t>(at - 1)];
+  std::fill_n(distance + v, kPadding, std::numeric_limits<T>::infinity());
+  const V bound = bound_of(distance, v, k);
+  int64_t count = 0;
+  const auto add = [&](int64_t i) {  // indices rise, so an equal one goes behind
+    const T far = distance[i];
+    if (count == k && !(far < best[k - 1])) return;
+    count = std::min(count + 1, k);
+    int64_t at = count - 1;
+    for (; at > 0 && far < best[at - 1]; --at) {
+      best[at] = best[at - 1];
       out[at] = out[at - 1];
     }
-    s.best[static_cast<size_t>(at)] = far;
-    out[at] = static_cast<int32_t>(s.index[c]);
+    best[at] = far;
+    out[at] = static_cast<int32_t>(i);
+  };
+  for (int64_t i = 0; i < v; i += lanes) {
+    uint8_t bytes[8] = {};
+    hn::StoreMaskBits(d, hn::Le(hn::LoadU(d, distance + i), bound), bytes);
+    uint64_t bits;
+    std::memcpy(&bits, bytes, sizeof bits);
+    for (; bits != 0; bits &= bits - 1) {
+      const int64_t at = i + std::countr_zero(bits);
+      if (at < v) add(at);
+    }
   }
 }
 
@@ -207,10 +188,10 @@ void knn(const KnnArgs& args) {
     using T = decltype(zero);
     parallel_for(args.query.size(0) * m, 64, [&](int64_t from, int64_t to) HWY_ATTR {
       Cloud<T> cloud(v);
-      Selection<T> selection(v, k);
+      std::vector<T> distance(cloud.x.size()), best(static_cast<size_t>(k));
       for (int64_t q = from; q < to; ++q) {
         if (q == from || q % m == 0) cloud.set(args.points.data<T>() + q / m * v * 3);
-        nearest(args.query.data<T>() + 3 * q, cloud, k, selection,
+        nearest(args.query.data<T>() + 3 * q, cloud, k, distance.data(), best.data(),
                 args.out.data<int32_t>() + q * k);
       }
     });
