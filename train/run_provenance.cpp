@@ -5,6 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "autograd/kernels/instruction_sets.h"
+
 // The build gives these for this file; without them the answer is "unknown".
 #ifndef RESTAGE_VERSION
 #define RESTAGE_VERSION "unknown"
@@ -26,23 +28,6 @@ std::string compiler() {
   return "gcc " __VERSION__;
 #else
   return "unknown";
-#endif
-}
-
-/// The widest vector instructions that the compiler was allowed to use.
-std::string simd() {
-#if defined(__AVX512F__)
-  return "avx512";
-#elif defined(__AVX2__) && defined(__FMA__)
-  return "avx2+fma";
-#elif defined(__AVX__)
-  return "avx";
-#elif defined(__SSE2__)
-  return "sse2";
-#elif defined(__ARM_NEON)
-  return "neon";
-#else
-  return "none";
 #endif
 }
 
@@ -72,7 +57,7 @@ std::string provenance_json(const RunInput& input) {
                                  {"flags", RESTAGE_FLAGS},
                                  {"processor", processor()},
                                  {"cores", std::thread::hardware_concurrency()},
-                                 {"simd", simd()},
+                                 {"simd", instruction_set()},
                                  {"threads", input.threads},
                                  {"seed", input.seed},
                                  {"data", nlohmann::ordered_json::array()},

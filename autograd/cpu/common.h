@@ -1,9 +1,9 @@
 // Small helpers of the CPU kernels.
 #pragma once
 
-#include <Eigen/Core>
-#include <Eigen/Geometry>
+#include <algorithm>
 #include <cstdint>
+#include <string>
 
 #include "autograd/base/error.h"
 #include "autograd/base/parallel.h"
@@ -25,11 +25,6 @@ void dispatch(DType type, F&& f) {
     throw Error(std::string("kernel has no variant for ") + name_of(type));
   }
 }
-
-template <class T>
-using ConstArray = Eigen::Map<const Eigen::Array<T, Eigen::Dynamic, 1>>;
-template <class T>
-using MutableArray = Eigen::Map<Eigen::Array<T, Eigen::Dynamic, 1>>;
 
 /// Rows per piece so that a piece has about kGrain numbers.
 inline int64_t row_grain(int64_t row_size) {

@@ -1,100 +1,97 @@
-#include <cmath>
-#include <cstring>
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "autograd/cpu/elementwise.cpp"
+#include <hwy/foreach_target.h>  // once per instruction set
 
+#include <algorithm>
+#include <atomic>
+
+#include "autograd/cpu/broadcast.h"
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/kernels.h"
+#include "autograd/cpu/math-inl.h"
+#include "autograd/cpu/philox-inl.h"
+#include "autograd/cpu/targets.h"
 
-namespace restage::cpu {
+HWY_BEFORE_NAMESPACE();
+namespace restage::cpu::HWY_NAMESPACE {
 namespace {
 
 template <class T>
-void apply_unary(Unary op, const ConstArray<T>& x, MutableArray<T>& y, T alpha) {
+void apply_unary(Unary op, int64_t n, const T* x, T* y, T alpha) {
+  const hn::ScalableTag<T> d;
+  using V = hn::Vec<decltype(d)>;
+  const V zero = hn::Zero(d), factor = hn::Set(d, alpha);
+  const auto each = [&](auto f) HWY_ATTR { map(n, y, f, x); };
   switch (op) {
     case Unary::neg:
-      y = -x;
-      break;
+      return each([](V v) HWY_ATTR { return hn::Neg(v); });
     case Unary::exp:
-      y = x.exp();
-      break;
+      return each([](V v) HWY_ATTR { return exp(v); });
     case Unary::log:
-      y = x.log();
-      break;
+      return each([](V v) HWY_ATTR { return log(v); });
     case Unary::sqrt:
-      y = x.sqrt();
-      break;
+      return each([](V v) HWY_ATTR { return hn::Sqrt(v); });
     case Unary::square:
-      y = x.square();
-      break;
+      return each([](V v) HWY_ATTR { return hn::Mul(v, v); });
     case Unary::abs:
-      y = x.abs();
-      break;
+      return each([](V v) HWY_ATTR { return hn::Abs(v); });
     case Unary::sigmoid:
-      y = T(1) / (T(1) + (-x).exp());
-      break;
+      return each([](V v) HWY_ATTR { return sigmoid(v); });
     case Unary::tanh:
-      y = x.tanh();
-      break;
-    case Unary::relu:
-      y = (x <= T(0)).select(T(0), x);  // NaN stays NaN
-      break;
+      return each([](V v) HWY_ATTR { return tanh(v); });
+    case Unary::relu:  // NaN stays NaN
+      return each([&](V v) HWY_ATTR { return hn::IfThenZeroElse(hn::Le(v, zero), v); });
     case Unary::leaky_relu:
-      y = (x > T(0)).select(x, alpha * x);
-      break;
+      return each([&](V v)
+                      HWY_ATTR { return hn::IfThenElse(hn::Gt(v, zero), v, hn::Mul(factor, v)); });
     case Unary::softplus:
-      y = x.max(T(0)) + (-x.abs()).exp().log1p();
-      break;
+      return each([](V v) HWY_ATTR { return softplus(v); });
     case Unary::scale:
-      y = alpha * x;
-      break;
+      return each([&](V v) HWY_ATTR { return hn::Mul(factor, v); });
     case Unary::add_scalar:
-      y = x + alpha;
-      break;
+      return each([&](V v) HWY_ATTR { return hn::Add(v, factor); });
   }
 }
 
 template <class T>
-void apply_unary_grad(Unary op, const ConstArray<T>& x, const ConstArray<T>& y,
-                      const ConstArray<T>& g, MutableArray<T>& out, T alpha) {
+void apply_unary_grad(Unary op, int64_t n, const T* x, const T* y, const T* g, T* out, T alpha) {
+  const hn::ScalableTag<T> d;
+  using V = hn::Vec<decltype(d)>;
+  const V zero = hn::Zero(d), one = hn::Set(d, T(1)), factor = hn::Set(d, alpha);
+  const auto by_x = [&](auto f) HWY_ATTR { map(n, out, f, g, x); };
+  const auto by_y = [&](auto f) HWY_ATTR { map(n, out, f, g, y); };
+  const auto constant = [&](auto f) HWY_ATTR { map(n, out, f, g); };
   switch (op) {
     case Unary::neg:
-      out = -g;
-      break;
+      return constant([](V a) HWY_ATTR { return hn::Neg(a); });
     case Unary::exp:
-      out = g * y;
-      break;
+      return by_y([](V a, V v) HWY_ATTR { return hn::Mul(a, v); });
     case Unary::log:
-      out = g / x;
-      break;
+      return by_x([](V a, V v) HWY_ATTR { return hn::Div(a, v); });
     case Unary::sqrt:
-      out = g * T(0.5) / y;
-      break;
+      return by_y([&](V a, V v) HWY_ATTR { return hn::Div(a, hn::Add(v, v)); });
     case Unary::square:
-      out = T(2) * g * x;
-      break;
-    case Unary::abs:
-      out = g * x.sign();
-      break;
+      return by_x([](V a, V v) HWY_ATTR { return hn::Mul(hn::Add(a, a), v); });
+    case Unary::abs:  // 0 at 0
+      return by_x([&](V a, V v) HWY_ATTR {
+        const V other = hn::IfThenElse(hn::Lt(v, zero), hn::Neg(a), hn::Mul(a, v));
+        return hn::IfThenElse(hn::Gt(v, zero), a, other);
+      });
     case Unary::sigmoid:
-      out = g * y * (T(1) - y);
-      break;
+      return by_y([&](V a, V v) HWY_ATTR { return hn::Mul(hn::Mul(a, v), hn::Sub(one, v)); });
     case Unary::tanh:
-      out = g * (T(1) - y.square());
-      break;
+      return by_y([&](V a, V v) HWY_ATTR { return hn::Mul(a, hn::NegMulAdd(v, v, one)); });
     case Unary::relu:
-      out = (x <= T(0)).select(T(0), g);
-      break;
+      return by_x([&](V a, V v) HWY_ATTR { return hn::IfThenZeroElse(hn::Le(v, zero), a); });
     case Unary::leaky_relu:
-      out = (x > T(0)).select(g, alpha * g);
-      break;
+      return by_x([&](V a, V v)
+                      HWY_ATTR { return hn::IfThenElse(hn::Gt(v, zero), a, hn::Mul(factor, a)); });
     case Unary::softplus:
-      out = g / (T(1) + (-x).exp());
-      break;
+      return by_x([](V a, V v) HWY_ATTR { return hn::Mul(a, sigmoid(v)); });
     case Unary::scale:
-      out = alpha * g;
-      break;
+      return constant([&](V a) HWY_ATTR { return hn::Mul(factor, a); });
     case Unary::add_scalar:
-      out = g;
-      break;
+      return constant([](V a) HWY_ATTR { return a; });
   }
 }
 
@@ -113,67 +110,10 @@ T combine(Binary op, T a, T b) {
   return T(0);
 }
 
-/// Row-major walk with stride 0 along broadcast axes, after merging axes that both sides walk
-/// alike.
-struct BroadcastPlan {
-  int64_t outer = 1, inner = 1;
-  std::array<int64_t, Shape::kMaxRank> size{}, step_a{}, step_b{};
-  int rank = 0;
-  int64_t inner_a = 0, inner_b = 0;  // 1 or 0 along the innermost run
-
-  BroadcastPlan(const Shape& a, const Shape& b, const Shape& out) {
-    int64_t sa = 1, sb = 1;
-    std::array<int64_t, Shape::kMaxRank> n{}, da{}, db{};
-    int count = 0;  // innermost first
-    for (int i = out.rank() - 1; i >= 0; --i) {
-      const int ia = i - (out.rank() - a.rank()), ib = i - (out.rank() - b.rank());
-      const int64_t la = ia < 0 ? 1 : a[ia], lb = ib < 0 ? 1 : b[ib];
-      const int64_t ta = la == 1 && out[i] != 1 ? 0 : sa, tb = lb == 1 && out[i] != 1 ? 0 : sb;
-      sa *= la;
-      sb *= lb;
-      if (out[i] == 1) continue;
-      if (count > 0 && merges(ta, da[count - 1], n[count - 1]) &&
-          merges(tb, db[count - 1], n[count - 1])) {
-        n[count - 1] *= out[i];
-        continue;
-      }
-      n[count] = out[i];
-      da[count] = ta;
-      db[count++] = tb;
-    }
-    if (count > 0) {
-      inner = n[0];
-      inner_a = da[0];
-      inner_b = db[0];
-    }
-    rank = std::max(0, count - 1);
-    for (int i = 0; i < rank; ++i) {  // outermost first
-      size[i] = n[count - 1 - i];
-      step_a[i] = da[count - 1 - i];
-      step_b[i] = db[count - 1 - i];
-      outer *= size[i];
-    }
-  }
-  void offsets(int64_t index, int64_t* a, int64_t* b) const {
-    *a = *b = 0;
-    for (int i = rank - 1; i >= 0; --i) {
-      const int64_t at = index % size[i];
-      index /= size[i];
-      *a += at * step_a[i];
-      *b += at * step_b[i];
-    }
-  }
-
- private:
-  static bool merges(int64_t outer_step, int64_t inner_step, int64_t inner_size) {
-    return inner_step == 0 ? outer_step == 0 : outer_step == inner_step * inner_size;
-  }
-};
-
 template <class T, Binary op>
 void binary_rows(const T* a, const T* b, T* out, const BroadcastPlan& plan) {
   const int64_t n = plan.inner;
-  const auto run = [&](int64_t row, int64_t from, int64_t to) {
+  const auto run = [&](int64_t row, int64_t from, int64_t to) HWY_ATTR {
     int64_t oa = 0, ob = 0;
     plan.offsets(row, &oa, &ob);
     const T* pa = a + oa;
@@ -193,36 +133,41 @@ void binary_rows(const T* a, const T* b, T* out, const BroadcastPlan& plan) {
     }
   };
   if (plan.outer == 1) {
-    parallel_for(n, kGrain, [&](int64_t from, int64_t to) { run(0, from, to); });
+    parallel_for(n, kGrain, [&](int64_t from, int64_t to) HWY_ATTR { run(0, from, to); });
   } else {
-    parallel_for(plan.outer, row_grain(n), [&](int64_t from, int64_t to) {
+    parallel_for(plan.outer, row_grain(n), [&](int64_t from, int64_t to) HWY_ATTR {
       for (int64_t row = from; row < to; ++row) run(row, 0, n);
     });
   }
 }
 
+/// factors[i] = 0 with probability limit / 2^32 and else `kept`; one Philox call decides for four
+/// neighbours. first and count are multiples of 32.
+template <class T>
+void dropout_factors(const RngKey& key, uint32_t limit, T kept, int64_t first, int64_t count,
+                     uint32_t* words, T* factors) {
+  philox_words(key, static_cast<uint64_t>(first / 4), count / 4, words);
+  for (int64_t i = 0; i < count; ++i) factors[i] = words[i] < limit ? T(0) : kept;
+}
+
 }  // namespace
 
 void unary(const UnaryArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) {
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
     using T = decltype(zero);
-    parallel_for(args.out.numel(), kGrain, [&](int64_t from, int64_t to) {
-      MutableArray<T> y(args.out.data<T>() + from, to - from);
-      apply_unary<T>(args.op, ConstArray<T>(args.x.data<T>() + from, to - from), y,
+    parallel_for(args.out.numel(), kGrain, [&](int64_t from, int64_t to) HWY_ATTR {
+      apply_unary<T>(args.op, to - from, args.x.data<T>() + from, args.out.data<T>() + from,
                      static_cast<T>(args.alpha));
     });
   });
 }
 
 void unary_grad(const UnaryGradArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) {
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
     using T = decltype(zero);
-    parallel_for(args.out.numel(), kGrain, [&](int64_t from, int64_t to) {
-      const int64_t n = to - from;
-      MutableArray<T> out(args.out.data<T>() + from, n);
-      apply_unary_grad<T>(args.op, ConstArray<T>(args.x.data<T>() + from, n),
-                          ConstArray<T>(args.y.data<T>() + from, n),
-                          ConstArray<T>(args.gy.data<T>() + from, n), out,
+    parallel_for(args.out.numel(), kGrain, [&](int64_t from, int64_t to) HWY_ATTR {
+      apply_unary_grad<T>(args.op, to - from, args.x.data<T>() + from, args.y.data<T>() + from,
+                          args.gy.data<T>() + from, args.out.data<T>() + from,
                           static_cast<T>(args.alpha));
     });
   });
@@ -231,7 +176,7 @@ void unary_grad(const UnaryGradArgs& args) {
 void binary(const BinaryArgs& args) {
   if (args.out.numel() == 0) return;
   const BroadcastPlan plan(args.a.shape(), args.b.shape(), args.out.shape());
-  dispatch(args.out.dtype(), [&](auto zero) {
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
     using T = decltype(zero);
     const T *a = args.a.data<T>(), *b = args.b.data<T>();
     T* out = args.out.data<T>();
@@ -255,11 +200,11 @@ void binary(const BinaryArgs& args) {
 void expand(const ExpandArgs& args) {
   if (args.out.numel() == 0) return;
   const BroadcastPlan plan(args.x.shape(), args.x.shape(), args.out.shape());
-  dispatch(args.out.dtype(), [&](auto zero) {
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
     using T = decltype(zero);
     const T* x = args.x.data<T>();
     T* out = args.out.data<T>();
-    parallel_for(plan.outer, row_grain(plan.inner), [&](int64_t from, int64_t to) {
+    parallel_for(plan.outer, row_grain(plan.inner), [&](int64_t from, int64_t to) HWY_ATTR {
       for (int64_t row = from; row < to; ++row) {
         int64_t oa = 0, ob = 0;
         plan.offsets(row, &oa, &ob);
@@ -271,41 +216,62 @@ void expand(const ExpandArgs& args) {
 }
 
 void accumulate(const AccumulateArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) {
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
     using T = decltype(zero);
-    parallel_for(args.out.numel(), kGrain, [&](int64_t from, int64_t to) {
-      MutableArray<T>(args.out.data<T>() + from, to - from) +=
-          ConstArray<T>(args.a.data<T>() + from, to - from);
+    parallel_for(args.out.numel(), kGrain, [&](int64_t from, int64_t to) HWY_ATTR {
+      T* out = args.out.data<T>();
+      const T* a = args.a.data<T>();
+      for (int64_t i = from; i < to; ++i) out[i] += a[i];
     });
   });
 }
 
 void dropout(const DropoutArgs& args) {
-  // One Philox call gives the decisions of four neighbours.
   const auto limit = static_cast<uint32_t>(args.p * 4294967296.0);
-  dispatch(args.out.dtype(), [&](auto zero) {
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
     using T = decltype(zero);
-    const T* x = args.x.data<T>();
-    T* out = args.out.data<T>();
-    const T factor = static_cast<T>(1.0 / (1.0 - args.p));
-    parallel_for(args.out.numel(), kGrain, [&](int64_t from, int64_t to) {
-      std::array<uint32_t, 4> words{};
-      for (int64_t i = from; i < to; ++i) {
-        if (i % 4 == 0 || i == from) words = philox(args.key, static_cast<uint64_t>(i / 4));
-        out[i] = words[static_cast<size_t>(i % 4)] < limit ? T(0) : x[i] * factor;
+    const T kept = static_cast<T>(1.0 / (1.0 - args.p));
+    parallel_for(args.out.numel(), kGrain, [&](int64_t from, int64_t to) HWY_ATTR {
+      constexpr int64_t kBlock = 256;  // divides kGrain
+      uint32_t words[kBlock];
+      T factors[kBlock];
+      const auto drop = [](auto x, auto f) HWY_ATTR {  // NaN and infinity, too
+        return hn::IfThenZeroElse(hn::Eq(f, hn::Zero(hn::DFromV<decltype(f)>())), hn::Mul(x, f));
+      };
+      for (int64_t i = from; i < to; i += kBlock) {
+        dropout_factors(args.key, limit, kept, i, kBlock, words, factors);
+        map(std::min(kBlock, to - i), args.out.data<T>() + i, drop, args.x.data<T>() + i,
+            static_cast<const T*>(factors));
       }
     });
   });
 }
 
 void non_finite(const NonFiniteArgs& args) {
-  int32_t found = 0;
-  dispatch(args.x.dtype(), [&](auto zero) {
+  std::atomic<int32_t> found = 0;
+  dispatch(args.x.dtype(), [&](auto zero) HWY_ATTR {
     using T = decltype(zero);
     const T* x = args.x.data<T>();
-    for (int64_t i = 0; i < args.x.numel() && !found; ++i) found = !std::isfinite(x[i]);
+    parallel_for(args.x.numel(), kGrain, [&](int64_t from, int64_t to) HWY_ATTR {
+      int32_t bad = 0;
+      for (int64_t i = from; i < to; ++i) bad |= x[i] - x[i] != T(0);  // NaN for both kinds
+      if (bad) found = 1;
+    });
   });
   args.out.data<int32_t>()[0] = found;
 }
 
+}  // namespace restage::cpu::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace restage::cpu {
+RESTAGE_KERNEL(unary, UnaryArgs)
+RESTAGE_KERNEL(unary_grad, UnaryGradArgs)
+RESTAGE_KERNEL(binary, BinaryArgs)
+RESTAGE_KERNEL(expand, ExpandArgs)
+RESTAGE_KERNEL(accumulate, AccumulateArgs)
+RESTAGE_KERNEL(dropout, DropoutArgs)
+RESTAGE_KERNEL(non_finite, NonFiniteArgs)
 }  // namespace restage::cpu
+#endif

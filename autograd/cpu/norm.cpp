@@ -1,11 +1,18 @@
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "autograd/cpu/norm.cpp"
+#include <hwy/foreach_target.h>  // once per instruction set
+
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/kernels.h"
+#include "autograd/cpu/math-inl.h"
+#include "autograd/cpu/targets.h"
 
-namespace restage::cpu {
+HWY_BEFORE_NAMESPACE();
+namespace restage::cpu::HWY_NAMESPACE {
 namespace {
 
 constexpr int64_t kPart = 512;  // rows per partial sum
@@ -16,12 +23,12 @@ template <class F>
 void two_sums(int64_t n, int64_t inner, double* a, double* b, bool parallel, F&& add_row) {
   const int64_t parts = std::max<int64_t>(1, (n + kPart - 1) / kPart);
   std::vector<double> partial(static_cast<size_t>(2 * parts * inner), 0.0);
-  const auto part = [&](int64_t p) {
+  const auto part = [&](int64_t p) HWY_ATTR {
     double* pa = partial.data() + 2 * p * inner;
     for (int64_t r = p * kPart; r < std::min(n, (p + 1) * kPart); ++r) add_row(r, pa, pa + inner);
   };
   if (parallel) {
-    parallel_for(parts, 1, [&](int64_t from, int64_t to) {
+    parallel_for(parts, 1, [&](int64_t from, int64_t to) HWY_ATTR {
       for (int64_t p = from; p < to; ++p) part(p);
     });
   } else {
@@ -40,7 +47,7 @@ void two_sums(int64_t n, int64_t inner, double* a, double* b, bool parallel, F&&
 template <class F>
 void for_blocks(int64_t outer, int64_t size, F&& f) {
   if (outer == 1) return f(0, true);
-  parallel_for(outer, row_grain(size), [&](int64_t from, int64_t to) {
+  parallel_for(outer, row_grain(size), [&](int64_t from, int64_t to) HWY_ATTR {
     for (int64_t o = from; o < to; ++o) f(o, false);
   });
 }
@@ -51,7 +58,7 @@ void for_block_rows(int64_t n, int64_t inner, bool parallel, F&& f) {
     for (int64_t r = 0; r < n; ++r) f(r);
     return;
   }
-  parallel_for(n, row_grain(inner), [&](int64_t from, int64_t to) {
+  parallel_for(n, row_grain(inner), [&](int64_t from, int64_t to) HWY_ATTR {
     for (int64_t r = from; r < to; ++r) f(r);
   });
 }
@@ -71,27 +78,29 @@ void norm_columns(const NormArgs& args) {
   const int64_t n = args.n, inner = args.inner;
   const std::vector<double> scale = along_inner<T>(args.scale, args.affine, inner, 1);
   const std::vector<double> shift = along_inner<T>(args.shift, args.affine, inner, 0);
-  for_blocks(args.outer, n * inner, [&](int64_t o, bool parallel) {
+  for_blocks(args.outer, n * inner, [&](int64_t o, bool parallel) HWY_ATTR {
     const T* x = args.x.data<T>() + o * n * inner;
     T* out = args.out.data<T>() + o * n * inner;
     double* mean = args.mean.data<double>() + o * inner;
     double* rstd = args.rstd.data<double>() + o * inner;
     std::vector<double> sums(static_cast<size_t>(inner)), unused(sums);
-    two_sums(n, inner, sums.data(), unused.data(), parallel, [&](int64_t r, double* a, double*) {
-      for (int64_t i = 0; i < inner; ++i) a[i] += static_cast<double>(x[r * inner + i]);
-    });
+    two_sums(n, inner, sums.data(), unused.data(), parallel,
+             [&](int64_t r, double* a, double*) HWY_ATTR {
+               for (int64_t i = 0; i < inner; ++i) a[i] += static_cast<double>(x[r * inner + i]);
+             });
     for (int64_t i = 0; i < inner; ++i)
       mean[i] = sums[static_cast<size_t>(i)] / static_cast<double>(n);
-    two_sums(n, inner, sums.data(), unused.data(), parallel, [&](int64_t r, double* a, double*) {
-      for (int64_t i = 0; i < inner; ++i) {
-        const double d = static_cast<double>(x[r * inner + i]) - mean[i];
-        a[i] += d * d;
-      }
-    });
+    two_sums(n, inner, sums.data(), unused.data(), parallel,
+             [&](int64_t r, double* a, double*) HWY_ATTR {
+               for (int64_t i = 0; i < inner; ++i) {
+                 const double d = static_cast<double>(x[r * inner + i]) - mean[i];
+                 a[i] += d * d;
+               }
+             });
     for (int64_t i = 0; i < inner; ++i)
       rstd[i] = 1.0 / std::sqrt(sums[static_cast<size_t>(i)] / static_cast<double>(n) + args.eps);
     const double *sc = scale.data(), *sh = shift.data();
-    for_block_rows(n, inner, parallel, [&](int64_t r) {
+    for_block_rows(n, inner, parallel, [&](int64_t r) HWY_ATTR {
       for (int64_t i = 0; i < inner; ++i)
         out[r * inner + i] = static_cast<T>(
             (static_cast<double>(x[r * inner + i]) - mean[i]) * rstd[i] * sc[i] + sh[i]);
@@ -104,7 +113,7 @@ void norm_columns_grad(const NormGradArgs& args) {
   const int64_t n = args.n, inner = args.inner;
   const std::vector<double> scale = along_inner<T>(args.scale, args.affine, inner, 1);
   const double* sc = scale.data();
-  for_blocks(args.outer, n * inner, [&](int64_t o, bool parallel) {
+  for_blocks(args.outer, n * inner, [&](int64_t o, bool parallel) HWY_ATTR {
     const T* x = args.x.data<T>() + o * n * inner;
     const T* gy = args.gy.data<T>() + o * n * inner;
     const double* mean = args.mean.data<double>() + o * inner;
@@ -112,16 +121,17 @@ void norm_columns_grad(const NormGradArgs& args) {
     T* out = args.out.data<T>() + o * n * inner;
     // Sums of the output's gradient, and of it times the normalised input, per column.
     std::vector<double> sg(static_cast<size_t>(inner)), sgx(sg);
-    two_sums(n, inner, sg.data(), sgx.data(), parallel, [&](int64_t r, double* a, double* b) {
-      for (int64_t i = 0; i < inner; ++i) {
-        const double g = static_cast<double>(gy[r * inner + i]);
-        a[i] += g;
-        b[i] += g * (static_cast<double>(x[r * inner + i]) - mean[i]) * rstd[i];
-      }
-    });
+    two_sums(n, inner, sg.data(), sgx.data(), parallel,
+             [&](int64_t r, double* a, double* b) HWY_ATTR {
+               for (int64_t i = 0; i < inner; ++i) {
+                 const double g = static_cast<double>(gy[r * inner + i]);
+                 a[i] += g;
+                 b[i] += g * (static_cast<double>(x[r * inner + i]) - mean[i]) * rstd[i];
+               }
+             });
     const double inv = 1.0 / static_cast<double>(n);
     const double *pg = sg.data(), *pgx = sgx.data();
-    for_block_rows(n, inner, parallel, [&](int64_t r) {
+    for_block_rows(n, inner, parallel, [&](int64_t r) HWY_ATTR {
       for (int64_t i = 0; i < inner; ++i) {
         const double h = (static_cast<double>(x[r * inner + i]) - mean[i]) * rstd[i];
         const double g = static_cast<double>(gy[r * inner + i]);
@@ -136,23 +146,34 @@ void norm_columns_grad(const NormGradArgs& args) {
   });
 }
 
-/// Layer norm: every row by itself, scale and shift along the row.
+/// Layer norm: every row by itself, scale and shift along the row. Rows are short, so their sums
+/// are in T.
 template <class T>
 void norm_rows(const NormArgs& args) {
   const int64_t n = args.n;
-  const Eigen::ArrayXd scale = ConstArray<T>(args.scale->data<T>(), n).template cast<double>();
-  const Eigen::ArrayXd shift = ConstArray<T>(args.shift->data<T>(), n).template cast<double>();
-  parallel_for(args.outer, row_grain(n), [&](int64_t from, int64_t to) {
-    Eigen::ArrayXd d(n);
+  const T *scale = args.scale->data<T>(), *shift = args.shift->data<T>();
+  parallel_for(args.outer, row_grain(n), [&](int64_t from, int64_t to) HWY_ATTR {
+    const hn::ScalableTag<T> d;
+    using V = hn::Vec<decltype(d)>;
     for (int64_t o = from; o < to; ++o) {
-      d = ConstArray<T>(args.x.data<T>() + o * n, n).template cast<double>();
-      const double mean = d.sum() / static_cast<double>(n);
-      d -= mean;
-      const double rstd = 1.0 / std::sqrt(d.square().sum() / static_cast<double>(n) + args.eps);
+      const T* x = args.x.data<T>() + o * n;
+      T* out = args.out.data<T>() + o * n;
+      const double count = static_cast<double>(n);
+      const double mean = sum_of(
+                              n, [](auto v) HWY_ATTR { return v; }, x) /
+                          count;
+      const auto centred = static_cast<T>(mean);
+      const auto square = [&](auto v) HWY_ATTR {
+        const auto c = hn::Sub(v, hn::Set(hn::DFromV<decltype(v)>(), centred));
+        return hn::Mul(c, c);
+      };
+      const double rstd = 1.0 / std::sqrt(sum_of(n, square, x) / count + args.eps);
       args.mean.data<double>()[o] = mean;
       args.rstd.data<double>()[o] = rstd;
-      MutableArray<T>(args.out.data<T>() + o * n, n) =
-          (d * rstd * scale + shift).template cast<T>();
+      const V m = hn::Set(d, centred), r = hn::Set(d, static_cast<T>(rstd));
+      const auto apply = [&](V v, V sc, V sh)
+                             HWY_ATTR { return hn::MulAdd(hn::Mul(hn::Sub(v, m), r), sc, sh); };
+      map(n, out, apply, x, scale, shift);
     }
   });
 }
@@ -160,50 +181,78 @@ void norm_rows(const NormArgs& args) {
 template <class T>
 void norm_rows_grad(const NormGradArgs& args) {
   const int64_t n = args.n;
-  const Eigen::ArrayXd scale = ConstArray<T>(args.scale->data<T>(), n).template cast<double>();
+  const T* scale = args.scale->data<T>();
   const int64_t parts = std::max<int64_t>(1, (args.outer + kPart - 1) / kPart);
-  Eigen::ArrayXXd g_scale = Eigen::ArrayXXd::Zero(n, parts), g_shift = g_scale;  // per part of rows
-  parallel_for(parts, 1, [&](int64_t from, int64_t to) {
-    Eigen::ArrayXd g(n), h(n);
+  // Per part of rows: the gradient of the scale, then that of the shift.
+  std::vector<double> partial(static_cast<size_t>(2 * parts * n), 0.0);
+  parallel_for(parts, 1, [&](int64_t from, int64_t to) HWY_ATTR {
+    const hn::ScalableTag<T> d;
+    using V = hn::Vec<decltype(d)>;
+    std::vector<T> normalised(static_cast<size_t>(n)), scaled(static_cast<size_t>(n));
+    T *h = normalised.data(), *gs = scaled.data();
     for (int64_t o = from * kPart; o < std::min(args.outer, to * kPart); ++o) {
-      const double rstd = args.rstd.data<double>()[o];
-      g = ConstArray<T>(args.gy.data<T>() + o * n, n).template cast<double>();
-      h = (ConstArray<T>(args.x.data<T>() + o * n, n).template cast<double>() -
-           args.mean.data<double>()[o]) *
-          rstd;
-      g_scale.col(o / kPart) += g * h;
-      g_shift.col(o / kPart) += g;
-      g *= scale;
-      const double sg = g.sum() / static_cast<double>(n),
-                   sgx = (g * h).sum() / static_cast<double>(n);
-      MutableArray<T>(args.out.data<T>() + o * n, n) =
-          (rstd * (g - sg - h * sgx)).template cast<T>();
+      const T *x = args.x.data<T>() + o * n, *g = args.gy.data<T>() + o * n;
+      const V mean = hn::Set(d, static_cast<T>(args.mean.data<double>()[o]));
+      const V rstd = hn::Set(d, static_cast<T>(args.rstd.data<double>()[o]));
+      map(
+          n, h, [&](V v) HWY_ATTR { return hn::Mul(hn::Sub(v, mean), rstd); }, x);
+      map(
+          n, gs, [](V a, V b) HWY_ATTR { return hn::Mul(a, b); }, g, scale);
+      double* g_scale = partial.data() + o / kPart * 2 * n;
+      double* g_shift = g_scale + n;
+      for (int64_t i = 0; i < n; ++i) {
+        g_scale[i] += static_cast<double>(g[i] * h[i]);
+        g_shift[i] += static_cast<double>(g[i]);
+      }
+      const double count = static_cast<double>(n);
+      const double sg = sum_of(
+                            n, [](auto v) HWY_ATTR { return v; }, gs) /
+                        count;
+      const double sgx = sum_of(
+                             n, [](auto a, auto b) HWY_ATTR { return hn::Mul(a, b); }, gs, h) /
+                         count;
+      const V vg = hn::Set(d, static_cast<T>(sg)), vgx = hn::Set(d, static_cast<T>(sgx));
+      const auto apply = [&](V a, V b) HWY_ATTR {
+        return hn::Mul(rstd, hn::NegMulAdd(b, vgx, hn::Sub(a, vg)));
+      };
+      map(n, args.out.data<T>() + o * n, apply, gs, h);
     }
   });
   if (args.g_scale == nullptr) return;
-  for (int64_t p = 1; p < parts; ++p) {
-    g_scale.col(0) += g_scale.col(p);
-    g_shift.col(0) += g_shift.col(p);
+  for (int64_t i = 0; i < n; ++i) {
+    double g_scale = 0, g_shift = 0;
+    for (int64_t p = 0; p < parts; ++p) {
+      g_scale += partial[static_cast<size_t>(2 * p * n + i)];
+      g_shift += partial[static_cast<size_t>((2 * p + 1) * n + i)];
+    }
+    args.g_scale->data<T>()[i] = static_cast<T>(g_scale);
+    args.g_shift->data<T>()[i] = static_cast<T>(g_shift);
   }
-  MutableArray<T>(args.g_scale->data<T>(), n) = g_scale.col(0).template cast<T>();
-  MutableArray<T>(args.g_shift->data<T>(), n) = g_shift.col(0).template cast<T>();
 }
 
 }  // namespace
 
 void norm(const NormArgs& args) {
   if (args.x.numel() == 0) return;
-  dispatch(args.out.dtype(), [&](auto zero) {
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
     using T = decltype(zero);
     args.affine == Affine::middle ? norm_rows<T>(args) : norm_columns<T>(args);
   });
 }
 
 void norm_grad(const NormGradArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) {
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
     using T = decltype(zero);
     args.affine == Affine::middle ? norm_rows_grad<T>(args) : norm_columns_grad<T>(args);
   });
 }
 
+}  // namespace restage::cpu::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace restage::cpu {
+RESTAGE_KERNEL(norm, NormArgs)
+RESTAGE_KERNEL(norm_grad, NormGradArgs)
 }  // namespace restage::cpu
+#endif

@@ -1,19 +1,30 @@
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "autograd/cpu/reduce.cpp"
+#include <hwy/foreach_target.h>  // once per instruction set
+
 #include <algorithm>
-#include <cmath>
 #include <vector>
 
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/kernels.h"
+#include "autograd/cpu/math-inl.h"
+#include "autograd/cpu/targets.h"
 
-namespace restage::cpu {
+HWY_BEFORE_NAMESPACE();
+namespace restage::cpu::HWY_NAMESPACE {
 namespace {
 
 constexpr int64_t kPart = 512;  // terms per partial sum
 
-/// Sums rows [from, to) of x [n, inner] into out [inner] (overwritten), in double, since what is
-/// summed (gradients of a bias) may all but cancel.
+/// Sums rows [from, to) of x [n, inner] into out [inner] (overwritten). Columns in double, since
+/// what is summed (gradients of a bias) may all but cancel.
 template <class T>
 void sum_rows(const T* x, int64_t from, int64_t to, int64_t inner, T* out) {
+  if (inner == 1) {
+    *out = static_cast<T>(sum_of(
+        to - from, [](auto v) HWY_ATTR { return v; }, x + from));
+    return;
+  }
   constexpr int64_t kColumns = 128;  // at a time
   double total[kColumns];
   for (int64_t i0 = 0; i0 < inner; i0 += kColumns) {
@@ -34,20 +45,21 @@ void sum_typed(const SumArgs& args) {
   const int64_t n = args.n, inner = args.inner;
   const int64_t parts = std::max<int64_t>(1, (n + kPart - 1) / kPart);
   if (parts == 1) {
-    parallel_for(args.outer, row_grain(n * inner), [&](int64_t from, int64_t to) {
+    parallel_for(args.outer, row_grain(n * inner), [&](int64_t from, int64_t to) HWY_ATTR {
       for (int64_t o = from; o < to; ++o) sum_rows(x + o * n * inner, 0, n, inner, out + o * inner);
     });
     return;
   }
   Tensor scratch = Tensor::empty({args.outer, parts, inner}, args.out.dtype());
   T* partial = scratch.data<T>();
-  parallel_for(args.outer * parts, row_grain(kPart * inner), [&](int64_t from, int64_t to) {
-    for (int64_t t = from; t < to; ++t) {
-      const int64_t o = t / parts, p = t % parts;
-      sum_rows(x + o * n * inner, p * kPart, std::min(n, (p + 1) * kPart), inner,
-               partial + t * inner);
-    }
-  });
+  parallel_for(args.outer * parts, row_grain(kPart * inner),
+               [&](int64_t from, int64_t to) HWY_ATTR {
+                 for (int64_t t = from; t < to; ++t) {
+                   const int64_t o = t / parts, p = t % parts;
+                   sum_rows(x + o * n * inner, p * kPart, std::min(n, (p + 1) * kPart), inner,
+                            partial + t * inner);
+                 }
+               });
   for (int64_t o = 0; o < args.outer; ++o)
     sum_rows(partial + o * parts * inner, 0, parts, inner, out + o * inner);
 }
@@ -55,22 +67,55 @@ void sum_typed(const SumArgs& args) {
 /// Calls f(o) for every outer row, several per piece.
 template <class F>
 void for_rows(int64_t outer, int64_t row_size, F&& f) {
-  parallel_for(outer, row_grain(row_size), [&](int64_t from, int64_t to) {
+  parallel_for(outer, row_grain(row_size), [&](int64_t from, int64_t to) HWY_ATTR {
     for (int64_t o = from; o < to; ++o) f(o);
   });
+}
+
+template <class T>
+void softmax_row(const T* x, int64_t n, T* y) {
+  if (n == 0) return;
+  const hn::ScalableTag<T> d;
+  using V = hn::Vec<decltype(d)>;
+  const V top = hn::Set(d, max_of(n, x));
+  map(
+      n, y, [&](V v) HWY_ATTR { return exp(hn::Sub(v, top)); }, x);
+  const V total = hn::Set(d, static_cast<T>(sum_of(
+                                 n, [](auto v) HWY_ATTR { return v; }, y)));
+  map(
+      n, y, [&](V v) HWY_ATTR { return hn::Div(v, total); }, y);
+}
+
+/// Along the rows of x [n, inner].
+template <class T>
+void softmax_columns(const T* x, int64_t n, int64_t inner, T* y) {
+  using V = hn::Vec<hn::ScalableTag<T>>;
+  std::vector<T> tops(x, x + inner), totals(static_cast<size_t>(inner), T(0));
+  T *top = tops.data(), *total = totals.data();
+  for (int64_t r = 1; r < n; ++r)
+    for (int64_t i = 0; i < inner; ++i)
+      top[i] = x[r * inner + i] > top[i] ? x[r * inner + i] : top[i];
+  const auto exponential = [](V& out, V& sum, V v, V t) HWY_ATTR {
+    out = exp(hn::Sub(v, t));
+    sum = hn::Add(sum, out);
+  };
+  for (int64_t r = 0; r < n; ++r)
+    update(inner, exponential, y + r * inner, total, x + r * inner, static_cast<const T*>(top));
+  for (int64_t r = 0; r < n; ++r)
+    for (int64_t i = 0; i < inner; ++i) y[r * inner + i] /= total[i];
 }
 
 }  // namespace
 
 void sum(const SumArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) { sum_typed<decltype(zero)>(args); });
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { sum_typed<decltype(zero)>(args); });
 }
 
 void max(const MaxArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) {
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
     using T = decltype(zero);
     const int64_t n = args.n, inner = args.inner;
-    for_rows(args.outer, n * inner, [&](int64_t o) {
+    for_rows(args.outer, n * inner, [&](int64_t o) HWY_ATTR {
       const T* x = args.x.data<T>() + o * n * inner;
       T* best = args.out.data<T>() + o * inner;
       int32_t* at = args.index.data<int32_t>() + o * inner;
@@ -90,10 +135,10 @@ void max(const MaxArgs& args) {
 }
 
 void max_grad(const MaxGradArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) {
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
     using T = decltype(zero);
     const int64_t n = args.n, inner = args.inner;
-    for_rows(args.outer, n * inner, [&](int64_t o) {
+    for_rows(args.outer, n * inner, [&](int64_t o) HWY_ATTR {
       T* out = args.out.data<T>() + o * n * inner;
       const T* gy = args.gy.data<T>() + o * inner;
       const int32_t* at = args.index.data<int32_t>() + o * inner;
@@ -104,54 +149,51 @@ void max_grad(const MaxGradArgs& args) {
 }
 
 void softmax(const SoftmaxArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) {
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
     using T = decltype(zero);
     const int64_t n = args.n, inner = args.inner;
-    for_rows(args.outer, n * inner, [&](int64_t o) {
+    for_rows(args.outer, n * inner, [&](int64_t o) HWY_ATTR {
       const T* x = args.x.data<T>() + o * n * inner;
       T* y = args.out.data<T>() + o * n * inner;
-      if (inner == 1) {
-        const ConstArray<T> in(x, n);
-        MutableArray<T> out(y, n);
-        out = (in - in.maxCoeff()).exp();
-        out /= out.sum();
-        return;
-      }
-      std::vector<T> top(x, x + inner), total(static_cast<size_t>(inner), T(0));
-      MutableArray<T> t(top.data(), inner), s(total.data(), inner);
-      for (int64_t r = 1; r < n; ++r) t = t.max(ConstArray<T>(x + r * inner, inner));
-      for (int64_t r = 0; r < n; ++r) {
-        MutableArray<T> out(y + r * inner, inner);
-        out = (ConstArray<T>(x + r * inner, inner) - t).exp();
-        s += out;
-      }
-      for (int64_t r = 0; r < n; ++r) MutableArray<T>(y + r * inner, inner) /= s;
+      inner == 1 ? softmax_row(x, n, y) : softmax_columns(x, n, inner, y);
     });
   });
 }
 
 void softmax_grad(const SoftmaxGradArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) {
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
     using T = decltype(zero);
     const int64_t n = args.n, inner = args.inner;
-    for_rows(args.outer, n * inner, [&](int64_t o) {
+    for_rows(args.outer, n * inner, [&](int64_t o) HWY_ATTR {
       const T* y = args.y.data<T>() + o * n * inner;
       const T* g = args.gy.data<T>() + o * n * inner;
       T* out = args.out.data<T>() + o * n * inner;
       if (inner == 1) {
-        const ConstArray<T> ya(y, n), ga(g, n);
-        MutableArray<T>(out, n) = ya * (ga - (ya * ga).sum());
+        const auto product = [](auto a, auto b) HWY_ATTR { return hn::Mul(a, b); };
+        const auto total = static_cast<T>(sum_of(n, product, y, g));
+        for (int64_t i = 0; i < n; ++i) out[i] = y[i] * (g[i] - total);
         return;
       }
-      std::vector<T> total(static_cast<size_t>(inner), T(0));
-      MutableArray<T> s(total.data(), inner);
+      std::vector<T> totals(static_cast<size_t>(inner), T(0));
+      T* total = totals.data();
       for (int64_t r = 0; r < n; ++r)
-        s += ConstArray<T>(y + r * inner, inner) * ConstArray<T>(g + r * inner, inner);
+        for (int64_t i = 0; i < inner; ++i) total[i] += y[r * inner + i] * g[r * inner + i];
       for (int64_t r = 0; r < n; ++r)
-        MutableArray<T>(out + r * inner, inner) =
-            ConstArray<T>(y + r * inner, inner) * (ConstArray<T>(g + r * inner, inner) - s);
+        for (int64_t i = 0; i < inner; ++i)
+          out[r * inner + i] = y[r * inner + i] * (g[r * inner + i] - total[i]);
     });
   });
 }
 
+}  // namespace restage::cpu::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace restage::cpu {
+RESTAGE_KERNEL(sum, SumArgs)
+RESTAGE_KERNEL(max, MaxArgs)
+RESTAGE_KERNEL(max_grad, MaxGradArgs)
+RESTAGE_KERNEL(softmax, SoftmaxArgs)
+RESTAGE_KERNEL(softmax_grad, SoftmaxGradArgs)
 }  // namespace restage::cpu
+#endif

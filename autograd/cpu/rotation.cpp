@@ -1,4 +1,6 @@
-// Conversions of rotations, row by row (spec 3.4).
+// Conversions of rotations, row by row (spec 3.4): scalar geometry, baseline code.
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 

@@ -1,4 +1,5 @@
-// Forward kinematics and linear blend skinning (spec 3.5, 5.2).
+// Forward kinematics (spec 3.5): a few small products a sample, baseline code.
+#include <Eigen/Core>
 #include <vector>
 
 #include "autograd/cpu/common.h"
@@ -74,67 +75,6 @@ void fk_grad_one(const FkGradArgs& args, int64_t s) {
   }
 }
 
-/// y = sum_j W_j (G_j x + b_j) with b_j = P_j - G_j rest_j, per sample.
-template <class T>
-std::vector<M34<T>> skinning_transforms(const Tensor& transforms, const Tensor& rest, int64_t s) {
-  const int64_t joints = transforms.size(1);
-  std::vector<M34<T>> out(static_cast<size_t>(joints));
-  for (int64_t j = 0; j < joints; ++j) {
-    M34<T>& t = out[static_cast<size_t>(j)];
-    t = Eigen::Map<const M34<T>>(transforms.data<T>() + (s * joints + j) * 12);
-    t.col(3) -=
-        t.template leftCols<3>() * Eigen::Map<const V3<T>>(rest.data<T>() + (s * joints + j) * 3);
-  }
-  return out;
-}
-
-template <class T>
-void lbs_one(const LbsArgs& args, int64_t s) {
-  const int64_t v = args.points.size(1), joints = args.transforms.size(1);
-  const auto t = skinning_transforms<T>(args.transforms, args.rest, s);
-  for (int64_t i = s * v; i < (s + 1) * v; ++i) {
-    const T* w = args.weights.data<T>() + i * joints;
-    M34<T> blend = M34<T>::Zero();
-    for (int64_t j = 0; j < joints; ++j) blend += w[j] * t[static_cast<size_t>(j)];
-    const Eigen::Map<const V3<T>> x(args.points.data<T>() + 3 * i);
-    Eigen::Map<V3<T>>(args.out.data<T>() + 3 * i) = blend.template leftCols<3>() * x + blend.col(3);
-  }
-}
-
-template <class T>
-void lbs_grad_one(const LbsGradArgs& args, int64_t s) {
-  const int64_t v = args.points.size(1), joints = args.transforms.size(1);
-  const auto t = skinning_transforms<T>(args.transforms, args.rest, s);
-  std::vector<M34<T>> gt(static_cast<size_t>(joints), M34<T>::Zero());
-  for (int64_t i = s * v; i < (s + 1) * v; ++i) {
-    const T* w = args.weights.data<T>() + i * joints;
-    T* gw = args.g_weights.data<T>() + i * joints;
-    const V3<T> x = Eigen::Map<const V3<T>>(args.points.data<T>() + 3 * i);
-    const V3<T> g = Eigen::Map<const V3<T>>(args.gy.data<T>() + 3 * i);
-    M34<T> outer;  // gradient of the blended transform
-    outer.template leftCols<3>() = g * x.transpose();
-    outer.col(3) = g;
-    M3<T> blend = M3<T>::Zero();
-    for (int64_t j = 0; j < joints; ++j) {
-      const M34<T>& tj = t[static_cast<size_t>(j)];
-      gw[j] = tj.cwiseProduct(outer).sum();
-      gt[static_cast<size_t>(j)] += w[j] * outer;
-      blend += w[j] * tj.template leftCols<3>();
-    }
-    Eigen::Map<V3<T>>(args.out.data<T>() + 3 * i) = blend.transpose() * g;
-  }
-  for (int64_t j = 0; j < joints; ++j) {
-    const int64_t at = s * joints + j;
-    const M3<T> rotation =
-        Eigen::Map<const M34<T>>(args.transforms.data<T>() + 12 * at).template leftCols<3>();
-    const V3<T> rest = Eigen::Map<const V3<T>>(args.rest.data<T>() + 3 * at);
-    M34<T> g = gt[static_cast<size_t>(j)];
-    g.template leftCols<3>() -= g.col(3) * rest.transpose();
-    Eigen::Map<M34<T>>(args.g_transforms.data<T>() + 12 * at) = g;
-    Eigen::Map<V3<T>>(args.g_rest.data<T>() + 3 * at) = -rotation.transpose() * g.col(3);
-  }
-}
-
 /// Runs f(s) for every sample in parallel.
 template <class F>
 void for_samples(int64_t n, int64_t grain, F&& f) {
@@ -154,18 +94,6 @@ void fk(const FkArgs& args) {
 void fk_grad(const FkGradArgs& args) {
   dispatch(args.out.dtype(), [&](auto zero) {
     for_samples(args.local.size(0), 16, [&](int64_t s) { fk_grad_one<decltype(zero)>(args, s); });
-  });
-}
-
-void lbs(const LbsArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) {
-    for_samples(args.points.size(0), 1, [&](int64_t s) { lbs_one<decltype(zero)>(args, s); });
-  });
-}
-
-void lbs_grad(const LbsGradArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) {
-    for_samples(args.points.size(0), 1, [&](int64_t s) { lbs_grad_one<decltype(zero)>(args, s); });
   });
 }
 

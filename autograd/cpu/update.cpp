@@ -1,36 +1,71 @@
+// Adam in one pass over the parameter, its gradient and its moments: 28 bytes a number, of which
+// every written one was read just before, so there is nothing to stream past the caches.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "autograd/cpu/update.cpp"
+#include <hwy/foreach_target.h>  // once per instruction set
+
 #include <cmath>
 
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/kernels.h"
+#include "autograd/cpu/math-inl.h"
+#include "autograd/cpu/targets.h"
 
-namespace restage::cpu {
+HWY_BEFORE_NAMESPACE();
+namespace restage::cpu::HWY_NAMESPACE {
+namespace {
 
-void adam(const AdamArgs& args) {
+template <class T>
+void adam_typed(const AdamArgs& args) {
+  const hn::ScalableTag<T> d;
+  using V = hn::Vec<decltype(d)>;
   const double c1 = 1.0 - std::pow(args.beta1, static_cast<double>(args.step));
   const double c2 = 1.0 - std::pow(args.beta2, static_cast<double>(args.step));
-  dispatch(args.out.dtype(), [&](auto zero) {
-    using T = decltype(zero);
-    const T step_size = static_cast<T>(args.lr / c1), root = static_cast<T>(std::sqrt(c2));
-    const T b1 = static_cast<T>(args.beta1), b2 = static_cast<T>(args.beta2),
-            eps = static_cast<T>(args.eps);
-    const T decay = static_cast<T>(args.weight_decay), gs = static_cast<T>(args.gradient_scale);
-    parallel_for(args.out.numel(), kGrain, [&](int64_t from, int64_t to) {
-      const int64_t n = to - from;
-      MutableArray<T> w(args.out.data<T>() + from, n), m(args.m.data<T>() + from, n),
-          v(args.v.data<T>() + from, n);
-      const ConstArray<T> gradient(args.gradient.data<T>() + from, n);
-      const Eigen::Array<T, Eigen::Dynamic, 1> g = gradient * gs + decay * w;
-      m = b1 * m + (T(1) - b1) * g;
-      v = b2 * v + (T(1) - b2) * g.square();
-      if (args.v_max != nullptr) {
-        MutableArray<T> top(args.v_max->data<T>() + from, n);
-        top = top.max(v);
-        w -= step_size * m / (top.sqrt() / root + eps);
-      } else {
-        w -= step_size * m / (v.sqrt() / root + eps);
-      }
-    });
+  const auto number = [](double x) { return static_cast<T>(x); };
+  const T step_size = number(args.lr / c1), root = number(1 / std::sqrt(c2)),
+          eps = number(args.eps), b1 = number(args.beta1), b2 = number(args.beta2),
+          decay = number(args.weight_decay), gs = number(args.gradient_scale);
+  parallel_for(args.out.numel(), kGrain, [&](int64_t from, int64_t to) HWY_ATTR {
+    const hn::ScalableTag<T> tag;
+    const auto all = [&](T x) HWY_ATTR { return hn::Set(tag, x); };
+    const auto moments = [&](V& w, V& m, V& v, V gradient) HWY_ATTR {
+      const V g = hn::MulAdd(gradient, all(gs), hn::Mul(all(decay), w));
+      m = hn::MulAdd(all(b1), m, hn::Mul(all(T(1) - b1), g));
+      v = hn::MulAdd(all(b2), v, hn::Mul(all(T(1) - b2), hn::Mul(g, g)));
+    };
+    const auto move = [&](V w, V m, V v) HWY_ATTR {
+      const V scale = hn::MulAdd(hn::Sqrt(v), all(root), all(eps));
+      return hn::Sub(w, hn::Div(hn::Mul(all(step_size), m), scale));
+    };
+    T *w = args.out.data<T>() + from, *m = args.m.data<T>() + from, *v = args.v.data<T>() + from;
+    const T* g = args.gradient.data<T>() + from;
+    if (args.v_max == nullptr) {
+      const auto step = [&](V& wv, V& mv, V& vv, V gv) HWY_ATTR {
+        moments(wv, mv, vv, gv);
+        wv = move(wv, mv, vv);
+      };
+      return update(to - from, step, w, m, v, g);
+    }
+    const auto step = [&](V& wv, V& mv, V& vv, V& top, V gv) HWY_ATTR {
+      moments(wv, mv, vv, gv);
+      top = hn::IfThenElse(hn::Lt(vv, top), top, vv);  // NaN in v shows
+      wv = move(wv, mv, top);
+    };
+    update(to - from, step, w, m, v, args.v_max->data<T>() + from, g);
   });
 }
 
+}  // namespace
+
+void adam(const AdamArgs& args) {
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { adam_typed<decltype(zero)>(args); });
+}
+
+}  // namespace restage::cpu::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace restage::cpu {
+RESTAGE_KERNEL(adam, AdamArgs)
 }  // namespace restage::cpu
+#endif

@@ -308,6 +308,34 @@ TEST(Neighbours, AreTheBruteForceOnesTiesToTheLowerIndex) {
     }
 }
 
+TEST(Neighbours, AreThoseOfAPlainSortAlsoOfDuplicatesAndNaN) {
+  for (uint64_t seed = 0; seed < 30; ++seed) {
+    const RngKey key{9, seed};
+    const auto v = static_cast<int64_t>(1 + uniform_int(key, 0, 400));
+    const auto k = static_cast<int64_t>(1 + uniform_int(key, 1, static_cast<uint64_t>(v)));
+    const uint64_t side = 2 + uniform_int(key, 2, 12);  // whole numbers: distances are exact
+    Tensor points = Tensor::empty({1, v, 3}, DType::f32);
+    for (int64_t i = 0; i < 3 * v; ++i)
+      points.data<float>()[i] = static_cast<float>(uniform_int(key.fold(1), i, side));
+    for (int64_t i = 0; seed % 3 == 0 && i < v; i += 5)
+      points.data<float>()[3 * i + i % 3] = std::nanf("");
+    const Tensor query = points.rows(0, 1), index = knn(query, points, k);
+    const Tensor wide = knn(query.cast(DType::f64), points.cast(DType::f64), k);
+    EXPECT_TRUE(same_bits(index, wide));
+    for (int64_t q = 0; q < v; ++q) {
+      std::vector<std::pair<double, int64_t>> order;
+      for (int64_t i = 0; i < v; ++i) {
+        const double d = squared(query, q, points, i);
+        order.emplace_back(std::isnan(d) ? HUGE_VAL : d, i);
+      }
+      std::sort(order.begin(), order.end());
+      for (int64_t i = 0; i < k; ++i)
+        ASSERT_EQ(index.item(q * k + i), order[static_cast<size_t>(i)].second)
+            << "seed " << seed << ", point " << q << ", neighbour " << i;
+    }
+  }
+}
+
 TEST(Neighbours, FarthestPointsAreTheBruteForceOnes) {
   for (const int64_t v : {1, 7, 60}) {
     const Tensor points = grid_cloud(3, v, 3);
@@ -394,6 +422,16 @@ TEST(DropoutMask, IsAFunctionOfTheKey) {
   EXPECT_TRUE(same_bits(part, a.rows(0, 1001)));
   const Tensor narrow = dropout(Var(ones.value.cast(DType::f32)), 0.3, key).value;
   for (int64_t i = 0; i < 1001; ++i) EXPECT_EQ(narrow.item(i) == 0, a.item(i) == 0);
+}
+
+TEST(DropoutMask, IsThatOfTheScalarGenerator) {
+  for (const int64_t n : {1, 5, 255, 257, 40001})
+    for (const RngKey key : {RngKey{1, 2}, RngKey{~0ull, 0x123456789abcdefull}}) {
+      const auto limit = static_cast<uint32_t>(0.4 * 4294967296.0);
+      const Tensor y = dropout(Var(Tensor::full({n}, 1)), 0.4, key).value;
+      for (int64_t i = 0; i < n; ++i)
+        ASSERT_EQ(y.item(i) == 0, philox(key, static_cast<uint64_t>(i / 4))[i % 4] < limit) << i;
+    }
 }
 
 TEST(DropoutMask, KeepsTheShareAndTheMean) {

@@ -9,6 +9,7 @@
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/reduce.h"
 #include "nn/layers/linear.h"
+#include "tests/support/use_set.h"
 #include "tests/train/tiny_training.h"
 
 namespace restage {
@@ -45,6 +46,21 @@ TrainConfig wide(int64_t steps) {
   c.deformation.pairs.points = 128;
   c.deformation.optimiser.batch = 2;
   return c;
+}
+
+TEST(TrainStages, FiveStepsGiveTheSameBitsOnAllVectorSets) {
+  const auto sets = testing::vector_sets();
+  if (sets.size() < 2) GTEST_SKIP() << "this processor has fewer than two vector sets";
+  for (const std::string name : kStageNames) {
+    std::string first;
+    for (const std::string& set : sets) {
+      const testing::UseSet use(set);
+      const auto stage = tiny_stage(name, wide(5));
+      for (int64_t i = 0; i < 5; ++i) stage->step(i);
+      if (first.empty()) first = bytes_of(*stage);
+      EXPECT_TRUE(bytes_of(*stage) == first) << name << ": " << sets[0] << " and " << set;
+    }
+  }
 }
 
 TEST(TrainStages, TwentyStepsWithOneTwoAndThreeThreadsGiveTheSameBits) {
