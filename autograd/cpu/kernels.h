@@ -1,6 +1,7 @@
 // Every kernel of the CPU backend; backend.cpp enters them into its table.
 #pragma once
 
+#include "autograd/kernels/deform.h"
 #include "autograd/kernels/elementwise.h"
 #include "autograd/kernels/layout.h"
 #include "autograd/kernels/matmul.h"
@@ -48,5 +49,6 @@ void fk_grad(const FkGradArgs&);
 void lbs(const LbsArgs&);
 void lbs_grad(const LbsGradArgs&);
 void adam(const AdamArgs&);
+void deform(const DeformArgs&);
 
 }  // namespace restage::cpu

@@ -9,7 +9,6 @@
 namespace restage {
 namespace {
 
-constexpr size_t kMaxInputs = 16;       // of an op
 thread_local std::string current_path;  // of ModuleScope
 std::atomic<int> finite_checks{0};
 
