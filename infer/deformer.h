@@ -15,8 +15,8 @@ class Deformer {
   Deformer(const Tensor& points, const Tensor& weights, const Mlp3* offsets);
 
   /// The posed points [v, 3]. `pose` [1, c] is what the offset network gets besides the point;
-  /// `bones` [j, 3, 4] takes a rest point to where each joint alone would carry it. `dense` computes
-  /// every unit for every point, to compare with.
+  /// `bones` [j, 3, 4] takes a rest point to where each joint alone would carry it. `dense`
+  /// computes every unit for every point, to compare with.
   Tensor operator()(const Tensor& pose, const Tensor& bones, bool dense = false) const;
   /// The share of the offset network's first units that change sign inside a tile, on average over
   /// the tiles: what is left of its second layer. 0 without offsets.

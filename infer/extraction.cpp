@@ -25,10 +25,9 @@ void JointExtractor::sort(const Points& cloud, const std::string& source) {
   for (size_t i = 1; i < sorted_.size() && distinct < kLeastDistinctPoints; ++i)
     if (sorted_[i] != sorted_[i - 1]) ++distinct;
   if (distinct < kLeastDistinctPoints)
-    throw InputError(source,
-                     "holds " + std::to_string(distinct) + " distinct points, too few for a body",
-                     "give at least " + std::to_string(kLeastDistinctPoints) +
-                         ", better a thousand");
+    throw InputError(
+        source, "holds " + std::to_string(distinct) + " distinct points, too few for a body",
+        "give at least " + std::to_string(kLeastDistinctPoints) + ", better a thousand");
 }
 
 /// Exactly as many of the sorted points as the model takes: a random subset, or all of them and
@@ -38,7 +37,8 @@ void JointExtractor::choose(const RngKey& key) {
   chosen_ = sorted_;
   Rng rng(key);
   if (chosen_.size() > n) {
-    for (size_t i = 0; i < n; ++i) std::swap(chosen_[i], chosen_[i + rng.below(chosen_.size() - i)]);
+    for (size_t i = 0; i < n; ++i)
+      std::swap(chosen_[i], chosen_[i + rng.below(chosen_.size() - i)]);
     chosen_.resize(n);
   }
   while (chosen_.size() < n) chosen_.push_back(sorted_[rng.below(sorted_.size())]);

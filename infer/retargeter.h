@@ -83,7 +83,7 @@ class Retargeter {
   Joints last_source_;
   Vec3 start_a_ = Vec3::Zero(), start_b_ = Vec3::Zero();  ///< pelvis in the first frame
   Vec3 root_b_ = Vec3::Zero();
-  int64_t frame_ = 0, grid_ = 0;  ///< source frames received, grid frames produced
+  int64_t frame_ = 0, grid_ = 0;         ///< source frames received, grid frames produced
   std::vector<RetargetedFrame> frames_;  ///< of the last push, and room for more
   FrameTimes times_;
 };

@@ -65,9 +65,7 @@ void parallel_for(int64_t n, int64_t grain, PieceRef body) {
     leave(joined);
   };
   const int64_t takers = std::min<int64_t>(pieces, threads());
-  const auto work = [&] {
-    tbb::parallel_for(int64_t{0}, takers, take, tbb::simple_partitioner());
-  };
+  const auto work = [&] { tbb::parallel_for(int64_t{0}, takers, take, tbb::simple_partitioner()); };
   leave(forked);
   if (arena) {
     arena->execute(work);

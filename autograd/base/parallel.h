@@ -15,8 +15,8 @@ int threads();
 class PieceRef {
  public:
   template <class F>
-    requires(!std::is_same_v<std::remove_cvref_t<F>, PieceRef>)
-  PieceRef(F&& f)  // NOLINT: any callable is one
+  requires(!std::is_same_v<std::remove_cvref_t<F>, PieceRef>)
+      PieceRef(F&& f)  // NOLINT: any callable is one
       : object_(const_cast<void*>(static_cast<const void*>(&f))),
         call_([](void* object, int64_t begin, int64_t end) {
           (*static_cast<std::remove_reference_t<F>*>(object))(begin, end);

@@ -95,8 +95,7 @@ void add_units(const Field& f, const std::vector<int32_t>& on, float* affine) {
       }
     }
     for (int c = 0; c < 4; ++c)
-      for (int v = 0; v < 2; ++v)
-        hn::StoreU(acc[c][v], d, affine + c * f.width + at + v * kLanes);
+      for (int v = 0; v < 2; ++v) hn::StoreU(acc[c][v], d, affine + c * f.width + at + v * kLanes);
   }
 }
 
@@ -221,10 +220,8 @@ void tiles(const DeformArgs& args, const Field* field, int64_t from, int64_t to)
     HWY_ALIGN float posed[3 * P];
     if (field) {
       prepare_tile(*field, t, x, args.dense, s);
-      for (int64_t p = 0; p < P; p += kVectors * kLanes)
-        offset_points(*field, s, x + p, moved + p);
-      if (args.active)
-        args.active->data<int32_t>()[t] = static_cast<int32_t>(s.active.size());
+      for (int64_t p = 0; p < P; p += kVectors * kLanes) offset_points(*field, s, x + p, moved + p);
+      if (args.active) args.active->data<int32_t>()[t] = static_cast<int32_t>(s.active.size());
       x = moved;
     }
     skin_points(x, args.weights.data<float>() + t * joints * P, args.bones.data<float>(), joints,

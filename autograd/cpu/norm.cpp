@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/kernels.h"
+#include "autograd/kernels/scratch.h"
 
 namespace restage::cpu {
 namespace {
@@ -15,7 +15,7 @@ constexpr int64_t kPart = 512;  // rows per partial sum
 template <class F>
 void two_sums(int64_t n, int64_t inner, double* a, double* b, bool parallel, F&& add_row) {
   const int64_t parts = std::max<int64_t>(1, (n + kPart - 1) / kPart);
-  std::vector<double> partial(static_cast<size_t>(2 * parts * inner), 0.0);
+  Scratch<double> partial(static_cast<size_t>(2 * parts * inner), 0.0);
   const auto part = [&](int64_t p) {
     double* pa = partial.data() + 2 * p * inner;
     for (int64_t r = p * kPart; r < std::min(n, (p + 1) * kPart); ++r) add_row(r, pa, pa + inner);
@@ -58,8 +58,8 @@ void for_block_rows(int64_t n, int64_t inner, bool parallel, F&& f) {
 
 /// A parameter along the inner axis as doubles, or `none` where there is no such parameter.
 template <class T>
-std::vector<double> along_inner(const Tensor* t, Affine affine, int64_t inner, double none) {
-  std::vector<double> out(static_cast<size_t>(inner), none);
+Scratch<double> along_inner(const Tensor* t, Affine affine, int64_t inner, double none) {
+  Scratch<double> out(static_cast<size_t>(inner), none);
   if (t == nullptr || affine != Affine::inner) return out;
   for (int64_t i = 0; i < inner; ++i)
     out[static_cast<size_t>(i)] = static_cast<double>(t->data<T>()[i]);
@@ -69,14 +69,14 @@ std::vector<double> along_inner(const Tensor* t, Affine affine, int64_t inner, d
 template <class T>
 void norm_columns(const NormArgs& args) {
   const int64_t n = args.n, inner = args.inner;
-  const std::vector<double> scale = along_inner<T>(args.scale, args.affine, inner, 1);
-  const std::vector<double> shift = along_inner<T>(args.shift, args.affine, inner, 0);
+  const Scratch<double> scale = along_inner<T>(args.scale, args.affine, inner, 1);
+  const Scratch<double> shift = along_inner<T>(args.shift, args.affine, inner, 0);
   for_blocks(args.outer, n * inner, [&](int64_t o, bool parallel) {
     const T* x = args.x.data<T>() + o * n * inner;
     T* out = args.out.data<T>() + o * n * inner;
     double* mean = args.mean.data<double>() + o * inner;
     double* rstd = args.rstd.data<double>() + o * inner;
-    std::vector<double> sums(static_cast<size_t>(inner)), unused(sums);
+    Scratch<double> sums(static_cast<size_t>(inner)), unused(sums);
     two_sums(n, inner, sums.data(), unused.data(), parallel, [&](int64_t r, double* a, double*) {
       for (int64_t i = 0; i < inner; ++i) a[i] += static_cast<double>(x[r * inner + i]);
     });
@@ -102,7 +102,7 @@ void norm_columns(const NormArgs& args) {
 template <class T>
 void norm_columns_grad(const NormGradArgs& args) {
   const int64_t n = args.n, inner = args.inner;
-  const std::vector<double> scale = along_inner<T>(args.scale, args.affine, inner, 1);
+  const Scratch<double> scale = along_inner<T>(args.scale, args.affine, inner, 1);
   const double* sc = scale.data();
   for_blocks(args.outer, n * inner, [&](int64_t o, bool parallel) {
     const T* x = args.x.data<T>() + o * n * inner;
@@ -111,7 +111,7 @@ void norm_columns_grad(const NormGradArgs& args) {
     const double* rstd = args.rstd.data<double>() + o * inner;
     T* out = args.out.data<T>() + o * n * inner;
     // Sums of the output's gradient, and of it times the normalised input, per column.
-    std::vector<double> sg(static_cast<size_t>(inner)), sgx(sg);
+    Scratch<double> sg(static_cast<size_t>(inner)), sgx(sg);
     two_sums(n, inner, sg.data(), sgx.data(), parallel, [&](int64_t r, double* a, double* b) {
       for (int64_t i = 0; i < inner; ++i) {
         const double g = static_cast<double>(gy[r * inner + i]);
@@ -140,10 +140,11 @@ void norm_columns_grad(const NormGradArgs& args) {
 template <class T>
 void norm_rows(const NormArgs& args) {
   const int64_t n = args.n;
-  const Eigen::ArrayXd scale = ConstArray<T>(args.scale->data<T>(), n).template cast<double>();
-  const Eigen::ArrayXd shift = ConstArray<T>(args.shift->data<T>(), n).template cast<double>();
+  const auto scale = ConstArray<T>(args.scale->data<T>(), n).template cast<double>();
+  const auto shift = ConstArray<T>(args.shift->data<T>(), n).template cast<double>();
   parallel_for(args.outer, row_grain(n), [&](int64_t from, int64_t to) {
-    Eigen::ArrayXd d(n);
+    Scratch<double> row(static_cast<size_t>(n));
+    MutableArray<double> d(row.data(), n);
     for (int64_t o = from; o < to; ++o) {
       d = ConstArray<T>(args.x.data<T>() + o * n, n).template cast<double>();
       const double mean = d.sum() / static_cast<double>(n);

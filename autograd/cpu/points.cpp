@@ -2,10 +2,10 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <vector>
 
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/kernels.h"
+#include "autograd/kernels/scratch.h"
 
 namespace restage::cpu {
 namespace {
@@ -18,13 +18,13 @@ T squared_distance(const T* a, const T* b) {
 
 /// First index of the largest value.
 template <class T>
-int64_t first_max(const std::vector<T>& values) {
+int64_t first_max(const Scratch<T>& values) {
   return std::max_element(values.begin(), values.end()) - values.begin();
 }
 
 template <class T>
-void nearest(const T* query, const T* points, int64_t v, int64_t k, std::vector<T>& distance,
-             std::vector<int32_t>& order, int32_t* out) {
+void nearest(const T* query, const T* points, int64_t v, int64_t k, Scratch<T>& distance,
+             Scratch<int32_t>& order, int32_t* out) {
   for (int64_t i = 0; i < v; ++i) {
     const T d = squared_distance(query, points + 3 * i);
     distance[static_cast<size_t>(i)] = d == d ? d : std::numeric_limits<T>::infinity();  // no NaN:
@@ -45,7 +45,7 @@ void farthest(const T* x, int64_t v, int64_t m, int32_t* out) {
   for (int64_t i = 0; i < v; ++i)
     for (int c = 0; c < 3; ++c) centre[c] += x[3 * i + c];
   for (T& c : centre) c /= static_cast<T>(v);
-  std::vector<T> distance(static_cast<size_t>(v));
+  Scratch<T> distance(static_cast<size_t>(v));
   for (int64_t i = 0; i < v; ++i)
     distance[static_cast<size_t>(i)] = squared_distance(x + 3 * i, centre);
   int64_t current = first_max(distance);
@@ -69,8 +69,8 @@ void knn(const KnnArgs& args) {
   dispatch(args.points.dtype(), [&](auto zero) {
     using T = decltype(zero);
     parallel_for(args.query.size(0) * m, 32, [&](int64_t from, int64_t to) {
-      std::vector<T> distance(static_cast<size_t>(v));
-      std::vector<int32_t> order(static_cast<size_t>(v));
+      Scratch<T> distance(static_cast<size_t>(v));
+      Scratch<int32_t> order(static_cast<size_t>(v));
       for (int64_t q = from; q < to; ++q)
         nearest(args.query.data<T>() + 3 * q, args.points.data<T>() + q / m * v * 3, v, k, distance,
                 order, args.out.data<int32_t>() + q * k);

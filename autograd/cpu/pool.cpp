@@ -33,8 +33,8 @@ constexpr size_t kAlign = 64;
 constexpr size_t kLarge = size_t{1} << 20;
 constexpr size_t kHuge = size_t{2} << 20;
 
-// Size classes: eight steps per power of two (and steps of 64 bytes below 512), so at most an eighth
-// is wasted.
+// Size classes: eight steps per power of two (and steps of 64 bytes below 512), so at most an
+// eighth is wasted.
 struct SizeClass {
   size_t index, bytes;
 };

@@ -1,9 +1,9 @@
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/kernels.h"
+#include "autograd/kernels/scratch.h"
 
 namespace restage::cpu {
 namespace {
@@ -117,7 +117,7 @@ void softmax(const SoftmaxArgs& args) {
         out /= out.sum();
         return;
       }
-      std::vector<T> top(x, x + inner), total(static_cast<size_t>(inner), T(0));
+      Scratch<T> top(x, x + inner), total(static_cast<size_t>(inner), T(0));
       MutableArray<T> t(top.data(), inner), s(total.data(), inner);
       for (int64_t r = 1; r < n; ++r) t = t.max(ConstArray<T>(x + r * inner, inner));
       for (int64_t r = 0; r < n; ++r) {
@@ -143,7 +143,7 @@ void softmax_grad(const SoftmaxGradArgs& args) {
         MutableArray<T>(out, n) = ya * (ga - (ya * ga).sum());
         return;
       }
-      std::vector<T> total(static_cast<size_t>(inner), T(0));
+      Scratch<T> total(static_cast<size_t>(inner), T(0));
       MutableArray<T> s(total.data(), inner);
       for (int64_t r = 0; r < n; ++r)
         s += ConstArray<T>(y + r * inner, inner) * ConstArray<T>(g + r * inner, inner);

@@ -6,7 +6,7 @@
 
 namespace restage {
 
-inline constexpr int64_t kDeformTile = 96;   ///< points of a tile: whole vectors of any width
+inline constexpr int64_t kDeformTile = 48;   ///< points of a tile: whole vectors of any width
 inline constexpr int64_t kDeformGroup = 8;   ///< neighbouring tiles that share work
 inline constexpr int64_t kDeformAlign = 32;  ///< the width p below is a multiple of it
 

@@ -4,7 +4,7 @@
 #include <cstring>
 
 #include "autograd/base/error.h"
-#include "autograd/kernels/kernel.h"
+#include "autograd/kernels/scratch.h"
 
 namespace restage {
 
@@ -69,22 +69,6 @@ struct Storage {
   void* data;
 };
 
-namespace {
-
-/// The handles of tensors come from the host's pool too: a steady loop takes nothing from the heap.
-template <class T>
-struct PoolAllocator {
-  using value_type = T;
-  PoolAllocator() = default;
-  template <class U>
-  PoolAllocator(const PoolAllocator<U>&) {}  // NOLINT: allocators convert
-  T* allocate(size_t n) { return static_cast<T*>(backend(Device{}).allocate(n * sizeof(T))); }
-  void deallocate(T* data, size_t n) { backend(Device{}).release(data, n * sizeof(T)); }
-  bool operator==(const PoolAllocator&) const { return true; }
-};
-
-}  // namespace
-
 Tensor Tensor::empty(const Shape& shape, DType type, Device device) {
   constexpr int64_t kMost = int64_t{1} << 48;  // numbers: more is a mistake, and must not overflow
   int64_t n = 1;
@@ -97,8 +81,8 @@ Tensor Tensor::empty(const Shape& shape, DType type, Device device) {
   t.shape_ = shape;
   t.numel_ = shape.numel();
   t.dtype_ = type;
-  t.storage_ = std::allocate_shared<Storage>(
-      PoolAllocator<Storage>(), static_cast<size_t>(t.numel_) * size_of(type), device);
+  t.storage_ = std::allocate_shared<Storage>(PoolAllocator<Storage>(),
+                                             static_cast<size_t>(t.numel_) * size_of(type), device);
   t.base_ = t.storage_->data;
   return t;
 }

@@ -78,7 +78,7 @@ void fill(Parameter& p, double value) { p.value = Tensor::full(p.value.shape(), 
 
 TEST(InferDeformer, EqualsThePlainNetworkForAnyNumberOfPoints) {
   const auto offsets = net();
-  for (const int64_t v : {1, 2, 63, 65, 95, 96, 97, 500, 768, 769, 3000}) {
+  for (const int64_t v : {1, 2, 47, 48, 49, 63, 65, 384, 385, 500, 3000}) {
     const Surface s = surface(v);
     const Deformer deformer(s.points, s.weights, offsets.get());
     EXPECT_LT(apart(deformer(s.pose, s.bones), reference(s, offsets.get())), 2e-6) << v;
@@ -97,8 +97,8 @@ TEST(InferDeformer, EqualsThePlainNetworkForAnyWidth) {
 }
 
 TEST(InferDeformer, EqualsTheTrainedNetwork) {
-  const ModelSet models = load_models(
-      std::string(RESTAGE_SOURCE_DIR) + "/experiments/weights/lite.safetensors", {});
+  const ModelSet models =
+      load_models(std::string(RESTAGE_SOURCE_DIR) + "/experiments/weights/lite.safetensors", {});
   const Surface s = surface(5000);
   const Deformer deformer(s.points, s.weights, models.offsets.net.get());
   const Tensor expected = reference(s, models.offsets.net.get());
@@ -131,8 +131,8 @@ TEST(InferDeformer, EqualsThePlainNetworkWhenAllOrNoUnitsChangeSign) {
       around.points.data<float>()[3 * i + c] =
           static_cast<float>((i % 2 == 0 ? 1 : -1) * (c == i / 2 % 3 ? 1 : 0.01 * c)) *
           (1 + 1e-6f * static_cast<float>(i));
-  around.points = around.points.rows(0, 90);
-  around.weights = around.weights.rows(0, 90);
+  around.points = around.points.rows(0, 40);
+  around.weights = around.weights.rows(0, 40);
   const Deformer deformer(around.points, around.weights, offsets.get());
   EXPECT_LT(apart(deformer(s.pose, s.bones), reference(around, offsets.get())), 5e-6);
   EXPECT_EQ(deformer.active_share(s.pose), 1);

@@ -114,10 +114,10 @@ TEST_P(SteadyFrames, TakeNothingFromTheHeapAndDoNotGrow) {
   EXPECT_EQ(memory_stats().in_use, memory.in_use);
   EXPECT_EQ(memory_stats().peak, memory.peak);
   EXPECT_EQ(memory_stats().large_allocations, memory.large_allocations);
-  EXPECT_LE(resident_pages(), resident + 16);  // stacks of threads may still be touched
+  EXPECT_LE(resident_pages(), resident + 64);  // stacks of threads may still be touched
 }
 
-INSTANTIATE_TEST_SUITE_P(Threads, SteadyFrames, ::testing::Values(1, 2));
+INSTANTIATE_TEST_SUITE_P(Threads, SteadyFrames, ::testing::Values(0, 1, 2));
 
 }  // namespace
 }  // namespace restage
