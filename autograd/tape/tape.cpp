@@ -46,6 +46,11 @@ void shape_error(const char* op, const char* letters, Inputs inputs, const std::
                    module_path());
 }
 
+void too_many_inputs(const char* op, size_t count) {
+  throw ShapeError(std::string(op) + ": an op has at most " + std::to_string(kMaxInputs) +
+                   " inputs, not " + std::to_string(count) + ", in " + module_path());
+}
+
 void require_floats(const char* op, const char* letters, Inputs inputs) {
   for (const Tensor& t : inputs)
     if (t.dtype() != inputs[0].dtype() || (t.dtype() != DType::f32 && t.dtype() != DType::f64))
@@ -101,9 +106,6 @@ Var Tape::record(std::unique_ptr<Function> function, std::span<const Var> inputs
   Node node;
   node.function = std::move(function);
   node.path = module_path();
-  if (inputs.size() > kMaxInputs)
-    throw Error(std::string(node.function->name()) + ": an op has at most " +
-                std::to_string(kMaxInputs) + " inputs");
   for (const Var& in : inputs) {
     if (in.tape != nullptr) require_own(in);
     node.inputs.push_back(in.tape == this ? in.node : -1);

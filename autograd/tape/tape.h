@@ -124,6 +124,8 @@ void require_finite(const Tensor& t, const char* op, const std::string& path, co
 /// Throws ShapeError: "op: [letters] message; got shapes; in module path".
 [[noreturn]] void shape_error(const char* op, const char* letters, Inputs inputs,
                               const std::string& why);
+/// Throws ShapeError: an op was given more than kMaxInputs.
+[[noreturn]] void too_many_inputs(const char* op, size_t count);
 /// ShapeError unless all inputs have the same floating dtype.
 void require_floats(const char* op, const char* letters, Inputs inputs);
 
@@ -148,6 +150,7 @@ struct Recorded final : Tape::Function {
 /// Saved&) const`, `Grads backward(const Saved&, const Tensor& gy, Needs) const`.
 template <class Op>
 Var call(const Op& op, std::span<const Var> inputs) {
+  if (inputs.size() > kMaxInputs) too_many_inputs(Op::name, inputs.size());
   InlineVector<Tensor, kMaxInputs> values;
   Tape* tape = nullptr;
   for (const Var& v : inputs) {
