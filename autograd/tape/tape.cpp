@@ -46,9 +46,10 @@ void shape_error(const char* op, const char* letters, Inputs inputs, const std::
                    module_path());
 }
 
-void too_many_inputs(const char* op, size_t count) {
-  throw ShapeError(std::string(op) + ": an op has at most " + std::to_string(kMaxInputs) +
-                   " inputs, not " + std::to_string(count) + ", in " + module_path());
+void too_many_inputs(const char* op, const char* letters, std::span<const Var> inputs) {
+  std::vector<Tensor> values;
+  for (const Var& v : inputs) values.push_back(v.value);
+  shape_error(op, letters, values, "an op has at most " + std::to_string(kMaxInputs) + " inputs");
 }
 
 void require_floats(const char* op, const char* letters, Inputs inputs) {

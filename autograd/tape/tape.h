@@ -125,7 +125,7 @@ void require_finite(const Tensor& t, const char* op, const std::string& path, co
 [[noreturn]] void shape_error(const char* op, const char* letters, Inputs inputs,
                               const std::string& why);
 /// Throws ShapeError: an op was given more than kMaxInputs.
-[[noreturn]] void too_many_inputs(const char* op, size_t count);
+[[noreturn]] void too_many_inputs(const char* op, const char* letters, std::span<const Var> inputs);
 /// ShapeError unless all inputs have the same floating dtype.
 void require_floats(const char* op, const char* letters, Inputs inputs);
 
@@ -150,7 +150,7 @@ struct Recorded final : Tape::Function {
 /// Saved&) const`, `Grads backward(const Saved&, const Tensor& gy, Needs) const`.
 template <class Op>
 Var call(const Op& op, std::span<const Var> inputs) {
-  if (inputs.size() > kMaxInputs) too_many_inputs(Op::name, inputs.size());
+  if (inputs.size() > kMaxInputs) too_many_inputs(Op::name, Op::letters, inputs);
   InlineVector<Tensor, kMaxInputs> values;
   Tape* tape = nullptr;
   for (const Var& v : inputs) {
