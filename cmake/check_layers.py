@@ -40,7 +40,7 @@ MAY_USE = {
 }
 
 # Single files that may reach further: memory comes from the backend.
-ALSO = {"autograd/tensor/tensor.cpp": ["autograd/kernels/kernel.h"]}
+ALSO = {"autograd/tensor/tensor.cpp": ["autograd/kernels/scratch.h"]}
 
 # Third-party (and a few system) headers and the only places that may know them.
 ONLY_IN = {

@@ -10,61 +10,76 @@ bool before(const Point& a, const Point& b) {
   return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
 }
 
-/// Exactly n of the sorted points: a random subset, or all of them and random repetitions.
-Points choose(const Points& sorted, size_t n, const RngKey& key) {
-  Points out = sorted;
-  Rng rng(key);
-  if (out.size() > n) {
-    for (size_t i = 0; i < n; ++i) std::swap(out[i], out[i + rng.below(out.size() - i)]);
-    out.resize(n);
-  }
-  while (out.size() < n) out.push_back(sorted[rng.below(sorted.size())]);
-  std::sort(out.begin(), out.end(), before);
-  return out;
-}
-
 }  // namespace
 
-Joints extract_joints(SkeletonModel& model, const Points& cloud, const std::string& source,
-                      const RngKey& key, int samples) {
+JointExtractor::JointExtractor(SkeletonModel& model, int samples)
+    : model_(model), centres_(static_cast<size_t>(samples)) {}
+
+void JointExtractor::sort(const Points& cloud, const std::string& source) {
   for (const Point& p : cloud)
     if (!p.allFinite())
       throw InputError(source, "holds a coordinate that is not finite", "remove such points");
-  Points sorted = cloud;
-  std::sort(sorted.begin(), sorted.end(), before);
-  Points distinct = sorted;
-  distinct.erase(std::unique(distinct.begin(), distinct.end()), distinct.end());
-  if (distinct.size() < kLeastDistinctPoints)
+  sorted_ = cloud;
+  std::sort(sorted_.begin(), sorted_.end(), before);
+  size_t distinct = sorted_.empty() ? 0 : 1;
+  for (size_t i = 1; i < sorted_.size() && distinct < kLeastDistinctPoints; ++i)
+    if (sorted_[i] != sorted_[i - 1]) ++distinct;
+  if (distinct < kLeastDistinctPoints)
     throw InputError(
-        source, "holds " + std::to_string(distinct.size()) + " distinct points, too few for a body",
+        source, "holds " + std::to_string(distinct) + " distinct points, too few for a body",
         "give at least " + std::to_string(kLeastDistinctPoints) + ", better a thousand");
-  const auto n = static_cast<size_t>(model.points());
-  Tensor batch = Tensor::empty({samples, static_cast<int64_t>(n), 3});
-  std::vector<Vec3> centres;
-  for (int s = 0; s < samples; ++s) {
-    const Points chosen = choose(sorted, n, key.fold(static_cast<uint64_t>(s)));
-    Vec3 centre = Vec3::Zero();
-    for (const Point& p : chosen) centre += p.cast<double>();
+}
+
+/// Exactly as many of the sorted points as the model takes: a random subset, or all of them and
+/// random repetitions; sorted.
+void JointExtractor::choose(const RngKey& key) {
+  const auto n = static_cast<size_t>(model_.points());
+  chosen_ = sorted_;
+  Rng rng(key);
+  if (chosen_.size() > n) {
+    for (size_t i = 0; i < n; ++i)
+      std::swap(chosen_[i], chosen_[i + rng.below(chosen_.size() - i)]);
+    chosen_.resize(n);
+  }
+  while (chosen_.size() < n) chosen_.push_back(sorted_[rng.below(sorted_.size())]);
+  std::sort(chosen_.begin(), chosen_.end(), before);
+}
+
+Joints JointExtractor::operator()(const Points& cloud, const std::string& source,
+                                  const RngKey& key) {
+  sort(cloud, source);
+  const auto n = static_cast<size_t>(model_.points());
+  const size_t samples = centres_.size();
+  Tensor batch = Tensor::empty({static_cast<int64_t>(samples), static_cast<int64_t>(n), 3});
+  for (size_t s = 0; s < samples; ++s) {
+    choose(key.fold(s));
+    Vec3& centre = centres_[s];
+    centre.setZero();
+    for (const Point& p : chosen_) centre += p.cast<double>();
     centre /= static_cast<double>(n);
-    centres.push_back(centre);
-    float* row = batch.data<float>() + static_cast<size_t>(s) * n * 3;
+    float* row = batch.data<float>() + s * n * 3;
     for (size_t i = 0; i < n; ++i)
       for (int c = 0; c < 3; ++c)
-        row[3 * i + static_cast<size_t>(c)] = static_cast<float>(chosen[i][c] - centre[c]);
+        row[3 * i + static_cast<size_t>(c)] = static_cast<float>(chosen_[i][c] - centre[c]);
   }
   Context ctx;
-  const Tensor joints = model.forward(ctx, batch).joints.value;
+  const Tensor joints = model_.forward(ctx, batch).joints.value;
   Joints out;
   for (size_t j = 0; j < kJoints; ++j) {
     out[j].setZero();
-    for (size_t s = 0; s < centres.size(); ++s) {
+    for (size_t s = 0; s < samples; ++s) {
       const float* x = joints.data<float>() + (s * kJoints + j) * 3;
-      out[j] += (Vec3(x[0], x[1], x[2]) + centres[s]) / static_cast<double>(samples);
+      out[j] += (Vec3(x[0], x[1], x[2]) + centres_[s]) / static_cast<double>(samples);
     }
     if (!out[j].allFinite())
       throw InputError(source, "gives joints that are not finite", "check its units: metres");
   }
   return out;
+}
+
+Joints extract_joints(SkeletonModel& model, const Points& cloud, const std::string& source,
+                      const RngKey& key, int samples) {
+  return JointExtractor(model, samples)(cloud, source, key);
 }
 
 Points surface_points(const Mesh& mesh, size_t n, const RngKey& key) {

@@ -10,10 +10,26 @@ namespace restage {
 
 inline constexpr size_t kLeastDistinctPoints = 64;
 
-/// The 22 joints of a cloud, metres, in the cloud's frame. Points are sorted lexicographically
-/// first, so their order in a file does not matter to the last bit. `samples` > 1 averages the
-/// answers for several random choices of points. InputError naming `source`: fewer than 64 distinct
-/// points, values that are not finite.
+/// The 22 joints of clouds. Keeps its working memory between clouds.
+class JointExtractor {
+ public:
+  /// `samples` > 1 averages the answers for several random choices of points.
+  explicit JointExtractor(SkeletonModel& model, int samples = 1);
+  /// Metres, in the cloud's frame. Points are sorted lexicographically first, so their order in a
+  /// file does not matter to the last bit. InputError naming `source`: fewer than 64 distinct
+  /// points, values that are not finite.
+  Joints operator()(const Points& cloud, const std::string& source, const RngKey& key);
+
+ private:
+  void sort(const Points& cloud, const std::string& source);
+  void choose(const RngKey& key);
+
+  SkeletonModel& model_;
+  Points sorted_, chosen_;
+  std::vector<Vec3> centres_;
+};
+
+/// The joints of one cloud.
 Joints extract_joints(SkeletonModel& model, const Points& cloud, const std::string& source,
                       const RngKey& key, int samples = 1);
 

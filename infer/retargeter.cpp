@@ -1,13 +1,12 @@
 #include "infer/retargeter.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <string>
 
-#include "autograd/ops/elementwise.h"
+#include "autograd/kernels/rotation.h"
 #include "autograd/ops/layout.h"
-#include "autograd/ops/rotation.h"
-#include "nn/losses/deformation.h"
 
 namespace restage {
 namespace {
@@ -31,6 +30,21 @@ Joints blend(const Joints& a, const Joints& b, double t) {
   return out;
 }
 
+/// Adds the time from its beginning to its end to a sum.
+class Stopwatch {
+ public:
+  explicit Stopwatch(double* seconds) : seconds_(seconds) {}
+  ~Stopwatch() {
+    *seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+ private:
+  double* seconds_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
 void require_tpose(const Joints& j, const std::string& where) {
   for (const auto& [shoulder, wrist, side] :
        {std::tuple<size_t, size_t, double>{16, 20, 1.0}, {17, 21, -1.0}}) {
@@ -49,7 +63,10 @@ void require_tpose(const Joints& j, const std::string& where) {
 
 Retargeter::Retargeter(const ModelSet& models, Mesh target, const std::string& where,
                        const RetargetOptions& options)
-    : models_(models), target_(std::move(target)), options_(options) {
+    : models_(models),
+      target_(std::move(target)),
+      options_(options),
+      extractor_(*models.skeleton, options.samples) {
   const RngKey key = RngKey{options.seed, 0}.fold("target");
   rest_ =
       extract_joints(*models.skeleton, surface_points(target_, kTargetPoints, key.fold("surface")),
@@ -60,7 +77,11 @@ Retargeter::Retargeter(const ModelSet& models, Mesh target, const std::string& w
 
 Retargeter::Retargeter(const ModelSet& models, Mesh target, const Joints& rest,
                        const RetargetOptions& options)
-    : models_(models), target_(std::move(target)), options_(options), rest_(rest) {
+    : models_(models),
+      target_(std::move(target)),
+      options_(options),
+      extractor_(*models.skeleton, options.samples),
+      rest_(rest) {
   prepare();
 }
 
@@ -80,17 +101,18 @@ void Retargeter::prepare() {
   keep_root_rotation_ = extra("keep_root_rotation", "true") == "true";
   const auto v = static_cast<int64_t>(target_.vertices.size());
   rest_tensor_ = tensor_of(rest_, rest_[0]);
-  points_tensor_ = Tensor::empty({1, v, 3});
+  Tensor points = Tensor::empty({1, v, 3});
   for (size_t i = 0; i < target_.vertices.size(); ++i)
     for (int c = 0; c < 3; ++c)
-      points_tensor_.data<float>()[3 * i + static_cast<size_t>(c)] =
+      points.data<float>()[3 * i + static_cast<size_t>(c)] =
           target_.vertices[i][c] - static_cast<float>(rest_[0][c]);
   Context ctx;
-  weights_tensor_ = (*models_.weights)(ctx, join_points(Var(rest_tensor_.reshape({1, 3 * kJoints})),
-                                                        Var(points_tensor_)))
-                        .value;
+  const Tensor weights =
+      (*models_.weights)(ctx, join_points(Var(rest_tensor_.reshape({1, 3 * kJoints})), Var(points)))
+          .value.reshape({v, kJoints});
   weights_ = Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, kJoints, Eigen::RowMajor>>(
-      weights_tensor_.data<float>(), v, kJoints);
+      weights.data<float>(), v, kJoints);
+  deformer_.emplace(points.reshape({v, 3}), weights, models_.offsets.net.get());
 }
 
 void Retargeter::restart() {
@@ -100,29 +122,56 @@ void Retargeter::restart() {
   frame_ = grid_ = 0;
 }
 
-std::vector<RetargetedFrame> Retargeter::push(const Points& cloud, const std::string& source) {
+std::span<const RetargetedFrame> Retargeter::push(const Points& cloud, const std::string& source) {
   const RngKey key = RngKey{options_.seed, 0}.fold("frame").fold(static_cast<uint64_t>(frame_));
-  return push_joints(extract_joints(*models_.skeleton, cloud, source, key, options_.samples));
+  Joints joints;
+  double seconds = 0;
+  {
+    const Stopwatch watch(&seconds);
+    joints = extractor_(cloud, source, key);
+  }
+  const auto out = push_joints(joints);
+  times_.extract = seconds;
+  return out;
 }
 
-std::vector<RetargetedFrame> Retargeter::push_joints(const Joints& joints) {
+std::span<const RetargetedFrame> Retargeter::push_joints(const Joints& joints) {
   last_source_ = joints;
-  std::vector<RetargetedFrame> out;
+  times_ = {};
+  size_t count = 0;
   const double now = static_cast<double>(frame_) / options_.fps;
   // Grid frames up to this moment; positions between two source frames are interpolated.
   while (static_cast<double>(grid_) / kFps <= now + 1e-9) {
     const double back =
         (now - static_cast<double>(grid_) / kFps) * options_.fps;  // in source frames
-    out.push_back(
-        step(received_ && back > 1e-9 ? blend(joints, *received_, std::min(back, 1.0)) : joints));
+    if (frames_.size() == count) frames_.emplace_back();
+    step(received_ && back > 1e-9 ? blend(joints, *received_, std::min(back, 1.0)) : joints,
+         &frames_[count++]);
     ++grid_;
   }
   received_ = joints;
   ++frame_;
-  return out;
+  return {frames_.data(), count};
 }
 
-RetargetedFrame Retargeter::step(const Joints& a) {
+void Retargeter::step(const Joints& a, RetargetedFrame* out) {
+  {
+    const Stopwatch watch(&times_.motion);
+    advance(a, &out->pose);
+  }
+  const Stopwatch watch(&times_.deformation);
+  const PosedSkeleton posed = forward_kinematics(rest_, out->pose);
+  out->joints = posed.joints;
+  deform(out->pose, posed, &out->vertices);
+  const auto finite = [](const auto& x) { return x.allFinite(); };
+  if (!std::all_of(out->joints.begin(), out->joints.end(), finite) ||
+      !std::all_of(out->vertices.begin(), out->vertices.end(), finite))
+    throw InputError("", "frame " + std::to_string(grid_) + " of the result is not finite",
+                     "check that source and target are in metres");
+}
+
+/// The motion model's answer to A's joints.
+void Retargeter::advance(const Joints& a, Pose* pose) {
   const double heading = remove_heading_ ? heading_angle(a) : 0;
   const Mat3 turn = turn_about_y(heading), back = turn.transpose();
   Joints local;
@@ -141,12 +190,11 @@ RetargetedFrame Retargeter::step(const Joints& a) {
   const SmrmOutput answer =
       (*models_.smrm)(ctx, Var(tensor_of(local, Vec3::Zero()).reshape({1, 1, kJoints, 3})),
                       Var(trans), Var(rest_tensor_), &state_);
-  RetargetedFrame out;
   const float* r = answer.rotations.value.data<float>();
   for (size_t j = 0; j < kJoints; ++j)
-    out.pose.local[j] =
+    pose->local[j] =
         Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(r + 9 * j).cast<double>();
-  out.pose.local[0] = turn * out.pose.local[0];
+  pose->local[0] = turn * pose->local[0];
   const float* t = answer.trans.value.data<float>();
   const Vec3 t_b = turn * Vec3(t[0], t[1], t[2]);
   if (path_ == Path::velocity) {
@@ -155,38 +203,31 @@ RetargetedFrame Retargeter::step(const Joints& a) {
     root_b_ = path_ == Path::relative ? Vec3(start_b_ + t_b) : t_b;
   }
   previous_ = a;
-  out.pose.root = root_b_;
-  out.joints = forward_kinematics(rest_, out.pose).joints;
-  out.vertices = pose_vertices(out.pose);
-  const auto finite = [](const auto& x) { return x.allFinite(); };
-  if (!std::all_of(out.joints.begin(), out.joints.end(), finite) ||
-      !std::all_of(out.vertices.begin(), out.vertices.end(), finite))
-    throw InputError("", "frame " + std::to_string(grid_) + " of the result is not finite",
-                     "check that source and target are in metres");
-  return out;
+  pose->root = root_b_;
+}
+
+void Retargeter::deform(const Pose& pose, const PosedSkeleton& posed, Points* out) const {
+  Tensor local = Tensor::empty({kJoints, 9}), bones = Tensor::empty({kJoints, 3, 4});
+  using Rows = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
+  using Bone = Eigen::Matrix<float, 3, 4, Eigen::RowMajor>;
+  for (size_t j = 0; j < kJoints; ++j) {
+    Eigen::Map<Rows>(local.data<float>() + 9 * j) = pose.local[j].cast<float>();
+    Eigen::Map<Bone> bone(bones.data<float>() + 12 * j);
+    bone.leftCols<3>() = posed.global[j].cast<float>();
+    bone.col(3) = (posed.joints[j] - posed.global[j] * (rest_[j] - rest_[0])).cast<float>();
+  }
+  Tensor angles = Tensor::empty({kJoints, 3});
+  launch(FromMatrixArgs{RotationForm::axis_angle, local, angles});
+  if (!keep_root_rotation_) std::fill_n(angles.data<float>(), 3, 0.0f);
+  const Tensor points = (*deformer_)(angles.reshape({1, 3 * kJoints}), bones);
+  out->resize(target_.vertices.size());
+  for (size_t i = 0; i < out->size(); ++i)
+    (*out)[i] = Eigen::Map<const Point>(points.data<float>() + 3 * i);
 }
 
 Points Retargeter::pose_vertices(const Pose& pose) const {
-  Tensor local = Tensor::empty({1, kJoints, 3, 3});
-  for (size_t j = 0; j < kJoints; ++j)
-    Eigen::Map<Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(local.data<float>() + 9 * j) =
-        pose.local[j].cast<float>();
-  Context ctx;
-  Var x = points_tensor_;
-  if (models_.offsets) {
-    Tensor angles = matrix_to_axis_angle(local).reshape({1, 3 * kJoints});
-    if (!keep_root_rotation_) std::fill_n(angles.data<float>(), 3, 0.0f);
-    x = x + (*models_.offsets)(ctx, join_points(Var(angles), x));
-  }
-  Tensor root = Tensor::empty({1, 3});
-  for (int c = 0; c < 3; ++c) root.data<float>()[c] = static_cast<float>(pose.root[c]);
-  const Var transforms =
-      forward_kinematics(Var(local), Var(rest_tensor_), Var(root), joint_parents());
-  const Tensor posed =
-      linear_blend_skinning(x, Var(weights_tensor_), transforms, Var(rest_tensor_)).value;
-  Points out(target_.vertices.size());
-  for (size_t i = 0; i < out.size(); ++i)
-    out[i] = Eigen::Map<const Point>(posed.data<float>() + 3 * i);
+  Points out;
+  deform(pose, forward_kinematics(rest_, pose), &out);
   return out;
 }
 

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <optional>
+#include <span>
 
+#include "infer/deformer.h"
 #include "infer/extraction.h"
 #include "nn/weights/bundle.h"
 
@@ -23,6 +25,11 @@ struct RetargetedFrame {
   Points vertices;  ///< posed, world, in the target's order
 };
 
+/// Seconds that the parts of one push() took.
+struct FrameTimes {
+  double extract = 0, motion = 0, deformation = 0;
+};
+
 class Retargeter {
  public:
   /// `models` must hold all stages and outlive the object. `where` names the target in errors.
@@ -34,10 +41,10 @@ class Retargeter {
              const RetargetOptions& options);
 
   /// One frame of A. At 30 fps each gives one frame of B, else those of the 30 fps grid that it
-  /// ends.
-  std::vector<RetargetedFrame> push(const Points& cloud, const std::string& source);
+  /// ends. They live until the next call: a steady frame takes no memory.
+  std::span<const RetargetedFrame> push(const Points& cloud, const std::string& source);
   /// The same from joints of A in the world.
-  std::vector<RetargetedFrame> push_joints(const Joints& joints);
+  std::span<const RetargetedFrame> push_joints(const Joints& joints);
   /// The target's surface in a pose of choice: skinning weights and offsets of the models.
   Points pose_vertices(const Pose& pose) const;
   /// Forgets the motion so far.
@@ -50,17 +57,23 @@ class Retargeter {
   }
   /// Joints extracted from the last cloud.
   const Joints& source_joints() const { return last_source_; }
+  /// What the last push() took.
+  const FrameTimes& times() const { return times_; }
 
  private:
   void prepare();
-  RetargetedFrame step(const Joints& a);
+  void step(const Joints& a, RetargetedFrame* out);
+  void advance(const Joints& a, Pose* pose);
+  void deform(const Pose& pose, const PosedSkeleton& posed, Points* out) const;
 
   const ModelSet& models_;
   Mesh target_;
   RetargetOptions options_;
+  JointExtractor extractor_;
   Joints rest_;
   Eigen::Matrix<float, Eigen::Dynamic, kJoints, Eigen::RowMajor> weights_;
-  Tensor rest_tensor_, points_tensor_, weights_tensor_;  // relative to the rest pelvis
+  Tensor rest_tensor_;  // relative to the rest pelvis
+  std::optional<Deformer> deformer_;
   // How the models were trained:
   enum class Path { velocity, relative, absolute } path_ = Path::velocity;
   bool remove_heading_ = false, keep_root_rotation_ = true;
@@ -70,7 +83,9 @@ class Retargeter {
   Joints last_source_;
   Vec3 start_a_ = Vec3::Zero(), start_b_ = Vec3::Zero();  ///< pelvis in the first frame
   Vec3 root_b_ = Vec3::Zero();
-  int64_t frame_ = 0, grid_ = 0;  ///< source frames received, grid frames produced
+  int64_t frame_ = 0, grid_ = 0;         ///< source frames received, grid frames produced
+  std::vector<RetargetedFrame> frames_;  ///< of the last push, and room for more
+  FrameTimes times_;
 };
 
 }  // namespace restage

@@ -5,6 +5,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <atomic>
 #include <memory>
 #include <mutex>
 
@@ -46,7 +47,7 @@ void set_threads(int n) {
 
 int threads() { return requested > 0 ? requested : tbb::this_task_arena::max_concurrency(); }
 
-void parallel_for(int64_t n, int64_t grain, const std::function<void(int64_t, int64_t)>& body) {
+void parallel_for(int64_t n, int64_t grain, PieceRef body) {
   if (n <= 0) return;
   grain = std::max<int64_t>(1, grain);
   const int64_t pieces = (n + grain - 1) / grain;
@@ -55,14 +56,16 @@ void parallel_for(int64_t n, int64_t grain, const std::function<void(int64_t, in
     for (int64_t i = 0; i < pieces; ++i) piece(i);
     return;
   }
-  const auto marked_piece = [&](int64_t i) {
+  // One task a thread, each taking the next piece until none is left: handing a piece out costs an
+  // addition, not a task of the library.
+  std::atomic<int64_t> next{0};
+  const auto take = [&](int64_t) {
     see(forked);
-    piece(i);
+    for (int64_t i; (i = next.fetch_add(1, std::memory_order_relaxed)) < pieces;) piece(i);
     leave(joined);
   };
-  const auto work = [&] {
-    tbb::parallel_for(int64_t{0}, pieces, marked_piece, tbb::simple_partitioner());
-  };
+  const int64_t takers = std::min<int64_t>(pieces, threads());
+  const auto work = [&] { tbb::parallel_for(int64_t{0}, takers, take, tbb::simple_partitioner()); };
   leave(forked);
   if (arena) {
     arena->execute(work);

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
+#include <type_traits>
 
 namespace restage {
 
@@ -11,8 +11,25 @@ namespace restage {
 void set_threads(int n);
 int threads();
 
+/// A callable (begin, end) that the caller keeps alive: a reference, so nothing is allocated.
+class PieceRef {
+ public:
+  template <class F>
+  requires(!std::is_same_v<std::remove_cvref_t<F>, PieceRef>)
+      PieceRef(F&& f)  // NOLINT: any callable is one
+      : object_(const_cast<void*>(static_cast<const void*>(&f))),
+        call_([](void* object, int64_t begin, int64_t end) {
+          (*static_cast<std::remove_reference_t<F>*>(object))(begin, end);
+        }) {}
+  void operator()(int64_t begin, int64_t end) const { call_(object_, begin, end); }
+
+ private:
+  void* object_;
+  void (*call_)(void* object, int64_t begin, int64_t end);
+};
+
 /// Calls body(begin, end) for consecutive pieces of [0, n) of `grain` items (the last may be
 /// shorter), on any thread, in any order. The pieces depend on n and grain only.
-void parallel_for(int64_t n, int64_t grain, const std::function<void(int64_t, int64_t)>& body);
+void parallel_for(int64_t n, int64_t grain, PieceRef body);
 
 }  // namespace restage

@@ -48,6 +48,7 @@ class CpuBackend final : public Backend {
     add<LbsArgs, cpu::lbs>();
     add<LbsGradArgs, cpu::lbs_grad>();
     add<AdamArgs, cpu::adam>();
+    add<DeformArgs, cpu::deform>();
   }
   std::string_view name() const override { return "cpu"; }
   void* allocate(size_t bytes) override { return cpu::pool_allocate(bytes); }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "autograd/kernels/attention.h"
+#include "autograd/kernels/deform.h"
 #include "autograd/kernels/elementwise.h"
 #include "autograd/kernels/layout.h"
 #include "autograd/kernels/matmul.h"
@@ -54,5 +55,6 @@ void fk_grad(const FkGradArgs&);
 void lbs(const LbsArgs&);
 void lbs_grad(const LbsGradArgs&);
 void adam(const AdamArgs&);
+void deform(const DeformArgs&);
 
 }  // namespace restage::cpu

@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/kernels.h"
 #include "autograd/cpu/math-inl.h"
 #include "autograd/cpu/targets.h"
+#include "autograd/kernels/scratch.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
@@ -22,7 +22,7 @@ constexpr int64_t kPart = 512;  // rows per partial sum
 template <class F>
 void two_sums(int64_t n, int64_t inner, double* a, double* b, bool parallel, F&& add_row) {
   const int64_t parts = std::max<int64_t>(1, (n + kPart - 1) / kPart);
-  std::vector<double> partial(static_cast<size_t>(2 * parts * inner), 0.0);
+  Scratch<double> partial(static_cast<size_t>(2 * parts * inner), 0.0);
   const auto part = [&](int64_t p) HWY_ATTR {
     double* pa = partial.data() + 2 * p * inner;
     for (int64_t r = p * kPart; r < std::min(n, (p + 1) * kPart); ++r) add_row(r, pa, pa + inner);
@@ -65,8 +65,8 @@ void for_block_rows(int64_t n, int64_t inner, bool parallel, F&& f) {
 
 /// A parameter along the inner axis as doubles, or `none` where there is no such parameter.
 template <class T>
-std::vector<double> along_inner(const Tensor* t, Affine affine, int64_t inner, double none) {
-  std::vector<double> out(static_cast<size_t>(inner), none);
+Scratch<double> along_inner(const Tensor* t, Affine affine, int64_t inner, double none) {
+  Scratch<double> out(static_cast<size_t>(inner), none);
   if (t == nullptr || affine != Affine::inner) return out;
   for (int64_t i = 0; i < inner; ++i)
     out[static_cast<size_t>(i)] = static_cast<double>(t->data<T>()[i]);
@@ -76,14 +76,14 @@ std::vector<double> along_inner(const Tensor* t, Affine affine, int64_t inner, d
 template <class T>
 void norm_columns(const NormArgs& args) {
   const int64_t n = args.n, inner = args.inner;
-  const std::vector<double> scale = along_inner<T>(args.scale, args.affine, inner, 1);
-  const std::vector<double> shift = along_inner<T>(args.shift, args.affine, inner, 0);
+  const Scratch<double> scale = along_inner<T>(args.scale, args.affine, inner, 1);
+  const Scratch<double> shift = along_inner<T>(args.shift, args.affine, inner, 0);
   for_blocks(args.outer, n * inner, [&](int64_t o, bool parallel) HWY_ATTR {
     const T* x = args.x.data<T>() + o * n * inner;
     T* out = args.out.data<T>() + o * n * inner;
     double* mean = args.mean.data<double>() + o * inner;
     double* rstd = args.rstd.data<double>() + o * inner;
-    std::vector<double> sums(static_cast<size_t>(inner)), unused(sums);
+    Scratch<double> sums(static_cast<size_t>(inner)), unused(sums);
     two_sums(n, inner, sums.data(), unused.data(), parallel,
              [&](int64_t r, double* a, double*) HWY_ATTR {
                for (int64_t i = 0; i < inner; ++i) a[i] += static_cast<double>(x[r * inner + i]);
@@ -111,7 +111,7 @@ void norm_columns(const NormArgs& args) {
 template <class T>
 void norm_columns_grad(const NormGradArgs& args) {
   const int64_t n = args.n, inner = args.inner;
-  const std::vector<double> scale = along_inner<T>(args.scale, args.affine, inner, 1);
+  const Scratch<double> scale = along_inner<T>(args.scale, args.affine, inner, 1);
   const double* sc = scale.data();
   for_blocks(args.outer, n * inner, [&](int64_t o, bool parallel) HWY_ATTR {
     const T* x = args.x.data<T>() + o * n * inner;
@@ -120,7 +120,7 @@ void norm_columns_grad(const NormGradArgs& args) {
     const double* rstd = args.rstd.data<double>() + o * inner;
     T* out = args.out.data<T>() + o * n * inner;
     // Sums of the output's gradient, and of it times the normalised input, per column.
-    std::vector<double> sg(static_cast<size_t>(inner)), sgx(sg);
+    Scratch<double> sg(static_cast<size_t>(inner)), sgx(sg);
     two_sums(n, inner, sg.data(), sgx.data(), parallel,
              [&](int64_t r, double* a, double* b) HWY_ATTR {
                for (int64_t i = 0; i < inner; ++i) {
@@ -184,11 +184,11 @@ void norm_rows_grad(const NormGradArgs& args) {
   const T* scale = args.scale->data<T>();
   const int64_t parts = std::max<int64_t>(1, (args.outer + kPart - 1) / kPart);
   // Per part of rows: the gradient of the scale, then that of the shift.
-  std::vector<double> partial(static_cast<size_t>(2 * parts * n), 0.0);
+  Scratch<double> partial(static_cast<size_t>(2 * parts * n), 0.0);
   parallel_for(parts, 1, [&](int64_t from, int64_t to) HWY_ATTR {
     const hn::ScalableTag<T> d;
     using V = hn::Vec<decltype(d)>;
-    std::vector<T> normalised(static_cast<size_t>(n)), scaled(static_cast<size_t>(n));
+    Scratch<T> normalised(static_cast<size_t>(n)), scaled(static_cast<size_t>(n));
     T *h = normalised.data(), *gs = scaled.data();
     for (int64_t o = from * kPart; o < std::min(args.outer, to * kPart); ++o) {
       const T *x = args.x.data<T>() + o * n, *g = args.gy.data<T>() + o * n;

@@ -6,12 +6,12 @@
 #include <bit>
 #include <cstring>
 #include <limits>
-#include <vector>
 
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/kernels.h"
 #include "autograd/cpu/math-inl.h"
 #include "autograd/cpu/targets.h"
+#include "autograd/kernels/scratch.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
@@ -22,7 +22,7 @@ constexpr int64_t kPadding = 64 / sizeof(float);  // the widest vector
 /// A cloud by coordinates, which may be read kPadding numbers beyond its end.
 template <class T>
 struct Cloud {
-  std::vector<T> x, y, z;
+  Scratch<T> x, y, z;
   explicit Cloud(int64_t v)
       : x(static_cast<size_t>(v + kPadding)), y(x.size()), z(x.size()), size(v) {}
   void set(const T* points) {
@@ -131,7 +131,7 @@ int64_t farthest_of(const Cloud<T>& cloud, const T* from, T* best) {
 
 /// Starts with the point farthest from the mean, then always the one farthest from all chosen.
 template <class T>
-void farthest(const T* x, Cloud<T>& cloud, std::vector<T>& distance, int64_t m, int32_t* out) {
+void farthest(const T* x, Cloud<T>& cloud, Scratch<T>& distance, int64_t m, int32_t* out) {
   const int64_t v = cloud.size;
   cloud.set(x);
   T centre[3] = {0, 0, 0};
@@ -188,7 +188,7 @@ void knn(const KnnArgs& args) {
     using T = decltype(zero);
     parallel_for(args.query.size(0) * m, 64, [&](int64_t from, int64_t to) HWY_ATTR {
       Cloud<T> cloud(v);
-      std::vector<T> distance(cloud.x.size()), best(static_cast<size_t>(k));
+      Scratch<T> distance(cloud.x.size()), best(static_cast<size_t>(k));
       for (int64_t q = from; q < to; ++q) {
         if (q == from || q % m == 0) cloud.set(args.points.data<T>() + q / m * v * 3);
         nearest(args.query.data<T>() + 3 * q, cloud, k, distance.data(), best.data(),
@@ -204,7 +204,7 @@ void fps(const FpsArgs& args) {
     using T = decltype(zero);
     parallel_for(args.points.size(0), 1, [&](int64_t from, int64_t to) HWY_ATTR {
       Cloud<T> cloud(v);
-      std::vector<T> distance(cloud.x.size());
+      Scratch<T> distance(cloud.x.size());
       for (int64_t s = from; s < to; ++s)
         farthest(args.points.data<T>() + s * v * 3, cloud, distance, m,
                  args.out.data<int32_t>() + s * m);
@@ -217,7 +217,7 @@ void attention_pool(const AttentionPoolArgs& args) {
   dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
     using T = decltype(zero);
     parallel_for(args.score.size(0), row_grain(k * d), [&](int64_t from, int64_t to) HWY_ATTR {
-      std::vector<T> top(static_cast<size_t>(d)), total(static_cast<size_t>(d));
+      Scratch<T> top(static_cast<size_t>(d)), total(static_cast<size_t>(d));
       for (int64_t p = from; p < to; ++p)
         pool_rows(args.score.data<T>() + p * k * d, args.value.data<T>() + p * k * d, k, d,
                   static_cast<T>(args.scale), args.weights.data<T>() + p * k * d,

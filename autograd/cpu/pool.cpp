@@ -2,10 +2,11 @@
 
 #include <sys/mman.h>
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <cstdlib>
-#include <map>
 #include <mutex>
 #include <new>
 #include <vector>
@@ -32,22 +33,36 @@ constexpr size_t kAlign = 64;
 constexpr size_t kLarge = size_t{1} << 20;
 constexpr size_t kHuge = size_t{2} << 20;
 
+// Size classes: eight steps per power of two (and steps of 64 bytes below 512), so at most an
+// eighth is wasted.
+struct SizeClass {
+  size_t index, bytes;
+};
+constexpr size_t kClasses = 8 * 64;
+
+SizeClass size_class(size_t bytes) {
+  const size_t least = std::max(bytes, kAlign);
+  const size_t step = std::max(kAlign, std::bit_floor(least) / 8);
+  const size_t size = (least + step - 1) / step * step;  // may be the next power of two
+  const size_t power = std::bit_floor(size), sub = std::max(kAlign, power / 8);
+  return {8 * static_cast<size_t>(std::countr_zero(power)) + (size - power) / sub, size};
+}
+
+/// The free blocks of one size class.
+struct FreeList {
+  std::vector<void*> blocks;
+  size_t taken = 0;  // from the system so far
+};
+
 struct Pool {
   std::mutex mutex;
-  std::map<size_t, std::vector<void*>> free;
+  std::array<FreeList, kClasses> free;
   MemoryStats stats;
 };
 
 Pool& pool() {
   static Pool* instance = new Pool;  // never destroyed: tensors of static lifetime may outlive it
   return *instance;
-}
-
-/// Size classes: eight steps per power of two, so at most an eighth is wasted.
-size_t size_class(size_t bytes) {
-  if (bytes <= kAlign) return kAlign;
-  const size_t step = std::max(kAlign, std::bit_floor(bytes) / 8);
-  return (bytes + step - 1) / step * step;
 }
 
 void* from_system(size_t bytes) {
@@ -61,17 +76,20 @@ void* from_system(size_t bytes) {
 }  // namespace
 
 void* cpu::pool_allocate(size_t bytes) {
-  const size_t size = size_class(bytes);
+  const auto [index, size] = size_class(bytes);
   Pool& p = pool();
   const std::lock_guard lock(p.mutex);
-  auto& list = p.free[size];
+  FreeList& list = p.free[index];
   void* data = nullptr;
-  if (list.empty()) {
+  if (list.blocks.empty()) {
+    // There is always room for all blocks of a class, so that giving one back takes no memory.
+    if (list.blocks.capacity() <= list.taken) list.blocks.reserve(2 * list.taken + 8);
     data = from_system(size);
+    ++list.taken;
     if (size >= kLarge) ++p.stats.large_allocations;
   } else {
-    data = list.back();
-    list.pop_back();
+    data = list.blocks.back();
+    list.blocks.pop_back();
   }
   p.stats.in_use += static_cast<int64_t>(size);
   p.stats.peak = std::max(p.stats.peak, p.stats.in_use);
@@ -81,11 +99,11 @@ void* cpu::pool_allocate(size_t bytes) {
 }
 
 void cpu::pool_release(void* data, size_t bytes) {
-  const size_t size = size_class(bytes);
+  const auto [index, size] = size_class(bytes);
   Pool& p = pool();
   const std::lock_guard lock(p.mutex);
   p.stats.in_use -= static_cast<int64_t>(size);
-  p.free[size].push_back(data);
+  p.free[index].blocks.push_back(data);
   ASAN_POISON_MEMORY_REGION(data, size);
 }
 

@@ -3,12 +3,12 @@
 #include <hwy/foreach_target.h>  // once per instruction set
 
 #include <algorithm>
-#include <vector>
 
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/kernels.h"
 #include "autograd/cpu/math-inl.h"
 #include "autograd/cpu/targets.h"
+#include "autograd/kernels/scratch.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
@@ -90,7 +90,7 @@ void softmax_row(const T* x, int64_t n, T* y) {
 template <class T>
 void softmax_columns(const T* x, int64_t n, int64_t inner, T* y) {
   using V = hn::Vec<hn::ScalableTag<T>>;
-  std::vector<T> tops(x, x + inner), totals(static_cast<size_t>(inner), T(0));
+  Scratch<T> tops(x, x + inner), totals(static_cast<size_t>(inner), T(0));
   T *top = tops.data(), *total = totals.data();
   for (int64_t r = 1; r < n; ++r)
     for (int64_t i = 0; i < inner; ++i)
@@ -174,7 +174,7 @@ void softmax_grad(const SoftmaxGradArgs& args) {
         for (int64_t i = 0; i < n; ++i) out[i] = y[i] * (g[i] - total);
         return;
       }
-      std::vector<T> totals(static_cast<size_t>(inner), T(0));
+      Scratch<T> totals(static_cast<size_t>(inner), T(0));
       T* total = totals.data();
       for (int64_t r = 0; r < n; ++r)
         for (int64_t i = 0; i < inner; ++i) total[i] += y[r * inner + i] * g[r * inner + i];

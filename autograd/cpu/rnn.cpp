@@ -4,13 +4,12 @@
 #define HWY_TARGET_INCLUDE "autograd/cpu/rnn.cpp"
 #include <hwy/foreach_target.h>  // once per instruction set
 
-#include <vector>
-
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/gemm_tile-inl.h"
 #include "autograd/cpu/kernels.h"
 #include "autograd/cpu/math-inl.h"
 #include "autograd/cpu/targets.h"
+#include "autograd/kernels/scratch.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
@@ -25,8 +24,8 @@ int piece_rows(int64_t n) {
 
 /// [rows, k] times packed columns -> [rows, n], rows <= Rows.
 template <class T, int Rows>
-void rows_times(const T* x, int64_t rows, int64_t k, const std::vector<T>& packed, int64_t n,
-                std::vector<T>& panel, T* out) {
+void rows_times(const T* x, int64_t rows, int64_t k, const Scratch<T>& packed, int64_t n,
+                Scratch<T>& panel, T* out) {
   constexpr int cols = Simd<T>::cols;
   for (int64_t l = 0; l < k; ++l)
     for (int64_t i = 0; i < Rows; ++i)
@@ -40,8 +39,8 @@ void rows_times(const T* x, int64_t rows, int64_t k, const std::vector<T>& packe
 }
 
 template <class T>
-void rows_times(int piece, const T* x, int64_t rows, int64_t k, const std::vector<T>& packed,
-                int64_t n, std::vector<T>& panel, T* out) {
+void rows_times(int piece, const T* x, int64_t rows, int64_t k, const Scratch<T>& packed, int64_t n,
+                Scratch<T>& panel, T* out) {
   if (piece == 4) return rows_times<T, 4>(x, rows, k, packed, n, panel, out);
   if (piece == 8) return rows_times<T, 8>(x, rows, k, packed, n, panel, out);
   rows_times<T, kRows>(x, rows, k, packed, n, panel, out);
@@ -49,9 +48,9 @@ void rows_times(int piece, const T* x, int64_t rows, int64_t k, const std::vecto
 
 /// A matrix [k, n] (by strides) in the layout of multiply().
 template <class T>
-std::vector<T> packed(const Strided<T>& m, int64_t k, int64_t n) {
+Scratch<T> packed(const Strided<T>& m, int64_t k, int64_t n) {
   constexpr int cols = Simd<T>::cols;
-  std::vector<T> out(static_cast<size_t>((n + cols - 1) / cols * cols * k));
+  Scratch<T> out(static_cast<size_t>((n + cols - 1) / cols * cols * k));
   pack_b(m, k, n, out.data());
   return out;
 }
@@ -93,11 +92,11 @@ void cell_grad(const T* gates, const T* previous, const T* g_out, int64_t h, T* 
 template <class T>
 void forward(const GruArgs& args) {
   const int64_t steps = args.gi.size(0), n = args.gi.size(1), h = args.h0.size(1);
-  const std::vector<T> w = packed<T>({args.w_hh.data<T>(), 1, h}, h, 3 * h);
+  const Scratch<T> w = packed<T>({args.w_hh.data<T>(), 1, h}, h, 3 * h);
   const int piece = piece_rows(n);
   parallel_for(n, piece, [&](int64_t from, int64_t to) HWY_ATTR {
     const int64_t rows = to - from;
-    std::vector<T> panel(static_cast<size_t>(h * piece)), gh(static_cast<size_t>(rows * 3 * h));
+    Scratch<T> panel(static_cast<size_t>(h * piece)), gh(static_cast<size_t>(rows * 3 * h));
     const T* previous = args.h0.data<T>() + from * h;
     for (int64_t t = 0; t < steps; ++t) {
       rows_times(piece, previous, rows, h, w, 3 * h, panel, gh.data());
@@ -114,13 +113,12 @@ void forward(const GruArgs& args) {
 template <class T>
 void backward(const GruGradArgs& args) {
   const int64_t steps = args.gy.size(0), n = args.gy.size(1), h = args.h0.size(1);
-  const std::vector<T> w = packed<T>({args.w_hh.data<T>(), h, 1}, 3 * h, h);
+  const Scratch<T> w = packed<T>({args.w_hh.data<T>(), h, 1}, 3 * h, h);
   const int piece = piece_rows(n);
   parallel_for(n, piece, [&](int64_t from, int64_t to) HWY_ATTR {
     const int64_t rows = to - from, count = rows * h;
-    std::vector<T> panel(static_cast<size_t>(3 * h * piece)),
-        carry(static_cast<size_t>(count), T(0));
-    std::vector<T> direct(static_cast<size_t>(count)), through(static_cast<size_t>(count));
+    Scratch<T> panel(static_cast<size_t>(3 * h * piece)), carry(static_cast<size_t>(count), T(0));
+    Scratch<T> direct(static_cast<size_t>(count)), through(static_cast<size_t>(count));
     for (int64_t t = steps - 1; t >= 0; --t) {
       const int64_t at = t * n + from;
       const T* gy = args.gy.data<T>() + at * h;

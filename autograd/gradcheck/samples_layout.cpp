@@ -31,7 +31,7 @@ OpSamples reshape_samples() {
 
 OpSamples permute_samples() {
   OpSamples s = samples_for<Permute>();
-  const auto by = [](std::vector<int> order) {
+  const auto by = [](const Axes& order) {
     return Build([order](Args x) { return permute(x[0], order); });
   };
   s.add("transposed", {random({2, 3}, 1)}, by({1, 0}));
@@ -47,9 +47,11 @@ OpSamples permute_samples() {
   s.error("no such axis", {random({2, 3}, 1)}, by({0, 2}));
   s.random = [by](Rng& rng) {
     const Shape shape = random_shape(rng, 1, 5, 3);
-    std::vector<int> order;
-    for (int i = 0; i < shape.rank(); ++i)
-      order.insert(order.begin() + static_cast<int>(rng.below(order.size() + 1)), i);
+    Axes order;
+    for (int i = 0; i < shape.rank(); ++i) {
+      order.push_back(i);
+      std::swap(order[rng.below(order.size())], order[order.size() - 1]);
+    }
     return Sample{"", {random(shape, rng)}, by(order)};
   };
   return s;

@@ -59,7 +59,7 @@ Tensor Permute::forward(Inputs x, Saved&) const {
 }
 
 Grads Permute::backward(const Saved&, const Tensor& gy, Needs) const {
-  Permute inverse{std::vector<int>(order.size())};
+  Permute inverse{order};
   for (size_t i = 0; i < order.size(); ++i)
     inverse.order[static_cast<size_t>(order[i])] = static_cast<int>(i);
   Saved nothing(false);

@@ -16,11 +16,13 @@ struct Reshape {
   Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
 };
 
+using Axes = InlineVector<int, Shape::kMaxRank>;
+
 /// Axis i of the result is axis order[i] of x.
 struct Permute {
   static constexpr const char* name = "permute";
   static constexpr const char* letters = "x[...]";
-  std::vector<int> order;
+  Axes order;
   void check(Inputs x) const;
   Tensor forward(Inputs x, Saved& saved) const;
   Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
@@ -81,9 +83,7 @@ struct Unfold {
 };
 
 inline Var reshape(const Var& x, const Shape& shape) { return call(Reshape{shape}, {x}); }
-inline Var permute(const Var& x, std::vector<int> order) {
-  return call(Permute{std::move(order)}, {x});
-}
+inline Var permute(const Var& x, const Axes& order) { return call(Permute{order}, {x}); }
 inline Var slice(const Var& x, int axis, int64_t from, int64_t to) {
   return call(Slice{axis, from, to}, {x});
 }

@@ -22,7 +22,8 @@ struct ToMatrix {
 struct ForwardKinematics {
   static constexpr const char* name = "forward_kinematics";
   static constexpr const char* letters = "R[n, j, 3, 3], rest[n, j, 3], root[n, 3]";
-  std::vector<int> parents;  ///< -1 for the root; parents come before children
+  std::span<const int> parents;  ///< -1 for the root; parents come before children. Outlives the
+                                 ///< tape
   void check(Inputs x) const;
   Tensor forward(Inputs x, Saved& saved) const;
   Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
@@ -51,8 +52,8 @@ Tensor matrix_to_quaternion(const Tensor& r);
 Tensor matrix_to_axis_angle(const Tensor& r);
 
 inline Var forward_kinematics(const Var& local, const Var& rest, const Var& root,
-                              std::vector<int> parents) {
-  return call(ForwardKinematics{std::move(parents)}, {local, rest, root});
+                              std::span<const int> parents) {
+  return call(ForwardKinematics{parents}, {local, rest, root});
 }
 /// Positions [n, j, 3] and global rotations [n, j, 3, 3] of forward_kinematics' result.
 Var joints_of(const Var& transforms);

@@ -9,7 +9,6 @@
 namespace restage {
 namespace {
 
-constexpr size_t kMaxInputs = 16;       // of an op
 thread_local std::string current_path;  // of ModuleScope
 std::atomic<int> finite_checks{0};
 
@@ -45,6 +44,12 @@ void shape_error(const char* op, const char* letters, Inputs inputs, const std::
               (t.defined() ? std::string(" ") + name_of(t.dtype()) : "");
   throw ShapeError(std::string(op) + " " + letters + ": " + why + "; got " + shapes + " in " +
                    module_path());
+}
+
+void too_many_inputs(const char* op, const char* letters, std::span<const Var> inputs) {
+  std::vector<Tensor> values;
+  for (const Var& v : inputs) values.push_back(v.value);
+  shape_error(op, letters, values, "an op has at most " + std::to_string(kMaxInputs) + " inputs");
 }
 
 void require_floats(const char* op, const char* letters, Inputs inputs) {
@@ -102,9 +107,6 @@ Var Tape::record(std::unique_ptr<Function> function, std::span<const Var> inputs
   Node node;
   node.function = std::move(function);
   node.path = module_path();
-  if (inputs.size() > kMaxInputs)
-    throw Error(std::string(node.function->name()) + ": an op has at most " +
-                std::to_string(kMaxInputs) + " inputs");
   for (const Var& in : inputs) {
     if (in.tape != nullptr) require_own(in);
     node.inputs.push_back(in.tape == this ? in.node : -1);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "autograd/base/error.h"
+#include "autograd/base/inline_vector.h"
 #include "autograd/tape/module_path.h"
 #include "autograd/tensor/tensor.h"
 
@@ -34,6 +35,7 @@ struct Var {
   Var detach() const { return Var(value); }
 };
 
+inline constexpr size_t kMaxInputs = 16;  ///< of an op
 using Inputs = std::span<const Tensor>;
 /// One gradient per input; undefined where none is needed or none exists.
 using Grads = std::vector<Tensor>;
@@ -122,6 +124,8 @@ void require_finite(const Tensor& t, const char* op, const std::string& path, co
 /// Throws ShapeError: "op: [letters] message; got shapes; in module path".
 [[noreturn]] void shape_error(const char* op, const char* letters, Inputs inputs,
                               const std::string& why);
+/// Throws ShapeError: an op was given more than kMaxInputs.
+[[noreturn]] void too_many_inputs(const char* op, const char* letters, std::span<const Var> inputs);
 /// ShapeError unless all inputs have the same floating dtype.
 void require_floats(const char* op, const char* letters, Inputs inputs);
 
@@ -146,16 +150,17 @@ struct Recorded final : Tape::Function {
 /// Saved&) const`, `Grads backward(const Saved&, const Tensor& gy, Needs) const`.
 template <class Op>
 Var call(const Op& op, std::span<const Var> inputs) {
-  std::vector<Tensor> values;
-  values.reserve(inputs.size());
+  if (inputs.size() > kMaxInputs) too_many_inputs(Op::name, Op::letters, inputs);
+  InlineVector<Tensor, kMaxInputs> values;
   Tape* tape = nullptr;
   for (const Var& v : inputs) {
     values.push_back(v.value);
     if (v.tape != nullptr) tape = v.tape;
   }
-  op.check(values);
+  const Inputs in(values.data(), values.size());
+  op.check(in);
   Saved saved(tape != nullptr);
-  Tensor y = op.forward(values, saved);
+  Tensor y = op.forward(in, saved);
   if (FiniteCheck::active()) require_finite(y, Op::name, module_path(), "forward");
   if (tape == nullptr) return Var(std::move(y));
   return tape->record(std::make_unique<detail::Recorded<Op>>(op, std::move(saved)), inputs,

@@ -4,7 +4,7 @@
 #include <cstring>
 
 #include "autograd/base/error.h"
-#include "autograd/kernels/kernel.h"
+#include "autograd/kernels/scratch.h"
 
 namespace restage {
 
@@ -81,7 +81,8 @@ Tensor Tensor::empty(const Shape& shape, DType type, Device device) {
   t.shape_ = shape;
   t.numel_ = shape.numel();
   t.dtype_ = type;
-  t.storage_ = std::make_shared<Storage>(static_cast<size_t>(t.numel_) * size_of(type), device);
+  t.storage_ = std::allocate_shared<Storage>(PoolAllocator<Storage>(),
+                                             static_cast<size_t>(t.numel_) * size_of(type), device);
   t.base_ = t.storage_->data;
   return t;
 }

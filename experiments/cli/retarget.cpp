@@ -9,6 +9,7 @@
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
+#include "experiments/cli/profile.h"
 #include "experiments/cli/weights_path.h"
 #include "infer/retargeter.h"
 #include "infer/writers/bvh.h"
@@ -108,6 +109,20 @@ void to_metres(const RetargetCommand& c, Points& points) {
   }
 }
 
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+void log_profile(const Profile& profile) {
+  for (const std::string& line : profile.lines()) log_info(line);
+  char text[96];
+  std::snprintf(text, sizeof text, "peak of tensors %.1f MiB",
+                static_cast<double>(memory_stats().peak) / 1048576.0);
+  log_info(text);
+}
+
 int run_retarget(const RetargetCommand& c, const Common& common) {
   check(c);
   const ModelSet models =
@@ -120,37 +135,42 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   options.samples = c.samples;
   Retargeter retargeter(models, read_mesh(c.target), c.target, options);
   // The first frame is looked at before anything is written or logged.
-  auto frame = frames->next();
+  double read = 0;
+  const auto next = [&] {
+    const Clock::time_point start = Clock::now();
+    auto frame = frames->next();
+    if (frame) to_metres(c, frame->points);
+    read = seconds_since(start);
+    return frame;
+  };
+  auto frame = next();
   if (!frame) throw InputError(c.source, "holds no frames", "give at least one cloud");
   const auto sink = make_sink(c, retargeter);
-  int64_t in = 0, out = 0, sequence = frame->sequence;
-  const auto start = std::chrono::steady_clock::now();
-  for (; frame; frame = frames->next()) {
+  Profile profile({"read", "extract", "motion", "deformation", "write", "frame"});
+  int64_t in = 0, out = 0;
+  const int64_t sequence = frame->sequence;
+  for (; frame; frame = next(), ++in) {
     if (frame->sequence != sequence)
       throw InputError(c.source, "holds several sequences", "give one sequence at a time");
-    to_metres(c, frame->points);
-    for (const RetargetedFrame& f : retargeter.push(frame->points, frame->source)) {
-      sink->push(f);
-      ++out;
-    }
-    ++in;
+    const Clock::time_point start = Clock::now();
+    const auto made = retargeter.push(frame->points, frame->source);
+    const Clock::time_point pushed = Clock::now();
+    for (const RetargetedFrame& f : made) sink->push(f);
+    const double write = seconds_since(pushed), work = seconds_since(start);
+    const FrameTimes& times = retargeter.times();
+    profile.add({read, times.extract, times.motion, times.deformation, write, read + work});
+    out += std::ssize(made);
   }
-  const double seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   sink->commit();
-  if (c.profile) {
-    char text[160];
-    std::snprintf(text, sizeof text, "%.2f ms a frame, peak of tensors %.1f MiB",
-                  1e3 * seconds / static_cast<double>(in),
-                  static_cast<double>(memory_stats().peak) / 1048576.0);
-    log_info(text);
-  }
+  if (c.profile) log_profile(profile);
   if (common.json) {
-    print_json({{"out", c.out},
-                {"source_frames", in},
-                {"frames", out},
-                {"fps", kFps},
-                {"seed", common.seed}});
+    Json document = {{"out", c.out},
+                     {"source_frames", in},
+                     {"frames", out},
+                     {"fps", kFps},
+                     {"seed", common.seed}};
+    if (c.profile) document["profile"] = profile.json();
+    print_json(document);
   } else {
     print("wrote " + c.out + ": " + std::to_string(out) + " frames (seed " +
           std::to_string(common.seed) + ")\n");
@@ -178,7 +198,8 @@ void add_retarget(Program& program) {
   app.add_option("--format", c->format, "of a folder's frames: ply or obj");
   app.add_option("--samples", c->samples, "random choices of points per frame to average");
   app.add_flag("--force", c->force, "accept a target that does not look like a T-pose");
-  app.add_flag("--profile", c->profile, "say how long a frame takes");
+  app.add_flag("--profile", c->profile,
+               "say how long a frame and its parts take: p50, p95, p99, max");
 }
 
 }  // namespace restage::cli

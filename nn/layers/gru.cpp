@@ -26,7 +26,7 @@ Var GruLayer::operator()(Context& ctx, const Var& x, Var* state) const {
   const ModuleScope path(scope);
   const int64_t n = x.size(0), t = x.size(1);
   Var y = permute(x, {1, 0, 2});
-  std::vector<Var> last;
+  InlineVector<Var, kMaxInputs> last;
   for (size_t l = 0; l < layers_.size(); ++l) {
     const Weights& w = *layers_[l];
     const auto index = static_cast<int64_t>(l);
@@ -37,7 +37,7 @@ Var GruLayer::operator()(Context& ctx, const Var& x, Var* state) const {
     y = gru(y, h0, ctx.bind(w.w_ih), ctx.bind(w.w_hh), ctx.bind(w.b_ih), ctx.bind(w.b_hh));
     last.push_back(t > 0 ? slice(y, 0, t - 1, t) : reshape(h0, {1, n, hidden_}));
   }
-  *state = call(Concat{0}, std::span<const Var>(last));
+  *state = call(Concat{0}, std::span<const Var>(last.data(), last.size()));
   return permute(y, {1, 0, 2});
 }
 

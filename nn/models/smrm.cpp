@@ -15,8 +15,6 @@ Var standardise(const Var& x, const Tensor& mean, const Tensor& deviation) {
 
 }  // namespace
 
-std::vector<int> joint_parents() { return {kParents.begin(), kParents.end()}; }
-
 Smrm::Smrm(const SmrmConfig& c, const Init& init)
     : config(c),
       enc(3 * (c.joints + 1), c.hidden, c.layers, c.dropout, init.sub("enc")),

@@ -47,6 +47,6 @@ struct Smrm : Module {
 };
 
 /// Parents of the 22 joints as the kinematics op takes them.
-std::vector<int> joint_parents();
+inline std::span<const int> joint_parents() { return kParents; }
 
 }  // namespace restage

@@ -9,6 +9,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "autograd/base/inline_vector.h"
 #include "autograd/base/parallel.h"
 #include "autograd/base/rng.h"
 
@@ -99,6 +100,28 @@ TEST(Checksums, SeeEverySingleByte) {
   EXPECT_EQ(checksum(text), *seen.find(checksum(text)));
   for (size_t n = 0; n < 37; ++n) EXPECT_TRUE(seen.insert(checksum(text.substr(0, n))).second);
   EXPECT_EQ(checksum("").size(), 16u);
+}
+
+TEST(InlineVector, HoldsValuesUpToItsSize) {
+  const auto value = std::make_shared<int>(7);
+  using Three = InlineVector<std::shared_ptr<int>, 3>;
+  {
+    Three a = {value, value};
+    EXPECT_EQ(a.size(), 2u);
+    EXPECT_EQ(value.use_count(), 3);
+    Three b = a;
+    b.push_back(nullptr);
+    EXPECT_EQ(value.use_count(), 5);
+    EXPECT_THROW(b.push_back(value), Error);
+    EXPECT_EQ(b.size(), 3u);
+    a = b;
+    EXPECT_EQ(a[0], value);
+    EXPECT_EQ(a[2], nullptr);
+    EXPECT_EQ(std::count(a.begin(), a.end(), value), 2);
+    b.clear();
+    EXPECT_EQ(value.use_count(), 3);
+  }
+  EXPECT_EQ(value.use_count(), 1);
 }
 
 TEST(ParallelFor, CoversEveryItemOnceForOddSizes) {

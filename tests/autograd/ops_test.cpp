@@ -484,8 +484,9 @@ TEST(Skeletons, AStraightChainTurnsAtItsJoints) {
   // Two bones of length 1 along y; the second joint turns by 90 degrees about z.
   const Tensor rest = Tensor::from<double>({1, 3, 3}, {0, 0, 0, 0, 1, 0, 0, 2, 0});
   const Tensor turns = Tensor::from<double>({1, 3, 3}, {0, 0, 0, 0, 0, std::acos(0.0), 0, 0, 0});
+  const std::array parents{-1, 0, 1};
   const Var t = forward_kinematics(axis_angle_to_matrix(Var(turns)), Var(rest),
-                                   Var(Tensor::from<double>({1, 3}, {5, 0, 0})), {-1, 0, 1});
+                                   Var(Tensor::from<double>({1, 3}, {5, 0, 0})), parents);
   expect_near(joints_of(t).value, Tensor::from<double>({1, 3, 3}, {5, 0, 0, 5, 1, 0, 4, 1, 0}),
               1e-15, "joints");
   expect_near(rotations_of(t).value.rows(0, 1).reshape({3, 3, 3}).rows(2, 3),

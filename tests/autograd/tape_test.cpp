@@ -149,6 +149,7 @@ TEST(Tape, DeepChainsNeitherRecurseNorOverflow) {
 
 struct Seventeen {
   static constexpr const char* name = "seventeen";
+  static constexpr const char* letters = "x_i[1]";
   void check(Inputs) const {}
   Tensor forward(Inputs x, Saved&) const { return x[0].clone(); }
   Grads backward(const Saved&, const Tensor& gy, Needs needs) const {

@@ -143,6 +143,14 @@ class Sources(Retarget):
         self.assertEqual(result.code, 0, result.err)
         self.assertIn("ms a frame", result.err)
         self.assertNotIn("ms a frame", result.out)
+        self.assertNotIn("profile", self.json(*self.call("out.h5")))
+        found = self.json(*self.call("out.h5", "--profile"))["profile"]
+        self.assertEqual(list(found), ["read", "extract", "motion", "deformation", "write", "frame"])
+        for row in found.values():
+            self.assertEqual(list(row), ["p50", "p95", "p99", "max"])
+            self.assertEqual(sorted(row.values()), list(row.values()))
+            self.assertGreater(row["p50"], 0)
+            self.assertLessEqual(row["max"], found["frame"]["max"])
 
 
 class BadRetargeting(Retarget):

@@ -70,7 +70,7 @@ const Body& target() {
 std::vector<RetargetedFrame> run(Retargeter& r, const std::vector<Joints>& source) {
   std::vector<RetargetedFrame> out;
   for (const Joints& j : source)
-    for (RetargetedFrame& f : r.push_joints(j)) out.push_back(std::move(f));
+    for (const RetargetedFrame& f : r.push_joints(j)) out.push_back(f);
   return out;
 }
 

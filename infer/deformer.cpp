@@ -1,0 +1,152 @@
+#include "infer/deformer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <string>
+
+#include "autograd/base/error.h"
+#include "autograd/kernels/matmul.h"
+
+namespace restage {
+namespace {
+
+constexpr int64_t P = kDeformTile;
+
+void require(const Tensor& t, const Shape& shape, const char* what) {
+  if (t.shape() == shape && t.dtype() == DType::f32) return;
+  throw ShapeError(std::string("deformer: ") + what + " must be float32 " + shape.str() + ", not " +
+                   name_of(t.dtype()) + " " + t.shape().str());
+}
+
+/// Sorts [begin, end) of the points into tiles: halved at the median of the longest side, on whole
+/// groups while there are several, so that a group's tiles are neighbours too.
+void sort_tiles(const float* x, int32_t* begin, int32_t* end) {
+  const int64_t tiles = (end - begin + P - 1) / P;
+  if (tiles <= 1) {
+    std::sort(begin, end);
+    return;
+  }
+  int64_t half = (tiles + 1) / 2;
+  if (tiles > kDeformGroup) half = (half + kDeformGroup - 1) / kDeformGroup * kDeformGroup;
+  int axis = 0;
+  float longest = -1;
+  for (int c = 0; c < 3; ++c) {
+    const auto [low, high] = std::minmax_element(
+        begin, end, [&](int32_t a, int32_t b) { return x[3 * a + c] < x[3 * b + c]; });
+    const float side = x[3 * *high + c] - x[3 * *low + c];
+    if (side > longest) longest = side, axis = c;
+  }
+  int32_t* middle = begin + half * P;
+  std::nth_element(begin, middle, end, [&](int32_t a, int32_t b) {
+    const float u = x[3 * a + axis], v = x[3 * b + axis];
+    return u < v || (u == v && a < b);
+  });
+  sort_tiles(x, begin, middle);
+  sort_tiles(x, middle, end);
+}
+
+/// Rows [v, c] -> [t, c, P] in the tiles' order.
+Tensor in_tiles(const Tensor& rows, const Tensor& order) {
+  const int64_t t = order.size(0), c = rows.size(1);
+  Tensor out = Tensor::empty({t, c, P});
+  for (int64_t i = 0; i < t * P; ++i) {
+    const float* row = rows.data<float>() + c * order.data<int32_t>()[i];
+    for (int64_t k = 0; k < c; ++k) out.data<float>()[(i / P * c + k) * P + i % P] = row[k];
+  }
+  return out;
+}
+
+/// a [m, n] without its first columns, or only its last: columns [from, to), transposed on request
+/// and the rows filled with zeros up to `width`.
+Tensor columns(const Tensor& a, int64_t from, int64_t to, bool transpose, int64_t width) {
+  const int64_t m = a.size(0), n = a.size(1), k = to - from;
+  Tensor out = Tensor::zeros({transpose ? k : m, width});
+  for (int64_t i = 0; i < m; ++i)
+    for (int64_t j = 0; j < k; ++j)
+      out.data<float>()[transpose ? j * width + i : i * width + j] =
+          a.data<float>()[i * n + from + j];
+  return out;
+}
+
+/// Least (sign 1) or largest (sign -1) w1 x of each unit in each tile.
+Tensor bound(const Tensor& points, const Tensor& w1, float sign) {
+  const int64_t t = points.size(0), u = w1.size(0);
+  Tensor out = Tensor::empty({t, u});
+  for (int64_t i = 0; i < t; ++i) {
+    const float* x = points.data<float>() + i * 3 * P;
+    for (int64_t k = 0; k < u; ++k) {
+      const float* w = w1.data<float>() + 3 * k;
+      float least = INFINITY;
+      for (int64_t p = 0; p < P; ++p)
+        least = std::min(least, sign * (w[0] * x[p] + w[1] * x[P + p] + w[2] * x[2 * P + p]));
+      out.data<float>()[i * u + k] = sign * least;
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+Deformer::Deformer(const Tensor& points, const Tensor& weights, const Mlp3* offsets)
+    : count_(points.size(0)), with_offsets_(offsets != nullptr) {
+  require(points, {count_, 3}, "points");
+  require(weights, {count_, weights.size(-1)}, "weights");
+  const int64_t t = (count_ + P - 1) / P;
+  order_ = Tensor::empty({t, P}, DType::i32);
+  int32_t* order = order_.data<int32_t>();
+  std::iota(order, order + count_, 0);
+  sort_tiles(points.data<float>(), order, order + count_);
+  // The last tile is filled up with its last point, which is then computed again to the same bits.
+  std::fill(order + count_, order + t * P, count_ > 0 ? order[count_ - 1] : 0);
+  points_ = in_tiles(points, order_);
+  weights_ = in_tiles(weights, order_);
+  if (!with_offsets_) return;
+  const Tensor &w1 = offsets->fc1.weight.value, &w2 = offsets->fc2.weight.value,
+               &w3 = offsets->fc3.weight.value;
+  const int64_t u = w1.size(0), c = w1.size(1) - 3;
+  const int64_t p = (u + kDeformAlign - 1) / kDeformAlign * kDeformAlign;
+  require(w1, {u, c + 3}, "fc1");
+  require(w3, {3, u}, "fc3");
+  pose_weights_ = columns(w1, 0, c, false, c);
+  bias1_ = offsets->fc1.bias.value;
+  field_.w1 = columns(w1, c, c + 3, false, 3);
+  field_.w2 = columns(w2, 0, u, true, p);
+  field_.b2 = columns(offsets->fc2.bias.value.reshape({1, u}), 0, u, false, p);
+  field_.w3 = columns(w3, 0, u, false, p);
+  field_.b3 = offsets->fc3.bias.value;
+  field_.low = bound(points_, field_.w1, 1);
+  field_.high = bound(points_, field_.w1, -1);
+}
+
+Tensor Deformer::operator()(const Tensor& pose, const Tensor& bones, bool dense) const {
+  return run(pose, bones, dense, nullptr);
+}
+
+double Deformer::active_share(const Tensor& pose) const {
+  const int64_t t = order_.size(0);
+  if (!with_offsets_ || t == 0) return 0;
+  Tensor active = Tensor::empty({t}, DType::i32);
+  run(pose, Tensor::zeros({weights_.size(1), 3, 4}), false, &active);
+  double total = 0;
+  for (int64_t i = 0; i < t; ++i) total += active.item(i);
+  return total / static_cast<double>(t * field_.w1.size(0));
+}
+
+Tensor Deformer::run(const Tensor& pose, const Tensor& bones, bool dense, Tensor* active) const {
+  require(bones, {weights_.size(1), 3, 4}, "bones");
+  Tensor out = Tensor::empty({count_, 3});
+  if (!with_offsets_) {
+    launch(DeformArgs{points_, weights_, order_, bones, nullptr, out});
+    return out;
+  }
+  require(pose, {1, pose_weights_.size(1)}, "pose");
+  OffsetField field = field_;
+  Tensor b1 = Tensor::empty({1, bias1_.size(0)});
+  launch(MatmulArgs{pose, pose_weights_, b1, false, true, &bias1_});
+  field.b1 = b1;
+  launch(DeformArgs{points_, weights_, order_, bones, &field, out, active, dense});
+  return out;
+}
+
+}  // namespace restage

@@ -1,0 +1,123 @@
+// A program of its own, because it counts what every part of it takes from the heap: once warm, an
+// online frame takes nothing, however many follow.
+#include <gtest/gtest.h>
+#include <malloc.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cstdio>
+
+#include "autograd/base/parallel.h"
+#include "infer/retargeter.h"
+#include "tests/support/tiny_body.h"
+
+namespace {
+std::atomic<long> taken{0};
+}  // namespace
+
+// glibc's own functions under other names; what stands here takes their place in the whole program,
+// libraries and operator new included.
+extern "C" {
+void* __libc_malloc(size_t);
+void* __libc_calloc(size_t, size_t);
+void* __libc_realloc(void*, size_t);
+void* __libc_memalign(size_t, size_t);
+void* malloc(size_t n) { return ++taken, __libc_malloc(n); }
+void* calloc(size_t n, size_t m) { return ++taken, __libc_calloc(n, m); }
+void* realloc(void* p, size_t n) { return ++taken, __libc_realloc(p, n); }
+void* memalign(size_t a, size_t n) { return ++taken, __libc_memalign(a, n); }
+void* aligned_alloc(size_t a, size_t n) { return ++taken, __libc_memalign(a, n); }
+int posix_memalign(void** p, size_t a, size_t n) {
+  *p = (++taken, __libc_memalign(a, n));
+  return *p == nullptr;
+}
+}
+
+namespace restage {
+namespace {
+
+ModelSet small_models() {
+  const Init init{RngKey{5, 0}, DType::f32};
+  ModelSizes motion, extractor;
+  motion.hidden = 32;
+  extractor.points = 64;
+  extractor.width = 16;
+  extractor.layers = 2;
+  extractor.centres = 16;
+  extractor.neighbours = 4;
+  ModelSet set;
+  const auto put = [&](const char* name, const ModelSizes& sizes) {
+    put_model(&set, name, sizes, make_model(name, sizes, init.sub(name)));
+  };
+  put("smrm/rot6d", motion);
+  put("deformation/weights", {});
+  put("deformation/offsets", {});
+  put("skeleton/patch_transformer", extractor);
+  return set;
+}
+
+int64_t resident_pages() {
+  std::FILE* file = std::fopen("/proc/self/statm", "r");
+  long total = 0, resident = 0;
+  const int found = std::fscanf(file, "%ld %ld", &total, &resident);
+  std::fclose(file);
+  EXPECT_EQ(found, 2);
+  return resident;
+}
+
+/// A walking scan: the same body, moved a little from frame to frame.
+std::vector<Points> clouds() {
+  const Mesh body = testing::tiny_body("a", "test").rest;
+  std::vector<Points> out;
+  for (uint64_t f = 0; f < 8; ++f) {
+    out.push_back(surface_points(body, 200, RngKey{f, 0}));
+    for (Point& p : out.back()) p += Point(0.02f * static_cast<float>(f), 0, 0);
+  }
+  return out;
+}
+
+class SteadyFrames : public ::testing::TestWithParam<int> {
+ protected:
+  SteadyFrames() : before_(threads()) { set_threads(GetParam()); }
+  ~SteadyFrames() override { set_threads(before_); }
+  int before_;
+};
+
+TEST(Counting, SeesTheHeap) {
+  const long before = taken;
+  const auto p = std::make_unique<int>(1);
+  EXPECT_EQ(taken, before + *p);
+}
+
+TEST_P(SteadyFrames, TakeNothingFromTheHeapAndDoNotGrow) {
+  const ModelSet models = small_models();
+  const Body target = testing::tiny_body("b", "test", 1.1, 1.2);
+  RetargetOptions options;
+  options.samples = 2;
+  Retargeter r(models, target.rest, target.joints, options);
+  const std::vector<Points> source = clouds();
+  const std::string name = "frame";
+  double moved = 0;
+  const auto frames = [&](size_t n) {
+    for (size_t i = 0; i < n; ++i)
+      moved += r.push(source[i % source.size()], name)[0].joints[0].norm();
+  };
+  frames(200);
+  reset_peak_memory();
+  frames(50);
+  const MemoryStats memory = memory_stats();
+  const int64_t resident = resident_pages();
+  const long count = taken;
+  frames(GetParam() == 1 ? 10000 : 2000);
+  EXPECT_EQ(taken - count, 0);
+  EXPECT_GT(moved, 0);
+  EXPECT_EQ(memory_stats().in_use, memory.in_use);
+  EXPECT_EQ(memory_stats().peak, memory.peak);
+  EXPECT_EQ(memory_stats().large_allocations, memory.large_allocations);
+  EXPECT_LE(resident_pages(), resident + 64);  // stacks of threads may still be touched
+}
+
+INSTANTIATE_TEST_SUITE_P(Threads, SteadyFrames, ::testing::Values(0, 1, 2));
+
+}  // namespace
+}  // namespace restage
