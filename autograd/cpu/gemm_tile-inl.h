@@ -9,12 +9,15 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <type_traits>
 #include <vector>
 
 #include "autograd/cpu/targets.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
+
+namespace hn = hwy::HWY_NAMESPACE;
 
 #if HWY_TARGET == HWY_AVX3
 inline constexpr int kVectorBytes = 64;
@@ -28,6 +31,7 @@ inline constexpr int kRows = 6;
 #endif
 inline constexpr int kVectors = 2;
 inline constexpr int64_t kDepth = 256;  // k per packed block
+inline constexpr int64_t kStrip = 16;   // k per pass while packing: the rows it reads stay in L1
 
 template <class T>
 struct Simd {
@@ -42,6 +46,7 @@ struct Strided {
   const T* data;
   int64_t row, col;
   const T& at(int64_t i, int64_t j) const { return data[i * row + j * col]; }
+  Strided from(int64_t i, int64_t j) const { return {data + i * row + j * col, row, col}; }
 };
 
 /// A copy of known length, which becomes a few vector moves instead of a call.
@@ -50,72 +55,132 @@ inline void copy_fixed(const T* from, T* to) {
   for (int i = 0; i < N; ++i) to[i] = from[i];
 }
 
+#if HWY_TARGET != HWY_SCALAR
+/// Blocks of 16 bytes, `stride` elements apart, as one vector.
+template <class D>
+HWY_INLINE hn::Vec<D> load_blocks(D d, const hn::TFromD<D>* p, int64_t stride) {
+  constexpr int blocks = static_cast<int>(hn::MaxLanes(D()) * sizeof(*p) / 16);
+  if constexpr (blocks == 1) {
+    return hn::LoadU(d, p);
+  } else {
+    const hn::Half<D> half;
+    return hn::Combine(d, load_blocks(half, p + blocks / 2 * stride, stride),
+                       load_blocks(half, p, stride));
+  }
+}
+
+/// out[l * step + i] = in[i * stride + l] for i < Lanes and as many l as fill 16 bytes.
+template <int Lanes, class T>
+HWY_INLINE void transpose_block(const T* in, int64_t stride, T* out, int64_t step) {
+  constexpr int block = 16 / static_cast<int>(sizeof(T));
+  const hn::CappedTag<T, Lanes> d;
+  const auto row = [&](int i) HWY_ATTR { return load_blocks(d, in + i * stride, block * stride); };
+  const auto store = [&](int l, auto v) HWY_ATTR { hn::StoreU(v, d, out + l * step); };
+  if constexpr (block == 2) {
+    const auto r0 = row(0), r1 = row(1);
+    store(0, hn::InterleaveLower(d, r0, r1));
+    store(1, hn::InterleaveUpper(d, r0, r1));
+  } else {
+    const auto r0 = row(0), r1 = row(1), r2 = row(2), r3 = row(3);
+    const auto lower0 = hn::InterleaveLower(d, r0, r2), lower1 = hn::InterleaveLower(d, r1, r3);
+    const auto upper0 = hn::InterleaveUpper(d, r0, r2), upper1 = hn::InterleaveUpper(d, r1, r3);
+    store(0, hn::InterleaveLower(d, lower0, lower1));
+    store(1, hn::InterleaveUpper(d, lower0, lower1));
+    store(2, hn::InterleaveLower(d, upper0, upper1));
+    store(3, hn::InterleaveUpper(d, upper0, upper1));
+  }
+}
+#endif
+
+/// Transposes Rows rows of `in` (`stride` apart) for l < k: out[l * step + i] = in[i * stride + l].
+template <int Rows, class T>
+HWY_INLINE void transpose(const T* in, int64_t stride, int64_t k, T* out, int64_t step) {
+  int64_t l = 0;
+#if HWY_TARGET != HWY_SCALAR
+  constexpr int block = 16 / static_cast<int>(sizeof(T));
+  constexpr int lanes = std::min(kVectorBytes / static_cast<int>(sizeof(T)),
+                                 1 << (31 - __builtin_clz(Rows)));  // rows at a time
+  if constexpr (lanes >= block) {
+    for (; l + block <= k; l += block) transpose_block<lanes>(in + l, stride, out + l * step, step);
+    if constexpr (Rows > lanes)
+      transpose<Rows - lanes>(in + lanes * stride, stride, l, out + lanes, step);
+  }
+#endif
+  for (; l < k; ++l)
+    for (int i = 0; i < Rows; ++i) out[l * step + i] = in[i * stride + l];
+}
+
+/// A panel of `Width` rows (of a; of b: columns), k-major and zero-padded: out[l * Width + i] =
+/// m(i, l) for i < count.
+template <int Width, class T>
+inline void pack_panel(const Strided<T>& m, int64_t count, int64_t k, T* out) {
+  if (count == Width && m.col == 1) return transpose<Width>(m.data, m.row, k, out, Width);
+  for (int64_t l = 0; l < k; ++l, out += Width) {
+    if (count == Width && m.row == 1) {
+      copy_fixed<Width>(m.data + l * m.col, out);
+    } else {
+      for (int i = 0; i < Width; ++i) out[i] = i < count ? m.at(i, l) : T(0);
+    }
+  }
+}
+
+/// Panels of `Width` rows one after the other. Rows that lie side by side are read a strip of k at
+/// a time, so that what a cache line holds for the next panel is still there.
+template <int Width, class T>
+inline void pack_panels(const Strided<T>& m, int64_t count, int64_t k, T* out) {
+  const int64_t strip = m.row == 1 ? kStrip : k;
+  for (int64_t l = 0; l < k; l += strip)
+    for (int64_t i = 0; i < count; i += Width)
+      pack_panel<Width>(m.from(i, l), std::min<int64_t>(Width, count - i), std::min(strip, k - l),
+                        out + i * k + l * Width);
+}
+
 /// Panels of kRows rows, k-major inside, zero-padded.
 template <class T>
 inline void pack_a(const Strided<T>& a, int64_t m, int64_t k, T* out) {
-  for (int64_t i0 = 0; i0 < m; i0 += kRows) {
-    const int64_t rows = std::min<int64_t>(kRows, m - i0);
-    if (rows == kRows && a.col == 1) {
-      const T* p = a.data + i0 * a.row;
-      for (int64_t l = 0; l < k; ++l)
-        for (int i = 0; i < kRows; ++i) out[l * kRows + i] = p[i * a.row + l];
-    } else if (rows == kRows && a.row == 1) {
-      for (int64_t l = 0; l < k; ++l) copy_fixed<kRows>(a.data + i0 + l * a.col, out + l * kRows);
-    } else {
-      for (int64_t l = 0; l < k; ++l)
-        for (int i = 0; i < kRows; ++i) out[l * kRows + i] = i < rows ? a.at(i0 + i, l) : T(0);
-    }
-    out += k * kRows;
-  }
+  pack_panels<kRows>(a, m, k, out);
 }
 
 /// Panels of `cols` columns, k-major inside, zero-padded.
 template <class T>
 inline void pack_b(const Strided<T>& b, int64_t k, int64_t n, T* out) {
-  constexpr int cols = Simd<T>::cols;
-  for (int64_t j0 = 0; j0 < n; j0 += cols) {
-    const int64_t width = std::min<int64_t>(cols, n - j0);
-    if (width == cols && b.col == 1) {
-      for (int64_t l = 0; l < k; ++l) copy_fixed<cols>(b.data + l * b.row + j0, out + l * cols);
-    } else if (width == cols && b.row == 1) {
-      constexpr int64_t block = 16;  // columns of memory at a time: whole cache lines of both sides
-      for (int64_t l0 = 0; l0 < k; l0 += block)
-        for (int j = 0; j < cols; ++j) {
-          const T* p = b.data + (j0 + j) * b.col + l0;
-          for (int64_t l = 0; l < std::min(block, k - l0); ++l) out[(l0 + l) * cols + j] = p[l];
-        }
-    } else {
-      for (int64_t l = 0; l < k; ++l)
-        for (int j = 0; j < cols; ++j) out[l * cols + j] = j < width ? b.at(l, j0 + j) : T(0);
-    }
-    out += k * cols;
-  }
+  pack_panels<Simd<T>::cols>(Strided<T>{b.data, b.col, b.row}, n, k, out);
 }
 
-/// out [Rows, cols] = a (packed, Rows wide) times b (packed): every element one chain of
-/// multiply-adds over k in order.
-template <class T, int Rows = kRows>
-inline void multiply(int64_t k, const T* a, const T* b, T* out) {
+/// Sums of a register tile: [Rows, cols].
+template <class T, int Rows>
+using Sums = typename Simd<T>::Vector[Rows][kVectors];
+
+/// The tile a (packed, Stride rows wide) times b (packed): every element one chain of multiply-adds
+/// over k in order.
+template <class T, int Rows, int Stride>
+HWY_INLINE void sum(int64_t k, const T* a, const T* b, Sums<T, Rows>& acc) {
   using V = typename Simd<T>::Vector;
-  constexpr int width = Simd<T>::width;
-  V acc[Rows][kVectors] = {};
   for (int64_t l = 0; l < k; ++l) {
     V bv[kVectors];
 #pragma GCC unroll 2
-    for (int v = 0; v < kVectors; ++v) bv[v] = *reinterpret_cast<const V*>(b + v * width);
+    for (int v = 0; v < kVectors; ++v) bv[v] = *reinterpret_cast<const V*>(b + v * Simd<T>::width);
 #pragma GCC unroll 12
     for (int i = 0; i < Rows; ++i) {
 #pragma GCC unroll 2
       for (int v = 0; v < kVectors; ++v) acc[i][v] += a[i] * bv[v];
     }
-    a += Rows;
+    a += Stride;
     b += Simd<T>::cols;
   }
+}
+
+/// out [Rows, cols] = a (packed, Rows wide) times b (packed).
+template <class T, int Rows = kRows>
+inline void multiply(int64_t k, const T* a, const T* b, T* out) {
+  using V = typename Simd<T>::Vector;
+  Sums<T, Rows> acc = {};
+  sum<T, Rows, Rows>(k, a, b, acc);
 #pragma GCC unroll 12
   for (int i = 0; i < Rows; ++i) {
 #pragma GCC unroll 2
     for (int v = 0; v < kVectors; ++v)
-      *reinterpret_cast<V*>(out + i * Simd<T>::cols + v * width) = acc[i][v];
+      *reinterpret_cast<V*>(out + i * Simd<T>::cols + v * Simd<T>::width) = acc[i][v];
   }
 }
 
