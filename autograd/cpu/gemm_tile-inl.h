@@ -31,6 +31,7 @@ inline constexpr int kRows = 6;
 #endif
 inline constexpr int kVectors = 2;
 inline constexpr int64_t kDepth = 256;  // k per packed block
+inline constexpr int kThin = 4;         // up to so many rows, weights are not packed
 inline constexpr int64_t kStrip = 16;   // k per pass while packing: the rows it reads stay in L1
 
 template <class T>
@@ -69,27 +70,31 @@ HWY_INLINE hn::Vec<D> load_blocks(D d, const hn::TFromD<D>* p, int64_t stride) {
   }
 }
 
-/// out[l * step + i] = in[i * stride + l] for i < Lanes and as many l as fill 16 bytes.
+/// v[l] = rows 0 to Lanes - 1 of `in` at l, for as many l as fill 16 bytes.
 template <int Lanes, class T>
-HWY_INLINE void transpose_block(const T* in, int64_t stride, T* out, int64_t step) {
-  constexpr int block = 16 / static_cast<int>(sizeof(T));
-  const hn::CappedTag<T, Lanes> d;
-  const auto row = [&](int i) HWY_ATTR { return load_blocks(d, in + i * stride, block * stride); };
-  const auto store = [&](int l, auto v) HWY_ATTR { hn::StoreU(v, d, out + l * step); };
-  if constexpr (block == 2) {
-    const auto r0 = row(0), r1 = row(1);
-    store(0, hn::InterleaveLower(d, r0, r1));
-    store(1, hn::InterleaveUpper(d, r0, r1));
-  } else {
-    const auto r0 = row(0), r1 = row(1), r2 = row(2), r3 = row(3);
-    const auto lower0 = hn::InterleaveLower(d, r0, r2), lower1 = hn::InterleaveLower(d, r1, r3);
-    const auto upper0 = hn::InterleaveUpper(d, r0, r2), upper1 = hn::InterleaveUpper(d, r1, r3);
-    store(0, hn::InterleaveLower(d, lower0, lower1));
-    store(1, hn::InterleaveUpper(d, lower0, lower1));
-    store(2, hn::InterleaveLower(d, upper0, upper1));
-    store(3, hn::InterleaveUpper(d, upper0, upper1));
+struct Transposed {
+  static constexpr int block = 16 / static_cast<int>(sizeof(T));
+  static constexpr hn::CappedTag<T, Lanes> d{};
+  hn::Vec<hn::CappedTag<T, Lanes>> v[block];
+
+  HWY_INLINE Transposed(const T* in, int64_t stride) {
+    const auto row = [&](int i)
+                         HWY_ATTR { return load_blocks(d, in + i * stride, block * stride); };
+    if constexpr (block == 2) {
+      const auto r0 = row(0), r1 = row(1);
+      v[0] = hn::InterleaveLower(d, r0, r1);
+      v[1] = hn::InterleaveUpper(d, r0, r1);
+    } else {
+      const auto r0 = row(0), r1 = row(1), r2 = row(2), r3 = row(3);
+      const auto lower0 = hn::InterleaveLower(d, r0, r2), lower1 = hn::InterleaveLower(d, r1, r3);
+      const auto upper0 = hn::InterleaveUpper(d, r0, r2), upper1 = hn::InterleaveUpper(d, r1, r3);
+      v[0] = hn::InterleaveLower(d, lower0, lower1);
+      v[1] = hn::InterleaveUpper(d, lower0, lower1);
+      v[2] = hn::InterleaveLower(d, upper0, upper1);
+      v[3] = hn::InterleaveUpper(d, upper0, upper1);
+    }
   }
-}
+};
 #endif
 
 /// Transposes Rows rows of `in` (`stride` apart) for l < k: out[l * step + i] = in[i * stride + l].
@@ -101,7 +106,10 @@ HWY_INLINE void transpose(const T* in, int64_t stride, int64_t k, T* out, int64_
   constexpr int lanes = std::min(kVectorBytes / static_cast<int>(sizeof(T)),
                                  1 << (31 - __builtin_clz(Rows)));  // rows at a time
   if constexpr (lanes >= block) {
-    for (; l + block <= k; l += block) transpose_block<lanes>(in + l, stride, out + l * step, step);
+    for (; l + block <= k; l += block) {
+      const Transposed<lanes, T> t(in + l, stride);
+      for (int i = 0; i < block; ++i) hn::StoreU(t.v[i], t.d, out + (l + i) * step);
+    }
     if constexpr (Rows > lanes)
       transpose<Rows - lanes>(in + lanes * stride, stride, l, out + lanes, step);
   }
@@ -170,18 +178,70 @@ HWY_INLINE void sum(int64_t k, const T* a, const T* b, Sums<T, Rows>& acc) {
   }
 }
 
-/// out [Rows, cols] = a (packed, Rows wide) times b (packed).
-template <class T, int Rows = kRows>
+/// out [Rows, cols] = a (packed, Stride rows wide) times b (packed).
+template <class T, int Rows = kRows, int Stride = Rows>
 inline void multiply(int64_t k, const T* a, const T* b, T* out) {
   using V = typename Simd<T>::Vector;
   Sums<T, Rows> acc = {};
-  sum<T, Rows, Rows>(k, a, b, acc);
+  sum<T, Rows, Stride>(k, a, b, acc);
 #pragma GCC unroll 12
   for (int i = 0; i < Rows; ++i) {
 #pragma GCC unroll 2
     for (int v = 0; v < kVectors; ++v)
       *reinterpret_cast<V*>(out + i * Simd<T>::cols + v * Simd<T>::width) = acc[i][v];
   }
+}
+
+/// The same for 1 to kRows rows of a panel that is kRows wide.
+template <class T, int Rows = kRows>
+inline void multiply_rows(int64_t rows, int64_t k, const T* a, const T* b, T* out) {
+  if (rows == Rows) return multiply<T, Rows, kRows>(k, a, b, out);
+  if constexpr (Rows > 1) multiply_rows<T, Rows - 1>(rows, k, a, b, out);
+}
+
+/// The same for rows of a (`stride` apart) and of b as they lie in memory, b(l, j) at b[j * ldb +
+/// l]: weights that are used once are turned in registers and never packed. Looks `ahead` numbers
+/// ahead of b. out [Rows, cols].
+template <class T, int Rows>
+inline void multiply_thin(int64_t k, const T* a, int64_t stride, const T* b, int64_t ldb,
+                          [[maybe_unused]] int64_t ahead, T* out) {
+  constexpr int cols = Simd<T>::cols;
+  std::fill_n(out, Rows * cols, T(0));
+  int64_t l = 0;
+#if HWY_TARGET != HWY_SCALAR
+  constexpr int width = Simd<T>::width;
+  using Turned = Transposed<width, T>;
+  constexpr auto d = Turned::d;
+  constexpr int64_t line = 64 / sizeof(T);  // whole cache lines of b while they are in L1
+  hn::Vec<hn::CappedTag<T, width>> acc[Rows][kVectors];
+  for (auto& row : acc)
+    for (auto& x : row) x = hn::Zero(d);
+  for (; l + line <= k; l += line) {
+    for (int v = 0; v < kVectors; ++v) {
+      const T* from = b + v * width * ldb + l;
+      for (int j = 0; j < width; ++j) __builtin_prefetch(from + ahead + j * ldb, 0, 2);
+      for (int64_t c = 0; c < line; c += Turned::block) {
+        const Turned t(from + c, ldb);
+        for (int i = 0; i < Rows; ++i)
+          for (int e = 0; e < Turned::block; ++e)
+            acc[i][v] = hn::MulAdd(hn::Set(d, a[i * stride + l + c + e]), t.v[e], acc[i][v]);
+      }
+    }
+  }
+  for (int i = 0; i < Rows; ++i)
+    for (int v = 0; v < kVectors; ++v) hn::StoreU(acc[i][v], d, out + i * cols + v * width);
+#endif
+  for (; l < k; ++l)
+    for (int j = 0; j < cols; ++j)
+      for (int i = 0; i < Rows; ++i) out[i * cols + j] += a[i * stride + l] * b[j * ldb + l];
+}
+
+/// The same for 1 to Rows rows.
+template <class T, int Rows = kThin>
+inline void multiply_thin_rows(int64_t rows, int64_t k, const T* a, int64_t stride, const T* b,
+                               int64_t ldb, int64_t ahead, T* out) {
+  if (rows == Rows) return multiply_thin<T, Rows>(k, a, stride, b, ldb, ahead, out);
+  if constexpr (Rows > 1) multiply_thin_rows<T, Rows - 1>(rows, k, a, stride, b, ldb, ahead, out);
 }
 
 }  // namespace restage::cpu::HWY_NAMESPACE

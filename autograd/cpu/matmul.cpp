@@ -3,8 +3,8 @@
 // parallel; one that a single tile needs is packed by that tile, in the cache where it is used.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "autograd/cpu/matmul.cpp"
-#include <hwy/foreach_target.h>  // once per instruction set
 #include <hwy/cache_control.h>
+#include <hwy/foreach_target.h>  // once per instruction set
 
 #include <algorithm>
 #include <array>
@@ -37,6 +37,8 @@ struct Product {
   const T* bias;
   Activation activation;
   bool accumulate;
+  /// A few rows times weights [n, k] as they lie in memory, each number of which is needed once.
+  bool thin() const { return m <= kThin && a.col == 1 && b.row == 1; }
 };
 
 /// Where a register tile stands: its block of k is the first, the last, or neither.
@@ -68,6 +70,17 @@ HWY_INLINE V finish(const Product<T>& p, const Place& at, V x, V c, V bias) {
   return x;
 }
 
+template <class T>
+void finish_tile(const Product<T>& p, const Place& at, int64_t rows, const T* sums) {
+  constexpr int cols = Simd<T>::cols;
+  const int64_t width = std::min<int64_t>(cols, p.n - at.col);
+  for (int64_t i = 0; i < rows; ++i) {
+    T* c = p.out + (at.row + i) * p.n + at.col;
+    for (int64_t j = 0; j < width; ++j)
+      c[j] = finish(p, at, sums[i * cols + j], c[j], p.bias ? p.bias[at.col + j] : T(0));
+  }
+}
+
 /// One register tile: sums over a block of k, then out.
 template <class T, int Rows>
 void register_tile(const Product<T>& p, const Place& at, int64_t k, const T* a, const T* b) {
@@ -93,9 +106,17 @@ void register_tile(const Product<T>& p, const Place& at, int64_t k, const T* a, 
   }
   alignas(kVectorBytes) T tile[Rows * cols];
   std::copy_n(&acc[0][0][0], Rows * cols, tile);
-  for (int64_t i = 0; i < Rows; ++i)
-    for (int64_t j = 0; j < p.n - at.col; ++j)
-      c[i * p.n + j] = finish(p, at, tile[i * cols + j], c[i * p.n + j], bias ? bias[j] : T(0));
+  finish_tile(p, at, Rows, tile);
+}
+
+/// A tile of a few rows: nothing is packed.
+template <class T>
+void thin_tile(const Product<T>& p, const Place& at, int64_t rows, int64_t l0, int64_t k) {
+  alignas(kVectorBytes) T sums[kThin * Simd<T>::cols];
+  const int64_t ahead = p.n - at.col >= 2 * Simd<T>::cols ? Simd<T>::cols * p.b.col : 0;
+  multiply_thin_rows<T>(rows, k, &p.a.at(at.row, l0), p.a.row, &p.b.at(l0, at.col), p.b.col, ahead,
+                        sums);
+  finish_tile(p, at, rows, sums);
 }
 
 /// register_tile for 1 to kRows rows.
@@ -123,7 +144,7 @@ struct Cut {
   template <class T>
   static Cut of(const Product<T>& p, int64_t batch) {
     constexpr int64_t step = Simd<T>::cols;
-    Cut c{batch == 1 && p.m <= kSharedRows, batch == 1 && p.m > kTileRows, p.k, 0, 0};
+    Cut c{batch == 1 && p.m <= kSharedRows && !p.thin(), batch == 1 && p.m > kTileRows, p.k, 0, 0};
     const int64_t wide = (c.share_a ? p.m : 0) + (c.share_b ? p.n : 0);
     if (wide * p.k > kShared) c.depth = std::max(kDepth, kShared / wide / kDepth * kDepth);
     // A multiply-add of a register tile takes 1/32 cycle, fetching and packing a number of b one.
@@ -135,7 +156,7 @@ struct Cut {
       const bool cut_rows = c.share_b && p.m / row_tiles > 6 * kRows;
       if (cut_rows && p.m / row_tiles > p.n / col_tiles) {
         ++row_tiles;
-      } else if (p.n / col_tiles > (c.share_a ? 1 : 8) * step) {
+      } else if (p.n / col_tiles > (c.share_b ? 8 : 1) * step) {
         ++col_tiles;
       } else if (cut_rows) {
         ++row_tiles;
@@ -162,19 +183,22 @@ void tile(const Product<T>& p, const Packed<T>& packed, int64_t i0, int64_t i1, 
   static constexpr auto kernels = register_tiles<T>(std::make_integer_sequence<int, kRows>());
   constexpr int cols = Simd<T>::cols;
   const int64_t m = round_up(p.m, kRows), n = round_up(p.n, cols);
+  const int64_t thin_end = p.thin() ? j0 + (j1 - j0) / cols * cols : j0;
+  const bool pack = !packed.a && thin_end < j1;
   alignas(64) T own_b[kDepth * cols];
-  const Buffer<T> own_a(packed.a ? 0 : round_up(i1 - i0, kRows) * std::min(kDepth, p.k));
+  const Buffer<T> own_a(pack ? round_up(i1 - i0, kRows) * std::min(kDepth, p.k) : 0);
   for (int64_t l0 = packed.begin; l0 < packed.end; l0 += kDepth) {
     const int64_t l = std::min(kDepth, packed.end - l0), before = l0 - packed.begin;
+    const auto at = [&](int64_t i, int64_t j) { return Place{i, j, l0 == 0, l0 + l == p.k}; };
+    for (int64_t j = j0; j < thin_end; j += cols) thin_tile(p, at(i0, j), i1 - i0, l0, l);
     const T* a = packed.a ? packed.a + before * m + i0 * l : own_a.data;
-    if (!packed.a) pack_rows(p.a.from(i0, l0), i1 - i0, l, own_a.data);
-    for (int64_t j = j0; j < j1; j += cols) {
+    if (pack) pack_rows(p.a.from(i0, l0), i1 - i0, l, own_a.data);
+    for (int64_t j = thin_end; j < j1; j += cols) {
       const T* b = packed.b ? packed.b + before * n + j * l : own_b;
       if (!packed.b) pack_b(p.b.from(l0, j), l, std::min<int64_t>(cols, j1 - j), own_b);
       for (int64_t i = i0; i < i1; i += kRows) {
         const int64_t rows = std::min<int64_t>(kRows, i1 - i);
-        kernels[static_cast<size_t>(rows - 1)](p, {i, j, l0 == 0, l0 + l == p.k}, l,
-                                               a + (i - i0) * l, b);
+        kernels[static_cast<size_t>(rows - 1)](p, at(i, j), l, a + (i - i0) * l, b);
       }
     }
   }
