@@ -50,10 +50,25 @@ struct Strided {
   Strided from(int64_t i, int64_t j) const { return {data + i * row + j * col, row, col}; }
 };
 
-/// A copy of known length, which becomes a few vector moves instead of a call.
+/// The largest power of two up to n and the width of a vector.
+template <class T>
+constexpr int lanes_of(int n) {
+  int lanes = kVectorBytes / static_cast<int>(sizeof(T));
+  while (lanes > n) lanes /= 2;
+  return lanes;
+}
+
+/// A copy of known length in a few vector moves.
 template <int N, class T>
-inline void copy_fixed(const T* from, T* to) {
+HWY_INLINE void copy_fixed(const T* from, T* to) {
+#if HWY_TARGET == HWY_SCALAR
   for (int i = 0; i < N; ++i) to[i] = from[i];
+#else
+  constexpr int lanes = lanes_of<T>(N);
+  const hn::CappedTag<T, lanes> d;
+  hn::StoreU(hn::LoadU(d, from), d, to);
+  if constexpr (N > lanes) copy_fixed<N - lanes>(from + lanes, to + lanes);
+#endif
 }
 
 #if HWY_TARGET != HWY_SCALAR
@@ -103,8 +118,7 @@ HWY_INLINE void transpose(const T* in, int64_t stride, int64_t k, T* out, int64_
   int64_t l = 0;
 #if HWY_TARGET != HWY_SCALAR
   constexpr int block = 16 / static_cast<int>(sizeof(T));
-  constexpr int lanes = std::min(kVectorBytes / static_cast<int>(sizeof(T)),
-                                 1 << (31 - __builtin_clz(Rows)));  // rows at a time
+  constexpr int lanes = lanes_of<T>(Rows);  // rows at a time
   if constexpr (lanes >= block) {
     for (; l + block <= k; l += block) {
       const Transposed<lanes, T> t(in + l, stride);
@@ -178,8 +192,8 @@ HWY_INLINE void sum(int64_t k, const T* a, const T* b, Sums<T, Rows>& acc) {
   }
 }
 
-/// out [Rows, cols] = a (packed, Stride rows wide) times b (packed).
-template <class T, int Rows = kRows, int Stride = Rows>
+/// out [Rows, cols] = a (packed, Stride rows wide) times b (packed), plus out if Add.
+template <class T, int Rows = kRows, int Stride = Rows, bool Add = false>
 inline void multiply(int64_t k, const T* a, const T* b, T* out) {
   using V = typename Simd<T>::Vector;
   Sums<T, Rows> acc = {};
@@ -187,21 +201,23 @@ inline void multiply(int64_t k, const T* a, const T* b, T* out) {
 #pragma GCC unroll 12
   for (int i = 0; i < Rows; ++i) {
 #pragma GCC unroll 2
-    for (int v = 0; v < kVectors; ++v)
-      *reinterpret_cast<V*>(out + i * Simd<T>::cols + v * Simd<T>::width) = acc[i][v];
+    for (int v = 0; v < kVectors; ++v) {
+      V* to = reinterpret_cast<V*>(out + i * Simd<T>::cols + v * Simd<T>::width);
+      *to = Add ? *to + acc[i][v] : acc[i][v];
+    }
   }
 }
 
 /// The same for 1 to kRows rows of a panel that is kRows wide.
-template <class T, int Rows = kRows>
+template <class T, bool Add, int Rows = kRows>
 inline void multiply_rows(int64_t rows, int64_t k, const T* a, const T* b, T* out) {
-  if (rows == Rows) return multiply<T, Rows, kRows>(k, a, b, out);
-  if constexpr (Rows > 1) multiply_rows<T, Rows - 1>(rows, k, a, b, out);
+  if (rows == Rows) return multiply<T, Rows, kRows, Add>(k, a, b, out);
+  if constexpr (Rows > 1) multiply_rows<T, Add, Rows - 1>(rows, k, a, b, out);
 }
 
-/// The same for rows of a (`stride` apart) and of b as they lie in memory, b(l, j) at b[j * ldb +
-/// l]: weights that are used once are turned in registers and never packed. Looks `ahead` numbers
-/// ahead of b. out [Rows, cols].
+/// Rows of a times b as multiply() does, for rows of a (`stride` apart) and of b as they lie in
+/// memory, b(l, j) at b[j * ldb + l]: weights that are used once are turned in registers and never
+/// packed. Looks `ahead` numbers ahead of b. out [Rows, cols].
 template <class T, int Rows>
 inline void multiply_thin(int64_t k, const T* a, int64_t stride, const T* b, int64_t ldb,
                           [[maybe_unused]] int64_t ahead, T* out) {

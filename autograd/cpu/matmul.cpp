@@ -13,8 +13,8 @@
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/gemm_tile-inl.h"
 #include "autograd/cpu/kernels.h"
-#include "autograd/cpu/pool.h"
 #include "autograd/cpu/targets.h"
+#include "autograd/cpu/workspace.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
@@ -22,7 +22,7 @@ namespace {
 
 constexpr int64_t kTileRows = 288;  // times kDepth: half of a small L2
 constexpr int64_t kTileCols = 512;
-constexpr int64_t kShared = 1 << 20;    // numbers of both operands packed at a time
+constexpr int64_t kShared = 1 << 19;    // numbers of both operands packed at a time
 constexpr int64_t kSharedRows = 1024;   // more rows than this are packed by their tiles
 constexpr int64_t kPieces = 16;         // tiles wanted at least, to have some to share
 constexpr int64_t kSmallest = 1 << 15;  // cycles, roughly, that a piece should take
@@ -45,17 +45,6 @@ struct Product {
 struct Place {
   int64_t row, col;
   bool first, last;
-};
-
-template <class T>
-struct Buffer {
-  explicit Buffer(int64_t n)
-      : bytes(static_cast<size_t>(n) * sizeof(T)), data(static_cast<T*>(pool_allocate(bytes))) {}
-  ~Buffer() { pool_release(data, bytes); }
-  Buffer(const Buffer&) = delete;
-  Buffer& operator=(const Buffer&) = delete;
-  size_t bytes;
-  T* data;
 };
 
 /// What becomes of sums x over a block of k for the element that holds c: the first block
@@ -186,13 +175,13 @@ void tile(const Product<T>& p, const Packed<T>& packed, int64_t i0, int64_t i1, 
   const int64_t thin_end = p.thin() ? j0 + (j1 - j0) / cols * cols : j0;
   const bool pack = !packed.a && thin_end < j1;
   alignas(64) T own_b[kDepth * cols];
-  const Buffer<T> own_a(pack ? round_up(i1 - i0, kRows) * std::min(kDepth, p.k) : 0);
+  const Workspace<T> own_a(pack ? round_up(i1 - i0, kRows) * std::min(kDepth, p.k) : 0);
   for (int64_t l0 = packed.begin; l0 < packed.end; l0 += kDepth) {
     const int64_t l = std::min(kDepth, packed.end - l0), before = l0 - packed.begin;
     const auto at = [&](int64_t i, int64_t j) { return Place{i, j, l0 == 0, l0 + l == p.k}; };
     for (int64_t j = j0; j < thin_end; j += cols) thin_tile(p, at(i0, j), i1 - i0, l0, l);
-    const T* a = packed.a ? packed.a + before * m + i0 * l : own_a.data;
-    if (pack) pack_rows(p.a.from(i0, l0), i1 - i0, l, own_a.data);
+    const T* a = packed.a ? packed.a + before * m + i0 * l : own_a.data();
+    if (pack) pack_rows(p.a.from(i0, l0), i1 - i0, l, own_a.data());
     for (int64_t j = thin_end; j < j1; j += cols) {
       const T* b = packed.b ? packed.b + before * n + j * l : own_b;
       if (!packed.b) pack_b(p.b.from(l0, j), l, std::min<int64_t>(cols, j1 - j), own_b);
@@ -237,19 +226,19 @@ template <class T>
 void single(const Product<T>& p, const Cut& cut) {
   constexpr int cols = Simd<T>::cols;
   const int64_t m = round_up(p.m, kRows), n = round_up(p.n, cols);
-  const Buffer<T> a(cut.share_a ? m * cut.depth : 0), b(cut.share_b ? n * cut.depth : 0);
+  const Workspace<T> a(cut.share_a ? m * cut.depth : 0), b(cut.share_b ? n * cut.depth : 0);
   for (int64_t begin = 0; begin < p.k; begin += cut.depth) {
     const int64_t end = std::min(p.k, begin + cut.depth);
     if (cut.share_a)
       pack_shared(begin, end, p.m, kRows, [&](int64_t l0, int64_t l, int64_t i0, int64_t i1) {
-        pack_rows(p.a.from(i0, l0), i1 - i0, l, a.data + (l0 - begin) * m + i0 * l);
+        pack_rows(p.a.from(i0, l0), i1 - i0, l, a.data() + (l0 - begin) * m + i0 * l);
       });
     if (cut.share_b)
       pack_shared(begin, end, p.n, cols, [&](int64_t l0, int64_t l, int64_t j0, int64_t j1) {
-        pack_b(p.b.from(l0, j0), l, j1 - j0, b.data + (l0 - begin) * n + j0 * l);
+        pack_b(p.b.from(l0, j0), l, j1 - j0, b.data() + (l0 - begin) * n + j0 * l);
       });
-    const Packed<T> packed{cut.share_a ? a.data : nullptr, cut.share_b ? b.data : nullptr, begin,
-                           end};
+    const Packed<T> packed{cut.share_a ? a.data() : nullptr, cut.share_b ? b.data() : nullptr,
+                           begin, end};
     parallel_for(tiles_of(p.m, p.n, cut), 1,
                  [&](int64_t from, int64_t to) { multiply_tiles(p, cut, packed, from, to); });
   }

@@ -6,13 +6,13 @@
 #include <hwy/foreach_target.h>  // once per instruction set
 
 #include <algorithm>
-#include <vector>
 
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/gemm_tile-inl.h"
 #include "autograd/cpu/kernels.h"
 #include "autograd/cpu/math-inl.h"
 #include "autograd/cpu/targets.h"
+#include "autograd/cpu/workspace.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
@@ -32,22 +32,56 @@ void for_units(int64_t h, const F& body) {
   });
 }
 
-/// All rows of a batch, [n, k], in panels of kRows rows, k-major: what multiply_rows() reads.
+/// Rows per panel: all panels of a batch about equally tall.
+int64_t panel_rows(int64_t n) {
+  const int64_t panels = std::max<int64_t>(1, (n + kRows - 1) / kRows);
+  return (n + panels - 1) / panels;
+}
+
+/// All rows of a batch, [n, k], in panels of `tall` rows, k-major, kRows apart.
 template <class T>
 struct Panels {
   Panels(int64_t n, int64_t columns)
-      : k(columns), data(static_cast<size_t>(round_up(n, kRows) * columns)) {}
-  T* at(int64_t row, int64_t column) { return data.data() + row * k + column * kRows; }
-  /// Takes columns from `column` on of up to kRows rows from `row` on, a multiple of kRows.
-  void put(const T* rows, int64_t stride, int64_t row, int64_t count, int64_t column,
-           int64_t width) {
-    T* to = at(row, column);
-    if (count == kRows) return transpose<kRows>(rows, stride, width, to, kRows);
-    for (int64_t j = 0; j < width; ++j)
-      for (int64_t i = 0; i < count; ++i) to[j * kRows + i] = rows[i * stride + j];
+      : rows(n),
+        k(columns),
+        tall(panel_rows(n)),
+        data(round_up(n, tall) / tall * kRows * columns) {}
+  T* at(int64_t row, int64_t column) const {
+    return data.data() + row / tall * kRows * k + column * kRows;
   }
-  int64_t k;
-  std::vector<T> data;
+  /// Takes columns from `column` on of all rows.
+  void put(const T* from, int64_t stride, int64_t column, int64_t width) {
+    for (int64_t row = 0; row < rows; row += tall) {
+      const T* in = from + row * stride;
+      T* to = at(row, column);
+      const int64_t count = std::min(tall, rows - row);
+      if (count == kRows) {
+        transpose<kRows>(in, stride, width, to, kRows);
+        continue;
+      }
+      for (int64_t i = 0; i < count; ++i)
+        for (int64_t j = 0; j < width; ++j) to[j * kRows + i] = in[i * stride + j];
+    }
+  }
+  /// out [rows, cols] = all rows times packed columns, summed as matmul() sums.
+  void times(const T* columns, T* out) const {
+    constexpr int cols = Simd<T>::cols;
+    for (int64_t l0 = 0; l0 < k; l0 += kDepth) {
+      const int64_t l = std::min(kDepth, k - l0);
+      for (int64_t row = 0; row < rows; row += tall) {
+        const int64_t count = std::min(tall, rows - row);
+        const T *a = at(row, l0), *b = columns + l0 * cols;
+        T* to = out + row * cols;
+        if (l0 == 0) {
+          multiply_rows<T, false>(count, l, a, b, to);
+        } else {
+          multiply_rows<T, true>(count, l, a, b, to);
+        }
+      }
+    }
+  }
+  int64_t rows, k, tall;
+  Workspace<T> data;
 };
 
 /// One vector of hidden units of one row. in: gi (r, z, n), gh (r, z, n), bias (r, z, n), old
@@ -109,63 +143,72 @@ void cell_grad(const T* gates, const T* previous, const T* g_out, int64_t h, int
 template <class T>
 struct Forward {
   static constexpr int cols = Simd<T>::cols;
-  const GruArgs& args;
-  const int64_t steps = args.gi.size(0), n = args.gi.size(1), h = args.h0.size(1);
-  const int64_t padded = round_up(h, cols);
-  /// A step alone reads the weights as they lie; more steps are worth packing them once.
-  const bool thin = steps == 1 && n <= kThin && padded == h;
-  std::vector<T> w = std::vector<T>(static_cast<size_t>(thin ? 0 : 3 * padded * h));
+  explicit Forward(const GruArgs& args)
+      : steps(args.gi.size(0)),
+        n(args.gi.size(1)),
+        h(args.h0.size(1)),
+        thin(steps == 1 && n <= kThin && h % cols == 0),
+        gi(args.gi.data<T>()),
+        h0(args.h0.data<T>()),
+        w_hh(args.w_hh.data<T>()),
+        b_hh(args.b_hh.data<T>()),
+        out(args.out.data<T>()),
+        gates(args.gates.data<T>()),
+        packed(thin ? 0 : 3 * round_up(h, cols) * h) {}
+
+  const int64_t steps, n, h;
+  const bool thin;  // a step alone reads the weights as they lie; more are worth packing them once
+  const T *gi, *h0, *w_hh, *b_hh;
+  T *out, *gates;
+  Workspace<T> packed;
   Panels<T> now{n, h}, next{n, h};
 
-  void pack(int64_t j, int64_t width) {
-    for (int64_t g = 0; g < 3; ++g)
-      pack_b<T>({args.w_hh.data<T>() + (g * h + j) * h, 1, h}, h, width,
-                w.data() + (g * padded + j) * h);
+  T* weights(int64_t gate, int64_t unit) const {
+    return packed.data() + (gate * round_up(h, cols) + unit) * h;
   }
 
-  void products(int64_t i, int64_t rows, int64_t j, T (*gh)[kRows * cols]) {
-    for (int64_t g = 0; g < 3; ++g) {
-      if (thin) {
-        const T* weights = args.w_hh.data<T>() + (g * h + j) * h;
-        multiply_thin_rows<T>(rows, h, args.h0.data<T>(), h, weights, h,
-                              g * h + j + 2 * cols <= 3 * h ? cols * h : 0, gh[g]);
-      } else {
-        multiply_rows<T>(rows, h, now.at(i, 0), w.data() + (g * padded + j) * h, gh[g]);
-      }
+  /// gh [n, cols]: W_h h for some units of a gate.
+  void product(int64_t gate, int64_t j, T* gh) const {
+    if (!thin) return now.times(weights(gate, j), gh);
+    const int64_t row = gate * h + j, ahead = row + 2 * cols <= 3 * h ? cols * h : 0;
+    T part[kThin * cols];
+    for (int64_t l0 = 0; l0 < h; l0 += kDepth) {
+      multiply_thin_rows<T>(n, std::min(kDepth, h - l0), h0 + l0, h, w_hh + row * h + l0, h, ahead,
+                            l0 == 0 ? gh : part);
+      for (int64_t i = 0; l0 > 0 && i < n * cols; ++i) gh[i] += part[i];
     }
   }
 
   void step(int64_t t, int64_t j, int64_t width) {
-    alignas(64) T gh[3][kRows * cols];
-    const T* bias = args.b_hh.data<T>() + j;
-    const T* state = (t > 0 ? args.out.data<T>() + (t - 1) * n * h : args.h0.data<T>()) + j;
-    T* out = args.out.data<T>() + t * n * h + j;
-    for (int64_t i0 = 0; i0 < n; i0 += kRows) {
-      const int64_t rows = std::min<int64_t>(kRows, n - i0);
-      products(i0, rows, j, gh);
-      for (int64_t i = i0; i < i0 + rows; ++i) {
-        const T* gi = args.gi.data<T>() + (t * n + i) * 3 * h + j;
-        T* gates = args.gates.data<T>() + (t * n + i) * 4 * h + j;
-        const int64_t at = (i - i0) * cols;
-        const T* in[] = {gi,         gi + h, gi + 2 * h, gh[0] + at,   gh[1] + at,
-                         gh[2] + at, bias,   bias + h,   bias + 2 * h, state + i * h};
-        T* results[] = {gates, gates + h, gates + 2 * h, gates + 3 * h, out + i * h};
-        cell(in, results, width);
-      }
-      if (t + 1 < steps) next.put(out + i0 * h, h, i0, rows, j, width);
+    const Workspace<T> memory(3 * n * cols);
+    T* gh = memory.data();
+    for (int64_t g = 0; g < 3; ++g) product(g, j, gh + g * n * cols);
+    const T* state = (t > 0 ? out + (t - 1) * n * h : h0) + j;
+    T* to = out + t * n * h + j;
+    const T* bias = b_hh + j;
+    for (int64_t i = 0; i < n; ++i) {
+      const T *x = gi + (t * n + i) * 3 * h + j, *p = gh + i * cols;
+      T* g = gates + (t * n + i) * 4 * h + j;
+      const T* in[] = {
+          x,        x + h,        x + 2 * h,    p, p + n * cols, p + 2 * n * cols, bias,
+          bias + h, bias + 2 * h, state + i * h};
+      T* results[] = {g, g + h, g + 2 * h, g + 3 * h, to + i * h};
+      cell(in, results, width);
     }
+    if (t + 1 < steps) next.put(to, h, j, width);
   }
 
   void run() {
-    if (steps == 0) return;
-    if (!thin) {
-      for_units<T>(h, [&](int64_t j, int64_t width) { pack(j, width); });
-      for (int64_t i = 0; i < n; i += kRows)
-        now.put(args.h0.data<T>() + i * h, h, i, std::min<int64_t>(kRows, n - i), 0, h);
+    if (!thin && steps > 0) {
+      now.put(h0, h, 0, h);
+      for_units<T>(h, [&](int64_t j, int64_t width) {
+        for (int64_t g = 0; g < 3; ++g)
+          pack_b<T>({w_hh + (g * h + j) * h, 1, h}, h, width, weights(g, j));
+      });
     }
     for (int64_t t = 0; t < steps; ++t) {
       for_units<T>(h, [&](int64_t j, int64_t width) { step(t, j, width); });
-      std::swap(now, next);
+      now.data.swap(next.data);
     }
   }
 };
@@ -173,60 +216,65 @@ struct Forward {
 template <class T>
 struct Backward {
   static constexpr int cols = Simd<T>::cols;
-  const GruGradArgs& args;
-  const int64_t steps = args.gy.size(0), n = args.gy.size(1), h = args.h0.size(1);
-  std::vector<T> w = std::vector<T>(static_cast<size_t>(round_up(h, cols) * 3 * h));
-  std::vector<T> direct = std::vector<T>(static_cast<size_t>(n * h));
-  Panels<T> now{n, 3 * h}, next{n, 3 * h};  // g_gh of the step before (in time: after) and of this
+  explicit Backward(const GruGradArgs& args)
+      : steps(args.gy.size(0)),
+        n(args.gy.size(1)),
+        h(args.h0.size(1)),
+        gates(args.gates.data<T>()),
+        y(args.y.data<T>()),
+        h0(args.h0.data<T>()),
+        w_hh(args.w_hh.data<T>()),
+        gy(args.gy.data<T>()),
+        g_gi(args.g_gi.data<T>()),
+        g_gh(args.g_gh.data<T>()),
+        out(args.out.data<T>()),
+        packed(round_up(h, cols) * 3 * h) {}
 
-  /// Gradient of the state after step t at some rows and units: [rows, cols].
-  void carry(int64_t t, int64_t i0, int64_t rows, int64_t j, int64_t width, T* g) {
-    if (t + 1 < steps) {
-      multiply_rows<T>(rows, 3 * h, now.at(i0, 0), w.data() + j * 3 * h, g);
-    } else {
-      std::fill_n(g, rows * cols, T(0));
-    }
-    for (int64_t i = 0; i < rows; ++i) {
-      const T* straight = direct.data() + (i0 + i) * h + j;
-      const T* gy = t < 0 ? nullptr : args.gy.data<T>() + (t * n + i0 + i) * h + j;
+  const int64_t steps, n, h;
+  const T *gates, *y, *h0, *w_hh, *gy;
+  T *g_gi, *g_gh, *out;
+  Workspace<T> packed, direct{n * h};
+  Panels<T> now{n, 3 * h}, next{n, 3 * h};  // g_gh of the step after this and of this one
+
+  /// g [n, cols]: gradient of some units of the state after step t; -1: of h0.
+  void carry(int64_t t, int64_t j, int64_t width, T* g) const {
+    const bool last = t + 1 == steps;
+    if (!last) now.times(packed.data() + j * 3 * h, g);
+    for (int64_t i = 0; i < n; ++i) {
+      T* to = g + i * cols;
+      const T *straight = direct.data() + i * h + j, *from = gy + (t * n + i) * h + j;
       for (int64_t u = 0; u < width; ++u) {
-        T x = straight[u] + g[i * cols + u];
-        if (gy) x += gy[u];
-        g[i * cols + u] = x;
+        T x = last ? T(0) : straight[u] + to[u];
+        if (t >= 0) x += from[u];
+        to[u] = x;
       }
     }
   }
 
   void step(int64_t t, int64_t j, int64_t width) {
-    alignas(64) T g[kRows * cols];
-    const T* state = t > 0 ? args.y.data<T>() + (t - 1) * n * h : args.h0.data<T>();
-    for (int64_t i0 = 0; i0 < n; i0 += kRows) {
-      const int64_t rows = std::min<int64_t>(kRows, n - i0);
-      carry(t, i0, rows, j, width, g);
+    const Workspace<T> g(n * cols);
+    carry(t, j, width, g.data());
+    const T* state = (t > 0 ? y + (t - 1) * n * h : h0) + j;
+    for (int64_t i = 0; i < n; ++i) {
+      const int64_t at = t * n + i;
       if (t < 0) {
-        for (int64_t i = 0; i < rows; ++i)
-          std::copy_n(g + i * cols, width, args.out.data<T>() + (i0 + i) * h + j);
-        continue;
+        std::copy_n(g.data() + i * cols, width, out + i * h + j);
+      } else {
+        cell_grad(gates + at * 4 * h + j, state + i * h, g.data() + i * cols, h, width,
+                  g_gi + at * 3 * h + j, g_gh + at * 3 * h + j, direct.data() + i * h + j);
       }
-      T* g_gh = args.g_gh.data<T>() + (t * n + i0) * 3 * h + j;
-      for (int64_t i = 0; i < rows; ++i) {
-        const int64_t at = t * n + i0 + i;
-        cell_grad(args.gates.data<T>() + at * 4 * h + j, state + (i0 + i) * h + j, g + i * cols, h,
-                  width, args.g_gi.data<T>() + at * 3 * h + j, g_gh + i * 3 * h,
-                  direct.data() + (i0 + i) * h + j);
-      }
-      for (int64_t gate = 0; gate < 3; ++gate)
-        next.put(g_gh + gate * h, 3 * h, i0, rows, gate * h + j, width);
     }
+    for (int64_t gate = 0; t >= 0 && gate < 3; ++gate)
+      next.put(g_gh + t * n * 3 * h + gate * h + j, 3 * h, gate * h + j, width);
   }
 
   void run() {
     for_units<T>(h, [&](int64_t j, int64_t width) {
-      pack_b<T>({args.w_hh.data<T>() + j, h, 1}, 3 * h, width, w.data() + j * 3 * h);
+      pack_b<T>({w_hh + j, h, 1}, 3 * h, width, packed.data() + j * 3 * h);
     });
-    for (int64_t t = steps - 1; t >= -1; --t) {  // -1: the gradient of h0
+    for (int64_t t = steps - 1; t >= -1; --t) {
       for_units<T>(h, [&](int64_t j, int64_t width) { step(t, j, width); });
-      std::swap(now, next);
+      now.data.swap(next.data);
     }
   }
 };
@@ -234,11 +282,11 @@ struct Backward {
 }  // namespace
 
 void gru(const GruArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { Forward<decltype(zero)>{args}.run(); });
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { Forward<decltype(zero)>(args).run(); });
 }
 
 void gru_grad(const GruGradArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { Backward<decltype(zero)>{args}.run(); });
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { Backward<decltype(zero)>(args).run(); });
 }
 
 }  // namespace restage::cpu::HWY_NAMESPACE
