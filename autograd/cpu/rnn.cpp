@@ -34,8 +34,8 @@ void for_units(int64_t h, const F& body) {
 
 /// Rows per panel: all panels of a batch about equally tall.
 int64_t panel_rows(int64_t n) {
-  const int64_t panels = std::max<int64_t>(1, (n + kRows - 1) / kRows);
-  return (n + panels - 1) / panels;
+  const int64_t panels = (n + kRows - 1) / kRows;
+  return n == 0 ? 1 : (n + panels - 1) / panels;
 }
 
 /// All rows of a batch, [n, k], in panels of `tall` rows, k-major, kRows apart.
