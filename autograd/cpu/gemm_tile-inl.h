@@ -222,34 +222,43 @@ template <class T, int Rows>
 inline void multiply_thin(int64_t k, const T* a, int64_t stride, const T* b, int64_t ldb,
                           [[maybe_unused]] int64_t ahead, T* out) {
   constexpr int cols = Simd<T>::cols;
-  std::fill_n(out, Rows * cols, T(0));
-  int64_t l = 0;
 #if HWY_TARGET != HWY_SCALAR
   constexpr int width = Simd<T>::width;
   using Turned = Transposed<width, T>;
   constexpr auto d = Turned::d;
   constexpr int64_t line = 64 / sizeof(T);  // whole cache lines of b while they are in L1
-  hn::Vec<hn::CappedTag<T, width>> acc[Rows][kVectors];
+  using V = hn::Vec<hn::CappedTag<T, width>>;
+  V acc[Rows][kVectors];
   for (auto& row : acc)
     for (auto& x : row) x = hn::Zero(d);
-  for (; l + line <= k; l += line) {
+  const auto add = [&](int v, int64_t l, V b_of_l) HWY_ATTR {
+    for (int i = 0; i < Rows; ++i)
+      acc[i][v] = hn::MulAdd(hn::Set(d, a[i * stride + l]), b_of_l, acc[i][v]);
+  };
+  int64_t l0 = 0;
+  for (; l0 + line <= k; l0 += line) {
     for (int v = 0; v < kVectors; ++v) {
-      const T* from = b + v * width * ldb + l;
+      const T* from = b + v * width * ldb + l0;
       for (int j = 0; j < width; ++j) __builtin_prefetch(from + ahead + j * ldb, 0, 2);
-      for (int64_t c = 0; c < line; c += Turned::block) {
-        const Turned t(from + c, ldb);
-        for (int i = 0; i < Rows; ++i)
-          for (int e = 0; e < Turned::block; ++e)
-            acc[i][v] = hn::MulAdd(hn::Set(d, a[i * stride + l + c + e]), t.v[e], acc[i][v]);
+      for (int64_t l = 0; l < line; l += Turned::block) {
+        const Turned t(from + l, ldb);
+        for (int e = 0; e < Turned::block; ++e) add(v, l0 + l + e, t.v[e]);
       }
     }
   }
+  for (; l0 < k; ++l0) {
+    HWY_ALIGN T column[cols];
+    for (int j = 0; j < cols; ++j) column[j] = b[j * ldb + l0];
+    for (int v = 0; v < kVectors; ++v) add(v, l0, hn::Load(d, column + v * width));
+  }
   for (int i = 0; i < Rows; ++i)
     for (int v = 0; v < kVectors; ++v) hn::StoreU(acc[i][v], d, out + i * cols + v * width);
-#endif
-  for (; l < k; ++l)
+#else
+  std::fill_n(out, Rows * cols, T(0));
+  for (int i = 0; i < Rows; ++i)
     for (int j = 0; j < cols; ++j)
-      for (int i = 0; i < Rows; ++i) out[i * cols + j] += a[i * stride + l] * b[j * ldb + l];
+      for (int64_t l = 0; l < k; ++l) out[i * cols + j] += a[i * stride + l] * b[j * ldb + l];
+#endif
 }
 
 /// The same for 1 to Rows rows.
