@@ -215,58 +215,69 @@ inline void multiply_rows(int64_t rows, int64_t k, const T* a, const T* b, T* ou
   if constexpr (Rows > 1) multiply_rows<T, Add, Rows - 1>(rows, k, a, b, out);
 }
 
-/// Rows of a times b as multiply() does, for rows of a (`stride` apart) and of b as they lie in
-/// memory, b(l, j) at b[j * ldb + l]: weights that are used once are turned in registers and never
-/// packed. Looks `ahead` numbers ahead of b. out [Rows, cols].
+/// Rows of a [Rows, k] times rows of b [cols, k], both as they lie in memory, summed in blocks of
+/// kDepth: weights that are used once are turned in registers and never packed. Looks `ahead`
+/// numbers ahead of b. out [Rows, cols].
 template <class T, int Rows>
-inline void multiply_thin(int64_t k, const T* a, int64_t stride, const T* b, int64_t ldb,
-                          [[maybe_unused]] int64_t ahead, T* out) {
+inline void multiply_thin(int64_t k, const T* a, const T* b, [[maybe_unused]] int64_t ahead,
+                          T* out) {
   constexpr int cols = Simd<T>::cols;
+  std::fill_n(out, Rows * cols, T(0));
 #if HWY_TARGET != HWY_SCALAR
   constexpr int width = Simd<T>::width;
   using Turned = Transposed<width, T>;
   constexpr auto d = Turned::d;
   constexpr int64_t line = 64 / sizeof(T);  // whole cache lines of b while they are in L1
   using V = hn::Vec<hn::CappedTag<T, width>>;
-  V acc[Rows][kVectors];
-  for (auto& row : acc)
-    for (auto& x : row) x = hn::Zero(d);
-  const auto add = [&](int v, int64_t l, V b_of_l) HWY_ATTR {
-    for (int i = 0; i < Rows; ++i)
-      acc[i][v] = hn::MulAdd(hn::Set(d, a[i * stride + l]), b_of_l, acc[i][v]);
-  };
-  int64_t l0 = 0;
-  for (; l0 + line <= k; l0 += line) {
-    for (int v = 0; v < kVectors; ++v) {
-      const T* from = b + v * width * ldb + l0;
-      for (int j = 0; j < width; ++j) __builtin_prefetch(from + ahead + j * ldb, 0, 2);
-      for (int64_t l = 0; l < line; l += Turned::block) {
-        const Turned t(from + l, ldb);
-        for (int e = 0; e < Turned::block; ++e) add(v, l0 + l + e, t.v[e]);
+  for (int64_t begin = 0; begin < k; begin += kDepth) {
+    const int64_t end = std::min(k, begin + kDepth);
+    V acc[Rows][kVectors];
+    for (auto& row : acc)
+      for (auto& x : row) x = hn::Zero(d);
+    const auto add = [&](int v, int64_t l, V b_of_l) HWY_ATTR {
+      for (int i = 0; i < Rows; ++i)
+        acc[i][v] = hn::MulAdd(hn::Set(d, a[i * k + l]), b_of_l, acc[i][v]);
+    };
+    int64_t l0 = begin;
+    for (; l0 + line <= end; l0 += line) {
+      for (int v = 0; v < kVectors; ++v) {
+        const T* from = b + v * width * k + l0;
+        for (int j = 0; j < width; ++j) __builtin_prefetch(from + ahead + j * k, 0, 2);
+        for (int64_t l = 0; l < line; l += Turned::block) {
+          const Turned t(from + l, k);
+          for (int e = 0; e < Turned::block; ++e) add(v, l0 + l + e, t.v[e]);
+        }
       }
     }
+    for (; l0 < end; ++l0) {
+      HWY_ALIGN T column[cols];
+      for (int j = 0; j < cols; ++j) column[j] = b[j * k + l0];
+      for (int v = 0; v < kVectors; ++v) add(v, l0, hn::Load(d, column + v * width));
+    }
+    for (int i = 0; i < Rows; ++i)
+      for (int v = 0; v < kVectors; ++v) {
+        T* to = out + i * cols + v * width;
+        hn::StoreU(hn::Add(hn::LoadU(d, to), acc[i][v]), d, to);
+      }
   }
-  for (; l0 < k; ++l0) {
-    HWY_ALIGN T column[cols];
-    for (int j = 0; j < cols; ++j) column[j] = b[j * ldb + l0];
-    for (int v = 0; v < kVectors; ++v) add(v, l0, hn::Load(d, column + v * width));
-  }
-  for (int i = 0; i < Rows; ++i)
-    for (int v = 0; v < kVectors; ++v) hn::StoreU(acc[i][v], d, out + i * cols + v * width);
 #else
-  std::fill_n(out, Rows * cols, T(0));
-  for (int i = 0; i < Rows; ++i)
-    for (int j = 0; j < cols; ++j)
-      for (int64_t l = 0; l < k; ++l) out[i * cols + j] += a[i * stride + l] * b[j * ldb + l];
+  for (int64_t begin = 0; begin < k; begin += kDepth)
+    for (int i = 0; i < Rows; ++i)
+      for (int j = 0; j < cols; ++j) {
+        T x = 0;
+        for (int64_t l = begin; l < std::min(k, begin + kDepth); ++l)
+          x += a[i * k + l] * b[j * k + l];
+        out[i * cols + j] += x;
+      }
 #endif
 }
 
 /// The same for 1 to Rows rows.
 template <class T, int Rows = kThin>
-inline void multiply_thin_rows(int64_t rows, int64_t k, const T* a, int64_t stride, const T* b,
-                               int64_t ldb, int64_t ahead, T* out) {
-  if (rows == Rows) return multiply_thin<T, Rows>(k, a, stride, b, ldb, ahead, out);
-  if constexpr (Rows > 1) multiply_thin_rows<T, Rows - 1>(rows, k, a, stride, b, ldb, ahead, out);
+inline void multiply_thin_rows(int64_t rows, int64_t k, const T* a, const T* b, int64_t ahead,
+                               T* out) {
+  if (rows == Rows) return multiply_thin<T, Rows>(k, a, b, ahead, out);
+  if constexpr (Rows > 1) multiply_thin_rows<T, Rows - 1>(rows, k, a, b, ahead, out);
 }
 
 }  // namespace restage::cpu::HWY_NAMESPACE

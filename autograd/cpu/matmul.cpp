@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <utility>
 
 #include "autograd/cpu/common.h"
@@ -38,7 +39,7 @@ struct Product {
   Activation activation;
   bool accumulate;
   /// A few rows times weights [n, k] as they lie in memory, each number of which is needed once.
-  bool thin() const { return m <= kThin && a.col == 1 && b.row == 1; }
+  bool thin() const { return m <= kThin && a.col == 1 && b.row == 1 && !accumulate; }
 };
 
 /// Where a register tile stands: its block of k is the first, the last, or neither.
@@ -94,18 +95,20 @@ void register_tile(const Product<T>& p, const Place& at, int64_t k, const T* a, 
     return;
   }
   alignas(kVectorBytes) T tile[Rows * cols];
-  std::copy_n(&acc[0][0][0], Rows * cols, tile);
+  std::memcpy(tile, acc, sizeof tile);
   finish_tile(p, at, Rows, tile);
 }
 
-/// A tile of a few rows: nothing is packed.
+/// Columns j0 to j1, a multiple of `cols`, for a few rows: nothing is packed.
 template <class T>
-void thin_tile(const Product<T>& p, const Place& at, int64_t rows, int64_t l0, int64_t k) {
-  alignas(kVectorBytes) T sums[kThin * Simd<T>::cols];
-  const int64_t ahead = p.n - at.col >= 2 * Simd<T>::cols ? Simd<T>::cols * p.b.col : 0;
-  multiply_thin_rows<T>(rows, k, &p.a.at(at.row, l0), p.a.row, &p.b.at(l0, at.col), p.b.col, ahead,
-                        sums);
-  finish_tile(p, at, rows, sums);
+void thin_tiles(const Product<T>& p, int64_t j0, int64_t j1) {
+  constexpr int cols = Simd<T>::cols;
+  alignas(kVectorBytes) T sums[kThin * cols];
+  for (int64_t j = j0; j < j1; j += cols) {
+    const int64_t ahead = p.n - j >= 2 * cols ? cols * p.k : 0;
+    multiply_thin_rows<T>(p.m, p.k, p.a.data, &p.b.at(0, j), ahead, sums);
+    finish_tile(p, Place{0, j, true, true}, p.m, sums);
+  }
 }
 
 /// register_tile for 1 to kRows rows.
@@ -137,8 +140,9 @@ struct Cut {
     const int64_t wide = (c.share_a ? p.m : 0) + (c.share_b ? p.n : 0);
     if (wide * p.k > kShared) c.depth = std::max(kDepth, kShared / wide / kDepth * kDepth);
     // A multiply-add of a register tile takes 1/32 cycle, fetching and packing a number of b one.
-    const int64_t cost = batch * p.n * p.k * (32 + p.m) / 32;
-    const int64_t pieces = std::clamp<int64_t>(cost / kSmallest / batch, 1, kPieces);
+    const int64_t cost = p.n * p.k * (32 + p.m) / 32;
+    const int64_t pieces =
+        std::clamp<int64_t>(cost / kSmallest, 1, std::max<int64_t>(1, kPieces / batch));
     int64_t row_tiles = (p.m + kTileRows - 1) / kTileRows;
     int64_t col_tiles = (p.n + kTileCols - 1) / kTileCols;
     while (row_tiles * col_tiles < pieces) {
@@ -173,15 +177,15 @@ void tile(const Product<T>& p, const Packed<T>& packed, int64_t i0, int64_t i1, 
   constexpr int cols = Simd<T>::cols;
   const int64_t m = round_up(p.m, kRows), n = round_up(p.n, cols);
   const int64_t thin_end = p.thin() ? j0 + (j1 - j0) / cols * cols : j0;
-  const bool pack = !packed.a && thin_end < j1;
   alignas(64) T own_b[kDepth * cols];
-  const Workspace<T> own_a(pack ? round_up(i1 - i0, kRows) * std::min(kDepth, p.k) : 0);
+  thin_tiles(p, j0, thin_end);
+  if (thin_end == j1) return;
+  const Workspace<T> own_a(packed.a ? 0 : round_up(i1 - i0, kRows) * std::min(kDepth, p.k));
   for (int64_t l0 = packed.begin; l0 < packed.end; l0 += kDepth) {
     const int64_t l = std::min(kDepth, packed.end - l0), before = l0 - packed.begin;
     const auto at = [&](int64_t i, int64_t j) { return Place{i, j, l0 == 0, l0 + l == p.k}; };
-    for (int64_t j = j0; j < thin_end; j += cols) thin_tile(p, at(i0, j), i1 - i0, l0, l);
     const T* a = packed.a ? packed.a + before * m + i0 * l : own_a.data();
-    if (pack) pack_rows(p.a.from(i0, l0), i1 - i0, l, own_a.data());
+    if (!packed.a) pack_rows(p.a.from(i0, l0), i1 - i0, l, own_a.data());
     for (int64_t j = thin_end; j < j1; j += cols) {
       const T* b = packed.b ? packed.b + before * n + j * l : own_b;
       if (!packed.b) pack_b(p.b.from(l0, j), l, std::min<int64_t>(cols, j1 - j), own_b);

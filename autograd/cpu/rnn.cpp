@@ -171,12 +171,7 @@ struct Forward {
   void product(int64_t gate, int64_t j, T* gh) const {
     if (!thin) return now.times(weights(gate, j), gh);
     const int64_t row = gate * h + j, ahead = row + 2 * cols <= 3 * h ? cols * h : 0;
-    T part[kThin * cols];
-    for (int64_t l0 = 0; l0 < h; l0 += kDepth) {
-      multiply_thin_rows<T>(n, std::min(kDepth, h - l0), h0 + l0, h, w_hh + row * h + l0, h, ahead,
-                            l0 == 0 ? gh : part);
-      for (int64_t i = 0; l0 > 0 && i < n * cols; ++i) gh[i] += part[i];
-    }
+    multiply_thin_rows<T>(n, h, h0, w_hh + row * h, ahead, gh);
   }
 
   void step(int64_t t, int64_t j, int64_t width) {
