@@ -15,7 +15,7 @@ inline constexpr int64_t kGroups = 8;
 
 /// The sums of one group of tiles.
 template <class T>
-struct Sums {
+struct GroupSums {
   int64_t from = 0, to = 0;  // tiles
   int64_t first_row = 0;     // of the clouds that the group touches
   Tensor gamma_t, both_t, hidden, key, value, xyz;
@@ -28,7 +28,7 @@ struct Backward {
   Tensor moments;         // [tiles, 4, 2d]: sums over pairs of [r 1] times the gradient of [s t]
   Buffer<T> gamma_right;  // G for de G
   Buffer<T> full_right;   // M for the gradient of h, if a tile is done in full
-  std::vector<Sums<T>> groups;
+  std::vector<GroupSums<T>> groups;
 
   explicit Backward(const NeighbourAttentionGradArgs& arguments)
       : a(arguments.in), args(arguments) {
@@ -39,7 +39,7 @@ struct Backward {
       pack_right<T>({args.in.both.template data<T>(), a.d, 1}, 2 * a.d, a.d, full_right);
     const int64_t per_group = (a.tiles.tiles() + kGroups - 1) / kGroups;
     for (int64_t t = 0; t < a.tiles.tiles(); t += per_group) {
-      Sums<T> s;
+      GroupSums<T> s;
       s.from = t;
       s.to = std::min(a.tiles.tiles(), t + per_group);
       s.first_row = a.point(s.from, 0) / a.v * a.v;
@@ -49,7 +49,7 @@ struct Backward {
 };
 
 template <class T>
-void make_sums(const Backward<T>& b, Sums<T>& s) {
+void make_sums(const Backward<T>& b, GroupSums<T>& s) {
   const int64_t d = b.a.d;
   const auto zeros = [&](const Shape& shape) {
     return Tensor::zeros(shape, b.args.gy.dtype(), b.args.gy.device());
@@ -65,7 +65,7 @@ void make_sums(const Backward<T>& b, Sums<T>& s) {
 
 /// e: gradient of the scores; st: [s, t] becomes [.., gradient of t]; also that of value.
 template <class T>
-void pool_grad(const Backward<T>& b, int64_t t, T* st, T* e, Sums<T>& sums) {
+void pool_grad(const Backward<T>& b, int64_t t, T* st, T* e, GroupSums<T>& sums) {
   const Attention<T>& a = b.a;
   const int64_t d = a.d;
   const auto scale = static_cast<T>(a.in.scale);
@@ -92,8 +92,8 @@ void pool_grad(const Backward<T>& b, int64_t t, T* st, T* e, Sums<T>& sums) {
 
 /// Masks the gradient gz [pairs, units] of the active units' ReLU and adds what W and b get.
 template <class T>
-void unit_grad(const Attention<T>& a, int64_t t, const T* r, const T* hidden, T* gz, Sums<T>& sums,
-               TileMemory<T>& memory) {
+void unit_grad(const Attention<T>& a, int64_t t, const T* r, const T* hidden, T* gz,
+               GroupSums<T>& sums, TileMemory<T>& memory) {
   const std::vector<int32_t>& units = a.active[static_cast<size_t>(t)];
   const int64_t pairs = a.tile_rows(t) * a.k, columns = a.columns(t), m = std::ssize(units);
   T* sum = memory.y.at_least(4 * m);
@@ -128,7 +128,7 @@ T dot(int64_t n, const T* x, const T* y) {
 /// Gradient of the points from that of the offsets of a tile's pairs: through the active units
 /// (gz), and what on(pair, axis) says comes through those that are on.
 template <class T, class F>
-void offset_grad(const Backward<T>& b, int64_t t, const T* gz, Sums<T>& sums, F&& on) {
+void offset_grad(const Backward<T>& b, int64_t t, const T* gz, GroupSums<T>& sums, F&& on) {
   const Attention<T>& a = b.a;
   const std::vector<int32_t>& units = a.active[static_cast<size_t>(t)];
   const int64_t m = std::ssize(units);

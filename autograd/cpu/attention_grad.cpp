@@ -13,7 +13,8 @@ namespace {
 
 /// Through relu(query - key + s): du masks dh; sums for query and key; st becomes [du, ..].
 template <class T>
-void score_grad(const Backward<T>& b, int64_t t, const T* u, const T* gu, T* st, Sums<T>& sums) {
+void score_grad(const Backward<T>& b, int64_t t, const T* u, const T* gu, T* st,
+                GroupSums<T>& sums) {
   const Attention<T>& a = b.a;
   const int64_t d = a.d;
   for (int64_t i = 0; i < a.tile_rows(t); ++i) {
@@ -40,7 +41,7 @@ void score_grad(const Backward<T>& b, int64_t t, const T* u, const T* gu, T* st,
 
 /// From the gradient of [s, t] to those of M and of the moments; the hidden columns are its factor.
 template <class T>
-void both_grad(Backward<T>& b, int64_t t, const T* hidden, const T* g_st, Sums<T>& sums,
+void both_grad(Backward<T>& b, int64_t t, const T* hidden, const T* g_st, GroupSums<T>& sums,
                TileMemory<T>& memory) {
   const Attention<T>& a = b.a;
   const std::vector<int32_t>& units = a.active[static_cast<size_t>(t)];
@@ -62,12 +63,12 @@ void both_grad(Backward<T>& b, int64_t t, const T* hidden, const T* g_st, Sums<T
 /// From the gradient of [s, t] to that of the active units' z, and to W, b and the points.
 template <class T>
 void hidden_grad(const Backward<T>& b, int64_t t, const T* r, const T* hidden, const T* g_st,
-                 Sums<T>& sums, TileMemory<T>& memory) {
+                 GroupSums<T>& sums, TileMemory<T>& memory) {
   const Attention<T>& a = b.a;
   const std::vector<int32_t>& units = a.active[static_cast<size_t>(t)];
   const int64_t pairs = a.tile_rows(t) * a.k, m = std::ssize(units), width = 2 * a.d;
   if (m == 0) return;
-  const T* right = b.full_right.memory.data();
+  const T* right = b.full_right.data();
   if (!a.full[static_cast<size_t>(t)]) {
     T* chosen = memory.more.at_least(m * width);
     for (int64_t i = 0; i < m; ++i)
@@ -83,7 +84,7 @@ void hidden_grad(const Backward<T>& b, int64_t t, const T* r, const T* hidden, c
 /// Gradient of the points: through the active units (gz, as hidden_grad left it) and those that are
 /// on (affine).
 template <class T>
-void xyz_grad(const Backward<T>& b, int64_t t, const T* gz, const T* g_st, Sums<T>& sums) {
+void xyz_grad(const Backward<T>& b, int64_t t, const T* gz, const T* g_st, GroupSums<T>& sums) {
   const Attention<T>& a = b.a;
   const int64_t width = 2 * a.d;
   const T* affine = a.affine.template data<T>() + 4 * t * width;
@@ -96,7 +97,7 @@ void xyz_grad(const Backward<T>& b, int64_t t, const T* gz, const T* g_st, Sums<
 /// A tile whose scores are products in full.
 template <class T>
 void full_tile_grad(Backward<T>& b, int64_t t, const T* r, const T* hidden, T* st, const T* u,
-                    Sums<T>& sums, TileMemory<T>& memory) {
+                    GroupSums<T>& sums, TileMemory<T>& memory) {
   const Attention<T>& a = b.a;
   const int64_t pairs = a.tile_rows(t) * a.k, d = a.d;
   T* e = memory.e.at_least(pairs * d);
@@ -105,16 +106,15 @@ void full_tile_grad(Backward<T>& b, int64_t t, const T* r, const T* hidden, T* s
           pack_right<T>({e, d, 1}, pairs, d, memory.right), sums.gamma_t.template data<T>(), d,
           true);
   T* gu = memory.more.at_least(pairs * d);
-  product(pairs, d, d, pack_left<T>({e, d, 1}, pairs, d, memory.left), b.gamma_right.memory.data(),
-          gu, d);
+  product(pairs, d, d, pack_left<T>({e, d, 1}, pairs, d, memory.left), b.gamma_right.data(), gu, d);
   score_grad(b, t, u, gu, st, sums);
   both_grad(b, t, hidden, st, sums, memory);
   hidden_grad(b, t, r, hidden, st, sums, memory);
-  if (b.args.g_xyz != nullptr) xyz_grad(b, t, memory.gz.memory.data(), st, sums);
+  if (b.args.g_xyz != nullptr) xyz_grad(b, t, memory.gz.data(), st, sums);
 }
 
 template <class T>
-void tile_grad(Backward<T>& b, int64_t t, Sums<T>& sums) {
+void tile_grad(Backward<T>& b, int64_t t, GroupSums<T>& sums) {
   TileMemory<T>& memory = TileMemory<T>::mine();
   const T* r = pair_offsets(b.a, t, memory.offsets);
   const T* hidden = hidden_columns(b.a, t, r, memory);
@@ -153,12 +153,12 @@ void affine_grad(const Backward<T>& b, Tensor& g_both_t, Tensor& g_hidden) {
 
 /// out = sum of a part over the groups, in order; `row` of out is where a group's part begins.
 template <class T>
-void add_groups(const std::vector<Sums<T>>& groups, Tensor Sums<T>::*part, int64_t row,
+void add_groups(const std::vector<GroupSums<T>>& groups, Tensor GroupSums<T>::*part, int64_t row,
                 Tensor& out) {
   T* to = out.data<T>();
   parallel_for(out.numel(), kGrain, [&](int64_t from, int64_t end) HWY_ATTR {
     std::fill(to + from, to + end, T(0));
-    for (const Sums<T>& s : groups) {
+    for (const GroupSums<T>& s : groups) {
       const int64_t shift = s.first_row * row;
       const T* x = (s.*part).template data<T>();
       const int64_t last = std::min(end, shift + (s.*part).numel());
@@ -175,9 +175,9 @@ void weight_grads(Backward<T>& b) {
     return Tensor::empty(shape, args.gy.dtype(), args.gy.device());
   };
   Tensor both_t = empty({d, 2 * d}), hidden = empty({4, d}), gamma_t = empty({d, d});
-  add_groups(b.groups, &Sums<T>::gamma_t, 0, gamma_t);
-  add_groups(b.groups, &Sums<T>::both_t, 0, both_t);
-  add_groups(b.groups, &Sums<T>::hidden, 0, hidden);
+  add_groups(b.groups, &GroupSums<T>::gamma_t, 0, gamma_t);
+  add_groups(b.groups, &GroupSums<T>::both_t, 0, both_t);
+  add_groups(b.groups, &GroupSums<T>::hidden, 0, hidden);
   affine_grad(b, both_t, hidden);
   transpose_matrix(gamma_t.data<T>(), d, d, args.out.template data<T>());
   transpose_matrix(both_t.data<T>(), d, 2 * d, args.g_both.template data<T>());
@@ -194,15 +194,15 @@ void backward(const NeighbourAttentionGradArgs& args) {
   Backward<T> b(args);
   parallel_for(std::ssize(b.groups), 1, [&](int64_t from, int64_t to) HWY_ATTR {
     for (int64_t g = from; g < to; ++g) {
-      Sums<T>& sums = b.groups[static_cast<size_t>(g)];
+      GroupSums<T>& sums = b.groups[static_cast<size_t>(g)];
       make_sums(b, sums);
       for (int64_t t = sums.from; t < sums.to; ++t) tile_grad(b, t, sums);
     }
   });
   weight_grads(b);
-  add_groups(b.groups, &Sums<T>::key, b.a.d, args.g_key);
-  add_groups(b.groups, &Sums<T>::value, b.a.d, args.g_value);
-  if (args.g_xyz != nullptr) add_groups(b.groups, &Sums<T>::xyz, 3, *args.g_xyz);
+  add_groups(b.groups, &GroupSums<T>::key, b.a.d, args.g_key);
+  add_groups(b.groups, &GroupSums<T>::value, b.a.d, args.g_value);
+  if (args.g_xyz != nullptr) add_groups(b.groups, &GroupSums<T>::xyz, 3, *args.g_xyz);
 }
 
 }  // namespace

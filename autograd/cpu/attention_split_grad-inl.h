@@ -44,7 +44,7 @@ void add_chosen(const T* from, const std::vector<int32_t>& columns, T* to) {
 /// The gradient of G from that of the scores, e. Returns what the units that are on saw of e: for
 /// each hidden column and (negated) each neighbour the sum of its products, [rows, d].
 template <class T>
-const T* gamma_grad(const Split& s, const T* columns, const T* rows, const T* e, Sums<T>& sums,
+const T* gamma_grad(const Split& s, const T* columns, const T* rows, const T* e, GroupSums<T>& sums,
                     TileMemory<T>& memory) {
   const int64_t d = s.d;
   T* seen = memory.more.at_least((s.active + s.rows()) * d);
@@ -85,7 +85,7 @@ void through_gamma(const Attention<T>& a, const T* left, int64_t count,
 /// zero.
 template <class T>
 void query_key_grad(const Backward<T>& b, int64_t t, const Split& s, const T* columns, T* gu,
-                    const T* on, Sums<T>& sums, TileMemory<T>& memory) {
+                    const T* on, GroupSums<T>& sums, TileMemory<T>& memory) {
   const Attention<T>& a = b.a;
   const auto g_key = [&](int64_t row) {
     return sums.key.template data<T>() + (row - sums.first_row) * s.d;
@@ -114,7 +114,7 @@ void query_key_grad(const Backward<T>& b, int64_t t, const Split& s, const T* co
 /// The gradient of M and of the moments: hidden columns times the gradients of s (gu, on) and of t.
 template <class T>
 void split_both_grad(Backward<T>& b, int64_t t, const Split& s, const T* hidden, const T* gu,
-                     const T* on, const T* g_st, Sums<T>& sums, TileMemory<T>& memory) {
+                     const T* on, const T* g_st, GroupSums<T>& sums, TileMemory<T>& memory) {
   const Attention<T>& a = b.a;
   const std::vector<int32_t>& units = a.active[static_cast<size_t>(t)];
   const int64_t d = s.d;
@@ -164,7 +164,7 @@ T* split_hidden_grad(const Backward<T>& b, int64_t t, const Split& s, const T* o
 /// that are on, and by the active ones.
 template <class T>
 void split_xyz_grad(const Backward<T>& b, int64_t t, const Split& s, const T* on_scores, const T* e,
-                    const T* gu, const T* gz, const T* g_st, Sums<T>& sums,
+                    const T* gu, const T* gz, const T* g_st, GroupSums<T>& sums,
                     const TileMemory<T>& memory) {
   const T* affine = b.a.affine.template data<T>() + 8 * t * s.d;
   std::vector<T> chosen(static_cast<size_t>(3 * s.active));
@@ -179,7 +179,7 @@ void split_xyz_grad(const Backward<T>& b, int64_t t, const Split& s, const T* on
 
 template <class T>
 void split_tile_grad(Backward<T>& b, int64_t t, const T* r, const T* hidden, T* st, const T* u,
-                     Sums<T>& sums, TileMemory<T>& memory) {
+                     GroupSums<T>& sums, TileMemory<T>& memory) {
   const Attention<T>& a = b.a;
   find_others(a, t, memory);
   const Split s{a.tile_rows(t) * a.k,  a.d,          std::ssize(memory.active),

@@ -69,7 +69,7 @@ struct Attention {
 
  private:
   void transpose_weights();
-  void classify(int64_t t, std::vector<T>& offsets);
+  void classify(int64_t t, Buffer<T>& offsets);
 };
 
 /// Memory of one thread.
@@ -175,13 +175,11 @@ void Attention<T>::transpose_weights() {
 }
 
 template <class T>
-void Attention<T>::classify(int64_t t, std::vector<T>& offsets) {
+void Attention<T>::classify(int64_t t, Buffer<T>& offsets) {
   const size_t i = static_cast<size_t>(t);
-  Buffer<T> buffer{std::move(offsets)};
-  const T* r = pair_offsets(*this, t, buffer);
+  const T* r = pair_offsets(*this, t, offsets);
   uint8_t* s = sign.data() + t * d;
   unit_signs(hidden.data<T>(), d, r, tile_rows(t) * k, s);
-  offsets = std::move(buffer.memory);
   for (int64_t u = 0; u < d; ++u)
     if (s[u] == kActive) active[i].push_back(static_cast<int32_t>(u));
   // Beyond this share leaving units out costs more than it saves.
@@ -215,7 +213,7 @@ Attention<T>::Attention(const NeighbourAttentionInputs& inputs)
   on = Tensor::empty({tiles.tiles(), 4, d}, in.w.dtype(), in.w.device());
   affine = Tensor::empty({tiles.tiles(), 4, 2 * d}, in.w.dtype(), in.w.device());
   parallel_for(tiles.tiles(), 4, [&](int64_t from, int64_t to) HWY_ATTR {
-    std::vector<T> offsets;
+    Buffer<T> offsets;
     for (int64_t t = from; t < to; ++t) classify(t, offsets);
   });
   Tensor flat = affine.reshape({4 * tiles.tiles(), 2 * d});
@@ -266,7 +264,7 @@ template <class T>
 T* pair_products(const Attention<T>& a, int64_t t, const T* hidden, TileMemory<T>& memory) {
   const int64_t pairs = a.tile_rows(t) * a.k, columns = a.columns(t);
   const T* left = pack_left<T>({hidden, columns, 1}, pairs, columns, memory.left);
-  const T* right = a.full_right.memory.data();
+  const T* right = a.full_right.data();
   if (!a.full[static_cast<size_t>(t)]) {
     column_rows(a, t, &memory.rows);
     right = pack_rows_right(memory.rows, 2 * a.d, memory.right);
@@ -310,7 +308,7 @@ bool split_scores(const Attention<T>& a, int64_t t, TileMemory<T>& memory) {
   memory.active.clear();
   memory.on.clear();
   if (a.full[static_cast<size_t>(t)]) return false;
-  const T *lo = memory.range.memory.data(), *hi = lo + a.d;
+  const T *lo = memory.range.data(), *hi = lo + a.d;
   for (int64_t c = 0; c < a.d; ++c) {
     if (lo[c] > T(0)) {
       memory.on.push_back(static_cast<int32_t>(c));

@@ -1,23 +1,34 @@
 // Packed, register-tiled matrix product. Output tiles go to threads; the sum over k stays in one
-// thread and in one order.
+// thread and in one order. An operand that several tiles need is packed once for all of them, in
+// parallel; one that a single tile needs is packed by that tile, in the cache where it is used.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "autograd/cpu/matmul.cpp"
+#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>  // once per instruction set
 
 #include <algorithm>
-#include <vector>
+#include <array>
+#include <cstring>
+#include <utility>
 
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/gemm_tile-inl.h"
 #include "autograd/cpu/kernels.h"
 #include "autograd/cpu/targets.h"
+#include "autograd/cpu/workspace.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
 namespace {
 
-constexpr int64_t kTileRows = 288;  // multiple of kRows
-constexpr int64_t kTileCols = 512;  // multiple of every kCols
+constexpr int64_t kTileRows = 288;  // times kDepth: half of a small L2
+constexpr int64_t kTileCols = 512;
+constexpr int64_t kShared = 1 << 19;    // numbers of both operands packed at a time
+constexpr int64_t kSharedRows = 1024;   // more rows than this are packed by their tiles
+constexpr int64_t kPieces = 16;         // tiles wanted at least, to have some to share
+constexpr int64_t kSmallest = 1 << 15;  // cycles, roughly, that a piece should take
+
+int64_t round_up(int64_t n, int64_t step) { return (n + step - 1) / step * step; }
 
 template <class T>
 struct Product {
@@ -27,60 +38,213 @@ struct Product {
   const T* bias;
   Activation activation;
   bool accumulate;
+  /// A few rows times weights [n, k] as they lie in memory, each number of which is needed once.
+  bool thin() const { return m <= kThin && a.col == 1 && b.row == 1 && !accumulate; }
 };
 
-/// Writes a computed register tile: the first block of k overwrites (unless accumulating), later
-/// ones add; the last one applies bias and activation.
+/// Where a register tile stands: its block of k is the first, the last, or neither.
+struct Place {
+  int64_t row, col;
+  bool first, last;
+};
+
+/// What becomes of sums x over a block of k for the element that holds c: the first block
+/// overwrites (unless accumulating), later ones add; after the last come bias and activation. NaN
+/// stays.
+template <class T, class V>
+HWY_INLINE V finish(const Product<T>& p, const Place& at, V x, V c, V bias) {
+  if (!at.first || p.accumulate) x += c;
+  if (!at.last) return x;
+  if (p.bias) x += bias;
+  if (p.activation == Activation::relu) x = x <= V{} ? V{} : x;
+  return x;
+}
+
 template <class T>
-void store(const Product<T>& p, const T* tile, int64_t i0, int64_t j0, bool first, bool last) {
+void finish_tile(const Product<T>& p, const Place& at, int64_t rows, const T* sums) {
   constexpr int cols = Simd<T>::cols;
-  const int64_t rows = std::min<int64_t>(kRows, p.m - i0),
-                width = std::min<int64_t>(cols, p.n - j0);
-  const bool add = !first || p.accumulate;
+  const int64_t width = std::min<int64_t>(cols, p.n - at.col);
   for (int64_t i = 0; i < rows; ++i) {
-    T* c = p.out + (i0 + i) * p.n + j0;
-    const T* t = tile + i * cols;
-    if (add) {
-      for (int64_t j = 0; j < width; ++j) c[j] += t[j];
-    } else {
-      for (int64_t j = 0; j < width; ++j) c[j] = t[j];
-    }
-    if (!last) continue;
-    if (p.bias)
-      for (int64_t j = 0; j < width; ++j) c[j] += p.bias[j0 + j];
-    if (p.activation == Activation::relu)
-      for (int64_t j = 0; j < width; ++j) c[j] = c[j] <= T(0) ? T(0) : c[j];  // NaN stays
+    T* c = p.out + (at.row + i) * p.n + at.col;
+    for (int64_t j = 0; j < width; ++j)
+      c[j] = finish(p, at, sums[i * cols + j], c[j], p.bias ? p.bias[at.col + j] : T(0));
   }
 }
 
-/// Per-thread packing memory, kept between calls.
+/// One register tile: sums over a block of k, then out.
+template <class T, int Rows>
+void register_tile(const Product<T>& p, const Place& at, int64_t k, const T* a, const T* b) {
+  using V = typename Simd<T>::Vector;
+  constexpr int width = Simd<T>::width, cols = Simd<T>::cols;
+  T* c = p.out + at.row * p.n + at.col;
+  const T* bias = p.bias ? p.bias + at.col : nullptr;
+  Sums<T, Rows> acc = {};
+  for (int i = 0; i < Rows; ++i) hwy::Prefetch(c + i * p.n);
+  sum<T, Rows, kRows>(k, a, b, acc);
+  if (p.n - at.col >= cols) {
+    const bool read = !at.first || p.accumulate;
+#pragma GCC unroll 12
+    for (int i = 0; i < Rows; ++i) {
+#pragma GCC unroll 2
+      for (int v = 0; v < kVectors; ++v) {
+        V* to = reinterpret_cast<V*>(c + i * p.n + v * width);
+        *to = finish(p, at, acc[i][v], read ? *to : V{},
+                     bias ? *reinterpret_cast<const V*>(bias + v * width) : V{});
+      }
+    }
+    return;
+  }
+  alignas(kVectorBytes) T tile[Rows * cols];
+  std::memcpy(tile, acc, sizeof tile);
+  finish_tile(p, at, Rows, tile);
+}
+
+/// Columns j0 to j1, a multiple of `cols`, for a few rows: nothing is packed.
 template <class T>
-T* workspace(int which, int64_t count) {
-  thread_local std::vector<T> memory[2];
-  auto& buffer = memory[which];
-  if (static_cast<int64_t>(buffer.size()) < count) buffer.resize(static_cast<size_t>(count));
-  return buffer.data();
+void thin_tiles(const Product<T>& p, int64_t j0, int64_t j1) {
+  constexpr int cols = Simd<T>::cols;
+  alignas(kVectorBytes) T sums[kThin * cols];
+  for (int64_t j = j0; j < j1; j += cols) {
+    const int64_t ahead = p.n - j >= 2 * cols ? cols * p.k : 0;
+    multiply_thin_rows<T>(p.m, p.k, p.a.data, &p.b.at(0, j), ahead, sums);
+    finish_tile(p, Place{0, j, true, true}, p.m, sums);
+  }
+}
+
+/// register_tile for 1 to kRows rows.
+template <class T, int... Less>
+constexpr auto register_tiles(std::integer_sequence<int, Less...>) {
+  return std::array{&register_tile<T, Less + 1>...};
+}
+
+/// Packs rows for register tiles that know how many rows they have: no padding.
+template <class T>
+void pack_rows(const Strided<T>& a, int64_t m, int64_t k, T* out) {
+  const int64_t whole = m / kRows * kRows;
+  pack_a(a, whole, k, out);
+  out += whole * k;
+  for (int64_t l = 0; l < k; ++l)
+    for (int64_t i = 0; i < m - whole; ++i) out[l * kRows + i] = a.at(whole + i, l);
+}
+
+/// How a product is cut, by its shape alone.
+struct Cut {
+  bool share_a, share_b;
+  int64_t depth;       // of k, packed at a time when operands are shared
+  int64_t rows, cols;  // of a tile
+
+  template <class T>
+  static Cut of(const Product<T>& p, int64_t batch) {
+    constexpr int64_t step = Simd<T>::cols;
+    Cut c{batch == 1 && p.m <= kSharedRows && !p.thin(), batch == 1 && p.m > kTileRows, p.k, 0, 0};
+    const int64_t wide = (c.share_a ? p.m : 0) + (c.share_b ? p.n : 0);
+    if (wide * p.k > kShared) c.depth = std::max(kDepth, kShared / wide / kDepth * kDepth);
+    // A multiply-add of a register tile takes 1/32 cycle, fetching and packing a number of b one.
+    const int64_t cost = p.n * p.k * (32 + p.m) / 32;
+    const int64_t pieces =
+        std::clamp<int64_t>(cost / kSmallest, 1, std::max<int64_t>(1, kPieces / batch));
+    int64_t row_tiles = (p.m + kTileRows - 1) / kTileRows;
+    int64_t col_tiles = (p.n + kTileCols - 1) / kTileCols;
+    while (row_tiles * col_tiles < pieces) {
+      const bool cut_rows = c.share_b && p.m / row_tiles > 6 * kRows;
+      if (cut_rows && p.m / row_tiles > p.n / col_tiles) {
+        ++row_tiles;
+      } else if (p.n / col_tiles > (c.share_b ? 8 : 1) * step) {
+        ++col_tiles;
+      } else if (cut_rows) {
+        ++row_tiles;
+      } else {
+        break;
+      }
+    }
+    c.rows = round_up((p.m + row_tiles - 1) / row_tiles, kRows);
+    c.cols = round_up((p.n + col_tiles - 1) / col_tiles, step);
+    return c;
+  }
+};
+
+/// Operands of a stretch of k from `begin` to `end` packed in blocks of kDepth; null: not shared.
+template <class T>
+struct Packed {
+  const T *a, *b;
+  int64_t begin, end;
+};
+
+template <class T>
+void tile(const Product<T>& p, const Packed<T>& packed, int64_t i0, int64_t i1, int64_t j0,
+          int64_t j1) {
+  static constexpr auto kernels = register_tiles<T>(std::make_integer_sequence<int, kRows>());
+  constexpr int cols = Simd<T>::cols;
+  const int64_t m = round_up(p.m, kRows), n = round_up(p.n, cols);
+  const int64_t thin_end = p.thin() ? j0 + (j1 - j0) / cols * cols : j0;
+  alignas(64) T own_b[kDepth * cols];
+  thin_tiles(p, j0, thin_end);
+  if (thin_end == j1) return;
+  const Workspace<T> own_a(packed.a ? 0 : round_up(i1 - i0, kRows) * std::min(kDepth, p.k));
+  for (int64_t l0 = packed.begin; l0 < packed.end; l0 += kDepth) {
+    const int64_t l = std::min(kDepth, packed.end - l0), before = l0 - packed.begin;
+    const auto at = [&](int64_t i, int64_t j) { return Place{i, j, l0 == 0, l0 + l == p.k}; };
+    const T* a = packed.a ? packed.a + before * m + i0 * l : own_a.data();
+    if (!packed.a) pack_rows(p.a.from(i0, l0), i1 - i0, l, own_a.data());
+    for (int64_t j = thin_end; j < j1; j += cols) {
+      const T* b = packed.b ? packed.b + before * n + j * l : own_b;
+      if (!packed.b) pack_b(p.b.from(l0, j), l, std::min<int64_t>(cols, j1 - j), own_b);
+      for (int64_t i = i0; i < i1; i += kRows) {
+        const int64_t rows = std::min<int64_t>(kRows, i1 - i);
+        kernels[static_cast<size_t>(rows - 1)](p, at(i, j), l, a + (i - i0) * l, b);
+      }
+    }
+  }
+}
+
+/// Packs what is shared: pack(l0, l, from, to) for panels of every block of the stretch.
+template <class F>
+void pack_shared(int64_t begin, int64_t end, int64_t count, int64_t panel, const F& pack) {
+  const int64_t blocks = (end - begin + kDepth - 1) / kDepth;
+  const int64_t piece = round_up(std::max<int64_t>(1, kGrain * 4 / kDepth), panel);
+  const int64_t pieces = (count + piece - 1) / piece;
+  parallel_for(blocks * pieces, 1, [&](int64_t from, int64_t to) {
+    for (int64_t t = from; t < to; ++t) {
+      const int64_t l0 = begin + t / pieces * kDepth, at = t % pieces * piece;
+      pack(l0, std::min(kDepth, end - l0), at, std::min(count, at + piece));
+    }
+  });
+}
+
+/// One product, or one of a batch of equal shape that threads share among them.
+template <class T>
+void multiply_tiles(const Product<T>& p, const Cut& cut, const Packed<T>& packed, int64_t from,
+                    int64_t to) {
+  const int64_t col_tiles = (p.n + cut.cols - 1) / cut.cols;
+  for (int64_t t = from; t < to; ++t) {
+    const int64_t i = t / col_tiles * cut.rows, j = t % col_tiles * cut.cols;
+    tile(p, packed, i, std::min(p.m, i + cut.rows), j, std::min(p.n, j + cut.cols));
+  }
+}
+
+int64_t tiles_of(int64_t m, int64_t n, const Cut& cut) {
+  return (m + cut.rows - 1) / cut.rows * ((n + cut.cols - 1) / cut.cols);
 }
 
 template <class T>
-void tile(const Product<T>& p, int64_t i0, int64_t i1, int64_t j0, int64_t j1) {
+void single(const Product<T>& p, const Cut& cut) {
   constexpr int cols = Simd<T>::cols;
-  const int64_t depth = std::min(kDepth, p.k);
-  const int64_t row_panels = (i1 - i0 + kRows - 1) / kRows,
-                col_panels = (j1 - j0 + cols - 1) / cols;
-  T* pa = workspace<T>(0, row_panels * kRows * depth);
-  T* pb = workspace<T>(1, col_panels * cols * depth);
-  T result[kRows * Simd<T>::cols];
-  for (int64_t l0 = 0; l0 < p.k; l0 += kDepth) {
-    const int64_t l = std::min(kDepth, p.k - l0);
-    pack_a<T>({&p.a.at(i0, l0), p.a.row, p.a.col}, i1 - i0, l, pa);
-    pack_b<T>({&p.b.at(l0, j0), p.b.row, p.b.col}, l, j1 - j0, pb);
-    for (int64_t jp = 0; jp < col_panels; ++jp) {
-      for (int64_t ip = 0; ip < row_panels; ++ip) {
-        multiply<T>(l, pa + ip * kRows * l, pb + jp * cols * l, result);
-        store(p, result, i0 + ip * kRows, j0 + jp * cols, l0 == 0, l0 + l == p.k);
-      }
-    }
+  const int64_t m = round_up(p.m, kRows), n = round_up(p.n, cols);
+  const Workspace<T> a(cut.share_a ? m * cut.depth : 0), b(cut.share_b ? n * cut.depth : 0);
+  for (int64_t begin = 0; begin < p.k; begin += cut.depth) {
+    const int64_t end = std::min(p.k, begin + cut.depth);
+    if (cut.share_a)
+      pack_shared(begin, end, p.m, kRows, [&](int64_t l0, int64_t l, int64_t i0, int64_t i1) {
+        pack_rows(p.a.from(i0, l0), i1 - i0, l, a.data() + (l0 - begin) * m + i0 * l);
+      });
+    if (cut.share_b)
+      pack_shared(begin, end, p.n, cols, [&](int64_t l0, int64_t l, int64_t j0, int64_t j1) {
+        pack_b(p.b.from(l0, j0), l, j1 - j0, b.data() + (l0 - begin) * n + j0 * l);
+      });
+    const Packed<T> packed{cut.share_a ? a.data() : nullptr, cut.share_b ? b.data() : nullptr,
+                           begin, end};
+    parallel_for(tiles_of(p.m, p.n, cut), 1,
+                 [&](int64_t from, int64_t to) { multiply_tiles(p, cut, packed, from, to); });
   }
 }
 
@@ -90,23 +254,8 @@ void empty_sum(const Product<T>& p) {
   for (int64_t i = 0; i < p.m; ++i)
     for (int64_t j = 0; j < p.n; ++j) {
       T& c = p.out[i * p.n + j];
-      c = (p.accumulate ? c : T(0)) + (p.bias ? p.bias[j] : T(0));
-      if (p.activation == Activation::relu && c <= T(0)) c = 0;
+      c = finish(p, Place{i, j, true, true}, T(0), c, p.bias ? p.bias[j] : T(0));
     }
-}
-
-/// Tile sizes follow from the shape alone; small products are cut finer to have pieces to share.
-int64_t tile_rows(int64_t m, int64_t n) {
-  int64_t rows = kTileRows;
-  const int64_t col_tiles = (n + kTileCols - 1) / kTileCols;
-  while (rows > 4 * kRows && (m + rows - 1) / rows * col_tiles < 8) rows /= 2;
-  return std::max<int64_t>(kRows, rows / kRows * kRows);
-}
-
-int64_t tile_cols(int64_t m, int64_t n) {
-  int64_t cols = kTileCols;
-  while (cols > 128 && m < 2 * kTileRows && (n + cols - 1) / cols < 8) cols /= 2;
-  return cols;
 }
 
 template <class T>
@@ -116,33 +265,31 @@ void run(const MatmulArgs& args) {
   const int64_t k = args.a.size(args.transpose_a ? ra - 2 : ra - 1);
   const int64_t batch = args.out.shape().product(0, ro - 2);
   const int64_t step_a = ra > 2 ? m * k : 0, step_b = rb > 2 ? n * k : 0;
-  const int64_t tr = tile_rows(m, n), tc = tile_cols(m, n);
-  const int64_t row_tiles = (m + tr - 1) / tr, col_tiles = (n + tc - 1) / tc;
-  const int64_t tiles = row_tiles * col_tiles;
   if (m == 0 || n == 0 || batch == 0) return;
-  const T* a = args.a.data<T>();
-  const T* b = args.b.data<T>();
-  T* out = args.out.data<T>();
-  const int64_t work = 2 * std::min(tr, m) * std::min(tc, n) * std::max<int64_t>(k, 1);
-  const int64_t grain = std::max<int64_t>(1, (1 << 18) / work);
-  parallel_for(batch * tiles, grain, [&](int64_t from, int64_t to) HWY_ATTR {
-    for (int64_t t = from; t < to; ++t) {
-      const int64_t bi = t / tiles, ti = t % tiles / col_tiles, tj = t % col_tiles;
-      const Product<T> p{{a + bi * step_a, args.transpose_a ? 1 : k, args.transpose_a ? m : 1},
-                         {b + bi * step_b, args.transpose_b ? 1 : n, args.transpose_b ? k : 1},
-                         out + bi * m * n,
-                         m,
-                         n,
-                         k,
-                         args.bias ? args.bias->data<T>() : nullptr,
-                         args.activation,
-                         args.accumulate};
-      if (k == 0) {
-        if (ti == 0 && tj == 0) empty_sum(p);
-        continue;
-      }
-      tile(p, ti * tr, std::min(m, (ti + 1) * tr), tj * tc, std::min(n, (tj + 1) * tc));
-    }
+  const auto product = [&](int64_t i) {
+    return Product<T>{
+        {args.a.data<T>() + i * step_a, args.transpose_a ? 1 : k, args.transpose_a ? m : 1},
+        {args.b.data<T>() + i * step_b, args.transpose_b ? 1 : n, args.transpose_b ? k : 1},
+        args.out.data<T>() + i * m * n,
+        m,
+        n,
+        k,
+        args.bias ? args.bias->data<T>() : nullptr,
+        args.activation,
+        args.accumulate};
+  };
+  if (k == 0) {
+    for (int64_t i = 0; i < batch; ++i) empty_sum(product(i));
+    return;
+  }
+  const Cut cut = Cut::of(product(0), batch);
+  if (batch == 1) return single(product(0), cut);
+  const int64_t tiles = tiles_of(m, n, cut);
+  const int64_t grain = std::max<int64_t>(1, kSmallest * 32 / (cut.rows * cut.cols * k));
+  parallel_for(batch * tiles, grain, [&](int64_t from, int64_t to) {
+    for (int64_t t = from; t < to; ++t)
+      multiply_tiles(product(t / tiles), cut, Packed<T>{nullptr, nullptr, 0, k}, t % tiles,
+                     t % tiles + 1);
   });
 }
 

@@ -7,6 +7,7 @@
 #define RESTAGE_CPU_PACKED_PRODUCT_INL_H
 #endif
 
+#include "autograd/cpu/buffer.h"
 #include "autograd/cpu/gemm_tile-inl.h"
 #include "autograd/kernels/stats.h"
 
@@ -14,16 +15,6 @@ HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
 
 inline int64_t whole_panels(int64_t n, int64_t panel) { return (n + panel - 1) / panel * panel; }
-
-/// Memory that grows and stays.
-template <class T>
-struct Buffer {
-  std::vector<T> memory;
-  T* at_least(int64_t count) {
-    if (static_cast<int64_t>(memory.size()) < count) memory.resize(static_cast<size_t>(count));
-    return memory.data();
-  }
-};
 
 /// Rows [m, k] for the left side of product(): blocks of kDepth, in them panels of rows.
 template <class T>
@@ -65,32 +56,46 @@ const T* pack_rows_right(const std::vector<const T*>& rows, int64_t n, Buffer<T>
   return out;
 }
 
+/// One register tile of product(): from registers to out if it is whole.
+template <class T>
+HWY_INLINE void product_tile(int64_t rows, int64_t columns, int64_t k, const T* left,
+                             const T* right, T* out, int64_t ld, bool add) {
+  using V = typename Simd<T>::Vector;
+  constexpr int cols = Simd<T>::cols;
+  Sums<T, kRows> acc = {};
+  sum<T, kRows, kRows>(k, left, right, acc);
+  if (rows == kRows && columns == cols) {
+#pragma GCC unroll 12
+    for (int i = 0; i < kRows; ++i) {
+#pragma GCC unroll 2
+      for (int v = 0; v < kVectors; ++v) {
+        V* to = reinterpret_cast<V*>(out + i * ld + v * Simd<T>::width);
+        *to = add ? *to + acc[i][v] : acc[i][v];
+      }
+    }
+    return;
+  }
+  alignas(kVectorBytes) T tile[kRows * cols];
+  std::copy_n(&acc[0][0][0], kRows * cols, tile);
+  for (int64_t i = 0; i < rows; ++i)
+    for (int64_t j = 0; j < columns; ++j)
+      out[i * ld + j] = add ? out[i * ld + j] + tile[i * cols + j] : tile[i * cols + j];
+}
+
 /// out [m, n] (rows `ld` apart) = left right, or += if add.
 template <class T>
 void product(int64_t m, int64_t n, int64_t k, const T* left, const T* right, T* out, int64_t ld,
              bool add = false) {
   constexpr int cols = Simd<T>::cols;
   const int64_t rows = whole_panels(m, kRows), width = whole_panels(n, cols);
-  T tile[kRows * cols];
   count_flops(2.0 * static_cast<double>(m * n * k));
   for (int64_t l0 = 0; l0 < k; l0 += kDepth) {
     const int64_t l = std::min(kDepth, k - l0);
-    const bool sum = add || l0 > 0;
-    for (int64_t j0 = 0; j0 < n; j0 += cols) {
-      const int64_t w = std::min<int64_t>(cols, n - j0);
-      for (int64_t i0 = 0; i0 < m; i0 += kRows) {
-        multiply<T>(l, left + rows * l0 + i0 * l, right + width * l0 + j0 * l, tile);
-        for (int64_t i = 0; i < std::min<int64_t>(kRows, m - i0); ++i) {
-          T* c = out + (i0 + i) * ld + j0;
-          const T* t = tile + i * cols;
-          if (sum) {
-            for (int64_t j = 0; j < w; ++j) c[j] += t[j];
-          } else {
-            for (int64_t j = 0; j < w; ++j) c[j] = t[j];
-          }
-        }
-      }
-    }
+    for (int64_t j = 0; j < n; j += cols)
+      for (int64_t i = 0; i < m; i += kRows)
+        product_tile<T>(std::min<int64_t>(kRows, m - i), std::min<int64_t>(cols, n - j), l,
+                        left + rows * l0 + i * l, right + width * l0 + j * l, out + i * ld + j, ld,
+                        add || l0 > 0);
   }
 }
 

@@ -1,86 +1,137 @@
-// GRU layers. The rows of a batch never meet, so each thread takes some rows through all steps: no
-// waiting between steps, and the recurrent weights are packed once for the whole sequence.
+// GRU layers. Threads share the hidden units: each takes some through a step for all rows of the
+// batch, so a weight is fetched once a step whatever the batch, and waits for the others before the
+// next. States go from step to step in the layout that products read.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "autograd/cpu/rnn.cpp"
 #include <hwy/foreach_target.h>  // once per instruction set
+
+#include <algorithm>
 
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/gemm_tile-inl.h"
 #include "autograd/cpu/kernels.h"
 #include "autograd/cpu/math-inl.h"
 #include "autograd/cpu/targets.h"
-#include "autograd/kernels/scratch.h"
+#include "autograd/cpu/workspace.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
 namespace {
 
-/// Rows per piece: a function of the batch alone. Fewer rows than the register tile has cost no
-/// more than a full tile, so small batches are still cut in two.
-int piece_rows(int64_t n) {
-  if (n <= 8) return 4;
-  return kRows > 8 && n <= 16 ? 8 : kRows;
+constexpr int64_t kPiece = 1 << 15;  // recurrent weights that a piece of a step has at least
+
+int64_t round_up(int64_t n, int64_t step) { return (n + step - 1) / step * step; }
+
+/// Calls body(first, count) for blocks of up to `cols` hidden units, on all threads.
+template <class T, class F>
+void for_units(int64_t h, const F& body) {
+  constexpr int64_t cols = Simd<T>::cols;
+  const int64_t grain = std::max<int64_t>(1, kPiece / (3 * h * cols));
+  parallel_for((h + cols - 1) / cols, grain, [&](int64_t from, int64_t to) {
+    for (int64_t b = from; b < to; ++b) body(b * cols, std::min(cols, h - b * cols));
+  });
 }
 
-/// [rows, k] times packed columns -> [rows, n], rows <= Rows.
-template <class T, int Rows>
-void rows_times(const T* x, int64_t rows, int64_t k, const Scratch<T>& packed, int64_t n,
-                Scratch<T>& panel, T* out) {
-  constexpr int cols = Simd<T>::cols;
-  for (int64_t l = 0; l < k; ++l)
-    for (int64_t i = 0; i < Rows; ++i)
-      panel[static_cast<size_t>(l * Rows + i)] = i < rows ? x[i * k + l] : T(0);
-  T tile[Rows * cols];
-  for (int64_t j0 = 0; j0 < n; j0 += cols) {
-    multiply<T, Rows>(k, panel.data(), packed.data() + j0 * k, tile);
-    const int64_t width = std::min<int64_t>(cols, n - j0);
-    for (int64_t i = 0; i < rows; ++i) std::copy_n(tile + i * cols, width, out + i * n + j0);
+/// Rows per panel: all panels of a batch about equally tall.
+int64_t panel_rows(int64_t n) {
+  const int64_t panels = (n + kRows - 1) / kRows;
+  return n == 0 ? 1 : (n + panels - 1) / panels;
+}
+
+/// All rows of a batch, [n, k], in panels of `tall` rows, k-major, kRows apart.
+template <class T>
+struct Panels {
+  Panels(int64_t n, int64_t columns)
+      : rows(n),
+        k(columns),
+        tall(panel_rows(n)),
+        data(round_up(n, tall) / tall * kRows * columns) {}
+  T* at(int64_t row, int64_t column) const {
+    return data.data() + row / tall * kRows * k + column * kRows;
   }
+  /// Takes columns from `column` on of all rows.
+  void put(const T* from, int64_t stride, int64_t column, int64_t width) {
+    for (int64_t row = 0; row < rows; row += tall) {
+      const T* in = from + row * stride;
+      T* to = at(row, column);
+      const int64_t count = std::min(tall, rows - row);
+      if (count == kRows) {
+        transpose<kRows>(in, stride, width, to, kRows);
+        continue;
+      }
+      for (int64_t i = 0; i < count; ++i)
+        for (int64_t j = 0; j < width; ++j) to[j * kRows + i] = in[i * stride + j];
+    }
+  }
+  /// out [rows, cols] = all rows times packed columns, summed as matmul() sums.
+  void times(const T* columns, T* out) const {
+    constexpr int cols = Simd<T>::cols;
+    for (int64_t l0 = 0; l0 < k; l0 += kDepth) {
+      const int64_t l = std::min(kDepth, k - l0);
+      for (int64_t row = 0; row < rows; row += tall) {
+        const int64_t count = std::min(tall, rows - row);
+        const T *a = at(row, l0), *b = columns + l0 * cols;
+        T* to = out + row * cols;
+        if (l0 == 0) {
+          multiply_rows<T, false>(count, l, a, b, to);
+        } else {
+          multiply_rows<T, true>(count, l, a, b, to);
+        }
+      }
+    }
+  }
+  int64_t rows, k, tall;
+  Workspace<T> data;
+};
+
+/// One vector of hidden units of one row. in: gi (r, z, n), gh (r, z, n), bias (r, z, n), old
+/// state; out: r, z, n, W_hn h + b_hn, new state.
+template <class T>
+HWY_INLINE void cell_vector(const T* const* in, T* const* out, int64_t j) {
+  const hn::ScalableTag<T> d;
+  const auto load = [&](int i) HWY_ATTR { return hn::LoadU(d, in[i] + j); };
+  const auto gate = [&](int g) HWY_ATTR {
+    return sigmoid(hn::Add(hn::Add(load(g), load(3 + g)), load(6 + g)));
+  };
+  const auto r = gate(0), z = gate(1);
+  const auto kept = hn::Add(load(5), load(8));
+  const auto n = tanh(hn::MulAdd(r, kept, load(2)));
+  const auto state = hn::MulAdd(hn::Sub(hn::Set(d, T(1)), z), n, hn::Mul(z, load(9)));
+  hn::StoreU(r, d, out[0] + j);
+  hn::StoreU(z, d, out[1] + j);
+  hn::StoreU(n, d, out[2] + j);
+  hn::StoreU(kept, d, out[3] + j);
+  hn::StoreU(state, d, out[4] + j);
 }
 
+/// `count` hidden units of one row; the last ones go through a padded vector.
 template <class T>
-void rows_times(int piece, const T* x, int64_t rows, int64_t k, const Scratch<T>& packed, int64_t n,
-                Scratch<T>& panel, T* out) {
-  if (piece == 4) return rows_times<T, 4>(x, rows, k, packed, n, panel, out);
-  if (piece == 8) return rows_times<T, 8>(x, rows, k, packed, n, panel, out);
-  rows_times<T, kRows>(x, rows, k, packed, n, panel, out);
+void cell(const T* const* in, T* const* out, int64_t count) {
+  const hn::ScalableTag<T> d;
+  const auto lanes = static_cast<int64_t>(hn::Lanes(d));
+  int64_t j = 0;
+  for (; j + lanes <= count; j += lanes) cell_vector(in, out, j);
+  if (j == count) return;
+  T padded[15][HWY_MAX_BYTES / sizeof(T)] = {};
+  const T* from[10];
+  T* to[5];
+  for (int i = 0; i < 10; ++i) from[i] = std::copy_n(in[i] + j, count - j, padded[i]) - (count - j);
+  for (int i = 0; i < 5; ++i) to[i] = padded[10 + i];
+  cell_vector(from, to, 0);
+  for (int i = 0; i < 5; ++i) std::copy_n(to[i], count - j, out[i] + j);
 }
 
-/// A matrix [k, n] (by strides) in the layout of multiply().
+/// Gradients at one row's hidden units. gates and g_gi, g_gh are h apart per gate; g: gradient of
+/// the new state; `direct` gets the part that goes straight to the old one.
 template <class T>
-Scratch<T> packed(const Strided<T>& m, int64_t k, int64_t n) {
-  constexpr int cols = Simd<T>::cols;
-  Scratch<T> out(static_cast<size_t>((n + cols - 1) / cols * cols * k));
-  pack_b(m, k, n, out.data());
-  return out;
-}
-
-template <class T>
-void cell(const T* gi, const T* gh, const T* bias, const T* previous, int64_t h, T* gates, T* out) {
-  T *r = gates, *z = gates + h, *n = gates + 2 * h, *kept = gates + 3 * h;
-  const auto gate = [](auto i, auto hidden, auto b)
-                        HWY_ATTR { return sigmoid(hn::Add(hn::Add(i, hidden), b)); };
-  map(h, r, gate, gi, gh, bias);
-  map(h, z, gate, gi + h, gh + h, bias + h);
-  map(
-      h, kept, [](auto a, auto b) HWY_ATTR { return hn::Add(a, b); }, gh + 2 * h, bias + 2 * h);
-  map(
-      h, n, [](auto i, auto reset, auto k) HWY_ATTR { return tanh(hn::MulAdd(reset, k, i)); },
-      gi + 2 * h, r, kept);
-  for (int64_t i = 0; i < h; ++i) out[i] = (T(1) - z[i]) * n[i] + z[i] * previous[i];
-}
-
-/// g: gradient of the new state; on return `direct` holds the part that goes straight to the old
-/// one.
-template <class T>
-void cell_grad(const T* gates, const T* previous, const T* g_out, int64_t h, T* gi, T* gh,
-               T* direct) {
-  for (int64_t i = 0; i < h; ++i) {
-    const T r = gates[i], z = gates[h + i], n = gates[2 * h + i], hn = gates[3 * h + i];
+void cell_grad(const T* gates, const T* previous, const T* g_out, int64_t h, int64_t count, T* gi,
+               T* gh, T* direct) {
+  for (int64_t i = 0; i < count; ++i) {
+    const T r = gates[i], z = gates[h + i], n = gates[2 * h + i], kept = gates[3 * h + i];
     const T g = g_out[i];
     const T in = g * (T(1) - z) * (T(1) - n * n);
     const T iz = g * (previous[i] - n) * z * (T(1) - z);
-    const T ir = in * hn * r * (T(1) - r);
+    const T ir = in * kept * r * (T(1) - r);
     gi[i] = gh[i] = ir;
     gi[h + i] = gh[h + i] = iz;
     gi[2 * h + i] = in;
@@ -90,59 +141,147 @@ void cell_grad(const T* gates, const T* previous, const T* g_out, int64_t h, T* 
 }
 
 template <class T>
-void forward(const GruArgs& args) {
-  const int64_t steps = args.gi.size(0), n = args.gi.size(1), h = args.h0.size(1);
-  const Scratch<T> w = packed<T>({args.w_hh.data<T>(), 1, h}, h, 3 * h);
-  const int piece = piece_rows(n);
-  parallel_for(n, piece, [&](int64_t from, int64_t to) HWY_ATTR {
-    const int64_t rows = to - from;
-    Scratch<T> panel(static_cast<size_t>(h * piece)), gh(static_cast<size_t>(rows * 3 * h));
-    const T* previous = args.h0.data<T>() + from * h;
-    for (int64_t t = 0; t < steps; ++t) {
-      rows_times(piece, previous, rows, h, w, 3 * h, panel, gh.data());
-      T* out = args.out.data<T>() + (t * n + from) * h;
-      for (int64_t i = 0; i < rows; ++i)
-        cell(args.gi.data<T>() + (t * n + from + i) * 3 * h, gh.data() + i * 3 * h,
-             args.b_hh.data<T>(), previous + i * h, h,
-             args.gates.data<T>() + (t * n + from + i) * 4 * h, out + i * h);
-      previous = out;
+struct Forward {
+  static constexpr int cols = Simd<T>::cols;
+  explicit Forward(const GruArgs& args)
+      : steps(args.gi.size(0)),
+        n(args.gi.size(1)),
+        h(args.h0.size(1)),
+        thin(steps == 1 && n <= kThin && h % cols == 0),
+        gi(args.gi.data<T>()),
+        h0(args.h0.data<T>()),
+        w_hh(args.w_hh.data<T>()),
+        b_hh(args.b_hh.data<T>()),
+        out(args.out.data<T>()),
+        gates(args.gates.data<T>()),
+        packed(thin ? 0 : 3 * round_up(h, cols) * h) {}
+
+  const int64_t steps, n, h;
+  const bool thin;  // a step alone reads the weights as they lie; more are worth packing them once
+  const T *gi, *h0, *w_hh, *b_hh;
+  T *out, *gates;
+  Workspace<T> packed;
+  Panels<T> now{n, h}, next{n, h};
+
+  T* weights(int64_t gate, int64_t unit) const {
+    return packed.data() + (gate * round_up(h, cols) + unit) * h;
+  }
+
+  /// gh [n, cols]: W_h h for some units of a gate.
+  void product(int64_t gate, int64_t j, T* gh) const {
+    if (!thin) return now.times(weights(gate, j), gh);
+    const int64_t row = gate * h + j, ahead = row + 2 * cols <= 3 * h ? cols * h : 0;
+    multiply_thin_rows<T>(n, h, h0, w_hh + row * h, ahead, gh);
+  }
+
+  void step(int64_t t, int64_t j, int64_t width) {
+    const Workspace<T> memory(3 * n * cols);
+    T* gh = memory.data();
+    for (int64_t g = 0; g < 3; ++g) product(g, j, gh + g * n * cols);
+    const T* state = (t > 0 ? out + (t - 1) * n * h : h0) + j;
+    T* to = out + t * n * h + j;
+    const T* bias = b_hh + j;
+    for (int64_t i = 0; i < n; ++i) {
+      const T *x = gi + (t * n + i) * 3 * h + j, *p = gh + i * cols;
+      T* g = gates + (t * n + i) * 4 * h + j;
+      const T* in[] = {
+          x,        x + h,        x + 2 * h,    p, p + n * cols, p + 2 * n * cols, bias,
+          bias + h, bias + 2 * h, state + i * h};
+      T* results[] = {g, g + h, g + 2 * h, g + 3 * h, to + i * h};
+      cell(in, results, width);
     }
-  });
-}
+    if (t + 1 < steps) next.put(to, h, j, width);
+  }
+
+  void run() {
+    if (!thin && steps > 0) {
+      now.put(h0, h, 0, h);
+      for_units<T>(h, [&](int64_t j, int64_t width) {
+        for (int64_t g = 0; g < 3; ++g)
+          pack_b<T>({w_hh + (g * h + j) * h, 1, h}, h, width, weights(g, j));
+      });
+    }
+    for (int64_t t = 0; t < steps; ++t) {
+      for_units<T>(h, [&](int64_t j, int64_t width) { step(t, j, width); });
+      now.data.swap(next.data);
+    }
+  }
+};
 
 template <class T>
-void backward(const GruGradArgs& args) {
-  const int64_t steps = args.gy.size(0), n = args.gy.size(1), h = args.h0.size(1);
-  const Scratch<T> w = packed<T>({args.w_hh.data<T>(), h, 1}, 3 * h, h);
-  const int piece = piece_rows(n);
-  parallel_for(n, piece, [&](int64_t from, int64_t to) HWY_ATTR {
-    const int64_t rows = to - from, count = rows * h;
-    Scratch<T> panel(static_cast<size_t>(3 * h * piece)), carry(static_cast<size_t>(count), T(0));
-    Scratch<T> direct(static_cast<size_t>(count)), through(static_cast<size_t>(count));
-    for (int64_t t = steps - 1; t >= 0; --t) {
-      const int64_t at = t * n + from;
-      const T* gy = args.gy.data<T>() + at * h;
-      for (int64_t i = 0; i < count; ++i) carry[static_cast<size_t>(i)] += gy[i];
-      const T* previous = t > 0 ? args.y.data<T>() + (at - n) * h : args.h0.data<T>() + from * h;
-      for (int64_t i = 0; i < rows; ++i)
-        cell_grad(args.gates.data<T>() + (at + i) * 4 * h, previous + i * h, carry.data() + i * h,
-                  h, args.g_gi.data<T>() + (at + i) * 3 * h, args.g_gh.data<T>() + (at + i) * 3 * h,
-                  direct.data() + i * h);
-      rows_times(piece, args.g_gh.data<T>() + at * 3 * h, rows, 3 * h, w, h, panel, through.data());
-      for (size_t i = 0; i < carry.size(); ++i) carry[i] = direct[i] + through[i];
+struct Backward {
+  static constexpr int cols = Simd<T>::cols;
+  explicit Backward(const GruGradArgs& args)
+      : steps(args.gy.size(0)),
+        n(args.gy.size(1)),
+        h(args.h0.size(1)),
+        gates(args.gates.data<T>()),
+        y(args.y.data<T>()),
+        h0(args.h0.data<T>()),
+        w_hh(args.w_hh.data<T>()),
+        gy(args.gy.data<T>()),
+        g_gi(args.g_gi.data<T>()),
+        g_gh(args.g_gh.data<T>()),
+        out(args.out.data<T>()),
+        packed(round_up(h, cols) * 3 * h) {}
+
+  const int64_t steps, n, h;
+  const T *gates, *y, *h0, *w_hh, *gy;
+  T *g_gi, *g_gh, *out;
+  Workspace<T> packed, direct{n * h};
+  Panels<T> now{n, 3 * h}, next{n, 3 * h};  // g_gh of the step after this and of this one
+
+  /// g [n, cols]: gradient of some units of the state after step t; -1: of h0.
+  void carry(int64_t t, int64_t j, int64_t width, T* g) const {
+    const bool last = t + 1 == steps;
+    if (!last) now.times(packed.data() + j * 3 * h, g);
+    for (int64_t i = 0; i < n; ++i) {
+      T* to = g + i * cols;
+      const T *straight = direct.data() + i * h + j, *from = gy + (t * n + i) * h + j;
+      for (int64_t u = 0; u < width; ++u) {
+        T x = last ? T(0) : straight[u] + to[u];
+        if (t >= 0) x += from[u];
+        to[u] = x;
+      }
     }
-    std::copy_n(carry.data(), count, args.out.data<T>() + from * h);
-  });
-}
+  }
+
+  void step(int64_t t, int64_t j, int64_t width) {
+    const Workspace<T> g(n * cols);
+    carry(t, j, width, g.data());
+    const T* state = (t > 0 ? y + (t - 1) * n * h : h0) + j;
+    for (int64_t i = 0; i < n; ++i) {
+      const int64_t at = t * n + i;
+      if (t < 0) {
+        std::copy_n(g.data() + i * cols, width, out + i * h + j);
+      } else {
+        cell_grad(gates + at * 4 * h + j, state + i * h, g.data() + i * cols, h, width,
+                  g_gi + at * 3 * h + j, g_gh + at * 3 * h + j, direct.data() + i * h + j);
+      }
+    }
+    for (int64_t gate = 0; t >= 0 && gate < 3; ++gate)
+      next.put(g_gh + t * n * 3 * h + gate * h + j, 3 * h, gate * h + j, width);
+  }
+
+  void run() {
+    for_units<T>(h, [&](int64_t j, int64_t width) {
+      pack_b<T>({w_hh + j, h, 1}, 3 * h, width, packed.data() + j * 3 * h);
+    });
+    for (int64_t t = steps - 1; t >= -1; --t) {
+      for_units<T>(h, [&](int64_t j, int64_t width) { step(t, j, width); });
+      now.data.swap(next.data);
+    }
+  }
+};
 
 }  // namespace
 
 void gru(const GruArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { forward<decltype(zero)>(args); });
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { Forward<decltype(zero)>(args).run(); });
 }
 
 void gru_grad(const GruGradArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { backward<decltype(zero)>(args); });
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { Backward<decltype(zero)>(args).run(); });
 }
 
 }  // namespace restage::cpu::HWY_NAMESPACE

@@ -30,6 +30,9 @@ void add_linear_op(Table& t) {
   s.add("with relu", {random({6, 4}, 1), random({5, 4}, 2), random({5}, 3)},
         linear_with(Activation::relu, true));
   s.large("large", {random({301, 67}, 1), random({130, 67}, 2), random({130}, 3)}, plain);
+  for (const int64_t rows : {1, 4})
+    s.large("few rows, weights read as they lie",
+            {random({rows, 578}, 1), random({150, 578}, 2), random({150}, 3)}, plain);
   s.kink("relu at 0 has derivative 0",
          {f64({1, 2}, {1, 2}), f64({2, 2}, {1, 1, 2, -1}), f64({2}, {-3, 1})},
          linear_with(Activation::relu, true),
@@ -81,6 +84,8 @@ void add_matmul(Table& t) {
       s.large("large" + how, factors(-1, -1, 130, 270, 141, ta, tb, rng), matmul_with(ta, tb));
     }
   const Build plain = matmul_with(false, false);
+  s.large("deeper than is packed at a time", factors(-1, -1, 310, 1400, 130, false, false, rng),
+          plain);
   s.error("k differs", {random({2, 3}, 1), random({4, 2}, 2)}, plain);
   s.error("k differs, transposed", {random({2, 3}, 1), random({2, 4}, 2)},
           matmul_with(false, true));

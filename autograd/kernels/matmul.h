@@ -1,5 +1,6 @@
 // Matrix products. Each output element is one chain of multiply-adds over k in order (per block of
-// k), whatever its position, so results do not depend on threads or on the other rows of a batch.
+// 256), whatever its position, so results do not depend on threads or on the other rows of a batch:
+// one row alone, which is computed in another way, has the same bits.
 #pragma once
 
 #include "autograd/kernels/kernel.h"

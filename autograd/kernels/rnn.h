@@ -1,4 +1,5 @@
-// A GRU layer (PyTorch's equations, spec 3.2), gates stacked r, z, n.
+// A GRU layer (PyTorch's equations, spec 3.2), gates stacked r, z, n. Sums are those of matmul.h: a
+// step alone has the bits of the same step of a sequence, a row those of the row in a batch.
 #pragma once
 
 #include "autograd/kernels/kernel.h"

@@ -65,6 +65,36 @@ TEST(FusedOps, GruIsItsReference) {
   }
 }
 
+TEST(FusedOps, GruOfManyRowsAndOfOneFrameIsItsReference) {
+  struct Sizes {
+    int64_t t, n, i, h;
+  };
+  // More rows than a panel and more units than a block; then weights that are read as they lie.
+  for (const auto& [t, n, i, h] : {Sizes{3, 14, 5, 40}, Sizes{1, 1, 69, 64}, Sizes{1, 4, 20, 320}})
+    expect_fused(
+        {random({t, n, i}, 1), random({n, h}, 2), random({3 * h, i}, 3), random({3 * h, h}, 4),
+         random({3 * h}, 5), random({3 * h}, 6)},
+        [](Args x) { return gru(x[0], x[1], x[2], x[3], x[4], x[5]); },
+        [](Args x) { return gru_reference(x[0], x[1], x[2], x[3], x[4], x[5]); });
+}
+
+TEST(FusedOps, AFrameOfAGruAloneHasTheBitsOfTheSequence) {
+  const int64_t t = 4, n = 3, h = 320;
+  const Tensor x = random({t, n, 9}, 1).cast(DType::f32),
+               w_ih = random({3 * h, 9}, 2).cast(DType::f32),
+               w_hh = random({3 * h, h}, 3).cast(DType::f32),
+               b_ih = random({3 * h}, 4).cast(DType::f32),
+               b_hh = random({3 * h}, 5).cast(DType::f32);
+  const Tensor h0 = random({n, h}, 6).cast(DType::f32);
+  const Tensor all = gru(Var(x), Var(h0), Var(w_ih), Var(w_hh), Var(b_ih), Var(b_hh)).value;
+  Var state(h0);
+  for (int64_t i = 0; i < t; ++i) {
+    const Var y = gru(Var(x.rows(i, i + 1)), state, Var(w_ih), Var(w_hh), Var(b_ih), Var(b_hh));
+    EXPECT_TRUE(same_bits(y.value, all.rows(i, i + 1))) << i;
+    state = reshape(y, {n, h});
+  }
+}
+
 TEST(FusedOps, AttentionPoolIsItsReference) {
   for (const int64_t d : {1, 6, 33})
     expect_fused(
@@ -266,12 +296,26 @@ TEST(MatmulValues, AreTheTripleLoopForAllSizesAndTransposes) {
 }
 
 TEST(MatmulValues, ARowDoesNotDependOnTheOthers) {
-  const Tensor a = random({600, 40}, 1).cast(DType::f32), b = random({40, 70}, 2).cast(DType::f32);
-  const Tensor all = matmul(Var(a), Var(b)).value;
-  for (const int64_t row : {0, 5, 311, 599}) {
-    const Tensor one = matmul(Var(a.rows(row, row + 1)), Var(b)).value;
-    EXPECT_TRUE(same_bits(one, all.rows(row, row + 1))) << row;
-  }
+  // Each of these is cut and packed in another way; the widths and depths leave remainders.
+  for (const int64_t k : {5, 40, 69, 578})
+    for (const bool transposed : {false, true}) {
+      const int64_t n = 150;
+      const Tensor a = random({1100, k}, 1).cast(DType::f32);
+      const Tensor b = random(transposed ? Shape{n, k} : Shape{k, n}, 2).cast(DType::f32);
+      const Tensor bias = random({n}, 3).cast(DType::f32);
+      const auto product = [&](int64_t from, int64_t rows) {
+        const Var x(a.rows(from, from + rows));
+        return (transposed ? linear(x, Var(b), Var(bias), Activation::relu) : matmul(x, Var(b)))
+            .value;
+      };
+      const Tensor all = product(0, 1100);
+      for (const int64_t rows : {1, 2, 3, 4, 5, 13, 300, 700})
+        for (const int64_t from : {0, 311, 1100 - static_cast<int>(rows)}) {
+          if (from + rows > 1100) continue;
+          EXPECT_TRUE(same_bits(product(from, rows), all.rows(from, from + rows)))
+              << rows << " rows from " << from << ", k " << k << ", transposed " << transposed;
+        }
+    }
 }
 
 /// Cloud with many equal points and equal distances.
