@@ -9,9 +9,11 @@ namespace nn = torch::nn;
 
 constexpr int64_t kNeighbours = 16;
 
-/// Rows of points [n, v, c] by index [n, ...], as one matrix: [n * ..., c].
+/// Rows of points [n, v, c] by index [n, ...], as one matrix: [n * ..., c]. As an embedding,
+/// because its backward pass is 3 times as fast as that of gather and 10 times that of
+/// index_select.
 Tensor pick_rows(const Tensor& points, const Tensor& flat_index) {
-  return points.flatten(0, 1).index_select(0, flat_index);
+  return torch::embedding(points.flatten(0, 1), flat_index);
 }
 
 /// Index [n, ...] into the points of each cloud -> index into the rows of all clouds, [n * ...].
@@ -81,7 +83,7 @@ struct SetAbstraction : nn::Module {
               ->as<nn::BatchNorm2d>()
               ->forward(mlp_convs[i]->as<nn::Conv2d>()->forward(g))
               .relu_();
-    return {centres, g.amax(2).transpose(1, 2)};
+    return {centres, std::get<0>(g.max(2)).transpose(1, 2)};
   }
   int64_t m_;
   nn::ModuleList mlp_convs, mlp_bns;
@@ -147,7 +149,7 @@ struct SpatialTransformer : nn::Module {
   Tensor forward(const Tensor& x) {
     Tensor h = bn1(conv1(x)).relu_();
     h = bn2(conv2(h)).relu_();
-    h = bn3(conv3(h)).relu_().amax(2);
+    h = std::get<0>(bn3(conv3(h)).relu_().max(2));
     h = bn4(fc1(h)).relu_();
     h = bn5(fc2(h)).relu_();
     return fc3(h).reshape({-1, 3, 3}) + torch::eye(3);
@@ -176,7 +178,7 @@ struct PointNet : Extractor {
     Tensor x = clouds.matmul(stn->forward(clouds.transpose(1, 2))).transpose(1, 2);
     x = bn1(conv1(x)).relu_();
     x = bn2(conv2(x)).relu_();
-    x = bn3(conv3(x)).relu_().amax(2);
+    x = std::get<0>(bn3(conv3(x)).relu_().max(2));
     x = bn4(fc1(x)).relu_();
     x = bn5(drop(fc2(x))).relu_();
     return fc3(x).reshape({-1, kJoints, 3});

@@ -94,7 +94,7 @@ Tensor skin(const Tensor& points, const Tensor& weights, const Posed& posed, con
   const Tensor transforms = torch::cat({posed.rotations.flatten(-2), shift}, -1);  // [n, 22, 12]
   const Tensor blended = weights.matmul(transforms);                               // [n, v, 12]
   const Tensor rotation = blended.slice(-1, 0, 9).unflatten(-1, {3, 3});
-  return (rotation * points.unsqueeze(-2)).sum(-1) + blended.slice(-1, 9, 12);
+  return rotation.matmul(points.unsqueeze(-1)).squeeze(-1) + blended.slice(-1, 9, 12);
 }
 
 }  // namespace bench
