@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "inputs.h"
+#include "bench/inputs.h"
 
 namespace restage::bench {
 
@@ -28,17 +28,18 @@ std::vector<double> summary(const Tensor& x);
 
 struct ItemInfo {
   std::string name;
-  std::string group;  ///< "training", "online" or "kernel"
-  std::string what;   ///< for tables
-  std::string per;    ///< what one of `examples` is
-  int examples = 1;   ///< per repetition
+  std::string what;  ///< for tables
+  std::string per;   ///< what one of `examples` is
+  int examples = 1;  ///< per repetition
   double gflop =
       0;  ///< of one example by the plain algorithm (docs/performance.md); 0: not counted
-  /// Models whose weights may change its speed: the item exists for every variant that has one of
-  /// them.
+  /// Models whose weights may change its speed: the item also exists with trained weights if there
+  /// are any of one of them.
   std::vector<std::string> models;
   /// `dropout` false: none, for check().
   std::unique_ptr<Item> (*make)(const Inputs& inputs, const std::string& variant, bool dropout);
+  /// What it is called with the weights it starts with.
+  std::string variant = "initial";
 };
 
 /// All items, in the order of the tables.

@@ -4,11 +4,11 @@
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/linear.h"
 #include "autograd/ops/reduce.h"
-#include "items.h"
+#include "bench/items.h"
+#include "bench/work.h"
 #include "nn/layers/gru.h"
 #include "nn/layers/vector_attention.h"
 #include "train/stage.h"
-#include "work.h"
 
 namespace restage::bench {
 namespace {
@@ -106,7 +106,6 @@ std::vector<ItemInfo> kernel_items() {
   const double wide = gflop_of(pairs * width * width);
   const double attention = attention_gflop(1024, 32), gru = 16 * 30 * gru_gflop(578, 512, 2);
   return {{"sgemm_pairs",
-           "kernel",
            "[16384 x 512] [512 x 512]",
            "product",
            1,
@@ -114,7 +113,6 @@ std::vector<ItemInfo> kernel_items() {
            {},
            Product<16384, 512, 512>::make},
           {"sgemm_gradient",
-           "kernel",
            "[16384 x 512]^T [16384 x 512]",
            "product",
            1,
@@ -122,7 +120,6 @@ std::vector<ItemInfo> kernel_items() {
            {},
            Product<512, 16384, 512, true>::make},
           {"sgemm_square",
-           "kernel",
            "[1024 x 1024] [1024 x 1024]",
            "product",
            1,
@@ -130,7 +127,6 @@ std::vector<ItemInfo> kernel_items() {
            {},
            Product<1024, 1024, 1024>::make},
           {"attention",
-           "kernel",
            "first attention block, forward",
            "cloud",
            1,
@@ -138,7 +134,6 @@ std::vector<ItemInfo> kernel_items() {
            {"skeleton"},
            Attention<false>::make},
           {"attention_train",
-           "kernel",
            "first attention block, forward and backward",
            "cloud",
            1,
@@ -146,7 +141,6 @@ std::vector<ItemInfo> kernel_items() {
            {"skeleton"},
            Attention<true>::make},
           {"gru_train",
-           "kernel",
            "SMRM's decoder GRU, batch 16, forward and backward",
            "step",
            1,

@@ -9,6 +9,7 @@ import glob
 import json
 import math
 import os
+import pathlib
 import statistics
 import subprocess
 import sys
@@ -20,7 +21,7 @@ TUNABLES = ("glibc.malloc.mmap_max=0:glibc.malloc.trim_threshold=100000000000:"
             "glibc.malloc.top_pad=268435456:glibc.malloc.hugetlb=1")
 RATIOS = ("skeleton_train", "skeleton_online", "smrm_train_b16", "smrm_train_b64", "smrm_online",
           "deformation_train", "deformation_online", "pointnet_train", "frame_online")
-LEAST_ROUNDS, MOST_ROUNDS = 5, 9
+LEAST_ROUNDS, WANTED_ROUNDS, MOST_ROUNDS = 3, 5, 9
 REQUEST_SECONDS = 0.6  # short repetitions are bundled: the system counts processor time in 10 ms
 FOREIGN_LIMIT = 0.05   # cores used by others during a request that counts as undisturbed
 TICK = 1 / os.sysconf("SC_CLK_TCK")
@@ -159,12 +160,14 @@ class Side:
         self.ours = isinstance(side, str)
         self.process = programs.start(side)
         self.request = f"run {item['name']} {side if self.ours else 'initial'}"
-        begin = time.monotonic()
-        self.process.ask(f"{self.request} 1")  # also builds the item and does one repetition untimed
         self.times, self.foreign, self.extra = [], [], {}
         begin = time.monotonic()
-        self.process.ask(f"{self.request} 1")
-        self.seconds = time.monotonic() - begin  # of one repetition, with what is not timed in it
+        self.process.ask(f"{self.request} 0")  # builds the item and warms up
+        self.seconds = time.monotonic() - begin
+        if self.seconds < 2 * REQUEST_SECONDS:
+            begin = time.monotonic()
+            self.process.ask(f"{self.request} 1")
+            self.seconds = time.monotonic() - begin  # of one repetition, with what is not timed in it
         self.repeats = 1
 
     def measure(self, quiet):
@@ -190,15 +193,15 @@ def finish_round(sides):
 
 def measure_item(programs, item, quiet, seconds, quick):
     """Rounds in which every side has its turn, until the time is over."""
+    begin = time.monotonic()
     all_sides = [Side(programs, item, s) for s in item["variants"] + programs.settings()
                  if isinstance(s, str) or item["compared"]]
-    sides, begin = all_sides, time.monotonic()
+    sides = all_sides
     for side in sides:
         side.repeats = 1 if quick else min(200, max(1, math.ceil(REQUEST_SECONDS / side.seconds)))
     for number in range(1 if quick else MOST_ROUNDS):
-        if number >= LEAST_ROUNDS and time.monotonic() - begin > seconds:
-            break
-        if number >= 3 and time.monotonic() - begin > 2 * seconds:
+        used = time.monotonic() - begin
+        if number >= WANTED_ROUNDS and used > seconds or number >= LEAST_ROUNDS and used > 1.5 * seconds:
             break
         for side in sides[number % len(sides):] + sides[:number % len(sides)]:
             side.measure(quiet)
@@ -230,8 +233,8 @@ def ratios(result):
 
 
 def least(item, kind):
-    """Of initial and trained weights; a forced setting such as "dense" stands beside them."""
-    found = [r[kind] for variant, r in item.get("ratios", {}).items() if variant in ("initial", "trained")]
+    """Of initial and trained weights; the forced-dense row stands beside them."""
+    found = [r[kind] for variant, r in item.get("ratios", {}).items() if variant != "dense"]
     return min(found) if found else None
 
 
@@ -259,8 +262,8 @@ def machine():
     with open("/proc/meminfo") as f:
         memory = int(f.readline().split()[1]) / 1024 ** 2
     caches = {}
-    for folder in sorted(glob.glob("/sys/devices/system/cpu/cpu0/cache/index*")):
-        level, kind, size = (open(f"{folder}/{x}").read().strip() for x in ("level", "type", "size"))
+    for folder in sorted(pathlib.Path("/sys/devices/system/cpu/cpu0/cache").glob("index*")):
+        level, kind, size = ((folder / name).read_text().strip() for name in ("level", "type", "size"))
         if kind != "Instruction":
             caches[f"L{level}"] = size
     return {"processor": info.get("model name", os.uname().machine), "cores": cores(),
@@ -275,7 +278,7 @@ def arguments():
     p.add_argument("--libtorch", help="libtorch_bench (none: no comparison)")
     p.add_argument("--json", help="file for all figures")
     p.add_argument("--items", help="only these, separated by commas")
-    p.add_argument("--minutes", type=float, default=9, help="about how long to measure (default 9)")
+    p.add_argument("--minutes", type=float, default=8, help="about how long to measure (default 8)")
     p.add_argument("--quick", action="store_true", help="every item once: to try the program, not a result")
     return p.parse_args()
 
@@ -300,9 +303,11 @@ def main():
     quiet = Quiet(patience=0 if a.quick else 20)
     # A step of the large extractor takes longer than all others together.
     weight = {i["name"]: 5 if i["name"] == "skeleton_train" else 1 for i in items}
+    end = time.monotonic() + 60 * a.minutes
     for item in items:
+        seconds = max(0.0, end - time.monotonic()) * weight[item["name"]] / sum(weight.values())
+        del weight[item["name"]]
         say(f"{item['name']}: {item['what']}")
-        seconds = 60 * a.minutes * weight[item["name"]] / sum(weight.values())
         item.update(measure_item(programs, item, quiet, seconds, a.quick))
         item["ratios"] = ratios(item)
     out["items"] = items

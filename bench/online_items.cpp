@@ -1,9 +1,9 @@
 // Online frames: each part by itself, and whole frames as `restage retarget` does them.
-#include "flush.h"
+#include "bench/flush.h"
+#include "bench/items.h"
+#include "bench/work.h"
 #include "infer/retargeter.h"
-#include "items.h"
 #include "nn/models/registry.h"
-#include "work.h"
 
 namespace restage::bench {
 namespace {
@@ -194,7 +194,6 @@ class FrameOnline : public Item {
 std::vector<ItemInfo> online_items() {
   const double deformation = offsets_gflop(kSurfacePoints) + skinning_gflop(kSurfacePoints);
   return {{"skeleton_online",
-           "online",
            "point transformer",
            "frame",
            1,
@@ -202,7 +201,6 @@ std::vector<ItemInfo> online_items() {
            {"skeleton"},
            SkeletonOnline::make},
           {"smrm_online",
-           "online",
            "SMRM, caches flushed before every frame",
            "frame",
            1,
@@ -210,7 +208,6 @@ std::vector<ItemInfo> online_items() {
            {},
            MotionOnline<true>::make},
           {"smrm_online_warm",
-           "online",
            "SMRM, caches as the last frame left them",
            "frame",
            1,
@@ -218,7 +215,6 @@ std::vector<ItemInfo> online_items() {
            {},
            MotionOnline<false>::make},
           {"deformation_online",
-           "online",
            "offsets and skinning of 6,890 points",
            "frame",
            1,
@@ -226,7 +222,6 @@ std::vector<ItemInfo> online_items() {
            {"offsets"},
            DeformationOnline::make},
           {"frame_online",
-           "online",
            "whole frame, paper's models",
            "frame",
            1,
@@ -234,13 +229,13 @@ std::vector<ItemInfo> online_items() {
            {"skeleton", "offsets"},
            FrameOnline::make},
           {"frame_online_lite",
-           "online",
            "whole frame, lite models",
            "frame",
            1,
            0,
            {},
-           FrameOnline::make_lite}};
+           FrameOnline::make_lite,
+           "lite"}};
 }
 
 }  // namespace restage::bench

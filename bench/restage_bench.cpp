@@ -13,7 +13,7 @@
 #include <sstream>
 
 #include "autograd/base/parallel.h"
-#include "items.h"
+#include "bench/items.h"
 
 namespace restage::bench {
 namespace {
@@ -23,12 +23,11 @@ using nlohmann::json;
 json list(const Inputs& inputs) {
   json out = json::array();
   for (const ItemInfo& i : items()) {
-    std::vector<std::string> variants = {"initial"};
+    std::vector<std::string> variants = {i.variant};
     if (std::any_of(i.models.begin(), i.models.end(),
                     [&](const std::string& m) { return inputs.has("trained", m); }))
       variants.push_back("trained");
     out.push_back({{"name", i.name},
-                   {"group", i.group},
                    {"what", i.what},
                    {"per", i.per},
                    {"examples", i.examples},

@@ -3,12 +3,12 @@
 
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/reduce.h"
-#include "items.h"
+#include "bench/items.h"
+#include "bench/work.h"
 #include "nn/losses/deformation.h"
 #include "nn/losses/motion.h"
 #include "train/optim/adam.h"
 #include "train/stage.h"
-#include "work.h"
 
 namespace restage::bench {
 namespace {
@@ -139,7 +139,6 @@ std::vector<ItemInfo> training_items() {
       2 * gflop_of(static_cast<double>(kSurfacePoints * (3 * kJoints + 3) * kMlpWidth));
   const double pair = 3 * (weights_gflop(kSurfacePoints) + offsets_gflop(kSurfacePoints)) - inputs;
   return {{"skeleton_train",
-           "training",
            "point transformer, batch 4",
            "cloud",
            kClouds,
@@ -147,7 +146,6 @@ std::vector<ItemInfo> training_items() {
            {"skeleton"},
            skeleton},
           {"smrm_train_b16",
-           "training",
            "SMRM, batch 16, windows of 30",
            "window",
            16,
@@ -155,7 +153,6 @@ std::vector<ItemInfo> training_items() {
            {},
            MotionTraining<16>::make},
           {"smrm_train_b64",
-           "training",
            "SMRM, batch 64, windows of 30",
            "window",
            64,
@@ -163,7 +160,6 @@ std::vector<ItemInfo> training_items() {
            {},
            MotionTraining<64>::make},
           {"deformation_train",
-           "training",
            "skinning weights and offsets, batch 4 of 6,890 points",
            "pair",
            kClouds,
@@ -171,7 +167,6 @@ std::vector<ItemInfo> training_items() {
            {},
            DeformationTraining::make},
           {"pointnet_train",
-           "training",
            "PointNet, batch 4",
            "cloud",
            kClouds,
