@@ -20,6 +20,8 @@ class Stage {
   virtual ~Stage() = default;
   virtual std::string name() const = 0;
   virtual int64_t steps() const = 0;
+  /// Clouds, windows or pairs of bodies in a step.
+  virtual int64_t examples_per_step() const = 0;
   /// Optimiser step number `step` (from 0). Everything random is a function of (seed, step), so a
   /// resumed run repeats the same bits. Returns what to log.
   virtual NamedValues step(int64_t step) = 0;

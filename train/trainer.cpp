@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
+#include "autograd/kernels/stats.h"
+#include "train/throughput.h"
 
 namespace restage {
 namespace {
@@ -29,18 +32,30 @@ std::string line(const NamedValues& values) {
 /// Steps `first` ... of one stage.
 void run_stage(Stage& stage, int64_t first, RunDir& run, const LoopConfig& loop, bool quiet) {
   const StopScope stop;
-  std::chrono::duration<double> stepping{0};  // without validation and checkpoints
+  Throughput throughput;
+  product_rate();
   const int64_t steps = stage.steps(), blocks_before = memory_stats().large_allocations;
   reset_peak_memory();
   Progress progress(stage.name(), steps, standard_progress(quiet), first);
   for (int64_t step = first; step < steps; ++step) {
+    take_kernel_stats();  // not what validation did
     const auto start = std::chrono::steady_clock::now();
-    const NamedValues values = stage.step(step);
-    stepping += std::chrono::steady_clock::now() - start;
+    NamedValues values = stage.step(step);
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+    const KernelStats work = take_kernel_stats();
+    throughput.add(stage.examples_per_step(), took.count(), work.flops);
+    if (std::isfinite(work.active_share)) {
+      values.emplace_back("active_share", work.active_share);
+      values.emplace_back("active_score_share", work.active_score_share);
+    }
     const int64_t done = step + 1;
     const bool last = done == steps, stopped = stop_requested();
     if (done % loop.log_every == 0 || last) run.metrics(stage.name(), done, values);
-    progress.update(done, values);
+    NamedValues shown = values;  // the loss first, then speed
+    const NamedValues speed = throughput.values();
+    shown.insert(shown.begin() + std::min<std::ptrdiff_t>(1, std::ssize(shown)), speed.begin(),
+                 speed.end());
+    progress.update(done, shown);
     if (done % loop.validate_every == 0 || last) {
       const NamedValues scores = stage.validate();
       run.metrics(stage.name(), done, scores);
@@ -55,12 +70,13 @@ void run_stage(Stage& stage, int64_t first, RunDir& run, const LoopConfig& loop,
   }
   progress.finish();
   if (first >= steps) return;
-  char text[200];
+  char text[300];
   std::snprintf(text, sizeof text,
-                "%s: %lld steps, %.1f ms a step, peak of tensors %.0f MiB, %lld "
+                "%s: %lld steps, %.1f ms a step, %s, peak of tensors %.0f MiB, %lld "
                 "large blocks taken",
                 stage.name().c_str(), static_cast<long long>(steps - first),
-                1e3 * stepping.count() / static_cast<double>(steps - first),
+                1e3 * throughput.seconds() / static_cast<double>(steps - first),
+                line(throughput.values()).c_str(),
                 static_cast<double>(memory_stats().peak) / 1048576.0,
                 static_cast<long long>(memory_stats().large_allocations - blocks_before));
   log_info(text);

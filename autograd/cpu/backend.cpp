@@ -30,10 +30,14 @@ class CpuBackend final : public Backend {
     add<FoldArgs, cpu::fold>();
     add<NormArgs, cpu::norm>();
     add<NormGradArgs, cpu::norm_grad>();
+    add<PooledNormArgs, cpu::pooled_norm>();
+    add<PooledNormGradArgs, cpu::pooled_norm_grad>();
     add<GruArgs, cpu::gru>();
     add<GruGradArgs, cpu::gru_grad>();
     add<KnnArgs, cpu::knn>();
     add<FpsArgs, cpu::fps>();
+    add<NeighbourAttentionArgs, cpu::neighbour_attention>();
+    add<NeighbourAttentionGradArgs, cpu::neighbour_attention_grad>();
     add<AttentionPoolArgs, cpu::attention_pool>();
     add<AttentionPoolGradArgs, cpu::attention_pool_grad>();
     add<ToMatrixArgs, cpu::to_matrix>();

@@ -1,11 +1,13 @@
 // Every kernel of the CPU backend; backend.cpp enters them into its table.
 #pragma once
 
+#include "autograd/kernels/attention.h"
 #include "autograd/kernels/elementwise.h"
 #include "autograd/kernels/layout.h"
 #include "autograd/kernels/matmul.h"
 #include "autograd/kernels/norm.h"
 #include "autograd/kernels/points.h"
+#include "autograd/kernels/pooled_norm.h"
 #include "autograd/kernels/reduce.h"
 #include "autograd/kernels/rnn.h"
 #include "autograd/kernels/rotation.h"
@@ -34,10 +36,14 @@ void unfold(const UnfoldArgs&);
 void fold(const FoldArgs&);
 void norm(const NormArgs&);
 void norm_grad(const NormGradArgs&);
+void pooled_norm(const PooledNormArgs&);
+void pooled_norm_grad(const PooledNormGradArgs&);
 void gru(const GruArgs&);
 void gru_grad(const GruGradArgs&);
 void knn(const KnnArgs&);
 void fps(const FpsArgs&);
+void neighbour_attention(const NeighbourAttentionArgs&);
+void neighbour_attention_grad(const NeighbourAttentionGradArgs&);
 void attention_pool(const AttentionPoolArgs&);
 void attention_pool_grad(const AttentionPoolGradArgs&);
 void to_matrix(const ToMatrixArgs&);

@@ -5,11 +5,13 @@ namespace restage::gradcheck {
 const std::vector<OpSamples>& all_samples() {
   static const Table table = [] {
     Table t;
+    add_attention(t);
     add_elementwise(t);
     add_layout(t);
     add_linear(t);
     add_norm(t);
     add_points(t);
+    add_pooled_norm(t);
     add_reduce(t);
     add_rnn(t);
     add_rotation(t);

@@ -7,11 +7,13 @@ namespace restage::gradcheck {
 
 using Table = std::vector<OpSamples>;
 
+void add_attention(Table& table);
 void add_elementwise(Table& table);
 void add_layout(Table& table);
 void add_linear(Table& table);
 void add_norm(Table& table);
 void add_points(Table& table);
+void add_pooled_norm(Table& table);
 void add_reduce(Table& table);
 void add_rnn(Table& table);
 void add_rotation(Table& table);

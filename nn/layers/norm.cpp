@@ -3,6 +3,9 @@
 #include <cmath>
 
 #include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+#include "autograd/ops/pooled_norm.h"
+#include "autograd/ops/reduce.h"
 
 namespace restage {
 
@@ -27,6 +30,20 @@ Var BatchNormLayer::operator()(Context& ctx, const Var& x) {
   const Tensor rstd = Tensor::from<double>(running_var.shape(), inverse).cast(x.dtype());
   const Var factor = mul(ctx.bind(weight), rstd);
   return add(mul(x, factor), sub(ctx.bind(bias), mul(running_mean, factor)));
+}
+
+Var BatchNormLayer::pooled(Context& ctx, const Linear& map, const Var& x, Activation activation) {
+  if (!ctx.training) {
+    const Var y = (*this)(ctx, map(ctx, x));
+    return max(activation == Activation::relu ? relu(y) : y, 1);
+  }
+  const ModuleScope path(scope);
+  BatchStatistics batch;
+  const Var w = reshape(ctx.bind(map.weight), {map.weight.value.size(0), -1});
+  const Var y = pooled_norm(x, w, ctx.bind(map.bias), ctx.bind(weight), ctx.bind(bias), activation,
+                            eps, &batch);
+  update(batch);
+  return y;
 }
 
 void BatchNormLayer::update(const BatchStatistics& batch) {

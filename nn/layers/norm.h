@@ -2,7 +2,7 @@
 #pragma once
 
 #include "autograd/ops/norm.h"
-#include "nn/module.h"
+#include "nn/layers/linear.h"
 
 namespace restage {
 
@@ -11,6 +11,9 @@ namespace restage {
 struct BatchNormLayer : Module {
   BatchNormLayer(int64_t channels, const Init& init);
   Var operator()(Context& ctx, const Var& x);
+  /// max over v of act(this(map(x))), x [n, v, i] -> [n, o], in training as one op; `map` has a
+  /// bias.
+  Var pooled(Context& ctx, const Linear& map, const Var& x, Activation activation);
   void visit(Fields& f) override;
   const char* kind() const override { return "BatchNorm"; }
   Parameter weight, bias;

@@ -2,12 +2,20 @@
 
 #include <cmath>
 
+#include "autograd/ops/attention.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
+#include "autograd/ops/linear.h"
 #include "autograd/ops/points.h"
 #include "autograd/ops/reduce.h"
 
 namespace restage {
+namespace {
+
+/// Pairs of points in a cloud from which folding the weights costs less than it saves.
+constexpr int64_t kFoldedPairs = 4096;
+
+}  // namespace
 
 Var neighbour_offsets(const Var& points, const Var& centres, const Tensor& index) {
   return gather(points, index) - reshape(centres, {centres.size(0), centres.size(1), 1, 3});
@@ -28,16 +36,45 @@ Var VectorAttention::operator()(Context& ctx, const Var& xyz, const Var& f) cons
   const ModuleScope path(scope);
   const int64_t n = xyz.size(0), v = xyz.size(1);
   const Tensor index = knn(xyz.value, xyz.value, k_);
-  const int64_t k = index.size(2);
+  const bool many = v * index.size(2) >= kFoldedPairs;
+  return f + fc2(ctx, reshape(many ? folded(ctx, xyz, f, index) : plain(ctx, xyz, f, index),
+                              {n, v, d_}));
+}
+
+Var VectorAttention::plain(Context& ctx, const Var& xyz, const Var& f, const Tensor& index) const {
+  const int64_t n = xyz.size(0), v = xyz.size(1), k = index.size(2);
   const Var h = fc1(ctx, f);
   // x_i - x_j is the negative of the neighbour's offset.
   const Var delta = fc_delta(ctx, neg(neighbour_offsets(xyz, xyz, index)));
   const Var q = reshape(w_qs(ctx, h), {n, v, 1, d_});
   const Var score = fc_gamma(ctx, q - gather(w_ks(ctx, h), index) + delta);
   const Var value = gather(w_vs(ctx, h), index) + delta;
-  const Var pooled = attention_pool(reshape(score, {n * v, k, d_}), reshape(value, {n * v, k, d_}),
-                                    1.0 / std::sqrt(static_cast<double>(d_)));
-  return f + fc2(ctx, reshape(pooled, {n, v, d_}));
+  return attention_pool(reshape(score, {n * v, k, d_}), reshape(value, {n * v, k, d_}),
+                        1.0 / std::sqrt(static_cast<double>(d_)));
+}
+
+// With D1, D2 the layers of fc_delta, G1, G2 those of fc_gamma and h = relu(D1 r + d1):
+//   G1 (q - k + D2 h + d2) + g1 = [G1 q + G1 d2 + g1] - [G1 k] + (G1 D2) h,
+//   v + delta                   = [v + d2] + D2 h,
+// and what acts on the points (brackets) is folded with fc1 into one matrix of c columns each.
+Var VectorAttention::folded(Context& ctx, const Var& xyz, const Var& f, const Tensor& index) const {
+  const auto weight = [&](const Linear& l) { return ctx.bind(l.weight); };
+  const auto bias = [&](const Linear& l) { return ctx.bind(l.bias); };
+  const auto times = [](const Var& m, const Var& column) {  // a matrix times a vector
+    return linear(column, m);
+  };
+  const Linear &delta1 = fc_delta[0], &delta2 = fc_delta[1], &gamma1 = fc_gamma[0],
+               &gamma2 = fc_gamma[1];
+  const Var w1 = weight(fc1), b1 = bias(fc1), d2 = weight(delta2), g1 = weight(gamma1);
+  const Var query = matmul(g1, matmul(weight(w_qs), w1)),
+            key = matmul(g1, matmul(weight(w_ks), w1)), value = matmul(weight(w_vs), w1);
+  const Var query_bias = times(g1, times(weight(w_qs), b1) + bias(delta2)) + bias(gamma1);
+  const Var key_bias = times(g1, times(weight(w_ks), b1));
+  const Var value_bias = times(weight(w_vs), b1) + bias(delta2);
+  return neighbour_attention(
+      {xyz, linear(f, query, query_bias), linear(f, key, key_bias), linear(f, value, value_bias),
+       weight(delta1), bias(delta1), concat({matmul(g1, d2), d2}, 0), weight(gamma2), bias(gamma2)},
+      index, 1.0 / std::sqrt(static_cast<double>(d_)), dense);
 }
 
 void VectorAttention::visit(Fields& f) {

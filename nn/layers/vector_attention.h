@@ -16,8 +16,15 @@ struct VectorAttention : Module {
   Linear fc1, fc2;
   ReluChain fc_delta, fc_gamma;
   Linear w_qs, w_ks, w_vs;
+  /// Products over pairs in full where many pairs allow to leave some out (the result is the same
+  /// up to rounding): for measurements.
+  bool dense = false;
 
  private:
+  /// The neighbours' weighted sum, as the paper writes it, and for many pairs with folded weights.
+  Var plain(Context& ctx, const Var& xyz, const Var& f, const Tensor& index) const;
+  Var folded(Context& ctx, const Var& xyz, const Var& f, const Tensor& index) const;
+
   int64_t d_, k_;
 };
 

@@ -24,7 +24,7 @@ Var SpatialTransformer::operator()(Context& ctx, const Var& x) {
   const ModuleScope path(scope);
   Var h = relu(bn1(ctx, conv1(ctx, x)));
   h = relu(bn2(ctx, conv2(ctx, h)));
-  h = max(relu(bn3(ctx, conv3(ctx, h))), 1);
+  h = bn3.pooled(ctx, conv3, h, Activation::relu);
   h = relu(bn4(ctx, fc1(ctx, h)));
   h = relu(bn5(ctx, fc2(ctx, h)));
   std::vector<double> eye(static_cast<size_t>(k_ * k_), 0.0);
@@ -71,8 +71,7 @@ SkeletonOutput PointNet::forward(Context& ctx, const Var& cloud) {
   x = relu(bn1(ctx, conv1(ctx, x)));
   if (fstn) x = matmul(x, (*fstn)(ctx, x));
   x = relu(bn2(ctx, conv2(ctx, x)));
-  x = bn3(ctx, conv3(ctx, x));
-  x = max(config.relu3 ? relu(x) : x, 1);
+  x = bn3.pooled(ctx, conv3, x, config.relu3 ? Activation::relu : Activation::none);
   x = relu(bn4(ctx, fc1(ctx, x)));
   x = relu(bn5(ctx, dropout(ctx, fc2(ctx, x), config.dropout)));
   SkeletonOutput out;

@@ -2,14 +2,19 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "autograd/base/parallel.h"
 #include "autograd/gradcheck/evaluate.h"
+#include "autograd/kernels/stats.h"
+#include "autograd/ops/attention.h"
 #include "autograd/ops/linear.h"
 #include "autograd/ops/norm.h"
 #include "autograd/ops/points.h"
+#include "autograd/ops/pooled_norm.h"
 #include "autograd/ops/reduce.h"
 #include "autograd/ops/rnn.h"
 #include "autograd/ops/rotation.h"
@@ -68,6 +73,47 @@ TEST(FusedOps, AttentionPoolIsItsReference) {
         [](Args x) { return attention_pool_reference(x[0], x[1], 0.4); });
 }
 
+/// Rows of random numbers that differ by `spread`.
+Tensor alike(const Shape& shape, uint64_t seed, double spread) {
+  Tensor x = random(shape, seed);
+  const int64_t d = shape[-1];
+  for (int64_t i = d; i < x.numel(); ++i) x.data<double>()[i] = x.item(i % d) + spread * x.item(i);
+  return x;
+}
+
+TEST(FusedOps, NeighbourAttentionIsItsReference) {
+  const int64_t v = 200, k = 5, d = 33;
+  for (const double spread : {1.0, 0.02, 1e-4}) {  // most units active, some, none
+    const Shape rows{2, v, d};
+    const Tensor xyz = alike({2, v, 3}, 1, spread), index = knn(xyz, xyz, k);
+    const std::vector<Tensor> inputs = {xyz,
+                                        alike(rows, 2, spread),
+                                        alike(rows, 3, spread),
+                                        random(rows, 4),
+                                        random({d, 3}, 5),
+                                        random({d}, 6, 0.01),
+                                        random({2 * d, d}, 7),
+                                        random({d, d}, 8),
+                                        random({d}, 9)};
+    for (const bool dense : {false, true}) {
+      take_kernel_stats();
+      expect_fused(
+          inputs,
+          [&](Args x) {
+            return neighbour_attention({x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]},
+                                       index, 0.05, dense);
+          },
+          [&](Args x) {
+            return neighbour_attention_reference(
+                {x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]}, index, 0.05);
+          });
+      const KernelStats stats = take_kernel_stats();
+      EXPECT_EQ(stats.active_share < 0.5, !dense && spread < 1);
+      EXPECT_EQ(stats.active_score_share < 0.5, !dense && spread < 1);
+    }
+  }
+}
+
 TEST(FusedOps, LinearWithReluIsMatmulPlusBiasAndRelu) {
   expect_fused(
       {random({5, 3, 7}, 1), random({11, 7}, 2), random({11}, 3)},
@@ -111,6 +157,48 @@ TEST(FusedOps, BatchNormReportsItsStatistics) {
   EXPECT_NEAR(s.variance.item(0), 3.5, 1e-12);
   EXPECT_DOUBLE_EQ(s.mean.item(1), 10);
   EXPECT_NEAR(s.variance.item(1), 0, 1e-12);
+}
+
+/// x [n, v, i] around `centre`, W [o, i], b, scale and shift.
+std::vector<Tensor> trunk(int64_t n, int64_t v, int64_t i, int64_t o, double centre) {
+  const Tensor x = add_scalar(Var(random({n, v, i}, 1)), centre).value;
+  return {x, random({o, i}, 2), random({o}, 3), random({o}, 4, 0.1), random({o}, 5)};
+}
+
+TEST(FusedOps, PooledNormIsItsReference) {
+  for (const Activation act : {Activation::none, Activation::relu})
+    for (const auto& [n, v, i, o] :
+         {std::array<int64_t, 4>{1, 9, 2, 3}, {3, 40, 7, 70}, {2, 700, 300, 33}})
+      expect_fused(
+          trunk(n, v, i, o, 3),
+          [=](Args x) { return pooled_norm(x[0], x[1], x[2], x[3], x[4], act, 1e-3); },
+          [=](Args x) { return pooled_norm_reference(x[0], x[1], x[2], x[3], x[4], act, 1e-3); });
+}
+
+TEST(FusedOps, PooledNormReportsTheStatisticsOfItsReference) {
+  std::vector<Var> x;
+  for (const Tensor& t : trunk(3, 50, 6, 40, 20)) x.emplace_back(t);
+  BatchStatistics a, b;
+  pooled_norm(x[0], x[1], x[2], x[3], x[4], Activation::relu, 1e-5, &a);
+  pooled_norm_reference(x[0], x[1], x[2], x[3], x[4], Activation::relu, 1e-5, &b);
+  EXPECT_EQ(a.count, 150);
+  EXPECT_EQ(a.count, b.count);
+  expect_near(a.mean, b.mean, 1e-12, "mean");
+  expect_near(a.variance, b.variance, 1e-12, "variance");
+}
+
+TEST(FusedOps, PooledNormShowsWhatIsNotFinite) {
+  const double bad[] = {std::nan(""), std::numeric_limits<double>::infinity()};
+  for (size_t k = 0; k < 5; ++k)
+    for (const double value : bad) {
+      std::vector<Tensor> inputs = trunk(2, 5, 3, 4, 0);
+      inputs[k].data<double>()[0] = value;
+      const std::vector<Var> x(inputs.begin(), inputs.end());
+      const Tensor y = pooled_norm(x[0], x[1], x[2], x[3], x[4], Activation::relu).value;
+      const Tensor r = pooled_norm_reference(x[0], x[1], x[2], x[3], x[4], Activation::relu).value;
+      for (int64_t i = 0; i < y.numel(); ++i)
+        EXPECT_EQ(std::isfinite(y.item(i)), std::isfinite(r.item(i))) << k << " " << i;
+    }
 }
 
 TEST(FusedOps, Conv1dIsTheSumOverItsWindow) {

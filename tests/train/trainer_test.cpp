@@ -32,6 +32,7 @@ class Disturbed final : public Stage {
       : stage_(std::move(stage)), when_(when), what_(std::move(what)) {}
   std::string name() const override { return stage_->name(); }
   int64_t steps() const override { return stage_->steps(); }
+  int64_t examples_per_step() const override { return stage_->examples_per_step(); }
   NamedValues step(int64_t step) override {
     if (step == when_) what_();
     return stage_->step(step);

@@ -14,6 +14,7 @@ class DeformationStage final : public Stage {
                    const Corpus& validation, uint64_t seed);
   std::string name() const override { return "deformation"; }
   int64_t steps() const override { return config_.optimiser.steps; }
+  int64_t examples_per_step() const override { return config_.optimiser.batch; }
   NamedValues step(int64_t step) override;
   NamedValues validate() override;
   void save(TensorFile& file) const override;

@@ -14,6 +14,7 @@ class MotionStage final : public Stage {
               uint64_t seed);
   std::string name() const override { return "motion"; }
   int64_t steps() const override { return config_.optimiser.steps; }
+  int64_t examples_per_step() const override { return config_.optimiser.batch; }
   NamedValues step(int64_t step) override;
   /// Errors against the true motion of B, as the evaluation measures them, and the two losses whose
   /// drifting apart shows B becoming a hidden code for A.

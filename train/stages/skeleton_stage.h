@@ -14,6 +14,7 @@ class SkeletonStage final : public Stage {
                 uint64_t seed);
   std::string name() const override { return "skeleton"; }
   int64_t steps() const override { return config_.optimiser.steps; }
+  int64_t examples_per_step() const override { return config_.optimiser.batch; }
   NamedValues step(int64_t step) override;
   NamedValues validate() override;
   void save(TensorFile& file) const override;

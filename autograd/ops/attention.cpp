@@ -1,0 +1,78 @@
+#include "autograd/ops/attention.h"
+
+#include <algorithm>
+
+#include "autograd/kernels/attention.h"
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+#include "autograd/ops/linear.h"
+#include "autograd/ops/points.h"
+
+namespace restage {
+namespace {
+
+NeighbourAttentionInputs kernel_inputs(const NeighbourAttention& op, const Tensor* x) {
+  return {x[0], op.index, x[1], x[2], x[3], x[4], x[5], x[6], x[7], op.scale, op.dense};
+}
+
+}  // namespace
+
+void NeighbourAttention::check(Inputs x) const {
+  const auto is = [&](size_t i, const Shape& shape) { return x[i].shape() == shape; };
+  if (x.size() != 9 || x[0].rank() != 3 || x[0].size(2) != 3 || x[1].rank() != 3)
+    shape_error(name, letters, x, "wrong number of axes");
+  const int64_t n = x[0].size(0), v = x[0].size(1), d = x[1].size(2);
+  const Shape rows{n, v, d};
+  if (!is(1, rows) || !is(2, rows) || !is(3, rows))
+    shape_error(name, letters, x, "n, v and d must agree");
+  if (!is(4, {d, 3}) || !is(5, {d}) || !is(6, {2 * d, d}) || !is(7, {d, d}) || !is(8, {d}))
+    shape_error(name, letters, x, "d must agree");
+  if (index.dtype() != DType::i32 || index.rank() != 3 || index.size(0) != n ||
+      index.size(1) != v || index.size(2) < 1)
+    shape_error(name, letters, x, "the index must be i32 [n, v, k > 0]");
+  if (!(scale > 0)) shape_error(name, letters, x, "the scale must be positive");
+  const int32_t* i = index.data<int32_t>();
+  if (std::any_of(i, i + index.numel(), [v](int32_t j) { return j < 0 || j >= v; }))
+    shape_error(name, letters, x, "an index is out of range");
+  require_floats(name, letters, x);
+}
+
+Tensor NeighbourAttention::forward(Inputs x, Saved& saved) const {
+  Tensor y = Tensor::empty(x[1].shape(), x[1].dtype(), x[1].device());
+  Tensor weights;
+  if (saved.on())
+    weights = Tensor::empty({x[1].size(0), x[1].size(1), index.size(2), x[1].size(2)}, x[1].dtype(),
+                            x[1].device());
+  launch(
+      NeighbourAttentionArgs{kernel_inputs(*this, x.data()), y, saved.on() ? &weights : nullptr});
+  saved.keep({x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], weights, y, x[8]});
+  return y;
+}
+
+Grads NeighbourAttention::backward(const Saved& saved, const Tensor& gy, Needs needs) const {
+  Grads g(9);
+  for (size_t i = 0; i < 8; ++i)
+    if (i > 0 || needs[0]) g[i] = Tensor::empty(saved[i].shape(), gy.dtype(), gy.device());
+  launch(NeighbourAttentionGradArgs{kernel_inputs(*this, &saved[0]), saved[8], saved[9], gy,
+                                    needs[0] ? &g[0] : nullptr, g[1], g[2], g[3], g[4], g[5], g[6],
+                                    g[7]});
+  g[8] = Tensor::zeros(saved[10].shape(), gy.dtype(), gy.device());
+  for (size_t i = 0; i < g.size(); ++i)
+    if (!needs[i]) g[i] = Tensor();
+  return g;
+}
+
+Var neighbour_attention_reference(std::initializer_list<Var> inputs, const Tensor& index,
+                                  double scale) {
+  const Var* x = inputs.begin();
+  const int64_t n = x[0].size(0), v = x[0].size(1), k = index.size(2), d = x[1].size(2);
+  const Var r = reshape(x[0], {n, v, 1, 3}) - gather(x[0], index);
+  const Var both = linear(linear(r, x[4], x[5], Activation::relu), x[6]);
+  const Var u = relu(reshape(x[1], {n, v, 1, d}) - gather(x[2], index) + slice(both, 3, 0, d));
+  const Var value = gather(x[3], index) + slice(both, 3, d, 2 * d);
+  const Var pooled = attention_pool(reshape(linear(u, x[7], x[8]), {n * v, k, d}),
+                                    reshape(value, {n * v, k, d}), scale);
+  return reshape(pooled, {n, v, d});
+}
+
+}  // namespace restage
