@@ -23,6 +23,8 @@ class Item {
   virtual std::vector<double> check() = 0;
 };
 
+/// Every attention of a point transformer does all products, if the variant is "dense".
+void make_dense(SkeletonModel& net, const std::string& variant);
 /// What an item's check() may say of a result: the sum of its absolute values and three of them.
 std::vector<double> summary(const Tensor& x);
 
@@ -38,6 +40,8 @@ struct ItemInfo {
   std::vector<std::string> models;
   /// `dropout` false: none, for check().
   std::unique_ptr<Item> (*make)(const Inputs& inputs, const std::string& variant, bool dropout);
+  /// Whether it also exists as "dense": initial weights, nothing left out.
+  bool dense = false;
   /// What it is called with the weights it starts with.
   std::string variant = "initial";
 };

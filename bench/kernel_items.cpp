@@ -68,6 +68,7 @@ class Attention : public Layer {
         xyz_(inputs.at("clouds.points").rows(0, 1)),
         features_(inputs.at("kernel.features")) {
     inputs.load(block_, variant, "skeleton", "backbone.transformer1.");
+    block_.dense = variant == "dense";
   }
   static std::unique_ptr<Item> make(const Inputs& i, const std::string& v, bool) {
     return std::make_unique<Attention>(i, v);
@@ -132,14 +133,16 @@ std::vector<ItemInfo> kernel_items() {
            1,
            attention,
            {"skeleton"},
-           Attention<false>::make},
+           Attention<false>::make,
+           true},
           {"attention_train",
            "first attention block, forward and backward",
            "cloud",
            1,
            3 * attention,
            {"skeleton"},
-           Attention<true>::make},
+           Attention<true>::make,
+           true},
           {"gru_train",
            "SMRM's decoder GRU, batch 16, forward and backward",
            "step",
@@ -147,6 +150,14 @@ std::vector<ItemInfo> kernel_items() {
            3 * gru,
            {},
            Recurrent::make}};
+}
+
+void make_dense(SkeletonModel& net, const std::string& variant) {
+  auto* transformer = dynamic_cast<PointTransformer*>(&net);
+  if (variant != "dense" || transformer == nullptr) return;
+  PointTransformerBackbone& b = transformer->backbone;
+  b.transformer1.dense = true;
+  for (size_t i = 0; i < b.transformers.size(); ++i) b.transformers[i].dense = true;
 }
 
 std::vector<double> summary(const Tensor& x) {

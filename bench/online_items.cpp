@@ -44,6 +44,7 @@ class SkeletonOnline : public Item {
         clouds_(inputs.at("frames.clouds")),
         frames_(clouds_.size(0)) {
     inputs.load(*net_, variant, "skeleton");
+    make_dense(*net_, variant);
   }
   static std::unique_ptr<Item> make(const Inputs& i, const std::string& v, bool d) {
     return std::make_unique<SkeletonOnline>(i, v, d);
@@ -199,7 +200,8 @@ std::vector<ItemInfo> online_items() {
            1,
            extractor_gflop(),
            {"skeleton"},
-           SkeletonOnline::make},
+           SkeletonOnline::make,
+           true},
           {"smrm_online",
            "SMRM, caches flushed before every frame",
            "frame",
@@ -235,6 +237,7 @@ std::vector<ItemInfo> online_items() {
            0,
            {},
            FrameOnline::make_lite,
+           false,
            "lite"}};
 }
 

@@ -50,14 +50,17 @@ def ours(out):
                    number(speed) if i["gflop"] else "", f"{100 * speed / rate:.0f} %" if rate and i["gflop"] else "",
                    number(r["peak_mib"])]
             if with_active:
-                row.insert(8, f"{r['active']:.3f}" if r.get("active") is not None else "")
+                row[8:8] = ([f"{r['active']:.3f}, {r['active_scores']:.3f}",
+                             f"{100 * r['done_gflop'] / i['examples'] / i['gflop']:.0f} %"]
+                            if "active" in r else ["", ""])
             rows.append(row)
     columns = ["item", "what", "weights", "example", "ms", "a second", "GFLOP/s", "of sgemm", "peak MiB"]
     if with_active:
-        columns.insert(8, "active units")
+        columns[8:8] = ["active units", "work done"]
     text = ("## Restage\n\nGFLOP/s count the plain algorithm's operations, also where fewer are done"
             + (f"; sgemm is the fastest product of this run, {number(rate)} GFLOP/s ({whose})" if rate else "")
-            + ".\n\n")
+            + "." + (" Active units: the share, behind the attention's first and second ReLU, that needs a product; "
+                     "work done: operations left of the plain algorithm's." if with_active else "") + "\n\n")
     return text + table(columns, rows)
 
 

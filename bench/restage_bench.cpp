@@ -4,15 +4,20 @@
 //   restage_bench list FOLDER          the items, as JSON
 //   restage_bench serve FOLDER         answers requests, one line of JSON for each line:
 //     run ITEM VARIANT N               {"ms": [N times]}, after one repetition that is not timed
-//                                      if the item is not the last one asked for
+//                                      if the item is not the last one asked for; where units are
+//                                      left out also the shares that were not, "active" and
+//                                      "active_scores" (autograd/kernels/stats.h), and "done_gflop"
+//                                      of one repetition
 //     check ITEM VARIANT               {"values": [...]}
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <cmath>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "autograd/base/parallel.h"
+#include "autograd/kernels/stats.h"
 #include "bench/items.h"
 
 namespace restage::bench {
@@ -27,6 +32,7 @@ json list(const Inputs& inputs) {
     if (std::any_of(i.models.begin(), i.models.end(),
                     [&](const std::string& m) { return inputs.has("trained", m); }))
       variants.push_back("trained");
+    if (i.dense) variants.push_back("dense");
     out.push_back({{"name", i.name},
                    {"what", i.what},
                    {"per", i.per},
@@ -49,7 +55,7 @@ class Server {
     if (verb == "check") return {{"values", make(name, variant, false)->check()}};
     if (verb != "run" || !(words >> repeats))
       throw std::invalid_argument("unknown request: " + line);
-    return {{"ms", times(name, variant, repeats)}};
+    return times(name, variant, repeats);
   }
 
  private:
@@ -59,21 +65,29 @@ class Server {
     throw std::invalid_argument("there is no item '" + name + "'");
   }
 
-  std::vector<double> times(const std::string& name, const std::string& variant, int repeats) {
+  json times(const std::string& name, const std::string& variant, int repeats) {
     if (const std::string wanted = name + " " + variant; wanted != current_) {
       item_.reset();
       item_ = make(name, variant, true);
       current_ = wanted;
       item_->run();
     }
-    std::vector<double> out;
+    std::vector<double> ms;
+    take_kernel_stats();
     for (int i = 0; i < repeats; ++i) {
       item_->prepare();
       const auto start = std::chrono::steady_clock::now();
       item_->run();
-      out.push_back(
+      ms.push_back(
           std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
               .count());
+    }
+    const KernelStats work = take_kernel_stats();
+    json out = {{"ms", ms}};
+    if (std::isfinite(work.active_share)) {
+      out["active"] = work.active_share;
+      out["active_scores"] = work.active_score_share;
+      out["done_gflop"] = 1e-9 * work.flops / std::max(1, repeats);
     }
     return out;
   }

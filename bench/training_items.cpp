@@ -53,6 +53,7 @@ class SkeletonTraining : public Training {
                    const std::string& file, bool dropout)
       : net_(make_skeleton_model(model, sizes_with(dropout), Init{})) {
     inputs.load(*net_, variant, file);
+    make_dense(*net_, variant);
     const Var points = inputs.at("clouds.points"), joints = inputs.at("clouds.joints");
     train({{"", net_.get()}},
           [=, this](Context& ctx) { return mse(net_->forward(ctx, points).joints, joints); });
@@ -144,7 +145,8 @@ std::vector<ItemInfo> training_items() {
            kClouds,
            extractor,
            {"skeleton"},
-           skeleton},
+           skeleton,
+           true},
           {"smrm_train_b16",
            "SMRM, batch 16, windows of 30",
            "window",

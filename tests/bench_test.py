@@ -14,8 +14,8 @@ def times(*values, **more):
             "rounds": len(values), "peak_mib": 10.0, **more}
 
 
-ITEM = {"name": "skeleton_train", "what": "x", "per": "cloud", "gflop": 1.0,
-        "ours": {"initial": times(10, 20, 10), "trained": times(20, 40, 20, active=0.25), "dense": times(80, 80, 80)},
+ITEM = {"name": "skeleton_train", "what": "x", "per": "cloud", "examples": 4, "gflop": 1.0,
+        "ours": {"initial": times(10, 20, 10), "trained": times(20, 40, 20, active=0.25, active_scores=0.5, done_gflop=0.6), "dense": times(80, 80, 80)},
         "libtorch": {"installed, 1T": times(200), "installed, 2T": times(60, 80, 50),
                      "tuned, 1T": times(90), "tuned, 2T": times(40, 60, 30)}}
 
@@ -92,7 +92,7 @@ class Report(unittest.TestCase):
             "memory": {"skeleton_train": {"ours": 10.0, "libtorch_tuned": 40.0}}})
         self.assertIn("Not a result", text)
         self.assertIn("Disturbed", text)
-        self.assertIn("| 0.250 |", text)
+        self.assertIn("| 0.250, 0.500 | 15 % |", text)
         self.assertIn("| skeleton_train | initial | 10 (10-20) | 200 (200-200) | 60 (50-80) |", text)
 
 

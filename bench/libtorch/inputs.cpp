@@ -31,7 +31,11 @@ Inputs::Inputs(std::string folder)
 void Inputs::load(torch::nn::Module& module, const std::string& model, int64_t parameters,
                   const std::string& prefix) const {
   torch::NoGradGuard no_grad;
-  const auto file = read_tensors(folder_ + "/initial/" + model + ".safetensors");
+  const auto path = [&](const std::string& kind) {
+    return folder_ + "/" + kind + "/" + model + ".safetensors";
+  };
+  const bool has = std::ifstream(path(variant)).good();
+  const auto file = read_tensors(path(has ? variant : "initial"));
   size_t filled = 0, wanted = 0;
   int64_t count = 0;
   const auto fill = [&](const std::string& name, Tensor& value) {

@@ -17,7 +17,9 @@ class Inputs {
  public:
   explicit Inputs(std::string folder);
   const Tensor& at(const std::string& name) const { return tensors_.at(name); }
-  /// Fills a module with the initial weights of a model. Throws unless names and shapes agree one
+  /// Which weights load() takes, where there are such ("trained"); else the initial ones.
+  std::string variant = "initial";
+  /// Fills a module with the weights of a model. Throws unless names and shapes agree one
   /// to one and the module has as many parameters as the paper's model (0: not checked).
   void load(torch::nn::Module& module, const std::string& model, int64_t parameters,
             const std::string& prefix = "") const;

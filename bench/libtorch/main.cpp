@@ -44,6 +44,7 @@ class Server {
     std::string verb, name, variant;
     int repeats = 1;
     words >> verb >> name >> variant;
+    inputs_.variant = variant;
     if (verb == "check") return {{"values", make(name, false)->check()}};
     TORCH_CHECK(verb == "run" && words >> repeats, "unknown request: ", line);
     return {{"ms", times(name, repeats)}};
