@@ -39,6 +39,14 @@ def head(out):
     return "\n\n".join(lines)
 
 
+def active_units(item, r):
+    """Both shares, and how much of the plain algorithm's work was done."""
+    if "active" not in r:
+        return ["", ""]
+    shares = ", ".join(f"{r[k]:.3f}" for k in ("active", "active_scores") if r.get(k) is not None)
+    return [shares, f"{100 * r['done_gflop'] / item['examples'] / item['gflop']:.0f} %" if item["gflop"] else ""]
+
+
 def ours(out):
     rate, whose = sgemm_rate(out["items"])
     with_active = any("active" in r for i in out["items"] for r in i["ours"].values())
@@ -50,9 +58,7 @@ def ours(out):
                    number(speed) if i["gflop"] else "", f"{100 * speed / rate:.0f} %" if rate and i["gflop"] else "",
                    number(r["peak_mib"])]
             if with_active:
-                row[8:8] = ([f"{r['active']:.3f}, {r['active_scores']:.3f}",
-                             f"{100 * r['done_gflop'] / i['examples'] / i['gflop']:.0f} %"]
-                            if "active" in r else ["", ""])
+                row[8:8] = active_units(i, r)
             rows.append(row)
     columns = ["item", "what", "weights", "example", "ms", "a second", "GFLOP/s", "of sgemm", "peak MiB"]
     if with_active:

@@ -15,7 +15,8 @@ def times(*values, **more):
 
 
 ITEM = {"name": "skeleton_train", "what": "x", "per": "cloud", "examples": 4, "gflop": 1.0,
-        "ours": {"initial": times(10, 20, 10), "trained": times(20, 40, 20, active=0.25, active_scores=0.5, done_gflop=0.6), "dense": times(80, 80, 80)},
+        "ours": {"initial": times(10, 20, 10),
+                 "trained": times(20, 40, 20, active=0.25, active_scores=0.5, done_gflop=0.6), "dense": times(80, 80, 80)},
         "libtorch": {"installed, 1T": times(200), "installed, 2T": times(60, 80, 50),
                      "tuned, 1T": times(90), "tuned, 2T": times(40, 60, 30)}}
 
