@@ -1,0 +1,186 @@
+#include "bench/inputs.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "autograd/base/error.h"
+#include "datasets/sampling/clouds.h"
+#include "datasets/sampling/evaluation.h"
+#include "datasets/sampling/pairs.h"
+#include "datasets/sampling/windows.h"
+#include "nn/weights/bundle.h"
+#include "nn/weights/state.h"
+
+namespace restage::bench {
+namespace {
+
+constexpr int64_t kBatch = 4, kWindows = 64;
+
+struct Model {
+  const char* file;  ///< in the folder
+  const char* name;  ///< in the registry
+};
+constexpr Model kModels[] = {{"skeleton", "skeleton/point_transformer"},
+                             {"pointnet", "skeleton/pointnet"},
+                             {"smrm", "smrm/rot6d"},
+                             {"weights", "deformation/weights"},
+                             {"offsets", "deformation/offsets"}};
+
+Tensor tensor_of(const Points& points) {
+  Tensor t = Tensor::empty({static_cast<int64_t>(points.size()), 3});
+  for (size_t i = 0; i < points.size(); ++i)
+    for (int c = 0; c < 3; ++c) t.data<float>()[3 * i + static_cast<size_t>(c)] = points[i][c];
+  return t;
+}
+
+Tensor tensor_of(const Joints& joints, const Vec3& origin) {
+  Points p;
+  for (const Vec3& j : joints) p.push_back((j - origin).cast<float>());
+  return tensor_of(p);
+}
+
+/// [a.size(), rows of each...] from tensors of one shape.
+Tensor stack(const std::vector<Tensor>& parts) {
+  std::vector<float> all;
+  for (const Tensor& t : parts) all.insert(all.end(), t.data<float>(), t.data<float>() + t.numel());
+  return Tensor::from<float>({static_cast<int64_t>(parts.size()), parts[0].size(0), 3}, all);
+}
+
+/// Sorted and about its centroid, as the online extraction puts every cloud.
+Points in_order(Points cloud, Point* centre) {
+  std::sort(cloud.begin(), cloud.end(), [](const Point& a, const Point& b) {
+    return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
+  });
+  *centre = centroid(cloud);
+  for (Point& p : cloud) p -= *centre;
+  return cloud;
+}
+
+/// Frames of one body's performance as clouds of 1,024 points, and another body as target.
+void add_performance(TensorFile& file, const Corpus& corpus) {
+  const EvalSequence sequence =
+      evaluation_sequences(corpus, 1, static_cast<size_t>(kFrames), 0).at(0);
+  const Performance performance(corpus, sequence, ScanConfig{1024, 1024, 0.005}, 0);
+  std::vector<Tensor> clouds, joints, roots;
+  for (size_t i = 0; i < performance.frames(); ++i) {
+    Point centre;
+    clouds.push_back(tensor_of(in_order(performance.cloud(i), &centre)));
+    const Joints a = performance.joints_a(i);
+    joints.push_back(tensor_of(a, a[0]));
+    roots.push_back(tensor_of(Points{a[0].cast<float>()}));
+  }
+  file.tensors["frames.clouds"] = stack(clouds);
+  file.tensors["frames.joints"] = stack(joints);
+  file.tensors["frames.roots"] = stack(roots);
+  const Body& b = performance.target();
+  const SurfaceSamples surface =
+      SurfaceSampler(b).draw(RngKey{0, 0}.fold("target"), static_cast<size_t>(kSurfacePoints));
+  Points points = surface.on_rest(b);
+  for (Point& p : points) p -= b.joints[0].cast<float>();
+  file.tensors["target.points"] = tensor_of(points);
+  file.tensors["target.joints"] = tensor_of(b.joints, b.joints[0]);
+}
+
+void add_batches(TensorFile& file, const Corpus& corpus) {
+  const CloudBatch clouds = CloudSampler(corpus, CloudConfig{}, 0).batch(0, kBatch);
+  file.tensors["clouds.points"] = clouds.points;
+  file.tensors["clouds.joints"] = clouds.joints;
+  const WindowBatch windows = WindowSampler(corpus, WindowConfig{}, 0).batch(0, kWindows);
+  file.tensors["windows.joints"] = windows.joints_a;
+  file.tensors["windows.trans"] = windows.trans_a;
+  file.tensors["windows.rest_a"] = windows.rest_a;
+  file.tensors["windows.rest_b"] = windows.rest_b;
+  file.tensors["windows.sixd"] = windows.sixd_a;
+  file.tensors["windows.self_mask"] = windows.self_mask;
+  PairConfig pair_config;
+  pair_config.points = static_cast<int>(kSurfacePoints);
+  const PairBatch pairs = PairSampler(corpus, pair_config, 0).batch(0, kBatch);
+  file.tensors["pairs.rest_points"] = pairs.rest_points;
+  file.tensors["pairs.posed_points"] = pairs.posed_points;
+  file.tensors["pairs.rest_joints"] = pairs.rest_joints;
+  file.tensors["pairs.local"] = pairs.local;
+  file.tensors["pairs.axis_angle"] = pairs.axis_angle;
+}
+
+/// What the kernels get: numbers without meaning.
+void add_kernel_inputs(TensorFile& file) {
+  const auto noise = [&](const char* name, const Shape& shape) {
+    Tensor t = Tensor::empty(shape);
+    const RngKey key = RngKey{0, 0}.fold(name);
+    for (int64_t i = 0; i < t.numel(); ++i)
+      t.data<float>()[i] = static_cast<float>(normal(key, static_cast<uint64_t>(i)));
+    file.tensors[std::string("kernel.") + name] = t;
+  };
+  noise("features", {1, 1024, 32});
+  noise("sequence", {16, 30, 578});
+}
+
+bool same_shapes(Module& a, Module& b) {
+  const auto x = state_of(a), y = state_of(b);
+  return std::equal(x.begin(), x.end(), y.begin(), y.end(), [](const auto& s, const auto& t) {
+    return s.name == t.name && s.value->shape() == t.value->shape();
+  });
+}
+
+void write_weights(const std::string& folder, const std::string& name, Module& net) {
+  std::filesystem::create_directories(folder);
+  write_safetensors(folder + "/" + name + ".safetensors", to_file(net));
+}
+
+/// Those models of a weights file that have the paper's sizes.
+void add_trained(const std::string& folder, const std::string& weights) {
+  const ModelSet set = load_models(weights, {});
+  const std::pair<const char*, Module*> all[] = {{"skeleton", set.skeleton.net.get()},
+                                                 {"weights", set.weights.net.get()},
+                                                 {"offsets", set.offsets.net.get()}};
+  for (const auto& [file, net] : all)
+    for (const Model& m : kModels)
+      if (net != nullptr && std::string(m.file) == file &&
+          same_shapes(*net, *make_model(m.name, {}, Init{})))
+        write_weights(folder + "/trained", file, *net);
+}
+
+}  // namespace
+
+void make_inputs(const std::string& folder, const InputSettings& settings) {
+  std::filesystem::remove_all(folder + "/trained");
+  CorpusSource source;
+  source.source = settings.data;
+  source.bodies = {4, 0, 0};
+  source.motions = {8, 0, 0};
+  const Corpus corpus = load_corpus(source, "train");
+  TensorFile file;
+  add_batches(file, corpus);
+  add_performance(file, corpus);
+  add_kernel_inputs(file);
+  file.metadata["data"] = corpus.description;
+  for (const Model& m : kModels)
+    write_weights(folder + "/initial", m.file,
+                  *make_model(m.name, {}, Init{RngKey{0, 0}.fold(m.name), DType::f32}));
+  add_trained(folder, settings.lite);
+  if (!settings.trained.empty()) add_trained(folder, settings.trained);
+  std::filesystem::copy_file(settings.lite, folder + "/lite.safetensors",
+                             std::filesystem::copy_options::overwrite_existing);
+  write_safetensors(folder + "/inputs.safetensors", file);
+}
+
+Inputs::Inputs(std::string folder)
+    : folder_(std::move(folder)), file_(read_safetensors(folder_ + "/inputs.safetensors")) {}
+
+const Tensor& Inputs::at(const std::string& name) const { return file_.at(name, folder_); }
+
+std::string Inputs::path(const std::string& variant, const std::string& model) const {
+  return folder_ + "/" + variant + "/" + model + ".safetensors";
+}
+
+bool Inputs::has(const std::string& variant, const std::string& model) const {
+  return std::filesystem::exists(path(variant, model));
+}
+
+void Inputs::load(Module& module, const std::string& variant, const std::string& model,
+                  const std::string& prefix) const {
+  const std::string file = path(has(variant, model) ? variant : "initial", model);
+  load_state(module, read_safetensors(file), prefix, file);
+}
+
+}  // namespace restage::bench

@@ -1,0 +1,244 @@
+// Online frames: each part by itself, and whole frames as `restage retarget` does them.
+#include "bench/flush.h"
+#include "bench/items.h"
+#include "bench/work.h"
+#include "infer/retargeter.h"
+#include "nn/models/registry.h"
+
+namespace restage::bench {
+namespace {
+
+/// Plays the frames of the performance again and again.
+class Frames {
+ public:
+  explicit Frames(int64_t count) : count_(count) {}
+  int64_t next() { return at_++ % count_; }
+
+ private:
+  int64_t count_, at_ = 0;
+};
+
+Joints joints_of(const Tensor& t) {
+  Joints out;
+  for (size_t j = 0; j < kJoints; ++j)
+    out[j] = Eigen::Map<const Point>(t.data<float>() + 3 * j).cast<double>();
+  return out;
+}
+
+Points points_of(const Tensor& t) {
+  Points out(static_cast<size_t>(t.numel() / 3));
+  for (size_t i = 0; i < out.size(); ++i) out[i] = Eigen::Map<const Point>(t.data<float>() + 3 * i);
+  return out;
+}
+
+Tensor tensor_of(const Points& points) {
+  Tensor t = Tensor::empty({static_cast<int64_t>(points.size()), 3});
+  std::copy_n(points[0].data(), t.numel(), t.data<float>());
+  return t;
+}
+
+class SkeletonOnline : public Item {
+ public:
+  SkeletonOnline(const Inputs& inputs, const std::string& variant, bool)
+      : net_(make_skeleton_model("skeleton/point_transformer", {}, Init{})),
+        clouds_(inputs.at("frames.clouds")),
+        frames_(clouds_.size(0)) {
+    inputs.load(*net_, variant, "skeleton");
+    make_dense(*net_, variant);
+  }
+  static std::unique_ptr<Item> make(const Inputs& i, const std::string& v, bool d) {
+    return std::make_unique<SkeletonOnline>(i, v, d);
+  }
+  void run() override { joints_ = extract(frames_.next()); }
+  std::vector<double> check() override {
+    joints_ = extract(0);
+    return summary(joints_);
+  }
+
+ private:
+  Tensor extract(int64_t frame) {
+    Context ctx;
+    return net_->forward(ctx, clouds_.rows(frame, frame + 1)).joints.value;
+  }
+  std::unique_ptr<SkeletonModel> net_;
+  Tensor clouds_, joints_;
+  Frames frames_;
+};
+
+/// `flushed`: the weights come from memory, as they do when an extractor ran in between.
+template <bool flushed>
+class MotionOnline : public Item {
+ public:
+  MotionOnline(const Inputs& inputs, const std::string& variant, bool)
+      : net_(SmrmConfig{}, Init{}),
+        joints_(inputs.at("frames.joints")),
+        rest_(inputs.at("target.joints").reshape({1, kJoints, 3})),
+        trans_(Tensor::zeros({1, 1, 3})),
+        frames_(joints_.size(0)) {
+    inputs.load(net_, variant, "smrm");
+  }
+  static std::unique_ptr<Item> make(const Inputs& i, const std::string& v, bool d) {
+    return std::make_unique<MotionOnline>(i, v, d);
+  }
+  void prepare() override {
+    if (flushed) flush_.run();
+  }
+  void run() override { step(frames_.next()); }
+  std::vector<double> check() override {
+    for (int64_t i = 0; i < 3; ++i) step(i);
+    return summary(answer_.joints.value);
+  }
+
+ private:
+  void step(int64_t frame) {
+    Context ctx;
+    answer_ = net_(ctx, joints_.rows(frame, frame + 1).reshape({1, 1, kJoints, 3}), trans_, rest_,
+                   &state_);
+  }
+  CacheFlush flush_{flushed};
+  Smrm net_;
+  Tensor joints_, rest_, trans_;
+  SmrmState state_;
+  SmrmOutput answer_;
+  Frames frames_;
+};
+
+ModelSet paper_models(const Inputs& inputs, const std::string& variant) {
+  ModelSet set;
+  const auto fill = [&](const char* name, const char* file) {
+    auto net = make_model(name, {}, Init{});
+    inputs.load(*net, variant, file);
+    put_model(&set, name, {}, std::move(net));
+  };
+  fill("skeleton/point_transformer", "skeleton");
+  fill("smrm/rot6d", "smrm");
+  fill("deformation/weights", "weights");
+  fill("deformation/offsets", "offsets");
+  return set;
+}
+
+Mesh target_of(const Inputs& inputs) { return {points_of(inputs.at("target.points")), {}}; }
+
+/// The target's points in one pose; the skinning weights are the retargeter's, made once.
+class DeformationOnline : public Item {
+ public:
+  DeformationOnline(const Inputs& inputs, const std::string& variant, bool)
+      : models_(paper_models(inputs, variant)),
+        retargeter_(models_, target_of(inputs), joints_of(inputs.at("target.joints")), {}) {
+    const Tensor& local = inputs.at("pairs.local");
+    for (int64_t i = 0; i < local.size(0); ++i) {
+      const float* r = local.data<float>() + i * kJoints * 9;
+      for (size_t j = 0; j < kJoints; ++j)
+        poses_[static_cast<size_t>(i)].local[j] =
+            Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(r + 9 * j).cast<double>();
+    }
+  }
+  static std::unique_ptr<Item> make(const Inputs& i, const std::string& v, bool d) {
+    return std::make_unique<DeformationOnline>(i, v, d);
+  }
+  void run() override {
+    points_ = retargeter_.pose_vertices(poses_[static_cast<size_t>(frames_.next())]);
+  }
+  std::vector<double> check() override {
+    points_ = retargeter_.pose_vertices(poses_[0]);
+    return summary(tensor_of(points_));
+  }
+
+ private:
+  ModelSet models_;
+  Retargeter retargeter_;
+  std::array<Pose, 4> poses_;
+  Points points_;
+  Frames frames_{4};
+};
+
+/// Cloud in, posed target out.
+class FrameOnline : public Item {
+ public:
+  FrameOnline(const Inputs& inputs, ModelSet models)
+      : models_(std::move(models)),
+        retargeter_(models_, target_of(inputs), joints_of(inputs.at("target.joints")), {}) {
+    const Tensor& clouds = inputs.at("frames.clouds");
+    for (int64_t i = 0; i < clouds.size(0); ++i)
+      clouds_.push_back(points_of(clouds.rows(i, i + 1)));
+    frames_ = Frames(clouds.size(0));
+  }
+  static std::unique_ptr<Item> make(const Inputs& inputs, const std::string& variant, bool) {
+    return std::make_unique<FrameOnline>(inputs, paper_models(inputs, variant));
+  }
+  static std::unique_ptr<Item> make_lite(const Inputs& inputs, const std::string&, bool) {
+    return std::make_unique<FrameOnline>(
+        inputs, load_models(inputs.lite(), {.skeleton = true, .smrm = true, .deformation = true}));
+  }
+  void run() override { push(frames_.next()); }
+  /// Vertices of the third frame relative to the pelvis.
+  std::vector<double> check() override {
+    for (int64_t i = 0; i < 3; ++i) push(i);
+    Points p = answer_.at(0).vertices;
+    for (Point& x : p) x -= answer_[0].joints[0].cast<float>();
+    return summary(tensor_of(p));
+  }
+
+ private:
+  void push(int64_t frame) {
+    answer_ = retargeter_.push(clouds_[static_cast<size_t>(frame)], "bench");
+  }
+  ModelSet models_;
+  Retargeter retargeter_;
+  std::vector<Points> clouds_;
+  std::vector<RetargetedFrame> answer_;
+  Frames frames_{1};
+};
+
+}  // namespace
+
+std::vector<ItemInfo> online_items() {
+  const double deformation = offsets_gflop(kSurfacePoints) + skinning_gflop(kSurfacePoints);
+  return {{"skeleton_online",
+           "point transformer",
+           "frame",
+           1,
+           extractor_gflop(),
+           {"skeleton"},
+           SkeletonOnline::make,
+           true},
+          {"smrm_online",
+           "SMRM, caches flushed before every frame",
+           "frame",
+           1,
+           motion_gflop(),
+           {},
+           MotionOnline<true>::make},
+          {"smrm_online_warm",
+           "SMRM, caches as the last frame left them",
+           "frame",
+           1,
+           motion_gflop(),
+           {},
+           MotionOnline<false>::make},
+          {"deformation_online",
+           "offsets and skinning of 6,890 points",
+           "frame",
+           1,
+           deformation,
+           {"offsets"},
+           DeformationOnline::make},
+          {"frame_online",
+           "whole frame, paper's models",
+           "frame",
+           1,
+           extractor_gflop() + motion_gflop() + deformation,
+           {"skeleton", "offsets"},
+           FrameOnline::make},
+          {"frame_online_lite",
+           "whole frame, lite models",
+           "frame",
+           1,
+           0,
+           {},
+           FrameOnline::make_lite,
+           false,
+           "lite"}};
+}
+
+}  // namespace restage::bench

@@ -1,0 +1,138 @@
+// Times what items.h lists. A driver (measure.py) starts it and asks, so that it can let this
+// program and LibTorch's (libtorch/) take turns:
+//   restage_bench inputs FOLDER ...    makes what both read
+//   restage_bench list FOLDER          the items, as JSON
+//   restage_bench serve FOLDER         answers requests, one line of JSON for each line:
+//     run ITEM VARIANT N               {"ms": [N times]}, after one repetition that is not timed
+//                                      if the item is not the last one asked for; where units are
+//                                      left out also the shares that were not, "active" and
+//                                      "active_scores" (autograd/kernels/stats.h), and "done_gflop"
+//                                      of one repetition
+//     check ITEM VARIANT               {"values": [...]}
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cmath>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "autograd/base/parallel.h"
+#include "autograd/kernels/stats.h"
+#include "bench/items.h"
+
+namespace restage::bench {
+namespace {
+
+using nlohmann::json;
+
+json list(const Inputs& inputs) {
+  json out = json::array();
+  for (const ItemInfo& i : items()) {
+    std::vector<std::string> variants = {i.variant};
+    if (std::any_of(i.models.begin(), i.models.end(),
+                    [&](const std::string& m) { return inputs.has("trained", m); }))
+      variants.push_back("trained");
+    if (i.dense) variants.push_back("dense");
+    out.push_back({{"name", i.name},
+                   {"what", i.what},
+                   {"per", i.per},
+                   {"examples", i.examples},
+                   {"gflop", i.gflop},
+                   {"variants", variants}});
+  }
+  return out;
+}
+
+class Server {
+ public:
+  explicit Server(const std::string& folder) : inputs_(folder) {}
+
+  json answer(const std::string& line) {
+    std::istringstream words(line);
+    std::string verb, name, variant;
+    int repeats = 1;
+    words >> verb >> name >> variant;
+    if (verb == "check") return {{"values", make(name, variant, false)->check()}};
+    if (verb != "run" || !(words >> repeats))
+      throw std::invalid_argument("unknown request: " + line);
+    return times(name, variant, repeats);
+  }
+
+ private:
+  std::unique_ptr<Item> make(const std::string& name, const std::string& variant, bool dropout) {
+    for (const ItemInfo& i : items())
+      if (i.name == name) return i.make(inputs_, variant, dropout);
+    throw std::invalid_argument("there is no item '" + name + "'");
+  }
+
+  json times(const std::string& name, const std::string& variant, int repeats) {
+    if (const std::string wanted = name + " " + variant; wanted != current_) {
+      item_.reset();
+      item_ = make(name, variant, true);
+      current_ = wanted;
+      item_->run();
+    }
+    std::vector<double> ms;
+    take_kernel_stats();
+    for (int i = 0; i < repeats; ++i) {
+      item_->prepare();
+      const auto start = std::chrono::steady_clock::now();
+      item_->run();
+      ms.push_back(
+          std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+              .count());
+    }
+    const KernelStats work = take_kernel_stats();
+    json out = {{"ms", ms}};
+    if (std::isfinite(work.active_share)) {
+      out["active"] = work.active_share;
+      out["active_scores"] = work.active_score_share;
+      out["done_gflop"] = 1e-9 * work.flops / std::max(1, repeats);
+    }
+    return out;
+  }
+
+  Inputs inputs_;
+  std::string current_;
+  std::unique_ptr<Item> item_;
+};
+
+int serve(const std::string& folder) {
+  Server server(folder);
+  for (std::string line; std::getline(std::cin, line);)
+    std::cout << server.answer(line).dump() << std::endl;
+  return 0;
+}
+
+int run(int argc, char** argv) {
+  CLI::App app("Times Restage; bench/README.md says how");
+  app.require_subcommand(1);
+  std::string folder;
+  InputSettings settings;
+  int threads = 0;
+  CLI::App* make = app.add_subcommand("inputs", "make the folder of inputs");
+  make->add_option("--data", settings.data, "'builtin' or a data set file");
+  make->add_option("--trained", settings.trained, "weights file with a paper-size extractor");
+  make->add_option("--lite", settings.lite, "weights file of the lite models")->required();
+  CLI::App* show = app.add_subcommand("list", "list the items as JSON");
+  CLI::App* answer = app.add_subcommand("serve", "answer requests on standard input");
+  answer->add_option("--threads", threads, "number of threads (0: all cores)");
+  for (CLI::App* sub : {make, show, answer}) sub->add_option("folder", folder)->required();
+  CLI11_PARSE(app, argc, argv);
+  set_threads(threads);
+  if (*make) make_inputs(folder, settings);
+  if (*show) std::cout << list(Inputs(folder)).dump(1) << '\n';
+  return *answer ? serve(folder) : 0;
+}
+
+}  // namespace
+}  // namespace restage::bench
+
+int main(int argc, char** argv) {
+  try {
+    return restage::bench::run(argc, argv);
+  } catch (const std::exception& e) {
+    std::cerr << "restage_bench: " << e.what() << '\n';
+    return 1;
+  }
+}

@@ -1,0 +1,180 @@
+// Full training steps as the trainer does them: forward, backward, Adam.
+#include <functional>
+
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/reduce.h"
+#include "bench/items.h"
+#include "bench/work.h"
+#include "nn/losses/deformation.h"
+#include "nn/losses/motion.h"
+#include "train/optim/adam.h"
+#include "train/stage.h"
+
+namespace restage::bench {
+namespace {
+
+constexpr double kRate = 1e-5;  // small, so that weights stay what the variant says
+constexpr int kClouds = 4;
+
+/// A model, a loss and an optimiser; the same batch in every step.
+class Training : public Item {
+ public:
+  using Loss = std::function<Var(Context&)>;
+
+  void run() override { adam_->step(differentiate(key_.fold(step_++), loss_).gradients, kRate, 0); }
+  std::vector<double> check() override {
+    const Differentiated d = differentiate(key_, loss_);
+    return {d.loss, d.norm};
+  }
+
+ protected:
+  void train(const std::vector<std::pair<std::string, Module*>>& modules, Loss loss) {
+    adam_ = std::make_unique<Adam>(modules, AdamConfig{});
+    loss_ = std::move(loss);
+  }
+
+ private:
+  std::unique_ptr<Adam> adam_;
+  Loss loss_;
+  RngKey key_ = RngKey{0, 0}.fold("bench");
+  uint64_t step_ = 0;
+};
+
+ModelSizes sizes_with(bool dropout) {
+  ModelSizes sizes;
+  if (!dropout) sizes.dropout = 0;
+  return sizes;
+}
+
+/// Either extractor.
+class SkeletonTraining : public Training {
+ public:
+  SkeletonTraining(const Inputs& inputs, const std::string& variant, const std::string& model,
+                   const std::string& file, bool dropout)
+      : net_(make_skeleton_model(model, sizes_with(dropout), Init{})) {
+    inputs.load(*net_, variant, file);
+    make_dense(*net_, variant);
+    const Var points = inputs.at("clouds.points"), joints = inputs.at("clouds.joints");
+    train({{"", net_.get()}},
+          [=, this](Context& ctx) { return mse(net_->forward(ctx, points).joints, joints); });
+  }
+
+ private:
+  std::unique_ptr<SkeletonModel> net_;
+};
+
+std::unique_ptr<Item> skeleton(const Inputs& inputs, const std::string& variant, bool dropout) {
+  return std::make_unique<SkeletonTraining>(inputs, variant, "skeleton/point_transformer",
+                                            "skeleton", dropout);
+}
+
+std::unique_ptr<Item> pointnet(const Inputs& inputs, const std::string& variant, bool dropout) {
+  return std::make_unique<SkeletonTraining>(inputs, variant, "skeleton/pointnet", "pointnet",
+                                            dropout);
+}
+
+/// A to B and back to A, losses without the discriminator's.
+template <int64_t batch>
+class MotionTraining : public Training {
+ public:
+  MotionTraining(const Inputs& inputs, const std::string& variant, bool dropout)
+      : net_(config(dropout), Init{}) {
+    inputs.load(net_, variant, "smrm");
+    const auto part = [&](const char* name) {
+      return inputs.at(std::string("windows.") + name).rows(0, batch);
+    };
+    const MotionBatch b{part("joints"), part("joints"), part("trans"), part("trans"),
+                        part("rest_a"), part("rest_b"), part("sixd"),  part("self_mask")};
+    train({{"", &net_}}, [=, this](Context& ctx) {
+      return motion_losses(ctx, net_, nullptr, b, MotionWeights{}).total;
+    });
+  }
+  static std::unique_ptr<Item> make(const Inputs& inputs, const std::string& variant,
+                                    bool dropout) {
+    return std::make_unique<MotionTraining>(inputs, variant, dropout);
+  }
+
+ private:
+  static SmrmConfig config(bool dropout) {
+    SmrmConfig c;
+    if (!dropout) c.dropout = 0;
+    return c;
+  }
+  Smrm net_;
+};
+
+/// Skinning weights and offsets together.
+class DeformationTraining : public Training {
+ public:
+  DeformationTraining(const Inputs& inputs, const std::string& variant, bool dropout)
+      : weights_(make_weight_net(Init{})), offsets_(make_offset_net(Init{})) {
+    inputs.load(*weights_, variant, "weights");
+    inputs.load(*offsets_, variant, "offsets");
+    name_scopes(*weights_, "weights");
+    name_scopes(*offsets_, "offsets");
+    if (!dropout) weights_->dropout_rate = offsets_->dropout_rate = 0;
+    const DeformationBatch b{inputs.at("pairs.rest_points"), inputs.at("pairs.posed_points"),
+                             inputs.at("pairs.rest_joints"), inputs.at("pairs.local"),
+                             inputs.at("pairs.axis_angle").reshape({-1, 3 * kJoints})};
+    train({{"weights.", weights_.get()}, {"offsets.", offsets_.get()}}, [=, this](Context& ctx) {
+      return scale(
+          squared_distance_sum(deform(ctx, *weights_, offsets_.get(), b).posed, b.posed_points),
+          1.0 / kClouds);
+    });
+  }
+  static std::unique_ptr<Item> make(const Inputs& inputs, const std::string& variant,
+                                    bool dropout) {
+    return std::make_unique<DeformationTraining>(inputs, variant, dropout);
+  }
+
+ private:
+  std::unique_ptr<Mlp3> weights_, offsets_;
+};
+
+}  // namespace
+
+std::vector<ItemInfo> training_items() {
+  const double extractor = 3 * extractor_gflop(), window = 2 * 30 * 3 * motion_gflop();
+  // Nobody asks for the gradient of the networks' inputs.
+  const double inputs =
+      2 * gflop_of(static_cast<double>(kSurfacePoints * (3 * kJoints + 3) * kMlpWidth));
+  const double pair = 3 * (weights_gflop(kSurfacePoints) + offsets_gflop(kSurfacePoints)) - inputs;
+  return {{"skeleton_train",
+           "point transformer, batch 4",
+           "cloud",
+           kClouds,
+           extractor,
+           {"skeleton"},
+           skeleton,
+           true},
+          {"smrm_train_b16",
+           "SMRM, batch 16, windows of 30",
+           "window",
+           16,
+           window,
+           {},
+           MotionTraining<16>::make},
+          {"smrm_train_b64",
+           "SMRM, batch 64, windows of 30",
+           "window",
+           64,
+           window,
+           {},
+           MotionTraining<64>::make},
+          {"deformation_train",
+           "skinning weights and offsets, batch 4 of 6,890 points",
+           "pair",
+           kClouds,
+           pair,
+           {},
+           DeformationTraining::make},
+          {"pointnet_train",
+           "PointNet, batch 4",
+           "cloud",
+           kClouds,
+           3 * pointnet_gflop(),
+           {},
+           pointnet}};
+}
+
+}  // namespace restage::bench
