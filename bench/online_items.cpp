@@ -174,7 +174,7 @@ class FrameOnline : public Item {
   /// Vertices of the third frame relative to the pelvis.
   std::vector<double> check() override {
     for (int64_t i = 0; i < 3; ++i) push(i);
-    Points p = answer_.at(0).vertices;
+    Points p = answer_[0].vertices;
     for (Point& x : p) x -= answer_[0].joints[0].cast<float>();
     return summary(tensor_of(p));
   }
@@ -186,7 +186,7 @@ class FrameOnline : public Item {
   ModelSet models_;
   Retargeter retargeter_;
   std::vector<Points> clouds_;
-  std::vector<RetargetedFrame> answer_;
+  std::span<const RetargetedFrame> answer_;
   Frames frames_{1};
 };
 

@@ -120,9 +120,8 @@ void unit_grad(const Attention<T>& a, int64_t t, const T* r, const T* hidden, T*
 
 template <class T>
 T dot(int64_t n, const T* x, const T* y) {
-  T total = 0;
-  for (int64_t i = 0; i < n; ++i) total += x[i] * y[i];
-  return total;
+  return sum_of(
+      n, [](auto a, auto b) HWY_ATTR { return hn::Mul(a, b); }, x, y);
 }
 
 /// Gradient of the points from that of the offsets of a tile's pairs: through the active units

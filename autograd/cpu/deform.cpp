@@ -11,6 +11,7 @@
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/kernels.h"
 #include "autograd/cpu/targets.h"
+#include "autograd/kernels/stats.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
@@ -221,6 +222,9 @@ void tiles(const DeformArgs& args, const Field* field, int64_t from, int64_t to)
     if (field) {
       prepare_tile(*field, t, x, args.dense, s);
       for (int64_t p = 0; p < P; p += kVectors * kLanes) offset_points(*field, s, x + p, moved + p);
+      count_units(std::ssize(s.active), field->units);
+      count_flops(2.0 * static_cast<double>(P * field->width) *
+                  static_cast<double>(s.terms.size() + 3));
       if (args.active) args.active->data<int32_t>()[t] = static_cast<int32_t>(s.active.size());
       x = moved;
     }

@@ -16,6 +16,7 @@
 #include "autograd/cpu/kernels.h"
 #include "autograd/cpu/targets.h"
 #include "autograd/cpu/workspace.h"
+#include "autograd/kernels/stats.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
@@ -282,6 +283,7 @@ void run(const MatmulArgs& args) {
     for (int64_t i = 0; i < batch; ++i) empty_sum(product(i));
     return;
   }
+  count_flops(2.0 * static_cast<double>(batch * m * n * k));
   const Cut cut = Cut::of(product(0), batch);
   if (batch == 1) return single(product(0), cut);
   const int64_t tiles = tiles_of(m, n, cut);

@@ -13,6 +13,7 @@
 #include "autograd/cpu/math-inl.h"
 #include "autograd/cpu/targets.h"
 #include "autograd/cpu/workspace.h"
+#include "autograd/kernels/stats.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
@@ -277,10 +278,12 @@ struct Backward {
 }  // namespace
 
 void gru(const GruArgs& args) {
+  count_flops(6.0 * static_cast<double>(args.out.numel() * args.h0.size(1)));
   dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { Forward<decltype(zero)>(args).run(); });
 }
 
 void gru_grad(const GruGradArgs& args) {
+  count_flops(6.0 * static_cast<double>(args.gy.numel() * args.h0.size(1)));
   dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { Backward<decltype(zero)>(args).run(); });
 }
 
