@@ -7,6 +7,8 @@
 #define RESTAGE_CPU_PACKED_PRODUCT_INL_H
 #endif
 
+#include <cstring>
+
 #include "autograd/cpu/buffer.h"
 #include "autograd/cpu/gemm_tile-inl.h"
 #include "autograd/kernels/stats.h"
@@ -76,7 +78,7 @@ HWY_INLINE void product_tile(int64_t rows, int64_t columns, int64_t k, const T* 
     return;
   }
   alignas(kVectorBytes) T tile[kRows * cols];
-  std::copy_n(&acc[0][0][0], kRows * cols, tile);
+  std::memcpy(tile, acc, sizeof tile);
   for (int64_t i = 0; i < rows; ++i)
     for (int64_t j = 0; j < columns; ++j)
       out[i * ld + j] = add ? out[i * ld + j] + tile[i * cols + j] : tile[i * cols + j];
