@@ -108,7 +108,7 @@ void Retargeter::prepare() {
           target_.vertices[i][c] - static_cast<float>(rest_[0][c]);
   Context ctx;
   const Tensor weights =
-      (*models_.weights)(ctx, join_points(Var(rest_tensor_.reshape({1, 3 * kJoints})), Var(points)))
+      models_.weights->at_points(ctx, Var(rest_tensor_.reshape({1, 3 * kJoints})), Var(points))
           .value.reshape({v, kJoints});
   weights_ = Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, kJoints, Eigen::RowMajor>>(
       weights.data<float>(), v, kJoints);

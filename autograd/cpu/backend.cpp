@@ -14,6 +14,7 @@ class CpuBackend final : public Backend {
     add<BinaryArgs, cpu::binary>();
     add<AccumulateArgs, cpu::accumulate>();
     add<DropoutArgs, cpu::dropout>();
+    add<ReluDropoutGradArgs, cpu::relu_dropout_grad>();
     add<ExpandArgs, cpu::expand>();
     add<NonFiniteArgs, cpu::non_finite>();
     add<SumArgs, cpu::sum>();

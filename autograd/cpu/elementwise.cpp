@@ -238,11 +238,34 @@ void dropout(const DropoutArgs& args) {
       const auto drop = [](auto x, auto f) HWY_ATTR {  // NaN and infinity, too
         return hn::IfThenZeroElse(hn::Eq(f, hn::Zero(hn::DFromV<decltype(f)>())), hn::Mul(x, f));
       };
+      const auto drop_relu = [&](auto x, auto f) HWY_ATTR {
+        return drop(hn::IfThenZeroElse(hn::Le(x, hn::Zero(hn::DFromV<decltype(x)>())), x), f);
+      };
       for (int64_t i = from; i < to; i += kBlock) {
         dropout_factors(args.key, limit, kept, i, kBlock, words, factors);
-        map(std::min(kBlock, to - i), args.out.data<T>() + i, drop, args.x.data<T>() + i,
-            static_cast<const T*>(factors));
+        const T *x = args.x.data<T>() + i, *f = factors;
+        T* out = args.out.data<T>() + i;
+        if (args.relu) {
+          map(std::min(kBlock, to - i), out, drop_relu, x, f);
+        } else {
+          map(std::min(kBlock, to - i), out, drop, x, f);
+        }
       }
+    });
+  });
+}
+
+void relu_dropout_grad(const ReluDropoutGradArgs& args) {
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
+    using T = decltype(zero);
+    const auto kept = static_cast<T>(1.0 / (1.0 - args.p));
+    const auto pass = [kept](auto g, auto y) HWY_ATTR {
+      const hn::DFromV<decltype(y)> d;
+      return hn::IfThenZeroElse(hn::Le(y, hn::Zero(d)), hn::Mul(g, hn::Set(d, kept)));
+    };
+    parallel_for(args.out.numel(), kGrain, [&](int64_t from, int64_t to) HWY_ATTR {
+      map(to - from, args.out.data<T>() + from, pass, args.gy.data<T>() + from,
+          args.y.data<T>() + from);
     });
   });
 }
@@ -272,6 +295,7 @@ RESTAGE_KERNEL(binary, BinaryArgs)
 RESTAGE_KERNEL(expand, ExpandArgs)
 RESTAGE_KERNEL(accumulate, AccumulateArgs)
 RESTAGE_KERNEL(dropout, DropoutArgs)
+RESTAGE_KERNEL(relu_dropout_grad, ReluDropoutGradArgs)
 RESTAGE_KERNEL(non_finite, NonFiniteArgs)
 }  // namespace restage::cpu
 #endif

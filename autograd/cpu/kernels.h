@@ -21,6 +21,7 @@ void unary_grad(const UnaryGradArgs&);
 void binary(const BinaryArgs&);
 void accumulate(const AccumulateArgs&);
 void dropout(const DropoutArgs&);
+void relu_dropout_grad(const ReluDropoutGradArgs&);
 void expand(const ExpandArgs&);
 void non_finite(const NonFiniteArgs&);
 void sum(const SumArgs&);

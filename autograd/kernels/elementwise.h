@@ -55,13 +55,24 @@ struct AccumulateArgs {
   const Tensor& a;
   Tensor& out;
 };
-/// out[i] = keep(i) ? x[i] / (1 - p) : 0, keep a function of (key, i) (see rng.h).
+/// out[i] = keep(i) ? x[i] / (1 - p) : 0, keep a function of (key, i) (see rng.h); relu(x) for x on
+/// request.
 struct DropoutArgs {
   static constexpr std::string_view name = "dropout";
   const Tensor& x;
   Tensor& out;
   double p;
   RngKey key;
+  bool relu = false;
+};
+/// Gradient of DropoutArgs with relu, from its result y, whose zeros are those of both:
+/// out = y > 0 ? gy / (1 - p) : 0.
+struct ReluDropoutGradArgs {
+  static constexpr std::string_view name = "relu_dropout_grad";
+  const Tensor& y;
+  const Tensor& gy;
+  Tensor& out;
+  double p;
 };
 /// out = x repeated to out's shape (numpy broadcasting).
 struct ExpandArgs {

@@ -134,6 +134,24 @@ Grads Dropout::backward(const Saved&, const Tensor& gy, Needs) const {
   return {gx};
 }
 
+void ReluDropout::check(Inputs x) const {
+  require_floats(name, letters, x);
+  if (p < 0 || p >= 1) shape_error(name, letters, x, "p must be in [0, 1)");
+}
+
+Tensor ReluDropout::forward(Inputs x, Saved& saved) const {
+  Tensor y = Tensor::empty(x[0].shape(), x[0].dtype(), x[0].device());
+  launch(DropoutArgs{x[0], y, p, key, true});
+  saved.keep({y});
+  return y;
+}
+
+Grads ReluDropout::backward(const Saved& saved, const Tensor& gy, Needs) const {
+  Tensor gx = Tensor::empty(gy.shape(), gy.dtype(), gy.device());
+  launch(ReluDropoutGradArgs{saved[0], gy, gx, p});
+  return {gx};
+}
+
 template struct UnaryOp<Unary::neg>;
 template struct UnaryOp<Unary::exp>;
 template struct UnaryOp<Unary::log>;

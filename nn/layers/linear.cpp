@@ -58,4 +58,9 @@ Var dropout(const Context& ctx, const Var& x, double p, const std::string& name)
   return dropout(x, p, ctx.rng.fold(module_path() + "." + name));
 }
 
+Var relu_dropout(const Context& ctx, const Var& x, double p, const std::string& name) {
+  if (!ctx.training || p <= 0) return relu(x);
+  return relu_dropout(x, p, ctx.rng.fold(module_path() + "." + name));
+}
+
 }  // namespace restage

@@ -15,10 +15,10 @@ DeformationOutput deform(Context& ctx, const Mlp3& weights, const Mlp3* offsets,
                          const Var& axis_angle) {
   const int64_t n = rest_points.size(0);
   DeformationOutput out;
-  out.weights = weights(ctx, join_points(reshape(rest_joints, {n, 3 * kJoints}), rest_points));
+  out.weights = weights.at_points(ctx, reshape(rest_joints, {n, 3 * kJoints}), rest_points);
   Var x = rest_points;
   if (offsets != nullptr) {
-    out.offsets = (*offsets)(ctx, join_points(axis_angle, rest_points));
+    out.offsets = offsets->at_points(ctx, axis_angle, rest_points);
     x = x + out.offsets;
   }
   const Var root = reshape(slice(rest_joints, 1, 0, 1), {n, 3});

@@ -2,6 +2,7 @@
 
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
+#include "autograd/ops/linear.h"
 #include "autograd/ops/reduce.h"
 
 namespace restage {
@@ -13,13 +14,37 @@ Mlp3::Mlp3(int64_t in, int64_t out, int64_t width, double dropout, bool softmax,
       dropout_rate(dropout),
       with_softmax(softmax) {}
 
-Var Mlp3::operator()(Context& ctx, const Var& x) const {
-  const ModuleScope path(scope);
+Var Mlp3::from_first(Context& ctx, const Var& sums) const {
   // ReLU and dropout commute, since the mask is never negative.
-  const Var h1 = dropout(ctx, fc1(ctx, x, Activation::relu), dropout_rate, "dropout1");
-  const Var h2 = dropout(ctx, fc2(ctx, h1, Activation::relu), dropout_rate, "dropout2");
+  const Var h1 = relu_dropout(ctx, sums, dropout_rate, "dropout1");
+  const Var h2 = ctx.training && dropout_rate > 0
+                     ? relu_dropout(ctx, fc2(ctx, h1), dropout_rate, "dropout2")
+                     : fc2(ctx, h1, Activation::relu);
   const Var y = fc3(ctx, h2);
   return with_softmax ? softmax(y) : y;
+}
+
+Var Mlp3::operator()(Context& ctx, const Var& x) const {
+  const ModuleScope path(scope);
+  return from_first(ctx, fc1(ctx, x));
+}
+
+// W [vector; p] + b = [W_p, (W_c vectors + b)] [p; one], with `one` the unit vector of the sample:
+// a product of n + 3 columns, whose gradient gives that of the vectors' part as well.
+Var Mlp3::at_points(Context& ctx, const Var& vector, const Var& points) const {
+  const int64_t n = points.size(0), v = points.size(1), c = vector.size(1);
+  if (n > c) return (*this)(ctx, join_points(vector, points));
+  const ModuleScope path(scope);
+  Tensor one = Tensor::zeros({n, v, n}, points.dtype());
+  for (int64_t i = 0; i < n; ++i)
+    for (int64_t j = 0; j < v; ++j) {
+      const int64_t at = (i * v + j) * n + i;
+      points.dtype() == DType::f64 ? one.data<double>()[at] = 1 : one.data<float>()[at] = 1;
+    }
+  const Var w = ctx.bind(fc1.weight);
+  const Var of_vectors = linear(vector, slice(w, 1, 0, c), ctx.bind(fc1.bias));
+  const Var both = concat({slice(w, 1, c, c + 3), permute(of_vectors, {1, 0})}, 1);
+  return from_first(ctx, linear(concat({points, Var(one)}, 2), both));
 }
 
 Var Mlp3::with_masks(Context& ctx, const Var& x, const Tensor& mask1, const Tensor& mask2) const {

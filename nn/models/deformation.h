@@ -12,6 +12,9 @@ namespace restage {
 struct Mlp3 : Module {
   Mlp3(int64_t in, int64_t out, int64_t width, double dropout, bool softmax, const Init& init);
   Var operator()(Context& ctx, const Var& x) const;
+  /// The same for join_points(vector, points): what a sample's vector [n, c] gives the first layer
+  /// is computed once and not for each of its points [n, v, 3].
+  Var at_points(Context& ctx, const Var& vector, const Var& points) const;
   /// The same with given 0/1 dropout masks.
   Var with_masks(Context& ctx, const Var& x, const Tensor& mask1, const Tensor& mask2) const;
   void visit(Fields& f) override;
@@ -19,6 +22,10 @@ struct Mlp3 : Module {
   Linear fc1, fc2, fc3;
   double dropout_rate;
   bool with_softmax;
+
+ private:
+  /// All that follows the first layer's sums.
+  Var from_first(Context& ctx, const Var& sums) const;
 };
 
 inline constexpr int64_t kMlpWidth = 256;
