@@ -1,0 +1,243 @@
+// Fused ops against their composed references.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "autograd/gradcheck/evaluate.h"
+#include "autograd/kernels/stats.h"
+#include "autograd/ops/attention.h"
+#include "autograd/ops/linear.h"
+#include "autograd/ops/norm.h"
+#include "autograd/ops/points.h"
+#include "autograd/ops/pooled_norm.h"
+#include "autograd/ops/reduce.h"
+#include "autograd/ops/rnn.h"
+#include "tests/support/expect_near.h"
+
+namespace restage {
+namespace {
+
+using gradcheck::Args;
+using gradcheck::Build;
+using gradcheck::evaluate;
+using gradcheck::Evaluation;
+using gradcheck::random;
+using gradcheck::same_bits;
+using gradcheck::Sample;
+
+/// Values and gradients of two ways to compute the same.
+void expect_equal(const std::vector<Tensor>& inputs, const Build& fused, const Build& reference,
+                  double tolerance) {
+  const Sample a{"fused", inputs, fused}, b{"reference", inputs, reference};
+  const Tensor u = random(gradcheck::value_of(a, inputs).shape(), 3).cast(inputs[0].dtype());
+  const Evaluation ea = evaluate(a, u), eb = evaluate(b, u);
+  expect_near(ea.value, eb.value, tolerance, "value");
+  for (size_t k = 0; k < inputs.size(); ++k)
+    expect_near(ea.gradients[k], eb.gradients[k], tolerance, "gradient " + std::to_string(k));
+}
+
+/// The same in both precisions.
+void expect_fused(const std::vector<Tensor>& inputs, const Build& fused, const Build& reference) {
+  expect_equal(inputs, fused, reference, 1e-11);
+  std::vector<Tensor> narrow;
+  for (const Tensor& t : inputs) narrow.push_back(t.cast(DType::f32));
+  expect_equal(narrow, fused, reference, 2e-4);
+}
+
+TEST(FusedOps, GruIsItsReference) {
+  for (const int64_t h : {1, 5, 16}) {
+    expect_fused(
+        {random({7, 3, 4}, 1), random({3, h}, 2), random({3 * h, 4}, 3), random({3 * h, h}, 4),
+         random({3 * h}, 5), random({3 * h}, 6)},
+        [](Args x) { return gru(x[0], x[1], x[2], x[3], x[4], x[5]); },
+        [](Args x) { return gru_reference(x[0], x[1], x[2], x[3], x[4], x[5]); });
+  }
+}
+
+TEST(FusedOps, GruOfManyRowsAndOfOneFrameIsItsReference) {
+  struct Sizes {
+    int64_t t, n, i, h;
+  };
+  // More rows than a panel and more units than a block; then weights that are read as they lie.
+  for (const auto& [t, n, i, h] : {Sizes{3, 14, 5, 40}, Sizes{1, 1, 69, 64}, Sizes{1, 4, 20, 320}})
+    expect_fused(
+        {random({t, n, i}, 1), random({n, h}, 2), random({3 * h, i}, 3), random({3 * h, h}, 4),
+         random({3 * h}, 5), random({3 * h}, 6)},
+        [](Args x) { return gru(x[0], x[1], x[2], x[3], x[4], x[5]); },
+        [](Args x) { return gru_reference(x[0], x[1], x[2], x[3], x[4], x[5]); });
+}
+
+TEST(FusedOps, AFrameOfAGruAloneHasTheBitsOfTheSequence) {
+  const int64_t t = 4, n = 3, h = 320;
+  const Tensor x = random({t, n, 9}, 1).cast(DType::f32),
+               w_ih = random({3 * h, 9}, 2).cast(DType::f32),
+               w_hh = random({3 * h, h}, 3).cast(DType::f32),
+               b_ih = random({3 * h}, 4).cast(DType::f32),
+               b_hh = random({3 * h}, 5).cast(DType::f32);
+  const Tensor h0 = random({n, h}, 6).cast(DType::f32);
+  const Tensor all = gru(Var(x), Var(h0), Var(w_ih), Var(w_hh), Var(b_ih), Var(b_hh)).value;
+  Var state(h0);
+  for (int64_t i = 0; i < t; ++i) {
+    const Var y = gru(Var(x.rows(i, i + 1)), state, Var(w_ih), Var(w_hh), Var(b_ih), Var(b_hh));
+    EXPECT_TRUE(same_bits(y.value, all.rows(i, i + 1))) << i;
+    state = reshape(y, {n, h});
+  }
+}
+
+TEST(FusedOps, AttentionPoolIsItsReference) {
+  for (const int64_t d : {1, 6, 33})
+    expect_fused(
+        {random({9, 5, d}, 1), random({9, 5, d}, 2)},
+        [](Args x) { return attention_pool(x[0], x[1], 0.4); },
+        [](Args x) { return attention_pool_reference(x[0], x[1], 0.4); });
+}
+
+/// Rows of random numbers that differ by `spread`.
+Tensor alike(const Shape& shape, uint64_t seed, double spread) {
+  Tensor x = random(shape, seed);
+  const int64_t d = shape[-1];
+  for (int64_t i = d; i < x.numel(); ++i) x.data<double>()[i] = x.item(i % d) + spread * x.item(i);
+  return x;
+}
+
+TEST(FusedOps, NeighbourAttentionIsItsReference) {
+  const int64_t v = 200, k = 5, d = 33;
+  for (const double spread : {1.0, 0.02, 1e-4}) {  // most units active, some, none
+    const Shape rows{2, v, d};
+    const Tensor xyz = alike({2, v, 3}, 1, spread), index = knn(xyz, xyz, k);
+    const std::vector<Tensor> inputs = {xyz,
+                                        alike(rows, 2, spread),
+                                        alike(rows, 3, spread),
+                                        random(rows, 4),
+                                        random({d, 3}, 5),
+                                        random({d}, 6, 0.01),
+                                        random({2 * d, d}, 7),
+                                        random({d, d}, 8),
+                                        random({d}, 9)};
+    for (const bool dense : {false, true}) {
+      take_kernel_stats();
+      expect_fused(
+          inputs,
+          [&](Args x) {
+            return neighbour_attention({x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]},
+                                       index, 0.05, dense);
+          },
+          [&](Args x) {
+            return neighbour_attention_reference(
+                {x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]}, index, 0.05);
+          });
+      const KernelStats stats = take_kernel_stats();
+      EXPECT_EQ(stats.active_share < 0.5, !dense && spread < 1);
+      EXPECT_EQ(stats.active_score_share < 0.5, !dense && spread < 1);
+    }
+  }
+}
+
+TEST(FusedOps, LinearWithReluIsMatmulPlusBiasAndRelu) {
+  expect_fused(
+      {random({5, 3, 7}, 1), random({11, 7}, 2), random({11}, 3)},
+      [](Args x) { return linear(x[0], x[1], x[2], Activation::relu); },
+      [](Args x) {
+        const Var flat = reshape(x[0], {15, 7});
+        return reshape(relu(matmul(flat, x[1], false, true) + x[2]), {5, 3, 11});
+      });
+}
+
+/// (x - mean) / sqrt(variance + eps) along `axis`, from elementary ops.
+Var normalised(const Var& x, int axis, double eps) {
+  Shape kept = x.shape();
+  kept.set(axis, 1);
+  const Var centred = x - reshape(mean(x, axis), kept);
+  const Var variance = reshape(mean(square(centred), axis), kept);
+  return centred / sqrt(add_scalar(variance, eps));
+}
+
+TEST(FusedOps, NormsAreTheirFormulas) {
+  expect_fused(
+      {random({6, 5}, 1), random({5}, 2), random({5}, 3)},
+      [](Args x) { return layer_norm(x[0], x[1], x[2]); },
+      [](Args x) { return normalised(x[0], 1, 1e-5) * x[1] + x[2]; });
+  expect_fused(
+      {random({600, 3}, 1), random({3}, 2), random({3}, 3)},
+      [](Args x) { return batch_norm(x[0], x[1], x[2], 1e-3); },
+      [](Args x) { return normalised(x[0], 0, 1e-3) * x[1] + x[2]; });
+  expect_fused(
+      {random({3, 520, 4}, 1)}, [](Args x) { return instance_norm(x[0]); },
+      [](Args x) { return normalised(x[0], 1, 1e-5); });
+}
+
+TEST(FusedOps, BatchNormReportsItsStatistics) {
+  const Tensor x = Tensor::from<double>({4, 2}, {1, 10, 2, 10, 3, 10, 6, 10});
+  BatchStatistics s;
+  batch_norm(Var(x), Var(Tensor::full({2}, 1, DType::f64)), Var(Tensor::zeros({2}, DType::f64)),
+             1e-5, &s);
+  EXPECT_EQ(s.count, 4);
+  EXPECT_DOUBLE_EQ(s.mean.item(0), 3);
+  EXPECT_NEAR(s.variance.item(0), 3.5, 1e-12);
+  EXPECT_DOUBLE_EQ(s.mean.item(1), 10);
+  EXPECT_NEAR(s.variance.item(1), 0, 1e-12);
+}
+
+/// x [n, v, i] around `centre`, W [o, i], b, scale and shift.
+std::vector<Tensor> trunk(int64_t n, int64_t v, int64_t i, int64_t o, double centre) {
+  const Tensor x = add_scalar(Var(random({n, v, i}, 1)), centre).value;
+  return {x, random({o, i}, 2), random({o}, 3), random({o}, 4, 0.1), random({o}, 5)};
+}
+
+TEST(FusedOps, PooledNormIsItsReference) {
+  for (const Activation act : {Activation::none, Activation::relu})
+    for (const auto& [n, v, i, o] :
+         {std::array<int64_t, 4>{1, 9, 2, 3}, {3, 40, 7, 70}, {2, 700, 300, 33}})
+      expect_fused(
+          trunk(n, v, i, o, 3),
+          [=](Args x) { return pooled_norm(x[0], x[1], x[2], x[3], x[4], act, 1e-3); },
+          [=](Args x) { return pooled_norm_reference(x[0], x[1], x[2], x[3], x[4], act, 1e-3); });
+}
+
+TEST(FusedOps, PooledNormReportsTheStatisticsOfItsReference) {
+  std::vector<Var> x;
+  for (const Tensor& t : trunk(3, 50, 6, 40, 20)) x.emplace_back(t);
+  BatchStatistics a, b;
+  pooled_norm(x[0], x[1], x[2], x[3], x[4], Activation::relu, 1e-5, &a);
+  pooled_norm_reference(x[0], x[1], x[2], x[3], x[4], Activation::relu, 1e-5, &b);
+  EXPECT_EQ(a.count, 150);
+  EXPECT_EQ(a.count, b.count);
+  expect_near(a.mean, b.mean, 1e-12, "mean");
+  expect_near(a.variance, b.variance, 1e-12, "variance");
+}
+
+TEST(FusedOps, PooledNormShowsWhatIsNotFinite) {
+  const double bad[] = {std::nan(""), std::numeric_limits<double>::infinity()};
+  for (size_t k = 0; k < 5; ++k)
+    for (const double value : bad) {
+      std::vector<Tensor> inputs = trunk(2, 5, 3, 4, 0);
+      inputs[k].data<double>()[0] = value;
+      const std::vector<Var> x(inputs.begin(), inputs.end());
+      const Tensor y = pooled_norm(x[0], x[1], x[2], x[3], x[4], Activation::relu).value;
+      const Tensor r = pooled_norm_reference(x[0], x[1], x[2], x[3], x[4], Activation::relu).value;
+      for (int64_t i = 0; i < y.numel(); ++i)
+        EXPECT_EQ(std::isfinite(y.item(i)), std::isfinite(r.item(i))) << k << " " << i;
+    }
+}
+
+TEST(FusedOps, Conv1dIsTheSumOverItsWindow) {
+  const int64_t n = 2, l = 9, c = 3, o = 4, k = 5, stride = 2, pad = 3, steps = 6;
+  const Tensor x = random({n, l, c}, 1), w = random({o, c, k}, 2), b = random({o}, 3);
+  const Tensor y = conv1d(Var(x), Var(w), Var(b), stride, pad, steps).value;
+  for (int64_t i = 0; i < n; ++i)
+    for (int64_t s = 0; s < steps; ++s)
+      for (int64_t q = 0; q < o; ++q) {
+        double sum = b.item(q);
+        for (int64_t j = 0; j < k; ++j) {
+          const int64_t at = s * stride - pad + j;
+          for (int64_t p = 0; at >= 0 && at < l && p < c; ++p)
+            sum += x.item((i * l + at) * c + p) * w.item((q * c + p) * k + j);
+        }
+        EXPECT_NEAR(y.item((i * steps + s) * o + q), sum, 1e-12);
+      }
+}
+
+}  // namespace
+}  // namespace restage
