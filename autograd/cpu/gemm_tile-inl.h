@@ -179,7 +179,7 @@ template <class T, int Rows, int Stride>
 HWY_INLINE void sum(int64_t k, const T* a, const T* b, Sums<T, Rows>& acc) {
   using V = typename Simd<T>::Vector;
   for (int64_t l = 0; l < k; ++l) {
-    V bv[kVectors];
+    alignas(kVectorBytes) V bv[kVectors];
 #pragma GCC unroll 2
     for (int v = 0; v < kVectors; ++v) bv[v] = *reinterpret_cast<const V*>(b + v * Simd<T>::width);
 #pragma GCC unroll 12
@@ -196,7 +196,7 @@ HWY_INLINE void sum(int64_t k, const T* a, const T* b, Sums<T, Rows>& acc) {
 template <class T, int Rows = kRows, int Stride = Rows, bool Add = false>
 inline void multiply(int64_t k, const T* a, const T* b, T* out) {
   using V = typename Simd<T>::Vector;
-  Sums<T, Rows> acc = {};
+  alignas(kVectorBytes) Sums<T, Rows> acc = {};
   sum<T, Rows, Stride>(k, a, b, acc);
 #pragma GCC unroll 12
   for (int i = 0; i < Rows; ++i) {

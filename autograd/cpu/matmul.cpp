@@ -79,7 +79,7 @@ void register_tile(const Product<T>& p, const Place& at, int64_t k, const T* a, 
   constexpr int width = Simd<T>::width, cols = Simd<T>::cols;
   T* c = p.out + at.row * p.n + at.col;
   const T* bias = p.bias ? p.bias + at.col : nullptr;
-  Sums<T, Rows> acc = {};
+  alignas(kVectorBytes) Sums<T, Rows> acc = {};
   for (int i = 0; i < Rows; ++i) hwy::Prefetch(c + i * p.n);
   sum<T, Rows, kRows>(k, a, b, acc);
   if (p.n - at.col >= cols) {

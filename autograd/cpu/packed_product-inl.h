@@ -64,7 +64,7 @@ HWY_INLINE void product_tile(int64_t rows, int64_t columns, int64_t k, const T* 
                              const T* right, T* out, int64_t ld, bool add) {
   using V = typename Simd<T>::Vector;
   constexpr int cols = Simd<T>::cols;
-  Sums<T, kRows> acc = {};
+  alignas(kVectorBytes) Sums<T, kRows> acc = {};
   sum<T, kRows, kRows>(k, left, right, acc);
   if (rows == kRows && columns == cols) {
 #pragma GCC unroll 12
