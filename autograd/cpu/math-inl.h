@@ -29,6 +29,14 @@ HWY_INLINE V keep_nan(V x, V y) {
   return hn::IfThenElse(hn::Eq(x, x), y, x);
 }
 
+/// x between -limit and limit, 0 for NaN: Highway's functions turn it into a whole number, which
+/// not every number of the baseline can become.
+template <class V>
+HWY_INLINE V within(V x, Lane<V> limit) {
+  const V top = hn::Set(hn::DFromV<V>(), limit);
+  return hn::Max(hn::Min(hn::IfThenElseZero(hn::Eq(x, x), x), top), hn::Neg(top));
+}
+
 /// exp(x) within 2 units in the last place; below 1.7e-38 (x < -87) zero. (Highway's own gives the
 /// subnormal numbers too, and takes twice as long.)
 template <class V>
@@ -63,7 +71,8 @@ HWY_INLINE V exp(V x) {
   const hn::DFromV<V> d;
   const V limit = hn::Set(d, std::log(std::numeric_limits<T>::max()));
   const V infinity = hn::Set(d, std::numeric_limits<T>::infinity());
-  return keep_nan(x, hn::IfThenElse(hn::Gt(x, limit), infinity, hn::Exp(d, hn::Min(x, limit))));
+  const V y = hn::Exp(d, within(x, T(1000)));
+  return keep_nan(x, hn::IfThenElse(hn::Gt(x, limit), infinity, y));
 }
 
 /// 1 - 2 / (exp(2 |x|) + 1), and near zero Cephes' polynomial.
@@ -86,7 +95,7 @@ HWY_INLINE V tanh_of_float(V x) {
 template <class V>
 HWY_INLINE V tanh(V x) {
   if constexpr (sizeof(Lane<V>) == sizeof(float)) return tanh_of_float(x);
-  return keep_nan(x, hn::Tanh(hn::DFromV<V>(), x));
+  return keep_nan(x, hn::Tanh(hn::DFromV<V>(), within(x, Lane<V>(20))));  // tanh(20) is 1
 }
 
 template <class V>
