@@ -131,7 +131,9 @@ void offset_grad(const Backward<T>& b, int64_t t, const T* gz, GroupSums<T>& sum
   const Attention<T>& a = b.a;
   const std::vector<int32_t>& units = a.active[static_cast<size_t>(t)];
   const int64_t m = std::ssize(units);
-  T* out = sums.xyz.template data<T>() - 3 * sums.first_row;
+  const auto out = [&](int64_t row, int64_t c) -> T& {
+    return sums.xyz.template data<T>()[3 * (row - sums.first_row) + c];
+  };
   for (int64_t c = 0; c < 3; ++c) {
     std::vector<T> w(units.size());
     choose(a.hidden.template data<T>() + c * a.d, units, w.data());
@@ -140,8 +142,8 @@ void offset_grad(const Backward<T>& b, int64_t t, const T* gz, GroupSums<T>& sum
       for (int64_t j = 0; j < a.k; ++j) {
         const int64_t pair = i * a.k + j;
         const T g = dot(m, gz + pair * m, w.data()) + on(pair, c);
-        out[3 * p + c] += g;
-        out[3 * a.neighbour(p, j) + c] -= g;
+        out(p, c) += g;
+        out(a.neighbour(p, j), c) -= g;
       }
     }
   }

@@ -27,8 +27,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
 
-inline constexpr int64_t kTilePairs =
-    240;  // of a tile: whole register tiles, and in L2 with d = 512
+/// Pairs of a tile: whole register tiles, and in L2 with d = 512.
+inline constexpr int64_t kTilePairs = 240;
 
 enum Sign : uint8_t { kOff, kActive, kOn };
 
@@ -48,6 +48,8 @@ struct Attention {
   std::vector<std::vector<int32_t>> active;  // of each tile; all units if it is done in full
   std::vector<char> full;                    // whether a tile is done in full
   bool any_full = false;
+  /// Whether scores may be split: what cancels or is left out must be finite, or NaN would vanish.
+  bool finite = false;
   Tensor on;             // [tiles, 4, d]: W and b of the units that are on
   Tensor affine;         // [tiles, 4, 2d]: on times M
   Buffer<T> full_right;  // both_t, packed, if a tile needs it
@@ -87,6 +89,15 @@ struct TileMemory {
     return memory;
   }
 };
+
+/// Whether all elements are numbers below infinity.
+template <class T>
+bool all_finite(const Tensor& t) {
+  const T* x = t.data<T>();
+  T bad = 0;
+  for (int64_t i = 0; i < t.numel(); ++i) bad = x[i] - x[i] == T(0) ? bad : T(1);
+  return bad == T(0);
+}
 
 /// out [columns, rows] = the transpose of m [rows, columns].
 template <class T>
@@ -210,6 +221,7 @@ Attention<T>::Attention(const NeighbourAttentionInputs& inputs)
       active(static_cast<size_t>(tiles.tiles())),
       full(static_cast<size_t>(tiles.tiles())) {
   transpose_weights();
+  finite = all_finite<T>(in.query) && all_finite<T>(in.key) && all_finite<T>(in.gamma);
   on = Tensor::empty({tiles.tiles(), 4, d}, in.w.dtype(), in.w.device());
   affine = Tensor::empty({tiles.tiles(), 4, 2 * d}, in.w.dtype(), in.w.device());
   parallel_for(tiles.tiles(), 4, [&](int64_t from, int64_t to) HWY_ATTR {
@@ -307,7 +319,7 @@ template <class T>
 bool split_scores(const Attention<T>& a, int64_t t, TileMemory<T>& memory) {
   memory.active.clear();
   memory.on.clear();
-  if (a.full[static_cast<size_t>(t)]) return false;
+  if (a.full[static_cast<size_t>(t)] || !a.finite) return false;
   const T *lo = memory.range.data(), *hi = lo + a.d;
   for (int64_t c = 0; c < a.d; ++c) {
     if (lo[c] > T(0)) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 
 #include "autograd/gradcheck/evaluate.h"
@@ -133,6 +134,33 @@ TEST(FusedOps, NeighbourAttentionIsItsReference) {
       EXPECT_EQ(stats.active_score_share < 0.5, !dense && spread < 1);
     }
   }
+}
+
+TEST(FusedOps, NeighbourAttentionShowsWhatIsNotFinite) {
+  const int64_t v = 60, d = 33;
+  const Shape rows{1, v, d};
+  const std::vector<Tensor> inputs = {
+      alike({1, v, 3}, 1, 1e-4), alike(rows, 2, 1e-4), alike(rows, 3, 1e-4),
+      random(rows, 4),           random({d, 3}, 5),    random({d}, 6, 0.01),
+      random({2 * d, d}, 7),     random({d, d}, 8),    random({d}, 9)};
+  const Tensor index = knn(inputs[0], inputs[0], 5);
+  for (size_t k = 0; k + 1 < inputs.size(); ++k)  // the last, g, is not seen by the softmax
+    for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity()}) {
+      std::vector<Tensor> x = inputs;
+      x[k] = x[k].clone();
+      x[k].data<double>()[x[k].numel() / 2] = bad;
+      const std::vector<Var> a(x.begin(), x.end());
+      const auto finite = [](const Var& y) {
+        double sum = 0;
+        for (const double e : y.value.to_vector<double>()) sum += e;
+        return std::isfinite(sum);
+      };
+      const Var reference = neighbour_attention_reference(
+          {a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8]}, index, 0.05);
+      const Var fused =
+          neighbour_attention({a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8]}, index, 0.05);
+      EXPECT_TRUE(finite(reference) || !finite(fused)) << "input " << k << " with " << bad;
+    }
 }
 
 TEST(FusedOps, LinearWithReluIsMatmulPlusBiasAndRelu) {
