@@ -36,7 +36,7 @@ struct Conv1d : Module {
 
 /// Zeroes elements in training with probability p; the mask is a function of step and module path.
 Var dropout(const Context& ctx, const Var& x, double p, const std::string& name = "dropout");
-/// dropout(relu(x)), the same mask.
+/// dropout(relu(x)), the same mask, in one pass.
 Var relu_dropout(const Context& ctx, const Var& x, double p, const std::string& name = "dropout");
 
 }  // namespace restage

@@ -24,8 +24,11 @@ struct Mlp3 : Module {
   bool with_softmax;
 
  private:
-  /// All that follows the first layer's sums.
-  Var from_first(Context& ctx, const Var& sums) const;
+  /// A hidden layer with ReLU and dropout; `layer` applies the activation that it is given.
+  template <class Layer>
+  Var hidden(Context& ctx, const char* name, Layer&& layer) const;
+  /// All that follows the first hidden layer.
+  Var from_first(Context& ctx, const Var& h1) const;
 };
 
 inline constexpr int64_t kMlpWidth = 256;
