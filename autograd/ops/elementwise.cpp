@@ -122,33 +122,20 @@ void Dropout::check(Inputs x) const {
   if (p < 0 || p >= 1) shape_error(name, letters, x, "p must be in [0, 1)");
 }
 
-Tensor Dropout::forward(Inputs x, Saved&) const {
+Tensor Dropout::forward(Inputs x, Saved& saved) const {
   Tensor y = Tensor::empty(x[0].shape(), x[0].dtype(), x[0].device());
-  launch(DropoutArgs{x[0], y, p, key});
+  launch(DropoutArgs{x[0], y, p, key, relu});
+  if (relu) saved.keep({y});
   return y;
 }
 
-Grads Dropout::backward(const Saved&, const Tensor& gy, Needs) const {
+Grads Dropout::backward(const Saved& saved, const Tensor& gy, Needs) const {
   Tensor gx = Tensor::empty(gy.shape(), gy.dtype(), gy.device());
-  launch(DropoutArgs{gy, gx, p, key});  // the mask is drawn again, not kept
-  return {gx};
-}
-
-void ReluDropout::check(Inputs x) const {
-  require_floats(name, letters, x);
-  if (p < 0 || p >= 1) shape_error(name, letters, x, "p must be in [0, 1)");
-}
-
-Tensor ReluDropout::forward(Inputs x, Saved& saved) const {
-  Tensor y = Tensor::empty(x[0].shape(), x[0].dtype(), x[0].device());
-  launch(DropoutArgs{x[0], y, p, key, true});
-  saved.keep({y});
-  return y;
-}
-
-Grads ReluDropout::backward(const Saved& saved, const Tensor& gy, Needs) const {
-  Tensor gx = Tensor::empty(gy.shape(), gy.dtype(), gy.device());
-  launch(ReluDropoutGradArgs{saved[0], gy, gx, p});
+  if (relu) {
+    launch(ReluDropoutGradArgs{saved[0], gy, gx, p});
+  } else {
+    launch(DropoutArgs{gy, gx, p, key});  // the mask is drawn again, not kept
+  }
   return {gx};
 }
 

@@ -54,6 +54,9 @@ struct Dropout {
   static constexpr const char* letters = "x[...]";
   double p = 0;
   RngKey key;
+  /// Of relu(x), in one pass each way: the result says what both let through, so no mask is drawn
+  /// again for the gradient.
+  bool relu = false;
   void check(Inputs x) const;
   Tensor forward(Inputs x, Saved& saved) const;
   Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
@@ -85,23 +88,11 @@ inline Var operator*(const Var& a, const Var& b) { return mul(a, b); }
 inline Var operator*(const Var& a, double c) { return scale(a, c); }
 inline Var operator/(const Var& a, const Var& b) { return div(a, b); }
 inline Var expand(const Var& x, const Shape& shape) { return call(Expand{shape}, {x}); }
-/// Dropout of relu(x) in one pass each way; its result says what both let through, so no mask is
-/// drawn or read again for the gradient.
-struct ReluDropout {
-  static constexpr const char* name = "relu_dropout";
-  static constexpr const char* letters = "x[...]";
-  double p = 0;
-  RngKey key;
-  void check(Inputs x) const;
-  Tensor forward(Inputs x, Saved& saved) const;
-  Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
-};
-inline Var relu_dropout(const Var& x, double p, const RngKey& key) {
-  return call(ReluDropout{p, key}, {x});
-}
-
 inline Var dropout(const Var& x, double p, const RngKey& key) {
   return p <= 0 ? x : call(Dropout{p, key}, {x});
+}
+inline Var relu_dropout(const Var& x, double p, const RngKey& key) {
+  return call(Dropout{p, key, true}, {x});
 }
 
 /// Sums t down to a shape that it was broadcast from (no gradient; used by backward passes).
