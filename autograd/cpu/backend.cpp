@@ -48,6 +48,7 @@ class CpuBackend final : public Backend {
     add<FkGradArgs, cpu::fk_grad>();
     add<LbsArgs, cpu::lbs>();
     add<LbsGradArgs, cpu::lbs_grad>();
+    add<SquaredNormArgs, cpu::squared_norm>();
     add<AdamArgs, cpu::adam>();
     add<DeformArgs, cpu::deform>();
   }

@@ -55,6 +55,7 @@ void fk(const FkArgs&);
 void fk_grad(const FkGradArgs&);
 void lbs(const LbsArgs&);
 void lbs_grad(const LbsGradArgs&);
+void squared_norm(const SquaredNormArgs&);
 void adam(const AdamArgs&);
 void deform(const DeformArgs&);
 

@@ -1,15 +1,19 @@
-// Adam in one pass over the parameter, its gradient and its moments: 28 bytes a number, of which
-// every written one was read just before, so there is nothing to stream past the caches.
+// Norms of gradients, and Adam in one pass over the parameter, its gradient and its moments: 28
+// bytes a number, of which every written one was read just before, so there is nothing to stream
+// past the caches.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "autograd/cpu/update.cpp"
 #include <hwy/foreach_target.h>  // once per instruction set
 
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/kernels.h"
 #include "autograd/cpu/math-inl.h"
 #include "autograd/cpu/targets.h"
+#include "autograd/kernels/scratch.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
@@ -55,7 +59,39 @@ void adam_typed(const AdamArgs& args) {
   });
 }
 
+constexpr int64_t kChains = 32;  // sums side by side
+
+/// Number i goes to chain i % kChains; the chains are added in order.
+template <class T>
+double squares(const T* x, int64_t n) {
+  double chain[kChains] = {};
+  int64_t i = 0;
+  for (; i + kChains <= n; i += kChains)
+    for (int64_t c = 0; c < kChains; ++c)
+      chain[c] += static_cast<double>(x[i + c]) * static_cast<double>(x[i + c]);
+  for (int64_t c = 0; i + c < n; ++c)
+    chain[c] += static_cast<double>(x[i + c]) * static_cast<double>(x[i + c]);
+  return std::accumulate(chain, chain + kChains, 0.0);
+}
+
+template <class T>
+double squared_norm_typed(const T* x, int64_t n) {
+  const int64_t parts = (n + kGrain - 1) / kGrain;
+  Scratch<double> sums(static_cast<size_t>(parts));
+  parallel_for(parts, 1, [&](int64_t from, int64_t to) HWY_ATTR {
+    for (int64_t p = from; p < to; ++p)
+      sums[static_cast<size_t>(p)] = squares(x + p * kGrain, std::min(kGrain, n - p * kGrain));
+  });
+  return std::accumulate(sums.begin(), sums.end(), 0.0);
+}
+
 }  // namespace
+
+void squared_norm(const SquaredNormArgs& args) {
+  dispatch(args.x.dtype(), [&](auto zero) HWY_ATTR {
+    *args.out.data<double>() = squared_norm_typed(args.x.data<decltype(zero)>(), args.x.numel());
+  });
+}
 
 void adam(const AdamArgs& args) {
   dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { adam_typed<decltype(zero)>(args); });
@@ -66,6 +102,7 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace restage::cpu {
+RESTAGE_KERNEL(squared_norm, SquaredNormArgs)
 RESTAGE_KERNEL(adam, AdamArgs)
 }  // namespace restage::cpu
 #endif

@@ -1,4 +1,4 @@
-// Optimiser updates in place.
+// What an optimiser does with gradients: their norm, updates in place.
 #pragma once
 
 #include "autograd/kernels/kernel.h"
@@ -15,6 +15,13 @@ struct AdamArgs {
   Tensor* v_max;
   double lr, beta1, beta2, eps, weight_decay, gradient_scale;
   int64_t step;
+};
+
+/// out [1], f64: the sum of the squares of x, in double, in an order that the size alone decides.
+struct SquaredNormArgs {
+  static constexpr std::string_view name = "squared_norm";
+  const Tensor& x;
+  Tensor& out;
 };
 
 }  // namespace restage

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "autograd/kernels/elementwise.h"
+#include "autograd/kernels/update.h"
 
 namespace restage {
 namespace {
@@ -64,22 +65,18 @@ const Tensor* Gradients::find(uint64_t id) const {
 }
 
 double Gradients::norm() const {
+  if (norm_) return *norm_;
   std::vector<uint64_t> ids;
   for (const auto& entry : by_id_) ids.push_back(entry.first);
   std::sort(ids.begin(), ids.end());
   double total = 0;
   for (const uint64_t id : ids) {
-    const Tensor& g = by_id_.at(id);
-    double part = 0;
-    if (g.dtype() == DType::f32) {
-      for (int64_t i = 0; i < g.numel(); ++i)
-        part += static_cast<double>(g.data<float>()[i]) * g.data<float>()[i];
-    } else {
-      for (int64_t i = 0; i < g.numel(); ++i) part += g.data<double>()[i] * g.data<double>()[i];
-    }
-    total += part;
+    Tensor squares = Tensor::empty({1}, DType::f64);
+    launch(SquaredNormArgs{by_id_.at(id), squares});
+    total += squares.item();
   }
-  return std::sqrt(total);
+  norm_ = std::sqrt(total);
+  return *norm_;
 }
 
 bool Gradients::finite() const { return std::isfinite(norm()); }

@@ -5,6 +5,7 @@
 
 #include <initializer_list>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <unordered_map>
@@ -64,13 +65,17 @@ class Gradients {
  public:
   /// Gradient of a leaf with this identity (Parameter::id), or null if it did not take part.
   const Tensor* find(uint64_t id) const;
-  void set(uint64_t id, Tensor gradient) { by_id_[id] = std::move(gradient); }
-  /// Euclidean norm over all leaves, in double, summed in order of identity.
+  void set(uint64_t id, Tensor gradient) {
+    by_id_[id] = std::move(gradient);
+    norm_.reset();
+  }
+  /// Euclidean norm over all leaves, in double, summed in order of identity; computed once.
   double norm() const;
   bool finite() const;
 
  private:
   std::unordered_map<uint64_t, Tensor> by_id_;
+  mutable std::optional<double> norm_;
 };
 
 class Tape {

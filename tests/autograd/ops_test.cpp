@@ -227,6 +227,24 @@ TEST(Threads, SumsAreAccurate) {
   EXPECT_NEAR(sum_all(Var(x)).value.item(), 0.1f * (1 << 20), 0.5);
 }
 
+TEST(Threads, NormsOfGradientsHaveTheSameBits) {
+  for (const DType type : {DType::f32, DType::f64}) {
+    for (const int64_t n : {0, 1, 31, 100003}) {
+      const Tensor x = random({n}, 6).cast(type);
+      double squares = 0;
+      for (const double v : x.to_vector<double>()) squares += v * v;
+      const auto norm = [&] {
+        Gradients g;
+        g.set(1, x);
+        g.set(2, Tensor::full({1}, 3, type));
+        return Tensor::full({1}, g.norm(), DType::f64);
+      };
+      EXPECT_NEAR(norm().item(), std::sqrt(squares + 9), 1e-9 * std::sqrt(squares + 9));
+      expect_same_for_all_threads(norm);
+    }
+  }
+}
+
 TEST(DropoutMask, IsAFunctionOfTheKey) {
   const Var ones(Tensor::full({100003}, 1, DType::f64));
   const RngKey key{1, 2};
