@@ -124,7 +124,8 @@ class DeformationOnline : public Item {
  public:
   DeformationOnline(const Inputs& inputs, const std::string& variant, bool)
       : models_(paper_models(inputs, variant)),
-        retargeter_(models_, target_of(inputs), joints_of(inputs.at("target.joints")), {}) {
+        retargeter_(models_, target_of(inputs), joints_of(inputs.at("target.joints")), {}),
+        dense_(variant == "dense") {
     const Tensor& local = inputs.at("pairs.local");
     for (int64_t i = 0; i < local.size(0); ++i) {
       const float* r = local.data<float>() + i * kJoints * 9;
@@ -137,16 +138,17 @@ class DeformationOnline : public Item {
     return std::make_unique<DeformationOnline>(i, v, d);
   }
   void run() override {
-    points_ = retargeter_.pose_vertices(poses_[static_cast<size_t>(frames_.next())]);
+    points_ = retargeter_.pose_vertices(poses_[static_cast<size_t>(frames_.next())], dense_);
   }
   std::vector<double> check() override {
-    points_ = retargeter_.pose_vertices(poses_[0]);
+    points_ = retargeter_.pose_vertices(poses_[0], dense_);
     return summary(tensor_of(points_));
   }
 
  private:
   ModelSet models_;
   Retargeter retargeter_;
+  bool dense_;
   std::array<Pose, 4> poses_;
   Points points_;
   Frames frames_{4};
@@ -222,7 +224,8 @@ std::vector<ItemInfo> online_items() {
            1,
            deformation,
            {"offsets"},
-           DeformationOnline::make},
+           DeformationOnline::make,
+           true},
           {"frame_online",
            "whole frame, paper's models",
            "frame",

@@ -206,7 +206,8 @@ void Retargeter::advance(const Joints& a, Pose* pose) {
   pose->root = root_b_;
 }
 
-void Retargeter::deform(const Pose& pose, const PosedSkeleton& posed, Points* out) const {
+void Retargeter::deform(const Pose& pose, const PosedSkeleton& posed, Points* out,
+                        bool dense) const {
   Tensor local = Tensor::empty({kJoints, 9}), bones = Tensor::empty({kJoints, 3, 4});
   using Rows = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
   using Bone = Eigen::Matrix<float, 3, 4, Eigen::RowMajor>;
@@ -219,15 +220,15 @@ void Retargeter::deform(const Pose& pose, const PosedSkeleton& posed, Points* ou
   Tensor angles = Tensor::empty({kJoints, 3});
   launch(FromMatrixArgs{RotationForm::axis_angle, local, angles});
   if (!keep_root_rotation_) std::fill_n(angles.data<float>(), 3, 0.0f);
-  const Tensor points = (*deformer_)(angles.reshape({1, 3 * kJoints}), bones);
+  const Tensor points = (*deformer_)(angles.reshape({1, 3 * kJoints}), bones, dense);
   out->resize(target_.vertices.size());
   for (size_t i = 0; i < out->size(); ++i)
     (*out)[i] = Eigen::Map<const Point>(points.data<float>() + 3 * i);
 }
 
-Points Retargeter::pose_vertices(const Pose& pose) const {
+Points Retargeter::pose_vertices(const Pose& pose, bool dense) const {
   Points out;
-  deform(pose, forward_kinematics(rest_, pose), &out);
+  deform(pose, forward_kinematics(rest_, pose), &out, dense);
   return out;
 }
 

@@ -45,8 +45,9 @@ class Retargeter {
   std::span<const RetargetedFrame> push(const Points& cloud, const std::string& source);
   /// The same from joints of A in the world.
   std::span<const RetargetedFrame> push_joints(const Joints& joints);
-  /// The target's surface in a pose of choice: skinning weights and offsets of the models.
-  Points pose_vertices(const Pose& pose) const;
+  /// The target's surface in a pose of choice: skinning weights and offsets of the models. `dense`:
+  /// nothing is left out, to compare with.
+  Points pose_vertices(const Pose& pose, bool dense = false) const;
   /// Forgets the motion so far.
   void restart();
 
@@ -64,7 +65,7 @@ class Retargeter {
   void prepare();
   void step(const Joints& a, RetargetedFrame* out);
   void advance(const Joints& a, Pose* pose);
-  void deform(const Pose& pose, const PosedSkeleton& posed, Points* out) const;
+  void deform(const Pose& pose, const PosedSkeleton& posed, Points* out, bool dense = false) const;
 
   const ModelSet& models_;
   Mesh target_;

@@ -11,7 +11,16 @@
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
 
-inline constexpr int64_t kGroups = 8;
+// Groups of tiles that threads share: at least so many where there are tiles enough, and at most,
+// since each has sums of its own (3 MB at the paper's sizes, and keys and values of its clouds).
+inline constexpr int64_t kLeastGroups = 8, kMostGroups = 64;
+inline constexpr int64_t kGroupTiles = 40;  // that repay the sums of a group
+
+/// Tiles in each group but the last.
+inline int64_t group_size(int64_t tiles) {
+  const auto cut = [&](int64_t groups) { return (tiles + groups - 1) / groups; };
+  return std::max(cut(kMostGroups), std::min(cut(kLeastGroups), kGroupTiles));
+}
 
 /// The sums of one group of tiles.
 template <class T>
@@ -37,7 +46,7 @@ struct Backward {
     pack_right<T>({args.in.gamma.template data<T>(), a.d, 1}, a.d, a.d, gamma_right);
     if (a.any_full)
       pack_right<T>({args.in.both.template data<T>(), a.d, 1}, 2 * a.d, a.d, full_right);
-    const int64_t per_group = (a.tiles.tiles() + kGroups - 1) / kGroups;
+    const int64_t per_group = group_size(a.tiles.tiles());
     for (int64_t t = 0; t < a.tiles.tiles(); t += per_group) {
       GroupSums<T> s;
       s.from = t;
