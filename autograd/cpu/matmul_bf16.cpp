@@ -10,7 +10,7 @@
 #include <hwy/foreach_target.h>  // once per instruction set
 
 #include <algorithm>
-#include <cstring>
+#include <limits>
 #if defined(__x86_64__)
 #include <xmmintrin.h>
 #endif
@@ -213,7 +213,7 @@ struct Block {
     vector_multiply(steps, a, b, rows, cols, add, sums);
   }
 
-  /// Sums that are complete get bias and activation. NaN stays.
+  /// Sums that are complete get bias and activation. NaN stays; of its many kinds always the same.
   void store(bool complete) const {
     const float* bias = complete && p.bias ? p.bias + j : nullptr;
     const bool relu = complete && p.activation == Activation::relu;
@@ -225,16 +225,16 @@ struct Block {
       int64_t c = 0;
       for (; c + width <= cols; c += width)
         *reinterpret_cast<V*>(to + c) =
-            finished(*reinterpret_cast<const V*>(from + c),
-                     bias ? reinterpret_cast<const V*>(bias + c) : nullptr, relu);
-      for (; c < cols; ++c) to[c] = finished(from[c], bias ? bias + c : nullptr, relu);
+            finished(*reinterpret_cast<const V*>(from + c), bias != nullptr,
+                     bias ? *reinterpret_cast<const V*>(bias + c) : V{}, relu);
+      for (; c < cols; ++c) to[c] = finished(from[c], bias != nullptr, bias ? bias[c] : 0, relu);
     }
   }
   template <class V>
-  static HWY_INLINE V finished(V x, const V* bias, bool relu) {
-    if (bias) x += *bias;
+  static HWY_INLINE V finished(V x, bool add_bias, V bias, bool relu) {
+    if (add_bias) x += bias;
     if (relu) x = x <= V{} ? V{} : x;
-    return x;
+    return x == x ? x : V{} + std::numeric_limits<float>::quiet_NaN();
   }
 };
 

@@ -31,7 +31,7 @@ class MatmulPrecisionScope {
 };
 
 /// Whether this processor (and its operating system) has a matrix unit for bfloat16: Intel's AMX.
-/// Without it the same bits are computed by vector instructions, at about the speed of float32.
+/// Without it vector instructions compute the same bits, slower than float32 products.
 bool has_matrix_unit();
 
 /// Whether it is used: by default if it is there. For tests and measurements: not while kernels

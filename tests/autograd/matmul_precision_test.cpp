@@ -278,14 +278,14 @@ TEST(MatmulPrecision, TheMatrixUnitAgreesInTheCornersToo) {
       const UseSet use(set);
       const UseUnit off(false);
       const Tensor vectors = c.run();
-      int64_t finite = 0;
+      EXPECT_TRUE(same_bits(unit, c.run())) << set << ", stream " << stream;
+      int64_t finite = 0, none = 0;
       for (int64_t i = 0; i < unit.numel(); ++i) {
-        const float x = unit.data<float>()[i], y = vectors.data<float>()[i];
-        finite += std::isfinite(x);
-        ASSERT_TRUE(std::bit_cast<uint32_t>(x) == std::bit_cast<uint32_t>(y))
-            << set << ": " << x << " and " << y;
+        finite += std::isfinite(unit.item(i));
+        none += std::isnan(unit.item(i));
       }
       EXPECT_GT(finite, 0);
+      EXPECT_TRUE(stream <= 2 || none > 0);
     }
 }
 
