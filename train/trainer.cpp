@@ -29,8 +29,14 @@ std::string line(const NamedValues& values) {
   return out;
 }
 
+NamedValues step_with(MatmulPrecision precision, Stage& stage, int64_t step) {
+  const MatmulPrecisionScope scope(precision);
+  return stage.step(step);
+}
+
 /// Steps `first` ... of one stage.
-void run_stage(Stage& stage, int64_t first, RunDir& run, const LoopConfig& loop, bool quiet) {
+void run_stage(Stage& stage, int64_t first, RunDir& run, const LoopConfig& loop,
+               MatmulPrecision precision, bool quiet) {
   const StopScope stop;
   Throughput throughput;
   product_rate();
@@ -40,7 +46,7 @@ void run_stage(Stage& stage, int64_t first, RunDir& run, const LoopConfig& loop,
   for (int64_t step = first; step < steps; ++step) {
     take_kernel_stats();  // not what validation did
     const auto start = std::chrono::steady_clock::now();
-    NamedValues values = stage.step(step);
+    NamedValues values = step_with(precision, stage, step);
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
     const KernelStats work = take_kernel_stats();
     throughput.add(stage.examples_per_step(), took.count(), work.flops);
@@ -85,7 +91,8 @@ void run_stage(Stage& stage, int64_t first, RunDir& run, const LoopConfig& loop,
 }  // namespace
 
 ModelSet train(RunDir& run, const std::vector<std::string>& stages, const LoopConfig& loop,
-               const std::function<std::unique_ptr<Stage>(const std::string&)>& make, bool quiet) {
+               const std::function<std::unique_ptr<Stage>(const std::string&)>& make, bool quiet,
+               MatmulPrecision precision) {
   const auto resumed = run.take_resumed();
   const auto begin =
       resumed ? std::find(stages.begin(), stages.end(), resumed->stage) - stages.begin() : 0;
@@ -103,7 +110,7 @@ ModelSet train(RunDir& run, const std::vector<std::string>& stages, const LoopCo
       stage->load(parse_safetensors(checkpoint->bytes, checkpoint->path), checkpoint->path);
       first = checkpoint->step;
     }
-    run_stage(*stage, first, run, loop, quiet);
+    run_stage(*stage, first, run, loop, precision, quiet);
     stage->export_models(result);
   }
   return result;

@@ -1,6 +1,7 @@
 // The training loop: stages in order, metrics, validation, checkpoints, resume, stop on a signal.
 #pragma once
 
+#include "autograd/kernels/matmul_precision.h"
 #include "train/config_reader.h"
 #include "train/progress.h"
 #include "train/run.h"
@@ -20,9 +21,11 @@ void visit(V& v, LoopConfig& c) {
 }
 
 /// Runs the stages to their ends, going on from the run's checkpoint if it was resumed. `make`
-/// builds a stage when its turn comes. Throws Interrupted after writing a checkpoint when a signal
-/// came. Returns the trained models.
+/// builds a stage when its turn comes. `precision` is that of the steps' products; validation has
+/// float32's, like everything that uses the models later. Throws Interrupted after writing a
+/// checkpoint when a signal came. Returns the trained models.
 ModelSet train(RunDir& run, const std::vector<std::string>& stages, const LoopConfig& loop,
-               const std::function<std::unique_ptr<Stage>(const std::string&)>& make, bool quiet);
+               const std::function<std::unique_ptr<Stage>(const std::string&)>& make, bool quiet,
+               MatmulPrecision precision = MatmulPrecision::float32);
 
 }  // namespace restage

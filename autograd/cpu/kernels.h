@@ -30,6 +30,7 @@ void max_grad(const MaxGradArgs&);
 void softmax(const SoftmaxArgs&);
 void softmax_grad(const SoftmaxGradArgs&);
 void matmul(const MatmulArgs&);
+void matmul_bf16(const MatmulArgs&);  // matmul() calls it
 void copy_blocks(const CopyBlocksArgs&);
 void permute(const PermuteArgs&);
 void gather(const GatherArgs&);

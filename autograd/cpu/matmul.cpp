@@ -14,6 +14,7 @@
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/gemm_tile-inl.h"
 #include "autograd/cpu/kernels.h"
+#include "autograd/cpu/matmul_sizes.h"
 #include "autograd/cpu/targets.h"
 #include "autograd/cpu/workspace.h"
 #include "autograd/kernels/stats.h"
@@ -260,24 +261,19 @@ void empty_sum(const Product<T>& p) {
 }
 
 template <class T>
-void run(const MatmulArgs& args) {
-  const int ra = args.a.rank(), rb = args.b.rank(), ro = args.out.rank();
-  const int64_t m = args.out.size(ro - 2), n = args.out.size(ro - 1);
-  const int64_t k = args.a.size(args.transpose_a ? ra - 2 : ra - 1);
-  const int64_t batch = args.out.shape().product(0, ro - 2);
-  const int64_t step_a = ra > 2 ? m * k : 0, step_b = rb > 2 ? n * k : 0;
+void run(const MatmulArgs& args, const MatmulSizes& s) {
+  const int64_t batch = s.batch, m = s.m, n = s.n, k = s.k;
   if (m == 0 || n == 0 || batch == 0) return;
   const auto product = [&](int64_t i) {
-    return Product<T>{
-        {args.a.data<T>() + i * step_a, args.transpose_a ? 1 : k, args.transpose_a ? m : 1},
-        {args.b.data<T>() + i * step_b, args.transpose_b ? 1 : n, args.transpose_b ? k : 1},
-        args.out.data<T>() + i * m * n,
-        m,
-        n,
-        k,
-        args.bias ? args.bias->data<T>() : nullptr,
-        args.activation,
-        args.accumulate};
+    return Product<T>{{args.a.data<T>() + i * s.a.step, s.a.row, s.a.col},
+                      {args.b.data<T>() + i * s.b.step, s.b.row, s.b.col},
+                      args.out.data<T>() + i * s.m * s.n,
+                      s.m,
+                      s.n,
+                      s.k,
+                      args.bias ? args.bias->data<T>() : nullptr,
+                      args.activation,
+                      args.accumulate};
   };
   if (k == 0) {
     for (int64_t i = 0; i < batch; ++i) empty_sum(product(i));
@@ -298,7 +294,11 @@ void run(const MatmulArgs& args) {
 }  // namespace
 
 void matmul(const MatmulArgs& args) {
-  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { run<decltype(zero)>(args); });
+  const MatmulSizes sizes(args);
+  if (args.precision == MatmulPrecision::bfloat16 && args.out.dtype() == DType::f32 &&
+      sizes.k >= MatmulArgs::kLeastTerms)
+    return cpu::matmul_bf16(args);
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { run<decltype(zero)>(args, sizes); });
 }
 
 }  // namespace restage::cpu::HWY_NAMESPACE

@@ -5,6 +5,7 @@
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/log.h"
 #include "autograd/base/parallel.h"
+#include "autograd/kernels/matmul_precision.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
 #include "train/config.h"
@@ -57,6 +58,13 @@ void check_stages(const TrainConfig& config, const Corpus& train, const Corpus& 
   for (const std::string& stage : config.stages) make_stage(stage, config, train, validation);
 }
 
+/// For the first lines of a run; nothing for float32.
+std::string products_in(MatmulPrecision precision) {
+  if (precision == MatmulPrecision::float32) return "";
+  return std::string("; products in bfloat16 ") +
+         (matrix_unit() ? "by the matrix unit (AMX)" : "by float32 vectors");
+}
+
 int run_train(const TrainOptions& options, const Program& program,
               const std::vector<std::string>& command_line) {
   const Request request = read_request(options.arguments);
@@ -88,11 +96,12 @@ int run_train(const TrainOptions& options, const Program& program,
   finish_output();
   log_info("seed " + std::to_string(config.seed) + ", " + std::to_string(threads()) + " threads; " +
            std::to_string(train_corpus.bodies.size()) + " bodies and " +
-           std::to_string(train_corpus.motions.size()) + " motions to train on");
+           std::to_string(train_corpus.motions.size()) + " motions to train on" +
+           products_in(config.precision));
   const ModelSet models = train(
       run, config.stages, config.loop,
       [&](const std::string& stage) { return make_stage(stage, config, train_corpus, validation); },
-      common.quiet);
+      common.quiet, config.precision);
   save_models(run.dir() + "/weights.safetensors", models);
   log_info("weights: " + run.dir() + "/weights.safetensors");
   return 0;

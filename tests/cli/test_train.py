@@ -149,6 +149,22 @@ class Resume(Train):
         self.assertEqual(self.weights_of(run), self.weights_of(whole))
         self.assertEqual(self.bytes(run + "/metrics.jsonl"), self.bytes(whole + "/metrics.jsonl"))
 
+    def test_precision_is_kept(self):
+        plain = self.train("tiny.yaml", "stages=[skeleton]")
+        self.assertIn("precision: float32\n", self.bytes(plain + "/config.yaml").decode())
+        self.assertNotIn("bfloat16", self.bytes(plain + "/log.txt").decode())
+        whole = self.train("tiny.yaml", "stages=[skeleton]", "precision=bfloat16")
+        self.assertIn("precision: bfloat16\n", self.bytes(whole + "/config.yaml").decode())
+        self.assertIn("products in bfloat16 by ", self.bytes(whole + "/log.txt").decode())
+        weights = self.weights_of(whole)
+        self.assertNotEqual(weights, self.weights_of(plain))
+        for name in self.checkpoints(whole)[1:]:  # back to the first checkpoint that is left
+            os.remove(self.path(whole + "/checkpoints/" + name))
+        os.remove(self.path(whole + "/weights.safetensors"))
+        self.done("train", "resume=" + whole)
+        self.assertEqual(self.weights_of(whole), weights)
+        self.bad_input(["train", "tiny.yaml", "precision=float16"], "precision", "bfloat16")
+
     def test_run_in_use(self):
         process, run = self.start("tiny.yaml", *LONG)
         self.bad_input(["train", "resume=" + run], run, "another process")

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "autograd/base/parallel.h"
+#include "autograd/kernels/matmul_precision.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/reduce.h"
 #include "nn/layers/linear.h"
@@ -75,6 +76,32 @@ TEST(TrainStages, TwentyStepsWithOneTwoAndThreeThreadsGiveTheSameBits) {
       if (n == 1) first = bytes_of(*stage);
       EXPECT_TRUE(bytes_of(*stage) == first) << name << " with " << n << " threads";
     }
+  }
+}
+
+TEST(TrainStages, StepsInBfloat16HaveTheSameBitsForAnyThreadsAndMeans) {
+  const Threads restore;
+  const bool unit = matrix_unit();
+  const MatmulPrecisionScope scope(MatmulPrecision::bfloat16);
+  for (const std::string name : kStageNames) {
+    const auto trained = [&](int n) {
+      set_threads(n);
+      const auto stage = tiny_stage(name, wide(8));
+      for (int64_t i = 0; i < 8; ++i) stage->step(i);
+      return bytes_of(*stage);
+    };
+    const std::string first = trained(1);
+    for (const int n : {2, 3})
+      EXPECT_TRUE(trained(n) == first) << name << " with " << n << " threads";
+    use_matrix_unit(false);
+    for (const std::string& set : testing::vector_sets()) {
+      const testing::UseSet use(set);
+      EXPECT_TRUE(trained(2) == first) << name << " with " << set;
+    }
+    use_matrix_unit(unit);
+    set_matmul_precision(MatmulPrecision::float32);
+    EXPECT_FALSE(trained(2) == first) << name << " does nothing in bfloat16";
+    set_matmul_precision(MatmulPrecision::bfloat16);
   }
 }
 
@@ -153,16 +180,21 @@ std::pair<double, double> learn(Stage& stage, int64_t steps) {
   return {first, last};
 }
 
+/// Sixty steps in which every stage learns something.
+TrainConfig sixty_steps() {
+  TrainConfig c = tiny_training(60);
+  for (OptimiserConfig* o : {&c.skeleton.optimiser, &c.motion.optimiser, &c.deformation.optimiser})
+    o->schedule.rate = 5e-3;
+  c.motion.sizes.hidden = 64;
+  c.motion.sizes.dropout = 0;
+  c.motion.self_first_pass = true;
+  c.motion.windows.self_share = 0.7;
+  return c;
+}
+
 TEST(TrainStages, LossFallsInSixtySteps) {
   for (const std::string name : kStageNames) {
-    TrainConfig c = tiny_training(60);
-    for (OptimiserConfig* o :
-         {&c.skeleton.optimiser, &c.motion.optimiser, &c.deformation.optimiser})
-      o->schedule.rate = 5e-3;
-    c.motion.sizes.hidden = 64;
-    c.motion.sizes.dropout = 0;
-    c.motion.self_first_pass = true;
-    c.motion.windows.self_share = 0.7;
+    const TrainConfig c = sixty_steps();
     const auto stage = tiny_stage(name, c);
     const std::string figure = name == "skeleton" ? "joint_error_mm"
                                : name == "motion" ? "local_mpjpe"
@@ -171,6 +203,19 @@ TEST(TrainStages, LossFallsInSixtySteps) {
     const auto [first, last] = learn(*stage, 60);
     EXPECT_LT(last, 0.7 * first) << name;
     EXPECT_LT(value_of(stage->validate(), figure), 0.8 * before) << name;
+  }
+}
+
+TEST(TrainStages, InBfloat16TheLossFallsAsInFloat32) {
+  for (const std::string name : kStageNames) {
+    std::pair<double, double> losses[2];
+    for (const auto precision : {MatmulPrecision::float32, MatmulPrecision::bfloat16}) {
+      const MatmulPrecisionScope scope(precision);
+      losses[precision == MatmulPrecision::bfloat16] = learn(*tiny_stage(name, sixty_steps()), 60);
+    }
+    EXPECT_NEAR(losses[1].first, losses[0].first, 0.03 * losses[0].first) << name;
+    EXPECT_NEAR(losses[1].second, losses[0].second, 0.1 * losses[0].second) << name;
+    EXPECT_NE(losses[1].second, losses[0].second) << name;
   }
 }
 

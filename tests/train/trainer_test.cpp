@@ -167,6 +167,57 @@ TEST_F(TrainTrainer, StopByASignalWritesACheckpointAndResumesToTheSameBits) {
   }
 }
 
+/// Notes the precision of products in steps and validations.
+class Watched final : public Stage {
+ public:
+  Watched(std::unique_ptr<Stage> stage, std::vector<MatmulPrecision>& steps,
+          std::vector<MatmulPrecision>& validations)
+      : stage_(std::move(stage)), steps_(steps), validations_(validations) {}
+  std::string name() const override { return stage_->name(); }
+  int64_t steps() const override { return stage_->steps(); }
+  int64_t examples_per_step() const override { return stage_->examples_per_step(); }
+  NamedValues step(int64_t step) override {
+    steps_.push_back(matmul_precision());
+    return stage_->step(step);
+  }
+  NamedValues validate() override {
+    validations_.push_back(matmul_precision());
+    return stage_->validate();
+  }
+  void save(TensorFile& file) const override { stage_->save(file); }
+  void load(const TensorFile& file, const std::string& where) override {
+    stage_->load(file, where);
+  }
+  void export_models(ModelSet& set) override { stage_->export_models(set); }
+
+ private:
+  std::unique_ptr<Stage> stage_;
+  std::vector<MatmulPrecision>&steps_, &validations_;
+};
+
+TEST_F(TrainTrainer, PrecisionIsForStepsOnly) {
+  std::vector<MatmulPrecision> steps, validations;
+  const Maker watched = [&](const std::string& name) -> std::unique_ptr<Stage> {
+    return std::make_unique<Watched>(tiny_stage(name, tiny_training(kSteps)), steps, validations);
+  };
+  RunDir run = create("bfloat16");
+  const auto bfloat16 = MatmulPrecision::bfloat16;
+  const std::string got = weights(train(run, kAll, loop(), watched, true, bfloat16));
+  EXPECT_EQ(steps, std::vector<MatmulPrecision>(3 * kSteps, bfloat16));
+  EXPECT_EQ(validations, std::vector<MatmulPrecision>(6, MatmulPrecision::float32));
+  EXPECT_EQ(matmul_precision(), MatmulPrecision::float32);
+  EXPECT_FALSE(got == whole().weights);
+  EXPECT_THROW(
+      {
+        RunDir other = create("stopped");
+        train(other, kAll, loop(), disturbed("motion", 3, [] { throw Killed(); }), true, bfloat16);
+      },
+      Killed);
+  EXPECT_EQ(matmul_precision(), MatmulPrecision::float32) << "after an error";
+  RunDir again = RunDir::resume(place("stopped"), kAll);
+  EXPECT_TRUE(weights(train(again, kAll, loop(), plain(), true, bfloat16)) == got);
+}
+
 TEST_F(TrainTrainer, TwoStopsInARow) {
   for (const int64_t when : {1, 3}) {
     RunDir run = when == 1 ? create("twice") : RunDir::resume(place("twice"), kAll);

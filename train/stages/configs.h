@@ -4,6 +4,7 @@
 #include <set>
 #include <string>
 
+#include "autograd/kernels/matmul_precision.h"
 #include "datasets/corpus.h"
 #include "datasets/sampling/clouds.h"
 #include "datasets/sampling/pairs.h"
@@ -204,11 +205,16 @@ void visit(V& v, EvaluationConfig& c) {
   v("frames", c.frames, "frames of each", at_least(3));
 }
 
+inline EnumNames<MatmulPrecision> config_names(MatmulPrecision) {
+  return {{"float32", MatmulPrecision::float32}, {"bfloat16", MatmulPrecision::bfloat16}};
+}
+
 /// A whole training.
 struct TrainConfig {
   std::string name = "restage";
   std::string run_root = "runs";
   uint64_t seed = 0;
+  MatmulPrecision precision = MatmulPrecision::float32;
   std::vector<std::string> stages = {"skeleton", "motion", "deformation"};
   CorpusSource data;
   SkeletonStageConfig skeleton;
@@ -223,6 +229,7 @@ void visit(V& v, TrainConfig& c) {
   v("name", c.name, "run directories are <run_root>/<name>-<time>-<n>");
   v("run_root", c.run_root, "folder of run directories");
   v("seed", c.seed, "of everything random");
+  v("precision", c.precision, "of the matrix products of training steps; all else is float32");
   v("stages", c.stages, "which stages, in order", one_of({"skeleton", "motion", "deformation"}));
   v("data", c.data, "bodies and motions");
   v("skeleton", c.skeleton, "the skeleton extractor");
