@@ -40,8 +40,9 @@ struct ItemInfo {
   std::vector<std::string> models;
   /// `dropout` false: none, for check().
   std::unique_ptr<Item> (*make)(const Inputs& inputs, const std::string& variant, bool dropout);
-  /// Whether it also exists as "dense": initial weights, nothing left out.
-  bool dense = false;
+  /// Further variants, with initial weights: "dense" leaves nothing out, "bfloat16" multiplies in
+  /// it (only where the processor has a unit for that). No ratio counts them.
+  std::vector<std::string> also = {};
   /// What it is called with the weights it starts with.
   std::string variant = "initial";
 };

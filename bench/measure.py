@@ -233,8 +233,8 @@ def ratios(result):
 
 
 def least(item, kind):
-    """Of initial and trained weights; the forced-dense row stands beside them."""
-    found = [r[kind] for variant, r in item.get("ratios", {}).items() if variant != "dense"]
+    """Of initial and trained weights; other variants stand beside them."""
+    found = [r[kind] for variant, r in item.get("ratios", {}).items() if variant not in ("dense", "bfloat16")]
     return min(found) if found else None
 
 
@@ -269,7 +269,7 @@ def machine():
         if kind != "Instruction":
             caches[f"L{level}"] = size
     return {"processor": info.get("model name", os.uname().machine), "cores": cores(),
-            "instructions": [f for f in ("avx2", "fma", "avx512f", "avx512_bf16") if f in flags],
+            "instructions": [f for f in ("avx2", "fma", "avx512f", "avx512_bf16", "amx_bf16") if f in flags],
             "caches": caches, "memory_gib": round(memory, 1), "system": " ".join(os.uname()[:3:2])}
 
 

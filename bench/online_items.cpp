@@ -203,7 +203,7 @@ std::vector<ItemInfo> online_items() {
            extractor_gflop(),
            {"skeleton"},
            SkeletonOnline::make,
-           true},
+           {"dense"}},
           {"smrm_online",
            "SMRM, caches flushed before every frame",
            "frame",
@@ -225,7 +225,7 @@ std::vector<ItemInfo> online_items() {
            deformation,
            {"offsets"},
            DeformationOnline::make,
-           true},
+           {"dense"}},
           {"frame_online",
            "whole frame, paper's models",
            "frame",
@@ -240,7 +240,7 @@ std::vector<ItemInfo> online_items() {
            0,
            {},
            FrameOnline::make_lite,
-           false,
+           {},
            "lite"}};
 }
 

@@ -17,6 +17,7 @@
 #include <sstream>
 
 #include "autograd/base/parallel.h"
+#include "autograd/kernels/matmul_precision.h"
 #include "autograd/kernels/stats.h"
 #include "bench/items.h"
 
@@ -32,7 +33,8 @@ json list(const Inputs& inputs) {
     if (std::any_of(i.models.begin(), i.models.end(),
                     [&](const std::string& m) { return inputs.has("trained", m); }))
       variants.push_back("trained");
-    if (i.dense) variants.push_back("dense");
+    for (const std::string& v : i.also)
+      if (v != "bfloat16" || has_matrix_unit()) variants.push_back(v);
     out.push_back({{"name", i.name},
                    {"what", i.what},
                    {"per", i.per},

@@ -1,6 +1,7 @@
 // Full training steps as the trainer does them: forward, backward, Adam.
 #include <functional>
 
+#include "autograd/kernels/matmul_precision.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/reduce.h"
 #include "bench/items.h"
@@ -21,7 +22,12 @@ class Training : public Item {
  public:
   using Loss = std::function<Var(Context&)>;
 
-  void run() override { adam_->step(differentiate(key_.fold(step_++), loss_).gradients, kRate, 0); }
+  explicit Training(const std::string& variant)
+      : precision_(variant == "bfloat16" ? MatmulPrecision::bfloat16 : MatmulPrecision::float32) {}
+  void run() override {
+    const MatmulPrecisionScope scope(precision_);
+    adam_->step(differentiate(key_.fold(step_++), loss_).gradients, kRate, 0);
+  }
   std::vector<double> check() override {
     const Differentiated d = differentiate(key_, loss_);
     return {d.loss, d.norm};
@@ -34,6 +40,7 @@ class Training : public Item {
   }
 
  private:
+  MatmulPrecision precision_;
   std::unique_ptr<Adam> adam_;
   Loss loss_;
   RngKey key_ = RngKey{0, 0}.fold("bench");
@@ -51,7 +58,7 @@ class SkeletonTraining : public Training {
  public:
   SkeletonTraining(const Inputs& inputs, const std::string& variant, const std::string& model,
                    const std::string& file, bool dropout)
-      : net_(make_skeleton_model(model, sizes_with(dropout), Init{})) {
+      : Training(variant), net_(make_skeleton_model(model, sizes_with(dropout), Init{})) {
     inputs.load(*net_, variant, file);
     make_dense(*net_, variant);
     const Var points = inputs.at("clouds.points"), joints = inputs.at("clouds.joints");
@@ -78,7 +85,7 @@ template <int64_t batch>
 class MotionTraining : public Training {
  public:
   MotionTraining(const Inputs& inputs, const std::string& variant, bool dropout)
-      : net_(config(dropout), Init{}) {
+      : Training(variant), net_(config(dropout), Init{}) {
     inputs.load(net_, variant, "smrm");
     const auto part = [&](const char* name) {
       return inputs.at(std::string("windows.") + name).rows(0, batch);
@@ -107,7 +114,7 @@ class MotionTraining : public Training {
 class DeformationTraining : public Training {
  public:
   DeformationTraining(const Inputs& inputs, const std::string& variant, bool dropout)
-      : weights_(make_weight_net(Init{})), offsets_(make_offset_net(Init{})) {
+      : Training(variant), weights_(make_weight_net(Init{})), offsets_(make_offset_net(Init{})) {
     inputs.load(*weights_, variant, "weights");
     inputs.load(*offsets_, variant, "offsets");
     name_scopes(*weights_, "weights");
@@ -146,28 +153,31 @@ std::vector<ItemInfo> training_items() {
            extractor,
            {"skeleton"},
            skeleton,
-           true},
+           {"dense", "bfloat16"}},
           {"smrm_train_b16",
            "SMRM, batch 16, windows of 30",
            "window",
            16,
            window,
            {},
-           MotionTraining<16>::make},
+           MotionTraining<16>::make,
+           {"bfloat16"}},
           {"smrm_train_b64",
            "SMRM, batch 64, windows of 30",
            "window",
            64,
            window,
            {},
-           MotionTraining<64>::make},
+           MotionTraining<64>::make,
+           {"bfloat16"}},
           {"deformation_train",
            "skinning weights and offsets, batch 4 of 6,890 points",
            "pair",
            kClouds,
            pair,
            {},
-           DeformationTraining::make},
+           DeformationTraining::make,
+           {"bfloat16"}},
           {"pointnet_train",
            "PointNet, batch 4",
            "cloud",
