@@ -137,11 +137,12 @@ HWY_INLINE void transpose(const T* in, int64_t stride, int64_t k, T* out, int64_
 template <int Width, class T>
 inline void pack_panel(const Strided<T>& m, int64_t count, int64_t k, T* out) {
   if (count == Width && m.col == 1) return transpose<Width>(m.data, m.row, k, out, Width);
+  if (count < Width) std::fill_n(out, k * Width, T(0));
   for (int64_t l = 0; l < k; ++l, out += Width) {
     if (count == Width && m.row == 1) {
       copy_fixed<Width>(m.data + l * m.col, out);
     } else {
-      for (int i = 0; i < Width; ++i) out[i] = i < count ? m.at(i, l) : T(0);
+      for (int i = 0; i < count; ++i) out[i] = m.at(i, l);
     }
   }
 }
