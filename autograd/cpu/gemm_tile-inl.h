@@ -137,11 +137,12 @@ HWY_INLINE void transpose(const T* in, int64_t stride, int64_t k, T* out, int64_
 template <int Width, class T>
 inline void pack_panel(const Strided<T>& m, int64_t count, int64_t k, T* out) {
   if (count == Width && m.col == 1) return transpose<Width>(m.data, m.row, k, out, Width);
+  if (count < Width) std::fill_n(out, k * Width, T(0));
   for (int64_t l = 0; l < k; ++l, out += Width) {
     if (count == Width && m.row == 1) {
       copy_fixed<Width>(m.data + l * m.col, out);
     } else {
-      for (int i = 0; i < Width; ++i) out[i] = i < count ? m.at(i, l) : T(0);
+      for (int i = 0; i < count; ++i) out[i] = m.at(i, l);
     }
   }
 }
@@ -215,23 +216,31 @@ inline void multiply_rows(int64_t rows, int64_t k, const T* a, const T* b, T* ou
   if constexpr (Rows > 1) multiply_rows<T, Add, Rows - 1>(rows, k, a, b, out);
 }
 
-/// Rows of a [Rows, k] times rows of b [cols, k], both as they lie in memory, summed in blocks of
-/// kDepth: weights that are used once are turned in registers and never packed. Looks `ahead`
-/// numbers ahead of b. out [Rows, cols].
-template <class T, int Rows>
-inline void multiply_thin(int64_t k, const T* a, const T* b, [[maybe_unused]] int64_t ahead,
-                          T* out) {
-  constexpr int cols = Simd<T>::cols;
-  std::fill_n(out, Rows * cols, T(0));
+/// Weights [any, k] as they lie in memory, from some row on.
+template <class T>
+struct Weights {
+  const T* data;
+  int64_t k;
+  Weights from(int64_t row) const { return {data + row * k, k}; }
+};
+
 #if HWY_TARGET != HWY_SCALAR
-  constexpr int width = Simd<T>::width;
+/// Rows of a [Rows, k] times as many rows of b as a cache line has numbers, which are turned in
+/// registers; adds to out, whose rows are `cols` apart, block of kDepth by block. Each line of b is
+/// asked for kAhead numbers early, and the first ones of `next`, what is read after b, at the end.
+template <class T, int Rows>
+HWY_INLINE void multiply_thin_tile(const T* a, const Weights<T>& b, const Weights<T>& next,
+                                   T* out) {
+  constexpr int cols = Simd<T>::cols;
+  constexpr int width = Simd<T>::width, line = 64 / sizeof(T), tile = std::min(line, cols);
   using Turned = Transposed<width, T>;
   constexpr auto d = Turned::d;
-  constexpr int64_t line = 64 / sizeof(T);  // whole cache lines of b while they are in L1
   using V = hn::Vec<hn::CappedTag<T, width>>;
+  constexpr int64_t kAhead = 4 * line;
+  const int64_t k = b.k;
   for (int64_t begin = 0; begin < k; begin += kDepth) {
     const int64_t end = std::min(k, begin + kDepth);
-    V acc[Rows][kVectors];
+    V acc[Rows][tile / width];
     for (auto& row : acc)
       for (auto& x : row) x = hn::Zero(d);
     const auto add = [&](int v, int64_t l, V b_of_l) HWY_ATTR {
@@ -240,9 +249,12 @@ inline void multiply_thin(int64_t k, const T* a, const T* b, [[maybe_unused]] in
     };
     int64_t l0 = begin;
     for (; l0 + line <= end; l0 += line) {
-      for (int v = 0; v < kVectors; ++v) {
-        const T* from = b + v * width * k + l0;
-        for (int j = 0; j < width; ++j) __builtin_prefetch(from + ahead + j * k, 0, 2);
+      const bool inside = l0 + kAhead < k;
+      const T* ahead = inside ? b.data + l0 + kAhead : next.data + (l0 + kAhead - k);
+      const int64_t step = inside ? k : next.k;
+      for (int v = 0; v < tile / width; ++v) {
+        for (int j = 0; j < width; ++j, ahead += step) __builtin_prefetch(ahead);
+        const T* from = b.data + v * width * k + l0;
         for (int64_t l = 0; l < line; l += Turned::block) {
           const Turned t(from + l, k);
           for (int e = 0; e < Turned::block; ++e) add(v, l0 + l + e, t.v[e]);
@@ -250,23 +262,38 @@ inline void multiply_thin(int64_t k, const T* a, const T* b, [[maybe_unused]] in
       }
     }
     for (; l0 < end; ++l0) {
-      HWY_ALIGN T column[cols];
-      for (int j = 0; j < cols; ++j) column[j] = b[j * k + l0];
-      for (int v = 0; v < kVectors; ++v) add(v, l0, hn::Load(d, column + v * width));
+      HWY_ALIGN T column[tile];
+      for (int j = 0; j < tile; ++j) column[j] = b.data[j * k + l0];
+      for (int v = 0; v < tile / width; ++v) add(v, l0, hn::Load(d, column + v * width));
     }
     for (int i = 0; i < Rows; ++i)
-      for (int v = 0; v < kVectors; ++v) {
+      for (int v = 0; v < tile / width; ++v) {
         T* to = out + i * cols + v * width;
         hn::StoreU(hn::Add(hn::LoadU(d, to), acc[i][v]), d, to);
       }
   }
+}
+
+#endif
+
+/// out [Rows, cols] = rows of a [Rows, k] times rows of b, summed in blocks of kDepth: weights that
+/// are used once are never packed.
+template <class T, int Rows>
+inline void multiply_thin(const T* a, const Weights<T>& b, [[maybe_unused]] const Weights<T>& next,
+                          T* out) {
+  constexpr int cols = Simd<T>::cols;
+  std::fill_n(out, Rows * cols, T(0));
+#if HWY_TARGET != HWY_SCALAR
+  constexpr int tile = std::min<int>(64 / sizeof(T), cols);
+  for (int j = 0; j < cols; j += tile)
+    multiply_thin_tile<T, Rows>(a, b.from(j), j + tile < cols ? b.from(j + tile) : next, out + j);
 #else
-  for (int64_t begin = 0; begin < k; begin += kDepth)
+  for (int64_t begin = 0; begin < b.k; begin += kDepth)
     for (int i = 0; i < Rows; ++i)
       for (int j = 0; j < cols; ++j) {
         T x = 0;
-        for (int64_t l = begin; l < std::min(k, begin + kDepth); ++l)
-          x += a[i * k + l] * b[j * k + l];
+        for (int64_t l = begin; l < std::min(b.k, begin + kDepth); ++l)
+          x += a[i * b.k + l] * b.data[j * b.k + l];
         out[i * cols + j] += x;
       }
 #endif
@@ -274,10 +301,10 @@ inline void multiply_thin(int64_t k, const T* a, const T* b, [[maybe_unused]] in
 
 /// The same for 1 to Rows rows.
 template <class T, int Rows = kThin>
-inline void multiply_thin_rows(int64_t rows, int64_t k, const T* a, const T* b, int64_t ahead,
-                               T* out) {
-  if (rows == Rows) return multiply_thin<T, Rows>(k, a, b, ahead, out);
-  if constexpr (Rows > 1) multiply_thin_rows<T, Rows - 1>(rows, k, a, b, ahead, out);
+inline void multiply_thin_rows(int64_t rows, const T* a, const Weights<T>& b,
+                               const Weights<T>& next, T* out) {
+  if (rows == Rows) return multiply_thin<T, Rows>(a, b, next, out);
+  if constexpr (Rows > 1) multiply_thin_rows<T, Rows - 1>(rows, a, b, next, out);
 }
 
 }  // namespace restage::cpu::HWY_NAMESPACE

@@ -107,8 +107,8 @@ void thin_tiles(const Product<T>& p, int64_t j0, int64_t j1) {
   constexpr int cols = Simd<T>::cols;
   alignas(kVectorBytes) T sums[kThin * cols];
   for (int64_t j = j0; j < j1; j += cols) {
-    const int64_t ahead = p.n - j >= 2 * cols ? cols * p.k : 0;
-    multiply_thin_rows<T>(p.m, p.k, p.a.data, &p.b.at(0, j), ahead, sums);
+    const Weights<T> b{&p.b.at(0, j), p.k};
+    multiply_thin_rows<T>(p.m, p.a.data, b, j + cols < j1 ? b.from(cols) : b, sums);
     finish_tile(p, Place{0, j, true, true}, p.m, sums);
   }
 }

@@ -141,68 +141,115 @@ void cell_grad(const T* gates, const T* previous, const T* g_out, int64_t h, int
   }
 }
 
+/// A layer as GruArgs has it.
 template <class T>
-struct Forward {
+struct Layer {
   static constexpr int cols = Simd<T>::cols;
-  explicit Forward(const GruArgs& args)
-      : steps(args.gi.size(0)),
-        n(args.gi.size(1)),
+  explicit Layer(const GruArgs& args)
+      : steps(args.x.size(0)),
+        n(args.x.size(1)),
+        i(args.x.size(2)),
         h(args.h0.size(1)),
-        thin(steps == 1 && n <= kThin && h % cols == 0),
-        gi(args.gi.data<T>()),
+        x(args.x.data<T>()),
         h0(args.h0.data<T>()),
+        w_ih(args.w_ih.data<T>()),
         w_hh(args.w_hh.data<T>()),
+        b_ih(args.b_ih.data<T>()),
         b_hh(args.b_hh.data<T>()),
         out(args.out.data<T>()),
-        gates(args.gates.data<T>()),
-        packed(thin ? 0 : 3 * round_up(h, cols) * h) {}
+        gates(args.gates != nullptr ? args.gates->data<T>() : nullptr) {}
 
-  const int64_t steps, n, h;
-  const bool thin;  // a step alone reads the weights as they lie; more are worth packing them once
-  const T *gi, *h0, *w_hh, *b_hh;
+  const int64_t steps, n, i, h;
+  const T *x, *h0, *w_ih, *w_hh, *b_ih, *b_hh;
   T *out, *gates;
-  Workspace<T> packed;
-  Panels<T> now{n, h}, next{n, h};
 
-  T* weights(int64_t gate, int64_t unit) const {
-    return packed.data() + (gate * round_up(h, cols) + unit) * h;
+  /// Units j to j + width of all rows after step t. gi: W_i x + b_i of the first of them, its gates
+  /// `apart`, its rows `row` apart; gh [3, n, cols]: W_h h.
+  void cells(int64_t t, int64_t j, int64_t width, const T* gi, int64_t apart, int64_t row,
+             const T* gh) const {
+    const T *state = (t > 0 ? out + (t - 1) * n * h : h0) + j, *bias = b_hh + j;
+    T unasked[4 * cols];
+    for (int64_t r = 0; r < n; ++r) {
+      const T *in = gi + r * row, *p = gh + r * cols;
+      T* g = gates != nullptr ? gates + (t * n + r) * 4 * h + j : unasked;
+      const int64_t step = gates != nullptr ? h : cols;
+      const T* from[] = {in,           in + apart,       in + 2 * apart, p,
+                         p + n * cols, p + 2 * n * cols, bias,           bias + h,
+                         bias + 2 * h, state + r * h};
+      T* to[] = {g, g + step, g + 2 * step, g + 3 * step, out + (t * n + r) * h + j};
+      cell(from, to, width);
+    }
+  }
+};
+
+/// A step alone, of a few rows: both products and the cells of some units in one go, weights read
+/// as they lie. More steps or rows are worth packing the weights once.
+template <class T>
+struct Frame {
+  static constexpr int cols = Simd<T>::cols;
+  const Layer<T>& of;
+
+  bool fits() const { return of.steps == 1 && of.n <= kThin && of.h % cols == 0; }
+
+  /// Rows of weights for some units: gates of W_i (0 to 2), then of W_h.
+  Weights<T> weights(int64_t product, int64_t j) const {
+    return product < 3 ? Weights<T>{of.w_ih, of.i}.from(product * of.h + j)
+                       : Weights<T>{of.w_hh, of.h}.from((product - 3) * of.h + j);
   }
 
-  /// gh [n, cols]: W_h h for some units of a gate.
-  void product(int64_t gate, int64_t j, T* gh) const {
-    if (!thin) return now.times(weights(gate, j), gh);
-    const int64_t row = gate * h + j, ahead = row + 2 * cols <= 3 * h ? cols * h : 0;
-    multiply_thin_rows<T>(n, h, h0, w_hh + row * h, ahead, gh);
+  void units(int64_t j) const {
+    alignas(64) T sums[6 * kThin * cols];
+    const int64_t size = of.n * cols;
+    for (int64_t p = 0; p < 6; ++p)
+      multiply_thin_rows<T>(of.n, p < 3 ? of.x : of.h0, weights(p, j),
+                            weights(std::min<int64_t>(p + 1, 5), j), sums + p * size);
+    for (int64_t row = 0; row < 3 * of.n; ++row)
+      for (int64_t u = 0; u < cols; ++u) sums[row * cols + u] += of.b_ih[row / of.n * of.h + j + u];
+    of.cells(0, j, cols, sums, size, cols, sums + 3 * size);
+  }
+
+  void run() const {
+    for_units<T>(of.h, [&](int64_t j, int64_t) { units(j); });
+  }
+};
+
+/// Steps one after the other; the input products of all of them are one.
+template <class T>
+struct Sequence {
+  static constexpr int cols = Simd<T>::cols;
+  Sequence(const Layer<T>& layer, const GruArgs& args)
+      : of(layer),
+        gi(Tensor::empty({of.steps * of.n, 3 * of.h}, args.x.dtype())),
+        packed(3 * round_up(of.h, cols) * of.h) {
+    cpu::matmul(MatmulArgs{args.x.reshape({of.steps * of.n, of.i}), args.w_ih, gi, false, true,
+                           &args.b_ih});
+  }
+
+  const Layer<T>& of;
+  Tensor gi;
+  Workspace<T> packed;
+  Panels<T> now{of.n, of.h}, next{of.n, of.h};
+
+  T* weights(int64_t gate, int64_t unit) const {
+    return packed.data() + (gate * round_up(of.h, cols) + unit) * of.h;
   }
 
   void step(int64_t t, int64_t j, int64_t width) {
-    const Workspace<T> memory(3 * n * cols);
-    T* gh = memory.data();
-    for (int64_t g = 0; g < 3; ++g) product(g, j, gh + g * n * cols);
-    const T* state = (t > 0 ? out + (t - 1) * n * h : h0) + j;
-    T* to = out + t * n * h + j;
-    const T* bias = b_hh + j;
-    for (int64_t i = 0; i < n; ++i) {
-      const T *x = gi + (t * n + i) * 3 * h + j, *p = gh + i * cols;
-      T* g = gates + (t * n + i) * 4 * h + j;
-      const T* in[] = {
-          x,        x + h,        x + 2 * h,    p, p + n * cols, p + 2 * n * cols, bias,
-          bias + h, bias + 2 * h, state + i * h};
-      T* results[] = {g, g + h, g + 2 * h, g + 3 * h, to + i * h};
-      cell(in, results, width);
-    }
-    if (t + 1 < steps) next.put(to, h, j, width);
+    const int64_t n = of.n, h = of.h;
+    const Workspace<T> gh(3 * n * cols);
+    for (int64_t g = 0; g < 3; ++g) now.times(weights(g, j), gh.data() + g * n * cols);
+    of.cells(t, j, width, gi.data<T>() + t * n * 3 * h + j, h, 3 * h, gh.data());
+    if (t + 1 < of.steps) next.put(of.out + t * n * h + j, h, j, width);
   }
 
   void run() {
-    if (!thin && steps > 0) {
-      now.put(h0, h, 0, h);
-      for_units<T>(h, [&](int64_t j, int64_t width) {
-        for (int64_t g = 0; g < 3; ++g)
-          pack_b<T>({w_hh + (g * h + j) * h, 1, h}, h, width, weights(g, j));
-      });
-    }
-    for (int64_t t = 0; t < steps; ++t) {
+    const int64_t h = of.h;
+    if (of.steps > 0) now.put(of.h0, h, 0, h);
+    for_units<T>(h, [&](int64_t j, int64_t width) {
+      for (int64_t g = 0; g < 3; ++g)
+        pack_b<T>({of.w_hh + (g * h + j) * h, 1, h}, h, width, weights(g, j));
+    });
+    for (int64_t t = 0; t < of.steps; ++t) {
       for_units<T>(h, [&](int64_t j, int64_t width) { step(t, j, width); });
       now.data.swap(next.data);
     }
@@ -278,8 +325,14 @@ struct Backward {
 }  // namespace
 
 void gru(const GruArgs& args) {
-  count_flops(6.0 * static_cast<double>(args.out.numel() * args.h0.size(1)));
-  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { Forward<decltype(zero)>(args).run(); });
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
+    const Layer<decltype(zero)> layer(args);
+    const Frame<decltype(zero)> frame{layer};
+    const int64_t k = layer.h + (frame.fits() ? layer.i : 0);  // else matmul() counts the inputs
+    count_flops(6.0 * static_cast<double>(args.out.numel() * k));
+    if (frame.fits()) return frame.run();
+    Sequence<decltype(zero)>(layer, args).run();
+  });
 }
 
 void gru_grad(const GruGradArgs& args) {

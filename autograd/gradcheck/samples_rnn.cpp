@@ -24,6 +24,7 @@ void add_rnn(Table& table) {
   s.add("no input number", gru_inputs(2, 2, 0, 2, rng), build);
   s.large("many sequences", gru_inputs(3, 290, 5, 32, rng), build);
   s.large("a frame: weights read as they lie", gru_inputs(1, 2, 69, 320, rng), build);
+  s.large("a frame of units that fill no block", gru_inputs(1, 3, 8, 70, rng), build);
   s.large("rows and units that fill no panel", gru_inputs(2, 14, 3, 70, rng), build);
   const auto broken = [&](const std::string& title, size_t which, const Shape& shape) {
     std::vector<Tensor> inputs = gru_inputs(2, 3, 4, 5, rng);

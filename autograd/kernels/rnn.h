@@ -6,17 +6,19 @@
 
 namespace restage {
 
-/// All steps of one layer. gi [t, n, 3h] = W_i x + b_i of every step, h0 [n, h], w_hh [3h, h],
-/// b_hh [3h] -> out [t, n, h]; gates [t, n, 4h] keeps r, z, n and W_hn h + b_hn of every step for
+/// All steps of one layer. x [t, n, i], h0 [n, h], w_ih [3h, i], w_hh [3h, h], b_ih and b_hh [3h]
+/// -> out [t, n, h]; gates [t, n, 4h], or null, keeps r, z, n and W_hn h + b_hn of every step for
 /// the backward pass.
 struct GruArgs {
   static constexpr std::string_view name = "gru";
-  const Tensor& gi;
+  const Tensor& x;
   const Tensor& h0;
+  const Tensor& w_ih;
   const Tensor& w_hh;
+  const Tensor& b_ih;
   const Tensor& b_hh;
   Tensor& out;
-  Tensor& gates;
+  Tensor* gates;
 };
 /// gy [t, n, h] and y = out of GruArgs -> g_gi [t, n, 3h], g_gh [t, n, 3h] (gradients of W_i x +
 /// b_i and of W_h h + b_h), out [n, h] = gradient of h0.

@@ -36,15 +36,12 @@ void Gru::check(Inputs x) const {
 }
 
 Tensor Gru::forward(Inputs in, Saved& saved) const {
-  const Tensor &x = in[0], &w_ih = in[2], &w_hh = in[3];
-  const int64_t t_count = x.size(0), n = x.size(1), h = in[1].size(1);
-  Tensor gi = Tensor::empty({t_count, n, 3 * h}, x.dtype(), x.device());
-  Tensor gi_flat = flat(gi);
-  launch(MatmulArgs{flat(x), w_ih, gi_flat, false, true, &in[4]});
-  Tensor y = Tensor::empty({t_count, n, h}, x.dtype(), x.device());
-  Tensor gates = Tensor::empty({t_count, n, 4 * h}, x.dtype(), x.device());
-  launch(GruArgs{gi, in[1], w_hh, in[5], y, gates});
-  saved.keep({x, in[1], w_ih, w_hh, y, gates});
+  const Tensor &x = in[0], &h0 = in[1], &w_ih = in[2], &w_hh = in[3];
+  const int64_t t_count = x.size(0), n = x.size(1), h = h0.size(1);
+  Tensor y = Tensor::empty({t_count, n, h}, x.dtype(), x.device()), gates;
+  if (saved.on()) gates = Tensor::empty({t_count, n, 4 * h}, x.dtype(), x.device());
+  launch(GruArgs{x, h0, w_ih, w_hh, in[4], in[5], y, saved.on() ? &gates : nullptr});
+  saved.keep({x, h0, w_ih, w_hh, y, gates});
   return y;
 }
 

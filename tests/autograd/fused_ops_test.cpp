@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "autograd/base/parallel.h"
 #include "autograd/gradcheck/evaluate.h"
 #include "autograd/kernels/stats.h"
 #include "autograd/ops/attention.h"
@@ -16,6 +17,7 @@
 #include "autograd/ops/reduce.h"
 #include "autograd/ops/rnn.h"
 #include "tests/support/expect_near.h"
+#include "tests/support/use_set.h"
 
 namespace restage {
 namespace {
@@ -61,8 +63,11 @@ TEST(FusedOps, GruOfManyRowsAndOfOneFrameIsItsReference) {
   struct Sizes {
     int64_t t, n, i, h;
   };
-  // More rows than a panel and more units than a block; then weights that are read as they lie.
-  for (const auto& [t, n, i, h] : {Sizes{3, 14, 5, 40}, Sizes{1, 1, 69, 64}, Sizes{1, 4, 20, 320}})
+  // More rows than a panel and more units than a block; then frames: of few rows and whole blocks
+  // of units, whose weights are read as they lie, and of more rows or other numbers of units.
+  for (const auto& [t, n, i, h] :
+       {Sizes{3, 14, 5, 40}, Sizes{1, 1, 69, 64}, Sizes{1, 2, 64, 32}, Sizes{1, 3, 1, 96},
+        Sizes{1, 4, 20, 320}, Sizes{1, 5, 20, 64}, Sizes{1, 2, 7, 33}, Sizes{1, 1, 0, 32}})
     expect_fused(
         {random({t, n, i}, 1), random({n, h}, 2), random({3 * h, i}, 3), random({3 * h, h}, 4),
          random({3 * h}, 5), random({3 * h}, 6)},
@@ -70,21 +75,58 @@ TEST(FusedOps, GruOfManyRowsAndOfOneFrameIsItsReference) {
         [](Args x) { return gru_reference(x[0], x[1], x[2], x[3], x[4], x[5]); });
 }
 
-TEST(FusedOps, AFrameOfAGruAloneHasTheBitsOfTheSequence) {
-  const int64_t t = 4, n = 3, h = 320;
-  const Tensor x = random({t, n, 9}, 1).cast(DType::f32),
-               w_ih = random({3 * h, 9}, 2).cast(DType::f32),
-               w_hh = random({3 * h, h}, 3).cast(DType::f32),
-               b_ih = random({3 * h}, 4).cast(DType::f32),
-               b_hh = random({3 * h}, 5).cast(DType::f32);
-  const Tensor h0 = random({n, h}, 6).cast(DType::f32);
-  const Tensor all = gru(Var(x), Var(h0), Var(w_ih), Var(w_hh), Var(b_ih), Var(b_hh)).value;
-  Var state(h0);
-  for (int64_t i = 0; i < t; ++i) {
-    const Var y = gru(Var(x.rows(i, i + 1)), state, Var(w_ih), Var(w_hh), Var(b_ih), Var(b_hh));
-    EXPECT_TRUE(same_bits(y.value, all.rows(i, i + 1))) << i;
-    state = reshape(y, {n, h});
+/// Every frame of x [t, n, i] alone, on a tape or without, as gru() gives them all together.
+void expect_frames_of_the_sequence(const Tensor& x, const Tensor& h0, const Build& weights_with) {
+  const Tensor all = weights_with({Var(x), Var(h0)}).value;
+  for (const bool taped : {false, true}) {
+    Tape tape;
+    Var state = taped ? tape.leaf(h0, 1) : Var(h0);
+    for (int64_t i = 0; i < x.size(0); ++i) {
+      const Var y = weights_with({Var(x.rows(i, i + 1)), state});
+      EXPECT_TRUE(same_bits(y.value, all.rows(i, i + 1))) << "frame " << i;
+      state = reshape(y, h0.shape());
+    }
   }
+}
+
+TEST(FusedOps, AFrameOfAGruAloneHasTheBitsOfTheSequence) {
+  const int before = threads();
+  for (const int64_t n : {1, 2, 3, 4, 5})
+    for (const int64_t h : {33, 64, 320}) {
+      SCOPED_TRACE(std::to_string(n) + " rows, " + std::to_string(h) + " units");
+      std::vector<Var> weights;
+      for (const Shape& shape : {Shape{3 * h, 69}, Shape{3 * h, h}, Shape{3 * h}, Shape{3 * h}})
+        weights.emplace_back(random(shape, 2 + weights.size()).cast(DType::f32));
+      for (const int count : {1, 2, 3}) {
+        set_threads(count);
+        expect_frames_of_the_sequence(random({4, n, 69}, 1).cast(DType::f32),
+                                      random({n, h}, 6).cast(DType::f32), [&](Args x) {
+                                        return gru(x[0], x[1], weights[0], weights[1], weights[2],
+                                                   weights[3]);
+                                      });
+      }
+    }
+  set_threads(before);
+}
+
+TEST(FusedOps, AFrameOfAGruWithoutATapeHasTheSameBitsOnAllVectorSets) {
+  const auto sets = testing::vector_sets();
+  if (sets.size() < 2) GTEST_SKIP() << "this processor has fewer than two vector sets";
+  for (const int64_t n : {1, 3, 4})
+    for (const int64_t h : {16, 48, 320}) {  // 16 and 48 fill blocks of AVX2 only
+      const auto frame = [&](const std::string& set) {
+        const testing::UseSet use(set);
+        const auto input = [](const Shape& shape, uint64_t stream) {
+          return Var(random(shape, stream).cast(DType::f32));
+        };
+        return gru(input({1, n, 69}, 1), input({n, h}, 2), input({3 * h, 69}, 3),
+                   input({3 * h, h}, 4), input({3 * h}, 5), input({3 * h}, 6))
+            .value;
+      };
+      const Tensor first = frame(sets[0]);
+      for (size_t i = 1; i < sets.size(); ++i)
+        EXPECT_TRUE(same_bits(frame(sets[i]), first)) << n << " rows, " << h << " units";
+    }
 }
 
 TEST(FusedOps, AttentionPoolIsItsReference) {

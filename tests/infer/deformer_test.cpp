@@ -11,6 +11,7 @@
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/rotation.h"
 #include "nn/weights/bundle.h"
+#include "tests/support/use_set.h"
 
 namespace restage {
 namespace {
@@ -76,6 +77,22 @@ std::unique_ptr<Mlp3> net(int64_t width = kMlpWidth) {
 
 void fill(Parameter& p, double value) { p.value = Tensor::full(p.value.shape(), value); }
 
+/// Planes through the origin, in which the first units change sign, and points of which every tile
+/// has some on both sides of each plane.
+Surface with_all_units_active(Mlp3* offsets) {
+  fill(offsets->fc1.bias, 0);
+  Tensor& w = offsets->fc1.weight.value;
+  for (int64_t i = 0; i < w.size(0); ++i)
+    for (int64_t c = 0; c < 69; ++c) w.data<float>()[69 * i + c] *= c < 66 ? 0.0f : 10.0f;
+  Surface s = surface(40);
+  for (int64_t i = 0; i < 40; ++i)
+    for (int64_t c = 0; c < 3; ++c)
+      s.points.data<float>()[3 * i + c] =
+          static_cast<float>((i % 2 == 0 ? 1 : -1) * (c == i / 2 % 3 ? 1 : 0.01 * c)) *
+          (1 + 1e-6f * static_cast<float>(i));
+  return s;
+}
+
 TEST(InferDeformer, EqualsThePlainNetworkForAnyNumberOfPoints) {
   const auto offsets = net();
   for (const int64_t v : {1, 2, 47, 48, 49, 63, 65, 384, 385, 500, 3000}) {
@@ -120,19 +137,7 @@ TEST(InferDeformer, EqualsThePlainNetworkWhenAllOrNoUnitsChangeSign) {
   EXPECT_EQ(share(), 0);
   fill(offsets->fc1.bias, -50);  // all off
   EXPECT_EQ(share(), 0);
-  // Stripes far narrower than a tile: every unit changes sign everywhere.
-  fill(offsets->fc1.bias, 0);
-  Tensor& w = offsets->fc1.weight.value;
-  for (int64_t i = 0; i < w.size(0); ++i)
-    for (int64_t c = 0; c < 69; ++c) w.data<float>()[69 * i + c] *= c < 66 ? 0.0f : 10.0f;
-  Surface around = s;  // every tile lies on both sides of every plane through the origin
-  for (int64_t i = 0; i < 1000; ++i)
-    for (int64_t c = 0; c < 3; ++c)
-      around.points.data<float>()[3 * i + c] =
-          static_cast<float>((i % 2 == 0 ? 1 : -1) * (c == i / 2 % 3 ? 1 : 0.01 * c)) *
-          (1 + 1e-6f * static_cast<float>(i));
-  around.points = around.points.rows(0, 40);
-  around.weights = around.weights.rows(0, 40);
+  const Surface around = with_all_units_active(offsets.get());
   const Deformer deformer(around.points, around.weights, offsets.get());
   EXPECT_LT(apart(deformer(s.pose, s.bones), reference(around, offsets.get())), 5e-6);
   EXPECT_EQ(deformer.active_share(s.pose), 1);
@@ -168,6 +173,32 @@ TEST(InferDeformer, BitsDoNotDependOnThreads) {
     EXPECT_TRUE(same_bits(deformer(s.pose, s.bones), one)) << n;
   }
   set_threads(before);
+}
+
+TEST(InferDeformer, BitsAreTheSameOnAllVectorSets) {
+  const auto sets = testing::vector_sets();
+  if (sets.size() < 2) GTEST_SKIP() << "this processor has fewer than two vector sets";
+  const ModelSet models =
+      load_models(std::string(RESTAGE_SOURCE_DIR) + "/experiments/weights/lite.safetensors", {});
+  const auto some = net(), odd = net(33), all = net();
+  const Surface any = surface(1000), everywhere = with_all_units_active(all.get());
+  const auto expect_same = [&](const Surface& s, const Mlp3* offsets, double least_share) {
+    for (const bool dense : {false, true}) {
+      const auto with = [&](const std::string& set) {
+        const testing::UseSet use(set);
+        const Deformer deformer(s.points, s.weights, offsets);
+        EXPECT_GE(deformer.active_share(s.pose), least_share);
+        return deformer(s.pose, s.bones, dense);
+      };
+      const Tensor first = with(sets[0]);
+      for (size_t i = 1; i < sets.size(); ++i) EXPECT_TRUE(same_bits(with(sets[i]), first));
+    }
+  };
+  expect_same(any, models.offsets.net.get(), 0.005);
+  expect_same(any, some.get(), 0.005);
+  expect_same(any, odd.get(), 0.005);
+  expect_same(everywhere, all.get(), 1);  // every unit of every tile
+  expect_same(any, nullptr, 0);
 }
 
 TEST(InferDeformer, NaNDoesNotVanish) {
