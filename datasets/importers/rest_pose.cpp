@@ -108,7 +108,7 @@ Mat3 facing_front(const Joints& rest, const Vec3& given, bool framed, const std:
   if (!given.isZero()) {
     if (std::abs(given.y()) > 0.5)
       throw InputError("", "a person cannot face up or down", "give --facing across --up");
-    if (given.cross(left).y() > 0)  // left is at the right hand of who faces there
+    if (given.cross(left).y() < 0)  // left is at the right hand of who faces there
       throw InputError(path, "for a person facing that way, its left joints are on the right",
                        "give the other --facing; if the file is mirrored, mend its names");
     yaw = -std::atan2(given.x(), given.z());

@@ -100,7 +100,8 @@ class Builder {
     if (j == 1 || j == 2 || j == 4 || j == 5) return -Vec3::UnitY();
     if (j == 7 || j == 8) return foot_direction(j);
     if (in_trunk(j)) return Vec3::UnitY();
-    return j % 2 ? Vec3::UnitX() : Vec3(-Vec3::UnitX());  // 13, 16, 18 are left
+    const bool left = j == 13 || j == 16 || j == 18;
+    return left ? Vec3(Vec3::UnitX()) : Vec3(-Vec3::UnitX());
   }
 
   /// Forward, and as steep as the foot is on the floor: in the frames with the lowest ankle.
