@@ -40,7 +40,8 @@ MotionClip convert_amc(std::string_view text, const std::string& path, std::stri
   const std::optional<Profile> profile = asked_profile(options);
   Recording recording;
   recording.format = "AMC on " + fs::path(asf_path).filename().string();
-  recording.rate_of_file = "AMC files say none, CMU's are 120";
+  recording.rate_of_file = "AMC files say none, the CMU set is 120 fps";
+  recording.rate_known = false;
   if (asf.length_unit > 0) recording.metres_per_unit = 0.0254 / asf.length_unit;
   SourceMotion& motion = recording.motion;
   motion.fps = kAmcFps;
@@ -54,11 +55,7 @@ MotionClip convert_amc(std::string_view text, const std::string& path, std::stri
   recording.names = name_joints(motion.skeleton, asf_path, profile ? &*profile : nullptr);
   MotionOptions with_subject = options;
   if (options.subject.empty()) with_subject.subject = stem_of(asf_path);
-  MotionClip clip = make_clip(std::move(recording), path, with_subject);
-  if (options.fps <= 0)
-    clip.report.remarks.push_back(
-        "AMC files do not say their rate: 120 fps is taken, as the CMU set has; else give --fps");
-  return clip;
+  return make_clip(std::move(recording), path, with_subject);
 }
 
 MotionClip read_amc(const std::string& path, const std::string& asf, const MotionOptions& options) {

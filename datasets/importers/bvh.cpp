@@ -58,7 +58,7 @@ MotionClip convert_bvh(std::string_view text, const std::string& path,
   recording.names = name_joints(file.skeleton, path, profile ? &*profile : nullptr);
   recording.format = "BVH";
   char rate[60];
-  std::snprintf(rate, sizeof rate, "the file says %.6g", frame_rate(file.frame_time));
+  std::snprintf(rate, sizeof rate, "the file says %.6g fps", frame_rate(file.frame_time));
   recording.rate_of_file = rate;
   const int hips = recording.names.map[0].joint;
   recording.motion = motion_of(std::move(file), hips);

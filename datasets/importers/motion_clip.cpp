@@ -196,12 +196,13 @@ MotionClip make_clip(Recording recording, const std::string& path, const MotionO
   const size_t frames = motion.local.size();
   const std::vector<PosedSkeleton> poses = poses_at_30_fps(std::move(motion), map, rest, path);
   report.facts.emplace_back(
-      "rate", fps == kFps
-                  ? "30 fps, taken as they are"
-                  : text_of(fps, "%.6g") + " fps" +
-                        (options.fps > 0 ? " as given (" + recording.rate_of_file + ")" : "") +
-                        " -> 30 fps, slerp: " + std::to_string(frames) + " frames -> " +
-                        std::to_string(poses.size()));
+      "rate",
+      (fps == kFps ? "30 fps, taken as they are"
+                   : text_of(fps, "%.6g") + " fps -> 30 fps, slerp: " + std::to_string(frames) +
+                         " frames -> " + std::to_string(poses.size())) +
+          (options.fps > 0        ? " (as given; " + recording.rate_of_file + ")"
+           : recording.rate_known ? std::string()
+                                  : " (" + recording.rate_of_file + ")"));
   compare_with_profile(*recording.names.profile, clip.scale, fps, report);
   for (const PosedSkeleton& pose : poses) clip.joints.push_back(pose.joints);
   clip.floor_y = floor_height(poses);

@@ -49,7 +49,8 @@ struct Recording {
   SourceMotion motion;  ///< in the file's units, at the file's rate
   NamedJoints names;
   std::string format;          ///< "BVH", "AMC": for the report
-  std::string rate_of_file;    ///< "the file says 120": for the report
+  std::string rate_of_file;    ///< "the file says 120 fps": for the report
+  bool rate_known = true;      ///< false: not by the file, but by custom
   double metres_per_unit = 0;  ///< if the file says it
 };
 

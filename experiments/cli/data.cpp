@@ -92,10 +92,13 @@ std::string block(const ImportReport& report) {
 /// The first words of what matters most, in one line; remarks in lines of their own.
 std::string summary(const ImportReport& report) {
   std::string text = report.file + ":";
-  for (const auto& [name, value] : report.facts)
-    if (name == "names" || name == "units" || name == "up" || name == "rate" || name == "rest pose")
-      text += (text.back() == ':' ? " " : "; ") + (name == "up" ? "up " : std::string()) +
-              value.substr(0, value.find_first_of(",:;("));
+  for (const auto& [name, value] : report.facts) {
+    if (name != "names" && name != "units" && name != "up" && name != "rate" && name != "rest pose")
+      continue;
+    std::string words = value.substr(0, value.find_first_of(",:;("));
+    words.erase(words.find_last_not_of(' ') + 1);
+    text += (text.back() == ':' ? " " : "; ") + words + (name == "up" ? " up" : "");
+  }
   text += "\n";
   for (const std::string& remark : report.remarks) text += "  note: " + remark + "\n";
   return text;
