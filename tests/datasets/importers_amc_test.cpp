@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -26,9 +27,9 @@ struct ToyBone {
 const std::vector<ToyBone>& toy() {
   static const std::vector<ToyBone> bones = [] {
     std::vector<ToyBone> out = {
-        {"lowerback", "root", {0, .1, 0}},         {"upperback", "lowerback", {0, .22, 0}},
-        {"thorax", "upperback", {0, .42, .01}},    {"lowerneck", "thorax", {0, .5, 0}},
-        {"upperneck", "lowerneck", {0, .57, .01}}, {"head", "upperneck", {0, .7, .02}}};
+        {"lowerback", "root", Vec3(0, .1, 0)},         {"upperback", "lowerback", Vec3(0, .22, 0)},
+        {"thorax", "upperback", Vec3(0, .42, .01)},    {"lowerneck", "thorax", Vec3(0, .5, 0)},
+        {"upperneck", "lowerneck", Vec3(0, .57, .01)}, {"head", "upperneck", Vec3(0, .7, .02)}};
     for (const int s : {1, -1}) {
       const std::string l = s > 0 ? "l" : "r";
       out.push_back({l + "hipjoint", "root", Vec3(s * .09, -.05, 0)});

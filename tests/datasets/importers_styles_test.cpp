@@ -161,10 +161,10 @@ TEST(ImportersStyles, ATPoseIsBuiltWhereZeroRotationsAreNone) {
     for (const char* limb : {"left_hip 1", "right_knee 1", "left_shoulder", "right_elbow"})
       EXPECT_NE(fact(clip.report, "turned").find(limb), std::string::npos)
           << fact(clip.report, "turned");
-    // The toy's own T-pose has its legs up to 4 degrees off the vertical.
+    // The toy's own T-pose has its trunk 2 and its shins 4 degrees off the vertical.
     const Errors error = errors(clip, style);
     EXPECT_LT(error.largest, 6) << profile;
-    EXPECT_LT(error.mean, 2) << profile;
+    EXPECT_LT(error.mean, 2.5) << profile;
     RecordProperty(profile + "_mean_degrees", std::to_string(error.mean));
     for (size_t f = 0; f < clip.joints.size(); ++f) {
       const PosedSkeleton truth = bvh_test::truth(static_cast<double>(f) / 30, true);

@@ -29,7 +29,7 @@ Body body(const std::string& id) {
   out.id = id;
   out.split = "train";
   out.rest.vertices = {Point(0, 0, 0), Point(1, 0, 0), Point(0, 1, 0)};
-  out.rest.faces = {{0, 1, 2}};
+  out.rest.faces.push_back({0, 1, 2});
   out.joints.fill(Vec3::Zero());
   out.weights.setZero(3, kJoints);
   out.weights.col(0).setOnes();
