@@ -51,9 +51,6 @@ inline Rule required(Rule rule = {}) {
 template <class E>
 using EnumNames = std::vector<std::pair<std::string, E>>;
 
-/// The candidate that `word` is probably a slip of, or "": few insertions, deletions, swaps.
-std::string nearest(const std::string& word, const std::vector<std::string>& candidates);
-
 namespace config_detail {
 
 template <class T>

@@ -6,8 +6,11 @@
 #include "autograd/base/error.h"
 #include "autograd/base/log.h"
 #include "autograd/base/parallel.h"
+#include "datasets/importers/amc.h"
+#include "datasets/importers/bvh.h"
 #include "datasets/importers/cmu.h"
 #include "datasets/importers/makehuman.h"
+#include "datasets/readers/word_lines.h"
 #include "datasets/schema.h"
 
 namespace restage {
@@ -15,12 +18,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_bvh(const fs::path& path) {
-  std::string name = path.filename().string();
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return name.ends_with(".bvh") || name.ends_with(".bvh.xz");
+bool is_a(const fs::path& path, const std::string& ending) {
+  const std::string name = lower_case(path.filename().string());
+  return name.ends_with(ending) || name.ends_with(ending + ".xz");
 }
+bool is_recording(const fs::path& path) { return is_a(path, ".bvh") || is_a(path, ".amc"); }
 
 void add_bodies(const std::string& folder, const std::string& garment, DatasetWriter& writer,
                 ImportSummary& summary) {
@@ -71,8 +73,14 @@ ImportSummary import_data_folder(const std::string& folder, bool bodies, bool cl
   return summary;
 }
 
-ImportSummary import_bvh_files(const std::vector<std::string>& files, const std::string& source,
-                               const std::string& out, const ImportOptions& options) {
+MotionClip read_recording(const std::string& file, const ImportOptions& options) {
+  return is_a(file, ".amc") ? read_amc(file, options.asf, options.motion)
+                            : read_bvh(file, options.motion);
+}
+
+ImportSummary import_recordings(const std::vector<std::string>& files, const std::string& source,
+                                const std::string& out, const ImportOptions& options) {
+  asked_profile(options.motion);  // a mistake there is not the files'
   FileInfo info;
   info.license = options.license;
   info.provenance = "imported from " + fs::path(source).filename().string();
@@ -80,7 +88,9 @@ ImportSummary import_bvh_files(const std::vector<std::string>& files, const std:
   DatasetWriter writer(out, info);
   for (const std::string& file : files) {
     try {
-      add_motion(import_bvh(file, options.bvh), writer, summary);
+      MotionClip clip = read_recording(file, options);
+      add_motion(clip.motion, writer, summary);
+      summary.reports.push_back(std::move(clip.report));
     } catch (const InputError& error) {
       if (files.size() == 1) throw;
       log_warning("skipped " + std::string(error.what()));
@@ -89,7 +99,7 @@ ImportSummary import_bvh_files(const std::vector<std::string>& files, const std:
   }
   if (summary.motions == 0)
     throw InputError(source,
-                     "none of its " + std::to_string(files.size()) + " BVH files could be used",
+                     "none of its " + std::to_string(files.size()) + " recordings could be used",
                      "import one alone to see why");
   writer.commit();
   return summary;
@@ -102,21 +112,24 @@ ImportSummary import_data(const std::string& source, const std::string& out,
   std::error_code ignored;
   if (!fs::is_directory(source, ignored)) {
     if (!fs::exists(source, ignored))
-      throw InputError(source, "is not there", "give a folder or a BVH file");
-    return import_bvh_files({source}, source, out, options);
+      throw InputError(source, "is not there", "give a folder, a BVH file or an AMC file");
+    if (is_a(source, ".asf"))
+      throw InputError(source, "is a skeleton without a motion",
+                       "give an .amc file and this one with --asf");
+    return import_recordings({source}, source, out, options);
   }
   const bool bodies = fs::exists(source + "/body/makehuman.h5", ignored);
   const bool clips = fs::exists(source + "/cmu/clips30.h5", ignored);
   if (bodies || clips) return import_data_folder(source, bodies, clips, out, options);
   std::vector<std::string> files;
   for (const fs::directory_entry& entry : fs::directory_iterator(source, ignored))
-    if (entry.is_regular_file(ignored) && is_bvh(entry.path()))
+    if (entry.is_regular_file(ignored) && is_recording(entry.path()))
       files.push_back(entry.path().string());
   if (files.empty())
-    throw InputError(source, "holds neither body/makehuman.h5, cmu/clips30.h5 nor BVH files",
-                     "give a data folder or a folder of .bvh files");
+    throw InputError(source, "holds neither body/makehuman.h5, cmu/clips30.h5 nor BVH or AMC files",
+                     "give a data folder or a folder of .bvh or .amc files");
   std::sort(files.begin(), files.end());
-  return import_bvh_files(files, source, out, options);
+  return import_recordings(files, source, out, options);
 }
 
 }  // namespace restage

@@ -1,220 +1,237 @@
-// map_joints(): the known sets of joint names, and where missing joints are put.
+// name_joints(): bones of a file as the 22 joints, and where missing joints are put.
 #include <algorithm>
-#include <cctype>
 #include <map>
 
 #include "autograd/base/error.h"
+#include "autograd/base/nearest.h"
 #include "datasets/importers/source_motion.h"
+#include "datasets/readers/word_lines.h"
 
 namespace restage {
 namespace {
 
 enum : int { kSpine1 = 3, kSpine2 = 6, kSpine3 = 9, kNeck = 12, kHead = 15 };
 
-/// Names of one family of skeletons in the order of kJointNames. An empty name, or one that a file
-/// lacks, is placed by rule; the joints of `kRequired` cannot be.
-struct Profile {
-  const char* title;
-  std::array<const char*, kJoints> names;
-  const char* chest_end;  ///< spine3, if missing, lies on the way from spine2 to this joint
-  double chest_fraction;  ///< how far
-};
+/// Those that cannot be placed.
 constexpr int kRequired[] = {0, 1, 2, 4, 5, 7, 8, 15, 16, 17, 18, 19, 20, 21};
 
-// clang-format off
-const Profile kProfiles[] = {
-    {"Daz",
-     {"hip", "lThigh", "rThigh", "abdomen", "lShin", "rShin", "chest", "lFoot", "rFoot", "", "lToe", "rToe",
-      "neck", "lCollar", "rCollar", "head", "lShldr", "rShldr", "lForeArm", "rForeArm", "lHand", "rHand"},
-     "neck", 0.35},
-    {"ASF",
-     {"root", "lfemur", "rfemur", "upperback", "ltibia", "rtibia", "thorax", "lfoot", "rfoot", "", "ltoes",
-      "rtoes", "upperneck", "lclavicle", "rclavicle", "head", "lhumerus", "rhumerus", "lradius", "rradius",
-      "lhand", "rhand"},
-     "lowerneck", 0.5},
-    {"CMU",  // the ASF skeleton under other names: LeftHand is its wrist bone, LeftFingerBase its hand
-     {"Hips", "LeftUpLeg", "RightUpLeg", "Spine", "LeftLeg", "RightLeg", "Spine1", "LeftFoot", "RightFoot", "",
-      "LeftToeBase", "RightToeBase", "Neck1", "LeftShoulder", "RightShoulder", "Head", "LeftArm", "RightArm",
-      "LeftForeArm", "RightForeArm", "LeftFingerBase", "RightFingerBase"},
-     "Neck", 0.5},
-    {"Mixamo",
-     {"Hips", "LeftUpLeg", "RightUpLeg", "Spine", "LeftLeg", "RightLeg", "Spine1", "LeftFoot", "RightFoot",
-      "Spine2", "LeftToeBase", "RightToeBase", "Neck", "LeftShoulder", "RightShoulder", "Head", "LeftArm",
-      "RightArm", "LeftForeArm", "RightForeArm", "LeftHand", "RightHand"},
-     "Neck", 0.35},
-    {"classic BVH",
-     {"Hips", "LeftHip", "RightHip", "Chest", "LeftKnee", "RightKnee", "Chest2", "LeftAnkle", "RightAnkle",
-      "Chest3", "LeftToe", "RightToe", "Neck", "LeftCollar", "RightCollar", "Head", "LeftShoulder",
-      "RightShoulder", "LeftElbow", "RightElbow", "LeftWrist", "RightWrist"},
-     "Neck", 0.35},
-    {"MakeHuman",
-     {"Root", "UpLeg_L", "UpLeg_R", "Spine1", "LoLeg_L", "LoLeg_R", "Spine2", "Foot_L", "Foot_R", "Spine3",
-      "Toe_L", "Toe_R", "Neck", "Clavicle_L", "Clavicle_R", "Head", "UpArm_L", "UpArm_R", "LoArm_L", "LoArm_R",
-      "Hand_L", "Hand_R"},
-     "Neck", 0.35},
-    {"MakeHuman default rig",
-     {"root", "upperleg01.L", "upperleg01.R", "spine04", "lowerleg01.L", "lowerleg01.R", "spine03", "foot.L",
-      "foot.R", "spine02", "toe1-1.L", "toe1-1.R", "neck01", "clavicle.L", "clavicle.R", "head", "upperarm01.L",
-      "upperarm01.R", "lowerarm01.L", "lowerarm01.R", "wrist.L", "wrist.R"},
-     "neck01", 0.35},
-    {"game engine",
-     {"pelvis", "thigh_l", "thigh_r", "spine_01", "calf_l", "calf_r", "spine_02", "foot_l", "foot_r", "spine_03",
-      "ball_l", "ball_r", "neck_01", "clavicle_l", "clavicle_r", "head", "upperarm_l", "upperarm_r", "lowerarm_l",
-      "lowerarm_r", "hand_l", "hand_r"},
-     "neck_01", 0.35},
-    {"SMPL",
-     {"Pelvis", "L_Hip", "R_Hip", "Spine1", "L_Knee", "R_Knee", "Spine2", "L_Ankle", "R_Ankle", "Spine3", "L_Foot",
-      "R_Foot", "Neck", "L_Collar", "R_Collar", "Head", "L_Shoulder", "R_Shoulder", "L_Elbow", "R_Elbow",
-      "L_Wrist", "R_Wrist"},
-     "Neck", 0.35},
-    {"restage",
-     {"pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle",
-      "right_ankle", "spine3", "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head",
-      "left_shoulder", "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist"},
-     "neck", 0.35},
+/// Bones by name: in lower case, without a namespace ("mixamorig:Hips") and, as a second name,
+/// without a prefix that three quarters of them share ("Model_Hips").
+class BoneNames {
+ public:
+  explicit BoneNames(const SourceSkeleton& skeleton) {
+    std::map<std::string, size_t> prefixes;
+    std::vector<std::string> plain;
+    for (const std::string& name : skeleton.names) {
+      plain.push_back(lower_case(name.substr(name.rfind(':') + 1)));  // npos + 1 is 0
+      const size_t end = plain.back().find('_');
+      if (end != std::string::npos) ++prefixes[plain.back().substr(0, end + 1)];
+    }
+    for (size_t j = 0; j < plain.size(); ++j) index_.emplace(plain[j], static_cast<int>(j));
+    for (const auto& [prefix, count] : prefixes)
+      if (4 * count >= 3 * plain.size())
+        for (size_t j = 0; j < plain.size(); ++j)
+          if (plain[j].starts_with(prefix))
+            index_.emplace(plain[j].substr(prefix.size()), static_cast<int>(j));
+  }
+
+  int find(const std::string& bone) const {
+    const auto at = index_.find(lower_case(bone));
+    return at == index_.end() ? -1 : at->second;
+  }
+  int find(const std::vector<std::string>& any) const {
+    for (const std::string& bone : any)
+      if (const int at = find(bone); at >= 0) return at;
+    return -1;
+  }
+  std::vector<std::string> all() const {
+    std::vector<std::string> out;
+    for (const auto& entry : index_) out.push_back(entry.first);
+    return out;
+  }
+
+ private:
+  std::map<std::string, int> index_;
 };
-// clang-format on
-
-/// Without a namespace ("mixamorig:Hips") and in lower case.
-std::string plain_name(const std::string& name) {
-  const size_t colon = name.rfind(':');
-  std::string out = colon == std::string::npos ? name : name.substr(colon + 1);
-  std::transform(out.begin(), out.end(), out.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return out;
-}
-
-using NameIndex = std::map<std::string, int>;
-
-int find(const NameIndex& index, const char* name) {
-  const auto at = index.find(plain_name(name));
-  return *name == '\0' || at == index.end() ? -1 : at->second;
-}
 
 struct Found {
   const Profile* profile = nullptr;
   std::array<int, kJoints> joints{};
-  std::vector<const char*> missing;  ///< of the required ones
-  int count = 0;
+  std::vector<std::string> missing;  ///< of the required ones
+  int count = 0;                     ///< how many of the 22 are there
+  int fitting = 0;                   ///< collars that hang from spine3
 };
 
-Found match(const Profile& profile, const NameIndex& index) {
+Found match(const Profile& profile, const BoneNames& names, const SourceSkeleton& skeleton) {
   Found out;
   out.profile = &profile;
-  for (int j = 0; j < kJoints; ++j) {
-    out.joints[j] = find(index, profile.names[j]);
+  for (size_t j = 0; j < kJoints; ++j) {
+    out.joints[j] = names.find(profile.bones[j]);
     out.count += out.joints[j] >= 0;
   }
   for (const int j : kRequired)
-    if (out.joints[j] < 0) out.missing.push_back(profile.names[j]);
+    if (out.joints[static_cast<size_t>(j)] < 0)
+      out.missing.push_back(profile.bones[static_cast<size_t>(j)][0]);
+  for (const size_t collar : {13, 14})
+    out.fitting += out.joints[collar] >= 0 && out.joints[kSpine3] >= 0 &&
+                   skeleton.parents[static_cast<size_t>(out.joints[collar])] == out.joints[kSpine3];
   return out;
 }
 
-/// The profile that misses least, then finds most, then comes first.
-Found best_match(const SourceSkeleton& skeleton, const std::string& where) {
-  NameIndex index;
-  for (size_t j = 0; j < skeleton.size(); ++j)
-    index.emplace(plain_name(skeleton.names[j]), static_cast<int>(j));
-  Found best;
-  for (const Profile& profile : kProfiles) {
-    Found found = match(profile, index);
-    if (best.profile == nullptr || found.missing.size() < best.missing.size() ||
-        (found.missing.size() == best.missing.size() && found.count > best.count))
-      best = std::move(found);
+bool better(const Found& a, const Found& b) {
+  if (a.missing.size() != b.missing.size()) return a.missing.size() < b.missing.size();
+  return a.count != b.count ? a.count > b.count : a.fitting > b.fitting;
+}
+
+[[noreturn]] void throw_missing(const Found& best, const BoneNames& names, bool chosen,
+                                const std::string& where) {
+  std::string lacks;
+  for (const std::string& bone : best.missing) {
+    if (lacks.size() > 80) {
+      lacks += ", ...";
+      break;
+    }
+    lacks += (lacks.empty() ? "" : ", ") + bone;
   }
-  if (best.missing.empty()) return best;
-  std::string names;
-  for (const char* name : best.missing) names += (names.empty() ? "" : ", ") + std::string(name);
+  const std::string close = nearest(lower_case(best.missing[0]), names.all());
+  if (!close.empty()) lacks += " (" + best.missing[0] + ": is it '" + close.substr(0, 40) + "'?)";
   throw InputError(where,
-                   "joint names fit no known skeleton; of the nearest (" +
-                       std::string(best.profile->title) + ") it lacks " + names,
-                   "rename the joints like Daz, ASF, CMU, Mixamo, MakeHuman or SMPL ones");
+                   chosen ? "lacks bones of the profile " + best.profile->name + ": " + lacks
+                          : "its bones fit no known skeleton; of the nearest (" +
+                                best.profile->title + ") it lacks " + lacks,
+                   "write a profile for it and give it with --profile, or rename the bones");
+}
+
+Found best_match(const SourceSkeleton& skeleton, const BoneNames& names, const Profile* chosen,
+                 const std::string& where) {
+  Found best;
+  if (chosen) best = match(*chosen, names, skeleton);
+  if (!chosen)
+    for (const Profile& profile : builtin_profiles()) {
+      Found found = match(profile, names, skeleton);
+      if (best.profile == nullptr || better(found, best)) best = std::move(found);
+    }
+  if (!best.missing.empty()) throw_missing(best, names, chosen != nullptr, where);
+  return best;
 }
 
 /// Places joints that the source lacks, in the frame of one that it has.
 class Placer {
  public:
-  Placer(const SourceSkeleton& skeleton, const Found& found) {
+  Placer(const SourceSkeleton& skeleton, const BoneNames& names, const Found& found,
+         const std::string& where)
+      : skeleton_(skeleton), names_(names), found_(found), where_(where) {
     zero_.resize(skeleton.size());
     for (size_t j = 0; j < skeleton.size(); ++j) {
       const int p = skeleton.parents[j];
       zero_[j] = p < 0 ? Vec3::Zero() : Vec3(zero_[static_cast<size_t>(p)] + skeleton.offsets[j]);
     }
-    for (int j = 0; j < kJoints; ++j) map_[j].joint = found.joints[j];
+    for (size_t j = 0; j < kJoints; ++j) out_.map[j].joint = found.joints[j];
   }
 
-  bool lacks(int j) const { return map_[j].joint < 0; }
-  Vec3 at(int j) const { return zero_[static_cast<size_t>(map_[j].joint)] + map_[j].offset; }
-  Vec3 source(int joint) const { return zero_[static_cast<size_t>(joint)]; }
-  const JointMap& map() const { return map_; }
-
-  /// Joint j turns with the source joint of `like` and rests at `where`.
-  void put(int j, int like, const Vec3& where) {
-    map_[j].joint = map_[like].joint;
-    map_[j].offset = where - zero_[static_cast<size_t>(map_[like].joint)];
-  }
-  void put_between(int j, int from, const Vec3& to, double fraction) {
-    put(j, from, at(from) + fraction * (to - at(from)));
+  NamedJoints place() {
+    out_.profile = found_.profile;
+    if (lacks(kNeck) && !by_profile(kNeck)) put_between(kNeck, last_spine(), at(kHead), 0.75);
+    spine();
+    for (const int side : {0, 1}) {
+      const int collar = 13 + side, shoulder = 16 + side, foot = 10 + side, ankle = 7 + side;
+      if (lacks(collar) && !by_profile(collar))
+        put(collar, kSpine3, at(kNeck) + 0.2 * (at(shoulder) - at(kNeck)));
+      if (lacks(foot) && !by_profile(foot)) put(foot, ankle, toe_of(ankle));
+    }
+    std::sort(out_.placed.begin(), out_.placed.end());
+    return out_;
   }
 
  private:
-  std::vector<Vec3> zero_;
-  JointMap map_;
-};
-
-void place_spine(Placer& placer, const Profile& profile, int chest_end) {
-  const int last = !placer.lacks(kSpine3)   ? kSpine3
-                   : !placer.lacks(kSpine2) ? kSpine2
-                   : !placer.lacks(kSpine1) ? kSpine1
-                                            : 0;
-  if (placer.lacks(kNeck)) placer.put_between(kNeck, last, placer.at(kHead), 0.75);
-  const Vec3 neck = placer.at(kNeck);
-  if (placer.lacks(kSpine1)) placer.put_between(kSpine1, 0, neck, 0.25);
-  if (placer.lacks(kSpine2)) {
-    // Two joints (or one, if spine3 is there) on the way from spine1 up.
-    const Vec3 top = placer.lacks(kSpine3) ? neck : placer.at(kSpine3);
-    placer.put_between(kSpine2, kSpine1, top, placer.lacks(kSpine3) ? 1.0 / 3 : 0.5);
-    if (placer.lacks(kSpine3)) placer.put_between(kSpine3, kSpine1, neck, 2.0 / 3);
+  bool lacks(int j) const { return joint(j).joint < 0; }
+  const SourceJoint& joint(int j) const { return out_.map[static_cast<size_t>(j)]; }
+  Vec3 at(int j) const { return zero_[static_cast<size_t>(joint(j).joint)] + joint(j).offset; }
+  int last_spine() const {
+    for (const int j : {kSpine3, kSpine2, kSpine1})
+      if (!lacks(j)) return j;
+    return 0;
   }
-  if (placer.lacks(kSpine3))
-    placer.put_between(kSpine3, kSpine2, chest_end >= 0 ? placer.source(chest_end) : neck,
-                       profile.chest_fraction);
-}
 
-void place_foot(Placer& placer, const SourceSkeleton& skeleton, int foot, int ankle,
-                const std::string& where) {
-  const size_t source = static_cast<size_t>(placer.map()[ankle].joint);
-  if (skeleton.has_end[source]) {
-    placer.put(foot, ankle, placer.at(ankle) + skeleton.ends[source]);
-    return;
+  /// Joint j turns with the bone of `like` and rests at `where`.
+  void put(int j, int like, const Vec3& where) {
+    SourceJoint& to = out_.map[static_cast<size_t>(j)];
+    to.joint = joint(like).joint;
+    to.offset = where - zero_[static_cast<size_t>(to.joint)];
+    out_.placed.push_back(j);
   }
-  for (size_t j = 0; j < skeleton.size(); ++j)
-    if (skeleton.parents[j] == static_cast<int>(source)) {
-      placer.put(foot, ankle, placer.source(static_cast<int>(j)));
-      return;
+  void put_between(int j, int from, const Vec3& to, double share) {
+    put(j, from, at(from) + share * (to - at(from)));
+  }
+
+  /// One of the 22 joints (if it has its place already) or a bone of the file, by name.
+  std::optional<SourceJoint> named(const std::string& name) const {
+    const auto j = std::find(kJointNames.begin(), kJointNames.end(), name) - kJointNames.begin();
+    if (j < kJoints && !lacks(static_cast<int>(j))) return joint(static_cast<int>(j));
+    const int bone = names_.find(name);
+    return bone < 0 ? std::nullopt : std::optional(SourceJoint{bone, Vec3::Zero()});
+  }
+  bool by_profile(int j) {
+    const auto& place = found_.profile->places[static_cast<size_t>(j)];
+    if (!place) return false;
+    const auto with = named(place->with), from = named(place->from), to = named(place->to);
+    if (!with || !from || !to) return false;
+    const auto rest = [&](const SourceJoint& s) -> Vec3 {
+      return zero_[static_cast<size_t>(s.joint)] + s.offset;
+    };
+    SourceJoint& target = out_.map[static_cast<size_t>(j)];
+    target.joint = with->joint;
+    target.offset = rest(*from) + place->share * (rest(*to) - rest(*from)) -
+                    zero_[static_cast<size_t>(with->joint)];
+    out_.placed.push_back(j);
+    return true;
+  }
+
+  void spine() {
+    const Vec3 neck = at(kNeck);
+    if (lacks(kSpine1) && !by_profile(kSpine1)) put_between(kSpine1, 0, neck, 0.25);
+    if (lacks(kSpine2) && !by_profile(kSpine2)) {
+      // Two joints (or one, if spine3 is there) on the way from spine1 up.
+      if (lacks(kSpine3)) {
+        put_between(kSpine3, kSpine1, neck, 2.0 / 3);
+        put_between(kSpine2, kSpine1, neck, 1.0 / 3);
+      } else {
+        put_between(kSpine2, kSpine1, at(kSpine3), 0.5);
+      }
     }
-  throw InputError(where, "joint " + skeleton.names[source] + " has neither a toe nor an end site",
-                   "add one, so that the foot's direction is known");
-}
+    if (lacks(kSpine3) && !by_profile(kSpine3)) put_between(kSpine3, kSpine2, neck, 0.35);
+  }
+
+  Vec3 toe_of(int ankle) const {
+    const size_t source = static_cast<size_t>(joint(ankle).joint);
+    if (skeleton_.has_end[source]) return at(ankle) + skeleton_.ends[source];
+    for (size_t j = 0; j < skeleton_.size(); ++j)
+      if (skeleton_.parents[j] == static_cast<int>(source)) return zero_[j];
+    throw InputError(where_,
+                     "joint " + skeleton_.names[source] + " has neither a toe nor an end site",
+                     "add one, so that the foot's direction is known");
+  }
+
+  const SourceSkeleton& skeleton_;
+  const BoneNames& names_;
+  const Found& found_;
+  const std::string& where_;
+  std::vector<Vec3> zero_;
+  NamedJoints out_;
+};
 
 }  // namespace
 
-JointMap map_joints(const SourceSkeleton& skeleton, const std::string& where) {
-  const Found found = best_match(skeleton, where);
-  NameIndex index;
-  for (size_t j = 0; j < skeleton.size(); ++j)
-    index.emplace(plain_name(skeleton.names[j]), static_cast<int>(j));
-  Placer placer(skeleton, found);
-  place_spine(placer, *found.profile, find(index, found.profile->chest_end));
-  for (const int side : {0, 1}) {
-    const int collar = 13 + side, shoulder = 16 + side, foot = 10 + side, ankle = 7 + side;
-    if (placer.lacks(collar)) {
-      const Vec3 neck = placer.at(kNeck);
-      placer.put(collar, kSpine3, neck + 0.2 * (placer.at(shoulder) - neck));
-    }
-    if (placer.lacks(foot)) place_foot(placer, skeleton, foot, ankle, where);
-  }
-  return placer.map();
+NamedJoints name_joints(const SourceSkeleton& skeleton, const std::string& where,
+                        const Profile* profile) {
+  const BoneNames names(skeleton);
+  const Found found = best_match(skeleton, names, profile, where);
+  return Placer(skeleton, names, found, where).place();
+}
+
+JointMap map_joints(const SourceSkeleton& skeleton, const std::string& where,
+                    const Profile* profile) {
+  return name_joints(skeleton, where, profile).map;
 }
 
 }  // namespace restage

@@ -1,23 +1,15 @@
-// Motions of foreign skeletons (BVH, CMU) and their mapping by joint names onto the 22 joints.
+// Motions of foreign skeletons (BVH, ASF/AMC, CMU) and their mapping by joint names onto the 22.
 // Units: metres, y up, once scaled; rotations are relative to the source's own zero pose.
 #pragma once
 
-#include <cstdint>
 #include <string>
 #include <vector>
 
+#include "datasets/importers/profiles.h"
+#include "datasets/readers/skeleton_file.h"
 #include "nn/geometry/body.h"
 
 namespace restage {
-
-struct SourceSkeleton {
-  std::vector<std::string> names;
-  std::vector<int> parents;   ///< a parent comes before its children; -1: root
-  std::vector<Vec3> offsets;  ///< from the parent, zero pose
-  std::vector<Vec3> ends;     ///< end site, from the joint; zero if it has none
-  std::vector<uint8_t> has_end;
-  size_t size() const { return names.size(); }
-};
 
 /// Frames of a skeleton. Translations are absent for all joints but the first ones down to the
 /// hips.
@@ -37,12 +29,21 @@ struct SourceJoint {
 };
 using JointMap = std::array<SourceJoint, kJoints>;
 
-/// Finds the 22 joints by name. Known: Daz (cgspeed CMU release), ASF/AMC, CMU original BVH, Mixamo
-/// and alike (any namespace prefix), MakeHuman (Root/UpLeg_L, default rig, game engine),
-/// SMPL-style. Missing spine and neck joints are put between their neighbours, missing collars and
-/// toes at the chest and the end site of the foot. InputError naming `where` and what is missing if
-/// no names fit.
-JointMap map_joints(const SourceSkeleton& skeleton, const std::string& where);
+struct NamedJoints {
+  JointMap map;
+  const Profile* profile = nullptr;  ///< built in, or the one asked for
+  std::vector<int> placed;           ///< joints that the source lacks, put where the profile says
+};
+
+/// Finds the 22 joints by name: with `profile`, or with the built-in one that fits best (the fewest
+/// joints missing, the most found, collars that hang from spine3; then the first by name). Case and
+/// a prefix that most bones share ("mixamorig:") do not matter. InputError naming `where`, what is
+/// missing and the nearest name that is there, if no names fit.
+NamedJoints name_joints(const SourceSkeleton& skeleton, const std::string& where,
+                        const Profile* profile = nullptr);
+/// name_joints(), the joints alone.
+JointMap map_joints(const SourceSkeleton& skeleton, const std::string& where,
+                    const Profile* profile = nullptr);
 
 /// Positions of the 22 joints at zero rotations, relative to the pelvis.
 Joints rest_joints(const SourceSkeleton& skeleton, const JointMap& map);

@@ -109,7 +109,7 @@ Diagnosis examine_hdf5(const std::string& path) {
 }
 
 Diagnosis examine_bvh(const std::string& path) {
-  const BvhClip clip = read_bvh(path);
+  const MotionClip clip = read_bvh(path);
   Diagnosis out{"bvh"};
   out.facts["frames_at_30_fps"] = clip.motion.frames();
   out.facts["metres_per_unit"] = clip.scale;

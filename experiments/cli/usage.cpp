@@ -3,7 +3,7 @@
 #include <utility>
 #include <vector>
 
-#include "train/config_reader.h"
+#include "autograd/base/nearest.h"
 
 namespace restage::cli {
 namespace {

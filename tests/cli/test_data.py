@@ -4,6 +4,28 @@ import os
 from support import CliTest, numbers, small_disk
 
 
+JOINTS = """pelvis left_hip right_hip spine1 left_knee right_knee spine2 left_ankle right_ankle spine3 left_foot right_foot neck
+left_collar right_collar head left_shoulder right_shoulder left_elbow right_elbow left_wrist right_wrist""".split()
+NAMES = """Hips LeftUpLeg RightUpLeg Spine LeftLeg RightLeg Spine1 LeftFoot RightFoot Spine2 LeftToeBase RightToeBase Neck
+LeftShoulder RightShoulder Head LeftArm RightArm LeftForeArm RightForeArm LeftHand RightHand""".split()
+PARENTS = [-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19]
+OFFSETS = [(0, 95, 0), (9, -5, 0), (-9, -5, 0), (0, 10, 0), (0, -41, 0), (0, -41, 0), (0, 12, 0), (0, -42, 0), (0, -42, 0), (0, 12, 0),
+           (0, -6, 14), (0, -6, 14), (0, 15, 0), (5, 10, 0), (-5, 10, 0), (0, 10, 2), (13, 0, 0), (-13, 0, 0), (27, 0, 0), (-27, 0, 0),
+           (25, 0, 0), (-25, 0, 0)]
+
+
+def toy_bvh(frames=5):
+    """A T-pose that walks ahead: Mixamo names, centimetres, 60 frames a second."""
+    def joint(j):
+        text = ("ROOT" if j == 0 else "JOINT") + " mixamorig:%s\n{\nOFFSET %g %g %g\n" % (NAMES[j], *OFFSETS[j])
+        text += "CHANNELS 6 Xposition Yposition Zposition" if j == 0 else "CHANNELS 3"
+        text += " Zrotation Xrotation Yrotation\n"
+        children = [joint(k) for k in range(len(PARENTS)) if PARENTS[k] == j]
+        return text + ("".join(children) or "End Site\n{\nOFFSET 0 5 0\n}\n") + "}\n"
+    motion = "".join("0 95 %g" % f + " 0" * 66 + "\n" for f in range(frames))
+    return "HIERARCHY\n%sMOTION\nFrames: %d\nFrame Time: 0.0166667\n%s" % (joint(0), frames, motion)
+
+
 class Data(CliTest):
     def test_build_inspect_verify(self):
         for name, seed, threads in (("a.h5", 3, 1), ("b.h5", 3, 2), ("c.h5", 4, 3)):
@@ -24,6 +46,55 @@ class Data(CliTest):
         result = self.restage("data", "verify", "bad.h5")
         self.assertEqual((result.code, result.err), (1, ""))
         self.assertIn("bad.h5:/joints", result.out)
+
+    def test_import_reports_what_was_found(self):
+        self.write("walk.bvh", toy_bvh())
+        text = self.done("data", "import", "walk.bvh", "--out", "walk.h5")
+        for words in ("Mixamo (profile mixamo)", "centimetres, by the legs", "y, by the rest pose",
+                      "60 fps -> 30 fps, slerp: 5 frames -> 3", "zero rotations"):
+            self.assertIn(words, text)
+        document = self.json("data", "import", "walk.bvh", "--fps", 30, "--subject", "ann", "--out", "walk.h5")
+        self.assertEqual(document["frames"], 5)
+        self.assertEqual([r["file"] for r in document["reports"]], ["walk.bvh"])
+        self.assertIn("as they are", document["reports"][0]["facts"]["rate"])
+        os.makedirs(self.path("many"))
+        for name in ("1.bvh", "2.bvh"):
+            self.write("many/" + name, toy_bvh())
+        lines = self.done("data", "import", "many", "--out", "many.h5").splitlines()
+        self.assertEqual(len(lines), 3, lines)
+        self.assertTrue(lines[0].startswith("many/1.bvh: Mixamo"), lines[0])
+        self.assertIn("rest pose", self.done("data", "import", "many", "--verbose", "--out", "many.h5"))
+
+    def test_import_with_a_profile(self):
+        self.write("suit.bvh", toy_bvh().replace("mixamorig:Left", "L ").replace("mixamorig:", ""))
+        self.bad_input(["data", "import", "suit.bvh", "--out", "x.h5"], "suit.bvh", "--profile")
+        self.bad_input(["data", "import", "suit.bvh", "--profile", "miximo", "--out", "x.h5"], "did you mean 'mixamo'?")
+        self.bad_input(["data", "import", "suit.bvh", "--profile", "none.yaml", "--out", "x.h5"], "none.yaml")
+        self.bad_input(["data", "import", "suit.bvh", "--up", "north", "--out", "x.h5"], "--up", "north")
+        self.bad_input(["data", "import", "suit.bvh", "--fps", "nan", "--out", "x.h5"], "--fps")
+        names = dict(zip(JOINTS, NAMES))
+        profile = "title: Suit\njoints:\n"
+        for joint, name in names.items():
+            profile += "  %s: %s\n" % (joint, name.replace("Left", "L_"))
+        self.write("suit.yaml", profile)
+        self.assertIn("Suit (profile suit)", self.done("data", "import", "suit.bvh", "--profile", "suit.yaml", "--out", "s.h5"))
+        self.write("bad.yaml", profile.replace("  head:", "  heed:"))
+        self.bad_input(["data", "import", "suit.bvh", "--profile", "bad.yaml", "--out", "x.h5"], "bad.yaml:", "'head'")
+
+    def test_merge(self):
+        self.done("data", "build", "--bodies", 1, 0, 0, "--motions", 0, 0, 0, "--out", "bodies.h5")
+        self.write("walk.bvh", toy_bvh())
+        self.done("data", "import", "walk.bvh", "--license", "mine", "--out", "walk.h5")
+        merged = self.json("data", "merge", "bodies.h5", "walk.h5", "--out", "all.h5")
+        self.assertEqual((merged["bodies"], merged["motions"]), (1, 1))
+        found = self.json("data", "inspect", "all.h5")
+        self.assertEqual(found["kind"], "dataset")
+        self.assertEqual(found["license"], "CC0-1.0; mine")
+        self.bad_input(["data", "merge", "walk.h5", "all.h5", "--out", "x.h5"], "'walk'", "--prefix")
+        self.done("data", "merge", "walk.h5", "all.h5", "--prefix", "--out", "both.h5")
+        self.assertEqual(self.json("data", "inspect", "both.h5")["counts"]["motions"], 2)
+        self.assertEqual(self.json("data", "verify", "both.h5")["problems"], [])
+        self.bad_input(["data", "merge", "walk.h5", "--out", "x.h5"], "two or more")
 
     def test_bad_input(self):
         self.bad_input(["data", "inspect", "none.h5"], "none.h5")

@@ -17,7 +17,7 @@ namespace {
 using bvh_test::Style;
 
 /// `clip` is the motion of importers_bvh_text.h from t = 0 on.
-void expect_motion(const BvhClip& clip, size_t frames, const std::string& what) {
+void expect_motion(const MotionClip& clip, size_t frames, const std::string& what) {
   ASSERT_EQ(clip.motion.frames(), frames) << what;
   ASSERT_EQ(clip.joints.size(), frames) << what;
   for (int j = 0; j < kJoints; ++j)
@@ -36,7 +36,7 @@ void expect_motion(const BvhClip& clip, size_t frames, const std::string& what) 
   }
 }
 
-BvhClip convert(const Style& style, BvhOptions options = {}) {
+MotionClip convert(const Style& style, MotionOptions options = {}) {
   if (options.drop_leading < 0) options.drop_leading = 0;
   return convert_bvh(bvh_test::text(style), "test.bvh", options);
 }
@@ -76,7 +76,7 @@ TEST(ImportersBvh, AnyFrameRateIsTrulyResampled) {
   wrong.fps = 60;
   std::string text = bvh_test::text(wrong);
   text.replace(text.find("0.0166666667"), 12, "0.00833333");
-  BvhOptions options;
+  MotionOptions options;
   options.fps = 60;
   options.drop_leading = 0;
   expect_motion(convert_bvh(text, "test.bvh", options), 61, "given fps");
@@ -86,7 +86,7 @@ TEST(ImportersBvh, AnyUnitAndUpAxisAndFacing) {
   for (const double unit : {1.0, 0.1, 0.0254 / 0.45, 0.0254, 0.01, 0.001}) {
     Style style;
     style.unit = unit;
-    const BvhClip clip = convert(style);
+    const MotionClip clip = convert(style);
     EXPECT_DOUBLE_EQ(clip.scale, unit);
     expect_motion(clip, 31, "unit " + std::to_string(unit));
   }
@@ -99,7 +99,7 @@ TEST(ImportersBvh, AnyUnitAndUpAxisAndFacing) {
     }
   Style odd;
   odd.unit = 0.0254 * 12 * 3;  // yards: a leg of 0.9 units would pass for metres, so by hand
-  BvhOptions options;
+  MotionOptions options;
   options.scale = odd.unit;
   expect_motion(convert(odd, options), 31, "yards");
   odd.unit = 0.2;
@@ -115,22 +115,22 @@ TEST(ImportersBvh, ZeroPoseThatIsNoTPoseNeedsARestFrame) {
   for (int j = 0; j < kJoints; ++j)
     style.bind[j] =
         Eigen::AngleAxisd(2.0 + j, Vec3(j % 3 - 1, 1, j % 4).normalized()).toRotationMatrix();
-  BvhOptions options;
-  options.rest_frame = 0;
+  MotionOptions options;
+  options.rest.frame = 0;
   options.drop_leading = 1;
   options.scale = style.unit;
-  options.up = UpAxis::y;
+  options.rest.up = Axis::y;
   expect_motion(convert(style, options), 31, "rest frame");
-  options.rest_frame = -1;
+  options.rest.frame = -1;
   EXPECT_THROW(convert(style, options), InputError);
-  options.rest_frame = 500;
+  options.rest.frame = 500;
   EXPECT_THROW(convert(style, options), InputError);
 }
 
 TEST(ImportersBvh, MissingSpineNeckCollarsAndToesArePlaced) {
   Style style;
   style.without = {6, 9, 12, 13, 14, 10, 11};
-  const BvhClip clip = convert(style);
+  const MotionClip clip = convert(style);
   const Joints& rest = clip.motion.rest;
   EXPECT_LT((rest[10] - (bvh_test::rest()[10] - bvh_test::rest()[0])).norm(),
             1e-5);  // the end site
@@ -151,10 +151,10 @@ TEST(ImportersBvh, MissingSpineNeckCollarsAndToesArePlaced) {
 
 TEST(ImportersBvh, LeadingAndKeptFrames) {
   Style style;
-  BvhOptions options;
+  MotionOptions options;
   options.drop_leading = 20;
   options.keep_frames = 41;
-  const BvhClip clip = convert(style, options);
+  const MotionClip clip = convert(style, options);
   ASSERT_EQ(clip.motion.frames(), 11u);
   EXPECT_LT((clip.joints[0][21] - bvh_test::truth(20 / 120.0).joints[21]).norm(), 2e-5);
   options.drop_leading = 121;
@@ -173,7 +173,7 @@ TEST(ImportersBvh, JumpingRootIsRefused) {
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("frame 3 to 4"), std::string::npos) << error.what();
   }
-  BvhOptions options;
+  MotionOptions options;
   options.max_root_speed = 0;
   EXPECT_NO_THROW(convert_bvh(text, "test.bvh", options));
 }
@@ -191,11 +191,11 @@ TEST(ImportersBvh, ReadsPlainAndXzFiles) {
             LZMA_OK);
   xz.resize(size);
   std::ofstream(packed, std::ios::binary) << xz;
-  BvhOptions options;
+  MotionOptions options;
   options.drop_leading = 0;
   expect_motion(read_bvh(plain, options), 31, "plain");
   expect_motion(read_bvh(packed, options), 31, "xz");
-  EXPECT_EQ(import_bvh(packed, options).id, "importers_07_01");
+  EXPECT_EQ(read_bvh(packed, options).motion.id, "importers_07_01");
   std::ofstream(packed, std::ios::binary) << xz.substr(0, xz.size() / 2);
   EXPECT_THROW(read_bvh(packed, options), InputError);
   EXPECT_THROW(read_bvh(folder + "no_such.bvh"), InputError);
@@ -295,7 +295,7 @@ TEST(ImportersBvh, MutatedFilesNeverCrash) {
         text.resize(at + 1);
     }
     try {
-      const BvhClip clip = convert_bvh(text, "fuzz.bvh");
+      const MotionClip clip = convert_bvh(text, "fuzz.bvh");
       ++usable;
       for (const Joints& joints : clip.joints)
         for (const Vec3& x : joints) ASSERT_TRUE(x.allFinite()) << i;

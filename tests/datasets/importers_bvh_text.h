@@ -1,6 +1,6 @@
-// One simple motion written as BVH in many styles. Every joint turns about a fixed axis at a
-// constant rate and the hips move on a line, so slerp and linear interpolation are exact at any
-// frame rate.
+// Two simple motions written as BVH in many styles. In the first every joint turns about a fixed
+// axis at a constant rate and the hips move on a line, so slerp and linear interpolation are exact
+// at any frame rate. In the second a toy walks: knees bend backwards, elbows forwards, arms hang.
 #pragma once
 
 #include <algorithm>
@@ -51,7 +51,10 @@ struct Style {
   int frames = 121;
   bool t_pose_first = false;  ///< frame 0 is the rest pose
   Rotations bind;             ///< global frames of the zero pose; identity: a T-pose
-  std::vector<int> without;   ///< joints left out (their children hang from their parents)
+  std::vector<std::string> names{kMixamo, kMixamo + kJoints};
+  bool moving_root = false;  ///< with `wrapped`: the root has six channels, all 0
+  bool walks = false;        ///< the second motion
+  std::vector<int> without;  ///< joints left out (their children hang from their parents)
   Style() { bind.fill(Mat3::Identity()); }
 };
 
@@ -62,9 +65,27 @@ inline Mat3 turn(int j, double t) {
 }
 inline Vec3 hips(double t) { return Vec3(0.4 * t, 0.95 - 0.1 * t, 1.1 * t); }
 
-inline PosedSkeleton truth(double t) {
+/// The same of a toy that walks two steps a second. At any time its feet are level.
+inline Mat3 walk_turn(int j, double t) {
+  const auto about = [](const Vec3& axis, double angle) {
+    return Eigen::AngleAxisd(angle, axis).toRotationMatrix();
+  };
+  const Vec3 x = Vec3::UnitX(), y = Vec3::UnitY(), z = Vec3::UnitZ();
+  const double swing = std::sin(2 * M_PI * t), bend = 0.4 * std::cos(2 * M_PI * t);
+  const double s = j == 1 || j == 4 || j == 7 || j == 16 || j == 18 ? 1 : -1;  // left or right
+  if (j == 0) return about(y, 0.5 * t);
+  if (j == 1 || j == 2) return about(x, -0.4 * s * swing);
+  if (j == 4 || j == 5) return about(x, 0.5 + s * bend);
+  if (j == 7 || j == 8) return about(x, 0.4 * s * swing - 0.5 - s * bend);
+  if (j == 3 || j == 6 || j == 9) return about(y, 0.06 * swing);
+  if (j == 15) return about(x, 0.1 * std::sin(4 * M_PI * t));
+  if (j == 16 || j == 17) return about(x, 0.5 * s * swing) * about(z, -1.3 * s);
+  if (j == 18 || j == 19) return about(y, -s * (0.5 + 0.2 * swing));
+  return Mat3::Identity();
+}
+inline PosedSkeleton truth(double t, bool walks = false) {
   Pose pose;
-  for (int j = 0; j < kJoints; ++j) pose.local[j] = turn(j, t);
+  for (int j = 0; j < kJoints; ++j) pose.local[j] = walks ? walk_turn(j, t) : turn(j, t);
   pose.root = hips(t);
   return forward_kinematics(rest(), pose);
 }
@@ -115,8 +136,8 @@ inline std::string text(const Style& style) {
     const Vec3 offset = root ? Vec3::Zero()
                              : Vec3(axes * style.bind[parent(j)].transpose() *
                                     (rest()[j] - rest()[parent(j)]) / style.unit);
-    out += (root && !style.wrapped ? "ROOT " : "JOINT ") + std::string(kMixamo[j]) + "\n{\nOFFSET" +
-           vector_text(offset) + "\n";
+    out += (root && !style.wrapped ? "ROOT " : "JOINT ") + style.names[static_cast<size_t>(j)] +
+           "\n{\nOFFSET" + vector_text(offset) + "\n";
     out += channels(root || style.all_positions ? "XYZ" : "",
                     root ? style.root_rotations : style.rotations, style.rotations_first);
     std::vector<int> children;
@@ -131,7 +152,9 @@ inline std::string text(const Style& style) {
     }
     out += "}\n";
   };
-  if (style.wrapped) out += "ROOT reference\n{\nOFFSET 0 0 0\nCHANNELS 0\n";
+  if (style.wrapped)
+    out += "ROOT reference\n{\nOFFSET 0 0 0\n" +
+           channels(style.moving_root ? "XYZ" : "", style.moving_root ? "ZYX" : "", false);
   write(0);
   if (style.wrapped) out += "}\n";
   out += "MOTION\nFrames: " + std::to_string(style.frames) +
@@ -141,8 +164,9 @@ inline std::string text(const Style& style) {
   for (int f = 0; f < style.frames; ++f) {
     const bool still = style.t_pose_first && f == 0;
     const double t = still ? 0 : (f - (style.t_pose_first ? 1 : 0)) / style.fps;
+    if (style.moving_root) out += " 0 0 0 0 0 0";
     for (const int j : order) {
-      Mat3 local = still ? Mat3::Identity() : turn(j, t);
+      Mat3 local = still ? Mat3(Mat3::Identity()) : style.walks ? walk_turn(j, t) : turn(j, t);
       // A joint left out takes its turns with it: the next one above is written as it is.
       const int p = parent(j);
       const Mat3 bind_parent = p < 0 ? Mat3::Identity() : style.bind[p];

@@ -93,9 +93,9 @@ TEST(ImportersCmu, RestAndFloorAreThoseOfTheFile) {
 }
 
 /// Imports the part of a BVH file that a clip of clips30.h5 was made from.
-BvhClip part_of(const std::string& path, const std::string& clip) {
+MotionClip part_of(const std::string& path, const std::string& clip) {
   const std::string group = "/clips/" + clip;
-  BvhOptions options;
+  MotionOptions options;
   options.drop_leading = static_cast<int>(*clips_file().number(group, "source_first_frame"));
   options.keep_frames = static_cast<size_t>(*clips_file().number(group, "source_frames"));
   options.fps = *clips_file().number(group, "source_fps");
@@ -114,7 +114,7 @@ TEST(ImportersCmu, BvhFilesGiveTheReferenceJoints) {
         *clips_file().text("/clips/" + clip, "skeleton") != "daz")
       continue;  // the others' references are of the ASF skeletons
     ++compared;
-    const BvhClip bvh = part_of(file, clip);
+    const MotionClip bvh = part_of(file, clip);
     EXPECT_LT(largest_difference(bvh.joints, expected), 2e-4) << clip;
     EXPECT_NEAR(bvh.floor_y, *clips_file().number("/clips/" + clip, "floor_y"), 2e-4) << clip;
     EXPECT_DOUBLE_EQ(bvh.scale, 0.01);
@@ -124,7 +124,7 @@ TEST(ImportersCmu, BvhFilesGiveTheReferenceJoints) {
 
 TEST(ImportersCmu, TheRuleForLeadingFramesIsThatOfTheClips) {
   NEED_DATA();
-  const BvhClip bvh = read_bvh(data_folder() + "/cmu/bvh/07_01.bvh.xz");
+  const MotionClip bvh = read_bvh(data_folder() + "/cmu/bvh/07_01.bvh.xz");
   EXPECT_LT(largest_difference(bvh.joints, reference("07_01")), 2e-4);
   EXPECT_EQ(bvh.motion.id, "07_01");
   EXPECT_EQ(bvh.motion.subject, "07");
@@ -132,10 +132,10 @@ TEST(ImportersCmu, TheRuleForLeadingFramesIsThatOfTheClips) {
 
 TEST(ImportersCmu, OriginalSkeletonIsTheAsfOne) {
   NEED_DATA();
-  BvhOptions options;
+  MotionOptions options;
   options.drop_leading = 1;  // a T-pose before the frames of the ASF/AMC file
   options.keep_frames = 2751;
-  const BvhClip bvh = read_bvh(data_folder() + "/cmu/bvh_original_skeleton/01_01.bvh.xz", options);
+  const MotionClip bvh = read_bvh(data_folder() + "/cmu/bvh_original_skeleton/01_01.bvh.xz", options);
   const std::vector<CmuClip>& clips = all_clips();
   const auto clip = std::find_if(clips.begin(), clips.end(),
                                  [](const CmuClip& c) { return c.motion.id == "01_01"; });
@@ -161,7 +161,7 @@ TEST(ImportersCmu, ForeignFiles) {
   const std::string folder = data_folder() + "/foreign/";
   for (const char* name : {"pymo_walk_meredith", "makehuman_walk1", "makehuman_zombiewalk1",
                            "makehuman_dance1", "makehuman_benchmark"}) {
-    const BvhClip clip = read_bvh(folder + name + ".bvh.xz");
+    const MotionClip clip = read_bvh(folder + name + ".bvh.xz");
     const Joints& rest = clip.motion.rest;
     EXPECT_GT(rest[16].x(), 0.08) << name;  // left is +x
     EXPECT_LT(rest[17].x(), -0.08) << name;

@@ -71,7 +71,7 @@ TEST_F(ImportersImport, FolderOfBvhFilesSkipsBadOnes) {
   std::ofstream(folder_ + "/in/readme.txt") << "no motion\n";
   ImportOptions options;
   options.license = "CC0-1.0";
-  options.bvh.split = "test";
+  options.motion.split = "test";
   const ImportSummary summary = import_data(folder_ + "/in", out(), options);
   EXPECT_EQ(summary.motions, 2u);
   ASSERT_EQ(summary.skipped.size(), 1u);

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "autograd/base/nearest.h"
 #include "autograd/base/rng.h"
 
 namespace restage {

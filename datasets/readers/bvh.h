@@ -5,11 +5,9 @@
 #include <string_view>
 #include <vector>
 
-#include "datasets/importers/source_motion.h"
+#include "datasets/readers/skeleton_file.h"
 
 namespace restage {
-
-enum class Channel { x_position, y_position, z_position, x_rotation, y_rotation, z_rotation };
 
 struct BvhFile {
   SourceSkeleton skeleton;                     ///< file units; the root keeps its OFFSET
@@ -23,11 +21,5 @@ struct BvhFile {
 /// Parses the text of a BVH file; `path` is for messages. Any joint order, any channel order.
 /// InputError with file:line for anything that is not BVH, not finite, or of the wrong count.
 BvhFile parse_bvh(std::string_view text, const std::string& path);
-
-/// The text of a .bvh or a .bvh.xz file (at most 1 GiB unpacked).
-std::string read_bvh_text(const std::string& path);
-
-/// Rotations and translations of all frames; translations only of joints down to `hips`.
-SourceMotion bvh_motion(const BvhFile& file, int hips);
 
 }  // namespace restage

@@ -1,100 +1,30 @@
-#include "datasets/importers/bvh_file.h"
+#include "datasets/readers/bvh.h"
 
-#include <lzma.h>
-
-#include <charconv>
 #include <cmath>
 
-#include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "datasets/readers/word_lines.h"
 
 namespace restage {
 namespace {
 
 constexpr size_t kMaxJoints = 4096;
-constexpr size_t kMaxText = size_t{1} << 30;
 
-/// Lines of a text as words, with the line number for messages.
-class Lines {
- public:
-  Lines(std::string_view text, const std::string& path) : text_(text), path_(path) {}
-
-  /// Goes to the next line that is not blank; false at the end.
-  bool next() {
-    while (at_ < text_.size()) {
-      const size_t end = std::min(text_.find('\n', at_), text_.size());
-      split(text_.substr(at_, end - at_));
-      at_ = end + 1;
-      ++number_;
-      if (!words_.empty()) return true;
-    }
-    words_.clear();
-    return false;
-  }
-  const std::vector<std::string_view>& words() const { return words_; }
-  std::string where() const { return path_ + ":" + std::to_string(number_); }
-  [[noreturn]] void fail(const std::string& wrong, const std::string& fix) const {
-    throw InputError(where(), wrong, fix);
-  }
-  double number(std::string_view word) const {
-    double value = 0;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error != std::errc() || end != word.data() + word.size() || !std::isfinite(value) ||
-        std::abs(value) > 1e9)
-      fail("'" + quoted(word) + "' is no usable number", "write a plain decimal number below 1e9");
-    return value;
-  }
-  /// Short and printable, for messages.
-  static std::string quoted(std::string_view word) {
-    std::string out(word.substr(0, 40));
-    for (char& c : out)
-      if (c < ' ' || c > '~') c = '?';
-    return out;
-  }
-
- private:
-  void split(std::string_view line) {
-    words_.clear();
-    size_t at = 0;
-    while (true) {
-      at = line.find_first_not_of(" \t\r\f\v", at);
-      if (at == std::string_view::npos) return;
-      const size_t end = std::min(line.find_first_of(" \t\r\f\v", at), line.size());
-      words_.push_back(line.substr(at, end - at));
-      at = end;
-    }
-  }
-
-  std::string_view text_;
-  std::string path_;
-  size_t at_ = 0, number_ = 0;
-  std::vector<std::string_view> words_;
-};
-
-bool same_word(std::string_view a, std::string_view lower) {
-  if (a.size() != lower.size()) return false;
-  for (size_t i = 0; i < a.size(); ++i) {
-    const char c = a[i] >= 'A' && a[i] <= 'Z' ? static_cast<char>(a[i] - 'A' + 'a') : a[i];
-    if (c != lower[i]) return false;
-  }
-  return true;
-}
-
-Channel channel_of(const Lines& lines, std::string_view word) {
+Channel channel_of(const WordLines& lines, std::string_view word) {
   constexpr std::pair<std::string_view, Channel> kNames[] = {
       {"xposition", Channel::x_position}, {"yposition", Channel::y_position},
       {"zposition", Channel::z_position}, {"xrotation", Channel::x_rotation},
       {"yrotation", Channel::y_rotation}, {"zrotation", Channel::z_rotation}};
   for (const auto& [name, channel] : kNames)
     if (same_word(word, name)) return channel;
-  lines.fail("'" + Lines::quoted(word) + "' is no channel",
+  lines.fail("'" + WordLines::quoted(word) + "' is no channel",
              "use Xposition, Yposition, Zposition, Xrotation, Yrotation, Zrotation");
 }
 
 /// Reads HIERARCHY up to the line with MOTION. Braces may stand on lines of their own or not.
 class HierarchyParser {
  public:
-  HierarchyParser(Lines& lines, BvhFile& file) : lines_(lines), file_(file) {}
+  HierarchyParser(WordLines& lines, BvhFile& file) : lines_(lines), file_(file) {}
 
   void parse() {
     if (!lines_.next() || !same_word(lines_.words()[0], "hierarchy"))
@@ -126,7 +56,7 @@ class HierarchyParser {
     } else if (same_word(key, "channels")) {
       channels(words);
     } else {
-      lines_.fail("'" + Lines::quoted(key) + "' is not known in a hierarchy",
+      lines_.fail("'" + WordLines::quoted(key) + "' is not known in a hierarchy",
                   "use ROOT, JOINT, End Site, OFFSET, CHANNELS and braces");
     }
   }
@@ -142,7 +72,7 @@ class HierarchyParser {
     const bool brace = words.back() == "{" && words.size() > 1;
     std::string name;
     for (size_t i = 1; i < words.size() - (brace ? 1 : 0); ++i)
-      name += (i > 1 ? "_" : "") + Lines::quoted(words[i]);
+      name += (i > 1 ? "_" : "") + WordLines::quoted(words[i]);
     if (name.empty()) lines_.fail("a joint without a name", "give it one");
     s.names.push_back(name);
     s.parents.push_back(open_.empty() ? -1 : open_.back());
@@ -209,7 +139,7 @@ class HierarchyParser {
     if (file_.channel_count == 0) lines_.fail("no joint has channels", "give a file with motion");
   }
 
-  Lines& lines_;
+  WordLines& lines_;
   BvhFile& file_;
   std::vector<int> open_;  // joints whose braces are open; -1: an end site
   std::vector<uint8_t> has_channels_;
@@ -217,7 +147,7 @@ class HierarchyParser {
 };
 
 /// "Frames: 12" or "Frame Time: 0.01": the number after the colon.
-double header_number(Lines& lines, std::string_view title) {
+double header_number(WordLines& lines, std::string_view title) {
   std::string joined;
   if (lines.next())
     for (const std::string_view word : lines.words()) {
@@ -232,7 +162,7 @@ double header_number(Lines& lines, std::string_view title) {
                                                  : std::string_view(joined).substr(begin));
 }
 
-void parse_frames(Lines& lines, BvhFile& file) {
+void parse_frames(WordLines& lines, BvhFile& file) {
   const double announced = header_number(lines, "frames");
   if (!(announced >= 1) || announced != std::floor(announced))
     lines.fail("no frames announced", "give a file with at least one frame");
@@ -261,82 +191,14 @@ void parse_frames(Lines& lines, BvhFile& file) {
                "give the whole file");
 }
 
-std::string unpack_xz(const std::string& packed, const std::string& path) {
-  lzma_stream stream = LZMA_STREAM_INIT;
-  if (lzma_stream_decoder(&stream, uint64_t{256} << 20, LZMA_CONCATENATED) != LZMA_OK)
-    throw WorkError(path + ": could not start the xz decoder; free some memory");
-  const struct Guard {
-    lzma_stream* stream;
-    ~Guard() { lzma_end(stream); }
-  } guard{&stream};
-  std::string out, piece(size_t{1} << 20, '\0');
-  stream.next_in = reinterpret_cast<const uint8_t*>(packed.data());
-  stream.avail_in = packed.size();
-  while (true) {
-    stream.next_out = reinterpret_cast<uint8_t*>(piece.data());
-    stream.avail_out = piece.size();
-    const lzma_ret state = lzma_code(&stream, LZMA_FINISH);
-    out.append(piece, 0, piece.size() - stream.avail_out);
-    if (state == LZMA_STREAM_END) return out;
-    if (state != LZMA_OK)
-      throw InputError(path, "is no whole xz file", "give a .bvh or an undamaged .bvh.xz");
-    if (out.size() > kMaxText)
-      throw InputError(path, "unpacks to more than 1 GiB", "cut the recording into shorter files");
-  }
-}
-
-Quat axis_rotation(Channel channel, double degrees) {
-  const Vec3 axis = channel == Channel::x_rotation   ? Vec3::UnitX()
-                    : channel == Channel::y_rotation ? Vec3::UnitY()
-                                                     : Vec3::UnitZ();
-  return Quat(Eigen::AngleAxisd(degrees * (M_PI / 180.0), axis));
-}
-
 }  // namespace
 
 BvhFile parse_bvh(std::string_view text, const std::string& path) {
   BvhFile file;
-  Lines lines(text, path);
+  WordLines lines(text, path);
   HierarchyParser(lines, file).parse();
   parse_frames(lines, file);
   return file;
-}
-
-std::string read_bvh_text(const std::string& path) {
-  std::string text = read_file(path, kMaxText);
-  return text.starts_with(
-             "\xFD"
-             "7zXZ")
-             ? unpack_xz(text, path)
-             : text;
-}
-
-SourceMotion bvh_motion(const BvhFile& file, int hips) {
-  SourceMotion out;
-  out.skeleton = file.skeleton;
-  out.fps = 1.0 / file.frame_time;
-  std::vector<uint8_t> moves(file.skeleton.size(), 0);
-  for (int j = hips; j >= 0; j = file.skeleton.parents[static_cast<size_t>(j)])
-    moves[static_cast<size_t>(j)] = 1;
-  for (size_t j = 0; j < moves.size(); ++j)
-    if (moves[j]) out.moving.push_back(static_cast<int>(j));
-  for (const std::vector<double>& frame : file.frames) {
-    std::vector<Quat>& local = out.local.emplace_back(file.skeleton.size(), Quat::Identity());
-    std::vector<Vec3>& position = out.position.emplace_back();
-    for (size_t j = 0; j < file.skeleton.size(); ++j) {
-      Vec3 offset = file.skeleton.offsets[j];
-      for (size_t c = 0; c < file.channels[j].size(); ++c) {
-        const Channel channel = file.channels[j][c];
-        const double value = frame[file.first_channel[j] + c];
-        if (channel >= Channel::x_rotation)
-          local[j] = local[j] * axis_rotation(channel, value);
-        else
-          offset[static_cast<int>(channel)] = value;
-      }
-      if (moves[j]) position.push_back(offset);
-    }
-  }
-  return out;
 }
 
 }  // namespace restage

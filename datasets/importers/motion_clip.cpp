@@ -1,0 +1,231 @@
+#include "datasets/importers/motion_clip.h"
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+
+#include "autograd/base/error.h"
+#include "datasets/readers/word_lines.h"
+
+namespace restage {
+namespace {
+
+constexpr size_t kMaxFrames = size_t{1} << 20;  // 9.7 hours at 30 fps
+
+std::string text_of(double value, const char* format = "%.4g") {
+  char text[40];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+struct Unit {
+  const char* name;
+  double from, to;  ///< a leg's length in units
+  double metres;
+};
+constexpr Unit kUnits[] = {{"metres", 0.4, 1.4, 1.0},
+                           {"decimetres", 4, 10, 0.1},
+                           {"inches / 0.45", 10, 20, 0.0254 / 0.45},
+                           {"inches", 20, 50, 0.0254},
+                           {"centimetres", 50, 140, 0.01},
+                           {"millimetres", 400, 1400, 0.001}};
+
+std::string unit_name(double metres) {
+  for (const Unit& unit : kUnits)
+    if (std::abs(unit.metres / metres - 1) < 1e-6) return unit.name;
+  return text_of(metres) + " m";
+}
+
+/// Metres per unit; see MotionOptions::scale.
+double find_scale(const Recording& recording, double given, const std::string& path,
+                  ImportReport& report) {
+  const double leg = leg_length(rest_joints(recording.motion.skeleton, recording.names.map));
+  const auto says = [&](double metres, const std::string& why) {
+    report.facts.emplace_back("units", unit_name(metres) + ", " + why + ": a leg of " +
+                                           text_of(leg) + " units is " +
+                                           text_of(leg * metres, "%.2f") + " m");
+    return metres;
+  };
+  if (given > 0) return says(given, "as given");
+  if (recording.metres_per_unit > 0) {
+    const double metres = leg * recording.metres_per_unit;
+    if (metres >= 0.4 && metres < 1.4) return says(recording.metres_per_unit, "as the file says");
+    report.remarks.push_back("the units that the file names would make a leg of " +
+                             text_of(metres) + " m: found by the leg instead");
+  }
+  for (const Unit& unit : kUnits)
+    if (leg >= unit.from && leg < unit.to) return says(unit.metres, "by the legs");
+  throw InputError(path, "a leg of " + text_of(leg) + " units is no person's in any known unit",
+                   "give the scale (metres per unit)");
+}
+
+void scale_lengths(Recording& recording, double scale) {
+  SourceMotion& motion = recording.motion;
+  for (Vec3& x : motion.skeleton.offsets) x *= scale;
+  for (Vec3& x : motion.skeleton.ends) x *= scale;
+  for (auto& frame : motion.position)
+    for (Vec3& x : frame) x *= scale;
+  for (SourceJoint& joint : recording.names.map) joint.offset *= scale;
+}
+
+void check_root(const SourceMotion& motion, double limit, const std::string& path) {
+  if (!(limit > 0)) return;
+  for (size_t f = 1; f < motion.position.size(); ++f) {
+    Vec3 step = Vec3::Zero();
+    for (size_t m = 0; m < motion.moving.size(); ++m)
+      step += motion.position[f][m] - motion.position[f - 1][m];
+    const double speed = step.norm() * motion.fps;
+    if (speed > limit)
+      throw InputError(path,
+                       "the root jumps " + text_of(step.norm()) + " m from frame " +
+                           std::to_string(f - 1) + " to " + std::to_string(f) + " (" +
+                           text_of(speed) + " m/s)",
+                       "the recording is broken there: cut it, or check frame rate and scale");
+  }
+}
+
+/// Largest turn of a joint other than the root against the zero pose, degrees.
+double largest_turn(const std::vector<Quat>& local) {
+  double largest = 0;
+  for (size_t j = 1; j < local.size(); ++j)
+    largest = std::max(largest, local[j].angularDistance(Quat::Identity()));
+  return largest * (180.0 / M_PI);
+}
+
+/// How many frames the Daz release's T-pose and the blend out of it take (0: none are there).
+size_t t_pose_lead(const std::vector<std::vector<Quat>>& local) {
+  constexpr size_t kDazLead = 11;
+  const bool lead = local.size() > kDazLead && largest_turn(local[0]) < 30.0 &&
+                    largest_turn(local[kDazLead]) > 45.0;
+  return lead ? kDazLead : 0;
+}
+
+void cut_frames(SourceMotion& motion, const MotionOptions& options, const std::string& path,
+                ImportReport& report) {
+  const size_t n = motion.local.size();
+  const bool asked = options.drop_leading >= 0;
+  const size_t first =
+      asked ? static_cast<size_t>(options.drop_leading) : t_pose_lead(motion.local);
+  if (first >= n)
+    throw InputError(path, "has only " + std::to_string(n) + " frames",
+                     "leave out fewer at its beginning");
+  const size_t count = options.keep_frames ? std::min(options.keep_frames, n - first) : n - first;
+  if (first > 0)
+    report.facts.emplace_back("left out",
+                              "the first " + std::to_string(first) + " frames, " +
+                                  (asked ? "as asked" : "a T-pose and a blend out of it"));
+  const auto cut = [&](auto& frames) {
+    frames.erase(frames.begin() + static_cast<std::ptrdiff_t>(first + count), frames.end());
+    frames.erase(frames.begin(), frames.begin() + static_cast<std::ptrdiff_t>(first));
+  };
+  cut(motion.local);
+  cut(motion.position);
+}
+
+/// The frames at 30 fps in terms of the rest pose.
+std::vector<PosedSkeleton> poses_at_30_fps(SourceMotion motion, const JointMap& map,
+                                           const RestPose& rest, const std::string& path) {
+  const double seconds = static_cast<double>(motion.local.size()) / motion.fps;
+  if (!(seconds * kFps < static_cast<double>(kMaxFrames)))
+    throw InputError(path, "lasts " + text_of(seconds) + " s",
+                     "cut it into files of at most 9 hours");
+  motion = resample(motion);
+  std::vector<PosedSkeleton> poses(motion.local.size());
+  for (size_t f = 0; f < poses.size(); ++f) {
+    poses[f] = source_pose(motion, map, f);
+    for (size_t j = 0; j < kJoints; ++j) {
+      poses[f].global[j] = rest.align * poses[f].global[j] * rest.frame[j];
+      poses[f].joints[j] = rest.align * poses[f].joints[j];
+    }
+  }
+  return poses;
+}
+
+/// "07_01" -> "07"; other names stand for themselves.
+std::string subject_of(const std::string& id) {
+  const size_t bar = id.find('_');
+  const bool number =
+      bar != std::string::npos && bar > 0 && id.find_first_not_of("0123456789") == bar;
+  return number ? id.substr(0, bar) : id;
+}
+
+void report_names(const Recording& recording, ImportReport& report) {
+  report.facts.emplace_back(
+      "format", recording.format + ", " + std::to_string(recording.motion.skeleton.size()) +
+                    " joints, " + std::to_string(recording.motion.local.size()) + " frames");
+  const Profile& profile = *recording.names.profile;
+  std::string placed;
+  for (const int j : recording.names.placed)
+    placed +=
+        (placed.empty() ? "; placed: " : ", ") + std::string(kJointNames[static_cast<size_t>(j)]);
+  report.facts.emplace_back("names", profile.title + " (profile " + profile.name + ")" + placed);
+}
+
+/// Where the file differs from what its family usually is.
+void compare_with_profile(const Profile& profile, double scale, double fps, ImportReport& report) {
+  const auto differs = [&](const std::string& what, const std::string& is,
+                           const std::string& usual) {
+    report.remarks.push_back(profile.title + " files usually have " + what + " " + usual +
+                             ", this one " + is);
+  };
+  if (!profile.units.empty() && unit_name(scale) != profile.units)
+    differs("units of", unit_name(scale), profile.units);
+  for (const auto& [name, value] : report.facts)
+    if (name == "up" && !profile.up.empty() && value.substr(0, value.find(',')) != profile.up)
+      differs("up axis", value.substr(0, value.find(',')), profile.up);
+  if (profile.fps > 0 && std::abs(fps / profile.fps - 1) > 1e-3)
+    differs("a rate of", text_of(fps, "%.6g") + " fps", text_of(profile.fps, "%.6g") + " fps");
+}
+
+}  // namespace
+
+MotionClip make_clip(Recording recording, const std::string& path, const MotionOptions& options) {
+  MotionClip clip;
+  ImportReport& report = clip.report;
+  report.file = path;
+  report_names(recording, report);
+  clip.scale = find_scale(recording, options.scale, path, report);
+  scale_lengths(recording, clip.scale);
+  SourceMotion& motion = recording.motion;
+  if (options.fps > 0) motion.fps = options.fps;
+  check_root(motion, options.max_root_speed, path);
+  const JointMap& map = recording.names.map;
+  const RestPose rest = find_rest_pose(motion, map, options.rest, path, report);
+  cut_frames(motion, options, path, report);
+  const double fps = motion.fps;
+  const size_t frames = motion.local.size();
+  const std::vector<PosedSkeleton> poses = poses_at_30_fps(std::move(motion), map, rest, path);
+  report.facts.emplace_back(
+      "rate",
+      (fps == kFps ? "30 fps, taken as they are"
+                   : text_of(fps, "%.6g") + " fps -> 30 fps, slerp: " + std::to_string(frames) +
+                         " frames -> " + std::to_string(poses.size())) +
+          (options.fps > 0        ? " (as given; " + recording.rate_of_file + ")"
+           : recording.rate_known ? std::string()
+                                  : " (" + recording.rate_of_file + ")"));
+  compare_with_profile(*recording.names.profile, clip.scale, fps, report);
+  for (const PosedSkeleton& pose : poses) clip.joints.push_back(pose.joints);
+  clip.floor_y = floor_height(poses);
+  report.facts.emplace_back("floor",
+                            text_of(clip.floor_y, "%.3f") + " m in the file's world, moved to 0");
+  clip.motion = to_motion(poses, rest.joints, clip.floor_y);
+  clip.motion.id = stem_of(path);
+  clip.motion.subject = options.subject.empty() ? subject_of(clip.motion.id) : options.subject;
+  clip.motion.split = options.split;
+  clip.motion.action = options.action;
+  return clip;
+}
+
+std::optional<Profile> asked_profile(const MotionOptions& options) {
+  if (options.profile.empty()) return std::nullopt;
+  return find_profile(options.profile);
+}
+
+std::string stem_of(const std::string& path) {
+  std::string name = std::filesystem::path(path).filename().string();
+  for (const std::string_view tail : {".xz", ".bvh", ".amc", ".asf"})
+    if (lower_case(name).ends_with(tail)) name.resize(name.size() - tail.size());
+  return name;
+}
+
+}  // namespace restage

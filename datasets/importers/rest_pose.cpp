@@ -1,0 +1,231 @@
+#include "datasets/importers/rest_pose.h"
+
+#include <cmath>
+#include <iterator>
+
+#include "autograd/base/error.h"
+#include "datasets/importers/t_pose.h"
+
+namespace restage {
+namespace {
+
+constexpr const char* kAxisNames[] = {"auto", "x", "-x", "y", "-y", "z", "-z"};
+constexpr double kDegrees = 180.0 / M_PI;
+constexpr double kShownAngle = 5;     // limbs further off are listed
+constexpr double kMostTrunk = 45;     // more off the vertical is no standing pose
+constexpr double kMostLimb = 120;     // more cannot be corrected by shortest arcs
+constexpr double kQuarterSlack = 10;  // to the nearest quarter turn
+
+/// A bone of a T-pose and where it points.
+struct Limb {
+  int from, to;
+  Vec3 wanted;
+};
+const std::vector<Limb>& limbs() {
+  static const Vec3 x = Vec3::UnitX(), y = Vec3::UnitY();
+  static const std::vector<Limb> all = {{1, 4, -y},  {2, 5, -y},   {4, 7, -y},  {5, 8, -y},
+                                        {16, 18, x}, {17, 19, -x}, {18, 20, x}, {19, 21, -x}};
+  return all;
+}
+
+double angle_between(const Vec3& a, const Vec3& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b)) * kDegrees;
+}
+
+Vec3 vector_of(Axis axis) {
+  const int i = static_cast<int>(axis) - 1;
+  return (i % 2 ? -1.0 : 1.0) * Vec3::Unit(i / 2);
+}
+/// The axis that a direction is nearest to.
+Axis axis_near(const Vec3& v) {
+  int i = 0;
+  v.cwiseAbs().maxCoeff(&i);
+  return static_cast<Axis>(1 + 2 * i + (v[i] < 0 ? 1 : 0));
+}
+
+/// The quarter or half turn that takes the file's up to y.
+Mat3 upright(Axis up) {
+  if (up == Axis::minus_y) return Vec3(1, -1, -1).asDiagonal();
+  const Vec3 from = vector_of(up), to = Vec3::UnitY(), axis = from.cross(to);
+  Mat3 out = from * to.transpose();  // exact, unlike sines and cosines of 90 degrees
+  out = to * from.transpose() - out + axis * axis.transpose();
+  return up == Axis::y ? Mat3(Mat3::Identity()) : out;
+}
+
+Vec3 standing(const Joints& joints) { return joints[15] - 0.5 * (joints[7] + joints[8]); }
+
+/// From the ankles to the head on average over (at most 2,000 frames of) the recording.
+Vec3 standing(const SourceMotion& motion, const JointMap& map) {
+  Vec3 sum = Vec3::Zero();
+  const size_t step = (motion.local.size() + 1999) / 2000;
+  size_t count = 0;
+  for (size_t f = 0; f < motion.local.size(); f += step, ++count)
+    sum += standing(source_pose(motion, map, f).joints);
+  return sum / static_cast<double>(std::max<size_t>(count, 1));
+}
+
+bool along_an_axis(const Vec3& v, double length) {
+  return v.norm() > length && v.cwiseAbs().maxCoeff() > 0.7 * v.norm();
+}
+
+Axis find_up(const SourceMotion& motion, const JointMap& map, const Joints& rest, Axis given,
+             const std::string& path, ImportReport& report) {
+  if (given != Axis::automatic) {
+    report.facts.emplace_back("up", to_string(given) + ", as given");
+    return given;
+  }
+  const double leg = leg_length(rest);
+  const Vec3 in_rest = standing(rest), moving = standing(motion, map);
+  const Axis by_rest = axis_near(in_rest), by_motion = axis_near(moving);
+  const bool rest_stands = along_an_axis(in_rest, 1.1 * leg);
+  const bool motion_stands = along_an_axis(moving, 0.8 * leg);
+  if (rest_stands &&
+      (std::abs(vector_of(by_rest).x()) < 0.5 || !motion_stands || by_rest == by_motion)) {
+    report.facts.emplace_back("up", to_string(by_rest) + ", by the rest pose");
+    if (motion_stands && by_motion != by_rest)
+      report.remarks.push_back("up is " + to_string(by_rest) +
+                               " in the rest pose, but the head is "
+                               "over the ankles along " +
+                               to_string(by_motion) +
+                               " in the recording: if nobody lies there, give --up " +
+                               to_string(by_motion));
+    return by_rest;
+  }
+  if (!motion_stands)
+    throw InputError(path, "neither the rest pose nor the recording stands, so up is not known",
+                     "say which axis is up (--up)");
+  report.facts.emplace_back("up", to_string(by_motion) + ", by the recording");
+  return by_motion;
+}
+
+/// Turn about y that brings an upright pose to face +z.
+Mat3 facing_front(const Joints& rest, const Vec3& given, bool framed, const std::string& path) {
+  const Vec3 left = (rest[1] - rest[2]) + (rest[16] - rest[17]);
+  if (!(std::hypot(left.x(), left.z()) > 1e-6))
+    throw InputError(path, "left and right joints lie on the line of the trunk",
+                     "correct the skeleton");
+  double yaw = std::atan2(left.z(), left.x());  // turning by +yaw about y takes `left` to +x
+  if (!given.isZero()) {
+    if (std::abs(given.y()) > 0.5)
+      throw InputError("", "a person cannot face up or down", "give --facing across --up");
+    if (given.cross(left).y() < 0)  // left is at the right hand of who faces there
+      throw InputError(path, "for a person facing that way, its left joints are on the right",
+                       "give the other --facing; if the file is mirrored, mend its names");
+    yaw = -std::atan2(given.x(), given.z());
+  }
+  const double quarter = std::round(yaw / (M_PI / 2)) * (M_PI / 2);
+  if (framed || std::abs(yaw - quarter) * kDegrees > kQuarterSlack) return turn_about_y(yaw);
+  const double c = std::round(std::cos(quarter)), s = std::round(std::sin(quarter));
+  Mat3 out;
+  out << c, 0, s, 0, 1, 0, -s, 0, c;
+  return out;
+}
+
+/// What keeps a pose from being T-like; "" if nothing does.
+std::string unlike_t_pose(const Joints& rest) {
+  const double trunk = angle_between(rest[15] - rest[0], Vec3::UnitY());
+  if (!(trunk <= kMostTrunk)) return "its trunk is not upright";
+  for (const Limb& limb : limbs()) {
+    const Vec3 bone = rest[static_cast<size_t>(limb.to)] - rest[static_cast<size_t>(limb.from)];
+    if (!(bone.norm() > 1e-4) || !(angle_between(bone, limb.wanted) <= kMostLimb))
+      return "its " + std::string(kJointNames[static_cast<size_t>(limb.from)]) +
+             " does not point towards the " +
+             std::string(kJointNames[static_cast<size_t>(limb.to)]) + " as a standing person's";
+  }
+  return "";
+}
+
+/// "left_hip 20, right_hip 20 degrees": limbs off a T-pose.
+std::string limbs_off(const Joints& rest) {
+  std::string out;
+  for (const Limb& limb : limbs()) {
+    const double angle = angle_between(
+        rest[static_cast<size_t>(limb.to)] - rest[static_cast<size_t>(limb.from)], limb.wanted);
+    if (angle < kShownAngle) continue;
+    out += (out.empty() ? "" : ", ") + std::string(kJointNames[static_cast<size_t>(limb.from)]) +
+           " " + std::to_string(std::lround(angle));
+  }
+  return out.empty() ? out : out + " degrees";
+}
+
+RestPose built_pose(const SourceMotion& motion, const JointMap& map, const Joints& zero,
+                    const Mat3& up, const std::string& path, ImportReport& report) {
+  const Rotations turned = build_t_pose(motion, map, up, path);
+  RestPose out;
+  out.align = up;
+  Joints stood;  // the zero pose as a whole, its trunk upright
+  for (size_t j = 0; j < kJoints; ++j) {
+    const int p = kParents[j];
+    out.frame[j] = turned[j].transpose();
+    stood[j] = turned[0] * (zero[j] - zero[0]);
+    out.joints[j] =
+        p < 0 ? Vec3::Zero()
+              : Vec3(out.joints[static_cast<size_t>(p)] +
+                     turned[static_cast<size_t>(p)] * (zero[j] - zero[static_cast<size_t>(p)]));
+  }
+  report.facts.emplace_back("rest pose",
+                            "built, for zero rotations are no T-pose: trunk upright, collars and "
+                            "arms along x, legs down, feet level, knees bending backwards and "
+                            "elbows forwards");
+  report.facts.emplace_back("turned", limbs_off(stood));
+  return out;
+}
+
+}  // namespace
+
+Axis parse_axis(const std::string& text, const std::string& option) {
+  for (size_t i = 0; i < std::size(kAxisNames); ++i)
+    if (text == kAxisNames[i]) return static_cast<Axis>(i);
+  throw InputError("", option + " '" + text.substr(0, 40) + "' is no axis",
+                   "give auto, x, -x, y, -y, z or -z");
+}
+
+std::string to_string(Axis axis) { return kAxisNames[static_cast<size_t>(axis)]; }
+
+RestPose find_rest_pose(const SourceMotion& motion, const JointMap& map, const RestOptions& options,
+                        const std::string& path, ImportReport& report) {
+  PosedSkeleton pose;
+  pose.joints = rest_joints(motion.skeleton, map);
+  pose.global.fill(Mat3::Identity());
+  const bool framed = options.frame >= 0;
+  if (framed) {
+    if (static_cast<size_t>(options.frame) >= motion.local.size())
+      throw InputError(path, "has no frame " + std::to_string(options.frame),
+                       "name a rest frame of it");
+    pose = source_pose(motion, map, static_cast<size_t>(options.frame));
+  }
+  const Mat3 up = upright(find_up(motion, map, pose.joints, options.up, path, report));
+  Joints upright_joints;
+  for (size_t j = 0; j < kJoints; ++j) upright_joints[j] = up * (pose.joints[j] - pose.joints[0]);
+  const Vec3 given =
+      options.facing == Axis::automatic ? Vec3(Vec3::Zero()) : Vec3(up * vector_of(options.facing));
+  RestPose out;
+  std::string wrong = "it does not stand";
+  if (!(angle_between(upright_joints[15], Vec3::UnitY()) > kMostTrunk)) {
+    const Mat3 front = facing_front(upright_joints, given, framed, path);
+    for (size_t j = 0; j < kJoints; ++j) {
+      out.joints[j] = front * upright_joints[j];
+      out.frame[j] = pose.global[j].transpose() * (front * up).transpose();
+    }
+    out.align = front * up;
+    wrong = unlike_t_pose(out.joints);
+  }
+  if (!wrong.empty() && framed)
+    throw InputError(path, "frame " + std::to_string(options.frame) + " is no T-pose: " + wrong,
+                     "name a frame that is a T-pose as the rest frame");
+  if (!wrong.empty()) return built_pose(motion, map, pose.joints, up, path, report);
+
+  const Vec3 front = out.align.transpose() * Vec3::UnitZ();
+  report.facts.emplace_back(
+      "facing", to_string(axis_near(front)) +
+                    (given.isZero() ? ", by the left and right joints" : ", as given") +
+                    (angle_between(front, vector_of(axis_near(front))) > 1 ? " (about)" : ""));
+  report.facts.emplace_back("rest pose",
+                            framed ? "frame " + std::to_string(options.frame) : "zero rotations");
+  const std::string off = limbs_off(out.joints);
+  if (!off.empty())
+    report.facts.emplace_back("off a T-pose", off + " (corrected bone by bone for each body)");
+  return out;
+}
+
+}  // namespace restage

@@ -1,0 +1,148 @@
+#include "datasets/merge.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+
+#include "autograd/base/error.h"
+#include "datasets/schema.h"
+#include "datasets/schema_detail.h"
+
+namespace restage {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Adds the parts of `text` ("a; b") that `all` does not have.
+void join(const std::string& text, std::vector<std::string>& all) {
+  for (size_t at = 0; at <= text.size();) {
+    const size_t end = std::min(text.find("; ", at), text.size());
+    const std::string part = text.substr(at, end - at);
+    if (!part.empty() && std::find(all.begin(), all.end(), part) == all.end()) all.push_back(part);
+    at = end + 2;
+  }
+}
+
+std::string joined(const std::vector<std::string>& parts) {
+  std::string out;
+  for (const std::string& part : parts) out += (out.empty() ? "" : "; ") + part;
+  return out;
+}
+
+/// What a file holds, without its values.
+struct Content {
+  std::vector<std::string> bodies, motions;
+};
+
+std::vector<std::string> members(const h5::File& file, const std::string& group) {
+  return file.has(group) ? file.children(group) : std::vector<std::string>();
+}
+
+/// Looks at all files before anything is written.
+class Plan {
+ public:
+  Plan(const std::vector<std::string>& files, const std::string& out, bool prefix)
+      : prefix_(prefix) {
+    if (files.size() < 2) throw InputError("", "one file is nothing to merge", "give two or more");
+    std::vector<std::string> licenses, provenances;
+    for (const std::string& file : files) {
+      std::error_code ignored;
+      if (fs::equivalent(file, out, ignored))
+        throw InputError(out, "is one of the files to merge", "write to another");
+      look_at(file, licenses, provenances);
+    }
+    refuse(body_clashes_, "bodies");
+    refuse(motion_clashes_, "motions");
+    info.license = joined(licenses);
+    info.provenance = joined(provenances);
+  }
+
+  std::string id(const std::string& file, const std::string& name) const {
+    return prefix_ ? fs::path(file).stem().string() + "_" + name : name;
+  }
+
+  std::vector<Content> content;
+  FileInfo info;
+
+ private:
+  void look_at(const std::string& path, std::vector<std::string>& licenses,
+               std::vector<std::string>& provenances) {
+    const h5::File file = open_schema_file(path);
+    Content& has = content.emplace_back();
+    has.bodies = members(file, "/bodies");
+    has.motions = members(file, "/motions");
+    if (has.bodies.empty() && has.motions.empty())
+      throw InputError(path, "holds neither bodies nor motions",
+                       "give files that 'restage data build' or 'import' wrote");
+    if (!has.motions.empty() && read_fps(file) != kFps)
+      throw InputError(path, "has motions that are not at 30 fps", "import them again");
+    for (const std::string& name : has.bodies) note(path, name, bodies_, body_clashes_);
+    for (const std::string& name : has.motions) {
+      note(path, name, motions_, motion_clashes_);
+      check_subject(path, file, "/motions/" + name);
+    }
+    join(file.text("/", "license").value_or("unknown"), licenses);
+    join(file.text("/", "provenance").value_or("unknown"), provenances);
+  }
+
+  void note(const std::string& path, const std::string& name,
+            std::map<std::string, std::string>& ids, std::vector<std::string>& clashes) const {
+    const auto [at, fresh] = ids.emplace(id(path, name), path);
+    if (!fresh) clashes.push_back("'" + at->first + "' of " + at->second + " and " + path);
+  }
+
+  /// A subject in two splits would let a test meet a person that training has seen.
+  void check_subject(const std::string& path, const h5::File& file, const std::string& motion) {
+    const std::string subject = file.text(motion, "subject").value_or("");
+    const std::string split = file.text(motion, "split").value_or("");
+    if (subject.empty()) return;
+    const std::string& first = splits_.emplace(subject, split).first->second;
+    if (first != split)
+      throw InputError(path,
+                       "subject '" + subject + "' is in the split '" + split + "' here and in '" +
+                           first + "' before",
+                       "import one of them again with another --subject or --split");
+  }
+
+  void refuse(const std::vector<std::string>& clashes, const std::string& what) const {
+    if (clashes.empty()) return;
+    std::string named = clashes[0];
+    if (clashes.size() > 1) named += " (and " + std::to_string(clashes.size() - 1) + " more)";
+    throw InputError("", "two " + what + " have the same id: " + named,
+                     prefix_ ? "rename one of the files, whose names are the prefixes"
+                             : "add --prefix to put the files' names before the ids");
+  }
+
+  bool prefix_;
+  std::map<std::string, std::string> bodies_, motions_;  // id to file
+  std::map<std::string, std::string> splits_;            // subject to split
+  std::vector<std::string> body_clashes_, motion_clashes_;
+};
+
+}  // namespace
+
+MergeSummary merge_data(const std::vector<std::string>& files, const std::string& out,
+                        const MergeOptions& options) {
+  const Plan plan(files, out, options.prefix);
+  DatasetWriter writer(out, plan.info);
+  MergeSummary done{0, 0, plan.info.license, plan.info.provenance};
+  for (size_t i = 0; i < files.size(); ++i) {
+    const h5::File file = open_schema_file(files[i]);
+    for (const std::string& name : plan.content[i].bodies) {
+      Body body = read_body(file, name);
+      body.id = plan.id(files[i], name);
+      writer.add(body);
+      ++done.bodies;
+    }
+    for (const std::string& name : plan.content[i].motions) {
+      Motion motion = read_motion(file, name);
+      motion.id = plan.id(files[i], name);
+      writer.add(motion);
+      ++done.motions;
+    }
+  }
+  writer.commit();
+  return done;
+}
+
+}  // namespace restage

@@ -1,0 +1,31 @@
+// What the files of motion capture (BVH, ASF) have in common, in the file's own units and axes.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "nn/geometry/skeleton.h"
+
+namespace restage {
+
+struct SourceSkeleton {
+  std::vector<std::string> names;
+  std::vector<int> parents;   ///< a parent comes before its children; -1: root
+  std::vector<Vec3> offsets;  ///< from the parent, zero pose
+  std::vector<Vec3> ends;     ///< end site, from the joint; zero if it has none
+  std::vector<uint8_t> has_end;
+  size_t size() const { return names.size(); }
+};
+
+enum class Channel { x_position, y_position, z_position, x_rotation, y_rotation, z_rotation };
+
+/// Rotation by `degrees` about the axis of a rotation channel.
+inline Quat channel_rotation(Channel channel, double degrees) {
+  const Vec3 axis = channel == Channel::x_rotation   ? Vec3::UnitX()
+                    : channel == Channel::y_rotation ? Vec3::UnitY()
+                                                     : Vec3::UnitZ();
+  return Quat(Eigen::AngleAxisd(degrees * (M_PI / 180.0), axis));
+}
+
+}  // namespace restage

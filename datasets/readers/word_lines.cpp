@@ -1,0 +1,77 @@
+#include "datasets/readers/word_lines.h"
+
+#include <charconv>
+#include <cmath>
+
+#include "autograd/base/error.h"
+
+namespace restage {
+namespace {
+
+char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
+constexpr size_t kMostWords = size_t{1} << 16;  // a line of more is no line of motion capture
+
+void split(std::string_view line, std::vector<std::string_view>& words) {
+  constexpr const char* kBlank = " \t\r\f\v";
+  words.clear();
+  for (size_t at = line.find_first_not_of(kBlank);
+       at != std::string_view::npos && words.size() <= kMostWords;) {
+    const size_t end = std::min(line.find_first_of(kBlank, at), line.size());
+    words.push_back(line.substr(at, end - at));
+    at = line.find_first_not_of(kBlank, end);
+  }
+}
+
+}  // namespace
+
+bool WordLines::next() {
+  while (at_ < text_.size()) {
+    const size_t end = std::min(text_.find('\n', at_), text_.size());
+    split(text_.substr(at_, end - at_), words_);
+    at_ = end + 1;
+    ++number_;
+    if (!words_.empty()) return true;
+  }
+  words_.clear();
+  return false;
+}
+
+void WordLines::fail(const std::string& wrong, const std::string& fix) const {
+  throw InputError(path_ + ":" + std::to_string(number_), wrong, fix);
+}
+
+double WordLines::number(std::string_view word) const {
+  double value = 0;
+  const char* end = word.data() + word.size();
+  const char* begin = word.data() + (word.size() > 1 && word[0] == '+' ? 1 : 0);
+  const auto [stop, error] = std::from_chars(begin, end, value);
+  const bool tiny = error == std::errc::result_out_of_range && stop == end &&
+                    word.find("e-") != std::string_view::npos;
+  if (tiny) return 0.0;
+  if (error != std::errc() || stop != end || !std::isfinite(value) || std::abs(value) > 1e9)
+    fail("'" + quoted(word) + "' is no usable number", "write a plain decimal number below 1e9");
+  return value;
+}
+
+std::string WordLines::quoted(std::string_view word) {
+  std::string out(word.substr(0, 40));
+  for (char& c : out)
+    if (c < ' ' || c > '~') c = '?';
+  return out;
+}
+
+bool same_word(std::string_view a, std::string_view lower_word) {
+  if (a.size() != lower_word.size()) return false;
+  for (size_t i = 0; i < a.size(); ++i)
+    if (lower(a[i]) != lower_word[i]) return false;
+  return true;
+}
+
+std::string lower_case(std::string_view word) {
+  std::string out(word);
+  for (char& c : out) c = lower(c);
+  return out;
+}
+
+}  // namespace restage

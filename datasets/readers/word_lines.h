@@ -1,0 +1,39 @@
+// Texts of words in lines, as motion capture writes them (BVH, ASF, AMC); used by the readers of
+// this folder.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace restage {
+
+/// Lines of a text as words, with the line number for messages. The text must outlive it.
+class WordLines {
+ public:
+  WordLines(std::string_view text, const std::string& path) : text_(text), path_(path) {}
+
+  /// Goes to the next line with words; false at the end.
+  bool next();
+  /// The words of the line (its first 65,537); never empty after a next() that was true.
+  const std::vector<std::string_view>& words() const { return words_; }
+  /// InputError "file:line: what is wrong; how to mend it".
+  [[noreturn]] void fail(const std::string& wrong, const std::string& fix) const;
+  /// The word as a finite number of at most 1e9; else fail().
+  double number(std::string_view word) const;
+  /// Short and printable, for messages.
+  static std::string quoted(std::string_view word);
+
+ private:
+  std::string_view text_;
+  std::string path_;
+  size_t at_ = 0, number_ = 0;
+  std::vector<std::string_view> words_;
+};
+
+/// Whether `a` is the word `lower`, whatever its case.
+bool same_word(std::string_view a, std::string_view lower);
+/// In lower case (ASCII).
+std::string lower_case(std::string_view word);
+
+}  // namespace restage

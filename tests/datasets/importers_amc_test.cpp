@@ -1,0 +1,299 @@
+// ASF/AMC: a toy written by the test with bones of any frame, and the CMU files of the data folder
+// against its reference joints.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+
+#include "autograd/base/error.h"
+#include "autograd/base/rng.h"
+#include "datasets/hdf5/file.h"
+#include "datasets/importers/amc.h"
+#include "datasets/readers/asf.h"
+
+namespace restage {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ToyBone {
+  std::string name, parent;
+  Vec3 end;  ///< of the bone, T-pose, from the root, metres
+};
+const std::vector<ToyBone>& toy() {
+  static const std::vector<ToyBone> bones = [] {
+    std::vector<ToyBone> out = {
+        {"lowerback", "root", Vec3(0, .1, 0)},         {"upperback", "lowerback", Vec3(0, .22, 0)},
+        {"thorax", "upperback", Vec3(0, .42, .01)},    {"lowerneck", "thorax", Vec3(0, .5, 0)},
+        {"upperneck", "lowerneck", Vec3(0, .57, .01)}, {"head", "upperneck", Vec3(0, .7, .02)}};
+    for (const int s : {1, -1}) {
+      const std::string l = s > 0 ? "l" : "r";
+      out.push_back({l + "hipjoint", "root", Vec3(s * .09, -.05, 0)});
+      out.push_back({l + "femur", l + "hipjoint", Vec3(s * .1, -.45, .01)});
+      out.push_back({l + "tibia", l + "femur", Vec3(s * .1, -.87, -.02)});
+      out.push_back({l + "foot", l + "tibia", Vec3(s * .11, -.93, .12)});
+      out.push_back({l + "toes", l + "foot", Vec3(s * .11, -.93, .18)});
+      out.push_back({l + "clavicle", "thorax", Vec3(s * .18, .43, 0)});
+      out.push_back({l + "humerus", l + "clavicle", Vec3(s * .45, .43, 0)});
+      out.push_back({l + "radius", l + "humerus", Vec3(s * .6, .43, 0)});
+      out.push_back({l + "wrist", l + "radius", Vec3(s * .7, .43, 0)});
+      out.push_back({l + "hand", l + "wrist", Vec3(s * .75, .43, 0)});
+    }
+    return out;
+  }();
+  return bones;
+}
+
+constexpr double kToyUnit = 0.0254 / 0.45;
+
+Mat3 about(int axis, double degrees) {
+  return Eigen::AngleAxisd(degrees * M_PI / 180, Vec3::Unit(axis)).toRotationMatrix();
+}
+Vec3 axis_of(size_t bone) {
+  return Vec3(10.0 * static_cast<double>(bone % 7), -20.0 * static_cast<double>(bone % 3),
+              15.0 * static_cast<double>(bone % 5));
+}
+double angle(size_t bone, int dof, int frame) {
+  return 20 * std::sin(0.7 * static_cast<double>(bone) + dof + 0.05 * frame);
+}
+/// Freedoms differ from bone to bone: all three, one, another order, none.
+std::string freedoms(size_t bone) {
+  const char* const kinds[] = {"xyz", "x", "zx", "", "yzx"};
+  return kinds[bone % 5];
+}
+
+std::string asf_text() {
+  std::string out =
+      "# toy\n:version 1.10\n:name TOY\n:units\n  mass 1.0\n  length 0.45\n  angle deg\n"
+      ":documentation\n  anything\n:root\n  order TX TY TZ RX RY RZ\n  axis XYZ\n"
+      "  position 0 0 0\n  orientation 0 0 0\n:bonedata\n";
+  std::map<std::string, Vec3> start = {{"root", Vec3::Zero()}};
+  char line[200];
+  for (size_t b = 0; b < toy().size(); ++b) {
+    const ToyBone& bone = toy()[b];
+    const Vec3 along = bone.end - start[bone.parent];
+    start[bone.name] = bone.end;
+    const Vec3 d = along.normalized(), a = axis_of(b);
+    std::snprintf(line, sizeof line,
+                  "  begin\n    id %zu\n    name %s\n    direction %.9g %.9g %.9g\n    length "
+                  "%.9g\n    axis %g %g %g XYZ\n",
+                  b + 1, bone.name.c_str(), d.x(), d.y(), d.z(), along.norm() / kToyUnit, a.x(),
+                  a.y(), a.z());
+    out += line;
+    if (!freedoms(b).empty()) {
+      out += "    dof";
+      for (const char c : freedoms(b)) out += std::string(" r") + c;
+      out += "\n    limits";
+      for (size_t i = 0; i < freedoms(b).size(); ++i) out += " (-160.0 20.0)\n          ";
+      out += "\n";
+    }
+    out += "  end\n";
+  }
+  out += ":hierarchy\n  begin\n";
+  for (const ToyBone& bone : toy()) out += "    " + bone.parent + " " + bone.name + "\n";
+  return out + "  end\n";
+}
+
+std::string amc_text(int frames) {
+  std::string out = "#!OML:ASF\n:FULLY-SPECIFIED\n:DEGREES\n";
+  for (int f = 0; f < frames; ++f) {
+    char line[200];
+    std::snprintf(line, sizeof line, "%d\nroot %.9g %.9g %.9g %.9g %.9g %.9g\n", f + 1,
+                  0.01 * f / kToyUnit, 0.95 / kToyUnit, 0.002 * f / kToyUnit, 5.0, 20.0 + 0.1 * f,
+                  -3.0);
+    out += line;
+    for (size_t b = 0; b < toy().size(); ++b) {
+      if (freedoms(b).empty()) continue;
+      out += toy()[b].name;
+      for (size_t d = 0; d < freedoms(b).size(); ++d) {
+        std::snprintf(line, sizeof line, " %.9g", angle(b, static_cast<int>(d), f));
+        out += line;
+      }
+      out += "\n";
+    }
+  }
+  return out;
+}
+
+/// Where the bones of a frame begin, by the definition of the format.
+std::map<std::string, Vec3> starts(int f) {
+  std::map<std::string, Mat3> turn = {
+      {"root", about(2, -3.0) * about(1, 20.0 + 0.1 * f) * about(0, 5.0)}};
+  std::map<std::string, Vec3> rest_end = {{"root", Vec3::Zero()}},
+                              end = {{"root", Vec3(0.01 * f, 0.95, 0.002 * f)}}, out = end;
+  for (size_t b = 0; b < toy().size(); ++b) {
+    const ToyBone& bone = toy()[b];
+    const Vec3 a = axis_of(b);
+    const Mat3 c = about(2, a.z()) * about(1, a.y()) * about(0, a.x());
+    Mat3 m = Mat3::Identity();
+    for (size_t d = 0; d < freedoms(b).size(); ++d)
+      m = about(freedoms(b)[d] - 'x', angle(b, static_cast<int>(d), f)) * m;
+    turn[bone.name] = turn[bone.parent] * c * m * c.transpose();
+    out[bone.name] = end[bone.parent];
+    end[bone.name] = end[bone.parent] + turn[bone.name] * (bone.end - rest_end[bone.parent]);
+    rest_end[bone.name] = bone.end;
+  }
+  return out;
+}
+
+TEST(ImportersAmc, AToyOfAnyFramesAndFreedomsIsReadExactly) {
+  const MotionClip clip = convert_amc(amc_text(121), "a/07_01.amc", asf_text(), "a/07.asf");
+  EXPECT_EQ(clip.motion.id, "07_01");
+  EXPECT_EQ(clip.motion.subject, "07");
+  EXPECT_NEAR(clip.scale, kToyUnit, 1e-12);
+  ASSERT_EQ(clip.joints.size(), 31u);
+  const std::map<int, std::string> bones = {
+      {0, "root"},     {1, "lfemur"},     {2, "rfemur"},     {3, "upperback"}, {4, "ltibia"},
+      {5, "rtibia"},   {6, "thorax"},     {7, "lfoot"},      {8, "rfoot"},     {10, "ltoes"},
+      {11, "rtoes"},   {12, "upperneck"}, {13, "lclavicle"}, {15, "head"},     {16, "lhumerus"},
+      {18, "lradius"}, {20, "lhand"},     {21, "rhand"}};
+  for (size_t f = 0; f < clip.joints.size(); ++f) {
+    const auto truth = starts(static_cast<int>(4 * f));
+    for (const auto& [joint, bone] : bones)
+      ASSERT_LT((clip.joints[f][static_cast<size_t>(joint)] - truth.at(bone)).norm(), 1e-6)
+          << f << bone;
+  }
+}
+
+TEST(ImportersAmc, RadiansAndGivenRate) {
+  std::string asf = asf_text(), amc = amc_text(9);
+  MotionOptions options;
+  options.fps = 60;
+  EXPECT_EQ(convert_amc(amc, "x.amc", asf, "x.asf", options).motion.frames(), 5u);
+  amc.replace(amc.find(":DEGREES"), 8, ":RADIANS");
+  const AsfFile skeleton = parse_asf(asf, "x.asf");
+  EXPECT_TRUE(parse_amc(amc, "x.amc", skeleton).radians);
+  EXPECT_EQ(skeleton.bones.size(), toy().size() + 1);
+  EXPECT_EQ(skeleton.bones[1].limits.size(), 3u);
+}
+
+void expect_refused(const std::string& asf, const std::string& amc, const std::string& says) {
+  try {
+    convert_amc(amc, "some.amc", asf, "some.asf");
+    ADD_FAILURE() << "accepted although " << says;
+  } catch (const InputError& error) {
+    const std::string what = error.what();
+    EXPECT_EQ(what.find("some.a"), 0u) << what;
+    EXPECT_NE(what.find(says), std::string::npos) << what;
+    EXPECT_LT(what.size(), 390u) << what;
+    EXPECT_EQ(what.find('\n'), std::string::npos) << what;
+  }
+}
+
+TEST(ImportersAmc, BadFilesAreNamedWithTheirLine) {
+  const std::string asf = asf_text(), amc = amc_text(5);
+  const auto with = [](std::string text, const std::string& from, const std::string& to) {
+    const size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return text.replace(at, from.size(), to);
+  };
+  expect_refused("", amc, "holds no bones");
+  expect_refused("HIERARCHY\n", amc, "does not begin with a section");
+  expect_refused(with(asf, "order TX", "order WX"), amc, "no freedom");
+  expect_refused(with(asf, "axis XYZ", "axis XXZ"), amc, "no order of axes");
+  expect_refused(with(asf, "dof rx", "dof rx rx"), amc, "given twice");
+  expect_refused(with(asf, "dof rx", "dof l"), amc, "no freedom");
+  expect_refused(with(asf, "length 0.45", "length 0"), amc, "must be positive");
+  expect_refused(with(asf, "name thorax", "name lowerback"), amc, "two bones are called lowerback");
+  expect_refused(with(asf, "direction ", "direction nan "), amc, "no usable number");
+  expect_refused(with(asf, "root lowerback", "root"), amc, "has no place in the hierarchy");
+  expect_refused(with(asf, "root lowerback", "head lowerback"), amc, "loop");
+  expect_refused(with(asf, "root lowerback", "root lowerback thorax"), amc, "two parents");
+  expect_refused(with(asf, "root lowerback", "root lowrback"), amc, "is no bone");
+  expect_refused(asf, "", "holds no frames");
+  expect_refused(asf, with(amc, "lowerback ", "lowrback "), "did you mean 'lowerback'");
+  expect_refused(asf, with(amc, "lowerback ", "lowerback 1 "), "has 4 values");
+  expect_refused(asf, with(amc, "\n2\n", "\n3\n"), "frame 3 follows frame 1");
+  expect_refused(asf, with(amc, "root ", "root inf "), "some.amc");
+  expect_refused(asf, with(amc, "lowerback", "#"), "lacks bone lowerback");
+  expect_refused(asf, with(amc, "\n1\n", "\n"), "frame's number expected");
+}
+
+TEST(ImportersAmc, FilesCutAndFlippedAnywhereNeverCrash) {
+  const std::string asf = asf_text(), amc = amc_text(6);
+  int cut = 0;
+  for (size_t percent = 0; percent < 100; ++percent) {
+    EXPECT_THROW(convert_amc(amc, "x.amc", asf.substr(0, asf.size() * percent / 100), "x.asf"),
+                 InputError)
+        << percent;
+    // Cut between two frames, or within a number, an AMC file is a shorter one.
+    try {
+      convert_amc(amc.substr(0, amc.size() * percent / 100), "x.amc", asf, "x.asf");
+    } catch (const InputError&) {
+      ++cut;
+    }
+  }
+  EXPECT_GT(cut, 85);
+  for (uint64_t i = 0; i < 600; ++i) {
+    Rng rng(RngKey{11, i});
+    std::string a = asf, m = amc;
+    for (uint64_t n = 1 + rng.below(3); n > 0; --n) {
+      std::string& text = rng.below(2) ? a : m;
+      text[rng.below(text.size())] = static_cast<char>(rng.below(256));
+    }
+    try {
+      for (const Joints& joints : convert_amc(m, "x.amc", a, "x.asf").joints)
+        for (const Vec3& x : joints) ASSERT_TRUE(x.allFinite()) << i;
+    } catch (const InputError& error) {
+      ASSERT_LT(std::string(error.what()).size(), 400u) << error.what();
+    }
+  }
+}
+
+TEST(ImportersAmc, TheSkeletonBesideIsFoundByName) {
+  const std::string folder = ::testing::TempDir() + "importers_amc/";
+  fs::remove_all(folder);
+  fs::create_directories(folder);
+  std::ofstream(folder + "07_01.amc") << amc_text(3);
+  EXPECT_THROW(find_asf(folder + "07_01.amc"), InputError);
+  std::ofstream(folder + "other.asf") << "broken";
+  EXPECT_EQ(find_asf(folder + "07_01.amc"), folder + "other.asf");  // the only one
+  std::ofstream(folder + "07.asf") << asf_text();
+  std::ofstream(folder + "0.asf") << "broken";
+  EXPECT_EQ(find_asf(folder + "07_01.amc"), folder + "07.asf");
+  EXPECT_EQ(read_amc(folder + "07_01.amc").motion.subject, "07");
+  EXPECT_THROW(read_amc(folder + "07_01.amc", folder + "other.asf"), InputError);
+  fs::remove_all(folder);
+}
+
+TEST(ImportersAmc, CmuFilesGiveTheReferenceJoints) {
+  const char* shared = std::getenv("RESTAGE_SHARED");
+  const std::string data =
+      (shared ? std::string(shared) : RESTAGE_SOURCE_DIR "/../shared") + "/data";
+  if (!fs::exists(data + "/cmu/clips30.h5"))
+    GTEST_SKIP() << "no data folder (set RESTAGE_SHARED): the reference joints are not at hand";
+  const h5::File clips = h5::File::open(data + "/cmu/clips30.h5");
+  size_t compared = 0;
+  for (const std::string& clip : clips.children("/clips")) {
+    const std::string group = "/clips/" + clip;
+    std::string file = data + "/cmu/asfamc/" + clip + ".amc.xz";
+    if (!fs::exists(file))
+      file = data + "/cmu/asfamc/" + clip.substr(0, clip.size() - 1) + ".amc.xz";
+    if (!fs::exists(file) || !clips.has(group + "/reference22")) continue;
+    MotionOptions options;
+    options.drop_leading = static_cast<int>(*clips.number(group, "source_first_frame"));
+    options.keep_frames = static_cast<size_t>(*clips.number(group, "source_frames"));
+    const MotionClip got = read_amc(file, "", options);
+    const auto expected = clips.read<float>(group + "/reference22", {-1, kJoints, 3});
+    ASSERT_EQ(got.joints.size() * kJoints * 3, expected.size()) << clip;
+    double sum = 0;
+    for (size_t i = 0; i < got.joints.size() * kJoints; ++i)
+      sum += (got.joints[i / kJoints][i % kJoints] -
+              Vec3(expected[3 * i], expected[3 * i + 1], expected[3 * i + 2]))
+                 .norm();
+    const double mean = sum / static_cast<double>(got.joints.size() * kJoints);
+    EXPECT_LT(mean, 1e-4) << clip;
+    RecordProperty(clip + "_mean_mm", std::to_string(1000 * mean));
+    std::printf("%s: mean joint error %.5f mm over %zu frames\n", clip.c_str(), 1000 * mean,
+                got.joints.size());
+    ++compared;
+  }
+  EXPECT_GE(compared, 5u);
+}
+
+}  // namespace
+}  // namespace restage

@@ -1,0 +1,79 @@
+// BVH files that are cut, flipped, deep or announce what they do not hold: refused with a line,
+// never a crash, never much memory.
+#include <gtest/gtest.h>
+
+#include "autograd/base/error.h"
+#include "autograd/base/rng.h"
+#include "datasets/importers/bvh.h"
+#include "datasets/readers/bvh.h"
+#include "tests/datasets/importers_bvh_text.h"
+
+namespace restage {
+namespace {
+
+std::string complaint(const std::string& text) {
+  try {
+    convert_bvh(text, "x.bvh");
+  } catch (const InputError& error) {
+    EXPECT_LT(std::string(error.what()).size(), 390u) << error.what();
+    return error.what();
+  }
+  return "";
+}
+
+std::string small_file() {
+  bvh_test::Style style;
+  style.frames = 12;
+  return bvh_test::text(style);
+}
+
+TEST(ReadersRecordings, CutAtEveryPercentIsRefused) {
+  const std::string good = small_file();
+  EXPECT_EQ(complaint(good), "");
+  for (size_t percent = 0; percent < 100; ++percent)
+    EXPECT_EQ(complaint(good.substr(0, good.size() * percent / 100)).find("x.bvh:"), 0u) << percent;
+}
+
+TEST(ReadersRecordings, FlippedBytesNeverCrash) {
+  const std::string good = small_file();
+  for (uint64_t i = 0; i < 500; ++i) {
+    Rng rng(RngKey{5, i});
+    std::string text = good;
+    for (uint64_t n = 1 + rng.below(4); n > 0; --n)
+      text[rng.below(text.size())] = static_cast<char>(rng.below(256));
+    complaint(text);
+  }
+}
+
+/// A chain of `depth` joints, one in the other.
+std::string deep(size_t depth) {
+  std::string text =
+      "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Xrotation Yrotation Zrotation\n";
+  for (size_t i = 1; i < depth; ++i) text += "JOINT b" + std::to_string(i) + "\n{\nOFFSET 0 1 0\n";
+  for (size_t i = 0; i < depth; ++i) text += "}\n";
+  return text + "MOTION\nFrames: 1\nFrame Time: 0.1\n0 0 0\n";
+}
+
+TEST(ReadersRecordings, DepthIsNoMatterButCountsAreLimited) {
+  EXPECT_EQ(parse_bvh(deep(4096), "x.bvh").skeleton.size(), 4096u);
+  EXPECT_NE(complaint(deep(4097)).find("more than 4096 joints"), std::string::npos);
+  EXPECT_NE(complaint(std::string(1 << 20, '{')).find("x.bvh:1"), std::string::npos);
+}
+
+TEST(ReadersRecordings, AnnouncedCountsAreNotBelieved) {
+  const std::string good = small_file();
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = good;
+    return text.replace(text.find(from), from.size(), to);
+  };
+  EXPECT_NE(complaint(with("Frames: 12", "Frames: 999999999")).find("ends after 12 of"),
+            std::string::npos);
+  EXPECT_NE(complaint(with("Frames: 12", "Frames: 11")).find("more frames than"),
+            std::string::npos);
+  std::string wide = good.substr(0, good.find("Frame Time")) + "Frame Time: 0.01\n";
+  for (int i = 0; i < 200000; ++i) wide += "0 ";
+  EXPECT_NE(complaint(wide).find("65537 values"), std::string::npos) << complaint(wide);
+}
+
+}  // namespace
+}  // namespace restage
