@@ -7,7 +7,10 @@
 #include "autograd/base/log.h"
 #include "autograd/base/parallel.h"
 #include "datasets/importers/cmu.h"
+#include "datasets/importers/import_detail.h"
 #include "datasets/importers/makehuman.h"
+#include "datasets/readers/array_frames.h"
+#include "datasets/readers/mesh_io.h"
 #include "datasets/schema.h"
 
 namespace restage {
@@ -40,12 +43,6 @@ void add_bodies(const std::string& folder, const std::string& garment, DatasetWr
   summary.bodies += recipes.size();
 }
 
-void add_motion(const Motion& motion, DatasetWriter& writer, ImportSummary& summary) {
-  writer.add(motion);
-  ++summary.motions;
-  summary.frames += motion.frames();
-}
-
 ImportSummary import_data_folder(const std::string& folder, bool bodies, bool clips,
                                  const std::string& out, const ImportOptions& options) {
   FileInfo info;
@@ -73,11 +70,8 @@ ImportSummary import_data_folder(const std::string& folder, bool bodies, bool cl
 
 ImportSummary import_bvh_files(const std::vector<std::string>& files, const std::string& source,
                                const std::string& out, const ImportOptions& options) {
-  FileInfo info;
-  info.license = options.license;
-  info.provenance = "imported from " + fs::path(source).filename().string();
   ImportSummary summary;
-  DatasetWriter writer(out, info);
+  DatasetWriter writer(out, file_info(source, options));
   for (const std::string& file : files) {
     try {
       add_motion(import_bvh(file, options.bvh), writer, summary);
@@ -95,28 +89,54 @@ ImportSummary import_bvh_files(const std::vector<std::string>& files, const std:
   return summary;
 }
 
+ImportSummary import_folder(const std::string& source, const std::string& out,
+                            const ImportOptions& options) {
+  std::error_code ignored;
+  const bool bodies = fs::exists(source + "/body/makehuman.h5", ignored);
+  const bool clips = fs::exists(source + "/cmu/clips30.h5", ignored);
+  if (bodies || clips) return import_data_folder(source, bodies, clips, out, options);
+  std::vector<std::string> bvh;
+  for (const fs::directory_entry& entry : fs::directory_iterator(source, ignored))
+    if (entry.is_regular_file(ignored) && is_bvh(entry.path()))
+      bvh.push_back(entry.path().string());
+  std::sort(bvh.begin(), bvh.end());
+  if (!bvh.empty()) return import_bvh_files(bvh, source, out, options);
+  return import_array_folder(source, out, options);
+}
+
 }  // namespace
+
+fs::path absolute_path(const fs::path& path) {
+  const fs::path out = fs::absolute(path).lexically_normal();
+  return out.has_filename() ? out : out.parent_path();
+}
+
+FileInfo file_info(const std::string& source, const ImportOptions& options) {
+  FileInfo info;
+  info.license = options.license;
+  info.provenance = "imported from " + absolute_path(source).filename().string();
+  return info;
+}
+
+void add_motion(const Motion& motion, DatasetWriter& writer, ImportSummary& summary) {
+  writer.add(motion);
+  ++summary.motions;
+  summary.frames += motion.frames();
+}
 
 ImportSummary import_data(const std::string& source, const std::string& out,
                           const ImportOptions& options) {
   std::error_code ignored;
-  if (!fs::is_directory(source, ignored)) {
-    if (!fs::exists(source, ignored))
-      throw InputError(source, "is not there", "give a folder or a BVH file");
-    return import_bvh_files({source}, source, out, options);
-  }
-  const bool bodies = fs::exists(source + "/body/makehuman.h5", ignored);
-  const bool clips = fs::exists(source + "/cmu/clips30.h5", ignored);
-  if (bodies || clips) return import_data_folder(source, bodies, clips, out, options);
-  std::vector<std::string> files;
-  for (const fs::directory_entry& entry : fs::directory_iterator(source, ignored))
-    if (entry.is_regular_file(ignored) && is_bvh(entry.path()))
-      files.push_back(entry.path().string());
-  if (files.empty())
-    throw InputError(source, "holds neither body/makehuman.h5, cmu/clips30.h5 nor BVH files",
-                     "give a data folder or a folder of .bvh files");
-  std::sort(files.begin(), files.end());
-  return import_bvh_files(files, source, out, options);
+  if (!fs::exists(source, ignored))
+    throw InputError(source, "is not there", "give a file or a folder");
+  if (!options.betas.empty() && !is_npz_name(source))
+    throw InputError(source, "is no body model, to which --betas belongs", "leave --betas out");
+  if (fs::is_directory(source, ignored)) return import_folder(source, out, options);
+  if (source.ends_with(".pkl"))
+    throw InputError(source, "is a pickle, which can run code and is never read",
+                     "convert it to plain arrays (docs/data.md shows how)");
+  if (is_array_name(source) || is_mesh_name(source)) return import_array_file(source, out, options);
+  return import_bvh_files({source}, source, out, options);
 }
 
 }  // namespace restage

@@ -5,25 +5,38 @@
 #include <vector>
 
 #include "datasets/importers/bvh.h"
+#include "datasets/importers/report.h"
+#include "datasets/readers/byte_stream.h"
 
 namespace restage {
 
 struct ImportOptions {
-  BvhOptions bvh;       ///< for BVH files
+  /// Of BVH files; its subject, split, scale, fps and up also hold for AMASS motions and scans.
+  BvhOptions bvh;
   std::string garment;  ///< dress the bodies in this garment of body/clothes; empty: skin
-  std::string license = "unknown";  ///< of BVH files; a data folder's is known
+  std::string license = "unknown";  ///< of all but a data folder, whose licence is known
+  std::string body_model;           ///< a SMPL, SMPL-H or SMPL-X model or a folder; AMASS needs it
+  /// For a body model as source: files of betas (read_betas), or "zeros" for the mean person.
+  std::vector<std::string> betas;
+  uint64_t max_memory = kMaxMemory;  ///< what unpacking one array may take
 };
 
 struct ImportSummary {
-  size_t bodies = 0, motions = 0, frames = 0;
-  std::vector<std::string> skipped;  ///< files of a BVH folder that could not be used, and why
+  size_t bodies = 0, motions = 0, frames = 0;  ///< frames of motions, or of scans
+  size_t sequences = 0;                        ///< of scans
+  size_t shapes = 0;                  ///< AMASS files left out because they hold a shape only
+  std::vector<ImportReport> reports;  ///< one per file or sequence that was used
+  std::vector<std::string> skipped;   ///< files of a folder that could not be used, and why
 };
 
 /// Writes `out` (whole or not at all) from `source`, which is
 /// - a folder laid out like the project's data folder: all bodies of body/makehuman.h5 by
 ///   body/bodies.csv and all clips of cmu/clips30.h5 (one of the two may be absent);
-/// - a BVH file (.bvh, .bvh.xz): one motion;
-/// - a folder of BVH files, in the order of their names; unusable ones are skipped with a warning.
+/// - a BVH file (.bvh, .bvh.xz) or a folder of them, in the order of their names;
+/// - an AMASS motion (.npz) or a tree of folders of them, subjects named by folder (amass.h);
+/// - a body model (.npz), giving bodies (smpl.h);
+/// - scans: an array or mesh file, or a tree of folders of them (scans.h).
+/// Unusable files of a folder are skipped with a warning, except frames within a scan sequence.
 /// InputError: no such source, nothing usable in it, damaged data. WorkError: disk full.
 ImportSummary import_data(const std::string& source, const std::string& out,
                           const ImportOptions& options = {});

@@ -23,7 +23,7 @@ class FrameSource {
   virtual ~FrameSource() = default;
   /// The next frame, nothing at the end. InputError for a bad frame (also: no points, NaN).
   virtual std::optional<Frame> next() = 0;
-  virtual void skip() = 0;             ///< leaves one frame out, reading as little as it can
+  virtual void skip() { next(); }      ///< leaves one frame out, reading as little as it can
   virtual void rewind() = 0;           ///< next() gives the first frame again
   virtual int64_t frames() const = 0;  ///< how many there are in all
   virtual double fps() const = 0;      ///< the file's rate; kFps where nothing says one

@@ -193,6 +193,7 @@ double NpyHeader::number(const char* element) const {
     if (width == 2) return half(element, big_endian);
     return width == 4 ? as<float>(element, big_endian) : as<double>(element, big_endian);
   }
+  if (is_text()) return std::numeric_limits<double>::quiet_NaN();
   const bool is_signed = kind == 'i';
   switch (width) {
     case 1:

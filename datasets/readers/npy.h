@@ -21,7 +21,7 @@ struct NpyHeader {
   int64_t count = 1;           ///< elements
   bool is_text() const { return kind == 'S' || kind == 'U'; }
   uint64_t bytes() const { return static_cast<uint64_t>(count) * width; }
-  /// The number stored in these `width` bytes.
+  /// The number stored in these `width` bytes; NaN for text.
   double number(const char* element) const;
 };
 
@@ -40,7 +40,7 @@ class NpyArray {
   bool is_text() const { return header_.is_text(); }
   const std::string& where() const { return where_; }
 
-  /// Element i in C order, whatever the file's order is; not for text.
+  /// Element i in C order, whatever the file's order is; NaN for text.
   double operator[](int64_t i) const;
   /// All numbers in C order. InputError if one is NaN or infinite.
   std::vector<double> finite() const;

@@ -74,6 +74,44 @@ struct ImportArguments {
   ImportOptions options;
 };
 
+Json reports_json(const std::vector<ImportReport>& reports) {
+  Json out = Json::array();
+  for (const ImportReport& report : reports) {
+    Json facts = Json::object();
+    for (const auto& [name, value] : report.facts) facts[name] = value;
+    out.push_back({{"file", report.file}, {"facts", facts}, {"remarks", report.remarks}});
+  }
+  return out;
+}
+
+/// A paragraph for each of the first files.
+std::string reports_text(const std::vector<ImportReport>& reports) {
+  constexpr size_t kMost = 10, kColumn = 12;
+  std::string out;
+  for (size_t i = 0; i < reports.size() && i < kMost; ++i) {
+    out += reports[i].file + "\n";
+    for (const auto& [name, value] : reports[i].facts)
+      out += "  " + name + std::string(name.size() < kColumn ? kColumn - name.size() : 1, ' ') +
+             value + "\n";
+    for (const std::string& remark : reports[i].remarks) out += "  note: " + remark + "\n";
+  }
+  if (reports.size() > kMost)
+    out += "and " + std::to_string(reports.size() - kMost) + " more files (--json lists all)\n";
+  return out;
+}
+
+std::string counts_text(const ImportSummary& done) {
+  std::string out;
+  const auto add = [&](size_t n, const char* what) {
+    if (n > 0) out += (out.empty() ? "" : ", ") + std::to_string(n) + " " + what;
+  };
+  add(done.bodies, "bodies");
+  add(done.motions, "motions");
+  add(done.sequences, "scan sequences");
+  add(done.frames, "frames");
+  return out;
+}
+
 int run_import(ImportArguments arguments, const Common& common) {
   static const std::map<std::string, UpAxis> axes = {
       {"auto", UpAxis::automatic}, {"y", UpAxis::y}, {"z", UpAxis::z}};
@@ -84,17 +122,22 @@ int run_import(ImportArguments arguments, const Common& common) {
   if (arguments.options.bvh.scale < 0 || arguments.options.bvh.fps < 0)
     throw InputError("", "--scale and --fps cannot be negative",
                      "leave them out to have them found");
+  arguments.options.max_memory = common.max_memory;
   const ImportSummary done = import_data(arguments.source, arguments.out, arguments.options);
   if (common.json) {
     print_json({{"out", arguments.out},
                 {"bodies", done.bodies},
                 {"motions", done.motions},
                 {"frames", done.frames},
+                {"sequences", done.sequences},
+                {"shapes", done.shapes},
+                {"reports", reports_json(done.reports)},
                 {"skipped", done.skipped}});
     return 0;
   }
-  print("wrote " + arguments.out + ": " + std::to_string(done.bodies) + " bodies, " +
-        std::to_string(done.motions) + " motions, " + std::to_string(done.frames) + " frames\n");
+  print("wrote " + arguments.out + ": " + counts_text(done) + "\n" + reports_text(done.reports));
+  if (done.shapes > 0)
+    print("left out " + std::to_string(done.shapes) + " files that hold a shape and no motion\n");
   for (const std::string& file : done.skipped) print("skipped " + file + "\n");
   return 0;
 }
@@ -102,20 +145,29 @@ int run_import(ImportArguments arguments, const Common& common) {
 void add_import(Program& program, CLI::App& group) {
   const auto given = std::make_shared<ImportArguments>();
   CLI::App& app =
-      program.add(group, "import", "turn MakeHuman bodies, CMU clips or BVH files into a data file",
+      program.add(group, "import", "turn bodies, motions or scans into a data file",
                   "restage data import DATA_FOLDER --out real.h5\n"
-                  "restage data import walk.bvh --subject ann --license CC0-1.0 --out walk.h5",
+                  "restage data import walk.bvh --subject ann --license CC0-1.0 --out walk.h5\n"
+                  "restage data import AMASS/ --body-model smplh/ --out amass.h5\n"
+                  "restage data import SMPLX_NEUTRAL.npz --betas zeros people.npz --out bodies.h5\n"
+                  "restage data import scans/ --fps 60 --scale 0.001 --out scans.h5",
                   [given, &program] { return run_import(*given, program.common()); });
-  app.add_option("SOURCE", given->source, "data folder, BVH file (.bvh, .bvh.xz) or folder of them")
+  app.add_option("SOURCE", given->source,
+                 "data folder; BVH files; AMASS motions or a body model (.npz); scans (PLY, OBJ, "
+                 "NPY, NPZ); or a folder of them")
       ->required();
   app.add_option("--out", given->out, "file to write")->required();
   app.add_option("--garment", given->options.garment, "dress the bodies (a file of body/clothes)");
-  app.add_option("--license", given->options.license, "licence of the BVH files");
-  app.add_option("--subject", given->options.bvh.subject, "who moves in the BVH files");
-  app.add_option("--split", given->options.bvh.split, "train, validation or test, for BVH files");
-  app.add_option("--scale", given->options.bvh.scale, "metres per unit of the BVH files");
-  app.add_option("--fps", given->options.bvh.fps, "true frame rate of the BVH files");
-  app.add_option("--up", given->up, "up axis of the BVH files: auto, y or z");
+  app.add_option("--license", given->options.license, "licence of the files");
+  app.add_option("--subject", given->options.bvh.subject, "who moves in them");
+  app.add_option("--split", given->options.bvh.split, "train, validation or test");
+  app.add_option("--scale", given->options.bvh.scale, "metres per unit of the files");
+  app.add_option("--fps", given->options.bvh.fps, "true frame rate of the files");
+  app.add_option("--up", given->up, "up axis of the files: auto, y or z");
+  app.add_option("--body-model", given->options.body_model,
+                 "SMPL, SMPL-H or SMPL-X model (.npz), or a folder of them: AMASS needs it");
+  app.add_option("--betas", given->options.betas,
+                 "people of a body model: NPZ or NPY files, or zeros for the mean person");
   app.add_option("--rest-frame", given->options.bvh.rest_frame, "T-pose frame of the BVH files");
 }
 

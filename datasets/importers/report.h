@@ -1,0 +1,17 @@
+// What an importer found out about a file and did to it: what commands print, `--json` gives whole
+// and tests read. Importers themselves print nothing.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace restage {
+
+struct ImportReport {
+  std::string file;
+  std::vector<std::pair<std::string, std::string>> facts;  ///< e.g. {"frame rate", "120 -> 30"}
+  std::vector<std::string> remarks;                        ///< what the user should know
+};
+
+}  // namespace restage
