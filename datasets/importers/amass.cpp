@@ -180,13 +180,15 @@ BodyModels::BodyModels(const std::string& path, uint64_t max_memory)
   const std::vector<std::string> files =
       folder ? files_below(path, is_npz_name) : std::vector<std::string>{path};
   for (const std::string& file : files) {
-    const Npz archive(file, max_memory);
-    if (!is_smpl_model(archive)) {
-      if (folder) continue;  // a folder may hold other things too
-      throw InputError(file, "is no body model (it has " + list_of(archive.names()) + ")",
-                       "give a SMPL, SMPL-H or SMPL-X model as published (.npz)");
+    try {
+      const Npz archive(file, max_memory);
+      if (!is_smpl_model(archive))
+        throw InputError(file, "is no body model (it has " + list_of(archive.names()) + ")",
+                         "give a SMPL, SMPL-H or SMPL-X model as published (.npz)");
+      entries_.push_back({file, gender_of(file), smpl_family(archive)});
+    } catch (const InputError&) {
+      if (!folder) throw;  // a folder may hold other things too, such as MANO's hands
     }
-    entries_.push_back({file, gender_of(file), smpl_family(archive)});
   }
   if (entries_.empty())
     throw InputError(path, "holds no SMPL, SMPL-H or SMPL-X model (.npz)",
@@ -199,7 +201,7 @@ const SmplModel& BodyModels::find(SmplFamily family, const std::string& gender,
   if (usable.empty() && family == SmplFamily::smplh) {
     usable = of_family(SmplFamily::smpl);
     if (!usable.empty())
-      remarks.push_back("a SMPL model stands in for SMPL-H; shapes are the same");
+      remarks.push_back("a SMPL model stands in for SMPL-H: their shapes are taken for the same");
   }
   if (usable.empty())
     throw InputError(clip,

@@ -19,7 +19,7 @@ namespace restage {
 /// SMPLX_MALE.npz).
 class BodyModels {
  public:
-  /// InputError: nothing there, no model in the folder.
+  /// What is no such model in a folder is left out. InputError: nothing there, no model in it.
   explicit BodyModels(const std::string& path, uint64_t max_memory = kMaxMemory);
 
   /// The model for a clip, loaded once; a single file stands for every gender. SMPL stands in for

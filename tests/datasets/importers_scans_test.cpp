@@ -123,6 +123,7 @@ TEST(ImportersScans, TreesOfFolders) {
   // And a sequence in one file.
   write_bytes(folder("tree/more") + "walk.npy", numbered(2));
   folder("tree/empty");
+  std::filesystem::create_directory_symlink(dir / "tree", dir / "tree/empty/round_and_round");
 
   const ImportSummary summary = import_data(dir / "tree", dir / "o.h5");
   EXPECT_EQ(summary.sequences, 4u);

@@ -22,11 +22,10 @@ struct TinySmpl {
 
   std::vector<int> parents() const {
     std::vector<int> out(kParents.begin(), kParents.end());
-    if (family == SmplFamily::smpl)
-      return {[&] {
-        out.push_back(20), out.push_back(21);
-        return out;
-      }()};
+    if (family == SmplFamily::smpl) {  // two hands
+      out.insert(out.end(), {20, 21});
+      return out;
+    }
     if (family == SmplFamily::smplx) out.insert(out.end(), {15, 15, 15});  // jaw and eyes
     for (const int wrist : {20, 21})
       for (int finger = 0; finger < 5; ++finger)
