@@ -6,23 +6,16 @@
 #include "autograd/base/error.h"
 #include "autograd/base/log.h"
 #include "autograd/base/parallel.h"
-#include "datasets/importers/amc.h"
-#include "datasets/importers/bvh.h"
 #include "datasets/importers/cmu.h"
+#include "datasets/importers/import_detail.h"
 #include "datasets/importers/makehuman.h"
-#include "datasets/readers/word_lines.h"
-#include "datasets/schema.h"
+#include "datasets/readers/array_frames.h"
+#include "datasets/readers/mesh_io.h"
 
 namespace restage {
 namespace {
 
 namespace fs = std::filesystem;
-
-bool is_a(const fs::path& path, const std::string& ending) {
-  const std::string name = lower_case(path.filename().string());
-  return name.ends_with(ending) || name.ends_with(ending + ".xz");
-}
-bool is_recording(const fs::path& path) { return is_a(path, ".bvh") || is_a(path, ".amc"); }
 
 void add_bodies(const std::string& folder, const std::string& garment, DatasetWriter& writer,
                 ImportSummary& summary) {
@@ -42,14 +35,50 @@ void add_bodies(const std::string& folder, const std::string& garment, DatasetWr
   summary.bodies += recipes.size();
 }
 
-void add_motion(const Motion& motion, DatasetWriter& writer, ImportSummary& summary) {
-  writer.add(motion);
-  ++summary.motions;
-  summary.frames += motion.frames();
-}
-
 ImportSummary import_data_folder(const std::string& folder, bool bodies, bool clips,
                                  const std::string& out, const ImportOptions& options) {
+  ImportSummary summary;
+  DatasetWriter writer(out, data_folder_info(bodies, clips));
+  if (bodies) add_bodies(folder + "/body", options.garment, writer, summary);
+  if (clips)
+    for (const Motion& motion : import_cmu(folder + "/cmu/clips30.h5"))
+      add_motion(motion, writer, summary);
+  writer.commit();
+  return summary;
+}
+
+ImportSummary import_folder(const std::string& source, const std::string& out,
+                            const ImportOptions& options) {
+  std::error_code ignored;
+  const bool bodies = fs::exists(source + "/body/makehuman.h5", ignored);
+  const bool clips = fs::exists(source + "/cmu/clips30.h5", ignored);
+  if (bodies || clips) return import_data_folder(source, bodies, clips, out, options);
+  std::vector<std::string> recordings;
+  for (const fs::directory_entry& entry : fs::directory_iterator(source, ignored))
+    if (entry.is_regular_file(ignored) && is_recording_name(entry.path().string()))
+      recordings.push_back(entry.path().string());
+  std::sort(recordings.begin(), recordings.end());
+  if (!recordings.empty()) return import_recordings(recordings, source, out, options);
+  return import_array_folder(source, out, options);
+}
+
+ImportSummary import_file(const std::string& source, const std::string& out,
+                          const ImportOptions& options) {
+  if (is_array_name(source) || is_mesh_name(source)) return import_array_file(source, out, options);
+  if (is_recording_name(source)) return import_recordings({source}, source, out, options);
+  if (source.ends_with(".pkl"))
+    throw InputError(source, "is a pickle, which can run code and is never read",
+                     "convert it to plain arrays (docs/data.md shows how)");
+  if (source.ends_with(".asf") || source.ends_with(".asf.xz"))
+    throw InputError(source, "is a skeleton without a motion",
+                     "give an .amc file and this one with --asf");
+  throw InputError(source, "is of no kind that can be imported, by its name",
+                   "give .bvh, .amc, .glb, .npz, .npy, .ply or .obj files, or a folder of them");
+}
+
+}  // namespace
+
+FileInfo data_folder_info(bool bodies, bool clips) {
   FileInfo info;
   info.license = info.provenance = "";
   if (bodies) {
@@ -63,73 +92,54 @@ ImportSummary import_data_folder(const std::string& folder, bool bodies, bool cl
                     "resold as data";
     info.provenance += std::string(bodies ? "; " : "") + "motions: " + kCmuAcknowledgement;
   }
-  ImportSummary summary;
-  DatasetWriter writer(out, info);
-  if (bodies) add_bodies(folder + "/body", options.garment, writer, summary);
-  if (clips)
-    for (const Motion& motion : import_cmu(folder + "/cmu/clips30.h5"))
-      add_motion(motion, writer, summary);
-  writer.commit();
-  return summary;
+  return info;
 }
 
-MotionClip read_recording(const std::string& file, const ImportOptions& options) {
-  return is_a(file, ".amc") ? read_amc(file, options.asf, options.motion)
-                            : read_bvh(file, options.motion);
+fs::path absolute_path(const fs::path& path) {
+  const fs::path out = fs::absolute(path).lexically_normal();
+  return out.has_filename() ? out : out.parent_path();
 }
 
-ImportSummary import_recordings(const std::vector<std::string>& files, const std::string& source,
-                                const std::string& out, const ImportOptions& options) {
-  asked_profile(options.motion);  // a mistake there is not the files'
+FileInfo file_info(const std::string& source, const ImportOptions& options) {
   FileInfo info;
   info.license = options.license;
-  info.provenance = "imported from " + fs::path(source).filename().string();
-  ImportSummary summary;
-  DatasetWriter writer(out, info);
+  info.provenance = "imported from " + absolute_path(source).filename().string();
+  return info;
+}
+
+void add_motion(const Motion& motion, DatasetWriter& writer, ImportSummary& summary) {
+  writer.add(motion);
+  ++summary.motions;
+  summary.frames += motion.frames();
+}
+
+void add_each(const std::vector<std::string>& files, ImportSummary& summary,
+              const std::function<void(const std::string&)>& add) {
   for (const std::string& file : files) {
     try {
-      MotionClip clip = read_recording(file, options);
-      add_motion(clip.motion, writer, summary);
-      summary.reports.push_back(std::move(clip.report));
+      add(file);
     } catch (const InputError& error) {
       if (files.size() == 1) throw;
       log_warning("skipped " + std::string(error.what()));
       summary.skipped.emplace_back(error.what());
     }
   }
-  if (summary.motions == 0)
-    throw InputError(source,
-                     "none of its " + std::to_string(files.size()) + " recordings could be used",
-                     "import one alone to see why");
-  writer.commit();
-  return summary;
 }
-
-}  // namespace
 
 ImportSummary import_data(const std::string& source, const std::string& out,
                           const ImportOptions& options) {
   std::error_code ignored;
-  if (!fs::is_directory(source, ignored)) {
-    if (!fs::exists(source, ignored))
-      throw InputError(source, "is not there", "give a folder, a BVH file or an AMC file");
-    if (is_a(source, ".asf"))
-      throw InputError(source, "is a skeleton without a motion",
-                       "give an .amc file and this one with --asf");
-    return import_recordings({source}, source, out, options);
-  }
-  const bool bodies = fs::exists(source + "/body/makehuman.h5", ignored);
-  const bool clips = fs::exists(source + "/cmu/clips30.h5", ignored);
-  if (bodies || clips) return import_data_folder(source, bodies, clips, out, options);
-  std::vector<std::string> files;
-  for (const fs::directory_entry& entry : fs::directory_iterator(source, ignored))
-    if (entry.is_regular_file(ignored) && is_recording(entry.path()))
-      files.push_back(entry.path().string());
-  if (files.empty())
-    throw InputError(source, "holds neither body/makehuman.h5, cmu/clips30.h5 nor BVH or AMC files",
-                     "give a data folder or a folder of .bvh or .amc files");
-  std::sort(files.begin(), files.end());
-  return import_recordings(files, source, out, options);
+  if (!fs::exists(source, ignored))
+    throw InputError(source, "is not there", "give a file or a folder");
+  const auto refuse = [&](bool given, const char* option, const char* whose) {
+    if (given)
+      throw InputError(source, std::string("has nothing to do with ") + option + ", which is for " + whose,
+                       std::string("leave ") + option + " out");
+  };
+  const bool folder = fs::is_directory(source, ignored);
+  refuse(!options.betas.empty() && (folder || !is_npz_name(source)), "--betas", "body models");
+  refuse(!options.clip.empty() && !folder && !is_recording_name(source), "--clip", "glTF characters");
+  return folder ? import_folder(source, out, options) : import_file(source, out, options);
 }
 
 }  // namespace restage

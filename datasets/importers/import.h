@@ -6,27 +6,46 @@
 
 #include "datasets/importers/motion_clip.h"
 #include "datasets/importers/report.h"
+#include "datasets/readers/byte_stream.h"
+#include "datasets/schema.h"
 
 namespace restage {
 
 struct ImportOptions {
-  MotionOptions motion;  ///< for BVH and AMC files
-  std::string asf;       ///< skeleton of AMC files; empty: the one beside each
-  std::string garment;   ///< dress the bodies in this garment of body/clothes; empty: skin
-  std::string license = "unknown";  ///< of BVH and AMC files; a data folder's is known
+  /// Of BVH and AMC files; subject, split, action, scale and up also hold for all other foreign
+  /// files, fps for AMASS motions and scans.
+  MotionOptions motion;
+  std::string asf;      ///< skeleton of AMC files; empty: the one beside each
+  std::string clip;     ///< of glTF files: this animation only; empty: all
+  std::string garment;  ///< dress the bodies in this garment of body/clothes; empty: skin
+  std::string license = "unknown";  ///< of all but a data folder, whose licence is known
+  std::string body_model;           ///< a SMPL, SMPL-H or SMPL-X model or a folder; AMASS needs it
+  /// For a body model as source: files of betas (read_betas), or "zeros" for the mean person.
+  std::vector<std::string> betas;
+  uint64_t max_memory = kMaxMemory;  ///< what unpacking one array may take
 };
 
 struct ImportSummary {
-  size_t bodies = 0, motions = 0, frames = 0;
+  size_t bodies = 0, motions = 0, frames = 0;  ///< frames of motions, or of scans
+  size_t sequences = 0;                        ///< of scans
+  size_t shapes = 0;                  ///< AMASS files left out because they hold a shape only
+  std::vector<ImportReport> reports;  ///< one per file or sequence that was used
   std::vector<std::string> skipped;   ///< files of a folder that could not be used, and why
-  std::vector<ImportReport> reports;  ///< of each recording, in the order of their names
 };
+
+/// Licence, origin and required acknowledgement of what comes out of a data folder.
+FileInfo data_folder_info(bool bodies, bool clips);
 
 /// Writes `out` (whole or not at all) from `source`, which is
 /// - a folder laid out like the project's data folder: all bodies of body/makehuman.h5 by
 ///   body/bodies.csv and all clips of cmu/clips30.h5 (one of the two may be absent);
 /// - a recording (.bvh, or .amc with its .asf; any may end in .xz): one motion;
-/// - a folder of them, in the order of their names; unusable ones are skipped with a warning.
+/// - a rigged character (.glb, .gltf, .vrm): its body and its animations (gltf_character.h);
+/// - a folder of recordings and characters, in the order of their names;
+/// - an AMASS motion (.npz) or a tree of folders of them, subjects named by folder (amass.h);
+/// - a body model (.npz), giving bodies (smpl.h);
+/// - scans: an array or mesh file, or a tree of folders of them (scans.h).
+/// Unusable files of a folder are skipped with a warning, except frames within a scan sequence.
 /// InputError: no such source, nothing usable in it, damaged data. WorkError: disk full.
 ImportSummary import_data(const std::string& source, const std::string& out,
                           const ImportOptions& options = {});

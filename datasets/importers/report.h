@@ -1,4 +1,5 @@
-// What an importer found in a file and what it did, for people and for programs.
+// What an importer found out about a file and did to it: what commands print, `--json` gives whole
+// and tests read. Importers themselves print nothing.
 #pragma once
 
 #include <string>
@@ -9,8 +10,8 @@ namespace restage {
 
 struct ImportReport {
   std::string file;
-  std::vector<std::pair<std::string, std::string>> facts;  ///< ("up", "z, by the rest pose")
-  std::vector<std::string> remarks;                        ///< what somebody should look at
+  std::vector<std::pair<std::string, std::string>> facts;  ///< e.g. {"frame rate", "120 -> 30"}
+  std::vector<std::string> remarks;                        ///< what the user should know
 };
 
 }  // namespace restage

@@ -9,7 +9,6 @@
 namespace restage {
 namespace {
 
-constexpr const char* kAxisNames[] = {"auto", "x", "-x", "y", "-y", "z", "-z"};
 constexpr double kDegrees = 180.0 / M_PI;
 constexpr double kShownAngle = 5;     // limbs further off are listed
 constexpr double kMostTrunk = 45;     // more off the vertical is no standing pose
@@ -30,26 +29,6 @@ const std::vector<Limb>& limbs() {
 
 double angle_between(const Vec3& a, const Vec3& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b)) * kDegrees;
-}
-
-Vec3 vector_of(Axis axis) {
-  const int i = static_cast<int>(axis) - 1;
-  return (i % 2 ? -1.0 : 1.0) * Vec3::Unit(i / 2);
-}
-/// The axis that a direction is nearest to.
-Axis axis_near(const Vec3& v) {
-  int i = 0;
-  v.cwiseAbs().maxCoeff(&i);
-  return static_cast<Axis>(1 + 2 * i + (v[i] < 0 ? 1 : 0));
-}
-
-/// The quarter or half turn that takes the file's up to y.
-Mat3 upright(Axis up) {
-  if (up == Axis::minus_y) return Vec3(1, -1, -1).asDiagonal();
-  const Vec3 from = vector_of(up), to = Vec3::UnitY(), axis = from.cross(to);
-  Mat3 out = from * to.transpose();  // exact, unlike sines and cosines of 90 degrees
-  out = to * from.transpose() - out + axis * axis.transpose();
-  return up == Axis::y ? Mat3(Mat3::Identity()) : out;
 }
 
 Vec3 standing(const Joints& joints) { return joints[15] - 0.5 * (joints[7] + joints[8]); }
@@ -173,14 +152,6 @@ RestPose built_pose(const SourceMotion& motion, const JointMap& map, const Joint
 
 }  // namespace
 
-Axis parse_axis(const std::string& text, const std::string& option) {
-  for (size_t i = 0; i < std::size(kAxisNames); ++i)
-    if (text == kAxisNames[i]) return static_cast<Axis>(i);
-  throw InputError("", option + " '" + text.substr(0, 40) + "' is no axis",
-                   "give auto, x, -x, y, -y, z or -z");
-}
-
-std::string to_string(Axis axis) { return kAxisNames[static_cast<size_t>(axis)]; }
 
 RestPose find_rest_pose(const SourceMotion& motion, const JointMap& map, const RestOptions& options,
                         const std::string& path, ImportReport& report) {

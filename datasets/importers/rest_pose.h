@@ -5,16 +5,11 @@
 #include <string>
 #include <vector>
 
+#include "datasets/importers/axis.h"
 #include "datasets/importers/report.h"
 #include "datasets/importers/source_motion.h"
 
 namespace restage {
-
-/// A direction along one of the file's axes.
-enum class Axis { automatic, x, minus_x, y, minus_y, z, minus_z };
-/// "auto", "x", "-x" ...; InputError naming `option` for anything else.
-Axis parse_axis(const std::string& text, const std::string& option);
-std::string to_string(Axis axis);
 
 struct RestOptions {
   /// automatic: where the head is from the ankles in the rest pose; if that pose does not stand,

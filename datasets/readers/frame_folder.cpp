@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "autograd/base/error.h"
+#include "datasets/readers/array_frames.h"
 #include "datasets/readers/mesh_io.h"
 #include "datasets/schema.h"
 #include "datasets/schema_detail.h"
@@ -22,21 +23,26 @@ std::string take_digits(const std::string& text, size_t& at) {
   return text.substr(begin, at - begin);
 }
 
-/// PLY/OBJ files, one frame each.
+/// PLY, OBJ or array files, one frame each.
 class FileFrames : public FrameSource {
  public:
-  explicit FileFrames(std::vector<std::string> files) : files_(std::move(files)) {}
+  FileFrames(std::vector<std::string> files, uint64_t max_memory)
+      : files_(std::move(files)), max_memory_(max_memory) {}
   std::optional<Frame> next() override {
     if (at_ == files_.size()) return std::nullopt;
-    Mesh mesh = read_mesh(files_[at_]);
-    return Frame{files_[at_++], std::move(mesh.vertices), std::move(mesh.faces), 0};
+    const std::string& file = files_[at_++];
+    if (is_array_name(file)) return read_array_frame(file, max_memory_);
+    Mesh mesh = read_mesh(file);
+    return Frame{file, std::move(mesh.vertices), std::move(mesh.faces), 0};
   }
+  void skip() override { at_ = std::min(at_ + 1, files_.size()); }
   void rewind() override { at_ = 0; }
   int64_t frames() const override { return static_cast<int64_t>(files_.size()); }
   double fps() const override { return kFps; }
 
  private:
   std::vector<std::string> files_;
+  uint64_t max_memory_;
   size_t at_ = 0;
 };
 
@@ -67,6 +73,7 @@ class Hdf5Frames : public FrameSource {
     ++at_;
     return frame;
   }
+  void skip() override { at_ = std::min(at_ + 1, frames_); }
   void rewind() override { at_ = 0; }
   int64_t frames() const override { return frames_; }
   double fps() const override { return fps_; }
@@ -132,22 +139,6 @@ std::unique_ptr<FrameSource> open_hdf5(const std::string& path) {
   return std::make_unique<VertexFrames>(std::move(file), std::move(set), frames);
 }
 
-std::vector<std::string> frame_files(const std::string& folder) {
-  std::vector<std::string> files;
-  std::error_code error;
-  for (std::filesystem::directory_iterator item(folder, error), end; !error && item != end;
-       item.increment(error)) {
-    const std::string name = item->path().filename().string();
-    if (name[0] != '.' && is_mesh_name(name) && !item->is_directory())
-      files.push_back(item->path().string());
-  }
-  if (error) throw InputError(folder, "cannot be read (" + error.message() + ")", "check the path");
-  if (files.empty())
-    throw InputError(folder, "holds no PLY or OBJ files", "give a folder of numbered frames");
-  std::sort(files.begin(), files.end(), natural_less);
-  return files;
-}
-
 bool is_hdf5_name(const std::string& path) {
   const std::string extension = std::filesystem::path(path).extension().string();
   return extension == ".h5" || extension == ".hdf5" || extension == ".H5";
@@ -171,15 +162,41 @@ bool natural_less(const std::string& a, const std::string& b) {
   return a < b;  // equal but for leading zeros: any fixed order
 }
 
-std::unique_ptr<FrameSource> open_frames(const std::string& path) {
+std::vector<std::string> frame_files(const std::string& folder) {
+  std::vector<std::string> meshes, arrays;
   std::error_code error;
-  if (std::filesystem::is_directory(path, error))
-    return std::make_unique<FileFrames>(frame_files(path));
+  for (std::filesystem::directory_iterator item(folder, error), end; !error && item != end;
+       item.increment(error)) {
+    const std::string name = item->path().filename().string();
+    if (name[0] == '.' || item->is_directory()) continue;
+    if (is_mesh_name(name)) meshes.push_back(item->path().string());
+    if (is_array_name(name)) arrays.push_back(item->path().string());
+  }
+  if (error) throw InputError(folder, "cannot be read (" + error.message() + ")", "check the path");
+  std::vector<std::string>& files = meshes.empty() ? arrays : meshes;
+  std::sort(files.begin(), files.end(), natural_less);
+  return files;
+}
+
+std::unique_ptr<FrameSource> open_frame_files(std::vector<std::string> files, uint64_t max_memory) {
+  return std::make_unique<FileFrames>(std::move(files), max_memory);
+}
+
+std::unique_ptr<FrameSource> open_frames(const std::string& path, uint64_t max_memory) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) {
+    std::vector<std::string> files = frame_files(path);
+    if (files.empty())
+      throw InputError(path, "holds no PLY or OBJ files and no arrays (NPY, NPZ)",
+                       "give a folder of numbered frames");
+    return open_frame_files(std::move(files), max_memory);
+  }
   if (is_hdf5_name(path)) return open_hdf5(path);
   if (!std::filesystem::exists(path, error))
     throw InputError(path, "does not exist",
-                     "give a folder of frames, a PLY or OBJ file, or an HDF5 file");
-  return std::make_unique<FileFrames>(std::vector<std::string>{path});
+                     "give a folder of frames, a PLY, OBJ, NPY, NPZ or HDF5 file");
+  if (is_array_name(path)) return open_array_frames(path, max_memory);
+  return open_frame_files({path}, max_memory);
 }
 
 }  // namespace restage

@@ -6,12 +6,13 @@
 #include <string>
 #include <vector>
 
+#include "datasets/readers/byte_stream.h"
 #include "nn/geometry/body.h"
 
 namespace restage {
 
 struct Frame {
-  std::string source;           ///< file, or "file:frame number" (from 0) for HDF5
+  std::string source;           ///< file, or "file:frame number" (from 0) for HDF5 and arrays
   Points points;                ///< metres; the number may change from frame to frame
   std::vector<Triangle> faces;  ///< empty for a cloud
   int64_t sequence = 0;         ///< which sequence of an HDF5 file it belongs to
@@ -22,15 +23,24 @@ class FrameSource {
   virtual ~FrameSource() = default;
   /// The next frame, nothing at the end. InputError for a bad frame (also: no points, NaN).
   virtual std::optional<Frame> next() = 0;
+  virtual void skip() { next(); }      ///< leaves one frame out, reading as little as it can
   virtual void rewind() = 0;           ///< next() gives the first frame again
   virtual int64_t frames() const = 0;  ///< how many there are in all
   virtual double fps() const = 0;      ///< the file's rate; kFps where nothing says one
 };
 
 /// A folder of numbered PLY/OBJ files (natural numeric order: f2 before f10; other files are left
-/// out), one PLY/OBJ file, or an HDF5 file of scans or predictions (their vertices). InputError if
-/// there is nothing to read.
-std::unique_ptr<FrameSource> open_frames(const std::string& path);
+/// out), one PLY/OBJ file, an HDF5 file of scans or predictions (their vertices), or arrays of
+/// points, NPY or NPZ (array_frames.h): one of shape [N, 3] or [F, N, 3], or, without PLY and OBJ
+/// files beside them, a folder of [N, 3]. InputError if there is nothing to read. `max_memory`
+/// bounds what unpacking an array may take.
+std::unique_ptr<FrameSource> open_frames(const std::string& path, uint64_t max_memory = kMaxMemory);
+
+/// The files of a folder that are its frames, in order; empty if it has none.
+std::vector<std::string> frame_files(const std::string& folder);
+/// These files (PLY, OBJ, arrays [N, 3]) as the frames of one sequence.
+std::unique_ptr<FrameSource> open_frame_files(std::vector<std::string> files,
+                                              uint64_t max_memory = kMaxMemory);
 
 /// f2 < f10: runs of digits compare as numbers, everything else by character.
 bool natural_less(const std::string& a, const std::string& b);

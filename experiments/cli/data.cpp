@@ -1,12 +1,10 @@
 // restage data: making and looking at data files (HDF5, datasets/README.md).
-#include <map>
 #include <memory>
 
 #include "autograd/base/error.h"
 #include "autograd/base/log.h"
 #include "datasets/builtin/bodies.h"
 #include "datasets/builtin/motions.h"
-#include "datasets/importers/import.h"
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
@@ -67,97 +65,6 @@ void add_build(Program& program, CLI::App& group) {
       ->expected(3);
 }
 
-// ---- import ------------------------------------------------------------------------------------
-
-struct ImportArguments {
-  std::string source, out, up = "auto", facing = "auto";
-  ImportOptions options;
-};
-
-Json as_json(const ImportReport& report) {
-  Json facts = Json::object();
-  for (const auto& [name, value] : report.facts) facts[name] = value;
-  return {{"file", report.file}, {"facts", facts}, {"remarks", report.remarks}};
-}
-
-/// All of a report: one fact a line.
-std::string block(const ImportReport& report) {
-  std::string text = report.file + "\n";
-  for (const auto& [name, value] : report.facts)
-    text += "  " + name + std::string(name.size() < 14 ? 14 - name.size() : 1, ' ') + value + "\n";
-  for (const std::string& remark : report.remarks) text += "  note: " + remark + "\n";
-  return text;
-}
-
-/// The first words of what matters most, in one line; remarks in lines of their own.
-std::string summary(const ImportReport& report) {
-  std::string text = report.file + ":";
-  for (const auto& [name, value] : report.facts) {
-    if (name != "names" && name != "units" && name != "up" && name != "rate" && name != "rest pose")
-      continue;
-    std::string words = value.substr(0, value.find_first_of(",:;("));
-    words.erase(words.find_last_not_of(' ') + 1);
-    text += (text.back() == ':' ? " " : "; ") + words + (name == "up" ? " up" : "");
-  }
-  text += "\n";
-  for (const std::string& remark : report.remarks) text += "  note: " + remark + "\n";
-  return text;
-}
-
-int run_import(ImportArguments arguments, const Common& common) {
-  MotionOptions& motion = arguments.options.motion;
-  motion.rest.up = parse_axis(arguments.up, "--up");
-  motion.rest.facing = parse_axis(arguments.facing, "--facing");
-  if (!(motion.scale >= 0 && motion.fps >= 0) || motion.scale > 1e6 || motion.fps > 1e4)
-    throw InputError("", "--scale and --fps must be sensible positive numbers",
-                     "leave them out to have them found");
-  const ImportSummary done = import_data(arguments.source, arguments.out, arguments.options);
-  if (common.json) {
-    Json reports = Json::array();
-    for (const ImportReport& report : done.reports) reports.push_back(as_json(report));
-    print_json({{"out", arguments.out},
-                {"bodies", done.bodies},
-                {"motions", done.motions},
-                {"frames", done.frames},
-                {"skipped", done.skipped},
-                {"reports", reports}});
-    return 0;
-  }
-  for (const ImportReport& report : done.reports)
-    print(done.reports.size() == 1 || common.verbose ? block(report) : summary(report));
-  print("wrote " + arguments.out + ": " + std::to_string(done.bodies) + " bodies, " +
-        std::to_string(done.motions) + " motions, " + std::to_string(done.frames) + " frames\n");
-  for (const std::string& file : done.skipped) print("skipped " + file + "\n");
-  return 0;
-}
-
-void add_import(Program& program, CLI::App& group) {
-  const auto given = std::make_shared<ImportArguments>();
-  CLI::App& app = program.add(
-      group, "import", "turn recordings, MakeHuman bodies or CMU clips into a data file",
-      "restage data import DATA_FOLDER --out real.h5\n"
-      "restage data import walk.bvh --subject ann --license CC0-1.0 --out walk.h5\n"
-      "restage data import 07_01.amc --asf 07.asf --out walk.h5\n"
-      "restage data import suit.bvh --profile suit.yaml --up z --fps 60 --out suit.h5",
-      [given, &program] { return run_import(*given, program.common()); });
-  MotionOptions& motion = given->options.motion;
-  app.add_option("SOURCE", given->source,
-                 "data folder; .bvh or .amc file (also packed: .xz) or folder of them")
-      ->required();
-  app.add_option("--out", given->out, "file to write")->required();
-  app.add_option("--garment", given->options.garment, "dress the bodies (a file of body/clothes)");
-  app.add_option("--license", given->options.license, "licence of the recordings");
-  app.add_option("--subject", motion.subject, "who moves (default: by the file's name)");
-  app.add_option("--split", motion.split, "train, validation or test");
-  app.add_option("--profile", motion.profile, "bone names: a known family or a .yaml file");
-  app.add_option("--asf", given->options.asf, "skeleton of .amc files (default: the one beside)");
-  app.add_option("--scale", motion.scale, "metres per unit of the file");
-  app.add_option("--fps", motion.fps, "true frame rate");
-  app.add_option("--up", given->up, "up axis of the file: auto, x, y, z, -x, -y or -z");
-  app.add_option("--facing", given->facing, "axis that the rest pose faces: auto, z, -y ...");
-  app.add_option("--rest-frame", motion.rest.frame, "a frame that is a T-pose");
-}
-
 // ---- inspect and verify ------------------------------------------------------------------------
 
 int run_inspect(const std::string& file, const Common& common) {
@@ -206,7 +113,7 @@ void add_file_command(Program& program, CLI::App& group, const std::string& name
 void add_data(Program& program) {
   CLI::App& group = program.add_group("data", "make, import and check data files");
   add_build(program, group);
-  add_import(program, group);
+  add_data_import(program, group);
   add_data_perform(program, group);
   add_data_merge(program, group);
   add_file_command(program, group, "inspect", "say what a file holds", run_inspect);

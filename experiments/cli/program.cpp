@@ -1,5 +1,8 @@
 #include "experiments/cli/program.h"
 
+#include <cctype>
+#include <charconv>
+#include <map>
 #include <new>
 #include <utility>
 
@@ -19,6 +22,24 @@ namespace restage::cli {
 namespace {
 
 constexpr int kMaxThreads = 1024;
+
+/// "512MB", "4GB", "2GiB" or plain bytes.
+uint64_t parse_memory(const std::string& text) {
+  static const std::map<std::string, double> units = {
+      {"", 1.0},   {"b", 1.0},      {"kb", 1e3},        {"mb", 1e6},
+      {"gb", 1e9}, {"kib", 1024.0}, {"mib", 1048576.0}, {"gib", 1073741824.0},
+      {"k", 1e3},  {"m", 1e6},      {"g", 1e9}};
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  std::string unit(end, text.data() + text.size());
+  for (char& c : unit) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const auto factor = units.find(unit);
+  const double bytes = factor == units.end() ? 0 : value * factor->second;
+  if (error != std::errc() || !(bytes >= 1e6 && bytes <= 1e15))
+    throw InputError("", "--max-memory '" + text.substr(0, 40) + "' is no size",
+                     "give 1MB or more, such as 512MB or 4GB");
+  return static_cast<uint64_t>(bytes);
+}
 
 std::string with_heading(const std::string& examples) {
   std::string text = "Examples:\n  ";
@@ -50,6 +71,11 @@ void Program::add_common_options(CLI::App& app) {
   app.add_flag("--quiet", common_.quiet, "print results and errors only")->group(group);
   app.add_flag("--verbose", common_.verbose, "print more about what is done")->group(group);
   app.add_flag("--json", common_.json, "print one JSON document instead of text")->group(group);
+  app.add_option_function<std::string>(
+         "--max-memory",
+         [this](const std::string& text) { common_.max_memory = parse_memory(text); },
+         "most that unpacking a compressed file may take (4GB)")
+      ->group(group);
 }
 
 CLI::App& Program::add(CLI::App& group, const std::string& name, const std::string& help,

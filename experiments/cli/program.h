@@ -9,6 +9,8 @@
 #include <functional>
 #include <string>
 
+#include "datasets/readers/byte_stream.h"
+
 namespace restage::cli {
 
 /// Options of every command.
@@ -17,6 +19,7 @@ struct Common {
   uint64_t seed = 0;
   bool quiet = false, verbose = false;  ///< already handed to base/log.h
   bool json = false;
+  uint64_t max_memory = kMaxMemory;  ///< what unpacking one compressed file may take, bytes
 };
 
 class Program {

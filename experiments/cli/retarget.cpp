@@ -127,7 +127,7 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   check(c);
   const ModelSet models =
       load_models(weights_path(c.weights), {.skeleton = true, .smrm = true, .deformation = true});
-  const auto frames = open_frames(c.source);
+  const auto frames = open_frames(c.source, common.max_memory);
   RetargetOptions options;
   options.fps = c.fps.value_or(frames->fps());
   options.force = c.force;
@@ -187,7 +187,8 @@ void add_retarget(Program& program) {
       "restage retarget --source scans/ --target hero.obj --weights w.safetensors --out hero.glb\n"
       "restage retarget --source scans.h5 --target hero.ply --weights runs/demo-1 --out result.h5",
       [c, &program] { return run_retarget(*c, program.common()); });
-  app.add_option("--source", c->source, "folder of clouds or HDF5 file of scans")->required();
+  app.add_option("--source", c->source, "folder of clouds, or a file of them (HDF5, NPZ, NPY)")
+      ->required();
   app.add_option("--target", c->target, "mesh or cloud in T-pose, y up, facing +z")->required();
   app.add_option("--weights", c->weights, "weights file or run directory")->required();
   app.add_option("--out", c->out, "X.glb, X.bvh, X.h5, or a folder for PLY or OBJ frames")

@@ -1,6 +1,6 @@
-// Damaged files: a few hundred seeded mutations of valid PLY, OBJ and HDF5 bytes. A reader may
-// succeed or throw InputError; anything else (a crash, another exception) fails. The sanitizer
-// build runs the same test.
+// Damaged files: a few hundred seeded mutations of valid PLY, OBJ, NPY, NPZ and HDF5 bytes. A
+// reader may succeed or throw InputError; anything else (a crash, another exception) fails. The
+// sanitizer build runs the same test.
 #include <gtest/gtest.h>
 #include <hdf5.h>
 
@@ -9,10 +9,12 @@
 
 #include "autograd/base/error.h"
 #include "autograd/base/rng.h"
+#include "datasets/importers/amass.h"
 #include "datasets/readers/frame_folder.h"
 #include "datasets/readers/mesh_io.h"
 #include "datasets/schema.h"
 #include "tests/datasets/schema_support.h"
+#include "tests/datasets/smpl_support.h"
 
 #if defined(__SANITIZE_ADDRESS__)
 // The HDF5 library itself forgets some memory when it refuses a damaged file.
@@ -105,6 +107,59 @@ TEST(ReadersFuzz, DamagedPlyAndObj) {
     EXPECT_GT(good, 0) << name;
     EXPECT_GT(refused, 50) << name;
   }
+}
+
+TEST(ReadersFuzz, DamagedArrays) {
+  const test::TempDir dir;
+  const std::vector<float> values(2 * 64 * 3, 0.5f);
+  const std::string cloud = test::npy<float>({2, 64, 3}, values);
+  test::write_bytes(dir / "a.npy", cloud);
+  test::write_bytes(dir / "a.npz", test::npz({{"points", cloud}, {"fps", test::npy_text("30")}}));
+  test::write_bytes(dir / "b.npz", test::npz({{"points", cloud}}, false));
+  const auto frames = [](const std::string& path) {
+    const std::unique_ptr<FrameSource> source = open_frames(path);
+    while (source->next()) {
+    }
+  };
+  for (const char* name : {"a.npy", "b.npz"}) {
+    const std::string original = dir / name;
+    const auto [good, refused] =
+        attack(original, dir / ("x" + original.substr(original.size() - 4)), 500, 19, frames);
+    EXPECT_GT(good, 0) << name;
+    EXPECT_GT(refused, 50) << name;
+  }
+  EXPECT_EQ(attack(dir / "a.npz", dir / "x.npz", 300, 20, frames).first, 0);  // no number as fps
+}
+
+/// Damage inside the arrays, which an archive's checksums would keep from the importers.
+TEST(ReadersFuzz, DamagedMotionsAndModels) {
+  const test::TempDir dir;
+  test::TinyClip clip;
+  clip.frames = 3;
+  const test::TinySmpl model;
+  test::write_bytes(dir / "model.npz", model.file());
+  BodyModels models(dir / "model.npz");
+  int refused = 0;
+  for (uint64_t round = 0; round < 600; ++round) {
+    Rng rng(RngKey{23, round});
+    const bool motion = round % 2 == 0;
+    auto arrays = motion ? clip.arrays() : model.arrays();
+    std::string& bytes = arrays[rng.below(arrays.size())].second;
+    bytes = mutate(bytes, rng);
+    std::filesystem::remove(dir / "x.npz");
+    test::write_bytes(dir / "x.npz", test::npz(arrays, false));
+    try {
+      ImportReport report;
+      if (motion)
+        import_amass(Npz(dir / "x.npz"), models, {}, report);
+      else
+        SmplModel(dir / "x.npz").body({1, 2});
+    } catch (const InputError& error) {
+      ++refused;
+      EXPECT_LT(std::string(error.what()).size(), 390u) << error.what();
+    }
+  }
+  EXPECT_GT(refused, 100);
 }
 
 /// Reads a file in every way there is; the first refusal ends it.

@@ -1,0 +1,59 @@
+// AMASS motions (.npz): poses of a SMPL-H or SMPL-X body as axis-angle numbers, z up, at the rate
+// of the recording. Skeletons come from the user's own body model (smpl.h), which AMASS does not
+// hold. Source: Mahmood et al. 2019; the SMPL-X files are of the 2023 release ("stageii").
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "datasets/importers/axis.h"
+#include "datasets/importers/report.h"
+#include "datasets/importers/smpl.h"
+
+namespace restage {
+
+/// The body models at hand: one file for all, or a folder in which each is found by its family and
+/// by "female", "male" or "neutral" in its name or its folder's (smplh/female/model.npz,
+/// SMPLX_MALE.npz).
+class BodyModels {
+ public:
+  /// What is no such model in a folder is left out. InputError: nothing there, no model in it.
+  explicit BodyModels(const std::string& path, uint64_t max_memory = kMaxMemory);
+
+  /// The model for a clip, loaded once; a single file stands for every gender. SMPL stands in for
+  /// SMPL-H, never for SMPL-X, whose shapes are others. What does not quite fit is remarked.
+  /// InputError (about `clip`) if none fits.
+  const SmplModel& find(SmplFamily family, const std::string& gender, const std::string& clip,
+                        std::vector<std::string>& remarks);
+
+ private:
+  struct Entry {
+    std::string path, gender;  ///< empty gender: the path does not say
+    SmplFamily family;
+  };
+  std::vector<const Entry*> of_family(SmplFamily family) const;
+
+  std::string path_;
+  uint64_t max_memory_;
+  std::vector<Entry> entries_;
+  std::map<std::string, std::unique_ptr<SmplModel>> loaded_;
+};
+
+struct AmassOptions {
+  Axis up = Axis::automatic;  ///< automatic: z, as in all of AMASS
+  double fps = 0;                 ///< the true rate, where the file's is wrong; 0: the file's
+  std::string id, subject, split = "train", action;
+};
+
+/// `poses` make a motion; `betas` without poses a shape only (shape.npz, neutral_stagei.npz).
+bool is_amass_motion(const Npz& file);
+bool is_amass_shape(const Npz& file);
+
+/// One clip at 30 fps, and what was done to it. InputError: another layout, no rate, not finite,
+/// no model that fits.
+Motion import_amass(const Npz& file, BodyModels& models, const AmassOptions& options,
+                    ImportReport& report);
+
+}  // namespace restage

@@ -1,0 +1,42 @@
+#include "datasets/importers/axis.h"
+
+#include <iterator>
+
+#include "autograd/base/error.h"
+
+namespace restage {
+namespace {
+
+constexpr const char* kAxisNames[] = {"auto", "x", "-x", "y", "-y", "z", "-z"};
+
+}  // namespace
+
+Axis parse_axis(const std::string& text, const std::string& option) {
+  for (size_t i = 0; i < std::size(kAxisNames); ++i)
+    if (text == kAxisNames[i]) return static_cast<Axis>(i);
+  throw InputError("", option + " '" + text.substr(0, 40) + "' is no axis",
+                   "give auto, x, -x, y, -y, z or -z");
+}
+
+std::string to_string(Axis axis) { return kAxisNames[static_cast<size_t>(axis)]; }
+
+Vec3 vector_of(Axis axis) {
+  const int i = static_cast<int>(axis) - 1;
+  return (i % 2 ? -1.0 : 1.0) * Vec3::Unit(i / 2);
+}
+
+Axis axis_near(const Vec3& v) {
+  int i = 0;
+  v.cwiseAbs().maxCoeff(&i);
+  return static_cast<Axis>(1 + 2 * i + (v[i] < 0 ? 1 : 0));
+}
+
+Mat3 upright(Axis up) {
+  if (up == Axis::minus_y) return Vec3(1, -1, -1).asDiagonal();
+  const Vec3 from = vector_of(up), to = Vec3::UnitY(), axis = from.cross(to);
+  Mat3 out = from * to.transpose();  // exact, unlike sines and cosines of 90 degrees
+  out = to * from.transpose() - out + axis * axis.transpose();
+  return up == Axis::y ? Mat3(Mat3::Identity()) : out;
+}
+
+}  // namespace restage

@@ -1,0 +1,24 @@
+// The axes of foreign files: which one is up, which one somebody faces.
+#pragma once
+
+#include <string>
+
+#include "nn/geometry/body.h"
+
+namespace restage {
+
+/// A direction along one of the file's axes.
+enum class Axis { automatic, x, minus_x, y, minus_y, z, minus_z };
+
+/// "auto", "x", "-x" ...; InputError naming `option` for anything else.
+Axis parse_axis(const std::string& text, const std::string& option);
+std::string to_string(Axis axis);
+
+/// The unit vector along an axis that is not automatic.
+Vec3 vector_of(Axis axis);
+/// The axis that a direction is nearest to.
+Axis axis_near(const Vec3& v);
+/// The quarter or half turn that takes the file's `up` to y; for z it is (x, y, z) -> (x, z, -y).
+Mat3 upright(Axis up);
+
+}  // namespace restage

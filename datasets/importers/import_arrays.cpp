@@ -1,0 +1,187 @@
+// import_data() of arrays and scans: AMASS motions, body models, clouds.
+#include <algorithm>
+#include <filesystem>
+
+#include "autograd/base/error.h"
+#include "datasets/importers/amass.h"
+#include "datasets/importers/import_detail.h"
+#include "datasets/importers/scans.h"
+#include "datasets/importers/smpl.h"
+#include "datasets/readers/array_frames.h"
+#include "datasets/readers/folders.h"
+
+namespace restage {
+namespace {
+
+namespace fs = std::filesystem;
+
+double checked_fps(const ImportOptions& options) {
+  const double fps = options.motion.fps;
+  if (fps != 0 && !(fps >= 1 && fps <= 2000))
+    throw InputError("", "--fps is out of range", "give frames per second, 1 to 2000");
+  return fps;
+}
+
+// ---- AMASS -------------------------------------------------------------------------------------
+
+/// Names a clip by where it lies below `root`: the folder is the subject, the path the id.
+AmassOptions amass_options(const fs::path& file, const fs::path& root,
+                           const ImportOptions& options) {
+  AmassOptions out;
+  out.up = options.motion.rest.up;
+  out.fps = options.motion.fps;
+  out.split = options.motion.split;
+  out.action = options.motion.action;
+  const fs::path below = absolute_path(file).lexically_relative(absolute_path(root));
+  out.subject = options.motion.subject;
+  if (out.subject.empty()) out.subject = below.parent_path().generic_string();
+  if (out.subject.empty()) out.subject = absolute_path(root).filename().string();
+  out.id = below.generic_string();
+  out.id.resize(out.id.size() - below.extension().string().size());
+  for (const std::string_view ending : {"_poses", "_stageii"})
+    if (out.id.ends_with(ending)) out.id.resize(out.id.size() - ending.size());
+  std::replace(out.id.begin(), out.id.end(), '/', '_');
+  return out;
+}
+
+ImportSummary import_amass_files(const std::vector<std::string>& files, const std::string& source,
+                                 const std::string& root, const std::string& out,
+                                 const ImportOptions& options) {
+  if (options.body_model.empty())
+    throw InputError(source, "holds AMASS motions, whose skeletons are in a body model beside them",
+                     "give your SMPL-H or SMPL-X model with --body-model MODEL.npz");
+  checked_fps(options);
+  BodyModels models(options.body_model, options.max_memory);
+  FileInfo info = file_info(source, options);
+  info.provenance +=
+      " (AMASS), skeletons of " + absolute_path(options.body_model).filename().string();
+  ImportSummary summary;
+  DatasetWriter writer(out, info);
+  add_each(files, summary, [&](const std::string& path) {
+    const Npz file(path, options.max_memory);
+    if (is_amass_shape(file)) {
+      ++summary.shapes;
+      return;
+    }
+    if (!is_amass_motion(file))
+      throw InputError(path, "holds no motion (it has " + list_of(file.names()) + ")",
+                       "AMASS motions have poses and trans");
+    ImportReport report;
+    add_motion(import_amass(file, models, amass_options(path, root, options), report), writer,
+               summary);
+    summary.reports.push_back(std::move(report));
+  });
+  if (summary.motions == 0)
+    throw InputError(source,
+                     "none of its " + std::to_string(files.size()) + " NPZ files could be used (" +
+                         std::to_string(summary.shapes) + " hold a shape and no motion)",
+                     "import one alone to see why");
+  writer.commit();
+  return summary;
+}
+
+// ---- body models -------------------------------------------------------------------------------
+
+/// A person's name: the model's and the betas file's, numbered if that holds several.
+std::string body_id(const std::string& model, const std::string& betas, size_t index,
+                    size_t count) {
+  std::string out = fs::path(model).stem().string() + "_" + fs::path(betas).stem().string();
+  return count > 1 ? out + "_" + std::to_string(index) : out;
+}
+
+ImportSummary import_model(const std::string& source, const std::string& out,
+                           const ImportOptions& options) {
+  const SmplModel model(source, options.max_memory);
+  ImportSummary summary;
+  DatasetWriter writer(out, file_info(source, options));
+  const std::vector<std::string> wanted =
+      options.betas.empty() ? std::vector<std::string>{"zeros"} : options.betas;
+  for (const std::string& name : wanted) {
+    const std::vector<Betas> people =
+        name == "zeros" ? std::vector<Betas>(1) : read_betas(name, options.max_memory);
+    ImportReport report{name == "zeros" ? source : name, {}, {}};
+    report.facts = {
+        {"body model", std::string(to_string(model.family())) + ", " +
+                           std::to_string(model.vertices()) + " vertices"},
+        {"people", std::to_string(people.size())},
+        {"betas", name == "zeros" ? "zeros: the mean person"
+                                  : std::to_string(people[0].size()) + ", the model has " +
+                                        std::to_string(model.shapes())}};
+    if (people[0].size() > model.shapes())
+      report.remarks.push_back("betas beyond the model's " + std::to_string(model.shapes()) +
+                               " are left out");
+    for (size_t i = 0; i < people.size(); ++i) {
+      Body body = model.body(people[i]);
+      body.id = body_id(source, name, i, people.size());
+      body.split = options.motion.split;
+      writer.add(body);
+      ++summary.bodies;
+    }
+    summary.reports.push_back(std::move(report));
+  }
+  writer.commit();
+  return summary;
+}
+
+// ---- scans -------------------------------------------------------------------------------------
+
+ImportSummary import_scan_files(const std::string& source, const std::string& out,
+                                const ImportOptions& options) {
+  ImportSummary summary;
+  const std::vector<ScanSequence> sequences =
+      find_scans(source, options.max_memory, summary.skipped);
+  if (sequences.empty())
+    throw InputError(
+        source,
+        "holds nothing to import" +
+            (summary.skipped.empty() ? "" : " (" + summary.skipped[0].substr(0, 200) + ")"),
+        "give a data folder, BVH files, AMASS motions, a body model or scans");
+  const ScanOptions scans{checked_fps(options), options.motion.scale, options.motion.rest.up,
+                          options.max_memory};
+  ScanWriter writer(out, file_info(source, options));
+  for (const ScanSequence& sequence : sequences) {
+    summary.frames +=
+        static_cast<size_t>(import_scans(sequence, scans, writer, summary.reports.emplace_back()));
+    ++summary.sequences;
+  }
+  writer.commit();
+  return summary;
+}
+
+ImportSummary import_npz(const std::string& source, const std::string& out,
+                         const ImportOptions& options) {
+  const Npz file(source, options.max_memory);
+  const std::string folder = absolute_path(source).parent_path().string();
+  if (is_smpl_model(file)) return import_model(source, out, options);
+  if (!options.betas.empty())
+    throw InputError(source, "is no body model, to which --betas belongs", "leave --betas out");
+  if (is_amass_motion(file)) return import_amass_files({source}, source, folder, out, options);
+  if (is_amass_shape(file))
+    throw InputError(source, "holds a body's shape and no motion",
+                     "import the body model and give this file as --betas");
+  return import_scan_files(source, out, options);
+}
+
+}  // namespace
+
+ImportSummary import_array_file(const std::string& source, const std::string& out,
+                                const ImportOptions& options) {
+  return is_npz_name(source) ? import_npz(source, out, options)
+                             : import_scan_files(source, out, options);
+}
+
+ImportSummary import_array_folder(const std::string& source, const std::string& out,
+                                  const ImportOptions& options) {
+  const std::vector<std::string> npz = files_below(source, is_npz_name);
+  const bool amass = std::any_of(npz.begin(), npz.end(), [&](const std::string& path) {
+    try {
+      return is_amass_motion(Npz(path, options.max_memory));
+    } catch (const InputError&) {
+      return false;  // one that is damaged is named when its turn comes
+    }
+  });
+  return amass ? import_amass_files(npz, source, source, out, options)
+               : import_scan_files(source, out, options);
+}
+
+}  // namespace restage

@@ -1,0 +1,178 @@
+#include "datasets/importers/scans.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <optional>
+
+#include "autograd/base/error.h"
+#include "datasets/readers/array_frames.h"
+#include "datasets/readers/folders.h"
+#include "datasets/readers/frame_folder.h"
+
+namespace restage {
+namespace {
+
+namespace fs = std::filesystem;
+
+// ---- finding -----------------------------------------------------------------------------------
+
+size_t count_pickles(const std::string& folder) {
+  size_t out = 0;
+  std::error_code ignored;
+  for (fs::directory_iterator item(folder, ignored), end; !ignored && item != end;
+       item.increment(ignored))
+    out += item->path().extension() == ".pkl";
+  return out;
+}
+
+/// The arrays of a folder: sequences by themselves, single frames together.
+void add_arrays(const std::string& folder, const std::vector<std::string>& files,
+                uint64_t max_memory, std::vector<ScanSequence>& out,
+                std::vector<std::string>& skipped) {
+  ScanSequence frames{folder, {}};
+  for (const std::string& file : files) {
+    try {
+      const std::optional<CloudArray> cloud = find_cloud(file, max_memory);
+      if (!cloud)
+        skipped.push_back(file + ": holds no points");
+      else if (cloud->sequence)
+        out.push_back({file, {file}});
+      else
+        frames.files.push_back(file);
+    } catch (const InputError& error) {
+      skipped.emplace_back(error.what());
+    }
+  }
+  if (!frames.files.empty()) out.push_back(std::move(frames));
+}
+
+// ---- importing ---------------------------------------------------------------------------------
+
+std::string text_of(const char* format, double a, double b = 0, double c = 0) {
+  char text[120];
+  std::snprintf(text, sizeof text, format, a, b, c);
+  return text;
+}
+
+/// The source's frame at each of our frames: the nearest in time, the earlier of two.
+class Clock {
+ public:
+  Clock(int64_t frames, double fps) : frames_(frames), fps_(fps) {}
+  int64_t count() const {
+    // A hair more than the last frame's time: 1 / 0.0166667 s is not exactly 60.
+    return static_cast<int64_t>(static_cast<double>(frames_ - 1) / fps_ * kFps + 1e-3) + 1;
+  }
+  int64_t source(int64_t k) const {
+    const double at = static_cast<double>(k) / kFps * fps_;
+    return std::min(frames_ - 1, static_cast<int64_t>(std::ceil(at - 0.5 - 1e-9)));
+  }
+
+ private:
+  int64_t frames_;
+  double fps_;
+};
+
+/// Metres, y up.
+void convert(Frame& frame, const Eigen::Matrix3f& to_ours) {
+  for (Point& p : frame.points) {
+    p = to_ours * p;
+    if (!p.allFinite())
+      throw InputError(frame.source, "is too large for that scale",
+                       "give metres a unit as --scale");
+  }
+}
+
+std::string rate_fact(double fps, const std::string& from, int64_t frames, const Clock& clock) {
+  const std::string before =
+      text_of("%.6g fps (", fps) + from + "), " + std::to_string(frames) + " frames";
+  if (fps == kFps) return before + ", kept";
+  const int64_t count = clock.count();
+  int64_t used = 1;
+  for (int64_t k = 1; k < count; ++k) used += clock.source(k) != clock.source(k - 1);
+  return before + " -> 30 fps, " + std::to_string(count) +
+         " frames (the nearest in time: " + std::to_string(frames - used) + " left out, " +
+         std::to_string(count - used) + " repeated)";
+}
+
+std::string size_fact(const Points& points) {
+  Point low = points[0], high = points[0];
+  for (const Point& p : points) {
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  const Point size = high - low;
+  return text_of("%.3g x %.3g x %.3g m in the first frame (x, y, z)", size.x(), size.y(), size.z());
+}
+
+}  // namespace
+
+std::vector<ScanSequence> find_scans(const std::string& path, uint64_t max_memory,
+                                     std::vector<std::string>& skipped) {
+  std::error_code ignored;
+  if (!fs::is_directory(path, ignored)) return {{path, {path}}};
+  std::vector<ScanSequence> out;
+  for (const std::string& folder : folders_below(path)) {
+    const std::vector<std::string> files = frame_files(folder);
+    if (!files.empty() && is_array_name(files[0]))
+      add_arrays(folder, files, max_memory, out, skipped);
+    else if (!files.empty())
+      out.push_back({folder, files});
+    if (const size_t n = count_pickles(folder))
+      skipped.push_back(folder + ": " + std::to_string(n) +
+                        " pickles (.pkl), which can run code and are never read; docs/data.md "
+                        "shows how to convert them");
+  }
+  return out;
+}
+
+int64_t import_scans(const ScanSequence& sequence, const ScanOptions& options, ScanWriter& out,
+                     ImportReport& report) {
+  const bool one = sequence.files.size() == 1;
+  const auto source = one ? open_frames(sequence.files[0], options.max_memory)
+                          : open_frame_files(sequence.files, options.max_memory);
+  const bool stated =
+      one && is_array_name(sequence.files[0]) && stated_fps(sequence.files[0], options.max_memory);
+  const double fps = options.fps > 0 ? options.fps : source->fps();
+  const double scale = options.scale > 0 ? options.scale : 1;
+  const Clock clock(source->frames(), fps);
+  const auto fact = [&](const char* name, const std::string& value) {
+    report.facts.emplace_back(name, value);
+  };
+  report.file = sequence.name;
+  fact("rate", rate_fact(fps,
+                               options.fps > 0 ? "--fps"
+                               : stated        ? "the file's"
+                                               : "taken for granted: --fps",
+                               source->frames(), clock));
+  fact("scale", options.scale > 0 ? text_of("%.6g m a unit (--scale)", scale)
+                                  : "metres (taken for granted: --scale)");
+  const Axis up = options.up == Axis::automatic ? Axis::y : options.up;
+  fact("up", to_string(up) + (options.up == Axis::automatic ? " (taken for granted: --up)" : " (--up)"));
+  const Eigen::Matrix3f to_ours = (scale * upright(up)).cast<float>();
+
+  int64_t at = 0;  // of the source, the frame that next() gives
+  size_t fewest = 0, most = 0;
+  Points points;
+  const int64_t count = clock.count();
+  for (int64_t k = 0; k < count; ++k) {
+    for (; at < clock.source(k); ++at) source->skip();
+    if (at == clock.source(k)) {  // else the frame before, once more
+      Frame frame = *source->next();
+      ++at;
+      convert(frame, to_ours);
+      points = std::move(frame.points);
+      if (k == 0) fact("size", size_fact(points));
+      fewest = k == 0 ? points.size() : std::min(fewest, points.size());
+      most = std::max(most, points.size());
+    }
+    out.append(points);
+  }
+  out.end_sequence();
+  fact("points", fewest == most ? std::to_string(most)
+                                : std::to_string(fewest) + " to " + std::to_string(most));
+  return count;
+}
+
+}  // namespace restage

@@ -1,0 +1,40 @@
+// Sequences of clouds and meshes as they come from scanners: files, folders of frames, trees of
+// such folders (CAPE: subject/sequence/*.npz; 4D-DRESS: subject/outfit/take/.../*.ply).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "datasets/importers/axis.h"
+#include "datasets/importers/report.h"
+#include "datasets/readers/byte_stream.h"
+#include "datasets/schema.h"
+
+namespace restage {
+
+struct ScanOptions {
+  double fps = 0;                 ///< true frames per second; 0: the file's, else 30
+  double scale = 0;               ///< metres per unit; 0: 1
+  Axis up = Axis::automatic;  ///< automatic: y
+  uint64_t max_memory = kMaxMemory;
+};
+
+/// One sequence: a single file that holds all its frames, or its frames' files in order.
+struct ScanSequence {
+  std::string name;
+  std::vector<std::string> files;
+};
+
+/// All sequences in a file or below a folder: each folder of PLY or OBJ files, each array of shape
+/// [F, N, 3], and the [N, 3] arrays of each folder together; folders in natural numeric order.
+/// What cannot be used is named in `skipped`, pickles (.pkl) as a count.
+std::vector<ScanSequence> find_scans(const std::string& path, uint64_t max_memory,
+                                     std::vector<std::string>& skipped);
+
+/// Appends a sequence to `out` in metres, y up and at 30 fps, in constant memory. Clouds cannot be
+/// interpolated: each frame is the nearest one in time, and the report says how many were left out
+/// or repeated. Faces are dropped. Returns the number of frames. InputError: see open_frames().
+int64_t import_scans(const ScanSequence& sequence, const ScanOptions& options, ScanWriter& out,
+                     ImportReport& report);
+
+}  // namespace restage

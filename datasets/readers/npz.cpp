@@ -1,0 +1,50 @@
+#include "datasets/readers/npz.h"
+
+#include "autograd/base/error.h"
+#include "datasets/readers/text.h"
+
+namespace restage {
+namespace {
+
+constexpr const char* kEnding = ".npy";
+
+}  // namespace
+
+std::vector<std::string> Npz::names() const {
+  std::vector<std::string> out;
+  for (const ZipFile::Member& member : zip_.members())
+    if (member.name.ends_with(kEnding))
+      out.push_back(member.name.substr(0, member.name.size() - 4));
+  return out;
+}
+
+bool Npz::has(const std::string& name) const { return zip_.find(name + kEnding) != nullptr; }
+
+std::unique_ptr<ByteStream> Npz::open(const std::string& name) const {
+  const ZipFile::Member* member = zip_.find(name + kEnding);
+  if (member == nullptr)
+    throw InputError(path(), "has no array '" + name + "' (it has " + list_of(names()) + ")",
+                     "give a file that has one");
+  return zip_.open(*member);
+}
+
+NpyArray Npz::array(const std::string& name) const {
+  const std::unique_ptr<ByteStream> in = open(name);
+  return NpyArray(*in, max_memory_);
+}
+
+NpyHeader Npz::header(const std::string& name) const {
+  const std::unique_ptr<ByteStream> in = open(name);
+  return read_npy_header(*in);
+}
+
+std::string list_of(const std::vector<std::string>& names) {
+  constexpr size_t kMost = 8;
+  std::string out;
+  for (size_t i = 0; i < names.size() && i < kMost; ++i)
+    out += (i > 0 ? ", " : "") + text::quote(names[i]);
+  if (names.empty()) return "none";
+  return out + (names.size() > kMost ? " ..." : "");
+}
+
+}  // namespace restage

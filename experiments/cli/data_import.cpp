@@ -1,0 +1,152 @@
+// restage data import: what users hold, into one data file.
+#include <algorithm>
+#include <memory>
+
+#include "autograd/base/error.h"
+#include "datasets/importers/import.h"
+#include "experiments/cli/commands.h"
+#include "experiments/cli/output.h"
+
+namespace restage::cli {
+namespace {
+
+struct ImportArguments {
+  std::string source, out, up = "auto", facing = "auto";
+  ImportOptions options;
+};
+
+Json as_json(const ImportReport& report) {
+  Json facts = Json::object();
+  for (const auto& [name, value] : report.facts) facts[name] = value;
+  return {{"file", report.file}, {"facts", facts}, {"remarks", report.remarks}};
+}
+
+std::string remarks_of(const ImportReport& report) {
+  std::string text;
+  for (const std::string& remark : report.remarks) text += "  note: " + remark + "\n";
+  return text;
+}
+
+/// All of a report: one fact a line.
+std::string block(const ImportReport& report) {
+  constexpr size_t kColumn = 14;
+  std::string text = report.file + "\n";
+  for (const auto& [name, value] : report.facts)
+    text +=
+        "  " + name + std::string(name.size() < kColumn ? kColumn - name.size() : 1, ' ') + value +
+        "\n";
+  return text + remarks_of(report);
+}
+
+/// The first words of what matters most, in one line; remarks in lines of their own.
+std::string summary(const ImportReport& report) {
+  static const std::vector<std::string> shown = {"layout", "names",  "units",     "scale",
+                                                 "up",     "rate",   "rest pose", "body model",
+                                                 "clips",  "points"};
+  std::string text = report.file + ":";
+  for (const auto& [name, value] : report.facts) {
+    if (std::find(shown.begin(), shown.end(), name) == shown.end()) continue;
+    std::string words = value.substr(0, value.find_first_of(",:;("));
+    words.erase(words.find_last_not_of(' ') + 1);
+    text += (text.back() == ':' ? " " : "; ") + words + (name == "up" ? " up" : "");
+  }
+  return text + "\n" + remarks_of(report);
+}
+
+std::string reports_text(const std::vector<ImportReport>& reports, bool verbose) {
+  constexpr size_t kMost = 40;  // a screenful; --verbose and --json have all
+  const size_t count = verbose ? reports.size() : std::min(kMost, reports.size());
+  std::string out;
+  for (size_t i = 0; i < count; ++i)
+    out += verbose || reports.size() == 1 ? block(reports[i]) : summary(reports[i]);
+  if (count < reports.size())
+    out += "and " + std::to_string(reports.size() - count) + " more (--verbose lists all)\n";
+  return out;
+}
+
+std::string counts_text(const ImportSummary& done) {
+  std::string out;
+  const auto add = [&](size_t n, const char* what) {
+    if (n > 0) out += (out.empty() ? "" : ", ") + std::to_string(n) + " " + what;
+  };
+  add(done.bodies, "bodies");
+  add(done.motions, "motions");
+  add(done.sequences, "scan sequences");
+  add(done.frames, "frames");
+  return out;
+}
+
+int run_import(ImportArguments arguments, const Common& common) {
+  MotionOptions& motion = arguments.options.motion;
+  motion.rest.up = parse_axis(arguments.up, "--up");
+  motion.rest.facing = parse_axis(arguments.facing, "--facing");
+  if (!(motion.scale >= 0 && motion.fps >= 0) || motion.scale > 1e6 || motion.fps > 1e4)
+    throw InputError("", "--scale and --fps must be sensible positive numbers",
+                     "leave them out to have them found");
+  arguments.options.max_memory = common.max_memory;
+  const ImportSummary done = import_data(arguments.source, arguments.out, arguments.options);
+  if (common.json) {
+    Json reports = Json::array();
+    for (const ImportReport& report : done.reports) reports.push_back(as_json(report));
+    print_json({{"out", arguments.out},
+                {"bodies", done.bodies},
+                {"motions", done.motions},
+                {"frames", done.frames},
+                {"sequences", done.sequences},
+                {"shapes", done.shapes},
+                {"skipped", done.skipped},
+                {"reports", reports}});
+    return 0;
+  }
+  print(reports_text(done.reports, common.verbose));
+  print("wrote " + arguments.out + ": " + counts_text(done) + "\n");
+  if (done.shapes > 0)
+    print("left out " + std::to_string(done.shapes) + " files that hold a shape and no motion\n");
+  for (const std::string& file : done.skipped) print("skipped " + file + "\n");
+  return 0;
+}
+
+}  // namespace
+
+void add_data_import(Program& program, CLI::App& group) {
+  const auto given = std::make_shared<ImportArguments>();
+  CLI::App& app =
+      program.add(group, "import", "turn bodies, motions, characters or scans into a data file",
+                  "restage data import DATA_FOLDER --out real.h5\n"
+                  "restage data import walk.bvh --subject ann --license CC0-1.0 --out walk.h5\n"
+                  "restage data import 07_01.amc --asf 07.asf --out walk.h5\n"
+                  "restage data import hero.glb --license CC0-1.0 --out hero.h5\n"
+                  "restage data import AMASS/ --body-model smplh/ --out amass.h5\n"
+                  "restage data import SMPLX_NEUTRAL.npz --betas zeros people.npz --out bodies.h5\n"
+                  "restage data import scans/ --fps 60 --scale 0.001 --out scans.h5",
+                  [given, &program] { return run_import(*given, program.common()); });
+  ImportOptions& options = given->options;
+  MotionOptions& motion = options.motion;
+  app.add_option("SOURCE", given->source,
+                 "data folder; recording (.bvh, .amc; also .xz); character (.glb, .gltf, .vrm); "
+                 "AMASS motion or body model (.npz); scans (.ply, .obj, .npy, .npz); or a folder "
+                 "of one kind")
+      ->required();
+  app.add_option("--out", given->out, "file to write")->required();
+  app.add_option("--license", options.license, "licence of the files");
+  app.add_option("--subject", motion.subject, "who moves (default: by the file's name)");
+  app.add_option("--split", motion.split, "train, validation or test");
+  app.add_option("--scale", motion.scale, "metres per unit of the file");
+  app.add_option("--fps", motion.fps, "true frame rate");
+  app.add_option("--up", given->up, "up axis of the file: auto, x, y, z, -x, -y or -z");
+  app.add_option("--facing", given->facing,
+                 "recordings: axis that the rest pose faces: auto, z, -y ...");
+  app.add_option("--rest-frame", motion.rest.frame, "recordings: a frame that is a T-pose");
+  app.add_option("--profile", motion.profile,
+                 "recordings: bone names, a known family or a .yaml file");
+  app.add_option("--asf", options.asf, "skeleton of .amc files (default: the one beside)");
+  app.add_option("--clip", options.clip, "characters: this animation only");
+  app.add_option("--body-model", options.body_model,
+                 "SMPL, SMPL-H or SMPL-X model (.npz), or a folder of them: AMASS needs it");
+  app.add_option("--betas", options.betas,
+                 "people of a body model: NPZ or NPY files, or zeros for the mean person");
+  app.add_option("--garment", options.garment,
+                 "data folder: dress the bodies (a file of body/clothes)");
+}
+
+}  // namespace restage::cli
