@@ -7,6 +7,7 @@
 #include "autograd/base/log.h"
 #include "autograd/base/parallel.h"
 #include "datasets/importers/cmu.h"
+#include "datasets/importers/gltf_character.h"
 #include "datasets/importers/makehuman.h"
 #include "datasets/schema.h"
 
@@ -71,8 +72,30 @@ ImportSummary import_data_folder(const std::string& folder, bool bodies, bool cl
   return summary;
 }
 
-ImportSummary import_bvh_files(const std::vector<std::string>& files, const std::string& source,
-                               const std::string& out, const ImportOptions& options) {
+void add_character(const std::string& file, const ImportOptions& options, DatasetWriter& writer,
+                   ImportSummary& summary) {
+  if (options.bvh.fps > 0 || options.bvh.rest_frame >= 0)
+    throw InputError(file,
+                     "states its key times and its rest pose, which --fps and --rest-frame "
+                     "would change",
+                     "leave them out");
+  CharacterOptions how;
+  how.rig = {options.bvh.scale, options.bvh.up};
+  how.clip = options.clip;
+  how.subject = options.bvh.subject;
+  how.split = options.bvh.split;
+  how.action = options.bvh.action;
+  const Character character = read_character(file, how);
+  if (character.body) {
+    writer.add(*character.body);
+    ++summary.bodies;
+  }
+  for (const Motion& motion : character.motions) add_motion(motion, writer, summary);
+  summary.reports.push_back(character.report);
+}
+
+ImportSummary import_files(const std::vector<std::string>& files, const std::string& source,
+                           const std::string& out, const ImportOptions& options) {
   FileInfo info;
   info.license = options.license;
   info.provenance = "imported from " + fs::path(source).filename().string();
@@ -80,16 +103,18 @@ ImportSummary import_bvh_files(const std::vector<std::string>& files, const std:
   DatasetWriter writer(out, info);
   for (const std::string& file : files) {
     try {
-      add_motion(import_bvh(file, options.bvh), writer, summary);
+      if (is_gltf_name(file))
+        add_character(file, options, writer, summary);
+      else
+        add_motion(import_bvh(file, options.bvh), writer, summary);
     } catch (const InputError& error) {
       if (files.size() == 1) throw;
       log_warning("skipped " + std::string(error.what()));
       summary.skipped.emplace_back(error.what());
     }
   }
-  if (summary.motions == 0)
-    throw InputError(source,
-                     "none of its " + std::to_string(files.size()) + " BVH files could be used",
+  if (summary.bodies + summary.motions == 0)
+    throw InputError(source, "none of its " + std::to_string(files.size()) + " files could be used",
                      "import one alone to see why");
   writer.commit();
   return summary;
@@ -102,21 +127,23 @@ ImportSummary import_data(const std::string& source, const std::string& out,
   std::error_code ignored;
   if (!fs::is_directory(source, ignored)) {
     if (!fs::exists(source, ignored))
-      throw InputError(source, "is not there", "give a folder or a BVH file");
-    return import_bvh_files({source}, source, out, options);
+      throw InputError(source, "is not there", "give a folder, a BVH file or a glTF character");
+    return import_files({source}, source, out, options);
   }
   const bool bodies = fs::exists(source + "/body/makehuman.h5", ignored);
   const bool clips = fs::exists(source + "/cmu/clips30.h5", ignored);
   if (bodies || clips) return import_data_folder(source, bodies, clips, out, options);
   std::vector<std::string> files;
   for (const fs::directory_entry& entry : fs::directory_iterator(source, ignored))
-    if (entry.is_regular_file(ignored) && is_bvh(entry.path()))
+    if (entry.is_regular_file(ignored) &&
+        (is_bvh(entry.path()) || is_gltf_name(entry.path().string())))
       files.push_back(entry.path().string());
   if (files.empty())
-    throw InputError(source, "holds neither body/makehuman.h5, cmu/clips30.h5 nor BVH files",
-                     "give a data folder or a folder of .bvh files");
+    throw InputError(
+        source, "holds neither body/makehuman.h5, cmu/clips30.h5, BVH files nor glTF characters",
+        "give a data folder or a folder of .bvh or .glb files");
   std::sort(files.begin(), files.end());
-  return import_bvh_files(files, source, out, options);
+  return import_files(files, source, out, options);
 }
 
 }  // namespace restage

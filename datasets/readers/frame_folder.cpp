@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "autograd/base/error.h"
+#include "datasets/readers/gltf.h"
 #include "datasets/readers/mesh_io.h"
 #include "datasets/schema.h"
 #include "datasets/schema_detail.h"
@@ -22,7 +23,7 @@ std::string take_digits(const std::string& text, size_t& at) {
   return text.substr(begin, at - begin);
 }
 
-/// PLY/OBJ files, one frame each.
+/// Mesh files, one frame each.
 class FileFrames : public FrameSource {
  public:
   explicit FileFrames(std::vector<std::string> files) : files_(std::move(files)) {}
@@ -132,6 +133,34 @@ std::unique_ptr<FrameSource> open_hdf5(const std::string& path) {
   return std::make_unique<VertexFrames>(std::move(file), std::move(set), frames);
 }
 
+/// A character that performs a clip.
+class ClipFrames : public FrameSource {
+ public:
+  ClipFrames(Gltf file, const std::string& clip)
+      : file_(std::move(file)),
+        clip_(&find_clip(file_, clip)),
+        frames_(clip_frames(file_, *clip_)) {
+    if (file_.vertices.empty())
+      throw InputError(file_.path, "holds no mesh that could be seen",
+                       "export the character with its mesh");
+  }
+  std::optional<Frame> next() override {
+    if (at_ == frames_) return std::nullopt;
+    const double seconds = clip_->begin + static_cast<double>(at_) / kFps;
+    Mesh mesh = gltf_mesh(file_, gltf_pose(file_, *clip_, seconds));
+    return Frame{file_.path + ":" + std::to_string(at_++), std::move(mesh.vertices),
+                 std::move(mesh.faces), 0};
+  }
+  void rewind() override { at_ = 0; }
+  int64_t frames() const override { return frames_; }
+  double fps() const override { return kFps; }
+
+ private:
+  Gltf file_;
+  const GltfClip* clip_;  // of file_, which does not move
+  int64_t frames_, at_ = 0;
+};
+
 std::vector<std::string> frame_files(const std::string& folder) {
   std::vector<std::string> files;
   std::error_code error;
@@ -143,7 +172,7 @@ std::vector<std::string> frame_files(const std::string& folder) {
   }
   if (error) throw InputError(folder, "cannot be read (" + error.message() + ")", "check the path");
   if (files.empty())
-    throw InputError(folder, "holds no PLY or OBJ files", "give a folder of numbered frames");
+    throw InputError(folder, "holds no PLY, OBJ or glTF files", "give a folder of numbered frames");
   std::sort(files.begin(), files.end(), natural_less);
   return files;
 }
@@ -171,14 +200,21 @@ bool natural_less(const std::string& a, const std::string& b) {
   return a < b;  // equal but for leading zeros: any fixed order
 }
 
-std::unique_ptr<FrameSource> open_frames(const std::string& path) {
+std::unique_ptr<FrameSource> open_frames(const std::string& path, const std::string& clip) {
   std::error_code error;
-  if (std::filesystem::is_directory(path, error))
-    return std::make_unique<FileFrames>(frame_files(path));
+  const bool folder = std::filesystem::is_directory(path, error);
+  if (!folder && is_gltf_name(path)) {
+    Gltf file = read_gltf(path);
+    if (!clip.empty() || !file.clips.empty())
+      return std::make_unique<ClipFrames>(std::move(file), clip);
+  }
+  if (!clip.empty())
+    throw InputError(path, "has no clips to choose from", "leave --clip out, or give a glTF file");
+  if (folder) return std::make_unique<FileFrames>(frame_files(path));
   if (is_hdf5_name(path)) return open_hdf5(path);
   if (!std::filesystem::exists(path, error))
     throw InputError(path, "does not exist",
-                     "give a folder of frames, a PLY or OBJ file, or an HDF5 file");
+                     "give a folder of frames, a PLY, OBJ or glTF file, or an HDF5 file");
   return std::make_unique<FileFrames>(std::vector<std::string>{path});
 }
 

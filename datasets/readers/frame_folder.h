@@ -11,7 +11,7 @@
 namespace restage {
 
 struct Frame {
-  std::string source;           ///< file, or "file:frame number" (from 0) for HDF5
+  std::string source;           ///< file, or "file:frame number" (from 0) for HDF5 and glTF
   Points points;                ///< metres; the number may change from frame to frame
   std::vector<Triangle> faces;  ///< empty for a cloud
   int64_t sequence = 0;         ///< which sequence of an HDF5 file it belongs to
@@ -27,10 +27,11 @@ class FrameSource {
   virtual double fps() const = 0;      ///< the file's rate; kFps where nothing says one
 };
 
-/// A folder of numbered PLY/OBJ files (natural numeric order: f2 before f10; other files are left
-/// out), one PLY/OBJ file, or an HDF5 file of scans or predictions (their vertices). InputError if
-/// there is nothing to read.
-std::unique_ptr<FrameSource> open_frames(const std::string& path);
+/// A folder of numbered mesh files (natural numeric order: f2 before f10; other files are left
+/// out), one PLY/OBJ file, an HDF5 file of scans or predictions (their vertices), or a glTF file:
+/// its surface performing the animation `clip` (empty: the first) at 30 fps, or at rest if it has
+/// none. InputError if there is nothing to read, or a clip is named where there are none.
+std::unique_ptr<FrameSource> open_frames(const std::string& path, const std::string& clip = "");
 
 /// f2 < f10: runs of digits compare as numbers, everything else by character.
 bool natural_less(const std::string& a, const std::string& b);

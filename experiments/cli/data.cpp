@@ -74,6 +74,20 @@ struct ImportArguments {
   ImportOptions options;
 };
 
+Json to_json(const ImportReport& report) {
+  Json facts = Json::object();
+  for (const auto& [name, value] : report.facts) facts[name] = value;
+  return {{"file", report.file}, {"facts", facts}, {"remarks", report.remarks}};
+}
+
+void print_report(const ImportReport& report) {
+  std::string text = report.file + "\n";
+  for (const auto& [name, value] : report.facts)
+    text += "  " + name + std::string(name.size() < 12 ? 12 - name.size() : 1, ' ') + value + "\n";
+  for (const std::string& remark : report.remarks) text += "  note        " + remark + "\n";
+  print(text);
+}
+
 int run_import(ImportArguments arguments, const Common& common) {
   static const std::map<std::string, UpAxis> axes = {
       {"auto", UpAxis::automatic}, {"y", UpAxis::y}, {"z", UpAxis::z}};
@@ -86,13 +100,17 @@ int run_import(ImportArguments arguments, const Common& common) {
                      "leave them out to have them found");
   const ImportSummary done = import_data(arguments.source, arguments.out, arguments.options);
   if (common.json) {
+    Json reports = Json::array();
+    for (const ImportReport& report : done.reports) reports.push_back(to_json(report));
     print_json({{"out", arguments.out},
                 {"bodies", done.bodies},
                 {"motions", done.motions},
                 {"frames", done.frames},
-                {"skipped", done.skipped}});
+                {"skipped", done.skipped},
+                {"reports", reports}});
     return 0;
   }
+  for (const ImportReport& report : done.reports) print_report(report);
   print("wrote " + arguments.out + ": " + std::to_string(done.bodies) + " bodies, " +
         std::to_string(done.motions) + " motions, " + std::to_string(done.frames) + " frames\n");
   for (const std::string& file : done.skipped) print("skipped " + file + "\n");
@@ -102,20 +120,25 @@ int run_import(ImportArguments arguments, const Common& common) {
 void add_import(Program& program, CLI::App& group) {
   const auto given = std::make_shared<ImportArguments>();
   CLI::App& app =
-      program.add(group, "import", "turn MakeHuman bodies, CMU clips or BVH files into a data file",
+      program.add(group, "import",
+                  "turn MakeHuman bodies, CMU clips, BVH files or glTF characters into a data file",
                   "restage data import DATA_FOLDER --out real.h5\n"
+                  "restage data import hero.glb --license CC0-1.0 --out hero.h5\n"
                   "restage data import walk.bvh --subject ann --license CC0-1.0 --out walk.h5",
                   [given, &program] { return run_import(*given, program.common()); });
-  app.add_option("SOURCE", given->source, "data folder, BVH file (.bvh, .bvh.xz) or folder of them")
+  app.add_option("SOURCE", given->source,
+                 "data folder, BVH file (.bvh, .bvh.xz), glTF character (.glb, .gltf, .vrm), or a "
+                 "folder of such files")
       ->required();
   app.add_option("--out", given->out, "file to write")->required();
   app.add_option("--garment", given->options.garment, "dress the bodies (a file of body/clothes)");
-  app.add_option("--license", given->options.license, "licence of the BVH files");
-  app.add_option("--subject", given->options.bvh.subject, "who moves in the BVH files");
-  app.add_option("--split", given->options.bvh.split, "train, validation or test, for BVH files");
-  app.add_option("--scale", given->options.bvh.scale, "metres per unit of the BVH files");
+  app.add_option("--clip", given->options.clip, "import this animation of a glTF file only");
+  app.add_option("--license", given->options.license, "licence of the files");
+  app.add_option("--subject", given->options.bvh.subject, "who moves in the files");
+  app.add_option("--split", given->options.bvh.split, "train, validation or test");
+  app.add_option("--scale", given->options.bvh.scale, "metres per unit of the files");
   app.add_option("--fps", given->options.bvh.fps, "true frame rate of the BVH files");
-  app.add_option("--up", given->up, "up axis of the BVH files: auto, y or z");
+  app.add_option("--up", given->up, "up axis of the files: auto, y or z");
   app.add_option("--rest-frame", given->options.bvh.rest_frame, "T-pose frame of the BVH files");
 }
 
