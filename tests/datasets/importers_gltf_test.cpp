@@ -11,6 +11,7 @@
 #include "datasets/readers/frame_folder.h"
 #include "datasets/readers/mesh_io.h"
 #include "datasets/schema.h"
+#include "infer/writers/glb.h"
 #include "tests/datasets/gltf_maker.h"
 
 namespace restage {
@@ -309,6 +310,47 @@ TEST_F(ImportersGltf, BodyPerformsItsOwnMotion) {
     for (int j = 0; j < kJoints; ++j)
       EXPECT_LT((posed.joints[j] - posed.joints[0] - (truth.joints[j] - truth.joints[0])).norm(),
                 0.005);
+  }
+}
+
+TEST_F(ImportersGltf, OurOwnOutputComesBackIn) {
+  const Body body =
+      testing::tiny_body("own", "train");  // at most two joints a vertex: nothing is cut
+  const Motion motion = testing::tiny_motion("swing", "ann", "train", 10);
+  std::vector<Pose> poses;
+  GlbWriter writer(path("own.glb"), body.rest, body.joints, body.weights);
+  for (size_t f = 0; f < 10; ++f) {
+    poses.push_back(pose_on(motion, body, f));
+    writer.push(poses.back());
+  }
+  EXPECT_LT(writer.commit().max, 1e-6);
+
+  const auto frames = open_frames(path("own.glb"));
+  ASSERT_EQ(frames->frames(), 10);
+  for (const Pose& pose : poses) {
+    const auto frame = frames->next();
+    const Points truth = linear_blend_skinning(body, pose);
+    ASSERT_EQ(frame->points.size(), truth.size());
+    for (size_t v = 0; v < truth.size(); ++v)
+      ASSERT_LT((frame->points[v] - truth[v]).norm(), 1e-4f);
+    EXPECT_EQ(frame->faces, body.rest.faces);
+  }
+
+  const Character found = read_character(path("own.glb"));
+  ASSERT_TRUE(found.body);
+  EXPECT_EQ(fact(found.report, "rest pose"), "T-pose");
+  EXPECT_TRUE(found.body->weights.isApprox(body.weights, 1e-6f));
+  ASSERT_EQ(found.motions.size(), 1u);
+  ASSERT_EQ(found.motions[0].frames(), 10u);
+  for (size_t f = 0; f < 10; ++f) {
+    const PosedSkeleton ours = forward_kinematics(body.joints, poses[f]);
+    const PosedSkeleton theirs =
+        forward_kinematics(found.body->joints, pose_on(found.motions[0], *found.body, f));
+    for (int j = 0; j < kJoints; ++j) {
+      EXPECT_LT((ours.joints[j] - ours.joints[0] - (theirs.joints[j] - theirs.joints[0])).norm(),
+                1e-4);
+      EXPECT_LT(Quat(ours.global[j]).angularDistance(Quat(theirs.global[j])), 1e-4);
+    }
   }
 }
 
