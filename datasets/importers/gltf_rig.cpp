@@ -8,6 +8,7 @@
 
 #include "autograd/base/error.h"
 #include "datasets/importers/source_motion.h"
+#include "datasets/readers/text.h"
 
 namespace restage {
 namespace {
@@ -76,7 +77,7 @@ Eigen::Affine3d bind_space(const Gltf& file, const std::vector<GltfBone>& bones,
                         [](const GltfBone& a, const GltfBone& b) { return a.node < b.node; });
   const Eigen::Affine3d by_root = rest[static_cast<size_t>(top.node)] * top.inverse_bind;
   const Offset off = rest_offset(bones, rest, by_root);
-  if (off.degrees < 0.5 && off.length < 0.01 * extent(bones, rest)) return by_root;
+  if (off.degrees < 0.5 && off.length <= 0.01 * extent(bones, rest)) return by_root;
   report.remarks.push_back(
       format("the nodes rest in another pose than the skin was made in (up to %.0f degrees): the "
              "skin's is taken",
@@ -375,7 +376,7 @@ void name_joints(const Gltf& file, GltfRig& rig, const JointMap& map, const std:
     int& owned = owner[static_cast<size_t>(rig.node[j])];
     if (owned < 0 || map[j].offset.isZero()) owned = static_cast<int>(j);
     words += (words.empty() ? "" : ", ") + std::string(kJointNames[j]) + " = " +
-             file.nodes[static_cast<size_t>(rig.node[j])].name +
+             text::quote(file.nodes[static_cast<size_t>(rig.node[j])].name) +
              (map[j].offset.isZero() ? "" : " (beside it)");
   }
   report.facts.emplace_back("joints", words);
@@ -412,7 +413,7 @@ GltfRig find_rig(const Gltf& file, const GltfRigOptions& options, ImportReport& 
   for (size_t j = 0; j < kJoints; ++j) {
     const auto n = static_cast<size_t>(rig.node[j]);
     if (!(std::abs(rig.bind[n].linear().determinant()) > 1e-30))
-      throw InputError(file.path, "bone '" + file.nodes[n].name.substr(0, 40) + "' has no size",
+      throw InputError(file.path, "bone " + text::quote(file.nodes[n].name) + " has no size",
                        "export it with scales other than 0");
     rig.offset[j] = rig.t_pose[n].linear() * rig.bind[n].linear().inverse() * rig.offset[j];
   }

@@ -72,6 +72,11 @@ ImportSummary import_data_folder(const std::string& folder, bool bodies, bool cl
   return summary;
 }
 
+void refuse_clip(const std::string& source, const ImportOptions& options) {
+  if (!options.clip.empty())
+    throw InputError(source, "has no clips to choose from", "leave --clip out");
+}
+
 void add_character(const std::string& file, const ImportOptions& options, DatasetWriter& writer,
                    ImportSummary& summary) {
   if (options.bvh.fps > 0 || options.bvh.rest_frame >= 0)
@@ -103,10 +108,12 @@ ImportSummary import_files(const std::vector<std::string>& files, const std::str
   DatasetWriter writer(out, info);
   for (const std::string& file : files) {
     try {
-      if (is_gltf_name(file))
+      if (is_gltf_name(file)) {
         add_character(file, options, writer, summary);
-      else
+      } else {
+        refuse_clip(file, options);
         add_motion(import_bvh(file, options.bvh), writer, summary);
+      }
     } catch (const InputError& error) {
       if (files.size() == 1) throw;
       log_warning("skipped " + std::string(error.what()));
@@ -132,7 +139,10 @@ ImportSummary import_data(const std::string& source, const std::string& out,
   }
   const bool bodies = fs::exists(source + "/body/makehuman.h5", ignored);
   const bool clips = fs::exists(source + "/cmu/clips30.h5", ignored);
-  if (bodies || clips) return import_data_folder(source, bodies, clips, out, options);
+  if (bodies || clips) {
+    refuse_clip(source, options);
+    return import_data_folder(source, bodies, clips, out, options);
+  }
   std::vector<std::string> files;
   for (const fs::directory_entry& entry : fs::directory_iterator(source, ignored))
     if (entry.is_regular_file(ignored) &&

@@ -9,6 +9,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "datasets/readers/gltf_detail.h"
+#include "datasets/readers/text.h"
 
 namespace restage {
 namespace {
@@ -189,8 +190,9 @@ class Builder {
         const size_t skin = checked(wearer.skin, model_.skins.size(), path_, "skin");
         if (out_.skin_nodes[skin] < 0) out_.skin_nodes[skin] = static_cast<int>(wearer.node);
       } else if (skins && !rigid[wearer.node]) {
-        out_.remarks.push_back("left out mesh '" + out_.nodes[wearer.node].name +
-                               "', which belongs to no skin");
+        if (loose_++ < 3)
+          loose_names_ +=
+              (loose_names_.empty() ? "" : ", ") + text::quote(out_.nodes[wearer.node].name);
         continue;
       }
       vertices_of_.clear();
@@ -376,7 +378,7 @@ class Builder {
     else if (sampler.interpolation == "STEP")
       track.interpolation = GltfTrack::Interpolation::step;
     else if (sampler.interpolation != "LINEAR" && !sampler.interpolation.empty())
-      broken(path_, "clip '" + clip.substr(0, 40) + "' is interpolated in an unknown way");
+      broken(path_, "clip " + text::quote(clip) + " is interpolated in an unknown way");
     track.times = times_of(sampler.input);
     track.values = gltf::read_floats(document_, sampler.output,
                                      turns ? TINYGLTF_TYPE_VEC4 : TINYGLTF_TYPE_VEC3, "key values",
@@ -385,13 +387,17 @@ class Builder {
     const size_t wanted =
         keys * (turns ? 4 : 3) * (track.interpolation == GltfTrack::Interpolation::cubic ? 3 : 1);
     if (track.values.size() != wanted)
-      broken(path_, "clip '" + clip.substr(0, 40) + "' has keys without values");
+      broken(path_, "clip " + text::quote(clip) + " has keys without values");
     for (const float x : track.values)
       if (!(std::abs(x) < kLargest)) broken(path_, "a key of an animation is out of range");
     return track;
   }
 
   void report() {
+    if (loose_ > 0)
+      out_.remarks.push_back("left out " + std::to_string(loose_) +
+                             " meshes that belong to no skin: " + loose_names_ +
+                             (loose_ > 3 ? ", ..." : ""));
     if (lines_ > 0) out_.remarks.push_back("left out lines: only points and triangles are read");
     if (morphs_)
       out_.remarks.push_back("morph targets are left out: the face rests as it is modelled");
@@ -417,7 +423,8 @@ class Builder {
   std::map<std::pair<int, int>, std::pair<size_t, size_t>> vertices_of_;
   std::map<size_t, int32_t> node_bone_;
   std::map<int, int> times_;
-  size_t lines_ = 0, weightless_ = 0, unknown_tracks_ = 0;
+  size_t lines_ = 0, loose_ = 0, weightless_ = 0, unknown_tracks_ = 0;
+  std::string loose_names_;
   bool morphs_ = false;
 };
 

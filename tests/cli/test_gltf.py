@@ -55,7 +55,7 @@ class Gltf(CliTest):
         facts = found["reports"][0]["facts"]
         self.assertIn("z (from", facts["up"])
         self.assertIn("left upper arm 45.0 degrees", facts["rest pose"])
-        self.assertIn("left_knee = left_knee", facts["joints"])
+        self.assertIn("left_knee = 'left_knee'", facts["joints"])
         self.assertEqual(self.json("data", "verify", "hero.h5")["problems"], [])
         counts = self.json("data", "inspect", "hero.h5")["counts"]
         self.assertEqual(counts["bodies"], 1)
@@ -85,6 +85,10 @@ class Gltf(CliTest):
         self.bad_input(["data", "import", "hero.glb", "--out", "x.h5", "--clip", "walk"], "no animation")
         self.bad_input(["data", "import", "hero.glb", "--out", "x.h5", "--fps", "24"], "--fps")
         self.bad_input(["data", "import", "hero.glb", "--out", "x.h5", "--rest-frame", "0"], "--rest-frame")
+
+    def test_clips_are_of_gltf_files(self):
+        self.write("walk.bvh", "HIERARCHY\n")
+        self.bad_input(["data", "import", "walk.bvh", "--out", "x.h5", "--clip", "walk"], "--clip")
 
     def test_target_and_source(self):
         w = weights("tposes", *TPOSES)

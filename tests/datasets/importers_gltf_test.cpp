@@ -160,7 +160,7 @@ TEST_F(ImportersGltf, MixamoInCentimetresBelowAScaledNode) {
   EXPECT_EQ(found.body->id, "hero");
   EXPECT_EQ(found.motions[0].action, "walk");
   EXPECT_EQ(fact(found.report, "rest pose"), "T-pose");
-  EXPECT_NE(fact(found.report, "joints").find("left_elbow = mixamorig:LeftForeArm"),
+  EXPECT_NE(fact(found.report, "joints").find("left_elbow = 'mixamorig:LeftForeArm'"),
             std::string::npos);
   EXPECT_NE(fact(found.report, "clip 'walk'").find("60 a second"), std::string::npos);
 }
