@@ -261,10 +261,10 @@ Mat3 find_front(const Joints& upright, ImportReport& report) {
   const Vec3 left = (upright[1] - upright[2]) + (upright[16] - upright[17]);
   const double yaw = std::atan2(left.z(), left.x()), quarter = M_PI / 2;
   const double nearest = std::round(yaw / quarter) * quarter;
-  report.facts.emplace_back(
-      "facing", format("turned by %.0f degrees to face +z",
-                       (std::abs(yaw - nearest) < 10 * kDegree ? nearest : yaw) / kDegree));
-  if (std::abs(yaw - nearest) >= 10 * kDegree) return turn_about_y(yaw);
+  const bool quarters = std::abs(yaw - nearest) < 10 * kDegree;
+  const double degrees = std::round((quarters ? nearest : yaw) / kDegree) + 0.0;  // no -0
+  report.facts.emplace_back("facing", format("turned by %.0f degrees to face +z", degrees));
+  if (!quarters) return turn_about_y(yaw);
   const double c = std::round(std::cos(nearest)), s = std::round(std::sin(nearest));
   Mat3 out;
   out << c, 0, s, 0, 1, 0, -s, 0, c;
