@@ -64,8 +64,8 @@ ImportSummary import_folder(const std::string& source, const std::string& out,
 
 ImportSummary import_file(const std::string& source, const std::string& out,
                           const ImportOptions& options) {
-  if (is_array_name(source) || is_mesh_name(source)) return import_array_file(source, out, options);
   if (is_recording_name(source)) return import_recordings({source}, source, out, options);
+  if (is_array_name(source) || is_mesh_name(source)) return import_array_file(source, out, options);
   if (source.ends_with(".pkl"))
     throw InputError(source, "is a pickle, which can run code and is never read",
                      "convert it to plain arrays (docs/data.md shows how)");

@@ -82,16 +82,22 @@ PosedSkeleton source_pose(const SourceMotion& motion, const JointMap& map, size_
   return out;
 }
 
-double floor_height(const std::vector<PosedSkeleton>& poses) {
-  std::vector<double> lowest;
-  for (const PosedSkeleton& p : poses)
-    lowest.push_back(
-        std::min({p.joints[7].y(), p.joints[8].y(), p.joints[10].y(), p.joints[11].y()}));
+double lowest_foot(const PosedSkeleton& p) {
+  return std::min({p.joints[7].y(), p.joints[8].y(), p.joints[10].y(), p.joints[11].y()});
+}
+
+double floor_height(std::vector<double> lowest) {
   if (lowest.empty()) return 0.0;
   std::sort(lowest.begin(), lowest.end());
   const double at = 0.05 * static_cast<double>(lowest.size() - 1);
   const size_t a = static_cast<size_t>(at), b = std::min(a + 1, lowest.size() - 1);
   return lowest[a] + (at - static_cast<double>(a)) * (lowest[b] - lowest[a]);
+}
+
+double floor_height(const std::vector<PosedSkeleton>& poses) {
+  std::vector<double> lowest;
+  for (const PosedSkeleton& pose : poses) lowest.push_back(lowest_foot(pose));
+  return floor_height(std::move(lowest));
 }
 
 Motion to_motion(const std::vector<PosedSkeleton>& poses, const Joints& rest, double floor_y) {

@@ -56,6 +56,9 @@ PosedSkeleton source_pose(const SourceMotion& motion, const JointMap& map, size_
 
 /// 5th percentile over frames of the lowest ankle or foot: the height of the clip's floor.
 double floor_height(const std::vector<PosedSkeleton>& poses);
+/// The same from lowest_foot() of each frame.
+double floor_height(std::vector<double> lowest);
+double lowest_foot(const PosedSkeleton& pose);
 
 /// World rotations and hips over the floor. The frames must be at 30 fps already.
 Motion to_motion(const std::vector<PosedSkeleton>& poses, const Joints& rest, double floor_y);

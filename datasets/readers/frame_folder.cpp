@@ -6,6 +6,7 @@
 
 #include "autograd/base/error.h"
 #include "datasets/readers/array_frames.h"
+#include "datasets/readers/gltf.h"
 #include "datasets/readers/mesh_io.h"
 #include "datasets/schema.h"
 #include "datasets/schema_detail.h"
@@ -23,7 +24,7 @@ std::string take_digits(const std::string& text, size_t& at) {
   return text.substr(begin, at - begin);
 }
 
-/// PLY, OBJ or array files, one frame each.
+/// Mesh or array files, one frame each.
 class FileFrames : public FrameSource {
  public:
   FileFrames(std::vector<std::string> files, uint64_t max_memory)
@@ -139,6 +140,34 @@ std::unique_ptr<FrameSource> open_hdf5(const std::string& path) {
   return std::make_unique<VertexFrames>(std::move(file), std::move(set), frames);
 }
 
+/// A character that performs a clip.
+class ClipFrames : public FrameSource {
+ public:
+  ClipFrames(Gltf file, const std::string& clip)
+      : file_(std::move(file)),
+        clip_(&find_clip(file_, clip)),
+        frames_(clip_frames(file_, *clip_)) {
+    if (file_.vertices.empty())
+      throw InputError(file_.path, "holds no mesh that could be seen",
+                       "export the character with its mesh");
+  }
+  std::optional<Frame> next() override {
+    if (at_ == frames_) return std::nullopt;
+    const double seconds = clip_->begin + static_cast<double>(at_) / kFps;
+    Mesh mesh = gltf_mesh(file_, gltf_pose(file_, *clip_, seconds));
+    return Frame{file_.path + ":" + std::to_string(at_++), std::move(mesh.vertices),
+                 std::move(mesh.faces), 0};
+  }
+  void rewind() override { at_ = 0; }
+  int64_t frames() const override { return frames_; }
+  double fps() const override { return kFps; }
+
+ private:
+  Gltf file_;
+  const GltfClip* clip_;  // of file_, which does not move
+  int64_t frames_, at_ = 0;
+};
+
 bool is_hdf5_name(const std::string& path) {
   const std::string extension = std::filesystem::path(path).extension().string();
   return extension == ".h5" || extension == ".hdf5" || extension == ".H5";
@@ -182,21 +211,29 @@ std::unique_ptr<FrameSource> open_frame_files(std::vector<std::string> files, ui
   return std::make_unique<FileFrames>(std::move(files), max_memory);
 }
 
-std::unique_ptr<FrameSource> open_frames(const std::string& path, uint64_t max_memory) {
+std::unique_ptr<FrameSource> open_frames(const std::string& path, const FrameOptions& options) {
   std::error_code error;
-  if (std::filesystem::is_directory(path, error)) {
+  const bool folder = std::filesystem::is_directory(path, error);
+  if (!folder && is_gltf_name(path)) {
+    Gltf file = read_gltf(path);
+    if (!options.clip.empty() || !file.clips.empty())
+      return std::make_unique<ClipFrames>(std::move(file), options.clip);
+  }
+  if (!options.clip.empty())
+    throw InputError(path, "has no clips to choose from", "leave --clip out, or give a glTF file");
+  if (folder) {
     std::vector<std::string> files = frame_files(path);
     if (files.empty())
-      throw InputError(path, "holds no PLY or OBJ files and no arrays (NPY, NPZ)",
+      throw InputError(path, "holds no PLY, OBJ or glTF files and no arrays (NPY, NPZ)",
                        "give a folder of numbered frames");
-    return open_frame_files(std::move(files), max_memory);
+    return open_frame_files(std::move(files), options.max_memory);
   }
   if (is_hdf5_name(path)) return open_hdf5(path);
   if (!std::filesystem::exists(path, error))
     throw InputError(path, "does not exist",
-                     "give a folder of frames, a PLY, OBJ, NPY, NPZ or HDF5 file");
-  if (is_array_name(path)) return open_array_frames(path, max_memory);
-  return open_frame_files({path}, max_memory);
+                     "give a folder of frames, or a PLY, OBJ, glTF, NPY, NPZ or HDF5 file");
+  if (is_array_name(path)) return open_array_frames(path, options.max_memory);
+  return open_frame_files({path}, options.max_memory);
 }
 
 }  // namespace restage

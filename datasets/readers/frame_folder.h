@@ -12,7 +12,7 @@
 namespace restage {
 
 struct Frame {
-  std::string source;           ///< file, or "file:frame number" (from 0) for HDF5 and arrays
+  std::string source;           ///< file, or "file:frame number" (from 0) where it holds several
   Points points;                ///< metres; the number may change from frame to frame
   std::vector<Triangle> faces;  ///< empty for a cloud
   int64_t sequence = 0;         ///< which sequence of an HDF5 file it belongs to
@@ -29,16 +29,22 @@ class FrameSource {
   virtual double fps() const = 0;      ///< the file's rate; kFps where nothing says one
 };
 
-/// A folder of numbered PLY/OBJ files (natural numeric order: f2 before f10; other files are left
-/// out), one PLY/OBJ file, an HDF5 file of scans or predictions (their vertices), or arrays of
-/// points, NPY or NPZ (array_frames.h): one of shape [N, 3] or [F, N, 3], or, without PLY and OBJ
-/// files beside them, a folder of [N, 3]. InputError if there is nothing to read. `max_memory`
-/// bounds what unpacking an array may take.
-std::unique_ptr<FrameSource> open_frames(const std::string& path, uint64_t max_memory = kMaxMemory);
+struct FrameOptions {
+  std::string clip;                  ///< of glTF files: the animation to play; empty: the first
+  uint64_t max_memory = kMaxMemory;  ///< what unpacking an array may take
+};
+
+/// A folder of numbered PLY, OBJ or glTF files (natural numeric order: f2 before f10; other files
+/// are left out), one PLY/OBJ file, an HDF5 file of scans or predictions (their vertices), a glTF
+/// file (its surface performing an animation at 30 fps, or at rest if it has none), or arrays of
+/// points, NPY or NPZ (array_frames.h): one of shape [N, 3] or [F, N, 3], or, without meshes beside
+/// them, a folder of [N, 3]. InputError if there is nothing to read, or a clip is named where there
+/// are none.
+std::unique_ptr<FrameSource> open_frames(const std::string& path, const FrameOptions& options = {});
 
 /// The files of a folder that are its frames, in order; empty if it has none.
 std::vector<std::string> frame_files(const std::string& folder);
-/// These files (PLY, OBJ, arrays [N, 3]) as the frames of one sequence.
+/// These files (PLY, OBJ, glTF, arrays [N, 3]) as the frames of one sequence.
 std::unique_ptr<FrameSource> open_frame_files(std::vector<std::string> files,
                                               uint64_t max_memory = kMaxMemory);
 

@@ -6,6 +6,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "datasets/readers/gltf.h"
 #include "datasets/readers/obj.h"
 #include "datasets/readers/ply.h"
 
@@ -52,7 +53,7 @@ void add_bytes(std::string& out, const T& value) {
 }  // namespace
 
 bool is_mesh_name(const std::string& path) {
-  return ends_in(path, ".ply") || ends_in(path, ".obj");
+  return ends_in(path, ".ply") || ends_in(path, ".obj") || is_gltf_name(path);
 }
 
 Mesh read_mesh(const std::string& path) {
@@ -60,6 +61,9 @@ Mesh read_mesh(const std::string& path) {
   Mesh mesh;
   if (content.empty()) {
     throw InputError(path, "is empty and holds no points", "give a mesh or cloud that has some");
+  } else if (is_gltf_name(path) || content.compare(0, 4, "glTF") == 0) {
+    const Gltf file = parse_gltf(content, path);
+    return gltf_mesh(file, gltf_rest(file));
   } else if (starts_as_ply(content)) {
     mesh = parse_ply(content, path);
   } else if (ends_in(path, ".ply")) {
@@ -68,7 +72,7 @@ Mesh read_mesh(const std::string& path) {
   } else if (ends_in(path, ".obj") || looks_like_obj(content)) {
     mesh = parse_obj(content, path);
   } else {
-    throw InputError(path, "is neither PLY nor OBJ", "convert it to one of them");
+    throw InputError(path, "is neither PLY, OBJ nor glTF", "convert it to one of them");
   }
   check_mesh(mesh, path);
   return mesh;

@@ -4,8 +4,8 @@
 #include <optional>
 
 #include "autograd/base/log.h"
+#include "datasets/importers/gltf_character.h"
 #include "datasets/readers/frame_folder.h"
-#include "datasets/readers/mesh_io.h"
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
@@ -20,7 +20,7 @@ namespace restage::cli {
 namespace {
 
 struct RetargetCommand {
-  std::string source, target, weights, out, up = "y", format = "ply";
+  std::string source, target, weights, out, clip, up = "y", format = "ply";
   std::optional<double> fps;  ///< of the source
   double scale = 1;
   bool force = false, profile = false;
@@ -123,17 +123,26 @@ void log_profile(const Profile& profile) {
   log_info(text);
 }
 
+/// How a character was brought into T-pose; nothing for a plain mesh. Said when all is done: bad
+/// input, which may come late in a source, is answered with one line.
+void log_target(const ImportReport& report) {
+  for (const auto& [name, value] : report.facts)
+    if (name != "joints") log_info(report.file + ": " + name + ": " + value);
+  for (const std::string& remark : report.remarks) log_info(report.file + ": " + remark);
+}
+
 int run_retarget(const RetargetCommand& c, const Common& common) {
   check(c);
   const ModelSet models =
       load_models(weights_path(c.weights), {.skeleton = true, .smrm = true, .deformation = true});
-  const auto frames = open_frames(c.source, common.max_memory);
+  const auto frames = open_frames(c.source, {c.clip, common.max_memory});
   RetargetOptions options;
   options.fps = c.fps.value_or(frames->fps());
   options.force = c.force;
   options.seed = common.seed;
   options.samples = c.samples;
-  Retargeter retargeter(models, read_mesh(c.target), c.target, options);
+  const TargetMesh target = read_target(c.target);
+  Retargeter retargeter(models, target.mesh, c.target, options);
   // The first frame is looked at before anything is written or logged.
   double read = 0;
   const auto next = [&] {
@@ -162,6 +171,7 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
     out += std::ssize(made);
   }
   sink->commit();
+  log_target(target.report);
   if (c.profile) log_profile(profile);
   if (common.json) {
     Json document = {{"out", c.out},
@@ -187,12 +197,16 @@ void add_retarget(Program& program) {
       "restage retarget --source scans/ --target hero.obj --weights w.safetensors --out hero.glb\n"
       "restage retarget --source scans.h5 --target hero.ply --weights runs/demo-1 --out result.h5",
       [c, &program] { return run_retarget(*c, program.common()); });
-  app.add_option("--source", c->source, "folder of clouds, or a file of them (HDF5, NPZ, NPY)")
+  app.add_option("--source", c->source,
+                 "folder of clouds, file of them (HDF5, NPZ, NPY), or glTF animation")
       ->required();
-  app.add_option("--target", c->target, "mesh or cloud in T-pose, y up, facing +z")->required();
+  app.add_option("--target", c->target,
+                 "mesh or cloud in T-pose, y up, facing +z; or a glTF character")
+      ->required();
   app.add_option("--weights", c->weights, "weights file or run directory")->required();
   app.add_option("--out", c->out, "X.glb, X.bvh, X.h5, or a folder for PLY or OBJ frames")
       ->required();
+  app.add_option("--clip", c->clip, "animation of a glTF source (default: the first)");
   app.add_option("--fps", c->fps, "frames per second of the source (default: the file's, else 30)");
   app.add_option("--source-up", c->up, "the source's up axis, y or z");
   app.add_option("--scale", c->scale, "the source's units in metres");

@@ -38,7 +38,7 @@ int run_skeleton(const SkeletonOptions& options, const Common& common) {
   if (options.samples < 1 || options.samples > 256)
     throw InputError("", "--samples is out of range", "give a number from 1 to 256");
   const ModelSet models = load_models(weights_path(options.weights), {.skeleton = true});
-  const auto frames = open_frames(options.input, common.max_memory);
+  const auto frames = open_frames(options.input, {"", common.max_memory});
   std::unique_ptr<PredictionWriter> writer;
   if (!options.out.empty())
     writer = std::make_unique<PredictionWriter>(options.out, 0, std::vector<Triangle>{}, FileInfo{},

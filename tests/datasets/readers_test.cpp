@@ -281,7 +281,7 @@ TEST(Readers, Hdf5ScansAndPredictionsAreFramesToo) {
 
 TEST(Readers, BadSequencesAreOneClearLine) {
   const TempDir dir;
-  EXPECT_NE(error_of([&] { open_frames(dir.path()); }).find("holds no PLY or OBJ files"),
+  EXPECT_NE(error_of([&] { open_frames(dir.path()); }).find("holds no PLY, OBJ or glTF files"),
             std::string::npos);
   EXPECT_NE(error_of([&] { open_frames(dir / "absent"); }).find("does not exist"),
             std::string::npos);

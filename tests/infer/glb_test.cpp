@@ -1,18 +1,10 @@
 #include "infer/writers/glb.h"
 
 #include <gtest/gtest.h>
+#include <tiny_gltf.h>
 
 #include <cstring>
 #include <filesystem>
-// clang-format off
-#include <nlohmann/json.hpp>  // first: tinygltf uses it and is told not to look for its own
-#define TINYGLTF_IMPLEMENTATION
-#define TINYGLTF_NO_STB_IMAGE
-#define TINYGLTF_NO_STB_IMAGE_WRITE
-#define TINYGLTF_NO_EXTERNAL_IMAGE
-#define TINYGLTF_NO_INCLUDE_JSON
-#include <tiny_gltf.h>
-// clang-format on
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"

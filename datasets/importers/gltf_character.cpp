@@ -1,0 +1,196 @@
+#include "datasets/importers/gltf_character.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <set>
+
+#include "autograd/base/error.h"
+#include "datasets/importers/source_motion.h"
+#include "datasets/readers/mesh_io.h"
+#include "datasets/readers/text.h"
+
+namespace restage {
+namespace {
+
+std::string stem_of(const std::string& path) { return std::filesystem::path(path).stem().string(); }
+
+void describe(const Gltf& file, ImportReport& report) {
+  report.file = file.path;
+  size_t joints = 0;
+  for (const GltfBone& bone : file.bones) joints += bone.skin >= 0;
+  report.facts.emplace_back("holds", std::to_string(file.vertices.size()) + " vertices, " +
+                                         std::to_string(file.faces.size()) + " triangles, " +
+                                         std::to_string(file.skin_nodes.size()) + " skins with " +
+                                         std::to_string(joints) + " joints, " +
+                                         std::to_string(file.clips.size()) + " animations");
+  if (!file.humanoid.empty())
+    report.facts.emplace_back("names", "VRM's list of bones, not the nodes' names");
+  report.remarks.insert(report.remarks.end(), file.remarks.begin(), file.remarks.end());
+}
+
+// ---- body --------------------------------------------------------------------------------------
+
+Mesh t_pose_mesh(const Gltf& file, const GltfRig& rig) {
+  Mesh out = gltf_mesh(file, rig.t_pose);
+  for (Point& p : out.vertices) p = rig.to_ours(p.cast<double>()).cast<float>();
+  return out;
+}
+
+/// Moves the lowest point to y = 0 and the pelvis over the origin; gives what was taken off.
+Vec3 put_on_floor(Mesh& mesh, const Vec3& pelvis) {
+  float floor = mesh.vertices[0].y();
+  for (const Point& p : mesh.vertices) floor = std::min(floor, p.y());
+  const Vec3 origin(pelvis.x(), double{floor}, pelvis.z());
+  for (Point& p : mesh.vertices) p = (p.cast<double>() - origin).cast<float>();
+  return origin;
+}
+
+Body body_of(const Gltf& file, const GltfRig& rig) {
+  Body body;
+  body.rest = t_pose_mesh(file, rig);
+  body.joints = t_pose_joints(rig);
+  const Vec3 origin = put_on_floor(body.rest, body.joints[0]);
+  for (Vec3& x : body.joints) x -= origin;
+  body.weights.setZero(static_cast<Eigen::Index>(file.vertices.size()), kJoints);
+  for (size_t v = 0; v < file.vertices.size(); ++v) {
+    auto row = body.weights.row(static_cast<Eigen::Index>(v));
+    for (uint32_t i = file.first_influence[v]; i < file.first_influence[v + 1]; ++i) {
+      const GltfBone& bone = file.bones[static_cast<size_t>(file.influences[i].bone)];
+      row[rig.joint[static_cast<size_t>(bone.node)]] += file.influences[i].weight;
+    }
+  }
+  return body;
+}
+
+// ---- motions -----------------------------------------------------------------------------------
+
+/// Whether a track moves one of the 22 joints or what it hangs on.
+bool moves_joints(const Gltf& file, const GltfRig& rig, const GltfClip& clip) {
+  std::vector<bool> counts(file.nodes.size());
+  for (int n : rig.node)
+    for (; n >= 0 && !counts[static_cast<size_t>(n)]; n = file.nodes[static_cast<size_t>(n)].parent)
+      counts[static_cast<size_t>(n)] = true;
+  return std::any_of(clip.tracks.begin(), clip.tracks.end(), [&](const GltfTrack& track) {
+    return counts[static_cast<size_t>(track.node)];
+  });
+}
+
+std::string rate_of(const Gltf& file, const GltfClip& clip, int64_t frames) {
+  size_t most = 0;
+  for (const GltfTrack& track : clip.tracks)
+    most = std::max(most, file.times[static_cast<size_t>(track.times)].size());
+  const double seconds = clip.end - clip.begin;
+  char out[160];
+  std::snprintf(out, sizeof out,
+                "%.2f s, up to %zu keys a joint (%.4g a second), sampled to %lld frames at 30 fps",
+                seconds, most, seconds > 0 ? static_cast<double>(most - 1) / seconds : 0.0,
+                static_cast<long long>(frames));
+  return out;
+}
+
+Motion motion_of(const Gltf& file, const GltfRig& rig, const GltfClip& clip, int64_t frames) {
+  Motion motion;
+  motion.rest = t_pose_joints(rig);
+  const Vec3 pelvis = motion.rest[0];
+  for (Vec3& x : motion.rest) x -= pelvis;
+  std::vector<double> lowest;
+  for (int64_t f = 0; f < frames; ++f) {
+    const double seconds = clip.begin + static_cast<double>(f) / kFps;
+    const PosedSkeleton pose = rig_pose(rig, gltf_pose(file, clip, seconds));
+    auto& global = motion.global.emplace_back();
+    for (size_t j = 0; j < kJoints; ++j) {
+      if (!pose.joints[j].allFinite() || !pose.global[j].allFinite())
+        throw InputError(file.path,
+                         "frame " + std::to_string(f) + " of " + text::quote(clip.name) +
+                             " puts a joint nowhere",
+                         "export it again with finite scales");
+      global[j] = Quat(pose.global[j]).normalized().cast<float>();
+    }
+    motion.hips.push_back((0.5 * (pose.joints[1] + pose.joints[2])).cast<float>());
+    lowest.push_back(lowest_foot(pose));
+  }
+  const auto floor = static_cast<float>(floor_height(std::move(lowest)));
+  for (Point& p : motion.hips) p.y() -= floor;
+  return motion;
+}
+
+std::vector<Motion> motions_of(const Gltf& file, const GltfRig& rig,
+                               const CharacterOptions& options, ImportReport& report) {
+  std::vector<const GltfClip*> clips;
+  if (!options.clip.empty())
+    clips.push_back(&find_clip(file, options.clip));
+  else
+    for (const GltfClip& clip : file.clips) clips.push_back(&clip);
+  std::vector<Motion> out;
+  std::set<std::string> ids;
+  int64_t left = 100000 + static_cast<int64_t>(file.bytes / 50);  // bounds what a small file makes
+  for (const GltfClip* clip : clips) {
+    if (!moves_joints(file, rig, *clip)) {
+      report.remarks.push_back("clip " + text::quote(clip->name) + " moves none of the joints");
+      continue;
+    }
+    const int64_t frames = clip_frames(file, *clip);
+    left -= frames;
+    if (left < 0)
+      throw InputError(file.path, "its animations are far longer than the keys in it",
+                       "import them one by one (--clip), or cut them");
+    Motion motion = motion_of(file, rig, *clip, frames);
+    std::string id = stem_of(file.path);
+    if (clips.size() > 1 || !options.clip.empty()) id += "_" + clip->name;
+    std::replace(id.begin(), id.end(), '/', '_');
+    motion.id = id;
+    for (int again = 2; !ids.insert(motion.id).second; ++again)
+      motion.id = id + "_" + std::to_string(again);
+    motion.subject = options.subject.empty() ? stem_of(file.path) : options.subject;
+    motion.split = options.split;
+    motion.action = options.action.empty() ? clip->name : options.action;
+    report.facts.emplace_back("clip " + text::quote(clip->name), rate_of(file, *clip, frames));
+    out.push_back(std::move(motion));
+  }
+  return out;
+}
+
+}  // namespace
+
+Character read_character(const std::string& path, const CharacterOptions& options) {
+  const Gltf file = read_gltf(path);
+  Character out;
+  describe(file, out.report);
+  const GltfRig rig = find_rig(file, options.rig, out.report);
+  if (!file.vertices.empty()) {
+    out.body = body_of(file, rig);
+    out.body->id = stem_of(path);
+    out.body->split = options.split;
+  }
+  out.motions = motions_of(file, rig, options, out.report);
+  if (!out.body && out.motions.empty())
+    throw InputError(path, "holds neither a mesh nor an animation of a person",
+                     "export the character with its mesh or its animation");
+  return out;
+}
+
+TargetMesh read_target(const std::string& path) {
+  TargetMesh out;
+  if (!is_gltf_name(path)) {
+    out.mesh = read_mesh(path);
+    return out;
+  }
+  const Gltf file = read_gltf(path);
+  describe(file, out.report);
+  if (file.skin_nodes.empty() || !has_known_joints(file)) {
+    out.report.remarks.push_back(
+        file.skin_nodes.empty()
+            ? "has no rig: its mesh is taken as it stands"
+            : "the joints' names are of no known family: its mesh is taken as it stands");
+    out.mesh = gltf_mesh(file, gltf_rest(file));
+    return out;
+  }
+  const GltfRig rig = find_rig(file, {}, out.report);
+  out.mesh = t_pose_mesh(file, rig);
+  put_on_floor(out.mesh, t_pose_joints(rig)[0]);
+  return out;
+}
+
+}  // namespace restage

@@ -1,0 +1,43 @@
+// Rigged glTF characters (Mixamo, VRM, Unreal, MakeHuman and Anny, SMPL, our own output) as bodies,
+// motions and targets of retargeting.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "datasets/importers/gltf_rig.h"
+
+namespace restage {
+
+struct CharacterOptions {
+  GltfRigOptions rig;
+  std::string clip;  ///< import this animation only; empty: all
+  /// Empty subject: the file's name. Empty action: the clip's name.
+  std::string subject, split = "train", action;
+};
+
+struct Character {
+  std::optional<Body> body;     ///< none, if the file holds no mesh
+  std::vector<Motion> motions;  ///< one per animation that moves the 22 joints
+  ImportReport report;
+};
+
+/// The body stands in T-pose on y = 0 with its pelvis over the origin; weights are those of the
+/// file's bones, each counted for the nearest of the 22 joints at it or above it. The motions are
+/// relative to the same T-pose, sampled at 30 fps by the file's own interpolation (slerp for
+/// LINEAR), over the floor. InputError: see read_gltf() and find_rig(); neither mesh nor motion;
+/// no such clip; more frames than a file of this size can mean.
+Character read_character(const std::string& path, const CharacterOptions& options = {});
+
+struct TargetMesh {
+  Mesh mesh;
+  ImportReport report;  ///< empty for PLY and OBJ
+};
+
+/// What `restage retarget --target` takes: of a glTF character the surface in T-pose, in metres, y
+/// up, facing +z, with all vertices and faces in the file's order; a glTF file without a known rig
+/// as it stands, with a remark; any other mesh as read_mesh() gives it.
+TargetMesh read_target(const std::string& path);
+
+}  // namespace restage

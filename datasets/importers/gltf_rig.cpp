@@ -1,0 +1,444 @@
+#include "datasets/importers/gltf_rig.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+
+#include "autograd/base/error.h"
+#include "datasets/importers/source_motion.h"
+#include "datasets/readers/text.h"
+
+namespace restage {
+namespace {
+
+constexpr double kDegree = M_PI / 180;
+constexpr double kStraight = 5 * kDegree;  // arms nearer than this to the T-pose stay
+
+template <class... Values>
+std::string format(const char* pattern, Values... values) {
+  char out[160];
+  std::snprintf(out, sizeof out, pattern, values...);
+  return out;
+}
+
+/// The rotation in a matrix that may also scale.
+Mat3 rotation_of(const Mat3& m) {
+  const Mat3 unscaled = m / std::cbrt(std::max(std::abs(m.determinant()), 1e-300));
+  if ((unscaled.transpose() * unscaled - Mat3::Identity()).cwiseAbs().maxCoeff() < 1e-9 &&
+      unscaled.determinant() > 0)
+    return unscaled;
+  return Eigen::Affine3d(Eigen::Translation3d(0, 0, 0) * m).rotation();
+}
+
+double angle_of(const Mat3& rotation) { return Eigen::AngleAxisd(rotation).angle(); }
+
+double angle_between(const Vec3& a, const Vec3& b) {
+  const double norms = a.norm() * b.norm();
+  return norms > 0 ? std::acos(std::clamp(a.dot(b) / norms, -1.0, 1.0)) : 0.0;
+}
+
+// ---- bind pose ---------------------------------------------------------------------------------
+
+struct Offset {
+  double degrees = 0, length = 0;
+};
+
+/// How far the nodes of a skin rest from where `mesh` puts their bind pose.
+Offset rest_offset(const std::vector<GltfBone>& bones, const GltfTransforms& rest,
+                   const Eigen::Affine3d& mesh) {
+  Offset out;
+  for (const GltfBone& bone : bones) {
+    const Eigen::Affine3d bound = mesh * bone.inverse_bind.inverse();
+    const Eigen::Affine3d& node = rest[static_cast<size_t>(bone.node)];
+    if (!(std::abs(node.linear().determinant()) > 1e-30)) continue;
+    const Mat3 turn = rotation_of(node.linear() * bound.linear().inverse());
+    out.degrees = std::max(out.degrees, angle_of(turn) / kDegree);
+    out.length = std::max(out.length, (node.translation() - bound.translation()).norm());
+  }
+  return out;
+}
+
+double extent(const std::vector<GltfBone>& bones, const GltfTransforms& rest) {
+  Vec3 low = Vec3::Constant(1e300), high = -low;
+  for (const GltfBone& bone : bones) {
+    low = low.cwiseMin(rest[static_cast<size_t>(bone.node)].translation());
+    high = high.cwiseMax(rest[static_cast<size_t>(bone.node)].translation());
+  }
+  return (high - low).norm();
+}
+
+/// From the space of a skin's vertices to the world, in its bind pose. `bones`: of that skin.
+Eigen::Affine3d bind_space(const Gltf& file, const std::vector<GltfBone>& bones,
+                           const GltfTransforms& rest, ImportReport& report) {
+  const GltfBone& top =
+      *std::min_element(bones.begin(), bones.end(),
+                        [](const GltfBone& a, const GltfBone& b) { return a.node < b.node; });
+  const Eigen::Affine3d by_root = rest[static_cast<size_t>(top.node)] * top.inverse_bind;
+  const Offset off = rest_offset(bones, rest, by_root);
+  if (off.degrees < 0.5 && off.length <= 0.01 * extent(bones, rest)) return by_root;
+  report.remarks.push_back(
+      format("the nodes rest in another pose than the skin was made in (up to %.0f degrees): the "
+             "skin's is taken",
+             off.degrees));
+  // Where the root itself rests turned, the node that wears the mesh says how the mesh stands.
+  const int wearer = file.skin_nodes[static_cast<size_t>(top.skin)];
+  if (wearer < 0) return by_root;
+  const Eigen::Affine3d& by_mesh = rest[static_cast<size_t>(wearer)];
+  const double ratio =
+      by_mesh.linear().determinant() / std::max(std::abs(by_root.linear().determinant()), 1e-300);
+  return std::abs(std::cbrt(ratio) - 1) < 0.01 ? by_mesh : by_root;
+}
+
+GltfTransforms bind_pose(const Gltf& file, ImportReport& report) {
+  const GltfTransforms rest = gltf_rest(file);
+  std::vector<std::vector<GltfBone>> skins(file.skin_nodes.size());
+  for (const GltfBone& bone : file.bones)
+    if (bone.skin >= 0) skins[static_cast<size_t>(bone.skin)].push_back(bone);
+  std::stable_sort(skins.begin(), skins.end(),
+                   [](const auto& a, const auto& b) { return a.size() > b.size(); });
+  GltfTransforms out(rest.size());
+  std::vector<bool> known(rest.size());
+  for (const auto& bones : skins) {
+    if (bones.empty()) continue;
+    // A skin that shares a joint with one that is placed already hangs on it.
+    const auto shared = std::find_if(bones.begin(), bones.end(), [&](const GltfBone& bone) {
+      return known[static_cast<size_t>(bone.node)];
+    });
+    const Eigen::Affine3d space =
+        shared != bones.end() ? out[static_cast<size_t>(shared->node)] * shared->inverse_bind
+                              : bind_space(file, bones, rest, report);
+    for (const GltfBone& bone : bones) {
+      const auto n = static_cast<size_t>(bone.node);
+      if (!known[n]) out[n] = space * bone.inverse_bind.inverse();
+      known[n] = true;
+    }
+  }
+  for (size_t n = 0; n < out.size(); ++n) {
+    if (known[n]) continue;
+    const int p = file.nodes[n].parent;
+    Eigen::Affine3d local;
+    local.fromPositionOrientationScale(file.nodes[n].translation, file.nodes[n].rotation,
+                                       file.nodes[n].scale);
+    out[n] = p < 0 ? local : out[static_cast<size_t>(p)] * local;
+  }
+  return out;
+}
+
+// ---- names -------------------------------------------------------------------------------------
+
+/// Nodes that may be bones: joints of skins and what hangs on them; all, if there are no skins.
+std::vector<int> bone_nodes(const Gltf& file) {
+  std::vector<bool> is(file.nodes.size());
+  bool skins = false;
+  for (const GltfBone& bone : file.bones)
+    if (bone.skin >= 0) skins = is[static_cast<size_t>(bone.node)] = true;
+  std::vector<int> out;
+  for (size_t n = 0; n < is.size(); ++n) {
+    const int p = file.nodes[n].parent;
+    if (!skins || (p >= 0 && is[static_cast<size_t>(p)])) is[n] = true;
+    if (is[n]) out.push_back(static_cast<int>(n));
+  }
+  return out;
+}
+
+/// "Armature_Hips_01" -> "Hips", if all names share such a beginning or such an end.
+void strip_common(std::vector<std::string>& names) {
+  std::vector<std::string*> given;
+  for (std::string& name : names)
+    if (!name.empty()) given.push_back(&name);
+  if (given.size() < 2) return;
+  size_t shared = given[0]->size();
+  for (const std::string* name : given) {
+    const auto [a, b] =
+        std::mismatch(name->begin(), name->end(), given[0]->begin(), given[0]->end());
+    shared = std::min(shared, static_cast<size_t>(a - name->begin()));
+  }
+  const auto end_of = [](const std::string& name) {
+    const size_t last = name.find_last_not_of("0123456789");
+    return last != std::string::npos && last + 1 < name.size() && name[last] == '_' ? last
+                                                                                    : name.size();
+  };
+  const bool numbered = std::all_of(given.begin(), given.end(), [&](const std::string* name) {
+    return end_of(*name) < name->size();
+  });
+  for (std::string* name : given) {
+    if (numbered) name->resize(end_of(*name));
+    name->erase(0, shared);
+  }
+}
+
+/// The zero pose of SourceSkeleton is the bind pose, all axes along the world's. Joint 0 is the
+/// world, joint i + 1 is nodes[i].
+SourceSkeleton skeleton_of(const Gltf& file, const std::vector<int>& nodes,
+                           const GltfTransforms& bind) {
+  SourceSkeleton out;
+  std::vector<int> place(file.nodes.size(), 0);
+  const auto add = [&](const std::string& name, int parent, const Vec3& offset) {
+    out.names.push_back(name);
+    out.parents.push_back(parent);
+    out.offsets.push_back(offset);
+    out.ends.push_back(Vec3::Zero());
+    out.has_end.push_back(0);
+  };
+  add("", -1, Vec3::Zero());
+  for (const int n : nodes) {
+    const GltfNode& node = file.nodes[static_cast<size_t>(n)];
+    const int parent = node.parent < 0 ? 0 : place[static_cast<size_t>(node.parent)];
+    const Vec3 from =
+        parent == 0 ? Vec3(Vec3::Zero()) : bind[static_cast<size_t>(node.parent)].translation();
+    place[static_cast<size_t>(n)] = static_cast<int>(out.size());
+    add(node.name, parent, bind[static_cast<size_t>(n)].translation() - from);
+  }
+  if (file.humanoid.empty()) return out;
+  // A VRM file says which bone is which; what its nodes are called is its author's business.
+  for (std::string& name : out.names) name.clear();
+  for (const auto& [name, n] : file.humanoid)
+    if (const int at = place[static_cast<size_t>(n)]; at > 0)
+      out.names[static_cast<size_t>(at)] = name;
+  return out;
+}
+
+JointMap map_names(SourceSkeleton& skeleton, const std::string& path) {
+  try {
+    return map_joints(skeleton, path);
+  } catch (const InputError&) {
+    SourceSkeleton stripped = skeleton;
+    strip_common(stripped.names);
+    if (stripped.names == skeleton.names) throw;
+    try {
+      const JointMap out = map_joints(stripped, path);
+      skeleton = std::move(stripped);
+      return out;
+    } catch (const InputError&) {
+    }
+    throw;  // what is wrong with the names as they stand in the file
+  }
+}
+
+// ---- units and axes ----------------------------------------------------------------------------
+
+double find_scale(const Joints& joints, const GltfRigOptions& options, const std::string& path,
+                  ImportReport& report) {
+  const double leg = leg_length(joints);
+  double scale = options.scale;
+  if (scale <= 0) {
+    scale = leg >= 0.1 && leg < 4      ? 1.0
+            : leg >= 10 && leg < 400   ? 0.01
+            : leg >= 400 && leg < 4000 ? 0.001
+                                       : 0.0;
+    if (scale == 0)
+      throw InputError(path, "a leg of " + format("%.3g", leg) + " units is no person's in metres",
+                       "give --scale (metres per unit)");
+  }
+  report.facts.emplace_back("units", format("%g m (%s; the leg has %.3g)", scale,
+                                            options.scale > 0 ? "as given"
+                                            : scale == 1.0    ? "the format's"
+                                                              : "by the leg",
+                                            leg));
+  return scale;
+}
+
+/// The quarter turns that bring the body upright.
+Mat3 find_up(const Joints& joints, Axis given, ImportReport& report) {
+  const bool found = given == Axis::automatic;
+  const Axis up = found ? axis_near(joints[15] - 0.5 * (joints[7] + joints[8])) : given;
+  report.facts.emplace_back("up", to_string(up) + (found ? " (from ankles to head)" : " (as given)"));
+  return upright(up);
+}
+
+/// The turn about y that brings the left side to +x: quarters, if it is within 10 degrees of one.
+Mat3 find_front(const Joints& upright, ImportReport& report) {
+  const Vec3 left = (upright[1] - upright[2]) + (upright[16] - upright[17]);
+  const double yaw = std::atan2(left.z(), left.x()), quarter = M_PI / 2;
+  const double nearest = std::round(yaw / quarter) * quarter;
+  const bool quarters = std::abs(yaw - nearest) < 10 * kDegree;
+  const double degrees = std::round((quarters ? nearest : yaw) / kDegree) + 0.0;  // no -0
+  report.facts.emplace_back("facing", format("turned by %.0f degrees to face +z", degrees));
+  if (!quarters) return turn_about_y(yaw);
+  const double c = std::round(std::cos(nearest)), s = std::round(std::sin(nearest));
+  Mat3 out;
+  out << c, 0, s, 0, 1, 0, -s, 0, c;
+  return out;
+}
+
+void check_standing(const Joints& joints, const std::string& path) {
+  struct Limb {
+    int from, to;
+    Vec3 wanted;
+    double limit;  ///< degrees
+  };
+  const Vec3 x = Vec3::UnitX(), y = Vec3::UnitY();
+  const Limb limbs[] = {{1, 4, -y, 60},   {2, 5, -y, 60},    {4, 7, -y, 60},
+                        {5, 8, -y, 60},   {16, 18, x, 120},  {17, 19, -x, 120},
+                        {18, 20, x, 120}, {19, 21, -x, 120}, {0, 15, y, 60}};
+  for (const Limb& limb : limbs) {
+    const Vec3 bone = joints[limb.to] - joints[limb.from];
+    if (!(bone.norm() > 1e-4) || angle_between(bone, limb.wanted) > limb.limit * kDegree)
+      throw InputError(path,
+                       "the skin was not made standing: " + std::string(kJointNames[limb.from]) +
+                           " to " + std::string(kJointNames[limb.to]) +
+                           " does not point as in a T-pose or an A-pose",
+                       "export it with the rest pose of its rig");
+  }
+}
+
+// ---- T-pose ------------------------------------------------------------------------------------
+
+bool is_middle_finger(std::string name) {
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return name.find("middle") != std::string::npos || name.find("finger3") != std::string::npos;
+}
+
+/// The first node of the middle finger below `hand`, or -1.
+int middle_finger(const Gltf& file, int hand) {
+  std::vector<bool> below(file.nodes.size());
+  below[static_cast<size_t>(hand)] = true;
+  for (size_t n = static_cast<size_t>(hand) + 1; n < below.size(); ++n) {
+    const int p = file.nodes[n].parent;
+    if (p < 0 || !below[static_cast<size_t>(p)]) continue;
+    below[n] = true;
+    if (is_middle_finger(file.nodes[n].name)) return static_cast<int>(n);
+    for (const auto& [name, node] : file.humanoid)
+      if (node == static_cast<int>(n) && is_middle_finger(name)) return node;
+  }
+  return -1;
+}
+
+/// World rotations of upper arms, forearms and hands onto the shoulders' line, as the joints show
+/// them; a limb without one keeps its parent's (hands) or its own place (everything else).
+std::array<std::optional<Mat3>, kJoints> arm_turns(const Gltf& file, const GltfRig& rig,
+                                                   const Joints& joints, ImportReport& report) {
+  std::array<std::optional<Mat3>, kJoints> out;
+  std::string words;
+  for (const int side : {0, 1}) {
+    const int shoulder = 16 + side, elbow = shoulder + 2, wrist = shoulder + 4;
+    const Vec3 x = rig.turn.transpose() * Vec3(side == 0 ? 1.0 : -1.0, 0, 0);
+    const int finger = middle_finger(file, rig.node[static_cast<size_t>(wrist)]);
+    const Vec3 knuckle =
+        finger >= 0 ? rig.bind[static_cast<size_t>(finger)].translation() : joints[wrist];
+    const auto turn = [&](int joint, const Vec3& bone, const char* name) {
+      const double angle = angle_between(bone, x);
+      const bool off = angle > kStraight;
+      out[static_cast<size_t>(joint)] = off ? shortest_arc(bone, x) : Mat3(Mat3::Identity());
+      if (off)
+        words += format("%s%s %s %.1f degrees", words.empty() ? "" : ", ",
+                        side == 0 ? "left" : "right", name, angle / kDegree);
+    };
+    turn(shoulder, joints[elbow] - joints[shoulder], "upper arm");
+    turn(elbow, joints[wrist] - joints[elbow], "forearm");
+    if (finger >= 0) turn(wrist, knuckle - joints[wrist], "hand");
+  }
+  report.facts.emplace_back(
+      "rest pose", words.empty() ? "T-pose" : "turned onto the T-pose by shortest arcs: " + words);
+  return out;
+}
+
+/// Every node turns with the nearest of the 22 joints above it that turns.
+GltfTransforms turned(const Gltf& file, const GltfRig& rig,
+                      const std::array<std::optional<Mat3>, kJoints>& turns) {
+  std::vector<Mat3> by(file.nodes.size(), Mat3::Identity());
+  GltfTransforms out(file.nodes.size());
+  for (size_t n = 0; n < out.size(); ++n) {
+    const int p = file.nodes[n].parent;
+    if (p >= 0) by[n] = by[static_cast<size_t>(p)];
+    for (size_t j = 0; j < kJoints; ++j)
+      if (rig.node[j] == static_cast<int>(n) && turns[j]) by[n] = *turns[j];
+    out[n].linear() = by[n] * rig.bind[n].linear();
+    const Vec3 at = rig.bind[n].translation();
+    out[n].translation() = p < 0 ? at
+                                 : Vec3(out[static_cast<size_t>(p)].translation() +
+                                        by[static_cast<size_t>(p)] *
+                                            (at - rig.bind[static_cast<size_t>(p)].translation()));
+  }
+  return out;
+}
+
+void find_nodes(const Gltf& file, GltfRig& rig, const JointMap& map, const std::vector<int>& nodes,
+                 ImportReport& report) {
+  std::vector<int> owner(file.nodes.size(), -1);
+  std::string words;
+  for (size_t j = 0; j < kJoints; ++j) {
+    if (map[j].joint == 0)
+      throw InputError(file.path, "its joints hang on no common bone", "export the whole skeleton");
+    rig.node[j] = nodes[static_cast<size_t>(map[j].joint) - 1];
+    rig.offset[j] = map[j].offset;
+    int& owned = owner[static_cast<size_t>(rig.node[j])];
+    if (owned < 0 || map[j].offset.isZero()) owned = static_cast<int>(j);
+    words += (words.empty() ? "" : ", ") + std::string(kJointNames[j]) + " = " +
+             text::quote(file.nodes[static_cast<size_t>(rig.node[j])].name) +
+             (map[j].offset.isZero() ? "" : " (beside it)");
+  }
+  report.facts.emplace_back("joints", words);
+  rig.joint.assign(file.nodes.size(), 0);
+  for (size_t n = 0; n < owner.size(); ++n)
+    rig.joint[n] = owner[n] >= 0 ? owner[n]
+                   : file.nodes[n].parent < 0
+                       ? 0
+                       : rig.joint[static_cast<size_t>(file.nodes[n].parent)];
+}
+
+}  // namespace
+
+GltfRig find_rig(const Gltf& file, const GltfRigOptions& options, ImportReport& report) {
+  GltfRig rig;
+  rig.bind = bind_pose(file, report);
+  const std::vector<int> nodes = bone_nodes(file);
+  SourceSkeleton skeleton = skeleton_of(file, nodes, rig.bind);
+  const JointMap map = map_names(skeleton, file.path);
+  find_nodes(file, rig, map, nodes, report);
+  Joints joints;
+  for (size_t j = 0; j < kJoints; ++j)
+    joints[j] = rig.bind[static_cast<size_t>(rig.node[j])].translation() + rig.offset[j];
+  rig.scale = find_scale(joints, options, file.path, report);
+  rig.turn = find_up(joints, options.up, report);
+  Joints upright;
+  for (size_t j = 0; j < kJoints; ++j) upright[j] = rig.to_ours(joints[j]);
+  const Mat3 front = find_front(upright, report);
+  for (Vec3& x : upright) x = front * x;
+  rig.turn = front * rig.turn;
+  check_standing(upright, file.path);
+  const auto turns = arm_turns(file, rig, joints, report);
+  rig.t_pose = turned(file, rig, turns);
+  for (size_t j = 0; j < kJoints; ++j) {
+    const auto n = static_cast<size_t>(rig.node[j]);
+    if (!(std::abs(rig.bind[n].linear().determinant()) > 1e-30))
+      throw InputError(file.path, "bone " + text::quote(file.nodes[n].name) + " has no size",
+                       "export it with scales other than 0");
+    rig.offset[j] = rig.t_pose[n].linear() * rig.bind[n].linear().inverse() * rig.offset[j];
+  }
+  return rig;
+}
+
+bool has_known_joints(const Gltf& file) {
+  SourceSkeleton skeleton = skeleton_of(file, bone_nodes(file), gltf_rest(file));
+  try {
+    map_names(skeleton, file.path);
+    return true;
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+Joints t_pose_joints(const GltfRig& rig) {
+  Joints out;
+  for (size_t j = 0; j < kJoints; ++j)
+    out[j] =
+        rig.to_ours(rig.t_pose[static_cast<size_t>(rig.node[j])].translation() + rig.offset[j]);
+  return out;
+}
+
+PosedSkeleton rig_pose(const GltfRig& rig, const GltfTransforms& world) {
+  PosedSkeleton out;
+  for (size_t j = 0; j < kJoints; ++j) {
+    const auto n = static_cast<size_t>(rig.node[j]);
+    const Mat3 from_t = world[n].linear() * rig.t_pose[n].linear().inverse();
+    out.global[j] = rig.turn * rotation_of(from_t) * rig.turn.transpose();
+    out.joints[j] = rig.to_ours(world[n].translation() + from_t * rig.offset[j]);
+  }
+  return out;
+}
+
+}  // namespace restage

@@ -1,0 +1,54 @@
+// Whose bones they are: the rig of a glTF character in terms of the 22 joints, and its T-pose.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "datasets/importers/axis.h"
+#include "datasets/importers/report.h"
+#include "datasets/readers/gltf.h"
+
+namespace restage {
+
+/// Everything but `scale` and `turn` is in the file's own world.
+struct GltfRig {
+  /// The pose in which the skin was made. Taken from the inverse bind matrices, because nodes often
+  /// rest in the first frame of an animation; without a skin it is where the nodes rest.
+  GltfTransforms bind;
+  /// The bind pose with upper arms, forearms and hands along the shoulders' line, by the shortest
+  /// arcs, where they are more than 5 degrees off; twist and everything else stays.
+  GltfTransforms t_pose;
+  std::array<int, kJoints> node{};     ///< which turns with each of the 22 joints
+  std::array<Vec3, kJoints> offset{};  ///< of the joint from its node, T-pose
+  std::vector<int> joint;              ///< per node: the nearest of the 22 at it or above it
+  double scale = 1;                    ///< metres per unit
+  Mat3 turn = Mat3::Identity();        ///< to y up, facing +z
+
+  Vec3 to_ours(const Vec3& x) const { return scale * (turn * x); }
+};
+
+struct GltfRigOptions {
+  /// Metres per unit. 0: by the leg (hip-knee-ankle): [0.1, 4) units are metres, as the format has
+  /// it, [10, 400) centimetres, [400, 4000) millimetres; else InputError.
+  double scale = 0;
+  /// automatic: the axis along which the head is furthest from the ankles.
+  Axis up = Axis::automatic;
+};
+
+/// Finds the joints by VRM's list of bones or by name (map_joints(); a prefix that all names share
+/// and a number at all their ends are left out where needed). Adds to the report what was found.
+/// InputError: names of no known family, a bind pose that does not stand with its arms out, to the
+/// front or down, unknown units.
+GltfRig find_rig(const Gltf& file, const GltfRigOptions& options, ImportReport& report);
+
+/// Whether find_rig() would find all joints that it needs.
+bool has_known_joints(const Gltf& file);
+
+/// Positions of the 22 joints in the T-pose, our axes and metres.
+Joints t_pose_joints(const GltfRig& rig);
+
+/// The 22 joints when the nodes are at `world`: rotations relative to the T-pose.
+PosedSkeleton rig_pose(const GltfRig& rig, const GltfTransforms& world);
+
+}  // namespace restage

@@ -1,0 +1,53 @@
+// Shared by the files gltf*.cpp of this folder only.
+#pragma once
+
+#include <tiny_gltf.h>
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "autograd/base/error.h"
+
+namespace restage::gltf {
+
+/// Bytes that may still be taken for values of a file. Data may be named any number of times, so
+/// what a small file asks for can be without limit.
+class Allowance {
+ public:
+  Allowance(uint64_t payload, std::string path)
+      : left_((uint64_t{48} << 20) + 6 * payload), path_(std::move(path)) {}
+  void spend(uint64_t count, uint64_t size);
+
+ private:
+  uint64_t left_;
+  std::string path_;
+};
+
+/// The structure as tinygltf reads it, and the bytes it points into.
+struct Document {
+  std::string path;
+  tinygltf::Model model;  ///< without buffers, pictures, materials, extras and extensions
+  std::vector<std::string> storage;       ///< what buffers point into, if not into the file
+  std::vector<std::string_view> buffers;  ///< as long as they are declared
+  std::vector<std::pair<std::string, int>> humanoid;  ///< VRM: name of a bone, number of its node
+  uint64_t payload = 0;  ///< bytes of the file and of all that it names
+};
+
+/// `content` must outlive the document.
+Document parse_document(std::string_view content, const std::string& path);
+
+[[noreturn]] void broken(const std::string& path, const std::string& what);
+/// `index` as a place in a list of `size`.
+size_t checked(int64_t index, size_t size, const std::string& path, const std::string& what);
+
+/// The numbers of accessor `index`, which must be of this type (TINYGLTF_TYPE_...), as floats:
+/// normalised integers as the format says, other integers as they are.
+std::vector<float> read_floats(const Document& document, int index, int type,
+                               const std::string& what, Allowance& allowance);
+/// Unsigned integers of any width.
+std::vector<uint32_t> read_integers(const Document& document, int index, int type,
+                                    const std::string& what, Allowance& allowance);
+
+}  // namespace restage::gltf

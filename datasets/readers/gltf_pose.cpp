@@ -1,0 +1,138 @@
+// Where nodes and vertices are: hierarchy, key frames, linear blend skinning.
+#include <algorithm>
+#include <cmath>
+
+#include "autograd/base/error.h"
+#include "datasets/readers/gltf.h"
+#include "datasets/readers/text.h"
+
+namespace restage {
+namespace {
+
+using Path = GltfTrack::Path;
+using Interpolation = GltfTrack::Interpolation;
+
+/// The keys about a time: `t` of the way from `a` to `b`, which are `seconds` apart.
+struct Between {
+  size_t a, b;
+  double t, seconds;
+};
+
+Between find_keys(const std::vector<float>& times, double seconds) {
+  const auto after = std::upper_bound(times.begin(), times.end(), seconds,
+                                      [](double s, float key) { return s < double{key}; });
+  const auto b = static_cast<size_t>(after - times.begin());
+  if (b == 0) return {0, 0, 0, 0};
+  if (b == times.size()) return {b - 1, b - 1, 0, 0};
+  const double from = double{times[b - 1]}, span = double{times[b]} - from;
+  return {b - 1, b, span > 0 ? (seconds - from) / span : 0, span};
+}
+
+/// One key's value; `part` 0 in-tangent, 1 value, 2 out-tangent of a cubic track.
+Eigen::Vector4d key(const GltfTrack& track, size_t k, size_t part) {
+  const size_t width = track.path == Path::rotation ? 4 : 3;
+  const size_t at = track.interpolation == Interpolation::cubic ? 3 * k + part : k;
+  Eigen::Vector4d out = Eigen::Vector4d::Zero();
+  for (size_t c = 0; c < width; ++c)
+    out[static_cast<Eigen::Index>(c)] = track.values[at * width + c];
+  return out;
+}
+
+Quat unit(const Eigen::Vector4d& xyzw) {
+  const double norm = xyzw.norm();
+  return norm > 1e-9 ? Quat(Eigen::Vector4d(xyzw / norm)) : Quat::Identity();
+}
+
+/// The format's appendix C.
+Eigen::Vector4d value_at(const GltfTrack& track, const Between& at) {
+  if (at.a == at.b || track.interpolation == Interpolation::step) return key(track, at.a, 1);
+  const double t = at.t;
+  if (track.interpolation == Interpolation::cubic) {
+    const double t2 = t * t, t3 = t2 * t;
+    return (2 * t3 - 3 * t2 + 1) * key(track, at.a, 1) +
+           at.seconds * (t3 - 2 * t2 + t) * key(track, at.a, 2) +
+           (3 * t2 - 2 * t3) * key(track, at.b, 1) + at.seconds * (t3 - t2) * key(track, at.b, 0);
+  }
+  if (track.path == Path::rotation)
+    return unit(key(track, at.a, 1)).slerp(t, unit(key(track, at.b, 1))).coeffs();
+  return (1 - t) * key(track, at.a, 1) + t * key(track, at.b, 1);
+}
+
+GltfTransforms to_world(const std::vector<GltfNode>& nodes) {
+  GltfTransforms out(nodes.size());
+  for (size_t n = 0; n < nodes.size(); ++n) {
+    const GltfNode& node = nodes[n];
+    Eigen::Affine3d local;
+    local.fromPositionOrientationScale(node.translation, node.rotation, node.scale);
+    out[n] = node.parent < 0 ? local : out[static_cast<size_t>(node.parent)] * local;
+  }
+  return out;
+}
+
+}  // namespace
+
+GltfTransforms gltf_rest(const Gltf& file) { return to_world(file.nodes); }
+
+GltfTransforms gltf_pose(const Gltf& file, const GltfClip& clip, double seconds) {
+  std::vector<GltfNode> nodes = file.nodes;
+  for (const GltfTrack& track : clip.tracks) {
+    const auto& times = file.times[static_cast<size_t>(track.times)];
+    const Eigen::Vector4d value = value_at(track, find_keys(times, seconds));
+    GltfNode& node = nodes[static_cast<size_t>(track.node)];
+    if (track.path == Path::rotation) node.rotation = unit(value);
+    if (track.path == Path::translation) node.translation = value.head<3>();
+    if (track.path == Path::scale) node.scale = value.head<3>();
+  }
+  return to_world(nodes);
+}
+
+void gltf_skin(const Gltf& file, const GltfTransforms& nodes, Points& out) {
+  using Rows = Eigen::Matrix<double, 3, 4>;
+  std::vector<Rows> bones;
+  bones.reserve(file.bones.size());
+  for (const GltfBone& bone : file.bones)
+    bones.push_back((nodes[static_cast<size_t>(bone.node)] * bone.inverse_bind).affine());
+  out.resize(file.vertices.size());
+  for (size_t v = 0; v < out.size(); ++v) {
+    Rows sum = Rows::Zero();
+    for (uint32_t i = file.first_influence[v]; i < file.first_influence[v + 1]; ++i)
+      sum +=
+          double{file.influences[i].weight} * bones[static_cast<size_t>(file.influences[i].bone)];
+    const Eigen::Vector4d at = file.vertices[v].cast<double>().homogeneous();
+    out[v] = (sum * at).cast<float>();
+    if (!out[v].allFinite())
+      throw InputError(file.path, "its transforms put vertex " + std::to_string(v) + " nowhere",
+                       "export it again with finite scales");
+  }
+}
+
+Mesh gltf_mesh(const Gltf& file, const GltfTransforms& nodes) {
+  if (file.vertices.empty())
+    throw InputError(file.path, "holds no mesh", "export the character with its mesh");
+  Mesh out;
+  gltf_skin(file, nodes, out.vertices);
+  out.faces = file.faces;
+  return out;
+}
+
+const GltfClip& find_clip(const Gltf& file, const std::string& name) {
+  if (file.clips.empty()) throw InputError(file.path, "holds no animation", "export it with one");
+  if (name.empty()) return file.clips.front();
+  std::string known;
+  for (const GltfClip& clip : file.clips) {
+    if (clip.name == name) return clip;
+    if (known.size() < 120) known += (known.empty() ? "" : ", ") + text::quote(clip.name);
+  }
+  throw InputError(file.path, "holds no clip " + text::quote(name), "name one of " + known);
+}
+
+int64_t clip_frames(const Gltf& file, const GltfClip& clip, double fps) {
+  constexpr double kLongest = 9 * 3600;
+  const double seconds = clip.end - clip.begin;
+  if (!(seconds <= kLongest))
+    throw InputError(file.path, "clip " + text::quote(clip.name) + " lasts longer than 9 hours",
+                     "cut it into shorter ones");
+  return static_cast<int64_t>(std::floor(seconds * fps + 1e-3)) + 1;
+}
+
+}  // namespace restage

@@ -1,0 +1,111 @@
+"""Rigged glTF characters: as bodies and motions, as targets, as sources."""
+import json
+import os
+import struct
+import sys
+
+from support import CliTest, points
+from tiny_run import TPOSES, weights
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "docs"))
+from anny_to_glb import write_glb  # noqa: E402: what the documentation tells users to run
+
+NAMES = ["pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle", "right_ankle",
+         "spine3", "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head", "left_shoulder",
+         "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist"]
+PARENTS = [-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19]
+# An A-pose with z up, as Anny's: x, depth towards -y, height.
+HEADS = [(0, 0, .95), (.09, 0, .88), (-.09, 0, .88), (0, 0, 1.06), (.1, 0, .48), (-.1, 0, .48), (0, 0, 1.2), (.1, 0, .08),
+         (-.1, 0, .08), (0, 0, 1.27), (.1, -.1, .02), (-.1, -.1, .02), (0, 0, 1.47), (.07, 0, 1.39), (-.07, 0, 1.39),
+         (0, 0, 1.56), (.18, 0, 1.41), (-.18, 0, 1.41), (.38, 0, 1.21), (-.38, 0, 1.21), (.58, 0, 1.01), (-.58, 0, 1.01)]
+
+
+def character(path, names=NAMES):
+    """Every bone carries three points about its head; 16 of 66 triangles cross from bone to bone."""
+    vertices, faces, w, index = [], [], [], []
+    for bone, (x, y, z) in enumerate(HEADS):
+        first = len(vertices)
+        vertices += [(x + .03, y, z), (x, y + .03, z), (x, y, z + .03)]
+        faces += [(first, first + 1, first + 2), (first, first + 1, max(first - 3, 0)), (first, first + 2, max(first - 2, 0))]
+        w += [[.75, .25, 0, 0, 0]] * 3
+        index += [[bone, max(PARENTS[bone], 0), 0, 0, 0]] * 3
+    write_glb(path, vertices, faces, names, PARENTS, HEADS, w, index)
+    return len(vertices), faces
+
+
+class Gltf(CliTest):
+    def setUp(self):
+        super().setUp()
+        self.vertices, self.faces = character(self.path("hero.glb"))
+
+    def change(self, name, change):
+        """A copy of hero.glb with another structure."""
+        data = self.bytes("hero.glb")
+        size = struct.unpack("<I", data[12:16])[0]
+        root = json.loads(data[20:20 + size])
+        change(root)
+        text = json.dumps(root).encode()
+        text += b" " * (-len(text) % 4)
+        rest = data[20 + size:]
+        return self.write(name, struct.pack("<4sIII4s", b"glTF", 2, 20 + len(text) + len(rest), len(text), b"JSON") + text + rest)
+
+    def test_import_says_what_it_found(self):
+        found = self.json("data", "import", "hero.glb", "--out", "hero.h5", "--license", "CC0-1.0")
+        self.assertEqual((found["bodies"], found["motions"], found["skipped"]), (1, 0, []))
+        facts = found["reports"][0]["facts"]
+        self.assertIn("z (from", facts["up"])
+        self.assertIn("left upper arm 45.0 degrees", facts["rest pose"])
+        self.assertIn("left_knee = 'left_knee'", facts["joints"])
+        self.assertEqual(self.json("data", "verify", "hero.h5")["problems"], [])
+        counts = self.json("data", "inspect", "hero.h5")["counts"]
+        self.assertEqual(counts["bodies"], 1)
+        text = self.done("data", "import", "hero.glb", "--out", "hero.h5")
+        self.assertIn("  rest pose   turned onto the T-pose", text)
+
+    def test_a_folder_may_mix_files(self):
+        os.makedirs(self.path("in"))
+        os.rename(self.path("hero.glb"), self.path("in/hero.glb"))
+        self.write("in/bad.glb", b"glTF")
+        found = self.json("data", "import", "in", "--out", "all.h5")
+        self.assertEqual((found["bodies"], len(found["skipped"])), (1, 1))
+
+    def test_cut_short_anywhere(self):
+        whole = self.bytes("hero.glb")
+        for percent in range(0, 100, 7):
+            self.write("cut.glb", whole[:len(whole) * percent // 100])
+            self.bad_input(["data", "import", "cut.glb", "--out", "x.h5"], "cut.glb")
+
+    def test_what_cannot_be_read(self):
+        draco = self.change("draco.glb", lambda r: r.update(extensionsRequired=["KHR_draco_mesh_compression"]))
+        self.bad_input(["data", "import", draco, "--out", "x.h5"], "Draco", "without mesh compression")
+        names = self.change("names.glb", lambda r: r["nodes"][4].update(name="bone"))
+        self.bad_input(["data", "import", names, "--out", "x.h5"], "left_knee")
+        outside = self.change("outside.glb", lambda r: r["buffers"][0].update(uri="../secret.bin"))
+        self.bad_input(["data", "import", outside, "--out", "x.h5"], "outside of its folder")
+        self.bad_input(["data", "import", "hero.glb", "--out", "x.h5", "--clip", "walk"], "no animation")
+        self.bad_input(["data", "import", "hero.glb", "--out", "x.h5", "--fps", "24"], "--fps")
+        self.bad_input(["data", "import", "hero.glb", "--out", "x.h5", "--rest-frame", "0"], "--rest-frame")
+
+    def test_clips_are_of_gltf_files(self):
+        self.write("walk.bvh", "HIERARCHY\n")
+        self.bad_input(["data", "import", "walk.bvh", "--out", "x.h5", "--clip", "walk"], "--clip")
+
+    def test_target_and_source(self):
+        w = weights("tposes", *TPOSES)
+        for i in range(5):
+            self.ply("scans/f%d.ply" % i, points(120, i))
+        call = ["retarget", "--weights", w, "--force"]
+        result = self.restage(*call, "--source", "scans", "--target", "hero.glb", "--out", "first.glb")
+        self.assertEqual(result.code, 0, result.err)
+        self.assertIn("rest pose", result.err)
+        # What we wrote comes back in: as a source, frame by frame, and as a target.
+        self.ply("plain.ply", points(90, 7))
+        self.done(*call, "--source", "first.glb", "--target", "plain.ply", "--out", "second.h5")
+        self.assertEqual(self.json("data", "inspect", "second.h5")["counts"]["frames"], 5)
+        self.done(*call, "--source", "scans", "--target", "first.glb", "--out", "third.h5")
+        self.assertEqual(self.json("data", "inspect", "third.h5")["counts"]["vertices"], self.vertices)
+        found = self.json("data", "import", "first.glb", "--out", "first.h5")
+        self.assertEqual((found["bodies"], found["motions"], found["frames"]), (1, 1, 5))
+        self.bad_input(call + ["--source", "first.glb", "--clip", "jump", "--target", "plain.ply", "--out", "x.h5"],
+                       "jump", "'motion'")
+        self.bad_input(call + ["--source", "scans", "--clip", "jump", "--target", "plain.ply", "--out", "x.h5"], "--clip")

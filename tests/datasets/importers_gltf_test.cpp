@@ -1,0 +1,380 @@
+// Rigged characters as bodies, motions and targets: styles of exporters with known poses, compared
+// in degrees and millimetres; our own output comes back in.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "autograd/base/atomic_file.h"
+#include "autograd/base/error.h"
+#include "datasets/importers/gltf_character.h"
+#include "datasets/importers/import.h"
+#include "datasets/readers/frame_folder.h"
+#include "datasets/readers/mesh_io.h"
+#include "datasets/schema.h"
+#include "infer/writers/glb.h"
+#include "tests/datasets/gltf_maker.h"
+
+namespace restage {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::CharacterMaker;
+using testing::known_character;
+using testing::KnownCharacter;
+using testing::plain_style;
+using testing::RigStyle;
+
+const Mat3 kLyingDown = Eigen::AngleAxisd(-M_PI / 2, Vec3::UnitX()).toRotationMatrix();
+const Mat3 kTurnedRound = Eigen::AngleAxisd(M_PI, Vec3::UnitY()).toRotationMatrix();
+
+Eigen::Affine3d scaled(double scale, const Mat3& turn = Mat3::Identity()) {
+  Eigen::Affine3d out = Eigen::Affine3d::Identity();
+  out.linear() = scale * turn;
+  return out;
+}
+
+/// Mixamo through Blender: centimetres and z up below an armature of scale 0.01, bones with axes.
+RigStyle mixamo_style(const std::string& prefix = "mixamorig:") {
+  RigStyle out;
+  const char* names[kJoints] = {
+      "Hips",        "LeftUpLeg",    "RightUpLeg",    "Spine",    "LeftLeg",     "RightLeg",
+      "Spine1",      "LeftFoot",     "RightFoot",     "Spine2",   "LeftToeBase", "RightToeBase",
+      "Neck",        "LeftShoulder", "RightShoulder", "Head",     "LeftArm",     "RightArm",
+      "LeftForeArm", "RightForeArm", "LeftHand",      "RightHand"};
+  for (int j = 0; j < kJoints; ++j) out.names[j] = prefix + names[j];
+  out.armature = scaled(0.01, kLyingDown);
+  out.bone_axes = true;
+  return out;
+}
+
+/// Unreal: an A-pose, twist bones, centimetres that nothing scales.
+RigStyle unreal_style() {
+  RigStyle out;
+  out.names = {"pelvis",     "thigh_l",    "thigh_r",    "spine_01", "calf_l",     "calf_r",
+               "spine_02",   "foot_l",     "foot_r",     "spine_03", "ball_l",     "ball_r",
+               "neck_01",    "clavicle_l", "clavicle_r", "head",     "upperarm_l", "upperarm_r",
+               "lowerarm_l", "lowerarm_r", "hand_l",     "hand_r"};
+  out.world = scaled(100);
+  out.armature = scaled(1, kLyingDown);
+  out.bone_axes = true;
+  out.arms_down = 45;
+  out.twist_bones = true;
+  out.fps = 24;
+  out.keys = 25;
+  return out;
+}
+
+/// VRM 0: faces -z; nodes have names of their own, the extension says which bone is which.
+RigStyle vrm_style() {
+  RigStyle out;
+  for (int j = 0; j < kJoints; ++j) out.names[j] = "J_" + std::to_string(100 + j);
+  out.world = scaled(1, kTurnedRound);
+  return out;
+}
+
+const char* kVrmNames[kJoints] = {
+    "hips",         "leftUpperLeg",  "rightUpperLeg", "spine",      "leftLowerLeg", "rightLowerLeg",
+    "chest",        "leftFoot",      "rightFoot",     "upperChest", "leftToes",     "rightToes",
+    "neck",         "leftShoulder",  "rightShoulder", "head",       "leftUpperArm", "rightUpperArm",
+    "leftLowerArm", "rightLowerArm", "leftHand",      "rightHand"};
+
+class ImportersGltf : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = ::testing::TempDir() + "importers_gltf_" +
+              ::testing::UnitTest::GetInstance()->current_test_info()->name();
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  std::string path(const std::string& name) const { return folder_ + "/" + name; }
+  std::string write(const std::string& name, const testing::GlbParts& parts) const {
+    write_file_atomically(path(name), parts.glb());
+    return path(name);
+  }
+  std::string write(const std::string& name, const RigStyle& style) const {
+    return write(name, CharacterMaker(known_, style).parts);
+  }
+
+  /// Largest distance to the known T-pose, metres; the file's character is put over the origin.
+  double largest_distance(const Points& found) const {
+    const Body& body = known_.body;
+    float floor = 1e9f;
+    for (const Point& p : body.rest.vertices) floor = std::min(floor, p.y());
+    double out = found.size() == body.rest.vertices.size() ? 0 : 1e9;
+    for (size_t v = 0; v < found.size() && out < 1e9; ++v) {
+      const Point shift(static_cast<float>(body.joints[0].x()), floor,
+                        static_cast<float>(body.joints[0].z()));
+      out = std::max(out, double{(found[v] - (body.rest.vertices[v] - shift)).norm()});
+    }
+    return out;
+  }
+
+  /// Body, joints and every frame of the motion are what was put in.
+  void expect_known(const Character& found, double degrees, double metres) const {
+    ASSERT_TRUE(found.body);
+    EXPECT_LT(largest_distance(found.body->rest.vertices), metres);
+    EXPECT_EQ(found.body->rest.faces, known_.body.rest.faces);
+    EXPECT_TRUE(found.body->weights.isApprox(known_.body.weights));
+    ASSERT_EQ(found.motions.size(), 1u);
+    const Motion& motion = found.motions[0];
+    ASSERT_EQ(motion.frames(), 31u);
+    double worst = 0, worst_joint = 0, floor = 0;
+    for (size_t f = 0; f < motion.frames(); ++f) {
+      const PosedSkeleton truth =
+          forward_kinematics(known_.body.joints, known_.pose(static_cast<double>(f) / kFps));
+      for (int j = 0; j < kJoints; ++j) {
+        const Quat q(truth.global[j]);
+        worst = std::max(worst, q.angularDistance(motion.global[f][j].cast<double>()));
+      }
+      const Vec3 hips = 0.5 * (truth.joints[1] + truth.joints[2]);
+      if (f == 0) floor = hips.y() - double{motion.hips[0].y()};
+      worst_joint =
+          std::max(worst_joint, (motion.hips[f].cast<double>() + Vec3(0, floor, 0) - hips).norm());
+    }
+    EXPECT_LT(worst * 180 / M_PI, degrees);
+    EXPECT_LT(worst_joint, metres);
+    for (int j = 0; j < kJoints; ++j) {
+      EXPECT_LT((motion.rest[j] - (known_.body.joints[j] - known_.body.joints[0])).norm(), metres);
+      EXPECT_LT((found.body->joints[j] - found.body->joints[0] -
+                 (known_.body.joints[j] - known_.body.joints[0]))
+                    .norm(),
+                metres);
+    }
+  }
+
+  static std::string fact(const ImportReport& report, const std::string& name) {
+    for (const auto& [key, value] : report.facts)
+      if (key == name) return value;
+    return "";
+  }
+
+  std::string folder_;
+  KnownCharacter known_ = known_character();
+};
+
+TEST_F(ImportersGltf, MixamoInCentimetresBelowAScaledNode) {
+  const Character found = read_character(write("hero.glb", mixamo_style()));
+  expect_known(found, 0.05, 1e-4);
+  EXPECT_EQ(found.body->id, "hero");
+  EXPECT_EQ(found.motions[0].action, "walk");
+  EXPECT_EQ(fact(found.report, "rest pose"), "T-pose");
+  EXPECT_NE(fact(found.report, "joints").find("left_elbow = 'mixamorig:LeftForeArm'"),
+            std::string::npos);
+  EXPECT_NE(fact(found.report, "clip 'walk'").find("60 a second"), std::string::npos);
+}
+
+TEST_F(ImportersGltf, PrefixesAndNumbersOfNamesAreLeftOut) {
+  RigStyle style = mixamo_style("mixamorig");  // as three.js writes it
+  expect_known(read_character(write("hero.glb", style)), 0.05, 1e-4);
+  for (int j = 0; j < kJoints; ++j)
+    style.names[j] += "_0" + std::to_string(j);  // as Sketchfab does
+  expect_known(read_character(write("hero.glb", style)), 0.05, 1e-4);
+}
+
+TEST_F(ImportersGltf, UnrealInAnAPoseWithTwistBones) {
+  const Character found = read_character(write("hero.glb", unreal_style()));
+  expect_known(found, 0.4, 1e-3);  // 24 keys a second of a smooth motion, between them by slerp
+  EXPECT_NE(fact(found.report, "units").find("0.01 m"), std::string::npos);
+  EXPECT_NE(fact(found.report, "rest pose").find("left upper arm 45.0 degrees"), std::string::npos);
+}
+
+TEST_F(ImportersGltf, VrmByItsListOfBonesTurnedToTheFront) {
+  for (const bool list : {true, false}) {
+    CharacterMaker maker(known_, vrm_style());
+    testing::GltfJson bones;
+    for (int j = 0; j < kJoints; ++j) {
+      if (list)
+        bones.push_back({{"bone", kVrmNames[j]}, {"node", j}});
+      else
+        bones[kVrmNames[j]] = {{"node", j}};
+    }
+    maker.parts.root["extensions"][list ? "VRM" : "VRMC_vrm"]["humanoid"]["humanBones"] = bones;
+    const Character found = read_character(write("hero.vrm", maker.parts));
+    expect_known(found, 0.05, 1e-4);
+    EXPECT_NE(fact(found.report, "facing").find("180"), std::string::npos);
+  }
+  // Without the list the names say nothing.
+  EXPECT_THROW(read_character(write("hero.glb", vrm_style())), InputError);
+}
+
+TEST_F(ImportersGltf, NodesThatRestInAnAnimationDoNotMatter) {
+  RigStyle style = mixamo_style();
+  style.nodes_rest_posed = true;
+  const Character found = read_character(write("hero.glb", style));
+  expect_known(found, 0.05, 1e-4);
+  ASSERT_EQ(found.report.remarks.size(), 1u);
+  EXPECT_NE(found.report.remarks[0].find("another pose"), std::string::npos);
+}
+
+TEST_F(ImportersGltf, AxesAndUnitsOfEveryKindComeOutRight) {
+  const Mat3 z_up = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitX()).toRotationMatrix();
+  const Mat3 oblique = turn_about_y(0.6);
+  for (const Mat3& turn : {z_up, kTurnedRound, oblique, Mat3(z_up * kTurnedRound)})
+    for (const double scale : {1.0, 100.0, 1000.0}) {
+      RigStyle style = plain_style();
+      style.world = scaled(scale, turn);
+      style.bone_axes = true;
+      expect_known(read_character(write("hero.glb", style)), 0.05, 1e-4);
+    }
+  RigStyle style = plain_style();
+  style.world = scaled(1 / 0.0254);
+  CharacterOptions inches;
+  inches.rig.scale = 0.0254;
+  expect_known(read_character(write("hero.glb", style), inches), 0.05, 1e-4);
+  style.world = scaled(7);
+  EXPECT_THROW(read_character(write("hero.glb", style)), InputError);
+}
+
+TEST_F(ImportersGltf, TargetStandsInTPoseWithItsVerticesInOrder) {
+  const TargetMesh found = read_target(write("hero.glb", unreal_style()));
+  EXPECT_LT(largest_distance(found.mesh.vertices), 1e-4);
+  EXPECT_EQ(found.mesh.faces, known_.body.rest.faces);
+  // Unknown names: as it stands, and said so.
+  const TargetMesh unknown = read_target(write("alien.glb", vrm_style()));
+  EXPECT_EQ(unknown.mesh.faces, known_.body.rest.faces);
+  ASSERT_FALSE(unknown.report.remarks.empty());
+  EXPECT_NE(unknown.report.remarks[0].find("as it stands"), std::string::npos);
+  // Any other mesh is taken as before.
+  write_ply(path("hero.ply"), known_.body.rest);
+  EXPECT_EQ(read_target(path("hero.ply")).mesh.vertices, known_.body.rest.vertices);
+}
+
+TEST_F(ImportersGltf, AnimationPlaysAsASequenceOfSurfaces) {
+  const std::string file = write("hero.glb", mixamo_style());
+  const auto frames = open_frames(file);
+  ASSERT_EQ(frames->frames(), 31);
+  for (int f = 0; f < 31; ++f) {
+    const auto frame = frames->next();
+    ASSERT_TRUE(frame);
+    const Points truth = linear_blend_skinning(known_.body, known_.pose(f / kFps));
+    ASSERT_EQ(frame->points.size(), truth.size());
+    for (size_t v = 0; v < truth.size(); ++v)
+      ASSERT_LT((frame->points[v] - truth[v]).norm(), 1e-4f) << f;
+  }
+  EXPECT_FALSE(frames->next());
+  frames->rewind();
+  EXPECT_EQ(frames->next()->source, file + ":0");
+}
+
+TEST_F(ImportersGltf, ClipsAreChosenByName) {
+  CharacterMaker maker(known_, plain_style());
+  maker.add_motion("run/fast");
+  maker.add_motion("walk");
+  const std::string file = write("hero.glb", maker.parts);
+  const Character all = read_character(file);
+  ASSERT_EQ(all.motions.size(), 3u);
+  EXPECT_EQ(all.motions[0].id, "hero_walk");
+  EXPECT_EQ(all.motions[1].id, "hero_run_fast");
+  EXPECT_EQ(all.motions[2].id, "hero_walk_2");
+  CharacterOptions options;
+  options.clip = "run/fast";
+  EXPECT_EQ(read_character(file, options).motions.size(), 1u);
+  EXPECT_EQ(open_frames(file, {"run/fast"})->frames(), 31);
+  options.clip = "jump";
+  EXPECT_THROW(read_character(file, options), InputError);
+  EXPECT_THROW(open_frames(file, {"jump"}), InputError);
+}
+
+TEST_F(ImportersGltf, ImportedFileHoldsBodyAndMotions) {
+  write("hero.glb", unreal_style());
+  write_file_atomically(path("bad.glb"), "glTF");
+  ImportOptions options;
+  options.motion.split = "test";
+  options.license = "CC0-1.0";
+  const ImportSummary one = import_data(path("hero.glb"), path("one.h5"), options);
+  EXPECT_EQ(one.bodies, 1u);
+  EXPECT_EQ(one.motions, 1u);
+  EXPECT_EQ(one.reports.size(), 1u);
+  EXPECT_TRUE(verify(path("one.h5")).empty());
+  EXPECT_EQ(read_bodies(path("one.h5"), "test").size(), 1u);
+  EXPECT_EQ(read_motions(path("one.h5"), "test")[0].subject, "hero");
+  const ImportSummary folder = import_data(folder_, path("all.h5"), options);
+  EXPECT_EQ(folder.bodies, 1u);
+  ASSERT_EQ(folder.skipped.size(), 1u);
+  EXPECT_NE(folder.skipped[0].find("bad.glb"), std::string::npos);
+  options.motion.fps = 24;
+  EXPECT_THROW(import_data(path("hero.glb"), path("no.h5"), options), InputError);
+}
+
+/// pose_on() puts a file's own motion onto its own body as the file plays it.
+TEST_F(ImportersGltf, BodyPerformsItsOwnMotion) {
+  const Character found = read_character(write("hero.glb", unreal_style()));
+  ASSERT_TRUE(found.body);
+  for (const size_t f : {0u, 10u, 30u}) {
+    const PosedSkeleton posed =
+        forward_kinematics(found.body->joints, pose_on(found.motions[0], *found.body, f));
+    const PosedSkeleton truth =
+        forward_kinematics(known_.body.joints, known_.pose(static_cast<double>(f) / kFps));
+    for (int j = 0; j < kJoints; ++j)
+      EXPECT_LT((posed.joints[j] - posed.joints[0] - (truth.joints[j] - truth.joints[0])).norm(),
+                0.005);
+  }
+}
+
+TEST_F(ImportersGltf, OurOwnOutputComesBackIn) {
+  const Body body =
+      testing::tiny_body("own", "train");  // at most two joints a vertex: nothing is cut
+  const Motion motion = testing::tiny_motion("swing", "ann", "train", 10);
+  std::vector<Pose> poses;
+  GlbWriter writer(path("own.glb"), body.rest, body.joints, body.weights);
+  for (size_t f = 0; f < 10; ++f) {
+    poses.push_back(pose_on(motion, body, f));
+    writer.push(poses.back());
+  }
+  EXPECT_LT(writer.commit().max, 1e-6);
+
+  const auto frames = open_frames(path("own.glb"));
+  ASSERT_EQ(frames->frames(), 10);
+  for (const Pose& pose : poses) {
+    const auto frame = frames->next();
+    const Points truth = linear_blend_skinning(body, pose);
+    ASSERT_EQ(frame->points.size(), truth.size());
+    for (size_t v = 0; v < truth.size(); ++v)
+      ASSERT_LT((frame->points[v] - truth[v]).norm(), 1e-4f);
+    EXPECT_EQ(frame->faces, body.rest.faces);
+  }
+
+  const Character found = read_character(path("own.glb"));
+  ASSERT_TRUE(found.body);
+  EXPECT_EQ(fact(found.report, "rest pose"), "T-pose");
+  EXPECT_TRUE(found.body->weights.isApprox(body.weights, 1e-6f));
+  ASSERT_EQ(found.motions.size(), 1u);
+  ASSERT_EQ(found.motions[0].frames(), 10u);
+  for (size_t f = 0; f < 10; ++f) {
+    const PosedSkeleton ours = forward_kinematics(body.joints, poses[f]);
+    const PosedSkeleton theirs =
+        forward_kinematics(found.body->joints, pose_on(found.motions[0], *found.body, f));
+    for (int j = 0; j < kJoints; ++j) {
+      EXPECT_LT((ours.joints[j] - ours.joints[0] - (theirs.joints[j] - theirs.joints[0])).norm(),
+                1e-4);
+      EXPECT_LT(Quat(ours.global[j]).angularDistance(Quat(theirs.global[j])), 1e-4);
+    }
+  }
+}
+
+TEST_F(ImportersGltf, RigsThatCannotBeUsedAreRefusedWithAWord) {
+  const auto refused = [&](const testing::GlbParts& parts, const std::string& word) {
+    try {
+      read_character(write("hero.glb", parts));
+      ADD_FAILURE() << word;
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << error.what();
+      EXPECT_LT(std::string(error.what()).size(), 390u);
+    }
+  };
+  RigStyle up = plain_style();
+  up.arms_down = -150;
+  CharacterMaker arms(known_, up);
+  refused(arms.parts, "left_shoulder");  // arms overhead and crossed: no shortest arc is meant
+  CharacterMaker nameless(known_, plain_style());
+  nameless.parts.root["nodes"][4]["name"] = "bone";
+  refused(nameless.parts, "left_knee");
+  testing::GlbParts empty;
+  empty.root["nodes"] = {{{"name", "hips"}}};
+  refused(empty, "lacks");
+}
+
+}  // namespace
+}  // namespace restage
