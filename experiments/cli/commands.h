@@ -7,6 +7,7 @@
 namespace restage::cli {
 
 void add_data(Program& program);
+void add_data_inspect(Program& program, CLI::App& group);  // of `data`
 void add_data_perform(Program& program, CLI::App& group);  // of `data`
 void add_doctor(Program& program);
 void add_eval(Program& program);
