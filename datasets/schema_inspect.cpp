@@ -59,7 +59,8 @@ void count_dataset(const h5::File& file, Inspection& out) {
       const int64_t frames = file.dataset("/motions/" + id + "/hips", {-1, 3}).rows();
       out.counts["frames"] += frames;
       count_member(file, "/motions/" + id, "motions", out);
-      if (const auto split = file.text("/motions/" + id, "split")) out.splits[*split]["frames"] += frames;
+      if (const auto split = file.text("/motions/" + id, "split"))
+        out.splits[*split]["frames"] += frames;
     }
   }
 }

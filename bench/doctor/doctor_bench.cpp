@@ -1,7 +1,9 @@
 // The doctor's model and how often the doctor is right.
-//   doctor_bench fit OUT.inc             coefficients of datasets/doctor/orientation_prior.inc, from
+//   doctor_bench fit OUT.inc             coefficients of datasets/doctor/orientation_prior.inc,
+//   from
 //                                        the built-in bodies and motions of the training split
-//   doctor_bench measure FILE [SEED]     2,400 cases: 24 permutations of axes x 5 units x 20 scans of
+//   doctor_bench measure FILE [SEED]     2,400 cases: 24 permutations of axes x 5 units x 20 scans
+//   of
 //                                        FILE's test split (or `builtin`), as Markdown
 #include <array>
 #include <cmath>
@@ -34,8 +36,10 @@ int fit(const std::string& out) {
   recipe.one_side_share = 0.3;
   recipe.stray_share = 0.2;
   const FitOptions options;
-  const std::vector<float> found = fit_orientation_prior(ScanMaker(corpus, recipe, options.seed), options, say);
-  std::string text = "// Made by `doctor_bench fit`: do not edit. Hundredths; |x|, then y, then z.\n";
+  const std::vector<float> found =
+      fit_orientation_prior(ScanMaker(corpus, recipe, options.seed), options, say);
+  std::string text =
+      "// Made by `doctor_bench fit`: do not edit. Hundredths; |x|, then y, then z.\n";
   for (size_t i = 0; i < found.size(); ++i)
     text += std::to_string(std::lround(100 * found[i])) + (i % 20 == 19 ? ",\n" : ",");
   write_file_atomically(out, text);
@@ -65,7 +69,8 @@ struct Confusion {
       for (const int n : row) sum += n;
     return sum;
   }
-  std::string table(const std::string& title, const std::function<std::string(size_t)>& name) const {
+  std::string table(const std::string& title,
+                    const std::function<std::string(size_t)>& name) const {
     std::string out = "| " + title + " |", line = "|---|";
     for (size_t i = 0; i < N; ++i) out += " " + name(i) + " |", line += "---:|";
     out += " unsure |\n" + line + "---:|\n";
@@ -93,14 +98,17 @@ void judge(const TrueScan& scan, int up, int facing, size_t unit, Tally& tally) 
   const Eigen::Matrix3f back = foreign.turn().transpose().cast<float>();
   const auto size = static_cast<float>(1 / kUnits[unit].metres);
   Mesh mesh;
-  for (const Point& p : scan.points) mesh.vertices.push_back(back * p * size + Point(0.3f, -0.2f, 0.1f) * size);
+  for (const Point& p : scan.points)
+    mesh.vertices.push_back(back * p * size + Point(0.3f, -0.2f, 0.1f) * size);
   const Diagnosis d = examine_surface(mesh);
   const auto u = static_cast<size_t>(up), f = static_cast<size_t>(facing);
   tally.up.add(u, d.orientation.up_sure < kSureEnough ? 6 : static_cast<size_t>(d.orientation.up));
   // A facing under another up axis is wrong whatever it says.
   size_t answer = static_cast<size_t>(d.orientation.facing);
-  if (d.orientation.up_sure < kSureEnough || d.orientation.facing_sure < kSureEnough) answer = 6;
-  else if (d.orientation.up != up && answer == f) answer = f ^ 1;
+  if (d.orientation.up_sure < kSureEnough || d.orientation.facing_sure < kSureEnough)
+    answer = 6;
+  else if (d.orientation.up != up && answer == f)
+    answer = f ^ 1;
   tally.facing.add(f, answer);
   size_t said = 5;
   for (size_t i = 0; i < kUnits.size(); ++i)
@@ -151,16 +159,19 @@ int measure(const std::string& file, uint64_t seed, int scans, double one_side) 
     add(all.unit, tallies[i].unit);
     const auto missed = [](const auto& c) { return c.all() - c.right(); };
     if (missed(tallies[i].up) + missed(tallies[i].facing) + missed(tallies[i].unit) > 0)
-      faults += "* " + what[i] + ": not right in " + std::to_string(missed(tallies[i].up)) + " (up), " +
-                std::to_string(missed(tallies[i].facing)) + " (facing), " +
+      faults += "* " + what[i] + ": not right in " + std::to_string(missed(tallies[i].up)) +
+                " (up), " + std::to_string(missed(tallies[i].facing)) + " (facing), " +
                 std::to_string(missed(tallies[i].unit)) + " (unit) of 120 cases\n";
   }
   const auto direction_name = [](size_t i) { return std::string(kDirections[i]); };
-  std::cout << "24 permutations of axes x 5 units x " << scans << " scans = " << all.up.all() << " cases\n\n"
+  std::cout << "24 permutations of axes x 5 units x " << scans << " scans = " << all.up.all()
+            << " cases\n\n"
             << "| question | right | unsure | wrong |\n|---|---:|---:|---:|\n"
             << row("up axis", all.up) << row("unit", all.unit) << row("facing", all.facing) << "\n"
             << all.up.table("up is \\ said", direction_name) << "\n"
-            << all.unit.table("unit is \\ said", [](size_t i) { return std::string(kUnits[i].name); }) << "\n"
+            << all.unit.table("unit is \\ said",
+                              [](size_t i) { return std::string(kUnits[i].name); })
+            << "\n"
             << all.facing.table("faces \\ said", direction_name) << "\nScans with any fault:\n\n"
             << (faults.empty() ? "none\n" : faults);
   return 0;
@@ -171,8 +182,10 @@ int run(int argc, char** argv) {
   if (words.size() == 2 && words[0] == "fit") return fit(words[1]);
   if (words.size() >= 2 && words.size() <= 5 && words[0] == "measure")
     return measure(words[1], words.size() > 2 ? std::stoull(words[2]) : 1,
-                   words.size() > 3 ? std::stoi(words[3]) : 20, words.size() > 4 ? std::stod(words[4]) : 0);
-  std::cerr << "doctor_bench fit OUT.inc | measure FILE|builtin [SEED [SCANS [SHARE OF ONE-CAMERA SCANS]]]\n";
+                   words.size() > 3 ? std::stoi(words[3]) : 20,
+                   words.size() > 4 ? std::stod(words[4]) : 0);
+  std::cerr << "doctor_bench fit OUT.inc | measure FILE|builtin [SEED [SCANS [SHARE OF ONE-CAMERA "
+               "SCANS]]]\n";
   return 2;
 }
 

@@ -46,7 +46,7 @@ void examine(const Points& scan, double turned, std::span<const float> coefficie
   for (int i = 0; i < kTurns; ++i) {
     look(scan, fit_turn(i) * start, out.seen[static_cast<size_t>(i)]);
     out.error[static_cast<size_t>(i)] = score(coefficients, out.seen[static_cast<size_t>(i)],
-                                               out.kinds[static_cast<size_t>(i)].data());
+                                              out.kinds[static_cast<size_t>(i)].data());
     most = std::max(most, out.error[static_cast<size_t>(i)]);
   }
   for (float& e : out.error) total += (e = std::exp(e - most));
@@ -57,8 +57,8 @@ void examine(const Points& scan, double turned, std::span<const float> coefficie
 }
 
 /// Mean gradient of the coefficients of kind `k`.
-void add_gradient(const std::vector<Example>& batch, int64_t k, const std::vector<float>& coefficients,
-                  std::vector<float>& gradient) {
+void add_gradient(const std::vector<Example>& batch, int64_t k,
+                  const std::vector<float>& coefficients, std::vector<float>& gradient) {
   float* to = gradient.data() + k * kPlaces;
   for (int i = 0; i < kPlaces; ++i)
     to[i] = static_cast<float>(kDecay) * coefficients[static_cast<size_t>(k * kPlaces + i)];
@@ -66,7 +66,8 @@ void add_gradient(const std::vector<Example>& batch, int64_t k, const std::vecto
     for (size_t t = 0; t < e.seen.size(); ++t) {
       const float error = e.error[t] * e.kinds[t][static_cast<size_t>(k)] / kBatch;
       if (std::abs(error) < 1e-7f) continue;
-      for (size_t i = 0; i < e.seen[t].place.size(); ++i) to[e.seen[t].place[i]] += error * e.seen[t].share[i];
+      for (size_t i = 0; i < e.seen[t].place.size(); ++i)
+        to[e.seen[t].place[i]] += error * e.seen[t].share[i];
     }
 }
 
@@ -95,7 +96,8 @@ std::vector<float> fit_orientation_prior(const ScanMaker& scans, const FitOption
   std::vector<Points> clouds(options.scans);
   parallel_for(static_cast<int64_t>(clouds.size()), 64, [&](int64_t begin, int64_t end) {
     for (int64_t i = begin; i < end; ++i)
-      clouds[static_cast<size_t>(i)] = normalised(scans.make(static_cast<uint64_t>(i)).points).points;
+      clouds[static_cast<size_t>(i)] =
+          normalised(scans.make(static_cast<uint64_t>(i)).points).points;
   });
   std::vector<float> coefficients(kKinds * kPlaces), gradient(coefficients.size());
   std::vector<size_t> order(clouds.size());
@@ -125,7 +127,8 @@ std::vector<float> fit_orientation_prior(const ScanMaker& scans, const FitOption
       parallel_for(kKinds, 1, [&](int64_t begin, int64_t end) {
         for (int64_t k = begin; k < end; ++k) add_gradient(batch, k, coefficients, gradient);
       });
-      const double done = (epoch + static_cast<double>(step) / static_cast<double>(steps)) / options.epochs;
+      const double done =
+          (epoch + static_cast<double>(step) / static_cast<double>(steps)) / options.epochs;
       adam.step(coefficients, gradient, kRate * (0.5 + 0.5 * std::cos(kPi * done)) + 1e-5);
     }
     say("epoch " + std::to_string(epoch + 1) + ": mean -log p(true turn) " +

@@ -17,7 +17,7 @@ struct ScanRecipe {
 };
 
 struct TrueScan {
-  Points points;  ///< metres, y up, facing +z but for `heading`, floor about y = 0
+  Points points;       ///< metres, y up, facing +z but for `heading`, floor about y = 0
   double heading = 0;  ///< degrees from +z towards +x
   bool rest = false;
   std::string what;

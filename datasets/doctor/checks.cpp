@@ -35,7 +35,7 @@ void check_source(const std::vector<Mesh>& first_frames, const std::string& wher
   std::vector<double> sizes;
   for (const Mesh& frame : first_frames) {
     if (frame.vertices.size() < kEnoughPoints) return;
-    const Shape shape = shape_of(frame);
+    const PersonShape shape = shape_of(frame);
     vote.add(shape.points);
     sizes.push_back(shape.size);
   }
@@ -43,17 +43,19 @@ void check_source(const std::vector<Mesh>& first_frames, const std::string& wher
   std::nth_element(sizes.begin(), sizes.begin() + std::ssize(sizes) / 2, sizes.end());
   const UnitGuess guess = guess_unit(sizes[sizes.size() / 2]);
   if (std::abs(guess.deviation) > kNoPerson) return;
-  check_unit(guess, where, "give --scale " + number(guess.unit.metres) + ", or --force to take it as it is");
+  check_unit(guess, where,
+             "give --scale " + number(guess.unit.metres) + ", or --force to take it as it is");
   const Orientation o = vote.result();
   if (o.up == 2 || o.up_sure < kVerySure) return;
-  throw InputError(where, up_words(o),
-                   std::string(o.up == 4 ? "give --source-up z" : "restage doctor --fix OUT turns it") +
-                       ", or --force if it is so");
+  throw InputError(
+      where, up_words(o),
+      std::string(o.up == 4 ? "give --source-up z" : "restage doctor --fix OUT turns it") +
+          ", or --force if it is so");
 }
 
 void check_target(const Mesh& target, const std::string& where) {
   if (target.vertices.size() < kEnoughPoints) return;
-  const Shape shape = shape_of(target);
+  const PersonShape shape = shape_of(target);
   const UnitGuess guess = guess_unit(shape.size);
   if (std::abs(guess.deviation) > kNoPerson) return;
   const std::string fix = "restage doctor --fix OUT mends it, --force takes it as it is";

@@ -34,16 +34,18 @@ constexpr double kFloorMatters = 0.05;  // metres; less is noise, or a shoe's so
 
 }  // namespace
 
-void recognise(Diagnosis& d, double size, const OrientationVote& vote, const ExamineOptions& options) {
+void recognise(Diagnosis& d, double size, const OrientationVote& vote,
+               const ExamineOptions& options) {
   d.size = size;
   d.unit = guess_unit(size);
-  if (options.scale) d.unit = {{"unit as given", *options.scale}, 1, d.unit.deviation};
+  if (options.scale) d.unit = {{"", *options.scale}, 1, d.unit.deviation};
   d.orientation = options.up ? vote.result(*options.up) : vote.result();
   if (!options.facing) return;
   if (*options.facing / 2 == d.orientation.up / 2)
-    throw InputError("", std::string("nobody whose head points along ") +
-                             kDirections[static_cast<size_t>(d.orientation.up)] + " faces " +
-                             kDirections[static_cast<size_t>(*options.facing)],
+    throw InputError("",
+                     std::string("nobody whose head points along ") +
+                         kDirections[static_cast<size_t>(d.orientation.up)] + " faces " +
+                         kDirections[static_cast<size_t>(*options.facing)],
                      "give --up too");
   d.orientation.facing = *options.facing;
   d.orientation.facing_sure = 1;
@@ -53,8 +55,7 @@ void recognise(Diagnosis& d, double size, const OrientationVote& vote, const Exa
 void judge_units(Diagnosis& d) {
   const UnitGuess& guess = d.unit;
   Finding f{"units", Weight::fact, "", guess.sure, "", ""};
-  f.evidence = "half of the points lie within " +
-               number(d.size) +
+  f.evidence = "half of the points lie within " + number(d.size) +
                " units of the middle; of people it is 0.26 to 0.63 m in any pose";
   if (guess.sure < kUnsure) {
     f.weight = Weight::note;
@@ -62,6 +63,9 @@ void judge_units(Diagnosis& d) {
     f.fix = "give metres per unit with --scale if they are not metres";
   } else if (guess.unit.metres == 1) {
     f.what = "metres";
+  } else if (*guess.unit.name == 0) {
+    f.what = "1 unit is " + number(guess.unit.metres) + " m, as given";
+    f.evidence = "given";
   } else {
     f.weight = guess.sure >= kSure ? Weight::wrong : Weight::note;
     f.what = std::string("1 unit is 1 ") + guess.unit.name + ", not 1 m";
@@ -72,8 +76,8 @@ void judge_units(Diagnosis& d) {
 
 void judge_up(Diagnosis& d, size_t clouds) {
   const Orientation& o = d.orientation;
-  Finding f{"up", Weight::fact, std::string(kDirections[static_cast<size_t>(o.up)]) + " is up",
-            o.up_sure, "", ""};
+  Finding f{"up",      Weight::fact, std::string(kDirections[static_cast<size_t>(o.up)]) + " is up",
+            o.up_sure, "",           ""};
   f.evidence = "where a person's points lie, in 144 attitudes" +
                (clouds > 1 ? ", over " + counted(clouds, "frame") : std::string());
   if (o.up_sure < kUnsure) {
@@ -101,8 +105,8 @@ void judge_facing(Diagnosis& d, bool target) {
   } else {
     f.what = std::string("faces ") + kDirections[static_cast<size_t>(o.facing)];
     if (std::abs(o.turned) > 20)
-      f.what += ", turned by about " + number(std::round(std::abs(o.turned) / 5) * 5) + " degrees to their " +
-                (o.turned > 0 ? "left" : "right");
+      f.what += ", turned by about " + number(std::round(std::abs(o.turned) / 5) * 5) +
+                " degrees to their " + (o.turned > 0 ? "left" : "right");
     // With another up axis the turn is part of that repair.
     if (target && o.up == 2 && o.facing != 4) {
       f.weight = o.facing_sure >= kSure ? Weight::wrong : Weight::note;
@@ -125,7 +129,8 @@ Mat3 best_turn(const Orientation& o) {
 
 void judge_frame(Diagnosis& d, double lowest, double highest) {
   if (d.unit.sure < kUnsure || d.orientation.up_sure < kUnsure) {
-    d.findings.push_back({"transform", Weight::note, "how to bring it into our frame cannot be told", 1,
+    d.findings.push_back({"transform", Weight::note,
+                          "how to bring it into our frame cannot be told", 1,
                           "units or up axis are unsure", ""});
     return;
   }
@@ -136,8 +141,8 @@ void judge_frame(Diagnosis& d, double lowest, double highest) {
   const double floor = t.scale * lowest;
   if (std::abs(floor) > kFloorMatters) t.offset = lowest * direction(d.orientation.up);
   d.transform = t;
-  d.findings.push_back({"height", Weight::fact, number(d.height) + " m from the floor to the top", 1,
-                        "in the pose that it shows", ""});
+  d.findings.push_back({"height", Weight::fact, number(d.height) + " m from the floor to the top",
+                        1, "in the pose that it shows", ""});
   Finding f{"floor", Weight::fact, "at 0", 1, "lowest points of the person", ""};
   if (!t.offset.isZero()) {
     f.weight = Weight::note;
@@ -151,10 +156,11 @@ void judge_points(Diagnosis& d, size_t distinct) {
   if (distinct >= kEnoughPoints) return;
   d.findings.push_back({"points", Weight::wrong,
                         "only " + std::to_string(distinct) + " distinct points; networks need " +
-                            std::to_string(kEnoughPoints), 1, "counted", "scan it more finely"});
+                            std::to_string(kEnoughPoints),
+                        1, "counted", "scan it more finely"});
 }
 
-void judge_parts(Diagnosis& d, const Shape& shape, const std::string& where) {
+void judge_parts(Diagnosis& d, const PersonShape& shape, const std::string& where) {
   const Parts& parts = shape.parts;
   const auto all = static_cast<double>(parts.part.size());
   const double metres = d.unit.sure >= kUnsure ? d.unit.unit.metres : 1;
@@ -183,7 +189,7 @@ void judge_parts(Diagnosis& d, const Shape& shape, const std::string& where) {
 
 namespace {
 
-void judge_cover(Diagnosis& d, const Mesh& mesh, const Shape& shape) {
+void judge_cover(Diagnosis& d, const Mesh& mesh, const PersonShape& shape) {
   const double one = one_sidedness(shape.points, shape.parts.spacing);
   if (one > kOneSided && shape.points.size() >= 200)
     d.findings.push_back({"holes", Weight::note, "seen from one side only", 0.9,
@@ -192,9 +198,10 @@ void judge_cover(Diagnosis& d, const Mesh& mesh, const Shape& shape) {
   if (mesh.faces.empty()) return;
   const Borders open = borders(mesh);
   if (open.edges > 0)
-    d.findings.push_back({"holes", Weight::note,
-                          counted(open.loops, "open border") + " with " + counted(open.edges, "edge"), 1,
-                          "edges with one triangle", "close them in a mesh editor if they are not meant"});
+    d.findings.push_back(
+        {"holes", Weight::note,
+         counted(open.loops, "open border") + " with " + counted(open.edges, "edge"), 1,
+         "edges with one triangle", "close them in a mesh editor if they are not meant"});
 }
 
 void judge_duplicates(Diagnosis& d, const Mesh& mesh, size_t equal) {
@@ -205,16 +212,16 @@ void judge_duplicates(Diagnosis& d, const Mesh& mesh, size_t equal) {
                         cloud ? "--fix removes them" : ""});
 }
 
-void judge_pose(Diagnosis& d, const Shape& shape, bool target) {
+void judge_pose(Diagnosis& d, const PersonShape& shape, bool target) {
   if (!d.transform || d.orientation.facing_sure < kUnsure) return;
   Points ours;
   for (const Point& p : shape.points) ours.push_back((*d.transform)(p));
   const auto angles = arm_angles(ours);
-  const double worst =
-      angles ? std::max(std::abs((*angles)[0]), std::abs((*angles)[1])) : 90;
+  const double worst = angles ? std::max(std::abs((*angles)[0]), std::abs((*angles)[1])) : 90;
   if (worst <= kTPoseAngle) {
     d.findings.push_back({"pose", Weight::fact, "T-pose", 0.95,
-                          "arms within " + number(std::ceil(worst)) + " degrees of the horizontal", ""});
+                          "arms within " + number(std::ceil(worst)) + " degrees of the horizontal",
+                          ""});
     return;
   }
   Finding f{"pose", target ? Weight::wrong : Weight::note, "not a T-pose", 0.95, "", ""};
@@ -236,7 +243,7 @@ Diagnosis examine_surface(const Mesh& mesh, const ExamineOptions& options) {
   d.fewest_points = d.most_points = static_cast<int64_t>(mesh.vertices.size());
   const size_t equal = duplicates(mesh.vertices);
   judge_points(d, mesh.vertices.size() - equal);
-  const Shape shape = shape_of(mesh);
+  const PersonShape shape = shape_of(mesh);
   OrientationVote vote;
   vote.add(shape.points);
   recognise(d, shape.size, vote, options);

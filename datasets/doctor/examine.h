@@ -17,14 +17,14 @@ namespace restage {
 struct ExamineOptions {
   bool target = false;  ///< it is meant as a target: T-pose and facing +z are then a must
   // What the user knows better; the rest is still found.
-  std::optional<double> scale;     ///< metres per unit
-  std::optional<int> up, facing;   ///< indices of kDirections
+  std::optional<double> scale;    ///< metres per unit
+  std::optional<int> up, facing;  ///< indices of kDirections
 };
 
 struct Diagnosis {
   std::string kind;  ///< "cloud", "mesh" or "frames"
   int64_t frames = 1, faces = 0, fewest_points = 0, most_points = 0;
-  double fps = 0;  ///< of a sequence
+  double fps = 0;   ///< of a sequence
   double size = 0;  ///< median distance of a person's points from their middle, in the data's units
   UnitGuess unit;
   Orientation orientation;

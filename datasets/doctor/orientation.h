@@ -13,11 +13,11 @@ inline constexpr std::array<const char*, 6> kDirections = {"+x", "-x", "+y", "-y
 Vec3 direction(int index);
 
 struct Orientation {
-  int up = 2;            ///< index of kDirections
-  double up_sure = 0;    ///< probability; 1/6 says nothing
-  int facing = 4;        ///< the axis nearest to where the person faces, at right angles to `up`
+  int up = 2;              ///< index of kDirections
+  double up_sure = 0;      ///< probability; 1/6 says nothing
+  int facing = 4;          ///< the axis nearest to where the person faces, at right angles to `up`
   double facing_sure = 0;  ///< probability of that axis if `up` is right
-  double turned = 0;     ///< degrees from there, towards their left; within -45 and 45
+  double turned = 0;       ///< degrees from there, towards their left; within -45 and 45
   /// The permutation of axes that brings `up` to +y and `facing` to +z.
   Mat3 turn() const;
 };

@@ -12,11 +12,12 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr size_t kMostLooked = 4096;  // of a large cloud, evenly spaced in the list
 constexpr float kThin = 0.12f;        // one point per cube of this edge, in units of the size
 
-constexpr int16_t kPrior[] = {  // hundredths
+constexpr int16_t kPrior[] = {
+// hundredths
 #include "datasets/doctor/orientation_prior.inc"
 };
 static_assert(std::size(kPrior) == kKinds * kPlaces, "fit the prior again: doctor_bench fit");
-constexpr float kFar = 1e4f;          // in the same unit
+constexpr float kFar = 1e4f;  // in the same unit
 
 float median(std::vector<float>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -37,8 +38,7 @@ void normalise(NormalisedCloud& cloud) {
   float size = median_of([&](const Point& p) { return (p - middle).norm(); });
   if (!std::isfinite(size)) size = 0;  // numbers near the end of float's range are no person
   const auto bounded = [](const Point& p) { return Point(p.cwiseMax(-kFar).cwiseMin(kFar)); };
-  for (Point& p : cloud.points)
-    p = size > 0 ? bounded((p - middle) / size) : Point::Zero();
+  for (Point& p : cloud.points) p = size > 0 ? bounded((p - middle) / size) : Point::Zero();
   cloud.middle += cloud.size * middle;
   cloud.size *= size;
 }

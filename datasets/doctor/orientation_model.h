@@ -17,7 +17,8 @@ inline constexpr int kAcross = 8, kUpwards = 15, kForward = 11;
 inline constexpr float kCell = 0.3f;
 inline constexpr int kPlaces = kAcross * kUpwards * kForward;
 
-inline constexpr int kUps = 6, kHeadings = 24;  ///< hypotheses: which axis is up, faced every 15 deg
+inline constexpr int kUps = 6,
+                     kHeadings = 24;  ///< hypotheses: which axis is up, faced every 15 deg
 
 /// A cloud as the model wants it: evenly thinned to some hundred points, relative to their median,
 /// in units of the median distance to it. Neither changes much with a few stray points, a raised

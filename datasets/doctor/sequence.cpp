@@ -76,8 +76,10 @@ Summary summary_of(const Frame& frame, bool numbered) {
   const size_t n = std::min<size_t>(frame.points.size(), 2000);
   for (size_t i = 0; i < n; ++i) some.push_back(frame.points[i * frame.points.size() / n]);
   for (int i = 0; i < kExtents; ++i) {
-    out.extent[static_cast<size_t>(2 * i)] = static_cast<float>(quantile(some, extent_direction(i), 0.02));
-    out.extent[static_cast<size_t>(2 * i + 1)] = static_cast<float>(quantile(some, extent_direction(i), 0.98));
+    out.extent[static_cast<size_t>(2 * i)] =
+        static_cast<float>(quantile(some, extent_direction(i), 0.02));
+    out.extent[static_cast<size_t>(2 * i + 1)] =
+        static_cast<float>(quantile(some, extent_direction(i), 0.98));
   }
   for (int axis = 0; axis < 3; ++axis)
     out.middle[axis] = static_cast<float>(quantile(some, direction(2 * axis), 0.5));
@@ -108,7 +110,8 @@ std::string frame_list(const std::vector<int64_t>& frames) {
 
 class Sequence {
  public:
-  Sequence(FrameSource& source, const ExamineOptions& options) : source_(source), options_(options) {}
+  Sequence(FrameSource& source, const ExamineOptions& options)
+      : source_(source), options_(options) {}
   Diagnosis examine();
 
  private:
@@ -130,12 +133,12 @@ class Sequence {
   std::vector<std::array<double, 12>> ends_;  // lowest and highest along each direction
   size_t looked_ = 0, distinct_ = SIZE_MAX;
   size_t strays_ = 0, stray_frames_ = 0, other_frames_ = 0, broken_frames_ = 0;
-  std::optional<Shape> worst_;  // the frame with most of somebody else
+  std::optional<PersonShape> worst_;  // the frame with most of somebody else
   int64_t worst_frame_ = 0;
 };
 
 void Sequence::look_closely(const Frame& frame, int64_t index) {
-  const Shape shape = shape_of({frame.points, frame.faces});
+  const PersonShape shape = shape_of({frame.points, frame.faces});
   vote_.add(shape.points, index < kFacingFrames);
   sizes_.push_back(shape.size);
   std::array<double, 12> ends;
@@ -157,7 +160,8 @@ void Sequence::look_closely(const Frame& frame, int64_t index) {
 }
 
 void Sequence::read() {
-  const int64_t all = source_.frames(), every = std::max<int64_t>(1, (all + kExamined - 1) / kExamined);
+  const int64_t all = source_.frames(),
+                every = std::max<int64_t>(1, (all + kExamined - 1) / kExamined);
   d_.fewest_points = INT64_MAX;
   for (int64_t i = 0; const auto frame = source_.next(); ++i) {
     const auto n = static_cast<int64_t>(frame->points.size());
@@ -177,7 +181,8 @@ void Sequence::judge_walk() {
   const Vec3 up = direction(d_.orientation.up);
   size_t last = 0;
   double far = 0;
-  for (size_t i = 0; i < frames_.size() && frames_[i].sequence == frames_[0].sequence && i < 45; ++i) {
+  for (size_t i = 0; i < frames_.size() && frames_[i].sequence == frames_[0].sequence && i < 45;
+       ++i) {
     const Vec3 way = (frames_[i].middle - frames_[0].middle).cast<double>();
     const double level = (way - up.dot(way) * up).norm();
     if (level > far) far = level, last = i;
@@ -192,8 +197,9 @@ void Sequence::judge_walk() {
       o.facing = i;
       o.facing_sure = 0.8;
     }
-    d_.findings.push_back({"walk", Weight::fact, std::string("goes towards ") + kDirections[static_cast<size_t>(i)],
-                           1, number(far * metres()) + " m in " + counted(last, "frame"), ""});
+    d_.findings.push_back({"walk", Weight::fact,
+                           std::string("goes towards ") + kDirections[static_cast<size_t>(i)], 1,
+                           number(far * metres()) + " m in " + counted(last, "frame"), ""});
   }
 }
 
@@ -201,7 +207,8 @@ void Sequence::judge_repeats() {
   std::vector<int64_t> at;
   std::vector<int64_t> runs(1, 1);
   for (size_t i = 1; i < frames_.size(); ++i) {
-    if (frames_[i].content == frames_[i - 1].content && frames_[i].sequence == frames_[i - 1].sequence) {
+    if (frames_[i].content == frames_[i - 1].content &&
+        frames_[i].sequence == frames_[i - 1].sequence) {
       at.push_back(static_cast<int64_t>(i));
       d_.repeated.insert(static_cast<int64_t>(i));
       ++runs.back();
@@ -211,9 +218,10 @@ void Sequence::judge_repeats() {
   }
   if (at.empty()) return;
   const int64_t k = runs[0];
-  const bool regular = runs.size() > 2 && k > 1 &&
-                       std::all_of(runs.begin(), runs.end() - 1, [&](int64_t r) { return r == k; }) &&
-                       runs.back() <= k;
+  const bool regular =
+      runs.size() > 2 && k > 1 &&
+      std::all_of(runs.begin(), runs.end() - 1, [&](int64_t r) { return r == k; }) &&
+      runs.back() <= k;
   Finding f{"repeated frames", Weight::note, "", 1, "equal points", ""};
   if (regular) {
     d_.keep_every = static_cast<int>(k);
@@ -248,22 +256,27 @@ void Sequence::judge_numbers() {
     at.push_back(frames_[i].number);
   }
   if (missing > 0)
-    d_.findings.push_back({"missing frames", Weight::note,
-                           counted(static_cast<size_t>(missing), "number") + " missing in the files' names, before " +
-                               frame_list(at), 1, "the numbering has gaps",
-                           "--fix puts the nearest frame in their place, so that the timing is right"});
+    d_.findings.push_back(
+        {"missing frames", Weight::note,
+         counted(static_cast<size_t>(missing), "number") + " missing in the files' names, before " +
+             frame_list(at),
+         1, "the numbering has gaps",
+         "--fix puts the nearest frame in their place, so that the timing is right"});
 }
 
 void Sequence::judge_jumps() {
   std::vector<double> steps(frames_.size(), -1);  // -1: the first of a sequence, or a repetition
   for (size_t i = 1; i < frames_.size(); ++i)
-    if (frames_[i].sequence == frames_[i - 1].sequence && !d_.repeated.contains(static_cast<int64_t>(i)))
+    if (frames_[i].sequence == frames_[i - 1].sequence &&
+        !d_.repeated.contains(static_cast<int64_t>(i)))
       steps[i] = step(frames_[i], frames_[i - 1]) * metres();
   std::vector<int64_t> at;
   for (int64_t i = 1; i < std::ssize(steps); ++i) {
     std::vector<double> around;
-    for (int64_t k = std::max<int64_t>(1, i - kAround); k <= std::min(std::ssize(steps) - 1, i + kAround); ++k)
-      if (k != i && steps[static_cast<size_t>(k)] >= 0) around.push_back(steps[static_cast<size_t>(k)]);
+    for (int64_t k = std::max<int64_t>(1, i - kAround);
+         k <= std::min(std::ssize(steps) - 1, i + kAround); ++k)
+      if (k != i && steps[static_cast<size_t>(k)] >= 0)
+        around.push_back(steps[static_cast<size_t>(k)]);
     // Nine in ten of the neighbours are slower: a fast gesture is no jump.
     if (around.size() < 4) continue;
     std::sort(around.begin(), around.end());
@@ -275,7 +288,8 @@ void Sequence::judge_jumps() {
   }
   if (!at.empty())
     d_.findings.push_back({"missing frames", Weight::note,
-                           "the motion jumps before " + std::string(at.size() == 1 ? "frame " : "frames ") + frame_list(at),
+                           "the motion jumps before " +
+                               std::string(at.size() == 1 ? "frame " : "frames ") + frame_list(at),
                            0.8, "a step several times as long as those around it",
                            "frames may be missing there; look at them"});
 }
@@ -283,7 +297,8 @@ void Sequence::judge_jumps() {
 void Sequence::judge_speed() {
   std::vector<double> speeds;
   for (size_t i = 1; i < frames_.size(); ++i)
-    if (frames_[i].sequence == frames_[i - 1].sequence && !d_.repeated.contains(static_cast<int64_t>(i)))
+    if (frames_[i].sequence == frames_[i - 1].sequence &&
+        !d_.repeated.contains(static_cast<int64_t>(i)))
       speeds.push_back((frames_[i].middle - frames_[i - 1].middle).norm() * metres() * d_.fps);
   Finding f{"frame rate", Weight::fact, number(d_.fps) + " frames a second", 1, "", ""};
   if (speeds.size() < 5 || d_.unit.sure < kUnsure) {
@@ -329,20 +344,25 @@ Diagnosis Sequence::examine() {
   judge_jumps();
   if (stray_frames_ > 0)
     d_.findings.push_back({"outliers", Weight::note,
-                           counted(strays_, "stray point") + " in " + std::to_string(stray_frames_) + " of " +
-                               counted(looked_, "frame") + " looked at", 1, "far from all others", "--fix removes them"});
+                           counted(strays_, "stray point") + " in " +
+                               std::to_string(stray_frames_) + " of " + counted(looked_, "frame") +
+                               " looked at",
+                           1, "far from all others", "--fix removes them"});
   if (worst_) {
-    Shape only_others = *worst_;
+    PersonShape only_others = *worst_;
     only_others.parts.stray = 0;
     only_others.parts.pieces = 1;
-    judge_parts(d_, only_others, ", most in frame " + std::to_string(worst_frame_) + "; seen in " +
-                                     std::to_string(other_frames_) + " of " + counted(looked_, "frame") + " looked at");
+    judge_parts(d_, only_others,
+                ", most in frame " + std::to_string(worst_frame_) + "; seen in " +
+                    std::to_string(other_frames_) + " of " + counted(looked_, "frame") +
+                    " looked at");
     // One frame with a passer-by spoils that frame only.
     if (4 * other_frames_ < looked_) d_.findings.back().weight = Weight::note;
   }
   if (2 * broken_frames_ > looked_)
-    d_.findings.push_back({"holes", Weight::note, "the person is in several pieces in " +
-                               std::to_string(broken_frames_) + " of " + counted(looked_, "frame") + " looked at",
+    d_.findings.push_back({"holes", Weight::note,
+                           "the person is in several pieces in " + std::to_string(broken_frames_) +
+                               " of " + counted(looked_, "frame") + " looked at",
                            1, "gaps between groups of points", "scan from more sides if you can"});
   return std::move(d_);
 }

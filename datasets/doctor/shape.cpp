@@ -24,7 +24,9 @@ constexpr double kShoulderHeight = 0.81, kShoulderWidth = 0.10, kShortestReach =
 /// A mesh whose surface can be sampled.
 bool has_area(const Mesh& mesh) {
   return std::any_of(mesh.faces.begin(), mesh.faces.end(), [&](const Triangle& f) {
-    const auto at = [&](int k) { return mesh.vertices[static_cast<size_t>(f[static_cast<size_t>(k)])]; };
+    const auto at = [&](int k) {
+      return mesh.vertices[static_cast<size_t>(f[static_cast<size_t>(k)])];
+    };
     const float area = (at(1) - at(0)).cross(at(2) - at(0)).norm();
     return area > 0 && std::isfinite(area);
   });
@@ -39,8 +41,8 @@ Points shape_points(const Mesh& mesh) {
   return SurfaceSampler(body).draw(RngKey{0, 0}.fold("doctor"), kSurfacePoints).on_rest(body);
 }
 
-Shape shape_of(const Mesh& mesh) {
-  Shape out;
+PersonShape shape_of(const Mesh& mesh) {
+  PersonShape out;
   const Points all = shape_points(mesh);
   out.parts = find_parts(all);
   for (size_t i = 0; i < all.size(); ++i)
@@ -71,7 +73,8 @@ double quantile(const Points& points, const Vec3& axis, double q) {
   if (points.empty()) return 0;
   std::vector<double> along;
   for (const Point& p : points) along.push_back(axis.dot(p.cast<double>()));
-  const auto at = along.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(along.size() - 1));
+  const auto at =
+      along.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(along.size() - 1));
   std::nth_element(along.begin(), at, along.end());
   return *at;
 }
@@ -95,7 +98,8 @@ std::optional<std::array<double, 2>> arm_angles(const Points& points) {
     x /= n * height;
     y /= n * height;
     if (x < kShortestReach) return std::nullopt;
-    out[static_cast<size_t>(side)] = std::atan2(kShoulderHeight - y, x - kShoulderWidth) * 180 / kPi;
+    out[static_cast<size_t>(side)] =
+        std::atan2(kShoulderHeight - y, x - kShoulderWidth) * 180 / kPi;
   }
   return out;
 }

@@ -14,15 +14,15 @@ namespace restage {
 Points shape_points(const Mesh& mesh);
 
 /// A person's points and what is wrong with the rest.
-struct Shape {
-  Points points;   ///< shape_points(), only the person's
-  Parts parts;     ///< of shape_points()
+struct PersonShape {
+  Points points;    ///< shape_points(), only the person's
+  Parts parts;      ///< of shape_points()
   double size = 0;  ///< median distance to the median point: 0.26 to 0.63 m in any pose
 };
-Shape shape_of(const Mesh& mesh);
+PersonShape shape_of(const Mesh& mesh);
 
 struct LengthUnit {
-  const char* name;
+  const char* name;  ///< empty: as the user gave it
   double metres;
 };
 /// Metre, decimetre, inch, centimetre, millimetre.
@@ -34,7 +34,7 @@ struct UnitGuess {
   double sure = 0;       ///< probability; 0 if no unit makes a person of it
   double deviation = 0;  ///< from a usual person, in standard deviations
 };
-/// By Shape::size.
+/// By PersonShape::size.
 UnitGuess guess_unit(double size);
 
 /// Value of `points` along `axis` that a share `q` of them lie below.

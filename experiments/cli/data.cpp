@@ -135,9 +135,10 @@ int run_verify(const std::string& file, const Common& common) {
 
 void add_verify(Program& program, CLI::App& group) {
   const auto file = std::make_shared<std::string>();
-  CLI::App& app = program.add(group, "verify", "read all of a file and list what is wrong (exit code 1)",
-                              "restage data verify data.h5\nrestage data verify data.h5 --json",
-                              [file, &program] { return run_verify(*file, program.common()); });
+  CLI::App& app =
+      program.add(group, "verify", "read all of a file and list what is wrong (exit code 1)",
+                  "restage data verify data.h5\nrestage data verify data.h5 --json",
+                  [file, &program] { return run_verify(*file, program.common()); });
   app.add_option("FILE", *file, "bodies, motions, scans or a prediction (HDF5)")->required();
 }
 

@@ -49,7 +49,9 @@ std::string to_text(const Inspection& found) {
   std::string text = row("kind", found.kind);
   for (const auto& [name, count] : found.counts) text += row(name, std::to_string(count));
   if (found.seconds > 0)
-    text += row("seconds", rounded(found.seconds, 1) + " at " + rounded(found.fps, found.fps == std::floor(found.fps) ? 0 : 2) + " frames a second");
+    text += row("seconds", rounded(found.seconds, 1) + " at " +
+                               rounded(found.fps, found.fps == std::floor(found.fps) ? 0 : 2) +
+                               " frames a second");
   for (const auto& [split, counts] : found.splits) {
     std::string line;
     for (const auto& [name, count] : counts)
@@ -57,11 +59,13 @@ std::string to_text(const Inspection& found) {
     text += row(split, line);
   }
   if (!found.heights.empty())
-    text += row("heights", rounded(found.heights.front(), 2) + " to " + rounded(found.heights.back(), 2) +
-                               " m, median " + rounded(found.heights[found.heights.size() / 2], 2) + " m");
+    text += row("heights", rounded(found.heights.front(), 2) + " to " +
+                               rounded(found.heights.back(), 2) + " m, median " +
+                               rounded(found.heights[found.heights.size() / 2], 2) + " m");
   if (!found.subjects.empty()) text += row("subjects", listed(found.subjects));
   if (!found.actions.empty()) text += row("actions", listed(found.actions));
-  text += row("units", found.units) + row("license", found.license) + row("provenance", found.provenance);
+  text += row("units", found.units) + row("license", found.license) +
+          row("provenance", found.provenance);
   if (!found.transform.empty()) text += row("transform", found.transform);
   return text;
 }
@@ -100,14 +104,16 @@ void add_bodies(std::vector<Figure>& figures, const std::vector<Body>& bodies) {
 /// The middle frame of each motion, performed by the file's bodies in turn, or by a built-in one.
 void add_motions(std::vector<Figure>& figures, const std::vector<Motion>& motions,
                  const std::vector<Body>& bodies) {
-  const std::vector<Body> performers = bodies.empty() ? std::vector{builtin_body(0, "test", 0)} : bodies;
+  const std::vector<Body> performers =
+      bodies.empty() ? std::vector{builtin_body(0, "test", 0)} : bodies;
   const size_t n = std::min(motions.size(), kMotionsDrawn);
   for (size_t k = 0; k < n; ++k) {
     const Motion& motion = motions[spread(k, n, motions.size())];
     const Body& body = performers[k % performers.size()];
     if (motion.frames() == 0) continue;
-    Figure figure{{{pose_surface(body, pose_on(motion, body, motion.frames() / 2)), body.rest.faces}},
-                  motion.id + (motion.action.empty() ? "" : ": " + motion.action)};
+    Figure figure{
+        {{pose_surface(body, pose_on(motion, body, motion.frames() / 2)), body.rest.faces}},
+        motion.id + (motion.action.empty() ? "" : ": " + motion.action)};
     figures.push_back(std::move(figure));
   }
 }
@@ -155,11 +161,13 @@ int run_inspect(const InspectOptions& options, const Common& common) {
 
 void add_data_inspect(Program& program, CLI::App& group) {
   const auto options = std::make_shared<InspectOptions>();
-  CLI::App& app = program.add(group, "inspect", "say what a file holds, and draw it",
-                              "restage data inspect data.h5\nrestage data inspect data.h5 --plot sheet.png\n"
-                              "restage data inspect data.h5 --json",
-                              [options, &program] { return run_inspect(*options, program.common()); });
-  app.add_option("FILE", options->file, "bodies, motions, scans or a prediction (HDF5)")->required();
+  CLI::App& app =
+      program.add(group, "inspect", "say what a file holds, and draw it",
+                  "restage data inspect data.h5\nrestage data inspect data.h5 --plot sheet.png\n"
+                  "restage data inspect data.h5 --json",
+                  [options, &program] { return run_inspect(*options, program.common()); });
+  app.add_option("FILE", options->file, "bodies, motions, scans or a prediction (HDF5)")
+      ->required();
   app.add_option("--plot", options->plot, "draw bodies, poses or frames on a contact sheet (PNG)");
 }
 

@@ -50,7 +50,8 @@ struct Report {
 
 int direction_of(const std::string& option, const std::string& text) {
   for (size_t i = 0; i < kDirections.size(); ++i)
-    if (text == kDirections[i] || (i % 2 == 0 && text == kDirections[i] + 1)) return static_cast<int>(i);
+    if (text == kDirections[i] || (i % 2 == 0 && text == kDirections[i] + 1))
+      return static_cast<int>(i);
   throw InputError("", option + " '" + text + "' is no direction", "give one of +x -x +y -y +z -z");
 }
 
@@ -136,7 +137,8 @@ std::vector<Joints> some_joints(const Prediction& data) {
     const int64_t f = k * data.frames / std::min<int64_t>(data.frames, 64);
     Joints& joints = out.emplace_back();
     for (size_t j = 0; j < joints.size(); ++j)
-      joints[j] = Eigen::Map<const Vec3>(data.joints.data() + 3 * (f * kJoints + static_cast<int64_t>(j)));
+      joints[j] =
+          Eigen::Map<const Vec3>(data.joints.data() + 3 * (f * kJoints + static_cast<int64_t>(j)));
   }
   return out;
 }
@@ -234,14 +236,15 @@ Report examine(const Options& options) {
 
 // ---- the command -------------------------------------------------------------------------------
 
-void print_report(const Options& options, const Report& found, const std::string& sidecar, const Common& common) {
+void print_report(const Options& options, const Report& found, const std::string& sidecar,
+                  const Common& common) {
   if (common.json) {
     Json notes = Json::array(), findings = Json::array();
     for (const Finding& f : found.findings) {
       findings.push_back(to_json(f));
       if (f.weight != Weight::fact) notes.push_back(f.what);
     }
-    Json document = {{"file", options.path},  {"kind", found.kind},     {"usable", found.usable()},
+    Json document = {{"file", options.path}, {"kind", found.kind},   {"usable", found.usable()},
                      {"facts", found.facts}, {"findings", findings}, {"notes", notes}};
     if (found.diagnosis && found.diagnosis->transform)
       document["transform"] = to_json(*found.diagnosis->transform);
@@ -249,7 +252,8 @@ void print_report(const Options& options, const Report& found, const std::string
     if (!sidecar.empty()) document["transform_file"] = sidecar;
     return print_json(document);
   }
-  std::string text = options.path + ": " + found.kind + (found.usable() ? "" : ", not usable as it is") + "\n";
+  std::string text =
+      options.path + ": " + found.kind + (found.usable() ? "" : ", not usable as it is") + "\n";
   for (const auto& [name, value] : found.facts.items())
     text += "  " + name + ": " + value.dump() + "\n";
   for (const Weight weight : {Weight::wrong, Weight::note, Weight::fact})
@@ -273,8 +277,11 @@ bool mended_well(const Options& options) {
 int run_doctor(const Options& options, const Common& common) {
   const Report found = examine(options);
   if (!found.diagnosis && (!options.picture.empty() || !options.fix.empty()))
-    throw InputError(options.path, "is of the kind '" + found.kind + "', which is neither drawn nor repaired here",
-                     "give a scan, a surface or a sequence of frames; restage data inspect --plot draws data files");
+    throw InputError(
+        options.path,
+        "is of the kind '" + found.kind + "', which is neither drawn nor repaired here",
+        "give a scan, a surface or a sequence of frames; restage data inspect --plot draws data "
+        "files");
   std::string sidecar;
   if (!options.picture.empty()) {
     const auto first = open_frames(options.path)->next();

@@ -47,7 +47,9 @@ std::vector<FigureLayer> layers_of(const Mesh& mesh, Move&& move) {
   const Points points = shape_points(mesh);
   const Parts parts = find_parts(points);
   for (size_t i = 0; i < points.size(); ++i) {
-    FigureLayer& to = parts.part[i] == Part::stray ? stray : parts.part[i] == Part::other ? other : person;
+    FigureLayer& to = parts.part[i] == Part::stray   ? stray
+                      : parts.part[i] == Part::other ? other
+                                                     : person;
     if (mesh.faces.empty() || &to != &person) to.points.push_back(move(points[i]));
   }
   if (!mesh.faces.empty())
@@ -127,9 +129,12 @@ void write_picture(const std::string& out, const std::string& title, const Mesh&
   const double size = d.size > 0 ? 0.39 / d.size : 1;
   Point middle;
   const Points points = shape_points(mesh);
-  for (int axis = 0; axis < 3; ++axis) middle[axis] = static_cast<float>(quantile(points, direction(2 * axis), 0.5));
-  Figure raw{layers_of(mesh, [&](const Point& p) { return Point((p - middle) * static_cast<float>(size)); }),
-             "as it is, y upwards", 32, 9, 0};
+  for (int axis = 0; axis < 3; ++axis)
+    middle[axis] = static_cast<float>(quantile(points, direction(2 * axis), 0.5));
+  Figure raw{
+      layers_of(mesh,
+                [&](const Point& p) { return Point((p - middle) * static_cast<float>(size)); }),
+      "as it is, y upwards", 32, 9, 0};
   raw.floor = static_cast<float>(quantile(raw.layers[0].points, Vec3::UnitY(), 0.003));
   std::vector<Figure> figures = {raw};
   if (d.transform) {
@@ -160,7 +165,8 @@ class FrameSink {
     out_ = out;
   }
   void push(const Mesh& mesh) {
-    if (mesh.vertices.empty()) throw InputError(out_, "a frame would be empty", "leave it out of the input");
+    if (mesh.vertices.empty())
+      throw InputError(out_, "a frame would be empty", "leave it out of the input");
     if (folder_) return folder_->push(mesh.vertices, mesh.faces);
     if (!mesh.faces.empty())
       throw InputError(out_, "cannot hold surfaces", "give a folder to --fix");
@@ -218,7 +224,8 @@ std::string write_repaired(const std::string& path, const std::string& out, cons
   info.transform = note.dump();
   const double fps = d.fps > 0 ? d.fps / d.keep_every : kFps;
   if (is_mesh_name(out)) {
-    if (d.kind == "frames") throw InputError(out, "is one frame only", "give a folder or an .h5 file to --fix");
+    if (d.kind == "frames")
+      throw InputError(out, "is one frame only", "give a folder or an .h5 file to --fix");
     const Mesh mesh = mended(read_mesh(path), d);
     out.ends_with("obj") || out.ends_with("OBJ") ? write_obj(out, mesh) : write_ply(out, mesh);
   } else {

@@ -23,6 +23,7 @@ void write_picture(const std::string& out, const std::string& title, const Mesh&
 /// Writes the repaired file (X.ply, X.obj, X.h5, or a folder) and its transform: in an HDF5 file's
 /// attribute `transform`, else in the file returned, X.transform.json beside it; empty for HDF5.
 /// InputError if it cannot be told how to repair it.
-std::string write_repaired(const std::string& path, const std::string& out, const Diagnosis& diagnosis);
+std::string write_repaired(const std::string& path, const std::string& out,
+                           const Diagnosis& diagnosis);
 
 }  // namespace restage::cli

@@ -215,7 +215,8 @@ void add_retarget(Program& program) {
   app.add_option("--scale", c->scale, "the source's units in metres");
   app.add_option("--format", c->format, "of a folder's frames: ply or obj");
   app.add_option("--samples", c->samples, "random choices of points per frame to average");
-  app.add_flag("--force", c->force, "accept a target that is no T-pose, and axes and units that look wrong");
+  app.add_flag("--force", c->force,
+               "accept a target that is no T-pose, and axes and units that look wrong");
   app.add_flag("--profile", c->profile,
                "say how long a frame and its parts take: p50, p95, p99, max");
 }

@@ -72,7 +72,8 @@ Image figure_sheet(const std::vector<Figure>& figures, const FigureSheetOptions&
     if (figure.layers.empty() || figure.layers[0].points.empty())
       throw InputError("", "\"" + figure.caption + "\" is empty", "leave such figures out");
   const Extent extent = extent_of(figures);
-  const double per_metre = options.cell_height / (1.16 * std::max(extent.high, extent.aside) + 0.12);
+  const double per_metre =
+      options.cell_height / (1.16 * std::max(extent.high, extent.aside) + 0.12);
   const int cell_width = std::clamp(static_cast<int>(per_metre * (2.0 * extent.aside + 0.16)),
                                     options.cell_height / 2, options.cell_height * 3 / 2);
   const int count = static_cast<int>(figures.size()), columns = std::min(count, options.columns),
@@ -91,8 +92,8 @@ Image figure_sheet(const std::vector<Figure>& figures, const FigureSheetOptions&
     const Figure& figure = figures[static_cast<size_t>(i)];
     paste(sheet, draw(figure, extent, cell_width, options.cell_height), x, y);
     const std::string caption = fitting(10, figure.caption, cell_width - 4);
-    draw_text(sheet, x + (cell_width - text_width(10, caption)) / 2, y + options.cell_height + 4, 10,
-              kPale, caption);
+    draw_text(sheet, x + (cell_width - text_width(10, caption)) / 2, y + options.cell_height + 4,
+              10, kPale, caption);
   }
   for (int i = 0; i < lines; ++i)
     draw_text(sheet, kMargin, top + rows * row_height + i * kLine + 6, 11, kInk,

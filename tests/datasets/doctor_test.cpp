@@ -48,7 +48,8 @@ Mat3 into_foreign(int up, int facing) {
 
 bool notes(const Diagnosis& d, const std::string& topic, const std::string& words) {
   for (const Finding& f : d.findings)
-    if (f.topic == topic && f.weight != Weight::fact && f.what.find(words) != std::string::npos) return true;
+    if (f.topic == topic && f.weight != Weight::fact && f.what.find(words) != std::string::npos)
+      return true;
   return false;
 }
 
@@ -141,7 +142,8 @@ TEST(DoctorOrientation, WhatIsNoPersonIsUnsure) {
   Points ball;
   for (int i = 0; i < 600; ++i)
     ball.push_back(Point(static_cast<float>(rng.normal()), static_cast<float>(rng.normal()),
-                         static_cast<float>(rng.normal())) * 50);
+                         static_cast<float>(rng.normal())) *
+                   50);
   const Diagnosis d = examine_surface(cloud(ball));
   EXPECT_TRUE(d.usable()) << "nothing certain can be said against it";
   EXPECT_NO_THROW(check_target(cloud(ball), "ball"));
@@ -168,7 +170,8 @@ TEST(Doctor, AHealthyBodyHasNothing) {
     ExamineOptions options;
     options.target = true;
     const Diagnosis d = examine_surface(mesh, options);
-    for (const Finding& f : d.findings) EXPECT_EQ(f.weight, Weight::fact) << f.topic << ": " << f.what;
+    for (const Finding& f : d.findings)
+      EXPECT_EQ(f.weight, Weight::fact) << f.topic << ": " << f.what;
     EXPECT_TRUE(d.transform && d.transform->is_identity());
     float low = 1e9f, high = -1e9f;
     for (const Point& p : mesh.vertices) low = std::min(low, p.y()), high = std::max(high, p.y());
@@ -178,7 +181,8 @@ TEST(Doctor, AHealthyBodyHasNothing) {
 }
 
 TEST(Doctor, FloorIsFoundAndMoved) {
-  const Diagnosis d = examine_surface(cloud(moved(scan(somebody()), Mat3::Identity(), 1, {0, 0.8f, 0})));
+  const Diagnosis d =
+      examine_surface(cloud(moved(scan(somebody()), Mat3::Identity(), 1, {0, 0.8f, 0})));
   EXPECT_TRUE(notes(d, "floor", "0.8"));
   EXPECT_TRUE(d.usable());
   EXPECT_NEAR((*d.transform)(Point(0, 0.8f, 0)).y(), 0, 0.02);
@@ -190,7 +194,8 @@ TEST(Doctor, StrayPointsAreCountedAndRemoved) {
   Rng rng(RngKey{7, 0});
   for (int i = 0; i < 20; ++i) {
     const double a = rng.uniform(0, 6.28);
-    points.push_back(Point(static_cast<float>(1.6 * std::cos(a)), static_cast<float>(rng.uniform(0, 2)),
+    points.push_back(Point(static_cast<float>(1.6 * std::cos(a)),
+                           static_cast<float>(rng.uniform(0, 2)),
                            static_cast<float>(1.6 * std::sin(a))));
   }
   const Diagnosis d = examine_surface(cloud(points));
@@ -236,7 +241,9 @@ TEST(Doctor, OneSidedScansAreFound) {
   const Body& body = somebody();
   const Points points = SurfaceSampler(body).draw(RngKey{3, 0}, 4000).on_rest(body);
   std::map<std::pair<long, long>, float> front;
-  const auto ray = [](const Point& p) { return std::pair(std::lround(p.x() / 0.04), std::lround(p.y() / 0.04)); };
+  const auto ray = [](const Point& p) {
+    return std::pair(std::lround(p.x() / 0.04), std::lround(p.y() / 0.04));
+  };
   for (const Point& p : points) {
     const auto at = front.try_emplace(ray(p), p.z()).first;
     at->second = std::max(at->second, p.z());
@@ -357,7 +364,8 @@ TEST(DoctorChecks, RefuseNonsenseWithTheOptionThatMendsIt) {
   };
   const auto source = [&](const Mat3& turn, double scale) {
     std::vector<Mesh> frames;
-    for (const Points& p : performance(kSourceFrames)) frames.push_back(cloud(moved(p, turn, scale)));
+    for (const Points& p : performance(kSourceFrames))
+      frames.push_back(cloud(moved(p, turn, scale)));
     return words([&] { check_source(frames, "scans"); });
   };
   EXPECT_EQ(source(Mat3::Identity(), 1), "");
