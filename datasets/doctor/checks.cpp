@@ -65,7 +65,7 @@ void check_target(const Mesh& target, const std::string& where) {
   const Orientation o = vote.result();
   if (o.up_sure < kVerySure) return;
   if (o.up != 2) throw InputError(where, up_words(o), fix);
-  if (o.facing != 4 && o.facing_sure >= kVerySure)
+  if (o.facing != 4 && o.facing_sure >= kSure)
     throw InputError(where,
                      std::string("it seems to face ") + kDirections[static_cast<size_t>(o.facing)] +
                          " (sure " + per_cent(o.facing_sure) + "), a target faces +z",

@@ -86,7 +86,8 @@ void judge_up(Diagnosis& d, size_t clouds) {
              kDirections[static_cast<size_t>(o.up)] + ")";
     f.fix = "say it with --source-up if it is not y; is it one whole person?";
   } else if (o.up != 2) {
-    f.weight = o.up_sure >= kSure ? Weight::wrong : Weight::note;
+    // What is of no person's size may be no person: then only a note.
+    f.weight = o.up_sure >= kSure && d.unit.sure >= kUnsure ? Weight::wrong : Weight::note;
     f.what += ", not +y";
     f.fix = o.up == 4 ? "--source-up z, or --fix" : "--fix turns it";
   }

@@ -17,7 +17,7 @@ constexpr size_t kSurfacePoints = 2000;
 // Logarithm of a person's size in metres: built-in bodies in all their poses have -0.92 +- 0.14,
 // people from children to giants get more room.
 constexpr double kMeanLogSize = -0.94, kDeviation = 0.22;
-constexpr double kMostDeviations = 4;
+constexpr double kNoPerson = 0.0111;  // density of "no person, or another unit": 3 deviations
 // A T-pose: shoulders at 0.81 of the height, 0.10 of it to the side (data of 160 bodies).
 constexpr double kShoulderHeight = 0.81, kShoulderWidth = 0.10, kShortestReach = 0.22;
 
@@ -55,7 +55,7 @@ UnitGuess guess_unit(double size) {
   UnitGuess out;
   out.deviation = 1e9;
   if (!(size > 0) || !std::isfinite(size)) return out;
-  double total = 0;
+  double total = kNoPerson;
   for (const LengthUnit& unit : kUnits) {
     const double deviation = (std::log(size * unit.metres) - kMeanLogSize) / kDeviation;
     total += std::exp(-0.5 * deviation * deviation);
@@ -64,8 +64,7 @@ UnitGuess guess_unit(double size) {
       out.deviation = deviation;
     }
   }
-  if (std::abs(out.deviation) < kMostDeviations)
-    out.sure = std::exp(-0.5 * out.deviation * out.deviation) / total;
+  out.sure = std::exp(-0.5 * out.deviation * out.deviation) / total;
   return out;
 }
 

@@ -31,7 +31,7 @@ inline constexpr std::array<LengthUnit, 5> kUnits = {
 
 struct UnitGuess {
   LengthUnit unit = kUnits[0];
-  double sure = 0;       ///< probability; 0 if no unit makes a person of it
+  double sure = 0;       ///< probability; low if no unit makes a person of it
   double deviation = 0;  ///< from a usual person, in standard deviations
 };
 /// By PersonShape::size.

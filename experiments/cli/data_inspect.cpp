@@ -75,7 +75,8 @@ Json to_json(const Inspection& found) {
               {"license", found.license}, {"provenance", found.provenance}, {"fps", found.fps},
               {"seconds", found.seconds}};
   if (found.kind == "scans" || found.kind == "prediction") {
-    if (!found.transform.empty()) out["transform"] = Json::parse(found.transform, nullptr, false);
+    if (Json transform = Json::parse(found.transform, nullptr, false); transform.is_object())
+      out["transform"] = std::move(transform);
     return out;
   }
   out["splits"] = found.splits;

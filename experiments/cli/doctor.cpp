@@ -310,8 +310,8 @@ void add_doctor(Program& program) {
   app.add_option("--fix", options->fix, "write it mended: .ply, .obj, .h5, or a folder of frames");
   app.add_flag("--target", options->target, "it is meant as a target: in T-pose, facing +z");
   app.add_option("--scale", options->scale, "metres per unit, where you know better");
-  app.add_option("--up", options->up, "the direction that is up: +x -x +y -y +z -z");
-  app.add_option("--facing", options->facing, "the direction that the person faces");
+  app.add_option("--up", options->up, "the direction that is up: x, y, z, --up=-x ...");
+  app.add_option("--facing", options->facing, "the direction that the person faces, as --up");
 }
 
 }  // namespace restage::cli

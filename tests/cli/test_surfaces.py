@@ -96,7 +96,7 @@ class Doctor(CliTest):
         self.done("doctor", "ball.ply", "--fix", "x.ply", "--up", "y", "--scale", "0.3")
         self.bad_input(["doctor", "ball.ply", "--up", "w"], "--up")
         self.bad_input(["doctor", "ball.ply", "--scale", "-1"], "--scale")
-        self.bad_input(["doctor", "ball.ply", "--up", "+y", "--facing", "-y"], "nobody")
+        self.bad_input(["doctor", "ball.ply", "--up", "+y", "--facing=-y"], "nobody")
 
     def test_bad_files(self):
         bad = lambda name, *words: self.bad_input(["doctor", name], name, *words)
