@@ -107,7 +107,7 @@ std::vector<float> fit_orientation_prior(const ScanMaker& scans, const FitOption
   Rng rng(RngKey{options.seed, 0}.fold("fit orientation"));
   const int truth = true_turn();
   Places first;  // kinds start as different scans, else they would stay alike
-  for (size_t k = 0; k < kKinds; ++k) {
+  for (size_t k = 0; kKinds > 1 && k < kKinds; ++k) {
     look(clouds[rng.below(clouds.size())], fit_turn(truth), first);
     for (size_t i = 0; i < first.place.size(); ++i)
       coefficients[k * kPlaces + static_cast<size_t>(first.place[i])] = 4 * first.share[i];
