@@ -50,7 +50,7 @@ ONLY_IN = {
     "hdf5.h": ["datasets/hdf5/"],
     "yaml-cpp/": ["train/config_yaml.cpp", "nn/weights/", "datasets/importers/profiles.cpp"],
     "CLI/": ["experiments/"],
-    "nanoflann.hpp": ["nn/metrics/"],
+    "nanoflann.hpp": ["nn/metrics/", "datasets/doctor/"],
     "nlohmann/": ["nn/weights/", "datasets/readers/", "train/", "infer/", "experiments/"],
     "stb/": ["infer/render/"],
     "lzma.h": ["datasets/readers/"],

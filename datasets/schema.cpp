@@ -44,6 +44,7 @@ h5::File create_schema_file(const std::string& path, const std::string& kind,
   file.set_number("/", "fps", kFps);
   file.set_text("/", "license", info.license);
   file.set_text("/", "provenance", info.provenance);
+  if (!info.transform.empty()) file.set_text("/", "transform", info.transform);
   return file;
 }
 

@@ -23,6 +23,7 @@ inline constexpr int64_t kSchemaVersion = 1;
 struct FileInfo {
   std::string license = "unknown";
   std::string provenance = "unknown";
+  std::string transform = "";  ///< how it came into our frame (JSON); empty: it was not moved
 };
 
 // ---- bodies and motions: one "data set file" holds either or both ------------------------------
@@ -122,9 +123,16 @@ struct Inspection {
   std::string kind;                       ///< "bodies", "motions", "dataset", "scans", "prediction"
   std::map<std::string, int64_t> counts;  ///< e.g. {"frames": 30, "vertices": 6890}
   std::string units, license, provenance;
+  std::string transform;  ///< of repaired files (FileInfo::transform); empty: none
+  double fps = kFps, seconds = 0;
+  /// Of data sets: {"train": {"bodies": 24, "motions": 60, "frames": 5400}, ...}, motions of each
+  /// subject and each action, and the bodies' heights in metres, in order of size.
+  std::map<std::string, std::map<std::string, int64_t>> splits;
+  std::map<std::string, int64_t> subjects, actions;
+  std::vector<double> heights;
 };
 
-/// What a file holds, without reading its values.
+/// What a file holds, without reading more values than the bodies' vertices.
 Inspection inspect(const std::string& path);
 
 /// Reads everything and checks it: finite values, weights that sum to 1, unit quaternions, rising

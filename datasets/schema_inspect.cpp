@@ -1,5 +1,7 @@
 // What a file holds (inspect) and whether it holds together (verify).
+#include <algorithm>
 #include <functional>
+#include <limits>
 
 #include "autograd/base/error.h"
 #include "datasets/schema.h"
@@ -18,22 +20,48 @@ std::string kind_of(const h5::File& file) {
                    "give a file laid out as in datasets/README.md");
 }
 
-void count_dataset(const h5::File& file, std::map<std::string, int64_t>& counts) {
+double height_of(const h5::Dataset& vertices) {
+  std::vector<float> values;
+  vertices.read_rows(0, vertices.rows(), values);
+  float low = std::numeric_limits<float>::max(), high = -low;
+  for (size_t i = 1; i < values.size(); i += 3) {
+    low = std::min(low, values[i]);
+    high = std::max(high, values[i]);
+  }
+  return values.empty() ? 0 : high - low;
+}
+
+/// Adds one body or motion of a group to what its attributes say of it.
+void count_member(const h5::File& file, const std::string& object, const std::string& kind,
+                  Inspection& out) {
+  ++out.counts[kind];
+  const auto said = [&](const char* name) { return file.text(object, name).value_or(""); };
+  if (const std::string split = said("split"); !split.empty()) ++out.splits[split][kind];
+  if (kind != "motions") return;
+  if (const std::string subject = said("subject"); !subject.empty()) ++out.subjects[subject];
+  if (const std::string action = said("action"); !action.empty()) ++out.actions[action];
+}
+
+void count_dataset(const h5::File& file, Inspection& out) {
   if (file.has("/bodies")) {
-    int64_t vertices = 0;
-    const std::vector<std::string> ids = file.children("/bodies");
-    for (const std::string& id : ids)
-      vertices += file.dataset("/bodies/" + id + "/vertices", {-1, 3}).rows();
-    counts["bodies"] = static_cast<int64_t>(ids.size());
-    counts["vertices"] = vertices;
+    out.counts["bodies"] = out.counts["vertices"] = 0;
+    for (const std::string& id : file.children("/bodies")) {
+      const h5::Dataset vertices = file.dataset("/bodies/" + id + "/vertices", {-1, 3});
+      out.counts["vertices"] += vertices.rows();
+      out.heights.push_back(height_of(vertices));
+      count_member(file, "/bodies/" + id, "bodies", out);
+    }
+    std::sort(out.heights.begin(), out.heights.end());
   }
   if (file.has("/motions")) {
-    int64_t frames = 0;
-    const std::vector<std::string> ids = file.children("/motions");
-    for (const std::string& id : ids)
-      frames += file.dataset("/motions/" + id + "/hips", {-1, 3}).rows();
-    counts["motions"] = static_cast<int64_t>(ids.size());
-    counts["frames"] = frames;
+    out.counts["motions"] = out.counts["frames"] = 0;
+    for (const std::string& id : file.children("/motions")) {
+      const int64_t frames = file.dataset("/motions/" + id + "/hips", {-1, 3}).rows();
+      out.counts["frames"] += frames;
+      count_member(file, "/motions/" + id, "motions", out);
+      if (const auto split = file.text("/motions/" + id, "split"))
+        out.splits[*split]["frames"] += frames;
+    }
   }
 }
 
@@ -99,7 +127,11 @@ Inspection inspect(const std::string& path) {
   if (out.kind == "scans" || out.kind == "prediction")
     count_frames(file, out.counts);
   else
-    count_dataset(file, out.counts);
+    count_dataset(file, out);
+  out.fps = read_fps(file);
+  out.transform = file.text("/", "transform").value_or("");
+  if (out.counts.contains("frames"))
+    out.seconds = static_cast<double>(out.counts.at("frames")) / out.fps;
   return out;
 }
 

@@ -7,7 +7,8 @@
 namespace restage::cli {
 
 void add_data(Program& program);
-void add_data_import(Program& program, CLI::App& group);  // of `data`
+void add_data_import(Program& program, CLI::App& group);   // of `data`
+void add_data_inspect(Program& program, CLI::App& group);  // of `data`
 void add_data_merge(Program& program, CLI::App& group);    // of `data`
 void add_data_perform(Program& program, CLI::App& group);  // of `data`
 void add_doctor(Program& program);

@@ -65,26 +65,7 @@ void add_build(Program& program, CLI::App& group) {
       ->expected(3);
 }
 
-// ---- inspect and verify ------------------------------------------------------------------------
-
-int run_inspect(const std::string& file, const Common& common) {
-  const Inspection found = inspect(file);
-  if (common.json) {
-    print_json({{"kind", found.kind},
-                {"counts", found.counts},
-                {"units", found.units},
-                {"license", found.license},
-                {"provenance", found.provenance}});
-    return 0;
-  }
-  std::string text = "kind        " + found.kind + "\n";
-  for (const auto& [name, count] : found.counts)
-    text += name + std::string(name.size() < 12 ? 12 - name.size() : 1, ' ') +
-            std::to_string(count) + "\n";
-  print(text + "units       " + found.units + "\nlicense     " + found.license + "\nprovenance  " +
-        found.provenance + "\n");
-  return 0;
-}
+// ---- verify ------------------------------------------------------------------------------------
 
 int run_verify(const std::string& file, const Common& common) {
   const std::vector<std::string> problems = verify(file);
@@ -98,13 +79,12 @@ int run_verify(const std::string& file, const Common& common) {
   return problems.empty() ? 0 : 1;
 }
 
-void add_file_command(Program& program, CLI::App& group, const std::string& name,
-                      const std::string& help, int (*run)(const std::string&, const Common&)) {
+void add_verify(Program& program, CLI::App& group) {
   const auto file = std::make_shared<std::string>();
   CLI::App& app =
-      program.add(group, name, help,
-                  "restage data " + name + " data.h5\nrestage data " + name + " data.h5 --json",
-                  [file, run, &program] { return run(*file, program.common()); });
+      program.add(group, "verify", "read all of a file and list what is wrong (exit code 1)",
+                  "restage data verify data.h5\nrestage data verify data.h5 --json",
+                  [file, &program] { return run_verify(*file, program.common()); });
   app.add_option("FILE", *file, "bodies, motions, scans or a prediction (HDF5)")->required();
 }
 
@@ -116,9 +96,8 @@ void add_data(Program& program) {
   add_data_import(program, group);
   add_data_perform(program, group);
   add_data_merge(program, group);
-  add_file_command(program, group, "inspect", "say what a file holds", run_inspect);
-  add_file_command(program, group, "verify",
-                   "read all of a file and list what is wrong (exit code 1)", run_verify);
+  add_data_inspect(program, group);
+  add_verify(program, group);
 }
 
 }  // namespace restage::cli

@@ -1,24 +1,26 @@
-// restage doctor: says what a file is, what stands out in it, and what is wrong with it. A file
-// that is broken ends as bad input does anywhere else: one line, exit code 2. A new kind of file: a
-// function that examines it and a line in kKinds.
+// restage doctor: says what a file is, what stands out in it, what is wrong with it, and mends it.
+// A file that is broken ends as bad input does anywhere else: one line, exit code 2. A new kind of
+// file: a function that examines it and a line in kKinds.
 #include <algorithm>
-#include <array>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <memory>
-#include <set>
 #include <utility>
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "datasets/doctor/examine.h"
+#include "datasets/importers/amc.h"
 #include "datasets/importers/bvh.h"
+#include "datasets/importers/gltf_character.h"
 #include "datasets/readers/frame_folder.h"
 #include "datasets/readers/mesh_io.h"
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
-#include "experiments/cli/output.h"
+#include "experiments/cli/doctor_report.h"
 #include "nn/weights/safetensors.h"
 #include "train/config.h"
 
@@ -27,100 +29,174 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kEnoughPoints = 64;  // distinct points that the skeleton extractor needs
-
-struct Diagnosis {
-  explicit Diagnosis(std::string what) : kind(std::move(what)) {}
-  std::string kind;
-  Json facts = Json::object();
-  std::vector<std::string> notes;  ///< unusual, though readable
+struct Options {
+  std::string path, picture, fix, up, facing;
+  std::optional<double> scale;
+  bool target = false;
 };
 
-std::string number(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", x);
-  return text;
+/// What is said of any kind of file.
+struct Report {
+  explicit Report(std::string what) : kind(std::move(what)) {}
+  std::string kind;
+  Json facts = Json::object();
+  std::vector<Finding> findings;
+  std::optional<Diagnosis> diagnosis;  ///< of clouds, surfaces and sequences
+  bool usable() const {
+    return std::none_of(findings.begin(), findings.end(),
+                        [](const Finding& f) { return f.weight == Weight::wrong; });
+  }
+};
+
+// ---- scans, surfaces, sequences ----------------------------------------------------------------
+
+int direction_of(const std::string& option, const std::string& text) {
+  for (size_t i = 0; i < kDirections.size(); ++i)
+    if (text == kDirections[i] || (i % 2 == 0 && text == kDirections[i] + 1))
+      return static_cast<int>(i);
+  throw InputError("", option + " '" + text + "' is no direction", "give one of +x -x +y -y +z -z");
 }
 
-/// What a person's points should look like: metres, standing along y, enough of them.
-void examine_points(const Points& points, Diagnosis& out) {
-  Point low = points[0], high = points[0];
-  std::set<std::array<float, 3>> distinct;
-  for (const Point& p : points) {
+ExamineOptions examine_options(const Options& options) {
+  ExamineOptions out;
+  out.target = options.target;
+  out.scale = options.scale;
+  if (out.scale && !(*out.scale > 0 && std::isfinite(*out.scale)))
+    throw InputError("", "--scale must be above 0", "metres = units x scale");
+  if (!options.up.empty()) out.up = direction_of("--up", options.up);
+  if (!options.facing.empty()) out.facing = direction_of("--facing", options.facing);
+  return out;
+}
+
+void adopt(Report& report, Diagnosis diagnosis) {
+  report.findings = diagnosis.findings;
+  report.diagnosis = std::move(diagnosis);
+}
+
+Report examine_mesh(const Options& options) {
+  const Mesh mesh = read_mesh(options.path);
+  Report out(mesh.faces.empty() ? "cloud" : "mesh");
+  Point low = mesh.vertices[0], high = mesh.vertices[0];
+  for (const Point& p : mesh.vertices) {
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
-    if (distinct.size() < kEnoughPoints) distinct.insert({p.x(), p.y(), p.z()});
   }
   const Point size = high - low;
-  out.facts["size"] = {size.x(), size.y(), size.z()};
-  out.facts["lowest"] = low.y();
-  if (distinct.size() < kEnoughPoints)
-    out.notes.push_back("only " + std::to_string(distinct.size()) +
-                        " distinct points; networks need " + std::to_string(kEnoughPoints));
-  const double largest = size.maxCoeff();
-  if (largest > 20)
-    out.notes.push_back(number(largest) + " m large; centimetres? then use a scale of 0.01");
-  else if (largest < 0.5)
-    out.notes.push_back(number(largest) + " m large; not a person in metres");
-  else if (size.z() > 1.2F * size.y())
-    out.notes.push_back("longer along z than along y; lying, or with z up?");
-}
-
-Diagnosis examine_mesh(const std::string& path) {
-  const Mesh mesh = read_mesh(path);
-  Diagnosis out{mesh.faces.empty() ? "cloud" : "mesh"};
   out.facts["points"] = mesh.vertices.size();
   if (!mesh.faces.empty()) out.facts["faces"] = mesh.faces.size();
-  examine_points(mesh.vertices, out);
+  out.facts["size"] = {size.x(), size.y(), size.z()};
+  adopt(out, examine_surface(mesh, examine_options(options)));
   return out;
 }
 
-Diagnosis examine_folder(const std::string& path) {
+Report examine_sequence(const Options& options) {
+  Report out("frames");
+  const auto source = open_frames(options.path);
+  Diagnosis d = examine_frames(*source, examine_options(options));
+  out.facts["frames"] = d.frames;
+  out.facts["fps"] = d.fps;
+  out.facts["fewest_points"] = d.fewest_points;
+  out.facts["most_points"] = d.most_points;
+  if (d.faces > 0) out.facts["faces"] = d.faces;
+  adopt(out, std::move(d));
+  return out;
+}
+
+Report examine_folder(const Options& options) {
+  const std::string& path = options.path;
   std::error_code ignored;
-  if (fs::exists(path + "/config.yaml", ignored) && fs::exists(path + "/metrics.jsonl", ignored)) {
-    load_config_tree(path + "/config.yaml");
-    Diagnosis out{"run"};
-    const std::string lines = read_file(path + "/metrics.jsonl");
-    out.facts["records"] = std::count(lines.begin(), lines.end(), '\n');
-    return out;
-  }
-  Diagnosis out{"frames"};
-  const auto source = open_frames(path);
-  size_t fewest = SIZE_MAX, most = 0;
-  while (const auto frame = source->next()) {
-    if (most == 0) examine_points(frame->points, out);
-    fewest = std::min(fewest, frame->points.size());
-    most = std::max(most, frame->points.size());
-  }
-  out.facts["frames"] = source->frames();
-  out.facts["fewest_points"] = fewest;
-  out.facts["most_points"] = most;
+  if (!fs::exists(path + "/config.yaml", ignored) || !fs::exists(path + "/metrics.jsonl", ignored))
+    return examine_sequence(options);
+  load_config_tree(path + "/config.yaml");
+  Report out("run");
+  const std::string lines = read_file(path + "/metrics.jsonl");
+  out.facts["records"] = std::count(lines.begin(), lines.end(), '\n');
   return out;
 }
 
-Diagnosis examine_hdf5(const std::string& path) {
+/// A rigged character, as retarget would take it: in T-pose, in our frame.
+Report examine_character(const Options& options) {
+  const TargetMesh target = read_target(options.path);
+  Report out("character");
+  out.facts["points"] = target.mesh.vertices.size();
+  out.facts["faces"] = target.mesh.faces.size();
+  for (const auto& [name, value] : target.report.facts) out.facts[name] = value;
+  adopt(out, examine_surface(target.mesh, examine_options(options)));
+  return out;
+}
+
+// ---- files with named joints -------------------------------------------------------------------
+
+/// Left and right, where joints have names: the only place where a mirror image can be told.
+void judge_hands(Report& out, const std::vector<Joints>& frames) {
+  int mirrored = 0, right = 0;
+  for (const Joints& joints : frames)
+    if (const auto found = is_mirrored(joints)) ++(*found ? mirrored : right);
+  if (mirrored + right == 0) return;
+  const double share = static_cast<double>(std::max(mirrored, right)) / (mirrored + right);
+  if (mirrored > right)
+    out.findings.push_back({"handedness", share > 0.9 ? Weight::wrong : Weight::note,
+                            "left and right are exchanged: a mirror image", share,
+                            "with toes forwards, the joints named left are on the right",
+                            "mirror it (x to -x) where it was made, or exchange the names"});
+  else
+    out.findings.push_back({"handedness", Weight::fact, "right-handed, left is left", share,
+                            "with toes forwards, the joints named left are on the left", ""});
+}
+
+std::vector<Joints> some_joints(const Prediction& data) {
+  std::vector<Joints> out;
+  for (int64_t k = 0; k < std::min<int64_t>(data.frames, 64); ++k) {
+    const int64_t f = k * data.frames / std::min<int64_t>(data.frames, 64);
+    Joints& joints = out.emplace_back();
+    for (size_t j = 0; j < joints.size(); ++j)
+      joints[j] =
+          Eigen::Map<const Vec3>(data.joints.data() + 3 * (f * kJoints + static_cast<int64_t>(j)));
+  }
+  return out;
+}
+
+Report examine_hdf5(const Options& options) {
+  const std::string& path = options.path;
   const Inspection found = inspect(path);
   if (const auto problems = verify(path); !problems.empty()) throw Error(problems[0], 2);
-  Diagnosis out{found.kind};
+  Report out(found.kind);
+  if (found.kind == "scans" || found.counts.contains("vertices")) {
+    if (found.kind == "scans" || found.kind == "prediction") out = examine_sequence(options);
+    out.kind = found.kind;
+  }
   for (const auto& [name, count] : found.counts) out.facts[name] = count;
   out.facts["units"] = found.units;
   out.facts["license"] = found.license;
+  if (found.kind == "prediction" && found.counts.contains("joints"))
+    judge_hands(out, some_joints(read_prediction(path)));
+  if (found.counts.contains("bodies")) {
+    std::vector<Joints> rest;
+    for (const Body& body : read_bodies(path)) rest.push_back(body.joints);
+    judge_hands(out, rest);
+  }
   return out;
 }
 
-Diagnosis examine_bvh(const std::string& path) {
-  const MotionClip clip = read_bvh(path);
-  Diagnosis out{"bvh"};
+/// A BVH or AMC file.
+Report examine_recording(const Options& options) {
+  const bool amc = options.path.ends_with(".amc") || options.path.ends_with(".amc.xz");
+  const MotionClip clip = amc ? read_amc(options.path, "", {}) : read_bvh(options.path);
+  Report out(amc ? "amc" : "bvh");
+  for (const auto& [name, value] : clip.report.facts) out.facts[name] = value;
   out.facts["frames_at_30_fps"] = clip.motion.frames();
   out.facts["metres_per_unit"] = clip.scale;
   out.facts["leg_length"] = leg_length(clip.motion.rest);
   out.facts["floor"] = clip.floor_y;
+  judge_hands(out, {clip.motion.rest});
   return out;
 }
 
-Diagnosis examine_config(const std::string& path) {
-  load_config_tree(path);
-  return Diagnosis("config");
+// ---- other files -------------------------------------------------------------------------------
+
+Report examine_config(const Options& options) {
+  load_config_tree(options.path);
+  return Report("config");
 }
 
 /// A few bytes from the start; InputError if the file cannot be read.
@@ -135,9 +211,9 @@ std::string first_bytes(const std::string& path) {
   return {bytes, static_cast<size_t>(file.gcount())};
 }
 
-Diagnosis examine_weights(const std::string& path) {
-  const TensorFile file = read_safetensors(path);
-  Diagnosis out{"weights"};
+Report examine_weights(const Options& options) {
+  const TensorFile file = read_safetensors(options.path);
+  Report out("weights");
   int64_t values = 0;
   for (const auto& [name, tensor] : file.tensors) values += tensor.numel();
   out.facts["tensors"] = file.tensors.size();
@@ -149,54 +225,112 @@ Diagnosis examine_weights(const std::string& path) {
 struct Kind {
   const char* start;                 ///< first bytes of such a file; empty: any
   std::vector<std::string> endings;  ///< of its name; none: any
-  Diagnosis (*examine)(const std::string& path);
+  Report (*examine)(const Options& options);
 };
 
 const Kind kKinds[] = {
     {"\x89HDF\r\n", {}, examine_hdf5},       {"ply", {}, examine_mesh},
     {"", {".ply", ".obj"}, examine_mesh},    {"", {".h5", ".hdf5"}, examine_hdf5},
-    {"", {".bvh", ".bvh.xz"}, examine_bvh},  {"", {".yaml", ".yml"}, examine_config},
+    {"", {".bvh", ".bvh.xz", ".amc", ".amc.xz"}, examine_recording},
+    {"", {".glb", ".gltf", ".vrm"}, examine_character},
+    {"", {".npz", ".npy"}, examine_sequence},
+    {"", {".yaml", ".yml"}, examine_config},
     {"", {".safetensors"}, examine_weights},
 };
 
-Diagnosis examine(const std::string& path) {
+Report examine(const Options& options) {
+  const std::string& path = options.path;
   std::error_code ignored;
-  if (fs::is_directory(path, ignored)) return examine_folder(path);
+  if (fs::is_directory(path, ignored)) return examine_folder(options);
   const std::string start = first_bytes(path);
   for (const Kind& kind : kKinds) {
     const auto named = [&](const std::string& ending) { return path.ends_with(ending); };
     if (start.starts_with(kind.start) &&
         (kind.endings.empty() || std::any_of(kind.endings.begin(), kind.endings.end(), named)))
-      return kind.examine(path);
+      return kind.examine(options);
   }
   throw InputError(path, "is of no kind that is known here",
-                   "give HDF5, PLY, OBJ, BVH, safetensors, YAML or a folder of frames");
+                   "give HDF5, PLY, OBJ, glTF, BVH, AMC, NPY, NPZ, safetensors, YAML or a folder of frames");
 }
 
-int run_doctor(const std::string& path, const Common& common) {
-  const Diagnosis found = examine(path);
+// ---- the command -------------------------------------------------------------------------------
+
+void print_report(const Options& options, const Report& found, const std::string& sidecar,
+                  const Common& common) {
   if (common.json) {
-    print_json(
-        {{"file", path}, {"kind", found.kind}, {"facts", found.facts}, {"notes", found.notes}});
-    return 0;
+    Json notes = Json::array(), findings = Json::array();
+    for (const Finding& f : found.findings) {
+      findings.push_back(to_json(f));
+      if (f.weight != Weight::fact) notes.push_back(f.what);
+    }
+    Json document = {{"file", options.path}, {"kind", found.kind},   {"usable", found.usable()},
+                     {"facts", found.facts}, {"findings", findings}, {"notes", notes}};
+    if (found.diagnosis && found.diagnosis->transform)
+      document["transform"] = to_json(*found.diagnosis->transform);
+    if (!options.fix.empty()) document["fixed"] = options.fix;
+    if (!sidecar.empty()) document["transform_file"] = sidecar;
+    return print_json(document);
   }
-  std::string text = path + ": " + found.kind + "\n";
+  std::string text =
+      options.path + ": " + found.kind + (found.usable() ? "" : ", not usable as it is") + "\n";
   for (const auto& [name, value] : found.facts.items())
     text += "  " + name + ": " + value.dump() + "\n";
-  for (const std::string& note : found.notes) text += "  note: " + note + "\n";
+  for (const Weight weight : {Weight::wrong, Weight::note, Weight::fact})
+    for (const Finding& f : found.findings)
+      if (f.weight == weight) text += to_text(f);
+  if (found.diagnosis && found.diagnosis->transform) text += to_text(*found.diagnosis->transform);
+  if (!options.fix.empty()) text += "wrote " + options.fix + "\n";
+  if (!sidecar.empty()) text += "wrote " + sidecar + "\n";
+  if (!options.picture.empty()) text += "wrote " + options.picture + "\n";
   print(text);
-  return 0;
+}
+
+/// Whether what --fix wrote is usable.
+bool mended_well(const Options& options) {
+  Options again;
+  again.path = options.fix;
+  again.target = options.target;
+  return examine(again).usable();
+}
+
+int run_doctor(const Options& options, const Common& common) {
+  const Report found = examine(options);
+  if (!found.diagnosis && (!options.picture.empty() || !options.fix.empty()))
+    throw InputError(
+        options.path,
+        "is of the kind '" + found.kind + "', which is neither drawn nor repaired here",
+        "give a scan, a surface or a sequence of frames; restage data inspect --plot draws data "
+        "files");
+  std::string sidecar;
+  if (!options.picture.empty()) {
+    const auto first = open_frames(options.path)->next();
+    write_picture(options.picture, options.path + ": " + found.kind, {first->points, first->faces},
+                  *found.diagnosis);
+  }
+  if (!options.fix.empty()) sidecar = write_repaired(options.path, options.fix, *found.diagnosis);
+  print_report(options, found, sidecar, common);
+  return (options.fix.empty() ? found.usable() : mended_well(options)) ? 0 : 1;
 }
 
 }  // namespace
 
 void add_doctor(Program& program) {
-  const auto path = std::make_shared<std::string>();
-  CLI::App& app = program.add("doctor", "say what a file is and what is wrong with it",
-                              "restage doctor scan.ply\nrestage doctor frames/ --json",
-                              [path, &program] { return run_doctor(*path, program.common()); });
-  app.add_option("FILE", *path, "HDF5, PLY, OBJ, BVH, safetensors, YAML, or a folder of frames")
+  const auto options = std::make_shared<Options>();
+  CLI::App& app = program.add(
+      "doctor", "say what a file is, what is wrong with it, and mend it",
+      "restage doctor scan.ply\nrestage doctor frames/ --json\n"
+      "restage doctor hero.obj --target --picture sheet.png\nrestage doctor frames/ --fix mended/\n"
+      "exit code: 0 usable, 1 read but not usable as it is, 2 not readable",
+      [options, &program] { return run_doctor(*options, program.common()); });
+  app.add_option("FILE", options->path,
+                 "HDF5, PLY, OBJ, BVH, safetensors, YAML, or a folder of frames")
       ->required();
+  app.add_option("--picture", options->picture, "draw it from front, side and top (PNG)");
+  app.add_option("--fix", options->fix, "write it mended: .ply, .obj, .h5, or a folder of frames");
+  app.add_flag("--target", options->target, "it is meant as a target: in T-pose, facing +z");
+  app.add_option("--scale", options->scale, "metres per unit, where you know better");
+  app.add_option("--up", options->up, "the direction that is up: x, y, z, --up=-x ...");
+  app.add_option("--facing", options->facing, "the direction that the person faces, as --up");
 }
 
 }  // namespace restage::cli

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "autograd/base/log.h"
+#include "datasets/doctor/examine.h"
 #include "datasets/importers/gltf_character.h"
 #include "datasets/readers/frame_folder.h"
 #include "datasets/schema.h"
@@ -109,6 +110,21 @@ void to_metres(const RetargetCommand& c, Points& points) {
   }
 }
 
+/// The doctor's words on what would make the result nonsense.
+void check_inputs(const RetargetCommand& c, FrameSource& frames, const Mesh& target) {
+  if (c.force) return;
+  check_target(target, c.target);
+  std::vector<Mesh> first;
+  while (first.size() < kSourceFrames) {
+    auto frame = frames.next();
+    if (!frame) break;
+    to_metres(c, frame->points);
+    first.push_back({std::move(frame->points), std::move(frame->faces)});
+  }
+  frames.rewind();
+  check_source(first, c.source);
+}
+
 using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) {
@@ -141,8 +157,9 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   options.force = c.force;
   options.seed = common.seed;
   options.samples = c.samples;
-  const TargetMesh target = read_target(c.target);
-  Retargeter retargeter(models, target.mesh, c.target, options);
+  TargetMesh target = read_target(c.target);
+  check_inputs(c, *frames, target.mesh);
+  Retargeter retargeter(models, std::move(target.mesh), c.target, options);
   // The first frame is looked at before anything is written or logged.
   double read = 0;
   const auto next = [&] {
@@ -212,7 +229,8 @@ void add_retarget(Program& program) {
   app.add_option("--scale", c->scale, "the source's units in metres");
   app.add_option("--format", c->format, "of a folder's frames: ply or obj");
   app.add_option("--samples", c->samples, "random choices of points per frame to average");
-  app.add_flag("--force", c->force, "accept a target that does not look like a T-pose");
+  app.add_flag("--force", c->force,
+               "accept a target that is no T-pose, and axes and units that look wrong");
   app.add_flag("--profile", c->profile,
                "say how long a frame and its parts take: p50, p95, p99, max");
 }

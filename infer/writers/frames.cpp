@@ -97,11 +97,11 @@ FrameFolderWriter::~FrameFolderWriter() {
   if (!done_) fs::remove_all(temporary_, ignored);
 }
 
-void FrameFolderWriter::push(const Points& vertices) {
+void FrameFolderWriter::push(const Points& vertices, const std::vector<Triangle>& faces) {
   char name[48];
   std::snprintf(name, sizeof name, "/frame_%06zu.%s", frames_, extension(format_));
-  check_mesh(folder_ + name, vertices, faces_);
-  write_plain(temporary_ + name, mesh_bytes(format_, vertices, faces_), folder_);
+  check_mesh(folder_ + name, vertices, faces);
+  write_plain(temporary_ + name, mesh_bytes(format_, vertices, faces), folder_);
   ++frames_;
 }
 

@@ -21,7 +21,9 @@ class FrameFolderWriter {
   FrameFolderWriter(const FrameFolderWriter&) = delete;
   FrameFolderWriter& operator=(const FrameFolderWriter&) = delete;
 
-  void push(const Points& vertices);
+  void push(const Points& vertices) { push(vertices, faces_); }
+  /// A frame with faces of its own.
+  void push(const Points& vertices, const std::vector<Triangle>& faces);
   void commit();
   size_t frames() const { return frames_; }
 

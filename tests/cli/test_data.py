@@ -38,6 +38,15 @@ class Data(CliTest):
         self.assertEqual(found["counts"]["motions"], 2)
         self.assertEqual(found["units"], "metres")
         self.assertIn("license", found)
+        self.assertEqual(found["splits"]["train"], {"bodies": 1, "motions": 1, "frames": found["splits"]["train"]["frames"]})
+        self.assertAlmostEqual(found["seconds"], found["counts"]["frames"] / 30)
+        self.assertTrue(1.4 < found["heights"]["least"] <= found["heights"]["most"] < 2.1, found["heights"])
+        self.assertEqual(sum(found["actions"].values()), 2)
+        text = self.done("data", "inspect", "a.h5", "--plot", "sheet.png")
+        for words in ("kind        dataset", "heights", "validation", "sheet.png"):
+            self.assertIn(words, text)
+        self.assertEqual(self.bytes("sheet.png")[:8], b"\x89PNG\r\n\x1a\n")
+        self.bad_input(["data", "inspect", "a.h5", "--plot", "sheet.jpg"], "sheet.jpg")
         self.assertEqual(self.json("data", "verify", "a.h5")["problems"], [])
         self.assertIn("bodies", self.done("doctor", "a.h5"))
 

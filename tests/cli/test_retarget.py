@@ -153,6 +153,46 @@ class Sources(Retarget):
             self.assertLessEqual(row["max"], found["frame"]["max"])
 
 
+class DoctorsWords(Retarget):
+    """Axes and units that would make nonsense of the result are refused with the option that mends them."""
+
+    def setUp(self):
+        super().setUp()
+        self.w = weights("tposes", *TPOSES)
+        self.done("data", "build", "--bodies", 1, 0, 1, "--motions", 1, 0, 0, "--quiet", "--out", "data.h5")
+        self.done("data", "perform", "--bodies", "data.h5", "--frames", 10, "--quiet", "--out", "walk")
+        self.done("doctor", "walk/source.h5", "--fix", "good/")
+        self.frames = [self.vertices("good/" + name) for name in sorted(os.listdir(self.path("good")))]
+
+    def vertices(self, name):
+        head, _, body = self.bytes(name).partition(b"end_header\n")
+        return list(struct.iter_unpack("<3f", body[:12 * int(head.split(b"element vertex ")[1].split()[0])]))
+
+    def source(self, name, move):
+        for i, frame in enumerate(self.frames):
+            self.ply("%s/f%d.ply" % (name, i), [move(*p) for p in frame])
+        return name
+
+    def test_source(self):
+        call = lambda *more, **inputs: self.call("out.h5", *more, target="walk/target.ply", force=False, **inputs)
+        self.done(*call(source="good"))
+        self.source("z", lambda x, y, z: (x, -z, y))
+        self.bad_input(call(source="z"), "z: ", "+z", "--source-up z", "--force")
+        self.done(*call("--source-up", "z", source="z"))
+        self.done(*call("--force", source="z"))
+        self.source("cm", lambda x, y, z: (100 * x, 100 * y, 100 * z))
+        self.bad_input(call(source="cm"), "1 cm", "--scale 0.01")
+        self.done(*call("--scale", "0.01", source="cm"))
+
+    def test_target(self):
+        hero = self.vertices("walk/target.ply")
+        call = lambda name: self.call("out.h5", target=name, source="good", force=False)
+        self.bad_input(call(self.ply("back.ply", [(-x, y, -z) for x, y, z in hero])), "back.ply", "face -z", "--fix")
+        self.bad_input(call(self.ply("mm.ply", [(1000 * x, 1000 * y, 1000 * z) for x, y, z in hero])), "1 mm", "--fix")
+        self.done("doctor", "back.ply", "--target", "--fix", "mended.ply")
+        self.done(*call("mended.ply"))
+
+
 class BadRetargeting(Retarget):
     OUTS = ("out.h5", "out.glb", "out.bvh", "frames/")
 

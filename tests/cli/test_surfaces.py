@@ -1,4 +1,5 @@
 """Clouds and surfaces through `doctor` and `render`."""
+import json
 import os
 import struct
 
@@ -9,18 +10,93 @@ FACES = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]
 
 
 class Doctor(CliTest):
+    def doctor(self, name, code, *more):
+        result = self.restage("doctor", name, "--json", *more)
+        self.assertEqual((result.code, result.err), (code, ""))
+        return json.loads(result.out)
+
     def test_says_what_a_file_is(self):
-        self.assertEqual(self.json("doctor", self.ply("a.ply", TETRAHEDRON, FACES))["kind"], "mesh")
-        found = self.json("doctor", self.ply("b.ply", points(200, 1)))
-        self.assertEqual((found["kind"], found["facts"]["points"], found["notes"]), ("cloud", 200, []))
-        found = self.json("doctor", self.ply("c.ply", points(3, 1)))
+        self.assertEqual(self.doctor(self.ply("a.ply", TETRAHEDRON, FACES), 1)["kind"], "mesh")
+        found = self.doctor(self.ply("b.ply", points(200, 1)), 0)
+        self.assertEqual((found["kind"], found["facts"]["points"], found["usable"]), ("cloud", 200, True))
+        found = self.doctor(self.ply("c.ply", points(3, 1)), 1)
         self.assertIn("3 distinct points", found["notes"][0])
-        self.assertIn("centimetres", self.json("doctor", self.ply("d.ply", [(170 * x, 170 * y, z) for x, y, z in points(100, 2)]))["notes"][0])
-        self.assertEqual(self.json("doctor", self.h5("p.h5", joints=([2, 22, 3], [0.0])))["kind"], "prediction")
+        self.assertEqual(self.doctor(self.h5("p.h5", joints=([2, 22, 3], [0.0])), 0)["kind"], "prediction")
         for i in (1, 2, 10):
             self.ply("frames/f%d.ply" % i, points(100 + i, i))
-        found = self.json("doctor", "frames")
+        found = self.doctor("frames", 0)
         self.assertEqual((found["kind"], found["facts"]["frames"], found["facts"]["most_points"]), ("frames", 3, 110))
+
+    def person(self):
+        """A cloud of a built-in body in T-pose and scans of one that moves."""
+        if not os.path.exists(self.path("walk")):
+            self.done("data", "build", "--bodies", 1, 0, 1, "--motions", 1, 0, 0, "--quiet", "--out", "data.h5")
+            self.done("data", "perform", "--bodies", "data.h5", "--frames", 12, "--quiet", "--out", "walk")
+        return self.vertices("walk/target.ply")
+
+    def vertices(self, name):
+        head, _, body = self.bytes(name).partition(b"end_header\n")
+        count = int(head.split(b"element vertex ")[1].split()[0])
+        return list(struct.iter_unpack("<3f", body[:12 * count]))
+
+    def test_foreign_axes_and_units_are_found_and_mended(self):
+        person = self.person()
+        found = self.doctor(self.ply("good.ply", person), 0, "--target")
+        self.assertEqual(found["notes"], [])
+        self.ply("foreign.ply", [(100 * x, -100 * z, 100 * y) for x, y, z in person])
+        found = self.doctor("foreign.ply", 1)
+        said = {f["topic"]: f for f in found["findings"]}
+        self.assertIn("1 cm", said["units"]["what"])
+        self.assertIn("--source-up z", said["up"]["fix"])
+        self.assertIn("+z is up", said["up"]["what"])
+        self.assertIn("faces -y", said["facing"]["what"])
+        text = self.restage("doctor", "foreign.ply")
+        self.assertEqual((text.code, text.err), (1, ""))
+        for words in ("not usable", "--scale 0.01", "p' = 0.01 R (p - t)"):
+            self.assertIn(words, text.out)
+        found = self.doctor("foreign.ply", 0, "--fix", "mended.ply")
+        self.assertEqual((found["fixed"], found["transform_file"]), ("mended.ply", "mended.ply.transform.json"))
+        back = self.vertices("mended.ply")
+        self.assertEqual(len(back), len(person))
+        self.assertLess(max(abs(a - b) for p, q in zip(back, person) for a, b in zip(p, q)), 0.06)
+        self.assertEqual(self.doctor("mended.ply", 0)["notes"], [])
+        kept = json.loads(self.bytes("mended.ply.transform.json"))
+        scale, turn, offset = kept["scale"], kept["rotation"], kept["offset"]
+        for p, q in zip(self.vertices("foreign.ply")[:20], back):
+            r = [a - b for a, b in zip(p, offset)]
+            for i in range(3):
+                self.assertAlmostEqual(q[i], scale * sum(turn[i][j] * r[j] for j in range(3)), 4)
+
+    def test_sequences_are_mended(self):
+        self.person()
+        self.assertEqual(self.doctor("walk/source.h5", 0)["kind"], "scans")
+        self.done("doctor", "walk/source.h5", "--fix", "frames/")
+        for i, name in enumerate(sorted(os.listdir(self.path("frames")))):
+            if i != 5:  # one is lost, and all are turned
+                self.ply("turned/f%d.ply" % i, [(x, -z, y) for x, y, z in self.vertices("frames/" + name)])
+        found = self.doctor("turned", 1)
+        self.assertIn("1 number missing", " ".join(found["notes"]))
+        self.doctor("turned", 0, "--fix", "again/")
+        self.assertEqual(len(os.listdir(self.path("again"))), 12)
+        self.doctor("turned", 0, "--fix", "again.h5")
+        found = self.json("data", "inspect", "again.h5")
+        self.assertEqual((found["counts"]["frames"], found["transform"]["scale"]), (12, 1))
+        self.assertEqual(self.doctor("again.h5", 0)["facts"]["frames"], 12)
+
+    def test_picture(self):
+        self.ply("odd.ply", self.person() + [(3, 3, 3), (2, -1, 2)])
+        self.assertIn("2 stray points", self.done("doctor", "odd.ply", "--picture", "sheet.png"))
+        self.assertEqual(self.bytes("sheet.png")[:8], b"\x89PNG\r\n\x1a\n")
+        self.bad_input(["doctor", "odd.ply", "--picture", "sheet.gif"], "sheet.gif")
+        self.bad_input(["doctor", "data.h5", "--picture", "sheet.png"], "dataset")
+
+    def test_bad_options(self):
+        self.ply("ball.ply", points(200, 1))
+        self.bad_input(["doctor", "ball.ply", "--fix", "x.ply"], "cannot be repaired", "--up")
+        self.done("doctor", "ball.ply", "--fix", "x.ply", "--up", "y", "--scale", "0.3")
+        self.bad_input(["doctor", "ball.ply", "--up", "w"], "--up")
+        self.bad_input(["doctor", "ball.ply", "--scale", "-1"], "--scale")
+        self.bad_input(["doctor", "ball.ply", "--up", "+y", "--facing=-y"], "nobody")
 
     def test_bad_files(self):
         bad = lambda name, *words: self.bad_input(["doctor", name], name, *words)

@@ -1,0 +1,202 @@
+// The doctor's model and how often the doctor is right.
+//   doctor_bench fit OUT.inc             coefficients of datasets/doctor/orientation_prior.inc,
+//   from
+//                                        the built-in bodies and motions of the training split
+//   doctor_bench measure FILE [SEED]     2,400 cases: 24 permutations of axes x 5 units x 20 scans
+//   of
+//                                        FILE's test split (or `builtin`), as Markdown
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <iostream>
+#include <string>
+
+#include "autograd/base/atomic_file.h"
+#include "autograd/base/error.h"
+#include "autograd/base/parallel.h"
+#include "autograd/base/rng.h"
+#include "bench/doctor/fit.h"
+#include "datasets/doctor/examine.h"
+
+namespace restage::bench {
+namespace {
+
+void say(const std::string& line) { std::cerr << line << std::endl; }
+
+// ---- fit ---------------------------------------------------------------------------------------
+
+int fit(const std::string& out) {
+  CorpusSource source;
+  source.bodies = {40, 0, 0};
+  source.motions = {220, 0, 0};
+  const Corpus corpus = load_corpus(source, "train");
+  ScanRecipe recipe;
+  recipe.heading = 15;
+  recipe.one_side_share = 0.3;
+  recipe.stray_share = 0.2;
+  const FitOptions options;
+  const std::vector<float> found =
+      fit_orientation_prior(ScanMaker(corpus, recipe, options.seed), options, say);
+  std::string text =
+      "// Made by `doctor_bench fit`: do not edit. Hundredths; |x|, then y, then z.\n";
+  for (size_t i = 0; i < found.size(); ++i)
+    text += std::to_string(std::lround(100 * found[i])) + (i % 20 == 19 ? ",\n" : ",");
+  write_file_atomically(out, text);
+  return 0;
+}
+
+// ---- measure -----------------------------------------------------------------------------------
+
+/// Rows: the truth; columns: the answer, the last one "unsure".
+template <size_t N>
+struct Confusion {
+  std::array<std::array<int, N + 1>, N> count{};
+  void add(size_t truth, size_t answer) { ++count[truth][answer]; }
+  int right() const {
+    int sum = 0;
+    for (size_t i = 0; i < N; ++i) sum += count[i][i];
+    return sum;
+  }
+  int unsure() const {
+    int sum = 0;
+    for (const auto& row : count) sum += row[N];
+    return sum;
+  }
+  int all() const {
+    int sum = 0;
+    for (const auto& row : count)
+      for (const int n : row) sum += n;
+    return sum;
+  }
+  std::string table(const std::string& title,
+                    const std::function<std::string(size_t)>& name) const {
+    std::string out = "| " + title + " |", line = "|---|";
+    for (size_t i = 0; i < N; ++i) out += " " + name(i) + " |", line += "---:|";
+    out += " unsure |\n" + line + "---:|\n";
+    for (size_t i = 0; i < N; ++i) {
+      out += "| " + name(i) + " |";
+      for (const int n : count[i]) out += " " + std::to_string(n) + " |";
+      out += "\n";
+    }
+    return out;
+  }
+};
+
+struct Tally {
+  Confusion<6> up, facing;
+  Confusion<5> unit;
+};
+
+constexpr double kSureEnough = 0.5;
+
+/// `scan` in a foreign frame: axes permuted, another unit, another place.
+void judge(const TrueScan& scan, int up, int facing, size_t unit, Tally& tally) {
+  Orientation foreign;  // where our up and forward axes point there
+  foreign.up = up;
+  foreign.facing = facing;
+  const Eigen::Matrix3f back = foreign.turn().transpose().cast<float>();
+  const auto size = static_cast<float>(1 / kUnits[unit].metres);
+  Mesh mesh;
+  for (const Point& p : scan.points)
+    mesh.vertices.push_back(back * p * size + Point(0.3f, -0.2f, 0.1f) * size);
+  const Diagnosis d = examine_surface(mesh);
+  const auto u = static_cast<size_t>(up), f = static_cast<size_t>(facing);
+  tally.up.add(u, d.orientation.up_sure < kSureEnough ? 6 : static_cast<size_t>(d.orientation.up));
+  // A facing under another up axis is wrong whatever it says.
+  size_t answer = static_cast<size_t>(d.orientation.facing);
+  if (d.orientation.up_sure < kSureEnough || d.orientation.facing_sure < kSureEnough)
+    answer = 6;
+  else if (d.orientation.up != up && answer == f)
+    answer = f ^ 1;
+  tally.facing.add(f, answer);
+  size_t said = 5;
+  for (size_t i = 0; i < kUnits.size(); ++i)
+    if (d.unit.sure >= kSureEnough && d.unit.unit.metres == kUnits[i].metres) said = i;
+  tally.unit.add(unit, said);
+}
+
+template <size_t N>
+std::string row(const std::string& question, const Confusion<N>& c) {
+  char text[160];
+  std::snprintf(text, sizeof text, "| %s | %.2f %% | %.2f %% | %.2f %% |\n", question.c_str(),
+                100.0 * c.right() / c.all(), 100.0 * c.unsure() / c.all(),
+                100.0 * (c.all() - c.right() - c.unsure()) / c.all());
+  return text;
+}
+
+int measure(const std::string& file, uint64_t seed, int scans, double one_side) {
+  CorpusSource source;
+  source.source = file;
+  source.bodies = {0, 0, 8};
+  source.motions = {0, 0, 44};
+  const Corpus corpus = load_corpus(source, "test");
+  ScanRecipe recipe;
+  recipe.rest_share = 0.2;
+  recipe.one_side_share = one_side;
+  const ScanMaker maker(corpus, recipe, seed);
+  std::vector<Tally> tallies(static_cast<size_t>(scans));
+  std::vector<std::string> what(tallies.size());
+  parallel_for(scans, 1, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) {
+      const TrueScan scan = maker.make(static_cast<uint64_t>(i));
+      what[static_cast<size_t>(i)] = scan.what;
+      for (int up = 0; up < 6; ++up)
+        for (int facing = 0; facing < 6; ++facing)
+          for (size_t unit = 0; facing / 2 != up / 2 && unit < kUnits.size(); ++unit)
+            judge(scan, up, facing, unit, tallies[static_cast<size_t>(i)]);
+    }
+  });
+  Tally all;
+  std::string faults;
+  const auto add = [](auto& to, const auto& from) {
+    for (size_t i = 0; i < to.count.size(); ++i)
+      for (size_t j = 0; j < to.count[i].size(); ++j) to.count[i][j] += from.count[i][j];
+  };
+  for (size_t i = 0; i < tallies.size(); ++i) {
+    add(all.up, tallies[i].up);
+    add(all.facing, tallies[i].facing);
+    add(all.unit, tallies[i].unit);
+    const auto missed = [](const auto& c) { return c.all() - c.right(); };
+    if (missed(tallies[i].up) + missed(tallies[i].facing) + missed(tallies[i].unit) > 0)
+      faults += "* " + what[i] + ": not right in " + std::to_string(missed(tallies[i].up)) +
+                " (up), " + std::to_string(missed(tallies[i].facing)) + " (facing), " +
+                std::to_string(missed(tallies[i].unit)) + " (unit) of 120 cases\n";
+  }
+  const auto direction_name = [](size_t i) { return std::string(kDirections[i]); };
+  std::cout << "24 permutations of axes x 5 units x " << scans << " scans = " << all.up.all()
+            << " cases\n\n"
+            << "| question | right | unsure | wrong |\n|---|---:|---:|---:|\n"
+            << row("up axis", all.up) << row("unit", all.unit) << row("facing", all.facing) << "\n"
+            << all.up.table("up is \\ said", direction_name) << "\n"
+            << all.unit.table("unit is \\ said",
+                              [](size_t i) { return std::string(kUnits[i].name); })
+            << "\n"
+            << all.facing.table("faces \\ said", direction_name) << "\nScans with any fault:\n\n"
+            << (faults.empty() ? "none\n" : faults);
+  return 0;
+}
+
+int run(int argc, char** argv) {
+  const std::vector<std::string> words(argv + 1, argv + argc);
+  if (words.size() == 2 && words[0] == "fit") return fit(words[1]);
+  if (words.size() >= 2 && words.size() <= 5 && words[0] == "measure")
+    return measure(words[1], words.size() > 2 ? std::stoull(words[2]) : 1,
+                   words.size() > 3 ? std::stoi(words[3]) : 20,
+                   words.size() > 4 ? std::stod(words[4]) : 0);
+  std::cerr << "doctor_bench fit OUT.inc | measure FILE|builtin [SEED [SCANS [SHARE OF ONE-CAMERA "
+               "SCANS]]]\n";
+  return 2;
+}
+
+}  // namespace
+}  // namespace restage::bench
+
+int main(int argc, char** argv) {
+  try {
+    return restage::bench::run(argc, argv);
+  } catch (const std::exception& error) {
+    std::cerr << "doctor_bench: " << error.what() << "\n";
+    return 1;
+  }
+}

@@ -1,0 +1,65 @@
+// The doctor: what a scan, a mesh or a sequence of frames is, what is wrong with it, and the
+// transform that mends it. Geometry and one table of coefficients (orientation_model.h); no
+// network. What cannot be told is said to be unsure, never guessed: left and right of a body look
+// alike, so a mirrored scan cannot be told from a right one (check_handedness() needs joints).
+#pragma once
+
+#include <functional>
+#include <map>
+#include <set>
+
+#include "datasets/doctor/finding.h"
+#include "datasets/doctor/shape.h"
+#include "datasets/readers/frame_folder.h"
+
+namespace restage {
+
+struct ExamineOptions {
+  bool target = false;  ///< it is meant as a target: T-pose and facing +z are then a must
+  // What the user knows better; the rest is still found.
+  std::optional<double> scale;    ///< metres per unit
+  std::optional<int> up, facing;  ///< indices of kDirections
+};
+
+struct Diagnosis {
+  std::string kind;  ///< "cloud", "mesh" or "frames"
+  int64_t frames = 1, faces = 0, fewest_points = 0, most_points = 0;
+  double fps = 0;   ///< of a sequence
+  double size = 0;  ///< median distance of a person's points from their middle, in the data's units
+  UnitGuess unit;
+  Orientation orientation;
+  double height = 0;  ///< metres from the floor to the top in the pose (of a sequence: the tallest)
+  std::vector<Finding> findings;
+  /// Into our frame; nothing if up axis or units cannot be told.
+  std::optional<Similarity> transform;
+  int keep_every = 1;              ///< every frame is there this many times in a row
+  std::set<int64_t> repeated;      ///< frames equal to the one before (from 0)
+  std::map<int64_t, int64_t> gap;  ///< before frame (from 0): so many frames are missing
+
+  bool usable() const;  ///< no finding that makes the result nonsense
+  const Finding* find(const std::string& topic) const;
+};
+
+/// One cloud or surface.
+Diagnosis examine_surface(const Mesh& mesh, const ExamineOptions& options = {});
+
+/// All frames, one at a time, in memory that grows by some hundred bytes a frame. `source` is read
+/// to its end; `target` is of no consequence. InputError for a frame that cannot be read.
+Diagnosis examine_frames(FrameSource& source, const ExamineOptions& options = {});
+
+/// A frame without stray points and what is not the person, without repeated points (of a cloud),
+/// and in our frame.
+Mesh mended(const Mesh& mesh, const Diagnosis& diagnosis);
+
+/// Whether the joints named left are on the left of somebody whose toes point forwards: "right",
+/// "mirrored", or nothing if the feet do not tell. `up` is a unit vector.
+std::optional<bool> is_mirrored(const Joints& joints, const Vec3& up = Vec3::UnitY());
+
+/// Cheap checks before retargeting; what is only perhaps wrong passes, and so does what is no
+/// person. `where` names the input. InputError with the option that mends it (--scale,
+/// --source-up, --force).
+inline constexpr int kSourceFrames = 8;  ///< that are enough for check_source()
+void check_source(const std::vector<Mesh>& first_frames, const std::string& where);
+void check_target(const Mesh& target, const std::string& where);
+
+}  // namespace restage

@@ -1,0 +1,98 @@
+#include "datasets/doctor/orientation.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "datasets/doctor/orientation_model.h"
+
+namespace restage {
+namespace {
+
+using namespace doctor_detail;
+
+constexpr int kQuarter = kHeadings / 4;
+
+int index_of(const Vec3& direction) {
+  int axis = 0;
+  direction.cwiseAbs().maxCoeff(&axis);
+  return 2 * axis + (direction[axis] < 0 ? 1 : 0);
+}
+
+}  // namespace
+
+Vec3 direction(int index) {
+  Vec3 out = Vec3::Zero();
+  out[index / 2] = index % 2 == 0 ? 1 : -1;
+  return out;
+}
+
+Mat3 Orientation::turn() const {
+  const Vec3 y = direction(up), z = direction(facing);
+  Mat3 out;
+  out << y.cross(z).transpose(), y.transpose(), z.transpose();
+  return out;
+}
+
+void OrientationVote::add(const Points& cloud, bool faces) {
+  const NormalisedCloud seen = normalised(cloud);
+  if (!(seen.size > 0)) return;
+  std::array<std::array<double, kHeadings>, kUps> p;
+  Places places;
+  double most = -1e300, total = 0;
+  for (int u = 0; u < kUps; ++u)
+    for (int h = 0; h < kHeadings; ++h) {
+      look(seen.points, hypothesis(u, h), places);
+      most = std::max(most, p[u][h] = score(orientation_prior(), places));
+    }
+  for (auto& row : p)
+    for (double& x : row) total += (x = std::exp(x - most));
+  for (int u = 0; u < kUps; ++u)
+    for (int h = 0; h < kHeadings; ++h) {
+      up_[u] += p[u][h] / total;
+      if (faces) facing_[u][h] += p[u][h] / total;
+    }
+  ++clouds_;
+}
+
+double OrientationVote::up(int index) const {
+  return clouds_ > 0 ? up_[static_cast<size_t>(index)] / clouds_ : 1.0 / kUps;
+}
+
+Orientation OrientationVote::result() const {
+  const int best = static_cast<int>(std::max_element(up_.begin(), up_.end()) - up_.begin());
+  Orientation out = result(clouds_ > 0 ? best : 2);
+  out.up_sure = up(out.up);
+  return out;
+}
+
+Orientation OrientationVote::result(int known_up) const {
+  Orientation out;
+  out.up = known_up;
+  out.up_sure = 1;
+  out.facing = (known_up + 2) % 6;
+  out.facing_sure = 1.0 / 4;
+  const auto& facing = facing_[static_cast<size_t>(out.up)];
+  double total = 0, most = -1;
+  for (const double x : facing) total += x;
+  if (!(total > 0)) return out;
+  int best = 0;
+  for (int quarter = 0; quarter < 4; ++quarter) {
+    double mass = 0;
+    for (int d = -kQuarter / 2; d <= kQuarter / 2; ++d)
+      mass += facing[static_cast<size_t>((quarter * kQuarter + d + kHeadings) % kHeadings)] *
+              (std::abs(d) == kQuarter / 2 ? 0.5 : 1.0);
+    if (mass > most) most = mass, best = quarter;
+  }
+  out.facing = index_of(hypothesis(out.up, best * kQuarter).row(2).transpose().cast<double>());
+  out.facing_sure = most / total;
+  double mass = 0;
+  for (int d = -kQuarter / 2; d <= kQuarter / 2; ++d) {
+    const double p = facing[static_cast<size_t>((best * kQuarter + d + kHeadings) % kHeadings)];
+    out.turned += p * d * 360 / kHeadings;
+    mass += p;
+  }
+  out.turned /= mass;
+  return out;
+}
+
+}  // namespace restage

@@ -1,0 +1,45 @@
+// Which way a person in a cloud is up, and which way they face, whatever they are doing.
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "nn/geometry/body.h"
+
+namespace restage {
+
+/// The six directions along axes in the order +x -x +y -y +z -z.
+inline constexpr std::array<const char*, 6> kDirections = {"+x", "-x", "+y", "-y", "+z", "-z"};
+Vec3 direction(int index);
+
+struct Orientation {
+  int up = 2;              ///< index of kDirections
+  double up_sure = 0;      ///< probability; 1/6 says nothing
+  int facing = 4;          ///< the axis nearest to where the person faces, at right angles to `up`
+  double facing_sure = 0;  ///< probability of that axis if `up` is right
+  double turned = 0;       ///< degrees from there, towards their left; within -45 and 45
+  /// The permutation of axes that brings `up` to +y and `facing` to +z.
+  Mat3 turn() const;
+};
+
+/// Sums up clouds of one person in one frame of reference. Order of points is of no consequence
+/// unless there are more than 4,096.
+class OrientationVote {
+ public:
+  /// Metres or any unit. Clouds whose points all lie in one place say nothing. `faces`: whether
+  /// the cloud also has a vote on where the person faces (who walks a circle faces everywhere).
+  void add(const Points& cloud, bool faces = true);
+  Orientation result() const;
+  /// The same where `up` is known.
+  Orientation result(int up) const;
+  /// Probability that direction `index` is up.
+  double up(int index) const;
+
+ private:
+  static constexpr int kHeadings = 24;
+  std::array<std::array<double, kHeadings>, 6> facing_{};  // sums of probabilities
+  std::array<double, 6> up_{};
+  int clouds_ = 0;
+};
+
+}  // namespace restage

@@ -1,0 +1,181 @@
+#include "datasets/doctor/parts.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <nanoflann.hpp>
+#include <numeric>
+
+#include "datasets/doctor/orientation_model.h"
+
+namespace restage {
+namespace {
+
+constexpr size_t kJudged = 20000;
+constexpr size_t kNeighbours = 4;      // a point's loneliness is the distance to this one
+constexpr float kLonely = 3.5f;        // times the typical distance: a stray point
+constexpr float kLinked = 2.5f;        // times the typical distance: of one piece
+constexpr float kApart = 0.4f;         // times the size (0.4 m of a person): not the same person
+constexpr double kSmallPiece = 0.012;  // part of all points; fewer are stray
+
+struct Cloud {
+  const Points& points;
+  size_t kdtree_get_point_count() const { return points.size(); }
+  float kdtree_get_pt(size_t i, size_t axis) const { return points[i][static_cast<int>(axis)]; }
+  template <class Box>
+  bool kdtree_get_bbox(Box&) const {
+    return false;
+  }
+};
+using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Cloud>, Cloud,
+                                                 3, uint32_t>;
+
+class Pieces {
+ public:
+  explicit Pieces(size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), size_t{0}); }
+  size_t of(size_t i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  void join(size_t a, size_t b) { parent_[of(a)] = of(b); }
+
+ private:
+  std::vector<size_t> parent_;
+};
+
+/// Distance of each point to its kNeighbours-th neighbour.
+std::vector<float> loneliness(const Tree& tree, const Points& points) {
+  std::vector<float> out(points.size());
+  std::array<uint32_t, kNeighbours + 1> index;
+  std::array<float, kNeighbours + 1> squared;
+  for (size_t i = 0; i < points.size(); ++i) {
+    const size_t n = tree.knnSearch(points[i].data(), index.size(), index.data(), squared.data());
+    out[i] = n > 0 ? std::sqrt(squared[n - 1]) : 0;
+  }
+  return out;
+}
+
+float median(std::vector<float> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+struct Neighbourhood {
+  const Points& points;
+  Cloud cloud{points};
+  Tree tree{3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(10)};
+
+  /// Calls `visit(j)` for all points within `radius` of p.
+  template <class Visit>
+  void near(const Point& p, float radius, Visit&& visit) const {
+    std::vector<std::pair<uint32_t, float>> found;
+    nanoflann::SearchParams params;
+    params.sorted = false;
+    tree.radiusSearch(p.data(), radius * radius, found, params);
+    for (const auto& [j, squared] : found) visit(static_cast<size_t>(j));
+  }
+  std::pair<size_t, float> nearest(const Point& p) const {
+    uint32_t index = 0;
+    float squared = std::numeric_limits<float>::infinity();
+    tree.knnSearch(p.data(), 1, &index, &squared);
+    return {index, std::sqrt(squared)};
+  }
+};
+
+/// The same for the points that are judged.
+Parts judge(const Points& points) {
+  Parts out;
+  out.part.assign(points.size(), Part::person);
+  const Neighbourhood all{points};
+  const std::vector<float> lonely = loneliness(all.tree, points);
+  out.spacing = median(lonely);
+  const auto spacing = static_cast<float>(out.spacing);
+  if (!(spacing > 0)) return out;
+  for (size_t i = 0; i < points.size(); ++i)
+    if (lonely[i] > kLonely * spacing) out.part[i] = Part::stray;
+
+  Pieces pieces(points.size());
+  for (size_t i = 0; i < points.size(); ++i)
+    if (out.part[i] != Part::stray)
+      all.near(points[i], kLinked * spacing, [&](size_t j) {
+        if (out.part[j] != Part::stray) pieces.join(i, j);
+      });
+  std::map<size_t, std::vector<size_t>> members;
+  for (size_t i = 0; i < points.size(); ++i)
+    if (out.part[i] != Part::stray) members[pieces.of(i)].push_back(i);
+  std::vector<std::vector<size_t>> ordered;
+  for (auto& [root, indices] : members) ordered.push_back(std::move(indices));
+  std::stable_sort(ordered.begin(), ordered.end(),
+                   [](const auto& a, const auto& b) { return a.size() > b.size(); });
+  if (ordered.empty()) return out;
+
+  // What lies near the person, or near what does, is of the person.
+  Points person, all_pieces;
+  for (const size_t i : ordered[0]) person.push_back(points[i]);
+  for (const auto& piece : ordered)
+    for (const size_t i : piece) all_pieces.push_back(points[i]);
+  const float apart =
+      std::max(kApart * doctor_detail::normalised(all_pieces).size, kLinked * spacing);
+  std::vector<bool> joined(ordered.size());
+  joined[0] = true;
+  const auto gap_of = [&](const std::vector<size_t>& piece, const Neighbourhood& to) {
+    float gap = std::numeric_limits<float>::infinity();
+    for (const size_t i : piece) gap = std::min(gap, to.nearest(points[i]).second);
+    return gap;
+  };
+  const auto small = static_cast<size_t>(kSmallPiece * static_cast<double>(points.size())) + 1;
+  for (bool again = true; again;) {
+    again = false;
+    const Neighbourhood near{person};
+    for (size_t k = 1; k < ordered.size() && !again; ++k)
+      if (!joined[k] && gap_of(ordered[k], near) < apart) {
+        joined[k] = again = true;
+        if (ordered[k].size() > small) ++out.pieces;
+        for (const size_t i : ordered[k]) person.push_back(points[i]);
+      }
+  }
+  const Neighbourhood near{person};
+  out.gap = std::numeric_limits<double>::infinity();
+  for (size_t k = 1; k < ordered.size(); ++k) {
+    if (joined[k]) continue;
+    const bool stray = ordered[k].size() <= small;
+    for (const size_t i : ordered[k]) out.part[i] = stray ? Part::stray : Part::other;
+    if (stray) continue;
+    out.largest_other = std::max(out.largest_other, ordered[k].size());
+    out.gap = std::min(out.gap, static_cast<double>(gap_of(ordered[k], near)));
+  }
+  if (out.largest_other == 0) out.gap = 0;
+  return out;
+}
+
+void count(Parts& parts) {
+  parts.stray = static_cast<size_t>(std::count(parts.part.begin(), parts.part.end(), Part::stray));
+  parts.other = static_cast<size_t>(std::count(parts.part.begin(), parts.part.end(), Part::other));
+}
+
+}  // namespace
+
+Parts find_parts(const Points& points) {
+  if (points.size() <= kJudged) {
+    Parts out = judge(points);
+    count(out);
+    return out;
+  }
+  Points some;
+  for (size_t i = 0; i < kJudged; ++i) some.push_back(points[i * points.size() / kJudged]);
+  Parts out = judge(some);
+  const Neighbourhood judged{some};
+  const std::vector<Part> part = std::move(out.part);
+  out.part.clear();
+  for (const Point& p : points) {
+    const auto [i, distance] = judged.nearest(p);
+    out.part.push_back(distance > kLonely * out.spacing ? Part::stray : part[i]);
+  }
+  out.largest_other = out.largest_other * points.size() / kJudged;
+  count(out);
+  return out;
+}
+
+}  // namespace restage

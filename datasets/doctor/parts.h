@@ -1,0 +1,26 @@
+// Which points of a cloud are the person, which stray points, which somebody or something else.
+#pragma once
+
+#include <vector>
+
+#include "nn/geometry/body.h"
+
+namespace restage {
+
+enum class Part : uint8_t { person, stray, other };
+
+struct Parts {
+  std::vector<Part> part;    ///< one for each point
+  size_t stray = 0;          ///< points with hardly a neighbour
+  size_t other = 0;          ///< points of pieces apart from the person
+  size_t largest_other = 0;  ///< of the largest such piece; as large as a person: a second person
+  int pieces = 1;            ///< that the person itself is in (holes, occlusion)
+  double gap = 0;            ///< the nearest other piece is this far away, in the data's units
+  double spacing = 0;        ///< typical distance between neighbours, in the data's units
+};
+
+/// The person is the largest piece and what lies within about 0.16 m of it. Works in any unit. At
+/// most 20,000 points are judged, spread evenly over the list; the rest go with their nearest.
+Parts find_parts(const Points& points);
+
+}  // namespace restage

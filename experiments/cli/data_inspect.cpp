@@ -1,0 +1,175 @@
+// restage data inspect: what a data file holds, in a screenful, and drawn.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+
+#include "autograd/base/error.h"
+#include "datasets/builtin/bodies.h"
+#include "datasets/schema.h"
+#include "experiments/cli/clips.h"
+#include "experiments/cli/commands.h"
+#include "experiments/cli/output.h"
+#include "infer/render/figures.h"
+
+namespace restage::cli {
+namespace {
+
+constexpr size_t kBodiesDrawn = 8, kMotionsDrawn = 16, kFramesDrawn = 24;
+constexpr size_t kListed = 14;  // subjects or actions that are named
+
+struct InspectOptions {
+  std::string file, plot;
+};
+
+std::string rounded(double x, int decimals) {
+  char text[48];
+  std::snprintf(text, sizeof text, "%.*f", decimals, x);
+  return text;
+}
+
+std::string row(std::string name, const std::string& value) {
+  name.resize(std::max<size_t>(name.size() + 1, 12), ' ');
+  return name + value + "\n";
+}
+
+/// "walk 12, jog 3 and 4 more", the most frequent first.
+std::string listed(const std::map<std::string, int64_t>& counts) {
+  std::vector<std::pair<std::string, int64_t>> order(counts.begin(), counts.end());
+  std::stable_sort(order.begin(), order.end(),
+                   [](const auto& a, const auto& b) { return a.second > b.second; });
+  std::string out;
+  for (size_t i = 0; i < order.size() && i < kListed; ++i)
+    out += (i > 0 ? ", " : "") + order[i].first + " " + std::to_string(order[i].second);
+  if (order.size() > kListed) out += " and " + std::to_string(order.size() - kListed) + " more";
+  return std::to_string(order.size()) + ": " + out;
+}
+
+std::string to_text(const Inspection& found) {
+  std::string text = row("kind", found.kind);
+  for (const auto& [name, count] : found.counts) text += row(name, std::to_string(count));
+  if (found.seconds > 0)
+    text += row("seconds", rounded(found.seconds, 1) + " at " +
+                               rounded(found.fps, found.fps == std::floor(found.fps) ? 0 : 2) +
+                               " frames a second");
+  for (const auto& [split, counts] : found.splits) {
+    std::string line;
+    for (const auto& [name, count] : counts)
+      line += (line.empty() ? "" : ", ") + std::to_string(count) + " " + name;
+    text += row(split, line);
+  }
+  if (!found.heights.empty())
+    text += row("heights", rounded(found.heights.front(), 2) + " to " +
+                               rounded(found.heights.back(), 2) + " m, median " +
+                               rounded(found.heights[found.heights.size() / 2], 2) + " m");
+  if (!found.subjects.empty()) text += row("subjects", listed(found.subjects));
+  if (!found.actions.empty()) text += row("actions", listed(found.actions));
+  text += row("units", found.units) + row("license", found.license) +
+          row("provenance", found.provenance);
+  if (!found.transform.empty()) text += row("transform", found.transform);
+  return text;
+}
+
+Json to_json(const Inspection& found) {
+  Json out = {{"kind", found.kind},       {"counts", found.counts},         {"units", found.units},
+              {"license", found.license}, {"provenance", found.provenance}, {"fps", found.fps},
+              {"seconds", found.seconds}};
+  if (found.kind == "scans" || found.kind == "prediction") {
+    if (Json transform = Json::parse(found.transform, nullptr, false); transform.is_object())
+      out["transform"] = std::move(transform);
+    return out;
+  }
+  out["splits"] = found.splits;
+  out["subjects"] = found.subjects;
+  out["actions"] = found.actions;
+  if (!found.heights.empty())
+    out["heights"] = {{"least", found.heights.front()},
+                      {"median", found.heights[found.heights.size() / 2]},
+                      {"most", found.heights.back()}};
+  return out;
+}
+
+// ---- plot --------------------------------------------------------------------------------------
+
+/// Number k of `n` drawn out of `all`, spread evenly.
+size_t spread(size_t k, size_t n, size_t all) { return n < 2 ? 0 : k * (all - 1) / (n - 1); }
+
+void add_bodies(std::vector<Figure>& figures, const std::vector<Body>& bodies) {
+  const size_t n = std::min(bodies.size(), kBodiesDrawn);
+  for (size_t k = 0; k < n; ++k) {
+    const Body& body = bodies[spread(k, n, bodies.size())];
+    figures.push_back({{{body.rest.vertices, body.rest.faces}}, body.id + " (" + body.split + ")"});
+  }
+}
+
+/// The middle frame of each motion, performed by the file's bodies in turn, or by a built-in one.
+void add_motions(std::vector<Figure>& figures, const std::vector<Motion>& motions,
+                 const std::vector<Body>& bodies) {
+  const std::vector<Body> performers =
+      bodies.empty() ? std::vector{builtin_body(0, "test", 0)} : bodies;
+  const size_t n = std::min(motions.size(), kMotionsDrawn);
+  for (size_t k = 0; k < n; ++k) {
+    const Motion& motion = motions[spread(k, n, motions.size())];
+    const Body& body = performers[k % performers.size()];
+    if (motion.frames() == 0) continue;
+    Figure figure{
+        {{pose_surface(body, pose_on(motion, body, motion.frames() / 2)), body.rest.faces}},
+        motion.id + (motion.action.empty() ? "" : ": " + motion.action)};
+    figures.push_back(std::move(figure));
+  }
+}
+
+void add_frames(std::vector<Figure>& figures, const std::string& file, double fps) {
+  const Clip clip = read_clip(file, "", 0);
+  const float floor = clip_floor(clip);
+  const size_t n = std::min(clip.frames.size(), kFramesDrawn);
+  for (size_t k = 0; k < n; ++k) {
+    const size_t f = spread(k, n, clip.frames.size());
+    Figure figure{{{clip.frames[f], clip.faces}}, rounded(static_cast<double>(f) / fps, 2) + " s"};
+    figure.floor = floor;
+    figures.push_back(std::move(figure));
+  }
+}
+
+void plot(const InspectOptions& options, const Inspection& found) {
+  std::vector<Figure> figures;
+  if (found.kind == "scans" || found.kind == "prediction") {
+    add_frames(figures, options.file, found.fps);
+  } else {
+    std::vector<Body> bodies;
+    if (found.counts.contains("bodies")) bodies = read_bodies(options.file);
+    add_bodies(figures, bodies);
+    if (found.counts.contains("motions")) add_motions(figures, read_motions(options.file), bodies);
+  }
+  FigureSheetOptions sheet;
+  sheet.title = options.file + ": " + found.kind;
+  write_png(options.plot, figure_sheet(figures, sheet));
+}
+
+int run_inspect(const InspectOptions& options, const Common& common) {
+  if (!options.plot.empty() && !options.plot.ends_with(".png"))
+    throw InputError(options.plot, "names no picture", "end --plot in .png");
+  const Inspection found = inspect(options.file);
+  if (!options.plot.empty()) plot(options, found);
+  if (common.json)
+    print_json(to_json(found));
+  else
+    print(to_text(found) + (options.plot.empty() ? "" : "wrote " + options.plot + "\n"));
+  return 0;
+}
+
+}  // namespace
+
+void add_data_inspect(Program& program, CLI::App& group) {
+  const auto options = std::make_shared<InspectOptions>();
+  CLI::App& app =
+      program.add(group, "inspect", "say what a file holds, and draw it",
+                  "restage data inspect data.h5\nrestage data inspect data.h5 --plot sheet.png\n"
+                  "restage data inspect data.h5 --json",
+                  [options, &program] { return run_inspect(*options, program.common()); });
+  app.add_option("FILE", options->file, "bodies, motions, scans or a prediction (HDF5)")
+      ->required();
+  app.add_option("--plot", options->plot, "draw bodies, poses or frames on a contact sheet (PNG)");
+}
+
+}  // namespace restage::cli

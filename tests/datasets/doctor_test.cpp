@@ -1,0 +1,403 @@
+// The doctor on built-in bodies: what it finds, how sure it is, and what it mends.
+#include <gtest/gtest.h>
+
+#include "autograd/base/error.h"
+#include "autograd/base/rng.h"
+#include "datasets/builtin/bodies.h"
+#include "datasets/builtin/motions.h"
+#include "datasets/doctor/examine.h"
+#include "datasets/doctor/orientation_model.h"
+#include "datasets/sampling/surface.h"
+
+namespace restage {
+namespace {
+
+const Body& somebody() {
+  static const Body body = builtin_body(0, "test", 0);
+  return body;
+}
+
+/// A scan of 1,100 points with 5 mm of noise: at rest, or in the middle of a motion, facing +z.
+Points scan(const Body& body, const Motion* motion = nullptr, size_t frame = 0, uint64_t seed = 1) {
+  const RngKey key{seed, 0};
+  const SurfaceSamples samples = SurfaceSampler(body).draw(key.fold("surface"), 1100);
+  Points out = samples.on_rest(body);
+  if (motion != nullptr) {
+    const Pose pose = pose_on(*motion, body, frame);
+    out = samples.on_pose(body, pose);
+    const Mat3 turn = turn_about_y(-heading_angle(forward_kinematics(body.joints, pose).joints));
+    for (Point& p : out) p = turn.cast<float>() * p;
+  }
+  add_noise(key.fold("noise"), 0.005, out);
+  return out;
+}
+
+Mesh cloud(Points points) { return {std::move(points), {}}; }
+
+Points moved(Points points, const Mat3& turn, double scale = 1, const Point& by = Point::Zero()) {
+  for (Point& p : points) p = turn.cast<float>() * p * static_cast<float>(scale) + by;
+  return points;
+}
+
+Mat3 into_foreign(int up, int facing) {
+  Orientation o;
+  o.up = up;
+  o.facing = facing;
+  return o.turn().transpose();
+}
+
+bool notes(const Diagnosis& d, const std::string& topic, const std::string& words) {
+  for (const Finding& f : d.findings)
+    if (f.topic == topic && f.weight != Weight::fact && f.what.find(words) != std::string::npos)
+      return true;
+  return false;
+}
+
+/// Frames in memory.
+class Frames : public FrameSource {
+ public:
+  explicit Frames(std::vector<Points> frames, std::vector<std::string> names = {}, double fps = 30)
+      : frames_(std::move(frames)), names_(std::move(names)), fps_(fps) {}
+  std::optional<Frame> next() override {
+    if (at_ == frames_.size()) return std::nullopt;
+    const std::string name = names_.empty() ? "x.h5:" + std::to_string(at_) : names_[at_];
+    return Frame{name, frames_[at_++], {}, 0};
+  }
+  void rewind() override { at_ = 0; }
+  int64_t frames() const override { return static_cast<int64_t>(frames_.size()); }
+  double fps() const override { return fps_; }
+
+ private:
+  std::vector<Points> frames_;
+  std::vector<std::string> names_;
+  double fps_;
+  size_t at_ = 0;
+};
+
+std::vector<Points> performance(size_t frames) {
+  const Motion motion = builtin_motion(0, "test", 0);
+  std::vector<Points> out;
+  for (size_t f = 0; f < std::min(frames, motion.frames()); ++f) {
+    const Pose pose = pose_on(motion, somebody(), f);
+    out.push_back(SurfaceSampler(somebody()).draw(RngKey{f, 0}, 1000).on_pose(somebody(), pose));
+  }
+  return out;
+}
+
+TEST(DoctorOrientation, HypothesesAreProperTurns) {
+  int permutations = 0;
+  for (int up = 0; up < 6; ++up)
+    for (int heading = 0; heading < 24; ++heading) {
+      const Eigen::Matrix3f turn = doctor_detail::hypothesis(up, heading);
+      EXPECT_NEAR(turn.determinant(), 1, 1e-5);
+      EXPECT_TRUE((turn * direction(up).cast<float>()).isApprox(Point::UnitY(), 1e-5f));
+      permutations += turn.isApprox(turn.array().round().matrix(), 0);
+    }
+  EXPECT_EQ(permutations, 24);
+}
+
+TEST(DoctorOrientation, EveryAxisAndUnitOfAScanIsFound) {
+  const Points rest = scan(somebody());
+  size_t unit = 0;
+  for (int up = 0; up < 6; ++up)
+    for (int facing = 0; facing < 6; ++facing) {
+      if (facing / 2 == up / 2) continue;
+      const LengthUnit length = kUnits[unit++ % kUnits.size()];
+      const Points foreign = moved(rest, into_foreign(up, facing), 1 / length.metres);
+      const Diagnosis d = examine_surface(cloud(foreign));
+      EXPECT_EQ(d.orientation.up, up);
+      EXPECT_EQ(d.orientation.facing, facing);
+      EXPECT_GT(d.orientation.up_sure, 0.9);
+      EXPECT_EQ(d.unit.unit.metres, length.metres);
+      EXPECT_EQ(d.usable(), up == 2 && length.metres == 1);
+      // The transform brings every point back to where it was, and there again.
+      ASSERT_TRUE(d.transform);
+      for (size_t i = 0; i < rest.size(); i += 100) {
+        EXPECT_LT(((*d.transform)(foreign[i]) - rest[i]).norm(), 1e-4f);
+        EXPECT_LT((d.transform->undo((*d.transform)(foreign[i])) - foreign[i]).norm(),
+                  1e-4 / length.metres);
+      }
+    }
+}
+
+TEST(DoctorOrientation, PeopleInMotionAreSeldomTakenForOthers) {
+  int up = 0, facing = 0, all = 0;
+  for (int k = 0; k < 22; ++k) {
+    const Motion motion = builtin_motion(0, "test", k);
+    for (const size_t frame : {motion.frames() / 3, 2 * motion.frames() / 3}) {
+      OrientationVote vote;
+      vote.add(scan(somebody(), &motion, frame, static_cast<uint64_t>(k)));
+      const Orientation o = vote.result();
+      up += o.up == 2;
+      facing += o.up == 2 && o.facing == 4;
+      ++all;
+    }
+  }
+  EXPECT_GE(up, all - 2);
+  EXPECT_GE(facing, all - 4);
+}
+
+TEST(DoctorOrientation, WhatIsNoPersonIsUnsure) {
+  Rng rng(RngKey{5, 0});
+  Points ball;
+  for (int i = 0; i < 600; ++i)
+    ball.push_back(Point(static_cast<float>(rng.normal()), static_cast<float>(rng.normal()),
+                         static_cast<float>(rng.normal())) *
+                   70);
+  const Diagnosis d = examine_surface(cloud(ball));
+  EXPECT_TRUE(d.usable()) << "nothing certain can be said against it";
+  EXPECT_NO_THROW(check_target(cloud(ball), "ball"));
+  EXPECT_EQ(guess_unit(0).sure, 0);
+  EXPECT_LT(guess_unit(1e30).sure, 1e-6);
+}
+
+TEST(DoctorOrientation, KnownBetterBeatsFound) {
+  const Mesh mesh = cloud(scan(somebody()));
+  ExamineOptions known;
+  known.scale = 0.5;
+  known.up = 4;
+  known.facing = 0;
+  const Diagnosis d = examine_surface(mesh, known);
+  EXPECT_EQ(d.transform->scale, 0.5);
+  EXPECT_TRUE((d.transform->rotation * Vec3::UnitZ()).isApprox(Vec3::UnitY()));
+  EXPECT_TRUE((d.transform->rotation * Vec3::UnitX()).isApprox(Vec3::UnitZ()));
+  known.facing = 5;
+  EXPECT_THROW(examine_surface(mesh, known), InputError);
+}
+
+TEST(Doctor, AHealthyBodyHasNothing) {
+  for (const Mesh& mesh : {somebody().rest, cloud(scan(somebody()))}) {
+    ExamineOptions options;
+    options.target = true;
+    const Diagnosis d = examine_surface(mesh, options);
+    for (const Finding& f : d.findings)
+      EXPECT_EQ(f.weight, Weight::fact) << f.topic << ": " << f.what;
+    EXPECT_TRUE(d.transform && d.transform->is_identity());
+    float low = 1e9f, high = -1e9f;
+    for (const Point& p : mesh.vertices) low = std::min(low, p.y()), high = std::max(high, p.y());
+    EXPECT_NEAR(d.height, high - low, 0.03);
+    EXPECT_EQ(d.find("pose")->what, "T-pose");
+  }
+}
+
+TEST(Doctor, FloorIsFoundAndMoved) {
+  const Diagnosis d =
+      examine_surface(cloud(moved(scan(somebody()), Mat3::Identity(), 1, {0, 0.8f, 0})));
+  EXPECT_TRUE(notes(d, "floor", "0.8"));
+  EXPECT_TRUE(d.usable());
+  EXPECT_NEAR((*d.transform)(Point(0, 0.8f, 0)).y(), 0, 0.02);
+}
+
+TEST(Doctor, StrayPointsAreCountedAndRemoved) {
+  Points points = scan(somebody());
+  const size_t clean = points.size();
+  Rng rng(RngKey{7, 0});
+  for (int i = 0; i < 20; ++i) {
+    const double a = rng.uniform(0, 6.28);
+    points.push_back(Point(static_cast<float>(1.6 * std::cos(a)),
+                           static_cast<float>(rng.uniform(0, 2)),
+                           static_cast<float>(1.6 * std::sin(a))));
+  }
+  const Diagnosis d = examine_surface(cloud(points));
+  EXPECT_TRUE(notes(d, "outliers", "20 stray points"));
+  EXPECT_EQ(d.orientation.up, 2);
+  EXPECT_EQ(mended(cloud(points), d).vertices.size(), clean);
+}
+
+TEST(Doctor, SomebodyElseIsToldFromThePerson) {
+  const Points person = scan(somebody());
+  Points limb = person, crowd = person;
+  for (const Point& p : scan(builtin_body(0, "test", 1), nullptr, 0, 2)) {
+    if (p.x() > 0.35f) limb.push_back(p + Point(0.9f, 0, 0.2f));  // an arm reaches into the view
+    crowd.push_back(p + Point(0.3f, 0, 1.5f));
+  }
+  const Diagnosis with_limb = examine_surface(cloud(limb));
+  EXPECT_TRUE(notes(with_limb, "others", "part of somebody"));
+  EXPECT_TRUE(with_limb.usable());
+  EXPECT_EQ(mended(cloud(limb), with_limb).vertices.size(), person.size());
+  const Diagnosis with_crowd = examine_surface(cloud(crowd));
+  EXPECT_TRUE(notes(with_crowd, "others", "second person"));
+  EXPECT_FALSE(with_crowd.usable());
+  EXPECT_TRUE(examine_surface(mended(cloud(crowd), with_crowd)).usable());
+}
+
+TEST(Doctor, HolesAreFound) {
+  Mesh mesh = somebody().rest;
+  EXPECT_EQ(borders(mesh).edges, 0u);
+  std::erase_if(mesh.faces, [&](const Triangle& f) {
+    const Point& p = mesh.vertices[static_cast<size_t>(f[0])];
+    return p.z() > 0 && std::abs(p.x()) < 0.05f && std::abs(p.y() - 1.2f) < 0.05f;
+  });
+  EXPECT_EQ(borders(mesh).loops, 1u);
+  EXPECT_TRUE(notes(examine_surface(mesh), "holes", "open border"));
+  Points front = scan(somebody());
+  EXPECT_FALSE(notes(examine_surface(cloud(front)), "holes", "one side"));
+  // A hole through the trunk of a cloud is no separate person.
+  std::erase_if(front, [](const Point& p) { return std::abs(p.y() - 1.0f) < 0.06f; });
+  EXPECT_EQ(examine_surface(cloud(front)).find("others"), nullptr);
+}
+
+TEST(Doctor, OneSidedScansAreFound) {
+  const Body& body = somebody();
+  const Points points = SurfaceSampler(body).draw(RngKey{3, 0}, 4000).on_rest(body);
+  std::map<std::pair<long, long>, float> front;
+  const auto ray = [](const Point& p) {
+    return std::pair(std::lround(p.x() / 0.04), std::lround(p.y() / 0.04));
+  };
+  for (const Point& p : points) {
+    const auto at = front.try_emplace(ray(p), p.z()).first;
+    at->second = std::max(at->second, p.z());
+  }
+  Points seen;
+  for (const Point& p : points)
+    if (p.z() > front[ray(p)] - 0.05f) seen.push_back(p);
+  EXPECT_TRUE(notes(examine_surface(cloud(seen)), "holes", "one side"));
+}
+
+TEST(Doctor, DuplicatesAndFewPoints) {
+  Points points = scan(somebody());
+  const size_t clean = points.size();
+  points.insert(points.end(), points.begin(), points.begin() + 30);
+  const Diagnosis d = examine_surface(cloud(points));
+  EXPECT_TRUE(notes(d, "duplicates", "30 points"));
+  EXPECT_EQ(mended(cloud(points), d).vertices.size(), clean);
+  const Diagnosis few = examine_surface(cloud(Points(200, Point(1, 2, 3))));
+  EXPECT_TRUE(notes(few, "points", "only 1 distinct"));
+  EXPECT_FALSE(few.usable());
+  EXPECT_FALSE(few.transform);
+}
+
+TEST(Doctor, TargetsMustStandInTPoseAndFaceForwards) {
+  ExamineOptions target;
+  target.target = true;
+  const Motion motion = builtin_motion(0, "test", 0);
+  const Mesh walking = cloud(scan(somebody(), &motion, 10));
+  EXPECT_TRUE(notes(examine_surface(walking, target), "pose", "not a T-pose"));
+  EXPECT_TRUE(examine_surface(walking).usable()) << "fine as a source";
+  const Mesh backwards = cloud(moved(scan(somebody()), turn_about_y(3.14159265358979)));
+  EXPECT_TRUE(notes(examine_surface(backwards, target), "facing", "-z"));
+  EXPECT_TRUE(examine_surface(backwards).usable());
+}
+
+TEST(Doctor, MirrorImagesShowInNamedJoints) {
+  Joints joints = somebody().joints;
+  EXPECT_EQ(is_mirrored(joints), std::optional(false));
+  for (Vec3& p : joints) p.x() = -p.x();
+  EXPECT_EQ(is_mirrored(joints), std::optional(true));
+  for (Vec3& p : joints) p = turn_about_y(2) * p;
+  EXPECT_EQ(is_mirrored(joints), std::optional(true));
+  joints.fill(Vec3::Zero());
+  EXPECT_FALSE(is_mirrored(joints));
+}
+
+TEST(DoctorSequence, HealthyFramesHaveNothing) {
+  Frames frames(performance(60));
+  const Diagnosis d = examine_frames(frames);
+  EXPECT_EQ(d.frames, 60);
+  EXPECT_TRUE(d.usable());
+  EXPECT_TRUE(d.repeated.empty());
+  EXPECT_TRUE(d.gap.empty());
+  EXPECT_EQ(d.find("missing frames"), nullptr);
+  EXPECT_EQ(d.orientation.up, 2);
+}
+
+TEST(DoctorSequence, AxesAndUnitsOfASequence) {
+  std::vector<Points> frames = performance(24);
+  for (Points& points : frames) points = moved(points, into_foreign(4, 1), 100);
+  Frames source(frames);
+  const Diagnosis d = examine_frames(source);
+  EXPECT_FALSE(d.usable());
+  EXPECT_TRUE(notes(d, "up", "+z is up"));
+  EXPECT_TRUE(notes(d, "units", "1 cm"));
+  EXPECT_NE(d.find("units")->fix.find("--scale 0.01"), std::string::npos);
+}
+
+TEST(DoctorSequence, RepeatedFramesInAnyOrderOfPoints) {
+  std::vector<Points> frames = performance(30);
+  std::reverse_copy(frames[9].begin(), frames[9].end(), frames[10].begin());
+  Frames source(frames);
+  const Diagnosis d = examine_frames(source);
+  EXPECT_EQ(d.repeated, std::set<int64_t>{10});
+  EXPECT_TRUE(notes(d, "repeated frames", "1 frame equal"));
+  EXPECT_EQ(d.keep_every, 1);
+
+  std::vector<Points> twice;
+  for (const Points& p : performance(20)) twice.insert(twice.end(), 2, p);
+  Frames doubled(twice);
+  const Diagnosis slow = examine_frames(doubled);
+  EXPECT_EQ(slow.keep_every, 2);
+  EXPECT_TRUE(notes(slow, "repeated frames", "15 frames a second"));
+}
+
+TEST(DoctorSequence, MissingFramesByNumberAndByMotion) {
+  std::vector<Points> frames = performance(30);
+  std::vector<std::string> names;
+  for (int i = 0; i < 30; ++i) names.push_back("f" + std::to_string(i < 12 ? i : i + 3) + ".ply");
+  Frames numbered(frames, names);
+  const Diagnosis d = examine_frames(numbered);
+  EXPECT_EQ(d.gap, (std::map<int64_t, int64_t>{{12, 3}}));
+  EXPECT_TRUE(notes(d, "missing frames", "3 numbers missing"));
+
+  std::vector<Points> jump = frames;
+  for (size_t f = 15; f < jump.size(); ++f)
+    for (Point& p : jump[f]) p += Point(0.6f, 0, 0);
+  Frames jumping(jump);
+  EXPECT_TRUE(notes(examine_frames(jumping), "missing frames", "jumps before frame 15"));
+}
+
+TEST(DoctorSequence, NobodyRunsThatFast) {
+  std::vector<Points> frames = performance(20);
+  for (size_t f = 0; f < frames.size(); ++f)
+    for (Point& p : frames[f]) p += static_cast<float>(f) * Point(0, 0, 0.3f);
+  Frames fast(frames, {}, 120);
+  EXPECT_TRUE(notes(examine_frames(fast), "frame rate", "cannot be"));
+}
+
+TEST(DoctorChecks, RefuseNonsenseWithTheOptionThatMendsIt) {
+  const auto words = [](const auto& call) -> std::string {
+    try {
+      call();
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const auto source = [&](const Mat3& turn, double scale) {
+    std::vector<Mesh> frames;
+    for (const Points& p : performance(kSourceFrames))
+      frames.push_back(cloud(moved(p, turn, scale)));
+    return words([&] { check_source(frames, "scans"); });
+  };
+  EXPECT_EQ(source(Mat3::Identity(), 1), "");
+  EXPECT_NE(source(into_foreign(4, 1), 1).find("--source-up z"), std::string::npos);
+  EXPECT_NE(source(into_foreign(0, 4), 1).find("--fix"), std::string::npos);
+  EXPECT_NE(source(Mat3::Identity(), 100).find("--scale 0.01"), std::string::npos);
+  const auto target = [&](const Mat3& turn, double scale) {
+    return words([&] { check_target(cloud(moved(scan(somebody()), turn, scale)), "hero"); });
+  };
+  EXPECT_EQ(target(Mat3::Identity(), 1), "");
+  EXPECT_NE(target(into_foreign(4, 1), 1).find("+z"), std::string::npos);
+  EXPECT_NE(target(into_foreign(2, 5), 1).find("face -z"), std::string::npos);
+  EXPECT_NE(target(Mat3::Identity(), 1000).find("1 mm"), std::string::npos);
+}
+
+TEST(DoctorChecks, GoodInputIsNeverRefused) {
+  const std::vector<Body> bodies = builtin_bodies(0, 0, 0, 4);
+  for (const Body& body : bodies) {
+    EXPECT_NO_THROW(check_target(body.rest, body.id));
+    EXPECT_NO_THROW(check_target(cloud(scan(body)), body.id));
+  }
+  for (int k = 0; k < 44; ++k) {
+    const Motion motion = builtin_motion(0, "test", k);
+    const Body& body = bodies[static_cast<size_t>(k) % bodies.size()];
+    std::vector<Mesh> frames;
+    for (size_t f = 0; f < kSourceFrames; ++f) {
+      const Pose pose = pose_on(motion, body, f);
+      frames.push_back(cloud(SurfaceSampler(body).draw(RngKey{f, 1}, 1000).on_pose(body, pose)));
+    }
+    EXPECT_NO_THROW(check_source(frames, motion.id)) << motion.action;
+  }
+}
+
+}  // namespace
+}  // namespace restage
