@@ -8,7 +8,6 @@
 #include "autograd/base/parallel.h"
 #include "datasets/importers/cmu.h"
 #include "datasets/importers/makehuman.h"
-#include "datasets/schema.h"
 
 namespace restage {
 namespace {
@@ -48,21 +47,8 @@ void add_motion(const Motion& motion, DatasetWriter& writer, ImportSummary& summ
 
 ImportSummary import_data_folder(const std::string& folder, bool bodies, bool clips,
                                  const std::string& out, const ImportOptions& options) {
-  FileInfo info;
-  info.license = info.provenance = "";
-  if (bodies) {
-    info.license = "bodies: CC0 1.0";
-    info.provenance =
-        "bodies: MakeHuman base mesh, targets and game-engine rig (makehumancommunity)";
-  }
-  if (clips) {
-    info.license += std::string(bodies ? "; " : "") +
-                    "motions: free for research and commercial use with acknowledgement, not to be "
-                    "resold as data";
-    info.provenance += std::string(bodies ? "; " : "") + "motions: " + kCmuAcknowledgement;
-  }
   ImportSummary summary;
-  DatasetWriter writer(out, info);
+  DatasetWriter writer(out, data_folder_info(bodies, clips));
   if (bodies) add_bodies(folder + "/body", options.garment, writer, summary);
   if (clips)
     for (const Motion& motion : import_cmu(folder + "/cmu/clips30.h5"))
@@ -96,6 +82,23 @@ ImportSummary import_bvh_files(const std::vector<std::string>& files, const std:
 }
 
 }  // namespace
+
+FileInfo data_folder_info(bool bodies, bool clips) {
+  FileInfo info;
+  info.license = info.provenance = "";
+  if (bodies) {
+    info.license = "bodies: CC0 1.0";
+    info.provenance =
+        "bodies: MakeHuman base mesh, targets and game-engine rig (makehumancommunity)";
+  }
+  if (clips) {
+    info.license += std::string(bodies ? "; " : "") +
+                    "motions: free for research and commercial use with acknowledgement, not to be "
+                    "resold as data";
+    info.provenance += std::string(bodies ? "; " : "") + "motions: " + kCmuAcknowledgement;
+  }
+  return info;
+}
 
 ImportSummary import_data(const std::string& source, const std::string& out,
                           const ImportOptions& options) {

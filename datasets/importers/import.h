@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "datasets/importers/bvh.h"
+#include "datasets/schema.h"
 
 namespace restage {
 
@@ -18,6 +19,9 @@ struct ImportSummary {
   size_t bodies = 0, motions = 0, frames = 0;
   std::vector<std::string> skipped;  ///< files of a BVH folder that could not be used, and why
 };
+
+/// Licence, origin and required acknowledgement of what comes out of a data folder.
+FileInfo data_folder_info(bool bodies, bool clips);
 
 /// Writes `out` (whole or not at all) from `source`, which is
 /// - a folder laid out like the project's data folder: all bodies of body/makehuman.h5 by
