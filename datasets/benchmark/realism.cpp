@@ -59,14 +59,25 @@ struct Sums {
   }
 };
 
-void measure_bodies(const std::vector<Body>& bodies, RealismReport& out,
-                    std::map<std::string, int>& outside) {
+using Counts = std::map<std::string, int>;
+
+std::vector<std::string> most_first(const Counts& counts) {
+  std::vector<std::pair<int, std::string>> ordered;
+  for (const auto& [name, count] : counts) ordered.emplace_back(-count, name);
+  std::sort(ordered.begin(), ordered.end());
+  std::vector<std::string> out;
+  for (const auto& [count, name] : ordered)
+    out.push_back(name + " (" + std::to_string(-count) + ")");
+  return out;
+}
+
+void measure_bodies(const std::vector<Body>& bodies, RealismReport& out, Counts& outside) {
   constexpr double kRight = std::numbers::pi / 2;
   struct Row {
     BentVolume knee[2], elbow[2];
     int inside = 0;
     double buried = 0;
-    std::vector<std::string> outside;
+    std::vector<std::string> outside, buried_at;
   };
   std::vector<Row> rows(bodies.size());
   parallel_for(static_cast<int64_t>(bodies.size()), 1, [&](int64_t begin, int64_t end) {
@@ -78,10 +89,11 @@ void measure_bodies(const std::vector<Body>& bodies, RealismReport& out,
         row.elbow[side] = bent_volume(body, 16 + side, 18 + side, 20 + side, kRight);
       }
       row.inside = joints_inside(body, body.rest.vertices, body.joints, &row.outside);
-      row.buried = buried_share(body);
+      row.buried = buried_share(body, 8, &row.buried_at);
     }
   });
   Sums knee, elbow;
+  Counts buried_at;
   double inside = 0;
   for (const Row& row : rows) {
     for (int side : {0, 1}) {
@@ -90,6 +102,7 @@ void measure_bodies(const std::vector<Body>& bodies, RealismReport& out,
     }
     inside += row.inside;
     out.buried += row.buried;
+    for (const std::string& name : row.buried_at) ++buried_at[name];
     for (const std::string& name : row.outside) ++outside[name];
   }
   const auto n = static_cast<double>(std::max<size_t>(1, bodies.size()));
@@ -99,10 +112,11 @@ void measure_bodies(const std::vector<Body>& bodies, RealismReport& out,
   out.elbow_least = {elbow.least_ours, elbow.least_linear};
   out.joints_inside_rest = inside / (n * kJoints);
   out.buried /= n;
+  out.buried_at = most_first(buried_at);
 }
 
 void measure_poses(const std::vector<Body>& bodies, const std::vector<Motion>& motions,
-                   RealismReport& out, std::map<std::string, int>& outside) {
+                   RealismReport& out, Counts& outside) {
   struct Row {
     int inside = 0;
     std::vector<std::string> outside;
@@ -187,7 +201,7 @@ int joints_inside(const Body& body, const Points& surface, const Joints& joints,
   return inside;
 }
 
-double buried_share(const Body& body, size_t step) {
+double buried_share(const Body& body, size_t step, std::vector<std::string>* where) {
   const Points& x = body.rest.vertices;
   std::vector<Vec3> normals(x.size(), Vec3::Zero());
   for (const Triangle& t : body.rest.faces) {
@@ -199,7 +213,11 @@ double buried_share(const Body& body, size_t step) {
     if (!(normals[v].norm() > 0)) continue;
     ++looked;
     const Vec3 at = x[v].cast<double>() + 0.003 * normals[v].normalized();
-    buried += winding_number(x, body.rest.faces, at) > 0.5;
+    if (!(winding_number(x, body.rest.faces, at) > 0.5)) continue;
+    ++buried;
+    Eigen::Index joint = 0;
+    body.weights.row(static_cast<Eigen::Index>(v)).maxCoeff(&joint);
+    if (where) where->emplace_back(kJointNames[static_cast<size_t>(joint)]);
   }
   return looked > 0 ? static_cast<double>(buried) / static_cast<double>(looked) : 0.0;
 }
@@ -229,17 +247,13 @@ RealismReport measure_realism(const std::vector<Body>& bodies,
   RealismReport out;
   out.bodies = bodies.size();
   out.motions = motions.size();
-  std::map<std::string, int> outside;
+  Counts outside;
   measure_bodies(bodies, out, outside);
   if (!bodies.empty() && !motions.empty()) {
     measure_poses(bodies, motions, out, outside);
     measure_feet(bodies, motions, out);
   }
-  std::vector<std::pair<int, std::string>> ordered;
-  for (const auto& [name, count] : outside) ordered.emplace_back(-count, name);
-  std::sort(ordered.begin(), ordered.end());
-  for (const auto& [count, name] : ordered)
-    out.outside.push_back(name + " (" + std::to_string(-count) + ")");
+  out.outside = most_first(outside);
   return out;
 }
 

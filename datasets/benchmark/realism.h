@@ -24,8 +24,8 @@ int joints_inside(const Body& body, const Points& surface, const Joints& joints,
                   std::vector<std::string>* outside = nullptr);
 
 /// Share of the rest surface, of every `step`-th vertex moved 3 mm outwards, that lies inside
-/// another part of it.
-double buried_share(const Body& body, size_t step = 8);
+/// another part of it. `where` (may be null) gets the joint that moves each such vertex.
+double buried_share(const Body& body, size_t step = 8, std::vector<std::string>* where = nullptr);
 
 /// Heights and speeds of the lowest points of a motion on a body, metres.
 struct FootContact {
@@ -39,8 +39,9 @@ struct RealismReport {
   size_t bodies = 0, motions = 0, frames = 0;
   BentVolume knee_mean, elbow_mean, knee_least, elbow_least;  ///< bent by 90 degrees
   double joints_inside_rest = 0, joints_inside_posed = 0;  ///< shares; posed: one frame a clip
-  std::vector<std::string> outside;                        ///< joints that were outside, most first
   double buried = 0;                                       ///< mean over bodies
+  /// Joints that were outside, and joints whose skin is buried: "name (count)", most first.
+  std::vector<std::string> outside, buried_at;
   /// Lowest point over all bodies and frames: percentiles 0, 1, 50, 99, 100, metres.
   std::vector<double> lowest;
   double on_floor = 0;   ///< share of frames whose lowest point is within 2 cm of the floor

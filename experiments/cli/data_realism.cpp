@@ -40,6 +40,7 @@ Json to_json(const RealismReport& r) {
           {"joints_inside", {{"rest", r.joints_inside_rest}, {"posed", r.joints_inside_posed}}},
           {"joints_outside", r.outside},
           {"buried_at_rest", r.buried},
+          {"buried_at", r.buried_at},
           {"lowest_point", r.lowest},
           {"on_floor", r.on_floor},
           {"slipping", r.slipping}};
@@ -58,7 +59,7 @@ std::string to_text(const RealismReport& r) {
   if (r.frames > 0)
     out += "joints inside the body, posed    " + percent(r.joints_inside_posed) + "\n";
   out += "joints found outside             " + listed(r.outside) + "\n" +
-         "skin inside other parts at rest  " + percent(r.buried) + "\n";
+         "skin inside other parts at rest  " + percent(r.buried) + ", at: " + listed(r.buried_at) + "\n";
   if (r.frames > 0)
     out += "lowest point, of " + std::to_string(r.frames) + " frames: least " +
            centimetres(r.lowest[0]) + ", 1 % below " + centimetres(r.lowest[1]) + ", median " +

@@ -18,7 +18,7 @@ constexpr uint32_t kSource = 0x4a8bc9, kTarget = 0xe8a06c;
 
 struct SheetArguments {
   std::string input, out, title;
-  int columns = 12;
+  int columns = 11;
 };
 
 Figure posed(const Body& body, const Motion& motion, size_t frame) {

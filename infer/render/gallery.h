@@ -18,7 +18,7 @@ struct Figure {
 };
 
 struct GalleryOptions {
-  int columns = 11, cell_width = 116, cell_height = 150;  ///< pixels
+  int columns = 11, cell_width = 132, cell_height = 138;  ///< pixels
   double height = 2.15;      ///< metres that a cell shows
   double azimuth = 28;       ///< degrees from the front towards the body's left
   double elevation = 8;
