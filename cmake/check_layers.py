@@ -56,7 +56,8 @@ ONLY_IN = {
     "openssl/": ["datasets/benchmark/sha256.cpp"],
     "stb/": ["infer/render/"],
     "lzma.h": ["datasets/importers/"],
-    "zlib.h": ["datasets/importers/"],
+    "zlib.h": ["datasets/importers/", "datasets/fetch/"],
+    "curl/": ["datasets/fetch/download.cpp"],
     "hwy/": ["autograd/cpu/"],
     "Eigen/": ["autograd/cpu/", "nn/", "datasets/", "train/", "infer/", "experiments/"],
     "tiny_gltf.h": [],  # tests only: it reads what we wrote

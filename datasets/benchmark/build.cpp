@@ -28,15 +28,15 @@ namespace fs = std::filesystem;
 /// A folder beside the wanted one that takes its place on commit() and is removed otherwise.
 class StagingFolder {
  public:
-  explicit StagingFolder(const std::string& target)
-      : target_(fs::path(target).lexically_normal()) {
+  explicit StagingFolder(const std::string& target) : target_(fs::path(target).lexically_normal()) {
     if (!target_.has_filename()) target_ = target_.parent_path();
     std::error_code failed;
     if (fs::exists(target_, failed) && !(fs::is_directory(target_) && fs::is_empty(target_)))
       throw InputError(target, "is there already", "give a new folder, or remove it");
     path_ = target_.string() + ".tmp-" + std::to_string(::getpid());
     fs::create_directory(path_, failed);
-    if (failed) throw InputError(target, "cannot be made a folder", "give a place you can write to");
+    if (failed)
+      throw InputError(target, "cannot be made a folder", "give a place you can write to");
   }
   ~StagingFolder() {
     std::error_code ignored;
@@ -73,14 +73,14 @@ class Builder {
     average_ = make_character({"average", "", {}, "", 0}, model_, rows_, key_);
     touching_ = outermost_vertices(average_);
     check_names();
+    for (const CharacterRecipe& c : r_.characters)
+      cast_.bodies.push_back(make_character(c, model_, rows_, key_));
   }
 
   void build(const std::string& folder) {
     write_split("train", r_.train, folder);
     write_split("validation", r_.validation, folder);
     write_split("test", r_.test, folder);
-    for (const CharacterRecipe& c : r_.characters)
-      cast_.bodies.push_back(make_character(c, model_, rows_, key_));
     for (const MotionRecipe& m : r_.motions) cast_.motions.push_back(test_clip(m.clip));
     write_pairs("naked", r_.naked, folder);
     write_pairs("clothed", r_.clothed, folder);
@@ -91,8 +91,8 @@ class Builder {
 
  private:
   const BodyRecipe& row(const std::string& id) const {
-    const auto at = std::find_if(rows_.begin(), rows_.end(),
-                                 [&](const BodyRecipe& r) { return r.id == id; });
+    const auto at =
+        std::find_if(rows_.begin(), rows_.end(), [&](const BodyRecipe& r) { return r.id == id; });
     if (at == rows_.end())
       throw InputError(where_, "bodies.csv has no body '" + id.substr(0, 40) + "'",
                        "name one such as '" + rows_.front().id + "'");
@@ -118,9 +118,9 @@ class Builder {
                              " and in " + split,
                          "keep a subject in one split");
     };
-    for (const auto& [split, lists] : {std::pair{"train", &r_.train},
-                                       std::pair{"validation", &r_.validation},
-                                       std::pair{"test", &r_.test}}) {
+    for (const auto& [split, lists] :
+         {std::pair{"train", &r_.train}, std::pair{"validation", &r_.validation},
+          std::pair{"test", &r_.test}}) {
       for (const std::string& id : lists->bodies) row(id);
       for (const std::string& id : lists->clips) subject(id, split);
     }
@@ -182,8 +182,8 @@ class Builder {
     out.body_b = index_of(r_.characters, target);
     out.motion = motion;
     out.first = static_cast<size_t>(m.first);
-    out.frames = m.frames > 0 ? static_cast<size_t>(m.frames)
-                              : cast_.motions[motion].frames() - out.first;
+    out.frames =
+        m.frames > 0 ? static_cast<size_t>(m.frames) : cast_.motions[motion].frames() - out.first;
     return out;
   }
 
@@ -201,9 +201,8 @@ class Builder {
         if (!p.motions.empty() &&
             std::find(p.motions.begin(), p.motions.end(), motion) == p.motions.end())
           continue;
-        write_sequence(
-            Performance(cast_, sequence(p.source, p.target, m), ScanConfig{}, r_.seed), info_,
-            made(folder + "/" + set, motion + "-" + p.source + "-" + p.target));
+        write_sequence(Performance(cast_, sequence(p.source, p.target, m), ScanConfig{}, r_.seed),
+                       info_, made(folder + "/" + set, motion + "-" + p.source + "-" + p.target));
       }
   }
 
@@ -251,6 +250,7 @@ BenchmarkSummary build_benchmark(const BenchmarkRecipe& recipe, const std::strin
   check_recipe(recipe, where);
   Builder builder(recipe, where, data);
   StagingFolder staging(out);
+  log_info("building " + out + " with seed " + std::to_string(recipe.seed));  // inputs are fine
   builder.build(staging.path());
   write_file_atomically(staging.path() + "/recipe.yaml", recipe_text);
   Manifest manifest;

@@ -15,18 +15,12 @@ BodyRecipe recipe_of(const CharacterRecipe& c, const std::vector<BodyRecipe>& ro
   BodyRecipe out;
   if (c.body.empty()) {
     const ShapeRecipe& s = c.shape;
-    out.values = {{"gender", s.gender},
-                  {"age", s.age},
-                  {"muscle", s.muscle},
-                  {"weight", s.weight},
-                  {"height", s.height},
-                  {"proportions", s.proportions},
-                  {"african", 1.0},
-                  {"asian", 1.0},
-                  {"caucasian", 1.0}};
+    out.values = {{"gender", s.gender}, {"age", s.age},       {"muscle", s.muscle},
+                  {"weight", s.weight}, {"height", s.height}, {"proportions", s.proportions},
+                  {"african", 1.0},     {"asian", 1.0},       {"caucasian", 1.0}};
   } else {
-    const auto row = std::find_if(rows.begin(), rows.end(),
-                                  [&](const BodyRecipe& r) { return r.id == c.body; });
+    const auto row =
+        std::find_if(rows.begin(), rows.end(), [&](const BodyRecipe& r) { return r.id == c.body; });
     if (row == rows.end())
       throw InputError("bodies.csv", "has no body '" + c.body.substr(0, 40) + "'",
                        "name one of its rows");

@@ -76,8 +76,7 @@ Motion on_floor(const Motion& motion, const Body& body, const std::vector<int32_
   raised.hips[0].y() += 1;
   const double scale = pose_on(raised, body, 0).root.y() - pose_on(motion, body, 0).root.y();
   Motion out = motion;
-  for (size_t f = 0; f < floor.size(); ++f)
-    out.hips[f].y() -= static_cast<float>(floor[f] / scale);
+  for (size_t f = 0; f < floor.size(); ++f) out.hips[f].y() -= static_cast<float>(floor[f] / scale);
   return out;
 }
 

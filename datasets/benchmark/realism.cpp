@@ -11,7 +11,7 @@
 namespace restage {
 namespace {
 
-constexpr double kPart = 0.35;     // of a bone's length: what counts as about a joint
+constexpr double kPart = 0.35;      // of a bone's length: what counts as about a joint
 constexpr double kTouching = 0.01;  // metres
 
 Vec3 corner(const Points& x, const Triangle& t, size_t k) {
@@ -152,9 +152,10 @@ void measure_feet(const std::vector<Body>& bodies, const std::vector<Motion>& mo
     }
   }
   for (const double p : {0.0, 0.01, 0.5, 0.99, 1.0}) out.lowest.push_back(percentile(lowest, p));
-  const auto near = std::count_if(lowest.begin(), lowest.end(),
-                                  [](double h) { return std::abs(h) <= 0.02; });
-  out.on_floor = static_cast<double>(near) / static_cast<double>(std::max<size_t>(1, lowest.size()));
+  const auto near =
+      std::count_if(lowest.begin(), lowest.end(), [](double h) { return std::abs(h) <= 0.02; });
+  out.on_floor =
+      static_cast<double>(near) / static_cast<double>(std::max<size_t>(1, lowest.size()));
   out.slipping = percentile(slipping, 0.5);
   out.frames = lowest.size();
 }
@@ -242,8 +243,7 @@ FootContact foot_contact(const Motion& motion, const Body& body,
   return out;
 }
 
-RealismReport measure_realism(const std::vector<Body>& bodies,
-                              const std::vector<Motion>& motions) {
+RealismReport measure_realism(const std::vector<Body>& bodies, const std::vector<Motion>& motions) {
   RealismReport out;
   out.bodies = bodies.size();
   out.motions = motions.size();

@@ -29,8 +29,9 @@ double buried_share(const Body& body, size_t step = 8, std::vector<std::string>*
 
 /// Heights and speeds of the lowest points of a motion on a body, metres.
 struct FootContact {
-  std::vector<double> lowest;    ///< per frame
-  std::vector<double> slipping;  ///< metres per second, of points that stay within 1 cm of the floor
+  std::vector<double> lowest;  ///< per frame
+  std::vector<double>
+      slipping;  ///< metres per second, of points that stay within 1 cm of the floor
 };
 FootContact foot_contact(const Motion& motion, const Body& body,
                          const std::vector<int32_t>& vertices);
@@ -38,14 +39,14 @@ FootContact foot_contact(const Motion& motion, const Body& body,
 struct RealismReport {
   size_t bodies = 0, motions = 0, frames = 0;
   BentVolume knee_mean, elbow_mean, knee_least, elbow_least;  ///< bent by 90 degrees
-  double joints_inside_rest = 0, joints_inside_posed = 0;  ///< shares; posed: one frame a clip
-  double buried = 0;                                       ///< mean over bodies
+  double joints_inside_rest = 0, joints_inside_posed = 0;     ///< shares; posed: one frame a clip
+  double buried = 0;                                          ///< mean over bodies
   /// Joints that were outside, and joints whose skin is buried: "name (count)", most first.
   std::vector<std::string> outside, buried_at;
   /// Lowest point over all bodies and frames: percentiles 0, 1, 50, 99, 100, metres.
   std::vector<double> lowest;
-  double on_floor = 0;   ///< share of frames whose lowest point is within 2 cm of the floor
-  double slipping = 0;   ///< median, metres per second
+  double on_floor = 0;  ///< share of frames whose lowest point is within 2 cm of the floor
+  double slipping = 0;  ///< median, metres per second
 };
 
 /// Feet on all bodies in all frames, joints of one frame of each motion, the rest on all bodies.

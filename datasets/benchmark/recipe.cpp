@@ -66,9 +66,9 @@ class Checker {
 
   void disjoint(const std::string& kind, std::vector<std::string> SplitRecipe::*list) const {
     std::map<std::string, std::string> split_of;
-    for (const auto& [split, names] : {std::pair{"train", &(r_.train.*list)},
-                                       std::pair{"validation", &(r_.validation.*list)},
-                                       std::pair{"test", &(r_.test.*list)}})
+    for (const auto& [split, names] :
+         {std::pair{"train", &(r_.train.*list)}, std::pair{"validation", &(r_.validation.*list)},
+          std::pair{"test", &(r_.test.*list)}})
       for (const std::string& name : *names)
         if (const auto [at, added] = split_of.emplace(name, split); !added)
           fail("the " + kind + " '" + name.substr(0, 40) + "' is in " + at->second + " and in " +
@@ -78,8 +78,8 @@ class Checker {
 
   void held_out(const std::string& kind, const std::string& name,
                 std::vector<std::string> SplitRecipe::*list) const {
-    for (const auto& [split, names] : {std::pair{"train", &(r_.train.*list)},
-                                       std::pair{"validation", &(r_.validation.*list)}})
+    for (const auto& [split, names] :
+         {std::pair{"train", &(r_.train.*list)}, std::pair{"validation", &(r_.validation.*list)}})
       if (!name.empty() && std::find(names->begin(), names->end(), name) != names->end())
         fail("the " + kind + " '" + name.substr(0, 40) + "' of a test set is in " + split,
              "take one that no model has seen");

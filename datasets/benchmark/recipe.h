@@ -23,7 +23,7 @@ struct ShapeRecipe {
 /// Someone who performs or is performed on: a row of bodies.csv or a shape of its own.
 struct CharacterRecipe {
   std::string id;
-  std::string body;     ///< row of bodies.csv; empty: `shape`
+  std::string body;  ///< row of bodies.csv; empty: `shape`
   ShapeRecipe shape;
   std::string garment;  ///< file of body/clothes; empty: naked
   double hair = 0;      ///< thickness, metres
@@ -44,12 +44,12 @@ struct PairRecipe {
 /// Cameras on a ring around the middle of the path.
 struct ScannerRecipe {
   std::string id;
-  int cameras = 1, pixels = 160;       ///< each of pixels x pixels
-  double margin = 2.4;                 ///< metres from the path's edge to the cameras
-  double azimuth = 0;                  ///< of the first camera, degrees from the front
-  std::vector<double> heights{1.1};    ///< of the cameras in turn, metres
-  double view = 50;                    ///< opening angle, degrees
-  double least_kept = 1;               ///< a frame keeps this share of its points or more
+  int cameras = 1, pixels = 160;     ///< each of pixels x pixels
+  double margin = 2.4;               ///< metres from the path's edge to the cameras
+  double azimuth = 0;                ///< of the first camera, degrees from the front
+  std::vector<double> heights{1.1};  ///< of the cameras in turn, metres
+  double view = 50;                  ///< opening angle, degrees
+  double least_kept = 1;             ///< a frame keeps this share of its points or more
   ScannerNoise noise;
 };
 

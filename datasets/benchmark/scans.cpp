@@ -114,8 +114,8 @@ SourceToWorld draw_frame(const RngKey& key) {
 }
 
 void write_scan_sequence(const Performance& performance, const ScannerRecipe& scanner,
-                 const ScanRecipe& recipe, const Body* intruder, const FileInfo& info,
-                 const RngKey& key, const std::string& folder) {
+                         const ScanRecipe& recipe, const Body* intruder, const FileInfo& info,
+                         const RngKey& key, const std::string& folder) {
   SourceToWorld frame = SourceToWorld::Identity();
   if (!recipe.known_frame) frame = draw_frame(key.fold("frame"));
   const ToSource to_source(frame);

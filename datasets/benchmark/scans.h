@@ -17,7 +17,7 @@ SourceToWorld draw_frame(const RngKey& key);
 /// Writes source.h5 (clouds, and A's joints, in the scanner's frame) and what write_truth() writes.
 /// `intruder` (may be null): whose left forearm reaches towards A.
 void write_scan_sequence(const Performance& performance, const ScannerRecipe& scanner,
-                 const ScanRecipe& recipe, const Body* intruder, const FileInfo& info,
-                 const RngKey& key, const std::string& folder);
+                         const ScanRecipe& recipe, const Body* intruder, const FileInfo& info,
+                         const RngKey& key, const std::string& folder);
 
 }  // namespace restage

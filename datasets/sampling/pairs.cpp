@@ -1,5 +1,7 @@
 #include "datasets/sampling/pairs.h"
 
+#include <algorithm>
+
 #include "autograd/base/error.h"
 #include "autograd/base/parallel.h"
 

@@ -73,10 +73,10 @@ void fill_triangle(const Vec3& a, const Vec3& b, const Vec3& c, int32_t face, De
     return std::pair{std::max(0, clamped(std::floor(low - 0.5))),
                      std::min(size - 1, clamped(std::ceil(high - 0.5)))};
   };
-  const auto [x0, x1] = range(std::min({a.x(), b.x(), c.x()}), std::max({a.x(), b.x(), c.x()}),
-                              map.width);
-  const auto [y0, y1] = range(std::min({a.y(), b.y(), c.y()}), std::max({a.y(), b.y(), c.y()}),
-                              map.height);
+  const auto [x0, x1] =
+      range(std::min({a.x(), b.x(), c.x()}), std::max({a.x(), b.x(), c.x()}), map.width);
+  const auto [y0, y1] =
+      range(std::min({a.y(), b.y(), c.y()}), std::max({a.y(), b.y(), c.y()}), map.height);
   for (int y = y0; y <= y1; ++y)
     for (int x = x0; x <= x1; ++x) {
       const double px = x + 0.5, py = y + 0.5;
@@ -149,8 +149,7 @@ void measure(const Mesh& surface, const View& view, const ScannerNoise& noise, c
       if (other > 0 && rng.uniform() < noise.mixed) depth += rng.uniform() * (other - depth);
       const double distance = depth * ray.norm();
       const double error = (noise.base + noise.growth * distance * distance) * rng.normal();
-      out.push_back(
-          (view.camera().eye + ray * (depth * (1 + error / distance))).cast<float>());
+      out.push_back((view.camera().eye + ray * (depth * (1 + error / distance))).cast<float>());
     }
 }
 

@@ -18,13 +18,13 @@ struct DepthCamera {
 
 /// Errors of a depth camera, as structured-light and time-of-flight sensors have them.
 struct ScannerNoise {
-  double base = 0.001;     ///< standard deviation along the ray at distance 0, metres
-  double growth = 0.0015;  ///< grows by this times the squared distance
-  double dropout = 0.02;   ///< pixels without answer
-  double grazing = 0.25;   ///< surfaces seen flatter than this cosine answer ever more rarely
-  double mixed = 0.3;      ///< share of pixels at outlines that mix front and back
-  double edge = 0.05;      ///< a step in depth from here on is an outline, metres
-  double behind = 0.3;     ///< what an outline mixes with where nothing stands behind it, metres
+  double base = 0.001;      ///< standard deviation along the ray at distance 0, metres
+  double growth = 0.0015;   ///< grows by this times the squared distance
+  double dropout = 0.02;    ///< pixels without answer
+  double grazing = 0.25;    ///< surfaces seen flatter than this cosine answer ever more rarely
+  double mixed = 0.3;       ///< share of pixels at outlines that mix front and back
+  double edge = 0.05;       ///< a step in depth from here on is an outline, metres
+  double behind = 0.3;      ///< what an outline mixes with where nothing stands behind it, metres
   double outliers = 0.002;  ///< points anywhere about the subject, as a share of the others
 };
 

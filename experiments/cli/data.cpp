@@ -115,6 +115,7 @@ void add_file_command(Program& program, CLI::App& group, const std::string& name
 void add_data(Program& program) {
   CLI::App& group = program.add_group("data", "make, import and check data files");
   add_data_build(program, group);
+  add_data_fetch(program, group);
   add_import(program, group);
   add_data_perform(program, group);
   add_data_sheet(program, group);

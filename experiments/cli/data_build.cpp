@@ -95,9 +95,8 @@ int build_recipe(const BuildOptions& options, const Common& common) {
   const Request request = read_request(options, common);
   BenchmarkRecipe recipe;
   load_config(request.recipe, request.overrides, recipe);
-  log_info("building " + request.out + " with seed " + std::to_string(recipe.seed));
-  const BenchmarkSummary done = build_benchmark(recipe, resolved_yaml(recipe), request.recipe,
-                                                request.data, request.out);
+  const BenchmarkSummary done =
+      build_benchmark(recipe, resolved_yaml(recipe), request.recipe, request.data, request.out);
   if (common.json)
     print_json({{"out", request.out},
                 {"files", done.files},

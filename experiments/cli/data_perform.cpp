@@ -52,8 +52,8 @@ int run_perform(const PerformOptions& o, const Common& common) {
   if (common.json) {
     print_json({{"out", o.out}, {"frames", s.frames}, {"seed", common.seed}});
   } else {
-    print("wrote " + o.out + "/{source.h5,target.ply,rest.h5,truth.h5}: " + std::to_string(s.frames) +
-          " frames (seed " + std::to_string(common.seed) + ")\n");
+    print("wrote " + o.out + "/{source.h5,target.ply,rest.h5,truth.h5}: " +
+          std::to_string(s.frames) + " frames (seed " + std::to_string(common.seed) + ")\n");
   }
   return 0;
 }
@@ -74,7 +74,8 @@ void add_data_perform(Program& program, CLI::App& group) {
   app.add_option("--target", o->target, "whose answer is written (default: the same body)");
   app.add_option("--first", o->first, "first frame");
   app.add_option("--frames", o->frames, "how many (default: to the end)");
-  app.add_option("--out", o->out, "folder for source.h5, target.ply, rest.h5 and truth.h5")->required();
+  app.add_option("--out", o->out, "folder for source.h5, target.ply, rest.h5 and truth.h5")
+      ->required();
 }
 
 }  // namespace restage::cli

@@ -48,8 +48,8 @@ Json to_json(const RealismReport& r) {
 
 std::string to_text(const RealismReport& r) {
   const auto volume = [](const BentVolume& mean, const BentVolume& least) {
-    return percent(mean.ours) + ", least " + percent(least.ours) + " (linear blending: " +
-           percent(mean.linear) + ", least " + percent(least.linear) + ")";
+    return percent(mean.ours) + ", least " + percent(least.ours) +
+           " (linear blending: " + percent(mean.linear) + ", least " + percent(least.linear) + ")";
   };
   std::string out =
       std::to_string(r.bodies) + " bodies, " + std::to_string(r.motions) + " motions\n" +
@@ -59,7 +59,8 @@ std::string to_text(const RealismReport& r) {
   if (r.frames > 0)
     out += "joints inside the body, posed    " + percent(r.joints_inside_posed) + "\n";
   out += "joints found outside             " + listed(r.outside) + "\n" +
-         "skin inside other parts at rest  " + percent(r.buried) + ", at: " + listed(r.buried_at) + "\n";
+         "skin inside other parts at rest  " + percent(r.buried) + ", at: " + listed(r.buried_at) +
+         "\n";
   if (r.frames > 0)
     out += "lowest point, of " + std::to_string(r.frames) + " frames: least " +
            centimetres(r.lowest[0]) + ", 1 % below " + centimetres(r.lowest[1]) + ", median " +
@@ -73,7 +74,8 @@ std::string to_text(const RealismReport& r) {
 int run_realism(const std::string& file, const Common& common) {
   const std::string kind = inspect(file).kind;
   if (kind != "bodies" && kind != "dataset")
-    throw InputError(file, "holds no bodies", "give a data file with bodies, and best with motions");
+    throw InputError(file, "holds no bodies",
+                     "give a data file with bodies, and best with motions");
   const RealismReport report = measure_realism(
       read_bodies(file), kind == "dataset" ? read_motions(file) : std::vector<Motion>{});
   if (common.json)
@@ -87,10 +89,10 @@ int run_realism(const std::string& file, const Common& common) {
 
 void add_data_realism(Program& program, CLI::App& group) {
   const auto file = std::make_shared<std::string>();
-  CLI::App& app = program.add(
-      group, "realism", "volume at bent joints, joints inside the body, feet on the floor",
-      "restage data realism benchmark/test.h5",
-      [file, &program] { return run_realism(*file, program.common()); });
+  CLI::App& app = program.add(group, "realism",
+                              "volume at bent joints, joints inside the body, feet on the floor",
+                              "restage data realism benchmark/test.h5",
+                              [file, &program] { return run_realism(*file, program.common()); });
   app.add_option("FILE", *file, "data file with bodies and motions (HDF5)")->required();
 }
 

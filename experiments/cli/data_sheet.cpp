@@ -22,15 +22,18 @@ struct SheetArguments {
 };
 
 Figure posed(const Body& body, const Motion& motion, size_t frame) {
-  return {motion.id + " " + body.id, {pose_surface(body, pose_on(motion, body, frame)),
-          body.rest.faces}, kTarget, 0};
+  return {motion.id + " " + body.id,
+          {pose_surface(body, pose_on(motion, body, frame)), body.rest.faces},
+          kTarget,
+          0};
 }
 
 /// Bodies in T-pose; then the middle of every motion, bodies in turn.
 std::vector<Figure> figures_of_file(const std::string& file) {
   const std::string kind = inspect(file).kind;
   if (kind != "bodies" && kind != "dataset")
-    throw InputError(file, "holds no bodies", "give a data file with bodies, or a benchmark folder");
+    throw InputError(file, "holds no bodies",
+                     "give a data file with bodies, or a benchmark folder");
   const std::vector<Body> bodies = read_bodies(file);
   std::vector<Figure> out;
   for (const Body& body : bodies) out.push_back({body.id, body.rest, kSource, 0});
@@ -89,8 +92,7 @@ std::vector<Figure> figures_of_folder(const std::string& folder) {
 }
 
 int run_sheet(const SheetArguments& a, const Common& common) {
-  if (!a.out.ends_with(".png"))
-    throw InputError(a.out, "names no picture", "end --out in .png");
+  if (!a.out.ends_with(".png")) throw InputError(a.out, "names no picture", "end --out in .png");
   if (a.columns < 1 || a.columns > 64)
     throw InputError("", "--columns " + std::to_string(a.columns) + " is out of range",
                      "give a number from 1 to 64");
@@ -111,11 +113,11 @@ int run_sheet(const SheetArguments& a, const Common& common) {
 
 void add_data_sheet(Program& program, CLI::App& group) {
   const auto a = std::make_shared<SheetArguments>();
-  CLI::App& app = program.add(
-      group, "sheet", "draw all bodies and motions of a file, or all sequences of a folder",
-      "restage data sheet benchmark/test.h5 --out test.png\n"
-      "restage data sheet benchmark/scans --out scans.png",
-      [a, &program] { return run_sheet(*a, program.common()); });
+  CLI::App& app = program.add(group, "sheet",
+                              "draw all bodies and motions of a file, or all sequences of a folder",
+                              "restage data sheet benchmark/test.h5 --out test.png\n"
+                              "restage data sheet benchmark/scans --out scans.png",
+                              [a, &program] { return run_sheet(*a, program.common()); });
   app.add_option("INPUT", a->input, "data file with bodies (HDF5), or naked/, clothed/ or scans/")
       ->required();
   app.add_option("--out", a->out, "sheet.png")->required();

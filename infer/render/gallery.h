@@ -19,10 +19,10 @@ struct Figure {
 
 struct GalleryOptions {
   int columns = 11, cell_width = 132, cell_height = 138;  ///< pixels
-  double height = 2.15;      ///< metres that a cell shows
-  double azimuth = 28;       ///< degrees from the front towards the body's left
+  double height = 2.15;                                   ///< metres that a cell shows
+  double azimuth = 28;  ///< degrees from the front towards the body's left
   double elevation = 8;
-  std::string title;         ///< one line at the top; empty: none
+  std::string title;  ///< one line at the top; empty: none
 };
 
 /// InputError if there are no figures.
