@@ -15,6 +15,13 @@ std::span<const float> as_floats(const Points& points) {
   return {floats(points), points.size() * 3};
 }
 
+std::array<float, kJoints * 3> flat_joints(const Joints& joints) {
+  std::array<float, kJoints * 3> flat;
+  for (size_t i = 0; i < flat.size(); ++i)
+    flat[i] = static_cast<float>(joints[i / 3][static_cast<int>(i % 3)]);
+  return flat;
+}
+
 /// [0, end] where the file has no offsets of its own.
 std::vector<int64_t> sequence_offsets(const h5::File& file, int64_t frames) {
   if (!file.has("/sequence_offset")) return {0, frames};
@@ -137,12 +144,27 @@ void ScanWriter::append(const Points& cloud) {
   frame_offset_.push_back(frame_offset_.back() + static_cast<int64_t>(cloud.size()));
 }
 
+void ScanWriter::append(const Points& cloud, const Joints& joints) {
+  if (!joints_ && frame_offset_.size() > 1)
+    throw ShapeError("scan writer: joints for some frames only");
+  if (!joints_) joints_ = file_.create_appendable<float>("/joints", {kJoints, 3});
+  joints_->append<float>(flat_joints(joints));
+  append(cloud);
+}
+
+void ScanWriter::set_foreign_frame() {
+  file_.set_text("/", "units", "unknown");
+  file_.set_text("/", "up", "unknown");
+}
+
 void ScanWriter::end_sequence() {
   const int64_t frames = static_cast<int64_t>(frame_offset_.size()) - 1;
   if (sequence_offset_.back() != frames) sequence_offset_.push_back(frames);
 }
 
 void ScanWriter::commit() {
+  if (joints_ && joints_->rows() + 1 != static_cast<int64_t>(frame_offset_.size()))
+    throw ShapeError("scan writer: joints for some frames only");
   file_.write<int64_t>("/frame_offset", {static_cast<int64_t>(frame_offset_.size())},
                        frame_offset_);
   write_sequence_offset(file_, sequence_offset_, static_cast<int64_t>(frame_offset_.size()) - 1);
@@ -212,11 +234,15 @@ void PredictionWriter::append(const Joints& joints, const Points& vertices) {
   if (static_cast<int64_t>(vertices.size()) != vertex_count_)
     throw ShapeError("prediction writer: " + std::to_string(vertices.size()) +
                      " vertices instead of " + std::to_string(vertex_count_));
-  std::array<float, kJoints * 3> flat;
-  for (size_t i = 0; i < flat.size(); ++i)
-    flat[i] = static_cast<float>(joints[i / 3][static_cast<int>(i % 3)]);
-  joints_.append<float>(flat);
+  joints_.append<float>(flat_joints(joints));
   if (vertices_) vertices_->append<float>(as_floats(vertices));
+}
+
+void PredictionWriter::set_source_to_world(const Eigen::Matrix<double, 3, 4>& transform) {
+  std::vector<double> rows;
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 4; ++c) rows.push_back(transform(r, c));
+  file_.write<double>("/source_to_world", {3, 4}, rows);
 }
 
 void PredictionWriter::end_sequence() {

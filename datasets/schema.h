@@ -72,12 +72,17 @@ class ScanWriter {
  public:
   ScanWriter(const std::string& path, const FileInfo& info, double fps = kFps);
   void append(const Points& cloud);
+  /// The same with the true joints of who was scanned: for all frames of a file, or for none.
+  void append(const Points& cloud, const Joints& joints);
+  /// Says that units and axes of the points are not the project's.
+  void set_foreign_frame();
   void end_sequence();  ///< the next cloud starts another sequence; the last one ends by itself
   void commit();
 
  private:
   h5::File file_;
   h5::Dataset points_;
+  std::optional<h5::Dataset> joints_;
   std::vector<int64_t> frame_offset_{0}, sequence_offset_{0};
 };
 
@@ -105,6 +110,9 @@ class PredictionWriter {
   PredictionWriter(const std::string& path, int64_t vertex_count,
                    const std::vector<Triangle>& faces, const FileInfo& info, double fps = kFps);
   void append(const Joints& joints, const Points& vertices);
+  /// How the source's scans relate to the world: world = A p + b, rows of [A | b]. Written as
+  /// /source_to_world [3,4].
+  void set_source_to_world(const Eigen::Matrix<double, 3, 4>& transform);
   void end_sequence();  ///< the next frame starts another sequence; the last one ends by itself
   void commit();        ///< before this nothing is under `path`
 

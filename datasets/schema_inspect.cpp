@@ -107,6 +107,13 @@ void verify_members(const h5::File& file, std::vector<std::string>& problems) {
       collect(problems, [&] { check_split(file, "/motions/" + id, read_motion(file, id).split); });
 }
 
+void verify_scans(const h5::File& file) {
+  const int64_t frames = read_scans(file.path()).frames();
+  if (!file.has("/joints")) return;
+  const h5::Dataset joints = file.dataset("/joints", {frames, kJoints, 3});
+  check_finite(joints.where(), joints.read<double>(), kJoints * 3);
+}
+
 }  // namespace
 
 double read_fps(const h5::File& file) {
@@ -141,12 +148,14 @@ std::vector<std::string> verify(const std::string& path) {
   std::vector<std::string> problems;
   collect(problems, [&] {
     const std::string units = file.text("/", "units").value_or("metres");
-    if (units != "metres") throw InputError(path, "is in '" + units + "'", "convert it to metres");
+    const bool scanned = kind == "scans" && units == "unknown";  // a scanner's own frame
+    if (units != "metres" && !scanned)
+      throw InputError(path, "is in '" + units + "'", "convert it to metres");
   });
   collect(problems, [&] { read_fps(file); });
-  if (kind == "scans")
-    collect(problems, [&] { read_scans(path); });
-  else if (kind == "prediction")
+  if (kind == "scans") {
+    collect(problems, [&] { verify_scans(file); });
+  } else if (kind == "prediction")
     collect(problems, [&] { read_prediction(path); });
   else
     collect(problems, [&] { verify_members(file, problems); });

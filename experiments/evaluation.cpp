@@ -1,7 +1,5 @@
 #include "experiments/evaluation.h"
 
-#include "datasets/readers/mesh_io.h"
-#include "datasets/schema.h"
 #include "nn/geometry/closed_form.h"
 
 namespace restage {
@@ -116,23 +114,6 @@ SystemEvaluation evaluate_system(const ModelSet& models, const Corpus& corpus,
     for (auto& reference : scores->references) finish(&reference.second);
   }
   return out;
-}
-
-void write_sequence(const Corpus& corpus, const EvalSequence& sequence, uint64_t seed,
-                    const std::string& folder) {
-  const Performance performance(corpus, sequence, ScanConfig{}, seed);
-  const FileInfo info{corpus.license, corpus.description};
-  ScanWriter scans(folder + "/source.h5", info);
-  PredictionWriter truth(folder + "/truth.h5",
-                         static_cast<int64_t>(performance.target().rest.vertices.size()),
-                         performance.target().rest.faces, info);
-  for (size_t i = 0; i < performance.frames(); ++i) {
-    scans.append(performance.cloud(i));
-    truth.append(performance.joints_b(i), performance.vertices_b(i));
-  }
-  scans.commit();
-  truth.commit();
-  write_ply(folder + "/target.ply", performance.target().rest);
 }
 
 }  // namespace restage

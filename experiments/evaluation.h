@@ -28,8 +28,4 @@ struct SystemEvaluation {
 SystemEvaluation evaluate_system(const ModelSet& models, const Corpus& corpus,
                                  const std::vector<EvalSequence>& list, uint64_t seed);
 
-/// Writes one sequence as files into an existing folder: source.h5 (scans), target.ply, truth.h5.
-void write_sequence(const Corpus& corpus, const EvalSequence& sequence, uint64_t seed,
-                    const std::string& folder);
-
 }  // namespace restage

@@ -41,6 +41,33 @@ void blend(SkinnedSurface& surface, const Joints& rest, const PosedSkeleton& pos
   }
 }
 
+double lowest(const SkinnedSurface& surface) {
+  double floor = surface.vertices.at(0).y();
+  for (const Vec3& x : surface.vertices) floor = std::min(floor, x.y());
+  return floor;
+}
+
+/// Adds the quads of `skin` that touch no hidden vertex, with the vertices they need.
+void append_bare(const SkinnedSurface& skin, const std::vector<uint8_t>& hidden,
+                 SkinnedSurface& out) {
+  std::vector<int32_t> moved(skin.vertices.size(), -1);
+  for (std::array<int32_t, 4> quad : skin.quads) {
+    bool bare = true;
+    for (const int32_t v : quad) bare = bare && hidden[static_cast<size_t>(v)] == 0;
+    if (!bare) continue;
+    for (int32_t& v : quad) {
+      const auto old = static_cast<size_t>(v);
+      if (moved[old] < 0) {
+        moved[old] = static_cast<int32_t>(out.vertices.size());
+        out.vertices.push_back(skin.vertices[old]);
+        out.weights.push_back(skin.weights[old]);
+      }
+      v = moved[old];
+    }
+    out.quads.push_back(quad);
+  }
+}
+
 /// From decimetres to a Body in metres that stands on y = 0: all first halves of the quads, then
 /// all second halves, without degenerate triangles.
 Body to_body(const SkinnedSurface& surface, const Joints& joints, double floor) {
@@ -205,29 +232,50 @@ SkinnedSurface MakeHuman::skin_of(const std::vector<Vec3>& vertices) const {
           std::vector<JointWeights>(weights_.begin(), weights_.begin() + skin), quads_};
 }
 
-Body MakeHuman::build(const BodyRecipe& recipe, const std::string& garment) const {
+std::vector<Vec3> MakeHuman::shaped(const BodyRecipe& recipe, Joints& joints) const {
   for (const auto& [name, value] : recipe.values)
     if (name.find('/') != std::string::npos && value != 0.0 &&
         targets_.count(name + (value > 0 ? "-incr" : "-decr")) == 0)
       throw InputError(path_, "has no target for the slider " + name, "correct the column's name");
-  const std::vector<Vec3> vertices = shape(recipe_targets(recipe));
-  Joints joints;
+  std::vector<Vec3> vertices = shape(recipe_targets(recipe));
   for (int j = 0; j < kJoints; ++j) joints[j] = bone_head(vertices, bone_index(kBones[j]));
+  return vertices;
+}
+
+PosedSkeleton MakeHuman::t_pose(const std::vector<Vec3>& vertices, const Joints& joints) const {
   Pose pose;
   pose.local = to_local(t_pose_rotations(vertices, joints));
   pose.root = joints[0];
-  const PosedSkeleton posed = forward_kinematics(joints, pose);
+  return forward_kinematics(joints, pose);
+}
 
+Body MakeHuman::build(const BodyRecipe& recipe, const std::string& garment) const {
+  Joints joints;
+  const std::vector<Vec3> vertices = shaped(recipe, joints);
+  const PosedSkeleton posed = t_pose(vertices, joints);
   SkinnedSurface surface = skin_of(vertices);
   blend(surface, joints, posed);
-  double floor = surface.vertices[0].y();
-  for (const Vec3& x : surface.vertices) floor = std::min(floor, x.y());
+  const double floor = lowest(surface);
   if (!garment.empty()) {
     surface = fit_garment(vertices, garment);
     blend(surface, joints, posed);
   }
   Body body = to_body(surface, posed.joints, floor);
   body.id = garment.empty() ? recipe.id : recipe.id + "_" + garment;
+  body.split = recipe.split;
+  return body;
+}
+
+Body MakeHuman::dress(const BodyRecipe& recipe, const std::string& garment) const {
+  Joints joints;
+  const std::vector<Vec3> vertices = shaped(recipe, joints);
+  std::vector<uint8_t> hidden;
+  SkinnedSurface surface = fit_garment(vertices, garment, &hidden);
+  append_bare(skin_of(vertices), hidden, surface);
+  const PosedSkeleton posed = t_pose(vertices, joints);
+  blend(surface, joints, posed);
+  Body body = to_body(surface, posed.joints, lowest(surface));
+  body.id = recipe.id;
   body.split = recipe.split;
   return body;
 }

@@ -47,6 +47,9 @@ class MakeHuman {
   /// garment (a file of clothes/, without ending) its surface instead, fitted to and skinned like
   /// the body; joints and floor stay the body's. InputError: unknown slider target or garment.
   Body build(const BodyRecipe& recipe, const std::string& garment = "") const;
+  /// A dressed character: the garment and the skin that it leaves bare (head, hands, feet ...), as
+  /// one surface with its lowest vertex at y = 0; vertices of covered skin are left out.
+  Body dress(const BodyRecipe& recipe, const std::string& garment) const;
 
  private:
   struct Target {
@@ -59,7 +62,12 @@ class MakeHuman {
   Vec3 bone_head(const std::vector<Vec3>& vertices, size_t bone) const;
   size_t bone_index(const std::string& name) const;
   Rotations t_pose_rotations(const std::vector<Vec3>& vertices, const Joints& joints) const;
-  SkinnedSurface fit_garment(const std::vector<Vec3>& vertices, const std::string& name) const;
+  /// Shaped vertices and joints of a recipe, in the rest A-pose.
+  std::vector<Vec3> shaped(const BodyRecipe& recipe, Joints& joints) const;
+  PosedSkeleton t_pose(const std::vector<Vec3>& vertices, const Joints& joints) const;
+  /// `hidden` (may be null): per vertex of the body, whether the garment covers it.
+  SkinnedSurface fit_garment(const std::vector<Vec3>& vertices, const std::string& name,
+                             std::vector<uint8_t>* hidden = nullptr) const;
   SkinnedSurface skin_of(const std::vector<Vec3>& vertices) const;
 
   std::string folder_, path_;

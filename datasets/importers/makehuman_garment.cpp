@@ -92,7 +92,19 @@ struct Binding {
 struct Bindings {
   std::vector<Binding> rows;
   Vec3 scale = Vec3::Ones();
+  std::vector<uint8_t> hidden;  ///< per vertex of the body: the garment covers it
 };
+
+/// A line of delete_verts: "12 - 40 44 50 - 51", ranges with both ends.
+void add_hidden(const std::vector<std::string>& words, const std::string& where, Bindings& out) {
+  for (size_t i = 0; i < words.size(); ++i) {
+    const auto first = static_cast<size_t>(index_of(words[i], 0, out.hidden.size(), where));
+    size_t last = first;
+    if (i + 2 < words.size() && words[i + 1] == "-")
+      last = static_cast<size_t>(index_of(words[i += 2], 0, out.hidden.size(), where));
+    for (size_t v = first; v <= last; ++v) out.hidden[v] = 1;
+  }
+}
 
 Binding binding_of(const std::vector<std::string>& words, size_t limit, const std::string& where) {
   const auto vertex = [&](size_t i) {
@@ -107,7 +119,8 @@ Binding binding_of(const std::vector<std::string>& words, size_t limit, const st
 
 Bindings read_bindings(const std::string& path, const std::vector<Vec3>& body) {
   Bindings out;
-  bool on = false;
+  out.hidden.assign(body.size(), 0);
+  enum { elsewhere, in_verts, in_hidden } part = elsewhere;
   each_line(read_gz(path), path,
             [&](const std::vector<std::string>& words, const std::string& where) {
               const bool numeric = words[0].find_first_not_of("0123456789") == std::string::npos;
@@ -123,11 +136,15 @@ Bindings read_bindings(const std::string& path, const std::vector<Vec3>& body) {
                   throw InputError(where, "scales by zero", "fetch the garment again");
                 out.scale[k] = std::abs(body[a][k] - body[b][k]) / base;
               } else if (words[0] == "verts") {
-                on = true;
-              } else if (on && numeric && (words.size() == 1 || words.size() == 9)) {
+                part = in_verts;
+              } else if (words[0] == "delete_verts") {
+                part = in_hidden;
+              } else if (part == in_verts && numeric && (words.size() == 1 || words.size() == 9)) {
                 out.rows.push_back(binding_of(words, body.size(), where));
-              } else if (on && !numeric && words[0][0] != '-') {
-                on = false;
+              } else if (part == in_hidden && numeric) {
+                add_hidden(words, where, out);
+              } else if (!numeric && words[0][0] != '-') {
+                part = elsewhere;
               }
             });
   if (out.rows.empty()) throw InputError(path, "binds no vertices", "fetch the garment again");
@@ -136,13 +153,14 @@ Bindings read_bindings(const std::string& path, const std::vector<Vec3>& body) {
 
 }  // namespace
 
-SkinnedSurface MakeHuman::fit_garment(const std::vector<Vec3>& body,
-                                      const std::string& name) const {
+SkinnedSurface MakeHuman::fit_garment(const std::vector<Vec3>& body, const std::string& name,
+                                      std::vector<uint8_t>* hidden) const {
   if (name.find('/') != std::string::npos || name.find("..") != std::string::npos)
     throw InputError(name.substr(0, 60), "is no garment's name",
                      "name a file of the clothes folder");
   const std::string stem = folder_ + "/clothes/" + name;
   const Bindings bindings = read_bindings(stem + ".mhclo.gz", body);
+  if (hidden) *hidden = bindings.hidden;
   SkinnedSurface out;
   for (const Binding& b : bindings.rows) {
     Vec3 x = b.offset.cwiseProduct(bindings.scale);

@@ -25,6 +25,7 @@ CloudConfig checked(const CloudConfig& c) {
   check(c.tpose_share >= 0 && c.tpose_share <= 1, "tpose_share", "0 to 1");
   check(c.tpose_heading >= 0 && c.tpose_heading <= 180, "tpose_heading", "0 to 180 degrees");
   check(c.scale_jitter >= 0 && c.scale_jitter < 1, "scale_jitter", "0 to below 1");
+  check(c.frame_step >= 1, "frame_step", "1 or more");
   check(c.min_fraction > 0 && c.min_fraction <= 1, "min_fraction", "above 0 to 1");
   return c;
 }
@@ -56,7 +57,7 @@ CloudSampler::CloudSampler(const Corpus& corpus, const CloudConfig& config, uint
     : corpus_(corpus),
       config_(checked(config)),
       key_(RngKey{seed, 0}.fold("clouds")),
-      frames_(corpus.motions),
+      frames_(corpus.motions, 1, static_cast<size_t>(config_.frame_step)),
       surfaces_(surface_samplers(corpus.bodies)) {
   if (surfaces_.empty()) throw InputError("", "no bodies to draw clouds from", "add bodies");
 }

@@ -19,6 +19,7 @@ struct CloudConfig {
   double scale_jitter = 0;    ///< bodies are scaled by 1 +- this
   double min_fraction = 1.0;  ///< below 1: as few as this part of the points are distinct, others
                               ///< repeat them, as in a scan with too few points
+  int frame_step = 1;         ///< only every so many frames of a motion; 30: one per second
   bool skin_weights = false;  ///< also fill CloudBatch::weights
 };
 

@@ -6,13 +6,14 @@
 
 namespace restage {
 
-FrameIndex::FrameIndex(const std::vector<Motion>& motions, size_t window) {
+FrameIndex::FrameIndex(const std::vector<Motion>& motions, size_t window, size_t step)
+    : step_(std::max<size_t>(1, step)) {
   uint64_t sum = 0;
   size_t longest = 0;
   for (size_t m = 0; m < motions.size(); ++m) {
     longest = std::max(longest, motions[m].frames());
     if (window == 0 || motions[m].frames() < window) continue;
-    sum += motions[m].frames() - window + 1;
+    sum += (motions[m].frames() - window) / step_ + 1;
     motion_.push_back(m);
     ends_.push_back(sum);
   }
@@ -29,7 +30,7 @@ FrameRef FrameIndex::at(uint64_t i) const {
   if (end == ends_.end())
     throw ShapeError("FrameIndex: place " + std::to_string(i) + " of " + std::to_string(count()));
   const auto k = static_cast<size_t>(end - ends_.begin());
-  return {motion_[k], static_cast<size_t>(i - (k > 0 ? ends_[k - 1] : 0))};
+  return {motion_[k], step_ * static_cast<size_t>(i - (k > 0 ? ends_[k - 1] : 0))};
 }
 
 }  // namespace restage

@@ -11,11 +11,12 @@ struct FrameRef {
   size_t motion = 0, frame = 0;
 };
 
-/// All places where `window` consecutive frames of one motion begin.
+/// All places where `window` consecutive frames of one motion begin; with a `step`, only every
+/// step-th from each motion's first (30: one frame per second of motion, as the paper samples).
 class FrameIndex {
  public:
   /// InputError if there is none.
-  explicit FrameIndex(const std::vector<Motion>& motions, size_t window = 1);
+  explicit FrameIndex(const std::vector<Motion>& motions, size_t window = 1, size_t step = 1);
   uint64_t count() const { return ends_.back(); }
   /// Place number `i` < count().
   FrameRef at(uint64_t i) const;
@@ -28,6 +29,7 @@ class FrameIndex {
  private:
   std::vector<size_t> motion_;  // the motions that are long enough
   std::vector<uint64_t> ends_;
+  size_t step_;
 };
 
 }  // namespace restage

@@ -1,5 +1,7 @@
 #include "datasets/sampling/pairs.h"
 
+#include <algorithm>
+
 #include "autograd/base/error.h"
 #include "autograd/base/parallel.h"
 
@@ -19,11 +21,13 @@ PairSampler::PairSampler(const Corpus& corpus, const PairConfig& config, uint64_
     : corpus_(corpus),
       config_(config),
       key_(RngKey{seed, 0}.fold("pairs")),
-      frames_(corpus.motions),
+      frames_(corpus.motions, 1, static_cast<size_t>(std::max(1, config.frame_step))),
       surfaces_(surface_samplers(corpus.bodies)) {
   if (surfaces_.empty()) throw InputError("", "no bodies to draw pairs from", "add bodies");
   if (config_.points < 1 || config_.points > 1 << 20)
     throw InputError("", "pair setting 'points' is out of range", "use 1 to 1048576");
+  if (config_.frame_step < 1)
+    throw InputError("", "pair setting 'frame_step' is out of range", "use 1 or more");
 }
 
 PairBatch PairSampler::make(int64_t n) const {

@@ -13,6 +13,7 @@ struct PairConfig {
   int points = 1024;
   bool heading = true;  ///< turn the pose by any angle about y
   bool mirror = false;  ///< every second sample is a mirror image
+  int frame_step = 1;   ///< only every so many frames of a motion; 30: one per second
 };
 
 /// float32, metres.

@@ -7,10 +7,14 @@
 namespace restage::cli {
 
 void add_data(Program& program);
-void add_data_import(Program& program, CLI::App& group);   // of `data`
-void add_data_inspect(Program& program, CLI::App& group);  // of `data`
-void add_data_merge(Program& program, CLI::App& group);    // of `data`
-void add_data_perform(Program& program, CLI::App& group);  // of `data`
+void add_data_build(Program& program, CLI::App& group);    // of `data`, as all add_data_*
+void add_data_fetch(Program& program, CLI::App& group);
+void add_data_import(Program& program, CLI::App& group);
+void add_data_inspect(Program& program, CLI::App& group);
+void add_data_merge(Program& program, CLI::App& group);
+void add_data_perform(Program& program, CLI::App& group);
+void add_data_realism(Program& program, CLI::App& group);
+void add_data_sheet(Program& program, CLI::App& group);
 void add_doctor(Program& program);
 void add_eval(Program& program);
 void add_info(Program& program);

@@ -2,10 +2,11 @@
 #include <filesystem>
 #include <memory>
 
+#include "autograd/base/error.h"
+#include "datasets/benchmark/sequence.h"
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
-#include "experiments/evaluation.h"
 
 namespace restage::cli {
 namespace {
@@ -46,12 +47,13 @@ int run_perform(const PerformOptions& o, const Common& common) {
   std::error_code failed;
   std::filesystem::create_directories(o.out, failed);
   if (failed) throw InputError(o.out, "cannot be made a folder", "give a place you can write to");
-  write_sequence(corpus, s, common.seed, o.out);
+  write_sequence(Performance(corpus, s, ScanConfig{}, common.seed),
+                 {corpus.license, corpus.description}, o.out);
   if (common.json) {
     print_json({{"out", o.out}, {"frames", s.frames}, {"seed", common.seed}});
   } else {
-    print("wrote " + o.out + "/{source.h5,target.ply,truth.h5}: " + std::to_string(s.frames) +
-          " frames (seed " + std::to_string(common.seed) + ")\n");
+    print("wrote " + o.out + "/{source.h5,target.ply,rest.h5,truth.h5}: " +
+          std::to_string(s.frames) + " frames (seed " + std::to_string(common.seed) + ")\n");
   }
   return 0;
 }
@@ -72,7 +74,8 @@ void add_data_perform(Program& program, CLI::App& group) {
   app.add_option("--target", o->target, "whose answer is written (default: the same body)");
   app.add_option("--first", o->first, "first frame");
   app.add_option("--frames", o->frames, "how many (default: to the end)");
-  app.add_option("--out", o->out, "folder for source.h5, target.ply and truth.h5")->required();
+  app.add_option("--out", o->out, "folder for source.h5, target.ply, rest.h5 and truth.h5")
+      ->required();
 }
 
 }  // namespace restage::cli

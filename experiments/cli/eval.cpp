@@ -4,6 +4,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "datasets/benchmark/sequence.h"
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/eval_report.h"
@@ -216,7 +217,8 @@ int run_eval_run(const EvalOptions& options, const Common& common) {
   if (!options.out.empty()) {
     std::filesystem::create_directories(options.out);
     write_file_atomically(options.out + "/metrics.md", text);
-    write_sequence(test, list[0], common.seed, options.out);
+    write_sequence(Performance(test, list[0], ScanConfig{}, common.seed),
+                   {test.license, test.description}, options.out);
   }
   if (!common.json) {
     print(text);

@@ -73,6 +73,8 @@ void visit(V& v, CloudConfig& c) {
   v("tpose_heading", c.tpose_heading, "rest poses turn by up to this, degrees", between(0, 180));
   v("scale_jitter", c.scale_jitter, "bodies scaled by 1 +- this", below(0, 1));
   v("min_fraction", c.min_fraction, "least part of distinct points", between(0.05, 1));
+  v("frame_step", c.frame_step, "only every so many frames of a motion (30: one a second)",
+    between(1, 100000));
 }
 
 struct SkeletonStageConfig {
@@ -171,6 +173,8 @@ void visit(V& v, PairConfig& c) {
   v("points", c.points, "points per pair", positive());
   v("heading", c.heading, "turn poses by any angle about y");
   v("mirror", c.mirror, "every second pair mirrored");
+  v("frame_step", c.frame_step, "only every so many frames of a motion (30: one a second)",
+    between(1, 100000));
 }
 
 struct DeformationStageConfig {

@@ -1,0 +1,272 @@
+#include "datasets/benchmark/build.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <set>
+
+#include "autograd/base/atomic_file.h"
+#include "autograd/base/error.h"
+#include "autograd/base/interrupt.h"
+#include "autograd/base/log.h"
+#include "datasets/benchmark/batches.h"
+#include "datasets/benchmark/characters.h"
+#include "datasets/benchmark/floor.h"
+#include "datasets/benchmark/manifest.h"
+#include "datasets/benchmark/scans.h"
+#include "datasets/benchmark/sequence.h"
+#include "datasets/importers/cmu.h"
+#include "datasets/importers/import.h"
+
+namespace restage {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder beside the wanted one that takes its place on commit() and is removed otherwise.
+class StagingFolder {
+ public:
+  explicit StagingFolder(const std::string& target) : target_(fs::path(target).lexically_normal()) {
+    if (!target_.has_filename()) target_ = target_.parent_path();
+    std::error_code failed;
+    if (fs::exists(target_, failed) && !(fs::is_directory(target_) && fs::is_empty(target_)))
+      throw InputError(target, "is there already", "give a new folder, or remove it");
+    path_ = target_.string() + ".tmp-" + std::to_string(::getpid());
+    fs::create_directory(path_, failed);
+    if (failed)
+      throw InputError(target, "cannot be made a folder", "give a place you can write to");
+  }
+  ~StagingFolder() {
+    std::error_code ignored;
+    if (!done_) fs::remove_all(path_, ignored);
+  }
+  StagingFolder(const StagingFolder&) = delete;
+  StagingFolder& operator=(const StagingFolder&) = delete;
+  std::string path() const { return path_.string(); }
+  void commit() {
+    std::error_code failed;
+    fs::rename(path_, target_, failed);
+    if (failed) throw WorkError(target_.string() + ": cannot be put in place; is it in use?");
+    done_ = true;
+  }
+
+ private:
+  fs::path target_, path_;
+  bool done_ = false;
+};
+
+class Builder {
+ public:
+  Builder(const BenchmarkRecipe& recipe, const std::string& where, const std::string& data)
+      : r_(recipe),
+        where_(where),
+        key_(RngKey{recipe.seed, 0}.fold("benchmark")),
+        model_(data + "/body"),
+        rows_(read_recipes(data + "/body/bodies.csv")),
+        info_(data_folder_info(true, true)) {
+    for (Motion& motion : import_cmu(data + "/cmu/clips30.h5")) {
+      const std::string id = motion.id;
+      clips_.emplace(id, std::move(motion));
+    }
+    average_ = make_character({"average", "", {}, "", 0}, model_, rows_, key_);
+    touching_ = outermost_vertices(average_);
+    check_names();
+    for (const CharacterRecipe& c : r_.characters)
+      cast_.bodies.push_back(make_character(c, model_, rows_, key_));
+  }
+
+  void build(const std::string& folder) {
+    write_split("train", r_.train, folder);
+    write_split("validation", r_.validation, folder);
+    write_split("test", r_.test, folder);
+    for (const MotionRecipe& m : r_.motions) cast_.motions.push_back(test_clip(m.clip));
+    write_pairs("naked", r_.naked, folder);
+    write_pairs("clothed", r_.clothed, folder);
+    write_all_scans(folder);
+  }
+
+  const FileInfo& info() const { return info_; }
+
+ private:
+  const BodyRecipe& row(const std::string& id) const {
+    const auto at =
+        std::find_if(rows_.begin(), rows_.end(), [&](const BodyRecipe& r) { return r.id == id; });
+    if (at == rows_.end())
+      throw InputError(where_, "bodies.csv has no body '" + id.substr(0, 40) + "'",
+                       "name one such as '" + rows_.front().id + "'");
+    return *at;
+  }
+
+  const Motion& clip(const std::string& id) const {
+    const auto at = clips_.find(id);
+    if (at == clips_.end())
+      throw InputError(where_, "clips30.h5 has no clip '" + id.substr(0, 40) + "'",
+                       "name one such as '" + clips_.begin()->first + "'");
+    return at->second;
+  }
+
+  /// Everything that names data, before anything is written.
+  void check_names() const {
+    std::map<std::string, std::string> split_of;
+    const auto subject = [&](const std::string& id, const std::string& split) {
+      const std::string& who = clip(id).subject;
+      if (const auto [at, added] = split_of.emplace(who, split); !added && at->second != split)
+        throw InputError(where_,
+                         "clip '" + id + "' is of subject " + who + ", who is in " + at->second +
+                             " and in " + split,
+                         "keep a subject in one split");
+    };
+    for (const auto& [split, lists] :
+         {std::pair{"train", &r_.train}, std::pair{"validation", &r_.validation},
+          std::pair{"test", &r_.test}}) {
+      for (const std::string& id : lists->bodies) row(id);
+      for (const std::string& id : lists->clips) subject(id, split);
+    }
+    for (const CharacterRecipe& c : r_.characters)
+      if (!c.body.empty()) row(c.body);
+    for (const MotionRecipe& m : r_.motions) {
+      subject(m.clip, "test");
+      const auto frames = static_cast<int64_t>(clip(m.clip).frames());
+      if (m.first >= frames || m.frames > frames - m.first)
+        throw InputError(where_,
+                         "motion '" + m.id + "' ends after clip '" + m.clip + "', which has " +
+                             std::to_string(frames) + " frames",
+                         "choose first and frames inside it");
+    }
+  }
+
+  Motion grounded(const std::string& id) const {
+    return on_floor(clip(id), average_, touching_, r_.floor_window);
+  }
+
+  Motion test_clip(const std::string& id) const {
+    Motion out = grounded(id);
+    out.split = "test";
+    return out;
+  }
+
+  void write_split(const std::string& split, const SplitRecipe& lists, const std::string& folder) {
+    if (lists.bodies.empty() && lists.clips.empty()) return;
+    log_info(split + ".h5: " + std::to_string(lists.bodies.size()) + " bodies, " +
+             std::to_string(lists.clips.size()) + " clips");
+    DatasetWriter writer(folder + "/" + split + ".h5", info_);
+    in_batches<Body>(
+        lists.bodies.size(),
+        [&](size_t i) {
+          Body body = model_.build(row(lists.bodies[i]));
+          body.split = split;
+          return body;
+        },
+        [&](size_t, const Body& body) { writer.add(body); });
+    for (const std::string& id : lists.clips) {
+      throw_if_stopped();
+      Motion motion = grounded(id);
+      motion.split = split;
+      writer.add(motion);
+    }
+    writer.commit();
+  }
+
+  template <class T>
+  static size_t index_of(const std::vector<T>& list, const std::string& id) {
+    const auto at = std::find_if(list.begin(), list.end(), [&](const T& t) { return t.id == id; });
+    return static_cast<size_t>(at - list.begin());  // check_recipe() knows that it is there
+  }
+
+  EvalSequence sequence(const std::string& source, const std::string& target, size_t motion) const {
+    const MotionRecipe& m = r_.motions[motion];
+    EvalSequence out;
+    out.body_a = index_of(r_.characters, source);
+    out.body_b = index_of(r_.characters, target);
+    out.motion = motion;
+    out.first = static_cast<size_t>(m.first);
+    out.frames =
+        m.frames > 0 ? static_cast<size_t>(m.frames) : cast_.motions[motion].frames() - out.first;
+    return out;
+  }
+
+  static std::string made(const std::string& folder, const std::string& name) {
+    log_info(fs::path(folder).filename().string() + "/" + name);
+    fs::create_directories(folder + "/" + name);
+    return folder + "/" + name;
+  }
+
+  void write_pairs(const std::string& set, const std::vector<PairRecipe>& pairs,
+                   const std::string& folder) const {
+    for (size_t m = 0; m < r_.motions.size(); ++m)
+      for (const PairRecipe& p : pairs) {
+        const std::string& motion = r_.motions[m].id;
+        if (!p.motions.empty() &&
+            std::find(p.motions.begin(), p.motions.end(), motion) == p.motions.end())
+          continue;
+        write_sequence(Performance(cast_, sequence(p.source, p.target, m), ScanConfig{}, r_.seed),
+                       info_, made(folder + "/" + set, motion + "-" + p.source + "-" + p.target));
+      }
+  }
+
+  void write_all_scans(const std::string& folder) const {
+    for (const ScanRecipe& s : r_.scans) {
+      const std::string name = s.motion + "-" + s.source + "-" + s.target + "-" + s.scanner;
+      const Performance performance(cast_,
+                                    sequence(s.source, s.target, index_of(r_.motions, s.motion)),
+                                    ScanConfig{}, r_.seed);
+      const Body* intruder =
+          s.intruder.empty() ? nullptr : &cast_.bodies[index_of(r_.characters, s.intruder)];
+      write_scan_sequence(performance, r_.scanners[index_of(r_.scanners, s.scanner)], s, intruder,
+                          info_, key_.fold("scans").fold(name), made(folder + "/scans", name));
+    }
+  }
+
+  const BenchmarkRecipe& r_;
+  const std::string& where_;
+  RngKey key_;
+  MakeHuman model_;
+  std::vector<BodyRecipe> rows_;
+  FileInfo info_;
+  std::map<std::string, Motion> clips_;
+  Body average_;
+  std::vector<int32_t> touching_;
+  Corpus cast_;
+};
+
+/// Files of the data folder that the benchmark is made from.
+std::set<std::string> inputs_of(const BenchmarkRecipe& recipe) {
+  std::set<std::string> out = {"body/makehuman.h5", "body/bodies.csv", "cmu/clips30.h5"};
+  for (const CharacterRecipe& c : recipe.characters)
+    if (!c.garment.empty())
+      for (const char* ending : {".obj.gz", ".mhclo.gz"})
+        out.insert("body/clothes/" + c.garment + ending);
+  return out;
+}
+
+}  // namespace
+
+BenchmarkSummary build_benchmark(const BenchmarkRecipe& recipe, const std::string& recipe_text,
+                                 const std::string& where, const std::string& data,
+                                 const std::string& out) {
+  const StopScope stop;  // a signal takes the unfinished folder away
+  check_recipe(recipe, where);
+  Builder builder(recipe, where, data);
+  StagingFolder staging(out);
+  log_info("building " + out + " with seed " + std::to_string(recipe.seed));  // inputs are fine
+  builder.build(staging.path());
+  write_file_atomically(staging.path() + "/recipe.yaml", recipe_text);
+  Manifest manifest;
+  manifest.protocol = recipe.protocol;
+  manifest.seed = recipe.seed;
+  manifest.license = builder.info().license;
+  manifest.provenance = builder.info().provenance;
+  for (const std::string& name : inputs_of(recipe))
+    manifest.inputs[name] = describe_file(data + "/" + name);
+  manifest.files = describe_files(staging.path());
+  write_manifest(staging.path(), manifest);
+  staging.commit();
+  BenchmarkSummary summary;
+  summary.files = manifest.files.size() + 1;
+  for (const auto& [name, file] : manifest.files) summary.bytes += file.bytes;
+  return summary;
+}
+
+}  // namespace restage

@@ -1,0 +1,98 @@
+#include "datasets/benchmark/recipe.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "autograd/base/error.h"
+
+namespace restage {
+namespace {
+
+class Checker {
+ public:
+  Checker(const BenchmarkRecipe& recipe, const std::string& where) : r_(recipe), where_(where) {}
+
+  void run() {
+    disjoint("body", &SplitRecipe::bodies);
+    disjoint("clip", &SplitRecipe::clips);
+    const std::set<std::string> characters = ids("character", r_.characters);
+    const std::set<std::string> motions = ids("motion", r_.motions);
+    const std::set<std::string> scanners = ids("scanner", r_.scanners);
+    for (const CharacterRecipe& c : r_.characters) held_out("body", c.body, &SplitRecipe::bodies);
+    for (const MotionRecipe& m : r_.motions) held_out("clip", m.clip, &SplitRecipe::clips);
+    for (const auto* pairs : {&r_.naked, &r_.clothed})
+      for (const PairRecipe& p : *pairs) {
+        known("character", p.source, characters);
+        known("character", p.target, characters);
+        for (const std::string& m : p.motions) known("motion", m, motions);
+      }
+    for (const ScanRecipe& s : r_.scans) {
+      known("scanner", s.scanner, scanners);
+      known("motion", s.motion, motions);
+      known("character", s.source, characters);
+      known("character", s.target, characters);
+      if (!s.intruder.empty()) known("character", s.intruder, characters);
+    }
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& what, const std::string& fix) const {
+    throw InputError(where_, what, fix);
+  }
+
+  /// Names become folders, put together with '-'.
+  template <class T>
+  std::set<std::string> ids(const std::string& kind, const std::vector<T>& list) const {
+    std::set<std::string> out;
+    for (const T& entry : list) {
+      const std::string id = entry.id.substr(0, 40);
+      if (entry.id.empty() || entry.id.size() > 40 ||
+          entry.id.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") != std::string::npos)
+        fail("'" + id + "' cannot be the id of a " + kind,
+             "use up to 40 small letters, digits and '_'");
+      if (!out.insert(entry.id).second)
+        fail("the " + kind + " '" + id + "' is there twice", "give each its own id");
+    }
+    return out;
+  }
+
+  void known(const std::string& kind, const std::string& name,
+             const std::set<std::string>& names) const {
+    if (names.count(name) == 0)
+      fail("there is no " + kind + " '" + name.substr(0, 40) + "'",
+           names.empty() ? "list some" : "name one such as '" + *names.begin() + "'");
+  }
+
+  void disjoint(const std::string& kind, std::vector<std::string> SplitRecipe::*list) const {
+    std::map<std::string, std::string> split_of;
+    for (const auto& [split, names] :
+         {std::pair{"train", &(r_.train.*list)}, std::pair{"validation", &(r_.validation.*list)},
+          std::pair{"test", &(r_.test.*list)}})
+      for (const std::string& name : *names)
+        if (const auto [at, added] = split_of.emplace(name, split); !added)
+          fail("the " + kind + " '" + name.substr(0, 40) + "' is in " + at->second + " and in " +
+                   split,
+               "keep it in one split");
+  }
+
+  void held_out(const std::string& kind, const std::string& name,
+                std::vector<std::string> SplitRecipe::*list) const {
+    for (const auto& [split, names] :
+         {std::pair{"train", &(r_.train.*list)}, std::pair{"validation", &(r_.validation.*list)}})
+      if (!name.empty() && std::find(names->begin(), names->end(), name) != names->end())
+        fail("the " + kind + " '" + name.substr(0, 40) + "' of a test set is in " + split,
+             "take one that no model has seen");
+  }
+
+  const BenchmarkRecipe& r_;
+  const std::string& where_;
+};
+
+}  // namespace
+
+void check_recipe(const BenchmarkRecipe& recipe, const std::string& where) {
+  Checker(recipe, where).run();
+}
+
+}  // namespace restage

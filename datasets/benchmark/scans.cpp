@@ -1,0 +1,147 @@
+#include "datasets/benchmark/scans.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "datasets/benchmark/batches.h"
+#include "datasets/benchmark/sequence.h"
+
+namespace restage {
+namespace {
+
+constexpr double kRadians = std::numbers::pi / 180;
+constexpr int kElbow = 18, kWrist = 20;  // the intruder's left arm
+
+/// The ground that a performance covers.
+struct Path {
+  Vec3 centre = Vec3::Zero();
+  double radius = 0;
+};
+
+Path path_of(const Performance& performance) {
+  Vec3 low = Vec3::Constant(1e9), high = -low;
+  for (size_t i = 0; i < performance.frames(); ++i) {
+    const Vec3 root = performance.pose_a(i).root;
+    low = low.cwiseMin(root);
+    high = high.cwiseMax(root);
+  }
+  Path out;
+  out.centre = 0.5 * (low + high);
+  out.centre.y() = 0.95;
+  out.radius = 0.5 * std::hypot(high.x() - low.x(), high.z() - low.z());
+  return out;
+}
+
+std::vector<DepthCamera> cameras_of(const ScannerRecipe& s, const Path& path) {
+  DepthCamera model;
+  model.width = model.height = s.pixels;
+  model.view = s.view * kRadians;
+  return camera_ring(s.cameras, path.radius + s.margin, s.azimuth * kRadians, path.centre,
+                     s.heights, model);
+}
+
+/// Forearm and hand of a posed body, the hand 25 cm from A's chest, reaching from A's left.
+Mesh reaching_arm(const Body& body, const Joints& a) {
+  Mesh out;
+  const Vec3 across = (a[16] - a[17]).normalized();  // A's right to left
+  const Vec3 bone = body.joints[kWrist] - body.joints[kElbow];
+  const Mat3 turn = shortest_arc(bone, -across + Vec3(0, 0.15, 0));
+  const Vec3 hand = a[9] + 0.45 * across + Vec3(0, 0.1, 0);
+  std::vector<int32_t> moved(body.rest.vertices.size(), -1);
+  for (size_t v = 0; v < moved.size(); ++v) {
+    const auto row = body.weights.row(static_cast<Eigen::Index>(v));
+    if (row[kElbow] + row[kWrist] < 0.5f) continue;
+    moved[v] = static_cast<int32_t>(out.vertices.size());
+    const Vec3 x = body.rest.vertices[v].cast<double>();
+    out.vertices.push_back((hand + turn * (x - body.joints[kWrist])).cast<float>());
+  }
+  for (Triangle t : body.rest.faces) {
+    for (int32_t& v : t) v = moved[static_cast<size_t>(v)];
+    if (*std::min_element(t.begin(), t.end()) >= 0) out.faces.push_back(t);
+  }
+  return out;
+}
+
+void append(const Mesh& part, Mesh& whole) {
+  const auto first = static_cast<int32_t>(whole.vertices.size());
+  whole.vertices.insert(whole.vertices.end(), part.vertices.begin(), part.vertices.end());
+  for (Triangle t : part.faces) {
+    for (int32_t& v : t) v += first;
+    whole.faces.push_back(t);
+  }
+}
+
+/// A share of the points in random order.
+Points keep_some(Points cloud, double least, const RngKey& key) {
+  Rng rng(key);
+  const double share = least + (1 - least) * rng.uniform();
+  for (size_t i = cloud.size(); i > 1; --i) std::swap(cloud[i - 1], cloud[rng.below(i)]);
+  const auto kept = static_cast<size_t>(std::ceil(share * static_cast<double>(cloud.size())));
+  cloud.resize(std::min(kept, cloud.size()));
+  return cloud;
+}
+
+/// From the world into the scanner's frame.
+class ToSource {
+ public:
+  explicit ToSource(const SourceToWorld& t)
+      : inverse_(t.leftCols<3>().inverse()), origin_(t.col(3)) {}
+  Vec3 operator()(const Vec3& world) const { return inverse_ * (world - origin_); }
+
+ private:
+  Mat3 inverse_;
+  Vec3 origin_;
+};
+
+}  // namespace
+
+SourceToWorld draw_frame(const RngKey& key) {
+  constexpr double kUnits[] = {1.0, 0.01, 0.001, 0.1, 0.0254};  // metres per unit
+  Rng rng(key);
+  const double unit = kUnits[rng.below(5)];
+  const auto first = static_cast<int>(rng.below(3));
+  const auto second = static_cast<int>((static_cast<uint64_t>(first) + 1 + rng.below(2)) % 3);
+  Mat3 axes = Mat3::Zero();  // columns: where the scanner's x, y and z lie
+  axes(first, 0) = rng.below(2) == 0 ? 1 : -1;
+  axes(second, 1) = rng.below(2) == 0 ? 1 : -1;
+  axes.col(2) = axes.col(0).cross(axes.col(1));
+  const Mat3 rotation = turn_about_y(rng.uniform(-std::numbers::pi, std::numbers::pi)) * axes;
+  SourceToWorld out;
+  out.leftCols<3>() = unit * rotation;
+  for (int c = 0; c < 3; ++c) out(c, 3) = rng.uniform(-2, 2);
+  return out;
+}
+
+void write_scan_sequence(const Performance& performance, const ScannerRecipe& scanner,
+                         const ScanRecipe& recipe, const Body* intruder, const FileInfo& info,
+                         const RngKey& key, const std::string& folder) {
+  SourceToWorld frame = SourceToWorld::Identity();
+  if (!recipe.known_frame) frame = draw_frame(key.fold("frame"));
+  const ToSource to_source(frame);
+  const std::vector<DepthCamera> cameras = cameras_of(scanner, path_of(performance));
+  const Body& a = performance.source();
+
+  ScanWriter scans(folder + "/source.h5", info);
+  if (!recipe.known_frame) scans.set_foreign_frame();
+  in_batches<Points>(
+      performance.frames(),
+      [&](size_t i) {
+        const RngKey frame_key = key.fold("scan").fold(i);
+        Mesh scene{pose_surface(a, performance.pose_a(i)), a.rest.faces};
+        if (intruder) append(reaching_arm(*intruder, performance.joints_a(i)), scene);
+        Points cloud = keep_some(scan_surface(scene, cameras, scanner.noise, frame_key),
+                                 scanner.least_kept, frame_key.fold("kept"));
+        for (Point& p : cloud) p = to_source(p.cast<double>()).cast<float>();
+        return cloud;
+      },
+      [&](size_t i, const Points& cloud) {
+        Joints joints = performance.joints_a(i);
+        for (Vec3& x : joints) x = to_source(x);
+        scans.append(cloud, joints);
+      });
+  scans.commit();
+  write_truth(performance, info, folder, &frame);
+}
+
+}  // namespace restage

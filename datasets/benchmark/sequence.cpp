@@ -1,0 +1,34 @@
+#include "datasets/benchmark/sequence.h"
+
+#include "datasets/benchmark/batches.h"
+#include "datasets/readers/mesh_io.h"
+
+namespace restage {
+
+void write_sequence(const Performance& performance, const FileInfo& info,
+                    const std::string& folder) {
+  ScanWriter scans(folder + "/source.h5", info);
+  in_batches<Points>(
+      performance.frames(), [&](size_t i) { return performance.cloud(i); },
+      [&](size_t i, const Points& cloud) { scans.append(cloud, performance.joints_a(i)); });
+  scans.commit();
+  write_truth(performance, info, folder);
+}
+
+void write_truth(const Performance& performance, const FileInfo& info, const std::string& folder,
+                 const Eigen::Matrix<double, 3, 4>* source_to_world) {
+  const Body& target = performance.target();
+  const auto vertices = static_cast<int64_t>(target.rest.vertices.size());
+  PredictionWriter truth(folder + "/truth.h5", vertices, target.rest.faces, info);
+  if (source_to_world) truth.set_source_to_world(*source_to_world);
+  in_batches<Points>(
+      performance.frames(), [&](size_t i) { return performance.vertices_b(i); },
+      [&](size_t i, const Points& surface) { truth.append(performance.joints_b(i), surface); });
+  truth.commit();
+  PredictionWriter rest(folder + "/rest.h5", vertices, target.rest.faces, info);
+  rest.append(target.joints, target.rest.vertices);
+  rest.commit();
+  write_ply(folder + "/target.ply", target.rest);
+}
+
+}  // namespace restage

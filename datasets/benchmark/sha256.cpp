@@ -1,0 +1,62 @@
+#include "datasets/benchmark/sha256.h"
+
+#include <openssl/evp.h>
+
+#include <array>
+#include <fstream>
+#include <vector>
+
+#include "autograd/base/error.h"
+
+namespace restage {
+
+struct Sha256::State {
+  EVP_MD_CTX* context = EVP_MD_CTX_new();
+  ~State() { EVP_MD_CTX_free(context); }
+  void check(int good) const {
+    if (good != 1) throw WorkError("SHA-256 cannot be computed: OpenSSL refuses it");
+  }
+};
+
+Sha256::Sha256() : state_(std::make_unique<State>()) {
+  state_->check(state_->context != nullptr &&
+                EVP_DigestInit_ex(state_->context, EVP_sha256(), nullptr));
+}
+Sha256::~Sha256() = default;
+
+void Sha256::add(std::string_view bytes) {
+  state_->check(EVP_DigestUpdate(state_->context, bytes.data(), bytes.size()));
+}
+
+std::string Sha256::hex() {
+  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
+  unsigned length = 0;
+  state_->check(EVP_DigestFinal_ex(state_->context, digest.data(), &length));
+  std::string out;
+  for (unsigned i = 0; i < length; ++i) {
+    out += "0123456789abcdef"[digest[i] >> 4];
+    out += "0123456789abcdef"[digest[i] & 15];
+  }
+  return out;
+}
+
+std::string sha256(std::string_view bytes) {
+  Sha256 sum;
+  sum.add(bytes);
+  return sum.hex();
+}
+
+std::string sha256_of_file(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw InputError(path, "cannot be read", "check that it is there");
+  Sha256 sum;
+  std::vector<char> piece(size_t{1} << 20);
+  while (file) {
+    file.read(piece.data(), static_cast<std::streamsize>(piece.size()));
+    sum.add({piece.data(), static_cast<size_t>(file.gcount())});
+  }
+  if (file.bad()) throw InputError(path, "cannot be read to its end", "check the disk");
+  return sum.hex();
+}
+
+}  // namespace restage

@@ -1,0 +1,27 @@
+// SHA-256, by OpenSSL: the only place that knows it.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace restage {
+
+/// Takes bytes piece by piece.
+class Sha256 {
+ public:
+  Sha256();
+  ~Sha256();
+  void add(std::string_view bytes);
+  std::string hex();  ///< 64 digits; ends the sum
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+std::string sha256(std::string_view bytes);
+/// Of a file, in constant memory. InputError if it cannot be read.
+std::string sha256_of_file(const std::string& path);
+
+}  // namespace restage

@@ -1,0 +1,193 @@
+#include "datasets/fetch/fetch.h"
+
+#include <zlib.h>
+
+#include <charconv>
+#include <filesystem>
+#include <memory>
+#include <set>
+#include <sstream>
+
+#include "autograd/base/atomic_file.h"
+#include "autograd/base/error.h"
+#include "autograd/base/interrupt.h"
+#include "autograd/base/log.h"
+#include "datasets/benchmark/sha256.h"
+#include "datasets/fetch/download.h"
+
+namespace restage {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr uint64_t kMostList = uint64_t{16} << 20;
+constexpr uint64_t kMostPacked = uint64_t{64} << 20;  // of files that are packed here
+
+bool is_inside(const std::string& name) {
+  const fs::path path(name);
+  return path.is_relative() && path.has_filename() && path.lexically_normal() == path &&
+         path.filename() != "." && *path.begin() != "..";
+}
+
+FetchEntry entry_of(const std::string& line, const std::string& where) {
+  std::istringstream words(line);
+  FetchEntry out;
+  std::string bytes, rest;
+  words >> out.sha256 >> bytes >> out.path >> out.address;
+  const auto [end, error] = std::from_chars(bytes.data(), bytes.data() + bytes.size(), out.bytes);
+  const bool sum = out.sha256.size() == 64 &&
+                   out.sha256.find_first_not_of("0123456789abcdef") == std::string::npos;
+  if (!sum || error != std::errc() || end != bytes.data() + bytes.size() || out.address.empty() ||
+      words >> rest)
+    throw InputError(where, "is no line 'SHA256 BYTES PATH ADDRESS'", "mend the list");
+  if (!is_inside(out.path))
+    throw InputError(where, "names a file outside of the data folder", "mend the list");
+  return out;
+}
+
+bool packed_here(const FetchEntry& e) {
+  return e.path.ends_with(".gz") && !e.address.ends_with(".gz");
+}
+
+std::string unpacked(const std::string& path) {
+  const std::unique_ptr<gzFile_s, int (*)(gzFile)> file(gzopen(path.c_str(), "rb"), gzclose);
+  std::string out, piece(size_t{1} << 16, '\0');
+  int got = 0;
+  while (file && out.size() <= kMostPacked &&
+         (got = gzread(file.get(), piece.data(), static_cast<unsigned>(piece.size()))) > 0)
+    out.append(piece, 0, static_cast<size_t>(got));
+  return out;
+}
+
+/// Gzip without name and time, so equal content gives equal bytes.
+std::string packed(const std::string& content) {
+  z_stream stream{};
+  if (deflateInit2(&stream, 9, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY) != Z_OK)
+    throw WorkError("a file cannot be packed: zlib does not start");
+  std::string out(deflateBound(&stream, content.size()), '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(content.data()));
+  stream.avail_in = static_cast<uInt>(content.size());
+  stream.next_out = reinterpret_cast<Bytef*>(out.data());
+  stream.avail_out = static_cast<uInt>(out.size());
+  const int done = deflate(&stream, Z_FINISH);
+  out.resize(stream.total_out);
+  deflateEnd(&stream);
+  if (done != Z_STREAM_END) throw WorkError("a file cannot be packed by zlib");
+  return out;
+}
+
+/// Whether the file `path` holds what the entry pins.
+bool is_right(const FetchEntry& e, const std::string& path, bool inside_gz) {
+  std::error_code none;
+  if (!fs::is_regular_file(path, none)) return false;
+  if (inside_gz) {
+    const std::string content = unpacked(path);
+    return content.size() == e.bytes && sha256(content) == e.sha256;
+  }
+  return fs::file_size(path, none) == e.bytes && sha256_of_file(path) == e.sha256;
+}
+
+void copy_in(const std::string& source, const std::string& target) {
+  AtomicFile file(target);
+  std::error_code failed;
+  fs::copy_file(source, file.path(), fs::copy_options::overwrite_existing, failed);
+  if (failed) throw WorkError(target + ": cannot be written; check space and permissions");
+  using Who = fs::perms;  // the source may be read-only
+  fs::permissions(file.path(),
+                  Who::owner_read | Who::owner_write | Who::group_read | Who::others_read, failed);
+  file.commit();
+}
+
+/// From an address into its place.
+void bring(const FetchEntry& e, const std::string& target) {
+  const std::string part = target + ".part";
+  std::error_code none;
+  if (fs::file_size(part, none) != e.bytes || none) download(e.address, part, e.bytes);
+  if (!is_right(e, part, false)) {
+    fs::remove(part, none);
+    throw WorkError(e.address + ": is not the file that the list pins (SHA-256 " +
+                    e.sha256.substr(0, 12) + "...); nothing was put in place");
+  }
+  if (packed_here(e)) {
+    write_file_atomically(target, packed(read_file(part, kMostPacked)));
+    fs::remove(part, none);
+    return;
+  }
+  fs::rename(part, target, none);
+  if (none) throw WorkError(target + ": cannot be put in place; check permissions");
+}
+
+/// Where a file of an address without protocol lies: beside the list.
+std::string beside(const std::string& list, const std::string& address) {
+  return (fs::path(list).parent_path() / address).string();
+}
+
+/// False if there is nowhere to take it from.
+bool fetch_one(const FetchEntry& e, const std::string& list, const std::string& from,
+               const std::string& target) {
+  const bool remote = e.address.find("://") != std::string::npos;
+  if (!from.empty() && fs::exists(from + "/" + e.path)) {
+    if (!is_right(e, from + "/" + e.path, packed_here(e)))
+      throw InputError(from + "/" + e.path, "is not the file that the list pins",
+                       "give a folder with the right one");
+    copy_in(from + "/" + e.path, target);
+  } else if (remote && from.empty()) {
+    bring(e, target);
+  } else if (!remote && e.address != "-") {
+    if (!is_right(e, beside(list, e.address), false))
+      throw InputError(beside(list, e.address), "is not the file that the list pins",
+                       "restore it, or correct the list");
+    copy_in(beside(list, e.address), target);
+  } else {
+    return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::vector<FetchEntry> read_fetch_list(const std::string& list) {
+  const std::string text = read_file(list, kMostList);
+  std::vector<FetchEntry> out;
+  std::set<std::string> paths;
+  std::istringstream lines(text);
+  std::string line;
+  for (size_t number = 1; std::getline(lines, line); ++number) {
+    if (line.find_first_not_of(" \t\r") == std::string::npos || line[0] == '#') continue;
+    const std::string where = list + ":" + std::to_string(number);
+    out.push_back(entry_of(line, where));
+    if (!paths.insert(out.back().path).second)
+      throw InputError(where, "names a file that stands above already", "name each file once");
+  }
+  if (out.empty()) throw InputError(list, "lists no files", "give a list of files to fetch");
+  return out;
+}
+
+FetchSummary fetch_data(const std::string& list, const std::string& out, const std::string& from) {
+  const StopScope stop;
+  const std::vector<FetchEntry> entries = read_fetch_list(list);
+  if (!from.empty() && !fs::is_directory(from))
+    throw InputError(from, "is no folder", "give --from a data folder");
+  FetchSummary summary;
+  for (const FetchEntry& e : entries) {
+    throw_if_stopped();
+    const std::string target = out + "/" + e.path;
+    if (is_right(e, target, packed_here(e))) {
+      ++summary.present;
+      continue;
+    }
+    std::error_code failed;
+    fs::create_directories(fs::path(target).parent_path(), failed);
+    if (failed) throw InputError(out, "cannot be made a folder", "give a place you can write to");
+    log_info("fetching " + e.path + " (" + std::to_string((e.bytes + 999) / 1000) + " kB)");
+    if (fetch_one(e, list, from, target)) {
+      ++summary.fetched;
+      summary.bytes += e.bytes;
+    } else {
+      summary.missing.push_back(e.path);
+    }
+  }
+  return summary;
+}
+
+}  // namespace restage

@@ -1,0 +1,137 @@
+// restage data build: the built-in source as a file, or a recipe as a benchmark folder.
+#include <cstdlib>
+#include <memory>
+
+#include "autograd/base/error.h"
+#include "autograd/base/log.h"
+#include "datasets/benchmark/build.h"
+#include "datasets/builtin/bodies.h"
+#include "datasets/builtin/motions.h"
+#include "datasets/schema.h"
+#include "experiments/cli/benchmark_config.h"
+#include "experiments/cli/commands.h"
+#include "experiments/cli/output.h"
+#include "train/config.h"
+
+namespace restage::cli {
+namespace {
+
+constexpr int kMostBodies = 10000;  // guards against typing errors, not a limit of the format
+
+struct BuildOptions {
+  std::vector<std::string> arguments;  ///< RECIPE.yaml, out=, data= and key=value; none: built-in
+  bool seed_given = false;
+  std::string out;
+  std::vector<int> bodies{24, 4, 4}, motions{60, 20, 20};  ///< train, validation, test
+};
+
+void check_counts(const std::string& name, const std::vector<int>& counts) {
+  for (const int n : counts)
+    if (n < 0 || n > kMostBodies)
+      throw InputError("", name + " " + std::to_string(n) + " is out of range",
+                       "give three numbers from 0 to " + std::to_string(kMostBodies));
+}
+
+int total(const std::vector<int>& counts) { return counts[0] + counts[1] + counts[2]; }
+
+int build_builtin(const BuildOptions& options, const Common& common) {
+  const auto &b = options.bodies, &m = options.motions;
+  if (options.out.empty())
+    throw InputError("", "there is no place to write to", "give --out FILE.h5");
+  check_counts("--bodies", b);
+  check_counts("--motions", m);
+  if (total(b) + total(m) == 0)
+    throw InputError("", "no bodies and no motions were asked for", "give --bodies or --motions");
+  DatasetWriter writer(options.out,
+                       {"CC0-1.0", "built-in source, seed " + std::to_string(common.seed)});
+  log_info("building " + std::to_string(total(b)) + " bodies and " + std::to_string(total(m)) +
+           " motions with seed " + std::to_string(common.seed));
+  for (const Body& body : builtin_bodies(common.seed, b[0], b[1], b[2])) writer.add(body);
+  for (const Motion& motion : builtin_motions(common.seed, m[0], m[1], m[2])) writer.add(motion);
+  writer.commit();
+  if (common.json)
+    print_json({{"out", options.out}, {"bodies", b}, {"motions", m}, {"seed", common.seed}});
+  else
+    print("wrote " + options.out + "\n");
+  return 0;
+}
+
+// ---- a recipe ----------------------------------------------------------------------------------
+
+struct Request {
+  std::string recipe, out, data;
+  std::vector<std::string> overrides;
+};
+
+Request read_request(const BuildOptions& options, const Common& common) {
+  Request out;
+  out.out = options.out;
+  if (const char* folder = std::getenv("RESTAGE_DATA")) out.data = folder;
+  for (const std::string& a : options.arguments) {
+    if (a.starts_with("out="))
+      out.out = a.substr(4);
+    else if (a.starts_with("data="))
+      out.data = a.substr(5);
+    else if (a.find('=') != std::string::npos)
+      out.overrides.push_back(a);
+    else if (out.recipe.empty())
+      out.recipe = a;
+    else
+      throw InputError("", "there are two recipes, '" + out.recipe + "' and '" + a + "'",
+                       "give one");
+  }
+  if (options.seed_given) out.overrides.push_back("seed=" + std::to_string(common.seed));
+  if (out.recipe.empty() || out.out.empty() || out.data.empty())
+    throw InputError("",
+                     std::string("there is no ") + (out.recipe.empty() ? "recipe"
+                                                    : out.out.empty()  ? "place to write to"
+                                                                       : "data folder"),
+                     "use 'restage data build RECIPE.yaml out=DIR data=DATA_FOLDER' (or set "
+                     "RESTAGE_DATA)");
+  return out;
+}
+
+int build_recipe(const BuildOptions& options, const Common& common) {
+  const Request request = read_request(options, common);
+  BenchmarkRecipe recipe;
+  load_config(request.recipe, request.overrides, recipe);
+  const BenchmarkSummary done =
+      build_benchmark(recipe, resolved_yaml(recipe), request.recipe, request.data, request.out);
+  if (common.json)
+    print_json({{"out", request.out},
+                {"files", done.files},
+                {"bytes", done.bytes},
+                {"seed", recipe.seed}});
+  else
+    print("wrote " + request.out + ": " + std::to_string(done.files) + " files, " +
+          std::to_string((done.bytes + 500'000) / 1'000'000) + " MB\n");
+  return 0;
+}
+
+}  // namespace
+
+void add_data_build(Program& program, CLI::App& group) {
+  const auto options = std::make_shared<BuildOptions>();
+  const auto self = std::make_shared<CLI::App*>(nullptr);
+  CLI::App& app = program.add(
+      group, "build", "make the open benchmark from its recipe, or parametric data from nothing",
+      "restage data build configs/data/open_benchmark.yaml out=benchmark data=DATA_FOLDER\n"
+      "restage data build --out data.h5\n"
+      "restage data build --bodies 40 5 5 --motions 120 20 20 --seed 1 --out data.h5",
+      [options, self, &program] {
+        options->seed_given = (*self)->count("--seed") > 0;
+        return options->arguments.empty() ? build_builtin(*options, program.common())
+                                          : build_recipe(*options, program.common());
+      });
+  app.add_option("ARGUMENTS", options->arguments,
+                 "RECIPE.yaml, out=DIR, data=DIR and key=value overrides");
+  app.add_option("--out", options->out, "file (or folder, of a recipe) to write");
+  app.add_option("--bodies", options->bodies, "built-in bodies for training, validation and test")
+      ->expected(3);
+  app.add_option("--motions", options->motions,
+                 "built-in motions for training, validation and test")
+      ->expected(3);
+  *self = &app;
+}
+
+}  // namespace restage::cli

@@ -1,0 +1,49 @@
+// restage data fetch: a data folder from the original public addresses, or from a copy.
+#include <memory>
+
+#include "datasets/fetch/fetch.h"
+#include "experiments/cli/commands.h"
+#include "experiments/cli/output.h"
+
+namespace restage::cli {
+namespace {
+
+struct FetchOptions {
+  std::string list = "configs/data/open_data.txt", out, from;
+};
+
+int run_fetch(const FetchOptions& o, const Common& common) {
+  const FetchSummary done = fetch_data(o.list, o.out, o.from);
+  if (common.json) {
+    print_json({{"out", o.out},
+                {"fetched", done.fetched},
+                {"present", done.present},
+                {"bytes", done.bytes},
+                {"missing", done.missing}});
+  } else {
+    std::string text = o.out + ": " + std::to_string(done.fetched) + " files fetched, " +
+                       std::to_string(done.present) + " there already\n";
+    for (const std::string& path : done.missing)
+      text += "missing " + path + ": " +
+              (o.from.empty() ? "has no address; give --from a folder that holds it\n"
+                              : "is not in " + o.from + "\n");
+    print(text);
+  }
+  return done.missing.empty() ? 0 : 1;
+}
+
+}  // namespace
+
+void add_data_fetch(Program& program, CLI::App& group) {
+  const auto o = std::make_shared<FetchOptions>();
+  CLI::App& app =
+      program.add(group, "fetch", "fill a data folder from public addresses, checked by SHA-256",
+                  "restage data fetch --out data\n"
+                  "restage data fetch --out data --from /mnt/copy_of_data",
+                  [o, &program] { return run_fetch(*o, program.common()); });
+  app.add_option("LIST", o->list, "lines 'SHA256 BYTES PATH ADDRESS' (default: " + o->list + ")");
+  app.add_option("--out", o->out, "data folder to fill")->required();
+  app.add_option("--from", o->from, "folder laid out alike to copy from, instead of the network");
+}
+
+}  // namespace restage::cli

@@ -1,0 +1,137 @@
+"""restage data build RECIPE, verify FOLDER, sheet, realism and fetch."""
+import hashlib
+import os
+import unittest
+
+from support import CliTest
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+DATA = os.path.join(os.environ.get("RESTAGE_SHARED", os.path.join(ROOT, "..", "shared")), "data")
+RECIPE = os.path.join(ROOT, "configs", "data", "open_benchmark.yaml")
+SMALL = ["train.bodies=[b000, b001]", 'train.clips=["13_11", "13_33"]', "validation.bodies=[b120]", 'validation.clips=["08_01"]',
+         "test.bodies=[b140]", 'test.clips=["02_03"]',
+         'motions=[{id: walking, clip: "02_01", frames: 20}, {id: throw, clip: "06_15", first: 60, frames: 20}]',
+         "naked=[{source: male, target: female, motions: [walking]}]", "clothed=[{source: male, target: short_long, motions: [throw]}]",
+         "scans=[{scanner: depth, motion: throw, source: worker, target: female, intruder: male}]"]
+
+
+class Recipes(CliTest):
+    """Wrong recipes, before any data is looked at."""
+
+    def build(self, *arguments):
+        return ["data", "build", *arguments, "out=out", "data=nowhere"]
+
+    def test_bad_usage(self):
+        self.bad_input(["data", "build"], "--out")
+        self.bad_input(["data", "build", RECIPE], "place to write to")
+        self.bad_input(["data", "build", "out=x", "data=y"], "no recipe")
+        self.bad_input(self.build("none.yaml"), "none.yaml")
+        self.bad_input(self.build(RECIPE, RECIPE), "two recipes")
+        self.bad_input(self.build(RECIPE), "nowhere")
+
+    def test_hostile_recipes(self):
+        cases = {"boddies: [b000]\n": "boddies",
+                 "train: {bodies: 3}\n": "train.bodies",
+                 "train: [1, 2]\n": "train",
+                 "seed: -1\n": "seed",
+                 "seed: [[[\n": "r.yaml",
+                 "characters: [{shape: {weight: 1}}]\n": "id",
+                 "characters: [{id: a, shape: {weight: 2}}]\n": "weight",
+                 "characters: [{id: '../../a'}]\n": "r.yaml: '../../a' cannot be the id",
+                 "scanners: [{id: a, pixels: 100000000}]\n": "pixels",
+                 "scanners: [{id: a, cameras: 0}]\n": "cameras",
+                 "scanners: [{id: a, heights: []}]\n": "heights",
+                 "scanners: [{id: a, noise: {dropout: .nan}}]\n": "dropout",
+                 "motions: [{id: a, clip: x, frames: 1e300}]\n": "frames",
+                 "naked: [{source: a, target: b}]\n": "no character 'a'",
+                 "train: {bodies: [a]}\ntest: {bodies: [a]}\n": "'a' is in train and in test",
+                 "include: r.yaml\n": "r.yaml",
+                 "a: &a [*a]\n": "r.yaml",
+                 "\x00\xff": "r.yaml",
+                 "x" * 2000000: "r.yaml"}
+        for text, words in cases.items():
+            with self.subTest(text[:60]):
+                self.write("r.yaml", text.encode("latin-1"))
+                self.bad_input(self.build("r.yaml"), words)
+
+    def test_verify_and_sheet_want_their_folders(self):
+        os.makedirs(self.path("empty"))
+        self.bad_input(["data", "verify", "empty"], "manifest.json")
+        self.bad_input(["data", "sheet", "empty", "--out", "x.png"], "no sequences")
+        self.bad_input(["data", "sheet", "empty", "--out", "x.txt"], ".png")
+        self.bad_input(["data", "realism", "none.h5"], "none.h5")
+
+
+@unittest.skipUnless(os.path.exists(os.path.join(DATA, "body", "makehuman.h5")), "no data folder (set RESTAGE_SHARED)")
+class Benchmark(CliTest):
+    def build(self, out, *more):
+        return ["data", "build", RECIPE, "out=" + out, "data=" + DATA, *SMALL, *more]
+
+    def test_build_verify_and_use(self):
+        made = self.json(*self.build("one", "--threads", 1))
+        self.assertEqual(made["files"], 3 + 2 + 3 * 4)
+        self.assertEqual(made["seed"], 0)
+        self.done(*self.build("two", "--threads", 2))
+        self.assertEqual(self.bytes("one/manifest.json"), self.bytes("two/manifest.json"))
+        self.assertEqual(self.json("data", "verify", "one")["problems"], [])
+        # The recipe that is kept makes the same again.
+        self.done("data", "build", "one/recipe.yaml", "out=three", "data=" + DATA)
+        self.assertEqual(self.bytes("one/manifest.json"), self.bytes("three/manifest.json"))
+        # Source, truth and rest fit what eval wants.
+        pair = "one/naked/walking-male-female/"
+        scores = self.json("eval", "--pred", pair + "truth.h5", "--truth", pair + "truth.h5", "--source", pair + "source.h5",
+                           "--rest", pair + "rest.h5")
+        self.assertEqual(scores["mean"]["mpjpe"], 0)
+        self.assertGreater(scores["references"]["rest_pose"]["mpjpe"], scores["references"]["closed_form"]["mpjpe"])
+        self.done("data", "sheet", "one/scans", "--out", "scans.png")
+        self.done("data", "sheet", "one/test.h5", "--out", "test.png")
+        self.assertEqual(self.bytes("test.png")[:4], b"\x89PNG")
+        found = self.json("data", "realism", "one/test.h5")
+        self.assertGreater(found["joints_inside"]["posed"], 0.95)
+        self.assertGreater(found["knee_volume"]["mean"]["surface"], found["knee_volume"]["mean"]["linear_blend"])
+
+    def test_verify_finds_differences(self):
+        self.done(*self.build("one", "naked=[]", "clothed=[]", "scans=[]"))
+        with open(self.path("one/test.h5"), "r+b") as f:
+            f.seek(5000)
+            f.write(b"?")
+        self.write("one/stray.txt", "x")
+        result = self.restage("data", "verify", "one")
+        self.assertEqual((result.code, result.err), (1, ""))
+        self.assertIn("one/test.h5: is not what the manifest says", result.out)
+        self.assertIn("one/stray.txt: is not in the manifest", result.out)
+        self.bad_input(self.build("one"), "is there already")
+
+
+class FetchData(CliTest):
+    def listed(self, content, path, address):
+        return "%s %d %s %s\n" % (hashlib.sha256(content).hexdigest(), len(content), path, address)
+
+    def test_from_addresses_and_copies(self):
+        self.write("origin/x", b"content")
+        self.write("list.txt", self.listed(b"content", "body/x", "file://" + self.path("origin/x")))
+        self.assertIn("1 files fetched", self.done("data", "fetch", "list.txt", "--out", "data"))
+        self.assertEqual(self.bytes("data/body/x"), b"content")
+        found = self.json("data", "fetch", "list.txt", "--out", "data")
+        self.assertEqual((found["fetched"], found["present"], found["missing"]), (0, 1, []))
+        self.done("data", "fetch", "list.txt", "--out", "copy", "--from", "data")
+        self.assertEqual(self.bytes("copy/body/x"), b"content")
+
+    def test_failures_say_what_to_do(self):
+        self.write("list.txt", self.listed(b"x", "a", "https://localhost:1/a"))
+        self.one_line(self.restage("data", "fetch", "list.txt", "--out", "data", "--quiet"), 1, "localhost", "--from FOLDER")
+        self.write("list.txt", self.listed(b"x", "a", "-"))
+        result = self.restage("data", "fetch", "list.txt", "--out", "data", "--quiet")
+        self.assertEqual((result.code, result.err), (1, ""))
+        self.assertIn("missing a", result.out)
+        self.write("list.txt", "words\n")
+        self.bad_input(["data", "fetch", "list.txt", "--out", "other"], "list.txt:1")
+        self.bad_input(["data", "fetch", "none.txt", "--out", "other"], "none.txt")
+        self.write("list.txt", self.listed(b"x", "a", "-"))
+        self.bad_input(["data", "fetch", "list.txt", "--out", "other", "--from", "nowhere"], "nowhere")
+
+    @unittest.skipUnless(os.path.exists(os.path.join(DATA, "body", "makehuman.h5")), "no data folder (set RESTAGE_SHARED)")
+    def test_the_projects_list_and_a_copy(self):
+        found = self.json("data", "fetch", os.path.join(ROOT, "configs", "data", "open_data.txt"), "--out", "data", "--from", DATA)
+        self.assertEqual(found["missing"], [])
+        self.assertTrue(os.path.exists(self.path("data/cmu/clips30.h5")))
