@@ -125,6 +125,9 @@ class TreeBuilder : public YAML::EventHandler {
     Frame& map = stack_.back();
     if (node.text == "<<")
       fail(mark, "merge keys ('<<') are not supported", "use 'include: file.yaml'");
+    if (map.node.children.size() >= kConfigMaxKeys)
+      fail(mark, "more than " + std::to_string(kConfigMaxKeys) + " keys in one section",
+           "give a configuration file");
     if (const ConfigNode* first = map.node.find(node.text))
       fail(mark,
            "the key " + in_quotes(node.text) + " stands here a second time (first in line " +

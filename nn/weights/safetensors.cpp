@@ -14,10 +14,11 @@
 namespace restage {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Json = nlohmann::json;  // finds names by a tree: a header may hold a million
 
 constexpr uint64_t kHeaderLimit = 100'000'000;  // as in the format's reference implementation
-constexpr int kDepthLimit = 4;                  // { name: { shape: [ ... ] } }
+constexpr int kMostNumbers = 64;                // of a list in the header
+constexpr uint64_t kMostElements = uint64_t{1} << 48;
 constexpr const char* kFix = "give an undamaged safetensors file";
 
 static_assert(std::endian::native == std::endian::little, "the format is little-endian");
@@ -67,6 +68,35 @@ float from_bfloat(uint16_t h) {
   return out;
 }
 
+/// Watches the header while it is parsed, so that it cannot make more of itself than it is:
+/// { name: { key: [ numbers ] } }, and every name and key once.
+class HeaderGuard {
+ public:
+  /// What is wrong; empty: nothing so far.
+  std::string judge(int depth, Json::parse_event_t event, const Json& value) {
+    using Event = Json::parse_event_t;
+    if (event == Event::key) {
+      const auto& key = value.get_ref<const std::string&>();
+      if (depth == 1) keys_.clear();
+      if (!(depth == 1 ? names_ : keys_).insert(key).second)
+        return "names " + std::string(depth == 1 ? "the tensor " : "") + name_in_quotes(key) +
+               " twice";
+    } else if (event == Event::object_start) {
+      if (depth > 1) return "has a header nested too deeply";
+    } else if (event == Event::array_start) {
+      if (depth != 2) return "has a header nested too deeply";
+      numbers_ = 0;
+    } else if (event == Event::value && depth == 3 && ++numbers_ > kMostNumbers) {
+      return "has a list of more than " + std::to_string(kMostNumbers) + " numbers in its header";
+    }
+    return "";
+  }
+
+ private:
+  std::set<std::string> names_, keys_;  // of the header, of the tensor at hand
+  int numbers_ = 0;
+};
+
 class Reader {
  public:
   Reader(std::string_view bytes, const std::string& where) : bytes_(bytes), where_(where) {}
@@ -96,18 +126,17 @@ class Reader {
     if (length > bytes_.size() - 8 || length > kHeaderLimit)
       fail("is no safetensors file or is cut off (header of " + std::to_string(length) + " bytes)");
     data_ = bytes_.substr(8 + length);
-    std::set<std::string> keys;
-    const auto guard = [&](int depth, Json::parse_event_t event, Json& value) {
-      if (depth > kDepthLimit) fail("has a header nested too deeply");
-      if (event == Json::parse_event_t::key && depth == 1 &&
-          !keys.insert(value.get<std::string>()).second)
-        fail("names the tensor " + name_in_quotes(value.get<std::string>()) + " twice");
+    const std::string_view text = bytes_.substr(8, length);
+    // Nothing may hide before or behind the header's text; to the JSON library a zero is its end.
+    if (text.empty() || text[0] != '{' || text.find('\0') != std::string_view::npos)
+      fail("has a header that is no JSON object");
+    HeaderGuard guard;
+    const auto keep = [&](int depth, Json::parse_event_t event, const Json& value) {
+      if (const std::string wrong = guard.judge(depth, event, value); !wrong.empty()) fail(wrong);
       return true;
     };
     try {
-      Json header = Json::parse(bytes_.substr(8, length), guard);
-      if (!header.is_object()) fail("has a header that is no JSON object");
-      return header;
+      return Json::parse(text, keep);
     } catch (const Json::exception&) {
       fail("has a header that is not JSON");
     }
@@ -137,14 +166,14 @@ class Reader {
     const Json &shape = value["shape"], &range = value["data_offsets"];
     if (!shape.is_array() || shape.size() > static_cast<size_t>(Shape::kMaxRank))
       fail(called + " has a shape of more than " + std::to_string(Shape::kMaxRank) + " axes");
-    uint64_t count = 1;
+    uint64_t count = 1;  // without axes of length 0, which must not hide the others
     bool empty = false;
     for (const Json& axis : shape) {
       const uint64_t n = unsigned_number(axis, called);
       e.shape.push_back(static_cast<int64_t>(n));
       empty = empty || n == 0;
-      if (n != 0 && count > data_.size() / n) count = data_.size() + 1;  // cannot fit: no overflow
-      if (n != 0) count *= count > data_.size() ? 1 : n;
+      if (n > kMostElements / count) fail(called + " has an impossible shape");
+      count *= std::max<uint64_t>(n, 1);
     }
     if (empty) count = 0;
     if (!range.is_array() || range.size() != 2) fail(called + " has no pair of data offsets");
@@ -152,7 +181,7 @@ class Reader {
     e.end = unsigned_number(range[1], called);
     if (e.begin > e.end || e.end > data_.size())
       fail(called + " reaches beyond the end of the file");
-    if (count > data_.size() || count * e.kind->bytes != e.end - e.begin)
+    if (count * e.kind->bytes != e.end - e.begin)
       fail(called + " has " + std::to_string(e.end - e.begin) + " bytes, which do not fit " +
            e.shape.str());
     return e;
@@ -236,18 +265,18 @@ TensorFile read_safetensors(const std::string& path) {
 }
 
 std::string safetensors_bytes(const TensorFile& file) {
-  Json header = Json::object();
+  nlohmann::ordered_json header = nlohmann::ordered_json::object();
   if (!file.metadata.empty()) header["__metadata__"] = file.metadata;
   uint64_t at = 0;
   for (const auto& [name, t] : file.tensors) {
-    Json shape = Json::array();
+    nlohmann::ordered_json shape = nlohmann::ordered_json::array();
     for (int i = 0; i < t.rank(); ++i) shape.push_back(t.size(i));
     const uint64_t end = at + static_cast<uint64_t>(t.numel()) * size_of(t.dtype());
     header[name] = {
         {"dtype", format_name(t.dtype())}, {"shape", shape}, {"data_offsets", {at, end}}};
     at = end;
   }
-  std::string text = header.dump(-1, ' ', false, Json::error_handler_t::replace);
+  std::string text = header.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
   text.resize((text.size() + 7) / 8 * 8, ' ');
   std::string out;
   out.reserve(8 + text.size() + at);
