@@ -37,7 +37,7 @@ TEST_P(CutFiles, EveryPercentIsOneClearLine) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Readers, CutFiles, ::testing::ValuesIn(targets()),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& target) { return std::string(target.param.name); });
 
 }  // namespace
 }  // namespace restage::fuzz

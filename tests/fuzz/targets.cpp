@@ -198,12 +198,12 @@ void read_hdf5(const std::string& bytes) {
   const std::string path = file_of(bytes, "x.h5");
   const Inspection holds = inspect(path);
   std::vector<std::function<void()>> actions = {[&] { verify(path); }};
-  if (holds.kind == "scans" || holds.kind == "prediction")
+  const bool scans = holds.kind == "scans", prediction = holds.kind == "prediction";
+  if (prediction) actions.emplace_back([&] { read_prediction(path); });
+  if (scans || (prediction && holds.counts.count("vertices") != 0))
     actions.emplace_back([&] { play(path); });
-  else
-    for (const auto& action : std::vector<std::function<void()>>{[&] { read_bodies(path); },
-                                                                 [&] { read_motions(path); }})
-      actions.push_back(action);
+  if (holds.counts.count("bodies") != 0) actions.emplace_back([&] { read_bodies(path); });
+  if (holds.counts.count("motions") != 0) actions.emplace_back([&] { read_motions(path); });
   do_all(actions);
 }
 
