@@ -80,9 +80,9 @@ def fuzz(options, name, longest, allocation, seed):
         found = re.findall(pattern, done.stderr)
         return int(found[-1]) if found else 0
 
-    return {"target": name, "inputs": last(r"number_of_executed_units: (\d+)") or last(r"^#(\d+)"),
+    return {"target": name, "inputs": last(r"number_of_executed_units:\s+(\d+)") or last(r"^#(\d+)"),
             "seconds": time.monotonic() - start, "edges": last(r"cov: (\d+)"),
-            "memory": last(r"peak_rss_mb: (\d+)"), "failed": done.returncode != 0, "kept": kept, "log": log}
+            "memory": last(r"peak_rss_mb:\s+(\d+)"), "failed": done.returncode != 0, "kept": kept, "log": log}
 
 
 def main():

@@ -5,6 +5,7 @@
 #include <exception>
 #include <functional>
 
+#include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
 #include "datasets/importers/amass.h"
 #include "datasets/importers/amc.h"
@@ -196,8 +197,12 @@ void read_names(const std::string& bytes) {
 
 void read_hdf5(const std::string& bytes) {
   const std::string path = file_of(bytes, "x.h5");
+  // Every opening costs a child process: each input is read in one of three ways.
+  const char way = checksum(bytes).back();
+  if (way < '5') return void(verify(path));
   const Inspection holds = inspect(path);
-  std::vector<std::function<void()>> actions = {[&] { verify(path); }};
+  if (way < 'a') return;
+  std::vector<std::function<void()>> actions;
   const bool scans = holds.kind == "scans", prediction = holds.kind == "prediction";
   if (prediction) actions.emplace_back([&] { read_prediction(path); });
   if (scans || (prediction && holds.counts.count("vertices") != 0))
