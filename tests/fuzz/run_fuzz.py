@@ -20,7 +20,6 @@ import tempfile
 import time
 
 HERE = pathlib.Path(__file__).resolve().parent
-BUILD = HERE.parent.parent / "build" / "fuzz"
 # Texts have words that chance finds slowly.
 DICTIONARY = {"ply": "ply", "obj": "obj", "gltf": "gltf", "character": "gltf", "bvh": "bvh", "asf": "asf",
               "amc": "asf", "npy": "npy", "npz": "npy", "amass": "npy", "smpl": "npy", "safetensors": "safetensors",
@@ -29,14 +28,18 @@ DICTIONARY = {"ply": "ply", "obj": "obj", "gltf": "gltf", "character": "gltf", "
 
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--program", type=pathlib.Path, default=BUILD / "restage_fuzz")
+    parser.add_argument("--program", type=pathlib.Path, default=HERE.parent.parent / "build/fuzz/restage_fuzz")
     parser.add_argument("--targets", help="some of them, with commas between; else all")
     parser.add_argument("--seconds", type=int, default=5, help="for each target")
     parser.add_argument("--inputs", type=int, help="for each target, instead of seconds")
     parser.add_argument("--jobs", type=int, default=2, help="targets at a time")
-    parser.add_argument("--corpus", type=pathlib.Path, default=BUILD / "corpus")
-    parser.add_argument("--findings", type=pathlib.Path, default=BUILD / "findings")
-    return parser.parse_args()
+    parser.add_argument("--corpus", type=pathlib.Path, help="else fuzz_corpus beside the program")
+    parser.add_argument("--findings", type=pathlib.Path, help="else fuzz_findings beside the program")
+    options = parser.parse_args()
+    options.program = options.program.resolve()
+    options.corpus = options.corpus or options.program.parent / "fuzz_corpus"
+    options.findings = options.findings or options.program.parent / "fuzz_findings"
+    return options
 
 
 def environment(scratch):
