@@ -52,7 +52,10 @@ class Reader {
  private:
   [[noreturn]] void fail(const YAML::Node& node, const std::string& wrong,
                          const std::string& fix = kFix) const {
-    throw InputError(path_ + ":" + std::to_string(std::max(node.Mark().line, 0) + 1), wrong, fix);
+    std::string line = wrong;  // a quoted key may hold anything
+    for (char& c : line)
+      if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
+    throw InputError(path_ + ":" + std::to_string(std::max(node.Mark().line, 0) + 1), line, fix);
   }
 
   std::string text(const YAML::Node& node) const {

@@ -84,6 +84,9 @@ TEST(ImportersProfiles, MistakesAreNamedWithLineAndNearestName) {
   EXPECT_EQ(complaint(good), "");
   EXPECT_EQ(complaint(good + "jonts: {}\n"),
             "suit.yaml:24: 'jonts' is not known here; did you mean 'joints'?");
+  EXPECT_EQ(complaint(own_profile() + "\"a\\nb\": x\n").find('\n'), std::string::npos);
+  EXPECT_NE(complaint(own_profile() + "\"a\\nb\": x\n").find("'a?b' is not known here"),
+            std::string::npos);
   EXPECT_NE(complaint(good + "  left_hipp: x\n").find("did you mean 'left_hip'?"),
             std::string::npos);
   EXPECT_NE(complaint(good + "  left_hip: x\n").find("given twice"), std::string::npos);
