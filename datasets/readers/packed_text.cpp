@@ -30,6 +30,11 @@ std::string unpack_xz(const std::string& packed, const std::string& path, uint64
       throw InputError(path, "unpacks to more than " + std::to_string(limit >> 20) + " MiB",
                        "cut the recording into shorter files");
     if (state == LZMA_STREAM_END) return out;
+    if (state == LZMA_MEMLIMIT_ERROR)
+      throw InputError(path,
+                       "takes more than " + std::to_string(kDecoderMemory >> 20) +
+                           " MiB to unpack, beyond what xz -9 needs",
+                       "pack it again, or give the text");
     if (state != LZMA_OK)
       throw InputError(path, "is no whole xz file", "give the text or an undamaged .xz file");
   }

@@ -1,12 +1,14 @@
 // BVH files that are cut, flipped, deep or announce what they do not hold: refused with a line,
 // never a crash, never much memory.
 #include <gtest/gtest.h>
+#include <lzma.h>
 
 #include "autograd/base/error.h"
 #include "autograd/base/rng.h"
 #include "datasets/importers/bvh.h"
 #include "datasets/readers/bvh.h"
 #include "tests/datasets/importers_bvh_text.h"
+#include "tests/datasets/schema_support.h"
 
 namespace restage {
 namespace {
@@ -73,6 +75,34 @@ TEST(ReadersRecordings, AnnouncedCountsAreNotBelieved) {
   std::string wide = good.substr(0, good.find("Frame Time")) + "Frame Time: 0.01\n";
   for (int i = 0; i < 200000; ++i) wide += "0 ";
   EXPECT_NE(complaint(wide).find("65537 values"), std::string::npos) << complaint(wide);
+}
+
+/// The unpacker would take the memory that the file asks for.
+TEST(ReadersRecordings, PackedTextsThatAskForMuchMemoryAreRefused) {
+  const test::TempDir dir;
+  const std::string text = small_file();
+  const auto refusal = [&](uint32_t mebibytes) -> std::string {
+    lzma_options_lzma options;
+    lzma_lzma_preset(&options, 0);
+    options.dict_size = mebibytes << 20;
+    const lzma_filter filters[] = {{LZMA_FILTER_LZMA2, &options}, {LZMA_VLI_UNKNOWN, nullptr}};
+    std::string packed(lzma_stream_buffer_bound(text.size()), '\0');
+    size_t size = 0;
+    EXPECT_EQ(
+        lzma_stream_buffer_encode(const_cast<lzma_filter*>(filters), LZMA_CHECK_CRC32, nullptr,
+                                  reinterpret_cast<const uint8_t*>(text.data()), text.size(),
+                                  reinterpret_cast<uint8_t*>(packed.data()), &size, packed.size()),
+        LZMA_OK);
+    test::write_bytes(dir / "x.bvh.xz", packed.substr(0, size));
+    try {
+      read_bvh(dir / "x.bvh.xz");
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(refusal(64), "");  // xz -9
+  EXPECT_NE(refusal(128).find("takes more than 80 MiB to unpack"), std::string::npos);
 }
 
 /// A few bytes a frame at one frame per second, or thousands of joints that never move, would be
