@@ -66,6 +66,10 @@ class Process:
         self.child.wait()
 
 
+def is_reading(item):
+    return item["name"].startswith("reading_")
+
+
 def cores():
     return len(os.sched_getaffinity(0))
 
@@ -232,6 +236,25 @@ def ratios(result):
     return out
 
 
+def reading(result):
+    """The loader beside the training that it feeds: examples a second of both; how many times as fast the loader
+    gives them as the rest of the step takes them, and its share of the step, medians over the rounds."""
+    times = {k: r["all"] for k, r in result["ours"].items()}
+    out = {f"{k}_per_s": 1e3 / statistics.median(t) for k, t in times.items()}
+    pairs = list(zip(times["training"], times["loader"]))
+    return {**out, "ratio": statistics.median([(t - r) / r for t, r in pairs]),
+            "share": statistics.median([r / t for t, r in pairs])}
+
+
+def memory_of_epoch(programs, item, quick):
+    """What the loader's process holds after 5,000 examples and after the 65,000 of an epoch, MiB."""
+    process = programs.start("loader")
+    few, many = (500, 6500) if quick else (5000, 65000)
+    answer = process.ask(f"memory {item['name']} loader {few} {many}")
+    process.close()
+    return {"examples": [few, many], **answer}
+
+
 def least(item, kind):
     """Of initial and trained weights; other variants stand beside them."""
     found = [r[kind] for variant, r in item.get("ratios", {}).items() if variant not in ("dense", "bfloat16")]
@@ -295,16 +318,18 @@ def main():
             sys.exit(f"there is no item {', '.join(sorted(unknown))}; there are " +
                      ", ".join(i["name"] for i in items))
         items = [i for i in items if i["name"] in a.items.split(",")]
+    elif a.libtorch:  # has no part in reading
+        items = [i for i in items if not is_reading(i)]
     for item in items:
-        item["compared"] = bool(a.libtorch) and not item["name"].endswith("_lite")
+        item["compared"] = bool(a.libtorch) and not item["name"].endswith("_lite") and not is_reading(item)
     compared = [i for i in items if i["compared"]]
-    out = {"ratios": {}, "ratios_installed": {}, "memory": {}, "quick": a.quick, "machine": machine()}
+    out = {"ratios": {}, "ratios_installed": {}, "reading": {}, "memory": {}, "quick": a.quick, "machine": machine()}
     if a.libtorch:
         say("do both give the same answers?")
         out["agreement"] = agreement(programs, compared)
     quiet = Quiet(patience=0 if a.quick else 20)
-    # A step of the large extractor takes longer than all others together.
-    weight = {i["name"]: 5 if i["name"] == "skeleton_train" else 1 for i in items}
+    # A step of the large extractor takes longer than those of all others together.
+    weight = {i["name"]: 5 if i["name"] in ("skeleton_train", "reading_skeleton_paper") else 1 for i in items}
     end = time.monotonic() + 60 * a.minutes
     for item in items:
         seconds = max(0.0, end - time.monotonic()) * weight[item["name"]] / sum(weight.values())
@@ -312,6 +337,8 @@ def main():
         say(f"{item['name']}: {item['what']}")
         item.update(measure_item(programs, item, quiet, seconds, a.quick))
         item["ratios"] = ratios(item)
+        if is_reading(item):
+            out["reading"][item["name"]] = {**reading(item), "memory": memory_of_epoch(programs, item, a.quick)}
     out["items"] = items
     out["disturbed"] = {"requests": quiet.requests, "above_limit": quiet.disturbed, "limit_cores": FOREIGN_LIMIT,
                         "worst_cores": quiet.worst}
