@@ -85,12 +85,13 @@ def main():
     build = os.path.abspath(sys.argv[1])
     with tempfile.TemporaryDirectory() as folder:
         prepare(folder, os.path.join(build, "tests", "make_samples"), sys.argv[2])
-        print(HEAD)
+        page = HEAD
         for title, what, command in CASES:
             code, text = run(os.path.join(build, "restage"), folder, command)
             if code != (2 if command.endswith("# exit 2") else 0):
                 sys.exit(f"{command}: exit code {code}\n{text}")
-            print(f"## {title}\n\n{what + '.' if what else 'A real file.'}\n\n```\n$ {command}\n{text.rstrip()}\n```\n")
+            page += f"\n## {title}\n\n{what or 'A real file'}.\n\n```\n$ {command}\n{text.rstrip()}\n```\n"
+        print(page, end="")
 
 
 if __name__ == "__main__":
