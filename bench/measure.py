@@ -133,17 +133,19 @@ class Quiet:
         self.worst = 0.0
 
     def ask(self, process, request):
-        """The answer of the least disturbed attempt, with the cores that others used."""
+        """The answer of the least disturbed attempt, the cores that others used and the seconds of processor time that
+        the process itself took."""
         best = None
         while True:
             time.sleep(0.05)  # for the last process's threads to fall asleep
-            begin, own, busy = time.monotonic(), process.seconds() + time.process_time(), busy_seconds()
+            begin, own, ours, busy = time.monotonic(), process.seconds(), time.process_time(), busy_seconds()
             answer = process.ask(request)
             wall = time.monotonic() - begin
-            used = busy_seconds() - busy - (process.seconds() + time.process_time() - own)
+            own = process.seconds() - own
+            used = busy_seconds() - busy - own - (time.process_time() - ours)
             foreign = max(0.0, used - 2 * TICK) / wall
             if best is None or foreign < best[1]:
-                best = (answer, foreign)
+                best = (answer, foreign, own)
             if foreign <= FOREIGN_LIMIT:
                 self.patience = min(self.limit, self.patience + 1)
                 break
@@ -164,7 +166,7 @@ class Side:
         self.ours = isinstance(side, str)
         self.process = programs.start(side)
         self.request = f"run {item['name']} {side if self.ours else 'initial'}"
-        self.times, self.foreign, self.extra = [], [], {}
+        self.times, self.processor, self.foreign, self.extra = [], [], [], {}
         begin = time.monotonic()
         self.process.ask(f"{self.request} 0")  # builds the item and warms up
         self.seconds = time.monotonic() - begin
@@ -175,14 +177,16 @@ class Side:
         self.repeats = 1
 
     def measure(self, quiet):
-        answer, foreign = quiet.ask(self.process, f"{self.request} {self.repeats}")
+        answer, foreign, own = quiet.ask(self.process, f"{self.request} {self.repeats}")
         self.times.append(statistics.median(answer.pop("ms")) / self.item["examples"])
+        self.processor.append(1e3 * own / self.repeats / self.item["examples"])
         self.foreign.append(foreign)
         self.extra.update(answer)
 
     def result(self):
         t = self.times
         return {"ms": statistics.median(t), "min": min(t), "max": max(t), "rounds": len(t), "all": t,
+                "processor": self.processor,
                 "peak_mib": self.process.peak_mib(), "foreign_cores": max(self.foreign), **self.extra}
 
 
@@ -238,12 +242,15 @@ def ratios(result):
 
 def reading(result):
     """The loader beside the training that it feeds: examples a second of both; how many times as fast the loader
-    gives them as the rest of the step takes them, and its share of the step, medians over the rounds."""
-    times = {k: r["all"] for k, r in result["ours"].items()}
-    out = {f"{k}_per_s": 1e3 / statistics.median(t) for k, t in times.items()}
-    pairs = list(zip(times["training"], times["loader"]))
-    return {**out, "ratio": statistics.median([(t - r) / r for t, r in pairs]),
-            "share": statistics.median([r / t for t, r in pairs])}
+    gives them as the rest of the step takes them, by the clock and by processor time, which others disturb less;
+    and its share of the step. Medians over the rounds."""
+    ours = result["ours"]
+    out = {f"{k}_per_s": 1e3 / statistics.median(r["all"]) for k, r in ours.items()}
+    for name, key in (("ratio", "all"), ("processor_ratio", "processor")):
+        out[name] = statistics.median([(t - r) / max(r, 1e-9)
+                                       for t, r in zip(ours["training"][key], ours["loader"][key])])
+    pairs = zip(ours["training"]["all"], ours["loader"]["all"])
+    return {**out, "share": statistics.median([r / t for t, r in pairs])}
 
 
 def memory_of_epoch(programs, item, quick):

@@ -56,12 +56,14 @@ def reading(out):
         heap = r["memory"]["heap"]
         rows.append([i["name"], i["per"], number(r["training_per_s"]), number(r["loader_per_s"]),
                      number(r["loader_1fps_per_s"]) if "loader_1fps_per_s" in r else "", f"**{r['ratio']:.1f}**",
+                     f"{r['processor_ratio']:.1f}",
                      f"{100 * r['share']:.1f} %", f"{heap[0]:.1f} -> {heap[1]:.1f}"])
     few, many = found[0][1]["memory"]["examples"]
-    text = ("## Reading\n\nExamples a second: of whole training steps, of the loader alone, of the loader from one frame "
-            "a second of motion. Ratio: how many times as fast the loader gives examples as the rest of the step takes "
-            f"them; heap: MiB in use after {few:,} examples and after {many:,}.\n\n")
-    return text + table(["item", "example", "training", "loader", "1 frame/s", "ratio", "of the step", "heap"], rows)
+    text = ("## Reading\n\nExamples a second: of whole training steps, of the loader alone, of the loader from one "
+            "frame a second of motion. Ratio: how many times as fast the loader gives examples as the rest of the step "
+            "takes them, by the clock and by processor time; heap: MiB in use after "
+            f"{few:,} examples and after {many:,}.\n\n")
+    return text + table(["item", "example", "training", "loader", "1 frame/s", "ratio", "processor", "of the step", "heap"], rows)
 
 
 def ours(out):

@@ -56,18 +56,20 @@ class Ratios(unittest.TestCase):
 
 class Reading(unittest.TestCase):
     ITEM = {"name": "reading_skeleton_lite", "what": "x", "per": "cloud", "examples": 12, "gflop": 0, "libtorch": {},
-            "ours": {"training": times(11, 6, 30), "loader": times(1, 2, 3), "loader_1fps": times(4, 4, 4)}}
+            "ours": {"training": times(11, 6, 30, processor=[22, 12, 60]), "loader": times(1, 2, 3, processor=[2, 4, 2]),
+                     "loader_1fps": times(4, 4, 4)}}
 
     def test_pairs_of_one_round(self):
         r = measure.reading(self.ITEM)
         self.assertEqual(r["ratio"], 9.0)  # the median of 10, 2 and 9: what the step takes without reading
+        self.assertEqual(r["processor_ratio"], 10.0)
         self.assertAlmostEqual(r["share"], 0.1)
         self.assertEqual((r["training_per_s"], r["loader_per_s"], r["loader_1fps_per_s"]), (1000 / 11, 500.0, 250.0))
 
     def test_table(self):
         found = {**measure.reading(self.ITEM), "memory": {"examples": [5000, 65000], "heap": [7.0, 7.04]}}
         text = report.reading({"items": [ITEM, self.ITEM], "reading": {self.ITEM["name"]: found}})
-        self.assertIn("| reading_skeleton_lite | cloud | 90.9 | 500 | 250 | **9.0** | 10.0 % | 7.0 -> 7.0 |", text)
+        self.assertIn("| reading_skeleton_lite | cloud | 90.9 | 500 | 250 | **9.0** | 10.0 | 10.0 % | 7.0 -> 7.0 |", text)
         self.assertNotIn("skeleton_train", text)
         self.assertEqual(report.reading({"items": [ITEM], "reading": {}}), "")
 
@@ -91,7 +93,7 @@ class DisturbedRequests(unittest.TestCase):
         measure.busy_seconds, measure.time.monotonic = busy_seconds, monotonic
         try:
             quiet = measure.Quiet(patience)
-            answer, load = quiet.ask(process, "run")
+            answer, load, _ = quiet.ask(process, "run")
         finally:
             measure.busy_seconds, measure.time.monotonic = original
         return answer["ms"][0], load, quiet.disturbed
