@@ -170,7 +170,7 @@ class Side:
         begin = time.monotonic()
         self.process.ask(f"{self.request} 0")  # builds the item and warms up
         self.seconds = time.monotonic() - begin
-        if self.seconds < 2 * REQUEST_SECONDS:
+        if self.seconds < 2 * REQUEST_SECONDS or is_reading(item):  # most of it was opening the data
             begin = time.monotonic()
             self.process.ask(f"{self.request} 1")
             self.seconds = time.monotonic() - begin  # of one repetition, with what is not timed in it
