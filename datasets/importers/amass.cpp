@@ -246,9 +246,10 @@ Motion import_amass(const Npz& file, BodyModels& models, const AmassOptions& opt
                          " of " + std::to_string(betas.size()) + " betas");
 
   const Joints rest = model.joints(betas);
-  SourceMotion motion = read_motion(file, rest, upright(options.up == Axis::automatic ? Axis::z : options.up));
+  SourceMotion motion =
+      read_motion(file, rest, upright(options.up == Axis::automatic ? Axis::z : options.up));
   fact("up", options.up == Axis::automatic ? "z (AMASS), turned to y"
-                                                : to_string(options.up) + " (--up)");
+                                           : to_string(options.up) + " (--up)");
   std::string from;
   motion.fps = rate_of(file, options.fps, from);
   fact("rate", resampled(motion, from, file.path()));

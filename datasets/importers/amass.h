@@ -43,7 +43,7 @@ class BodyModels {
 
 struct AmassOptions {
   Axis up = Axis::automatic;  ///< automatic: z, as in all of AMASS
-  double fps = 0;                 ///< the true rate, where the file's is wrong; 0: the file's
+  double fps = 0;             ///< the true rate, where the file's is wrong; 0: the file's
   std::string id, subject, split = "train", action;
 };
 

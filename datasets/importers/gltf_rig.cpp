@@ -244,7 +244,8 @@ double find_scale(const Joints& joints, const GltfRigOptions& options, const std
 Mat3 find_up(const Joints& joints, Axis given, ImportReport& report) {
   const bool found = given == Axis::automatic;
   const Axis up = found ? axis_near(joints[15] - 0.5 * (joints[7] + joints[8])) : given;
-  report.facts.emplace_back("up", to_string(up) + (found ? " (from ankles to head)" : " (as given)"));
+  report.facts.emplace_back("up",
+                            to_string(up) + (found ? " (from ankles to head)" : " (as given)"));
   return upright(up);
 }
 
@@ -357,7 +358,7 @@ GltfTransforms turned(const Gltf& file, const GltfRig& rig,
 }
 
 void find_nodes(const Gltf& file, GltfRig& rig, const JointMap& map, const std::vector<int>& nodes,
-                 ImportReport& report) {
+                ImportReport& report) {
   std::vector<int> owner(file.nodes.size(), -1);
   std::string words;
   for (size_t j = 0; j < kJoints; ++j) {

@@ -133,12 +133,14 @@ ImportSummary import_data(const std::string& source, const std::string& out,
     throw InputError(source, "is not there", "give a file or a folder");
   const auto refuse = [&](bool given, const char* option, const char* whose) {
     if (given)
-      throw InputError(source, std::string("has nothing to do with ") + option + ", which is for " + whose,
+      throw InputError(source,
+                       std::string("has nothing to do with ") + option + ", which is for " + whose,
                        std::string("leave ") + option + " out");
   };
   const bool folder = fs::is_directory(source, ignored);
   refuse(!options.betas.empty() && (folder || !is_npz_name(source)), "--betas", "body models");
-  refuse(!options.clip.empty() && !folder && !is_recording_name(source), "--clip", "glTF characters");
+  refuse(!options.clip.empty() && !folder && !is_recording_name(source), "--clip",
+         "glTF characters");
   return folder ? import_folder(source, out, options) : import_file(source, out, options);
 }
 

@@ -152,7 +152,6 @@ RestPose built_pose(const SourceMotion& motion, const JointMap& map, const Joint
 
 }  // namespace
 
-
 RestPose find_rest_pose(const SourceMotion& motion, const JointMap& map, const RestOptions& options,
                         const std::string& path, ImportReport& report) {
   PosedSkeleton pose;

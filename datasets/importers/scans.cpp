@@ -142,14 +142,15 @@ int64_t import_scans(const ScanSequence& sequence, const ScanOptions& options, S
   };
   report.file = sequence.name;
   fact("rate", rate_fact(fps,
-                               options.fps > 0 ? "--fps"
-                               : stated        ? "the file's"
-                                               : "taken for granted: --fps",
-                               source->frames(), clock));
+                         options.fps > 0 ? "--fps"
+                         : stated        ? "the file's"
+                                         : "taken for granted: --fps",
+                         source->frames(), clock));
   fact("scale", options.scale > 0 ? text_of("%.6g m a unit (--scale)", scale)
                                   : "metres (taken for granted: --scale)");
   const Axis up = options.up == Axis::automatic ? Axis::y : options.up;
-  fact("up", to_string(up) + (options.up == Axis::automatic ? " (taken for granted: --up)" : " (--up)"));
+  fact("up",
+       to_string(up) + (options.up == Axis::automatic ? " (taken for granted: --up)" : " (--up)"));
   const Eigen::Matrix3f to_ours = (scale * upright(up)).cast<float>();
 
   int64_t at = 0;  // of the source, the frame that next() gives

@@ -13,8 +13,8 @@
 namespace restage {
 
 struct ScanOptions {
-  double fps = 0;                 ///< true frames per second; 0: the file's, else 30
-  double scale = 0;               ///< metres per unit; 0: 1
+  double fps = 0;             ///< true frames per second; 0: the file's, else 30
+  double scale = 0;           ///< metres per unit; 0: 1
   Axis up = Axis::automatic;  ///< automatic: y
   uint64_t max_memory = kMaxMemory;
 };

@@ -7,7 +7,7 @@
 namespace restage::cli {
 
 void add_data(Program& program);
-void add_data_build(Program& program, CLI::App& group);    // of `data`, as all add_data_*
+void add_data_build(Program& program, CLI::App& group);  // of `data`, as all add_data_*
 void add_data_fetch(Program& program, CLI::App& group);
 void add_data_import(Program& program, CLI::App& group);
 void add_data_inspect(Program& program, CLI::App& group);

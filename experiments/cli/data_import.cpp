@@ -32,16 +32,15 @@ std::string block(const ImportReport& report) {
   constexpr size_t kColumn = 14;
   std::string text = report.file + "\n";
   for (const auto& [name, value] : report.facts)
-    text +=
-        "  " + name + std::string(name.size() < kColumn ? kColumn - name.size() : 1, ' ') + value +
-        "\n";
+    text += "  " + name + std::string(name.size() < kColumn ? kColumn - name.size() : 1, ' ') +
+            value + "\n";
   return text + remarks_of(report);
 }
 
 /// The first words of what matters most, in one line; remarks in lines of their own.
 std::string summary(const ImportReport& report) {
-  static const std::vector<std::string> shown = {"layout", "names",  "units",     "scale",
-                                                 "up",     "rate",   "rest pose", "body model",
+  static const std::vector<std::string> shown = {"layout", "names", "units",     "scale",
+                                                 "up",     "rate",  "rest pose", "body model",
                                                  "clips",  "points"};
   std::string text = report.file + ":";
   for (const auto& [name, value] : report.facts) {

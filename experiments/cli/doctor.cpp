@@ -229,8 +229,10 @@ struct Kind {
 };
 
 const Kind kKinds[] = {
-    {"\x89HDF\r\n", {}, examine_hdf5},       {"ply", {}, examine_mesh},
-    {"", {".ply", ".obj"}, examine_mesh},    {"", {".h5", ".hdf5"}, examine_hdf5},
+    {"\x89HDF\r\n", {}, examine_hdf5},
+    {"ply", {}, examine_mesh},
+    {"", {".ply", ".obj"}, examine_mesh},
+    {"", {".h5", ".hdf5"}, examine_hdf5},
     {"", {".bvh", ".bvh.xz", ".amc", ".amc.xz"}, examine_recording},
     {"", {".glb", ".gltf", ".vrm"}, examine_character},
     {"", {".npz", ".npy"}, examine_sequence},
@@ -249,8 +251,9 @@ Report examine(const Options& options) {
         (kind.endings.empty() || std::any_of(kind.endings.begin(), kind.endings.end(), named)))
       return kind.examine(options);
   }
-  throw InputError(path, "is of no kind that is known here",
-                   "give HDF5, PLY, OBJ, glTF, BVH, AMC, NPY, NPZ, safetensors, YAML or a folder of frames");
+  throw InputError(
+      path, "is of no kind that is known here",
+      "give HDF5, PLY, OBJ, glTF, BVH, AMC, NPY, NPZ, safetensors, YAML or a folder of frames");
 }
 
 // ---- the command -------------------------------------------------------------------------------

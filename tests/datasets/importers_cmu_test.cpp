@@ -135,7 +135,8 @@ TEST(ImportersCmu, OriginalSkeletonIsTheAsfOne) {
   MotionOptions options;
   options.drop_leading = 1;  // a T-pose before the frames of the ASF/AMC file
   options.keep_frames = 2751;
-  const MotionClip bvh = read_bvh(data_folder() + "/cmu/bvh_original_skeleton/01_01.bvh.xz", options);
+  const MotionClip bvh =
+      read_bvh(data_folder() + "/cmu/bvh_original_skeleton/01_01.bvh.xz", options);
   const std::vector<CmuClip>& clips = all_clips();
   const auto clip = std::find_if(clips.begin(), clips.end(),
                                  [](const CmuClip& c) { return c.motion.id == "01_01"; });
