@@ -41,6 +41,8 @@ class Registration {
   /// threads. InputError naming `source`: fewer than 64 distinct points, values that are not
   /// finite.
   RetargetedFrame push(const Points& cloud, const std::string& source);
+  /// Forgets the frame before.
+  void restart() { previous_.reset(); }
   /// The registered template's joints in the last frame, in the source's build.
   const Joints& source_joints() const { return source_joints_; }
   const Mesh& target() const { return body_.rest; }
