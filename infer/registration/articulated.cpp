@@ -71,7 +71,6 @@ struct Hinge {
 };
 constexpr Hinge kHinges[] = {{4, 0, 1}, {5, 0, 1}, {18, 1, -1}, {19, 1, 1}};
 constexpr double kOtherWay = 1e-2;
-constexpr double kUsualStretch = 3e-2, kUsualSize = 3e-3;  // of a squared relative difference
 constexpr double kDamping = 1e-5;
 
 // ---- matches -----------------------------------------------------------------------------------
@@ -193,20 +192,20 @@ class NodeDerivative {
   Eigen::Matrix<double, 3, Eigen::Dynamic> jacobian_;
 };
 
-void add_priors(const RigState& state, Equations& e) {
+void add_priors(const RigState& state, const ArticulatedOptions& options, Equations& e) {
   for (int k = 0; k < kJoints; ++k) {
     const Vec3 weight = stiffness(k),
                angle = rotation_vector(state.pose.local[static_cast<size_t>(k)]);
-    for (int c = 0; c < 3; ++c) e.prior(kTurn + 3 * k + c, weight[c], angle[c]);
+    for (int c = 0; c < 3; ++c) e.prior(kTurn + 3 * k + c, options.turns * weight[c], angle[c]);
   }
   for (const Hinge& hinge : kHinges) {
     const double angle =
         rotation_vector(state.pose.local[static_cast<size_t>(hinge.joint)])[hinge.axis];
     if (angle * hinge.sign < 0) e.prior(kTurn + 3 * hinge.joint + hinge.axis, kOtherWay, angle);
   }
-  e.prior(kSize, kUsualSize, std::log(state.scale));
+  e.prior(kSize, options.size, std::log(state.scale));
   for (int k = 0; k < kJoints; ++k)
-    e.prior(kStretch + k, kUsualStretch, state.stretch[static_cast<size_t>(k)] - 1);
+    e.prior(kStretch + k, options.stretch, state.stretch[static_cast<size_t>(k)] - 1);
   e.h.diagonal().array() += kDamping;
 }
 
@@ -274,7 +273,7 @@ RigState fit_articulated(const Rig& rig, const std::vector<Vec3>& cloud, RigStat
     Equations e;
     NodeDerivative derivative(rig, state, posed);
     for (size_t i = 0; i < rig.nodes.size(); ++i) derivative.add(i, pulls[i], e);
-    add_priors(state, e);
+    add_priors(state, options, e);
     const Step step = -e.h.ldlt().solve(e.g);
     if (!step.allFinite()) break;  // keep what there is
     // A turn of more than half a radian is beyond what the derivative knows.

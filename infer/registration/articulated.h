@@ -32,7 +32,10 @@ PosedRig pose_rig(const Rig& rig, const RigState& state);
 
 struct ArticulatedOptions {
   int iterations = 30;
-  double widest = 0.30, narrowest = 0.04;  ///< of the kernel, first and last iteration, metres
+  double widest = 0.30, narrowest = 0.06;  ///< of the kernel, first and last iteration, metres
+  /// Cost of a relative difference of size, of bone lengths, and of turns (a factor), squared,
+  /// beside mean squared distances in metres.
+  double size = 3e-4, stretch = 3e-3, turns = 1;
 };
 
 /// Mean cost of distances between nodes and cloud, both ways, below `width` squared: what

@@ -64,12 +64,6 @@ RigState placed(const Rig& rig, RigState state, const std::vector<Vec3>& cloud) 
   return state;
 }
 
-/// The rig's flesh and bones are the target's: joints of the registered template as the source has
-/// them, and the target's pelvis on the source's path.
-Vec3 reposed_root(const Joints& source, const Joints& rest) {
-  return trajectory_scale(source, rest) * source[0];
-}
-
 }  // namespace
 
 Registration::Registration(Mesh target, const Joints& rest, const std::string& where,
@@ -78,8 +72,8 @@ Registration::Registration(Mesh target, const Joints& rest, const std::string& w
   body_.id = where;
   body_.rest = std::move(target);
   body_.joints = rest;
+  rig_ = make_rig(body_.rest, rest, where, options.nodes);  // checks its input
   body_.weights = bone_distance_weights(body_.rest.vertices, rest);
-  rig_ = make_rig(body_.rest, body_.weights, rest, where, options.nodes);
 }
 
 /// Headings and arm poses, the most promising first, and the frame before.
@@ -138,7 +132,7 @@ RetargetedFrame Registration::push(const Points& cloud, const std::string& sourc
 
   RetargetedFrame out;
   out.pose = pose;
-  out.pose.root = reposed_root(source_joints_, body_.joints);
+  out.pose.root = trajectory_scale(source_joints_, body_.joints) * source_joints_[0];
   out.joints = forward_kinematics(body_.joints, out.pose).joints;
   out.vertices = linear_blend_skinning(body_, out.pose);
   return out;

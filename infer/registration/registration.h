@@ -24,7 +24,7 @@ namespace restage {
 
 struct RegistrationOptions {
   size_t nodes = kRigNodes;
-  int searched = 5;    ///< starts that are fitted, besides the frame before
+  int searched = 12;   ///< starts that are fitted, besides the frame before
   double grid = 0.03;  ///< the cloud is thinned to one point a cube of this width, metres
   bool free_form = true;
   ArticulatedOptions articulated;

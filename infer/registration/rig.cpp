@@ -43,7 +43,7 @@ std::vector<size_t> spread(const Points& points, size_t count) {
   for (size_t i = 0; i < points.size(); ++i)
     nearest[i] = (points[i] - middle.cast<float>()).squaredNorm();
   std::vector<size_t> out;
-  while (out.size() < count) {
+  while (out.size() < count && !points.empty()) {
     const auto far = std::max_element(nearest.begin(), nearest.end());
     if (!(*far > 0)) break;  // all others are copies
     const auto chosen = static_cast<size_t>(far - nearest.begin());
@@ -124,8 +124,7 @@ SkinWeights bone_distance_weights(const Points& points, const Joints& rest) {
   return out;
 }
 
-Rig make_rig(const Mesh& target, const SkinWeights& weights, const Joints& rest,
-             const std::string& where, size_t count) {
+Rig make_rig(const Mesh& target, const Joints& rest, const std::string& where, size_t count) {
   check(target, rest, where);
   const std::vector<size_t> chosen = spread(target.vertices, count);
   if (chosen.size() < kLeastRigPoints)
@@ -133,14 +132,17 @@ Rig make_rig(const Mesh& target, const SkinWeights& weights, const Joints& rest,
         where, "holds " + std::to_string(chosen.size()) + " distinct points, too few for a body",
         "give at least " + std::to_string(kLeastRigPoints));
   const std::vector<Vec3> normals = normals_of(target);
+  Points places;
+  for (const size_t v : chosen) places.push_back(target.vertices[v]);
+  const SkinWeights weights = bone_distance_weights(places, rest);
   Rig rig;
   rig.joints = rest;
-  for (const size_t v : chosen) {
+  for (size_t i = 0; i < chosen.size(); ++i) {
     RigNode& node = rig.nodes.emplace_back();
-    node.rest = target.vertices[v].cast<double>();
-    node.normal = normals[v];
+    node.rest = places[i].cast<double>();
+    node.normal = normals[chosen[i]];
     Eigen::Matrix<double, 1, kJoints> row =
-        weights.row(static_cast<Eigen::Index>(v)).cast<double>();
+        weights.row(static_cast<Eigen::Index>(i)).cast<double>();
     for (size_t k = 0; k < node.joint.size(); ++k) {
       node.weight[k] = row.maxCoeff(&node.joint[k]);
       row[node.joint[k]] = -1;

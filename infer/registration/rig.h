@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <string>
 #include <vector>
 
 #include "nn/geometry/body.h"
@@ -31,9 +32,10 @@ struct Rig {
 inline constexpr size_t kRigNodes = 600;  ///< about 5 cm apart on a person
 inline constexpr size_t kLeastRigPoints = 64;
 
-/// The first `count` points of farthest point sampling (ties to the lower index). InputError naming
-/// `where`: fewer than kLeastRigPoints distinct points, points or joints that are not finite.
-Rig make_rig(const Mesh& target, const SkinWeights& weights, const Joints& rest,
-             const std::string& where, size_t count = kRigNodes);
+/// The first `count` points of farthest point sampling (ties to the lower index), with weights as
+/// above. InputError naming `where`: fewer than kLeastRigPoints distinct points, points or joints
+/// that are not finite.
+Rig make_rig(const Mesh& target, const Joints& rest, const std::string& where,
+             size_t count = kRigNodes);
 
 }  // namespace restage
