@@ -16,7 +16,7 @@ constexpr double kNoPerson = 3;  // standard deviations from a person's size in 
 
 /// Metres? Refused only where another unit fits a person well.
 void check_unit(const UnitGuess& guess, const std::string& where, const std::string& fix) {
-  if (guess.unit.metres == 1 || guess.sure < kVerySure) return;
+  if (guess.unit.metres == 1 || guess.sure < kSure) return;
   throw InputError(where,
                    std::string("1 unit seems to be 1 ") + guess.unit.name + " (sure " +
                        per_cent(guess.sure) + "), metres are expected",

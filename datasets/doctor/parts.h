@@ -10,17 +10,18 @@ namespace restage {
 enum class Part : uint8_t { person, stray, other };
 
 struct Parts {
-  std::vector<Part> part;    ///< one for each point
-  size_t stray = 0;          ///< points with hardly a neighbour
-  size_t other = 0;          ///< points of pieces apart from the person
-  size_t largest_other = 0;  ///< of the largest such piece; as large as a person: a second person
+  std::vector<Part> part;  ///< one for each point
+  size_t stray = 0;        ///< points with hardly a neighbour
+  size_t other = 0;        ///< points of pieces apart from the person
+  /// Points that were judged, evenly spread over what there is; the rest go with their nearest.
+  std::vector<size_t> judged;
+  size_t largest_other = 0;  ///< judged points of the largest such piece; many: a second person
   int pieces = 1;            ///< that the person itself is in (holes, occlusion)
   double gap = 0;            ///< the nearest other piece is this far away, in the data's units
   double spacing = 0;        ///< typical distance between neighbours, in the data's units
 };
 
-/// The person is the largest piece and what lies within about 0.16 m of it. Works in any unit. At
-/// most 20,000 points are judged, spread evenly over the list; the rest go with their nearest.
+/// The person is the largest piece and what lies within about 0.16 m of it. Works in any unit.
 Parts find_parts(const Points& points);
 
 }  // namespace restage

@@ -45,7 +45,7 @@ PersonShape shape_of(const Mesh& mesh) {
   PersonShape out;
   const Points all = shape_points(mesh);
   out.parts = find_parts(all);
-  for (size_t i = 0; i < all.size(); ++i)
+  for (const size_t i : out.parts.judged)
     if (out.parts.part[i] == Part::person) out.points.push_back(all[i]);
   out.size = doctor_detail::normalised(out.points).size;
   return out;

@@ -15,7 +15,7 @@ Points shape_points(const Mesh& mesh);
 
 /// A person's points and what is wrong with the rest.
 struct PersonShape {
-  Points points;    ///< shape_points(), only the person's
+  Points points;    ///< those of the person that were judged: evenly spread
   Parts parts;      ///< of shape_points()
   double size = 0;  ///< median distance to the median point: 0.26 to 0.63 m in any pose
 };

@@ -102,20 +102,24 @@ void add_bodies(std::vector<Figure>& figures, const std::vector<Body>& bodies) {
   }
 }
 
-/// The middle frame of each motion, performed by the file's bodies in turn, or by a built-in one.
+/// Moments of each motion, fewer the more motions there are, performed by the file's bodies in turn
+/// or by a built-in one.
 void add_motions(std::vector<Figure>& figures, const std::vector<Motion>& motions,
                  const std::vector<Body>& bodies) {
   const std::vector<Body> performers =
       bodies.empty() ? std::vector{builtin_body(0, "test", 0)} : bodies;
-  const size_t n = std::min(motions.size(), kMotionsDrawn);
+  const size_t n = std::min(motions.size(), kMotionsDrawn),
+               moments = kMotionsDrawn / std::max<size_t>(n, 1);
   for (size_t k = 0; k < n; ++k) {
     const Motion& motion = motions[spread(k, n, motions.size())];
     const Body& body = performers[k % performers.size()];
-    if (motion.frames() == 0) continue;
-    Figure figure{
-        {{pose_surface(body, pose_on(motion, body, motion.frames() / 2)), body.rest.faces}},
-        motion.id + (motion.action.empty() ? "" : ": " + motion.action)};
-    figures.push_back(std::move(figure));
+    for (size_t m = 0; m < moments && motion.frames() > 0; ++m) {
+      const size_t frame = (2 * m + 1) * motion.frames() / (2 * moments);
+      std::string label = motion.id + (motion.action.empty() ? "" : ": " + motion.action);
+      if (moments > 1) label += " " + rounded(static_cast<double>(frame) / kFps, 1) + " s";
+      figures.push_back(
+          {{{pose_surface(body, pose_on(motion, body, frame)), body.rest.faces}}, label});
+    }
   }
 }
 

@@ -63,9 +63,10 @@ std::vector<FigureLayer> layers_of(const Mesh& mesh, Move&& move) {
 /// Height beside the person and an arrow on the floor where they face.
 FigureLayer marks(const FigureLayer& person, const Diagnosis& d) {
   const Vec3 x = Vec3::UnitX(), z = Vec3::UnitZ();
-  const auto side = static_cast<float>(quantile(person.points, x, 0.995) + 0.1),
-             middle = static_cast<float>(quantile(person.points, x, 0.5)),
-             depth = static_cast<float>(quantile(person.points, z, 0.5)),
+  const auto middle = static_cast<float>(quantile(person.points, x, 0.5)),
+             side = std::min(static_cast<float>(quantile(person.points, x, 0.995)) + 0.1f,
+                             middle + 0.5f),  // within arms stretched out
+      depth = static_cast<float>(quantile(person.points, z, 0.5)),
              front = static_cast<float>(quantile(person.points, z, 0.99) + 0.4),
              top = static_cast<float>(d.height);
   FigureLayer out{{}, {}, kMark};

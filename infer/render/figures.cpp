@@ -12,7 +12,7 @@ namespace restage {
 namespace {
 
 constexpr Rgb kPaper = {0xf7, 0xf8, 0xfa}, kInk = {0x2b, 0x30, 0x38}, kPale = {0x7a, 0x83, 0x90};
-constexpr int kMargin = 22, kTitle = 34, kCaption = 24, kLine = 20;
+constexpr int kMargin = 22, kTitle = 34, kCaption = 24, kLine = 20, kWidest = 1800;
 constexpr float kView = 0.36f;                        // a long lens: little perspective
 constexpr float kMostAside = 1.6f, kMostHigh = 3.2f;  // stray points may lie anywhere
 
@@ -81,9 +81,10 @@ Image figure_sheet(const std::vector<Figure>& figures, const FigureSheetOptions&
   const int top = kMargin + (options.title.empty() ? 0 : kTitle),
             row_height = options.cell_height + kCaption,
             lines = static_cast<int>(options.lines.size());
-  int width = 2 * kMargin + columns * cell_width;
+  int width = std::max(2 * kMargin + columns * cell_width,
+                       std::min(2 * kMargin + text_width(14, options.title), kWidest));
   for (const std::string& line : options.lines)
-    width = std::max(width, std::min(2 * kMargin + text_width(11, line), 1800));
+    width = std::max(width, std::min(2 * kMargin + text_width(11, line), kWidest));
   Image sheet(width, top + rows * row_height + lines * kLine + kMargin, kPaper);
   const int room = width - 2 * kMargin;
   draw_text(sheet, kMargin, kMargin - 4, 14, kInk, fitting(14, options.title, room));

@@ -61,10 +61,12 @@ class Arrays(CliTest):
         self.write("amass/ben/run_stageii.npz", clip(121, "mocap_frame_rate"))
         self.write("amass/ben/shape.npz", npz(betas=npy((2,), [0.0, 0.0])))
         self.write("amass/ben/broken.npz", clip()[:-30])
-        text = self.done("data", "import", "amass", "--body-model", "model.npz", "--out", "a.h5")
+        text = self.done("data", "import", "amass", "--body-model", "model.npz", "--out", "a.h5", "--verbose")
         for expected in ("2 motions, 47 frames", "SMPL-H, poses [61, 156]", "120 fps (mocap_frame_rate), 121 frames -> 30 fps, 31",
                          "2 of 2 betas", "left out 1 files that hold a shape", "skipped amass/ben/broken.npz"):
             self.assertIn(expected, text)
+        text = self.done("data", "import", "amass", "--body-model", "model.npz", "--out", "a.h5")
+        self.assertIn("amass/ann/walk_poses.npz: SMPL-H; model.npz; z up; 120 fps\n", text)
         found = self.json("data", "import", "amass", "--body-model", "model.npz", "--out", "b.h5")
         self.assertEqual((found["motions"], found["shapes"], len(found["skipped"])), (2, 1, 1))
         self.assertEqual([r["file"] for r in found["reports"]], ["amass/ann/walk_poses.npz", "amass/ben/run_stageii.npz"])

@@ -60,7 +60,7 @@ class Gltf(CliTest):
         counts = self.json("data", "inspect", "hero.h5")["counts"]
         self.assertEqual(counts["bodies"], 1)
         text = self.done("data", "import", "hero.glb", "--out", "hero.h5")
-        self.assertIn("  rest pose   turned onto the T-pose", text)
+        self.assertIn("  rest pose     turned onto the T-pose", text)
 
     def test_a_folder_may_mix_files(self):
         os.makedirs(self.path("in"))

@@ -95,8 +95,9 @@ testing::GlbParts export_model(const Model& model, size_t skin) {
     const int p = model.parents[b];
     const Vec3 offset =
         (model.heads[b] - (p < 0 ? Vec3(Vec3::Zero()) : model.heads[static_cast<size_t>(p)])) / 10;
-    out.root["nodes"].push_back(
-        {{"name", model.names[b]}, {"translation", {offset.x(), offset.y(), offset.z()}}});
+    testing::GltfJson& node = out.root["nodes"][b];  // parents need not come first
+    node["name"] = model.names[b];
+    node["translation"] = {offset.x(), offset.y(), offset.z()};
     if (p >= 0) out.root["nodes"][static_cast<size_t>(p)]["children"].push_back(b);
     Eigen::Affine3d bind = Eigen::Affine3d::Identity();
     bind.translation() = -model.heads[b] / 10;

@@ -136,7 +136,7 @@ std::vector<BadFile> bad_files() {
   return {
       {"empty.ply", "", "empty.ply: is empty and holds no points"},
       {"text.ply", "hello", "text.ply: is not a PLY file"},
-      {"text.xyz", "hello", "text.xyz: is neither PLY nor OBJ"},
+      {"text.xyz", "hello", "text.xyz: is neither PLY, OBJ nor glTF"},
       {"header.ply", "ply\nformat ascii 1.0\nelement vertex 3\n",
        "header.ply: is cut short inside the PLY header"},
       {"noformat.ply", "ply\nend_header\n", "noformat.ply:2: the PLY header names no format"},
