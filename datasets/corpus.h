@@ -23,7 +23,7 @@ struct SplitCounts {
 struct CorpusSource {
   /// "builtin", a data set file (datasets/schema.h), or a benchmark's folder: SPLIT.h5 in it.
   std::string source = "builtin";
-  uint64_t seed = 0;               ///< of the built-in source; seed and counts leave files alone
+  uint64_t seed = 0;  ///< of the built-in source; seed and counts leave files alone
   SplitCounts bodies{24, 6, 6};
   SplitCounts motions{120, 20, 20};
 };

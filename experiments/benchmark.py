@@ -47,7 +47,8 @@ class Restage:
         command = [self.program, *map(str, arguments), "--quiet", *(["--json"] if json_wanted else [])]
         done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         if done.returncode not in allowed:
-            raise Failed((done.stderr or done.stdout).strip().splitlines()[-1])
+            words = done.stderr.strip().splitlines()
+            raise Failed(words[-1] if words else f"restage {arguments[0]}: exit code {done.returncode}")
         return json.loads(done.stdout) if json_wanted else done.stdout
 
 
@@ -84,6 +85,9 @@ class Sequence:
 
     def scratch(self, name):
         return os.path.join(self.work, name)
+
+    def without_paths(self, text):
+        return text.replace(os.path.join(self.folder or "", ""), "").replace(os.path.join(self.work, ""), "")[:300]
 
 
 def sequences(restage, benchmark, name):
@@ -164,7 +168,7 @@ def run_row(restage, arguments, name, row, about):
                     if name == "references":
                         done[-1] = {"name": sequence.name, "frames": done[-1]["frames"], **found["references"]}
                 except Failed as failure:
-                    done.append({"name": sequence.name, "failed": str(failure)[:300]})
+                    done.append({"name": sequence.name, "failed": sequence.without_paths(str(failure))})
             frames += done[-1].get("frames", 0)
             say(f"{name}: {set_name}/{sequence.name}: " + (done[-1].get("failed") or "done"))
             write(path, made)
