@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <csignal>
@@ -24,11 +25,13 @@
 namespace restage::h5 {
 namespace {
 
-constexpr rlim_t kCpuSeconds = 10;  // a damaged file can also make the library loop for ever
-constexpr unsigned kWallSeconds = 120;
-constexpr int kShortOfMemory = 3;                   // the child's exit code
-constexpr hsize_t kReadWhole = hsize_t{64} << 20;   // bytes; larger data sets: first and last row
-constexpr hsize_t kReadInAll = hsize_t{256} << 20;  // after that, the ends only
+// A damaged file can also make the library loop for ever. Of processor time, with as much again for
+// every 100 MB of the file; the clock may go on ten times as long.
+constexpr rlim_t kCpuSeconds = 10;
+constexpr int kShortOfMemory = 3;                  // the child's exit code
+constexpr hsize_t kReadWhole = hsize_t{64} << 20;  // bytes; larger data sets: first and last row
+constexpr hsize_t kReadInAll = hsize_t{256}
+                               << 20;  // of values unpacked; after that, structure only
 
 hsize_t bytes_read = 0;  // by this child
 
@@ -55,8 +58,10 @@ void* take(hsize_t bytes) {
   return out;
 }
 
-/// Reads the selection of `count` rows from `first` into memory that is thrown away.
-void read_rows(hid_t set, hid_t type, int rank, const hsize_t* dims, hsize_t first, hsize_t count) {
+/// Reads the selection of `count` rows from `first` into memory that is thrown away. At least a
+/// whole `chunk` (bytes) is unpacked for it.
+void read_rows(hid_t set, hid_t type, int rank, const hsize_t* dims, hsize_t chunk, hsize_t first,
+               hsize_t count) {
   hsize_t start[H5S_MAX_RANK] = {}, size[H5S_MAX_RANK];
   hsize_t bytes = H5Tget_size(type);
   for (int i = 0; i < rank; ++i) {
@@ -65,38 +70,51 @@ void read_rows(hid_t set, hid_t type, int rank, const hsize_t* dims, hsize_t fir
     bytes *= size[i];
   }
   if (rank > 0) start[0] = first;
-  bytes_read += bytes;
+  bytes_read += std::max(bytes, chunk);
   void* out = take(bytes);
-  const hid_t space = H5Dget_space(set);
-  const hid_t memory = rank > 0 ? H5Screate_simple(rank, size, nullptr) : H5Screate(H5S_SCALAR);
+  const Handle space(H5Dget_space(set), H5Sclose);
+  const Handle memory(rank > 0 ? H5Screate_simple(rank, size, nullptr) : H5Screate(H5S_SCALAR),
+                      H5Sclose);
   if (rank > 0) H5Sselect_hyperslab(space, H5S_SELECT_SET, start, nullptr, size, nullptr);
   if (out != nullptr) tried(H5Dread(set, type, memory, space, H5P_DEFAULT, out));
   std::free(out);
 }
 
+/// Bytes of a chunk, unpacked; 0: not stored in chunks.
+hsize_t chunk_bytes(hid_t creation, size_t width) {
+  hsize_t chunk[H5S_MAX_RANK];
+  const int rank =
+      H5Pget_layout(creation) == H5D_CHUNKED ? H5Pget_chunk(creation, H5S_MAX_RANK, chunk) : 0;
+  if (rank <= 0) return 0;
+  double bytes = static_cast<double>(width);
+  for (int i = 0; i < rank; ++i) bytes *= static_cast<double>(chunk[i]);
+  return static_cast<hsize_t>(std::min(bytes, 1e15));
+}
+
 void read_dataset(hid_t set) {
-  const hid_t type = H5Dget_type(set), space = H5Dget_space(set),
-              creation = H5Dget_create_plist(set);
+  const Handle type(H5Dget_type(set), H5Tclose), space(H5Dget_space(set), H5Sclose),
+      creation(H5Dget_create_plist(set), H5Pclose);
   hsize_t dims[H5S_MAX_RANK] = {};
   const int rank = H5Sget_simple_extent_dims(space, dims, nullptr);
   if (type < 0 || rank < 0 || H5Pget_external_count(creation) > 0) return;
   H5Dget_storage_size(set);  // walks the whole index of chunks
+  if (bytes_read > kReadInAll) return;
   hsize_t bytes = H5Tget_size(type);
+  const hsize_t chunk = chunk_bytes(creation, bytes);
   bool whole = bytes > 0;
   for (int i = 0; i < rank; ++i) {
     whole = whole && (dims[i] == 0 || bytes <= kReadWhole / dims[i]);
     bytes *= dims[i];
   }
-  if (whole && bytes_read < kReadInAll)
-    return read_rows(set, type, rank, dims, 0, rank > 0 ? dims[0] : 1);
+  if (whole) return read_rows(set, type, rank, dims, chunk, 0, rank > 0 ? dims[0] : 1);
   if (rank == 0 || dims[0] == 0) return;
-  read_rows(set, type, rank, dims, 0, 1);
-  read_rows(set, type, rank, dims, dims[0] - 1, 1);
+  read_rows(set, type, rank, dims, chunk, 0, 1);
+  read_rows(set, type, rank, dims, chunk, dims[0] - 1, 1);
 }
 
 herr_t read_attribute(hid_t object, const char* name, const H5A_info_t*, void*) {
-  const hid_t id = H5Aopen(object, name, H5P_DEFAULT), type = H5Aget_type(id),
-              space = H5Aget_space(id);
+  const Handle id(H5Aopen(object, name, H5P_DEFAULT), H5Aclose);
+  const Handle type(H5Aget_type(id), H5Tclose), space(H5Aget_space(id), H5Sclose);
   const hssize_t values = H5Sget_simple_extent_npoints(space);
   const size_t width = type < 0 ? 0 : H5Tget_size(type);
   if (values <= 0 || width == 0 || static_cast<hsize_t>(values) > kReadWhole / width) return 0;
@@ -107,11 +125,10 @@ herr_t read_attribute(hid_t object, const char* name, const H5A_info_t*, void*) 
 }
 
 herr_t read_object(hid_t root, const char* name, const H5O_info_t*, void*) {
-  const hid_t object = tried(H5Oopen(root, name, H5P_DEFAULT));
+  const Handle object(tried(H5Oopen(root, name, H5P_DEFAULT)), H5Oclose);
   if (object < 0) return 0;
   tried(H5Aiterate2(object, H5_INDEX_NAME, H5_ITER_NATIVE, nullptr, read_attribute, nullptr));
   if (H5Iget_type(object) == H5I_DATASET) read_dataset(object);
-  H5Oclose(object);
   return 0;
 }
 
@@ -130,16 +147,16 @@ void limit(decltype(RLIMIT_AS) what, rlim_t soft, rlim_t hard) {
   ::setrlimit(what, &both);
 }
 
-[[noreturn]] void child(const char* path) {
+[[noreturn]] void child(const char* path, rlim_t seconds) {
   const int nowhere = ::open("/dev/null", O_WRONLY);
   if (nowhere >= 0) ::dup2(nowhere, STDERR_FILENO);
   for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGABRT, SIGALRM, SIGILL, SIGXCPU})
     std::signal(signal, SIG_DFL);
   limit(RLIMIT_CORE, 0, 0);
-  limit(RLIMIT_CPU, kCpuSeconds, kCpuSeconds + 1);  // SIGXCPU first, then SIGKILL
+  limit(RLIMIT_CPU, seconds, seconds + 1);  // SIGXCPU first, then SIGKILL
   if (const rlim_t used = address_space(); used > 0)
     limit(RLIMIT_AS, used + kProbeMemory, used + kProbeMemory);
-  ::alarm(kWallSeconds);
+  ::alarm(static_cast<unsigned>(10 * seconds));
   const hid_t file = tried(H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT));
   if (file >= 0) tried(H5Ovisit(file, H5_INDEX_NAME, H5_ITER_NATIVE, read_object, nullptr));
   // Any other error that the library reports is no crash: the parent will see it too.
@@ -180,7 +197,8 @@ Probe probe(const std::string& path) {
   if (pid < 0)
     throw WorkError(path + ": no process to read it in could be started (" + std::strerror(errno) +
                     "); end some others");
-  if (pid == 0) child(path.c_str());
+  if (pid == 0)
+    child(path.c_str(), kCpuSeconds * static_cast<rlim_t>(1 + identity[2] / 100'000'000));
   int status = 0;
   while (::waitpid(pid, &status, 0) < 0)
     if (errno != EINTR)

@@ -18,9 +18,9 @@ inline constexpr unsigned long kProbeMemory = 1ul << 30;
 
 /// The library trusts what a file says of itself: a damaged or hostile one can crash the process
 /// that reads it, fill its memory, or keep it busy for ever. So a child process reads it first,
-/// every object, attribute and value (of very large data sets the ends), with limits on memory and
-/// time. A file that passed is not read again while its size and times stay. Call it under the
-/// Lock. WorkError: no process to be had.
+/// every object and attribute and up to 256 MiB of values (of large data sets the ends), with
+/// limits on memory and time. A file that passed is not read again while its size and times stay.
+/// Call it under the Lock. WorkError: no process to be had.
 Probe probe(const std::string& path);
 
 }  // namespace restage::h5
