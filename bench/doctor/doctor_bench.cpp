@@ -77,8 +77,11 @@ int fit(const std::string& out, const std::string& file) {
   const std::vector<float> found =
       fit_orientation_prior(scans_to_fit(file, options.seed), options, say);
   std::string text =
-      "// Made by `doctor_bench fit` from built-in people and CMU motions (THIRD_PARTY.md): do not "
-      "edit.\n// Hundredths; kind of attitude, then |x|, then y, then z.\n";
+      "// Made by `doctor_bench fit`: do not edit. Hundredths; kind of attitude, |x|, y, z.\n"
+      "// From built-in people, MakeHuman bodies (CC0) and CMU motions: the data used in this "
+      "project\n"
+      "// was obtained from mocap.cs.cmu.edu. The database was created with funding from NSF\n"
+      "// EIA-0196217.\n";
   for (size_t i = 0; i < found.size(); ++i)
     text += std::to_string(std::lround(100 * found[i])) + (i % 20 == 19 ? ",\n" : ",");
   write_file_atomically(out, text);
