@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
 #include "datasets/sampling/clouds.h"
 #include "datasets/sampling/evaluation.h"
@@ -10,6 +11,7 @@
 #include "datasets/sampling/windows.h"
 #include "nn/weights/bundle.h"
 #include "nn/weights/state.h"
+#include "train/config.h"
 
 namespace restage::bench {
 namespace {
@@ -140,6 +142,18 @@ void add_trained(const std::string& folder, const std::string& weights) {
         write_weights(folder + "/trained", file, *net);
 }
 
+/// All bodies and motions of a file; of the built-in source its usual numbers, for both sizes.
+void write_training(const std::string& folder, const InputSettings& settings,
+                    const std::string& size) {
+  TrainConfig config;
+  load_config(settings.configs + "/" + size + "/all.yaml", {}, config);
+  config.data = {};
+  config.data.source = settings.data == "builtin"
+                           ? settings.data
+                           : std::filesystem::absolute(settings.data).string();
+  write_file_atomically(folder + "/" + size + ".yaml", resolved_yaml(config));
+}
+
 }  // namespace
 
 void make_inputs(const std::string& folder, const InputSettings& settings) {
@@ -157,6 +171,7 @@ void make_inputs(const std::string& folder, const InputSettings& settings) {
   for (const Model& m : kModels)
     write_weights(folder + "/initial", m.file,
                   *make_model(m.name, {}, Init{RngKey{0, 0}.fold(m.name), DType::f32}));
+  for (const char* size : {"lite", "paper"}) write_training(folder, settings, size);
   add_trained(folder, settings.lite);
   if (!settings.trained.empty()) add_trained(folder, settings.trained);
   std::filesystem::copy_file(settings.lite, folder + "/lite.safetensors",
@@ -175,6 +190,12 @@ std::string Inputs::path(const std::string& variant, const std::string& model) c
 
 bool Inputs::has(const std::string& variant, const std::string& model) const {
   return std::filesystem::exists(path(variant, model));
+}
+
+TrainConfig Inputs::training(const std::string& size) const {
+  TrainConfig config;
+  load_config(folder_ + "/" + size + ".yaml", {}, config);
+  return config;
 }
 
 void Inputs::load(Module& module, const std::string& variant, const std::string& model,

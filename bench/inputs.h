@@ -3,12 +3,14 @@
 //   initial/MODEL.safetensors     paper-size models as they start, PyTorch's names
 //   trained/MODEL.safetensors     the same after training, where there are such weights
 //   lite.safetensors              a whole lite system (nn/weights/bundle.h)
+//   lite.yaml, paper.yaml         trainings of all stages, on the data given
 #pragma once
 
 #include <string>
 
 #include "nn/models/registry.h"
 #include "nn/weights/safetensors.h"
+#include "train/stages/configs.h"
 
 namespace restage::bench {
 
@@ -16,9 +18,10 @@ inline constexpr int64_t kSurfacePoints = 6890;  ///< of deformation, as many as
 inline constexpr int64_t kFrames = 48;           ///< of the performance that online items play
 
 struct InputSettings {
-  std::string data = "builtin";  ///< or a data set file
-  std::string trained;           ///< weights file with a paper-size extractor, may be empty
-  std::string lite;              ///< weights file of a lite system
+  std::string data = "builtin";     ///< or a data set file
+  std::string trained;              ///< weights file with a paper-size extractor, may be empty
+  std::string lite;                 ///< weights file of a lite system
+  std::string configs = "configs";  ///< the folder with lite/all.yaml and paper/all.yaml
 };
 
 /// Makes the folder; everything is a function of the settings. InputError for unusable files.
@@ -37,6 +40,8 @@ class Inputs {
   void load(Module& module, const std::string& variant, const std::string& model,
             const std::string& prefix = "") const;
   std::string lite() const { return folder_ + "/lite.safetensors"; }
+  /// The training configuration "lite" or "paper".
+  TrainConfig training(const std::string& size) const;
 
  private:
   std::string path(const std::string& variant, const std::string& model) const;

@@ -1,5 +1,6 @@
-// What restage_bench can time: training steps, online frames and the kernels that dominate, all on
-// inputs and weights that LibTorch's program (libtorch/) reads from the same folder (inputs.h).
+// What restage_bench can time: training steps, reading, online frames and the kernels that
+// dominate, all on inputs and weights that LibTorch's program (libtorch/) reads from the same
+// folder (inputs.h).
 #pragma once
 
 #include <memory>
@@ -51,6 +52,7 @@ struct ItemInfo {
 std::vector<ItemInfo> items();
 /// One table each; items() joins them.
 std::vector<ItemInfo> training_items();
+std::vector<ItemInfo> reading_items();
 std::vector<ItemInfo> online_items();
 std::vector<ItemInfo> kernel_items();
 

@@ -170,7 +170,7 @@ std::vector<double> summary(const Tensor& x) {
 
 std::vector<ItemInfo> items() {
   std::vector<ItemInfo> all = training_items();
-  for (auto&& more : {online_items(), kernel_items()})
+  for (auto&& more : {reading_items(), online_items(), kernel_items()})
     all.insert(all.end(), more.begin(), more.end());
   return all;
 }

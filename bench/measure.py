@@ -66,6 +66,10 @@ class Process:
         self.child.wait()
 
 
+def is_reading(item):
+    return item["name"].startswith("reading_")
+
+
 def cores():
     return len(os.sched_getaffinity(0))
 
@@ -129,17 +133,19 @@ class Quiet:
         self.worst = 0.0
 
     def ask(self, process, request):
-        """The answer of the least disturbed attempt, with the cores that others used."""
+        """The answer of the least disturbed attempt, the cores that others used and the seconds of processor time that
+        the process itself took."""
         best = None
         while True:
             time.sleep(0.05)  # for the last process's threads to fall asleep
-            begin, own, busy = time.monotonic(), process.seconds() + time.process_time(), busy_seconds()
+            begin, own, ours, busy = time.monotonic(), process.seconds(), time.process_time(), busy_seconds()
             answer = process.ask(request)
             wall = time.monotonic() - begin
-            used = busy_seconds() - busy - (process.seconds() + time.process_time() - own)
+            own = process.seconds() - own
+            used = busy_seconds() - busy - own - (time.process_time() - ours)
             foreign = max(0.0, used - 2 * TICK) / wall
             if best is None or foreign < best[1]:
-                best = (answer, foreign)
+                best = (answer, foreign, own)
             if foreign <= FOREIGN_LIMIT:
                 self.patience = min(self.limit, self.patience + 1)
                 break
@@ -160,25 +166,27 @@ class Side:
         self.ours = isinstance(side, str)
         self.process = programs.start(side)
         self.request = f"run {item['name']} {side if self.ours else 'initial'}"
-        self.times, self.foreign, self.extra = [], [], {}
+        self.times, self.processor, self.foreign, self.extra = [], [], [], {}
         begin = time.monotonic()
         self.process.ask(f"{self.request} 0")  # builds the item and warms up
         self.seconds = time.monotonic() - begin
-        if self.seconds < 2 * REQUEST_SECONDS:
+        if self.seconds < 2 * REQUEST_SECONDS or is_reading(item):  # most of it was opening the data
             begin = time.monotonic()
             self.process.ask(f"{self.request} 1")
             self.seconds = time.monotonic() - begin  # of one repetition, with what is not timed in it
         self.repeats = 1
 
     def measure(self, quiet):
-        answer, foreign = quiet.ask(self.process, f"{self.request} {self.repeats}")
+        answer, foreign, own = quiet.ask(self.process, f"{self.request} {self.repeats}")
         self.times.append(statistics.median(answer.pop("ms")) / self.item["examples"])
+        self.processor.append(1e3 * own / self.repeats / self.item["examples"])
         self.foreign.append(foreign)
         self.extra.update(answer)
 
     def result(self):
         t = self.times
         return {"ms": statistics.median(t), "min": min(t), "max": max(t), "rounds": len(t), "all": t,
+                "processor": self.processor,
                 "peak_mib": self.process.peak_mib(), "foreign_cores": max(self.foreign), **self.extra}
 
 
@@ -230,6 +238,28 @@ def ratios(result):
         if by_kind:
             out[variant] = {**by_kind, "best": min(by_kind.values())}
     return out
+
+
+def reading(result):
+    """The loader beside the training that it feeds: examples a second of both; how many times as fast the loader
+    gives them as the rest of the step takes them, by the clock and by processor time, which others disturb less;
+    and its share of the step. Medians over the rounds."""
+    ours = result["ours"]
+    out = {f"{k}_per_s": 1e3 / statistics.median(r["all"]) for k, r in ours.items()}
+    for name, key in (("ratio", "all"), ("processor_ratio", "processor")):
+        out[name] = statistics.median([(t - r) / max(r, 1e-9)
+                                       for t, r in zip(ours["training"][key], ours["loader"][key])])
+    pairs = zip(ours["training"]["all"], ours["loader"]["all"])
+    return {**out, "share": statistics.median([r / t for t, r in pairs])}
+
+
+def memory_of_epoch(programs, item, quick):
+    """What the loader's process holds after 5,000 examples and after the 65,000 of an epoch, MiB."""
+    process = programs.start("loader")
+    few, many = (500, 6500) if quick else (5000, 65000)
+    answer = process.ask(f"memory {item['name']} loader {few} {many}")
+    process.close()
+    return {"examples": [few, many], **answer}
 
 
 def least(item, kind):
@@ -295,16 +325,18 @@ def main():
             sys.exit(f"there is no item {', '.join(sorted(unknown))}; there are " +
                      ", ".join(i["name"] for i in items))
         items = [i for i in items if i["name"] in a.items.split(",")]
+    elif a.libtorch:  # has no part in reading
+        items = [i for i in items if not is_reading(i)]
     for item in items:
-        item["compared"] = bool(a.libtorch) and not item["name"].endswith("_lite")
+        item["compared"] = bool(a.libtorch) and not item["name"].endswith("_lite") and not is_reading(item)
     compared = [i for i in items if i["compared"]]
-    out = {"ratios": {}, "ratios_installed": {}, "memory": {}, "quick": a.quick, "machine": machine()}
+    out = {"ratios": {}, "ratios_installed": {}, "reading": {}, "memory": {}, "quick": a.quick, "machine": machine()}
     if a.libtorch:
         say("do both give the same answers?")
         out["agreement"] = agreement(programs, compared)
     quiet = Quiet(patience=0 if a.quick else 20)
-    # A step of the large extractor takes longer than all others together.
-    weight = {i["name"]: 5 if i["name"] == "skeleton_train" else 1 for i in items}
+    # A step of the large extractor takes longer than those of all others together.
+    weight = {i["name"]: 5 if i["name"] in ("skeleton_train", "reading_skeleton_paper") else 1 for i in items}
     end = time.monotonic() + 60 * a.minutes
     for item in items:
         seconds = max(0.0, end - time.monotonic()) * weight[item["name"]] / sum(weight.values())
@@ -312,6 +344,8 @@ def main():
         say(f"{item['name']}: {item['what']}")
         item.update(measure_item(programs, item, quiet, seconds, a.quick))
         item["ratios"] = ratios(item)
+        if is_reading(item):
+            out["reading"][item["name"]] = {**reading(item), "memory": memory_of_epoch(programs, item, a.quick)}
     out["items"] = items
     out["disturbed"] = {"requests": quiet.requests, "above_limit": quiet.disturbed, "limit_cores": FOREIGN_LIMIT,
                         "worst_cores": quiet.worst}

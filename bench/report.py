@@ -47,11 +47,32 @@ def active_units(item, r):
     return [shares, f"{100 * r['done_gflop'] / item['examples'] / item['gflop']:.0f} %" if item["gflop"] else ""]
 
 
+def reading(out):
+    found = [(i, out["reading"][i["name"]]) for i in out["items"] if i["name"] in out["reading"]]
+    if not found:
+        return ""
+    rows = []
+    for i, r in found:
+        heap = r["memory"]["heap"]
+        rows.append([i["name"], i["per"], number(r["training_per_s"]), number(r["loader_per_s"]),
+                     number(r["loader_1fps_per_s"]) if "loader_1fps_per_s" in r else "", f"**{r['ratio']:.1f}**",
+                     f"{r['processor_ratio']:.1f}",
+                     f"{100 * r['share']:.1f} %", f"{heap[0]:.1f} -> {heap[1]:.1f}"])
+    few, many = found[0][1]["memory"]["examples"]
+    text = ("## Reading\n\nExamples a second: of whole training steps, of the loader alone, of the loader from one "
+            "frame a second of motion. Ratio: how many times as fast the loader gives examples as the rest of the step "
+            "takes them, by the clock and by processor time; heap: MiB in use after "
+            f"{few:,} examples and after {many:,}.\n\n")
+    return text + table(["item", "example", "training", "loader", "1 frame/s", "ratio", "processor", "of the step", "heap"], rows)
+
+
 def ours(out):
     rate, whose = sgemm_rate(out["items"])
     with_active = any("active" in r for i in out["items"] for r in i["ours"].values())
     rows = []
     for i in out["items"]:
+        if i["name"] in out["reading"]:
+            continue
         for variant, r in i["ours"].items():
             speed = i["gflop"] / r["ms"] * 1e3
             row = [i["name"], i["what"], variant, i["per"], spread(r), number(1e3 / r["ms"]),
@@ -60,6 +81,8 @@ def ours(out):
             if with_active:
                 row[8:8] = active_units(i, r)
             rows.append(row)
+    if not rows:
+        return ""
     columns = ["item", "what", "weights", "example", "ms", "a second", "GFLOP/s", "of sgemm", "peak MiB"]
     if with_active:
         columns[8:8] = ["active units", "work done"]
@@ -101,4 +124,4 @@ def memory(out):
 
 
 def markdown(out):
-    return "\n\n".join(p for p in (head(out), ours(out), against_libtorch(out), memory(out)) if p)
+    return "\n\n".join(p for p in (head(out), ours(out), reading(out), against_libtorch(out), memory(out)) if p)

@@ -9,9 +9,18 @@
 //                                      "active_scores" (autograd/kernels/stats.h), and "done_gflop"
 //                                      of one repetition
 //     check ITEM VARIANT               {"values": [...]}
+//     memory ITEM VARIANT FEW MANY     what the process holds after FEW examples of a fresh item
+//     and
+//                                      after MANY, [MiB, MiB] each: "heap" (all that was asked for
+//                                      and not freed, kept blocks of tensors included), "tensors",
+//                                      "resident"
+#include <malloc.h>
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <cmath>
+#include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -19,6 +28,7 @@
 #include "autograd/base/parallel.h"
 #include "autograd/kernels/matmul_precision.h"
 #include "autograd/kernels/stats.h"
+#include "autograd/tensor/tensor.h"
 #include "bench/items.h"
 
 namespace restage::bench {
@@ -45,6 +55,19 @@ json list(const Inputs& inputs) {
   return out;
 }
 
+/// Asked for and not freed, of all arenas.
+double heap_bytes() {
+  const struct mallinfo2 info = mallinfo2();
+  return static_cast<double>(info.uordblks + info.hblkhd);
+}
+
+double resident_bytes() {
+  std::ifstream statm("/proc/self/statm");
+  double total = 0, resident = 0;
+  statm >> total >> resident;
+  return resident * static_cast<double>(sysconf(_SC_PAGESIZE));
+}
+
 class Server {
  public:
   explicit Server(const std::string& folder) : inputs_(folder) {}
@@ -52,22 +75,44 @@ class Server {
   json answer(const std::string& line) {
     std::istringstream words(line);
     std::string verb, name, variant;
-    int repeats = 1;
+    int64_t count = 1, many = 1;
     words >> verb >> name >> variant;
     if (verb == "check") return {{"values", make(name, variant, false)->check()}};
-    if (verb != "run" || !(words >> repeats))
-      throw std::invalid_argument("unknown request: " + line);
-    return times(name, variant, repeats);
+    if (verb == "run" && words >> count) return times(name, variant, count);
+    if (verb == "memory" && words >> count >> many) return memory(name, variant, count, many);
+    throw std::invalid_argument("unknown request: " + line);
   }
 
  private:
-  std::unique_ptr<Item> make(const std::string& name, const std::string& variant, bool dropout) {
+  static ItemInfo info(const std::string& name) {
     for (const ItemInfo& i : items())
-      if (i.name == name) return i.make(inputs_, variant, dropout);
+      if (i.name == name) return i;
     throw std::invalid_argument("there is no item '" + name + "'");
   }
+  std::unique_ptr<Item> make(const std::string& name, const std::string& variant, bool dropout) {
+    return info(name).make(inputs_, variant, dropout);
+  }
 
-  json times(const std::string& name, const std::string& variant, int repeats) {
+  json memory(const std::string& name, const std::string& variant, int64_t few, int64_t many) {
+    item_.reset();
+    current_.clear();
+    const auto item = make(name, variant, true);
+    const int each = info(name).examples;
+    json out;
+    for (int64_t done = 0; done < many;) {
+      item->run();
+      const bool passes = done < few && done + each >= few;
+      done += each;
+      if (!passes && done < many) continue;
+      const auto add = [&](const char* key, double bytes) { out[key].push_back(bytes / 1048576); };
+      add("heap", heap_bytes());
+      add("tensors", static_cast<double>(memory_stats().in_use));
+      add("resident", resident_bytes());
+    }
+    return out;
+  }
+
+  json times(const std::string& name, const std::string& variant, int64_t repeats) {
     if (const std::string wanted = name + " " + variant; wanted != current_) {
       item_.reset();
       item_ = make(name, variant, true);
@@ -76,7 +121,7 @@ class Server {
     }
     std::vector<double> ms;
     take_kernel_stats();
-    for (int i = 0; i < repeats; ++i) {
+    for (int64_t i = 0; i < repeats; ++i) {
       item_->prepare();
       const auto start = std::chrono::steady_clock::now();
       item_->run();
@@ -89,7 +134,7 @@ class Server {
     if (std::isfinite(work.active_share)) {
       out["active"] = work.active_share;
       out["active_scores"] = work.active_score_share;
-      out["done_gflop"] = 1e-9 * work.flops / std::max(1, repeats);
+      out["done_gflop"] = 1e-9 * work.flops / static_cast<double>(std::max<int64_t>(1, repeats));
     }
     return out;
   }
@@ -116,6 +161,7 @@ int run(int argc, char** argv) {
   make->add_option("--data", settings.data, "'builtin' or a data set file");
   make->add_option("--trained", settings.trained, "weights file with a paper-size extractor");
   make->add_option("--lite", settings.lite, "weights file of the lite models")->required();
+  make->add_option("--configs", settings.configs, "folder with lite/all.yaml and paper/all.yaml");
   CLI::App* show = app.add_subcommand("list", "list the items as JSON");
   CLI::App* answer = app.add_subcommand("serve", "answer requests on standard input");
   answer->add_option("--threads", threads, "number of threads (0: all cores)");

@@ -54,6 +54,26 @@ class Ratios(unittest.TestCase):
         self.assertIsNone(measure.least({**alone, "ratios": {}}, "best"))
 
 
+class Reading(unittest.TestCase):
+    ITEM = {"name": "reading_skeleton_lite", "what": "x", "per": "cloud", "examples": 12, "gflop": 0, "libtorch": {},
+            "ours": {"training": times(11, 6, 30, processor=[22, 12, 60]), "loader": times(1, 2, 3, processor=[2, 4, 2]),
+                     "loader_1fps": times(4, 4, 4)}}
+
+    def test_pairs_of_one_round(self):
+        r = measure.reading(self.ITEM)
+        self.assertEqual(r["ratio"], 9.0)  # the median of 10, 2 and 9: what the step takes without reading
+        self.assertEqual(r["processor_ratio"], 10.0)
+        self.assertAlmostEqual(r["share"], 0.1)
+        self.assertEqual((r["training_per_s"], r["loader_per_s"], r["loader_1fps_per_s"]), (1000 / 11, 500.0, 250.0))
+
+    def test_table(self):
+        found = {**measure.reading(self.ITEM), "memory": {"examples": [5000, 65000], "heap": [7.0, 7.04]}}
+        text = report.reading({"items": [ITEM, self.ITEM], "reading": {self.ITEM["name"]: found}})
+        self.assertIn("| reading_skeleton_lite | cloud | 90.9 | 500 | 250 | **9.0** | 10.0 | 10.0 % | 7.0 -> 7.0 |", text)
+        self.assertNotIn("skeleton_train", text)
+        self.assertEqual(report.reading({"items": [ITEM], "reading": {}}), "")
+
+
 class DisturbedRequests(unittest.TestCase):
     def ask(self, foreign, patience):
         """Requests of which number i finds others using foreign[i] seconds."""
@@ -73,7 +93,7 @@ class DisturbedRequests(unittest.TestCase):
         measure.busy_seconds, measure.time.monotonic = busy_seconds, monotonic
         try:
             quiet = measure.Quiet(patience)
-            answer, load = quiet.ask(process, "run")
+            answer, load, _ = quiet.ask(process, "run")
         finally:
             measure.busy_seconds, measure.time.monotonic = original
         return answer["ms"][0], load, quiet.disturbed
@@ -89,7 +109,7 @@ class Report(unittest.TestCase):
     def test_tables(self):
         item = {**ITEM, "ratios": measure.ratios(ITEM)}
         text = report.markdown({
-            "items": [item], "machine": measure.machine(), "quick": True, "agreement": {"skeleton_train": 1e-6},
+            "items": [item], "reading": {}, "machine": measure.machine(), "quick": True, "agreement": {"skeleton_train": 1e-6},
             "disturbed": {"requests": 9, "above_limit": 1, "limit_cores": 0.05, "worst_cores": 0.5},
             "memory": {"skeleton_train": {"ours": 10.0, "libtorch_tuned": 40.0}}})
         self.assertIn("Not a result", text)

@@ -25,6 +25,8 @@ class Stage {
   /// Optimiser step number `step` (from 0). Everything random is a function of (seed, step), so a
   /// resumed run repeats the same bits. Returns what to log.
   virtual NamedValues step(int64_t step) = 0;
+  /// Draws the examples of that step and forgets them: what reading alone costs (bench/README.md).
+  virtual void read(int64_t step) const = 0;
   /// Held-out figures by the evaluation's own metrics.
   virtual NamedValues validate() = 0;
   /// All that a checkpoint needs: models, optimisers, anything carried from step to step.

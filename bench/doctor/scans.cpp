@@ -65,7 +65,11 @@ TrueScan ScanMaker::make(uint64_t index) const {
   TrueScan out;
   const size_t b = rng.below(state_->corpus.bodies.size());
   const Body& body = state_->corpus.bodies[b];
-  const FrameRef at = state_->frames.at(rng.below(state_->frames.count()));
+  FrameRef at = state_->frames.at(rng.below(state_->frames.count()));
+  if (recipe.by_clip_share > 0 && rng.uniform() < recipe.by_clip_share) {
+    at.motion = rng.below(state_->corpus.motions.size());
+    at.frame = rng.below(state_->corpus.motions[at.motion].frames());
+  }
   out.rest = rng.uniform() < recipe.rest_share;
   const auto n = static_cast<size_t>(recipe.least) +
                  rng.below(static_cast<uint64_t>(recipe.most - recipe.least + 1));

@@ -13,6 +13,7 @@ struct ScanRecipe {
   double rest_share = 0.1;       ///< scans that show the T-pose
   double heading = 20;           ///< degrees to either side of +z
   double one_side_share = 0;     ///< scans that one depth camera sees
+  double by_clip_share = 0;      ///< scans of any clip alike; the others of any frame alike
   double stray_share = 0;        ///< scans with a few per cent of stray points
 };
 

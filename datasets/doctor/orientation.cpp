@@ -33,6 +33,8 @@ Mat3 Orientation::turn() const {
   return out;
 }
 
+OrientationVote::OrientationVote() : OrientationVote(orientation_prior()) {}
+
 void OrientationVote::add(const Points& cloud, bool faces) {
   const NormalisedCloud seen = normalised(cloud);
   if (!(seen.size > 0)) return;
@@ -42,7 +44,7 @@ void OrientationVote::add(const Points& cloud, bool faces) {
   for (int u = 0; u < kUps; ++u)
     for (int h = 0; h < kHeadings; ++h) {
       look(seen.points, hypothesis(u, h), places);
-      most = std::max(most, p[u][h] = score(orientation_prior(), places));
+      most = std::max(most, p[u][h] = score(coefficients_, places));
     }
   for (auto& row : p)
     for (double& x : row) total += (x = std::exp(x - most));

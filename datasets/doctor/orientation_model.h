@@ -1,7 +1,7 @@
 // The statistical model behind orientation.h: where the points of a person lie who stands along y
 // and faces +z. A cloud, turned in some way, is scored by what lies where on a coarse grid; the
-// coefficients of the places (orientation_prior.inc) are fitted to posed built-in bodies by
-// `doctor_bench fit` (bench/doctor). Internal to this folder and to that program.
+// coefficients of the places (orientation_prior.inc) are fitted to posed bodies by `doctor_bench
+// fit` (bench/doctor). Internal to this folder and to that program.
 #pragma once
 
 #include <span>
@@ -46,8 +46,7 @@ float score(std::span<const float> coefficients, const Places& at, float* kinds 
 /// degrees from the first of two level axes to +z. Multiples of six are permutations of axes.
 Eigen::Matrix3f hypothesis(int up, int heading);
 
-inline constexpr int kKinds = 1;  ///< one was enough for the figures of docs/results.md
-/// The fitted coefficients, kKinds x kPlaces of them.
+/// The fitted coefficients: a multiple of kPlaces.
 std::span<const float> orientation_prior();
 
 }  // namespace restage::doctor_detail

@@ -12,7 +12,7 @@
 #include "datasets/readers/mesh_io.h"
 #include "datasets/schema.h"
 #include "infer/writers/glb.h"
-#include "tests/datasets/gltf_maker.h"
+#include "tests/datasets/gltf_styles.h"
 
 namespace restage {
 namespace {
@@ -21,62 +21,14 @@ namespace fs = std::filesystem;
 using testing::CharacterMaker;
 using testing::known_character;
 using testing::KnownCharacter;
+using testing::kTurnedRound;
+using testing::mixamo_style;
 using testing::plain_style;
 using testing::RigStyle;
-
-const Mat3 kLyingDown = Eigen::AngleAxisd(-M_PI / 2, Vec3::UnitX()).toRotationMatrix();
-const Mat3 kTurnedRound = Eigen::AngleAxisd(M_PI, Vec3::UnitY()).toRotationMatrix();
-
-Eigen::Affine3d scaled(double scale, const Mat3& turn = Mat3::Identity()) {
-  Eigen::Affine3d out = Eigen::Affine3d::Identity();
-  out.linear() = scale * turn;
-  return out;
-}
-
-/// Mixamo through Blender: centimetres and z up below an armature of scale 0.01, bones with axes.
-RigStyle mixamo_style(const std::string& prefix = "mixamorig:") {
-  RigStyle out;
-  const char* names[kJoints] = {
-      "Hips",        "LeftUpLeg",    "RightUpLeg",    "Spine",    "LeftLeg",     "RightLeg",
-      "Spine1",      "LeftFoot",     "RightFoot",     "Spine2",   "LeftToeBase", "RightToeBase",
-      "Neck",        "LeftShoulder", "RightShoulder", "Head",     "LeftArm",     "RightArm",
-      "LeftForeArm", "RightForeArm", "LeftHand",      "RightHand"};
-  for (int j = 0; j < kJoints; ++j) out.names[j] = prefix + names[j];
-  out.armature = scaled(0.01, kLyingDown);
-  out.bone_axes = true;
-  return out;
-}
-
-/// Unreal: an A-pose, twist bones, centimetres that nothing scales.
-RigStyle unreal_style() {
-  RigStyle out;
-  out.names = {"pelvis",     "thigh_l",    "thigh_r",    "spine_01", "calf_l",     "calf_r",
-               "spine_02",   "foot_l",     "foot_r",     "spine_03", "ball_l",     "ball_r",
-               "neck_01",    "clavicle_l", "clavicle_r", "head",     "upperarm_l", "upperarm_r",
-               "lowerarm_l", "lowerarm_r", "hand_l",     "hand_r"};
-  out.world = scaled(100);
-  out.armature = scaled(1, kLyingDown);
-  out.bone_axes = true;
-  out.arms_down = 45;
-  out.twist_bones = true;
-  out.fps = 24;
-  out.keys = 25;
-  return out;
-}
-
-/// VRM 0: faces -z; nodes have names of their own, the extension says which bone is which.
-RigStyle vrm_style() {
-  RigStyle out;
-  for (int j = 0; j < kJoints; ++j) out.names[j] = "J_" + std::to_string(100 + j);
-  out.world = scaled(1, kTurnedRound);
-  return out;
-}
-
-const char* kVrmNames[kJoints] = {
-    "hips",         "leftUpperLeg",  "rightUpperLeg", "spine",      "leftLowerLeg", "rightLowerLeg",
-    "chest",        "leftFoot",      "rightFoot",     "upperChest", "leftToes",     "rightToes",
-    "neck",         "leftShoulder",  "rightShoulder", "head",       "leftUpperArm", "rightUpperArm",
-    "leftLowerArm", "rightLowerArm", "leftHand",      "rightHand"};
+using testing::scaled;
+using testing::unreal_style;
+using testing::vrm_parts;
+using testing::vrm_style;
 
 class ImportersGltf : public ::testing::Test {
  protected:
@@ -182,16 +134,7 @@ TEST_F(ImportersGltf, UnrealInAnAPoseWithTwistBones) {
 
 TEST_F(ImportersGltf, VrmByItsListOfBonesTurnedToTheFront) {
   for (const bool list : {true, false}) {
-    CharacterMaker maker(known_, vrm_style());
-    testing::GltfJson bones;
-    for (int j = 0; j < kJoints; ++j) {
-      if (list)
-        bones.push_back({{"bone", kVrmNames[j]}, {"node", j}});
-      else
-        bones[kVrmNames[j]] = {{"node", j}};
-    }
-    maker.parts.root["extensions"][list ? "VRM" : "VRMC_vrm"]["humanoid"]["humanBones"] = bones;
-    const Character found = read_character(write("hero.vrm", maker.parts));
+    const Character found = read_character(write("hero.vrm", vrm_parts(known_, list)));
     expect_known(found, 0.05, 1e-4);
     EXPECT_NE(fact(found.report, "facing").find("180"), std::string::npos);
   }

@@ -7,11 +7,13 @@
 
 #include "autograd/base/error.h"
 #include "datasets/importers/bvh.h"
-#include "tests/datasets/importers_bvh_text.h"
+#include "tests/datasets/importers_bvh_styles.h"
 
 namespace restage {
 namespace {
 
+using bvh_test::bones_along_x;
+using bvh_test::names_of;
 using bvh_test::Style;
 
 std::string fact(const ImportReport& report, const std::string& name) {
@@ -54,35 +56,6 @@ Errors errors(const MotionClip& clip, const Style& style) {
     }
   }
   out.mean /= static_cast<double>(count);
-  return out;
-}
-
-/// Names of a profile, as a file of the family has them.
-std::vector<std::string> names_of(const std::string& profile, const std::string& prefix = "") {
-  std::vector<std::string> out;
-  const Profile found = find_profile(profile);
-  for (const auto& bones : found.bones) out.push_back(bones.empty() ? "none" : prefix + bones[0]);
-  return out;
-}
-
-/// Every bone along +x at zero rotations, twisted as LAFAN1's are.
-Rotations bones_along_x() {
-  const Vec3 x = Vec3::UnitX(), y = Vec3::UnitY(), z = Vec3::UnitZ();
-  const auto frame = [](const Vec3& bone, const Vec3& second) {
-    Mat3 m;
-    m << bone, second, bone.cross(second);
-    return m;
-  };
-  Rotations out;
-  out.fill(frame(y, z));  // the trunk: up, front, left
-  for (const int j : {1, 2, 4, 5}) out[j] = frame(-y, z);
-  for (const int j : {13, 16, 18, 20}) out[j] = frame(x, -z);
-  for (const int j : {14, 17, 19, 21}) out[j] = frame(-x, -z);
-  for (const int j : {7, 8, 10, 11}) {
-    const Vec3 foot = (bvh_test::rest()[10] - bvh_test::rest()[7]).normalized();
-    const Vec3 level(0, foot.y(), std::sqrt(1 - foot.y() * foot.y()));
-    out[j] = frame(level, Vec3(0, level.z(), -level.y()));
-  }
   return out;
 }
 

@@ -37,6 +37,7 @@ class Disturbed final : public Stage {
     if (step == when_) what_();
     return stage_->step(step);
   }
+  void read(int64_t step) const override { stage_->read(step); }
   NamedValues validate() override { return stage_->validate(); }
   void save(TensorFile& file) const override { stage_->save(file); }
   void load(const TensorFile& file, const std::string& where) override {
@@ -180,6 +181,7 @@ class Watched final : public Stage {
     steps_.push_back(matmul_precision());
     return stage_->step(step);
   }
+  void read(int64_t step) const override { stage_->read(step); }
   NamedValues validate() override {
     validations_.push_back(matmul_precision());
     return stage_->validate();

@@ -64,9 +64,14 @@ Var DeformationStage::root_loss(Context& ctx, const DeformationBatch& b) const {
              Var(minus_centroid(b.rest_points)));
 }
 
+PairBatch DeformationStage::batch(int64_t step) const {
+  const int64_t n = config_.optimiser.batch;
+  return sampler_.batch(step * n, n);
+}
+
 NamedValues DeformationStage::step(int64_t step) {
   const OptimiserConfig& o = config_.optimiser;
-  const DeformationBatch b = batch_of(sampler_.batch(step * o.batch, o.batch));
+  const DeformationBatch b = batch_of(batch(step));
   const bool with_offsets = config_.offsets && step >= config_.skinning_steps;
   double distance = 0;
   const Differentiated d = differentiate(key_.fold(static_cast<uint64_t>(step)), [&](Context& ctx) {

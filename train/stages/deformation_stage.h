@@ -16,12 +16,14 @@ class DeformationStage final : public Stage {
   int64_t steps() const override { return config_.optimiser.steps; }
   int64_t examples_per_step() const override { return config_.optimiser.batch; }
   NamedValues step(int64_t step) override;
+  void read(int64_t step) const override { batch(step); }
   NamedValues validate() override;
   void save(TensorFile& file) const override;
   void load(const TensorFile& file, const std::string& where) override;
   void export_models(ModelSet& set) override;
 
  private:
+  PairBatch batch(int64_t step) const;
   DeformationBatch batch_of(const PairBatch& pairs) const;
   Var root_loss(Context& ctx, const DeformationBatch& batch) const;
 

@@ -117,29 +117,36 @@ void MotionStage::update_discriminator(int64_t step, const WindowBatch& batch, d
   values->push_back({"discriminator", d.loss});
 }
 
+MotionStage::Batch MotionStage::batch(int64_t step) const {
+  const int64_t n = config_.optimiser.batch;
+  Batch out;
+  if (config_.self_first_pass)
+    out.self = std::llround(config_.windows.self_share * static_cast<double>(n));
+  out.cycle = n - out.self;
+  if (out.cycle > 0) out.windows = sampler_.batch(step * out.cycle, out.cycle);
+  if (out.self > 0) out.own = self_sampler_.batch(step * out.self, out.self);
+  return out;
+}
+
 NamedValues MotionStage::step(int64_t step) {
   const OptimiserConfig& o = config_.optimiser;
   const double rate = learning_rate(o.schedule, step, o.steps);
-  const int64_t self = config_.self_first_pass
-                           ? std::llround(config_.windows.self_share * static_cast<double>(o.batch))
-                           : 0;
-  const int64_t cycle = o.batch - self;
+  const Batch b = batch(step);
+  const int64_t cycle = b.cycle, self = b.self;
   const double self_part = static_cast<double>(self) / static_cast<double>(o.batch);
   NamedValues values;
   MotionLosses l, s;
   const bool adversarial = config_.weights.adversarial > 0 && cycle > 1;
-  const WindowBatch windows = cycle > 0 ? sampler_.batch(step * cycle, cycle) : WindowBatch{};
-  const WindowBatch own = self > 0 ? self_sampler_.batch(step * self, self) : WindowBatch{};
-  if (adversarial) update_discriminator(step, windows, rate, &values);
+  if (adversarial) update_discriminator(step, b.windows, rate, &values);
   const Differentiated d = differentiate(key_.fold(static_cast<uint64_t>(step)), [&](Context& ctx) {
     Var total;
     if (self > 0) {
-      s = self_losses(ctx, *model_, motion_batch(own), config_.weights);
+      s = self_losses(ctx, *model_, motion_batch(b.own), config_.weights);
       total = scale(s.total, self_part);
     }
     if (cycle > 0) {
       l = motion_losses(ctx, *model_, adversarial ? discriminator_.get() : nullptr,
-                        motion_batch(windows), config_.weights);
+                        motion_batch(b.windows), config_.weights);
       const Var part = scale(l.total, 1 - self_part);
       total = self > 0 ? total + part : part;
     }

@@ -16,6 +16,7 @@ class MotionStage final : public Stage {
   int64_t steps() const override { return config_.optimiser.steps; }
   int64_t examples_per_step() const override { return config_.optimiser.batch; }
   NamedValues step(int64_t step) override;
+  void read(int64_t step) const override { batch(step); }
   /// Errors against the true motion of B, as the evaluation measures them, and the two losses whose
   /// drifting apart shows B becoming a hidden code for A.
   NamedValues validate() override;
@@ -24,6 +25,12 @@ class MotionStage final : public Stage {
   void export_models(ModelSet& set) override;
 
  private:
+  /// Windows of a step: for the cycle, and self samples apart; either may be undefined.
+  struct Batch {
+    int64_t cycle = 0, self = 0;  ///< how many
+    WindowBatch windows, own;
+  };
+  Batch batch(int64_t step) const;
   void set_statistics();
   /// Discriminator's own step, unless it is winning clearly (spec 4.4).
   void update_discriminator(int64_t step, const WindowBatch& batch, double rate,

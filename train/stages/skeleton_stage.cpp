@@ -67,11 +67,16 @@ Var SkeletonStage::loss(Context& ctx, const CloudBatch& batch) const {
   return total;
 }
 
+CloudBatch SkeletonStage::batch(int64_t step) const {
+  const int64_t n = config_.optimiser.batch;
+  return sampler_.batch(step * n, n);
+}
+
 NamedValues SkeletonStage::step(int64_t step) {
   const OptimiserConfig& o = config_.optimiser;
-  const CloudBatch batch = sampler_.batch(step * o.batch, o.batch);
+  const CloudBatch clouds = batch(step);
   const Differentiated d = differentiate(key_.fold(static_cast<uint64_t>(step)),
-                                         [&](Context& ctx) { return loss(ctx, batch); });
+                                         [&](Context& ctx) { return loss(ctx, clouds); });
   const double rate = learning_rate(o.schedule, step, o.steps);
   adam_.step(d.gradients, rate, o.clip);
   return {{"loss", d.loss}, {"gradient_norm", d.norm}, {"rate", rate}};

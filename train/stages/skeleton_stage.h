@@ -16,12 +16,14 @@ class SkeletonStage final : public Stage {
   int64_t steps() const override { return config_.optimiser.steps; }
   int64_t examples_per_step() const override { return config_.optimiser.batch; }
   NamedValues step(int64_t step) override;
+  void read(int64_t step) const override { batch(step); }
   NamedValues validate() override;
   void save(TensorFile& file) const override;
   void load(const TensorFile& file, const std::string& where) override;
   void export_models(ModelSet& set) override;
 
  private:
+  CloudBatch batch(int64_t step) const;
   Var loss(Context& ctx, const CloudBatch& batch) const;
 
   SkeletonStageConfig config_;
