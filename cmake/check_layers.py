@@ -50,7 +50,7 @@ ONLY_IN = {
     "hdf5.h": ["datasets/hdf5/"],
     "yaml-cpp/": ["train/config_yaml.cpp", "nn/weights/", "datasets/importers/profiles.cpp"],
     "CLI/": ["experiments/"],
-    "nanoflann.hpp": ["nn/metrics/", "datasets/doctor/"],
+    "nanoflann.hpp": ["nn/metrics/", "datasets/doctor/", "infer/registration/"],
     "nlohmann/": ["nn/weights/", "datasets/readers/", "datasets/benchmark/manifest.cpp", "train/", "infer/",
                   "experiments/"],
     "openssl/": ["datasets/benchmark/sha256.cpp"],

@@ -2,6 +2,7 @@
 
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <map>
 
 #include "autograd/base/error.h"
@@ -67,7 +68,17 @@ Corpus builtin_corpus(const CorpusSource& source, const std::string& split) {
   return out;
 }
 
-Corpus file_corpus(const std::string& path, const std::string& split) {
+/// The file that holds a split: of a benchmark's folder each has its own.
+std::string file_of(const std::string& source, const std::string& split) {
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(source, ignored)) return source;
+  if (split.empty())
+    throw InputError(source, "is a folder of splits", "name train.h5, validation.h5 or test.h5");
+  return source + "/" + split + ".h5";
+}
+
+Corpus file_corpus(const std::string& source, const std::string& split) {
+  const std::string path = file_of(source, split);
   Corpus out;
   const Inspection about = inspect(path);
   out.bodies = read_bodies(path, split);

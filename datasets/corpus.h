@@ -21,8 +21,9 @@ struct SplitCounts {
 
 /// What load_corpus() loads.
 struct CorpusSource {
-  std::string source = "builtin";  ///< "builtin" or a data set file (datasets/schema.h)
-  uint64_t seed = 0;               ///< of the built-in source; seed and counts leave files alone
+  /// "builtin", a data set file (datasets/schema.h), or a benchmark's folder: SPLIT.h5 in it.
+  std::string source = "builtin";
+  uint64_t seed = 0;  ///< of the built-in source; seed and counts leave files alone
   SplitCounts bodies{24, 6, 6};
   SplitCounts motions{120, 20, 20};
 };
@@ -30,7 +31,7 @@ struct CorpusSource {
 /// All of it, or one split ("train", "validation", "test"; else InputError). A body belongs to one
 /// split, and a motion to the split of its subject, so splits never share either. InputError if
 /// there is no body or no motion, if what is loaded has a subject in two splits, or if the file is
-/// missing or damaged.
+/// missing or damaged; all of a folder.
 Corpus load_corpus(const CorpusSource& source, const std::string& split = "");
 /// The bodies and the motions of one split. InputError if either is missing.
 Corpus subset(const Corpus& corpus, const std::string& split);

@@ -38,6 +38,8 @@ struct ConfigNode {
 /// Limits of one configuration, all files and aliases together.
 inline constexpr size_t kConfigMaxBytes = 1 << 20, kConfigMaxNodes = 100'000;
 inline constexpr int kConfigMaxDepth = 32, kConfigMaxFiles = 64;
+/// Keys of one section: they are looked for one by one.
+inline constexpr size_t kConfigMaxKeys = 1000;
 
 /// Parses one YAML document whose root must be a map (`any_root`: anything). Errors (InputError):
 /// broken YAML, duplicate keys, tags, merge keys, more than one document, too deep or too large.

@@ -14,6 +14,13 @@
 namespace restage {
 namespace {
 
+/// yaml-cpp's messages may quote what it did not understand.
+std::string printable(std::string text) {
+  for (char& c : text)
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
+  return text;
+}
+
 class TreeBuilder : public YAML::EventHandler {
  public:
   TreeBuilder(const std::string& source, bool lines) : source_(source), lines_(lines) {}
@@ -125,6 +132,9 @@ class TreeBuilder : public YAML::EventHandler {
     Frame& map = stack_.back();
     if (node.text == "<<")
       fail(mark, "merge keys ('<<') are not supported", "use 'include: file.yaml'");
+    if (map.node.children.size() >= kConfigMaxKeys)
+      fail(mark, "more than " + std::to_string(kConfigMaxKeys) + " keys in one section",
+           "give a configuration file");
     if (const ConfigNode* first = map.node.find(node.text))
       fail(mark,
            "the key " + in_quotes(node.text) + " stands here a second time (first in line " +
@@ -176,7 +186,8 @@ ConfigNode parse_yaml(std::string_view text, const std::string& source, bool any
   } catch (const YAML::Exception& error) {
     const int line = error.mark.is_null() ? 0 : error.mark.line + 1;
     throw InputError(ConfigPlace{source, any_root ? 0 : line, 0}.text(),
-                     "is not YAML (" + error.msg.substr(0, 80) + ")", "mend it here or just above");
+                     "is not YAML (" + printable(error.msg.substr(0, 80)) + ")",
+                     "mend it here or just above");
   }
   ConfigNode root = std::move(builder.root);
   if (root.place.source.empty()) root.place = root.key_place = {source, any_root ? 0 : 1, 1};

@@ -16,7 +16,7 @@
 namespace restage::h5 {
 namespace {
 
-constexpr uint64_t kAlwaysAllowed = uint64_t{256} << 20;  // bytes that any data set may claim
+constexpr uint64_t kAlwaysAllowed = uint64_t{64} << 20;  // bytes that any data set may claim
 constexpr uint64_t kMostCompression = 2000;  // gzip reaches 1032; beyond this, a claim is a lie
 constexpr uint64_t kLargestChunk = uint64_t{256} << 20;
 constexpr uint64_t kLargestRead = uint64_t{16} << 30;
@@ -115,6 +115,20 @@ Shape extent_of(hid_t space, const std::string& where) {
     shape.push_back(static_cast<int64_t>(dims[i]));
   }
   return shape;
+}
+
+void check_probe(Probe probed, const std::string& path) {
+  if (probed == Probe::crashed)
+    throw InputError(path, "is an HDF5 file, but damaged, cut short or still being written",
+                     "copy or make the file again");
+  if (probed == Probe::memory)
+    throw InputError(path,
+                     "takes more than " + std::to_string(kProbeMemory >> 20) +
+                         " MiB to read, which no file of this kind needs",
+                     "make it again with smaller chunks (h5repack)");
+  if (probed == Probe::time)
+    throw InputError(path, "is an HDF5 file whose reading finds no end",
+                     "copy or make the file again");
 }
 
 uint64_t file_size(const std::string& path) {
@@ -291,13 +305,11 @@ File File::open(const std::string& path) {
   auto state = std::make_unique<State>(path);
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   H5Pset_fclose_degree(access, H5F_CLOSE_STRONG);
-  if (survives_reading(path)) state->id = H5Fopen(path.c_str(), H5F_ACC_RDONLY, access);
-  if (state->id < 0) {
-    if (H5Fis_hdf5(path.c_str()) > 0)
-      throw InputError(path, "is an HDF5 file, but damaged, cut short or still being written",
-                       "copy or make the file again");
+  if (H5Fis_hdf5(path.c_str()) <= 0)
     throw InputError(path, "is not an HDF5 file", "give an HDF5 file (.h5)");
-  }
+  check_probe(probe(path), path);
+  state->id = H5Fopen(path.c_str(), H5F_ACC_RDONLY, access);
+  if (state->id < 0) check_probe(Probe::crashed, path);
   return File(std::move(state));
 }
 

@@ -3,14 +3,19 @@
 #include <fcntl.h>
 #include <hdf5.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
+#include <set>
 
+#include "autograd/base/error.h"
 #include "datasets/hdf5/detail.h"
 
 // The child is a copy of a process that may have threads: only plain library calls here, no
@@ -21,23 +26,33 @@ namespace {
 
 constexpr rlim_t kCpuSeconds = 10;  // a damaged file can also make the library loop for ever
 constexpr unsigned kWallSeconds = 120;
+constexpr int kShortOfMemory = 3;                   // the child's exit code
 constexpr hsize_t kReadWhole = hsize_t{64} << 20;   // bytes; larger data sets: first and last row
 constexpr hsize_t kReadInAll = hsize_t{256} << 20;  // after that, the ends only
 
 hsize_t bytes_read = 0;  // by this child
 
-/// Version of the superblock, which may stand at 0, 512, 1024, ...; -1 if there is none.
-int superblock_version(const std::string& path) {
-  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (fd < 0) return -1;
-  int version = -1;
-  for (off_t at = 0; version < 0 && at < (off_t{1} << 40); at = at == 0 ? 512 : at * 2) {
-    unsigned char head[9];
-    if (::pread(fd, head, sizeof head, at) != static_cast<ssize_t>(sizeof head)) break;
-    if (std::memcmp(head, "\x89HDF\r\n\x1a\n", 8) == 0) version = head[8];
-  }
-  ::close(fd);
-  return version;
+bool short_of_memory = false;
+
+herr_t find_shortage(unsigned, const H5E_error2_t* entry, void*) {
+  short_of_memory =
+      short_of_memory || (entry->maj_num == H5E_RESOURCE &&
+                          (entry->min_num == H5E_NOSPACE || entry->min_num == H5E_CANTALLOC));
+  return 0;
+}
+
+/// Notes whether a call failed for want of memory; the next call forgets why this one failed.
+template <class Result>
+Result tried(Result result) {
+  if (result < 0) H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, find_shortage, nullptr);
+  return result;
+}
+
+/// Memory for values that nobody looks at.
+void* take(hsize_t bytes) {
+  void* out = std::malloc(static_cast<size_t>(bytes));
+  short_of_memory = short_of_memory || out == nullptr;
+  return out;
 }
 
 /// Reads the selection of `count` rows from `first` into memory that is thrown away.
@@ -51,11 +66,11 @@ void read_rows(hid_t set, hid_t type, int rank, const hsize_t* dims, hsize_t fir
   }
   if (rank > 0) start[0] = first;
   bytes_read += bytes;
-  void* out = std::malloc(static_cast<size_t>(bytes));
+  void* out = take(bytes);
   const hid_t space = H5Dget_space(set);
   const hid_t memory = rank > 0 ? H5Screate_simple(rank, size, nullptr) : H5Screate(H5S_SCALAR);
   if (rank > 0) H5Sselect_hyperslab(space, H5S_SELECT_SET, start, nullptr, size, nullptr);
-  if (out != nullptr) H5Dread(set, type, memory, space, H5P_DEFAULT, out);
+  if (out != nullptr) tried(H5Dread(set, type, memory, space, H5P_DEFAULT, out));
   std::free(out);
 }
 
@@ -85,48 +100,97 @@ herr_t read_attribute(hid_t object, const char* name, const H5A_info_t*, void*) 
   const hssize_t values = H5Sget_simple_extent_npoints(space);
   const size_t width = type < 0 ? 0 : H5Tget_size(type);
   if (values <= 0 || width == 0 || static_cast<hsize_t>(values) > kReadWhole / width) return 0;
-  void* out = std::malloc(static_cast<size_t>(values) * width);
-  if (out != nullptr) H5Aread(id, type, out);
+  void* out = take(static_cast<hsize_t>(values) * width);
+  if (out != nullptr) tried(H5Aread(id, type, out));
   std::free(out);
   return 0;
 }
 
 herr_t read_object(hid_t root, const char* name, const H5O_info_t*, void*) {
-  const hid_t object = H5Oopen(root, name, H5P_DEFAULT);
+  const hid_t object = tried(H5Oopen(root, name, H5P_DEFAULT));
   if (object < 0) return 0;
-  H5Aiterate2(object, H5_INDEX_NAME, H5_ITER_NATIVE, nullptr, read_attribute, nullptr);
+  tried(H5Aiterate2(object, H5_INDEX_NAME, H5_ITER_NATIVE, nullptr, read_attribute, nullptr));
   if (H5Iget_type(object) == H5I_DATASET) read_dataset(object);
   H5Oclose(object);
   return 0;
 }
 
+/// Bytes of address space in use; the limit comes on top, as this process may be large already.
+rlim_t address_space() {
+  char text[64] = {};
+  const int fd = ::open("/proc/self/statm", O_RDONLY | O_CLOEXEC);
+  const ssize_t n = fd < 0 ? -1 : ::read(fd, text, sizeof text - 1);
+  ::close(fd);
+  return n <= 0 ? 0
+                : std::strtoul(text, nullptr, 10) * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE));
+}
+
+void limit(decltype(RLIMIT_AS) what, rlim_t soft, rlim_t hard) {
+  const rlimit both{soft, hard};
+  ::setrlimit(what, &both);
+}
+
 [[noreturn]] void child(const char* path) {
   const int nowhere = ::open("/dev/null", O_WRONLY);
   if (nowhere >= 0) ::dup2(nowhere, STDERR_FILENO);
-  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGABRT, SIGALRM, SIGILL})
+  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGABRT, SIGALRM, SIGILL, SIGXCPU})
     std::signal(signal, SIG_DFL);
-  const rlimit no_core{0, 0};
-  ::setrlimit(RLIMIT_CORE, &no_core);
-  const rlimit cpu{kCpuSeconds, kCpuSeconds};
-  ::setrlimit(RLIMIT_CPU, &cpu);
+  limit(RLIMIT_CORE, 0, 0);
+  limit(RLIMIT_CPU, kCpuSeconds, kCpuSeconds + 1);  // SIGXCPU first, then SIGKILL
+  if (const rlim_t used = address_space(); used > 0)
+    limit(RLIMIT_AS, used + kProbeMemory, used + kProbeMemory);
   ::alarm(kWallSeconds);
-  const hid_t file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
-  if (file >= 0) H5Ovisit(file, H5_INDEX_NAME, H5_ITER_NATIVE, read_object, nullptr);
-  ::_exit(0);  // an error that the library reports is no crash: the parent will see it too
+  const hid_t file = tried(H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT));
+  if (file >= 0) tried(H5Ovisit(file, H5_INDEX_NAME, H5_ITER_NATIVE, read_object, nullptr));
+  // Any other error that the library reports is no crash: the parent will see it too.
+  ::_exit(short_of_memory ? kShortOfMemory : 0);
+}
+
+Probe outcome(int status) {
+  if (WIFEXITED(status))
+    return WEXITSTATUS(status) == 0                ? Probe::good
+           : WEXITSTATUS(status) == kShortOfMemory ? Probe::memory
+                                                   : Probe::crashed;
+  const int signal = WTERMSIG(status);
+  return signal == SIGXCPU || signal == SIGALRM ? Probe::time : Probe::crashed;
+}
+
+/// What tells one state of a file from another.
+using Identity = std::array<int64_t, 7>;
+
+Identity identity_of(const std::string& path) {
+  struct stat s {};
+  if (::stat(path.c_str(), &s) != 0) return {};
+  return {static_cast<int64_t>(s.st_dev),
+          static_cast<int64_t>(s.st_ino),
+          s.st_size,
+          s.st_mtim.tv_sec,
+          s.st_mtim.tv_nsec,
+          s.st_ctim.tv_sec,
+          s.st_ctim.tv_nsec};
 }
 
 }  // namespace
 
-bool survives_reading(const std::string& path) {
-  const int version = superblock_version(path);
-  if (version < 0 || version >= 3) return true;
+Probe probe(const std::string& path) {
+  static std::set<Identity> passed;  // guarded by the Lock
+  const Identity identity = identity_of(path);
+  if (passed.count(identity) != 0) return Probe::good;
   const pid_t pid = ::fork();
-  if (pid < 0) return true;  // no process to spare: read it unprobed
+  if (pid < 0)
+    throw WorkError(path + ": no process to read it in could be started (" + std::strerror(errno) +
+                    "); end some others");
   if (pid == 0) child(path.c_str());
   int status = 0;
   while (::waitpid(pid, &status, 0) < 0)
-    if (errno != EINTR) return true;
-  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
+    if (errno != EINTR)
+      throw WorkError(path + ": the process that reads it was lost (" + std::strerror(errno) +
+                      "); run it again");
+  const Probe out = outcome(status);
+  // Of a file that changed just now, a further change may not show in its times.
+  constexpr int64_t kSettled = 5;  // seconds
+  if (out == Probe::good && std::time(nullptr) - identity[5] > kSettled) passed.insert(identity);
+  return out;
 }
 
 }  // namespace restage::h5

@@ -5,11 +5,22 @@
 
 namespace restage::h5 {
 
-/// The older file layouts (most programs write them) carry no checksums over their structure, and
-/// the library trusts it: a damaged file can crash the process that reads it. Such a file is first
-/// read by a child process, every object, attribute and value (of very large data sets the ends).
-/// False if the child did not survive. Files of the newest layout (ours) are checksummed
-/// throughout: true at once. Call it under the Lock.
-bool survives_reading(const std::string& path);
+enum class Probe {
+  good,
+  crashed,  ///< the library fell over, as it does on damaged structure
+  memory,   ///< it asked for more than kProbeMemory
+  time,     ///< it found no end
+};
+
+/// What reading may take: a chunk as large as we read any, 256 MiB, packed and (zlib's output grows
+/// by doubling) twice that unpacked, the values themselves, 64 MiB, and the library's own caches.
+inline constexpr unsigned long kProbeMemory = 1ul << 30;
+
+/// The library trusts what a file says of itself: a damaged or hostile one can crash the process
+/// that reads it, fill its memory, or keep it busy for ever. So a child process reads it first,
+/// every object, attribute and value (of very large data sets the ends), with limits on memory and
+/// time. A file that passed is not read again while its size and times stay. Call it under the
+/// Lock. WorkError: no process to be had.
+Probe probe(const std::string& path);
 
 }  // namespace restage::h5

@@ -140,12 +140,14 @@ SourceMotion read_motion(const Npz& file, const Joints& rest, const Mat3& up) {
 }
 
 /// Brings the motion to 30 fps and says how.
-std::string resampled(SourceMotion& motion, const std::string& from, const std::string& path) {
+std::string resampled(SourceMotion& motion, uint64_t bytes, const std::string& from,
+                      const std::string& path) {
   const std::string before = number_text(motion.fps) + " fps (" + from + "), ";
   const size_t frames = motion.local.size();
   if (!(static_cast<double>(frames) / motion.fps < kMaxSeconds))
     throw InputError(path, "lasts more than 9 hours at " + number_text(motion.fps) + " fps",
                      "cut it, or give the true rate with --fps");
+  check_length(frames, kJoints, motion.fps, bytes, path);
   if (motion.fps == kFps) return before + std::to_string(frames) + " frames, kept";
   motion = resample(motion);
   return before + std::to_string(frames) + " frames -> 30 fps, " +
@@ -153,7 +155,7 @@ std::string resampled(SourceMotion& motion, const std::string& from, const std::
 }
 
 /// Remarks on a body that lies: an option that is wrong, or a motion on the floor.
-void check_upright(const std::vector<PosedSkeleton>& poses, ImportReport& report) {
+void check_upright(const Poses& poses, ImportReport& report) {
   Vec3 sum = Vec3::Zero();
   for (const PosedSkeleton& pose : poses) sum += pose.joints[15] - pose.joints[0];
   if (sum.y() < 0.5 * sum.norm())
@@ -252,9 +254,9 @@ Motion import_amass(const Npz& file, BodyModels& models, const AmassOptions& opt
                                            : to_string(options.up) + " (--up)");
   std::string from;
   motion.fps = rate_of(file, options.fps, from);
-  fact("rate", resampled(motion, from, file.path()));
+  fact("rate", resampled(motion, poses.bytes(), from, file.path()));
 
-  std::vector<PosedSkeleton> posed(motion.local.size());
+  Poses posed(motion.local.size());
   const JointMap map = identity_map();
   for (size_t f = 0; f < posed.size(); ++f) posed[f] = source_pose(motion, map, f);
   check_upright(posed, report);

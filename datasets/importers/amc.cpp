@@ -39,6 +39,8 @@ MotionClip convert_amc(std::string_view text, const std::string& path, std::stri
   AmcFile amc = parse_amc(text, path, asf);
   const std::optional<Profile> profile = asked_profile(options);
   Recording recording;
+  recording.bytes = text.size();
+  check_length(amc.frames.size(), asf.bones.size(), kAmcFps, text.size(), path);
   recording.format = "AMC on " + fs::path(asf_path).filename().string();
   recording.rate_of_file = "AMC files say none, the CMU set is 120 fps";
   recording.rate_known = false;

@@ -60,6 +60,9 @@ MotionClip convert_bvh(std::string_view text, const std::string& path,
   char rate[60];
   std::snprintf(rate, sizeof rate, "the file says %.6g fps", frame_rate(file.frame_time));
   recording.rate_of_file = rate;
+  recording.bytes = text.size();
+  check_length(file.frames.size(), file.skeleton.size(), frame_rate(file.frame_time), text.size(),
+               path);
   const int hips = recording.names.map[0].joint;
   recording.motion = motion_of(std::move(file), hips);
   return make_clip(std::move(recording), path, options);

@@ -104,7 +104,7 @@ CmuClip convert(const RawClip& raw, bool with_joints, const std::string& where) 
   one.moving = {0};
   one.local.assign(1, std::vector<Quat>(n));
   one.position.assign(1, std::vector<Vec3>(1));
-  std::vector<PosedSkeleton> poses(frames);
+  Poses poses(frames);
   CmuClip out;
   for (size_t f = 0; f < frames; ++f) {
     for (size_t j = 0; j < n; ++j) one.local[0][j] = unpack(&raw.rotations[(f * n + j) * 4], where);

@@ -123,14 +123,15 @@ void cut_frames(SourceMotion& motion, const MotionOptions& options, const std::s
 }
 
 /// The frames at 30 fps in terms of the rest pose.
-std::vector<PosedSkeleton> poses_at_30_fps(SourceMotion motion, const JointMap& map,
-                                           const RestPose& rest, const std::string& path) {
+Poses poses_at_30_fps(SourceMotion motion, const JointMap& map, const RestPose& rest,
+                      uint64_t bytes, const std::string& path) {
   const double seconds = static_cast<double>(motion.local.size()) / motion.fps;
   if (!(seconds * kFps < static_cast<double>(kMaxFrames)))
     throw InputError(path, "lasts " + text_of(seconds) + " s",
                      "cut it into files of at most 9 hours");
+  check_length(motion.local.size(), motion.skeleton.size(), motion.fps, bytes, path);
   motion = resample(motion);
-  std::vector<PosedSkeleton> poses(motion.local.size());
+  Poses poses(motion.local.size());
   for (size_t f = 0; f < poses.size(); ++f) {
     poses[f] = source_pose(motion, map, f);
     for (size_t j = 0; j < kJoints; ++j) {
@@ -194,7 +195,8 @@ MotionClip make_clip(Recording recording, const std::string& path, const MotionO
   cut_frames(motion, options, path, report);
   const double fps = motion.fps;
   const size_t frames = motion.local.size();
-  const std::vector<PosedSkeleton> poses = poses_at_30_fps(std::move(motion), map, rest, path);
+  const Poses poses = poses_at_30_fps(std::move(motion), map, rest, recording.bytes, path);
+  clip.joints.reserve(poses.size());
   report.facts.emplace_back(
       "rate",
       (fps == kFps ? "30 fps, taken as they are"

@@ -52,6 +52,7 @@ struct Recording {
   std::string rate_of_file;    ///< "the file says 120 fps": for the report
   bool rate_known = true;      ///< false: not by the file, but by custom
   double metres_per_unit = 0;  ///< if the file says it
+  uint64_t bytes = 0;          ///< of the file, unpacked
 };
 
 /// Units, axes, rest pose, rate: found or as given, each with a fact in the report. Quarter turns

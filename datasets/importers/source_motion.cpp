@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "autograd/base/error.h"
+
 namespace restage {
 namespace {
 
@@ -26,6 +28,18 @@ Joints rest_joints(const SourceSkeleton& skeleton, const JointMap& map) {
   const Vec3 pelvis = out[0];
   for (Vec3& x : out) x -= pelvis;
   return out;
+}
+
+void check_length(size_t frames, size_t joints, double fps, uint64_t bytes,
+                  const std::string& path) {
+  const double most = static_cast<double>(frames) * std::max(1.0, kFps / fps);
+  const auto payload = static_cast<double>(bytes);
+  // 22 positions of a frame are 528 bytes; a joint's three angles take at least 6 in a text.
+  if (most > 100'000 + payload / 66 || most * static_cast<double>(joints) > 6e6 + payload / 2)
+    throw InputError(path,
+                     "would make " + std::to_string(static_cast<int64_t>(most)) + " frames of " +
+                         std::to_string(joints) + " joints, far more than is in the file",
+                     "check its frame rate, or cut it");
 }
 
 SourceMotion resample(const SourceMotion& motion, double fps) {
@@ -94,13 +108,13 @@ double floor_height(std::vector<double> lowest) {
   return lowest[a] + (at - static_cast<double>(a)) * (lowest[b] - lowest[a]);
 }
 
-double floor_height(const std::vector<PosedSkeleton>& poses) {
+double floor_height(const Poses& poses) {
   std::vector<double> lowest;
   for (const PosedSkeleton& pose : poses) lowest.push_back(lowest_foot(pose));
   return floor_height(std::move(lowest));
 }
 
-Motion to_motion(const std::vector<PosedSkeleton>& poses, const Joints& rest, double floor_y) {
+Motion to_motion(const Poses& poses, const Joints& rest, double floor_y) {
   Motion out;
   out.rest = rest;
   out.global.resize(poses.size());

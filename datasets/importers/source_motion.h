@@ -2,6 +2,8 @@
 // Units: metres, y up, once scaled; rotations are relative to the source's own zero pose.
 #pragma once
 
+#include <cstdint>
+#include <deque>
 #include <string>
 #include <vector>
 
@@ -48,19 +50,28 @@ JointMap map_joints(const SourceSkeleton& skeleton, const std::string& where,
 /// Positions of the 22 joints at zero rotations, relative to the pelvis.
 Joints rest_joints(const SourceSkeleton& skeleton, const JointMap& map);
 
+/// A slow frame rate, or joints that never move, make a long motion of a few bytes: InputError if
+/// these frames, as they are or at 30 fps, are far more than a file of `bytes` can mean (in memory:
+/// beyond 64 MB and 8 times the file).
+void check_length(size_t frames, size_t joints, double fps, uint64_t bytes,
+                  const std::string& path);
+
 /// Slerp of local rotations and linear interpolation of translations at t = k / 30 s.
 SourceMotion resample(const SourceMotion& motion, double fps = kFps);
 
 /// Global rotations and positions of the 22 joints in one frame.
 PosedSkeleton source_pose(const SourceMotion& motion, const JointMap& map, size_t frame);
 
+/// Frame by frame; in pieces, as the frames of hours are many.
+using Poses = std::deque<PosedSkeleton>;
+
 /// 5th percentile over frames of the lowest ankle or foot: the height of the clip's floor.
-double floor_height(const std::vector<PosedSkeleton>& poses);
+double floor_height(const Poses& poses);
 /// The same from lowest_foot() of each frame.
 double floor_height(std::vector<double> lowest);
 double lowest_foot(const PosedSkeleton& pose);
 
 /// World rotations and hips over the floor. The frames must be at 30 fps already.
-Motion to_motion(const std::vector<PosedSkeleton>& poses, const Joints& rest, double floor_y);
+Motion to_motion(const Poses& poses, const Joints& rest, double floor_y);
 
 }  // namespace restage

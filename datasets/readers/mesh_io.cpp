@@ -56,8 +56,9 @@ bool is_mesh_name(const std::string& path) {
   return ends_in(path, ".ply") || ends_in(path, ".obj") || is_gltf_name(path);
 }
 
-Mesh read_mesh(const std::string& path) {
-  const std::string content = read_file(path);
+Mesh read_mesh(const std::string& path) { return parse_mesh(read_file(path), path); }
+
+Mesh parse_mesh(const std::string& content, const std::string& path) {
   Mesh mesh;
   if (content.empty()) {
     throw InputError(path, "is empty and holds no points", "give a mesh or cloud that has some");

@@ -14,6 +14,8 @@ namespace restage {
 /// become fans of triangles; normals, colours, texture coordinates and groups are ignored; a file
 /// without faces is a cloud. Coordinates are kept as they are (metres by convention).
 Mesh read_mesh(const std::string& path);
+/// The same from memory.
+Mesh parse_mesh(const std::string& content, const std::string& path);
 
 /// Binary little-endian PLY, float32: keeps every bit. Atomic; WorkError on a full disk.
 void write_ply(const std::string& path, const Mesh& mesh);

@@ -8,7 +8,7 @@
 namespace restage {
 namespace {
 
-constexpr uint64_t kDecoderMemory = uint64_t{256} << 20;
+constexpr uint64_t kDecoderMemory = uint64_t{80} << 20;  // xz -9 needs 65 MiB
 
 std::string unpack_xz(const std::string& packed, const std::string& path, uint64_t limit) {
   lzma_stream stream = LZMA_STREAM_INIT;

@@ -8,6 +8,7 @@
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/eval_report.h"
+#include "experiments/cli/eval_world.h"
 #include "experiments/cli/weights_path.h"
 #include "experiments/evaluation.h"
 #include "nn/geometry/closed_form.h"
@@ -22,7 +23,8 @@ using metrics::SequenceView;
 using metrics::Track;
 
 struct EvalOptions {
-  std::string run, pred, truth, source, rest, out;
+  std::string run, pred, truth, source, rest, mended, out;
+  int64_t every = 1;
   bool variants = false, per_joint = false;
 };
 
@@ -39,6 +41,26 @@ struct File {
                                  : Track{data.vertices.data(), data.frames, data.vertex_count};
   }
   int64_t sequences() const { return static_cast<int64_t>(data.sequence_offset.size()) - 1; }
+
+  /// Keeps every `step`-th frame of each sequence, from its first.
+  void thin(int64_t step) {
+    std::vector<int64_t> kept, offset{0};
+    for (int64_t s = 0; s < sequences(); ++s) {
+      const auto i = static_cast<size_t>(s);
+      for (int64_t f = data.sequence_offset[i]; f < data.sequence_offset[i + 1]; f += step)
+        kept.push_back(f);
+      offset.push_back(std::ssize(kept));
+    }
+    for (std::vector<double>* values : {&data.joints, &data.vertices}) {
+      const auto row = static_cast<std::ptrdiff_t>(values->size()) / data.frames;
+      for (size_t k = 0; k < kept.size(); ++k)
+        std::copy_n(values->begin() + kept[k] * row, row,
+                    values->begin() + static_cast<std::ptrdiff_t>(k) * row);
+      values->resize(kept.size() * static_cast<size_t>(row));
+    }
+    data.frames = std::ssize(kept);
+    data.sequence_offset = std::move(offset);
+  }
 };
 
 std::string counted(int64_t n, const std::string& what) { return std::to_string(n) + " " + what; }
@@ -97,8 +119,9 @@ std::vector<Joints> joints_of(const Track& track) {
 /// The references for every sequence, as if they had been predicted.
 class References {
  public:
-  References(const EvalOptions& options, const File& truth, const std::vector<int64_t>& offset)
-      : source_(options.source), rest_(options.rest) {
+  /// `source` and `rest` as read, in the world and of the truth's frames.
+  References(File source, File rest, const File& truth, const std::vector<int64_t>& offset)
+      : source_(std::move(source)), rest_(std::move(rest)) {
     check_same_frames(source_, truth);
     for (const File* file : {&source_, &rest_})
       if (!file->joints().present())
@@ -233,6 +256,38 @@ int run_eval_run(const EvalOptions& options, const Common& common) {
   return 0;
 }
 
+/// Source joints of scans with a frame of their own go to the world, and so does what was predicted
+/// from mended ones: turned and moved, its path stretched about the world's origin as the truth's
+/// is, its size left as it was predicted.
+std::optional<WorldMap> into_world(const EvalOptions& options, File& pred,
+                                   std::optional<File>& source, const std::optional<File>& rest) {
+  const std::optional<WorldMap> to_world = source_to_world(options.truth);
+  if (to_world && source) to_world->carry(source->data.joints, false);
+  if (options.mended.empty()) return std::nullopt;
+  if (!to_world)
+    throw InputError(options.truth, "does not say where its scans are",
+                     "leave --mended out: nothing was in a frame of its own");
+  const WorldMap map = mended_to_world(options.mended, *to_world);
+  const bool joints = source->joints().present() && rest->joints().present();
+  const double stretched = joints ? trajectory_scale(joints_of(source->joints().slice(0, 1))[0],
+                                                     joints_of(rest->joints().slice(0, 1))[0])
+                                  : 1;
+  map.carry(pred.data.joints, true, stretched);
+  map.carry(pred.data.vertices, true, stretched);
+  return map;
+}
+
+std::vector<metrics::Metric> chosen_metrics(const EvalOptions& options) {
+  std::vector<metrics::Metric> out(metrics::table().begin(), metrics::table().end());
+  if (options.variants)
+    out.insert(out.end(), metrics::variants().begin(), metrics::variants().end());
+  // Frames that do not follow each other have no acceleration.
+  for (metrics::Metric& m : out)
+    if (options.every > 1 && std::string(m.name).find("acc") != std::string::npos)
+      m.compute = [](const SequenceView&) { return metrics::Value(); };
+  return out;
+}
+
 int run_eval(const EvalOptions& options, const Common& common) {
   if (!options.run.empty()) {
     if (!options.run.starts_with("run="))
@@ -248,18 +303,30 @@ int run_eval(const EvalOptions& options, const Common& common) {
   if (options.source.empty() != options.rest.empty())
     throw InputError("", "--source and --rest belong together",
                      "give both for the references, or neither");
-  const File pred(options.pred), truth(options.truth);
+  if (options.every < 1) throw InputError("", "--every is out of range", "give 1 or more frames");
+  if (!options.mended.empty() && options.source.empty())
+    throw InputError("", "--mended needs --source and --rest", "give both");
+  File pred(options.pred), truth(options.truth);
+  std::optional<File> source, rest;
+  if (!options.source.empty()) {
+    source.emplace(options.source);
+    rest.emplace(options.rest);
+  }
+  const std::optional<WorldMap> mended = into_world(options, pred, source, rest);
+  if (options.every > 1) {
+    truth.thin(options.every);
+    if (source) source->thin(options.every);
+  }
   check_pair(pred, truth);
   const std::vector<int64_t> offset = common_sequences(pred, truth);
 
-  std::vector<metrics::Metric> chosen(metrics::table().begin(), metrics::table().end());
-  if (options.variants)
-    chosen.insert(chosen.end(), metrics::variants().begin(), metrics::variants().end());
   EvalReport report;
+  const std::vector<metrics::Metric> chosen = chosen_metrics(options);
   report.metrics = chosen;
   for (size_t s = 0; s + 1 < offset.size(); ++s) report.frames.push_back(offset[s + 1] - offset[s]);
-  if (!options.source.empty())
-    report.references = References(options, truth, offset).evaluate(offset, truth, chosen);
+  if (source)
+    report.references = References(std::move(*source), std::move(*rest), truth, offset)
+                            .evaluate(offset, truth, report.metrics);
   report.model =
       metrics::evaluate(cut(offset, pred.joints(), pred.vertices(), truth), report.metrics);
 
@@ -268,6 +335,8 @@ int run_eval(const EvalOptions& options, const Common& common) {
     Json document = to_json(report);
     for (size_t j = 0; j < by_joint.size(); ++j)
       document["pa_mpjpe_by_joint"][std::string(kJointNames[j])] = by_joint[j];
+    if (mended)
+      document["mended"] = {{"scale_error", 1 / mended->scale}, {"tilt_degrees", mended->tilt()}};
     print_json(document);
     return 0;
   }
@@ -294,6 +363,10 @@ void add_eval(Program& program) {
   app.add_option("--source", options->source, "joints of the source, for the references");
   app.add_option("--rest", options->rest,
                  "rest joints of the target (one row, or one a sequence), for the references");
+  app.add_option("--every", options->every,
+                 "the prediction holds only every so many frames of the truth's sequences");
+  app.add_option("--mended", options->mended,
+                 "what restage doctor --fix made of the scans that the prediction is from");
   app.add_flag("--variants", options->variants, "further alignments: rigid, sequence, root");
   app.add_flag("--per-joint", options->per_joint, "also the aligned error of every joint");
 }

@@ -17,7 +17,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr uint64_t kHeaderLimit = 100'000'000;  // as in the format's reference implementation
-constexpr int kDepthLimit = 4;                  // { name: { shape: [ ... ] } }
+constexpr int kMostNumbers = 64;                // of a list in the header
+constexpr uint64_t kMostElements = uint64_t{1} << 48;
+constexpr uint64_t kLargest = std::numeric_limits<int64_t>::max();
 constexpr const char* kFix = "give an undamaged safetensors file";
 
 static_assert(std::endian::native == std::endian::little, "the format is little-endian");
@@ -67,20 +69,128 @@ float from_bfloat(uint16_t h) {
   return out;
 }
 
+/// What the header says of a tensor; nothing of it is believed yet.
+struct Claim {
+  std::string name, dtype;
+  bool has_dtype = false, has_shape = false, has_offsets = false;
+  bool shape_is_list = false, offsets_are_list = false;
+  bool whole = true;  ///< all numbers of the lists are whole and fit 64 bits
+  std::vector<uint64_t> shape, offsets;
+};
+
+/// The header as the JSON library reads it, piece by piece, so that no text makes more of itself in
+/// memory than it is: { name: { key: [ numbers ] } }, every name and key once. (The library's own
+/// tree grows to many times the text, and filtering it takes quadratic time.)
+class Header : public Json::json_sax_t {
+ public:
+  explicit Header(const std::string& where) : where_(where) {}
+
+  std::vector<Claim> claims;
+  std::map<std::string, std::string> metadata;
+
+  bool null() override { return other(); }
+  bool boolean(bool) override { return other(); }
+  bool number_integer(number_integer_t) override { return other(); }  // only negative ones
+  bool number_float(number_float_t, const string_t&) override { return other(); }
+  bool binary(binary_t&) override { return other(); }
+
+  bool number_unsigned(number_unsigned_t n) override {
+    if (depth_ != 3) return other();
+    count_number();
+    if (list_ != nullptr) list_->push_back(n);
+    return true;
+  }
+  bool string(string_t& text) override {
+    if (depth_ != 2) return other();
+    if (in_metadata_)
+      metadata[key_] = text;
+    else if (key_ == "dtype")
+      claims.back().has_dtype = true, claims.back().dtype = text;
+    else
+      other();
+    return true;
+  }
+
+  bool start_object(size_t) override {
+    if (depth_ == 1 && !in_metadata_) claims.emplace_back().name = name_;
+    if (++depth_ > 2) fail("has a header nested too deeply");
+    keys_.clear();
+    return true;
+  }
+  bool key(string_t& key) override {
+    const bool name = depth_ == 1;
+    if (!(name ? names_ : keys_).insert(key).second)
+      fail("names " + std::string(name ? "the tensor " : "") + name_in_quotes(key) + " twice");
+    (name ? name_ : key_) = key;
+    if (name) in_metadata_ = key == "__metadata__";
+    return true;
+  }
+  bool end_object() override {
+    --depth_;
+    return true;
+  }
+  bool start_array(size_t) override {
+    if (depth_ == 2 && in_metadata_) other();
+    if (depth_ != 2) fail("has a header nested too deeply");
+    ++depth_;
+    numbers_ = 0;
+    Claim& claim = claims.back();
+    list_ = key_ == "shape" ? &claim.shape : key_ == "data_offsets" ? &claim.offsets : nullptr;
+    if (key_ == "shape") claim.has_shape = claim.shape_is_list = true;
+    if (key_ == "data_offsets") claim.has_offsets = claim.offsets_are_list = true;
+    return true;
+  }
+  bool end_array() override {
+    --depth_;
+    return true;
+  }
+  bool parse_error(size_t, const std::string&, const Json::exception&) override { return false; }
+
+ private:
+  [[noreturn]] void fail(const std::string& wrong) const { throw InputError(where_, wrong, kFix); }
+
+  void count_number() {
+    if (++numbers_ > kMostNumbers)
+      fail("has a list of more than " + std::to_string(kMostNumbers) + " numbers in its header");
+  }
+
+  /// A value that is not of the kind that belongs here.
+  bool other() {
+    if (depth_ == 1 && in_metadata_) fail("has metadata that is no JSON object");
+    if (depth_ == 2 && in_metadata_)
+      fail("has metadata " + name_in_quotes(key_) + " that is no text");
+    if (depth_ == 1) {
+      claims.emplace_back().name = name_;  // lacks everything
+    } else if (depth_ == 2) {
+      claims.back().has_dtype |= key_ == "dtype";
+      claims.back().has_shape |= key_ == "shape";
+      claims.back().has_offsets |= key_ == "data_offsets";
+    } else {
+      count_number();
+      if (list_ != nullptr) claims.back().whole = false;
+    }
+    return true;
+  }
+
+  const std::string& where_;
+  std::set<std::string> names_, keys_;  // of the header, of the tensor at hand
+  std::string name_, key_;
+  std::vector<uint64_t>* list_ = nullptr;
+  int depth_ = 0, numbers_ = 0;
+  bool in_metadata_ = false;
+};
+
 class Reader {
  public:
   Reader(std::string_view bytes, const std::string& where) : bytes_(bytes), where_(where) {}
 
   TensorFile read() {
-    const Json header = parse_header();
+    Header header(where_);
+    parse(header);
     TensorFile out;
+    out.metadata = std::move(header.metadata);
     std::vector<Entry> entries;
-    for (const auto& [name, value] : header.items()) {
-      if (name == "__metadata__")
-        read_metadata(value, &out);
-      else
-        entries.push_back(read_entry(name, value));
-    }
+    for (Claim& claim : header.claims) entries.push_back(read_entry(claim));
     check_layout(entries);
     for (const Entry& e : entries) out.tensors.emplace(e.name, decode(e));
     return out;
@@ -89,80 +199,58 @@ class Reader {
  private:
   [[noreturn]] void fail(const std::string& wrong) const { throw InputError(where_, wrong, kFix); }
 
-  Json parse_header() {
+  void parse(Header& header) {
     if (bytes_.size() < 8) fail("is too short to be a safetensors file");
     uint64_t length = 0;
     std::memcpy(&length, bytes_.data(), 8);
     if (length > bytes_.size() - 8 || length > kHeaderLimit)
       fail("is no safetensors file or is cut off (header of " + std::to_string(length) + " bytes)");
     data_ = bytes_.substr(8 + length);
-    std::set<std::string> keys;
-    const auto guard = [&](int depth, Json::parse_event_t event, Json& value) {
-      if (depth > kDepthLimit) fail("has a header nested too deeply");
-      if (event == Json::parse_event_t::key && depth == 1 &&
-          !keys.insert(value.get<std::string>()).second)
-        fail("names the tensor " + name_in_quotes(value.get<std::string>()) + " twice");
-      return true;
-    };
-    try {
-      Json header = Json::parse(bytes_.substr(8, length), guard);
-      if (!header.is_object()) fail("has a header that is no JSON object");
-      return header;
-    } catch (const Json::exception&) {
-      fail("has a header that is not JSON");
-    }
+    const std::string_view text = bytes_.substr(8, length);
+    // Nothing may hide before or behind the header's text; to the JSON library a zero is its end.
+    if (text.empty() || text[0] != '{' || text.find('\0') != std::string_view::npos)
+      fail("has a header that is no JSON object");
+    if (!Json::sax_parse(text, &header)) fail("has a header that is not JSON");
   }
 
-  void read_metadata(const Json& value, TensorFile* out) const {
-    if (!value.is_object()) fail("has metadata that is no JSON object");
-    for (const auto& [key, text] : value.items()) {
-      if (!text.is_string()) fail("has metadata " + name_in_quotes(key) + " that is no text");
-      out->metadata[key] = text.get<std::string>();
-    }
-  }
-
-  Entry read_entry(const std::string& name, const Json& value) const {
-    const std::string called = "tensor " + name_in_quotes(name);
-    if (!value.is_object() || !value.contains("dtype") || !value.contains("shape") ||
-        !value.contains("data_offsets"))
+  Entry read_entry(Claim& claim) const {
+    const std::string called = "tensor " + name_in_quotes(claim.name);
+    if (!claim.has_dtype || !claim.has_shape || !claim.has_offsets)
       fail(called + " lacks dtype, shape or data_offsets");
     Entry e;
-    e.name = name;
-    const std::string dtype = value["dtype"].is_string() ? value["dtype"].get<std::string>() : "";
+    e.name = std::move(claim.name);
     for (const Kind& k : kKinds)
-      if (dtype == k.name) e.kind = &k;
+      if (claim.dtype == k.name) e.kind = &k;
     if (e.kind == nullptr)
-      throw InputError(where_, called + " has the unknown dtype " + name_in_quotes(dtype),
+      throw InputError(where_, called + " has the unknown dtype " + name_in_quotes(claim.dtype),
                        "store it as F32, F64, I32, I64, F16 or BF16");
-    const Json &shape = value["shape"], &range = value["data_offsets"];
-    if (!shape.is_array() || shape.size() > static_cast<size_t>(Shape::kMaxRank))
+    if (!claim.shape_is_list || claim.shape.size() > static_cast<size_t>(Shape::kMaxRank))
       fail(called + " has a shape of more than " + std::to_string(Shape::kMaxRank) + " axes");
-    uint64_t count = 1;
+    uint64_t count = 1;  // without axes of length 0, which must not hide the others
     bool empty = false;
-    for (const Json& axis : shape) {
-      const uint64_t n = unsigned_number(axis, called);
+    if (!claim.whole) fail_number(called);
+    for (const uint64_t n : claim.shape) {
+      if (n > kLargest) fail_number(called);
       e.shape.push_back(static_cast<int64_t>(n));
       empty = empty || n == 0;
-      if (n != 0 && count > data_.size() / n) count = data_.size() + 1;  // cannot fit: no overflow
-      if (n != 0) count *= count > data_.size() ? 1 : n;
+      if (n > kMostElements / count) fail(called + " has an impossible shape");
+      count *= std::max<uint64_t>(n, 1);
     }
     if (empty) count = 0;
-    if (!range.is_array() || range.size() != 2) fail(called + " has no pair of data offsets");
-    e.begin = unsigned_number(range[0], called);
-    e.end = unsigned_number(range[1], called);
+    if (!claim.offsets_are_list || claim.offsets.size() != 2)
+      fail(called + " has no pair of data offsets");
+    e.begin = claim.offsets[0];
+    e.end = claim.offsets[1];
     if (e.begin > e.end || e.end > data_.size())
       fail(called + " reaches beyond the end of the file");
-    if (count > data_.size() || count * e.kind->bytes != e.end - e.begin)
+    if (count * e.kind->bytes != e.end - e.begin)
       fail(called + " has " + std::to_string(e.end - e.begin) + " bytes, which do not fit " +
            e.shape.str());
     return e;
   }
 
-  uint64_t unsigned_number(const Json& value, const std::string& called) const {
-    if (!value.is_number_unsigned() ||
-        value.get<uint64_t>() > static_cast<uint64_t>(std::numeric_limits<int64_t>::max()))
-      fail(called + " has a length or offset that is no whole number");
-    return value.get<uint64_t>();
+  [[noreturn]] void fail_number(const std::string& called) const {
+    fail(called + " has a length or offset that is no whole number");
   }
 
   /// The format allows neither gaps nor overlaps.

@@ -62,6 +62,56 @@ class Eval(CliTest):
         self.assertAlmostEqual(references["closed_form"]["mpjpe"], 0, places=9)
         self.assertAlmostEqual(references["rest_pose"]["mpjpe"], 0, places=9)
 
+    def test_every(self):
+        kept = [x + 0.1 for f in (0, 2, 4) for x in self.joints[66 * f:66 * (f + 1)]]
+        self.h5("seconds.h5", joints=([3, 22, 3], kept))
+        result = self.eval("seconds.h5", "truth.h5", "--every", 2)
+        self.assertEqual(result["sequences"][0]["frames"], 3)
+        self.assertAlmostEqual(result["mean"]["mpjpe"], 0.1 * math.sqrt(3), places=11)
+        self.assertIsNone(result["mean"]["acc"])  # a second apart nothing is an acceleration
+        self.h5("rest.h5", joints=([1, 22, 3], numbers(66, 4)))
+        references = self.eval("seconds.h5", "truth.h5", "--every", 2, "--source", "truth.h5", "--rest", "rest.h5")["references"]
+        self.assertEqual(references["source_unchanged"]["mpjpe"], 0)
+        # Each sequence from its own first frame: 0, 2 of the first three frames and 3, 5 of the others.
+        self.h5("two.h5", joints=([F, 22, 3], self.joints), sequence_offset=([3], [0, 3, F], "int64"))
+        kept = [x for f in (0, 2, 3, 5) for x in self.joints[66 * f:66 * (f + 1)]]
+        self.h5("four.h5", joints=([4, 22, 3], kept), sequence_offset=([3], [0, 2, 4], "int64"))
+        result = self.eval("four.h5", "two.h5", "--every", 2)
+        self.assertEqual([s["mpjpe"] for s in result["sequences"]], [0, 0])
+        self.bad_input(["eval", "--pred", "pred.h5", "--truth", "truth.h5", "--every", 2], "frames")
+        self.bad_input(["eval", "--pred", "pred.h5", "--truth", "truth.h5", "--every", 0], "--every")
+
+    def test_mended_scans(self):
+        # Scans in centimetres, x of theirs the world's y, y its z, z its x, and 1, 2, 3 m away. The doctor takes them
+        # for decimetres, turns them by a quarter about y, and moves them to an origin of its own.
+        places = [self.joints[3 * i:3 * i + 3] for i in range(F * 22)]
+        scanned = [[100 * (y - 2), 100 * (z - 3), 100 * (x - 1)] for x, y, z in places]
+        mended = [[-0.1 * (y - 6), 0.1 * (x - 5), 0.1 * (z - 7)] for x, y, z in scanned]
+        flat = lambda rows: [x for row in rows for x in row]
+        self.h5("truth.h5", joints=([F, 22, 3], self.joints),
+                source_to_world=([3, 4], [0, 0, 0.01, 1, 0.01, 0, 0, 2, 0, 0.01, 0, 3]))
+        self.h5("source.h5", joints=([F, 22, 3], flat(scanned)))
+        self.h5("rest.h5", joints=([1, 22, 3], self.joints[:66]))  # of the source's own size: the path is not stretched
+        note = '{"scale": 0.1, "rotation": [[0, -1, 0], [1, 0, 0], [0, 0, 1]], "offset": [5, 6, 7]}'
+        self.h5("mended.h5", {"transform": note}, points=([1, 3], [0]), frame_offset=([2], [0, 1], "int64"))
+        # What an ideal system would answer from them, of the size that it is: a tenth of what the doctor made of it.
+        self.h5("pred.h5", joints=([F, 22, 3], [0.1 * x for x in flat(mended)]))
+        files = ["--source", "source.h5", "--rest", "rest.h5"]
+        result = self.eval("pred.h5", "truth.h5", "--mended", "mended.h5", *files)
+        self.assertAlmostEqual(result["mean"]["mpjpe"], 0, places=9)
+        self.assertAlmostEqual(result["mended"]["scale_error"], 10)
+        self.assertAlmostEqual(result["mended"]["tilt_degrees"], 0)
+        self.assertAlmostEqual(result["references"]["source_unchanged"]["mpjpe"], 0, places=9)
+        bad = lambda *words: self.bad_input(["eval", "--pred", "pred.h5", "--truth", "truth.h5", "--mended", "mended.h5", *files], *words)
+        self.bad_input(["eval", "--pred", "pred.h5", "--truth", "truth.h5", "--mended", "mended.h5"], "--source")
+        for text in ("", "{}", note.replace("0.1", "-1"), note.replace("[5, 6, 7]", "[5]"), note.replace("[5, 6, 7]", '"x"')):
+            self.h5("mended.h5", {"transform": text}, points=([1, 3], [0]), frame_offset=([2], [0, 1], "int64"))
+            bad("mended.h5", "how it was mended")
+        self.h5("truth.h5", joints=([F, 22, 3], self.joints))
+        bad("truth.h5", "where its scans are")
+        self.h5("truth.h5", joints=([F, 22, 3], self.joints), source_to_world=([3, 4], [0]))
+        bad("source_to_world")
+
     def test_table(self):
         self.h5("rest.h5", joints=([1, 22, 3], numbers(66, 4)))
         text = self.done("eval", "--pred", "pred.h5", "--truth", "truth.h5", "--source", "truth.h5", "--rest", "rest.h5", "--per-joint")

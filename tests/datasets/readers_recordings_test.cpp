@@ -75,5 +75,30 @@ TEST(ReadersRecordings, AnnouncedCountsAreNotBelieved) {
   EXPECT_NE(complaint(wide).find("65537 values"), std::string::npos) << complaint(wide);
 }
 
+/// A few bytes a frame at one frame per second, or thousands of joints that never move, would be
+/// gigabytes in memory.
+TEST(ReadersRecordings, SmallFilesThatMakeLongMotionsAreRefused) {
+  const std::string good = small_file();
+  const std::string head = good.substr(0, good.find("MOTION"));
+  const auto recording = [](const std::string& hierarchy, size_t channels, int frames) {
+    std::string line,
+        text = hierarchy + "MOTION\nFrames: " + std::to_string(frames) + "\nFrame Time: 1\n";
+    for (size_t c = 0; c < channels; ++c) line += "0 ";
+    for (int f = 0; f < frames; ++f) text += line + "\n";
+    return text;
+  };
+  const size_t channels = parse_bvh(good, "x.bvh").channel_count;
+  EXPECT_EQ(complaint(recording(head, channels, 100)), "");
+  EXPECT_NE(complaint(recording(head, channels, 5000)).find("far more than is in the file"),
+            std::string::npos);
+  std::string still;
+  for (int i = 0; i < 3000; ++i) still += "JOINT x" + std::to_string(i) + "\n{\nOFFSET 0 1 0\n}\n";
+  const size_t at = head.rfind('}');
+  const std::string crowd = head.substr(0, at) + still + head.substr(at);
+  EXPECT_EQ(complaint(recording(crowd, channels, 10)), "");
+  EXPECT_NE(complaint(recording(crowd, channels, 500)).find("of 3022 joints, far more"),
+            std::string::npos);
+}
+
 }  // namespace
 }  // namespace restage

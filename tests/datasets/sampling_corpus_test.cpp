@@ -84,6 +84,20 @@ TEST(SamplingCorpus, FilesComeBackAsTheyWereWritten) {
   std::filesystem::remove(path);
 }
 
+TEST(SamplingCorpus, AFolderHoldsAFileForEachSplit) {
+  const Corpus all = tiny_corpus(), train = subset(all, "train");
+  const auto folder = std::filesystem::temp_directory_path() / "restage_sampling_corpus_folder";
+  std::filesystem::create_directories(folder);
+  write_dataset((folder / "train.h5").string(), train.bodies, train.motions, {"x", "boxes"});
+  EXPECT_EQ(checksum(load_corpus({folder.string()}, "train")), checksum(train));
+  EXPECT_THROW(load_corpus({folder.string()}, "test"), InputError);  // no such file
+  EXPECT_THROW(load_corpus({folder.string()}), InputError);          // which?
+  // A file whose bodies are of another split than its name says.
+  std::filesystem::rename(folder / "train.h5", folder / "test.h5");
+  EXPECT_THROW(load_corpus({folder.string()}, "test"), InputError);
+  std::filesystem::remove_all(folder);
+}
+
 TEST(SamplingCorpus, ChecksumNoticesSmallChanges) {
   const Corpus all = tiny_corpus();
   const std::string before = checksum(all);

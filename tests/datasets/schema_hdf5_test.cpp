@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <hdf5.h>
 #include <sys/resource.h>
+#include <zlib.h>
 
 #include <cmath>
 #include <csignal>
@@ -198,6 +199,70 @@ TEST(SchemaHdf5, RefusesClaimsThatTheFileCannotKeep) {
   EXPECT_NE(refusal("/link").find("link into another file"), std::string::npos);
   EXPECT_NE(refusal("/soft").find("is missing"), std::string::npos);
   EXPECT_EQ(file.read<double>("/small", {4, 3}), std::vector<double>(12, 0.0));
+}
+
+/// AddressSanitizer ends a process whose allocation fails.
+#if defined(__has_feature)
+#if __has_feature(address_sanitizer)
+constexpr bool kEndsWithoutMemory = true;
+#else
+constexpr bool kEndsWithoutMemory = false;
+#endif
+#else
+constexpr bool kEndsWithoutMemory = false;
+#endif
+
+/// zlib's packing of so many MiB of zeros: the same piece again and again.
+std::string packed_zeros(uint32_t mebibytes) {
+  const std::string zeros(size_t{1} << 20, '\0');
+  z_stream state{};
+  deflateInit(&state, 9);
+  const auto pack = [&](size_t n, int flush) {
+    std::string out(size_t{1} << 20, '\0');
+    state.next_in = reinterpret_cast<unsigned char*>(const_cast<char*>(zeros.data()));
+    state.avail_in = static_cast<unsigned>(n);
+    state.next_out = reinterpret_cast<unsigned char*>(out.data());
+    state.avail_out = static_cast<unsigned>(out.size());
+    deflate(&state, flush);
+    out.resize(out.size() - state.avail_out);
+    return out;
+  };
+  std::string out = pack(zeros.size(), Z_FULL_FLUSH);
+  const std::string again = pack(zeros.size(), Z_FULL_FLUSH);
+  for (uint32_t i = 1; i < mebibytes; ++i) out += again;
+  out += pack(0, Z_FINISH);
+  deflateEnd(&state);
+  const uint32_t sum = static_cast<uint32_t>((uint64_t{mebibytes} << 20) % 65521) << 16 | 1;
+  for (int i = 0; i < 4; ++i) out[out.size() - 4 + i] = static_cast<char>(sum >> (24 - 8 * i));
+  return out;
+}
+
+/// 2 MB that unpack to 2 GiB, in one chunk, in the oldest and in the newest layout: the child that
+/// reads it first is stopped, and nobody else begins.
+TEST(SchemaHdf5, AFileThatFillsTheMemoryIsStoppedInItsChild) {
+  const TempDir dir;
+  const std::string packed = packed_zeros(2048), path = dir / "bomb.h5";
+  for (const bool newest : {false, true}) {
+    const hid_t access = H5Pcreate(H5P_FILE_ACCESS), creation = H5Pcreate(H5P_DATASET_CREATE);
+    if (newest) H5Pset_libver_bounds(access, H5F_LIBVER_V110, H5F_LIBVER_V110);
+    const hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
+    const hsize_t size = uint64_t{2048} << 20, start = 0;
+    H5Pset_chunk(creation, 1, &size);
+    H5Pset_deflate(creation, 9);
+    const hid_t space = H5Screate_simple(1, &size, nullptr);
+    const hid_t set =
+        H5Dcreate2(file, "/joints", H5T_STD_U8LE, space, H5P_DEFAULT, creation, H5P_DEFAULT);
+    EXPECT_GE(H5Dwrite_chunk(set, H5P_DEFAULT, 0, &start, packed.size(), packed.data()), 0);
+    H5Dclose(set);
+    H5Sclose(space);
+    H5Fclose(file);
+    H5Pclose(creation);
+    H5Pclose(access);
+    const std::string refusal = error_of([&] { h5::File::open(path); });
+    EXPECT_NE(refusal.find(kEndsWithoutMemory ? "damaged" : "takes more than 1024 MiB to read"),
+              std::string::npos)
+        << refusal;
+  }
 }
 
 TEST(SchemaHdf5, ReadsForeignByteOrdersAndText) {

@@ -121,9 +121,11 @@ TEST(WeightsSafetensors, DamagedHeadersAreNamed) {
   expect_bad(tensor(R"("dtype":"F32","shape":[2],"data_offsets":[8,0])"), "beyond the end");
   expect_bad(tensor(R"("dtype":"F32","shape":[3],"data_offsets":[0,8])"), "do not fit");
   expect_bad(tensor(R"("dtype":"F32","shape":[4611686018427387904,4],"data_offsets":[0,0])"),
-             "do not fit");
+             "impossible shape");
   expect_bad(tensor(R"("dtype":"F32","shape":[4294967296,4294967296],"data_offsets":[0,0])"),
-             "do not fit");
+             "impossible shape");
+  expect_bad(tensor(R"("dtype":"F32","shape":[0,4294967296,4294967296],"data_offsets":[0,0])"),
+             "impossible shape");
   expect_bad(tensor(R"("dtype":"F32","shape":[18446744073709551615],"data_offsets":[0,0])"),
              "whole number");
   expect_bad(tensor(R"("dtype":"F32","shape":[1],"data_offsets":[4,8])"), "gap");
@@ -138,6 +140,77 @@ TEST(WeightsSafetensors, OverlapsDoublesAndDepthAreRefused) {
   std::string deep = "{\"a\":";
   for (int i = 0; i < 100000; ++i) deep += "[";
   expect_bad(with_header(deep, ""), "deeply");
+}
+
+/// What the format's audits and fuzzers found in other readers.
+TEST(WeightsSafetensors, KnownAttacksAreRefused) {
+  const std::string one = R"({"dtype":"F32","shape":[1],"data_offsets":[0,4]})", data(4, '\0');
+  const auto range = [](int begin, int end) {
+    return R"({"dtype":"F32","shape":[)" + std::to_string((end - begin) / 4) +
+           R"(],"data_offsets":[)" + std::to_string(begin) + "," + std::to_string(end) + "]}";
+  };
+  // A length of the header beyond the file, beyond the limit, and nothing of it allocated.
+  for (const uint64_t length : {uint64_t{3}, uint64_t{1} << 40, ~uint64_t{0}, ~uint64_t{0} - 7}) {
+    std::string bytes(10, '{');
+    std::memcpy(bytes.data(), &length, 8);
+    expect_bad(bytes, "cut off");
+  }
+  std::string long_header = "{\"a\":" + one + "}";
+  long_header.resize(100'000'001, ' ');
+  expect_bad(with_header(long_header, data), "cut off");
+  // Keys once, of the header and within a tensor or the metadata.
+  expect_bad(with_header(R"({"__metadata__":{},"__metadata__":{}})", ""), "twice");
+  expect_bad(with_header(R"({"__metadata__":{"a":"b","a":"c"}})", ""), "twice");
+  expect_bad(
+      with_header(R"({"t":{"dtype":"F32","dtype":"I32","shape":[1],"data_offsets":[0,4]}})", data),
+      "names 'dtype' twice");
+  // Overlaps: whole, in part, an empty tensor inside of another; holes before, between, behind.
+  const auto two = [&](const std::string& a, const std::string& b, size_t bytes) {
+    return with_header("{\"a\":" + a + ",\"b\":" + b + "}", std::string(bytes, '\0'));
+  };
+  expect_bad(two(range(0, 8), range(4, 12), 12), "overlaps");
+  expect_bad(two(range(0, 12), range(4, 8), 12), "overlaps");
+  expect_bad(two(range(0, 8), range(4, 4), 8), "overlaps");
+  expect_bad(two(range(4, 8), range(8, 12), 12), "gap");
+  expect_bad(two(range(0, 4), range(8, 12), 12), "gap");
+  expect_bad(two(range(0, 4), range(4, 8), 12), "4 bytes more");
+  // Two files in one: something before, behind or after the end of the header's text.
+  expect_bad(with_header(" {\"a\":" + one + "}", data), "no JSON object");
+  expect_bad(with_header("\xef\xbb\xbf{\"a\":" + one + "}", data), "no JSON object");
+  expect_bad(with_header("{\"a\":" + one + "}{}", data), "not JSON");
+  expect_bad(with_header("{\"a\":" + one + "}" + std::string("\0PK", 3), data), "no JSON object");
+  expect_bad(with_header("{\"a\":" + one + "}", data + "PK"), "2 bytes more");
+  // Numbers that are none: negative, fractions, beyond 64 bits, texts.
+  for (const char* bad : {"-1", "1.0", "1e0", "18446744073709551616", "\"1\"", "null", "[1]"}) {
+    const std::string shape = std::string("{\"t\":{\"dtype\":\"F32\",\"shape\":[") + bad;
+    EXPECT_THROW(
+        parse_safetensors(with_header(shape + "],\"data_offsets\":[0,4]}}", data), "w.safetensors"),
+        InputError)
+        << bad;
+  }
+  // Types of numbers that are not read, also the newest.
+  for (const char* type : {"F8_E4M3", "F8_E5M2", "F8_E8M0", "F6_E2M3", "F4", "BOOL", "U8", "I8",
+                           "U16", "I16", "U32", "U64", "C64", "f32", ""})
+    expect_bad(with_header(std::string("{\"t\":{\"dtype\":\"") + type +
+                               R"(","shape":[1],"data_offsets":[0,4]}})",
+                           data),
+               "unknown dtype");
+}
+
+/// A header may make no more of itself than it is, and be read in good time.
+TEST(WeightsSafetensors, LargeHeadersStaySmall) {
+  std::string zeros = "0";
+  for (int i = 0; i < 100; ++i) zeros += ",0";
+  expect_bad(with_header("{\"t\":{\"dtype\":\"F32\",\"shape\":[" + zeros + "]}}", ""),
+             "more than 64 numbers");
+  expect_bad(with_header("{\"t\":[" + zeros + "]}", ""), "deeply");
+  expect_bad(with_header("{\"t\":{\"shape\":[[" + zeros + "]]}}", ""), "deeply");
+  expect_bad(with_header("{\"t\":{\"shape\":{\"a\":0}}}", ""), "deeply");
+  std::string many = "{";
+  for (int i = 0; i < 200'000; ++i)
+    many += (i > 0 ? ",\"" : "\"") + std::to_string(i) +
+            R"(":{"dtype":"F32","shape":[0],"data_offsets":[0,0]})";
+  EXPECT_EQ(parse_safetensors(with_header(many + "}", ""), "x").tensors.size(), 200'000u);
 }
 
 TEST(WeightsSafetensors, RandomDamageNeverCrashes) {

@@ -257,6 +257,11 @@ TEST_F(TrainConfig, AliasesAreAllowedButBounded) {
   EXPECT_NE(error(bomb).find("more than 100000 values, aliases expanded"), std::string::npos);
   EXPECT_EQ(error("name: " + std::string(100, '[') + std::string(100, ']') + "\n"),
             "x.yaml:1: nested deeper than 32; flatten the file");
+  EXPECT_EQ(error("name: \"a\\\nb\"\n").find('\n'), std::string::npos);
+  std::string keys;
+  for (int i = 0; i < 60'000; ++i) keys += "k" + std::to_string(i) + ": 1\n";
+  EXPECT_EQ(error(keys),
+            "x.yaml:1001: more than 1000 keys in one section; give a configuration file");
   EXPECT_NE(error(std::string(kConfigMaxBytes + 1, '#')), "");
   EXPECT_NE(error(std::string(900'000, '[')), "");
 }

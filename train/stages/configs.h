@@ -27,7 +27,8 @@ void visit(V& v, SplitCounts& c) {
 
 template <class V>
 void visit(V& v, CorpusSource& c) {
-  v("source", c.source, "builtin, or a data set file made by 'restage data import' or 'build'");
+  v("source", c.source,
+    "builtin, a data set file ('restage data import'), or a benchmark's folder");
   v("seed", c.seed, "of the built-in source");
   v("bodies", c.bodies, "built-in bodies per split");
   v("motions", c.motions, "built-in motions per split");

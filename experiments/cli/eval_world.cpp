@@ -1,0 +1,67 @@
+#include "experiments/cli/eval_world.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "autograd/base/error.h"
+#include "datasets/schema.h"
+
+namespace restage::cli {
+
+void WorldMap::carry(std::vector<double>& points, bool rigid, double stretched) const {
+  for (size_t i = 0; i + 2 < points.size(); i += 3) {
+    Eigen::Map<Vec3> p(&points[i]);
+    p = ((rigid ? 1 : scale) * (rotation * p) + stretched * shift).eval();
+  }
+}
+
+double WorldMap::tilt() const {
+  return std::acos(std::clamp(rotation(1, 1), -1.0, 1.0)) * 180 / std::numbers::pi;
+}
+
+std::optional<WorldMap> source_to_world(const std::string& truth) {
+  const h5::File file = open_schema_file(truth);
+  if (!file.has("/source_to_world")) return std::nullopt;
+  const std::vector<double> rows = file.read<double>("/source_to_world", {3, 4});
+  const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> m(rows.data());
+  const double volume = m.leftCols<3>().determinant();
+  if (!m.allFinite() || !(volume > 0))
+    throw InputError(truth + ":/source_to_world", "is no rotation and scale",
+                     "store world = A p + b as rows of [A | b]");
+  WorldMap out;
+  out.scale = std::cbrt(volume);
+  out.rotation = m.leftCols<3>() / out.scale;
+  out.shift = m.col(3);
+  return out;
+}
+
+WorldMap mended_to_world(const std::string& mended, const WorldMap& to_world) {
+  const std::string text = inspect(mended).transform;
+  const auto note = nlohmann::json::parse(text, nullptr, false);
+  double scale = 0;
+  Mat3 rotation;
+  Vec3 offset;
+  try {
+    scale = note.at("scale").get<double>();
+    for (int r = 0; r < 3; ++r) {
+      offset[r] = note.at("offset").at(static_cast<size_t>(r)).get<double>();
+      for (int c = 0; c < 3; ++c)
+        rotation(r, c) =
+            note.at("rotation").at(static_cast<size_t>(r)).at(static_cast<size_t>(c)).get<double>();
+    }
+  } catch (const nlohmann::json::exception&) {
+    scale = 0;
+  }
+  if (!(scale > 0) || !std::isfinite(scale))
+    throw InputError(mended, "does not say how it was mended",
+                     "give the file that restage doctor --fix wrote");
+  WorldMap out;  // p' = scale rotation (p - offset), and world = A p + b
+  out.scale = to_world.scale / scale;
+  out.rotation = to_world.rotation * rotation.transpose();
+  out.shift = to_world.scale * (to_world.rotation * offset) + to_world.shift;
+  return out;
+}
+
+}  // namespace restage::cli

@@ -1,0 +1,141 @@
+#include "infer/registration/registration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+#include "autograd/base/error.h"
+#include "autograd/base/parallel.h"
+#include "infer/extraction.h"
+#include "nn/geometry/closed_form.h"
+
+namespace restage {
+namespace {
+
+constexpr int kHeadings = 8;
+constexpr std::array<double, 3> kArms = {0.0, 0.8, 1.3};  // lowered from the T-pose, radians
+constexpr double kStartWidth = 0.2, kLastWidth = 0.06;    // of the kernel that compares, metres
+
+/// One point, the mean, for each occupied cube of a grid, in the order of the cubes.
+std::vector<Vec3> thinned(const Points& cloud, double width, const std::string& source) {
+  struct Sum {
+    Vec3 sum = Vec3::Zero();
+    double count = 0;
+  };
+  std::map<std::array<int64_t, 3>, Sum> cubes;
+  for (const Point& p : cloud) {
+    if (!p.allFinite() || p.cwiseAbs().maxCoeff() > 1e6f)
+      throw InputError(source, "holds a coordinate that is not finite or beyond 1000 km",
+                       "remove such points, and give metres");
+    std::array<int64_t, 3> at;
+    for (int c = 0; c < 3; ++c)
+      at[static_cast<size_t>(c)] =
+          static_cast<int64_t>(std::floor(static_cast<double>(p[c]) / width));
+    Sum& cube = cubes[at];
+    cube.sum += p.cast<double>();
+    cube.count += 1;
+  }
+  if (cubes.size() < kLeastDistinctPoints)
+    throw InputError(
+        source, "holds points in " + std::to_string(cubes.size()) + " places, too few for a body",
+        "give at least " + std::to_string(kLeastDistinctPoints) + " some centimetres apart");
+  std::vector<Vec3> out;
+  for (const auto& [at, cube] : cubes) out.push_back(cube.sum / cube.count);
+  return out;
+}
+
+/// The median by coordinate: stray points do not move it.
+Vec3 middle(const std::vector<Vec3>& points) {
+  Vec3 out;
+  for (int c = 0; c < 3; ++c) {
+    std::vector<double> values;
+    for (const Vec3& p : points) values.push_back(p[c]);
+    const auto half = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), half, values.end());
+    out[c] = *half;
+  }
+  return out;
+}
+
+/// A pose of the rig whose middle is that of the cloud.
+RigState placed(const Rig& rig, RigState state, const std::vector<Vec3>& cloud) {
+  state.pose.root += middle(cloud) - middle(pose_rig(rig, state).nodes);
+  return state;
+}
+
+}  // namespace
+
+Registration::Registration(Mesh target, const Joints& rest, const std::string& where,
+                           const RegistrationOptions& options)
+    : options_(options) {
+  body_.id = where;
+  body_.rest = std::move(target);
+  body_.joints = rest;
+  rig_ = make_rig(body_.rest, rest, where, options.nodes);  // checks its input
+  body_.weights = bone_distance_weights(body_.rest.vertices, rest);
+}
+
+/// Headings and arm poses, the most promising first, and the frame before.
+std::vector<RigState> Registration::starts(const std::vector<Vec3>& cloud) const {
+  struct Candidate {
+    double cost;
+    RigState state;
+  };
+  std::vector<Candidate> all(kHeadings * kArms.size());
+  RigState build;
+  if (previous_) {
+    build.scale = previous_->scale;
+    build.stretch = previous_->stretch;
+  }
+  parallel_for(static_cast<int64_t>(all.size()), 1, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) {
+      RigState state = build;
+      state.pose.local.fill(Mat3::Identity());
+      state.pose.local[0] =
+          turn_about_y(2 * std::numbers::pi * static_cast<double>(i % kHeadings) / kHeadings);
+      const double arms = kArms[static_cast<size_t>(i / kHeadings)];
+      state.pose.local[16] = Eigen::AngleAxisd(-arms, Vec3::UnitZ()).toRotationMatrix();
+      state.pose.local[17] = Eigen::AngleAxisd(arms, Vec3::UnitZ()).toRotationMatrix();
+      state = placed(rig_, state, cloud);
+      all[static_cast<size_t>(i)] = {misfit(pose_rig(rig_, state), cloud, kStartWidth), state};
+    }
+  });
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
+  std::vector<RigState> out;
+  if (previous_) out.push_back(placed(rig_, *previous_, cloud));
+  for (size_t i = 0; i < all.size() && i < static_cast<size_t>(options_.searched); ++i)
+    out.push_back(all[i].state);
+  return out;
+}
+
+RetargetedFrame Registration::push(const Points& cloud, const std::string& source) {
+  const std::vector<Vec3> points = thinned(cloud, options_.grid, source);
+  std::vector<RigState> fitted = starts(points);
+  std::vector<double> costs(fitted.size());
+  parallel_for(std::ssize(fitted), 1, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) {
+      const auto k = static_cast<size_t>(i);
+      fitted[k] = fit_articulated(rig_, points, fitted[k], options_.articulated);
+      costs[k] = misfit(pose_rig(rig_, fitted[k]), points, kLastWidth);
+    }
+  });
+  const auto best =
+      static_cast<size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
+  previous_ = fitted[best];
+  const PosedRig posed = pose_rig(rig_, *previous_);
+  Pose pose = previous_->pose;
+  if (options_.free_form)
+    pose = refit_pose(rig_, posed, fit_free_form(rig_, posed, points, options_.free_form_options));
+  source_joints_ = forward_kinematics(built(body_.joints, *previous_), pose).joints;
+
+  RetargetedFrame out;
+  out.pose = pose;
+  out.pose.root = trajectory_scale(source_joints_, body_.joints) * source_joints_[0];
+  out.joints = forward_kinematics(body_.joints, out.pose).joints;
+  out.vertices = linear_blend_skinning(body_, out.pose);
+  return out;
+}
+
+}  // namespace restage

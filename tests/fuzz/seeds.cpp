@@ -1,0 +1,435 @@
+// Small valid files of every kind, as other programs write them.
+#include <hdf5.h>
+#include <lzma.h>
+
+#include <cmath>
+#include <functional>
+#include <map>
+
+#include "datasets/importers/builtin_profiles.h"
+#include "datasets/schema.h"
+#include "experiments/cli/benchmark_config.h"
+#include "nn/weights/bundle.h"
+#include "tests/datasets/gltf_maker.h"
+#include "tests/datasets/importers_bvh_text.h"
+#include "tests/datasets/schema_support.h"
+#include "tests/datasets/smpl_support.h"
+#include "tests/fuzz/targets.h"
+#include "tests/support/tiny_body.h"
+#include "train/config.h"
+#include "train/stages/configs.h"
+
+namespace restage::fuzz {
+namespace {
+
+using Seeds = std::vector<Seed>;
+
+// ---- meshes ------------------------------------------------------------------------------------
+
+template <class T>
+std::string big(T value) {
+  std::string out = test::raw(value);
+  return {out.rbegin(), out.rend()};
+}
+
+Seeds ply_seeds() {
+  const std::string vertices = "element vertex 4\nproperty float x\nproperty float y\nproperty ";
+  const std::string header = vertices + "float z\n", corners = "0 0 0\n1 0 0\n0 1.5e0 -1\n0 0 1\n";
+  const std::string faces = "element face 2\nproperty list uchar int vertex_indices\n";
+  std::string little = "ply\nformat binary_little_endian 1.0\n" + header + faces + "end_header\n",
+              large = "ply\r\nformat binary_big_endian 1.0\r\ncomment x\r\n" + vertices +
+                      "double z\nproperty uchar red\nelement face 1\nproperty uchar flags\n"
+                      "property list ushort uint vertex_index\nelement edge 1\nproperty int a\n"
+                      "end_header\n";
+  for (int i = 0; i < 4; ++i) {
+    for (int c = 0; c < 3; ++c) little += test::raw(0.5f * static_cast<float>(i * c));
+    large += big(1.0f) + big(0.25f * static_cast<float>(i)) + big(-2.0) + 'r';
+  }
+  little += '\3' + test::raw(0) + test::raw(1) + test::raw(2);
+  little += '\4' + test::raw(0) + test::raw(1) + test::raw(2) + test::raw(3);
+  large += 'f' + big(uint16_t{4});
+  for (uint32_t i = 0; i < 4; ++i) large += big(i);
+  large += big(7);
+  return {{"cloud", "ply\nformat ascii 1.0\n" + header + "end_header\n" + corners},
+          {"mesh", "ply\nformat ascii 1.0\nobj_info y\n" + header + faces + "end_header\n" +
+                       corners + "3 0 1 2\n4 0 1 2 3\n"},
+          {"little", little},
+          {"big", large}};
+}
+
+Seeds obj_seeds() {
+  const std::string corners = "v 0 0 0\nv 1 0 0 1 0.5 0.5\nv 0 1.25 0\nv +0 -0 1e0\n";
+  return {
+      {"cloud", corners, Cut::any},
+      {"mesh",
+       "# a\nmtllib a.mtl\no a\n" + corners + "g b\nusemtl c\ns off\nf 1 2 3\nf -4 -3 -2 -1 # d\n",
+       Cut::any},
+      {"normals",
+       corners + "vt 0 0\nvn 0 0 1\r\nf 1/1/1 2/1/1 3/1/1\nf 1//1 3//1 4//1\nf 1/1 2/1 4/1\n",
+       Cut::any}};
+}
+
+// ---- characters --------------------------------------------------------------------------------
+
+using testing::GlbParts;
+using testing::GltfJson;
+
+std::string base64(const std::string& bytes) {
+  constexpr const char* kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  for (size_t i = 0; i < bytes.size(); i += 3) {
+    uint32_t word = 0;
+    for (size_t k = 0; k < 3; ++k)
+      word = word << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
+    for (size_t k = 0; k < 4; ++k)
+      out += i + k <= bytes.size() ? kDigits[word >> (18 - 6 * k) & 63] : '=';
+  }
+  return out;
+}
+
+/// The same with its buffer in the text, where no length stands in the way of changes.
+std::string as_text(const GlbParts& parts) {
+  GltfJson root = parts.root;
+  root["buffers"] = {{{"byteLength", parts.binary.size()},
+                      {"uri", "data:application/octet-stream;base64," + base64(parts.binary)}}};
+  return root.dump();
+}
+
+GlbParts scene(const char* interpolation, size_t values) {
+  GlbParts out;
+  GltfJson primitive;
+  primitive["attributes"]["POSITION"] = out.floats({0, 0, 0, 1, 0, 0, 0, 1, 0}, "VEC3", 3);
+  primitive["indices"] = out.add(std::vector<uint16_t>{0, 1, 2}, 5123, "SCALAR", 1);
+  out.root["meshes"] = {{{"primitives", {primitive}}}};
+  out.root["nodes"] = {{{"mesh", 0}, {"translation", {5, 0, 0}}, {"children", {1}}},
+                       {{"mesh", 0}, {"scale", {2, 2, 2}}, {"rotation", {0, 0, 1, 0}}}};
+  out.root["scenes"] = {{{"nodes", {0}}}};
+  out.root["scene"] = 0;
+  const int times = out.floats({0, 0.5f, 1}, "SCALAR", 1);
+  const int moved = out.floats(std::vector<float>(values, 0.5f), "VEC3", 3);
+  out.root["animations"] = {
+      {{"name", "go"},
+       {"samplers", {{{"input", times}, {"output", moved}, {"interpolation", interpolation}}}},
+       {"channels", {{{"sampler", 0}, {"target", {{"node", 1}, {"path", "translation"}}}}}}}};
+  return out;
+}
+
+GlbParts sparse_scene() {
+  GlbParts out = scene("STEP", 9);
+  const int indices = out.add(std::vector<uint8_t>{1}, 5121, "SCALAR", 1);
+  const int values = out.floats({7, 8, 9}, "VEC3", 3);
+  const auto view = [&](int accessor) { return out.root["accessors"][accessor]["bufferView"]; };
+  out.root["accessors"][0]["sparse"] = {
+      {"count", 1},
+      {"indices", {{"bufferView", view(indices)}, {"componentType", 5121}}},
+      {"values", {{"bufferView", view(values)}}}};
+  out.root["extensions"]["VRM"]["humanoid"]["humanBones"] = {{{"bone", "hips"}, {"node", 1}}};
+  return out;
+}
+
+GlbParts character(bool twist) {
+  testing::RigStyle style = testing::plain_style();
+  style.twist_bones = style.bone_axes = twist;
+  style.keys = 4;
+  const testing::KnownCharacter known = testing::known_character();
+  return testing::CharacterMaker(known, style).parts;
+}
+
+Seeds gltf_seeds() {
+  return {{"linear.glb", scene("LINEAR", 9).glb()},
+          {"cubic.glb", scene("CUBICSPLINE", 27).glb()},
+          {"sparse.glb", sparse_scene().glb()},
+          {"linear.gltf", as_text(scene("LINEAR", 9))},
+          {"sparse.gltf", as_text(sparse_scene())}};
+}
+Seeds character_seeds() {
+  return {{"plain.glb", character(false).glb()},
+          {"twisted.glb", character(true).glb()},
+          {"twisted.gltf", as_text(character(true))}};
+}
+
+// ---- recordings --------------------------------------------------------------------------------
+
+Seeds bvh_seeds() {
+  bvh_test::Style plain, odd;
+  plain.frames = 3;
+  odd.frames = 4;
+  odd.fps = 24;
+  odd.rotations = "YXZ";
+  odd.rotations_first = odd.reversed = odd.all_positions = odd.wrapped = odd.z_up = true;
+  return {{"plain", bvh_test::text(plain)}, {"odd", bvh_test::text(odd)}};
+}
+
+constexpr std::string_view kSkeleton =
+    R"(# the least of a person
+:version 1.10
+:name toy
+:units
+  mass 1.0
+  length 0.45
+  angle deg
+:documentation
+  anything
+:root
+  order TX TY TZ RX RY RZ
+  axis XYZ
+  position 0 0 0
+  orientation 0 0 0
+:bonedata
+)";
+
+struct Bone {
+  const char *name, *parent, *direction, *length, *freedoms;
+};
+constexpr Bone kBones[] = {{"lowerback", "root", "0 1 0", "1.8", "rx ry rz"},
+                           {"upperback", "lowerback", "0 1 0", "2.1", "rx ry rz"},
+                           {"thorax", "upperback", "0 1 0.02", "3.5", "rx"},
+                           {"lowerneck", "thorax", "0 1 0", "1.4", "rx"},
+                           {"upperneck", "lowerneck", "0 1 0", "1.2", ""},
+                           {"head", "upperneck", "0 1 0", "2.3", "rz rx"},
+                           {"lhipjoint", "root", "0.9 -0.5 0", "1.8", ""},
+                           {"lfemur", "lhipjoint", "0 -1 0", "7.1", "rx ry rz"},
+                           {"ltibia", "lfemur", "0 -1 0", "7.4", "rx"},
+                           {"lfoot", "ltibia", "0 -0.4 0.9", "2.5", "rx"},
+                           {"ltoes", "lfoot", "0 0 1", "1.1", "rx"},
+                           {"rhipjoint", "root", "-0.9 -0.5 0", "1.8", ""},
+                           {"rfemur", "rhipjoint", "0 -1 0", "7.1", "rx ry rz"},
+                           {"rtibia", "rfemur", "0 -1 0", "7.4", "rx"},
+                           {"rfoot", "rtibia", "0 -0.4 0.9", "2.5", "rx"},
+                           {"rtoes", "rfoot", "0 0 1", "1.1", "rx"},
+                           {"lclavicle", "thorax", "1 0.1 0", "3.2", "ry rz"},
+                           {"lhumerus", "lclavicle", "1 0 0", "4.8", "rx ry rz"},
+                           {"lradius", "lhumerus", "1 0 0", "2.7", "rx"},
+                           {"lwrist", "lradius", "1 0 0", "1.8", "ry"},
+                           {"lhand", "lwrist", "1 0 0", "0.9", "rx rz"},
+                           {"rclavicle", "thorax", "-1 0.1 0", "3.2", "ry rz"},
+                           {"rhumerus", "rclavicle", "-1 0 0", "4.8", "rx ry rz"},
+                           {"rradius", "rhumerus", "-1 0 0", "2.7", "rx"},
+                           {"rwrist", "rradius", "-1 0 0", "1.8", "ry"},
+                           {"rhand", "rwrist", "-1 0 0", "0.9", "rx rz"}};
+
+std::string asf_text() {
+  std::string out(kSkeleton);
+  int id = 0;
+  for (const Bone& bone : kBones) {
+    out += "  begin\n    id " + std::to_string(++id) + "\n    name " + bone.name +
+           "\n    direction " + bone.direction + "\n    length " + bone.length +
+           "\n    axis 10 -20 15 XYZ\n";
+    if (*bone.freedoms != '\0') {
+      const std::string freedoms = bone.freedoms;
+      out += "    dof " + freedoms + "\n    limits";
+      for (size_t i = 0; i < (freedoms.size() + 1) / 3; ++i) out += " (-160.0 20.0)\n";
+    }
+    out += "  end\n";
+  }
+  out += ":hierarchy\n  begin\n";
+  for (const Bone& bone : kBones) out += std::string("    ") + bone.parent + " " + bone.name + "\n";
+  return out + "  end\n";
+}
+
+std::string amc_text(int frames) {
+  std::string out = "#!OML:ASF\n:FULLY-SPECIFIED\n:DEGREES\n";
+  for (int f = 1; f <= frames; ++f) {
+    out += std::to_string(f) + "\nroot 0.1 16.5 0." + std::to_string(f) + " 5 20 -3\n";
+    for (const Bone& bone : kBones) {
+      if (*bone.freedoms == '\0') continue;
+      out += bone.name;
+      for (const char* c = bone.freedoms; *c != '\0'; ++c)
+        if (*c == 'r') out += " " + std::to_string(f) + ".25";
+      out += "\n";
+    }
+  }
+  return out;
+}
+
+std::string packed(const std::string& text) {
+  std::string out(lzma_stream_buffer_bound(text.size()), '\0');
+  size_t used = 0;
+  lzma_easy_buffer_encode(0, LZMA_CHECK_CRC32, nullptr,
+                          reinterpret_cast<const uint8_t*>(text.data()), text.size(),
+                          reinterpret_cast<uint8_t*>(out.data()), &used, out.size());
+  out.resize(used);
+  return out;
+}
+
+// ---- arrays ------------------------------------------------------------------------------------
+
+std::vector<float> numbers(size_t n) {
+  std::vector<float> out(n);
+  for (size_t i = 0; i < n; ++i) out[i] = static_cast<float>(std::sin(static_cast<double>(i)));
+  return out;
+}
+
+Seeds npy_seeds() {
+  const std::string bytes(2 * 3 * 3 * 8, '\0');
+  return {{"cloud", test::npy<float>({5, 3}, numbers(15))},
+          {"frames", test::npy<float>({2, 4, 3}, numbers(24))},
+          {"fortran", test::npy_of(test::npy_header(">f8", {2, 3, 3}, true), bytes)},
+          {"half", test::npy_of(test::npy_header("<f2", {4, 3}), bytes.substr(0, 24))},
+          {"bytes", test::npy_of(test::npy_header("|u1", {4, 3}), bytes.substr(0, 12), 2)},
+          {"scalar", test::npy<double>({}, {30})},
+          {"text", test::npy_text("female")}};
+}
+
+Seeds npz_seeds() {
+  const std::string cloud = test::npy<float>({2, 4, 3}, numbers(24));
+  const std::string rate = test::npy<double>({}, {25});
+  test::ZipEntry modern;
+  modern.name = "points.npy";
+  modern.bytes = cloud;
+  modern.deflate = modern.zip64 = modern.descriptor = true;
+  return {{"packed", test::npz({{"points", cloud}, {"fps", rate}})},
+          {"stored", test::npz({{"vertices", cloud}, {"text", test::npy_text("a")}}, false)},
+          {"zip64", test::zip_of({modern}, "comment")}};
+}
+
+Seeds amass_seeds() {
+  test::TinyClip clip, modern;
+  clip.frames = modern.frames = 2;
+  modern.family = SmplFamily::smplh;
+  modern.rate_key = "mocap_frame_rate";
+  modern.type = true;
+  return {{"clip", framed(clip.arrays()), Cut::never_cut},
+          {"modern", framed(modern.arrays()), Cut::never_cut}};
+}
+
+Seeds smpl_seeds() {
+  test::TinySmpl model;
+  model.family = SmplFamily::smpl;
+  return {{"smpl", framed(model.arrays()), Cut::never_cut}};
+}
+
+// ---- weights and configurations ----------------------------------------------------------------
+
+Seeds safetensors_seeds() {
+  TensorFile plain;
+  plain.tensors["a.weight"] = Tensor::from<float>({3}, {1.5f, -2, 0});
+  plain.tensors["b"] = Tensor::from<double>({2, 2}, {1, 2, 3, 4e300});
+  plain.tensors["empty"] = Tensor::zeros({0, 4});
+  plain.tensors["index"] = Tensor::from<int64_t>({1}, {int64_t{1} << 40});
+  plain.metadata["note"] = "line\n\"quoted\"";
+  ModelSizes sizes;
+  sizes.hidden = 2;
+  ModelSet models;
+  put_model(&models, "smrm/rot6d", sizes,
+            make_model("smrm/rot6d", sizes, Init{{7, 1}, DType::f32}));
+  const std::string half = R"({"h":{"dtype":"F16","shape":[2],"data_offsets":[0,4]},)"
+                           R"("b":{"dtype":"BF16","shape":[2,1],"data_offsets":[4,8]}})";
+  return {{"plain", safetensors_bytes(plain)},
+          {"models", safetensors_bytes(to_file(models))},
+          {"header", half + '\0' + "12345678", Cut::never_cut}};
+}
+
+/// What the file says and what it leaves at its default.
+template <class Config>
+std::string resolved(const std::string& file) {
+  Config config;
+  if (!file.empty()) load_config(RESTAGE_SOURCE_DIR "/configs/" + file, {}, config);
+  return resolved_yaml(config);
+}
+
+Seeds config_seeds() {
+  return {{"default", resolved<TrainConfig>(""), Cut::any},
+          {"lite", resolved<TrainConfig>("lite/all.yaml"), Cut::any},
+          {"anchors", "name: &a x\nseed: 3\nskeleton:\n  clouds: {noise: 0.01}\n", Cut::any}};
+}
+
+Seeds profile_seeds() {
+  Seeds out;
+  for (const ProfileText& text : builtin_profile_texts())
+    out.push_back({std::string(text.name), std::string(text.yaml), Cut::any});
+  return out;
+}
+
+// ---- HDF5 --------------------------------------------------------------------------------------
+
+std::string hdf5(const std::function<void(const std::string&)>& write) {
+  const test::TempDir dir;
+  write(dir / "x.h5");
+  return test::bytes_of(dir / "x.h5");
+}
+
+/// The oldest layout, as most programs write it: its structure has no checksums.
+void write_old_layout(const std::string& path) {
+  const hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  const hsize_t dims[3] = {4, kJoints, 3}, chunk[3] = {2, kJoints, 3};
+  const std::vector<double> joints(4 * kJoints * 3, 0.25);
+  const hid_t creation = H5Pcreate(H5P_DATASET_CREATE), space = H5Screate_simple(3, dims, nullptr);
+  H5Pset_chunk(creation, 3, chunk);
+  H5Pset_deflate(creation, 4);
+  const hid_t set =
+      H5Dcreate2(file, "/joints", H5T_IEEE_F64LE, space, H5P_DEFAULT, creation, H5P_DEFAULT);
+  H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, joints.data());
+  H5Dclose(set);
+  H5Sclose(space);
+  H5Pclose(creation);
+  H5Fclose(file);
+}
+
+Seeds hdf5_seeds() {
+  const Body body = testing::tiny_body("a", "train");
+  const Motion motion = testing::tiny_motion("m", "s", "train", 4);
+  return {{"dataset",
+           hdf5([&](const std::string& path) { write_dataset(path, {body}, {motion}, {}); })},
+          {"scans", hdf5([&](const std::string& path) {
+             ScanWriter scans(path, {});
+             scans.append(body.rest.vertices);
+             scans.append({body.rest.vertices[0]});
+             scans.commit();
+           })},
+          {"prediction", hdf5([&](const std::string& path) {
+             PredictionWriter out(path, static_cast<int64_t>(body.rest.vertices.size()),
+                                  body.rest.faces, {});
+             out.append(body.joints, body.rest.vertices);
+             out.commit();
+           })},
+          {"old", hdf5(write_old_layout)}};
+}
+
+}  // namespace
+
+std::string_view amc_skeleton() {
+  static const std::string text = asf_text();
+  return text;
+}
+
+std::vector<Seed> seeds(std::string_view target) {
+  static const std::map<std::string_view, std::function<Seeds()>> makers = {
+      {"ply", ply_seeds},
+      {"obj", obj_seeds},
+      {"gltf", gltf_seeds},
+      {"character", character_seeds},
+      {"bvh", bvh_seeds},
+      {"asf",
+       [] {
+         return Seeds{{"toy", asf_text()}};
+       }},
+      {"amc",
+       [] {
+         return Seeds{{"toy", amc_text(3), Cut::any}};
+       }},
+      {"xz",
+       [] {
+         return Seeds{{"plain", packed(bvh_seeds()[0].bytes)}};
+       }},
+      {"npy", npy_seeds},
+      {"npz", npz_seeds},
+      {"amass", amass_seeds},
+      {"smpl", smpl_seeds},
+      {"safetensors", safetensors_seeds},
+      {"config", config_seeds},
+      {"recipe",
+       [] {
+         return Seeds{{"open", resolved<BenchmarkRecipe>("data/open_benchmark.yaml"), Cut::any}};
+       }},
+      {"profile", profile_seeds},
+      {"names",
+       [] {
+         return Seeds{{"map", "a.*: skeleton.*\nb.0.bias: ~\n'x': y\n", Cut::any}};
+       }},
+      {"hdf5", hdf5_seeds}};
+  return makers.at(target)();
+}
+
+}  // namespace restage::fuzz

@@ -1,0 +1,252 @@
+#include "tests/fuzz/targets.h"
+
+#include <algorithm>
+#include <cstring>
+#include <exception>
+#include <functional>
+
+#include "autograd/base/atomic_file.h"
+#include "autograd/base/error.h"
+#include "datasets/importers/amass.h"
+#include "datasets/importers/amc.h"
+#include "datasets/importers/bvh.h"
+#include "datasets/importers/gltf_character.h"
+#include "datasets/readers/array_frames.h"
+#include "datasets/readers/asf.h"
+#include "datasets/readers/frame_folder.h"
+#include "datasets/readers/mesh_io.h"
+#include "datasets/schema.h"
+#include "experiments/cli/benchmark_config.h"
+#include "nn/weights/bundle.h"
+#include "nn/weights/state.h"
+#include "tests/datasets/schema_support.h"
+#include "tests/datasets/smpl_support.h"
+#include "train/config.h"
+#include "train/stages/configs.h"
+
+namespace restage::fuzz {
+namespace {
+
+const test::TempDir& folder() {
+  static const test::TempDir dir;  // where TMPDIR says; run_fuzz.py chooses a place in memory
+  return dir;
+}
+
+/// A new file with these bytes, for readers that want one.
+std::string file_of(const std::string& bytes, const std::string& name) {
+  const std::string path = folder() / name;
+  std::filesystem::remove(path);  // much faster than cutting the old one to nothing
+  test::write_bytes(path, bytes);
+  return path;
+}
+
+/// Does all of them, whatever is refused; then the first refusal counts.
+void do_all(const std::vector<std::function<void()>>& actions) {
+  std::exception_ptr refusal;
+  for (const auto& action : actions) {
+    try {
+      action();
+    } catch (const InputError&) {
+      if (!refusal) refusal = std::current_exception();
+    }
+  }
+  if (refusal) std::rethrow_exception(refusal);
+}
+
+void play(const std::string& path) {
+  const std::unique_ptr<FrameSource> frames = open_frames(path);
+  while (frames->next()) {
+  }
+}
+
+// ---- meshes and characters ---------------------------------------------------------------------
+
+void read_ply(const std::string& bytes) { parse_mesh(bytes, "x.ply"); }
+void read_obj(const std::string& bytes) { parse_mesh(bytes, "x.obj"); }
+
+void read_scene(const std::string& bytes) {
+  const Gltf file = parse_gltf(bytes, folder() / "x.glb");
+  gltf_mesh(file, gltf_rest(file));
+  for (const GltfClip& clip : file.clips) {
+    clip_frames(file, clip);
+    gltf_pose(file, clip, 0.5 * (clip.begin + clip.end));
+  }
+}
+
+void read_rigged(const std::string& bytes) {
+  const std::string path = file_of(bytes, "x.glb");
+  do_all({[&] { read_character(path); }, [&] { read_target(path); }});
+}
+
+// ---- recordings --------------------------------------------------------------------------------
+
+void read_bvh_text(const std::string& bytes) { convert_bvh(bytes, "x.bvh"); }
+
+void read_asf(const std::string& bytes) {
+  const AsfFile asf = parse_asf(bytes, "x.asf");
+  asf_skeleton(asf);
+  size_t values = 0;
+  for (const AsfBone& bone : asf.bones) values += bone.freedoms.size();
+  Vec3 position;
+  asf_pose(asf, std::vector<double>(values, 1.0), asf.radians, position);
+}
+
+void read_amc_text(const std::string& bytes) {
+  convert_amc(bytes, "x.amc", amc_skeleton(), "x.asf");
+}
+
+void read_packed(const std::string& bytes) { read_bvh(file_of(bytes, "x.bvh.xz")); }
+
+// ---- arrays ------------------------------------------------------------------------------------
+
+void use_array(const NpyArray& array) {
+  if (array.is_text())
+    for (int64_t i = 0; i < std::min<int64_t>(array.size(), 100); ++i) array.text(i);
+  else
+    array.finite();
+}
+
+void read_npy_file(const std::string& bytes) {
+  const std::string path = file_of(bytes, "x.npy");
+  use_array(read_npy(path));
+  if (find_cloud(path)) play(path);
+}
+
+void read_npz_file(const std::string& bytes) {
+  const std::string path = file_of(bytes, "x.npz");
+  const Npz file(path);
+  std::vector<std::function<void()>> actions;
+  for (const std::string& name : file.names())
+    actions.emplace_back([&file, name] { use_array(file.array(name)); });
+  actions.emplace_back([&] {
+    if (find_cloud(file)) play(path);
+  });
+  actions.emplace_back([&] { stated_fps(path); });
+  do_all(actions);
+}
+
+/// framed(), undone as far as there are bytes.
+std::vector<std::pair<std::string, std::string>> arrays_of(std::string_view bytes) {
+  std::vector<std::pair<std::string, std::string>> out;
+  for (size_t end = 0; (end = bytes.find('\0')) != std::string_view::npos && out.size() < 64;) {
+    const std::string name(bytes.substr(0, end));
+    bytes.remove_prefix(end + 1);
+    uint32_t length = 0;
+    std::memcpy(&length, bytes.data(), std::min<size_t>(4, bytes.size()));
+    bytes.remove_prefix(std::min<size_t>(4, bytes.size()));
+    const std::string_view array = bytes.substr(0, length);
+    bytes.remove_prefix(array.size());
+    const auto same = [&](const auto& other) { return other.first == name; };
+    if (name.size() < 1000 && std::none_of(out.begin(), out.end(), same))
+      out.emplace_back(name, array);
+  }
+  return out;
+}
+
+void read_motion(const std::string& bytes) {
+  static BodyModels models(file_of(test::TinySmpl().file(), "model.npz"));
+  ImportReport report;
+  import_amass(Npz(file_of(test::npz(arrays_of(bytes), false), "x.npz")), models, {}, report);
+}
+
+void read_body_model(const std::string& bytes) {
+  const SmplModel model(file_of(test::npz(arrays_of(bytes), false), "x.npz"));
+  model.body({1, -2});
+}
+
+// ---- weights and configurations ----------------------------------------------------------------
+
+/// A text that begins with a brace is a header whose length is still to be put before it; the data
+/// follow a zero.
+void read_weights(const std::string& bytes) {
+  std::string file = bytes;
+  if (bytes.starts_with('{')) {
+    const size_t end = std::min(bytes.find('\0'), bytes.size());
+    const uint64_t length = end;
+    file = std::string(reinterpret_cast<const char*>(&length), 8) + bytes.substr(0, end) +
+           bytes.substr(std::min(end + 1, bytes.size()));
+  }
+  const TensorFile tensors = parse_safetensors(file, "x.safetensors");
+  if (tensors.metadata.count("restage") != 0) models_of(tensors, {}, "x.safetensors");
+}
+
+template <class Config>
+Config config_of(const std::string& bytes) {
+  Config config;
+  load_config(file_of(bytes, "x.yaml"), {}, config);
+  const std::string resolved = resolved_yaml(config);
+  Config again;
+  read_config(parse_yaml(resolved, "resolved"), again);
+  if (resolved_yaml(again) != resolved) throw std::logic_error("the resolved YAML says otherwise");
+  return config;
+}
+
+void read_training(const std::string& bytes) { config_of<TrainConfig>(bytes); }
+void read_recipe(const std::string& bytes) {
+  check_recipe(config_of<BenchmarkRecipe>(bytes), "x.yaml");
+}
+void read_profile(const std::string& bytes) { parse_profile(bytes, "x.yaml"); }
+void read_names(const std::string& bytes) {
+  TensorFile file;
+  file.tensors["a.weight"] = Tensor::zeros({1});
+  file.tensors["b.0.bias"] = Tensor::zeros({1});
+  NameMap::parse(bytes, "x.yaml").apply(file, "x");
+}
+
+// ---- HDF5 --------------------------------------------------------------------------------------
+
+void read_hdf5(const std::string& bytes) {
+  const std::string path = file_of(bytes, "x.h5");
+  // Every opening costs a child process: each input is read in one of three ways.
+  const char way = checksum(bytes).back();
+  if (way < '5') return void(verify(path));
+  const Inspection holds = inspect(path);
+  if (way < 'a') return;
+  std::vector<std::function<void()>> actions;
+  const bool scans = holds.kind == "scans", prediction = holds.kind == "prediction";
+  if (prediction) actions.emplace_back([&] { read_prediction(path); });
+  if (scans || (prediction && holds.counts.count("vertices") != 0))
+    actions.emplace_back([&] { play(path); });
+  if (holds.counts.count("bodies") != 0) actions.emplace_back([&] { read_bodies(path); });
+  if (holds.counts.count("motions") != 0) actions.emplace_back([&] { read_motions(path); });
+  do_all(actions);
+}
+
+}  // namespace
+
+// No allocation may be above 8 times the uncompressed payload plus 64 MB. Of a plain format that is
+// 64 + 8 * 64 KiB: 65 MiB. What is packed unpacks to at most 1032 times its size (deflate) or to as
+// much as the reader allows, so 16 KiB may mean 16 MiB, and 8 times as much. In "hdf5" libFuzzer
+// also watches the child that reads first, which may take 1 GiB (datasets/hdf5/probe.h); what the
+// file claims is checked against what it stores.
+const std::vector<Target>& targets() {
+  constexpr size_t kLong = size_t{64} << 10, kShort = size_t{16} << 10;
+  static const std::vector<Target> all = {{"ply", kShort, 65, read_ply},
+                                          {"obj", kShort, 65, read_obj},
+                                          {"gltf", kLong, 65, read_scene},
+                                          {"character", kLong, 65, read_rigged},
+                                          {"bvh", kLong, 65, read_bvh_text},
+                                          {"asf", kShort, 65, read_asf},
+                                          {"amc", kShort, 65, read_amc_text},
+                                          {"xz", kShort, 320, read_packed},
+                                          {"npy", kShort, 65, read_npy_file},
+                                          {"npz", kShort, 192, read_npz_file},
+                                          {"amass", kLong, 65, read_motion},
+                                          {"smpl", kLong, 65, read_body_model},
+                                          {"safetensors", kLong, 65, read_weights},
+                                          {"config", kShort, 65, read_training},
+                                          {"recipe", kShort, 65, read_recipe},
+                                          {"profile", kShort, 65, read_profile},
+                                          {"names", kShort, 65, read_names},
+                                          {"hdf5", kLong, 1040, read_hdf5}};
+  return all;
+}
+
+std::string framed(const std::vector<std::pair<std::string, std::string>>& arrays) {
+  std::string out;
+  for (const auto& [name, bytes] : arrays)
+    out += name + '\0' + test::raw(static_cast<uint32_t>(bytes.size())) + bytes;
+  return out;
+}
+
+}  // namespace restage::fuzz

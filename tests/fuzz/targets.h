@@ -1,0 +1,42 @@
+// The readers as functions of bytes: what libFuzzer calls (fuzz_main.cpp), and the test of cut
+// files (cut_files_test.cpp).
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace restage::fuzz {
+
+struct Target {
+  std::string_view name;
+  size_t longest;     ///< bytes of an input
+  size_t allocation;  ///< MiB that one allocation may take; targets.cpp has the arithmetic
+  /// Reads the bytes in every way there is. InputError if they are refused; nothing else may come
+  /// out.
+  void (*read)(const std::string& bytes);
+};
+const std::vector<Target>& targets();
+
+/// What becomes of a seed that is cut short.
+enum class Cut {
+  refused,    ///< its format says how much there should be
+  any,        ///< line by line: it is refused in the middle of a line, or is a whole shorter file
+  never_cut,  ///< no file format, but a form that suits the fuzzer
+};
+
+/// A small valid file to begin from.
+struct Seed {
+  std::string name, bytes;
+  Cut cut = Cut::refused;
+};
+std::vector<Seed> seeds(std::string_view target);
+
+/// Arrays of an NPZ one after the other, without the checksums that would keep damage from the
+/// importers: name, zero, length (4 bytes), bytes.
+std::string framed(const std::vector<std::pair<std::string, std::string>>& arrays);
+
+/// The skeleton of the target "amc".
+std::string_view amc_skeleton();
+
+}  // namespace restage::fuzz
