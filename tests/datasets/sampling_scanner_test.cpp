@@ -44,7 +44,7 @@ TEST(SamplingScanner, OneCameraSeesTheNearSideAlone) {
   ASSERT_GT(points.size(), 2000u);
   for (const Point& p : points) {
     EXPECT_NEAR(off_surface(p), 0, 0.005);  // facets
-    EXPECT_GT(p.z(), 0.06f);                // what can be seen from 3 m
+    EXPECT_GT(p.z(), 0.05f);                // 0.083 can be seen of a ball, a little more of facets
   }
   // The middle of the image is the nearest point.
   double nearest = 1e9;
@@ -110,7 +110,7 @@ TEST(SamplingScanner, OutlinesMixAndFlatViewsDropOut) {
   size_t behind = 0;
   for (const Point& p : scan_surface(ball(), {camera}, noise, {1, 0}))
     behind += off_surface(p) > 0.01 && p.z() < 0.2f;
-  EXPECT_GT(behind, 50u);
+  EXPECT_GT(behind, 30u);
   EXPECT_LT(behind, all / 4);
   noise = kPerfect;
   noise.grazing = 0.5;
