@@ -180,8 +180,9 @@ TEST_F(BenchmarkBuild, ADressedCharacterIsWhole) {
   EXPECT_LT(taller, 0.08f);
   ASSERT_EQ(hairy.rest.vertices.size(), dressed.rest.vertices.size());
   for (size_t v = 0; v < hairy.rest.vertices.size(); ++v)
-    if (dressed.weights(static_cast<Eigen::Index>(v), 15) < 0.5f)
+    if (dressed.weights(static_cast<Eigen::Index>(v), 15) < 0.5f) {
       ASSERT_EQ(hairy.rest.vertices[v], dressed.rest.vertices[v]);
+    }
 }
 
 TEST_F(BenchmarkBuild, WrongNamesAndTakenPlacesLeaveNothing) {
@@ -333,9 +334,10 @@ TEST(FetchList, TheProjectsOwnListIsSound) {
   const std::vector<FetchEntry> entries =
       read_fetch_list(RESTAGE_SOURCE_DIR "/configs/data/open_data.txt");
   EXPECT_GT(entries.size(), 10u);
-  for (const FetchEntry& e : entries)
-    if (e.address.find("://") == std::string::npos && e.address != "-")
-      EXPECT_EQ(sha256_of_file(RESTAGE_SOURCE_DIR "/configs/data/" + e.address), e.sha256);
+  for (const FetchEntry& e : entries) {
+    if (e.address.find("://") != std::string::npos || e.address == "-") continue;
+    EXPECT_EQ(sha256_of_file(RESTAGE_SOURCE_DIR "/configs/data/" + e.address), e.sha256);
+  }
 }
 
 }  // namespace
