@@ -59,7 +59,7 @@ void gait_leg(const Gait& g, double phase, double hip_height, double pitch, int 
   a[channel(side, kToes)] = std::max(0.0, .8 * tilt * (p < g.contact));
 }
 
-Performance gait(const Temper& s, Rng& r, Gait g, double way, double seconds) {
+Choreography gait(const Temper& s, Rng& r, Gait g, double way, double seconds) {
   g.rate = vary(r, g.rate, .12) * s.tempo;
   g.travel = vary(r, g.travel, .18) * std::sqrt(s.energy);
   g.clearance = vary(r, g.clearance, .25);
@@ -100,7 +100,7 @@ Performance gait(const Temper& s, Rng& r, Gait g, double way, double seconds) {
     a[kNeckNod] = -.5 * g.lean + 2 * c2;
     return a;
   };
-  Performance p{seconds, angles, nullptr, {}};
+  Choreography p{seconds, angles, nullptr, {}};
   if (g.contact < .5) {  // no foot to go by in the air
     p.speed = way * g.travel * g.rate / g.contact;
     p.flight = [=](double t) {  // airborne twice per stride, between two contacts
@@ -114,29 +114,29 @@ Performance gait(const Temper& s, Rng& r, Gait g, double way, double seconds) {
 
 }  // namespace
 
-Performance walk(const Temper& s, Rng& r) {
+Choreography walk(const Temper& s, Rng& r) {
   return gait(s, r, {1.0, .60, .54, .05, .0, 30, 24, 14, 3, 7, 0, 0}, 1, r.uniform(3, 6));
 }
 
-Performance jog(const Temper& s, Rng& r) {
+Choreography jog(const Temper& s, Rng& r) {
   return gait(s, r, {1.35, .36, .58, .24, .03, 30, 36, 75, 9, 12, 0, .05}, 1, r.uniform(2.5, 5));
 }
 
-Performance march(const Temper& s, Rng& r) {
+Choreography march(const Temper& s, Rng& r) {
   return gait(s, r, {.9, .58, .46, .30, .0, 18, 45, 22, -1, 8, 0, 0}, 1, r.uniform(3, 5));
 }
 
-Performance walk_in_circle(const Temper& s, Rng& r) {
+Choreography walk_in_circle(const Temper& s, Rng& r) {
   const double way = r.uniform() < .5 ? -1 : 1, turn = way * r.uniform(35, 75);
   return gait(s, r, {.95, .60, .48, .06, .005, 24, 20, 16, 3, 7, turn, 0}, 1, r.uniform(3.5, 6));
 }
 
-Performance walk_backward(const Temper& s, Rng& r) {
+Choreography walk_backward(const Temper& s, Rng& r) {
   return gait(s, r, {.8, .62, .40, .06, .005, 16, 14, 18, 2, 5, 0, 0}, -1, r.uniform(3, 5));
 }
 
-Performance sneak(const Temper& s, Rng& r) {
-  Performance p =
+Choreography sneak(const Temper& s, Rng& r) {
+  Choreography p =
       gait(s, r, {.55, .64, .56, .16, .14, 16, 14, 85, 26, 6, 0, 0}, 1, r.uniform(3.5, 6));
   const double phase = r.uniform(0, 6);
   p.angles = [inner = p.angles, phase](double t) {

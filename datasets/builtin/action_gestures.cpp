@@ -6,7 +6,7 @@
 
 namespace restage {
 
-Performance throw_ball(const Temper& s, Rng& r) {
+Choreography throw_ball(const Temper& s, Rng& r) {
   const double e = s.energy, h = r.uniform(.5, .9) / s.tempo, high = r.uniform(-25, 45);
   const double lift = r.uniform(0, 60);
   Timeline k;
@@ -45,7 +45,7 @@ Performance throw_ball(const Temper& s, Rng& r) {
   return play(s, r, k, 2.6 * h + r.uniform(1.1, 1.8));
 }
 
-Performance punch(const Temper& s, Rng& r) {
+Choreography punch(const Temper& s, Rng& r) {
   const double reach = 12 * s.energy, beat = r.uniform(.22, .36) / s.tempo;
   const Angles guard = crouch(30, 8)
                            .trunk({10, 0, -15})
@@ -79,7 +79,7 @@ Performance punch(const Temper& s, Rng& r) {
   return play(s, r, k, std::clamp(t + .3, 2.0, 6.0));
 }
 
-Performance kick(const Temper& s, Rng& r) {
+Choreography kick(const Temper& s, Rng& r) {
   const double h = r.uniform(.38, .6) / s.tempo, e = s.energy, side = r.uniform(5, 55);
   const double yaw = r.uniform(-30, 30);
   Timeline k;
@@ -114,7 +114,7 @@ Performance kick(const Temper& s, Rng& r) {
   return play(s, r, k, 3.6 * h + r.uniform(.4, 1.2));
 }
 
-Performance wave(const Temper& s, Rng& r) {
+Choreography wave(const Temper& s, Rng& r) {
   const double rate = r.uniform(1.1, 2.1) * s.tempo, high = r.uniform(-20, 60),
                wide = r.uniform(12, 32);
   const bool both = r.uniform() < .25;
@@ -127,7 +127,7 @@ Performance wave(const Temper& s, Rng& r) {
   const double seconds = r.uniform(2.8, 5);
   up.add(seconds - .9, raised);
   up.add(seconds - .1, stand());
-  Performance p = play(s, r, up, seconds);
+  Choreography p = play(s, r, up, seconds);
   p.angles = [inner = p.angles, rate, wide, seconds](double t) {
     Angles a = inner(t);
     const double on = std::clamp(std::min(t - .5, seconds - .5 - t) / .5, 0.0, 1.0);
@@ -142,7 +142,7 @@ Performance wave(const Temper& s, Rng& r) {
   return p;
 }
 
-Performance reach(const Temper& s, Rng& r) {
+Choreography reach(const Temper& s, Rng& r) {
   Timeline k;
   double t = 0;
   k.add(t, stand());
@@ -169,7 +169,7 @@ Performance reach(const Temper& s, Rng& r) {
   return play(s, r, k, std::clamp(t, 2.0, 6.0));
 }
 
-Performance bow(const Temper& s, Rng& r) {
+Choreography bow(const Temper& s, Rng& r) {
   const double down = r.uniform(.7, 1.3) / s.tempo, deep = r.uniform(40, 85),
                hold = r.uniform(.3, 1);
   const bool touch = r.uniform() < .5;
@@ -186,7 +186,7 @@ Performance bow(const Temper& s, Rng& r) {
   return play(s, r, k, std::clamp(.8 + 2 * down + hold, 2.0, 6.0));
 }
 
-Performance clap(const Temper& s, Rng& r) {
+Choreography clap(const Temper& s, Rng& r) {
   const double rate = r.uniform(1.2, 2.2) * s.tempo, high = r.uniform(45, 150),
                open = r.uniform(18, 45);
   const double sway = 8 * r.normal(), bent = r.uniform(25, 70), bounce = r.uniform(0, 18);
@@ -202,7 +202,7 @@ Performance clap(const Temper& s, Rng& r) {
   return {r.uniform(2, 4.5), angles, nullptr, {}};
 }
 
-Performance look_around(const Temper& s, Rng& r) {
+Choreography look_around(const Temper& s, Rng& r) {
   Timeline k;
   double t = 0;
   k.add(t, stand());
@@ -229,7 +229,7 @@ Performance look_around(const Temper& s, Rng& r) {
   return play(s, r, k, seconds);
 }
 
-Performance stretch(const Temper& s, Rng& r) {
+Choreography stretch(const Temper& s, Rng& r) {
   Timeline k;
   double t = 0;
   k.add(t, stand());

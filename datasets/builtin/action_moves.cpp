@@ -6,7 +6,7 @@
 
 namespace restage {
 
-Performance sit(const Temper& s, Rng& r) {
+Choreography sit(const Temper& s, Rng& r) {
   const double down = r.uniform(.9, 1.6) / s.tempo, stay = r.uniform(.8, 2),
                knee = r.uniform(78, 100);
   const Angles leaning = crouch(60).trunk({34, 0, 0}).head({-10, 0}).arms({30, -78, 5, 25});
@@ -36,7 +36,7 @@ Performance sit(const Temper& s, Rng& r) {
   return play(s, r, k, std::clamp(.5 + 2.1 * down + stay, 2.0, 6.0));
 }
 
-Performance squat(const Temper& s, Rng& r) {
+Choreography squat(const Temper& s, Rng& r) {
   const double rate = r.uniform(.35, .6) * s.tempo,
                deep = r.uniform(80, 128) * std::min(s.energy, 1.1);
   const double wide = r.uniform(4, 22), forward = r.uniform(0, 95), start = r.uniform(0, .3);
@@ -55,7 +55,7 @@ Performance squat(const Temper& s, Rng& r) {
   return {r.uniform(2.5, 5), angles, nullptr, {}};
 }
 
-Performance jump(const Temper& s, Rng& r) {
+Choreography jump(const Temper& s, Rng& r) {
   const double pre = r.uniform(.5, .8) / s.tempo, air = r.uniform(.38, .56) * std::sqrt(s.energy);
   const double turn = r.uniform() < .35 ? r.uniform(-180, 180) : 0, apart = r.uniform(2, 32);
   const double up = r.uniform(60, 170), high = 9.81 * air * air / 8, tuck = r.uniform(5, 80);
@@ -83,7 +83,7 @@ Performance jump(const Temper& s, Rng& r) {
   k.add(land + .22,
         crouch(70).trunk({30, 0, 0}).head({-12, 0}).arms({20, -65, 0, 30}).set(kYaw, turn));
   k.add(land + .8, stand().set(kYaw, turn));
-  Performance p = play(s, r, k, std::max(2.0, land + r.uniform(1, 1.6)));
+  Choreography p = play(s, r, k, std::max(2.0, land + r.uniform(1, 1.6)));
   p.flight = [=](double t) {
     const double u = (t - off) / (land - off);
     return u <= 0 || u >= 1 ? 0.0 : 4 * high * u * (1 - u);
@@ -91,7 +91,7 @@ Performance jump(const Temper& s, Rng& r) {
   return p;
 }
 
-Performance turn_around(const Temper& s, Rng& r) {
+Choreography turn_around(const Temper& s, Rng& r) {
   const double way = r.uniform() < .5 ? -1 : 1, total = way * r.uniform(90, 360);
   const double seconds = std::clamp(std::abs(total) / r.uniform(70, 120) / s.tempo, 2.0, 6.0);
   const double rate = r.uniform(1, 1.5) * s.tempo, lift = r.uniform(18, 40), arm = r.uniform(5, 20);
@@ -116,7 +116,7 @@ Performance turn_around(const Temper& s, Rng& r) {
   return {seconds, angles, nullptr, {}};
 }
 
-Performance lunge(const Temper& s, Rng& r) {
+Choreography lunge(const Temper& s, Rng& r) {
   Timeline k;
   double t = .1;
   const double e = s.energy, seconds = r.uniform(3, 5.5);
@@ -137,7 +137,7 @@ Performance lunge(const Temper& s, Rng& r) {
 }
 
 /// Every channel swings at multiples of half the beat.
-Performance dance(const Temper& s, Rng& r) {
+Choreography dance(const Temper& s, Rng& r) {
   struct Wave {
     double middle, size, harmonic, phase, slow, slow_phase;
   };
@@ -191,7 +191,7 @@ Performance dance(const Temper& s, Rng& r) {
 }
 
 /// Wanders through random poses within the joint limits.
-Performance freestyle(const Temper& s, Rng& r) {
+Choreography freestyle(const Temper& s, Rng& r) {
   Timeline k;
   double t = 0, yaw = 0;
   const double seconds = r.uniform(3.5, 6);

@@ -70,32 +70,32 @@ inline double vary(Rng& r, double value, double share = 0.2) {
 }
 
 /// Plays a timeline for the acting hand of the subject, mostly the good one.
-Performance play(const Temper& s, Rng& r, Timeline line, double seconds);
+Choreography play(const Temper& s, Rng& r, Timeline line, double seconds);
 
 // action_gaits.cpp
-Performance walk(const Temper& s, Rng& r);
-Performance jog(const Temper& s, Rng& r);
-Performance march(const Temper& s, Rng& r);
-Performance walk_in_circle(const Temper& s, Rng& r);
-Performance walk_backward(const Temper& s, Rng& r);
-Performance sneak(const Temper& s, Rng& r);
+Choreography walk(const Temper& s, Rng& r);
+Choreography jog(const Temper& s, Rng& r);
+Choreography march(const Temper& s, Rng& r);
+Choreography walk_in_circle(const Temper& s, Rng& r);
+Choreography walk_backward(const Temper& s, Rng& r);
+Choreography sneak(const Temper& s, Rng& r);
 // action_gestures.cpp
-Performance throw_ball(const Temper& s, Rng& r);
-Performance punch(const Temper& s, Rng& r);
-Performance kick(const Temper& s, Rng& r);
-Performance wave(const Temper& s, Rng& r);
-Performance reach(const Temper& s, Rng& r);
-Performance bow(const Temper& s, Rng& r);
-Performance clap(const Temper& s, Rng& r);
-Performance look_around(const Temper& s, Rng& r);
-Performance stretch(const Temper& s, Rng& r);
+Choreography throw_ball(const Temper& s, Rng& r);
+Choreography punch(const Temper& s, Rng& r);
+Choreography kick(const Temper& s, Rng& r);
+Choreography wave(const Temper& s, Rng& r);
+Choreography reach(const Temper& s, Rng& r);
+Choreography bow(const Temper& s, Rng& r);
+Choreography clap(const Temper& s, Rng& r);
+Choreography look_around(const Temper& s, Rng& r);
+Choreography stretch(const Temper& s, Rng& r);
 // action_moves.cpp
-Performance sit(const Temper& s, Rng& r);
-Performance squat(const Temper& s, Rng& r);
-Performance jump(const Temper& s, Rng& r);
-Performance turn_around(const Temper& s, Rng& r);
-Performance lunge(const Temper& s, Rng& r);
-Performance dance(const Temper& s, Rng& r);
-Performance freestyle(const Temper& s, Rng& r);
+Choreography sit(const Temper& s, Rng& r);
+Choreography squat(const Temper& s, Rng& r);
+Choreography jump(const Temper& s, Rng& r);
+Choreography turn_around(const Temper& s, Rng& r);
+Choreography lunge(const Temper& s, Rng& r);
+Choreography dance(const Temper& s, Rng& r);
+Choreography freestyle(const Temper& s, Rng& r);
 
 }  // namespace restage

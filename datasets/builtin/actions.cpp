@@ -7,7 +7,7 @@
 
 namespace restage {
 
-Performance play(const Temper& s, Rng& r, Timeline line, double seconds) {
+Choreography play(const Temper& s, Rng& r, Timeline line, double seconds) {
   const bool swap = s.left_handed != (r.uniform() < 0.85);
   return {seconds,
           [line = std::move(line), swap](double t) { return swap ? mirrored(line(t)) : line(t); },

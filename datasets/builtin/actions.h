@@ -23,7 +23,7 @@ struct Temper {
 Temper draw_temper(const RngKey& key);
 
 /// One performance: angles and height of flight (metres) at a time in seconds.
-struct Performance {
+struct Choreography {
   double seconds = 3;
   std::function<Angles(double)> angles;
   std::function<double(double)> flight;  ///< null: never leaves the floor
@@ -34,7 +34,7 @@ struct Performance {
 
 struct Action {
   std::string name;
-  Performance (*perform)(const Temper&, Rng&);
+  Choreography (*perform)(const Temper&, Rng&);
 };
 
 const std::vector<Action>& actions();

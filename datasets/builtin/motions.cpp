@@ -108,7 +108,7 @@ RngKey motion_key(uint64_t seed, const std::string& split) {
 }
 
 // World rotations of all frames; joints relative to the pelvis come along for the floor.
-std::vector<PosedSkeleton> posed_frames(const Performance& p, const Temper& temper, Rng& r,
+std::vector<PosedSkeleton> posed_frames(const Choreography& p, const Temper& temper, Rng& r,
                                         const Joints& rest) {
   const Unrest unrest(r);
   const double heading = r.uniform(-180, 180);
@@ -151,7 +151,7 @@ Motion builtin_motion(uint64_t seed, const std::string& split, int index) {
   const Action& action = actions()[index % actions().size()];
   const Temper temper = draw_temper(key.fold("subject").fold(subject));
   Rng r(key.fold("motion").fold(index));
-  Performance performance = action.perform(temper, r);
+  Choreography performance = action.perform(temper, r);
   performance.seconds = std::clamp(performance.seconds, 2.0, 6.0);
 
   Motion m;

@@ -8,7 +8,7 @@
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
-#include "infer/render/gallery.h"
+#include "infer/render/figures.h"
 
 namespace restage::cli {
 namespace {
@@ -21,11 +21,13 @@ struct SheetArguments {
   int columns = 11;
 };
 
+Figure figure(Points points, std::vector<Triangle> faces, uint32_t colour, std::string caption) {
+  return {{{std::move(points), std::move(faces), colour}}, std::move(caption)};
+}
+
 Figure posed(const Body& body, const Motion& motion, size_t frame) {
-  return {motion.id + " " + body.id,
-          {pose_surface(body, pose_on(motion, body, frame)), body.rest.faces},
-          kTarget,
-          0};
+  return figure(pose_surface(body, pose_on(motion, body, frame)), body.rest.faces, kTarget,
+                motion.id + " " + body.id);
 }
 
 /// Bodies in T-pose; then the middle of every motion, bodies in turn.
@@ -36,7 +38,8 @@ std::vector<Figure> figures_of_file(const std::string& file) {
                      "give a data file with bodies, or a benchmark folder");
   const std::vector<Body> bodies = read_bodies(file);
   std::vector<Figure> out;
-  for (const Body& body : bodies) out.push_back({body.id, body.rest, kSource, 0});
+  for (const Body& body : bodies)
+    out.push_back(figure(body.rest.vertices, body.rest.faces, kSource, body.id));
   if (kind == "bodies") return out;
   size_t turn = 0;
   for (const Motion& motion : read_motions(file))
@@ -78,15 +81,16 @@ std::vector<Figure> figures_of_folder(const std::string& folder) {
     const Prediction truth = read_prediction(path + "/truth.h5");
     if (static_cast<int64_t>(frame) >= truth.frames)
       throw InputError(path + "/truth.h5", "has fewer frames than source.h5", "build it again");
-    Mesh answer{{}, truth.faces};
+    Points answer;
     const auto count = static_cast<size_t>(truth.vertex_count);
     for (size_t v = frame * count; v < (frame + 1) * count; ++v)
-      answer.vertices.push_back(
+      answer.push_back(
           Vec3(truth.vertices[3 * v], truth.vertices[3 * v + 1], truth.vertices[3 * v + 2])
               .cast<float>());
     const size_t dash = name.find('-');
-    out.push_back({name.substr(0, dash), {std::move(cloud), {}}, kSource, 0});
-    out.push_back({dash == name.npos ? "" : name.substr(dash + 1), std::move(answer), kTarget, 0});
+    out.push_back(figure(std::move(cloud), {}, kSource, name.substr(0, dash)));
+    out.push_back(figure(std::move(answer), truth.faces, kTarget,
+                         dash == name.npos ? "" : name.substr(dash + 1)));
   }
   return out;
 }
@@ -96,12 +100,13 @@ int run_sheet(const SheetArguments& a, const Common& common) {
   if (a.columns < 1 || a.columns > 64)
     throw InputError("", "--columns " + std::to_string(a.columns) + " is out of range",
                      "give a number from 1 to 64");
-  GalleryOptions options;
+  FigureSheetOptions options;
   options.columns = a.columns;
+  options.cell_height = 150;
   options.title = a.title;
-  write_png(a.out, gallery(fs::is_directory(a.input) ? figures_of_folder(a.input)
-                                                     : figures_of_file(a.input),
-                           options));
+  write_png(a.out, figure_sheet(fs::is_directory(a.input) ? figures_of_folder(a.input)
+                                                          : figures_of_file(a.input),
+                                options));
   if (common.json)
     print_json({{"out", a.out}});
   else

@@ -74,8 +74,10 @@ Image figure_sheet(const std::vector<Figure>& figures, const FigureSheetOptions&
   const Extent extent = extent_of(figures);
   const double per_metre =
       options.cell_height / (1.16 * std::max(extent.high, extent.aside) + 0.12);
-  const int cell_width = std::clamp(static_cast<int>(per_metre * (2.0 * extent.aside + 0.16)),
-                                    options.cell_height / 2, options.cell_height * 3 / 2);
+  int wanted = static_cast<int>(per_metre * (2.0 * extent.aside + 0.16));
+  for (const Figure& figure : figures)
+    wanted = std::max(wanted, text_width(10, figure.caption) + 8);
+  const int cell_width = std::clamp(wanted, options.cell_height / 2, options.cell_height * 3 / 2);
   const int count = static_cast<int>(figures.size()), columns = std::min(count, options.columns),
             rows = (count + columns - 1) / columns;
   const int top = kMargin + (options.title.empty() ? 0 : kTitle),
