@@ -342,7 +342,7 @@ TEST(ReadersArrays, CutAtEveryByte) {
       {"y.npz", npz({{"poses", a}, {"gender", b}}, false)},
       {"z.npz", zip_of({modern}, "comment")}};
   for (const auto& file : files) {
-    const std::string &name = file.first, &bytes = file.second;
+    const std::string name = file.first, &bytes = file.second;
     test::write_bytes(dir / name, bytes);
     read_all(dir / name);
     for (size_t n = 0; n < bytes.size(); ++n) {
