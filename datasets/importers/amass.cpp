@@ -42,7 +42,10 @@ std::string gender_of(const fs::path& file) {
 /// Text of a scalar; empty where there is none, or where it is no plain text.
 std::string text_of(const Npz& file, const char* name) {
   if (!file.has(name) || !file.header(name).is_text()) return "";
-  return lower(file.array(name).text());
+  std::string out = lower(file.array(name).text()).substr(0, 40);
+  for (char& c : out)
+    if (c < 32 || c > 126) c = '?';  // it is printed
+  return out;
 }
 
 // ---- one file ----------------------------------------------------------------------------------

@@ -39,12 +39,13 @@ NpyHeader Npz::header(const std::string& name) const {
 }
 
 std::string list_of(const std::vector<std::string>& names) {
-  constexpr size_t kMost = 8;
-  std::string out;
-  for (size_t i = 0; i < names.size() && i < kMost; ++i)
-    out += (i > 0 ? ", " : "") + text::quote(names[i]);
+  constexpr size_t kMost = 8, kLong = 120;  // names may be anything, and a message is one line
   if (names.empty()) return "none";
-  return out + (names.size() > kMost ? " ..." : "");
+  std::string out = text::quote(names[0]);
+  size_t i = 1;
+  for (; i < names.size() && i < kMost && out.size() < kLong; ++i)
+    out += ", " + text::quote(names[i]);
+  return out + (i < names.size() ? " ..." : "");
 }
 
 }  // namespace restage

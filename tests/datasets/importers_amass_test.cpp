@@ -314,6 +314,20 @@ TEST(ImportersAmass, WhatIsWrongIsSaid) {
   EXPECT_HAS(refused("betas", npy<double>({2, 4}, std::vector<double>(8, 0))), "one person");
   EXPECT_HAS(refused("betas", npy<double>({4}, std::vector<double>(4, NAN))), "NaN");
   EXPECT_HAS(refused("betas", ""), "'betas'");
+  // Found by the fuzzer: text of the file in a message that is one short line.
+  auto odd = TinyClip().arrays();
+  odd.emplace_back("surface_model_type", test::npy_text("smpl\nh" + std::string(500, 'x')));
+  write_bytes(dir / "c.npz", npz(odd));
+  ImportReport unused;
+  const std::string said = error_of([&] { import_amass(Npz(dir / "c.npz"), models, {}, unused); });
+  EXPECT_HAS(said, "for the model smpl?hxxx");
+  EXPECT_EQ(said.find('\n'), std::string::npos);
+  EXPECT_LT(said.size(), 390u);
+  std::vector<std::pair<std::string, std::string>> many;
+  for (int i = 0; i < 9; ++i)
+    many.emplace_back(std::string(60, static_cast<char>('a' + i)), npy<double>({1}, {1}));
+  write_bytes(dir / "many.npz", npz(many));
+  EXPECT_LT(error_of([&] { SmplModel(dir / "many.npz"); }).size(), 390u);
   TinyClip other;
   other.family = SmplFamily::smplx;
   write_bytes(dir / "c.npz", other.file());
