@@ -189,6 +189,27 @@ TEST(Doctor, FloorIsFoundAndMoved) {
   EXPECT_NEAR((*d.transform)(Point(0, 0.8f, 0)).y(), 0, 0.02);
 }
 
+/// Vertices of a mesh taken as a cloud: hundreds in the head, few elsewhere. What is usual in one
+/// place makes nothing stray in another.
+TEST(Doctor, ADenseHeadMakesNothingElseStray) {
+  Points points = scan(somebody());
+  const size_t even = points.size();
+  Rng rng(RngKey{3, 0});
+  for (size_t i = 0; i < even; ++i)
+    for (int k = 0; k < 40 && points[i].y() > somebody().joints[15].y(); ++k)
+      points.push_back(points[i] +
+                       0.01f * Point(rng.uniform(-1, 1), rng.uniform(-1, 1), rng.uniform(-1, 1)));
+  ASSERT_GT(points.size(), 2 * even);
+  const Parts parts = find_parts(points);
+  EXPECT_EQ(parts.other, 0u);
+  EXPECT_LT(parts.stray, even / 100);
+  const Diagnosis d = examine_surface(cloud(points));
+  EXPECT_EQ(d.orientation.up, 2);
+  EXPECT_EQ(d.unit.unit.metres, 1);
+  ASSERT_NE(d.find("pose"), nullptr);
+  EXPECT_EQ(d.find("pose")->what, "T-pose");
+}
+
 TEST(Doctor, StrayPointsAreCountedAndRemoved) {
   Points points = scan(somebody());
   const size_t clean = points.size();

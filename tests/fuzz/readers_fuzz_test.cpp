@@ -2,7 +2,6 @@
 // reader may succeed or throw InputError; anything else (a crash, another exception) fails. The
 // sanitizer build runs the same test.
 #include <gtest/gtest.h>
-#include <hdf5.h>
 
 #include <cmath>
 #include <filesystem>
@@ -15,6 +14,7 @@
 #include "datasets/schema.h"
 #include "tests/datasets/schema_support.h"
 #include "tests/datasets/smpl_support.h"
+#include "tests/fuzz/old_layout.h"
 
 #if defined(__SANITIZE_ADDRESS__)
 // The HDF5 library itself forgets some memory when it refuses a damaged file.
@@ -213,26 +213,9 @@ TEST(ReadersFuzz, DamagedHdf5) {
   RecordProperty("read", scan_good + good + set_good);
 }
 
-/// As most programs write it: the oldest layout, whose structure has no checksums.
-void write_old_layout(const std::string& path) {
-  const hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
-  const hsize_t dims[3] = {6, kJoints, 3}, chunk[3] = {2, kJoints, 3};
-  const std::vector<double> joints(6 * kJoints * 3, 0.25);
-  const hid_t creation = H5Pcreate(H5P_DATASET_CREATE), space = H5Screate_simple(3, dims, nullptr);
-  H5Pset_chunk(creation, 3, chunk);
-  H5Pset_deflate(creation, 4);
-  const hid_t set =
-      H5Dcreate2(file, "/joints", H5T_IEEE_F64LE, space, H5P_DEFAULT, creation, H5P_DEFAULT);
-  H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, joints.data());
-  H5Dclose(set);
-  H5Sclose(space);
-  H5Pclose(creation);
-  H5Fclose(file);
-}
-
 TEST(ReadersFuzz, DamagedHdf5OfTheOldLayout) {
   const test::TempDir dir;
-  write_old_layout(dir / "old.h5");
+  test::write_old_layout(dir / "old.h5");
   EXPECT_EQ(read_prediction(dir / "old.h5").frames, 6);
   const auto [good, refused] = attack(dir / "old.h5", dir / "x.h5", 200, 17,
                                       [](const std::string& path) { read_prediction(path); });

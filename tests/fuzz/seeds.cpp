@@ -1,5 +1,4 @@
 // Small valid files of every kind, as other programs write them.
-#include <hdf5.h>
 #include <lzma.h>
 
 #include <cmath>
@@ -14,6 +13,7 @@
 #include "tests/datasets/importers_bvh_text.h"
 #include "tests/datasets/schema_support.h"
 #include "tests/datasets/smpl_support.h"
+#include "tests/fuzz/old_layout.h"
 #include "tests/fuzz/targets.h"
 #include "tests/support/tiny_body.h"
 #include "train/config.h"
@@ -350,23 +350,6 @@ std::string hdf5(const std::function<void(const std::string&)>& write) {
   return test::bytes_of(dir / "x.h5");
 }
 
-/// The oldest layout, as most programs write it: its structure has no checksums.
-void write_old_layout(const std::string& path) {
-  const hid_t file = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
-  const hsize_t dims[3] = {4, kJoints, 3}, chunk[3] = {2, kJoints, 3};
-  const std::vector<double> joints(4 * kJoints * 3, 0.25);
-  const hid_t creation = H5Pcreate(H5P_DATASET_CREATE), space = H5Screate_simple(3, dims, nullptr);
-  H5Pset_chunk(creation, 3, chunk);
-  H5Pset_deflate(creation, 4);
-  const hid_t set =
-      H5Dcreate2(file, "/joints", H5T_IEEE_F64LE, space, H5P_DEFAULT, creation, H5P_DEFAULT);
-  H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, joints.data());
-  H5Dclose(set);
-  H5Sclose(space);
-  H5Pclose(creation);
-  H5Fclose(file);
-}
-
 Seeds hdf5_seeds() {
   const Body body = testing::tiny_body("a", "train");
   const Motion motion = testing::tiny_motion("m", "s", "train", 4);
@@ -384,7 +367,7 @@ Seeds hdf5_seeds() {
              out.append(body.joints, body.rest.vertices);
              out.commit();
            })},
-          {"old", hdf5(write_old_layout)}};
+          {"old", hdf5(test::write_old_layout)}};
 }
 
 }  // namespace

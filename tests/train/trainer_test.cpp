@@ -25,18 +25,14 @@ using testing::tiny_training;
 constexpr int64_t kSteps = 9;
 const std::vector<std::string> kAll = {"skeleton", "motion", "deformation"};
 
-/// A stage that does something of the test's own before one of its steps.
-class Disturbed final : public Stage {
+/// Hands everything on to another stage; tests change what they want to see.
+class Forwarding : public Stage {
  public:
-  Disturbed(std::unique_ptr<Stage> stage, int64_t when, std::function<void()> what)
-      : stage_(std::move(stage)), when_(when), what_(std::move(what)) {}
+  explicit Forwarding(std::unique_ptr<Stage> stage) : stage_(std::move(stage)) {}
   std::string name() const override { return stage_->name(); }
   int64_t steps() const override { return stage_->steps(); }
   int64_t examples_per_step() const override { return stage_->examples_per_step(); }
-  NamedValues step(int64_t step) override {
-    if (step == when_) what_();
-    return stage_->step(step);
-  }
+  NamedValues step(int64_t step) override { return stage_->step(step); }
   void read(int64_t step) const override { stage_->read(step); }
   NamedValues validate() override { return stage_->validate(); }
   void save(TensorFile& file) const override { stage_->save(file); }
@@ -47,6 +43,19 @@ class Disturbed final : public Stage {
 
  private:
   std::unique_ptr<Stage> stage_;
+};
+
+/// Does something of the test's own before one of its steps.
+class Disturbed final : public Forwarding {
+ public:
+  Disturbed(std::unique_ptr<Stage> stage, int64_t when, std::function<void()> what)
+      : Forwarding(std::move(stage)), when_(when), what_(std::move(what)) {}
+  NamedValues step(int64_t step) override {
+    if (step == when_) what_();
+    return Forwarding::step(step);
+  }
+
+ private:
   int64_t when_;
   std::function<void()> what_;
 };
@@ -169,31 +178,21 @@ TEST_F(TrainTrainer, StopByASignalWritesACheckpointAndResumesToTheSameBits) {
 }
 
 /// Notes the precision of products in steps and validations.
-class Watched final : public Stage {
+class Watched final : public Forwarding {
  public:
   Watched(std::unique_ptr<Stage> stage, std::vector<MatmulPrecision>& steps,
           std::vector<MatmulPrecision>& validations)
-      : stage_(std::move(stage)), steps_(steps), validations_(validations) {}
-  std::string name() const override { return stage_->name(); }
-  int64_t steps() const override { return stage_->steps(); }
-  int64_t examples_per_step() const override { return stage_->examples_per_step(); }
+      : Forwarding(std::move(stage)), steps_(steps), validations_(validations) {}
   NamedValues step(int64_t step) override {
     steps_.push_back(matmul_precision());
-    return stage_->step(step);
+    return Forwarding::step(step);
   }
-  void read(int64_t step) const override { stage_->read(step); }
   NamedValues validate() override {
     validations_.push_back(matmul_precision());
-    return stage_->validate();
+    return Forwarding::validate();
   }
-  void save(TensorFile& file) const override { stage_->save(file); }
-  void load(const TensorFile& file, const std::string& where) override {
-    stage_->load(file, where);
-  }
-  void export_models(ModelSet& set) override { stage_->export_models(set); }
 
  private:
-  std::unique_ptr<Stage> stage_;
   std::vector<MatmulPrecision>&steps_, &validations_;
 };
 
