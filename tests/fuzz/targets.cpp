@@ -150,7 +150,9 @@ void read_motion(const std::string& bytes) {
 }
 
 void read_body_model(const std::string& bytes) {
-  const SmplModel model(file_of(test::npz(arrays_of(bytes), false), "x.npz"));
+  const Npz file(file_of(test::npz(arrays_of(bytes), false), "x.npz"));
+  SmplModel model(file);
+  model.read_blend_shapes(file);
   model.body({1, -2});
 }
 
