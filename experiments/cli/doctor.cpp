@@ -268,6 +268,7 @@ void print_report(const Options& options, const Report& found, const std::string
     }
     Json document = {{"file", options.path}, {"kind", found.kind},   {"usable", found.usable()},
                      {"facts", found.facts}, {"findings", findings}, {"notes", notes}};
+    if (found.diagnosis) document["frame"] = frame_json(*found.diagnosis);
     if (found.diagnosis && found.diagnosis->transform)
       document["transform"] = to_json(*found.diagnosis->transform);
     if (!options.fix.empty()) document["fixed"] = options.fix;

@@ -87,6 +87,17 @@ Json to_json(const Finding& f) {
           {"sure", f.sure},   {"evidence", f.evidence},   {"fix", f.fix}};
 }
 
+Json frame_json(const Diagnosis& d) {
+  const auto told = [](bool sure, Json value) { return sure ? value : Json(nullptr); };
+  const bool unit = d.unit.sure >= 0.5, up = d.orientation.up_sure >= 0.5;
+  const auto axis = [](int index) { return Json(kDirections[static_cast<size_t>(index)]); };
+  return {{"unit", told(unit && *d.unit.unit.name != 0, d.unit.unit.name)},
+          {"metres_per_unit", told(unit, d.unit.unit.metres)},
+          {"up", told(up, axis(d.orientation.up))},
+          {"facing", told(up && d.orientation.facing_sure >= 0.5, axis(d.orientation.facing))},
+          {"height", told(d.transform.has_value(), d.height)}};
+}
+
 Json to_json(const Similarity& t) {
   Json rotation = Json::array();
   for (int i = 0; i < 3; ++i)

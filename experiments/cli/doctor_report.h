@@ -8,6 +8,9 @@
 
 namespace restage::cli {
 
+/// What the data's own frame is found to be: unit, metres_per_unit, up and facing ("+z"), height in
+/// metres; null where it is unsure (below one half).
+Json frame_json(const Diagnosis& diagnosis);
 Json to_json(const Finding& finding);
 /// {"scale", "rotation" (rows), "offset", "formula"}.
 Json to_json(const Similarity& transform);

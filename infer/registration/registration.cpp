@@ -41,6 +41,7 @@ std::vector<Vec3> thinned(const Points& cloud, double width, const std::string& 
         source, "holds points in " + std::to_string(cubes.size()) + " places, too few for a body",
         "give at least " + std::to_string(kLeastDistinctPoints) + " some centimetres apart");
   std::vector<Vec3> out;
+  out.reserve(cubes.size());
   for (const auto& [at, cube] : cubes) out.push_back(cube.sum / cube.count);
   return out;
 }
@@ -50,6 +51,7 @@ Vec3 middle(const std::vector<Vec3>& points) {
   Vec3 out;
   for (int c = 0; c < 3; ++c) {
     std::vector<double> values;
+    values.reserve(points.size());
     for (const Vec3& p : points) values.push_back(p[c]);
     const auto half = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
     std::nth_element(values.begin(), half, values.end());

@@ -50,6 +50,9 @@ class Doctor(CliTest):
         self.assertIn("--source-up z", said["up"]["fix"])
         self.assertIn("+z is up", said["up"]["what"])
         self.assertIn("faces -y", said["facing"]["what"])
+        frame = found["frame"]
+        self.assertEqual((frame["unit"], frame["metres_per_unit"], frame["up"], frame["facing"]), ("cm", 0.01, "+z", "-y"))
+        self.assertTrue(1.2 < frame["height"] < 2.3)
         text = self.restage("doctor", "foreign.ply")
         self.assertEqual((text.code, text.err), (1, ""))
         for words in ("not usable", "--scale 0.01", "p' = 0.01 R (p - t)"):
