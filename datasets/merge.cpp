@@ -128,8 +128,9 @@ MergeSummary merge_data(const std::vector<std::string>& files, const std::string
   MergeSummary done{0, 0, plan.info.license, plan.info.provenance};
   for (size_t i = 0; i < files.size(); ++i) {
     const h5::File file = open_schema_file(files[i]);
+    SharedShapes shared;
     for (const std::string& name : plan.content[i].bodies) {
-      Body body = read_body(file, name);
+      Body body = read_body(file, name, shared);
       body.id = plan.id(files[i], name);
       writer.add(body);
       ++done.bodies;

@@ -48,8 +48,11 @@ class DatasetWriter {
   void commit();
 
  private:
+  void add_blend_shapes(const Body& body, const std::string& group);
+
   h5::File file_;
   std::vector<std::vector<Triangle>> topologies_;
+  std::vector<std::shared_ptr<const PoseBlendShapes>> blend_shapes_;
   int64_t bodies_ = 0, motions_ = 0;
 };
 

@@ -56,6 +56,18 @@ void read_weights(const h5::File& file, const std::string& name, Body& body) {
   }
 }
 
+/// [V,3,189] of a group of their own, which several bodies name.
+std::shared_ptr<const PoseBlendShapes> read_blend_shapes(const h5::File& file,
+                                                         const std::string& name,
+                                                         int64_t vertices) {
+  const std::vector<float> flat =
+      read_finite<float>(file, name, {vertices, 3, PoseBlendShapes::kFeatures});
+  const auto out = std::make_shared<PoseBlendShapes>();
+  out->directions.resize(3 * vertices, PoseBlendShapes::kFeatures);
+  std::copy(flat.begin(), flat.end(), out->directions.data());
+  return out;
+}
+
 template <class T, class Read>
 std::vector<T> read_members(const std::string& path, const std::string& group,
                             const std::string& split, const Read& read) {
@@ -71,7 +83,7 @@ std::vector<T> read_members(const std::string& path, const std::string& group,
 
 }  // namespace
 
-Body read_body(const h5::File& file, const std::string& id) {
+Body read_body(const h5::File& file, const std::string& id, SharedShapes& shared) {
   const std::string group = "/bodies/" + id;
   Body body;
   body.id = id;
@@ -88,6 +100,12 @@ Body read_body(const h5::File& file, const std::string& id) {
   }
   body.joints = read_joints(file, group + "/joints");
   read_weights(file, group + "/weights", body);
+  if (const std::optional<std::string> name = file.text(group, "blend_shapes")) {
+    auto& shapes = shared[*name];
+    if (!shapes || shapes->directions.rows() != 3 * vertices)
+      shapes = read_blend_shapes(file, "/blend_shapes/" + *name, vertices);
+    body.blend_shapes = shapes;
+  }
   return body;
 }
 
@@ -129,6 +147,7 @@ void DatasetWriter::add(const Body& body) {
       std::span<const float>(body.weights.data(), static_cast<size_t>(body.weights.size())));
   file_.set_text(group, "split", body.split);
   ++bodies_;
+  add_blend_shapes(body, group);
   if (body.rest.faces.empty()) return;
   auto same = std::find(topologies_.begin(), topologies_.end(), body.rest.faces);
   const std::string topology = std::to_string(same - topologies_.begin());
@@ -137,6 +156,23 @@ void DatasetWriter::add(const Body& body) {
     write_faces(file_, "/topologies/" + topology, body.rest.faces);
   }
   file_.set_text(group, "topology", topology);
+}
+
+/// What a model's people share is written once.
+void DatasetWriter::add_blend_shapes(const Body& body, const std::string& group) {
+  if (!body.blend_shapes) return;
+  const auto& directions = body.blend_shapes->directions;
+  const auto same =
+      std::find_if(blend_shapes_.begin(), blend_shapes_.end(), [&](const auto& shapes) {
+        return shapes == body.blend_shapes ||
+               (shapes->directions.rows() == directions.rows() && shapes->directions == directions);
+      });
+  const std::string name = std::to_string(same - blend_shapes_.begin());
+  file_.set_text(group, "blend_shapes", name);
+  if (same != blend_shapes_.end()) return;
+  blend_shapes_.push_back(body.blend_shapes);
+  file_.write<float>("/blend_shapes/" + name, {directions.rows() / 3, 3, directions.cols()},
+                     {directions.data(), static_cast<size_t>(directions.size())});
 }
 
 void DatasetWriter::add(const Motion& motion) {
@@ -180,7 +216,10 @@ void write_motions(const std::string& path, const std::vector<Motion>& motions,
 }
 
 std::vector<Body> read_bodies(const std::string& path, const std::string& split) {
-  return read_members<Body>(path, "/bodies", split, read_body);
+  SharedShapes shared;
+  return read_members<Body>(
+      path, "/bodies", split,
+      [&](const h5::File& file, const std::string& id) { return read_body(file, id, shared); });
 }
 
 std::vector<Motion> read_motions(const std::string& path, const std::string& split) {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cmath>
+#include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -41,8 +43,11 @@ void write_points(h5::File& file, const std::string& name, const Points& points)
 /// The file's frame rate; the project's if it says none. InputError if it is not positive.
 double read_fps(const h5::File& file);
 
+/// Blend shapes of a file by name: large, and read once for all bodies that share them.
+using SharedShapes = std::map<std::string, std::shared_ptr<const PoseBlendShapes>>;
+
 /// One member of /bodies or /motions, checked.
-Body read_body(const h5::File& file, const std::string& id);
+Body read_body(const h5::File& file, const std::string& id, SharedShapes& shared);
 Motion read_motion(const h5::File& file, const std::string& id);
 
 }  // namespace restage

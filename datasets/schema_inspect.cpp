@@ -99,9 +99,11 @@ void check_split(const h5::File& file, const std::string& object, const std::str
 }
 
 void verify_members(const h5::File& file, std::vector<std::string>& problems) {
+  SharedShapes shared;
   if (file.has("/bodies"))
     for (const std::string& id : file.children("/bodies"))
-      collect(problems, [&] { check_split(file, "/bodies/" + id, read_body(file, id).split); });
+      collect(problems,
+              [&] { check_split(file, "/bodies/" + id, read_body(file, id, shared).split); });
   if (file.has("/motions"))
     for (const std::string& id : file.children("/motions"))
       collect(problems, [&] { check_split(file, "/motions/" + id, read_motion(file, id).split); });

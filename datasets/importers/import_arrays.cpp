@@ -91,7 +91,9 @@ std::string body_id(const std::string& model, const std::string& betas, size_t i
 
 ImportSummary import_model(const std::string& source, const std::string& out,
                            const ImportOptions& options) {
-  const SmplModel model(source, options.max_memory);
+  const Npz file(source, options.max_memory);
+  SmplModel model(file);
+  model.read_blend_shapes(file);
   ImportSummary summary;
   DatasetWriter writer(out, file_info(source, options));
   const std::vector<std::string> wanted =
@@ -103,6 +105,8 @@ ImportSummary import_model(const std::string& source, const std::string& out,
     report.facts = {
         {"body model", std::string(to_string(model.family())) + ", " +
                            std::to_string(model.vertices()) + " vertices"},
+        {"pose", model.has_blend_shapes() ? "the model's blend shapes (posedirs)"
+                                          : "no blend shapes: bends by our own rule"},
         {"people", std::to_string(people.size())},
         {"betas", name == "zeros" ? "zeros: the mean person"
                                   : std::to_string(people[0].size()) + ", the model has " +

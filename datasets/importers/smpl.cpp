@@ -153,6 +153,24 @@ void SmplModel::read_faces(const Npz& file) {
   }
 }
 
+void SmplModel::read_blend_shapes(const Npz& file) {
+  if (!file.has("posedirs")) return;
+  const NpyArray array = file.array("posedirs");
+  const auto n = static_cast<int64_t>(template_.size());
+  const auto width = 9 * (static_cast<int64_t>(parents_.size()) - 1);
+  check_shape(array, {n, 3, width});
+  const auto shapes = std::make_shared<PoseBlendShapes>();
+  shapes->directions.resize(3 * n, PoseBlendShapes::kFeatures);
+  for (int64_t row = 0; row < 3 * n; ++row)  // fingers, jaw and eyes stay as they are
+    for (int64_t k = 0; k < PoseBlendShapes::kFeatures; ++k) {
+      const double value = array[row * width + k];
+      if (!(std::abs(value) < kMostMetres))
+        throw InputError(array.where(), "holds a number that is no length in metres", kFix);
+      shapes->directions(row, k) = static_cast<float>(value);
+    }
+  blend_shapes_ = shapes;
+}
+
 Vec3 SmplModel::vertex(size_t v, const Betas& betas) const {
   Vec3 out = template_[v];
   const size_t n = std::min(betas.size(), shapes_);
@@ -187,6 +205,7 @@ Body SmplModel::body(const Betas& betas) const {
   for (Vec3& x : out.joints) x.y() -= floor;
   out.rest.faces = faces_;
   out.weights = weights_;
+  out.blend_shapes = blend_shapes_;
   return out;
 }
 

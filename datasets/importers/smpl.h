@@ -2,9 +2,9 @@
 // ("betas"), and the skeletons that AMASS motions are recorded on.
 //
 // Read are v_template [V, 3], shapedirs [V, 3, B], J_regressor [J, V], weights [V, J],
-// kintree_table [2, J] and f [T, 3], as plain arrays. Shapes and joints are exact. Pose correctives
-// (posedirs) are not used: a Body has a rest surface, joints and weights, and pose_surface() bends
-// all bodies alike. Source: Loper et al. 2015, Romero et al. 2017, Pavlakos et al. 2019.
+// kintree_table [2, J], f [T, 3] and posedirs [V, 3, 9 (J - 1)], as plain arrays. Surfaces are the
+// model's own for all poses of the 22 joints; fingers, jaw and eyes rest. Source: Loper et al.
+// 2015, Romero et al. 2017, Pavlakos et al. 2019.
 #pragma once
 
 #include <string>
@@ -35,6 +35,11 @@ class SmplModel {
 
   /// The 22 joints at zero rotations: metres, y up, facing +z, in the model's own frame.
   Joints joints(const Betas& betas) const;
+  /// Reads the model's pose blend shapes, which body() then hands on; a model may have none. They
+  /// are as large as all the rest together, so whoever needs joints alone leaves this out.
+  void read_blend_shapes(const Npz& file);
+  bool has_blend_shapes() const { return blend_shapes_ != nullptr; }
+
   /// A T-posed body, lowest vertex at y = 0. Weights of hands, jaw and eyes count for the wrists
   /// and the head. Without id and split.
   Body body(const Betas& betas) const;
@@ -56,6 +61,7 @@ class SmplModel {
   std::vector<std::vector<uint32_t>> joint_vertices_;  // that each of the 22 is a mean of
   Eigen::Matrix<float, Eigen::Dynamic, kJoints, Eigen::RowMajor> weights_;
   std::vector<Triangle> faces_;
+  std::shared_ptr<const PoseBlendShapes> blend_shapes_;
 };
 
 /// Whether an archive is a body model, and which; the latter throws InputError for an unknown one.

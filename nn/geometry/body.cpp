@@ -195,6 +195,33 @@ void check_body(const Body& body, const char* who) {
     throw ShapeError(std::string(who) + ": body '" + body.id + "' has " +
                      std::to_string(body.rest.vertices.size()) + " vertices but " +
                      std::to_string(body.weights.rows()) + " rows of weights");
+  if (body.blend_shapes &&
+      static_cast<size_t>(body.blend_shapes->directions.rows()) != 3 * body.rest.vertices.size())
+    throw ShapeError(std::string(who) + ": body '" + body.id + "' has " +
+                     std::to_string(body.rest.vertices.size()) + " vertices but blend shapes of " +
+                     std::to_string(body.blend_shapes->directions.rows() / 3));
+}
+
+/// A rest point moved by the weighted mean of its joints' transforms.
+Point blend_point(const Point& rest, const float* weights, const SkinTransforms& transforms) {
+  Mat3f rotation = Mat3f::Zero();
+  Point offset = Point::Zero();
+  for (int j = 0; j < kJoints; ++j) {
+    const float w = weights[j];
+    if (w == 0.0f) continue;
+    rotation += w * transforms.rotation[j];
+    offset += w * transforms.offset[j];
+  }
+  return rotation * rest + offset;
+}
+
+/// The local rotations less the identity, as blend shapes count them.
+Eigen::Matrix<float, PoseBlendShapes::kFeatures, 1> pose_features(const Pose& pose) {
+  Eigen::Matrix<float, PoseBlendShapes::kFeatures, 1> out;
+  for (int j = 1; j < kJoints; ++j)
+    for (int k = 0; k < 9; ++k)
+      out[9 * (j - 1) + k] = static_cast<float>(pose.local[j](k / 3, k % 3) - (k % 4 == 0 ? 1 : 0));
+  return out;
 }
 
 }  // namespace
@@ -226,18 +253,31 @@ Pose pose_on(const Motion& motion, const Body& body, size_t frame) {
 Points pose_surface(const Body& body, const Pose& pose, const std::vector<int32_t>* pick) {
   check_body(body, "pose_surface");
   const PosedSkeleton posed = forward_kinematics(body.joints, pose);
-  const DualTransforms transforms = dual_transforms(body, posed);
-  const Muscles muscles = flexed_muscles(body, posed);
   const Points& rest = body.rest.vertices;
-  const float* weights = body.weights.data();
-  const size_t n = pick ? pick->size() : rest.size();
-  Points out(n);
-  for (size_t i = 0; i < n; ++i) {
-    const size_t v = pick ? static_cast<size_t>((*pick)[i]) : i;
-    if (v >= rest.size())
-      throw ShapeError("pose_surface: vertex " + std::to_string((*pick)[i]) + " of body '" +
-                       body.id + "', which has " + std::to_string(rest.size()));
-    out[i] = skin_point(rest[v], weights + v * kJoints, transforms, muscles);
+  Points out(pick ? pick->size() : rest.size());
+  const auto each = [&](auto&& place) {
+    for (size_t i = 0; i < out.size(); ++i) {
+      const size_t v = pick ? static_cast<size_t>((*pick)[i]) : i;
+      if (v >= rest.size())
+        throw ShapeError("pose_surface: vertex " + std::to_string((*pick)[i]) + " of body '" +
+                         body.id + "', which has " + std::to_string(rest.size()));
+      out[i] = place(v, body.weights.data() + v * kJoints);
+    }
+  };
+  if (body.blend_shapes) {
+    const SkinTransforms transforms = skin_transforms(body, posed);
+    const auto& directions = body.blend_shapes->directions;
+    const auto features = pose_features(pose);
+    each([&](size_t v, const float* weights) {
+      const Point moved = directions.middleRows<3>(static_cast<Eigen::Index>(3 * v)) * features;
+      return blend_point(rest[v] + moved, weights, transforms);
+    });
+  } else {
+    const DualTransforms transforms = dual_transforms(body, posed);
+    const Muscles muscles = flexed_muscles(body, posed);
+    each([&](size_t v, const float* weights) {
+      return skin_point(rest[v], weights, transforms, muscles);
+    });
   }
   return out;
 }
@@ -247,17 +287,8 @@ Points linear_blend_skinning(const Body& body, const Pose& pose) {
   const SkinTransforms transforms = skin_transforms(body, forward_kinematics(body.joints, pose));
   const Points& rest = body.rest.vertices;
   Points out(rest.size());
-  for (size_t v = 0; v < rest.size(); ++v) {
-    Mat3f rotation = Mat3f::Zero();
-    Point offset = Point::Zero();
-    for (int j = 0; j < kJoints; ++j) {
-      const float w = body.weights(static_cast<Eigen::Index>(v), j);
-      if (w == 0.0f) continue;
-      rotation += w * transforms.rotation[j];
-      offset += w * transforms.offset[j];
-    }
-    out[v] = rotation * rest[v] + offset;
-  }
+  for (size_t v = 0; v < rest.size(); ++v)
+    out[v] = blend_point(rest[v], body.weights.data() + v * kJoints, transforms);
   return out;
 }
 

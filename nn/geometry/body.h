@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,15 @@ struct Mesh {
   std::vector<Triangle> faces;
 };
 
+/// How a surface gives way to a pose before it is skinned: SMPL's pose blend shapes (Loper et al.,
+/// SMPL, 2015, eq. 9), the same for everybody of a model.
+struct PoseBlendShapes {
+  static constexpr int kFeatures = 9 * (kJoints - 1);
+  /// Row 3 v + axis: metres by which that coordinate of vertex v moves for each number of the local
+  /// rotations of joints 1 to 21, row by row, less the identity's.
+  Eigen::Matrix<float, Eigen::Dynamic, kFeatures, Eigen::RowMajor> directions;
+};
+
 /// One person or character in T-pose: lowest point at y = 0, facing +z, left = +x.
 struct Body {
   std::string id;
@@ -29,6 +39,7 @@ struct Body {
   Joints joints;  ///< rest joints, same frame as `rest`
   /// Skinning weights, one row of 22 per vertex, each row sums to 1.
   Eigen::Matrix<float, Eigen::Dynamic, kJoints, Eigen::RowMajor> weights;
+  std::shared_ptr<const PoseBlendShapes> blend_shapes;  ///< null: pose_surface() has its own rule
 };
 
 /// A motion as parameters, at kFps. Rotations are relative to `rest` (a T-like pose whose limbs may
@@ -45,11 +56,12 @@ struct Motion {
 /// rest directions corrected by shortest arcs, trajectory scaled by leg length. One pose per frame.
 Pose pose_on(const Motion& motion, const Body& body, size_t frame);
 
-/// Surface of a posed body by dual-quaternion skinning plus muscle bulges, which linear blend
-/// skinning cannot reproduce (docs/method.md). `pick` poses only these vertices (null: all).
+/// Surface of a posed body: with blend shapes as SMPL does it (they, then linear blend skinning),
+/// else by dual-quaternion skinning plus muscle bulges. Neither can be reproduced by linear blend
+/// skinning alone (docs/method.md). `pick` poses only these vertices (null: all).
 Points pose_surface(const Body& body, const Pose& pose, const std::vector<int32_t>* pick = nullptr);
 
-/// Plain linear blend skinning (spec 5.2) of all vertices.
+/// Plain linear blend skinning (spec 5.2) of all vertices, without blend shapes.
 Points linear_blend_skinning(const Body& body, const Pose& pose);
 
 }  // namespace restage

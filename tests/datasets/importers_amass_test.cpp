@@ -92,6 +92,77 @@ TEST(ImportersSmpl, HandsJawAndEyesCountForTheirJoints) {
   }
 }
 
+/// SMPL's equations over all of the model's joints, hands at rest, beside what the body does with
+/// the first 22 through a file.
+TEST(ImportersSmpl, PosedSurfacesAreTheModels) {
+  const TempDir dir;
+  for (const SmplFamily family : kFamilies) {
+    TinySmpl tiny;
+    tiny.family = family;
+    write_bytes(dir / "model.npz", tiny.file());
+    ImportOptions options;
+    options.betas = {"zeros", dir / "one.npz"};
+    write_bytes(dir / "one.npz", npz({{"betas", npy<double>({4}, {1, -1, 0.5, 2})}}));
+    import_data(dir / "model.npz", dir / "bodies.h5", options);
+    const std::vector<Body> bodies = read_bodies(dir / "bodies.h5");
+    ASSERT_EQ(bodies.size(), 2u);
+    EXPECT_EQ(bodies[0].blend_shapes, bodies[1].blend_shapes);  // read and kept once
+    const Body& body = bodies[1];
+
+    Pose pose;
+    pose.root = Vec3(0.3, 1, -2);
+    for (int j = 0; j < kJoints; ++j)
+      pose.local[j] = Eigen::AngleAxisd(0.2 + 0.05 * j, Vec3(j % 3 - 1, 1, j % 2).normalized())
+                          .toRotationMatrix();
+    const std::vector<int> parents = tiny.parents();
+    std::vector<Mat3> local(tiny.joints(), Mat3::Identity());
+    for (size_t j = 0; j < kJoints; ++j) local[j] = pose.local[j];
+    const std::vector<Vec3> rest = tiny.shaped({1, -1, 0.5, 2});
+    std::vector<Mat3> turn(tiny.joints());
+    std::vector<Vec3> at(tiny.joints());
+    for (size_t j = 0; j < tiny.joints(); ++j) {
+      const auto p = static_cast<size_t>(std::max(parents[j], 0));
+      turn[j] = j == 0 ? local[0] : Mat3(turn[p] * local[j]);
+      at[j] = j == 0 ? pose.root : Vec3(at[p] + turn[p] * (rest[j] - rest[p]));
+    }
+    const Points posed = pose_surface(body, pose);
+    double blended = 0;
+    for (size_t v = 0; v < tiny.vertices(); ++v) {
+      Vec3 bent = rest[v];
+      for (int axis = 0; axis < 3; ++axis)
+        for (size_t k = 0; k < 9 * (tiny.joints() - 1); ++k)
+          bent[axis] += tiny.bend(v, static_cast<size_t>(axis), k) *
+                        (local[k / 9 + 1](static_cast<int>(k % 9 / 3), static_cast<int>(k % 3)) -
+                         (k % 9 % 4 == 0 ? 1 : 0));
+      Vec3 expected = Vec3::Zero();
+      for (size_t j = 0; j < tiny.joints(); ++j)
+        expected += tiny.weight(v, j) * (at[j] + turn[j] * (bent - rest[j]));
+      EXPECT_LT((posed[v].cast<double>() - expected).norm(), 1e-5) << v;
+      blended += (bent - rest[v]).norm();
+    }
+    EXPECT_GT(blended / static_cast<double>(tiny.vertices()), 0.01);
+    const std::vector<int32_t> pick = {3, 0};
+    EXPECT_EQ(pose_surface(body, pose, &pick)[0], posed[3]);
+  }
+}
+
+TEST(ImportersSmpl, BlendShapesThatDoNotFitAreRefused) {
+  const TempDir dir;
+  const auto refused = [&](const std::string& bytes) {
+    auto arrays = TinySmpl().arrays();
+    replace(arrays, "posedirs", bytes);
+    write_bytes(dir / "m.npz", npz(arrays));
+    return error_of([&] { import_data(dir / "m.npz", dir / "x.h5"); });
+  };
+  EXPECT_HAS(refused(npy<double>({58, 3}, std::vector<double>(174, 0))), "not [58, 3, 459]");
+  EXPECT_HAS(refused(npy<float>({58, 3, 459}, std::vector<float>(58 * 3 * 459, NAN))), "metres");
+  auto arrays = TinySmpl().arrays();
+  remove(arrays, "posedirs");
+  write_bytes(dir / "m.npz", npz(arrays));
+  import_data(dir / "m.npz", dir / "x.h5");
+  EXPECT_EQ(read_bodies(dir / "x.h5")[0].blend_shapes, nullptr);
+}
+
 TEST(ImportersSmpl, ExpressionsAreNoShapes) {
   const TempDir dir;
   TinySmpl tiny;

@@ -53,6 +53,12 @@ struct TinySmpl {
                            7.0 * static_cast<double>(shape));
   }
 
+  /// Metres for feature `k` of 9 (J - 1), as posedirs has it.
+  double bend(size_t vertex, size_t axis, size_t k) const {
+    return 0.01 * std::cos(5.0 * static_cast<double>(vertex) + 2.0 * static_cast<double>(axis) +
+                           0.7 * static_cast<double>(k));
+  }
+
   std::vector<Vec3> shaped(const Betas& betas) const {
     std::vector<Vec3> out = template_vertices();
     for (size_t v = 0; v < out.size(); ++v)
@@ -70,9 +76,10 @@ struct TinySmpl {
   std::vector<std::pair<std::string, std::string>> arrays() const {
     const auto v = static_cast<int64_t>(vertices()), j = static_cast<int64_t>(joints());
     const std::vector<Vec3> rest = template_vertices();
-    std::vector<double> flat, directions, regressor, weights;
+    std::vector<double> flat, directions, bends, regressor, weights;
     for (size_t i = 0; i < vertices(); ++i) {
       for (size_t axis = 0; axis < 3; ++axis) {
+        for (size_t k = 0; k < 9 * (joints() - 1); ++k) bends.push_back(bend(i, axis, k));
         flat.push_back(rest[i][static_cast<int>(axis)]);
         for (size_t b = 0; b < shapes; ++b) directions.push_back(direction(i, axis, b));
       }
@@ -85,7 +92,8 @@ struct TinySmpl {
     for (size_t k = 0; k < joints(); ++k) tree.push_back(static_cast<uint32_t>(k));
     return {{"v_template", npy<double>({v, 3}, flat)},
             {"shapedirs", npy<double>({v, 3, static_cast<int64_t>(shapes)}, directions)},
-            {"posedirs", npy_of(npy_header("|O", {}), "a pickle that nobody reads")},
+            {"posedirs", npy<double>({v, 3, 9 * (j - 1)}, bends)},
+            {"dynamic", npy_of(npy_header("|O", {}), "a pickle that nobody reads")},
             {"J_regressor", npy<double>({j, v}, regressor)},
             {"weights", npy<double>({v, j}, weights)},
             {"kintree_table", npy<uint32_t>({2, j}, tree)},

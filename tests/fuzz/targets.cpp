@@ -150,7 +150,9 @@ void read_motion(const std::string& bytes) {
 }
 
 void read_body_model(const std::string& bytes) {
-  const SmplModel model(file_of(test::npz(arrays_of(bytes), false), "x.npz"));
+  const Npz file(file_of(test::npz(arrays_of(bytes), false), "x.npz"));
+  SmplModel model(file);
+  model.read_blend_shapes(file);
   model.body({1, -2});
 }
 
@@ -215,12 +217,12 @@ void read_hdf5(const std::string& bytes) {
 }  // namespace
 
 // No allocation may be above 8 times the uncompressed payload plus 64 MB. Of a plain format that is
-// 64 + 8 * 64 KiB: 65 MiB. What is packed unpacks to at most 1032 times its size (deflate) or to as
-// much as the reader allows, so 16 KiB may mean 16 MiB, and 8 times as much. In "hdf5" libFuzzer
-// also watches the child that reads first, which may take 1 GiB (datasets/hdf5/probe.h); what the
-// file claims is checked against what it stores.
+// 64 + 8 * 64 KiB: 65 MiB (66 of a body model, which has no shorter one). What is packed unpacks to
+// at most 1032 times its size (deflate) or to as much as the reader allows, so 16 KiB may mean 16
+// MiB, and 8 times as much. In "hdf5" libFuzzer also watches the child that reads first, which may
+// take 1 GiB (datasets/hdf5/probe.h); what the file claims is checked against what it stores.
 const std::vector<Target>& targets() {
-  constexpr size_t kLong = size_t{64} << 10, kShort = size_t{16} << 10;
+  constexpr size_t kLong = size_t{64} << 10, kModel = 3 * kLong, kShort = size_t{16} << 10;
   static const std::vector<Target> all = {{"ply", kShort, 65, read_ply},
                                           {"obj", kShort, 65, read_obj},
                                           {"gltf", kLong, 65, read_scene},
@@ -232,7 +234,7 @@ const std::vector<Target>& targets() {
                                           {"npy", kShort, 65, read_npy_file},
                                           {"npz", kShort, 192, read_npz_file},
                                           {"amass", kLong, 65, read_motion},
-                                          {"smpl", kLong, 65, read_body_model},
+                                          {"smpl", kModel, 66, read_body_model},
                                           {"safetensors", kLong, 65, read_weights},
                                           {"config", kShort, 65, read_training},
                                           {"recipe", kShort, 65, read_recipe},

@@ -212,6 +212,11 @@ TEST(GeometryBody, WrongSizesAreShapeErrors) {
   EXPECT_THROW(pose_surface(body, pose, &pick), ShapeError);
   EXPECT_THROW(pose_surface(body, pose, &negative), ShapeError);
   EXPECT_THROW(pose_on(Motion(), body, 0), ShapeError);
+  const auto shapes = std::make_shared<PoseBlendShapes>();
+  shapes->directions.setZero(3, PoseBlendShapes::kFeatures);
+  body.blend_shapes = shapes;
+  EXPECT_THROW(pose_surface(body, pose), ShapeError);
+  body.blend_shapes = nullptr;
   body.rest.vertices.pop_back();
   EXPECT_THROW(pose_surface(body, pose), ShapeError);
   EXPECT_THROW(linear_blend_skinning(body, pose), ShapeError);
