@@ -4,9 +4,11 @@
 
 #include <charconv>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <set>
 #include <sstream>
+#include <string_view>
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
@@ -14,6 +16,7 @@
 #include "autograd/base/log.h"
 #include "datasets/benchmark/sha256.h"
 #include "datasets/fetch/download.h"
+#include "datasets/importers/makehuman_pack.h"
 
 namespace restage {
 namespace {
@@ -21,6 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr uint64_t kMostList = uint64_t{16} << 20;
+constexpr std::string_view kPacked = "makehuman:";
 constexpr uint64_t kMostPacked = uint64_t{64} << 20;  // of files that are packed here
 
 bool is_inside(const std::string& name) {
@@ -29,7 +33,19 @@ bool is_inside(const std::string& name) {
          path.filename() != "." && *path.begin() != "..";
 }
 
-FetchEntry entry_of(const std::string& line, const std::string& where) {
+using Addresses = std::map<std::string, std::string>;  // what "@NAME" stands for
+
+/// "@NAME/rest" with what the name stands for.
+std::string resolved(const std::string& address, const Addresses& known, const std::string& where) {
+  if (address.empty() || address[0] != '@') return address;
+  const size_t end = std::min(address.find('/'), address.size());
+  const auto at = known.find(address.substr(0, end));
+  if (at == known.end())
+    throw InputError(where, "uses an @ name that no line above it explains", "mend the list");
+  return at->second + address.substr(end);
+}
+
+FetchEntry entry_of(const std::string& line, const std::string& where, const Addresses& known) {
   std::istringstream words(line);
   FetchEntry out;
   std::string bytes, rest;
@@ -42,6 +58,7 @@ FetchEntry entry_of(const std::string& line, const std::string& where) {
     throw InputError(where, "is no line 'SHA256 BYTES PATH ADDRESS'", "mend the list");
   if (!is_inside(out.path))
     throw InputError(where, "names a file outside of the data folder", "mend the list");
+  out.address = resolved(out.address, known, where);
   return out;
 }
 
@@ -122,22 +139,37 @@ std::string beside(const std::string& list, const std::string& address) {
   return (fs::path(list).parent_path() / address).string();
 }
 
+bool fetch_and_pack(const std::string& parts, const std::string& out, const std::string& from,
+                    const std::string& target) {
+  for (const FetchEntry& e : read_fetch_list(parts))
+    if (e.address.starts_with(kPacked))
+      throw InputError(parts, "lists a file that is packed from others again", "mend the list");
+  if (!fetch_data(parts, out, from).missing.empty()) return false;
+  pack_makehuman(out + "/body/makehuman", target);
+  return true;
+}
+
 /// False if there is nowhere to take it from.
 bool fetch_one(const FetchEntry& e, const std::string& list, const std::string& from,
-               const std::string& target) {
+               const std::string& out) {
+  const std::string target = out + "/" + e.path, copy = from + "/" + e.path;
   const bool remote = e.address.find("://") != std::string::npos;
-  if (!from.empty() && fs::exists(from + "/" + e.path)) {
-    if (!is_right(e, from + "/" + e.path, packed_here(e)))
-      throw InputError(from + "/" + e.path, "is not the file that the list pins",
-                       "give a folder with the right one");
-    copy_in(from + "/" + e.path, target);
+  const bool packed = e.address.starts_with(kPacked), copied = !from.empty() && fs::exists(copy);
+  if (copied && is_right(e, copy, packed_here(e))) {
+    copy_in(copy, target);
+  } else if (packed) {  // a copy that was packed elsewhere may differ, its parts do not
+    return fetch_and_pack(beside(list, e.address.substr(kPacked.size())), out, from, target);
+  } else if (copied) {
+    throw InputError(copy, "is not the file that the list pins",
+                     "give a folder with the right one");
   } else if (remote && from.empty()) {
     bring(e, target);
   } else if (!remote && e.address != "-") {
-    if (!is_right(e, beside(list, e.address), false))
-      throw InputError(beside(list, e.address), "is not the file that the list pins",
+    const std::string own = beside(list, e.address);
+    if (!is_right(e, own, false))
+      throw InputError(own, "is not the file that the list pins",
                        "restore it, or correct the list");
-    copy_in(beside(list, e.address), target);
+    copy_in(own, target);
   } else {
     return false;
   }
@@ -150,12 +182,20 @@ std::vector<FetchEntry> read_fetch_list(const std::string& list) {
   const std::string text = read_file(list, kMostList);
   std::vector<FetchEntry> out;
   std::set<std::string> paths;
+  Addresses known;
   std::istringstream lines(text);
   std::string line;
   for (size_t number = 1; std::getline(lines, line); ++number) {
     if (line.find_first_not_of(" \t\r") == std::string::npos || line[0] == '#') continue;
     const std::string where = list + ":" + std::to_string(number);
-    out.push_back(entry_of(line, where));
+    if (line[0] == '@') {
+      std::istringstream words(line);
+      std::string name, address, rest;
+      if (!(words >> name >> address) || words >> rest || !known.emplace(name, address).second)
+        throw InputError(where, "is no line '@NAME ADDRESS' of a new name", "mend the list");
+      continue;
+    }
+    out.push_back(entry_of(line, where, known));
     if (!paths.insert(out.back().path).second)
       throw InputError(where, "names a file that stands above already", "name each file once");
   }
@@ -180,7 +220,7 @@ FetchSummary fetch_data(const std::string& list, const std::string& out, const s
     fs::create_directories(fs::path(target).parent_path(), failed);
     if (failed) throw InputError(out, "cannot be made a folder", "give a place you can write to");
     log_info("fetching " + e.path + " (" + std::to_string((e.bytes + 999) / 1000) + " kB)");
-    if (fetch_one(e, list, from, target)) {
+    if (fetch_one(e, list, from, out)) {
       ++summary.fetched;
       summary.bytes += e.bytes;
     } else {

@@ -8,13 +8,15 @@
 
 namespace restage {
 
-/// One line of a list: `SHA256 BYTES PATH ADDRESS`.
+/// One line of a list: `SHA256 BYTES PATH ADDRESS`. A line `@NAME ADDRESS` above lets addresses
+/// begin with @NAME.
 struct FetchEntry {
   std::string sha256;
   uint64_t bytes = 0;
   std::string path;     ///< in the data folder; ends in .gz, but `address` does not: packed here,
                         ///< and sum and bytes are those of what is inside
-  std::string address;  ///< https://, file://, a file beside the list, or "-": none
+  std::string address;  ///< https://, file://, a file beside the list, "-": none, or
+                        ///< "makehuman:LIST": packed from the files of that list (pack_makehuman)
 };
 
 /// InputError file:line for what is no entry, a path out of the folder, or a path given twice.
@@ -29,8 +31,9 @@ struct FetchSummary {
 /// Brings every file of `list` into `out`, which is made if needed. With `from`, a folder laid out
 /// alike, files are copied from there. A file that is there already and right is left alone;
 /// downloads go on where they broke off (PATH.part); a file takes its place only after its sum was
-/// checked. InputError: list or `from` are wrong. WorkError: the network or the disk fails, or what
-/// arrives is not what is pinned.
+/// checked; what is packed from others has no sum of its own, its parts have. InputError: list or
+/// `from` are wrong. WorkError: the network or the disk fails, or what arrives is not what is
+/// pinned.
 FetchSummary fetch_data(const std::string& list, const std::string& out,
                         const std::string& from = "");
 

@@ -444,6 +444,21 @@ void File::write(const std::string& name, const Shape& shape, std::span<const T>
     throw_write_error(state_->path);
 }
 
+void File::write_text(const std::string& name, const std::vector<std::string>& values) {
+  size_t width = 1;
+  for (const std::string& value : values) width = std::max(width, value.size());
+  std::string rows;
+  for (const std::string& value : values) rows += value + std::string(width - value.size(), '\0');
+  const Lock lock;
+  const Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
+  H5Tset_size(type, width);
+  H5Tset_strpad(type, H5T_STR_NULLPAD);
+  H5Tset_cset(type, H5T_CSET_UTF8);
+  const Handle id(make_dataset(name, {static_cast<int64_t>(values.size())}, type, false), H5Dclose);
+  if (!values.empty() && H5Dwrite(id, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows.data()) < 0)
+    throw_write_error(state_->path);
+}
+
 template <class T>
 Dataset File::create_appendable(const std::string& name, const Shape& row) {
   const Lock lock;

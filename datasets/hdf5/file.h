@@ -97,6 +97,8 @@ class File {
   void write(const std::string& name, const Shape& shape, const std::vector<T>& values) {
     write(name, shape, std::span<const T>(values));
   }
+  /// A new data set of strings [N], UTF-8.
+  void write_text(const std::string& name, const std::vector<std::string>& values);
   /// A new data set with no rows yet, each of the shape `row` (empty: one value).
   template <class T>
   Dataset create_appendable(const std::string& name, const Shape& row);

@@ -39,20 +39,27 @@ std::string gender_of(const fs::path& file) {
   return "";
 }
 
-/// Text of a scalar; empty where there is none, or where it is no plain text.
-std::string text_of(const Npz& file, const char* name) {
-  if (!file.has(name) || !file.header(name).is_text()) return "";
-  std::string out = lower(file.array(name).text()).substr(0, 40);
-  for (char& c : out)
-    if (c < 32 || c > 126) c = '?';  // it is printed
-  return out;
+/// Text of a scalar; empty where there is none, or where it is no plain text, which is remarked:
+/// some files keep it as a Python object.
+std::string text_of(const Npz& file, const char* name, ImportReport& report) {
+  if (!file.has(name)) return "";
+  try {
+    if (!file.header(name).is_text()) return "";
+    std::string out = lower(file.array(name).text()).substr(0, 40);
+    for (char& c : out)
+      if (c < 32 || c > 126) c = '?';  // it is printed
+    return out;
+  } catch (const InputError& e) {
+    report.remarks.push_back(std::string(name) + " counts as not stated: " + e.what());
+    return "";
+  }
 }
 
 // ---- one file ----------------------------------------------------------------------------------
 
-SmplFamily family_of(const Npz& file, const NpyHeader& poses) {
+SmplFamily family_of(const Npz& file, const NpyHeader& poses, ImportReport& report) {
   const int64_t width = poses.shape.size() == 2 ? poses.shape[1] : 0;
-  const std::string type = text_of(file, "surface_model_type");
+  const std::string type = text_of(file, "surface_model_type", report);
   if (width == 156 && (type.empty() || type == "smplh")) return SmplFamily::smplh;
   if (width == 165 && (type.empty() || type == "smplx")) return SmplFamily::smplx;
   throw InputError(
@@ -241,9 +248,9 @@ Motion import_amass(const Npz& file, BodyModels& models, const AmassOptions& opt
     report.facts.emplace_back(name, value);
   };
   const NpyHeader poses = file.header("poses");
-  const SmplFamily family = family_of(file, poses);
+  const SmplFamily family = family_of(file, poses, report);
   fact("layout", std::string(to_string(family)) + ", poses " + shape_text(poses.shape));
-  const std::string gender = text_of(file, "gender");
+  const std::string gender = text_of(file, "gender", report);
   fact("gender", gender.empty() ? "not stated" : gender);
   const SmplModel& model = models.find(family, gender, file.path(), report.remarks);
   const Betas betas = betas_of(file);

@@ -2,14 +2,12 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 
 #include "autograd/base/error.h"
 #include "datasets/importers/makehuman.h"
+#include "datasets/importers/makehuman_lines.h"
 
 namespace restage {
 namespace {
@@ -31,54 +29,20 @@ std::string read_gz(const std::string& path) {
   return out;
 }
 
-/// Calls line(words, where) for each line that has words.
-template <class Line>
-void each_line(const std::string& text, const std::string& path, const Line& line) {
-  size_t number = 0;
-  for (size_t at = 0; at < text.size();) {
-    const size_t end = std::min(text.find('\n', at), text.size());
-    std::vector<std::string> words;
-    for (size_t i = at; i < end;) {
-      const size_t from = text.find_first_not_of(" \t\r", i);
-      if (from >= end) break;
-      i = std::min(text.find_first_of(" \t\r\n", from), end);
-      words.push_back(text.substr(from, i - from));
-    }
-    at = end + 1;
-    ++number;
-    if (!words.empty()) line(words, path + ":" + std::to_string(number));
-  }
-}
-
-double number_of(std::string_view word, const std::string& where) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error != std::errc() || end == word.data() || !std::isfinite(value) || std::abs(value) > 1e9)
-    throw InputError(where, "has no number where one belongs", "fetch the garment again");
-  return value;
-}
-
-/// A vertex index written as a number, `first` being the first one.
-int32_t index_of(std::string_view word, int first, size_t limit, const std::string& where) {
-  const double value = number_of(word, where) - first;
-  if (value < 0 || value >= static_cast<double>(limit) || value != std::floor(value))
-    throw InputError(where, "names a vertex that does not exist", "fetch the garment again");
-  return static_cast<int32_t>(value);
-}
-
 std::vector<std::array<int32_t, 4>> read_quads(const std::string& path, size_t vertices) {
+  const std::string text = read_gz(path);
+  WordLines lines(text, path);
   std::vector<std::array<int32_t, 4>> out;
-  each_line(read_gz(path), path,
-            [&](const std::vector<std::string>& words, const std::string& where) {
-              if (words[0] != "f") return;
-              if (words.size() != 4 && words.size() != 5)
-                throw InputError(where, "is a face that is no triangle or quad",
-                                 "fetch the garment again");
-              std::array<int32_t, 4> quad{};
-              for (size_t k = 0; k < 4; ++k)
-                quad[k] = index_of(words[std::min(k + 1, words.size() - 1)], 1, vertices, where);
-              out.push_back(quad);
-            });
+  while (lines.next()) {
+    const auto& words = lines.words();
+    if (words[0] != "f") continue;
+    if (words.size() != 4 && words.size() != 5)
+      lines.fail("is a face that is no triangle or quad", kFetchAgain);
+    std::array<int32_t, 4> quad{};
+    for (size_t k = 0; k < 4; ++k)
+      quad[k] = vertex_named(lines, words[std::min(k + 1, words.size() - 1)], 1, vertices);
+    out.push_back(quad);
+  }
   return out;
 }
 
@@ -96,58 +60,67 @@ struct Bindings {
 };
 
 /// A line of delete_verts: "12 - 40 44 50 - 51", ranges with both ends.
-void add_hidden(const std::vector<std::string>& words, const std::string& where, Bindings& out) {
+void add_hidden(const WordLines& lines, Bindings& out) {
+  const auto& words = lines.words();
+  const auto vertex = [&](size_t i) {
+    return static_cast<size_t>(vertex_named(lines, words[i], 0, out.hidden.size()));
+  };
   for (size_t i = 0; i < words.size(); ++i) {
-    const auto first = static_cast<size_t>(index_of(words[i], 0, out.hidden.size(), where));
+    const size_t first = vertex(i);
     size_t last = first;
-    if (i + 2 < words.size() && words[i + 1] == "-")
-      last = static_cast<size_t>(index_of(words[i += 2], 0, out.hidden.size(), where));
+    if (i + 2 < words.size() && words[i + 1] == "-") last = vertex(i += 2);
     for (size_t v = first; v <= last; ++v) out.hidden[v] = 1;
   }
 }
 
-Binding binding_of(const std::vector<std::string>& words, size_t limit, const std::string& where) {
+Binding binding_of(const WordLines& lines, size_t limit) {
+  const auto& words = lines.words();
   const auto vertex = [&](size_t i) {
-    return static_cast<size_t>(index_of(words[i], 0, limit, where));
+    return static_cast<size_t>(vertex_named(lines, words[i], 0, limit));
   };
   if (words.size() == 1) return {{vertex(0), vertex(0), vertex(0)}, {1, 0, 0}, Vec3::Zero()};
-  const auto number = [&](size_t i) { return number_of(words[i], where); };
+  const auto number = [&](size_t i) { return lines.number(words[i]); };
   return {{vertex(0), vertex(1), vertex(2)},
           {number(3), number(4), number(5)},
           Vec3(number(6), number(7), number(8))};
+}
+
+/// A line "x_scale 12 40 1.5": two vertices, and how far apart they are on the base mesh.
+void read_scale(const WordLines& lines, const std::vector<Vec3>& body, Vec3& scale) {
+  const auto& words = lines.words();
+  if (words.size() < 4) lines.fail("lacks numbers", kFetchAgain);
+  const int k = words[0][0] - 'x';
+  const auto a = static_cast<size_t>(vertex_named(lines, words[1], 0, body.size()));
+  const auto b = static_cast<size_t>(vertex_named(lines, words[2], 0, body.size()));
+  const double base = lines.number(words[3]);
+  if (!(base > 1e-9)) lines.fail("scales by zero", kFetchAgain);
+  scale[k] = std::abs(body[a][k] - body[b][k]) / base;
 }
 
 Bindings read_bindings(const std::string& path, const std::vector<Vec3>& body) {
   Bindings out;
   out.hidden.assign(body.size(), 0);
   enum { elsewhere, in_verts, in_hidden } part = elsewhere;
-  each_line(read_gz(path), path,
-            [&](const std::vector<std::string>& words, const std::string& where) {
-              const bool numeric = words[0].find_first_not_of("0123456789") == std::string::npos;
-              if (words[0].size() == 7 && words[0].ends_with("_scale") && words[0][0] >= 'x' &&
-                  words[0][0] <= 'z') {
-                if (words.size() < 4)
-                  throw InputError(where, "lacks numbers", "fetch the garment again");
-                const int k = words[0][0] - 'x';
-                const size_t a = static_cast<size_t>(index_of(words[1], 0, body.size(), where));
-                const size_t b = static_cast<size_t>(index_of(words[2], 0, body.size(), where));
-                const double base = number_of(words[3], where);
-                if (!(base > 1e-9))
-                  throw InputError(where, "scales by zero", "fetch the garment again");
-                out.scale[k] = std::abs(body[a][k] - body[b][k]) / base;
-              } else if (words[0] == "verts") {
-                part = in_verts;
-              } else if (words[0] == "delete_verts") {
-                part = in_hidden;
-              } else if (part == in_verts && numeric && (words.size() == 1 || words.size() == 9)) {
-                out.rows.push_back(binding_of(words, body.size(), where));
-              } else if (part == in_hidden && numeric) {
-                add_hidden(words, where, out);
-              } else if (!numeric && words[0][0] != '-') {
-                part = elsewhere;
-              }
-            });
-  if (out.rows.empty()) throw InputError(path, "binds no vertices", "fetch the garment again");
+  const std::string text = read_gz(path);
+  WordLines lines(text, path);
+  while (lines.next()) {
+    const auto& words = lines.words();
+    const std::string_view word = words[0];
+    const bool numeric = word.find_first_not_of("0123456789") == std::string_view::npos;
+    if (word == "x_scale" || word == "y_scale" || word == "z_scale")
+      read_scale(lines, body, out.scale);
+    else if (word == "verts")
+      part = in_verts;
+    else if (word == "delete_verts")
+      part = in_hidden;
+    else if (part == in_verts && numeric && (words.size() == 1 || words.size() == 9))
+      out.rows.push_back(binding_of(lines, body.size()));
+    else if (part == in_hidden && numeric)
+      add_hidden(lines, out);
+    else if (!numeric && word[0] != '-')
+      part = elsewhere;
+  }
+  if (out.rows.empty()) throw InputError(path, "binds no vertices", kFetchAgain);
   return out;
 }
 

@@ -1,5 +1,4 @@
-// Texts of words in lines, as motion capture writes them (BVH, ASF, AMC); used by the readers of
-// this folder.
+// Texts of words in lines, as motion capture (BVH, ASF, AMC) and MakeHuman write them.
 #pragma once
 
 #include <string>

@@ -39,7 +39,7 @@ CASES = [
     ("AMASS", "Made by the tests: a clip in SMPL-H's layout, one in SMPL-X's, a shape without motion",
      "restage data import samples/AMASS --body-model samples/models --license AMASS --verbose --out amass.h5"),
     ("SMPL bodies", "Made by the tests: SMPL-X, the mean person and one of AMASS's shapes",
-     "restage data import samples/models/SMPLX_NEUTRAL.npz --betas zeros samples/AMASS/ben/shape.npz --out bodies.h5"),
+     "restage data import samples/models/SMPLX_NEUTRAL.npz --betas zeros samples/AMASS/ben/shape.npz --verbose --out bodies.h5"),
     ("glTF: Mixamo", "Made by the tests, as Blender exports it: z up and centimetres below an armature",
      "restage data import samples/mixamo.glb --license CC0-1.0 --out hero.h5"),
     ("glTF: Unreal", "Made by the tests: A-pose, twist bones, centimetres",

@@ -1,6 +1,9 @@
 """restage data build RECIPE, verify FOLDER, sheet, realism and fetch."""
+import gzip
 import hashlib
 import os
+import shutil
+import tarfile
 import unittest
 
 from support import CliTest
@@ -129,6 +132,27 @@ class FetchData(CliTest):
         self.bad_input(["data", "fetch", "none.txt", "--out", "other"], "none.txt")
         self.write("list.txt", self.listed(b"x", "a", "-"))
         self.bad_input(["data", "fetch", "list.txt", "--out", "other", "--from", "nowhere"], "nowhere")
+
+    @unittest.skipUnless(os.path.exists(os.path.join(DATA, "body", "targets_original.tar.xz")), "no data folder (set RESTAGE_SHARED)")
+    def test_bodies_from_the_published_files_are_those_of_the_copy(self):
+        originals = self.path("originals/body/makehuman")
+        with tarfile.open(os.path.join(DATA, "body", "targets_original.tar.xz")) as targets:
+            targets.extractall(originals)
+        for name in ("base.obj", "rigs/game_engine.mhskel", "rigs/weights.game_engine.json"):
+            with gzip.open(os.path.join(DATA, "body", name + ".gz")) as packed:
+                self.write("originals/body/makehuman/" + os.path.basename(name), packed.read())
+        listed = os.path.join(ROOT, "configs", "data", "open_data.txt")
+        result = self.restage("data", "fetch", listed, "--out", "data", "--from", "originals")
+        self.assertEqual(result.code, 1)  # motions and garments are not there
+        self.assertNotIn("missing body/makehuman.h5", result.out)
+        os.makedirs(self.path("copy/body"))
+        for name in ("makehuman.h5", "bodies.csv"):
+            shutil.copy(os.path.join(DATA, "body", name), self.path("copy/body/" + name))
+        for folder in ("data", "copy"):
+            os.rename(self.path(folder), self.path("source"))
+            self.done("data", "import", "source", "--out", folder + ".h5")
+            os.rename(self.path("source"), self.path(folder))
+        self.assertEqual(self.bytes("data.h5"), self.bytes("copy.h5"))
 
     @unittest.skipUnless(os.path.exists(os.path.join(DATA, "body", "makehuman.h5")), "no data folder (set RESTAGE_SHARED)")
     def test_the_projects_list_and_a_copy(self):

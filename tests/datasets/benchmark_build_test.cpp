@@ -3,6 +3,7 @@
 #include <zlib.h>
 
 #include <cstdlib>
+#include <map>
 #include <set>
 
 #include "autograd/base/parallel.h"
@@ -11,6 +12,8 @@
 #include "datasets/benchmark/manifest.h"
 #include "datasets/benchmark/sha256.h"
 #include "datasets/fetch/fetch.h"
+#include "datasets/hdf5/file.h"
+#include "datasets/importers/makehuman_pack.h"
 #include "datasets/schema.h"
 #include "tests/datasets/schema_support.h"
 
@@ -282,6 +285,95 @@ TEST_F(Fetch, ACopyServesWithoutNetwork) {
   EXPECT_THROW(fetch_data(file, dir_ / "other", dir_ / "copy"), InputError);
   EXPECT_FALSE(fs::exists(dir_ / "other/cmu/big.bin"));
   EXPECT_THROW(fetch_data(file, dir_ / "other", dir_ / "none"), InputError);
+}
+
+/// MakeHuman's files with one quad, two bones and two targets.
+std::map<std::string, std::string> tiny_makehuman() {
+  return {{"base.obj",
+           "# CC0\nv 0 0 0\nv 1 0 0\nv 1 1.5 0\nv 0 1 0\nv 9 9 9\ng body\nf 1/1 2/2 3/3 4/4\n"
+           "g joint-head\nf 5/1 5/1 5/1 5/1\n"},
+          {"targets/a/up-incr.target", "# CC0\n2 0 .25 -1\n4 0 1 0\n"},
+          {"targets/none.target", "# CC0\n"},
+          {"game_engine.mhskel",
+           R"({"bones": {"Root": {"head": "r", "parent": null}, "pelvis": {"head": "p", "parent":
+             "Root"}}, "joints": {"r": [0, 1], "p": [4]}})"},
+          {"weights.game_engine.json", R"({"weights": {"Root": [], "pelvis": [[2, 0.5]]}})"}};
+}
+
+TEST_F(Fetch, MakeHumanIsPackedFromItsPublishedFiles) {
+  std::string parts = "@here file://" + dir_.path() + "/origin\n";
+  for (const auto& [name, content] : tiny_makehuman()) {
+    fs::create_directories(fs::path(dir_ / ("origin/" + name)).parent_path());
+    origin(name, content);
+    parts += line(content, "body/makehuman/" + name, "@here/" + name);
+  }
+  write_bytes(dir_ / "parts.txt", parts);
+  const std::string file = list(line("a copy", "body/makehuman.h5", "makehuman:parts.txt"));
+  EXPECT_EQ(fetch_data(file, dir_ / "out").fetched, 1u);
+  const std::string packed = bytes_of(dir_ / "out/body/makehuman.h5");
+  const h5::File h5 = h5::File::open(dir_ / "out/body/makehuman.h5");
+  EXPECT_EQ(h5.read<float>("/base/vertices", {5, 3})[7], 1.5f);
+  EXPECT_EQ(h5.read<int32_t>("/base/body_quads", {-1, 4}), (std::vector<int32_t>{0, 1, 2, 3}));
+  EXPECT_EQ(h5.dataset("/rig/bone_names").read_text(),
+            (std::vector<std::string>{"Root", "pelvis"}));
+  EXPECT_EQ(h5.read<int32_t>("/rig/bone_parent", {2}), (std::vector<int32_t>{-1, 0}));
+  EXPECT_EQ(h5.read<int32_t>("/rig/head_vertices", {2, 2}), (std::vector<int32_t>{0, 1, 4, -1}));
+  EXPECT_EQ(h5.read<int32_t>("/rig/weight_vertex", {1}), (std::vector<int32_t>{2}));
+  EXPECT_EQ(h5.dataset("/targets/names").read_text(),
+            (std::vector<std::string>{"a/up-incr", "none"}));
+  EXPECT_EQ(h5.read<int64_t>("/targets/count", {2}), (std::vector<int64_t>{2, 0}));
+  EXPECT_EQ(h5.read<int16_t>("/targets/delta_milli", {2, 3}),
+            (std::vector<int16_t>{0, 250, -1000, 0, 1000, 0}));
+
+  fetch_data(file, dir_ / "out");
+  EXPECT_EQ(bytes_of(dir_ / "out/body/makehuman.h5"), packed) << "again gives the same";
+  // A folder that has the published files serves as well; one that lacks a file does not.
+  EXPECT_TRUE(fetch_data(file, dir_ / "copied", dir_ / "out").missing.empty());
+  EXPECT_EQ(bytes_of(dir_ / "copied/body/makehuman.h5"), packed);
+  fs::remove(dir_ / "out/body/makehuman/base.obj");
+  EXPECT_EQ(fetch_data(file, dir_ / "other", dir_ / "out").missing,
+            std::vector<std::string>{"body/makehuman.h5"});
+  write_bytes(dir_ / "parts.txt", line("a copy", "body/makehuman.h5", "makehuman:parts.txt"));
+  EXPECT_THROW(fetch_data(file, dir_ / "endless"), InputError);
+}
+
+TEST_F(Fetch, BrokenMakeHumanFilesAreRefusedByLine) {
+  const auto refused = [&](const std::string& name, const std::string& content,
+                           const std::string& words) {
+    std::map<std::string, std::string> files = tiny_makehuman();
+    files[name] = content;
+    const TempDir folder;
+    for (const auto& [path, text] : files) {
+      fs::create_directories(fs::path(folder / path).parent_path());
+      write_bytes(folder / path, text);
+    }
+    try {
+      pack_makehuman(folder.path(), folder / "out.h5");
+      ADD_FAILURE() << name << ": " << content;
+    } catch (const InputError& e) {
+      EXPECT_NE(std::string(e.what()).find(words), std::string::npos) << e.what();
+    }
+    EXPECT_FALSE(fs::exists(folder / "out.h5"));
+  };
+  refused("base.obj", "v 0 0 0\ng body\nf 1 1 1 2\n", "base.obj:3");
+  refused("base.obj", "v 0 0 0\ng body\nf 1 1 1\n", "no quad");
+  refused("base.obj", "v 0 0 0\n", "no faces");
+  refused("targets/none.target", "5 0 0 0\n", "none.target:1");
+  refused("targets/none.target", "0 0 0\n", "vertex x y z");
+  refused("targets/none.target", "0 0 40 0\n", "3 metres");
+  refused("game_engine.mhskel", "{", "laid out");
+  refused("game_engine.mhskel",
+          R"({"bones": {"Root": {"head": "r", "parent": "x"}}, "joints": {"r": [0]}})", "a bone");
+  refused("weights.game_engine.json", R"({"weights": {"pelvis": [[7, 0.5]]}})", "a vertex");
+  refused("weights.game_engine.json", R"({"weights": {"pelvis": [[0, -1]]}})", "a weight");
+}
+
+TEST_F(Fetch, AtNamesMustBeExplained) {
+  EXPECT_THROW(read_fetch_list(list(line("x", "a", "@who/a"))), InputError);
+  EXPECT_THROW(read_fetch_list(list("@a x\n@a y\n" + line("x", "a", "@a/a"))), InputError);
+  EXPECT_THROW(read_fetch_list(list("@a\n" + line("x", "a", "@a/a"))), InputError);
+  EXPECT_EQ(read_fetch_list(list("@a https://b\n" + line("x", "a", "@a/c")))[0].address,
+            "https://b/c");
 }
 
 TEST_F(Fetch, GoesOnWhereItBrokeOff) {

@@ -295,6 +295,21 @@ TEST(ImportersAmass, BothLayoutsEqualTheModelsFormulaAt30Fps) {
     }
 }
 
+TEST(ImportersAmass, AGenderThatIsAPythonObjectIsNotStated) {
+  const TempDir dir;
+  write_bytes(dir / "neutral.npz", TinySmpl().file());
+  BodyModels models(dir / "neutral.npz");
+  auto arrays = TinyClip().arrays();
+  for (auto& [name, bytes] : arrays)
+    if (name == "gender") bytes = test::npy_of(test::npy_header("|O", {}), "a pickle");
+  write_bytes(dir / "clip.npz", npz(arrays));
+  ImportReport report;
+  import_amass(Npz(dir / "clip.npz"), models, {}, report);
+  EXPECT_HAS(fact(report, "gender"), "not stated");
+  ASSERT_EQ(report.remarks.size(), 1u);
+  EXPECT_HAS(report.remarks[0], "gender counts as not stated");
+}
+
 TEST(ImportersAmass, OptionsOverrideAndDoubtsAreRemarked) {
   const TempDir dir;
   write_bytes(dir / "male.npz", TinySmpl().file());
