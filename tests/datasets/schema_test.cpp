@@ -295,6 +295,35 @@ TEST(Schema, RefusesEveryBadPrediction) {
                      ":/ attribute restage_schema: is not an integer"));
 }
 
+TEST(Schema, BlendShapesMustBeThereAndFit) {
+  const TempDir dir;
+  const Body body = some_body("a", 4);
+  const auto refusal = [&](const h5::Shape& shape, float value) {
+    h5::File file = h5::File::create(dir / "a.h5");
+    std::vector<float> vertices;
+    for (const Point& p : body.rest.vertices) vertices.insert(vertices.end(), &p[0], &p[0] + 3);
+    std::vector<double> joints;
+    for (const Vec3& p : body.joints) joints.insert(joints.end(), &p[0], &p[0] + 3);
+    const std::vector<float> weights(body.weights.data(),
+                                     body.weights.data() + body.weights.size());
+    file.write<float>("/bodies/a/vertices", {4, 3}, vertices);
+    file.write<double>("/bodies/a/joints", {kJoints, 3}, joints);
+    file.write<float>("/bodies/a/weights", {4, kJoints}, weights);
+    file.set_text("/bodies/a", "split", "train");
+    file.set_text("/bodies/a", "blend_shapes", "0");
+    if (!shape.empty())
+      file.write<float>(
+          "/blend_shapes/0", shape,
+          std::vector<float>(static_cast<size_t>(shape[0] * shape[1] * shape[2]), value));
+    file.commit();
+    return error_of([&] { read_bodies(dir / "a.h5"); });
+  };
+  EXPECT_NE(refusal({}, 0).find("/blend_shapes/0: is missing"), std::string::npos);
+  EXPECT_NE(refusal({5, 3, 189}, 0).find("[5, 3, 189] instead of [4, 3, 189]"), std::string::npos);
+  EXPECT_NE(refusal({4, 3, 207}, 0).find("[4, 3, 207] instead of [4, 3, 189]"), std::string::npos);
+  EXPECT_NE(refusal({4, 3, 189}, NAN).find("/blend_shapes/0"), std::string::npos);
+}
+
 TEST(Schema, ScanOffsetsMustFitThePoints) {
   const TempDir dir;
   Scans scans;

@@ -351,7 +351,11 @@ std::string hdf5(const std::function<void(const std::string&)>& write) {
 }
 
 Seeds hdf5_seeds() {
-  const Body body = testing::tiny_body("a", "train");
+  Body body = testing::tiny_body("a", "train");
+  const auto shapes = std::make_shared<PoseBlendShapes>();
+  shapes->directions.setConstant(3 * static_cast<Eigen::Index>(body.rest.vertices.size()),
+                                 PoseBlendShapes::kFeatures, 0.001f);
+  body.blend_shapes = shapes;
   const Motion motion = testing::tiny_motion("m", "s", "train", 4);
   return {{"dataset",
            hdf5([&](const std::string& path) { write_dataset(path, {body}, {motion}, {}); })},
