@@ -93,6 +93,8 @@ void Retargeter::prepare() {
   if (!(options_.fps >= 1 && options_.fps <= 1000))
     throw InputError("", "the source's frames per second are out of range",
                      "give --fps from 1 to 1000");
+  if (!(options_.anchor >= 0))
+    throw InputError("", "the anchor's time is out of range", "give --anchor 0 or more seconds");
   const std::string translation = extra("translation", "velocity");
   path_ = translation == "velocity"   ? Path::velocity
           : translation == "relative" ? Path::relative
@@ -120,6 +122,7 @@ void Retargeter::restart() {
   previous_.reset();
   received_.reset();
   frame_ = grid_ = 0;
+  legs_a_ = 0;
 }
 
 std::span<const RetargetedFrame> Retargeter::push(const Points& cloud, const std::string& source) {
@@ -197,13 +200,23 @@ void Retargeter::advance(const Joints& a, Pose* pose) {
   pose->local[0] = turn * pose->local[0];
   const float* t = answer.trans.value.data<float>();
   const Vec3 t_b = turn * Vec3(t[0], t[1], t[2]);
-  if (path_ == Path::velocity) {
-    if (previous_) root_b_ += t_b / kFps;
-  } else {
+  if (path_ == Path::velocity)
+    sum_path(a, t_b);
+  else
     root_b_ = path_ == Path::relative ? Vec3(start_b_ + t_b) : t_b;
-  }
   previous_ = a;
   pose->root = root_b_;
+}
+
+/// Velocities that are a little too large or askew would carry B away from A for ever.
+void Retargeter::sum_path(const Joints& a, const Vec3& velocity) {
+  const auto n = static_cast<double>(grid_ + 1);
+  legs_a_ += (leg_length(a) - legs_a_) / n;
+  if (!previous_) return;
+  root_b_ += velocity / kFps;
+  if (!(options_.anchor > 0)) return;
+  const Vec3 wanted = leg_length(rest_) / std::max(legs_a_, 1e-6) * a[0];
+  root_b_ += (1 - std::exp(-1 / (kFps * options_.anchor))) * (wanted - root_b_);
 }
 
 void Retargeter::deform(const Pose& pose, const PosedSkeleton& posed, Points* out,

@@ -16,6 +16,9 @@ struct RetargetOptions {
   bool force = false;  ///< accept a target that does not look like a T-pose
   uint64_t seed = 0;   ///< of the choice of points
   int samples = 1;     ///< choices of points per frame that are averaged
+  /// Seconds in which B's path, a sum of velocities, goes back to A's in proportion to the legs, so
+  /// that errors do not add up. 0: never, as in the papers (docs/method.md, "Drift").
+  double anchor = 0.25;
 };
 
 /// B in one frame.
@@ -65,6 +68,7 @@ class Retargeter {
   void prepare();
   void step(const Joints& a, RetargetedFrame* out);
   void advance(const Joints& a, Pose* pose);
+  void sum_path(const Joints& a, const Vec3& velocity);
   void deform(const Pose& pose, const PosedSkeleton& posed, Points* out, bool dense = false) const;
 
   const ModelSet& models_;
@@ -84,6 +88,7 @@ class Retargeter {
   Joints last_source_;
   Vec3 start_a_ = Vec3::Zero(), start_b_ = Vec3::Zero();  ///< pelvis in the first frame
   Vec3 root_b_ = Vec3::Zero();
+  double legs_a_ = 0;                    ///< mean leg length of A so far
   int64_t frame_ = 0, grid_ = 0;         ///< source frames received, grid frames produced
   std::vector<RetargetedFrame> frames_;  ///< of the last push, and room for more
   FrameTimes times_;

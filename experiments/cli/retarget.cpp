@@ -23,7 +23,7 @@ namespace {
 struct RetargetCommand {
   std::string source, target, weights, out, clip, up = "y", format = "ply";
   std::optional<double> fps;  ///< of the source
-  double scale = 1;
+  double scale = 1, anchor = RetargetOptions{}.anchor;
   bool force = false, profile = false;
   int samples = 4;
 };
@@ -94,6 +94,8 @@ void check(const RetargetCommand& c) {
     throw InputError("", "--fps is out of range", "give the source's frames per second, 1 to 1000");
   if (c.samples < 1 || c.samples > 256)
     throw InputError("", "--samples is out of range", "give 1 to 256");
+  if (!(c.anchor >= 0 && c.anchor <= 1e6))
+    throw InputError("", "--anchor is out of range", "give seconds, or 0 for none");
   const auto dot = c.out.find_last_of('.');
   const auto slash = c.out.find_last_of('/');
   const bool extension = dot != std::string::npos && (slash == std::string::npos || dot > slash) &&
@@ -157,6 +159,7 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   options.force = c.force;
   options.seed = common.seed;
   options.samples = c.samples;
+  options.anchor = c.anchor;
   TargetMesh target = read_target(c.target);
   check_inputs(c, *frames, target.mesh);
   Retargeter retargeter(models, std::move(target.mesh), c.target, options);
@@ -229,6 +232,9 @@ void add_retarget(Program& program) {
   app.add_option("--scale", c->scale, "the source's units in metres");
   app.add_option("--format", c->format, "of a folder's frames: ply or obj");
   app.add_option("--samples", c->samples, "random choices of points per frame to average");
+  app.add_option("--anchor", c->anchor,
+                 "seconds in which the path goes back to the source's, scaled to the target's legs "
+                 "(0: never)");
   app.add_flag("--force", c->force,
                "accept a target that is no T-pose, and axes and units that look wrong");
   app.add_flag("--profile", c->profile,

@@ -127,7 +127,7 @@ TEST(InferRetargeter, FrameByFrameEqualsTheWholeSequence) {
   for (const std::string name : {"smrm/rot6d", "smrm/quaternion"}) {
     const ModelSet models = untrained(name);
     const std::vector<Joints> source = performance(40);
-    Retargeter r(models, target().rest, target().joints, {});
+    Retargeter r(models, target().rest, target().joints, {.anchor = 0});
     const std::vector<RetargetedFrame> online = run(r, source);
     const std::vector<Pose> whole = whole_sequence(models, source);
     ASSERT_EQ(online.size(), whole.size());
@@ -143,6 +143,29 @@ TEST(InferRetargeter, FrameByFrameEqualsTheWholeSequence) {
     r.restart();
     EXPECT_GT(apart(r.push_joints(source[20])[0].joints, online[20].joints), 1e-4);
   }
+}
+
+TEST(InferRetargeter, TheAnchorBoundsDriftAndLeavesThePoseAlone) {
+  const ModelSet models = untrained();
+  const std::vector<Joints> source = performance(120);
+  const double scale = leg_length(target().joints) / leg_length(source[0]), seconds = 0.25;
+  Retargeter summed(models, target().rest, target().joints, {.anchor = 0});
+  Retargeter anchored(models, target().rest, target().joints, {.anchor = seconds});
+  const std::vector<RetargetedFrame> far = run(summed, source), near = run(anchored, source);
+  const auto off = [&](const RetargetedFrame& frame, size_t f) {
+    return Vec3(frame.pose.root - scale * source[f][0]);
+  };
+  double fastest = 0, most = 0;  // metres a second, metres
+  for (size_t f = 1; f < source.size(); ++f) {
+    fastest = std::max(fastest, kFps * (off(far[f], f) - off(far[f - 1], f - 1)).norm());
+    most = std::max(most, off(near[f], f).norm());
+    for (size_t j = 0; j < kJoints; ++j)
+      EXPECT_EQ(near[f].pose.local[j], far[f].pose.local[j]) << f << " " << j;
+  }
+  EXPECT_LT(off(near[0], 0).norm(), 1e-9);
+  EXPECT_GT(fastest, 1e-3) << "an untrained network is wrong";
+  EXPECT_LE(most, seconds * fastest * 1.01);
+  EXPECT_LT(off(near.back(), 119).norm(), 0.5 * off(far.back(), 119).norm());
 }
 
 TEST(InferRetargeter, RestartForgetsEverything) {
