@@ -45,6 +45,14 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
+/// What paths are scaled about: the origin. Of somebody far from it a place on the floor nearby, so
+/// that a scale which still settles moves nobody by much.
+Vec3 scaling_centre(const Vec3& start) {
+  constexpr double kNear = 3;  // metres
+  const double far = std::hypot(start[0], start[2]);
+  return far <= kNear ? Vec3(0, 0, 0) : Vec3((1 - kNear / far) * Vec3(start[0], 0, start[2]));
+}
+
 void require_tpose(const Joints& j, const std::string& where) {
   for (const auto& [shoulder, wrist, side] :
        {std::tuple<size_t, size_t, double>{16, 20, 1.0}, {17, 21, -1.0}}) {
@@ -180,8 +188,11 @@ void Retargeter::advance(const Joints& a, Pose* pose) {
   Joints local;
   for (size_t j = 0; j < kJoints; ++j) local[j] = back * (a[j] - a[0]);
   if (!previous_) {  // B begins where A does, in proportion to its legs
+    const double scale = leg_length(rest_) / std::max(leg_length(a), 1e-6);
     start_a_ = a[0];
-    root_b_ = start_b_ = leg_length(rest_) / std::max(leg_length(a), 1e-6) * a[0];
+    root_b_ = start_b_ = scale * a[0];
+    centre_a_ = scaling_centre(a[0]);
+    centre_b_ = scale * centre_a_;
   }
   const Vec3 before = path_ == Path::velocity   ? (previous_ ? (*previous_)[0] : a[0])
                       : path_ == Path::relative ? start_a_
@@ -215,7 +226,8 @@ void Retargeter::sum_path(const Joints& a, const Vec3& velocity) {
   if (!previous_) return;
   root_b_ += velocity / kFps;
   if (!(options_.anchor > 0)) return;
-  const Vec3 wanted = leg_length(rest_) / std::max(legs_a_, 1e-6) * a[0];
+  const double scale = leg_length(rest_) / std::max(legs_a_, 1e-6);
+  const Vec3 wanted = centre_b_ + scale * (a[0] - centre_a_);
   root_b_ += (1 - std::exp(-1 / (kFps * options_.anchor))) * (wanted - root_b_);
 }
 

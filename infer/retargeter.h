@@ -88,7 +88,8 @@ class Retargeter {
   Joints last_source_;
   Vec3 start_a_ = Vec3::Zero(), start_b_ = Vec3::Zero();  ///< pelvis in the first frame
   Vec3 root_b_ = Vec3::Zero();
-  double legs_a_ = 0;                    ///< mean leg length of A so far
+  Vec3 centre_a_ = Vec3::Zero(), centre_b_ = Vec3::Zero();  ///< what paths are scaled about
+  double legs_a_ = 0;                                       ///< mean leg length of A so far
   int64_t frame_ = 0, grid_ = 0;         ///< source frames received, grid frames produced
   std::vector<RetargetedFrame> frames_;  ///< of the last push, and room for more
   FrameTimes times_;

@@ -168,6 +168,19 @@ TEST(InferRetargeter, TheAnchorBoundsDriftAndLeavesThePoseAlone) {
   EXPECT_LT(off(near.back(), 119).norm(), 0.5 * off(far.back(), 119).norm());
 }
 
+TEST(InferRetargeter, LegsThatSeemToGrowMoveNobodyWhoIsFarAway) {
+  const ModelSet models = untrained();
+  const auto way = [&](double away) {  // of B in two seconds, A growing by 2 %
+    std::vector<Joints> source(60, performance(1)[0]);
+    for (size_t f = 0; f < source.size(); ++f)
+      for (Vec3& x : source[f]) x = (1 + 0.02 * static_cast<double>(f) / 60) * x + Vec3(away, 0, 0);
+    Retargeter r(models, target().rest, target().joints, {});
+    const std::vector<RetargetedFrame> out = run(r, source);
+    return Vec3(out.back().pose.root - out.front().pose.root);
+  };
+  EXPECT_LT((way(1000) - way(0)).norm(), 0.02 * 3);
+}
+
 TEST(InferRetargeter, RestartForgetsEverything) {
   const ModelSet models = untrained();
   const std::vector<Joints> source = performance(12);
