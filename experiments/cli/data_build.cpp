@@ -1,5 +1,6 @@
 // restage data build: the built-in source as a file, or a recipe as a benchmark folder.
 #include <cstdlib>
+#include <filesystem>
 #include <memory>
 
 #include "autograd/base/error.h"
@@ -63,6 +64,14 @@ struct Request {
   std::vector<std::string> overrides;
 };
 
+/// Where a data folder is looked for if none is named: what `data fetch --out data` fills, then
+/// the one beside a checkout. Empty: neither is there.
+std::string usual_data_folder() {
+  for (const char* folder : {"data", "../shared/data"})
+    if (std::filesystem::exists(std::string(folder) + "/body/makehuman.h5")) return folder;
+  return "";
+}
+
 Request read_request(const BuildOptions& options, const Common& common) {
   Request out;
   out.out = options.out;
@@ -81,13 +90,14 @@ Request read_request(const BuildOptions& options, const Common& common) {
                        "give one");
   }
   if (options.seed_given) out.overrides.push_back("seed=" + std::to_string(common.seed));
+  if (out.data.empty()) out.data = usual_data_folder();
   if (out.recipe.empty() || out.out.empty() || out.data.empty())
     throw InputError("",
                      std::string("there is no ") + (out.recipe.empty() ? "recipe"
                                                     : out.out.empty()  ? "place to write to"
                                                                        : "data folder"),
                      "use 'restage data build RECIPE.yaml out=DIR data=DATA_FOLDER' (or set "
-                     "RESTAGE_DATA)");
+                     "RESTAGE_DATA, or fill ./data with 'restage data fetch')");
   return out;
 }
 
@@ -99,12 +109,13 @@ int build_recipe(const BuildOptions& options, const Common& common) {
       build_benchmark(recipe, resolved_yaml(recipe), request.recipe, request.data, request.out);
   if (common.json)
     print_json({{"out", request.out},
+                {"data", request.data},
                 {"files", done.files},
                 {"bytes", done.bytes},
                 {"seed", recipe.seed}});
   else
     print("wrote " + request.out + ": " + std::to_string(done.files) + " files, " +
-          std::to_string((done.bytes + 500'000) / 1'000'000) + " MB\n");
+          std::to_string((done.bytes + 500'000) / 1'000'000) + " MB, from " + request.data + "\n");
   return 0;
 }
 

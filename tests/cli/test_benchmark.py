@@ -70,6 +70,12 @@ class Benchmark(CliTest):
     def build(self, out, *more):
         return ["data", "build", RECIPE, "out=" + out, "data=" + DATA, *SMALL, *more]
 
+    def test_the_data_folder_is_found(self):
+        os.symlink(DATA, self.path("data"))
+        command = [a for a in self.build("one") if not a.startswith("data=")]
+        self.assertEqual(self.json(*command)["data"], "data")
+        self.bad_input(command + ["train.bodies=[nobody]"], "no body 'nobody'")
+
     def test_build_verify_and_use(self):
         made = self.json(*self.build("one", "--threads", 1))
         self.assertEqual(made["files"], 3 + 2 + 3 * 4)
