@@ -1,10 +1,10 @@
 // restage data import: what users hold, into one data file.
-#include <algorithm>
 #include <memory>
 
 #include "autograd/base/error.h"
 #include "datasets/importers/import.h"
 #include "experiments/cli/commands.h"
+#include "experiments/cli/import_text.h"
 #include "experiments/cli/output.h"
 
 namespace restage::cli {
@@ -14,54 +14,6 @@ struct ImportArguments {
   std::string source, out, up = "auto", facing = "auto";
   ImportOptions options;
 };
-
-Json as_json(const ImportReport& report) {
-  Json facts = Json::object();
-  for (const auto& [name, value] : report.facts) facts[name] = value;
-  return {{"file", report.file}, {"facts", facts}, {"remarks", report.remarks}};
-}
-
-std::string remarks_of(const ImportReport& report) {
-  std::string text;
-  for (const std::string& remark : report.remarks) text += "  note: " + remark + "\n";
-  return text;
-}
-
-/// All of a report: one fact a line.
-std::string block(const ImportReport& report) {
-  constexpr size_t kColumn = 14;
-  std::string text = report.file + "\n";
-  for (const auto& [name, value] : report.facts)
-    text += "  " + name + std::string(name.size() < kColumn ? kColumn - name.size() : 1, ' ') +
-            value + "\n";
-  return text + remarks_of(report);
-}
-
-/// The first words of what matters most, in one line; remarks in lines of their own.
-std::string summary(const ImportReport& report) {
-  static const std::vector<std::string> shown = {"layout", "names", "units",     "scale",
-                                                 "up",     "rate",  "rest pose", "body model",
-                                                 "clips",  "points"};
-  std::string text = report.file + ":";
-  for (const auto& [name, value] : report.facts) {
-    if (std::find(shown.begin(), shown.end(), name) == shown.end()) continue;
-    std::string words = value.substr(0, value.find_first_of(",:;("));
-    words.erase(words.find_last_not_of(' ') + 1);
-    text += (text.back() == ':' ? " " : "; ") + words + (name == "up" ? " up" : "");
-  }
-  return text + "\n" + remarks_of(report);
-}
-
-std::string reports_text(const std::vector<ImportReport>& reports, bool verbose) {
-  constexpr size_t kMost = 40;  // a screenful; --verbose and --json have all
-  const size_t count = verbose ? reports.size() : std::min(kMost, reports.size());
-  std::string out;
-  for (size_t i = 0; i < count; ++i)
-    out += verbose || reports.size() == 1 ? block(reports[i]) : summary(reports[i]);
-  if (count < reports.size())
-    out += "and " + std::to_string(reports.size() - count) + " more (--verbose lists all)\n";
-  return out;
-}
 
 std::string counts_text(const ImportSummary& done) {
   std::string out;
@@ -85,8 +37,6 @@ int run_import(ImportArguments arguments, const Common& common) {
   arguments.options.max_memory = common.max_memory;
   const ImportSummary done = import_data(arguments.source, arguments.out, arguments.options);
   if (common.json) {
-    Json reports = Json::array();
-    for (const ImportReport& report : done.reports) reports.push_back(as_json(report));
     print_json({{"out", arguments.out},
                 {"bodies", done.bodies},
                 {"motions", done.motions},
@@ -94,7 +44,7 @@ int run_import(ImportArguments arguments, const Common& common) {
                 {"sequences", done.sequences},
                 {"shapes", done.shapes},
                 {"skipped", done.skipped},
-                {"reports", reports}});
+                {"reports", reports_json(done.reports)}});
     return 0;
   }
   print(reports_text(done.reports, common.verbose));

@@ -1,14 +1,22 @@
-// restage data inspect: what a data file holds, in a screenful, and drawn.
+// restage data inspect: what a file holds, in a screenful, and drawn. Files of others are looked at
+// as `restage data import` reads them.
+#include <unistd.h>
+
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "autograd/base/error.h"
 #include "datasets/builtin/bodies.h"
+#include "datasets/importers/import.h"
 #include "datasets/schema.h"
 #include "experiments/cli/clips.h"
 #include "experiments/cli/commands.h"
+#include "experiments/cli/import_text.h"
 #include "experiments/cli/output.h"
 #include "infer/render/figures.h"
 
@@ -19,7 +27,7 @@ constexpr size_t kBodiesDrawn = 8, kMotionsDrawn = 16, kFramesDrawn = 24;
 constexpr size_t kListed = 14;  // subjects or actions that are named
 
 struct InspectOptions {
-  std::string file, plot;
+  std::string file, plot, body_model;
 };
 
 std::string rounded(double x, int decimals) {
@@ -135,30 +143,78 @@ void add_frames(std::vector<Figure>& figures, const std::string& file, double fp
   }
 }
 
-void plot(const InspectOptions& options, const Inspection& found) {
+void plot(const InspectOptions& options, const std::string& data, const Inspection& found) {
   std::vector<Figure> figures;
   if (found.kind == "scans" || found.kind == "prediction") {
-    add_frames(figures, options.file, found.fps);
+    add_frames(figures, data, found.fps);
   } else {
     std::vector<Body> bodies;
-    if (found.counts.contains("bodies")) bodies = read_bodies(options.file);
+    if (found.counts.contains("bodies")) bodies = read_bodies(data);
     add_bodies(figures, bodies);
-    if (found.counts.contains("motions")) add_motions(figures, read_motions(options.file), bodies);
+    if (found.counts.contains("motions")) add_motions(figures, read_motions(data), bodies);
   }
   FigureSheetOptions sheet;
   sheet.title = options.file + ": " + found.kind;
   write_png(options.plot, figure_sheet(figures, sheet));
 }
 
+/// Whether a path is what others make, by its name.
+bool is_foreign(const std::string& path) {
+  if (std::filesystem::is_directory(path)) return true;
+  std::string name = path;
+  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  for (const char* end :
+       {".bvh", ".amc", ".xz", ".glb", ".gltf", ".vrm", ".npz", ".npy", ".ply", ".obj"})
+    if (name.ends_with(end)) return std::filesystem::exists(path);
+  return false;
+}
+
+/// A data file that goes away with the object.
+class Imported {
+ public:
+  Imported(const InspectOptions& options, const Common& common)
+      : path_((std::filesystem::temp_directory_path() /
+               ("restage-inspect-" + std::to_string(::getpid()) + ".h5"))
+                  .string()) {
+    ImportOptions how;
+    how.body_model = options.body_model;
+    how.max_memory = common.max_memory;
+    reports_ = import_data(options.file, path_, how).reports;
+  }
+  ~Imported() {
+    std::error_code ignored;
+    std::filesystem::remove(path_, ignored);
+  }
+  Imported(const Imported&) = delete;
+  Imported& operator=(const Imported&) = delete;
+
+  const std::string& path() const { return path_; }
+  const std::vector<ImportReport>& reports() const { return reports_; }
+
+ private:
+  std::string path_;
+  std::vector<ImportReport> reports_;
+};
+
 int run_inspect(const InspectOptions& options, const Common& common) {
   if (!options.plot.empty() && !options.plot.ends_with(".png"))
     throw InputError(options.plot, "names no picture", "end --plot in .png");
-  const Inspection found = inspect(options.file);
-  if (!options.plot.empty()) plot(options, found);
-  if (common.json)
-    print_json(to_json(found));
-  else
-    print(to_text(found) + (options.plot.empty() ? "" : "wrote " + options.plot + "\n"));
+  if (std::filesystem::exists(options.file + "/manifest.json"))
+    throw InputError(options.file, "is a folder that 'restage data build' made",
+                     "inspect a file in it, or 'restage data verify' it");
+  std::optional<Imported> imported;
+  if (is_foreign(options.file)) imported.emplace(options, common);
+  const std::string& data = imported ? imported->path() : options.file;
+  const Inspection found = inspect(data);
+  if (!options.plot.empty()) plot(options, data, found);
+  if (common.json) {
+    Json out = to_json(found);
+    if (imported) out["reports"] = reports_json(imported->reports());
+    print_json(out);
+    return 0;
+  }
+  if (imported) print(reports_text(imported->reports(), common.verbose));
+  print(to_text(found) + (options.plot.empty() ? "" : "wrote " + options.plot + "\n"));
   return 0;
 }
 
@@ -169,10 +225,14 @@ void add_data_inspect(Program& program, CLI::App& group) {
   CLI::App& app =
       program.add(group, "inspect", "say what a file holds, and draw it",
                   "restage data inspect data.h5\nrestage data inspect data.h5 --plot sheet.png\n"
+                  "restage data inspect walk.bvh\nrestage data inspect hero.glb --plot hero.png\n"
                   "restage data inspect data.h5 --json",
                   [options, &program] { return run_inspect(*options, program.common()); });
-  app.add_option("FILE", options->file, "bodies, motions, scans or a prediction (HDF5)")
+  app.add_option(
+         "FILE", options->file,
+         "bodies, motions, scans or a prediction (HDF5), or what 'restage data import' takes")
       ->required();
+  app.add_option("--body-model", options->body_model, "for an AMASS motion: its SMPL model (.npz)");
   app.add_option("--plot", options->plot, "draw bodies, poses or frames on a contact sheet (PNG)");
 }
 

@@ -56,6 +56,22 @@ class Data(CliTest):
         self.assertEqual((result.code, result.err), (1, ""))
         self.assertIn("bad.h5:/joints", result.out)
 
+    def test_inspect_looks_into_what_others_made(self):
+        self.write("walk.bvh", toy_bvh())
+        text = self.done("data", "inspect", "walk.bvh", "--plot", "walk.png")
+        for words in ("Mixamo (profile mixamo)", "kind        motions", "walk.png"):
+            self.assertIn(words, text)
+        found = self.json("data", "inspect", "walk.bvh")
+        self.assertEqual((found["kind"], found["counts"]["motions"]), ("motions", 1))
+        self.assertEqual(found["reports"][0]["file"], "walk.bvh")
+        self.assertEqual(sorted(os.listdir(self.folder)), ["walk.bvh", "walk.png"])
+        self.write("cut.bvh", toy_bvh()[:600])
+        self.bad_input(["data", "inspect", "cut.bvh"], "cut.bvh")
+        self.write("built/manifest.json", "{}")
+        self.bad_input(["data", "inspect", "built"], "data verify")
+        self.write("words.txt", "hello")
+        self.bad_input(["data", "inspect", "words.txt"], "HDF5")
+
     def test_import_reports_what_was_found(self):
         self.write("walk.bvh", toy_bvh())
         text = self.done("data", "import", "walk.bvh", "--out", "walk.h5")
