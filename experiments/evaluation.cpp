@@ -95,13 +95,15 @@ void judge(const Performance& performance, Retargeter& retargeter, bool clouds,
 }  // namespace
 
 SystemEvaluation evaluate_system(const ModelSet& models, const Corpus& corpus,
-                                 const std::vector<EvalSequence>& list, uint64_t seed) {
+                                 const std::vector<EvalSequence>& list, uint64_t seed,
+                                 double anchor) {
   SystemEvaluation out;
   RetargetOptions options;
   options.seed = seed;
   options.force =
       true;  // a badly extracted target counts with its error instead of ending the table
   options.samples = 4;
+  options.anchor = anchor;
   for (const EvalSequence& sequence : list) {
     const Performance performance(corpus, sequence, ScanConfig{}, seed);
     Retargeter from_clouds(models, performance.target().rest, performance.target().id, options);

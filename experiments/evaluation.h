@@ -21,11 +21,13 @@ struct SystemScores {
 
 struct SystemEvaluation {
   SystemScores extracted;  ///< clouds in, target's joints extracted: end to end
-  SystemScores truth;      ///< true joints of source and target: the motion network alone
+  SystemScores truth;      ///< true joints of source and target: no extractor
 };
 
-/// Judges every sequence of `list` on the bodies and motions of `corpus`.
+/// Judges every sequence of `list` on the bodies and motions of `corpus`. `anchor`:
+/// RetargetOptions.
 SystemEvaluation evaluate_system(const ModelSet& models, const Corpus& corpus,
-                                 const std::vector<EvalSequence>& list, uint64_t seed);
+                                 const std::vector<EvalSequence>& list, uint64_t seed,
+                                 double anchor);
 
 }  // namespace restage

@@ -126,6 +126,12 @@ void add_each(const std::vector<std::string>& files, ImportSummary& summary,
   }
 }
 
+bool is_importable(const std::string& source) {
+  std::error_code ignored;
+  return fs::is_directory(source, ignored) || is_recording_name(source) || is_array_name(source) ||
+         is_mesh_name(source);
+}
+
 ImportSummary import_data(const std::string& source, const std::string& out,
                           const ImportOptions& options) {
   std::error_code ignored;

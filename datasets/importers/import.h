@@ -36,6 +36,9 @@ struct ImportSummary {
 /// Licence, origin and required acknowledgement of what comes out of a data folder.
 FileInfo data_folder_info(bool bodies, bool clips);
 
+/// Whether `source` is a folder, or a file whose name ends like one that import_data() reads.
+bool is_importable(const std::string& source);
+
 /// Writes `out` (whole or not at all) from `source`, which is
 /// - a folder laid out like the project's data folder: all bodies of body/makehuman.h5 by
 ///   body/bodies.csv and all clips of cmu/clips30.h5 (one of the two may be absent);

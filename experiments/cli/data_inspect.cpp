@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -158,17 +157,6 @@ void plot(const InspectOptions& options, const std::string& data, const Inspecti
   write_png(options.plot, figure_sheet(figures, sheet));
 }
 
-/// Whether a path is what others make, by its name.
-bool is_foreign(const std::string& path) {
-  if (std::filesystem::is_directory(path)) return true;
-  std::string name = path;
-  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  for (const char* end :
-       {".bvh", ".amc", ".xz", ".glb", ".gltf", ".vrm", ".npz", ".npy", ".ply", ".obj"})
-    if (name.ends_with(end)) return std::filesystem::exists(path);
-  return false;
-}
-
 /// A data file that goes away with the object.
 class Imported {
  public:
@@ -203,7 +191,7 @@ int run_inspect(const InspectOptions& options, const Common& common) {
     throw InputError(options.file, "is a folder that 'restage data build' made",
                      "inspect a file in it, or 'restage data verify' it");
   std::optional<Imported> imported;
-  if (is_foreign(options.file)) imported.emplace(options, common);
+  if (is_importable(options.file)) imported.emplace(options, common);
   const std::string& data = imported ? imported->path() : options.file;
   const Inspection found = inspect(data);
   if (!options.plot.empty()) plot(options, data, found);

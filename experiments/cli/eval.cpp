@@ -26,6 +26,7 @@ struct EvalOptions {
   std::string run, pred, truth, source, rest, mended, out;
   int64_t every = 1;
   bool variants = false, per_joint = false;
+  double anchor = RetargetOptions{}.anchor;
 };
 
 struct File {
@@ -225,16 +226,18 @@ int run_eval_run(const EvalOptions& options, const Common& common) {
   const auto list =
       evaluation_sequences(test, static_cast<size_t>(config.evaluation.sequences),
                            static_cast<size_t>(config.evaluation.frames), common.seed);
-  const SystemEvaluation scores = evaluate_system(models, test, list, common.seed);
+  const SystemEvaluation scores = evaluate_system(models, test, list, common.seed, options.anchor);
   const auto [joints, tposes] = skeleton_errors(models, test, config);
   const EvalReport extracted = report_of(scores.extracted), truth = report_of(scores.truth);
-  char line[160];
+  char line[160], path[96] = "";
+  if (options.anchor > 0)
+    std::snprintf(path, sizeof path, ", paths held to the source's within %g s", options.anchor);
   std::snprintf(line, sizeof line,
                 "Extractor on held-out clouds: %.1f mm; on held-out T-poses: %.1f mm.\n",
                 1e3 * joints, 1e3 * tposes);
   const std::string text = "From clouds alone (extracted skeletons), " +
                            std::to_string(list.size()) + " held-out sequences, seed " +
-                           std::to_string(common.seed) + ":\n\n" +
+                           std::to_string(common.seed) + path + ":\n\n" +
                            to_markdown(extracted, models.smrm.name) + "\nFrom true skeletons:\n\n" +
                            to_markdown(truth, models.smrm.name) + "\n" + line;
   if (!options.out.empty()) {
@@ -252,6 +255,7 @@ int run_eval_run(const EvalOptions& options, const Common& common) {
   document["extractor"] = {{"joint_error_mm", 1e3 * joints},
                            {"tpose_joint_error_mm", 1e3 * tposes}};
   document["seed"] = common.seed;
+  document["anchor"] = options.anchor;
   print_json(document);
   return 0;
 }
@@ -358,6 +362,8 @@ void add_eval(Program& program) {
   app.add_option("RUN", options->run, "run=RUN_DIR: the trained system on its held-out data");
   app.add_option("--out", options->out,
                  "with run=: folder for the table and the files of one sequence");
+  app.add_option("--anchor", options->anchor,
+                 "with run=: as in 'restage retarget'; 0: the papers' sum of velocities");
   app.add_option("--pred", options->pred, "predicted /joints and /vertices (HDF5)");
   app.add_option("--truth", options->truth, "true /joints and /vertices (HDF5)");
   app.add_option("--source", options->source, "joints of the source, for the references");

@@ -94,8 +94,6 @@ void check(const RetargetCommand& c) {
     throw InputError("", "--fps is out of range", "give the source's frames per second, 1 to 1000");
   if (c.samples < 1 || c.samples > 256)
     throw InputError("", "--samples is out of range", "give 1 to 256");
-  if (!(c.anchor >= 0 && c.anchor <= 1e6))
-    throw InputError("", "--anchor is out of range", "give seconds, or 0 for none");
   const auto dot = c.out.find_last_of('.');
   const auto slash = c.out.find_last_of('/');
   const bool extension = dot != std::string::npos && (slash == std::string::npos || dot > slash) &&

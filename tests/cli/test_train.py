@@ -38,6 +38,22 @@ class Train(CliTest):
 
 
 class Runs(Train):
+    def test_a_run_is_judged_on_its_held_out_data(self):
+        run = self.train("tiny.yaml", "data.bodies.test=2", "evaluation.sequences=2", "evaluation.frames=20")
+        held = self.json("eval", "run=" + run, "--out", "judged")
+        summed = self.json("eval", "run=" + run, "--anchor", 0)
+        self.assertEqual((held["anchor"], summed["anchor"], len(held["sequences"])), (0.25, 0, 2))
+        for found in (held, held["true_skeletons"]):
+            self.assertEqual(sorted(found["references"]), ["closed_form", "rest_pose", "source_unchanged"])
+            self.assertLess(found["references"]["closed_form"]["mpjpe"], found["mean"]["mpjpe"], "ten steps of training")
+        # The anchor moves the path and nothing else.
+        self.assertAlmostEqual(held["mean"]["pa_mpjpe"], summed["mean"]["pa_mpjpe"], 6)
+        self.assertNotAlmostEqual(held["mean"]["mpjpe"], summed["mean"]["mpjpe"], 3)
+        self.assertIn("within 0.25 s", self.bytes("judged/metrics.md").decode())
+        self.assertEqual(sorted(os.listdir(self.path("judged"))), ["metrics.md", "rest.h5", "source.h5", "target.ply", "truth.h5"])
+        self.bad_input(["eval", "run=" + run, "--anchor", "-1"], "--anchor")
+        self.bad_input(["eval", "run=nowhere"], "nowhere")
+
     def test_run_directory(self):
         result = self.restage("train", "tiny.yaml", "seed=5", "deformation.optimiser.steps=6")
         self.assertEqual(result.code, 0, result.err)
