@@ -86,13 +86,8 @@ std::vector<std::string> File::children(const std::string& group) const {
     throw InputError(where, "is missing", "give a file that has it");
   const Handle id(H5Gopen2(state_->id, group.c_str(), H5P_DEFAULT), H5Gclose);
   if (id < 0) throw InputError(where, "is not a group", "give a file of the documented schema");
-  const Handle creation(H5Gget_create_plist(id), H5Pclose);
-  unsigned order = 0;
-  H5Pget_link_creation_order(creation, &order);
   std::vector<std::string> names;
-  hsize_t next = 0;
-  const H5_index_t index = (order & H5P_CRT_ORDER_INDEXED) ? H5_INDEX_CRT_ORDER : H5_INDEX_NAME;
-  if (H5Literate(id, index, H5_ITER_INC, &next, collect_name, &names) < 0)
+  if (H5Literate(id, order_of(id), H5_ITER_INC, nullptr, collect_name, &names) < 0)
     throw InputError(where, "is damaged", "copy or make the file again");
   return names;
 }
@@ -127,8 +122,7 @@ std::optional<double> File::number(const std::string& object, const std::string&
   const Lock lock;
   const Attribute attribute = open_attribute(*state_, object, name);
   if (attribute.id < 0) return std::nullopt;
-  const H5T_class_t kind = H5Tget_class(attribute.type);
-  if (kind != H5T_FLOAT && kind != H5T_INTEGER)
+  if (classify(attribute.type, attribute.where) == Type::text)
     throw InputError(attribute.where, "is not a number", "store a number");
   double value = 0;
   if (H5Aread(attribute.id, H5T_NATIVE_DOUBLE, &value) < 0) throw_damaged(attribute.where);
@@ -139,7 +133,7 @@ std::optional<int64_t> File::integer(const std::string& object, const std::strin
   const Lock lock;
   const Attribute attribute = open_attribute(*state_, object, name);
   if (attribute.id < 0) return std::nullopt;
-  if (H5Tget_class(attribute.type) != H5T_INTEGER)
+  if (classify(attribute.type, attribute.where) != Type::integer)
     throw InputError(attribute.where, "is not an integer", "store an integer");
   int64_t value = 0;
   if (H5Aread(attribute.id, H5T_NATIVE_INT64, &value) < 0) throw_damaged(attribute.where);

@@ -1,7 +1,9 @@
 #include "datasets/hdf5/detail.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <cstring>
+#include <initializer_list>
 
 #include "autograd/base/error.h"
 
@@ -26,6 +28,19 @@ herr_t find_errno(unsigned, const H5E_error2_t* entry, void* out) {
   return 0;
 }
 
+/// numpy's float16, which the library has no name for.
+Handle half_type() {
+  Handle half(H5Tcopy(H5T_IEEE_F32LE), H5Tclose);
+  H5Tset_fields(half, 15, 10, 5, 0, 10);
+  H5Tset_size(half, 2);
+  H5Tset_ebias(half, 15);
+  return half;
+}
+
+bool is_one_of(hid_t type, std::initializer_list<hid_t> known) {
+  return std::any_of(known.begin(), known.end(), [&](hid_t k) { return H5Tequal(type, k) > 0; });
+}
+
 }  // namespace
 
 Lock::Lock() : lock_(library_mutex()) { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
@@ -38,6 +53,12 @@ File::State::~State() {
 
 std::string File::State::where(const std::string& name) const {
   return path + ":" + (name.empty() || name[0] != '/' ? "/" : "") + printable(name);
+}
+
+Handle file_access() {
+  Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  H5Pset_fclose_degree(access, H5F_CLOSE_STRONG);
+  return access;
 }
 
 std::string printable(const std::string& name) {
@@ -53,6 +74,35 @@ void throw_write_error(const std::string& path) {
   throw WorkError(path + ": could not be written (" +
                   (code == 0 ? "HDF5 failed" : std::strerror(code)) +
                   "); free some space and run it again");
+}
+
+bool is_wide_integer(hid_t type) {
+  return is_one_of(type, {H5T_STD_I64LE, H5T_STD_I64BE, H5T_STD_U64LE, H5T_STD_U64BE, H5T_STD_U32LE,
+                          H5T_STD_U32BE});
+}
+
+Type classify(hid_t type, const std::string& where) {
+  const H5T_class_t kind = H5Tget_class(type);
+  if (kind == H5T_STRING) return Type::text;
+  if (kind == H5T_FLOAT &&
+      (is_one_of(type, {H5T_IEEE_F32LE, H5T_IEEE_F32BE, H5T_IEEE_F64LE, H5T_IEEE_F64BE}) ||
+       H5Tequal(type, half_type()) > 0))
+    return Type::floating;
+  if (kind == H5T_INTEGER &&
+      (is_wide_integer(type) ||
+       is_one_of(type,
+                 {H5T_STD_I8LE, H5T_STD_I8BE, H5T_STD_U8LE, H5T_STD_U8BE, H5T_STD_I16LE,
+                  H5T_STD_I16BE, H5T_STD_U16LE, H5T_STD_U16BE, H5T_STD_I32LE, H5T_STD_I32BE})))
+    return Type::integer;
+  throw InputError(where, "holds neither plain numbers nor text",
+                   "store float32, float64 or integers of 8 to 64 bits");
+}
+
+H5_index_t order_of(hid_t group) {
+  const Handle creation(H5Gget_create_plist(group), H5Pclose);
+  unsigned order = 0;
+  H5Pget_link_creation_order(creation, &order);
+  return (order & H5P_CRT_ORDER_INDEXED) ? H5_INDEX_CRT_ORDER : H5_INDEX_NAME;
 }
 
 bool link_exists(const File::State& state, const std::string& name) {

@@ -52,10 +52,20 @@ struct File::State {
   std::string where(const std::string& name) const;
 };
 
+/// How every file is opened: closing it closes all that is in it. (A file that is open already can
+/// only be opened again in the same way.)
+Handle file_access();
 /// A name from a file, made fit for a one-line message.
 std::string printable(const std::string& name);
 /// WorkError with the system's reason (disk full) from the library's error stack.
 [[noreturn]] void throw_write_error(const std::string& path);
+/// What a file's type holds. InputError but for plain machine types and text: odd bit layouts exist
+/// in no honest file, and converting them is where the library has been attacked.
+Type classify(hid_t type, const std::string& where);
+/// Whether not every value fits an int32_t.
+bool is_wide_integer(hid_t type);
+/// How a group's members are listed: as they were made, if the file knows, else by name.
+H5_index_t order_of(hid_t group);
 /// Whether every part of the path is there. InputError for links into other files.
 bool link_exists(const File::State& state, const std::string& name);
 

@@ -31,42 +31,6 @@ hid_t memory_type() {
   if constexpr (std::is_same_v<T, uint8_t>) return H5T_NATIVE_UINT8;
 }
 
-/// numpy's float16, which the library has no name for.
-Handle half_type() {
-  Handle half(H5Tcopy(H5T_IEEE_F32LE), H5Tclose);
-  H5Tset_fields(half, 15, 10, 5, 0, 10);
-  H5Tset_size(half, 2);
-  H5Tset_ebias(half, 15);
-  return half;
-}
-
-bool is_one_of(hid_t type, std::initializer_list<hid_t> known) {
-  return std::any_of(known.begin(), known.end(), [&](hid_t k) { return H5Tequal(type, k) > 0; });
-}
-
-bool is_wide_integer(hid_t type) {
-  return is_one_of(type, {H5T_STD_I64LE, H5T_STD_I64BE, H5T_STD_U64LE, H5T_STD_U64BE, H5T_STD_U32LE,
-                          H5T_STD_U32BE});
-}
-
-/// Only plain machine types: odd bit layouts exist in no honest file.
-Type classify(hid_t type, const std::string& where) {
-  const H5T_class_t kind = H5Tget_class(type);
-  if (kind == H5T_STRING) return Type::text;
-  if (kind == H5T_FLOAT &&
-      (is_one_of(type, {H5T_IEEE_F32LE, H5T_IEEE_F32BE, H5T_IEEE_F64LE, H5T_IEEE_F64BE}) ||
-       H5Tequal(type, half_type()) > 0))
-    return Type::floating;
-  if (kind == H5T_INTEGER &&
-      (is_wide_integer(type) ||
-       is_one_of(type,
-                 {H5T_STD_I8LE, H5T_STD_I8BE, H5T_STD_U8LE, H5T_STD_U8BE, H5T_STD_I16LE,
-                  H5T_STD_I16BE, H5T_STD_U16LE, H5T_STD_U16BE, H5T_STD_I32LE, H5T_STD_I32BE})))
-    return Type::integer;
-  throw InputError(where, "holds neither plain numbers nor text",
-                   "store float32, float64 or integers of 8 to 64 bits");
-}
-
 /// Only filters of our own files: others are rare, or plug-ins, or known to trip on damaged data.
 void check_filters(hid_t properties, const std::string& where) {
   const int n = H5Pget_nfilters(properties);
@@ -118,7 +82,7 @@ Shape extent_of(hid_t space, const std::string& where) {
 }
 
 void check_probe(Probe probed, const std::string& path) {
-  if (probed == Probe::crashed)
+  if (probed == Probe::damaged)
     throw InputError(path, "is an HDF5 file, but damaged, cut short or still being written",
                      "copy or make the file again");
   if (probed == Probe::memory)
@@ -303,13 +267,12 @@ File File::open(const std::string& path) {
   if (!S_ISREG(info.st_mode)) throw InputError(path, "is not a file", "give an HDF5 file");
   const Lock lock;
   auto state = std::make_unique<State>(path);
-  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-  H5Pset_fclose_degree(access, H5F_CLOSE_STRONG);
+  const Handle access = file_access();
   if (H5Fis_hdf5(path.c_str()) <= 0)
     throw InputError(path, "is not an HDF5 file", "give an HDF5 file (.h5)");
   check_probe(probe(path), path);
   state->id = H5Fopen(path.c_str(), H5F_ACC_RDONLY, access);
-  if (state->id < 0) check_probe(Probe::crashed, path);
+  if (state->id < 0) check_probe(Probe::damaged, path);
   return File(std::move(state));
 }
 
@@ -317,8 +280,7 @@ File File::create(const std::string& path) {
   const Lock lock;
   auto state = std::make_unique<State>(path);
   state->target = std::make_unique<AtomicFile>(path);
-  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-  H5Pset_fclose_degree(access, H5F_CLOSE_STRONG);
+  const Handle access = file_access();
   // The newest layout has checksums over its structure too; no times, so equal content is equal
   // bytes.
   H5Pset_libver_bounds(access, H5F_LIBVER_V110, H5F_LIBVER_V110);

@@ -28,14 +28,14 @@ namespace {
 // A damaged file can also make the library loop for ever. Of processor time, with as much again for
 // every 100 MB of the file; the clock may go on ten times as long.
 constexpr rlim_t kCpuSeconds = 10;
-constexpr int kShortOfMemory = 3;                  // the child's exit code
+constexpr int kShortOfMemory = 3, kDamaged = 4;    // the child's exit codes
 constexpr hsize_t kReadWhole = hsize_t{64} << 20;  // bytes; larger data sets: first and last row
 constexpr hsize_t kReadInAll = hsize_t{256}
                                << 20;  // of values unpacked; after that, structure only
 
 hsize_t bytes_read = 0;  // by this child
 
-bool short_of_memory = false;
+bool short_of_memory = false, damaged = false;
 
 herr_t find_shortage(unsigned, const H5E_error2_t* entry, void*) {
   short_of_memory =
@@ -49,6 +49,13 @@ template <class Result>
 Result tried(Result result) {
   if (result < 0) H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, find_shortage, nullptr);
   return result;
+}
+
+/// For what must not fail in any sound file, whatever is in it.
+template <class Result>
+Result needed(Result result) {
+  damaged = damaged || result < 0;
+  return tried(result);
 }
 
 /// Memory for values that nobody looks at.
@@ -96,7 +103,9 @@ void read_dataset(hid_t set) {
       creation(H5Dget_create_plist(set), H5Pclose);
   hsize_t dims[H5S_MAX_RANK] = {};
   const int rank = H5Sget_simple_extent_dims(space, dims, nullptr);
-  if (type < 0 || rank < 0 || H5Pget_external_count(creation) > 0) return;
+  if (type < 0 || rank < 0 || H5Pget_external_count(creation) > 0 ||
+      H5Pget_layout(creation) == H5D_VIRTUAL)
+    return;                  // values of other files are never read
   H5Dget_storage_size(set);  // walks the whole index of chunks
   if (bytes_read > kReadInAll) return;
   hsize_t bytes = H5Tget_size(type);
@@ -124,11 +133,15 @@ herr_t read_attribute(hid_t object, const char* name, const H5A_info_t*, void*) 
   return 0;
 }
 
+herr_t pass_by(hid_t, const char*, const H5L_info_t*, void*) { return 0; }
+
 herr_t read_object(hid_t root, const char* name, const H5O_info_t*, void*) {
-  const Handle object(tried(H5Oopen(root, name, H5P_DEFAULT)), H5Oclose);
+  const Handle object(needed(H5Oopen(root, name, H5P_DEFAULT)), H5Oclose);
   if (object < 0) return 0;
-  tried(H5Aiterate2(object, H5_INDEX_NAME, H5_ITER_NATIVE, nullptr, read_attribute, nullptr));
+  needed(H5Aiterate2(object, H5_INDEX_NAME, H5_ITER_NATIVE, nullptr, read_attribute, nullptr));
   if (H5Iget_type(object) == H5I_DATASET) read_dataset(object);
+  if (H5Iget_type(object) == H5I_GROUP)
+    needed(H5Literate(object, order_of(object), H5_ITER_INC, nullptr, pass_by, nullptr));
   return 0;
 }
 
@@ -157,19 +170,19 @@ void limit(decltype(RLIMIT_AS) what, rlim_t soft, rlim_t hard) {
   if (const rlim_t used = address_space(); used > 0)
     limit(RLIMIT_AS, used + kProbeMemory, used + kProbeMemory);
   ::alarm(static_cast<unsigned>(10 * seconds));
-  const hid_t file = tried(H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT));
-  if (file >= 0) tried(H5Ovisit(file, H5_INDEX_NAME, H5_ITER_NATIVE, read_object, nullptr));
-  // Any other error that the library reports is no crash: the parent will see it too.
-  ::_exit(short_of_memory ? kShortOfMemory : 0);
+  const hid_t file = needed(H5Fopen(path, H5F_ACC_RDONLY, file_access()));
+  if (file >= 0) needed(H5Ovisit(file, H5_INDEX_NAME, H5_ITER_NATIVE, read_object, nullptr));
+  // Values that could not be read stop nothing: the parent gets the same answer, if it asks.
+  ::_exit(short_of_memory ? kShortOfMemory : damaged ? kDamaged : 0);
 }
 
 Probe outcome(int status) {
   if (WIFEXITED(status))
     return WEXITSTATUS(status) == 0                ? Probe::good
            : WEXITSTATUS(status) == kShortOfMemory ? Probe::memory
-                                                   : Probe::crashed;
+                                                   : Probe::damaged;
   const int signal = WTERMSIG(status);
-  return signal == SIGXCPU || signal == SIGALRM ? Probe::time : Probe::crashed;
+  return signal == SIGXCPU || signal == SIGALRM ? Probe::time : Probe::damaged;
 }
 
 /// What tells one state of a file from another.

@@ -7,7 +7,7 @@ namespace restage::h5 {
 
 enum class Probe {
   good,
-  crashed,  ///< the library fell over, as it does on damaged structure
+  damaged,  ///< the library fell over, or could not walk through all of the structure
   memory,   ///< it asked for more than kProbeMemory
   time,     ///< it found no end
 };
@@ -18,9 +18,10 @@ inline constexpr unsigned long kProbeMemory = 1ul << 30;
 
 /// The library trusts what a file says of itself: a damaged or hostile one can crash the process
 /// that reads it, fill its memory, or keep it busy for ever. So a child process reads it first,
-/// every object and attribute and up to 256 MiB of values (of large data sets the ends), with
-/// limits on memory and time. A file that passed is not read again while its size and times stay.
-/// Call it under the Lock. WorkError: no process to be had.
+/// every group, object and attribute and up to 256 MiB of values (of large data sets the ends),
+/// with limits on memory and time. What it could not walk to its end is refused whole: behind the
+/// place where it stopped, nothing is known. A file that passed is not read again while its size
+/// and times stay. Call it under the Lock. WorkError: no process to be had.
 Probe probe(const std::string& path);
 
 }  // namespace restage::h5

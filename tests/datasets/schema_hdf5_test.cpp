@@ -11,6 +11,7 @@
 #include "autograd/base/error.h"
 #include "datasets/hdf5/file.h"
 #include "tests/datasets/schema_support.h"
+#include "tests/fuzz/old_layout.h"
 
 namespace restage {
 namespace {
@@ -183,6 +184,11 @@ TEST(SchemaHdf5, RefusesClaimsThatTheFileCannotKeep) {
     H5Tinsert(odd, "a", 0, H5T_NATIVE_DOUBLE);
     raw.add("/compound", odd, {2}, {});
     H5Tclose(odd);
+    const hid_t bits = H5Tcopy(H5T_STD_I32LE), one = H5Screate(H5S_SCALAR);
+    H5Tset_precision(bits, 13);
+    H5Aclose(H5Acreate2(raw.id(), "bits", bits, one, H5P_DEFAULT, H5P_DEFAULT));
+    H5Sclose(one);
+    H5Tclose(bits);
     H5Lcreate_external("other.h5", "/x", raw.id(), "/link", H5P_DEFAULT, H5P_DEFAULT);
     H5Lcreate_soft("/nowhere", raw.id(), "/soft", H5P_DEFAULT, H5P_DEFAULT);
   }
@@ -196,9 +202,30 @@ TEST(SchemaHdf5, RefusesClaimsThatTheFileCannotKeep) {
   EXPECT_NE(refusal("/chunk").find("chunks of impossible size"), std::string::npos);
   EXPECT_NE(refusal("/packed").find("compressed by filter 5"), std::string::npos);
   EXPECT_NE(refusal("/compound").find("neither plain numbers nor text"), std::string::npos);
+  EXPECT_NE(error_of([&] { file.number("/", "bits"); }).find("neither plain numbers nor text"),
+            std::string::npos);
   EXPECT_NE(refusal("/link").find("link into another file"), std::string::npos);
   EXPECT_NE(refusal("/soft").find("is missing"), std::string::npos);
   EXPECT_EQ(file.read<double>("/small", {4, 3}), std::vector<double>(12, 0.0));
+}
+
+/// The root group says that its names are nowhere: the first look for one is refused in order, and
+/// the second crashes the library. (libFuzzer's finding, cut down.)
+TEST(SchemaHdf5, AFileThatCannotBeWalkedToItsEndIsRefusedWhole) {
+  const TempDir dir;
+  const std::string path = dir / "old.h5";
+  test::write_old_layout(path);
+  EXPECT_EQ(h5::File::open(path).children(), std::vector<std::string>{"joints"});
+  std::string bytes = test::bytes_of(path);
+  ASSERT_EQ(bytes.substr(136, 4), "TREE") << "the library lays the file out in another way";
+  bytes.replace(128, 8, 8, '\xff');  // the address of the names
+  bytes[143] = '\xff';               // and how many there are
+  test::write_bytes(path, bytes);
+  EXPECT_NE(error_of([&] {
+              const h5::File file = h5::File::open(path);
+              for (int i = 0; i < 2; ++i) file.has("/joints");
+            }).find("damaged, cut short"),
+            std::string::npos);
 }
 
 /// AddressSanitizer ends a process whose allocation fails.
