@@ -52,7 +52,7 @@ ONLY_IN = {
     "CLI/": ["experiments/"],
     "nanoflann.hpp": ["nn/metrics/", "datasets/doctor/", "infer/registration/"],
     "nlohmann/": ["nn/weights/", "datasets/readers/", "datasets/benchmark/manifest.cpp",
-                  "datasets/importers/makehuman_pack.cpp", "train/", "infer/",
+                  "datasets/importers/makehuman_pack.cpp", "datasets/fetch/fetch_cmu.cpp", "train/", "infer/",
                   "experiments/"],
     "openssl/": ["datasets/benchmark/sha256.cpp"],
     "stb/": ["infer/render/"],

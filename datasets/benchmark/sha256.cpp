@@ -10,34 +10,50 @@
 
 namespace restage {
 
-struct Sha256::State {
-  EVP_MD_CTX* context = EVP_MD_CTX_new();
-  ~State() { EVP_MD_CTX_free(context); }
-  void check(int good) const {
-    if (good != 1) throw WorkError("SHA-256 cannot be computed: OpenSSL refuses it");
-  }
-};
+namespace {
 
-Sha256::Sha256() : state_(std::make_unique<State>()) {
-  state_->check(state_->context != nullptr &&
-                EVP_DigestInit_ex(state_->context, EVP_sha256(), nullptr));
-}
-Sha256::~Sha256() = default;
-
-void Sha256::add(std::string_view bytes) {
-  state_->check(EVP_DigestUpdate(state_->context, bytes.data(), bytes.size()));
+void check(int good) {
+  if (good != 1) throw WorkError("a checksum cannot be computed: OpenSSL refuses it");
 }
 
-std::string Sha256::hex() {
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
-  unsigned length = 0;
-  state_->check(EVP_DigestFinal_ex(state_->context, digest.data(), &length));
+std::string hex_of(const unsigned char* digest, unsigned length) {
   std::string out;
   for (unsigned i = 0; i < length; ++i) {
     out += "0123456789abcdef"[digest[i] >> 4];
     out += "0123456789abcdef"[digest[i] & 15];
   }
   return out;
+}
+
+}  // namespace
+
+struct Sha256::State {
+  EVP_MD_CTX* context = EVP_MD_CTX_new();
+  ~State() { EVP_MD_CTX_free(context); }
+};
+
+Sha256::Sha256() : state_(std::make_unique<State>()) {
+  check(state_->context != nullptr && EVP_DigestInit_ex(state_->context, EVP_sha256(), nullptr));
+}
+Sha256::Sha256(Sha256&&) noexcept = default;
+Sha256::~Sha256() = default;
+
+void Sha256::add(std::string_view bytes) {
+  check(EVP_DigestUpdate(state_->context, bytes.data(), bytes.size()));
+}
+
+std::string Sha256::hex() {
+  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
+  unsigned length = 0;
+  check(EVP_DigestFinal_ex(state_->context, digest.data(), &length));
+  return hex_of(digest.data(), length);
+}
+
+std::string sha1(std::string_view bytes) {
+  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
+  unsigned length = 0;
+  check(EVP_Digest(bytes.data(), bytes.size(), digest.data(), &length, EVP_sha1(), nullptr));
+  return hex_of(digest.data(), length);
 }
 
 std::string sha256(std::string_view bytes) {

@@ -1,4 +1,4 @@
-// SHA-256, by OpenSSL: the only place that knows it.
+// SHA-256 (and git's SHA-1), by OpenSSL: the only place that knows it.
 #pragma once
 
 #include <memory>
@@ -11,6 +11,7 @@ namespace restage {
 class Sha256 {
  public:
   Sha256();
+  Sha256(Sha256&&) noexcept;
   ~Sha256();
   void add(std::string_view bytes);
   std::string hex();  ///< 64 digits; ends the sum
@@ -21,6 +22,8 @@ class Sha256 {
 };
 
 std::string sha256(std::string_view bytes);
+/// 40 digits; only for what git names by it.
+std::string sha1(std::string_view bytes);
 /// Of a file, in constant memory. InputError if it cannot be read.
 std::string sha256_of_file(const std::string& path);
 

@@ -16,6 +16,7 @@
 #include "autograd/base/log.h"
 #include "datasets/benchmark/sha256.h"
 #include "datasets/fetch/download.h"
+#include "datasets/fetch/fetch_cmu.h"
 #include "datasets/importers/makehuman_pack.h"
 
 namespace restage {
@@ -24,7 +25,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr uint64_t kMostList = uint64_t{16} << 20;
-constexpr std::string_view kPacked = "makehuman:";
+constexpr std::string_view kMakehuman = "makehuman:",
+                           kCmu = "cmu:";             // packed from the files of a list
 constexpr uint64_t kMostPacked = uint64_t{64} << 20;  // of files that are packed here
 
 bool is_inside(const std::string& name) {
@@ -115,6 +117,18 @@ void copy_in(const std::string& source, const std::string& target) {
   file.commit();
 }
 
+/// Where a file of an address without protocol lies: beside the list.
+std::string beside(const std::string& list, const std::string& address) {
+  return (fs::path(list).parent_path() / address).string();
+}
+
+/// Whether the file `path` is what the entry of `list` means; clips may have been packed by anyone.
+bool is_right(const FetchEntry& e, const std::string& path, const std::string& list) {
+  return is_right(e, path, packed_here(e)) ||
+         (e.address.starts_with(kCmu) && fs::is_regular_file(path) &&
+          is_packed_cmu(read_cmu_originals(beside(list, e.address.substr(kCmu.size()))), path));
+}
+
 /// From an address into its place.
 void bring(const FetchEntry& e, const std::string& target) {
   const std::string part = target + ".part";
@@ -134,18 +148,26 @@ void bring(const FetchEntry& e, const std::string& target) {
   if (none) throw WorkError(target + ": cannot be put in place; check permissions");
 }
 
-/// Where a file of an address without protocol lies: beside the list.
-std::string beside(const std::string& list, const std::string& address) {
-  return (fs::path(list).parent_path() / address).string();
-}
-
-bool fetch_and_pack(const std::string& parts, const std::string& out, const std::string& from,
-                    const std::string& target) {
+bool fetch_makehuman(const std::string& parts, const std::string& out, const std::string& from,
+                     const std::string& target) {
   for (const FetchEntry& e : read_fetch_list(parts))
-    if (e.address.starts_with(kPacked))
+    if (e.address.starts_with(kMakehuman) || e.address.starts_with(kCmu))
       throw InputError(parts, "lists a file that is packed from others again", "mend the list");
   if (!fetch_data(parts, out, from).missing.empty()) return false;
   pack_makehuman(out + "/body/makehuman", target);
+  return true;
+}
+
+bool fetch_cmu(const std::string& list, const std::string& out, const std::string& from,
+               const std::string& target) {
+  const CmuOriginals originals = read_cmu_originals(list);
+  const std::string folder = from.empty() ? out + "/cmu/originals" : from;
+  if (from.empty())
+    fetch_cmu_originals(originals, folder);
+  else if (!has_cmu_originals(originals, folder))
+    return false;
+  log_info("packing " + std::to_string(originals.clips.size()) + " clips");
+  pack_cmu(originals, folder, target);
   return true;
 }
 
@@ -154,11 +176,14 @@ bool fetch_one(const FetchEntry& e, const std::string& list, const std::string& 
                const std::string& out) {
   const std::string target = out + "/" + e.path, copy = from + "/" + e.path;
   const bool remote = e.address.find("://") != std::string::npos;
-  const bool packed = e.address.starts_with(kPacked), copied = !from.empty() && fs::exists(copy);
-  if (copied && is_right(e, copy, packed_here(e))) {
+  const bool makehuman = e.address.starts_with(kMakehuman), cmu = e.address.starts_with(kCmu);
+  const bool copied = !from.empty() && fs::exists(copy);
+  if (copied && is_right(e, copy, list)) {
     copy_in(copy, target);
-  } else if (packed) {  // a copy that was packed elsewhere may differ, its parts do not
-    return fetch_and_pack(beside(list, e.address.substr(kPacked.size())), out, from, target);
+  } else if (makehuman) {  // a copy that was packed elsewhere may differ, its parts do not
+    return fetch_makehuman(beside(list, e.address.substr(kMakehuman.size())), out, from, target);
+  } else if (cmu) {
+    return fetch_cmu(beside(list, e.address.substr(kCmu.size())), out, from, target);
   } else if (copied) {
     throw InputError(copy, "is not the file that the list pins",
                      "give a folder with the right one");
@@ -212,7 +237,7 @@ FetchSummary fetch_data(const std::string& list, const std::string& out, const s
   for (const FetchEntry& e : entries) {
     throw_if_stopped();
     const std::string target = out + "/" + e.path;
-    if (is_right(e, target, packed_here(e))) {
+    if (is_right(e, target, list)) {
       ++summary.present;
       continue;
     }

@@ -16,7 +16,8 @@ struct FetchEntry {
   std::string path;     ///< in the data folder; ends in .gz, but `address` does not: packed here,
                         ///< and sum and bytes are those of what is inside
   std::string address;  ///< https://, file://, a file beside the list, "-": none, or
-                        ///< "makehuman:LIST": packed from the files of that list (pack_makehuman)
+                        ///< packed from the files of a list: "makehuman:LIST" (pack_makehuman),
+                        ///< "cmu:LIST" (pack_cmu)
 };
 
 /// InputError file:line for what is no entry, a path out of the folder, or a path given twice.

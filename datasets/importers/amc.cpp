@@ -4,7 +4,6 @@
 #include <filesystem>
 
 #include "autograd/base/error.h"
-#include "datasets/readers/asf.h"
 #include "datasets/readers/packed_text.h"
 #include "datasets/readers/word_lines.h"
 
@@ -33,6 +32,19 @@ std::string find_asf(const std::string& amc_path) {
   return best;
 }
 
+SourceMotion amc_motion(const AsfFile& asf, AmcFile amc) {
+  SourceMotion out;
+  out.fps = kAmcFps;
+  out.skeleton = asf_skeleton(asf);
+  out.moving = {0};
+  for (std::vector<double>& values : amc.frames) {
+    std::vector<Vec3>& position = out.position.emplace_back(1);
+    out.local.push_back(asf_pose(asf, values, amc.radians, position[0]));
+    values = {};
+  }
+  return out;
+}
+
 MotionClip convert_amc(std::string_view text, const std::string& path, std::string_view asf_text,
                        const std::string& asf_path, const MotionOptions& options) {
   const AsfFile asf = parse_asf(asf_text, asf_path);
@@ -45,16 +57,8 @@ MotionClip convert_amc(std::string_view text, const std::string& path, std::stri
   recording.rate_of_file = "AMC files say none, the CMU set is 120 fps";
   recording.rate_known = false;
   if (asf.length_unit > 0) recording.metres_per_unit = 0.0254 / asf.length_unit;
-  SourceMotion& motion = recording.motion;
-  motion.fps = kAmcFps;
-  motion.skeleton = asf_skeleton(asf);
-  motion.moving = {0};
-  for (std::vector<double>& values : amc.frames) {
-    std::vector<Vec3>& position = motion.position.emplace_back(1);
-    motion.local.push_back(asf_pose(asf, values, amc.radians, position[0]));
-    values = {};
-  }
-  recording.names = name_joints(motion.skeleton, asf_path, profile ? &*profile : nullptr);
+  recording.motion = amc_motion(asf, std::move(amc));
+  recording.names = name_joints(recording.motion.skeleton, asf_path, profile ? &*profile : nullptr);
   MotionOptions with_subject = options;
   if (options.subject.empty()) with_subject.subject = stem_of(asf_path);
   return make_clip(std::move(recording), path, with_subject);

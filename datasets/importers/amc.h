@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "datasets/importers/motion_clip.h"
+#include "datasets/readers/asf.h"
 
 namespace restage {
 
@@ -17,6 +18,10 @@ MotionClip read_amc(const std::string& path, const std::string& asf = "",
 /// The same from texts; the paths are for messages and the id.
 MotionClip convert_amc(std::string_view amc, const std::string& path, std::string_view asf,
                        const std::string& asf_path, const MotionOptions& options = {});
+
+/// Rotations of all bones and the root's translation, in the file's units. Takes the frames as it
+/// goes.
+SourceMotion amc_motion(const AsfFile& asf, AmcFile amc);
 
 /// The skeleton beside a recording: of the .asf files of its folder the one with the longest name
 /// that the recording's begins with (07_01.amc: 07.asf), else the only one. InputError: none.

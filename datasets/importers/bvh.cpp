@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstdio>
 
-#include "datasets/readers/bvh.h"
 #include "datasets/readers/packed_text.h"
 
 namespace restage {
@@ -15,9 +14,9 @@ double frame_rate(double frame_time) {
   return std::abs(fps / std::round(fps) - 1.0) < 5e-4 ? std::round(fps) : fps;
 }
 
-/// Rotations of all joints, translations of those down to `hips`. Takes the file's frames as it
-/// goes, so that they are in memory only once.
-SourceMotion motion_of(BvhFile file, int hips) {
+}  // namespace
+
+SourceMotion bvh_motion(BvhFile file, int hips) {
   SourceMotion out;
   out.fps = frame_rate(file.frame_time);
   std::vector<uint8_t> moves(file.skeleton.size(), 0);
@@ -48,8 +47,6 @@ SourceMotion motion_of(BvhFile file, int hips) {
   return out;
 }
 
-}  // namespace
-
 MotionClip convert_bvh(std::string_view text, const std::string& path,
                        const MotionOptions& options) {
   BvhFile file = parse_bvh(text, path);
@@ -64,7 +61,7 @@ MotionClip convert_bvh(std::string_view text, const std::string& path,
   check_length(file.frames.size(), file.skeleton.size(), frame_rate(file.frame_time), text.size(),
                path);
   const int hips = recording.names.map[0].joint;
-  recording.motion = motion_of(std::move(file), hips);
+  recording.motion = bvh_motion(std::move(file), hips);
   return make_clip(std::move(recording), path, options);
 }
 

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "datasets/importers/motion_clip.h"
+#include "datasets/readers/bvh.h"
 
 namespace restage {
 
@@ -14,5 +15,9 @@ MotionClip read_bvh(const std::string& path, const MotionOptions& options = {});
 /// The same from text; `path` is for messages and the id.
 MotionClip convert_bvh(std::string_view text, const std::string& path,
                        const MotionOptions& options = {});
+
+/// Rotations of all joints, translations of those from the root down to `hips`, in the file's units.
+/// Takes the file's frames as it goes, so that they are in memory only once.
+SourceMotion bvh_motion(BvhFile file, int hips);
 
 }  // namespace restage

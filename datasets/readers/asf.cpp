@@ -180,7 +180,8 @@ class AsfParser {
     const double norm = bone.direction.norm();
     if (!(norm > 1e-9) || !(bone.length >= 0))
       lines_.fail("bone " + bone.name + " has no direction or no length", "give it both");
-    bone.direction /= norm;
+    // Written with six digits, a direction is never quite of unit length; others take it as it is.
+    if (std::abs(norm - 1) > 1e-4) bone.direction /= norm;
     if (!index_.emplace(bone.name, static_cast<int>(asf_.bones.size()) - 1).second ||
         bone.name == "root")
       lines_.fail("two bones are called " + bone.name, "give each its own name");

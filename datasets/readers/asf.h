@@ -15,7 +15,7 @@ namespace restage {
 struct AsfBone {
   std::string name;
   int parent = -1;                ///< a bone that comes before; bone 0 is the root
-  Vec3 direction = Vec3::Zero();  ///< from its start to its end, zero pose, unit length
+  Vec3 direction = Vec3::Zero();  ///< from its start to its end, zero pose; of length 1 within 1e-4
   double length = 0;              ///< file units
   Quat axis = Quat::Identity();   ///< its own frame against the world's
   /// Freedoms in the order of their values; rotations are about the axes of its own frame, the

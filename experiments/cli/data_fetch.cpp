@@ -43,7 +43,9 @@ void add_data_fetch(Program& program, CLI::App& group) {
                   [o, &program] { return run_fetch(*o, program.common()); });
   app.add_option("LIST", o->list, "lines 'SHA256 BYTES PATH ADDRESS' (default: " + o->list + ")");
   app.add_option("--out", o->out, "data folder to fill")->required();
-  app.add_option("--from", o->from, "folder laid out alike to copy from, instead of the network");
+  app.add_option("--from", o->from,
+                 "folder laid out alike to copy from, instead of the network; CMU's recordings may "
+                 "lie anywhere in it");
 }
 
 }  // namespace restage::cli

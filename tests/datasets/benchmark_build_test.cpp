@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 #include <zlib.h>
 
-#include <cstdlib>
 #include <map>
 #include <set>
 
@@ -13,9 +12,11 @@
 #include "datasets/benchmark/sha256.h"
 #include "datasets/fetch/fetch.h"
 #include "datasets/hdf5/file.h"
+#include "datasets/importers/cmu_pack.h"
 #include "datasets/importers/makehuman_pack.h"
 #include "datasets/schema.h"
 #include "tests/datasets/schema_support.h"
+#include "tests/support/data_folder.h"
 
 namespace restage {
 namespace {
@@ -24,15 +25,6 @@ namespace fs = std::filesystem;
 using test::bytes_of;
 using test::TempDir;
 using test::write_bytes;
-
-std::string data_folder() {
-  const char* shared = std::getenv("RESTAGE_SHARED");
-  return (shared ? std::string(shared) : RESTAGE_SOURCE_DIR "/../shared") + "/data";
-}
-
-#define NEED_DATA()                                                                             \
-  if (!fs::exists(data_folder() + "/body/makehuman.h5") || !fs::exists(data_folder() + "/cmu")) \
-  GTEST_SKIP() << "no data folder (set RESTAGE_SHARED)"
 
 BenchmarkRecipe small_recipe() {
   BenchmarkRecipe r;
@@ -55,12 +47,12 @@ BenchmarkRecipe small_recipe() {
 
 class BenchmarkBuild : public ::testing::Test {
  protected:
-  void SetUp() override { NEED_DATA(); }
+  void SetUp() override { RESTAGE_NEED_DATA(); }
   void TearDown() override { set_threads(0); }
   std::string build(const std::string& name, int with_threads,
                     const BenchmarkRecipe& recipe = small_recipe()) {
     set_threads(with_threads);
-    build_benchmark(recipe, "text\n", "r.yaml", data_folder(), dir_ / name);
+    build_benchmark(recipe, "text\n", "r.yaml", test::data_folder(), dir_ / name);
     return dir_ / name;
   }
   TempDir dir_;
@@ -157,8 +149,8 @@ TEST_F(BenchmarkBuild, ScansComeBackIntoTheWorldByTheirTruth) {
 }
 
 TEST_F(BenchmarkBuild, ADressedCharacterIsWhole) {
-  const MakeHuman model(data_folder() + "/body");
-  const std::vector<BodyRecipe> rows = read_recipes(data_folder() + "/body/bodies.csv");
+  const MakeHuman model(test::data_folder() + "/body");
+  const std::vector<BodyRecipe> rows = read_recipes(test::data_folder() + "/body/bodies.csv");
   const auto make = [&](const char* garment, double hair) {
     return make_character({"x", "b147", {}, garment, hair}, model, rows, {0, 0});
   };
@@ -191,7 +183,7 @@ TEST_F(BenchmarkBuild, ADressedCharacterIsWhole) {
 TEST_F(BenchmarkBuild, WrongNamesAndTakenPlacesLeaveNothing) {
   const auto refused = [&](const BenchmarkRecipe& r, const std::string& words) {
     try {
-      build_benchmark(r, "", "r.yaml", data_folder(), dir_ / "out");
+      build_benchmark(r, "", "r.yaml", test::data_folder(), dir_ / "out");
       ADD_FAILURE() << words;
     } catch (const InputError& error) {
       EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
@@ -214,7 +206,7 @@ TEST_F(BenchmarkBuild, WrongNamesAndTakenPlacesLeaveNothing) {
   r.characters[1].garment = "../../secret";
   refused(r, "garment");
   fs::create_directories(dir_ / "taken/x");
-  EXPECT_THROW(build_benchmark(small_recipe(), "", "r.yaml", data_folder(), dir_ / "taken"),
+  EXPECT_THROW(build_benchmark(small_recipe(), "", "r.yaml", test::data_folder(), dir_ / "taken"),
                InputError);
   EXPECT_THROW(build_benchmark(small_recipe(), "", "r.yaml", dir_ / "nothing", dir_ / "out"),
                InputError);
@@ -428,6 +420,12 @@ TEST(FetchList, TheProjectsOwnListsAreSound) {
   EXPECT_GT(entries.size(), 10u);
   for (const FetchEntry& e : entries) {
     if (e.address.find("://") != std::string::npos || e.address == "-") continue;
+    if (e.address.starts_with("cmu:")) {
+      for (const auto& [name, from] : read_cmu_originals(folder + e.address.substr(4)).repositories)
+        EXPECT_TRUE(from.tree.starts_with("https://") && from.files.starts_with("https://"))
+            << name;
+      continue;
+    }
     if (!e.address.starts_with(packed)) {
       EXPECT_EQ(sha256_of_file(folder + e.address), e.sha256);
       continue;

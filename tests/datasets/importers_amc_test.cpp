@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -14,6 +13,7 @@
 #include "datasets/hdf5/file.h"
 #include "datasets/importers/amc.h"
 #include "datasets/readers/asf.h"
+#include "tests/support/data_folder.h"
 
 namespace restage {
 namespace {
@@ -261,11 +261,8 @@ TEST(ImportersAmc, TheSkeletonBesideIsFoundByName) {
 }
 
 TEST(ImportersAmc, CmuFilesGiveTheReferenceJoints) {
-  const char* shared = std::getenv("RESTAGE_SHARED");
-  const std::string data =
-      (shared ? std::string(shared) : RESTAGE_SOURCE_DIR "/../shared") + "/data";
-  if (!fs::exists(data + "/cmu/clips30.h5"))
-    GTEST_SKIP() << "no data folder (set RESTAGE_SHARED): the reference joints are not at hand";
+  RESTAGE_NEED_DATA();
+  const std::string data = test::data_folder();
   const h5::File clips = h5::File::open(data + "/cmu/clips30.h5");
   size_t compared = 0;
   for (const std::string& clip : clips.children("/clips")) {

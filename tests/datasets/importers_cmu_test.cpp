@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <map>
 
@@ -12,29 +11,21 @@
 #include "datasets/hdf5/file.h"
 #include "datasets/importers/bvh.h"
 #include "datasets/importers/cmu.h"
+#include "tests/support/data_folder.h"
 
 namespace restage {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string data_folder() {
-  const char* shared = std::getenv("RESTAGE_SHARED");
-  return (shared ? std::string(shared) : RESTAGE_SOURCE_DIR "/../shared") + "/data";
-}
-
-#define NEED_DATA()                                   \
-  if (!fs::exists(data_folder() + "/cmu/clips30.h5")) \
-  GTEST_SKIP() << "no data folder (set RESTAGE_SHARED): the reference joints are not at hand"
-
 const h5::File& clips_file() {
-  static const h5::File file = h5::File::open(data_folder() + "/cmu/clips30.h5");
+  static const h5::File file = h5::File::open(test::data_folder() + "/cmu/clips30.h5");
   return file;
 }
 
 /// Read once for all tests.
 const std::vector<CmuClip>& all_clips() {
-  static const std::vector<CmuClip> clips = read_cmu(data_folder() + "/cmu/clips30.h5", true);
+  static const std::vector<CmuClip> clips = read_cmu(test::data_folder() + "/cmu/clips30.h5", true);
   return clips;
 }
 
@@ -55,7 +46,7 @@ double largest_difference(const std::vector<Joints>& joints, const std::vector<f
 }
 
 TEST(ImportersCmu, AllClipsGiveTheReferenceJoints) {
-  NEED_DATA();
+  RESTAGE_NEED_DATA();
   const std::vector<CmuClip>& clips = all_clips();
   EXPECT_EQ(clips.size(), 247u);
   size_t compared = 0, frames = 0;
@@ -76,7 +67,7 @@ TEST(ImportersCmu, AllClipsGiveTheReferenceJoints) {
 }
 
 TEST(ImportersCmu, RestAndFloorAreThoseOfTheFile) {
-  NEED_DATA();
+  RESTAGE_NEED_DATA();
   for (const CmuClip& clip : all_clips()) {
     const std::string group = "/clips/" + clip.motion.id;
     const std::string skeleton = *clips_file().text(group, "skeleton");
@@ -103,11 +94,11 @@ MotionClip part_of(const std::string& path, const std::string& clip) {
 }
 
 TEST(ImportersCmu, BvhFilesGiveTheReferenceJoints) {
-  NEED_DATA();
+  RESTAGE_NEED_DATA();
   size_t compared = 0;
   for (const std::string& clip : clips_file().children("/clips")) {
     const bool has_part = clip.find_first_of("abcdefgh", 2) != std::string::npos;
-    const std::string file = data_folder() + "/cmu/bvh/" +
+    const std::string file = test::data_folder() + "/cmu/bvh/" +
                              (has_part ? clip.substr(0, clip.size() - 1) : clip) + ".bvh.xz";
     const std::vector<float> expected = reference(clip);
     if (expected.empty() || !fs::exists(file) ||
@@ -123,20 +114,20 @@ TEST(ImportersCmu, BvhFilesGiveTheReferenceJoints) {
 }
 
 TEST(ImportersCmu, TheRuleForLeadingFramesIsThatOfTheClips) {
-  NEED_DATA();
-  const MotionClip bvh = read_bvh(data_folder() + "/cmu/bvh/07_01.bvh.xz");
+  RESTAGE_NEED_DATA();
+  const MotionClip bvh = read_bvh(test::data_folder() + "/cmu/bvh/07_01.bvh.xz");
   EXPECT_LT(largest_difference(bvh.joints, reference("07_01")), 2e-4);
   EXPECT_EQ(bvh.motion.id, "07_01");
   EXPECT_EQ(bvh.motion.subject, "07");
 }
 
 TEST(ImportersCmu, OriginalSkeletonIsTheAsfOne) {
-  NEED_DATA();
+  RESTAGE_NEED_DATA();
   MotionOptions options;
   options.drop_leading = 1;  // a T-pose before the frames of the ASF/AMC file
   options.keep_frames = 2751;
   const MotionClip bvh =
-      read_bvh(data_folder() + "/cmu/bvh_original_skeleton/01_01.bvh.xz", options);
+      read_bvh(test::data_folder() + "/cmu/bvh_original_skeleton/01_01.bvh.xz", options);
   const std::vector<CmuClip>& clips = all_clips();
   const auto clip = std::find_if(clips.begin(), clips.end(),
                                  [](const CmuClip& c) { return c.motion.id == "01_01"; });
@@ -158,8 +149,8 @@ TEST(ImportersCmu, OriginalSkeletonIsTheAsfOne) {
 }
 
 TEST(ImportersCmu, ForeignFiles) {
-  NEED_DATA();
-  const std::string folder = data_folder() + "/foreign/";
+  RESTAGE_NEED_DATA();
+  const std::string folder = test::data_folder() + "/foreign/";
   for (const char* name : {"pymo_walk_meredith", "makehuman_walk1", "makehuman_zombiewalk1",
                            "makehuman_dance1", "makehuman_benchmark"}) {
     const MotionClip clip = read_bvh(folder + name + ".bvh.xz");
@@ -189,9 +180,9 @@ TEST(ImportersCmu, ForeignFiles) {
 }
 
 TEST(ImportersCmu, BrokenRootIsRefused) {
-  NEED_DATA();
+  RESTAGE_NEED_DATA();
   try {
-    read_bvh(data_folder() + "/cmu/bvh/07_12.bvh.xz");
+    read_bvh(test::data_folder() + "/cmu/bvh/07_12.bvh.xz");
     FAIL();
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("root jumps"), std::string::npos) << error.what();

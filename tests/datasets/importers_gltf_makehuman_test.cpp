@@ -10,16 +10,14 @@
 #include "datasets/importers/gltf_character.h"
 #include "datasets/importers/makehuman.h"
 #include "tests/datasets/gltf_maker.h"
+#include "tests/support/data_folder.h"
 
 namespace restage {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string body_folder() {
-  const char* shared = std::getenv("RESTAGE_SHARED");
-  return (shared ? std::string(shared) : RESTAGE_SOURCE_DIR "/../shared") + "/data/body";
-}
+std::string body_folder() { return test::data_folder() + "/body"; }
 
 /// The data of makehuman.h5 in decimetres, shaped by a recipe.
 struct Model {

@@ -1,7 +1,6 @@
 // `restage data import` as a function: data folders, BVH files and folders into schema files.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 
@@ -9,16 +8,12 @@
 #include "datasets/importers/import.h"
 #include "datasets/schema.h"
 #include "tests/datasets/importers_bvh_text.h"
+#include "tests/support/data_folder.h"
 
 namespace restage {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string data_folder() {
-  const char* shared = std::getenv("RESTAGE_SHARED");
-  return (shared ? std::string(shared) : RESTAGE_SOURCE_DIR "/../shared") + "/data";
-}
 
 class ImportersImport : public ::testing::Test {
  protected:
@@ -33,14 +28,14 @@ class ImportersImport : public ::testing::Test {
 };
 
 TEST_F(ImportersImport, DataFolderBecomesOneFile) {
-  if (!fs::exists(data_folder() + "/cmu/clips30.h5"))
+  if (!fs::exists(test::data_folder() + "/cmu/clips30.h5"))
     GTEST_SKIP() << "no data folder (set RESTAGE_SHARED)";
   // Two bodies and all clips: the whole set takes seconds more and shows nothing more.
   fs::create_directories(folder_ + "/in/body");
-  fs::create_symlink(fs::absolute(data_folder() + "/cmu"), folder_ + "/in/cmu");
-  fs::create_symlink(fs::absolute(data_folder() + "/body/makehuman.h5"),
+  fs::create_symlink(fs::absolute(test::data_folder() + "/cmu"), folder_ + "/in/cmu");
+  fs::create_symlink(fs::absolute(test::data_folder() + "/body/makehuman.h5"),
                      folder_ + "/in/body/makehuman.h5");
-  std::ifstream csv(data_folder() + "/body/bodies.csv");
+  std::ifstream csv(test::data_folder() + "/body/bodies.csv");
   std::ofstream few(folder_ + "/in/body/bodies.csv");
   std::string line;
   for (int i = 0; i < 3 && std::getline(csv, line); ++i) few << line << "\n";

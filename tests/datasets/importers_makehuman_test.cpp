@@ -1,7 +1,6 @@
 // MakeHuman bodies against the data folder's reference tool (tests/golden/bodies.json).
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -9,6 +8,7 @@
 
 #include "autograd/base/error.h"
 #include "datasets/importers/makehuman.h"
+#include "tests/support/data_folder.h"
 
 namespace restage {
 namespace {
@@ -16,14 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-std::string body_folder() {
-  const char* shared = std::getenv("RESTAGE_SHARED");
-  return (shared ? std::string(shared) : RESTAGE_SOURCE_DIR "/../shared") + "/data/body";
-}
-
-#define NEED_DATA()                                 \
-  if (!fs::exists(body_folder() + "/makehuman.h5")) \
-  GTEST_SKIP() << "no data folder (set RESTAGE_SHARED): the MakeHuman model is not at hand"
+std::string body_folder() { return test::data_folder() + "/body"; }
 
 json golden() {
   std::ifstream in(RESTAGE_SOURCE_DIR "/tests/golden/bodies.json");
@@ -35,7 +28,7 @@ double difference(const json& expected, const Vec3& value) {
 }
 
 TEST(ImportersMakeHuman, BodiesEqualThoseOfTheReferenceTool) {
-  NEED_DATA();
+  RESTAGE_NEED_DATA();
   const MakeHuman model(body_folder());
   const std::vector<BodyRecipe> recipes = read_recipes(body_folder() + "/bodies.csv");
   ASSERT_EQ(recipes.size(), 160u);
@@ -66,7 +59,7 @@ TEST(ImportersMakeHuman, BodiesEqualThoseOfTheReferenceTool) {
 }
 
 TEST(ImportersMakeHuman, EveryBodyIsAStandingTPose) {
-  NEED_DATA();
+  RESTAGE_NEED_DATA();
   const MakeHuman model(body_folder());
   std::set<std::string> splits;
   const std::vector<BodyRecipe> recipes = read_recipes(body_folder() + "/bodies.csv");
@@ -90,7 +83,7 @@ TEST(ImportersMakeHuman, EveryBodyIsAStandingTPose) {
 }
 
 TEST(ImportersMakeHuman, GarmentsFitTheBody) {
-  NEED_DATA();
+  RESTAGE_NEED_DATA();
   const MakeHuman model(body_folder());
   const BodyRecipe recipe = read_recipes(body_folder() + "/bodies.csv").at(0);
   const json expected = golden().at("garment");

@@ -18,6 +18,7 @@ inline void write_old_layout(const std::string& path) {
   const hid_t creation = H5Pcreate(H5P_DATASET_CREATE), space = H5Screate_simple(3, dims, nullptr);
   H5Pset_chunk(creation, 3, chunk);
   H5Pset_deflate(creation, 4);
+  H5Pset_obj_track_times(creation, false);  // the same bytes each time
   const hid_t set =
       H5Dcreate2(file, "/joints", H5T_IEEE_F64LE, space, H5P_DEFAULT, creation, H5P_DEFAULT);
   H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, joints.data());

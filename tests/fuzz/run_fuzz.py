@@ -3,7 +3,7 @@
 
     tests/fuzz/run_fuzz.py                      5 seconds each, build/fuzz/restage_fuzz
     tests/fuzz/run_fuzz.py --inputs 200000      so many inputs each
-    tests/fuzz/run_fuzz.py --targets ply,bvh --seconds 60
+    tests/fuzz/run_fuzz.py --targets ply,bvh --seconds 60 --seed 1
 
 Inputs that taught something new stay in the corpus folder and are where the next run begins. Ends
 with 1 if there was a finding; what caused it is kept and named. Plain Python, no packages.
@@ -32,6 +32,7 @@ def arguments():
     parser.add_argument("--targets", help="some of them, with commas between; else all")
     parser.add_argument("--seconds", type=int, default=5, help="for each target")
     parser.add_argument("--inputs", type=int, help="for each target, instead of seconds")
+    parser.add_argument("--seed", type=int, default=int(time.time()), help="else another one each time")
     parser.add_argument("--jobs", type=int, default=2, help="targets at a time")
     parser.add_argument("--corpus", type=pathlib.Path, help="else fuzz_corpus beside the program")
     parser.add_argument("--findings", type=pathlib.Path, help="else fuzz_findings beside the program")
@@ -48,7 +49,7 @@ def environment(scratch):
                 UBSAN_OPTIONS="print_stacktrace=1:halt_on_error=1")
 
 
-def fuzz(options, name, longest, allocation, seed):
+def fuzz(options, name, longest, allocation):
     """One run; a row of the table."""
     corpus, findings = options.corpus / name, options.findings / name
     for folder in (corpus, findings):
@@ -63,7 +64,7 @@ def fuzz(options, name, longest, allocation, seed):
         limit = f"-runs={options.inputs}" if options.inputs else f"-max_total_time={options.seconds}"
         words = HERE / "dictionaries" / f"{DICTIONARY.get(name)}.dict"
         command = program + [limit, f"-max_len={longest}", f"-malloc_limit_mb={allocation}", "-rss_limit_mb=1536",
-                             "-timeout=30", f"-seed={seed}", f"-artifact_prefix={findings}/", "-print_final_stats=1",
+                             "-timeout=30", f"-seed={options.seed}", f"-artifact_prefix={findings}/", "-print_final_stats=1",
                              "-verbosity=1", "-use_value_profile=1"]
         command += [f"-dict={words}"] if words.exists() else []
         start = time.monotonic()
@@ -98,12 +99,11 @@ def main():
         if unknown:
             sys.exit(f"run_fuzz: no target {sorted(unknown)[0]}; there are " + ", ".join(t[0] for t in targets))
         targets = [t for t in targets if t[0] in wanted]
-    seed = int(time.time())
-    print(f"seed {seed}\n| target | inputs | seconds | edges covered | peak memory, MB | findings |\n"
+    print(f"seed {options.seed}\n| target | inputs | seconds | edges covered | peak memory, MB | findings |\n"
           "|---|---|---|---|---|---|", flush=True)
     rows = []
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
-        jobs = [pool.submit(fuzz, options, name, longest, allocation, seed) for name, longest, allocation in targets]
+        jobs = [pool.submit(fuzz, options, name, longest, allocation) for name, longest, allocation in targets]
         for job in jobs:
             row = job.result()
             rows.append(row)
