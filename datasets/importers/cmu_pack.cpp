@@ -10,6 +10,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "autograd/base/interrupt.h"
 #include "datasets/benchmark/sha256.h"
 #include "datasets/hdf5/file.h"
 #include "datasets/importers/amc.h"
@@ -137,7 +138,7 @@ std::vector<std::string> files_below(const std::string& folder) {
   std::error_code failed;
   fs::recursive_directory_iterator at(folder, failed);
   for (; !failed && at != fs::recursive_directory_iterator(); at.increment(failed))
-    if (at->is_regular_file()) out.push_back(at->path().string());
+    if (std::error_code unknown; at->is_regular_file(unknown)) out.push_back(at->path().string());
   std::sort(out.begin(), out.end());
   return out;
 }
@@ -276,8 +277,10 @@ CmuOriginals read_cmu_originals(const std::string& list) {
 void pack_cmu(const CmuOriginals& originals, const std::string& folder, const std::string& out) {
   const std::vector<std::string> files = files_below(folder);
   h5::File file = h5::File::create(out);
-  for (const CmuOriginal& entry : originals.clips)
+  for (const CmuOriginal& entry : originals.clips) {
+    throw_if_stopped();
     write_clip(file, entry, find_clip(entry, files, folder));
+  }
   file.commit();
 }
 
