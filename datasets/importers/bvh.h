@@ -16,8 +16,8 @@ MotionClip read_bvh(const std::string& path, const MotionOptions& options = {});
 MotionClip convert_bvh(std::string_view text, const std::string& path,
                        const MotionOptions& options = {});
 
-/// Rotations of all joints, translations of those from the root down to `hips`, in the file's units.
-/// Takes the file's frames as it goes, so that they are in memory only once.
+/// Rotations of all joints, translations of those from the root down to `hips`, in the file's
+/// units. Takes the file's frames as it goes, so that they are in memory only once.
 SourceMotion bvh_motion(BvhFile file, int hips);
 
 }  // namespace restage
