@@ -1,9 +1,11 @@
 #include "datasets/fetch/fetch_cmu.h"
 
+#include <cctype>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <string_view>
 #include <vector>
 
 #include "autograd/base/atomic_file.h"
@@ -91,6 +93,20 @@ bool is_plain(const std::string& path) {
   return true;
 }
 
+/// A path as part of an address: blanks and the like as %20.
+std::string escaped(const std::string& path) {
+  constexpr std::string_view kPlain = "-._~/";
+  std::string out;
+  for (const char c : path) {
+    const auto byte = static_cast<unsigned char>(c);
+    if ((byte < 128 && std::isalnum(byte) != 0) || kPlain.find(c) != std::string_view::npos)
+      out += c;
+    else
+      out += std::string("%") + "0123456789ABCDEF"[byte >> 4] + "0123456789ABCDEF"[byte & 15];
+  }
+  return out;
+}
+
 void fetch_blob(const Blob& blob, const CmuRepository& repository, const std::string& target) {
   std::error_code none;
   if (fs::file_size(target, none) == blob.bytes && !none &&
@@ -98,7 +114,7 @@ void fetch_blob(const Blob& blob, const CmuRepository& repository, const std::st
     return;
   log_info("fetching " + blob.path + " (" + std::to_string((blob.bytes + 999) / 1000) + " kB)");
   make_folder_of(target);
-  const std::string part = target + ".part", address = repository.files + "/" + blob.path;
+  const std::string part = target + ".part", address = repository.files + "/" + escaped(blob.path);
   if (fs::file_size(part, none) != blob.bytes || none) download(address, part, blob.bytes);
   if (git_sum(read_file(part, kMostFile)) != blob.sha1) {
     fs::remove(part, none);

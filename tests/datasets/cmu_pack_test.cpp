@@ -134,11 +134,11 @@ TEST_F(CmuPack, ListsAreHeldToTheirForm) {
 
 TEST_F(CmuPack, FetchingFindsFilesInAnyRepositoryOnce) {
   const std::string text =
-      repository("one", {{"walks/01/01_01.bvh", toy_bvh()}, {"README", "-"}}) +
+      repository("one", {{"100% walks/01#/01_01.bvh", toy_bvh()}, {"README", "-"}}) +
       repository("two", {{"copy/01_01.bvh", toy_bvh()}, {"01_01.bvh", toy_bvh("45")}}) + clip();
   const CmuOriginals originals = list(text);
   fetch_cmu_originals(originals, dir_ / "got");
-  EXPECT_EQ(bytes_of(dir_ / "got/one/walks/01/01_01.bvh"), toy_bvh());
+  EXPECT_EQ(bytes_of(dir_ / "got/one/100% walks/01#/01_01.bvh"), toy_bvh());
   EXPECT_EQ(bytes_of(dir_ / "got/two/01_01.bvh"), toy_bvh("45"));
   EXPECT_FALSE(fs::exists(dir_ / "got/two/copy")) << "the same bytes again";
   EXPECT_FALSE(fs::exists(dir_ / "got/one/README"));
@@ -146,9 +146,9 @@ TEST_F(CmuPack, FetchingFindsFilesInAnyRepositoryOnce) {
   EXPECT_FALSE(has_cmu_originals(originals, dir_ / "web/none"));
   // What is right stays without the network, what is not comes again.
   fs::rename(dir_ / "web/two", dir_ / "web/gone");
-  write_bytes(dir_ / "got/one/walks/01/01_01.bvh", toy_bvh("46"));
+  write_bytes(dir_ / "got/one/100% walks/01#/01_01.bvh", toy_bvh("46"));
   fetch_cmu_originals(originals, dir_ / "got");
-  EXPECT_EQ(bytes_of(dir_ / "got/one/walks/01/01_01.bvh"), toy_bvh());
+  EXPECT_EQ(bytes_of(dir_ / "got/one/100% walks/01#/01_01.bvh"), toy_bvh());
 }
 
 TEST_F(CmuPack, WhatIsNotAsTheRepositorySaysIsRefused) {
