@@ -54,7 +54,7 @@ ONLY_IN = {
     "nlohmann/": ["nn/weights/", "datasets/readers/", "datasets/benchmark/manifest.cpp",
                   "datasets/importers/makehuman_pack.cpp", "datasets/fetch/fetch_cmu.cpp", "train/", "infer/",
                   "experiments/"],
-    "openssl/": ["datasets/benchmark/sha256.cpp"],
+    "openssl/": ["datasets/readers/sha256.cpp"],
     "stb/": ["infer/render/"],
     "lzma.h": ["datasets/readers/"],
     "zlib.h": ["datasets/importers/", "datasets/readers/", "datasets/fetch/"],

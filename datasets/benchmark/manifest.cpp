@@ -5,7 +5,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
-#include "datasets/benchmark/sha256.h"
+#include "datasets/readers/sha256.h"
 #include "datasets/schema.h"
 
 namespace restage {

@@ -12,8 +12,8 @@
 #include "autograd/base/error.h"
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
-#include "datasets/benchmark/sha256.h"
 #include "datasets/fetch/download.h"
+#include "datasets/readers/sha256.h"
 
 namespace restage {
 namespace {

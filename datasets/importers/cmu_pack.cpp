@@ -11,11 +11,11 @@
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
 #include "autograd/base/interrupt.h"
-#include "datasets/benchmark/sha256.h"
 #include "datasets/hdf5/file.h"
 #include "datasets/importers/amc.h"
 #include "datasets/importers/bvh.h"
 #include "datasets/readers/packed_text.h"
+#include "datasets/readers/sha256.h"
 
 namespace restage {
 namespace {

@@ -11,9 +11,9 @@
 #include "datasets/benchmark/realism.h"
 #include "datasets/benchmark/recipe.h"
 #include "datasets/benchmark/scans.h"
-#include "datasets/benchmark/sha256.h"
 #include "datasets/builtin/bodies.h"
 #include "datasets/builtin/motions.h"
+#include "datasets/readers/sha256.h"
 #include "datasets/sampling/frames.h"
 #include "tests/datasets/schema_support.h"
 

@@ -10,11 +10,11 @@
 #include <set>
 
 #include "autograd/base/error.h"
-#include "datasets/benchmark/sha256.h"
 #include "datasets/fetch/fetch.h"
 #include "datasets/fetch/fetch_cmu.h"
 #include "datasets/hdf5/file.h"
 #include "datasets/importers/cmu.h"
+#include "datasets/readers/sha256.h"
 #include "tests/datasets/npz_support.h"
 #include "tests/datasets/schema_support.h"
 #include "tests/support/data_folder.h"

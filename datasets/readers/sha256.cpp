@@ -1,4 +1,4 @@
-#include "datasets/benchmark/sha256.h"
+#include "datasets/readers/sha256.h"
 
 #include <openssl/evp.h>
 
