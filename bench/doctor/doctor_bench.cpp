@@ -1,6 +1,6 @@
 // The doctor's model and how often the doctor is right.
-//   doctor_bench fit OUT.inc FILE             coefficients of
-//                                             datasets/doctor/orientation_prior.inc, from built-in
+//   doctor_bench fit OUT.safetensors FILE     the network of
+//                                             datasets/doctor/orientation_model.h, from built-in
 //                                             people and those of FILE's training split
 //   doctor_bench measure FILE [name=value..]  2,400 cases: 24 permutations of axes x 5 units x 20
 //                                             scans of FILE's test split (or `builtin`), as
@@ -15,14 +15,13 @@
 #include <string>
 #include <vector>
 
-#include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
 #include "autograd/base/parallel.h"
 #include "autograd/base/rng.h"
 #include "bench/doctor/dress.h"
 #include "bench/doctor/fit.h"
 #include "datasets/doctor/examine.h"
-#include "datasets/doctor/orientation_model.h"
+#include "nn/weights/state.h"
 
 namespace restage::bench {
 namespace {
@@ -30,19 +29,6 @@ namespace {
 void say(const std::string& line) { std::cerr << line << std::endl; }
 
 // ---- fit ---------------------------------------------------------------------------------------
-
-/// `count` normalised scans of a split. `from`: a data set file, or `builtin`.
-void add_scans(const Corpus& corpus, ScanRecipe recipe, size_t count, uint64_t seed,
-               std::vector<Points>& out) {
-  const ScanMaker maker(corpus, recipe, seed);
-  const size_t before = out.size();
-  out.resize(before + count);
-  parallel_for(static_cast<int64_t>(count), 64, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i)
-      out[before + static_cast<size_t>(i)] =
-          doctor_detail::normalised(maker.make(static_cast<uint64_t>(i)).points).points;
-  });
-}
 
 Corpus people(const std::string& from, const std::string& split) {
   CorpusSource source;
@@ -59,32 +45,53 @@ ScanRecipe fit_recipe(double noise) {
   recipe.one_side_share = 0.35;
   recipe.stray_share = 0.2;
   recipe.by_clip_share = 0.5;  // acrobats are brief
+  recipe.mixed_share = 0.4;
+  recipe.pose_noise = 6;
   return recipe;
 }
 
-/// Built-in people, and FILE's, naked and dressed: all of the training split.
-std::vector<Points> scans_to_fit(const std::string& file, uint64_t seed) {
-  std::vector<Points> out;
-  add_scans(people("builtin", "train"), fit_recipe(0.005), 10000, seed, out);
-  const Corpus real = people(file, "train");
-  add_scans(real, fit_recipe(0.004), 16000, seed + 1, out);
-  add_scans(dressed(real, seed), fit_recipe(0.008), 14000, seed + 2, out);
-  return out;
-}
+/// Built-in people, and FILE's, naked and dressed, all of the training split; and a few things.
+class Examples {
+ public:
+  Examples(const std::string& file, uint64_t seed)
+      : key_{seed, 0},
+        builtin_(people("builtin", "train")),
+        naked_(people(file, "train")),
+        dressed_(dressed(naked_, seed)),
+        makers_{ScanMaker(builtin_, fit_recipe(0.005), seed),
+                ScanMaker(naked_, fit_recipe(0.004), seed + 1),
+                ScanMaker(dressed_, fit_recipe(0.008), seed + 2)} {}
+  FitExample operator()(uint64_t index) const {
+    const RngKey key = key_.fold("example").fold(index);
+    const double kind = Rng(key).uniform();
+    FitExample out;
+    out.person = kind > 0.06;
+    out.points = !out.person   ? random_thing(key)
+                 : kind < 0.14 ? makers_[0].make(index).points
+                 : kind < 0.57 ? makers_[1].make(index).points
+                               : makers_[2].make(index).points;
+    out.points = doctor_detail::normalised(out.points).points;
+    return out;
+  }
+
+ private:
+  RngKey key_;
+  Corpus builtin_, naked_, dressed_;
+  std::array<ScanMaker, 3> makers_;
+};
 
 int fit(const std::string& out, const std::string& file) {
   const FitOptions options;
-  const std::vector<float> found =
-      fit_orientation_prior(scans_to_fit(file, options.seed), options, say);
-  std::string text =
-      "// Made by `doctor_bench fit`: do not edit. Hundredths; kind of attitude, |x|, y, z.\n"
-      "// From built-in people, MakeHuman bodies (CC0) and CMU motions: the data used in this "
-      "project\n"
-      "// was obtained from mocap.cs.cmu.edu. The database was created with funding from NSF\n"
-      "// EIA-0196217.\n";
-  for (size_t i = 0; i < found.size(); ++i)
-    text += std::to_string(std::lround(100 * found[i])) + (i % 20 == 19 ? ",\n" : ",");
-  write_file_atomically(out, text);
+  OrientationNet net{Init{RngKey{options.seed, 0}}};
+  const Examples examples(file, options.seed);
+  fit_orientation_net(std::cref(examples), options, say, net);
+  TensorFile weights = to_file(net);
+  weights.metadata["made by"] = "doctor_bench fit";
+  weights.metadata["license"] =
+      "From built-in people, MakeHuman bodies (CC0) and CMU motions: the data used in this project "
+      "was obtained from mocap.cs.cmu.edu. The database was created with funding from NSF "
+      "EIA-0196217.";
+  write_safetensors(out, weights);
   return 0;
 }
 

@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "autograd/base/rng.h"
 #include "datasets/corpus.h"
 
 namespace restage::bench {
@@ -15,6 +16,8 @@ struct ScanRecipe {
   double one_side_share = 0;     ///< scans that one depth camera sees
   double by_clip_share = 0;      ///< scans of any clip alike; the others of any frame alike
   double stray_share = 0;        ///< scans with a few per cent of stray points
+  double mixed_share = 0;        ///< poses whose legs, trunk and arms come from three frames
+  double pose_noise = 0;         ///< degrees about each axis of each joint, standard deviation
 };
 
 struct TrueScan {
@@ -28,6 +31,7 @@ struct TrueScan {
 class ScanMaker {
  public:
   ScanMaker(const Corpus& corpus, const ScanRecipe& recipe, uint64_t seed);
+  ScanMaker(ScanMaker&&) noexcept;
   ~ScanMaker();
   TrueScan make(uint64_t index) const;
 
@@ -35,5 +39,8 @@ class ScanMaker {
   struct State;
   std::unique_ptr<State> state_;
 };
+
+/// What is no person: a few boxes, rods, plates and balls, hollow or full, here and there.
+Points random_thing(const RngKey& key);
 
 }  // namespace restage::bench

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "autograd/ops/reduce.h"
 #include "datasets/doctor/orientation_model.h"
 
 namespace restage {
@@ -16,6 +17,17 @@ int index_of(const Vec3& direction) {
   int axis = 0;
   direction.cwiseAbs().maxCoeff(&axis);
   return 2 * axis + (direction[axis] < 0 ? 1 : 0);
+}
+
+/// Of each hypothesis: kUps x kHeadings numbers.
+Tensor probabilities(const Points& cloud) {
+  Tensor seen = Tensor::empty({kUps * kHeadings, kPlaces});
+  float* row = seen.data<float>();
+  for (int u = 0; u < kUps; ++u)
+    for (int h = 0; h < kHeadings; ++h, row += kPlaces)
+      look(cloud, hypothesis(u, h), std::span<float, kPlaces>(row, kPlaces));
+  Context ctx;
+  return softmax(orientation_net()(ctx, Var(seen)), 0).value;
 }
 
 }  // namespace
@@ -33,25 +45,15 @@ Mat3 Orientation::turn() const {
   return out;
 }
 
-OrientationVote::OrientationVote() : OrientationVote(orientation_prior()) {}
-
 void OrientationVote::add(const Points& cloud, bool faces) {
   const NormalisedCloud seen = normalised(cloud);
   if (!(seen.size > 0)) return;
-  std::array<std::array<double, kHeadings>, kUps> p;
-  Places places;
-  double most = -1e300, total = 0;
-  for (int u = 0; u < kUps; ++u)
-    for (int h = 0; h < kHeadings; ++h) {
-      look(seen.points, hypothesis(u, h), places);
-      most = std::max(most, p[u][h] = score(coefficients_, places));
-    }
-  for (auto& row : p)
-    for (double& x : row) total += (x = std::exp(x - most));
-  for (int u = 0; u < kUps; ++u)
-    for (int h = 0; h < kHeadings; ++h) {
-      up_[u] += p[u][h] / total;
-      if (faces) facing_[u][h] += p[u][h] / total;
+  const Tensor p = probabilities(seen.points);
+  for (size_t u = 0; u < kUps; ++u)
+    for (size_t h = 0; h < kHeadings; ++h) {
+      const double share = p.data<float>()[u * kHeadings + h];
+      up_[u] += share;
+      if (faces) facing_[u][h] += share;
     }
   ++clouds_;
 }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <span>
 #include <string>
 
 #include "nn/geometry/body.h"
@@ -27,9 +26,6 @@ struct Orientation {
 /// unless there are more than 4,096.
 class OrientationVote {
  public:
-  OrientationVote();
-  /// With other coefficients than the shipped ones (orientation_model.h), which the caller keeps.
-  explicit OrientationVote(std::span<const float> coefficients) : coefficients_(coefficients) {}
   /// Metres or any unit. Clouds whose points all lie in one place say nothing. `faces`: whether
   /// the cloud also has a vote on where the person faces (who walks a circle faces everywhere).
   void add(const Points& cloud, bool faces = true);
@@ -44,7 +40,6 @@ class OrientationVote {
   std::array<std::array<double, kHeadings>, 6> facing_{};  // sums of probabilities
   std::array<double, 6> up_{};
   int clouds_ = 0;
-  std::span<const float> coefficients_;
 };
 
 }  // namespace restage

@@ -3,7 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <set>
+#include <string>
+
+#include "datasets/doctor/orientation_weights.h"
+#include "nn/weights/state.h"
 
 namespace restage::doctor_detail {
 namespace {
@@ -12,11 +17,6 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr size_t kMostLooked = 4096;  // of a large cloud, evenly spaced in the list
 constexpr float kThin = 0.12f;        // one point per cube of this edge, in units of the size
 
-constexpr int16_t kPrior[] = {
-// hundredths
-#include "datasets/doctor/orientation_prior.inc"
-};
-static_assert(std::size(kPrior) % kPlaces == 0, "fit the prior again: doctor_bench fit");
 constexpr float kFar = 1e4f;  // in the same unit
 
 float median(std::vector<float>& values) {
@@ -66,8 +66,8 @@ NormalisedCloud normalised(const Points& points) {
   return out;
 }
 
-void look(const Points& points, const Eigen::Matrix3f& turn, Places& out) {
-  std::array<float, kPlaces> share{};
+void look(const Points& points, const Eigen::Matrix3f& turn, std::span<float, kPlaces> shares) {
+  std::fill(shares.begin(), shares.end(), 0.0f);
   const auto along = [](float x, int n) {
     return std::clamp(x, 0.0f, static_cast<float>(n) - 1.001f);
   };
@@ -78,37 +78,30 @@ void look(const Points& points, const Eigen::Matrix3f& turn, Places& out) {
     const int i = static_cast<int>(x), j = static_cast<int>(y), k = static_cast<int>(z);
     const float fx = x - static_cast<float>(i), fy = y - static_cast<float>(j),
                 fz = z - static_cast<float>(k);
-    float* at = share.data() + (i * kUpwards + j) * kForward + k;
+    float* at = shares.data() + (i * kUpwards + j) * kForward + k;
     for (const int dx : {0, 1})
       for (const int dy : {0, 1})
         for (const int dz : {0, 1})
           at[(dx * kUpwards + dy) * kForward + dz] +=
               (dx ? fx : 1 - fx) * (dy ? fy : 1 - fy) * (dz ? fz : 1 - fz);
   }
-  out.place.clear();
-  out.share.clear();
   const float scale = 1.0f / static_cast<float>(std::max<size_t>(points.size(), 1));
-  for (int i = 0; i < kPlaces; ++i)
-    if (share[static_cast<size_t>(i)] > 0) {
-      out.place.push_back(i);
-      out.share.push_back(std::sqrt(share[static_cast<size_t>(i)] * scale));
-    }
+  for (float& share : shares) share = std::sqrt(share * scale);
 }
 
-float score(std::span<const float> coefficients, const Places& at, float* kinds) {
-  constexpr size_t kMost = 16;
-  std::array<float, kMost> each{};
-  const size_t n = std::min(coefficients.size() / kPlaces, kMost);
-  float most = -1e30f, total = 0;
-  for (size_t k = 0; k < n; ++k) {
-    const float* of = coefficients.data() + k * kPlaces;
-    for (size_t i = 0; i < at.place.size(); ++i) each[k] += of[at.place[i]] * at.share[i];
-    most = std::max(most, each[k]);
-  }
-  for (size_t k = 0; k < n; ++k) total += (each[k] = std::exp(each[k] - most));
-  if (kinds != nullptr)
-    for (size_t k = 0; k < n; ++k) kinds[k] = each[k] / total;
-  return most + std::log(total);
+Var OrientationNet::operator()(Context& ctx, const Var& seen) const {
+  const Var wide = relu_dropout(ctx, layers[0](ctx, seen), 0.1);
+  return layers[2](ctx, layers[1](ctx, wide, Activation::relu));
+}
+
+const OrientationNet& orientation_net() {
+  static const auto net = [] {
+    auto out = std::make_unique<OrientationNet>(Init{});
+    const std::string where = "the doctor's built-in network";
+    load_state(*out, parse_safetensors(orientation_weights(), where), "", where);
+    return out;
+  }();
+  return *net;
 }
 
 Eigen::Matrix3f hypothesis(int up, int heading) {
@@ -121,15 +114,6 @@ Eigen::Matrix3f hypothesis(int up, int heading) {
   Mat3 turn = turn_about_y(-2 * kPi * heading / kHeadings) * stand;
   if (heading % (kHeadings / 4) == 0) turn = turn.array().round();  // exactly a permutation
   return turn.cast<float>();
-}
-
-std::span<const float> orientation_prior() {
-  static const auto prior = [] {
-    std::array<float, std::size(kPrior)> out;
-    for (size_t i = 0; i < out.size(); ++i) out[i] = static_cast<float>(kPrior[i]) / 100;
-    return out;
-  }();
-  return prior;
 }
 
 }  // namespace restage::doctor_detail
