@@ -21,12 +21,10 @@ void JointExtractor::sort(const Points& cloud, const std::string& source) {
       throw InputError(source, "holds a coordinate that is not finite", "remove such points");
   sorted_ = cloud;
   std::sort(sorted_.begin(), sorted_.end(), before);
-  size_t distinct = sorted_.empty() ? 0 : 1;
-  for (size_t i = 1; i < sorted_.size() && distinct < kLeastDistinctPoints; ++i)
-    if (sorted_[i] != sorted_[i - 1]) ++distinct;
-  if (distinct < kLeastDistinctPoints)
+  sorted_.erase(std::unique(sorted_.begin(), sorted_.end()), sorted_.end());
+  if (sorted_.size() < kLeastDistinctPoints)
     throw InputError(
-        source, "holds " + std::to_string(distinct) + " distinct points, too few for a body",
+        source, "holds " + std::to_string(sorted_.size()) + " distinct points, too few for a body",
         "give at least " + std::to_string(kLeastDistinctPoints) + ", better a thousand");
 }
 

@@ -15,9 +15,9 @@ class JointExtractor {
  public:
   /// `samples` > 1 averages the answers for several random choices of points.
   explicit JointExtractor(SkeletonModel& model, int samples = 1);
-  /// Metres, in the cloud's frame. Points are sorted lexicographically first, so their order in a
-  /// file does not matter to the last bit. InputError naming `source`: fewer than 64 distinct
-  /// points, values that are not finite.
+  /// Metres, in the cloud's frame. Points are sorted lexicographically first and exact repeats
+  /// left out, so neither their order in a file nor pixels without depth matter to the last bit.
+  /// InputError naming `source`: fewer than 64 distinct points, values that are not finite.
   Joints operator()(const Points& cloud, const std::string& source, const RngKey& key);
 
  private:

@@ -186,6 +186,13 @@ void judge_parts(Diagnosis& d, const PersonShape& shape, const std::string& wher
                           "gaps between groups of points", "scan from more sides if you can"});
 }
 
+void judge_duplicates(Diagnosis& d, size_t repeats, bool cloud, const std::string& where) {
+  if (repeats == 0) return;
+  d.findings.push_back({"duplicates", cloud ? Weight::note : Weight::fact,
+                        counted(repeats, "point") + " equal to another" + where, 1, "counted",
+                        cloud ? "--fix removes them" : ""});
+}
+
 }  // namespace doctor_detail
 
 namespace {
@@ -203,14 +210,6 @@ void judge_cover(Diagnosis& d, const Mesh& mesh, const PersonShape& shape) {
         {"holes", Weight::note,
          counted(open.loops, "open border") + " with " + counted(open.edges, "edge"), 1,
          "edges with one triangle", "close them in a mesh editor if they are not meant"});
-}
-
-void judge_duplicates(Diagnosis& d, const Mesh& mesh, size_t equal) {
-  if (equal == 0) return;
-  const bool cloud = mesh.faces.empty();
-  d.findings.push_back({"duplicates", cloud ? Weight::note : Weight::fact,
-                        counted(equal, "point") + " equal to another", 1, "counted",
-                        cloud ? "--fix removes them" : ""});
 }
 
 void judge_pose(Diagnosis& d, const PersonShape& shape, bool target) {
@@ -242,8 +241,8 @@ Diagnosis examine_surface(const Mesh& mesh, const ExamineOptions& options) {
   d.kind = mesh.faces.empty() ? "cloud" : "mesh";
   d.faces = static_cast<int64_t>(mesh.faces.size());
   d.fewest_points = d.most_points = static_cast<int64_t>(mesh.vertices.size());
-  const size_t equal = duplicates(mesh.vertices);
-  judge_points(d, mesh.vertices.size() - equal);
+  const size_t points = distinct(mesh.vertices).size();
+  judge_points(d, points);
   const PersonShape shape = shape_of(mesh);
   OrientationVote vote;
   vote.add(shape.points);
@@ -256,7 +255,7 @@ Diagnosis examine_surface(const Mesh& mesh, const ExamineOptions& options) {
   judge_pose(d, shape, options.target);
   judge_parts(d, shape, "");
   judge_cover(d, mesh, shape);
-  judge_duplicates(d, mesh, equal);
+  judge_duplicates(d, mesh.vertices.size() - points, mesh.faces.empty(), "");
   return d;
 }
 

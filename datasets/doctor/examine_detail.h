@@ -24,6 +24,7 @@ void judge_facing(Diagnosis& d, bool target);
 void judge_frame(Diagnosis& d, double lowest, double highest);
 void judge_points(Diagnosis& d, size_t distinct);
 /// `where` is added to each sentence (" in frame 7"), and may be empty.
+void judge_duplicates(Diagnosis& d, size_t repeats, bool cloud, const std::string& where);
 void judge_parts(Diagnosis& d, const PersonShape& shape, const std::string& where);
 
 }  // namespace restage::doctor_detail

@@ -21,7 +21,8 @@ struct Parts {
   double spacing = 0;        ///< typical distance between neighbours, in the data's units
 };
 
-/// The person is the largest piece and what lies within about 0.16 m of it. Works in any unit.
+/// The person is the largest piece and what lies within about 0.16 m of it. Works in any unit. No
+/// point may be there twice: distances between neighbours say what is usual.
 Parts find_parts(const Points& points);
 
 }  // namespace restage

@@ -1,6 +1,3 @@
-#include <array>
-#include <set>
-
 #include "datasets/doctor/examine.h"
 
 namespace restage {
@@ -30,13 +27,10 @@ Mesh mended(const Mesh& mesh, const Diagnosis& diagnosis) {
   // A surface keeps its vertices (their numbers are what others refer to); a cloud loses what is
   // not the person.
   if (mesh.faces.empty()) {
-    const Parts parts = find_parts(mesh.vertices);
-    std::set<std::array<float, 3>> seen;
-    std::vector<bool> keep;
-    for (size_t i = 0; i < mesh.vertices.size(); ++i) {
-      const Point& p = mesh.vertices[i];
-      keep.push_back(parts.part[i] == Part::person && seen.insert({p.x(), p.y(), p.z()}).second);
-    }
+    const std::vector<size_t> once = distinct(mesh.vertices);
+    const Parts parts = find_parts(without_repeats(mesh.vertices));
+    std::vector<bool> keep(mesh.vertices.size());
+    for (size_t k = 0; k < once.size(); ++k) keep[once[k]] = parts.part[k] == Part::person;
     out = kept(mesh, keep);
   }
   if (diagnosis.transform)

@@ -72,9 +72,10 @@ Summary summary_of(const Frame& frame, bool numbered) {
   out.content = content_of(frame.points);
   out.sequence = frame.sequence;
   if (numbered) out.number = number_in(frame.source);
+  const Points points = without_repeats(frame.points);
   Points some;
-  const size_t n = std::min<size_t>(frame.points.size(), 2000);
-  for (size_t i = 0; i < n; ++i) some.push_back(frame.points[i * frame.points.size() / n]);
+  const size_t n = std::min<size_t>(points.size(), 2000);
+  for (size_t i = 0; i < n; ++i) some.push_back(points[i * points.size() / n]);
   for (int i = 0; i < kExtents; ++i) {
     out.extent[static_cast<size_t>(2 * i)] =
         static_cast<float>(quantile(some, extent_direction(i), 0.02));
@@ -131,7 +132,7 @@ class Sequence {
   OrientationVote vote_;
   std::vector<double> sizes_;
   std::vector<std::array<double, 12>> ends_;  // lowest and highest along each direction
-  size_t looked_ = 0, distinct_ = SIZE_MAX;
+  size_t looked_ = 0, fewest_distinct_ = SIZE_MAX, repeats_ = 0, repeat_frames_ = 0;
   size_t strays_ = 0, stray_frames_ = 0, other_frames_ = 0, broken_frames_ = 0;
   std::optional<PersonShape> worst_;  // the frame with most of somebody else
   int64_t worst_frame_ = 0;
@@ -147,7 +148,10 @@ void Sequence::look_closely(const Frame& frame, int64_t index) {
     ends[static_cast<size_t>(2 * i + 1)] = quantile(shape.points, direction(i), 1 - kLevel);
   }
   ends_.push_back(ends);
-  distinct_ = std::min(distinct_, frame.points.size() - duplicates(frame.points));
+  const size_t points = distinct(frame.points).size(), repeats = frame.points.size() - points;
+  fewest_distinct_ = std::min(fewest_distinct_, points);
+  repeats_ += repeats;
+  repeat_frames_ += repeats > 0;
   strays_ += shape.parts.stray;
   stray_frames_ += shape.parts.stray > 0;
   other_frames_ += shape.parts.other > 0;
@@ -323,7 +327,7 @@ Diagnosis Sequence::examine() {
   read();
   d_.frames = static_cast<int64_t>(frames_.size());
   recognise(d_, median(sizes_), vote_, options_);
-  judge_points(d_, distinct_);
+  judge_points(d_, fewest_distinct_);
   judge_units(d_);
   judge_up(d_, looked_);
   judge_walk();
@@ -342,6 +346,9 @@ Diagnosis Sequence::examine() {
   judge_repeats();
   judge_numbers();
   judge_jumps();
+  judge_duplicates(
+      d_, repeats_, d_.faces == 0,
+      " in " + std::to_string(repeat_frames_) + " of " + counted(looked_, "frame") + " looked at");
   if (stray_frames_ > 0)
     d_.findings.push_back({"outliers", Weight::note,
                            counted(strays_, "stray point") + " in " +

@@ -34,8 +34,34 @@ bool has_area(const Mesh& mesh) {
 
 }  // namespace
 
+std::vector<size_t> distinct(const Points& points) {
+  struct Entry {
+    std::array<float, 3> point;
+    size_t index;
+    bool operator<(const Entry& other) const {
+      return point != other.point ? point < other.point : index < other.index;
+    }
+  };
+  std::vector<Entry> sorted;
+  sorted.reserve(points.size());
+  for (size_t i = 0; i < points.size(); ++i)
+    sorted.push_back({{points[i].x(), points[i].y(), points[i].z()}, i});
+  std::sort(sorted.begin(), sorted.end());
+  std::vector<size_t> out;
+  for (size_t i = 0; i < sorted.size(); ++i)
+    if (i == 0 || sorted[i].point != sorted[i - 1].point) out.push_back(sorted[i].index);
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+Points without_repeats(const Points& points) {
+  Points out;
+  for (const size_t i : distinct(points)) out.push_back(points[i]);
+  return out;
+}
+
 Points shape_points(const Mesh& mesh) {
-  if (!has_area(mesh)) return mesh.vertices;
+  if (!has_area(mesh)) return without_repeats(mesh.vertices);
   Body body;
   body.rest = mesh;
   return SurfaceSampler(body).draw(RngKey{0, 0}.fold("doctor"), kSurfacePoints).on_rest(body);
@@ -134,15 +160,6 @@ double one_sidedness(const Points& points, double spacing) {
     if (all >= 0.15 * static_cast<double>(rays.size())) most = std::max(most, one / all);
   }
   return most;
-}
-
-size_t duplicates(const Points& points) {
-  std::vector<std::array<float, 3>> sorted;
-  for (const Point& p : points) sorted.push_back({p.x(), p.y(), p.z()});
-  std::sort(sorted.begin(), sorted.end());
-  size_t out = 0;
-  for (size_t i = 1; i < sorted.size(); ++i) out += sorted[i] == sorted[i - 1];
-  return out;
 }
 
 Borders borders(const Mesh& mesh) {

@@ -9,8 +9,14 @@
 
 namespace restage {
 
+/// Indices of the points that are not exactly equal to an earlier one, in order. Repeats are no
+/// measurements: a depth camera's pixels without answer are all at one place.
+std::vector<size_t> distinct(const Points& points);
+/// Those points.
+Points without_repeats(const Points& points);
+
 /// Points evenly over the surface, so that a face modelled in detail weighs no more than a back; of
-/// a cloud its own points. The same for the same mesh.
+/// a cloud its own points, each once. The same for the same mesh.
 Points shape_points(const Mesh& mesh);
 
 /// A person's points and what is wrong with the rest.
@@ -47,9 +53,6 @@ std::optional<std::array<double, 2>> arm_angles(const Points& points);
 /// Share of the rays through the cloud, from the direction where it is largest, that hit one side
 /// only: about 0.3 of a closed body, 0.8 of what one depth camera saw.
 double one_sidedness(const Points& points, double spacing);
-
-/// Points that are exactly equal to an earlier one.
-size_t duplicates(const Points& points);
 
 /// Edges with one triangle only, and how many closed lines they make.
 struct Borders {

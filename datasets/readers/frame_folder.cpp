@@ -47,19 +47,32 @@ class FileFrames : public FrameSource {
   size_t at_ = 0;
 };
 
+void check_sequence(const std::string& path, int64_t sequence, int64_t sequences) {
+  if (sequence >= 0 && sequence < sequences) return;
+  throw InputError(path, "has no sequence number " + std::to_string(sequence),
+                   sequences == 1 ? "it holds one, number 0"
+                                  : "give a number from 0 to " + std::to_string(sequences - 1));
+}
+
 /// What scans and predictions share: a data set of points read piece by piece.
 class Hdf5Frames : public FrameSource {
  public:
   Hdf5Frames(h5::File file, h5::Dataset set, int64_t frames)
-      : file_(std::move(file)), set_(std::move(set)), frames_(frames), fps_(read_fps(file_)) {
-    if (frames_ == 0)
-      throw InputError(set_.where(), "holds no frames", "give a file with at least one frame");
+      : file_(std::move(file)), set_(std::move(set)), end_(frames), fps_(read_fps(file_)) {
     sequence_ = file_.has("/sequence_offset")
-                    ? read_offsets(file_, "/sequence_offset", frames_, true)
-                    : std::vector<int64_t>{0, frames_};
+                    ? read_offsets(file_, "/sequence_offset", frames, true)
+                    : std::vector<int64_t>{0, frames};
+    require_frames();
+  }
+  /// From now on the file is this sequence.
+  void choose(int64_t sequence) {
+    check_sequence(file_.path(), sequence, sequences());
+    begin_ = at_ = sequence_[static_cast<size_t>(sequence)];
+    end_ = sequence_[static_cast<size_t>(sequence) + 1];
+    require_frames();
   }
   std::optional<Frame> next() override {
-    if (at_ == frames_) return std::nullopt;
+    if (at_ == end_) return std::nullopt;
     Frame frame;
     frame.source = file_.path() + ":" + std::to_string(at_);
     const int64_t row = read(at_, values_);
@@ -74,9 +87,10 @@ class Hdf5Frames : public FrameSource {
     ++at_;
     return frame;
   }
-  void skip() override { at_ = std::min(at_ + 1, frames_); }
-  void rewind() override { at_ = 0; }
-  int64_t frames() const override { return frames_; }
+  void skip() override { at_ = std::min(at_ + 1, end_); }
+  void rewind() override { at_ = begin_; }
+  int64_t frames() const override { return end_ - begin_; }
+  int64_t sequences() const override { return static_cast<int64_t>(sequence_.size()) - 1; }
   double fps() const override { return fps_; }
 
  protected:
@@ -87,7 +101,11 @@ class Hdf5Frames : public FrameSource {
   std::vector<Triangle> faces_;
 
  private:
-  int64_t frames_, at_ = 0;
+  void require_frames() const {
+    if (begin_ == end_)
+      throw InputError(set_.where(), "holds no frames", "give a file with at least one frame");
+  }
+  int64_t begin_ = 0, end_, at_ = 0;
   double fps_;
   std::vector<int64_t> sequence_;
   std::vector<float> values_;
@@ -124,7 +142,7 @@ class VertexFrames : public Hdf5Frames {
   }
 };
 
-std::unique_ptr<FrameSource> open_hdf5(const std::string& path) {
+std::unique_ptr<Hdf5Frames> open_hdf5(const std::string& path) {
   h5::File file = open_schema_file(path);
   if (file.has("/points")) {
     h5::Dataset set = file.dataset("/points", {-1, 3});
@@ -214,6 +232,12 @@ std::unique_ptr<FrameSource> open_frame_files(std::vector<std::string> files, ui
 std::unique_ptr<FrameSource> open_frames(const std::string& path, const FrameOptions& options) {
   std::error_code error;
   const bool folder = std::filesystem::is_directory(path, error);
+  if (!folder && is_hdf5_name(path) && options.clip.empty()) {
+    auto frames = open_hdf5(path);
+    if (options.sequence) frames->choose(*options.sequence);
+    return frames;
+  }
+  if (options.sequence) check_sequence(path, *options.sequence, 1);
   if (!folder && is_gltf_name(path)) {
     Gltf file = read_gltf(path);
     if (!options.clip.empty() || !file.clips.empty())
@@ -228,7 +252,6 @@ std::unique_ptr<FrameSource> open_frames(const std::string& path, const FrameOpt
                        "give a folder of numbered frames");
     return open_frame_files(std::move(files), options.max_memory);
   }
-  if (is_hdf5_name(path)) return open_hdf5(path);
   if (!std::filesystem::exists(path, error))
     throw InputError(path, "does not exist",
                      "give a folder of frames, or a PLY, OBJ, glTF, NPY, NPZ or HDF5 file");

@@ -26,20 +26,22 @@ class FrameSource {
   virtual void skip() { next(); }      ///< leaves one frame out, reading as little as it can
   virtual void rewind() = 0;           ///< next() gives the first frame again
   virtual int64_t frames() const = 0;  ///< how many there are in all
-  virtual double fps() const = 0;      ///< the file's rate; kFps where nothing says one
+  virtual int64_t sequences() const { return 1; }
+  virtual double fps() const = 0;  ///< the file's rate; kFps where nothing says one
 };
 
 struct FrameOptions {
   std::string clip;                  ///< of glTF files: the animation to play; empty: the first
   uint64_t max_memory = kMaxMemory;  ///< what unpacking an array may take
+  std::optional<int64_t> sequence;   ///< only this one, from 0; else all, one after the other
 };
 
 /// A folder of numbered PLY, OBJ or glTF files (natural numeric order: f2 before f10; other files
 /// are left out), one PLY/OBJ file, an HDF5 file of scans or predictions (their vertices), a glTF
 /// file (its surface performing an animation at 30 fps, or at rest if it has none), or arrays of
 /// points, NPY or NPZ (array_frames.h): one of shape [N, 3] or [F, N, 3], or, without meshes beside
-/// them, a folder of [N, 3]. InputError if there is nothing to read, or a clip is named where there
-/// are none.
+/// them, a folder of [N, 3]. InputError if there is nothing to read, or a clip or sequence is named
+/// that is not there.
 std::unique_ptr<FrameSource> open_frames(const std::string& path, const FrameOptions& options = {});
 
 /// The files of a folder that are its frames, in order; empty if it has none.

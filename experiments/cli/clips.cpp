@@ -14,16 +14,13 @@ bool ends_with_hdf5(const std::string& path) {
   return path.ends_with(".h5") || path.ends_with(".hdf5");
 }
 
-[[noreturn]] void no_such_sequence(const std::string& path, int64_t sequence) {
-  throw InputError(path, "has no sequence number " + std::to_string(sequence),
-                   "count sequences from 0");
-}
-
 /// Joints alone: enough points along each bone to see a stick figure.
 Clip stick_figure(const std::string& path, const std::string& label, int64_t sequence) {
   const Prediction data = read_prediction(path);
   const auto s = static_cast<size_t>(sequence);
-  if (s + 1 >= data.sequence_offset.size()) no_such_sequence(path, sequence);
+  if (sequence < 0 || s + 1 >= data.sequence_offset.size())
+    throw InputError(path, "has no sequence number " + std::to_string(sequence),
+                     "count sequences from 0");
   Clip clip;
   clip.label = label;
   for (int64_t f = data.sequence_offset[s]; f < data.sequence_offset[s + 1]; ++f) {
@@ -50,18 +47,16 @@ bool has_joints_only(const std::string& path) {
 
 Clip read_clip(const std::string& path, const std::string& label, int64_t sequence) {
   if (has_joints_only(path)) return stick_figure(path, label, sequence);
-  const auto source = open_frames(path);
+  const auto source = open_frames(path, {.clip = "", .sequence = sequence});
   Clip clip;
   clip.label = label;
   bool surface = true;
   while (auto frame = source->next()) {
-    if (frame->sequence != sequence) continue;
     if (clip.frames.empty()) clip.faces = frame->faces;
     surface = surface && frame->faces == clip.faces &&
               (clip.frames.empty() || frame->points.size() == clip.frames[0].size());
     clip.frames.push_back(std::move(frame->points));
   }
-  if (clip.frames.empty()) no_such_sequence(path, sequence);
   if (!surface) clip.faces.clear();
   return clip;
 }

@@ -22,7 +22,8 @@ namespace {
 
 struct RetargetCommand {
   std::string source, target, weights, out, clip, up = "y", format = "ply";
-  std::optional<double> fps;  ///< of the source
+  std::optional<double> fps;        ///< of the source
+  std::optional<int64_t> sequence;  ///< of the source, from 0
   double scale = 1, anchor = RetargetOptions{}.anchor;
   bool force = false, profile = false;
   int samples = 4;
@@ -151,7 +152,10 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   check(c);
   const ModelSet models =
       load_models(weights_path(c.weights), {.skeleton = true, .smrm = true, .deformation = true});
-  const auto frames = open_frames(c.source, {c.clip, common.max_memory});
+  const auto frames = open_frames(c.source, {c.clip, common.max_memory, c.sequence});
+  if (!c.sequence && frames->sequences() > 1)
+    throw InputError(c.source, "holds " + std::to_string(frames->sequences()) + " sequences",
+                     "choose one with --sequence N, from 0");
   RetargetOptions options;
   options.fps = c.fps.value_or(frames->fps());
   options.force = c.force;
@@ -175,10 +179,7 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   const auto sink = make_sink(c, retargeter);
   Profile profile({"read", "extract", "motion", "deformation", "write", "frame"});
   int64_t in = 0, out = 0;
-  const int64_t sequence = frame->sequence;
   for (; frame; frame = next(), ++in) {
-    if (frame->sequence != sequence)
-      throw InputError(c.source, "holds several sequences", "give one sequence at a time");
     const Clock::time_point start = Clock::now();
     const auto made = retargeter.push(frame->points, frame->source);
     const Clock::time_point pushed = Clock::now();
@@ -225,6 +226,7 @@ void add_retarget(Program& program) {
   app.add_option("--out", c->out, "X.glb, X.bvh, X.h5, or a folder for PLY or OBJ frames")
       ->required();
   app.add_option("--clip", c->clip, "animation of a glTF source (default: the first)");
+  app.add_option("--sequence", c->sequence, "which sequence of an HDF5 source, from 0");
   app.add_option("--fps", c->fps, "frames per second of the source (default: the file's, else 30)");
   app.add_option("--source-up", c->up, "the source's up axis, y or z");
   app.add_option("--scale", c->scale, "the source's units in metres");

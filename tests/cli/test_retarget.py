@@ -237,7 +237,13 @@ class BadRetargeting(Retarget):
 
     def test_several_sequences(self):
         self.h5("two.h5", vertices=([4, 100, 3], numbers(1200, 1), "float32"), sequence_offset=([3], [0, 2, 4], "int64"))
-        self.bad("two.h5", "sequence", source="two.h5", outs=self.OUTS)
+        self.bad("two.h5", "holds 2 sequences", "--sequence", source="two.h5", outs=self.OUTS)
+        self.done(*self.call("second.h5", "--sequence", 1, source="two.h5"))
+        self.h5("one.h5", vertices=([2, 100, 3], numbers(1200, 1)[600:], "float32"))
+        self.done(*self.call("alone.h5", source="one.h5"))
+        self.assertEqual(self.bytes("second.h5"), self.bytes("alone.h5"))
+        for source, sequence in (("two.h5", 2), ("two.h5", -1), ("one.h5", 1), ("scans", 1)):
+            self.bad_input(self.call("out.h5", "--sequence=%d" % sequence, source=source), "no sequence number")
 
     def test_existing_results_survive_bad_input(self):
         for out in ("out.h5", "out.glb"):

@@ -210,6 +210,27 @@ TEST(Doctor, ADenseHeadMakesNothingElseStray) {
   EXPECT_EQ(d.find("pose")->what, "T-pose");
 }
 
+/// Pixels without depth, all at one place: judged as if they were not there, and in no time.
+TEST(Doctor, RepeatsOfAPointAreToldAndOtherwiseIgnored) {
+  Points points = scan(somebody());
+  points.push_back(Point(0, 0, 1));
+  const Diagnosis clean = examine_surface(cloud(points));
+  const size_t distinct_points = points.size();
+  points.insert(points.begin(), 3 * distinct_points, Point(0, 0, 1));
+  const Diagnosis d = examine_surface(cloud(points));
+  EXPECT_TRUE(notes(d, "duplicates", std::to_string(3 * distinct_points) + " points equal"));
+  EXPECT_EQ(d.size, clean.size);
+  EXPECT_EQ(d.height, clean.height);
+  EXPECT_EQ(d.orientation.up_sure, clean.orientation.up_sure);
+  ASSERT_NE(d.find("outliers"), nullptr);
+  EXPECT_EQ(d.find("outliers")->what, clean.find("outliers")->what);
+  EXPECT_EQ(mended(cloud(points), d).vertices.size(),
+            mended(cloud(without_repeats(points)), clean).vertices.size());
+
+  points.assign(200000, Point(0, 0, 0));  // nothing but such pixels
+  EXPECT_TRUE(examine_surface(cloud(points)).find("points"));
+}
+
 TEST(Doctor, StrayPointsAreCountedAndRemoved) {
   Points points = scan(somebody());
   const size_t clean = points.size();

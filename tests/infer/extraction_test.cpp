@@ -42,6 +42,16 @@ std::string error(const std::function<void()>& f) {
   return "none";
 }
 
+TEST(InferExtraction, RepeatsOfPointsDoNotMatterToTheLastBit) {
+  const auto model = small("skeleton/point_transformer");
+  for (const size_t n : {70u, 400u}) {
+    Points points = cloud(n);
+    const Joints once = extract_joints(*model, points, "c", RngKey{3, 0}, 2);
+    points.insert(points.begin(), 1000, points[7]);  // pixels without depth
+    EXPECT_EQ(extract_joints(*model, points, "c", RngKey{3, 0}, 2), once) << n;
+  }
+}
+
 TEST(InferExtraction, OrderOfPointsDoesNotMatterToTheLastBit) {
   for (const std::string name :
        {"skeleton/point_transformer", "skeleton/pointnet", "skeleton/patch_transformer"}) {
