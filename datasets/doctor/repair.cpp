@@ -1,5 +1,5 @@
+#include <algorithm>
 #include <array>
-#include <set>
 
 #include "datasets/doctor/examine.h"
 
@@ -23,22 +23,69 @@ Mesh kept(const Mesh& mesh, const std::vector<bool>& keep) {
   return out;
 }
 
+/// Calls `visit(i, j)` for points i < j of which j is equal to i.
+template <class Visit>
+void for_each_repeated(const Points& points, Visit&& visit) {
+  struct Numbered {
+    std::array<float, 3> at;
+    uint32_t number;
+    bool operator<(const Numbered& b) const { return at != b.at ? at < b.at : number < b.number; }
+  };
+  std::vector<Numbered> sorted(points.size());
+  for (size_t i = 0; i < points.size(); ++i)
+    sorted[i] = {{points[i].x(), points[i].y(), points[i].z()}, static_cast<uint32_t>(i)};
+  std::sort(sorted.begin(), sorted.end());
+  for (size_t k = 1; k < sorted.size(); ++k)
+    if (sorted[k].at == sorted[k - 1].at) visit(sorted[k - 1].number, sorted[k].number);
+}
+
+std::vector<bool> points_to_keep(const Points& points) {
+  const Parts parts = find_parts(points);
+  std::vector<bool> keep(points.size());
+  for (size_t i = 0; i < points.size(); ++i) keep[i] = parts.part[i] == Part::person;
+  for_each_repeated(points, [&](size_t, size_t later) { keep[later] = false; });
+  return keep;
+}
+
+/// Vertices of the pieces of a surface most of which is the person: a piece is what triangles and
+/// equal vertices (seams) hold together, and is kept or left out as a whole.
+std::vector<bool> vertices_to_keep(const Mesh& mesh) {
+  Pieces pieces(mesh.vertices.size());
+  for (const Triangle& f : mesh.faces)
+    for (const size_t k : {1, 2}) pieces.join(static_cast<size_t>(f[0]), static_cast<size_t>(f[k]));
+  for_each_repeated(mesh.vertices, [&](size_t a, size_t b) { pieces.join(a, b); });
+
+  const ShapePoints shape = located_shape_points(mesh);
+  const Parts parts = find_parts(shape.points);
+  std::vector<int> votes(mesh.vertices.size());
+  std::vector<bool> asked(mesh.vertices.size());
+  for (size_t i = 0; i < shape.points.size(); ++i) {
+    const size_t piece = pieces.of(shape.vertex[i]);
+    votes[piece] += parts.part[i] == Part::person ? 1 : -1;
+    asked[piece] = true;
+  }
+  // Pieces too small to have been looked at go with what they are beside.
+  std::vector<size_t> small;
+  Points at;
+  for (size_t i = 0; i < mesh.vertices.size(); ++i)
+    if (const size_t piece = pieces.of(i); !asked[piece]) {
+      asked[piece] = true;
+      small.push_back(piece);
+      at.push_back(mesh.vertices[i]);
+    }
+  const std::vector<Part> beside = parts_at(at, shape.points, parts);
+  for (size_t k = 0; k < small.size(); ++k) votes[small[k]] = beside[k] == Part::person ? 1 : -1;
+
+  std::vector<bool> keep(mesh.vertices.size());
+  for (size_t i = 0; i < keep.size(); ++i) keep[i] = votes[pieces.of(i)] >= 0;
+  return keep;
+}
+
 }  // namespace
 
 Mesh mended(const Mesh& mesh, const Diagnosis& diagnosis) {
-  Mesh out = mesh;
-  // A surface keeps its vertices (their numbers are what others refer to); a cloud loses what is
-  // not the person.
-  if (mesh.faces.empty()) {
-    const Parts parts = find_parts(mesh.vertices);
-    std::set<std::array<float, 3>> seen;
-    std::vector<bool> keep;
-    for (size_t i = 0; i < mesh.vertices.size(); ++i) {
-      const Point& p = mesh.vertices[i];
-      keep.push_back(parts.part[i] == Part::person && seen.insert({p.x(), p.y(), p.z()}).second);
-    }
-    out = kept(mesh, keep);
-  }
+  Mesh out =
+      kept(mesh, mesh.faces.empty() ? points_to_keep(mesh.vertices) : vertices_to_keep(mesh));
   if (diagnosis.transform)
     for (Point& p : out.vertices) p = (*diagnosis.transform)(p);
   return out;

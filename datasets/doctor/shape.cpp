@@ -34,11 +34,26 @@ bool has_area(const Mesh& mesh) {
 
 }  // namespace
 
-Points shape_points(const Mesh& mesh) {
-  if (!has_area(mesh)) return mesh.vertices;
+ShapePoints located_shape_points(const Mesh& mesh) {
+  ShapePoints out;
+  if (!has_area(mesh)) {
+    out.points = mesh.vertices;
+    out.vertex.resize(mesh.vertices.size());
+    std::iota(out.vertex.begin(), out.vertex.end(), size_t{0});
+    return out;
+  }
   Body body;
   body.rest = mesh;
-  return SurfaceSampler(body).draw(RngKey{0, 0}.fold("doctor"), kSurfacePoints).on_rest(body);
+  const SurfaceSamples samples =
+      SurfaceSampler(body).draw(RngKey{0, 0}.fold("doctor"), kSurfacePoints);
+  out.points = samples.on_rest(body);
+  for (size_t i = 0; i < samples.size(); ++i)
+    out.vertex.push_back(static_cast<size_t>(samples.vertices[3 * i]));
+  return out;
+}
+
+Points shape_points(const Mesh& mesh) {
+  return mesh.faces.empty() ? mesh.vertices : located_shape_points(mesh).points;
 }
 
 PersonShape shape_of(const Mesh& mesh) {

@@ -12,6 +12,12 @@ namespace restage {
 /// Points evenly over the surface, so that a face modelled in detail weighs no more than a back; of
 /// a cloud its own points. The same for the same mesh.
 Points shape_points(const Mesh& mesh);
+/// The same, and a vertex that each is at or beside: of a surface, a corner of its triangle.
+struct ShapePoints {
+  Points points;
+  std::vector<size_t> vertex;
+};
+ShapePoints located_shape_points(const Mesh& mesh);
 
 /// A person's points and what is wrong with the rest.
 struct PersonShape {
