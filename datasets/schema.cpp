@@ -34,6 +34,13 @@ void write_sequence_offset(h5::File& file, std::vector<int64_t> offset, int64_t 
   file.write<int64_t>("/sequence_offset", {static_cast<int64_t>(offset.size())}, offset);
 }
 
+void write_source_to_world(h5::File& file, const Eigen::Matrix<double, 3, 4>& transform) {
+  std::vector<double> rows;
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 4; ++c) rows.push_back(transform(r, c));
+  file.write<double>("/source_to_world", {3, 4}, rows);
+}
+
 void check_frames(const std::string& where, int64_t frames) {
   if (frames == 0)
     throw InputError(where, "holds no frames", "give a file with at least one frame");
@@ -216,6 +223,8 @@ void write_prediction(const std::string& path, const Prediction& prediction, con
                        prediction.vertices);
   write_sequence_offset(file, prediction.sequence_offset, prediction.frames);
   if (!prediction.faces.empty()) write_faces(file, "/faces", prediction.faces);
+  file.set_number("/", "fps", prediction.fps);
+  if (prediction.source_to_world) write_source_to_world(file, *prediction.source_to_world);
   file.commit();
 }
 
@@ -239,10 +248,7 @@ void PredictionWriter::append(const Joints& joints, const Points& vertices) {
 }
 
 void PredictionWriter::set_source_to_world(const Eigen::Matrix<double, 3, 4>& transform) {
-  std::vector<double> rows;
-  for (int r = 0; r < 3; ++r)
-    for (int c = 0; c < 4; ++c) rows.push_back(transform(r, c));
-  file_.write<double>("/source_to_world", {3, 4}, rows);
+  write_source_to_world(file_, transform);
 }
 
 void PredictionWriter::end_sequence() {

@@ -99,6 +99,10 @@ struct Prediction {
   std::vector<double> vertices;          ///< F x V x 3; empty if absent
   std::vector<int64_t> sequence_offset;  ///< S + 1, from 0 to F; {0, F} for one sequence
   std::vector<Triangle> faces;           ///< empty if absent
+  // Written, not read:
+  double fps = kFps;
+  /// PredictionWriter::set_source_to_world().
+  std::optional<Eigen::Matrix<double, 3, 4>> source_to_world;
 };
 
 /// /joints [F,22,3] and /vertices [F,V,3] (float32 or float64, either may be absent),

@@ -23,8 +23,9 @@ struct ExamineOptions {
 
 struct Diagnosis {
   std::string kind;  ///< "cloud", "mesh" or "frames"
-  int64_t frames = 1, faces = 0, fewest_points = 0, most_points = 0;
-  double fps = 0;   ///< of a sequence
+  int64_t frames = 1, sequences = 1, faces = 0, fewest_points = 0, most_points = 0;
+  int64_t shown = 0;  ///< the frame (from 0) that shows the worst of it
+  double fps = 0;     ///< of a sequence
   double size = 0;  ///< median distance of a person's points from their middle, in the data's units
   UnitGuess unit;
   Orientation orientation;
@@ -36,6 +37,8 @@ struct Diagnosis {
   std::set<int64_t> repeated;      ///< frames equal to the one before (from 0)
   std::map<int64_t, int64_t> gap;  ///< before frame (from 0): so many frames are missing
 
+  /// Whether so many missing frames are replaced by those around them: up to a second of them.
+  bool is_filled(int64_t missing) const { return static_cast<double>(missing) <= fps; }
   bool usable() const;  ///< no finding that makes the result nonsense
   const Finding* find(const std::string& topic) const;
 };
@@ -48,7 +51,7 @@ Diagnosis examine_surface(const Mesh& mesh, const ExamineOptions& options = {});
 Diagnosis examine_frames(FrameSource& source, const ExamineOptions& options = {});
 
 /// A frame without stray points and what is not the person, without repeated points (of a cloud),
-/// and in our frame.
+/// and in our frame. Of a surface only whole pieces are left out; the order of the rest stays.
 Mesh mended(const Mesh& mesh, const Diagnosis& diagnosis);
 
 /// Whether the joints named left are on the left of somebody whose toes point forwards: "right",

@@ -15,12 +15,16 @@ struct Similarity {
   double scale = 1;
   Mat3 rotation = Mat3::Identity();
   Vec3 offset = Vec3::Zero();  ///< in the units and axes of the data
-  Point operator()(const Point& p) const {
-    return (scale * (rotation * (p.cast<double>() - offset))).cast<float>();
-  }
+  Vec3 operator()(const Vec3& p) const { return scale * (rotation * (p - offset)); }
+  Point operator()(const Point& p) const { return (*this)(Vec3(p.cast<double>())).cast<float>(); }
   /// The way back: p = offset + rotation^T p' / scale.
   Point undo(const Point& p) const {
     return (rotation.transpose() * p.cast<double>() / scale + offset).cast<float>();
+  }
+  /// First `first`, then this one.
+  Similarity after(const Similarity& first) const {
+    return {scale * first.scale, rotation * first.rotation,
+            first.offset + first.rotation.transpose() * offset / first.scale};
   }
   bool is_identity() const { return scale == 1 && rotation.isIdentity(0) && offset.isZero(0); }
 };

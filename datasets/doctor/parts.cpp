@@ -33,19 +33,6 @@ struct Cloud {
 using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Cloud>, Cloud,
                                                  3, uint32_t>;
 
-class Pieces {
- public:
-  explicit Pieces(size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), size_t{0}); }
-  size_t of(size_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void join(size_t a, size_t b) { parent_[of(a)] = of(b); }
-
- private:
-  std::vector<size_t> parent_;
-};
-
 /// Distance of each point to its kNeighbours-th neighbour.
 std::vector<float> loneliness(const Tree& tree, const Points& points) {
   std::vector<float> out(points.size());
@@ -174,21 +161,31 @@ std::vector<size_t> evenly_spread(const Points& points) {
 
 }  // namespace
 
+Pieces::Pieces(size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), size_t{0}); }
+
+size_t Pieces::of(size_t i) {
+  while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+  return i;
+}
+
+std::vector<Part> parts_at(const Points& others, const Points& points, const Parts& parts) {
+  std::vector<Part> out;
+  if (points.empty()) return out;
+  const Neighbourhood near{points};
+  for (const Point& p : others) {
+    const auto [i, distance] = near.nearest(p);
+    out.push_back(distance > kLonely * parts.spacing ? Part::stray : parts.part[i]);
+  }
+  return out;
+}
+
 Parts find_parts(const Points& points) {
   const std::vector<size_t> judged = evenly_spread(points);
   Points some;
   for (const size_t i : judged) some.push_back(points[i]);
   Parts out = judge(some);
   out.judged = judged;
-  if (judged.size() < points.size()) {
-    const Neighbourhood near{some};
-    const std::vector<Part> part = std::move(out.part);
-    out.part.clear();
-    for (const Point& p : points) {
-      const auto [i, distance] = near.nearest(p);
-      out.part.push_back(distance > kLonely * out.spacing ? Part::stray : part[i]);
-    }
-  }
+  if (judged.size() < points.size()) out.part = parts_at(points, some, out);
   out.stray = static_cast<size_t>(std::count(out.part.begin(), out.part.end(), Part::stray));
   out.other = static_cast<size_t>(std::count(out.part.begin(), out.part.end(), Part::other));
   return out;

@@ -25,4 +25,18 @@ struct Parts {
 /// point may be there twice: distances between neighbours say what is usual.
 Parts find_parts(const Points& points);
 
+/// What other points are: what the nearest of `points` is, which are judged in `parts`, or stray.
+std::vector<Part> parts_at(const Points& others, const Points& points, const Parts& parts);
+
+/// Pieces of a whole, joined two by two.
+class Pieces {
+ public:
+  explicit Pieces(size_t n);
+  size_t of(size_t i);  ///< the same number for all members of a piece
+  void join(size_t a, size_t b) { parent_[of(a)] = of(b); }
+
+ private:
+  std::vector<size_t> parent_;
+};
+
 }  // namespace restage

@@ -135,7 +135,8 @@ class Sequence {
   size_t looked_ = 0, fewest_distinct_ = SIZE_MAX, repeats_ = 0, repeat_frames_ = 0;
   size_t strays_ = 0, stray_frames_ = 0, other_frames_ = 0, broken_frames_ = 0;
   std::optional<PersonShape> worst_;  // the frame with most of somebody else
-  int64_t worst_frame_ = 0;
+  int64_t worst_frame_ = 0, stray_frame_ = 0;
+  size_t most_strays_ = 0;
 };
 
 void Sequence::look_closely(const Frame& frame, int64_t index) {
@@ -153,6 +154,10 @@ void Sequence::look_closely(const Frame& frame, int64_t index) {
   repeats_ += repeats;
   repeat_frames_ += repeats > 0;
   strays_ += shape.parts.stray;
+  if (shape.parts.stray > most_strays_) {
+    most_strays_ = shape.parts.stray;
+    stray_frame_ = index;
+  }
   stray_frames_ += shape.parts.stray > 0;
   other_frames_ += shape.parts.other > 0;
   broken_frames_ += shape.parts.pieces > 1;
@@ -231,7 +236,7 @@ void Sequence::judge_repeats() {
     d_.keep_every = static_cast<int>(k);
     f.what = "every frame is there " + std::to_string(k) + " times: the true rate is " +
              number(d_.fps / static_cast<double>(k)) + " frames a second";
-    f.fix = "--fix keeps one of each";
+    f.fix = "--fix OUT.h5 keeps one of each, at that rate";
   } else if (runs.size() == 1) {
     f.what = "all frames are the same";
     f.fix = "give a sequence that moves";
@@ -252,11 +257,13 @@ void Sequence::judge_numbers() {
   }
   std::vector<int64_t> at;
   int64_t missing = 0;
+  bool filled = true;
   for (size_t i = 1; i < frames_.size(); ++i) {
     const int64_t ahead = (frames_[i].number - frames_[i - 1].number) / usual;
     if (ahead <= 1) continue;
     d_.gap[static_cast<int64_t>(i)] = ahead - 1;
     missing += ahead - 1;
+    filled = filled && d_.is_filled(ahead - 1);
     at.push_back(frames_[i].number);
   }
   if (missing > 0)
@@ -265,7 +272,9 @@ void Sequence::judge_numbers() {
          counted(static_cast<size_t>(missing), "number") + " missing in the files' names, before " +
              frame_list(at),
          1, "the numbering has gaps",
-         "--fix puts the nearest frame in their place, so that the timing is right"});
+         filled ? "--fix puts the nearest frame in their place, so that the timing is right"
+                : "--fix fills gaps of up to a second with the nearest frame; cut the sequence at "
+                  "longer ones"});
 }
 
 void Sequence::judge_jumps() {
@@ -326,6 +335,8 @@ Diagnosis Sequence::examine() {
   d_.fps = source_.fps();
   read();
   d_.frames = static_cast<int64_t>(frames_.size());
+  d_.sequences = frames_.back().sequence + 1;
+  d_.shown = worst_ ? worst_frame_ : stray_frame_;
   recognise(d_, median(sizes_), vote_, options_);
   judge_points(d_, fewest_distinct_);
   judge_units(d_);

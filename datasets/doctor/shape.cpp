@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <unordered_map>
 
 #include "datasets/doctor/orientation_model.h"
@@ -34,7 +33,7 @@ bool has_area(const Mesh& mesh) {
 
 }  // namespace
 
-std::vector<size_t> distinct(const Points& points) {
+std::vector<size_t> first_equals(const Points& points) {
   struct Entry {
     std::array<float, 3> point;
     size_t index;
@@ -47,10 +46,19 @@ std::vector<size_t> distinct(const Points& points) {
   for (size_t i = 0; i < points.size(); ++i)
     sorted.push_back({{points[i].x(), points[i].y(), points[i].z()}, i});
   std::sort(sorted.begin(), sorted.end());
-  std::vector<size_t> out;
+  std::vector<size_t> out(points.size());
   for (size_t i = 0; i < sorted.size(); ++i)
-    if (i == 0 || sorted[i].point != sorted[i - 1].point) out.push_back(sorted[i].index);
-  std::sort(out.begin(), out.end());
+    out[sorted[i].index] = i > 0 && sorted[i].point == sorted[i - 1].point
+                               ? out[sorted[i - 1].index]
+                               : sorted[i].index;
+  return out;
+}
+
+std::vector<size_t> distinct(const Points& points) {
+  const std::vector<size_t> first = first_equals(points);
+  std::vector<size_t> out;
+  for (size_t i = 0; i < first.size(); ++i)
+    if (first[i] == i) out.push_back(i);
   return out;
 }
 
@@ -60,11 +68,25 @@ Points without_repeats(const Points& points) {
   return out;
 }
 
-Points shape_points(const Mesh& mesh) {
-  if (!has_area(mesh)) return without_repeats(mesh.vertices);
+ShapePoints located_shape_points(const Mesh& mesh) {
+  ShapePoints out;
+  if (!has_area(mesh)) {
+    out.vertex = distinct(mesh.vertices);
+    for (const size_t i : out.vertex) out.points.push_back(mesh.vertices[i]);
+    return out;
+  }
   Body body;
   body.rest = mesh;
-  return SurfaceSampler(body).draw(RngKey{0, 0}.fold("doctor"), kSurfacePoints).on_rest(body);
+  const SurfaceSamples samples =
+      SurfaceSampler(body).draw(RngKey{0, 0}.fold("doctor"), kSurfacePoints);
+  out.points = samples.on_rest(body);
+  for (size_t i = 0; i < samples.size(); ++i)
+    out.vertex.push_back(static_cast<size_t>(samples.vertices[3 * i]));
+  return out;
+}
+
+Points shape_points(const Mesh& mesh) {
+  return located_shape_points(mesh).points;
 }
 
 PersonShape shape_of(const Mesh& mesh) {

@@ -9,6 +9,8 @@
 
 namespace restage {
 
+/// For each point the index of the first that is exactly equal to it: its own, if none is.
+std::vector<size_t> first_equals(const Points& points);
 /// Indices of the points that are not exactly equal to an earlier one, in order. Repeats are no
 /// measurements: a depth camera's pixels without answer are all at one place.
 std::vector<size_t> distinct(const Points& points);
@@ -18,6 +20,12 @@ Points without_repeats(const Points& points);
 /// Points evenly over the surface, so that a face modelled in detail weighs no more than a back; of
 /// a cloud its own points, each once. The same for the same mesh.
 Points shape_points(const Mesh& mesh);
+/// The same, and a vertex that each is at or beside: of a surface, a corner of its triangle.
+struct ShapePoints {
+  Points points;
+  std::vector<size_t> vertex;
+};
+ShapePoints located_shape_points(const Mesh& mesh);
 
 /// A person's points and what is wrong with the rest.
 struct PersonShape {

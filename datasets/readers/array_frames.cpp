@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "autograd/base/error.h"
+#include "datasets/readers/precision.h"
 #include "datasets/readers/text.h"
 
 namespace restage {
@@ -88,6 +89,7 @@ class ArrayFrames : public FrameSource {
     else
       read(frame);
     ++at_;
+    check_precision(frame.points, frame.source, kSubtract);
     return frame;
   }
   void skip() override {

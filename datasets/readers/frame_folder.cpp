@@ -8,6 +8,7 @@
 #include "datasets/readers/array_frames.h"
 #include "datasets/readers/gltf.h"
 #include "datasets/readers/mesh_io.h"
+#include "datasets/readers/precision.h"
 #include "datasets/schema.h"
 #include "datasets/schema_detail.h"
 
@@ -81,6 +82,7 @@ class Hdf5Frames : public FrameSource {
     frame.points.resize(values_.size() / 3);
     for (size_t i = 0; i < values_.size(); ++i)
       frame.points[i / 3][static_cast<int>(i % 3)] = values_[i];
+    check_precision(frame.points, frame.source, kSubtract);
     frame.faces = faces_;
     frame.sequence =
         std::upper_bound(sequence_.begin(), sequence_.end(), at_) - sequence_.begin() - 1;

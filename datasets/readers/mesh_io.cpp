@@ -9,6 +9,7 @@
 #include "datasets/readers/gltf.h"
 #include "datasets/readers/obj.h"
 #include "datasets/readers/ply.h"
+#include "datasets/readers/precision.h"
 
 namespace restage {
 namespace {
@@ -56,9 +57,22 @@ bool is_mesh_name(const std::string& path) {
   return ends_in(path, ".ply") || ends_in(path, ".obj") || is_gltf_name(path);
 }
 
-Mesh read_mesh(const std::string& path) { return parse_mesh(read_file(path), path); }
+Mesh read_mesh(const std::string& path) {
+  Mesh mesh = parse_mesh(read_file(path), path);
+  check_precision(mesh.vertices, path, "restage doctor FILE --fix OUT moves it to the origin");
+  return mesh;
+}
 
-Mesh parse_mesh(const std::string& content, const std::string& path) {
+Mesh read_mesh(const std::string& path, Vec3& origin) {
+  const std::string content = read_file(path);
+  Mesh mesh = parse_mesh(content, path);
+  origin.setZero();
+  if (is_gltf_name(path) || !is_blurred(mesh.vertices)) return mesh;  // glTF is single precision
+  origin = mesh.vertices[0].cast<double>();
+  return parse_mesh(content, path, origin);
+}
+
+Mesh parse_mesh(const std::string& content, const std::string& path, const Vec3& origin) {
   Mesh mesh;
   if (content.empty()) {
     throw InputError(path, "is empty and holds no points", "give a mesh or cloud that has some");
@@ -66,12 +80,12 @@ Mesh parse_mesh(const std::string& content, const std::string& path) {
     const Gltf file = parse_gltf(content, path);
     return gltf_mesh(file, gltf_rest(file));
   } else if (starts_as_ply(content)) {
-    mesh = parse_ply(content, path);
+    mesh = parse_ply(content, path, origin);
   } else if (ends_in(path, ".ply")) {
     throw InputError(path, "is not a PLY file (it does not begin with 'ply')",
                      "export the file again");
   } else if (ends_in(path, ".obj") || looks_like_obj(content)) {
-    mesh = parse_obj(content, path);
+    mesh = parse_obj(content, path, origin);
   } else {
     throw InputError(path, "is neither PLY, OBJ nor glTF", "convert it to one of them");
   }

@@ -1,6 +1,7 @@
 // Triangle meshes and clouds in PLY, OBJ and glTF files.
 // Reading never trusts a count in a file. InputError "file[:line]: what; fix" for anything wrong:
-// cut short, impossible counts, NaN or infinite coordinates, no points, a face index out of range.
+// cut short, impossible counts, NaN or infinite coordinates, no points, a face index out of range,
+// coordinates so far from the origin that single precision blurs them.
 #pragma once
 
 #include <string>
@@ -14,8 +15,12 @@ namespace restage {
 /// become fans of triangles; normals, colours, texture coordinates and groups are ignored; a file
 /// without faces is a cloud. Coordinates are kept as they are (metres by convention).
 Mesh read_mesh(const std::string& path);
-/// The same from memory.
-Mesh parse_mesh(const std::string& content, const std::string& path);
+/// The same of coordinates however far from the origin: where single precision would blur them
+/// (precision.h), `origin` is taken off them first, else it is zero.
+Mesh read_mesh(const std::string& path, Vec3& origin);
+/// From memory.
+Mesh parse_mesh(const std::string& content, const std::string& path,
+                const Vec3& origin = Vec3::Zero());
 
 /// Binary little-endian PLY, float32: keeps every bit. Atomic; WorkError on a full disk.
 void write_ply(const std::string& path, const Mesh& mesh);

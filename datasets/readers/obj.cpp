@@ -7,7 +7,7 @@ namespace restage {
 namespace {
 
 template <class Where>
-Point parse_vertex(std::string_view line, const Where& where) {
+Point parse_vertex(std::string_view line, const Vec3& origin, const Where& where) {
   Point point;
   for (int axis = 0; axis < 3; ++axis) {
     const std::string_view word = text::take_word(line);
@@ -16,7 +16,7 @@ Point parse_vertex(std::string_view line, const Where& where) {
       throw InputError(where(), "a vertex has fewer than 3 coordinates", "export the file again");
     if (!text::parse(word, value))
       throw InputError(where(), text::quote(word) + " is no number", "export the file again");
-    point[axis] = text::coordinate(value, where);
+    point[axis] = text::coordinate(value - origin[axis], where);
   }
   return point;
 }
@@ -38,7 +38,7 @@ int32_t parse_corner(std::string_view word, size_t vertices, const Where& where)
 
 }  // namespace
 
-Mesh parse_obj(std::string_view content, const std::string& path) {
+Mesh parse_obj(std::string_view content, const std::string& path, const Vec3& origin) {
   Mesh mesh;
   text::Lines lines(content);
   std::string_view line;
@@ -48,7 +48,7 @@ Mesh parse_obj(std::string_view content, const std::string& path) {
     if (keyword != "v" && keyword != "f") continue;  // normals, groups, materials, comments
     const auto where = [&] { return path + ":" + std::to_string(lines.number()); };
     if (keyword == "v") {
-      mesh.vertices.push_back(parse_vertex(line, where));
+      mesh.vertices.push_back(parse_vertex(line, origin, where));
       continue;
     }
     corners.clear();

@@ -8,7 +8,9 @@
 
 namespace restage {
 
-/// `content` is the whole file, `path` only names it in errors.
-Mesh parse_obj(std::string_view content, const std::string& path);
+/// `content` is the whole file, `path` only names it in errors. `origin` is taken off every vertex
+/// before it becomes a float.
+Mesh parse_obj(std::string_view content, const std::string& path,
+               const Vec3& origin = Vec3::Zero());
 
 }  // namespace restage

@@ -250,7 +250,8 @@ void skip_property(Rows& rows, const Property& property) {
   for (size_t i = 0; i < n; ++i) rows.next(property.type);
 }
 
-void read_vertices(Rows& rows, const Element& element, const std::string& path, Points& points) {
+void read_vertices(Rows& rows, const Element& element, const std::string& path, const Vec3& origin,
+                   Points& points) {
   std::array<int, 3> axis_seen = {0, 0, 0};
   std::vector<int> axis_of;  // for each property: 0, 1, 2 or -1
   for (const Property& p : element.properties) {
@@ -268,7 +269,8 @@ void read_vertices(Rows& rows, const Element& element, const std::string& path, 
         skip_property(rows, element.properties[k]);
       else
         point[axis_of[k]] =
-            text::coordinate(rows.next(element.properties[k].type), [&] { return rows.where(); });
+            text::coordinate(rows.next(element.properties[k].type) - origin[axis_of[k]],
+                             [&] { return rows.where(); });
     }
     rows.end_row();
     points.push_back(point);
@@ -303,7 +305,7 @@ void read_faces(Rows& rows, const Element& element, std::vector<Triangle>& faces
 
 }  // namespace
 
-Mesh parse_ply(std::string_view content, const std::string& path) {
+Mesh parse_ply(std::string_view content, const std::string& path, const Vec3& origin) {
   text::Lines lines(content);
   const Header header = parse_header(lines, path);
   Rows rows(lines, header, path);
@@ -311,7 +313,7 @@ Mesh parse_ply(std::string_view content, const std::string& path) {
   for (const Element& element : header.elements) {
     rows.begin(element);
     if (element.name == "vertex") {
-      read_vertices(rows, element, path, mesh.vertices);
+      read_vertices(rows, element, path, origin, mesh.vertices);
     } else if (element.name == "face") {
       read_faces(rows, element, mesh.faces);
     } else {

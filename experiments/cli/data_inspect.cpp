@@ -11,6 +11,7 @@
 
 #include "autograd/base/error.h"
 #include "datasets/builtin/bodies.h"
+#include "datasets/doctor/shape.h"
 #include "datasets/importers/import.h"
 #include "datasets/schema.h"
 #include "experiments/cli/clips.h"
@@ -101,6 +102,18 @@ Json to_json(const Inspection& found) {
 /// Number k of `n` drawn out of `all`, spread evenly.
 size_t spread(size_t k, size_t n, size_t all) { return n < 2 ? 0 : k * (all - 1) / (n - 1); }
 
+std::string rounded_to_digits(double x) {
+  char text[48];
+  std::snprintf(text, sizeof text, "%.2g", x);
+  return text;
+}
+
+void remark(std::vector<std::string>& remarks, size_t drawn, size_t all, const std::string& what) {
+  if (drawn < all)
+    remarks.push_back("drawn: " + std::to_string(drawn) + " of " + std::to_string(all) + " " +
+                      what);
+}
+
 void add_bodies(std::vector<Figure>& figures, const std::vector<Body>& bodies) {
   const size_t n = std::min(bodies.size(), kBodiesDrawn);
   for (size_t k = 0; k < n; ++k) {
@@ -130,10 +143,24 @@ void add_motions(std::vector<Figure>& figures, const std::vector<Motion>& motion
   }
 }
 
-void add_frames(std::vector<Figure>& figures, const std::string& file, double fps) {
-  const Clip clip = read_clip(file, "", 0);
+/// Brings frames to about a person's size, that a view of metres shows them: 1 if they are of some.
+float drawing_scale(const Clip& clip) {
+  const double size = shape_of({clip.frames[0], clip.faces}).size;
+  return size > 0 && (size < 0.1 || size > 1.5) ? static_cast<float>(0.39 / size) : 1;
+}
+
+void add_frames(std::vector<Figure>& figures, const std::string& file, double fps,
+                std::vector<std::string>& remarks) {
+  Clip clip = read_clip(file, "", 0);
+  if (const float scale = drawing_scale(clip); scale != 1) {
+    for (Points& frame : clip.frames)
+      for (Point& p : frame) p *= scale;
+    remarks.push_back("drawn " + rounded_to_digits(scale) +
+                      " times as large as it is; restage doctor says in what units it may be");
+  }
   const float floor = clip_floor(clip);
   const size_t n = std::min(clip.frames.size(), kFramesDrawn);
+  remark(remarks, n, clip.frames.size(), "frames");
   for (size_t k = 0; k < n; ++k) {
     const size_t f = spread(k, n, clip.frames.size());
     Figure figure{{{clip.frames[f], clip.faces}}, rounded(static_cast<double>(f) / fps, 2) + " s"};
@@ -142,19 +169,31 @@ void add_frames(std::vector<Figure>& figures, const std::string& file, double fp
   }
 }
 
-void plot(const InspectOptions& options, const std::string& data, const Inspection& found) {
+/// Draws; gives what was left out.
+std::vector<std::string> plot(const InspectOptions& options, const std::string& data,
+                              const Inspection& found) {
   std::vector<Figure> figures;
+  std::vector<std::string> remarks;
   if (found.kind == "scans" || found.kind == "prediction") {
-    add_frames(figures, data, found.fps);
+    if (const int64_t n = found.counts.at("sequences"); n > 1)
+      remarks.push_back("drawn: the first of " + std::to_string(n) + " sequences");
+    add_frames(figures, data, found.fps, remarks);
   } else {
     std::vector<Body> bodies;
     if (found.counts.contains("bodies")) bodies = read_bodies(data);
     add_bodies(figures, bodies);
-    if (found.counts.contains("motions")) add_motions(figures, read_motions(data), bodies);
+    remark(remarks, figures.size(), bodies.size(), "bodies");
+    if (found.counts.contains("motions")) {
+      const std::vector<Motion> motions = read_motions(data);
+      remark(remarks, std::min(motions.size(), kMotionsDrawn), motions.size(), "motions");
+      add_motions(figures, motions, bodies);
+    }
   }
   FigureSheetOptions sheet;
+  sheet.lines = remarks;
   sheet.title = options.file + ": " + found.kind;
   write_png(options.plot, figure_sheet(figures, sheet));
+  return remarks;
 }
 
 /// A data file that goes away with the object.
@@ -194,15 +233,20 @@ int run_inspect(const InspectOptions& options, const Common& common) {
   if (is_importable(options.file)) imported.emplace(options, common);
   const std::string& data = imported ? imported->path() : options.file;
   const Inspection found = inspect(data);
-  if (!options.plot.empty()) plot(options, data, found);
+  std::vector<std::string> remarks;
+  if (!options.plot.empty()) remarks = plot(options, data, found);
   if (common.json) {
     Json out = to_json(found);
     if (imported) out["reports"] = reports_json(imported->reports());
+    if (!options.plot.empty()) out["plot"] = {{"file", options.plot}, {"remarks", remarks}};
     print_json(out);
     return 0;
   }
   if (imported) print(reports_text(imported->reports(), common.verbose));
-  print(to_text(found) + (options.plot.empty() ? "" : "wrote " + options.plot + "\n"));
+  std::string text = to_text(found);
+  if (!options.plot.empty()) text += "wrote " + options.plot + "\n";
+  for (const std::string& line : remarks) text += "  " + line + "\n";
+  print(text);
   return 0;
 }
 

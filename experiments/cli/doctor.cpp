@@ -2,6 +2,7 @@
 // A file that is broken ends as bad input does anywhere else: one line, exit code 2. A new kind of
 // file: a function that examines it and a line in kKinds.
 #include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -18,8 +19,10 @@
 #include "datasets/importers/gltf_character.h"
 #include "datasets/readers/frame_folder.h"
 #include "datasets/readers/mesh_io.h"
+#include "datasets/readers/precision.h"
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
+#include "experiments/cli/doctor_repair.h"
 #include "experiments/cli/doctor_report.h"
 #include "nn/weights/safetensors.h"
 #include "train/config.h"
@@ -30,7 +33,8 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Options {
-  std::string path, picture, fix, up, facing;
+  std::string path, picture, up, facing;
+  std::optional<std::string> fix;
   std::optional<double> scale;
   bool target = false;
 };
@@ -41,12 +45,20 @@ struct Report {
   std::string kind;
   Json facts = Json::object();
   std::vector<Finding> findings;
-  std::optional<Diagnosis> diagnosis;  ///< of clouds, surfaces and sequences
+  std::optional<Diagnosis> diagnosis;  ///< of clouds, surfaces and sequences,
+  Subject subject;                     ///< and what was examined, drawn and repaired
   bool usable() const {
     return std::none_of(findings.begin(), findings.end(),
                         [](const Finding& f) { return f.weight == Weight::wrong; });
   }
 };
+
+/// Of file names: some programs shout.
+std::string small_letters(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
 
 // ---- scans, surfaces, sequences ----------------------------------------------------------------
 
@@ -68,14 +80,8 @@ ExamineOptions examine_options(const Options& options) {
   return out;
 }
 
-void adopt(Report& report, Diagnosis diagnosis) {
-  report.findings = diagnosis.findings;
-  report.diagnosis = std::move(diagnosis);
-}
-
-Report examine_mesh(const Options& options) {
-  const Mesh mesh = read_mesh(options.path);
-  Report out(mesh.faces.empty() ? "cloud" : "mesh");
+Report examine_one(const std::string& kind, Mesh mesh, const Vec3& origin, const Options& options) {
+  Report out(kind);
   Point low = mesh.vertices[0], high = mesh.vertices[0];
   for (const Point& p : mesh.vertices) {
     low = low.cwiseMin(p);
@@ -85,20 +91,59 @@ Report examine_mesh(const Options& options) {
   out.facts["points"] = mesh.vertices.size();
   if (!mesh.faces.empty()) out.facts["faces"] = mesh.faces.size();
   out.facts["size"] = {size.x(), size.y(), size.z()};
-  adopt(out, examine_surface(mesh, examine_options(options)));
+  out.diagnosis = examine_surface(mesh, examine_options(options));
+  out.findings = out.diagnosis->findings;
+  out.subject = {options.path, std::move(mesh), nullptr, std::nullopt, "", origin};
+  return out;
+}
+
+/// Points that were single precision far from the origin lie on a grid, where they are farthest.
+bool on_grid(const Points& points, const Vec3& origin) {
+  Eigen::Index axis = 0;
+  origin.cwiseAbs().maxCoeff(&axis);
+  const double step = rounding_step({Point::Constant(static_cast<float>(origin[axis]))});
+  return std::all_of(points.begin(), points.end(), [&](const Point& p) {
+    return std::remainder(static_cast<double>(p[axis]), step) == 0;
+  });
+}
+
+void judge_origin(Report& out) {
+  const Vec3& origin = out.subject.origin;
+  if (origin.isZero(0)) return;
+  Finding f{"origin", Weight::wrong, "", 1, "", "--fix moves it to the origin"};
+  char text[96];
+  std::snprintf(text, sizeof text, "lies around (%.7g %.7g %.7g), far from the origin", origin.x(),
+                origin.y(), origin.z());
+  f.what = text;
+  f.evidence = "retargeting works in single precision, which is too coarse there";
+  if (on_grid(out.subject.mesh->vertices, origin)) {
+    f.what += ", and was rounded to the coarse steps of single precision there";
+    f.fix = "export it again in double precision, or with an offset subtracted";
+  }
+  out.findings.push_back(f);
+}
+
+Report examine_mesh(const Options& options) {
+  Vec3 origin;
+  Mesh mesh = read_mesh(options.path, origin);
+  const char* kind = mesh.faces.empty() ? "cloud" : "mesh";
+  Report out = examine_one(kind, std::move(mesh), origin, options);
+  judge_origin(out);
   return out;
 }
 
 Report examine_sequence(const Options& options) {
   Report out("frames");
-  const auto source = open_frames(options.path);
+  auto source = open_frames(options.path);
   Diagnosis d = examine_frames(*source, examine_options(options));
   out.facts["frames"] = d.frames;
   out.facts["fps"] = d.fps;
   out.facts["fewest_points"] = d.fewest_points;
   out.facts["most_points"] = d.most_points;
   if (d.faces > 0) out.facts["faces"] = d.faces;
-  adopt(out, std::move(d));
+  out.findings = d.findings;
+  out.diagnosis = std::move(d);
+  out.subject = {options.path, std::nullopt, std::move(source), std::nullopt, ""};
   return out;
 }
 
@@ -116,12 +161,11 @@ Report examine_folder(const Options& options) {
 
 /// A rigged character, as retarget would take it: in T-pose, in our frame.
 Report examine_character(const Options& options) {
-  const TargetMesh target = read_target(options.path);
-  Report out("character");
-  out.facts["points"] = target.mesh.vertices.size();
-  out.facts["faces"] = target.mesh.faces.size();
+  TargetMesh target = read_target(options.path);
+  Report out = examine_one("character", std::move(target.mesh), Vec3::Zero(), options);
+  out.subject.taken_as = "the surface that retarget takes as its target";
+  out.facts["examined"] = out.subject.taken_as;
   for (const auto& [name, value] : target.report.facts) out.facts[name] = value;
-  adopt(out, examine_surface(target.mesh, examine_options(options)));
   return out;
 }
 
@@ -138,7 +182,8 @@ void judge_hands(Report& out, const std::vector<Joints>& frames) {
     out.findings.push_back({"handedness", share > 0.9 ? Weight::wrong : Weight::note,
                             "left and right are exchanged: a mirror image", share,
                             "with toes forwards, the joints named left are on the right",
-                            "mirror it (x to -x) where it was made, or exchange the names"});
+                            "mirror it (x to -x) where it was made, or exchange the names; --fix "
+                            "cannot know which"});
   else
     out.findings.push_back({"handedness", Weight::fact, "right-handed, left is left", share,
                             "with toes forwards, the joints named left are on the left", ""});
@@ -164,6 +209,7 @@ Report examine_hdf5(const Options& options) {
   if (found.kind == "scans" || found.counts.contains("vertices")) {
     if (found.kind == "scans" || found.kind == "prediction") out = examine_sequence(options);
     out.kind = found.kind;
+    out.subject.stored = found;
   }
   for (const auto& [name, count] : found.counts) out.facts[name] = count;
   out.facts["units"] = found.units;
@@ -180,7 +226,8 @@ Report examine_hdf5(const Options& options) {
 
 /// A BVH or AMC file.
 Report examine_recording(const Options& options) {
-  const bool amc = options.path.ends_with(".amc") || options.path.ends_with(".amc.xz");
+  const std::string file = small_letters(options.path);
+  const bool amc = file.ends_with(".amc") || file.ends_with(".amc.xz");
   const MotionClip clip = amc ? read_amc(options.path, "", {}) : read_bvh(options.path);
   Report out(amc ? "amc" : "bvh");
   for (const auto& [name, value] : clip.report.facts) out.facts[name] = value;
@@ -245,8 +292,9 @@ Report examine(const Options& options) {
   std::error_code ignored;
   if (fs::is_directory(path, ignored)) return examine_folder(options);
   const std::string start = first_bytes(path);
+  const std::string name = small_letters(path);
   for (const Kind& kind : kKinds) {
-    const auto named = [&](const std::string& ending) { return path.ends_with(ending); };
+    const auto named = [&](const std::string& ending) { return name.ends_with(ending); };
     if (start.starts_with(kind.start) &&
         (kind.endings.empty() || std::any_of(kind.endings.begin(), kind.endings.end(), named)))
       return kind.examine(options);
@@ -258,7 +306,12 @@ Report examine(const Options& options) {
 
 // ---- the command -------------------------------------------------------------------------------
 
-void print_report(const Options& options, const Report& found, const std::string& sidecar,
+struct Written {
+  std::string picture;  ///< empty: none
+  std::optional<Repaired> fix;
+};
+
+void print_report(const Options& options, const Report& found, const Written& written,
                   const Common& common) {
   if (common.json) {
     Json notes = Json::array(), findings = Json::array();
@@ -270,9 +323,9 @@ void print_report(const Options& options, const Report& found, const std::string
                      {"facts", found.facts}, {"findings", findings}, {"notes", notes}};
     if (found.diagnosis) document["frame"] = frame_json(*found.diagnosis);
     if (found.diagnosis && found.diagnosis->transform)
-      document["transform"] = to_json(*found.diagnosis->transform);
-    if (!options.fix.empty()) document["fixed"] = options.fix;
-    if (!sidecar.empty()) document["transform_file"] = sidecar;
+      document["transform"] = to_json(from_file(found.subject, *found.diagnosis->transform));
+    if (!written.picture.empty()) document["picture"] = written.picture;
+    if (written.fix) document["fixed"] = to_json(*written.fix);
     return print_json(document);
   }
   std::string text =
@@ -282,38 +335,47 @@ void print_report(const Options& options, const Report& found, const std::string
   for (const Weight weight : {Weight::wrong, Weight::note, Weight::fact})
     for (const Finding& f : found.findings)
       if (f.weight == weight) text += to_text(f);
-  if (found.diagnosis && found.diagnosis->transform) text += to_text(*found.diagnosis->transform);
-  if (!options.fix.empty()) text += "wrote " + options.fix + "\n";
-  if (!sidecar.empty()) text += "wrote " + sidecar + "\n";
-  if (!options.picture.empty()) text += "wrote " + options.picture + "\n";
+  if (found.diagnosis && found.diagnosis->transform)
+    text += to_text(from_file(found.subject, *found.diagnosis->transform));
+  if (written.fix) text += to_text(*written.fix);
+  if (!written.picture.empty()) text += "wrote " + written.picture + "\n";
   print(text);
 }
 
-/// Whether what --fix wrote is usable.
-bool mended_well(const Options& options) {
+/// What is wrong with what --fix wrote. What the user said of the data's frame holds of ours now.
+std::vector<Finding> still_wrong(const Options& options) {
   Options again;
-  again.path = options.fix;
+  again.path = *options.fix;
   again.target = options.target;
-  return examine(again).usable();
+  if (options.scale) again.scale = 1;
+  if (!options.up.empty()) again.up = "+y";
+  if (!options.facing.empty()) again.facing = "+z";
+  std::vector<Finding> out = examine(again).findings;
+  std::erase_if(out, [](const Finding& f) { return f.weight != Weight::wrong; });
+  return out;
 }
 
 int run_doctor(const Options& options, const Common& common) {
+  if (options.fix) repair_kind(*options.fix);
   const Report found = examine(options);
-  if (!found.diagnosis && (!options.picture.empty() || !options.fix.empty()))
+  if (!found.diagnosis && (!options.picture.empty() || options.fix))
     throw InputError(
         options.path,
         "is of the kind '" + found.kind + "', which is neither drawn nor repaired here",
         "give a scan, a surface or a sequence of frames; restage data inspect --plot draws data "
         "files");
-  std::string sidecar;
+  Written written;
   if (!options.picture.empty()) {
-    const auto first = open_frames(options.path)->next();
-    write_picture(options.picture, options.path + ": " + found.kind, {first->points, first->faces},
-                  *found.diagnosis);
+    write_picture(options.picture, options.path + ": " + found.kind,
+                  frame_of(found.subject, found.diagnosis->shown), *found.diagnosis);
+    written.picture = options.picture;
   }
-  if (!options.fix.empty()) sidecar = write_repaired(options.path, options.fix, *found.diagnosis);
-  print_report(options, found, sidecar, common);
-  return (options.fix.empty() ? found.usable() : mended_well(options)) ? 0 : 1;
+  if (options.fix) {
+    written.fix = write_repaired(found.subject, *options.fix, *found.diagnosis);
+    written.fix->still_wrong = still_wrong(options);
+  }
+  print_report(options, found, written, common);
+  return (written.fix ? written.fix->still_wrong.empty() : found.usable()) ? 0 : 1;
 }
 
 }  // namespace
@@ -330,7 +392,9 @@ void add_doctor(Program& program) {
                  "HDF5, PLY, OBJ, BVH, safetensors, YAML, or a folder of frames")
       ->required();
   app.add_option("--picture", options->picture, "draw it from front, side and top (PNG)");
-  app.add_option("--fix", options->fix, "write it mended: .ply, .obj, .h5, or a folder of frames");
+  app.add_option("--fix", options->fix,
+                 "write it mended: X.ply or X.obj (one cloud or surface), X.h5 (a sequence), or a "
+                 "folder of frames");
   app.add_flag("--target", options->target, "it is meant as a target: in T-pose, facing +z");
   app.add_option("--scale", options->scale, "metres per unit, where you know better");
   app.add_option("--up", options->up, "the direction that is up: x, y, z, --up=-x ...");

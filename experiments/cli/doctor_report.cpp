@@ -4,12 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
-#include "datasets/readers/mesh_io.h"
-#include "datasets/schema.h"
 #include "infer/render/figures.h"
-#include "infer/writers/frames.h"
 
 namespace restage::cli {
 namespace {
@@ -20,11 +16,6 @@ std::string digits(double x) {
   char text[32];
   std::snprintf(text, sizeof text, "%.6g", x == 0 ? 0.0 : x);  // no minus zero
   return text;
-}
-
-std::string name_of(const std::string& path) {
-  const auto slash = path.find_last_of('/', path.find_last_not_of('/'));
-  return slash == std::string::npos ? path : path.substr(slash + 1);
 }
 
 // ---- picture -----------------------------------------------------------------------------------
@@ -40,7 +31,7 @@ Points dotted(const Point& from, const Point& to) {
 
 void append(Points& to, const Points& from) { to.insert(to.end(), from.begin(), from.end()); }
 
-/// The person's surface or points, and what else there is, moved by `move`.
+/// The person's surface or points, what else there is, and stray points, moved by `move`.
 template <class Move>
 std::vector<FigureLayer> layers_of(const Mesh& mesh, Move&& move) {
   FigureLayer person{{}, mesh.faces, kPerson}, stray{{}, {}, kStray}, other{{}, {}, kOther};
@@ -54,10 +45,7 @@ std::vector<FigureLayer> layers_of(const Mesh& mesh, Move&& move) {
   }
   if (!mesh.faces.empty())
     for (const Point& p : mesh.vertices) person.points.push_back(move(p));
-  std::vector<FigureLayer> out = {person};
-  for (const FigureLayer& layer : {stray, other})
-    if (!layer.points.empty()) out.push_back(layer);
-  return out;
+  return {person, other, stray};
 }
 
 /// Height beside the person and an arrow on the floor where they face.
@@ -108,6 +96,25 @@ Json to_json(const Similarity& t) {
           {"offset", {t.offset.x(), t.offset.y(), t.offset.z()}}};
 }
 
+std::optional<Similarity> similarity_from(const std::string& json) {
+  const Json note = Json::parse(json, nullptr, false);
+  Similarity out;
+  try {
+    out.scale = note.at("scale").get<double>();
+    for (int r = 0; r < 3; ++r) {
+      out.offset[r] = note.at("offset").at(static_cast<size_t>(r)).get<double>();
+      for (int c = 0; c < 3; ++c)
+        out.rotation(r, c) =
+            note.at("rotation").at(static_cast<size_t>(r)).at(static_cast<size_t>(c)).get<double>();
+    }
+  } catch (const Json::exception&) {
+    return std::nullopt;
+  }
+  const bool good = out.scale > 0 && std::isfinite(out.scale) && out.rotation.allFinite() &&
+                    out.offset.allFinite();
+  return good ? std::optional(out) : std::nullopt;
+}
+
 std::string to_text(const Finding& f) {
   char head[64];
   std::snprintf(head, sizeof head, "  %-6s%-16s", name(f.weight), f.topic.c_str());
@@ -131,6 +138,26 @@ std::string to_text(const Similarity& t) {
          digits(t.offset.z()) + "]\n";
 }
 
+Json to_json(const Repaired& repaired) {
+  Json out = {{"file", repaired.file},
+              {"transform_file", nullptr},
+              {"usable", repaired.still_wrong.empty()},
+              {"still_wrong", Json::array()},
+              {"remarks", repaired.remarks}};
+  if (!repaired.transform_file.empty()) out["transform_file"] = repaired.transform_file;
+  for (const Finding& f : repaired.still_wrong) out["still_wrong"].push_back(to_json(f));
+  return out;
+}
+
+std::string to_text(const Repaired& repaired) {
+  std::string text =
+      "wrote " + repaired.file + (repaired.still_wrong.empty() ? "\n" : ", still not usable:\n");
+  for (const Finding& f : repaired.still_wrong) text += to_text(f);
+  for (const std::string& remark : repaired.remarks) text += "  " + remark + "\n";
+  if (!repaired.transform_file.empty()) text += "wrote " + repaired.transform_file + "\n";
+  return text;
+}
+
 void write_picture(const std::string& out, const std::string& title, const Mesh& mesh,
                    const Diagnosis& d) {
   if (!out.ends_with(".png")) throw InputError(out, "names no picture", "end --picture in .png");
@@ -146,109 +173,22 @@ void write_picture(const std::string& out, const std::string& title, const Mesh&
   Figure raw{
       layers_of(mesh,
                 [&](const Point& p) { return Point((p - middle) * static_cast<float>(size)); }),
-      "as it is, y upwards", 32, 9, 0};
+      "all of it as it is, y upwards", 32, 9, 0};
+  raw.whole = true;
   raw.floor = static_cast<float>(quantile(raw.layers[0].points, Vec3::UnitY(), 0.003));
   std::vector<Figure> figures = {raw};
   if (d.transform) {
     std::vector<FigureLayer> layers = layers_of(mesh, *d.transform);
-    layers.push_back(marks(layers[0], d));
-    figures.push_back({layers, "front", 0, 4, 0});
-    figures.push_back({layers, "left side", 90, 4, 0});
-    figures.push_back({layers, "top", 0, 89, 0});
+    layers.insert(layers.begin() + 1, marks(layers[0], d));
+    const size_t framed = 3;  // person, marks, others; stray points may lie anywhere
+    figures.push_back({layers, "front", 0, 4, 0, framed});
+    figures.push_back({layers, "left side", 90, 4, 0, framed});
+    figures.push_back({layers, "top", 0, 89, 0, framed});
   }
   for (const Finding& f : d.findings)
     options.lines.push_back(std::string(name(f.weight)) + ": " + f.topic + ": " + f.what +
                             (f.weight != Weight::fact && !f.fix.empty() ? " -> " + f.fix : ""));
   write_png(out, figure_sheet(figures, options));
-}
-
-// ---- repair ------------------------------------------------------------------------------------
-
-namespace {
-
-/// Where frames go: an HDF5 file or a folder.
-class FrameSink {
- public:
-  FrameSink(const std::string& out, const FileInfo& info, double fps) {
-    if (out.ends_with(".h5"))
-      scans_.emplace(out, info, fps);
-    else
-      folder_.emplace(out, std::vector<Triangle>{});
-    out_ = out;
-  }
-  void push(const Mesh& mesh) {
-    if (mesh.vertices.empty())
-      throw InputError(out_, "a frame would be empty", "leave it out of the input");
-    if (folder_) return folder_->push(mesh.vertices, mesh.faces);
-    if (!mesh.faces.empty())
-      throw InputError(out_, "cannot hold surfaces", "give a folder to --fix");
-    scans_->append(mesh.vertices);
-  }
-  void end_sequence() {
-    if (scans_) scans_->end_sequence();
-  }
-  void commit() {
-    if (scans_) scans_->commit();
-    if (folder_) folder_->commit();
-  }
-
- private:
-  std::string out_;
-  std::optional<ScanWriter> scans_;
-  std::optional<FrameFolderWriter> folder_;
-};
-
-void write_frames(const std::string& path, FrameSink& sink, const Diagnosis& d) {
-  const auto source = open_frames(path);
-  std::optional<Mesh> previous;
-  int64_t sequence = 0;
-  for (int64_t i = 0; const auto frame = source->next(); ++i) {
-    if (frame->sequence != sequence) {
-      if (i > 0) sink.end_sequence();
-      sequence = frame->sequence;
-      previous.reset();
-    }
-    if (i % d.keep_every != 0) continue;
-    Mesh mesh = mended({frame->points, frame->faces}, d);
-    // A gap of up to a second: the nearest frame in time stands in.
-    const auto gap = d.gap.find(i);
-    if (gap != d.gap.end() && previous && static_cast<double>(gap->second) <= d.fps)
-      for (int64_t k = 0; k < gap->second; ++k) sink.push(2 * k < gap->second ? *previous : mesh);
-    sink.push(mesh);
-    previous = std::move(mesh);
-  }
-  sink.commit();
-}
-
-bool is_hdf5(const std::string& path) { return path.ends_with(".h5") || path.ends_with(".hdf5"); }
-
-}  // namespace
-
-std::string write_repaired(const std::string& path, const std::string& out, const Diagnosis& d) {
-  if (!d.transform)
-    throw InputError(path, "cannot be repaired: its up axis or its units cannot be told",
-                     "say them with --up and --scale");
-  Json note = to_json(*d.transform);
-  note["from"] = name_of(path);
-  FileInfo info;
-  if (is_hdf5(path)) info.license = inspect(path).license;
-  info.provenance = "repaired by restage doctor from " + name_of(path);
-  info.transform = note.dump();
-  const double fps = d.fps > 0 ? d.fps / d.keep_every : kFps;
-  if (is_mesh_name(out)) {
-    if (d.kind == "frames")
-      throw InputError(out, "is one frame only", "give a folder or an .h5 file to --fix");
-    const Mesh mesh = mended(read_mesh(path), d);
-    out.ends_with("obj") || out.ends_with("OBJ") ? write_obj(out, mesh) : write_ply(out, mesh);
-  } else {
-    FrameSink sink(out, info, fps);
-    write_frames(path, sink, d);
-  }
-  if (out.ends_with(".h5")) return "";
-  note["fps"] = fps;
-  const std::string sidecar = out.substr(0, out.find_last_not_of('/') + 1) + ".transform.json";
-  write_file_atomically(sidecar, note.dump(2) + "\n");
-  return sidecar;
 }
 
 }  // namespace restage::cli

@@ -1,9 +1,11 @@
-// What `restage doctor` says about scans, surfaces and sequences, draws of them, and writes.
+// What `restage doctor` says about scans, surfaces and sequences, and draws of them.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "datasets/doctor/examine.h"
+#include "experiments/cli/doctor_repair.h"
 #include "experiments/cli/output.h"
 
 namespace restage::cli {
@@ -14,19 +16,18 @@ Json frame_json(const Diagnosis& diagnosis);
 Json to_json(const Finding& finding);
 /// {"scale", "rotation" (rows), "offset", "formula"}.
 Json to_json(const Similarity& transform);
+/// The same read again; nothing if the text is no such document.
+std::optional<Similarity> similarity_from(const std::string& json);
+/// {"file", "transform_file", "usable", "still_wrong", "remarks"}.
+Json to_json(const Repaired& repaired);
 /// One finding as a few lines of text.
 std::string to_text(const Finding& finding);
 std::string to_text(const Similarity& transform);
+std::string to_text(const Repaired& repaired);
 
 /// Front, side and top of what was found, brought into our frame, and as it is: the person blue,
 /// stray points red, somebody or something else orange, marks for floor, height and facing.
 void write_picture(const std::string& out, const std::string& title, const Mesh& mesh,
                    const Diagnosis& diagnosis);
-
-/// Writes the repaired file (X.ply, X.obj, X.h5, or a folder) and its transform: in an HDF5 file's
-/// attribute `transform`, else in the file returned, X.transform.json beside it; empty for HDF5.
-/// InputError if it cannot be told how to repair it.
-std::string write_repaired(const std::string& path, const std::string& out,
-                           const Diagnosis& diagnosis);
 
 }  // namespace restage::cli

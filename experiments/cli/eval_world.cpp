@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "autograd/base/error.h"
 #include "datasets/schema.h"
+#include "experiments/cli/doctor_report.h"
 
 namespace restage::cli {
 
@@ -38,29 +38,14 @@ std::optional<WorldMap> source_to_world(const std::string& truth) {
 }
 
 WorldMap mended_to_world(const std::string& mended, const WorldMap& to_world) {
-  const std::string text = inspect(mended).transform;
-  const auto note = nlohmann::json::parse(text, nullptr, false);
-  double scale = 0;
-  Mat3 rotation;
-  Vec3 offset;
-  try {
-    scale = note.at("scale").get<double>();
-    for (int r = 0; r < 3; ++r) {
-      offset[r] = note.at("offset").at(static_cast<size_t>(r)).get<double>();
-      for (int c = 0; c < 3; ++c)
-        rotation(r, c) =
-            note.at("rotation").at(static_cast<size_t>(r)).at(static_cast<size_t>(c)).get<double>();
-    }
-  } catch (const nlohmann::json::exception&) {
-    scale = 0;
-  }
-  if (!(scale > 0) || !std::isfinite(scale))
+  const std::optional<Similarity> repair = similarity_from(inspect(mended).transform);
+  if (!repair)
     throw InputError(mended, "does not say how it was mended",
                      "give the file that restage doctor --fix wrote");
   WorldMap out;  // p' = scale rotation (p - offset), and world = A p + b
-  out.scale = to_world.scale / scale;
-  out.rotation = to_world.rotation * rotation.transpose();
-  out.shift = to_world.scale * (to_world.rotation * offset) + to_world.shift;
+  out.scale = to_world.scale / repair->scale;
+  out.rotation = to_world.rotation * repair->rotation.transpose();
+  out.shift = to_world.scale * (to_world.rotation * repair->offset) + to_world.shift;
   return out;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "autograd/base/error.h"
@@ -13,40 +14,103 @@ namespace {
 
 constexpr Rgb kPaper = {0xf7, 0xf8, 0xfa}, kInk = {0x2b, 0x30, 0x38}, kPale = {0x7a, 0x83, 0x90};
 constexpr int kMargin = 22, kTitle = 34, kCaption = 24, kLine = 20, kWidest = 1800;
-constexpr float kView = 0.36f;                        // a long lens: little perspective
-constexpr float kMostAside = 1.6f, kMostHigh = 3.2f;  // stray points may lie anywhere
+constexpr float kView = 0.36f;                  // a long lens: little perspective
+constexpr float kAround = 1.08f, kRim = 0.12f;  // around what is framed: a share, and metres
+constexpr float kWidestCell = 1.5f;             // times its height
+constexpr float kFarAway = 4.0f;                // times as far as nine in ten points: out of view
 
 float radians(double degrees) { return static_cast<float>(degrees * std::numbers::pi / 180); }
 
-/// What all cells show, metres.
-struct Extent {
-  float aside = 0.3f, high = 0.5f;
+/// The points that have to be in view.
+Points framed_points(const Figure& figure) {
+  Points out;
+  for (size_t k = 0; k < figure.layers.size() && (figure.whole || k < figure.framed); ++k)
+    for (const Point& p : figure.layers[k].points)
+      if (p.allFinite()) out.push_back(p);
+  if (figure.whole || out.empty()) return out;
+  const Point centre = clip_centre(out);
+  std::vector<float> away;
+  for (const Point& p : out) away.push_back((p - centre).norm());
+  const auto most = away.begin() + static_cast<std::ptrdiff_t>(away.size() * 9 / 10);
+  std::nth_element(away.begin(), most, away.end());
+  const float limit = kFarAway * *most;
+  std::erase_if(out, [&](const Point& p) { return (p - centre).norm() > limit; });
+  return out;
+}
+
+/// Where a figure's camera looks, and half of what it has to see there, metres.
+struct View {
+  Point low = Point::Zero(), high = Point::Zero();  ///< of what is framed; y over the floor
+  Camera camera;
+  float aside = 0, tall = 0;
 };
 
-Extent extent_of(const std::vector<Figure>& figures) {
-  Extent out;
-  for (const Figure& figure : figures) {
-    const Point centre = clip_centre(figure.layers[0].points);
-    for (const Point& p : figure.layers[0].points) {
-      if (!p.allFinite()) continue;
-      const Point off = p - centre;
-      out.aside = std::max(out.aside, std::min(std::hypot(off.x(), off.z()), kMostAside));
-      out.high = std::max(out.high, std::min(p.y() - figure.floor, kMostHigh));
-    }
+/// `points` are framed_points(); heights from `low` to `high` over the floor are in view too.
+View view_of(const Figure& figure, const Points& points, float low, float high) {
+  View out;
+  Camera& camera = out.camera;
+  camera.azimuth = radians(figure.azimuth);
+  camera.elevation = radians(figure.elevation);
+  camera.view = kView;
+  const Point first = points.empty() ? Point(Point::Zero()) : points[0];
+  out.low = out.high = first;
+  for (const Point& p : points) {
+    out.low = out.low.cwiseMin(p);
+    out.high = out.high.cwiseMax(p);
+  }
+  camera.target = 0.5f * (out.low + out.high);
+  camera.target.y() = figure.floor + 0.5f * (low + high);
+  const float ca = std::cos(camera.azimuth), sa = std::sin(camera.azimuth),
+              ce = std::cos(camera.elevation), se = std::sin(camera.elevation),
+              nearer = std::tan(0.5f * kView);  // what is nearer to the eye needs more room
+  const Point right(ca, 0, -sa), eye(sa * ce, se, ca * ce), up = eye.cross(right);
+  out.tall = 0.5f * (high - low) * ce;
+  for (const Point& p : points) {
+    const Point off = p - camera.target;
+    const float closer = nearer * off.dot(eye);
+    out.aside =
+        std::max(out.aside, std::abs(off.dot(right)) + kWidestCell * std::max(0.0f, closer));
+    out.tall = std::max(out.tall, std::abs(off.dot(up)) + closer);
   }
   return out;
 }
 
-Image draw(const Figure& figure, const Extent& extent, int width, int height) {
+/// Metres that a cell is high, of one at most `wide` times as wide.
+float cell_metres(const View& view, float wide) {
+  return 2 * kAround * std::max(view.tall, view.aside / wide) + kRim;
+}
+
+/// The views of all figures: of those that share a scale the floors are level and as high in the
+/// cells.
+std::vector<View> views_of(const std::vector<Figure>& figures) {
+  std::vector<Points> points;
+  float low = std::numeric_limits<float>::max(), high = -low;
+  const auto levels = [](const Figure& figure, const Points& of, float& from, float& to) {
+    for (const Point& p : of) {
+      from = std::min(from, p.y() - figure.floor);
+      to = std::max(to, p.y() - figure.floor);
+    }
+  };
+  for (const Figure& figure : figures) {
+    points.push_back(framed_points(figure));
+    if (!figure.whole) levels(figure, points.back(), low, high);
+  }
+  std::vector<View> out;
+  for (size_t i = 0; i < figures.size(); ++i) {
+    float from = low, to = high;
+    if (figures[i].whole) {
+      from = std::numeric_limits<float>::max(), to = -from;
+      levels(figures[i], points[i], from, to);
+    }
+    if (from > to) from = to = 0;  // not a point that is finite
+    out.push_back(view_of(figures[i], points[i], from, to));
+  }
+  return out;
+}
+
+Image draw(const Figure& figure, Camera camera, float metres, int width, int height) {
   Canvas canvas(width, height);
-  Camera camera;
-  camera.azimuth = radians(figure.azimuth);
-  camera.elevation = radians(figure.elevation);
-  camera.view = kView;
-  const float tall = 1.16f * std::max(extent.high, extent.aside) + 0.12f;
-  camera.distance = 0.5f * tall / std::tan(0.5f * kView);
-  const Point centre = clip_centre(figure.layers[0].points);
-  camera.target = {centre.x(), figure.floor + 0.5f * extent.high, centre.z()};
+  camera.distance = 0.5f * metres / std::tan(0.5f * kView);
   const FigureLayer& first = figure.layers[0];
   canvas.begin(camera, figure.floor, first.points, first.faces);
   for (const FigureLayer& layer : figure.layers) {
@@ -71,13 +135,20 @@ Image figure_sheet(const std::vector<Figure>& figures, const FigureSheetOptions&
   for (const Figure& figure : figures)
     if (figure.layers.empty() || figure.layers[0].points.empty())
       throw InputError("", "\"" + figure.caption + "\" is empty", "leave such figures out");
-  const Extent extent = extent_of(figures);
-  const double per_metre =
-      options.cell_height / (1.16 * std::max(extent.high, extent.aside) + 0.12);
-  int wanted = static_cast<int>(per_metre * (2.0 * extent.aside + 0.16));
+  const std::vector<View> views = views_of(figures);
+  View shared;  // room for each of those that share a scale
+  for (size_t i = 0; i < figures.size(); ++i)
+    if (!figures[i].whole || figures.size() == 1) {
+      shared.aside = std::max(shared.aside, views[i].aside);
+      shared.tall = std::max(shared.tall, views[i].tall);
+    }
+  const float metres = cell_metres(shared, kWidestCell);
+  int wanted = static_cast<int>(static_cast<float>(options.cell_height) / metres *
+                                (2 * kAround * shared.aside + kRim));
   for (const Figure& figure : figures)
     wanted = std::max(wanted, text_width(10, figure.caption) + 8);
   const int cell_width = std::clamp(wanted, options.cell_height / 2, options.cell_height * 3 / 2);
+  const float wide = static_cast<float>(cell_width) / static_cast<float>(options.cell_height);
   const int count = static_cast<int>(figures.size()), columns = std::min(count, options.columns),
             rows = (count + columns - 1) / columns;
   const int top = kMargin + (options.title.empty() ? 0 : kTitle),
@@ -93,7 +164,9 @@ Image figure_sheet(const std::vector<Figure>& figures, const FigureSheetOptions&
   for (int i = 0; i < count; ++i) {
     const int x = kMargin + i % columns * cell_width, y = top + i / columns * row_height;
     const Figure& figure = figures[static_cast<size_t>(i)];
-    paste(sheet, draw(figure, extent, cell_width, options.cell_height), x, y);
+    const View& view = views[static_cast<size_t>(i)];
+    const float here = figure.whole ? cell_metres(view, wide) : metres;
+    paste(sheet, draw(figure, view.camera, here, cell_width, options.cell_height), x, y);
     const std::string caption = fitting(10, figure.caption, cell_width - 4);
     draw_text(sheet, x + (cell_width - text_width(10, caption)) / 2, y + options.cell_height + 4,
               10, kPale, caption);

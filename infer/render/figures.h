@@ -16,12 +16,14 @@ struct FigureLayer {
   uint32_t colour = 0x4a8bc9;
 };
 
-/// Metres, y up. The view follows the first layer.
+/// Metres, y up. The view contains the first `framed` layers, but for a few points far away.
 struct Figure {
   std::vector<FigureLayer> layers;
   std::string caption;
   double azimuth = 32, elevation = 9;  ///< degrees, as SheetOptions
   float floor = 0;
+  size_t framed = 1;
+  bool whole = false;  ///< a scale of its own, at which every point of all layers is in view
 };
 
 struct FigureSheetOptions {
@@ -30,7 +32,8 @@ struct FigureSheetOptions {
   std::vector<std::string> lines;  ///< under the figures
 };
 
-/// The scale is the same in all cells. InputError if there are no figures, or one is empty.
+/// The scale is the same in all cells but those that are `whole`. InputError if there are no
+/// figures, or one is empty.
 Image figure_sheet(const std::vector<Figure>& figures, const FigureSheetOptions& options = {});
 
 }  // namespace restage

@@ -39,6 +39,7 @@ double strokes_of(std::string_view text, double size, std::vector<Stroke>* strok
   const double scale = size / kCapital;
   double pen = 0;
   for (const char c : text) {
+    if ((static_cast<unsigned char>(c) & 0xc0) == 0x80) continue;  // the rest of a UTF-8 character
     const std::string_view g = glyph(c);
     const double left = g[0] - 'R', right = g[1] - 'R';
     bool down = false;

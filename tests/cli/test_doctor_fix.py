@@ -1,0 +1,268 @@
+"""What `restage doctor --fix` and `--picture` write."""
+import json
+import os
+import struct
+import zlib
+
+from support import CliTest, numbers
+from test_gltf import character
+
+
+class DoctorFix(CliTest):
+    def person(self):
+        """Points of a built-in body in T-pose."""
+        if not os.path.exists(self.path("walk")):
+            self.done("data", "build", "--bodies", 1, 0, 1, "--motions", 1, 0, 0, "--quiet", "--out", "data.h5")
+            self.done("data", "perform", "--bodies", "data.h5", "--frames", 12, "--quiet", "--out", "walk")
+        return self.mesh("walk/target.ply")[0]
+
+    def mesh(self, name):
+        head, _, body = self.bytes(name).partition(b"end_header\n")
+        count = lambda what: int(head.split(b"element %s " % what)[1].split()[0]) if b"element " + what in head else 0
+        n = count(b"vertex")
+        rest = body[12 * n:]
+        return (list(struct.iter_unpack("<3f", body[:12 * n])),
+                [struct.unpack_from("<3i", rest, 13 * i + 1) for i in range(count(b"face"))])
+
+    def fix(self, name, out, code, *more):
+        result = self.restage("doctor", name, "--json", "--fix", out, *more)
+        self.assertEqual((result.code, result.err), (code, ""))
+        return json.loads(result.out)
+
+    def frames(self, folder, clouds):
+        for i, cloud in enumerate(clouds):
+            self.ply("%s/f%d.ply" % (folder, i), cloud)
+        return folder
+
+    def walk(self):
+        """Twelve clouds of the person, each a little further on."""
+        person = self.person()
+        return [[(x, y, z + 0.02 * i) for x, y, z in person] for i in range(12)]
+
+    def test_what_can_be_written_is_known_before_anything_is_read(self):
+        for out in ("x.glb", "x.gltf", "x.npz", "x.npy", "x.stl", "x.png", "x.xyz", "x.hdf5", ""):
+            self.bad_input(["doctor", "nothing.ply", "--fix", out], ".ply or .obj", ".h5", "folder")
+        self.frames("walk12", self.walk())
+        self.bad_input(["doctor", "walk12", "--fix", "x.ply"], "x.ply", "12 frames", ".h5")
+        self.bad_input(["doctor", "walk/target.ply", "--fix", "x.h5"], "surfaces", ".ply")
+
+    def test_a_character_is_mended_as_retarget_takes_it(self):
+        count, faces = character(self.path("hero.glb"))  # an A-pose, z up
+        fixed = self.restage("doctor", "hero.glb", "--fix", "hero.ply", "--up", "y", "--scale", 1, "--facing", "z")
+        self.assertEqual(fixed.err, "")
+        self.assertIn("takes as its target", fixed.out)
+        vertices, written = self.mesh("hero.ply")
+        self.assertEqual((len(vertices), len(written)), (count, len(faces)))
+        left, right = vertices[3 * 20], vertices[3 * 21]  # at the wrists: the arms are along x
+        self.assertAlmostEqual(left[1], vertices[3 * 16][1], 1)
+        self.assertTrue(left[0] > 0.6 > -0.6 > right[0])
+        self.assertEqual(json.loads(self.bytes("hero.ply.transform.json"))["of"], "the surface that retarget takes as its target")
+
+    def test_one_frame_of_any_kind_becomes_a_file(self):
+        self.frames("one", [self.person()])
+        self.assertTrue(self.fix("one", "one.ply", 0)["fixed"]["usable"])
+        self.assertEqual(len(self.mesh("one.ply")[0]), len(set(self.person())))
+        text = "".join("v %r %r %r\n" % p for p in self.person())
+        self.assertEqual(self.fix(self.write("SHOUT.OBJ", text), "quiet.obj", 0)["kind"], "cloud")
+
+    def test_json_says_what_was_written(self):
+        self.ply("back.ply", [(-x, y, -z) for x, y, z in self.person()])
+        found = self.fix("back.ply", "mended.ply", 0, "--target", "--picture", "p.png")
+        self.assertEqual((found["picture"], found["usable"]), ("p.png", False))
+        fixed = found["fixed"]
+        self.assertEqual((fixed["file"], fixed["transform_file"], fixed["usable"], fixed["still_wrong"]),
+                         ("mended.ply", "mended.ply.transform.json", True, []))
+        self.assertIn("no normals, colours", " ".join(fixed["remarks"]))
+        self.assertIsNone(self.fix("back.ply", "mended.h5", 0)["fixed"]["transform_file"])
+
+    def test_what_is_still_wrong_is_said(self):
+        arms = [(x, y - abs(x), z) for x, y, z in self.person()]  # hanging arms stay what they are
+        found = self.fix(self.ply("arms.ply", arms), "arms2.ply", 1, "--target")
+        self.assertIn("T-pose", found["fixed"]["still_wrong"][0]["what"])
+        text = self.restage("doctor", "arms.ply", "--fix", "arms2.ply", "--target")
+        self.assertEqual(text.code, 1)
+        self.assertIn("wrote arms2.ply, still not usable:", text.out)
+
+    def test_predictions_stay_predictions(self):
+        self.person()
+        vertices, faces = self.mesh("walk/target.ply")
+        flat = lambda rows: [x for row in rows for x in row]
+        joints = numbers(4 * 66, 3)
+        far = [(100 * x, -100 * z, 100 * y) for x, y, z in vertices]
+        self.h5("cm.h5", {"license": "CC0", "provenance": "mocap.cs.cmu.edu"}, joints=([4, 22, 3], joints),
+                vertices=([4, len(far), 3], flat(far) * 4, "float32"), faces=([len(faces), 3], flat(faces), "int64"),
+                sequence_offset=([3], [0, 1, 4], "int64"), source_to_world=([3, 4], [1, 0, 0, 5, 0, 1, 0, 6, 0, 0, 1, 7]))
+        self.fix("cm.h5", "m.h5", 0)
+        said = self.json("data", "inspect", "m.h5")
+        self.assertEqual((said["kind"], said["license"]), ("prediction", "CC0"))
+        self.assertEqual(said["counts"], {"frames": 4, "joints": 22, "vertices": len(far), "faces": len(faces), "sequences": 2})
+        self.assertTrue(said["provenance"].startswith("mocap.cs.cmu.edu; repaired"))
+        t = said["transform"]
+        move = lambda p: [t["scale"] * sum(t["rotation"][i][j] * (p[j] - t["offset"][j]) for j in range(3)) for i in range(3)]
+        # eval finds the joints where the transform puts them.
+        moved = flat(move(joints[k:k + 3]) for k in range(0, len(joints), 3))
+        self.h5("truth.h5", joints=([4, 22, 3], moved), vertices=([4, len(far), 3], flat(map(move, far)) * 4, "float64"),
+                sequence_offset=([3], [0, 1, 4], "int64"))
+        mean = self.json("eval", "--pred", "m.h5", "--truth", "truth.h5")["mean"]
+        self.assertLess(mean["mpjpe"], 1e-9)
+        self.assertLess(mean["mpvd"], 1e-6)
+
+    def test_a_mirrored_prediction_stays_one_and_says_so(self):
+        self.person()
+        vertices, _ = self.mesh("walk/target.ply")
+        # Hips, ankles, toes, shoulders: the left ones on the right of one who faces +z.
+        joint = [[0, 1, 0] for _ in range(22)]
+        for left, at in ((1, (-.1, .9, 0)), (7, (-.1, .1, 0)), (10, (-.1, 0, .15)), (16, (-.2, 1.4, 0))):
+            joint[left] = list(at)
+            joint[left + 1] = [-at[0], at[1], at[2]]
+        self.h5("mir.h5", joints=([2, 22, 3], [x for p in joint for x in p] * 2),
+                vertices=([2, len(vertices), 3], [x for p in vertices for x in p] * 2, "float32"))
+        fixed = self.fix("mir.h5", "mir2.h5", 1)["fixed"]
+        self.assertIn("exchanged", fixed["still_wrong"][0]["what"])
+        self.assertEqual(self.json("data", "inspect", "mir2.h5")["counts"]["joints"], 22)
+
+    def test_scans_keep_their_joints_and_where_they_are_from(self):
+        self.person()
+        self.assertEqual(self.json("data", "inspect", "walk/source.h5")["counts"]["joints"], 22)
+        self.fix("walk/source.h5", "again.h5", 0)
+        said = self.json("data", "inspect", "again.h5")
+        was = self.json("data", "inspect", "walk/source.h5")
+        self.assertEqual((said["counts"]["joints"], said["license"]), (22, was["license"]))
+        self.assertTrue(said["provenance"].startswith(was["provenance"]))
+        self.assertIn("joints are not kept", " ".join(self.fix("walk/source.h5", "folder", 0)["fixed"]["remarks"]))
+
+    def test_repairs_add_up(self):
+        self.frames("far", [[(50 + 100 * x, 100 * y, 100 * z) for x, y, z in c] for c in self.walk()])
+        self.fix("far", "once.h5", 0)
+        self.fix("once.h5", "twice.h5", 0)
+        once, twice = (self.json("data", "inspect", name)["transform"] for name in ("once.h5", "twice.h5"))
+        self.assertAlmostEqual(twice["scale"], 0.01)
+        for a, b in zip(once["offset"], twice["offset"]):
+            self.assertAlmostEqual(a, b, delta=1)  # centimetres
+
+    def test_of_a_mesh_whole_pieces_are_left_out(self):
+        self.person()
+        vertices, faces = self.mesh("walk/target.ply")
+        n = len(vertices)
+        boxes = [(3 + x, y, z) for x in (0, .6) for y in (0, .6) for z in (0, .6)]
+        box = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)]
+        # The box stands first, so that all numbers move; the person's order stays.
+        self.ply("both.ply", boxes + vertices, box + [tuple(v + 8 for v in f) for f in faces])
+        known = ("--scale", 1, "--up", "y", "--facing", "z")
+        found = self.fix("both.ply", "alone.ply", 0, *known)
+        self.assertIn("8 points and 12 triangles", " ".join(found["fixed"]["remarks"]))
+        self.fix("walk/target.ply", "self.ply", 0, *known)
+        kept, its = self.mesh("alone.ply")
+        self.assertEqual((len(kept), its), (n, faces))
+        whole = self.mesh("self.ply")[0]
+        for axis in range(3):
+            shift = kept[0][axis] - whole[0][axis]
+            self.assertLess(max(abs(p[axis] - q[axis] - shift) for p, q in zip(kept, whole)), 1e-5)
+
+    def test_a_folder_plays_at_the_right_rate(self):
+        clouds = self.walk()
+        self.frames("twice", [c for c in clouds for _ in range(2)])  # 15 frames a second
+        found = self.fix("twice", "again", 0)
+        self.assertEqual(len(os.listdir(self.path("again"))), 24)
+        self.assertIn("30 frames a second", " ".join(found["fixed"]["remarks"]))
+        self.fix("twice", "again.h5", 0)
+        said = self.json("data", "inspect", "again.h5")
+        self.assertEqual((said["counts"]["frames"], said["fps"]), (12, 15))
+        self.fix("again.h5", "slow", 0)
+        self.assertEqual(len(os.listdir(self.path("slow"))), 24)
+
+    def test_sequences_are_not_joined(self):
+        cloud = self.person()
+        flat = [x for c in self.walk()[:4] for p in c for x in p]
+        n = len(cloud)
+        self.h5("two.h5", points=([4 * n, 3], flat, "float32"), frame_offset=([5], [0, n, 2 * n, 3 * n, 4 * n], "int64"),
+                sequence_offset=([3], [0, 2, 4], "int64"))
+        self.bad_input(["doctor", "two.h5", "--fix", "folder"], "2 sequences", ".h5")
+        self.fix("two.h5", "mended.h5", 0)
+        self.assertEqual(self.json("data", "inspect", "mended.h5")["counts"]["sequences"], 2)
+
+    def double_ply(self, name, cloud, kind="double"):
+        head = "ply\nformat binary_little_endian 1.0\nelement vertex %d\n" % len(cloud)
+        head += "".join("property %s %s\n" % (kind, axis) for axis in "xyz") + "end_header\n"
+        return self.write(name, head.encode() + b"".join(struct.pack("<3d" if kind == "double" else "<3f", *p) for p in cloud))
+
+    def test_far_from_the_origin(self):
+        person = self.person()
+        far = [(500000 + x, 5000000 + y, z) for x, y, z in person]
+        self.double_ply("utm.ply", far)
+        self.bad_input(["render", "utm.ply", "--out", "x.png"], "utm.ply", "from the origin", "doctor")
+        found = self.fix("utm.ply", "near.ply", 0)
+        self.assertIn("far from the origin", " ".join(found["notes"]))
+        near = self.mesh("near.ply")[0]
+        shift = [near[0][i] - person[0][i] for i in range(3)]
+        self.assertLess(max(abs(a - b - s) for p, q in zip(near, person) for a, b, s in zip(p, q, shift)), 1e-5)
+        kept = json.loads(self.bytes("near.ply.transform.json"))
+        self.assertEqual(found["transform"]["offset"], kept["offset"])
+        for i in range(3):
+            self.assertAlmostEqual(near[0][i], far[0][i] - kept["offset"][i], 5)
+        # What was single precision there is lost, and said to be.
+        self.double_ply("lost.ply", far, "float")
+        text = self.restage("doctor", "lost.ply")
+        self.assertEqual(text.code, 1)
+        self.assertIn("double precision", text.out)
+        flat = [x for p in far for x in p]
+        self.h5("utm.h5", points=([len(far), 3], flat), frame_offset=([2], [0, len(far)], "int64"))
+        self.bad_input(["doctor", "utm.h5"], "from the origin", "subtract")
+
+    def test_gaps_that_are_not_filled_are_said(self):
+        for i, cloud in enumerate(self.walk()):
+            self.ply("gap/f%d.ply" % (i if i < 6 else i + 40), cloud)
+        found = self.fix("gap", "out.h5", 0)
+        fix = [f["fix"] for f in found["findings"] if f["topic"] == "missing frames"]
+        self.assertIn("up to a second", fix[0])
+        self.assertEqual(self.json("data", "inspect", "out.h5")["counts"]["frames"], 12)
+
+    def pixels(self, name):
+        """Rows of RGB of a PNG."""
+        data, at, packed, width, height = self.bytes(name), 8, b"", 0, 0
+        while at < len(data):
+            size, kind = struct.unpack(">I4s", data[at:at + 8])
+            chunk = data[at + 8:at + 8 + size]
+            if kind == b"IHDR":
+                width, height = struct.unpack(">2I", chunk[:8])
+            if kind == b"IDAT":
+                packed += chunk
+            at += size + 12
+        raw, stride, rows, above = zlib.decompress(packed), 3 * width, [], bytes(3 * width)
+        for y in range(height):
+            filter_, row = raw[y * (stride + 1)], bytearray(raw[y * (stride + 1) + 1:(y + 1) * (stride + 1)])
+            for i in range(stride):
+                a, b, c = (row[i - 3] if i > 2 else 0), above[i], (above[i - 3] if i > 2 else 0)
+                p = a + b - c
+                paeth = min((abs(p - a), 0, a), (abs(p - b), 1, b), (abs(p - c), 2, c))[2]
+                row[i] = (row[i] + (0, a, b, (a + b) // 2, paeth)[filter_]) % 256
+            rows.append(bytes(row))
+            above = row
+        return rows
+
+    def share(self, name, wanted, columns=(0, 1)):
+        """Pixels whose colour is about so, in a part of the width."""
+        rows = self.pixels(name)
+        width = len(rows[0]) // 3
+        return sum(wanted(*row[3 * x:3 * x + 3]) for row in rows[40:400] for x in range(int(columns[0] * width), int(columns[1] * width)))
+
+    def test_pictures_show_the_frame_with_the_finding_and_all_of_it(self):
+        clouds = self.walk()
+        clouds[7] = clouds[7] + [(x + 2.5, y, z) for x, y, z in clouds[7]]
+        self.done("doctor", self.frames("late", clouds), "--picture", "p.png")
+        orange = lambda r, g, b: r > 150 and r > g + 40 and g > b + 30
+        for quarter in range(4):  # as it is, front, side, top
+            self.assertGreater(self.share("p.png", orange, (quarter / 4, (quarter + 1) / 4)), 60, quarter)
+
+    def test_inspect_plots_what_is_there(self):
+        person = self.person()
+        clouds = [[(100 * x, 100 * y, 100 * z) for x, y, z in c] for c in self.walk()]
+        n = len(person)
+        self.h5("cm.h5", points=([12 * n, 3], [x for c in clouds for p in c for x in p], "float32"),
+                frame_offset=([13], [n * i for i in range(13)], "int64"), sequence_offset=([3], [0, 8, 12], "int64"))
+        found = self.json("data", "inspect", "cm.h5", "--plot", "p.png")
+        said = " ".join(found["plot"]["remarks"])
+        self.assertIn("first of 2 sequences", said)
+        self.assertRegex(said, r"drawn 0\.0\d+ times as large")
+        blue = lambda r, g, b: b > r + 40 and b > 90
+        self.assertGreater(self.share("p.png", blue), 8 * 300)
