@@ -164,7 +164,6 @@ Report examine_character(const Options& options) {
   TargetMesh target = read_target(options.path);
   Report out = examine_one("character", std::move(target.mesh), Vec3::Zero(), options);
   out.subject.taken_as = "the surface that retarget takes as its target";
-  out.facts["examined"] = out.subject.taken_as;
   for (const auto& [name, value] : target.report.facts) out.facts[name] = value;
   return out;
 }
@@ -336,7 +335,7 @@ void print_report(const Options& options, const Report& found, const Written& wr
     for (const Finding& f : found.findings)
       if (f.weight == weight) text += to_text(f);
   if (found.diagnosis && found.diagnosis->transform)
-    text += to_text(from_file(found.subject, *found.diagnosis->transform));
+    text += to_text(from_file(found.subject, *found.diagnosis->transform), found.subject.taken_as);
   if (written.fix) text += to_text(*written.fix);
   if (!written.picture.empty()) text += "wrote " + written.picture + "\n";
   print(text);
@@ -366,8 +365,10 @@ int run_doctor(const Options& options, const Common& common) {
         "files");
   Written written;
   if (!options.picture.empty()) {
-    write_picture(options.picture, options.path + ": " + found.kind,
-                  frame_of(found.subject, found.diagnosis->shown), *found.diagnosis);
+    const Diagnosis& d = *found.diagnosis;
+    const std::string which = d.frames > 1 ? ", frame " + std::to_string(d.shown) : "";
+    write_picture(options.picture, options.path + ": " + found.kind + which,
+                  frame_of(found.subject, d.shown), d);
     written.picture = options.picture;
   }
   if (options.fix) {

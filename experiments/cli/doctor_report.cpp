@@ -127,9 +127,10 @@ std::string to_text(const Finding& f) {
   return text;
 }
 
-std::string to_text(const Similarity& t) {
-  if (t.is_identity()) return "  in our frame already\n";
-  std::string text = "  into our frame: p' = " + digits(t.scale) + " R (p - t), R = [";
+std::string to_text(const Similarity& t, const std::string& of) {
+  const std::string what = of.empty() ? "  " : "  " + of + ": ";
+  if (t.is_identity()) return what + "in our frame already\n";
+  std::string text = what + "into our frame: p' = " + digits(t.scale) + " R (p - t), R = [";
   for (int i = 0; i < 3; ++i) {
     if (i > 0) text += "; ";
     for (int j = 0; j < 3; ++j) text += (j > 0 ? " " : "") + digits(t.rotation(i, j));

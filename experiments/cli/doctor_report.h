@@ -22,7 +22,8 @@ std::optional<Similarity> similarity_from(const std::string& json);
 Json to_json(const Repaired& repaired);
 /// One finding as a few lines of text.
 std::string to_text(const Finding& finding);
-std::string to_text(const Similarity& transform);
+/// `of`: what it moves, if not the file as it is.
+std::string to_text(const Similarity& transform, const std::string& of);
 std::string to_text(const Repaired& repaired);
 
 /// Front, side and top of what was found, brought into our frame, and as it is: the person blue,

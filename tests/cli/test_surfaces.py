@@ -58,7 +58,7 @@ class Doctor(CliTest):
         for words in ("not usable", "--scale 0.01", "p' = 0.01 R (p - t)"):
             self.assertIn(words, text.out)
         found = self.doctor("foreign.ply", 0, "--fix", "mended.ply")
-        self.assertEqual((found["fixed"], found["transform_file"]), ("mended.ply", "mended.ply.transform.json"))
+        self.assertEqual((found["fixed"]["file"], found["fixed"]["transform_file"]), ("mended.ply", "mended.ply.transform.json"))
         back = self.vertices("mended.ply")
         self.assertEqual(len(back), len(person))
         self.assertLess(max(abs(a - b) for p, q in zip(back, person) for a, b in zip(p, q)), 0.06)

@@ -9,6 +9,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "infer/render/figures.h"
 #include "infer/render/page.h"
 #include "infer/render/rasteriser.h"
 #include "infer/render/sheet.h"
@@ -70,6 +71,25 @@ TEST(Sheet, EveryCellShowsItsClip) {
     }
   EXPECT_EQ(sheet.at(1, 1), (Rgb{0xf7, 0xf8, 0xfa}));
   EXPECT_EQ(contact_sheet(toy_clips(), options).rgb, sheet.rgb);
+}
+
+TEST(Figures, TheViewContainsWhatItIsToldTo) {
+  constexpr uint32_t kBlue = 0x4a8bc9, kOrange = 0xe8892a;
+  const Points person = toy_clips(1)[0].frames[0];
+  Points aside = person, far = {person[0] + Point(40, 3, 40)};
+  for (Point& p : aside) p.x() += 3;
+  const auto drawn = [](const Figure& figure, uint32_t colour) {
+    const Image sheet = figure_sheet({figure});
+    return coloured(sheet, 0, sheet.width, 0, sheet.height, colour);
+  };
+  Figure two{{{person, {}, kBlue}, {aside, {}, kOrange}}, "", 0, 4, 0, 2};
+  EXPECT_GT(drawn(two, kBlue), 100);
+  EXPECT_GT(drawn(two, kOrange), 100);
+  Figure stray{{{person, {}, kBlue}, {far, {}, kOrange}}, "", 0, 4, 0, 2};
+  EXPECT_GT(drawn(stray, kBlue), 100);
+  EXPECT_EQ(drawn(stray, kOrange), 0) << "a point far away does not make the person tiny";
+  stray.whole = true;
+  EXPECT_GT(drawn(stray, kOrange), 0);
 }
 
 TEST(Sheet, MeshInFrontHidesWhatIsBehind) {
