@@ -1,5 +1,6 @@
 """What the tests of the command line share: running the program, the contract of its errors, files."""
 import json
+import math
 import os
 import random
 import shutil
@@ -102,6 +103,11 @@ def numbers(count, seed, scale=1.0):
 def points(count, seed):
     x = numbers(3 * count, seed)
     return [tuple(x[3 * i:3 * i + 3]) for i in range(count)]
+
+
+def sphere(count=500, radius=0.5):
+    """Points on a sphere of a person's size."""
+    return [tuple(radius * x / math.hypot(*p) for x in p) for p in points(count, 5) if math.hypot(*p) < 1]
 
 
 def small_disk():
