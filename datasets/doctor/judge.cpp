@@ -14,6 +14,7 @@ namespace doctor_detail {
 namespace {
 
 constexpr double kFloorMatters = 0.05;  // metres; less is noise, or a shoe's sole
+constexpr double kPoseSure = 0.75;      // of the up axis: seated people are seldom more certain
 constexpr double kPlaneMatters = 0.03;  // share of all points
 
 }  // namespace
@@ -226,7 +227,7 @@ void judge_pose(Diagnosis& d, const PersonShape& shape, bool target) {
     d.findings.push_back(f);
     return;
   }
-  if (target) f.weight = o.up_sure >= kSure ? Weight::wrong : Weight::note;
+  if (target) f.weight = o.up_sure >= kPoseSure ? Weight::wrong : Weight::note;
   f.what = target ? "not a T-pose" : "not a T-pose (a target needs one, a source does not)";
   f.fix = target ? "pose it with the arms along x and the legs straight down" : "";
   if (!angles) {

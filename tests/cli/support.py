@@ -106,8 +106,13 @@ def points(count, seed):
 
 
 def sphere(count=500, radius=0.5):
-    """Points on a sphere of a person's size."""
-    return [tuple(radius * x / math.hypot(*p) for x in p) for p in points(count, 5) if math.hypot(*p) < 1]
+    """Points evenly on a sphere of a person's size."""
+    out = []
+    for i in range(count):
+        z, turn = (2 * i + 1) / count - 1, 2.39996 * i
+        r = radius * math.sqrt(1 - z * z)
+        out.append((r * math.cos(turn), r * math.sin(turn), radius * z))
+    return out
 
 
 def small_disk():
