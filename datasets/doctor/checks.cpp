@@ -1,9 +1,9 @@
 // What `restage retarget` asks before it starts.
-#include <algorithm>
 #include <cmath>
 
 #include "autograd/base/error.h"
 #include "datasets/doctor/examine_detail.h"
+#include "datasets/doctor/orientation_model.h"
 #include "datasets/doctor/words.h"
 
 namespace restage {
@@ -12,64 +12,95 @@ using namespace doctor_detail;
 
 namespace {
 
-constexpr double kNoPerson = 3;  // standard deviations from a person's size in any unit
+/// Frames in memory, as one sequence.
+class Given final : public FrameSource {
+ public:
+  explicit Given(const std::vector<Mesh>& frames) : frames_(frames) {}
+  std::optional<Frame> next() override {
+    if (at_ == frames_.size()) return std::nullopt;
+    const Mesh& frame = frames_[at_++];
+    return Frame{"", frame.vertices, frame.faces, 0};
+  }
+  void rewind() override { at_ = 0; }
+  int64_t frames() const override { return static_cast<int64_t>(frames_.size()); }
+  double fps() const override { return kFps; }
 
-/// Metres? Refused only where another unit fits a person well.
-void check_unit(const UnitGuess& guess, const std::string& where, const std::string& fix) {
-  if (guess.unit.metres == 1 || guess.sure < kSure) return;
-  throw InputError(where,
-                   std::string("1 unit seems to be 1 ") + guess.unit.name + " (sure " +
-                       per_cent(guess.sure) + "), metres are expected",
-                   fix);
+ private:
+  const std::vector<Mesh>& frames_;
+  size_t at_ = 0;
+};
+
+[[noreturn]] void refuse(const std::string& where, const Finding& f, const std::string& fix) {
+  std::string what = f.what;
+  if (f.sure < 1 && f.sure >= kUnsure) what += " (sure " + per_cent(f.sure) + ")";
+  throw InputError(where, what, fix + ", or --force to take it as it is");
 }
 
-std::string up_words(const Orientation& o) {
-  return std::string("the head seems to point along ") + kDirections[static_cast<size_t>(o.up)] +
-         " (sure " + per_cent(o.up_sure) + "), +y is expected";
+std::string scale_advice(double size, double given) {
+  const UnitGuess raw = guess_unit(size / given);
+  if (raw.sure < kUnsure) return "give metres per unit with --scale";
+  return raw.unit.metres == 1 && given != 1 ? "leave --scale out"
+                                            : "give --scale " + number(raw.unit.metres);
+}
+
+/// `up`: in the frame that the source was brought into.
+std::string up_advice(int up, bool z_up) {
+  if (z_up && up == 5) return "leave --source-up out";
+  if (!z_up && up == 4) return "give --source-up z";
+  return "restage doctor --fix OUT turns it";
 }
 
 }  // namespace
 
-void check_source(const std::vector<Mesh>& first_frames, const std::string& where) {
-  OrientationVote vote;
-  std::vector<double> sizes;
-  for (const Mesh& frame : first_frames) {
-    if (frame.vertices.size() < kEnoughPoints) return;
-    const PersonShape shape = shape_of(frame);
-    vote.add(shape.points);
-    sizes.push_back(shape.size);
+void check_source(const std::vector<Mesh>& first_frames, const std::string& where,
+                  const SourceFrame& given) {
+  for (const Mesh& frame : first_frames)
+    if (frame.vertices.size() < kEnoughPoints) return;  // refused when its turn comes
+  if (first_frames.empty()) return;
+  Given frames(first_frames);
+  const Diagnosis d = examine_frames(frames);
+  for (const Finding& f : d.findings) {
+    if (f.weight != Weight::wrong || f.topic == "points") continue;
+    if (f.topic == "units") refuse(where, f, scale_advice(d.size, given.scale));
+    if (f.topic == "up" && f.sure < kNobody) refuse(where, f, "give scans of one whole person");
+    // A few frames, alike: less certain than the many that the doctor looks at.
+    if (f.topic == "up" && f.sure < kVerySure) continue;
+    if (f.topic == "up") refuse(where, f, up_advice(d.orientation.up, given.z_up));
+    refuse(where, f, "restage doctor --fix OUT mends it");
   }
-  if (sizes.empty()) return;
-  std::nth_element(sizes.begin(), sizes.begin() + std::ssize(sizes) / 2, sizes.end());
-  const UnitGuess guess = guess_unit(sizes[sizes.size() / 2]);
-  if (std::abs(guess.deviation) > kNoPerson) return;
-  check_unit(guess, where,
-             "give --scale " + number(guess.unit.metres) + ", or --force to take it as it is");
-  const Orientation o = vote.result();
-  if (o.up == 2 || o.up_sure < kVerySure) return;
-  throw InputError(
-      where, up_words(o),
-      std::string(o.up == 4 ? "give --source-up z" : "restage doctor --fix OUT turns it") +
-          ", or --force if it is so");
 }
 
-void check_target(const Mesh& target, const std::string& where) {
+void check_target(const Mesh& target, const std::string& where, const Joints* named) {
+  if (named != nullptr && is_mirrored(*named).value_or(false))
+    throw InputError(where, "is a mirror image: the joints named left are on the right",
+                     "mirror it (x to -x) where it was made, or exchange the names; or --force");
   if (target.vertices.size() < kEnoughPoints) return;
-  const PersonShape shape = shape_of(target);
-  const UnitGuess guess = guess_unit(shape.size);
-  if (std::abs(guess.deviation) > kNoPerson) return;
-  const std::string fix = "restage doctor --fix OUT mends it, --force takes it as it is";
-  check_unit(guess, where, fix);
-  OrientationVote vote;
-  vote.add(shape.points);
-  const Orientation o = vote.result();
-  if (o.up_sure < kVerySure) return;
-  if (o.up != 2) throw InputError(where, up_words(o), fix);
-  if (o.facing != 4 && o.facing_sure >= kSure)
-    throw InputError(where,
-                     std::string("it seems to face ") + kDirections[static_cast<size_t>(o.facing)] +
-                         " (sure " + per_cent(o.facing_sure) + "), a target faces +z",
-                     fix);
+  ExamineOptions options;
+  options.target = true;
+  const Diagnosis d = judge_surface(target, shape_of(target), repeats(target.vertices), options);
+  for (const Finding& f : d.findings) {
+    if (f.weight != Weight::wrong || f.topic == "points") continue;
+    const bool nobody = f.topic == "up" && f.sure < kNobody;
+    Finding said = f;
+    if (f.topic == "pose") said.what += ": " + f.evidence;
+    refuse(where, said,
+           nobody              ? "give one whole person in T-pose"
+           : f.topic == "pose" ? f.fix
+                               : "restage doctor --target --fix OUT mends it");
+  }
+}
+
+void check_frame(const Points& frame, const std::string& where) {
+  const double size = normalised(frame).size;
+  constexpr double kRoom = 2;  // stray points, or half of somebody
+  if (frame.size() < kEnoughPoints || is_person_sized(size * kRoom) ||
+      is_person_sized(size / kRoom))
+    return;
+  throw InputError(
+      where,
+      "is of another size than the frames before: half of its points lie within " + number(size) +
+          " m of the middle",
+      "give all frames in one unit, leave this one out, or --force to take it as it is");
 }
 
 }  // namespace restage

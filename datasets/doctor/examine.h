@@ -14,6 +14,9 @@
 
 namespace restage {
 
+/// Of --scale: nanometres to thousands of kilometres.
+inline constexpr double kLeastScale = 1e-9, kMostScale = 1e6;
+
 struct ExamineOptions {
   bool target = false;  ///< it is meant as a target: T-pose and facing +z are then a must
   // What the user knows better; the rest is still found.
@@ -54,15 +57,29 @@ Diagnosis examine_frames(FrameSource& source, const ExamineOptions& options = {}
 /// and in our frame. Of a surface only whole pieces are left out; the order of the rest stays.
 Mesh mended(const Mesh& mesh, const Diagnosis& diagnosis);
 
+/// The unit of skeletons, by the lengths of their bones, which no pose changes.
+Finding examine_skeletons(const std::vector<Joints>& frames);
+
 /// Whether the joints named left are on the left of somebody whose toes point forwards: "right",
 /// "mirrored", or nothing if the feet do not tell. `up` is a unit vector.
 std::optional<bool> is_mirrored(const Joints& joints, const Vec3& up = Vec3::UnitY());
 
-/// Cheap checks before retargeting; what is only perhaps wrong passes, and so does what is no
-/// person. `where` names the input. InputError with the option that mends it (--scale,
-/// --source-up, --force).
+/// How a source was read: metres per unit, and whether its z axis points up.
+struct SourceFrame {
+  double scale = 1;
+  bool z_up = false;
+};
+
+/// Cheap checks before retargeting: what the doctor finds wrong is refused in the doctor's words, a
+/// target as examine_surface() judges it, a source by its first frames, brought into metres, y up,
+/// as `given`. What is only perhaps wrong passes. `where` names the input. InputError with the
+/// option that mends it (--scale, --source-up, --force).
 inline constexpr int kSourceFrames = 8;  ///< that are enough for check_source()
-void check_source(const std::vector<Mesh>& first_frames, const std::string& where);
-void check_target(const Mesh& target, const std::string& where);
+void check_source(const std::vector<Mesh>& first_frames, const std::string& where,
+                  const SourceFrame& given = {});
+/// `named`: the joints of a rig (null: none), which show a mirror image.
+void check_target(const Mesh& target, const std::string& where, const Joints* named = nullptr);
+/// The same for any later frame, cheaply: whether it is of a person's size.
+void check_frame(const Points& frame, const std::string& where);
 
 }  // namespace restage

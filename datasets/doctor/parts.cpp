@@ -9,6 +9,7 @@
 #include <set>
 
 #include "datasets/doctor/orientation_model.h"
+#include "datasets/doctor/planes.h"
 
 namespace restage {
 namespace {
@@ -179,7 +180,10 @@ std::vector<Part> parts_at(const Points& others, const Points& points, const Par
   return out;
 }
 
-Parts find_parts(const Points& points) {
+namespace {
+
+/// Of points without a floor and walls.
+Parts find_pieces(const Points& points) {
   const std::vector<size_t> judged = evenly_spread(points);
   Points some;
   for (const size_t i : judged) some.push_back(points[i]);
@@ -188,6 +192,25 @@ Parts find_parts(const Points& points) {
   if (judged.size() < points.size()) out.part = parts_at(points, some, out);
   out.stray = static_cast<size_t>(std::count(out.part.begin(), out.part.end(), Part::stray));
   out.other = static_cast<size_t>(std::count(out.part.begin(), out.part.end(), Part::other));
+  return out;
+}
+
+}  // namespace
+
+Parts find_parts(const Points& points) {
+  const Planes planes = find_planes(points);
+  if (!planes.any()) return find_pieces(points);
+  std::vector<size_t> number;
+  Points rest;
+  for (size_t i = 0; i < points.size(); ++i)
+    if (!planes.on[i]) number.push_back(i), rest.push_back(points[i]);
+  Parts out = find_pieces(rest);
+  std::vector<Part> part(points.size(), Part::other);
+  for (size_t i = 0; i < rest.size(); ++i) part[number[i]] = out.part[i];
+  for (size_t& i : out.judged) i = number[i];
+  out.part = std::move(part);
+  out.flat = planes.points;
+  out.flat_normal = planes.normal;
   return out;
 }
 

@@ -13,6 +13,8 @@ struct Parts {
   std::vector<Part> part;  ///< one for each point
   size_t stray = 0;        ///< points with hardly a neighbour
   size_t other = 0;        ///< points of pieces apart from the person
+  size_t flat = 0;         ///< points of a floor or walls; they are Part::other, not of `other`
+  Vec3 flat_normal = Vec3::Zero();  ///< of the first of these planes, towards the person
   /// Points that were judged, evenly spread over what there is; the rest go with their nearest.
   std::vector<size_t> judged;
   size_t largest_other = 0;  ///< judged points of the largest such piece; many: a second person
@@ -21,8 +23,9 @@ struct Parts {
   double spacing = 0;        ///< typical distance between neighbours, in the data's units
 };
 
-/// The person is the largest piece and what lies within about 0.16 m of it. Works in any unit. No
-/// point may be there twice: distances between neighbours say what is usual.
+/// The person, beside floors and walls (planes.h), is the largest piece and what lies within about
+/// 0.16 m of it. Works in any unit. No point may be there twice: distances between neighbours say
+/// what is usual.
 Parts find_parts(const Points& points);
 
 /// What other points are: what the nearest of `points` is, which are judged in `parts`, or stray.

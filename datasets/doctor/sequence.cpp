@@ -1,13 +1,11 @@
 // Sequences: what one frame alone does not show. Frames are read once; of each only a few numbers
 // are kept, and some thirty, spread over the sequence, are examined like single scans.
 #include <algorithm>
-#include <cctype>
 #include <cmath>
-#include <cstring>
-#include <filesystem>
 
 #include "autograd/base/error.h"
 #include "datasets/doctor/examine_detail.h"
+#include "datasets/doctor/summary.h"
 #include "datasets/doctor/words.h"
 
 namespace restage {
@@ -18,82 +16,12 @@ namespace {
 
 constexpr int64_t kExamined = 32;     // frames that are looked at closely
 constexpr int64_t kFacingFrames = 4;  // of the first: where the person faces when it starts
-constexpr int kExtents = 13;          // directions in which a frame's extent is kept
 constexpr int64_t kAround = 7;        // frames to each side that say how fast is usual
 constexpr double kJump = 3.5;         // times the usual step, and
 constexpr double kJumpMetres = 0.1;   // at least this far: frames are missing
+constexpr double kSizeJump = 2;       // times another size than the frame before: another unit
 constexpr double kFastest = 8;        // metres per second of a person's middle
 constexpr double kWalked = 0.7;       // metres: long enough to say where somebody walks
-
-/// What is kept of a frame: where it ends in 26 directions, and its middle.
-struct Summary {
-  uint64_t content = 0;  ///< the same for the same points in any order
-  std::array<float, 2 * kExtents> extent{};
-  Point middle = Point::Zero();
-  int64_t sequence = 0, number = -1;  ///< number in the file's name
-};
-
-uint64_t mixed(uint64_t x) {
-  x ^= x >> 33;
-  x *= 0xff51afd7ed558ccdULL;
-  x ^= x >> 33;
-  x *= 0xc4ceb9fe1a85ec53ULL;
-  return x ^ (x >> 33);
-}
-
-uint64_t content_of(const Points& points) {
-  uint64_t sum = points.size();
-  for (const Point& p : points) {
-    std::array<uint32_t, 3> bits;
-    std::memcpy(bits.data(), p.data(), sizeof bits);
-    sum += mixed(mixed(mixed(bits[0]) ^ bits[1]) ^ bits[2]);
-  }
-  return sum;
-}
-
-Vec3 extent_direction(int i) {
-  const int code = 14 + i;
-  return Vec3(code / 9 - 1, code / 3 % 3 - 1, code % 3 - 1).normalized();
-}
-
-/// The last run of digits of a file's name; -1: none, or no file of its own.
-int64_t number_in(const std::string& source) {
-  const std::string name = std::filesystem::path(source).filename().string();
-  const size_t end = name.find_last_of("0123456789", name.rfind('.'));
-  if (end == std::string::npos) return -1;
-  size_t begin = end;
-  while (begin > 0 && std::isdigit(static_cast<unsigned char>(name[begin - 1]))) --begin;
-  const std::string digits = name.substr(begin, end - begin + 1);
-  return digits.size() > 15 ? -1 : std::stoll(digits);
-}
-
-Summary summary_of(const Frame& frame, bool numbered) {
-  Summary out;
-  out.content = content_of(frame.points);
-  out.sequence = frame.sequence;
-  if (numbered) out.number = number_in(frame.source);
-  const Points points = without_repeats(frame.points);
-  Points some;
-  const size_t n = std::min<size_t>(points.size(), 2000);
-  for (size_t i = 0; i < n; ++i) some.push_back(points[i * points.size() / n]);
-  for (int i = 0; i < kExtents; ++i) {
-    out.extent[static_cast<size_t>(2 * i)] =
-        static_cast<float>(quantile(some, extent_direction(i), 0.02));
-    out.extent[static_cast<size_t>(2 * i + 1)] =
-        static_cast<float>(quantile(some, extent_direction(i), 0.98));
-  }
-  for (int axis = 0; axis < 3; ++axis)
-    out.middle[axis] = static_cast<float>(quantile(some, direction(2 * axis), 0.5));
-  return out;
-}
-
-/// How far the outline moved, in the data's units.
-double step(const Summary& a, const Summary& b) {
-  double sum = 0;
-  for (size_t i = 0; i < a.extent.size(); ++i)
-    sum += std::pow(static_cast<double>(a.extent[i]) - b.extent[i], 2);
-  return std::sqrt(sum / static_cast<double>(a.extent.size()));
-}
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -109,6 +37,11 @@ std::string frame_list(const std::vector<int64_t>& frames) {
   return out + (frames.size() > 5 ? ", ..." : "");
 }
 
+/// One of the two sizes is that of somebody else, or in another unit.
+bool jumps(double a, double b) {
+  return a > 0 && b > 0 && (a > kSizeJump * b || b > kSizeJump * a);
+}
+
 class Sequence {
  public:
   Sequence(FrameSource& source, const ExamineOptions& options)
@@ -118,6 +51,8 @@ class Sequence {
  private:
   void read();
   void look_closely(const Frame& frame, int64_t index);
+  void measure_jump(const Mesh& before, const Mesh& frame);
+  bool judge_sizes();
   void judge_walk();
   void judge_repeats();
   void judge_numbers();
@@ -129,11 +64,12 @@ class Sequence {
   ExamineOptions options_;
   Diagnosis d_;
   std::vector<Summary> frames_;
-  OrientationVote vote_;
+  Seen seen_;
   std::vector<double> sizes_;
   std::vector<std::array<double, 12>> ends_;  // lowest and highest along each direction
-  size_t looked_ = 0, fewest_distinct_ = SIZE_MAX, repeats_ = 0, repeat_frames_ = 0;
-  size_t strays_ = 0, stray_frames_ = 0, other_frames_ = 0, broken_frames_ = 0;
+  size_t looked_ = 0, fewest_distinct_ = SIZE_MAX, points_ = 0, repeats_ = 0, repeat_frames_ = 0;
+  size_t strays_ = 0, stray_frames_ = 0, other_frames_ = 0, broken_frames_ = 0, flat_frames_ = 0;
+  Parts flattest_;                    // of the frame with most of a floor
   std::optional<PersonShape> worst_;  // the frame with most of somebody else
   int64_t worst_frame_ = 0, stray_frame_ = 0;
   size_t most_strays_ = 0;
@@ -141,7 +77,7 @@ class Sequence {
 
 void Sequence::look_closely(const Frame& frame, int64_t index) {
   const PersonShape shape = shape_of({frame.points, frame.faces});
-  vote_.add(shape.points, index < kFacingFrames);
+  seen_.vote.add(shape.points, index < kFacingFrames);
   sizes_.push_back(shape.size);
   std::array<double, 12> ends;
   for (int i = 0; i < 6; ++i) {
@@ -149,15 +85,14 @@ void Sequence::look_closely(const Frame& frame, int64_t index) {
     ends[static_cast<size_t>(2 * i + 1)] = quantile(shape.points, direction(i), 1 - kLevel);
   }
   ends_.push_back(ends);
-  const size_t points = distinct(frame.points).size(), repeats = frame.points.size() - points;
-  fewest_distinct_ = std::min(fewest_distinct_, points);
-  repeats_ += repeats;
-  repeat_frames_ += repeats > 0;
+  points_ += frame.points.size();
   strays_ += shape.parts.stray;
   if (shape.parts.stray > most_strays_) {
     most_strays_ = shape.parts.stray;
     stray_frame_ = index;
   }
+  flat_frames_ += shape.parts.flat > 0;
+  if (shape.parts.flat > flattest_.flat) flattest_ = shape.parts;
   stray_frames_ += shape.parts.stray > 0;
   other_frames_ += shape.parts.other > 0;
   broken_frames_ += shape.parts.pieces > 1;
@@ -168,21 +103,65 @@ void Sequence::look_closely(const Frame& frame, int64_t index) {
   ++looked_;
 }
 
+/// The person alone, where all points together change their size.
+void Sequence::measure_jump(const Mesh& before, const Mesh& frame) {
+  frames_[frames_.size() - 2].size = static_cast<float>(shape_of(before).size);
+  frames_.back().size = static_cast<float>(shape_of(frame).size);
+}
+
 void Sequence::read() {
   const int64_t all = source_.frames(),
                 every = std::max<int64_t>(1, (all + kExamined - 1) / kExamined);
   d_.fewest_points = INT64_MAX;
-  for (int64_t i = 0; const auto frame = source_.next(); ++i) {
+  Mesh before;
+  for (int64_t i = 0; auto frame = source_.next(); ++i) {
     const auto n = static_cast<int64_t>(frame->points.size());
     d_.fewest_points = std::min(d_.fewest_points, n);
     d_.most_points = std::max(d_.most_points, n);
     d_.faces = static_cast<int64_t>(frame->faces.size());
+    const Points once = without_repeats(frame->points);
+    fewest_distinct_ = std::min(fewest_distinct_, once.size());
+    repeats_ += frame->points.size() - once.size();
+    repeat_frames_ += once.size() < frame->points.size();
     // A file of HDF5 numbers its frames itself, without gaps.
-    frames_.push_back(summary_of(*frame, frame->source.find(".h5:") == std::string::npos &&
-                                             frame->source.find(".hdf5:") == std::string::npos));
+    frames_.push_back(summary_of(*frame, once,
+                                 frame->source.find(".h5:") == std::string::npos &&
+                                     frame->source.find(".hdf5:") == std::string::npos));
     if (i % every == 0 || i < kFacingFrames) look_closely(*frame, i);
+    Mesh mesh{std::move(frame->points), std::move(frame->faces)};
+    if (i > 0 && jumps(frames_[frames_.size() - 2].size, frames_.back().size))
+      measure_jump(before, mesh);
+    before = std::move(mesh);
   }
   if (frames_.empty()) throw InputError("", "the sequence holds no frames", "give at least one");
+}
+
+/// Whether all frames are in one unit: nobody becomes twice as large from one frame to the next.
+bool Sequence::judge_sizes() {
+  std::vector<int64_t> at;
+  double factor = 1;
+  for (size_t i = 1; i < frames_.size(); ++i) {
+    const double ratio = double{frames_[i].size} / frames_[i - 1].size;
+    if (!jumps(frames_[i - 1].size, frames_[i].size)) continue;
+    at.push_back(static_cast<int64_t>(i));
+    if (std::abs(std::log(ratio)) > std::abs(std::log(factor))) factor = ratio;
+  }
+  if (at.empty()) return true;
+  // A frame or two with something else in view are no other unit.
+  const auto size_of = [&](size_t begin, size_t end) {
+    std::vector<double> sizes;
+    for (size_t i = begin; i < end; ++i) sizes.push_back(double{frames_[i].size});
+    return median(std::move(sizes));
+  };
+  const auto turn = static_cast<size_t>(at[0]);
+  const bool lasts = jumps(size_of(0, turn), size_of(turn, frames_.size()));
+  d_.findings.push_back({"sizes", lasts ? Weight::wrong : Weight::note,
+                         "the size changes " + number(std::max(factor, 1 / factor)) +
+                             " times before " + (at.size() == 1 ? "frame " : "frames ") +
+                             frame_list(at),
+                         1, "median distance of the points from their middle",
+                         lasts ? "bring all frames into one unit" : "look at these frames"});
+  return !lasts;
 }
 
 /// Where the person goes, as further evidence of where they face.
@@ -325,7 +304,7 @@ void Sequence::judge_speed() {
     f.weight = Weight::note;
     f.sure = 0.9;
     f.what += " cannot be: nobody runs that fast";
-    f.fix = "give the true rate with --fps";
+    f.fix = "give retarget the true rate with --fps";
   }
   d_.findings.push_back(f);
 }
@@ -337,8 +316,12 @@ Diagnosis Sequence::examine() {
   d_.frames = static_cast<int64_t>(frames_.size());
   d_.sequences = frames_.back().sequence + 1;
   d_.shown = worst_ ? worst_frame_ : stray_frame_;
-  recognise(d_, median(sizes_), vote_, options_);
+  seen_.size = median(sizes_);
+  seen_.stray_share =
+      static_cast<double>(strays_) / static_cast<double>(std::max<size_t>(points_, 1));
+  recognise(d_, seen_, options_);
   judge_points(d_, fewest_distinct_);
+  if (!judge_sizes()) d_.unit.sure = 0;
   judge_units(d_);
   judge_up(d_, looked_);
   judge_walk();
@@ -359,17 +342,24 @@ Diagnosis Sequence::examine() {
   judge_jumps();
   judge_duplicates(
       d_, repeats_, d_.faces == 0,
-      " in " + std::to_string(repeat_frames_) + " of " + counted(looked_, "frame") + " looked at");
+      " in " + std::to_string(repeat_frames_) + " of " + counted(frames_.size(), "frame"));
   if (stray_frames_ > 0)
     d_.findings.push_back({"outliers", Weight::note,
                            counted(strays_, "stray point") + " in " +
                                std::to_string(stray_frames_) + " of " + counted(looked_, "frame") +
                                " looked at",
                            1, "far from all others", "--fix removes them"});
+  if (flat_frames_ > 0) {
+    judge_plane(d_, flattest_,
+                "; seen in " + std::to_string(flat_frames_) + " of " + counted(looked_, "frame") +
+                    " looked at");
+    if (4 * flat_frames_ < looked_) d_.findings.back().weight = Weight::note;
+  }
   if (worst_) {
     PersonShape only_others = *worst_;
     only_others.parts.stray = 0;
     only_others.parts.pieces = 1;
+    only_others.parts.flat = 0;
     judge_parts(d_, only_others,
                 ", most in frame " + std::to_string(worst_frame_) + "; seen in " +
                     std::to_string(other_frames_) + " of " + counted(looked_, "frame") +

@@ -11,14 +11,11 @@
 namespace restage {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr size_t kSurfacePoints = 2000;
 // Logarithm of a person's size in metres: built-in bodies in all their poses have -0.92 +- 0.14,
 // people from children to giants get more room.
 constexpr double kMeanLogSize = -0.94, kDeviation = 0.22;
 constexpr double kNoPerson = 0.0111;  // density of "no person, or another unit": 3 deviations
-// A T-pose: shoulders at 0.81 of the height, 0.10 of it to the side (data of 160 bodies).
-constexpr double kShoulderHeight = 0.81, kShoulderWidth = 0.10, kShortestReach = 0.22;
 
 /// A mesh whose surface can be sampled.
 bool has_area(const Mesh& mesh) {
@@ -61,6 +58,8 @@ std::vector<size_t> distinct(const Points& points) {
     if (first[i] == i) out.push_back(i);
   return out;
 }
+
+size_t repeats(const Points& points) { return points.size() - distinct(points).size(); }
 
 Points without_repeats(const Points& points) {
   Points out;
@@ -124,31 +123,6 @@ double quantile(const Points& points, const Vec3& axis, double q) {
       along.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(along.size() - 1));
   std::nth_element(along.begin(), at, along.end());
   return *at;
-}
-
-std::optional<std::array<double, 2>> arm_angles(const Points& points) {
-  const double floor = quantile(points, Vec3::UnitY(), 0.002),
-               height = quantile(points, Vec3::UnitY(), 0.998) - floor,
-               middle = quantile(points, Vec3::UnitX(), 0.5);
-  std::array<double, 2> out{};
-  if (!(height > 0)) return std::nullopt;
-  for (const int side : {0, 1}) {
-    const Vec3 outwards = (side == 0 ? 1 : -1) * Vec3::UnitX();
-    const double reach = quantile(points, outwards, 0.985);
-    double x = 0, y = 0, n = 0;
-    for (const Point& p : points)
-      if (outwards.x() * p.x() >= reach) {
-        x += outwards.x() * (p.x() - middle);
-        y += p.y() - floor;
-        ++n;
-      }
-    x /= n * height;
-    y /= n * height;
-    if (x < kShortestReach) return std::nullopt;
-    out[static_cast<size_t>(side)] =
-        std::atan2(kShoulderHeight - y, x - kShoulderWidth) * 180 / kPi;
-  }
-  return out;
 }
 
 double one_sidedness(const Points& points, double spacing) {

@@ -1,7 +1,7 @@
 // What one cloud or surface shows, in its own units and axes; the pieces of examine.h.
 #pragma once
 
-#include <optional>
+#include <array>
 #include <string>
 
 #include "datasets/doctor/orientation.h"
@@ -16,6 +16,8 @@ std::vector<size_t> first_equals(const Points& points);
 std::vector<size_t> distinct(const Points& points);
 /// Those points.
 Points without_repeats(const Points& points);
+/// How many the others are.
+size_t repeats(const Points& points);
 
 /// Points evenly over the surface, so that a face modelled in detail weighs no more than a back; of
 /// a cloud its own points, each once. The same for the same mesh.
@@ -51,12 +53,18 @@ struct UnitGuess {
 /// By PersonShape::size.
 UnitGuess guess_unit(double size);
 
+/// PersonShape::size in metres of anybody from half a metre, crouching, to three, arms and legs
+/// spread; what is not of this size is no person in metres, and retargeting refuses it. (Adults in
+/// feet are larger.)
+inline constexpr double kSmallestSize = 0.07, kLargestSize = 1.0;
+inline bool is_person_sized(double metres) {
+  return metres >= kSmallestSize && metres <= kLargestSize;
+}
+/// The size of somebody who stands, times their height.
+inline constexpr double kSizeOfHeight = 0.23;
+
 /// Value of `points` along `axis` that a share `q` of them lie below.
 double quantile(const Points& points, const Vec3& axis, double q);
-
-/// Angles below the horizontal at which the two arms leave the shoulders (left, right; degrees;
-/// negative: raised), of points in our frame. Nothing if there are no arms at the sides at all.
-std::optional<std::array<double, 2>> arm_angles(const Points& points);
 
 /// Share of the rays through the cloud, from the direction where it is largest, that hit one side
 /// only: about 0.3 of a closed body, 0.8 of what one depth camera saw.

@@ -189,7 +189,9 @@ TargetMesh read_target(const std::string& path) {
   }
   const GltfRig rig = find_rig(file, {}, out.report);
   out.mesh = t_pose_mesh(file, rig);
-  put_on_floor(out.mesh, t_pose_joints(rig)[0]);
+  out.joints = t_pose_joints(rig);
+  const Vec3 moved = put_on_floor(out.mesh, (*out.joints)[0]);
+  for (Vec3& x : *out.joints) x -= moved;
   return out;
 }
 

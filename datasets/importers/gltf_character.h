@@ -32,7 +32,8 @@ Character read_character(const std::string& path, const CharacterOptions& option
 
 struct TargetMesh {
   Mesh mesh;
-  ImportReport report;  ///< empty for PLY and OBJ
+  ImportReport report;           ///< empty for PLY and OBJ
+  std::optional<Joints> joints;  ///< of a known rig, by their names, beside the surface
 };
 
 /// What `restage retarget --target` takes: of a glTF character the surface in T-pose, in metres, y

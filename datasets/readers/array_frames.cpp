@@ -156,6 +156,9 @@ std::optional<CloudArray> find_cloud(const Npz& file) {
       const NpyHeader header = file.header(name);
       if (is_cloud(header)) return cloud(name, header);
     }
+  if (file.has("poses") && file.has("trans"))
+    throw InputError(file.path(), "is a motion in AMASS's format, not a scan",
+                     "import it with restage data import");
   std::optional<CloudArray> found;
   std::vector<std::string> several;
   for (const std::string& name : file.names()) {

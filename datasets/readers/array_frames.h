@@ -24,7 +24,8 @@ struct CloudArray {
   bool sequence = false;  ///< [F, N, 3] rather than [N, 3]
 };
 
-/// The cloud of an NPZ; nothing if it has none. InputError if there are several to choose from.
+/// The cloud of an NPZ; nothing if it has none. InputError if there are several to choose from, or
+/// it is a motion of AMASS.
 std::optional<CloudArray> find_cloud(const Npz& file);
 /// The same of an NPY or NPZ file.
 std::optional<CloudArray> find_cloud(const std::string& path, uint64_t max_memory = kMaxMemory);

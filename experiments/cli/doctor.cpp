@@ -73,8 +73,8 @@ ExamineOptions examine_options(const Options& options) {
   ExamineOptions out;
   out.target = options.target;
   out.scale = options.scale;
-  if (out.scale && !(*out.scale > 0 && std::isfinite(*out.scale)))
-    throw InputError("", "--scale must be above 0", "metres = units x scale");
+  if (out.scale && !(*out.scale >= kLeastScale && *out.scale <= kMostScale))
+    throw InputError("", "--scale is out of range", "give metres per unit, 1e-9 to 1e6");
   if (!options.up.empty()) out.up = direction_of("--up", options.up);
   if (!options.facing.empty()) out.facing = direction_of("--facing", options.facing);
   return out;
@@ -159,17 +159,6 @@ Report examine_folder(const Options& options) {
   return out;
 }
 
-/// A rigged character, as retarget would take it: in T-pose, in our frame.
-Report examine_character(const Options& options) {
-  TargetMesh target = read_target(options.path);
-  Report out = examine_one("character", std::move(target.mesh), Vec3::Zero(), options);
-  out.subject.taken_as = "the surface that retarget takes as its target";
-  for (const auto& [name, value] : target.report.facts) out.facts[name] = value;
-  return out;
-}
-
-// ---- files with named joints -------------------------------------------------------------------
-
 /// Left and right, where joints have names: the only place where a mirror image can be told.
 void judge_hands(Report& out, const std::vector<Joints>& frames) {
   int mirrored = 0, right = 0;
@@ -188,6 +177,18 @@ void judge_hands(Report& out, const std::vector<Joints>& frames) {
                             "with toes forwards, the joints named left are on the left", ""});
 }
 
+/// A rigged character, as retarget would take it: in T-pose, in our frame.
+Report examine_character(const Options& options) {
+  TargetMesh target = read_target(options.path);
+  Report out = examine_one("character", std::move(target.mesh), Vec3::Zero(), options);
+  out.subject.taken_as = "the surface that retarget takes as its target";
+  for (const auto& [name, value] : target.report.facts) out.facts[name] = value;
+  if (target.joints) judge_hands(out, {*target.joints});
+  return out;
+}
+
+// ---- files with named joints -------------------------------------------------------------------
+
 std::vector<Joints> some_joints(const Prediction& data) {
   std::vector<Joints> out;
   for (int64_t k = 0; k < std::min<int64_t>(data.frames, 64); ++k) {
@@ -203,7 +204,11 @@ std::vector<Joints> some_joints(const Prediction& data) {
 Report examine_hdf5(const Options& options) {
   const std::string& path = options.path;
   const Inspection found = inspect(path);
-  if (const auto problems = verify(path); !problems.empty()) throw Error(problems[0], 2);
+  // A foreign unit is the first problem that verify() names; here it is a finding.
+  const bool foreign =
+      found.units != "metres" && !(found.kind == "scans" && found.units == "unknown");
+  if (const auto problems = verify(path); problems.size() > foreign)
+    throw Error(problems[foreign ? 1 : 0], 2);
   Report out(found.kind);
   if (found.kind == "scans" || found.counts.contains("vertices")) {
     if (found.kind == "scans" || found.kind == "prediction") out = examine_sequence(options);
@@ -212,9 +217,17 @@ Report examine_hdf5(const Options& options) {
   }
   for (const auto& [name, count] : found.counts) out.facts[name] = count;
   out.facts["units"] = found.units;
+  if (foreign)
+    out.findings.push_back({"declared units", out.diagnosis ? Weight::note : Weight::wrong,
+                            "the file says '" + found.units + "', and only metres are read", 1,
+                            "its attribute units",
+                            out.diagnosis ? "--fix writes metres" : "convert it to metres"});
   out.facts["license"] = found.license;
-  if (found.kind == "prediction" && found.counts.contains("joints"))
-    judge_hands(out, some_joints(read_prediction(path)));
+  if (found.kind == "prediction" && found.counts.contains("joints")) {
+    const std::vector<Joints> joints = some_joints(read_prediction(path));
+    if (!found.counts.contains("vertices")) out.findings.push_back(examine_skeletons(joints));
+    judge_hands(out, joints);
+  }
   if (found.counts.contains("bodies")) {
     std::vector<Joints> rest;
     for (const Body& body : read_bodies(path)) rest.push_back(body.joints);

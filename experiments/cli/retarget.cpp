@@ -7,6 +7,7 @@
 #include "datasets/doctor/examine.h"
 #include "datasets/importers/gltf_character.h"
 #include "datasets/readers/frame_folder.h"
+#include "datasets/readers/gltf.h"
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
@@ -89,10 +90,13 @@ void check(const RetargetCommand& c) {
     throw InputError("", "--source-up '" + c.up + "' is unknown", "use y or z");
   if (c.format != "ply" && c.format != "obj")
     throw InputError("", "--format '" + c.format + "' is unknown", "use ply or obj");
-  if (!(c.scale > 0) || !std::isfinite(c.scale))
-    throw InputError("", "--scale must be above 0", "metres = units x scale");
+  if (!(c.scale >= kLeastScale && c.scale <= kMostScale))
+    throw InputError("", "--scale is out of range", "give metres per unit, 1e-9 to 1e6");
   if (c.fps && !(*c.fps >= 1 && *c.fps <= 1000))
     throw InputError("", "--fps is out of range", "give the source's frames per second, 1 to 1000");
+  if (c.fps && is_gltf_name(c.source))
+    throw InputError(c.source, "states its key times, which --fps cannot change",
+                     "leave --fps out");
   if (c.samples < 1 || c.samples > 256)
     throw InputError("", "--samples is out of range", "give 1 to 256");
   const auto dot = c.out.find_last_of('.');
@@ -112,9 +116,9 @@ void to_metres(const RetargetCommand& c, Points& points) {
 }
 
 /// The doctor's words on what would make the result nonsense.
-void check_inputs(const RetargetCommand& c, FrameSource& frames, const Mesh& target) {
+void check_inputs(const RetargetCommand& c, FrameSource& frames, const TargetMesh& target) {
   if (c.force) return;
-  check_target(target, c.target);
+  check_target(target.mesh, c.target, target.joints ? &*target.joints : nullptr);
   std::vector<Mesh> first;
   while (first.size() < kSourceFrames) {
     auto frame = frames.next();
@@ -123,7 +127,7 @@ void check_inputs(const RetargetCommand& c, FrameSource& frames, const Mesh& tar
     first.push_back({std::move(frame->points), std::move(frame->faces)});
   }
   frames.rewind();
-  check_source(first, c.source);
+  check_source(first, c.source, {c.scale, c.up == "z"});
 }
 
 using Clock = std::chrono::steady_clock;
@@ -163,7 +167,7 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   options.samples = c.samples;
   options.anchor = c.anchor;
   TargetMesh target = read_target(c.target);
-  check_inputs(c, *frames, target.mesh);
+  check_inputs(c, *frames, target);
   Retargeter retargeter(models, std::move(target.mesh), c.target, options);
   // The first frame is looked at before anything is written or logged.
   double read = 0;
@@ -181,6 +185,7 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   int64_t in = 0, out = 0;
   for (; frame; frame = next(), ++in) {
     const Clock::time_point start = Clock::now();
+    if (!c.force) check_frame(frame->points, frame->source);
     const auto made = retargeter.push(frame->points, frame->source);
     const Clock::time_point pushed = Clock::now();
     for (const RetargetedFrame& f : made) sink->push(f);
@@ -236,7 +241,7 @@ void add_retarget(Program& program) {
                  "seconds in which the path goes back to the source's, scaled to the target's legs "
                  "(0: never)");
   app.add_flag("--force", c->force,
-               "accept a target that is no T-pose, and axes and units that look wrong");
+               "accept a target that is no T-pose, and what else the doctor calls wrong");
   app.add_flag("--profile", c->profile,
                "say how long a frame and its parts take: p50, p95, p99, max");
 }

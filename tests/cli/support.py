@@ -1,5 +1,6 @@
 """What the tests of the command line share: running the program, the contract of its errors, files."""
 import json
+import math
 import os
 import random
 import shutil
@@ -102,6 +103,16 @@ def numbers(count, seed, scale=1.0):
 def points(count, seed):
     x = numbers(3 * count, seed)
     return [tuple(x[3 * i:3 * i + 3]) for i in range(count)]
+
+
+def sphere(count=500, radius=0.5):
+    """Points evenly on a sphere of a person's size."""
+    out = []
+    for i in range(count):
+        z, turn = (2 * i + 1) / count - 1, 2.39996 * i
+        r = radius * math.sqrt(1 - z * z)
+        out.append((r * math.cos(turn), r * math.sin(turn), radius * z))
+    return out
 
 
 def small_disk():

@@ -78,6 +78,7 @@ class Arrays(CliTest):
         self.bad_input(["data", "import", "amass/ben/broken.npz", "--out", "x.h5"], "broken.npz")
         self.bad_input(["data", "import", "amass/ben/shape.npz", "--out", "x.h5"], "--betas")
         self.bad_input(["data", "import", "amass", "--body-model", "none.npz", "--out", "x.h5"], "none.npz")
+        self.bad_input(["doctor", "amass/ann/walk_poses.npz"], "walk_poses.npz", "restage data import")
 
     def test_body_model(self):
         self.write("SMPLH_MALE.npz", smplh())

@@ -109,3 +109,13 @@ class Gltf(CliTest):
         self.bad_input(call + ["--source", "first.glb", "--clip", "jump", "--target", "plain.ply", "--out", "x.h5"],
                        "jump", "'motion'")
         self.bad_input(call + ["--source", "scans", "--clip", "jump", "--target", "plain.ply", "--out", "x.h5"], "--clip")
+        self.bad_input(call + ["--source", "first.glb", "--fps", "60", "--target", "plain.ply", "--out", "x.h5"], "leave --fps out")
+
+    def test_mirrored_rigs_are_named(self):
+        other = {"left": "right", "right": "left"}
+        character(self.path("mirror.glb"), ["_".join(other.get(word, word) for word in name.split("_")) for name in NAMES])
+        hands = lambda name: [f["weight"] for f in json.loads(self.restage("doctor", name, "--json").out)["findings"] if f["topic"] == "handedness"]
+        self.assertEqual((hands("hero.glb"), hands("mirror.glb")), (["fact"], ["wrong"]))
+        self.ply("scans/f0.ply", points(120, 1))
+        self.bad_input(["retarget", "--weights", weights("tposes", *TPOSES), "--source", "scans", "--target", "mirror.glb", "--out", "x.h5"],
+                       "mirror.glb", "mirror image", "--force")

@@ -3,7 +3,7 @@ import json
 import os
 import struct
 
-from support import CliTest, numbers, points, small_disk
+from support import CliTest, numbers, points, small_disk, sphere
 from tiny_run import TPOSES, weights
 
 FRAMES = 5
@@ -97,10 +97,6 @@ class Outputs(Retarget):
             self.done(*self.call(out, target="cloud.ply"))
         self.assertEqual(self.counts("out.h5")["vertices"], len(TARGET))
 
-    def test_tpose_needs_no_force(self):
-        self.done(*self.call("out.h5", w=weights("tposes", *TPOSES), force=False))
-        self.assertEqual(self.counts("out.h5")["frames"], FRAMES)
-
 
 class Sources(Retarget):
     def same(self, a, b):
@@ -176,6 +172,7 @@ class DoctorsWords(Retarget):
     def test_source(self):
         call = lambda *more, **inputs: self.call("out.h5", *more, target="walk/target.ply", force=False, **inputs)
         self.done(*call(source="good"))
+        self.assertEqual(self.counts("out.h5")["frames"], 10)
         self.source("z", lambda x, y, z: (x, -z, y))
         self.bad_input(call(source="z"), "z: ", "+z", "--source-up z", "--force")
         self.done(*call("--source-up", "z", source="z"))
@@ -183,11 +180,36 @@ class DoctorsWords(Retarget):
         self.source("cm", lambda x, y, z: (100 * x, 100 * y, 100 * z))
         self.bad_input(call(source="cm"), "1 cm", "--scale 0.01")
         self.done(*call("--scale", "0.01", source="cm"))
+        # What is given already is taken into account.
+        self.bad_input(call("--scale", "0.1", source="cm"), "--scale 0.01")
+        self.bad_input(call("--scale", "0.01", source="good"), "leave --scale out")
+        self.bad_input(call("--source-up", "z", source="good"), "leave --source-up out")
+        for scale in ("0", "inf", "nan", "1e300", "1e-30"):
+            self.bad_input(call("--scale", scale, source="good"), "--scale")
+
+    def test_what_is_no_person(self):
+        call = lambda source: self.call("out.h5", target="walk/target.ply", source=source, force=False)
+        self.bad_input(call("scans"), "no unit", "--force")
+        self.bad_input(call(self.ply("sphere.ply", sphere())), "nobody", "--force")
+        for name, by in (("km", 1e-3), ("feet", 1 / 0.3048), ("huge", 1e30)):
+            self.source(name, lambda x, y, z: (by * x, by * y, by * z))
+            self.bad_input(call(name), name, "--scale", "--force")
+        ground = [(0.1 * (i % 40) - 2, 0.001 * (i % 7), 0.1 * (i // 40) - 2) for i in range(1600)]
+        for i, frame in enumerate(self.frames):
+            self.ply("ground/f%d.ply" % i, frame + ground)
+            self.ply("late/f%d.ply" % i, [(100 * x, 100 * y, 100 * z) for x, y, z in frame] if i == 9 else frame)
+        self.bad_input(call("ground"), "a floor", "doctor", "--force")
+        self.bad_input(call("late"), "f9.ply", "another size", "--force")
+        self.assertNotIn("out.h5", os.listdir(self.folder))
 
     def test_target(self):
         hero = self.vertices("walk/target.ply")
         call = lambda name: self.call("out.h5", target=name, source="good", force=False)
-        self.bad_input(call(self.ply("back.ply", [(-x, y, -z) for x, y, z in hero])), "back.ply", "face -z", "--fix")
+        self.bad_input(call(self.ply("back.ply", [(-x, y, -z) for x, y, z in hero])), "back.ply", "faces -z", "--fix")
+        turned = [(0.8 * x + 0.6 * z, y, 0.8 * z - 0.6 * x) for x, y, z in hero]
+        self.bad_input(call(self.ply("turned.ply", turned)), "not a T-pose", "turned by", "--force")
+        self.assertEqual(self.restage("doctor", "turned.ply", "--target").code, 1)
+        self.bad_input(self.call("out.h5", target="walk/target.ply", source="good", w=weights("tiny"), force=False), "is not in T-pose", "--force")
         self.bad_input(call(self.ply("mm.ply", [(1000 * x, 1000 * y, 1000 * z) for x, y, z in hero])), "1 mm", "--fix")
         self.done("doctor", "back.ply", "--target", "--fix", "mended.ply")
         self.done(*call("mended.ply"))
@@ -201,7 +223,7 @@ class BadRetargeting(Retarget):
             self.bad_input(self.call(out, *more, **inputs), *contains)
 
     def test_targets(self):
-        self.bad("hero.ply", "T-pose", "--force", force=False, outs=self.OUTS)
+        self.bad("hero.ply", "--force", force=False, outs=self.OUTS)
         good = self.bytes("hero.ply")
         bad = lambda name, *words: self.bad(name, *words, target=name)
         bad("none.ply")

@@ -3,7 +3,7 @@ import json
 import os
 import struct
 
-from support import CliTest, numbers, points, small_disk
+from support import CliTest, numbers, points, small_disk, sphere
 
 TETRAHEDRON = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
 FACES = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]
@@ -17,14 +17,16 @@ class Doctor(CliTest):
 
     def test_says_what_a_file_is(self):
         self.assertEqual(self.doctor(self.ply("a.ply", TETRAHEDRON, FACES), 1)["kind"], "mesh")
-        found = self.doctor(self.ply("b.ply", points(200, 1)), 0)
-        self.assertEqual((found["kind"], found["facts"]["points"], found["usable"]), ("cloud", 200, True))
+        found = self.doctor(self.ply("b.ply", points(200, 1)), 1)
+        self.assertEqual((found["kind"], found["facts"]["points"], found["usable"]), ("cloud", 200, False))
+        self.assertIn("no unit", found["notes"][0])
+        self.assertIn("nobody", " ".join(self.doctor(self.ply("sphere.ply", sphere()), 1)["notes"]))
         found = self.doctor(self.ply("c.ply", points(3, 1)), 1)
         self.assertIn("3 distinct points", found["notes"][0])
-        self.assertEqual(self.doctor(self.h5("p.h5", joints=([2, 22, 3], [0.0])), 0)["kind"], "prediction")
+        self.assertEqual(self.doctor(self.h5("p.h5", joints=([2, 22, 3], [0.0])), 1)["kind"], "prediction")
         for i in (1, 2, 10):
             self.ply("frames/f%d.ply" % i, points(100 + i, i))
-        found = self.doctor("frames", 0)
+        found = self.doctor("frames", 1)
         self.assertEqual((found["kind"], found["facts"]["frames"], found["facts"]["most_points"]), ("frames", 3, 110))
 
     def person(self):
@@ -86,6 +88,17 @@ class Doctor(CliTest):
         self.assertEqual((found["counts"]["frames"], found["transform"]["scale"]), (12, 1))
         self.assertEqual(self.doctor("again.h5", 0)["facts"]["frames"], 12)
 
+    def test_scale_given_and_declared_units(self):
+        person = self.person()
+        self.ply("cm.ply", [(100 * x, 100 * y, 100 * z) for x, y, z in person])
+        self.doctor("cm.ply", 0, "--scale", "0.01")
+        self.assertIn("m tall", self.doctor("cm.ply", 1, "--scale", "1")["notes"][0])
+        flat = [100 * x for p in person for x in p]
+        self.h5("declared.h5", {"units": "centimetres"}, points=([len(person), 3], flat), frame_offset=([2], [0, len(person)], "int64"))
+        notes = " ".join(self.doctor("declared.h5", 1)["notes"])
+        for words in ("1 cm", "the file says 'centimetres'"):
+            self.assertIn(words, notes)
+
     def test_picture(self):
         self.ply("odd.ply", self.person() + [(3, 3, 3), (2, -1, 2)])
         self.assertIn("2 stray points", self.done("doctor", "odd.ply", "--picture", "sheet.png"))
@@ -97,6 +110,8 @@ class Doctor(CliTest):
         self.ply("ball.ply", points(200, 1))
         self.bad_input(["doctor", "ball.ply", "--fix", "x.ply"], "cannot be repaired", "--up")
         self.done("doctor", "ball.ply", "--fix", "x.ply", "--up", "y", "--scale", "0.3")
+        for scale in ("0", "inf", "nan", "1e300", "1e-30"):
+            self.bad_input(["doctor", "ball.ply", "--scale", scale], "--scale")
         self.bad_input(["doctor", "ball.ply", "--up", "w"], "--up")
         self.bad_input(["doctor", "ball.ply", "--scale", "-1"], "--scale")
         self.bad_input(["doctor", "ball.ply", "--up", "+y", "--facing=-y"], "nobody")

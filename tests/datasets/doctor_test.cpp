@@ -7,6 +7,7 @@
 #include "datasets/builtin/motions.h"
 #include "datasets/doctor/examine.h"
 #include "datasets/doctor/orientation_model.h"
+#include "datasets/doctor/planes.h"
 #include "datasets/sampling/surface.h"
 
 namespace restage {
@@ -145,8 +146,10 @@ TEST(DoctorOrientation, WhatIsNoPersonIsUnsure) {
                          static_cast<float>(rng.normal())) *
                    70);
   const Diagnosis d = examine_surface(cloud(ball));
-  EXPECT_TRUE(d.usable()) << "nothing certain can be said against it";
-  EXPECT_NO_THROW(check_target(cloud(ball), "ball"));
+  EXPECT_TRUE(notes(d, "up", "nobody"));
+  EXPECT_FALSE(d.usable());
+  EXPECT_THROW(check_target(cloud(ball), "ball"), InputError);
+  EXPECT_LT(d.unit.sure, 0.5) << "a unit is told by a person's size";
   EXPECT_EQ(guess_unit(0).sure, 0);
   EXPECT_LT(guess_unit(1e30).sure, 1e-6);
 }
@@ -310,6 +313,95 @@ TEST(Doctor, DuplicatesAndFewPoints) {
   EXPECT_FALSE(few.transform);
 }
 
+/// Two by two metres of floor, or of a wall behind the person.
+Points with_plane(Points points, bool wall) {
+  Rng rng(RngKey{11, 0});
+  for (int i = 0; i < 1500; ++i) {
+    const auto u = static_cast<float>(rng.uniform(-1, 1)),
+               v = static_cast<float>(rng.uniform(-1, 1)),
+               noise = static_cast<float>(0.004 * rng.normal());
+    points.push_back(wall ? Point(u, 1 + v, -0.5f + noise) : Point(u, noise, v));
+  }
+  return points;
+}
+
+TEST(Doctor, FloorsAndWallsAreNamedAndRemoved) {
+  const Points person = scan(somebody());
+  for (const bool wall : {false, true})
+    for (const double units : {1.0, 100.0}) {
+      const Mesh mesh = cloud(moved(with_plane(person, wall), into_foreign(4, 1), units));
+      const Diagnosis d = examine_surface(mesh);
+      EXPECT_TRUE(notes(d, "plane", wall ? "a wall" : "a floor"));
+      EXPECT_FALSE(d.usable());
+      EXPECT_EQ(d.orientation.up, 4);
+      EXPECT_EQ(d.unit.unit.metres, 1 / units);
+      const size_t left = mended(mesh, d).vertices.size();
+      EXPECT_LE(left, person.size() + 15);
+      EXPECT_GE(left, person.size() * 96 / 100) << "soles lie on the floor";
+    }
+  EXPECT_THROW(check_target(cloud(with_plane(person, false)), "hero"), InputError);
+}
+
+TEST(Doctor, NobodyIsTakenForAFloor) {
+  for (int k = 0; k < 22; ++k) {
+    const Motion motion = builtin_motion(0, "test", k);
+    EXPECT_FALSE(find_planes(scan(somebody(), &motion, motion.frames() / 2)).any()) << k;
+  }
+  Points flat;
+  Rng rng(RngKey{12, 0});
+  for (int i = 0; i < 1000; ++i)
+    flat.push_back({static_cast<float>(rng.uniform()), 0, static_cast<float>(rng.uniform())});
+  EXPECT_FALSE(find_planes(flat).any()) << "with nobody beside it, it is no floor";
+}
+
+TEST(Doctor, NobodyIsOfThatSize) {
+  const auto judged = [](double scale, std::optional<double> given = std::nullopt) {
+    ExamineOptions options;
+    options.scale = given;
+    return examine_surface(cloud(moved(scan(somebody()), Mat3::Identity(), scale)), options);
+  };
+  for (const double scale : {1e-30, 1e-3, 1e-2, 1 / 0.3048, 20.0, 1e9, 1e30})
+    EXPECT_FALSE(judged(scale).usable()) << scale;
+  for (const double scale : {0.31, 0.55, 1.0, 1.7}) EXPECT_TRUE(judged(scale).usable()) << scale;
+  EXPECT_TRUE(judged(100, 0.01).usable());
+  EXPECT_FALSE(judged(100, 1).usable());
+  EXPECT_NE(judged(100, 1).find("units")->fix.find("--scale 0.01"), std::string::npos);
+}
+
+/// The same target, the same answer: what the doctor calls wrong is refused, nothing else.
+TEST(Doctor, TargetsAreJudgedAsRetargetingDoes) {
+  const Body& body = somebody();
+  const auto posed = [&](int joint, const Vec3& axis, double angle, int child, double back) {
+    Pose pose;
+    pose.root = body.joints[0];
+    pose.local.fill(Mat3::Identity());
+    for (const int side : {0, 1}) {
+      const double sign = axis.z() != 0 && side == 1 ? -1 : 1;
+      pose.local[static_cast<size_t>(joint + side)] =
+          Eigen::AngleAxisd(sign * angle, axis).toRotationMatrix();
+      if (child > 0)
+        pose.local[static_cast<size_t>(child + side)] =
+            Eigen::AngleAxisd(back, axis).toRotationMatrix();
+    }
+    return cloud(SurfaceSampler(body).draw(RngKey{4, 0}, 1500).on_pose(body, pose));
+  };
+  const Mesh turned = cloud(moved(scan(body), turn_about_y(0.75)));
+  const Mesh seated = posed(1, Vec3::UnitX(), -1.5, 4, 1.5),
+             hanging = posed(16, Vec3::UnitZ(), -1, 0, 0);
+  ExamineOptions target;
+  target.target = true;
+  for (const auto& [mesh, good] :
+       {std::pair(body.rest, true), {turned, false}, {seated, false}, {hanging, false}}) {
+    const Diagnosis d = examine_surface(mesh, target);
+    EXPECT_EQ(d.usable(), good) << d.find("pose")->evidence << ", up " << d.orientation.up_sure;
+    EXPECT_EQ(notes(d, "pose", "not a T-pose"), !good);
+    if (good)
+      EXPECT_NO_THROW(check_target(mesh, "hero"));
+    else
+      EXPECT_THROW(check_target(mesh, "hero"), InputError);
+  }
+}
+
 TEST(Doctor, TargetsMustStandInTPoseAndFaceForwards) {
   ExamineOptions target;
   target.target = true;
@@ -388,6 +480,41 @@ TEST(DoctorSequence, MissingFramesByNumberAndByMotion) {
   EXPECT_TRUE(notes(examine_frames(jumping), "missing frames", "jumps before frame 15"));
 }
 
+TEST(DoctorSequence, OneUnitThroughout) {
+  std::vector<Points> frames = performance(40);
+  for (size_t f = 20; f < frames.size(); ++f)
+    for (Point& p : frames[f]) p *= 100;
+  Frames changing(frames);
+  const Diagnosis d = examine_frames(changing);
+  EXPECT_TRUE(notes(d, "sizes", "before frame 20"));
+  EXPECT_FALSE(d.usable());
+  EXPECT_FALSE(d.transform);
+  EXPECT_NO_THROW(check_frame(frames[19], "f19"));
+  EXPECT_THROW(check_frame(frames[20], "f20"), InputError);
+  // Somebody who comes into view is no other unit.
+  std::vector<Points> joined = performance(40);
+  for (size_t f = 20; f < joined.size(); ++f)
+    for (const Point& p : Points(joined[f])) joined[f].push_back(p + Point(1.2f, 0, 0));
+  Frames company(joined);
+  EXPECT_EQ(examine_frames(company).find("sizes"), nullptr);
+}
+
+TEST(DoctorSequence, EveryFrameNeedsPoints) {
+  std::vector<Points> frames = performance(60);
+  frames[51].resize(50);
+  Frames source(frames);
+  EXPECT_TRUE(notes(examine_frames(source), "points", "only 50"));
+}
+
+TEST(DoctorSequence, SkeletonsAreOfAPersonsSize) {
+  Joints joints = somebody().joints;
+  EXPECT_EQ(examine_skeletons({joints}).what, "metres");
+  for (Vec3& x : joints) x *= 100;
+  EXPECT_EQ(examine_skeletons({joints}).weight, Weight::wrong);
+  joints.fill(Vec3::Zero());
+  EXPECT_EQ(examine_skeletons({joints}).weight, Weight::wrong);
+}
+
 TEST(DoctorSequence, NobodyRunsThatFast) {
   std::vector<Points> frames = performance(20);
   for (size_t f = 0; f < frames.size(); ++f)
@@ -405,12 +532,19 @@ TEST(DoctorChecks, RefuseNonsenseWithTheOptionThatMendsIt) {
     }
     return "";
   };
-  const auto source = [&](const Mat3& turn, double scale) {
+  const auto source = [&](const Mat3& turn, double scale, const SourceFrame& given = {}) {
     std::vector<Mesh> frames;
     for (const Points& p : performance(kSourceFrames))
       frames.push_back(cloud(moved(p, turn, scale)));
-    return words([&] { check_source(frames, "scans"); });
+    return words([&] { check_source(frames, "scans", given); });
   };
+  // What was given already counts: metres read as centimetres, y up read as z up.
+  EXPECT_NE(source(Mat3::Identity(), 0.01, {0.01, false}).find("leave --scale out"),
+            std::string::npos);
+  EXPECT_NE(source(Mat3::Identity(), 10, {0.1, false}).find("--scale 0.01"), std::string::npos);
+  EXPECT_NE(source(into_foreign(5, 2), 1, {1, true}).find("leave --source-up out"),
+            std::string::npos);
+  EXPECT_NE(source(Mat3::Identity(), 3e4).find("--scale"), std::string::npos);
   EXPECT_EQ(source(Mat3::Identity(), 1), "");
   EXPECT_NE(source(into_foreign(4, 1), 1).find("--source-up z"), std::string::npos);
   EXPECT_NE(source(into_foreign(0, 4), 1).find("--fix"), std::string::npos);
@@ -420,7 +554,7 @@ TEST(DoctorChecks, RefuseNonsenseWithTheOptionThatMendsIt) {
   };
   EXPECT_EQ(target(Mat3::Identity(), 1), "");
   EXPECT_NE(target(into_foreign(4, 1), 1).find("+z"), std::string::npos);
-  EXPECT_NE(target(into_foreign(2, 5), 1).find("face -z"), std::string::npos);
+  EXPECT_NE(target(into_foreign(2, 5), 1).find("faces -z"), std::string::npos);
   EXPECT_NE(target(Mat3::Identity(), 1000).find("1 mm"), std::string::npos);
 }
 

@@ -1,0 +1,257 @@
+// The doctor's judgements: from what was measured to findings.
+#include <algorithm>
+#include <cmath>
+
+#include "autograd/base/error.h"
+#include "datasets/doctor/examine_detail.h"
+#include "datasets/doctor/pose.h"
+#include "datasets/doctor/words.h"
+
+namespace restage {
+
+namespace doctor_detail {
+
+namespace {
+
+constexpr double kFloorMatters = 0.05;  // metres; less is noise, or a shoe's sole
+constexpr double kPoseSure = 0.75;      // of the up axis: seated people are seldom more certain
+constexpr double kPlaneMatters = 0.03;  // share of all points
+
+}  // namespace
+
+void recognise(Diagnosis& d, const Seen& seen, const ExamineOptions& options) {
+  d.size = seen.size;
+  d.unit = guess_unit(seen.size);
+  d.orientation = seen.vote.result();
+  // Another unit than metres is told by a person's size: only where a person is seen.
+  const double by_chance = 1.0 / kDirections.size();
+  if (d.unit.unit.metres != 1)
+    d.unit.sure *= std::max(0.0, (d.orientation.up_sure - by_chance) / (1 - by_chance)) *
+                   (1 - seen.stray_share);
+  if (options.scale) d.unit = {{"", *options.scale}, 1, d.unit.deviation};
+  if (options.up) d.orientation = seen.vote.result(*options.up);
+  if (!options.facing) return;
+  if (*options.facing / 2 == d.orientation.up / 2)
+    throw InputError("",
+                     std::string("nobody whose head points along ") +
+                         kDirections[static_cast<size_t>(d.orientation.up)] + " faces " +
+                         kDirections[static_cast<size_t>(*options.facing)],
+                     "give two directions at right angles, --up and --facing");
+  d.orientation.facing = *options.facing;
+  d.orientation.facing_sure = 1;
+  d.orientation.turned = 0;
+}
+
+void judge_units(Diagnosis& d) {
+  const UnitGuess& guess = d.unit;
+  Finding f{"units", Weight::fact, "", guess.sure, "", ""};
+  f.evidence = "half of the points lie within " + number(d.size) +
+               " units of the middle; of people it is 0.26 to 0.63 m in any pose";
+  // What is metres, or is taken as such.
+  const double taken = *guess.unit.name == 0 ? guess.unit.metres : 1;
+  const bool sized = is_person_sized(d.size * taken);
+  if (!sized) f.weight = Weight::wrong;
+  const std::string tall = "somebody about " + number(d.size * taken / kSizeOfHeight) + " m tall";
+  if (*guess.unit.name == 0) {
+    f.what = "1 unit is " + number(guess.unit.metres) + " m, as given";
+    if (!sized) f.what += ", which makes " + tall;
+    const UnitGuess found = guess_unit(d.size);
+    if (!sized && found.sure >= kUnsure)
+      f.fix = "--scale " + number(found.unit.metres) + " makes a person of it";
+  } else if (guess.sure < kUnsure) {
+    if (sized) f.weight = Weight::note;
+    f.what = "no unit (m, dm, inch, cm, mm) clearly makes a person of it";
+    if (!sized) f.what += "; in metres it is " + tall;
+    f.fix = "give metres per unit with --scale if they are not metres";
+  } else if (guess.unit.metres == 1) {
+    f.what = "metres";
+  } else {
+    f.what = std::string("1 unit is 1 ") + guess.unit.name + ", not 1 m";
+    f.fix = "--fix; or give retarget --scale " + number(guess.unit.metres);
+  }
+  d.findings.push_back(f);
+}
+
+void judge_up(Diagnosis& d, size_t clouds) {
+  const Orientation& o = d.orientation;
+  Finding f{"up",      Weight::fact, std::string(kDirections[static_cast<size_t>(o.up)]) + " is up",
+            o.up_sure, "",           ""};
+  f.evidence = "where a person's points lie, in 144 attitudes" +
+               (clouds > 1 ? ", over " + counted(clouds, "frame") : std::string());
+  if (o.up_sure < kNobody) {
+    f.weight = Weight::wrong;
+    f.what = "nobody can be made out, and which axis is up cannot be told";
+    f.fix = "is it one whole person, and nothing else? If so, say --up";
+  } else if (o.up_sure < kUnsure) {
+    f.weight = Weight::note;
+    f.what = std::string("which axis is up cannot be told (perhaps ") +
+             kDirections[static_cast<size_t>(o.up)] + ")";
+    f.fix = "say it with --up; is it one whole person?";
+  } else if (o.up != 2) {
+    // What is of no person's size may be no person: then only a note.
+    f.weight = o.up_sure >= kSure && d.unit.sure >= kUnsure ? Weight::wrong : Weight::note;
+    f.what += ", not +y";
+    f.fix = o.up == 4 ? "--fix turns it; or give retarget --source-up z" : "--fix turns it";
+  }
+  d.findings.push_back(f);
+}
+
+void judge_facing(Diagnosis& d, bool target) {
+  const Orientation& o = d.orientation;
+  if (o.up_sure < kUnsure) return;
+  Finding f{"facing", Weight::fact, "", o.facing_sure, "", ""};
+  f.evidence = "feet, knees, seat and chest are not the same before and behind";
+  if (o.facing_sure < kUnsure) {
+    f.weight = Weight::note;
+    f.what = std::string("which way the person faces cannot be told (perhaps ") +
+             kDirections[static_cast<size_t>(o.facing)] + ")";
+  } else {
+    f.what = std::string("faces ") + kDirections[static_cast<size_t>(o.facing)];
+    if (std::abs(o.turned) > 20)
+      f.what += ", turned by about " + number(std::round(std::abs(o.turned) / 5) * 5) +
+                " degrees to their " + (o.turned > 0 ? "left" : "right");
+    // With another up axis the turn is part of that repair.
+    if (target && o.up == 2 && o.facing != 4) {
+      f.weight = o.facing_sure >= kSure ? Weight::wrong : Weight::note;
+      f.fix = "--fix turns it; a target has to face +z";
+    }
+  }
+  d.findings.push_back(f);
+}
+
+/// The proper turn: as found where that is sure, else as few axes exchanged as possible.
+Mat3 best_turn(const Orientation& o) {
+  if (o.facing_sure >= kUnsure) return o.turn();
+  Orientation guess = o;
+  Mat3 best = Mat3::Zero();
+  for (guess.facing = 0; guess.facing < 6; ++guess.facing)
+    if (guess.facing / 2 != o.up / 2 && (best.isZero() || guess.turn().trace() > best.trace()))
+      best = guess.turn();
+  return best;
+}
+
+void judge_frame(Diagnosis& d, double lowest, double highest) {
+  if (d.unit.sure < kUnsure || d.orientation.up_sure < kUnsure) {
+    d.findings.push_back({"transform", Weight::note,
+                          "how to bring it into our frame cannot be told", 1,
+                          "units or up axis are unsure", ""});
+    return;
+  }
+  Similarity t;
+  t.scale = d.unit.unit.metres;
+  t.rotation = best_turn(d.orientation);
+  d.height = t.scale * (highest - lowest);
+  const double floor = t.scale * lowest;
+  if (std::abs(floor) > kFloorMatters) t.offset = lowest * direction(d.orientation.up);
+  d.transform = t;
+  d.findings.push_back({"height", Weight::fact, number(d.height) + " m from the floor to the top",
+                        1, "in the pose that it shows", ""});
+  Finding f{"floor", Weight::fact, "at 0", 1, "lowest points of the person", ""};
+  if (!t.offset.isZero()) {
+    f.weight = Weight::note;
+    f.what = "at " + number(floor) + " m, not 0";
+    f.fix = "--fix moves it";
+  }
+  d.findings.push_back(f);
+}
+
+void judge_points(Diagnosis& d, size_t distinct) {
+  if (distinct >= kEnoughPoints) return;
+  d.findings.push_back({"points", Weight::wrong,
+                        "only " + std::to_string(distinct) + " distinct points; networks need " +
+                            std::to_string(kEnoughPoints),
+                        1, "counted", "scan it more finely"});
+}
+
+void judge_plane(Diagnosis& d, const Parts& parts, const std::string& where) {
+  if (parts.flat == 0) return;
+  const double share = static_cast<double>(parts.flat) / static_cast<double>(parts.part.size());
+  const bool level = std::abs(parts.flat_normal.dot(direction(d.orientation.up))) > 0.8;
+  const char* what = d.orientation.up_sure < kUnsure ? "a floor or a wall"
+                     : level                         ? "a floor"
+                                                     : "a wall";
+  d.findings.push_back({"plane", share >= kPlaneMatters ? Weight::wrong : Weight::note,
+                        std::string(what) + " is in view (" + counted(parts.flat, "point") + ", " +
+                            per_cent(share) + ")" + where,
+                        0.95, "points in one plane that reaches far beyond the person",
+                        "--fix removes it"});
+}
+
+void judge_parts(Diagnosis& d, const PersonShape& shape, const std::string& where) {
+  const Parts& parts = shape.parts;
+  const auto all = static_cast<double>(parts.part.size());
+  judge_plane(d, parts, where);
+  const double metres = d.unit.sure >= kUnsure ? d.unit.unit.metres : 1;
+  if (parts.stray > 0)
+    d.findings.push_back({"outliers", Weight::note,
+                          counted(parts.stray, "stray point") + " (" +
+                              per_cent(static_cast<double>(parts.stray) / all) + ")" + where,
+                          1, "far from all others", "--fix removes them"});
+  if (parts.other > 0) {
+    const auto person = static_cast<double>(shape.points.size());
+    const bool somebody = static_cast<double>(parts.largest_other) > 0.4 * person;
+    Finding f{"others", somebody ? Weight::wrong : Weight::note, "", 0.9, "", "--fix removes it"};
+    f.what = (somebody ? "a second person" : "part of somebody or something else") +
+             (" (" + counted(parts.other, "point")) + ")" + where;
+    f.evidence = "a separate piece, " + number(parts.gap * metres) +
+                 (d.unit.sure >= kUnsure ? " m" : " units") + " from the person";
+    d.findings.push_back(f);
+  }
+  if (parts.pieces > 1)
+    d.findings.push_back({"holes", Weight::note,
+                          "the person is in " + std::to_string(parts.pieces) + " pieces" + where, 1,
+                          "gaps between groups of points", "scan from more sides if you can"});
+}
+
+void judge_pose(Diagnosis& d, const PersonShape& shape, bool target) {
+  const Orientation& o = d.orientation;
+  Finding f{"pose", Weight::fact, "", std::min(0.95, o.up_sure), "", ""};
+  if (o.up_sure < kUnsure) {
+    f.weight = Weight::note;
+    f.what = "whether it stands in T-pose cannot be told, as the up axis is unsure";
+    if (target) d.findings.push_back(f);
+    return;
+  }
+  if (!target && o.facing_sure < kUnsure) return;
+  const Eigen::Matrix3f turn = best_turn(o).cast<float>();
+  Points ours;
+  for (const Point& p : shape.points) ours.push_back(turn * p);
+  const auto angles = t_pose_angles(ours);
+  const double arms = angles ? std::max(angles->arms[0], angles->arms[1]) : 90,
+               legs = angles ? angles->legs : 0;
+  const auto degrees = [](double x) { return number(std::round(x)); };
+  if (arms <= kTPoseAngle && legs <= kLegAngle) {
+    f.what = "T-pose";
+    f.evidence = "arms within " + number(std::ceil(arms)) + " degrees of where they belong";
+    if (target) f.evidence += "; retarget also measures them by the joints that its network finds";
+    d.findings.push_back(f);
+    return;
+  }
+  if (target) f.weight = o.up_sure >= kPoseSure ? Weight::wrong : Weight::note;
+  f.what = target ? "not a T-pose" : "not a T-pose (a target needs one, a source does not)";
+  f.fix = target ? "pose it with the arms along x and the legs straight down" : "";
+  if (!angles) {
+    f.evidence = "no arms stretched out at the sides";
+  } else if (arms <= kTPoseAngle) {
+    f.evidence = "a leg is " + degrees(legs) + " degrees from straight down";
+  } else if (std::abs(angles->turned) > kTPoseAngle) {
+    f.evidence = "the arms are turned by " + degrees(std::abs(angles->turned)) +
+                 " degrees to their " + (angles->turned > 0 ? "left" : "right");
+    if (target) f.fix = "turn it to face +z";
+  } else {
+    f.evidence = "arms point " + degrees(angles->below[0]) + " and " + degrees(angles->below[1]) +
+                 " degrees below the horizontal";
+  }
+  d.findings.push_back(f);
+}
+
+void judge_duplicates(Diagnosis& d, size_t equal, bool cloud, const std::string& where) {
+  if (equal == 0) return;
+  d.findings.push_back({"duplicates", cloud ? Weight::note : Weight::fact,
+                        counted(equal, "point") + " equal to another" + where, 1, "counted",
+                        cloud ? "--fix removes them" : ""});
+}
+
+}  // namespace doctor_detail
+
+}  // namespace restage
