@@ -84,9 +84,7 @@ ShapePoints located_shape_points(const Mesh& mesh) {
   return out;
 }
 
-Points shape_points(const Mesh& mesh) {
-  return located_shape_points(mesh).points;
-}
+Points shape_points(const Mesh& mesh) { return located_shape_points(mesh).points; }
 
 PersonShape shape_of(const Mesh& mesh) {
   PersonShape out;

@@ -19,7 +19,8 @@ struct Summary {
   int64_t sequence = 0, number = -1;  ///< number in the file's name
 };
 
-/// `points`: the frame's, each once. `numbered`: the frame has a file of its own, whose name may hold its number.
+/// `points`: the frame's, each once. `numbered`: the frame has a file of its own, whose name may
+/// hold its number.
 Summary summary_of(const Frame& frame, const Points& points, bool numbered);
 /// How far the outline moved, in the data's units.
 double step(const Summary& a, const Summary& b);
