@@ -7,6 +7,7 @@
 
 #include <map>
 #include <sstream>
+#include <string_view>
 #include <utility>
 
 #include "train/config_tree.h"
@@ -19,6 +20,25 @@ std::string printable(std::string text) {
   for (char& c : text)
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
   return text;
+}
+
+/// yaml-cpp lets any bytes pass; what is written from them (JSON) does not.
+bool is_utf8(std::string_view text) {
+  while (!text.empty()) {
+    const auto lead = static_cast<unsigned char>(text[0]);
+    const size_t n = lead < 0x80 ? 1 : lead < 0xe0 ? 2 : lead < 0xf0 ? 3 : 4;
+    if ((lead >= 0x80 && lead < 0xc2) || lead > 0xf4 || text.size() < n) return false;
+    uint32_t code = n == 1 ? lead : lead & (0xffU >> (n + 1));
+    for (size_t i = 1; i < n; ++i) {
+      const auto byte = static_cast<unsigned char>(text[i]);
+      if ((byte & 0xc0) != 0x80) return false;
+      code = code << 6 | (byte & 0x3f);
+    }
+    const bool longer = (n == 3 && code < 0x800) || (n == 4 && code < 0x10000);
+    if (longer || (code >= 0xd800 && code < 0xe000) || code > 0x10ffff) return false;
+    text.remove_prefix(n);
+  }
+  return true;
 }
 
 class TreeBuilder : public YAML::EventHandler {
@@ -39,6 +59,7 @@ class TreeBuilder : public YAML::EventHandler {
   void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
                 const std::string& value) override {
     refuse_tag(mark, tag);
+    if (!is_utf8(value)) fail(mark, "holds bytes that are no text in UTF-8", "save it as UTF-8");
     ConfigNode node = make(mark, ConfigNode::Kind::scalar);
     node.text = value;
     node.quoted = tag == "!";  // yaml-cpp's way of saying that it stood in quotes

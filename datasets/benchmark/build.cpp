@@ -25,14 +25,26 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Where a folder can be put, links followed. An empty one that is there is made anew, to see
+/// whether it can be replaced: no folder can in which somebody stands, or where a disk is mounted.
+fs::path new_folder(const std::string& target) {
+  std::error_code failed;
+  fs::path out = fs::weakly_canonical(target, failed);
+  if (!out.has_filename()) out = out.parent_path();
+  if (!fs::exists(fs::symlink_status(out, failed))) return out;
+  if (!fs::is_directory(out, failed) || !fs::is_empty(out, failed))
+    throw InputError(target, "is there already", "give a new folder, or remove it");
+  if (out == fs::current_path(failed) || !fs::remove(out, failed) ||
+      !fs::create_directory(out, failed))
+    throw InputError(target, "is there already and in use", "give a new folder");
+  return out;
+}
+
 /// A folder beside the wanted one that takes its place on commit() and is removed otherwise.
 class StagingFolder {
  public:
-  explicit StagingFolder(const std::string& target) : target_(fs::path(target).lexically_normal()) {
-    if (!target_.has_filename()) target_ = target_.parent_path();
+  explicit StagingFolder(const std::string& target) : target_(new_folder(target)) {
     std::error_code failed;
-    if (fs::exists(target_, failed) && !(fs::is_directory(target_) && fs::is_empty(target_)))
-      throw InputError(target, "is there already", "give a new folder, or remove it");
     path_ = target_.string() + ".tmp-" + std::to_string(::getpid());
     fs::create_directory(path_, failed);
     if (failed)
@@ -75,13 +87,14 @@ class Builder {
     check_names();
     for (const CharacterRecipe& c : r_.characters)
       cast_.bodies.push_back(make_character(c, model_, rows_, key_));
+    for (const MotionRecipe& m : r_.motions) cast_.motions.push_back(test_clip(m.clip));
+    check_views();
   }
 
   void build(const std::string& folder) {
     write_split("train", r_.train, folder);
     write_split("validation", r_.validation, folder);
     write_split("test", r_.test, folder);
-    for (const MotionRecipe& m : r_.motions) cast_.motions.push_back(test_clip(m.clip));
     write_pairs("naked", r_.naked, folder);
     write_pairs("clothed", r_.clothed, folder);
     write_all_scans(folder);
@@ -206,17 +219,32 @@ class Builder {
       }
   }
 
-  void write_all_scans(const std::string& folder) const {
+  ScanScene scene(const ScanRecipe& s) const {
+    ScanScene out{{cast_, sequence(s.source, s.target, index_of(r_.motions, s.motion)),
+                   ScanConfig{}, r_.seed},
+                  r_.scanners[index_of(r_.scanners, s.scanner)],
+                  nullptr,
+                  key_.fold("scans").fold(name_of(s))};
+    if (!s.intruder.empty()) out.intruder = &cast_.bodies[index_of(r_.characters, s.intruder)];
+    return out;
+  }
+
+  /// Cameras that see nobody are told before anything is written.
+  void check_views() const {
     for (const ScanRecipe& s : r_.scans) {
-      const std::string name = s.motion + "-" + s.source + "-" + s.target + "-" + s.scanner;
-      const Performance performance(cast_,
-                                    sequence(s.source, s.target, index_of(r_.motions, s.motion)),
-                                    ScanConfig{}, r_.seed);
-      const Body* intruder =
-          s.intruder.empty() ? nullptr : &cast_.bodies[index_of(r_.characters, s.intruder)];
-      write_scan_sequence(performance, r_.scanners[index_of(r_.scanners, s.scanner)], s, intruder,
-                          info_, key_.fold("scans").fold(name), made(folder + "/scans", name));
+      const size_t seen = points_in_first_frame(scene(s));
+      if (seen < kLeastPoints)
+        throw InputError(where_,
+                         "scanner '" + s.scanner + "' sees " + std::to_string(seen) +
+                             " points of '" + s.source + "' in motion '" + s.motion +
+                             "', at least " + std::to_string(kLeastPoints) + " are needed",
+                         "bring it nearer, or give it more pixels and less dropout");
     }
+  }
+
+  void write_all_scans(const std::string& folder) const {
+    for (const ScanRecipe& s : r_.scans)
+      write_scan_sequence(scene(s), s.known_frame, info_, made(folder + "/scans", name_of(s)));
   }
 
   const BenchmarkRecipe& r_;

@@ -158,7 +158,8 @@ std::vector<std::string> verify_benchmark(const std::string& folder) {
   fs::recursive_directory_iterator at(folder, failed);
   for (; !failed && at != fs::recursive_directory_iterator(); at.increment(failed)) {
     const std::string name = at->path().lexically_relative(folder).generic_string();
-    if (!at->is_directory() && name != kManifestName && manifest.files.count(name) == 0)
+    const bool file = at->is_symlink() || !at->is_directory();  // no link is followed
+    if (file && name != kManifestName && manifest.files.count(name) == 0)
       problems.push_back(folder + "/" + name + ": is not in the manifest; remove it");
   }
   if (failed) throw InputError(folder, "cannot be listed", "check its permissions");

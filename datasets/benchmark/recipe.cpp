@@ -1,6 +1,7 @@
 #include "datasets/benchmark/recipe.h"
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <set>
 
@@ -8,6 +9,11 @@
 
 namespace restage {
 namespace {
+
+constexpr std::array<std::pair<const char*, SplitRecipe BenchmarkRecipe::*>, 3> kSplits = {
+    {{"train", &BenchmarkRecipe::train},
+     {"validation", &BenchmarkRecipe::validation},
+     {"test", &BenchmarkRecipe::test}}};
 
 class Checker {
  public:
@@ -19,7 +25,11 @@ class Checker {
     const std::set<std::string> characters = ids("character", r_.characters);
     const std::set<std::string> motions = ids("motion", r_.motions);
     const std::set<std::string> scanners = ids("scanner", r_.scanners);
-    for (const CharacterRecipe& c : r_.characters) held_out("body", c.body, &SplitRecipe::bodies);
+    for (const CharacterRecipe& c : r_.characters) {
+      held_out("body", c.body, &SplitRecipe::bodies);
+      if (!c.body.empty() && c.shape != ShapeRecipe{})
+        fail("the character '" + c.id + "' has both a body and a shape", "keep one of the two");
+    }
     for (const MotionRecipe& m : r_.motions) held_out("clip", m.clip, &SplitRecipe::clips);
     for (const auto* pairs : {&r_.naked, &r_.clothed})
       for (const PairRecipe& p : *pairs) {
@@ -34,6 +44,7 @@ class Checker {
       known("character", s.target, characters);
       if (!s.intruder.empty()) known("character", s.intruder, characters);
     }
+    each_once();
   }
 
  private:
@@ -66,14 +77,35 @@ class Checker {
 
   void disjoint(const std::string& kind, std::vector<std::string> SplitRecipe::*list) const {
     std::map<std::string, std::string> split_of;
-    for (const auto& [split, names] :
-         {std::pair{"train", &(r_.train.*list)}, std::pair{"validation", &(r_.validation.*list)},
-          std::pair{"test", &(r_.test.*list)}})
-      for (const std::string& name : *names)
-        if (const auto [at, added] = split_of.emplace(name, split); !added)
-          fail("the " + kind + " '" + name.substr(0, 40) + "' is in " + at->second + " and in " +
-                   split,
-               "keep it in one split");
+    for (const auto& [split, lists] : kSplits)
+      for (const std::string& name : (r_.*lists).*list)
+        if (const auto [at, added] = split_of.emplace(name, split); !added) {
+          const std::string what = "the " + kind + " '" + name.substr(0, 40) + "' is ";
+          if (at->second == split) fail(what + "listed twice in " + split, "list it once");
+          fail(what + "in " + at->second + " and in " + split, "keep it in one split");
+        }
+  }
+
+  /// Every sequence is a folder of its own, and there is something to make at all.
+  void each_once() const {
+    std::set<std::string> folders;
+    const auto add = [&](const std::string& folder) {
+      if (!folders.insert(folder).second)
+        fail("the sequence '" + folder + "' is listed twice", "list it once");
+    };
+    for (const auto& [set, pairs] : {std::pair{"naked/", &r_.naked}, {"clothed/", &r_.clothed}})
+      for (const PairRecipe& p : *pairs) {
+        std::vector<std::string> motions = p.motions;
+        if (motions.empty())
+          for (const MotionRecipe& m : r_.motions) motions.push_back(m.id);
+        for (const std::string& m : motions) add(set + m + "-" + p.source + "-" + p.target);
+      }
+    for (const ScanRecipe& s : r_.scans) add("scans/" + name_of(s));
+    const bool splits = std::any_of(kSplits.begin(), kSplits.end(), [&](const auto& split) {
+      return !(r_.*split.second).bodies.empty() || !(r_.*split.second).clips.empty();
+    });
+    if (!splits && folders.empty())
+      fail("makes nothing", "list bodies and clips, or pairs of characters and motions");
   }
 
   void held_out(const std::string& kind, const std::string& name,
@@ -90,6 +122,10 @@ class Checker {
 };
 
 }  // namespace
+
+std::string name_of(const ScanRecipe& scan) {
+  return scan.motion + "-" + scan.source + "-" + scan.target + "-" + scan.scanner;
+}
 
 void check_recipe(const BenchmarkRecipe& recipe, const std::string& where) {
   Checker(recipe, where).run();

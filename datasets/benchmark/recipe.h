@@ -18,6 +18,7 @@ struct SplitRecipe {
 /// Macro sliders of a MakeHuman body, 0 to 1; in the middle is the average adult.
 struct ShapeRecipe {
   double gender = 0.5, age = 0.5, muscle = 0.5, weight = 0.5, height = 0.5, proportions = 0.5;
+  bool operator==(const ShapeRecipe&) const = default;
 };
 
 /// Someone who performs or is performed on: a row of bodies.csv or a shape of its own.
@@ -73,8 +74,12 @@ struct BenchmarkRecipe {
   std::vector<ScanRecipe> scans;
 };
 
+/// The folder of a sequence of scans.
+std::string name_of(const ScanRecipe& scan);
+
 /// InputError "where: what; fix" for names that are not ids, twice given or unknown, for a body or
-/// clip in two splits, and for characters or motions taken from training or validation.
+/// clip in two splits, for characters or motions taken from training or validation, for a sequence
+/// that is listed twice, and for a recipe of nothing.
 void check_recipe(const BenchmarkRecipe& recipe, const std::string& where);
 
 }  // namespace restage

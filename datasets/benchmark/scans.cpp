@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "autograd/base/error.h"
 #include "datasets/benchmark/batches.h"
 #include "datasets/benchmark/sequence.h"
 
@@ -94,6 +95,16 @@ class ToSource {
   Vec3 origin_;
 };
 
+/// What the cameras see of a frame, in the world.
+Points seen(const ScanScene& scene, const std::vector<DepthCamera>& cameras, size_t i) {
+  const Body& a = scene.performance.source();
+  const RngKey key = scene.key.fold("scan").fold(i);
+  Mesh surface{pose_surface(a, scene.performance.pose_a(i)), a.rest.faces};
+  if (scene.intruder) append(reaching_arm(*scene.intruder, scene.performance.joints_a(i)), surface);
+  return keep_some(scan_surface(surface, cameras, scene.scanner.noise, key),
+                   scene.scanner.least_kept, key.fold("kept"));
+}
+
 }  // namespace
 
 SourceToWorld draw_frame(const RngKey& key) {
@@ -113,29 +124,33 @@ SourceToWorld draw_frame(const RngKey& key) {
   return out;
 }
 
-void write_scan_sequence(const Performance& performance, const ScannerRecipe& scanner,
-                         const ScanRecipe& recipe, const Body* intruder, const FileInfo& info,
-                         const RngKey& key, const std::string& folder) {
+size_t points_in_first_frame(const ScanScene& scene) {
+  const auto cameras = cameras_of(scene.scanner, path_of(scene.performance));
+  return seen(scene, cameras, 0).size();
+}
+
+void write_scan_sequence(const ScanScene& scene, bool known_frame, const FileInfo& info,
+                         const std::string& folder) {
+  const Performance& performance = scene.performance;
   SourceToWorld frame = SourceToWorld::Identity();
-  if (!recipe.known_frame) frame = draw_frame(key.fold("frame"));
+  if (!known_frame) frame = draw_frame(scene.key.fold("frame"));
   const ToSource to_source(frame);
-  const std::vector<DepthCamera> cameras = cameras_of(scanner, path_of(performance));
-  const Body& a = performance.source();
+  const std::vector<DepthCamera> cameras = cameras_of(scene.scanner, path_of(performance));
 
   ScanWriter scans(folder + "/source.h5", info);
-  if (!recipe.known_frame) scans.set_foreign_frame();
+  if (!known_frame) scans.set_foreign_frame();
   in_batches<Points>(
       performance.frames(),
       [&](size_t i) {
-        const RngKey frame_key = key.fold("scan").fold(i);
-        Mesh scene{pose_surface(a, performance.pose_a(i)), a.rest.faces};
-        if (intruder) append(reaching_arm(*intruder, performance.joints_a(i)), scene);
-        Points cloud = keep_some(scan_surface(scene, cameras, scanner.noise, frame_key),
-                                 scanner.least_kept, frame_key.fold("kept"));
+        Points cloud = seen(scene, cameras, i);
         for (Point& p : cloud) p = to_source(p.cast<double>()).cast<float>();
         return cloud;
       },
       [&](size_t i, const Points& cloud) {
+        if (cloud.size() < kLeastPoints)
+          throw WorkError(folder + ": frame " + std::to_string(i) + " has " +
+                          std::to_string(cloud.size()) +
+                          " points, too few for anybody; bring the scanner nearer");
         Joints joints = performance.joints_a(i);
         for (Vec3& x : joints) x = to_source(x);
         scans.append(cloud, joints);

@@ -14,10 +14,21 @@ using SourceToWorld = Eigen::Matrix<double, 3, 4>;
 /// permutations that keep the hand, any facing, an origin up to 2 m away.
 SourceToWorld draw_frame(const RngKey& key);
 
-/// Writes source.h5 (clouds, and A's joints, in the scanner's frame) and what write_truth() writes.
-/// `intruder` (may be null): whose left forearm reaches towards A.
-void write_scan_sequence(const Performance& performance, const ScannerRecipe& scanner,
-                         const ScanRecipe& recipe, const Body* intruder, const FileInfo& info,
-                         const RngKey& key, const std::string& folder);
+inline constexpr size_t kLeastPoints = 64;  ///< of a frame that can be retargeted
+
+/// Who is seen by which scanner.
+struct ScanScene {
+  Performance performance;
+  const ScannerRecipe& scanner;
+  const Body* intruder = nullptr;  ///< whose left forearm reaches towards A; null: nobody's
+  RngKey key;
+};
+
+size_t points_in_first_frame(const ScanScene& scene);
+
+/// Writes source.h5 (clouds, and A's joints, in the scanner's frame, which is the world if
+/// `known_frame`) and what write_truth() writes. WorkError for a frame of fewer than kLeastPoints.
+void write_scan_sequence(const ScanScene& scene, bool known_frame, const FileInfo& info,
+                         const std::string& folder);
 
 }  // namespace restage

@@ -47,6 +47,8 @@ std::string resolved(const std::string& address, const Addresses& known, const s
   return at->second + address.substr(end);
 }
 
+bool is_remote(const std::string& address) { return address.find("://") != std::string::npos; }
+
 FetchEntry entry_of(const std::string& line, const std::string& where, const Addresses& known) {
   std::istringstream words(line);
   FetchEntry out;
@@ -61,6 +63,10 @@ FetchEntry entry_of(const std::string& line, const std::string& where, const Add
   if (!is_inside(out.path))
     throw InputError(where, "names a file outside of the data folder", "mend the list");
   out.address = resolved(out.address, known, where);
+  if (is_remote(out.address) && !out.address.starts_with("https://") &&
+      !out.address.starts_with("file://"))
+    throw InputError(where, "names an address that is neither https:// nor file://",
+                     "mend the list");
   return out;
 }
 
@@ -148,57 +154,97 @@ void bring(const FetchEntry& e, const std::string& target) {
   if (none) throw WorkError(target + ": cannot be put in place; check permissions");
 }
 
-bool fetch_makehuman(const std::string& parts, const std::string& out, const std::string& from,
-                     const std::string& target) {
-  for (const FetchEntry& e : read_fetch_list(parts))
-    if (e.address.starts_with(kMakehuman) || e.address.starts_with(kCmu))
-      throw InputError(parts, "lists a file that is packed from others again", "mend the list");
-  if (!fetch_data(parts, out, from).missing.empty()) return false;
-  pack_makehuman(out + "/body/makehuman", target);
-  return true;
+// ---- what is to be done, found out before anything is ------------------------------------------
+
+struct Folders {
+  const std::string &out, &from;
+};
+
+enum class Way { present, copy, download, makehuman, cmu, missing };
+
+struct Step {
+  FetchEntry entry;
+  Way way = Way::missing;
+  std::string source;       ///< what is copied; of cmu the list
+  std::vector<Step> parts;  ///< of makehuman
+};
+
+std::vector<Step> plan(const std::string& list, const Folders& folders);
+
+Step plan_makehuman(const FetchEntry& e, const std::string& list, const Folders& folders) {
+  for (const FetchEntry& part : read_fetch_list(list))
+    if (part.address.starts_with(kMakehuman) || part.address.starts_with(kCmu))
+      throw InputError(list, "lists a file that is packed from others again", "mend the list");
+  Step out{e, Way::makehuman, "", plan(list, folders)};
+  for (const Step& part : out.parts)
+    if (part.way == Way::missing) out.way = Way::missing;
+  return out;
 }
 
-bool fetch_cmu(const std::string& list, const std::string& out, const std::string& from,
-               const std::string& target) {
+Step plan_cmu(const FetchEntry& e, const std::string& list, const Folders& folders) {
   const CmuOriginals originals = read_cmu_originals(list);
-  const std::string folder = from.empty() ? out + "/cmu/originals" : from;
-  if (from.empty())
-    fetch_cmu_originals(originals, folder);
-  else if (!has_cmu_originals(originals, folder))
-    return false;
-  log_info("packing " + std::to_string(originals.clips.size()) + " clips");
-  pack_cmu(originals, folder, target);
-  return true;
+  const bool there = folders.from.empty() || has_cmu_originals(originals, folders.from);
+  return {e, there ? Way::cmu : Way::missing, list, {}};
 }
 
-/// False if there is nowhere to take it from.
-bool fetch_one(const FetchEntry& e, const std::string& list, const std::string& from,
-               const std::string& out) {
-  const std::string target = out + "/" + e.path, copy = from + "/" + e.path;
-  const bool remote = e.address.find("://") != std::string::npos;
-  const bool makehuman = e.address.starts_with(kMakehuman), cmu = e.address.starts_with(kCmu);
-  const bool copied = !from.empty() && fs::exists(copy);
-  if (copied && is_right(e, copy, list)) {
-    copy_in(copy, target);
-  } else if (makehuman) {  // a copy that was packed elsewhere may differ, its parts do not
-    return fetch_makehuman(beside(list, e.address.substr(kMakehuman.size())), out, from, target);
-  } else if (cmu) {
-    return fetch_cmu(beside(list, e.address.substr(kCmu.size())), out, from, target);
-  } else if (copied) {
+Step plan_one(const FetchEntry& e, const std::string& list, const Folders& folders) {
+  if (is_right(e, folders.out + "/" + e.path, list)) return {e, Way::present, "", {}};
+  const std::string copy = folders.from + "/" + e.path;
+  const bool copied = !folders.from.empty() && fs::exists(copy);
+  if (copied && is_right(e, copy, list)) return {e, Way::copy, copy, {}};
+  Step out{e, Way::missing, "", {}};
+  if (e.address.starts_with(kMakehuman)) {  // packed elsewhere it may differ, its parts do not
+    out = plan_makehuman(e, beside(list, e.address.substr(kMakehuman.size())), folders);
+  } else if (e.address.starts_with(kCmu)) {
+    out = plan_cmu(e, beside(list, e.address.substr(kCmu.size())), folders);
+  } else if (is_remote(e.address)) {
+    if (folders.from.empty()) out.way = Way::download;
+  } else if (e.address != "-" && !copied) {
+    out = {e, Way::copy, beside(list, e.address), {}};
+    if (!is_right(e, out.source, false))
+      throw InputError(out.source, "is not the file that the list pins",
+                       "restore it, or correct the list");
+  }
+  if (copied && out.way == Way::missing)
     throw InputError(copy, "is not the file that the list pins",
                      "give a folder with the right one");
-  } else if (remote && from.empty()) {
-    bring(e, target);
-  } else if (!remote && e.address != "-") {
-    const std::string own = beside(list, e.address);
-    if (!is_right(e, own, false))
-      throw InputError(own, "is not the file that the list pins",
-                       "restore it, or correct the list");
-    copy_in(own, target);
-  } else {
-    return false;
+  return out;
+}
+
+/// InputError for lists, copies and files beside the list that are not what they should be.
+std::vector<Step> plan(const std::string& list, const Folders& folders) {
+  std::vector<Step> out;
+  for (const FetchEntry& e : read_fetch_list(list)) {
+    throw_if_stopped();
+    out.push_back(plan_one(e, list, folders));
   }
-  return true;
+  return out;
+}
+
+// ---- doing it ----------------------------------------------------------------------------------
+
+void perform(const Step& step, const Folders& folders) {
+  if (step.way == Way::present || step.way == Way::missing) return;
+  throw_if_stopped();
+  const FetchEntry& e = step.entry;
+  const std::string target = folders.out + "/" + e.path;
+  std::error_code failed;
+  fs::create_directories(fs::path(target).parent_path(), failed);
+  if (failed) throw WorkError(target + ": its folder cannot be made; check space and permissions");
+  log_info("fetching " + e.path + " (" + std::to_string((e.bytes + 999) / 1000) + " kB)");
+  if (step.way == Way::copy) copy_in(step.source, target);
+  if (step.way == Way::download) bring(e, target);
+  if (step.way == Way::makehuman) {
+    for (const Step& part : step.parts) perform(part, folders);
+    pack_makehuman(folders.out + "/body/makehuman", target);
+  }
+  if (step.way == Way::cmu) {
+    const CmuOriginals originals = read_cmu_originals(step.source);
+    const std::string found = folders.from.empty() ? folders.out + "/cmu/originals" : folders.from;
+    if (folders.from.empty()) fetch_cmu_originals(originals, found);
+    log_info("packing " + std::to_string(originals.clips.size()) + " clips");
+    pack_cmu(originals, found, target);
+  }
 }
 
 }  // namespace
@@ -230,26 +276,27 @@ std::vector<FetchEntry> read_fetch_list(const std::string& list) {
 
 FetchSummary fetch_data(const std::string& list, const std::string& out, const std::string& from) {
   const StopScope stop;
-  const std::vector<FetchEntry> entries = read_fetch_list(list);
   if (!from.empty() && !fs::is_directory(from))
     throw InputError(from, "is no folder", "give --from a data folder");
+  const Folders folders{out, from};
+  const std::vector<Step> steps = plan(list, folders);
+  std::error_code failed;
+  fs::create_directories(out, failed);
+  if (failed) throw InputError(out, "cannot be made a folder", "give a place you can write to");
   FetchSummary summary;
-  for (const FetchEntry& e : entries) {
-    throw_if_stopped();
-    const std::string target = out + "/" + e.path;
-    if (is_right(e, target, list)) {
-      ++summary.present;
-      continue;
+  for (const Step& step : steps) {
+    try {
+      perform(step, folders);
+    } catch (const InputError& error) {  // what could be checked before was: a damaged recording
+      throw WorkError(error.what());
     }
-    std::error_code failed;
-    fs::create_directories(fs::path(target).parent_path(), failed);
-    if (failed) throw InputError(out, "cannot be made a folder", "give a place you can write to");
-    log_info("fetching " + e.path + " (" + std::to_string((e.bytes + 999) / 1000) + " kB)");
-    if (fetch_one(e, list, from, out)) {
-      ++summary.fetched;
-      summary.bytes += e.bytes;
+    if (step.way == Way::present) {
+      ++summary.present;
+    } else if (step.way == Way::missing) {
+      summary.missing.push_back(step.entry.path);
     } else {
-      summary.missing.push_back(e.path);
+      ++summary.fetched;
+      summary.bytes += step.entry.bytes;
     }
   }
   return summary;

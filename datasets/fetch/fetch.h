@@ -32,9 +32,9 @@ struct FetchSummary {
 /// Brings every file of `list` into `out`, which is made if needed. With `from`, a folder laid out
 /// alike, files are copied from there. A file that is there already and right is left alone;
 /// downloads go on where they broke off (PATH.part); a file takes its place only after its sum was
-/// checked; what is packed from others has no sum of its own, its parts have. InputError: list or
-/// `from` are wrong. WorkError: the network or the disk fails, or what arrives is not what is
-/// pinned.
+/// checked; what is packed from others has no sum of its own, its parts have. InputError, before
+/// anything is written: lists, what they name, or what is in `from` are wrong. WorkError: the
+/// network or the disk fails, or what arrives is not what is pinned.
 FetchSummary fetch_data(const std::string& list, const std::string& out,
                         const std::string& from = "");
 

@@ -33,7 +33,8 @@ class FrameSource {
 struct FrameOptions {
   std::string clip;                  ///< of glTF files: the animation to play; empty: the first
   uint64_t max_memory = kMaxMemory;  ///< what unpacking an array may take
-  std::optional<int64_t> sequence;   ///< only this one, from 0; else all, one after the other
+  std::optional<int64_t> sequence =
+      std::nullopt;  ///< only this one, from 0; else all, one after the other
 };
 
 /// A folder of numbered PLY, OBJ or glTF files (natural numeric order: f2 before f10; other files

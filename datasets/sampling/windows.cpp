@@ -147,7 +147,10 @@ WindowSampler::WindowSampler(const Corpus& corpus, const WindowConfig& config, u
       frames_(corpus.motions, static_cast<size_t>(config.frames)) {
   if (corpus.bodies.empty()) throw InputError("", "no bodies to draw windows from", "add bodies");
   if (corpus.bodies.size() == 1 && config_.self_share < 1)
-    throw InputError("", "one body cannot be retargeted to another", "add bodies to the data");
+    throw InputError("",
+                     "one body alone ('" + corpus.bodies[0].id + "', of " + corpus.bodies[0].split +
+                         ") cannot be retargeted to another",
+                     "add bodies to that split");
 }
 
 FrameRef WindowSampler::place(Rng& rng) const {

@@ -17,7 +17,7 @@ int run_verify(const std::string& file, const Common& common) {
     print_json({{"file", file}, {"problems", problems}});
   } else {
     std::string text;
-    for (const std::string& problem : problems) text += problem + "\n";
+    for (const std::string& problem : problems) text += on_one_line(problem) + "\n";
     print(problems.empty() ? file + ": all is well\n" : text);
   }
   return problems.empty() ? 0 : 1;

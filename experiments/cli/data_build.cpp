@@ -21,7 +21,7 @@ constexpr int kMostBodies = 10000;  // guards against typing errors, not a limit
 
 struct BuildOptions {
   std::vector<std::string> arguments;  ///< RECIPE.yaml, out=, data= and key=value; none: built-in
-  bool seed_given = false;
+  bool seed_given = false, counts_given = false;
   std::string out;
   std::vector<int> bodies{24, 4, 4}, motions{60, 20, 20};  ///< train, validation, test
 };
@@ -75,12 +75,20 @@ std::string usual_data_folder() {
 Request read_request(const BuildOptions& options, const Common& common) {
   Request out;
   out.out = options.out;
-  if (const char* folder = std::getenv("RESTAGE_DATA")) out.data = folder;
+  if (options.counts_given)
+    throw InputError("", "--bodies and --motions are of built-in data, a recipe names its own",
+                     "leave them out, or override train.bodies and the like");
+  const auto once = [](std::string& place, const std::string& argument) {
+    const size_t equals = argument.find('=');
+    if (!place.empty())
+      throw InputError("", argument.substr(0, equals + 1) + " is given twice", "give it once");
+    place = argument.substr(equals + 1);
+  };
   for (const std::string& a : options.arguments) {
     if (a.starts_with("out="))
-      out.out = a.substr(4);
+      once(out.out, a);
     else if (a.starts_with("data="))
-      out.data = a.substr(5);
+      once(out.data, a);
     else if (a.find('=') != std::string::npos)
       out.overrides.push_back(a);
     else if (out.recipe.empty())
@@ -90,6 +98,8 @@ Request read_request(const BuildOptions& options, const Common& common) {
                        "give one");
   }
   if (options.seed_given) out.overrides.push_back("seed=" + std::to_string(common.seed));
+  if (const char* folder = std::getenv("RESTAGE_DATA"); folder && out.data.empty())
+    out.data = folder;
   if (out.data.empty()) out.data = usual_data_folder();
   if (out.recipe.empty() || out.out.empty() || out.data.empty())
     throw InputError("",
@@ -131,6 +141,7 @@ void add_data_build(Program& program, CLI::App& group) {
       "restage data build --bodies 40 5 5 --motions 120 20 20 --seed 1 --out data.h5",
       [options, self, &program] {
         options->seed_given = (*self)->count("--seed") > 0;
+        options->counts_given = (*self)->count("--bodies") + (*self)->count("--motions") > 0;
         return options->arguments.empty() ? build_builtin(*options, program.common())
                                           : build_recipe(*options, program.common());
       });

@@ -1,6 +1,8 @@
 // restage data fetch: a data folder from the original public addresses, or from a copy.
+#include <filesystem>
 #include <memory>
 
+#include "autograd/base/error.h"
 #include "datasets/fetch/fetch.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
@@ -8,11 +10,16 @@
 namespace restage::cli {
 namespace {
 
+constexpr const char* kProjectsList = "configs/data/open_data.txt";
+
 struct FetchOptions {
-  std::string list = "configs/data/open_data.txt", out, from;
+  std::string list = kProjectsList, out, from;
 };
 
 int run_fetch(const FetchOptions& o, const Common& common) {
+  if (o.list == kProjectsList && !std::filesystem::exists(o.list))
+    throw InputError(o.list, "is not below this folder",
+                     "run it in the folder of Restage's sources, or name a LIST");
   const FetchSummary done = fetch_data(o.list, o.out, o.from);
   if (common.json) {
     print_json({{"out", o.out},

@@ -26,7 +26,7 @@ struct EvalOptions {
   std::string run, pred, truth, source, rest, mended, out;
   int64_t every = 1;
   bool variants = false, per_joint = false;
-  double anchor = RetargetOptions{}.anchor;
+  std::optional<double> anchor;
 };
 
 struct File {
@@ -226,12 +226,13 @@ int run_eval_run(const EvalOptions& options, const Common& common) {
   const auto list =
       evaluation_sequences(test, static_cast<size_t>(config.evaluation.sequences),
                            static_cast<size_t>(config.evaluation.frames), common.seed);
-  const SystemEvaluation scores = evaluate_system(models, test, list, common.seed, options.anchor);
+  const double anchor = options.anchor.value_or(RetargetOptions{}.anchor);
+  const SystemEvaluation scores = evaluate_system(models, test, list, common.seed, anchor);
   const auto [joints, tposes] = skeleton_errors(models, test, config);
   const EvalReport extracted = report_of(scores.extracted), truth = report_of(scores.truth);
   char line[160], path[96] = "";
-  if (options.anchor > 0)
-    std::snprintf(path, sizeof path, ", paths held to the source's within %g s", options.anchor);
+  if (anchor > 0)
+    std::snprintf(path, sizeof path, ", paths held to the source's within %g s", anchor);
   std::snprintf(line, sizeof line,
                 "Extractor on held-out clouds: %.1f mm; on held-out T-poses: %.1f mm.\n",
                 1e3 * joints, 1e3 * tposes);
@@ -255,7 +256,7 @@ int run_eval_run(const EvalOptions& options, const Common& common) {
   document["extractor"] = {{"joint_error_mm", 1e3 * joints},
                            {"tpose_joint_error_mm", 1e3 * tposes}};
   document["seed"] = common.seed;
-  document["anchor"] = options.anchor;
+  document["anchor"] = anchor;
   print_json(document);
   return 0;
 }
@@ -292,6 +293,21 @@ std::vector<metrics::Metric> chosen_metrics(const EvalOptions& options) {
   return out;
 }
 
+/// Options of the other way to call it would be of no effect.
+void check_way(const EvalOptions& o) {
+  const bool run = !o.run.empty();
+  const std::pair<bool, const char*> others[] = {
+      {run && !o.source.empty(), "--source"}, {run && !o.rest.empty(), "--rest"},
+      {run && !o.mended.empty(), "--mended"}, {run && o.every != 1, "--every"},
+      {run && o.variants, "--variants"},      {run && o.per_joint, "--per-joint"},
+      {!run && !o.out.empty(), "--out"},      {!run && o.anchor, "--anchor"}};
+  for (const auto& [given, name] : others)
+    if (given)
+      throw InputError(
+          "", std::string(name) + " goes with " + (run ? "--pred and --truth" : "run=") + " only",
+          "leave it out");
+}
+
 int run_eval(const EvalOptions& options, const Common& common) {
   if (!options.run.empty()) {
     if (!options.run.starts_with("run="))
@@ -299,11 +315,13 @@ int run_eval(const EvalOptions& options, const Common& common) {
                        "use 'run=RUN_DIR', or --pred and --truth");
     if (!options.pred.empty() || !options.truth.empty())
       throw InputError("", "run= and --pred do not go together", "give one of them");
+    check_way(options);
     return run_eval_run(options, common);
   }
   if (options.pred.empty() || options.truth.empty())
     throw InputError("", options.pred.empty() ? "--pred is missing" : "--truth is missing",
                      "give --pred P.h5 --truth T.h5, or run=RUN_DIR");
+  check_way(options);
   if (options.source.empty() != options.rest.empty())
     throw InputError("", "--source and --rest belong together",
                      "give both for the references, or neither");

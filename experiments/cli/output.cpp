@@ -40,10 +40,14 @@ void finish_output() {
   if (std::fflush(stdout) != 0) fail();
 }
 
-std::string error_line(const std::string& text) {
-  std::string line = "restage: " + text;
-  for (char& c : line)
+std::string on_one_line(std::string text) {
+  for (char& c : text)
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
+  return text;
+}
+
+std::string error_line(const std::string& text) {
+  std::string line = on_one_line("restage: " + text);
   if (line.size() <= kMaxLine) return line;
   // Too long: shorten the middle; the place stands at the front, the fix at the end.
   constexpr size_t kTail = 200;

@@ -16,6 +16,9 @@ void print_json(const Json& document);
 /// Flushes standard output. WorkError if something printed did not arrive.
 void finish_output();
 
+/// Names in files may hold line breaks and the like; here they become blanks.
+std::string on_one_line(std::string text);
+
 /// `restage: <text>` to standard error as exactly one line of under 400 characters.
 void print_error(const std::string& text);
 /// What print_error() prints, without the line's end.

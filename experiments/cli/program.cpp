@@ -1,9 +1,12 @@
 #include "experiments/cli/program.h"
 
+#include <algorithm>
 #include <cctype>
 #include <charconv>
 #include <map>
 #include <new>
+#include <span>
+#include <string_view>
 #include <utility>
 
 #include "autograd/base/error.h"
@@ -47,6 +50,18 @@ std::string with_heading(const std::string& examples) {
   return text;
 }
 
+/// Results are files or folders, of every command.
+void check_out(const CLI::App& app) {
+  const CLI::App* command = &app;
+  while (!command->get_subcommands().empty()) command = command->get_subcommands().back();
+  const CLI::Option* out = command->get_option_no_throw("--out");
+  if (out == nullptr || out->count() == 0) return;
+  const std::string& place = out->results().back();
+  if (place.empty() || place == "-")
+    throw InputError("", place.empty() ? "--out is empty" : "--out cannot be standard output",
+                     "give the name of a file or folder to write");
+}
+
 }  // namespace
 
 Program::Program() : app_("Correspondence-free retargeting of human motion.", "restage") {
@@ -65,7 +80,12 @@ void Program::add_common_options(CLI::App& app) {
   app.add_option("--threads", common_.threads, "number of threads, 0 for all cores")->group(group);
   app.add_option("--seed", common_.seed, "seed of all random numbers")
       ->check([](const std::string& text) {
-        return text.starts_with("-") ? "is '" + text + "', but cannot be negative" : std::string();
+        if (text.starts_with("-")) return "is '" + text + "', but cannot be negative";
+        uint64_t value = 0;
+        const auto end = text.data() + text.size();
+        return std::from_chars(text.data(), end, value).ec == std::errc::result_out_of_range
+                   ? "is '" + text + "', but cannot be above 2^64 - 1"
+                   : std::string();
       })
       ->group(group);
   app.add_flag("--quiet", common_.quiet, "print results and errors only")->group(group);
@@ -96,6 +116,7 @@ CLI::App& Program::add_group(const std::string& name, const std::string& help) {
   CLI::App& group = *app_.add_subcommand(name, help);
   add_common_options(group);
   group.require_subcommand(1);
+  group.footer("More about each: restage " + name + " COMMAND --help");
   return group;
 }
 
@@ -103,7 +124,12 @@ int Program::run(int argc, char** argv) {
   try {
     app_.parse(argc, argv);
   } catch (const CLI::CallForVersion& version) {
-    print(std::string(version.what()) + "\n");
+    const std::span<char*> words(argv, static_cast<size_t>(argc));
+    if (std::any_of(words.begin(), words.end(),
+                    [](const char* w) { return w == std::string_view("--json"); }))
+      print_json({{"version", RESTAGE_VERSION}});
+    else
+      print(std::string(version.what()) + "\n");
     return 0;
   } catch (const CLI::Success&) {  // --help
     print(app_.help());
@@ -114,6 +140,7 @@ int Program::run(int argc, char** argv) {
   if (common_.threads < 0 || common_.threads > kMaxThreads)
     throw InputError("", "--threads " + std::to_string(common_.threads) + " is out of range",
                      "give a number from 0 (all cores) to " + std::to_string(kMaxThreads));
+  check_out(app_);
   set_threads(common_.threads);
   set_log_level(common_.quiet     ? LogLevel::quiet
                 : common_.verbose ? LogLevel::debug

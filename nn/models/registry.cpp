@@ -1,5 +1,6 @@
 #include "nn/models/registry.h"
 
+#include "autograd/base/nearest.h"
 #include "nn/models/deformation.h"
 #include "nn/models/discriminator.h"
 #include "nn/models/patch_transformer.h"
@@ -65,21 +66,6 @@ std::unique_ptr<Module> mlp(const ModelSizes& s, const Init& init) {
   return net;
 }
 
-size_t edit_distance(const std::string& a, const std::string& b) {
-  std::vector<size_t> row(b.size() + 1);
-  for (size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (size_t i = 1; i <= a.size(); ++i) {
-    size_t corner = row[0];
-    row[0] = i;
-    for (size_t j = 1; j <= b.size(); ++j) {
-      const size_t above = row[j];
-      row[j] = std::min({row[j - 1] + 1, above + 1, corner + (a[i - 1] != b[j - 1] ? 1 : 0)});
-      corner = above;
-    }
-  }
-  return row[b.size()];
-}
-
 }  // namespace
 
 const std::vector<ModelInfo>& models() {
@@ -102,16 +88,19 @@ const std::vector<ModelInfo>& models() {
 
 std::unique_ptr<Module> make_model(const std::string& name, const ModelSizes& sizes,
                                    const Init& init) {
-  const ModelInfo* nearest = &models()[0];
+  std::vector<std::string> names;
   for (const ModelInfo& info : models()) {
     if (info.name == name) {
       auto model = info.make(sizes, init);
       name_scopes(*model, name);
       return model;
     }
-    if (edit_distance(name, info.name) < edit_distance(name, nearest->name)) nearest = &info;
+    names.push_back(info.name);
   }
-  throw InputError("", "there is no model '" + name + "'", "did you mean '" + nearest->name + "'?");
+  const std::string near = nearest(name, names);
+  throw InputError(
+      "", "there is no model '" + name + "'",
+      near.empty() ? "'restage info --help' lists them" : "did you mean '" + near + "'?");
 }
 
 std::unique_ptr<SkeletonModel> make_skeleton_model(const std::string& name, const ModelSizes& sizes,

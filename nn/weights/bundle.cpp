@@ -274,7 +274,9 @@ void set_size(ModelSizes* sizes, const std::string& name, const std::string& val
     known = known || name == candidate;
     names += std::string(names.empty() ? "" : ", ") + candidate;
   });
-  if (!known || !(given.is_number() || given.is_boolean()))
+  const double number = given.is_number() ? given.get<double>() : 0;  // below 1: the default
+  const bool good = given.is_boolean() || (name == "dropout" ? number >= 0 : number >= 1);
+  if (!known || !good)
     throw InputError("", "'" + name + "=" + value + "' is no size of a model",
                      "give NAME=NUMBER with one of " + names);
   Json all = to_json(*sizes);

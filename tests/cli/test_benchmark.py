@@ -57,6 +57,25 @@ class Recipes(CliTest):
                 self.write("r.yaml", text.encode("latin-1"))
                 self.bad_input(self.build("r.yaml"), words)
 
+    def test_recipes_that_contradict_themselves(self):
+        two = "characters=[{id: a, body: b1}, {id: b}]"
+        walk = "motions=[{id: walk, clip: x}]"
+        pair = "{source: a, target: b}"
+        scan = "{scanner: rig, motion: walk, source: a, target: b}"
+        self.write("empty.yaml", "")
+        bad = lambda word, *more: self.bad_input(self.build("empty.yaml", *more), word)
+        bad("makes nothing")
+        bad("makes nothing", two, "naked=[%s]" % pair)
+        bad("'naked/walk-a-b' is listed twice", two, walk, "naked=[%s, {source: a, target: b, motions: [walk]}]" % pair)
+        bad("'scans/walk-a-b-rig' is listed twice", two, walk, "scanners=[{id: rig}]", "scans=[%s, %s, intruder: b}]" % (scan, scan[:-1]))
+        bad("listed twice in train", "train.clips=[x, x]")
+        bad("in train and in test", "train.clips=[x]", "test.clips=[x]")
+        bad("both a body and a shape", "characters=[{id: a, body: b1, shape: {age: 1}}]", "train.clips=[x]")
+        bad("--bodies", "train.clips=[x]", "--bodies", 3, 3, 3)
+        bad("out= is given twice", "train.clips=[x]", "--out", "there")
+        self.write("bytes.yaml", b'protocol: "\xff\xfe"\ntrain: {clips: [x]}\n')
+        self.bad_input(self.build("bytes.yaml"), "bytes.yaml:1", "UTF-8")
+
     def test_verify_and_sheet_want_their_folders(self):
         os.makedirs(self.path("empty"))
         self.bad_input(["data", "verify", "empty"], "manifest.json")
@@ -75,6 +94,29 @@ class Benchmark(CliTest):
         command = [a for a in self.build("one") if not a.startswith("data=")]
         self.assertEqual(self.json(*command)["data"], "data")
         self.bad_input(command + ["train.bodies=[nobody]"], "no body 'nobody'")
+
+    def test_places_that_cannot_be_taken_and_scanners_that_see_nobody(self):
+        bad = lambda *more: self.bad_input(self.build("one", *more), "sees 0 points")
+        bad("scanners=[{id: depth, pixels: 16, margin: 50}]")
+        bad("scanners=[{id: depth, noise: {dropout: 1}}]")
+        os.makedirs(self.path("empty"))
+        os.symlink("empty", self.path("link"))
+        self.bad_input(self.build("."), "is there already")
+        os.remove(self.path("link"))
+        os.rmdir(self.path("empty"))
+        os.makedirs(self.path("apart/empty"))
+        os.symlink("apart/empty", self.path("link"))
+        self.done(*self.build("link", "naked=[]", "clothed=[]", "scans=[]"))
+        self.assertTrue(os.path.islink(self.path("link")))
+        self.assertEqual(self.json("data", "verify", "link")["problems"], [])
+
+    def test_the_small_recipe(self):
+        self.done("data", "build", os.path.join(ROOT, "configs", "data", "small_benchmark.yaml"), "out=small", "data=" + DATA)
+        self.assertEqual(self.json("data", "verify", "small")["problems"], [])
+        self.assertEqual(sorted(os.listdir(self.path("small"))), ["clothed", "manifest.json", "naked", "recipe.yaml", "scans",
+                                                                  "test.h5", "train.h5", "validation.h5"])
+        size = sum(os.path.getsize(os.path.join(at, name)) for at, _, names in os.walk(self.path("small")) for name in names)
+        self.assertLess(size, 20e6)
 
     def test_build_verify_and_use(self):
         made = self.json(*self.build("one", "--threads", 1))
@@ -105,10 +147,14 @@ class Benchmark(CliTest):
             f.seek(5000)
             f.write(b"?")
         self.write("one/stray.txt", "x")
+        self.write("one/with\nbreak", "x")
+        os.symlink("/etc", self.path("one/elsewhere"))
         result = self.restage("data", "verify", "one")
         self.assertEqual((result.code, result.err), (1, ""))
         self.assertIn("one/test.h5: is not what the manifest says", result.out)
         self.assertIn("one/stray.txt: is not in the manifest", result.out)
+        self.assertIn("one/elsewhere: is not in the manifest", result.out)
+        self.assertIn("one/with break: is not in the manifest", result.out)
         self.bad_input(self.build("one"), "is there already")
 
 
@@ -138,6 +184,21 @@ class FetchData(CliTest):
         self.bad_input(["data", "fetch", "none.txt", "--out", "other"], "none.txt")
         self.write("list.txt", self.listed(b"x", "a", "-"))
         self.bad_input(["data", "fetch", "list.txt", "--out", "other", "--from", "nowhere"], "nowhere")
+
+    def test_what_is_wrong_is_told_before_anything_is_fetched(self):
+        good = self.listed(b"x", "a", "-")
+        self.write("copy/a", b"x")
+        self.write("copy/b", b"?")
+        self.write("own.csv", b"?")
+        for wrong in (self.listed(b"y", "b", "-"), self.listed(b"y", "b", "makehuman:parts.txt"), self.listed(b"y", "b", "cmu:clips.txt"),
+                      self.listed(b"y", "c", "own.csv"), self.listed(b"y", "c", "makehuman:nope.txt"), self.listed(b"y", "c", "cmu:nope.txt"),
+                      self.listed(b"y", "c", "http://localhost/c")):
+            self.write("parts.txt", self.listed(b"z", "d", "https://localhost:1/d"))
+            self.write("clips.txt", "@one https://localhost:1/tree https://localhost:1/files\n" + "0" * 64 +
+                       " 01_01a 01_01.bvh - 4 0 40 0 01 train walk\n")
+            self.write("list.txt", good + wrong)
+            self.bad_input(["data", "fetch", "list.txt", "--out", "data", "--from", "copy"])
+        self.bad_input(["data", "fetch", "--out", "data"], "open_data.txt", "LIST")
 
     @unittest.skipUnless(os.path.exists(os.path.join(DATA, "body", "targets_original.tar.xz")), "no data folder (set RESTAGE_SHARED)")
     def test_bodies_from_the_published_files_are_those_of_the_copy(self):

@@ -10,7 +10,10 @@ from support import PROGRAM, CliTest
 class Usage(CliTest):
     def test_help_and_version(self):
         self.assertRegex(self.done("--version"), r"^restage \d+\.\d+\.\d+\n$")
+        self.assertEqual(list(self.json("--version")), ["version"])
         self.assertIn("eval", self.done("--help"))
+        for group in ("data", "weights"):
+            self.assertNotIn("restage eval", self.done(group, "--help"))
         for command in (["eval"], ["render"], ["doctor"], ["data", "build"], ["data", "import"], ["data", "inspect"], ["data", "verify"]):
             text = self.done(*command, "--help")
             self.assertIn("Examples:", text)
@@ -28,6 +31,12 @@ class Usage(CliTest):
         self.bad_input(["doctor", "x", "--threads", "many"], "--threads")
         self.bad_input(["doctor", "x", "--threads", "-1"], "--threads")
         self.bad_input(["doctor", "x", "--seed", "-1"], "--seed")
+        self.bad_input(["doctor", "x", "--seed", str(2 ** 64)], "--seed")
+        for out in ("", "-"):
+            self.bad_input(["skeleton", "--weights", "w", "--input", "x", "--out", out], "--out")
+        self.bad_input(["eval", "--pred", "a.h5", "--truth", "b.h5", "--anchor", 1], "--anchor")
+        self.bad_input(["eval", "--pred", "a.h5", "--truth", "b.h5", "--out", "x"], "--out")
+        self.bad_input(["eval", "run=x", "--every", 2], "--every")
 
     def test_error_is_one_short_line_for_any_file_name(self):
         self.bad_input(["doctor", "no\nsuch\x1b[31mfile"], "cannot be read")

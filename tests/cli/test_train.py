@@ -223,6 +223,8 @@ class BadTraining(Train):
         self.bad(CONFIG.replace("{frames: 10,", "{frame: 10,"), "bad.yaml:%d: " % line, "'frames'")
         self.bad_input(["train", "tiny.yaml", "motion.window.frames=10"], "motion.window", "windows")
         self.bad_input(["train", "tiny.yaml", "sed=1"], "'seed'")
+        for name in ("../x", "a/b", "''"):
+            self.bad_input(["train", "tiny.yaml", "name=" + name, "run_root=new"], "name")
 
     def test_values(self):
         self.bad(CONFIG.replace("seed: 3", "seed: three"), "bad.yaml:2: ")

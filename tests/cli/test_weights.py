@@ -37,6 +37,7 @@ class Info(CliTest):
 
     def test_unknown_model(self):
         self.bad_input(["info", "smrm/rot6"], "smrm/rot6d")
+        self.bad_input(["info", "nope"], "restage info --help")
 
 
 class Weights(CliTest):
@@ -86,6 +87,8 @@ class Weights(CliTest):
         self.bad_input(["weights", "import", "--from", good, "--model", "deformation/offset", "--out", "w.safetensors"], "deformation/offsets")
         self.bad_input(["weights", "import", "--from", good, "--map", self.write("m.yaml", "[1]"), *into], "m.yaml")
         self.bad_input(["weights", "import", "--from", good, "--size", "hidde=3", *into], "hidden")
+        for value in (-5, 0):
+            self.bad_input(["weights", "import", "--from", good, "--size=hidden=%d" % value, *into], "no size")
         self.bad_input(["weights", "export", "--from", good, "--model", "smrm", "--out", "s.safetensors"], good)
         self.bad_input(["weights", "import", "--from", good, "--model", "deformation/offsets", "--out", "nowhere/w.safetensors"], "nowhere")
 

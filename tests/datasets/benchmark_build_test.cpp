@@ -323,8 +323,11 @@ TEST_F(Fetch, MakeHumanIsPackedFromItsPublishedFiles) {
   EXPECT_TRUE(fetch_data(file, dir_ / "copied", dir_ / "out").missing.empty());
   EXPECT_EQ(bytes_of(dir_ / "copied/body/makehuman.h5"), packed);
   fs::remove(dir_ / "out/body/makehuman/base.obj");
+  EXPECT_THROW(fetch_data(file, dir_ / "other", dir_ / "out"), InputError) << "there, but another";
+  fs::remove(dir_ / "out/body/makehuman.h5");
   EXPECT_EQ(fetch_data(file, dir_ / "other", dir_ / "out").missing,
             std::vector<std::string>{"body/makehuman.h5"});
+  EXPECT_EQ(test::names_in(dir_ / "other"), std::vector<std::string>{}) << "nothing in part";
   write_bytes(dir_ / "parts.txt", line("a copy", "body/makehuman.h5", "makehuman:parts.txt"));
   EXPECT_THROW(fetch_data(file, dir_ / "endless"), InputError);
 }
@@ -392,7 +395,7 @@ TEST_F(Fetch, WhatIsNotPinnedNeverTakesItsPlace) {
   } catch (const WorkError& error) {
     EXPECT_NE(std::string(error.what()).find("--from FOLDER"), std::string::npos);
   }
-  EXPECT_THROW(fetch_data(list(line(big_, "a", "http://localhost:1/x")), dir_ / "out"), WorkError)
+  EXPECT_THROW(fetch_data(list(line(big_, "a", "http://localhost:1/x")), dir_ / "out"), InputError)
       << "unencrypted";
 }
 

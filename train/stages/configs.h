@@ -232,6 +232,8 @@ struct TrainConfig {
 template <class V>
 void visit(V& v, TrainConfig& c) {
   v("name", c.name, "run directories are <run_root>/<name>-<time>-<n>");
+  v.check("name", !c.name.empty() && c.name.size() <= 100 && c.name.find('/') == std::string::npos,
+          "is not the name of a folder in run_root", "give 1 to 100 characters without '/'");
   v("run_root", c.run_root, "folder of run directories");
   v("seed", c.seed, "of everything random");
   v("precision", c.precision, "of the matrix products of training steps; all else is float32");
