@@ -61,7 +61,7 @@ void judge_units(Diagnosis& d) {
   } else if (guess.sure < kUnsure) {
     if (sized) f.weight = Weight::note;
     f.what = "no unit (m, dm, inch, cm, mm) clearly makes a person of it";
-    if (!sized) f.what += "; in metres it is " + tall;
+    if (!sized && d.size > 0) f.what += "; in metres it is " + tall;
     f.fix = "give metres per unit with --scale if they are not metres";
   } else if (guess.unit.metres == 1) {
     f.what = "metres";
