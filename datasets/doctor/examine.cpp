@@ -107,6 +107,7 @@ std::optional<bool> is_mirrored(const Joints& joints, const Vec3& up) {
   }
   const Vec3 left = joints[1] - joints[2] + joints[16] - joints[17];
   const Vec3 forward = toes - toes.dot(up) * up;
+  if (!(forward.norm() > 0.25 * toes.norm())) return std::nullopt;  // on tiptoe: noise
   const double turn = up.cross(forward).dot(left);
   if (!(std::abs(turn) > 0.3 * forward.norm() * left.norm())) return std::nullopt;
   return turn < 0;

@@ -62,6 +62,11 @@ Finding examine_skeletons(const std::vector<Joints>& frames);
 
 /// Whether the joints named left are on the left of somebody whose toes point forwards: "right",
 /// "mirrored", or nothing if the feet do not tell. `up` is a unit vector.
+inline constexpr const char* kMirrored = "left and right are exchanged: a mirror image";
+inline constexpr const char* kMirroredBecause =
+    "with toes forwards, the joints named left are on the right";
+inline constexpr const char* kMirroredFix =
+    "mirror it (x to -x) where it was made, or exchange the names";
 std::optional<bool> is_mirrored(const Joints& joints, const Vec3& up = Vec3::UnitY());
 
 /// How a source was read: metres per unit, and whether its z axis points up.

@@ -1,5 +1,6 @@
 #include "datasets/importers/bvh.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -8,17 +9,111 @@
 namespace restage {
 namespace {
 
-/// A whole number of frames per second where the frame time is within 0.05 % of it.
-double frame_rate(double frame_time) {
-  const double fps = 1.0 / frame_time;
-  return std::abs(fps / std::round(fps) - 1.0) < 5e-4 ? std::round(fps) : fps;
+struct Rate {
+  double fps;
+  bool rounded;  ///< the file says another, too short to be exact
+};
+
+/// A whole number of frames per second where the frame time is within 0.05 % of it; else the usual
+/// rate whose frame time rounds (or is cut) to the digits in the file; else what the file says.
+Rate frame_rate(const BvhFile& file) {
+  const double time = file.frame_time, digit = file.frame_time_digit, fps = 1.0 / time;
+  if (std::abs(fps / std::round(fps) - 1.0) < 5e-4) return {std::round(fps), false};
+  double best = 0;
+  for (const double usual : {24.0, 25.0, 30.0, 50.0, 60.0, 100.0, 120.0, 240.0}) {
+    const double off = 1 / usual - time;
+    if (off >= -0.5001 * digit && off < digit &&
+        (best == 0 || std::abs(off) < std::abs(1 / best - time)))
+      best = usual;
+  }
+  return best > 0 ? Rate{best, true} : Rate{fps, false};
+}
+
+std::string rate_text(const BvhFile& file) {
+  const Rate rate = frame_rate(file);
+  char text[100];
+  if (rate.rounded)
+    std::snprintf(text, sizeof text, "the file's frame time of %.6g s is %.6g fps, rounded",
+                  file.frame_time, rate.fps);
+  else
+    std::snprintf(text, sizeof text, "the file says %.6g fps", rate.fps);
+  return text;
+}
+
+/// What a joint's position channels say: on average, and how far from there at most.
+struct Place {
+  Vec3 mean = Vec3::Zero();
+  double stray = 0;
+};
+
+/// `otherwise`: of the axes that have no channel.
+Place place_of(const BvhFile& file, size_t joint, const Vec3& otherwise) {
+  const auto at = [&](const std::vector<double>& frame) {
+    Vec3 out = otherwise;
+    for (size_t c = 0; c < file.channels[joint].size(); ++c)
+      if (file.channels[joint][c] < Channel::x_rotation)
+        out[static_cast<int>(file.channels[joint][c])] = frame[file.first_channel[joint] + c];
+    return out;
+  };
+  Place out;
+  for (const auto& frame : file.frames)
+    out.mean += at(frame) / static_cast<double>(file.frames.size());
+  for (const auto& frame : file.frames)
+    out.stray = std::max(out.stray, (at(frame) - out.mean).norm());
+  return out;
+}
+
+/// The joint and all that it hangs on.
+void mark_upwards(const SourceSkeleton& skeleton, int joint, std::vector<uint8_t>& marks) {
+  for (; joint >= 0; joint = skeleton.parents[static_cast<size_t>(joint)])
+    marks[static_cast<size_t>(joint)] = 1;
+}
+
+/// Joints of use that are told where they are in every frame, but for those down to the hips, which
+/// move.
+std::vector<size_t> told_joints(const BvhFile& file, const JointMap& map) {
+  std::vector<uint8_t> moves(file.skeleton.size(), 0), used = moves;
+  mark_upwards(file.skeleton, map[0].joint, moves);
+  for (const SourceJoint& joint : map) mark_upwards(file.skeleton, joint.joint, used);
+  std::vector<size_t> out;
+  for (size_t j = 0; j < moves.size(); ++j)
+    if (used[j] && !moves[j] &&
+        std::any_of(file.channels[j].begin(), file.channels[j].end(),
+                    [](Channel c) { return c < Channel::x_rotation; }))
+      out.push_back(j);
+  return out;
+}
+
+/// Bones have one length here, so joints rest where the channels put them on average.
+BonePositions use_positions(BvhFile& file, const JointMap& map) {
+  const std::vector<size_t> told = told_joints(file, map);
+  double said = 0, drawn = 0;
+  for (const size_t j : told) {
+    said += place_of(file, j, Vec3::Zero()).mean.norm();
+    drawn += file.skeleton.offsets[j].norm();
+  }
+  const bool deltas = said < 0.2 * drawn;  // Blender's: counted from OFFSET, which others replace
+  BonePositions found;
+  found.joints = told.size();
+  for (const size_t j : told) {
+    Vec3& offset = file.skeleton.offsets[j];
+    const Place place = place_of(file, j, deltas ? Vec3(Vec3::Zero()) : offset);
+    const Vec3 rest = deltas ? Vec3(offset + place.mean) : place.mean;
+    found.off_offset = std::max(found.off_offset, (rest - offset).norm());
+    offset = rest;
+    if (place.stray > found.stray) {
+      found.stray = place.stray;
+      found.stray_joint = file.skeleton.names[j];
+    }
+  }
+  return found;
 }
 
 }  // namespace
 
 SourceMotion bvh_motion(BvhFile file, int hips) {
   SourceMotion out;
-  out.fps = frame_rate(file.frame_time);
+  out.fps = frame_rate(file).fps;
   std::vector<uint8_t> moves(file.skeleton.size(), 0);
   for (int j = hips; j >= 0; j = file.skeleton.parents[static_cast<size_t>(j)])
     moves[static_cast<size_t>(j)] = 1;
@@ -54,12 +149,13 @@ MotionClip convert_bvh(std::string_view text, const std::string& path,
   Recording recording;
   recording.names = name_joints(file.skeleton, path, profile ? &*profile : nullptr);
   recording.format = "BVH";
-  char rate[60];
-  std::snprintf(rate, sizeof rate, "the file says %.6g fps", frame_rate(file.frame_time));
-  recording.rate_of_file = rate;
+  recording.rate_of_file = rate_text(file);
+  recording.rate_known = !frame_rate(file).rounded;
   recording.bytes = text.size();
-  check_length(file.frames.size(), file.skeleton.size(), frame_rate(file.frame_time), text.size(),
-               path);
+  check_length(file.frames.size(), file.skeleton.size(), frame_rate(file).fps, text.size(), path);
+  recording.positions = use_positions(file, recording.names.map);
+  if (recording.positions.joints > 0)  // joints that the file lacks are placed between those it has
+    recording.names = name_joints(file.skeleton, path, profile ? &*profile : nullptr);
   const int hips = recording.names.map[0].joint;
   recording.motion = bvh_motion(std::move(file), hips);
   return make_clip(std::move(recording), path, options);

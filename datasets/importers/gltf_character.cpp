@@ -14,7 +14,9 @@
 namespace restage {
 namespace {
 
-std::string stem_of(const std::string& path) { return std::filesystem::path(path).stem().string(); }
+std::string id_of(const std::string& path, const CharacterOptions& options) {
+  return options.id.empty() ? std::filesystem::path(path).stem().string() : options.id;
+}
 
 void describe(const Gltf& file, ImportReport& report) {
   report.file = file.path;
@@ -25,8 +27,6 @@ void describe(const Gltf& file, ImportReport& report) {
                                          std::to_string(file.skin_nodes.size()) + " skins with " +
                                          std::to_string(joints) + " joints, " +
                                          std::to_string(file.clips.size()) + " animations");
-  if (!file.humanoid.empty())
-    report.facts.emplace_back("names", "VRM's list of bones, not the nodes' names");
   report.remarks.insert(report.remarks.end(), file.remarks.begin(), file.remarks.end());
 }
 
@@ -137,13 +137,13 @@ std::vector<Motion> motions_of(const Gltf& file, const GltfRig& rig,
       throw InputError(file.path, "its animations are far longer than the keys in it",
                        "import them one by one (--clip), or cut them");
     Motion motion = motion_of(file, rig, *clip, frames);
-    std::string id = stem_of(file.path);
+    std::string id = id_of(file.path, options);
     if (clips.size() > 1 || !options.clip.empty()) id += "_" + clip->name;
     std::replace(id.begin(), id.end(), '/', '_');
     motion.id = id;
     for (int again = 2; !ids.insert(motion.id).second; ++again)
       motion.id = id + "_" + std::to_string(again);
-    motion.subject = options.subject.empty() ? stem_of(file.path) : options.subject;
+    motion.subject = options.subject.empty() ? id_of(file.path, options) : options.subject;
     motion.split = options.split;
     motion.action = options.action.empty() ? clip->name : options.action;
     report.facts.emplace_back("clip " + text::quote(clip->name), rate_of(file, *clip, frames));
@@ -152,19 +152,33 @@ std::vector<Motion> motions_of(const Gltf& file, const GltfRig& rig,
   return out;
 }
 
+[[noreturn]] void throw_no_skin(const std::string& path) {
+  throw InputError(path, "has no skin: no bone moves its mesh",
+                   "bind the mesh to the rig (in Blender: Set Parent To, Armature Deform) and "
+                   "export again; as a rigid --target it will do");
+}
+
 }  // namespace
 
 Character read_character(const std::string& path, const CharacterOptions& options) {
   const Gltf file = read_gltf(path);
   Character out;
   describe(file, out.report);
+  const bool skinned = std::any_of(
+      file.influences.begin(), file.influences.end(),
+      [&](const GltfInfluence& by) { return file.bones[static_cast<size_t>(by.bone)].skin >= 0; });
+  const bool loose = !skinned && !file.vertices.empty();
+  if (loose && file.clips.empty()) throw_no_skin(path);
   const GltfRig rig = find_rig(file, options.rig, out.report);
-  if (!file.vertices.empty()) {
+  check_handedness(t_pose_joints(rig), options.force, path, out.report);
+  if (loose) out.report.remarks.push_back("left out its mesh, which belongs to no skin");
+  if (skinned) {
     out.body = body_of(file, rig);
-    out.body->id = stem_of(path);
+    out.body->id = id_of(path, options);
     out.body->split = options.split;
   }
   out.motions = motions_of(file, rig, options, out.report);
+  if (loose && out.motions.empty()) throw_no_skin(path);
   if (!out.body && out.motions.empty())
     throw InputError(path, "holds neither a mesh nor an animation of a person",
                      "export the character with its mesh or its animation");
@@ -188,6 +202,7 @@ TargetMesh read_target(const std::string& path) {
     return out;
   }
   const GltfRig rig = find_rig(file, {}, out.report);
+  check_handedness(t_pose_joints(rig), true, path, out.report);
   out.mesh = t_pose_mesh(file, rig);
   out.joints = t_pose_joints(rig);
   const Vec3 moved = put_on_floor(out.mesh, (*out.joints)[0]);

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "autograd/base/error.h"
+#include "datasets/importers/length_units.h"
 #include "datasets/importers/source_motion.h"
 #include "datasets/readers/text.h"
 
@@ -169,10 +170,15 @@ void strip_common(std::vector<std::string>& names) {
   }
 }
 
+/// Whether bones go by VRM's list of them; a profile that is asked for goes by the nodes' names.
+bool by_list(const Gltf& file, const Profile* profile) {
+  return !file.humanoid.empty() && (profile == nullptr || profile->name == "vrm");
+}
+
 /// The zero pose of SourceSkeleton is the bind pose, all axes along the world's. Joint 0 is the
 /// world, joint i + 1 is nodes[i].
 SourceSkeleton skeleton_of(const Gltf& file, const std::vector<int>& nodes,
-                           const GltfTransforms& bind) {
+                           const GltfTransforms& bind, bool by_vrm_list) {
   SourceSkeleton out;
   std::vector<int> place(file.nodes.size(), 0);
   const auto add = [&](const std::string& name, int parent, const Vec3& offset) {
@@ -191,7 +197,7 @@ SourceSkeleton skeleton_of(const Gltf& file, const std::vector<int>& nodes,
     place[static_cast<size_t>(n)] = static_cast<int>(out.size());
     add(node.name, parent, bind[static_cast<size_t>(n)].translation() - from);
   }
-  if (file.humanoid.empty()) return out;
+  if (!by_vrm_list) return out;
   // A VRM file says which bone is which; what its nodes are called is its author's business.
   for (std::string& name : out.names) name.clear();
   for (const auto& [name, n] : file.humanoid)
@@ -200,15 +206,15 @@ SourceSkeleton skeleton_of(const Gltf& file, const std::vector<int>& nodes,
   return out;
 }
 
-JointMap map_names(SourceSkeleton& skeleton, const std::string& path) {
+NamedJoints map_names(SourceSkeleton& skeleton, const Profile* profile, const std::string& path) {
   try {
-    return map_joints(skeleton, path);
+    return name_joints(skeleton, path, profile);
   } catch (const InputError&) {
     SourceSkeleton stripped = skeleton;
     strip_common(stripped.names);
     if (stripped.names == skeleton.names) throw;
     try {
-      const JointMap out = map_joints(stripped, path);
+      NamedJoints out = name_joints(stripped, path, profile);
       skeleton = std::move(stripped);
       return out;
     } catch (const InputError&) {
@@ -223,20 +229,21 @@ double find_scale(const Joints& joints, const GltfRigOptions& options, const std
                   ImportReport& report) {
   const double leg = leg_length(joints);
   double scale = options.scale;
+  std::string how = "as given";
   if (scale <= 0) {
-    scale = leg >= 0.1 && leg < 4      ? 1.0
-            : leg >= 10 && leg < 400   ? 0.01
-            : leg >= 400 && leg < 4000 ? 0.001
-                                       : 0.0;
+    const LegUnit* unit = unit_of_leg(leg);
+    scale = leg >= 0.1 && leg < 4       ? 1.0
+            : unit                      ? unit->metres
+            : leg >= 140 && leg < 400   ? 0.01
+            : leg >= 1400 && leg < 4000 ? 0.001
+                                        : 0.0;
     if (scale == 0)
       throw InputError(path, "a leg of " + format("%.3g", leg) + " units is no person's in metres",
                        "give --scale (metres per unit)");
+    how = scale == 1.0 ? "the format's" : unit_name(scale) + " by the leg";
   }
-  report.facts.emplace_back("units", format("%g m (%s; the leg has %.3g)", scale,
-                                            options.scale > 0 ? "as given"
-                                            : scale == 1.0    ? "the format's"
-                                                              : "by the leg",
-                                            leg));
+  report.facts.emplace_back("units",
+                            format("%g m (%s; the leg has %.3g)", scale, how.c_str(), leg));
   return scale;
 }
 
@@ -387,8 +394,14 @@ GltfRig find_rig(const Gltf& file, const GltfRigOptions& options, ImportReport& 
   GltfRig rig;
   rig.bind = bind_pose(file, report);
   const std::vector<int> nodes = bone_nodes(file);
-  SourceSkeleton skeleton = skeleton_of(file, nodes, rig.bind);
-  const JointMap map = map_names(skeleton, file.path);
+  SourceSkeleton skeleton = skeleton_of(file, nodes, rig.bind, by_list(file, options.profile));
+  const NamedJoints names = map_names(skeleton, options.profile, file.path);
+  const JointMap& map = names.map;
+  if (by_list(file, options.profile))
+    report.facts.emplace_back("names", "VRM's list of bones, not the nodes' names");
+  else if (options.profile)
+    report.facts.emplace_back("names",
+                              names.profile->title + " (profile " + names.profile->name + ")");
   find_nodes(file, rig, map, nodes, report);
   Joints joints;
   for (size_t j = 0; j < kJoints; ++j)
@@ -414,9 +427,10 @@ GltfRig find_rig(const Gltf& file, const GltfRigOptions& options, ImportReport& 
 }
 
 bool has_known_joints(const Gltf& file) {
-  SourceSkeleton skeleton = skeleton_of(file, bone_nodes(file), gltf_rest(file));
+  SourceSkeleton skeleton =
+      skeleton_of(file, bone_nodes(file), gltf_rest(file), by_list(file, nullptr));
   try {
-    map_names(skeleton, file.path);
+    map_names(skeleton, nullptr, file.path);
     return true;
   } catch (const InputError&) {
     return false;

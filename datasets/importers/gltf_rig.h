@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "datasets/importers/axis.h"
+#include "datasets/importers/profiles.h"
 #include "datasets/importers/report.h"
 #include "datasets/readers/gltf.h"
 
@@ -30,10 +31,14 @@ struct GltfRig {
 
 struct GltfRigOptions {
   /// Metres per unit. 0: by the leg (hip-knee-ankle): [0.1, 4) units are metres, as the format has
-  /// it, [10, 400) centimetres, [400, 4000) millimetres; else InputError.
+  /// it, longer ones as of recordings (length_units.h), giants in centimetres up to 400 and in
+  /// millimetres up to 4000; else InputError.
   double scale = 0;
   /// automatic: the axis along which the head is furthest from the ankles.
   Axis up = Axis::automatic;
+  /// Whose names the bones have; null: VRM's list of bones if there is one, else the built-in
+  /// profile that fits.
+  const Profile* profile = nullptr;
 };
 
 /// Finds the joints by VRM's list of bones or by name (map_joints(); a prefix that all names share

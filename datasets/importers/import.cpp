@@ -10,6 +10,7 @@
 #include "datasets/importers/import_detail.h"
 #include "datasets/importers/makehuman.h"
 #include "datasets/readers/array_frames.h"
+#include "datasets/readers/folders.h"
 #include "datasets/readers/mesh_io.h"
 
 namespace restage {
@@ -37,6 +38,7 @@ void add_bodies(const std::string& folder, const std::string& garment, DatasetWr
 
 ImportSummary import_data_folder(const std::string& folder, bool bodies, bool clips,
                                  const std::string& out, const ImportOptions& options) {
+  check_options({InputKind::data_folder}, folder, options);
   ImportSummary summary;
   DatasetWriter writer(out, data_folder_info(bodies, clips));
   if (bodies) add_bodies(folder + "/body", options.garment, writer, summary);
@@ -53,13 +55,16 @@ ImportSummary import_folder(const std::string& source, const std::string& out,
   const bool bodies = fs::exists(source + "/body/makehuman.h5", ignored);
   const bool clips = fs::exists(source + "/cmu/clips30.h5", ignored);
   if (bodies || clips) return import_data_folder(source, bodies, clips, out, options);
-  std::vector<std::string> recordings;
-  for (const fs::directory_entry& entry : fs::directory_iterator(source, ignored))
-    if (entry.is_regular_file(ignored) && is_recording_name(entry.path().string()))
-      recordings.push_back(entry.path().string());
-  std::sort(recordings.begin(), recordings.end());
-  if (!recordings.empty()) return import_recordings(recordings, source, out, options);
-  return import_array_folder(source, out, options);
+  const std::vector<std::string> recordings = files_below(source, is_recording_name);
+  if (recordings.empty()) return import_array_folder(source, out, options);
+  ImportSummary summary = import_recordings(recordings, source, out, options);
+  count_ignored(
+      source,
+      [](const std::string& path) {
+        return is_recording_name(path) || path.ends_with(".asf") || path.ends_with(".asf.xz");
+      },
+      summary);
+  return summary;
 }
 
 ImportSummary import_file(const std::string& source, const std::string& out,
@@ -126,6 +131,12 @@ void add_each(const std::vector<std::string>& files, ImportSummary& summary,
   }
 }
 
+void count_ignored(const std::string& folder, bool (*considered)(const std::string&),
+                   ImportSummary& summary) {
+  for (const std::string& path : files_below(folder, [](const std::string&) { return true; }))
+    if (!considered(path)) ++summary.ignored[fs::path(path).extension().string()];
+}
+
 bool is_importable(const std::string& source) {
   std::error_code ignored;
   return fs::is_directory(source, ignored) || is_recording_name(source) || is_array_name(source) ||
@@ -137,17 +148,8 @@ ImportSummary import_data(const std::string& source, const std::string& out,
   std::error_code ignored;
   if (!fs::exists(source, ignored))
     throw InputError(source, "is not there", "give a file or a folder");
-  const auto refuse = [&](bool given, const char* option, const char* whose) {
-    if (given)
-      throw InputError(source,
-                       std::string("has nothing to do with ") + option + ", which is for " + whose,
-                       std::string("leave ") + option + " out");
-  };
-  const bool folder = fs::is_directory(source, ignored);
-  refuse(!options.betas.empty() && (folder || !is_npz_name(source)), "--betas", "body models");
-  refuse(!options.clip.empty() && !folder && !is_recording_name(source), "--clip",
-         "glTF characters");
-  return folder ? import_folder(source, out, options) : import_file(source, out, options);
+  return fs::is_directory(source, ignored) ? import_folder(source, out, options)
+                                           : import_file(source, out, options);
 }
 
 }  // namespace restage

@@ -1,6 +1,7 @@
 // `restage data import`: foreign data into one file of the project's schema.
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -12,8 +13,7 @@
 namespace restage {
 
 struct ImportOptions {
-  /// Of BVH and AMC files; subject, split, action, scale and up also hold for all other foreign
-  /// files, fps for AMASS motions and scans.
+  /// Of BVH and AMC files; which of them other kinds take: import_options.cpp.
   MotionOptions motion;
   std::string asf;      ///< skeleton of AMC files; empty: the one beside each
   std::string clip;     ///< of glTF files: this animation only; empty: all
@@ -28,9 +28,11 @@ struct ImportOptions {
 struct ImportSummary {
   size_t bodies = 0, motions = 0, frames = 0;  ///< frames of motions, or of scans
   size_t sequences = 0;                        ///< of scans
-  size_t shapes = 0;                  ///< AMASS files left out because they hold a shape only
-  std::vector<ImportReport> reports;  ///< one per file or sequence that was used
-  std::vector<std::string> skipped;   ///< files of a folder that could not be used, and why
+  size_t shapes = 0;                      ///< AMASS files left out because they hold a shape only
+  std::vector<ImportReport> reports;      ///< one per file or sequence that was used
+  std::map<std::string, size_t> ignored;  ///< files of a folder of no kind that was looked for,
+                                          ///< by the ends of their names (".txt")
+  std::vector<std::string> skipped;       ///< files of a folder that could not be used, and why
 };
 
 /// Licence, origin and required acknowledgement of what comes out of a data folder.
@@ -44,10 +46,11 @@ bool is_importable(const std::string& source);
 ///   body/bodies.csv and all clips of cmu/clips30.h5 (one of the two may be absent);
 /// - a recording (.bvh, or .amc with its .asf; any may end in .xz): one motion;
 /// - a rigged character (.glb, .gltf, .vrm): its body and its animations (gltf_character.h);
-/// - a folder of recordings and characters, in the order of their names;
+/// - a tree of folders of recordings and characters, in the order of their names;
 /// - an AMASS motion (.npz) or a tree of folders of them, subjects named by folder (amass.h);
 /// - a body model (.npz), giving bodies (smpl.h);
 /// - scans: an array or mesh file, or a tree of folders of them (scans.h).
+/// An option that a kind of input does not take is an InputError, never ignored.
 /// Unusable files of a folder are skipped with a warning, except frames within a scan sequence.
 /// InputError: no such source, nothing usable in it, damaged data. WorkError: disk full.
 ImportSummary import_data(const std::string& source, const std::string& out,

@@ -9,6 +9,7 @@
 #include "datasets/importers/smpl.h"
 #include "datasets/readers/array_frames.h"
 #include "datasets/readers/folders.h"
+#include "datasets/readers/mesh_io.h"
 
 namespace restage {
 namespace {
@@ -47,6 +48,7 @@ AmassOptions amass_options(const fs::path& file, const fs::path& root,
 ImportSummary import_amass_files(const std::vector<std::string>& files, const std::string& source,
                                  const std::string& root, const std::string& out,
                                  const ImportOptions& options) {
+  check_options({InputKind::amass}, source, options);
   if (options.body_model.empty())
     throw InputError(source, "holds AMASS motions, whose skeletons are in a body model beside them",
                      "give your SMPL-H or SMPL-X model with --body-model MODEL.npz");
@@ -91,6 +93,7 @@ std::string body_id(const std::string& model, const std::string& betas, size_t i
 
 ImportSummary import_model(const std::string& source, const std::string& out,
                            const ImportOptions& options) {
+  check_options({InputKind::body_model}, source, options);
   const Npz file(source, options.max_memory);
   SmplModel model(file);
   model.read_blend_shapes(file);
@@ -131,6 +134,7 @@ ImportSummary import_model(const std::string& source, const std::string& out,
 
 ImportSummary import_scan_files(const std::string& source, const std::string& out,
                                 const ImportOptions& options) {
+  check_options({InputKind::scans}, source, options);
   ImportSummary summary;
   const std::vector<ScanSequence> sequences =
       find_scans(source, options.max_memory, summary.skipped);
@@ -184,8 +188,13 @@ ImportSummary import_array_folder(const std::string& source, const std::string& 
       return false;  // one that is damaged is named when its turn comes
     }
   });
-  return amass ? import_amass_files(npz, source, source, out, options)
-               : import_scan_files(source, out, options);
+  ImportSummary summary = amass ? import_amass_files(npz, source, source, out, options)
+                                : import_scan_files(source, out, options);
+  const auto of_scans = [](const std::string& path) {
+    return is_array_name(path) || is_mesh_name(path) || path.ends_with(".pkl");
+  };
+  count_ignored(source, amass ? is_npz_name : of_scans, summary);
+  return summary;
 }
 
 }  // namespace restage

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,13 @@ std::filesystem::path absolute_path(const std::filesystem::path& path);
 /// Licence as given, provenance by the source's name.
 FileInfo file_info(const std::string& source, const ImportOptions& options);
 void add_motion(const Motion& motion, DatasetWriter& writer, ImportSummary& summary);
+enum class InputKind { data_folder, bvh, amc, character, amass, body_model, scans };
+/// InputError for an option that none of these kinds takes: none is ignored without a word.
+void check_options(const std::set<InputKind>& kinds, const std::string& source,
+                   const ImportOptions& options);
+/// Counts the files below the folder that are not `considered`, by the ends of their names.
+void count_ignored(const std::string& folder, bool (*considered)(const std::string&),
+                   ImportSummary& summary);
 /// Calls `add` for each file; of several, those that it throws an InputError for are skipped with a
 /// warning and listed.
 void add_each(const std::vector<std::string>& files, ImportSummary& summary,

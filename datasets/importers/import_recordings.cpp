@@ -1,4 +1,9 @@
 // import_data() of moving skeletons: BVH and ASF/AMC recordings, rigged glTF characters.
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <set>
+
 #include "autograd/base/error.h"
 #include "datasets/importers/amc.h"
 #include "datasets/importers/bvh.h"
@@ -14,16 +19,27 @@ bool is_a(const std::string& path, const std::string& ending) {
   return name.ends_with(ending) || name.ends_with(ending + ".xz");
 }
 
+InputKind kind_of(const std::string& file) {
+  return is_gltf_name(file)   ? InputKind::character
+         : is_a(file, ".amc") ? InputKind::amc
+                              : InputKind::bvh;
+}
+
+/// What some files of a folder take others may not: those are skipped. A skeleton for the AMC files
+/// is no business of theirs.
+void check_file_options(const std::string& file, ImportOptions options) {
+  if (kind_of(file) != InputKind::amc) options.asf.clear();
+  check_options({kind_of(file)}, file, options);
+}
+
 void add_character(const std::string& file, const ImportOptions& options, DatasetWriter& writer,
                    ImportSummary& summary) {
-  if (options.motion.fps > 0 || options.motion.rest.frame >= 0)
-    throw InputError(file,
-                     "states its key times and its rest pose, which --fps and --rest-frame "
-                     "would change",
-                     "leave them out");
+  const std::optional<Profile> profile = asked_profile(options.motion);
   CharacterOptions how;
-  how.rig = {options.motion.scale, options.motion.rest.up};
+  how.rig = {options.motion.scale, options.motion.rest.up, profile ? &*profile : nullptr};
+  how.force = options.motion.force;
   how.clip = options.clip;
+  how.id = options.motion.id;
   how.subject = options.motion.subject;
   how.split = options.motion.split;
   how.action = options.motion.action;
@@ -38,12 +54,31 @@ void add_character(const std::string& file, const ImportOptions& options, Datase
 
 void add_recording(const std::string& file, const ImportOptions& options, DatasetWriter& writer,
                    ImportSummary& summary) {
-  if (!options.clip.empty())
-    throw InputError(file, "has no clips to choose from", "leave --clip out");
   MotionClip clip = is_a(file, ".amc") ? read_amc(file, options.asf, options.motion)
                                        : read_bvh(file, options.motion);
   add_motion(clip.motion, writer, summary);
   summary.reports.push_back(std::move(clip.report));
+}
+
+std::string name_of(const std::string& file) {
+  return is_gltf_name(file) ? std::filesystem::path(file).stem().string() : stem_of(file);
+}
+
+/// An id for each file whose name another one has too: where it lies below `root` ("a/walk.bvh":
+/// "a_walk").
+std::map<std::string, std::string> ids_by_place(const std::vector<std::string>& files,
+                                                const std::string& root) {
+  std::map<std::string, size_t> count;
+  for (const std::string& file : files) ++count[name_of(file)];
+  std::map<std::string, std::string> out;
+  for (const std::string& file : files) {
+    if (count[name_of(file)] == 1) continue;
+    const auto below = absolute_path(file).lexically_relative(absolute_path(root)).parent_path();
+    std::string id = (below / name_of(file)).generic_string();
+    std::replace(id.begin(), id.end(), '/', '_');
+    out[file] = id;
+  }
+  return out;
 }
 
 }  // namespace
@@ -55,11 +90,18 @@ bool is_recording_name(const std::string& path) {
 ImportSummary import_recordings(const std::vector<std::string>& files, const std::string& source,
                                 const std::string& out, const ImportOptions& options) {
   asked_profile(options.motion);  // a mistake there is not the files'
+  std::set<InputKind> kinds;
+  for (const std::string& file : files) kinds.insert(kind_of(file));
+  check_options(kinds, source, options);
   ImportSummary summary;
   DatasetWriter writer(out, file_info(source, options));
+  const std::map<std::string, std::string> ids = ids_by_place(files, source);
   add_each(files, summary, [&](const std::string& file) {
-    is_gltf_name(file) ? add_character(file, options, writer, summary)
-                       : add_recording(file, options, writer, summary);
+    check_file_options(file, options);
+    ImportOptions how = options;
+    if (const auto id = ids.find(file); id != ids.end()) how.motion.id = id->second;
+    is_gltf_name(file) ? add_character(file, how, writer, summary)
+                       : add_recording(file, how, writer, summary);
   });
   if (summary.bodies + summary.motions == 0)
     throw InputError(source, "none of its " + std::to_string(files.size()) + " files could be used",

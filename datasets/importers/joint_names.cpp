@@ -15,15 +15,22 @@ enum : int { kSpine1 = 3, kSpine2 = 6, kSpine3 = 9, kNeck = 12, kHead = 15 };
 /// Those that cannot be placed.
 constexpr int kRequired[] = {0, 1, 2, 4, 5, 7, 8, 15, 16, 17, 18, 19, 20, 21};
 
-/// Bones by name: in lower case, without a namespace ("mixamorig:Hips") and, as a second name,
-/// without a prefix that three quarters of them share ("Model_Hips").
+/// In lower case, "Bip01 L Thigh" as "bip01_l_thigh" (BVH files cannot hold blanks in names).
+std::string plain_name(std::string_view bone) {
+  std::string out = lower_case(bone);
+  std::replace(out.begin(), out.end(), ' ', '_');
+  return out;
+}
+
+/// Bones by plain name, without a namespace ("mixamorig:Hips") and, as a second name, without a
+/// prefix that three quarters of them share ("Model_Hips").
 class BoneNames {
  public:
   explicit BoneNames(const SourceSkeleton& skeleton) {
     std::map<std::string, size_t> prefixes;
     std::vector<std::string> plain;
     for (const std::string& name : skeleton.names) {
-      plain.push_back(lower_case(name.substr(name.rfind(':') + 1)));  // npos + 1 is 0
+      plain.push_back(plain_name(name.substr(name.rfind(':') + 1)));  // npos + 1 is 0
       const size_t end = plain.back().find('_');
       if (end != std::string::npos) ++prefixes[plain.back().substr(0, end + 1)];
     }
@@ -36,7 +43,7 @@ class BoneNames {
   }
 
   int find(const std::string& bone) const {
-    const auto at = index_.find(lower_case(bone));
+    const auto at = index_.find(plain_name(bone));
     return at == index_.end() ? -1 : at->second;
   }
   int find(const std::vector<std::string>& any) const {

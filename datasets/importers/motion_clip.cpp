@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "autograd/base/error.h"
+#include "datasets/importers/length_units.h"
 #include "datasets/readers/word_lines.h"
 
 namespace restage {
@@ -16,24 +17,6 @@ std::string text_of(double value, const char* format = "%.4g") {
   char text[40];
   std::snprintf(text, sizeof text, format, value);
   return text;
-}
-
-struct Unit {
-  const char* name;
-  double from, to;  ///< a leg's length in units
-  double metres;
-};
-constexpr Unit kUnits[] = {{"metres", 0.4, 1.4, 1.0},
-                           {"decimetres", 4, 10, 0.1},
-                           {"inches / 0.45", 10, 20, 0.0254 / 0.45},
-                           {"inches", 20, 50, 0.0254},
-                           {"centimetres", 50, 140, 0.01},
-                           {"millimetres", 400, 1400, 0.001}};
-
-std::string unit_name(double metres) {
-  for (const Unit& unit : kUnits)
-    if (std::abs(unit.metres / metres - 1) < 1e-6) return unit.name;
-  return text_of(metres) + " m";
 }
 
 /// Metres per unit; see MotionOptions::scale.
@@ -53,8 +36,7 @@ double find_scale(const Recording& recording, double given, const std::string& p
     report.remarks.push_back("the units that the file names would make a leg of " +
                              text_of(metres) + " m: found by the leg instead");
   }
-  for (const Unit& unit : kUnits)
-    if (leg >= unit.from && leg < unit.to) return says(unit.metres, "by the legs");
+  if (const LegUnit* unit = unit_of_leg(leg)) return says(unit->metres, "by the legs");
   throw InputError(path, "a leg of " + text_of(leg) + " units is no person's in any known unit",
                    "give the scale (metres per unit)");
 }
@@ -92,28 +74,39 @@ double largest_turn(const std::vector<Quat>& local) {
   return largest * (180.0 / M_PI);
 }
 
-/// How many frames the Daz release's T-pose and the blend out of it take (0: none are there).
-size_t t_pose_lead(const std::vector<std::vector<Quat>>& local) {
-  constexpr size_t kDazLead = 11;
-  const bool lead = local.size() > kDazLead && largest_turn(local[0]) < 30.0 &&
-                    largest_turn(local[kDazLead]) > 45.0;
-  return lead ? kDazLead : 0;
+/// Whether a recording begins with a T-pose that does not face anywhere yet and, within four
+/// frames, turns its limbs away from it: as the Daz release blends by some 20 degrees a frame, or
+/// at once. Nobody who is recorded does: that is 2,400 degrees a second from rest.
+bool begins_with_lead(const std::vector<std::vector<Quat>>& local, size_t lead) {
+  const double root = local[0][0].angularDistance(Quat::Identity()) * (180.0 / M_PI);
+  const bool blends = lead == 1 || largest_turn(local[1]) < 40.0;
+  return root < 0.01 && blends && largest_turn(local[0]) < 30.0 &&
+         largest_turn(local[std::min<size_t>(lead, 4)]) > 50.0;
 }
 
-void cut_frames(SourceMotion& motion, const MotionOptions& options, const std::string& path,
-                ImportReport& report) {
+size_t lead_of(const std::vector<std::vector<Quat>>& local, const Profile& profile) {
+  const bool known = profile.lead > 0 && local.size() > profile.lead;
+  return known && begins_with_lead(local, profile.lead) ? profile.lead : 0;
+}
+
+void cut_frames(SourceMotion& motion, const Profile& profile, const MotionOptions& options,
+                const std::string& path, ImportReport& report) {
   const size_t n = motion.local.size();
   const bool asked = options.drop_leading >= 0;
   const size_t first =
-      asked ? static_cast<size_t>(options.drop_leading) : t_pose_lead(motion.local);
+      asked ? static_cast<size_t>(options.drop_leading) : lead_of(motion.local, profile);
   if (first >= n)
     throw InputError(path, "has only " + std::to_string(n) + " frames",
                      "leave out fewer at its beginning");
   const size_t count = options.keep_frames ? std::min(options.keep_frames, n - first) : n - first;
   if (first > 0)
-    report.facts.emplace_back("left out",
-                              "the first " + std::to_string(first) + " frames, " +
-                                  (asked ? "as asked" : "a T-pose and a blend out of it"));
+    report.facts.emplace_back(
+        "beginning",
+        std::to_string(first) + (first == 1 ? " frame" : " frames") + " left out, " +
+            (asked
+                 ? "as asked"
+                 : std::string("a T-pose") + (first > 1 ? " and a blend out of it" : "") +
+                       " that " + profile.title + " files begin with (--drop-leading 0 keeps it)"));
   const auto cut = [&](auto& frames) {
     frames.erase(frames.begin() + static_cast<std::ptrdiff_t>(first + count), frames.end());
     frames.erase(frames.begin(), frames.begin() + static_cast<std::ptrdiff_t>(first));
@@ -142,12 +135,12 @@ Poses poses_at_30_fps(SourceMotion motion, const JointMap& map, const RestPose& 
   return poses;
 }
 
-/// "07_01" -> "07"; other names stand for themselves.
-std::string subject_of(const std::string& id) {
-  const size_t bar = id.find('_');
+/// "07_01" -> "07"; of other names the clip's id.
+std::string subject_of(const std::string& name, const std::string& id) {
+  const size_t bar = name.find('_');
   const bool number =
-      bar != std::string::npos && bar > 0 && id.find_first_not_of("0123456789") == bar;
-  return number ? id.substr(0, bar) : id;
+      bar != std::string::npos && bar > 0 && name.find_first_not_of("0123456789") == bar;
+  return number ? name.substr(0, bar) : id;
 }
 
 void report_names(const Recording& recording, ImportReport& report) {
@@ -160,6 +153,20 @@ void report_names(const Recording& recording, ImportReport& report) {
     placed +=
         (placed.empty() ? "; placed: " : ", ") + std::string(kJointNames[static_cast<size_t>(j)]);
   report.facts.emplace_back("names", profile.title + " (profile " + profile.name + ")" + placed);
+}
+
+/// Bones that the file moves apart are of one length here, which is said where it is seen.
+void report_positions(const BonePositions& found, double scale, ImportReport& report) {
+  constexpr double kSeen = 0.001;  // metres
+  if (found.off_offset * scale > kSeen)
+    report.facts.emplace_back("offsets", "by the position channels of " +
+                                             std::to_string(found.joints) + " joints, up to " +
+                                             text_of(found.off_offset * scale, "%.3f") +
+                                             " m from OFFSET");
+  if (found.stray * scale > kSeen)
+    report.remarks.push_back("the position channels stretch bones: " + found.stray_joint +
+                             " strays up to " + text_of(found.stray * scale, "%.3f") +
+                             " m from its mean place, which is taken");
 }
 
 /// Where the file differs from what its family usually is.
@@ -187,12 +194,14 @@ MotionClip make_clip(Recording recording, const std::string& path, const MotionO
   report_names(recording, report);
   clip.scale = find_scale(recording, options.scale, path, report);
   scale_lengths(recording, clip.scale);
+  report_positions(recording.positions, clip.scale, report);
   SourceMotion& motion = recording.motion;
   if (options.fps > 0) motion.fps = options.fps;
   check_root(motion, options.max_root_speed, path);
   const JointMap& map = recording.names.map;
   const RestPose rest = find_rest_pose(motion, map, options.rest, path, report);
-  cut_frames(motion, options, path, report);
+  check_handedness(rest.joints, options.force, path, report);
+  cut_frames(motion, *recording.names.profile, options, path, report);
   const double fps = motion.fps;
   const size_t frames = motion.local.size();
   const Poses poses = poses_at_30_fps(std::move(motion), map, rest, recording.bytes, path);
@@ -211,8 +220,9 @@ MotionClip make_clip(Recording recording, const std::string& path, const MotionO
   report.facts.emplace_back("floor",
                             text_of(clip.floor_y, "%.3f") + " m in the file's world, moved to 0");
   clip.motion = to_motion(poses, rest.joints, clip.floor_y);
-  clip.motion.id = stem_of(path);
-  clip.motion.subject = options.subject.empty() ? subject_of(clip.motion.id) : options.subject;
+  clip.motion.id = options.id.empty() ? stem_of(path) : options.id;
+  clip.motion.subject =
+      options.subject.empty() ? subject_of(stem_of(path), clip.motion.id) : options.subject;
   clip.motion.split = options.split;
   clip.motion.action = options.action;
   return clip;

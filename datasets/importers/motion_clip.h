@@ -22,18 +22,19 @@ struct MotionOptions {
   /// within 0.05 % of a whole number of frames per second means that number; AMC files say none and
   /// are 120 fps.
   double fps = 0.0;
-  /// Frames of the file to leave out at its beginning. -1: 11 if frame 0 is a T-pose (every joint
-  /// within 30 degrees of zero) and frame 11 is not (some joint beyond 45), else 0: in the Daz
-  /// release of the CMU set frame 0 is a T-pose and up to 8 frames blend out of it.
+  /// Frames of the file to leave out at its beginning. -1: those that the profile knows its files
+  /// to begin with (Profile::lead), if this one does; else none.
   int drop_leading = -1;
   /// Frames of the file to keep after those; 0: all.
   size_t keep_frames = 0;
   /// A faster root, metres per second between two frames, means a broken file. 0: any speed.
   double max_root_speed = 25.0;
+  /// Take a recording whose left and right are exchanged, with a remark; else InputError.
+  bool force = false;
   /// Bone names: a built-in profile's name or a YAML file (profiles.h); empty: the one that fits.
   std::string profile;
-  std::string subject, split = "train",
-                       action;  ///< empty subject: from the file name (07_01 -> 07)
+  /// Empty id: the file's name. Empty subject: from the file's name (07_01 -> 07), else the id.
+  std::string id, subject, split = "train", action;
 };
 
 struct MotionClip {
@@ -42,6 +43,14 @@ struct MotionClip {
   double floor_y = 0;          ///< height of the clip's floor in that world
   double scale = 0;            ///< metres per unit of the file
   ImportReport report;
+};
+
+/// Joints below the hips that have position channels (which replace their OFFSET).
+struct BonePositions {
+  size_t joints = 0;
+  double off_offset = 0;  ///< the most that they differ from OFFSET, file units
+  double stray = 0;       ///< the most that one moves from its mean place, and which
+  std::string stray_joint;
 };
 
 /// How a file's recording came to be a SourceMotion.
@@ -53,6 +62,7 @@ struct Recording {
   bool rate_known = true;      ///< false: not by the file, but by custom
   double metres_per_unit = 0;  ///< if the file says it
   uint64_t bytes = 0;          ///< of the file, unpacked
+  BonePositions positions;
 };
 
 /// Units, axes, rest pose, rate: found or as given, each with a fact in the report. Quarter turns

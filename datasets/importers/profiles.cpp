@@ -35,12 +35,14 @@ class Reader {
     }
     Profile out;
     out.name = std::filesystem::path(path_).stem().string();
-    each(root, {"title", "joints", "places", "expect"}, [&](const std::string& key, const auto& v) {
-      if (key == "title") out.title = text(v);
-      if (key == "joints") joints(v, out);
-      if (key == "places") places(v, out);
-      if (key == "expect") expectations(v, out);
-    });
+    each(root, {"title", "joints", "places", "expect", "lead"},
+         [&](const std::string& key, const auto& v) {
+           if (key == "title") out.title = text(v);
+           if (key == "joints") joints(v, out);
+           if (key == "places") places(v, out);
+           if (key == "expect") expectations(v, out);
+           if (key == "lead") out.lead = static_cast<size_t>(number(v, 1, 1000));
+         });
     if (out.title.empty()) throw InputError(path_, "has no title", kFix);
     for (const int j : {0, 1, 2, 4, 5, 7, 8, 15, 16, 17, 18, 19, 20, 21})
       if (out.bones[static_cast<size_t>(j)].empty())

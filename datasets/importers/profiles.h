@@ -28,6 +28,9 @@ struct Profile {
   /// What files of the family usually are; a file that differs gets a remark. Empty or 0: no say.
   std::string units, up;
   double fps = 0;
+  /// Frames that files of the family begin with before the recording: a T-pose and a blend out of
+  /// it. A file that does not begin so keeps all frames.
+  size_t lead = 0;
 };
 
 /// All built-in profiles, by name.

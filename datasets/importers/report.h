@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "nn/geometry/skeleton.h"
+
 namespace restage {
 
 struct ImportReport {
@@ -13,5 +15,10 @@ struct ImportReport {
   std::vector<std::pair<std::string, std::string>> facts;  ///< e.g. {"frame rate", "120 -> 30"}
   std::vector<std::string> remarks;                        ///< what the user should know
 };
+
+/// A rest pose whose left and right are exchanged makes a mirror image of every motion: InputError
+/// in the doctor's words, or a remark if it is forced. `rest` in our frame.
+void check_handedness(const Joints& rest, bool force, const std::string& path,
+                      ImportReport& report);
 
 }  // namespace restage

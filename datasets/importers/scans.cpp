@@ -1,12 +1,16 @@
 #include "datasets/importers/scans.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
+#include <set>
 
 #include "autograd/base/error.h"
+#include "datasets/doctor/orientation_model.h"
+#include "datasets/doctor/shape.h"
 #include "datasets/readers/array_frames.h"
 #include "datasets/readers/folders.h"
 #include "datasets/readers/frame_folder.h"
@@ -96,6 +100,41 @@ std::string rate_fact(double fps, const std::string& from, int64_t frames, const
          std::to_string(count - used) + " repeated)";
 }
 
+/// InputError unless there are 64 different points, as many as retargeting needs.
+void check_count(const Frame& frame) {
+  constexpr size_t kFewest = 64;
+  std::set<std::array<float, 3>> different;
+  for (const Point& p : frame.points)
+    if (different.insert({p.x(), p.y(), p.z()}).second && different.size() == kFewest) return;
+  throw InputError(frame.source,
+                   "has only " + std::to_string(different.size()) + " different points",
+                   "give scans of 64 points or more");
+}
+
+/// InputError unless its size, the median distance to its median point, can be that of a person
+/// (0.26 to 0.63 m in any pose) or of some people in a room: in metres where the scale is given,
+/// else in some unit, with a remark if that is surely another than metres.
+void check_size(const Frame& frame, double given_scale, ImportReport& report) {
+  constexpr double kLeast = 0.1, kMost = 5, kMillimetre = 0.001;
+  Point low = frame.points[0], high = frame.points[0];
+  for (const Point& p : frame.points) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  const double width = (high.cast<double>() - low.cast<double>()).norm();
+  const double size = width < 1e7 ? doctor_detail::normalised(frame.points).size : width;
+  if (given_scale > 0 && !(size * given_scale > kLeast && size * given_scale < kMost))
+    throw InputError(frame.source,
+                     text_of("is %.3g m large with --scale %.6g, which no person is",
+                             width * given_scale, given_scale),
+                     "give the true metres a unit, or leave --scale out to hear what it seems");
+  if (!(given_scale > 0) && !(size > kLeast && size < kMost / kMillimetre))
+    throw InputError(frame.source,
+                     text_of("is %.3g units large, which no person is in any unit", width),
+                     "give scans of one person, or metres a unit as --scale");
+  const UnitGuess guess = guess_unit(size);
+  if (!(given_scale > 0) && guess.unit.metres != 1 && guess.sure > 0.9)
+    report.remarks.push_back(text_of("a unit seems to be %.6g m: if so, give --scale %.6g",
+                                     guess.unit.metres, guess.unit.metres));
+}
+
 std::string size_fact(const Points& points) {
   Point low = points[0], high = points[0];
   for (const Point& p : points) {
@@ -162,6 +201,8 @@ int64_t import_scans(const ScanSequence& sequence, const ScanOptions& options, S
     if (at == clock.source(k)) {  // else the frame before, once more
       Frame frame = *source->next();
       ++at;
+      check_count(frame);
+      if (k == 0) check_size(frame, options.scale, report);
       convert(frame, to_ours);
       points = std::move(frame.points);
       if (k == 0) fact("size", size_fact(points));

@@ -28,10 +28,11 @@ SmplFamily family_of(const NpyArray& kintree) {
   misfit(kintree, "[2, 24] (SMPL), [2, 52] (SMPL-H) or [2, 55] (SMPL-X)");
 }
 
-/// SMPL-X keeps expressions behind the shapes: 300 + 100, or 10 + 10 in its small files.
+/// SMPL-X as published keeps expressions behind the shapes: 300 + 100, or 10 + 10 in its small
+/// files. Others (16, 100) have been cut to their shapes.
 size_t shapes_of(SmplFamily family, size_t directions) {
   if (family != SmplFamily::smplx) return directions;
-  return directions >= 300 ? 300 : std::min<size_t>(directions, 10);
+  return directions == 20 ? 10 : std::min<size_t>(directions, 300);
 }
 
 }  // namespace
@@ -65,6 +66,11 @@ SmplModel::SmplModel(const Npz& file)
   const Joints rest = joints({});
   if (!(rest[15].y() > rest[0].y()) || !(rest[1].x() > rest[2].x()))
     throw InputError(path_, "does not stand with y up and its left towards +x", kFix);
+  const double height = (rest[15] - 0.5 * (rest[7] + rest[8])).norm();
+  if (!(height > 0.3 && height < 3))
+    throw InputError(path_,
+                     "is no person's size in metres: from ankles to head " + std::to_string(height),
+                     kFix);
 }
 
 void SmplModel::read_template(const Npz& file) {

@@ -1,6 +1,7 @@
 #include "datasets/readers/bvh.h"
 
 #include <cmath>
+#include <cstdlib>
 
 #include "autograd/base/error.h"
 #include "datasets/readers/word_lines.h"
@@ -27,7 +28,8 @@ class HierarchyParser {
   HierarchyParser(WordLines& lines, BvhFile& file) : lines_(lines), file_(file) {}
 
   void parse() {
-    if (!lines_.next() || !same_word(lines_.words()[0], "hierarchy"))
+    if (!lines_.next()) lines_.fail("is empty", "give a BVH file");
+    if (!same_word(lines_.words()[0], "hierarchy"))
       lines_.fail("does not begin with HIERARCHY", "give a BVH file");
     while (lines_.next()) {
       const auto& words = lines_.words();
@@ -93,7 +95,8 @@ class HierarchyParser {
 
   void offset(const std::vector<std::string_view>& words) {
     if (open_.empty()) lines_.fail("OFFSET outside of a joint", "mend the hierarchy");
-    if (words.size() != 4) lines_.fail("OFFSET needs three numbers", "write OFFSET x y z");
+    if (words.size() != 4)
+      lines_.fail("OFFSET needs three numbers", "write OFFSET x y z, with decimal points");
     const Vec3 value(lines_.number(words[1]), lines_.number(words[2]), lines_.number(words[3]));
     SourceSkeleton& s = file_.skeleton;
     if (open_.back() >= 0) {
@@ -146,8 +149,8 @@ class HierarchyParser {
   bool opening_ = false;  // a name was read, its brace not yet
 };
 
-/// "Frames: 12" or "Frame Time: 0.01": the number after the colon.
-double header_number(WordLines& lines, std::string_view title) {
+/// "Frames: 12" or "Frame Time : 0.01": what is written after the colon.
+std::string header_value(WordLines& lines, const std::string& title) {
   std::string joined;
   if (lines.next())
     for (const std::string_view word : lines.words()) {
@@ -155,18 +158,29 @@ double header_number(WordLines& lines, std::string_view title) {
       joined += (joined.empty() ? "" : " ") + std::string(word.substr(0, 100));
     }
   const size_t colon = joined.find(':');
-  if (colon == std::string::npos || !same_word(std::string_view(joined).substr(0, colon), title))
-    lines.fail("'" + std::string(title) + ": NUMBER' expected", "give the whole file");
+  const size_t end = joined.find_last_not_of(' ', colon - (colon > 0 ? 1 : 0)) + 1;
+  if (colon == std::string::npos || !same_word(std::string_view(joined).substr(0, end), title))
+    lines.fail("'" + title + ": NUMBER' expected", "give the whole file");
   const size_t begin = joined.find_first_not_of(' ', colon + 1);
-  return lines.number(begin == std::string::npos ? std::string_view()
-                                                 : std::string_view(joined).substr(begin));
+  return begin == std::string::npos ? std::string() : joined.substr(begin);
+}
+
+/// "0.0333" -> 0.0001, "8.33e-3" -> 0.00001.
+double last_digit(const std::string& number) {
+  const size_t e = number.find_first_of("eE"), point = number.find('.');
+  const size_t end = std::min(e, number.size());
+  double power = point < end ? -static_cast<double>(end - point - 1) : 0;
+  if (e != std::string::npos) power += std::strtod(number.c_str() + e + 1, nullptr);
+  return std::pow(10.0, power);
 }
 
 void parse_frames(WordLines& lines, BvhFile& file) {
-  const double announced = header_number(lines, "frames");
+  const double announced = lines.number(header_value(lines, "frames"));
   if (!(announced >= 1) || announced != std::floor(announced))
     lines.fail("no frames announced", "give a file with at least one frame");
-  file.frame_time = header_number(lines, "frame time");
+  const std::string frame_time = header_value(lines, "frame time");
+  file.frame_time = lines.number(frame_time);
+  file.frame_time_digit = last_digit(frame_time);
   if (!(file.frame_time >= 1e-4 && file.frame_time <= 1.0))
     lines.fail("frame time " + std::to_string(file.frame_time) + " s is not usable",
                "write seconds per frame, between 0.0001 and 1");
@@ -177,10 +191,11 @@ void parse_frames(WordLines& lines, BvhFile& file) {
                  "correct 'Frames:'");
     const auto& words = lines.words();
     if (words.size() != file.channel_count)
-      lines.fail("frame " + std::to_string(file.frames.size()) + " has " +
-                     std::to_string(words.size()) + " values, the hierarchy has " +
-                     std::to_string(file.channel_count) + " channels",
-                 "give the whole file, one frame a line");
+      lines.fail(
+          "frame " + std::to_string(file.frames.size()) + " has " + std::to_string(words.size()) +
+              " values, the hierarchy has " + std::to_string(file.channel_count) + " channels",
+          words.size() == 2 * file.channel_count ? "write decimals with points, not with commas"
+                                                 : "give the whole file, one frame a line");
     std::vector<double>& frame = file.frames.emplace_back();
     frame.reserve(words.size());
     for (const std::string_view word : words) frame.push_back(lines.number(word));

@@ -15,6 +15,7 @@ struct BvhFile {
   std::vector<size_t> first_channel;           ///< per joint
   size_t channel_count = 0;
   double frame_time = 0;                    ///< seconds
+  double frame_time_digit = 0;              ///< what one of its last printed digit is worth
   std::vector<std::vector<double>> frames;  ///< channel_count values each; degrees, file units
 };
 

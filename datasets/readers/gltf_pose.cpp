@@ -18,14 +18,17 @@ struct Between {
   double t, seconds;
 };
 
+/// A key counts as reached a hair before its time: 1/30 s as a float is not 1/30 s, and a STEP
+/// track (or two keys at one time) would be a frame late. 0.1 ms is well below any frame.
 Between find_keys(const std::vector<float>& times, double seconds) {
-  const auto after = std::upper_bound(times.begin(), times.end(), seconds,
+  const double reached = seconds + 1e-4 + std::abs(seconds) * 1.2e-7;
+  const auto after = std::upper_bound(times.begin(), times.end(), reached,
                                       [](double s, float key) { return s < double{key}; });
   const auto b = static_cast<size_t>(after - times.begin());
   if (b == 0) return {0, 0, 0, 0};
   if (b == times.size()) return {b - 1, b - 1, 0, 0};
   const double from = double{times[b - 1]}, span = double{times[b]} - from;
-  return {b - 1, b, span > 0 ? (seconds - from) / span : 0, span};
+  return {b - 1, b, span > 0 ? std::max(0.0, (seconds - from) / span) : 0, span};
 }
 
 /// One key's value; `part` 0 in-tangent, 1 value, 2 out-tangent of a cubic track.
@@ -106,12 +109,30 @@ void gltf_skin(const Gltf& file, const GltfTransforms& nodes, Points& out) {
   }
 }
 
+namespace {
+
+/// A mirror turns a surface inside out: triangles whose bones mirror are turned round.
+void keep_outside_out(const Gltf& file, const GltfTransforms& nodes, std::vector<Triangle>& faces) {
+  std::vector<bool> mirrors;
+  for (const GltfBone& bone : file.bones)
+    mirrors.push_back(
+        (nodes[static_cast<size_t>(bone.node)] * bone.inverse_bind).linear().determinant() < 0);
+  if (std::find(mirrors.begin(), mirrors.end(), true) == mirrors.end()) return;
+  for (Triangle& face : faces) {
+    const uint32_t first = file.first_influence[static_cast<size_t>(face[0])];
+    if (mirrors[static_cast<size_t>(file.influences[first].bone)]) std::swap(face[1], face[2]);
+  }
+}
+
+}  // namespace
+
 Mesh gltf_mesh(const Gltf& file, const GltfTransforms& nodes) {
   if (file.vertices.empty())
     throw InputError(file.path, "holds no mesh", "export the character with its mesh");
   Mesh out;
   gltf_skin(file, nodes, out.vertices);
   out.faces = file.faces;
+  keep_outside_out(file, nodes, out.faces);
   return out;
 }
 

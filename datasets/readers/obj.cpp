@@ -1,5 +1,7 @@
 #include "datasets/readers/obj.h"
 
+#include <algorithm>
+
 #include "autograd/base/error.h"
 #include "datasets/readers/text.h"
 
@@ -36,11 +38,42 @@ int32_t parse_corner(std::string_view word, size_t vertices, const Where& where)
   return static_cast<int32_t>(zero_based);
 }
 
+/// Lines of an OBJ file; `\` at the end of a vertex or face joins the next one to it.
+class ObjLines {
+ public:
+  explicit ObjLines(std::string_view content) : lines_(content) {}
+  bool next(std::string_view& line) {
+    if (!lines_.next(line)) return false;
+    if (!line.ends_with('\\') || (line[0] != 'v' && line[0] != 'f')) return true;
+    joined_ = line;
+    while (joined_.ends_with('\\')) {
+      joined_.back() = ' ';
+      if (!lines_.next(line)) break;
+      joined_ += line;
+    }
+    line = joined_;
+    return true;
+  }
+  int64_t number() const { return lines_.number(); }
+
+ private:
+  text::Lines lines_;
+  std::string joined_;
+};
+
 }  // namespace
 
 Mesh parse_obj(std::string_view content, const std::string& path, const Vec3& origin) {
+  content = text::without_mark(content, path);
+  std::string with_ends;  // lines of old Macintosh programs end with CR alone
+  if (content.find('\n') == std::string_view::npos &&
+      content.find('\r') != std::string_view::npos) {
+    with_ends = content;
+    std::replace(with_ends.begin(), with_ends.end(), '\r', '\n');
+    content = with_ends;
+  }
   Mesh mesh;
-  text::Lines lines(content);
+  ObjLines lines(content);
   std::string_view line;
   std::vector<int32_t> corners;
   while (lines.next(line)) {

@@ -30,6 +30,13 @@ bool Lines::next(std::string_view& line) {
   return true;
 }
 
+std::string_view without_mark(std::string_view content, const std::string& path) {
+  if (content.starts_with("\xFF\xFE") || content.starts_with("\xFE\xFF"))
+    throw InputError(path, "is text as UTF-16", "save it as UTF-8, or as plain ASCII");
+  if (content.starts_with("\xEF\xBB\xBF")) content.remove_prefix(3);
+  return content;
+}
+
 std::string_view take_word(std::string_view& line) {
   size_t begin = 0;
   while (begin < line.size() && is_blank(line[begin])) ++begin;

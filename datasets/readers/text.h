@@ -24,6 +24,9 @@ class Lines {
   int64_t number_ = 0;
 };
 
+/// Without the byte order mark that some editors put before UTF-8. InputError for UTF-16.
+std::string_view without_mark(std::string_view content, const std::string& path);
+
 /// Cuts the next word off `line`; empty at its end.
 std::string_view take_word(std::string_view& line);
 /// The whole word as a number (nan and inf count as numbers), independent of the locale.

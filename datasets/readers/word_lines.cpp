@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "autograd/base/error.h"
+#include "datasets/readers/text.h"
 
 namespace restage {
 namespace {
@@ -13,7 +14,7 @@ char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + '
 constexpr size_t kMostWords = size_t{1} << 16;  // a line of more is no line of motion capture
 
 void split(std::string_view line, std::vector<std::string_view>& words) {
-  constexpr const char* kBlank = " \t\r\f\v";
+  constexpr const char* kBlank = " \t\f\v,";
   words.clear();
   for (size_t at = line.find_first_not_of(kBlank);
        at != std::string_view::npos && words.size() <= kMostWords;) {
@@ -25,11 +26,18 @@ void split(std::string_view line, std::vector<std::string_view>& words) {
 
 }  // namespace
 
+WordLines::WordLines(std::string_view text, const std::string& path)
+    : text_(text::without_mark(text, path)), path_(path) {
+  constexpr std::string_view kNothing("\0\x1a \t\r\n\f\v", 8);
+  text_ = text_.substr(0, text_.find_last_not_of(kNothing) + 1);  // npos + 1 is 0
+}
+
 bool WordLines::next() {
   while (at_ < text_.size()) {
-    const size_t end = std::min(text_.find('\n', at_), text_.size());
+    size_t end = at_;
+    while (end < text_.size() && text_[end] != '\n' && text_[end] != '\r') ++end;
     split(text_.substr(at_, end - at_), words_);
-    at_ = end + 1;
+    at_ = end + (text_.substr(end).starts_with("\r\n") ? 2 : 1);
     ++number_;
     if (!words_.empty()) return true;
   }
@@ -38,7 +46,7 @@ bool WordLines::next() {
 }
 
 void WordLines::fail(const std::string& wrong, const std::string& fix) const {
-  throw InputError(path_ + ":" + std::to_string(number_), wrong, fix);
+  throw InputError(number_ > 0 ? path_ + ":" + std::to_string(number_) : path_, wrong, fix);
 }
 
 double WordLines::number(std::string_view word) const {

@@ -7,16 +7,18 @@
 
 namespace restage {
 
-/// Lines of a text as words, with the line number for messages. The text must outlive it.
+/// Lines of a text as words, with the line number for messages. The text must outlive it. Lines end
+/// with LF, CR LF or CR, words with blanks or commas; a byte order mark and what editors of old
+/// leave at the end (NUL, ^Z) are no words. InputError for UTF-16.
 class WordLines {
  public:
-  WordLines(std::string_view text, const std::string& path) : text_(text), path_(path) {}
+  WordLines(std::string_view text, const std::string& path);
 
   /// Goes to the next line with words; false at the end.
   bool next();
   /// The words of the line (its first 65,537); never empty after a next() that was true.
   const std::vector<std::string_view>& words() const { return words_; }
-  /// InputError "file:line: what is wrong; how to mend it".
+  /// InputError "file:line: what is wrong; how to mend it"; before the first line without it.
   [[noreturn]] void fail(const std::string& wrong, const std::string& fix) const;
   /// The word as a finite number of at most 1e9; else fail().
   double number(std::string_view word) const;

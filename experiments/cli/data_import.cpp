@@ -1,4 +1,6 @@
 // restage data import: what users hold, into one data file.
+#include <cstdlib>
+#include <map>
 #include <memory>
 
 #include "autograd/base/error.h"
@@ -9,6 +11,15 @@
 
 namespace restage::cli {
 namespace {
+
+/// For options that are left out to have them found: what is given must mean something.
+std::string positive(const std::string& text) {
+  const double value = std::strtod(text.c_str(), nullptr);
+  return value > 0 ? "" : "is '" + text.substr(0, 40) + "', but must be above 0";
+}
+std::string not_negative(const std::string& text) {
+  return text.starts_with("-") ? "is '" + text.substr(0, 40) + "', but frames count from 0" : "";
+}
 
 struct ImportArguments {
   std::string source, out, up = "auto", facing = "auto";
@@ -27,11 +38,23 @@ std::string counts_text(const ImportSummary& done) {
   return out;
 }
 
+/// "3 files of other kinds: 2 .npz, 1 .txt".
+std::string ignored_text(const std::map<std::string, size_t>& ignored) {
+  size_t all = 0;
+  std::string kinds;
+  for (const auto& [end, count] : ignored) {
+    all += count;
+    kinds += (kinds.empty() ? "" : ", ") + std::to_string(count) + " " +
+             (end.empty() ? "without an ending" : end.substr(0, 20));
+  }
+  return std::to_string(all) + " files of other kinds: " + kinds.substr(0, 300);
+}
+
 int run_import(ImportArguments arguments, const Common& common) {
   MotionOptions& motion = arguments.options.motion;
   motion.rest.up = parse_axis(arguments.up, "--up");
   motion.rest.facing = parse_axis(arguments.facing, "--facing");
-  if (!(motion.scale >= 0 && motion.fps >= 0) || motion.scale > 1e6 || motion.fps > 1e4)
+  if (motion.scale > 1e6 || motion.fps > 1e4)
     throw InputError("", "--scale and --fps must be sensible positive numbers",
                      "leave them out to have them found");
   arguments.options.max_memory = common.max_memory;
@@ -43,6 +66,7 @@ int run_import(ImportArguments arguments, const Common& common) {
                 {"frames", done.frames},
                 {"sequences", done.sequences},
                 {"shapes", done.shapes},
+                {"ignored", done.ignored},
                 {"skipped", done.skipped},
                 {"reports", reports_json(done.reports)}});
     return 0;
@@ -51,6 +75,7 @@ int run_import(ImportArguments arguments, const Common& common) {
   print("wrote " + arguments.out + ": " + counts_text(done) + "\n");
   if (done.shapes > 0)
     print("left out " + std::to_string(done.shapes) + " files that hold a shape and no motion\n");
+  if (!done.ignored.empty()) print("ignored " + ignored_text(done.ignored) + "\n");
   for (const std::string& file : done.skipped) print("skipped " + file + "\n");
   return 0;
 }
@@ -80,14 +105,22 @@ void add_data_import(Program& program, CLI::App& group) {
   app.add_option("--license", options.license, "licence of the files");
   app.add_option("--subject", motion.subject, "who moves (default: by the file's name)");
   app.add_option("--split", motion.split, "train, validation or test");
-  app.add_option("--scale", motion.scale, "metres per unit of the file");
-  app.add_option("--fps", motion.fps, "true frame rate");
+  app.add_option("--scale", motion.scale, "metres per unit of the file")->check(positive);
+  app.add_option("--fps", motion.fps, "true frame rate")->check(positive);
   app.add_option("--up", given->up, "up axis of the file: auto, x, y, z, -x, -y or -z");
   app.add_option("--facing", given->facing,
                  "recordings: axis that the rest pose faces: auto, z, -y ...");
-  app.add_option("--rest-frame", motion.rest.frame, "recordings: a frame that is a T-pose");
+  app.add_option("--rest-frame", motion.rest.frame, "recordings: a frame that is a T-pose")
+      ->check(not_negative);
+  app.add_option(
+         "--drop-leading", motion.drop_leading,
+         "recordings: frames to leave out at the beginning (default: the T-pose in front of "
+         "the Daz release of CMU)")
+      ->check(not_negative);
   app.add_option("--profile", motion.profile,
-                 "recordings: bone names, a known family or a .yaml file");
+                 "recordings, characters: bone names, a known family or a .yaml file");
+  app.add_flag("--force", motion.force,
+               "recordings, characters: take also one whose left and right are exchanged");
   app.add_option("--asf", options.asf, "skeleton of .amc files (default: the one beside)");
   app.add_option("--clip", options.clip, "characters: this animation only");
   app.add_option("--body-model", options.body_model,

@@ -205,6 +205,7 @@ class Imported {
                   .string()) {
     ImportOptions how;
     how.body_model = options.body_model;
+    how.motion.force = true;
     how.max_memory = common.max_memory;
     reports_ = import_data(options.file, path_, how).reports;
   }

@@ -167,11 +167,8 @@ void judge_hands(Report& out, const std::vector<Joints>& frames) {
   if (mirrored + right == 0) return;
   const double share = static_cast<double>(std::max(mirrored, right)) / (mirrored + right);
   if (mirrored > right)
-    out.findings.push_back({"handedness", share > 0.9 ? Weight::wrong : Weight::note,
-                            "left and right are exchanged: a mirror image", share,
-                            "with toes forwards, the joints named left are on the right",
-                            "mirror it (x to -x) where it was made, or exchange the names; --fix "
-                            "cannot know which"});
+    out.findings.push_back({"handedness", share > 0.9 ? Weight::wrong : Weight::note, kMirrored,
+                            share, kMirroredBecause, kMirroredFix});
   else
     out.findings.push_back({"handedness", Weight::fact, "right-handed, left is left", share,
                             "with toes forwards, the joints named left are on the left", ""});
@@ -240,7 +237,9 @@ Report examine_hdf5(const Options& options) {
 Report examine_recording(const Options& options) {
   const std::string file = small_letters(options.path);
   const bool amc = file.ends_with(".amc") || file.ends_with(".amc.xz");
-  const MotionClip clip = amc ? read_amc(options.path, "", {}) : read_bvh(options.path);
+  MotionOptions how;
+  how.force = true;  // mirrored or not is a finding here
+  const MotionClip clip = amc ? read_amc(options.path, "", how) : read_bvh(options.path, how);
   Report out(amc ? "amc" : "bvh");
   for (const auto& [name, value] : clip.report.facts) out.facts[name] = value;
   out.facts["frames_at_30_fps"] = clip.motion.frames();

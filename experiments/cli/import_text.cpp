@@ -29,9 +29,9 @@ std::string block(const ImportReport& report) {
 
 /// The first words of what matters most, in one line; remarks in lines of their own.
 std::string summary(const ImportReport& report) {
-  static const std::vector<std::string> shown = {"layout", "names", "units",     "scale",
-                                                 "up",     "rate",  "rest pose", "body model",
-                                                 "clips",  "points"};
+  static const std::vector<std::string> shown = {"layout", "names",  "units",     "scale",
+                                                 "up",     "rate",   "rest pose", "body model",
+                                                 "clips",  "points", "beginning"};
   std::string text = report.file + ":";
   for (const auto& [name, value] : report.facts) {
     if (std::find(shown.begin(), shown.end(), name) == shown.end()) continue;

@@ -36,10 +36,10 @@ JOINTS = [(0, .95, 0), (.09, .88, 0), (-.09, .88, 0), (0, 1.06, 0), (.1, .48, .0
           (-.44, 1.41, 0), (.7, 1.41, 0), (-.7, 1.41, 0)] + [(.8, 1.41, 0)] * 15 + [(-.8, 1.41, 0)] * 15
 
 
-def smplh():
+def smplh(size=1):
     n = len(JOINTS)
     eye = [float(i == j) for i in range(n) for j in range(n)]
-    return npz(v_template=npy((n, 3), [x for p in JOINTS for x in p]), shapedirs=npy((n, 3, 2), [.01] * (6 * n)),
+    return npz(v_template=npy((n, 3), [size * x for p in JOINTS for x in p]), shapedirs=npy((n, 3, 2), [.01] * (6 * n)),
                J_regressor=npy((n, n), eye), weights=npy((n, n), eye), f=npy((1, 3), [0, 1, 2], "<i4"),
                kintree_table=npy((2, n), PARENTS + list(range(n)), "<i4"))
 
@@ -88,13 +88,15 @@ class Arrays(CliTest):
         self.assertEqual(self.json("data", "inspect", "b.h5")["counts"]["bodies"], 2)
         self.assertEqual(self.json("data", "verify", "b.h5")["problems"], [])
         self.bad_input(["data", "import", "SMPLH_MALE.npz", "--betas", "none.npz", "--out", "x.h5"], "none.npz")
+        for size in (10, 0.01):
+            self.bad_input(["data", "import", self.write("big.npz", smplh(size)), "--out", "x.h5"], "big.npz", "no person's size")
 
     def test_scans(self):
         self.write("walk.npz", npz(points=cloud(7)))
         self.assertIn("1 scan sequences, 4 frames", self.done("data", "import", "walk.npz", "--fps", 60, "--out", "s.h5"))
         self.assertEqual(self.json("data", "inspect", "s.h5")["counts"]["frames"], 4)
         for f in (1, 2, 3):
-            self.ply("scans/take1/%d.ply" % f, [(f, 0, 0), (0, f, 0)])
+            self.ply("scans/take1/%d.ply" % f, [(f, 0, 0)] + [(20 * (i % 9), 10 * i, 20 * i) for i in range(80)])
         found = self.json("data", "import", "scans", "--scale", 0.001, "--up", "z", "--out", "t.h5")
         self.assertEqual((found["sequences"], found["frames"]), (1, 3))
         self.assertIn("--scale", found["reports"][0]["facts"]["scale"])
@@ -109,7 +111,7 @@ class Arrays(CliTest):
             self.assertEqual([f["source"] for f in found["frames"]], [name + ":0", name + ":1"])
 
     def test_memory_limit(self):
-        self.write("bomb.npz", npz(points=npy((1, 300000, 3), [0.0] * 900000)))
+        self.write("bomb.npz", npz(points=npy((1, 300000, 3), [i / 180 for i in range(297)] * 3030 + [0.0] * 90)))
         self.bad_input(["data", "import", "bomb.npz", "--max-memory", "2MB", "--out", "x.h5"], "--max-memory")
         self.done("data", "import", "bomb.npz", "--max-memory", "8MB", "--out", "x.h5")
         for wrong in ("much", "-1", "4XB", "", "1e99GB", "10"):

@@ -86,6 +86,42 @@ class Gltf(CliTest):
         self.bad_input(["data", "import", "hero.glb", "--out", "x.h5", "--fps", "24"], "--fps")
         self.bad_input(["data", "import", "hero.glb", "--out", "x.h5", "--rest-frame", "0"], "--rest-frame")
 
+    def test_no_skin_is_no_character(self):
+        loose = self.change("loose.glb", lambda r: [node.pop("skin", None) for node in r["nodes"]])
+        self.bad_input(["data", "import", loose, "--out", "x.h5"], "loose.glb", "no skin")
+        bare = self.change("bare.glb", lambda r: (r.pop("skins"), [node.pop("skin", None) for node in r["nodes"]]))
+        self.bad_input(["data", "import", bare, "--out", "x.h5"], "bare.glb", "no skin")
+
+    def test_a_profile_names_bones(self):
+        names = ["bone %d" % j for j in range(22)]
+        character(self.path("own.glb"), names)
+        self.bad_input(["data", "import", "own.glb", "--out", "x.h5"], "own.glb", "--profile")
+        self.write("own.yaml", "title: Own\njoints:\n" + "".join("  %s: %s\n" % pair for pair in zip(NAMES, names)))
+        facts = self.json("data", "import", "own.glb", "--profile", "own.yaml", "--out", "x.h5")["reports"][0]["facts"]
+        self.assertEqual(facts["names"], "Own (profile own)")
+        self.bad_input(["data", "import", "hero.glb", "--profile", "mixamo", "--out", "x.h5"], "hero.glb", "profile mixamo")
+        self.bad_input(["data", "import", "hero.glb", "--facing", "z", "--out", "x.h5"], "--facing")
+
+    def test_mirrored_by_a_scale(self):
+        def mirror(root):
+            above = next(i for i, node in enumerate(root["nodes"]) if node.get("name") == NAMES[0])
+            root["nodes"].append({"name": "mirror", "scale": [-1, 1, 1], "children": [above]})
+            roots = root["scenes"][0]["nodes"]
+            roots[roots.index(above)] = len(root["nodes"]) - 1
+        self.change("mirror.glb", mirror)
+        self.bad_input(["data", "import", "mirror.glb", "--out", "x.h5"], "mirror.glb", "left and right are exchanged")
+        self.assertEqual(self.json("data", "import", "mirror.glb", "--force", "--out", "x.h5")["bodies"], 1)
+
+    def test_inches(self):
+        def inches(root):
+            above = next(i for i, node in enumerate(root["nodes"]) if node.get("name") == NAMES[0])
+            root["nodes"].append({"name": "inches", "scale": [39.37] * 3, "children": [above]})
+            roots = root["scenes"][0]["nodes"]
+            roots[roots.index(above)] = len(root["nodes"]) - 1
+        self.change("inches.glb", inches)
+        facts = self.json("data", "import", "inches.glb", "--out", "x.h5")["reports"][0]["facts"]
+        self.assertIn("0.0254 m (inches by the leg", facts["units"])
+
     def test_clips_are_of_gltf_files(self):
         self.write("walk.bvh", "HIERARCHY\n")
         self.bad_input(["data", "import", "walk.bvh", "--out", "x.h5", "--clip", "walk"], "--clip")

@@ -1,6 +1,7 @@
 // Scan sequences from files, folders and trees of folders: which frames, which rate, which units.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 
 #include "datasets/importers/import.h"
@@ -26,14 +27,30 @@ std::string fact(const ImportReport& report, const std::string& name) {
   return "";
 }
 
-/// F frames of two points; x of the first is the frame's number.
+/// A person of 80 points, and in front of them any other.
+Points person(const Point& first, float unit = 1) {
+  Points out{first};
+  for (int i = 1; i < 80; ++i) {
+    const auto x = static_cast<float>(i);
+    out.push_back(unit * Point(0.2f * std::sin(x), 0.02f * x, 0.1f * std::cos(x)));
+  }
+  return out;
+}
+
+std::vector<float> flat(const Points& points) {
+  std::vector<float> out;
+  for (const Point& p : points) out.insert(out.end(), {p.x(), p.y(), p.z()});
+  return out;
+}
+
+/// F frames; x of the first point is the frame's number.
 std::string numbered(int64_t frames) {
   std::vector<float> values;
   for (int64_t f = 0; f < frames; ++f) {
-    const float two_points[] = {static_cast<float>(f), 1, 2, 3, 4, 5};
-    values.insert(values.end(), std::begin(two_points), std::end(two_points));
+    const std::vector<float> frame = flat(person({static_cast<float>(f), 1, 2}));
+    values.insert(values.end(), frame.begin(), frame.end());
   }
-  return npy<float>({frames, 2, 3}, values);
+  return npy<float>({frames, 80, 3}, values);
 }
 
 /// The numbers of the frames that were taken.
@@ -75,8 +92,9 @@ TEST(ImportersScans, TheNearestFrameInTimeIsTakenAndReported) {
 
 TEST(ImportersScans, UnitsAxesAndTheFilesOwnRate) {
   const TempDir dir;
-  write_bytes(dir / "s.npz", npz({{"points", npy<double>({1, 1, 3}, {1000, 2000, 3000})},
-                                  {"fps", npy<double>({}, {60})}}));
+  write_bytes(dir / "s.npz",
+              npz({{"points", npy<float>({1, 80, 3}, flat(person({1000, 2000, 3000}, 1000)))},
+                   {"fps", npy<double>({}, {60})}}));
   ImportOptions options;
   options.motion.scale = 0.001;
   options.motion.rest.up = Axis::z;
@@ -101,7 +119,7 @@ TEST(ImportersScans, TreesOfFolders) {
     std::filesystem::create_directories(dir / name);
     return dir / name + "/";
   };
-  const auto mesh = [](float x) { return Mesh{{{x, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}}; };
+  const auto mesh = [](float x) { return Mesh{person({x, 0, 0}), {{0, 1, 2}}}; };
   // As 4D-DRESS: subject/outfit/take/what/frames, and its pickles.
   for (const char* take : {"Take10", "Take9"}) {
     const std::string scans = folder(std::string("tree/00122/Inner/") + take + "/Scans");
@@ -117,7 +135,8 @@ TEST(ImportersScans, TreesOfFolders) {
                 npz({{"pose", npy<float>({72}, std::vector<float>(72, 0))},
                      {"transl", npy<float>({3}, {0, 0, 0})},
                      {"v_cano", npy<float>({1, 3}, {9, 9, 9})},
-                     {"v_posed", npy<float>({1, 3}, {200.f + static_cast<float>(f), 0, 0})}}));
+                     {"v_posed",
+                      npy<float>({80, 3}, flat(person({200.f + static_cast<float>(f), 0, 0})))}}));
   write_bytes(cape + "notes.npz", npz({{"x", npy<double>({1}, {1})}}));
   write_bytes(cape + "broken.npz", "PK");
   // And a sequence in one file.
@@ -135,7 +154,7 @@ TEST(ImportersScans, TreesOfFolders) {
   EXPECT_HAS(summary.reports[0].file, "Take9/Scans");
   EXPECT_HAS(summary.reports[1].file, "Take10/Scans");
   EXPECT_HAS(summary.reports[3].file, "walk.npy");
-  EXPECT_EQ(fact(summary.reports[0], "points"), "3");
+  EXPECT_EQ(fact(summary.reports[0], "points"), "80");
   ASSERT_EQ(summary.skipped.size(), 3u);
   EXPECT_HAS(summary.skipped[0], "2 pickles");
   EXPECT_HAS(summary.skipped[1], "broken.npz: is no zip archive");
@@ -145,7 +164,7 @@ TEST(ImportersScans, TreesOfFolders) {
 TEST(ImportersScans, ABrokenFrameIsAnErrorAndLeavesNothing) {
   const TempDir dir;
   std::filesystem::create_directories(dir / "in");
-  write_ply(dir / "in/1.ply", Mesh{{{0, 0, 0}}, {}});
+  write_ply(dir / "in/1.ply", Mesh{person({0, 0, 0}), {}});
   write_bytes(dir / "in/2.ply", "ply\n");
   EXPECT_HAS(error_of([&] { import_data(dir / "in", dir / "o.h5"); }), "2.ply");
   EXPECT_EQ(test::names_in(dir.path()), std::vector<std::string>{"in"});

@@ -167,6 +167,38 @@ TEST(ReadersGltf, KeysAreHeldSteppedAndSplined) {
   EXPECT_THROW(animate("SPIRAL", {0, 0, 0, 4, 0, 0}), InputError);
 }
 
+TEST(ReadersGltf, AKeyIsReachedInItsOwnFrame) {
+  GlbParts parts = triangle();
+  std::vector<float> times, values;
+  for (int k = 0; k < 900; ++k) {
+    times.push_back(static_cast<float>(k / 30.0));  // as a float, often later than k / 30
+    values.insert(values.end(), {static_cast<float>(k), 0, 0});
+  }
+  parts.root["animations"] = {
+      {{"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}}}},
+       {"samplers",
+        {{{"input", parts.floats(times, "SCALAR", 1)},
+          {"output", parts.floats(values, "VEC3", 3)},
+          {"interpolation", "STEP"}}}}}};
+  const Gltf file = parse_gltf(parts.glb(), "t.glb");
+  for (int k = 0; k < 900; ++k)
+    ASSERT_EQ(gltf_pose(file, file.clips[0], k / 30.0)[0].translation().x(), k);
+  EXPECT_EQ(gltf_pose(file, file.clips[0], 7.9 / 30)[0].translation().x(), 7);
+}
+
+TEST(ReadersGltf, AMirrorDoesNotTurnTheSurfaceInsideOut) {
+  GlbParts parts = triangle();
+  const auto normal = [&] {
+    const Gltf file = parse_gltf(parts.glb(), "t.glb");
+    const Mesh mesh = gltf_mesh(file, gltf_rest(file));
+    const auto at = [&](size_t k) { return mesh.vertices[static_cast<size_t>(mesh.faces[0][k])]; };
+    return (at(1) - at(0)).cross(at(2) - at(0)).z();
+  };
+  const float before = normal();
+  parts.root["nodes"][0]["scale"] = {-1, 1, 1};
+  EXPECT_EQ(normal(), before);
+}
+
 TEST(ReadersGltf, BuffersInTheTextAndBesideTheFile) {
   const std::string folder = ::testing::TempDir() + "readers_gltf";
   fs::remove_all(folder);

@@ -1,0 +1,73 @@
+// Which options belong to which kind of input (--force, a permission, goes with all).
+#include <algorithm>
+
+#include "autograd/base/error.h"
+#include "datasets/importers/import_detail.h"
+
+namespace restage {
+namespace {
+
+using Kinds = std::set<InputKind>;
+
+struct Given {
+  const char* option;
+  bool given;
+  Kinds takers;
+  const char* whose;
+};
+
+std::vector<Given> all_of(const ImportOptions& options) {
+  using enum InputKind;
+  const MotionOptions& motion = options.motion;
+  const Kinds recordings = {bvh, amc}, moving = {bvh, amc, character};
+  const char *of_recordings = "BVH and AMC recordings",
+             *of_moving = "recordings and glTF characters";
+  return {
+      {"--license",
+       options.license != ImportOptions().license,
+       {bvh, amc, character, amass, body_model, scans},
+       "files whose licence is not known"},
+      {"--subject", !motion.subject.empty(), {bvh, amc, character, amass}, "motions"},
+      {"--split",
+       motion.split != MotionOptions().split,
+       {bvh, amc, character, amass, body_model},
+       "motions and bodies"},
+      {"--scale",
+       motion.scale > 0,
+       {bvh, amc, character, scans},
+       "recordings, glTF characters and scans"},
+      {"--fps",
+       motion.fps > 0,
+       {bvh, amc, amass, scans},
+       "recordings, AMASS motions and scans (glTF files state their key times)"},
+      {"--up",
+       motion.rest.up != Axis::automatic,
+       {bvh, amc, character, amass, scans},
+       "recordings, characters, AMASS motions and scans"},
+      {"--facing", motion.rest.facing != Axis::automatic, recordings, of_recordings},
+      {"--rest-frame", motion.rest.frame >= 0, recordings, of_recordings},
+      {"--drop-leading", motion.drop_leading >= 0, recordings, of_recordings},
+      {"--profile", !motion.profile.empty(), moving, of_moving},
+      {"--asf", !options.asf.empty(), {amc}, "AMC recordings"},
+      {"--clip", !options.clip.empty(), {character}, "glTF characters"},
+      {"--body-model", !options.body_model.empty(), {amass}, "AMASS motions"},
+      {"--betas", !options.betas.empty(), {body_model}, "body models"},
+      {"--garment", !options.garment.empty(), {data_folder}, "data folders"},
+  };
+}
+
+}  // namespace
+
+void check_options(const Kinds& kinds, const std::string& source, const ImportOptions& options) {
+  for (const Given& one : all_of(options)) {
+    const bool taken = std::any_of(kinds.begin(), kinds.end(),
+                                   [&](InputKind kind) { return one.takers.count(kind) > 0; });
+    if (one.given && !taken)
+      throw InputError(
+          source,
+          std::string("has nothing to do with ") + one.option + ", which is for " + one.whose,
+          std::string("leave ") + one.option + " out");
+  }
+}
+
+}  // namespace restage
