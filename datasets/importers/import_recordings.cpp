@@ -1,9 +1,11 @@
 // import_data() of moving skeletons: BVH and ASF/AMC recordings, rigged glTF characters.
 #include "autograd/base/error.h"
+#include "autograd/base/output_check.h"
 #include "datasets/importers/amc.h"
 #include "datasets/importers/bvh.h"
 #include "datasets/importers/gltf_character.h"
 #include "datasets/importers/import_detail.h"
+#include "datasets/readers/packed_text.h"
 #include "datasets/readers/word_lines.h"
 
 namespace restage {
@@ -14,7 +16,7 @@ bool is_a(const std::string& path, const std::string& ending) {
   return name.ends_with(ending) || name.ends_with(ending + ".xz");
 }
 
-void add_character(const std::string& file, const ImportOptions& options, DatasetWriter& writer,
+void add_character(const std::string& file, const ImportOptions& options, ImportWriter& writer,
                    ImportSummary& summary) {
   if (options.motion.fps > 0 || options.motion.rest.frame >= 0)
     throw InputError(file,
@@ -28,21 +30,19 @@ void add_character(const std::string& file, const ImportOptions& options, Datase
   how.split = options.motion.split;
   how.action = options.motion.action;
   Character character = read_character(file, how);
-  if (character.body) {
-    writer.add(*character.body);
-    ++summary.bodies;
-  }
-  for (const Motion& motion : character.motions) add_motion(motion, writer, summary);
+  std::vector<Body> bodies;
+  if (character.body) bodies.push_back(std::move(*character.body));
+  writer.add(file, bodies, character.motions);
   summary.reports.push_back(std::move(character.report));
 }
 
-void add_recording(const std::string& file, const ImportOptions& options, DatasetWriter& writer,
+void add_recording(const std::string& file, const ImportOptions& options, ImportWriter& writer,
                    ImportSummary& summary) {
   if (!options.clip.empty())
     throw InputError(file, "has no clips to choose from", "leave --clip out");
   MotionClip clip = is_a(file, ".amc") ? read_amc(file, options.asf, options.motion)
                                        : read_bvh(file, options.motion);
-  add_motion(clip.motion, writer, summary);
+  writer.add(file, {}, {std::move(clip.motion)});
   summary.reports.push_back(std::move(clip.report));
 }
 
@@ -54,16 +54,20 @@ bool is_recording_name(const std::string& path) {
 
 ImportSummary import_recordings(const std::vector<std::string>& files, const std::string& source,
                                 const std::string& out, const ImportOptions& options) {
-  asked_profile(options.motion);  // a mistake there is not the files'
+  // Mistakes in the options are not the files'.
+  asked_profile(options.motion);
+  if (!options.asf.empty()) parse_asf(read_packed_text(options.asf), options.asf);
+  std::vector<std::string> inputs = files;
+  for (const char* part : {".asf", ".asf.xz", ".bin"})  // what recordings and characters refer to
+    if (lower_case(out).ends_with(part)) inputs.push_back(out);
+  check_output(out, inputs);
   ImportSummary summary;
-  DatasetWriter writer(out, file_info(source, options));
+  ImportWriter writer(out, file_info(source, options), summary);
   add_each(files, summary, [&](const std::string& file) {
     is_gltf_name(file) ? add_character(file, options, writer, summary)
                        : add_recording(file, options, writer, summary);
   });
-  if (summary.bodies + summary.motions == 0)
-    throw InputError(source, "none of its " + std::to_string(files.size()) + " files could be used",
-                     "import one alone to see why");
+  check_any(summary, source);
   writer.commit();
   return summary;
 }
