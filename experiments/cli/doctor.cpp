@@ -2,16 +2,14 @@
 // A file that is broken ends as bad input does anywhere else: one line, exit code 2. A new kind of
 // file: a function that examines it and a line in kKinds.
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <utility>
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "autograd/base/output_check.h"
 #include "datasets/doctor/examine.h"
 #include "datasets/importers/amc.h"
 #include "datasets/importers/bvh.h"
@@ -33,6 +31,7 @@ struct Options {
   std::string path, picture, fix, up, facing;
   std::optional<double> scale;
   bool target = false;
+  uint64_t max_memory = kMaxMemory;
 };
 
 /// What is said of any kind of file.
@@ -91,7 +90,7 @@ Report examine_mesh(const Options& options) {
 
 Report examine_sequence(const Options& options) {
   Report out("frames");
-  const auto source = open_frames(options.path);
+  const auto source = open_frames(options.path, {"", options.max_memory});
   Diagnosis d = examine_frames(*source, examine_options(options));
   out.facts["frames"] = d.frames;
   out.facts["fps"] = d.fps;
@@ -201,14 +200,9 @@ Report examine_config(const Options& options) {
 
 /// A few bytes from the start; InputError if the file cannot be read.
 std::string first_bytes(const std::string& path) {
-  errno = 0;
-  std::ifstream file(path, std::ios::binary);
-  char bytes[8] = {};
-  file.read(bytes, sizeof bytes);
-  if (file.bad() || (file.gcount() == 0 && errno != 0))
-    throw InputError(path, std::string("cannot be read (") + std::strerror(errno) + ")",
-                     "check the path");
-  return {bytes, static_cast<size_t>(file.gcount())};
+  FileStream file(path);
+  const std::vector<char> bytes = file.take(std::min<uint64_t>(8, file.size()));
+  return {bytes.begin(), bytes.end()};
 }
 
 Report examine_weights(const Options& options) {
@@ -294,10 +288,12 @@ bool mended_well(const Options& options) {
   Options again;
   again.path = options.fix;
   again.target = options.target;
+  again.max_memory = options.max_memory;
   return examine(again).usable();
 }
 
 int run_doctor(const Options& options, const Common& common) {
+  for (const std::string& out : {options.fix, options.picture}) check_output(out, {options.path});
   const Report found = examine(options);
   if (!found.diagnosis && (!options.picture.empty() || !options.fix.empty()))
     throw InputError(
@@ -305,13 +301,19 @@ int run_doctor(const Options& options, const Common& common) {
         "is of the kind '" + found.kind + "', which is neither drawn nor repaired here",
         "give a scan, a surface or a sequence of frames; restage data inspect --plot draws data "
         "files");
-  std::string sidecar;
+  // The picture takes its place last, so that nothing is left where the repair fails.
+  std::optional<AtomicFile> picture;
   if (!options.picture.empty()) {
-    const auto first = open_frames(options.path)->next();
-    write_picture(options.picture, options.path + ": " + found.kind, {first->points, first->faces},
-                  *found.diagnosis);
+    const auto first = open_frames(options.path, {"", options.max_memory})->next();
+    const std::string bytes = picture_of(options.picture, options.path + ": " + found.kind,
+                                         {first->points, first->faces}, *found.diagnosis);
+    picture.emplace(options.picture);
+    picture->write(bytes);
   }
-  if (!options.fix.empty()) sidecar = write_repaired(options.path, options.fix, *found.diagnosis);
+  std::string sidecar;
+  if (!options.fix.empty())
+    sidecar = write_repaired(options.path, options.fix, *found.diagnosis, options.max_memory);
+  if (picture) picture->commit();
   print_report(options, found, sidecar, common);
   return (options.fix.empty() ? found.usable() : mended_well(options)) ? 0 : 1;
 }
@@ -325,7 +327,10 @@ void add_doctor(Program& program) {
       "restage doctor scan.ply\nrestage doctor frames/ --json\n"
       "restage doctor hero.obj --target --picture sheet.png\nrestage doctor frames/ --fix mended/\n"
       "exit code: 0 usable, 1 read but not usable as it is, 2 not readable",
-      [options, &program] { return run_doctor(*options, program.common()); });
+      [options, &program] {
+        options->max_memory = program.common().max_memory;
+        return run_doctor(*options, program.common());
+      });
   app.add_option("FILE", options->path,
                  "HDF5, PLY, OBJ, BVH, safetensors, YAML, or a folder of frames")
       ->required();

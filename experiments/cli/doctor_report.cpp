@@ -131,8 +131,8 @@ std::string to_text(const Similarity& t) {
          digits(t.offset.z()) + "]\n";
 }
 
-void write_picture(const std::string& out, const std::string& title, const Mesh& mesh,
-                   const Diagnosis& d) {
+std::string picture_of(const std::string& out, const std::string& title, const Mesh& mesh,
+                       const Diagnosis& d) {
   if (!out.ends_with(".png")) throw InputError(out, "names no picture", "end --picture in .png");
   FigureSheetOptions options;
   options.cell_height = 360;
@@ -159,7 +159,7 @@ void write_picture(const std::string& out, const std::string& title, const Mesh&
   for (const Finding& f : d.findings)
     options.lines.push_back(std::string(name(f.weight)) + ": " + f.topic + ": " + f.what +
                             (f.weight != Weight::fact && !f.fix.empty() ? " -> " + f.fix : ""));
-  write_png(out, figure_sheet(figures, options));
+  return png_bytes(figure_sheet(figures, options));
 }
 
 // ---- repair ------------------------------------------------------------------------------------
@@ -198,11 +198,10 @@ class FrameSink {
   std::optional<FrameFolderWriter> folder_;
 };
 
-void write_frames(const std::string& path, FrameSink& sink, const Diagnosis& d) {
-  const auto source = open_frames(path);
+void write_frames(FrameSource& source, FrameSink& sink, const Diagnosis& d) {
   std::optional<Mesh> previous;
   int64_t sequence = 0;
-  for (int64_t i = 0; const auto frame = source->next(); ++i) {
+  for (int64_t i = 0; const auto frame = source.next(); ++i) {
     if (frame->sequence != sequence) {
       if (i > 0) sink.end_sequence();
       sequence = frame->sequence;
@@ -224,7 +223,8 @@ bool is_hdf5(const std::string& path) { return path.ends_with(".h5") || path.end
 
 }  // namespace
 
-std::string write_repaired(const std::string& path, const std::string& out, const Diagnosis& d) {
+std::string write_repaired(const std::string& path, const std::string& out, const Diagnosis& d,
+                           uint64_t max_memory) {
   if (!d.transform)
     throw InputError(path, "cannot be repaired: its up axis or its units cannot be told",
                      "say them with --up and --scale");
@@ -235,6 +235,15 @@ std::string write_repaired(const std::string& path, const std::string& out, cons
   info.provenance = "repaired by restage doctor from " + name_of(path);
   info.transform = note.dump();
   const double fps = d.fps > 0 ? d.fps / d.keep_every : kFps;
+  // Both files or none: the transform's is opened first and takes its place last.
+  std::optional<AtomicFile> sidecar;
+  const std::string sidecar_name =
+      out.ends_with(".h5") ? "" : out.substr(0, out.find_last_not_of('/') + 1) + ".transform.json";
+  if (!sidecar_name.empty()) {
+    note["fps"] = fps;
+    sidecar.emplace(sidecar_name);
+    sidecar->write(note.dump(2) + "\n");
+  }
   if (is_mesh_name(out)) {
     if (d.kind == "frames")
       throw InputError(out, "is one frame only", "give a folder or an .h5 file to --fix");
@@ -242,13 +251,10 @@ std::string write_repaired(const std::string& path, const std::string& out, cons
     out.ends_with("obj") || out.ends_with("OBJ") ? write_obj(out, mesh) : write_ply(out, mesh);
   } else {
     FrameSink sink(out, info, fps);
-    write_frames(path, sink, d);
+    write_frames(*open_frames(path, {"", max_memory}), sink, d);
   }
-  if (out.ends_with(".h5")) return "";
-  note["fps"] = fps;
-  const std::string sidecar = out.substr(0, out.find_last_not_of('/') + 1) + ".transform.json";
-  write_file_atomically(sidecar, note.dump(2) + "\n");
-  return sidecar;
+  if (sidecar) sidecar->commit();
+  return sidecar_name;
 }
 
 }  // namespace restage::cli

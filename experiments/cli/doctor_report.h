@@ -19,14 +19,15 @@ std::string to_text(const Finding& finding);
 std::string to_text(const Similarity& transform);
 
 /// Front, side and top of what was found, brought into our frame, and as it is: the person blue,
-/// stray points red, somebody or something else orange, marks for floor, height and facing.
-void write_picture(const std::string& out, const std::string& title, const Mesh& mesh,
-                   const Diagnosis& diagnosis);
+/// stray points red, somebody or something else orange, marks for floor, height and facing. The
+/// bytes of a PNG file that is to be called `out`.
+std::string picture_of(const std::string& out, const std::string& title, const Mesh& mesh,
+                       const Diagnosis& diagnosis);
 
 /// Writes the repaired file (X.ply, X.obj, X.h5, or a folder) and its transform: in an HDF5 file's
 /// attribute `transform`, else in the file returned, X.transform.json beside it; empty for HDF5.
-/// InputError if it cannot be told how to repair it.
+/// InputError if it cannot be told how to repair it; then nothing is written.
 std::string write_repaired(const std::string& path, const std::string& out,
-                           const Diagnosis& diagnosis);
+                           const Diagnosis& diagnosis, uint64_t max_memory);
 
 }  // namespace restage::cli
