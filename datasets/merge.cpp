@@ -5,6 +5,7 @@
 #include <map>
 
 #include "autograd/base/error.h"
+#include "autograd/base/output_check.h"
 #include "datasets/schema.h"
 #include "datasets/schema_detail.h"
 
@@ -44,13 +45,9 @@ class Plan {
   Plan(const std::vector<std::string>& files, const std::string& out, bool prefix)
       : prefix_(prefix) {
     if (files.size() < 2) throw InputError("", "one file is nothing to merge", "give two or more");
+    check_output(out, files);
     std::vector<std::string> licenses, provenances;
-    for (const std::string& file : files) {
-      std::error_code ignored;
-      if (fs::equivalent(file, out, ignored))
-        throw InputError(out, "is one of the files to merge", "write to another");
-      look_at(file, licenses, provenances);
-    }
+    for (const std::string& file : files) look_at(file, licenses, provenances);
     refuse(body_clashes_, "bodies");
     refuse(motion_clashes_, "motions");
     info.license = joined(licenses);
@@ -76,7 +73,10 @@ class Plan {
                        "give files that 'restage data build' or 'import' wrote");
     if (!has.motions.empty() && read_fps(file) != kFps)
       throw InputError(path, "has motions that are not at 30 fps", "import them again");
-    for (const std::string& name : has.bodies) note(path, name, bodies_, body_clashes_);
+    for (const std::string& name : has.bodies) {
+      note(path, name, bodies_, body_clashes_);
+      checked_split(file, "/bodies/" + name);
+    }
     for (const std::string& name : has.motions) {
       note(path, name, motions_, motion_clashes_);
       check_subject(path, file, "/motions/" + name);
@@ -91,10 +91,18 @@ class Plan {
     if (!fresh) clashes.push_back("'" + at->first + "' of " + at->second + " and " + path);
   }
 
+  static std::string checked_split(const h5::File& file, const std::string& object) {
+    const std::string split = file.text(object, "split").value_or("");
+    if (!is_split(split))
+      throw InputError(file.path() + ":" + object, "has the split '" + split.substr(0, 60) + "'",
+                       "import it again with --split train, validation or test");
+    return split;
+  }
+
   /// A subject in two splits would let a test meet a person that training has seen.
   void check_subject(const std::string& path, const h5::File& file, const std::string& motion) {
     const std::string subject = file.text(motion, "subject").value_or("");
-    const std::string split = file.text(motion, "split").value_or("");
+    const std::string split = checked_split(file, motion);
     if (subject.empty()) return;
     const std::string& first = splits_.emplace(subject, split).first->second;
     if (first != split)

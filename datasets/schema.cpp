@@ -48,6 +48,10 @@ void check_frames(const std::string& where, int64_t frames) {
 
 }  // namespace
 
+bool is_split(const std::string& name) {
+  return name == "train" || name == "validation" || name == "test";
+}
+
 h5::File create_schema_file(const std::string& path, const std::string& kind,
                             const FileInfo& info) {
   h5::File file = h5::File::create(path);
@@ -167,6 +171,12 @@ void ScanWriter::set_foreign_frame() {
 void ScanWriter::end_sequence() {
   const int64_t frames = static_cast<int64_t>(frame_offset_.size()) - 1;
   if (sequence_offset_.back() != frames) sequence_offset_.push_back(frames);
+}
+
+void ScanWriter::drop_sequence() {
+  frame_offset_.resize(static_cast<size_t>(sequence_offset_.back()) + 1);
+  points_.truncate(frame_offset_.back());
+  if (joints_) joints_->truncate(sequence_offset_.back());
 }
 
 void ScanWriter::commit() {

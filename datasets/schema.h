@@ -28,6 +28,9 @@ struct FileInfo {
 
 // ---- bodies and motions: one "data set file" holds either or both ------------------------------
 
+/// The three that bodies and motions may be in: "train", "validation", "test".
+bool is_split(const std::string& name);
+
 /// Equal face lists are stored once. InputError if two have the same id or an id has a '/'.
 void write_dataset(const std::string& path, const std::vector<Body>& bodies,
                    const std::vector<Motion>& motions, const FileInfo& info);
@@ -80,6 +83,8 @@ class ScanWriter {
   /// Says that units and axes of the points are not the project's.
   void set_foreign_frame();
   void end_sequence();  ///< the next cloud starts another sequence; the last one ends by itself
+  /// Takes back what was appended since the last end_sequence().
+  void drop_sequence();
   void commit();
 
  private:

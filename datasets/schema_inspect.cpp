@@ -93,7 +93,7 @@ void collect(std::vector<std::string>& problems, const std::function<void()>& ch
 }
 
 void check_split(const h5::File& file, const std::string& object, const std::string& split) {
-  if (split != "train" && split != "validation" && split != "test")
+  if (!is_split(split))
     throw InputError(file.path() + ":" + object, "has the split '" + split + "'",
                      "use train, validation or test");
 }

@@ -14,55 +14,80 @@
 namespace restage {
 namespace {
 
-[[noreturn]] void fail(const std::string& target, int code) {
-  const std::string why = std::strerror(code);
-  if (code == ENOENT || code == ENOTDIR || code == EACCES || code == EISDIR || code == EROFS)
-    throw InputError(target, "cannot be written (" + why + ")",
-                     "give a path in a folder you can write to");
-  throw WorkError(target + ": could not be written (" + why +
-                  "); free some space and run it again");
-}
+namespace fs = std::filesystem;
 
 void sync_path(const std::string& path, const std::string& target, int flags) {
   const int fd = ::open(path.c_str(), flags);
-  if (fd < 0) fail(target, errno);
+  if (fd < 0) throw_unwritable(target, errno);
   const int result = ::fsync(fd);
   const int code = errno;
   ::close(fd);
-  if (result != 0 && code != EINVAL) fail(target, code);
+  if (result != 0 && code != EINVAL) throw_unwritable(target, code);
+}
+
+/// Where a target leads: links stay, and what is no plain file is left alone.
+std::string place_of(const std::string& target) {
+  fs::path place = target;
+  std::error_code failed;
+  for (int links = 0; fs::is_symlink(place, failed); ++links) {
+    if (links == 40) throw_unwritable(target, ELOOP);
+    const fs::path next = fs::read_symlink(place, failed);
+    if (failed) throw_unwritable(target, failed.value());
+    place = place.parent_path() / next;
+  }
+  struct stat info {};
+  if (::stat(place.c_str(), &info) != 0) {
+    if (errno == ENOENT) return place.string();
+    throw_unwritable(target, errno);
+  }
+  if (S_ISDIR(info.st_mode)) throw_unwritable(target, EISDIR);
+  if (!S_ISREG(info.st_mode))
+    throw InputError(target, "is a device, pipe or socket", "give the name of a file");
+  return place.string();
 }
 
 }  // namespace
 
-AtomicFile::AtomicFile(std::string target) : target_(std::move(target)) {
-  if (std::filesystem::is_directory(target_)) fail(target_, EISDIR);
-  temporary_ = target_ + ".part" + std::to_string(::getpid());
-  const int fd = ::open(temporary_.c_str(), O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0644);
-  if (fd < 0) fail(target_, errno);
+void throw_unwritable(const std::string& target, int code) {
+  const std::string why = std::strerror(code);
+  if (code == ENAMETOOLONG)
+    throw InputError(target, "cannot be written (" + why + ")", "shorten it");
+  for (const int users : {ENOENT, ENOTDIR, EACCES, EPERM, EISDIR, EROFS, EEXIST, ELOOP})
+    if (code == users)
+      throw InputError(target, "cannot be written (" + why + ")",
+                       "give a path in a folder you can write to");
+  throw WorkError(target + ": could not be written (" + why +
+                  "); free some space and run it again");
+}
+
+AtomicFile::AtomicFile(std::string target)
+    : target_(std::move(target)), place_(place_of(target_)), temporary_(name_beside(place_)) {
+  const int fd = ::open(path().c_str(), O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0644);
+  if (fd < 0) throw_unwritable(target_, errno);
   ::close(fd);
 }
 
-AtomicFile::~AtomicFile() {
-  if (!done_) ::unlink(temporary_.c_str());
+void AtomicFile::write(std::string_view content) {
+  std::FILE* out = std::fopen(path().c_str(), "wb");
+  if (out == nullptr) throw_unwritable(target_, errno);
+  const size_t written = std::fwrite(content.data(), 1, content.size(), out);
+  const int code = errno;
+  const bool closed = std::fclose(out) == 0;
+  if (written != content.size()) throw_unwritable(target_, code);
+  if (!closed) throw_unwritable(target_, errno);
 }
 
 void AtomicFile::commit() {
-  sync_path(temporary_, target_, O_RDONLY);
-  if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail(target_, errno);
-  done_ = true;
-  const auto folder = std::filesystem::path(target_).parent_path();
+  sync_path(path(), target_, O_RDONLY);
+  if (::rename(path().c_str(), place_.c_str()) != 0) throw_unwritable(target_, errno);
+  temporary_.keep();
+  const fs::path folder = fs::path(place_).parent_path();
   sync_path(folder.empty() ? "." : folder.string(), target_, O_RDONLY | O_DIRECTORY);
 }
 
 void write_file_atomically(const std::string& target, std::string_view content) {
   AtomicFile file(target);
-  std::FILE* out = std::fopen(file.path().c_str(), "wb");
-  if (out == nullptr) fail(target, errno);
-  const size_t written = std::fwrite(content.data(), 1, content.size(), out);
-  const int code = errno;
-  const bool closed = std::fclose(out) == 0;
-  if (written != content.size()) fail(target, code);
-  if (!closed) fail(target, errno);
+  file.write(content);
   file.commit();
 }
 
@@ -72,6 +97,8 @@ std::string read_file(const std::string& path, uint64_t limit) {
     throw InputError(path, std::string("cannot be read (") + std::strerror(errno) + ")",
                      "check the path");
   if (S_ISDIR(info.st_mode)) throw InputError(path, "is a folder, not a file", "give a file");
+  if (!S_ISREG(info.st_mode))
+    throw InputError(path, "is a device, pipe or socket, not a file", "give a file");
   if (static_cast<uint64_t>(info.st_size) > limit)
     throw InputError(path, "is too large (" + std::to_string(info.st_size) + " bytes)",
                      "give a smaller file");

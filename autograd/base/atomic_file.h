@@ -6,28 +6,32 @@
 #include <string>
 #include <string_view>
 
+#include "autograd/base/temporary.h"
+
 namespace restage {
 
 /// A temporary path beside `target` that becomes `target` on commit() and is removed otherwise.
-/// Libraries that open files by name (HDF5) write to path(). Errors (no such folder: InputError;
-/// disk full: WorkError) name the target.
+/// Of a link, what it leads to is written and the link stays. Libraries that open files by name
+/// (HDF5) write to path(). Errors (no such folder, a device or pipe: InputError; disk full:
+/// WorkError) name the target.
 class AtomicFile {
  public:
   explicit AtomicFile(std::string target);
-  ~AtomicFile();
-  AtomicFile(const AtomicFile&) = delete;
-  AtomicFile& operator=(const AtomicFile&) = delete;
-  const std::string& path() const { return temporary_; }
-  void commit();  ///< fsync file, rename, fsync folder
+  const std::string& path() const { return temporary_.path(); }
+  void write(std::string_view content);  ///< all of it, closed again
+  void commit();                         ///< fsync file, rename, fsync folder
 
  private:
-  std::string target_, temporary_;
-  bool done_ = false;
+  std::string target_, place_;  ///< as it was given, and behind all links
+  Temporary temporary_;
 };
 
+/// InputError or WorkError, by the system's error number, for a `target` that cannot be written.
+[[noreturn]] void throw_unwritable(const std::string& target, int code);
 /// The whole content at once.
 void write_file_atomically(const std::string& target, std::string_view content);
-/// Reads a whole file; InputError if it cannot be read or has more than `limit` bytes.
+/// Reads a whole file; InputError if it cannot be read, is no plain file (a pipe could keep us
+/// waiting for ever) or has more than `limit` bytes.
 std::string read_file(const std::string& path, uint64_t limit = uint64_t{1} << 32);
 /// 64-bit FNV-1a based checksum of bytes, as 16 hex digits (detects damage, not malice).
 std::string checksum(std::string_view bytes);

@@ -5,6 +5,8 @@
 
 #include <atomic>
 
+#include "autograd/base/temporary.h"
+
 namespace restage {
 namespace {
 
@@ -15,6 +17,7 @@ static_assert(std::atomic<int>::is_always_lock_free, "used in a signal handler")
 void on_signal(int signal) {
   int none = 0;
   if (scopes.load() > 0 && caught.compare_exchange_strong(none, signal)) return;
+  remove_temporaries();
   _exit(128 + signal);
 }
 

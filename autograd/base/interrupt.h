@@ -1,5 +1,6 @@
-// SIGINT and SIGTERM. By default they end the program at once with exit code 130 or 143; inside a
-// StopScope they only set a flag, so that a training run can write a checkpoint first.
+// SIGINT and SIGTERM. By default they end the program at once with exit code 130 or 143, and what
+// it was writing is removed (temporary.h); inside a StopScope they only set a flag, so that a
+// training run can write a checkpoint first.
 #pragma once
 
 #include "autograd/base/error.h"

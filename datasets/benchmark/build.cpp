@@ -1,7 +1,5 @@
 #include "datasets/benchmark/build.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <map>
@@ -9,8 +7,8 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
-#include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
+#include "autograd/base/temporary.h"
 #include "datasets/benchmark/batches.h"
 #include "datasets/benchmark/characters.h"
 #include "datasets/benchmark/floor.h"
@@ -43,30 +41,24 @@ fs::path new_folder(const std::string& target) {
 /// A folder beside the wanted one that takes its place on commit() and is removed otherwise.
 class StagingFolder {
  public:
-  explicit StagingFolder(const std::string& target) : target_(new_folder(target)) {
+  explicit StagingFolder(const std::string& target)
+      : target_(new_folder(target)), temporary_(name_beside(target_.string())) {
     std::error_code failed;
-    path_ = target_.string() + ".tmp-" + std::to_string(::getpid());
-    fs::create_directory(path_, failed);
+    fs::create_directory(path(), failed);
     if (failed)
       throw InputError(target, "cannot be made a folder", "give a place you can write to");
   }
-  ~StagingFolder() {
-    std::error_code ignored;
-    if (!done_) fs::remove_all(path_, ignored);
-  }
-  StagingFolder(const StagingFolder&) = delete;
-  StagingFolder& operator=(const StagingFolder&) = delete;
-  std::string path() const { return path_.string(); }
+  const std::string& path() const { return temporary_.path(); }
   void commit() {
     std::error_code failed;
-    fs::rename(path_, target_, failed);
+    fs::rename(path(), target_, failed);
     if (failed) throw WorkError(target_.string() + ": cannot be put in place; is it in use?");
-    done_ = true;
+    temporary_.keep();
   }
 
  private:
-  fs::path target_, path_;
-  bool done_ = false;
+  fs::path target_;
+  Temporary temporary_;
 };
 
 class Builder {
@@ -174,7 +166,6 @@ class Builder {
         },
         [&](size_t, const Body& body) { writer.add(body); });
     for (const std::string& id : lists.clips) {
-      throw_if_stopped();
       Motion motion = grounded(id);
       motion.split = split;
       writer.add(motion);
@@ -274,7 +265,6 @@ std::set<std::string> inputs_of(const BenchmarkRecipe& recipe) {
 BenchmarkSummary build_benchmark(const BenchmarkRecipe& recipe, const std::string& recipe_text,
                                  const std::string& where, const std::string& data,
                                  const std::string& out) {
-  const StopScope stop;  // a signal takes the unfinished folder away
   check_recipe(recipe, where);
   Builder builder(recipe, where, data);
   StagingFolder staging(out);

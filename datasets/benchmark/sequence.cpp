@@ -5,6 +5,10 @@
 
 namespace restage {
 
+std::vector<std::string> sequence_files(const std::string& folder) {
+  return {folder + "/source.h5", folder + "/target.ply", folder + "/rest.h5", folder + "/truth.h5"};
+}
+
 void write_sequence(const Performance& performance, const FileInfo& info,
                     const std::string& folder) {
   ScanWriter scans(folder + "/source.h5", info);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "datasets/sampling/evaluation.h"
 #include "datasets/schema.h"
@@ -16,6 +17,9 @@ namespace restage {
 /// Frames are made on all threads, a few at a time: memory does not depend on their number.
 void write_sequence(const Performance& performance, const FileInfo& info,
                     const std::string& folder);
+
+/// The names that it writes to.
+std::vector<std::string> sequence_files(const std::string& folder);
 
 /// The last three of them. `source_to_world` (may be null): where the source's scans were put.
 void write_truth(const Performance& performance, const FileInfo& info, const std::string& folder,

@@ -251,6 +251,14 @@ void Dataset::append(std::span<const T> values) {
   shape_[0] += count;
 }
 
+void Dataset::truncate(int64_t rows) {
+  const Lock lock;
+  std::vector<hsize_t> size(shape_.begin(), shape_.end());
+  size[0] = static_cast<hsize_t>(rows);
+  if (H5Dset_extent(id_, size.data()) < 0) throw_write_error(path_);
+  shape_[0] = rows;
+}
+
 // ---- File --------------------------------------------------------------------------------------
 
 File::File(std::unique_ptr<State> state) : state_(std::move(state)) {}

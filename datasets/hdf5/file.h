@@ -47,6 +47,7 @@ class Dataset {
   /// sets made by File::create_appendable().
   template <class T>
   void append(std::span<const T> values);
+  void truncate(int64_t rows);  ///< keeps the first `rows` of what was appended
 
  private:
   friend class File;

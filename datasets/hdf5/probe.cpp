@@ -163,7 +163,8 @@ void limit(decltype(RLIMIT_AS) what, rlim_t soft, rlim_t hard) {
 [[noreturn]] void child(const char* path, rlim_t seconds) {
   const int nowhere = ::open("/dev/null", O_WRONLY);
   if (nowhere >= 0) ::dup2(nowhere, STDERR_FILENO);
-  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGABRT, SIGALRM, SIGILL, SIGXCPU})
+  for (const int signal :
+       {SIGSEGV, SIGBUS, SIGFPE, SIGABRT, SIGALRM, SIGILL, SIGXCPU, SIGINT, SIGTERM})
     std::signal(signal, SIG_DFL);
   limit(RLIMIT_CORE, 0, 0);
   limit(RLIMIT_CPU, seconds, seconds + 1);  // SIGXCPU first, then SIGKILL

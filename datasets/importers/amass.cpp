@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "autograd/base/error.h"
+#include "datasets/importers/import_detail.h"
 #include "datasets/importers/source_motion.h"
 #include "datasets/readers/array_frames.h"
 #include "datasets/readers/folders.h"
@@ -68,6 +69,16 @@ SmplFamily family_of(const Npz& file, const NpyHeader& poses, ImportReport& repo
       "AMASS has [F, 156] (SMPL-H) and [F, 165] (SMPL-X)");
 }
 
+/// 0 where there is no single number; some files keep it as a Python object.
+double number_of(const Npz& file, const char* name) {
+  try {
+    const NpyArray array = file.array(name);
+    return array.is_text() || array.size() != 1 ? 0 : array[0];
+  } catch (const InputError&) {
+    return 0;
+  }
+}
+
 /// The file's rate; a hair beside a whole number means that number.
 double rate_of(const Npz& file, double wanted, std::string& from) {
   from = "--fps";
@@ -75,10 +86,10 @@ double rate_of(const Npz& file, double wanted, std::string& from) {
   for (const char* name : kRates) {
     if (!file.has(name)) continue;
     from = name;
-    const NpyArray array = file.array(name);
-    const double fps = array.is_text() || array.size() != 1 ? 0 : array[0];
+    const double fps = number_of(file, name);
     if (!(fps >= 1 && fps <= 2000))
-      throw InputError(array.where(), "is no frame rate", "give the true one with --fps");
+      throw InputError(file.path() + ":" + name, "is no frame rate",
+                       "give the true one with --fps");
     return std::abs(fps / std::round(fps) - 1) < 5e-4 ? std::round(fps) : fps;
   }
   throw InputError(file.path(), "says no frame rate (mocap_framerate, mocap_frame_rate)",
@@ -182,6 +193,8 @@ BodyModels::BodyModels(const std::string& path, uint64_t max_memory)
     : path_(path), max_memory_(max_memory) {
   std::error_code ignored;
   const bool folder = fs::is_directory(path, ignored);
+  if (is_pickle_name(path)) refuse_pickle(path);
+  std::string first;  // reason why a file is none
   const std::vector<std::string> files =
       folder ? files_below(path, is_npz_name) : std::vector<std::string>{path};
   for (const std::string& file : files) {
@@ -191,13 +204,18 @@ BodyModels::BodyModels(const std::string& path, uint64_t max_memory)
         throw InputError(file, "is no body model (it has " + list_of(archive.names()) + ")",
                          "give a SMPL, SMPL-H or SMPL-X model as published (.npz)");
       entries_.push_back({file, gender_of(file), smpl_family(archive)});
-    } catch (const InputError&) {
+    } catch (const InputError& error) {
       if (!folder) throw;  // a folder may hold other things too, such as MANO's hands
+      if (first.empty()) first = error.what();
     }
   }
-  if (entries_.empty())
-    throw InputError(path, "holds no SMPL, SMPL-H or SMPL-X model (.npz)",
-                     "give a model or a folder of them as --body-model");
+  if (!entries_.empty()) return;
+  const std::string none = "holds no SMPL, SMPL-H or SMPL-X model (.npz)";
+  if (!first.empty())
+    refuse_all(path, none + " among " + std::to_string(files.size()) + " files", first);
+  if (const auto pickles = files_below(path, is_pickle_name); !pickles.empty())
+    refuse_pickle(pickles[0]);
+  throw InputError(path, none, "give a model or a folder of them as --body-model");
 }
 
 const SmplModel& BodyModels::find(SmplFamily family, const std::string& gender,

@@ -27,7 +27,10 @@ std::string find_asf(const std::string& amc_path) {
     if (stem.starts_with(stem_of(asf)) && stem_of(asf).size() > stem_of(best).size()) best = asf;
   if (best.empty() && all.size() == 1) best = all[0];
   if (best.empty())
-    throw InputError(amc_path, "there is no skeleton for it in its folder",
+    throw InputError(amc_path,
+                     all.empty() ? "there is no skeleton (.asf) in its folder"
+                                 : "none of the " + std::to_string(all.size()) +
+                                       " skeletons (.asf) in its folder has a name it begins with",
                      "give one with --asf FILE.asf");
   return best;
 }

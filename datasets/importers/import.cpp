@@ -1,10 +1,12 @@
 #include "datasets/importers/import.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <set>
 
 #include "autograd/base/error.h"
-#include "autograd/base/log.h"
+#include "autograd/base/output_check.h"
 #include "autograd/base/parallel.h"
 #include "datasets/importers/cmu.h"
 #include "datasets/importers/import_detail.h"
@@ -18,10 +20,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void add_bodies(const std::string& folder, const std::string& garment, DatasetWriter& writer,
-                ImportSummary& summary) {
+void add_bodies(const std::string& folder, const std::string& garment, ImportWriter& writer) {
   const MakeHuman model(folder);
-  const std::vector<BodyRecipe> recipes = read_recipes(folder + "/bodies.csv");
+  const std::string list = folder + "/bodies.csv";
+  const std::vector<BodyRecipe> recipes = read_recipes(list);
   constexpr size_t kBatch = 16;  // built by all threads, written by one
   for (size_t begin = 0; begin < recipes.size(); begin += kBatch) {
     const size_t n = std::min(kBatch, recipes.size() - begin);
@@ -31,20 +33,23 @@ void add_bodies(const std::string& folder, const std::string& garment, DatasetWr
         bodies[static_cast<size_t>(i)] =
             model.build(recipes[begin + static_cast<size_t>(i)], garment);
     });
-    for (const Body& body : bodies) writer.add(body);
+    writer.add(list, bodies, {});
   }
-  summary.bodies += recipes.size();
 }
 
 ImportSummary import_data_folder(const std::string& folder, bool bodies, bool clips,
                                  const std::string& out, const ImportOptions& options) {
   check_options({InputKind::data_folder}, folder, options);
+  const std::string body = folder + "/body", cmu = folder + "/cmu/clips30.h5";
+  std::vector<std::string> inputs = {cmu, body + "/makehuman.h5", body + "/bodies.csv",
+                                     body + "/joints22.json"};
+  for (const char* ending : {".obj.gz", ".mhclo.gz"})
+    inputs.push_back(body + "/clothes/" + options.garment + ending);
+  check_output(out, inputs);
   ImportSummary summary;
-  DatasetWriter writer(out, data_folder_info(bodies, clips));
-  if (bodies) add_bodies(folder + "/body", options.garment, writer, summary);
-  if (clips)
-    for (const Motion& motion : import_cmu(folder + "/cmu/clips30.h5"))
-      add_motion(motion, writer, summary);
+  ImportWriter writer(out, data_folder_info(bodies, clips), summary);
+  if (bodies) add_bodies(body, options.garment, writer);
+  if (clips) writer.add(cmu, {}, import_cmu(cmu));
   writer.commit();
   return summary;
 }
@@ -71,14 +76,36 @@ ImportSummary import_file(const std::string& source, const std::string& out,
                           const ImportOptions& options) {
   if (is_recording_name(source)) return import_recordings({source}, source, out, options);
   if (is_array_name(source) || is_mesh_name(source)) return import_array_file(source, out, options);
-  if (source.ends_with(".pkl"))
-    throw InputError(source, "is a pickle, which can run code and is never read",
-                     "convert it to plain arrays (docs/data.md shows how)");
+  if (is_pickle_name(source)) refuse_pickle(source);
   if (source.ends_with(".asf") || source.ends_with(".asf.xz"))
     throw InputError(source, "is a skeleton without a motion",
                      "give an .amc file and this one with --asf");
   throw InputError(source, "is of no kind that can be imported, by its name",
                    "give .bvh, .amc, .glb, .npz, .npy, .ply or .obj files, or a folder of them");
+}
+
+/// What no file can make right is said before any is opened.
+void check_options(const ImportOptions& options) {
+  const MotionOptions& motion = options.motion;
+  if (!is_split(motion.split))
+    throw InputError("", "--split '" + motion.split.substr(0, 60) + "' is unknown",
+                     "give train, validation or test");
+  const Axis up = motion.rest.up, facing = motion.rest.facing;
+  if (up != Axis::automatic && facing != Axis::automatic &&
+      std::abs(vector_of(up).dot(vector_of(facing))) > 0.5)
+    throw InputError("", "nobody faces up or down: --facing lies along --up",
+                     "give --facing across --up");
+}
+
+/// All that the options name; what is found in a folder is checked where it is found.
+std::vector<std::string> inputs_of(const std::string& source, const ImportOptions& options) {
+  std::vector<std::string> out = options.betas;
+  std::error_code ignored;
+  if (fs::is_directory(options.body_model, ignored))
+    out = files_below(options.body_model, is_npz_name);
+  for (const std::string& path : {source, options.asf, options.motion.profile, options.body_model})
+    out.push_back(path);
+  return out;
 }
 
 }  // namespace
@@ -112,10 +139,57 @@ FileInfo file_info(const std::string& source, const ImportOptions& options) {
   return info;
 }
 
-void add_motion(const Motion& motion, DatasetWriter& writer, ImportSummary& summary) {
-  writer.add(motion);
-  ++summary.motions;
-  summary.frames += motion.frames();
+namespace {
+
+template <class T>
+void check_ids(const std::string& file, const std::vector<T>& entries, const std::string& what,
+               const std::map<std::string, std::string>& taken) {
+  std::set<std::string> own;
+  for (const T& entry : entries) {
+    const auto at = taken.find(entry.id);
+    if (at == taken.end() && own.insert(entry.id).second) continue;
+    throw InputError(file,
+                     "its " + what + " '" + entry.id.substr(0, 60) + "' has the name of one in " +
+                         (at == taken.end() ? "the same file" : at->second),
+                     "rename one of the two");
+  }
+}
+
+}  // namespace
+
+void ImportWriter::add(const std::string& file, const std::vector<Body>& bodies,
+                       const std::vector<Motion>& motions) {
+  check_ids(file, bodies, "body", bodies_);
+  check_ids(file, motions, "motion", motions_);
+  for (const Body& body : bodies) {
+    writer_.add(body);
+    bodies_.emplace(body.id, file);
+  }
+  for (const Motion& motion : motions) {
+    writer_.add(motion);
+    motions_.emplace(motion.id, file);
+    summary_.frames += motion.frames();
+  }
+  summary_.bodies += bodies.size();
+  summary_.motions += motions.size();
+}
+
+void refuse_all(const std::string& where, const std::string& what, const std::string& first) {
+  const size_t fix = first.rfind("; ");
+  throw InputError(where, what + ", the first: " + first.substr(0, fix),
+                   fix == std::string::npos ? "mend it" : first.substr(fix + 2));
+}
+
+void check_any(const ImportSummary& summary, const std::string& source) {
+  if (summary.bodies + summary.motions + summary.sequences > 0) return;
+  const std::string shapes = std::to_string(summary.shapes) + " files with a shape and no motion";
+  if (summary.skipped.empty())
+    throw InputError(source, "holds nothing but " + shapes,
+                     "import the body model and give them as --betas");
+  refuse_all(source,
+             "all " + std::to_string(summary.skipped.size()) + " files were skipped" +
+                 (summary.shapes > 0 ? " besides " + shapes : ""),
+             summary.skipped[0]);
 }
 
 void add_each(const std::vector<std::string>& files, ImportSummary& summary,
@@ -125,7 +199,6 @@ void add_each(const std::vector<std::string>& files, ImportSummary& summary,
       add(file);
     } catch (const InputError& error) {
       if (files.size() == 1) throw;
-      log_warning("skipped " + std::string(error.what()));
       summary.skipped.emplace_back(error.what());
     }
   }
@@ -137,6 +210,13 @@ void count_ignored(const std::string& folder, bool (*considered)(const std::stri
     if (!considered(path)) ++summary.ignored[fs::path(path).extension().string()];
 }
 
+bool is_pickle_name(const std::string& path) { return path.ends_with(".pkl"); }
+
+void refuse_pickle(const std::string& path) {
+  throw InputError(path, "is a pickle, which can run code and is never read",
+                   "convert it to plain arrays (docs/data.md shows how)");
+}
+
 bool is_importable(const std::string& source) {
   std::error_code ignored;
   return fs::is_directory(source, ignored) || is_recording_name(source) || is_array_name(source) ||
@@ -145,9 +225,12 @@ bool is_importable(const std::string& source) {
 
 ImportSummary import_data(const std::string& source, const std::string& out,
                           const ImportOptions& options) {
+  check_options(options);
   std::error_code ignored;
   if (!fs::exists(source, ignored))
-    throw InputError(source, "is not there", "give a file or a folder");
+    throw InputError(source, source.empty() ? "SOURCE is empty" : "is not there",
+                     "give a file or a folder");
+  check_output(out, inputs_of(source, options));
   return fs::is_directory(source, ignored) ? import_folder(source, out, options)
                                            : import_file(source, out, options);
 }

@@ -51,7 +51,8 @@ bool is_importable(const std::string& source);
 /// - a body model (.npz), giving bodies (smpl.h);
 /// - scans: an array or mesh file, or a tree of folders of them (scans.h).
 /// An option that a kind of input does not take is an InputError, never ignored.
-/// Unusable files of a folder are skipped with a warning, except frames within a scan sequence.
+/// Unusable files of a folder are skipped and listed, and so is a scan sequence of a tree with a
+/// frame that is unusable; if nothing is left, the first one's reason is the error.
 /// InputError: no such source, nothing usable in it, damaged data. WorkError: disk full.
 ImportSummary import_data(const std::string& source, const std::string& out,
                           const ImportOptions& options = {});

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "autograd/base/error.h"
+#include "autograd/base/output_check.h"
 #include "datasets/importers/amass.h"
 #include "datasets/importers/import_detail.h"
 #include "datasets/importers/scans.h"
@@ -53,12 +54,13 @@ ImportSummary import_amass_files(const std::vector<std::string>& files, const st
     throw InputError(source, "holds AMASS motions, whose skeletons are in a body model beside them",
                      "give your SMPL-H or SMPL-X model with --body-model MODEL.npz");
   checked_fps(options);
+  check_output(out, files);
   BodyModels models(options.body_model, options.max_memory);
   FileInfo info = file_info(source, options);
   info.provenance +=
       " (AMASS), skeletons of " + absolute_path(options.body_model).filename().string();
   ImportSummary summary;
-  DatasetWriter writer(out, info);
+  ImportWriter writer(out, info, summary);
   add_each(files, summary, [&](const std::string& path) {
     const Npz file(path, options.max_memory);
     if (is_amass_shape(file)) {
@@ -69,15 +71,10 @@ ImportSummary import_amass_files(const std::vector<std::string>& files, const st
       throw InputError(path, "holds no motion (it has " + list_of(file.names()) + ")",
                        "AMASS motions have poses and trans");
     ImportReport report;
-    add_motion(import_amass(file, models, amass_options(path, root, options), report), writer,
-               summary);
+    writer.add(path, {}, {import_amass(file, models, amass_options(path, root, options), report)});
     summary.reports.push_back(std::move(report));
   });
-  if (summary.motions == 0)
-    throw InputError(source,
-                     "none of its " + std::to_string(files.size()) + " NPZ files could be used (" +
-                         std::to_string(summary.shapes) + " hold a shape and no motion)",
-                     "import one alone to see why");
+  check_any(summary, source);
   writer.commit();
   return summary;
 }
@@ -98,7 +95,7 @@ ImportSummary import_model(const std::string& source, const std::string& out,
   SmplModel model(file);
   model.read_blend_shapes(file);
   ImportSummary summary;
-  DatasetWriter writer(out, file_info(source, options));
+  ImportWriter writer(out, file_info(source, options), summary);
   const std::vector<std::string> wanted =
       options.betas.empty() ? std::vector<std::string>{"zeros"} : options.betas;
   for (const std::string& name : wanted) {
@@ -121,8 +118,7 @@ ImportSummary import_model(const std::string& source, const std::string& out,
       Body body = model.body(people[i]);
       body.id = body_id(source, name, i, people.size());
       body.split = options.motion.split;
-      writer.add(body);
-      ++summary.bodies;
+      writer.add(name, {std::move(body)}, {});
     }
     summary.reports.push_back(std::move(report));
   }
@@ -146,12 +142,22 @@ ImportSummary import_scan_files(const std::string& source, const std::string& ou
         "give a data folder, BVH files, AMASS motions, a body model or scans");
   const ScanOptions scans{checked_fps(options), options.motion.scale, options.motion.rest.up,
                           options.max_memory};
+  for (const ScanSequence& sequence : sequences) check_output(out, sequence.files);
   ScanWriter writer(out, file_info(source, options));
   for (const ScanSequence& sequence : sequences) {
-    summary.frames +=
-        static_cast<size_t>(import_scans(sequence, scans, writer, summary.reports.emplace_back()));
-    ++summary.sequences;
+    try {
+      ImportReport report;
+      summary.frames += static_cast<size_t>(import_scans(sequence, scans, writer, report));
+      summary.reports.push_back(std::move(report));
+      ++summary.sequences;
+    } catch (const InputError& error) {
+      if (sequences.size() == 1) throw;
+      writer.drop_sequence();
+      summary.skipped.push_back(sequence.files.size() == 1 ? error.what()
+                                                           : sequence.name + ": " + error.what());
+    }
   }
+  check_any(summary, source);
   writer.commit();
   return summary;
 }

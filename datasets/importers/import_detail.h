@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <set>
 #include <string>
 #include <vector>
@@ -15,7 +16,7 @@ namespace restage {
 std::filesystem::path absolute_path(const std::filesystem::path& path);
 /// Licence as given, provenance by the source's name.
 FileInfo file_info(const std::string& source, const ImportOptions& options);
-void add_motion(const Motion& motion, DatasetWriter& writer, ImportSummary& summary);
+
 enum class InputKind { data_folder, bvh, amc, character, amass, body_model, scans };
 /// InputError for an option that none of these kinds takes: none is ignored without a word.
 void check_options(const std::set<InputKind>& kinds, const std::string& source,
@@ -23,8 +24,34 @@ void check_options(const std::set<InputKind>& kinds, const std::string& source,
 /// Counts the files below the folder that are not `considered`, by the ends of their names.
 void count_ignored(const std::string& folder, bool (*considered)(const std::string&),
                    ImportSummary& summary);
-/// Calls `add` for each file; of several, those that it throws an InputError for are skipped with a
-/// warning and listed.
+
+/// A data file that is filled from others. Of each of them all goes in or nothing.
+class ImportWriter {
+ public:
+  ImportWriter(const std::string& out, const FileInfo& info, ImportSummary& summary)
+      : writer_(out, info), summary_(summary) {}
+  /// What `file` holds, counted in the summary. InputError naming it, before anything is written,
+  /// if an id is taken.
+  void add(const std::string& file, const std::vector<Body>& bodies,
+           const std::vector<Motion>& motions);
+  void commit() { writer_.commit(); }
+
+ private:
+  DatasetWriter writer_;
+  ImportSummary& summary_;
+  std::map<std::string, std::string> bodies_, motions_;  ///< id to the file it came from
+};
+
+bool is_pickle_name(const std::string& path);
+[[noreturn]] void refuse_pickle(const std::string& path);
+
+/// InputError for several files, with the reason and the remedy of the first: its error's text.
+[[noreturn]] void refuse_all(const std::string& where, const std::string& what,
+                             const std::string& first);
+/// Of folders: InputError with the first file's reason if nothing came of any of them.
+void check_any(const ImportSummary& summary, const std::string& source);
+/// Calls `add` for each file; of several, those that it throws an InputError for are skipped and
+/// listed.
 void add_each(const std::vector<std::string>& files, ImportSummary& summary,
               const std::function<void(const std::string&)>& add);
 

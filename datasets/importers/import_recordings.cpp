@@ -5,10 +5,12 @@
 #include <set>
 
 #include "autograd/base/error.h"
+#include "autograd/base/output_check.h"
 #include "datasets/importers/amc.h"
 #include "datasets/importers/bvh.h"
 #include "datasets/importers/gltf_character.h"
 #include "datasets/importers/import_detail.h"
+#include "datasets/readers/packed_text.h"
 #include "datasets/readers/word_lines.h"
 
 namespace restage {
@@ -32,7 +34,7 @@ void check_file_options(const std::string& file, ImportOptions options) {
   check_options({kind_of(file)}, file, options);
 }
 
-void add_character(const std::string& file, const ImportOptions& options, DatasetWriter& writer,
+void add_character(const std::string& file, const ImportOptions& options, ImportWriter& writer,
                    ImportSummary& summary) {
   const std::optional<Profile> profile = asked_profile(options.motion);
   CharacterOptions how;
@@ -44,19 +46,17 @@ void add_character(const std::string& file, const ImportOptions& options, Datase
   how.split = options.motion.split;
   how.action = options.motion.action;
   Character character = read_character(file, how);
-  if (character.body) {
-    writer.add(*character.body);
-    ++summary.bodies;
-  }
-  for (const Motion& motion : character.motions) add_motion(motion, writer, summary);
+  std::vector<Body> bodies;
+  if (character.body) bodies.push_back(std::move(*character.body));
+  writer.add(file, bodies, character.motions);
   summary.reports.push_back(std::move(character.report));
 }
 
-void add_recording(const std::string& file, const ImportOptions& options, DatasetWriter& writer,
+void add_recording(const std::string& file, const ImportOptions& options, ImportWriter& writer,
                    ImportSummary& summary) {
   MotionClip clip = is_a(file, ".amc") ? read_amc(file, options.asf, options.motion)
                                        : read_bvh(file, options.motion);
-  add_motion(clip.motion, writer, summary);
+  writer.add(file, {}, {std::move(clip.motion)});
   summary.reports.push_back(std::move(clip.report));
 }
 
@@ -89,12 +89,18 @@ bool is_recording_name(const std::string& path) {
 
 ImportSummary import_recordings(const std::vector<std::string>& files, const std::string& source,
                                 const std::string& out, const ImportOptions& options) {
-  asked_profile(options.motion);  // a mistake there is not the files'
+  // Mistakes in the options are not the files'.
+  asked_profile(options.motion);
+  if (!options.asf.empty()) parse_asf(read_packed_text(options.asf), options.asf);
   std::set<InputKind> kinds;
   for (const std::string& file : files) kinds.insert(kind_of(file));
   check_options(kinds, source, options);
+  std::vector<std::string> inputs = files;
+  for (const char* part : {".asf", ".asf.xz", ".bin"})  // what recordings and characters refer to
+    if (lower_case(out).ends_with(part)) inputs.push_back(out);
+  check_output(out, inputs);
   ImportSummary summary;
-  DatasetWriter writer(out, file_info(source, options));
+  ImportWriter writer(out, file_info(source, options), summary);
   const std::map<std::string, std::string> ids = ids_by_place(files, source);
   add_each(files, summary, [&](const std::string& file) {
     check_file_options(file, options);
@@ -103,9 +109,7 @@ ImportSummary import_recordings(const std::vector<std::string>& files, const std
     is_gltf_name(file) ? add_character(file, how, writer, summary)
                        : add_recording(file, how, writer, summary);
   });
-  if (summary.bodies + summary.motions == 0)
-    throw InputError(source, "none of its " + std::to_string(files.size()) + " files could be used",
-                     "import one alone to see why");
+  check_any(summary, source);
   writer.commit();
   return summary;
 }

@@ -86,7 +86,8 @@ Mat3 facing_front(const Joints& rest, const Vec3& given, bool framed, const std:
   double yaw = std::atan2(left.z(), left.x());  // turning by +yaw about y takes `left` to +x
   if (!given.isZero()) {
     if (std::abs(given.y()) > 0.5)
-      throw InputError("", "a person cannot face up or down", "give --facing across --up");
+      throw InputError(path, "stands along the axis that --facing names",
+                       "give --facing across its up axis");
     if (given.cross(left).y() < 0)  // left is at the right hand of who faces there
       throw InputError(path, "for a person facing that way, its left joints are on the right",
                        "give the other --facing; if the file is mirrored, mend its names");

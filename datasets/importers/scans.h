@@ -33,7 +33,8 @@ std::vector<ScanSequence> find_scans(const std::string& path, uint64_t max_memor
 
 /// Appends a sequence to `out` in metres, y up and at 30 fps, in constant memory. Clouds cannot be
 /// interpolated: each frame is the nearest one in time, and the report says how many were left out
-/// or repeated. Faces are dropped. Returns the number of frames. InputError: see open_frames().
+/// or repeated. Faces are dropped. Returns the number of frames. InputError: see open_frames();
+/// the frames before it are in `out`, until its drop_sequence().
 int64_t import_scans(const ScanSequence& sequence, const ScanOptions& options, ScanWriter& out,
                      ImportReport& report);
 

@@ -10,6 +10,8 @@
 #include <optional>
 
 #include "autograd/base/error.h"
+#include "autograd/base/output_check.h"
+#include "autograd/base/temporary.h"
 #include "datasets/builtin/bodies.h"
 #include "datasets/doctor/shape.h"
 #include "datasets/importers/import.h"
@@ -200,33 +202,27 @@ std::vector<std::string> plot(const InspectOptions& options, const std::string& 
 class Imported {
  public:
   Imported(const InspectOptions& options, const Common& common)
-      : path_((std::filesystem::temp_directory_path() /
+      : file_((std::filesystem::temp_directory_path() /
                ("restage-inspect-" + std::to_string(::getpid()) + ".h5"))
                   .string()) {
     ImportOptions how;
     how.body_model = options.body_model;
     how.motion.force = true;
     how.max_memory = common.max_memory;
-    reports_ = import_data(options.file, path_, how).reports;
+    reports_ = import_data(options.file, file_.path(), how).reports;
   }
-  ~Imported() {
-    std::error_code ignored;
-    std::filesystem::remove(path_, ignored);
-  }
-  Imported(const Imported&) = delete;
-  Imported& operator=(const Imported&) = delete;
-
-  const std::string& path() const { return path_; }
+  const std::string& path() const { return file_.path(); }
   const std::vector<ImportReport>& reports() const { return reports_; }
 
  private:
-  std::string path_;
+  Temporary file_;
   std::vector<ImportReport> reports_;
 };
 
 int run_inspect(const InspectOptions& options, const Common& common) {
   if (!options.plot.empty() && !options.plot.ends_with(".png"))
     throw InputError(options.plot, "names no picture", "end --plot in .png");
+  check_output(options.plot, {options.file, options.body_model});
   if (std::filesystem::exists(options.file + "/manifest.json"))
     throw InputError(options.file, "is a folder that 'restage data build' made",
                      "inspect a file in it, or 'restage data verify' it");

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "autograd/base/error.h"
+#include "autograd/base/output_check.h"
 #include "datasets/benchmark/sequence.h"
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
@@ -28,6 +29,7 @@ size_t index_of(const std::vector<T>& list, const std::string& id, const std::st
 
 int run_perform(const PerformOptions& o, const Common& common) {
   const std::string& motion_file = o.motions.empty() ? o.bodies : o.motions;
+  for (const std::string& file : sequence_files(o.out)) check_output(file, {o.bodies, o.motions});
   Corpus corpus{read_bodies(o.bodies), read_motions(motion_file), "made by restage data perform",
                 ""};
   corpus.license = inspect(o.bodies).license;

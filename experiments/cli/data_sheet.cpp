@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "autograd/base/error.h"
+#include "autograd/base/output_check.h"
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
@@ -100,6 +101,7 @@ int run_sheet(const SheetArguments& a, const Common& common) {
   if (a.columns < 1 || a.columns > 64)
     throw InputError("", "--columns " + std::to_string(a.columns) + " is out of range",
                      "give a number from 1 to 64");
+  check_output(a.out, {a.input});
   FigureSheetOptions options;
   options.columns = a.columns;
   options.cell_height = 150;

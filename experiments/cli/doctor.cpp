@@ -3,16 +3,14 @@
 // file: a function that examines it and a line in kKinds.
 #include <algorithm>
 #include <cctype>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <utility>
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "autograd/base/output_check.h"
 #include "datasets/doctor/examine.h"
 #include "datasets/importers/amc.h"
 #include "datasets/importers/bvh.h"
@@ -37,6 +35,7 @@ struct Options {
   std::optional<std::string> fix;
   std::optional<double> scale;
   bool target = false;
+  uint64_t max_memory = kMaxMemory;
 };
 
 /// What is said of any kind of file.
@@ -134,7 +133,7 @@ Report examine_mesh(const Options& options) {
 
 Report examine_sequence(const Options& options) {
   Report out("frames");
-  auto source = open_frames(options.path);
+  auto source = open_frames(options.path, {"", options.max_memory});
   Diagnosis d = examine_frames(*source, examine_options(options));
   out.facts["frames"] = d.frames;
   out.facts["fps"] = d.fps;
@@ -259,14 +258,9 @@ Report examine_config(const Options& options) {
 
 /// A few bytes from the start; InputError if the file cannot be read.
 std::string first_bytes(const std::string& path) {
-  errno = 0;
-  std::ifstream file(path, std::ios::binary);
-  char bytes[8] = {};
-  file.read(bytes, sizeof bytes);
-  if (file.bad() || (file.gcount() == 0 && errno != 0))
-    throw InputError(path, std::string("cannot be read (") + std::strerror(errno) + ")",
-                     "check the path");
-  return {bytes, static_cast<size_t>(file.gcount())};
+  FileStream file(path);
+  const std::vector<char> bytes = file.take(std::min<uint64_t>(8, file.size()));
+  return {bytes.begin(), bytes.end()};
 }
 
 Report examine_weights(const Options& options) {
@@ -358,6 +352,7 @@ std::vector<Finding> still_wrong(const Options& options) {
   Options again;
   again.path = *options.fix;
   again.target = options.target;
+  again.max_memory = options.max_memory;
   if (options.scale) again.scale = 1;
   if (!options.up.empty()) again.up = "+y";
   if (!options.facing.empty()) again.facing = "+z";
@@ -368,6 +363,8 @@ std::vector<Finding> still_wrong(const Options& options) {
 
 int run_doctor(const Options& options, const Common& common) {
   if (options.fix) repair_kind(*options.fix);
+  check_output(options.fix.value_or(""), {options.path});
+  check_output(options.picture, {options.path});
   const Report found = examine(options);
   if (!found.diagnosis && (!options.picture.empty() || options.fix))
     throw InputError(
@@ -376,17 +373,21 @@ int run_doctor(const Options& options, const Common& common) {
         "give a scan, a surface or a sequence of frames; restage data inspect --plot draws data "
         "files");
   Written written;
+  std::optional<AtomicFile> picture;  // takes its place last: a repair that fails leaves nothing
   if (!options.picture.empty()) {
     const Diagnosis& d = *found.diagnosis;
     const std::string which = d.frames > 1 ? ", frame " + std::to_string(d.shown) : "";
-    write_picture(options.picture, options.path + ": " + found.kind + which,
-                  frame_of(found.subject, d.shown), d);
+    const std::string bytes = picture_of(options.picture, options.path + ": " + found.kind + which,
+                                         frame_of(found.subject, d.shown), d);
+    picture.emplace(options.picture);
+    picture->write(bytes);
     written.picture = options.picture;
   }
   if (options.fix) {
     written.fix = write_repaired(found.subject, *options.fix, *found.diagnosis);
     written.fix->still_wrong = still_wrong(options);
   }
+  if (picture) picture->commit();
   print_report(options, found, written, common);
   return (written.fix ? written.fix->still_wrong.empty() : found.usable()) ? 0 : 1;
 }
@@ -400,7 +401,10 @@ void add_doctor(Program& program) {
       "restage doctor scan.ply\nrestage doctor frames/ --json\n"
       "restage doctor hero.obj --target --picture sheet.png\nrestage doctor frames/ --fix mended/\n"
       "exit code: 0 usable, 1 read but not usable as it is, 2 not readable",
-      [options, &program] { return run_doctor(*options, program.common()); });
+      [options, &program] {
+        options->max_memory = program.common().max_memory;
+        return run_doctor(*options, program.common());
+      });
   app.add_option("FILE", options->path,
                  "HDF5, PLY, OBJ, BVH, safetensors, YAML, or a folder of frames")
       ->required();

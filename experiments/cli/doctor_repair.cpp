@@ -288,7 +288,7 @@ Repaired write_repaired(const Subject& subject, const std::string& out, const Di
       throw InputError(done.transform_file, "is a folder", "give another name to --fix");
     note["fps"] = kind == RepairKind::folder ? kFps : rate(d);
     side.emplace(done.transform_file);
-    write_file_atomically(side->path(), note.dump(2) + "\n");
+    side->write(note.dump(2) + "\n");
   }
   const auto sink = make_sink(subject, out, kind, info, d);
   Mender mend(out, d);

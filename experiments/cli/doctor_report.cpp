@@ -159,8 +159,8 @@ std::string to_text(const Repaired& repaired) {
   return text;
 }
 
-void write_picture(const std::string& out, const std::string& title, const Mesh& mesh,
-                   const Diagnosis& d) {
+std::string picture_of(const std::string& out, const std::string& title, const Mesh& mesh,
+                       const Diagnosis& d) {
   if (!out.ends_with(".png")) throw InputError(out, "names no picture", "end --picture in .png");
   FigureSheetOptions options;
   options.cell_height = 360;
@@ -189,7 +189,7 @@ void write_picture(const std::string& out, const std::string& title, const Mesh&
   for (const Finding& f : d.findings)
     options.lines.push_back(std::string(name(f.weight)) + ": " + f.topic + ": " + f.what +
                             (f.weight != Weight::fact && !f.fix.empty() ? " -> " + f.fix : ""));
-  write_png(out, figure_sheet(figures, options));
+  return png_bytes(figure_sheet(figures, options));
 }
 
 }  // namespace restage::cli

@@ -27,8 +27,9 @@ std::string to_text(const Similarity& transform, const std::string& of);
 std::string to_text(const Repaired& repaired);
 
 /// Front, side and top of what was found, brought into our frame, and as it is: the person blue,
-/// stray points red, somebody or something else orange, marks for floor, height and facing.
-void write_picture(const std::string& out, const std::string& title, const Mesh& mesh,
-                   const Diagnosis& diagnosis);
+/// stray points red, somebody or something else orange, marks for floor, height and facing. The
+/// bytes of a PNG file that is to be called `out`.
+std::string picture_of(const std::string& out, const std::string& title, const Mesh& mesh,
+                       const Diagnosis& diagnosis);
 
 }  // namespace restage::cli

@@ -4,6 +4,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "autograd/base/output_check.h"
 #include "datasets/benchmark/sequence.h"
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
@@ -216,10 +217,20 @@ std::pair<double, double> skeleton_errors(const ModelSet& models, const Corpus& 
                       sampler.clouds(evaluation_tposes(test, 8, clouds.tpose_heading, 2)))};
 }
 
+/// What --out gets: the table and one sequence.
+std::vector<std::string> result_files(const std::string& folder) {
+  if (folder.empty()) return {};
+  std::vector<std::string> out = sequence_files(folder);
+  out.push_back(folder + "/metrics.md");
+  return out;
+}
+
 int run_eval_run(const EvalOptions& options, const Common& common) {
   const std::string folder = options.run.substr(4);
   TrainConfig config;
   load_config(run_config_path(folder), {}, config);
+  for (const std::string& file : result_files(options.out))
+    check_output(file, {run_config_path(folder), weights_path(folder), config.data.source});
   const ModelSet models =
       load_models(weights_path(folder), {.skeleton = true, .smrm = true, .deformation = true});
   const Corpus test = load_corpus(config.data, "test");

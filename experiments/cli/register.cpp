@@ -2,8 +2,8 @@
 #include <memory>
 
 #include "autograd/base/error.h"
-#include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
+#include "autograd/base/output_check.h"
 #include "datasets/readers/frame_folder.h"
 #include "datasets/readers/mesh_io.h"
 #include "datasets/schema.h"
@@ -34,18 +34,17 @@ int run_register(const RegisterOptions& o, const Common& common) {
     throw InputError("", "--every is out of range", "give 1 or more frames");
   if (!o.out.ends_with(".h5"))
     throw InputError(o.out, "is of no kind that is written here", "end --out in .h5");
+  check_output(o.out, {o.source, o.target, o.rest});
   const auto frames = open_frames(o.source, {"", common.max_memory});
   Mesh target = read_mesh(o.target);
   const std::vector<Triangle> faces = target.faces;
   const auto vertices = static_cast<int64_t>(target.vertices.size());
   Registration registration(std::move(target), rest_joints(o.rest), o.target);
 
-  const StopScope stop;
   PredictionWriter writer(o.out, vertices, faces, FileInfo{},
                           frames->fps() / static_cast<double>(o.every));
   int64_t made = 0, sequence = 0, in_sequence = 0;
   while (const auto frame = frames->next()) {
-    throw_if_stopped();
     if (frame->sequence != sequence) {
       writer.end_sequence();
       registration.restart();

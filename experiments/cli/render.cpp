@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "autograd/base/error.h"
+#include "autograd/base/output_check.h"
 #include "experiments/cli/clips.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
@@ -27,6 +28,7 @@ void check(const RenderOptions& options) {
                      "give a number from 1 to 64");
   if (!(options.fps > 0) || options.fps > 1000)
     throw InputError("", "--fps is out of range", "give frames per second above 0");
+  check_output(options.out, {options.result, options.source, options.truth});
 }
 
 int run_render(const RenderOptions& options, const Common& common) {

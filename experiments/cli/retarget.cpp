@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "autograd/base/log.h"
+#include "autograd/base/output_check.h"
 #include "datasets/doctor/examine.h"
 #include "datasets/importers/gltf_character.h"
 #include "datasets/readers/frame_folder.h"
@@ -106,6 +107,7 @@ void check(const RetargetCommand& c) {
   if (extension && !c.out.ends_with(".glb") && !c.out.ends_with(".bvh") && !c.out.ends_with(".h5"))
     throw InputError(c.out, "is of no kind that can be written",
                      "end it in .glb, .bvh, .h5, or / for a folder");
+  check_output(c.out, {c.source, c.target, weights_path(c.weights)});
 }
 
 void to_metres(const RetargetCommand& c, Points& points) {

@@ -1,6 +1,8 @@
 // restage skeleton: joints of clouds.
+#include <filesystem>
 #include <memory>
 
+#include "autograd/base/output_check.h"
 #include "datasets/readers/frame_folder.h"
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
@@ -34,9 +36,19 @@ std::string text_of(const Joints& joints) {
   return out;
 }
 
+/// Frames of a folder too, as --out may have any name.
+std::vector<std::string> inputs_of(const SkeletonOptions& options) {
+  std::vector<std::string> out = {options.input};
+  std::error_code ignored;
+  if (std::filesystem::is_directory(options.input, ignored)) out = frame_files(options.input);
+  out.push_back(weights_path(options.weights));
+  return out;
+}
+
 int run_skeleton(const SkeletonOptions& options, const Common& common) {
   if (options.samples < 1 || options.samples > 256)
     throw InputError("", "--samples is out of range", "give a number from 1 to 256");
+  check_output(options.out, inputs_of(options));
   const ModelSet models = load_models(weights_path(options.weights), {.skeleton = true});
   const auto frames = open_frames(options.input, {"", common.max_memory});
   std::unique_ptr<PredictionWriter> writer;

@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "autograd/base/error.h"
+#include "autograd/base/output_check.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
 #include "nn/weights/bundle.h"
@@ -69,7 +70,9 @@ int report(const Transfer& t, const TensorFile& written, const Common& common) {
   return 0;
 }
 
+/// A file may be extended in place: --with and --out may be the same.
 int run_import(const Transfer& t, const Common& common) {
+  check_output(t.out, {t.from, t.map});
   TensorFile state = read_safetensors(t.from);
   ModelSizes sizes = exported_sizes(state, t.from);
   for (const std::string& size : t.sizes) {
@@ -91,6 +94,7 @@ int run_import(const Transfer& t, const Common& common) {
 }
 
 int run_export(const Transfer& t, const Common& common) {
+  check_output(t.out, {t.from});
   const TensorFile out = export_model(load_models(t.from, {}), t.model, t.from);
   write_safetensors(t.out, out);
   return report(t, out, common);

@@ -8,21 +8,13 @@
 #include <cstring>
 #include <filesystem>
 
+#include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
 
 namespace restage {
 namespace {
 
 namespace fs = std::filesystem;
-
-[[noreturn]] void fail(const std::string& target, int code) {
-  const std::string why = std::strerror(code);
-  if (code == ENOENT || code == ENOTDIR || code == EACCES || code == EROFS || code == EEXIST)
-    throw InputError(target, "cannot be written (" + why + ")",
-                     "give a path in a folder you can write to");
-  throw WorkError(target + ": could not be written (" + why +
-                  "); free some space and run it again");
-}
 
 bool is_frame(const std::string& name) {
   if (name.size() < 16 || name.compare(0, 6, "frame_") != 0) return false;
@@ -34,33 +26,44 @@ bool is_frame(const std::string& name) {
 // Only what looks like our own earlier result may be replaced.
 void check_replaceable(const std::string& folder) {
   std::error_code code;
-  if (!fs::exists(fs::symlink_status(folder, code))) return;
+  const fs::file_type kind = fs::symlink_status(folder, code).type();
+  if (kind == fs::file_type::none) throw_unwritable(folder, code.value());
+  if (kind == fs::file_type::not_found) return;
   if (!fs::is_directory(folder, code) || fs::is_symlink(folder, code))
     throw InputError(folder, "exists and is not a folder", "give another name");
   for (fs::directory_iterator it(folder, code), end; !code && it != end; it.increment(code))
     if (!is_frame(it->path().filename().string()))
       throw InputError(folder, "holds other files (" + it->path().filename().string() + ")",
                        "give a new or an empty folder");
-  if (code) fail(folder, code.value());
+  if (code) throw_unwritable(folder, code.value());
+}
+
+/// The name without slashes at its end.
+std::string checked(std::string folder) {
+  while (folder.size() > 1 && folder.back() == '/') folder.pop_back();
+  if (folder.empty() || folder == "/" || folder == "." || folder == "..")
+    throw InputError(folder, "cannot be replaced by a folder of frames", "give a folder's name");
+  check_replaceable(folder);
+  return folder;
 }
 
 void write_plain(const std::string& path, const std::string& bytes, const std::string& target) {
   std::FILE* out = std::fopen(path.c_str(), "wb");
-  if (out == nullptr) fail(target, errno);
+  if (out == nullptr) throw_unwritable(target, errno);
   const size_t written = std::fwrite(bytes.data(), 1, bytes.size(), out);
   const int code = errno;
-  if (std::fclose(out) != 0) fail(target, errno);
-  if (written != bytes.size()) fail(target, code);
+  if (std::fclose(out) != 0) throw_unwritable(target, errno);
+  if (written != bytes.size()) throw_unwritable(target, code);
 }
 
 // All frames at once: one flush of the file system is far cheaper than one per file.
 void flush_folder(const std::string& folder, const std::string& target) {
   const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) fail(target, errno);
+  if (fd < 0) throw_unwritable(target, errno);
   const int result = ::syncfs(fd);
   const int code = errno;
   ::close(fd);
-  if (result != 0) fail(target, code);
+  if (result != 0) throw_unwritable(target, code);
 }
 
 // In one step where the file system can, else in three.
@@ -71,51 +74,42 @@ void swap_folders(const std::string& temporary, const std::string& folder) {
   if (::rename(folder.c_str(), old.c_str()) != 0 ||
       ::rename(temporary.c_str(), folder.c_str()) != 0 ||
       ::rename(old.c_str(), temporary.c_str()) != 0)
-    fail(folder, errno);
+    throw_unwritable(folder, errno);
 }
 
 }  // namespace
 
 FrameFolderWriter::FrameFolderWriter(std::string folder, std::vector<Triangle> faces,
                                      MeshFormat format)
-    : folder_(std::move(folder)), faces_(std::move(faces)), format_(format) {
-  while (folder_.size() > 1 && folder_.back() == '/') folder_.pop_back();
-  if (folder_.empty() || folder_ == "/" || folder_ == "." || folder_ == "..")
-    throw InputError(folder_, "cannot be replaced by a folder of frames", "give a folder's name");
-  check_replaceable(folder_);
-  const fs::path path(folder_);
-  temporary_ =
-      (path.parent_path() / ("." + path.filename().string() + ".part" + std::to_string(::getpid())))
-          .string();
+    : folder_(checked(std::move(folder))),
+      temporary_(name_beside(folder_, ".")),
+      faces_(std::move(faces)),
+      format_(format) {
   std::error_code code;
-  fs::remove_all(temporary_, code);
-  if (!fs::create_directory(temporary_, code) || code) fail(folder_, code ? code.value() : EEXIST);
-}
-
-FrameFolderWriter::~FrameFolderWriter() {
-  std::error_code ignored;
-  if (!done_) fs::remove_all(temporary_, ignored);
+  fs::remove_all(temporary_.path(), code);
+  if (!fs::create_directory(temporary_.path(), code) || code)
+    throw_unwritable(folder_, code ? code.value() : EEXIST);
 }
 
 void FrameFolderWriter::push(const Points& vertices, const std::vector<Triangle>& faces) {
   char name[48];
   std::snprintf(name, sizeof name, "/frame_%06zu.%s", frames_, extension(format_));
   check_mesh(folder_ + name, vertices, faces);
-  write_plain(temporary_ + name, mesh_bytes(format_, vertices, faces), folder_);
+  write_plain(temporary_.path() + name, mesh_bytes(format_, vertices, faces), folder_);
   ++frames_;
 }
 
 void FrameFolderWriter::commit() {
-  flush_folder(temporary_, folder_);
+  flush_folder(temporary_.path(), folder_);
   check_replaceable(folder_);
   // rename() replaces an empty folder; frames of an earlier run swap places and are then removed
-  if (::rename(temporary_.c_str(), folder_.c_str()) != 0) {
-    if (errno != ENOTEMPTY && errno != EEXIST) fail(folder_, errno);
-    swap_folders(temporary_, folder_);
+  if (::rename(temporary_.path().c_str(), folder_.c_str()) != 0) {
+    if (errno != ENOTEMPTY && errno != EEXIST) throw_unwritable(folder_, errno);
+    swap_folders(temporary_.path(), folder_);
     std::error_code ignored;
-    fs::remove_all(temporary_, ignored);
+    fs::remove_all(temporary_.path(), ignored);
   }
-  done_ = true;
+  temporary_.keep();
   const fs::path parent = fs::path(folder_).parent_path();
   flush_folder(parent.empty() ? "." : parent.string(), folder_);
 }

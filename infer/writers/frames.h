@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "autograd/base/temporary.h"
 #include "infer/writers/mesh_file.h"
 
 namespace restage {
@@ -17,9 +18,6 @@ class FrameFolderWriter {
   /// `faces` are those of every frame; empty for clouds, whose point count may change.
   FrameFolderWriter(std::string folder, std::vector<Triangle> faces,
                     MeshFormat format = MeshFormat::ply);
-  ~FrameFolderWriter();
-  FrameFolderWriter(const FrameFolderWriter&) = delete;
-  FrameFolderWriter& operator=(const FrameFolderWriter&) = delete;
 
   void push(const Points& vertices) { push(vertices, faces_); }
   /// A frame with faces of its own.
@@ -28,11 +26,11 @@ class FrameFolderWriter {
   size_t frames() const { return frames_; }
 
  private:
-  std::string folder_, temporary_;
+  std::string folder_;
+  Temporary temporary_;
   std::vector<Triangle> faces_;
   MeshFormat format_;
   size_t frames_ = 0;
-  bool done_ = false;
 };
 
 }  // namespace restage

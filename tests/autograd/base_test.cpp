@@ -10,6 +10,7 @@
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
 #include "autograd/base/inline_vector.h"
+#include "autograd/base/output_check.h"
 #include "autograd/base/parallel.h"
 #include "autograd/base/rng.h"
 
@@ -79,6 +80,56 @@ TEST_F(AtomicFiles, AFullDiskIsAWorkError) {
     EXPECT_NE(std::string(error.what()).find(at("x") + ": "), std::string::npos) << error.what();
   }
   EXPECT_EQ(entries(), 0u);
+}
+
+TEST_F(AtomicFiles, LeadThroughLinksAndLeavePipesAlone) {
+  fs::create_symlink("x", at("link"));
+  write_file_atomically(at("link"), "new");
+  EXPECT_TRUE(fs::is_symlink(at("link")));
+  EXPECT_EQ(read_file(at("x")), "new");
+  ASSERT_EQ(::mkfifo(at("pipe").c_str(), 0600), 0);
+  EXPECT_THROW(write_file_atomically(at("pipe"), "x"), InputError);
+  EXPECT_TRUE(fs::is_fifo(at("pipe")));
+  EXPECT_THROW(read_file(at("pipe")), InputError);
+}
+
+TEST_F(AtomicFiles, NamesMayBeAsLongAsTheFileSystemHolds) {
+  const std::string longest(255, 'x');
+  write_file_atomically(at(longest), "1");
+  EXPECT_EQ(read_file(at(longest)), "1");
+  EXPECT_THROW(write_file_atomically(at(longest + "x"), "1"), InputError);
+}
+
+TEST_F(AtomicFiles, ASignalRemovesWhatIsUnderWay) {
+  write_file_atomically(at("kept"), "1");
+  const AtomicFile file(at("kept"));
+  const Temporary folder(at("folder"));
+  fs::create_directories(at("folder/a/b"));
+  for (const char* name : {"folder/1", "folder/a/2", "folder/a/b/3"}) std::ofstream(at(name));
+  fs::create_directory_symlink(folder_ / "kept", at("folder/link"));
+  {
+    Temporary other(at("other"));
+    std::ofstream(at("other"));
+    other.keep();
+  }
+  remove_temporaries();
+  EXPECT_EQ(entries(), 2u);  // "kept" and "other"
+  EXPECT_EQ(read_file(at("kept")), "1");
+}
+
+TEST_F(AtomicFiles, OutputsMustNotLieOverInputs) {
+  fs::create_directories(at("folder/in"));
+  write_file_atomically(at("folder/in/x"), "1");
+  fs::create_hard_link(at("folder/in/x"), at("twin"));
+  fs::create_symlink(at("folder/in"), at("link"));
+  const std::string x = at("folder/in/x");
+  for (const std::string& out : {x, at("twin"), at("link") + "/x", at("folder"), at("link"),
+                                 at("folder/../folder/in/x"), at("folder/")})
+    EXPECT_THROW(check_output(out, {"", at("missing"), x}), InputError) << out;
+  EXPECT_THROW(check_output(at("link"), {at("folder/in")}), InputError);
+  fs::create_directory(at("folder/other"));
+  for (const std::string& out : {at("new"), at("folder/in/new"), at("folder/other"), std::string()})
+    EXPECT_NO_THROW(check_output(out, {x, at("folder")})) << out;
 }
 
 TEST_F(AtomicFiles, ReadingHasLimits) {

@@ -4,7 +4,7 @@ import math
 import struct
 import zipfile
 
-from support import CliTest
+from support import CliTest, points
 from tiny_run import weights
 
 
@@ -91,6 +91,34 @@ class Arrays(CliTest):
         for size in (10, 0.01):
             self.bad_input(["data", "import", self.write("big.npz", smplh(size)), "--out", "x.h5"], "big.npz", "no person's size")
 
+    def test_a_body_model_that_is_none(self):
+        self.write("a_poses.npz", clip())
+        bad = lambda model, *words: self.bad_input(["data", "import", "a_poses.npz", "--body-model", model, "--out", "x.h5"], *words)
+        bad(self.write("old/m.pkl", "x"), "old/m.pkl", "pickle", "docs/data.md")
+        bad("old", "old/m.pkl", "pickle", "docs/data.md")
+        self.write("broken/m.npz", smplh()[:-30])
+        bad("broken", "holds no SMPL", "among 1 files, the first: broken/m.npz")
+        self.write("model.npz", smplh())
+        objects = npy((), ["x"], "<U1").replace(b"'<U1'", b"'|O' ")
+        self.write("a_poses.npz", npz(poses=npy((3, 156), [0.0] * 468), trans=npy((3, 3), [0.0] * 9),
+                                      betas=npy((1,), [0.0]), mocap_framerate=objects))
+        bad("model.npz", "a_poses.npz:mocap_framerate", "--fps")
+
+    def test_a_damaged_frame_costs_its_sequence(self):
+        for take in "abc":
+            for f in (1, 2, 3):
+                self.ply("tree/%s/%d.ply" % (take, f), points(80 + f, f))
+        self.write("tree/b/2.ply", self.bytes("tree/b/2.ply")[:-9])
+        found = self.json("data", "import", "tree", "--out", "t.h5")
+        self.assertEqual((found["sequences"], found["frames"], len(found["reports"]), len(found["skipped"])), (2, 6, 2, 1))
+        self.assertTrue(found["skipped"][0].startswith("tree/b: tree/b/2.ply: "), found["skipped"])
+        self.assertEqual(self.json("data", "verify", "t.h5")["problems"], [])
+        self.assertEqual(self.json("data", "inspect", "t.h5")["counts"]["points"], 2 * (81 + 82 + 83))
+        self.bad_input(["data", "import", "tree/b", "--out", "x.h5"], "tree/b/2.ply")
+        for take in "ac":
+            self.write("tree/%s/3.ply" % take, "x")
+        self.bad_input(["data", "import", "tree", "--out", "x.h5"], "all 3 files were skipped, the first: tree/a: tree/a/3.ply")
+
     def test_scans(self):
         self.write("walk.npz", npz(points=cloud(7)))
         self.assertIn("1 scan sequences, 4 frames", self.done("data", "import", "walk.npz", "--fps", 60, "--out", "s.h5"))
@@ -113,6 +141,7 @@ class Arrays(CliTest):
     def test_memory_limit(self):
         self.write("bomb.npz", npz(points=npy((1, 300000, 3), [i / 180 for i in range(297)] * 3030 + [0.0] * 90)))
         self.bad_input(["data", "import", "bomb.npz", "--max-memory", "2MB", "--out", "x.h5"], "--max-memory")
+        self.bad_input(["doctor", "bomb.npz", "--max-memory", "2MB"], "--max-memory")
         self.done("data", "import", "bomb.npz", "--max-memory", "8MB", "--out", "x.h5")
         for wrong in ("much", "-1", "4XB", "", "1e99GB", "10"):
             self.bad_input(["data", "import", "bomb.npz", "--max-memory=" + wrong, "--out", "y.h5"], "--max-memory")

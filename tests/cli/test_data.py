@@ -1,4 +1,5 @@
 """restage data."""
+import lzma
 import os
 
 from support import CliTest, numbers, small_disk
@@ -89,6 +90,27 @@ class Data(CliTest):
         self.assertEqual(len(lines), 3, lines)
         self.assertTrue(lines[0].startswith("many/1.bvh: Mixamo"), lines[0])
         self.assertIn("rest pose", self.done("data", "import", "many", "--verbose", "--out", "many.h5"))
+
+    def test_import_of_a_folder_skips_and_lists(self):
+        self.write("many/a.bvh", toy_bvh())
+        self.write("many/a.bvh.xz", lzma.compress(toy_bvh().encode()))
+        self.write("many/b.bvh", "HIERARCHY")
+        call = ["data", "import", "many", "--out", "many.h5"]
+        result = self.restage(*call)
+        self.assertEqual((result.code, result.err), (0, ""))
+        self.assertIn("skipped many/a.bvh.xz: its motion 'a' has the name of one in many/a.bvh;", result.out)
+        self.assertIn("skipped many/b.bvh", result.out)
+        self.assertEqual(self.json("data", "inspect", "many.h5")["counts"]["motions"], 1)
+        os.remove(self.path("many.h5"))
+        self.write("bad/1.bvh", "HIERARCHY")
+        self.write("bad/2.bvh", "HIERARCHY")
+        self.bad_input(["data", "import", "bad", "--out", "x.h5"], "bad: all 2 files were skipped, the first: bad/1.bvh")
+        self.bad_input(call + ["--facing", "y"], "all 3 files were skipped, the first: many/a.bvh: stands along", "--facing")
+        # Options that no file can make right are not the files' fault.
+        self.bad_input(call + ["--facing", "y", "--up=-y"], "--facing lies along --up")
+        self.bad_input(call + ["--split", "nope"], "--split 'nope'", "validation")
+        self.bad_input(call + ["--asf", "none.asf"], "none.asf")
+        self.bad_input(["data", "import", "", "--out", "x.h5"], "SOURCE is empty")
 
     def test_import_with_a_profile(self):
         self.write("suit.bvh", toy_bvh().replace("mixamorig:Left", "L ").replace("mixamorig:", ""))

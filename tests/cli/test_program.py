@@ -67,4 +67,4 @@ class Signals(CliTest):
                 running.send_signal(number)
                 running.stderr.read()
                 self.assertEqual(running.wait(60), code)
-            self.assertNotIn("big.h5", os.listdir(self.folder))
+            self.assertEqual(os.listdir(self.folder), [])

@@ -109,6 +109,9 @@ class Doctor(CliTest):
     def test_bad_options(self):
         self.ply("ball.ply", points(200, 1))
         self.bad_input(["doctor", "ball.ply", "--fix", "x.ply"], "cannot be repaired", "--up")
+        self.bad_input(["doctor", "ball.ply", "--fix", "x.ply", "--picture", "x.png"], "cannot be repaired")
+        os.mkdir(self.path("y.ply.transform.json"))
+        self.bad_input(["doctor", "ball.ply", "--fix", "y.ply", "--up", "y", "--scale", "0.3"], "y.ply.transform.json")
         self.done("doctor", "ball.ply", "--fix", "x.ply", "--up", "y", "--scale", "0.3")
         for scale in ("0", "inf", "nan", "1e300", "1e-30"):
             self.bad_input(["doctor", "ball.ply", "--scale", scale], "--scale")

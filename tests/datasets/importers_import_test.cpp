@@ -6,6 +6,7 @@
 
 #include "autograd/base/error.h"
 #include "datasets/importers/import.h"
+#include "datasets/importers/import_detail.h"
 #include "datasets/schema.h"
 #include "tests/datasets/importers_bvh_text.h"
 #include "tests/support/data_folder.h"
@@ -76,6 +77,49 @@ TEST_F(ImportersImport, FolderOfBvhFilesSkipsBadOnes) {
   EXPECT_EQ(motions[0].id, "01_walk");
   EXPECT_EQ(motions[0].subject, "01");
   EXPECT_EQ(inspect(out()).license, "CC0-1.0");
+}
+
+TEST_F(ImportersImport, OfAFileAllGoesInOrNothing) {
+  Body body;
+  body.id = "b";
+  body.split = "train";
+  body.rest.vertices = {Point(0, 0, 0), Point(1, 0, 0), Point(0, 1, 0)};
+  body.joints.fill(Vec3::Zero());
+  body.weights.setZero(3, kJoints);
+  body.weights.col(0).setOnes();
+  Motion motion;
+  motion.id = "m";
+  motion.split = "train";
+  motion.rest.fill(Vec3::Zero());
+  motion.global.resize(1);
+  motion.global[0].fill(Eigen::Quaternionf::Identity());
+  motion.hips.assign(1, Point(0, 1, 0));
+  ImportSummary summary;
+  ImportWriter writer(out(), {}, summary);
+  writer.add("first.glb", {}, {motion});
+  EXPECT_THROW(writer.add("twins.glb", {body, body}, {}), InputError);
+  try {
+    writer.add("second.glb", {body}, {motion});
+    ADD_FAILURE() << "two motions of one name";
+  } catch (const InputError& error) {
+    EXPECT_EQ(std::string(error.what()),
+              "second.glb: its motion 'm' has the name of one in first.glb; rename one of the two");
+  }
+  writer.commit();
+  EXPECT_EQ(summary.bodies, 0u);
+  EXPECT_EQ(summary.motions, 1u);
+  EXPECT_EQ(inspect(out()).kind, "motions");
+}
+
+TEST_F(ImportersImport, OptionsAreJudgedBeforeFiles) {
+  ImportOptions options;
+  options.motion.split = "nope";
+  try {
+    import_data("no such file", out(), options);
+    ADD_FAILURE() << "an unknown split";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("--split 'nope'"), std::string::npos) << error.what();
+  }
 }
 
 TEST_F(ImportersImport, NothingIsLeftBehindByAFailure) {

@@ -47,6 +47,20 @@ std::string complaint(const std::vector<std::string>& files, const std::string& 
   return "";
 }
 
+TEST(Merge, SplitsMustBeKnown) {
+  const test::TempDir dir;
+  const std::string a = dir / "a.h5", out = dir / "out.h5";
+  Body odd = body("odd");
+  odd.split = "nope";
+  write_bodies(a, {body("b1")}, {});
+  write_bodies(dir / "b.h5", {odd}, {});
+  write_motions(dir / "c.h5", {motion("m", "", "nope")}, {});
+  EXPECT_NE(complaint({a, dir / "b.h5"}, out).find("b.h5:/bodies/odd: has the split 'nope'"),
+            std::string::npos);
+  EXPECT_NE(complaint({a, dir / "c.h5"}, out).find("c.h5:/motions/m: has the split 'nope'"),
+            std::string::npos);
+}
+
 TEST(Merge, BodiesMotionsLicencesAndAcknowledgementsAreJoined) {
   const test::TempDir dir;
   const std::string a = dir / "a.h5", b = dir / "b.h5", c = dir / "c.h5", out = dir / "out.h5";
@@ -89,7 +103,7 @@ TEST(Merge, RefusesWhatWouldLeakOrIsNoData) {
   EXPECT_NE(complaint({a, b}, out).find("subject 'ann' is in the split 'test'"), std::string::npos);
   EXPECT_NE(complaint({a}, out).find("nothing to merge"), std::string::npos);
   EXPECT_NE(complaint({a, a}, out).find("same id"), std::string::npos);
-  EXPECT_NE(complaint({a, b}, a).find("is one of the files"), std::string::npos);
+  EXPECT_NE(complaint({a, b}, a).find("is one of the inputs"), std::string::npos);
   Scans scans;
   scans.points = {Point(0, 0, 0)};
   scans.frame_offset = {0, 1};

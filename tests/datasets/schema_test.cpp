@@ -324,6 +324,36 @@ TEST(Schema, BlendShapesMustBeThereAndFit) {
   EXPECT_NE(refusal({4, 3, 189}, NAN).find("/blend_shapes/0"), std::string::npos);
 }
 
+TEST(Schema, ASequenceOfScansCanBeTakenBack) {
+  const test::TempDir dir;
+  const Points cloud(700, Point(1, 2, 3)), other(1500, Point(4, 5, 6));
+  Joints joints;
+  joints.fill(Vec3::Zero());
+  for (const bool disturbed : {false, true}) {
+    ScanWriter writer(dir / (disturbed ? "b.h5" : "a.h5"), kInfo);
+    if (disturbed) {
+      writer.append(other, joints);
+      writer.drop_sequence();
+    }
+    writer.append(cloud, joints);
+    writer.append(other, joints);
+    writer.end_sequence();
+    if (disturbed) {
+      writer.append(other, joints);
+      writer.append(cloud, joints);
+      writer.drop_sequence();
+    }
+    writer.append(cloud, joints);
+    writer.commit();
+  }
+  EXPECT_TRUE(verify(dir / "b.h5").empty());
+  const Scans a = read_scans(dir / "a.h5"), b = read_scans(dir / "b.h5");
+  EXPECT_EQ(a.points, b.points);
+  EXPECT_EQ(a.frame_offset, b.frame_offset);
+  EXPECT_EQ(a.sequence_offset, b.sequence_offset);
+  EXPECT_EQ(b.sequence_offset, (std::vector<int64_t>{0, 2, 3}));
+}
+
 TEST(Schema, ScanOffsetsMustFitThePoints) {
   const TempDir dir;
   Scans scans;

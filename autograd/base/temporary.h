@@ -1,0 +1,32 @@
+// Files and folders that must not outlive the work on them.
+#pragma once
+
+#include <string>
+
+namespace restage {
+
+/// A name beside a target for work in progress: `prefix` + its name + ".part" + the process's
+/// number, shortened where the file system could not hold it.
+std::string name_beside(const std::string& target, const std::string& prefix = "");
+
+/// The file or folder `path`, which the owner makes, is removed in the end unless it was kept, also
+/// when a signal ends the program (interrupt.h). Of more than 64 at a time a signal leaves the
+/// rest.
+class Temporary {
+ public:
+  explicit Temporary(std::string path);
+  ~Temporary();
+  Temporary(const Temporary&) = delete;
+  Temporary& operator=(const Temporary&) = delete;
+  const std::string& path() const { return path_; }
+  void keep();  ///< it has another name by now
+
+ private:
+  std::string path_;
+  int slot_ = -1;
+};
+
+/// Removes all that there are. Only calls that a signal handler may make.
+void remove_temporaries() noexcept;
+
+}  // namespace restage
