@@ -91,10 +91,10 @@ ImportSummary import_recordings(const std::vector<std::string>& files, const std
                                 const std::string& out, const ImportOptions& options) {
   // Mistakes in the options are not the files'.
   asked_profile(options.motion);
-  if (!options.asf.empty()) parse_asf(read_packed_text(options.asf), options.asf);
   std::set<InputKind> kinds;
   for (const std::string& file : files) kinds.insert(kind_of(file));
   check_options(kinds, source, options);
+  if (!options.asf.empty()) parse_asf(read_packed_text(options.asf), options.asf);
   std::vector<std::string> inputs = files;
   for (const char* part : {".asf", ".asf.xz", ".bin"})  // what recordings and characters refer to
     if (lower_case(out).ends_with(part)) inputs.push_back(out);

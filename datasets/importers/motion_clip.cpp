@@ -75,11 +75,11 @@ double largest_turn(const std::vector<Quat>& local) {
 }
 
 /// Whether a recording begins with a T-pose that does not face anywhere yet and, within four
-/// frames, turns its limbs away from it: as the Daz release blends by some 20 degrees a frame, or
+/// frames, turns its limbs away from it: as the Daz release blends by 20 to 40 degrees a frame, or
 /// at once. Nobody who is recorded does: that is 2,400 degrees a second from rest.
 bool begins_with_lead(const std::vector<std::vector<Quat>>& local, size_t lead) {
   const double root = local[0][0].angularDistance(Quat::Identity()) * (180.0 / M_PI);
-  const bool blends = lead == 1 || largest_turn(local[1]) < 40.0;
+  const bool blends = lead == 1 || largest_turn(local[1]) < 60.0;
   return root < 0.01 && blends && largest_turn(local[0]) < 30.0 &&
          largest_turn(local[std::min<size_t>(lead, 4)]) > 50.0;
 }

@@ -109,7 +109,7 @@ class Data(CliTest):
         # Options that no file can make right are not the files' fault.
         self.bad_input(call + ["--facing", "y", "--up=-y"], "--facing lies along --up")
         self.bad_input(call + ["--split", "nope"], "--split 'nope'", "validation")
-        self.bad_input(call + ["--asf", "none.asf"], "none.asf")
+        self.bad_input(call + ["--asf", "none.asf"], "--asf")
         self.bad_input(["data", "import", "", "--out", "x.h5"], "SOURCE is empty")
 
     def test_import_with_a_profile(self):
