@@ -66,7 +66,7 @@ class Examples {
     const double kind = Rng(key).uniform();
     FitExample out;
     out.person = kind > 0.06;
-    out.points = !out.person   ? random_thing(key)
+    out.points = !out.person   ? random_thing(key.fold("thing"))
                  : kind < 0.14 ? makers_[0].make(index).points
                  : kind < 0.57 ? makers_[1].make(index).points
                                : makers_[2].make(index).points;

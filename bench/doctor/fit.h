@@ -12,7 +12,7 @@ namespace restage::bench {
 using doctor_detail::OrientationNet;
 
 struct FitOptions {
-  int64_t steps = 30000;  ///< of 32 examples
+  int64_t steps = 25000;  ///< of 32 examples
   double rate = 2e-3;     ///< of Adam; falls to nothing along half a cosine
   double tilt = 4;        ///< degrees by which people lean in examples, standard deviation
   uint64_t seed = 1;
