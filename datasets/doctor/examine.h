@@ -57,6 +57,10 @@ Diagnosis examine_frames(FrameSource& source, const ExamineOptions& options = {}
 /// and in our frame. Of a surface only whole pieces are left out; the order of the rest stays.
 Mesh mended(const Mesh& mesh, const Diagnosis& diagnosis);
 
+/// That the reader left points out because a coordinate is NaN or infinite: retargeting refuses
+/// them. `where` is added to the sentence.
+Finding non_finite(size_t points, const std::string& where);
+
 /// The unit of skeletons, by the lengths of their bones, which no pose changes.
 Finding examine_skeletons(const std::vector<Joints>& frames);
 

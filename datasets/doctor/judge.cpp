@@ -254,4 +254,13 @@ void judge_duplicates(Diagnosis& d, size_t equal, bool cloud, const std::string&
 
 }  // namespace doctor_detail
 
+Finding non_finite(size_t points, const std::string& where) {
+  return {"non-finite",
+          Weight::wrong,
+          doctor_detail::counted(points, "point") + " with a NaN or infinite coordinate" + where,
+          1,
+          "counted",
+          "--fix leaves them out"};
+}
+
 }  // namespace restage

@@ -68,6 +68,7 @@ class Sequence {
   std::vector<double> sizes_;
   std::vector<std::array<double, 12>> ends_;  // lowest and highest along each direction
   size_t looked_ = 0, fewest_distinct_ = SIZE_MAX, points_ = 0, repeats_ = 0, repeat_frames_ = 0;
+  size_t non_finite_ = 0, non_finite_frames_ = 0;
   size_t strays_ = 0, stray_frames_ = 0, other_frames_ = 0, broken_frames_ = 0, flat_frames_ = 0;
   Parts flattest_;                    // of the frame with most of a floor
   std::optional<PersonShape> worst_;  // the frame with most of somebody else
@@ -119,6 +120,8 @@ void Sequence::read() {
     d_.fewest_points = std::min(d_.fewest_points, n);
     d_.most_points = std::max(d_.most_points, n);
     d_.faces = static_cast<int64_t>(frame->faces.size());
+    non_finite_ += frame->left_out;
+    non_finite_frames_ += frame->left_out > 0;
     const Points once = without_repeats(frame->points);
     fewest_distinct_ = std::min(fewest_distinct_, once.size());
     repeats_ += frame->points.size() - once.size();
@@ -340,6 +343,9 @@ Diagnosis Sequence::examine() {
   judge_repeats();
   judge_numbers();
   judge_jumps();
+  if (non_finite_ > 0)
+    d_.findings.push_back(non_finite(non_finite_, " in " + std::to_string(non_finite_frames_) +
+                                                      " of " + counted(frames_.size(), "frame")));
   judge_duplicates(
       d_, repeats_, d_.faces == 0,
       " in " + std::to_string(repeat_frames_) + " of " + counted(frames_.size(), "frame"));

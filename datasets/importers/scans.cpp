@@ -170,7 +170,7 @@ int64_t import_scans(const ScanSequence& sequence, const ScanOptions& options, S
                      ImportReport& report) {
   const bool one = sequence.files.size() == 1;
   const auto source = one ? open_frames(sequence.files[0], {"", options.max_memory})
-                          : open_frame_files(sequence.files, options.max_memory);
+                          : open_frame_files(sequence.files, {"", options.max_memory});
   const bool stated =
       one && is_array_name(sequence.files[0]) && stated_fps(sequence.files[0], options.max_memory);
   const double fps = options.fps > 0 ? options.fps : source->fps();

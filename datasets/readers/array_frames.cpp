@@ -62,8 +62,11 @@ OpenArray open_array(const std::string& path, uint64_t max_memory) {
 
 class ArrayFrames : public FrameSource {
  public:
-  ArrayFrames(const std::string& path, uint64_t max_memory)
-      : path_(path), array_(open_array(path, max_memory)) {
+  ArrayFrames(const std::string& path, const FrameOptions& options)
+      : path_(path),
+        array_(open_array(path, options.max_memory)),
+        how_(options.leave_out_non_finite ? NonFinite::mark : NonFinite::refuse) {
+    const uint64_t max_memory = options.max_memory;
     const NpyHeader& header = array_.header;
     const size_t axes = header.shape.size();
     frames_ = axes == 3 ? header.shape[0] : 1;
@@ -89,6 +92,12 @@ class ArrayFrames : public FrameSource {
     else
       read(frame);
     ++at_;
+    if (how_ == NonFinite::mark) {
+      frame.left_out = leave_out_non_finite(frame.points, frame.faces);
+      if (frame.points.empty())
+        throw InputError(frame.source, "holds no points but NaN and infinite ones",
+                         "leave the frame out");
+    }
     check_precision(frame.points, frame.source, kSubtract);
     return frame;
   }
@@ -129,13 +138,14 @@ class ArrayFrames : public FrameSource {
         put(frame, i, axis,
             (*whole_)[(at_ * points_ + static_cast<int64_t>(i)) * 3 + static_cast<int64_t>(axis)]);
   }
-  static void put(Frame& frame, size_t point, size_t axis, double value) {
-    frame.points[point][static_cast<int>(axis)] =
-        text::coordinate(value, [&] { return frame.source + ": point " + std::to_string(point); });
+  void put(Frame& frame, size_t point, size_t axis, double value) const {
+    frame.points[point][static_cast<int>(axis)] = text::coordinate(
+        value, [&] { return frame.source + ": point " + std::to_string(point); }, how_);
   }
 
   std::string path_;
   OpenArray array_;
+  NonFinite how_;
   std::optional<NpyArray> whole_;
   int64_t frames_ = 0, points_ = 0, at_ = 0;
   double fps_ = kFps;
@@ -191,12 +201,13 @@ std::optional<double> stated_fps(const std::string& path, uint64_t max_memory) {
   return fps[0];
 }
 
-std::unique_ptr<FrameSource> open_array_frames(const std::string& path, uint64_t max_memory) {
-  return std::make_unique<ArrayFrames>(path, max_memory);
+std::unique_ptr<FrameSource> open_array_frames(const std::string& path,
+                                               const FrameOptions& options) {
+  return std::make_unique<ArrayFrames>(path, options);
 }
 
-Frame read_array_frame(const std::string& path, uint64_t max_memory) {
-  ArrayFrames frames(path, max_memory);
+Frame read_array_frame(const std::string& path, const FrameOptions& options) {
+  ArrayFrames frames(path, options);
   if (frames.frames() != 1)
     throw InputError(
         path,

@@ -36,9 +36,10 @@ std::optional<double> stated_fps(const std::string& path, uint64_t max_memory = 
 /// One frame [N, 3] or a sequence [F, N, 3], frame by frame in constant memory (in Fortran order:
 /// all at once, as one frame is then spread over the whole file). InputError: no cloud, no points,
 /// NaN, see npz.h.
-std::unique_ptr<FrameSource> open_array_frames(const std::string& path, uint64_t max_memory);
+std::unique_ptr<FrameSource> open_array_frames(const std::string& path,
+                                               const FrameOptions& options = {});
 
 /// The single frame of a file; InputError if it holds a sequence.
-Frame read_array_frame(const std::string& path, uint64_t max_memory);
+Frame read_array_frame(const std::string& path, const FrameOptions& options = {});
 
 }  // namespace restage

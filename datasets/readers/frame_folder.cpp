@@ -28,14 +28,15 @@ std::string take_digits(const std::string& text, size_t& at) {
 /// Mesh or array files, one frame each.
 class FileFrames : public FrameSource {
  public:
-  FileFrames(std::vector<std::string> files, uint64_t max_memory)
-      : files_(std::move(files)), max_memory_(max_memory) {}
+  FileFrames(std::vector<std::string> files, const FrameOptions& options)
+      : files_(std::move(files)), options_(options) {}
   std::optional<Frame> next() override {
     if (at_ == files_.size()) return std::nullopt;
     const std::string& file = files_[at_++];
-    if (is_array_name(file)) return read_array_frame(file, max_memory_);
-    Mesh mesh = read_mesh(file);
-    return Frame{file, std::move(mesh.vertices), std::move(mesh.faces), 0};
+    if (is_array_name(file)) return read_array_frame(file, options_);
+    size_t left_out = 0;
+    Mesh mesh = options_.leave_out_non_finite ? read_mesh(file, left_out) : read_mesh(file);
+    return Frame{file, std::move(mesh.vertices), std::move(mesh.faces), 0, left_out};
   }
   void skip() override { at_ = std::min(at_ + 1, files_.size()); }
   void rewind() override { at_ = 0; }
@@ -44,7 +45,7 @@ class FileFrames : public FrameSource {
 
  private:
   std::vector<std::string> files_;
-  uint64_t max_memory_;
+  FrameOptions options_;
   size_t at_ = 0;
 };
 
@@ -227,8 +228,9 @@ std::vector<std::string> frame_files(const std::string& folder) {
   return files;
 }
 
-std::unique_ptr<FrameSource> open_frame_files(std::vector<std::string> files, uint64_t max_memory) {
-  return std::make_unique<FileFrames>(std::move(files), max_memory);
+std::unique_ptr<FrameSource> open_frame_files(std::vector<std::string> files,
+                                              const FrameOptions& options) {
+  return std::make_unique<FileFrames>(std::move(files), options);
 }
 
 std::unique_ptr<FrameSource> open_frames(const std::string& path, const FrameOptions& options) {
@@ -252,13 +254,13 @@ std::unique_ptr<FrameSource> open_frames(const std::string& path, const FrameOpt
     if (files.empty())
       throw InputError(path, "holds no PLY, OBJ or glTF files and no arrays (NPY, NPZ)",
                        "give a folder of numbered frames");
-    return open_frame_files(std::move(files), options.max_memory);
+    return open_frame_files(std::move(files), options);
   }
   if (!std::filesystem::exists(path, error))
     throw InputError(path, "does not exist",
                      "give a folder of frames, or a PLY, OBJ, glTF, NPY, NPZ or HDF5 file");
-  if (is_array_name(path)) return open_array_frames(path, options.max_memory);
-  return open_frame_files({path}, options.max_memory);
+  if (is_array_name(path)) return open_array_frames(path, options);
+  return open_frame_files({path}, options);
 }
 
 }  // namespace restage

@@ -16,6 +16,7 @@ struct Frame {
   Points points;                ///< metres; the number may change from frame to frame
   std::vector<Triangle> faces;  ///< empty for a cloud
   int64_t sequence = 0;         ///< which sequence of an HDF5 file it belongs to
+  size_t left_out = 0;          ///< points that were NaN or infinite
 };
 
 class FrameSource {
@@ -35,6 +36,8 @@ struct FrameOptions {
   uint64_t max_memory = kMaxMemory;  ///< what unpacking an array may take
   std::optional<int64_t> sequence =
       std::nullopt;  ///< only this one, from 0; else all, one after the other
+  /// Of meshes and arrays: points that are NaN or infinite are left out instead of refused.
+  bool leave_out_non_finite = false;
 };
 
 /// A folder of numbered PLY, OBJ or glTF files (natural numeric order: f2 before f10; other files
@@ -49,7 +52,7 @@ std::unique_ptr<FrameSource> open_frames(const std::string& path, const FrameOpt
 std::vector<std::string> frame_files(const std::string& folder);
 /// These files (PLY, OBJ, glTF, arrays [N, 3]) as the frames of one sequence.
 std::unique_ptr<FrameSource> open_frame_files(std::vector<std::string> files,
-                                              uint64_t max_memory = kMaxMemory);
+                                              const FrameOptions& options = {});
 
 /// f2 < f10: runs of digits compare as numbers, everything else by character.
 bool natural_less(const std::string& a, const std::string& b);

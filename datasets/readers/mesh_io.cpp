@@ -46,6 +46,15 @@ void check_mesh(const Mesh& mesh, const std::string& path) {
                          "correct the face list");
 }
 
+Mesh without_non_finite(const std::string& content, const std::string& path, const Vec3& origin,
+                        size_t& left_out) {
+  Mesh mesh = parse_mesh(content, path, origin, NonFinite::mark);
+  left_out = leave_out_non_finite(mesh.vertices, mesh.faces);
+  if (mesh.vertices.empty())
+    throw InputError(path, "holds no points but NaN and infinite ones", "export it again");
+  return mesh;
+}
+
 template <class T>
 void add_bytes(std::string& out, const T& value) {
   out.append(reinterpret_cast<const char*>(&value), sizeof value);
@@ -63,16 +72,23 @@ Mesh read_mesh(const std::string& path) {
   return mesh;
 }
 
-Mesh read_mesh(const std::string& path, Vec3& origin) {
-  const std::string content = read_file(path);
-  Mesh mesh = parse_mesh(content, path);
-  origin.setZero();
-  if (is_gltf_name(path) || !is_blurred(mesh.vertices)) return mesh;  // glTF is single precision
-  origin = mesh.vertices[0].cast<double>();
-  return parse_mesh(content, path, origin);
+Mesh read_mesh(const std::string& path, size_t& left_out) {
+  Mesh mesh = without_non_finite(read_file(path), path, Vec3::Zero(), left_out);
+  check_precision(mesh.vertices, path, "restage doctor FILE --fix OUT moves it to the origin");
+  return mesh;
 }
 
-Mesh parse_mesh(const std::string& content, const std::string& path, const Vec3& origin) {
+Mesh read_mesh(const std::string& path, size_t& left_out, Vec3& origin) {
+  const std::string content = read_file(path);
+  origin.setZero();
+  Mesh mesh = without_non_finite(content, path, origin, left_out);
+  if (is_gltf_name(path) || !is_blurred(mesh.vertices)) return mesh;  // glTF is single precision
+  origin = mesh.vertices[0].cast<double>();
+  return without_non_finite(content, path, origin, left_out);
+}
+
+Mesh parse_mesh(const std::string& content, const std::string& path, const Vec3& origin,
+                NonFinite how) {
   Mesh mesh;
   if (content.empty()) {
     throw InputError(path, "is empty and holds no points", "give a mesh or cloud that has some");
@@ -80,12 +96,12 @@ Mesh parse_mesh(const std::string& content, const std::string& path, const Vec3&
     const Gltf file = parse_gltf(content, path);
     return gltf_mesh(file, gltf_rest(file));
   } else if (starts_as_ply(content)) {
-    mesh = parse_ply(content, path, origin);
+    mesh = parse_ply(content, path, origin, how);
   } else if (ends_in(path, ".ply")) {
     throw InputError(path, "is not a PLY file (it does not begin with 'ply')",
                      "export the file again");
   } else if (ends_in(path, ".obj") || looks_like_obj(content)) {
-    mesh = parse_obj(content, path, origin);
+    mesh = parse_obj(content, path, origin, how);
   } else {
     throw InputError(path, "is neither PLY, OBJ nor glTF", "convert it to one of them");
   }

@@ -6,7 +6,7 @@
 
 #include <string>
 
-#include "nn/geometry/body.h"
+#include "datasets/readers/non_finite.h"
 
 namespace restage {
 
@@ -15,12 +15,14 @@ namespace restage {
 /// become fans of triangles; normals, colours, texture coordinates and groups are ignored; a file
 /// without faces is a cloud. Coordinates are kept as they are (metres by convention).
 Mesh read_mesh(const std::string& path);
+/// The same without points of a PLY or OBJ file that are NaN or infinite, and how many these are.
+Mesh read_mesh(const std::string& path, size_t& left_out);
 /// The same of coordinates however far from the origin: where single precision would blur them
 /// (precision.h), `origin` is taken off them first, else it is zero.
-Mesh read_mesh(const std::string& path, Vec3& origin);
+Mesh read_mesh(const std::string& path, size_t& left_out, Vec3& origin);
 /// From memory.
 Mesh parse_mesh(const std::string& content, const std::string& path,
-                const Vec3& origin = Vec3::Zero());
+                const Vec3& origin = Vec3::Zero(), NonFinite how = NonFinite::refuse);
 
 /// Binary little-endian PLY, float32: keeps every bit. Atomic; WorkError on a full disk.
 void write_ply(const std::string& path, const Mesh& mesh);

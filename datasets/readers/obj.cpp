@@ -9,7 +9,7 @@ namespace restage {
 namespace {
 
 template <class Where>
-Point parse_vertex(std::string_view line, const Vec3& origin, const Where& where) {
+Point parse_vertex(std::string_view line, const Vec3& origin, NonFinite how, const Where& where) {
   Point point;
   for (int axis = 0; axis < 3; ++axis) {
     const std::string_view word = text::take_word(line);
@@ -18,7 +18,7 @@ Point parse_vertex(std::string_view line, const Vec3& origin, const Where& where
       throw InputError(where(), "a vertex has fewer than 3 coordinates", "export the file again");
     if (!text::parse(word, value))
       throw InputError(where(), text::quote(word) + " is no number", "export the file again");
-    point[axis] = text::coordinate(value - origin[axis], where);
+    point[axis] = text::coordinate(value - origin[axis], where, how);
   }
   return point;
 }
@@ -63,7 +63,8 @@ class ObjLines {
 
 }  // namespace
 
-Mesh parse_obj(std::string_view content, const std::string& path, const Vec3& origin) {
+Mesh parse_obj(std::string_view content, const std::string& path, const Vec3& origin,
+               NonFinite how) {
   content = text::without_mark(content, path);
   std::string with_ends;  // lines of old Macintosh programs end with CR alone
   if (content.find('\n') == std::string_view::npos &&
@@ -81,7 +82,7 @@ Mesh parse_obj(std::string_view content, const std::string& path, const Vec3& or
     if (keyword != "v" && keyword != "f") continue;  // normals, groups, materials, comments
     const auto where = [&] { return path + ":" + std::to_string(lines.number()); };
     if (keyword == "v") {
-      mesh.vertices.push_back(parse_vertex(line, origin, where));
+      mesh.vertices.push_back(parse_vertex(line, origin, how, where));
       continue;
     }
     corners.clear();

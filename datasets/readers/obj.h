@@ -4,13 +4,13 @@
 #include <string>
 #include <string_view>
 
-#include "nn/geometry/body.h"
+#include "datasets/readers/non_finite.h"
 
 namespace restage {
 
 /// `content` is the whole file, `path` only names it in errors. `origin` is taken off every vertex
 /// before it becomes a float.
-Mesh parse_obj(std::string_view content, const std::string& path,
-               const Vec3& origin = Vec3::Zero());
+Mesh parse_obj(std::string_view content, const std::string& path, const Vec3& origin = Vec3::Zero(),
+               NonFinite how = NonFinite::refuse);
 
 }  // namespace restage

@@ -251,7 +251,7 @@ void skip_property(Rows& rows, const Property& property) {
 }
 
 void read_vertices(Rows& rows, const Element& element, const std::string& path, const Vec3& origin,
-                   Points& points) {
+                   NonFinite how, Points& points) {
   std::array<int, 3> axis_seen = {0, 0, 0};
   std::vector<int> axis_of;  // for each property: 0, 1, 2 or -1
   for (const Property& p : element.properties) {
@@ -268,9 +268,9 @@ void read_vertices(Rows& rows, const Element& element, const std::string& path, 
       if (axis_of[k] < 0)
         skip_property(rows, element.properties[k]);
       else
-        point[axis_of[k]] =
-            text::coordinate(rows.next(element.properties[k].type) - origin[axis_of[k]],
-                             [&] { return rows.where(); });
+        point[axis_of[k]] = text::coordinate(
+            rows.next(element.properties[k].type) - origin[axis_of[k]],
+            [&] { return rows.where(); }, how);
     }
     rows.end_row();
     points.push_back(point);
@@ -305,7 +305,8 @@ void read_faces(Rows& rows, const Element& element, std::vector<Triangle>& faces
 
 }  // namespace
 
-Mesh parse_ply(std::string_view content, const std::string& path, const Vec3& origin) {
+Mesh parse_ply(std::string_view content, const std::string& path, const Vec3& origin,
+               NonFinite how) {
   text::Lines lines(content);
   const Header header = parse_header(lines, path);
   Rows rows(lines, header, path);
@@ -313,7 +314,7 @@ Mesh parse_ply(std::string_view content, const std::string& path, const Vec3& or
   for (const Element& element : header.elements) {
     rows.begin(element);
     if (element.name == "vertex") {
-      read_vertices(rows, element, path, origin, mesh.vertices);
+      read_vertices(rows, element, path, origin, how, mesh.vertices);
     } else if (element.name == "face") {
       read_faces(rows, element, mesh.faces);
     } else {

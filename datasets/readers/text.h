@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "nn/geometry/body.h"
+#include "datasets/readers/non_finite.h"
 
 namespace restage::text {
 
@@ -36,11 +36,13 @@ bool parse(std::string_view word, int64_t& value);
 std::string quote(std::string_view word);
 
 [[noreturn]] void throw_no_coordinate(double value, const std::string& where);
-/// One coordinate as float; InputError at `where()` if it is NaN, infinite or beyond float.
+/// One coordinate as float; if it is NaN, infinite or beyond float, NaN or InputError at `where()`.
 template <class Where>
-float coordinate(double value, const Where& where) {
-  if (!(std::abs(value) <= static_cast<double>(std::numeric_limits<float>::max())))
+float coordinate(double value, const Where& where, NonFinite how = NonFinite::refuse) {
+  if (!(std::abs(value) <= static_cast<double>(std::numeric_limits<float>::max()))) {
+    if (how == NonFinite::mark) return std::numeric_limits<float>::quiet_NaN();
     throw_no_coordinate(value, where());
+  }
   return static_cast<float>(value);
 }
 /// Adds the fan of a polygon of n corners.

@@ -124,16 +124,19 @@ void judge_origin(Report& out) {
 
 Report examine_mesh(const Options& options) {
   Vec3 origin;
-  Mesh mesh = read_mesh(options.path, origin);
+  size_t left_out = 0;
+  Mesh mesh = read_mesh(options.path, left_out, origin);
   const char* kind = mesh.faces.empty() ? "cloud" : "mesh";
   Report out = examine_one(kind, std::move(mesh), origin, options);
   judge_origin(out);
+  if (left_out > 0) out.findings.push_back(non_finite(left_out, ""));
   return out;
 }
 
 Report examine_sequence(const Options& options) {
   Report out("frames");
-  auto source = open_frames(options.path, {"", options.max_memory});
+  auto source = open_frames(
+      options.path, {.clip = "", .max_memory = options.max_memory, .leave_out_non_finite = true});
   Diagnosis d = examine_frames(*source, examine_options(options));
   out.facts["frames"] = d.frames;
   out.facts["fps"] = d.fps;

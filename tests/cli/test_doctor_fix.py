@@ -5,6 +5,7 @@ import struct
 import zlib
 
 from support import CliTest, numbers
+from test_arrays import npy
 from test_gltf import character
 
 
@@ -45,6 +46,28 @@ class DoctorFix(CliTest):
         self.frames("walk12", self.walk())
         self.bad_input(["doctor", "walk12", "--fix", "x.ply"], "x.ply", "12 frames", ".h5")
         self.bad_input(["doctor", "walk/target.ply", "--fix", "x.h5"], "surfaces", ".ply")
+
+    def test_points_that_are_no_numbers_are_told_and_left_out(self):
+        nan, inf = float("nan"), float("inf")
+        person, bad = self.person(), [(nan, 0, 0), (0, inf, 0), (0, 0, -inf)]
+        faces = self.mesh("walk/target.ply")[1]
+        cloud = person[:900] + bad + person[900:]
+        shifted = [[i + 3 * (i >= 900) for i in face] for face in faces]
+        self.write("bad.obj", "".join("v %.9g %.9g %.9g\n" % p for p in cloud).encode())
+        self.write("bad.npy", npy((2, len(cloud), 3), 2 * [x for point in cloud for x in point], "<f4"))
+        self.frames("bad_frames", [cloud, person])
+        for name, out, said in ((self.ply("bad.ply", cloud), "a.ply", "3 points"),
+                                (self.ply("mesh.ply", cloud, shifted + [(0, 1, 900)]), "b.ply", "3 points"),
+                                ("bad.obj", "c.ply", "3 points"), ("bad.npy", "d.h5", "6 points"), ("bad_frames", "e.h5", "3 points")):
+            found = json.loads(self.restage("doctor", name, "--json").out)
+            wrong = [f for f in found["findings"] if f["topic"] == "non-finite"]
+            self.assertEqual([f["weight"] for f in wrong], ["wrong"], name)
+            self.assertTrue(wrong[0]["what"].startswith(said), wrong)
+            self.assertFalse(found["usable"])
+            self.assertEqual(self.restage("doctor", name).code, 1)
+            self.assertTrue(self.fix(name, out, 0)["fixed"]["usable"], name)
+        self.assertEqual(self.mesh("b.ply"), (person, faces))
+        self.assertEqual(json.loads(self.done("doctor", "e.h5", "--json"))["facts"]["frames"], 2)
 
     def test_a_character_is_mended_as_retarget_takes_it(self):
         count, faces = character(self.path("hero.glb"))  # an A-pose, z up
