@@ -14,13 +14,6 @@ constexpr double kShoulderHeight = 0.81, kShoulderWidth = 0.10, kShortestReach =
 constexpr double kHipHeight = 0.53, kHipWidth = 0.055, kFoot = 0.06;
 constexpr double kChest = 0.6, kNeck = 0.8, kTrunkWidth = 0.12;
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// The middle of the points that `chosen` takes; nothing if there are none.
 template <class Chosen>
 std::optional<Vec3> middle_of(const std::vector<Vec3>& points, Chosen&& chosen) {

@@ -23,13 +23,6 @@ constexpr double kSizeJump = 2;       // times another size than the frame befor
 constexpr double kFastest = 8;        // metres per second of a person's middle
 constexpr double kWalked = 0.7;       // metres: long enough to say where somebody walks
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 std::string frame_list(const std::vector<int64_t>& frames) {
   std::string out;
   for (size_t i = 0; i < frames.size() && i < 5; ++i)

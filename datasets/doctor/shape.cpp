@@ -113,6 +113,13 @@ UnitGuess guess_unit(double size) {
   return out;
 }
 
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + std::ssize(values) / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 double quantile(const Points& points, const Vec3& axis, double q) {
   if (points.empty()) return 0;
   std::vector<double> along;

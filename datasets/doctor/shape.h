@@ -65,6 +65,8 @@ inline constexpr double kSizeOfHeight = 0.23;
 
 /// Value of `points` along `axis` that a share `q` of them lie below.
 double quantile(const Points& points, const Vec3& axis, double q);
+/// The middle one, of an even number the upper of the two; 0 if there are none.
+double median(std::vector<double> values);
 
 /// Share of the rays through the cloud, from the direction where it is largest, that hit one side
 /// only: about 0.3 of a closed body, 0.8 of what one depth camera saw.
