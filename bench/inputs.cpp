@@ -11,7 +11,7 @@
 #include "datasets/sampling/windows.h"
 #include "nn/weights/bundle.h"
 #include "nn/weights/state.h"
-#include "train/config.h"
+#include "nn/config/config.h"
 
 namespace restage::bench {
 namespace {

@@ -13,7 +13,7 @@ TOP = ("autograd", "nn", "datasets", "train", "infer", "experiments")
 
 BASE, TENSOR = "autograd/base", "autograd/tensor"
 ENGINE = [BASE, TENSOR, "autograd/kernels", "autograd/tape", "autograd/ops"]
-NN = ["nn", "nn/geometry", "nn/layers", "nn/losses", "nn/metrics", "nn/models", "nn/weights"]
+NN = ["nn", "nn/config", "nn/geometry", "nn/layers", "nn/losses", "nn/metrics", "nn/models", "nn/weights"]
 
 # What a folder may include besides itself. A name covers that folder only, "name/*" all below it.
 MAY_USE = {
@@ -24,13 +24,14 @@ MAY_USE = {
     "autograd/tape": [BASE, TENSOR, "autograd/kernels"],
     "autograd/ops": [BASE, TENSOR, "autograd/kernels", "autograd/tape"],
     "autograd/gradcheck": ENGINE,
+    "nn/config": [BASE],
     "nn": ENGINE,
     "nn/geometry": [BASE],
     "nn/metrics": [BASE, "nn/geometry"],
     "nn/layers": ENGINE + ["nn"],
-    "nn/models": ENGINE + ["nn", "nn/geometry", "nn/layers"],
+    "nn/models": ENGINE + ["nn", "nn/config", "nn/geometry", "nn/layers"],
     "nn/losses": ENGINE + ["nn", "nn/geometry", "nn/layers", "nn/models"],
-    "nn/weights": [BASE, TENSOR, "nn", "nn/models"],
+    "nn/weights": [BASE, TENSOR, "nn", "nn/config", "nn/models"],
     "datasets/*": ENGINE + NN + ["datasets/*"],
     "infer/*": ENGINE + NN + ["infer/*"],
     "train/stages": ENGINE + NN + ["train/*", "datasets/*"],
@@ -48,7 +49,7 @@ ONLY_IN = {
     "spdlog/": ["autograd/base/log.cpp"],
     "sanitizer/": ["autograd/cpu/pool.cpp"],
     "hdf5.h": ["datasets/hdf5/"],
-    "yaml-cpp/": ["train/config_yaml.cpp", "nn/weights/", "datasets/importers/profiles.cpp"],
+    "yaml-cpp/": ["nn/config/config_yaml.cpp", "nn/weights/", "datasets/importers/profiles.cpp"],
     "CLI/": ["experiments/"],
     "nanoflann.hpp": ["nn/metrics/", "datasets/doctor/", "infer/registration/"],
     "nlohmann/": ["nn/weights/", "datasets/readers/", "datasets/benchmark/manifest.cpp",

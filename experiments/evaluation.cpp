@@ -1,6 +1,7 @@
 #include "experiments/evaluation.h"
 
 #include "nn/geometry/closed_form.h"
+#include "train/stages/skeleton_stage.h"
 
 namespace restage {
 namespace {
@@ -57,12 +58,13 @@ void add_references(const Sequence& s, const Retargeter& target, SystemScores* s
   const auto carried = rest_pose_joints(s.source, target.rest());
   for (size_t f = 0; f < s.source.size(); ++f) {
     closed.joints.push(forward_kinematics(target.rest(), poses[f]).joints);
-    closed.vertices.push(target.pose_vertices(poses[f]));
     rest.joints.push(carried[f]);
+    unchanged.joints.push(s.source[f]);
+    if (target.surface() == nullptr) continue;
+    closed.vertices.push((*target.surface())(poses[f]));
     Points moved = target.target().vertices;
     for (Point& p : moved) p += (carried[f][0] - target.rest()[0]).cast<float>();
     rest.vertices.push(moved);
-    unchanged.joints.push(s.source[f]);
   }
   if (scores->references.empty())
     scores->references = {{"rest_pose", {}}, {"source_unchanged", {}}, {"closed_form", {}}};
@@ -71,19 +73,25 @@ void add_references(const Sequence& s, const Retargeter& target, SystemScores* s
   add(closed, s, &scores->references[2].second);
 }
 
-void judge(const Performance& performance, Retargeter& retargeter, bool clouds,
-           SystemScores* scores) {
+Sequence truth_of(const Performance& performance) {
   Sequence s;
-  Predicted model;
   for (size_t i = 0; i < performance.frames(); ++i) {
     s.joints.push(performance.joints_b(i));
     s.vertices.push(performance.vertices_b(i));
+  }
+  return s;
+}
+
+void judge_retargeting(const Performance& performance, Retargeter& retargeter, bool clouds,
+                       Sequence s, SystemScores* scores) {
+  Predicted model;
+  for (size_t i = 0; i < performance.frames(); ++i) {
     const auto frames = clouds ? retargeter.push(performance.cloud(i), "frame " + std::to_string(i))
                                : retargeter.push_joints(performance.joints_a(i));
-    s.source.push_back(retargeter.source_joints());
+    s.source.push_back(*retargeter.source_joints());
     for (const RetargetedFrame& f : frames) {
       model.joints.push(f.joints);
-      model.vertices.push(f.vertices);
+      if (retargeter.surface() != nullptr) model.vertices.push(f.vertices);
     }
   }
   if (!clouds) s.source_rest = performance.source().joints;
@@ -92,29 +100,112 @@ void judge(const Performance& performance, Retargeter& retargeter, bool clouds,
   add_references(s, retargeter, scores);
 }
 
+/// The surface alone; what stands still is the reference.
+void judge_surface(const Performance& performance, const Surface& surface, const Sequence& s,
+                   SystemScores* scores) {
+  const Body& body = performance.target();
+  Predicted model, rest;
+  for (size_t i = 0; i < performance.frames(); ++i) {
+    const Pose pose = performance.pose_b(i);
+    model.vertices.push(surface(pose));
+    Points moved = body.rest.vertices;
+    for (Point& p : moved) p += (pose.root - body.joints[0]).cast<float>();
+    rest.vertices.push(moved);
+  }
+  if (scores->references.empty()) scores->references = {{"rest_pose", {}}};
+  add(model, s, &scores->model);
+  add(rest, s, &scores->references[0].second);
+  scores->frames.push_back(s.joints.frames);
+}
+
+/// What a condition needs, and what is not there of it.
+struct Condition {
+  const char* name;
+  std::vector<std::string> roles;
+};
+
+std::string lacking(const Condition& condition, const Bundle& weights) {
+  for (const std::string& role : condition.roles)
+    if (weights.find(role) == nullptr)
+      return std::string(condition.name) + ": no model for " + role;
+  return "";
+}
+
+/// Extractor alone, on held-out clouds and T-poses.
+void judge_extractor(const Bundle& weights, const Corpus& corpus, CloudConfig clouds,
+                     SystemEvaluation* out) {
+  auto* model = weights.find_as<SkeletonModel>("skeleton");
+  if (model == nullptr) {
+    out->missing.push_back("extractor: no model for skeleton");
+    return;
+  }
+  clouds.points = static_cast<int>(model->points());
+  clouds.mirror = false;
+  clouds.scale_jitter = 0;
+  const CloudSampler sampler(corpus, clouds, 2);
+  out->joint_error = joint_error(*model, sampler.clouds(evaluation_clouds(corpus, 400, 2)));
+  out->tpose_joint_error =
+      joint_error(*model, sampler.clouds(evaluation_tposes(corpus, 8, clouds.tpose_heading, 2)));
+}
+
 }  // namespace
 
-SystemEvaluation evaluate_system(const ModelSet& models, const Corpus& corpus,
-                                 const std::vector<EvalSequence>& list, uint64_t seed,
-                                 double anchor) {
+const SystemScores* SystemEvaluation::find(const std::string& condition) const {
+  for (const auto& [name, scores] : conditions)
+    if (name == condition) return &scores;
+  return nullptr;
+}
+
+EvaluationOptions evaluation_options(const TrainConfig& config, const Corpus& test, uint64_t seed) {
+  EvaluationOptions out;
+  out.seed = seed;
+  out.clouds = config.section("skeleton").config.as<SkeletonStageConfig>().clouds;
+  out.sequences = evaluation_sequences(test, static_cast<size_t>(config.evaluation.sequences),
+                                       static_cast<size_t>(config.evaluation.frames), seed);
+  return out;
+}
+
+SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weights_name,
+                                 const Corpus& corpus, const EvaluationOptions& options) {
   SystemEvaluation out;
-  RetargetOptions options;
-  options.seed = seed;
-  options.force =
-      true;  // a badly extracted target counts with its error instead of ending the table
-  options.samples = 4;
-  options.anchor = anchor;
-  for (const EvalSequence& sequence : list) {
-    const Performance performance(corpus, sequence, ScanConfig{}, seed);
-    Retargeter from_clouds(models, performance.target().rest, performance.target().id, options);
-    judge(performance, from_clouds, true, &out.extracted);
-    Retargeter from_truth(models, performance.target().rest, performance.target().joints, options);
-    judge(performance, from_truth, false, &out.truth);
+  for (const Condition& condition : {Condition{"clouds", {"skeleton", "motion"}},
+                                     Condition{"true_skeletons", {"motion"}},
+                                     Condition{"true_poses", {"deformation.weights"}}}) {
+    const std::string missing = lacking(condition, weights);
+    if (!missing.empty())
+      out.missing.push_back(missing);
+    else
+      out.conditions.emplace_back(condition.name, SystemScores{});
   }
-  for (SystemScores* scores : {&out.extracted, &out.truth}) {
-    finish(&scores->model);
-    for (auto& reference : scores->references) finish(&reference.second);
+  if (weights.find("motion") != nullptr && weights.find("deformation.weights") == nullptr)
+    out.missing.push_back("surfaces: no model for deformation.weights");
+  RetargetOptions retarget;
+  retarget.seed = options.seed;
+  retarget.force = true;  // a badly extracted target counts with its error instead of ending the table
+  retarget.samples = 4;
+  retarget.anchor = options.anchor;
+  for (const EvalSequence& sequence : options.sequences) {
+    const Performance performance(corpus, sequence, ScanConfig{}, options.seed);
+    const Sequence truth = truth_of(performance);
+    const Body& target = performance.target();
+    for (auto& [name, scores] : out.conditions) {
+      if (name == "true_poses") {
+        judge_surface(performance, Surface(weights, weights_name, target.rest, target.joints), truth,
+                      &scores);
+      } else if (name == "clouds") {
+        Retargeter retargeter(weights, weights_name, target.rest, target.id, retarget);
+        judge_retargeting(performance, retargeter, true, truth, &scores);
+      } else {
+        Retargeter retargeter(weights, weights_name, target.rest, target.joints, retarget);
+        judge_retargeting(performance, retargeter, false, truth, &scores);
+      }
+    }
   }
+  for (auto& [name, scores] : out.conditions) {
+    finish(&scores.model);
+    for (auto& reference : scores.references) finish(&reference.second);
+  }
+  judge_extractor(weights, corpus, options.clouds, &out);
   return out;
 }
 

@@ -1,6 +1,7 @@
 // The whole system on held-out bodies and subjects: what `restage eval run=RUN` prints.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -8,10 +9,11 @@
 #include "datasets/sampling/evaluation.h"
 #include "infer/retargeter.h"
 #include "nn/metrics/metrics.h"
+#include "train/stages/train_config.h"
 
 namespace restage {
 
-/// One way of looking at the same sequences: from true skeletons, or from clouds alone.
+/// One way of looking at the same sequences.
 struct SystemScores {
   metrics::Evaluation model;
   std::vector<int64_t> frames;
@@ -19,15 +21,34 @@ struct SystemScores {
   std::vector<std::pair<std::string, metrics::Evaluation>> references;
 };
 
+/// What weights can be judged on, and what they cannot.
 struct SystemEvaluation {
-  SystemScores extracted;  ///< clouds in, target's joints extracted: end to end
-  SystemScores truth;      ///< true joints of source and target: no extractor
+  /// By condition, as far as there are models for it:
+  ///   "clouds"          clouds in, the target's joints extracted: end to end (skeleton, motion)
+  ///   "true_skeletons"  true joints of source and target: no extractor (motion)
+  ///   "true_poses"      true joints and rotations of the target: its surface alone (deformation)
+  std::vector<std::pair<std::string, SystemScores>> conditions;
+  /// Extractor alone, metres; empty without one.
+  std::optional<double> joint_error, tpose_joint_error;
+  /// "clouds: no model for skeleton"
+  std::vector<std::string> missing;
+
+  /// Null if it could not be judged.
+  const SystemScores* find(const std::string& condition) const;
 };
 
-/// Judges every sequence of `list` on the bodies and motions of `corpus`. `anchor`:
-/// RetargetOptions.
-SystemEvaluation evaluate_system(const ModelSet& models, const Corpus& corpus,
-                                 const std::vector<EvalSequence>& list, uint64_t seed,
-                                 double anchor);
+struct EvaluationOptions {
+  uint64_t seed = 0;
+  double anchor = RetargetOptions{}.anchor;
+  std::vector<EvalSequence> sequences;
+  CloudConfig clouds;  ///< of the extractor's own figures
+};
+
+/// Judges the models of `weights` on the bodies and motions of `corpus`.
+SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weights_name,
+                                 const Corpus& corpus, const EvaluationOptions& options);
+
+/// What `restage eval run=` looks at: the sequences and clouds of a training's configuration.
+EvaluationOptions evaluation_options(const TrainConfig& config, const Corpus& test, uint64_t seed);
 
 }  // namespace restage

@@ -69,60 +69,43 @@ void require_tpose(const Joints& j, const std::string& where) {
 
 }  // namespace
 
-Retargeter::Retargeter(const ModelSet& models, Mesh target, const std::string& where,
-                       const RetargetOptions& options)
-    : models_(models),
-      target_(std::move(target)),
-      options_(options),
-      extractor_(*models.skeleton, options.samples) {
+Retargeter::Retargeter(const Bundle& weights, const std::string& weights_name, Mesh target,
+                       const std::string& where, const RetargetOptions& options)
+    : models_(weights), target_(std::move(target)), options_(options) {
+  auto& skeleton = models_.need_as<SkeletonModel>("skeleton", weights_name);
   const RngKey key = RngKey{options.seed, 0}.fold("target");
-  rest_ =
-      extract_joints(*models.skeleton, surface_points(target_, kTargetPoints, key.fold("surface")),
-                     where, key, kTargetSamples);
+  rest_ = extract_joints(skeleton, surface_points(target_, kTargetPoints, key.fold("surface")),
+                         where, key, kTargetSamples);
   if (!options.force) require_tpose(rest_, where);
-  prepare();
+  prepare(weights_name);
 }
 
-Retargeter::Retargeter(const ModelSet& models, Mesh target, const Joints& rest,
-                       const RetargetOptions& options)
-    : models_(models),
-      target_(std::move(target)),
-      options_(options),
-      extractor_(*models.skeleton, options.samples),
-      rest_(rest) {
-  prepare();
+Retargeter::Retargeter(const Bundle& weights, const std::string& weights_name, Mesh target,
+                       const Joints& rest, const RetargetOptions& options)
+    : models_(weights), target_(std::move(target)), options_(options), rest_(rest) {
+  prepare(weights_name);
 }
 
-void Retargeter::prepare() {
-  const auto extra = [&](const char* name, const char* standard) {
-    const auto it = models_.extra.find(name);
-    return it == models_.extra.end() ? std::string(standard) : it->second;
-  };
+void Retargeter::prepare(const std::string& weights_name) {
   if (!(options_.fps >= 1 && options_.fps <= 1000))
     throw InputError("", "the source's frames per second are out of range",
                      "give --fps from 1 to 1000");
   if (!(options_.anchor >= 0))
     throw InputError("", "the anchor's time is out of range", "give --anchor 0 or more seconds");
-  const std::string translation = extra("translation", "velocity");
+  if (auto* skeleton = models_.find_as<SkeletonModel>("skeleton"))
+    extractor_.emplace(*skeleton, options_.samples);
+  const TrainedModel& motion = models_.need("motion", weights_name);
+  motion_ = &models_.need_as<MotionModel>("motion", weights_name);
+  const std::string translation =
+      motion.setting("translation", {"velocity", "relative", "absolute"});
   path_ = translation == "velocity"   ? Path::velocity
           : translation == "relative" ? Path::relative
                                       : Path::absolute;
-  remove_heading_ = extra("remove_heading", "false") == "true";
-  keep_root_rotation_ = extra("keep_root_rotation", "true") == "true";
-  const auto v = static_cast<int64_t>(target_.vertices.size());
+  remove_heading_ = motion.setting("remove_heading", {"false", "true"}) == "true";
   rest_tensor_ = tensor_of(rest_, rest_[0]);
-  Tensor points = Tensor::empty({1, v, 3});
-  for (size_t i = 0; i < target_.vertices.size(); ++i)
-    for (int c = 0; c < 3; ++c)
-      points.data<float>()[3 * i + static_cast<size_t>(c)] =
-          target_.vertices[i][c] - static_cast<float>(rest_[0][c]);
-  Context ctx;
-  const Tensor weights =
-      models_.weights->at_points(ctx, Var(rest_tensor_.reshape({1, 3 * kJoints})), Var(points))
-          .value.reshape({v, kJoints});
-  weights_ = Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, kJoints, Eigen::RowMajor>>(
-      weights.data<float>(), v, kJoints);
-  deformer_.emplace(points.reshape({v, 3}), weights, models_.offsets.net.get());
+  if (models_.find("deformation.weights") != nullptr)
+    surface_.emplace(models_, weights_name, target_, rest_);
+  if (surface_) rig_.emplace(SystemRig{rest_, surface_->weights()});
 }
 
 void Retargeter::restart() {
@@ -139,7 +122,10 @@ std::span<const RetargetedFrame> Retargeter::push(const Points& cloud, const std
   double seconds = 0;
   {
     const Stopwatch watch(&seconds);
-    joints = extractor_(cloud, source, key);
+    if (!extractor_)
+      throw InputError(source, "cannot be read without a model for skeleton",
+                       "give weights that have one");
+    joints = (*extractor_)(cloud, source, key);
   }
   const auto out = push_joints(joints);
   times_.extract = seconds;
@@ -173,7 +159,7 @@ void Retargeter::step(const Joints& a, RetargetedFrame* out) {
   const Stopwatch watch(&times_.deformation);
   const PosedSkeleton posed = forward_kinematics(rest_, out->pose);
   out->joints = posed.joints;
-  deform(out->pose, posed, &out->vertices);
+  if (surface_) (*surface_)(out->pose, posed, &out->vertices);
   const auto finite = [](const auto& x) { return x.allFinite(); };
   if (!std::all_of(out->joints.begin(), out->joints.end(), finite) ||
       !std::all_of(out->vertices.begin(), out->vertices.end(), finite))
@@ -201,9 +187,9 @@ void Retargeter::advance(const Joints& a, Pose* pose) {
   Tensor trans = Tensor::empty({1, 1, 3});
   for (int c = 0; c < 3; ++c) trans.data<float>()[c] = static_cast<float>(moved[c]);
   Context ctx;
-  const SmrmOutput answer =
-      (*models_.smrm)(ctx, Var(tensor_of(local, Vec3::Zero()).reshape({1, 1, kJoints, 3})),
-                      Var(trans), Var(rest_tensor_), &state_);
+  const MotionOutput answer =
+      motion_->forward(ctx, Var(tensor_of(local, Vec3::Zero()).reshape({1, 1, kJoints, 3})),
+                       Var(trans), Var(rest_tensor_), &state_);
   const float* r = answer.rotations.value.data<float>();
   for (size_t j = 0; j < kJoints; ++j)
     pose->local[j] =
@@ -229,32 +215,6 @@ void Retargeter::sum_path(const Joints& a, const Vec3& velocity) {
   const double scale = leg_length(rest_) / std::max(legs_a_, 1e-6);
   const Vec3 wanted = centre_b_ + scale * (a[0] - centre_a_);
   root_b_ += (1 - std::exp(-1 / (kFps * options_.anchor))) * (wanted - root_b_);
-}
-
-void Retargeter::deform(const Pose& pose, const PosedSkeleton& posed, Points* out,
-                        bool dense) const {
-  Tensor local = Tensor::empty({kJoints, 9}), bones = Tensor::empty({kJoints, 3, 4});
-  using Rows = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
-  using Bone = Eigen::Matrix<float, 3, 4, Eigen::RowMajor>;
-  for (size_t j = 0; j < kJoints; ++j) {
-    Eigen::Map<Rows>(local.data<float>() + 9 * j) = pose.local[j].cast<float>();
-    Eigen::Map<Bone> bone(bones.data<float>() + 12 * j);
-    bone.leftCols<3>() = posed.global[j].cast<float>();
-    bone.col(3) = (posed.joints[j] - posed.global[j] * (rest_[j] - rest_[0])).cast<float>();
-  }
-  Tensor angles = Tensor::empty({kJoints, 3});
-  launch(FromMatrixArgs{RotationForm::axis_angle, local, angles});
-  if (!keep_root_rotation_) std::fill_n(angles.data<float>(), 3, 0.0f);
-  const Tensor points = (*deformer_)(angles.reshape({1, 3 * kJoints}), bones, dense);
-  out->resize(target_.vertices.size());
-  for (size_t i = 0; i < out->size(); ++i)
-    (*out)[i] = Eigen::Map<const Point>(points.data<float>() + 3 * i);
-}
-
-Points Retargeter::pose_vertices(const Pose& pose, bool dense) const {
-  Points out;
-  deform(pose, forward_kinematics(rest_, pose), &out, dense);
-  return out;
 }
 
 }  // namespace restage

@@ -5,8 +5,10 @@
 #include <optional>
 #include <span>
 
-#include "infer/deformer.h"
 #include "infer/extraction.h"
+#include "infer/surface.h"
+#include "infer/system.h"
+#include "nn/models/motion.h"
 #include "nn/weights/bundle.h"
 
 namespace restage {
@@ -21,68 +23,54 @@ struct RetargetOptions {
   double anchor = 0.25;
 };
 
-/// B in one frame.
-struct RetargetedFrame {
-  Pose pose;        ///< local rotations, pelvis in the world
-  Joints joints;    ///< posed, world
-  Points vertices;  ///< posed, world, in the target's order
-};
-
-/// Seconds that the parts of one push() took.
-struct FrameTimes {
-  double extract = 0, motion = 0, deformation = 0;
-};
-
-class Retargeter {
+/// Our chain of three networks.
+class Retargeter final : public System {
  public:
-  /// `models` must hold all stages and outlive the object. `where` names the target in errors.
-  /// InputError: a target whose shoulder-wrist lines are more than 30 degrees from +-x.
-  Retargeter(const ModelSet& models, Mesh target, const std::string& where,
-             const RetargetOptions& options);
-  /// The same from known rest joints of the target instead of extracted ones.
-  Retargeter(const ModelSet& models, Mesh target, const Joints& rest,
-             const RetargetOptions& options);
+  /// `weights` come from the file `weights_name` (for errors) and need at least a model for skeleton
+  /// and one for motion. Without `deformation.weights` frames have no vertices, without offsets
+  /// skinning is all. `where` names the target. InputError: a model that is missing, a setting that
+  /// is unknown, a target whose shoulder-wrist lines are more than 30 degrees from +-x.
+  Retargeter(const Bundle& weights, const std::string& weights_name, Mesh target,
+             const std::string& where, const RetargetOptions& options);
+  /// The same from known rest joints of the target instead of extracted ones; the source is then
+  /// given by push_joints() unless there is a model for skeleton.
+  Retargeter(const Bundle& weights, const std::string& weights_name, Mesh target,
+             const Joints& rest, const RetargetOptions& options);
 
-  /// One frame of A. At 30 fps each gives one frame of B, else those of the 30 fps grid that it
-  /// ends. They live until the next call: a steady frame takes no memory.
-  std::span<const RetargetedFrame> push(const Points& cloud, const std::string& source);
+  /// At 30 fps each cloud gives one frame, else those of the 30 fps grid that it ends. A steady frame
+  /// takes no memory.
+  std::span<const RetargetedFrame> push(const Points& cloud, const std::string& source) override;
   /// The same from joints of A in the world.
   std::span<const RetargetedFrame> push_joints(const Joints& joints);
-  /// The target's surface in a pose of choice: skinning weights and offsets of the models. `dense`:
-  /// nothing is left out, to compare with.
-  Points pose_vertices(const Pose& pose, bool dense = false) const;
-  /// Forgets the motion so far.
-  void restart();
+  void restart() override;
 
-  const Mesh& target() const { return target_; }
+  const Mesh& target() const override { return target_; }
+  const SystemRig* rig() const override { return rig_ ? &*rig_ : nullptr; }
   const Joints& rest() const { return rest_; }
-  const Eigen::Matrix<float, Eigen::Dynamic, kJoints, Eigen::RowMajor>& weights() const {
-    return weights_;
-  }
-  /// Joints extracted from the last cloud.
-  const Joints& source_joints() const { return last_source_; }
-  /// What the last push() took.
-  const FrameTimes& times() const { return times_; }
+  /// Null without a model for `deformation.weights`.
+  const Surface* surface() const { return surface_ ? &*surface_ : nullptr; }
+  const Joints* source_joints() const override { return &last_source_; }
+  FrameTimes times() const override { return times_; }
 
  private:
-  void prepare();
+  void prepare(const std::string& weights_name);
   void step(const Joints& a, RetargetedFrame* out);
   void advance(const Joints& a, Pose* pose);
   void sum_path(const Joints& a, const Vec3& velocity);
-  void deform(const Pose& pose, const PosedSkeleton& posed, Points* out, bool dense = false) const;
 
-  const ModelSet& models_;
+  Bundle models_;
   Mesh target_;
   RetargetOptions options_;
-  JointExtractor extractor_;
+  std::optional<JointExtractor> extractor_;
+  const MotionModel* motion_ = nullptr;
   Joints rest_;
-  Eigen::Matrix<float, Eigen::Dynamic, kJoints, Eigen::RowMajor> weights_;
+  std::optional<Surface> surface_;
+  std::optional<SystemRig> rig_;
   Tensor rest_tensor_;  // relative to the rest pelvis
-  std::optional<Deformer> deformer_;
   // How the models were trained:
   enum class Path { velocity, relative, absolute } path_ = Path::velocity;
-  bool remove_heading_ = false, keep_root_rotation_ = true;
-  SmrmState state_;
+  bool remove_heading_ = false;
+  MotionState state_;
   std::optional<Joints> previous_;  ///< A on the 30 fps grid, one step ago
   std::optional<Joints> received_;  ///< A as last pushed
   Joints last_source_;

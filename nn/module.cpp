@@ -69,6 +69,11 @@ void cast_module(Module& module, DType type) {
 }
 
 Tensor Init::uniform(const Shape& shape, double bound, const std::string& name) const {
+  if (budget != nullptr) {
+    *budget -= shape.numel();
+    if (*budget < 0)
+      throw InputError("", "is too small for the network", "give the sizes it was trained with");
+  }
   const RngKey stream = key.fold(name);
   std::vector<double> values(static_cast<size_t>(shape.numel()));
   for (size_t i = 0; i < values.size(); ++i)

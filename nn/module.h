@@ -77,8 +77,12 @@ void cast_module(Module& module, DType type);
 struct Init {
   RngKey key;
   DType type = DType::f32;
+  /// How many numbers a network may still take, where a file says how large it is to be (null: as
+  /// many as it likes). So a damaged size cannot ask for all memory.
+  int64_t* budget = nullptr;
+  /// InputError if the budget is spent.
   Tensor uniform(const Shape& shape, double bound, const std::string& name) const;
-  Init sub(const std::string& name) const { return {key.fold(name), type}; }
+  Init sub(const std::string& name) const { return {key.fold(name), type, budget}; }
 };
 
 }  // namespace restage

@@ -1,4 +1,6 @@
-// A stage is what is optimised and how; the loop around it is the trainer's (trainer.h).
+// A stage is what is optimised and how; the loop around it is the trainer's (trainer.h). A stage
+// enters its networks and optimisers once, and saving, loading, starting from other weights and
+// handing on follow from that.
 #pragma once
 
 #include <functional>
@@ -10,6 +12,8 @@
 #include "nn/module.h"
 #include "nn/weights/bundle.h"
 #include "nn/weights/state.h"
+#include "train/model_choice.h"
+#include "train/optim/optimiser.h"
 
 namespace restage {
 
@@ -17,11 +21,16 @@ using NamedValues = std::vector<std::pair<std::string, double>>;
 
 class Stage {
  public:
+  Stage(std::string name, OptimiserConfig optimiser)
+      : optimiser_(std::move(optimiser)), name_(std::move(name)) {}
   virtual ~Stage() = default;
-  virtual std::string name() const = 0;
-  virtual int64_t steps() const = 0;
+  Stage(const Stage&) = delete;
+  Stage& operator=(const Stage&) = delete;
+
+  const std::string& name() const { return name_; }
+  int64_t steps() const { return optimiser_.steps; }
   /// Clouds, windows or pairs of bodies in a step.
-  virtual int64_t examples_per_step() const = 0;
+  int64_t examples_per_step() const { return optimiser_.batch; }
   /// Optimiser step number `step` (from 0). Everything random is a function of (seed, step), so a
   /// resumed run repeats the same bits. Returns what to log.
   virtual NamedValues step(int64_t step) = 0;
@@ -29,11 +38,54 @@ class Stage {
   virtual void read(int64_t step) const = 0;
   /// Held-out figures by the evaluation's own metrics.
   virtual NamedValues validate() = 0;
-  /// All that a checkpoint needs: models, optimisers, anything carried from step to step.
-  virtual void save(TensorFile& file) const = 0;
-  virtual void load(const TensorFile& file, const std::string& where) = 0;
-  /// Hands the trained models over (after the last step).
-  virtual void export_models(ModelSet& set) = 0;
+
+  /// All that a checkpoint needs: networks, optimisers, anything carried from step to step.
+  void save(TensorFile& file) const;
+  void load(const TensorFile& file, const std::string& where);
+  /// Takes tensors of trained weights in the place of random ones: those whose names in a weights
+  /// file ("smrm.enc.weight_ih_l0") match one of `names`, where * stands for any text. Settings stay
+  /// the stage's own; a difference gives a warning. InputError naming `where`: a pattern that
+  /// matches nothing, a tensor that is missing or does not fit.
+  void start_from(const Bundle& weights, const std::vector<std::string>& names,
+                  const std::string& where);
+  /// The networks to be used later, by role. They are shared with the stage.
+  Bundle result() const;
+
+ protected:
+  /// Builds a network that the stage trains. `handed_on`: it is needed after the training.
+  template <class M>
+  M* add_network(const std::string& role, const std::string& model, const AnyConfig& sizes,
+                 const RngKey& key, Settings settings = {}, bool handed_on = true) {
+    auto net = make_model_as<M>(model, sizes, Init{key, DType::f32});
+    networks_.push_back({role, {model, sizes, net, std::move(settings)}, handed_on});
+    return net.get();
+  }
+  template <class M>
+  M* add_network(const ModelChoice& choice, const RngKey& key, Settings settings = {}) {
+    return add_network<M>(choice.role, choice.name, choice.sizes, key, std::move(settings));
+  }
+  /// An optimiser of the networks of some roles.
+  Adam* add_optimiser(const std::string& name, const std::vector<std::string>& roles,
+                      const AdamConfig& config);
+  /// Whatever else is carried from step to step.
+  virtual void save_more(TensorFile&) const {}
+  virtual void load_more(const TensorFile&, const std::string& /*where*/) {}
+
+  const OptimiserConfig optimiser_;
+
+ private:
+  struct Network {
+    std::string role;
+    TrainedModel model;
+    bool handed_on;
+  };
+  struct Optimiser {
+    std::string name;
+    std::unique_ptr<Adam> adam;
+  };
+  std::string name_;
+  std::vector<Network> networks_;
+  std::vector<Optimiser> optimisers_;
 };
 
 /// One differentiation: runs `loss` on a fresh tape in training mode and returns the gradients of

@@ -36,17 +36,20 @@ NamedValues step_with(MatmulPrecision precision, Stage& stage, int64_t step) {
 
 /// Steps `first` ... of one stage.
 void run_stage(Stage& stage, int64_t first, RunDir& run, const LoopConfig& loop,
-               MatmulPrecision precision, bool quiet) {
+               const TrainOptions& options) {
+  const auto tell = [&](auto&& event) {
+    for (TrainObserver* observer : options.observers) event(*observer);
+  };
   const StopScope stop;
   Throughput throughput;
   product_rate();
   const int64_t steps = stage.steps(), blocks_before = memory_stats().large_allocations;
   reset_peak_memory();
-  Progress progress(stage.name(), steps, standard_progress(quiet), first);
+  Progress progress(stage.name(), steps, standard_progress(options.quiet), first);
   for (int64_t step = first; step < steps; ++step) {
     take_kernel_stats();  // not what validation did
     const auto start = std::chrono::steady_clock::now();
-    NamedValues values = step_with(precision, stage, step);
+    NamedValues values = step_with(options.precision, stage, step);
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
     const KernelStats work = take_kernel_stats();
     throughput.add(stage.examples_per_step(), took.count(), work.flops);
@@ -62,13 +65,17 @@ void run_stage(Stage& stage, int64_t first, RunDir& run, const LoopConfig& loop,
     shown.insert(shown.begin() + std::min<std::ptrdiff_t>(1, std::ssize(shown)), speed.begin(),
                  speed.end());
     progress.update(done, shown);
+    tell([&](TrainObserver& o) { o.on_step(stage, done, values); });
     if (done % loop.validate_every == 0 || last) {
       const NamedValues scores = stage.validate();
       run.metrics(stage.name(), done, scores);
       progress.note(stage.name() + " after " + std::to_string(done) + " steps: " + line(scores));
+      tell([&](TrainObserver& o) { o.on_validation(stage, done, scores); });
     }
-    if (done % loop.checkpoint_every == 0 || last || stopped)
-      run.save_checkpoint(stage.name(), done, bytes_of(stage));
+    if (done % loop.checkpoint_every == 0 || last || stopped) {
+      const std::string path = run.save_checkpoint(stage.name(), done, bytes_of(stage));
+      tell([&](TrainObserver& o) { o.on_checkpoint(stage, done, path); });
+    }
     if (stopped) {
       progress.finish();
       throw_if_stopped();
@@ -90,15 +97,15 @@ void run_stage(Stage& stage, int64_t first, RunDir& run, const LoopConfig& loop,
 
 }  // namespace
 
-ModelSet train(RunDir& run, const std::vector<std::string>& stages, const LoopConfig& loop,
-               const std::function<std::unique_ptr<Stage>(const std::string&)>& make, bool quiet,
-               MatmulPrecision precision) {
+Bundle train(RunDir& run, const std::vector<std::string>& stages, const LoopConfig& loop,
+             const MakeStage& make, const TrainOptions& options) {
   const auto resumed = run.take_resumed();
   const auto begin =
       resumed ? std::find(stages.begin(), stages.end(), resumed->stage) - stages.begin() : 0;
-  ModelSet result;
+  Bundle result;
   for (size_t i = 0; i < stages.size(); ++i) {
-    const auto stage = make(stages[i]);
+    const auto stage = make(stages[i], &result);
+    if (stage == nullptr) continue;
     int64_t first = 0;
     const auto index = static_cast<std::ptrdiff_t>(i);
     if (resumed && index <= begin) {
@@ -110,8 +117,8 @@ ModelSet train(RunDir& run, const std::vector<std::string>& stages, const LoopCo
       stage->load(parse_safetensors(checkpoint->bytes, checkpoint->path), checkpoint->path);
       first = checkpoint->step;
     }
-    run_stage(*stage, first, run, loop, precision, quiet);
-    stage->export_models(result);
+    run_stage(*stage, first, run, loop, options);
+    result.add(stage->result());
   }
   return result;
 }

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "autograd/kernels/matmul_precision.h"
-#include "train/config_reader.h"
+#include "nn/config/config_reader.h"
 #include "train/progress.h"
 #include "train/run.h"
 #include "train/stage.h"
@@ -20,12 +20,31 @@ void visit(V& v, LoopConfig& c) {
   v("checkpoint_every", c.checkpoint_every, "steps between checkpoints", positive());
 }
 
-/// Runs the stages to their ends, going on from the run's checkpoint if it was resumed. `make`
-/// builds a stage when its turn comes. `precision` is that of the steps' products; validation has
-/// float32's, like everything that uses the models later. Throws Interrupted after writing a
-/// checkpoint when a signal came. Returns the trained models.
-ModelSet train(RunDir& run, const std::vector<std::string>& stages, const LoopConfig& loop,
-               const std::function<std::unique_ptr<Stage>(const std::string&)>& make, bool quiet,
-               MatmulPrecision precision = MatmulPrecision::float32);
+/// Watches a training; one hangs on the loop for each thing that wants to know. Called on the
+/// thread that trains, after the loop's own lines are written.
+class TrainObserver {
+ public:
+  virtual ~TrainObserver() = default;
+  virtual void on_step(const Stage&, int64_t /*done*/, const NamedValues&) {}
+  virtual void on_validation(const Stage&, int64_t /*done*/, const NamedValues&) {}
+  /// A checkpoint is on the disk.
+  virtual void on_checkpoint(const Stage&, int64_t /*done*/, const std::string& /*path*/) {}
+};
+
+struct TrainOptions {
+  /// Of the steps' products; validation has float32's, like everything that uses the models later.
+  MatmulPrecision precision = MatmulPrecision::float32;
+  bool quiet = false;
+  std::vector<TrainObserver*> observers;
+};
+
+/// Builds a stage when its turn comes, from what those before it left. Null: there is nothing to
+/// train, and its networks have been put into the bundle.
+using MakeStage = std::function<std::unique_ptr<Stage>(const std::string& name, Bundle* so_far)>;
+
+/// Runs the stages to their ends, going on from the run's checkpoint if it was resumed. Throws
+/// Interrupted after writing a checkpoint when a signal came. Returns the networks of all stages.
+Bundle train(RunDir& run, const std::vector<std::string>& stages, const LoopConfig& loop,
+             const MakeStage& make, const TrainOptions& options = {});
 
 }  // namespace restage

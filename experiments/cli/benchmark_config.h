@@ -2,7 +2,7 @@
 #pragma once
 
 #include "datasets/benchmark/recipe.h"
-#include "train/config_reader.h"
+#include "nn/config/config_reader.h"
 
 namespace restage {
 

@@ -5,7 +5,6 @@ namespace restage::cli {
 void add_commands(Program& program) {
   add_train(program);
   add_retarget(program);
-  add_register(program);
   add_skeleton(program);
   add_data(program);
   add_eval(program);

@@ -18,7 +18,6 @@ void add_data_sheet(Program& program, CLI::App& group);
 void add_doctor(Program& program);
 void add_eval(Program& program);
 void add_info(Program& program);
-void add_register(Program& program);
 void add_render(Program& program);
 void add_retarget(Program& program);
 void add_skeleton(Program& program);

@@ -12,7 +12,7 @@
 #include "experiments/cli/benchmark_config.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
-#include "train/config.h"
+#include "nn/config/config.h"
 
 namespace restage::cli {
 namespace {

@@ -23,7 +23,7 @@
 #include "experiments/cli/doctor_repair.h"
 #include "experiments/cli/doctor_report.h"
 #include "nn/weights/safetensors.h"
-#include "train/config.h"
+#include "nn/config/config.h"
 
 namespace restage::cli {
 namespace {

@@ -10,12 +10,10 @@
 #include "experiments/cli/commands.h"
 #include "experiments/cli/eval_report.h"
 #include "experiments/cli/eval_world.h"
-#include "experiments/cli/weights_path.h"
 #include "experiments/evaluation.h"
 #include "nn/geometry/closed_form.h"
-#include "train/config.h"
+#include "nn/config/config.h"
 #include "train/run.h"
-#include "train/stages/skeleton_stage.h"
 
 namespace restage::cli {
 namespace {
@@ -204,19 +202,6 @@ EvalReport report_of(const SystemScores& scores) {
   return report;
 }
 
-/// Extractor alone, on held-out clouds and T-poses.
-std::pair<double, double> skeleton_errors(const ModelSet& models, const Corpus& test,
-                                          const TrainConfig& config) {
-  CloudConfig clouds = config.skeleton.clouds;
-  clouds.points = static_cast<int>(models.skeleton->points());
-  clouds.mirror = false;
-  clouds.scale_jitter = 0;
-  const CloudSampler sampler(test, clouds, 2);
-  return {joint_error(*models.skeleton, sampler.clouds(evaluation_clouds(test, 400, 2))),
-          joint_error(*models.skeleton,
-                      sampler.clouds(evaluation_tposes(test, 8, clouds.tpose_heading, 2)))};
-}
-
 /// What --out gets: the table and one sequence.
 std::vector<std::string> result_files(const std::string& folder) {
   if (folder.empty()) return {};
@@ -225,50 +210,79 @@ std::vector<std::string> result_files(const std::string& folder) {
   return out;
 }
 
+/// In words, for the heading of a table.
+std::string heading(const std::string& condition) {
+  if (condition == "clouds") return "From clouds alone (extracted skeletons)";
+  if (condition == "true_skeletons") return "From true skeletons";
+  return "Surface alone (true skeletons and rotations of the target)";
+}
+
+std::string to_text(const SystemEvaluation& scores, const EvaluationOptions& options,
+                    const std::string& motion) {
+  std::string out = std::to_string(options.sequences.size()) + " held-out sequences, seed " +
+                    std::to_string(options.seed);
+  char line[160];
+  if (options.anchor > 0) {
+    std::snprintf(line, sizeof line, ", paths held to the source's within %g s", options.anchor);
+    out += line;
+  }
+  out += ".\n";
+  for (const auto& [name, part] : scores.conditions)
+    out += "\n" + heading(name) + ":\n\n" +
+           to_markdown(report_of(part), name == "true_poses" ? "deformation" : motion);
+  if (scores.joint_error) {
+    std::snprintf(line, sizeof line,
+                  "\nExtractor on held-out clouds: %.1f mm; on held-out T-poses: %.1f mm.\n",
+                  1e3 * *scores.joint_error, 1e3 * *scores.tpose_joint_error);
+    out += line;
+  }
+  for (const std::string& missing : scores.missing) out += "\nNot measured: " + missing + ".\n";
+  return out;
+}
+
+/// The best that the weights can be judged on stands at the top: from clouds, else from true
+/// skeletons, else the surface. Its name is "condition".
+Json to_json(const SystemEvaluation& scores, const EvaluationOptions& options) {
+  const bool any = !scores.conditions.empty();
+  EvalReport nothing;
+  nothing.model.mean.assign(metrics::table().size(), std::nullopt);
+  Json document = to_json(any ? report_of(scores.conditions.front().second) : nothing);
+  document["condition"] = any ? Json(scores.conditions.front().first) : Json(nullptr);
+  for (size_t i = 1; i < scores.conditions.size(); ++i)
+    document[scores.conditions[i].first] = to_json(report_of(scores.conditions[i].second));
+  if (scores.joint_error)
+    document["extractor"] = {{"joint_error_mm", 1e3 * *scores.joint_error},
+                             {"tpose_joint_error_mm", 1e3 * *scores.tpose_joint_error}};
+  document["missing"] = scores.missing;
+  document["seed"] = options.seed;
+  document["anchor"] = options.anchor;
+  return document;
+}
+
 int run_eval_run(const EvalOptions& options, const Common& common) {
   const std::string folder = options.run.substr(4);
   TrainConfig config;
   load_config(run_config_path(folder), {}, config);
+  const std::string weights_name = weights_path(folder);
   for (const std::string& file : result_files(options.out))
-    check_output(file, {run_config_path(folder), weights_path(folder), config.data.source});
-  const ModelSet models =
-      load_models(weights_path(folder), {.skeleton = true, .smrm = true, .deformation = true});
+    check_output(file, {run_config_path(folder), weights_name, config.data.source});
+  const Bundle weights = load_bundle(folder);
   const Corpus test = load_corpus(config.data, "test");
-  const auto list =
-      evaluation_sequences(test, static_cast<size_t>(config.evaluation.sequences),
-                           static_cast<size_t>(config.evaluation.frames), common.seed);
-  const double anchor = options.anchor.value_or(RetargetOptions{}.anchor);
-  const SystemEvaluation scores = evaluate_system(models, test, list, common.seed, anchor);
-  const auto [joints, tposes] = skeleton_errors(models, test, config);
-  const EvalReport extracted = report_of(scores.extracted), truth = report_of(scores.truth);
-  char line[160], path[96] = "";
-  if (anchor > 0)
-    std::snprintf(path, sizeof path, ", paths held to the source's within %g s", anchor);
-  std::snprintf(line, sizeof line,
-                "Extractor on held-out clouds: %.1f mm; on held-out T-poses: %.1f mm.\n",
-                1e3 * joints, 1e3 * tposes);
-  const std::string text = "From clouds alone (extracted skeletons), " +
-                           std::to_string(list.size()) + " held-out sequences, seed " +
-                           std::to_string(common.seed) + path + ":\n\n" +
-                           to_markdown(extracted, models.smrm.name) + "\nFrom true skeletons:\n\n" +
-                           to_markdown(truth, models.smrm.name) + "\n" + line;
+  EvaluationOptions how = evaluation_options(config, test, common.seed);
+  if (options.anchor) how.anchor = *options.anchor;
+  const SystemEvaluation scores = evaluate_system(weights, weights_name, test, how);
+  const TrainedModel* motion = weights.find("motion");
+  const std::string text = to_text(scores, how, motion ? motion->model : "");
   if (!options.out.empty()) {
     std::filesystem::create_directories(options.out);
     write_file_atomically(options.out + "/metrics.md", text);
-    write_sequence(Performance(test, list[0], ScanConfig{}, common.seed),
+    write_sequence(Performance(test, how.sequences[0], ScanConfig{}, common.seed),
                    {test.license, test.description}, options.out);
   }
-  if (!common.json) {
+  if (common.json)
+    print_json(to_json(scores, how));
+  else
     print(text);
-    return 0;
-  }
-  Json document = to_json(extracted);
-  document["true_skeletons"] = to_json(truth);
-  document["extractor"] = {{"joint_error_mm", 1e3 * joints},
-                           {"tpose_joint_error_mm", 1e3 * tposes}};
-  document["seed"] = common.seed;
-  document["anchor"] = anchor;
-  print_json(document);
   return 0;
 }
 

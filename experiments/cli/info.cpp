@@ -32,7 +32,7 @@ std::vector<Layer> layers_of(Module& model) {
 }
 
 int run_info(const std::string& name, const Common& common) {
-  const auto model = make_model(name, {}, Init{});
+  const auto model = make_model(name, model_type(name).config, Init{});
   const int64_t total = count_parameters(*model);
   const std::vector<Layer> layers = layers_of(*model);
   if (common.json) {
@@ -55,7 +55,7 @@ int run_info(const std::string& name, const Common& common) {
 
 std::string model_names() {
   std::string out;
-  for (const ModelInfo& info : models()) out += "\n  " + info.name + ": " + info.help;
+  for (const ModelType& type : models()) out += "\n  " + type.name + ": " + type.help;
   return out;
 }
 

@@ -121,6 +121,8 @@ CLI::App& Program::add_group(const std::string& name, const std::string& help) {
 }
 
 int Program::run(int argc, char** argv) {
+  command_line_.assign(argv, argv + argc);
+  if (argc > 0) command_line_[0] = "restage";  // not where it lies on this machine
   try {
     app_.parse(argc, argv);
   } catch (const CLI::CallForVersion& version) {

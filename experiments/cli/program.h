@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "datasets/readers/byte_stream.h"
 
@@ -37,6 +38,8 @@ class Program {
                 const std::string& examples, std::function<int()> action);
 
   const Common& common() const { return common_; }
+  /// All words that the program was called with, its own name first.
+  const std::vector<std::string>& command_line() const { return command_line_; }
 
   /// Reads the arguments and runs the chosen command. Throws.
   int run(int argc, char** argv);
@@ -46,6 +49,7 @@ class Program {
 
   CLI::App app_;
   Common common_;
+  std::vector<std::string> command_line_;
   std::function<int()> action_;
 };
 

@@ -13,8 +13,7 @@
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
 #include "experiments/cli/profile.h"
-#include "experiments/cli/weights_path.h"
-#include "infer/retargeter.h"
+#include "infer/systems.h"
 #include "infer/writers/bvh.h"
 #include "infer/writers/frames.h"
 #include "infer/writers/glb.h"
@@ -24,11 +23,13 @@ namespace {
 
 struct RetargetCommand {
   std::string source, target, weights, out, clip, up = "y", format = "ply";
+  std::string system = "chain", rest;
   std::optional<double> fps;        ///< of the source
   std::optional<int64_t> sequence;  ///< of the source, from 0
   double scale = 1, anchor = RetargetOptions{}.anchor;
   bool force = false, profile = false;
   int samples = 4;
+  int64_t every = 1;
 };
 
 /// Where results go; one class for each kind of file.
@@ -39,9 +40,17 @@ class Sink {
   virtual void commit() = 0;
 };
 
+/// What the skeleton's files are made of.
+const SystemRig& rig_of(const System& system, const std::string& out) {
+  if (system.rig() == nullptr)
+    throw InputError(out, "needs a skeleton, which this system does not have",
+                     "end it in .h5, or / for a folder of frames");
+  return *system.rig();
+}
+
 struct GlbSink final : Sink {
-  GlbSink(const std::string& path, const Retargeter& r)
-      : writer(path, r.target(), r.rest(), r.weights()) {}
+  GlbSink(const std::string& path, const System& s)
+      : writer(path, s.target(), rig_of(s, path).rest, rig_of(s, path).weights) {}
   void push(const RetargetedFrame& f) override { writer.push(f.pose); }
   void commit() override {
     const InfluenceError e = writer.commit();
@@ -55,34 +64,35 @@ struct GlbSink final : Sink {
 };
 
 struct BvhSink final : Sink {
-  BvhSink(const std::string& path, const Retargeter& r) : writer(path, r.rest()) {}
+  BvhSink(const std::string& path, const System& s) : writer(path, rig_of(s, path).rest) {}
   void push(const RetargetedFrame& f) override { writer.push(f.pose); }
   void commit() override { writer.commit(); }
   BvhWriter writer;
 };
 
 struct H5Sink final : Sink {
-  H5Sink(const std::string& path, const Retargeter& r)
-      : writer(path, static_cast<int64_t>(r.target().vertices.size()), r.target().faces, FileInfo{},
-               kFps) {}
+  H5Sink(const std::string& path, const System& s, double fps)
+      : writer(path, static_cast<int64_t>(s.target().vertices.size()), s.target().faces, FileInfo{},
+               fps) {}
   void push(const RetargetedFrame& f) override { writer.append(f.joints, f.vertices); }
   void commit() override { writer.commit(); }
   PredictionWriter writer;
 };
 
 struct FolderSink final : Sink {
-  FolderSink(const std::string& path, const Retargeter& r, MeshFormat format)
-      : writer(path, r.target().faces, format) {}
+  FolderSink(const std::string& path, const System& s, MeshFormat format)
+      : writer(path, s.target().faces, format) {}
   void push(const RetargetedFrame& f) override { writer.push(f.vertices); }
   void commit() override { writer.commit(); }
   FrameFolderWriter writer;
 };
 
-std::unique_ptr<Sink> make_sink(const RetargetCommand& c, const Retargeter& r) {
-  if (c.out.ends_with(".glb")) return std::make_unique<GlbSink>(c.out, r);
-  if (c.out.ends_with(".bvh")) return std::make_unique<BvhSink>(c.out, r);
-  if (c.out.ends_with(".h5")) return std::make_unique<H5Sink>(c.out, r);
-  return std::make_unique<FolderSink>(c.out, r,
+std::unique_ptr<Sink> make_sink(const RetargetCommand& c, const System& s) {
+  if (c.out.ends_with(".glb")) return std::make_unique<GlbSink>(c.out, s);
+  if (c.out.ends_with(".bvh")) return std::make_unique<BvhSink>(c.out, s);
+  if (c.out.ends_with(".h5"))
+    return std::make_unique<H5Sink>(c.out, s, kFps / static_cast<double>(c.every));
+  return std::make_unique<FolderSink>(c.out, s,
                                       c.format == "obj" ? MeshFormat::obj : MeshFormat::ply);
 }
 
@@ -98,6 +108,12 @@ void check(const RetargetCommand& c) {
   if (c.fps && is_gltf_name(c.source))
     throw InputError(c.source, "states its key times, which --fps cannot change",
                      "leave --fps out");
+  if (system_type(c.system).weights && c.weights.empty())
+    throw InputError("", "--weights is missing", "give a weights file or a run");
+  if (c.every < 1 || c.every > 1000000)
+    throw InputError("", "--every is out of range", "give 1 or more frames");
+  if (c.every > 1 && !c.out.ends_with(".h5"))
+    throw InputError(c.out, "is played at 30 frames a second", "end --out in .h5 with --every");
   if (c.samples < 1 || c.samples > 256)
     throw InputError("", "--samples is out of range", "give 1 to 256");
   const auto dot = c.out.find_last_of('.');
@@ -107,7 +123,10 @@ void check(const RetargetCommand& c) {
   if (extension && !c.out.ends_with(".glb") && !c.out.ends_with(".bvh") && !c.out.ends_with(".h5"))
     throw InputError(c.out, "is of no kind that can be written",
                      "end it in .glb, .bvh, .h5, or / for a folder");
-  check_output(c.out, {c.source, c.target, weights_path(c.weights)});
+  std::vector<std::string> inputs = {c.source, c.target};
+  if (!c.weights.empty()) inputs.push_back(weights_path(c.weights));
+  if (!c.rest.empty()) inputs.push_back(c.rest);
+  check_output(c.out, inputs);
 }
 
 void to_metres(const RetargetCommand& c, Points& points) {
@@ -154,15 +173,30 @@ void log_target(const ImportReport& report) {
   for (const std::string& remark : report.remarks) log_info(report.file + ": " + remark);
 }
 
+Joints rest_joints(const std::string& path) {
+  const Prediction rest = read_prediction(path);
+  if (rest.joints.empty() || rest.frames != 1)
+    throw InputError(path + ":/joints", "is not one skeleton",
+                     "give the target's rest joints as [1, 22, 3]");
+  Joints out;
+  for (size_t j = 0; j < out.size(); ++j) out[j] = Eigen::Map<const Vec3>(&rest.joints[3 * j]);
+  return out;
+}
+
 int run_retarget(const RetargetCommand& c, const Common& common) {
   check(c);
-  const ModelSet models =
-      load_models(weights_path(c.weights), {.skeleton = true, .smrm = true, .deformation = true});
+  SystemInput input;
+  if (!c.weights.empty()) {
+    input.weights_name = weights_path(c.weights);
+    input.weights = load_bundle(c.weights);
+    for (const char* role : {"skeleton", "motion", "deformation.weights"})
+      if (system_type(c.system).weights) input.weights.need(role, input.weights_name);
+  }
   const auto frames = open_frames(c.source, {c.clip, common.max_memory, c.sequence});
   if (!c.sequence && frames->sequences() > 1)
     throw InputError(c.source, "holds " + std::to_string(frames->sequences()) + " sequences",
                      "choose one with --sequence N, from 0");
-  RetargetOptions options;
+  RetargetOptions& options = input.options;
   options.fps = c.fps.value_or(frames->fps());
   options.force = c.force;
   options.seed = common.seed;
@@ -170,7 +204,12 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   options.anchor = c.anchor;
   TargetMesh target = read_target(c.target);
   check_inputs(c, *frames, target);
-  Retargeter retargeter(models, std::move(target.mesh), c.target, options);
+  if (!c.rest.empty()) input.rest = rest_joints(c.rest);
+  // The joints that a rig names are where its maker put them, not where a network finds them.
+  if (c.rest.empty() && !system_type(c.system).weights) input.rest = target.joints;
+  input.target = std::move(target.mesh);
+  input.target_name = c.target;
+  const auto system = system_type(c.system).make(std::move(input));
   // The first frame is looked at before anything is written or logged.
   double read = 0;
   const auto next = [&] {
@@ -182,20 +221,25 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   };
   auto frame = next();
   if (!frame) throw InputError(c.source, "holds no frames", "give at least one cloud");
-  const auto sink = make_sink(c, retargeter);
+  const auto sink = make_sink(c, *system);
   Profile profile({"read", "extract", "motion", "deformation", "write", "frame"});
   int64_t in = 0, out = 0;
+  const auto write_all = [&](std::span<const RetargetedFrame> made) {
+    for (const RetargetedFrame& f : made) sink->push(f);
+    out += std::ssize(made);
+  };
   for (; frame; frame = next(), ++in) {
+    if (in % c.every != 0) continue;
     const Clock::time_point start = Clock::now();
     if (!c.force) check_frame(frame->points, frame->source);
-    const auto made = retargeter.push(frame->points, frame->source);
+    const auto made = system->push(frame->points, frame->source);
     const Clock::time_point pushed = Clock::now();
-    for (const RetargetedFrame& f : made) sink->push(f);
+    write_all(made);
     const double write = seconds_since(pushed), work = seconds_since(start);
-    const FrameTimes& times = retargeter.times();
+    const FrameTimes times = system->times();
     profile.add({read, times.extract, times.motion, times.deformation, write, read + work});
-    out += std::ssize(made);
   }
+  write_all(system->finish());
   sink->commit();
   log_target(target.report);
   if (c.profile) log_profile(profile);
@@ -221,7 +265,9 @@ void add_retarget(Program& program) {
   CLI::App& app = program.add(
       "retarget", "a target performs the motion of a sequence of clouds",
       "restage retarget --source scans/ --target hero.obj --weights w.safetensors --out hero.glb\n"
-      "restage retarget --source scans.h5 --target hero.ply --weights runs/demo-1 --out result.h5",
+      "restage retarget --source scans.h5 --target hero.ply --weights runs/demo-1 --out result.h5\n"
+      "restage retarget --source scans.h5 --target hero.ply --system register --rest rest.h5 "
+      "--out r.h5",
       [c, &program] { return run_retarget(*c, program.common()); });
   app.add_option("--source", c->source,
                  "folder of clouds, file of them (HDF5, NPZ, NPY), or glTF animation")
@@ -229,7 +275,13 @@ void add_retarget(Program& program) {
   app.add_option("--target", c->target,
                  "mesh or cloud in T-pose, y up, facing +z; or a glTF character")
       ->required();
-  app.add_option("--weights", c->weights, "weights file or run directory")->required();
+  app.add_option("--weights", c->weights, "weights file, run or artifact");
+  app.add_option("--system", c->system,
+                 "chain: the networks of --weights; register: the target is registered to each "
+                 "cloud and reposed, without learning")
+      ->capture_default_str();
+  app.add_option("--rest", c->rest, "the target's 22 rest joints (HDF5, /joints [1, 22, 3])");
+  app.add_option("--every", c->every, "only every so many frames of the source; for X.h5");
   app.add_option("--out", c->out, "X.glb, X.bvh, X.h5, or a folder for PLY or OBJ frames")
       ->required();
   app.add_option("--clip", c->clip, "animation of a glTF source (default: the first)");

@@ -7,7 +7,6 @@
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
-#include "experiments/cli/weights_path.h"
 #include "infer/extraction.h"
 #include "nn/weights/bundle.h"
 
@@ -49,7 +48,8 @@ int run_skeleton(const SkeletonOptions& options, const Common& common) {
   if (options.samples < 1 || options.samples > 256)
     throw InputError("", "--samples is out of range", "give a number from 1 to 256");
   check_output(options.out, inputs_of(options));
-  const ModelSet models = load_models(weights_path(options.weights), {.skeleton = true});
+  const Bundle models = load_bundle(options.weights);
+  auto& model = models.need_as<SkeletonModel>("skeleton", weights_path(options.weights));
   const auto frames = open_frames(options.input, {"", common.max_memory});
   std::unique_ptr<PredictionWriter> writer;
   if (!options.out.empty())
@@ -61,7 +61,7 @@ int run_skeleton(const SkeletonOptions& options, const Common& common) {
   const RngKey key = RngKey{common.seed, 0}.fold("skeleton");
   while (const auto frame = frames->next()) {
     const Joints joints =
-        extract_joints(*models.skeleton, frame->points, frame->source, key, options.samples);
+        extract_joints(model, frame->points, frame->source, key, options.samples);
     if (writer) writer->append(joints, {});
     if (common.json) {
       list.push_back({{"source", frame->source}, {"joints", json_of(joints)}});

@@ -1,21 +1,19 @@
 // restage train: all stages of a configuration, or the rest of an interrupted run.
-#include <filesystem>
 #include <memory>
 
-#include "autograd/base/atomic_file.h"
 #include "autograd/base/log.h"
 #include "autograd/base/parallel.h"
 #include "autograd/kernels/matmul_precision.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
-#include "train/config.h"
+#include "nn/config/config.h"
 #include "train/run_provenance.h"
-#include "train/stages/registry.h"
+#include "train/stages/training.h"
 
 namespace restage::cli {
 namespace {
 
-struct TrainOptions {
+struct TrainArguments {
   std::vector<std::string> arguments;
   bool seed_given = false;
 };
@@ -52,12 +50,6 @@ Request read_request(const std::vector<std::string>& arguments) {
   return out;
 }
 
-/// Everything that can be wrong with the input is found before a run directory is made: models of
-/// unknown names, sizes that do not fit together, windows longer than every motion.
-void check_stages(const TrainConfig& config, const Corpus& train, const Corpus& validation) {
-  for (const std::string& stage : config.stages) make_stage(stage, config, train, validation);
-}
-
 /// For the first lines of a run; nothing for float32.
 std::string products_in(MatmulPrecision precision) {
   if (precision == MatmulPrecision::float32) return "";
@@ -65,27 +57,25 @@ std::string products_in(MatmulPrecision precision) {
          (matrix_unit() ? "by the matrix unit (AMX)" : "by float32 vectors");
 }
 
-int run_train(const TrainOptions& options, const Program& program,
-              const std::vector<std::string>& command_line) {
+int run_train(const TrainArguments& options, const Program& program) {
   const Request request = read_request(options.arguments);
   const Common& common = program.common();
+  if (!request.resume.empty() && options.seed_given)
+    throw InputError("", "--seed cannot change a resumed run", "leave it out, or train anew");
   TrainConfig config;
-  if (request.resume.empty()) {
-    std::vector<std::string> overrides = request.overrides;
-    if (options.seed_given) overrides.push_back("seed=" + std::to_string(common.seed));
-    load_config(request.config, overrides, config);
-  } else {
-    load_config(run_config_path(request.resume), {}, config);
-  }
-  const Corpus train_corpus = load_corpus(config.data, "train");
-  const Corpus validation = load_corpus(config.data, "validation");
-  check_stages(config, train_corpus, validation);
-
-  RunInput input{config.seed, threads(), command_line, {}};
+  std::vector<std::string> overrides = request.overrides;
+  if (options.seed_given) overrides.push_back("seed=" + std::to_string(common.seed));
+  load_config(request.resume.empty() ? request.config : run_config_path(request.resume), overrides,
+              config);
+  const TrainingData data(config.data);
+  RunInput input{config.seed, threads(), program.command_line(), {}, resolved_yaml(config)};
   if (config.data.source != "builtin")
-    input.data.push_back({config.data.source, checksum(train_corpus)});
+    input.data.push_back({config.data.source, checksum(data.train) + checksum(data.validation)});
+  if (!request.resume.empty()) check_same_run(request.resume, input);
+  check_stages(config, data);
+
   RunDir run = request.resume.empty()
-                   ? RunDir::create(config.run_root, config.name, resolved_yaml(config),
+                   ? RunDir::create(config.run_root, config.name, input.resolved_yaml,
                                     provenance_json(input), config.stages)
                    : RunDir::resume(request.resume, config.stages);
   if (common.json) {
@@ -95,14 +85,10 @@ int run_train(const TrainOptions& options, const Program& program,
   }
   finish_output();
   log_info("seed " + std::to_string(config.seed) + ", " + std::to_string(threads()) + " threads; " +
-           std::to_string(train_corpus.bodies.size()) + " bodies and " +
-           std::to_string(train_corpus.motions.size()) + " motions to train on" +
+           std::to_string(data.train.bodies.size()) + " bodies and " +
+           std::to_string(data.train.motions.size()) + " motions to train on" +
            products_in(config.precision));
-  const ModelSet models = train(
-      run, config.stages, config.loop,
-      [&](const std::string& stage) { return make_stage(stage, config, train_corpus, validation); },
-      common.quiet, config.precision);
-  save_models(run.dir() + "/weights.safetensors", models);
+  save_bundle(run.dir() + "/weights.safetensors", train_run(run, config, data, common.quiet));
   log_info("weights: " + run.dir() + "/weights.safetensors");
   return 0;
 }
@@ -110,18 +96,18 @@ int run_train(const TrainOptions& options, const Program& program,
 }  // namespace
 
 void add_train(Program& program) {
-  const auto options = std::make_shared<TrainOptions>();
+  const auto options = std::make_shared<TrainArguments>();
   const auto self = std::make_shared<CLI::App*>(nullptr);
   CLI::App& app = program.add(
       "train", "train the stages of a configuration",
       "restage train configs/demo.yaml\n"
       "restage train configs/lite/all.yaml data.source=data.h5 motion.optimiser.steps=2000\n"
+      "restage train configs/lite/all.yaml skeleton.from=experiments/weights/lite.safetensors "
+      "motion.init=experiments/weights/lite.safetensors\n"
       "restage train resume=runs/demo-20260101-120000-1",
       [options, self, &program] {
         options->seed_given = (*self)->count("--seed") > 0;
-        std::vector<std::string> line = {"restage", "train"};
-        line.insert(line.end(), options->arguments.begin(), options->arguments.end());
-        return run_train(*options, program, line);
+        return run_train(*options, program);
       });
   app.add_option("ARGUMENTS", options->arguments,
                  "CONFIG.yaml and key=value overrides, or resume=RUN_DIR")

@@ -74,16 +74,14 @@ int report(const Transfer& t, const TensorFile& written, const Common& common) {
 int run_import(const Transfer& t, const Common& common) {
   check_output(t.out, {t.from, t.map});
   TensorFile state = read_safetensors(t.from);
-  ModelSizes sizes = exported_sizes(state, t.from);
-  for (const std::string& size : t.sizes) {
-    const size_t equals = size.find('=');
-    set_size(&sizes, size.substr(0, equals),
-             equals == std::string::npos ? "" : size.substr(equals + 1));
-  }
+  for (const std::string& size : t.sizes)
+    if (size.find('=') == std::string::npos || size.find('.') < size.find('='))
+      throw InputError("", "'" + size + "' is no size of a model", "give NAME=VALUE");
   if (!t.map.empty()) state = NameMap::read(t.map).apply(state, t.from);
-  ModelSet models = t.with.empty() ? ModelSet{} : load_models(t.with, {});
+  Bundle models;
+  if (!t.with.empty()) models = load_bundle(t.with);
   try {
-    import_model(&models, t.model, sizes, state, t.from);
+    models.put(model_type(t.model).role, import_model(t.model, t.sizes, state, t.from));
   } catch (const StateError& e) {
     print_misfits(e, common);
     throw;
@@ -95,7 +93,7 @@ int run_import(const Transfer& t, const Common& common) {
 
 int run_export(const Transfer& t, const Common& common) {
   check_output(t.out, {t.from});
-  const TensorFile out = export_model(load_models(t.from, {}), t.model, t.from);
+  const TensorFile out = export_model(load_bundle(t.from), t.model, t.from);
   write_safetensors(t.out, out);
   return report(t, out, common);
 }
@@ -126,7 +124,7 @@ void add_export(Program& program, CLI::App& group) {
                   "restage weights export --from w.safetensors --model smrm --out smrm.safetensors",
                   [t, &program] { return run_export(*t, program.common()); });
   app.add_option("--from", t->from, "weights file")->required();
-  app.add_option("--model", t->model, "its name (smrm/rot6d) or place (smrm)")->required();
+  app.add_option("--model", t->model, "its name (smrm/rot6d), role (motion) or prefix (smrm)")->required();
   app.add_option("--out", t->out, "state dict to write (safetensors)")->required();
 }
 

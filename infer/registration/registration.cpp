@@ -112,7 +112,7 @@ std::vector<RigState> Registration::starts(const std::vector<Vec3>& cloud) const
   return out;
 }
 
-RetargetedFrame Registration::push(const Points& cloud, const std::string& source) {
+std::span<const RetargetedFrame> Registration::push(const Points& cloud, const std::string& source) {
   const std::vector<Vec3> points = thinned(cloud, options_.grid, source);
   std::vector<RigState> fitted = starts(points);
   std::vector<double> costs(fitted.size());
@@ -132,12 +132,12 @@ RetargetedFrame Registration::push(const Points& cloud, const std::string& sourc
     pose = refit_pose(rig_, posed, fit_free_form(rig_, posed, points, options_.free_form_options));
   source_joints_ = forward_kinematics(built(body_.joints, *previous_), pose).joints;
 
-  RetargetedFrame out;
+  RetargetedFrame& out = frame_;
   out.pose = pose;
   out.pose.root = trajectory_scale(source_joints_, body_.joints) * source_joints_[0];
   out.joints = forward_kinematics(body_.joints, out.pose).joints;
   out.vertices = linear_blend_skinning(body_, out.pose);
-  return out;
+  return {&frame_, 1};
 }
 
 }  // namespace restage

@@ -18,7 +18,7 @@
 #include <string>
 
 #include "infer/registration/free_form.h"
-#include "infer/retargeter.h"
+#include "infer/system.h"
 
 namespace restage {
 
@@ -31,7 +31,7 @@ struct RegistrationOptions {
   FreeFormOptions free_form_options;
 };
 
-class Registration {
+class Registration final : public System {
  public:
   /// `where` names the target in errors. InputError: see make_rig().
   Registration(Mesh target, const Joints& rest, const std::string& where,
@@ -40,12 +40,13 @@ class Registration {
   /// The target performing one frame of the source (metres, y up). The same bits for any number of
   /// threads. InputError naming `source`: fewer than 64 distinct points, values that are not
   /// finite.
-  RetargetedFrame push(const Points& cloud, const std::string& source);
+  std::span<const RetargetedFrame> push(const Points& cloud, const std::string& source) override;
   /// Forgets the frame before.
-  void restart() { previous_.reset(); }
+  void restart() override { previous_.reset(); }
   /// The registered template's joints in the last frame, in the source's build.
-  const Joints& source_joints() const { return source_joints_; }
-  const Mesh& target() const { return body_.rest; }
+  const Joints* source_joints() const override { return &source_joints_; }
+  const Mesh& target() const override { return body_.rest; }
+  const SystemRig* rig() const override { return &system_rig_; }
 
  private:
   std::vector<RigState> starts(const std::vector<Vec3>& cloud) const;
@@ -55,6 +56,8 @@ class Registration {
   Rig rig_;
   std::optional<RigState> previous_;
   Joints source_joints_;
+  SystemRig system_rig_{body_.joints, body_.weights};
+  RetargetedFrame frame_;
 };
 
 }  // namespace restage

@@ -10,7 +10,6 @@
 
 namespace restage {
 
-using SkinWeights = Eigen::Matrix<float, Eigen::Dynamic, kJoints, Eigen::RowMajor>;
 
 /// The four strongest joints of each vertex, weights falling, summing to 1 in float32 (within an
 /// ulp or two). Unused places hold joint 0 and weight 0.

@@ -16,6 +16,9 @@ using Point = Eigen::Vector3f;
 using Points = std::vector<Point>;  ///< metres
 using Triangle = std::array<int32_t, 3>;
 
+/// How much each joint moves each vertex: one row of 22 a vertex, whose sum is 1.
+using SkinWeights = Eigen::Matrix<float, Eigen::Dynamic, kJoints, Eigen::RowMajor>;
+
 /// A triangle surface, or a cloud when `faces` is empty.
 struct Mesh {
   Points vertices;
@@ -37,8 +40,7 @@ struct Body {
   std::string split;  ///< "train", "validation" or "test"
   Mesh rest;
   Joints joints;  ///< rest joints, same frame as `rest`
-  /// Skinning weights, one row of 22 per vertex, each row sums to 1.
-  Eigen::Matrix<float, Eigen::Dynamic, kJoints, Eigen::RowMajor> weights;
+  SkinWeights weights;
   std::shared_ptr<const PoseBlendShapes> blend_shapes;  ///< null: pose_surface() has its own rule
 };
 

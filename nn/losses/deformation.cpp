@@ -6,16 +6,16 @@
 #include "autograd/ops/layout.h"
 #include "autograd/ops/reduce.h"
 #include "autograd/ops/rotation.h"
-#include "nn/models/smrm.h"
+#include "nn/models/motion.h"
 
 namespace restage {
 
-DeformationOutput deform(Context& ctx, const Mlp3& weights, const Mlp3* offsets,
+DeformationOutput deform(Context& ctx, const DeformationModel& weights, const OffsetNet* offsets,
                          const Var& rest_points, const Var& rest_joints, const Var& local,
                          const Var& axis_angle) {
   const int64_t n = rest_points.size(0);
   DeformationOutput out;
-  out.weights = weights.at_points(ctx, reshape(rest_joints, {n, 3 * kJoints}), rest_points);
+  out.weights = weights.weights(ctx, rest_joints, rest_points);
   Var x = rest_points;
   if (offsets != nullptr) {
     out.offsets = offsets->at_points(ctx, axis_angle, rest_points);
@@ -27,7 +27,7 @@ DeformationOutput deform(Context& ctx, const Mlp3& weights, const Mlp3* offsets,
   return out;
 }
 
-DeformationOutput deform(Context& ctx, const Mlp3& weights, const Mlp3* offsets,
+DeformationOutput deform(Context& ctx, const DeformationModel& weights, const OffsetNet* offsets,
                          const DeformationBatch& b) {
   return deform(ctx, weights, offsets, b.rest_points, b.rest_joints, b.local, b.axis_angle);
 }

@@ -16,10 +16,10 @@ struct DeformationOutput {
 };
 
 /// Eq. 3: posed points from rest points. `offsets` null: none.
-DeformationOutput deform(Context& ctx, const Mlp3& weights, const Mlp3* offsets,
+DeformationOutput deform(Context& ctx, const DeformationModel& weights, const OffsetNet* offsets,
                          const DeformationBatch& batch);
 /// The same with gradients to what is on a tape.
-DeformationOutput deform(Context& ctx, const Mlp3& weights, const Mlp3* offsets,
+DeformationOutput deform(Context& ctx, const DeformationModel& weights, const OffsetNet* offsets,
                          const Var& rest_points, const Var& rest_joints, const Var& local,
                          const Var& axis_angle);
 /// Eq. 4: squared distances, summed over all points and pairs.

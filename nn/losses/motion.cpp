@@ -66,12 +66,12 @@ Var rotation_loss(const Var& rotations, const Var& sixd) {
   return mse(reshape(matrix_to_sixd(rotations), sixd.shape()), sixd);
 }
 
-MotionLosses motion_losses(Context& ctx, const Smrm& net, Discriminator* discriminator,
+MotionLosses motion_losses(Context& ctx, const MotionModel& net, Discriminator* discriminator,
                            const MotionBatch& b, const MotionWeights& w) {
   MotionLosses out;
-  SmrmState forth, back;
-  const SmrmOutput to_b = net(ctx, b.input, b.trans, b.rest_b, &forth);
-  const SmrmOutput to_a = net(ctx, to_b.joints, to_b.trans, b.rest_a, &back);
+  MotionState forth, back;
+  const MotionOutput to_b = net.forward(ctx, b.input, b.trans, b.rest_b, &forth);
+  const MotionOutput to_a = net.forward(ctx, to_b.joints, to_b.trans, b.rest_a, &back);
   out.joints_b = to_b.joints;
   out.trans_b = to_b.trans;
   out.cycle = mse(to_a.joints, b.joints) + mse(to_a.trans, b.true_trans);
@@ -98,11 +98,11 @@ MotionLosses motion_losses(Context& ctx, const Smrm& net, Discriminator* discrim
   return out;
 }
 
-MotionLosses self_losses(Context& ctx, const Smrm& net, const MotionBatch& b,
+MotionLosses self_losses(Context& ctx, const MotionModel& net, const MotionBatch& b,
                          const MotionWeights& w) {
   MotionLosses out;
-  SmrmState state;
-  const SmrmOutput to_a = net(ctx, b.input, b.trans, b.rest_a, &state);
+  MotionState state;
+  const MotionOutput to_a = net.forward(ctx, b.input, b.trans, b.rest_a, &state);
   out.joints_b = to_a.joints;
   out.trans_b = to_a.trans;
   out.cycle = mse(to_a.joints, b.joints) + mse(to_a.trans, b.true_trans);

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "nn/models/discriminator.h"
-#include "nn/models/smrm.h"
+#include "nn/models/motion.h"
 
 namespace restage {
 
@@ -12,7 +12,7 @@ struct MotionWeights {
   double twist = 0;          ///< NKN's twist loss (spec 4.3)
 };
 
-/// One batch: motions of A, skeletons of both. Shapes as in Smrm; self_mask [n] is 1 where B is A.
+/// One batch: motions of A, skeletons of both. Shapes as in MotionModel; self_mask [n] is 1 where B is A.
 /// `input` and `trans` are what the network sees (perhaps with noise), `joints` and `true_trans`
 /// what is true.
 struct MotionBatch {
@@ -27,12 +27,12 @@ struct MotionLosses {
 
 /// Generator side: A -> B -> A through the same network. `discriminator` null leaves the
 /// adversarial term out.
-MotionLosses motion_losses(Context& ctx, const Smrm& net, Discriminator* discriminator,
+MotionLosses motion_losses(Context& ctx, const MotionModel& net, Discriminator* discriminator,
                            const MotionBatch& batch, const MotionWeights& weights);
 
 /// Self-reconstruction alone: one pass A -> A, whose answer is known. cycle and trans errors,
 /// rotation and smoothness are those of this pass; `self` is their weighted sum.
-MotionLosses self_losses(Context& ctx, const Smrm& net, const MotionBatch& batch,
+MotionLosses self_losses(Context& ctx, const MotionModel& net, const MotionBatch& batch,
                          const MotionWeights& weights);
 
 struct DiscriminatorLosses {

@@ -69,17 +69,14 @@ void Mlp3::visit(Fields& f) {
   f("fc3", fc3);
 }
 
-std::unique_ptr<Mlp3> make_weight_net(const Init& init, int64_t width) {
-  return std::make_unique<Mlp3>(3 * kJoints + 3, kJoints, width, 0.2, true, init);
+Var WeightNet::weights(Context& ctx, const Var& rest, const Var& points) const {
+  const ModuleScope path(scope);
+  return net.at_points(ctx, reshape(rest, {rest.size(0), 3 * kJoints}), points);
 }
-std::unique_ptr<Mlp3> make_offset_net(const Init& init, int64_t width) {
-  return std::make_unique<Mlp3>(3 * kJoints + 3, 3, width, 0.2, false, init);
-}
-std::unique_ptr<Mlp3> make_root_net(const Init& init, int64_t width) {
-  return std::make_unique<Mlp3>(3 * kJoints, 3, width, 0.2, false, init);
-}
-std::unique_ptr<Mlp3> make_v1_field(const Init& init, int64_t width) {
-  return std::make_unique<Mlp3>(3 * kJoints, kJoints, width, 0.2, true, init);
+
+Var V1Field::weights(Context& ctx, const Var& rest, const Var& points) const {
+  const ModuleScope path(scope);
+  return net(ctx, joint_differences(points, rest));
 }
 
 Var join_points(const Var& vector, const Var& points) {

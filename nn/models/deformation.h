@@ -1,8 +1,7 @@
 // `deformation/*`: skinning weights, pose-corrective offsets and their relatives (spec 5).
 #pragma once
 
-#include <memory>
-
+#include "nn/config/rules.h"
 #include "nn/geometry/skeleton.h"
 #include "nn/layers/linear.h"
 
@@ -31,18 +30,60 @@ struct Mlp3 : Module {
   Var from_first(Context& ctx, const Var& h1) const;
 };
 
-inline constexpr int64_t kMlpWidth = 256;
+struct MlpConfig {
+  int64_t width = 256;
+  double dropout = 0.2;
+};
 
-/// W_net [rest joints (66), p (3)] -> 22 weights; joints and p relative to the rest pelvis.
-std::unique_ptr<Mlp3> make_weight_net(const Init& init, int64_t width = kMlpWidth);
-/// O_net [22 axis-angles (66), p (3)] -> offset, metres.
-std::unique_ptr<Mlp3> make_offset_net(const Init& init, int64_t width = kMlpWidth);
-/// The third MLP that the paper's count implies (spec 5.4, H1): rest joints relative to the pelvis
-/// (66)
-/// -> rest pelvis minus the centroid of the rest points.
-std::unique_ptr<Mlp3> make_root_net(const Init& init, int64_t width = kMlpWidth);
+template <class V>
+void visit(V& v, MlpConfig& c) {
+  v("width", c.width, "of the hidden layers", between(1, kMostWidth));
+  v("dropout", c.dropout, "dropout rate", below(0, 1));
+}
+
+/// How a target's surface follows its joints; the role `deformation.weights`.
+struct DeformationModel : Module {
+  /// rest joints [n, 22, 3] and points [n, v, 3], both relative to the rest pelvis, metres ->
+  /// skinning weights [n, v, 22], each point's sum 1.
+  virtual Var weights(Context& ctx, const Var& rest, const Var& points) const = 0;
+};
+
+/// W_net [rest joints (66), p (3)] -> 22 weights.
+struct WeightNet final : DeformationModel {
+  using Config = MlpConfig;
+  WeightNet(const MlpConfig& c, const Init& init)
+      : net(3 * kJoints + 3, kJoints, c.width, c.dropout, true, init) {}
+  Var weights(Context& ctx, const Var& rest, const Var& points) const override;
+  void visit(Fields& f) override { net.visit(f); }
+  const char* kind() const override { return net.kind(); }
+  Mlp3 net;
+};
+
 /// The first version's field: [p - J_j (66)] -> 22 weights.
-std::unique_ptr<Mlp3> make_v1_field(const Init& init, int64_t width = kMlpWidth);
+struct V1Field final : DeformationModel {
+  using Config = MlpConfig;
+  V1Field(const MlpConfig& c, const Init& init)
+      : net(3 * kJoints, kJoints, c.width, c.dropout, true, init) {}
+  Var weights(Context& ctx, const Var& rest, const Var& points) const override;
+  void visit(Fields& f) override { net.visit(f); }
+  const char* kind() const override { return net.kind(); }
+  Mlp3 net;
+};
+
+/// O_net [22 axis-angles (66), p (3)] -> offset, metres; the role `deformation.offsets`.
+struct OffsetNet final : Mlp3 {
+  using Config = MlpConfig;
+  OffsetNet(const MlpConfig& c, const Init& init)
+      : Mlp3(3 * kJoints + 3, 3, c.width, c.dropout, false, init) {}
+};
+
+/// The third MLP that the paper's count implies (spec 5.4, H1): rest joints relative to the pelvis
+/// (66) -> rest pelvis minus the centroid of the rest points; the role `deformation.root`.
+struct RootNet final : Mlp3 {
+  using Config = MlpConfig;
+  RootNet(const MlpConfig& c, const Init& init)
+      : Mlp3(3 * kJoints, 3, c.width, c.dropout, false, init) {}
+};
 
 /// Joins a vector per sample [n, c] with every point [n, v, 3]: [n, v, c + 3].
 Var join_points(const Var& vector, const Var& points);

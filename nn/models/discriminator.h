@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "nn/config/rules.h"
 #include "nn/layers/linear.h"
 #include "nn/layers/module_list.h"
 #include "nn/layers/norm.h"
@@ -15,7 +16,13 @@ struct DiscriminatorConfig {
   bool nkn_head = false;  ///< NKN's last layer for windows of exactly 60 frames
 };
 
+template <class V>
+void visit(V& v, DiscriminatorConfig& c) {
+  v("nkn_head", c.nkn_head, "NKN's last layer, for windows of exactly 60 frames");
+}
+
 struct Discriminator : Module {
+  using Config = DiscriminatorConfig;
   Discriminator(const DiscriminatorConfig& c, const Init& init);
   /// x [n, t, in] (discriminator_input), condition [n, condition] (bone vectors) -> logits [n].
   Var operator()(Context& ctx, const Var& x, const Var& condition);

@@ -2,6 +2,7 @@
 // the farthest points become tokens of a transformer; every token votes for every joint.
 #pragma once
 
+#include "nn/config/rules.h"
 #include "nn/layers/mlp.h"
 #include "nn/layers/self_attention.h"
 #include "nn/models/skeleton.h"
@@ -14,7 +15,19 @@ struct PatchTransformerConfig {
   double patch_scale = 10, centre_scale = 2;  ///< bring offsets and positions to order one
 };
 
+template <class V>
+void visit(V& v, PatchTransformerConfig& c) {
+  v("points", c.points, "points per cloud", between(1, kMostPoints));
+  v("width", c.width, "channels of a token", between(1, kMostWidth));
+  v("layers", c.layers, "layers of the transformer", between(0, 64));
+  v("centres", c.centres, "patches, each a token", between(1, kMostPoints));
+  v("neighbours", c.neighbours, "points of a patch", between(1, kMostPoints));
+  v.check("width", c.width % c.heads == 0, "does not fit the heads",
+          "give a multiple of " + std::to_string(c.heads));
+}
+
 struct PatchTransformer : SkeletonModel {
+  using Config = PatchTransformerConfig;
   PatchTransformer(const PatchTransformerConfig& c, const Init& init);
   SkeletonOutput forward(Context& ctx, const Var& cloud) override;
   int64_t points() const override { return config.points; }

@@ -1,6 +1,7 @@
 // `skeleton/point_transformer`: the extractor of the 3DV paper (Table 6; spec 2.2, 2.3).
 #pragma once
 
+#include "nn/config/rules.h"
 #include "nn/layers/vector_attention.h"
 #include "nn/models/skeleton.h"
 
@@ -10,6 +11,17 @@ struct PointTransformerConfig {
   int64_t points = 1024, blocks = 4, neighbours = 16, width = 512, base = 32, head1 = 256,
           head2 = 64;
 };
+
+template <class V>
+void visit(V& v, PointTransformerConfig& c) {
+  v("points", c.points, "points per cloud", between(1, kMostPoints));
+  v("width", c.width, "channels of the attention", between(1, kMostWidth));
+  v("layers", c.blocks, "blocks; each takes a quarter of the points and doubles the channels",
+    between(0, 8));
+  v("neighbours", c.neighbours, "neighbours of a point", between(1, kMostPoints));
+  v.check("layers", (c.points >> (2 * c.blocks)) > 0, "leave no points",
+          "give fewer layers or more points");
+}
 
 struct TransitionDown : Module {
   TransitionDown(int64_t m, int64_t k, int64_t in, int64_t out, const Init& init)
@@ -32,6 +44,7 @@ struct PointTransformerBackbone : Module {
 };
 
 struct PointTransformer : SkeletonModel {
+  using Config = PointTransformerConfig;
   PointTransformer(const PointTransformerConfig& c, const Init& init);
   SkeletonOutput forward(Context& ctx, const Var& cloud) override;
   int64_t points() const override { return config.points; }

@@ -4,6 +4,7 @@
 #include <array>
 #include <memory>
 
+#include "nn/config/rules.h"
 #include "nn/layers/linear.h"
 #include "nn/layers/norm.h"
 #include "nn/models/skeleton.h"
@@ -17,6 +18,14 @@ struct PointNetConfig {
   bool relu3 = true;               ///< ReLU before the maximum (v1's table)
   double dropout = 0.3;
 };
+
+template <class V>
+void visit(V& v, PointNetConfig& c) {
+  v("points", c.points, "points per cloud", between(1, kMostPoints));
+  v("dropout", c.dropout, "dropout rate", below(0, 1));
+  v("feature_transform", c.feature_transform, "the 64x64 T-net of the first version's table");
+  v("relu3", c.relu3, "ReLU before the maximum");
+}
 
 /// T-net: a k x k matrix per cloud, identity added.
 struct SpatialTransformer : Module {
@@ -32,6 +41,7 @@ struct SpatialTransformer : Module {
 };
 
 struct PointNet : SkeletonModel {
+  using Config = PointNetConfig;
   PointNet(const PointNetConfig& c, const Init& init);
   SkeletonOutput forward(Context& ctx, const Var& cloud) override;
   int64_t points() const override { return config.points; }

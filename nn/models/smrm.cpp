@@ -9,7 +9,7 @@ namespace {
 
 int64_t rotation_width(RotationForm form) { return form == RotationForm::sixd ? 6 : 4; }
 
-Var standardise(const Var& x, const Tensor& mean, const Tensor& deviation) {
+Var in_units(const Var& x, const Tensor& mean, const Tensor& deviation) {
   return (x - Var(mean)) / Var(deviation);
 }
 
@@ -45,19 +45,28 @@ Smrm::Smrm(const SmrmConfig& c, const Init& init)
   }
 }
 
-SmrmOutput Smrm::operator()(Context& ctx, const Var& joints, const Var& trans, const Var& rest,
-                            SmrmState* state) const {
+void Smrm::standardise(const MotionStatistics& s) {
+  if (!config.standardise) return;
+  joint_mean = s.joints.mean, joint_std = s.joints.deviation;
+  rest_mean = s.rest.mean, rest_std = s.rest.deviation;
+  trans_mean = s.trans.mean, trans_std = s.trans.deviation;
+  if (config.rotation == RotationForm::sixd) rot_mean = s.sixd.mean, rot_std = s.sixd.deviation;
+}
+
+MotionOutput Smrm::forward(Context& ctx, const Var& joints, const Var& trans, const Var& rest,
+                           MotionState* state) const {
   const ModuleScope path(scope);
   const int64_t n = joints.size(0), t = joints.size(1), j = config.joints;
   Var a = reshape(joints, {n, t, 3 * j}), v = trans, b = reshape(rest, {n, 1, 3 * j});
   if (config.standardise) {
-    a = standardise(a, joint_mean, joint_std);
-    v = standardise(v, trans_mean, trans_std);
-    b = standardise(b, rest_mean, rest_std);
+    a = in_units(a, joint_mean, joint_std);
+    v = in_units(v, trans_mean, trans_std);
+    b = in_units(b, rest_mean, rest_std);
   }
-  const Var code = enc(ctx, concat({a, v}, 2), &state->encoder);
-  const Var decoded = dec(ctx, concat({code, expand(b, {n, t, 3 * j})}, 2), &state->decoder);
-  SmrmOutput out;
+  state->resize(2);
+  const Var code = enc(ctx, concat({a, v}, 2), &(*state)[0]);
+  const Var decoded = dec(ctx, concat({code, expand(b, {n, t, 3 * j})}, 2), &(*state)[1]);
+  MotionOutput out;
   out.raw = fc_rot(ctx, decoded);
   out.trans = fc_trans(ctx, decoded);
   if (config.standardise) {

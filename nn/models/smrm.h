@@ -2,9 +2,10 @@
 #pragma once
 
 #include "autograd/kernels/rotation.h"
-#include "nn/geometry/skeleton.h"
+#include "nn/config/rules.h"
 #include "nn/layers/gru.h"
 #include "nn/layers/linear.h"
+#include "nn/models/motion.h"
 
 namespace restage {
 
@@ -18,24 +19,21 @@ struct SmrmConfig {
   int64_t joints = kJoints;
 };
 
-/// Hidden states carried from frame to frame, both [layers, n, hidden]; undefined at the start.
-struct SmrmState {
-  Var encoder, decoder;
-};
+template <class V>
+void visit(V& v, SmrmConfig& c) {
+  v("hidden", c.hidden, "size of the hidden states", between(1, kMostWidth));
+  v("dropout", c.dropout, "between the layers", below(0, 1));
+  v("standardise", c.standardise, "inputs in units of the training set's deviation");
+  v("rest_pose_start", c.rest_pose_start, "first output near the rest pose");
+}
 
-struct SmrmOutput {
-  Var raw;        ///< [n, t, 22 * (6 | 4)] before orthonormalisation
-  Var rotations;  ///< [n, t, 22, 3, 3] local
-  Var joints;     ///< [n, t, 22, 3] relative to the root, metres
-  Var trans;      ///< [n, t, 3], in the configured meaning (velocity: m/s)
-};
-
-struct Smrm : Module {
+/// The state is {encoder, decoder}, both [layers, n, hidden].
+struct Smrm final : MotionModel {
+  using Config = SmrmConfig;
   Smrm(const SmrmConfig& c, const Init& init);
-  /// joints [n, t, 22, 3] of A relative to its root; trans [n, t, 3]; rest [n, 22, 3] of B relative
-  /// to its root. `state` is read and replaced.
-  SmrmOutput operator()(Context& ctx, const Var& joints, const Var& trans, const Var& rest,
-                        SmrmState* state) const;
+  MotionOutput forward(Context& ctx, const Var& joints, const Var& trans, const Var& rest,
+                       MotionState* state) const override;
+  void standardise(const MotionStatistics& statistics) override;
   void visit(Fields& f) override;
   const char* kind() const override { return "SMRM"; }
   SmrmConfig config;
@@ -45,8 +43,5 @@ struct Smrm : Module {
   // translation.
   Tensor joint_mean, joint_std, rest_mean, rest_std, trans_mean, trans_std, rot_mean, rot_std;
 };
-
-/// Parents of the 22 joints as the kinematics op takes them.
-inline std::span<const int> joint_parents() { return kParents; }
 
 }  // namespace restage

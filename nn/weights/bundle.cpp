@@ -1,11 +1,10 @@
 #include "nn/weights/bundle.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "nn/models/patch_transformer.h"
-#include "nn/models/point_transformer.h"
-#include "nn/models/pointnet.h"
+#include "autograd/base/nearest.h"
 #include "nn/weights/state.h"
 
 namespace restage {
@@ -15,123 +14,66 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kKey = "restage";
 constexpr const char* kFix = "give a weights file that restage wrote";
-constexpr int64_t kMostPoints = 1 << 16;
 
-/// The sizes by name, for both directions.
-template <class Sizes, class F>
-void each_size(Sizes& s, F f) {
-  f("hidden", s.hidden);
-  f("points", s.points);
-  f("width", s.width);
-  f("layers", s.layers);
-  f("centres", s.centres);
-  f("neighbours", s.neighbours);
-  f("standardise", s.standardise);
-  f("rest_pose_start", s.rest_pose_start);
-  f("dropout", s.dropout);
+/// The name of a role in a file's metadata.
+std::string place_of(const std::string& role) {
+  const std::string prefix = prefix_of(role);
+  return prefix.substr(0, prefix.size() - 1);
 }
 
-/// Calls f(prefix, needed, model) for every place of a set.
-template <class Set, class F>
-void each_place(Set& set, const NeededModels& needs, F f) {
-  f("skeleton.", needs.skeleton, set.skeleton);
-  f("smrm.", needs.smrm, set.smrm);
-  f("deformation.weights.", needs.deformation, set.weights);
-  f("deformation.offsets.", false, set.offsets);
-  f("deformation.root.", false, set.root);
-  f("deformation.v1_field.", false, set.v1_field);
-  f("discriminator.", false, set.discriminator);
-}
+std::string role_of(const std::string& place) { return place == "smrm" ? "motion" : place; }
 
-std::string stage_of(const std::string& prefix) { return prefix.substr(0, prefix.size() - 1); }
+// ---- sizes as JSON -----------------------------------------------------------------------------
 
-/// Sizes as they are in the network, so that a file does not depend on what is the default later.
-ModelSizes actual_sizes(ModelSizes s, const Module& net) {
-  if (const auto* m = dynamic_cast<const PointTransformer*>(&net)) {
-    s.points = m->config.points;
-    s.width = m->config.width;
-    s.layers = m->config.blocks;
-    s.neighbours = m->config.neighbours;
-  } else if (const auto* p = dynamic_cast<const PointNet*>(&net)) {
-    s.points = p->config.points;
-    s.dropout = p->config.dropout;
-  } else if (const auto* t = dynamic_cast<const PatchTransformer*>(&net)) {
-    s.points = t->config.points;
-    s.width = t->config.width;
-    s.layers = t->config.layers;
-    s.centres = t->config.centres;
-    s.neighbours = t->config.neighbours;
-  } else if (const auto* r = dynamic_cast<const Smrm*>(&net)) {
-    s.hidden = r->config.hidden;
-    s.standardise = r->config.standardise;
-    s.rest_pose_start = r->config.rest_pose_start;
-    s.dropout = r->config.dropout;
-  } else if (const auto* d = dynamic_cast<const Mlp3*>(&net)) {
-    s.dropout = d->dropout_rate;
-  }
-  return s;
-}
-
-/// Only those that are set.
-Json to_json(const ModelSizes& sizes) {
+Json to_json(const AnyConfig& config) {
   Json out = Json::object();
-  each_size(sizes, [&out](const char* name, const auto& value) {
-    bool set = value > 0;
-    if constexpr (std::is_same_v<std::decay_t<decltype(value)>, double>) set = value >= 0;
-    if (set) out[name] = value;
-  });
+  for (const ConfigNode& entry : write_config(config).children) {
+    const Json number = entry.quoted ? Json() : Json::parse(entry.text, nullptr, false);
+    out[entry.key] = number.is_null() || number.is_discarded() ? Json(entry.text) : number;
+  }
   return out;
 }
 
-ModelSizes sizes_of(const Json& json, const std::string& where) {
-  ModelSizes out;
-  each_size(out, [&](const char* name, auto& value) {
-    if (!json.contains(name)) return;
-    const Json& given = json[name];
-    using T = std::decay_t<decltype(value)>;
-    const bool fits = std::is_same_v<T, bool>     ? given.is_boolean()
-                      : std::is_same_v<T, double> ? given.is_number()
-                                                  : given.is_number_integer();
-    if (!fits)
-      throw InputError(where, "has no proper size " + name_in_quotes(name) + " in its metadata",
-                       kFix);
-    value = given.get<T>();
-  });
+ConfigNode node_of(const Json& json, const std::string& where) {
+  ConfigNode node;
+  node.place = node.key_place = {where, 0, 0};
+  node.kind = json.is_object()  ? ConfigNode::Kind::map
+              : json.is_array() ? ConfigNode::Kind::list
+                                : ConfigNode::Kind::scalar;
+  if (json.is_object()) {
+    for (const auto& [key, value] : json.items()) {
+      node.children.push_back(node_of(value, where));
+      node.children.back().key = key;
+    }
+  } else {
+    node.quoted = json.is_string();
+    node.text = json.is_string() ? json.get<std::string>() : json.dump();
+  }
+  return node;
+}
+
+/// The sizes in `json` over the model's own.
+AnyConfig sizes_of(const ModelType& type, const Json& json, const std::string& where) {
+  AnyConfig out = type.config;
+  read_config(node_of(json, where), out);
   return out;
 }
 
-/// A network may only be as large as the numbers in the file that are to fill it; so a damaged size
-/// cannot ask for all memory.
-void check_sizes(const std::string& model, const ModelSizes& s, const TensorFile& file,
-                 const std::string& prefix, const std::string& where) {
-  int64_t numbers = 0;
-  for (const auto& [name, tensor] : file.tensors)
-    if (name.compare(0, prefix.size(), prefix) == 0) numbers += tensor.numel();
-  const auto square_fits = [numbers](int64_t n) {
-    return n <= 0 || (n < (int64_t{1} << 31) && n * n <= numbers);
-  };
-  // The point transformer doubles its channels (32 at first) with every layer.
-  const bool doubles = model == "skeleton/point_transformer";
-  const bool layers_fit =
-      s.layers <= 0 || (doubles ? s.layers <= 16 && square_fits(int64_t{32} << s.layers)
-                                : s.layers <= static_cast<int64_t>(file.tensors.size()));
-  // ... and takes a quarter of the points.
-  const bool points_fit =
-      s.points <= kMostPoints && s.centres <= kMostPoints && s.neighbours <= kMostPoints &&
-      (!doubles || s.points <= 0 || s.layers <= 0 || (s.points >> (2 * s.layers)) > 0);
-  if (!square_fits(s.hidden) || !square_fits(s.width) || !layers_fit || !points_fit ||
-      !(s.dropout < 1))
-    throw InputError(
-        where, "has sizes of " + name_in_quotes(model) + " that its tensors cannot fill", kFix);
+Settings settings_of(const Json& json, const std::string& where) {
+  Settings out;
+  for (const auto& [key, value] : json.items()) {
+    if (!value.is_string())
+      throw InputError(where, "has a setting " + name_in_quotes(key) + " that is no text", kFix);
+    out[key] = value.get<std::string>();
+  }
+  return out;
 }
 
-template <class M>
-std::unique_ptr<M> as(std::unique_ptr<Module> net) {
-  auto* wanted = dynamic_cast<M*>(net.get());
-  if (wanted == nullptr) return nullptr;
-  net.release();
-  return std::unique_ptr<M>(wanted);
+Json object_at(const Json& json, const char* key) {
+  return json.contains(key) && json[key].is_object() ? json[key] : Json::object();
 }
+
+// ---- metadata ----------------------------------------------------------------------------------
 
 Json parse_metadata(const TensorFile& file, const std::string& where) {
   const auto text = file.metadata.find(kKey);
@@ -146,142 +88,195 @@ Json parse_metadata(const TensorFile& file, const std::string& where) {
   return json;
 }
 
+/// Files of version 0.1.0 had the settings of all models in one place.
+void add_older_settings(const Json& metadata, const std::string& where, Bundle* bundle) {
+  static const std::map<std::string, std::string> roles = {
+      {"translation", "motion"},
+      {"remove_heading", "motion"},
+      {"keep_root_rotation", "deformation.offsets"}};
+  for (const auto& [name, value] : settings_of(object_at(metadata, "extra"), where)) {
+    const auto role = roles.find(name);
+    if (role == roles.end())
+      throw InputError(where, "has a setting " + name_in_quotes(name) + " of no model", kFix);
+    const TrainedModel* found = bundle->find(role->second);
+    if (found == nullptr) continue;
+    TrainedModel model = *found;
+    model.settings[name] = value;
+    bundle->put(role->second, std::move(model));
+  }
+}
+
+/// A network may only be as large as the numbers in the file that are to fill it.
+int64_t numbers_below(const TensorFile& file, const std::string& prefix) {
+  int64_t out = 0;
+  for (const auto& [name, tensor] : file.tensors)
+    if (name.starts_with(prefix)) out += tensor.numel();
+  return out;
+}
+
+std::shared_ptr<Module> filled(const std::string& name, const AnyConfig& config,
+                               const TensorFile& file, const std::string& prefix,
+                               const std::string& where) {
+  int64_t budget = numbers_below(file, prefix);
+  Init init;
+  init.budget = &budget;
+  std::shared_ptr<Module> net;
+  try {
+    net = make_model(name, config, init);
+  } catch (const InputError&) {
+    throw InputError(where, "has sizes of " + name_in_quotes(name) + " that its tensors cannot fill",
+                     kFix);
+  }
+  load_state(*net, file, prefix, where);
+  return net;
+}
+
+bool known_model(const std::string& name) {
+  return std::any_of(models().begin(), models().end(),
+                     [&](const ModelType& type) { return type.name == name; });
+}
+
+TrainedModel model_of(const std::string& place, const Json& entry, const TensorFile& file,
+                      const std::string& where) {
+  if (!entry.is_object() || !entry.contains("model") || !entry["model"].is_string())
+    throw InputError(where, "does not name its model for " + name_in_quotes(place), kFix);
+  TrainedModel out;
+  out.model = entry["model"].get<std::string>();
+  if (!known_model(out.model) || model_type(out.model).role != role_of(place))
+    throw InputError(
+        where, "names " + name_in_quotes(out.model) + ", which is no model for " + place, kFix);
+  out.config = sizes_of(model_type(out.model), object_at(entry, "sizes"), where);
+  out.settings = settings_of(object_at(entry, "settings"), where);
+  out.net = filled(out.model, out.config, file, place + ".", where);
+  return out;
+}
+
 }  // namespace
 
-std::string stage_prefix(const std::string& model) {
-  if (model.compare(0, 9, "skeleton/") == 0) return "skeleton.";
-  if (model == "smrm/discriminator") return "discriminator.";
-  if (model.compare(0, 5, "smrm/") == 0) return "smrm.";
-  return "deformation." + model.substr(model.find('/') + 1) + ".";
+std::string prefix_of(const std::string& role) { return (role == "motion" ? "smrm" : role) + "."; }
+
+std::string TrainedModel::setting(const std::string& name,
+                                  const std::vector<std::string>& known) const {
+  const auto found = settings.find(name);
+  if (found == settings.end()) return known.front();
+  if (std::find(known.begin(), known.end(), found->second) == known.end())
+    throw InputError("",
+                     "the weights were trained with " + name + " " +
+                         name_in_quotes(found->second) + ", which is unknown here",
+                     "use the version of restage that trained them");
+  return found->second;
 }
 
-void put_model(ModelSet* models, const std::string& name, const ModelSizes& sizes,
-               std::unique_ptr<Module> net) {
-  const std::string wanted = stage_prefix(name);
-  each_place(*models, {}, [&](const std::string& prefix, bool, auto& place) {
-    if (prefix != wanted) return;
-    place.name = name;
-    place.sizes = sizes;
-    place.net = as<std::decay_t<decltype(*place.net)>>(std::move(net));
-  });
+void Bundle::put(const std::string& role, TrainedModel model) {
+  const ModelType& type = model_type(model.model);
+  if (type.role != role)
+    throw InputError("", "'" + model.model + "' cannot be used as " + role,
+                     "it is a model for " + type.role);
+  by_role_.insert_or_assign(role, std::move(model));
 }
 
-TensorFile to_file(const ModelSet& models) {
+const TrainedModel* Bundle::find(const std::string& role) const {
+  const auto found = by_role_.find(role);
+  return found == by_role_.end() ? nullptr : &found->second;
+}
+
+const TrainedModel& Bundle::need(const std::string& role, const std::string& where) const {
+  if (const TrainedModel* found = find(role)) return *found;
+  throw InputError(where, "holds no model for " + place_of(role),
+                   "give weights that have one, or train that stage too");
+}
+
+void Bundle::add(const Bundle& other) {
+  for (const auto& [role, model] : other) by_role_.insert_or_assign(role, model);
+}
+
+Bundle Bundle::only(const std::vector<std::string>& roles) const {
+  Bundle out;
+  for (const std::string& role : roles)
+    if (const TrainedModel* found = find(role)) out.by_role_[role] = *found;
+  return out;
+}
+
+TensorFile to_file(const Bundle& bundle) {
   TensorFile out;
-  Json json = {{"format", 1}, {"models", Json::object()}, {"extra", models.extra}};
-  each_place(models, {}, [&](const std::string& prefix, bool, auto& place) {
-    if (!place) return;
-    append(&out, *place, prefix);
-    json["models"][stage_of(prefix)] = {{"model", place.name},
-                                        {"sizes", to_json(actual_sizes(place.sizes, *place))}};
-  });
+  Json json = {{"format", 1}, {"models", Json::object()}};
+  for (const auto& [role, model] : bundle) {
+    append(&out, *model.net, prefix_of(role));
+    json["models"][place_of(role)] = {{"model", model.model},
+                                      {"sizes", to_json(model.config)},
+                                      {"settings", model.settings}};
+  }
   out.metadata[kKey] = json.dump();
   return out;
 }
 
-void save_models(const std::string& path, const ModelSet& models) {
-  write_safetensors(path, to_file(models));
+void save_bundle(const std::string& path, const Bundle& bundle) {
+  write_safetensors(path, to_file(bundle));
 }
 
-ModelSet models_of(const TensorFile& file, const NeededModels& needs, const std::string& where) {
+Bundle bundle_of(const TensorFile& file, const std::string& where) {
   const Json json = parse_metadata(file, where);
-  ModelSet out;
+  Bundle out;
   size_t tensors = 0;
-  each_place(out, needs, [&](const std::string& prefix, bool needed, auto& place) {
-    const std::string stage = stage_of(prefix);
-    if (!json["models"].contains(stage)) {
-      if (needed)
-        throw InputError(where, "holds no model for " + stage, "give weights of all stages");
-      return;
-    }
-    const Json& entry = json["models"][stage];
-    if (!entry.is_object() || !entry.contains("model") || !entry["model"].is_string())
-      throw InputError(where, "does not name its model for " + stage, kFix);
-    const std::string name = entry["model"].get<std::string>();
-    const ModelSizes sizes =
-        sizes_of(entry.contains("sizes") ? entry["sizes"] : Json::object(), where);
-    check_sizes(name, sizes, file, prefix, where);
-    std::unique_ptr<Module> net;
-    try {
-      if (stage_prefix(name) == prefix) net = make_model(name, sizes, Init{});
-    } catch (const InputError&) {
-    }
-    if (net == nullptr)
-      throw InputError(where, "names " + name_in_quotes(name) + ", which is no model for " + stage,
-                       kFix);
-    load_state(*net, file, prefix, where);
-    for (const auto& item : file.tensors)
-      tensors += item.first.compare(0, prefix.size(), prefix) == 0 ? 1 : 0;
-    place.name = name;
-    place.sizes = sizes;
-    place.net = as<std::decay_t<decltype(*place.net)>>(std::move(net));
-  });
+  for (const auto& [place, entry] : json["models"].items()) {
+    out.put(role_of(place), model_of(place, entry, file, where));
+    for (const auto& item : file.tensors) tensors += item.first.starts_with(place + ".") ? 1 : 0;
+  }
   if (tensors != file.tensors.size())
     throw InputError(where,
                      "holds " + std::to_string(file.tensors.size() - tensors) +
                          " tensors that belong to no model",
                      kFix);
-  if (json.contains("extra") && json["extra"].is_object())
-    for (const auto& [key, value] : json["extra"].items())
-      if (value.is_string()) out.extra[key] = value.get<std::string>();
+  add_older_settings(json, where, &out);
   return out;
 }
 
-ModelSet load_models(const std::string& path, const NeededModels& needs) {
-  return models_of(read_safetensors(path), needs, path);
+std::string weights_path(const std::string& file_or_folder) {
+  namespace fs = std::filesystem;
+  std::error_code ignored;
+  if (!fs::is_directory(file_or_folder, ignored)) return file_or_folder;
+  const std::string path = (fs::path(file_or_folder) / "weights.safetensors").string();
+  if (!fs::exists(path, ignored))
+    throw InputError(file_or_folder, "holds no weights.safetensors",
+                     "give a weights file, a finished run or an artifact");
+  return path;
 }
 
-void import_model(ModelSet* models, const std::string& name, const ModelSizes& sizes,
-                  const TensorFile& state, const std::string& where) {
-  const bool known = std::any_of(::restage::models().begin(), ::restage::models().end(),
-                                 [&](const ModelInfo& info) { return info.name == name; });
-  if (known) check_sizes(name, sizes, state, "", where);
-  auto net = make_model(name, sizes, Init{});
-  load_state(*net, state, "", where);
-  put_model(models, name, sizes, std::move(net));
+Bundle load_bundle(const std::string& path) {
+  const std::string file = weights_path(path);
+  return bundle_of(read_safetensors(file), file);
 }
 
-TensorFile export_model(const ModelSet& models, const std::string& which,
-                        const std::string& where) {
-  TensorFile out;
-  each_place(models, {}, [&](const std::string& prefix, bool, auto& place) {
-    if (!place || (place.name != which && stage_of(prefix) != which)) return;
-    out = to_file(*place, "");
-    const Json json = {{"format", 1},
-                       {"model", place.name},
-                       {"sizes", to_json(actual_sizes(place.sizes, *place))}};
-    out.metadata[kKey] = json.dump();
-  });
-  if (out.tensors.empty())
-    throw InputError(where, "holds no model " + name_in_quotes(which),
-                     "see 'restage weights show' for what it holds");
-  return out;
-}
-
-ModelSizes exported_sizes(const TensorFile& state, const std::string& where) {
+TrainedModel import_model(const std::string& name, const std::vector<std::string>& sizes,
+                          const TensorFile& state, const std::string& where) {
+  TrainedModel out;
+  out.model = name;
+  const ModelType& type = model_type(name);
   const auto text = state.metadata.find(kKey);
-  if (text == state.metadata.end()) return {};
-  const Json json = Json::parse(text->second, nullptr, false);
-  const bool has_sizes = json.is_object() && json.contains("sizes") && json["sizes"].is_object();
-  return has_sizes ? sizes_of(json["sizes"], where) : ModelSizes{};
+  const Json json =
+      text == state.metadata.end() ? Json() : Json::parse(text->second, nullptr, false);
+  out.config = sizes_of(type, object_at(json, "sizes"), where);
+  out.settings = settings_of(object_at(json, "settings"), where);
+  ConfigNode tree = write_config(out.config);
+  for (const std::string& size : sizes) apply_override(tree, size);
+  read_config(tree, out.config);
+  out.net = filled(name, out.config, state, "", where);
+  return out;
 }
 
-void set_size(ModelSizes* sizes, const std::string& name, const std::string& value) {
-  const Json given = Json::parse(value, nullptr, false);
-  bool known = false;
-  std::string names;
-  each_size(*sizes, [&](const char* candidate, auto&) {
-    known = known || name == candidate;
-    names += std::string(names.empty() ? "" : ", ") + candidate;
-  });
-  const double number = given.is_number() ? given.get<double>() : 0;  // below 1: the default
-  const bool good = given.is_boolean() || (name == "dropout" ? number >= 0 : number >= 1);
-  if (!known || !good)
-    throw InputError("", "'" + name + "=" + value + "' is no size of a model",
-                     "give NAME=NUMBER with one of " + names);
-  Json all = to_json(*sizes);
-  all[name] = given;
-  *sizes = sizes_of(all, "--size");
+TensorFile export_model(const Bundle& bundle, const std::string& which, const std::string& where) {
+  for (const auto& [role, model] : bundle) {
+    if (model.model != which && role != which && place_of(role) != which) continue;
+    TensorFile out = to_file(*model.net, "");
+    const Json json = {{"format", 1},
+                       {"model", model.model},
+                       {"sizes", to_json(model.config)},
+                       {"settings", model.settings}};
+    out.metadata[kKey] = json.dump();
+    return out;
+  }
+  throw InputError(where, "holds no model " + name_in_quotes(which),
+                   "see 'restage weights show' for what it holds");
 }
 
 }  // namespace restage

@@ -16,7 +16,7 @@
 #include "tests/fuzz/old_layout.h"
 #include "tests/fuzz/targets.h"
 #include "tests/support/tiny_body.h"
-#include "train/config.h"
+#include "nn/config/config.h"
 #include "train/stages/configs.h"
 
 namespace restage::fuzz {

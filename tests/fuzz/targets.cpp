@@ -21,7 +21,7 @@
 #include "nn/weights/state.h"
 #include "tests/datasets/schema_support.h"
 #include "tests/datasets/smpl_support.h"
-#include "train/config.h"
+#include "nn/config/config.h"
 #include "train/stages/configs.h"
 
 namespace restage::fuzz {

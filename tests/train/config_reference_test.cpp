@@ -7,7 +7,7 @@
 #include <regex>
 #include <set>
 
-#include "train/config.h"
+#include "nn/config/config.h"
 #include "train/stages/configs.h"
 
 namespace restage {

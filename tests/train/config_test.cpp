@@ -1,4 +1,4 @@
-#include "train/config.h"
+#include "nn/config/config.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "train/config.h"
+#include "nn/config/config.h"
 
 namespace restage {
 namespace {

@@ -3,7 +3,7 @@
 
 #include "nn/module.h"
 #include "nn/weights/safetensors.h"
-#include "train/config_reader.h"
+#include "nn/config/config_reader.h"
 
 namespace restage {
 

@@ -9,14 +9,6 @@
 namespace restage {
 namespace {
 
-std::unique_ptr<Mlp3> make_net(std::unique_ptr<Mlp3> (*make)(const Init&, int64_t),
-                               const char* name, double dropout, uint64_t seed) {
-  auto net = make(Init{RngKey{seed, 0}.fold(name), DType::f32}, kMlpWidth);
-  if (dropout >= 0) net->dropout_rate = dropout;
-  name_scopes(*net, name);
-  return net;
-}
-
 PairConfig held_out(PairConfig c) {
   c.mirror = false;
   return c;
@@ -36,17 +28,28 @@ Tensor minus_centroid(const Tensor& points) {
 
 }  // namespace
 
-DeformationStage::DeformationStage(const DeformationStageConfig& config, const Corpus& train,
-                                   const Corpus& validation, uint64_t seed)
-    : config_(config),
-      weights_(make_net(make_weight_net, "deformation/weights", config.dropout, seed)),
-      offsets_(make_net(make_offset_net, "deformation/offsets", config.dropout, seed)),
-      root_(make_net(make_root_net, "deformation/root", config.dropout, seed)),
-      adam_({{"weights.", weights_.get()}, {"offsets.", offsets_.get()}, {"root.", root_.get()}},
-            config.optimiser.adam),
-      sampler_(train, config.pairs, RngKey{seed, 0}.fold("deformation.pairs").stream),
-      validation_sampler_(validation, held_out(config.pairs), 1),
-      key_(RngKey{seed, 0}.fold("deformation.step")) {}
+DeformationStage::DeformationStage(const Config& config, const StageInput& in)
+    : Stage("deformation", config.optimiser),
+      config_(config),
+      weights_(add_network<DeformationModel>(config.model,
+                                             RngKey{in.seed, 0}.fold("deformation/weights"))),
+      offsets_(config.offsets
+                   ? add_network<OffsetNet>("deformation.offsets", "deformation/offsets",
+                                            config.model.sizes,
+                                            RngKey{in.seed, 0}.fold("deformation/offsets"),
+                                            {{"keep_root_rotation",
+                                              config.keep_root_rotation ? "true" : "false"}})
+                   : nullptr),
+      root_(config.root_net
+                ? add_network<RootNet>("deformation.root", "deformation/root", config.model.sizes,
+                                       RngKey{in.seed, 0}.fold("deformation/root"))
+                : nullptr),
+      adam_(add_optimiser("adam",
+                          {"deformation.weights", "deformation.offsets", "deformation.root"},
+                          config.optimiser.adam)),
+      sampler_(in.train, config.pairs, RngKey{in.seed, 0}.fold("deformation.pairs").stream),
+      validation_sampler_(in.validation, held_out(config.pairs), 1),
+      key_(RngKey{in.seed, 0}.fold("deformation.step")) {}
 
 DeformationBatch DeformationStage::batch_of(const PairBatch& p) const {
   DeformationBatch b{p.rest_points, p.posed_points, p.rest_joints, p.local, p.axis_angle};
@@ -72,20 +75,19 @@ PairBatch DeformationStage::batch(int64_t step) const {
 NamedValues DeformationStage::step(int64_t step) {
   const OptimiserConfig& o = config_.optimiser;
   const DeformationBatch b = batch_of(batch(step));
-  const bool with_offsets = config_.offsets && step >= config_.skinning_steps;
+  const OffsetNet* offsets = step >= config_.skinning_steps ? offsets_ : nullptr;
   double distance = 0;
   const Differentiated d = differentiate(key_.fold(static_cast<uint64_t>(step)), [&](Context& ctx) {
-    const DeformationOutput out =
-        deform(ctx, *weights_, with_offsets ? offsets_.get() : nullptr, b);
+    const DeformationOutput out = deform(ctx, *weights_, offsets, b);
     distance = mean_distance(out.posed.value, b.posed_points);
     // Sum over the points of a pair, mean over pairs.
     Var total =
         scale(squared_distance_sum(out.posed, b.posed_points), 1.0 / static_cast<double>(o.batch));
-    if (config_.root_net) total = total + root_loss(ctx, b);
+    if (root_ != nullptr) total = total + root_loss(ctx, b);
     return total;
   });
   const double rate = learning_rate(o.schedule, step, o.steps);
-  adam_.step(d.gradients, rate, o.clip);
+  adam_->step(d.gradients, rate, o.clip);
   return {{"loss", d.loss}, {"distance_mm", 1e3 * distance}, {"rate", rate}};
 }
 
@@ -98,38 +100,15 @@ NamedValues DeformationStage::validate() {
     const DeformationBatch b = batch_of(validation_sampler_.batch(i, count));
     const auto share = static_cast<double>(count) / static_cast<double>(n);
     with += share *
-            mean_distance(deform(ctx, *weights_, offsets_.get(), b).posed.value, b.posed_points);
+            mean_distance(deform(ctx, *weights_, offsets_, b).posed.value, b.posed_points);
     without +=
         share * mean_distance(deform(ctx, *weights_, nullptr, b).posed.value, b.posed_points);
-    if (config_.root_net) root += share * root_loss(ctx, b).value.item();
+    if (root_ != nullptr) root += share * root_loss(ctx, b).value.item();
   }
   NamedValues values{{"skinning_mm", 1e3 * without}};
-  if (config_.offsets) values.push_back({"with_offsets_mm", 1e3 * with});
-  if (config_.root_net) values.push_back({"root_mse", root});
+  if (offsets_ != nullptr) values.push_back({"with_offsets_mm", 1e3 * with});
+  if (root_ != nullptr) values.push_back({"root_mse", root});
   return values;
-}
-
-void DeformationStage::save(TensorFile& file) const {
-  append(&file, *weights_, "weights.");
-  append(&file, *offsets_, "offsets.");
-  append(&file, *root_, "root.");
-  adam_.save("adam.", file);
-}
-
-void DeformationStage::load(const TensorFile& file, const std::string& where) {
-  load_state(*weights_, file, "weights.", where);
-  load_state(*offsets_, file, "offsets.", where);
-  load_state(*root_, file, "root.", where);
-  adam_.load("adam.", file, where);
-}
-
-void DeformationStage::export_models(ModelSet& set) {
-  ModelSizes sizes;
-  sizes.dropout = config_.dropout;
-  set.extra["keep_root_rotation"] = config_.keep_root_rotation ? "true" : "false";
-  set.weights = {"deformation/weights", sizes, std::move(weights_)};
-  if (config_.offsets) set.offsets = {"deformation/offsets", sizes, std::move(offsets_)};
-  if (config_.root_net) set.root = {"deformation/root", sizes, std::move(root_)};
 }
 
 }  // namespace restage

@@ -1,35 +1,62 @@
 // Training of skinning weights and pose-corrective offsets (spec 5.3; the paper's third stage).
 #pragma once
 
+#include "datasets/sampling/pairs.h"
 #include "nn/losses/deformation.h"
 #include "train/stage.h"
-#include "train/stages/configs.h"
+#include "train/stages/stage_input.h"
 
 namespace restage {
 
+template <class V>
+void visit(V& v, PairConfig& c) {
+  v("points", c.points, "points per pair", positive());
+  v("heading", c.heading, "turn poses by any angle about y");
+  v("mirror", c.mirror, "every second pair mirrored");
+  v("frame_step", c.frame_step, "only every so many frames of a motion (30: one a second)",
+    between(1, 100000));
+}
+
+struct DeformationStageConfig {
+  ModelChoice model{"deformation/weights"};  ///< the sizes are those of the offsets too
+  OptimiserConfig optimiser;
+  PairConfig pairs;
+  int64_t skinning_steps = 0;
+  bool offsets = true, root_net = false, keep_root_rotation = true;
+  int64_t validation_pairs = 60;
+};
+
+template <class V>
+void visit(V& v, DeformationStageConfig& c) {
+  visit_choice(v, c.model);
+  v("optimiser", c.optimiser, "steps, batch, rate");
+  v("pairs", c.pairs, "how training pairs are made");
+  v("skinning_steps", c.skinning_steps, "first steps without offsets (the paper: one epoch)",
+    at_least(0));
+  v("offsets", c.offsets, "train pose-corrective offsets");
+  v("root_net", c.root_net, "also train the third MLP (docs/method.md)");
+  v("keep_root_rotation", c.keep_root_rotation, "offsets see the root's rotation (false: zero)");
+  v("validation_pairs", c.validation_pairs, "held-out pairs per validation", positive());
+}
+
 class DeformationStage final : public Stage {
  public:
-  /// Keeps references to both corpora.
-  DeformationStage(const DeformationStageConfig& config, const Corpus& train,
-                   const Corpus& validation, uint64_t seed);
-  std::string name() const override { return "deformation"; }
-  int64_t steps() const override { return config_.optimiser.steps; }
-  int64_t examples_per_step() const override { return config_.optimiser.batch; }
+  using Config = DeformationStageConfig;
+  DeformationStage(const Config& config, const StageInput& input);
   NamedValues step(int64_t step) override;
   void read(int64_t step) const override { batch(step); }
   NamedValues validate() override;
-  void save(TensorFile& file) const override;
-  void load(const TensorFile& file, const std::string& where) override;
-  void export_models(ModelSet& set) override;
 
  private:
   PairBatch batch(int64_t step) const;
   DeformationBatch batch_of(const PairBatch& pairs) const;
   Var root_loss(Context& ctx, const DeformationBatch& batch) const;
 
-  DeformationStageConfig config_;
-  std::unique_ptr<Mlp3> weights_, offsets_, root_;
-  Adam adam_;
+  Config config_;
+  DeformationModel* weights_;
+  OffsetNet* offsets_;  // null: none
+  RootNet* root_;       // null: none
+  Adam* adam_;
   PairSampler sampler_, validation_sampler_;
   RngKey key_;
 };

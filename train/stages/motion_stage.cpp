@@ -8,10 +8,12 @@
 namespace restage {
 namespace {
 
-std::unique_ptr<Smrm> make_smrm(const MotionStageConfig& c, uint64_t seed) {
-  auto module = make_model(c.model, c.sizes, Init{RngKey{seed, 0}.fold("motion.init"), DType::f32});
-  auto* smrm = dynamic_cast<Smrm*>(module.release());
-  return std::unique_ptr<Smrm>(smrm);
+/// What must be known of the training to use the network.
+Settings settings_of(const MotionStageConfig& c) {
+  Settings out{{"remove_heading", c.windows.remove_heading ? "true" : "false"}};
+  for (const auto& [name, value] : config_names(Translation{}))
+    if (value == c.windows.translation) out["translation"] = name;
+  return out;
 }
 
 WindowConfig held_out(WindowConfig c, int64_t frames) {
@@ -41,8 +43,7 @@ MotionBatch motion_batch(const WindowBatch& w) {
 }
 
 /// Mean and deviation per column of rows of width n; deviations are at least `least`.
-void statistics(const std::vector<Tensor>& parts, int64_t n, double least, Tensor* mean,
-                Tensor* deviation) {
+MotionStatistics::Columns columns(const std::vector<Tensor>& parts, int64_t n, double least) {
   std::vector<double> s(static_cast<size_t>(n), 0.0), q(s);
   int64_t rows = 0;
   for (const Tensor& t : parts) {
@@ -58,29 +59,31 @@ void statistics(const std::vector<Tensor>& parts, int64_t n, double least, Tenso
     q[i] =
         std::max(least, std::sqrt(std::max(0.0, q[i] / static_cast<double>(rows) - s[i] * s[i])));
   }
-  *mean = Tensor::from<double>({n}, s).cast(DType::f32);
-  *deviation = Tensor::from<double>({n}, q).cast(DType::f32);
+  return {Tensor::from<double>({n}, s).cast(DType::f32),
+          Tensor::from<double>({n}, q).cast(DType::f32)};
 }
 
 }  // namespace
 
-MotionStage::MotionStage(const MotionStageConfig& config, const Corpus& train,
-                         const Corpus& validation, uint64_t seed)
-    : config_(config),
-      model_(make_smrm(config, seed)),
-      discriminator_(std::make_unique<Discriminator>(
-          DiscriminatorConfig{}, Init{RngKey{seed, 0}.fold("discriminator.init"), DType::f32})),
-      adam_({{"model.", model_.get()}}, config.optimiser.adam),
-      discriminator_adam_({{"discriminator.", discriminator_.get()}}, config.discriminator_adam),
-      sampler_(train, cycle_windows(config), RngKey{seed, 0}.fold("motion.windows").stream),
-      self_sampler_(train, self_windows(config), RngKey{seed, 0}.fold("motion.self").stream),
-      validation_sampler_(validation, held_out(config.windows, config.validation_frames), 1),
-      key_(RngKey{seed, 0}.fold("motion.step")) {
-  name_scopes(*discriminator_, "smrm/discriminator");
-  if (model_->config.standardise) set_statistics();
+MotionStage::MotionStage(const Config& config, const StageInput& in)
+    : Stage("motion", config.optimiser),
+      config_(config),
+      model_(add_network<MotionModel>(config.model, RngKey{in.seed, 0}.fold("motion.init"),
+                                      settings_of(config))),
+      discriminator_(add_network<Discriminator>(
+          "discriminator", "smrm/discriminator", model_type("smrm/discriminator").training,
+          RngKey{in.seed, 0}.fold("discriminator.init"), {}, false)),
+      adam_(add_optimiser("adam", {"motion"}, config.optimiser.adam)),
+      discriminator_adam_(
+          add_optimiser("discriminator_adam", {"discriminator"}, config.discriminator_adam)),
+      sampler_(in.train, cycle_windows(config), RngKey{in.seed, 0}.fold("motion.windows").stream),
+      self_sampler_(in.train, self_windows(config), RngKey{in.seed, 0}.fold("motion.self").stream),
+      validation_sampler_(in.validation, held_out(config.windows, config.validation_frames), 1),
+      key_(RngKey{in.seed, 0}.fold("motion.step")) {
+  model_->standardise(statistics());
 }
 
-void MotionStage::set_statistics() {
+MotionStatistics MotionStage::statistics() const {
   std::vector<Tensor> joints, rest, trans, rotations;
   for (int64_t i = 0; i < 32; ++i) {
     const WindowBatch b = sampler_.batch(i * 16, 16);
@@ -89,11 +92,8 @@ void MotionStage::set_statistics() {
     trans.push_back(b.trans_a);
     rotations.push_back(b.sixd_a);
   }
-  statistics(joints, 3 * kJoints, 0.01, &model_->joint_mean, &model_->joint_std);
-  statistics(rest, 3 * kJoints, 0.01, &model_->rest_mean, &model_->rest_std);
-  statistics(trans, 3, 0.05, &model_->trans_mean, &model_->trans_std);
-  if (model_->config.rotation == RotationForm::sixd)
-    statistics(rotations, 6 * kJoints, 0.01, &model_->rot_mean, &model_->rot_std);
+  return {columns(joints, 3 * kJoints, 0.01), columns(rest, 3 * kJoints, 0.01),
+          columns(trans, 3, 0.05), columns(rotations, 6 * kJoints, 0.01)};
 }
 
 void MotionStage::update_discriminator(int64_t step, const WindowBatch& batch, double rate,
@@ -103,9 +103,9 @@ void MotionStage::update_discriminator(int64_t step, const WindowBatch& batch, d
   const Differentiated d = differentiate(
       key_.fold("discriminator").fold(static_cast<uint64_t>(step)), [&](Context& ctx) {
         Context plain;  // the generator gets no gradient from this step
-        SmrmState state;
-        const SmrmOutput fake =
-            (*model_)(plain, batch.input_a, batch.input_trans_a, batch.rest_b, &state);
+        MotionState state;
+        const MotionOutput fake =
+            model_->forward(plain, batch.input_a, batch.input_trans_a, batch.rest_b, &state);
         const DiscriminatorLosses l =
             discriminator_losses(ctx, *discriminator_, batch.real_b, batch.real_trans_b,
                                  batch.rest_b, fake.joints.value, fake.trans.value, batch.rest_b);
@@ -113,7 +113,7 @@ void MotionStage::update_discriminator(int64_t step, const WindowBatch& batch, d
         return l.total;
       });
   balance_ = 0.99 * balance_ + 0.01 * score;
-  discriminator_adam_.step(d.gradients, rate, config_.optimiser.clip);
+  discriminator_adam_->step(d.gradients, rate, config_.optimiser.clip);
   values->push_back({"discriminator", d.loss});
 }
 
@@ -145,14 +145,14 @@ NamedValues MotionStage::step(int64_t step) {
       total = scale(s.total, self_part);
     }
     if (cycle > 0) {
-      l = motion_losses(ctx, *model_, adversarial ? discriminator_.get() : nullptr,
+      l = motion_losses(ctx, *model_, adversarial ? discriminator_ : nullptr,
                         motion_batch(b.windows), config_.weights);
       const Var part = scale(l.total, 1 - self_part);
       total = self > 0 ? total + part : part;
     }
     return total;
   });
-  adam_.step(d.gradients, rate, o.clip);
+  adam_->step(d.gradients, rate, o.clip);
   values.insert(values.begin(), {"loss", d.loss});
   if (adversarial) {
     // softplus(-x) = -log sigmoid(x): the batch's mean score, recovered from the loss.
@@ -176,9 +176,9 @@ NamedValues MotionStage::validate() {
   for (int64_t i = 0; i < n; i += 16) {
     const int64_t count = std::min<int64_t>(16, n - i);
     const WindowBatch b = validation_sampler_.batch(i, count);
-    SmrmState forth, back;
-    const SmrmOutput to_b = (*model_)(ctx, b.input_a, b.trans_a, b.rest_b, &forth);
-    const SmrmOutput to_a = (*model_)(ctx, to_b.joints, to_b.trans, b.rest_a, &back);
+    MotionState forth, back;
+    const MotionOutput to_b = model_->forward(ctx, b.input_a, b.trans_a, b.rest_b, &forth);
+    const MotionOutput to_a = model_->forward(ctx, to_b.joints, to_b.trans, b.rest_a, &back);
     const auto error = [&](const Tensor& p, const Tensor& t, int64_t s, bool align) {
       const Tensor pred = p.rows(s, s + 1).cast(DType::f64),
                    truth = t.rows(s, s + 1).cast(DType::f64);
@@ -200,30 +200,15 @@ NamedValues MotionStage::validate() {
       {"pa_mpjpe", mean_of(pa)}, {"local_mpjpe", mean_of(local)}, {"cycle_mpjpe", mean_of(cycle)}};
 }
 
-void MotionStage::save(TensorFile& file) const {
-  append(&file, *model_, "model.");
-  append(&file, *discriminator_, "discriminator.");
-  adam_.save("adam.", file);
-  discriminator_adam_.save("discriminator_adam.", file);
+void MotionStage::save_more(TensorFile& file) const {
   file.tensors["balance"] = Tensor::from<double>({1}, {balance_});
 }
 
-void MotionStage::load(const TensorFile& file, const std::string& where) {
-  load_state(*model_, file, "model.", where);
-  load_state(*discriminator_, file, "discriminator.", where);
-  adam_.load("adam.", file, where);
-  discriminator_adam_.load("discriminator_adam.", file, where);
+void MotionStage::load_more(const TensorFile& file, const std::string& where) {
   const Tensor* balance = file.find("balance");
   if (balance == nullptr || balance->numel() != 1)
     throw InputError(where, "'balance' is missing", "resume from an undamaged checkpoint");
   balance_ = balance->item();
-}
-
-void MotionStage::export_models(ModelSet& set) {
-  static const char* const names[] = {"velocity", "relative", "absolute"};
-  set.smrm = {config_.model, config_.sizes, std::move(model_)};
-  set.extra["translation"] = names[static_cast<int>(config_.windows.translation)];
-  set.extra["remove_heading"] = config_.windows.remove_heading ? "true" : "false";
 }
 
 }  // namespace restage

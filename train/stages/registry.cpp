@@ -5,15 +5,43 @@
 #include "train/stages/skeleton_stage.h"
 
 namespace restage {
+namespace {
 
-std::unique_ptr<Stage> make_stage(const std::string& name, const TrainConfig& c,
-                                  const Corpus& train, const Corpus& validation) {
-  if (name == "skeleton")
-    return std::make_unique<SkeletonStage>(c.skeleton, train, validation, c.seed);
-  if (name == "motion") return std::make_unique<MotionStage>(c.motion, train, validation, c.seed);
-  if (name == "deformation")
-    return std::make_unique<DeformationStage>(c.deformation, train, validation, c.seed);
-  throw InputError("", "there is no stage '" + name + "'", "use skeleton, motion or deformation");
+template <class S>
+StageType stage(const char* name, const char* help, std::vector<std::string> roles,
+                std::vector<std::string> reads = {}) {
+  return {name,
+          help,
+          AnyConfig(typename S::Config()),
+          std::move(roles),
+          std::move(reads),
+          [](const AnyConfig& c, const StageInput& input) -> std::unique_ptr<Stage> {
+            return std::make_unique<S>(c.as<typename S::Config>(), input);
+          }};
+}
+
+}  // namespace
+
+const std::vector<StageType>& stage_types() {
+  static const std::vector<StageType> table = {
+      stage<SkeletonStage>("skeleton", "the skeleton extractor", {"skeleton"}),
+      stage<MotionStage>("motion", "the motion retargeting network", {"motion"}),
+      stage<DeformationStage>("deformation", "skinning weights and offsets",
+                              {"deformation.weights", "deformation.offsets", "deformation.root"}),
+  };
+  return table;
+}
+
+std::vector<std::string> stage_names() {
+  std::vector<std::string> out;
+  for (const StageType& type : stage_types()) out.push_back(type.name);
+  return out;
+}
+
+const StageType& stage_type(const std::string& name) {
+  for (const StageType& type : stage_types())
+    if (type.name == name) return type;
+  throw InputError("", "there is no stage '" + name + "'", "use one of those in the configuration");
 }
 
 }  // namespace restage

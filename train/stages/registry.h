@@ -1,12 +1,27 @@
-// The training stages by name.
+// The training stages by name. A stage is a pair of files here (its config struct with a visit(), a
+// class derived from Stage) and one line in registry.cpp.
 #pragma once
 
-#include "train/stages/configs.h"
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "train/stage.h"
+#include "train/stages/stage_input.h"
 
 namespace restage {
 
-/// "skeleton", "motion" or "deformation"; keeps references to the corpora.
-std::unique_ptr<Stage> make_stage(const std::string& name, const TrainConfig& config,
-                                  const Corpus& train, const Corpus& validation);
+struct StageType {
+  std::string name, help;
+  AnyConfig config;                 ///< at its defaults
+  std::vector<std::string> roles;   ///< what it may leave in a bundle; the first always
+  std::vector<std::string> reads;   ///< stages whose networks it needs; they are trained before
+  std::unique_ptr<Stage> (*make)(const AnyConfig& config, const StageInput& input);
+};
+
+const std::vector<StageType>& stage_types();
+std::vector<std::string> stage_names();
+/// InputError if there is no such stage.
+const StageType& stage_type(const std::string& name);
 
 }  // namespace restage

@@ -4,7 +4,6 @@
 #include "autograd/ops/layout.h"
 #include "autograd/ops/reduce.h"
 #include "nn/losses/deformation.h"
-#include "nn/models/registry.h"
 
 namespace restage {
 namespace {
@@ -33,18 +32,17 @@ CloudConfig held_out(CloudConfig c, const SkeletonModel& model) {
 
 }  // namespace
 
-SkeletonStage::SkeletonStage(const SkeletonStageConfig& config, const Corpus& train,
-                             const Corpus& validation, uint64_t seed)
-    : config_(config),
-      model_(make_skeleton_model(config.model, config.sizes,
-                                 Init{RngKey{seed, 0}.fold("skeleton.init"), DType::f32})),
-      adam_({{"model.", model_.get()}}, config.optimiser.adam),
-      sampler_(train, training_clouds(config, *model_),
-               RngKey{seed, 0}.fold("skeleton.clouds").stream),
-      validation_sampler_(validation, held_out(config.clouds, *model_), 1),
-      posed_(evaluation_clouds(validation, static_cast<size_t>(config.validation_clouds), 1)),
-      tposes_(evaluation_tposes(validation, 4, config.clouds.tpose_heading, 1)),
-      key_(RngKey{seed, 0}.fold("skeleton.step")) {}
+SkeletonStage::SkeletonStage(const Config& config, const StageInput& in)
+    : Stage("skeleton", config.optimiser),
+      config_(config),
+      model_(add_network<SkeletonModel>(config.model, RngKey{in.seed, 0}.fold("skeleton.init"))),
+      adam_(add_optimiser("adam", {"skeleton"}, config.optimiser.adam)),
+      sampler_(in.train, training_clouds(config, *model_),
+               RngKey{in.seed, 0}.fold("skeleton.clouds").stream),
+      validation_sampler_(in.validation, held_out(config.clouds, *model_), 1),
+      posed_(evaluation_clouds(in.validation, static_cast<size_t>(config.validation_clouds), 1)),
+      tposes_(evaluation_tposes(in.validation, 4, config.clouds.tpose_heading, 1)),
+      key_(RngKey{in.seed, 0}.fold("skeleton.step")) {}
 
 Var SkeletonStage::loss(Context& ctx, const CloudBatch& batch) const {
   const SkeletonOutput out = model_->forward(ctx, batch.points);
@@ -78,7 +76,7 @@ NamedValues SkeletonStage::step(int64_t step) {
   const Differentiated d = differentiate(key_.fold(static_cast<uint64_t>(step)),
                                          [&](Context& ctx) { return loss(ctx, clouds); });
   const double rate = learning_rate(o.schedule, step, o.steps);
-  adam_.step(d.gradients, rate, o.clip);
+  adam_->step(d.gradients, rate, o.clip);
   return {{"loss", d.loss}, {"gradient_norm", d.norm}, {"rate", rate}};
 }
 
@@ -99,20 +97,6 @@ NamedValues SkeletonStage::validate() {
   return {
       {"joint_error_mm", 1e3 * joint_error(*model_, validation_sampler_.clouds(posed_))},
       {"tpose_joint_error_mm", 1e3 * joint_error(*model_, validation_sampler_.clouds(tposes_))}};
-}
-
-void SkeletonStage::save(TensorFile& file) const {
-  append(&file, *model_, "model.");
-  adam_.save("adam.", file);
-}
-
-void SkeletonStage::load(const TensorFile& file, const std::string& where) {
-  load_state(*model_, file, "model.", where);
-  adam_.load("adam.", file, where);
-}
-
-void SkeletonStage::export_models(ModelSet& set) {
-  set.skeleton = {config_.model, config_.sizes, std::move(model_)};
 }
 
 }  // namespace restage

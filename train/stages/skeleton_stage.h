@@ -2,33 +2,67 @@
 #pragma once
 
 #include "datasets/sampling/evaluation.h"
+#include "nn/models/skeleton.h"
 #include "train/stage.h"
-#include "train/stages/configs.h"
+#include "train/stages/stage_input.h"
 
 namespace restage {
 
+template <class V>
+void visit(V& v, CloudConfig& c) {
+  v("noise", c.noise, "Gaussian noise per coordinate, metres", at_least(0));
+  v("heading", c.heading, "turn clouds by any angle about y");
+  v("mirror", c.mirror, "every second cloud mirrored");
+  v("tpose_share", c.tpose_share, "part of the clouds that are rest poses", between(0, 1));
+  v("tpose_heading", c.tpose_heading, "rest poses turn by up to this, degrees", between(0, 180));
+  v("scale_jitter", c.scale_jitter, "bodies scaled by 1 +- this", below(0, 1));
+  v("min_fraction", c.min_fraction, "least part of distinct points", between(0.05, 1));
+  v("frame_step", c.frame_step, "only every so many frames of a motion (30: one a second)",
+    between(1, 100000));
+}
+
+struct SkeletonStageConfig {
+  enum class Loss { mse, distance };
+  ModelChoice model{"skeleton/point_transformer"};
+  OptimiserConfig optimiser;
+  CloudConfig clouds;
+  Loss loss = Loss::mse;
+  double vote_weight = 0, segmentation_weight = 0;
+  int64_t validation_clouds = 200;
+};
+
+inline EnumNames<SkeletonStageConfig::Loss> config_names(SkeletonStageConfig::Loss) {
+  return {{"mse", SkeletonStageConfig::Loss::mse},
+          {"distance", SkeletonStageConfig::Loss::distance}};
+}
+
+template <class V>
+void visit(V& v, SkeletonStageConfig& c) {
+  visit_choice(v, c.model);
+  v("optimiser", c.optimiser, "steps, batch, rate");
+  v("clouds", c.clouds, "how training clouds are made");
+  v("loss", c.loss, "mse (the paper) or mean distance");
+  v("vote_weight", c.vote_weight, "voting models: weight of each centre's own votes", at_least(0));
+  v("segmentation_weight", c.segmentation_weight,
+    "voting models: weight of naming the moving joint", at_least(0));
+  v("validation_clouds", c.validation_clouds, "held-out clouds per validation", positive());
+}
+
 class SkeletonStage final : public Stage {
  public:
-  /// Keeps references to both corpora.
-  SkeletonStage(const SkeletonStageConfig& config, const Corpus& train, const Corpus& validation,
-                uint64_t seed);
-  std::string name() const override { return "skeleton"; }
-  int64_t steps() const override { return config_.optimiser.steps; }
-  int64_t examples_per_step() const override { return config_.optimiser.batch; }
+  using Config = SkeletonStageConfig;
+  SkeletonStage(const Config& config, const StageInput& input);
   NamedValues step(int64_t step) override;
   void read(int64_t step) const override { batch(step); }
   NamedValues validate() override;
-  void save(TensorFile& file) const override;
-  void load(const TensorFile& file, const std::string& where) override;
-  void export_models(ModelSet& set) override;
 
  private:
   CloudBatch batch(int64_t step) const;
   Var loss(Context& ctx, const CloudBatch& batch) const;
 
-  SkeletonStageConfig config_;
-  std::unique_ptr<SkeletonModel> model_;
-  Adam adam_;
+  Config config_;
+  SkeletonModel* model_;
+  Adam* adam_;
   CloudSampler sampler_, validation_sampler_;
   std::vector<CloudSubject> posed_, tposes_;
   RngKey key_;

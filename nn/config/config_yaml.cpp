@@ -10,7 +10,7 @@
 #include <string_view>
 #include <utility>
 
-#include "train/config_tree.h"
+#include "nn/config/config_tree.h"
 
 namespace restage {
 namespace {

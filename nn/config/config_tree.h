@@ -1,6 +1,6 @@
 // The tree of values behind a configuration: what the YAML files and the command line say, each
 // value with the file, line and column that it comes from. What keys there are and what they mean
-// is said by the config structs (train/config_reader.h).
+// is said by the config structs (nn/config/config_reader.h).
 #pragma once
 
 #include <cstddef>

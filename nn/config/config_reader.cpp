@@ -1,4 +1,4 @@
-#include "train/config_reader.h"
+#include "nn/config/config_reader.h"
 
 #include <algorithm>
 #include <cctype>

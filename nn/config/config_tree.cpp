@@ -1,4 +1,4 @@
-#include "train/config_tree.h"
+#include "nn/config/config_tree.h"
 
 #include <cctype>
 #include <charconv>

@@ -16,7 +16,7 @@
 #include <string>
 #include <vector>
 
-#include "train/config_reader.h"
+#include "nn/config/config_reader.h"
 
 namespace restage {
 

@@ -1,0 +1,46 @@
+#include "infer/systems.h"
+
+#include "autograd/base/nearest.h"
+#include "infer/registration/registration.h"
+
+namespace restage {
+namespace {
+
+std::unique_ptr<System> make_chain(SystemInput in) {
+  if (in.rest)
+    return std::make_unique<Retargeter>(in.weights, in.weights_name, std::move(in.target), *in.rest,
+                                        in.options);
+  return std::make_unique<Retargeter>(in.weights, in.weights_name, std::move(in.target),
+                                      in.target_name, in.options);
+}
+
+std::unique_ptr<System> make_registration(SystemInput in) {
+  if (!in.rest)
+    throw InputError(in.target_name, "comes without its rest joints, which registration needs",
+                     "give --rest R.h5, or a rigged character as the target");
+  return std::make_unique<Registration>(std::move(in.target), *in.rest, in.target_name);
+}
+
+}  // namespace
+
+const std::vector<SystemType>& systems() {
+  static const std::vector<SystemType> table = {
+      {"chain", "extractor, motion network and deformation of the weights", true, make_chain},
+      {"register", "no learning: the target is registered to each cloud, then reposed", false,
+       make_registration},
+  };
+  return table;
+}
+
+const SystemType& system_type(const std::string& name) {
+  std::vector<std::string> names;
+  for (const SystemType& type : systems()) {
+    if (type.name == name) return type;
+    names.push_back(type.name);
+  }
+  const std::string near = nearest(name, names);
+  throw InputError("", "there is no system '" + name + "'",
+                   near.empty() ? "use chain or register" : "did you mean '" + near + "'?");
+}
+
+}  // namespace restage

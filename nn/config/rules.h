@@ -1,0 +1,43 @@
+// What the values of config structs must fulfil; all that a struct with a visit() needs to include.
+// Keys are listed and read by nn/config/config_reader.h.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace restage {
+
+/// What a value must fulfil; for lists, each of their items.
+struct Rule {
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+  bool low_open = false, high_open = false;  ///< the bound itself is not allowed
+  std::vector<std::string> choices;          ///< allowed texts (empty: all)
+  bool required = false;                     ///< the key must be given
+};
+inline Rule above(double low) { return {.low = low, .low_open = true, .choices = {}}; }
+inline Rule at_least(double low) { return {.low = low, .choices = {}}; }
+inline Rule positive() { return above(0); }
+inline Rule between(double low, double high) { return {.low = low, .high = high, .choices = {}}; }
+/// low <= value < high: dropout rates, decays.
+inline Rule below(double low, double high) {
+  return {.low = low, .high = high, .high_open = true, .choices = {}};
+}
+inline Rule one_of(std::vector<std::string> choices) { return {.choices = std::move(choices)}; }
+inline Rule required(Rule rule = {}) {
+  rule.required = true;
+  return rule;
+}
+
+/// The names of an enum's values in YAML: `inline EnumNames<E> config_names(E) { return {{"a",
+/// E::a}}; }`
+template <class E>
+using EnumNames = std::vector<std::pair<std::string, E>>;
+
+/// More than any network here needs; a larger number in a file is a mistake.
+inline constexpr int64_t kMostPoints = 1 << 16, kMostWidth = 1 << 14;
+
+}  // namespace restage

@@ -1,0 +1,41 @@
+// What every motion network is: joints and translation of A in, the motion of B out (spec 3.1).
+#pragma once
+
+#include <vector>
+
+#include "nn/geometry/skeleton.h"
+#include "nn/module.h"
+
+namespace restage {
+
+/// What a network carries from frame to frame, in a form of its own; empty at the start.
+using MotionState = std::vector<Var>;
+
+struct MotionOutput {
+  Var raw;        ///< what the network gives before it becomes rotations, [n, t, 22 * numbers]
+  Var rotations;  ///< [n, t, 22, 3, 3] local
+  Var joints;     ///< [n, t, 22, 3] relative to the root, metres
+  Var trans;      ///< [n, t, 3], in the configured meaning (velocity: m/s)
+};
+
+/// Mean and deviation per column of what a training shows to its network.
+struct MotionStatistics {
+  struct Columns {
+    Tensor mean, deviation;
+  };
+  Columns joints, rest, trans, sixd;  ///< [66], [66], [3], [132]
+};
+
+struct MotionModel : Module {
+  /// joints [n, t, 22, 3] of A relative to its root; trans [n, t, 3]; rest [n, 22, 3] of B relative
+  /// to its root. `state` is read and replaced.
+  virtual MotionOutput forward(Context& ctx, const Var& joints, const Var& trans, const Var& rest,
+                               MotionState* state) const = 0;
+  /// Called once before a training; a network that takes numbers as they are ignores it.
+  virtual void standardise(const MotionStatistics& statistics) = 0;
+};
+
+/// Parents of the 22 joints as the kinematics op takes them.
+inline std::span<const int> joint_parents() { return kParents; }
+
+}  // namespace restage

@@ -1,0 +1,104 @@
+#include "train/stages/identity.h"
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "datasets/readers/sha256.h"
+
+namespace restage {
+namespace {
+
+using Json = nlohmann::json;  // keys in order of their names
+
+/// A tree with its numbers as text, so that how they are printed elsewhere does not matter.
+Json to_json(const ConfigNode& node) {
+  switch (node.kind) {
+    case ConfigNode::Kind::null:
+      return nullptr;
+    case ConfigNode::Kind::scalar:
+      return node.text;
+    case ConfigNode::Kind::list: {
+      Json out = Json::array();
+      for (const ConfigNode& child : node.children) out.push_back(to_json(child));
+      return out;
+    }
+    case ConfigNode::Kind::map:
+      break;
+  }
+  Json out = Json::object();
+  for (const ConfigNode& child : node.children) out[child.key] = to_json(child);
+  return out;
+}
+
+template <class C>
+Json keys_of(const C& config) {
+  return to_json(write_config(config));
+}
+
+}  // namespace
+
+std::string short_id(const std::string& text) { return sha256(text).substr(0, 12); }
+
+std::string Identities::data(const CorpusSource& source) {
+  if (source.source == "builtin") return keys_of(source).dump();
+  std::string& known = seen_["data " + source.source];
+  if (!known.empty()) return known;
+  namespace fs = std::filesystem;
+  std::error_code ignored;
+  if (!fs::is_directory(source.source, ignored)) return known = sha256_of_file(source.source);
+  Json files = Json::object();
+  for (const char* split : {"train", "validation", "test"}) {
+    const fs::path file = fs::path(source.source) / (std::string(split) + ".h5");
+    if (fs::exists(file, ignored)) files[split] = sha256_of_file(file.string());
+  }
+  return known = files.dump();
+}
+
+std::string Identities::weights(const std::string& path) {
+  std::string& known = seen_["weights " + path];
+  if (known.empty()) known = sha256_of_file(weights_path(path));
+  return known;
+}
+
+std::vector<StageId> Identities::stages(const TrainConfig& config) {
+  std::vector<StageId> out;
+  std::map<std::string, std::string> left;  // what a later stage would read
+  for (const std::string& name : config.stages) {
+    const StageSection& section = config.section(name);
+    if (section.from) {
+      left[name] = weights(*section.from);
+      continue;
+    }
+    Json json = {{"behaviour", kBehaviour},
+                 {"stage", name},
+                 {"config", keys_of(section.config)},
+                 {"data", data(config.data)},
+                 {"seed", config.seed},
+                 {"precision", static_cast<int>(config.precision)},
+                 {"reads", Json::object()}};
+    if (section.init) {
+      json["init"] = weights(*section.init);
+      json["init_names"] = section.init_names;
+    }
+    for (const std::string& read : stage_type(name).reads) json["reads"][read] = left[read];
+    left[name] = short_id(json.dump());
+    out.push_back({name, left[name], json.dump()});
+  }
+  return out;
+}
+
+std::string Identities::trial(const TrainConfig& config,
+                              const std::map<std::string, std::string>& more) {
+  Json json = {{"behaviour", kBehaviour},
+               {"data", data(config.data)},
+               {"seed", config.seed},
+               {"evaluation", keys_of(config.evaluation)},
+               {"stages", config.stages},
+               {"more", more}};
+  for (const StageId& stage : stages(config)) json["artifacts"][stage.stage] = stage.id;
+  for (const std::string& name : config.stages)
+    if (const auto& from = config.section(name).from) json["from"][name] = weights(*from);
+  return short_id(json.dump());
+}
+
+}  // namespace restage

@@ -1,0 +1,150 @@
+#include "train/stages/store.h"
+
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "autograd/base/atomic_file.h"
+#include "autograd/base/interrupt.h"
+#include "autograd/base/log.h"
+#include "datasets/readers/sha256.h"
+#include "train/lease.h"
+
+namespace restage {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kFiles[] = {"weights.safetensors", "config.yaml", "metrics.jsonl"};
+
+/// What is wrong with the artifact in `folder`; nothing if it is whole.
+std::string damage(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_regular_file(folder / "artifact.json", error)) return "artifact.json is missing";
+  const Json json =
+      Json::parse(read_file((folder / "artifact.json").string(), 1 << 20), nullptr, false);
+  if (!json.is_object() || !json.contains("files") || !json["files"].is_object())
+    return "artifact.json is damaged";
+  for (const char* name : kFiles) {
+    const auto sum = json["files"].find(name);
+    if (sum == json["files"].end() || !fs::is_regular_file(folder / name, error))
+      return std::string(name) + " is missing";
+    if (*sum != sha256_of_file((folder / name).string()))
+      return std::string(name) + " does not fit its checksum";
+  }
+  return "";
+}
+
+/// The last line of a stage's metrics: its last validation.
+Json last_validation(const std::string& metrics) {
+  const size_t end = metrics.find_last_not_of('\n');
+  if (end == std::string::npos) return nullptr;
+  const size_t begin = metrics.rfind('\n', end);
+  const size_t first = begin == std::string::npos ? 0 : begin + 1;
+  const Json line = Json::parse(metrics.substr(first, end + 1 - first), nullptr, false);
+  return line.is_discarded() ? Json() : line;
+}
+
+RunDir open_run(const std::string& folder, const std::string& stage, const std::string& yaml,
+                const std::string& facts) {
+  std::error_code ignored;
+  if (fs::exists(fs::path(folder) / "config.yaml", ignored))
+    return RunDir::resume(folder, {stage});
+  fs::remove_all(folder, ignored);
+  return RunDir::create_at(folder, yaml, facts, {stage});
+}
+
+}  // namespace
+
+std::string Store::path(const StageId& id) const { return (fs::path(dir_) / id.name()).string(); }
+
+bool Store::has(const StageId& id) const {
+  std::error_code ignored;
+  return fs::is_regular_file(fs::path(path(id)) / "artifact.json", ignored);
+}
+
+std::optional<Bundle> Store::find(const StageId& id) const {
+  const std::string folder = path(id);
+  std::error_code error;
+  if (!fs::exists(folder, error)) return std::nullopt;
+  std::string wrong;
+  try {
+    wrong = damage(folder);
+    if (wrong.empty()) return load_bundle(folder);
+  } catch (const InputError& e) {
+    wrong = e.what();
+  }
+  log_warning(folder + " is damaged (" + wrong + ") and will be made again");
+  const std::string aside = folder + ".damaged";
+  fs::remove_all(aside, error);
+  fs::rename(folder, aside, error);
+  return std::nullopt;
+}
+
+Bundle Store::get(const StageId& id, const std::string& config_yaml, const Make& make) const {
+  std::error_code error;
+  fs::create_directories(dir_, error);
+  if (error)
+    throw InputError(dir_, "cannot be made (" + error.message() + ")",
+                     "give store= a folder that you can write to");
+  const fs::path aside = fs::path(dir_) / ("." + id.name() + ".partial");
+  const std::string lease_path = (fs::path(dir_) / ("." + id.name() + ".lease")).string();
+  const StopScope stop;
+  for (bool told = false;; told = true) {
+    if (auto found = find(id)) return std::move(*found);
+    auto lease = Lease::take(lease_path, id.name());
+    if (lease) {
+      if (auto found = find(id)) {  // somebody has just finished it
+        lease->forget();
+        return std::move(*found);
+      }
+      Bundle bundle;
+      {
+        RunDir run = open_run(aside.string(), id.stage, config_yaml, id.facts);
+        bundle = make(run);
+      }
+      if (lease->lost())
+        throw WorkError("another process has taken over " + id.name() + "; run it again");
+      publish(id, aside.string(), config_yaml, bundle);
+      fs::remove_all(aside, error);
+      lease->forget();
+      // What others read is what we use.
+      if (auto found = find(id)) return std::move(*found);
+      throw WorkError(path(id) + " could not be read back; free some space and run it again");
+    }
+    if (!told) {
+      const auto holder = Lease::holder(lease_path);
+      log_info("waiting for " + id.name() + (holder ? ", which " + holder->text() + " makes" : ""));
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    throw_if_stopped();
+  }
+}
+
+void Store::publish(const StageId& id, const std::string& run, const std::string& config_yaml,
+                    const Bundle& bundle) const {
+  const fs::path ready = fs::path(dir_) / ("." + id.name() + ".ready");
+  std::error_code error;
+  fs::remove_all(ready, error);
+  if (!fs::create_directory(ready, error) || error)
+    throw WorkError(ready.string() + ": could not be made (" + error.message() +
+                    "); free some space and run it again");
+  const std::string metrics = read_file((fs::path(run) / "metrics.jsonl").string());
+  save_bundle((ready / "weights.safetensors").string(), bundle);
+  write_file_atomically((ready / "config.yaml").string(), config_yaml);
+  write_file_atomically((ready / "metrics.jsonl").string(), metrics);
+  Json json = {{"id", id.id}, {"stage", id.stage}, {"made_from", Json::parse(id.facts)}};
+  json["metrics"] = last_validation(metrics);
+  for (const char* name : kFiles) json["files"][name] = sha256_of_file((ready / name).string());
+  write_file_atomically((ready / "artifact.json").string(), json.dump(2) + "\n");
+  fs::rename(ready, path(id), error);
+  if (error)
+    throw WorkError(path(id) + ": could not be put into the store (" + error.message() +
+                    "); run it again");
+}
+
+}  // namespace restage

@@ -1,0 +1,46 @@
+// The store: a folder of artifacts, each what one finished stage left, in a folder STAGE-ID:
+//
+//   weights.safetensors  the networks and what must be known to use them (nn/weights/bundle.h)
+//   config.yaml          the keys of the stage, resolved
+//   metrics.jsonl        its curves
+//   artifact.json        id, data, seed, what it read, its last validation, checksums of the others
+//
+// An artifact is complete or absent: it is made aside, in .STAGE-ID.partial, a run directory that the
+// next process goes on from, and then renamed. Its bytes are a function of its id: no time, host or
+// thread count is in it.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "nn/weights/bundle.h"
+#include "train/run.h"
+#include "train/stages/identity.h"
+
+namespace restage {
+
+class Store {
+ public:
+  explicit Store(std::string dir) : dir_(std::move(dir)) {}
+
+  /// Its folder is there; whether its content is undamaged is seen when it is read.
+  bool has(const StageId& id) const;
+  std::string path(const StageId& id) const;
+  /// The artifact, or nothing. A damaged one gives a warning, is moved aside and counts as absent.
+  std::optional<Bundle> find(const StageId& id) const;
+
+  /// Trains in the given run directory, which may hold the checkpoints of an earlier attempt.
+  using Make = std::function<Bundle(RunDir& run)>;
+  /// The artifact, made if it is absent. While another process makes it, this one waits. Interrupted
+  /// on a signal; then the next call goes on.
+  Bundle get(const StageId& id, const std::string& config_yaml, const Make& make) const;
+
+ private:
+  void publish(const StageId& id, const std::string& run, const std::string& config_yaml,
+               const Bundle& bundle) const;
+
+  std::string dir_;
+};
+
+}  // namespace restage

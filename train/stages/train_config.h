@@ -1,0 +1,109 @@
+// The root of training configurations (configs/*.yaml): data, loop, and a section for every stage.
+#pragma once
+
+#include <optional>
+#include <set>
+#include <string>
+
+#include "autograd/kernels/matmul_precision.h"
+#include "datasets/corpus.h"
+#include "train/stages/registry.h"
+#include "train/trainer.h"
+
+namespace restage {
+
+template <class V>
+void visit(V& v, SplitCounts& c) {
+  v("train", c.train, "how many to train on", positive());
+  v("validation", c.validation, "how many to validate on", positive());
+  v("test", c.test, "how many to test on", positive());
+}
+
+template <class V>
+void visit(V& v, CorpusSource& c) {
+  v("source", c.source,
+    "builtin, a data set file ('restage data import'), or a benchmark's folder");
+  v("seed", c.seed, "of the built-in source");
+  v("bodies", c.bodies, "built-in bodies per split");
+  v("motions", c.motions, "built-in motions per split");
+}
+
+struct EvaluationConfig {
+  int64_t sequences = 12, frames = 90;
+};
+
+template <class V>
+void visit(V& v, EvaluationConfig& c) {
+  v("sequences", c.sequences, "held-out sequences of 'restage eval run=...'", positive());
+  v("frames", c.frames, "frames of each", at_least(3));
+}
+
+inline EnumNames<MatmulPrecision> config_names(MatmulPrecision) {
+  return {{"float32", MatmulPrecision::float32}, {"bfloat16", MatmulPrecision::bfloat16}};
+}
+
+/// One stage of a configuration: trained as its own keys say, or taken as it is.
+struct StageSection {
+  std::optional<std::string> from;  ///< weights file, run or artifact: not trained
+  std::optional<std::string> init;  ///< the same: trained on from these weights
+  std::vector<std::string> init_names = {"*"};
+  AnyConfig config;  ///< as the stage's type says
+};
+
+template <class V>
+void visit(V& v, StageSection& c) {
+  v("from", c.from, "take the stage's networks from a weights file, run or artifact; no training");
+  v("init", c.init, "start from those of a weights file, run or artifact instead of random ones");
+  v("init_names", c.init_names, "which tensors init takes; * stands for any text");
+  v.check("init", !c.init || !c.from, "makes no sense with 'from', which trains nothing",
+          "give one of them");
+  visit(v, c.config);
+}
+
+/// A whole training.
+struct TrainConfig {
+  TrainConfig() {
+    for (const StageType& type : stage_types()) {
+      sections.emplace_back(type.name, StageSection{});
+      sections.back().second.config = type.config;
+    }
+  }
+  StageSection& section(const std::string& stage) {
+    for (auto& entry : sections)
+      if (entry.first == stage) return entry.second;
+    throw Error("there is no stage " + stage);
+  }
+  const StageSection& section(const std::string& stage) const {
+    return const_cast<TrainConfig*>(this)->section(stage);
+  }
+
+  std::string name = "restage";
+  std::string run_root = "runs";
+  uint64_t seed = 0;
+  MatmulPrecision precision = MatmulPrecision::float32;
+  std::vector<std::string> stages = {"skeleton", "motion", "deformation"};
+  CorpusSource data;
+  std::vector<std::pair<std::string, StageSection>> sections;  ///< of every stage there is
+  LoopConfig loop;
+  EvaluationConfig evaluation;
+};
+
+template <class V>
+void visit(V& v, TrainConfig& c) {
+  v("name", c.name, "run directories are <run_root>/<name>-<time>-<n>");
+  v.check("name", !c.name.empty() && c.name.size() <= 100 && c.name.find('/') == std::string::npos,
+          "is not the name of a folder in run_root", "give 1 to 100 characters without '/'");
+  v("run_root", c.run_root, "folder of run directories");
+  v("seed", c.seed, "of everything random");
+  v("precision", c.precision, "of the matrix products of training steps; all else is float32");
+  v("stages", c.stages, "which stages, in order", one_of(stage_names()));
+  v("data", c.data, "bodies and motions");
+  for (auto& [name, section] : c.sections) v(name, section, stage_type(name).help);
+  v("loop", c.loop, "logging, validation, checkpoints");
+  v("evaluation", c.evaluation, "what 'restage eval run=...' looks at");
+  const std::set<std::string> once(c.stages.begin(), c.stages.end());
+  v.check("stages", !c.stages.empty() && once.size() == c.stages.size(),
+          "must name each stage at most once, and at least one", "name each stage once");
+}
+
+}  // namespace restage

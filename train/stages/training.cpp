@@ -1,0 +1,92 @@
+#include "train/stages/training.h"
+
+#include <algorithm>
+#include <memory>
+
+#include "nn/config/config.h"
+
+namespace restage {
+namespace {
+
+/// The stage's networks in weights from elsewhere.
+Bundle taken_from(const StageType& type, const std::string& path) {
+  const Bundle out = load_bundle(path).only(type.roles);
+  out.need(type.roles.front(), path);
+  return out;
+}
+
+void check_order(const TrainConfig& config, const StageType& type) {
+  const auto& stages = config.stages;
+  const auto self = std::find(stages.begin(), stages.end(), type.name);
+  for (const std::string& read : type.reads)
+    if (std::find(stages.begin(), self, read) == self)
+      throw InputError("", "stage '" + type.name + "' needs what '" + read + "' leaves",
+                       "name " + read + " before it in stages (" + read +
+                           ".from takes it from elsewhere)");
+}
+
+}  // namespace
+
+std::unique_ptr<Stage> make_stage(const TrainConfig& config, const std::string& name,
+                                  const TrainingData& data, Bundle* so_far) {
+  const StageType& type = stage_type(name);
+  const StageSection& section = config.section(name);
+  if (section.from) {
+    so_far->add(taken_from(type, *section.from));
+    return nullptr;
+  }
+  check_order(config, type);
+  auto stage = type.make(section.config, {data.train, data.validation, config.seed, *so_far});
+  if (section.init)
+    stage->start_from(load_bundle(*section.init), section.init_names, *section.init);
+  return stage;
+}
+
+void check_stages(const TrainConfig& config, const TrainingData& data) {
+  Bundle so_far;
+  for (const std::string& name : config.stages)
+    if (const auto stage = make_stage(config, name, data, &so_far)) so_far.add(stage->result());
+}
+
+Bundle train_run(RunDir& run, const TrainConfig& config, const TrainingData& data, bool quiet) {
+  TrainOptions options;
+  options.precision = config.precision;
+  options.quiet = quiet;
+  return train(
+      run, config.stages, config.loop,
+      [&](const std::string& name, Bundle* so_far) {
+        return make_stage(config, name, data, so_far);
+      },
+      options);
+}
+
+StoreTraining train_in_store(const Store& store, const TrainConfig& config, Identities* identities,
+                             const TrainOptions& options, const std::string& last_stage) {
+  StoreTraining out;
+  out.artifacts = identities->stages(config);
+  std::unique_ptr<TrainingData> data;
+  TrainOptions own = options;
+  own.precision = config.precision;
+  for (const std::string& name : config.stages) {
+    const StageSection& section = config.section(name);
+    if (section.from) {
+      out.bundle.add(taken_from(stage_type(name), *section.from));
+    } else {
+      const auto id = std::find_if(out.artifacts.begin(), out.artifacts.end(),
+                                   [&](const StageId& s) { return s.stage == name; });
+      out.bundle.add(store.get(*id, resolved_yaml(section.config), [&](RunDir& run) {
+        if (data == nullptr) data = std::make_unique<TrainingData>(config.data);
+        return train(
+            run, {name}, config.loop,
+            [&](const std::string&, Bundle*) {
+              return make_stage(config, name, *data, &out.bundle);
+            },
+            own);
+      }));
+    }
+    if (name == last_stage) break;
+  }
+  return out;
+}
+
+}  // namespace restage
