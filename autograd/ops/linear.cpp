@@ -7,13 +7,14 @@
 namespace restage {
 namespace {
 
-Tensor product(const Tensor& a, const Tensor& b, bool ta, bool tb) {
+Tensor product(const Tensor& a, const Tensor& b, bool ta, bool tb, MatmulPrecision precision) {
   Shape shape;
   if (a.rank() == 3 || b.rank() == 3) shape.push_back(a.rank() == 3 ? a.size(0) : b.size(0));
   shape.push_back(a.size(ta ? -1 : -2));
   shape.push_back(b.size(tb ? -2 : -1));
   Tensor y = Tensor::empty(shape, a.dtype(), a.device());
-  launch(MatmulArgs{a, b, y, ta, tb});
+  launch(MatmulArgs{
+      .a = a, .b = b, .out = y, .transpose_a = ta, .transpose_b = tb, .precision = precision});
   return y;
 }
 
@@ -38,7 +39,13 @@ Tensor LinearOp::forward(Inputs x, Saved& saved) const {
   shape.set(-1, x[1].size(0));
   Tensor y = Tensor::empty(shape, x[0].dtype(), x[0].device());
   Tensor rows = y.reshape({flat.size(0), x[1].size(0)});
-  launch(MatmulArgs{flat, x[1], rows, false, true, x.size() > 2 ? &x[2] : nullptr, activation});
+  launch(MatmulArgs{.a = flat,
+                    .b = x[1],
+                    .out = rows,
+                    .transpose_b = true,
+                    .bias = x.size() > 2 ? &x[2] : nullptr,
+                    .activation = activation,
+                    .precision = precision});
   saved.keep({saved.needs(1) ? x[0] : Tensor(), saved.needs(0) ? x[1] : Tensor(),
               activation == Activation::relu ? y : Tensor()});
   return y;
@@ -54,8 +61,8 @@ Grads LinearOp::backward(const Saved& saved, const Tensor& gy, Needs needs) cons
   }
   g = g.reshape({rows, o});
   Grads out(needs.size());
-  if (needs[0]) out[0] = product(g, saved[1], false, false).reshape(x);
-  if (needs[1]) out[1] = product(g, saved[0].reshape({rows, i}), true, false);
+  if (needs[0]) out[0] = product(g, saved[1], false, false, precision).reshape(x);
+  if (needs[1]) out[1] = product(g, saved[0].reshape({rows, i}), true, false, precision);
   if (needs.size() > 2 && needs[2]) {
     out[2] = Tensor::empty({o}, gy.dtype(), gy.device());
     launch(SumArgs{g, out[2], 1, rows, o});
@@ -76,19 +83,22 @@ void Matmul::check(Inputs x) const {
 
 Tensor Matmul::forward(Inputs x, Saved& saved) const {
   saved.keep({saved.needs(1) ? x[0] : Tensor(), saved.needs(0) ? x[1] : Tensor()});
-  return product(x[0], x[1], transpose_a, transpose_b);
+  return product(x[0], x[1], transpose_a, transpose_b, precision);
 }
 
 Grads Matmul::backward(const Saved& saved, const Tensor& gy, Needs needs) const {
   const Tensor &a = saved[0], &b = saved[1];
   Grads g(2);
+  const auto times = [this](const Tensor& l, const Tensor& r, bool tl, bool tr) {
+    return product(l, r, tl, tr, precision);
+  };
   if (needs[0])
     g[0] =
-        unshare(transpose_a ? product(b, gy, transpose_b, true) : product(gy, b, false, !transpose_b),
+        unshare(transpose_a ? times(b, gy, transpose_b, true) : times(gy, b, false, !transpose_b),
                 saved.shape(0));
   if (needs[1])
     g[1] =
-        unshare(transpose_b ? product(gy, a, true, transpose_a) : product(a, gy, !transpose_a, false),
+        unshare(transpose_b ? times(gy, a, true, transpose_a) : times(a, gy, !transpose_a, false),
                 saved.shape(1));
   return g;
 }
