@@ -51,6 +51,8 @@
   K(to_matrix, ToMatrixArgs)                              \
   K(to_matrix_grad, ToMatrixGradArgs)                     \
   K(from_matrix, FromMatrixArgs)                          \
+  K(atan2, Atan2Args)                                     \
+  K(atan2_grad, Atan2GradArgs)                            \
   K(fk, FkArgs)                                           \
   K(fk_grad, FkGradArgs)                                  \
   K(lbs, LbsArgs)                                         \

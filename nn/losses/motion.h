@@ -49,4 +49,8 @@ DiscriminatorLosses discriminator_losses(Context& ctx, Discriminator& net, const
 /// (Q5). Quaternion networks are compared as matrices too, which needs no choice of sign (Q6).
 Var rotation_loss(const Var& rotations, const Var& sixd);
 
+/// Mean of max(0, |e| - 100 degrees)^2 over joints 1 ... of rotations [n, t, j, 3, 3], with
+/// e = atan2(-R20, R00) the angle about y for the order y-z-x (spec 4.3), as NKN.
+Var twist_loss(const Var& rotations);
+
 }  // namespace restage

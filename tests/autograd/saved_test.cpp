@@ -77,6 +77,7 @@ TEST(SavedTensors, AreThoseOfTheTable) {
       {"attention_pool", "x1 480 y"},           // the softmax
       {"neighbour_attention", "x0 x1 x2 x3 x4 x5 x6 x7 8 y 4"},  // the softmax, the index
       {"to_matrix", "x0"},
+      {"atan2", "x0 x1"},
       {"forward_kinematics", "x0 x1 y"},
       {"linear_blend_skinning", "x0 x1 x2 x3"},
   };
