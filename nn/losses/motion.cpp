@@ -1,5 +1,7 @@
 #include "nn/losses/motion.h"
 
+#include <optional>
+
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
 #include "autograd/ops/reduce.h"
@@ -44,7 +46,8 @@ Var twist_loss(const Var& rotations) {
 }
 
 MotionLosses motion_losses(Context& ctx, const Smrm& net, Discriminator* discriminator,
-                           const MotionBatch& b, const MotionWeights& w) {
+                           const MotionBatch& b, const MotionWeights& w,
+                           bool discriminator_gradients) {
   MotionLosses out;
   SmrmState forth, back;
   const SmrmOutput to_b = net(ctx, b.input, b.trans, b.rest_b, &forth);
@@ -64,6 +67,8 @@ MotionLosses motion_losses(Context& ctx, const Smrm& net, Discriminator* discrim
   out.total = scale(out.cycle, w.cycle) + scale(out.rotation, w.rotation) +
               scale(out.smoothness, w.smoothness) + scale(out.self, w.self);
   if (discriminator != nullptr) {
+    std::optional<Frozen> judge;
+    if (!discriminator_gradients) judge.emplace(ctx);
     const Var logit =
         (*discriminator)(ctx, discriminator_input(to_b.joints, to_b.trans), bone_vectors(b.rest_b));
     out.adversarial = masked_mean(softplus(neg(logit)), complement(b.self_mask));

@@ -26,9 +26,11 @@ struct MotionLosses {
 };
 
 /// Generator side: A -> B -> A through the same network. `discriminator` null leaves the
-/// adversarial term out.
+/// adversarial term out. It judges as it is: its parameters are constants, and have gradients only
+/// for who asks for them.
 MotionLosses motion_losses(Context& ctx, const Smrm& net, Discriminator* discriminator,
-                           const MotionBatch& batch, const MotionWeights& weights);
+                           const MotionBatch& batch, const MotionWeights& weights,
+                           bool discriminator_gradients = false);
 
 /// Self-reconstruction alone: one pass A -> A, whose answer is known. cycle and trans errors,
 /// rotation and smoothness are those of this pass; `self` is their weighted sum.
