@@ -39,10 +39,32 @@ class Fields {
 struct Context {
   Tape* tape = nullptr;   ///< null: nothing is recorded
   bool training = false;  ///< dropout on, batch statistics in batch norm
-  RngKey rng;             ///< of this step; dropout masks are functions of it and the module path
+  RngKey rng;             ///< of this step
+  uint64_t masks = 0;     ///< dropout masks drawn so far
+  bool frozen = false;    ///< parameters are constants (Frozen)
 
-  /// The parameter as a value: a leaf of the tape, or a constant without one.
-  Var bind(const Parameter& p) const { return tape ? tape->leaf(p.value, p.id) : Var(p.value); }
+  /// The parameter as a value: a leaf of the tape, or a constant where it has no gradient.
+  Var bind(const Parameter& p) const {
+    return tape && !frozen ? tape->leaf(p.value, p.id) : Var(p.value);
+  }
+  /// Stream of the next dropout mask: a function of `rng` and of how many came before, so no two of
+  /// a step are equal. Calls follow each other in an order that the source fixes: two layers that
+  /// drop must not be called within one expression.
+  RngKey next_mask() { return rng.fold("dropout").fold(masks++); }
+};
+
+/// While it lives, parameters that `ctx` binds are constants: gradients go through a module to its
+/// inputs and cost nothing for what it holds. Batch norm behaves as ever.
+class Frozen {
+ public:
+  explicit Frozen(Context& ctx) : ctx_(ctx), before_(ctx.frozen) { ctx.frozen = true; }
+  ~Frozen() { ctx_.frozen = before_; }
+  Frozen(const Frozen&) = delete;
+  Frozen& operator=(const Frozen&) = delete;
+
+ private:
+  Context& ctx_;
+  bool before_;
 };
 
 struct Module {

@@ -54,40 +54,40 @@ void apply_unary(Unary op, int64_t n, const T* x, T* y, T alpha) {
 }
 
 template <class T>
-void apply_unary_grad(Unary op, int64_t n, const T* x, const T* y, const T* g, T* out, T alpha) {
+void apply_unary_grad(Unary op, int64_t n, const T* kept, const T* g, T* out, T alpha) {
   const hn::ScalableTag<T> d;
   using V = hn::Vec<decltype(d)>;
   const V zero = hn::Zero(d), one = hn::Set(d, T(1)), factor = hn::Set(d, alpha);
-  const auto by_x = [&](auto f) HWY_ATTR { map(n, out, f, g, x); };
-  const auto by_y = [&](auto f) HWY_ATTR { map(n, out, f, g, y); };
+  const auto by_kept = [&](auto f) HWY_ATTR { map(n, out, f, g, kept); };
   const auto constant = [&](auto f) HWY_ATTR { map(n, out, f, g); };
   switch (op) {
     case Unary::neg:
       return constant([](V a) HWY_ATTR { return hn::Neg(a); });
     case Unary::exp:
-      return by_y([](V a, V v) HWY_ATTR { return hn::Mul(a, v); });
+      return by_kept([](V a, V v) HWY_ATTR { return hn::Mul(a, v); });
     case Unary::log:
-      return by_x([](V a, V v) HWY_ATTR { return hn::Div(a, v); });
+      return by_kept([](V a, V v) HWY_ATTR { return hn::Div(a, v); });
     case Unary::sqrt:
-      return by_y([&](V a, V v) HWY_ATTR { return hn::Div(a, hn::Add(v, v)); });
+      return by_kept([&](V a, V v) HWY_ATTR { return hn::Div(a, hn::Add(v, v)); });
     case Unary::square:
-      return by_x([](V a, V v) HWY_ATTR { return hn::Mul(hn::Add(a, a), v); });
+      return by_kept([](V a, V v) HWY_ATTR { return hn::Mul(hn::Add(a, a), v); });
     case Unary::abs:  // 0 at 0
-      return by_x([&](V a, V v) HWY_ATTR {
+      return by_kept([&](V a, V v) HWY_ATTR {
         const V other = hn::IfThenElse(hn::Lt(v, zero), hn::Neg(a), hn::Mul(a, v));
         return hn::IfThenElse(hn::Gt(v, zero), a, other);
       });
     case Unary::sigmoid:
-      return by_y([&](V a, V v) HWY_ATTR { return hn::Mul(hn::Mul(a, v), hn::Sub(one, v)); });
+      return by_kept([&](V a, V v) HWY_ATTR { return hn::Mul(hn::Mul(a, v), hn::Sub(one, v)); });
     case Unary::tanh:
-      return by_y([&](V a, V v) HWY_ATTR { return hn::Mul(a, hn::NegMulAdd(v, v, one)); });
+      return by_kept([&](V a, V v) HWY_ATTR { return hn::Mul(a, hn::NegMulAdd(v, v, one)); });
     case Unary::relu:
-      return by_x([&](V a, V v) HWY_ATTR { return hn::IfThenZeroElse(hn::Le(v, zero), a); });
+      return by_kept([&](V a, V v) HWY_ATTR { return hn::IfThenZeroElse(hn::Le(v, zero), a); });
     case Unary::leaky_relu:
-      return by_x([&](V a, V v)
-                      HWY_ATTR { return hn::IfThenElse(hn::Gt(v, zero), a, hn::Mul(factor, a)); });
+      return by_kept([&](V a, V v) HWY_ATTR {
+        return hn::IfThenElse(hn::Gt(v, zero), a, hn::Mul(factor, a));
+      });
     case Unary::softplus:
-      return by_x([](V a, V v) HWY_ATTR { return hn::Mul(a, sigmoid(v)); });
+      return by_kept([](V a, V v) HWY_ATTR { return hn::Mul(a, sigmoid(v)); });
     case Unary::scale:
       return constant([&](V a) HWY_ATTR { return hn::Mul(factor, a); });
     case Unary::add_scalar:
@@ -165,8 +165,9 @@ void unary(const UnaryArgs& args) {
 void unary_grad(const UnaryGradArgs& args) {
   dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
     using T = decltype(zero);
+    const T* kept = args.kept ? args.kept->data<T>() : nullptr;
     parallel_for(args.out.numel(), kGrain, [&](int64_t from, int64_t to) HWY_ATTR {
-      apply_unary_grad<T>(args.op, to - from, args.x.data<T>() + from, args.y.data<T>() + from,
+      apply_unary_grad<T>(args.op, to - from, kept ? kept + from : nullptr,
                           args.gy.data<T>() + from, args.out.data<T>() + from,
                           static_cast<T>(args.alpha));
     });

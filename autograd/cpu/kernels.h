@@ -1,4 +1,5 @@
-// Every kernel of the CPU backend; backend.cpp enters them into its table.
+// Every kernel of the CPU backend with its contract, once: declared here, entered into the table by
+// backend.cpp.
 #pragma once
 
 #include "autograd/kernels/attention.h"
@@ -14,50 +15,57 @@
 #include "autograd/kernels/rotation.h"
 #include "autograd/kernels/update.h"
 
+#define RESTAGE_CPU_KERNELS(K)                            \
+  K(unary, UnaryArgs)                                     \
+  K(unary_grad, UnaryGradArgs)                            \
+  K(binary, BinaryArgs)                                   \
+  K(accumulate, AccumulateArgs)                           \
+  K(dropout, DropoutArgs)                                 \
+  K(relu_dropout_grad, ReluDropoutGradArgs)               \
+  K(expand, ExpandArgs)                                   \
+  K(non_finite, NonFiniteArgs)                            \
+  K(sum, SumArgs)                                         \
+  K(max, MaxArgs)                                         \
+  K(max_grad, MaxGradArgs)                                \
+  K(softmax, SoftmaxArgs)                                 \
+  K(softmax_grad, SoftmaxGradArgs)                        \
+  K(matmul, MatmulArgs)                                   \
+  K(copy_blocks, CopyBlocksArgs)                          \
+  K(permute, PermuteArgs)                                 \
+  K(gather, GatherArgs)                                   \
+  K(scatter_add, ScatterAddArgs)                          \
+  K(unfold, UnfoldArgs)                                   \
+  K(fold, FoldArgs)                                       \
+  K(norm, NormArgs)                                       \
+  K(norm_grad, NormGradArgs)                              \
+  K(pooled_norm, PooledNormArgs)                          \
+  K(pooled_norm_grad, PooledNormGradArgs)                 \
+  K(gru, GruArgs)                                         \
+  K(gru_grad, GruGradArgs)                                \
+  K(knn, KnnArgs)                                         \
+  K(fps, FpsArgs)                                         \
+  K(neighbour_attention, NeighbourAttentionArgs)          \
+  K(neighbour_attention_grad, NeighbourAttentionGradArgs) \
+  K(attention_pool, AttentionPoolArgs)                    \
+  K(attention_pool_grad, AttentionPoolGradArgs)           \
+  K(to_matrix, ToMatrixArgs)                              \
+  K(to_matrix_grad, ToMatrixGradArgs)                     \
+  K(from_matrix, FromMatrixArgs)                          \
+  K(atan2, Atan2Args)                                     \
+  K(atan2_grad, Atan2GradArgs)                            \
+  K(fk, FkArgs)                                           \
+  K(fk_grad, FkGradArgs)                                  \
+  K(lbs, LbsArgs)                                         \
+  K(lbs_grad, LbsGradArgs)                                \
+  K(squared_norm, SquaredNormArgs)                        \
+  K(adam, AdamArgs)                                       \
+  K(deform, DeformArgs)
+
 namespace restage::cpu {
 
-void unary(const UnaryArgs&);
-void unary_grad(const UnaryGradArgs&);
-void binary(const BinaryArgs&);
-void accumulate(const AccumulateArgs&);
-void dropout(const DropoutArgs&);
-void relu_dropout_grad(const ReluDropoutGradArgs&);
-void expand(const ExpandArgs&);
-void non_finite(const NonFiniteArgs&);
-void sum(const SumArgs&);
-void max(const MaxArgs&);
-void max_grad(const MaxGradArgs&);
-void softmax(const SoftmaxArgs&);
-void softmax_grad(const SoftmaxGradArgs&);
-void matmul(const MatmulArgs&);
+#define RESTAGE_DECLARE(kernel, Args) void kernel(const Args&);
+RESTAGE_CPU_KERNELS(RESTAGE_DECLARE)
+#undef RESTAGE_DECLARE
 void matmul_bf16(const MatmulArgs&);  // matmul() calls it
-void copy_blocks(const CopyBlocksArgs&);
-void permute(const PermuteArgs&);
-void gather(const GatherArgs&);
-void scatter_add(const ScatterAddArgs&);
-void unfold(const UnfoldArgs&);
-void fold(const FoldArgs&);
-void norm(const NormArgs&);
-void norm_grad(const NormGradArgs&);
-void pooled_norm(const PooledNormArgs&);
-void pooled_norm_grad(const PooledNormGradArgs&);
-void gru(const GruArgs&);
-void gru_grad(const GruGradArgs&);
-void knn(const KnnArgs&);
-void fps(const FpsArgs&);
-void neighbour_attention(const NeighbourAttentionArgs&);
-void neighbour_attention_grad(const NeighbourAttentionGradArgs&);
-void attention_pool(const AttentionPoolArgs&);
-void attention_pool_grad(const AttentionPoolGradArgs&);
-void to_matrix(const ToMatrixArgs&);
-void to_matrix_grad(const ToMatrixGradArgs&);
-void from_matrix(const FromMatrixArgs&);
-void fk(const FkArgs&);
-void fk_grad(const FkGradArgs&);
-void lbs(const LbsArgs&);
-void lbs_grad(const LbsGradArgs&);
-void squared_norm(const SquaredNormArgs&);
-void adam(const AdamArgs&);
-void deform(const DeformArgs&);
 
 }  // namespace restage::cpu

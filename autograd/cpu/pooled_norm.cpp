@@ -177,12 +177,8 @@ void finish(const PooledNormArgs& args, const double* squares, const T* mean) {
   }
 }
 
-/// In float32 whatever the precision of products is: these belong to sums that fused loops make in
-/// float32, and what must cancel between them would not.
-void product(MatmulArgs args) {
-  args.precision = MatmulPrecision::float32;
-  cpu::matmul(args);
-}
+// Products here are in float32 whatever other ops' precision is: they belong to sums that fused
+// loops make in float32, and what must cancel between them would not.
 
 template <class T>
 void forward(const PooledNormArgs& args) {
@@ -190,7 +186,7 @@ void forward(const PooledNormArgs& args) {
   Tensor x_mean = Tensor::empty({1, k}, args.out.dtype());
   Tensor z_mean = Tensor::empty({1, o}, args.out.dtype());
   centre<T>(args.x, n * v, k, x_mean, args.centred);
-  product({x_mean, args.weight, z_mean, false, true, &args.bias});
+  cpu::matmul({x_mean, args.weight, z_mean, false, true, &args.bias});
   std::vector<double> squares(static_cast<size_t>(n * o));
   find_peaks<T>(args, squares.data());
   finish<T>(args, squares.data(), z_mean.data<T>());
@@ -245,8 +241,8 @@ void weight_gradient(const PooledNormGradArgs& args, const Factors& f) {
                 k = args.centred.size(2);
   const Tensor h = args.centred.reshape({n * v, k});
   Tensor gram = Tensor::empty({k, k}, h.dtype());
-  product({h, h, gram, true, false});
-  product({args.weight, gram, args.g_weight});
+  cpu::matmul({h, h, gram, true, false});
+  cpu::matmul({args.weight, gram, args.g_weight});
   const int32_t* index = args.index.data<int32_t>();
   parallel_for(o, row_grain(k * (n + 1)), [&](int64_t from, int64_t to) HWY_ATTR {
     for (int64_t c = from; c < to; ++c) {
@@ -271,10 +267,10 @@ void input_gradient(const PooledNormGradArgs& args, const Factors& f) {
   Tensor m = Tensor::empty({k, k}, args.gy.dtype());
   Tensor everywhere = Tensor::empty({1, k}, args.gy.dtype());
   scale_rows(f.slope.data<T>(), w, o, k, scaled.data<T>());
-  product({args.weight, scaled, m, true, false});
-  product({f.constant, args.weight, everywhere});
+  cpu::matmul({args.weight, scaled, m, true, false});
+  cpu::matmul({f.constant, args.weight, everywhere});
   Tensor out = args.out.reshape({n * v, k});
-  product({args.centred.reshape({n * v, k}), m, out, false, false, &everywhere});
+  cpu::matmul({args.centred.reshape({n * v, k}), m, out, false, false, &everywhere});
   const int32_t* index = args.index.data<int32_t>();
   parallel_for(n, row_grain(o * k), [&](int64_t from, int64_t to) HWY_ATTR {
     for (int64_t t = from * o; t < to * o; ++t) {

@@ -221,8 +221,12 @@ struct Sequence {
       : of(layer),
         gi(Tensor::empty({of.steps * of.n, 3 * of.h}, args.x.dtype())),
         packed(3 * round_up(of.h, cols) * of.h) {
-    cpu::matmul(MatmulArgs{args.x.reshape({of.steps * of.n, of.i}), args.w_ih, gi, false, true,
-                           &args.b_ih});
+    cpu::matmul(MatmulArgs{.a = args.x.reshape({of.steps * of.n, of.i}),
+                           .b = args.w_ih,
+                           .out = gi,
+                           .transpose_b = true,
+                           .bias = &args.b_ih,
+                           .precision = args.precision});
   }
 
   const Layer<T>& of;

@@ -68,6 +68,7 @@ struct Report {
 ///   cotangent; |numeric - analytic| <= 1e-6 * max(|numeric|, |analytic|) + 1e-8 * scale, where
 ///   scale is the largest derivative of the input or 1;
 /// - not vacuous: something was compared, and not only zeros with zeros;
+/// - no input is written to;
 /// - each input alone on the tape gives the same bits as all together (needs), and the others none;
 /// - a value used twice, in two calls and as two inputs of one call, receives the sum;
 /// - the same bits again, for 1, 2 and 3 threads and over memory full of NaN (nothing is left

@@ -29,12 +29,29 @@ struct UnaryArgs {
   Tensor& out;
   double alpha = 0;
 };
-/// out = gy * f'(x), with y = f(x) given. At kinks (relu, abs at 0) the derivative is 0.
+/// What f'(x) is computed from: neg, scale and add_scalar need nothing.
+enum class Derivative { of_nothing, of_x, of_y };
+constexpr Derivative derivative(Unary op) {
+  switch (op) {
+    case Unary::neg:
+    case Unary::scale:
+    case Unary::add_scalar:
+      return Derivative::of_nothing;
+    case Unary::exp:
+    case Unary::sqrt:
+    case Unary::sigmoid:
+    case Unary::tanh:
+    case Unary::relu:
+      return Derivative::of_y;
+    default:
+      return Derivative::of_x;
+  }
+}
+/// out = gy * f'(x). At kinks (relu, abs at 0) the derivative is 0.
 struct UnaryGradArgs {
   static constexpr std::string_view name = "unary_grad";
   Unary op;
-  const Tensor& x;
-  const Tensor& y;
+  const Tensor* kept;  ///< x or y = f(x), as derivative(op) says; null where it needs neither
   const Tensor& gy;
   Tensor& out;
   double alpha = 0;

@@ -35,10 +35,12 @@ class Backend {
 /// The backend of a device (autograd/kernels/kernel.cpp lists them).
 Backend& backend(Device device);
 
-/// Runs a kernel where its output lives.
+/// Runs a kernel where its output lives, and counts the write (Tensor::version). A kernel that
+/// changes memory which others may hold does so in `out`.
 template <class Args>
 void launch(const Args& args) {
   backend(args.out.device()).find(Args::name)(&args);
+  args.out.written();
 }
 
 }  // namespace restage

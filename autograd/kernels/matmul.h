@@ -29,7 +29,7 @@ struct MatmulArgs {
   bool accumulate = false;
   /// float64 operands, and products of fewer than kLeastTerms terms, stay as they are: the latter
   /// are bound by memory, and most of them take in coordinates, which need their digits.
-  MatmulPrecision precision = matmul_precision();
+  MatmulPrecision precision = MatmulPrecision::float32;
   static constexpr int64_t kLeastTerms = 32;
 };
 

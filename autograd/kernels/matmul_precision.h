@@ -1,5 +1,6 @@
 // How precisely float32 matrix products multiply. A switch for the whole process, like PyTorch's
-// set_float32_matmul_precision; float32 unless somebody asks for less.
+// set_float32_matmul_precision; float32 unless somebody asks for less. An op reads it when it is
+// made and keeps it, so its backward pass multiplies as its forward pass did; kernels are told.
 //
 // bfloat16: the operands of a product are rounded to bfloat16 (8 bits of significand, float32's
 // range; to nearest, ties to even; NaN stays NaN) while they are packed. Products of two such
@@ -12,7 +13,7 @@ namespace restage {
 
 enum class MatmulPrecision { float32, bfloat16 };
 
-/// The one in use: what MatmulArgs that say nothing else are computed with.
+/// The one in use: what ops that are made now compute with.
 MatmulPrecision matmul_precision();
 void set_matmul_precision(MatmulPrecision precision);
 

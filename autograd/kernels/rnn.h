@@ -3,6 +3,7 @@
 #pragma once
 
 #include "autograd/kernels/kernel.h"
+#include "autograd/kernels/matmul_precision.h"
 
 namespace restage {
 
@@ -19,6 +20,7 @@ struct GruArgs {
   const Tensor& b_hh;
   Tensor& out;
   Tensor* gates;
+  MatmulPrecision precision = MatmulPrecision::float32;  ///< of the input products
 };
 /// gy [t, n, h] and y = out of GruArgs -> g_gi [t, n, 3h], g_gh [t, n, 3h] (gradients of W_i x +
 /// b_i and of W_h h + b_h), out [n, h] = gradient of h0.

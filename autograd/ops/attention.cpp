@@ -45,7 +45,7 @@ Tensor NeighbourAttention::forward(Inputs x, Saved& saved) const {
                             x[1].device());
   launch(
       NeighbourAttentionArgs{kernel_inputs(*this, x.data()), y, saved.on() ? &weights : nullptr});
-  saved.keep({x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], weights, y, x[8]});
+  saved.keep({x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], weights, y, index});
   return y;
 }
 
@@ -56,7 +56,7 @@ Grads NeighbourAttention::backward(const Saved& saved, const Tensor& gy, Needs n
   launch(NeighbourAttentionGradArgs{kernel_inputs(*this, &saved[0]), saved[8], saved[9], gy,
                                     needs[0] ? &g[0] : nullptr, g[1], g[2], g[3], g[4], g[5], g[6],
                                     g[7]});
-  g[8] = Tensor::zeros(saved[10].shape(), gy.dtype(), gy.device());
+  g[8] = Tensor::zeros(saved.shape(8), gy.dtype(), gy.device());
   for (size_t i = 0; i < g.size(); ++i)
     if (!needs[i]) g[i] = Tensor();
   return g;

@@ -3,6 +3,16 @@
 #include "autograd/kernels/reduce.h"
 
 namespace restage {
+namespace {
+
+Tensor negative(const Tensor& t) {
+  Tensor out = Tensor::empty(t.shape(), t.dtype(), t.device());
+  launch(UnaryArgs{Unary::neg, t, out});
+  return out;
+}
+
+}  // namespace
+
 Tensor sum_to(const Tensor& t, const Shape& shape) {
   if (t.shape() == shape) return t;
   Tensor current = t;
@@ -44,14 +54,16 @@ template <Unary U>
 Tensor UnaryOp<U>::forward(Inputs x, Saved& saved) const {
   Tensor y = Tensor::empty(x[0].shape(), x[0].dtype(), x[0].device());
   launch(UnaryArgs{U, x[0], y, alpha});
-  saved.keep({x[0], y});
+  if constexpr (derivative(U) == Derivative::of_x) saved.keep({x[0]});
+  if constexpr (derivative(U) == Derivative::of_y) saved.keep({y});
   return y;
 }
 
 template <Unary U>
 Grads UnaryOp<U>::backward(const Saved& saved, const Tensor& gy, Needs) const {
   Tensor gx = Tensor::empty(gy.shape(), gy.dtype(), gy.device());
-  launch(UnaryGradArgs{U, saved[0], saved[1], gy, gx, alpha});
+  const Tensor* kept = derivative(U) == Derivative::of_nothing ? nullptr : &saved[0];
+  launch(UnaryGradArgs{U, kept, gy, gx, alpha});
   return {gx};
 }
 
@@ -65,35 +77,28 @@ void BinaryOp<B>::check(Inputs x) const {
 
 template <Binary B>
 Tensor BinaryOp<B>::forward(Inputs x, Saved& saved) const {
-  saved.keep({x[0], x[1]});
+  if constexpr (B == Binary::mul || B == Binary::div)
+    saved.keep(
+        {saved.needs(1) ? x[0] : Tensor(), saved.needs(0) || B == Binary::div ? x[1] : Tensor()});
   return binary(B, x[0], x[1]);
 }
 
 template <Binary B>
 Grads BinaryOp<B>::backward(const Saved& saved, const Tensor& gy, Needs needs) const {
-  const Tensor &a = saved[0], &b = saved[1];
+  const Shape &a = saved.shape(0), &b = saved.shape(1);
   Grads g(2);
   if constexpr (B == Binary::add || B == Binary::sub) {
-    if (needs[0]) g[0] = sum_to(gy, a.shape());
-    if (needs[1]) {
-      g[1] = sum_to(gy, b.shape());
-      if constexpr (B == Binary::sub) {
-        Tensor negative = Tensor::empty(b.shape(), b.dtype(), b.device());
-        launch(UnaryArgs{Unary::neg, g[1], negative});
-        g[1] = negative;
-      }
-    }
+    if (needs[0]) g[0] = sum_to(gy, a);
+    if (needs[1]) g[1] = B == Binary::add ? sum_to(gy, b) : negative(sum_to(gy, b));
   } else if constexpr (B == Binary::mul) {
-    if (needs[0]) g[0] = sum_to(restage::binary(Binary::mul, gy, b), a.shape());
-    if (needs[1]) g[1] = sum_to(restage::binary(Binary::mul, gy, a), b.shape());
+    if (needs[0]) g[0] = sum_to(restage::binary(Binary::mul, gy, saved[1]), a);
+    if (needs[1]) g[1] = sum_to(restage::binary(Binary::mul, gy, saved[0]), b);
   } else {
-    const Tensor ga = restage::binary(Binary::div, gy, b);
-    if (needs[0]) g[0] = sum_to(ga, a.shape());
+    const Tensor ga = restage::binary(Binary::div, gy, saved[1]);
+    if (needs[0]) g[0] = sum_to(ga, a);
     if (needs[1]) {
-      const Tensor q = restage::binary(Binary::div, restage::binary(Binary::mul, ga, a), b);
-      Tensor negative = Tensor::empty(q.shape(), q.dtype(), q.device());
-      launch(UnaryArgs{Unary::neg, q, negative});
-      g[1] = sum_to(negative, b.shape());
+      const Tensor top = restage::binary(Binary::mul, ga, saved[0]);
+      g[1] = sum_to(negative(restage::binary(Binary::div, top, saved[1])), b);
     }
   }
   return g;
@@ -106,15 +111,14 @@ void Expand::check(Inputs x) const {
     shape_error(name, letters, x, "cannot be repeated to " + shape.str());
 }
 
-Tensor Expand::forward(Inputs x, Saved& saved) const {
+Tensor Expand::forward(Inputs x, Saved&) const {
   Tensor y = Tensor::empty(shape, x[0].dtype(), x[0].device());
   launch(ExpandArgs{x[0], y});
-  saved.keep({x[0]});
   return y;
 }
 
 Grads Expand::backward(const Saved& saved, const Tensor& gy, Needs) const {
-  return {sum_to(gy, saved[0].shape())};
+  return {sum_to(gy, saved.shape(0))};
 }
 
 void Dropout::check(Inputs x) const {

@@ -26,13 +26,10 @@ void Reshape::check(Inputs x) const {
     shape_error(name, letters, x, "the numbers do not fit into " + shape.str());
 }
 
-Tensor Reshape::forward(Inputs x, Saved& saved) const {
-  saved.keep({x[0]});
-  return x[0].reshape(shape);
-}
+Tensor Reshape::forward(Inputs x, Saved&) const { return x[0].reshape(shape); }
 
 Grads Reshape::backward(const Saved& saved, const Tensor& gy, Needs) const {
-  return {gy.reshape(saved[0].shape())};
+  return {gy.reshape(saved.shape(0))};
 }
 
 void Permute::check(Inputs x) const {
@@ -48,13 +45,13 @@ void Permute::check(Inputs x) const {
 
 Tensor Permute::forward(Inputs x, Saved&) const {
   Shape shape;
-  PermuteArgs args{x[0], const_cast<Tensor&>(x[0]), {}};
+  std::array<int, Shape::kMaxRank> axes{};
   for (size_t i = 0; i < order.size(); ++i) {
     shape.push_back(x[0].size(order[i]));
-    args.order[i] = order[i];
+    axes[i] = order[i];
   }
   Tensor y = Tensor::empty(shape, x[0].dtype(), x[0].device());
-  launch(PermuteArgs{x[0], y, args.order});
+  launch(PermuteArgs{x[0], y, axes});
   return y;
 }
 
@@ -62,7 +59,7 @@ Grads Permute::backward(const Saved&, const Tensor& gy, Needs) const {
   Permute inverse{order};
   for (size_t i = 0; i < order.size(); ++i)
     inverse.order[static_cast<size_t>(order[i])] = static_cast<int>(i);
-  Saved nothing(false);
+  Saved nothing;
   return {inverse.forward({&gy, 1}, nothing)};
 }
 
@@ -74,17 +71,16 @@ void Slice::check(Inputs x) const {
                 "range " + std::to_string(from) + ".." + std::to_string(to) + " does not fit");
 }
 
-Tensor Slice::forward(Inputs x, Saved& saved) const {
+Tensor Slice::forward(Inputs x, Saved&) const {
   Shape shape = x[0].shape();
   shape.set(axis, to - from);
   Tensor y = Tensor::empty(shape, x[0].dtype(), x[0].device());
   copy_axis(x[0], y, axis, from, 0, to - from);
-  saved.keep({x[0]});
   return y;
 }
 
 Grads Slice::backward(const Saved& saved, const Tensor& gy, Needs) const {
-  Tensor gx = Tensor::zeros(saved[0].shape(), gy.dtype(), gy.device());
+  Tensor gx = Tensor::zeros(saved.shape(0), gy.dtype(), gy.device());
   copy_axis(gy, gx, axis, 0, from, to - from);
   return {gx};
 }
@@ -102,20 +98,17 @@ void Concat::check(Inputs x) const {
     shape_error(name, letters, x, "all axes but axis " + std::to_string(axis) + " must agree");
 }
 
-Tensor Concat::forward(Inputs x, Saved& saved) const {
+Tensor Concat::forward(Inputs x, Saved&) const {
   Shape shape = x[0].shape();
   int64_t total = 0;
   for (const Tensor& t : x) total += t.size(axis);
   shape.set(axis, total);
   Tensor y = Tensor::empty(shape, x[0].dtype(), x[0].device());
   int64_t at = 0;
-  Tensor sizes = Tensor::empty({static_cast<int64_t>(x.size())}, DType::i64);
-  for (size_t i = 0; i < x.size(); ++i) {
-    copy_axis(x[i], y, axis, 0, at, x[i].size(axis));
-    sizes.data<int64_t>()[i] = x[i].size(axis);
-    at += x[i].size(axis);
+  for (const Tensor& t : x) {
+    copy_axis(t, y, axis, 0, at, t.size(axis));
+    at += t.size(axis);
   }
-  saved.keep({sizes});
   return y;
 }
 
@@ -123,11 +116,9 @@ Grads Concat::backward(const Saved& saved, const Tensor& gy, Needs needs) const 
   Grads g(needs.size());
   int64_t at = 0;
   for (size_t i = 0; i < needs.size(); ++i) {
-    const int64_t n = saved[0].data<int64_t>()[i];
+    const int64_t n = saved.shape(i)[axis];
     if (needs[i]) {
-      Shape shape = gy.shape();
-      shape.set(axis, n);
-      g[i] = Tensor::empty(shape, gy.dtype(), gy.device());
+      g[i] = Tensor::empty(saved.shape(i), gy.dtype(), gy.device());
       copy_axis(gy, g[i], axis, at, 0, n);
     }
     at += n;
@@ -158,14 +149,15 @@ Tensor Gather::forward(Inputs x, Saved& saved) const {
   Shape shape = index.shape();
   shape.push_back(x[0].size(2));
   Tensor y = Tensor::empty(shape, x[0].dtype(), x[0].device());
-  launch(GatherArgs{x[0], index.reshape({index.size(0), -1}), y});
-  saved.keep({x[0]});
+  const Tensor flat = index.reshape({index.size(0), -1});
+  launch(GatherArgs{x[0], flat, y});
+  saved.keep({flat});
   return y;
 }
 
 Grads Gather::backward(const Saved& saved, const Tensor& gy, Needs) const {
-  Tensor gx = Tensor::empty(saved[0].shape(), gy.dtype(), gy.device());
-  launch(ScatterAddArgs{gy, index.reshape({index.size(0), -1}), gx});
+  Tensor gx = Tensor::empty(saved.shape(0), gy.dtype(), gy.device());
+  launch(ScatterAddArgs{gy, saved[0], gx});
   return {gx};
 }
 
@@ -176,15 +168,16 @@ void ScatterAdd::check(Inputs x) const {
     shape_error(name, letters, x, "one index per row is needed, not " + index.shape().str());
 }
 
-Tensor ScatterAdd::forward(Inputs x, Saved&) const {
+Tensor ScatterAdd::forward(Inputs x, Saved& saved) const {
   Tensor y = Tensor::empty({x[0].size(0), rows, x[0].size(2)}, x[0].dtype(), x[0].device());
   launch(ScatterAddArgs{x[0], index, y});
+  saved.keep({index});
   return y;
 }
 
-Grads ScatterAdd::backward(const Saved&, const Tensor& gy, Needs) const {
-  Tensor gx = Tensor::empty({gy.size(0), index.size(1), gy.size(2)}, gy.dtype(), gy.device());
-  launch(GatherArgs{gy, index, gx});
+Grads ScatterAdd::backward(const Saved& saved, const Tensor& gy, Needs) const {
+  Tensor gx = Tensor::empty(saved.shape(0), gy.dtype(), gy.device());
+  launch(GatherArgs{gy, saved[0], gx});
   return {gx};
 }
 
@@ -195,15 +188,14 @@ void Unfold::check(Inputs x) const {
     shape_error(name, letters, x, "kernel and stride must be positive");
 }
 
-Tensor Unfold::forward(Inputs x, Saved& saved) const {
+Tensor Unfold::forward(Inputs x, Saved&) const {
   Tensor y = Tensor::empty({x[0].size(0), steps, x[0].size(2) * k}, x[0].dtype(), x[0].device());
   launch(UnfoldArgs{x[0], y, k, stride, pad_left});
-  saved.keep({x[0]});
   return y;
 }
 
 Grads Unfold::backward(const Saved& saved, const Tensor& gy, Needs) const {
-  Tensor gx = Tensor::empty(saved[0].shape(), gy.dtype(), gy.device());
+  Tensor gx = Tensor::empty(saved.shape(0), gy.dtype(), gy.device());
   launch(FoldArgs{gy, gx, k, stride, pad_left});
   return {gx};
 }

@@ -7,19 +7,20 @@
 namespace restage {
 namespace {
 
-Tensor product(const Tensor& a, const Tensor& b, bool ta, bool tb) {
+Tensor product(const Tensor& a, const Tensor& b, bool ta, bool tb, MatmulPrecision precision) {
   Shape shape;
   if (a.rank() == 3 || b.rank() == 3) shape.push_back(a.rank() == 3 ? a.size(0) : b.size(0));
   shape.push_back(a.size(ta ? -1 : -2));
   shape.push_back(b.size(tb ? -2 : -1));
   Tensor y = Tensor::empty(shape, a.dtype(), a.device());
-  launch(MatmulArgs{a, b, y, ta, tb});
+  launch(MatmulArgs{
+      .a = a, .b = b, .out = y, .transpose_a = ta, .transpose_b = tb, .precision = precision});
   return y;
 }
 
 /// A gradient of a matrix that was shared by a batch.
-Tensor unshare(const Tensor& g, const Tensor& of) {
-  return g.rank() == of.rank() ? g : sum_to(g, of.shape());
+Tensor unshare(const Tensor& g, const Shape& of) {
+  return g.rank() == of.rank() ? g : sum_to(g, of);
 }
 
 }  // namespace
@@ -38,34 +39,33 @@ Tensor LinearOp::forward(Inputs x, Saved& saved) const {
   shape.set(-1, x[1].size(0));
   Tensor y = Tensor::empty(shape, x[0].dtype(), x[0].device());
   Tensor rows = y.reshape({flat.size(0), x[1].size(0)});
-  launch(MatmulArgs{flat, x[1], rows, false, true, x.size() > 2 ? &x[2] : nullptr, activation});
-  if (activation == Activation::relu) {
-    saved.keep({x[0], x[1], y});
-  } else {
-    saved.keep({x[0], x[1]});
-  }
+  launch(MatmulArgs{.a = flat,
+                    .b = x[1],
+                    .out = rows,
+                    .transpose_b = true,
+                    .bias = x.size() > 2 ? &x[2] : nullptr,
+                    .activation = activation,
+                    .precision = precision});
+  saved.keep({saved.needs(1) ? x[0] : Tensor(), saved.needs(0) ? x[1] : Tensor(),
+              activation == Activation::relu ? y : Tensor()});
   return y;
 }
 
 Grads LinearOp::backward(const Saved& saved, const Tensor& gy, Needs needs) const {
-  const Tensor &x = saved[0], &w = saved[1];
+  const Shape& x = saved.shape(0);
+  const int64_t rows = x.product(0, x.rank() - 1), i = saved.shape(1)[1], o = saved.shape(1)[0];
   Tensor g = gy;
   if (activation == Activation::relu) {
     g = Tensor::empty(gy.shape(), gy.dtype(), gy.device());
-    launch(UnaryGradArgs{Unary::relu, saved[2], saved[2], gy, g});
+    launch(UnaryGradArgs{Unary::relu, &saved[2], gy, g});
   }
-  const int64_t rows = x.shape().product(0, x.rank() - 1);
-  g = g.reshape({rows, w.size(0)});
+  g = g.reshape({rows, o});
   Grads out(needs.size());
-  if (needs[0]) {
-    out[0] = Tensor::empty(x.shape(), gy.dtype(), gy.device());
-    Tensor flat = out[0].reshape({rows, w.size(1)});
-    launch(MatmulArgs{g, w, flat});
-  }
-  if (needs[1]) out[1] = product(g, x.reshape({rows, w.size(1)}), true, false);
+  if (needs[0]) out[0] = product(g, saved[1], false, false, precision).reshape(x);
+  if (needs[1]) out[1] = product(g, saved[0].reshape({rows, i}), true, false, precision);
   if (needs.size() > 2 && needs[2]) {
-    out[2] = Tensor::empty({w.size(0)}, gy.dtype(), gy.device());
-    launch(SumArgs{g, out[2], 1, rows, w.size(0)});
+    out[2] = Tensor::empty({o}, gy.dtype(), gy.device());
+    launch(SumArgs{g, out[2], 1, rows, o});
   }
   return out;
 }
@@ -82,19 +82,24 @@ void Matmul::check(Inputs x) const {
 }
 
 Tensor Matmul::forward(Inputs x, Saved& saved) const {
-  saved.keep({x[0], x[1]});
-  return product(x[0], x[1], transpose_a, transpose_b);
+  saved.keep({saved.needs(1) ? x[0] : Tensor(), saved.needs(0) ? x[1] : Tensor()});
+  return product(x[0], x[1], transpose_a, transpose_b, precision);
 }
 
 Grads Matmul::backward(const Saved& saved, const Tensor& gy, Needs needs) const {
   const Tensor &a = saved[0], &b = saved[1];
   Grads g(2);
+  const auto times = [this](const Tensor& l, const Tensor& r, bool tl, bool tr) {
+    return product(l, r, tl, tr, precision);
+  };
   if (needs[0])
-    g[0] = unshare(
-        transpose_a ? product(b, gy, transpose_b, true) : product(gy, b, false, !transpose_b), a);
+    g[0] =
+        unshare(transpose_a ? times(b, gy, transpose_b, true) : times(gy, b, false, !transpose_b),
+                saved.shape(0));
   if (needs[1])
-    g[1] = unshare(
-        transpose_b ? product(gy, a, true, transpose_a) : product(a, gy, !transpose_a, false), b);
+    g[1] =
+        unshare(transpose_b ? times(gy, a, true, transpose_a) : times(a, gy, !transpose_a, false),
+                saved.shape(1));
   return g;
 }
 

@@ -30,19 +30,18 @@ void check_axis(const char* name, const char* letters, Inputs x, int axis, bool 
 
 void Sum::check(Inputs x) const { check_axis(name, letters, x, axis, false); }
 
-Tensor Sum::forward(Inputs x, Saved& saved) const {
+Tensor Sum::forward(Inputs x, Saved&) const {
   const Around a(x[0].shape(), axis);
   Tensor y = Tensor::empty(a.without, x[0].dtype(), x[0].device());
   launch(SumArgs{x[0], y, a.outer, a.n, a.inner});
-  saved.keep({x[0]});
   return y;
 }
 
 Grads Sum::backward(const Saved& saved, const Tensor& gy, Needs) const {
-  const Around a(saved[0].shape(), axis);
+  const Around a(saved.shape(0), axis);
   Tensor gx = Tensor::empty({a.outer, a.n, a.inner}, gy.dtype(), gy.device());
   launch(ExpandArgs{gy.reshape({a.outer, 1, a.inner}), gx});
-  return {gx.reshape(saved[0].shape())};
+  return {gx.reshape(saved.shape(0))};
 }
 
 void Max::check(Inputs x) const { check_axis(name, letters, x, axis, true); }
@@ -52,14 +51,14 @@ Tensor Max::forward(Inputs x, Saved& saved) const {
   Tensor y = Tensor::empty(a.without, x[0].dtype(), x[0].device());
   Tensor index = Tensor::empty(a.without, DType::i32, x[0].device());
   launch(MaxArgs{x[0], y, index, a.outer, a.n, a.inner});
-  saved.keep({x[0], index});
+  saved.keep({index});
   return y;
 }
 
 Grads Max::backward(const Saved& saved, const Tensor& gy, Needs) const {
-  const Around a(saved[0].shape(), axis);
-  Tensor gx = Tensor::empty(saved[0].shape(), gy.dtype(), gy.device());
-  launch(MaxGradArgs{gy, saved[1], gx, a.outer, a.n, a.inner});
+  const Around a(saved.shape(0), axis);
+  Tensor gx = Tensor::empty(saved.shape(0), gy.dtype(), gy.device());
+  launch(MaxGradArgs{gy, saved[0], gx, a.outer, a.n, a.inner});
   return {gx};
 }
 

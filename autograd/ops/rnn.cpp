@@ -40,7 +40,7 @@ Tensor Gru::forward(Inputs in, Saved& saved) const {
   const int64_t t_count = x.size(0), n = x.size(1), h = h0.size(1);
   Tensor y = Tensor::empty({t_count, n, h}, x.dtype(), x.device()), gates;
   if (saved.on()) gates = Tensor::empty({t_count, n, 4 * h}, x.dtype(), x.device());
-  launch(GruArgs{x, h0, w_ih, w_hh, in[4], in[5], y, saved.on() ? &gates : nullptr});
+  launch(GruArgs{x, h0, w_ih, w_hh, in[4], in[5], y, saved.on() ? &gates : nullptr, precision});
   saved.keep({x, h0, w_ih, w_hh, y, gates});
   return y;
 }
@@ -53,16 +53,20 @@ Grads Gru::backward(const Saved& saved, const Tensor& gy, Needs needs) const {
   Tensor g_gh = Tensor::empty({t_count, n, 3 * h}, x.dtype(), x.device());
   Tensor g_h0 = Tensor::empty({n, h}, x.dtype(), x.device());
   launch(GruGradArgs{gates, y, h0, w_hh, gy, g_gi, g_gh, g_h0});
+  const auto product = [this](const Tensor& a, const Tensor& b, Tensor& out, bool transpose_a) {
+    launch(
+        MatmulArgs{.a = a, .b = b, .out = out, .transpose_a = transpose_a, .precision = precision});
+  };
   Grads g(6);
   if (needs[0]) {
     g[0] = Tensor::empty(x.shape(), x.dtype(), x.device());
     Tensor rows = flat(g[0]);
-    launch(MatmulArgs{flat(g_gi), w_ih, rows});
+    product(flat(g_gi), w_ih, rows, false);
   }
   if (needs[1]) g[1] = g_h0;
   if (needs[2]) {
     g[2] = Tensor::empty(w_ih.shape(), x.dtype(), x.device());
-    launch(MatmulArgs{flat(g_gi), flat(x), g[2], true, false});
+    product(flat(g_gi), flat(x), g[2], true);
   }
   if (needs[3]) {
     // States before each step: h0 followed by all but the last output.
@@ -73,7 +77,7 @@ Grads Gru::backward(const Saved& saved, const Tensor& gy, Needs needs) const {
       launch(CopyBlocksArgs{y, rest, t_count - 1, n * h, n * h, 0, n * h, 0});
     }
     g[3] = Tensor::empty(w_hh.shape(), x.dtype(), x.device());
-    launch(MatmulArgs{flat(g_gh), flat(before), g[3], true, false});
+    product(flat(g_gh), flat(before), g[3], true);
   }
   if (needs[4]) g[4] = column_sum(g_gi);
   if (needs[5]) g[5] = column_sum(g_gh);

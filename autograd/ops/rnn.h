@@ -1,6 +1,7 @@
 // Recurrent layers (spec 3.2).
 #pragma once
 
+#include "autograd/kernels/matmul_precision.h"
 #include "autograd/tape/tape.h"
 
 namespace restage {
@@ -11,6 +12,8 @@ struct Gru {
   static constexpr const char* name = "gru";
   static constexpr const char* letters =
       "x[t, n, i], h0[n, h], w_ih[3h, i], w_hh[3h, h], b_ih[3h], b_hh[3h]";
+  /// Of products over all steps at once, forward and backward, as in LinearOp.
+  MatmulPrecision precision = matmul_precision();
   void check(Inputs x) const;
   Tensor forward(Inputs x, Saved& saved) const;
   Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;

@@ -47,6 +47,25 @@ Grads ToMatrix::backward(const Saved& saved, const Tensor& gy, Needs) const {
   return {gx};
 }
 
+void Atan2::check(Inputs x) const {
+  if (!(x[0].shape() == x[1].shape())) shape_error(name, letters, x, "shapes differ");
+  require_floats(name, letters, x);
+}
+
+Tensor Atan2::forward(Inputs x, Saved& saved) const {
+  Tensor y = Tensor::empty(x[0].shape(), x[0].dtype(), x[0].device());
+  launch(Atan2Args{x[0], x[1], y});
+  saved.keep({x[0], x[1]});
+  return y;
+}
+
+Grads Atan2::backward(const Saved& saved, const Tensor& gy, Needs) const {
+  Grads g{Tensor::empty(gy.shape(), gy.dtype(), gy.device()),
+          Tensor::empty(gy.shape(), gy.dtype(), gy.device())};
+  launch(Atan2GradArgs{saved[0], saved[1], gy, g[0], g[1]});
+  return g;
+}
+
 void ForwardKinematics::check(Inputs x) const {
   const bool ranks = x[0].rank() == 4 && x[1].rank() == 3 && x[2].rank() == 2;
   if (!ranks || x[0].size(2) != 3 || x[0].size(3) != 3 || x[1].size(2) != 3 || x[2].size(1) != 3)

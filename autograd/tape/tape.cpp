@@ -13,6 +13,10 @@ namespace {
 thread_local std::string current_path;  // of ModuleScope
 std::atomic<int> finite_checks{0};
 
+std::string text_of(const Tensor& t) {
+  return t.defined() ? t.shape().str() + " " + name_of(t.dtype()) : "none";
+}
+
 }  // namespace
 
 ModuleScope::ModuleScope(const std::string& name) : previous_(current_path.size()) {
@@ -40,9 +44,7 @@ void require_finite(const Tensor& t, const char* op, const std::string& path, co
 
 void shape_error(const char* op, const char* letters, Inputs inputs, const std::string& why) {
   std::string shapes;
-  for (const Tensor& t : inputs)
-    shapes += (shapes.empty() ? "" : ", ") + (t.defined() ? t.shape().str() : std::string("none")) +
-              (t.defined() ? std::string(" ") + name_of(t.dtype()) : "");
+  for (const Tensor& t : inputs) shapes += (shapes.empty() ? "" : ", ") + text_of(t);
   throw ShapeError(std::string(op) + " " + letters + ": " + why + "; got " + shapes + " in " +
                    module_path());
 }
@@ -59,24 +61,51 @@ void require_floats(const char* op, const char* letters, Inputs inputs) {
       shape_error(op, letters, inputs, "needs equal float dtypes");
 }
 
+Saved::Saved(Inputs inputs, Needs needs) {
+  inputs_.reserve(inputs.size());
+  for (size_t i = 0; i < inputs.size(); ++i)
+    inputs_.push_back({inputs[i].shape(), inputs[i].dtype(), needs[i]});
+}
+
+void Saved::keep(std::initializer_list<Tensor> tensors) {
+  if (!on()) return;
+  tensors_ = tensors;
+  versions_.clear();
+  for (const Tensor& t : tensors_) versions_.push_back(t.version());
+}
+
+bool Saved::intact() const {
+  for (size_t i = 0; i < tensors_.size(); ++i)
+    if (tensors_[i].version() != versions_[i]) return false;
+  return true;
+}
+
 const Tensor* Gradients::find(uint64_t id) const {
   const auto it = by_id_.find(id);
-  return it == by_id_.end() ? nullptr : &it->second;
+  return it == by_id_.end() ? nullptr : &it->second.gradient;
+}
+
+double Gradients::norm(std::span<const uint64_t> ids) const {
+  double total = 0;
+  for (const uint64_t id : ids) {
+    const auto it = by_id_.find(id);
+    if (it == by_id_.end()) continue;
+    const Leaf& leaf = it->second;
+    if (!leaf.squares) {
+      Tensor squares = Tensor::empty({1}, DType::f64);
+      launch(SquaredNormArgs{leaf.gradient, squares});
+      leaf.squares = squares.item();
+    }
+    total += *leaf.squares;
+  }
+  return std::sqrt(total);
 }
 
 double Gradients::norm() const {
-  if (norm_) return *norm_;
   std::vector<uint64_t> ids;
   for (const auto& entry : by_id_) ids.push_back(entry.first);
   std::sort(ids.begin(), ids.end());
-  double total = 0;
-  for (const uint64_t id : ids) {
-    Tensor squares = Tensor::empty({1}, DType::f64);
-    launch(SquaredNormArgs{by_id_.at(id), squares});
-    total += squares.item();
-  }
-  norm_ = std::sqrt(total);
-  return *norm_;
+  return norm(ids);
 }
 
 bool Gradients::finite() const { return std::isfinite(norm()); }
@@ -115,29 +144,55 @@ Var Tape::record(std::unique_ptr<Function> function, std::span<const Var> inputs
   return v;
 }
 
+/// The op's gradients of its inputs, held to what Grads promises.
+Grads Tape::Node::backward(const Tensor& gy) const {
+  const Saved& saved = function->saved();
+  const auto fail = [this](const std::string& what) {
+    throw Error(std::string("backward of '") + name() + "' in " + path + ": " + what);
+  };
+  if (!saved.intact())
+    fail("a tensor that it keeps was changed after the forward pass; change a clone");
+  InlineVector<bool, kMaxInputs> needs;
+  for (const int64_t input : inputs) needs.push_back(input >= 0);
+  Grads g = function->backward(gy, Needs(needs.data(), needs.size()));
+  if (g.size() != inputs.size())
+    fail("gave " + std::to_string(g.size()) + " gradients for " + std::to_string(inputs.size()) +
+         " inputs");
+  for (size_t k = 0; k < g.size(); ++k) {
+    if (!needs[k] && !g[k].defined()) continue;
+    if (!g[k].defined() || !(g[k].shape() == saved.shape(k)) || g[k].dtype() != saved.dtype(k))
+      fail("the gradient of input " + std::to_string(k) + " is " + text_of(g[k]) +
+           ", the input is " + saved.shape(k).str() + " " + name_of(saved.dtype(k)));
+    if (FiniteCheck::active() && needs[k]) require_finite(g[k], name(), path, "backward");
+  }
+  return g;
+}
+
 Gradients Tape::backward(const Var& loss) {
   if (loss.tape != this) throw Error("backward: the loss does not depend on anything of this tape");
   if (loss.value.numel() != 1)
     throw ShapeError("backward: the loss has shape " + loss.shape().str() + ", not one number");
   require_own(loss);
-  std::vector<Tensor> grads(nodes_.size());
-  const auto at = [this](int64_t node) { return static_cast<size_t>(node - first_); };
+  const int64_t first = first_;
+  const auto at = [first](int64_t node) { return static_cast<size_t>(node - first); };
+  // Off the tape before anything can fail: what is half consumed must not be walked again.
+  std::vector<Node> nodes = std::move(nodes_);
+  first_ += static_cast<int64_t>(nodes.size());
+  nodes_.clear();
+  leaves_.clear();
+  std::vector<Tensor> grads(nodes.size());
   grads[at(loss.node)] = Tensor::full(loss.shape(), 1.0, loss.dtype());
   Gradients result;
   for (size_t i = at(loss.node) + 1; i-- > 0;) {
-    Node& node = nodes_[i];
-    if (!grads[i].defined()) continue;
+    Node& node = nodes[i];
+    if (!grads[i].defined()) continue;  // the loss does not depend on it
     if (node.function == nullptr) {
       result.set(node.id, grads[i]);
       continue;
     }
-    std::array<bool, kMaxInputs> needs{};
-    for (size_t k = 0; k < node.inputs.size(); ++k) needs[k] = node.inputs[k] >= 0;
-    Grads gx = node.function->backward(grads[i], Needs(needs.data(), node.inputs.size()));
+    const Grads gx = node.backward(grads[i]);
     for (size_t k = 0; k < node.inputs.size(); ++k) {
-      if (node.inputs[k] < 0 || k >= gx.size() || !gx[k].defined()) continue;
-      if (FiniteCheck::active())
-        require_finite(gx[k], node.function->name(), node.path, "backward");
+      if (node.inputs[k] < 0) continue;
       Tensor& target = grads[at(node.inputs[k])];
       if (target.defined()) {
         Tensor total = target.clone();  // the first gradient may be shared with another node
@@ -150,9 +205,6 @@ Gradients Tape::backward(const Var& loss) {
     node.function.reset();  // frees what the op had kept
     grads[i] = Tensor();
   }
-  first_ += static_cast<int64_t>(nodes_.size());
-  nodes_.clear();
-  leaves_.clear();
   return result;
 }
 

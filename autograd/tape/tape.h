@@ -38,25 +38,41 @@ struct Var {
 
 inline constexpr size_t kMaxInputs = 16;  ///< of an op
 using Inputs = std::span<const Tensor>;
-/// One gradient per input; undefined where none is needed or none exists.
+/// One gradient per input, of the input's shape and dtype; undefined only where it is not needed.
+/// (What has no gradient is no input of an op but a member, as the index of gather is.)
 using Grads = std::vector<Tensor>;
 /// needs[i]: whether the gradient of input i is wanted.
 using Needs = std::span<const bool>;
 
-/// What an op keeps for its backward pass; keeps nothing when nobody will ask.
+/// What is kept of a call for its backward pass: shapes and dtypes of the inputs in any case, and
+/// the tensors that the op keeps. Nothing when nobody will ask.
 class Saved {
  public:
-  explicit Saved(bool on) : on_(on) {}
-  void keep(std::initializer_list<Tensor> tensors) {
-    if (on_) tensors_.assign(tensors);
-  }
-  bool on() const { return on_; }
+  Saved() = default;  ///< nobody will ask
+  Saved(Inputs inputs, Needs needs);
+  bool on() const { return !inputs_.empty(); }
+  /// Whether the gradient of this input will be asked for.
+  bool needs(size_t input) const { return on() && inputs_[input].needed; }
+  const Shape& shape(size_t input) const { return inputs_[input].shape; }
+  DType dtype(size_t input) const { return inputs_[input].dtype; }
+
+  /// Keeps tensors that are complete: changing one before the backward pass is an Error there. An
+  /// op that computes from shapes alone keeps none.
+  void keep(std::initializer_list<Tensor> tensors);
   const Tensor& operator[](size_t i) const { return tensors_[i]; }
-  size_t count() const { return tensors_.size(); }
+  const std::vector<Tensor>& tensors() const { return tensors_; }
+  /// Whether none of them was written to since.
+  bool intact() const;
 
  private:
-  bool on_;
+  struct Input {
+    Shape shape;
+    DType dtype;
+    bool needed;
+  };
+  std::vector<Input> inputs_;
   std::vector<Tensor> tensors_;
+  std::vector<uint64_t> versions_;
 };
 
 /// Result of backward: a value, not a field of the parameters, so that two players of one game
@@ -65,17 +81,20 @@ class Gradients {
  public:
   /// Gradient of a leaf with this identity (Parameter::id), or null if it did not take part.
   const Tensor* find(uint64_t id) const;
-  void set(uint64_t id, Tensor gradient) {
-    by_id_[id] = std::move(gradient);
-    norm_.reset();
-  }
-  /// Euclidean norm over all leaves, in double, summed in order of identity; computed once.
+  void set(uint64_t id, Tensor gradient) { by_id_[id] = {std::move(gradient), {}}; }
+  /// Euclidean norm over these leaves, in double, summed in the order given; one without a gradient
+  /// adds nothing. Each leaf's part is computed once.
+  double norm(std::span<const uint64_t> ids) const;
+  /// Over all leaves, in order of identity.
   double norm() const;
   bool finite() const;
 
  private:
-  std::unordered_map<uint64_t, Tensor> by_id_;
-  mutable std::optional<double> norm_;
+  struct Leaf {
+    Tensor gradient;
+    mutable std::optional<double> squares;  // their sum
+  };
+  std::unordered_map<uint64_t, Leaf> by_id_;
 };
 
 class Tape {
@@ -86,25 +105,36 @@ class Tape {
 
   /// A differentiable leaf. The same id always gives the same node.
   Var leaf(const Tensor& value, uint64_t id);
-  /// Gradients of all leaves of a scalar. Consumes the recorded ops: values recorded before are
-  /// stale afterwards, and using one with this tape again is an Error.
+  /// Gradients of all leaves of a scalar. Consumes the recorded ops, also when it ends with an
+  /// error: values recorded before are stale afterwards, and using one with this tape again is an
+  /// Error. So is an op whose gradients have not the number, shapes and dtypes of its inputs, and
+  /// one of whose kept tensors was changed since.
   Gradients backward(const Var& loss);
   size_t size() const { return nodes_.size(); }
+  /// What node i is: an op by its name, or "leaf".
+  const char* name(size_t i) const { return nodes_[i].name(); }
+  /// What node i keeps for the backward pass; null for a leaf.
+  const Saved* saved(size_t i) const {
+    return nodes_[i].function ? &nodes_[i].function->saved() : nullptr;
+  }
 
   struct Function {
     virtual ~Function() = default;
     virtual Grads backward(const Tensor& gy, Needs needs) const = 0;
     virtual const char* name() const = 0;
+    virtual const Saved& saved() const = 0;
   };
   /// Used by call(): enters an op with its output.
   Var record(std::unique_ptr<Function> function, std::span<const Var> inputs, Tensor output);
 
  private:
   struct Node {
-    std::unique_ptr<Function> function;  // null: leaf
+    std::unique_ptr<Function> function;  // null: a leaf
     std::vector<int64_t> inputs;         // node of each input, -1: constant
     uint64_t id = 0;                     // of a leaf
     std::string path;
+    const char* name() const { return function ? function->name() : "leaf"; }
+    Grads backward(const Tensor& gy) const;
   };
   void require_own(const Var& v) const;
 
@@ -138,13 +168,14 @@ namespace detail {
 
 template <class Op>
 struct Recorded final : Tape::Function {
-  Recorded(Op o, Saved s) : op(std::move(o)), saved(std::move(s)) {}
+  Recorded(Op o, Saved s) : op(std::move(o)), kept(std::move(s)) {}
   Grads backward(const Tensor& gy, Needs needs) const override {
-    return op.backward(saved, gy, needs);
+    return op.backward(kept, gy, needs);
   }
   const char* name() const override { return Op::name; }
+  const Saved& saved() const override { return kept; }
   Op op;
-  Saved saved;
+  Saved kept;
 };
 
 }  // namespace detail
@@ -157,14 +188,16 @@ template <class Op>
 Var call(const Op& op, std::span<const Var> inputs) {
   if (inputs.size() > kMaxInputs) too_many_inputs(Op::name, Op::letters, inputs);
   InlineVector<Tensor, kMaxInputs> values;
+  InlineVector<bool, kMaxInputs> needs;
   Tape* tape = nullptr;
   for (const Var& v : inputs) {
     values.push_back(v.value);
+    needs.push_back(v.tape != nullptr);
     if (v.tape != nullptr) tape = v.tape;
   }
   const Inputs in(values.data(), values.size());
   op.check(in);
-  Saved saved(tape != nullptr);
+  Saved saved = tape ? Saved(in, Needs(needs.data(), needs.size())) : Saved();
   Tensor y = op.forward(in, saved);
   if (FiniteCheck::active()) require_finite(y, Op::name, module_path(), "forward");
   if (tape == nullptr) return Var(std::move(y));

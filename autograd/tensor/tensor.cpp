@@ -67,6 +67,7 @@ struct Storage {
   size_t bytes;
   Device device;
   void* data;
+  uint64_t version = 0;
 };
 
 Tensor Tensor::empty(const Shape& shape, DType type, Device device) {
@@ -119,6 +120,12 @@ Tensor Tensor::from(const Shape& shape, const std::vector<T>& values) {
 }
 
 Device Tensor::device() const { return storage_ ? storage_->device : Device{}; }
+
+uint64_t Tensor::version() const { return storage_ ? storage_->version : 0; }
+
+void Tensor::written() {
+  if (storage_) ++storage_->version;
+}
 
 template <class T>
 T* Tensor::data() {

@@ -55,6 +55,12 @@ class Tensor {
   void* raw() { return base_; }
   const void* raw() const { return base_; }
 
+  /// How often the memory was written to, counted for all tensors that share it: what a tape keeps
+  /// for the backward pass must not change until then. launch() counts a kernel's output; who
+  /// writes through data() or raw() into memory that others may hold calls written() himself.
+  uint64_t version() const;
+  void written();
+
   Tensor reshape(const Shape& shape) const;     ///< same memory; one dimension may be -1
   Tensor rows(int64_t from, int64_t to) const;  ///< leading-axis range, same memory
   Tensor clone() const;

@@ -53,14 +53,14 @@ void Conv1d::visit(Fields& f) {
   f("bias", bias);
 }
 
-Var dropout(const Context& ctx, const Var& x, double p, const std::string& name) {
+Var dropout(Context& ctx, const Var& x, double p) {
   if (!ctx.training || p <= 0) return x;
-  return dropout(x, p, ctx.rng.fold(module_path() + "." + name));
+  return dropout(x, p, ctx.next_mask());
 }
 
-Var relu_dropout(const Context& ctx, const Var& x, double p, const std::string& name) {
+Var relu_dropout(Context& ctx, const Var& x, double p) {
   if (!ctx.training || p <= 0) return relu(x);
-  return relu_dropout(x, p, ctx.rng.fold(module_path() + "." + name));
+  return relu_dropout(x, p, ctx.next_mask());
 }
 
 }  // namespace restage

@@ -34,9 +34,10 @@ struct Conv1d : Module {
   Parameter weight, bias;
 };
 
-/// Zeroes elements in training with probability p; the mask is a function of step and module path.
-Var dropout(const Context& ctx, const Var& x, double p, const std::string& name = "dropout");
-/// dropout(relu(x)), the same mask, in one pass.
-Var relu_dropout(const Context& ctx, const Var& x, double p, const std::string& name = "dropout");
+/// Zeroes elements in training with probability p; every call has a mask of its own
+/// (Context::next_mask).
+Var dropout(Context& ctx, const Var& x, double p);
+/// dropout(relu(x)) in one pass.
+Var relu_dropout(Context& ctx, const Var& x, double p);
 
 }  // namespace restage

@@ -1,6 +1,6 @@
 #include "nn/losses/motion.h"
 
-#include <cmath>
+#include <optional>
 
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
@@ -31,43 +31,23 @@ Tensor complement(const Tensor& mask) {
   return Tensor::from<double>(mask.shape(), out).cast(mask.dtype());
 }
 
-/// Mean of max(0, |e| - 100 degrees)^2 over joints 1 ... 21, e = atan2(-R20, R00) the angle about y
-/// for the order y-z-x (spec 4.3), as NKN.
-Var twist_loss(const Var& rotations) {
-  const int64_t joints = rotations.size(2), frames = rotations.value.numel() / (9 * joints);
-  const int64_t rows = frames * (joints - 1);
-  const Var flat = reshape(slice(reshape(rotations, {frames, joints, 9}), 1, 1, joints), {rows, 9});
-  const Var s = neg(slice(flat, 1, 6, 7)), c = slice(flat, 1, 0, 1);
-  constexpr double limit = 100.0 / 180.0 * 3.14159265358979323846;
-  std::vector<double> excess(static_cast<size_t>(rows)), ds(excess), dc(excess);
-  double total = 0;
-  for (int64_t i = 0; i < rows; ++i) {
-    const double si = s.value.item(i), ci = c.value.item(i), e = std::atan2(si, ci),
-                 r = si * si + ci * ci;
-    const double over = std::max(0.0, std::abs(e) - limit), g = 2 * over * (e < 0 ? -1.0 : 1.0);
-    total += over * over;
-    if (r > 1e-12) {
-      ds[static_cast<size_t>(i)] = g * ci / r;
-      dc[static_cast<size_t>(i)] = -g * si / r;
-    }
-  }
-  const auto constant = [&](const std::vector<double>& v) {
-    return Var(Tensor::from<double>({rows, 1}, v).cast(rotations.dtype()));
-  };
-  // A linear function with the loss's value and gradient at this point.
-  const Var linear_part = sum_all(s * constant(ds) + c * constant(dc));
-  return scale(add_scalar(linear_part, total - linear_part.value.item()),
-               1.0 / static_cast<double>(rows));
-}
-
 }  // namespace
 
 Var rotation_loss(const Var& rotations, const Var& sixd) {
   return mse(reshape(matrix_to_sixd(rotations), sixd.shape()), sixd);
 }
 
+Var twist_loss(const Var& rotations) {
+  const int64_t joints = rotations.size(2), frames = rotations.value.numel() / (9 * joints);
+  const Var limbs = slice(reshape(rotations, {frames, joints, 9}), 1, 1, joints);
+  constexpr double limit = 100.0 / 180.0 * 3.14159265358979323846;
+  const Var angle = atan2(neg(slice(limbs, 2, 6, 7)), slice(limbs, 2, 0, 1));
+  return mean_all(square(relu(add_scalar(abs(angle), -limit))));
+}
+
 MotionLosses motion_losses(Context& ctx, const MotionModel& net, Discriminator* discriminator,
-                           const MotionBatch& b, const MotionWeights& w) {
+                           const MotionBatch& b, const MotionWeights& w,
+                           bool discriminator_gradients) {
   MotionLosses out;
   MotionState forth, back;
   const MotionOutput to_b = net.forward(ctx, b.input, b.trans, b.rest_b, &forth);
@@ -87,6 +67,8 @@ MotionLosses motion_losses(Context& ctx, const MotionModel& net, Discriminator* 
   out.total = scale(out.cycle, w.cycle) + scale(out.rotation, w.rotation) +
               scale(out.smoothness, w.smoothness) + scale(out.self, w.self);
   if (discriminator != nullptr) {
+    std::optional<Frozen> judge;
+    if (!discriminator_gradients) judge.emplace(ctx);
     const Var logit =
         (*discriminator)(ctx, discriminator_input(to_b.joints, to_b.trans), bone_vectors(b.rest_b));
     out.adversarial = masked_mean(softplus(neg(logit)), complement(b.self_mask));

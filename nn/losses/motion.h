@@ -26,9 +26,11 @@ struct MotionLosses {
 };
 
 /// Generator side: A -> B -> A through the same network. `discriminator` null leaves the
-/// adversarial term out.
+/// adversarial term out. It judges as it is: its parameters are constants, and have gradients only
+/// for who asks for them.
 MotionLosses motion_losses(Context& ctx, const MotionModel& net, Discriminator* discriminator,
-                           const MotionBatch& batch, const MotionWeights& weights);
+                           const MotionBatch& batch, const MotionWeights& weights,
+                           bool discriminator_gradients = false);
 
 /// Self-reconstruction alone: one pass A -> A, whose answer is known. cycle and trans errors,
 /// rotation and smoothness are those of this pass; `self` is their weighted sum.
@@ -48,5 +50,9 @@ DiscriminatorLosses discriminator_losses(Context& ctx, Discriminator& net, const
 /// Mean of (6D(predicted) - target)^2 over all numbers, 6D the first two columns of the matrices
 /// (Q5). Quaternion networks are compared as matrices too, which needs no choice of sign (Q6).
 Var rotation_loss(const Var& rotations, const Var& sixd);
+
+/// Mean of max(0, |e| - 100 degrees)^2 over joints 1 ... of rotations [n, t, j, 3, 3], with
+/// e = atan2(-R20, R00) the angle about y for the order y-z-x (spec 4.3), as NKN.
+Var twist_loss(const Var& rotations);
 
 }  // namespace restage

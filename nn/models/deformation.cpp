@@ -17,20 +17,20 @@ Mlp3::Mlp3(int64_t in, int64_t out, int64_t width, double dropout, bool softmax,
 // ReLU and dropout commute, since the mask is never negative; without dropout ReLU is part of the
 // product.
 template <class Layer>
-Var Mlp3::hidden(Context& ctx, const char* name, Layer&& layer) const {
+Var Mlp3::hidden(Context& ctx, Layer&& layer) const {
   if (!ctx.training || dropout_rate <= 0) return layer(Activation::relu);
-  return relu_dropout(ctx, layer(Activation::none), dropout_rate, name);
+  return relu_dropout(ctx, layer(Activation::none), dropout_rate);
 }
 
 Var Mlp3::from_first(Context& ctx, const Var& h1) const {
-  const Var h2 = hidden(ctx, "dropout2", [&](Activation a) { return fc2(ctx, h1, a); });
+  const Var h2 = hidden(ctx, [&](Activation a) { return fc2(ctx, h1, a); });
   const Var y = fc3(ctx, h2);
   return with_softmax ? softmax(y) : y;
 }
 
 Var Mlp3::operator()(Context& ctx, const Var& x) const {
   const ModuleScope path(scope);
-  return from_first(ctx, hidden(ctx, "dropout1", [&](Activation a) { return fc1(ctx, x, a); }));
+  return from_first(ctx, hidden(ctx, [&](Activation a) { return fc1(ctx, x, a); }));
 }
 
 // W [vector; p] + b = [W_p, (W_c vectors + b)] [p; one], with `one` the unit vector of the sample:
@@ -49,9 +49,7 @@ Var Mlp3::at_points(Context& ctx, const Var& vector, const Var& points) const {
   const Var of_vectors = linear(vector, slice(w, 1, 0, c), ctx.bind(fc1.bias));
   const Var both = concat({slice(w, 1, c, c + 3), permute(of_vectors, {1, 0})}, 1);
   const Var x = concat({points, Var(one)}, 2);
-  return from_first(ctx, hidden(ctx, "dropout1", [&](Activation a) {
-                      return call(LinearOp{a}, {x, both});
-                    }));
+  return from_first(ctx, hidden(ctx, [&](Activation a) { return call(LinearOp{a}, {x, both}); }));
 }
 
 Var Mlp3::with_masks(Context& ctx, const Var& x, const Tensor& mask1, const Tensor& mask2) const {

@@ -25,7 +25,7 @@ struct Mlp3 : Module {
  private:
   /// A hidden layer with ReLU and dropout; `layer` applies the activation that it is given.
   template <class Layer>
-  Var hidden(Context& ctx, const char* name, Layer&& layer) const;
+  Var hidden(Context& ctx, Layer&& layer) const;
   /// All that follows the first hidden layer.
   Var from_first(Context& ctx, const Var& h1) const;
 };

@@ -85,6 +85,7 @@ enum class Defect {
   broadcast,      // gradient of the broadcast shape
   one_missing,    // one element of the gradient is left unwritten
   needs,          // returns nothing unless both gradients are wanted
+  input,          // changes an input
   counter,        // the value depends on how often it was called
   no_shape_check  // accepts everything
 };
@@ -104,6 +105,7 @@ struct Product {
     broadcast_shape(x[0].shape(), x[1].shape(), &ok);
     if (!ok) return x[0];
     Tensor y = binary(Binary::mul, x[0], x[1]);
+    if (D == Defect::input && x[0].numel() > 0) Tensor(x[0]).data<double>()[0] += 1e-3;
     static int calls = 0;
     if (D == Defect::counter && y.numel() > 0 && y.dtype() == DType::f64)
       y.data<double>()[0] += 1e-15 * ++calls;
@@ -159,9 +161,10 @@ TEST(GradcheckSelf, PassesACorrectOp) {
 TEST(GradcheckSelf, ReportsEachDefect) {
   expect_report<Defect::sign>("finite differences say");
   expect_report<Defect::scale>("finite differences say");
-  expect_report<Defect::broadcast>("the gradient of input 1 has another shape");
+  expect_report<Defect::broadcast>("the gradient of input 1 is [4] float64, the input is [1]");
   expect_report<Defect::one_missing>("nan, finite differences say");
-  expect_report<Defect::needs>("alone on the tape its gradient differs");
+  expect_report<Defect::needs>("the gradient of input 0 is none");
+  expect_report<Defect::input>("input 0 was changed");
   expect_report<Defect::counter>("other bits");
   expect_report<Defect::no_shape_check>("sizes differ: was not refused");
 }

@@ -14,6 +14,7 @@
 #include "autograd/kernels/matmul.h"
 #include "autograd/ops/linear.h"
 #include "autograd/ops/reduce.h"
+#include "autograd/ops/rnn.h"
 #include "tests/support/use_set.h"
 
 namespace restage {
@@ -331,6 +332,34 @@ TEST(MatmulPrecision, GradientsOfALayerAreCloseToThoseOfFloat32) {
   expect_close(exact.gradients[0], rounded.gradients[0], "gradient of the input");
   expect_close(exact.gradients[1], rounded.gradients[1], "gradient of the weights");
   EXPECT_TRUE(same_bits(exact.gradients[2], rounded.gradients[2])) << "the bias is no product";
+}
+
+TEST(MatmulPrecision, TheBackwardPassMultipliesAsTheForwardPassDid) {
+  const Tensor x = floats({40, 70}, 1), w = floats({90, 70}, 2), wide = floats({40, 90}, 3);
+  const Tensor frames = floats({3, 40, 70}, 4), state = floats({40, 32}, 5),
+               w_ih = floats({96, 70}, 6), w_hh = floats({96, 32}, 7), bias = floats({96}, 8);
+  const gradcheck::Sample samples[] = {
+      {"linear", {x, w}, [](gradcheck::Args in) { return linear(in[0], in[1]); }},
+      {"matmul", {x, wide}, [](gradcheck::Args in) { return matmul(in[0], in[1], true); }},
+      {"gru", {frames, state, w_ih, w_hh, bias, bias}, [](gradcheck::Args in) {
+         return gru(in[0], in[1], in[2], in[3], in[4], in[5]);
+       }}};
+  for (const gradcheck::Sample& s : samples) {
+    Tape tape;
+    std::vector<Var> leaves;
+    for (size_t k = 0; k < s.inputs.size(); ++k) leaves.push_back(tape.leaf(s.inputs[k], k + 1));
+    Var y;
+    {
+      const MatmulPrecisionScope scope(kBf16);
+      y = s.build(leaves);
+    }
+    const Tensor u = floats(y.shape(), 9);
+    const Gradients late = tape.backward(sum_all(mul(y, Var(u))));
+    const MatmulPrecisionScope scope(kBf16);
+    const gradcheck::Evaluation all = gradcheck::evaluate(s, u);
+    for (size_t k = 0; k < s.inputs.size(); ++k)
+      EXPECT_TRUE(same_bits(*late.find(k + 1), all.gradients[k])) << s.title << " input " << k;
+  }
 }
 
 TEST(MatmulPrecision, AMatrixUnitThatIsNotThereIsAnError) {

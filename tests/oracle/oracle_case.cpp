@@ -276,7 +276,7 @@ void motion_generator(Case& c) {
   b.rest_b = c.in("tpB");
   b.sixd = c.in("th6A");
   b.self_mask = c.constant("self_mask");
-  const MotionLosses l = motion_losses(c.ctx(), *net, dis.get(), b, MotionWeights{});
+  const MotionLosses l = motion_losses(c.ctx(), *net, dis.get(), b, MotionWeights{}, true);
   c.out("cyc", l.cycle);
   c.out("rot", l.rotation);
   c.out("smooth", l.smoothness);

@@ -1,5 +1,7 @@
 #include "train/optim/adam.h"
 
+#include <algorithm>
+
 #include "autograd/kernels/update.h"
 
 namespace restage {
@@ -17,13 +19,15 @@ Adam::Adam(const std::vector<std::pair<std::string, Module*>>& modules, const Ad
                 0};
       if (config.amsgrad) slot.v_max = Tensor::zeros(e.value->shape(), e.value->dtype());
       slots_.push_back(std::move(slot));
+      ids_.push_back(e.parameter->id);
     }
   }
+  std::sort(ids_.begin(), ids_.end());
 }
 
 void Adam::step(const Gradients& gradients, double rate, double clip) {
   double scale = 1;
-  if (clip > 0) scale = std::min(1.0, clip / (gradients.norm() + 1e-6));
+  if (clip > 0) scale = std::min(1.0, clip / (gradients.norm(ids_) + 1e-6));
   for (Slot& s : slots_) {
     const Tensor* g = gradients.find(s.parameter->id);
     if (g == nullptr) continue;

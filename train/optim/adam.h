@@ -25,8 +25,9 @@ class Adam {
  public:
   /// Optimises the parameters of `modules`, each under its prefix (names of the saved state).
   Adam(const std::vector<std::pair<std::string, Module*>>& modules, const AdamConfig& config);
-  /// One update; a parameter without gradient stays, as in PyTorch. `clip`: largest global norm of
-  /// the gradient (0: none); the gradient is scaled down to it as torch's clip_grad_norm_ does.
+  /// One update; a parameter without gradient stays, as in PyTorch. `clip`: largest norm of the
+  /// gradient of the parameters that this optimises (0: none), whatever else `gradients` holds; the
+  /// gradient is scaled down to it as torch's clip_grad_norm_ does.
   void step(const Gradients& gradients, double rate, double clip);
   void save(const std::string& prefix, TensorFile& file) const;
   /// InputError if the state does not fit.
@@ -40,6 +41,7 @@ class Adam {
     int64_t steps = 0;
   };
   std::vector<Slot> slots_;
+  std::vector<uint64_t> ids_;  // of the parameters, ascending
   AdamConfig config_;
 };
 
