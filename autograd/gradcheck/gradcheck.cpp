@@ -302,7 +302,6 @@ OpSamples& OpSamples::add(const std::string& title, std::vector<Tensor> inputs, 
 
 OpSamples& OpSamples::large(const std::string& title, std::vector<Tensor> inputs, Build build) {
   samples.push_back({title, std::move(inputs), std::move(build), Sample::Kind::large});
-  samples.back().f32_tolerance = 1e-3;
   return *this;
 }
 
