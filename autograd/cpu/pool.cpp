@@ -7,10 +7,12 @@
 #include <bit>
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <mutex>
 #include <new>
 #include <vector>
 
+#include "autograd/tensor/nan_memory.h"
 #include "autograd/tensor/tensor.h"
 
 // Under AddressSanitizer free blocks, and the slack behind a tensor, may not be touched.
@@ -58,6 +60,7 @@ struct Pool {
   std::mutex mutex;
   std::array<FreeList, kClasses> free;
   MemoryStats stats;
+  int nan_memory = 0;  // objects of this name alive
 };
 
 Pool& pool() {
@@ -74,6 +77,16 @@ void* from_system(size_t bytes) {
 }
 
 }  // namespace
+
+NanMemory::NanMemory() {
+  const std::lock_guard lock(pool().mutex);
+  ++pool().nan_memory;
+}
+
+NanMemory::~NanMemory() {
+  const std::lock_guard lock(pool().mutex);
+  --pool().nan_memory;
+}
 
 void* cpu::pool_allocate(size_t bytes) {
   const auto [index, size] = size_class(bytes);
@@ -95,6 +108,7 @@ void* cpu::pool_allocate(size_t bytes) {
   p.stats.peak = std::max(p.stats.peak, p.stats.in_use);
   ASAN_POISON_MEMORY_REGION(data, size);
   ASAN_UNPOISON_MEMORY_REGION(data, bytes);
+  if (p.nan_memory > 0) std::memset(data, 0xff, bytes);
   return data;
 }
 

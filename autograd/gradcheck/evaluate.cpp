@@ -44,13 +44,4 @@ bool same_bits(const Evaluation& a, const Evaluation& b) {
   return true;
 }
 
-void fill_free_memory_with_nan() {
-  std::vector<Tensor> blocks;  // a few of every size class that small samples use
-  for (int64_t bytes = 64; bytes <= 16384; bytes += bytes < 1024 ? 64 : bytes / 8)
-    for (int i = 0; i < 6; ++i) {
-      blocks.push_back(Tensor::empty({bytes / 8}, DType::f64));
-      std::memset(blocks.back().raw(), 0xff, static_cast<size_t>(bytes / 8 * 8));
-    }
-}
-
 }  // namespace restage::gradcheck

@@ -22,7 +22,4 @@ Evaluation evaluate(const Sample& s, const Tensor& u,
 bool same_bits(const Tensor& a, const Tensor& b);
 bool same_bits(const Evaluation& a, const Evaluation& b);
 
-/// Leaves NaN in the blocks that the next tensors will be made of.
-void fill_free_memory_with_nan();
-
 }  // namespace restage::gradcheck

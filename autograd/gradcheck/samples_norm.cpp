@@ -19,7 +19,6 @@ void affine_samples(OpSamples& s, const Build& build, int64_t least_rows) {
   for (double& v : std::span<double>(narrow.data<double>(), 30)) v = 3 + 0.3 * v;
   s.add("narrow channels far from 0", {narrow, random({5}, 1), random({5}, 2)}, build);
   s.large("many rows", affine_inputs({1301, 40}, 52), build);
-  s.samples.back().f32_tolerance = 1e-2;
   s.error("one axis", affine_inputs({3}, 1), build);
   s.error("c differs", {random({4, 3}, 1), random({2}, 2), random({3}, 3)}, build);
   s.error("c differs in shift", {random({4, 3}, 1), random({3}, 2), random({1}, 3)}, build);
@@ -56,9 +55,7 @@ void add_norm(Table& t) {
   s.add("one point", {random({2, 1, 3}, 54)}, instance);
   s.samples.back().zero_gradient = true;
   s.large("many points", {random({3, 1100, 9}, 55)}, instance);
-  s.samples.back().f32_tolerance = 1e-2;
   s.large("one sample of many points", {random({1, 1100, 19}, 56)}, instance);
-  s.samples.back().f32_tolerance = 1e-2;
   s.error("two axes", {random({4, 3}, 1)}, instance);
   s.error("no point", {random({2, 0, 3}, 1)}, instance);
   s.error("integers", {i32({1, 2, 1}, {1, 2})}, instance);

@@ -27,10 +27,12 @@ void along_axis(OpSamples& s, const AxisOp& op, bool empty_ok, bool flat_if_sing
   } else {
     s.error("empty axis", {random({2, 0, 3}, 1)}, on(1));
   }
+  // Numbers up to 26; partial sums round at 6e-8 of their size. All of these ops stay below 2.5e-7
+  // of the largest result.
   s.large("many rows", {distinct({1001, 51})}, on(1));
-  s.samples.back().f32_tolerance = 2e-2;  // exponentials of large numbers
+  s.samples.back().f32_tolerance = 2e-6;
   s.large("many columns", {distinct({1203, 40})}, on(0));
-  s.samples.back().f32_tolerance = 2e-2;
+  s.samples.back().f32_tolerance = 2e-6;
   s.error("no such axis", {random({2, 3}, 1)}, on(2));
   s.error("no such axis from the end", {random({2, 3}, 1)}, on(-3));
   s.error("integers", {i32({2}, {1, 2})}, on(0));

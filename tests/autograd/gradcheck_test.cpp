@@ -169,6 +169,15 @@ TEST(GradcheckSelf, ReportsEachDefect) {
   expect_report<Defect::no_shape_check>("sizes differ: was not refused");
 }
 
+TEST(GradcheckSelf, ReportsAHoleInALargeGradientToo) {
+  const OpSamples s = product_samples<Defect::one_missing>();
+  const auto many = std::find_if(s.samples.begin(), s.samples.end(), [](const Sample& sample) {
+    return sample.kind == Sample::Kind::large;
+  });
+  const auto report = [&] { return check_sample(s, *many).text(); };
+  EXPECT_NE(report().find("nan, finite differences say"), std::string::npos) << report();
+}
+
 TEST(GradcheckSelf, ReportsAnIncompleteTable) {
   OpSamples s = product_samples<Defect::none>();
   s.random = nullptr;

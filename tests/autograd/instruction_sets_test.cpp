@@ -10,6 +10,7 @@
 
 #include "autograd/base/error.h"
 #include "autograd/gradcheck/evaluate.h"
+#include "autograd/tensor/nan_memory.h"
 #include "tests/support/use_set.h"
 
 namespace restage::gradcheck {
@@ -34,7 +35,7 @@ void for_samples(const std::function<void(const OpSamples&, const Sample&)>& f) 
 
 Evaluation with_set(const std::string& set, const Sample& s) {
   const UseSet use(set);
-  fill_free_memory_with_nan();
+  const NanMemory unwritten_shows;
   return evaluate(s, random(value_of(s, s.inputs).shape(), 7).cast(DType::f32));
 }
 

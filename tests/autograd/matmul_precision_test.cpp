@@ -15,6 +15,7 @@
 #include "autograd/ops/linear.h"
 #include "autograd/ops/reduce.h"
 #include "autograd/ops/rnn.h"
+#include "autograd/tensor/nan_memory.h"
 #include "tests/support/use_set.h"
 
 namespace restage {
@@ -57,7 +58,7 @@ struct Case {
   bool ta = false, tb = false, relu = false;
 
   Tensor run(MatmulPrecision precision = kBf16) const {
-    gradcheck::fill_free_memory_with_nan();
+    const NanMemory unwritten_shows;
     Shape shape;
     if (a.rank() == 3 || b.rank() == 3) shape.push_back(a.rank() == 3 ? a.size(0) : b.size(0));
     shape.push_back(a.size(ta ? -1 : -2));

@@ -66,6 +66,7 @@ class Case {
   Tensor probe(const std::string& name = "probe") const { return file_.at("out." + name, where_); }
 
   bool has_parameter(const std::string& name) const { return file_.find("p." + name) != nullptr; }
+  bool has_buffer(const std::string& name) const { return file_.find("buf." + name) != nullptr; }
   int64_t size(const std::string& parameter, int axis) const {
     const Tensor& t = file_.at("p." + parameter, where_);
     if (axis >= t.rank())
@@ -236,6 +237,7 @@ std::unique_ptr<Smrm> make_smrm(const Case& c, const std::string& prefix) {
   config.hidden = c.size(prefix + "enc.weight_hh_l0", 1);
   config.layers = gru_layers(c, prefix + "enc.");
   config.dropout = 0;
+  config.standardise = c.has_buffer(prefix + "joint_mean");
   return std::make_unique<Smrm>(config, c.init());
 }
 
@@ -284,6 +286,30 @@ void motion_generator(Case& c) {
   c.out("self", l.self);
   c.out("B_joints", l.joints_b);
   c.out("B_trans", l.trans_b);
+  c.finish(l.total);
+}
+
+/// The default path: the standardised network, one supervised pass from what it sees (X, tX) to
+/// what is true (A, tA).
+void motion_self(Case& c) {
+  const auto net = make_smrm(c, "");
+  c.load(*net);
+  MotionBatch b;
+  b.joints = c.in("A");
+  b.true_trans = c.in("tA");
+  b.input = c.in("X");
+  b.trans = c.in("tX");
+  b.rest_a = c.in("tpA");
+  b.sixd = c.in("th6A");
+  MotionWeights weights;
+  weights.rotation = c.number("rotation_weight");
+  weights.smoothness = c.number("smoothness_weight");
+  const MotionLosses l = self_losses(c.ctx(), *net, b, weights);
+  c.out("cyc", l.cycle);
+  c.out("rot", l.rotation);
+  c.out("smooth", l.smoothness);
+  c.out("joints", l.joints_b);
+  c.out("trans", l.trans_b);
   c.finish(l.total);
 }
 
@@ -359,6 +385,7 @@ constexpr Entry kCases[] = {
     {"pointnet_", pointnet},
     {"smrm_", smrm},
     {"motion_generator", motion_generator},
+    {"motion_self", motion_self},
     {"motion_discriminator", motion_discriminator},
     {"discriminator_nkn", discriminator_nkn},
     {"deformation", deformation},
