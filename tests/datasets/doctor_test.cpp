@@ -203,20 +203,6 @@ TEST(Doctor, ABentSheetIsNobody) {
   EXPECT_EQ(mended(sheet, d).vertices.size(), 4u);
 }
 
-/// Hundreds of groups of points, one by one within reach of the last: joined in a moment.
-TEST(Doctor, ManyPiecesAreJoinedQuickly) {
-  Points points;
-  Rng rng(RngKey{13, 0});
-  const auto near = [&] { return static_cast<float>(rng.uniform(-0.02, 0.02)); };
-  for (int piece = 0; piece < 4000; ++piece) {
-    const Point at(0.3f * static_cast<float>(piece % 16),
-                   0.3f * static_cast<float>(piece / 16 % 16),
-                   0.3f * static_cast<float>(piece / 256));
-    for (int k = 0; k < 5; ++k) points.push_back(at + Point(near(), near(), near()));
-  }
-  EXPECT_EQ(find_parts(points).other, 0u);
-}
-
 /// Triangles that share a corner and nothing else: all their edges are borders, of one line.
 TEST(Doctor, AFanOfTrianglesIsOneBorder) {
   Mesh fan{{Point::Zero()}, {}};
