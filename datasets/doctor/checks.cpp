@@ -74,19 +74,19 @@ void check_target(const Mesh& target, const std::string& where, const Joints* na
   if (named != nullptr && is_mirrored(*named).value_or(false))
     throw InputError(where, "is a mirror image: the joints named left are on the right",
                      "mirror it (x to -x) where it was made, or exchange the names; or --force");
-  if (target.vertices.size() < kEnoughPoints) return;
   ExamineOptions options;
   options.target = true;
   const Diagnosis d = judge_surface(target, shape_of(target), repeats(target.vertices), options);
   for (const Finding& f : d.findings) {
-    if (f.weight != Weight::wrong || f.topic == "points") continue;
+    if (f.weight != Weight::wrong) continue;
     const bool nobody = f.topic == "up" && f.sure < kNobody;
     Finding said = f;
     if (f.topic == "pose") said.what += ": " + f.evidence;
     refuse(where, said,
-           nobody              ? "give one whole person in T-pose"
-           : f.topic == "pose" ? f.fix
-                               : "restage doctor --target --fix OUT mends it");
+           nobody ? "give one whole person in T-pose"
+           : f.topic == "pose" || f.topic == "points"
+               ? f.fix
+               : "restage doctor --target --fix OUT mends it");
   }
 }
 

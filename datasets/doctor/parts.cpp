@@ -116,15 +116,17 @@ Parts judge(const Points& points) {
     return gap;
   };
   const auto small = static_cast<size_t>(kSmallPiece * static_cast<double>(points.size())) + 1;
-  for (bool again = true; again;) {
-    again = false;
-    const Neighbourhood near{person};
-    for (size_t k = 1; k < ordered.size() && !again; ++k)
-      if (!joined[k] && gap_of(ordered[k], near) < apart) {
-        joined[k] = again = true;
-        if (ordered[k].size() > small) ++out.pieces;
-        for (const size_t i : ordered[k]) person.push_back(points[i]);
-      }
+  for (Points latest = person; !latest.empty();) {  // only what was joined last can join more
+    const Neighbourhood near{latest};
+    Points next;
+    for (size_t k = 1; k < ordered.size(); ++k) {
+      if (joined[k] || !(gap_of(ordered[k], near) < apart)) continue;
+      joined[k] = true;
+      if (ordered[k].size() > small) ++out.pieces;
+      for (const size_t i : ordered[k]) next.push_back(points[i]);
+    }
+    person.insert(person.end(), next.begin(), next.end());
+    latest = std::move(next);
   }
   const Neighbourhood near{person};
   out.gap = std::numeric_limits<double>::infinity();
@@ -184,6 +186,7 @@ namespace {
 
 /// Of points without a floor and walls.
 Parts find_pieces(const Points& points) {
+  if (points.empty()) return {};
   const std::vector<size_t> judged = evenly_spread(points);
   Points some;
   for (const size_t i : judged) some.push_back(points[i]);

@@ -150,14 +150,16 @@ Planes find_planes(const Points& points) {
     if (!plane || !reaches_far(left, *plane, kCell * size)) break;
     plane->thick = std::clamp(noise_of(some, *plane), kThin * size, kThick * size);
     plane = fitted(some, *plane);
+    std::vector<bool> on = out.on;
     left.clear();
     for (size_t i = 0; i < points.size(); ++i) {
-      if (!out.on[i] && plane->has(points[i])) {
-        out.on[i] = true;
-        ++out.points;
-      }
-      if (!out.on[i]) left.push_back(points[i]);
+      on[i] = on[i] || plane->has(points[i]);
+      if (!on[i]) left.push_back(points[i]);
     }
+    // A sheet that is bent a little: nobody is beside it.
+    if (static_cast<double>(left.size()) < kRest * static_cast<double>(points.size())) break;
+    out.on = std::move(on);
+    out.points = points.size() - left.size();
     if (round == 0) out.normal = plane->normal;
   }
   return out;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <unordered_map>
+#include <set>
 
 #include "datasets/doctor/orientation_model.h"
 #include "datasets/sampling/surface.h"
@@ -172,23 +172,22 @@ Borders borders(const Mesh& mesh) {
     }
   std::sort(edges.begin(), edges.end());
   Borders out;
-  std::unordered_map<int32_t, int32_t> next;  // union of the vertices on borders
-  const auto root = [&](int32_t v) {
-    while (next[v] != v) v = next[v];
-    return v;
-  };
+  Pieces lines(mesh.vertices.size());  // of vertices that borders join
+  std::vector<size_t> on_border;
   for (size_t i = 0; i < edges.size();) {
     size_t end = i;
     while (end < edges.size() && edges[end] == edges[i]) ++end;
     if (end - i == 1) {
       ++out.edges;
-      for (const int32_t v : edges[i]) next.try_emplace(v, v);
-      const int32_t a = root(edges[i][0]), b = root(edges[i][1]);
-      if (a != b) next[a] = b;
+      const auto a = static_cast<size_t>(edges[i][0]), b = static_cast<size_t>(edges[i][1]);
+      lines.join(a, b);
+      on_border.insert(on_border.end(), {a, b});
     }
     i = end;
   }
-  for (const auto& [v, to] : next) out.loops += v == to;
+  std::set<size_t> loops;
+  for (const size_t v : on_border) loops.insert(lines.of(v));
+  out.loops = loops.size();
   return out;
 }
 

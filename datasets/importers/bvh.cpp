@@ -157,8 +157,14 @@ MotionClip convert_bvh(std::string_view text, const std::string& path,
   if (recording.positions.joints > 0)  // joints that the file lacks are placed between those it has
     recording.names = name_joints(file.skeleton, path, profile ? &*profile : nullptr);
   const int hips = recording.names.map[0].joint;
+  const size_t frames = file.frames.size(), left_out = file.lines_left_out;
   recording.motion = bvh_motion(std::move(file), hips);
-  return make_clip(std::move(recording), path, options);
+  MotionClip clip = make_clip(std::move(recording), path, options);
+  if (left_out > 0)
+    clip.report.remarks.push_back(
+        "'Frames:' announces " + std::to_string(frames) +
+        "; left out what follows them, in as many more lines: " + std::to_string(left_out));
+  return clip;
 }
 
 MotionClip read_bvh(const std::string& path, const MotionOptions& options) {

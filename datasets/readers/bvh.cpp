@@ -185,10 +185,10 @@ void parse_frames(WordLines& lines, BvhFile& file) {
     lines.fail("frame time " + std::to_string(file.frame_time) + " s is not usable",
                "write seconds per frame, between 0.0001 and 1");
   while (lines.next()) {
-    if (static_cast<double>(file.frames.size()) >= announced)
-      lines.fail("more frames than the " + std::to_string(static_cast<long long>(announced)) +
-                     " announced",
-                 "correct 'Frames:'");
+    if (static_cast<double>(file.frames.size()) >= announced) {
+      ++file.lines_left_out;
+      continue;
+    }
     const auto& words = lines.words();
     if (words.size() != file.channel_count)
       lines.fail(

@@ -17,10 +17,12 @@ struct BvhFile {
   double frame_time = 0;                    ///< seconds
   double frame_time_digit = 0;              ///< what one of its last printed digit is worth
   std::vector<std::vector<double>> frames;  ///< channel_count values each; degrees, file units
+  size_t lines_left_out = 0;  ///< after as many frames as the file announces: vendors miscount
 };
 
 /// Parses the text of a BVH file; `path` is for messages. Any joint order, any channel order.
-/// InputError with file:line for anything that is not BVH, not finite, or of the wrong count.
+/// InputError with file:line for anything that is not BVH, not finite, or of fewer frames than it
+/// announces; lines after these are left out.
 BvhFile parse_bvh(std::string_view text, const std::string& path);
 
 }  // namespace restage

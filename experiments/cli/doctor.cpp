@@ -176,6 +176,13 @@ void judge_hands(Report& out, const std::vector<Joints>& frames) {
                             "with toes forwards, the joints named left are on the left", ""});
 }
 
+/// What the importer remarks. Of left and right judge_hands() says more.
+void add_remarks(Report& out, const ImportReport& report) {
+  for (const std::string& remark : report.remarks)
+    if (!remark.starts_with(kMirrored))
+      out.findings.push_back({"remark", Weight::note, remark, 1, "", ""});
+}
+
 /// A rigged character, as retarget would take it: in T-pose, in our frame.
 Report examine_character(const Options& options) {
   TargetMesh target = read_target(options.path);
@@ -183,6 +190,7 @@ Report examine_character(const Options& options) {
   out.subject.taken_as = "the surface that retarget takes as its target";
   for (const auto& [name, value] : target.report.facts) out.facts[name] = value;
   if (target.joints) judge_hands(out, {*target.joints});
+  add_remarks(out, target.report);
   return out;
 }
 
@@ -249,6 +257,7 @@ Report examine_recording(const Options& options) {
   out.facts["leg_length"] = leg_length(clip.motion.rest);
   out.facts["floor"] = clip.floor_y;
   judge_hands(out, {clip.motion.rest});
+  add_remarks(out, clip.report);
   return out;
 }
 

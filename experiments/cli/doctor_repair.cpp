@@ -200,6 +200,10 @@ void check(const Subject& subject, const std::string& out, RepairKind kind, cons
   if (kind == RepairKind::hdf5 && d.faces > 0 && !is_prediction(subject))
     throw InputError(out, "cannot hold surfaces",
                      d.frames > 1 ? "give a folder to --fix" : "end it in .ply or .obj");
+  if (kind == RepairKind::folder && d.fps > 0 && d.fps < 1)
+    throw InputError(out,
+                     "would hold every frame more than 30 times: a folder is played at 30 a second",
+                     "give an .h5 file to --fix");
   if (kind == RepairKind::folder && d.sequences > 1)
     throw InputError(out, "would join " + std::to_string(d.sequences) + " sequences into one",
                      "give an .h5 file to --fix");

@@ -13,6 +13,7 @@
 #include "autograd/base/output_check.h"
 #include "autograd/base/parallel.h"
 #include "autograd/base/rng.h"
+#include "tests/support/lacking.h"
 
 namespace restage {
 namespace {
@@ -69,7 +70,7 @@ TEST_F(AtomicFiles, NameTheTargetThatCannotBeWritten) {
 }
 
 TEST_F(AtomicFiles, AFullDiskIsAWorkError) {
-  if (!fs::exists("/dev/full")) GTEST_SKIP() << "there is no /dev/full here";
+  if (!fs::exists("/dev/full")) RESTAGE_LACKS("there is no /dev/full here");
   // The temporary file of this process, already there as a link to the full device.
   fs::create_symlink("/dev/full", at("x") + ".part" + std::to_string(::getpid()));
   try {

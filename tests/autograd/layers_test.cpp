@@ -7,6 +7,8 @@
 #include <fstream>
 #include <string>
 
+#include "tests/support/lacking.h"
+
 namespace restage {
 namespace {
 
@@ -22,7 +24,7 @@ int check_layers(const std::string& root, const std::string& output = "") {
 
 TEST(Layers, PointOneWay) {
   const int code = check_layers(RESTAGE_SOURCE_DIR);
-  if (code < 0) GTEST_SKIP() << "python3 is missing";
+  if (code < 0) RESTAGE_LACKS("python3 is missing");
   EXPECT_EQ(code, 0) << "see the lines above; the rule is in docs/design/architecture.md";
 }
 
@@ -37,7 +39,7 @@ TEST(Layers, ABrokenArrowIsSeen) {
     return check_layers(root, " > /dev/null");
   };
   const int fine = with("autograd/ops/x.h", "#include \"autograd/tape/tape.h\"");
-  if (fine < 0) GTEST_SKIP() << "python3 is missing";
+  if (fine < 0) RESTAGE_LACKS("python3 is missing");
   EXPECT_EQ(fine, 0);
   EXPECT_EQ(with("train/stages/x.cpp", "#include \"datasets/schema.h\""), 0);
   EXPECT_EQ(with("autograd/tape/x.h", "#include \"autograd/ops/reduce.h\""), 1);

@@ -1,6 +1,6 @@
 // make_h5 FILE.h5 < DESCRIPTION.json: writes any HDF5 file for the tests of the command line, which
 // run on a bare Python. {"datasets": {"/joints": {"type": "float64", "shape": [..], "values":
-// [..]}}, "attributes": {"name": text or integer}}; values may be numbers, "nan" or "inf"; one
+// [..]}}, "attributes": {"name": text or number}}; values may be numbers, "nan" or "inf"; one
 // value fills the whole data set.
 #include <iostream>
 #include <limits>
@@ -43,7 +43,8 @@ int main(int argc, char** argv) try {
   }
   for (const auto& [name, value] : description["attributes"].items()) {
     if (value.is_string()) file.set_text("/", name, value.get<std::string>());
-    if (value.is_number()) file.set_integer("/", name, value.get<int64_t>());
+    if (value.is_number_integer()) file.set_integer("/", name, value.get<int64_t>());
+    if (value.is_number_float()) file.set_number("/", name, value.get<double>());
   }
   file.commit();
   return 0;

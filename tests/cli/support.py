@@ -12,6 +12,8 @@ import unittest
 
 PROGRAM = os.environ["RESTAGE_PROGRAM"]
 MAKE_H5 = os.environ["RESTAGE_MAKE_H5"]
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+DATA = os.path.join(os.environ.get("RESTAGE_SHARED", os.path.join(ROOT, "..", "shared")), "data")
 
 
 class Result:
@@ -93,6 +95,14 @@ class CliTest(unittest.TestCase):
         body = b"".join(struct.pack("<3f", *p) for p in points)
         body += b"".join(struct.pack("<B3i", 3, *f) for f in faces)
         return self.write(name, (head + "end_header\n").encode() + body)
+
+
+def needs_data(name):
+    """Decorator of a test that needs a file of the data folder; where RESTAGE_CI is set, it fails without."""
+    missing = not os.path.exists(os.path.join(DATA, name))
+    if missing and os.environ.get("RESTAGE_CI"):
+        raise FileNotFoundError(f"lacking, and required in CI: {os.path.join(DATA, name)} (set RESTAGE_SHARED)")
+    return unittest.skipIf(missing, "no data folder (set RESTAGE_SHARED)")
 
 
 def numbers(count, seed, scale=1.0):

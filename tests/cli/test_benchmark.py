@@ -4,12 +4,9 @@ import hashlib
 import os
 import shutil
 import tarfile
-import unittest
 
-from support import CliTest
+from support import DATA, ROOT, CliTest, needs_data
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-DATA = os.path.join(os.environ.get("RESTAGE_SHARED", os.path.join(ROOT, "..", "shared")), "data")
 RECIPE = os.path.join(ROOT, "configs", "data", "open_benchmark.yaml")
 SMALL = ["train.bodies=[b000, b001]", 'train.clips=["13_11", "13_33"]', "validation.bodies=[b120]", 'validation.clips=["08_01"]',
          "test.bodies=[b140]", 'test.clips=["02_03"]',
@@ -84,7 +81,7 @@ class Recipes(CliTest):
         self.bad_input(["data", "realism", "none.h5"], "none.h5")
 
 
-@unittest.skipUnless(os.path.exists(os.path.join(DATA, "body", "makehuman.h5")), "no data folder (set RESTAGE_SHARED)")
+@needs_data("body/makehuman.h5")
 class Benchmark(CliTest):
     def build(self, out, *more):
         return ["data", "build", RECIPE, "out=" + out, "data=" + DATA, *SMALL, *more]
@@ -200,7 +197,7 @@ class FetchData(CliTest):
             self.bad_input(["data", "fetch", "list.txt", "--out", "data", "--from", "copy"])
         self.bad_input(["data", "fetch", "--out", "data"], "open_data.txt", "LIST")
 
-    @unittest.skipUnless(os.path.exists(os.path.join(DATA, "body", "targets_original.tar.xz")), "no data folder (set RESTAGE_SHARED)")
+    @needs_data("body/targets_original.tar.xz")
     def test_bodies_from_the_published_files_are_those_of_the_copy(self):
         originals = self.path("originals/body/makehuman")
         with tarfile.open(os.path.join(DATA, "body", "targets_original.tar.xz")) as targets:
@@ -221,7 +218,7 @@ class FetchData(CliTest):
             os.rename(self.path("source"), self.path(folder))
         self.assertEqual(self.bytes("data.h5"), self.bytes("copy.h5"))
 
-    @unittest.skipUnless(os.path.exists(os.path.join(DATA, "body", "makehuman.h5")), "no data folder (set RESTAGE_SHARED)")
+    @needs_data("body/makehuman.h5")
     def test_the_projects_list_and_a_copy(self):
         found = self.json("data", "fetch", os.path.join(ROOT, "configs", "data", "open_data.txt"), "--out", "data", "--from", DATA)
         self.assertEqual(found["missing"], [])

@@ -194,6 +194,12 @@ class DoctorFix(CliTest):
         self.fix("again.h5", "slow", 0)
         self.assertEqual(len(os.listdir(self.path("slow"))), 24)
 
+    def test_a_rate_that_would_fill_the_disk_is_refused(self):
+        cloud = self.person()
+        self.h5("still.h5", {"fps": 1e-6}, points=([2 * len(cloud), 3], [x for p in cloud for x in p] * 2, "float32"),
+                frame_offset=([3], [0, len(cloud), 2 * len(cloud)], "int64"))
+        self.bad_input(["doctor", "still.h5", "--fix", "folder"], "30 a second", ".h5")
+
     def test_sequences_are_not_joined(self):
         cloud = self.person()
         flat = [x for c in self.walk()[:4] for p in c for x in p]

@@ -194,6 +194,26 @@ TEST(Doctor, NobodyIsTakenForAFloor) {
   EXPECT_FALSE(find_planes(flat).any()) << "with nobody beside it, it is no floor";
 }
 
+/// Bent so little that the plane fitted to it has all of its points: nobody was left to judge.
+TEST(Doctor, ABentSheetIsNobody) {
+  const Mesh sheet{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0.02f}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}};
+  const Diagnosis d = examine_surface(sheet);
+  EXPECT_FALSE(d.usable());
+  EXPECT_EQ(d.find("plane"), nullptr);
+  EXPECT_EQ(mended(sheet, d).vertices.size(), 4u);
+}
+
+/// Triangles that share a corner and nothing else: all their edges are borders, of one line.
+TEST(Doctor, AFanOfTrianglesIsOneBorder) {
+  Mesh fan{{Point::Zero()}, {}};
+  for (int32_t i = 1; i < 200000; i += 2) {
+    fan.vertices.insert(fan.vertices.end(), 2, Point(static_cast<float>(i), 1, 0));
+    fan.faces.push_back({0, i, i + 1});
+  }
+  EXPECT_EQ(borders(fan).edges, 300000u);
+  EXPECT_EQ(borders(fan).loops, 1u);
+}
+
 TEST(Doctor, NobodyIsOfThatSize) {
   const auto judged = [](double scale, std::optional<double> given = std::nullopt) {
     ExamineOptions options;
@@ -240,6 +260,23 @@ TEST(Doctor, TargetsAreJudgedAsRetargetingDoes) {
     else
       EXPECT_THROW(check_target(mesh, "hero"), InputError);
   }
+}
+
+/// What the doctor calls unusable is refused as a target, also with few points.
+TEST(Doctor, FlatSquaresAreNoTarget) {
+  Mesh squares;  // twelve of them, with corners of their own: 48 vertices
+  for (int32_t i = 0; i < 12; ++i) {
+    const Point at(0.06f * static_cast<float>(i % 4), 0.06f * static_cast<float>(i / 4), 0);
+    for (const Point& corner :
+         {Point(0, 0, 0), Point(0.05f, 0, 0), Point(0.05f, 0.05f, 0), Point(0, 0.05f, 0)})
+      squares.vertices.push_back(at + corner);
+    squares.faces.push_back({4 * i, 4 * i + 1, 4 * i + 2});
+    squares.faces.push_back({4 * i, 4 * i + 2, 4 * i + 3});
+  }
+  ExamineOptions target;
+  target.target = true;
+  EXPECT_FALSE(examine_surface(squares, target).usable());
+  EXPECT_THROW(check_target(squares, "squares"), InputError);
 }
 
 TEST(Doctor, TargetsMustStandInTPoseAndFaceForwards) {

@@ -29,8 +29,7 @@ class ImportersImport : public ::testing::Test {
 };
 
 TEST_F(ImportersImport, DataFolderBecomesOneFile) {
-  if (!fs::exists(test::data_folder() + "/cmu/clips30.h5"))
-    GTEST_SKIP() << "no data folder (set RESTAGE_SHARED)";
+  RESTAGE_NEED_DATA();
   // Two bodies and all clips: the whole set takes seconds more and shows nothing more.
   fs::create_directories(folder_ + "/in/body");
   fs::create_symlink(fs::absolute(test::data_folder() + "/cmu"), folder_ + "/in/cmu");

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Runs the fuzz targets of the readers and prints what came of it.
+"""Runs the fuzz targets of the readers and of what comes after them, and prints what came of it.
 
     tests/fuzz/run_fuzz.py                      5 seconds each, build/fuzz/restage_fuzz
     tests/fuzz/run_fuzz.py --inputs 200000      so many inputs each
@@ -23,7 +23,9 @@ HERE = pathlib.Path(__file__).resolve().parent
 # Texts have words that chance finds slowly.
 DICTIONARY = {"ply": "ply", "obj": "obj", "gltf": "gltf", "character": "gltf", "bvh": "bvh", "asf": "asf",
               "amc": "asf", "npy": "npy", "npz": "npy", "amass": "npy", "smpl": "npy", "safetensors": "safetensors",
-              "config": "yaml", "recipe": "yaml", "profile": "yaml", "names": "yaml"}
+              "config": "yaml", "recipe": "yaml",
+              "profile": "yaml", "names": "yaml", "doctor": "obj", "sequence": "npy", "import": "bvh", "skeleton": "obj",
+              "retarget": "obj"}
 
 
 def arguments():

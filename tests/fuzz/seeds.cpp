@@ -5,7 +5,9 @@
 #include <functional>
 #include <map>
 
+#include "datasets/builtin/bodies.h"
 #include "datasets/importers/builtin_profiles.h"
+#include "datasets/sampling/surface.h"
 #include "datasets/schema.h"
 #include "experiments/cli/benchmark_config.h"
 #include "nn/weights/bundle.h"
@@ -374,6 +376,55 @@ Seeds hdf5_seeds() {
           {"old", hdf5(test::write_old_layout)}};
 }
 
+// ---- what comes after reading ------------------------------------------------------------------
+
+std::string obj_of(const Mesh& mesh) {
+  std::string out;
+  char line[80];
+  for (const Point& p : mesh.vertices) {
+    std::snprintf(line, sizeof line, "v %.3f %.3f %.3f\n", double{p[0]}, double{p[1]},
+                  double{p[2]});
+    out += line;
+  }
+  for (const Triangle& f : mesh.faces) {
+    std::snprintf(line, sizeof line, "f %d %d %d\n", f[0] + 1, f[1] + 1, f[2] + 1);
+    out += line;
+  }
+  return out;
+}
+
+/// A person in T-pose, as a scan of some hundred points and as a surface of boxes; nobody.
+Seeds people_seeds() {
+  const Body body = builtin_body(0, "fuzz", 0);
+  const Points scan = SurfaceSampler(body).draw(RngKey{1, 0}, 400).on_rest(body);
+  const Mesh sheet{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0.02f}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}};
+  return {{"scan", obj_of({scan, {}}), Cut::never_cut},
+          {"boxes", obj_of(testing::tiny_body("a", "train").rest), Cut::never_cut},
+          {"sheet", obj_of(sheet), Cut::any}};
+}
+
+Seeds sequence_seeds() {
+  const Body body = testing::tiny_body("a", "train");
+  std::vector<float> walk;
+  for (int f = 0; f < 6; ++f)
+    for (const Point& p : body.rest.vertices)
+      for (int axis = 0; axis < 3; ++axis)
+        walk.push_back(p[axis] + (axis == 2 ? 0.03f * static_cast<float>(f) : 0));
+  const auto n = static_cast<int64_t>(body.rest.vertices.size());
+  return {{"walk", test::npy<float>({6, n, 3}, walk)},
+          {"noise", test::npy<float>({20, 5, 3}, numbers(300))}};
+}
+
+Seeds import_seeds() {
+  const auto of = [](int kind, const std::string& bytes) {
+    return static_cast<char>(kind) + bytes;
+  };
+  return {{"bvh", of(0, bvh_seeds()[0].bytes), Cut::never_cut},
+          {"obj", of(3, people_seeds()[0].bytes), Cut::never_cut},
+          {"ply", of(4, ply_seeds()[2].bytes), Cut::never_cut},
+          {"npy", of(5, sequence_seeds()[1].bytes), Cut::never_cut}};
+}
+
 }  // namespace
 
 std::string_view amc_skeleton() {
@@ -415,7 +466,12 @@ std::vector<Seed> seeds(std::string_view target) {
        [] {
          return Seeds{{"map", "a.*: skeleton.*\nb.0.bias: ~\n'x': y\n", Cut::any}};
        }},
-      {"hdf5", hdf5_seeds}};
+      {"hdf5", hdf5_seeds},
+      {"doctor", people_seeds},
+      {"sequence", sequence_seeds},
+      {"import", import_seeds},
+      {"skeleton", people_seeds},
+      {"retarget", people_seeds}};
   return makers.at(target)();
 }
 

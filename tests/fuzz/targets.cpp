@@ -22,7 +22,8 @@
 #include "tests/datasets/schema_support.h"
 #include "tests/datasets/smpl_support.h"
 #include "nn/config/config.h"
-#include "train/stages/configs.h"
+#include "tests/fuzz/after_reading.h"
+#include "train/stages/train_config.h"
 
 namespace restage::fuzz {
 namespace {
@@ -32,13 +33,16 @@ const test::TempDir& folder() {
   return dir;
 }
 
-/// A new file with these bytes, for readers that want one.
+}  // namespace
+
 std::string file_of(const std::string& bytes, const std::string& name) {
   const std::string path = folder() / name;
   std::filesystem::remove(path);  // much faster than cutting the old one to nothing
   test::write_bytes(path, bytes);
   return path;
 }
+
+namespace {
 
 /// Does all of them, whatever is refused; then the first refusal counts.
 void do_all(const std::vector<std::function<void()>>& actions) {
@@ -240,7 +244,12 @@ const std::vector<Target>& targets() {
                                           {"recipe", kShort, 65, read_recipe},
                                           {"profile", kShort, 65, read_profile},
                                           {"names", kShort, 65, read_names},
-                                          {"hdf5", kLong, 1040, read_hdf5}};
+                                          {"hdf5", kLong, 1040, read_hdf5},
+                                          {"doctor", kShort, 65, doctor_surface},
+                                          {"sequence", kShort, 65, doctor_sequence},
+                                          {"import", kShort, 65, import_file},
+                                          {"skeleton", kShort, 65, extract},
+                                          {"retarget", kShort, 65, retarget}};
   return all;
 }
 

@@ -1,5 +1,5 @@
-// The readers as functions of bytes: what libFuzzer calls (fuzz_main.cpp), and the test of cut
-// files (cut_files_test.cpp).
+// The readers, and what comes after them (after_reading.h), as functions of bytes: what libFuzzer
+// calls (fuzz_main.cpp), and the test of cut files (cut_files_test.cpp).
 #pragma once
 
 #include <string>
@@ -31,6 +31,9 @@ struct Seed {
   Cut cut = Cut::refused;
 };
 std::vector<Seed> seeds(std::string_view target);
+
+/// A new file with these bytes, in a folder that goes away with the program; its path.
+std::string file_of(const std::string& bytes, const std::string& name);
 
 /// Arrays of an NPZ one after the other, without the checksums that would keep damage from the
 /// importers: name, zero, length (4 bytes), bytes.

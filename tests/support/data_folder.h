@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <string>
 
+#include "tests/support/lacking.h"
+
 namespace restage::test {
 
 /// RESTAGE_SHARED/data, else ../shared/data beside the repository; it may not be there.
@@ -15,8 +17,8 @@ inline std::string data_folder() {
 
 }  // namespace restage::test
 
-/// Skips a test that needs the data folder where there is none.
+/// Ends a test that needs the data folder where there is none.
 #define RESTAGE_NEED_DATA()                                                          \
   if (!std::filesystem::exists(restage::test::data_folder() + "/cmu/clips30.h5") ||  \
       !std::filesystem::exists(restage::test::data_folder() + "/body/makehuman.h5")) \
-  GTEST_SKIP() << "no data folder (set RESTAGE_SHARED): its bodies and motions are not at hand"
+  RESTAGE_LACKS("no data folder (set RESTAGE_SHARED): its bodies and motions are not at hand")
