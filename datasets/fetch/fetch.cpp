@@ -17,6 +17,7 @@
 #include "datasets/fetch/download.h"
 #include "datasets/fetch/fetch_cmu.h"
 #include "datasets/importers/makehuman_pack.h"
+#include "datasets/readers/packed_text.h"
 #include "datasets/readers/sha256.h"
 
 namespace restage {
@@ -74,16 +75,6 @@ bool packed_here(const FetchEntry& e) {
   return e.path.ends_with(".gz") && !e.address.ends_with(".gz");
 }
 
-std::string unpacked(const std::string& path) {
-  const std::unique_ptr<gzFile_s, int (*)(gzFile)> file(gzopen(path.c_str(), "rb"), gzclose);
-  std::string out, piece(size_t{1} << 16, '\0');
-  int got = 0;
-  while (file && out.size() <= kMostPacked &&
-         (got = gzread(file.get(), piece.data(), static_cast<unsigned>(piece.size()))) > 0)
-    out.append(piece, 0, static_cast<size_t>(got));
-  return out;
-}
-
 /// Gzip without name and time, so equal content gives equal bytes.
 std::string packed(const std::string& content) {
   z_stream stream{};
@@ -106,8 +97,8 @@ bool is_right(const FetchEntry& e, const std::string& path, bool inside_gz) {
   std::error_code none;
   if (!fs::is_regular_file(path, none)) return false;
   if (inside_gz) {
-    const std::string content = unpacked(path);
-    return content.size() == e.bytes && sha256(content) == e.sha256;
+    const std::optional<std::string> content = read_gz(path, kMostPacked);
+    return content && content->size() == e.bytes && sha256(*content) == e.sha256;
   }
   return fs::file_size(path, none) == e.bytes && sha256_of_file(path) == e.sha256;
 }

@@ -113,8 +113,7 @@ Sha256 sum_of_skeleton(const PackedClip& clip) {
   Sha256 sum;
   for (const size_t j : joints_by_name(clip)) {
     const int32_t parent = clip.parents[j];
-    sum.add(clip.names[j] + " " + (parent < 0 ? "" : clip.names[static_cast<size_t>(parent)]) +
-            "\n");
+    sum.add(clip.names[j] + " " + (parent < 0 ? "" : clip.names[parent]) + "\n");
     sum.add(piece(clip.offsets, j, 3));
     sum.add(piece(clip.ends, j, 3));
   }

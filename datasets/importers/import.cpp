@@ -30,8 +30,7 @@ void add_bodies(const std::string& folder, const std::string& garment, ImportWri
     std::vector<Body> bodies(n);
     parallel_for(static_cast<int64_t>(n), 1, [&](int64_t from, int64_t to) {
       for (int64_t i = from; i < to; ++i)
-        bodies[static_cast<size_t>(i)] =
-            model.build(recipes[begin + static_cast<size_t>(i)], garment);
+        bodies[i] = model.build(recipes[begin + static_cast<size_t>(i)], garment);
     });
     writer.add(list, bodies, {});
   }

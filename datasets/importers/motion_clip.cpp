@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "autograd/base/error.h"
+#include "autograd/base/format.h"
 #include "datasets/importers/length_units.h"
 #include "datasets/readers/word_lines.h"
 
@@ -13,20 +14,14 @@ namespace {
 
 constexpr size_t kMaxFrames = size_t{1} << 20;  // 9.7 hours at 30 fps
 
-std::string text_of(double value, const char* format = "%.4g") {
-  char text[40];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
-}
-
 /// Metres per unit; see MotionOptions::scale.
 double find_scale(const Recording& recording, double given, const std::string& path,
                   ImportReport& report) {
   const double leg = leg_length(rest_joints(recording.motion.skeleton, recording.names.map));
   const auto says = [&](double metres, const std::string& why) {
     report.facts.emplace_back("units", unit_name(metres) + ", " + why + ": a leg of " +
-                                           text_of(leg) + " units is " +
-                                           text_of(leg * metres, "%.2f") + " m");
+                                           format("%.4g", leg) + " units is " +
+                                           format("%.2f", leg * metres) + " m");
     return metres;
   };
   if (given > 0) return says(given, "as given");
@@ -34,10 +29,11 @@ double find_scale(const Recording& recording, double given, const std::string& p
     const double metres = leg * recording.metres_per_unit;
     if (metres >= 0.4 && metres < 1.4) return says(recording.metres_per_unit, "as the file says");
     report.remarks.push_back("the units that the file names would make a leg of " +
-                             text_of(metres) + " m: found by the leg instead");
+                             format("%.4g", metres) + " m: found by the leg instead");
   }
   if (const LegUnit* unit = unit_of_leg(leg)) return says(unit->metres, "by the legs");
-  throw InputError(path, "a leg of " + text_of(leg) + " units is no person's in any known unit",
+  throw InputError(path,
+                   "a leg of " + format("%.4g", leg) + " units is no person's in any known unit",
                    "give the scale (metres per unit)");
 }
 
@@ -59,9 +55,9 @@ void check_root(const SourceMotion& motion, double limit, const std::string& pat
     const double speed = step.norm() * motion.fps;
     if (speed > limit)
       throw InputError(path,
-                       "the root jumps " + text_of(step.norm()) + " m from frame " +
+                       "the root jumps " + format("%.4g", step.norm()) + " m from frame " +
                            std::to_string(f - 1) + " to " + std::to_string(f) + " (" +
-                           text_of(speed) + " m/s)",
+                           format("%.4g", speed) + " m/s)",
                        "the recording is broken there: cut it, or check frame rate and scale");
   }
 }
@@ -120,7 +116,7 @@ Poses poses_at_30_fps(SourceMotion motion, const JointMap& map, const RestPose& 
                       uint64_t bytes, const std::string& path) {
   const double seconds = static_cast<double>(motion.local.size()) / motion.fps;
   if (!(seconds * kFps < static_cast<double>(kMaxFrames)))
-    throw InputError(path, "lasts " + text_of(seconds) + " s",
+    throw InputError(path, "lasts " + format("%.4g", seconds) + " s",
                      "cut it into files of at most 9 hours");
   check_length(motion.local.size(), motion.skeleton.size(), motion.fps, bytes, path);
   motion = resample(motion);
@@ -150,8 +146,7 @@ void report_names(const Recording& recording, ImportReport& report) {
   const Profile& profile = *recording.names.profile;
   std::string placed;
   for (const int j : recording.names.placed)
-    placed +=
-        (placed.empty() ? "; placed: " : ", ") + std::string(kJointNames[static_cast<size_t>(j)]);
+    placed += (placed.empty() ? "; placed: " : ", ") + std::string(kJointNames[j]);
   report.facts.emplace_back("names", profile.title + " (profile " + profile.name + ")" + placed);
 }
 
@@ -161,11 +156,11 @@ void report_positions(const BonePositions& found, double scale, ImportReport& re
   if (found.off_offset * scale > kSeen)
     report.facts.emplace_back("offsets", "by the position channels of " +
                                              std::to_string(found.joints) + " joints, up to " +
-                                             text_of(found.off_offset * scale, "%.3f") +
+                                             format("%.3f", found.off_offset * scale) +
                                              " m from OFFSET");
   if (found.stray * scale > kSeen)
     report.remarks.push_back("the position channels stretch bones: " + found.stray_joint +
-                             " strays up to " + text_of(found.stray * scale, "%.3f") +
+                             " strays up to " + format("%.3f", found.stray * scale) +
                              " m from its mean place, which is taken");
 }
 
@@ -182,7 +177,7 @@ void compare_with_profile(const Profile& profile, double scale, double fps, Impo
     if (name == "up" && !profile.up.empty() && value.substr(0, value.find(',')) != profile.up)
       differs("up axis", value.substr(0, value.find(',')), profile.up);
   if (profile.fps > 0 && std::abs(fps / profile.fps - 1) > 1e-3)
-    differs("a rate of", text_of(fps, "%.6g") + " fps", text_of(profile.fps, "%.6g") + " fps");
+    differs("a rate of", format("%.6g", fps) + " fps", format("%.6g", profile.fps) + " fps");
 }
 
 }  // namespace
@@ -209,7 +204,7 @@ MotionClip make_clip(Recording recording, const std::string& path, const MotionO
   report.facts.emplace_back(
       "rate",
       (fps == kFps ? "30 fps, taken as they are"
-                   : text_of(fps, "%.6g") + " fps -> 30 fps, slerp: " + std::to_string(frames) +
+                   : format("%.6g", fps) + " fps -> 30 fps, slerp: " + std::to_string(frames) +
                          " frames -> " + std::to_string(poses.size())) +
           (options.fps > 0        ? " (as given; " + recording.rate_of_file + ")"
            : recording.rate_known ? std::string()
@@ -218,7 +213,7 @@ MotionClip make_clip(Recording recording, const std::string& path, const MotionO
   for (const PosedSkeleton& pose : poses) clip.joints.push_back(pose.joints);
   clip.floor_y = floor_height(poses);
   report.facts.emplace_back("floor",
-                            text_of(clip.floor_y, "%.3f") + " m in the file's world, moved to 0");
+                            format("%.3f", clip.floor_y) + " m in the file's world, moved to 0");
   clip.motion = to_motion(poses, rest.joints, clip.floor_y);
   clip.motion.id = options.id.empty() ? stem_of(path) : options.id;
   clip.motion.subject =

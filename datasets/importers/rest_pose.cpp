@@ -106,11 +106,10 @@ std::string unlike_t_pose(const Joints& rest) {
   const double trunk = angle_between(rest[15] - rest[0], Vec3::UnitY());
   if (!(trunk <= kMostTrunk)) return "its trunk is not upright";
   for (const Limb& limb : limbs()) {
-    const Vec3 bone = rest[static_cast<size_t>(limb.to)] - rest[static_cast<size_t>(limb.from)];
+    const Vec3 bone = rest[limb.to] - rest[limb.from];
     if (!(bone.norm() > 1e-4) || !(angle_between(bone, limb.wanted) <= kMostLimb))
-      return "its " + std::string(kJointNames[static_cast<size_t>(limb.from)]) +
-             " does not point towards the " +
-             std::string(kJointNames[static_cast<size_t>(limb.to)]) + " as a standing person's";
+      return "its " + std::string(kJointNames[limb.from]) + " does not point towards the " +
+             std::string(kJointNames[limb.to]) + " as a standing person's";
   }
   return "";
 }
@@ -119,11 +118,10 @@ std::string unlike_t_pose(const Joints& rest) {
 std::string limbs_off(const Joints& rest) {
   std::string out;
   for (const Limb& limb : limbs()) {
-    const double angle = angle_between(
-        rest[static_cast<size_t>(limb.to)] - rest[static_cast<size_t>(limb.from)], limb.wanted);
+    const double angle = angle_between(rest[limb.to] - rest[limb.from], limb.wanted);
     if (angle < kShownAngle) continue;
-    out += (out.empty() ? "" : ", ") + std::string(kJointNames[static_cast<size_t>(limb.from)]) +
-           " " + std::to_string(std::lround(angle));
+    out += (out.empty() ? "" : ", ") + std::string(kJointNames[limb.from]) + " " +
+           std::to_string(std::lround(angle));
   }
   return out.empty() ? out : out + " degrees";
 }
@@ -138,10 +136,7 @@ RestPose built_pose(const SourceMotion& motion, const JointMap& map, const Joint
     const int p = kParents[j];
     out.frame[j] = turned[j].transpose();
     stood[j] = turned[0] * (zero[j] - zero[0]);
-    out.joints[j] =
-        p < 0 ? Vec3::Zero()
-              : Vec3(out.joints[static_cast<size_t>(p)] +
-                     turned[static_cast<size_t>(p)] * (zero[j] - zero[static_cast<size_t>(p)]));
+    out.joints[j] = p < 0 ? Vec3::Zero() : Vec3(out.joints[p] + turned[p] * (zero[j] - zero[p]));
   }
   report.facts.emplace_back("rest pose",
                             "built, for zero rotations are no T-pose: trunk upright, collars and "
