@@ -17,6 +17,7 @@
 #include "datasets/fetch/download.h"
 #include "datasets/fetch/fetch_cmu.h"
 #include "datasets/importers/makehuman_pack.h"
+#include "datasets/readers/folders.h"
 #include "datasets/readers/packed_text.h"
 #include "datasets/readers/sha256.h"
 
@@ -29,12 +30,6 @@ constexpr uint64_t kMostList = uint64_t{16} << 20;
 constexpr std::string_view kMakehuman = "makehuman:",
                            kCmu = "cmu:";             // packed from the files of a list
 constexpr uint64_t kMostPacked = uint64_t{64} << 20;  // of files that are packed here
-
-bool is_inside(const std::string& name) {
-  const fs::path path(name);
-  return path.is_relative() && path.has_filename() && path.lexically_normal() == path &&
-         path.filename() != "." && *path.begin() != "..";
-}
 
 using Addresses = std::map<std::string, std::string>;  // what "@NAME" stands for
 
@@ -56,10 +51,8 @@ FetchEntry entry_of(const std::string& line, const std::string& where, const Add
   std::string bytes, rest;
   words >> out.sha256 >> bytes >> out.path >> out.address;
   const auto [end, error] = std::from_chars(bytes.data(), bytes.data() + bytes.size(), out.bytes);
-  const bool sum = out.sha256.size() == 64 &&
-                   out.sha256.find_first_not_of("0123456789abcdef") == std::string::npos;
-  if (!sum || error != std::errc() || end != bytes.data() + bytes.size() || out.address.empty() ||
-      words >> rest)
+  if (!is_sha256(out.sha256) || error != std::errc() || end != bytes.data() + bytes.size() ||
+      out.address.empty() || words >> rest)
     throw InputError(where, "is no line 'SHA256 BYTES PATH ADDRESS'", "mend the list");
   if (!is_inside(out.path))
     throw InputError(where, "names a file outside of the data folder", "mend the list");

@@ -41,7 +41,7 @@ std::string text_of(const Npz& file, const char* name, ImportReport& report) {
       if (c < 32 || c > 126) c = '?';  // it is printed
     return out;
   } catch (const InputError& e) {
-    report.remarks.push_back(std::string(name) + " counts as not stated: " + e.what());
+    report.remark(std::string(name) + " counts as not stated: " + e.what());
     return "";
   }
 }
@@ -166,7 +166,7 @@ void check_upright(const Poses& poses, ImportReport& report) {
   Vec3 sum = Vec3::Zero();
   for (const PosedSkeleton& pose : poses) sum += pose.joints[15] - pose.joints[0];
   if (sum.y() < 0.5 * sum.norm())
-    report.remarks.push_back(
+    report.remark(
         "the body is not upright on average: if it should be, the file's up axis is another "
         "(--up y)");
 }
@@ -248,34 +248,32 @@ bool is_amass_shape(const Npz& file) { return file.has("betas") && !file.has("po
 Motion import_amass(const Npz& file, BodyModels& models, const AmassOptions& options,
                     ImportReport& report) {
   report.file = file.path();
-  const auto fact = [&](const char* name, const std::string& value) {
-    report.facts.emplace_back(name, value);
-  };
   const NpyHeader poses = file.header("poses");
   const SmplFamily family = family_of(file, poses, report);
-  fact("layout", std::string(to_string(family)) + ", poses " + shape_text(poses.shape));
+  report.fact("layout", std::string(to_string(family)) + ", poses " + shape_text(poses.shape));
   const std::string gender = text_of(file, "gender", report);
-  fact("gender", gender.empty() ? "not stated" : gender);
+  report.fact("gender", gender.empty() ? "not stated" : gender);
   const SmplModel& model = models.find(family, gender, file.path(), report.remarks);
   const Betas betas = betas_of(file);
-  fact("body model", model.path() + ", " + std::to_string(std::min(betas.size(), model.shapes())) +
-                         " of " + std::to_string(betas.size()) + " betas");
+  report.fact("body model", model.path() + ", " +
+                                std::to_string(std::min(betas.size(), model.shapes())) + " of " +
+                                std::to_string(betas.size()) + " betas");
 
   const Joints rest = model.joints(betas);
   SourceMotion motion =
       read_motion(file, rest, upright(options.up == Axis::automatic ? Axis::z : options.up));
-  fact("up", options.up == Axis::automatic ? "z (AMASS), turned to y"
-                                           : to_string(options.up) + " (--up)");
+  report.fact("up", options.up == Axis::automatic ? "z (AMASS), turned to y"
+                                                  : to_string(options.up) + " (--up)");
   std::string from;
   motion.fps = rate_of(file, options.fps, from);
-  fact("rate", resampled(motion, poses.bytes(), from, file.path()));
+  report.fact("rate", resampled(motion, poses.bytes(), from, file.path()));
 
   Poses posed(motion.local.size());
   const JointMap map = identity_map();
   for (size_t f = 0; f < posed.size(); ++f) posed[f] = source_pose(motion, map, f);
   check_upright(posed, report);
   const double floor = floor_height(posed);
-  fact("floor", format("%.6g", std::round(1e3 * floor) / 1e3) + " m, taken to 0");
+  report.fact("floor", format("%.6g", std::round(1e3 * floor) / 1e3) + " m, taken to 0");
   Joints centred = rest;
   for (Vec3& x : centred) x -= rest[0];
   Motion out = to_motion(posed, centred, floor);

@@ -23,11 +23,11 @@ void describe(const Gltf& file, ImportReport& report) {
   report.file = file.path;
   size_t joints = 0;
   for (const GltfBone& bone : file.bones) joints += bone.skin >= 0;
-  report.facts.emplace_back("holds", std::to_string(file.vertices.size()) + " vertices, " +
-                                         std::to_string(file.faces.size()) + " triangles, " +
-                                         std::to_string(file.skin_nodes.size()) + " skins with " +
-                                         std::to_string(joints) + " joints, " +
-                                         std::to_string(file.clips.size()) + " animations");
+  report.fact("holds", std::to_string(file.vertices.size()) + " vertices, " +
+                           std::to_string(file.faces.size()) + " triangles, " +
+                           std::to_string(file.skin_nodes.size()) + " skins with " +
+                           std::to_string(joints) + " joints, " +
+                           std::to_string(file.clips.size()) + " animations");
   report.remarks.insert(report.remarks.end(), file.remarks.begin(), file.remarks.end());
 }
 
@@ -123,7 +123,7 @@ std::vector<Motion> motions_of(const Gltf& file, const GltfRig& rig,
   int64_t left = 100000 + static_cast<int64_t>(file.bytes / 50);  // bounds what a small file makes
   for (const GltfClip* clip : clips) {
     if (!moves_joints(file, rig, *clip)) {
-      report.remarks.push_back("clip " + text::quote(clip->name) + " moves none of the joints");
+      report.remark("clip " + text::quote(clip->name) + " moves none of the joints");
       continue;
     }
     const int64_t frames = clip_frames(file, *clip);
@@ -141,7 +141,7 @@ std::vector<Motion> motions_of(const Gltf& file, const GltfRig& rig,
     motion.subject = options.subject.empty() ? id_of(file.path, options) : options.subject;
     motion.split = options.split;
     motion.action = options.action.empty() ? clip->name : options.action;
-    report.facts.emplace_back("clip " + text::quote(clip->name), rate_of(file, *clip, frames));
+    report.fact("clip " + text::quote(clip->name), rate_of(file, *clip, frames));
     out.push_back(std::move(motion));
   }
   return out;
@@ -166,7 +166,7 @@ Character read_character(const std::string& path, const CharacterOptions& option
   if (loose && file.clips.empty()) throw_no_skin(path);
   const GltfRig rig = find_rig(file, options.rig, out.report);
   check_handedness(t_pose_joints(rig), options.force, path, out.report);
-  if (loose) out.report.remarks.push_back("left out its mesh, which belongs to no skin");
+  if (loose) out.report.remark("left out its mesh, which belongs to no skin");
   if (skinned) {
     out.body = body_of(file, rig);
     out.body->id = id_of(path, options);
@@ -189,7 +189,7 @@ TargetMesh read_target(const std::string& path) {
   const Gltf file = read_gltf(path);
   describe(file, out.report);
   if (file.skin_nodes.empty() || !has_known_joints(file)) {
-    out.report.remarks.push_back(
+    out.report.remark(
         file.skin_nodes.empty()
             ? "has no rig: its mesh is taken as it stands"
             : "the joints' names are of no known family: its mesh is taken as it stands");

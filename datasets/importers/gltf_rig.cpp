@@ -70,7 +70,7 @@ Eigen::Affine3d bind_space(const Gltf& file, const std::vector<GltfBone>& bones,
   const Eigen::Affine3d by_root = rest[top.node] * top.inverse_bind;
   const Offset off = rest_offset(bones, rest, by_root);
   if (off.degrees < 0.5 && off.length <= 0.01 * extent(bones, rest)) return by_root;
-  report.remarks.push_back(
+  report.remark(
       format("the nodes rest in another pose than the skin was made in (up to %.0f degrees): the "
              "skin's is taken",
              off.degrees));
@@ -222,8 +222,7 @@ double find_scale(const Joints& joints, const GltfRigOptions& options, const std
                        "give --scale (metres per unit)");
     how = scale == 1.0 ? "the format's" : unit_name(scale) + " by the leg";
   }
-  report.facts.emplace_back("units",
-                            format("%g m (%s; the leg has %.3g)", scale, how.c_str(), leg));
+  report.fact("units", format("%g m (%s; the leg has %.3g)", scale, how.c_str(), leg));
   return scale;
 }
 
@@ -231,8 +230,7 @@ double find_scale(const Joints& joints, const GltfRigOptions& options, const std
 Mat3 find_up(const Joints& joints, Axis given, ImportReport& report) {
   const bool found = given == Axis::automatic;
   const Axis up = found ? axis_near(joints[15] - 0.5 * (joints[7] + joints[8])) : given;
-  report.facts.emplace_back("up",
-                            to_string(up) + (found ? " (from ankles to head)" : " (as given)"));
+  report.fact("up", to_string(up) + (found ? " (from ankles to head)" : " (as given)"));
   return upright(up);
 }
 
@@ -243,7 +241,7 @@ Mat3 find_front(const Joints& upright, ImportReport& report) {
   const double nearest = std::round(yaw / quarter) * quarter;
   const bool quarters = std::abs(yaw - nearest) < 10 * kDegree;
   const double degrees = std::round((quarters ? nearest : yaw) / kDegree) + 0.0;  // no -0
-  report.facts.emplace_back("facing", format("turned by %.0f degrees to face +z", degrees));
+  report.fact("facing", format("turned by %.0f degrees to face +z", degrees));
   if (!quarters) return turn_about_y(yaw);
   const double c = std::round(std::cos(nearest)), s = std::round(std::sin(nearest));
   Mat3 out;
@@ -317,8 +315,8 @@ std::array<std::optional<Mat3>, kJoints> arm_turns(const Gltf& file, const GltfR
     turn(elbow, joints[wrist] - joints[elbow], "forearm");
     if (finger >= 0) turn(wrist, knuckle - joints[wrist], "hand");
   }
-  report.facts.emplace_back(
-      "rest pose", words.empty() ? "T-pose" : "turned onto the T-pose by shortest arcs: " + words);
+  report.fact("rest pose",
+              words.empty() ? "T-pose" : "turned onto the T-pose by shortest arcs: " + words);
   return out;
 }
 
@@ -355,7 +353,7 @@ void find_nodes(const Gltf& file, GltfRig& rig, const JointMap& map, const std::
              text::quote(file.nodes[rig.node[j]].name) +
              (map[j].offset.isZero() ? "" : " (beside it)");
   }
-  report.facts.emplace_back("joints", words);
+  report.fact("joints", words);
   rig.joint.assign(file.nodes.size(), 0);
   for (size_t n = 0; n < owner.size(); ++n)
     rig.joint[n] = owner[n] >= 0              ? owner[n]
@@ -373,10 +371,9 @@ GltfRig find_rig(const Gltf& file, const GltfRigOptions& options, ImportReport& 
   const NamedJoints names = map_names(skeleton, options.profile, file.path);
   const JointMap& map = names.map;
   if (by_list(file, options.profile))
-    report.facts.emplace_back("names", "VRM's list of bones, not the nodes' names");
+    report.fact("names", "VRM's list of bones, not the nodes' names");
   else if (options.profile)
-    report.facts.emplace_back("names",
-                              names.profile->title + " (profile " + names.profile->name + ")");
+    report.fact("names", names.profile->title + " (profile " + names.profile->name + ")");
   find_nodes(file, rig, map, nodes, report);
   Joints joints;
   for (size_t j = 0; j < kJoints; ++j)

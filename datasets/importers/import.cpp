@@ -205,7 +205,7 @@ void add_each(const std::vector<std::string>& files, ImportSummary& summary,
 
 void count_ignored(const std::string& folder, bool (*considered)(const std::string&),
                    ImportSummary& summary) {
-  for (const std::string& path : files_below(folder, [](const std::string&) { return true; }))
+  for (const std::string& path : files_below(folder))
     if (!considered(path)) ++summary.ignored[fs::path(path).extension().string()];
 }
 

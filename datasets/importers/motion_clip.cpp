@@ -19,17 +19,16 @@ double find_scale(const Recording& recording, double given, const std::string& p
                   ImportReport& report) {
   const double leg = leg_length(rest_joints(recording.motion.skeleton, recording.names.map));
   const auto says = [&](double metres, const std::string& why) {
-    report.facts.emplace_back("units", unit_name(metres) + ", " + why + ": a leg of " +
-                                           format("%.4g", leg) + " units is " +
-                                           format("%.2f", leg * metres) + " m");
+    report.fact("units", unit_name(metres) + ", " + why + ": a leg of " + format("%.4g", leg) +
+                             " units is " + format("%.2f", leg * metres) + " m");
     return metres;
   };
   if (given > 0) return says(given, "as given");
   if (recording.metres_per_unit > 0) {
     const double metres = leg * recording.metres_per_unit;
     if (metres >= 0.4 && metres < 1.4) return says(recording.metres_per_unit, "as the file says");
-    report.remarks.push_back("the units that the file names would make a leg of " +
-                             format("%.4g", metres) + " m: found by the leg instead");
+    report.remark("the units that the file names would make a leg of " + format("%.4g", metres) +
+                  " m: found by the leg instead");
   }
   if (const LegUnit* unit = unit_of_leg(leg)) return says(unit->metres, "by the legs");
   throw InputError(path,
@@ -96,13 +95,12 @@ void cut_frames(SourceMotion& motion, const Profile& profile, const MotionOption
                      "leave out fewer at its beginning");
   const size_t count = options.keep_frames ? std::min(options.keep_frames, n - first) : n - first;
   if (first > 0)
-    report.facts.emplace_back(
-        "beginning",
-        std::to_string(first) + (first == 1 ? " frame" : " frames") + " left out, " +
-            (asked
-                 ? "as asked"
-                 : std::string("a T-pose") + (first > 1 ? " and a blend out of it" : "") +
-                       " that " + profile.title + " files begin with (--drop-leading 0 keeps it)"));
+    report.fact("beginning",
+                std::to_string(first) + (first == 1 ? " frame" : " frames") + " left out, " +
+                    (asked ? "as asked"
+                           : std::string("a T-pose") + (first > 1 ? " and a blend out of it" : "") +
+                                 " that " + profile.title +
+                                 " files begin with (--drop-leading 0 keeps it)"));
   const auto cut = [&](auto& frames) {
     frames.erase(frames.begin() + static_cast<std::ptrdiff_t>(first + count), frames.end());
     frames.erase(frames.begin(), frames.begin() + static_cast<std::ptrdiff_t>(first));
@@ -140,36 +138,33 @@ std::string subject_of(const std::string& name, const std::string& id) {
 }
 
 void report_names(const Recording& recording, ImportReport& report) {
-  report.facts.emplace_back(
-      "format", recording.format + ", " + std::to_string(recording.motion.skeleton.size()) +
-                    " joints, " + std::to_string(recording.motion.local.size()) + " frames");
+  report.fact("format", recording.format + ", " + std::to_string(recording.motion.skeleton.size()) +
+                            " joints, " + std::to_string(recording.motion.local.size()) +
+                            " frames");
   const Profile& profile = *recording.names.profile;
   std::string placed;
   for (const int j : recording.names.placed)
     placed += (placed.empty() ? "; placed: " : ", ") + std::string(kJointNames[j]);
-  report.facts.emplace_back("names", profile.title + " (profile " + profile.name + ")" + placed);
+  report.fact("names", profile.title + " (profile " + profile.name + ")" + placed);
 }
 
 /// Bones that the file moves apart are of one length here, which is said where it is seen.
 void report_positions(const BonePositions& found, double scale, ImportReport& report) {
   constexpr double kSeen = 0.001;  // metres
   if (found.off_offset * scale > kSeen)
-    report.facts.emplace_back("offsets", "by the position channels of " +
-                                             std::to_string(found.joints) + " joints, up to " +
-                                             format("%.3f", found.off_offset * scale) +
-                                             " m from OFFSET");
+    report.fact("offsets", "by the position channels of " + std::to_string(found.joints) +
+                               " joints, up to " + format("%.3f", found.off_offset * scale) +
+                               " m from OFFSET");
   if (found.stray * scale > kSeen)
-    report.remarks.push_back("the position channels stretch bones: " + found.stray_joint +
-                             " strays up to " + format("%.3f", found.stray * scale) +
-                             " m from its mean place, which is taken");
+    report.remark("the position channels stretch bones: " + found.stray_joint + " strays up to " +
+                  format("%.3f", found.stray * scale) + " m from its mean place, which is taken");
 }
 
 /// Where the file differs from what its family usually is.
 void compare_with_profile(const Profile& profile, double scale, double fps, ImportReport& report) {
   const auto differs = [&](const std::string& what, const std::string& is,
                            const std::string& usual) {
-    report.remarks.push_back(profile.title + " files usually have " + what + " " + usual +
-                             ", this one " + is);
+    report.remark(profile.title + " files usually have " + what + " " + usual + ", this one " + is);
   };
   if (!profile.units.empty() && unit_name(scale) != profile.units)
     differs("units of", unit_name(scale), profile.units);
@@ -201,19 +196,17 @@ MotionClip make_clip(Recording recording, const std::string& path, const MotionO
   const size_t frames = motion.local.size();
   const Poses poses = poses_at_30_fps(std::move(motion), map, rest, recording.bytes, path);
   clip.joints.reserve(poses.size());
-  report.facts.emplace_back(
-      "rate",
-      (fps == kFps ? "30 fps, taken as they are"
-                   : format("%.6g", fps) + " fps -> 30 fps, slerp: " + std::to_string(frames) +
-                         " frames -> " + std::to_string(poses.size())) +
-          (options.fps > 0        ? " (as given; " + recording.rate_of_file + ")"
-           : recording.rate_known ? std::string()
-                                  : " (" + recording.rate_of_file + ")"));
+  report.fact("rate", (fps == kFps ? "30 fps, taken as they are"
+                                   : format("%.6g", fps) +
+                                         " fps -> 30 fps, slerp: " + std::to_string(frames) +
+                                         " frames -> " + std::to_string(poses.size())) +
+                          (options.fps > 0        ? " (as given; " + recording.rate_of_file + ")"
+                           : recording.rate_known ? std::string()
+                                                  : " (" + recording.rate_of_file + ")"));
   compare_with_profile(*recording.names.profile, clip.scale, fps, report);
   for (const PosedSkeleton& pose : poses) clip.joints.push_back(pose.joints);
   clip.floor_y = floor_height(poses);
-  report.facts.emplace_back("floor",
-                            format("%.3f", clip.floor_y) + " m in the file's world, moved to 0");
+  report.fact("floor", format("%.3f", clip.floor_y) + " m in the file's world, moved to 0");
   clip.motion = to_motion(poses, rest.joints, clip.floor_y);
   clip.motion.id = options.id.empty() ? stem_of(path) : options.id;
   clip.motion.subject =

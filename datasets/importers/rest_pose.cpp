@@ -50,7 +50,7 @@ bool along_an_axis(const Vec3& v, double length) {
 Axis find_up(const SourceMotion& motion, const JointMap& map, const Joints& rest, Axis given,
              const std::string& path, ImportReport& report) {
   if (given != Axis::automatic) {
-    report.facts.emplace_back("up", to_string(given) + ", as given");
+    report.fact("up", to_string(given) + ", as given");
     return given;
   }
   const double leg = leg_length(rest);
@@ -60,20 +60,19 @@ Axis find_up(const SourceMotion& motion, const JointMap& map, const Joints& rest
   const bool motion_stands = along_an_axis(moving, 0.8 * leg);
   if (rest_stands &&
       (std::abs(vector_of(by_rest).x()) < 0.5 || !motion_stands || by_rest == by_motion)) {
-    report.facts.emplace_back("up", to_string(by_rest) + ", by the rest pose");
+    report.fact("up", to_string(by_rest) + ", by the rest pose");
     if (motion_stands && by_motion != by_rest)
-      report.remarks.push_back("up is " + to_string(by_rest) +
-                               " in the rest pose, but the head is "
-                               "over the ankles along " +
-                               to_string(by_motion) +
-                               " in the recording: if nobody lies there, give --up " +
-                               to_string(by_motion));
+      report.remark("up is " + to_string(by_rest) +
+                    " in the rest pose, but the head is "
+                    "over the ankles along " +
+                    to_string(by_motion) + " in the recording: if nobody lies there, give --up " +
+                    to_string(by_motion));
     return by_rest;
   }
   if (!motion_stands)
     throw InputError(path, "neither the rest pose nor the recording stands, so up is not known",
                      "say which axis is up (--up)");
-  report.facts.emplace_back("up", to_string(by_motion) + ", by the recording");
+  report.fact("up", to_string(by_motion) + ", by the recording");
   return by_motion;
 }
 
@@ -138,11 +137,11 @@ RestPose built_pose(const SourceMotion& motion, const JointMap& map, const Joint
     stood[j] = turned[0] * (zero[j] - zero[0]);
     out.joints[j] = p < 0 ? Vec3::Zero() : Vec3(out.joints[p] + turned[p] * (zero[j] - zero[p]));
   }
-  report.facts.emplace_back("rest pose",
-                            "built, for zero rotations are no T-pose: trunk upright, collars and "
-                            "arms along x, legs down, feet level, knees bending backwards and "
-                            "elbows forwards");
-  report.facts.emplace_back("turned", limbs_off(stood));
+  report.fact("rest pose",
+              "built, for zero rotations are no T-pose: trunk upright, collars and "
+              "arms along x, legs down, feet level, knees bending backwards and "
+              "elbows forwards");
+  report.fact("turned", limbs_off(stood));
   return out;
 }
 
@@ -182,15 +181,13 @@ RestPose find_rest_pose(const SourceMotion& motion, const JointMap& map, const R
   if (!wrong.empty()) return built_pose(motion, map, pose.joints, up, path, report);
 
   const Vec3 front = out.align.transpose() * Vec3::UnitZ();
-  report.facts.emplace_back(
-      "facing", to_string(axis_near(front)) +
-                    (given.isZero() ? ", by the left and right joints" : ", as given") +
-                    (angle_between(front, vector_of(axis_near(front))) > 1 ? " (about)" : ""));
-  report.facts.emplace_back("rest pose",
-                            framed ? "frame " + std::to_string(options.frame) : "zero rotations");
+  report.fact("facing",
+              to_string(axis_near(front)) +
+                  (given.isZero() ? ", by the left and right joints" : ", as given") +
+                  (angle_between(front, vector_of(axis_near(front))) > 1 ? " (about)" : ""));
+  report.fact("rest pose", framed ? "frame " + std::to_string(options.frame) : "zero rotations");
   const std::string off = limbs_off(out.joints);
-  if (!off.empty())
-    report.facts.emplace_back("off a T-pose", off + " (corrected bone by bone for each body)");
+  if (!off.empty()) report.fact("off a T-pose", off + " (corrected bone by bone for each body)");
   return out;
 }
 

@@ -126,8 +126,8 @@ void check_size(const Frame& frame, double given_scale, ImportReport& report) {
                      "give scans of one person, or metres a unit as --scale");
   const UnitGuess guess = guess_unit(size);
   if (!(given_scale > 0) && guess.unit.metres != 1 && guess.sure > 0.9)
-    report.remarks.push_back(format("a unit seems to be %.6g m: if so, give --scale %.6g",
-                                    guess.unit.metres, guess.unit.metres));
+    report.remark(format("a unit seems to be %.6g m: if so, give --scale %.6g", guess.unit.metres,
+                         guess.unit.metres));
 }
 
 std::string size_fact(const Points& points) {
@@ -166,20 +166,17 @@ int64_t import_scans(const ScanSequence& sequence, const ScanOptions& options, S
   const double fps = options.fps > 0 ? options.fps : source->fps();
   const double scale = options.scale > 0 ? options.scale : 1;
   const Clock clock(source->frames(), fps);
-  const auto fact = [&](const char* name, const std::string& value) {
-    report.facts.emplace_back(name, value);
-  };
   report.file = sequence.name;
-  fact("rate", rate_fact(fps,
-                         options.fps > 0 ? "--fps"
-                         : stated        ? "the file's"
-                                         : "taken for granted: --fps",
-                         source->frames(), clock));
-  fact("scale", options.scale > 0 ? format("%.6g m a unit (--scale)", scale)
-                                  : "metres (taken for granted: --scale)");
+  report.fact("rate", rate_fact(fps,
+                                options.fps > 0 ? "--fps"
+                                : stated        ? "the file's"
+                                                : "taken for granted: --fps",
+                                source->frames(), clock));
+  report.fact("scale", options.scale > 0 ? format("%.6g m a unit (--scale)", scale)
+                                         : "metres (taken for granted: --scale)");
   const Axis up = options.up == Axis::automatic ? Axis::y : options.up;
-  fact("up",
-       to_string(up) + (options.up == Axis::automatic ? " (taken for granted: --up)" : " (--up)"));
+  report.fact("up", to_string(up) +
+                        (options.up == Axis::automatic ? " (taken for granted: --up)" : " (--up)"));
   const Eigen::Matrix3f to_ours = (scale * upright(up)).cast<float>();
 
   int64_t at = 0;  // of the source, the frame that next() gives
@@ -195,15 +192,15 @@ int64_t import_scans(const ScanSequence& sequence, const ScanOptions& options, S
       if (k == 0) check_size(frame, options.scale, report);
       convert(frame, to_ours);
       points = std::move(frame.points);
-      if (k == 0) fact("size", size_fact(points));
+      if (k == 0) report.fact("size", size_fact(points));
       fewest = k == 0 ? points.size() : std::min(fewest, points.size());
       most = std::max(most, points.size());
     }
     out.append(points);
   }
   out.end_sequence();
-  fact("points", fewest == most ? std::to_string(most)
-                                : std::to_string(fewest) + " to " + std::to_string(most));
+  report.fact("points", fewest == most ? std::to_string(most)
+                                       : std::to_string(fewest) + " to " + std::to_string(most));
   return count;
 }
 
