@@ -29,11 +29,6 @@ Mat3 rotation_of(const Mat3& m) {
 
 double angle_of(const Mat3& rotation) { return Eigen::AngleAxisd(rotation).angle(); }
 
-double angle_between(const Vec3& a, const Vec3& b) {
-  const double norms = a.norm() * b.norm();
-  return norms > 0 ? std::acos(std::clamp(a.dot(b) / norms, -1.0, 1.0)) : 0.0;
-}
-
 // ---- bind pose ---------------------------------------------------------------------------------
 
 struct Offset {
@@ -237,15 +232,10 @@ Mat3 find_up(const Joints& joints, Axis given, ImportReport& report) {
 /// The turn about y that brings the left side to +x: quarters, if it is within 10 degrees of one.
 Mat3 find_front(const Joints& upright, ImportReport& report) {
   const Vec3 left = (upright[1] - upright[2]) + (upright[16] - upright[17]);
-  const double yaw = std::atan2(left.z(), left.x()), quarter = M_PI / 2;
-  const double nearest = std::round(yaw / quarter) * quarter;
-  const bool quarters = std::abs(yaw - nearest) < 10 * kDegree;
-  const double degrees = std::round((quarters ? nearest : yaw) / kDegree) + 0.0;  // no -0
+  double yaw = std::atan2(left.z(), left.x());
+  const Mat3 out = turn_in_quarters(yaw);
+  const double degrees = std::round(yaw / kDegree) + 0.0;  // no -0
   report.fact("facing", format("turned by %.0f degrees to face +z", degrees));
-  if (!quarters) return turn_about_y(yaw);
-  const double c = std::round(std::cos(nearest)), s = std::round(std::sin(nearest));
-  Mat3 out;
-  out << c, 0, s, 0, 1, 0, -s, 0, c;
   return out;
 }
 

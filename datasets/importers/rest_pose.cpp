@@ -10,10 +10,9 @@ namespace restage {
 namespace {
 
 constexpr double kDegrees = 180.0 / M_PI;
-constexpr double kShownAngle = 5;     // limbs further off are listed
-constexpr double kMostTrunk = 45;     // more off the vertical is no standing pose
-constexpr double kMostLimb = 120;     // more cannot be corrected by shortest arcs
-constexpr double kQuarterSlack = 10;  // to the nearest quarter turn
+constexpr double kShownAngle = 5;  // limbs further off are listed
+constexpr double kMostTrunk = 45;  // more off the vertical is no standing pose
+constexpr double kMostLimb = 120;  // more cannot be corrected by shortest arcs
 
 /// A bone of a T-pose and where it points.
 struct Limb {
@@ -27,9 +26,7 @@ const std::vector<Limb>& limbs() {
   return all;
 }
 
-double angle_between(const Vec3& a, const Vec3& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b)) * kDegrees;
-}
+double degrees_between(const Vec3& a, const Vec3& b) { return angle_between(a, b) * kDegrees; }
 
 Vec3 standing(const Joints& joints) { return joints[15] - 0.5 * (joints[7] + joints[8]); }
 
@@ -92,21 +89,16 @@ Mat3 facing_front(const Joints& rest, const Vec3& given, bool framed, const std:
                        "give the other --facing; if the file is mirrored, mend its names");
     yaw = -std::atan2(given.x(), given.z());
   }
-  const double quarter = std::round(yaw / (M_PI / 2)) * (M_PI / 2);
-  if (framed || std::abs(yaw - quarter) * kDegrees > kQuarterSlack) return turn_about_y(yaw);
-  const double c = std::round(std::cos(quarter)), s = std::round(std::sin(quarter));
-  Mat3 out;
-  out << c, 0, s, 0, 1, 0, -s, 0, c;
-  return out;
+  return framed ? turn_about_y(yaw) : turn_in_quarters(yaw);
 }
 
 /// What keeps a pose from being T-like; "" if nothing does.
 std::string unlike_t_pose(const Joints& rest) {
-  const double trunk = angle_between(rest[15] - rest[0], Vec3::UnitY());
+  const double trunk = degrees_between(rest[15] - rest[0], Vec3::UnitY());
   if (!(trunk <= kMostTrunk)) return "its trunk is not upright";
   for (const Limb& limb : limbs()) {
     const Vec3 bone = rest[limb.to] - rest[limb.from];
-    if (!(bone.norm() > 1e-4) || !(angle_between(bone, limb.wanted) <= kMostLimb))
+    if (!(bone.norm() > 1e-4) || !(degrees_between(bone, limb.wanted) <= kMostLimb))
       return "its " + std::string(kJointNames[limb.from]) + " does not point towards the " +
              std::string(kJointNames[limb.to]) + " as a standing person's";
   }
@@ -117,7 +109,7 @@ std::string unlike_t_pose(const Joints& rest) {
 std::string limbs_off(const Joints& rest) {
   std::string out;
   for (const Limb& limb : limbs()) {
-    const double angle = angle_between(rest[limb.to] - rest[limb.from], limb.wanted);
+    const double angle = degrees_between(rest[limb.to] - rest[limb.from], limb.wanted);
     if (angle < kShownAngle) continue;
     out += (out.empty() ? "" : ", ") + std::string(kJointNames[limb.from]) + " " +
            std::to_string(std::lround(angle));
@@ -166,7 +158,7 @@ RestPose find_rest_pose(const SourceMotion& motion, const JointMap& map, const R
       options.facing == Axis::automatic ? Vec3(Vec3::Zero()) : Vec3(up * vector_of(options.facing));
   RestPose out;
   std::string wrong = "it does not stand";
-  if (!(angle_between(upright_joints[15], Vec3::UnitY()) > kMostTrunk)) {
+  if (!(degrees_between(upright_joints[15], Vec3::UnitY()) > kMostTrunk)) {
     const Mat3 front = facing_front(upright_joints, given, framed, path);
     for (size_t j = 0; j < kJoints; ++j) {
       out.joints[j] = front * upright_joints[j];
@@ -184,7 +176,7 @@ RestPose find_rest_pose(const SourceMotion& motion, const JointMap& map, const R
   report.fact("facing",
               to_string(axis_near(front)) +
                   (given.isZero() ? ", by the left and right joints" : ", as given") +
-                  (angle_between(front, vector_of(axis_near(front))) > 1 ? " (about)" : ""));
+                  (degrees_between(front, vector_of(axis_near(front))) > 1 ? " (about)" : ""));
   report.fact("rest pose", framed ? "frame " + std::to_string(options.frame) : "zero rotations");
   const std::string off = limbs_off(out.joints);
   if (!off.empty()) report.fact("off a T-pose", off + " (corrected bone by bone for each body)");

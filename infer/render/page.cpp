@@ -79,8 +79,7 @@ std::string script_json(const Json& json) {
 
 std::string hex(uint32_t colour) { return format("#%06x", colour & 0xffffffu); }
 
-// ---- thinning
-// ------------------------------------------------------------------------------------
+// ---- thinning -----------------------------------------------------------------------------------
 
 // Which vertices of a surface are kept (empty: all), and the faces between them.
 struct Surface {
@@ -164,8 +163,7 @@ Plan make_plan(const std::vector<Clip>& clips, const PageOptions& options) {
   return plan;
 }
 
-// ---- data
-// ----------------------------------------------------------------------------------------
+// ---- data ---------------------------------------------------------------------------------------
 
 Points picked(const Clip& clip, const Surface& surface, size_t frame, size_t max_points) {
   const Points& all = clip.frames[frame];
