@@ -6,6 +6,7 @@
 #include <map>
 
 #include "autograd/base/error.h"
+#include "autograd/base/format.h"
 #include "datasets/builtin/bodies.h"
 #include "datasets/builtin/motions.h"
 #include "datasets/schema.h"
@@ -166,9 +167,7 @@ std::string checksum(const Corpus& corpus) {
   Hash hash;
   for (const Body& body : corpus.bodies) add(hash, body);
   for (const Motion& motion : corpus.motions) add(hash, motion);
-  char text[24];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(hash.value()));
-  return text;
+  return format("%016llx", static_cast<unsigned long long>(hash.value()));
 }
 
 }  // namespace restage

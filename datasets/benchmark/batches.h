@@ -19,8 +19,7 @@ void in_batches(size_t n, const Make& make, const Use& use) {
     throw_if_stopped();
     const size_t count = std::min(kBatch, n - begin);
     parallel_for(static_cast<int64_t>(count), 1, [&](int64_t from, int64_t to) {
-      for (int64_t i = from; i < to; ++i)
-        values[static_cast<size_t>(i)] = make(begin + static_cast<size_t>(i));
+      for (int64_t i = from; i < to; ++i) values[i] = make(begin + static_cast<size_t>(i));
     });
     for (size_t i = 0; i < count; ++i) use(begin + i, values[i]);
   }

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "autograd/base/error.h"
+#include "nn/geometry/box.h"
 
 namespace restage {
 namespace {
@@ -42,16 +43,12 @@ double hairiness(const Point& direction) {
 
 void add_hair(Body& body, double thickness, const RngKey& key) {
   if (!(thickness > 0)) return;
-  const auto on_head = [&](size_t v) {
-    return body.weights(static_cast<Eigen::Index>(v), kHead) > 0.9f;
-  };
+  const auto on_head = [&](size_t v) { return body.weights(v, kHead) > 0.9f; };
   Points& x = body.rest.vertices;
-  Point low = Point::Constant(1e9f), high = -low;
+  Box head;
   for (size_t v = 0; v < x.size(); ++v)
-    if (on_head(v)) {
-      low = low.cwiseMin(x[v]);
-      high = high.cwiseMax(x[v]);
-    }
+    if (on_head(v)) head.extend(x[v]);
+  const Point low = head.min(), high = head.max();
   if (!(high.y() > low.y())) return;
   Point middle = 0.5f * (low + high);
   middle.y() = high.y() - 0.45f * (high.y() - low.y());
@@ -60,14 +57,14 @@ void add_hair(Body& body, double thickness, const RngKey& key) {
   std::array<double, 6> phase;
   for (int k = 0; k < 6; ++k) {
     for (int c = 0; c < 3; ++c) waves(k, c) = 9.0 * rng.normal();
-    phase[static_cast<size_t>(k)] = rng.uniform(0, 2 * std::numbers::pi);
+    phase[k] = rng.uniform(0, 2 * std::numbers::pi);
   }
   for (size_t v = 0; v < x.size(); ++v) {
     if (!on_head(v)) continue;
     const Point way = (x[v] - middle).normalized();
     double lock = 0;
     for (int k = 0; k < 6; ++k)
-      lock += std::sin(waves.row(k).dot(way.cast<double>()) + phase[static_cast<size_t>(k)]) / 6;
+      lock += std::sin(waves.row(k).dot(way.cast<double>()) + phase[k]) / 6;
     const double out = thickness * hairiness(way) * (1 + 0.8 * lock);
     x[v] += static_cast<float>(out) * way;
   }

@@ -14,8 +14,8 @@ std::vector<int32_t> outermost_vertices(const Body& body) {
   std::array<std::vector<int32_t>, kJoints> of_joint;
   for (size_t v = 0; v < x.size(); ++v) {
     Eigen::Index joint = 0;
-    body.weights.row(static_cast<Eigen::Index>(v)).maxCoeff(&joint);
-    of_joint[static_cast<size_t>(joint)].push_back(static_cast<int32_t>(v));
+    body.weights.row(v).maxCoeff(&joint);
+    of_joint[joint].push_back(static_cast<int32_t>(v));
   }
   for (const std::vector<int32_t>& part : of_joint)
     for (int code = 0; code < 27 && !part.empty(); ++code) {
@@ -23,7 +23,7 @@ std::vector<int32_t> outermost_vertices(const Body& body) {
                       static_cast<float>(code / 9 - 1));
       if (way.isZero()) continue;
       out.push_back(*std::max_element(part.begin(), part.end(), [&](int32_t a, int32_t b) {
-        return way.dot(x[static_cast<size_t>(a)]) < way.dot(x[static_cast<size_t>(b)]);
+        return way.dot(x[a]) < way.dot(x[b]);
       }));
     }
   std::sort(out.begin(), out.end());

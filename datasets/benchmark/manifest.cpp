@@ -5,6 +5,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "datasets/readers/folders.h"
 #include "datasets/readers/sha256.h"
 #include "datasets/schema.h"
 
@@ -24,21 +25,11 @@ Json to_json(const std::map<std::string, ManifestFile>& files) {
   return out;
 }
 
-/// A name is a path below the folder, in its shortest form.
-bool is_inside(const std::string& name) {
-  const fs::path path(name);
-  return !name.empty() && path.is_relative() && path.lexically_normal() == path &&
-         *path.begin() != ".." && name.find('\\') == std::string::npos &&
-         name.find('\0') == std::string::npos;
-}
-
 std::map<std::string, ManifestFile> files_of(const Json& json, const std::string& where) {
   std::map<std::string, ManifestFile> out;
   for (const auto& [name, entry] : json.items()) {
     ManifestFile file{entry.at("sha256").get<std::string>(), entry.at("bytes").get<uint64_t>()};
-    const bool digits = file.sha256.size() == 64 &&
-                        file.sha256.find_first_not_of("0123456789abcdef") == std::string::npos;
-    if (!is_inside(name) || !digits)
+    if (!is_inside(name) || !is_sha256(file.sha256))
       throw InputError(where, "lists a file that cannot be one of this folder",
                        "build the folder again");
     out[name] = file;

@@ -14,17 +14,15 @@ namespace {
 constexpr double kPart = 0.35;      // of a bone's length: what counts as about a joint
 constexpr double kTouching = 0.01;  // metres
 
-Vec3 corner(const Points& x, const Triangle& t, size_t k) {
-  return x[static_cast<size_t>(t[k])].cast<double>();
-}
+Vec3 corner(const Points& x, const Triangle& t, size_t k) { return x[t[k]].cast<double>(); }
 
 /// Faces of the skin of two bones near their joint, found at rest.
 std::vector<Triangle> faces_about(const Body& body, int near, int joint, int far) {
-  const Vec3 middle = body.joints[static_cast<size_t>(joint)];
-  const Vec3 up = body.joints[static_cast<size_t>(near)] - middle;
-  const Vec3 down = body.joints[static_cast<size_t>(far)] - middle;
+  const Vec3 middle = body.joints[joint];
+  const Vec3 up = body.joints[near] - middle;
+  const Vec3 down = body.joints[far] - middle;
   const auto close = [&](int32_t v) {
-    const Vec3 x = body.rest.vertices[static_cast<size_t>(v)].cast<double>() - middle;
+    const Vec3 x = body.rest.vertices[v].cast<double>() - middle;
     const double a = x.dot(up) / up.squaredNorm(), b = x.dot(down) / down.squaredNorm();
     return body.weights(v, near) + body.weights(v, joint) > 0.5f && a < kPart && b < kPart;
   };
@@ -82,8 +80,8 @@ void measure_bodies(const std::vector<Body>& bodies, RealismReport& out, Counts&
   std::vector<Row> rows(bodies.size());
   parallel_for(static_cast<int64_t>(bodies.size()), 1, [&](int64_t begin, int64_t end) {
     for (int64_t i = begin; i < end; ++i) {
-      const Body& body = bodies[static_cast<size_t>(i)];
-      Row& row = rows[static_cast<size_t>(i)];
+      const Body& body = bodies[i];
+      Row& row = rows[i];
       for (int side : {0, 1}) {
         row.knee[side] = bent_volume(body, 1 + side, 4 + side, 7 + side, kRight);
         row.elbow[side] = bent_volume(body, 16 + side, 18 + side, 20 + side, kRight);
@@ -164,15 +162,15 @@ void measure_feet(const std::vector<Body>& bodies, const std::vector<Motion>& mo
 
 BentVolume bent_volume(const Body& body, int near, int joint, int far, double angle) {
   const std::vector<Triangle> faces = faces_about(body, near, joint, far);
-  const Vec3 bone = body.joints[static_cast<size_t>(far)] - body.joints[static_cast<size_t>(joint)];
+  const Vec3 bone = body.joints[far] - body.joints[joint];
   const bool leg = std::abs(bone.y()) > std::abs(bone.x());
   // A knee takes the shin backwards, an elbow the forearm forwards.
   const Vec3 axis = leg ? Vec3(1, 0, 0) : Vec3(0, bone.x() > 0 ? -1 : 1, 0);
   Pose pose;
   pose.local.fill(Mat3::Identity());
   pose.root = body.joints[0];
-  pose.local[static_cast<size_t>(joint)] = Eigen::AngleAxisd(angle, axis).toRotationMatrix();
-  const Vec3 apex = body.joints[static_cast<size_t>(joint)];
+  pose.local[joint] = Eigen::AngleAxisd(angle, axis).toRotationMatrix();
+  const Vec3 apex = body.joints[joint];
   const double rest = cone_volume(body.rest.vertices, faces, apex);
   if (!(std::abs(rest) > 0)) return {};
   return {cone_volume(pose_surface(body, pose), faces, apex) / rest,
@@ -207,7 +205,7 @@ double buried_share(const Body& body, size_t step, std::vector<std::string>* whe
   std::vector<Vec3> normals(x.size(), Vec3::Zero());
   for (const Triangle& t : body.rest.faces) {
     const Vec3 n = (corner(x, t, 1) - corner(x, t, 0)).cross(corner(x, t, 2) - corner(x, t, 0));
-    for (const int32_t v : t) normals[static_cast<size_t>(v)] += n;
+    for (const int32_t v : t) normals[v] += n;
   }
   size_t looked = 0, buried = 0;
   for (size_t v = 0; v < x.size(); v += std::max<size_t>(1, step)) {
@@ -217,8 +215,8 @@ double buried_share(const Body& body, size_t step, std::vector<std::string>* whe
     if (!(winding_number(x, body.rest.faces, at) > 0.5)) continue;
     ++buried;
     Eigen::Index joint = 0;
-    body.weights.row(static_cast<Eigen::Index>(v)).maxCoeff(&joint);
-    if (where) where->emplace_back(kJointNames[static_cast<size_t>(joint)]);
+    body.weights.row(v).maxCoeff(&joint);
+    if (where) where->emplace_back(kJointNames[joint]);
   }
   return looked > 0 ? static_cast<double>(buried) / static_cast<double>(looked) : 0.0;
 }

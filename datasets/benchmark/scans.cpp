@@ -21,16 +21,12 @@ struct Path {
 };
 
 Path path_of(const Performance& performance) {
-  Vec3 low = Vec3::Constant(1e9), high = -low;
-  for (size_t i = 0; i < performance.frames(); ++i) {
-    const Vec3 root = performance.pose_a(i).root;
-    low = low.cwiseMin(root);
-    high = high.cwiseMax(root);
-  }
+  Eigen::AlignedBox3d box;
+  for (size_t i = 0; i < performance.frames(); ++i) box.extend(performance.pose_a(i).root);
   Path out;
-  out.centre = 0.5 * (low + high);
+  out.centre = 0.5 * (box.min() + box.max());
   out.centre.y() = 0.95;
-  out.radius = 0.5 * std::hypot(high.x() - low.x(), high.z() - low.z());
+  out.radius = 0.5 * std::hypot(box.sizes().x(), box.sizes().z());
   return out;
 }
 
@@ -51,14 +47,14 @@ Mesh reaching_arm(const Body& body, const Joints& a) {
   const Vec3 hand = a[9] + 0.45 * across + Vec3(0, 0.1, 0);
   std::vector<int32_t> moved(body.rest.vertices.size(), -1);
   for (size_t v = 0; v < moved.size(); ++v) {
-    const auto row = body.weights.row(static_cast<Eigen::Index>(v));
+    const auto row = body.weights.row(v);
     if (row[kElbow] + row[kWrist] < 0.5f) continue;
     moved[v] = static_cast<int32_t>(out.vertices.size());
     const Vec3 x = body.rest.vertices[v].cast<double>();
     out.vertices.push_back((hand + turn * (x - body.joints[kWrist])).cast<float>());
   }
   for (Triangle t : body.rest.faces) {
-    for (int32_t& v : t) v = moved[static_cast<size_t>(v)];
+    for (int32_t& v : t) v = moved[v];
     if (*std::min_element(t.begin(), t.end()) >= 0) out.faces.push_back(t);
   }
   return out;

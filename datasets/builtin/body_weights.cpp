@@ -94,10 +94,10 @@ Weights shape_weights(const BodyShape& shape, const SurfaceMesh& mesh) {
     }
     w.swap(next);
   }
-  Weights out(static_cast<Eigen::Index>(n), kJoints);
+  Weights out(n, kJoints);
   for (size_t v = 0; v < n; ++v) {
     keep_four(w[v]);
-    out.row(static_cast<Eigen::Index>(v)) = w[v].cast<float>();
+    out.row(v) = w[v].cast<float>();
   }
   return out;
 }

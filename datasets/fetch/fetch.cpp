@@ -17,6 +17,8 @@
 #include "datasets/fetch/download.h"
 #include "datasets/fetch/fetch_cmu.h"
 #include "datasets/importers/makehuman_pack.h"
+#include "datasets/readers/folders.h"
+#include "datasets/readers/packed_text.h"
 #include "datasets/readers/sha256.h"
 
 namespace restage {
@@ -28,12 +30,6 @@ constexpr uint64_t kMostList = uint64_t{16} << 20;
 constexpr std::string_view kMakehuman = "makehuman:",
                            kCmu = "cmu:";             // packed from the files of a list
 constexpr uint64_t kMostPacked = uint64_t{64} << 20;  // of files that are packed here
-
-bool is_inside(const std::string& name) {
-  const fs::path path(name);
-  return path.is_relative() && path.has_filename() && path.lexically_normal() == path &&
-         path.filename() != "." && *path.begin() != "..";
-}
 
 using Addresses = std::map<std::string, std::string>;  // what "@NAME" stands for
 
@@ -55,10 +51,8 @@ FetchEntry entry_of(const std::string& line, const std::string& where, const Add
   std::string bytes, rest;
   words >> out.sha256 >> bytes >> out.path >> out.address;
   const auto [end, error] = std::from_chars(bytes.data(), bytes.data() + bytes.size(), out.bytes);
-  const bool sum = out.sha256.size() == 64 &&
-                   out.sha256.find_first_not_of("0123456789abcdef") == std::string::npos;
-  if (!sum || error != std::errc() || end != bytes.data() + bytes.size() || out.address.empty() ||
-      words >> rest)
+  if (!is_sha256(out.sha256) || error != std::errc() || end != bytes.data() + bytes.size() ||
+      out.address.empty() || words >> rest)
     throw InputError(where, "is no line 'SHA256 BYTES PATH ADDRESS'", "mend the list");
   if (!is_inside(out.path))
     throw InputError(where, "names a file outside of the data folder", "mend the list");
@@ -72,16 +66,6 @@ FetchEntry entry_of(const std::string& line, const std::string& where, const Add
 
 bool packed_here(const FetchEntry& e) {
   return e.path.ends_with(".gz") && !e.address.ends_with(".gz");
-}
-
-std::string unpacked(const std::string& path) {
-  const std::unique_ptr<gzFile_s, int (*)(gzFile)> file(gzopen(path.c_str(), "rb"), gzclose);
-  std::string out, piece(size_t{1} << 16, '\0');
-  int got = 0;
-  while (file && out.size() <= kMostPacked &&
-         (got = gzread(file.get(), piece.data(), static_cast<unsigned>(piece.size()))) > 0)
-    out.append(piece, 0, static_cast<size_t>(got));
-  return out;
 }
 
 /// Gzip without name and time, so equal content gives equal bytes.
@@ -106,8 +90,8 @@ bool is_right(const FetchEntry& e, const std::string& path, bool inside_gz) {
   std::error_code none;
   if (!fs::is_regular_file(path, none)) return false;
   if (inside_gz) {
-    const std::string content = unpacked(path);
-    return content.size() == e.bytes && sha256(content) == e.sha256;
+    const std::optional<std::string> content = read_gz(path, kMostPacked);
+    return content && content->size() == e.bytes && sha256(*content) == e.sha256;
   }
   return fs::file_size(path, none) == e.bytes && sha256_of_file(path) == e.sha256;
 }

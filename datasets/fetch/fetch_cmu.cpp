@@ -13,6 +13,7 @@
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 #include "datasets/fetch/download.h"
+#include "datasets/readers/folders.h"
 #include "datasets/readers/sha256.h"
 
 namespace restage {
@@ -84,15 +85,6 @@ std::vector<Blob> read_tree(const CmuRepository& repository, const std::string& 
   return out;
 }
 
-/// Names in a repository are its owner's: none may lead out of the folder.
-bool is_plain(const std::string& path) {
-  const fs::path p(path);
-  if (p.is_absolute() || p.lexically_normal() != p) return false;
-  for (const fs::path& part : p)
-    if (part == ".." || part == ".") return false;
-  return true;
-}
-
 /// A path as part of an address: blanks and the like as %20.
 std::string escaped(const std::string& path) {
   constexpr std::string_view kPlain = "-._~/";
@@ -127,11 +119,8 @@ void fetch_blob(const Blob& blob, const CmuRepository& repository, const std::st
 
 bool has_cmu_originals(const CmuOriginals& originals, const std::string& folder) {
   std::set<std::string> missing = wanted_files(originals);
-  std::error_code failed;
-  fs::recursive_directory_iterator at(folder, failed);
-  for (; !failed && at != fs::recursive_directory_iterator(); at.increment(failed))
-    std::erase_if(missing,
-                  [&](const std::string& file) { return is_path_of(at->path().string(), file); });
+  for (const std::string& path : files_below(folder))
+    std::erase_if(missing, [&](const std::string& file) { return is_path_of(path, file); });
   return missing.empty();
 }
 
@@ -145,7 +134,7 @@ void fetch_cmu_originals(const CmuOriginals& originals, const std::string& folde
         if (!is_path_of(blob.path, file)) continue;
         throw_if_stopped();
         missing.erase(file);
-        if (blob.bytes <= kMostFile && is_plain(blob.path) && seen.insert(blob.sha1).second)
+        if (blob.bytes <= kMostFile && is_inside(blob.path) && seen.insert(blob.sha1).second)
           fetch_blob(blob, repository, own + "/" + blob.path);
       }
   }

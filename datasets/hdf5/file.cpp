@@ -174,7 +174,7 @@ void Dataset::read_rows(int64_t first, int64_t count, std::vector<T>& out) const
   const bool narrow = std::is_integral_v<T> && !std::is_same_v<T, int64_t> &&
                       (wide_ || !std::is_same_v<T, int32_t>);
   check_memory(values, narrow ? sizeof(int64_t) : sizeof(T));
-  out.resize(static_cast<size_t>(values));
+  out.resize(values);
   if (values == 0) return;
   const Lock lock;
   if (!narrow) return read_raw(first, count, memory_type<T>(), out.data());

@@ -1,16 +1,17 @@
 #include "datasets/importers/amass.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 
 #include "autograd/base/error.h"
+#include "autograd/base/format.h"
 #include "datasets/importers/import_detail.h"
 #include "datasets/importers/source_motion.h"
 #include "datasets/readers/array_frames.h"
 #include "datasets/readers/folders.h"
+#include "datasets/readers/word_lines.h"
 
 namespace restage {
 namespace {
@@ -21,22 +22,11 @@ constexpr int64_t kMaxFrames = int64_t{1} << 22;  // 9.7 hours at 120 fps
 constexpr double kMaxSeconds = 35000;
 constexpr const char* kRates[] = {"mocap_framerate", "mocap_frame_rate"};
 
-std::string number_text(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
-}
-
-std::string lower(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
-
 /// By the name of the file or its folder: SMPLX_MALE.npz, female/model.npz.
 std::string gender_of(const fs::path& file) {
   for (const fs::path& name : {file.filename(), file.parent_path().filename()})
     for (const char* gender : {"female", "male", "neutral"})  // "female" holds "male"
-      if (lower(name.string()).find(gender) != std::string::npos) return gender;
+      if (lower_case(name.string()).find(gender) != std::string::npos) return gender;
   return "";
 }
 
@@ -46,12 +36,12 @@ std::string text_of(const Npz& file, const char* name, ImportReport& report) {
   if (!file.has(name)) return "";
   try {
     if (!file.header(name).is_text()) return "";
-    std::string out = lower(file.array(name).text()).substr(0, 40);
+    std::string out = lower_case(file.array(name).text()).substr(0, 40);
     for (char& c : out)
       if (c < 32 || c > 126) c = '?';  // it is printed
     return out;
   } catch (const InputError& e) {
-    report.remarks.push_back(std::string(name) + " counts as not stated: " + e.what());
+    report.remark(std::string(name) + " counts as not stated: " + e.what());
     return "";
   }
 }
@@ -114,19 +104,15 @@ Quat rotation(const Vec3& axis_angle) {
 /// The 22 joints as a skeleton of their own, and each standing for itself.
 SourceSkeleton skeleton_of(const Joints& rest) {
   SourceSkeleton out;
-  for (size_t j = 0; j < kJoints; ++j) {
-    out.names.emplace_back(kJointNames[j]);
-    out.parents.push_back(kParents[j]);
-    out.offsets.push_back(j == 0 ? rest[0] : rest[j] - rest[static_cast<size_t>(kParents[j])]);
-  }
-  out.ends.assign(kJoints, Vec3::Zero());
-  out.has_end.assign(kJoints, 0);
+  for (size_t j = 0; j < kJoints; ++j)
+    out.add(std::string(kJointNames[j]), kParents[j],
+            j == 0 ? rest[0] : Vec3(rest[j] - rest[kParents[j]]));
   return out;
 }
 
 JointMap identity_map() {
   JointMap out;
-  for (int j = 0; j < kJoints; ++j) out[static_cast<size_t>(j)].joint = j;
+  for (int j = 0; j < kJoints; ++j) out[j].joint = j;
   return out;
 }
 
@@ -163,10 +149,10 @@ SourceMotion read_motion(const Npz& file, const Joints& rest, const Mat3& up) {
 /// Brings the motion to 30 fps and says how.
 std::string resampled(SourceMotion& motion, uint64_t bytes, const std::string& from,
                       const std::string& path) {
-  const std::string before = number_text(motion.fps) + " fps (" + from + "), ";
+  const std::string before = format("%.6g", motion.fps) + " fps (" + from + "), ";
   const size_t frames = motion.local.size();
   if (!(static_cast<double>(frames) / motion.fps < kMaxSeconds))
-    throw InputError(path, "lasts more than 9 hours at " + number_text(motion.fps) + " fps",
+    throw InputError(path, "lasts more than 9 hours at " + format("%.6g", motion.fps) + " fps",
                      "cut it, or give the true rate with --fps");
   check_length(frames, kJoints, motion.fps, bytes, path);
   if (motion.fps == kFps) return before + std::to_string(frames) + " frames, kept";
@@ -180,7 +166,7 @@ void check_upright(const Poses& poses, ImportReport& report) {
   Vec3 sum = Vec3::Zero();
   for (const PosedSkeleton& pose : poses) sum += pose.joints[15] - pose.joints[0];
   if (sum.y() < 0.5 * sum.norm())
-    report.remarks.push_back(
+    report.remark(
         "the body is not upright on average: if it should be, the file's up axis is another "
         "(--up y)");
 }
@@ -262,34 +248,32 @@ bool is_amass_shape(const Npz& file) { return file.has("betas") && !file.has("po
 Motion import_amass(const Npz& file, BodyModels& models, const AmassOptions& options,
                     ImportReport& report) {
   report.file = file.path();
-  const auto fact = [&](const char* name, const std::string& value) {
-    report.facts.emplace_back(name, value);
-  };
   const NpyHeader poses = file.header("poses");
   const SmplFamily family = family_of(file, poses, report);
-  fact("layout", std::string(to_string(family)) + ", poses " + shape_text(poses.shape));
+  report.fact("layout", std::string(to_string(family)) + ", poses " + shape_text(poses.shape));
   const std::string gender = text_of(file, "gender", report);
-  fact("gender", gender.empty() ? "not stated" : gender);
+  report.fact("gender", gender.empty() ? "not stated" : gender);
   const SmplModel& model = models.find(family, gender, file.path(), report.remarks);
   const Betas betas = betas_of(file);
-  fact("body model", model.path() + ", " + std::to_string(std::min(betas.size(), model.shapes())) +
-                         " of " + std::to_string(betas.size()) + " betas");
+  report.fact("body model", model.path() + ", " +
+                                std::to_string(std::min(betas.size(), model.shapes())) + " of " +
+                                std::to_string(betas.size()) + " betas");
 
   const Joints rest = model.joints(betas);
   SourceMotion motion =
       read_motion(file, rest, upright(options.up == Axis::automatic ? Axis::z : options.up));
-  fact("up", options.up == Axis::automatic ? "z (AMASS), turned to y"
-                                           : to_string(options.up) + " (--up)");
+  report.fact("up", options.up == Axis::automatic ? "z (AMASS), turned to y"
+                                                  : to_string(options.up) + " (--up)");
   std::string from;
   motion.fps = rate_of(file, options.fps, from);
-  fact("rate", resampled(motion, poses.bytes(), from, file.path()));
+  report.fact("rate", resampled(motion, poses.bytes(), from, file.path()));
 
   Poses posed(motion.local.size());
   const JointMap map = identity_map();
   for (size_t f = 0; f < posed.size(); ++f) posed[f] = source_pose(motion, map, f);
   check_upright(posed, report);
   const double floor = floor_height(posed);
-  fact("floor", number_text(std::round(1e3 * floor) / 1e3) + " m, taken to 0");
+  report.fact("floor", format("%.6g", std::round(1e3 * floor) / 1e3) + " m, taken to 0");
   Joints centred = rest;
   for (Vec3& x : centred) x -= rest[0];
   Motion out = to_motion(posed, centred, floor);

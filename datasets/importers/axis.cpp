@@ -1,5 +1,6 @@
 #include "datasets/importers/axis.h"
 
+#include <cmath>
 #include <iterator>
 
 #include "autograd/base/error.h"
@@ -37,6 +38,20 @@ Mat3 upright(Axis up) {
   Mat3 out = from * to.transpose();  // exact, unlike sines and cosines of 90 degrees
   out = to * from.transpose() - out + axis * axis.transpose();
   return up == Axis::y ? Mat3(Mat3::Identity()) : out;
+}
+
+Mat3 turn_in_quarters(double& yaw) {
+  const double nearest = std::round(yaw / (M_PI / 2)) * (M_PI / 2);
+  if (std::abs(yaw - nearest) > M_PI / 18) return turn_about_y(yaw);
+  yaw = nearest;
+  const double c = std::round(std::cos(yaw)), s = std::round(std::sin(yaw));
+  Mat3 out;
+  out << c, 0, s, 0, 1, 0, -s, 0, c;
+  return out;
+}
+
+double angle_between(const Vec3& a, const Vec3& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
 }  // namespace restage

@@ -21,4 +21,10 @@ Axis axis_near(const Vec3& v);
 /// The quarter or half turn that takes the file's `up` to y; for z it is (x, y, z) -> (x, z, -y).
 Mat3 upright(Axis up);
 
+/// The turn about y by `yaw`, radians; by whole quarters where it is within 10 degrees of one,
+/// which `yaw` becomes.
+Mat3 turn_in_quarters(double& yaw);
+/// Radians; 0 if either has no length.
+double angle_between(const Vec3& a, const Vec3& b);
+
 }  // namespace restage

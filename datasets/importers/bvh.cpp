@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
+#include "autograd/base/format.h"
 #include "datasets/readers/packed_text.h"
 
 namespace restage {
@@ -31,13 +31,9 @@ Rate frame_rate(const BvhFile& file) {
 
 std::string rate_text(const BvhFile& file) {
   const Rate rate = frame_rate(file);
-  char text[100];
-  if (rate.rounded)
-    std::snprintf(text, sizeof text, "the file's frame time of %.6g s is %.6g fps, rounded",
-                  file.frame_time, rate.fps);
-  else
-    std::snprintf(text, sizeof text, "the file says %.6g fps", rate.fps);
-  return text;
+  return rate.rounded ? format("the file's frame time of %.6g s is %.6g fps, rounded",
+                               file.frame_time, rate.fps)
+                      : format("the file says %.6g fps", rate.fps);
 }
 
 /// What a joint's position channels say: on average, and how far from there at most.
@@ -65,8 +61,7 @@ Place place_of(const BvhFile& file, size_t joint, const Vec3& otherwise) {
 
 /// The joint and all that it hangs on.
 void mark_upwards(const SourceSkeleton& skeleton, int joint, std::vector<uint8_t>& marks) {
-  for (; joint >= 0; joint = skeleton.parents[static_cast<size_t>(joint)])
-    marks[static_cast<size_t>(joint)] = 1;
+  for (; joint >= 0; joint = skeleton.parents[joint]) marks[joint] = 1;
 }
 
 /// Joints of use that are told where they are in every frame, but for those down to the hips, which
@@ -115,8 +110,7 @@ SourceMotion bvh_motion(BvhFile file, int hips) {
   SourceMotion out;
   out.fps = frame_rate(file).fps;
   std::vector<uint8_t> moves(file.skeleton.size(), 0);
-  for (int j = hips; j >= 0; j = file.skeleton.parents[static_cast<size_t>(j)])
-    moves[static_cast<size_t>(j)] = 1;
+  for (int j = hips; j >= 0; j = file.skeleton.parents[j]) moves[j] = 1;
   for (size_t j = 0; j < moves.size(); ++j)
     if (moves[j]) out.moving.push_back(static_cast<int>(j));
   out.local.reserve(file.frames.size());

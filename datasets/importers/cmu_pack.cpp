@@ -14,6 +14,7 @@
 #include "datasets/hdf5/file.h"
 #include "datasets/importers/amc.h"
 #include "datasets/importers/bvh.h"
+#include "datasets/readers/folders.h"
 #include "datasets/readers/packed_text.h"
 #include "datasets/readers/sha256.h"
 
@@ -113,8 +114,7 @@ Sha256 sum_of_skeleton(const PackedClip& clip) {
   Sha256 sum;
   for (const size_t j : joints_by_name(clip)) {
     const int32_t parent = clip.parents[j];
-    sum.add(clip.names[j] + " " + (parent < 0 ? "" : clip.names[static_cast<size_t>(parent)]) +
-            "\n");
+    sum.add(clip.names[j] + " " + (parent < 0 ? "" : clip.names[parent]) + "\n");
     sum.add(piece(clip.offsets, j, 3));
     sum.add(piece(clip.ends, j, 3));
   }
@@ -130,17 +130,6 @@ std::string sum_of_clip(const PackedClip& clip) {
     for (const size_t j : by_name) sum.add(piece(clip.rotations, f * by_name.size() + j, 4));
   }
   return sum.hex();
-}
-
-/// All files below the folder, in an order of their own.
-std::vector<std::string> files_below(const std::string& folder) {
-  std::vector<std::string> out;
-  std::error_code failed;
-  fs::recursive_directory_iterator at(folder, failed);
-  for (; !failed && at != fs::recursive_directory_iterator(); at.increment(failed))
-    if (std::error_code unknown; at->is_regular_file(unknown)) out.push_back(at->path().string());
-  std::sort(out.begin(), out.end());
-  return out;
 }
 
 std::vector<std::string> named(const std::vector<std::string>& files, const std::string& name,

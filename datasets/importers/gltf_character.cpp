@@ -7,6 +7,7 @@
 #include <set>
 
 #include "autograd/base/error.h"
+#include "autograd/base/format.h"
 #include "datasets/importers/source_motion.h"
 #include "datasets/readers/mesh_io.h"
 #include "datasets/readers/text.h"
@@ -22,11 +23,11 @@ void describe(const Gltf& file, ImportReport& report) {
   report.file = file.path;
   size_t joints = 0;
   for (const GltfBone& bone : file.bones) joints += bone.skin >= 0;
-  report.facts.emplace_back("holds", std::to_string(file.vertices.size()) + " vertices, " +
-                                         std::to_string(file.faces.size()) + " triangles, " +
-                                         std::to_string(file.skin_nodes.size()) + " skins with " +
-                                         std::to_string(joints) + " joints, " +
-                                         std::to_string(file.clips.size()) + " animations");
+  report.fact("holds", std::to_string(file.vertices.size()) + " vertices, " +
+                           std::to_string(file.faces.size()) + " triangles, " +
+                           std::to_string(file.skin_nodes.size()) + " skins with " +
+                           std::to_string(joints) + " joints, " +
+                           std::to_string(file.clips.size()) + " animations");
   report.remarks.insert(report.remarks.end(), file.remarks.begin(), file.remarks.end());
 }
 
@@ -53,12 +54,12 @@ Body body_of(const Gltf& file, const GltfRig& rig) {
   body.joints = t_pose_joints(rig);
   const Vec3 origin = put_on_floor(body.rest, body.joints[0]);
   for (Vec3& x : body.joints) x -= origin;
-  body.weights.setZero(static_cast<Eigen::Index>(file.vertices.size()), kJoints);
+  body.weights.setZero(file.vertices.size(), kJoints);
   for (size_t v = 0; v < file.vertices.size(); ++v) {
-    auto row = body.weights.row(static_cast<Eigen::Index>(v));
+    auto row = body.weights.row(v);
     for (uint32_t i = file.first_influence[v]; i < file.first_influence[v + 1]; ++i) {
-      const GltfBone& bone = file.bones[static_cast<size_t>(file.influences[i].bone)];
-      row[rig.joint[static_cast<size_t>(bone.node)]] += file.influences[i].weight;
+      const GltfBone& bone = file.bones[file.influences[i].bone];
+      row[rig.joint[bone.node]] += file.influences[i].weight;
     }
   }
   return body;
@@ -70,24 +71,18 @@ Body body_of(const Gltf& file, const GltfRig& rig) {
 bool moves_joints(const Gltf& file, const GltfRig& rig, const GltfClip& clip) {
   std::vector<bool> counts(file.nodes.size());
   for (int n : rig.node)
-    for (; n >= 0 && !counts[static_cast<size_t>(n)]; n = file.nodes[static_cast<size_t>(n)].parent)
-      counts[static_cast<size_t>(n)] = true;
-  return std::any_of(clip.tracks.begin(), clip.tracks.end(), [&](const GltfTrack& track) {
-    return counts[static_cast<size_t>(track.node)];
-  });
+    for (; n >= 0 && !counts[n]; n = file.nodes[n].parent) counts[n] = true;
+  return std::any_of(clip.tracks.begin(), clip.tracks.end(),
+                     [&](const GltfTrack& track) { return counts[track.node]; });
 }
 
 std::string rate_of(const Gltf& file, const GltfClip& clip, int64_t frames) {
   size_t most = 0;
-  for (const GltfTrack& track : clip.tracks)
-    most = std::max(most, file.times[static_cast<size_t>(track.times)].size());
+  for (const GltfTrack& track : clip.tracks) most = std::max(most, file.times[track.times].size());
   const double seconds = clip.end - clip.begin;
-  char out[160];
-  std::snprintf(out, sizeof out,
-                "%.2f s, up to %zu keys a joint (%.4g a second), sampled to %lld frames at 30 fps",
+  return format("%.2f s, up to %zu keys a joint (%.4g a second), sampled to %lld frames at 30 fps",
                 seconds, most, seconds > 0 ? static_cast<double>(most - 1) / seconds : 0.0,
                 static_cast<long long>(frames));
-  return out;
 }
 
 Motion motion_of(const Gltf& file, const GltfRig& rig, const GltfClip& clip, int64_t frames) {
@@ -128,7 +123,7 @@ std::vector<Motion> motions_of(const Gltf& file, const GltfRig& rig,
   int64_t left = 100000 + static_cast<int64_t>(file.bytes / 50);  // bounds what a small file makes
   for (const GltfClip* clip : clips) {
     if (!moves_joints(file, rig, *clip)) {
-      report.remarks.push_back("clip " + text::quote(clip->name) + " moves none of the joints");
+      report.remark("clip " + text::quote(clip->name) + " moves none of the joints");
       continue;
     }
     const int64_t frames = clip_frames(file, *clip);
@@ -146,7 +141,7 @@ std::vector<Motion> motions_of(const Gltf& file, const GltfRig& rig,
     motion.subject = options.subject.empty() ? id_of(file.path, options) : options.subject;
     motion.split = options.split;
     motion.action = options.action.empty() ? clip->name : options.action;
-    report.facts.emplace_back("clip " + text::quote(clip->name), rate_of(file, *clip, frames));
+    report.fact("clip " + text::quote(clip->name), rate_of(file, *clip, frames));
     out.push_back(std::move(motion));
   }
   return out;
@@ -164,14 +159,14 @@ Character read_character(const std::string& path, const CharacterOptions& option
   const Gltf file = read_gltf(path);
   Character out;
   describe(file, out.report);
-  const bool skinned = std::any_of(
-      file.influences.begin(), file.influences.end(),
-      [&](const GltfInfluence& by) { return file.bones[static_cast<size_t>(by.bone)].skin >= 0; });
+  const bool skinned =
+      std::any_of(file.influences.begin(), file.influences.end(),
+                  [&](const GltfInfluence& by) { return file.bones[by.bone].skin >= 0; });
   const bool loose = !skinned && !file.vertices.empty();
   if (loose && file.clips.empty()) throw_no_skin(path);
   const GltfRig rig = find_rig(file, options.rig, out.report);
   check_handedness(t_pose_joints(rig), options.force, path, out.report);
-  if (loose) out.report.remarks.push_back("left out its mesh, which belongs to no skin");
+  if (loose) out.report.remark("left out its mesh, which belongs to no skin");
   if (skinned) {
     out.body = body_of(file, rig);
     out.body->id = id_of(path, options);
@@ -194,7 +189,7 @@ TargetMesh read_target(const std::string& path) {
   const Gltf file = read_gltf(path);
   describe(file, out.report);
   if (file.skin_nodes.empty() || !has_known_joints(file)) {
-    out.report.remarks.push_back(
+    out.report.remark(
         file.skin_nodes.empty()
             ? "has no rig: its mesh is taken as it stands"
             : "the joints' names are of no known family: its mesh is taken as it stands");

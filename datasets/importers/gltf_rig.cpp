@@ -1,28 +1,22 @@
 #include "datasets/importers/gltf_rig.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <optional>
 
 #include "autograd/base/error.h"
+#include "autograd/base/format.h"
 #include "datasets/importers/length_units.h"
 #include "datasets/importers/source_motion.h"
 #include "datasets/readers/text.h"
+#include "datasets/readers/word_lines.h"
 
 namespace restage {
 namespace {
 
 constexpr double kDegree = M_PI / 180;
 constexpr double kStraight = 5 * kDegree;  // arms nearer than this to the T-pose stay
-
-template <class... Values>
-std::string format(const char* pattern, Values... values) {
-  char out[160];
-  std::snprintf(out, sizeof out, pattern, values...);
-  return out;
-}
 
 /// The rotation in a matrix that may also scale.
 Mat3 rotation_of(const Mat3& m) {
@@ -34,11 +28,6 @@ Mat3 rotation_of(const Mat3& m) {
 }
 
 double angle_of(const Mat3& rotation) { return Eigen::AngleAxisd(rotation).angle(); }
-
-double angle_between(const Vec3& a, const Vec3& b) {
-  const double norms = a.norm() * b.norm();
-  return norms > 0 ? std::acos(std::clamp(a.dot(b) / norms, -1.0, 1.0)) : 0.0;
-}
 
 // ---- bind pose ---------------------------------------------------------------------------------
 
@@ -52,7 +41,7 @@ Offset rest_offset(const std::vector<GltfBone>& bones, const GltfTransforms& res
   Offset out;
   for (const GltfBone& bone : bones) {
     const Eigen::Affine3d bound = mesh * bone.inverse_bind.inverse();
-    const Eigen::Affine3d& node = rest[static_cast<size_t>(bone.node)];
+    const Eigen::Affine3d& node = rest[bone.node];
     if (!(std::abs(node.linear().determinant()) > 1e-30)) continue;
     const Mat3 turn = rotation_of(node.linear() * bound.linear().inverse());
     out.degrees = std::max(out.degrees, angle_of(turn) / kDegree);
@@ -62,12 +51,9 @@ Offset rest_offset(const std::vector<GltfBone>& bones, const GltfTransforms& res
 }
 
 double extent(const std::vector<GltfBone>& bones, const GltfTransforms& rest) {
-  Vec3 low = Vec3::Constant(1e300), high = -low;
-  for (const GltfBone& bone : bones) {
-    low = low.cwiseMin(rest[static_cast<size_t>(bone.node)].translation());
-    high = high.cwiseMax(rest[static_cast<size_t>(bone.node)].translation());
-  }
-  return (high - low).norm();
+  Eigen::AlignedBox3d box;
+  for (const GltfBone& bone : bones) box.extend(rest[bone.node].translation().eval());
+  return box.sizes().norm();
 }
 
 /// From the space of a skin's vertices to the world, in its bind pose. `bones`: of that skin.
@@ -76,17 +62,17 @@ Eigen::Affine3d bind_space(const Gltf& file, const std::vector<GltfBone>& bones,
   const GltfBone& top =
       *std::min_element(bones.begin(), bones.end(),
                         [](const GltfBone& a, const GltfBone& b) { return a.node < b.node; });
-  const Eigen::Affine3d by_root = rest[static_cast<size_t>(top.node)] * top.inverse_bind;
+  const Eigen::Affine3d by_root = rest[top.node] * top.inverse_bind;
   const Offset off = rest_offset(bones, rest, by_root);
   if (off.degrees < 0.5 && off.length <= 0.01 * extent(bones, rest)) return by_root;
-  report.remarks.push_back(
+  report.remark(
       format("the nodes rest in another pose than the skin was made in (up to %.0f degrees): the "
              "skin's is taken",
              off.degrees));
   // Where the root itself rests turned, the node that wears the mesh says how the mesh stands.
-  const int wearer = file.skin_nodes[static_cast<size_t>(top.skin)];
+  const int wearer = file.skin_nodes[top.skin];
   if (wearer < 0) return by_root;
-  const Eigen::Affine3d& by_mesh = rest[static_cast<size_t>(wearer)];
+  const Eigen::Affine3d& by_mesh = rest[wearer];
   const double ratio =
       by_mesh.linear().determinant() / std::max(std::abs(by_root.linear().determinant()), 1e-300);
   return std::abs(std::cbrt(ratio) - 1) < 0.01 ? by_mesh : by_root;
@@ -96,7 +82,7 @@ GltfTransforms bind_pose(const Gltf& file, ImportReport& report) {
   const GltfTransforms rest = gltf_rest(file);
   std::vector<std::vector<GltfBone>> skins(file.skin_nodes.size());
   for (const GltfBone& bone : file.bones)
-    if (bone.skin >= 0) skins[static_cast<size_t>(bone.skin)].push_back(bone);
+    if (bone.skin >= 0) skins[bone.skin].push_back(bone);
   std::stable_sort(skins.begin(), skins.end(),
                    [](const auto& a, const auto& b) { return a.size() > b.size(); });
   GltfTransforms out(rest.size());
@@ -104,12 +90,10 @@ GltfTransforms bind_pose(const Gltf& file, ImportReport& report) {
   for (const auto& bones : skins) {
     if (bones.empty()) continue;
     // A skin that shares a joint with one that is placed already hangs on it.
-    const auto shared = std::find_if(bones.begin(), bones.end(), [&](const GltfBone& bone) {
-      return known[static_cast<size_t>(bone.node)];
-    });
-    const Eigen::Affine3d space =
-        shared != bones.end() ? out[static_cast<size_t>(shared->node)] * shared->inverse_bind
-                              : bind_space(file, bones, rest, report);
+    const auto shared = std::find_if(bones.begin(), bones.end(),
+                                     [&](const GltfBone& bone) { return known[bone.node]; });
+    const Eigen::Affine3d space = shared != bones.end() ? out[shared->node] * shared->inverse_bind
+                                                        : bind_space(file, bones, rest, report);
     for (const GltfBone& bone : bones) {
       const auto n = static_cast<size_t>(bone.node);
       if (!known[n]) out[n] = space * bone.inverse_bind.inverse();
@@ -122,7 +106,7 @@ GltfTransforms bind_pose(const Gltf& file, ImportReport& report) {
     Eigen::Affine3d local;
     local.fromPositionOrientationScale(file.nodes[n].translation, file.nodes[n].rotation,
                                        file.nodes[n].scale);
-    out[n] = p < 0 ? local : out[static_cast<size_t>(p)] * local;
+    out[n] = p < 0 ? local : out[p] * local;
   }
   return out;
 }
@@ -134,11 +118,11 @@ std::vector<int> bone_nodes(const Gltf& file) {
   std::vector<bool> is(file.nodes.size());
   bool skins = false;
   for (const GltfBone& bone : file.bones)
-    if (bone.skin >= 0) skins = is[static_cast<size_t>(bone.node)] = true;
+    if (bone.skin >= 0) skins = is[bone.node] = true;
   std::vector<int> out;
   for (size_t n = 0; n < is.size(); ++n) {
     const int p = file.nodes[n].parent;
-    if (!skins || (p >= 0 && is[static_cast<size_t>(p)])) is[n] = true;
+    if (!skins || (p >= 0 && is[p])) is[n] = true;
     if (is[n]) out.push_back(static_cast<int>(n));
   }
   return out;
@@ -181,28 +165,19 @@ SourceSkeleton skeleton_of(const Gltf& file, const std::vector<int>& nodes,
                            const GltfTransforms& bind, bool by_vrm_list) {
   SourceSkeleton out;
   std::vector<int> place(file.nodes.size(), 0);
-  const auto add = [&](const std::string& name, int parent, const Vec3& offset) {
-    out.names.push_back(name);
-    out.parents.push_back(parent);
-    out.offsets.push_back(offset);
-    out.ends.push_back(Vec3::Zero());
-    out.has_end.push_back(0);
-  };
-  add("", -1, Vec3::Zero());
+  out.add("", -1, Vec3::Zero());
   for (const int n : nodes) {
-    const GltfNode& node = file.nodes[static_cast<size_t>(n)];
-    const int parent = node.parent < 0 ? 0 : place[static_cast<size_t>(node.parent)];
-    const Vec3 from =
-        parent == 0 ? Vec3(Vec3::Zero()) : bind[static_cast<size_t>(node.parent)].translation();
-    place[static_cast<size_t>(n)] = static_cast<int>(out.size());
-    add(node.name, parent, bind[static_cast<size_t>(n)].translation() - from);
+    const GltfNode& node = file.nodes[n];
+    const int parent = node.parent < 0 ? 0 : place[node.parent];
+    const Vec3 from = parent == 0 ? Vec3(Vec3::Zero()) : bind[node.parent].translation();
+    place[n] = static_cast<int>(out.size());
+    out.add(node.name, parent, bind[n].translation() - from);
   }
   if (!by_vrm_list) return out;
   // A VRM file says which bone is which; what its nodes are called is its author's business.
   for (std::string& name : out.names) name.clear();
   for (const auto& [name, n] : file.humanoid)
-    if (const int at = place[static_cast<size_t>(n)]; at > 0)
-      out.names[static_cast<size_t>(at)] = name;
+    if (const int at = place[n]; at > 0) out.names[at] = name;
   return out;
 }
 
@@ -242,8 +217,7 @@ double find_scale(const Joints& joints, const GltfRigOptions& options, const std
                        "give --scale (metres per unit)");
     how = scale == 1.0 ? "the format's" : unit_name(scale) + " by the leg";
   }
-  report.facts.emplace_back("units",
-                            format("%g m (%s; the leg has %.3g)", scale, how.c_str(), leg));
+  report.fact("units", format("%g m (%s; the leg has %.3g)", scale, how.c_str(), leg));
   return scale;
 }
 
@@ -251,23 +225,17 @@ double find_scale(const Joints& joints, const GltfRigOptions& options, const std
 Mat3 find_up(const Joints& joints, Axis given, ImportReport& report) {
   const bool found = given == Axis::automatic;
   const Axis up = found ? axis_near(joints[15] - 0.5 * (joints[7] + joints[8])) : given;
-  report.facts.emplace_back("up",
-                            to_string(up) + (found ? " (from ankles to head)" : " (as given)"));
+  report.fact("up", to_string(up) + (found ? " (from ankles to head)" : " (as given)"));
   return upright(up);
 }
 
 /// The turn about y that brings the left side to +x: quarters, if it is within 10 degrees of one.
 Mat3 find_front(const Joints& upright, ImportReport& report) {
   const Vec3 left = (upright[1] - upright[2]) + (upright[16] - upright[17]);
-  const double yaw = std::atan2(left.z(), left.x()), quarter = M_PI / 2;
-  const double nearest = std::round(yaw / quarter) * quarter;
-  const bool quarters = std::abs(yaw - nearest) < 10 * kDegree;
-  const double degrees = std::round((quarters ? nearest : yaw) / kDegree) + 0.0;  // no -0
-  report.facts.emplace_back("facing", format("turned by %.0f degrees to face +z", degrees));
-  if (!quarters) return turn_about_y(yaw);
-  const double c = std::round(std::cos(nearest)), s = std::round(std::sin(nearest));
-  Mat3 out;
-  out << c, 0, s, 0, 1, 0, -s, 0, c;
+  double yaw = std::atan2(left.z(), left.x());
+  const Mat3 out = turn_in_quarters(yaw);
+  const double degrees = std::round(yaw / kDegree) + 0.0;  // no -0
+  report.fact("facing", format("turned by %.0f degrees to face +z", degrees));
   return out;
 }
 
@@ -294,19 +262,18 @@ void check_standing(const Joints& joints, const std::string& path) {
 
 // ---- T-pose ------------------------------------------------------------------------------------
 
-bool is_middle_finger(std::string name) {
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+bool is_middle_finger(const std::string& node) {
+  const std::string name = lower_case(node);
   return name.find("middle") != std::string::npos || name.find("finger3") != std::string::npos;
 }
 
 /// The first node of the middle finger below `hand`, or -1.
 int middle_finger(const Gltf& file, int hand) {
   std::vector<bool> below(file.nodes.size());
-  below[static_cast<size_t>(hand)] = true;
+  below[hand] = true;
   for (size_t n = static_cast<size_t>(hand) + 1; n < below.size(); ++n) {
     const int p = file.nodes[n].parent;
-    if (p < 0 || !below[static_cast<size_t>(p)]) continue;
+    if (p < 0 || !below[p]) continue;
     below[n] = true;
     if (is_middle_finger(file.nodes[n].name)) return static_cast<int>(n);
     for (const auto& [name, node] : file.humanoid)
@@ -324,13 +291,12 @@ std::array<std::optional<Mat3>, kJoints> arm_turns(const Gltf& file, const GltfR
   for (const int side : {0, 1}) {
     const int shoulder = 16 + side, elbow = shoulder + 2, wrist = shoulder + 4;
     const Vec3 x = rig.turn.transpose() * Vec3(side == 0 ? 1.0 : -1.0, 0, 0);
-    const int finger = middle_finger(file, rig.node[static_cast<size_t>(wrist)]);
-    const Vec3 knuckle =
-        finger >= 0 ? rig.bind[static_cast<size_t>(finger)].translation() : joints[wrist];
+    const int finger = middle_finger(file, rig.node[wrist]);
+    const Vec3 knuckle = finger >= 0 ? rig.bind[finger].translation() : joints[wrist];
     const auto turn = [&](int joint, const Vec3& bone, const char* name) {
       const double angle = angle_between(bone, x);
       const bool off = angle > kStraight;
-      out[static_cast<size_t>(joint)] = off ? shortest_arc(bone, x) : Mat3(Mat3::Identity());
+      out[joint] = off ? shortest_arc(bone, x) : Mat3(Mat3::Identity());
       if (off)
         words += format("%s%s %s %.1f degrees", words.empty() ? "" : ", ",
                         side == 0 ? "left" : "right", name, angle / kDegree);
@@ -339,8 +305,8 @@ std::array<std::optional<Mat3>, kJoints> arm_turns(const Gltf& file, const GltfR
     turn(elbow, joints[wrist] - joints[elbow], "forearm");
     if (finger >= 0) turn(wrist, knuckle - joints[wrist], "hand");
   }
-  report.facts.emplace_back(
-      "rest pose", words.empty() ? "T-pose" : "turned onto the T-pose by shortest arcs: " + words);
+  report.fact("rest pose",
+              words.empty() ? "T-pose" : "turned onto the T-pose by shortest arcs: " + words);
   return out;
 }
 
@@ -351,15 +317,13 @@ GltfTransforms turned(const Gltf& file, const GltfRig& rig,
   GltfTransforms out(file.nodes.size());
   for (size_t n = 0; n < out.size(); ++n) {
     const int p = file.nodes[n].parent;
-    if (p >= 0) by[n] = by[static_cast<size_t>(p)];
+    if (p >= 0) by[n] = by[p];
     for (size_t j = 0; j < kJoints; ++j)
       if (rig.node[j] == static_cast<int>(n) && turns[j]) by[n] = *turns[j];
     out[n].linear() = by[n] * rig.bind[n].linear();
     const Vec3 at = rig.bind[n].translation();
-    out[n].translation() = p < 0 ? at
-                                 : Vec3(out[static_cast<size_t>(p)].translation() +
-                                        by[static_cast<size_t>(p)] *
-                                            (at - rig.bind[static_cast<size_t>(p)].translation()));
+    out[n].translation() =
+        p < 0 ? at : Vec3(out[p].translation() + by[p] * (at - rig.bind[p].translation()));
   }
   return out;
 }
@@ -373,19 +337,18 @@ void find_nodes(const Gltf& file, GltfRig& rig, const JointMap& map, const std::
       throw InputError(file.path, "its joints hang on no common bone", "export the whole skeleton");
     rig.node[j] = nodes[static_cast<size_t>(map[j].joint) - 1];
     rig.offset[j] = map[j].offset;
-    int& owned = owner[static_cast<size_t>(rig.node[j])];
+    int& owned = owner[rig.node[j]];
     if (owned < 0 || map[j].offset.isZero()) owned = static_cast<int>(j);
     words += (words.empty() ? "" : ", ") + std::string(kJointNames[j]) + " = " +
-             text::quote(file.nodes[static_cast<size_t>(rig.node[j])].name) +
+             text::quote(file.nodes[rig.node[j]].name) +
              (map[j].offset.isZero() ? "" : " (beside it)");
   }
-  report.facts.emplace_back("joints", words);
+  report.fact("joints", words);
   rig.joint.assign(file.nodes.size(), 0);
   for (size_t n = 0; n < owner.size(); ++n)
-    rig.joint[n] = owner[n] >= 0 ? owner[n]
-                   : file.nodes[n].parent < 0
-                       ? 0
-                       : rig.joint[static_cast<size_t>(file.nodes[n].parent)];
+    rig.joint[n] = owner[n] >= 0              ? owner[n]
+                   : file.nodes[n].parent < 0 ? 0
+                                              : rig.joint[file.nodes[n].parent];
 }
 
 }  // namespace
@@ -398,14 +361,13 @@ GltfRig find_rig(const Gltf& file, const GltfRigOptions& options, ImportReport& 
   const NamedJoints names = map_names(skeleton, options.profile, file.path);
   const JointMap& map = names.map;
   if (by_list(file, options.profile))
-    report.facts.emplace_back("names", "VRM's list of bones, not the nodes' names");
+    report.fact("names", "VRM's list of bones, not the nodes' names");
   else if (options.profile)
-    report.facts.emplace_back("names",
-                              names.profile->title + " (profile " + names.profile->name + ")");
+    report.fact("names", names.profile->title + " (profile " + names.profile->name + ")");
   find_nodes(file, rig, map, nodes, report);
   Joints joints;
   for (size_t j = 0; j < kJoints; ++j)
-    joints[j] = rig.bind[static_cast<size_t>(rig.node[j])].translation() + rig.offset[j];
+    joints[j] = rig.bind[rig.node[j]].translation() + rig.offset[j];
   rig.scale = find_scale(joints, options, file.path, report);
   rig.turn = find_up(joints, options.up, report);
   Joints upright;
@@ -440,8 +402,7 @@ bool has_known_joints(const Gltf& file) {
 Joints t_pose_joints(const GltfRig& rig) {
   Joints out;
   for (size_t j = 0; j < kJoints; ++j)
-    out[j] =
-        rig.to_ours(rig.t_pose[static_cast<size_t>(rig.node[j])].translation() + rig.offset[j]);
+    out[j] = rig.to_ours(rig.t_pose[rig.node[j]].translation() + rig.offset[j]);
   return out;
 }
 

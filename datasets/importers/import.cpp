@@ -30,8 +30,7 @@ void add_bodies(const std::string& folder, const std::string& garment, ImportWri
     std::vector<Body> bodies(n);
     parallel_for(static_cast<int64_t>(n), 1, [&](int64_t from, int64_t to) {
       for (int64_t i = from; i < to; ++i)
-        bodies[static_cast<size_t>(i)] =
-            model.build(recipes[begin + static_cast<size_t>(i)], garment);
+        bodies[i] = model.build(recipes[begin + static_cast<size_t>(i)], garment);
     });
     writer.add(list, bodies, {});
   }
@@ -206,7 +205,7 @@ void add_each(const std::vector<std::string>& files, ImportSummary& summary,
 
 void count_ignored(const std::string& folder, bool (*considered)(const std::string&),
                    ImportSummary& summary) {
-  for (const std::string& path : files_below(folder, [](const std::string&) { return true; }))
+  for (const std::string& path : files_below(folder))
     if (!considered(path)) ++summary.ignored[fs::path(path).extension().string()];
 }
 

@@ -112,8 +112,7 @@ ImportSummary import_model(const std::string& source, const std::string& out,
                                   : std::to_string(people[0].size()) + ", the model has " +
                                         std::to_string(model.shapes())}};
     if (people[0].size() > model.shapes())
-      report.remarks.push_back("betas beyond the model's " + std::to_string(model.shapes()) +
-                               " are left out");
+      report.remark("betas beyond the model's " + std::to_string(model.shapes()) + " are left out");
     for (size_t i = 0; i < people.size(); ++i) {
       Body body = model.body(people[i]);
       body.id = body_id(source, name, i, people.size());

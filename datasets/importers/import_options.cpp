@@ -19,19 +19,17 @@ struct Given {
 std::vector<Given> all_of(const ImportOptions& options) {
   using enum InputKind;
   const MotionOptions& motion = options.motion;
-  const Kinds recordings = {bvh, amc}, moving = {bvh, amc, character};
+  const Kinds recordings = {bvh, amc}, moving = {bvh, amc, character},
+              motions = {bvh, amc, character, amass},
+              bodies = {bvh, amc, character, amass, body_model},
+              files = {bvh, amc, character, amass, body_model, scans};
   const char *of_recordings = "BVH and AMC recordings",
              *of_moving = "recordings and glTF characters";
+  const ImportOptions none;
   return {
-      {"--license",
-       options.license != ImportOptions().license,
-       {bvh, amc, character, amass, body_model, scans},
-       "files whose licence is not known"},
-      {"--subject", !motion.subject.empty(), {bvh, amc, character, amass}, "motions"},
-      {"--split",
-       motion.split != MotionOptions().split,
-       {bvh, amc, character, amass, body_model},
-       "motions and bodies"},
+      {"--license", options.license != none.license, files, "files whose licence is not known"},
+      {"--subject", !motion.subject.empty(), motions, "motions"},
+      {"--split", motion.split != none.motion.split, bodies, "motions and bodies"},
       {"--scale",
        motion.scale > 0,
        {bvh, amc, character, scans},

@@ -11,20 +11,18 @@
 #include "datasets/importers/gltf_character.h"
 #include "datasets/importers/import_detail.h"
 #include "datasets/readers/packed_text.h"
+#include "datasets/readers/text.h"
 #include "datasets/readers/word_lines.h"
 
 namespace restage {
 namespace {
 
-bool is_a(const std::string& path, const std::string& ending) {
-  const std::string name = lower_case(path);
-  return name.ends_with(ending) || name.ends_with(ending + ".xz");
-}
+bool is_amc_name(const std::string& path) { return text::ends_in(path, {".amc", ".amc.xz"}); }
 
 InputKind kind_of(const std::string& file) {
-  return is_gltf_name(file)   ? InputKind::character
-         : is_a(file, ".amc") ? InputKind::amc
-                              : InputKind::bvh;
+  return is_gltf_name(file)  ? InputKind::character
+         : is_amc_name(file) ? InputKind::amc
+                             : InputKind::bvh;
 }
 
 /// What some files of a folder take others may not: those are skipped. A skeleton for the AMC files
@@ -54,8 +52,8 @@ void add_character(const std::string& file, const ImportOptions& options, Import
 
 void add_recording(const std::string& file, const ImportOptions& options, ImportWriter& writer,
                    ImportSummary& summary) {
-  MotionClip clip = is_a(file, ".amc") ? read_amc(file, options.asf, options.motion)
-                                       : read_bvh(file, options.motion);
+  MotionClip clip = is_amc_name(file) ? read_amc(file, options.asf, options.motion)
+                                      : read_bvh(file, options.motion);
   writer.add(file, {}, {std::move(clip.motion)});
   summary.reports.push_back(std::move(clip.report));
 }
@@ -84,7 +82,7 @@ std::map<std::string, std::string> ids_by_place(const std::vector<std::string>& 
 }  // namespace
 
 bool is_recording_name(const std::string& path) {
-  return is_a(path, ".bvh") || is_a(path, ".amc") || is_gltf_name(path);
+  return text::ends_in(path, {".bvh", ".bvh.xz"}) || is_amc_name(path) || is_gltf_name(path);
 }
 
 ImportSummary import_recordings(const std::vector<std::string>& files, const std::string& source,

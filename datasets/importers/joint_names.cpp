@@ -77,11 +77,10 @@ Found match(const Profile& profile, const BoneNames& names, const SourceSkeleton
     out.count += out.joints[j] >= 0;
   }
   for (const int j : kRequired)
-    if (out.joints[static_cast<size_t>(j)] < 0)
-      out.missing.push_back(profile.bones[static_cast<size_t>(j)][0]);
+    if (out.joints[j] < 0) out.missing.push_back(profile.bones[j][0]);
   for (const size_t collar : {13, 14})
     out.fitting += out.joints[collar] >= 0 && out.joints[kSpine3] >= 0 &&
-                   skeleton.parents[static_cast<size_t>(out.joints[collar])] == out.joints[kSpine3];
+                   skeleton.parents[out.joints[collar]] == out.joints[kSpine3];
   return out;
 }
 
@@ -131,7 +130,7 @@ class Placer {
     zero_.resize(skeleton.size());
     for (size_t j = 0; j < skeleton.size(); ++j) {
       const int p = skeleton.parents[j];
-      zero_[j] = p < 0 ? Vec3::Zero() : Vec3(zero_[static_cast<size_t>(p)] + skeleton.offsets[j]);
+      zero_[j] = p < 0 ? Vec3::Zero() : Vec3(zero_[p] + skeleton.offsets[j]);
     }
     for (size_t j = 0; j < kJoints; ++j) out_.map[j].joint = found.joints[j];
   }
@@ -152,8 +151,8 @@ class Placer {
 
  private:
   bool lacks(int j) const { return joint(j).joint < 0; }
-  const SourceJoint& joint(int j) const { return out_.map[static_cast<size_t>(j)]; }
-  Vec3 at(int j) const { return zero_[static_cast<size_t>(joint(j).joint)] + joint(j).offset; }
+  const SourceJoint& joint(int j) const { return out_.map[j]; }
+  Vec3 at(int j) const { return zero_[joint(j).joint] + joint(j).offset; }
   int last_spine() const {
     for (const int j : {kSpine3, kSpine2, kSpine1})
       if (!lacks(j)) return j;
@@ -162,9 +161,9 @@ class Placer {
 
   /// Joint j turns with the bone of `like` and rests at `where`.
   void put(int j, int like, const Vec3& where) {
-    SourceJoint& to = out_.map[static_cast<size_t>(j)];
+    SourceJoint& to = out_.map[j];
     to.joint = joint(like).joint;
-    to.offset = where - zero_[static_cast<size_t>(to.joint)];
+    to.offset = where - zero_[to.joint];
     out_.placed.push_back(j);
   }
   void put_between(int j, int from, const Vec3& to, double share) {
@@ -179,17 +178,14 @@ class Placer {
     return bone < 0 ? std::nullopt : std::optional(SourceJoint{bone, Vec3::Zero()});
   }
   bool by_profile(int j) {
-    const auto& place = found_.profile->places[static_cast<size_t>(j)];
+    const auto& place = found_.profile->places[j];
     if (!place) return false;
     const auto with = named(place->with), from = named(place->from), to = named(place->to);
     if (!with || !from || !to) return false;
-    const auto rest = [&](const SourceJoint& s) -> Vec3 {
-      return zero_[static_cast<size_t>(s.joint)] + s.offset;
-    };
-    SourceJoint& target = out_.map[static_cast<size_t>(j)];
+    const auto rest = [&](const SourceJoint& s) -> Vec3 { return zero_[s.joint] + s.offset; };
+    SourceJoint& target = out_.map[j];
     target.joint = with->joint;
-    target.offset = rest(*from) + place->share * (rest(*to) - rest(*from)) -
-                    zero_[static_cast<size_t>(with->joint)];
+    target.offset = rest(*from) + place->share * (rest(*to) - rest(*from)) - zero_[with->joint];
     out_.placed.push_back(j);
     return true;
   }

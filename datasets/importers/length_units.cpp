@@ -1,7 +1,8 @@
 #include "datasets/importers/length_units.h"
 
+#include "autograd/base/format.h"
+
 #include <cmath>
-#include <cstdio>
 
 namespace restage {
 namespace {
@@ -24,9 +25,7 @@ const LegUnit* unit_of_leg(double leg) {
 std::string unit_name(double metres) {
   for (const LegUnit& unit : kUnits)
     if (std::abs(unit.metres / metres - 1) < 1e-6) return unit.name;
-  char text[40];
-  std::snprintf(text, sizeof text, "%.4g m", metres);
-  return text;
+  return format("%.4g m", metres);
 }
 
 }  // namespace restage

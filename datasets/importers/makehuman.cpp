@@ -5,6 +5,7 @@
 
 #include "autograd/base/error.h"
 #include "datasets/hdf5/file.h"
+#include "nn/geometry/skinning.h"
 
 namespace restage {
 namespace {
@@ -28,17 +29,10 @@ void check_indices(const std::vector<int32_t>& values, size_t limit, int32_t low
       broken(where, "holds the index " + std::to_string(v) + " of " + std::to_string(limit));
 }
 
-/// Linear blend skinning from the rest joints to a posed skeleton, in place.
-void blend(SkinnedSurface& surface, const Joints& rest, const PosedSkeleton& posed) {
-  for (size_t v = 0; v < surface.vertices.size(); ++v) {
-    Vec3 sum = Vec3::Zero();
-    for (size_t j = 0; j < kJoints; ++j) {
-      const double w = surface.weights[v][j];
-      if (w != 0.0)
-        sum += w * (posed.global[j] * (surface.vertices[v] - rest[j]) + posed.joints[j]);
-    }
-    surface.vertices[v] = sum;
-  }
+/// From the rest joints to a posed skeleton, in place.
+void skin(SkinnedSurface& surface, const Joints& rest, const PosedSkeleton& posed) {
+  for (size_t v = 0; v < surface.vertices.size(); ++v)
+    surface.vertices[v] = blend(surface.vertices[v], surface.weights[v].data(), rest, posed);
 }
 
 double lowest(const SkinnedSurface& surface) {
@@ -53,7 +47,7 @@ void append_bare(const SkinnedSurface& skin, const std::vector<uint8_t>& hidden,
   std::vector<int32_t> moved(skin.vertices.size(), -1);
   for (std::array<int32_t, 4> quad : skin.quads) {
     bool bare = true;
-    for (const int32_t v : quad) bare = bare && hidden[static_cast<size_t>(v)] == 0;
+    for (const int32_t v : quad) bare = bare && hidden[v] == 0;
     if (!bare) continue;
     for (int32_t& v : quad) {
       const auto old = static_cast<size_t>(v);
@@ -78,15 +72,13 @@ Body to_body(const SkinnedSurface& surface, const Joints& joints, double floor) 
   for (int j = 0; j < kJoints; ++j) out.joints[j] = (joints[j] - down) / 10;
   for (const int half : {1, 2})
     for (const auto& quad : surface.quads) {
-      const Triangle t = {quad[0], quad[static_cast<size_t>(half)],
-                          quad[static_cast<size_t>(half + 1)]};
+      const Triangle t = {quad[0], quad[half], quad[half + 1]};
       if (t[0] != t[1] && t[1] != t[2] && t[0] != t[2]) out.rest.faces.push_back(t);
     }
-  out.weights.resize(static_cast<Eigen::Index>(surface.weights.size()), kJoints);
+  out.weights.resize(surface.weights.size(), kJoints);
   for (size_t v = 0; v < surface.weights.size(); ++v)
     for (size_t j = 0; j < kJoints; ++j)
-      out.weights(static_cast<Eigen::Index>(v), static_cast<Eigen::Index>(j)) =
-          static_cast<float>(surface.weights[v][j]);
+      out.weights(v, j) = static_cast<float>(surface.weights[v][j]);
   return out;
 }
 
@@ -128,9 +120,8 @@ void MakeHuman::read_rig(const h5::File& file) {
   check_indices(parents, bones_.size(), -1, path_ + ":/rig/bone_parent");
   for (size_t b = 0; b < bones_.size(); ++b) {
     size_t steps = 0;
-    for (int at = static_cast<int>(b); at >= 0; at = parents[static_cast<size_t>(at)]) {
-      const auto found =
-          std::find(std::begin(kBones), std::end(kBones), bones_[static_cast<size_t>(at)]);
+    for (int at = static_cast<int>(b); at >= 0; at = parents[at]) {
+      const auto found = std::find(std::begin(kBones), std::end(kBones), bones_[at]);
       joint[b] = static_cast<size_t>(found - std::begin(kBones));
       if (joint[b] < kJoints) break;
       if (++steps > bones_.size()) broken(path_ + ":/rig/bone_parent", "goes round in circles");
@@ -155,8 +146,7 @@ void MakeHuman::read_weights(const h5::File& file, const std::vector<size_t>& jo
   for (size_t i = 0; i < value.size(); ++i) {
     if (!(value[i] >= 0 && value[i] < 1e6))
       broken(path_ + ":/rig/weight_value", "holds a negative weight");
-    weights_[static_cast<size_t>(vertex[i])][joint_of_bone[static_cast<size_t>(bone[i])]] +=
-        value[i];
+    weights_[vertex[i]][joint_of_bone[bone[i]]] += value[i];
   }
   for (auto& row : weights_) {
     double sum = 0;
@@ -192,7 +182,7 @@ std::vector<Vec3> MakeHuman::shape(const TargetWeights& weights) const {
     const size_t end = target->second.start + target->second.count;
     for (size_t i = target->second.start; i < end; ++i) {
       const int16_t* d = &target_delta_[3 * i];
-      out[static_cast<size_t>(target_vertex_[i])] += weight / 1000.0 * Vec3(d[0], d[1], d[2]);
+      out[target_vertex_[i]] += weight / 1000.0 * Vec3(d[0], d[1], d[2]);
     }
   }
   return out;
@@ -206,7 +196,7 @@ size_t MakeHuman::bone_index(const std::string& name) const {
 
 Vec3 MakeHuman::bone_head(const std::vector<Vec3>& vertices, size_t bone) const {
   Vec3 sum = Vec3::Zero();
-  for (const int32_t v : heads_[bone]) sum += vertices[static_cast<size_t>(v)];
+  for (const int32_t v : heads_[bone]) sum += vertices[v];
   return sum / static_cast<double>(std::max<size_t>(1, heads_[bone].size()));
 }
 
@@ -254,11 +244,11 @@ Body MakeHuman::build(const BodyRecipe& recipe, const std::string& garment) cons
   const std::vector<Vec3> vertices = shaped(recipe, joints);
   const PosedSkeleton posed = t_pose(vertices, joints);
   SkinnedSurface surface = skin_of(vertices);
-  blend(surface, joints, posed);
+  skin(surface, joints, posed);
   const double floor = lowest(surface);
   if (!garment.empty()) {
     surface = fit_garment(vertices, garment);
-    blend(surface, joints, posed);
+    skin(surface, joints, posed);
   }
   Body body = to_body(surface, posed.joints, floor);
   body.id = garment.empty() ? recipe.id : recipe.id + "_" + garment;
@@ -273,7 +263,7 @@ Body MakeHuman::dress(const BodyRecipe& recipe, const std::string& garment) cons
   SkinnedSurface surface = fit_garment(vertices, garment, &hidden);
   append_bare(skin_of(vertices), hidden, surface);
   const PosedSkeleton posed = t_pose(vertices, joints);
-  blend(surface, joints, posed);
+  skin(surface, joints, posed);
   Body body = to_body(surface, posed.joints, lowest(surface));
   body.id = recipe.id;
   body.split = recipe.split;

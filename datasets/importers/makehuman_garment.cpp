@@ -1,6 +1,4 @@
 // Garments: a mesh (.obj.gz) whose vertices are bound to three vertices of the body (.mhclo.gz).
-#include <zlib.h>
-
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -8,29 +6,21 @@
 #include "autograd/base/error.h"
 #include "datasets/importers/makehuman.h"
 #include "datasets/importers/makehuman_lines.h"
+#include "datasets/readers/packed_text.h"
 
 namespace restage {
 namespace {
 
-constexpr size_t kMaxText = size_t{64} << 20;
-
-std::string read_gz(const std::string& path) {
+std::string read_part(const std::string& path) {
   if (!std::filesystem::is_regular_file(path))
     throw InputError(path, "is not there", "name a garment of the clothes folder");
-  gzFile file = gzopen(path.c_str(), "rb");
-  if (file == nullptr) throw InputError(path, "cannot be read", "check its permissions");
-  std::string out, piece(1 << 16, '\0');
-  int got = 0;
-  while ((got = gzread(file, piece.data(), static_cast<unsigned>(piece.size()))) > 0 &&
-         out.size() < kMaxText)
-    out.append(piece, 0, static_cast<size_t>(got));
-  const bool whole = got == 0 && gzeof(file) && gzclose(file) == Z_OK;
-  if (!whole) throw InputError(path, "is damaged or larger than 64 MiB", "fetch it again");
-  return out;
+  std::optional<std::string> text = read_gz(path);
+  if (!text) throw InputError(path, "is damaged or larger than 64 MiB", "fetch it again");
+  return std::move(*text);
 }
 
 std::vector<std::array<int32_t, 4>> read_quads(const std::string& path, size_t vertices) {
-  const std::string text = read_gz(path);
+  const std::string text = read_part(path);
   WordLines lines(text, path);
   std::vector<std::array<int32_t, 4>> out;
   while (lines.next()) {
@@ -101,7 +91,7 @@ Bindings read_bindings(const std::string& path, const std::vector<Vec3>& body) {
   Bindings out;
   out.hidden.assign(body.size(), 0);
   enum { elsewhere, in_verts, in_hidden } part = elsewhere;
-  const std::string text = read_gz(path);
+  const std::string text = read_part(path);
   WordLines lines(text, path);
   while (lines.next()) {
     const auto& words = lines.words();

@@ -12,6 +12,7 @@
 #include "autograd/base/error.h"
 #include "datasets/hdf5/file.h"
 #include "datasets/importers/makehuman_lines.h"
+#include "datasets/readers/folders.h"
 
 namespace restage {
 namespace {
@@ -85,12 +86,10 @@ void read_target(const std::string& path, size_t vertices, Targets& out) {
 
 Targets read_targets(const std::string& folder, size_t vertices) {
   std::map<std::string, std::string> files;  // by name, so in an order of their own
-  std::error_code failed;
-  fs::recursive_directory_iterator at(folder, failed);
-  for (; !failed && at != fs::recursive_directory_iterator(); at.increment(failed)) {
-    const fs::path name = at->path().lexically_relative(folder);
-    if (at->is_regular_file() && name.extension() == ".target")
-      files[(name.parent_path() / name.stem()).generic_string()] = at->path().string();
+  for (const std::string& path : files_below(folder)) {
+    const fs::path name = fs::path(path).lexically_relative(folder);
+    if (name.extension() == ".target")
+      files[(name.parent_path() / name.stem()).generic_string()] = path;
   }
   if (files.empty()) broken(folder, "holds no targets");
   Targets out;

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "autograd/base/error.h"
+#include "autograd/base/format.h"
 #include "datasets/importers/length_units.h"
 #include "datasets/readers/word_lines.h"
 
@@ -13,31 +14,25 @@ namespace {
 
 constexpr size_t kMaxFrames = size_t{1} << 20;  // 9.7 hours at 30 fps
 
-std::string text_of(double value, const char* format = "%.4g") {
-  char text[40];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
-}
-
 /// Metres per unit; see MotionOptions::scale.
 double find_scale(const Recording& recording, double given, const std::string& path,
                   ImportReport& report) {
   const double leg = leg_length(rest_joints(recording.motion.skeleton, recording.names.map));
   const auto says = [&](double metres, const std::string& why) {
-    report.facts.emplace_back("units", unit_name(metres) + ", " + why + ": a leg of " +
-                                           text_of(leg) + " units is " +
-                                           text_of(leg * metres, "%.2f") + " m");
+    report.fact("units", unit_name(metres) + ", " + why + ": a leg of " + format("%.4g", leg) +
+                             " units is " + format("%.2f", leg * metres) + " m");
     return metres;
   };
   if (given > 0) return says(given, "as given");
   if (recording.metres_per_unit > 0) {
     const double metres = leg * recording.metres_per_unit;
     if (metres >= 0.4 && metres < 1.4) return says(recording.metres_per_unit, "as the file says");
-    report.remarks.push_back("the units that the file names would make a leg of " +
-                             text_of(metres) + " m: found by the leg instead");
+    report.remark("the units that the file names would make a leg of " + format("%.4g", metres) +
+                  " m: found by the leg instead");
   }
   if (const LegUnit* unit = unit_of_leg(leg)) return says(unit->metres, "by the legs");
-  throw InputError(path, "a leg of " + text_of(leg) + " units is no person's in any known unit",
+  throw InputError(path,
+                   "a leg of " + format("%.4g", leg) + " units is no person's in any known unit",
                    "give the scale (metres per unit)");
 }
 
@@ -59,9 +54,9 @@ void check_root(const SourceMotion& motion, double limit, const std::string& pat
     const double speed = step.norm() * motion.fps;
     if (speed > limit)
       throw InputError(path,
-                       "the root jumps " + text_of(step.norm()) + " m from frame " +
+                       "the root jumps " + format("%.4g", step.norm()) + " m from frame " +
                            std::to_string(f - 1) + " to " + std::to_string(f) + " (" +
-                           text_of(speed) + " m/s)",
+                           format("%.4g", speed) + " m/s)",
                        "the recording is broken there: cut it, or check frame rate and scale");
   }
 }
@@ -100,13 +95,12 @@ void cut_frames(SourceMotion& motion, const Profile& profile, const MotionOption
                      "leave out fewer at its beginning");
   const size_t count = options.keep_frames ? std::min(options.keep_frames, n - first) : n - first;
   if (first > 0)
-    report.facts.emplace_back(
-        "beginning",
-        std::to_string(first) + (first == 1 ? " frame" : " frames") + " left out, " +
-            (asked
-                 ? "as asked"
-                 : std::string("a T-pose") + (first > 1 ? " and a blend out of it" : "") +
-                       " that " + profile.title + " files begin with (--drop-leading 0 keeps it)"));
+    report.fact("beginning",
+                std::to_string(first) + (first == 1 ? " frame" : " frames") + " left out, " +
+                    (asked ? "as asked"
+                           : std::string("a T-pose") + (first > 1 ? " and a blend out of it" : "") +
+                                 " that " + profile.title +
+                                 " files begin with (--drop-leading 0 keeps it)"));
   const auto cut = [&](auto& frames) {
     frames.erase(frames.begin() + static_cast<std::ptrdiff_t>(first + count), frames.end());
     frames.erase(frames.begin(), frames.begin() + static_cast<std::ptrdiff_t>(first));
@@ -120,7 +114,7 @@ Poses poses_at_30_fps(SourceMotion motion, const JointMap& map, const RestPose& 
                       uint64_t bytes, const std::string& path) {
   const double seconds = static_cast<double>(motion.local.size()) / motion.fps;
   if (!(seconds * kFps < static_cast<double>(kMaxFrames)))
-    throw InputError(path, "lasts " + text_of(seconds) + " s",
+    throw InputError(path, "lasts " + format("%.4g", seconds) + " s",
                      "cut it into files of at most 9 hours");
   check_length(motion.local.size(), motion.skeleton.size(), motion.fps, bytes, path);
   motion = resample(motion);
@@ -144,37 +138,33 @@ std::string subject_of(const std::string& name, const std::string& id) {
 }
 
 void report_names(const Recording& recording, ImportReport& report) {
-  report.facts.emplace_back(
-      "format", recording.format + ", " + std::to_string(recording.motion.skeleton.size()) +
-                    " joints, " + std::to_string(recording.motion.local.size()) + " frames");
+  report.fact("format", recording.format + ", " + std::to_string(recording.motion.skeleton.size()) +
+                            " joints, " + std::to_string(recording.motion.local.size()) +
+                            " frames");
   const Profile& profile = *recording.names.profile;
   std::string placed;
   for (const int j : recording.names.placed)
-    placed +=
-        (placed.empty() ? "; placed: " : ", ") + std::string(kJointNames[static_cast<size_t>(j)]);
-  report.facts.emplace_back("names", profile.title + " (profile " + profile.name + ")" + placed);
+    placed += (placed.empty() ? "; placed: " : ", ") + std::string(kJointNames[j]);
+  report.fact("names", profile.title + " (profile " + profile.name + ")" + placed);
 }
 
 /// Bones that the file moves apart are of one length here, which is said where it is seen.
 void report_positions(const BonePositions& found, double scale, ImportReport& report) {
   constexpr double kSeen = 0.001;  // metres
   if (found.off_offset * scale > kSeen)
-    report.facts.emplace_back("offsets", "by the position channels of " +
-                                             std::to_string(found.joints) + " joints, up to " +
-                                             text_of(found.off_offset * scale, "%.3f") +
-                                             " m from OFFSET");
+    report.fact("offsets", "by the position channels of " + std::to_string(found.joints) +
+                               " joints, up to " + format("%.3f", found.off_offset * scale) +
+                               " m from OFFSET");
   if (found.stray * scale > kSeen)
-    report.remarks.push_back("the position channels stretch bones: " + found.stray_joint +
-                             " strays up to " + text_of(found.stray * scale, "%.3f") +
-                             " m from its mean place, which is taken");
+    report.remark("the position channels stretch bones: " + found.stray_joint + " strays up to " +
+                  format("%.3f", found.stray * scale) + " m from its mean place, which is taken");
 }
 
 /// Where the file differs from what its family usually is.
 void compare_with_profile(const Profile& profile, double scale, double fps, ImportReport& report) {
   const auto differs = [&](const std::string& what, const std::string& is,
                            const std::string& usual) {
-    report.remarks.push_back(profile.title + " files usually have " + what + " " + usual +
-                             ", this one " + is);
+    report.remark(profile.title + " files usually have " + what + " " + usual + ", this one " + is);
   };
   if (!profile.units.empty() && unit_name(scale) != profile.units)
     differs("units of", unit_name(scale), profile.units);
@@ -182,7 +172,7 @@ void compare_with_profile(const Profile& profile, double scale, double fps, Impo
     if (name == "up" && !profile.up.empty() && value.substr(0, value.find(',')) != profile.up)
       differs("up axis", value.substr(0, value.find(',')), profile.up);
   if (profile.fps > 0 && std::abs(fps / profile.fps - 1) > 1e-3)
-    differs("a rate of", text_of(fps, "%.6g") + " fps", text_of(profile.fps, "%.6g") + " fps");
+    differs("a rate of", format("%.6g", fps) + " fps", format("%.6g", profile.fps) + " fps");
 }
 
 }  // namespace
@@ -206,19 +196,17 @@ MotionClip make_clip(Recording recording, const std::string& path, const MotionO
   const size_t frames = motion.local.size();
   const Poses poses = poses_at_30_fps(std::move(motion), map, rest, recording.bytes, path);
   clip.joints.reserve(poses.size());
-  report.facts.emplace_back(
-      "rate",
-      (fps == kFps ? "30 fps, taken as they are"
-                   : text_of(fps, "%.6g") + " fps -> 30 fps, slerp: " + std::to_string(frames) +
-                         " frames -> " + std::to_string(poses.size())) +
-          (options.fps > 0        ? " (as given; " + recording.rate_of_file + ")"
-           : recording.rate_known ? std::string()
-                                  : " (" + recording.rate_of_file + ")"));
+  report.fact("rate", (fps == kFps ? "30 fps, taken as they are"
+                                   : format("%.6g", fps) +
+                                         " fps -> 30 fps, slerp: " + std::to_string(frames) +
+                                         " frames -> " + std::to_string(poses.size())) +
+                          (options.fps > 0        ? " (as given; " + recording.rate_of_file + ")"
+                           : recording.rate_known ? std::string()
+                                                  : " (" + recording.rate_of_file + ")"));
   compare_with_profile(*recording.names.profile, clip.scale, fps, report);
   for (const PosedSkeleton& pose : poses) clip.joints.push_back(pose.joints);
   clip.floor_y = floor_height(poses);
-  report.facts.emplace_back("floor",
-                            text_of(clip.floor_y, "%.3f") + " m in the file's world, moved to 0");
+  report.fact("floor", format("%.3f", clip.floor_y) + " m in the file's world, moved to 0");
   clip.motion = to_motion(poses, rest.joints, clip.floor_y);
   clip.motion.id = options.id.empty() ? stem_of(path) : options.id;
   clip.motion.subject =

@@ -45,7 +45,7 @@ class Reader {
          });
     if (out.title.empty()) throw InputError(path_, "has no title", kFix);
     for (const int j : {0, 1, 2, 4, 5, 7, 8, 15, 16, 17, 18, 19, 20, 21})
-      if (out.bones[static_cast<size_t>(j)].empty())
+      if (out.bones[j].empty())
         throw InputError(path_, "names no bone for " + std::string(kJointNames[j]),
                          "add it under 'joints'");
     return out;

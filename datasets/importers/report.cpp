@@ -11,7 +11,7 @@ void check_handedness(const Joints& rest, bool force, const std::string& path,
   const std::string wrong = std::string(kMirrored) + " (" + kMirroredBecause + ")";
   if (!force)
     throw InputError(path, wrong, std::string(kMirroredFix) + "; --force takes it as it is");
-  report.remarks.push_back(wrong + ": taken as it is");
+  report.remark(wrong + ": taken as it is");
 }
 
 }  // namespace restage

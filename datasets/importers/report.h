@@ -14,6 +14,8 @@ struct ImportReport {
   std::string file;
   std::vector<std::pair<std::string, std::string>> facts;  ///< e.g. {"frame rate", "120 -> 30"}
   std::vector<std::string> remarks;                        ///< what the user should know
+  void fact(const std::string& name, const std::string& value) { facts.emplace_back(name, value); }
+  void remark(const std::string& text) { remarks.push_back(text); }
 };
 
 /// A rest pose whose left and right are exchanged makes a mirror image of every motion: InputError

@@ -10,10 +10,9 @@ namespace restage {
 namespace {
 
 constexpr double kDegrees = 180.0 / M_PI;
-constexpr double kShownAngle = 5;     // limbs further off are listed
-constexpr double kMostTrunk = 45;     // more off the vertical is no standing pose
-constexpr double kMostLimb = 120;     // more cannot be corrected by shortest arcs
-constexpr double kQuarterSlack = 10;  // to the nearest quarter turn
+constexpr double kShownAngle = 5;  // limbs further off are listed
+constexpr double kMostTrunk = 45;  // more off the vertical is no standing pose
+constexpr double kMostLimb = 120;  // more cannot be corrected by shortest arcs
 
 /// A bone of a T-pose and where it points.
 struct Limb {
@@ -27,9 +26,7 @@ const std::vector<Limb>& limbs() {
   return all;
 }
 
-double angle_between(const Vec3& a, const Vec3& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b)) * kDegrees;
-}
+double degrees_between(const Vec3& a, const Vec3& b) { return angle_between(a, b) * kDegrees; }
 
 Vec3 standing(const Joints& joints) { return joints[15] - 0.5 * (joints[7] + joints[8]); }
 
@@ -50,7 +47,7 @@ bool along_an_axis(const Vec3& v, double length) {
 Axis find_up(const SourceMotion& motion, const JointMap& map, const Joints& rest, Axis given,
              const std::string& path, ImportReport& report) {
   if (given != Axis::automatic) {
-    report.facts.emplace_back("up", to_string(given) + ", as given");
+    report.fact("up", to_string(given) + ", as given");
     return given;
   }
   const double leg = leg_length(rest);
@@ -60,20 +57,19 @@ Axis find_up(const SourceMotion& motion, const JointMap& map, const Joints& rest
   const bool motion_stands = along_an_axis(moving, 0.8 * leg);
   if (rest_stands &&
       (std::abs(vector_of(by_rest).x()) < 0.5 || !motion_stands || by_rest == by_motion)) {
-    report.facts.emplace_back("up", to_string(by_rest) + ", by the rest pose");
+    report.fact("up", to_string(by_rest) + ", by the rest pose");
     if (motion_stands && by_motion != by_rest)
-      report.remarks.push_back("up is " + to_string(by_rest) +
-                               " in the rest pose, but the head is "
-                               "over the ankles along " +
-                               to_string(by_motion) +
-                               " in the recording: if nobody lies there, give --up " +
-                               to_string(by_motion));
+      report.remark("up is " + to_string(by_rest) +
+                    " in the rest pose, but the head is "
+                    "over the ankles along " +
+                    to_string(by_motion) + " in the recording: if nobody lies there, give --up " +
+                    to_string(by_motion));
     return by_rest;
   }
   if (!motion_stands)
     throw InputError(path, "neither the rest pose nor the recording stands, so up is not known",
                      "say which axis is up (--up)");
-  report.facts.emplace_back("up", to_string(by_motion) + ", by the recording");
+  report.fact("up", to_string(by_motion) + ", by the recording");
   return by_motion;
 }
 
@@ -93,24 +89,18 @@ Mat3 facing_front(const Joints& rest, const Vec3& given, bool framed, const std:
                        "give the other --facing; if the file is mirrored, mend its names");
     yaw = -std::atan2(given.x(), given.z());
   }
-  const double quarter = std::round(yaw / (M_PI / 2)) * (M_PI / 2);
-  if (framed || std::abs(yaw - quarter) * kDegrees > kQuarterSlack) return turn_about_y(yaw);
-  const double c = std::round(std::cos(quarter)), s = std::round(std::sin(quarter));
-  Mat3 out;
-  out << c, 0, s, 0, 1, 0, -s, 0, c;
-  return out;
+  return framed ? turn_about_y(yaw) : turn_in_quarters(yaw);
 }
 
 /// What keeps a pose from being T-like; "" if nothing does.
 std::string unlike_t_pose(const Joints& rest) {
-  const double trunk = angle_between(rest[15] - rest[0], Vec3::UnitY());
+  const double trunk = degrees_between(rest[15] - rest[0], Vec3::UnitY());
   if (!(trunk <= kMostTrunk)) return "its trunk is not upright";
   for (const Limb& limb : limbs()) {
-    const Vec3 bone = rest[static_cast<size_t>(limb.to)] - rest[static_cast<size_t>(limb.from)];
-    if (!(bone.norm() > 1e-4) || !(angle_between(bone, limb.wanted) <= kMostLimb))
-      return "its " + std::string(kJointNames[static_cast<size_t>(limb.from)]) +
-             " does not point towards the " +
-             std::string(kJointNames[static_cast<size_t>(limb.to)]) + " as a standing person's";
+    const Vec3 bone = rest[limb.to] - rest[limb.from];
+    if (!(bone.norm() > 1e-4) || !(degrees_between(bone, limb.wanted) <= kMostLimb))
+      return "its " + std::string(kJointNames[limb.from]) + " does not point towards the " +
+             std::string(kJointNames[limb.to]) + " as a standing person's";
   }
   return "";
 }
@@ -119,11 +109,10 @@ std::string unlike_t_pose(const Joints& rest) {
 std::string limbs_off(const Joints& rest) {
   std::string out;
   for (const Limb& limb : limbs()) {
-    const double angle = angle_between(
-        rest[static_cast<size_t>(limb.to)] - rest[static_cast<size_t>(limb.from)], limb.wanted);
+    const double angle = degrees_between(rest[limb.to] - rest[limb.from], limb.wanted);
     if (angle < kShownAngle) continue;
-    out += (out.empty() ? "" : ", ") + std::string(kJointNames[static_cast<size_t>(limb.from)]) +
-           " " + std::to_string(std::lround(angle));
+    out += (out.empty() ? "" : ", ") + std::string(kJointNames[limb.from]) + " " +
+           std::to_string(std::lround(angle));
   }
   return out.empty() ? out : out + " degrees";
 }
@@ -138,16 +127,13 @@ RestPose built_pose(const SourceMotion& motion, const JointMap& map, const Joint
     const int p = kParents[j];
     out.frame[j] = turned[j].transpose();
     stood[j] = turned[0] * (zero[j] - zero[0]);
-    out.joints[j] =
-        p < 0 ? Vec3::Zero()
-              : Vec3(out.joints[static_cast<size_t>(p)] +
-                     turned[static_cast<size_t>(p)] * (zero[j] - zero[static_cast<size_t>(p)]));
+    out.joints[j] = p < 0 ? Vec3::Zero() : Vec3(out.joints[p] + turned[p] * (zero[j] - zero[p]));
   }
-  report.facts.emplace_back("rest pose",
-                            "built, for zero rotations are no T-pose: trunk upright, collars and "
-                            "arms along x, legs down, feet level, knees bending backwards and "
-                            "elbows forwards");
-  report.facts.emplace_back("turned", limbs_off(stood));
+  report.fact("rest pose",
+              "built, for zero rotations are no T-pose: trunk upright, collars and "
+              "arms along x, legs down, feet level, knees bending backwards and "
+              "elbows forwards");
+  report.fact("turned", limbs_off(stood));
   return out;
 }
 
@@ -172,7 +158,7 @@ RestPose find_rest_pose(const SourceMotion& motion, const JointMap& map, const R
       options.facing == Axis::automatic ? Vec3(Vec3::Zero()) : Vec3(up * vector_of(options.facing));
   RestPose out;
   std::string wrong = "it does not stand";
-  if (!(angle_between(upright_joints[15], Vec3::UnitY()) > kMostTrunk)) {
+  if (!(degrees_between(upright_joints[15], Vec3::UnitY()) > kMostTrunk)) {
     const Mat3 front = facing_front(upright_joints, given, framed, path);
     for (size_t j = 0; j < kJoints; ++j) {
       out.joints[j] = front * upright_joints[j];
@@ -187,15 +173,13 @@ RestPose find_rest_pose(const SourceMotion& motion, const JointMap& map, const R
   if (!wrong.empty()) return built_pose(motion, map, pose.joints, up, path, report);
 
   const Vec3 front = out.align.transpose() * Vec3::UnitZ();
-  report.facts.emplace_back(
-      "facing", to_string(axis_near(front)) +
-                    (given.isZero() ? ", by the left and right joints" : ", as given") +
-                    (angle_between(front, vector_of(axis_near(front))) > 1 ? " (about)" : ""));
-  report.facts.emplace_back("rest pose",
-                            framed ? "frame " + std::to_string(options.frame) : "zero rotations");
+  report.fact("facing",
+              to_string(axis_near(front)) +
+                  (given.isZero() ? ", by the left and right joints" : ", as given") +
+                  (degrees_between(front, vector_of(axis_near(front))) > 1 ? " (about)" : ""));
+  report.fact("rest pose", framed ? "frame " + std::to_string(options.frame) : "zero rotations");
   const std::string off = limbs_off(out.joints);
-  if (!off.empty())
-    report.facts.emplace_back("off a T-pose", off + " (corrected bone by bone for each body)");
+  if (!off.empty()) report.fact("off a T-pose", off + " (corrected bone by bone for each body)");
   return out;
 }
 

@@ -9,11 +9,13 @@
 #include <set>
 
 #include "autograd/base/error.h"
+#include "autograd/base/format.h"
 #include "datasets/doctor/orientation_model.h"
 #include "datasets/doctor/shape.h"
 #include "datasets/readers/array_frames.h"
 #include "datasets/readers/folders.h"
 #include "datasets/readers/frame_folder.h"
+#include "nn/geometry/box.h"
 
 namespace restage {
 namespace {
@@ -54,12 +56,6 @@ void add_arrays(const std::string& folder, const std::vector<std::string>& files
 
 // ---- importing ---------------------------------------------------------------------------------
 
-std::string text_of(const char* format, double a, double b = 0, double c = 0) {
-  char text[120];
-  std::snprintf(text, sizeof text, format, a, b, c);
-  return text;
-}
-
 /// The source's frame at each of our frames: the nearest in time, the earlier of two.
 class Clock {
  public:
@@ -90,7 +86,7 @@ void convert(Frame& frame, const Eigen::Matrix3f& to_ours) {
 
 std::string rate_fact(double fps, const std::string& from, int64_t frames, const Clock& clock) {
   const std::string before =
-      text_of("%.6g fps (", fps) + from + "), " + std::to_string(frames) + " frames";
+      format("%.6g fps (", fps) + from + "), " + std::to_string(frames) + " frames";
   if (fps == kFps) return before + ", kept";
   const int64_t count = clock.count();
   int64_t used = 1;
@@ -116,33 +112,27 @@ void check_count(const Frame& frame) {
 /// else in some unit, with a remark if that is surely another than metres.
 void check_size(const Frame& frame, double given_scale, ImportReport& report) {
   constexpr double kLeast = 0.1, kMost = 5, kMillimetre = 0.001;
-  Point low = frame.points[0], high = frame.points[0];
-  for (const Point& p : frame.points) low = low.cwiseMin(p), high = high.cwiseMax(p);
-  const double width = (high.cast<double>() - low.cast<double>()).norm();
+  const Box box = box_of(frame.points);
+  const double width = (box.max().cast<double>() - box.min().cast<double>()).norm();
   const double size = width < 1e7 ? doctor_detail::normalised(frame.points).size : width;
   if (given_scale > 0 && !(size * given_scale > kLeast && size * given_scale < kMost))
     throw InputError(frame.source,
-                     text_of("is %.3g m large with --scale %.6g, which no person is",
-                             width * given_scale, given_scale),
+                     format("is %.3g m large with --scale %.6g, which no person is",
+                            width * given_scale, given_scale),
                      "give the true metres a unit, or leave --scale out to hear what it seems");
   if (!(given_scale > 0) && !(size > kLeast && size < kMost / kMillimetre))
     throw InputError(frame.source,
-                     text_of("is %.3g units large, which no person is in any unit", width),
+                     format("is %.3g units large, which no person is in any unit", width),
                      "give scans of one person, or metres a unit as --scale");
   const UnitGuess guess = guess_unit(size);
   if (!(given_scale > 0) && guess.unit.metres != 1 && guess.sure > 0.9)
-    report.remarks.push_back(text_of("a unit seems to be %.6g m: if so, give --scale %.6g",
-                                     guess.unit.metres, guess.unit.metres));
+    report.remark(format("a unit seems to be %.6g m: if so, give --scale %.6g", guess.unit.metres,
+                         guess.unit.metres));
 }
 
 std::string size_fact(const Points& points) {
-  Point low = points[0], high = points[0];
-  for (const Point& p : points) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
-  const Point size = high - low;
-  return text_of("%.3g x %.3g x %.3g m in the first frame (x, y, z)", size.x(), size.y(), size.z());
+  const Point size = box_of(points).sizes();
+  return format("%.3g x %.3g x %.3g m in the first frame (x, y, z)", size.x(), size.y(), size.z());
 }
 
 }  // namespace
@@ -176,20 +166,17 @@ int64_t import_scans(const ScanSequence& sequence, const ScanOptions& options, S
   const double fps = options.fps > 0 ? options.fps : source->fps();
   const double scale = options.scale > 0 ? options.scale : 1;
   const Clock clock(source->frames(), fps);
-  const auto fact = [&](const char* name, const std::string& value) {
-    report.facts.emplace_back(name, value);
-  };
   report.file = sequence.name;
-  fact("rate", rate_fact(fps,
-                         options.fps > 0 ? "--fps"
-                         : stated        ? "the file's"
-                                         : "taken for granted: --fps",
-                         source->frames(), clock));
-  fact("scale", options.scale > 0 ? text_of("%.6g m a unit (--scale)", scale)
-                                  : "metres (taken for granted: --scale)");
+  report.fact("rate", rate_fact(fps,
+                                options.fps > 0 ? "--fps"
+                                : stated        ? "the file's"
+                                                : "taken for granted: --fps",
+                                source->frames(), clock));
+  report.fact("scale", options.scale > 0 ? format("%.6g m a unit (--scale)", scale)
+                                         : "metres (taken for granted: --scale)");
   const Axis up = options.up == Axis::automatic ? Axis::y : options.up;
-  fact("up",
-       to_string(up) + (options.up == Axis::automatic ? " (taken for granted: --up)" : " (--up)"));
+  report.fact("up", to_string(up) +
+                        (options.up == Axis::automatic ? " (taken for granted: --up)" : " (--up)"));
   const Eigen::Matrix3f to_ours = (scale * upright(up)).cast<float>();
 
   int64_t at = 0;  // of the source, the frame that next() gives
@@ -205,15 +192,15 @@ int64_t import_scans(const ScanSequence& sequence, const ScanOptions& options, S
       if (k == 0) check_size(frame, options.scale, report);
       convert(frame, to_ours);
       points = std::move(frame.points);
-      if (k == 0) fact("size", size_fact(points));
+      if (k == 0) report.fact("size", size_fact(points));
       fewest = k == 0 ? points.size() : std::min(fewest, points.size());
       most = std::max(most, points.size());
     }
     out.append(points);
   }
   out.end_sequence();
-  fact("points", fewest == most ? std::to_string(most)
-                                : std::to_string(fewest) + " to " + std::to_string(most));
+  report.fact("points", fewest == most ? std::to_string(most)
+                                       : std::to_string(fewest) + " to " + std::to_string(most));
   return count;
 }
 

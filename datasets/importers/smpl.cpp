@@ -99,7 +99,7 @@ void SmplModel::read_skeleton(const Npz& file) {
   const int64_t n = table.shape()[1];
   for (int64_t j = 0; j < n; ++j) {
     const double parent = table[j];  // the root's is -1, or 2^32 - 1 where signs were lost
-    const bool known = j < kJoints ? j == 0 || parent == kParents[static_cast<size_t>(j)]
+    const bool known = j < kJoints ? j == 0 || parent == kParents[j]
                                    : parent >= 0 && parent < static_cast<double>(j);
     if (!known)
       throw InputError(table.where(),
@@ -116,8 +116,7 @@ void SmplModel::read_regressor() {
     const double share = regressor_[i];
     if (!(std::abs(share) < 1e3))
       throw InputError(regressor_.where(), "holds a number that is no share", kFix);
-    if (share != 0)
-      joint_vertices_[static_cast<size_t>(i / n)].push_back(static_cast<uint32_t>(i % n));
+    if (share != 0) joint_vertices_[i / n].push_back(static_cast<uint32_t>(i % n));
   }
 }
 
@@ -134,14 +133,13 @@ void SmplModel::read_weights(const Npz& file) {
       if (!(weight >= -1e-6 && weight < 1e3))
         throw InputError(array.where(), "holds a weight that is negative or no number", kFix);
       int ours = static_cast<int>(j);  // hands, jaw and eyes: the joint of ours they hang from
-      while (ours >= kJoints) ours = parents_[static_cast<size_t>(ours)];
-      row[static_cast<size_t>(ours)] += std::max(weight, 0.0);
+      while (ours >= kJoints) ours = parents_[ours];
+      row[ours] += std::max(weight, 0.0);
       sum += std::max(weight, 0.0);
     }
     if (!(sum > 0))
       throw InputError(array.where(), "gives vertex " + std::to_string(v) + " no weight", kFix);
-    for (int j = 0; j < kJoints; ++j)
-      weights_(v, j) = static_cast<float>(row[static_cast<size_t>(j)] / sum);
+    for (int j = 0; j < kJoints; ++j) weights_(v, j) = static_cast<float>(row[j] / sum);
   }
 }
 
@@ -149,13 +147,13 @@ void SmplModel::read_faces(const Npz& file) {
   const NpyArray array = file.array("f");
   if (array.is_text() || array.shape().size() != 2 || array.shape()[1] != 3)
     misfit(array, "[T, 3]");
-  faces_.resize(static_cast<size_t>(array.shape()[0]));
+  faces_.resize(array.shape()[0]);
   for (int64_t i = 0; i < array.size(); ++i) {
     const double index = array[i];
     if (!(index >= 0 && index < static_cast<double>(template_.size())) ||
         index != std::floor(index))
       throw InputError(array.where(), "names a vertex that does not exist", kFix);
-    faces_[static_cast<size_t>(i / 3)][static_cast<size_t>(i % 3)] = static_cast<int32_t>(index);
+    faces_[i / 3][i % 3] = static_cast<int32_t>(index);
   }
 }
 

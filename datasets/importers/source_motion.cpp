@@ -13,7 +13,7 @@ std::vector<Vec3> zero_positions(const SourceSkeleton& skeleton) {
   std::vector<Vec3> out(skeleton.size());
   for (size_t j = 0; j < out.size(); ++j) {
     const int p = skeleton.parents[j];
-    out[j] = p < 0 ? Vec3::Zero() : Vec3(out[static_cast<size_t>(p)] + skeleton.offsets[j]);
+    out[j] = p < 0 ? Vec3::Zero() : Vec3(out[p] + skeleton.offsets[j]);
   }
   return out;
 }
@@ -23,8 +23,7 @@ std::vector<Vec3> zero_positions(const SourceSkeleton& skeleton) {
 Joints rest_joints(const SourceSkeleton& skeleton, const JointMap& map) {
   const std::vector<Vec3> zero = zero_positions(skeleton);
   Joints out;
-  for (int j = 0; j < kJoints; ++j)
-    out[j] = zero[static_cast<size_t>(map[j].joint)] + map[j].offset;
+  for (int j = 0; j < kJoints; ++j) out[j] = zero[map[j].joint] + map[j].offset;
   const Vec3 pelvis = out[0];
   for (Vec3& x : out) x -= pelvis;
   return out;

@@ -1,6 +1,5 @@
 #include "datasets/readers/array_frames.h"
 
-#include <cctype>
 #include <cmath>
 
 #include "autograd/base/error.h"
@@ -11,14 +10,6 @@ namespace restage {
 namespace {
 
 constexpr const char* kNames[] = {"points", "vertices", "verts", "v_posed"};
-
-bool ends_in(const std::string& path, std::string_view extension) {
-  if (path.size() < extension.size()) return false;
-  const std::string_view tail = std::string_view(path).substr(path.size() - extension.size());
-  return std::equal(tail.begin(), tail.end(), extension.begin(), [](unsigned char a, char b) {
-    return static_cast<char>(std::tolower(a)) == b;
-  });
-}
 
 bool is_cloud(const NpyHeader& header) {
   const size_t axes = header.shape.size();
@@ -132,7 +123,7 @@ class ArrayFrames : public FrameSource {
       }
   }
   void pick(Frame& frame) {
-    frame.points.resize(static_cast<size_t>(points_));
+    frame.points.resize(points_);
     for (size_t i = 0; i < frame.points.size(); ++i)
       for (size_t axis = 0; axis < 3; ++axis)
         put(frame, i, axis,
@@ -153,9 +144,9 @@ class ArrayFrames : public FrameSource {
 
 }  // namespace
 
-bool is_npz_name(const std::string& path) { return ends_in(path, ".npz"); }
+bool is_npz_name(const std::string& path) { return text::ends_in(path, {".npz"}); }
 
-bool is_array_name(const std::string& path) { return ends_in(path, ".npy") || is_npz_name(path); }
+bool is_array_name(const std::string& path) { return text::ends_in(path, {".npy", ".npz"}); }
 
 std::optional<CloudArray> find_cloud(const Npz& file) {
   const auto cloud = [](const std::string& name, const NpyHeader& header) {

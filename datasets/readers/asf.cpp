@@ -192,7 +192,7 @@ class AsfParser {
     const int parent = bone_index(words()[0]);
     for (size_t i = 1; i < words().size(); ++i) {
       const int child = bone_index(words()[i]);
-      AsfBone& bone = asf_.bones[static_cast<size_t>(child)];
+      AsfBone& bone = asf_.bones[child];
       if (child == 0 || bone.parent >= 0)
         lines_.fail("bone " + bone.name + " has two parents", "keep one");
       bone.parent = parent;
@@ -220,20 +220,19 @@ class AsfParser {
       if (asf_.bones[b].parent < 0)
         throw InputError(path_, "bone " + asf_.bones[b].name + " has no place in the hierarchy",
                          "add it, or give the whole file");
-      children[static_cast<size_t>(asf_.bones[b].parent)].push_back(static_cast<int>(b));
+      children[asf_.bones[b].parent].push_back(static_cast<int>(b));
     }
     std::vector<int> order = {0};
     for (size_t i = 0; i < order.size(); ++i)
-      for (const int child : children[static_cast<size_t>(order[i])]) order.push_back(child);
+      for (const int child : children[order[i]]) order.push_back(child);
     if (order.size() != asf_.bones.size())
       throw InputError(path_, "its hierarchy has a loop", "correct it");
     std::vector<int> place(order.size());
-    for (size_t i = 0; i < order.size(); ++i)
-      place[static_cast<size_t>(order[i])] = static_cast<int>(i);
+    for (size_t i = 0; i < order.size(); ++i) place[order[i]] = static_cast<int>(i);
     std::vector<AsfBone> sorted;
     for (const int b : order) {
-      AsfBone& bone = sorted.emplace_back(std::move(asf_.bones[static_cast<size_t>(b)]));
-      if (bone.parent >= 0) bone.parent = place[static_cast<size_t>(bone.parent)];
+      AsfBone& bone = sorted.emplace_back(std::move(asf_.bones[b]));
+      if (bone.parent >= 0) bone.parent = place[bone.parent];
     }
     asf_.bones = std::move(sorted);
     return std::move(asf_);
@@ -256,13 +255,12 @@ AsfFile parse_asf(std::string_view text, const std::string& path) {
 SourceSkeleton asf_skeleton(const AsfFile& asf) {
   SourceSkeleton out;
   for (const AsfBone& bone : asf.bones) {
-    out.names.push_back(bone.name);
-    out.parents.push_back(bone.parent);
     const bool root = bone.parent < 0;
-    const AsfBone& parent = asf.bones[static_cast<size_t>(root ? 0 : bone.parent)];
-    out.offsets.push_back(root ? asf.root_position : Vec3(parent.direction * parent.length));
-    out.ends.push_back(bone.direction * bone.length);
-    out.has_end.push_back(!root);
+    const AsfBone& parent = asf.bones[root ? 0 : bone.parent];
+    out.add(bone.name, bone.parent,
+            root ? asf.root_position : Vec3(parent.direction * parent.length));
+    out.ends.back() = bone.direction * bone.length;
+    out.has_end.back() = !root;
   }
   return out;
 }

@@ -76,11 +76,7 @@ class HierarchyParser {
     for (size_t i = 1; i < words.size() - (brace ? 1 : 0); ++i)
       name += (i > 1 ? "_" : "") + WordLines::quoted(words[i]);
     if (name.empty()) lines_.fail("a joint without a name", "give it one");
-    s.names.push_back(name);
-    s.parents.push_back(open_.empty() ? -1 : open_.back());
-    s.offsets.push_back(Vec3::Zero());
-    s.ends.push_back(Vec3::Zero());
-    s.has_end.push_back(0);
+    s.add(name, open_.empty() ? -1 : open_.back(), Vec3::Zero());
     file_.channels.emplace_back();
     has_channels_.push_back(0);
     open_.push_back(static_cast<int>(s.size()) - 1);
@@ -100,7 +96,7 @@ class HierarchyParser {
     const Vec3 value(lines_.number(words[1]), lines_.number(words[2]), lines_.number(words[3]));
     SourceSkeleton& s = file_.skeleton;
     if (open_.back() >= 0) {
-      s.offsets[static_cast<size_t>(open_.back())] = value;
+      s.offsets[open_.back()] = value;
     } else {
       const size_t joint = static_cast<size_t>(open_[open_.size() - 2]);
       s.ends[joint] = value;

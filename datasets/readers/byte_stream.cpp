@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdio>
 #include <cstring>
 
 #include "autograd/base/error.h"
@@ -14,7 +13,10 @@ namespace {
 
 constexpr uint64_t kPiece = uint64_t{1} << 20;
 
-std::FILE* as_file(void* file) { return static_cast<std::FILE*>(file); }
+[[noreturn]] void throw_unreadable(const std::string& path) {
+  throw InputError(path, std::string("cannot be read (") + std::strerror(errno) + ")",
+                   "check the path");
+}
 
 }  // namespace
 
@@ -30,7 +32,7 @@ std::vector<char> ByteStream::take(uint64_t n) {
   std::vector<char> out;
   for (uint64_t done = 0; done < n;) {
     const uint64_t piece = std::min(n - done, std::max(kPiece, done));
-    out.resize(static_cast<size_t>(done + piece));
+    out.resize(done + piece);
     read(out.data() + done, static_cast<size_t>(piece));
     done += piece;
   }
@@ -57,45 +59,27 @@ void ByteStream::rewind() {
   position_ = 0;
 }
 
-FileStream::FileStream(const std::string& path) : ByteStream(path, file_size_of(path)) {
-  open(path);
-}
-
-FileStream::FileStream(const std::string& path, std::string where, uint64_t begin, uint64_t size)
-    : ByteStream(std::move(where), size), begin_(begin) {
-  open(path);
-  do_rewind();
-}
-
-void FileStream::open(const std::string& path) {
-  file_ = std::fopen(path.c_str(), "rb");
-  if (file_ == nullptr)
-    throw InputError(path, std::string("cannot be read (") + std::strerror(errno) + ")",
-                     "check the path");
-}
-
-FileStream::~FileStream() {
-  if (file_ != nullptr) std::fclose(as_file(file_));
+FileStream::FileStream(const std::string& path)
+    : ByteStream(path, file_size_of(path)), file_(path, std::ios::binary) {
+  if (!file_) throw_unreadable(path);
 }
 
 void FileStream::do_read(char* out, size_t n) {
-  if (std::fread(out, 1, n, as_file(file_)) != n)
+  if (!file_.read(out, static_cast<std::streamsize>(n)))
     throw InputError(where(), "ends before its last byte",
                      "it was cut while being read: try again");
 }
 
-void FileStream::do_skip(uint64_t n) { ::fseeko(as_file(file_), static_cast<off_t>(n), SEEK_CUR); }
+void FileStream::do_skip(uint64_t n) { file_.seekg(static_cast<std::streamoff>(n), std::ios::cur); }
 
 void FileStream::do_rewind() {
-  std::clearerr(as_file(file_));
-  ::fseeko(as_file(file_), static_cast<off_t>(begin_), SEEK_SET);
+  file_.clear();
+  file_.seekg(0);
 }
 
 uint64_t file_size_of(const std::string& path) {
   struct stat info {};
-  if (::stat(path.c_str(), &info) != 0)
-    throw InputError(path, std::string("cannot be read (") + std::strerror(errno) + ")",
-                     "check the path");
+  if (::stat(path.c_str(), &info) != 0) throw_unreadable(path);
   if (!S_ISREG(info.st_mode)) throw InputError(path, "is no file", "give a file");
   return static_cast<uint64_t>(info.st_size);
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <fstream>
 #include <memory>
 #include <string>
 #include <vector>
@@ -38,14 +39,10 @@ class ByteStream {
   uint64_t size_, position_ = 0;
 };
 
-/// A regular file, or a piece of one. InputError: missing, a folder, not that long.
+/// A regular file. InputError: missing, a folder.
 class FileStream : public ByteStream {
  public:
   explicit FileStream(const std::string& path);
-  FileStream(const std::string& path, std::string where, uint64_t begin, uint64_t size);
-  ~FileStream() override;
-  FileStream(const FileStream&) = delete;
-  FileStream& operator=(const FileStream&) = delete;
 
  protected:
   void do_read(char* out, size_t n) override;
@@ -53,9 +50,7 @@ class FileStream : public ByteStream {
   void do_rewind() override;
 
  private:
-  void open(const std::string& path);
-  void* file_ = nullptr;  // FILE
-  uint64_t begin_ = 0;
+  std::ifstream file_;
 };
 
 /// Bytes of a regular file. InputError: missing, a folder, a device.

@@ -49,4 +49,11 @@ std::vector<std::string> files_below(const std::string& root, bool (*wanted)(con
   return out;
 }
 
+bool is_inside(const std::string& name) {
+  const fs::path path(name);
+  return path.is_relative() && path.has_filename() && path.filename() != "." &&
+         path.lexically_normal() == path && *path.begin() != ".." &&
+         name.find_first_of(std::string_view("\\\0", 2)) == std::string::npos;
+}
+
 }  // namespace restage

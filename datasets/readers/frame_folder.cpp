@@ -56,33 +56,40 @@ void check_sequence(const std::string& path, int64_t sequence, int64_t sequences
                                   : "give a number from 0 to " + std::to_string(sequences - 1));
 }
 
-/// What scans and predictions share: a data set of points read piece by piece.
+/// Scans or the vertices of a prediction: a data set of which a frame is some rows.
 class Hdf5Frames : public FrameSource {
  public:
-  Hdf5Frames(h5::File file, h5::Dataset set, int64_t frames)
-      : file_(std::move(file)), set_(std::move(set)), end_(frames), fps_(read_fps(file_)) {
-    sequence_ = file_.has("/sequence_offset")
-                    ? read_offsets(file_, "/sequence_offset", frames, true)
-                    : std::vector<int64_t>{0, frames};
+  /// Frame f has the rows [offset[f], offset[f + 1]); without offsets it is row f.
+  Hdf5Frames(h5::File file, h5::Dataset set, std::vector<int64_t> offset)
+      : file_(std::move(file)),
+        set_(std::move(set)),
+        offset_(std::move(offset)),
+        end_(offset_.empty() ? set_.rows() : static_cast<int64_t>(offset_.size()) - 1),
+        fps_(read_fps(file_)),
+        sequence_{0, end_} {
+    if (file_.has("/sequence_offset"))
+      sequence_ = read_offsets(file_, "/sequence_offset", end_, true);
     require_frames();
+    if (set_.shape().size() == 3 && file_.has("/faces"))
+      faces_ = read_faces(file_, "/faces", set_.shape()[1]);
   }
   /// From now on the file is this sequence.
   void choose(int64_t sequence) {
     check_sequence(file_.path(), sequence, sequences());
-    begin_ = at_ = sequence_[static_cast<size_t>(sequence)];
-    end_ = sequence_[static_cast<size_t>(sequence) + 1];
+    begin_ = at_ = sequence_[sequence];
+    end_ = sequence_[sequence + 1];
     require_frames();
   }
   std::optional<Frame> next() override {
     if (at_ == end_) return std::nullopt;
     Frame frame;
     frame.source = file_.path() + ":" + std::to_string(at_);
-    const int64_t row = read(at_, values_);
-    check_finite(set_.where(), values_, std::max<int64_t>(set_.row_size(), 1), row);
-    if (values_.empty()) throw InputError(frame.source, "holds no points", "leave the frame out");
-    frame.points.resize(values_.size() / 3);
-    for (size_t i = 0; i < values_.size(); ++i)
-      frame.points[i / 3][static_cast<int>(i % 3)] = values_[i];
+    std::vector<float> values;
+    set_.read_rows(row(at_), row(at_ + 1) - row(at_), values);
+    check_finite(set_.where(), values, std::max<int64_t>(set_.row_size(), 1), row(at_));
+    if (values.empty()) throw InputError(frame.source, "holds no points", "leave the frame out");
+    frame.points.resize(values.size() / 3);
+    std::copy(values.begin(), values.end(), frame.points[0].data());
     check_precision(frame.points, frame.source, kSubtract);
     frame.faces = faces_;
     frame.sequence =
@@ -96,69 +103,33 @@ class Hdf5Frames : public FrameSource {
   int64_t sequences() const override { return static_cast<int64_t>(sequence_.size()) - 1; }
   double fps() const override { return fps_; }
 
- protected:
-  /// Reads the values of a frame and returns the first row of the data set that was read.
-  virtual int64_t read(int64_t frame, std::vector<float>& values) = 0;
-  h5::File file_;
-  h5::Dataset set_;
-  std::vector<Triangle> faces_;
-
  private:
+  int64_t row(int64_t frame) const { return offset_.empty() ? frame : offset_[frame]; }
   void require_frames() const {
     if (begin_ == end_)
       throw InputError(set_.where(), "holds no frames", "give a file with at least one frame");
   }
+  h5::File file_;
+  h5::Dataset set_;
+  std::vector<int64_t> offset_;
   int64_t begin_ = 0, end_, at_ = 0;
   double fps_;
   std::vector<int64_t> sequence_;
-  std::vector<float> values_;
-};
-
-class ScanFrames : public Hdf5Frames {
- public:
-  ScanFrames(h5::File file, h5::Dataset set, std::vector<int64_t> offset)
-      : Hdf5Frames(std::move(file), std::move(set), static_cast<int64_t>(offset.size()) - 1),
-        offset_(std::move(offset)) {}
-
- protected:
-  int64_t read(int64_t frame, std::vector<float>& values) override {
-    const auto f = static_cast<size_t>(frame);
-    set_.read_rows(offset_[f], offset_[f + 1] - offset_[f], values);
-    return offset_[f];
-  }
-
- private:
-  std::vector<int64_t> offset_;
-};
-
-class VertexFrames : public Hdf5Frames {
- public:
-  VertexFrames(h5::File file, h5::Dataset set, int64_t frames)
-      : Hdf5Frames(std::move(file), std::move(set), frames) {
-    if (file_.has("/faces")) faces_ = read_faces(file_, "/faces", set_.shape()[1]);
-  }
-
- protected:
-  int64_t read(int64_t frame, std::vector<float>& values) override {
-    set_.read_rows(frame, 1, values);
-    return frame;
-  }
+  std::vector<Triangle> faces_;
 };
 
 std::unique_ptr<Hdf5Frames> open_hdf5(const std::string& path) {
   h5::File file = open_schema_file(path);
-  if (file.has("/points")) {
-    h5::Dataset set = file.dataset("/points", {-1, 3});
-    std::vector<int64_t> offset = read_offsets(file, "/frame_offset", set.rows(), false);
-    return std::make_unique<ScanFrames>(std::move(file), std::move(set), std::move(offset));
-  }
-  if (!file.has("/vertices"))
+  const bool scans = file.has("/points");
+  if (!scans && !file.has("/vertices"))
     throw InputError(
         path + ":/points", "is missing, and so is /vertices",
         "give a file of scans (/points, /frame_offset) or surfaces (/vertices [F, V, 3])");
-  h5::Dataset set = file.dataset("/vertices", {-1, -1, 3});
-  const int64_t frames = set.rows();
-  return std::make_unique<VertexFrames>(std::move(file), std::move(set), frames);
+  h5::Dataset set =
+      scans ? file.dataset("/points", {-1, 3}) : file.dataset("/vertices", {-1, -1, 3});
+  std::vector<int64_t> offset;
+  if (scans) offset = read_offsets(file, "/frame_offset", set.rows(), false);
+  return std::make_unique<Hdf5Frames>(std::move(file), std::move(set), std::move(offset));
 }
 
 /// A character that performs a clip.

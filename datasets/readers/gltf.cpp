@@ -2,7 +2,6 @@
 #include "datasets/readers/gltf.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <map>
 #include <tuple>
@@ -41,7 +40,7 @@ bool has_numbers(const std::vector<double>& values, size_t count, const std::str
 void decompose(const std::vector<double>& m, GltfNode& node) {
   Mat3 linear;
   for (int c = 0; c < 3; ++c)
-    for (int r = 0; r < 3; ++r) linear(r, c) = m[static_cast<size_t>(4 * c + r)];
+    for (int r = 0; r < 3; ++r) linear(r, c) = m[4 * c + r];
   node.translation = Vec3(m[12], m[13], m[14]);
   node.scale = linear.colwise().norm().transpose();
   if (linear.determinant() < 0) node.scale.x() = -node.scale.x();
@@ -110,10 +109,9 @@ class Builder {
     if (scenes.empty()) return;
     const int number = model_.defaultScene < 0 ? 0 : model_.defaultScene;
     for (const int root : scenes[checked(number, scenes.size(), path_, "scene")].nodes)
-      shown_[static_cast<size_t>(place_[checked(root, place_.size(), path_, "node")])] = true;
+      shown_[place_[checked(root, place_.size(), path_, "node")]] = true;
     for (size_t i = 0; i < order_.size(); ++i)
-      if (const int p = parent_[order_[i]]; p >= 0 && shown_[static_cast<size_t>(place_[p])])
-        shown_[i] = true;
+      if (const int p = parent_[order_[i]]; p >= 0 && shown_[place_[p]]) shown_[i] = true;
   }
 
   void read_node(size_t at) {
@@ -121,7 +119,7 @@ class Builder {
     const std::string where = name_of("node", order_[at]);
     GltfNode node;
     node.name = in.name;
-    if (const int p = parent_[order_[at]]; p >= 0) node.parent = place_[static_cast<size_t>(p)];
+    if (const int p = parent_[order_[at]]; p >= 0) node.parent = place_[p];
     if (has_numbers(in.matrix, 16, path_, "the matrix of " + where)) decompose(in.matrix, node);
     if (has_numbers(in.translation, 3, path_, "the translation of " + where))
       node.translation = Vec3(in.translation[0], in.translation[1], in.translation[2]);
@@ -172,9 +170,9 @@ class Builder {
   /// Nodes that are joints or hang below one.
   std::vector<bool> below_joints() const {
     std::vector<bool> out(out_.nodes.size());
-    for (const GltfBone& bone : out_.bones) out[static_cast<size_t>(bone.node)] = true;
+    for (const GltfBone& bone : out_.bones) out[bone.node] = true;
     for (size_t n = 0; n < out.size(); ++n)
-      if (const int p = out_.nodes[n].parent; p >= 0 && out[static_cast<size_t>(p)]) out[n] = true;
+      if (const int p = out_.nodes[n].parent; p >= 0 && out[p]) out[n] = true;
     return out;
   }
 
@@ -356,7 +354,7 @@ class Builder {
     if (clip.tracks.empty()) return;
     clip.begin = INFINITY, clip.end = -INFINITY;
     for (const GltfTrack& track : clip.tracks) {
-      const auto& times = out_.times[static_cast<size_t>(track.times)];
+      const auto& times = out_.times[track.times];
       clip.begin = std::min(clip.begin, static_cast<double>(times.front()));
       clip.end = std::max(clip.end, static_cast<double>(times.back()));
     }
@@ -383,7 +381,7 @@ class Builder {
     track.values = gltf::read_floats(document_, sampler.output,
                                      turns ? TINYGLTF_TYPE_VEC4 : TINYGLTF_TYPE_VEC3, "key values",
                                      allowance_);
-    const size_t keys = out_.times[static_cast<size_t>(track.times)].size();
+    const size_t keys = out_.times[track.times].size();
     const size_t wanted =
         keys * (turns ? 4 : 3) * (track.interpolation == GltfTrack::Interpolation::cubic ? 3 : 1);
     if (track.values.size() != wanted)
@@ -431,11 +429,7 @@ class Builder {
 }  // namespace
 
 bool is_gltf_name(const std::string& path) {
-  const size_t dot = path.rfind('.');
-  if (dot == std::string::npos) return false;
-  std::string end = path.substr(dot);
-  for (char& c : end) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return end == ".glb" || end == ".gltf" || end == ".vrm";
+  return text::ends_in(path, {".glb", ".gltf", ".vrm"});
 }
 
 Gltf parse_gltf(std::string_view content, const std::string& path) {

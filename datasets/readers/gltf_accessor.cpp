@@ -1,40 +1,27 @@
 // Numbers of a glTF file: buffers, views, accessors, sparse changes. Every range is checked.
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "datasets/readers/gltf_detail.h"
+#include "datasets/readers/numbers.h"
 
 namespace restage::gltf {
 namespace {
 
-struct Component {
-  size_t size = 0;
-  double (*as_number)(const char*) = nullptr;
-  double largest = 0;  ///< of a normalised integer; 0: not an integer
-};
-
-template <class T>
-double number_at(const char* bytes) {
-  T value;
-  std::memcpy(&value, bytes, sizeof value);
-  return static_cast<double>(value);
-}
-
-Component component(int type, const std::string& path, const std::string& what) {
+const Number& component(int type, const std::string& path, const std::string& what) {
   switch (type) {
     case TINYGLTF_COMPONENT_TYPE_BYTE:
-      return {1, number_at<int8_t>, 127};
+      return kNumber<int8_t>;
     case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-      return {1, number_at<uint8_t>, 255};
+      return kNumber<uint8_t>;
     case TINYGLTF_COMPONENT_TYPE_SHORT:
-      return {2, number_at<int16_t>, 32767};
+      return kNumber<int16_t>;
     case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-      return {2, number_at<uint16_t>, 65535};
+      return kNumber<uint16_t>;
     case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
-      return {4, number_at<uint32_t>, 4294967295.0};
+      return kNumber<uint32_t>;
     case TINYGLTF_COMPONENT_TYPE_FLOAT:
-      return {4, number_at<float>, 0};
+      return kNumber<float>;
     default:
       broken(path, what + " are of the unknown component type " + std::to_string(type));
   }
@@ -88,48 +75,47 @@ const tinygltf::Accessor& accessor_of(const Document& document, int index, int t
 
 /// Replaces the elements that a sparse accessor names.
 template <class T>
-void read_sparse(const Document& document, const tinygltf::Accessor& accessor,
-                 const Component& kind, size_t width, double factor, const std::string& what,
-                 std::vector<T>& values) {
+void read_sparse(const Document& document, const tinygltf::Accessor& accessor, const Number& kind,
+                 size_t width, double factor, const std::string& what, std::vector<T>& values) {
   const auto& sparse = accessor.sparse;
   const std::string& path = document.path;
   if (sparse.count <= 0 || static_cast<uint64_t>(sparse.count) > accessor.count ||
       sparse.indices.byteOffset < 0 || sparse.values.byteOffset < 0)
     broken(path, what + " have an impossible sparse part");
   const auto count = static_cast<size_t>(sparse.count);
-  const Component index = component(sparse.indices.componentType, path, "indices of " + what);
-  if (index.largest == 0) broken(path, "indices of " + what + " are no integers");
+  const Number& index = component(sparse.indices.componentType, path, "indices of " + what);
+  if (!index.integer) broken(path, "indices of " + what + " are no integers");
   const Span places = elements(document, sparse.indices.bufferView,
-                               static_cast<uint64_t>(sparse.indices.byteOffset), count, index.size,
+                               static_cast<uint64_t>(sparse.indices.byteOffset), count, index.bytes,
                                false, "indices of " + what);
   const Span news =
       elements(document, sparse.values.bufferView, static_cast<uint64_t>(sparse.values.byteOffset),
-               count, width * kind.size, false, "sparse " + what);
+               count, width * kind.bytes, false, "sparse " + what);
   for (size_t i = 0; i < count; ++i) {
-    const double place = index.as_number(places.first + i * places.stride);
+    const double place = index.at(places.first + i * places.stride, false);
     if (!(place >= 0 && place < static_cast<double>(accessor.count)))
       broken(path, what + " have a sparse part out of range");
     for (size_t c = 0; c < width; ++c)
       values[static_cast<size_t>(place) * width + c] =
-          static_cast<T>(kind.as_number(news.first + i * news.stride + c * kind.size) * factor);
+          static_cast<T>(kind.at(news.first + i * news.stride + c * kind.bytes, false) * factor);
   }
 }
 
 template <class T>
 std::vector<T> read_values(const Document& document, const tinygltf::Accessor& accessor,
-                           const Component& kind, double factor, const std::string& what,
+                           const Number& kind, double factor, const std::string& what,
                            Allowance& allowance) {
   const size_t width = components_of(accessor.type);
   allowance.spend(accessor.count, width * sizeof(T));
   std::vector<T> out;
   if (accessor.bufferView >= 0) {
     const Span span = elements(document, accessor.bufferView, accessor.byteOffset, accessor.count,
-                               width * kind.size, true, what);
+                               width * kind.bytes, true, what);
     out.resize(accessor.count * width);
     for (size_t i = 0; i < accessor.count; ++i)
       for (size_t c = 0; c < width; ++c)
         out[i * width + c] =
-            static_cast<T>(kind.as_number(span.first + i * span.stride + c * kind.size) * factor);
+            static_cast<T>(kind.at(span.first + i * span.stride + c * kind.bytes, false) * factor);
   } else if (accessor.sparse.isSparse) {
     out.resize(accessor.count * width);
   } else {
@@ -144,8 +130,8 @@ std::vector<T> read_values(const Document& document, const tinygltf::Accessor& a
 std::vector<float> read_floats(const Document& document, int index, int type,
                                const std::string& what, Allowance& allowance) {
   const tinygltf::Accessor& accessor = accessor_of(document, index, type, what);
-  const Component kind = component(accessor.componentType, document.path, what);
-  const double factor = accessor.normalized && kind.largest > 0 ? 1.0 / kind.largest : 1.0;
+  const Number& kind = component(accessor.componentType, document.path, what);
+  const double factor = accessor.normalized && kind.integer ? 1.0 / kind.largest : 1.0;
   std::vector<float> out = read_values<float>(document, accessor, kind, factor, what, allowance);
   for (float& x : out) {
     if (!std::isfinite(x)) broken(document.path, what + " hold NaN or infinity");

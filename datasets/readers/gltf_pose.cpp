@@ -36,8 +36,7 @@ Eigen::Vector4d key(const GltfTrack& track, size_t k, size_t part) {
   const size_t width = track.path == Path::rotation ? 4 : 3;
   const size_t at = track.interpolation == Interpolation::cubic ? 3 * k + part : k;
   Eigen::Vector4d out = Eigen::Vector4d::Zero();
-  for (size_t c = 0; c < width; ++c)
-    out[static_cast<Eigen::Index>(c)] = track.values[at * width + c];
+  for (size_t c = 0; c < width; ++c) out[c] = track.values[at * width + c];
   return out;
 }
 
@@ -67,7 +66,7 @@ GltfTransforms to_world(const std::vector<GltfNode>& nodes) {
     const GltfNode& node = nodes[n];
     Eigen::Affine3d local;
     local.fromPositionOrientationScale(node.translation, node.rotation, node.scale);
-    out[n] = node.parent < 0 ? local : out[static_cast<size_t>(node.parent)] * local;
+    out[n] = node.parent < 0 ? local : out[node.parent] * local;
   }
   return out;
 }
@@ -79,9 +78,9 @@ GltfTransforms gltf_rest(const Gltf& file) { return to_world(file.nodes); }
 GltfTransforms gltf_pose(const Gltf& file, const GltfClip& clip, double seconds) {
   std::vector<GltfNode> nodes = file.nodes;
   for (const GltfTrack& track : clip.tracks) {
-    const auto& times = file.times[static_cast<size_t>(track.times)];
+    const auto& times = file.times[track.times];
     const Eigen::Vector4d value = value_at(track, find_keys(times, seconds));
-    GltfNode& node = nodes[static_cast<size_t>(track.node)];
+    GltfNode& node = nodes[track.node];
     if (track.path == Path::rotation) node.rotation = unit(value);
     if (track.path == Path::translation) node.translation = value.head<3>();
     if (track.path == Path::scale) node.scale = value.head<3>();
@@ -94,13 +93,12 @@ void gltf_skin(const Gltf& file, const GltfTransforms& nodes, Points& out) {
   std::vector<Rows> bones;
   bones.reserve(file.bones.size());
   for (const GltfBone& bone : file.bones)
-    bones.push_back((nodes[static_cast<size_t>(bone.node)] * bone.inverse_bind).affine());
+    bones.push_back((nodes[bone.node] * bone.inverse_bind).affine());
   out.resize(file.vertices.size());
   for (size_t v = 0; v < out.size(); ++v) {
     Rows sum = Rows::Zero();
     for (uint32_t i = file.first_influence[v]; i < file.first_influence[v + 1]; ++i)
-      sum +=
-          double{file.influences[i].weight} * bones[static_cast<size_t>(file.influences[i].bone)];
+      sum += double{file.influences[i].weight} * bones[file.influences[i].bone];
     const Eigen::Vector4d at = file.vertices[v].cast<double>().homogeneous();
     out[v] = (sum * at).cast<float>();
     if (!out[v].allFinite())
@@ -115,12 +113,11 @@ namespace {
 void keep_outside_out(const Gltf& file, const GltfTransforms& nodes, std::vector<Triangle>& faces) {
   std::vector<bool> mirrors;
   for (const GltfBone& bone : file.bones)
-    mirrors.push_back(
-        (nodes[static_cast<size_t>(bone.node)] * bone.inverse_bind).linear().determinant() < 0);
+    mirrors.push_back((nodes[bone.node] * bone.inverse_bind).linear().determinant() < 0);
   if (std::find(mirrors.begin(), mirrors.end(), true) == mirrors.end()) return;
   for (Triangle& face : faces) {
-    const uint32_t first = file.first_influence[static_cast<size_t>(face[0])];
-    if (mirrors[static_cast<size_t>(file.influences[first].bone)]) std::swap(face[1], face[2]);
+    const uint32_t first = file.first_influence[face[0]];
+    if (mirrors[file.influences[first].bone]) std::swap(face[1], face[2]);
   }
 }
 

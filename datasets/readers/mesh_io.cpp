@@ -1,27 +1,16 @@
 #include "datasets/readers/mesh_io.h"
 
-#include <cctype>
-#include <cstdio>
-#include <cstring>
-
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
 #include "datasets/readers/gltf.h"
 #include "datasets/readers/obj.h"
 #include "datasets/readers/ply.h"
 #include "datasets/readers/precision.h"
+#include "datasets/readers/text.h"
+#include "nn/geometry/mesh_file.h"
 
 namespace restage {
 namespace {
-
-bool ends_in(const std::string& path, const char* extension) {
-  const size_t n = std::strlen(extension);
-  if (path.size() < n) return false;
-  for (size_t i = 0; i < n; ++i)
-    if (std::tolower(static_cast<unsigned char>(path[path.size() - n + i])) != extension[i])
-      return false;
-  return true;
-}
 
 bool starts_as_ply(const std::string& content) {
   return content.compare(0, 4, "ply\n") == 0 || content.compare(0, 5, "ply\r\n") == 0;
@@ -55,15 +44,10 @@ Mesh without_non_finite(const std::string& content, const std::string& path, con
   return mesh;
 }
 
-template <class T>
-void add_bytes(std::string& out, const T& value) {
-  out.append(reinterpret_cast<const char*>(&value), sizeof value);
-}
-
 }  // namespace
 
 bool is_mesh_name(const std::string& path) {
-  return ends_in(path, ".ply") || ends_in(path, ".obj") || is_gltf_name(path);
+  return text::ends_in(path, {".ply", ".obj"}) || is_gltf_name(path);
 }
 
 Mesh read_mesh(const std::string& path) {
@@ -97,10 +81,10 @@ Mesh parse_mesh(const std::string& content, const std::string& path, const Vec3&
     return gltf_mesh(file, gltf_rest(file));
   } else if (starts_as_ply(content)) {
     mesh = parse_ply(content, path, origin, how);
-  } else if (ends_in(path, ".ply")) {
+  } else if (text::ends_in(path, {".ply"})) {
     throw InputError(path, "is not a PLY file (it does not begin with 'ply')",
                      "export the file again");
-  } else if (ends_in(path, ".obj") || looks_like_obj(content)) {
+  } else if (text::ends_in(path, {".obj"}) || looks_like_obj(content)) {
     mesh = parse_obj(content, path, origin, how);
   } else {
     throw InputError(path, "is neither PLY, OBJ nor glTF", "convert it to one of them");
@@ -110,36 +94,11 @@ Mesh parse_mesh(const std::string& content, const std::string& path, const Vec3&
 }
 
 void write_ply(const std::string& path, const Mesh& mesh) {
-  static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "PLY is written as it lies in memory");
-  std::string out = "ply\nformat binary_little_endian 1.0\nelement vertex " +
-                    std::to_string(mesh.vertices.size()) +
-                    "\nproperty float x\nproperty float y\nproperty float z\n";
-  if (!mesh.faces.empty())
-    out += "element face " + std::to_string(mesh.faces.size()) +
-           "\nproperty list uchar int vertex_indices\n";
-  out += "end_header\n";
-  for (const Point& p : mesh.vertices)
-    out.append(reinterpret_cast<const char*>(p.data()), 3 * sizeof(float));
-  for (const Triangle& face : mesh.faces) {
-    add_bytes(out, uint8_t{3});
-    add_bytes(out, face);
-  }
-  write_file_atomically(path, out);
+  write_file_atomically(path, ply_bytes(mesh.vertices, mesh.faces, false));
 }
 
 void write_obj(const std::string& path, const Mesh& mesh) {
-  std::string out;
-  char line[128];
-  for (const Point& p : mesh.vertices) {
-    std::snprintf(line, sizeof line, "v %.9g %.9g %.9g\n", static_cast<double>(p[0]),
-                  static_cast<double>(p[1]), static_cast<double>(p[2]));
-    out += line;
-  }
-  for (const Triangle& f : mesh.faces) {
-    std::snprintf(line, sizeof line, "f %lld %lld %lld\n", f[0] + 1LL, f[1] + 1LL, f[2] + 1LL);
-    out += line;
-  }
-  write_file_atomically(path, out);
+  write_file_atomically(path, obj_bytes(mesh.vertices, mesh.faces, false));
 }
 
 }  // namespace restage

@@ -15,7 +15,7 @@ size_t leave_out_non_finite(Points& points, std::vector<Triangle>& faces) {
   points.resize(kept);
   std::erase_if(faces, [&](Triangle& face) {
     for (int32_t& corner : face) {
-      corner = index[static_cast<size_t>(corner)];
+      corner = index[corner];
       if (corner < 0) return true;
     }
     return false;

@@ -102,6 +102,22 @@ class HeaderParser {
   bool has_type_ = false, has_order_ = false, has_shape_ = false;
 };
 
+/// The kind of number that numpy names so; null for another.
+const Number* number_of(char kind, size_t width) {
+  struct Named {
+    char kind;
+    const Number* type;
+  };
+  static constexpr Named kNames[] = {
+      {'b', &kNumber<uint8_t>},  {'i', &kNumber<int8_t>},      {'i', &kNumber<int16_t>},
+      {'i', &kNumber<int32_t>},  {'i', &kNumber<int64_t>},     {'u', &kNumber<uint8_t>},
+      {'u', &kNumber<uint16_t>}, {'u', &kNumber<uint32_t>},    {'u', &kNumber<uint64_t>},
+      {'f', &kNumber<float>},    {'f', &kNumber<Eigen::half>}, {'f', &kNumber<double>}};
+  for (const Named& known : kNames)
+    if (kind == known.kind && width == known.type->bytes) return known.type;
+  return nullptr;
+}
+
 void HeaderParser::read_type() {
   if (peek() == '[' || peek() == '(')
     throw InputError(where_, "holds records (a structured array)", "save each field by itself");
@@ -117,15 +133,8 @@ void HeaderParser::read_type() {
   out_.kind = type[at];
   out_.big_endian = type[0] == '>';
   out_.width = static_cast<size_t>(width) * (out_.kind == 'U' ? 4 : 1);
-  const auto one_of = [&](std::initializer_list<int64_t> widths) {
-    for (const int64_t w : widths)
-      if (w == width) return true;
-    return false;
-  };
-  const bool known = (out_.kind == 'b' && one_of({1})) ||
-                     ((out_.kind == 'i' || out_.kind == 'u') && one_of({1, 2, 4, 8})) ||
-                     (out_.kind == 'f' && one_of({2, 4, 8})) || out_.is_text();
-  if (!known)
+  out_.type = number_of(out_.kind, out_.width);
+  if (out_.type == nullptr && !out_.is_text())
     throw InputError(where_,
                      "holds values of the type " + text::quote(type) + ", which is not read",
                      "save it as float32, float64 or whole numbers");
@@ -141,28 +150,6 @@ void count_elements(NpyHeader& header, const std::string& where) {
     count *= n;
   }
   header.count = static_cast<int64_t>(count);
-}
-
-template <class T>
-double as(const char* bytes, bool swap) {
-  char raw[sizeof(T)];
-  for (size_t i = 0; i < sizeof(T); ++i) raw[i] = bytes[swap ? sizeof(T) - 1 - i : i];
-  T value;
-  std::memcpy(&value, raw, sizeof value);
-  return static_cast<double>(value);
-}
-
-/// IEEE half precision.
-double half(const char* bytes, bool swap) {
-  const auto bits = static_cast<uint32_t>(as<uint16_t>(bytes, swap));
-  const double sign = (bits & 0x8000) != 0 ? -1.0 : 1.0;
-  const int exponent = static_cast<int>((bits >> 10) & 31);
-  const double fraction = static_cast<double>(bits & 0x3ff);
-  if (exponent == 31)
-    return fraction != 0 ? std::numeric_limits<double>::quiet_NaN()
-                         : sign * std::numeric_limits<double>::infinity();
-  return sign *
-         (exponent == 0 ? std::ldexp(fraction, -24) : std::ldexp(fraction + 1024.0, exponent - 25));
 }
 
 void add_utf8(std::string& out, uint32_t code) {
@@ -186,26 +173,6 @@ void add_utf8(std::string& out, uint32_t code) {
 }
 
 }  // namespace
-
-double NpyHeader::number(const char* element) const {
-  static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "swapping is decided for such machines");
-  if (kind == 'f') {
-    if (width == 2) return half(element, big_endian);
-    return width == 4 ? as<float>(element, big_endian) : as<double>(element, big_endian);
-  }
-  if (is_text()) return std::numeric_limits<double>::quiet_NaN();
-  const bool is_signed = kind == 'i';
-  switch (width) {
-    case 1:
-      return is_signed ? as<int8_t>(element, false) : as<uint8_t>(element, false);
-    case 2:
-      return is_signed ? as<int16_t>(element, big_endian) : as<uint16_t>(element, big_endian);
-    case 4:
-      return is_signed ? as<int32_t>(element, big_endian) : as<uint32_t>(element, big_endian);
-    default:
-      return is_signed ? as<int64_t>(element, big_endian) : as<uint64_t>(element, big_endian);
-  }
-}
 
 NpyHeader read_npy_header(ByteStream& in) {
   char magic[8];
@@ -275,7 +242,7 @@ std::string NpyArray::text(int64_t i) const {
   std::string out;
   if (header_.kind == 'S') out.assign(element, header_.width);
   for (size_t at = 0; header_.kind == 'U' && at < header_.width; at += 4)
-    add_utf8(out, static_cast<uint32_t>(as<uint32_t>(element + at, header_.big_endian)));
+    add_utf8(out, static_cast<uint32_t>(number_at<uint32_t>(element + at, header_.big_endian)));
   while (!out.empty() && out.back() == '\0') out.pop_back();
   return out;
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "datasets/readers/byte_stream.h"
+#include "datasets/readers/numbers.h"
 
 namespace restage {
 
@@ -16,13 +17,16 @@ namespace restage {
 struct NpyHeader {
   char kind = 'f';   ///< numpy's: b truth value, i integer, u unsigned, f floating, S bytes, U text
   size_t width = 8;  ///< bytes of one element
+  const Number* type = nullptr;  ///< null for text
   bool big_endian = false, fortran = false;
   std::vector<int64_t> shape;  ///< slowest axis first; empty: one value
   int64_t count = 1;           ///< elements
   bool is_text() const { return kind == 'S' || kind == 'U'; }
   uint64_t bytes() const { return static_cast<uint64_t>(count) * width; }
   /// The number stored in these `width` bytes; NaN for text.
-  double number(const char* element) const;
+  double number(const char* element) const {
+    return type ? type->at(element, big_endian) : std::numeric_limits<double>::quiet_NaN();
+  }
 };
 
 /// Reads the header; the stream then stands at the first element, and holds exactly the array's

@@ -1,6 +1,9 @@
 #include "datasets/readers/packed_text.h"
 
 #include <lzma.h>
+#include <zlib.h>
+
+#include <memory>
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
@@ -41,6 +44,18 @@ std::string unpack_xz(const std::string& packed, const std::string& path, uint64
 }
 
 }  // namespace
+
+std::optional<std::string> read_gz(const std::string& path, uint64_t limit) {
+  std::unique_ptr<gzFile_s, int (*)(gzFile)> file(gzopen(path.c_str(), "rb"), gzclose);
+  std::string out, piece(size_t{1} << 16, '\0');
+  for (int got = 1; file && got > 0 && out.size() <= limit;) {
+    got = gzread(file.get(), piece.data(), static_cast<unsigned>(piece.size()));
+    // Of a file that was cut, only closing tells.
+    if (got == 0 && gzeof(file.get()) && gzclose(file.release()) == Z_OK) return out;
+    if (got > 0) out.append(piece, 0, static_cast<size_t>(got));
+  }
+  return std::nullopt;
+}
 
 std::string read_packed_text(const std::string& path, uint64_t limit) {
   std::string text = read_file(path, limit);

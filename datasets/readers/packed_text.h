@@ -1,7 +1,8 @@
-// Texts that may be packed: .bvh.xz, .asf.xz, .amc.xz.
+// Texts that may be packed: .bvh.xz, .asf.xz, .amc.xz, .mhclo.gz.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 namespace restage {
@@ -10,5 +11,8 @@ namespace restage {
 /// more than `limit` bytes packed or unpacked. The decoder itself takes at most 80 MiB, as
 /// much as xz -9 needs.
 std::string read_packed_text(const std::string& path, uint64_t limit = uint64_t{1} << 30);
+
+/// What is inside a gzip file; nothing if it is missing, damaged or holds more than `limit` bytes.
+std::optional<std::string> read_gz(const std::string& path, uint64_t limit = uint64_t{64} << 20);
 
 }  // namespace restage

@@ -1,11 +1,10 @@
 #include "datasets/readers/ply.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 
 #include "autograd/base/error.h"
+#include "datasets/readers/numbers.h"
 #include "datasets/readers/text.h"
 
 namespace restage {
@@ -14,13 +13,10 @@ namespace {
 const char* const kExportAgain = "export the file again";
 
 enum class Format { ascii, little, big };
-enum class Number { i8, u8, i16, u16, i32, u32, f32, f64 };
-
 struct Property {
   std::string name;
-  Number type = Number::f32;
-  bool list = false;
-  Number count_type = Number::u8;
+  const Number* type = nullptr;
+  const Number* count = nullptr;  // of a list: the kind of its length
 };
 
 struct Element {
@@ -34,28 +30,20 @@ struct Header {
   std::vector<Element> elements;
 };
 
-size_t bytes_of(Number type) {
-  constexpr std::array<size_t, 8> sizes = {1, 1, 2, 2, 4, 4, 4, 8};
-  return sizes[static_cast<size_t>(type)];
-}
-
-bool is_integer(Number type) { return type != Number::f32 && type != Number::f64; }
-
-bool number_type(std::string_view name, Number& type) {
-  constexpr std::array<std::array<std::string_view, 2>, 8> names = {{{"char", "int8"},
-                                                                     {"uchar", "uint8"},
-                                                                     {"short", "int16"},
-                                                                     {"ushort", "uint16"},
-                                                                     {"int", "int32"},
-                                                                     {"uint", "uint32"},
-                                                                     {"float", "float32"},
-                                                                     {"double", "float64"}}};
-  for (size_t i = 0; i < names.size(); ++i)
-    if (name == names[i][0] || name == names[i][1]) {
-      type = static_cast<Number>(i);
-      return true;
-    }
-  return false;
+/// The kind of number of this name; null for an unknown one.
+const Number* number_named(std::string_view name) {
+  struct Named {
+    std::string_view old_name, name;
+    const Number* type;
+  };
+  static constexpr Named kNames[] = {
+      {"char", "int8", &kNumber<int8_t>},    {"uchar", "uint8", &kNumber<uint8_t>},
+      {"short", "int16", &kNumber<int16_t>}, {"ushort", "uint16", &kNumber<uint16_t>},
+      {"int", "int32", &kNumber<int32_t>},   {"uint", "uint32", &kNumber<uint32_t>},
+      {"float", "float32", &kNumber<float>}, {"double", "float64", &kNumber<double>}};
+  for (const Named& known : kNames)
+    if (name == known.old_name || name == known.name) return known.type;
+  return nullptr;
 }
 
 std::string at_line(const std::string& path, int64_t line) {
@@ -68,14 +56,15 @@ Property parse_property(std::string_view line, const std::string& where) {
   Property property;
   std::string_view word = text::take_word(line);
   if (word == "list") {
-    property.list = true;
     const std::string_view count = text::take_word(line);
-    if (!number_type(count, property.count_type) || !is_integer(property.count_type))
+    property.count = number_named(count);
+    if (property.count == nullptr || !property.count->integer)
       throw InputError(where, "unknown type " + text::quote(count) + " of a list's length",
                        kExportAgain);
     word = text::take_word(line);
   }
-  if (!number_type(word, property.type))
+  property.type = number_named(word);
+  if (property.type == nullptr)
     throw InputError(where, "unknown property type " + text::quote(word), kExportAgain);
   property.name = text::take_word(line);
   return property;
@@ -144,7 +133,7 @@ class Rows {
     row_ = 0;
     uint64_t smallest = 0;
     for (const Property& p : element.properties)
-      smallest += format_ == Format::ascii ? 2 : bytes_of(p.list ? p.count_type : p.type);
+      smallest += format_ == Format::ascii ? 2 : (p.count ? p.count : p.type)->bytes;
     const size_t left = format_ == Format::ascii ? lines_.rest().size() + 1 : bytes_.size();
     if (element.count > 0 && smallest == 0)
       throw InputError(path_, "element " + text::quote(element.name) + " has no properties",
@@ -165,13 +154,15 @@ class Rows {
       throw InputError(where(), "has more values than the header says", kExportAgain);
   }
 
-  double next(Number type) { return format_ == Format::ascii ? next_word() : next_bytes(type); }
+  double next(const Number& type) {
+    return format_ == Format::ascii ? next_word() : next_bytes(type);
+  }
 
   /// Length of a list, checked against what is left.
   size_t next_length(const Property& property) {
-    const double n = next(property.count_type);
+    const double n = next(*property.count);
     const size_t left =
-        format_ == Format::ascii ? line_.size() : bytes_.size() / bytes_of(property.type);
+        format_ == Format::ascii ? line_.size() : bytes_.size() / property.type->bytes;
     if (!(n >= 0) || n != std::floor(n))
       throw InputError(where(), "a list has an impossible length", kExportAgain);
     if (n > static_cast<double>(left)) throw_short();
@@ -195,38 +186,10 @@ class Rows {
     return value;
   }
 
-  double next_bytes(Number type) {
-    const size_t n = bytes_of(type);
-    if (bytes_.size() < n) throw_short();
-    unsigned char raw[8];
-    std::memcpy(raw, bytes_.data(), n);
-    bytes_.remove_prefix(n);
-    if (format_ == Format::big) std::reverse(raw, raw + n);
-    switch (type) {
-      case Number::i8:
-        return as<int8_t>(raw);
-      case Number::u8:
-        return as<uint8_t>(raw);
-      case Number::i16:
-        return as<int16_t>(raw);
-      case Number::u16:
-        return as<uint16_t>(raw);
-      case Number::i32:
-        return as<int32_t>(raw);
-      case Number::u32:
-        return as<uint32_t>(raw);
-      case Number::f32:
-        return static_cast<double>(as<float>(raw));
-      case Number::f64:
-        return as<double>(raw);
-    }
-    return 0;
-  }
-
-  template <class T>
-  static T as(const unsigned char* raw) {
-    T value;
-    std::memcpy(&value, raw, sizeof value);
+  double next_bytes(const Number& type) {
+    if (bytes_.size() < type.bytes) throw_short();
+    const double value = type.at(bytes_.data(), format_ == Format::big);
+    bytes_.remove_prefix(type.bytes);
     return value;
   }
 
@@ -246,8 +209,8 @@ class Rows {
 };
 
 void skip_property(Rows& rows, const Property& property) {
-  const size_t n = property.list ? rows.next_length(property) : 1;
-  for (size_t i = 0; i < n; ++i) rows.next(property.type);
+  const size_t n = property.count ? rows.next_length(property) : 1;
+  for (size_t i = 0; i < n; ++i) rows.next(*property.type);
 }
 
 void read_vertices(Rows& rows, const Element& element, const std::string& path, const Vec3& origin,
@@ -255,8 +218,12 @@ void read_vertices(Rows& rows, const Element& element, const std::string& path, 
   std::array<int, 3> axis_seen = {0, 0, 0};
   std::vector<int> axis_of;  // for each property: 0, 1, 2 or -1
   for (const Property& p : element.properties) {
-    axis_of.push_back(p.list ? -1 : p.name == "x" ? 0 : p.name == "y" ? 1 : p.name == "z" ? 2 : -1);
-    if (axis_of.back() >= 0) ++axis_seen[static_cast<size_t>(axis_of.back())];
+    axis_of.push_back(p.count         ? -1
+                      : p.name == "x" ? 0
+                      : p.name == "y" ? 1
+                      : p.name == "z" ? 2
+                                      : -1);
+    if (axis_of.back() >= 0) ++axis_seen[axis_of.back()];
   }
   if (axis_seen != std::array<int, 3>{1, 1, 1})
     throw InputError(path, "the vertices do not have the properties x, y and z", kExportAgain);
@@ -269,7 +236,7 @@ void read_vertices(Rows& rows, const Element& element, const std::string& path, 
         skip_property(rows, element.properties[k]);
       else
         point[axis_of[k]] = text::coordinate(
-            rows.next(element.properties[k].type) - origin[axis_of[k]],
+            rows.next(*element.properties[k].type) - origin[axis_of[k]],
             [&] { return rows.where(); }, how);
     }
     rows.end_row();
@@ -284,7 +251,7 @@ void read_faces(Rows& rows, const Element& element, std::vector<Triangle>& faces
   for (uint64_t i = 0; i < element.count; ++i) {
     rows.begin_row();
     for (const Property& p : element.properties) {
-      if (!p.list || (p.name != "vertex_indices" && p.name != "vertex_index")) {
+      if (!p.count || (p.name != "vertex_indices" && p.name != "vertex_index")) {
         skip_property(rows, p);
         continue;
       }
@@ -292,7 +259,7 @@ void read_faces(Rows& rows, const Element& element, std::vector<Triangle>& faces
       if (n < 3) throw InputError(rows.where(), "a face has fewer than 3 corners", kExportAgain);
       corners.clear();
       for (size_t k = 0; k < n; ++k) {
-        const double index = rows.next(p.type);
+        const double index = rows.next(*p.type);
         if (!(index >= 0 && index < 2147483648.0) || index != std::floor(index))
           throw InputError(rows.where(), "a face index is out of range", kExportAgain);
         corners.push_back(static_cast<int32_t>(index));

@@ -1,9 +1,10 @@
 #include "datasets/readers/precision.h"
 
 #include <cmath>
-#include <cstdio>
 
 #include "autograd/base/error.h"
+#include "autograd/base/format.h"
+#include "nn/geometry/box.h"
 
 namespace restage {
 namespace {
@@ -16,13 +17,9 @@ struct Bounds {
 
 Bounds bounds_of(const Points& points) {
   if (points.empty()) return {};
-  Point low = points[0], high = points[0];
-  for (const Point& p : points) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
-  return {static_cast<double>(low.cwiseAbs().cwiseMax(high.cwiseAbs()).maxCoeff()),
-          (high.cast<double>() - low.cast<double>()).maxCoeff()};
+  const Box box = box_of(points);
+  return {double{box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff()},
+          (box.max().cast<double>() - box.min().cast<double>()).maxCoeff()};
 }
 
 double step_at(double x) { return x > 0 ? std::ldexp(1.0, std::ilogb(x) - 23) : 0; }
@@ -39,12 +36,11 @@ bool is_blurred(const Points& points) {
 void check_precision(const Points& points, const std::string& where, const std::string& fix) {
   if (!is_blurred(points)) return;
   const Bounds bounds = bounds_of(points);
-  char text[160];
-  std::snprintf(text, sizeof text,
-                "lies %.3g units from the origin, where single precision has steps of %.2g, and is "
-                "only %.3g large",
-                bounds.farthest, step_at(bounds.farthest), bounds.extent);
-  throw InputError(where, text, fix);
+  throw InputError(where,
+                   format("lies %.3g units from the origin, where single precision has steps of "
+                          "%.2g, and is only %.3g large",
+                          bounds.farthest, step_at(bounds.farthest), bounds.extent),
+                   fix);
 }
 
 }  // namespace restage

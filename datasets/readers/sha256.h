@@ -22,6 +22,8 @@ class Sha256 {
 };
 
 std::string sha256(std::string_view bytes);
+/// Whether a text is such a sum: 64 hexadecimal digits in small letters.
+bool is_sha256(std::string_view text);
 /// 40 digits; only for what git names by it.
 std::string sha1(std::string_view bytes);
 /// Of a file, in constant memory. InputError if it cannot be read.

@@ -16,6 +16,14 @@ struct SourceSkeleton {
   std::vector<Vec3> ends;     ///< end site, from the joint; zero if it has none
   std::vector<uint8_t> has_end;
   size_t size() const { return names.size(); }
+  /// A joint without an end site.
+  void add(const std::string& name, int parent, const Vec3& offset) {
+    names.push_back(name);
+    parents.push_back(parent);
+    offsets.push_back(offset);
+    ends.push_back(Vec3::Zero());
+    has_end.push_back(0);
+  }
 };
 
 enum class Channel { x_position, y_position, z_position, x_rotation, y_rotation, z_rotation };

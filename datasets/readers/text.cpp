@@ -1,9 +1,11 @@
 #include "datasets/readers/text.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
 #include "autograd/base/error.h"
+#include "datasets/readers/word_lines.h"
 
 namespace restage::text {
 namespace {
@@ -49,6 +51,12 @@ std::string_view take_word(std::string_view& line) {
 
 bool parse(std::string_view word, double& value) { return parse_whole(word, value); }
 bool parse(std::string_view word, int64_t& value) { return parse_whole(word, value); }
+
+bool ends_in(std::string_view name, std::initializer_list<std::string_view> endings) {
+  const std::string lower = lower_case(name);
+  return std::any_of(endings.begin(), endings.end(),
+                     [&](std::string_view ending) { return lower.ends_with(ending); });
+}
 
 std::string quote(std::string_view word) {
   std::string out = "'";

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <initializer_list>
 #include <limits>
 #include <string>
 #include <string_view>
@@ -32,6 +33,8 @@ std::string_view take_word(std::string_view& line);
 /// The whole word as a number (nan and inf count as numbers), independent of the locale.
 bool parse(std::string_view word, double& value);
 bool parse(std::string_view word, int64_t& value);
+/// Whether the name ends in one of these (lower case), whatever its own case is.
+bool ends_in(std::string_view name, std::initializer_list<std::string_view> endings);
 /// A short, printable copy for messages.
 std::string quote(std::string_view word);
 

@@ -70,10 +70,7 @@ std::string WordLines::quoted(std::string_view word) {
 }
 
 bool same_word(std::string_view a, std::string_view lower_word) {
-  if (a.size() != lower_word.size()) return false;
-  for (size_t i = 0; i < a.size(); ++i)
-    if (lower(a[i]) != lower_word[i]) return false;
-  return true;
+  return lower_case(a) == lower_word;
 }
 
 std::string lower_case(std::string_view word) {

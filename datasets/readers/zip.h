@@ -1,8 +1,6 @@
-// Zip archives, read member by member: stored and deflate, zip64, data descriptors.
-// The central directory is the truth; whatever contradicts it is refused when the archive is
-// opened: members that overlap or lie outside, two of one name, sizes that a local header gives
-// differently or that deflate cannot reach. (libzip and minizip check none of these, so this is
-// our own parser of the directory; zlib unpacks.)
+// Zip archives, read member by member, by libzip: stored and deflate, zip64, data descriptors.
+// Refused when the archive is opened: what contradicts its directory, two members of one name,
+// members that claim more than deflate can reach or share their bytes with others.
 #pragma once
 
 #include <cstdint>
@@ -12,16 +10,17 @@
 
 #include "datasets/readers/byte_stream.h"
 
+struct zip;
+
 namespace restage {
 
 class ZipFile {
  public:
   struct Member {
     std::string name;
-    uint16_t flags = 0, method = 0;
-    uint32_t crc = 0;
     uint64_t packed = 0, size = 0;  ///< bytes in the file, bytes unpacked
-    uint64_t header = 0, data = 0;  ///< where its local header and its bytes begin
+    uint16_t method = 0;
+    bool encrypted = false;
   };
 
   /// Reads the directory only. InputError: not zip, cut short, contradicting itself.
@@ -36,10 +35,8 @@ class ZipFile {
   std::unique_ptr<ByteStream> open(const Member& member) const;
 
  private:
-  void read_directory();
-  void read_local_headers(FileStream& file, uint64_t directory);
-
   std::string path_;
+  std::shared_ptr<zip> archive_;  ///< also of the streams that were opened
   std::vector<Member> members_;
 };
 

@@ -47,7 +47,7 @@ void put_weights(const Body& body, const SurfaceSamples& samples, size_t i, bool
   std::fill_n(to, kJoints, 0.0f);
   for (size_t corner = 3 * i; corner < 3 * i + 3; ++corner)
     for (int j = 0; j < kJoints; ++j)
-      to[mirror ? kMirror[static_cast<size_t>(j)] : j] +=
+      to[mirror ? kMirror[j] : j] +=
           samples.weights[corner] * body.weights(samples.vertices[corner], j);
 }
 
@@ -120,7 +120,7 @@ CloudBatch CloudSampler::make(int64_t first, int64_t n,
   float* joints = out.joints.data<float>();
   parallel_for(n, 1, [&](int64_t from, int64_t to) {
     for (int64_t i = from; i < to; ++i)
-      fill(subjects ? (*subjects)[static_cast<size_t>(i)] : subject(first + i),
+      fill(subjects ? (*subjects)[i] : subject(first + i),
            key_.fold(static_cast<uint64_t>(first + i)), points + i * config_.points * 3,
            joints + i * kJoints * 3,
            weights != nullptr ? weights + i * config_.points * kJoints : nullptr);

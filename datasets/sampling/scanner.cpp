@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "autograd/base/error.h"
+#include "nn/geometry/box.h"
 
 namespace restage {
 namespace {
@@ -102,18 +103,15 @@ DepthMap depth_map(const Mesh& surface, const View& view) {
   for (const Point& p : surface.vertices) seen.push_back(view.project(p));
   for (size_t f = 0; f < surface.faces.size(); ++f) {
     const Triangle& t = surface.faces[f];
-    fill_triangle(seen.at(static_cast<size_t>(t[0])), seen.at(static_cast<size_t>(t[1])),
-                  seen.at(static_cast<size_t>(t[2])), static_cast<int32_t>(f), map);
+    fill_triangle(seen.at(t[0]), seen.at(t[1]), seen.at(t[2]), static_cast<int32_t>(f), map);
   }
   return map;
 }
 
 /// Cosine between a face's normal, either side, and the ray.
 double facing(const Mesh& surface, int32_t face, const Vec3& ray) {
-  const Triangle& t = surface.faces[static_cast<size_t>(face)];
-  const auto at = [&](size_t k) {
-    return Vec3(surface.vertices[static_cast<size_t>(t[k])].cast<double>());
-  };
+  const Triangle& t = surface.faces[face];
+  const auto at = [&](size_t k) { return Vec3(surface.vertices[t[k]].cast<double>()); };
   const Vec3 normal = (at(1) - at(0)).cross(at(2) - at(0));
   const double length = normal.norm() * ray.norm();
   return length > 0 ? std::abs(normal.dot(ray)) / length : 0.0;
@@ -156,11 +154,7 @@ void measure(const Mesh& surface, const View& view, const ScannerNoise& noise, c
 /// Stray points about the box of the cloud.
 void add_outliers(double share, const RngKey& key, Points& cloud) {
   if (cloud.empty() || !(share > 0)) return;
-  Point low = cloud[0], high = cloud[0];
-  for (const Point& p : cloud) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
+  const Point low = box_of(cloud).min(), high = box_of(cloud).max();
   const Point margin = Point::Constant(0.3f);
   Rng rng(key);
   const auto count = static_cast<size_t>(share * static_cast<double>(cloud.size()) + rng.uniform());

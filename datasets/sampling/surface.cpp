@@ -26,8 +26,7 @@ Points SurfaceSamples::on(const Points& picked) const {
 
 Points SurfaceSamples::on_rest(const Body& body) const {
   Points picked(vertices.size());
-  for (size_t i = 0; i < picked.size(); ++i)
-    picked[i] = body.rest.vertices.at(static_cast<size_t>(vertices[i]));
+  for (size_t i = 0; i < picked.size(); ++i) picked[i] = body.rest.vertices.at(vertices[i]);
   return on(picked);
 }
 
@@ -46,8 +45,7 @@ SurfaceSampler::SurfaceSampler(const Body& body) : faces_(body.rest.faces) {
         throw InputError(
             where, "a face names vertex " + std::to_string(v) + " of " + std::to_string(x.size()),
             "mend the mesh");
-    const Point &a = x[static_cast<size_t>(f[0])], &b = x[static_cast<size_t>(f[1])],
-                &c = x[static_cast<size_t>(f[2])];
+    const Point &a = x[f[0]], &b = x[f[1]], &c = x[f[2]];
     sum += 0.5 * static_cast<double>((b - a).cross(c - a).norm());
     ends_.push_back(sum);
   }

@@ -13,13 +13,9 @@ namespace {
 int run_verify(const std::string& file, const Common& common) {
   const std::vector<std::string> problems =
       std::filesystem::is_directory(file) ? verify_benchmark(file) : verify(file);
-  if (common.json) {
-    print_json({{"file", file}, {"problems", problems}});
-  } else {
-    std::string text;
-    for (const std::string& problem : problems) text += on_one_line(problem) + "\n";
-    print(problems.empty() ? file + ": all is well\n" : text);
-  }
+  std::string text = problems.empty() ? file + ": all is well\n" : "";
+  for (const std::string& problem : problems) text += on_one_line(problem) + "\n";
+  print(common.json, {{"file", file}, {"problems", problems}}, text);
   return problems.empty() ? 0 : 1;
 }
 

@@ -50,10 +50,8 @@ int build_builtin(const BuildOptions& options, const Common& common) {
   for (const Body& body : builtin_bodies(common.seed, b[0], b[1], b[2])) writer.add(body);
   for (const Motion& motion : builtin_motions(common.seed, m[0], m[1], m[2])) writer.add(motion);
   writer.commit();
-  if (common.json)
-    print_json({{"out", options.out}, {"bodies", b}, {"motions", m}, {"seed", common.seed}});
-  else
-    print("wrote " + options.out + "\n");
+  print(common.json, {{"out", options.out}, {"bodies", b}, {"motions", m}, {"seed", common.seed}},
+        "wrote " + options.out + "\n");
   return 0;
 }
 
@@ -117,15 +115,15 @@ int build_recipe(const BuildOptions& options, const Common& common) {
   load_config(request.recipe, request.overrides, recipe);
   const BenchmarkSummary done =
       build_benchmark(recipe, resolved_yaml(recipe), request.recipe, request.data, request.out);
-  if (common.json)
-    print_json({{"out", request.out},
-                {"data", request.data},
-                {"files", done.files},
-                {"bytes", done.bytes},
-                {"seed", recipe.seed}});
-  else
-    print("wrote " + request.out + ": " + std::to_string(done.files) + " files, " +
-          std::to_string((done.bytes + 500'000) / 1'000'000) + " MB, from " + request.data + "\n");
+  print(common.json,
+        {{"out", request.out},
+         {"data", request.data},
+         {"files", done.files},
+         {"bytes", done.bytes},
+         {"seed", recipe.seed}},
+        "wrote " + request.out + ": " + std::to_string(done.files) + " files, " +
+            std::to_string((done.bytes + 500'000) / 1'000'000) + " MB, from " + request.data +
+            "\n");
   return 0;
 }
 

@@ -21,21 +21,19 @@ int run_fetch(const FetchOptions& o, const Common& common) {
     throw InputError(o.list, "is not below this folder",
                      "run it in the folder of Restage's sources, or name a LIST");
   const FetchSummary done = fetch_data(o.list, o.out, o.from);
-  if (common.json) {
-    print_json({{"out", o.out},
-                {"fetched", done.fetched},
-                {"present", done.present},
-                {"bytes", done.bytes},
-                {"missing", done.missing}});
-  } else {
-    std::string text = o.out + ": " + std::to_string(done.fetched) + " files fetched, " +
-                       std::to_string(done.present) + " there already\n";
-    for (const std::string& path : done.missing)
-      text += "missing " + path + ": " +
-              (o.from.empty() ? "has no address; give --from a folder that holds it\n"
-                              : "is not in " + o.from + "\n");
-    print(text);
-  }
+  std::string text = o.out + ": " + std::to_string(done.fetched) + " files fetched, " +
+                     std::to_string(done.present) + " there already\n";
+  for (const std::string& path : done.missing)
+    text += "missing " + path + ": " +
+            (o.from.empty() ? "has no address; give --from a folder that holds it\n"
+                            : "is not in " + o.from + "\n");
+  print(common.json,
+        {{"out", o.out},
+         {"fetched", done.fetched},
+         {"present", done.present},
+         {"bytes", done.bytes},
+         {"missing", done.missing}},
+        text);
   return done.missing.empty() ? 0 : 1;
 }
 

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "autograd/base/error.h"
+#include "autograd/base/format.h"
 #include "autograd/base/output_check.h"
 #include "autograd/base/temporary.h"
 #include "datasets/builtin/bodies.h"
@@ -32,11 +33,7 @@ struct InspectOptions {
   std::string file, plot, body_model;
 };
 
-std::string rounded(double x, int decimals) {
-  char text[48];
-  std::snprintf(text, sizeof text, "%.*f", decimals, x);
-  return text;
-}
+std::string rounded(double x, int decimals) { return format("%.*f", decimals, x); }
 
 std::string row(std::string name, const std::string& value) {
   name.resize(std::max<size_t>(name.size() + 1, 12), ' ');
@@ -104,12 +101,6 @@ Json to_json(const Inspection& found) {
 /// Number k of `n` drawn out of `all`, spread evenly.
 size_t spread(size_t k, size_t n, size_t all) { return n < 2 ? 0 : k * (all - 1) / (n - 1); }
 
-std::string rounded_to_digits(double x) {
-  char text[48];
-  std::snprintf(text, sizeof text, "%.2g", x);
-  return text;
-}
-
 void remark(std::vector<std::string>& remarks, size_t drawn, size_t all, const std::string& what) {
   if (drawn < all)
     remarks.push_back("drawn: " + std::to_string(drawn) + " of " + std::to_string(all) + " " +
@@ -157,7 +148,7 @@ void add_frames(std::vector<Figure>& figures, const std::string& file, double fp
   if (const float scale = drawing_scale(clip); scale != 1) {
     for (Points& frame : clip.frames)
       for (Point& p : frame) p *= scale;
-    remarks.push_back("drawn " + rounded_to_digits(scale) +
+    remarks.push_back("drawn " + format("%.2g", double{scale}) +
                       " times as large as it is; restage doctor says in what units it may be");
   }
   const float floor = clip_floor(clip);

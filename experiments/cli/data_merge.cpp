@@ -16,16 +16,14 @@ struct MergeArguments {
 
 int run_merge(const MergeArguments& given, const Common& common) {
   const MergeSummary done = merge_data(given.files, given.out, given.options);
-  if (common.json) {
-    print_json({{"out", given.out},
-                {"bodies", done.bodies},
-                {"motions", done.motions},
-                {"license", done.license},
-                {"provenance", done.provenance}});
-    return 0;
-  }
-  print("wrote " + given.out + ": " + std::to_string(done.bodies) + " bodies, " +
-        std::to_string(done.motions) + " motions\nlicense     " + done.license + "\n");
+  print(common.json,
+        {{"out", given.out},
+         {"bodies", done.bodies},
+         {"motions", done.motions},
+         {"license", done.license},
+         {"provenance", done.provenance}},
+        "wrote " + given.out + ": " + std::to_string(done.bodies) + " bodies, " +
+            std::to_string(done.motions) + " motions\nlicense     " + done.license + "\n");
   return 0;
 }
 

@@ -1,8 +1,8 @@
 // restage data realism: how believable the bodies and motions of a data file are when posed.
-#include <cstdio>
 #include <memory>
 
 #include "autograd/base/error.h"
+#include "autograd/base/format.h"
 #include "datasets/benchmark/realism.h"
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
@@ -11,17 +11,8 @@
 namespace restage::cli {
 namespace {
 
-std::string percent(double share) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.1f %%", 100 * share);
-  return text;
-}
-
-std::string centimetres(double metres) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.1f cm", 100 * metres);
-  return text;
-}
+std::string percent(double share) { return format("%.1f %%", 100 * share); }
+std::string centimetres(double metres) { return format("%.1f cm", 100 * metres); }
 
 std::string listed(const std::vector<std::string>& names) {
   std::string out;
@@ -78,10 +69,7 @@ int run_realism(const std::string& file, const Common& common) {
                      "give a data file with bodies, and best with motions");
   const RealismReport report = measure_realism(
       read_bodies(file), kind == "dataset" ? read_motions(file) : std::vector<Motion>{});
-  if (common.json)
-    print_json(to_json(report));
-  else
-    print(to_text(report));
+  print(common.json, to_json(report), to_text(report));
   return 0;
 }
 

@@ -109,10 +109,7 @@ int run_sheet(const SheetArguments& a, const Common& common) {
   write_png(a.out, figure_sheet(fs::is_directory(a.input) ? figures_of_folder(a.input)
                                                           : figures_of_file(a.input),
                                 options));
-  if (common.json)
-    print_json({{"out", a.out}});
-  else
-    print("wrote " + a.out + "\n");
+  print(common.json, {{"out", a.out}}, "wrote " + a.out + "\n");
   return 0;
 }
 

@@ -36,6 +36,10 @@ void print_json(const Json& document) {
   print(document.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
+void print(bool json, const Json& document, const std::string& text) {
+  json ? print_json(document) : print(text);
+}
+
 void finish_output() {
   if (std::fflush(stdout) != 0) fail();
 }

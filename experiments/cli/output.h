@@ -13,6 +13,8 @@ using Json = nlohmann::ordered_json;
 void print(const std::string& text);
 /// One JSON document to standard output.
 void print_json(const Json& document);
+/// The one document or the text, as the user asked (Common::json).
+void print(bool json, const Json& document, const std::string& text);
 /// Flushes standard output. WorkError if something printed did not arrive.
 void finish_output();
 

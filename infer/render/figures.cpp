@@ -8,6 +8,7 @@
 #include "autograd/base/error.h"
 #include "infer/render/clip.h"
 #include "infer/render/rasteriser.h"
+#include "nn/geometry/box.h"
 
 namespace restage {
 namespace {
@@ -40,7 +41,6 @@ Points framed_points(const Figure& figure) {
 
 /// Where a figure's camera looks, and half of what it has to see there, metres.
 struct View {
-  Point low = Point::Zero(), high = Point::Zero();  ///< of what is framed; y over the floor
   Camera camera;
   float aside = 0, tall = 0;
 };
@@ -52,13 +52,7 @@ View view_of(const Figure& figure, const Points& points, float low, float high) 
   camera.azimuth = radians(figure.azimuth);
   camera.elevation = radians(figure.elevation);
   camera.view = kView;
-  const Point first = points.empty() ? Point(Point::Zero()) : points[0];
-  out.low = out.high = first;
-  for (const Point& p : points) {
-    out.low = out.low.cwiseMin(p);
-    out.high = out.high.cwiseMax(p);
-  }
-  camera.target = 0.5f * (out.low + out.high);
+  if (!points.empty()) camera.target = box_of(points).center();
   camera.target.y() = figure.floor + 0.5f * (low + high);
   const float ca = std::cos(camera.azimuth), sa = std::sin(camera.azimuth),
               ce = std::cos(camera.elevation), se = std::sin(camera.elevation),
@@ -163,8 +157,8 @@ Image figure_sheet(const std::vector<Figure>& figures, const FigureSheetOptions&
   draw_text(sheet, kMargin, kMargin - 4, 14, kInk, fitting(14, options.title, room));
   for (int i = 0; i < count; ++i) {
     const int x = kMargin + i % columns * cell_width, y = top + i / columns * row_height;
-    const Figure& figure = figures[static_cast<size_t>(i)];
-    const View& view = views[static_cast<size_t>(i)];
+    const Figure& figure = figures[i];
+    const View& view = views[i];
     const float here = figure.whole ? cell_metres(view, wide) : metres;
     paste(sheet, draw(figure, view.camera, here, cell_width, options.cell_height), x, y);
     const std::string caption = fitting(10, figure.caption, cell_width - 4);
@@ -173,7 +167,7 @@ Image figure_sheet(const std::vector<Figure>& figures, const FigureSheetOptions&
   }
   for (int i = 0; i < lines; ++i)
     draw_text(sheet, kMargin, top + rows * row_height + i * kLine + 6, 11, kInk,
-              fitting(11, options.lines[static_cast<size_t>(i)], room));
+              fitting(11, options.lines[i], room));
   return sheet;
 }
 

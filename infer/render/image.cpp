@@ -109,14 +109,13 @@ void draw_text(Image& image, int x, int y, double size, Rgb colour, std::string_
     const int y0 = std::max(0, static_cast<int>(std::min(s.y0, s.y1) - pen) - 1);
     for (int v = y0; v < std::min<double>(height, std::max(s.y0, s.y1) + pen + 2); ++v)
       for (int u = x0; u < std::min<double>(width, std::max(s.x0, s.x1) + pen + 2); ++u) {
-        double& least = nearest[static_cast<size_t>(v * width + u)];
+        double& least = nearest[v * width + u];
         least = std::min(least, distance(s, u + 0.5, v + 0.5));
       }
   }
   for (int v = 0; v < height; ++v)
     for (int u = 0; u < width; ++u)
-      blend(image, x + u, y + v, colour,
-            std::clamp(pen + 0.5 - nearest[static_cast<size_t>(v * width + u)], 0.0, 1.0));
+      blend(image, x + u, y + v, colour, std::clamp(pen + 0.5 - nearest[v * width + u], 0.0, 1.0));
 }
 
 int text_width(double size, std::string_view text) {

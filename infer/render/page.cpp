@@ -8,6 +8,7 @@
 #include <set>
 
 #include "autograd/base/atomic_file.h"
+#include "autograd/base/format.h"
 #include "infer/render/sheet.h"
 
 namespace restage {
@@ -23,6 +24,7 @@ constexpr const char* kStyle =
     ;
 constexpr const char* kScript =
 #include "infer/render/viewer/viewer.js.inc"
+#include "nn/geometry/box.h"
     ;
 constexpr size_t kMostStride = 4;         // of frames, before surfaces are thinned
 constexpr size_t kFewestVertices = 1200;  // a person is still one
@@ -75,14 +77,9 @@ std::string script_json(const Json& json) {
   return out;
 }
 
-std::string hex(uint32_t colour) {
-  char text[8];
-  std::snprintf(text, sizeof text, "#%06x", static_cast<unsigned>(colour & 0xffffffu));
-  return text;
-}
+std::string hex(uint32_t colour) { return format("#%06x", colour & 0xffffffu); }
 
-// ---- thinning
-// ------------------------------------------------------------------------------------
+// ---- thinning -----------------------------------------------------------------------------------
 
 // Which vertices of a surface are kept (empty: all), and the faces between them.
 struct Surface {
@@ -98,16 +95,14 @@ Surface cluster(const Clip& clip, float cell) {
   for (size_t v = 0; v < place.size(); ++v) {
     std::array<int64_t, 3> key;
     for (size_t k = 0; k < 3; ++k)
-      key[k] =
-          static_cast<int64_t>(std::floor(clip.frames[0][v][static_cast<Eigen::Index>(k)] / cell));
+      key[k] = static_cast<int64_t>(std::floor(clip.frames[0][v][k] / cell));
     const auto [found, added] = cells.emplace(key, static_cast<int32_t>(surface.kept.size()));
     if (added) surface.kept.push_back(static_cast<int32_t>(v));
     place[v] = found->second;
   }
   std::set<Triangle> seen;
   for (const Triangle& f : clip.faces) {
-    const Triangle moved = {place[static_cast<size_t>(f[0])], place[static_cast<size_t>(f[1])],
-                            place[static_cast<size_t>(f[2])]};
+    const Triangle moved = {place[f[0]], place[f[1]], place[f[2]]};
     if (moved[0] == moved[1] || moved[1] == moved[2] || moved[0] == moved[2]) continue;
     Triangle sorted = moved;
     std::sort(sorted.begin(), sorted.end());
@@ -118,12 +113,10 @@ Surface cluster(const Clip& clip, float cell) {
 
 Surface thin(const Clip& clip, size_t vertices) {
   if (clip.faces.empty() || clip.frames[0].size() <= vertices) return {{}, clip.faces};
-  const Point& first = clip.frames[0][0];
-  Point low = first, high = first;
-  for (const Point& p : clip.frames[0]) low = low.cwiseMin(p), high = high.cwiseMax(p);
-  float cell = std::max(1e-6f, (high - low).norm() / 400);
+  const float size = box_of(clip.frames[0]).sizes().norm();
+  float cell = std::max(1e-6f, size / 400);
   Surface surface = cluster(clip, cell);
-  while (surface.kept.size() > vertices && cell < (high - low).norm()) {
+  while (surface.kept.size() > vertices && cell < size) {
     cell *= 1.2f;
     surface = cluster(clip, cell);
   }
@@ -170,15 +163,14 @@ Plan make_plan(const std::vector<Clip>& clips, const PageOptions& options) {
   return plan;
 }
 
-// ---- data
-// ----------------------------------------------------------------------------------------
+// ---- data ---------------------------------------------------------------------------------------
 
 Points picked(const Clip& clip, const Surface& surface, size_t frame, size_t max_points) {
   const Points& all = clip.frames[frame];
   Points out;
   if (!clip.faces.empty()) {
     if (surface.kept.empty()) return all;
-    for (const int32_t v : surface.kept) out.push_back(all[static_cast<size_t>(v)]);
+    for (const int32_t v : surface.kept) out.push_back(all[v]);
     return out;
   }
   const Point centre = clip_centre(all);
@@ -200,7 +192,7 @@ std::vector<Point> calm_centres(const std::vector<Points>& frames, double fps) {
   for (std::ptrdiff_t f = 0; f < count; ++f) {
     const std::ptrdiff_t side = std::min({reach, f, count - 1 - f});
     Point sum = Point::Zero();
-    for (std::ptrdiff_t k = f - side; k <= f + side; ++k) sum += centres[static_cast<size_t>(k)];
+    for (std::ptrdiff_t k = f - side; k <= f + side; ++k) sum += centres[k];
     calm.push_back(sum / static_cast<float>(2 * side + 1));
   }
   return calm;
@@ -223,9 +215,9 @@ Packed pack(const Clip& clip, const Surface& surface, const Plan& plan, size_t n
   std::vector<Points> frames;
   for (size_t f = 0; f < plan.frames; ++f)
     frames.push_back(picked(clip, surface, f * plan.stride, options.max_points));
-  Point low = frames[0][0], high = low;
-  for (const Points& points : frames)
-    for (const Point& p : points) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  Box box;
+  for (const Points& points : frames) box.extend(box_of(points));
+  const Point low = box.min(), high = box.max();
   const Eigen::Vector3d step = ((high - low).cast<double>() / 65535.0).cwiseMax(1e-9);
   Packed packed;
   const float floor = clip_floor(clip);

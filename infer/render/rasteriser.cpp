@@ -228,7 +228,7 @@ void Canvas::occlude() {
         }
         dark += ring.strength * sum / kDirections;
       }
-      keep[static_cast<size_t>(y * width_ + x)] = std::exp(-1.6f * dark);
+      keep[y * width_ + x] = std::exp(-1.6f * dark);
     }
   for (size_t k = 0; k < keep.size(); ++k) light_[k] *= keep[k];
 }

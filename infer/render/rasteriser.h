@@ -50,8 +50,8 @@ class Canvas {
   Colour shade(const Point& normal, const Colour& colour) const;
   Colour ground_at(const Point& at, float floor, const std::vector<float>& shadow) const;
   void occlude();
-  float& depth(int x, int y) { return depth_[static_cast<size_t>(y * width_ + x)]; }
-  Colour& pixel(int x, int y) { return light_[static_cast<size_t>(y * width_ + x)]; }
+  float& depth(int x, int y) { return depth_[y * width_ + x]; }
+  Colour& pixel(int x, int y) { return light_[y * width_ + x]; }
 
   int width_, height_, samples_;  ///< in samples
   SceneStyle style_;

@@ -28,7 +28,7 @@ void fill(Map& map, const Texel& a, const Texel& b, const Texel& c) {
       const float px = static_cast<float>(x) + 0.5f, py = static_cast<float>(y) + 0.5f;
       const float s = ((px - a.x) * (c.y - a.y) - (c.x - a.x) * (py - a.y)) / area;
       const float t = ((b.x - a.x) * (py - a.y) - (px - a.x) * (b.y - a.y)) / area;
-      if (s >= 0 && t >= 0 && s + t <= 1) map[static_cast<size_t>(y * kSize + x)] = 1;
+      if (s >= 0 && t >= 0 && s + t <= 1) map[y * kSize + x] = 1;
     }
 }
 
@@ -38,21 +38,17 @@ void stamp(Map& map, const Texel& at) {
   if (!(at.x > -r && at.y > -r && at.x < kSize + r && at.y < kSize + r)) return;
   for (int y = static_cast<int>(at.y) - r; y <= static_cast<int>(at.y) + r; ++y)
     for (int x = static_cast<int>(at.x) - r; x <= static_cast<int>(at.x) + r; ++x)
-      if (x >= 0 && y >= 0 && x < kSize && y < kSize) map[static_cast<size_t>(y * kSize + x)] = 1;
+      if (x >= 0 && y >= 0 && x < kSize && y < kSize) map[y * kSize + x] = 1;
 }
 
 // Mean over 2 r + 1 texels along one direction.
 void blur_lines(Map& map, int r, int step, int line) {
   std::vector<float> sums(kSize + 1);
   for (int l = 0; l < kSize; ++l) {
+    for (int k = 0; k < kSize; ++k) sums[k + 1] = sums[k] + map[l * line + k * step];
     for (int k = 0; k < kSize; ++k)
-      sums[static_cast<size_t>(k + 1)] =
-          sums[static_cast<size_t>(k)] + map[static_cast<size_t>(l * line + k * step)];
-    for (int k = 0; k < kSize; ++k)
-      map[static_cast<size_t>(l * line + k * step)] =
-          (sums[static_cast<size_t>(std::min(kSize, k + r + 1))] -
-           sums[static_cast<size_t>(std::max(0, k - r))]) /
-          static_cast<float>(2 * r + 1);
+      map[l * line + k * step] = (sums[std::min(kSize, k + r + 1)] - sums[std::max(0, k - r)]) /
+                                 static_cast<float>(2 * r + 1);
   }
 }
 
@@ -103,7 +99,7 @@ float shadow_at(const std::vector<float>& map, const Point& centre, const Point&
   if (!(x >= 0 && y >= 0 && x < kSize - 1 && y < kSize - 1)) return 0;
   const int i = static_cast<int>(x), j = static_cast<int>(y);
   const float u = x - static_cast<float>(i), v = y - static_cast<float>(j);
-  const float* at_texel = &map[static_cast<size_t>(j * kSize + i)];
+  const float* at_texel = &map[j * kSize + i];
   return (1 - v) * ((1 - u) * at_texel[0] + u * at_texel[1]) +
          v * ((1 - u) * at_texel[kSize] + u * at_texel[kSize + 1]);
 }

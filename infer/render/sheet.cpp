@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 
+#include "autograd/base/format.h"
 #include "infer/render/rasteriser.h"
 
 namespace restage {
@@ -105,16 +105,14 @@ Image contact_sheet(const std::vector<Clip>& clips, const SheetOptions& options)
     const int y = top + r * row_height;
     for (int c = 0; c < columns; ++c)
       paste(sheet,
-            draw_cell(clips[clip], layout.cells[clip][static_cast<size_t>(c)], layout.floors[clip],
-                      kClipColours[clip], cell_width, layout, options),
+            draw_cell(clips[clip], layout.cells[clip][c], layout.floors[clip], kClipColours[clip],
+                      cell_width, layout, options),
             kMargin + c * cell_width, y + kLabel);
     fill_rectangle(sheet, kMargin, y + 4, 12, 12, bytes_of(kClipColours[clip]));
     draw_text(sheet, kMargin + 20, y + 4, 12, kInk, clips[clip].label);
   }
   for (int c = 0; c < columns; ++c) {
-    char time[32];
-    std::snprintf(time, sizeof time, "%.2f s",
-                  static_cast<double>(layout.moments[static_cast<size_t>(c)]) / options.fps);
+    const std::string time = format("%.2f s", static_cast<double>(layout.moments[c]) / options.fps);
     draw_text(sheet, kMargin + c * cell_width + (cell_width - text_width(10, time)) / 2,
               top + rows * row_height + 8, 10, kPale, time);
   }

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "autograd/base/temporary.h"
-#include "infer/writers/mesh_file.h"
+#include "nn/geometry/mesh_file.h"
 
 namespace restage {
 

@@ -8,7 +8,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
-#include "infer/writers/mesh_file.h"
+#include "nn/geometry/mesh_file.h"
 
 namespace restage {
 namespace {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "autograd/base/error.h"
+#include "nn/geometry/skinning.h"
 
 namespace restage {
 namespace {
@@ -19,23 +20,8 @@ constexpr int kLimbs[8][2] = {{1, 4},   {2, 5},   {4, 7},   {5, 8},
 /// Left hip-knee plus knee-ankle: trajectories are scaled by this side, as the reference tool does.
 double left_leg(const Joints& x) { return (x[1] - x[4]).norm() + (x[4] - x[7]).norm(); }
 
-/// x -> rotation x + offset, of each joint, from the rest surface to the posed one.
-struct SkinTransforms {
-  std::array<Mat3f, kJoints> rotation;
-  std::array<Point, kJoints> offset;
-};
-
-SkinTransforms skin_transforms(const Body& body, const PosedSkeleton& posed) {
-  SkinTransforms out;
-  for (int j = 0; j < kJoints; ++j) {
-    out.rotation[j] = posed.global[j].cast<float>();
-    out.offset[j] = (posed.joints[j] - posed.global[j] * body.joints[j]).cast<float>();
-  }
-  return out;
-}
-
-/// The same as unit dual quaternions, and which of each pair must change sign to blend the short
-/// way.
+/// How each joint moves the rest surface, as unit dual quaternions, and which of each pair must
+/// change sign to blend the short way.
 struct DualTransforms {
   std::array<Vec4f, kJoints> real, dual;  // x, y, z, w
   float sign[kJoints][kJoints];
@@ -106,7 +92,7 @@ void add_muscle(JointMuscles& out, const Vec3& origin, const Vec3& bone, const V
   const Vec3 axis = bone / length;
   const Vec3 side = towards - axis * axis.dot(towards);
   if (!(side.norm() > 1e-6 * towards.norm())) return;
-  Muscle& m = out.muscle[static_cast<size_t>(out.count++)];
+  Muscle& m = out.muscle[out.count++];
   m.origin = origin.cast<float>();
   m.axis = axis.cast<float>();
   m.side = side.normalized().cast<float>();
@@ -202,19 +188,6 @@ void check_body(const Body& body, const char* who) {
                      std::to_string(body.blend_shapes->directions.rows() / 3));
 }
 
-/// A rest point moved by the weighted mean of its joints' transforms.
-Point blend_point(const Point& rest, const float* weights, const SkinTransforms& transforms) {
-  Mat3f rotation = Mat3f::Zero();
-  Point offset = Point::Zero();
-  for (int j = 0; j < kJoints; ++j) {
-    const float w = weights[j];
-    if (w == 0.0f) continue;
-    rotation += w * transforms.rotation[j];
-    offset += w * transforms.offset[j];
-  }
-  return rotation * rest + offset;
-}
-
 /// The local rotations less the identity, as blend shapes count them.
 Eigen::Matrix<float, PoseBlendShapes::kFeatures, 1> pose_features(const Pose& pose) {
   Eigen::Matrix<float, PoseBlendShapes::kFeatures, 1> out;
@@ -265,12 +238,12 @@ Points pose_surface(const Body& body, const Pose& pose, const std::vector<int32_
     }
   };
   if (body.blend_shapes) {
-    const SkinTransforms transforms = skin_transforms(body, posed);
     const auto& directions = body.blend_shapes->directions;
     const auto features = pose_features(pose);
     each([&](size_t v, const float* weights) {
-      const Point moved = directions.middleRows<3>(static_cast<Eigen::Index>(3 * v)) * features;
-      return blend_point(rest[v] + moved, weights, transforms);
+      const Point moved = directions.middleRows<3>(3 * v) * features;
+      return Point(
+          blend((rest[v] + moved).cast<double>(), weights, body.joints, posed).cast<float>());
     });
   } else {
     const DualTransforms transforms = dual_transforms(body, posed);
@@ -284,11 +257,12 @@ Points pose_surface(const Body& body, const Pose& pose, const std::vector<int32_
 
 Points linear_blend_skinning(const Body& body, const Pose& pose) {
   check_body(body, "linear_blend_skinning");
-  const SkinTransforms transforms = skin_transforms(body, forward_kinematics(body.joints, pose));
-  const Points& rest = body.rest.vertices;
-  Points out(rest.size());
-  for (size_t v = 0; v < rest.size(); ++v)
-    out[v] = blend_point(rest[v], body.weights.data() + v * kJoints, transforms);
+  const PosedSkeleton posed = forward_kinematics(body.joints, pose);
+  Points out;
+  for (size_t v = 0; v < body.rest.vertices.size(); ++v)
+    out.push_back(blend(body.rest.vertices[v].cast<double>(), body.weights.data() + v * kJoints,
+                        body.joints, posed)
+                      .cast<float>());
   return out;
 }
 

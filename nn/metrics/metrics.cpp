@@ -28,7 +28,7 @@ Value mean_over_frames(int64_t first, int64_t last,
   if (n <= 0) return std::nullopt;
   std::vector<double> each(static_cast<size_t>(n));
   parallel_for(n, 1, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i) each[static_cast<size_t>(i)] = of_frame(first + i);
+    for (int64_t i = begin; i < end; ++i) each[i] = of_frame(first + i);
   });
   double total = 0;
   for (const double x : each) total += x;
@@ -99,8 +99,8 @@ std::vector<Similarity> align(const Track& pred, const Track& truth, const Align
     case Alignment::Mode::frame:
       parallel_for(pred.frames, 1, [&](int64_t begin, int64_t end) {
         for (int64_t f = begin; f < end; ++f)
-          maps[static_cast<size_t>(f)] = procrustes(
-              pred.slice(f, f + 1).data, truth.slice(f, f + 1).data, pred.points, how.scale);
+          maps[f] = procrustes(pred.slice(f, f + 1).data, truth.slice(f, f + 1).data, pred.points,
+                               how.scale);
       });
       break;
   }
@@ -113,7 +113,7 @@ Value mean_distance(const Track& pred, const Track& truth, const Alignment& how)
   return mean_over_frames(0, pred.frames, [&](int64_t f) {
     double sum = 0;
     for (int64_t i = 0; i < pred.points; ++i)
-      sum += (apply(maps[static_cast<size_t>(f)], pred.at(f, i)) - truth.at(f, i)).norm();
+      sum += (apply(maps[f], pred.at(f, i)) - truth.at(f, i)).norm();
     return sum / static_cast<double>(pred.points);
   });
 }
@@ -126,8 +126,8 @@ std::vector<double> mean_distance_by_point(const Track& pred, const Track& truth
   for (int64_t i = 0; i < pred.points; ++i) {
     double sum = 0;
     for (int64_t f = 0; f < pred.frames; ++f)
-      sum += (apply(maps[static_cast<size_t>(f)], pred.at(f, i)) - truth.at(f, i)).norm();
-    mean[static_cast<size_t>(i)] = sum / static_cast<double>(pred.frames);
+      sum += (apply(maps[f], pred.at(f, i)) - truth.at(f, i)).norm();
+    mean[i] = sum / static_cast<double>(pred.frames);
   }
   return mean;
 }
@@ -135,9 +135,7 @@ std::vector<double> mean_distance_by_point(const Track& pred, const Track& truth
 Value acceleration_error(const Track& pred, const Track& truth, const Alignment& how) {
   if (!comparable(pred, truth) || pred.frames < 3) return std::nullopt;
   const auto maps = align(pred, truth, how);
-  const auto moved = [&](int64_t f, int64_t i) {
-    return apply(maps[static_cast<size_t>(f)], pred.at(f, i));
-  };
+  const auto moved = [&](int64_t f, int64_t i) { return apply(maps[f], pred.at(f, i)); };
   return mean_over_frames(1, pred.frames - 1, [&](int64_t f) {
     double sum = 0;
     for (int64_t i = 0; i < pred.points; ++i) {
@@ -162,7 +160,7 @@ Value edge_length_difference_mm(const Track& pred, const Track& truth, Neighbour
     double sum = 0;
     for (int64_t i = 0; i < pred.points; ++i)
       for (int k = 0; k < kEdgeNeighbours; ++k) {
-        const int64_t j = near[static_cast<size_t>(i * kEdgeNeighbours + k)];
+        const int64_t j = near[i * kEdgeNeighbours + k];
         sum += std::abs((pred.at(f, i) - pred.at(f, j)).norm() -
                         (truth.at(f, i) - truth.at(f, j)).norm());
       }

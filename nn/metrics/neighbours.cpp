@@ -44,8 +44,8 @@ class Nearest {
       distance_[i] = distance_[i - 1];
       index_[i] = index_[i - 1];
     }
-    distance_[static_cast<size_t>(at)] = distance;
-    index_[static_cast<size_t>(at)] = index;
+    distance_[at] = distance;
+    index_[at] = index;
     return true;
   }
   const std::array<uint32_t, kEdgeNeighbours>& indices() const { return index_; }

@@ -1,4 +1,4 @@
-#include "infer/writers/mesh_file.h"
+#include "nn/geometry/mesh_file.h"
 
 #include <bit>
 #include <cstdio>
@@ -21,8 +21,9 @@ void append(std::string& bytes, const T* values, size_t count) {
 
 const char* extension(MeshFormat format) { return format == MeshFormat::ply ? "ply" : "obj"; }
 
-std::string ply_bytes(const Points& vertices, const std::vector<Triangle>& faces) {
-  std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment restage, metres, y up\n";
+std::string ply_bytes(const Points& vertices, const std::vector<Triangle>& faces, bool comment) {
+  std::string bytes = "ply\nformat binary_little_endian 1.0\n";
+  if (comment) bytes += "comment restage, metres, y up\n";
   bytes += "element vertex " + std::to_string(vertices.size()) + "\n";
   bytes += "property float x\nproperty float y\nproperty float z\n";
   if (!faces.empty())
@@ -38,8 +39,8 @@ std::string ply_bytes(const Points& vertices, const std::vector<Triangle>& faces
   return bytes;
 }
 
-std::string obj_bytes(const Points& vertices, const std::vector<Triangle>& faces) {
-  std::string text = "# restage, metres, y up\n";
+std::string obj_bytes(const Points& vertices, const std::vector<Triangle>& faces, bool comment) {
+  std::string text = comment ? "# restage, metres, y up\n" : "";
   text.reserve(vertices.size() * 40 + faces.size() * 24);
   char line[96];
   for (const Point& p : vertices) {

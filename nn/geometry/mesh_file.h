@@ -1,5 +1,5 @@
-// Bytes of single meshes and clouds: binary little-endian PLY and OBJ. Written here and not with
-// the readers because inference and data sources do not see each other.
+// Bytes of single meshes and clouds: binary little-endian PLY and OBJ. Both keep every bit of a
+// float.
 #pragma once
 
 #include <string>
@@ -13,10 +13,13 @@ enum class MeshFormat { ply, obj };
 
 /// "ply" or "obj", without a dot.
 const char* extension(MeshFormat format);
-/// Binary PLY, float32 x y z in metres; faces as `list uchar int vertex_indices`, none for a cloud.
-std::string ply_bytes(const Points& vertices, const std::vector<Triangle>& faces);
-/// OBJ text, nine significant digits (float32 comes back exactly), 1-based faces.
-std::string obj_bytes(const Points& vertices, const std::vector<Triangle>& faces);
+/// Binary PLY, float32 x y z; faces as `list uchar int vertex_indices`, none for a cloud. `comment`:
+/// a line on who wrote it, in metres and y up.
+std::string ply_bytes(const Points& vertices, const std::vector<Triangle>& faces,
+                      bool comment = true);
+/// OBJ text, nine significant digits, 1-based faces.
+std::string obj_bytes(const Points& vertices, const std::vector<Triangle>& faces,
+                      bool comment = true);
 std::string mesh_bytes(MeshFormat format, const Points& vertices,
                        const std::vector<Triangle>& faces);
 /// InputError, naming `where`, when the mesh is empty, a coordinate is not finite, or a face names
