@@ -37,7 +37,8 @@ struct LeaseOptions {
 /// What the file of a lease says.
 struct LeaseHolder {
   std::string host, who;
-  int64_t pid = 0;
+  int64_t pid = 0, beat = 0;
+  bool here = false;  ///< on this host, so that its number and start time decide
   std::string text() const;  ///< "process 12 on host a (trial 4f2a)"
 };
 
@@ -56,7 +57,7 @@ class Lease {
   Lease& operator=(Lease&&) = delete;
   ~Lease();  ///< releases
 
-  /// Somebody else holds it now: this process was taken for dead.
+  /// Somebody else holds it now, or might: this process was, or will be, taken for dead.
   bool lost() const;
   /// The work is done and will be seen to be done: removes the lease's files.
   void forget();

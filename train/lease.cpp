@@ -1,0 +1,350 @@
+#include "train/lease.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <charconv>
+#include <chrono>
+#include <condition_variable>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <thread>
+#include <vector>
+
+#include "autograd/base/error.h"
+
+namespace restage {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+using Seconds = std::chrono::duration<double>;
+
+/// A record is one text of this size, so that a heartbeat replaces it at one blow.
+constexpr size_t kRecord = 1024;
+constexpr int kTries = 1000;
+
+std::string first_line(const std::string& path) {
+  std::ifstream file(path);
+  std::string line;
+  std::getline(file, line);
+  return line;
+}
+
+/// Where process numbers mean the same: the running kernel and the process namespace.
+const std::string& process_world() {
+  static const std::string world = [] {
+    char name[64] = "";
+    const ssize_t n = ::readlink("/proc/self/ns/pid", name, sizeof name - 1);
+    return first_line("/proc/sys/kernel/random/boot_id") + "/" +
+           std::string(name, n > 0 ? static_cast<size_t>(n) : 0);
+  }();
+  return world;
+}
+
+std::string host_name() {
+  char name[256] = "";
+  if (::gethostname(name, sizeof name - 1) != 0) return "unknown";
+  return name;
+}
+
+/// Ticks from the boot to the start of a process: "" if that cannot be seen, "dead" if it is dead
+/// and not yet buried by its parent. After the name, which may hold anything, the state is the
+/// first word and the start time the 20th.
+std::string start_of(int64_t pid) {
+  const std::string line = first_line("/proc/" + std::to_string(pid) + "/stat");
+  const size_t name_end = line.rfind(')');
+  if (name_end == std::string::npos || name_end + 2 >= line.size()) return "";
+  const char state = line[name_end + 2];
+  if (state == 'Z' || state == 'X') return "dead";
+  size_t at = name_end + 2;
+  for (int word = 1; word < 20 && at != std::string::npos; ++word) at = line.find(' ', at) + 1;
+  return line.substr(at, line.find(' ', at) - at);
+}
+
+/// Of this host: is this process there, and the same that it was?
+bool runs(int64_t pid, const std::string& start) {
+  const std::string now = start_of(pid);
+  if (now.empty() || start.empty())  // /proc shows nothing, perhaps of another user
+    return ::kill(static_cast<pid_t>(pid), 0) == 0 || errno == EPERM;
+  return now == start;
+}
+
+struct Record {
+  LeaseHolder holder;
+  std::string world, start, token;
+  bool released = false;
+
+  /// Of `kRecord` bytes, and what changes has its place in them: a reader in the middle of a
+  /// heartbeat sees no broken text.
+  std::string text() const {
+    const nlohmann::ordered_json json = {{"host", holder.host}, {"pid", holder.pid},
+                                         {"who", holder.who},   {"start", start},
+                                         {"world", world},      {"token", token}};
+    std::string out =
+        json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+    char changing[80];
+    std::snprintf(changing, sizeof changing, ",\"released\":%d,\"beat\":%20lld}", released ? 1 : 0,
+                  static_cast<long long>(holder.beat));
+    out.back() = ' ';
+    out += changing;
+    out.resize(kRecord - 1, ' ');
+    return out + "\n";
+  }
+};
+
+std::string numbered(const std::string& path, int64_t number) {
+  return path + "." + std::to_string(number);
+}
+
+/// Nothing: no such file. A file that is not a lease's counts as one of a dead holder.
+std::optional<Record> read_record(const std::string& file) {
+  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd < 0) return std::nullopt;
+  std::string bytes(kRecord, ' ');
+  const ssize_t n = ::pread(fd, bytes.data(), bytes.size(), 0);
+  ::close(fd);
+  bytes.resize(n > 0 ? static_cast<size_t>(n) : 0);
+  Record out;
+  const auto json = nlohmann::json::parse(bytes, nullptr, false);
+  const auto text = [&](const char* key) {
+    const auto found = json.find(key);
+    return found != json.end() && found->is_string() ? found->get<std::string>() : std::string();
+  };
+  const auto number = [&](const char* key) {
+    const auto found = json.find(key);
+    return found != json.end() && found->is_number_integer() ? found->get<int64_t>() : 0;
+  };
+  if (!json.is_object()) {
+    out.released = true;
+    return out;
+  }
+  out.holder = {text("host"), text("who"), number("pid"), number("beat"),
+                text("world") == process_world()};
+  out.world = text("world");
+  out.start = text("start");
+  out.token = text("token");
+  out.released = number("released") != 0;
+  return out;
+}
+
+/// The highest number there is; 0: none.
+int64_t last_number(const std::string& path) {
+  const fs::path folder = fs::path(path).parent_path();
+  const std::string prefix = fs::path(path).filename().string() + ".";
+  int64_t last = 0;
+  std::error_code error;
+  for (fs::directory_iterator it(folder.empty() ? "." : folder, error), end; !error && it != end;
+       it.increment(error)) {
+    const std::string name = it->path().filename().string();
+    if (!name.starts_with(prefix)) continue;
+    int64_t number = 0;
+    const char* stop = name.data() + name.size();
+    const auto found = std::from_chars(name.data() + prefix.size(), stop, number);
+    if (found.ec == std::errc() && found.ptr == stop) last = std::max(last, number);
+  }
+  return last;
+}
+
+/// Known at once: free, or of a process of ours that is dead.
+bool surely_free(const Record& record) {
+  if (record.released) return true;
+  return record.holder.here && !runs(record.holder.pid, record.start);
+}
+
+[[noreturn]] void fail(const std::string& path) {
+  throw WorkError(path + ": the lease could not be written (" + std::strerror(errno) +
+                  "); free some space, or make the folder writable");
+}
+
+/// The file of a lease to be, complete, under a name that nobody else uses.
+std::string draft(const std::string& path, const Record& record) {
+  const std::string name = path + "-" + record.token;
+  const int fd = ::open(name.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0644);
+  if (fd < 0) fail(path);
+  const std::string text = record.text();
+  const bool good = ::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
+                    ::fsync(fd) == 0;
+  const int code = good ? 0 : errno;
+  ::close(fd);
+  if (good) return name;
+  ::unlink(name.c_str());
+  errno = code == 0 ? ENOSPC : code;
+  fail(path);
+}
+
+/// One name for a file, for one process only. A network file system may do it and answer that it
+/// failed: the count of names tells.
+bool link_once(const std::string& from, const std::string& to) {
+  if (::link(from.c_str(), to.c_str()) == 0) return true;
+  const int code = errno;
+  struct stat found {};
+  if (::stat(from.c_str(), &found) == 0 && found.st_nlink == 2) return true;
+  errno = code;
+  return false;
+}
+
+std::string fresh_token() {
+  unsigned char bytes[8] = {};
+  const int fd = ::open("/dev/urandom", O_RDONLY | O_CLOEXEC);
+  if (fd < 0 || ::read(fd, bytes, sizeof bytes) != sizeof bytes)
+    throw WorkError("no random numbers from the system");
+  ::close(fd);
+  std::string out;
+  for (const unsigned char byte : bytes) {
+    out += "0123456789abcdef"[byte >> 4];
+    out += "0123456789abcdef"[byte & 15];
+  }
+  return out;
+}
+
+/// Waits until the heartbeat of the holder in `file` moves (true), or does not for `patience`. Time
+/// in which we ourselves stood still (a stalled file system, a suspended process) does not count.
+bool beats(const std::string& file, const Record& record, double patience) {
+  const double nap = std::clamp(patience / 20, 0.01, 1.0);
+  for (double waited = 0; waited < patience;) {
+    const auto before = Clock::now();
+    std::this_thread::sleep_for(Seconds(nap));
+    const std::optional<Record> now = read_record(file);
+    if (!now || now->released) return false;
+    if (now->token != record.token || now->holder.beat != record.holder.beat) return true;
+    waited += std::min(Seconds(Clock::now() - before).count(), 2 * nap);
+  }
+  return false;
+}
+
+}  // namespace
+
+std::string LeaseHolder::text() const {
+  return "process " + std::to_string(pid) + " on host " + host + " (" + who + ")";
+}
+
+struct Lease::State {
+  std::string path, file;
+  int64_t number = 0;
+  Record record;
+  LeaseOptions options;
+  std::atomic<bool> lost = false;
+  std::mutex mutex;
+  std::condition_variable wake;
+  bool ending = false, forgotten = false;
+  std::thread thread;
+
+  /// Somebody linked the next number, or removed ours after finishing the work.
+  bool superseded() const {
+    return ::access(numbered(path, number + 1).c_str(), F_OK) == 0 ||
+           ::access(file.c_str(), F_OK) != 0;
+  }
+  /// In place: no new block of a full disk is needed. False: the file could not be written.
+  bool write() {
+    const int fd = ::open(file.c_str(), O_WRONLY | O_CLOEXEC);
+    if (fd < 0) return false;
+    const std::string text = record.text();
+    const bool good = ::pwrite(fd, text.data(), text.size(), 0) == static_cast<ssize_t>(text.size());
+    return ::close(fd) == 0 && good;
+  }
+  void beat_until_end() {
+    auto written = Clock::now();
+    std::unique_lock lock(mutex);
+    while (!wake.wait_for(lock, Seconds(options.beat), [&] { return ending; })) {
+      lock.unlock();
+      ++record.holder.beat;
+      if (superseded()) {
+        lost = true;
+      } else if (write()) {
+        written = Clock::now();
+      } else if (Seconds(Clock::now() - written).count() > options.patience / 2) {
+        lost = true;  // others may take us for dead from now on
+      }
+      if (options.on_beat) options.on_beat();
+      lock.lock();
+    }
+  }
+  ~State() {
+    {
+      const std::lock_guard lock(mutex);
+      ending = true;
+    }
+    wake.notify_all();
+    if (thread.joinable()) thread.join();
+    if (forgotten || superseded()) return;
+    record.released = true;
+    write();
+  }
+};
+
+std::optional<Lease> Lease::take(const std::string& path, const std::string& who,
+                                 LeaseOptions options) {
+  auto state = std::make_unique<State>();
+  state->path = path;
+  state->options = std::move(options);
+  state->record.holder = {host_name(), who.substr(0, 200), ::getpid(), 0, true};
+  state->record.world = process_world();
+  state->record.start = start_of(::getpid());
+  state->record.token = fresh_token();
+  const std::string name = draft(path, state->record);
+  struct Remove {
+    const std::string& name;
+    ~Remove() { ::unlink(name.c_str()); }
+  } const remove{name};
+
+  int64_t number = last_number(path);
+  for (int i = 0; i < kTries; ++i) {
+    if (const auto now = read_record(numbered(path, number)); number > 0 && now) {
+      if (!surely_free(*now)) {
+        if (now->holder.here) return std::nullopt;
+        if (beats(numbered(path, number), *now, state->options.patience)) return std::nullopt;
+        if (const auto later = last_number(path); later > number) {
+          number = later;
+          continue;
+        }
+      }
+    }
+    state->number = number + 1;
+    state->file = numbered(path, state->number);
+    if (link_once(name, state->file)) {
+      if (last_number(path) > state->number) {  // others have come and gone: ours is of the past
+        ::unlink(state->file.c_str());
+        number = last_number(path);
+        continue;
+      }
+      state->thread = std::thread([raw = state.get()] { raw->beat_until_end(); });
+      return Lease(std::move(state));
+    }
+    if (errno != EEXIST) fail(path);
+    number = std::max(number + 1, last_number(path));
+  }
+  throw WorkError(path + ": the lease changes hands all the time; try again later");
+}
+
+std::optional<LeaseHolder> Lease::holder(const std::string& path) {
+  const int64_t number = last_number(path);
+  if (number == 0) return std::nullopt;
+  const auto record = read_record(numbered(path, number));
+  if (!record || surely_free(*record)) return std::nullopt;
+  return record->holder;
+}
+
+Lease::Lease(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Lease::Lease(Lease&&) noexcept = default;
+Lease::~Lease() = default;
+
+bool Lease::lost() const { return state_->lost || state_->superseded(); }
+
+void Lease::forget() {
+  state_->forgotten = true;
+  const int64_t last = state_->number;
+  for (int64_t number = 1; number <= last; ++number)
+    ::unlink(numbered(state_->path, number).c_str());
+}
+
+}  // namespace restage
