@@ -195,15 +195,20 @@ bool artifact_there(const std::string& store, const std::string& stage, const st
   return fs::exists(fs::path(store) / (stage + "-" + id), ignored);
 }
 
-TrialOutcome run_trial(const std::string& config_yaml_path, const Evaluate& evaluate,
-                       const std::string& store, const std::string& folder, bool quiet) {
+TrialOutcome run_trial(const std::string& config_yaml_path, const std::string& id,
+                       const Evaluate& evaluate, const std::string& store,
+                       const std::string& folder, bool quiet) {
   const ConfigNode tree = load_config_tree(config_yaml_path);
   const TrainConfig config = read(tree);
   if (!evaluate.benchmark.empty())
     throw WorkError("trials cannot be measured on a benchmark yet");
   TrialOutcome out;
-  TrialPlanner planner(evaluate, store);
-  for (const StageArtifact& artifact : planner.plan(tree).artifacts)
+  const PlannedTrial planned = TrialPlanner(evaluate, store).plan(tree);
+  if (planned.id != id)
+    throw InputError(config_yaml_path,
+                     "asks another question (" + planned.id + ") than it was planned for",
+                     "its data or the program changed: plan the sweep again");
+  for (const StageArtifact& artifact : planned.artifacts)
     out.artifacts[artifact.stage] = artifact.id;
 
   const std::string weights = folder + "/run/weights.safetensors";

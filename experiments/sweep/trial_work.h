@@ -59,11 +59,13 @@ struct TrialOutcome {
   Json metrics = Json::object();  ///< {set: {"mean": {...}, "sequences": [{"name", ...}]}}
 };
 
-/// Trains what is missing and evaluates. `folder`: of the trial, for what it needs on the way. May
-/// be called again after an interruption and goes on where it was. Throws Interrupted after a
-/// checkpoint if a signal came (the caller has a StopScope).
-TrialOutcome run_trial(const std::string& config_yaml_path, const Evaluate& evaluate,
-                       const std::string& store, const std::string& folder, bool quiet);
+/// Trains what is missing and evaluates. `id`: InputError if the trial is another one by now, since
+/// its data changed. `folder`: of the trial, for what it needs on the way. May be called again after
+/// an interruption and goes on where it was. Throws Interrupted after a checkpoint if a signal came
+/// (the caller has a StopScope).
+TrialOutcome run_trial(const std::string& config_yaml_path, const std::string& id,
+                       const Evaluate& evaluate, const std::string& store,
+                       const std::string& folder, bool quiet);
 
 /// What a few steps of a stage cost.
 struct Measured {
