@@ -244,6 +244,7 @@ int run_stop(const std::string& path, double wait, const Common& common) {
 
 }  // namespace
 
+void add_sweep(Program& program);
 void add_sweep(Program& program) {
   CLI::App& group = program.add_group("sweep", "many trainings from one file");
 
