@@ -65,6 +65,25 @@ const ConfigNode* value_of(const std::string& key, const Combination& combinatio
   return nullptr;
 }
 
+std::vector<std::string> keys_of(const SweepFile& file) {
+  std::vector<std::string> out;
+  for (const Axis& axis : file.axes) out.insert(out.end(), axis.keys.begin(), axis.keys.end());
+  for (const Setting& setting : file.set) out.push_back(setting.key);
+  for (const Case& one : file.cases)
+    for (const Setting& setting : one.settings) out.push_back(setting.key);
+  return out;
+}
+
+std::string how_to_mend(const Exclusion& exclusion, const std::vector<std::string>& keys) {
+  for (const Setting& wanted : exclusion.values) {
+    if (std::find(keys.begin(), keys.end(), wanted.key) != keys.end()) continue;
+    const std::string close = nearest(wanted.key, keys);
+    return close.empty() ? "nothing here varies " + in_quotes(wanted.key)
+                         : "did you mean " + in_quotes(close) + "?";
+  }
+  return "correct its values, or remove it";
+}
+
 /// Leaves out what `exclude` names. Each of its entries must have an effect.
 std::vector<Combination> without_excluded(const SweepFile& file, std::vector<Combination> all) {
   std::set<const Exclusion*> used;
@@ -85,15 +104,8 @@ std::vector<Combination> without_excluded(const SweepFile& file, std::vector<Com
   }
   for (const Exclusion& exclusion : file.exclude) {
     if (used.contains(&exclusion)) continue;
-    std::string fix = "correct its values, or remove it";
-    for (const Setting& wanted : exclusion.values) {
-      std::vector<std::string> keys;
-      for (const Combination& combination : {all.front()})
-        for (const Setting& setting : combination.settings) keys.push_back(setting.key);
-      const std::string close = nearest(wanted.key, keys);
-      if (!close.empty() && close != wanted.key) fix = "did you mean " + in_quotes(close) + "?";
-    }
-    throw InputError(exclusion.place.text(), "this 'exclude' matches no combination", fix);
+    throw InputError(exclusion.place.text(), "this 'exclude' matches no combination",
+                     how_to_mend(exclusion, keys_of(file)));
   }
   if (out.empty()) throw InputError(file.path, "'exclude' leaves no trial", "exclude less");
   return out;

@@ -114,19 +114,27 @@ struct TrialPlanner::Memory {
   std::string store, benchmark;  // its manifest's SHA-256
   std::map<std::string, std::string> training, test;
   std::set<std::string> good;
+  std::string loaded;  // of these:
+  Corpus train, validation;
 
+  void load(const TrainConfig& config, const std::string& key) {
+    if (loaded == key) return;
+    train = load_corpus(config.data, "train");
+    validation = load_corpus(config.data, "validation");
+    loaded = key;
+  }
   void look(const TrainConfig& config, const std::string& key) {
     if (training.contains(key)) return;
-    const Corpus train = load_corpus(config.data, "train");
-    const Corpus validation = load_corpus(config.data, "validation");
+    load(config, key);
     training[key] = checksum(train) + checksum(validation);
     if (evaluate.benchmark.empty()) test[key] = checksum(load_corpus(config.data, "test"));
   }
   /// Models of unknown names, sizes that do not fit together, windows longer than every motion.
-  void check(const TrainConfig& config, const std::string& stage, const std::string& id) {
+  void check(const TrainConfig& config, const std::string& key, const std::string& stage,
+             const std::string& id) {
     if (!good.insert(id).second) return;
-    make_stage(stage, config, load_corpus(config.data, "train"),
-               load_corpus(config.data, "validation"));
+    load(config, key);
+    make_stage(stage, config, train, validation);
   }
 };
 
@@ -168,7 +176,7 @@ PlannedTrial TrialPlanner::plan(const ConfigNode& tree) {
                                   {"precision", all["precision"]},
                                   {"seed", config.seed},
                                   {"data", memory_->training[data_key]}});
-    memory_->check(config, stage, id);
+    memory_->check(config, data_key, stage, id);
     trial["stages"].push_back({stage, id});
     out.artifacts.push_back({stage, id, artifact_there(memory_->store, stage, id)});
   }

@@ -102,7 +102,8 @@ class Plans(Sweep):
         self.bad_input(["sweep", "plan", "sweep.yaml", "data.source='a,b'"], "a,b")  # quotes keep a comma: one file, missing
 
     def test_out_is_ready_for_any_engine(self):
-        self.done("sweep", "plan", "sweep.yaml", "--out", "d", "stages=[deformation]", "motion.optimiser.steps=2", "deformation.optimiser.steps=2,3")
+        self.write("sweep.yaml", SWEEP)
+        self.done("sweep", "plan", "sweep.yaml", "--out", "d", "deformation.optimiser.steps=2,3")
         again = self.json("sweep", "plan", "d/sweep.yaml")  # the resolved file stands for itself
         self.assertEqual(sorted(os.listdir(self.path("d"))), ["plan.json", "sweep.yaml", "trials"])
         self.assertEqual(sorted(os.listdir(self.path("d/trials"))), sorted(t["id"] for t in again["trials"]))
@@ -216,7 +217,7 @@ class Runs(Sweep):
         more = self.restage("sweep", "run", "sweep.yaml", "--out", "d", "seeds=3,4")
         self.assertEqual((more.code, more.out), (0, "4 done\n"), more.err)
         self.assertEqual([self.bytes("d/trials/%s/result.json" % t["id"]) for t in plan], before)
-        self.assertEqual(self.done("trial", "d", plan[0]["id"]), "trial %s is done before\n".replace("is done", "was done") % plan[0]["id"])
+        self.assertEqual(self.done("trial", "d", plan[0]["id"]), "trial %s was done before\n" % plan[0]["id"])
         # An edited base asks other questions; what is there belongs to its id and is told, not used.
         self.write("configs/tiny.yaml", BASE.replace("self_share: 0.25", "self_share: 0.5"))
         changed = self.restage("sweep", "run", "sweep.yaml", "--out", "d")
@@ -261,7 +262,8 @@ class Runs(Sweep):
         self.assertEqual(self.result(trial)["state"], "stopped")
 
     def test_stopped_and_gone_on(self):
-        slow = ["deformation.optimiser.steps=400", "stages=[deformation]", "motion.optimiser.steps=2", "seeds=1,2,3"]
+        self.write("sweep.yaml", "base: configs/tiny.yaml\nset: {stages: [deformation], deformation.optimiser.steps: 4000}\nseeds: [1, 2, 3]\n")
+        slow = []
         whole = self.restage("sweep", "run", "sweep.yaml", "--out", "whole", *slow)
         self.assertEqual(whole.code, 0, whole.err)
         sweeper = self.start("sweep", "run", "sweep.yaml", "--out", "d", "--jobs", "2", *slow)
@@ -287,12 +289,11 @@ class Runs(Sweep):
             self.assertEqual(self.running(), [])
             self.assertEqual(self.json("sweep", "status", "d")["counts"]["stopped"], 1)
 
-    def test_a_killed_trial_is_retried_and_told(self):
+    def test_a_killed_trial_is_told(self):
         sweeper = self.start("sweep", "run", "sweep.yaml", "--out", "d", "skeleton.optimiser.steps=1000000", "motion.optimiser.steps=2")
-        for _ in range(1):
-            self.wait_for(lambda: os.path.exists(self.path("d/plan.json")) and self.running())
-            holder = self.json("sweep", "status", "d")["trials"][0]["holder"]
-            os.kill(int(holder.split()[1]), signal.SIGKILL)
+        self.wait_for(lambda: os.path.exists(self.path("d/plan.json")) and self.running())
+        holder = self.json("sweep", "status", "d")["trials"][0]["holder"]
+        os.kill(int(holder.split()[1]), signal.SIGKILL)
         self.assertEqual(sweeper.wait(60), 1)
         failed = self.json("sweep", "status", "d")["trials"][0]
         self.assertEqual(failed["state"], "failed")

@@ -165,7 +165,7 @@ def no_memory(world, *_):
     """Trials that may not have the memory they need: all fail or are killed, the sweeper says so and ends; with memory it goes on."""
     def little():
         resource.setrlimit(resource.RLIMIT_AS, (world.little_memory, world.little_memory))
-    _, code = world.run(*world.words("memory"))if False else world.run("sweep", "plan", "sweep.yaml", "--out", "memory", "store=memory-store")
+    world.run("sweep", "plan", "sweep.yaml", "--out", "memory", "store=memory-store")
     states = []
     for trial in world.status("memory")["trials"]:
         process = world.start("trial", "memory", trial["id"], before=little)
