@@ -257,15 +257,17 @@ struct Lease::State {
     std::unique_lock lock(mutex);
     while (!wake.wait_for(lock, Seconds(options.beat), [&] { return ending; })) {
       lock.unlock();
-      ++record.holder.beat;
-      if (superseded()) {
-        lost = true;
-      } else if (write()) {
-        written = Clock::now();
-      } else if (Seconds(Clock::now() - written).count() > options.patience / 2) {
-        lost = true;  // others may take us for dead from now on
+      bool good = false;
+      try {
+        ++record.holder.beat;
+        if (superseded()) lost = true;
+        good = !lost && write();
+        if (options.on_beat) options.on_beat();
+      } catch (...) {  // no memory, which the work will find out by itself
       }
-      if (options.on_beat) options.on_beat();
+      if (good) written = Clock::now();
+      // Others may take us for dead from then on.
+      if (Seconds(Clock::now() - written).count() > options.patience / 2) lost = true;
       lock.lock();
     }
   }

@@ -1,9 +1,13 @@
 #include "experiments/cli/commands.h"
 
 namespace restage::cli {
+void add_sweep(Program& program);
+void add_trial(Program& program);
 
 void add_commands(Program& program) {
   add_train(program);
+  add_sweep(program);
+  add_trial(program);
   add_retarget(program);
   add_skeleton(program);
   add_data(program);

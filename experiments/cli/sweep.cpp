@@ -1,0 +1,305 @@
+// restage sweep plan, run, status, stop: many trainings from one file.
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <thread>
+
+#include "autograd/base/interrupt.h"
+#include "autograd/base/log.h"
+#include "autograd/base/parallel.h"
+#include "experiments/cli/commands.h"
+#include "experiments/cli/output.h"
+#include "experiments/sweep/plan.h"
+#include "experiments/sweep/pool.h"
+#include "experiments/sweep/sweep_dir.h"
+#include "train/progress.h"
+
+namespace restage::cli {
+namespace {
+
+using sweep::PlannedTrial;
+using sweep::SweepDir;
+using sweep::SweepPlan;
+
+struct PlanOptions {
+  std::vector<std::string> arguments;
+  std::string out;
+  bool measure = false, seed_given = false;
+};
+
+struct RunOptions {
+  std::vector<std::string> arguments;
+  std::string out;
+  int jobs = 1;
+  bool seed_given = false;
+};
+
+/// SWEEP.yaml and key=value, in any order.
+std::pair<std::string, std::vector<std::string>> split(const std::vector<std::string>& arguments) {
+  std::pair<std::string, std::vector<std::string>> out;
+  for (const std::string& argument : arguments) {
+    if (argument.find('=') != std::string::npos)
+      out.second.push_back(argument);
+    else if (out.first.empty())
+      out.first = argument;
+    else
+      throw InputError("", "there are two sweep files, '" + out.first + "' and '" + argument + "'",
+                       "give one");
+  }
+  if (out.first.empty())
+    throw InputError("", "no sweep file was given",
+                     "use 'restage sweep plan SWEEP.yaml [key=value ...]'");
+  return out;
+}
+
+// ---- plan ----
+
+sweep::Json overrides_json(const PlannedTrial& trial) {
+  sweep::Json out = sweep::Json::object();
+  for (const auto& [key, value] : trial.overrides) out[key] = sweep::as_json(value);
+  return out;
+}
+
+Json plan_json(const SweepPlan& plan) {
+  Json trials = Json::array();
+  for (const PlannedTrial& trial : plan.trials) {
+    Json artifacts = Json::object();
+    for (const auto& artifact : trial.artifacts) artifacts[artifact.stage] = artifact.id;
+    trials.push_back({{"id", trial.id},
+                      {"case", trial.case_name},
+                      {"seed", trial.seed},
+                      {"overrides", overrides_json(trial)},
+                      {"artifacts", std::move(artifacts)}});
+  }
+  return {{"trials", std::move(trials)},
+          {"artifacts",
+           {{"there", plan.there}, {"to_make", plan.to_make}, {"shared", plan.shared}}}};
+}
+
+std::string plan_text(const SweepPlan& plan) {
+  std::map<std::string, int> uses;
+  for (const PlannedTrial& trial : plan.trials)
+    for (const auto& artifact : trial.artifacts) ++uses[artifact.stage + "-" + artifact.id];
+  std::vector<std::vector<std::string>> rows{{"trial", "case", "seed", "differs in", "artifacts"}};
+  for (const PlannedTrial& trial : plan.trials) {
+    std::string artifacts;
+    for (const auto& artifact : trial.artifacts) {
+      const int n = uses[artifact.stage + "-" + artifact.id];
+      artifacts += (artifacts.empty() ? "" : ", ") + artifact.stage + "-" + artifact.id;
+      artifacts += artifact.there ? " (there)" : n > 1 ? " (shared by " + std::to_string(n) + ")" : "";
+    }
+    const std::string differs = sweep::describe(trial);
+    rows.push_back({trial.id, trial.case_name.empty() ? "-" : trial.case_name,
+                    std::to_string(trial.seed), differs.empty() ? "-" : differs, artifacts});
+  }
+  return markdown_table(rows) + "\n" + std::to_string(plan.trials.size()) + " trials; artifacts: " +
+         std::to_string(plan.there) + " there, " + std::to_string(plan.to_make) + " to make, " +
+         std::to_string(plan.shared) + " shared by several trials\n";
+}
+
+int run_plan(const PlanOptions& options, const Common& common) {
+  auto [path, words] = split(options.arguments);
+  if (options.seed_given) words.push_back("seed=" + std::to_string(common.seed));
+  const sweep::SweepFile file = sweep::read_sweep_file(path, words);
+  const SweepPlan plan = sweep::plan_sweep(file);
+  Json document = plan_json(plan);
+  std::string text = plan_text(plan);
+  if (options.measure) {
+    const sweep::Forecast forecast = sweep::measure(plan);
+    document["forecast"] = {{"seconds", forecast.seconds}, {"memory_bytes", forecast.memory_bytes}};
+    char line[160];
+    std::snprintf(line, sizeof line,
+                  "about %s of training one after the other on %d threads, %.0f MiB of tensors\n",
+                  duration_text(forecast.seconds).c_str(), threads(),
+                  static_cast<double>(forecast.memory_bytes) / 1048576.0);
+    text += line;
+  } else if (plan.to_make > 0) {
+    text += "--measure forecasts time and memory from a few steps\n";
+  }
+  if (!options.out.empty()) {
+    const int stale = sweep::write_sweep_dir(options.out, file, plan);
+    if (stale > 0)
+      log_warning(std::to_string(stale) + " trials in " + options.out +
+                  " are not of this sweep: they stay and are not counted");
+  }
+  if (common.json)
+    print_json(document);
+  else
+    print(text);
+  return 0;
+}
+
+// ---- status ----
+
+Json status_json(const SweepDir& dir) {
+  Json counts = {{"pending", 0}, {"running", 0}, {"done", 0}, {"failed", 0}, {"stopped", 0}};
+  Json trials = Json::array();
+  for (const sweep::TrialEntry& trial : dir.trials) {
+    const sweep::TrialStatus status = status_of(dir, trial);
+    counts[status.state] = counts.value(status.state, 0) + 1;
+    trials.push_back({{"id", trial.id},
+                      {"case", trial.case_name},
+                      {"seed", trial.seed},
+                      {"overrides", trial.overrides},
+                      {"state", status.state},
+                      {"error", status.error.empty() ? Json(nullptr) : Json(status.error)},
+                      {"seconds", status.seconds},
+                      {"holder", status.holder ? Json(status.holder->text()) : Json(nullptr)}});
+  }
+  return {{"counts", std::move(counts)}, {"trials", std::move(trials)}};
+}
+
+std::string counts_text(const Json& status) {
+  std::string out;
+  for (const auto& [state, n] : status["counts"].items())
+    if (n != 0) out += (out.empty() ? "" : ", ") + std::to_string(n.get<int>()) + " " + state;
+  return out + "\n";
+}
+
+std::string status_text(const Json& status) {
+  std::string out = counts_text(status);
+  for (const Json& trial : status["trials"]) {
+    out += trial["id"].get<std::string>() + "  " + trial["state"].get<std::string>();
+    if (const std::string name = trial["case"]; !name.empty()) out += "  " + name;
+    out += "  seed " + trial["seed"].dump();
+    for (const auto& [key, value] : trial["overrides"].items()) out += "  " + key + "=" + value.dump();
+    for (const char* more : {"holder", "error"})
+      if (trial[more].is_string()) out += "  " + on_one_line(trial[more]);
+    out += "\n";
+  }
+  return out;
+}
+
+// ---- run ----
+
+/// Planning reads data and builds models; a process of its own takes that memory with it.
+int plan_in_a_process(const RunOptions& options, const Common& common) {
+  std::vector<std::string> words = {"restage", "sweep", "plan", "--out", options.out, "--threads",
+                                    std::to_string(common.threads)};
+  if (options.seed_given) words.insert(words.end(), {"--seed", std::to_string(common.seed)});
+  if (common.quiet) words.emplace_back("--quiet");
+  words.insert(words.end(), options.arguments.begin(), options.arguments.end());
+  const int pid = sweep::spawn_self(words, "", false);
+  int status = 0;
+  while (::waitpid(pid, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (WIFEXITED(status)) return WEXITSTATUS(status);
+  throw WorkError("planning was killed by signal " + std::to_string(WTERMSIG(status)));
+}
+
+int run_run(const RunOptions& options, const Common& common) {
+  split(options.arguments);
+  if (options.jobs < 1)
+    throw InputError("", "--jobs " + std::to_string(options.jobs) + " is out of range",
+                     "give 1 or more");
+  const StopScope stop;
+  if (const int code = plan_in_a_process(options, common); code != 0) return code;
+  SweepDir dir = sweep::read_sweep_dir(options.out);
+  const int each = std::max(1, threads() / options.jobs);
+  const sweep::PoolOutcome outcome = sweep::run_pool(dir, {options.jobs, each});
+  const Json status = status_json(dir);
+  if (common.json)
+    print_json(status);
+  else
+    print(counts_text(status));
+  finish_output();
+  if (outcome.stop_requested && outcome.pending + outcome.stopped > 0)
+    throw WorkError("stopped by 'restage sweep stop'; 'restage sweep run' goes on");
+  return outcome.done == std::ssize(dir.trials) ? 0 : 1;
+}
+
+// ---- stop ----
+
+int run_stop(const std::string& path, double wait, const Common& common) {
+  const SweepDir dir = sweep::read_sweep_dir(path);
+  sweep::request_stop(path);
+  const auto running = [&] {
+    std::vector<std::string> ids;
+    for (const sweep::TrialEntry& trial : dir.trials)
+      if (status_of(dir, trial).state == "running") ids.push_back(trial.id);
+    return ids;
+  };
+  const auto start = std::chrono::steady_clock::now();
+  std::vector<std::string> left = running();
+  log_info("asked " + std::to_string(left.size()) + " running trials to stop");
+  while (!left.empty() &&
+         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() < wait) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    left = running();
+  }
+  const Json status = status_json(dir);
+  if (common.json)
+    print_json(status);
+  else
+    print(counts_text(status));
+  if (left.empty()) return 0;
+  throw WorkError("trial " + left.front() + " still runs after " + duration_text(wait) +
+                  "; it ends at its next step, or give --wait SECONDS");
+}
+
+}  // namespace
+
+void add_sweep(Program& program);
+void add_sweep(Program& program) {
+  CLI::App& group = program.add_group("sweep", "many trainings from one file");
+
+  const auto plan = std::make_shared<PlanOptions>();
+  const auto plan_app = std::make_shared<CLI::App*>(nullptr);
+  CLI::App& p = program.add(
+      group, "plan", "list the trials of a sweep file; with --out, write them ready to run",
+      "restage sweep plan experiments/smoothness.yaml\n"
+      "restage sweep plan sweep.yaml motion.weights.smoothness=0,0.1 motion.optimiser.steps=500\n"
+      "restage sweep plan sweep.yaml 'seeds=range(1,6)' --out runs/sweep",
+      [plan, plan_app, &program] {
+        plan->seed_given = (*plan_app)->count("--seed") > 0;
+        return run_plan(*plan, program.common());
+      });
+  *plan_app = &p;
+  p.add_option("SWEEP", plan->arguments, "SWEEP.yaml and key=value, key=a,b, key=range(a,b,step)")
+      ->required();
+  p.add_option("--out", plan->out, "folder to write");
+  p.add_flag("--measure", plan->measure, "forecast time and memory from a few steps of each stage");
+
+  const auto run = std::make_shared<RunOptions>();
+  const auto run_app = std::make_shared<CLI::App*>(nullptr);
+  CLI::App& r = program.add(
+      group, "run", "run every trial of a sweep that is not done; called again it goes on",
+      "restage sweep run experiments/smoothness.yaml --out runs/smoothness\n"
+      "restage sweep run sweep.yaml --out runs/sweep --jobs 4 motion.optimiser.steps=500",
+      [run, run_app, &program] {
+        run->seed_given = (*run_app)->count("--seed") > 0;
+        return run_run(*run, program.common());
+      });
+  *run_app = &r;
+  r.add_option("SWEEP", run->arguments, "SWEEP.yaml and key=value, as in 'sweep plan'")->required();
+  r.add_option("--out", run->out, "folder of the sweep")->required();
+  r.add_option("--jobs", run->jobs, "trials at once; they share the threads (1)");
+
+  const auto dir = std::make_shared<std::string>();
+  CLI::App& status = program.add(group, "status", "counts, and a line for every trial",
+                                 "restage sweep status runs/smoothness\n"
+                                 "restage sweep status runs/smoothness --json",
+                                 [dir, &program] {
+                                   const Json found = status_json(sweep::read_sweep_dir(*dir));
+                                   if (program.common().json)
+                                     print_json(found);
+                                   else
+                                     print(status_text(found));
+                                   return 0;
+                                 });
+  status.add_option("DIR", *dir, "folder of the sweep")->required();
+
+  const auto wait = std::make_shared<double>(60);
+  CLI::App& stop = program.add(group, "stop", "running trials write a checkpoint and end",
+                               "restage sweep stop runs/smoothness",
+                               [dir, wait, &program] { return run_stop(*dir, *wait, program.common()); });
+  stop.add_option("DIR", *dir, "folder of the sweep")->required();
+  stop.add_option("--wait", *wait, "seconds to wait for them (60)");
+}
+
+}  // namespace restage::cli

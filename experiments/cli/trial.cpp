@@ -1,0 +1,32 @@
+// restage trial: one trial of a sweep's folder. What every engine calls.
+#include <memory>
+
+#include "experiments/cli/commands.h"
+#include "experiments/cli/output.h"
+#include "experiments/sweep/trial.h"
+
+namespace restage::cli {
+
+void add_trial(Program& program) {
+  struct Options {
+    std::string dir, id;
+  };
+  const auto options = std::make_shared<Options>();
+  CLI::App& app = program.add(
+      "trial", "run one trial of a sweep's folder, start to finish",
+      "restage trial runs/smoothness 4f2a90c1d3e5\n"
+      "restage trial runs/smoothness 4f2a90c1d3e5 --threads 4",
+      [options, &program] {
+        const Common& common = program.common();
+        const bool fresh = sweep::perform_trial(options->dir, options->id, common.quiet);
+        if (common.json)
+          print_json({{"id", options->id}, {"state", "done"}});
+        else
+          print("trial " + options->id + (fresh ? " is done\n" : " was done before\n"));
+        return 0;
+      });
+  app.add_option("DIR", options->dir, "folder of 'restage sweep plan --out'")->required();
+  app.add_option("ID", options->id, "of the trial")->required();
+}
+
+}  // namespace restage::cli

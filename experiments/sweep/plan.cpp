@@ -1,0 +1,248 @@
+#include "experiments/sweep/plan.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "autograd/base/nearest.h"
+#include "train/config.h"
+
+namespace restage::sweep {
+namespace {
+
+constexpr size_t kMostTrials = 100'000;
+
+/// Lays `key: value` over a configuration, keeping the places of both.
+void lay(ConfigNode& root, const Setting& setting) {
+  ConfigNode value = setting.value;
+  std::string rest = setting.key;
+  while (true) {
+    const size_t dot = rest.rfind('.');
+    value.key = rest.substr(dot == std::string::npos ? 0 : dot + 1);
+    ConfigNode map;
+    map.kind = ConfigNode::Kind::map;
+    map.place = map.key_place = setting.value.key_place;
+    map.children = {std::move(value)};
+    value = std::move(map);
+    if (dot == std::string::npos) break;
+    rest.resize(dot);
+  }
+  merge_config(root, std::move(value));
+}
+
+/// One case with one point of every axis.
+struct Combination {
+  const Case* one = nullptr;
+  Settings settings;  ///< of the case and the axes
+};
+
+std::vector<Combination> combinations(const SweepFile& file) {
+  size_t count = file.cases.size() * std::max<size_t>(1, file.seeds.size());
+  for (const Axis& axis : file.axes)
+    if ((count *= axis.points.size()) > kMostTrials)
+      throw InputError(file.path,
+                       "gives more than " + std::to_string(kMostTrials) + " trials",
+                       "vary fewer keys at once");
+  std::vector<Combination> out;
+  for (const Case& one : file.cases) out.push_back({&one, one.settings});
+  for (const Axis& axis : file.axes) {
+    std::vector<Combination> wider;
+    for (const Combination& before : out)
+      for (const Settings& point : axis.points) {
+        wider.push_back(before);
+        wider.back().settings.insert(wider.back().settings.end(), point.begin(), point.end());
+      }
+    out = std::move(wider);
+  }
+  return out;
+}
+
+const ConfigNode* value_of(const std::string& key, const Combination& combination,
+                           const Settings& set) {
+  for (const Settings* settings : {&combination.settings, &set})
+    for (const Setting& setting : *settings)
+      if (setting.key == key) return &setting.value;
+  return nullptr;
+}
+
+std::vector<std::string> keys_of(const SweepFile& file) {
+  std::vector<std::string> out;
+  for (const Axis& axis : file.axes) out.insert(out.end(), axis.keys.begin(), axis.keys.end());
+  for (const Setting& setting : file.set) out.push_back(setting.key);
+  for (const Case& one : file.cases)
+    for (const Setting& setting : one.settings) out.push_back(setting.key);
+  return out;
+}
+
+std::string how_to_mend(const Exclusion& exclusion, const std::vector<std::string>& keys) {
+  for (const Setting& wanted : exclusion.values) {
+    if (std::find(keys.begin(), keys.end(), wanted.key) != keys.end()) continue;
+    const std::string close = nearest(wanted.key, keys);
+    return close.empty() ? "nothing here varies " + in_quotes(wanted.key)
+                         : "did you mean " + in_quotes(close) + "?";
+  }
+  return "correct its values, or remove it";
+}
+
+/// Leaves out what `exclude` names. Each of its entries must have an effect.
+std::vector<Combination> without_excluded(const SweepFile& file, std::vector<Combination> all) {
+  std::set<const Exclusion*> used;
+  std::vector<Combination> out;
+  for (Combination& combination : all) {
+    bool excluded = false;
+    for (const Exclusion& exclusion : file.exclude) {
+      const bool hit = std::all_of(
+          exclusion.values.begin(), exclusion.values.end(), [&](const Setting& wanted) {
+            const ConfigNode* value = value_of(wanted.key, combination, file.set);
+            return value != nullptr && same_value(*value, wanted.value);
+          });
+      if (!hit) continue;
+      used.insert(&exclusion);
+      excluded = true;
+    }
+    if (!excluded) out.push_back(std::move(combination));
+  }
+  for (const Exclusion& exclusion : file.exclude) {
+    if (used.contains(&exclusion)) continue;
+    throw InputError(exclusion.place.text(), "this 'exclude' matches no combination",
+                     how_to_mend(exclusion, keys_of(file)));
+  }
+  if (out.empty()) throw InputError(file.path, "'exclude' leaves no trial", "exclude less");
+  return out;
+}
+
+std::string shown(const Setting& setting) {
+  return in_quotes(setting.key + ": " + value_text(setting.value));
+}
+
+[[noreturn]] void fail_same(const Combination& a, const Combination& b) {
+  for (size_t i = 0; i < b.settings.size() && a.one == b.one; ++i)
+    if (value_text(a.settings[i].value) != value_text(b.settings[i].value) ||
+        a.settings[i].value.place.column != b.settings[i].value.place.column ||
+        a.settings[i].value.place.line != b.settings[i].value.place.line)
+      throw InputError(b.settings[i].value.place.text(),
+                       shown(a.settings[i]) + " and " + shown(b.settings[i]) + " give the same trial",
+                       "leave one out; names, folders and logging change no result");
+  throw InputError(b.one->place.text(),
+                   "the cases " + in_quotes(a.one->name) + " and " + in_quotes(b.one->name) +
+                       " give the same trial",
+                   "leave one out; names, folders and logging change no result");
+}
+
+class Planner {
+ public:
+  explicit Planner(const SweepFile& file)
+      : file_(file), planner_(file.evaluate, file.store), base_(load_config_tree(file.base)) {
+    for (const Setting& setting : file.set) {
+      lay(base_, setting);
+      unread_.insert(setting.key);
+    }
+  }
+
+  SweepPlan plan() {
+    for (const Combination& combination : without_excluded(file_, combinations(file_)))
+      add(combination);
+    for (const Setting& setting : file_.set)
+      if (unread_.contains(setting.key)) fail_unread(setting);
+    count();
+    return std::move(plan_);
+  }
+
+ private:
+  void add(const Combination& combination) {
+    ConfigNode tree = base_;
+    std::map<std::string, std::string> overrides;
+    std::vector<std::string> keys;
+    for (const Setting& setting : combination.settings) {
+      lay(tree, setting);
+      overrides[setting.key] = value_text(setting.value);
+      keys.push_back(setting.key);
+    }
+    check_read(tree, combination, keys);
+    const size_t seeds = std::max<size_t>(1, file_.seeds.size());
+    for (size_t s = 0; s < seeds; ++s) {
+      if (!file_.seeds.empty()) {
+        ConfigNode seed;
+        seed.kind = ConfigNode::Kind::scalar;
+        seed.text = std::to_string(file_.seeds[s]);
+        seed.place = seed.key_place = {file_.path, 0, 0};
+        lay(tree, {"seed", seed});
+      }
+      PlannedTrial trial = planner_.plan(tree);
+      trial.case_name = combination.one->name;
+      trial.overrides = overrides;
+      const auto [found, fresh] = ids_.emplace(trial.id, combination);
+      if (!fresh) fail_same(found->second, combination);
+      plan_.trials.push_back(std::move(trial));
+    }
+  }
+
+  /// What varies must be read wherever it is given, what holds for all trials by one at least.
+  void check_read(const ConfigNode& tree, const Combination& combination,
+                  const std::vector<std::string>& keys) {
+    for (const std::string& key : TrialPlanner::unread(tree, keys))
+      for (const Setting& setting : combination.settings)
+        if (setting.key == key) fail_unread(setting);
+    const std::vector<std::string> open(unread_.begin(), unread_.end());
+    const auto still = TrialPlanner::unread(tree, open);
+    unread_ = {still.begin(), still.end()};
+  }
+
+  [[noreturn]] static void fail_unread(const Setting& setting) {
+    throw InputError(setting.value.key_place.text(),
+                     "no stage reads " + in_quotes(setting.key) +
+                         ": it is not among the 'stages' of this configuration",
+                     "remove it, or add the stage");
+  }
+
+  void count() {
+    std::map<std::string, std::pair<int, bool>> uses;  // stage and id: trials, there
+    for (const PlannedTrial& trial : plan_.trials)
+      for (const StageArtifact& artifact : trial.artifacts) {
+        auto& entry = uses[artifact.stage + "-" + artifact.id];
+        ++entry.first;
+        entry.second = artifact.there;
+      }
+    for (const auto& [name, entry] : uses) {
+      ++(entry.second ? plan_.there : plan_.to_make);
+      plan_.shared += entry.first > 1;
+    }
+  }
+
+  const SweepFile& file_;
+  TrialPlanner planner_;
+  ConfigNode base_;
+  std::set<std::string> unread_;  ///< keys of `set` that no trial has read so far
+  std::map<std::string, Combination> ids_;
+  SweepPlan plan_;
+};
+
+}  // namespace
+
+SweepPlan plan_sweep(const SweepFile& file) { return Planner(file).plan(); }
+
+Forecast measure(const SweepPlan& plan) {
+  Forecast out;
+  std::set<std::string> counted;                // artifacts
+  std::map<std::string, Measured> by_question;  // everything but the seed, and the stage
+  for (const PlannedTrial& trial : plan.trials)
+    for (const StageArtifact& artifact : trial.artifacts) {
+      if (artifact.there || !counted.insert(artifact.stage + artifact.id).second) continue;
+      const std::string question = trial.case_name + "|" + describe(trial) + "|" + artifact.stage;
+      if (!by_question.contains(question))
+        by_question[question] =
+            measure_stage(parse_yaml(trial.config_yaml, trial.id), artifact.stage);
+      const Measured& one = by_question[question];
+      out.seconds += one.seconds_per_step * static_cast<double>(one.steps);
+      out.memory_bytes = std::max(out.memory_bytes, one.memory_bytes);
+    }
+  return out;
+}
+
+std::string describe(const PlannedTrial& trial) {
+  std::string out;
+  for (const auto& [key, value] : trial.overrides) out += (out.empty() ? "" : ", ") + key + "=" + value;
+  return out;
+}
+
+}  // namespace restage::sweep

@@ -1,0 +1,30 @@
+// The local engine: runs the trials of a sweep's folder as child processes, so many at once. It
+// holds no locks and keeps nothing in memory that is not in the folder: it may be killed, run twice
+// at a time, or stand beside other engines.
+#pragma once
+
+#include "experiments/sweep/sweep_dir.h"
+
+namespace restage::sweep {
+
+struct PoolOptions {
+  int jobs = 1;     ///< trials at once
+  int threads = 1;  ///< of each
+};
+
+struct PoolOutcome {
+  int done = 0, failed = 0, stopped = 0, pending = 0;
+  bool stop_requested = false;  ///< by `restage sweep stop`
+};
+
+/// Runs every trial that is not done, going on after failures. A trial waits while another one makes
+/// an artifact that it needs, if there is one that need not wait. Trials that others are running are
+/// waited for. Throws Interrupted after a signal, when its children have ended (the caller has a
+/// StopScope).
+PoolOutcome run_pool(const SweepDir& dir, const PoolOptions& options);
+
+/// Starts this program again with these arguments. `output`: standard output and error go there
+/// (appended); "": the former nowhere, the latter where ours goes. Returns the process. WorkError.
+int spawn_self(const std::vector<std::string>& arguments, const std::string& output, bool own_group);
+
+}  // namespace restage::sweep

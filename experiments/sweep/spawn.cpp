@@ -1,0 +1,43 @@
+#include <fcntl.h>
+#include <spawn.h>
+#include <unistd.h>
+
+#include <cstring>
+
+#include "experiments/sweep/pool.h"
+
+namespace restage::sweep {
+
+int spawn_self(const std::vector<std::string>& arguments, const std::string& output,
+               bool own_group) {
+  posix_spawn_file_actions_t files;
+  posix_spawnattr_t attributes;
+  posix_spawn_file_actions_init(&files);
+  posix_spawnattr_init(&attributes);
+  const bool kept = !output.empty() && [&] {  // a full disk is no reason not to start
+    const int fd = ::open(output.c_str(), O_CREAT | O_WRONLY | O_APPEND | O_CLOEXEC, 0644);
+    if (fd >= 0) ::close(fd);
+    return fd >= 0;
+  }();
+  const char* sink = kept ? output.c_str() : "/dev/null";
+  posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, sink, O_WRONLY | O_APPEND, 0);
+  if (!output.empty()) posix_spawn_file_actions_adddup2(&files, STDOUT_FILENO, STDERR_FILENO);
+  // A group of its own: Ctrl-C in the terminal reaches us alone, and we pass it on once.
+  if (own_group) {
+    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+    posix_spawnattr_setpgroup(&attributes, 0);
+  }
+  std::vector<char*> words;
+  for (const std::string& argument : arguments) words.push_back(const_cast<char*>(argument.c_str()));
+  words.push_back(nullptr);
+  pid_t pid = 0;
+  const int code = posix_spawn(&pid, "/proc/self/exe", &files, &attributes, words.data(), environ);
+  posix_spawn_file_actions_destroy(&files);
+  posix_spawnattr_destroy(&attributes);
+  if (code != 0)
+    throw WorkError(std::string("a process could not be started (") + std::strerror(code) + ")");
+  return pid;
+}
+
+}  // namespace restage::sweep

@@ -1,0 +1,301 @@
+#include "experiments/sweep/sweep_dir.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <set>
+
+#include "autograd/base/atomic_file.h"
+#include "autograd/base/nearest.h"
+#include "train/config_reader.h"
+
+namespace restage::sweep {
+namespace {
+
+namespace fs = std::filesystem;
+using Kind = ConfigNode::Kind;
+
+constexpr const char* kPlan = "/plan.json";
+
+ConfigNode text_node(const std::string& text) { return config_detail::write_leaf(text); }
+
+/// Adds `key: value` to a map.
+void put(ConfigNode& map, const std::string& key, ConfigNode value) {
+  map.kind = Kind::map;
+  value.key = key;
+  map.children.push_back(std::move(value));
+}
+
+void append(ConfigNode& list, ConfigNode value) {
+  list.kind = Kind::list;
+  value.key.clear();
+  list.children.push_back(std::move(value));
+}
+
+ConfigNode settings_node(const Settings& settings) {
+  ConfigNode out;
+  out.kind = Kind::map;
+  for (const Setting& setting : settings) put(out, setting.key, setting.value);
+  return out;
+}
+
+/// The lists of an axis, by key.
+ConfigNode axis_node(const Axis& axis) {
+  ConfigNode out;
+  for (size_t k = 0; k < axis.keys.size(); ++k) {
+    ConfigNode list;
+    for (const Settings& point : axis.points) append(list, point[k].value);
+    put(out, axis.keys[k], std::move(list));
+  }
+  return out;
+}
+
+/// The sweep file with everything that the command line added, base and store seen from `dir`.
+std::string resolved(const SweepFile& file, const std::string& dir) {
+  ConfigNode root, grid, zip, cases, exclude, seeds;
+  put(root, "name", text_node(file.name));
+  put(root, "base", text_node(fs::relative(file.base, dir).string()));
+  if (!file.set.empty()) put(root, "set", settings_node(file.set));
+  for (const Axis& axis : file.axes) {
+    if (axis.keys.size() == 1)
+      put(grid, axis.keys[0], axis_node(axis).children[0]);
+    else
+      append(zip, axis_node(axis));
+  }
+  if (!grid.children.empty()) put(root, "grid", std::move(grid));
+  if (!zip.children.empty()) put(root, "zip", std::move(zip));
+  for (const Case& one : file.cases)
+    if (!one.name.empty()) put(cases, one.name, settings_node(one.settings));
+  if (!cases.children.empty()) put(root, "cases", std::move(cases));
+  for (const Exclusion& exclusion : file.exclude) append(exclude, settings_node(exclusion.values));
+  if (!exclude.children.empty()) put(root, "exclude", std::move(exclude));
+  for (const uint64_t seed : file.seeds) append(seeds, config_detail::write_leaf(seed));
+  if (!seeds.children.empty()) put(root, "seeds", std::move(seeds));
+  if (!file.evaluate.benchmark.empty()) {
+    ConfigNode evaluate, sets;
+    put(evaluate, "benchmark", text_node(file.evaluate.benchmark));
+    for (const std::string& set : file.evaluate.sets) append(sets, text_node(set));
+    put(evaluate, "sets", std::move(sets));
+    put(root, "evaluate", std::move(evaluate));
+  }
+  put(root, "retries", config_detail::write_leaf(file.retries));
+  if (file.early_stop) {
+    ConfigNode early;
+    put(early, "metric", text_node(file.early_stop->metric));
+    put(early, "rule", text_node(file.early_stop->rule));
+    put(early, "after", config_detail::write_leaf(file.early_stop->after));
+    put(root, "early_stop", std::move(early));
+  }
+  return "# made from " + file.path + " and " + file.base + "\n" + config_to_yaml(root);
+}
+
+/// The file is left alone if it holds this already: what is complete is not touched.
+void write_if_new(const std::string& path, const std::string& content) {
+  std::ifstream file(path, std::ios::binary);
+  if (file && std::string(std::istreambuf_iterator<char>(file), {}) == content) return;
+  write_file_atomically(path, content);
+}
+
+void make_folder(const std::string& path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (!error) return;
+  if (error == std::errc::no_space_on_device)
+    throw WorkError(path + ": could not be made (" + error.message() + "); free some space");
+  throw InputError(path, "cannot be made (" + error.message() + ")",
+                   "choose a folder that you can write to");
+}
+
+Json parsed(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return nullptr;
+  const std::string text(std::istreambuf_iterator<char>(file), {});
+  Json json = Json::parse(text, nullptr, false);
+  return json.is_discarded() ? Json(nullptr) : json;
+}
+
+std::string host_name() {
+  char name[256] = "";
+  return ::gethostname(name, sizeof name - 1) == 0 ? name : "unknown";
+}
+
+Json node_json(const ConfigNode& node) {
+  if (node.kind == Kind::null) return nullptr;
+  if (node.kind == Kind::list || node.kind == Kind::map) {
+    Json out = node.kind == Kind::list ? Json::array() : Json::object();
+    for (const ConfigNode& child : node.children) {
+      if (node.kind == Kind::list)
+        out.push_back(node_json(child));
+      else
+        out[child.key] = node_json(child);
+    }
+    return out;
+  }
+  if (node.quoted) return node.text;
+  if (node.text == "true" || node.text == "false") return node.text == "true";
+  const char *begin = node.text.data(), *end = begin + node.text.size();
+  int64_t whole = 0;
+  if (const auto r = std::from_chars(begin, end, whole); r.ec == std::errc() && r.ptr == end)
+    return whole;
+  double real = 0;
+  const auto r = std::from_chars(begin, end, real);
+  if (r.ec == std::errc() && r.ptr == end && std::isfinite(real)) return real;
+  return node.text;
+}
+
+}  // namespace
+
+const TrialEntry& SweepDir::trial(const std::string& id) const {
+  std::vector<std::string> ids;
+  for (const TrialEntry& entry : trials) {
+    if (entry.id == id) return entry;
+    ids.push_back(entry.id);
+  }
+  const std::string close = nearest(id, ids);
+  throw InputError(path, "has no trial " + in_quotes(id),
+                   close.empty() ? "'restage sweep status " + path + "' lists them"
+                                 : "did you mean " + in_quotes(close) + "?");
+}
+
+int write_sweep_dir(const std::string& dir, const SweepFile& file, const SweepPlan& plan) {
+  std::error_code ignored;
+  if (fs::exists(dir, ignored) && !fs::exists(dir + "/sweep.yaml", ignored) &&
+      !fs::exists(dir + "/trials", ignored) &&
+      (!fs::is_directory(dir, ignored) || !fs::is_empty(dir, ignored)))
+    throw InputError(dir, "exists and is no sweep's folder", "choose another folder for --out");
+  make_folder(dir + "/trials");
+  Json trials = Json::array();
+  std::set<std::string> ids;
+  for (const PlannedTrial& trial : plan.trials) {
+    ids.insert(trial.id);
+    const std::string folder = dir + "/trials/" + trial.id;
+    make_folder(folder);
+    write_if_new(folder + "/config.yaml", trial.config_yaml);
+    Json entry = {{"id", trial.id}, {"case", trial.case_name}, {"seed", trial.seed}};
+    entry["overrides"] = Json::object();
+    for (const auto& [key, value] : trial.overrides) entry["overrides"][key] = as_json(value);
+    entry["artifacts"] = Json::object();
+    for (const StageArtifact& artifact : trial.artifacts)
+      entry["artifacts"][artifact.stage] = artifact.id;
+    trials.push_back(std::move(entry));
+  }
+  write_if_new(dir + "/sweep.yaml", resolved(file, dir));
+  const Json document = {
+      {"directory", fs::relative(fs::current_path(), dir).string()},
+      {"store", file.store},
+      {"evaluate", {{"benchmark", file.evaluate.benchmark}, {"sets", file.evaluate.sets}}},
+      {"retries", file.retries},
+      {"trials", std::move(trials)}};
+  write_if_new(dir + kPlan, document.dump(1) + "\n");
+  int stale = 0;
+  for (const auto& entry : fs::directory_iterator(dir + "/trials", ignored))
+    stale += !ids.contains(entry.path().filename().string());
+  return stale;
+}
+
+SweepDir read_sweep_dir(const std::string& dir) {
+  const Json json = parsed(dir + kPlan);
+  SweepDir out;
+  out.path = dir;
+  while (out.path.size() > 1 && out.path.back() == '/') out.path.pop_back();
+  try {
+    out.directory = json.at("directory");
+    out.store = json.at("store");
+    out.evaluate.benchmark = json.at("evaluate").at("benchmark");
+    out.evaluate.sets = json.at("evaluate").at("sets").get<std::vector<std::string>>();
+    out.retries = json.at("retries");
+    for (const Json& entry : json.at("trials")) {
+      TrialEntry trial{entry.at("id"), entry.at("case"), entry.at("seed"), entry.at("overrides"), {}};
+      for (const auto& [stage, id] : entry.at("artifacts").items())
+        trial.artifacts.emplace_back(stage, id);
+      out.trials.push_back(std::move(trial));
+    }
+  } catch (const nlohmann::json::exception&) {
+    throw InputError(dir, "is no sweep's folder (no plan.json that can be read)",
+                     "make it with 'restage sweep plan SWEEP.yaml --out " + dir + "'");
+  }
+  return out;
+}
+
+std::optional<TrialResult> read_result(const SweepDir& dir, const std::string& id) {
+  Json json = parsed(dir.result(id));
+  if (!json.is_object() || !json.contains("state") || !json["state"].is_string() ||
+      json.value("id", Json()) != Json(id))
+    return std::nullopt;
+  std::string state = json["state"];
+  return TrialResult{std::move(state), std::move(json)};
+}
+
+void write_result(const SweepDir& dir, const TrialEntry& trial, const std::string& state,
+                  const std::string& error, const TrialOutcome& outcome, double seconds) {
+  Json artifacts = Json::object();
+  for (const auto& [stage, id] : outcome.artifacts) artifacts[stage] = id;
+  const Json document = {{"id", trial.id},
+                         {"case", trial.case_name},
+                         {"seed", trial.seed},
+                         {"overrides", trial.overrides},
+                         {"state", state},
+                         {"error", error.empty() ? Json(nullptr) : Json(error)},
+                         {"artifacts", std::move(artifacts)},
+                         {"metrics", outcome.metrics},
+                         {"seconds", std::round(1e3 * seconds) / 1e3},
+                         {"host", host_name()},
+                         {"command", "restage trial " + dir.path + " " + trial.id}};
+  write_file_atomically(dir.result(trial.id),
+                        document.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+TrialStatus status_of(const SweepDir& dir, const TrialEntry& trial) {
+  TrialStatus out;
+  out.holder = Lease::holder(dir.lease(trial.id));
+  const std::optional<TrialResult> result = read_result(dir, trial.id);
+  if (result && (result->state == "done" || !out.holder)) {
+    out.state = result->state;
+    out.seconds = result->document.value("seconds", 0.0);
+    const Json error = result->document.value("error", Json());
+    if (error.is_string()) out.error = error;
+    if (out.state == "done") out.holder.reset();
+  } else {
+    out.state = out.holder ? "running" : "pending";
+  }
+  return out;
+}
+
+void request_stop(const std::string& dir) {
+  unsigned char bytes[8] = {};
+  const int fd = ::open("/dev/urandom", O_RDONLY | O_CLOEXEC);
+  if (fd < 0 || ::read(fd, bytes, sizeof bytes) != sizeof bytes)
+    throw WorkError("no random numbers from the system");
+  ::close(fd);
+  std::string token;
+  for (const unsigned char byte : bytes) token += std::to_string(static_cast<int>(byte)) + ".";
+  write_file_atomically(dir + "/stop", token + "\n");
+}
+
+std::string stop_token(const std::string& dir) {
+  std::ifstream file(dir + "/stop");
+  std::string token;
+  std::getline(file, token);
+  return token;
+}
+
+Json as_json(const std::string& yaml) { return node_json(parse_yaml(yaml, "", true)); }
+
+std::string last_line(const std::string& path) {
+  constexpr std::streamoff kTail = 4096;
+  constexpr size_t kLongest = 300;
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  if (!file) return "";
+  const std::streamoff size = file.tellg();
+  file.seekg(std::max<std::streamoff>(0, size - kTail));
+  std::string line, last;
+  while (std::getline(file, line))
+    if (line.find_first_not_of(" \t\r") != std::string::npos) last = line;
+  return last.substr(0, kLongest);
+}
+
+}  // namespace restage::sweep

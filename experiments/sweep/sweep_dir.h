@@ -1,0 +1,82 @@
+// The folder of a sweep (experiments.md, "Files of a sweep"):
+//
+//   sweep.yaml             the sweep file, resolved; reading it again gives the same trials
+//   plan.json              the trials that it stands for, and where relative paths begin
+//   stop                   changes when the trials that run now are asked to end
+//   trials/ID/config.yaml  resolved configuration
+//   trials/ID/result.json  when the trial is over
+//   trials/ID/lease.N      who works on it (train/lease.h)
+//   trials/ID/log.txt
+//
+// Only the trials in plan.json count; others are of an earlier file, and stay.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "experiments/sweep/plan.h"
+#include "train/lease.h"
+
+namespace restage::sweep {
+
+/// A trial as plan.json knows it.
+struct TrialEntry {
+  std::string id, case_name;
+  uint64_t seed = 0;
+  Json overrides = Json::object();  ///< typed values
+  std::vector<std::pair<std::string, std::string>> artifacts;  ///< stage, id
+};
+
+struct SweepDir {
+  std::string path;       ///< as given
+  std::string directory;  ///< from which the sweep was planned: relative paths begin here
+  std::string store;      ///< seen from `directory`
+  Evaluate evaluate;
+  int retries = 0;
+  std::vector<TrialEntry> trials;
+
+  std::string folder(const std::string& id) const { return path + "/trials/" + id; }
+  std::string lease(const std::string& id) const { return folder(id) + "/lease"; }
+  std::string result(const std::string& id) const { return folder(id) + "/result.json"; }
+  std::string log(const std::string& id) const { return folder(id) + "/log.txt"; }
+  /// InputError with the nearest id if there is none.
+  const TrialEntry& trial(const std::string& id) const;
+};
+
+/// Writes or renews the folder. Returns how many trials of earlier plans stay in it unused.
+/// InputError: `dir` is a folder of something else.
+int write_sweep_dir(const std::string& dir, const SweepFile& file, const SweepPlan& plan);
+/// InputError: no sweep's folder.
+SweepDir read_sweep_dir(const std::string& dir);
+
+/// What a trial came to.
+struct TrialResult {
+  std::string state;  ///< "done", "failed", "stopped"
+  Json document;
+};
+/// Nothing if the trial is not over. What cannot be read, or says another id, counts as not there.
+std::optional<TrialResult> read_result(const SweepDir& dir, const std::string& id);
+/// The document of the contract, by rename. `seconds` is of the last attempt.
+void write_result(const SweepDir& dir, const TrialEntry& trial, const std::string& state,
+                  const std::string& error, const TrialOutcome& outcome, double seconds);
+
+/// Where a trial stands: a result's state, "running" if somebody holds its lease, or "pending".
+struct TrialStatus {
+  std::string state, error;
+  double seconds = 0;
+  std::optional<LeaseHolder> holder;
+};
+TrialStatus status_of(const SweepDir& dir, const TrialEntry& trial);
+
+/// Asks what runs now to stop.
+void request_stop(const std::string& dir);
+/// Changes with every request; what runs remembers it and compares.
+std::string stop_token(const std::string& dir);
+
+/// YAML on one line as JSON: numbers, true, false, null, text, lists.
+Json as_json(const std::string& yaml);
+/// The last line of a file that is not blank, at most 300 characters; "" without one.
+std::string last_line(const std::string& path);
+
+}  // namespace restage::sweep

@@ -1,0 +1,22 @@
+// Words of the command line that vary a configuration: key=value, key=a,b, key=choice(a,b) and
+// key=range(start,stop,step).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "train/config_tree.h"
+
+namespace restage::sweep {
+
+struct SweepWord {
+  std::string text, key;
+  std::vector<ConfigNode> values;  ///< YAML each, placed at "override 'text'"
+  bool several = false;            ///< an axis (also one of a single value: choice(a))
+};
+
+/// A comma inside quotes, brackets or braces divides nothing. range() leaves `stop` out and may have
+/// no more than 10,000 values; `step` may be left out (1) or negative. InputError otherwise.
+SweepWord read_sweep_word(const std::string& text);
+
+}  // namespace restage::sweep

@@ -1,0 +1,18 @@
+// One trial of a sweep's folder, start to finish: what `restage trial DIR ID` does and every engine
+// calls. Idempotent, and safe against being killed at any moment.
+#pragma once
+
+#include <string>
+
+#include "experiments/sweep/sweep_dir.h"
+
+namespace restage::sweep {
+
+/// Does nothing if the trial is done. Else takes its lease, trains what is missing, evaluates and
+/// writes result.json. WorkError: somebody else works on it, or the trial failed (its result says
+/// so too). InputError: no such trial, or the data is not what it was planned with. Interrupted: a
+/// signal or `restage sweep stop` came, and a checkpoint was written. Returns false if the trial
+/// was done before.
+bool perform_trial(const std::string& dir, const std::string& id, bool quiet);
+
+}  // namespace restage::sweep

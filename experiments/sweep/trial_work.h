@@ -1,0 +1,78 @@
+// All that sweeps know of training configurations: which artifacts a trial needs, its id, and the
+// work itself. Whatever changes about configurations, stages and the store changes here.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "experiments/sweep/sweep_file.h"
+#include "train/config_tree.h"
+
+namespace restage::sweep {
+
+using Json = nlohmann::ordered_json;
+
+/// Raised whenever the same configuration gives other results than before: part of every id.
+inline constexpr int kBehaviour = 1;
+
+/// What one stage leaves. `id`: first 12 hex digits of a SHA-256 (experiments.md, "Words").
+struct StageArtifact {
+  std::string stage, id;
+  bool there = false;  ///< in the store, complete
+};
+
+struct PlannedTrial {
+  std::string id, case_name;
+  uint64_t seed = 0;
+  std::map<std::string, std::string> overrides;  ///< what distinguishes it, values as YAML
+  std::string config_yaml;                       ///< fully resolved
+  std::vector<StageArtifact> artifacts;          ///< in the order of training
+};
+
+/// Makes PlannedTrials; remembers the checksums of data that it has read.
+class TrialPlanner {
+ public:
+  TrialPlanner(Evaluate evaluate, std::string store);
+  ~TrialPlanner();
+
+  /// `tree`: a whole configuration, the trial's settings laid over its base. It is read strictly and
+  /// checked as `restage train` would. `case_name` and `overrides` are the caller's to fill in.
+  PlannedTrial plan(const ConfigNode& tree);
+  /// The keys among `keys` (dotted) that no stage of this configuration reads.
+  static std::vector<std::string> unread(const ConfigNode& tree,
+                                         const std::vector<std::string>& keys);
+
+ private:
+  struct Memory;
+  std::unique_ptr<Memory> memory_;
+};
+
+/// Is it in the store, complete? Cheap.
+bool artifact_there(const std::string& store, const std::string& stage, const std::string& id);
+
+struct TrialOutcome {
+  std::map<std::string, std::string> artifacts;  ///< stage to id
+  Json metrics = Json::object();  ///< {set: {"mean": {...}, "sequences": [{"name", ...}]}}
+};
+
+/// Trains what is missing and evaluates. `id`: InputError if the trial is another one by now, since
+/// its data changed. `folder`: of the trial, for what it needs on the way. May be called again after
+/// an interruption and goes on where it was. Throws Interrupted after a checkpoint if a signal came
+/// (the caller has a StopScope).
+TrialOutcome run_trial(const std::string& config_yaml_path, const std::string& id,
+                       const Evaluate& evaluate, const std::string& store,
+                       const std::string& folder, bool quiet);
+
+/// What a few steps of a stage cost.
+struct Measured {
+  double seconds_per_step = 0;
+  int64_t steps = 0, memory_bytes = 0;
+};
+/// Trains a few steps of `stage` and forgets them.
+Measured measure_stage(const ConfigNode& tree, const std::string& stage);
+
+}  // namespace restage::sweep

@@ -1,0 +1,300 @@
+"""restage sweep plan, run, status, stop and restage trial (the contract of experiments)."""
+import json
+import os
+import shutil
+import signal
+import subprocess
+import time
+
+from support import PROGRAM, CliTest
+from tiny_run import CONFIG
+
+# About a second a trial, half of which is evaluation.
+BASE = CONFIG.replace("motions: {train: 4, validation: 2, test: 1}", "motions: {train: 4, validation: 2, test: 2}").replace(
+    "bodies: {train: 2, validation: 2, test: 1}", "bodies: {train: 2, validation: 2, test: 2}") + "evaluation: {sequences: 1, frames: 5}\n"
+SWEEP = """name: smoothness
+base: configs/tiny.yaml
+set: {deformation.optimiser.steps: 4}
+grid:
+  motion.weights.smoothness: [0, 0.1]
+zip:
+  - {motion.windows.frames: [5, 8], motion.optimiser.batch: [4, 2]}
+cases:
+  quaternion: {motion.model: smrm/quaternion}
+  6D: {motion.model: smrm/rot6d}
+exclude:
+  - {motion.windows.frames: 5, motion.weights.smoothness: 0.0}
+seeds: [1, 2]
+"""
+SHORT = "base: configs/tiny.yaml\ngrid:\n  motion.optimiser.steps: [2, 3]\n"
+
+
+class Sweep(CliTest):
+    def setUp(self):
+        super().setUp()
+        self.write("configs/tiny.yaml", BASE)
+        self.write("sweep.yaml", SHORT)
+
+    def plan(self, *arguments):
+        return self.json("sweep", "plan", "sweep.yaml", *arguments)
+
+    def start(self, *arguments):
+        process = subprocess.Popen([PROGRAM, *arguments], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        for clean in (process.stderr.close, process.stdout.close, process.wait, process.kill):
+            self.addCleanup(clean)
+        return process
+
+    def result(self, trial, folder="d"):
+        return json.loads(self.bytes("%s/trials/%s/result.json" % (folder, trial)))
+
+    def wait_for(self, condition, seconds=60):
+        end = time.monotonic() + seconds
+        while not condition():
+            self.assertLess(time.monotonic(), end, "waited too long")
+            time.sleep(0.02)
+
+    def running(self, folder="d"):
+        return [t["id"] for t in self.json("sweep", "status", folder)["trials"] if t["state"] == "running"]
+
+
+class Plans(Sweep):
+    def test_all_parts_of_a_sweep_file(self):
+        self.write("sweep.yaml", SWEEP)
+        before = sorted(os.listdir(self.folder))
+        plan = self.plan()
+        self.assertEqual(sorted(os.listdir(self.folder)), before, "planning changes nothing")
+        trials = plan["trials"]
+        # 2 cases x (2 x 2 - 1) x 2 seeds
+        self.assertEqual(len({t["id"] for t in trials}), 12)
+        for t in trials:
+            self.assertRegex(t["id"], "^[0-9a-f]{12}$")
+            self.assertEqual(sorted(t["overrides"]), ["motion.model", "motion.optimiser.batch", "motion.weights.smoothness", "motion.windows.frames"])
+            self.assertEqual(t["overrides"]["motion.optimiser.batch"], {5: 4, 8: 2}[t["overrides"]["motion.windows.frames"]])
+            self.assertNotEqual((t["overrides"]["motion.windows.frames"], t["overrides"]["motion.weights.smoothness"]), (5, 0))
+        self.assertEqual({(t["case"], t["seed"]) for t in trials}, {(c, s) for c in ("quaternion", "6D") for s in (1, 2)})
+        # Ten motion networks over one extractor train one extractor: two seeds of it here, and of the deformation.
+        self.assertEqual(len({t["artifacts"]["skeleton"] for t in trials}), 2)
+        self.assertEqual(plan["artifacts"], {"there": 0, "to_make": 2 + 12 + 2, "shared": 4})
+
+    def test_ids_are_of_the_question(self):
+        first = [t["id"] for t in self.plan()["trials"]]
+        for same in (["name=other"], ["run_root=elsewhere"], ["loop.log_every=7"], ["--threads", "1"], ["seed=3"]):
+            self.assertEqual([t["id"] for t in self.plan(*same)["trials"]], first, same)
+        for other in (["seed=4"], ["motion.windows.noise=0.1"], ["data.seed=5"], ["evaluation.frames=6"]):
+            self.assertFalse(set(first) & {t["id"] for t in self.plan(*other)["trials"]}, other)
+        shutil.move(self.path("configs"), self.path("moved"))
+        self.write("moved/sweep.yaml", SHORT.replace("configs/", "").replace("[2, 3]", "[ 02,3 ]").replace("02", "2"))
+        self.assertEqual([t["id"] for t in self.json("sweep", "plan", "moved/sweep.yaml")["trials"]], first)
+
+    def test_words_of_the_command_line(self):
+        def steps(*words):
+            return [t["overrides"].get("motion.optimiser.steps") for t in self.plan(*words)["trials"]]
+        self.assertEqual(steps("motion.optimiser.steps=4,5,6"), [4, 5, 6])
+        self.assertEqual(steps("motion.optimiser.steps=choice(7)"), [7])
+        self.assertEqual(steps("motion.optimiser.steps=range(2,9,3)"), [2, 5, 8])
+        self.assertEqual(steps("motion.optimiser.steps=range(3,1,-1)"), [3, 2])
+        self.assertEqual(steps("motion.optimiser.steps=9"), [None])
+        self.assertEqual([t["overrides"]["stages"] for t in self.plan("stages=[motion],[motion, skeleton]")["trials"]],
+                         [["motion"], ["motion", "skeleton"]] * 2)
+        self.assertEqual(len(self.plan("motion.windows.noise=range(0,0.3,0.1)")["trials"]), 6)
+        self.assertEqual({t["seed"] for t in self.plan("seeds=range(1,4)")["trials"]}, {1, 2, 3})
+        self.assertEqual({t["seed"] for t in self.plan("--seed", 8)["trials"]}, {8})
+        self.bad_input(["sweep", "plan", "sweep.yaml", "data.source='a,b'"], "a,b")  # quotes keep a comma: one file, missing
+
+    def test_out_is_ready_for_any_engine(self):
+        self.write("sweep.yaml", SWEEP)
+        self.done("sweep", "plan", "sweep.yaml", "--out", "d", "deformation.optimiser.steps=2,3")
+        again = self.json("sweep", "plan", "d/sweep.yaml")  # the resolved file stands for itself
+        self.assertEqual(sorted(os.listdir(self.path("d"))), ["plan.json", "sweep.yaml", "trials"])
+        self.assertEqual(sorted(os.listdir(self.path("d/trials"))), sorted(t["id"] for t in again["trials"]))
+
+    def test_measured_forecast(self):
+        found = self.plan("--measure")["forecast"]
+        self.assertGreater(found["seconds"], 0)
+        self.assertGreater(found["memory_bytes"], 1000)
+
+
+class BadSweeps(Sweep):
+    def bad(self, text, line, *contains, words=()):
+        self.write("bad.yaml", text)
+        self.bad_input(["sweep", "plan", "bad.yaml", *words], "bad.yaml:%d: " % line, *contains)
+
+    def test_each_in_one_line_with_its_place(self):
+        base = "base: configs/tiny.yaml\n"
+        table = [
+            (base + "grids: {a.b: [1]}\n", 2, "'grids'", "'grid'"),
+            ("grid: {a.b: [1]}\n", 1, "'base' is missing"),
+            ("base: none.yaml\n", 1, "none.yaml"),
+            (base + "grid:\n  motion.windos.frames: [5, 6]\n", 3, "windos", "'windows'"),
+            (base + "set:\n  motion.windows.frame: 5\n", 3, "'frames'"),
+            (base + "grid:\n  motion.windows.frames: [5,\n    none]\n", 4, "motion.windows.frames"),
+            (base + "grid:\n  motion.windows.frames: 5\n", 3, "list"),
+            (base + "grid:\n  motion.windows.frames: []\n", 3, "list"),
+            (base + "zip:\n  - motion.windows.frames: [5, 6]\n    motion.optimiser.batch: [1, 2, 3]\n", 4, "3 values", "has 2"),
+            (base + "zip: {motion.windows.frames: [5, 6]}\n", 2, "list"),
+            (base + "grid: {motion.windows.frames: [5, 6]}\nexclude:\n  - {motion.windows.frames: 7}\n", 4, "matches no"),
+            (base + "grid: {motion.windows.frames: [5, 6]}\nexclude:\n  - {motion.window.frames: 5}\n", 4, "matches no", "'motion.windows.frames'"),
+            (base + "grid: {motion.windows.frames: [5]}\nexclude: [{motion.windows.frames: 5}]\n", None, "no trial"),
+            (base + "cases:\n  a: {motion.windows.frames: 5}\n  b: {motion.windows.frames: 5}\n", 4, "'a' and 'b'", "same trial"),
+            (base + "cases:\n  a: {name: x}\n  b: {name: y}\n", 4, "'a' and 'b'", "same trial"),
+            (base + "grid:\n  motion.weights.smoothness:\n    - 0\n    - 0.0\n", 5, "same trial"),
+            (base + "grid:\n  loop.log_every:\n    - 1\n    - 2\n", 5, "same trial"),
+            (base + "set:\n  stages: [motion]\n  skeleton.optimiser.steps: 5\n", 4, "no stage reads", "skeleton.optimiser.steps"),
+            (base + "set: {stages: [motion]}\ngrid:\n  skeleton.optimiser.steps: [5, 6]\n", 4, "no stage reads"),
+            (base + "cases:\n  a: {}\n  b:\n    stages: [motion]\n    skeleton.optimiser.steps: 5\n", 6, "no stage reads"),
+            (base + "set: {motion.windows.frames: 7}\ngrid:\n  motion.windows.frames: [5, 6]\n", 4, "line 2"),
+            (base + "grid:\n  motion.windows.frames: [5, 6]\nzip:\n  - {motion.windows.frames: [5, 6]}\n", 5, "line 3"),
+            (base + "grid:\n  motion.windows.frames: [5, 6]\ncases:\n  a: {motion.windows.frames: 7}\n", 5, "line 3"),
+            (base + "grid:\n  motion: {windows.frames: [5]}\n  motion.windows: {frames: [6]}\n", 4, "second time"),
+            (base + "seeds: [1, 2, 1]\n", 2, "twice"),
+            (base + "seeds: [a]\n", 2, "seeds"),
+            (base + "grid: {seed: [1, 2]}\n", 2, "seeds"),
+            (base + "evaluate: {benchmark: nowhere, sets: [naked]}\n", 2, "nowhere"),
+            (base + "evaluate: {benchmark: nowhere}\n", 2, "sets"),
+            (base + "evaluate: {benchmarks: nowhere}\n", 2, "'benchmark'"),
+            (base + "retries: many\n", 2, "retries"),
+            (base + "early_stop: {metric: motion.pa_mpjpe, rule: best}\n", 2, "median"),
+        ]
+        for text, line, *contains in table:
+            with self.subTest(text):
+                if line is None:
+                    self.write("bad.yaml", text)
+                    self.bad_input(["sweep", "plan", "bad.yaml"], "bad.yaml", *contains)
+                else:
+                    self.bad(text, line, *contains)
+
+    def test_an_empty_case_is_a_case(self):
+        self.write("sweep.yaml", "base: configs/tiny.yaml\ncases:\n  a: {}\n  b: {motion.windows.frames: 5}\n")
+        self.assertEqual([t["case"] for t in self.plan()["trials"]], ["a", "b"])
+
+    def test_a_key_of_all_trials_may_be_read_by_one(self):
+        self.write("sweep.yaml", "base: configs/tiny.yaml\nset: {skeleton.optimiser.steps: 5}\ncases:\n  a: {}\n  b: {stages: [motion]}\n")
+        self.assertEqual([len(t["artifacts"]) for t in self.plan()["trials"]], [3, 1])
+
+    def test_words(self):
+        for word, *contains in (["motion.windows.frames=5,,6", "empty"], ["motion.windows.frames=range(1,1)", "range"],
+                                ["motion.windows.frames=range(a,b)", "numbers"], ["=5", "override"], ["motion.windows.frame=5,6", "'frames'"],
+                                ["a b=5", "no key"], ["seeds=1,1", "twice"]):
+            with self.subTest(word):
+                self.bad_input(["sweep", "plan", "sweep.yaml", word], *contains)
+        self.bad_input(["sweep", "plan", "sweep.yaml", "motion.windows.frames=5", "motion.windows.frames=6"], "second time")
+        self.bad_input(["sweep", "plan", "sweep.yaml", "sweep.yaml"], "two sweep files")
+        self.bad_input(["sweep", "plan", "a=1"], "no sweep file")
+        self.bad_input(["sweep", "plan", "none.yaml"], "none.yaml")
+        self.bad_input(["sweep", "run", "sweep.yaml"], "--out")
+        self.bad_input(["sweep", "run", "sweep.yaml", "--out", "d", "--jobs", "0"], "--jobs")
+        self.bad_input(["sweep", "run", "sweep.yaml", "--out", "configs"], "configs", "no sweep's folder")
+        self.bad_input(["sweep", "run", "sweep.yaml", "--out", "d", "motion.window=1"], "motion.window")
+
+    def test_folders(self):
+        self.bad_input(["sweep", "status", "nowhere"], "nowhere")
+        self.bad_input(["sweep", "stop", "configs"], "configs")
+        self.bad_input(["trial", "nowhere", "0123456789ab"], "nowhere")
+        self.done("sweep", "plan", "sweep.yaml", "--out", "d")
+        self.bad_input(["trial", "d", "0123456789ab"], "no trial")
+
+
+class Runs(Sweep):
+    def test_from_file_to_results_and_on(self):
+        result = self.restage("sweep", "run", "sweep.yaml", "--out", "d", "--jobs", "2")
+        self.assertEqual(result.code, 0, result.err)
+        self.assertEqual(result.out, "2 done\n")
+        plan = self.plan()["trials"]
+        for trial in plan:
+            found = self.result(trial["id"])
+            for key in ("id", "case", "seed", "overrides", "artifacts"):
+                self.assertEqual(found[key], trial[key])
+            self.assertEqual((found["state"], found["error"]), ("done", None))
+            self.assertGreater(found["seconds"], 0)
+            for name, metrics in found["metrics"].items():
+                self.assertIn("mpjpe", metrics["mean"], name)
+                self.assertTrue(metrics["sequences"][0]["name"])
+            self.assertTrue(found["metrics"])
+            self.assertTrue({"config.yaml", "result.json", "log.txt"} <= set(os.listdir(self.path("d/trials/" + trial["id"]))))
+        # Again: nothing is done twice. More seeds: what is done is kept.
+        before = [self.bytes("d/trials/%s/result.json" % t["id"]) for t in plan]
+        self.done("sweep", "run", "sweep.yaml", "--out", "d")
+        more = self.restage("sweep", "run", "sweep.yaml", "--out", "d", "seeds=3,4")
+        self.assertEqual((more.code, more.out), (0, "4 done\n"), more.err)
+        self.assertEqual([self.bytes("d/trials/%s/result.json" % t["id"]) for t in plan], before)
+        self.assertEqual(self.done("trial", "d", plan[0]["id"]), "trial %s was done before\n" % plan[0]["id"])
+        # An edited base asks other questions; what is there belongs to its id and is told, not used.
+        self.write("configs/tiny.yaml", BASE.replace("self_share: 0.25", "self_share: 0.5"))
+        changed = self.restage("sweep", "run", "sweep.yaml", "--out", "d")
+        self.assertIn("4 trials in d are not of this sweep", changed.err)
+        self.assertEqual(self.json("sweep", "status", "d")["counts"]["done"], 2)
+        self.assertEqual(self.json("sweep", "status", "d")["counts"], {"pending": 0, "running": 0, "done": 2, "failed": 0, "stopped": 0})
+
+    def test_from_another_folder(self):
+        self.done("sweep", "plan", "sweep.yaml", "--out", "d")
+        trial = self.plan()["trials"][0]["id"]
+        done = subprocess.run([PROGRAM, "trial", self.path("d"), trial], cwd="/", capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(self.result(trial)["state"], "done")
+
+    def test_a_failing_trial_ends_no_other(self):
+        self.write("sweep.yaml", SHORT + "cases:\n  good: {}\n  bad: {skeleton.optimiser.schedule.rate: 1e25}\nretries: 1\n")
+        result = self.restage("sweep", "run", "sweep.yaml", "--out", "d")
+        self.assertEqual(result.code, 1, result.err)
+        self.assertEqual(result.out, "2 done, 2 failed\n")
+        self.assertEqual(result.err.count("is tried again"), 2)
+        for trial in self.json("sweep", "status", "d")["trials"]:
+            if trial["case"] == "bad":
+                self.assertEqual(trial["state"], "failed")
+                self.assertIn("skeleton/patch_transformer", trial["error"])
+        self.assertIn("skeleton/patch_transformer", self.done("sweep", "status", "d"))
+
+    def test_one_trial_is_run_by_one(self):
+        self.done("sweep", "plan", "sweep.yaml", "--out", "d", "skeleton.optimiser.steps=1000000")
+        trial = os.listdir(self.path("d/trials"))[0]
+        first = self.start("trial", "d", trial)
+        self.wait_for(self.running)
+        second = self.restage("trial", "d", trial)
+        self.one_line(second, 1, str(first.pid), trial)
+        first.kill()
+        first.wait()
+        self.assertEqual(self.running(), [], "a dead holder is known at once")
+        third = self.start("trial", "d", trial)
+        self.wait_for(self.running)
+        third.send_signal(signal.SIGTERM)
+        third.stderr.read()
+        self.assertEqual(third.wait(60), 143)
+        self.assertEqual(self.result(trial)["state"], "stopped")
+
+    def test_stopped_and_gone_on(self):
+        self.write("sweep.yaml", "base: configs/tiny.yaml\nset: {stages: [deformation], deformation.optimiser.steps: 4000}\nseeds: [1, 2, 3]\n")
+        slow = []
+        whole = self.restage("sweep", "run", "sweep.yaml", "--out", "whole", *slow)
+        self.assertEqual(whole.code, 0, whole.err)
+        sweeper = self.start("sweep", "run", "sweep.yaml", "--out", "d", "--jobs", "2", *slow)
+        self.wait_for(lambda: os.path.exists(self.path("d/plan.json")) and self.running())
+        self.done("sweep", "stop", "d")
+        self.assertEqual(sweeper.wait(60), 1)
+        self.assertIn("goes on", sweeper.stderr.read())
+        counts = self.json("sweep", "status", "d")["counts"]
+        self.assertEqual((counts["running"], counts["failed"]), (0, 0))
+        self.assertGreater(counts["stopped"] + counts["pending"], 0)
+        self.done("sweep", "run", "sweep.yaml", "--out", "d", *slow)
+        for trial in os.listdir(self.path("d/trials")):
+            name = "/trials/%s/run/weights.safetensors" % trial
+            self.assertEqual(self.bytes("d" + name), self.bytes("whole" + name))
+
+    def test_signals_are_passed_on(self):
+        for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
+            sweeper = self.start("sweep", "run", "sweep.yaml", "--out", "d", "skeleton.optimiser.steps=1000000")
+            self.wait_for(lambda: os.path.exists(self.path("d/plan.json")) and self.running())
+            sweeper.send_signal(number)
+            sweeper.stderr.read()
+            self.assertEqual(sweeper.wait(60), code)
+            self.assertEqual(self.running(), [])
+            self.assertEqual(self.json("sweep", "status", "d")["counts"]["stopped"], 1)
+
+    def test_a_killed_trial_is_told(self):
+        sweeper = self.start("sweep", "run", "sweep.yaml", "--out", "d", "skeleton.optimiser.steps=1000000", "motion.optimiser.steps=2")
+        self.wait_for(lambda: os.path.exists(self.path("d/plan.json")) and self.running())
+        holder = self.json("sweep", "status", "d")["trials"][0]["holder"]
+        os.kill(int(holder.split()[1]), signal.SIGKILL)
+        self.assertEqual(sweeper.wait(60), 1)
+        failed = self.json("sweep", "status", "d")["trials"][0]
+        self.assertEqual(failed["state"], "failed")
+        self.assertIn("signal 9", failed["error"])
