@@ -4,6 +4,7 @@ namespace restage::cli {
 
 void add_commands(Program& program) {
   add_train(program);
+  add_sweep(program);
   add_retarget(program);
   add_register(program);
   add_skeleton(program);
