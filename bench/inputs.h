@@ -10,7 +10,7 @@
 
 #include "nn/models/registry.h"
 #include "nn/weights/safetensors.h"
-#include "train/stages/configs.h"
+#include "train/stages/train_config.h"
 
 namespace restage::bench {
 

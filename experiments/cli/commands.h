@@ -21,6 +21,9 @@ void add_info(Program& program);
 void add_render(Program& program);
 void add_retarget(Program& program);
 void add_skeleton(Program& program);
+void add_sweep(Program& program);
+void add_sweep_export(Program& program, CLI::App& group);  // of `sweep`, as all add_sweep_*
+void add_sweep_table(Program& program, CLI::App& group);
 void add_train(Program& program);
 void add_weights(Program& program);
 

@@ -300,6 +300,8 @@ void add_sweep(Program& program) {
                                [dir, wait, &program] { return run_stop(*dir, *wait, program.common()); });
   stop.add_option("DIR", *dir, "folder of the sweep")->required();
   stop.add_option("--wait", *wait, "seconds to wait for them (60)");
+  add_sweep_table(program, group);
+  add_sweep_export(program, group);
 }
 
 }  // namespace restage::cli

@@ -5,7 +5,7 @@
 #include <set>
 
 #include "autograd/base/nearest.h"
-#include "train/config.h"
+#include "nn/config/config.h"
 
 namespace restage::sweep {
 namespace {

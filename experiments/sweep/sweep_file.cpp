@@ -9,7 +9,7 @@
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/nearest.h"
 #include "experiments/sweep/sweep_words.h"
-#include "train/config_reader.h"
+#include "nn/config/config_reader.h"
 
 namespace restage::sweep {
 namespace {

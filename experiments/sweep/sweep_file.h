@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "train/config_tree.h"
+#include "nn/config/config_tree.h"
 
 namespace restage::sweep {
 

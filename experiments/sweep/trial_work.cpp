@@ -14,7 +14,7 @@
 #include "datasets/benchmark/manifest.h"
 #include "datasets/readers/sha256.h"
 #include "experiments/evaluation.h"
-#include "train/config.h"
+#include "nn/config/config.h"
 #include "train/run_provenance.h"
 #include "train/stages/registry.h"
 

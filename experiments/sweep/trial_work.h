@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "experiments/sweep/sweep_file.h"
-#include "train/config_tree.h"
+#include "nn/config/config_tree.h"
 
 namespace restage::sweep {
 

@@ -19,7 +19,7 @@
 #include "tests/fuzz/targets.h"
 #include "tests/support/tiny_body.h"
 #include "nn/config/config.h"
-#include "train/stages/configs.h"
+#include "train/stages/train_config.h"
 
 namespace restage::fuzz {
 namespace {

@@ -8,7 +8,7 @@
 #include <set>
 
 #include "nn/config/config.h"
-#include "train/stages/configs.h"
+#include "train/stages/train_config.h"
 
 namespace restage {
 namespace {

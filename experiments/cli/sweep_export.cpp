@@ -1,0 +1,71 @@
+// restage sweep export: a script that lets Slurm, GNU parallel or Snakemake run the trials.
+#include <filesystem>
+#include <memory>
+
+#include "autograd/base/atomic_file.h"
+#include "autograd/base/error.h"
+#include "autograd/base/output_check.h"
+#include "experiments/cli/commands.h"
+#include "experiments/cli/output.h"
+#include "experiments/sweep/export.h"
+
+namespace restage::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Arguments {
+  std::string dir, engine, out, program;
+};
+
+/// The program that runs now, wherever it was found.
+std::string this_program() {
+  std::error_code code;
+  const fs::path path = fs::read_symlink("/proc/self/exe", code);
+  if (code) throw WorkError("where this program lies cannot be found out; give it with --program");
+  return path.string();
+}
+
+int run_export(const Arguments& a, const Common& common) {
+  const tables::Engine engine = tables::engine_named(a.engine);
+  const auto plan = tables::read_plan(a.dir);
+  if (!plan)
+    throw InputError(a.dir, "holds no planned sweep (plan.json)",
+                     "write it with 'restage sweep plan SWEEP.yaml --out DIR'");
+  if (!a.program.empty() && !fs::is_regular_file(a.program))
+    throw InputError(a.program, "is no program", "leave --program out to use this one");
+  check_output(a.out, {a.dir + "/plan.json", a.dir + "/sweep.yaml", a.program});
+  const tables::ExportOptions options{
+      a.program.empty() ? this_program() : fs::canonical(a.program).string(),
+      fs::canonical(a.dir).string(), common.threads};
+  write_file_atomically(a.out, tables::export_script(engine, *plan, options));
+  const std::string start = engine == tables::Engine::slurm ? "sbatch " + a.out
+                            : engine == tables::Engine::parallel
+                                ? "parallel < " + a.out
+                                : "snakemake --cores all -k -s " + a.out;
+  if (common.json)
+    print_json({{"out", a.out}, {"engine", a.engine}, {"trials", plan->size()}, {"start", start}});
+  else
+    print("wrote " + a.out + ": " + std::to_string(plan->size()) + " trials\nstart it with " +
+          start + "\n");
+  return 0;
+}
+
+}  // namespace
+
+void add_sweep_export(Program& program, CLI::App& group) {
+  const auto a = std::make_shared<Arguments>();
+  CLI::App& app = program.add(
+      group, "export", "a script for Slurm, GNU parallel or Snakemake that runs the trials",
+      "restage sweep export runs/smoothness --engine slurm --out s.sbatch && sbatch s.sbatch\n"
+      "restage sweep export runs/smoothness --engine parallel --out s.txt && parallel < s.txt\n"
+      "restage sweep export runs/smoothness --engine snakemake --out s.smk && "
+      "snakemake --cores 4 -k -s s.smk",
+      [a, &program] { return run_export(*a, program.common()); });
+  app.add_option("DIR", a->dir, "folder of a planned sweep ('sweep plan --out DIR')")->required();
+  app.add_option("--engine", a->engine, "slurm, parallel or snakemake")->required();
+  app.add_option("--out", a->out, "script to write")->required();
+  app.add_option("--program", a->program, "restage as the machines see it (this program)");
+}
+
+}  // namespace restage::cli

@@ -1,0 +1,74 @@
+// restage sweep table: what came of a sweep, in rows.
+#include <filesystem>
+#include <memory>
+
+#include "autograd/base/atomic_file.h"
+#include "autograd/base/error.h"
+#include "autograd/base/log.h"
+#include "autograd/base/output_check.h"
+#include "experiments/cli/commands.h"
+#include "experiments/cli/output.h"
+#include "experiments/sweep/table_formats.h"
+
+namespace restage::cli {
+namespace {
+
+struct Arguments {
+  std::string dir, out;
+  tables::TableOptions options;
+};
+
+/// A table must not replace what it is made of.
+void check_place(const Arguments& a) {
+  if (a.out.empty()) return;
+  tables::to_format({}, {}, a.out);  // before any work: is the ending known?
+  std::vector<std::string> inputs = {a.dir + "/plan.json", a.dir + "/sweep.yaml"};
+  std::error_code code;
+  for (std::filesystem::directory_iterator at(a.dir + "/trials", code), end; !code && at != end;
+       at.increment(code))
+    inputs.push_back(at->path().string() + "/result.json");
+  check_output(a.out, inputs);
+}
+
+int run_table(Arguments a, const Common& common) {
+  check_place(a);
+  a.options.seed = common.seed;
+  const tables::Results results = tables::read_results(a.dir);
+  const tables::Table table = tables::make_table(results, a.options);
+  for (const auto* notices : {&results.notices, &table.notices})
+    for (const std::string& notice : *notices) log_warning(on_one_line(notice));
+  if (!a.out.empty()) write_file_atomically(a.out, tables::to_format(table, results, a.out));
+  if (common.json) {
+    Json document = tables::to_json(table, results);
+    document["seed"] = common.seed;
+    print_json(document);
+  } else {
+    print(tables::to_markdown(table, results));
+    log_info("seed of the intervals: " + std::to_string(common.seed));
+  }
+  if (!a.out.empty()) log_info("wrote " + a.out);
+  return 0;
+}
+
+}  // namespace
+
+void add_sweep_table(Program& program, CLI::App& group) {
+  const auto a = std::make_shared<Arguments>();
+  CLI::App& app = program.add(
+      group, "table", "mean, deviation and 95 % interval of a sweep's trials, in rows",
+      "restage sweep table runs/smoothness\n"
+      "restage sweep table runs/smoothness --columns pa_mpjpe,acc --against quaternion\n"
+      "restage sweep table runs/smoothness --rows motion.weights.smoothness --out table.tex",
+      [a, &program] { return run_table(*a, program.common()); });
+  app.add_option("DIR", a->dir, "folder of the sweep")->required();
+  app.add_option("--rows", a->options.rows, "KEY,... to group by, also 'case' (case and overrides)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  app.add_option("--columns", a->options.columns, "METRIC,... to show (all)")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  app.add_option("--against", a->options.against, "differences to the row with this label");
+  app.add_option("--out", a->out, "F.md, F.csv, F.tex or F.svg to write");
+}
+
+}  // namespace restage::cli

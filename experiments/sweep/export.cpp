@@ -1,0 +1,235 @@
+#include "experiments/sweep/export.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <set>
+
+#include "autograd/base/error.h"
+#include "autograd/base/nearest.h"
+
+namespace restage::tables {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr size_t kMaxTasks = 1000;  ///< Slurm's MaxArraySize is 1001 unless somebody raised it
+
+/// One word of a POSIX shell.
+std::string quoted(const std::string& text) {
+  std::string out = "'";
+  for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return out + "'";
+}
+
+void refuse(const std::string& path, const std::string& characters, const std::string& what) {
+  if (path.find_first_of(characters) == std::string::npos) return;
+  throw InputError("", "the path '" + path + "' has " + what + ", which the engine cannot be told",
+                   "rename the folder, or give another one");
+}
+
+/// A name that may stand in a line of options.
+std::string job_name(const std::string& dir) {
+  std::string name = std::filesystem::path(dir).filename().string();
+  std::erase_if(name, [](unsigned char c) { return std::isalnum(c) == 0 && c != '-' && c != '_'; });
+  return "restage" + (name.empty() ? "" : "-" + name);
+}
+
+// ---- Slurm -------------------------------------------------------------------------------------
+
+std::string slurm_script(const std::vector<PlannedTrial>& plan, const ExportOptions& o) {
+  std::string ids;
+  for (const PlannedTrial& trial : plan) ids += "  " + trial.id + "\n";
+  const size_t tasks = std::min(plan.size(), kMaxTasks);
+  return "#!/bin/bash\n"
+         "# The trials of a sweep: sbatch FILE (options given to sbatch win over those below).\n"
+         "# A requeued or repeated job goes on where its trial was left; done ones are passed by.\n"
+         "#SBATCH --job-name=" +
+         job_name(o.dir) +
+         "\n"
+         "#SBATCH --array=0-" +
+         std::to_string(tasks - 1) +
+         "\n"
+         "#SBATCH --requeue\n"
+         "#SBATCH --open-mode=append\n"
+         "#SBATCH --signal=B:TERM@120\n" +
+         (o.threads > 0 ? "#SBATCH --cpus-per-task=" + std::to_string(o.threads) + "\n" : "") +
+         "restage=" + quoted(o.program) +
+         "\n"
+         "dir=" +
+         quoted(o.dir) +
+         "\n"
+         "ids=(\n" +
+         ids +
+         ")\n"
+         "tasks=" +
+         std::to_string(tasks) +
+         "\n"
+         R"(code=0 stopping=
+# Before the time is up, Slurm tells this shell, and the trial must hear of it to write a checkpoint.
+trap 'stopping=1; kill -TERM "$trial" 2> /dev/null' TERM
+for ((i = SLURM_ARRAY_TASK_ID; i < ${#ids[@]}; i += tasks)); do
+  "$restage" trial "$dir" "${ids[i]}" --threads "${SLURM_CPUS_PER_TASK:-1}" &
+  trial=$!
+  wait "$trial"
+  ended=$?
+  # A trap ends the first wait; the second one hears how the trial ended.
+  if [ -n "$stopping" ]; then wait "$trial"; exit $?; fi
+  [ "$ended" = 0 ] || code=$ended
+done
+exit "$code"
+)";
+}
+
+// ---- GNU parallel ------------------------------------------------------------------------------
+
+std::string parallel_list(const std::vector<PlannedTrial>& plan, const ExportOptions& o) {
+  std::string text;
+  for (const PlannedTrial& trial : plan)
+    text += quoted(o.program) + " trial " + quoted(o.dir) + " " + trial.id + " --threads " +
+            std::to_string(std::max(1, o.threads)) + "\n";
+  return text;
+}
+
+// ---- Snakemake ---------------------------------------------------------------------------------
+
+/// An artifact that several trials use.
+struct Shared {
+  std::string name, stage;
+  std::vector<const PlannedTrial*> users;
+  std::set<std::string> after;  ///< shared artifacts that all of its users have as well
+};
+
+bool uses(const PlannedTrial& trial, const std::string& name) {
+  return std::any_of(trial.artifacts.begin(), trial.artifacts.end(),
+                     [&](const auto& a) { return a.first + "-" + a.second == name; });
+}
+
+/// A plan does not say which artifact reads which. One that stands earlier in every trial that uses
+/// the later one may be read by it, and is made before it.
+std::vector<Shared> shared_artifacts(const std::vector<PlannedTrial>& plan) {
+  std::vector<Shared> out;
+  for (const PlannedTrial& trial : plan)
+    for (const auto& [stage, id] : trial.artifacts) {
+      const std::string name = stage + "-" + id;
+      auto at =
+          std::find_if(out.begin(), out.end(), [&](const Shared& s) { return s.name == name; });
+      if (at == out.end()) at = out.insert(at, {name, stage, {}, {}});
+      at->users.push_back(&trial);
+    }
+  std::erase_if(out, [](const Shared& s) { return s.users.size() < 2; });
+  for (Shared& later : out)
+    for (const auto& [stage, id] : later.users.front()->artifacts) {
+      if (stage == later.stage) break;
+      const std::string name = stage + "-" + id;
+      if (std::all_of(later.users.begin(), later.users.end(),
+                      [&](const PlannedTrial* t) { return uses(*t, name); }))
+        later.after.insert(name);
+    }
+  return out;
+}
+
+/// JSON text of strings, lists and maps is Python's too; characters stay as they are.
+std::string python(const Json& value) { return value.dump(2); }
+
+std::string snakefile(const std::vector<PlannedTrial>& plan, const ExportOptions& o) {
+  const std::vector<Shared> shared = shared_artifacts(plan);
+  Json trials = Json::object(), stages = Json::object();
+  for (const PlannedTrial& trial : plan) {
+    Json& needs = trials[trial.id] = Json::array();
+    for (const Shared& s : shared)
+      if (uses(trial, s.name)) needs.push_back(s.name);
+  }
+  for (const Shared& s : shared)
+    stages[s.name] = {{"trial", s.users.front()->id}, {"stage", s.stage}, {"after", s.after}};
+  return R"(# The trials of a sweep and the stages that several of them share: snakemake -s FILE --cores N
+# (and -k, so that one failed trial does not keep others from starting).
+import json
+import os
+
+RESTAGE = )" +
+         python(o.program) + R"(
+DIR = )" +
+         python(o.dir) + R"(
+THREADS = )" +
+         std::to_string(std::max(1, o.threads)) + R"(
+# Each trial with the shared artifacts that it needs; each of these with a trial that it is part of.
+TRIALS = )" +
+         python(trials) + R"(
+STAGES = )" +
+         python(stages) + R"(
+MARKS = os.path.join(DIR, "snakemake")
+
+
+def state(trial):
+    """What its own result says; nothing else decides whether a trial is done."""
+    try:
+        with open(os.path.join(DIR, "trials", trial, "result.json")) as f:
+            return json.load(f)["state"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def mark(name):
+    return os.path.join(MARKS, name)
+
+
+# Snakemake wants files of its own, which it may delete: marks, never results or artifacts.
+for trial in TRIALS:
+    if state(trial) not in ("done", "stopped") and os.path.exists(mark(trial + ".trial")):
+        os.remove(mark(trial + ".trial"))
+
+
+rule all:
+    input: [mark(trial + ".trial") for trial in TRIALS if state(trial) != "done"]
+
+
+rule stage:
+    input: lambda wildcards: [mark(name + ".stage") for name in STAGES[wildcards.name]["after"]]
+    output: temp(mark("{name}.stage"))
+    wildcard_constraints: name="[^/]+"
+    params: trial=lambda wildcards: STAGES[wildcards.name]["trial"], stage=lambda wildcards: STAGES[wildcards.name]["stage"]
+    threads: THREADS
+    shell: "{RESTAGE:q} trial {DIR:q} {params.trial} --stage {params.stage:q} --threads {threads} && touch {output:q}"
+
+
+rule trial:
+    input: lambda wildcards: [mark(name + ".stage") for name in TRIALS[wildcards.trial]]
+    output: mark("{trial}.trial")
+    wildcard_constraints: trial="[0-9a-f]+"
+    threads: THREADS
+    shell: "{RESTAGE:q} trial {DIR:q} {wildcards.trial} --threads {threads} && touch {output:q}"
+)";
+}
+
+}  // namespace
+
+Engine engine_named(const std::string& name) {
+  const std::vector<std::string> names = {"slurm", "parallel", "snakemake"};
+  const auto at = std::find(names.begin(), names.end(), name);
+  if (at != names.end()) return static_cast<Engine>(at - names.begin());
+  const std::string near = nearest(name, names);
+  throw InputError(
+      "", "there is no engine '" + name + "'",
+      near.empty() ? "there are slurm, parallel and snakemake" : "did you mean '" + near + "'?");
+}
+
+std::string export_script(Engine engine, const std::vector<PlannedTrial>& plan,
+                          const ExportOptions& options) {
+  for (const std::string& path : {options.program, options.dir}) {
+    refuse(path, "\r\n", "a line break");
+    if (engine == Engine::snakemake) refuse(path, "{}", "a brace");
+  }
+  if (plan.empty())
+    throw InputError(options.dir, "the plan has no trials", "plan the sweep again with --out");
+  switch (engine) {
+    case Engine::slurm:
+      return slurm_script(plan, options);
+    case Engine::parallel:
+      return parallel_list(plan, options);
+    case Engine::snakemake:
+      break;
+  }
+  return snakefile(plan, options);
+}
+
+}  // namespace restage::tables

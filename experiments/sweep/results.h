@@ -1,0 +1,66 @@
+// What the trials of a sweep left behind (../shared/spec is the contract; docs/experiments.md):
+// DIR/plan.json, what was planned, and DIR/trials/ID/result.json, what came of each. Results may
+// come from any machine and engine, so nothing in them is believed: what is damaged, or belongs to
+// another trial or plan, is told in one line and not used.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace restage::tables {
+
+/// What a plan says about a trial.
+struct PlannedTrial {
+  std::string id;         ///< 12 hex digits
+  std::string case_name;  ///< empty: no cases
+  uint64_t seed = 0;
+  std::map<std::string, nlohmann::json> overrides;             ///< by key
+  std::vector<std::pair<std::string, std::string>> artifacts;  ///< stage and id, as made
+};
+
+/// Values by METRIC (nn/metrics/metrics.h, table()); what is null is not there.
+using MetricValues = std::map<std::string, double>;
+
+struct SetResult {
+  MetricValues mean;
+  std::vector<std::pair<std::string, MetricValues>> sequences;  ///< by name, names are unique
+};
+
+/// Damaged: what is there cannot be used.
+enum class TrialState { done, failed, stopped, pending, damaged };
+inline constexpr const char* kTrialStates[] = {"done", "failed", "stopped", "pending", "damaged"};
+
+struct TrialResult : PlannedTrial {
+  TrialState state = TrialState::pending;
+  bool described = true;  ///< false: neither plan nor result says more than the id
+  std::string error;      ///< of a failed one
+  double seconds = 0;
+  std::vector<std::pair<std::string, SetResult>> sets;  ///< of one that is done
+};
+
+struct Results {
+  std::vector<TrialResult>
+      trials;  ///< in the plan's order; without a plan by case, overrides, seed
+  std::vector<std::string> notices;  ///< a line for each thing that is not used, and why
+  int count(TrialState state) const;
+};
+
+/// 12 lower-case hex digits.
+bool is_trial_id(const std::string& text);
+/// DIR/plan.json, the document of `restage sweep plan --json`; nothing if it is not there.
+/// InputError: damaged.
+std::optional<std::vector<PlannedTrial>> read_plan(const std::string& dir);
+/// One result file. InputError: damaged, or the result of another trial.
+TrialResult read_result(const std::string& path, const std::string& id);
+/// All trials of a sweep. InputError: `dir` holds no sweep.
+Results read_results(const std::string& dir);
+
+/// A value of an override as a person writes it: text without quotes.
+std::string plain_text(const nlohmann::json& value);
+
+}  // namespace restage::tables

@@ -1,0 +1,246 @@
+#include "experiments/sweep/table.h"
+
+#include <algorithm>
+#include <set>
+
+#include "autograd/base/error.h"
+#include "autograd/base/nearest.h"
+
+namespace restage::tables {
+namespace {
+
+using Json = nlohmann::json;
+
+/// The trials of one row, in order.
+struct Group {
+  std::map<std::string, Json> key;  ///< what they were grouped by; the case as "case"
+  std::vector<const TrialResult*> trials;
+};
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "'" : ", '") + word + "'";
+  return text;
+}
+
+// ---- groups ------------------------------------------------------------------------------------
+
+/// Overrides beside the case; a seed among them is no key of a row.
+std::map<std::string, Json> keys_of(const TrialResult& trial) {
+  std::map<std::string, Json> keys = trial.overrides;
+  keys.erase("seed");
+  if (!trial.case_name.empty()) keys["case"] = trial.case_name;
+  return keys;
+}
+
+void check_keys(const Results& results, const std::vector<std::string>& rows) {
+  std::set<std::string> known;
+  for (const TrialResult& trial : results.trials)
+    for (const auto& [key, value] : keys_of(trial)) known.insert(key);
+  const std::vector<std::string> names(known.begin(), known.end());
+  for (const std::string& row : rows) {
+    if (known.contains(row)) continue;
+    const std::string near = nearest(row, names);
+    throw InputError("", "no trial has the key '" + row + "' to make rows of",
+                     !near.empty()   ? "did you mean '" + near + "'?"
+                     : names.empty() ? "these trials have neither cases nor overrides"
+                                     : "there are " + joined(names));
+  }
+}
+
+std::vector<Group> group(const Results& results, const std::vector<std::string>& rows) {
+  check_keys(results, rows);
+  std::vector<Group> groups;
+  for (const TrialResult& trial : results.trials) {
+    if (!trial.described) continue;
+    std::map<std::string, Json> key = keys_of(trial);
+    if (!rows.empty())
+      std::erase_if(key, [&](const auto& item) {
+        return std::find(rows.begin(), rows.end(), item.first) == rows.end();
+      });
+    auto at =
+        std::find_if(groups.begin(), groups.end(), [&](const Group& g) { return g.key == key; });
+    if (at == groups.end()) at = groups.insert(at, {key, {}});
+    at->trials.push_back(&trial);
+  }
+  return groups;
+}
+
+// ---- labels ------------------------------------------------------------------------------------
+
+/// Whether all rows agree about a key.
+bool is_common(const std::vector<Group>& groups, const std::string& key) {
+  for (const Group& g : groups) {
+    const auto here = g.key.find(key), first = groups.front().key.find(key);
+    if ((here == g.key.end()) != (first == groups.front().key.end())) return false;
+    if (here != g.key.end() && here->second != first->second) return false;
+  }
+  return true;
+}
+
+/// Whether the name of the case says what a key is.
+bool follows_from_case(const std::vector<Group>& groups, const std::string& key) {
+  std::map<std::string, Json> of_case;
+  for (const Group& g : groups) {
+    const auto name = g.key.find("case"), value = g.key.find(key);
+    if (name == g.key.end()) return false;
+    const Json here = value == g.key.end() ? Json() : value->second;
+    if (of_case.emplace(name->second.get<std::string>(), here).first->second != here) return false;
+  }
+  return true;
+}
+
+/// The case, then the keys that tell rows apart and do not follow from the case.
+std::vector<std::string> labels(const std::vector<Group>& groups) {
+  std::vector<std::string> out;
+  std::set<std::string> taken;
+  for (const Group& g : groups) {
+    std::string label = g.key.contains("case") ? plain_text(g.key.at("case")) : "";
+    for (const auto& [key, value] : g.key)
+      if (key != "case" && !is_common(groups, key) && !follows_from_case(groups, key))
+        label += (label.empty() ? "" : ", ") + key + "=" + plain_text(value);
+    if (label.empty()) label = "base";
+    std::string unique = label;
+    for (int i = 2; !taken.insert(unique).second; ++i) unique = label + " #" + std::to_string(i);
+    out.push_back(unique);
+  }
+  return out;
+}
+
+size_t find_row(const std::vector<Row>& rows, const std::string& wanted) {
+  std::vector<size_t> found;
+  std::vector<std::string> names;
+  for (size_t r = 0; r < rows.size(); ++r) {
+    if (rows[r].label == wanted) return r;
+    if (rows[r].label.starts_with(wanted)) found.push_back(r);
+    names.push_back(rows[r].label);
+  }
+  if (found.size() == 1) return found.front();
+  throw InputError("",
+                   "'" + wanted + "' is the beginning of " +
+                       (found.empty() ? "no row" : std::to_string(found.size()) + " rows"),
+                   names.empty() ? "there are no rows" : "the rows are " + joined(names));
+}
+
+// ---- cells -------------------------------------------------------------------------------------
+
+std::vector<const metrics::Metric*> columns(const std::vector<std::string>& names) {
+  std::vector<const metrics::Metric*> out;
+  std::vector<std::string> known;
+  for (const metrics::Metric& metric : metrics::table()) {
+    known.emplace_back(metric.name);
+    if (names.empty()) out.push_back(&metric);
+  }
+  for (const std::string& name : names) {
+    const auto at = std::find(known.begin(), known.end(), name);
+    if (at == known.end()) {
+      const std::string near = nearest(name, known);
+      throw InputError(
+          "", "there is no metric '" + name + "'",
+          near.empty() ? "there are " + joined(known) : "did you mean '" + near + "'?");
+    }
+    out.push_back(&metrics::table()[static_cast<size_t>(at - known.begin())]);
+  }
+  return out;
+}
+
+/// What pairs a trial with one of another row: the seed, and what the rows do not name.
+std::string pair_key(const TrialResult& trial, const Group& group) {
+  std::string key = "seed " + std::to_string(trial.seed);
+  for (const auto& [name, value] : keys_of(trial))
+    if (!group.key.contains(name)) key += "\n" + name + "=" + value.dump();
+  return key;
+}
+
+Sample sample_of(const Group& group, const std::string& set, const std::string& metric) {
+  Sample sample;
+  for (const TrialResult* trial : group.trials) {
+    const auto at = std::find_if(trial->sets.begin(), trial->sets.end(),
+                                 [&](const auto& item) { return item.first == set; });
+    if (at == trial->sets.end() || !at->second.mean.contains(metric)) continue;
+    Repetition r{pair_key(*trial, group), at->second.mean.at(metric), {}};
+    for (const auto& [name, values] : at->second.sequences)
+      if (values.contains(metric)) r.sequences[name] = values.at(metric);
+    sample.push_back(std::move(r));
+  }
+  return sample;
+}
+
+Row head_of(const Group& group, const std::string& label) {
+  Row row;
+  row.label = label;
+  row.overrides = group.trials.front()->overrides;
+  row.case_name = group.trials.front()->case_name;
+  for (const TrialResult* trial : group.trials) {
+    std::erase_if(row.overrides, [&](const auto& item) {
+      const auto same = trial->overrides.find(item.first);
+      return same == trial->overrides.end() || same->second != item.second;
+    });
+    if (trial->case_name != row.case_name) row.case_name.clear();
+    if (trial->state == TrialState::done) {
+      row.seeds.push_back(trial->seed);
+      ++row.n;
+    }
+  }
+  std::sort(row.seeds.begin(), row.seeds.end());
+  row.seeds.erase(std::unique(row.seeds.begin(), row.seeds.end()), row.seeds.end());
+  return row;
+}
+
+void tell_pooled(const std::vector<Group>& groups, std::vector<std::string>* notices) {
+  std::set<std::string> pooled;
+  for (const Group& g : groups)
+    for (const TrialResult* trial : g.trials)
+      for (const auto& [key, value] : keys_of(*trial))
+        if (!g.key.contains(key) && keys_of(*g.trials.front())[key] != value) pooled.insert(key);
+  if (!pooled.empty())
+    notices->push_back("rows pool trials that differ in " + joined({pooled.begin(), pooled.end()}) +
+                       ", and each of them counts as a repetition; name these keys in --rows to "
+                       "tell them apart");
+}
+
+/// Metric by metric of one set, for all rows.
+void fill_set(const std::vector<Group>& groups, size_t set, Bootstrap* bootstrap, Table* table) {
+  double contradiction = 0;
+  for (size_t c = 0; c < table->columns.size(); ++c) {
+    std::vector<Sample> samples;
+    for (const Group& g : groups)
+      samples.push_back(sample_of(g, table->sets[set], table->columns[c]->name));
+    for (size_t r = 0; r < groups.size(); ++r) {
+      Cell& cell = table->rows[r].cells[set][c];
+      cell.value = bootstrap->estimate(samples[r]);
+      contradiction = std::max(contradiction, largest_contradiction(samples[r]));
+      if (table->against && r != *table->against)
+        cell.difference =
+            bootstrap->estimate(paired_difference(samples[r], samples[*table->against]));
+    }
+  }
+  if (contradiction > 1e-6)
+    table->notices.push_back("set '" + table->sets[set] +
+                             "': some means are not the averages of their sequences; means are "
+                             "given as told, intervals are those of sequences shifted to them");
+}
+
+}  // namespace
+
+Table make_table(const Results& results, const TableOptions& options) {
+  Table table;
+  table.columns = columns(options.columns);
+  const std::vector<Group> groups = group(results, options.rows);
+  std::set<std::string> known;
+  for (const TrialResult& trial : results.trials)
+    for (const auto& [name, set] : trial.sets)
+      if (known.insert(name).second) table.sets.push_back(name);
+  const std::vector<std::string> names = labels(groups);
+  for (size_t r = 0; r < groups.size(); ++r) {
+    Row& row = table.rows.emplace_back(head_of(groups[r], names[r]));
+    row.cells.assign(table.sets.size(), std::vector<Cell>(table.columns.size()));
+  }
+  if (!options.against.empty()) table.against = find_row(table.rows, options.against);
+  tell_pooled(groups, &table.notices);
+  Bootstrap bootstrap(options.seed);
+  for (size_t s = 0; s < table.sets.size(); ++s) fill_set(groups, s, &bootstrap, &table);
+  return table;
+}
+
+}  // namespace restage::tables

@@ -1,0 +1,237 @@
+// Results of trials, however damaged, and the rows that are made of them.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "autograd/base/atomic_file.h"
+#include "autograd/base/error.h"
+#include "experiments/sweep/table_formats.h"
+
+namespace restage::tables {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+class TableTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    dir_ = (fs::temp_directory_path() / ("restage-table-" + std::to_string(getpid()))).string();
+    fs::remove_all(dir_);
+    fs::create_directories(dir_ + "/trials");
+  }
+  void TearDown() override { fs::remove_all(dir_); }
+
+  static std::string id(int i) {
+    const std::string digits = std::to_string(i);
+    return std::string(12 - digits.size(), 'a') + digits;
+  }
+  static Json trial(int i, const std::string& name, int seed, const Json& overrides, double value) {
+    const Json one = {{"name", "walk"}, {"frames", 60}, {"mpjpe", value - 0.01}, {"mpvd", nullptr}};
+    const Json two = {{"name", "jump"}, {"frames", 60}, {"mpjpe", value + 0.01}, {"mpvd", nullptr}};
+    return {{"id", id(i)},
+            {"case", name},
+            {"seed", seed},
+            {"overrides", overrides},
+            {"state", "done"},
+            {"error", nullptr},
+            {"artifacts", {{"motion", "0123456789ab"}}},
+            {"seconds", 1.5},
+            {"metrics",
+             {{"naked",
+               {{"mean", {{"mpjpe", value}, {"mpvd", nullptr}}}, {"sequences", {one, two}}}}}}};
+  }
+  void write(const std::string& name, const std::string& text) const {
+    fs::create_directories(fs::path(dir_ + "/" + name).parent_path());
+    write_file_atomically(dir_ + "/" + name, text);
+  }
+  void put(const Json& result) const {
+    write("trials/" + result["id"].get<std::string>() + "/result.json", result.dump());
+  }
+  /// Cases quaternion and 6D, each with a = 0 and 1 and seeds 1, 2, 3.
+  void put_sweep() const {
+    int i = 0;
+    for (const char* name : {"quaternion", "6D"})
+      for (int a = 0; a < 2; ++a)
+        for (int seed = 1; seed <= 3; ++seed)
+          put(trial(++i, name, seed, {{"a", a}, {"model", std::string("m/") + name}},
+                    0.1 + 0.02 * a + 0.001 * seed * seed + (name[0] == '6' ? 0.05 : 0)));
+  }
+  std::string dir_;
+};
+
+TEST_F(TableTest, RowsAreCasesAndOverridesAndSeedsAreRepetitions) {
+  put_sweep();
+  const Results results = read_results(dir_);
+  EXPECT_TRUE(results.notices.empty());
+  const Table table = make_table(results, {});
+  ASSERT_EQ(table.rows.size(), 4u);
+  EXPECT_EQ(table.rows[0].label, "6D, a=0");  // the case says which model it is
+  EXPECT_EQ(table.rows[3].label, "quaternion, a=1");
+  EXPECT_EQ(table.rows[3].overrides.at("model"), "m/quaternion");
+  EXPECT_EQ(table.rows[3].seeds, (std::vector<uint64_t>{1, 2, 3}));
+  const Estimate& e = table.rows[3].cells[0][0].value;
+  EXPECT_EQ(e.n, 3);
+  EXPECT_NEAR(*e.mean, 0.12 + 0.014 / 3, 1e-12);
+  EXPECT_NEAR(*e.deviation, 0.004041451884327381, 1e-12);  // np.std([.001, .004, .009], ddof=1)
+  const Json json = to_json(table, results);
+  EXPECT_TRUE(json["rows"][0]["metrics"]["naked"]["mpvd"]["mean"].is_null());
+  EXPECT_EQ(json["rows"][0]["metrics"]["naked"]["mpvd"]["n"], 0);
+  EXPECT_EQ(json["trials"]["done"], 12);
+}
+
+TEST_F(TableTest, DifferencesArePairedBySeed) {
+  put_sweep();
+  TableOptions options;
+  options.against = "quaternion, a=0";
+  options.columns = {"mpjpe"};
+  const Table table = make_table(read_results(dir_), options);
+  const Estimate d = *table.rows[0].cells[0][0].difference;
+  EXPECT_EQ(d.n, 3);
+  EXPECT_NEAR(*d.mean, 0.05, 1e-12);
+  EXPECT_NEAR(*d.low, 0.05, 1e-12);  // the same for every seed and sequence
+  EXPECT_FALSE(table.rows[*table.against].cells[0][0].difference);
+}
+
+TEST_F(TableTest, RowsByAKeyPoolTheOthersAndSaySo) {
+  put_sweep();
+  TableOptions options;
+  options.rows = {"a"};
+  options.against = "a=0";
+  const Table table = make_table(read_results(dir_), options);
+  ASSERT_EQ(table.rows.size(), 2u);
+  EXPECT_EQ(table.rows[0].n, 6);
+  EXPECT_EQ(table.rows[0].seeds.size(), 3u);
+  EXPECT_NEAR(*table.rows[1].cells[0][0].difference->mean, 0.02, 1e-12);
+  EXPECT_EQ(table.rows[1].cells[0][0].difference->n, 6);  // paired by case and seed
+  ASSERT_EQ(table.notices.size(), 1u);
+  EXPECT_NE(table.notices[0].find("'case'"), std::string::npos);
+}
+
+template <class Call>
+std::string error_of(Call call) {
+  try {
+    call();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST_F(TableTest, UnknownNamesAreToldWithWhatThereIs) {
+  put_sweep();
+  const Results results = read_results(dir_);
+  const auto error = [&](const TableOptions& options) {
+    return error_of([&] { make_table(results, options); });
+  };
+  EXPECT_NE(error({.rows = {"mode"}}).find("did you mean 'model'?"), std::string::npos);
+  EXPECT_NE(error({.columns = {"mpjep"}}).find("did you mean 'mpjpe'?"), std::string::npos);
+  EXPECT_NE(error({.against = "8D"}).find("the rows are '6D, a=0', '6D, a=1'"), std::string::npos);
+  EXPECT_NE(error({.against = "6D"}).find("beginning of 2 rows"), std::string::npos);
+  EXPECT_EQ(make_table(results, {.against = "quaternion, a=1"}).against, 3u);
+}
+
+TEST_F(TableTest, WhatIsNotDoneIsCountedAndNotAveraged) {
+  put_sweep();
+  Json failed = trial(1, "quaternion", 1, {{"a", 0}, {"model", "m/quaternion"}}, 5);
+  failed["state"] = "failed";
+  failed["error"] = "restage: the loss is not finite";
+  put(failed);
+  fs::create_directories(dir_ + "/trials/" + id(77));
+  const Results results = read_results(dir_);
+  EXPECT_EQ(counts_text(results), "11 done, 1 failed, 1 pending");
+  const Table table = make_table(results, {});
+  EXPECT_EQ(table.rows[2].n, 2);
+  EXPECT_LT(*table.rows[2].cells[0][0].value.mean, 1);
+}
+
+TEST_F(TableTest, DamagedAndForeignResultsAreToldAndNotUsed) {
+  put_sweep();
+  const std::string good =
+      trial(1, "quaternion", 1, {{"a", 0}, {"model", "m/quaternion"}}, 0.1).dump();
+  const auto with = [&](const char* place, const Json& value) {
+    Json json = Json::parse(good);
+    json[Json::json_pointer(place)] = value;
+    return json.dump();
+  };
+  Json deep;
+  for (int i = 0; i < 50; ++i) deep = Json::array({deep});
+  const std::vector<std::string> bad = {"",
+                                        "{",
+                                        "[]",
+                                        "null",
+                                        good.substr(0, good.size() / 2),
+                                        good + good,
+                                        "\xff\xfe",
+                                        with("/id", id(2)),
+                                        with("/id", 5),
+                                        with("/seed", -1),
+                                        with("/seed", "1"),
+                                        with("/case", 3),
+                                        with("/state", "running"),
+                                        with("/state", "damaged"),
+                                        with("/overrides", 1),
+                                        with("/overrides/a", deep),
+                                        with("/metrics", nullptr),
+                                        with("/metrics/naked", 1),
+                                        with("/metrics/naked/mean", Json::array()),
+                                        with("/metrics/naked/mean/mpjpe", "0.1"),
+                                        with("/metrics/naked/sequences", nullptr),
+                                        with("/metrics/naked/sequences/0", 1),
+                                        with("/metrics/naked/sequences/0/name", nullptr),
+                                        with("/metrics/naked/sequences/0/name", "jump"),
+                                        with("/artifacts", "x"),
+                                        with("/seconds", "long"),
+                                        "{\"id\": 1e999}"};
+  for (const std::string& text : bad) {
+    write("trials/" + id(1) + "/result.json", text);
+    const Results results = read_results(dir_);
+    EXPECT_EQ(results.notices.size(), 1u) << text;
+    EXPECT_EQ(counts_text(results), "11 done, 1 damaged") << text;
+    EXPECT_EQ(make_table(results, {}).rows[2].n, 2) << text;
+  }
+  write("trials/" + id(1) + "/result.json", good);
+  EXPECT_EQ(counts_text(read_results(dir_)), "12 done");
+}
+
+TEST_F(TableTest, ThePlanSaysWhatBelongs) {
+  put_sweep();
+  Json plan = {{"trials", Json::array()}};
+  for (const int seed : {1, 2, 3, 4}) {
+    Json entry = trial(seed < 4 ? 6 + seed : 99, "6D", seed, {{"a", 0}, {"model", "m/6D"}}, 0);
+    plan["trials"].push_back(entry);
+  }
+  write("plan.json", plan.dump());
+  const Results results = read_results(dir_);
+  EXPECT_EQ(counts_text(results), "3 done, 1 pending");
+  EXPECT_EQ(results.notices.size(), 9u);  // of an earlier plan
+  EXPECT_EQ(make_table(results, {}).rows.size(), 1u);
+  // A result that answers another question than the plan asks under this id.
+  plan["trials"][0]["seed"] = 5;
+  write("plan.json", plan.dump());
+  EXPECT_EQ(counts_text(read_results(dir_)), "2 done, 1 pending, 1 damaged");
+  EXPECT_NE(error_of([&] { read_results(dir_ + "/trials"); }).find("holds no trials"),
+            std::string::npos);
+}
+
+TEST_F(TableTest, NamesCannotBreakTheFormats) {
+  const std::string name = "a|b_&<\"%\n\\x,y";
+  for (int seed = 1; seed <= 2; ++seed) put(trial(seed, name, seed, Json::object(), 0.1 * seed));
+  const Results results = read_results(dir_);
+  const Table table = make_table(results, {});
+  EXPECT_NE(to_csv(table).find("\"a|b_&<\"\"%\n\\x,y\""), std::string::npos);
+  EXPECT_NE(to_csv(table).find(",naked,mpjpe,m,0.15000000000000002,"), std::string::npos);
+  EXPECT_NE(to_tex(table, results).find("a|b\\_\\&<\"\\% \\textbackslash{}x,y & 2"),
+            std::string::npos);
+  EXPECT_NE(to_markdown(table, results).find("| a\\|b_&<\"% \\x,y |"), std::string::npos);
+  EXPECT_NE(to_svg(table).find("a|b_&amp;&lt;&quot;% \\x,y"), std::string::npos);
+  EXPECT_EQ(to_svg(table).find("script"), std::string::npos);
+  EXPECT_EQ(to_format(table, results, "x.csv"), to_csv(table));
+  EXPECT_NE(error_of([&] { to_format(table, results, "x.pdf"); }).find(".svg"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace restage::tables
