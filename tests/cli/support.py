@@ -80,6 +80,18 @@ class CliTest(unittest.TestCase):
         with open(self.path(name), "rb") as f:
             return f.read()
 
+    def vertices(self, name):
+        """Of a binary PLY file that the program wrote."""
+        head, _, body = self.bytes(name).partition(b"end_header\n")
+        return list(struct.iter_unpack("<3f", body[:12 * int(head.split(b"element vertex ")[1].split()[0])]))
+
+    def person(self, frames=12):
+        """Points of a built-in body in T-pose; walk/ holds scans of another that moves, and what else `perform` writes."""
+        if not os.path.exists(self.path("walk")):
+            self.done("data", "build", "--bodies", 1, 0, 1, "--motions", 1, 0, 0, "--quiet", "--out", "data.h5")
+            self.done("data", "perform", "--bodies", "data.h5", "--frames", frames, "--quiet", "--out", "walk")
+        return self.vertices("walk/target.ply")
+
     def write(self, name, content):
         os.makedirs(os.path.dirname(self.path(name)), exist_ok=True)
         with open(self.path(name), "wb" if isinstance(content, bytes) else "w") as f:

@@ -4,6 +4,7 @@ import math
 import struct
 import zipfile
 
+import test_data
 from support import CliTest, points
 from tiny_run import weights
 
@@ -28,7 +29,7 @@ def npz(**arrays):
     return out.getvalue()
 
 
-PARENTS = [-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19] + \
+PARENTS = test_data.PARENTS + \
     [p for wrist, first in ((20, 22), (21, 37)) for f in range(5) for p in (wrist, first + 3 * f, first + 3 * f + 1)]
 JOINTS = [(0, .95, 0), (.09, .88, 0), (-.09, .88, 0), (0, 1.06, 0), (.1, .48, .01), (-.1, .48, .01), (0, 1.2, 0),
           (.1, .08, -.02), (-.1, .08, -.02), (0, 1.27, .02), (.11, .02, .1), (-.11, .02, .1), (0, 1.47, -.02),

@@ -5,15 +5,12 @@ import struct
 import sys
 
 from support import CliTest, points
+from test_data import JOINTS as NAMES, PARENTS
 from tiny_run import TPOSES, weights
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "docs"))
 from anny_to_glb import write_glb  # noqa: E402: what the documentation tells users to run
 
-NAMES = ["pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle", "right_ankle",
-         "spine3", "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head", "left_shoulder",
-         "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist"]
-PARENTS = [-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19]
 # An A-pose with z up, as Anny's: x, depth towards -y, height.
 HEADS = [(0, 0, .95), (.09, 0, .88), (-.09, 0, .88), (0, 0, 1.06), (.1, 0, .48), (-.1, 0, .48), (0, 0, 1.2), (.1, 0, .08),
          (-.1, 0, .08), (0, 0, 1.27), (.1, -.1, .02), (-.1, -.1, .02), (0, 0, 1.47), (.07, 0, 1.39), (-.07, 0, 1.39),

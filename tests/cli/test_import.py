@@ -2,7 +2,7 @@
 import os
 
 from support import CliTest
-from test_data import NAMES, toy_bvh
+from test_data import JOINTS, NAMES, toy_bvh
 
 RESTS = " 0" * 66
 
@@ -165,10 +165,8 @@ class Import(CliTest):
             self.assertNotIn("placed", report["facts"]["names"])
 
     def test_own_recordings_get_no_remark_on_units(self):
-        joints = "pelvis left_hip right_hip spine1 left_knee right_knee spine2 left_ankle right_ankle spine3 left_foot right_foot neck " \
-                 "left_collar right_collar head left_shoulder right_shoulder left_elbow right_elbow left_wrist right_wrist".split()
         text = toy_bvh()
-        for name, joint in zip(NAMES, joints):
+        for name, joint in zip(NAMES, JOINTS):
             text = text.replace("mixamorig:%s\n" % name, joint + "\n")
         self.assertEqual(self.imported("own.bvh", text)[0]["remarks"], [])
 

@@ -155,14 +155,9 @@ class DoctorsWords(Retarget):
     def setUp(self):
         super().setUp()
         self.w = weights("tposes", *TPOSES)
-        self.done("data", "build", "--bodies", 1, 0, 1, "--motions", 1, 0, 0, "--quiet", "--out", "data.h5")
-        self.done("data", "perform", "--bodies", "data.h5", "--frames", 10, "--quiet", "--out", "walk")
+        self.person(10)
         self.done("doctor", "walk/source.h5", "--fix", "good/")
         self.frames = [self.vertices("good/" + name) for name in sorted(os.listdir(self.path("good")))]
-
-    def vertices(self, name):
-        head, _, body = self.bytes(name).partition(b"end_header\n")
-        return list(struct.iter_unpack("<3f", body[:12 * int(head.split(b"element vertex ")[1].split()[0])]))
 
     def source(self, name, move):
         for i, frame in enumerate(self.frames):
@@ -285,14 +280,9 @@ class BadRetargeting(Retarget):
         self.bad("cut.safetensors", w=self.write("cut.safetensors", whole[:len(whole) // 2]))
 
     def test_options(self):
-        self.bad("--fps", more=["--fps", "-1"])
-        self.bad("--fps", more=["--fps", "nan"])
-        self.bad("--fps", more=["--fps", "0.001"])
-        self.bad("--scale", more=["--scale", "0"])
-        self.bad("--scale", more=["--scale", "-2"])
-        self.bad("--source-up", more=["--source-up", "x"])
-        self.bad("--format", more=["--format", "stl"])
-        self.bad("--samples", more=["--samples", "0"])
+        for option, value in (("--fps", "-1"), ("--fps", "nan"), ("--fps", "0.001"), ("--scale", "0"), ("--scale", "-2"),
+                              ("--source-up", "x"), ("--format", "stl"), ("--samples", "0")):
+            self.bad(option, more=[option, value])
         self.bad("out.fbx", outs=["out.fbx"])
         self.bad("nowhere", outs=["nowhere/" + n for n in ("out.h5", "out.glb", "out.bvh")])
         self.write("own/notes.txt", "not a frame\n")

@@ -29,18 +29,6 @@ class Doctor(CliTest):
         found = self.doctor("frames", 1)
         self.assertEqual((found["kind"], found["facts"]["frames"], found["facts"]["most_points"]), ("frames", 3, 110))
 
-    def person(self):
-        """A cloud of a built-in body in T-pose and scans of one that moves."""
-        if not os.path.exists(self.path("walk")):
-            self.done("data", "build", "--bodies", 1, 0, 1, "--motions", 1, 0, 0, "--quiet", "--out", "data.h5")
-            self.done("data", "perform", "--bodies", "data.h5", "--frames", 12, "--quiet", "--out", "walk")
-        return self.vertices("walk/target.ply")
-
-    def vertices(self, name):
-        head, _, body = self.bytes(name).partition(b"end_header\n")
-        count = int(head.split(b"element vertex ")[1].split()[0])
-        return list(struct.iter_unpack("<3f", body[:12 * count]))
-
     def test_foreign_axes_and_units_are_found_and_mended(self):
         person = self.person()
         found = self.doctor(self.ply("good.ply", person), 0, "--target")

@@ -7,50 +7,47 @@
 #include "datasets/importers/amass.h"
 #include "datasets/importers/import.h"
 #include "datasets/schema.h"
-#include "tests/datasets/schema_support.h"
+#include "tests/datasets/importers_support.h"
 #include "tests/datasets/smpl_support.h"
 
 namespace restage {
 namespace {
 
-using test::error_of;
-using test::npy;
-using test::npz;
-using test::TempDir;
-using test::TinyClip;
-using test::TinySmpl;
-using test::write_bytes;
+using namespace test;
+using ImportersSmpl = FileTest;
+using ImportersAmass = FileTest;
 
-#define EXPECT_HAS(text, part) EXPECT_NE((text).find(part), std::string::npos) << (text)
+using Arrays = std::vector<std::pair<std::string, std::string>>;
 
 constexpr SmplFamily kFamilies[] = {SmplFamily::smpl, SmplFamily::smplh, SmplFamily::smplx};
 
-std::string fact(const ImportReport& report, const std::string& name) {
-  for (const auto& [key, value] : report.facts)
-    if (key == name) return value;
-  return "";
-}
-
-template <class Arrays>
-void replace(Arrays& arrays, const std::string& name, const std::string& bytes) {
+/// The arrays with another one of this name, or without it where `bytes` are empty.
+Arrays with(Arrays arrays, const std::string& name, const std::string& bytes) {
   for (auto& [key, value] : arrays)
     if (key == name) value = bytes;
+  if (bytes.empty()) std::erase_if(arrays, [&](const auto& array) { return array.first == name; });
+  return arrays;
 }
 
-template <class Arrays>
-void remove(Arrays& arrays, const std::string& name) {
-  std::erase_if(arrays, [&](const auto& array) { return array.first == name; });
+std::string doubles(const std::vector<int64_t>& shape, double value) {
+  int64_t size = 1;
+  for (const int64_t n : shape) size *= n;
+  return npy<double>(shape, std::vector<double>(static_cast<size_t>(size), value));
 }
+
+/// An array, what stands in its place (nothing: it is missing), and what is said of it.
+struct WrongArray {
+  const char* name;
+  std::string bytes;
+  const char* says;
+};
 
 // ---- models ------------------------------------------------------------------------------------
 
-TEST(ImportersSmpl, ShapesAndJointsAreExact) {
-  const TempDir dir;
+TEST_F(ImportersSmpl, ShapesAndJointsAreExact) {
   for (const SmplFamily family : kFamilies) {
-    TinySmpl tiny;
-    tiny.family = family;
-    write_bytes(dir / "model.npz", tiny.file());
-    const SmplModel model(dir / "model.npz");
+    const TinySmpl tiny{family};
+    const SmplModel model(dir.write("model.npz", tiny.file()));
     EXPECT_EQ(model.family(), family);
     EXPECT_EQ(model.shapes(), 4u);
     for (const Betas& betas : {Betas{}, Betas{1, -2}, Betas{0.5, 0.25, -1, 3}}) {
@@ -72,13 +69,10 @@ TEST(ImportersSmpl, ShapesAndJointsAreExact) {
   }
 }
 
-TEST(ImportersSmpl, HandsJawAndEyesCountForTheirJoints) {
-  const TempDir dir;
+TEST_F(ImportersSmpl, HandsJawAndEyesCountForTheirJoints) {
   for (const SmplFamily family : kFamilies) {
-    TinySmpl tiny;
-    tiny.family = family;
-    write_bytes(dir / "model.npz", tiny.file());
-    const Body body = SmplModel(dir / "model.npz").body({});
+    const TinySmpl tiny{family};
+    const Body body = SmplModel(dir.write("model.npz", tiny.file())).body({});
     const std::vector<int> parents = tiny.parents();
     for (size_t v = 0; v < tiny.joints(); ++v) {
       int joint = static_cast<int>(v);
@@ -94,16 +88,13 @@ TEST(ImportersSmpl, HandsJawAndEyesCountForTheirJoints) {
 
 /// SMPL's equations over all of the model's joints, hands at rest, beside what the body does with
 /// the first 22 through a file.
-TEST(ImportersSmpl, PosedSurfacesAreTheModels) {
-  const TempDir dir;
+TEST_F(ImportersSmpl, PosedSurfacesAreTheModels) {
   for (const SmplFamily family : kFamilies) {
-    TinySmpl tiny;
-    tiny.family = family;
-    write_bytes(dir / "model.npz", tiny.file());
+    const TinySmpl tiny{family};
     ImportOptions options;
-    options.betas = {"zeros", dir / "one.npz"};
-    write_bytes(dir / "one.npz", npz({{"betas", npy<double>({4}, {1, -1, 0.5, 2})}}));
-    import_data(dir / "model.npz", dir / "bodies.h5", options);
+    options.betas = {"zeros",
+                     dir.write("one.npz", npz({{"betas", npy<double>({4}, {1, -1, 0.5, 2})}}))};
+    import_data(dir.write("model.npz", tiny.file()), dir / "bodies.h5", options);
     const std::vector<Body> bodies = read_bodies(dir / "bodies.h5");
     ASSERT_EQ(bodies.size(), 2u);
     EXPECT_EQ(bodies[0].blend_shapes, bodies[1].blend_shapes);  // read and kept once
@@ -146,71 +137,58 @@ TEST(ImportersSmpl, PosedSurfacesAreTheModels) {
   }
 }
 
-TEST(ImportersSmpl, BlendShapesThatDoNotFitAreRefused) {
-  const TempDir dir;
-  const auto refused = [&](const std::string& bytes) {
-    auto arrays = TinySmpl().arrays();
-    replace(arrays, "posedirs", bytes);
-    write_bytes(dir / "m.npz", npz(arrays));
-    return error_of([&] { import_data(dir / "m.npz", dir / "x.h5"); });
+TEST_F(ImportersSmpl, BlendShapesThatDoNotFitAreRefused) {
+  const auto import = [&](const std::string& posedirs) {
+    import_data(dir.write("m.npz", npz(with(TinySmpl().arrays(), "posedirs", posedirs))),
+                dir / "x.h5");
   };
-  EXPECT_HAS(refused(npy<double>({58, 3}, std::vector<double>(174, 0))), "not [58, 3, 459]");
-  EXPECT_HAS(refused(npy<float>({58, 3, 459}, std::vector<float>(58 * 3 * 459, NAN))), "metres");
-  auto arrays = TinySmpl().arrays();
-  remove(arrays, "posedirs");
-  write_bytes(dir / "m.npz", npz(arrays));
-  import_data(dir / "m.npz", dir / "x.h5");
+  EXPECT_HAS(error_of([&] { import(doubles({58, 3}, 0)); }), "not [58, 3, 459]");
+  EXPECT_HAS(error_of([&] { import(doubles({58, 3, 459}, NAN)); }), "metres");
+  import("");
   EXPECT_EQ(read_bodies(dir / "x.h5")[0].blend_shapes, nullptr);
 }
 
-TEST(ImportersSmpl, ExpressionsAreNoShapes) {
-  const TempDir dir;
-  TinySmpl tiny;
-  tiny.family = SmplFamily::smplx;
-  tiny.shapes = 16;  // cut to its shapes, as many as AMASS's people have
-  write_bytes(dir / "model.npz", tiny.file());
-  EXPECT_EQ(SmplModel(dir / "model.npz").shapes(), 16u);
-  tiny.shapes = 20;
-  write_bytes(dir / "model.npz", tiny.file());
-  const SmplModel model(dir / "model.npz");
+TEST_F(ImportersSmpl, ExpressionsAreNoShapes) {
+  // A file cut to its shapes has as many as AMASS's people, 16; a whole one has 20 columns.
+  const SmplModel cut(dir.write("cut.npz", TinySmpl{SmplFamily::smplx, 16}.file()));
+  EXPECT_EQ(cut.shapes(), 16u);
+  const TinySmpl tiny{SmplFamily::smplx, 20};
+  const SmplModel model(dir.write("model.npz", tiny.file()));
   EXPECT_EQ(model.shapes(), 10u);
-  Betas many(20, 0.5);
-  EXPECT_LT((model.joints(many)[5] - tiny.shaped(Betas(10, 0.5))[5]).norm(), 1e-12);
+  EXPECT_LT((model.joints(Betas(20, 0.5))[5] - tiny.shaped(Betas(10, 0.5))[5]).norm(), 1e-12);
 }
 
-TEST(ImportersSmpl, WhatIsWrongIsSaid) {
-  const TempDir dir;
-  const auto refused = [&](const std::string& name, const std::string& bytes) {
-    auto arrays = TinySmpl().arrays();
-    if (bytes.empty())
-      remove(arrays, name);
-    else
-      replace(arrays, name, bytes);
-    write_bytes(dir / "m.npz", npz(arrays));
-    return error_of([&] { SmplModel(dir / "m.npz"); });
-  };
-  const std::vector<double> ones(52 * 58, 1.0), nan(58 * 3, NAN);
-  for (const char* name :
-       {"v_template", "shapedirs", "J_regressor", "weights", "kintree_table", "f"})
-    EXPECT_HAS(refused(name, ""), std::string("'") + name + "'");
-  EXPECT_HAS(refused("v_template", npy<double>({58, 3}, nan)), "NaN");
-  EXPECT_HAS(refused("v_template", npy<double>({174}, std::vector<double>(174, 1))), "not [V, 3]");
-  EXPECT_HAS(refused("v_template", npy<double>({58, 3}, std::vector<double>(174, 1e3))), "metres");
-  EXPECT_HAS(refused("v_template", npy<double>({58, 3}, std::vector<double>(174, 1))), "y up");
-  EXPECT_HAS(refused("shapedirs", npy<double>({58, 3}, std::vector<double>(174, 1))), "[58, 3, B]");
-  EXPECT_HAS(refused("J_regressor", test::npy_of(test::npy_header("|O", {}), "x")), "pickle");
-  EXPECT_HAS(refused("J_regressor", npy<double>({58, 52}, ones)), "not [52, 58]");
-  EXPECT_HAS(refused("weights", npy<double>({58, 52}, std::vector<double>(58 * 52, 0))),
-             "no weight");
-  EXPECT_HAS(refused("weights", npy<double>({58, 52}, std::vector<double>(58 * 52, -1))),
-             "negative");
-  EXPECT_HAS(refused("kintree_table", npy<uint32_t>({2, 52}, std::vector<uint32_t>(104, 0))),
-             "another parent");
-  EXPECT_HAS(refused("kintree_table", npy<uint32_t>({2, 3}, std::vector<uint32_t>(6, 0))),
-             "[2, 52]");
-  EXPECT_HAS(refused("f", npy<uint32_t>({1, 3}, {0, 1, 58})), "does not exist");
-  write_bytes(dir / "n.npz", npz({{"x", npy<double>({1}, {1})}}));
+TEST_F(ImportersSmpl, WhatIsWrongIsSaid) {
+  const WrongArray wrong[] = {
+      {"v_template", "", "'v_template'"},
+      {"shapedirs", "", "'shapedirs'"},
+      {"J_regressor", "", "'J_regressor'"},
+      {"weights", "", "'weights'"},
+      {"kintree_table", "", "'kintree_table'"},
+      {"f", "", "'f'"},
+      {"v_template", doubles({58, 3}, NAN), "NaN"},
+      {"v_template", doubles({174}, 1), "not [V, 3]"},
+      {"v_template", doubles({58, 3}, 1e3), "metres"},
+      {"v_template", doubles({58, 3}, 1), "y up"},
+      {"shapedirs", doubles({58, 3}, 1), "[58, 3, B]"},
+      {"J_regressor", npy_of(npy_header("|O", {}), "x"), "pickle"},
+      {"J_regressor", doubles({58, 52}, 1), "not [52, 58]"},
+      {"weights", doubles({58, 52}, 0), "no weight"},
+      {"weights", doubles({58, 52}, -1), "negative"},
+      {"kintree_table", npy<uint32_t>({2, 52}, std::vector<uint32_t>(104, 0)), "another parent"},
+      {"kintree_table", npy<uint32_t>({2, 3}, std::vector<uint32_t>(6, 0)), "[2, 52]"},
+      {"f", npy<uint32_t>({1, 3}, {0, 1, 58}), "does not exist"}};
+  for (const auto& [name, bytes, says] : wrong) {
+    const std::string path = dir.write("m.npz", npz(with(TinySmpl().arrays(), name, bytes)));
+    EXPECT_HAS(error_of([&] { SmplModel{path}; }), says) << name;
+  }
+  dir.write("n.npz", npz({{"x", npy<double>({1}, {1})}}));
   EXPECT_HAS(error_of([&] { SmplModel(dir / "n.npz"); }), "(it has 'x')");
+  Arrays many;  // all their names do not make the line too long
+  for (int i = 0; i < 9; ++i)
+    many.emplace_back(std::string(60, static_cast<char>('a' + i)), npy<double>({1}, {1}));
+  dir.write("many.npz", npz(many));
+  error_of([&] { SmplModel(dir / "many.npz"); });
 }
 
 // ---- motions -----------------------------------------------------------------------------------
@@ -252,30 +230,25 @@ Joints motion_joints(const Motion& motion, size_t frame) {
   return out;
 }
 
-TEST(ImportersAmass, BothLayoutsEqualTheModelsFormulaAt30Fps) {
-  const TempDir dir;
+TEST_F(ImportersAmass, BothLayoutsEqualTheModelsFormulaAt30Fps) {
   for (const SmplFamily family : {SmplFamily::smplh, SmplFamily::smplx})
     for (const double fps : {120.0, 60.0, 100.0, 30.0}) {
-      TinySmpl tiny;
-      tiny.family = family;
-      write_bytes(dir / "model.npz", tiny.file());
-      TinyClip clip;
-      clip.family = family;
-      clip.fps = fps;
-      clip.frames = static_cast<int64_t>(fps) + 1;
-      clip.type = family == SmplFamily::smplx;
-      clip.rate_key = clip.type ? "mocap_frame_rate" : "mocap_framerate";
-      write_bytes(dir / "walk_poses.npz", clip.file());
-      BodyModels models(dir / "model.npz");
+      const TinySmpl tiny{family};
+      const bool x = family == SmplFamily::smplx;
+      const TinyClip clip{.family = family,
+                          .frames = static_cast<int64_t>(fps) + 1,
+                          .fps = fps,
+                          .rate_key = x ? "mocap_frame_rate" : "mocap_framerate",
+                          .type = x};
+      BodyModels models(dir.write("model.npz", tiny.file()));
       AmassOptions options;
       options.id = "walk";
       options.subject = "ann";
       options.split = "test";
       ImportReport report;
-      const Motion motion = import_amass(Npz(dir / "walk_poses.npz"), models, options, report);
-      EXPECT_EQ(motion.id, "walk");
-      EXPECT_EQ(motion.subject, "ann");
-      EXPECT_EQ(motion.split, "test");
+      const Motion motion =
+          import_amass(Npz(dir.write("walk_poses.npz", clip.file())), models, options, report);
+      EXPECT_EQ(motion.id + " " + motion.subject + " " + motion.split, "walk ann test");
       ASSERT_EQ(motion.frames(), 31u) << fps;
       EXPECT_LT(motion.rest[0].norm(), 1e-12);
       // The same up to one height: the clip's floor goes to 0.
@@ -298,14 +271,10 @@ TEST(ImportersAmass, BothLayoutsEqualTheModelsFormulaAt30Fps) {
     }
 }
 
-TEST(ImportersAmass, AGenderThatIsAPythonObjectIsNotStated) {
-  const TempDir dir;
-  write_bytes(dir / "neutral.npz", TinySmpl().file());
-  BodyModels models(dir / "neutral.npz");
-  auto arrays = TinyClip().arrays();
-  for (auto& [name, bytes] : arrays)
-    if (name == "gender") bytes = test::npy_of(test::npy_header("|O", {}), "a pickle");
-  write_bytes(dir / "clip.npz", npz(arrays));
+TEST_F(ImportersAmass, AGenderThatIsAPythonObjectIsNotStated) {
+  BodyModels models(dir.write("neutral.npz", TinySmpl().file()));
+  const std::string object = npy_of(npy_header("|O", {}), "a pickle");
+  dir.write("clip.npz", npz(with(TinyClip().arrays(), "gender", object)));
   ImportReport report;
   import_amass(Npz(dir / "clip.npz"), models, {}, report);
   EXPECT_HAS(fact(report, "gender"), "not stated");
@@ -313,25 +282,17 @@ TEST(ImportersAmass, AGenderThatIsAPythonObjectIsNotStated) {
   EXPECT_HAS(report.remarks[0], "gender counts as not stated");
 }
 
-TEST(ImportersAmass, OptionsOverrideAndDoubtsAreRemarked) {
-  const TempDir dir;
-  write_bytes(dir / "male.npz", TinySmpl().file());
-  TinyClip clip;
-  clip.fps = 59.99;
-  clip.betas.resize(16, 0);
-  write_bytes(dir / "a.npz", clip.file());
-  BodyModels models(dir / "male.npz");
-  const auto import = [&](const AmassOptions& options) {
-    ImportReport report;
-    const Motion motion = import_amass(Npz(dir / "a.npz"), models, options, report);
-    return std::pair(motion.frames(), report);
-  };
-  EXPECT_EQ(import({}).first, 61u);  // 59.99 means 60
+TEST_F(ImportersAmass, OptionsOverrideAndDoubtsAreRemarked) {
+  const TinyClip clip{.fps = 59.99,
+                      .betas = {0.5, -1, 0.25, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}};
+  const Npz file(dir.write("a.npz", clip.file()));
+  BodyModels models(dir.write("male.npz", TinySmpl().file()));
+  ImportReport plain, report;
+  EXPECT_EQ(import_amass(file, models, {}, plain).frames(), 61u);  // 59.99 means 60
   AmassOptions other;
   other.up = Axis::y;
   other.fps = 30;
-  const auto [frames, report] = import(other);
-  EXPECT_EQ(frames, 121u);
+  EXPECT_EQ(import_amass(file, models, other, report).frames(), 121u);
   EXPECT_HAS(fact(report, "body model"), "4 of 16 betas");
   EXPECT_HAS(fact(report, "up"), "--up");
   ASSERT_EQ(report.remarks.size(), 2u);
@@ -339,114 +300,78 @@ TEST(ImportersAmass, OptionsOverrideAndDoubtsAreRemarked) {
   EXPECT_HAS(report.remarks[1], "not upright");
 }
 
-TEST(ImportersAmass, TheModelIsFoundByFamilyAndGender) {
-  const TempDir dir;
-  const auto folder = [&](const std::string& name) {
-    std::filesystem::create_directories(dir / name);
-    return dir / name;
-  };
-  TinySmpl h, x;
-  x.family = SmplFamily::smplx;
-  write_bytes(folder("models/smplh/female") + "/model.npz", h.file());
-  write_bytes(folder("models/smplh/male") + "/model.npz", h.file());
-  write_bytes(folder("models/smplx") + "/SMPLX_NEUTRAL.npz", x.file());
-  write_bytes(folder("models/dmpls/male") + "/model.npz", npz({{"x", npy<double>({1}, {1})}}));
+TEST_F(ImportersAmass, TheModelIsFoundByFamilyAndGender) {
+  const std::string h = TinySmpl().file();
+  dir.write("models/smplh/female/model.npz", h);
+  dir.write("models/smplh/male/model.npz", h);
+  dir.write("models/smplx/SMPLX_NEUTRAL.npz", TinySmpl{SmplFamily::smplx}.file());
+  dir.write("models/dmpls/male/model.npz", npz({{"x", npy<double>({1}, {1})}}));
   BodyModels models(dir / "models");
   std::vector<std::string> remarks;
-  EXPECT_EQ(models.find(SmplFamily::smplh, "female", "c", remarks).path(),
-            dir / "models/smplh/female/model.npz");
-  EXPECT_EQ(models.find(SmplFamily::smplh, "male", "c", remarks).path(),
-            dir / "models/smplh/male/model.npz");
-  EXPECT_EQ(models.find(SmplFamily::smplx, "neutral", "c", remarks).family(), SmplFamily::smplx);
-  EXPECT_EQ(models.find(SmplFamily::smplx, "", "c", remarks).family(), SmplFamily::smplx);
+  for (const char* gender : {"female", "male"})
+    EXPECT_EQ(models.find(SmplFamily::smplh, gender, "c", remarks).path(),
+              dir / "models/smplh/" + gender + "/model.npz");
+  for (const char* gender : {"neutral", ""})
+    EXPECT_EQ(models.find(SmplFamily::smplx, gender, "c", remarks).family(), SmplFamily::smplx);
   EXPECT_TRUE(remarks.empty());
   EXPECT_HAS(error_of([&] { models.find(SmplFamily::smplh, "neutral", "c", remarks); }),
              "neutral body, whose model");
   BodyModels one(dir / "models/smplx/SMPLX_NEUTRAL.npz");
   EXPECT_HAS(error_of([&] { one.find(SmplFamily::smplh, "male", "c", remarks); }), "--body-model");
-  TinySmpl plain;
-  plain.family = SmplFamily::smpl;
-  write_bytes(dir / "plain.npz", plain.file());
-  BodyModels stand_in(dir / "plain.npz");
+  BodyModels stand_in(dir.write("plain.npz", TinySmpl{SmplFamily::smpl}.file()));
   EXPECT_EQ(stand_in.find(SmplFamily::smplh, "male", "c", remarks).family(), SmplFamily::smpl);
   EXPECT_EQ(remarks.size(), 1u);
-  EXPECT_HAS(error_of([&] { BodyModels(dir / "models/dmpls"); }), "holds no SMPL");
-  EXPECT_HAS(error_of([&] { BodyModels(dir / "models/dmpls/male/model.npz"); }),
-             "is no body model");
-  EXPECT_HAS(error_of([&] { BodyModels(dir / "nothing.npz"); }), "cannot be read");
+  for (const auto& [path, says] : {std::pair{"models/dmpls", "holds no SMPL"},
+                                   {"models/dmpls/male/model.npz", "is no body model"},
+                                   {"nothing.npz", "cannot be read"}})
+    EXPECT_HAS(error_of([&, path = path] { BodyModels(dir / path); }), says);
 }
 
-TEST(ImportersAmass, WhatIsWrongIsSaid) {
-  const TempDir dir;
-  write_bytes(dir / "model.npz", TinySmpl().file());
-  BodyModels models(dir / "model.npz");
-  const auto refused = [&](const std::string& name, const std::string& bytes) {
-    auto arrays = TinyClip().arrays();
-    if (bytes.empty())
-      remove(arrays, name);
-    else
-      replace(arrays, name, bytes);
-    write_bytes(dir / "c.npz", npz(arrays));
+TEST_F(ImportersAmass, WhatIsWrongIsSaid) {
+  BodyModels models(dir.write("model.npz", TinySmpl().file()));
+  const auto refused = [&](const Arrays& arrays) {
+    dir.write("c.npz", npz(arrays));
     ImportReport report;
     return error_of([&] { import_amass(Npz(dir / "c.npz"), models, {}, report); });
   };
-  EXPECT_HAS(refused("mocap_framerate", ""), "--fps");
-  EXPECT_HAS(refused("mocap_framerate", npy<double>({}, {0})), "no frame rate");
-  EXPECT_HAS(refused("mocap_framerate", test::npy_text("fast")), "no frame rate");
-  EXPECT_HAS(refused("poses", npy<double>({1, 72}, std::vector<double>(72, 0))), "[1, 72]");
-  EXPECT_HAS(refused("poses", npy<double>({156}, std::vector<double>(156, 0))), "[156]");
-  EXPECT_HAS(refused("poses", npy<double>({0, 156}, {})), "0 frames");
-  EXPECT_HAS(refused("poses", npy<double>({121, 156}, std::vector<double>(121 * 156, NAN))),
-             "finite");
-  EXPECT_HAS(refused("trans", npy<double>({120, 3}, std::vector<double>(360, 0))), "[121, 3]");
-  EXPECT_HAS(refused("trans", npy<double>({121, 3}, std::vector<double>(363, INFINITY))), "finite");
-  EXPECT_HAS(refused("betas", npy<double>({2, 4}, std::vector<double>(8, 0))), "one person");
-  EXPECT_HAS(refused("betas", npy<double>({4}, std::vector<double>(4, NAN))), "NaN");
-  EXPECT_HAS(refused("betas", ""), "'betas'");
+  const WrongArray wrong[] = {{"mocap_framerate", "", "--fps"},
+                              {"mocap_framerate", npy<double>({}, {0}), "no frame rate"},
+                              {"mocap_framerate", npy_text("fast"), "no frame rate"},
+                              {"poses", doubles({1, 72}, 0), "[1, 72]"},
+                              {"poses", doubles({156}, 0), "[156]"},
+                              {"poses", doubles({0, 156}, 0), "0 frames"},
+                              {"poses", doubles({121, 156}, NAN), "finite"},
+                              {"trans", doubles({120, 3}, 0), "[121, 3]"},
+                              {"trans", doubles({121, 3}, INFINITY), "finite"},
+                              {"betas", doubles({2, 4}, 0), "one person"},
+                              {"betas", doubles({4}, NAN), "NaN"},
+                              {"betas", "", "'betas'"}};
+  for (const auto& [name, bytes, says] : wrong)
+    EXPECT_HAS(refused(with(TinyClip().arrays(), name, bytes)), says) << name;
   // Found by the fuzzer: text of the file in a message that is one short line.
-  auto odd = TinyClip().arrays();
-  odd.emplace_back("surface_model_type", test::npy_text("smpl\nh" + std::string(500, 'x')));
-  write_bytes(dir / "c.npz", npz(odd));
-  ImportReport unused;
-  const std::string said = error_of([&] { import_amass(Npz(dir / "c.npz"), models, {}, unused); });
-  EXPECT_HAS(said, "for the model smpl?hxxx");
-  EXPECT_EQ(said.find('\n'), std::string::npos);
-  EXPECT_LT(said.size(), 390u);
-  std::vector<std::pair<std::string, std::string>> many;
-  for (int i = 0; i < 9; ++i)
-    many.emplace_back(std::string(60, static_cast<char>('a' + i)), npy<double>({1}, {1}));
-  write_bytes(dir / "many.npz", npz(many));
-  EXPECT_LT(error_of([&] { SmplModel(dir / "many.npz"); }).size(), 390u);
-  TinyClip other;
-  other.family = SmplFamily::smplx;
-  write_bytes(dir / "c.npz", other.file());
-  ImportReport report;
-  EXPECT_HAS(error_of([&] { import_amass(Npz(dir / "c.npz"), models, {}, report); }),
-             "whose shapes are others");
+  Arrays odd = TinyClip().arrays();
+  odd.emplace_back("surface_model_type", npy_text("smpl\nh" + std::string(500, 'x')));
+  EXPECT_HAS(refused(odd), "for the model smpl?hxxx");
+  EXPECT_HAS(refused(TinyClip{SmplFamily::smplx}.arrays()), "whose shapes are others");
 }
 
 // ---- the command's function --------------------------------------------------------------------
 
-TEST(ImportersAmass, ATreeOfClipsNamesSubjectsAndListsWhatIsUnusable) {
-  const TempDir dir;
-  write_bytes(dir / "model.npz", TinySmpl().file());
-  for (const char* name : {"tree/ACCAD/Female1", "tree/CMU/07", "tree/notes"})
-    std::filesystem::create_directories(dir / name);
+TEST_F(ImportersAmass, ATreeOfClipsNamesSubjectsAndListsWhatIsUnusable) {
   TinyClip clip;
-  write_bytes(dir / "tree/ACCAD/Female1/walk_poses.npz", clip.file());
+  dir.write("tree/ACCAD/Female1/walk_poses.npz", clip.file());
   clip.rate_key = "mocap_frame_rate";
-  write_bytes(dir / "tree/CMU/07/07_10_stageii.npz", clip.file());
-  write_bytes(dir / "tree/CMU/07/07_2_poses.npz", clip.file());
-  const std::string shape = npz({{"betas", npy<double>({16}, std::vector<double>(16, 0))},
-                                 {"gender", test::npy_text("male")}});
-  write_bytes(dir / "tree/CMU/07/shape.npz", shape);
-  write_bytes(dir / "tree/CMU/07/neutral_stagei.npz", shape);
-  write_bytes(dir / "tree/CMU/07/broken_poses.npz", clip.file().substr(0, 4000));
-  write_bytes(dir / "tree/notes/other.npz", npz({{"x", npy<double>({1}, {1})}}));
-  write_bytes(dir / "tree/notes/readme.txt", "hello");
+  dir.write("tree/CMU/07/07_10_stageii.npz", clip.file());
+  dir.write("tree/CMU/07/07_2_poses.npz", clip.file());
+  const std::string shape = npz({{"betas", doubles({16}, 0)}, {"gender", npy_text("male")}});
+  dir.write("tree/CMU/07/shape.npz", shape);
+  dir.write("tree/CMU/07/neutral_stagei.npz", shape);
+  dir.write("tree/CMU/07/broken_poses.npz", clip.file().substr(0, 4000));
+  dir.write("tree/notes/other.npz", npz({{"x", npy<double>({1}, {1})}}));
+  dir.write("tree/notes/readme.txt", "hello");
   ImportOptions options;
   EXPECT_HAS(error_of([&] { import_data(dir / "tree", dir / "o.h5", options); }), "--body-model");
-  options.body_model = dir / "model.npz";
+  options.body_model = dir.write("model.npz", TinySmpl().file());
   options.motion.split = "validation";
   options.license = "AMASS";
   const ImportSummary summary = import_data(dir / "tree", dir / "o.h5", options);
@@ -458,13 +383,11 @@ TEST(ImportersAmass, ATreeOfClipsNamesSubjectsAndListsWhatIsUnusable) {
   EXPECT_HAS(summary.skipped[0], "broken_poses.npz");
   EXPECT_HAS(summary.skipped[1], "other.npz: holds no motion (it has 'x')");
   EXPECT_TRUE(verify(dir / "o.h5").empty());
-  const std::vector<Motion> motions = read_motions(dir / "o.h5", "validation");
-  ASSERT_EQ(motions.size(), 3u);
-  EXPECT_EQ(motions[0].id, "ACCAD_Female1_walk");
-  EXPECT_EQ(motions[0].subject, "ACCAD/Female1");
-  EXPECT_EQ(motions[1].id, "CMU_07_07_2");  // natural order
-  EXPECT_EQ(motions[2].id, "CMU_07_07_10");
-  EXPECT_EQ(motions[2].subject, "CMU/07");
+  std::vector<std::string> names;  // in natural order
+  for (const Motion& m : read_motions(dir / "o.h5", "validation"))
+    names.push_back(m.subject + " " + m.id);
+  EXPECT_EQ(names, (std::vector<std::string>{"ACCAD/Female1 ACCAD_Female1_walk",
+                                             "CMU/07 CMU_07_07_2", "CMU/07 CMU_07_07_10"}));
   EXPECT_EQ(inspect(dir / "o.h5").license, "AMASS");
   // One file: the subject is its folder, and what is wrong is an error.
   import_data(dir / "tree/CMU/07/07_2_poses.npz", dir / "p.h5", options);
@@ -474,16 +397,15 @@ TEST(ImportersAmass, ATreeOfClipsNamesSubjectsAndListsWhatIsUnusable) {
   EXPECT_FALSE(std::filesystem::exists(dir / "q.h5"));
 }
 
-TEST(ImportersSmpl, ImportGivesBodies) {
-  const TempDir dir;
-  TinySmpl tiny;
-  write_bytes(dir / "SMPLH_NEUTRAL.npz", tiny.file());
-  write_bytes(dir / "ann.npz", npz({{"betas", npy<double>({4}, {1, 0, -1, 0})}}));
-  write_bytes(dir / "crowd.npy", npy<double>({2, 6}, {1, 2, 3, 4, 5, 6, 0, 0, 0, 0, 0, 1}));
+TEST_F(ImportersSmpl, ImportGivesBodies) {
+  const TinySmpl tiny;
+  const std::string model = dir.write("SMPLH_NEUTRAL.npz", tiny.file());
   ImportOptions options;
-  options.betas = {"zeros", dir / "ann.npz", dir / "crowd.npy"};
+  options.betas = {
+      "zeros", dir.write("ann.npz", npz({{"betas", npy<double>({4}, {1, 0, -1, 0})}})),
+      dir.write("crowd.npy", npy<double>({2, 6}, {1, 2, 3, 4, 5, 6, 0, 0, 0, 0, 0, 1}))};
   options.motion.split = "test";
-  const ImportSummary summary = import_data(dir / "SMPLH_NEUTRAL.npz", dir / "o.h5", options);
+  const ImportSummary summary = import_data(model, dir / "o.h5", options);
   EXPECT_EQ(summary.bodies, 4u);
   ASSERT_EQ(summary.reports.size(), 3u);
   EXPECT_HAS(summary.reports[2].remarks.at(0), "left out");
@@ -496,9 +418,8 @@ TEST(ImportersSmpl, ImportGivesBodies) {
   const std::vector<Vec3> ann = tiny.shaped({1, 0, -1, 0});
   EXPECT_LT((bodies[1].joints[4] - bodies[1].joints[0] - (ann[4] - ann[0])).norm(), 1e-12);
   EXPECT_EQ(bodies[3].rest.vertices, bodies[0].rest.vertices);  // betas beyond the model's
-  options.betas = {dir / "SMPLH_NEUTRAL.npz"};
-  EXPECT_HAS(error_of([&] { import_data(dir / "SMPLH_NEUTRAL.npz", dir / "p.h5", options); }),
-             "'betas'");
+  options.betas = {model};
+  EXPECT_HAS(error_of([&] { import_data(model, dir / "p.h5", options); }), "'betas'");
   EXPECT_HAS(error_of([&] { import_data(dir / "ann.npz", dir / "p.h5", options); }), "--betas");
 }
 

@@ -38,6 +38,13 @@ inline constexpr const char* kMixamo[kJoints] = {
     "mixamorig:LeftForeArm", "mixamorig:RightForeArm", "mixamorig:LeftHand",
     "mixamorig:RightHand"};
 
+/// No joint turned.
+inline Rotations unturned() {
+  Rotations out;
+  out.fill(Mat3::Identity());
+  return out;
+}
+
 struct Style {
   std::string rotations = "ZXY", root_rotations = "ZYX";  ///< channel order
   bool rotations_first = false;  ///< the root's rotation channels before its positions
@@ -49,13 +56,12 @@ struct Style {
   int quarter_turns = 0;  ///< the rest pose faces another way
   double fps = 120;
   int frames = 121;
-  bool t_pose_first = false;  ///< frame 0 is the rest pose
-  Rotations bind;             ///< global frames of the zero pose; identity: a T-pose
-  std::vector<std::string> names{kMixamo, kMixamo + kJoints};
-  bool moving_root = false;  ///< with `wrapped`: the root has six channels, all 0
-  bool walks = false;        ///< the second motion
-  std::vector<int> without;  ///< joints left out (their children hang from their parents)
-  Style() { bind.fill(Mat3::Identity()); }
+  bool t_pose_first = false;    ///< frame 0 is the rest pose
+  Rotations bind = unturned();  ///< global frames of the zero pose; identity: a T-pose
+  std::vector<std::string> names = {kMixamo, kMixamo + kJoints};
+  bool moving_root = false;       ///< with `wrapped`: the root has six channels, all 0
+  bool walks = false;             ///< the second motion
+  std::vector<int> without = {};  ///< joints left out (their children hang from their parents)
 };
 
 /// Local rotation of joint j at time t.

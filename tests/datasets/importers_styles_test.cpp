@@ -1,32 +1,25 @@
 // BVH of CMU, Mixamo, LAFAN1, 100STYLE, SOMA ...: written by the test from known rotations, read
-// back, and compared with them in degrees. And what the report says of each.
+// back, and compared with them in degrees. And what the report says of each, and the profiles of
+// bone names behind it: the built-in ones, files of one's own, and mistakes in them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
-#include "autograd/base/error.h"
 #include "datasets/importers/bvh.h"
+#include "datasets/importers/source_motion.h"
 #include "tests/datasets/importers_bvh_styles.h"
+#include "tests/datasets/importers_support.h"
 
 namespace restage {
 namespace {
 
+using namespace test;
 using bvh_test::bones_along_x;
 using bvh_test::names_of;
 using bvh_test::Style;
-
-std::string fact(const ImportReport& report, const std::string& name) {
-  for (const auto& [key, value] : report.facts)
-    if (key == name) return value;
-  return "";
-}
-
-std::string remarks(const ImportReport& report) {
-  std::string out;
-  for (const std::string& remark : report.remarks) out += remark + "\n";
-  return out;
-}
+using ImportersProfiles = FileTest;
 
 bool lacks(const Style& style, int j) {
   return std::find(style.without.begin(), style.without.end(), j) != style.without.end();
@@ -84,56 +77,53 @@ TEST(ImportersStyles, FamiliesWithATPoseAreReadExactly) {
       {"unreal5", "", "centimetres", 0.01, 30, true, {}},
       {"restage", "", "metres", 1.0, 30, false, {}}};
   for (const Family& family : families) {
-    Style style;
-    style.names = names_of(family.profile, family.prefix);
-    style.unit = family.unit;
-    style.fps = family.fps;
-    style.frames = static_cast<int>(family.fps) + 1;
-    style.z_up = family.z_up;
-    style.without = family.without;
-    style.wrapped = style.moving_root = family.profile == "soma";
-    style.walks = true;
+    const std::string& profile = family.profile;
+    const Style style{.wrapped = profile == "soma",
+                      .unit = family.unit,
+                      .z_up = family.z_up,
+                      .fps = family.fps,
+                      .frames = static_cast<int>(family.fps) + 1,
+                      .names = names_of(profile, family.prefix),
+                      .moving_root = profile == "soma",
+                      .walks = true,
+                      .without = family.without};
     MotionOptions options;
     options.drop_leading = 0;
     const MotionClip clip = convert_bvh(bvh_test::text(style), "01_walk.bvh", options);
-    const std::string& profile = family.profile;
     // Between the frames of 24 fps a swing is not what slerp makes of it.
     EXPECT_LT(errors(clip, style).largest, family.fps == 24 ? 1.0 : 0.01) << profile;
     EXPECT_NEAR(clip.scale, family.unit, 1e-12) << profile;
-    const std::string names = fact(clip.report, "names");
     const std::string expected = profile == "vrm" ? "unity" : profile;  // names equal but for case
-    EXPECT_NE(names.find("(profile " + expected + ")"), std::string::npos) << names;
-    EXPECT_EQ(fact(clip.report, "units").find(family.units + ", by the legs"), 0u) << profile;
-    EXPECT_EQ(fact(clip.report, "up"),
-              (family.z_up ? "z" : "y") + std::string(", by the rest pose"));
-    EXPECT_EQ(fact(clip.report, "facing").find(family.z_up ? "-y" : "z"), 0u) << profile;
-    EXPECT_EQ(fact(clip.report, "rest pose"), "zero rotations");
+    EXPECT_HAS(fact(clip.report, "names"), "(profile " + expected + ")");
+    const std::string rate = family.fps == 30
+                                 ? "30 fps, taken"
+                                 : std::to_string(int(family.fps)) + " fps -> 30 fps, slerp";
+    for (const auto& [name, begins] :
+         {std::pair<const char*, std::string>{"units", family.units + ", by the legs"},
+          {"up", family.z_up ? "z, by the rest pose" : "y, by the rest pose"},
+          {"facing", family.z_up ? "-y" : "z"},
+          {"rest pose", "zero rotations"},
+          {"rate", rate}})
+      EXPECT_TRUE(fact(clip.report, name).starts_with(begins)) << profile << " " << name;
     EXPECT_EQ(fact(clip.report, "off a T-pose"), "") << profile;
-    const std::string rate = fact(clip.report, "rate");
-    EXPECT_EQ(
-        rate.find(family.fps == 30 ? "30 fps, taken"
-                                   : std::to_string(int(family.fps)) + " fps -> 30 fps, slerp"),
-        0u)
-        << rate;
   }
 }
 
 TEST(ImportersStyles, ATPoseIsBuiltWhereZeroRotationsAreNone) {
   for (const std::string profile : {"lafan1", "soma"}) {
-    Style style;
-    style.names = names_of(profile);
-    style.bind = bones_along_x();
-    style.fps = 30;
-    style.frames = 61;
-    style.walks = true;
-    style.wrapped = style.moving_root = profile == "soma";
+    const Style style{.wrapped = profile == "soma",
+                      .fps = 30,
+                      .frames = 61,
+                      .bind = bones_along_x(),
+                      .names = names_of(profile),
+                      .moving_root = profile == "soma",
+                      .walks = true};
     const MotionClip clip = convert_bvh(bvh_test::text(style), "walk1.bvh");
-    EXPECT_NE(fact(clip.report, "names").find(profile), std::string::npos);
+    EXPECT_HAS(fact(clip.report, "names"), profile);
     EXPECT_EQ(fact(clip.report, "up"), "y, by the recording");
     EXPECT_EQ(fact(clip.report, "rest pose").find("built"), 0u);
     for (const char* limb : {"left_hip 1", "right_knee 1", "left_shoulder", "right_elbow"})
-      EXPECT_NE(fact(clip.report, "turned").find(limb), std::string::npos)
-          << fact(clip.report, "turned");
+      EXPECT_HAS(fact(clip.report, "turned"), limb);
     // The toy's own T-pose has its trunk 2 and its shins 4 degrees off the vertical.
     const Errors error = errors(clip, style);
     EXPECT_LT(error.largest, 6) << profile;
@@ -151,11 +141,8 @@ TEST(ImportersStyles, ATPoseIsBuiltWhereZeroRotationsAreNone) {
 }
 
 TEST(ImportersStyles, NoTPoseCanBeBuiltFromFramesThatShowNone) {
-  Style style;
-  style.names = names_of("lafan1");
-  style.bind = bones_along_x();
-  style.frames = 3;
-  std::string text = bvh_test::text(style);
+  std::string text =
+      bvh_test::text({.frames = 3, .bind = bones_along_x(), .names = names_of("lafan1")});
   text = text.substr(0, text.find("Frame Time"));
   text += "Frame Time: 0.0333\n";
   for (int f = 0; f < 3; ++f) {  // zero rotations: both legs beside the head
@@ -164,28 +151,22 @@ TEST(ImportersStyles, NoTPoseCanBeBuiltFromFramesThatShowNone) {
   }
   MotionOptions options;
   options.rest.up = Axis::y;
-  try {
-    convert_bvh(text, "zero.bvh", options);
-    FAIL();
-  } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("none can be built"), std::string::npos)
-        << error.what();
-  }
+  EXPECT_HAS(error_of([&] { convert_bvh(text, "zero.bvh", options); }), "none can be built");
+}
+
+/// A second of the toy that walks, in Mixamo's style but for its rate.
+Style walking(double fps = 30) {
+  return {.fps = fps, .frames = static_cast<int>(fps) + 1, .walks = true};
 }
 
 TEST(ImportersStyles, APosesAreReportedLimbByLimb) {
-  Style style;
-  style.fps = 30;
-  style.frames = 31;
-  style.walks = true;
+  Style style = walking();
   // Zero rotations: arms 45 degrees down. The T-pose is 45 degrees up from there.
   for (const auto& [j, side] : {std::pair{16, 1}, {18, 1}, {20, 1}, {17, -1}, {19, -1}, {21, -1}})
     style.bind[j] = Eigen::AngleAxisd(side * M_PI / 4, Vec3::UnitZ()).toRotationMatrix();
   const MotionClip clip = convert_bvh(bvh_test::text(style), "a.bvh");
-  EXPECT_EQ(fact(clip.report, "off a T-pose")
-                .find("left_shoulder 45, right_shoulder 45, left_elbow 45, right_elbow 45 degrees"),
-            0u)
-      << fact(clip.report, "off a T-pose");
+  EXPECT_HAS(fact(clip.report, "off a T-pose"),
+             "left_shoulder 45, right_shoulder 45, left_elbow 45, right_elbow 45 degrees");
   // Bone by bone, as pose_on does: world rotations of the arms are told from the arms' own rest.
   const PosedSkeleton truth = bvh_test::truth(0.5, true);
   const Mat3 got = clip.motion.global[15][16].cast<double>().toRotationMatrix();
@@ -193,11 +174,7 @@ TEST(ImportersStyles, APosesAreReportedLimbByLimb) {
 }
 
 TEST(ImportersStyles, OptionsOverrideWhatIsFound) {
-  Style style;
-  style.fps = 60;
-  style.frames = 61;
-  style.walks = true;
-  const std::string text = bvh_test::text(style);
+  const std::string text = bvh_test::text(walking(60));
   MotionOptions options;
   options.scale = 0.0125;
   options.fps = 30;
@@ -208,7 +185,7 @@ TEST(ImportersStyles, OptionsOverrideWhatIsFound) {
   const MotionClip clip = convert_bvh(text, "a.bvh", options);
   EXPECT_EQ(clip.motion.frames(), 61u);
   EXPECT_DOUBLE_EQ(clip.scale, 0.0125);
-  EXPECT_NE(fact(clip.report, "units").find("as given"), std::string::npos);
+  EXPECT_HAS(fact(clip.report, "units"), "as given");
   EXPECT_EQ(fact(clip.report, "up"), "y, as given");
   EXPECT_EQ(fact(clip.report, "facing"), "z, as given");
   EXPECT_EQ(clip.motion.subject, "ann");
@@ -218,36 +195,23 @@ TEST(ImportersStyles, OptionsOverrideWhatIsFound) {
   EXPECT_THROW(convert_bvh(text, "a.bvh", options), InputError);
   options = {};
   options.profile = "daz";  // not its names
-  try {
-    convert_bvh(text, "a.bvh", options);
-    FAIL();
-  } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("lacks bones of the profile daz"), std::string::npos)
-        << error.what();
-  }
+  EXPECT_HAS(error_of([&] { convert_bvh(text, "a.bvh", options); }),
+             "lacks bones of the profile daz");
   EXPECT_EQ(parse_axis("-y", "--up"), Axis::minus_y);
   EXPECT_THROW(parse_axis("north", "--up"), InputError);
 }
 
 TEST(ImportersStyles, FilesUnlikeTheirFamilyGetARemark) {
-  Style style;
+  Style style = walking();  // 100STYLE has 60 frames a second, and centimetres
   style.names = names_of("100style");
-  style.fps = 30;  // 100STYLE is 60
   style.unit = 0.0254;
-  style.frames = 31;
-  style.walks = true;
   const MotionClip clip = convert_bvh(bvh_test::text(style), "a.bvh");
-  EXPECT_NE(remarks(clip.report).find("60 fps, this one 30 fps"), std::string::npos)
-      << remarks(clip.report);
-  EXPECT_NE(remarks(clip.report).find("centimetres, this one inches"), std::string::npos);
+  EXPECT_HAS(remarks(clip.report), "60 fps, this one 30 fps");
+  EXPECT_HAS(remarks(clip.report), "centimetres, this one inches");
 }
 
 TEST(ImportersStyles, AnyAxisMayBeUp) {
-  Style style;
-  style.fps = 30;
-  style.frames = 31;
-  style.walks = true;
-  std::string text = bvh_test::text(style);
+  std::string text = bvh_test::text(walking());
   // Upside down: a half turn about x before everything else, by a bone above the hips.
   text.replace(text.find("ROOT mixamorig:Hips"), 19, "JOINT mixamorig:Hips");
   text.insert(text.find("JOINT"),
@@ -258,7 +222,101 @@ TEST(ImportersStyles, AnyAxisMayBeUp) {
     text.insert(at + 1, "180 0 0 ");
   const MotionClip clip = convert_bvh(text, "a.bvh");
   EXPECT_EQ(fact(clip.report, "up"), "y, by the rest pose");
-  EXPECT_NE(remarks(clip.report).find("--up -y"), std::string::npos) << remarks(clip.report);
+  EXPECT_HAS(remarks(clip.report), "--up -y");
+}
+
+// ---- profiles of bone names
+// ----------------------------------------------------------------------
+
+std::string own_profile() {
+  std::string out = "title: Suit\njoints:\n";
+  for (const std::string_view joint : kJointNames)
+    if (joint != "spine3") out += "  " + std::string(joint) + ": b_" + std::string(joint) + "\n";
+  return out;
+}
+
+/// A skeleton of the bones that the profile names first.
+SourceSkeleton skeleton_of(const Profile& profile) {
+  SourceSkeleton out;
+  std::array<int, kJoints> at{};
+  for (size_t j = 0; j < kJoints; ++j) {
+    int parent = j == 0 ? -1 : kParents[j];
+    while (parent > 0 && profile.bones[static_cast<size_t>(parent)].empty())
+      parent = kParents[static_cast<size_t>(parent)];
+    if (profile.bones[j].empty()) continue;
+    at[j] = static_cast<int>(out.size());
+    out.names.push_back(profile.bones[j][0]);
+    out.parents.push_back(parent < 0 ? -1 : at[static_cast<size_t>(parent)]);
+    out.offsets.push_back(Vec3(0, 0.1, 0));
+    out.ends.push_back(Vec3(0, 0, 0.1));
+    out.has_end.push_back(1);
+  }
+  return out;
+}
+
+TEST_F(ImportersProfiles, EveryBuiltInOneFindsItsOwnNames) {
+  std::set<std::string> names;
+  for (const Profile& profile : builtin_profiles()) {
+    names.insert(profile.name);
+    EXPECT_FALSE(profile.title.empty());
+    const NamedJoints found = name_joints(skeleton_of(profile), profile.name);
+    EXPECT_EQ(found.profile->bones[0].empty(), false);
+    if (profile.name != "vrm") {  // unity's names but for case
+      EXPECT_EQ(found.profile->name, profile.name);
+    }
+    EXPECT_EQ(name_joints(skeleton_of(profile), "x", &profile).profile, &profile);
+  }
+  for (const char* name : {"daz", "cmu", "asf", "mixamo", "lafan1", "100style", "soma", "smpl",
+                           "vrm", "unreal", "unity", "makehuman", "restage"})
+    EXPECT_EQ(names.count(name), 1u) << name;
+}
+
+TEST_F(ImportersProfiles, OnesOwnFileIsAsGood) {
+  const Profile profile = find_profile(
+      dir.write("suit.yaml", own_profile() + "places: {spine3: {from: spine2, to: b_neck, share: "
+                                             "0.5}}\nexpect: {units: metres, up: z, fps: 90}\n"));
+  EXPECT_EQ(profile.name, "suit");
+  EXPECT_EQ(profile.fps, 90);
+  const SourceSkeleton skeleton = skeleton_of(profile);
+  const NamedJoints found = name_joints(skeleton, "x.bvh", &profile);
+  EXPECT_EQ(found.placed, std::vector<int>{9});
+  const Joints rest = rest_joints(skeleton, found.map);
+  EXPECT_LT((rest[9] - 0.5 * (rest[6] + rest[12])).norm(), 1e-12);
+}
+
+std::string complaint(const std::string& yaml) {
+  return refusal_of([&] { parse_profile(yaml, "suit.yaml"); });
+}
+
+TEST_F(ImportersProfiles, MistakesAreNamedWithLineAndNearestName) {
+  const std::string good = own_profile();
+  EXPECT_EQ(complaint(good), "");
+  const std::pair<std::string, const char*> cases[] = {
+      {good + "jonts: {}\n", "suit.yaml:24: 'jonts' is not known here; did you mean 'joints'?"},
+      {good + "\"a\\nb\": x\n", "'a?b' is not known here"},
+      {good + "  left_hipp: x\n", "did you mean 'left_hip'?"},
+      {good + "  left_hip: x\n", "given twice"},
+      {"title: x\n", "names no bone for pelvis"},
+      {good.substr(good.find("joints")), "has no title"},
+      {good + "expect: {fps: fast}\n", "a number is expected"},
+      {good + "places: {spine3: {from: spine2}}\n", "'from' and 'to'"},
+      {good + "places: {head: {from: neck, to: neck}}\n", "not known here"},
+      {good + std::string(70000, '#'), "longer than"}};
+  for (const auto& [yaml, says] : cases) EXPECT_HAS(complaint(yaml), says);
+  for (const std::string& bad : std::vector<std::string>{
+           "", "- a\n", "title: [\n", "\t", "a: &b [*b]\n", "title: {a: b}\n", "%YAML 9.9\n---\n",
+           "title: x\njoints: 3\n", "title: " + std::string(20000, '[')})
+    EXPECT_EQ(complaint(bad).find("suit.yaml"), 0u) << bad << ": " << complaint(bad);
+  for (size_t cut = 0; cut < good.size(); cut += 7) complaint(good.substr(0, cut));  // no crash
+}
+
+TEST_F(ImportersProfiles, UnknownNamesAreAnsweredWithTheNearest) {
+  EXPECT_HAS(error_of([&] { find_profile("miximo"); }), "did you mean 'mixamo'?");
+  EXPECT_THROW(find_profile("no/such.yaml"), InputError);
+  SourceSkeleton skeleton = skeleton_of(find_profile("mixamo"));
+  for (std::string& name : skeleton.names)
+    if (name == "LeftUpLeg") name = "LeftUpLegg";
+  EXPECT_HAS(error_of([&] { name_joints(skeleton, "a.bvh"); }), "LeftUpLeg: is it 'leftuplegg'?");
 }
 
 }  // namespace

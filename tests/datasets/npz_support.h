@@ -39,6 +39,12 @@ inline std::string npy_header(const std::string& type, const std::vector<int64_t
          ", 'shape': " + python_shape(shape) + ", }";
 }
 
+/// The same with numpy's name of the type, as "<f8".
+inline std::string npy_as(const std::string& type, const std::vector<int64_t>& shape,
+                          const std::string& bytes, int version = 1) {
+  return npy_of(npy_header(type, shape), bytes, version);
+}
+
 inline const char* numpy_type(double) { return "<f8"; }
 inline const char* numpy_type(float) { return "<f4"; }
 inline const char* numpy_type(int64_t) { return "<i8"; }
@@ -49,22 +55,22 @@ template <class T>
 std::string npy(const std::vector<int64_t>& shape, const std::vector<T>& values) {
   std::string bytes;
   for (const T value : values) bytes += raw(value);
-  return npy_of(npy_header(numpy_type(T{}), shape), bytes);
+  return npy_as(numpy_type(T{}), shape, bytes);
 }
 
 /// A text scalar, as numpy stores 'female'.
 inline std::string npy_text(const std::string& text) {
   std::string bytes;
   for (const char c : text) bytes += raw(static_cast<uint32_t>(c));
-  return npy_of(npy_header("<U" + std::to_string(text.size()), {}), bytes);
+  return npy_as("<U" + std::to_string(text.size()), {}, bytes);
 }
 
 struct ZipEntry {
-  std::string name, bytes;
+  std::string name = "a.npy", bytes = "";
   bool deflate = false, zip64 = false, descriptor = false;
-  std::optional<uint64_t> claimed_size;    ///< a lie, in both headers
-  std::optional<uint64_t> directory_size;  ///< a lie, in the directory only
-  std::optional<uint16_t> method;
+  std::optional<uint64_t> claimed_size = {};    ///< a lie, in both headers
+  std::optional<uint64_t> directory_size = {};  ///< a lie, in the directory only
+  std::optional<uint16_t> method = {};
   uint32_t wrong_crc = 0;  ///< flips bits of the checksum
   uint16_t flags = 0;
   bool same_place = false;  ///< its directory entry points at the member before
@@ -142,13 +148,7 @@ inline std::string zip_of(const std::vector<ZipEntry>& entries, const std::strin
 inline std::string npz(const std::vector<std::pair<std::string, std::string>>& arrays,
                        bool deflate = true) {
   std::vector<ZipEntry> entries;
-  for (const auto& [name, bytes] : arrays) {
-    ZipEntry entry;
-    entry.name = name + ".npy";
-    entry.bytes = bytes;
-    entry.deflate = deflate;
-    entries.push_back(entry);
-  }
+  for (const auto& [name, bytes] : arrays) entries.push_back({name + ".npy", bytes, deflate});
   return zip_of(entries);
 }
 

@@ -14,32 +14,26 @@
 namespace restage {
 namespace {
 
-using test::error_of;
-using test::npy;
-using test::npy_header;
-using test::npy_of;
-using test::npz;
-using test::raw;
-using test::TempDir;
-using test::zip_of;
-using test::ZipEntry;
+using namespace test;
+using ReadersArrays = FileTest;
 
-NpyArray array_of(const TempDir& dir, const std::string& bytes, uint64_t limit = kMaxMemory) {
-  test::write_bytes(dir / "a.npy", bytes);
-  return read_npy(dir / "a.npy", limit);
+using Arrays = std::vector<std::pair<std::string, std::string>>;
+
+NpyArray array_of(const std::string& bytes, uint64_t limit = kMaxMemory) {
+  const TempDir dir;
+  return read_npy(dir.write("a.npy", bytes), limit);
 }
 
-std::string refusal(const TempDir& dir, const std::string& bytes) {
-  return error_of([&] { array_of(dir, bytes); });
+std::string refusal(const std::string& bytes) {
+  return error_of([&] { array_of(bytes); });
 }
 
-#define EXPECT_HAS(text, part) EXPECT_NE((text).find(part), std::string::npos) << (text)
+std::string zeros(size_t n) { return std::string(n, '\0'); }
 
 // ---- NPY ---------------------------------------------------------------------------------------
 
 template <class T>
 void expect_numbers(const std::string& type, const std::vector<T>& values) {
-  const TempDir dir;
   for (const bool big : {false, true}) {
     std::string bytes;
     for (const T value : values) {
@@ -48,15 +42,15 @@ void expect_numbers(const std::string& type, const std::vector<T>& values) {
       bytes += one;
     }
     const std::string order = sizeof(T) == 1 ? "|" : big ? ">" : "<";
-    const NpyArray array = array_of(
-        dir, npy_of(npy_header(order + type, {static_cast<int64_t>(values.size())}), bytes));
+    const NpyArray array =
+        array_of(npy_as(order + type, {static_cast<int64_t>(values.size())}, bytes));
     ASSERT_EQ(array.size(), static_cast<int64_t>(values.size()));
     for (size_t i = 0; i < values.size(); ++i)
       EXPECT_EQ(array[static_cast<int64_t>(i)], static_cast<double>(values[i])) << type << big;
   }
 }
 
-TEST(ReadersArrays, AllNumbersInBothByteOrders) {
+TEST_F(ReadersArrays, AllNumbersInBothByteOrders) {
   expect_numbers<uint8_t>("b1", {0, 1});
   expect_numbers<int8_t>("i1", {0, -128, 127});
   expect_numbers<uint8_t>("u1", {0, 255});
@@ -70,8 +64,7 @@ TEST(ReadersArrays, AllNumbersInBothByteOrders) {
   expect_numbers<double>("f8", {-0.1, 1e-310, 1e300});
 }
 
-TEST(ReadersArrays, HalfPrecision) {
-  const TempDir dir;
+TEST_F(ReadersArrays, HalfPrecision) {
   const std::pair<uint16_t, double> cases[] = {
       {0x0000, 0.0},     {0x3c00, 1.0},     {0xc000, -2.0},      {0x3555, 0.333251953125},
       {0x7bff, 65504.0}, {0x0001, 0x1p-24}, {0x03ff, 0x3ffp-24}, {0x0400, 0x1p-14}};
@@ -80,20 +73,19 @@ TEST(ReadersArrays, HalfPrecision) {
     little += raw(bits);
     big += raw(static_cast<uint16_t>(bits << 8 | bits >> 8));
   }
-  const NpyArray a = array_of(dir, npy_of(npy_header("<f2", {8}), little));
-  const NpyArray b = array_of(dir, npy_of(npy_header(">f2", {8}), big));
+  const NpyArray a = array_of(npy_as("<f2", {8}, little));
+  const NpyArray b = array_of(npy_as(">f2", {8}, big));
   for (int i = 0; i < 8; ++i) {
     EXPECT_EQ(a[i], cases[i].second);
     EXPECT_EQ(b[i], cases[i].second);
   }
-  const NpyArray c = array_of(dir, npy_of(npy_header("<f2", {2}), raw(uint32_t{0x7e00fc00})));
+  const NpyArray c = array_of(npy_as("<f2", {2}, raw(uint32_t{0x7e00fc00})));
   EXPECT_EQ(c[0], -std::numeric_limits<double>::infinity());
   EXPECT_TRUE(std::isnan(c[1]));
   EXPECT_HAS(error_of([&] { c.finite(); }), "infinity at element 0");
 }
 
-TEST(ReadersArrays, OrdersVersionsAndScalars) {
-  const TempDir dir;
+TEST_F(ReadersArrays, OrdersVersionsAndScalars) {
   // [2, 3, 2] holding 0..11 in C order.
   std::vector<double> c(12), f(12);
   for (int i = 0; i < 2; ++i)
@@ -108,85 +100,66 @@ TEST(ReadersArrays, OrdersVersionsAndScalars) {
       std::string bytes;
       for (const double value : fortran ? f : c) bytes += raw(value);
       const NpyArray array =
-          array_of(dir, npy_of(npy_header("<f8", {2, 3, 2}, fortran), bytes, version));
+          array_of(npy_of(npy_header("<f8", {2, 3, 2}, fortran), bytes, version));
       EXPECT_EQ(array.shape(), (std::vector<int64_t>{2, 3, 2}));
       EXPECT_EQ(array.finite(), c);
     }
-  const NpyArray scalar = array_of(dir, npy<double>({}, {120.0}));
+  const NpyArray scalar = array_of(npy<double>({}, {120.0}));
   EXPECT_TRUE(scalar.shape().empty());
   EXPECT_EQ(scalar.finite(), std::vector<double>{120.0});
-  EXPECT_EQ(array_of(dir, npy<float>({0, 3}, {})).size(), 0);
+  EXPECT_EQ(array_of(npy<float>({0, 3}, {})).size(), 0);
   // As Python 2 and hand-made headers look.
-  EXPECT_EQ(array_of(dir, npy_of("{\"shape\":(1L,),'descr':'<i8' , 'fortran_order':False}",
-                                 raw(int64_t{7})))[0],
+  EXPECT_EQ(array_of(npy_of("{\"shape\":(1L,),'descr':'<i8' , 'fortran_order':False}",
+                            raw(int64_t{7})))[0],
             7);
 }
 
-TEST(ReadersArrays, Text) {
-  const TempDir dir;
-  EXPECT_EQ(array_of(dir, test::npy_text("female")).text(), "female");
-  EXPECT_EQ(array_of(dir, npy_of(npy_header("|S8", {}), std::string("male\0\0\0\0", 8))).text(),
-            "male");
+TEST_F(ReadersArrays, Text) {
+  EXPECT_EQ(array_of(npy_text("female")).text(), "female");
+  EXPECT_EQ(array_of(npy_as("|S8", {}, std::string("male\0\0\0\0", 8))).text(), "male");
   const std::string big = std::string("\0\0\0\xe9\0\0\x20\xac\0\1\xf6\0", 12);
-  EXPECT_EQ(array_of(dir, npy_of(npy_header(">U3", {1}), big)).text(), "é€😀");
-  EXPECT_EQ(array_of(dir, npy_of(npy_header("<U0", {}), "")).text(), "");
-  EXPECT_EQ(array_of(dir, npy_of(npy_header("<U2", {0}), "")).text(), "");
+  EXPECT_EQ(array_of(npy_as(">U3", {1}, big)).text(), "é€😀");
+  EXPECT_EQ(array_of(npy_as("<U0", {}, "")).text(), "");
+  EXPECT_EQ(array_of(npy_as("<U2", {0}, "")).text(), "");
 }
 
-TEST(ReadersArrays, WhatIsNotRead) {
-  const TempDir dir;
-  EXPECT_HAS(refusal(dir, npy_of(npy_header("|O", {}), "\x80\x03X")), "pickle");
-  EXPECT_HAS(refusal(dir, npy_of(npy_header("<f16", {1}), std::string(16, '\0'))), "'<f16'");
-  EXPECT_HAS(refusal(dir, npy_of(npy_header("<c8", {1}), std::string(8, '\0'))), "'<c8'");
-  EXPECT_HAS(refusal(dir, npy_of(npy_header("<M8[ns]", {1}), std::string(8, '\0'))), "header");
-  EXPECT_HAS(refusal(dir, npy_of("{'descr': [('x', '<f4')], 'fortran_order': False, 'shape': (), }",
-                                 std::string(4, '\0'))),
-             "records");
-  EXPECT_HAS(refusal(dir, "no array"), "is no NPY array");
-  EXPECT_HAS(refusal(dir, ""), "is no NPY array");
-  EXPECT_HAS(refusal(dir, npy_of(npy_header("<f8", {1}), std::string(8, '\0'), 4)), "version");
-  for (const char* header :
-       {"", "{}", "{'descr': '<f8'}", "{'descr': '<f8', 'descr': '<f8', 'shape': ()}",
-        "{'descr': '<f8', 'fortran_order': Maybe, 'shape': ()}",
-        "{'descr': '<f8', 'fortran_order': False, 'shape': (-1,)}",
-        "{'descr': '<f8', 'fortran_order': False, 'shape': (1}",
-        "{'descr': '<f8', 'fortran_order': False, 'shape': (99999999999999999999,)}",
-        "{'descr': '<f8', 'fortran_order': False, 'shape': (), 'x': ()}",
-        "{'descr': '', 'fortran_order': False, 'shape': ()}",
-        "{'descr': '<', 'fortran_order': False, 'shape': ()}",
-        "{'descr': '<f8', 'fortran_order': False, 'shape': ()} more"})
-    EXPECT_HAS(refusal(dir, npy_of(header, std::string(8, '\0'))), "a.npy: ");
+TEST_F(ReadersArrays, WhatIsNotRead) {
+  const std::string plain = "{'descr': '<f8', 'fortran_order': False, 'shape': ";
+  const std::pair<std::string, const char*> cases[] = {
+      {npy_as("|O", {}, "\x80\x03X"), "pickle"},
+      {npy_as("<f16", {1}, zeros(16)), "'<f16'"},
+      {npy_as("<c8", {1}, zeros(8)), "'<c8'"},
+      {npy_as("<M8[ns]", {1}, zeros(8)), "header"},
+      {npy_of("{'descr': [('x', '<f4')], 'fortran_order': False, 'shape': (), }", zeros(4)),
+       "records"},
+      {"no array", "is no NPY array"},
+      {"", "is no NPY array"},
+      {npy_as("<f8", {1}, zeros(8), 4), "version"}};
+  for (const auto& [bytes, says] : cases) EXPECT_HAS(refusal(bytes), says);
+  for (const std::string& header :
+       {std::string(), std::string("{}"), std::string("{'descr': '<f8'}"),
+        std::string("{'descr': '<f8', 'descr': '<f8', 'shape': ()}"),
+        std::string("{'descr': '<f8', 'fortran_order': Maybe, 'shape': ()}"), plain + "(-1,)}",
+        plain + "(1}", plain + "(99999999999999999999,)}", plain + "(), 'x': ()}",
+        std::string("{'descr': '', 'fortran_order': False, 'shape': ()}"),
+        std::string("{'descr': '<', 'fortran_order': False, 'shape': ()}"), plain + "()} more"})
+    EXPECT_HAS(refusal(npy_of(header, zeros(8))), "a.npy: ") << header;
 }
 
-TEST(ReadersArrays, LengthsAreNeverBelieved) {
-  const TempDir dir;
-  EXPECT_HAS(refusal(dir, npy_of(npy_header("<f8", {2}), std::string(15, '\0'))), "cut short");
-  EXPECT_HAS(refusal(dir, npy_of(npy_header("<f8", {2}), std::string(17, '\0'))),
-             "save one array a file");
-  EXPECT_HAS(refusal(dir, npy_of(npy_header("<f8", {1 << 20, 1 << 20, 1 << 20}), "")),
-             "impossible shape");
-  EXPECT_HAS(refusal(dir, npy_of(npy_header("<f8", {int64_t{1} << 43}), "12345678")),
-             "should hold");
+TEST_F(ReadersArrays, LengthsAreNeverBelieved) {
   std::string endless = npy<double>({1}, {1.0});
   endless[8] = endless[9] = '\xff';  // a header longer than the file
-  EXPECT_HAS(refusal(dir, endless), "cut short");
-  EXPECT_HAS(error_of([&] { array_of(dir, npy<double>({4}, {1, 2, 3, 4}), 31); }), "--max-memory");
+  const std::pair<std::string, const char*> cases[] = {
+      {npy_as("<f8", {2}, zeros(15)), "cut short"},
+      {npy_as("<f8", {2}, zeros(17)), "save one array a file"},
+      {npy_as("<f8", {1 << 20, 1 << 20, 1 << 20}, ""), "impossible shape"},
+      {npy_as("<f8", {int64_t{1} << 43}, "12345678"), "should hold"},
+      {endless, "cut short"}};
+  for (const auto& [bytes, says] : cases) EXPECT_HAS(refusal(bytes), says);
+  EXPECT_HAS(error_of([&] { array_of(npy<double>({4}, {1, 2, 3, 4}), 31); }), "--max-memory");
 }
 
 // ---- NPZ ---------------------------------------------------------------------------------------
-
-std::string opened(const TempDir& dir, const std::string& bytes) {
-  test::write_bytes(dir / "a.npz", bytes);
-  return error_of([&] { Npz(dir / "a.npz"); });
-}
-
-ZipEntry entry(const std::string& name, const std::string& bytes, bool deflate = false) {
-  ZipEntry out;
-  out.name = name;
-  out.bytes = bytes;
-  out.deflate = deflate;
-  return out;
-}
 
 std::string counting(int n) {
   std::vector<double> values;
@@ -194,17 +167,16 @@ std::string counting(int n) {
   return npy<double>({n}, values);
 }
 
-TEST(ReadersArrays, EveryPackingOfZip) {
-  const TempDir dir;
+TEST_F(ReadersArrays, EveryPackingOfZip) {
   for (int variant = 0; variant < 8; ++variant) {
-    std::vector<ZipEntry> entries = {entry("x.npy", counting(1000)), entry("readme.txt", "hello"),
-                                     entry("folder/y.npy", counting(3))};
+    std::vector<ZipEntry> entries = {
+        {"x.npy", counting(1000)}, {"readme.txt", "hello"}, {"folder/y.npy", counting(3)}};
     for (ZipEntry& e : entries) {
       e.deflate = (variant & 1) != 0;
       e.zip64 = (variant & 2) != 0;
       e.descriptor = (variant & 4) != 0;
     }
-    test::write_bytes(dir / "a.npz", zip_of(entries, variant % 3 ? "PK\5\6 a comment" : ""));
+    write_bytes(dir / "a.npz", zip_of(entries, variant % 3 ? "PK\5\6 a comment" : ""));
     const Npz file(dir / "a.npz");
     EXPECT_EQ(file.names(), (std::vector<std::string>{"x", "folder/y"}));
     EXPECT_TRUE(file.has("x"));
@@ -216,17 +188,15 @@ TEST(ReadersArrays, EveryPackingOfZip) {
     EXPECT_EQ(file.header("x").shape, std::vector<int64_t>{1000});
     EXPECT_HAS(error_of([&] { file.array("z"); }), "has no array 'z' (it has 'x', 'folder/y')");
   }
-  test::write_bytes(dir / "a.npz", zip_of({}));
+  write_bytes(dir / "a.npz", zip_of({}));
   EXPECT_TRUE(Npz(dir / "a.npz").names().empty());
 }
 
-TEST(ReadersArrays, AMemberCanBeReadAgainAndSkippedInto) {
-  const TempDir dir;
+TEST_F(ReadersArrays, AMemberCanBeReadAgainAndSkippedInto) {
   for (const bool deflate : {false, true}) {
     std::string text;
     for (int i = 0; i < 300000; ++i) text += static_cast<char>('a' + i % 23);
-    test::write_bytes(dir / "a.zip", zip_of({entry("t", text, deflate)}));
-    const ZipFile file(dir / "a.zip");
+    const ZipFile file(dir.write("a.zip", zip_of({{"t", text, deflate}})));
     const auto in = file.open(*file.find("t"));
     for (int round = 0; round < 2; ++round, in->rewind()) {
       in->skip(123456);
@@ -241,79 +211,58 @@ TEST(ReadersArrays, AMemberCanBeReadAgainAndSkippedInto) {
   }
 }
 
-TEST(ReadersArrays, ArchivesThatContradictThemselves) {
-  const TempDir dir;
-  EXPECT_HAS(opened(dir, "no archive at all"), "is no zip archive");
-  EXPECT_HAS(opened(dir, ""), "is no zip archive");
-  EXPECT_HAS(opened(dir, zip_of({entry("a.npy", "1"), entry("a.npy", "2")})), "two members");
-
-  ZipEntry again = entry("a.npy", counting(9));
-  again.same_place = true;  // the quine and bomb of overlapping members
-  ZipEntry first = entry("a.npy", counting(9));
-  again.name = "b.npy";
-  EXPECT_HAS(opened(dir, zip_of({first, again})), "overlaps");
-
-  ZipEntry liar = entry("a.npy", counting(9), true);
-  liar.claimed_size = uint64_t{1} << 40;
-  liar.zip64 = true;
-  EXPECT_HAS(opened(dir, zip_of({liar})), "which cannot be");
-  liar = entry("a.npy", counting(9));
-  liar.claimed_size = 5;
-  EXPECT_HAS(opened(dir, zip_of({liar})), "which cannot be");
-  liar = entry("a.npy", counting(9), true);
-  liar.directory_size = 100;
-  EXPECT_HAS(opened(dir, zip_of({liar})), "contradicts the directory");
-
-  std::string outside = zip_of({entry("a.npy", counting(9))});
-  const size_t place = outside.find("PK\1\2") + 42;  // the member's offset
-  outside[place] = '\x7f';
-  EXPECT_HAS(opened(dir, outside), "has no header");
-  outside[place + 2] = '\x7f';
-  EXPECT_HAS(opened(dir, outside), "lies outside");
-  std::string other = zip_of({entry("a.npy", counting(9))});
-  other[30] = 'b';  // the name in the local header
-  EXPECT_HAS(opened(dir, other), "contradicts the directory");
-}
-
-TEST(ReadersArrays, MembersThatLie) {
-  const TempDir dir;
-  const auto reading = [&](const ZipEntry& e) {
-    test::write_bytes(dir / "a.npz", zip_of({e}));
-    const Npz file(dir / "a.npz");
-    return error_of([&] { file.array("a"); });
+TEST_F(ReadersArrays, ArchivesThatContradictThemselves) {
+  const std::string nine = counting(9);
+  const std::string whole = zip_of({{.bytes = nine}});
+  const size_t offset = whole.find("PK\1\2") + 42;  // where the directory says that a member is
+  const auto with = [&](std::vector<std::pair<size_t, char>> changes) {
+    std::string out = whole;
+    for (const auto& [at, byte] : changes) out[at] = byte;
+    return out;
   };
-  const std::string bytes = counting(1000);
-  ZipEntry e = entry("a.npy", bytes, true);
-  e.wrong_crc = 4;
-  EXPECT_HAS(reading(e), "checksum");
-  e.deflate = false;
-  EXPECT_HAS(reading(e), "checksum");
-  e = entry("a.npy", bytes, true);
-  e.claimed_size = bytes.size() - 8;
-  EXPECT_HAS(reading(e), "holds 7992");
-  e.claimed_size = bytes.size() + 8;
-  EXPECT_HAS(reading(e), "holds 8008");
-  e = entry("a.npy", bytes + "12345678", true);  // header and directory agree, the data is longer
-  e.claimed_size = bytes.size();
-  EXPECT_HAS(reading(e), "more than the");
-  e = entry("a.npy", bytes.substr(0, bytes.size() - 8), true);
-  e.claimed_size = bytes.size();
-  EXPECT_HAS(reading(e), "fewer than the");
-  e = entry("a.npy", bytes);
-  e.flags = 1;
-  EXPECT_HAS(reading(e), "encrypted");
-  e.flags = 0;
-  e.method = 12;
-  e.claimed_size = bytes.size();
-  EXPECT_HAS(reading(e), "method 12");
+  const std::pair<std::string, const char*> cases[] = {
+      {"no archive at all", "is no zip archive"},
+      {"", "is no zip archive"},
+      {zip_of({{.bytes = "1"}, {.bytes = "2"}}), "two members"},
+      // The quine and bomb of overlapping members.
+      {zip_of({{.bytes = nine}, {.name = "b.npy", .bytes = nine, .same_place = true}}), "overlaps"},
+      {zip_of({{.bytes = nine, .deflate = true, .zip64 = true, .claimed_size = uint64_t{1} << 40}}),
+       "which cannot be"},
+      {zip_of({{.bytes = nine, .claimed_size = 5}}), "which cannot be"},
+      {zip_of({{.bytes = nine, .deflate = true, .directory_size = 100}}),
+       "contradicts the directory"},
+      {with({{offset, '\x7f'}}), "has no header"},
+      {with({{offset, '\x7f'}, {offset + 2, '\x7f'}}), "lies outside"},
+      {with({{30, 'b'}}), "contradicts the directory"}};  // the name in the local header
+  for (const auto& [bytes, says] : cases) {
+    const std::string path = dir.write("a.npz", bytes);
+    EXPECT_HAS(error_of([&] { Npz{path}; }), says);
+  }
 }
 
-TEST(ReadersArrays, BombsStopAtTheMemoryLimit) {
-  const TempDir dir;
+TEST_F(ReadersArrays, MembersThatLie) {
+  const std::string bytes = counting(1000), shorter = bytes.substr(0, bytes.size() - 8);
+  const size_t size = bytes.size();
+  const std::pair<ZipEntry, const char*> cases[] = {
+      {{.bytes = bytes, .deflate = true, .wrong_crc = 4}, "checksum"},
+      {{.bytes = bytes, .wrong_crc = 4}, "checksum"},
+      {{.bytes = bytes, .deflate = true, .claimed_size = size - 8}, "holds 7992"},
+      {{.bytes = bytes, .deflate = true, .claimed_size = size + 8}, "holds 8008"},
+      // Header and directory agree; what is packed is longer or shorter.
+      {{.bytes = bytes + "12345678", .deflate = true, .claimed_size = size}, "more than the"},
+      {{.bytes = shorter, .deflate = true, .claimed_size = size}, "fewer than the"},
+      {{.bytes = bytes, .flags = 1}, "encrypted"},
+      {{.bytes = bytes, .claimed_size = size, .method = 12}, "method 12"}};
+  for (const auto& [entry, says] : cases) {
+    const Npz file(dir.write("a.npz", zip_of({entry})));
+    EXPECT_HAS(error_of([&] { file.array("a"); }), says);
+  }
+}
+
+TEST_F(ReadersArrays, BombsStopAtTheMemoryLimit) {
   const int64_t n = 20 << 20;
-  const std::string bomb =
-      npy_of(npy_header("|u1", {n}), std::string(static_cast<size_t>(n), '\0'));
-  test::write_bytes(dir / "a.npz", npz({{"a", bomb}, {"b", counting(3)}}));
+  const std::string bomb = npy_as("|u1", {n}, std::string(static_cast<size_t>(n), '\0'));
+  write_bytes(dir / "a.npz", npz({{"a", bomb}, {"b", counting(3)}}));
   EXPECT_LT(std::filesystem::file_size(dir / "a.npz"), 30000u);
   const Npz file(dir / "a.npz", 10 << 20);
   EXPECT_HAS(error_of([&] { file.array("a"); }), "--max-memory");
@@ -331,23 +280,20 @@ void read_all(const std::string& path) {
   for (const std::string& name : file.names()) file.array(name);
 }
 
-TEST(ReadersArrays, CutAtEveryByte) {
-  const TempDir dir;
-  const std::string a = npy<float>({2, 3}, {1, 2, 3, 4, 5, 6}), b = test::npy_text("male");
-  ZipEntry modern = entry("poses.npy", a, true);
-  modern.zip64 = modern.descriptor = true;
+TEST_F(ReadersArrays, CutAtEveryByte) {
+  const std::string a = npy<float>({2, 3}, {1, 2, 3, 4, 5, 6}), b = npy_text("male");
   const std::pair<const char*, std::string> files[] = {
       {"x.npy", a},
       {"x.npz", npz({{"poses", a}, {"gender", b}})},
       {"y.npz", npz({{"poses", a}, {"gender", b}}, false)},
-      {"z.npz", zip_of({modern}, "comment")}};
+      {"z.npz", zip_of({{"poses.npy", a, true, true, true}}, "comment")}};
   for (const auto& file : files) {
     const std::string name = file.first, &bytes = file.second;
-    test::write_bytes(dir / name, bytes);
+    write_bytes(dir / name, bytes);
     read_all(dir / name);
     for (size_t n = 0; n < bytes.size(); ++n) {
       std::filesystem::remove(dir / name);
-      test::write_bytes(dir / name, bytes.substr(0, n));
+      write_bytes(dir / name, bytes.substr(0, n));
       EXPECT_HAS(error_of([&] { read_all(dir / name); }), name) << n << " bytes";
     }
   }
@@ -355,10 +301,8 @@ TEST(ReadersArrays, CutAtEveryByte) {
 
 // ---- frames ------------------------------------------------------------------------------------
 
-TEST(ReadersArrays, CloudsAreFrames) {
-  const TempDir dir;
-  test::write_bytes(dir / "one.npy", npy<double>({2, 3}, {1, 2, 3, 4, 5, 6}));
-  const auto one = open_frames(dir / "one.npy");
+TEST_F(ReadersArrays, CloudsAreFrames) {
+  const auto one = open_frames(dir.write("one.npy", npy<double>({2, 3}, {1, 2, 3, 4, 5, 6})));
   EXPECT_EQ(one->frames(), 1);
   EXPECT_EQ(one->fps(), kFps);
   const auto frame = one->next();
@@ -378,8 +322,8 @@ TEST(ReadersArrays, CloudsAreFrames) {
                                 npy_of(npy_header("<f4", {3, 2, 3}, true), bytes)};
   for (const std::string& array : orders)
     for (const bool deflate : {false, true}) {
-      test::write_bytes(dir / "s.npz",
-                        npz({{"fps", npy<int64_t>({}, {60})}, {"points", array}}, deflate));
+      write_bytes(dir / "s.npz",
+                  npz({{"fps", npy<int64_t>({}, {60})}, {"points", array}}, deflate));
       const auto many = open_frames(dir / "s.npz");
       EXPECT_EQ(many->frames(), 3);
       EXPECT_EQ(many->fps(), 60);
@@ -395,42 +339,35 @@ TEST(ReadersArrays, CloudsAreFrames) {
   EXPECT_HAS(error_of([&] { read_array_frame(dir / "s.npz"); }), "sequence of 3");
 }
 
-TEST(ReadersArrays, WhichArrayIsTheCloud) {
-  const TempDir dir;
+TEST_F(ReadersArrays, WhichArrayIsTheCloud) {
   const std::string cloud = npy<float>({1, 3}, {1, 2, 3}), other = npy<float>({1, 3}, {9, 9, 9});
-  const auto first = [&](const std::vector<std::pair<std::string, std::string>>& arrays) {
-    test::write_bytes(dir / "a.npz", npz(arrays));
-    return open_frames(dir / "a.npz")->next()->points[0];
+  const auto first = [&](const Arrays& arrays) {
+    return open_frames(dir.write("a.npz", npz(arrays)))->next()->points[0];
   };
-  EXPECT_EQ(first({{"normals", other}, {"points", cloud}}), Point(1, 2, 3));
-  EXPECT_EQ(first({{"transl", npy<float>({3}, {9, 9, 9})},
-                   {"v_cano", other},
-                   {"v_posed", cloud},
-                   {"pose", npy<float>({72}, std::vector<float>(72, 0))}}),
-            Point(1, 2, 3));  // CAPE
-  EXPECT_EQ(first({{"faces", npy<int64_t>({1, 3}, {0, 0, 0})}, {"my_scan", cloud}}),
-            Point(1, 2, 3));
-  EXPECT_EQ(first({{"labels", npy_of(npy_header("|O", {}), "x")}, {"my_scan", cloud}}),
-            Point(1, 2, 3));
-  const auto refused = [&](const std::vector<std::pair<std::string, std::string>>& arrays) {
-    test::write_bytes(dir / "a.npz", npz(arrays));
-    return error_of([&] { open_frames(dir / "a.npz")->next(); });
-  };
-  EXPECT_HAS(refused({{"a", cloud}, {"b", other}}), "several arrays of points: 'a', 'b'");
-  EXPECT_HAS(refused({{"poses", npy<float>({2}, {1, 2})}}),
-             "holds no points (its arrays: 'poses')");
-  EXPECT_HAS(refused({{"points", npy<float>({0, 3}, {})}}), "holds no points");
-  EXPECT_HAS(refused({{"points", npy<float>({1, 3}, {1, NAN, 3})}}), "NaN");
-  EXPECT_HAS(refused({{"points", cloud}, {"fps", npy<float>({}, {0})}}), "fps: is no frame rate");
-  test::write_bytes(dir / "b.npy", npy<float>({4}, {1, 2, 3, 4}));
+  const Arrays with_a_cloud[] = {{{"normals", other}, {"points", cloud}},
+                                 {{"transl", npy<float>({3}, {9, 9, 9})},  // CAPE
+                                  {"v_cano", other},
+                                  {"v_posed", cloud},
+                                  {"pose", npy<float>({72}, std::vector<float>(72, 0))}},
+                                 {{"faces", npy<int64_t>({1, 3}, {0, 0, 0})}, {"my_scan", cloud}},
+                                 {{"labels", npy_as("|O", {}, "x")}, {"my_scan", cloud}}};
+  for (const Arrays& arrays : with_a_cloud) EXPECT_EQ(first(arrays), Point(1, 2, 3));
+  const std::pair<Arrays, const char*> without[] = {
+      {{{"a", cloud}, {"b", other}}, "several arrays of points: 'a', 'b'"},
+      {{{"poses", npy<float>({2}, {1, 2})}}, "holds no points (its arrays: 'poses')"},
+      {{{"points", npy<float>({0, 3}, {})}}, "holds no points"},
+      {{{"points", npy<float>({1, 3}, {1, NAN, 3})}}, "NaN"},
+      {{{"points", cloud}, {"fps", npy<float>({}, {0})}}, "fps: is no frame rate"}};
+  for (const auto& [arrays, says] : without)
+    EXPECT_HAS(error_of([&, &held = arrays] { first(held); }), says);
+  dir.write("b.npy", npy<float>({4}, {1, 2, 3, 4}));
   EXPECT_HAS(error_of([&] { open_frames(dir / "b.npy"); }), "array [4], which is no cloud");
 }
 
-TEST(ReadersArrays, FoldersOfArrays) {
-  const TempDir dir;
+TEST_F(ReadersArrays, FoldersOfArrays) {
   for (const int i : {10, 2, 1})
-    test::write_bytes(dir / ("f" + std::to_string(i) + ".npz"),
-                      npz({{"v_posed", npy<double>({1, 3}, {double(i), 0, 0})}}));
+    write_bytes(dir / ("f" + std::to_string(i) + ".npz"),
+                npz({{"v_posed", npy<double>({1, 3}, {double(i), 0, 0})}}));
   const auto frames = open_frames(dir.path());
   EXPECT_EQ(frames->frames(), 3);
   EXPECT_EQ(frames->next()->points[0], Point(1, 0, 0));
@@ -441,7 +378,7 @@ TEST(ReadersArrays, FoldersOfArrays) {
   frames->skip();
   EXPECT_FALSE(frames->next());
   // Meshes come first: arrays beside them are something else.
-  test::write_bytes(dir / "scan.obj", "v 7 7 7\n");
+  write_bytes(dir / "scan.obj", "v 7 7 7\n");
   EXPECT_EQ(open_frames(dir.path())->frames(), 1);
 }
 

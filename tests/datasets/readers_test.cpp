@@ -13,8 +13,8 @@
 namespace restage {
 namespace {
 
-using test::error_of;
-using test::TempDir;
+using namespace test;
+using Readers = FileTest;
 
 Mesh square() {
   Mesh mesh;
@@ -42,8 +42,7 @@ struct Binary {
   }
 };
 
-TEST(Readers, WritesAndReadsPlyAndObjBitForBit) {
-  const TempDir dir;
+TEST_F(Readers, WritesAndReadsPlyAndObjBitForBit) {
   write_ply(dir / "a.ply", square());
   write_obj(dir / "a.obj", square());
   expect_equal(read_mesh(dir / "a.ply"), square());
@@ -58,8 +57,7 @@ TEST(Readers, WritesAndReadsPlyAndObjBitForBit) {
   expect_equal(read_mesh(dir / "b.txt"), square());
 }
 
-TEST(Readers, ReadsPlyOfAnyOrderTypeAndEncoding) {
-  const TempDir dir;
+TEST_F(Readers, ReadsPlyOfAnyOrderTypeAndEncoding) {
   const std::string header =
       " 1.0\r\ncomment made by hand\r\nobj_info x\r\nelement material 2\r\nproperty list uchar "
       "short ids\r\n"
@@ -70,7 +68,7 @@ TEST(Readers, ReadsPlyOfAnyOrderTypeAndEncoding) {
   const std::string ascii =
       "2 7 -8\r\n0\r\n0 255 0 0\r\n0 1 1 0\r\n\r\n0 2 1 1\r\n+0.5 3 0 1e0\r\n1 4 -1 .5\r\n"
       "0.5 3 0 1 2 1 0.25\r\n1 5 0 1 2 3 4 0\r\n";
-  test::write_bytes(dir / "a.ply", "ply\r\nformat ascii" + header + ascii);
+  write_bytes(dir / "a.ply", "ply\r\nformat ascii" + header + ascii);
   Mesh expected;
   expected.vertices = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0.5f}, {-1, 0.5f, 1}};
   expected.faces = {{0, 1, 2}, {0, 1, 2}, {0, 2, 3}, {0, 3, 4}};
@@ -91,18 +89,16 @@ TEST(Readers, ReadsPlyOfAnyOrderTypeAndEncoding) {
     for (uint32_t i = 0; i < 5; ++i) b.add<uint32_t>(i);
     b.add<int8_t>(0);
     const std::string format = big ? "binary_big_endian" : "binary_little_endian";
-    test::write_bytes(dir / "b.ply", "ply\r\nformat " + format + header + b.out);
-    expect_equal(read_mesh(dir / "b.ply"), expected);
-    test::write_bytes(dir / "b.ply",
-                      "ply\r\nformat " + format + header + b.out.substr(0, b.out.size() - 1));
-    EXPECT_NE(error_of([&] { read_mesh(dir / "b.ply"); }).find("b.ply: is cut short"),
-              std::string::npos);
+    expect_equal(read_mesh(dir.write("b.ply", "ply\r\nformat " + format + header + b.out)),
+                 expected);
+    write_bytes(dir / "b.ply",
+                "ply\r\nformat " + format + header + b.out.substr(0, b.out.size() - 1));
+    EXPECT_HAS(error_of([&] { read_mesh(dir / "b.ply"); }), "b.ply: is cut short");
   }
 }
 
-TEST(Readers, ReadsObjOfAllFlavours) {
-  const TempDir dir;
-  test::write_bytes(
+TEST_F(Readers, ReadsObjOfAllFlavours) {
+  write_bytes(
       dir / "a.obj",
       "# comment\nmtllib x.mtl\r\no thing\nv 0 0 0 1.0\nv 1 0 0 0.5 0.5 0.5\n  v 1 1 0\nvt 0 0\n"
       "vn 0 0 1\nf 1/1/1 2/1/1 3/1/1\ns off\nv 0 1 0\nf -4//1 -3//1 -2//1 -1//1 # four\nf 1/1 3/1 "
@@ -113,10 +109,9 @@ TEST(Readers, ReadsObjOfAllFlavours) {
   expect_equal(read_mesh(dir / "a.obj"), expected);
 }
 
+/// A file's content and what is said of it, from its name on.
 struct BadFile {
-  const char* name;
-  std::string content;
-  const char* message;  ///< what follows the folder in the error, up to here
+  std::string content, says;
 };
 
 std::string ply(const std::string& elements, const std::string& rows) {
@@ -134,89 +129,77 @@ std::vector<BadFile> bad_files() {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   std::memcpy(&binary[binary.size() - 8], &nan, 4);
   return {
-      {"empty.ply", "", "empty.ply: is empty and holds no points"},
-      {"text.ply", "hello", "text.ply: is not a PLY file"},
-      {"text.xyz", "hello", "text.xyz: is neither PLY, OBJ nor glTF"},
-      {"header.ply", "ply\nformat ascii 1.0\nelement vertex 3\n",
+      {"", "empty.ply: is empty and holds no points"},
+      {"hello", "text.ply: is not a PLY file"},
+      {"hello", "text.xyz: is neither PLY, OBJ nor glTF"},
+      {"ply\nformat ascii 1.0\nelement vertex 3\n",
        "header.ply: is cut short inside the PLY header"},
-      {"noformat.ply", "ply\nend_header\n", "noformat.ply:2: the PLY header names no format"},
-      {"format.ply", "ply\nformat binary_middle_endian 1.0\n", "format.ply:2: unknown PLY format"},
-      {"type.ply", ply("element vertex 1\nproperty real x\n", ""),
-       "type.ply:4: unknown property type 'real'"},
-      {"count.ply", ply("element vertex -3\n", ""),
-       "count.ply:3: impossible count '-3' of element 'vertex'"},
-      {"word.ply", "ply\nvertices 3\n", "word.ply:2: unknown PLY header line 'vertices'"},
-      {"huge.ply",
-       ply("element vertex 9000000000000000000\nproperty float x\nproperty float y\nproperty float "
+      {"ply\nend_header\n", "noformat.ply:2: the PLY header names no format"},
+      {"ply\nformat binary_middle_endian 1.0\n", "format.ply:2: unknown PLY format"},
+      {ply("element vertex 1\nproperty real x\n", ""), "type.ply:4: unknown property type 'real'"},
+      {ply("element vertex -3\n", ""), "count.ply:3: impossible count '-3' of element 'vertex'"},
+      {"ply\nvertices 3\n", "word.ply:2: unknown PLY header line 'vertices'"},
+      {ply("element vertex 9000000000000000000\nproperty float x\nproperty float y\nproperty float "
            "z\n",
            three),
        "huge.ply: is cut short: element 'vertex' should have 9000000000000000000 rows"},
-      {"bare.ply", ply("element junk 9000000000000000000\n" + kVertex3, three),
+      {ply("element junk 9000000000000000000\n" + kVertex3, three),
        "bare.ply: element 'junk' has no prop"},
-      {"noz.ply", ply("element vertex 1\nproperty float x\nproperty float y\n", "0 0\n"),
+      {ply("element vertex 1\nproperty float x\nproperty float y\n", "0 0\n"),
        "noz.ply: the vertices do not"},
-      {"rows.ply", ply(kVertex3, "0.25 0.25 0.25\n1 0 0\n"), "rows.ply: is cut short"},
-      {"fewer.ply", ply(kVertex3, "0 0.25 0\n1 0\n0 1 0\n"), "fewer.ply:9: has fewer values"},
-      {"more.ply", ply(kVertex3, "0 0 0 0\n1 0 0\n0 1 0\n"), "more.ply:8: has more values"},
-      {"word2.ply", ply(kVertex3, "0 0 zero\n1 0 0\n0 1 0\n"), "word2.ply:8: 'zero' is no number"},
-      {"nan.ply", ply(kVertex3, "0 0 0\n1 nan 0\n0 1 0\n"), "nan.ply:9: a coordinate is NaN"},
-      {"inf.ply", ply(kVertex3, "0 0 0\n1 -inf 0\n0 1 0\n"), "inf.ply:9: a coordinate is infinite"},
-      {"far.ply", ply(kVertex3, "0 0 0\n1 1e39 0\n0 1 0\n"), "far.ply:9: a coordinate is infinite"},
-      {"binary.ply", binary, "binary.ply:vertex 2: a coordinate is NaN"},
-      {"none.ply",
-       ply("element vertex 0\nproperty float x\nproperty float y\nproperty float z\n", ""),
+      {ply(kVertex3, "0.25 0.25 0.25\n1 0 0\n"), "rows.ply: is cut short"},
+      {ply(kVertex3, "0 0.25 0\n1 0\n0 1 0\n"), "fewer.ply:9: has fewer values"},
+      {ply(kVertex3, "0 0 0 0\n1 0 0\n0 1 0\n"), "more.ply:8: has more values"},
+      {ply(kVertex3, "0 0 zero\n1 0 0\n0 1 0\n"), "word2.ply:8: 'zero' is no number"},
+      {ply(kVertex3, "0 0 0\n1 nan 0\n0 1 0\n"), "nan.ply:9: a coordinate is NaN"},
+      {ply(kVertex3, "0 0 0\n1 -inf 0\n0 1 0\n"), "inf.ply:9: a coordinate is infinite"},
+      {ply(kVertex3, "0 0 0\n1 1e39 0\n0 1 0\n"), "far.ply:9: a coordinate is infinite"},
+      {binary, "binary.ply:vertex 2: a coordinate is NaN"},
+      {ply("element vertex 0\nproperty float x\nproperty float y\nproperty float z\n", ""),
        "none.ply: holds no points"},
-      {"range.ply", ply(kVertex3 + kFace1, three + "3 0 1 3\n"),
+      {ply(kVertex3 + kFace1, three + "3 0 1 3\n"),
        "range.ply: triangle 0 has vertex index 3 (from 0), out of range for 3 vertices"},
-      {"minus.ply", ply(kVertex3 + kFace1, three + "3 0 1 -1\n"),
-       "minus.ply:13: a face index is out of range"},
-      {"edge.ply", ply(kVertex3 + kFace1, three + "2 0 1\n"),
-       "edge.ply:13: a face has fewer than 3 corners"},
-      {"list.ply", ply(kVertex3 + kFace1, three + "250 0 1 2\n"), "list.ply: is cut short"},
-      {"list2.ply", ply(kVertex3 + kFace1, three + "-3 0 1 2\n"),
+      {ply(kVertex3 + kFace1, three + "3 0 1 -1\n"), "minus.ply:13: a face index is out of range"},
+      {ply(kVertex3 + kFace1, three + "2 0 1\n"), "edge.ply:13: a face has fewer than 3 corners"},
+      {ply(kVertex3 + kFace1, three + "250 0 1 2\n"), "list.ply: is cut short"},
+      {ply(kVertex3 + kFace1, three + "-3 0 1 2\n"),
        "list2.ply:13: a list has an impossible length"},
-      {"none.obj", "# nothing\n", "none.obj: holds no points"},
-      {"cut.obj", "v 0 0 0\nv 1 0", "cut.obj:2: a vertex has fewer than 3 coordinates"},
-      {"word.obj", "v 0 0 0\nv 1 0 1,5\n", "word.obj:2: '1,5' is no number"},
-      {"nan.obj", "v 0 0 NaN\n", "nan.obj:1: a coordinate is NaN"},
-      {"range.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n",
-       "range.obj: triangle 0 has vertex index 3 (from 0)"},
-      {"zero.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n",
-       "zero.obj:4: face index 0 is out of range"},
-      {"minus.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 -4\n",
-       "minus.obj:4: face index -4 is out of range"},
-      {"corner.obj", "v 0 0 0\nf 1 1 99999999999999999999\n",
+      {"# nothing\n", "none.obj: holds no points"},
+      {"v 0 0 0\nv 1 0", "cut.obj:2: a vertex has fewer than 3 coordinates"},
+      {"v 0 0 0\nv 1 0 1,5\n", "word.obj:2: '1,5' is no number"},
+      {"v 0 0 NaN\n", "nan.obj:1: a coordinate is NaN"},
+      {"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "range.obj: triangle 0 has vertex index 3 (from 0)"},
+      {"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n", "zero.obj:4: face index 0 is out of range"},
+      {"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 -4\n", "minus.obj:4: face index -4 is out of range"},
+      {"v 0 0 0\nf 1 1 99999999999999999999\n",
        "corner.obj:2: '99999999999999999999' is no face corner"},
-      {"edge.obj", "v 0 0 0\nv 1 0 0\nf 1 2\n", "edge.obj:3: a face has fewer than 3 corners"},
+      {"v 0 0 0\nv 1 0 0\nf 1 2\n", "edge.obj:3: a face has fewer than 3 corners"},
   };
 }
 
-TEST(Readers, EveryBadFileIsOneClearLine) {
-  const TempDir dir;
-  for (const BadFile& bad : bad_files()) {
-    test::write_bytes(dir / bad.name, bad.content);
-    const std::string text = error_of([&] { read_mesh(dir / bad.name); });
-    EXPECT_EQ(text.rfind(dir / bad.message, 0), 0u)
-        << text << "\nshould begin " << dir / bad.message;
+TEST_F(Readers, EveryBadFileIsOneClearLine) {
+  for (const auto& [content, says] : bad_files()) {
+    const std::string path = dir.write(says.substr(0, says.find(':')), content);
+    const std::string text = error_of([&] { read_mesh(path); });
+    EXPECT_EQ(text.rfind(dir / says, 0), 0u) << text << "\nshould begin " << dir / says;
   }
-  EXPECT_NE(error_of([&] { read_mesh(dir / "absent.ply"); }).find("absent.ply: cannot be read"),
-            std::string::npos);
-  EXPECT_NE(error_of([&] { read_mesh(dir.path()); }).find("is a folder"), std::string::npos);
+  EXPECT_HAS(error_of([&] { read_mesh(dir / "absent.ply"); }), "absent.ply: cannot be read");
+  EXPECT_HAS(error_of([&] { read_mesh(dir.path()); }), "is a folder");
 }
 
-TEST(Readers, NumbersInNamesCompareAsNumbers) {
-  EXPECT_TRUE(natural_less("f2.ply", "f10.ply"));
+TEST_F(Readers, NumbersInNamesCompareAsNumbers) {
+  for (const auto& [less, more] : {std::pair{"f2.ply", "f10.ply"},
+                                   {"f002.ply", "f10.ply"},
+                                   {"a9b2", "a9b11"},
+                                   {"a", "a1"},
+                                   {"99999999999999999999998", "99999999999999999999999"}})
+    EXPECT_TRUE(natural_less(less, more)) << less;
   EXPECT_FALSE(natural_less("f10.ply", "f2.ply"));
-  EXPECT_TRUE(natural_less("f002.ply", "f10.ply"));
-  EXPECT_TRUE(natural_less("a9b2", "a9b11"));
-  EXPECT_TRUE(natural_less("a", "a1"));
   EXPECT_TRUE(natural_less("f01", "f1") != natural_less("f1", "f01"));
   EXPECT_FALSE(natural_less("f1", "f1"));
-  EXPECT_TRUE(natural_less("99999999999999999999998", "99999999999999999999999"));
 }
 
-TEST(Readers, FoldersGiveFramesInOrderWithChangingCounts) {
-  const TempDir dir;
+TEST_F(Readers, FoldersGiveFramesInOrderWithChangingCounts) {
   const char* names[] = {"f10.ply", "f2.obj", "f1.ply", "f9.PLY"};
   for (size_t i = 0; i < 4; ++i) {
     Mesh mesh;
@@ -226,8 +209,8 @@ TEST(Readers, FoldersGiveFramesInOrderWithChangingCounts) {
     else
       write_ply(dir / names[i], mesh);
   }
-  test::write_bytes(dir / "readme.txt", "not a frame");
-  test::write_bytes(dir / ".f3.ply", "hidden");
+  write_bytes(dir / "readme.txt", "not a frame");
+  write_bytes(dir / ".f3.ply", "hidden");
   const std::unique_ptr<FrameSource> frames = open_frames(dir.path());
   EXPECT_EQ(frames->frames(), 4);
   for (int pass = 0; pass < 2; ++pass) {
@@ -244,8 +227,7 @@ TEST(Readers, FoldersGiveFramesInOrderWithChangingCounts) {
   EXPECT_FALSE(single->next());
 }
 
-TEST(Readers, Hdf5ScansAndPredictionsAreFramesToo) {
-  const TempDir dir;
+TEST_F(Readers, Hdf5ScansAndPredictionsAreFramesToo) {
   {
     ScanWriter writer(dir / "s.h5", {}, 60);
     writer.append({{1, 0, 0}, {2, 0, 0}});
@@ -279,14 +261,10 @@ TEST(Readers, Hdf5ScansAndPredictionsAreFramesToo) {
   EXPECT_EQ(posed->faces, (std::vector<Triangle>{{0, 1, 2}}));
 }
 
-TEST(Readers, BadSequencesAreOneClearLine) {
-  const TempDir dir;
-  EXPECT_NE(error_of([&] { open_frames(dir.path()); }).find("holds no PLY, OBJ or glTF files"),
-            std::string::npos);
-  EXPECT_NE(error_of([&] { open_frames(dir / "absent"); }).find("does not exist"),
-            std::string::npos);
-  EXPECT_NE(error_of([&] { open_frames(dir / "absent.h5"); }).find("cannot be read"),
-            std::string::npos);
+TEST_F(Readers, BadSequencesAreOneClearLine) {
+  EXPECT_HAS(error_of([&] { open_frames(dir.path()); }), "holds no PLY, OBJ or glTF files");
+  EXPECT_HAS(error_of([&] { open_frames(dir / "absent"); }), "does not exist");
+  EXPECT_HAS(error_of([&] { open_frames(dir / "absent.h5"); }), "cannot be read");
   {
     PredictionWriter joints_only(dir / "j.h5", 0, {}, {});
     joints_only.append(Joints{}, {});
@@ -297,12 +275,11 @@ TEST(Readers, BadSequencesAreOneClearLine) {
     gap.append({Point(0, std::numeric_limits<float>::quiet_NaN(), 0)});
     gap.commit();
   }
-  EXPECT_NE(
-      error_of([&] { open_frames(dir / "j.h5"); }).find("/points: is missing, and so is /vertices"),
-      std::string::npos);
+  EXPECT_HAS(error_of([&] { open_frames(dir / "j.h5"); }),
+             "/points: is missing, and so is /vertices");
   const std::unique_ptr<FrameSource> gap = open_frames(dir / "gap.h5");
   gap->next();
-  EXPECT_NE(error_of([&] { gap->next(); }).find("gap.h5:1: holds no points"), std::string::npos);
+  EXPECT_HAS(error_of([&] { gap->next(); }), "gap.h5:1: holds no points");
 }
 
 }  // namespace

@@ -4,67 +4,27 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <set>
 
 #include "autograd/base/error.h"
-#include "autograd/base/parallel.h"
 #include "datasets/sampling/evaluation.h"
-#include "tests/support/tiny_body.h"
+#include "tests/datasets/sampling_support.h"
 
 namespace restage {
 namespace {
 
-using testing::tiny_corpus;
-
-Corpus train() { return subset(tiny_corpus(), "train"); }
-
-bool same_bits(const Tensor& a, const Tensor& b) {
-  return a.shape() == b.shape() &&
-         std::memcmp(a.raw(), b.raw(), static_cast<size_t>(a.numel()) * sizeof(float)) == 0;
-}
-
-Vec3 mean(const float* x, int n) {
-  Vec3 sum = Vec3::Zero();
-  for (int i = 0; i < n; ++i) sum += Vec3(x[3 * i], x[3 * i + 1], x[3 * i + 2]);
-  return sum / n;
-}
-
-Vec3 at(const Tensor& x, int64_t row, int i) {
-  const float* p = x.data<float>() + (row * x.size(1) + i) * 3;
-  return Vec3(p[0], p[1], p[2]);
-}
-
-TEST(SamplingClouds, SameBitsForAnyThreadsAndAnyBatch) {
-  const Corpus corpus = train();
-  CloudConfig config;
-  config.points = 64;
-  config.min_fraction = 0.5;
-  const CloudSampler sampler(corpus, config, 5);
-  set_threads(1);
-  const CloudBatch one = sampler.batch(100, 9);
-  for (const int threads : {2, 3}) {
-    set_threads(threads);
-    const CloudBatch again = sampler.batch(100, 9);
-    EXPECT_TRUE(same_bits(one.points, again.points));
-    EXPECT_TRUE(same_bits(one.joints, again.joints));
-  }
-  set_threads(0);
-  EXPECT_TRUE(same_bits(one.points.rows(4, 9), sampler.batch(104, 5).points));
-  EXPECT_FALSE(same_bits(one.points, sampler.batch(101, 9).points));
-  EXPECT_FALSE(same_bits(one.points, CloudSampler(corpus, config, 6).batch(100, 9).points));
-}
+using namespace testing;
 
 TEST(SamplingClouds, CentredOnThePointsWithJointsInside) {
-  const Corpus corpus = train();
-  CloudConfig config;
-  config.points = 512;
-  const CloudBatch batch = CloudSampler(corpus, config, 1).batch(0, 20);
+  const Corpus& corpus = training_corpus();
+  const CloudBatch batch = CloudSampler(corpus, {.points = 512}, 1).batch(0, 20);
   EXPECT_EQ(batch.points.shape(), (Shape{20, 512, 3}));
   EXPECT_EQ(batch.joints.shape(), (Shape{20, kJoints, 3}));
   for (int64_t i = 0; i < 20; ++i) {
-    EXPECT_LT(mean(batch.points.data<float>() + i * 512 * 3, 512).norm(), 1e-5);
+    Vec3 sum = Vec3::Zero();
+    for (int p = 0; p < 512; ++p) sum += at(batch.points, i, p);
+    EXPECT_LT((sum / 512).norm(), 1e-5);
     // Boxes run along every bone, so points are near every joint.
     for (int j = 0; j < kJoints; ++j) {
       double nearest = std::numeric_limits<double>::infinity();
@@ -76,12 +36,9 @@ TEST(SamplingClouds, CentredOnThePointsWithJointsInside) {
 }
 
 TEST(SamplingClouds, MirroredCloudsBelongToMirroredJoints) {
-  Corpus corpus = train();
+  Corpus corpus = training_corpus();
   corpus.bodies.resize(1);
-  CloudConfig config;
-  config.points = 256;
-  config.noise = 0;
-  const CloudSampler sampler(corpus, config, 1);
+  const CloudSampler sampler(corpus, {.points = 256, .noise = 0}, 1);
   CloudSubject plain;
   plain.at = {0, 20};
   plain.augmentation.heading = 0.4;
@@ -97,11 +54,8 @@ TEST(SamplingClouds, MirroredCloudsBelongToMirroredJoints) {
 }
 
 TEST(SamplingClouds, SkinWeightsBelongToTheirPoints) {
-  const Corpus corpus = train();
-  CloudConfig config;
-  config.points = 128;
-  config.noise = 0;
-  config.min_fraction = 0.5;
+  const Corpus& corpus = training_corpus();
+  CloudConfig config{.points = 128, .noise = 0, .min_fraction = 0.5};
   EXPECT_FALSE(CloudSampler(corpus, config, 1).batch(0, 1).weights.defined());
   config.skin_weights = true;
   CloudSubject subject;
@@ -129,10 +83,8 @@ TEST(SamplingClouds, SkinWeightsBelongToTheirPoints) {
 }
 
 TEST(SamplingClouds, SharesOfTposesMirrorsAndHeadings) {
-  const Corpus corpus = train();
-  CloudConfig config;
-  config.tpose_share = 0.2;
-  const CloudSampler sampler(corpus, config, 2);
+  const Corpus& corpus = training_corpus();
+  const CloudSampler sampler(corpus, {.tpose_share = 0.2}, 2);
   const int n = 4000;
   int rest = 0, mirrored = 0, away = 0;
   std::set<size_t> bodies, motions;
@@ -157,12 +109,9 @@ TEST(SamplingClouds, SharesOfTposesMirrorsAndHeadings) {
 }
 
 TEST(SamplingClouds, TposesShowTheRestJoints) {
-  const Corpus corpus = train();
-  CloudConfig config;
-  config.heading = config.mirror = false;
-  config.tpose_share = 1;
-  config.scale_jitter = 0.1;
-  const CloudSampler sampler(corpus, config, 3);
+  const Corpus& corpus = training_corpus();
+  const CloudSampler sampler(
+      corpus, {.heading = false, .mirror = false, .tpose_share = 1, .scale_jitter = 0.1}, 3);
   const CloudBatch batch = sampler.batch(0, 4);
   for (int i = 0; i < 4; ++i) {
     const CloudSubject s = sampler.subject(i);
@@ -176,16 +125,16 @@ TEST(SamplingClouds, TposesShowTheRestJoints) {
 }
 
 TEST(SamplingClouds, PoorScansRepeatPoints) {
-  const Corpus corpus = train();
-  CloudConfig config;
-  config.points = 200;
-  config.min_fraction = 0.25;
-  const CloudBatch batch = CloudSampler(corpus, config, 4).batch(0, 40);
+  const Corpus& corpus = training_corpus();
+  const CloudBatch batch =
+      CloudSampler(corpus, {.points = 200, .min_fraction = 0.25}, 4).batch(0, 40);
   size_t least = 200, most = 0;
   for (int64_t i = 0; i < 40; ++i) {
-    std::set<std::array<float, 3>> distinct;
-    const float* p = batch.points.data<float>() + i * 600;
-    for (int k = 0; k < 200; ++k) distinct.insert({p[3 * k], p[3 * k + 1], p[3 * k + 2]});
+    std::set<std::array<double, 3>> distinct;
+    for (int k = 0; k < 200; ++k) {
+      const Vec3 p = at(batch.points, i, k);
+      distinct.insert({p.x(), p.y(), p.z()});
+    }
     least = std::min(least, distinct.size());
     most = std::max(most, distinct.size());
   }
@@ -195,16 +144,10 @@ TEST(SamplingClouds, PoorScansRepeatPoints) {
 }
 
 TEST(SamplingClouds, SettingsOutOfRangeAreErrors) {
-  const Corpus corpus = train();
-  CloudConfig config;
-  config.points = 0;
-  EXPECT_THROW(CloudSampler(corpus, config, 1), InputError);
-  config = {};
-  config.noise = -1;
-  EXPECT_THROW(CloudSampler(corpus, config, 1), InputError);
-  config = {};
-  config.min_fraction = 0;
-  EXPECT_THROW(CloudSampler(corpus, config, 1), InputError);
+  const Corpus& corpus = training_corpus();
+  for (const CloudConfig& bad :
+       {CloudConfig{.points = 0}, CloudConfig{.noise = -1}, CloudConfig{.min_fraction = 0}})
+    EXPECT_THROW(CloudSampler(corpus, bad, 1), InputError);
   EXPECT_THROW(CloudSampler(Corpus{}, {}, 1), InputError);
 }
 

@@ -4,31 +4,16 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstring>
 #include <set>
 
 #include "autograd/base/error.h"
-#include "autograd/base/parallel.h"
 #include "datasets/sampling/pairs.h"
-#include "tests/support/tiny_body.h"
+#include "tests/datasets/sampling_support.h"
 
 namespace restage {
 namespace {
 
-using testing::tiny_corpus;
-
-Corpus train() { return subset(tiny_corpus(), "train"); }
-
-bool same_bits(const Tensor& a, const Tensor& b) {
-  return a.shape() == b.shape() &&
-         std::memcmp(a.raw(), b.raw(), static_cast<size_t>(a.numel()) * sizeof(float)) == 0;
-}
-
-/// Three numbers from position 3 i of row `row`.
-Vec3 at(const Tensor& x, int64_t row, int64_t i) {
-  const float* p = x.data<float>() + row * (x.numel() / x.size(0)) + 3 * i;
-  return Vec3(p[0], p[1], p[2]);
-}
+using namespace testing;
 
 Joints joints_at(const Tensor& x, int64_t row, int64_t frame = 0) {
   Joints out;
@@ -55,32 +40,10 @@ double largest(const Joints& a, const Joints& b) {
   return out;
 }
 
-TEST(SamplingWindows, SameBitsForAnyThreadsAndAnyBatch) {
-  const Corpus corpus = train();
-  WindowConfig config;
-  config.noise = 0.01;
-  const WindowSampler sampler(corpus, config, 5);
-  set_threads(1);
-  const WindowBatch one = sampler.batch(40, 7);
-  for (const int threads : {2, 3}) {
-    set_threads(threads);
-    const WindowBatch again = sampler.batch(40, 7);
-    EXPECT_TRUE(same_bits(one.input_a, again.input_a));
-    EXPECT_TRUE(same_bits(one.sixd_a, again.sixd_a));
-    EXPECT_TRUE(same_bits(one.real_b, again.real_b));
-    EXPECT_TRUE(same_bits(one.self_mask, again.self_mask));
-  }
-  set_threads(0);
-  EXPECT_TRUE(same_bits(one.real_b.rows(3, 7), sampler.batch(43, 4).real_b));
-  EXPECT_FALSE(same_bits(one.joints_a, WindowSampler(corpus, config, 6).batch(40, 7).joints_a));
-}
-
 TEST(SamplingWindows, RotationsGiveTheJointsMirroredOrNot) {
-  Corpus corpus = train();
+  Corpus corpus = training_corpus();
   for (Body& body : corpus.bodies) body.joints[4].x() += 0.03;  // sides that differ
-  WindowConfig config;
-  config.truth = true;
-  const WindowSampler sampler(corpus, config, 1);
+  const WindowSampler sampler(corpus, {.truth = true}, 1);
   const WindowBatch batch = sampler.batch(0, 12);
   int mirrored = 0;
   for (int64_t i = 0; i < 12; ++i) {
@@ -98,11 +61,8 @@ TEST(SamplingWindows, RotationsGiveTheJointsMirroredOrNot) {
 }
 
 TEST(SamplingWindows, SelfSamplesHaveOneBody) {
-  const Corpus corpus = train();
-  WindowConfig config;
-  config.self_share = 0.4;
-  config.truth = true;
-  const WindowSampler sampler(corpus, config, 2);
+  const Corpus& corpus = training_corpus();
+  const WindowSampler sampler(corpus, {.self_share = 0.4, .truth = true}, 2);
   const WindowBatch batch = sampler.batch(0, 60);
   for (int64_t i = 0; i < 60; ++i) {
     const WindowSubject s = sampler.subject(i);
@@ -127,7 +87,7 @@ TEST(SamplingWindows, SelfSamplesHaveOneBody) {
 }
 
 TEST(SamplingWindows, TheDiscriminatorsWindowHasBsBones) {
-  const Corpus corpus = train();
+  const Corpus& corpus = training_corpus();
   const WindowBatch batch = WindowSampler(corpus, {}, 3).batch(0, 10);
   for (int64_t i = 0; i < 10; ++i) {
     const Joints rest = joints_at(batch.rest_b, i), real = joints_at(batch.real_b, i, 17);
@@ -137,9 +97,8 @@ TEST(SamplingWindows, TheDiscriminatorsWindowHasBsBones) {
 }
 
 TEST(SamplingWindows, TranslationsDescribeThePath) {
-  const Corpus corpus = train();
-  WindowConfig config;
-  config.truth = true;
+  const Corpus& corpus = training_corpus();
+  WindowConfig config{.truth = true};
   std::vector<WindowBatch> batches;
   for (const char* name : {"velocity", "relative", "absolute"}) {
     config.translation = translation_of(name);
@@ -160,9 +119,8 @@ TEST(SamplingWindows, TranslationsDescribeThePath) {
 }
 
 TEST(SamplingWindows, RemovedHeadingsFaceForwardAndKeepTheMotion) {
-  const Corpus corpus = train();
-  WindowConfig config;
-  config.truth = true;
+  const Corpus& corpus = training_corpus();
+  WindowConfig config{.truth = true};
   const WindowBatch free = WindowSampler(corpus, config, 4).batch(0, 6);
   config.remove_heading = true;
   const WindowBatch faced = WindowSampler(corpus, config, 4).batch(0, 6);
@@ -185,13 +143,10 @@ TEST(SamplingWindows, RemovedHeadingsFaceForwardAndKeepTheMotion) {
 }
 
 TEST(SamplingWindows, NoiseIsOnTheInputOnly) {
-  const Corpus corpus = train();
-  WindowConfig config;
-  const WindowBatch clean = WindowSampler(corpus, config, 4).batch(0, 20);
+  const Corpus& corpus = training_corpus();
+  const WindowBatch clean = WindowSampler(corpus, {}, 4).batch(0, 20);
   EXPECT_TRUE(same_bits(clean.input_a, clean.joints_a));
-  config.noise = 0.02;
-  config.noise_correlation = 0.6;
-  config.noisy_translation = true;
+  const WindowConfig config{.noise = 0.02, .noise_correlation = 0.6, .noisy_translation = true};
   const WindowBatch noisy = WindowSampler(corpus, config, 4).batch(0, 20);
   EXPECT_TRUE(same_bits(clean.joints_a, noisy.joints_a));
   EXPECT_TRUE(same_bits(clean.trans_a, noisy.trans_a));
@@ -219,39 +174,18 @@ TEST(SamplingWindows, NoiseIsOnTheInputOnly) {
 }
 
 TEST(SamplingWindows, SettingsOutOfRangeAreErrors) {
-  const Corpus corpus = train();
-  WindowConfig config;
-  config.frames = 1;
-  EXPECT_THROW(WindowSampler(corpus, config, 1), InputError);
-  config.frames = 1000;
-  EXPECT_THROW(WindowSampler(corpus, config, 1), InputError);
-  config = {};
-  config.self_share = 2;
-  EXPECT_THROW(WindowSampler(corpus, config, 1), InputError);
+  const Corpus& corpus = training_corpus();
+  for (const WindowConfig& bad :
+       {WindowConfig{.frames = 1}, WindowConfig{.frames = 1000}, WindowConfig{.self_share = 2}})
+    EXPECT_THROW(WindowSampler(corpus, bad, 1), InputError);
   Corpus lonely = corpus;
   lonely.bodies.resize(1);
   EXPECT_THROW(WindowSampler(lonely, {}, 1), InputError);
-  config.self_share = 1;
-  EXPECT_EQ(WindowSampler(lonely, config, 1).batch(0, 2).self_mask.item(1), 1.0);
-}
-
-TEST(SamplingPairs, SameBitsForAnyThreads) {
-  const Corpus corpus = train();
-  const PairSampler sampler(corpus, {100, true, true}, 5);
-  set_threads(1);
-  const PairBatch one = sampler.batch(10, 6);
-  for (const int threads : {2, 3}) {
-    set_threads(threads);
-    const PairBatch again = sampler.batch(10, 6);
-    EXPECT_TRUE(same_bits(one.posed_points, again.posed_points));
-    EXPECT_TRUE(same_bits(one.axis_angle, again.axis_angle));
-  }
-  set_threads(0);
-  EXPECT_TRUE(same_bits(one.rest_points.rows(2, 6), sampler.batch(12, 4).rest_points));
+  EXPECT_EQ(WindowSampler(lonely, {.self_share = 1}, 1).batch(0, 2).self_mask.item(1), 1.0);
 }
 
 TEST(SamplingPairs, TheRestPoseGivesTheRestPoints) {
-  const Corpus corpus = train();
+  const Corpus& corpus = training_corpus();
   const PairSampler sampler(corpus, {200, false, false}, 1);
   Pose rest;
   rest.local.fill(Mat3::Identity());
@@ -266,7 +200,7 @@ TEST(SamplingPairs, TheRestPoseGivesTheRestPoints) {
 
 TEST(SamplingPairs, PointsCorrespondThroughTheBones) {
   // A body whose vertices each follow one joint: then G (p - rest_j) + P_j takes rest onto posed.
-  Corpus corpus = train();
+  Corpus corpus = training_corpus();
   for (Body& body : corpus.bodies)
     for (Eigen::Index v = 0; v < body.weights.rows(); ++v) {
       const int owner = kParents[static_cast<size_t>(v / 8 + 1)];
@@ -303,7 +237,7 @@ TEST(SamplingPairs, PointsCorrespondThroughTheBones) {
 }
 
 TEST(SamplingPairs, RandomPairsMoveAndSettingsAreChecked) {
-  const Corpus corpus = train();
+  const Corpus& corpus = training_corpus();
   const PairBatch batch = PairSampler(corpus, {50, true, false}, 1).batch(0, 3);
   double moved = 0;
   for (int64_t i = 0; i < 3; ++i)

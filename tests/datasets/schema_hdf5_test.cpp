@@ -1,11 +1,9 @@
 // The HDF5 wrapper: round trips, streaming, and refusal of everything that is not as it claims.
 #include <gtest/gtest.h>
 #include <hdf5.h>
-#include <sys/resource.h>
 #include <zlib.h>
 
 #include <cmath>
-#include <csignal>
 #include <filesystem>
 
 #include "autograd/base/error.h"
@@ -16,11 +14,20 @@
 namespace restage {
 namespace {
 
-using test::error_of;
-using test::TempDir;
+using namespace test;
+using SchemaHdf5 = FileTest;
 
-TEST(SchemaHdf5, WritesAndReadsEveryTypeShapeAndAttribute) {
-  const TempDir dir;
+/// A file of one data set.
+template <class T>
+std::string write_one(const std::string& path, const std::string& name, const h5::Shape& shape,
+                      const std::vector<T>& values) {
+  h5::File file = h5::File::create(path);
+  file.write<T>(name, shape, values);
+  file.commit();
+  return path;
+}
+
+TEST_F(SchemaHdf5, WritesAndReadsEveryTypeShapeAndAttribute) {
   const std::string path = dir / "a.h5";
   {
     h5::File file = h5::File::create(path);
@@ -52,14 +59,11 @@ TEST(SchemaHdf5, WritesAndReadsEveryTypeShapeAndAttribute) {
   EXPECT_EQ(file.integer("/g/h", "n"), -3);
   EXPECT_EQ(error_of([&] { file.dataset("/i64").read<int32_t>(); }),
             path + ":/i64: holds 1099511627776, which is out of range; correct the value");
-  EXPECT_NE(error_of([&] { file.dataset("/f").read<int32_t>(); }).find("holds fractions"),
-            std::string::npos);
-  EXPECT_NE(error_of([&] { file.integer("/", "note"); }).find("is not an integer"),
-            std::string::npos);
+  EXPECT_HAS(error_of([&] { file.dataset("/f").read<int32_t>(); }), "holds fractions");
+  EXPECT_HAS(error_of([&] { file.integer("/", "note"); }), "is not an integer");
 }
 
-TEST(SchemaHdf5, AppendsAndReadsRowsAcrossChunks) {
-  const TempDir dir;
+TEST_F(SchemaHdf5, AppendsAndReadsRowsAcrossChunks) {
   const std::string path = dir / "rows.h5";
   const int64_t width = 30000;  // four rows to a chunk
   {
@@ -80,70 +84,53 @@ TEST(SchemaHdf5, AppendsAndReadsRowsAcrossChunks) {
   EXPECT_EQ(rows.size(), static_cast<size_t>(2 * width));
   EXPECT_EQ(rows.front(), 3);
   EXPECT_EQ(rows.back(), 4);
-  EXPECT_NE(error_of([&] { set.read_rows(10, 2, rows); }).find("has 11 rows"), std::string::npos);
+  EXPECT_HAS(error_of([&] { set.read_rows(10, 2, rows); }), "has 11 rows");
 }
 
-TEST(SchemaHdf5, EqualContentIsEqualBytesAndAbandonedFilesLeaveNothing) {
-  const TempDir dir;
+TEST_F(SchemaHdf5, EqualContentIsEqualBytesAndAbandonedFilesLeaveNothing) {
   for (const char* name : {"a.h5", "b.h5"}) {
     h5::File file = h5::File::create(dir / name);
     file.write<float>("/g/x", {2}, std::vector<float>{1, 2});
     file.set_text("/", "kind", "test");
     file.commit();
   }
-  EXPECT_EQ(test::bytes_of(dir / "a.h5"), test::bytes_of(dir / "b.h5"));
+  EXPECT_EQ(bytes_of(dir / "a.h5"), bytes_of(dir / "b.h5"));
   { h5::File::create(dir / "c.h5").write<float>("/x", {1}, std::vector<float>{1}); }
-  EXPECT_EQ(test::names_in(dir.path()), (std::vector<std::string>{"a.h5", "b.h5"}));
+  EXPECT_EQ(names_in(dir.path()), (std::vector<std::string>{"a.h5", "b.h5"}));
 }
 
-TEST(SchemaHdf5, SaysWhatIsWrongWithAFile) {
-  const TempDir dir;
-  EXPECT_NE(error_of([&] { h5::File::open(dir / "no.h5"); }).find("no.h5: cannot be read"),
-            std::string::npos);
-  EXPECT_NE(error_of([&] { h5::File::open(dir.path()); }).find("is not a file"), std::string::npos);
-  test::write_bytes(dir / "text.h5", "hello");
-  EXPECT_NE(error_of([&] { h5::File::open(dir / "text.h5"); }).find("is not an HDF5 file"),
-            std::string::npos);
-  EXPECT_NE(error_of([&] { h5::File::create(dir / "no/such/x.h5"); }).find("cannot be written"),
-            std::string::npos);
-
-  const std::string path = dir / "whole.h5";
-  {
-    h5::File file = h5::File::create(path);
-    file.write<float>("/joints", {1, 22, 3}, std::vector<float>(66));
-    file.commit();
-  }
-  const std::string whole = test::bytes_of(path);
-  test::write_bytes(dir / "cut.h5", whole.substr(0, whole.size() / 2));
-  EXPECT_NE(error_of([&] { h5::File::open(dir / "cut.h5"); }).find("cut short"), std::string::npos);
+TEST_F(SchemaHdf5, SaysWhatIsWrongWithAFile) {
+  const std::string path =
+      write_one(dir / "whole.h5", "/joints", {1, 22, 3}, std::vector<float>(66));
+  const std::string whole = bytes_of(path);
+  dir.write("text.h5", "hello");
+  dir.write("cut.h5", whole.substr(0, whole.size() / 2));
+  for (const auto& [name, says] : {std::pair{"no.h5", "no.h5: cannot be read"},
+                                   {"", "is not a file"},
+                                   {"text.h5", "is not an HDF5 file"},
+                                   {"cut.h5", "cut short"}})
+    EXPECT_HAS(error_of([&, name = name] { h5::File::open(dir / name); }), says);
+  EXPECT_HAS(error_of([&] { h5::File::create(dir / "no/such/x.h5"); }), "cannot be written");
   const h5::File file = h5::File::open(path);
   EXPECT_EQ(error_of([&] { file.dataset("/bodies/x"); }),
             path + ":/bodies/x: is missing; give a file that has it");
-  EXPECT_EQ(error_of([&] {
-              file.dataset("/joints", {-1, 21, 3});
-            }),
+  const h5::Shape other = {-1, 21, 3};
+  EXPECT_EQ(error_of([&] { file.dataset("/joints", other); }),
             path +
                 ":/joints: is shaped [1, 22, 3] instead of [*, 21, 3]; store it as documented "
                 "(datasets/README.md)");
-  EXPECT_NE(error_of([&] { file.children("/joints"); }).find("is not a group"), std::string::npos);
+  EXPECT_HAS(error_of([&] { file.children("/joints"); }), "is not a group");
 }
 
-TEST(SchemaHdf5, ChecksumFindsDamagedValues) {
-  const TempDir dir;
-  const std::string path = dir / "x.h5";
+TEST_F(SchemaHdf5, ChecksumFindsDamagedValues) {
   std::vector<double> values(5000);
   for (size_t i = 0; i < values.size(); ++i) values[i] = std::sin(static_cast<double>(i) * 0.7);
-  {
-    h5::File file = h5::File::create(path);
-    file.write<double>("/x", {5000}, values);
-    file.commit();
-  }
-  std::string bytes = test::bytes_of(path);
+  const std::string path = write_one(dir / "x.h5", "/x", {5000}, values);
+  std::string bytes = bytes_of(path);
   bytes[bytes.size() / 2] ^= 1;  // the values are most of the file
-  test::write_bytes(path, bytes);
-  EXPECT_NE(
-      error_of([&] { h5::File::open(path).dataset("/x").read<double>(); }).find("/x: is damaged"),
-      std::string::npos);
+  write_bytes(path, bytes);
+  EXPECT_HAS(error_of([&] { h5::File::open(path).dataset("/x").read<double>(); }),
+             "/x: is damaged");
 }
 
 /// A file made with the bare library, as foreign programs do.
@@ -168,8 +155,7 @@ class RawFile {
   hid_t id_;
 };
 
-TEST(SchemaHdf5, RefusesClaimsThatTheFileCannotKeep) {
-  const TempDir dir;
+TEST_F(SchemaHdf5, RefusesClaimsThatTheFileCannotKeep) {
   const std::string path = dir / "claims.h5";
   {
     RawFile raw(path);
@@ -193,48 +179,40 @@ TEST(SchemaHdf5, RefusesClaimsThatTheFileCannotKeep) {
     H5Lcreate_soft("/nowhere", raw.id(), "/soft", H5P_DEFAULT, H5P_DEFAULT);
   }
   const h5::File file = h5::File::open(path);
-  const auto refusal = [&](const char* name) {
-    return error_of([&] { file.dataset(name).read<double>(); });
-  };
-  EXPECT_NE(refusal("/huge").find("far more than the file stores"), std::string::npos);
-  EXPECT_NE(refusal("/overflow").find("claims an impossible size"), std::string::npos);
-  EXPECT_NE(refusal("/hidden").find("claims an impossible size"), std::string::npos);
-  EXPECT_NE(refusal("/chunk").find("chunks of impossible size"), std::string::npos);
-  EXPECT_NE(refusal("/packed").find("compressed by filter 5"), std::string::npos);
-  EXPECT_NE(refusal("/compound").find("neither plain numbers nor text"), std::string::npos);
-  EXPECT_NE(error_of([&] { file.number("/", "bits"); }).find("neither plain numbers nor text"),
-            std::string::npos);
-  EXPECT_NE(refusal("/link").find("link into another file"), std::string::npos);
-  EXPECT_NE(refusal("/soft").find("is missing"), std::string::npos);
+  for (const auto& [name, says] : {std::pair{"/huge", "far more than the file stores"},
+                                   {"/overflow", "claims an impossible size"},
+                                   {"/hidden", "claims an impossible size"},
+                                   {"/chunk", "chunks of impossible size"},
+                                   {"/packed", "compressed by filter 5"},
+                                   {"/compound", "neither plain numbers nor text"},
+                                   {"/link", "link into another file"},
+                                   {"/soft", "is missing"}})
+    EXPECT_HAS(error_of([&, name = name] { file.dataset(name).read<double>(); }), says);
+  EXPECT_HAS(error_of([&] { file.number("/", "bits"); }), "neither plain numbers nor text");
   EXPECT_EQ(file.read<double>("/small", {4, 3}), std::vector<double>(12, 0.0));
 }
 
 /// The root group says that its names are nowhere: the first look for one is refused in order, and
 /// the second crashes the library. (libFuzzer's finding, cut down.)
-TEST(SchemaHdf5, AFileThatCannotBeWalkedToItsEndIsRefusedWhole) {
-  const TempDir dir;
+TEST_F(SchemaHdf5, AFileThatCannotBeWalkedToItsEndIsRefusedWhole) {
   const std::string path = dir / "old.h5";
-  test::write_old_layout(path);
+  write_old_layout(path);
   EXPECT_EQ(h5::File::open(path).children(), std::vector<std::string>{"joints"});
-  std::string bytes = test::bytes_of(path);
+  std::string bytes = bytes_of(path);
   ASSERT_EQ(bytes.substr(136, 4), "TREE") << "the library lays the file out in another way";
   bytes.replace(128, 8, 8, '\xff');  // the address of the names
   bytes[143] = '\xff';               // and how many there are
-  test::write_bytes(path, bytes);
-  EXPECT_NE(error_of([&] {
-              const h5::File file = h5::File::open(path);
-              for (int i = 0; i < 2; ++i) file.has("/joints");
-            }).find("damaged, cut short"),
-            std::string::npos);
+  write_bytes(path, bytes);
+  EXPECT_HAS(error_of([&] {
+               const h5::File file = h5::File::open(path);
+               for (int i = 0; i < 2; ++i) file.has("/joints");
+             }),
+             "damaged, cut short");
 }
 
 /// AddressSanitizer ends a process whose allocation fails.
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer)
-constexpr bool kEndsWithoutMemory = true;
-#else
-constexpr bool kEndsWithoutMemory = false;
-#endif
+#ifdef __has_feature
+constexpr bool kEndsWithoutMemory = __has_feature(address_sanitizer);
 #else
 constexpr bool kEndsWithoutMemory = false;
 #endif
@@ -266,8 +244,7 @@ std::string packed_zeros(uint32_t mebibytes) {
 
 /// 2 MB that unpack to 2 GiB, in one chunk, in the oldest and in the newest layout: the child that
 /// reads it first is stopped, and nobody else begins.
-TEST(SchemaHdf5, AFileThatFillsTheMemoryIsStoppedInItsChild) {
-  const TempDir dir;
+TEST_F(SchemaHdf5, AFileThatFillsTheMemoryIsStoppedInItsChild) {
   const std::string packed = packed_zeros(2048), path = dir / "bomb.h5";
   for (const bool newest : {false, true}) {
     const hid_t access = H5Pcreate(H5P_FILE_ACCESS), creation = H5Pcreate(H5P_DATASET_CREATE);
@@ -286,14 +263,11 @@ TEST(SchemaHdf5, AFileThatFillsTheMemoryIsStoppedInItsChild) {
     H5Pclose(creation);
     H5Pclose(access);
     const std::string refusal = error_of([&] { h5::File::open(path); });
-    EXPECT_NE(refusal.find(kEndsWithoutMemory ? "damaged" : "takes more than 1024 MiB to read"),
-              std::string::npos)
-        << refusal;
+    EXPECT_HAS(refusal, kEndsWithoutMemory ? "damaged" : "takes more than 1024 MiB to read");
   }
 }
 
-TEST(SchemaHdf5, ReadsForeignByteOrdersAndText) {
-  const TempDir dir;
+TEST_F(SchemaHdf5, ReadsForeignByteOrdersAndText) {
   const std::string path = dir / "foreign.h5";
   {
     RawFile raw(path);
@@ -326,46 +300,22 @@ TEST(SchemaHdf5, ReadsForeignByteOrdersAndText) {
   EXPECT_EQ(file.text("/", "kind"), "left_hip");
 }
 
-/// While it lives, files cannot grow beyond `bytes`: writing fails as on a full disk.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) : old_handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    getrlimit(RLIMIT_FSIZE, &old_);
-    const rlimit small{bytes, old_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &small);
-  }
-  ~FileSizeLimit() {
-    setrlimit(RLIMIT_FSIZE, &old_);
-    std::signal(SIGXFSZ, old_handler_);
-  }
-
- private:
-  rlimit old_{};
-  void (*old_handler_)(int);
-};
-
-TEST(SchemaHdf5, AFullDiskIsOneWorkErrorAndLeavesNothing) {
-  const TempDir dir;
+TEST_F(SchemaHdf5, AFullDiskIsOneWorkErrorAndLeavesNothing) {
   std::vector<double> noise(40000);
   for (size_t i = 0; i < noise.size(); ++i) noise[i] = std::sin(static_cast<double>(i * i) * 0.37);
   for (const rlim_t limit : {1000, 50000, 150000}) {
     const FileSizeLimit full(limit);
-    try {
+    const std::string said = error_of<WorkError>([&] {
       h5::File file = h5::File::create(dir / "x.h5");
       h5::Dataset set = file.create_appendable<double>("/rows", {40000});
       for (int i = 0; i < 4; ++i) set.append<double>(noise);
       file.commit();
-      ADD_FAILURE() << "written in spite of the limit";
-    } catch (const WorkError& error) {
-      EXPECT_NE(std::string(error.what()).find("x.h5: could not be written (File too large)"),
-                std::string::npos)
-          << error.what();
-    }
+    });
+    EXPECT_HAS(said, "x.h5: could not be written (File too large)");
   }
-  EXPECT_TRUE(test::names_in(dir.path()).empty());
-  h5::File after = h5::File::create(dir / "y.h5");  // the library is still usable
-  after.write<double>("/x", {40000}, noise);
-  after.commit();
+  EXPECT_TRUE(names_in(dir.path()).empty());
+  // The library is still usable.
+  write_one(dir / "y.h5", "/x", {40000}, noise);
   EXPECT_EQ(h5::File::open(dir / "y.h5").read<double>("/x", {-1}), noise);
 }
 

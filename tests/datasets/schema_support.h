@@ -1,9 +1,11 @@
-// Temporary folders and error texts for the tests of files.
+// Temporary folders, files and error texts: for all tests that read or write.
 #pragma once
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <algorithm>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -13,6 +15,14 @@
 #include "autograd/base/error.h"
 
 namespace restage::test {
+
+/// Writes a file, and the folders above it; its path.
+inline std::string write_bytes(const std::string& path, const std::string& content) {
+  std::filesystem::create_directories(std::filesystem::path(path).parent_path());
+  std::ofstream(path, std::ios::binary)
+      .write(content.data(), static_cast<std::streamsize>(content.size()));
+  return path;
+}
 
 /// A new folder that goes away with its content.
 class TempDir {
@@ -29,9 +39,18 @@ class TempDir {
   TempDir& operator=(const TempDir&) = delete;
   const std::string& path() const { return path_; }
   std::string operator/(const std::string& name) const { return path_ + "/" + name; }
+  std::string write(const std::string& name, const std::string& content) const {
+    return write_bytes(*this / name, content);
+  }
 
  private:
   std::string path_;
+};
+
+/// A test with a folder of its own.
+class FileTest : public ::testing::Test {
+ protected:
+  const TempDir dir;
 };
 
 inline std::string bytes_of(const std::string& path) {
@@ -39,11 +58,6 @@ inline std::string bytes_of(const std::string& path) {
   std::stringstream out;
   out << in.rdbuf();
   return out.str();
-}
-
-inline void write_bytes(const std::string& path, const std::string& content) {
-  std::ofstream(path, std::ios::binary)
-      .write(content.data(), static_cast<std::streamsize>(content.size()));
 }
 
 inline std::vector<std::string> names_in(const std::string& folder) {
@@ -54,21 +68,48 @@ inline std::vector<std::string> names_in(const std::string& folder) {
   return names;
 }
 
-/// The text of the InputError that `action` throws: one line of under 400 characters. Empty, and a
-/// test failure, if it throws none.
-template <class Action>
-std::string error_of(const Action& action) {
+/// While it lives, files cannot grow beyond `bytes`: writing fails as on a full disk.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) : old_handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &old_);
+    const rlimit small{bytes, old_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &small);
+  }
+  ~FileSizeLimit() {
+    setrlimit(RLIMIT_FSIZE, &old_);
+    std::signal(SIGXFSZ, old_handler_);
+  }
+
+ private:
+  rlimit old_{};
+  void (*old_handler_)(int);
+};
+
+/// What an error of class `Error` says that `action` throws: one line of under 400 characters that
+/// also says how to mend it. Empty if it throws none.
+template <class Error = InputError, class Action>
+std::string refusal_of(const Action& action) {
   try {
     action();
-  } catch (const InputError& error) {
+  } catch (const Error& error) {
     const std::string text = error.what();
     EXPECT_EQ(text.find('\n'), std::string::npos) << text;
     EXPECT_LT(text.size(), 390u) << text;
     EXPECT_NE(text.find("; "), std::string::npos) << text;
     return text;
   }
-  ADD_FAILURE() << "no InputError";
   return "";
 }
 
+/// The same of an action that must throw: it is a test failure if it does not.
+template <class Error = InputError, class Action>
+std::string error_of(const Action& action) {
+  const std::string text = refusal_of<Error>(action);
+  if (text.empty()) ADD_FAILURE() << "nothing is refused";
+  return text;
+}
+
 }  // namespace restage::test
+
+#define EXPECT_HAS(text, part) EXPECT_PRED_FORMAT2(::testing::IsSubstring, part, text)

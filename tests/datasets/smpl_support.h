@@ -109,7 +109,7 @@ struct TinyClip {
   int64_t frames = 121;
   double fps = 120;
   std::string rate_key = "mocap_framerate", gender = "female";
-  Betas betas{0.5, -1, 0.25, 2};
+  Betas betas = {0.5, -1, 0.25, 2};
   bool type = false;  ///< say surface_model_type
 
   int64_t width() const { return family == SmplFamily::smplx ? 165 : 156; }

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <cstring>
-#include <filesystem>
 #include <set>
 
 #include "autograd/base/atomic_file.h"
@@ -13,6 +11,7 @@
 #include "infer/render/page.h"
 #include "infer/render/rasteriser.h"
 #include "infer/render/sheet.h"
+#include "tests/datasets/schema_support.h"
 #include "tests/infer/toy_body.h"
 
 namespace restage {
@@ -25,7 +24,7 @@ std::vector<Clip> toy_clips(size_t frames = 12) {
       {"source cloud", {}, {}}, {"result", {}, body.rest.faces}, {"truth", {}, body.rest.faces}};
   for (size_t f = 0; f < frames; ++f) {
     const Points surface =
-        testing::toy_surface(body, testing::toy_pose(body, static_cast<double>(f) / 24));
+        linear_blend_skinning(body, testing::toy_pose(body, static_cast<double>(f) / 24));
     clips[0].frames.push_back(
         Points(surface.begin(), surface.end() - static_cast<std::ptrdiff_t>(10 * f)));
     clips[1].frames.push_back(surface);
@@ -121,20 +120,20 @@ TEST(Sheet, AnyNumbersAreDrawnWithoutHarm) {
   SheetOptions options;
   options.cell_height = 60;
   EXPECT_GT(contact_sheet({cloud, mesh}, options).width, 0);
-  EXPECT_NE(page_html({cloud, mesh}).find("</html>"), std::string::npos);
+  EXPECT_HAS(page_html({cloud, mesh}), "</html>");
   const Clip nothing{"all stray", {{{nan, nan, nan}}}, {}};
   EXPECT_GT(contact_sheet({nothing}, options).width, 0);
-  EXPECT_NE(page_html({nothing}).find("</html>"), std::string::npos);
+  EXPECT_HAS(page_html({nothing}), "</html>");
 }
 
 TEST(Sheet, BadClipsAreRefused) {
-  EXPECT_THROW(contact_sheet({}), InputError);
-  EXPECT_THROW(contact_sheet({{"empty", {}, {}}}), InputError);
-  EXPECT_THROW(contact_sheet({{"no points", {{}}, {}}}), InputError);
-  EXPECT_THROW(page_html({{"face", {{{0, 0, 0}}}, {{0, 1, 0}}}}), InputError);
-  EXPECT_THROW(page_html({{"count", {{{0, 0, 0}}, {{0, 0, 0}, {1, 1, 1}}}, {{0, 0, 0}}}}),
-               InputError);
-  EXPECT_THROW(page_html({{"nan", {{{std::nanf(""), 0, 0}}}, {{0, 0, 0}}}}), InputError);
+  for (const std::vector<Clip>& bad :
+       {std::vector<Clip>{}, {{"empty", {}, {}}}, {{"no points", {{}}, {}}}})
+    EXPECT_THROW(contact_sheet(bad), InputError);
+  for (const Clip& bad : {Clip{"face", {{{0, 0, 0}}}, {{0, 1, 0}}},
+                          {"count", {{{0, 0, 0}}, {{0, 0, 0}, {1, 1, 1}}}, {{0, 0, 0}}},
+                          {"nan", {{{std::nanf(""), 0, 0}}}, {{0, 0, 0}}}})
+    EXPECT_THROW(page_html({bad}), InputError) << bad.label;
 }
 
 TEST(Picture, PngIsWellFormedAndTextLeavesInk) {
@@ -169,8 +168,7 @@ TEST(Page, IsOneFileThatAsksForNothing) {
   for (const char* word : {"http:", "https:", "src=", "href=", "@import", "url(", "fetch(",
                            "import(", "XMLHttp", "WebSocket", "</script><b>"})
     EXPECT_EQ(page.find(word), std::string::npos) << word;
-  EXPECT_NE(page.find("walk &lt;onto&gt; &quot;another&quot; &amp; body @DATA@"),
-            std::string::npos);
+  EXPECT_HAS(page, "walk &lt;onto&gt; &quot;another&quot; &amp; body @DATA@");
   size_t frames = 0;
   for (const Points& points : clips[0].frames) frames += std::min<size_t>(points.size(), 2048);
   EXPECT_EQ(base64_of(page, "frames0").size(), (frames * 6 + 2) / 3 * 4);
@@ -188,7 +186,7 @@ TEST(Page, LongSequencesStayBelowTheLimit) {
     options.max_bytes = limit;
     const std::string page = page_html(clips, options);
     EXPECT_LE(page.size(), limit * 11 / 10 + 30000);
-    EXPECT_NE(page.find("Holds one frame in"), std::string::npos);
+    EXPECT_HAS(page, "Holds one frame in");
   }
   EXPECT_EQ(page_html(toy_clips(), {}).find("Holds one frame in"), std::string::npos);
 }

@@ -5,25 +5,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "nn/geometry/body.h"
+#include "tests/support/tiny_body.h"
 
 namespace restage::testing {
-
-inline Joints toy_joints() {
-  Joints j;
-  j[0] = {0, .95, 0};
-  j[3] = {0, 1.05, 0}, j[6] = {0, 1.17, 0}, j[9] = {0, 1.28, 0}, j[12] = {0, 1.45, 0};
-  j[15] = {0, 1.57, .02};
-  for (const int side : {0, 1}) {
-    const double s = side == 0 ? 1 : -1;
-    j[1 + side] = {s * .09, .88, 0}, j[4 + side] = {s * .1, .48, .01},
-          j[7 + side] = {s * .1, .08, 0};
-    j[10 + side] = {s * .1, .03, .13};
-    j[13 + side] = {s * .07, 1.37, 0}, j[16 + side] = {s * .18, 1.38, 0};
-    j[18 + side] = {s * .44, 1.38, 0}, j[20 + side] = {s * .68, 1.38, 0};
-  }
-  return j;
-}
 
 // Rings of `around` points along the bone, closed by its end points.
 inline void add_capsule(Mesh& mesh, const Vec3& a, const Vec3& b, double radius, int along,
@@ -59,7 +43,7 @@ inline void add_capsule(Mesh& mesh, const Vec3& a, const Vec3& b, double radius,
 inline Body toy_body(int along = 8, int around = 12) {
   Body body;
   body.id = "toy";
-  body.joints = toy_joints();
+  body.joints = tiny_joints();
   for (int j = 1; j < kJoints; ++j) {
     const double radius = j == 3 || j == 6 || j == 9 ? .14 : j == 15 ? .1 : j < 6 ? .08 : .05;
     add_capsule(body.rest, body.joints[kParents[j]], body.joints[j], radius, along, around);
@@ -94,20 +78,6 @@ inline Pose toy_pose(const Body& body, double phase) {
   pose.local[18] = turn(-.7, y), pose.local[19] = turn(.7, y);
   pose.root = body.joints[0] + Vec3(.3 * s, -.05, phase);
   return pose;
-}
-
-inline Points toy_surface(const Body& body, const Pose& pose) {
-  const PosedSkeleton posed = forward_kinematics(body.joints, pose);
-  Points out;
-  for (size_t v = 0; v < body.rest.vertices.size(); ++v) {
-    Vec3 sum = Vec3::Zero();
-    for (int j = 0; j < kJoints; ++j)
-      sum += double{body.weights(static_cast<Eigen::Index>(v), j)} *
-             (posed.joints[j] +
-              posed.global[j] * (body.rest.vertices[v].cast<double>() - body.joints[j]));
-    out.push_back(sum.cast<float>());
-  }
-  return out;
 }
 
 }  // namespace restage::testing

@@ -4,6 +4,8 @@
 
 #include <cstdlib>
 
+#include "tests/datasets/schema_support.h"
+
 namespace restage {
 namespace {
 
@@ -86,7 +88,7 @@ TEST(TrainProgress, BarRedrawsInPlaceAtMostTenTimesASecond) {
     progress.finish();
     progress.update(99);
   }
-  EXPECT_NE(screen.text.find(" 50% 50/100  took 0:02"), std::string::npos) << screen.text;
+  EXPECT_HAS(screen.text, " 50% 50/100  took 0:02");
 }
 
 TEST(TrainProgress, BarFitsAnyWidth) {
@@ -101,8 +103,8 @@ TEST(TrainProgress, BarFitsAnyWidth) {
     const std::string line = screen.text.substr(1, screen.text.size() - 4);
     EXPECT_LE(static_cast<int>(line.size()), std::max(columns - 1, 1)) << line;
     if (columns >= 60) {
-      EXPECT_NE(line.find("###"), std::string::npos) << line;
-      EXPECT_NE(line.find("100.0/s  ETA 0:05"), std::string::npos) << line;
+      EXPECT_HAS(line, "###");
+      EXPECT_HAS(line, "100.0/s  ETA 0:05");
     }
     if (columns == 200) {
       EXPECT_EQ(line,
@@ -120,8 +122,8 @@ TEST(TrainProgress, ColourOnlyWhenWanted) {
   Progress progress("x", 10, out);
   screen.time += 1;
   progress.update(5);
-  EXPECT_NE(screen.text.find("[\x1b[32m###"), std::string::npos) << screen.text;
-  EXPECT_NE(screen.text.find("#\x1b[0m-"), std::string::npos) << screen.text;
+  EXPECT_HAS(screen.text, "[\x1b[32m###");
+  EXPECT_HAS(screen.text, "#\x1b[0m-");
   ::setenv("NO_COLOR", "1", 1);
   EXPECT_FALSE(standard_progress().colour);
   ::unsetenv("NO_COLOR");

@@ -2,19 +2,18 @@
 
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
 
 #include "autograd/base/atomic_file.h"
-#include "autograd/base/error.h"
 #include "autograd/base/log.h"
 #include "autograd/base/rng.h"
+#include "tests/datasets/schema_support.h"
 #include "train/run_provenance.h"
 
 namespace restage {
@@ -23,48 +22,56 @@ namespace {
 namespace fs = std::filesystem;
 const std::vector<std::string> kStages = {"skeleton", "smrm", "deformation"};
 
-class TrainRun : public testing::Test {
+class TrainRun : public test::FileTest {
  protected:
-  void SetUp() override {
-    root = testing::TempDir() + "restage_run_" + std::to_string(::getpid());
-    fs::remove_all(root);
-    fs::create_directories(root);
-    set_log_level(LogLevel::quiet);
-  }
-  void TearDown() override {
-    set_log_level(LogLevel::info);
-    fs::remove_all(root);
-  }
+  TrainRun() { set_log_level(LogLevel::quiet); }
+  ~TrainRun() override { set_log_level(LogLevel::info); }
   RunDir make(const std::string& name = "a") {
     return RunDir::create_at(root + "/" + name, "steps: 1\n", "{}\n", kStages);
   }
-  std::vector<std::string> checkpoints(const std::string& dir) {
-    std::vector<std::string> names;
-    for (const auto& item : fs::directory_iterator(dir + "/checkpoints"))
-      names.push_back(
-          item.path().filename().string().substr(0, item.path().filename().string().rfind('-')));
-    std::sort(names.begin(), names.end());
+  /// Names without the checksum at their end.
+  std::vector<std::string> checkpoints(const std::string& run) {
+    std::vector<std::string> names = test::names_in(run + "/checkpoints");
+    for (std::string& name : names) name.resize(name.rfind('-'));
     return names;
   }
+  /// What is said against an action, without the folder; "" if nothing is.
   template <class F>
   std::string error(F&& f) {
-    try {
-      f();
-    } catch (const InputError& e) {
-      std::string what = e.what();
-      for (size_t at; (at = what.find(root + "/")) != std::string::npos;)
-        what.erase(at, root.size() + 1);
-      return what;
-    }
-    return "";
+    std::string what = test::refusal_of(f);
+    for (size_t at; (at = what.find(root + "/")) != std::string::npos;)
+      what.erase(at, root.size() + 1);
+    return what;
   }
-  std::string root;
+  const std::string root = dir.path();
 };
 
-void damage(const std::string& path) {
-  std::string bytes = read_file(path);
-  bytes[bytes.size() / 2] ^= 1;
-  std::ofstream(path, std::ios::binary) << bytes;
+/// A child that does `work`, which tells each act through the pipe; killed after `acts` acts and a
+/// little while. True if it had finished by itself.
+bool killed_child(uint64_t acts, unsigned delay_us, const std::function<void(int pipe)>& work) {
+  int ends[2];
+  if (::pipe(ends) != 0) throw std::runtime_error("pipe");
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::close(ends[0]);
+    try {
+      work(ends[1]);
+    } catch (...) {
+      ::_exit(4);
+    }
+    ::_exit(0);
+  }
+  ::close(ends[1]);
+  char act;
+  for (uint64_t i = 0; i < acts && ::read(ends[0], &act, 1) == 1; ++i) {
+  }
+  ::usleep(delay_us);
+  ::kill(child, SIGKILL);
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  ::close(ends[0]);
+  EXPECT_TRUE(WIFSIGNALED(status) || (WIFEXITED(status) && WEXITSTATUS(status) == 0)) << status;
+  return WIFEXITED(status);
 }
 
 TEST_F(TrainRun, CreateMakesWhatTheContractLists) {
@@ -77,9 +84,7 @@ TEST_F(TrainRun, CreateMakesWhatTheContractLists) {
     EXPECT_TRUE(fs::exists(a.dir() + "/" + name)) << name;
   EXPECT_EQ(read_file(run_config_path(a.dir())), "steps: 1\n");
   EXPECT_EQ(read_file(a.dir() + "/provenance.json"), "{\"x\": 1}\n");
-  int entries = 0;
-  for ([[maybe_unused]] const auto& item : fs::directory_iterator(root)) ++entries;
-  EXPECT_EQ(entries, 2) << "a draft was left behind";
+  EXPECT_EQ(test::names_in(root).size(), 2u) << "a draft was left behind";
   // roots are made when they are missing
   EXPECT_TRUE(fs::exists(RunDir::create(root + "/deep/er", "x", "", "", kStages).dir()));
 }
@@ -105,7 +110,7 @@ TEST_F(TrainRun, LogGoesIntoTheRun) {
   }
   log_info("not any more");
   const std::string log = read_file(root + "/a/log.txt");
-  EXPECT_NE(log.find("hello run\n"), std::string::npos);
+  EXPECT_HAS(log, "hello run\n");
   EXPECT_EQ(log.find("not any more"), std::string::npos);
 }
 
@@ -161,14 +166,15 @@ TEST_F(TrainRun, DamagedCheckpointsArePassedOver) {
     RunDir run = make();
     run.save_checkpoint("skeleton", 1, std::string(1000, 'a'));
     newest = run.save_checkpoint("skeleton", 2, std::string(1000, 'b'));
-    damage(newest);
-    std::ofstream(run.dir() + "/checkpoints/notes.txt") << "mine";
-    std::ofstream(run.dir() + "/checkpoints/foreign-1-0123456789abcdef.safetensors") << "mine";
-    std::ofstream(run.dir() + "/checkpoints/skeleton-9-xx.safetensors") << "mine";
+    std::string bytes = read_file(newest);
+    bytes[bytes.size() / 2] ^= 1;
+    test::write_bytes(newest, bytes);
+    for (const char* name :
+         {"notes.txt", "foreign-1-0123456789abcdef.safetensors", "skeleton-9-xx.safetensors"})
+      test::write_bytes(run.dir() + "/checkpoints/" + name, "mine");
     EXPECT_EQ(latest_checkpoint(run.dir(), kStages)->step, 1);
-    EXPECT_NE(read_file(run.dir() + "/log.txt")
-                  .find(newest + ": the checkpoint is damaged and passed over\n"),
-              std::string::npos);
+    EXPECT_HAS(read_file(run.dir() + "/log.txt"),
+               newest + ": the checkpoint is damaged and passed over\n");
   }
   RunDir run = RunDir::resume(root + "/a", kStages);
   const auto state = run.take_resumed();
@@ -195,9 +201,8 @@ TEST_F(TrainRun, ResumeCutsTheMetricsAtTheCheckpoint) {
     run.metrics("deformation", 1, {{"loss", 4}});
     const std::string text = read_file(run.dir() + "/metrics.jsonl");
     EXPECT_EQ(text.substr(0, text.find('\n')), "{\"step\":1,\"stage\":\"skeleton\",\"loss\":0.1}");
-    EXPECT_NE(
-        text.find("{\"step\":1,\"stage\":\"smrm\",\"loss\":0.001,\"odd \\\"name\\\"\\n\":null}\n"),
-        std::string::npos);
+    EXPECT_HAS(text,
+               "{\"step\":1,\"stage\":\"smrm\",\"loss\":0.001,\"odd \\\"name\\\"\\n\":null}\n");
   }
   std::ofstream(root + "/a/metrics.jsonl", std::ios::app)
       << "{\"step\":2,\"loss\":1}\nnoise\n[1]\n{\"step\":\"2\",\"stage\":\"smrm\"}\n{\"step\":2,"
@@ -229,25 +234,11 @@ TEST_F(TrainRun, FullDiskIsOneErrorAndLeavesNoHalves) {
   run.metrics("smrm", 1, {{"loss", 1}});
   run.save_checkpoint("smrm", 1, "good");
   const std::string metrics = read_file(run.dir() + "/metrics.jsonl");
-  rlimit old{};
-  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &old), 0);
-  const auto handler = ::signal(SIGXFSZ, SIG_IGN);
-  const rlimit tight{metrics.size() + 10, old.rlim_max};  // no file may grow beyond this
-  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &tight), 0);
-  int errors = 0;
-  try {
-    run.metrics("smrm", 2, {{"loss", 1}});
-  } catch (const WorkError&) {
-    ++errors;
+  {
+    const test::FileSizeLimit full(metrics.size() + 10);
+    EXPECT_THROW(run.metrics("smrm", 2, {{"loss", 1}}), WorkError);
+    EXPECT_THROW(run.save_checkpoint("smrm", 2, std::string(5000, 'x')), WorkError);
   }
-  try {
-    run.save_checkpoint("smrm", 2, std::string(5000, 'x'));
-  } catch (const WorkError&) {
-    ++errors;
-  }
-  ::setrlimit(RLIMIT_FSIZE, &old);
-  ::signal(SIGXFSZ, handler);
-  EXPECT_EQ(errors, 2);
   EXPECT_EQ(read_file(run.dir() + "/metrics.jsonl"), metrics);
   EXPECT_EQ(checkpoints(run.dir()), (std::vector<std::string>{"smrm-000000001"}));
   run.save_checkpoint("smrm", 2, "good again");
@@ -279,52 +270,31 @@ std::string payload(const std::string& stage, int64_t step) {
 
 constexpr int64_t kStepsPerStage = 60;
 
-/// Trains (resumes, writes metrics each step, a checkpoint every third) and tells each act through
-/// the pipe, until it is killed or done.
-[[noreturn]] void train_until_killed(const std::string& dir, int pipe) {
-  try {
-    RunDir run = RunDir::resume(dir, kStages);
-    const auto from = run.take_resumed();
-    bool skip = from.has_value();
-    for (const auto& stage : kStages) {
-      int64_t step = 0;
-      if (skip && stage != from->stage) continue;
-      if (skip) step = from->step;
-      skip = false;
-      while (++step <= kStepsPerStage) {
-        run.metrics(stage, step, {{"loss", 1.0 / static_cast<double>(step)}});
-        if (::write(pipe, "m", 1) != 1) ::_exit(3);
-        if (step % 3 != 0) continue;
-        run.save_checkpoint(stage, step, payload(stage, step));
-        if (::write(pipe, "c", 1) != 1) ::_exit(3);
-      }
+/// Trains: resumes, writes metrics each step, a checkpoint every third, and tells each act.
+void train(const std::string& dir, int pipe) {
+  const auto tell = [&](char act) {
+    if (::write(pipe, &act, 1) != 1) ::_exit(3);
+  };
+  RunDir run = RunDir::resume(dir, kStages);
+  const auto from = run.take_resumed();
+  bool skip = from.has_value();
+  for (const auto& stage : kStages) {
+    int64_t step = 0;
+    if (skip && stage != from->stage) continue;
+    if (skip) step = from->step;
+    skip = false;
+    while (++step <= kStepsPerStage) {
+      run.metrics(stage, step, {{"loss", 1.0 / static_cast<double>(step)}});
+      tell('m');
+      if (step % 3 != 0) continue;
+      run.save_checkpoint(stage, step, payload(stage, step));
+      tell('c');
     }
-    ::_exit(0);
-  } catch (...) {
-    ::_exit(4);
   }
 }
 
-/// Kills a child after `acts` acts and a little while; true if it had finished by itself.
 bool run_child(const std::string& dir, uint64_t acts, unsigned delay_us) {
-  int ends[2];
-  if (::pipe(ends) != 0) throw std::runtime_error("pipe");
-  const pid_t child = ::fork();
-  if (child == 0) {
-    ::close(ends[0]);
-    train_until_killed(dir, ends[1]);
-  }
-  ::close(ends[1]);
-  char act;
-  for (uint64_t i = 0; i < acts && ::read(ends[0], &act, 1) == 1; ++i) {
-  }
-  ::usleep(delay_us);
-  ::kill(child, SIGKILL);
-  int status = 0;
-  ::waitpid(child, &status, 0);
-  ::close(ends[0]);
-  EXPECT_TRUE(WIFSIGNALED(status) || (WIFEXITED(status) && WEXITSTATUS(status) == 0)) << status;
-  return WIFEXITED(status);
+  return killed_child(acts, delay_us, [&](int pipe) { train(dir, pipe); });
 }
 
 int64_t position(const std::optional<Checkpoint>& state) {
@@ -334,22 +304,21 @@ int64_t position(const std::optional<Checkpoint>& state) {
 }
 
 TEST_F(TrainRun, ResumesAfterSigkillAtAnyMoment) {
-  const std::string dir = root + "/a";
-  make();
+  const std::string run_dir = make().dir();
   Rng rng({3, 4});
   int64_t last = 0;
   int kills = 0;
   for (int round = 0; round < 20; ++round) {
-    const bool done = run_child(dir, rng.below(20), static_cast<unsigned>(rng.below(3000)));
+    const bool done = run_child(run_dir, rng.below(20), static_cast<unsigned>(rng.below(3000)));
     kills += done ? 0 : 1;
-    RunDir run = RunDir::resume(dir, kStages);
+    RunDir run = RunDir::resume(run_dir, kStages);
     const auto state = run.take_resumed();
     ASSERT_GE(position(state), last) << "progress was lost";
     last = position(state);
     if (state) {
       ASSERT_EQ(state->bytes, payload(state->stage, state->step));
     }
-    std::ifstream file(dir + "/metrics.jsonl");
+    std::ifstream file(run_dir + "/metrics.jsonl");
     int64_t lines = 0;
     for (std::string line; std::getline(file, line); ++lines) {
       const auto json = nlohmann::json::parse(line);
@@ -360,44 +329,27 @@ TEST_F(TrainRun, ResumesAfterSigkillAtAnyMoment) {
   }
   EXPECT_GE(kills, 10);
   EXPECT_GE(last, 20);
-  EXPECT_TRUE(run_child(dir, ~0ull, 0)) << "nothing is left in the way of the end";
-  EXPECT_EQ(position(latest_checkpoint(dir, kStages)), 3 * kStepsPerStage);
+  EXPECT_TRUE(run_child(run_dir, ~0ull, 0)) << "nothing is left in the way of the end";
+  EXPECT_EQ(position(latest_checkpoint(run_dir, kStages)), 3 * kStepsPerStage);
   for (const auto& stage : kStages)
-    EXPECT_EQ(latest_checkpoint(dir, {stage})->bytes, payload(stage, kStepsPerStage));
+    EXPECT_EQ(latest_checkpoint(run_dir, {stage})->bytes, payload(stage, kStepsPerStage));
 }
 
 TEST_F(TrainRun, CreationIsWholeOrNotAtAll) {
   Rng rng({5, 6});
   for (int round = 0; round < 10; ++round) {
-    int ends[2];
-    ASSERT_EQ(::pipe(ends), 0);
-    const pid_t child = ::fork();
-    if (child == 0) {
-      for (;;) {
-        try {
-          RunDir::create(root, "k", "steps: 1\n", "{}\n", kStages);
-        } catch (...) {
-          ::_exit(4);
-        }
-        if (::write(ends[1], "r", 1) != 1) ::_exit(3);
-      }
-    }
-    ::close(ends[1]);
-    char made;
-    for (uint64_t i = rng.below(4); i > 0 && ::read(ends[0], &made, 1) == 1; --i) {
-    }
-    ::usleep(static_cast<unsigned>(rng.below(2000)));
-    ::kill(child, SIGKILL);
-    int status = 0;
-    ::waitpid(child, &status, 0);
-    ::close(ends[0]);
-    EXPECT_TRUE(WIFSIGNALED(status));
+    const bool done =
+        killed_child(rng.below(4), static_cast<unsigned>(rng.below(2000)), [&](int pipe) {
+          do RunDir::create(root, "k", "steps: 1\n", "{}\n", kStages);
+          while (::write(pipe, "r", 1) == 1);
+        });
+    EXPECT_FALSE(done);
   }
   int runs = 0;
-  for (const auto& item : fs::directory_iterator(root)) {
-    if (item.path().filename().string()[0] == '.') continue;
-    EXPECT_EQ(error([&] { RunDir::resume(item.path().string(), kStages); }), "");
-    EXPECT_EQ(read_file(item.path().string() + "/provenance.json"), "{}\n");
+  for (const std::string& name : test::names_in(root)) {
+    if (name[0] == '.') continue;
+    EXPECT_EQ(error([&] { RunDir::resume(root + "/" + name, kStages); }), "");
+    EXPECT_EQ(read_file(root + "/" + name + "/provenance.json"), "{}\n");
     ++runs;
   }
   EXPECT_GT(runs, 5);
