@@ -16,9 +16,6 @@ namespace restage::sweep {
 
 using Json = nlohmann::ordered_json;
 
-/// Raised whenever the same configuration gives other results than before: part of every id.
-inline constexpr int kBehaviour = 1;
-
 /// What one stage leaves. `id`: first 12 hex digits of a SHA-256 (experiments.md, "Words").
 struct StageArtifact {
   std::string stage, id;
@@ -59,13 +56,13 @@ struct TrialOutcome {
   Json metrics = Json::object();  ///< {set: {"mean": {...}, "sequences": [{"name", ...}]}}
 };
 
-/// Trains what is missing and evaluates. `id`: InputError if the trial is another one by now, since
-/// its data changed. `folder`: of the trial, for what it needs on the way. May be called again after
-/// an interruption and goes on where it was. Throws Interrupted after a checkpoint if a signal came
-/// (the caller has a StopScope).
+/// Trains what is missing in the store and evaluates. `id`: InputError if the trial is another one by
+/// now, since its data changed. `last_stage`: makes the artifacts up to that stage and no more. May be
+/// called again after an interruption and goes on where it was. Throws Interrupted after a checkpoint
+/// if a signal came (the caller has a StopScope).
 TrialOutcome run_trial(const std::string& config_yaml_path, const std::string& id,
-                       const Evaluate& evaluate, const std::string& store,
-                       const std::string& folder, bool quiet);
+                       const Evaluate& evaluate, const std::string& store, bool quiet,
+                       const std::string& last_stage = "");
 
 /// What a few steps of a stage cost.
 struct Measured {
