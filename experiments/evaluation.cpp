@@ -40,17 +40,6 @@ void add(const Predicted& p, const Sequence& s, metrics::Evaluation* into) {
   into->sequences.push_back(metrics::evaluate({&view, 1}).sequences[0]);
 }
 
-void finish(metrics::Evaluation* e) {
-  const size_t columns = metrics::table().size();
-  for (size_t m = 0; m < columns; ++m) {
-    double total = 0;
-    int count = 0;
-    for (const metrics::Values& row : e->sequences)
-      if (row[m]) total += *row[m], ++count;
-    e->mean.push_back(count > 0 ? metrics::Value(total / count) : std::nullopt);
-  }
-}
-
 /// The rows that need no learning. Their surfaces use the model's skinning, since they have none.
 void add_references(const Sequence& s, const Retargeter& target, SystemScores* scores) {
   Predicted rest, unchanged, closed;
@@ -202,8 +191,8 @@ SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weigh
     }
   }
   for (auto& [name, scores] : out.conditions) {
-    finish(&scores.model);
-    for (auto& reference : scores.references) finish(&reference.second);
+    metrics::average(&scores.model);
+    for (auto& reference : scores.references) metrics::average(&reference.second);
   }
   judge_extractor(weights, corpus, options.clouds, &out);
   return out;

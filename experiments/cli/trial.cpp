@@ -9,7 +9,7 @@ namespace restage::cli {
 
 void add_trial(Program& program) {
   struct Options {
-    std::string dir, id;
+    std::string dir, id, stage;
   };
   const auto options = std::make_shared<Options>();
   CLI::App& app = program.add(
@@ -18,6 +18,14 @@ void add_trial(Program& program) {
       "restage trial runs/smoothness 4f2a90c1d3e5 --threads 4",
       [options, &program] {
         const Common& common = program.common();
+        if (!options->stage.empty()) {
+          sweep::perform_stage(options->dir, options->id, options->stage, common.quiet);
+          if (common.json)
+            print_json({{"id", options->id}, {"stage", options->stage}});
+          else
+            print("stage " + options->stage + " of trial " + options->id + " is in the store\n");
+          return 0;
+        }
         const bool fresh = sweep::perform_trial(options->dir, options->id, common.quiet);
         if (common.json)
           print_json({{"id", options->id}, {"state", "done"}});
@@ -27,6 +35,7 @@ void add_trial(Program& program) {
       });
   app.add_option("DIR", options->dir, "folder of 'restage sweep plan --out'")->required();
   app.add_option("ID", options->id, "of the trial")->required();
+  app.add_option("--stage", options->stage, "make only the artifacts up to this stage");
 }
 
 }  // namespace restage::cli

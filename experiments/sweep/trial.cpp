@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <filesystem>
@@ -47,6 +48,19 @@ std::string busy(const std::string& id, const std::optional<LeaseHolder>& holder
 
 }  // namespace
 
+void perform_stage(const std::string& path, const std::string& id, const std::string& stage,
+                   bool quiet) {
+  const SweepDir dir = enter(path);
+  const auto& artifacts = dir.trial(id).artifacts;
+  const bool known = std::any_of(artifacts.begin(), artifacts.end(),
+                                 [&](const auto& entry) { return entry.first == stage; });
+  if (!known)
+    throw InputError("", "trial " + id + " trains no stage '" + stage + "'",
+                     "name one of its artifacts in plan.json");
+  const StopScope stop;
+  run_trial(dir.folder(id) + "/config.yaml", id, dir.evaluate, dir.store, quiet, stage);
+}
+
 bool perform_trial(const std::string& path, const std::string& id, bool quiet) {
   const SweepDir dir = enter(path);
   const TrialEntry& trial = dir.trial(id);
@@ -82,8 +96,7 @@ bool perform_trial(const std::string& path, const std::string& id, bool quiet) {
   };
   try {
     log_info("trial " + id + ", seed " + std::to_string(trial.seed));
-    outcome = run_trial(dir.folder(id) + "/config.yaml", id, dir.evaluate, dir.store,
-                        dir.folder(id), quiet);
+    outcome = run_trial(dir.folder(id) + "/config.yaml", id, dir.evaluate, dir.store, quiet);
     finish("done", "");
     lease->forget();
     return true;

@@ -15,4 +15,9 @@ namespace restage::sweep {
 /// was done before.
 bool perform_trial(const std::string& dir, const std::string& id, bool quiet);
 
+/// Makes the trial's artifacts up to that stage, and no result: for engines that run stages which
+/// several trials share as jobs of their own.
+void perform_stage(const std::string& dir, const std::string& id, const std::string& stage,
+                   bool quiet);
+
 }  // namespace restage::sweep

@@ -275,6 +275,22 @@ void check_pair(const Track& pred, const Track& truth, const char* what, size_t 
 std::span<const Metric> table() { return kTable; }
 std::span<const Metric> variants() { return kVariants; }
 
+void average(Evaluation* evaluation) {
+  evaluation->mean.clear();
+  const size_t columns =
+      evaluation->sequences.empty() ? table().size() : evaluation->sequences[0].size();
+  for (size_t m = 0; m < columns; ++m) {
+    double sum = 0;
+    int count = 0;
+    for (const Values& values : evaluation->sequences)
+      if (values[m]) {
+        sum += *values[m];
+        ++count;
+      }
+    evaluation->mean.push_back(count > 0 ? finite(sum / count) : std::nullopt);
+  }
+}
+
 Evaluation evaluate(std::span<const SequenceView> sequences, std::span<const Metric> metrics) {
   Evaluation out;
   for (const SequenceView& s : sequences) {
@@ -283,16 +299,8 @@ Evaluation evaluate(std::span<const SequenceView> sequences, std::span<const Met
     Values& values = out.sequences.emplace_back();
     for (const Metric& metric : metrics) values.push_back(metric.compute(s));
   }
-  for (size_t m = 0; m < metrics.size(); ++m) {
-    double sum = 0;
-    int count = 0;
-    for (const Values& values : out.sequences)
-      if (values[m]) {
-        sum += *values[m];
-        ++count;
-      }
-    out.mean.push_back(count > 0 ? finite(sum / count) : std::nullopt);
-  }
+  average(&out);
+  if (sequences.empty()) out.mean.assign(metrics.size(), std::nullopt);
   return out;
 }
 

@@ -107,6 +107,9 @@ struct Evaluation {
   Values mean;  ///< over the sequences that have a value, equal weight each
 };
 
+/// Fills `mean` from `sequences`.
+void average(Evaluation* evaluation);
+
 /// Computes all metrics of a table for every sequence. Same bits for any number of threads.
 /// Throws WorkError if prediction and truth of a sequence differ in shape.
 Evaluation evaluate(std::span<const SequenceView> sequences,

@@ -80,6 +80,14 @@ std::unique_ptr<Module> make_model(const std::string& name, const AnyConfig& con
   return module;
 }
 
+AnyConfig model_config(const std::string& name, const std::vector<std::string>& sizes) {
+  AnyConfig out = model_type(name).config;
+  ConfigNode tree = write_config(out);
+  for (const std::string& size : sizes) apply_override(tree, size);
+  read_config(tree, out);
+  return out;
+}
+
 std::vector<std::string> models_of_role(const std::string& role) {
   std::vector<std::string> out;
   for (const ModelType& type : models())

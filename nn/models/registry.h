@@ -25,6 +25,8 @@ const ModelType& model_type(const std::string& name);
 /// `config` as model_type(name).config, perhaps changed.
 std::unique_ptr<Module> make_model(const std::string& name, const AnyConfig& config,
                                    const Init& init);
+/// The sizes of a model with some changed, each "name=value". InputError if it has no such size.
+AnyConfig model_config(const std::string& name, const std::vector<std::string>& sizes = {});
 /// The names of the models of a role.
 std::vector<std::string> models_of_role(const std::string& role);
 

@@ -106,7 +106,8 @@ void add_older_settings(const Json& metadata, const std::string& where, Bundle* 
   }
 }
 
-/// A network may only be as large as the numbers in the file that are to fill it.
+/// A network may only be about as large as the numbers in the file that are to fill it; a little
+/// larger, so that the tensors that do not fit can be named.
 int64_t numbers_below(const TensorFile& file, const std::string& prefix) {
   int64_t out = 0;
   for (const auto& [name, tensor] : file.tensors)
@@ -117,7 +118,7 @@ int64_t numbers_below(const TensorFile& file, const std::string& prefix) {
 std::shared_ptr<Module> filled(const std::string& name, const AnyConfig& config,
                                const TensorFile& file, const std::string& prefix,
                                const std::string& where) {
-  int64_t budget = numbers_below(file, prefix);
+  int64_t budget = 4 * numbers_below(file, prefix) + 4096;
   Init init;
   init.budget = &budget;
   std::shared_ptr<Module> net;
@@ -257,7 +258,7 @@ TrainedModel import_model(const std::string& name, const std::vector<std::string
       text == state.metadata.end() ? Json() : Json::parse(text->second, nullptr, false);
   out.config = sizes_of(type, object_at(json, "sizes"), where);
   out.settings = settings_of(object_at(json, "settings"), where);
-  ConfigNode tree = write_config(out.config);
+  ConfigNode tree = write_config(out.config);  // what the file says, then what the caller says
   for (const std::string& size : sizes) apply_override(tree, size);
   read_config(tree, out.config);
   out.net = filled(name, out.config, state, "", where);

@@ -13,6 +13,7 @@
 #include "infer/writers/bvh.h"
 #include "infer/writers/glb.h"
 #include "tests/fuzz/targets.h"
+#include "tests/support/small_models.h"
 
 namespace restage::fuzz {
 namespace {
@@ -24,26 +25,8 @@ int way_of(const std::string& bytes, int ways) {
 }
 
 /// Untrained networks, as small as they can be.
-const ModelSet& tiny_models() {
-  static const ModelSet models = [] {
-    const Init init{RngKey{5, 0}, DType::f32};
-    ModelSizes motion, extractor;
-    motion.hidden = 8;
-    extractor.points = 64;
-    extractor.width = 16;
-    extractor.layers = 1;
-    extractor.centres = 16;
-    extractor.neighbours = 4;
-    ModelSet out;
-    const auto put = [&](const std::string& name, const ModelSizes& sizes) {
-      put_model(&out, name, sizes, make_model(name, sizes, init.sub(name)));
-    };
-    put("skeleton/patch_transformer", extractor);
-    put("smrm/rot6d", motion);
-    put("deformation/weights", {});
-    put("deformation/offsets", {});
-    return out;
-  }();
+const Bundle& tiny_models() {
+  static const Bundle models = testing::untrained_bundle("smrm/rot6d", {"hidden=8"});
   return models;
 }
 
@@ -100,7 +83,7 @@ void import_file(const std::string& bytes) {
 void extract(const std::string& bytes) {
   const Mesh mesh = parse_mesh(bytes, "x.obj");
   for (const Vec3& joint :
-       extract_joints(*tiny_models().skeleton, mesh.vertices, "x.obj", {1, 0}, 2))
+       extract_joints(tiny_models().need_as<SkeletonModel>("skeleton", "w"), mesh.vertices, "x.obj", {1, 0}, 2))
     if (!joint.allFinite()) throw std::logic_error("a joint is not finite");
 }
 
@@ -112,7 +95,7 @@ void retarget(const std::string& bytes) {
     check_target(mesh, "x.obj");
     check_source({{mesh.vertices, {}}}, "x.obj");
   }
-  Retargeter system(tiny_models(), mesh, "x.obj", options);
+  Retargeter system(tiny_models(), "w", mesh, "x.obj", options);
   GlbWriter glb(file_of("", "out.glb"), mesh, system.rest(), system.weights());
   BvhWriter bvh(file_of("", "out.bvh"), system.rest());
   for (const float size : {1.0f, 1.01f}) {

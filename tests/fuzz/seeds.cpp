@@ -11,6 +11,7 @@
 #include "datasets/schema.h"
 #include "experiments/cli/benchmark_config.h"
 #include "nn/weights/bundle.h"
+#include "tests/support/small_models.h"
 #include "tests/datasets/gltf_maker.h"
 #include "tests/datasets/importers_bvh_text.h"
 #include "tests/datasets/schema_support.h"
@@ -311,11 +312,9 @@ Seeds safetensors_seeds() {
   plain.tensors["empty"] = Tensor::zeros({0, 4});
   plain.tensors["index"] = Tensor::from<int64_t>({1}, {int64_t{1} << 40});
   plain.metadata["note"] = "line\n\"quoted\"";
-  ModelSizes sizes;
-  sizes.hidden = 2;
-  ModelSet models;
-  put_model(&models, "smrm/rot6d", sizes,
-            make_model("smrm/rot6d", sizes, Init{{7, 1}, DType::f32}));
+  Bundle models;
+  models.put("motion",
+             testing::untrained_model("smrm/rot6d", {"hidden=2"}, Init{{7, 1}, DType::f32}));
   const std::string half = R"({"h":{"dtype":"F16","shape":[2],"data_offsets":[0,4]},)"
                            R"("b":{"dtype":"BF16","shape":[2,1],"data_offsets":[4,8]}})";
   return {{"plain", safetensors_bytes(plain)},

@@ -71,8 +71,8 @@ bool same_bits(const Tensor& a, const Tensor& b) {
   return a.to_vector<float>() == b.to_vector<float>();
 }
 
-std::unique_ptr<Mlp3> net(int64_t width = kMlpWidth) {
-  return make_offset_net(Init{RngKey{7, 0}, DType::f32}, width);
+std::unique_ptr<OffsetNet> net(int64_t width = MlpConfig().width) {
+  return std::make_unique<OffsetNet>(MlpConfig{width, 0.2}, Init{RngKey{7, 0}, DType::f32});
 }
 
 void fill(Parameter& p, double value) { p.value = Tensor::full(p.value.shape(), value); }
@@ -114,11 +114,11 @@ TEST(InferDeformer, EqualsThePlainNetworkForAnyWidth) {
 }
 
 TEST(InferDeformer, EqualsTheTrainedNetwork) {
-  const ModelSet models =
-      load_models(std::string(RESTAGE_SOURCE_DIR) + "/experiments/weights/lite.safetensors", {});
+  const Bundle models =
+      load_bundle(std::string(RESTAGE_SOURCE_DIR) + "/experiments/weights/lite.safetensors");
   const Surface s = surface(5000);
-  const Deformer deformer(s.points, s.weights, models.offsets.net.get());
-  const Tensor expected = reference(s, models.offsets.net.get());
+  const Deformer deformer(s.points, s.weights, models.find_as<OffsetNet>("deformation.offsets"));
+  const Tensor expected = reference(s, models.find_as<OffsetNet>("deformation.offsets"));
   EXPECT_LT(apart(deformer(s.pose, s.bones), expected), 2e-6);
   EXPECT_LT(apart(deformer(s.pose, s.bones, true), expected), 2e-6);
   EXPECT_GT(deformer.active_share(s.pose), 0.005);
@@ -178,8 +178,8 @@ TEST(InferDeformer, BitsDoNotDependOnThreads) {
 TEST(InferDeformer, BitsAreTheSameOnAllVectorSets) {
   const auto sets = testing::vector_sets();
   if (sets.size() < 2) GTEST_SKIP() << "this processor has fewer than two vector sets";
-  const ModelSet models =
-      load_models(std::string(RESTAGE_SOURCE_DIR) + "/experiments/weights/lite.safetensors", {});
+  const Bundle models =
+      load_bundle(std::string(RESTAGE_SOURCE_DIR) + "/experiments/weights/lite.safetensors");
   const auto some = net(), odd = net(33), all = net();
   const Surface any = surface(1000), everywhere = with_all_units_active(all.get());
   const auto expect_same = [&](const Surface& s, const Mlp3* offsets, double least_share) {
@@ -194,7 +194,7 @@ TEST(InferDeformer, BitsAreTheSameOnAllVectorSets) {
       for (size_t i = 1; i < sets.size(); ++i) EXPECT_TRUE(same_bits(with(sets[i]), first));
     }
   };
-  expect_same(any, models.offsets.net.get(), 0.005);
+  expect_same(any, models.find_as<OffsetNet>("deformation.offsets"), 0.005);
   expect_same(any, some.get(), 0.005);
   expect_same(any, odd.get(), 0.005);
   expect_same(everywhere, all.get(), 1);  // every unit of every tile
@@ -211,13 +211,14 @@ TEST(InferDeformer, NaNDoesNotVanish) {
 
 TEST(InferDeformer, RefusesWhatDoesNotFit) {
   const Surface s = surface(10);
-  const auto offsets = net(), skinning = make_weight_net(Init{RngKey{7, 0}, DType::f32});
-  EXPECT_THROW(Deformer(s.points, s.weights, skinning.get()), ShapeError);
+  const auto offsets = net();
+  const WeightNet skinning(MlpConfig(), Init{RngKey{7, 0}, DType::f32});
+  EXPECT_THROW(Deformer(s.points, s.weights, &skinning.net), ShapeError);
   EXPECT_THROW(Deformer(s.points, s.weights.rows(0, 9), offsets.get()), ShapeError);
   EXPECT_THROW(Deformer(s.weights, s.weights, offsets.get()), ShapeError);
   EXPECT_THROW(Deformer(s.points.cast(DType::f64), s.weights, offsets.get()), ShapeError);
-  const auto wide = make_offset_net(Init{RngKey{7, 0}, DType::f64});
-  EXPECT_THROW(Deformer(s.points, s.weights, wide.get()), ShapeError);
+  const OffsetNet wide(MlpConfig(), Init{RngKey{7, 0}, DType::f64});
+  EXPECT_THROW(Deformer(s.points, s.weights, &wide), ShapeError);
   const Deformer deformer(s.points, s.weights, offsets.get());
   EXPECT_THROW(deformer(random({1, 65}, "p", 1), s.bones), ShapeError);
   EXPECT_THROW(deformer(s.pose, random({21, 3, 4}, "b", 1)), ShapeError);

@@ -14,15 +14,14 @@ namespace {
 
 using testing::tiny_body;
 
-std::unique_ptr<SkeletonModel> small(const std::string& name) {
-  ModelSizes sizes;
-  sizes.points = 96;
-  sizes.width = 32;
-  sizes.layers = 1;
-  sizes.centres = 24;
-  sizes.neighbours = 8;
-  if (name == "skeleton/pointnet") sizes = {}, sizes.points = 96;
-  return make_skeleton_model(name, sizes, Init{RngKey{1, 0}, DType::f32});
+std::shared_ptr<SkeletonModel> small(const std::string& name) {
+  std::vector<std::string> sizes = {"points=96"};
+  if (name != "skeleton/pointnet") {
+    sizes.insert(sizes.end(), {"width=32", "layers=1", "neighbours=8"});
+    if (name == "skeleton/patch_transformer") sizes.push_back("centres=24");
+  }
+  return make_model_as<SkeletonModel>(name, model_config(name, sizes),
+                                      Init{RngKey{1, 0}, DType::f32});
 }
 
 Points cloud(size_t n, uint64_t seed = 1) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "autograd/ops/elementwise.h"
+#include "tests/support/small_models.h"
 #include "tests/support/tiny_body.h"
 
 namespace restage {
@@ -33,25 +34,7 @@ struct FixedExtractor final : SkeletonModel {
   const char* kind() const override { return "Fixed"; }
 };
 
-/// Untrained networks, small where they can be.
-ModelSet untrained(const std::string& smrm = "smrm/rot6d") {
-  const Init init{RngKey{5, 0}, DType::f32};
-  ModelSizes sizes;
-  sizes.hidden = 32;
-  ModelSet set;
-  put_model(&set, smrm, sizes, make_model(smrm, sizes, init.sub("smrm")));
-  put_model(&set, "deformation/weights", {}, make_model("deformation/weights", {}, init.sub("w")));
-  put_model(&set, "deformation/offsets", {}, make_model("deformation/offsets", {}, init.sub("o")));
-  ModelSizes extractor;
-  extractor.points = 64;
-  extractor.width = 16;
-  extractor.layers = 1;
-  extractor.centres = 16;
-  extractor.neighbours = 4;
-  put_model(&set, "skeleton/patch_transformer", extractor,
-            make_model("skeleton/patch_transformer", extractor, init.sub("s")));
-  return set;
-}
+Bundle untrained(const std::string& smrm = "smrm/rot6d") { return testing::untrained_bundle(smrm); }
 
 std::vector<Joints> performance(size_t frames) {
   const Motion motion = tiny_motion("m", "s", "test", frames);
@@ -89,7 +72,7 @@ double apart(const Points& a, const Points& b) {
 }
 
 /// The whole sequence in one forward pass of the network, velocities in the world's directions.
-std::vector<Pose> whole_sequence(const ModelSet& models, const std::vector<Joints>& source) {
+std::vector<Pose> whole_sequence(const Bundle& models, const std::vector<Joints>& source) {
   const auto frames = static_cast<int64_t>(source.size());
   Tensor joints = Tensor::zeros({1, frames, kJoints, 3}), trans = Tensor::zeros({1, frames, 3});
   Tensor rest = Tensor::zeros({1, kJoints, 3});
@@ -107,8 +90,9 @@ std::vector<Pose> whole_sequence(const ModelSet& models, const std::vector<Joint
       rest.data<float>()[3 * j + c] =
           static_cast<float>(target().joints[j][c] - target().joints[0][c]);
   Context ctx;
-  SmrmState state;
-  const SmrmOutput out = (*models.smrm)(ctx, Var(joints), Var(trans), Var(rest), &state);
+  MotionState state;
+  const MotionOutput out = models.need_as<MotionModel>("motion", "test")
+                               .forward(ctx, Var(joints), Var(trans), Var(rest), &state);
   std::vector<Pose> poses(source.size());
   Vec3 root = leg_length(target().joints) / leg_length(source[0]) * source[0][0];
   for (size_t f = 0; f < source.size(); ++f) {
@@ -125,9 +109,9 @@ std::vector<Pose> whole_sequence(const ModelSet& models, const std::vector<Joint
 
 TEST(InferRetargeter, FrameByFrameEqualsTheWholeSequence) {
   for (const std::string name : {"smrm/rot6d", "smrm/quaternion"}) {
-    const ModelSet models = untrained(name);
+    const Bundle models = untrained(name);
     const std::vector<Joints> source = performance(40);
-    Retargeter r(models, target().rest, target().joints, {.anchor = 0});
+    Retargeter r(models, "w", target().rest, target().joints, {.anchor = 0});
     const std::vector<RetargetedFrame> online = run(r, source);
     const std::vector<Pose> whole = whole_sequence(models, source);
     ASSERT_EQ(online.size(), whole.size());
@@ -146,11 +130,11 @@ TEST(InferRetargeter, FrameByFrameEqualsTheWholeSequence) {
 }
 
 TEST(InferRetargeter, TheAnchorBoundsDriftAndLeavesThePoseAlone) {
-  const ModelSet models = untrained();
+  const Bundle models = untrained();
   const std::vector<Joints> source = performance(120);
   const double scale = leg_length(target().joints) / leg_length(source[0]), seconds = 0.25;
-  Retargeter summed(models, target().rest, target().joints, {.anchor = 0});
-  Retargeter anchored(models, target().rest, target().joints, {.anchor = seconds});
+  Retargeter summed(models, "w", target().rest, target().joints, {.anchor = 0});
+  Retargeter anchored(models, "w", target().rest, target().joints, {.anchor = seconds});
   const std::vector<RetargetedFrame> far = run(summed, source), near = run(anchored, source);
   const auto off = [&](const RetargetedFrame& frame, size_t f) {
     return Vec3(frame.pose.root - scale * source[f][0]);
@@ -169,12 +153,12 @@ TEST(InferRetargeter, TheAnchorBoundsDriftAndLeavesThePoseAlone) {
 }
 
 TEST(InferRetargeter, LegsThatSeemToGrowMoveNobodyWhoIsFarAway) {
-  const ModelSet models = untrained();
+  const Bundle models = untrained();
   const auto way = [&](double away) {  // of B in two seconds, A growing by 2 %
     std::vector<Joints> source(60, performance(1)[0]);
     for (size_t f = 0; f < source.size(); ++f)
       for (Vec3& x : source[f]) x = (1 + 0.02 * static_cast<double>(f) / 60) * x + Vec3(away, 0, 0);
-    Retargeter r(models, target().rest, target().joints, {});
+    Retargeter r(models, "w", target().rest, target().joints, {});
     const std::vector<RetargetedFrame> out = run(r, source);
     return Vec3(out.back().pose.root - out.front().pose.root);
   };
@@ -182,9 +166,9 @@ TEST(InferRetargeter, LegsThatSeemToGrowMoveNobodyWhoIsFarAway) {
 }
 
 TEST(InferRetargeter, RestartForgetsEverything) {
-  const ModelSet models = untrained();
+  const Bundle models = untrained();
   const std::vector<Joints> source = performance(12);
-  Retargeter r(models, target().rest, target().joints, {});
+  Retargeter r(models, "w", target().rest, target().joints, {});
   const std::vector<RetargetedFrame> first = run(r, source);
   r.restart();
   const std::vector<RetargetedFrame> again = run(r, source);
@@ -196,9 +180,9 @@ TEST(InferRetargeter, RestartForgetsEverything) {
 }
 
 TEST(InferRetargeter, MemoryDoesNotGrowWithTheFrames) {
-  const ModelSet models = untrained();
+  const Bundle models = untrained();
   const std::vector<Joints> source = performance(100);
-  Retargeter r(models, target().rest, target().joints, {});
+  Retargeter r(models, "w", target().rest, target().joints, {});
   for (int i = 0; i < 5; ++i) r.push_joints(source[0]);
   reset_peak_memory();
   for (int i = 0; i < 5; ++i) r.push_joints(source[1]);
@@ -211,12 +195,12 @@ TEST(InferRetargeter, MemoryDoesNotGrowWithTheFrames) {
 }
 
 TEST(InferRetargeter, FramesOfOtherRatesFallOnTheThirtyPerSecondGrid) {
-  const ModelSet models = untrained();
+  const Bundle models = untrained();
   const std::vector<Joints> source = performance(40);
   const auto frames = [&](double fps, size_t n) {
     RetargetOptions options;
     options.fps = fps;
-    Retargeter r(models, target().rest, target().joints, options);
+    Retargeter r(models, "w", target().rest, target().joints, options);
     return run(r, {source.begin(), source.begin() + static_cast<std::ptrdiff_t>(n)});
   };
   EXPECT_EQ(frames(30, 40).size(), 40u);
@@ -235,7 +219,7 @@ TEST(InferRetargeter, FramesOfOtherRatesFallOnTheThirtyPerSecondGrid) {
     for (size_t j = 0; j < kJoints; ++j) middle[j] = (source[f][j] + source[f + 1][j]) / 2;
     if (f < 19) doubled.push_back(middle);
   }
-  Retargeter plain(models, target().rest, target().joints, {});
+  Retargeter plain(models, "w", target().rest, target().joints, {});
   const auto from60 = frames(60, 40), direct = run(plain, half);
   plain.restart();
   const auto from15 = frames(15, 20), midpoints = run(plain, doubled);
@@ -246,19 +230,19 @@ TEST(InferRetargeter, FramesOfOtherRatesFallOnTheThirtyPerSecondGrid) {
 }
 
 TEST(InferRetargeter, VerticesKeepTheTargetsOrder) {
-  const ModelSet models = untrained();
+  const Bundle models = untrained();
   const std::vector<Joints> source = performance(3);
   Mesh turned = target().rest;
   std::reverse(turned.vertices.begin(), turned.vertices.end());
   const auto n = static_cast<int>(turned.vertices.size());
   for (Triangle& t : turned.faces)
     for (int& i : t) i = n - 1 - i;
-  Retargeter a(models, target().rest, target().joints, {}), b(models, turned, target().joints, {});
+  Retargeter a(models, "w", target().rest, target().joints, {}), b(models, "w", turned, target().joints, {});
   EXPECT_EQ(b.target().faces, turned.faces);
-  ASSERT_EQ(a.weights().rows(), n);
+  ASSERT_EQ(a.rig()->weights.rows(), n);
   for (int i = 0; i < n; ++i) {
-    EXPECT_NEAR(a.weights().row(i).sum(), 1.0f, 1e-5f);
-    EXPECT_LT((a.weights().row(i) - b.weights().row(n - 1 - i)).cwiseAbs().maxCoeff(), 1e-5f);
+    EXPECT_NEAR(a.rig()->weights.row(i).sum(), 1.0f, 1e-5f);
+    EXPECT_LT((a.rig()->weights.row(i) - b.rig()->weights.row(n - 1 - i)).cwiseAbs().maxCoeff(), 1e-5f);
   }
   for (const Joints& j : source) {
     const Points x = a.push_joints(j)[0].vertices;
@@ -269,13 +253,13 @@ TEST(InferRetargeter, VerticesKeepTheTargetsOrder) {
 }
 
 TEST(InferRetargeter, TargetsAwayFromTheOriginAreTheSame) {
-  const ModelSet models = untrained();
+  const Bundle models = untrained();
   const std::vector<Joints> source = performance(4);
   Mesh moved = target().rest;
   for (Point& p : moved.vertices) p += Point(2, 0.5f, -3);
   Joints rest = target().joints;
   for (Vec3& j : rest) j += Vec3(2, 0.5, -3);
-  Retargeter a(models, target().rest, target().joints, {}), b(models, moved, rest, {});
+  Retargeter a(models, "w", target().rest, target().joints, {}), b(models, "w", moved, rest, {});
   for (const Joints& j : source) {
     const RetargetedFrame x = a.push_joints(j)[0], y = b.push_joints(j)[0];
     EXPECT_LT(apart(x.joints, y.joints), 1e-4);
@@ -283,18 +267,35 @@ TEST(InferRetargeter, TargetsAwayFromTheOriginAreTheSame) {
   }
 }
 
+TEST(InferRetargeter, UnknownSettingsAreRefused) {
+  const Bundle models = testing::with_setting(untrained(), "motion", "translation", "sideways");
+  EXPECT_THROW(Retargeter(models, "w", target().rest, target().joints, {}), InputError);
+}
+
+/// The skeleton moves without a surface, for who has trained no deformation.
+TEST(InferRetargeter, WithoutDeformationThereAreJointsOnly) {
+  Bundle models = untrained();
+  models.erase("deformation.weights");
+  Retargeter r(models, "w", target().rest, target().joints, {});
+  const auto frames = run(r, performance(2));
+  EXPECT_TRUE(frames[1].vertices.empty());
+  EXPECT_EQ(r.rig(), nullptr);
+  models.erase("motion");
+  EXPECT_THROW(Retargeter(models, "w", target().rest, target().joints, {}), InputError);
+}
+
 TEST(InferRetargeter, RestPoseIsTheTargetItselfWithoutOffsets) {
-  ModelSet models = untrained();
-  models.offsets.net.reset();
-  const Retargeter r(models, target().rest, target().joints, {});
+  Bundle models = untrained();
+  models.erase("deformation.offsets");
+  const Retargeter r(models, "w", target().rest, target().joints, {});
   Pose pose;
   for (Mat3& m : pose.local) m.setIdentity();
   pose.root = target().joints[0];
-  EXPECT_LT(apart(r.pose_vertices(pose), target().rest.vertices), 1e-5);
+  EXPECT_LT(apart((*r.surface())(pose), target().rest.vertices), 1e-5);
   pose.root += Vec3(1, 2, 3);
   Points there = target().rest.vertices;
   for (Point& p : there) p += Point(1, 2, 3);
-  EXPECT_LT(apart(r.pose_vertices(pose), there), 1e-5);
+  EXPECT_LT(apart((*r.surface())(pose), there), 1e-5);
 }
 
 /// Every meaning of the translation starts B at A's place in proportion to its legs, or says where
@@ -306,10 +307,10 @@ TEST(InferRetargeter, TranslationsMeanWhatTheWeightsSay) {
   for (Joints& joints : elsewhere)
     for (Vec3& j : joints) j += step;
   for (const std::string kind : {"velocity", "relative", "absolute"}) {
-    ModelSet models = untrained();
-    models.extra["translation"] = kind;
-    Retargeter a(models, target().rest, target().joints, {}),
-        b(models, target().rest, target().joints, {});
+    const Bundle models =
+        testing::with_setting(untrained(), "motion", "translation", kind);
+    Retargeter a(models, "w", target().rest, target().joints, {}),
+        b(models, "w", target().rest, target().joints, {});
     const auto x = run(a, source), y = run(b, elsewhere);
     const double ratio = leg_length(target().joints) / leg_length(source[0]);
     if (kind == "velocity") {
@@ -330,15 +331,15 @@ TEST(InferRetargeter, TranslationsMeanWhatTheWeightsSay) {
 }
 
 TEST(InferRetargeter, WithoutHeadingTheResultTurnsWithTheSource) {
-  ModelSet models = untrained();
-  models.extra["remove_heading"] = "true";
+  Bundle models = untrained();
+  models = testing::with_setting(models, "motion", "remove_heading", "true");
   const std::vector<Joints> source = performance(8);
   std::vector<Joints> turned = source;
   const Mat3 turn = turn_about_y(1.1);
   for (Joints& joints : turned)
     for (Vec3& j : joints) j = turn * j;
-  Retargeter a(models, target().rest, target().joints, {}),
-      b(models, target().rest, target().joints, {});
+  Retargeter a(models, "w", target().rest, target().joints, {}),
+      b(models, "w", target().rest, target().joints, {});
   const auto x = run(a, source), y = run(b, turned);
   for (size_t f = 0; f < x.size(); ++f) {
     Joints expected = x[f].joints;
@@ -347,11 +348,13 @@ TEST(InferRetargeter, WithoutHeadingTheResultTurnsWithTheSource) {
   }
 }
 
-ModelSet with_extractor(const Joints& joints) {
-  ModelSet models = untrained();
+Bundle with_extractor(const Joints& joints) {
+  Bundle models = untrained();
   auto fixed = std::make_unique<FixedExtractor>();
   fixed->joints = joints;
-  models.skeleton.net = std::move(fixed);
+  TrainedModel model = models.need("skeleton", "test");
+  model.net = std::move(fixed);
+  models.put("skeleton", std::move(model));
   return models;
 }
 
@@ -374,10 +377,10 @@ TEST(InferRetargeter, TargetsThatAreNoTPose) {
   RetargetOptions force;
   force.force = true;
   const auto refused = [&](const Joints& joints) {
-    const ModelSet models = with_extractor(joints);
-    EXPECT_NO_THROW(Retargeter(models, target().rest, "hero.obj", force));
+    const Bundle models = with_extractor(joints);
+    EXPECT_NO_THROW(Retargeter(models, "w", target().rest, "hero.obj", force));
     try {
-      const Retargeter r(models, target().rest, "hero.obj", {});
+      const Retargeter r(models, "w", target().rest, "hero.obj", {});
     } catch (const InputError& e) {
       EXPECT_EQ(std::string(e.what()).rfind("hero.obj: is not in T-pose", 0), 0u) << e.what();
       EXPECT_NE(std::string(e.what()).find("--force"), std::string::npos) << e.what();
@@ -400,25 +403,25 @@ TEST(InferRetargeter, TargetsThatAreNoTPose) {
 }
 
 TEST(InferRetargeter, WhatCannotBeAnsweredIsSaid) {
-  const ModelSet models = untrained();
+  const Bundle models = untrained();
   for (const double fps : {0.0, -30.0, 0.01, 1e9, std::nan("")}) {
     RetargetOptions options;
     options.fps = fps;
-    EXPECT_THROW(Retargeter(models, target().rest, target().joints, options), InputError) << fps;
+    EXPECT_THROW(Retargeter(models, "w", target().rest, target().joints, options), InputError) << fps;
   }
-  Retargeter r(models, target().rest, target().joints, {});
+  Retargeter r(models, "w", target().rest, target().joints, {});
   Joints huge = tiny_joints();
   for (Vec3& j : huge) j *= 1e60;
   EXPECT_THROW(r.push_joints(huge), InputError);
 }
 
 TEST(InferRetargeter, CloudsGoThroughTheExtractor) {
-  ModelSet models = untrained();
+  Bundle models = untrained();
   RetargetOptions options;
   options.force = true;
   options.samples = 2;
-  Retargeter a(models, target().rest, "hero.obj", options),
-      b(models, target().rest, "hero.obj", options);
+  Retargeter a(models, "w", target().rest, "hero.obj", options),
+      b(models, "w", target().rest, "hero.obj", options);
   EXPECT_EQ(a.rest(), b.rest());
   for (uint64_t f = 0; f < 4; ++f) {
     Points cloud = surface_points(target().rest, 300 + 20 * f, RngKey{f, 0});
@@ -429,7 +432,7 @@ TEST(InferRetargeter, CloudsGoThroughTheExtractor) {
     EXPECT_EQ(x[0].joints, y[0].joints);
     EXPECT_EQ(x[0].vertices, y[0].vertices);
     EXPECT_EQ(x[0].vertices.size(), target().rest.vertices.size());
-    EXPECT_EQ(a.source_joints(), b.source_joints());
+    EXPECT_EQ(*a.source_joints(), *b.source_joints());
   }
   EXPECT_THROW(a.push(Points(3, Point(0, 0, 0)), "f1.ply"), InputError);
 }

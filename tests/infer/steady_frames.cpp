@@ -9,6 +9,7 @@
 
 #include "autograd/base/parallel.h"
 #include "infer/retargeter.h"
+#include "tests/support/small_models.h"
 #include "tests/support/tiny_body.h"
 
 namespace {
@@ -35,26 +36,6 @@ int posix_memalign(void** p, size_t a, size_t n) {
 
 namespace restage {
 namespace {
-
-ModelSet small_models() {
-  const Init init{RngKey{5, 0}, DType::f32};
-  ModelSizes motion, extractor;
-  motion.hidden = 32;
-  extractor.points = 64;
-  extractor.width = 16;
-  extractor.layers = 2;
-  extractor.centres = 16;
-  extractor.neighbours = 4;
-  ModelSet set;
-  const auto put = [&](const char* name, const ModelSizes& sizes) {
-    put_model(&set, name, sizes, make_model(name, sizes, init.sub(name)));
-  };
-  put("smrm/rot6d", motion);
-  put("deformation/weights", {});
-  put("deformation/offsets", {});
-  put("skeleton/patch_transformer", extractor);
-  return set;
-}
 
 int64_t resident_pages() {
   std::FILE* file = std::fopen("/proc/self/statm", "r");
@@ -90,11 +71,11 @@ TEST(Counting, SeesTheHeap) {
 }
 
 TEST_P(SteadyFrames, TakeNothingFromTheHeapAndDoNotGrow) {
-  const ModelSet models = small_models();
+  const Bundle models = testing::untrained_bundle("smrm/rot6d", {"hidden=32"}, 2);
   const Body target = testing::tiny_body("b", "test", 1.1, 1.2);
   RetargetOptions options;
   options.samples = 2;
-  Retargeter r(models, target.rest, target.joints, options);
+  Retargeter r(models, "w", target.rest, target.joints, options);
   const std::vector<Points> source = clouds();
   const std::string name = "frame";
   double moved = 0;

@@ -15,8 +15,8 @@ using gradcheck::random;
 
 TEST(Mlp3, SharesWhatIsTheSameForAllPointsOfASample) {
   for (const int64_t n : {1, 3, 80}) {  // the last has more samples than numbers to a vector
-    auto net = make_weight_net(Init{RngKey{4, 0}, DType::f64}, 16);
-    name_scopes(*net, "weights");
+    WeightNet model({16, 0.2}, Init{RngKey{4, 0}, DType::f64});
+    const Mlp3* net = &model.net;
     const Tensor vector = random({n, 3 * kJoints}, 1), points = random({n, 5, 3}, 2);
     std::vector<Gradients> gradients;
     std::vector<Tensor> values;
@@ -35,7 +35,7 @@ TEST(Mlp3, SharesWhatIsTheSameForAllPointsOfASample) {
     };
     expect_near(values[0], values[1]);
     std::vector<uint64_t> ids = {1000001, 1000002};
-    for (const Parameter* parameter : parameters_of(*net)) ids.push_back(parameter->id);
+    for (const Parameter* parameter : parameters_of(model)) ids.push_back(parameter->id);
     for (const uint64_t id : ids) {
       ASSERT_TRUE(gradients[0].find(id) && gradients[1].find(id));
       expect_near(*gradients[0].find(id), *gradients[1].find(id));

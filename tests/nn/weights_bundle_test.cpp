@@ -2,37 +2,34 @@
 #include <gtest/gtest.h>
 
 #include "nn/weights/bundle.h"
+#include "nn/models/deformation.h"
+#include "nn/models/skeleton.h"
+#include "nn/models/smrm.h"
 #include "nn/weights/state.h"
+#include "tests/support/small_models.h"
 
 namespace restage {
 namespace {
 
-ModelSet small_set() {
-  ModelSizes extractor, motion;
-  extractor.points = 64;
-  extractor.width = 16;
-  extractor.layers = 1;
-  extractor.centres = 8;
-  extractor.neighbours = 4;
-  motion.hidden = 8;
-  motion.standardise = true;
+Bundle small_set() {
   const Init init{{7, 1}, DType::f32};
-  ModelSet set;
-  put_model(&set, "skeleton/patch_transformer", extractor,
-            make_model("skeleton/patch_transformer", extractor, init));
-  put_model(&set, "smrm/rot6d", motion, make_model("smrm/rot6d", motion, init));
-  put_model(&set, "deformation/weights", {}, make_model("deformation/weights", {}, init));
-  put_model(&set, "deformation/offsets", {}, make_model("deformation/offsets", {}, init));
-  set.extra["translation"] = "velocity";
-  set.smrm->joint_mean = Tensor::full({66}, 0.5);
+  Bundle set;
+  const auto put = [&](const std::string& name, const std::vector<std::string>& sizes,
+                       Settings settings = {}) {
+    set.put(model_type(name).role, testing::untrained_model(name, sizes, init, settings));
+  };
+  put("skeleton/patch_transformer",
+      {"points=64", "width=16", "layers=1", "centres=8", "neighbours=4"});
+  put("smrm/rot6d", {"hidden=8", "standardise=true"}, {{"translation", "velocity"}});
+  put("deformation/weights", {});
+  put("deformation/offsets", {}, {{"keep_root_rotation", "false"}});
+  set.find_as<Smrm>("motion")->joint_mean = Tensor::full({66}, 0.5);
   return set;
 }
 
-constexpr NeededModels kAll{true, true, true};
-
-void expect_bad(const TensorFile& file, const std::string& part, const NeededModels& needs = kAll) {
+void expect_bad(const TensorFile& file, const std::string& part) {
   try {
-    models_of(file, needs, "w.safetensors");
+    bundle_of(file, "w.safetensors");
     ADD_FAILURE() << "accepted, expected: " << part;
   } catch (const InputError& e) {
     const std::string what = e.what();
@@ -53,33 +50,60 @@ TensorFile edited(const std::string& from, const std::string& to) {
 }
 
 TEST(WeightsBundle, EverythingComesBack) {
-  const ModelSet set = small_set();
+  const Bundle set = small_set();
   const TensorFile file = to_file(set);
   for (const char* name : {"skeleton.vote.weight", "smrm.enc.weight_ih_l0", "smrm.joint_mean",
                            "deformation.weights.fc1.weight", "deformation.offsets.fc3.bias"})
     EXPECT_NE(file.find(name), nullptr) << name;
-  const std::string path = testing::TempDir() + "restage_bundle.safetensors";
-  save_models(path, set);
-  const ModelSet back = load_models(path, kAll);
+  const std::string path = ::testing::TempDir() + "restage_bundle.safetensors";
+  save_bundle(path, set);
+  const Bundle back = load_bundle(path);
   EXPECT_EQ(safetensors_bytes(to_file(back)), safetensors_bytes(file));
-  EXPECT_EQ(back.skeleton.name, "skeleton/patch_transformer");
-  EXPECT_EQ(back.skeleton->points(), 64);
-  EXPECT_EQ(back.smrm->config.hidden, 8);
-  EXPECT_EQ(back.extra.at("translation"), "velocity");
-  EXPECT_EQ(back.smrm->joint_mean.item(3), 0.5);
-  EXPECT_FALSE(back.root);
-  EXPECT_EQ(back.smrm.sizes.dropout, 0.2);  // the default, written out
+  EXPECT_EQ(back.need("skeleton", "w").model, "skeleton/patch_transformer");
+  EXPECT_EQ(back.find_as<SkeletonModel>("skeleton")->points(), 64);
+  const Smrm& motion = back.need_as<Smrm>("motion", "w");
+  EXPECT_EQ(motion.config.hidden, 8);
+  EXPECT_EQ(motion.config.dropout, 0.2);  // the default, written out
+  EXPECT_EQ(motion.joint_mean.item(3), 0.5);
+  EXPECT_EQ(back.need("motion", "w").setting("translation", {"absolute", "velocity"}), "velocity");
+  EXPECT_EQ(back.find("deformation.root"), nullptr);
 }
 
-TEST(WeightsBundle, MissingStagesAreNamedIfNeeded) {
-  ModelSet set = small_set();
-  set.smrm = {};
-  const TensorFile file = to_file(set);
-  EXPECT_TRUE(models_of(file, {true, false, true}, "w").skeleton);
-  expect_bad(file, "no model for smrm");
-  ModelSet no_offsets = small_set();
-  no_offsets.offsets = {};
-  EXPECT_TRUE(models_of(to_file(no_offsets), kAll, "w").weights);
+TEST(WeightsBundle, RolesAreFoundAsWhatTheyAreUsedFor) {
+  Bundle set = small_set();
+  EXPECT_NE(set.find_as<DeformationModel>("deformation.weights"), nullptr);
+  EXPECT_EQ(set.find_as<MotionModel>("skeleton"), nullptr);
+  EXPECT_THROW(set.need_as<MotionModel>("skeleton", "w"), InputError);
+  EXPECT_THROW(set.put("motion", set.need("skeleton", "w")), InputError);
+  set.erase("motion");
+  EXPECT_EQ(testing::message_of([&] { set.need("motion", "w.safetensors"); })
+                .find("w.safetensors: holds no model for smrm"),
+            0u);
+}
+
+TEST(WeightsBundle, SettingsAreKnownOrRefused) {
+  const TrainedModel motion = small_set().need("motion", "w");
+  EXPECT_EQ(motion.setting("remove_heading", {"false", "true"}), "false");  // the first, if unsaid
+  EXPECT_THROW(motion.setting("translation", {"absolute", "relative"}), InputError);
+  TensorFile file = to_file(small_set());
+  std::string& text = file.metadata["restage"];
+  text.replace(text.find("\"velocity\""), 10, "7");
+  expect_bad(file, "that is no text");
+}
+
+/// Files of version 0.1.0 kept the settings of all models together.
+TEST(WeightsBundle, OlderFilesAreUnderstood) {
+  TensorFile file = to_file(small_set());
+  std::string& text = file.metadata["restage"];
+  const std::string now = R"(,"settings":{"translation":"velocity"})";
+  ASSERT_NE(text.find(now), std::string::npos) << text;
+  text.erase(text.find(now), now.size());
+  text.insert(text.size() - 1, R"(,"extra":{"translation":"relative","remove_heading":"true"})");
+  const TrainedModel motion = bundle_of(file, "w").need("motion", "w");
+  EXPECT_EQ(motion.settings.at("translation"), "relative");
+  EXPECT_EQ(motion.settings.at("remove_heading"), "true");
+  text.insert(text.rfind("}}"), R"(,"gravity":"9.81")");
+  expect_bad(file, "'gravity' of no model");
 }
 
 TEST(WeightsBundle, FilesFromElsewhereAreRefused) {
@@ -98,10 +122,10 @@ TEST(WeightsBundle, WrongModelsSizesAndTensorsAreRefused) {
   expect_bad(edited("skeleton/patch_transformer", "smrm/rot6d"), "no model for skeleton");
   expect_bad(edited("skeleton/patch_transformer", "skeleton/unheard_of"), "no model for skeleton");
   expect_bad(edited("\"hidden\":8", "\"hidden\":9"), "does not fit smrm/rot6d");
-  expect_bad(edited("\"hidden\":8", "\"hidden\":2000000000"), "cannot fill");
-  expect_bad(edited("\"hidden\":8", "\"hidden\":4611686018427387904"), "cannot fill");
-  expect_bad(edited("\"hidden\":8", "\"hidden\":\"x\""), "no proper size");
-  expect_bad(edited("\"layers\":1", "\"layers\":100000000"), "cannot fill");
+  expect_bad(edited("\"hidden\":8", "\"hidden\":2000000000"), "whole number");
+  expect_bad(edited("\"hidden\":8", "\"hidden\":4611686018427387904"), "whole number");
+  expect_bad(edited("\"hidden\":8", "\"hidden\":\"x\""), "whole number");
+  expect_bad(edited("\"layers\":1", "\"layers\":100000000"), "whole number");
   TensorFile file = to_file(small_set());
   file.tensors["stray"] = Tensor::zeros({1});
   expect_bad(file, "belong to no model");
@@ -111,35 +135,38 @@ TEST(WeightsBundle, WrongModelsSizesAndTensorsAreRefused) {
 }
 
 TEST(WeightsBundle, SingleModelsGoOutAndIn) {
-  const ModelSet set = small_set();
+  const Bundle set = small_set();
   const TensorFile alone = export_model(set, "smrm", "w");
   EXPECT_NE(alone.find("enc.weight_ih_l0"), nullptr);
-  ModelSet other;
-  import_model(&other, "smrm/rot6d", exported_sizes(alone, "w"), alone, "w");
+  EXPECT_EQ(safetensors_bytes(export_model(set, "motion", "w")), safetensors_bytes(alone));
+  Bundle other;
+  other.put("motion", import_model("smrm/rot6d", {}, alone, "w"));
+  EXPECT_EQ(other.need("motion", "w").settings, set.need("motion", "w").settings);
   EXPECT_EQ(safetensors_bytes(export_model(other, "smrm/rot6d", "w")), safetensors_bytes(alone));
   EXPECT_THROW(export_model(set, "discriminator", "w"), InputError);
-  EXPECT_THROW(import_model(&other, "smrm/rot7d", {}, alone, "w"), InputError);
-  EXPECT_THROW(import_model(&other, "smrm/quaternion", {}, alone, "w"), StateError);
+  EXPECT_THROW(import_model("smrm/rot7d", {}, alone, "w"), InputError);
+  EXPECT_THROW(import_model("smrm/quaternion", {}, alone, "w"), StateError);
   for (const std::string name :
        {"smrm/discriminator", "deformation/v1_field", "deformation/root"}) {
-    const auto net = make_model(name, {}, Init{});
-    import_model(&other, name, {}, to_file(*net), "w");
-    EXPECT_EQ(to_file(models_of(to_file(other), {}, "w")).tensors.size(),
+    const auto net = make_model(name, model_config(name), Init{});
+    other.put(model_type(name).role, import_model(name, {}, to_file(*net), "w"));
+    EXPECT_EQ(to_file(bundle_of(to_file(other), "w")).tensors.size(),
               to_file(other).tensors.size());
   }
 }
 
 TEST(WeightsBundle, SizesAreSetByName) {
-  ModelSizes s;
-  set_size(&s, "hidden", "256");
-  set_size(&s, "standardise", "true");
-  set_size(&s, "dropout", "0.1");
+  const auto config = [](const std::vector<std::string>& sizes) {
+    return model_config("smrm/rot6d", sizes).as<SmrmConfig>();
+  };
+  const SmrmConfig s = config({"hidden=256", "standardise=true", "dropout=0.1"});
   EXPECT_EQ(s.hidden, 256);
   EXPECT_TRUE(s.standardise);
   EXPECT_EQ(s.dropout, 0.1);
-  EXPECT_THROW(set_size(&s, "hiden", "256"), InputError);
-  EXPECT_THROW(set_size(&s, "hidden", "many"), InputError);
-  EXPECT_THROW(set_size(&s, "hidden", "true"), InputError);
+  EXPECT_THROW(config({"hiden=256"}), InputError);
+  EXPECT_THROW(config({"hidden=many"}), InputError);
+  EXPECT_THROW(config({"hidden=true"}), InputError);
+  EXPECT_THROW(config({"centres=8"}), InputError);  // of another model
 }
 
 }  // namespace

@@ -130,7 +130,7 @@ class FullSize : public testing::TestWithParam<DType> {
     }
   }
   std::unique_ptr<Module> make(const std::string& name) const {
-    auto model = make_model(name, {}, Init{});
+    auto model = make_model(name, model_config(name), Init{});
     hash_init(*model, type());
     return model;
   }
@@ -149,9 +149,9 @@ TEST_P(FullSize, Extractors) {
 TEST_P(FullSize, Smrm) {
   for (const std::string form : {"6d", "quat"}) {
     auto model = make(form == "6d" ? "smrm/rot6d" : "smrm/quaternion");
-    SmrmState state;
-    const SmrmOutput y = dynamic_cast<Smrm&>(*model)(ctx, in(inputs.joints), in(inputs.trans),
-                                                     in(inputs.rest), &state);
+    MotionState state;
+    const MotionOutput y = dynamic_cast<MotionModel&>(*model).forward(
+        ctx, in(inputs.joints), in(inputs.trans), in(inputs.rest), &state);
     expect("smrm_" + form + "_joints", y.joints);
     expect("smrm_" + form + "_trans", y.trans);
     expect("smrm_" + form + "_raw", y.raw);
@@ -163,11 +163,15 @@ TEST_P(FullSize, DeformationAndDiscriminator) {
     auto model = make("deformation/" + name);
     return dynamic_cast<Mlp3&>(*model)(ctx, x);
   };
+  const auto skinning = [&](const std::string& name, const Var& joints, const Var& at) {
+    auto model = make("deformation/" + name);
+    return dynamic_cast<DeformationModel&>(*model).weights(ctx, joints, at);
+  };
   const Tensor rest = in(inputs.rest), points = in(inputs.points);
-  expect("w_net", run("weights", join_points(rest.reshape({1, 66}), points)));
+  expect("w_net", skinning("weights", rest, points));
   expect("o_net", run("offsets", join_points(in(inputs.axis_angle), points)));
   expect("third_mlp", run("root", rest.reshape({1, 66})));
-  expect("v1_field", run("v1_field", joint_differences(points, rest)));
+  expect("v1_field", skinning("v1_field", rest, points));
   auto model = make("smrm/discriminator");
   expect("discriminator", dynamic_cast<Discriminator&>(*model)(ctx, in(hash_fill({2, 29, 69}, 906)),
                                                                in(hash_fill({2, 63}, 907))));
@@ -192,7 +196,7 @@ TEST(FullSizeModels, ParametersStandInTheOraclesOrder) {
     std::istringstream words(golden("full_size").metadata.at("order." + key));
     std::vector<std::string> want, got;
     for (std::string word; words >> word;) want.push_back(word);
-    auto model = make_model(name, {}, Init{});
+    auto model = make_model(name, model_config(name), Init{});
     for (const StateEntry& e : state_of(*model))
       if (e.parameter != nullptr) got.push_back(e.name);
     EXPECT_EQ(got, want) << name;
@@ -210,7 +214,7 @@ TEST(FullSizeModels, ParameterCounts) {
                                                  {"deformation/root", 83715},
                                                  {"deformation/v1_field", 88598}};
   for (const auto& [name, count] : counts)
-    EXPECT_EQ(count_parameters(*make_model(name, {}, Init{})), count) << name;
+    EXPECT_EQ(count_parameters(*make_model(name, model_config(name), Init{})), count) << name;
 }
 
 struct Vector7 : Module {

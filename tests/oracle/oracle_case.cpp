@@ -255,14 +255,15 @@ std::unique_ptr<Discriminator> make_discriminator(const Case& c, const std::stri
 void smrm(Case& c) {
   const auto net = make_smrm(c, "");
   c.load(*net);
-  SmrmState state;
-  const SmrmOutput y = (*net)(c.ctx(), c.in("joints"), c.in("trans"), c.in("tpose"), &state);
+  MotionState state;
+  const MotionOutput y =
+      net->forward(c.ctx(), c.in("joints"), c.in("trans"), c.in("tpose"), &state);
   c.out("raw", y.raw);
   c.out("R", y.rotations);
   c.out("joints", y.joints);
   c.out("trans", y.trans);
-  c.out("h_enc", state.encoder);
-  c.out("h_dec", state.decoder);
+  c.out("h_enc", state[0]);
+  c.out("h_dec", state[1]);
   c.finish(mse(y.joints, c.in("target")) + mean_all(square(y.trans)));
 }
 
@@ -341,12 +342,13 @@ std::unique_ptr<Mlp3> make_mlp(const Case& c, const std::string& prefix, bool so
 }
 
 void deformation(Case& c) {
-  const auto weights = make_mlp(c, "W.", true, 0), offsets = make_mlp(c, "O.", false, 0);
-  c.load(*weights, "W.");
-  c.load(*offsets, "O.");
+  WeightNet weights({c.size("W.fc1.weight", 0), 0}, c.init());
+  OffsetNet offsets({c.size("O.fc1.weight", 0), 0}, c.init());
+  c.load(weights, "W.");
+  c.load(offsets, "O.");
   const Tensor aa = c.constant("aa");
   const Var local = axis_angle_to_matrix(aa);
-  const DeformationOutput y = deform(c.ctx(), *weights, offsets.get(), c.in("p"), c.in("tpose"),
+  const DeformationOutput y = deform(c.ctx(), weights, &offsets, c.in("p"), c.in("tpose"),
                                      local, aa.reshape({aa.size(0), -1}));
   c.out("weights", y.weights);
   c.out("offsets", y.offsets);
