@@ -10,6 +10,7 @@
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/format.h"
 #include "infer/render/sheet.h"
+#include "nn/geometry/box.h"
 
 namespace restage {
 namespace {
@@ -24,7 +25,6 @@ constexpr const char* kStyle =
     ;
 constexpr const char* kScript =
 #include "infer/render/viewer/viewer.js.inc"
-#include "nn/geometry/box.h"
     ;
 constexpr size_t kMostStride = 4;         // of frames, before surfaces are thinned
 constexpr size_t kFewestVertices = 1200;  // a person is still one

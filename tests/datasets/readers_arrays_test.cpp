@@ -251,7 +251,21 @@ TEST(ReadersArrays, ArchivesThatContradictThemselves) {
   again.same_place = true;  // the quine and bomb of overlapping members
   ZipEntry first = entry("a.npy", counting(9));
   again.name = "b.npy";
-  EXPECT_HAS(opened(dir, zip_of({first, again})), "overlaps");
+  EXPECT_HAS(opened(dir, zip_of({first, again})), "contradicts the directory");
+
+  // A member that lies in the bytes of another: bombs are made so.
+  const ZipEntry inner = entry("b.npy", counting(99));
+  std::string nested = zip_of({inner});
+  const std::string bytes = nested.substr(0, nested.find("PK\1\2"));
+  nested = zip_of({entry("a.npy", bytes), inner});
+  const auto put = [&](size_t at, size_t value) {
+    nested.replace(at, 4, test::raw(static_cast<uint32_t>(value)));
+  };
+  const size_t begin = nested.find(bytes), end = begin + bytes.size();
+  nested.erase(end, bytes.size());
+  put(nested.rfind("PK\1\2") + 42, begin);  // where the second member is
+  put(nested.rfind("PK\5\6") + 16, end);    // and the directory
+  EXPECT_HAS(opened(dir, nested), "overlaps");
 
   ZipEntry liar = entry("a.npy", counting(9), true);
   liar.claimed_size = uint64_t{1} << 40;
@@ -267,9 +281,9 @@ TEST(ReadersArrays, ArchivesThatContradictThemselves) {
   std::string outside = zip_of({entry("a.npy", counting(9))});
   const size_t place = outside.find("PK\1\2") + 42;  // the member's offset
   outside[place] = '\x7f';
-  EXPECT_HAS(opened(dir, outside), "has no header");
+  EXPECT_HAS(opened(dir, outside), "is no zip archive, or cut short");
   outside[place + 2] = '\x7f';
-  EXPECT_HAS(opened(dir, outside), "lies outside");
+  EXPECT_HAS(opened(dir, outside), "is no zip archive, or cut short");
   std::string other = zip_of({entry("a.npy", counting(9))});
   other[30] = 'b';  // the name in the local header
   EXPECT_HAS(opened(dir, other), "contradicts the directory");
