@@ -94,8 +94,7 @@ class ScanWriter {
   std::vector<int64_t> frame_offset_{0}, sequence_offset_{0};
 };
 
-// ---- predictions and ground truth: what `restage eval` compares
-// -----------------------------------
+// ---- predictions and ground truth: what `restage eval` compares ---------------------------------
 
 struct Prediction {
   int64_t frames = 0;
@@ -136,8 +135,7 @@ class PredictionWriter {
   std::vector<int64_t> sequence_offset_{0};
 };
 
-// ---- any of them
-// ----------------------------------------------------------------------------------
+// ---- any of them --------------------------------------------------------------------------------
 
 struct Inspection {
   std::string kind;                       ///< "bodies", "motions", "dataset", "scans", "prediction"
@@ -160,8 +158,7 @@ Inspection inspect(const std::string& path);
 /// InputError only if the file cannot be opened or is of no known kind.
 std::vector<std::string> verify(const std::string& path);
 
-// ---- pieces that readers share
-// ----------------------------------------------------------------------
+// ---- pieces that readers share ------------------------------------------------------------------
 
 /// Opens and checks the schema version.
 h5::File open_schema_file(const std::string& path);

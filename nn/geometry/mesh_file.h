@@ -13,8 +13,8 @@ enum class MeshFormat { ply, obj };
 
 /// "ply" or "obj", without a dot.
 const char* extension(MeshFormat format);
-/// Binary PLY, float32 x y z; faces as `list uchar int vertex_indices`, none for a cloud. `comment`:
-/// a line on who wrote it, in metres and y up.
+/// Binary PLY, float32 x y z; faces as `list uchar int vertex_indices`, none for a cloud.
+/// `comment`: a line on who wrote it, in metres and y up.
 std::string ply_bytes(const Points& vertices, const std::vector<Triangle>& faces,
                       bool comment = true);
 /// OBJ text, nine significant digits, 1-based faces.

@@ -1,5 +1,5 @@
 // The 22-joint skeleton (spec of the method, section 1.2) and kinematics on plain Eigen values.
-// Tensor versions that the networks differentiate through are ops (autograd/ops/geometry.h).
+// Tensor versions that the networks differentiate through are ops (autograd/ops/rotation.h).
 // Units: metres, y up, +z forward, +x the body's left. Matrices act on column vectors.
 #pragma once
 

@@ -1,4 +1,5 @@
-// Linear blend skinning (spec 5.2) on plain values; the networks' is an op (autograd/ops/rotation.h).
+// Linear blend skinning (spec 5.2) on plain values; the networks' is an op
+// (autograd/ops/rotation.h).
 #pragma once
 
 #include "nn/geometry/skeleton.h"

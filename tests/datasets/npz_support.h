@@ -125,9 +125,9 @@ inline std::string zip_of(const std::vector<ZipEntry>& entries, const std::strin
         e.zip64 ? u16(1) + u16(24) + raw(told) + raw(uint64_t{packed.size()}) + raw(uint64_t{at})
                 : "";
     const auto field = [&](uint64_t v) { return u32(e.zip64 ? 0xffffffff : v); };
-    directory += "PK\1\2" + u16(45) + u16(20) + u16(flags) + u16(method) + u32(0) + u32(crc) +
-                 field(packed.size()) + field(told) + u16(e.name.size()) + u16(extra.size()) +
-                 u16(0) + u16(0) + u16(0) + u32(0) + field(at) + e.name + extra;
+    directory += "PK\1\2" + u16(45) + u16(e.zip64 ? 45 : 20) + u16(flags) + u16(method) + u32(0) +
+                 u32(crc) + field(packed.size()) + field(told) + u16(e.name.size()) +
+                 u16(extra.size()) + u16(0) + u16(0) + u16(0) + u32(0) + field(at) + e.name + extra;
     zip64 = zip64 || e.zip64;
   }
   const uint64_t begin = out.size(), count = entries.size();

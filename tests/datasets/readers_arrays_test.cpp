@@ -211,6 +211,22 @@ TEST_F(ReadersArrays, AMemberCanBeReadAgainAndSkippedInto) {
   }
 }
 
+/// A member that lies in the bytes of another: bombs are made so.
+std::string nested_members() {
+  const ZipEntry inner{.name = "b.npy", .bytes = counting(99)};
+  std::string nested = zip_of({inner});
+  const std::string bytes = nested.substr(0, nested.find("PK\1\2"));
+  nested = zip_of({{.bytes = bytes}, inner});
+  const auto put = [&](size_t at, size_t value) {
+    nested.replace(at, 4, raw(static_cast<uint32_t>(value)));
+  };
+  const size_t begin = nested.find(bytes), end = begin + bytes.size();
+  nested.erase(end, bytes.size());
+  put(nested.rfind("PK\1\2") + 42, begin);  // where the second member is
+  put(nested.rfind("PK\5\6") + 16, end);    // and the directory
+  return nested;
+}
+
 TEST_F(ReadersArrays, ArchivesThatContradictThemselves) {
   const std::string nine = counting(9);
   const std::string whole = zip_of({{.bytes = nine}});
@@ -225,14 +241,16 @@ TEST_F(ReadersArrays, ArchivesThatContradictThemselves) {
       {"", "is no zip archive"},
       {zip_of({{.bytes = "1"}, {.bytes = "2"}}), "two members"},
       // The quine and bomb of overlapping members.
-      {zip_of({{.bytes = nine}, {.name = "b.npy", .bytes = nine, .same_place = true}}), "overlaps"},
+      {zip_of({{.bytes = nine}, {.name = "b.npy", .bytes = nine, .same_place = true}}),
+       "contradicts the directory"},
       {zip_of({{.bytes = nine, .deflate = true, .zip64 = true, .claimed_size = uint64_t{1} << 40}}),
        "which cannot be"},
       {zip_of({{.bytes = nine, .claimed_size = 5}}), "which cannot be"},
       {zip_of({{.bytes = nine, .deflate = true, .directory_size = 100}}),
        "contradicts the directory"},
-      {with({{offset, '\x7f'}}), "has no header"},
-      {with({{offset, '\x7f'}, {offset + 2, '\x7f'}}), "lies outside"},
+      {with({{offset, '\x7f'}}), "is no zip archive, or cut short"},
+      {with({{offset, '\x7f'}, {offset + 2, '\x7f'}}), "is no zip archive, or cut short"},
+      {nested_members(), "overlaps"},
       {with({{30, 'b'}}), "contradicts the directory"}};  // the name in the local header
   for (const auto& [bytes, says] : cases) {
     const std::string path = dir.write("a.npz", bytes);
