@@ -7,8 +7,8 @@
 
 #include "autograd/base/atomic_file.h"
 #include "datasets/readers/mesh_io.h"
-#include "tests/datasets/gltf_styles.h"
-#include "tests/datasets/importers_bvh_styles.h"
+#include "tests/datasets/gltf_maker.h"
+#include "tests/datasets/importers_bvh_text.h"
 #include "tests/datasets/smpl_support.h"
 
 namespace restage {

@@ -10,13 +10,6 @@ from test_gltf import character
 
 
 class DoctorFix(CliTest):
-    def person(self):
-        """Points of a built-in body in T-pose."""
-        if not os.path.exists(self.path("walk")):
-            self.done("data", "build", "--bodies", 1, 0, 1, "--motions", 1, 0, 0, "--quiet", "--out", "data.h5")
-            self.done("data", "perform", "--bodies", "data.h5", "--frames", 12, "--quiet", "--out", "walk")
-        return self.mesh("walk/target.ply")[0]
-
     def mesh(self, name):
         head, _, body = self.bytes(name).partition(b"end_header\n")
         count = lambda what: int(head.split(b"element %s " % what)[1].split()[0]) if b"element " + what in head else 0

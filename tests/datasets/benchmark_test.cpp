@@ -239,7 +239,7 @@ TEST(BenchmarkRealism, WindingNumberTellsInsideFromOutside) {
   EXPECT_EQ(joints_inside(body, body.rest.vertices, joints), kJoints);
   joints[4] += Vec3(0, 0, 0.5);
   EXPECT_EQ(joints_inside(body, body.rest.vertices, joints, &outside), kJoints - 1);
-  EXPECT_EQ(outside, std::vector<std::string>{"left_knee"});
+  EXPECT_EQ(outside, Names{"left_knee"});
   EXPECT_LT(buried_share(body, 40), 0.05);
 }
 
@@ -302,7 +302,7 @@ TEST_F(BenchmarkBuild, SameBytesForAnyNumberOfThreadsAndVerified) {
       EXPECT_HAS(found.provenance, "NSF EIA-0196217") << name;
       EXPECT_HAS(found.license, "CC0") << name;
     }
-  EXPECT_EQ(names_in(dir.path()), (std::vector<std::string>{"one", "two"}));
+  EXPECT_EQ(names_in(dir.path()), (Names{"one", "two"}));
   BenchmarkRecipe other = small_recipe();
   other.seed = 1;
   const std::string three = build("three", 2, other);

@@ -9,9 +9,11 @@
 
 #include "autograd/base/error.h"
 #include "autograd/base/parallel.h"
+#include "datasets/benchmark/realism.h"
 #include "datasets/builtin/bodies.h"
 #include "datasets/builtin/motions.h"
 #include "datasets/builtin/pose_channels.h"
+#include "tests/support/tiny_body.h"
 
 namespace restage {
 namespace {
@@ -37,17 +39,8 @@ double volume(const Mesh& mesh) {
   return sum;
 }
 
-// How often the surface winds around a point: 1 inside, 0 outside (sum of solid angles).
-double winding(const Mesh& mesh, const Vec3& p) {
-  double sum = 0;
-  for (const Triangle& f : mesh.faces) {
-    const auto corner = [&](int k) { return Vec3(mesh.vertices[f[k]].cast<double>() - p); };
-    const Vec3 a = corner(0), b = corner(1), c = corner(2);
-    const double la = a.norm(), lb = b.norm(), lc = c.norm();
-    sum += 2 * std::atan2(a.dot(b.cross(c)),
-                          la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
-  }
-  return sum / (4 * M_PI);
+double winding(const Body& body, const Vec3& at) {
+  return winding_number(body.rest.vertices, body.rest.faces, at);
 }
 
 bool same(const Body& a, const Body& b) {
@@ -100,7 +93,7 @@ TEST(BuiltinBodies, JointsLieInsideAndMirror) {
   for (const size_t i : {0, 3, 8, 11}) {
     const Body& body = some_bodies()[i];
     for (int j = 0; j < kJoints; ++j) {
-      EXPECT_NEAR(winding(body.rest, body.joints[j]), 1, 1e-3) << body.id << " joint " << j;
+      EXPECT_NEAR(winding(body, body.joints[j]), 1, 1e-3) << body.id << " joint " << j;
       const Vec3 mirrored = body.joints[kMirror[j]].cwiseProduct(Vec3(-1, 1, 1));
       EXPECT_LT((body.joints[j] - mirrored).norm(), 1e-12);
     }
@@ -111,8 +104,8 @@ TEST(BuiltinBodies, JointsLieInsideAndMirror) {
     EXPECT_GT(body.joints[10].z(), body.joints[7].z() + 0.05);
     // Outside: between the legs, beside the chest under the arm.
     const double knee = body.joints[4].y();
-    EXPECT_NEAR(winding(body.rest, {0, knee, 0}), 0, 1e-3);
-    EXPECT_NEAR(winding(body.rest, {body.joints[18].x(), body.joints[9].y(), 0}), 0, 1e-3);
+    EXPECT_NEAR(winding(body, {0, knee, 0}), 0, 1e-3);
+    EXPECT_NEAR(winding(body, {body.joints[18].x(), body.joints[9].y(), 0}), 0, 1e-3);
   }
 }
 
@@ -205,17 +198,6 @@ const std::vector<Motion>& some_motions() {
   return motions;
 }
 
-Joints joints_of(const Motion& m, size_t frame) {
-  Joints x;
-  x[0] = Vec3::Zero();
-  for (int j = 1; j < kJoints; ++j)
-    x[j] = x[kParents[j]] +
-           m.global[frame][kParents[j]].cast<double>() * (m.rest[j] - m.rest[kParents[j]]);
-  const Vec3 shift = m.hips[frame].cast<double>() - 0.5 * (x[1] + x[2]);
-  for (Vec3& p : x) p += shift;
-  return x;
-}
-
 TEST(BuiltinMotions, AreFiniteUnitAndOfTheRightLength) {
   for (const Motion& m : some_motions()) {
     EXPECT_GE(m.frames(), 60u) << m.id;
@@ -230,10 +212,10 @@ TEST(BuiltinMotions, AreFiniteUnitAndOfTheRightLength) {
 
 TEST(BuiltinMotions, MoveAtHumanSpeed) {
   for (const Motion& m : some_motions()) {
-    Joints before = joints_of(m, 0);
+    Joints before = testing::motion_joints(m, 0);
     for (size_t f = 1; f < m.frames(); ++f) {
       EXPECT_LT((m.hips[f] - m.hips[f - 1]).norm() * kFps, 6.5) << m.id << " frame " << f;
-      const Joints now = joints_of(m, f);
+      const Joints now = testing::motion_joints(m, f);
       for (int j = 0; j < kJoints; ++j) {
         EXPECT_LT((now[j] - before[j]).norm() * kFps, 14)
             << m.id << " frame " << f << " joint " << j;
@@ -249,7 +231,7 @@ TEST(BuiltinMotions, StandOnTheFloor) {
   for (const Motion& m : some_motions()) {
     double worst = 0, highest = 0;
     for (size_t f = 0; f < m.frames(); ++f) {
-      const Joints x = joints_of(m, f);
+      const Joints x = testing::motion_joints(m, f);
       double lowest = 1e9;
       for (const int j : {7, 8, 10, 11}) lowest = std::min(lowest, x[j].y() - m.rest[j].y());
       worst = std::min(worst, lowest);
@@ -268,9 +250,9 @@ TEST(BuiltinMotions, StandingFeetHardlySlide) {
   for (const Motion& m : some_motions()) {
     if (m.action == "jump" || m.action == "jog" || m.action == "dance") continue;
     std::vector<double> speed;
-    Joints before = joints_of(m, 0);
+    Joints before = testing::motion_joints(m, 0);
     for (size_t f = 1; f < m.frames(); ++f) {
-      const Joints now = joints_of(m, f);
+      const Joints now = testing::motion_joints(m, f);
       double slowest = 1e9;
       for (const int j : {7, 8, 10, 11})
         slowest = std::min(slowest, (now[j] - before[j]).cwiseProduct(Vec3(1, 0, 1)).norm() * kFps);
@@ -319,7 +301,7 @@ TEST(BuiltinMotions, CoverThePoseSpace) {
   std::array<int, 8> heading{};
   for (const Motion& m : some_motions())
     for (size_t f = 0; f < m.frames(); f += 3) {
-      const Joints x = joints_of(m, f);
+      const Joints x = testing::motion_joints(m, f);
       const auto axis = [&](int j, const Vec3& v) {
         return Vec3(m.global[f][j].cast<double>() * v);
       };

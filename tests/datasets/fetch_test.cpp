@@ -59,11 +59,11 @@ TEST_F(Fetch, AddressesAreCheckedPackedAndKept) {
   const FetchSummary first = fetch_data(file, dir / "out");
   EXPECT_EQ(first.fetched, 3u);
   EXPECT_EQ(first.present, 0u);
-  EXPECT_EQ(first.missing, std::vector<std::string>{"packed.h5"});
+  EXPECT_EQ(first.missing, Names{"packed.h5"});
   EXPECT_EQ(bytes_of(dir / "out/cmu/big.bin"), big_);
   EXPECT_EQ(bytes_of(dir / "out/body/own.csv"), "a,b\n");
   EXPECT_EQ(bytes_of(dir / "out/body/clothes/x.obj.gz").substr(0, 2), "\x1f\x8b");
-  EXPECT_EQ(names_in(dir / "out/cmu"), std::vector<std::string>{"big.bin"});
+  EXPECT_EQ(names_in(dir / "out/cmu"), Names{"big.bin"});
   const FetchSummary again = fetch_data(file, dir / "out");
   EXPECT_EQ(again.fetched, 0u);
   EXPECT_EQ(again.present, 3u);
@@ -112,13 +112,11 @@ TEST_F(Fetch, MakeHumanIsPackedFromItsPublishedFiles) {
   const h5::File h5 = h5::File::open(dir / "out/body/makehuman.h5");
   EXPECT_EQ(h5.read<float>("/base/vertices", {5, 3})[7], 1.5f);
   EXPECT_EQ(h5.read<int32_t>("/base/body_quads", {-1, 4}), (std::vector<int32_t>{0, 1, 2, 3}));
-  EXPECT_EQ(h5.dataset("/rig/bone_names").read_text(),
-            (std::vector<std::string>{"Root", "pelvis"}));
+  EXPECT_EQ(h5.dataset("/rig/bone_names").read_text(), (Names{"Root", "pelvis"}));
   EXPECT_EQ(h5.read<int32_t>("/rig/bone_parent", {2}), (std::vector<int32_t>{-1, 0}));
   EXPECT_EQ(h5.read<int32_t>("/rig/head_vertices", {2, 2}), (std::vector<int32_t>{0, 1, 4, -1}));
   EXPECT_EQ(h5.read<int32_t>("/rig/weight_vertex", {1}), (std::vector<int32_t>{2}));
-  EXPECT_EQ(h5.dataset("/targets/names").read_text(),
-            (std::vector<std::string>{"a/up-incr", "none"}));
+  EXPECT_EQ(h5.dataset("/targets/names").read_text(), (Names{"a/up-incr", "none"}));
   EXPECT_EQ(h5.read<int64_t>("/targets/count", {2}), (std::vector<int64_t>{2, 0}));
   EXPECT_EQ(h5.read<int16_t>("/targets/delta_milli", {2, 3}),
             (std::vector<int16_t>{0, 250, -1000, 0, 1000, 0}));
@@ -131,9 +129,8 @@ TEST_F(Fetch, MakeHumanIsPackedFromItsPublishedFiles) {
   fs::remove(dir / "out/body/makehuman/base.obj");
   EXPECT_THROW(fetch_data(file, dir / "other", dir / "out"), InputError) << "there, but another";
   fs::remove(dir / "out/body/makehuman.h5");
-  EXPECT_EQ(fetch_data(file, dir / "other", dir / "out").missing,
-            std::vector<std::string>{"body/makehuman.h5"});
-  EXPECT_EQ(names_in(dir / "other"), std::vector<std::string>{}) << "nothing in part";
+  EXPECT_EQ(fetch_data(file, dir / "other", dir / "out").missing, Names{"body/makehuman.h5"});
+  EXPECT_EQ(names_in(dir / "other"), Names{}) << "nothing in part";
   dir.write("parts.txt", line("a copy", "body/makehuman.h5", "makehuman:parts.txt"));
   EXPECT_THROW(fetch_data(file, dir / "endless"), InputError);
 }
@@ -321,13 +318,13 @@ TEST_F(CmuPack, ShortRecordingsAndMissingOnesAreNamed) {
 
 TEST_F(CmuPack, ListsAreHeldToTheirForm) {
   const std::string sum = toy_sum();
-  for (const std::string& bad : std::vector<std::string>{
-           std::string("# nothing\n"), std::string("@a x\n"), std::string("@a x y z\n"),
-           "@a x y\n@a x y\n" + clip(), sum + " c f - 2 0 5 0.5 01 test\n",
-           sum + " c f - 2 0 5 0.5 01 test walk more\n", sum + " c/d f - 2 0 5 0.5 01 test walk\n",
-           sum + " c f - 0 0 5 0.5 01 test walk\n", sum + " c f - 2 -1 5 0.5 01 test walk\n",
-           sum + " c f - 2 0 0 0.5 01 test walk\n", "abc c f - 2 0 5 0.5 01 test walk\n",
-           clip() + clip()})
+  for (const std::string& bad :
+       Names{std::string("# nothing\n"), std::string("@a x\n"), std::string("@a x y z\n"),
+             "@a x y\n@a x y\n" + clip(), sum + " c f - 2 0 5 0.5 01 test\n",
+             sum + " c f - 2 0 5 0.5 01 test walk more\n",
+             sum + " c/d f - 2 0 5 0.5 01 test walk\n", sum + " c f - 0 0 5 0.5 01 test walk\n",
+             sum + " c f - 2 -1 5 0.5 01 test walk\n", sum + " c f - 2 0 0 0.5 01 test walk\n",
+             "abc c f - 2 0 5 0.5 01 test walk\n", clip() + clip()})
     EXPECT_NE(error_of([&] { list(bad); }), "") << bad;
 }
 
@@ -387,7 +384,7 @@ TEST_F(CmuPack, TheDataFolderIsFilledFromRepositories) {
   EXPECT_EQ(bytes_of(dir / "out3/cmu/clips30.h5"), bytes_of(dir / "out/cmu/clips30.h5"));
   fs::create_directories(dir / "nothing");
   EXPECT_EQ(fetch_data(dir / "data.txt", dir / "out4", dir / "nothing").missing,
-            std::vector<std::string>{"cmu/clips30.h5"});
+            Names{"cmu/clips30.h5"});
 }
 
 // ---- the data folder

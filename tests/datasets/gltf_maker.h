@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/datasets/importers_bvh_text.h"
 #include "tests/support/tiny_body.h"
 
 namespace restage::testing {
@@ -131,10 +132,7 @@ class CharacterMaker {
  public:
   CharacterMaker(const KnownCharacter& known, const RigStyle& style)
       : known_(known), style_(style) {
-    Pose down;
-    down.local = to_local(arms_down(style));
-    down.root = known.body.joints[0];
-    bind_ = place(forward_kinematics(known.body.joints, down));
+    bind_ = place(forward_kinematics(known.body.joints, rest_pose()));
     add_nodes();
     add_mesh();
     add_motion("walk");
@@ -170,6 +168,8 @@ class CharacterMaker {
   }
 
  private:
+  Pose rest_pose() const { return {to_local(arms_down(style_)), known_.body.joints[0]}; }
+
   using World = std::array<Eigen::Affine3d, kJoints>;
 
   /// Bones in the file's world.
@@ -225,20 +225,13 @@ class CharacterMaker {
 
   void add_mesh() {
     const Body& body = known_.body;
-    const Rotations down = arms_down(style_);
-    Pose pose;
-    pose.local = to_local(down);
-    pose.root = body.joints[0];
-    const PosedSkeleton posed = forward_kinematics(body.joints, pose);
+    const Points posed = linear_blend_skinning(body, rest_pose());
     std::vector<float> positions, weights;
     std::vector<uint8_t> joints;
     for (size_t v = 0; v < body.rest.vertices.size(); ++v) {
       int bone = 0;
       body.weights.row(static_cast<Eigen::Index>(v)).maxCoeff(&bone);
-      const Vec3 at =
-          posed.joints[bone] +
-          posed.global[bone] * (body.rest.vertices[v].cast<double>() - body.joints[bone]);
-      const Vec3 stored = style_.armature.inverse() * (style_.world * at);
+      const Vec3 stored = style_.armature.inverse() * (style_.world * posed[v].cast<double>());
       for (int c = 0; c < 3; ++c) positions.push_back(static_cast<float>(stored[c]));
       const bool twist = twist_.count(bone) != 0;
       for (const int joint : {bone, twist ? twist_.at(bone) : 0, 0, 0})
@@ -273,5 +266,72 @@ class CharacterMaker {
   std::vector<int> joints_;   // node of each joint of the skin
   std::map<int, int> twist_;  // bone: its twist bone, as joint of the skin
 };
+
+// ---- rigs as users export them
+// -------------------------------------------------------------------
+
+inline const Mat3 kLyingDown = Eigen::AngleAxisd(-M_PI / 2, Vec3::UnitX()).toRotationMatrix();
+inline const Mat3 kTurnedRound = Eigen::AngleAxisd(M_PI, Vec3::UnitY()).toRotationMatrix();
+
+inline Eigen::Affine3d scaled(double scale, const Mat3& turn = Mat3::Identity()) {
+  Eigen::Affine3d out = Eigen::Affine3d::Identity();
+  out.linear() = scale * turn;
+  return out;
+}
+
+/// Mixamo through Blender: centimetres and z up below an armature of scale 0.01, bones with axes.
+inline RigStyle mixamo_style(const std::string& prefix = "mixamorig:") {
+  RigStyle out;
+  for (int j = 0; j < kJoints; ++j)
+    out.names[j] = prefix + (bvh_test::kMixamo[j] + std::strlen("mixamorig:"));
+  out.armature = scaled(0.01, kLyingDown);
+  out.bone_axes = true;
+  return out;
+}
+
+/// Unreal: an A-pose, twist bones, centimetres that nothing scales.
+inline RigStyle unreal_style() {
+  RigStyle out;
+  out.names = {"pelvis",     "thigh_l",    "thigh_r",    "spine_01", "calf_l",     "calf_r",
+               "spine_02",   "foot_l",     "foot_r",     "spine_03", "ball_l",     "ball_r",
+               "neck_01",    "clavicle_l", "clavicle_r", "head",     "upperarm_l", "upperarm_r",
+               "lowerarm_l", "lowerarm_r", "hand_l",     "hand_r"};
+  out.world = scaled(100);
+  out.armature = scaled(1, kLyingDown);
+  out.bone_axes = true;
+  out.arms_down = 45;
+  out.twist_bones = true;
+  out.fps = 24;
+  out.keys = 25;
+  return out;
+}
+
+/// VRM 0: faces -z; nodes have names of their own, the extension says which bone is which.
+inline RigStyle vrm_style() {
+  RigStyle out;
+  for (int j = 0; j < kJoints; ++j) out.names[j] = "J_" + std::to_string(100 + j);
+  out.world = scaled(1, kTurnedRound);
+  return out;
+}
+
+inline const char* const kVrmNames[kJoints] = {
+    "hips",         "leftUpperLeg",  "rightUpperLeg", "spine",      "leftLowerLeg", "rightLowerLeg",
+    "chest",        "leftFoot",      "rightFoot",     "upperChest", "leftToes",     "rightToes",
+    "neck",         "leftShoulder",  "rightShoulder", "head",       "leftUpperArm", "rightUpperArm",
+    "leftLowerArm", "rightLowerArm", "leftHand",      "rightHand"};
+
+/// The same with that list, as VRM 0 has it or, without `list`, VRM 1.
+inline GlbParts vrm_parts(const KnownCharacter& known, bool list) {
+  GlbParts parts = CharacterMaker(known, vrm_style()).parts;
+  GltfJson bones;
+  for (int j = 0; j < kJoints; ++j) {
+    if (list)
+      bones.push_back({{"bone", kVrmNames[j]}, {"node", j}});
+    else
+      bones[kVrmNames[j]] = {{"node", j}};
+  }
+  parts.root["extensions"][list ? "VRM" : "VRMC_vrm"]["humanoid"]["humanBones"] = bones;
+  return parts;
+}
 
 }  // namespace restage::testing

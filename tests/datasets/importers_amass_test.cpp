@@ -217,19 +217,6 @@ Joints smpl_joints(const TinyClip& clip, const TinySmpl& model, double t) {
   return out;
 }
 
-/// The same from an imported motion.
-Joints motion_joints(const Motion& motion, size_t frame) {
-  Pose pose;
-  Rotations global;
-  for (size_t j = 0; j < kJoints; ++j)
-    global[j] = motion.global[frame][j].cast<double>().toRotationMatrix();
-  pose.local = to_local(global);
-  Joints out = forward_kinematics(motion.rest, pose).joints;
-  const Vec3 move = motion.hips[frame].cast<double>() - 0.5 * (out[1] + out[2]);
-  for (Vec3& x : out) x += move;
-  return out;
-}
-
 TEST_F(ImportersAmass, BothLayoutsEqualTheModelsFormulaAt30Fps) {
   for (const SmplFamily family : {SmplFamily::smplh, SmplFamily::smplx})
     for (const double fps : {120.0, 60.0, 100.0, 30.0}) {
@@ -255,7 +242,7 @@ TEST_F(ImportersAmass, BothLayoutsEqualTheModelsFormulaAt30Fps) {
       double floor = 0;
       for (size_t f = 0; f < motion.frames(); ++f) {
         const Joints wanted = smpl_joints(clip, tiny, static_cast<double>(f) / kFps);
-        const Joints got = motion_joints(motion, f);
+        const Joints got = testing::motion_joints(motion, f);
         if (f == 0) floor = wanted[0].z() - got[0].y();
         for (size_t j = 0; j < kJoints; ++j) {
           const Vec3 y_up(wanted[j].x(), wanted[j].z() - floor, -wanted[j].y());
@@ -386,8 +373,8 @@ TEST_F(ImportersAmass, ATreeOfClipsNamesSubjectsAndListsWhatIsUnusable) {
   std::vector<std::string> names;  // in natural order
   for (const Motion& m : read_motions(dir / "o.h5", "validation"))
     names.push_back(m.subject + " " + m.id);
-  EXPECT_EQ(names, (std::vector<std::string>{"ACCAD/Female1 ACCAD_Female1_walk",
-                                             "CMU/07 CMU_07_07_2", "CMU/07 CMU_07_07_10"}));
+  EXPECT_EQ(names, (Names{"ACCAD/Female1 ACCAD_Female1_walk", "CMU/07 CMU_07_07_2",
+                          "CMU/07 CMU_07_07_10"}));
   EXPECT_EQ(inspect(dir / "o.h5").license, "AMASS");
   // One file: the subject is its folder, and what is wrong is an error.
   import_data(dir / "tree/CMU/07/07_2_poses.npz", dir / "p.h5", options);

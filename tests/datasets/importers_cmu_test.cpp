@@ -1,15 +1,19 @@
-// CMU clips and BVH files of the data folder against its reference joints.
+// ASF/AMC: a toy written by the test with bones of any frame. And CMU's clips, BVH and AMC files of
+// the data folder against its reference joints.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
+#include <cstdio>
 #include <map>
 
+#include "autograd/base/rng.h"
 #include "datasets/hdf5/file.h"
+#include "datasets/importers/amc.h"
 #include "datasets/importers/bvh.h"
 #include "datasets/importers/cmu.h"
+#include "datasets/readers/asf.h"
 #include "tests/datasets/schema_support.h"
 #include "tests/support/data_folder.h"
 
@@ -18,11 +22,247 @@ namespace {
 
 namespace fs = std::filesystem;
 using namespace test;
+using ImportersAmc = FileTest;
 
 class ImportersCmu : public ::testing::Test {
  protected:
   void SetUp() override { RESTAGE_NEED_DATA(); }
 };
+
+struct ToyBone {
+  std::string name, parent;
+  Vec3 end;  ///< of the bone, T-pose, from the root, metres
+};
+const std::vector<ToyBone>& toy() {
+  static const std::vector<ToyBone> bones = [] {
+    std::vector<ToyBone> out = {
+        {"lowerback", "root", Vec3(0, .1, 0)},         {"upperback", "lowerback", Vec3(0, .22, 0)},
+        {"thorax", "upperback", Vec3(0, .42, .01)},    {"lowerneck", "thorax", Vec3(0, .5, 0)},
+        {"upperneck", "lowerneck", Vec3(0, .57, .01)}, {"head", "upperneck", Vec3(0, .7, .02)}};
+    for (const int s : {1, -1}) {
+      const std::string l = s > 0 ? "l" : "r";
+      out.push_back({l + "hipjoint", "root", Vec3(s * .09, -.05, 0)});
+      out.push_back({l + "femur", l + "hipjoint", Vec3(s * .1, -.45, .01)});
+      out.push_back({l + "tibia", l + "femur", Vec3(s * .1, -.87, -.02)});
+      out.push_back({l + "foot", l + "tibia", Vec3(s * .11, -.93, .12)});
+      out.push_back({l + "toes", l + "foot", Vec3(s * .11, -.93, .18)});
+      out.push_back({l + "clavicle", "thorax", Vec3(s * .18, .43, 0)});
+      out.push_back({l + "humerus", l + "clavicle", Vec3(s * .45, .43, 0)});
+      out.push_back({l + "radius", l + "humerus", Vec3(s * .6, .43, 0)});
+      out.push_back({l + "wrist", l + "radius", Vec3(s * .7, .43, 0)});
+      out.push_back({l + "hand", l + "wrist", Vec3(s * .75, .43, 0)});
+    }
+    return out;
+  }();
+  return bones;
+}
+
+constexpr double kToyUnit = 0.0254 / 0.45;
+
+Mat3 about(int axis, double degrees) {
+  return Eigen::AngleAxisd(degrees * M_PI / 180, Vec3::Unit(axis)).toRotationMatrix();
+}
+Vec3 axis_of(size_t bone) {
+  return Vec3(10.0 * static_cast<double>(bone % 7), -20.0 * static_cast<double>(bone % 3),
+              15.0 * static_cast<double>(bone % 5));
+}
+double angle(size_t bone, int dof, int frame) {
+  return 20 * std::sin(0.7 * static_cast<double>(bone) + dof + 0.05 * frame);
+}
+/// Freedoms differ from bone to bone: all three, one, another order, none.
+std::string freedoms(size_t bone) {
+  const char* const kinds[] = {"xyz", "x", "zx", "", "yzx"};
+  return kinds[bone % 5];
+}
+
+std::string asf_text() {
+  std::string out =
+      "# toy\n:version 1.10\n:name TOY\n:units\n  mass 1.0\n  length 0.45\n  angle deg\n"
+      ":documentation\n  anything\n:root\n  order TX TY TZ RX RY RZ\n  axis XYZ\n"
+      "  position 0 0 0\n  orientation 0 0 0\n:bonedata\n";
+  std::map<std::string, Vec3> start = {{"root", Vec3::Zero()}};
+  char line[200];
+  for (size_t b = 0; b < toy().size(); ++b) {
+    const ToyBone& bone = toy()[b];
+    const Vec3 along = bone.end - start[bone.parent];
+    start[bone.name] = bone.end;
+    const Vec3 d = along.normalized(), a = axis_of(b);
+    std::snprintf(line, sizeof line,
+                  "  begin\n    id %zu\n    name %s\n    direction %.9g %.9g %.9g\n    length "
+                  "%.9g\n    axis %g %g %g XYZ\n",
+                  b + 1, bone.name.c_str(), d.x(), d.y(), d.z(), along.norm() / kToyUnit, a.x(),
+                  a.y(), a.z());
+    out += line;
+    if (!freedoms(b).empty()) {
+      out += "    dof";
+      for (const char c : freedoms(b)) out += std::string(" r") + c;
+      out += "\n    limits";
+      for (size_t i = 0; i < freedoms(b).size(); ++i) out += " (-160.0 20.0)\n          ";
+      out += "\n";
+    }
+    out += "  end\n";
+  }
+  out += ":hierarchy\n  begin\n";
+  for (const ToyBone& bone : toy()) out += "    " + bone.parent + " " + bone.name + "\n";
+  return out + "  end\n";
+}
+
+std::string amc_text(int frames) {
+  std::string out = "#!OML:ASF\n:FULLY-SPECIFIED\n:DEGREES\n";
+  for (int f = 0; f < frames; ++f) {
+    char line[200];
+    std::snprintf(line, sizeof line, "%d\nroot %.9g %.9g %.9g %.9g %.9g %.9g\n", f + 1,
+                  0.01 * f / kToyUnit, 0.95 / kToyUnit, 0.002 * f / kToyUnit, 5.0, 20.0 + 0.1 * f,
+                  -3.0);
+    out += line;
+    for (size_t b = 0; b < toy().size(); ++b) {
+      if (freedoms(b).empty()) continue;
+      out += toy()[b].name;
+      for (size_t d = 0; d < freedoms(b).size(); ++d) {
+        std::snprintf(line, sizeof line, " %.9g", angle(b, static_cast<int>(d), f));
+        out += line;
+      }
+      out += "\n";
+    }
+  }
+  return out;
+}
+
+/// Where the bones of a frame begin, by the definition of the format.
+std::map<std::string, Vec3> starts(int f) {
+  std::map<std::string, Mat3> turn = {
+      {"root", about(2, -3.0) * about(1, 20.0 + 0.1 * f) * about(0, 5.0)}};
+  std::map<std::string, Vec3> rest_end = {{"root", Vec3::Zero()}},
+                              end = {{"root", Vec3(0.01 * f, 0.95, 0.002 * f)}}, out = end;
+  for (size_t b = 0; b < toy().size(); ++b) {
+    const ToyBone& bone = toy()[b];
+    const Vec3 a = axis_of(b);
+    const Mat3 c = about(2, a.z()) * about(1, a.y()) * about(0, a.x());
+    Mat3 m = Mat3::Identity();
+    for (size_t d = 0; d < freedoms(b).size(); ++d)
+      m = about(freedoms(b)[d] - 'x', angle(b, static_cast<int>(d), f)) * m;
+    turn[bone.name] = turn[bone.parent] * c * m * c.transpose();
+    out[bone.name] = end[bone.parent];
+    end[bone.name] = end[bone.parent] + turn[bone.name] * (bone.end - rest_end[bone.parent]);
+    rest_end[bone.name] = bone.end;
+  }
+  return out;
+}
+
+TEST_F(ImportersAmc, AToyOfAnyFramesAndFreedomsIsReadExactly) {
+  const MotionClip clip = convert_amc(amc_text(121), "a/07_01.amc", asf_text(), "a/07.asf");
+  EXPECT_EQ(clip.motion.id, "07_01");
+  EXPECT_EQ(clip.motion.subject, "07");
+  EXPECT_NEAR(clip.scale, kToyUnit, 1e-12);
+  ASSERT_EQ(clip.joints.size(), 31u);
+  const std::map<int, std::string> bones = {
+      {0, "root"},     {1, "lfemur"},     {2, "rfemur"},     {3, "upperback"}, {4, "ltibia"},
+      {5, "rtibia"},   {6, "thorax"},     {7, "lfoot"},      {8, "rfoot"},     {10, "ltoes"},
+      {11, "rtoes"},   {12, "upperneck"}, {13, "lclavicle"}, {15, "head"},     {16, "lhumerus"},
+      {18, "lradius"}, {20, "lhand"},     {21, "rhand"}};
+  for (size_t f = 0; f < clip.joints.size(); ++f) {
+    const auto truth = starts(static_cast<int>(4 * f));
+    for (const auto& [joint, bone] : bones)
+      ASSERT_LT((clip.joints[f][static_cast<size_t>(joint)] - truth.at(bone)).norm(), 1e-6)
+          << f << bone;
+  }
+}
+
+TEST_F(ImportersAmc, RadiansAndGivenRate) {
+  std::string asf = asf_text(), amc = amc_text(9);
+  MotionOptions options;
+  options.fps = 60;
+  EXPECT_EQ(convert_amc(amc, "x.amc", asf, "x.asf", options).motion.frames(), 5u);
+  amc = replaced(amc, ":DEGREES", ":RADIANS");
+  const AsfFile skeleton = parse_asf(asf, "x.asf");
+  EXPECT_TRUE(parse_amc(amc, "x.amc", skeleton).radians);
+  EXPECT_EQ(skeleton.bones.size(), toy().size() + 1);
+  EXPECT_EQ(skeleton.bones[1].limits.size(), 3u);
+}
+
+TEST_F(ImportersAmc, BadFilesAreNamedWithTheirLine) {
+  const std::string asf = asf_text(), amc = amc_text(5);
+  /// The first `from` of the skeleton or of the recording becomes `to`.
+  struct Case {
+    bool skeleton;
+    const char *from, *to, *says;
+  };
+  const Case cases[] = {{true, "order TX", "order WX", "no freedom"},
+                        {true, "axis XYZ", "axis XXZ", "no order of axes"},
+                        {true, "dof rx", "dof rx rx", "given twice"},
+                        {true, "dof rx", "dof l", "no freedom"},
+                        {true, "length 0.45", "length 0", "must be positive"},
+                        {true, "name thorax", "name lowerback", "two bones are called lowerback"},
+                        {true, "direction ", "direction nan ", "no usable number"},
+                        {true, "root lowerback", "root", "has no place in the hierarchy"},
+                        {true, "root lowerback", "head lowerback", "loop"},
+                        {true, "root lowerback", "root lowerback thorax", "two parents"},
+                        {true, "root lowerback", "root lowrback", "is no bone"},
+                        {false, "lowerback ", "lowrback ", "did you mean 'lowerback'"},
+                        {false, "lowerback ", "lowerback 1 ", "has 4 values"},
+                        {false, "\n2\n", "\n3\n", "frame 3 follows frame 1"},
+                        {false, "root ", "root inf ", "some.amc"},
+                        {false, "lowerback", "#", "lacks bone lowerback"},
+                        {false, "\n1\n", "\n", "frame's number expected"}};
+  const auto expect_refused = [](const std::string& skeleton, const std::string& recording,
+                                 const char* says) {
+    const std::string said =
+        error_of([&] { convert_amc(recording, "some.amc", skeleton, "some.asf"); });
+    EXPECT_EQ(said.find("some.a"), 0u) << said;
+    EXPECT_HAS(said, says);
+  };
+  for (const Case& c : cases) {
+    if (c.skeleton)
+      expect_refused(replaced(asf, c.from, c.to), amc, c.says);
+    else
+      expect_refused(asf, replaced(amc, c.from, c.to), c.says);
+  }
+  expect_refused("", amc, "holds no bones");
+  expect_refused("HIERARCHY\n", amc, "does not begin with a section");
+  expect_refused(asf, "", "holds no frames");
+}
+
+TEST_F(ImportersAmc, FilesCutAndFlippedAnywhereNeverCrash) {
+  const std::string asf = asf_text(), amc = amc_text(6);
+  const auto refused = [](const std::string& recording, const std::string& skeleton) {
+    return !refusal_of([&] {
+              const MotionClip clip = convert_amc(recording, "x.amc", skeleton, "x.asf");
+              for (const Joints& joints : clip.joints)
+                for (const Vec3& x : joints) ASSERT_TRUE(x.allFinite());
+            }).empty();
+  };
+  int cut = 0;
+  for (size_t percent = 0; percent < 100; ++percent) {
+    EXPECT_TRUE(refused(amc, asf.substr(0, asf.size() * percent / 100))) << percent;
+    // Cut between two frames, or within a number, an AMC file is a shorter one.
+    cut += refused(amc.substr(0, amc.size() * percent / 100), asf);
+  }
+  EXPECT_GT(cut, 85);
+  for (uint64_t i = 0; i < 600; ++i) {
+    Rng rng(RngKey{11, i});
+    std::string a = asf, m = amc;
+    for (uint64_t n = 1 + rng.below(3); n > 0; --n) {
+      std::string& text = rng.below(2) ? a : m;
+      text[rng.below(text.size())] = static_cast<char>(rng.below(256));
+    }
+    refused(m, a);
+  }
+}
+
+TEST_F(ImportersAmc, TheSkeletonBesideIsFoundByName) {
+  const std::string recording = dir.write("07_01.amc", amc_text(3));
+  EXPECT_THROW(find_asf(recording), InputError);
+  const std::string other = dir.write("other.asf", "broken");
+  EXPECT_EQ(find_asf(recording), other);  // the only one
+  const std::string own = dir.write("07.asf", asf_text());
+  dir.write("0.asf", "broken");
+  EXPECT_EQ(find_asf(recording), own);
+  EXPECT_EQ(read_amc(recording).motion.subject, "07");
+  EXPECT_THROW(read_amc(recording, other), InputError);
+}
+
+// ---- the data folder
+// -------------------------------------------------------------------------------
 
 const h5::File& clips_file() {
   static const h5::File file = h5::File::open(data_folder() + "/cmu/clips30.h5");
@@ -87,33 +327,65 @@ TEST_F(ImportersCmu, RestAndFloorAreThoseOfTheFile) {
   }
 }
 
-/// Imports the part of a BVH file that a clip of clips30.h5 was made from.
-MotionClip part_of(const std::string& path, const std::string& clip) {
+/// The part of a recording that a clip of clips30.h5 was made from.
+MotionOptions part_of(const std::string& clip) {
   const std::string group = "/clips/" + clip;
   MotionOptions options;
   options.drop_leading = static_cast<int>(*clips_file().number(group, "source_first_frame"));
   options.keep_frames = static_cast<size_t>(*clips_file().number(group, "source_frames"));
-  options.fps = *clips_file().number(group, "source_fps");
-  return read_bvh(path, options);
+  return options;
+}
+
+/// The recording of a clip in data/cmu/FOLDER, empty if there is none: several clips may be of one.
+std::string recording_of(const std::string& clip, const std::string& folder,
+                         const std::string& ending) {
+  for (const std::string& name : {clip, clip.substr(0, clip.size() - 1)}) {
+    const std::string file = data_folder() + "/cmu/" + folder + "/" + name + ending;
+    if (fs::exists(file)) return file;
+  }
+  return "";
 }
 
 TEST_F(ImportersCmu, BvhFilesGiveTheReferenceJoints) {
   size_t compared = 0;
   for (const std::string& clip : clips_file().children("/clips")) {
-    const bool has_part = clip.find_first_of("abcdefgh", 2) != std::string::npos;
-    const std::string file = data_folder() + "/cmu/bvh/" +
-                             (has_part ? clip.substr(0, clip.size() - 1) : clip) + ".bvh.xz";
+    const std::string file = recording_of(clip, "bvh", ".bvh.xz");
     const std::vector<float> expected = reference(clip);
-    if (expected.empty() || !fs::exists(file) ||
+    if (expected.empty() || file.empty() ||
         *clips_file().text("/clips/" + clip, "skeleton") != "daz")
       continue;  // the others' references are of the ASF skeletons
+    MotionOptions options = part_of(clip);
+    options.fps = *clips_file().number("/clips/" + clip, "source_fps");
     ++compared;
-    const MotionClip bvh = part_of(file, clip);
+    const MotionClip bvh = read_bvh(file, options);
     EXPECT_LT(largest_difference(bvh.joints, expected), 2e-4) << clip;
     EXPECT_NEAR(bvh.floor_y, *clips_file().number("/clips/" + clip, "floor_y"), 2e-4) << clip;
     EXPECT_DOUBLE_EQ(bvh.scale, 0.01);
   }
   EXPECT_GE(compared, 15u);
+}
+
+TEST_F(ImportersAmc, CmuFilesGiveTheReferenceJoints) {
+  RESTAGE_NEED_DATA();
+  size_t compared = 0;
+  for (const std::string& clip : clips_file().children("/clips")) {
+    const std::string file = recording_of(clip, "asfamc", ".amc.xz");
+    const std::vector<float> expected = reference(clip);
+    if (file.empty() || expected.empty()) continue;
+    const MotionClip got = read_amc(file, "", part_of(clip));
+    ASSERT_EQ(got.joints.size() * kJoints * 3, expected.size()) << clip;
+    double sum = 0;
+    for (size_t i = 0; i < got.joints.size() * kJoints; ++i)
+      sum += (got.joints[i / kJoints][i % kJoints] -
+              Vec3(expected[3 * i], expected[3 * i + 1], expected[3 * i + 2]))
+                 .norm();
+    const double mean = sum / static_cast<double>(got.joints.size() * kJoints);
+    EXPECT_LT(mean, 1e-4) << clip;
+    std::printf("%s: mean joint error %.5f mm over %zu frames\n", clip.c_str(), 1000 * mean,
+                got.joints.size());
+    ++compared;
+  }
+  EXPECT_GE(compared, 4u);
 }
 
 TEST_F(ImportersCmu, TheRuleForLeadingFramesIsThatOfTheClips) {

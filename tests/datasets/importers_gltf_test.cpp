@@ -8,7 +8,7 @@
 #include "datasets/readers/mesh_io.h"
 #include "datasets/schema.h"
 #include "infer/writers/glb.h"
-#include "tests/datasets/gltf_styles.h"
+#include "tests/datasets/gltf_maker.h"
 #include "tests/datasets/importers_support.h"
 
 namespace restage {

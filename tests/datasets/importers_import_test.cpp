@@ -103,7 +103,7 @@ TEST_F(ImportersImport, NothingIsLeftBehindByAFailure) {
     EXPECT_THROW(import_data(dir / source, out()), InputError) << source;
   fs::remove(dir / "in/bad.bvh");
   EXPECT_THROW(import_data(dir / "in", out()), InputError) << "an empty folder";
-  EXPECT_EQ(names_in(dir.path()), std::vector<std::string>{"in"});
+  EXPECT_EQ(names_in(dir.path()), Names{"in"});
 }
 
 // ---- scans
@@ -242,7 +242,7 @@ TEST_F(ImportersScans, ABrokenFrameIsAnErrorAndLeavesNothing) {
   write_ply(dir / "in/1.ply", Mesh{person({0, 0, 0}), {}});
   write_bytes(dir / "in/2.ply", "ply\n");
   EXPECT_HAS(error_of([&] { import_data(dir / "in", dir / "o.h5"); }), "2.ply");
-  EXPECT_EQ(names_in(dir.path()), std::vector<std::string>{"in"});
+  EXPECT_EQ(names_in(dir.path()), Names{"in"});
   // A single mesh or cloud is a sequence of one frame.
   const ImportSummary one = import_data(dir / "in/1.ply", dir / "o.h5");
   EXPECT_EQ(one.frames, 1u);

@@ -9,7 +9,7 @@
 
 #include "datasets/importers/bvh.h"
 #include "datasets/importers/source_motion.h"
-#include "tests/datasets/importers_bvh_styles.h"
+#include "tests/datasets/importers_bvh_text.h"
 #include "tests/datasets/importers_support.h"
 
 namespace restage {
@@ -303,9 +303,9 @@ TEST_F(ImportersProfiles, MistakesAreNamedWithLineAndNearestName) {
       {good + "places: {head: {from: neck, to: neck}}\n", "not known here"},
       {good + std::string(70000, '#'), "longer than"}};
   for (const auto& [yaml, says] : cases) EXPECT_HAS(complaint(yaml), says);
-  for (const std::string& bad : std::vector<std::string>{
-           "", "- a\n", "title: [\n", "\t", "a: &b [*b]\n", "title: {a: b}\n", "%YAML 9.9\n---\n",
-           "title: x\njoints: 3\n", "title: " + std::string(20000, '[')})
+  for (const std::string& bad :
+       Names{"", "- a\n", "title: [\n", "\t", "a: &b [*b]\n", "title: {a: b}\n", "%YAML 9.9\n---\n",
+             "title: x\njoints: 3\n", "title: " + std::string(20000, '[')})
     EXPECT_EQ(complaint(bad).find("suit.yaml"), 0u) << bad << ": " << complaint(bad);
   for (size_t cut = 0; cut < good.size(); cut += 7) complaint(good.substr(0, cut));  // no crash
 }

@@ -178,7 +178,7 @@ TEST_F(ReadersArrays, EveryPackingOfZip) {
     }
     write_bytes(dir / "a.npz", zip_of(entries, variant % 3 ? "PK\5\6 a comment" : ""));
     const Npz file(dir / "a.npz");
-    EXPECT_EQ(file.names(), (std::vector<std::string>{"x", "folder/y"}));
+    EXPECT_EQ(file.names(), (Names{"x", "folder/y"}));
     EXPECT_TRUE(file.has("x"));
     EXPECT_FALSE(file.has("readme"));
     const NpyArray x = file.array("x");

@@ -51,7 +51,7 @@ TEST_F(SchemaHdf5, WritesAndReadsEveryTypeShapeAndAttribute) {
   EXPECT_EQ(file.read<float>("/i16", {2}), (std::vector<float>{-32768, 32767}));
   EXPECT_TRUE(file.read<uint8_t>("/u8", {-1, 4}).empty());
   EXPECT_EQ(file.dataset("/scalar").read<int32_t>(), std::vector<int32_t>{7});
-  EXPECT_EQ(file.children(), (std::vector<std::string>{"g", "f", "i64", "i16", "u8", "scalar"}));
+  EXPECT_EQ(file.children(), (Names{"g", "f", "i64", "i16", "u8", "scalar"}));
   EXPECT_EQ(file.text("/", "note"), "metres, \xc3\xa9");
   EXPECT_EQ(file.text("/g", "empty"), "");
   EXPECT_EQ(file.text("/", "absent"), std::nullopt);
@@ -96,7 +96,7 @@ TEST_F(SchemaHdf5, EqualContentIsEqualBytesAndAbandonedFilesLeaveNothing) {
   }
   EXPECT_EQ(bytes_of(dir / "a.h5"), bytes_of(dir / "b.h5"));
   { h5::File::create(dir / "c.h5").write<float>("/x", {1}, std::vector<float>{1}); }
-  EXPECT_EQ(names_in(dir.path()), (std::vector<std::string>{"a.h5", "b.h5"}));
+  EXPECT_EQ(names_in(dir.path()), (Names{"a.h5", "b.h5"}));
 }
 
 TEST_F(SchemaHdf5, SaysWhatIsWrongWithAFile) {
@@ -197,7 +197,7 @@ TEST_F(SchemaHdf5, RefusesClaimsThatTheFileCannotKeep) {
 TEST_F(SchemaHdf5, AFileThatCannotBeWalkedToItsEndIsRefusedWhole) {
   const std::string path = dir / "old.h5";
   write_old_layout(path);
-  EXPECT_EQ(h5::File::open(path).children(), std::vector<std::string>{"joints"});
+  EXPECT_EQ(h5::File::open(path).children(), Names{"joints"});
   std::string bytes = bytes_of(path);
   ASSERT_EQ(bytes.substr(136, 4), "TREE") << "the library lays the file out in another way";
   bytes.replace(128, 8, 8, '\xff');  // the address of the names
@@ -296,7 +296,7 @@ TEST_F(SchemaHdf5, ReadsForeignByteOrdersAndText) {
   }
   const h5::File file = h5::File::open(path);
   EXPECT_EQ(file.read<double>("/big", {2}), (std::vector<double>{0.5, -3}));
-  EXPECT_EQ(file.dataset("/names").read_text(), (std::vector<std::string>{"left_hip", ""}));
+  EXPECT_EQ(file.dataset("/names").read_text(), (Names{"left_hip", ""}));
   EXPECT_EQ(file.text("/", "kind"), "left_hip");
 }
 

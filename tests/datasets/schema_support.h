@@ -16,6 +16,8 @@
 
 namespace restage::test {
 
+using Names = std::vector<std::string>;
+
 /// Writes a file, and the folders above it; its path.
 inline std::string write_bytes(const std::string& path, const std::string& content) {
   std::filesystem::create_directories(std::filesystem::path(path).parent_path());
@@ -60,8 +62,13 @@ inline std::string bytes_of(const std::string& path) {
   return out.str();
 }
 
-inline std::vector<std::string> names_in(const std::string& folder) {
-  std::vector<std::string> names;
+/// `text` with another word in the place of the first `from`.
+inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  return text.replace(text.find(from), from.size(), to);  // std::out_of_range without `from`
+}
+
+inline Names names_in(const std::string& folder) {
+  Names names;
   for (const auto& item : std::filesystem::directory_iterator(folder))
     names.push_back(item.path().filename().string());
   std::sort(names.begin(), names.end());

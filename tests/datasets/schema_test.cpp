@@ -200,7 +200,7 @@ TEST_F(Schema, PredictionWriterStreamsAndIsAtomic) {
   EXPECT_EQ(p.vertices[4 * 9], 4.0);
   EXPECT_NEAR(p.joints[4 * 66 + 3], 5 * 0.09, 1e-6);
   { PredictionWriter abandoned(dir / "q.h5", 0, {}, kInfo); }
-  EXPECT_EQ(names_in(dir.path()), std::vector<std::string>{"p.h5"});
+  EXPECT_EQ(names_in(dir.path()), Names{"p.h5"});
 }
 
 TEST_F(Schema, RefusesEveryBadPrediction) {

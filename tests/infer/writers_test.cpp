@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstring>
 #include <numbers>
-#include <sstream>
 
+#include "datasets/readers/bvh.h"
 #include "infer/writers/bvh.h"
 #include "infer/writers/frames.h"
 #include "infer/writers/glb.h"
@@ -208,90 +208,38 @@ TEST(GlbInfluences, RowsOfAnySharpness) {
 // ---- BVH and frames
 // --------------------------------------------------------------------------------
 
-// A reader of what the writer promises: names, offsets and channels by depth-first order.
-struct ReadBvh {
-  std::vector<std::string> names;
-  std::vector<int> parents;
-  std::vector<Vec3> offsets;
-  size_t frames = 0;
-  double frame_time = 0;
-  std::vector<std::vector<double>> rows;
-};
-
-ReadBvh read_bvh(const std::string& path) {
-  ReadBvh bvh;
-  std::ifstream in(path);
-  std::string word, line;
-  std::vector<int> stack;
-  int pending = -1;
-  while (in >> word && word != "MOTION") {
-    if (word == "ROOT" || word == "JOINT") {
-      in >> word;
-      bvh.names.push_back(word);
-      bvh.parents.push_back(stack.empty() ? -1 : stack.back());
-      pending = static_cast<int>(bvh.names.size()) - 1;
-    } else if (word == "End") {
-      pending = -2;
-    } else if (word == "{") {
-      stack.push_back(pending);
-    } else if (word == "}") {
-      stack.pop_back();
-    } else if (word == "OFFSET") {
-      Vec3 v;
-      in >> v.x() >> v.y() >> v.z();
-      if (stack.back() >= 0) bvh.offsets.push_back(v);
-    }
-  }
-  in >> word >> bvh.frames >> word >> word >> bvh.frame_time;
-  std::getline(in, line);
-  while (std::getline(in, line)) {
-    std::istringstream row(line);
-    bvh.rows.emplace_back(std::istream_iterator<double>(row), std::istream_iterator<double>());
-  }
-  return bvh;
-}
-
 TEST_F(WritersTest, BvhPosesTheSameJoints) {
   const Body body = toy_body();
   BvhWriter writer(dir / "walk.bvh", body.joints);
   for (int f = 0; f < 12; ++f) writer.push(toy_pose(body, f / 12.0));
   EXPECT_FALSE(fs::exists(dir / "walk.bvh"));
   writer.commit();
-  const ReadBvh bvh = read_bvh(dir / "walk.bvh");
-  ASSERT_EQ(bvh.names.size(), 22u);
-  EXPECT_EQ(bvh.frames, 12u);
-  ASSERT_EQ(bvh.rows.size(), 12u);
+  const BvhFile bvh = parse_bvh(bytes_of(dir / "walk.bvh"), "walk.bvh");
+  ASSERT_EQ(bvh.skeleton.size(), 22u);
+  ASSERT_EQ(bvh.channel_count, 69u);
+  ASSERT_EQ(bvh.frames.size(), 12u);
   EXPECT_DOUBLE_EQ(bvh.frame_time, 1.0 / 30.0);
-  std::vector<double> last;
   for (size_t f = 0; f < 12; ++f) {
-    const auto& row = bvh.rows[f];
-    ASSERT_EQ(row.size(), 69u);
+    const std::vector<double>& row = bvh.frames[f];
     const PosedSkeleton truth =
         forward_kinematics(body.joints, toy_pose(body, static_cast<double>(f) / 12));
     std::vector<Vec3> at(22);
-    std::vector<Mat3> turned(22);
+    std::vector<Quat> turned(22);
     for (size_t i = 0; i < 22; ++i) {
-      const double* a = &row[3 + 3 * i];
-      const double degree = std::numbers::pi / 180;
-      const Mat3 local = (Eigen::AngleAxisd(a[0] * degree, Vec3::UnitZ()) *
-                          Eigen::AngleAxisd(a[1] * degree, Vec3::UnitY()) *
-                          Eigen::AngleAxisd(a[2] * degree, Vec3::UnitX()))
-                             .toRotationMatrix();
-      const int p = bvh.parents[i];
-      turned[i] = p < 0 ? local : Mat3(turned[static_cast<size_t>(p)] * local);
+      const auto p = static_cast<size_t>(std::max(bvh.skeleton.parents[i], 0));
+      turned[i] = i == 0 ? Quat::Identity() : turned[p];
       at[i] =
-          p < 0
-              ? Vec3(row[0], row[1], row[2])
-              : Vec3(at[static_cast<size_t>(p)] + turned[static_cast<size_t>(p)] * bvh.offsets[i]);
-      const auto joint =
-          std::find(kJointNames.begin(), kJointNames.end(), bvh.names[i]) - kJointNames.begin();
-      ASSERT_LT(joint, 22);
-      EXPECT_LT((at[i] / 100 - truth.joints[static_cast<size_t>(joint)]).norm(), 1e-6)
-          << bvh.names[i];
+          i == 0 ? Vec3(row[0], row[1], row[2]) : Vec3(at[p] + turned[p] * bvh.skeleton.offsets[i]);
+      for (size_t k = i == 0 ? 3 : 0; k < bvh.channels[i].size(); ++k)
+        turned[i] = turned[i] * channel_rotation(bvh.channels[i][k], row[bvh.first_channel[i] + k]);
+      const std::string& name = bvh.skeleton.names[i];
+      const auto joint = std::find(kJointNames.begin(), kJointNames.end(), name);
+      ASSERT_NE(joint, kJointNames.end()) << name;
+      const Vec3& wanted = truth.joints[static_cast<size_t>(joint - kJointNames.begin())];
+      EXPECT_LT((at[i] / 100 - wanted).norm(), 1e-6) << name;
     }
-    for (size_t k = 3; k < last.size(); ++k)
-      EXPECT_LT(std::abs(row[k] - last[k]), 120) << "channel " << k;
-    last = row;
+    for (size_t k = 3; f > 0 && k < row.size(); ++k)
+      EXPECT_LT(std::abs(row[k] - bvh.frames[f - 1][k]), 120) << "channel " << k;
   }
 }
 

@@ -80,6 +80,19 @@ inline Motion tiny_motion(const std::string& id, const std::string& subject,
   return motion;
 }
 
+/// Where a motion has its skeleton's joints in a frame.
+inline Joints motion_joints(const Motion& motion, size_t frame) {
+  Pose pose;
+  Rotations global;
+  for (size_t j = 0; j < kJoints; ++j)
+    global[j] = motion.global[frame][j].cast<double>().toRotationMatrix();
+  pose.local = to_local(global);
+  Joints out = forward_kinematics(motion.rest, pose).joints;
+  const Vec3 move = motion.hips[frame].cast<double>() - 0.5 * (out[1] + out[2]);
+  for (Vec3& x : out) x += move;
+  return out;
+}
+
 /// 3 + 2 + 2 bodies and 3 + 2 + 2 motions (one of them of ten frames only).
 inline Corpus tiny_corpus() {
   Corpus out;
