@@ -395,7 +395,7 @@ std::string obj_of(const Mesh& mesh) {
 
 /// A person in T-pose, as a scan of some hundred points and as a surface of boxes; nobody.
 Seeds people_seeds() {
-  const Body body = builtin_body(0, "fuzz", 0);
+  const Body body = builtin_body(0, "test", 0);
   const Points scan = SurfaceSampler(body).draw(RngKey{1, 0}, 400).on_rest(body);
   const Mesh sheet{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0.02f}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}}};
   return {{"scan", obj_of({scan, {}}), Cut::never_cut},
