@@ -160,7 +160,6 @@ def calls(i, model, good, frames):
     yield ["weights", "show", model], [], False
     yield ["eval", "--pred", model, "--truth", result], [], False
     yield ["eval", "--pred", result, "--truth", model], [], False
-    yield ["train", model], [], False
 
 
 def main():

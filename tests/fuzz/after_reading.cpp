@@ -18,8 +18,7 @@
 namespace restage::fuzz {
 namespace {
 
-/// Three in sixteen inputs are taken one way, three the next: what an input is taken for must be a
-/// function of its bytes.
+/// Which of some ways an input is taken: the same for the same bytes.
 int way_of(const std::string& bytes, int ways) {
   return std::stoi(checksum(bytes).substr(0, 4), nullptr, 16) % ways;
 }
