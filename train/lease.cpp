@@ -236,7 +236,7 @@ struct Lease::State {
   std::atomic<bool> lost = false;
   std::mutex mutex;
   std::condition_variable wake;
-  bool ending = false, forgotten = false;
+  bool held = false, ending = false, forgotten = false;
   std::thread thread;
 
   /// Somebody linked the next number, or removed ours after finishing the work.
@@ -278,7 +278,7 @@ struct Lease::State {
     }
     wake.notify_all();
     if (thread.joinable()) thread.join();
-    if (forgotten || superseded()) return;
+    if (!held || forgotten || superseded()) return;
     record.released = true;
     write();
   }
@@ -319,6 +319,7 @@ std::optional<Lease> Lease::take(const std::string& path, const std::string& who
         number = last_number(path);
         continue;
       }
+      state->held = true;
       state->thread = std::thread([raw = state.get()] { raw->beat_until_end(); });
       return Lease(std::move(state));
     }
