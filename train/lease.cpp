@@ -106,16 +106,28 @@ std::string numbered(const std::string& path, int64_t number) {
   return path + "." + std::to_string(number);
 }
 
-/// Nothing: no such file. A file that is not a lease's counts as one of a dead holder.
-std::optional<Record> read_record(const std::string& file) {
+/// The first bytes of a file; nothing: no such file.
+std::optional<std::string> read_bytes(const std::string& file) {
   const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
   if (fd < 0) return std::nullopt;
   std::string bytes(kRecord, ' ');
   const ssize_t n = ::pread(fd, bytes.data(), bytes.size(), 0);
   ::close(fd);
   bytes.resize(n > 0 ? static_cast<size_t>(n) : 0);
+  return bytes;
+}
+
+/// Nothing: no such file. One that stays unreadable for a while is damaged, and nobody's.
+std::optional<Record> read_record(const std::string& file) {
+  constexpr int kLooks = 10;
+  nlohmann::json json;
+  for (int look = 0; look < kLooks && !json.is_object(); ++look) {
+    if (look > 0) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    const std::optional<std::string> bytes = read_bytes(file);
+    if (!bytes) return std::nullopt;
+    json = nlohmann::json::parse(*bytes, nullptr, false);
+  }
   Record out;
-  const auto json = nlohmann::json::parse(bytes, nullptr, false);
   const auto text = [&](const char* key) {
     const auto found = json.find(key);
     return found != json.end() && found->is_string() ? found->get<std::string>() : std::string();
