@@ -90,8 +90,7 @@ struct Record {
     const nlohmann::ordered_json json = {{"host", holder.host}, {"pid", holder.pid},
                                          {"who", holder.who},   {"start", start},
                                          {"world", world},      {"token", token}};
-    std::string out =
-        json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+    std::string out = json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
     char changing[80];
     std::snprintf(changing, sizeof changing, ",\"released\":%d,\"beat\":%20lld}", released ? 1 : 0,
                   static_cast<long long>(holder.beat));
@@ -261,7 +260,8 @@ struct Lease::State {
     const int fd = ::open(file.c_str(), O_WRONLY | O_CLOEXEC);
     if (fd < 0) return false;
     const std::string text = record.text();
-    const bool good = ::pwrite(fd, text.data(), text.size(), 0) == static_cast<ssize_t>(text.size());
+    const bool good =
+        ::pwrite(fd, text.data(), text.size(), 0) == static_cast<ssize_t>(text.size());
     return ::close(fd) == 0 && good;
   }
   void beat_until_end() {

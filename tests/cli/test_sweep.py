@@ -154,6 +154,7 @@ class BadSweeps(Sweep):
             (base + "evaluate: {benchmarks: nowhere}\n", 2, "'benchmark'"),
             (base + "retries: many\n", 2, "retries"),
             (base + "early_stop: {metric: motion.pa_mpjpe, rule: best}\n", 2, "median"),
+            (base + "early_stop: {metric: motion.pa_mpjpe}\n", 2, "yet"),
         ]
         for text, line, *contains in table:
             with self.subTest(text):
