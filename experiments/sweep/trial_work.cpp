@@ -101,7 +101,8 @@ RunDir open_run(const std::string& folder, const TrainConfig& config, const Corp
   const std::string run = folder + "/run";
   if (fs::exists(run)) return RunDir::resume(run, config.stages);
   RunInput input{config.seed, threads(), {"restage", "trial"}, {}};
-  if (config.data.source != "builtin") input.data.push_back({config.data.source, checksum(data)});
+  if (config.data.source != "builtin")
+    input.data.push_back({config.data.source, checksum(data)});
   return RunDir::create_at(run, resolved_yaml(config), provenance_json(input), config.stages);
 }
 
@@ -207,7 +208,8 @@ TrialOutcome run_trial(const std::string& config_yaml_path, const std::string& i
                        const std::string& folder, bool quiet) {
   const ConfigNode tree = load_config_tree(config_yaml_path);
   const TrainConfig config = read(tree);
-  if (!evaluate.benchmark.empty()) throw WorkError("trials cannot be measured on a benchmark yet");
+  if (!evaluate.benchmark.empty())
+    throw WorkError("trials cannot be measured on a benchmark yet");
   TrialOutcome out;
   const PlannedTrial planned = TrialPlanner(evaluate, store).plan(tree);
   if (planned.id != id)
@@ -222,12 +224,11 @@ TrialOutcome run_trial(const std::string& config_yaml_path, const std::string& i
     const Corpus data = load_corpus(config.data, "train");
     const Corpus validation = load_corpus(config.data, "validation");
     RunDir run = open_run(folder, config, data);
-    save_models(weights, train(
-                             run, config.stages, config.loop,
-                             [&](const std::string& stage) {
-                               return make_stage(stage, config, data, validation);
-                             },
-                             quiet, config.precision));
+    save_models(weights,
+                train(
+                    run, config.stages, config.loop,
+                    [&](const std::string& stage) { return make_stage(stage, config, data, validation); },
+                    quiet, config.precision));
   }
   throw_if_stopped();
   out.metrics = evaluate_held_out(load_models(weights, {}), config);
