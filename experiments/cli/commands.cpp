@@ -1,6 +1,8 @@
 #include "experiments/cli/commands.h"
 
 namespace restage::cli {
+void add_sweep(Program& program);
+void add_trial(Program& program);
 
 void add_commands(Program& program) {
   add_train(program);

@@ -22,9 +22,7 @@ void add_register(Program& program);
 void add_render(Program& program);
 void add_retarget(Program& program);
 void add_skeleton(Program& program);
-void add_sweep(Program& program);
 void add_train(Program& program);
-void add_trial(Program& program);
 void add_weights(Program& program);
 
 /// Adds every command, in the order of `restage --help`.
