@@ -90,8 +90,7 @@ struct Record {
     const nlohmann::ordered_json json = {{"host", holder.host}, {"pid", holder.pid},
                                          {"who", holder.who},   {"start", start},
                                          {"world", world},      {"token", token}};
-    std::string out =
-        json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+    std::string out = json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
     char changing[80];
     std::snprintf(changing, sizeof changing, ",\"released\":%d,\"beat\":%20lld}", released ? 1 : 0,
                   static_cast<long long>(holder.beat));
@@ -106,16 +105,28 @@ std::string numbered(const std::string& path, int64_t number) {
   return path + "." + std::to_string(number);
 }
 
-/// Nothing: no such file. A file that is not a lease's counts as one of a dead holder.
-std::optional<Record> read_record(const std::string& file) {
+/// The first bytes of a file; nothing: no such file.
+std::optional<std::string> read_bytes(const std::string& file) {
   const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
   if (fd < 0) return std::nullopt;
   std::string bytes(kRecord, ' ');
   const ssize_t n = ::pread(fd, bytes.data(), bytes.size(), 0);
   ::close(fd);
   bytes.resize(n > 0 ? static_cast<size_t>(n) : 0);
+  return bytes;
+}
+
+/// Nothing: no such file. One that stays unreadable for a while is damaged, and nobody's.
+std::optional<Record> read_record(const std::string& file) {
+  constexpr int kLooks = 10;
+  nlohmann::json json;
+  for (int look = 0; look < kLooks && !json.is_object(); ++look) {
+    if (look > 0) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    const std::optional<std::string> bytes = read_bytes(file);
+    if (!bytes) return std::nullopt;
+    json = nlohmann::json::parse(*bytes, nullptr, false);
+  }
   Record out;
-  const auto json = nlohmann::json::parse(bytes, nullptr, false);
   const auto text = [&](const char* key) {
     const auto found = json.find(key);
     return found != json.end() && found->is_string() ? found->get<std::string>() : std::string();
@@ -236,7 +247,7 @@ struct Lease::State {
   std::atomic<bool> lost = false;
   std::mutex mutex;
   std::condition_variable wake;
-  bool ending = false, forgotten = false;
+  bool held = false, ending = false, forgotten = false;
   std::thread thread;
 
   /// Somebody linked the next number, or removed ours after finishing the work.
@@ -249,7 +260,8 @@ struct Lease::State {
     const int fd = ::open(file.c_str(), O_WRONLY | O_CLOEXEC);
     if (fd < 0) return false;
     const std::string text = record.text();
-    const bool good = ::pwrite(fd, text.data(), text.size(), 0) == static_cast<ssize_t>(text.size());
+    const bool good =
+        ::pwrite(fd, text.data(), text.size(), 0) == static_cast<ssize_t>(text.size());
     return ::close(fd) == 0 && good;
   }
   void beat_until_end() {
@@ -278,7 +290,7 @@ struct Lease::State {
     }
     wake.notify_all();
     if (thread.joinable()) thread.join();
-    if (forgotten || superseded()) return;
+    if (!held || forgotten || superseded()) return;
     record.released = true;
     write();
   }
@@ -319,6 +331,7 @@ std::optional<Lease> Lease::take(const std::string& path, const std::string& who
         number = last_number(path);
         continue;
       }
+      state->held = true;
       state->thread = std::thread([raw = state.get()] { raw->beat_until_end(); });
       return Lease(std::move(state));
     }

@@ -1,5 +1,6 @@
 // Who works on something: a claim that outlives nobody. Several processes, on several hosts that
-// share a file system, may want to make the same artifact or run the same trial; one gets the lease.
+// share a file system, may want to make the same artifact or run the same trial; one gets the
+// lease.
 //
 //   auto lease = Lease::take(dir + "/lease", "trial 4f2a");
 //   if (!lease) return busy(Lease::holder(dir + "/lease"));
@@ -7,16 +8,16 @@
 //   ... work, looking at lease->lost() now and then ...
 //   publish(dir); lease->forget();
 //
-// A lease at `path` is a row of files `path.1`, `path.2`, ...; the last one counts. To take it is to
-// link the next number, which only one process can do; no file is ever taken away from its holder,
-// so there is no moment in which two could hold it, and nothing needs a lock server. A lease is free
-// if there is none, if it says released, or if its holder is dead:
+// A lease at `path` is a row of files `path.1`, `path.2`, ...; the last one counts. To take it is
+// to link the next number, which only one process can do; no file is ever taken away from its
+// holder, so there is no moment in which two could hold it, and nothing needs a lock server. A
+// lease is free if there is none, if it says released, or if its holder is dead:
 //  - on the same host (boot and process namespace) when no process has its number and start time,
 //    which is known at once;
 //  - on another host when its heartbeat, a counter, has not changed during `patience` of our own
 //    monotonic clock. No wall clock is ever read, so one that jumps does not matter.
-// A holder that was suspended for longer than that may have lost its lease: lost() says so, and what
-// it publishes must be the same bytes as its successor's, or be guarded by lost().
+// A holder that was suspended for longer than that may have lost its lease: lost() says so, and
+// what it publishes must be the same bytes as its successor's, or be guarded by lost().
 #pragma once
 
 #include <cstdint>
@@ -38,7 +39,7 @@ struct LeaseOptions {
 struct LeaseHolder {
   std::string host, who;
   int64_t pid = 0, beat = 0;
-  bool here = false;  ///< on this host, so that its number and start time decide
+  bool here = false;         ///< on this host, so that its number and start time decide
   std::string text() const;  ///< "process 12 on host a (trial 4f2a)"
 };
 

@@ -76,9 +76,9 @@ Json plan_json(const SweepPlan& plan) {
                       {"overrides", overrides_json(trial)},
                       {"artifacts", std::move(artifacts)}});
   }
-  return {{"trials", std::move(trials)},
-          {"artifacts",
-           {{"there", plan.there}, {"to_make", plan.to_make}, {"shared", plan.shared}}}};
+  return {
+      {"trials", std::move(trials)},
+      {"artifacts", {{"there", plan.there}, {"to_make", plan.to_make}, {"shared", plan.shared}}}};
 }
 
 std::string plan_text(const SweepPlan& plan) {
@@ -91,15 +91,18 @@ std::string plan_text(const SweepPlan& plan) {
     for (const auto& artifact : trial.artifacts) {
       const int n = uses[artifact.stage + "-" + artifact.id];
       artifacts += (artifacts.empty() ? "" : ", ") + artifact.stage + "-" + artifact.id;
-      artifacts += artifact.there ? " (there)" : n > 1 ? " (shared by " + std::to_string(n) + ")" : "";
+      artifacts += artifact.there ? " (there)"
+                   : n > 1        ? " (shared by " + std::to_string(n) + ")"
+                                  : "";
     }
     const std::string differs = sweep::describe(trial);
     rows.push_back({trial.id, trial.case_name.empty() ? "-" : trial.case_name,
                     std::to_string(trial.seed), differs.empty() ? "-" : differs, artifacts});
   }
-  return markdown_table(rows) + "\n" + std::to_string(plan.trials.size()) + " trials; artifacts: " +
-         std::to_string(plan.there) + " there, " + std::to_string(plan.to_make) + " to make, " +
-         std::to_string(plan.shared) + " shared by several trials\n";
+  return markdown_table(rows) + "\n" + std::to_string(plan.trials.size()) +
+         " trials; artifacts: " + std::to_string(plan.there) + " there, " +
+         std::to_string(plan.to_make) + " to make, " + std::to_string(plan.shared) +
+         " shared by several trials\n";
 }
 
 int run_plan(const PlanOptions& options, const Common& common) {
@@ -167,7 +170,8 @@ std::string status_text(const Json& status) {
     out += trial["id"].get<std::string>() + "  " + trial["state"].get<std::string>();
     if (const std::string name = trial["case"]; !name.empty()) out += "  " + name;
     out += "  seed " + trial["seed"].dump();
-    for (const auto& [key, value] : trial["overrides"].items()) out += "  " + key + "=" + value.dump();
+    for (const auto& [key, value] : trial["overrides"].items())
+      out += "  " + key + "=" + value.dump();
     for (const char* more : {"holder", "error"})
       if (trial[more].is_string()) out += "  " + on_one_line(trial[more]);
     out += "\n";
@@ -179,7 +183,12 @@ std::string status_text(const Json& status) {
 
 /// Planning reads data and builds models; a process of its own takes that memory with it.
 int plan_in_a_process(const RunOptions& options, const Common& common) {
-  std::vector<std::string> words = {"restage", "sweep", "plan", "--out", options.out, "--threads",
+  std::vector<std::string> words = {"restage",
+                                    "sweep",
+                                    "plan",
+                                    "--out",
+                                    options.out,
+                                    "--threads",
                                     std::to_string(common.threads)};
   if (options.seed_given) words.insert(words.end(), {"--seed", std::to_string(common.seed)});
   if (common.quiet) words.emplace_back("--quiet");
@@ -244,7 +253,6 @@ int run_stop(const std::string& path, double wait, const Common& common) {
 
 }  // namespace
 
-void add_sweep(Program& program);
 void add_sweep(Program& program) {
   CLI::App& group = program.add_group("sweep", "many trainings from one file");
 
@@ -296,8 +304,9 @@ void add_sweep(Program& program) {
 
   const auto wait = std::make_shared<double>(60);
   CLI::App& stop = program.add(group, "stop", "running trials write a checkpoint and end",
-                               "restage sweep stop runs/smoothness",
-                               [dir, wait, &program] { return run_stop(*dir, *wait, program.common()); });
+                               "restage sweep stop runs/smoothness", [dir, wait, &program] {
+                                 return run_stop(*dir, *wait, program.common());
+                               });
   stop.add_option("DIR", *dir, "folder of the sweep")->required();
   stop.add_option("--wait", *wait, "seconds to wait for them (60)");
   add_sweep_table(program, group);

@@ -40,8 +40,7 @@ std::vector<Combination> combinations(const SweepFile& file) {
   size_t count = file.cases.size() * std::max<size_t>(1, file.seeds.size());
   for (const Axis& axis : file.axes)
     if ((count *= axis.points.size()) > kMostTrials)
-      throw InputError(file.path,
-                       "gives more than " + std::to_string(kMostTrials) + " trials",
+      throw InputError(file.path, "gives more than " + std::to_string(kMostTrials) + " trials",
                        "vary fewer keys at once");
   std::vector<Combination> out;
   for (const Case& one : file.cases) out.push_back({&one, one.settings});
@@ -91,8 +90,8 @@ std::vector<Combination> without_excluded(const SweepFile& file, std::vector<Com
   for (Combination& combination : all) {
     bool excluded = false;
     for (const Exclusion& exclusion : file.exclude) {
-      const bool hit = std::all_of(
-          exclusion.values.begin(), exclusion.values.end(), [&](const Setting& wanted) {
+      const bool hit =
+          std::all_of(exclusion.values.begin(), exclusion.values.end(), [&](const Setting& wanted) {
             const ConfigNode* value = value_of(wanted.key, combination, file.set);
             return value != nullptr && same_value(*value, wanted.value);
           });
@@ -120,9 +119,10 @@ std::string shown(const Setting& setting) {
     if (value_text(a.settings[i].value) != value_text(b.settings[i].value) ||
         a.settings[i].value.place.column != b.settings[i].value.place.column ||
         a.settings[i].value.place.line != b.settings[i].value.place.line)
-      throw InputError(b.settings[i].value.place.text(),
-                       shown(a.settings[i]) + " and " + shown(b.settings[i]) + " give the same trial",
-                       "leave one out; names, folders and logging change no result");
+      throw InputError(
+          b.settings[i].value.place.text(),
+          shown(a.settings[i]) + " and " + shown(b.settings[i]) + " give the same trial",
+          "leave one out; names, folders and logging change no result");
   throw InputError(b.one->place.text(),
                    "the cases " + in_quotes(a.one->name) + " and " + in_quotes(b.one->name) +
                        " give the same trial",
@@ -219,7 +219,12 @@ class Planner {
 
 }  // namespace
 
-SweepPlan plan_sweep(const SweepFile& file) { return Planner(file).plan(); }
+SweepPlan plan_sweep(const SweepFile& file) {
+  if (file.early_stop)
+    throw InputError(file.early_stop->place.text(), "trials cannot be stopped early yet",
+                     "remove 'early_stop'");
+  return Planner(file).plan();
+}
 
 Forecast measure(const SweepPlan& plan) {
   Forecast out;
@@ -241,7 +246,8 @@ Forecast measure(const SweepPlan& plan) {
 
 std::string describe(const PlannedTrial& trial) {
   std::string out;
-  for (const auto& [key, value] : trial.overrides) out += (out.empty() ? "" : ", ") + key + "=" + value;
+  for (const auto& [key, value] : trial.overrides)
+    out += (out.empty() ? "" : ", ") + key + "=" + value;
   return out;
 }
 

@@ -21,8 +21,8 @@ struct SweepPlan {
 };
 
 /// Every case x grid x zip x seed that is not excluded, in this order, the last fastest. InputError
-/// at file and line: a value that the configuration refuses, a key that no stage reads, an `exclude`
-/// that matches nothing, two combinations that give the same trial.
+/// at file and line: a value that the configuration refuses, a key that no stage reads, an
+/// `exclude` that matches nothing, two combinations that give the same trial.
 SweepPlan plan_sweep(const SweepFile& file);
 
 /// Trains a few steps of every stage that is to be made; trials that differ by their seed alone are

@@ -17,14 +17,15 @@ struct PoolOutcome {
   bool stop_requested = false;  ///< by `restage sweep stop`
 };
 
-/// Runs every trial that is not done, going on after failures. A trial waits while another one makes
-/// an artifact that it needs, if there is one that need not wait. Trials that others are running are
-/// waited for. Throws Interrupted after a signal, when its children have ended (the caller has a
-/// StopScope).
+/// Runs every trial that is not done, going on after failures. A trial waits while another one
+/// makes an artifact that it needs, if there is one that need not wait. Trials that others are
+/// running are waited for. Throws Interrupted after a signal, when its children have ended (the
+/// caller has a StopScope).
 PoolOutcome run_pool(const SweepDir& dir, const PoolOptions& options);
 
 /// Starts this program again with these arguments. `output`: standard output and error go there
 /// (appended); "": the former nowhere, the latter where ours goes. Returns the process. WorkError.
-int spawn_self(const std::vector<std::string>& arguments, const std::string& output, bool own_group);
+int spawn_self(const std::vector<std::string>& arguments, const std::string& output,
+               bool own_group);
 
 }  // namespace restage::sweep

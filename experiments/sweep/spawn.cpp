@@ -29,7 +29,8 @@ int spawn_self(const std::vector<std::string>& arguments, const std::string& out
     posix_spawnattr_setpgroup(&attributes, 0);
   }
   std::vector<char*> words;
-  for (const std::string& argument : arguments) words.push_back(const_cast<char*>(argument.c_str()));
+  for (const std::string& argument : arguments)
+    words.push_back(const_cast<char*>(argument.c_str()));
   words.push_back(nullptr);
   pid_t pid = 0;
   const int code = posix_spawn(&pid, "/proc/self/exe", &files, &attributes, words.data(), environ);

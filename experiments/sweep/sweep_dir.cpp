@@ -209,7 +209,8 @@ SweepDir read_sweep_dir(const std::string& dir) {
     out.evaluate.sets = json.at("evaluate").at("sets").get<std::vector<std::string>>();
     out.retries = json.at("retries");
     for (const Json& entry : json.at("trials")) {
-      TrialEntry trial{entry.at("id"), entry.at("case"), entry.at("seed"), entry.at("overrides"), {}};
+      TrialEntry trial{
+          entry.at("id"), entry.at("case"), entry.at("seed"), entry.at("overrides"), {}};
       for (const auto& [stage, id] : entry.at("artifacts").items())
         trial.artifacts.emplace_back(stage, id);
       out.trials.push_back(std::move(trial));

@@ -24,7 +24,7 @@ namespace restage::sweep {
 struct TrialEntry {
   std::string id, case_name;
   uint64_t seed = 0;
-  Json overrides = Json::object();  ///< typed values
+  Json overrides = Json::object();                             ///< typed values
   std::vector<std::pair<std::string, std::string>> artifacts;  ///< stage, id
 };
 

@@ -17,8 +17,9 @@ namespace {
 namespace fs = std::filesystem;
 using Kind = ConfigNode::Kind;
 
-const std::vector<std::string> kKeys = {"name",    "base",  "set",      "grid",    "zip",       "cases",
-                                        "exclude", "seeds", "evaluate", "retries", "early_stop"};
+const std::vector<std::string> kKeys = {"name",     "base",    "set",       "grid",
+                                        "zip",      "cases",   "exclude",   "seeds",
+                                        "evaluate", "retries", "early_stop"};
 
 [[noreturn]] void fail(const ConfigPlace& place, const std::string& wrong, const std::string& fix) {
   throw InputError(place.text(), wrong, fix);
@@ -156,6 +157,7 @@ EarlyStop early_stop_of(const ConfigNode& node) {
   need(node, Kind::map, "a section such as {metric: motion.pa_mpjpe, rule: median, after: 0.3}");
   check_keys(node, {"metric", "rule", "after"});
   EarlyStop out;
+  out.place = node.key_place;
   const ConfigNode* metric = node.find("metric");
   if (metric == nullptr) fail(node.key_place, "'early_stop' needs a 'metric'", "add it");
   out.metric = number_of<std::string>(*metric, "early_stop.metric", {});
@@ -250,7 +252,8 @@ class Reader {
       return;
     }
     need(*node, Kind::map, "a section of 'name: {key: value}' lines");
-    if (node->children.empty()) fail(node->key_place, "'cases' is empty", "name one, or leave it out");
+    if (node->children.empty())
+      fail(node->key_place, "'cases' is empty", "name one, or leave it out");
     for (const ConfigNode& entry : node->children) {
       Case made{entry.key, entry.key_place, {}};
       if (entry.kind != Kind::null) made.settings = settings_of(entry, "a section {key: value}");

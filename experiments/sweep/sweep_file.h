@@ -49,6 +49,7 @@ struct EarlyStop {
   std::string metric;           ///< "motion.pa_mpjpe": stage and held-out figure of its validation
   std::string rule = "median";  ///< or "asha"
   double after = 0.3;           ///< part of the stage's steps that every trial may do
+  ConfigPlace place;
 };
 
 struct SweepFile {

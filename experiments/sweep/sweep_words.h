@@ -15,8 +15,8 @@ struct SweepWord {
   bool several = false;            ///< an axis (also one of a single value: choice(a))
 };
 
-/// A comma inside quotes, brackets or braces divides nothing. range() leaves `stop` out and may have
-/// no more than 10,000 values; `step` may be left out (1) or negative. InputError otherwise.
+/// A comma inside quotes, brackets or braces divides nothing. range() leaves `stop` out and may
+/// have no more than 10,000 values; `step` may be left out (1) or negative. InputError otherwise.
 SweepWord read_sweep_word(const std::string& text);
 
 }  // namespace restage::sweep

@@ -22,12 +22,14 @@ constexpr double kBeat = 1, kPatience = 20;  // seconds
 
 /// The pool makes log.txt the standard error of its trials; others get a copy of the log there.
 bool is_standard_error(const std::string& path) {
-  struct stat log {}, error {};
+  struct stat log {
+  }, error{};
   return ::stat(path.c_str(), &log) == 0 && ::fstat(STDERR_FILENO, &error) == 0 &&
          log.st_dev == error.st_dev && log.st_ino == error.st_ino;
 }
 
-/// Relative paths in configurations begin where the sweep was planned, wherever an engine starts us.
+/// Relative paths in configurations begin where the sweep was planned, wherever an engine starts
+/// us.
 SweepDir enter(const std::string& path) {
   SweepDir dir = read_sweep_dir(path);
   dir.path = fs::absolute(dir.path).lexically_normal().string();
@@ -35,7 +37,8 @@ SweepDir enter(const std::string& path) {
   std::error_code error;
   fs::current_path(fs::path(dir.path) / dir.directory, error);
   if (error)
-    throw InputError(path, "the folder that it was planned from is not there (" + dir.directory + ")",
+    throw InputError(path,
+                     "the folder that it was planned from is not there (" + dir.directory + ")",
                      "plan it again");
   return dir;
 }

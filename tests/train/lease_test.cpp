@@ -45,7 +45,11 @@ class LeaseTest : public ::testing::Test {
     char digits[24];
     std::snprintf(digits, sizeof digits, "%20d", beat);
     record.replace(at, 20, digits);
-    std::ofstream(path_ + "." + std::to_string(number)) << record;
+    write(number, record);
+  }
+  /// In place, as heartbeats are.
+  void write(int number, const std::string& record) const {
+    std::fstream(path_ + "." + std::to_string(number), std::ios::in | std::ios::out) << record;
   }
 
   std::string folder_, path_;
@@ -101,11 +105,11 @@ TEST_F(LeaseTest, AProcessNumberThatWasUsedAgainIsNotTheHolder) {
   { auto lease = Lease::take(path_, "a"); }
   std::string record = text(1);
   record.replace(record.find("\"released\":") + 11, 1, "0");
-  std::ofstream(path_ + ".1") << record;
+  write(1, record);
   EXPECT_TRUE(Lease::holder(path_)) << "as if this process held it";
   const size_t at = record.find("\"start\":\"") + 9;
   record[at] = record[at] == '9' ? '8' : '9';
-  std::ofstream(path_ + ".1") << record;
+  write(1, record);
   EXPECT_FALSE(Lease::holder(path_));
   EXPECT_TRUE(Lease::take(path_, "b"));
 }
