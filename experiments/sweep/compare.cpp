@@ -42,7 +42,10 @@ void flatten(const ConfigNode& node, const std::string& key,
   }
 }
 
+/// Adds the lines of a metrics.jsonl, if it is there.
 void read_curves(const std::string& path, Compared* out) {
+  std::error_code ignored;
+  if (!fs::exists(path, ignored)) return;
   std::istringstream lines(read_file(path));
   for (std::string line; std::getline(lines, line);) {
     const auto entry = nlohmann::json::parse(line, nullptr, false);
@@ -53,7 +56,19 @@ void read_curves(const std::string& path, Compared* out) {
       if (name != "step" && value.is_number())
         out->curves[prefix + name].emplace_back(entry["step"].get<double>(), value.get<double>());
   }
-  for (const auto& [name, curve] : out->curves) out->figures[name] = curve.back().second;
+}
+
+/// The figures of a trial that is over, and the curves of the artifacts that it used.
+void read_trial(const fs::path& folder, Compared* out) {
+  const TrialResult result =
+      read_result((folder / "result.json").string(), folder.filename().string());
+  for (const auto& [set, values] : result.sets)
+    for (const auto& [name, value] : values.mean) out->figures[set + ": " + name] = value;
+  const std::string store = store_of(folder.parent_path().parent_path().string());
+  if (store.empty()) return;
+  for (const auto& [stage, id] : result.artifacts)
+    if (is_trial_id(id) && stage.find('/') == std::string::npos)
+      read_curves(store + "/" + stage + "-" + id + "/metrics.jsonl", out);
 }
 
 std::string value_or_dash(const Compared& run, const std::string& key) {
@@ -110,19 +125,15 @@ void draw_panel(const std::vector<Compared>& all, const std::string& name, doubl
 Compared read_compared(const std::string& folder) {
   Compared out;
   out.name = folder;
-  const std::string config = folder + "/config.yaml", metrics = folder + "/metrics.jsonl",
-                    result = folder + "/result.json";
+  const std::string config = folder + "/config.yaml";
   std::error_code ignored;
   if (!fs::exists(config, ignored))
     throw InputError(folder, "is neither a run nor a trial (it has no config.yaml)",
                      "give folders of 'restage train' or DIR/trials/ID of a sweep");
   flatten(parse_yaml(read_file(config, kConfigMaxBytes), config), "", &out.config);
-  if (fs::exists(metrics, ignored)) read_curves(metrics, &out);
-  if (fs::exists(result, ignored)) {
-    const std::string id = fs::canonical(folder).filename().string();
-    for (const auto& [set, values] : read_result(result, id).sets)
-      for (const auto& [name, value] : values.mean) out.figures[set + ": " + name] = value;
-  }
+  read_curves(folder + "/metrics.jsonl", &out);
+  if (fs::exists(folder + "/result.json", ignored)) read_trial(fs::canonical(folder), &out);
+  for (const auto& [name, curve] : out.curves) out.figures[name] = curve.back().second;
   return out;
 }
 

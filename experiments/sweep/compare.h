@@ -1,5 +1,6 @@
 // Runs and trials side by side: what differs in their configurations, their final figures, their
-// curves. A run is a folder of `restage train`; a trial is DIR/trials/ID of a sweep.
+// curves. A run is a folder of `restage train`; a trial is DIR/trials/ID of a sweep, whose curves
+// are those of the artifacts that it used (STORE/STAGE-ID/metrics.jsonl).
 #pragma once
 
 #include <map>

@@ -64,6 +64,7 @@ class Tables(CliTest):
         table = json.loads(result.out)
         self.assertEqual((table["trials"]["failed"], table["trials"]["damaged"], table["rows"][0]["n"]), (1, 1, 1))
         self.assertIsNone(table["rows"][0]["metrics"]["naked"]["mpjpe"]["deviation"])
+        self.bad_input(["sweep", "table", "s", "--out", "nowhere/t.csv"], "nowhere/t.csv")
 
     def test_bad_input(self):
         self.bad_input(["sweep", "table", "nowhere"], "nowhere", "trials")
@@ -90,6 +91,10 @@ class Tables(CliTest):
         self.done("compare", one, two, "--out", "curves/")
         self.assertEqual(self.bytes("curves/curves.svg"), self.bytes("c.svg"))
         self.assertIn("the same", self.done("compare", one, one))
+        os.remove(self.path(one + "/metrics.jsonl"))  # a trial's curves are those of its artifacts
+        self.write("s/plan.json", json.dumps({"trials": [], "directory": "..", "store": "runs/store"}))
+        self.write("runs/store/motion-000000000000/metrics.jsonl", '{"step": 3, "stage": "motion", "loss": 7}\n')
+        self.assertEqual(self.json("compare", one, two)["runs"][0]["metrics"]["motion.loss"], 7)
         self.bad_input(["compare", "s"], "neither a run nor a trial")
         self.bad_input(["compare", one, "--out", "c.png"], ".svg")
 

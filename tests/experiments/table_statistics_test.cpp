@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "autograd/base/rng.h"
