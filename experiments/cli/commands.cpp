@@ -12,6 +12,7 @@ void add_commands(Program& program) {
   add_skeleton(program);
   add_data(program);
   add_eval(program);
+  add_compare(program);
   add_render(program);
   add_info(program);
   add_weights(program);

@@ -6,6 +6,7 @@
 
 namespace restage::cli {
 
+void add_compare(Program& program);
 void add_data(Program& program);
 void add_data_build(Program& program, CLI::App& group);  // of `data`, as all add_data_*
 void add_data_fetch(Program& program, CLI::App& group);

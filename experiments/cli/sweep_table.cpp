@@ -35,9 +35,10 @@ int run_table(Arguments a, const Common& common) {
   a.options.seed = common.seed;
   const tables::Results results = tables::read_results(a.dir);
   const tables::Table table = tables::make_table(results, a.options);
+  if (!a.out.empty()) write_file_atomically(a.out, tables::to_format(table, results, a.out));
+  // Bad input has one line, so notices come after all that can still be wrong.
   for (const auto* notices : {&results.notices, &table.notices})
     for (const std::string& notice : *notices) log_warning(on_one_line(notice));
-  if (!a.out.empty()) write_file_atomically(a.out, tables::to_format(table, results, a.out));
   if (common.json) {
     Json document = tables::to_json(table, results);
     document["seed"] = common.seed;

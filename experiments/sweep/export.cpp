@@ -1,6 +1,7 @@
 #include "experiments/sweep/export.h"
 
 #include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <set>
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <set>
 #include <tuple>
 
@@ -226,6 +227,19 @@ std::optional<std::vector<PlannedTrial>> read_plan(const std::string& dir) {
       reader.fail("has the trial " + plan.back().id + " twice");
   }
   return plan;
+}
+
+std::string store_of(const std::string& dir) {
+  std::error_code ignored;
+  if (!fs::exists(dir + "/plan.json", ignored)) return "";
+  const Json plan = Json::parse(read_file(dir + "/plan.json", kMaxBytes), nullptr, false);
+  const auto text = [&](const char* key) {
+    return plan.is_object() && plan.contains(key) && plan[key].is_string()
+               ? plan[key].get<std::string>()
+               : "";
+  };
+  // The store is seen from where the sweep was planned, and that place from the sweep's folder.
+  return text("store").empty() ? "" : (fs::path(dir) / text("directory") / text("store")).string();
 }
 
 TrialResult read_result(const std::string& path, const std::string& id) {

@@ -55,6 +55,8 @@ bool is_trial_id(const std::string& text);
 /// DIR/plan.json, the document of `restage sweep plan --json`; nothing if it is not there.
 /// InputError: damaged.
 std::optional<std::vector<PlannedTrial>> read_plan(const std::string& dir);
+/// The folder of artifacts as DIR/plan.json names it; empty if it does not.
+std::string store_of(const std::string& dir);
 /// One result file. InputError: damaged, or the result of another trial.
 TrialResult read_result(const std::string& path, const std::string& id);
 /// All trials of a sweep. InputError: `dir` holds no sweep.

@@ -1,7 +1,9 @@
 // The few shapes that our plots are made of, as SVG text.
 #pragma once
 
+#include <cstddef>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace restage::tables {

@@ -164,6 +164,44 @@ std::string tex_line(const std::vector<std::string>& cells) {
   return line + " \\\\\n";
 }
 
+// ---- SVG ---------------------------------------------------------------------------------------
+
+constexpr double kPanel = 220, kTop = 34, kStep = 18;  ///< width, room for titles, height of a row
+constexpr size_t kLongestLabel = 70;
+
+void draw_labels(const Table& table, double x, double y, Svg* svg) {
+  for (size_t r = 0; r < table.rows.size(); ++r) {
+    const std::string& label = table.rows[r].label;
+    svg->text(x, y + kStep * (static_cast<double>(r) + 0.5) + 4,
+              label.size() <= kLongestLabel ? label : label.substr(0, kLongestLabel - 3) + "...",
+              "end");
+  }
+}
+
+/// A column with a value: dots and intervals of all rows below each other.
+void draw_panel(const Table& table, size_t set, size_t column, double x, double y, Svg* svg) {
+  const double bottom = y + kStep * static_cast<double>(table.rows.size());
+  double low = 1e300, high = -1e300;
+  for (const Row& row : table.rows)
+    if (const Estimate& e = row.cells[set][column].value; e.mean) {
+      low = std::min(low, e.low.value_or(*e.mean));
+      high = std::max(high, e.high.value_or(*e.mean));
+    }
+  const Axis axis(low, high, x, x + kPanel);
+  svg->text(x, y - 10, table.sets[set] + ": " + heading(*table.columns[column]), "start", 12);
+  for (const double mark : axis.marks()) {
+    svg->line(axis.at(mark), y, axis.at(mark), bottom, "#ddd");
+    svg->text(axis.at(mark), bottom + 14, short_number(mark), "middle", 10, "#555");
+  }
+  for (size_t r = 0; r < table.rows.size(); ++r) {
+    const double at = y + kStep * (static_cast<double>(r) + 0.5);
+    const Estimate& e = table.rows[r].cells[set][column].value;
+    if (!e.mean) continue;
+    if (e.low) svg->line(axis.at(*e.low), at, axis.at(*e.high), at, colour_of(r), 2);
+    svg->dot(axis.at(*e.mean), at, 3.5, colour_of(r));
+  }
+}
+
 // ---- JSON --------------------------------------------------------------------------------------
 
 Json number(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
@@ -259,48 +297,26 @@ std::string to_tex(const Table& table, const Results& results) {
 }
 
 std::string to_svg(const Table& table) {
-  constexpr double kPanel = 220, kGap = 30, kTop = 34, kStep = 18;
   size_t longest = 4;
   for (const Row& row : table.rows) longest = std::max(longest, row.label.size());
-  const double left = 20 + 6.2 * static_cast<double>(std::min<size_t>(longest, 70));
-  const double plot = kStep * static_cast<double>(table.rows.size()), height = kTop + plot + 40;
+  const double left = 20 + 6.2 * static_cast<double>(std::min(longest, kLongestLabel));
   Svg svg;
-  double width = left + kPanel, bottom = 0;
+  double width = left + kPanel, y = kTop;
   for (size_t s = 0; s < table.sets.size(); ++s) {
     const std::vector<size_t> columns = filled(table, s);
-    for (size_t i = 0; i < columns.size(); ++i) {
-      const double x = left + (kPanel + kGap) * static_cast<double>(i), y = bottom + kTop;
+    if (columns.empty()) continue;
+    draw_labels(table, left - 10, y, &svg);
+    double x = left;
+    for (const size_t c : columns) {
+      draw_panel(table, s, c, x, y, &svg);
       width = std::max(width, x + kPanel);
-      double low = 1e300, high = -1e300;
-      for (const Row& row : table.rows)
-        if (const Estimate& e = row.cells[s][columns[i]].value; e.mean) {
-          low = std::min(low, e.low.value_or(*e.mean));
-          high = std::max(high, e.high.value_or(*e.mean));
-        }
-      const Axis axis(low, high, x, x + kPanel);
-      svg.text(x, y - 10, table.sets[s] + ": " + heading(*table.columns[columns[i]]), "start", 12);
-      for (const double mark : axis.marks()) {
-        svg.line(axis.at(mark), y, axis.at(mark), y + plot, "#ddd");
-        svg.text(axis.at(mark), y + plot + 14, short_number(mark), "middle", 10, "#555");
-      }
-      for (size_t r = 0; r < table.rows.size(); ++r) {
-        const double at = y + kStep * (static_cast<double>(r) + 0.5);
-        if (i == 0) {
-          const std::string& label = table.rows[r].label;
-          svg.text(left - 10, at + 4, label.size() <= 70 ? label : label.substr(0, 67) + "...",
-                   "end");
-        }
-        const Estimate& e = table.rows[r].cells[s][columns[i]].value;
-        if (!e.mean) continue;
-        if (e.low) svg.line(axis.at(*e.low), at, axis.at(*e.high), at, colour_of(r), 2);
-        svg.dot(axis.at(*e.mean), at, 3.5, colour_of(r));
-      }
+      x += kPanel + 30;
     }
-    if (!columns.empty()) bottom += height;
+    y += kStep * static_cast<double>(table.rows.size()) + kTop + 40;
   }
-  svg.text(12, bottom + 16, "mean, and 95 % interval by bootstrap over sequences and seeds",
-           "start", 10, "#555");
-  return svg.document(width + 20, bottom + 26);
+  svg.text(12, y - 18, "mean, and 95 % interval by bootstrap over sequences and seeds", "start", 10,
+           "#555");
+  return svg.document(width + 20, y - 8);
 }
 
 Json to_json(const Table& table, const Results& results) {

@@ -158,6 +158,30 @@ class Engines(unittest.TestCase):
             first, _ = self.two_rounds(run)
             self.assertEqual({c[2] for c in first}, {"1"})
 
+    def test_a_slurm_job_told_to_stop_passes_it_on_and_waits(self):
+        """Slurm sends TERM to the script's shell alone; the trial needs time for its checkpoint."""
+        with open(self.program, "w") as f:
+            f.write('#!/bin/bash\ntrap \'sleep 1; echo checkpoint > "$2/checkpoint"; exit 143\' TERM\n'
+                    'echo > "$2/started"; while true; do sleep 0.1; done\n')
+        job = subprocess.Popen(["bash", self.export("slurm")], env=dict(os.environ, SLURM_ARRAY_TASK_ID="4"))
+        self.addCleanup(job.kill)
+        end = time.monotonic() + 30
+        while not os.path.exists(self.path("started")) and time.monotonic() < end:
+            time.sleep(0.05)
+        job.terminate()
+        self.assertEqual(job.wait(30), 143)
+        self.assertTrue(os.path.exists(self.path("checkpoint")))
+
+    def test_more_trials_than_an_array_may_have_tasks(self):
+        trials = [{"id": f"{i:012x}", "case": "", "seed": i, "overrides": {}, "artifacts": {}} for i in range(2500)]
+        with open(self.path("plan.json"), "w") as f:
+            json.dump({"trials": trials}, f)
+        script = self.export("slurm")
+        with open(script) as f:
+            self.assertIn("#SBATCH --array=0-999\n", f.read())
+        subprocess.run(["bash", script], env=dict(os.environ, SLURM_ARRAY_TASK_ID="499"), timeout=60, stderr=subprocess.DEVNULL)
+        self.assertEqual([int(c[0], 16) for c in self.calls()], [499, 1499, 2499])
+
 
 class Slurm:
     """A Slurm of one node with its own key, ports and folders; everything ends and goes with the context."""
