@@ -131,15 +131,17 @@ void write_weights(const std::string& folder, const std::string& name, Module& n
 
 /// Those models of a weights file that have the paper's sizes.
 void add_trained(const std::string& folder, const std::string& weights) {
-  const ModelSet set = load_models(weights, {});
-  const std::pair<const char*, Module*> all[] = {{"skeleton", set.skeleton.net.get()},
-                                                 {"weights", set.weights.net.get()},
-                                                 {"offsets", set.offsets.net.get()}};
-  for (const auto& [file, net] : all)
-    for (const Model& m : kModels)
+  const Bundle set = load_bundle(weights);
+  const std::pair<const char*, const char*> all[] = {{"skeleton", "skeleton"},
+                                                     {"weights", "deformation.weights"},
+                                                     {"offsets", "deformation.offsets"}};
+  for (const auto& [file, role] : all)
+    for (const Model& m : kModels) {
+      auto* net = set.find_as<Module>(role);
       if (net != nullptr && std::string(m.file) == file &&
-          same_shapes(*net, *make_model(m.name, {}, Init{})))
+          same_shapes(*net, *make_model(m.name, model_config(m.name), Init{})))
         write_weights(folder + "/trained", file, *net);
+    }
 }
 
 /// All bodies and motions of a file; of the built-in source its usual numbers, for both sizes.
@@ -170,7 +172,8 @@ void make_inputs(const std::string& folder, const InputSettings& settings) {
   file.metadata["data"] = corpus.description;
   for (const Model& m : kModels)
     write_weights(folder + "/initial", m.file,
-                  *make_model(m.name, {}, Init{RngKey{0, 0}.fold(m.name), DType::f32}));
+                  *make_model(m.name, model_config(m.name),
+                              Init{RngKey{0, 0}.fold(m.name), DType::f32}));
   for (const char* size : {"lite", "paper"}) write_training(folder, settings, size);
   add_trained(folder, settings.lite);
   if (!settings.trained.empty()) add_trained(folder, settings.trained);

@@ -8,8 +8,7 @@
 
 #include <string>
 
-#include "nn/models/registry.h"
-#include "nn/weights/safetensors.h"
+#include "nn/weights/bundle.h"
 #include "train/stages/train_config.h"
 
 namespace restage::bench {

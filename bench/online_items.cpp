@@ -40,7 +40,8 @@ Tensor tensor_of(const Points& points) {
 class SkeletonOnline : public Item {
  public:
   SkeletonOnline(const Inputs& inputs, const std::string& variant, bool)
-      : net_(make_skeleton_model("skeleton/point_transformer", {}, Init{})),
+      : net_(make_model_as<SkeletonModel>("skeleton/point_transformer",
+                                          model_config("skeleton/point_transformer"), Init{})),
         clouds_(inputs.at("frames.clouds")),
         frames_(clouds_.size(0)) {
     inputs.load(*net_, variant, "skeleton");
@@ -60,7 +61,7 @@ class SkeletonOnline : public Item {
     Context ctx;
     return net_->forward(ctx, clouds_.rows(frame, frame + 1)).joints.value;
   }
-  std::unique_ptr<SkeletonModel> net_;
+  std::shared_ptr<SkeletonModel> net_;
   Tensor clouds_, joints_;
   Frames frames_;
 };
@@ -92,23 +93,23 @@ class MotionOnline : public Item {
  private:
   void step(int64_t frame) {
     Context ctx;
-    answer_ = net_(ctx, joints_.rows(frame, frame + 1).reshape({1, 1, kJoints, 3}), trans_, rest_,
+    answer_ = net_.forward(ctx, joints_.rows(frame, frame + 1).reshape({1, 1, kJoints, 3}), trans_, rest_,
                    &state_);
   }
   CacheFlush flush_{flushed};
   Smrm net_;
   Tensor joints_, rest_, trans_;
-  SmrmState state_;
-  SmrmOutput answer_;
+  MotionState state_;
+  MotionOutput answer_;
   Frames frames_;
 };
 
-ModelSet paper_models(const Inputs& inputs, const std::string& variant) {
-  ModelSet set;
+Bundle paper_models(const Inputs& inputs, const std::string& variant) {
+  Bundle set;
   const auto fill = [&](const char* name, const char* file) {
-    auto net = make_model(name, {}, Init{});
-    inputs.load(*net, variant, file);
-    put_model(&set, name, {}, std::move(net));
+    TrainedModel model{name, model_config(name), make_model(name, model_config(name), Init{}), {}};
+    inputs.load(*model.net, variant, file);
+    set.put(model_type(name).role, std::move(model));
   };
   fill("skeleton/point_transformer", "skeleton");
   fill("smrm/rot6d", "smrm");
@@ -119,12 +120,12 @@ ModelSet paper_models(const Inputs& inputs, const std::string& variant) {
 
 Mesh target_of(const Inputs& inputs) { return {points_of(inputs.at("target.points")), {}}; }
 
-/// The target's points in one pose; the skinning weights are the retargeter's, made once.
+/// The target's points in one pose; the skinning weights are made once.
 class DeformationOnline : public Item {
  public:
   DeformationOnline(const Inputs& inputs, const std::string& variant, bool)
-      : models_(paper_models(inputs, variant)),
-        retargeter_(models_, target_of(inputs), joints_of(inputs.at("target.joints")), {}),
+      : surface_(paper_models(inputs, variant), "bench", target_of(inputs),
+                 joints_of(inputs.at("target.joints"))),
         dense_(variant == "dense") {
     const Tensor& local = inputs.at("pairs.local");
     for (int64_t i = 0; i < local.size(0); ++i) {
@@ -138,16 +139,15 @@ class DeformationOnline : public Item {
     return std::make_unique<DeformationOnline>(i, v, d);
   }
   void run() override {
-    points_ = retargeter_.pose_vertices(poses_[static_cast<size_t>(frames_.next())], dense_);
+    points_ = surface_(poses_[static_cast<size_t>(frames_.next())], dense_);
   }
   std::vector<double> check() override {
-    points_ = retargeter_.pose_vertices(poses_[0], dense_);
+    points_ = surface_(poses_[0], dense_);
     return summary(tensor_of(points_));
   }
 
  private:
-  ModelSet models_;
-  Retargeter retargeter_;
+  Surface surface_;
   bool dense_;
   std::array<Pose, 4> poses_;
   Points points_;
@@ -157,9 +157,8 @@ class DeformationOnline : public Item {
 /// Cloud in, posed target out.
 class FrameOnline : public Item {
  public:
-  FrameOnline(const Inputs& inputs, ModelSet models)
-      : models_(std::move(models)),
-        retargeter_(models_, target_of(inputs), joints_of(inputs.at("target.joints")), {}) {
+  FrameOnline(const Inputs& inputs, const Bundle& models)
+      : retargeter_(models, "bench", target_of(inputs), joints_of(inputs.at("target.joints")), {}) {
     const Tensor& clouds = inputs.at("frames.clouds");
     for (int64_t i = 0; i < clouds.size(0); ++i)
       clouds_.push_back(points_of(clouds.rows(i, i + 1)));
@@ -169,8 +168,7 @@ class FrameOnline : public Item {
     return std::make_unique<FrameOnline>(inputs, paper_models(inputs, variant));
   }
   static std::unique_ptr<Item> make_lite(const Inputs& inputs, const std::string&, bool) {
-    return std::make_unique<FrameOnline>(
-        inputs, load_models(inputs.lite(), {.skeleton = true, .smrm = true, .deformation = true}));
+    return std::make_unique<FrameOnline>(inputs, load_bundle(inputs.lite()));
   }
   void run() override { push(frames_.next()); }
   /// Vertices of the third frame relative to the pelvis.
@@ -185,7 +183,6 @@ class FrameOnline : public Item {
   void push(int64_t frame) {
     answer_ = retargeter_.push(clouds_[static_cast<size_t>(frame)], "bench");
   }
-  ModelSet models_;
   Retargeter retargeter_;
   std::vector<Points> clouds_;
   std::span<const RetargetedFrame> answer_;

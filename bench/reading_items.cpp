@@ -1,7 +1,9 @@
 // The loader of every stage beside the training that it feeds, both as the trainer runs them.
 #include "autograd/base/error.h"
 #include "bench/items.h"
-#include "train/stages/registry.h"
+#include "train/stages/deformation_stage.h"
+#include "train/stages/skeleton_stage.h"
+#include "train/stages/training.h"
 
 namespace restage::bench {
 namespace {
@@ -20,12 +22,11 @@ class Reading : public Item {
  public:
   Reading(const Inputs& inputs, const Subject& subject, const std::string& variant)
       : config_(config(inputs, subject, variant)),
-        train_(load_corpus(config_.data, "train")),
-        validation_(load_corpus(config_.data, "validation")),
-        stage_(make_stage(subject.stage, config_, train_, validation_)),
+        data_(config_.data),
+        stage_(make_stage(config_, subject.stage, data_, &nothing_)),
         trains_(variant == "training"),
         // From there on offsets are trained as well.
-        step_(stage_->name() == "deformation" ? config_.deformation.skinning_steps : 0) {
+        step_(stage_->name() == "deformation" ? deformation(config_).skinning_steps : 0) {
     if (stage_->examples_per_step() != subject.batch)
       throw InputError(std::string(subject.size) + "/all.yaml",
                        "its batch of stage '" + stage_->name() + "' is not what is timed",
@@ -46,16 +47,21 @@ class Reading : public Item {
   }
 
  private:
+  static DeformationStageConfig& deformation(TrainConfig& c) {
+    return c.section("deformation").config.as<DeformationStageConfig>();
+  }
   static TrainConfig config(const Inputs& inputs, const Subject& subject,
                             const std::string& variant) {
     TrainConfig c = inputs.training(subject.size);
     if (variant == "loader_1fps")
-      c.skeleton.clouds.frame_step = c.deformation.pairs.frame_step = 30;
+      c.section("skeleton").config.as<SkeletonStageConfig>().clouds.frame_step =
+          deformation(c).pairs.frame_step = 30;
     return c;
   }
 
   TrainConfig config_;
-  Corpus train_, validation_;
+  TrainingData data_;
+  Bundle nothing_;
   std::unique_ptr<Stage> stage_;
   bool trains_;
   int64_t step_;

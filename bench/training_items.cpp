@@ -47,10 +47,11 @@ class Training : public Item {
   uint64_t step_ = 0;
 };
 
-ModelSizes sizes_with(bool dropout) {
-  ModelSizes sizes;
-  if (!dropout) sizes.dropout = 0;
-  return sizes;
+std::shared_ptr<SkeletonModel> extractor_of(const std::string& model, bool dropout) {
+  const bool drops = model == "skeleton/pointnet";
+  const std::vector<std::string> sizes = {"dropout=0"};
+  return make_model_as<SkeletonModel>(
+      model, model_config(model, drops && !dropout ? sizes : std::vector<std::string>()), Init{});
 }
 
 /// Either extractor.
@@ -58,7 +59,7 @@ class SkeletonTraining : public Training {
  public:
   SkeletonTraining(const Inputs& inputs, const std::string& variant, const std::string& model,
                    const std::string& file, bool dropout)
-      : Training(variant), net_(make_skeleton_model(model, sizes_with(dropout), Init{})) {
+      : Training(variant), net_(extractor_of(model, dropout)) {
     inputs.load(*net_, variant, file);
     make_dense(*net_, variant);
     const Var points = inputs.at("clouds.points"), joints = inputs.at("clouds.joints");
@@ -67,7 +68,7 @@ class SkeletonTraining : public Training {
   }
 
  private:
-  std::unique_ptr<SkeletonModel> net_;
+  std::shared_ptr<SkeletonModel> net_;
 };
 
 std::unique_ptr<Item> skeleton(const Inputs& inputs, const std::string& variant, bool dropout) {
@@ -114,19 +115,17 @@ class MotionTraining : public Training {
 class DeformationTraining : public Training {
  public:
   DeformationTraining(const Inputs& inputs, const std::string& variant, bool dropout)
-      : Training(variant), weights_(make_weight_net(Init{})), offsets_(make_offset_net(Init{})) {
-    inputs.load(*weights_, variant, "weights");
-    inputs.load(*offsets_, variant, "offsets");
-    name_scopes(*weights_, "weights");
-    name_scopes(*offsets_, "offsets");
-    if (!dropout) weights_->dropout_rate = offsets_->dropout_rate = 0;
+      : Training(variant), weights_(config(dropout), Init{}), offsets_(config(dropout), Init{}) {
+    inputs.load(weights_, variant, "weights");
+    inputs.load(offsets_, variant, "offsets");
+    name_scopes(weights_, "weights");
+    name_scopes(offsets_, "offsets");
     const DeformationBatch b{inputs.at("pairs.rest_points"), inputs.at("pairs.posed_points"),
                              inputs.at("pairs.rest_joints"), inputs.at("pairs.local"),
                              inputs.at("pairs.axis_angle").reshape({-1, 3 * kJoints})};
-    train({{"weights.", weights_.get()}, {"offsets.", offsets_.get()}}, [=, this](Context& ctx) {
-      return scale(
-          squared_distance_sum(deform(ctx, *weights_, offsets_.get(), b).posed, b.posed_points),
-          1.0 / kClouds);
+    train({{"weights.", &weights_}, {"offsets.", &offsets_}}, [=, this](Context& ctx) {
+      return scale(squared_distance_sum(deform(ctx, weights_, &offsets_, b).posed, b.posed_points),
+                   1.0 / kClouds);
     });
   }
   static std::unique_ptr<Item> make(const Inputs& inputs, const std::string& variant,
@@ -135,7 +134,9 @@ class DeformationTraining : public Training {
   }
 
  private:
-  std::unique_ptr<Mlp3> weights_, offsets_;
+  static MlpConfig config(bool dropout) { return {MlpConfig().width, dropout ? 0.2 : 0.0}; }
+  WeightNet weights_;
+  OffsetNet offsets_;
 };
 
 }  // namespace
@@ -144,7 +145,7 @@ std::vector<ItemInfo> training_items() {
   const double extractor = 3 * extractor_gflop(), window = 2 * 30 * 3 * motion_gflop();
   // Nobody asks for the gradient of the networks' inputs.
   const double inputs =
-      2 * gflop_of(static_cast<double>(kSurfacePoints * (3 * kJoints + 3) * kMlpWidth));
+      2 * gflop_of(static_cast<double>(kSurfacePoints * (3 * kJoints + 3) * MlpConfig().width));
   const double pair = 3 * (weights_gflop(kSurfacePoints) + offsets_gflop(kSurfacePoints)) - inputs;
   return {{"skeleton_train",
            "point transformer, batch 4",

@@ -40,8 +40,8 @@ class Stage {
   virtual NamedValues validate() = 0;
 
   /// All that a checkpoint needs: networks, optimisers, anything carried from step to step.
-  void save(TensorFile& file) const;
-  void load(const TensorFile& file, const std::string& where);
+  virtual void save(TensorFile& file) const;
+  virtual void load(const TensorFile& file, const std::string& where);
   /// Takes tensors of trained weights in the place of random ones: those whose names in a weights
   /// file ("smrm.enc.weight_ih_l0") match one of `names`, where * stands for any text. Settings stay
   /// the stage's own; a difference gives a warning. InputError naming `where`: a pattern that
@@ -49,7 +49,7 @@ class Stage {
   void start_from(const Bundle& weights, const std::vector<std::string>& names,
                   const std::string& where);
   /// The networks to be used later, by role. They are shared with the stage.
-  Bundle result() const;
+  virtual Bundle result() const;
 
  protected:
   /// Builds a network that the stage trains. `handed_on`: it is needed after the training.

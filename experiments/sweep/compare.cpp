@@ -10,7 +10,7 @@
 #include "autograd/base/error.h"
 #include "experiments/sweep/results.h"
 #include "experiments/sweep/svg.h"
-#include "train/config_tree.h"
+#include "nn/config/config_tree.h"
 
 namespace restage::tables {
 namespace {

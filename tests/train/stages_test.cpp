@@ -18,6 +18,12 @@ namespace {
 
 using testing::bytes_of;
 using testing::tiny_corpora;
+using testing::choose;
+using testing::deformation;
+using testing::motion;
+using testing::optimisers;
+using testing::resize;
+using testing::skeleton;
 using testing::tiny_stage;
 using testing::tiny_training;
 
@@ -38,14 +44,12 @@ struct Threads {
 /// Sizes at which ops are cut into several pieces.
 TrainConfig wide(int64_t steps) {
   TrainConfig c = tiny_training(steps);
-  c.skeleton.sizes.points = 256;
-  c.skeleton.sizes.centres = 64;
-  c.skeleton.sizes.width = 64;
-  c.skeleton.optimiser.batch = c.motion.optimiser.batch = 8;
-  c.motion.sizes.hidden = 48;
-  c.motion.windows.frames = 20;
-  c.deformation.pairs.points = 128;
-  c.deformation.optimiser.batch = 2;
+  resize(skeleton(c).model, {"points=256", "centres=64", "width=64"});
+  skeleton(c).optimiser.batch = motion(c).optimiser.batch = 8;
+  resize(motion(c).model, {"hidden=48"});
+  motion(c).windows.frames = 20;
+  deformation(c).pairs.points = 128;
+  deformation(c).optimiser.batch = 2;
   return c;
 }
 
@@ -173,11 +177,11 @@ TEST(TrainStages, StateOfAnotherStageIsRefused) {
 
 TEST(TrainStages, SteadyStepsTakeNoLargeBlocks) {
   TrainConfig c = wide(20);
-  c.skeleton.sizes.points = 512;  // every stage needs blocks of more than 1 MiB
-  c.skeleton.sizes.neighbours = 16;
-  c.motion.optimiser.batch = 64;
-  c.motion.windows.frames = 40;
-  c.deformation.pairs.points = 1024;
+  // Every stage needs blocks of more than 1 MiB.
+  resize(skeleton(c).model, {"points=512", "neighbours=16"});
+  motion(c).optimiser.batch = 64;
+  motion(c).windows.frames = 40;
+  deformation(c).pairs.points = 1024;
   for (const std::string name : kStageNames) {
     const auto stage = tiny_stage(name, c);
     reset_peak_memory();
@@ -186,7 +190,7 @@ TEST(TrainStages, SteadyStepsTakeNoLargeBlocks) {
     for (; step < 3; ++step) stage->step(step);
     EXPECT_GT(memory_stats().peak - before, int64_t{4} << 20) << name << " is too small to tell";
     // All of deformation's kinds of step: the offsets begin later.
-    if (name == "deformation") stage->step(step = c.deformation.skinning_steps);
+    if (name == "deformation") stage->step(step = deformation(c).skinning_steps);
     const int64_t blocks = memory_stats().large_allocations;
     for (const int64_t end = step + 6; ++step < end;) stage->step(step);
     EXPECT_EQ(memory_stats().large_allocations, blocks) << name;
@@ -209,12 +213,11 @@ std::pair<double, double> learn(Stage& stage, int64_t steps) {
 /// Sixty steps in which every stage learns something.
 TrainConfig sixty_steps() {
   TrainConfig c = tiny_training(60);
-  for (OptimiserConfig* o : {&c.skeleton.optimiser, &c.motion.optimiser, &c.deformation.optimiser})
+  for (OptimiserConfig* o : optimisers(c))
     o->schedule.rate = 5e-3;
-  c.motion.sizes.hidden = 64;
-  c.motion.sizes.dropout = 0;
-  c.motion.self_first_pass = true;
-  c.motion.windows.self_share = 0.7;
+  resize(motion(c).model, {"hidden=64", "dropout=0"});
+  motion(c).self_first_pass = true;
+  motion(c).windows.self_share = 0.7;
   return c;
 }
 
@@ -247,20 +250,13 @@ TEST(TrainStages, InBfloat16TheLossFallsAsInFloat32) {
 
 TEST(TrainStages, ExtractorsWithBatchNormLearn) {
   TrainConfig c = tiny_training(12);
-  c.skeleton.model = "skeleton/point_transformer";
-  c.skeleton.sizes = {};
-  c.skeleton.sizes.points = 64;
-  c.skeleton.sizes.width = 16;
-  c.skeleton.sizes.layers = 2;
-  c.skeleton.sizes.neighbours = 6;
+  choose(skeleton(c).model, "skeleton/point_transformer",
+         {"points=64", "width=16", "layers=2", "neighbours=6"});
   const auto transformer = tiny_stage("skeleton", c);
   const auto [first, last] = learn(*transformer, 12);
   EXPECT_LT(last, 0.9 * first);
 
-  c.skeleton.model = "skeleton/pointnet";
-  c.skeleton.sizes = {};
-  c.skeleton.sizes.points = 64;
-  c.skeleton.sizes.dropout = 0;
+  choose(skeleton(c).model, "skeleton/pointnet", {"points=64", "dropout=0"});
   const auto pointnet = tiny_stage("skeleton", c);
   const std::string start = bytes_of(*pointnet);
   const auto [one, twelve] = learn(*pointnet, 12);
@@ -279,28 +275,28 @@ TEST(TrainStages, EveryWayToTrainTheMotionNetwork) {
   for (const bool self_first : {false, true})
     for (const double adversarial : {0.0, 0.05}) {
       TrainConfig c = tiny_training(4);
-      c.motion.model = adversarial > 0 ? "smrm/quaternion" : "smrm/rot6d";
-      c.motion.sizes.standardise = c.motion.model == "smrm/rot6d";
-      c.motion.self_first_pass = self_first;
-      c.motion.windows.self_share = 0.5;
-      c.motion.weights.adversarial = adversarial;
-      c.motion.windows.remove_heading = self_first;
-      c.motion.windows.translation = self_first ? Translation::relative : Translation::absolute;
+      const bool quaternions = adversarial > 0;
+      choose(motion(c).model, quaternions ? "smrm/quaternion" : "smrm/rot6d",
+             {"hidden=16", quaternions ? "standardise=false" : "standardise=true"});
+      motion(c).self_first_pass = self_first;
+      motion(c).windows.self_share = 0.5;
+      motion(c).weights.adversarial = adversarial;
+      motion(c).windows.remove_heading = self_first;
+      motion(c).windows.translation = self_first ? Translation::relative : Translation::absolute;
       const auto stage = tiny_stage("motion", c);
       for (int64_t i = 0; i < 4; ++i)
         for (const auto& [name, value] : stage->step(i)) EXPECT_TRUE(std::isfinite(value)) << name;
-      ModelSet set;
-      stage->export_models(set);
-      EXPECT_EQ(set.extra["translation"], self_first ? "relative" : "absolute");
-      EXPECT_EQ(set.extra["remove_heading"], self_first ? "true" : "false");
+      const Settings settings = stage->result().need("motion", "test").settings;
+      EXPECT_EQ(settings.at("translation"), self_first ? "relative" : "absolute");
+      EXPECT_EQ(settings.at("remove_heading"), self_first ? "true" : "false");
     }
 }
 
 TEST(TrainStages, DiscriminatorRestsWhileItWins) {
   TrainConfig c = tiny_training(3);
-  c.motion.balance_limit = 0;
+  motion(c).balance_limit = 0;
   EXPECT_NO_THROW(value_of(tiny_stage("motion", c)->step(0), "discriminator"));
-  c.motion.balance_limit = 1;  // a mean score is below 1
+  motion(c).balance_limit = 1;  // a mean score is below 1
   for (const auto& [name, value] : tiny_stage("motion", c)->step(0))
     EXPECT_NE(name, "discriminator") << value;
 }
@@ -355,7 +351,7 @@ TEST(TrainStages, HugeRateIsCaughtInTheStepWhereItShows) {
   for (const std::string name : kStageNames) {
     TrainConfig c = tiny_training(6);
     for (OptimiserConfig* o :
-         {&c.skeleton.optimiser, &c.motion.optimiser, &c.deformation.optimiser}) {
+         optimisers(c)) {
       o->schedule = {};
       o->schedule.rate = 1e25;
       o->clip = 0;

@@ -2,38 +2,62 @@
 #pragma once
 
 #include "tests/support/tiny_body.h"
-#include "train/stages/registry.h"
+#include "train/stages/deformation_stage.h"
+#include "train/stages/motion_stage.h"
+#include "train/stages/skeleton_stage.h"
+#include "train/stages/training.h"
 
 namespace restage::testing {
+
+inline SkeletonStageConfig& skeleton(TrainConfig& c) {
+  return c.section("skeleton").config.as<SkeletonStageConfig>();
+}
+inline MotionStageConfig& motion(TrainConfig& c) {
+  return c.section("motion").config.as<MotionStageConfig>();
+}
+inline DeformationStageConfig& deformation(TrainConfig& c) {
+  return c.section("deformation").config.as<DeformationStageConfig>();
+}
+inline std::vector<OptimiserConfig*> optimisers(TrainConfig& c) {
+  return {&skeleton(c).optimiser, &motion(c).optimiser, &deformation(c).optimiser};
+}
+/// Sizes of the chosen model, as configurations give them: "width=32".
+inline void resize(ModelChoice& choice, const std::vector<std::string>& sizes) {
+  ConfigNode tree = write_config(choice.sizes);
+  for (const std::string& size : sizes) apply_override(tree, size);
+  read_config(tree, choice.sizes);
+}
+inline void choose(ModelChoice& choice, const std::string& model,
+                   const std::vector<std::string>& sizes) {
+  choice = ModelChoice(model);
+  resize(choice, sizes);
+}
 
 /// Small networks on the bodies of boxes, with dropout, noise, discriminator and all.
 inline TrainConfig tiny_training(int64_t steps) {
   TrainConfig c;
   c.seed = 7;
-  c.skeleton.model = "skeleton/patch_transformer";
-  c.skeleton.sizes.points = 96;
-  c.skeleton.sizes.width = 32;
-  c.skeleton.sizes.layers = 1;
-  c.skeleton.sizes.centres = 24;
-  c.skeleton.sizes.neighbours = 8;
-  c.skeleton.vote_weight = 0.5;
-  c.skeleton.segmentation_weight = 0.5;
-  c.skeleton.validation_clouds = 4;
-  c.motion.sizes.hidden = 16;
-  c.motion.sizes.standardise = true;
-  c.motion.windows.frames = 12;
-  c.motion.windows.noise = 0.01;
-  c.motion.windows.self_share = 0.25;
-  c.motion.self_first_pass = false;
-  c.motion.weights.adversarial = 0.01;
-  c.motion.validation_windows = 2;
-  c.motion.validation_frames = 12;
-  c.deformation.pairs.points = 48;
-  c.deformation.skinning_steps = steps / 3;
-  c.deformation.root_net = true;
-  c.deformation.validation_pairs = 2;
-  for (OptimiserConfig* o :
-       {&c.skeleton.optimiser, &c.motion.optimiser, &c.deformation.optimiser}) {
+  SkeletonStageConfig& s = skeleton(c);
+  choose(s.model, "skeleton/patch_transformer",
+         {"points=96", "width=32", "layers=1", "centres=24", "neighbours=8"});
+  s.vote_weight = 0.5;
+  s.segmentation_weight = 0.5;
+  s.validation_clouds = 4;
+  MotionStageConfig& m = motion(c);
+  choose(m.model, "smrm/rot6d", {"hidden=16"});
+  m.windows.frames = 12;
+  m.windows.noise = 0.01;
+  m.windows.self_share = 0.25;
+  m.self_first_pass = false;
+  m.weights.adversarial = 0.01;
+  m.validation_windows = 2;
+  m.validation_frames = 12;
+  DeformationStageConfig& d = deformation(c);
+  d.pairs.points = 48;
+  d.skinning_steps = steps / 3;
+  d.root_net = true;
+  d.validation_pairs = 2;
+  for (OptimiserConfig* o : optimisers(c)) {
     o->steps = steps;
     o->batch = 4;
     o->clip = 1;
@@ -45,16 +69,19 @@ inline TrainConfig tiny_training(int64_t steps) {
 }
 
 /// The corpora of a training, made once.
-struct TinyCorpora {
-  Corpus train = subset(tiny_corpus(), "train"), validation = subset(tiny_corpus(), "validation");
-};
-inline const TinyCorpora& tiny_corpora() {
-  static const TinyCorpora corpora;
-  return corpora;
+inline const TrainingData& tiny_data() {
+  static const TrainingData data = [] {
+    TrainingData out;
+    out.train = subset(tiny_corpus(), "train");
+    out.validation = subset(tiny_corpus(), "validation");
+    return out;
+  }();
+  return data;
 }
 
 inline std::unique_ptr<Stage> tiny_stage(const std::string& name, const TrainConfig& config) {
-  return make_stage(name, config, tiny_corpora().train, tiny_corpora().validation);
+  Bundle so_far;
+  return make_stage(config, name, tiny_data(), &so_far);
 }
 
 /// All that a stage carries from step to step.

@@ -23,15 +23,21 @@ using testing::tiny_stage;
 using testing::tiny_training;
 
 constexpr int64_t kSteps = 9;
+const TrainOptions kQuiet{.precision = MatmulPrecision::float32, .quiet = true, .observers = {}};
 const std::vector<std::string> kAll = {"skeleton", "motion", "deformation"};
+
+OptimiserConfig optimiser_of(const Stage& stage) {
+  OptimiserConfig out;
+  out.steps = stage.steps();
+  out.batch = stage.examples_per_step();
+  return out;
+}
 
 /// Hands everything on to another stage; tests change what they want to see.
 class Forwarding : public Stage {
  public:
-  explicit Forwarding(std::unique_ptr<Stage> stage) : stage_(std::move(stage)) {}
-  std::string name() const override { return stage_->name(); }
-  int64_t steps() const override { return stage_->steps(); }
-  int64_t examples_per_step() const override { return stage_->examples_per_step(); }
+  explicit Forwarding(std::unique_ptr<Stage> stage)
+      : Stage(stage->name(), optimiser_of(*stage)), stage_(std::move(stage)) {}
   NamedValues step(int64_t step) override { return stage_->step(step); }
   void read(int64_t step) const override { stage_->read(step); }
   NamedValues validate() override { return stage_->validate(); }
@@ -39,7 +45,7 @@ class Forwarding : public Stage {
   void load(const TensorFile& file, const std::string& where) override {
     stage_->load(file, where);
   }
-  void export_models(ModelSet& set) override { stage_->export_models(set); }
+  Bundle result() const override { return stage_->result(); }
 
  private:
   std::unique_ptr<Stage> stage_;
@@ -83,14 +89,13 @@ class TrainTrainer : public ::testing::Test {
     return RunDir::create_at(place(name), "x: 1\n", "{}\n", kAll);
   }
 
-  using Maker = std::function<std::unique_ptr<Stage>(const std::string&)>;
-  static Maker plain() {
-    return [](const std::string& name) { return tiny_stage(name, tiny_training(kSteps)); };
+  static MakeStage plain() {
+    return [](const std::string& name, Bundle*) { return tiny_stage(name, tiny_training(kSteps)); };
   }
   /// `what` happens before step `when` of stage `which`.
-  static Maker disturbed(const std::string& which, int64_t when,
+  static MakeStage disturbed(const std::string& which, int64_t when,
                          const std::function<void()>& what) {
-    return [=](const std::string& name) -> std::unique_ptr<Stage> {
+    return [=](const std::string& name, Bundle*) -> std::unique_ptr<Stage> {
       auto stage = tiny_stage(name, tiny_training(kSteps));
       if (name != which) return stage;
       return std::make_unique<Disturbed>(std::move(stage), when, what);
@@ -103,7 +108,7 @@ class TrainTrainer : public ::testing::Test {
     c.checkpoint_every = 4;
     return c;
   }
-  static std::string weights(const ModelSet& set) { return safetensors_bytes(to_file(set)); }
+  static std::string weights(const Bundle& set) { return safetensors_bytes(to_file(set)); }
   std::string metrics(const std::string& name) const {
     return read_file(place(name) + "/metrics.jsonl");
   }
@@ -116,7 +121,7 @@ class TrainTrainer : public ::testing::Test {
     static Whole result;
     if (result.weights.empty()) {
       RunDir run = create("whole");
-      result.weights = weights(train(run, kAll, loop(), plain(), true));
+      result.weights = weights(train(run, kAll, loop(), plain(), kQuiet));
       result.metrics = metrics("whole");
     }
     return result;
@@ -124,7 +129,7 @@ class TrainTrainer : public ::testing::Test {
   /// Resumes `name`, which must then be the same as the undisturbed training.
   void expect_completes(const std::string& name) {
     RunDir run = RunDir::resume(place(name), kAll);
-    EXPECT_TRUE(weights(train(run, kAll, loop(), plain(), true)) == whole().weights) << name;
+    EXPECT_TRUE(weights(train(run, kAll, loop(), plain(), kQuiet)) == whole().weights) << name;
     EXPECT_EQ(metrics(name), whole().metrics) << name;
   }
   std::string root_;
@@ -146,16 +151,16 @@ TEST_F(TrainTrainer, MetricsSayWhatHappened) {
 TEST_F(TrainTrainer, CheckpointsAreLeftAtTheEndsOfStages) {
   whole();
   RunDir run = create("a");
-  train(run, kAll, loop(), plain(), true);
+  train(run, kAll, loop(), plain(), kQuiet);
   for (const std::string& stage : kAll) {
     const auto last = latest_checkpoint(run.dir(), {stage});
     ASSERT_TRUE(last) << stage;
     EXPECT_EQ(last->step, kSteps);
   }
-  const ModelSet models =
-      models_of(parse_safetensors(whole().weights, "w"), {true, true, true}, "w");
-  EXPECT_TRUE(models.offsets);
-  EXPECT_TRUE(models.root);
+  const Bundle models = bundle_of(parse_safetensors(whole().weights, "w"), "w");
+  for (const char* role :
+       {"skeleton", "motion", "deformation.weights", "deformation.offsets", "deformation.root"})
+    EXPECT_NE(models.find(role), nullptr) << role;
 }
 
 TEST_F(TrainTrainer, StopByASignalWritesACheckpointAndResumesToTheSameBits) {
@@ -163,7 +168,7 @@ TEST_F(TrainTrainer, StopByASignalWritesACheckpointAndResumesToTheSameBits) {
     {
       RunDir run = create(stage);
       try {
-        train(run, kAll, loop(), disturbed(stage, 5, [] { ::raise(SIGTERM); }), true);
+        train(run, kAll, loop(), disturbed(stage, 5, [] { ::raise(SIGTERM); }), kQuiet);
         FAIL() << "not stopped in " << stage;
       } catch (const Interrupted& stopped) {
         EXPECT_EQ(stopped.exit_code, 143);
@@ -198,12 +203,12 @@ class Watched final : public Forwarding {
 
 TEST_F(TrainTrainer, PrecisionIsForStepsOnly) {
   std::vector<MatmulPrecision> steps, validations;
-  const Maker watched = [&](const std::string& name) -> std::unique_ptr<Stage> {
+  const MakeStage watched = [&](const std::string& name, Bundle*) -> std::unique_ptr<Stage> {
     return std::make_unique<Watched>(tiny_stage(name, tiny_training(kSteps)), steps, validations);
   };
   RunDir run = create("bfloat16");
   const auto bfloat16 = MatmulPrecision::bfloat16;
-  const std::string got = weights(train(run, kAll, loop(), watched, true, bfloat16));
+  const std::string got = weights(train(run, kAll, loop(), watched, {.precision = bfloat16, .quiet = true, .observers = {}}));
   EXPECT_EQ(steps, std::vector<MatmulPrecision>(3 * kSteps, bfloat16));
   EXPECT_EQ(validations, std::vector<MatmulPrecision>(6, MatmulPrecision::float32));
   EXPECT_EQ(matmul_precision(), MatmulPrecision::float32);
@@ -211,18 +216,39 @@ TEST_F(TrainTrainer, PrecisionIsForStepsOnly) {
   EXPECT_THROW(
       {
         RunDir other = create("stopped");
-        train(other, kAll, loop(), disturbed("motion", 3, [] { throw Killed(); }), true, bfloat16);
+        train(other, kAll, loop(), disturbed("motion", 3, [] { throw Killed(); }), {.precision = bfloat16, .quiet = true, .observers = {}});
       },
       Killed);
   EXPECT_EQ(matmul_precision(), MatmulPrecision::float32) << "after an error";
   RunDir again = RunDir::resume(place("stopped"), kAll);
-  EXPECT_TRUE(weights(train(again, kAll, loop(), plain(), true, bfloat16)) == got);
+  EXPECT_TRUE(weights(train(again, kAll, loop(), plain(), {.precision = bfloat16, .quiet = true, .observers = {}})) == got);
+}
+
+/// Counts what it is told.
+struct Counting final : TrainObserver {
+  int steps = 0, validations = 0, checkpoints = 0;
+  void on_step(const Stage&, int64_t, const NamedValues&) override { ++steps; }
+  void on_validation(const Stage&, int64_t, const NamedValues&) override { ++validations; }
+  void on_checkpoint(const Stage&, int64_t, const std::string& path) override {
+    checkpoints += fs::exists(path) ? 1 : 0;
+  }
+};
+
+TEST_F(TrainTrainer, ObserversSeeEverything) {
+  Counting seen;
+  RunDir run = create("observed");
+  TrainOptions options = kQuiet;
+  options.observers = {&seen};
+  train(run, {"skeleton"}, loop(), plain(), options);
+  EXPECT_EQ(seen.steps, kSteps);
+  EXPECT_EQ(seen.validations, 2);
+  EXPECT_EQ(seen.checkpoints, 3);
 }
 
 TEST_F(TrainTrainer, TwoStopsInARow) {
   for (const int64_t when : {1, 3}) {
     RunDir run = when == 1 ? create("twice") : RunDir::resume(place("twice"), kAll);
-    EXPECT_THROW(train(run, kAll, loop(), disturbed("motion", when, [] { ::raise(SIGINT); }), true),
+    EXPECT_THROW(train(run, kAll, loop(), disturbed("motion", when, [] { ::raise(SIGINT); }), kQuiet),
                  Interrupted);
   }
   expect_completes("twice");
@@ -235,7 +261,7 @@ TEST_F(TrainTrainer, FailureGoesBackToTheCheckpointBefore) {
     const std::string name = stage + std::to_string(when);
     {
       RunDir run = create(name);
-      EXPECT_THROW(train(run, kAll, loop(), disturbed(stage, when, [] { throw Killed(); }), true),
+      EXPECT_THROW(train(run, kAll, loop(), disturbed(stage, when, [] { throw Killed(); }), kQuiet),
                    Killed);
     }
     expect_completes(name);
@@ -245,7 +271,7 @@ TEST_F(TrainTrainer, FailureGoesBackToTheCheckpointBefore) {
 TEST_F(TrainTrainer, ResumedCompleteRunGivesItsModelsAgain) {
   {
     RunDir run = create("done");
-    train(run, kAll, loop(), plain(), true);
+    train(run, kAll, loop(), plain(), kQuiet);
   }
   expect_completes("done");
 }
@@ -253,13 +279,13 @@ TEST_F(TrainTrainer, ResumedCompleteRunGivesItsModelsAgain) {
 TEST_F(TrainTrainer, MissingCheckpointOfAnEarlierStageIsSaid) {
   {
     RunDir run = create("gap");
-    EXPECT_THROW(train(run, kAll, loop(), disturbed("motion", 6, [] { throw Killed(); }), true),
+    EXPECT_THROW(train(run, kAll, loop(), disturbed("motion", 6, [] { throw Killed(); }), kQuiet),
                  Killed);
   }
   fs::remove(latest_checkpoint(place("gap"), {"skeleton"})->path);
   RunDir run = RunDir::resume(place("gap"), kAll);
   try {
-    train(run, kAll, loop(), plain(), true);
+    train(run, kAll, loop(), plain(), kQuiet);
     FAIL();
   } catch (const InputError& e) {
     EXPECT_NE(std::string(e.what()).find("'skeleton'"), std::string::npos) << e.what();
@@ -268,14 +294,14 @@ TEST_F(TrainTrainer, MissingCheckpointOfAnEarlierStageIsSaid) {
 
 TEST_F(TrainTrainer, DivergenceIsAFailureThatNamesThePlace) {
   RunDir run = create("diverged");
-  const Maker make = [](const std::string& name) {
+  const MakeStage make = [](const std::string& name, Bundle*) {
     TrainConfig c = tiny_training(kSteps);
-    c.skeleton.optimiser.schedule = {};
-    c.skeleton.optimiser.schedule.rate = 1e25;
+    testing::skeleton(c).optimiser.schedule = {};
+    testing::skeleton(c).optimiser.schedule.rate = 1e25;
     return tiny_stage(name, c);
   };
   try {
-    train(run, kAll, loop(), make, true);
+    train(run, kAll, loop(), make, kQuiet);
     FAIL();
   } catch (const NonFiniteError& e) {
     EXPECT_EQ(e.exit_code, 1);

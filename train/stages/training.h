@@ -9,6 +9,7 @@ namespace restage {
 
 /// What a configuration trains and validates on.
 struct TrainingData {
+  TrainingData() = default;
   explicit TrainingData(const CorpusSource& source)
       : train(load_corpus(source, "train")), validation(load_corpus(source, "validation")) {}
   Corpus train, validation;
