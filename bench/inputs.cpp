@@ -9,9 +9,9 @@
 #include "datasets/sampling/evaluation.h"
 #include "datasets/sampling/pairs.h"
 #include "datasets/sampling/windows.h"
+#include "nn/config/config.h"
 #include "nn/weights/bundle.h"
 #include "nn/weights/state.h"
-#include "nn/config/config.h"
 
 namespace restage::bench {
 namespace {
@@ -171,9 +171,9 @@ void make_inputs(const std::string& folder, const InputSettings& settings) {
   add_kernel_inputs(file);
   file.metadata["data"] = corpus.description;
   for (const Model& m : kModels)
-    write_weights(folder + "/initial", m.file,
-                  *make_model(m.name, model_config(m.name),
-                              Init{RngKey{0, 0}.fold(m.name), DType::f32}));
+    write_weights(
+        folder + "/initial", m.file,
+        *make_model(m.name, model_config(m.name), Init{RngKey{0, 0}.fold(m.name), DType::f32}));
   for (const char* size : {"lite", "paper"}) write_training(folder, settings, size);
   add_trained(folder, settings.lite);
   if (!settings.trained.empty()) add_trained(folder, settings.trained);

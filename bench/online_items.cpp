@@ -93,8 +93,8 @@ class MotionOnline : public Item {
  private:
   void step(int64_t frame) {
     Context ctx;
-    answer_ = net_.forward(ctx, joints_.rows(frame, frame + 1).reshape({1, 1, kJoints, 3}), trans_, rest_,
-                   &state_);
+    answer_ = net_.forward(ctx, joints_.rows(frame, frame + 1).reshape({1, 1, kJoints, 3}), trans_,
+                           rest_, &state_);
   }
   CacheFlush flush_{flushed};
   Smrm net_;
@@ -138,9 +138,7 @@ class DeformationOnline : public Item {
   static std::unique_ptr<Item> make(const Inputs& i, const std::string& v, bool d) {
     return std::make_unique<DeformationOnline>(i, v, d);
   }
-  void run() override {
-    points_ = surface_(poses_[static_cast<size_t>(frames_.next())], dense_);
-  }
+  void run() override { points_ = surface_(poses_[static_cast<size_t>(frames_.next())], dense_); }
   std::vector<double> check() override {
     points_ = surface_(poses_[0], dense_);
     return summary(tensor_of(points_));

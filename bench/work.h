@@ -57,7 +57,8 @@ inline double motion_gflop() {
 
 inline double mlp_gflop(int64_t points, int64_t in, int64_t out) {
   return gflop_of(
-      static_cast<double>(points * (in * MlpConfig().width + MlpConfig().width * MlpConfig().width + MlpConfig().width * out)));
+      static_cast<double>(points * (in * MlpConfig().width + MlpConfig().width * MlpConfig().width +
+                                    MlpConfig().width * out)));
 }
 inline double weights_gflop(int64_t points) { return mlp_gflop(points, 3 * kJoints + 3, kJoints); }
 inline double offsets_gflop(int64_t points) { return mlp_gflop(points, 3 * kJoints + 3, 3); }

@@ -114,8 +114,9 @@ void judge(const Bundle& weights, const std::string& folder, bool scans, uint64_
         scans ? retargeted_scans(weights, folder, seed)
               : retargeted(weights, folder, (fs::path(folder) / "source.h5").string(), seed);
     if (pred.frames != truth.frames)
-      throw InputError(folder, "gives " + std::to_string(pred.frames) + " frames instead of " +
-                                   std::to_string(truth.frames),
+      throw InputError(folder,
+                       "gives " + std::to_string(pred.frames) + " frames instead of " +
+                           std::to_string(truth.frames),
                        "build the benchmark again");
     const int64_t n = truth.frames;
     const metrics::SequenceView view{track(pred.joints, n, kJoints),

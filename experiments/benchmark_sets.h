@@ -13,8 +13,8 @@ void check_benchmark_set(const std::string& set);
 
 /// Retargets every sequence of a set of the benchmark in `folder`, as `restage retarget` would, and
 /// compares with the true answer. Scans first go through the doctor, as a user's would; a sequence
-/// that cannot be retargeted gives a warning and has no values. `names`: of the sequences, in order.
-/// InputError if the folder is no such benchmark, or the weights lack a model.
+/// that cannot be retargeted gives a warning and has no values. `names`: of the sequences, in
+/// order. InputError if the folder is no such benchmark, or the weights lack a model.
 SystemScores evaluate_benchmark_set(const Bundle& weights, const std::string& folder,
                                     const std::string& set, uint64_t seed,
                                     std::vector<std::string>* names);

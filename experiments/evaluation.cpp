@@ -157,9 +157,9 @@ EvaluationOptions evaluation_options(const TrainConfig& config, const Corpus& te
 SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weights_name,
                                  const Corpus& corpus, const EvaluationOptions& options) {
   SystemEvaluation out;
-  for (const Condition& condition : {Condition{"clouds", {"skeleton", "motion"}},
-                                     Condition{"true_skeletons", {"motion"}},
-                                     Condition{"true_poses", {"deformation.weights"}}}) {
+  for (const Condition& condition :
+       {Condition{"clouds", {"skeleton", "motion"}}, Condition{"true_skeletons", {"motion"}},
+        Condition{"true_poses", {"deformation.weights"}}}) {
     const std::string missing = lacking(condition, weights);
     if (!missing.empty())
       out.missing.push_back(missing);
@@ -170,7 +170,8 @@ SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weigh
     out.missing.push_back("surfaces: no model for deformation.weights");
   RetargetOptions retarget;
   retarget.seed = options.seed;
-  retarget.force = true;  // a badly extracted target counts with its error instead of ending the table
+  retarget.force =
+      true;  // a badly extracted target counts with its error instead of ending the table
   retarget.samples = 4;
   retarget.anchor = options.anchor;
   for (const EvalSequence& sequence : options.sequences) {
@@ -179,8 +180,8 @@ SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weigh
     const Body& target = performance.target();
     for (auto& [name, scores] : out.conditions) {
       if (name == "true_poses") {
-        judge_surface(performance, Surface(weights, weights_name, target.rest, target.joints), truth,
-                      &scores);
+        judge_surface(performance, Surface(weights, weights_name, target.rest, target.joints),
+                      truth, &scores);
       } else if (name == "clouds") {
         Retargeter retargeter(weights, weights_name, target.rest, target.id, retarget);
         judge_retargeting(performance, retargeter, true, truth, &scores);

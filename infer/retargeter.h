@@ -26,10 +26,11 @@ struct RetargetOptions {
 /// Our chain of three networks.
 class Retargeter final : public System {
  public:
-  /// `weights` come from the file `weights_name` (for errors) and need at least a model for skeleton
-  /// and one for motion. Without `deformation.weights` frames have no vertices, without offsets
-  /// skinning is all. `where` names the target. InputError: a model that is missing, a setting that
-  /// is unknown, a target whose shoulder-wrist lines are more than 30 degrees from +-x.
+  /// `weights` come from the file `weights_name` (for errors) and need at least a model for
+  /// skeleton and one for motion. Without `deformation.weights` frames have no vertices, without
+  /// offsets skinning is all. `where` names the target. InputError: a model that is missing, a
+  /// setting that is unknown, a target whose shoulder-wrist lines are more than 30 degrees from
+  /// +-x.
   Retargeter(const Bundle& weights, const std::string& weights_name, Mesh target,
              const std::string& where, const RetargetOptions& options);
   /// The same from known rest joints of the target instead of extracted ones; the source is then
@@ -37,8 +38,8 @@ class Retargeter final : public System {
   Retargeter(const Bundle& weights, const std::string& weights_name, Mesh target,
              const Joints& rest, const RetargetOptions& options);
 
-  /// At 30 fps each cloud gives one frame, else those of the 30 fps grid that it ends. A steady frame
-  /// takes no memory.
+  /// At 30 fps each cloud gives one frame, else those of the 30 fps grid that it ends. A steady
+  /// frame takes no memory.
   std::span<const RetargetedFrame> push(const Points& cloud, const std::string& source) override;
   /// The same from joints of A in the world.
   std::span<const RetargetedFrame> push_joints(const Joints& joints);

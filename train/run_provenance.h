@@ -22,8 +22,8 @@ struct RunInput {
 /// JSON with version, git_commit, compiler, flags, processor, simd, threads, seed, data,
 /// command_line, started (UTC) and configuration ({"dotted.key": "value"}).
 std::string provenance_json(const RunInput& input);
-/// InputError naming what has changed since the run in `dir` was made: its data, its config.yaml, the
-/// seed. A run goes on with the same bits or not at all.
+/// InputError naming what has changed since the run in `dir` was made: its data, its config.yaml,
+/// the seed. A run goes on with the same bits or not at all.
 void check_same_run(const std::string& dir, const RunInput& input);
 
 }  // namespace restage

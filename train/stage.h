@@ -43,8 +43,8 @@ class Stage {
   virtual void save(TensorFile& file) const;
   virtual void load(const TensorFile& file, const std::string& where);
   /// Takes tensors of trained weights in the place of random ones: those whose names in a weights
-  /// file ("smrm.enc.weight_ih_l0") match one of `names`, where * stands for any text. Settings stay
-  /// the stage's own; a difference gives a warning. InputError naming `where`: a pattern that
+  /// file ("smrm.enc.weight_ih_l0") match one of `names`, where * stands for any text. Settings
+  /// stay the stage's own; a difference gives a warning. InputError naming `where`: a pattern that
   /// matches nothing, a tensor that is missing or does not fit.
   void start_from(const Bundle& weights, const std::vector<std::string>& names,
                   const std::string& where);

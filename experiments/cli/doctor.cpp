@@ -22,8 +22,8 @@
 #include "experiments/cli/commands.h"
 #include "experiments/cli/doctor_repair.h"
 #include "experiments/cli/doctor_report.h"
-#include "nn/weights/safetensors.h"
 #include "nn/config/config.h"
+#include "nn/weights/safetensors.h"
 
 namespace restage::cli {
 namespace {

@@ -11,8 +11,8 @@
 #include "experiments/cli/eval_report.h"
 #include "experiments/cli/eval_world.h"
 #include "experiments/evaluation.h"
-#include "nn/geometry/closed_form.h"
 #include "nn/config/config.h"
+#include "nn/geometry/closed_form.h"
 #include "train/run.h"
 
 namespace restage::cli {

@@ -60,8 +60,7 @@ int run_skeleton(const SkeletonOptions& options, const Common& common) {
   // The same points give the same joints wherever they stand, so every frame has the same key.
   const RngKey key = RngKey{common.seed, 0}.fold("skeleton");
   while (const auto frame = frames->next()) {
-    const Joints joints =
-        extract_joints(model, frame->points, frame->source, key, options.samples);
+    const Joints joints = extract_joints(model, frame->points, frame->source, key, options.samples);
     if (writer) writer->append(joints, {});
     if (common.json) {
       list.push_back({{"source", frame->source}, {"joints", json_of(joints)}});

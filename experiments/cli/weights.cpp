@@ -124,7 +124,8 @@ void add_export(Program& program, CLI::App& group) {
                   "restage weights export --from w.safetensors --model smrm --out smrm.safetensors",
                   [t, &program] { return run_export(*t, program.common()); });
   app.add_option("--from", t->from, "weights file")->required();
-  app.add_option("--model", t->model, "its name (smrm/rot6d), role (motion) or prefix (smrm)")->required();
+  app.add_option("--model", t->model, "its name (smrm/rot6d), role (motion) or prefix (smrm)")
+      ->required();
   app.add_option("--out", t->out, "state dict to write (safetensors)")->required();
 }
 

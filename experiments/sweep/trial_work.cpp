@@ -50,8 +50,8 @@ std::vector<std::string> names_of(const std::vector<EvalSequence>& list, const C
   return out;
 }
 
-/// The run's own held-out data: a set for every condition that its stages can be judged on. The same
-/// sequences for every seed, so that trials can be compared sequence by sequence.
+/// The run's own held-out data: a set for every condition that its stages can be judged on. The
+/// same sequences for every seed, so that trials can be compared sequence by sequence.
 Json evaluate_held_out(const Bundle& models, const TrainConfig& config) {
   const Corpus test = load_corpus(config.data, "test");
   const EvaluationOptions how = evaluation_options(config, test, 0);

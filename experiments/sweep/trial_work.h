@@ -36,8 +36,8 @@ class TrialPlanner {
   TrialPlanner(Evaluate evaluate, std::string store);
   ~TrialPlanner();
 
-  /// `tree`: a whole configuration, the trial's settings laid over its base. It is read strictly and
-  /// checked as `restage train` would. `case_name` and `overrides` are the caller's to fill in.
+  /// `tree`: a whole configuration, the trial's settings laid over its base. It is read strictly
+  /// and checked as `restage train` would. `case_name` and `overrides` are the caller's to fill in.
   PlannedTrial plan(const ConfigNode& tree);
   /// The keys among `keys` (dotted) that no stage of this configuration reads.
   static std::vector<std::string> unread(const ConfigNode& tree,
@@ -56,10 +56,10 @@ struct TrialOutcome {
   Json metrics = Json::object();  ///< {set: {"mean": {...}, "sequences": [{"name", ...}]}}
 };
 
-/// Trains what is missing in the store and evaluates. `id`: InputError if the trial is another one by
-/// now, since its data changed. `last_stage`: makes the artifacts up to that stage and no more. May be
-/// called again after an interruption and goes on where it was. Throws Interrupted after a checkpoint
-/// if a signal came (the caller has a StopScope).
+/// Trains what is missing in the store and evaluates. `id`: InputError if the trial is another one
+/// by now, since its data changed. `last_stage`: makes the artifacts up to that stage and no more.
+/// May be called again after an interruption and goes on where it was. Throws Interrupted after a
+/// checkpoint if a signal came (the caller has a StopScope).
 TrialOutcome run_trial(const std::string& config_yaml_path, const std::string& id,
                        const Evaluate& evaluate, const std::string& store, bool quiet,
                        const std::string& last_stage = "");

@@ -112,7 +112,8 @@ std::vector<RigState> Registration::starts(const std::vector<Vec3>& cloud) const
   return out;
 }
 
-std::span<const RetargetedFrame> Registration::push(const Points& cloud, const std::string& source) {
+std::span<const RetargetedFrame> Registration::push(const Points& cloud,
+                                                    const std::string& source) {
   const std::vector<Vec3> points = thinned(cloud, options_.grid, source);
   std::vector<RigState> fitted = starts(points);
   std::vector<double> costs(fitted.size());

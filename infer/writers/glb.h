@@ -10,7 +10,6 @@
 
 namespace restage {
 
-
 /// The four strongest joints of each vertex, weights falling, summing to 1 in float32 (within an
 /// ulp or two). Unused places hold joint 0 and weight 0.
 struct Influences {

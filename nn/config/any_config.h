@@ -1,5 +1,5 @@
-// A config struct whose type is known at run time only: that of a model or a stage which YAML names.
-// It behaves as the struct does: visitors go through to the struct's own visit().
+// A config struct whose type is known at run time only: that of a model or a stage which YAML
+// names. It behaves as the struct does: visitors go through to the struct's own visit().
 #pragma once
 
 #include <memory>
@@ -15,8 +15,8 @@ class AnyConfig {
   /// A struct without keys.
   AnyConfig() = default;
   template <class C>
-    requires(!std::is_same_v<std::decay_t<C>, AnyConfig>)
-  explicit AnyConfig(C value) : held_(std::make_unique<Held<C>>(std::move(value))) {}
+  requires(!std::is_same_v<std::decay_t<C>, AnyConfig>) explicit AnyConfig(C value)
+      : held_(std::make_unique<Held<C>>(std::move(value))) {}
   AnyConfig(const AnyConfig& other) : held_(other.held_ ? other.held_->clone() : nullptr) {}
   AnyConfig(AnyConfig&&) noexcept = default;
   AnyConfig& operator=(AnyConfig other) noexcept {

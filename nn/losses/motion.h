@@ -12,9 +12,9 @@ struct MotionWeights {
   double twist = 0;          ///< NKN's twist loss (spec 4.3)
 };
 
-/// One batch: motions of A, skeletons of both. Shapes as in MotionModel; self_mask [n] is 1 where B is A.
-/// `input` and `trans` are what the network sees (perhaps with noise), `joints` and `true_trans`
-/// what is true.
+/// One batch: motions of A, skeletons of both. Shapes as in MotionModel; self_mask [n] is 1 where B
+/// is A. `input` and `trans` are what the network sees (perhaps with noise), `joints` and
+/// `true_trans` what is true.
 struct MotionBatch {
   Var joints, input, true_trans, trans, rest_a, rest_b, sixd;
   Tensor self_mask;

@@ -13,7 +13,7 @@ namespace restage {
 
 struct ModelType {
   std::string name, help;
-  std::string role;  ///< what it is used as (nn/weights/bundle.h)
+  std::string role;    ///< what it is used as (nn/weights/bundle.h)
   AnyConfig config;    ///< its sizes, at their defaults
   AnyConfig training;  ///< the same, as a training starts that does not say otherwise
   std::unique_ptr<Module> (*make)(const AnyConfig& config, const Init& init);
@@ -34,7 +34,8 @@ std::vector<std::string> models_of_role(const std::string& role);
 template <class M>
 std::shared_ptr<M> make_model_as(const std::string& name, const AnyConfig& config,
                                  const Init& init) {
-  auto model = std::dynamic_pointer_cast<M>(std::shared_ptr<Module>(make_model(name, config, init)));
+  auto model =
+      std::dynamic_pointer_cast<M>(std::shared_ptr<Module>(make_model(name, config, init)));
   if (model == nullptr)
     throw InputError("", "'" + name + "' is a model of another kind than is needed here",
                      "'restage info --help' lists the models");

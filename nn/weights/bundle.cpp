@@ -125,8 +125,8 @@ std::shared_ptr<Module> filled(const std::string& name, const AnyConfig& config,
   try {
     net = make_model(name, config, init);
   } catch (const InputError&) {
-    throw InputError(where, "has sizes of " + name_in_quotes(name) + " that its tensors cannot fill",
-                     kFix);
+    throw InputError(
+        where, "has sizes of " + name_in_quotes(name) + " that its tensors cannot fill", kFix);
   }
   load_state(*net, file, prefix, where);
   return net;
@@ -162,8 +162,8 @@ std::string TrainedModel::setting(const std::string& name,
   if (found == settings.end()) return known.front();
   if (std::find(known.begin(), known.end(), found->second) == known.end())
     throw InputError("",
-                     "the weights were trained with " + name + " " +
-                         name_in_quotes(found->second) + ", which is unknown here",
+                     "the weights were trained with " + name + " " + name_in_quotes(found->second) +
+                         ", which is unknown here",
                      "use the version of restage that trained them");
   return found->second;
 }
@@ -203,9 +203,8 @@ TensorFile to_file(const Bundle& bundle) {
   Json json = {{"format", 1}, {"models", Json::object()}};
   for (const auto& [role, model] : bundle) {
     append(&out, *model.net, prefix_of(role));
-    json["models"][place_of(role)] = {{"model", model.model},
-                                      {"sizes", to_json(model.config)},
-                                      {"settings", model.settings}};
+    json["models"][place_of(role)] = {
+        {"model", model.model}, {"sizes", to_json(model.config)}, {"settings", model.settings}};
   }
   out.metadata[kKey] = json.dump();
   return out;

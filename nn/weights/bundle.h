@@ -1,5 +1,6 @@
 // A bundle of weights: trained networks by the role that each fills in a system, with all that must
-// be known to use them. It is what stages hand on, what weights files hold and what `retarget` reads.
+// be known to use them. It is what stages hand on, what weights files hold and what `retarget`
+// reads.
 //
 //   role                 what fills it (interface)                       prefix in a file
 //   skeleton             clouds -> joints (nn/models/skeleton.h)         skeleton.
@@ -76,7 +77,8 @@ TensorFile to_file(const Bundle& bundle);
 void save_bundle(const std::string& path, const Bundle& bundle);
 
 /// All models of a file, in float32. InputError naming `where` if a model is unknown, its sizes are
-/// impossible or unknown, tensors belong to none, or (StateError) do not fit; nothing is loaded then.
+/// impossible or unknown, tensors belong to none, or (StateError) do not fit; nothing is loaded
+/// then.
 Bundle bundle_of(const TensorFile& file, const std::string& where);
 /// Of a weights file, or of a folder that holds weights.safetensors (a run, an artifact).
 Bundle load_bundle(const std::string& path);

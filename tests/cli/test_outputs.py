@@ -66,7 +66,7 @@ class InputsStay(CliTest):
         self.stays("w.h5", *retarget, "frames", "--target", "hero.ply", "--out", "w.h5")
         self.stays("frames/frame_000001.ply", "skeleton", "--weights", w, "--input", "frames", "--out", "frames/frame_000001.ply")
         self.h5("rest.h5", joints=([1, 22, 3], [0.0]))
-        self.stays("rest.h5", "register", "--source", "frames", "--target", "hero.ply", "--rest", "rest.h5", "--out", "rest.h5")
+        self.stays("rest.h5", "retarget", "--system", "register", "--source", "frames", "--target", "hero.ply", "--rest", "rest.h5", "--out", "rest.h5")
         self.done("doctor", "frames", "--fix", "scans.h5", "--up", "y", "--scale", "0.3")
         shutil.copy(self.path("scans.h5"), self.path("scans.png"))
         self.stays("scans.png", "render", "scans.png", "--out", "scans.png")

@@ -54,6 +54,61 @@ class Runs(Train):
         self.bad_input(["eval", "run=" + run, "--anchor", "-1"], "--anchor")
         self.bad_input(["eval", "run=nowhere"], "nowhere")
 
+    def test_any_stages_can_be_judged(self):
+        small = ("data.bodies.test=2", "evaluation.sequences=1", "evaluation.frames=5")
+        found = {}
+        for stages in ("skeleton", "motion", "deformation", "skeleton,motion"):
+            run = self.train("tiny.yaml", "stages=[%s]" % stages, *small)
+            found[stages] = self.json("eval", "run=" + run)
+            self.assertIn("Not measured", self.done("eval", "run=" + run), stages)
+        self.assertEqual({k: v["condition"] for k, v in found.items()},
+                         {"skeleton": None, "motion": "true_skeletons", "deformation": "true_poses", "skeleton,motion": "clouds"})
+        self.assertIsNone(found["skeleton"]["mean"]["mpjpe"])
+        self.assertEqual(found["skeleton"]["sequences"], [])
+        self.assertGreater(found["skeleton"]["extractor"]["joint_error_mm"], 0)
+        self.assertNotIn("extractor", found["motion"])
+        self.assertIn("clouds: no model for skeleton", found["motion"]["missing"])
+        self.assertGreater(found["motion"]["mean"]["pa_mpjpe"], 0)
+        self.assertIsNone(found["motion"]["mean"]["mpvd"], "no surface was trained")
+        self.assertGreater(found["deformation"]["mean"]["mpvd"], 0)
+        self.assertIn("true_skeletons", found["skeleton,motion"])
+
+    def test_stages_from_elsewhere(self):
+        first = self.train("tiny.yaml", "stages=[skeleton,motion]")
+        # Taken as it is: not trained, part of the run's weights. Started from: other bits than from nothing.
+        run = self.train("tiny.yaml", "skeleton.from=" + first, "motion.init=" + first, "seed=2")
+        plain = self.train("tiny.yaml", "skeleton.from=" + first, "seed=2")
+        encoder = self.train("tiny.yaml", "skeleton.from=" + first, "motion.init=" + first, "motion.init_names=[smrm.enc.*]", "seed=2")
+        def part(where, model):
+            self.done("weights", "export", "--from", where, "--model", model, "--out", "part.safetensors")
+            return self.bytes("part.safetensors")
+        self.assertEqual(part(run, "skeleton"), part(first, "skeleton"))
+        self.assertEqual(self.checkpoints(run)[-1].split("-")[0], "motion")
+        self.assertEqual(len({part(r, "motion") for r in (first, run, plain, encoder)}), 4)
+        self.assertEqual(part(run, "deformation.weights"), part(plain, "deformation.weights"))
+        for words, part in ((["skeleton.from=nowhere"], "nowhere"), (["deformation.from=" + first], "no model for deformation.weights"),
+                            (["motion.init=" + first, "motion.sizes.hidden=8"], "smrm.enc.weight_ih_l0"),
+                            (["motion.init=" + first, "motion.init_names=[smrm.encoder.*]"], "smrm.encoder.*"),
+                            (["motion.init=" + first, "motion.from=" + first], "motion.init")):
+            self.bad_input(["train", "tiny.yaml", *words], part)
+
+    def test_a_run_goes_on_as_it_was_or_not_at_all(self):
+        run = self.train("tiny.yaml", "stages=[motion]")
+        self.bad_input(["train", "resume=" + run, "--seed", "3"], "--seed")
+        line = json.loads(self.bytes(run + "/provenance.json"))["command_line"]
+        self.assertEqual(line, ["restage", "train", "tiny.yaml", "stages=[motion]", "--quiet"], "all of it")
+        config = self.bytes(run + "/config.yaml").decode()
+        self.write(run + "/config.yaml", config.replace("smoothness: 0.1", "smoothness: 0.2"))
+        self.bad_input(["train", "resume=" + run], "motion.weights.smoothness", "0.1")
+        self.write(run + "/config.yaml", config)
+        self.done("train", "resume=" + run, "--quiet")
+
+    def test_what_must_be_known_of_the_weights_is_kept(self):
+        run = self.train("tiny.yaml", "motion.windows.remove_heading=true", "motion.windows.translation=relative")
+        self.done("weights", "export", "--from", run, "--model", "smrm", "--out", "alone.safetensors")
+        self.done("weights", "import", "--from", "alone.safetensors", "--model", "smrm/rot6d", "--with", run, "--out", "again.safetensors")
+        self.assertEqual(self.bytes("again.safetensors"), self.weights_of(run))
+
     def test_run_directory(self):
         result = self.restage("train", "tiny.yaml", "seed=5", "deformation.optimiser.steps=6")
         self.assertEqual(result.code, 0, result.err)

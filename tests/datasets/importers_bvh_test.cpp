@@ -291,8 +291,7 @@ TEST_F(ReadersRecordings, AnnouncedCountsAreNotBelieved) {
   EXPECT_HAS(complaint(replaced(good, "Frames: 12", "Frames: 999999999")), "ends after 12 of");
   // Vendors miscount: what is announced is read, what follows is left out, whatever it is.
   const MotionClip eleven =
-      convert_bvh(replaced(good, "Frames: 12", "Frames: 11") + "and notes
-", "x.bvh");
+      convert_bvh(replaced(good, "Frames: 12", "Frames: 11") + "and notes\n", "x.bvh");
   EXPECT_EQ(eleven.report.remarks.size(), 1u);
   EXPECT_HAS(eleven.report.remarks.back(), "announces 11; left out");
   EXPECT_HAS(complaint(replaced(good, "Frames: 12", "Frames: 13")), "ends after 12 of");

@@ -70,7 +70,8 @@ class World:
         over time and provenance of a run hold times."""
         found = {}
         for root in (self.path(name) + "/trials", self.path(name) + "-store"):
-            for folder, _, files in os.walk(root):
+            for folder, folders, files in os.walk(root):
+                folders[:] = [f for f in folders if not f.startswith(".")]  # what is being made
                 for file in files:
                     where = os.path.relpath(os.path.join(folder, file), root)
                     with open(os.path.join(folder, file), "rb") as f:
@@ -80,7 +81,7 @@ class World:
                         for key in ("seconds", "host", "command"):
                             result.pop(key)
                         content = json.dumps(result, sort_keys=True).encode()
-                    elif not (file.endswith(".safetensors") or file in ("config.yaml", "metrics.jsonl")) or "/checkpoints/" in where:
+                    elif not (file.endswith(".safetensors") or file in ("config.yaml", "metrics.jsonl", "artifact.json")) or "/checkpoints/" in where:
                         continue
                     found[where] = hashlib.sha256(content).hexdigest()
         return found
@@ -88,7 +89,7 @@ class World:
     def leftovers(self, name):
         """Drafts, leases and temporary files must not stay behind a finished sweep."""
         return [os.path.join(f, n) for root in (self.path(name), self.path(name) + "-store") for f, folders, files in os.walk(root)
-                for n in folders + files if ".part" in n or n.startswith("lease") or ".draft" in n]
+                for n in folders + files if ".part" in n or "lease" in n or ".draft" in n or n.endswith(".ready")]
 
     def same_as(self, whole, name):
         a, b = self.bytes_of(whole), self.bytes_of(name)

@@ -81,8 +81,8 @@ void import_file(const std::string& bytes) {
 
 void extract(const std::string& bytes) {
   const Mesh mesh = parse_mesh(bytes, "x.obj");
-  for (const Vec3& joint :
-       extract_joints(tiny_models().need_as<SkeletonModel>("skeleton", "w"), mesh.vertices, "x.obj", {1, 0}, 2))
+  for (const Vec3& joint : extract_joints(tiny_models().need_as<SkeletonModel>("skeleton", "w"),
+                                          mesh.vertices, "x.obj", {1, 0}, 2))
     if (!joint.allFinite()) throw std::logic_error("a joint is not finite");
 }
 
@@ -95,7 +95,7 @@ void retarget(const std::string& bytes) {
     check_source({{mesh.vertices, {}}}, "x.obj");
   }
   Retargeter system(tiny_models(), "w", mesh, "x.obj", options);
-  GlbWriter glb(file_of("", "out.glb"), mesh, system.rest(), system.weights());
+  GlbWriter glb(file_of("", "out.glb"), mesh, system.rest(), system.rig()->weights);
   BvhWriter bvh(file_of("", "out.bvh"), system.rest());
   for (const float size : {1.0f, 1.01f}) {
     Points cloud = mesh.vertices;

@@ -10,16 +10,16 @@
 #include "datasets/sampling/surface.h"
 #include "datasets/schema.h"
 #include "experiments/cli/benchmark_config.h"
+#include "nn/config/config.h"
 #include "nn/weights/bundle.h"
-#include "tests/support/small_models.h"
 #include "tests/datasets/gltf_maker.h"
 #include "tests/datasets/importers_bvh_text.h"
 #include "tests/datasets/schema_support.h"
 #include "tests/datasets/smpl_support.h"
 #include "tests/fuzz/old_layout.h"
 #include "tests/fuzz/targets.h"
+#include "tests/support/small_models.h"
 #include "tests/support/tiny_body.h"
-#include "nn/config/config.h"
 #include "train/stages/train_config.h"
 
 namespace restage::fuzz {

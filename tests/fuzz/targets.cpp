@@ -17,11 +17,11 @@
 #include "datasets/readers/mesh_io.h"
 #include "datasets/schema.h"
 #include "experiments/cli/benchmark_config.h"
+#include "nn/config/config.h"
 #include "nn/weights/bundle.h"
 #include "nn/weights/state.h"
 #include "tests/datasets/schema_support.h"
 #include "tests/datasets/smpl_support.h"
-#include "nn/config/config.h"
 #include "tests/fuzz/after_reading.h"
 #include "train/stages/train_config.h"
 
@@ -173,7 +173,7 @@ void read_weights(const std::string& bytes) {
            bytes.substr(std::min(end + 1, bytes.size()));
   }
   const TensorFile tensors = parse_safetensors(file, "x.safetensors");
-  if (tensors.metadata.count("restage") != 0) models_of(tensors, {}, "x.safetensors");
+  if (tensors.metadata.count("restage") != 0) bundle_of(tensors, "x.safetensors");
 }
 
 template <class Config>

@@ -50,7 +50,7 @@ double mean_distance(const Joints& a, const Joints& b) {
 }
 
 RetargetedFrame registered(const Body& target, const Points& cloud) {
-  return Registration(target.rest, target.joints, "target").push(cloud, "cloud");
+  return Registration(target.rest, target.joints, "target").push(cloud, "cloud")[0];
 }
 
 TEST(Registration, RecoversThePoseOfTheSameBody) {
@@ -91,7 +91,7 @@ TEST(Registration, TheSameBitsForAnyNumberOfThreads) {
     set_threads(n);
     Registration registration(body().rest, body().joints, "target");
     registration.push(cloud, "first");
-    found.push_back(registration.push(cloud, "second"));  // with a frame before
+    found.push_back(registration.push(cloud, "second")[0]);  // with a frame before
   }
   set_threads(0);
   for (size_t k = 1; k < found.size(); ++k)

@@ -237,12 +237,14 @@ TEST(InferRetargeter, VerticesKeepTheTargetsOrder) {
   const auto n = static_cast<int>(turned.vertices.size());
   for (Triangle& t : turned.faces)
     for (int& i : t) i = n - 1 - i;
-  Retargeter a(models, "w", target().rest, target().joints, {}), b(models, "w", turned, target().joints, {});
+  Retargeter a(models, "w", target().rest, target().joints, {}),
+      b(models, "w", turned, target().joints, {});
   EXPECT_EQ(b.target().faces, turned.faces);
   ASSERT_EQ(a.rig()->weights.rows(), n);
   for (int i = 0; i < n; ++i) {
     EXPECT_NEAR(a.rig()->weights.row(i).sum(), 1.0f, 1e-5f);
-    EXPECT_LT((a.rig()->weights.row(i) - b.rig()->weights.row(n - 1 - i)).cwiseAbs().maxCoeff(), 1e-5f);
+    EXPECT_LT((a.rig()->weights.row(i) - b.rig()->weights.row(n - 1 - i)).cwiseAbs().maxCoeff(),
+              1e-5f);
   }
   for (const Joints& j : source) {
     const Points x = a.push_joints(j)[0].vertices;
@@ -307,8 +309,7 @@ TEST(InferRetargeter, TranslationsMeanWhatTheWeightsSay) {
   for (Joints& joints : elsewhere)
     for (Vec3& j : joints) j += step;
   for (const std::string kind : {"velocity", "relative", "absolute"}) {
-    const Bundle models =
-        testing::with_setting(untrained(), "motion", "translation", kind);
+    const Bundle models = testing::with_setting(untrained(), "motion", "translation", kind);
     Retargeter a(models, "w", target().rest, target().joints, {}),
         b(models, "w", target().rest, target().joints, {});
     const auto x = run(a, source), y = run(b, elsewhere);
@@ -407,7 +408,8 @@ TEST(InferRetargeter, WhatCannotBeAnsweredIsSaid) {
   for (const double fps : {0.0, -30.0, 0.01, 1e9, std::nan("")}) {
     RetargetOptions options;
     options.fps = fps;
-    EXPECT_THROW(Retargeter(models, "w", target().rest, target().joints, options), InputError) << fps;
+    EXPECT_THROW(Retargeter(models, "w", target().rest, target().joints, options), InputError)
+        << fps;
   }
   Retargeter r(models, "w", target().rest, target().joints, {});
   Joints huge = tiny_joints();

@@ -34,10 +34,10 @@ TEST(DropoutMasks, TwoPassesThroughOneNetworkDiffer) {
   Context evaluation;
   EXPECT_TRUE(same_bits(net(evaluation), net(evaluation))) << "nothing else may differ";
 
-  const auto mlp = make_weight_net(Init{RngKey{6, 0}, DType::f64}, 16);  // ReLU and dropout in one
-  name_scopes(*mlp, "weights");
+  WeightNet weights({16, 0.2}, Init{RngKey{6, 0}, DType::f64});  // ReLU and dropout in one
+  name_scopes(weights, "weights");
   const Tensor x = random({5, 3 * kJoints + 3}, 2);
-  EXPECT_FALSE(same_bits((*mlp)(ctx, x).value, (*mlp)(ctx, x).value));
+  EXPECT_FALSE(same_bits(weights.net(ctx, x).value, weights.net(ctx, x).value));
 }
 
 TEST(DropoutMasks, TwoNetworksDifferWithoutNames) {
@@ -57,9 +57,9 @@ TEST(DropoutMasks, TheTwoPassesOfACycleDiffer) {
   const Tensor joints = random({1, 4, kJoints, 3}, 1), trans = random({1, 4, 3}, 2),
                rest = random({1, kJoints, 3}, 3);
   Context ctx = training_step();
-  SmrmState forth, back;
-  const Tensor first = net(ctx, joints, trans, rest, &forth).raw.value;
-  const Tensor second = net(ctx, joints, trans, rest, &back).raw.value;
+  MotionState forth, back;
+  const Tensor first = net.forward(ctx, joints, trans, rest, &forth).raw.value;
+  const Tensor second = net.forward(ctx, joints, trans, rest, &back).raw.value;
   EXPECT_FALSE(same_bits(first, second));
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "autograd/gradcheck/evaluate.h"
+#include "nn/models/smrm.h"
 
 namespace restage {
 namespace {

@@ -12,6 +12,7 @@
 #include "nn/models/deformation.h"
 #include "nn/models/discriminator.h"
 #include "nn/models/registry.h"
+#include "nn/models/skeleton.h"
 #include "nn/models/smrm.h"
 #include "nn/weights/safetensors.h"
 #include "train/optim/adam.h"

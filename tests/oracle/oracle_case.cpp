@@ -16,6 +16,7 @@
 #include "nn/losses/motion.h"
 #include "nn/models/point_transformer.h"
 #include "nn/models/pointnet.h"
+#include "nn/models/smrm.h"
 #include "nn/weights/state.h"
 
 namespace restage::oracle {
@@ -348,8 +349,8 @@ void deformation(Case& c) {
   c.load(offsets, "O.");
   const Tensor aa = c.constant("aa");
   const Var local = axis_angle_to_matrix(aa);
-  const DeformationOutput y = deform(c.ctx(), weights, &offsets, c.in("p"), c.in("tpose"),
-                                     local, aa.reshape({aa.size(0), -1}));
+  const DeformationOutput y = deform(c.ctx(), weights, &offsets, c.in("p"), c.in("tpose"), local,
+                                     aa.reshape({aa.size(0), -1}));
   c.out("weights", y.weights);
   c.out("offsets", y.offsets);
   c.out("posed", y.posed);

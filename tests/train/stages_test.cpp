@@ -17,7 +17,6 @@ namespace restage {
 namespace {
 
 using testing::bytes_of;
-using testing::tiny_corpora;
 using testing::choose;
 using testing::deformation;
 using testing::motion;
@@ -213,8 +212,7 @@ std::pair<double, double> learn(Stage& stage, int64_t steps) {
 /// Sixty steps in which every stage learns something.
 TrainConfig sixty_steps() {
   TrainConfig c = tiny_training(60);
-  for (OptimiserConfig* o : optimisers(c))
-    o->schedule.rate = 5e-3;
+  for (OptimiserConfig* o : optimisers(c)) o->schedule.rate = 5e-3;
   resize(motion(c).model, {"hidden=64", "dropout=0"});
   motion(c).self_first_pass = true;
   motion(c).windows.self_share = 0.7;
@@ -350,8 +348,7 @@ TEST(TrainStages, NonFiniteValuesAreNamedWithOpAndModule) {
 TEST(TrainStages, HugeRateIsCaughtInTheStepWhereItShows) {
   for (const std::string name : kStageNames) {
     TrainConfig c = tiny_training(6);
-    for (OptimiserConfig* o :
-         optimisers(c)) {
+    for (OptimiserConfig* o : optimisers(c)) {
       o->schedule = {};
       o->schedule.rate = 1e25;
       o->clip = 0;

@@ -94,7 +94,7 @@ class TrainTrainer : public ::testing::Test {
   }
   /// `what` happens before step `when` of stage `which`.
   static MakeStage disturbed(const std::string& which, int64_t when,
-                         const std::function<void()>& what) {
+                             const std::function<void()>& what) {
     return [=](const std::string& name, Bundle*) -> std::unique_ptr<Stage> {
       auto stage = tiny_stage(name, tiny_training(kSteps));
       if (name != which) return stage;
@@ -208,7 +208,8 @@ TEST_F(TrainTrainer, PrecisionIsForStepsOnly) {
   };
   RunDir run = create("bfloat16");
   const auto bfloat16 = MatmulPrecision::bfloat16;
-  const std::string got = weights(train(run, kAll, loop(), watched, {.precision = bfloat16, .quiet = true, .observers = {}}));
+  const std::string got = weights(
+      train(run, kAll, loop(), watched, {.precision = bfloat16, .quiet = true, .observers = {}}));
   EXPECT_EQ(steps, std::vector<MatmulPrecision>(3 * kSteps, bfloat16));
   EXPECT_EQ(validations, std::vector<MatmulPrecision>(6, MatmulPrecision::float32));
   EXPECT_EQ(matmul_precision(), MatmulPrecision::float32);
@@ -216,12 +217,14 @@ TEST_F(TrainTrainer, PrecisionIsForStepsOnly) {
   EXPECT_THROW(
       {
         RunDir other = create("stopped");
-        train(other, kAll, loop(), disturbed("motion", 3, [] { throw Killed(); }), {.precision = bfloat16, .quiet = true, .observers = {}});
+        train(other, kAll, loop(), disturbed("motion", 3, [] { throw Killed(); }),
+              {.precision = bfloat16, .quiet = true, .observers = {}});
       },
       Killed);
   EXPECT_EQ(matmul_precision(), MatmulPrecision::float32) << "after an error";
   RunDir again = RunDir::resume(place("stopped"), kAll);
-  EXPECT_TRUE(weights(train(again, kAll, loop(), plain(), {.precision = bfloat16, .quiet = true, .observers = {}})) == got);
+  EXPECT_TRUE(weights(train(again, kAll, loop(), plain(),
+                            {.precision = bfloat16, .quiet = true, .observers = {}})) == got);
 }
 
 /// Counts what it is told.
@@ -248,8 +251,9 @@ TEST_F(TrainTrainer, ObserversSeeEverything) {
 TEST_F(TrainTrainer, TwoStopsInARow) {
   for (const int64_t when : {1, 3}) {
     RunDir run = when == 1 ? create("twice") : RunDir::resume(place("twice"), kAll);
-    EXPECT_THROW(train(run, kAll, loop(), disturbed("motion", when, [] { ::raise(SIGINT); }), kQuiet),
-                 Interrupted);
+    EXPECT_THROW(
+        train(run, kAll, loop(), disturbed("motion", when, [] { ::raise(SIGINT); }), kQuiet),
+        Interrupted);
   }
   expect_completes("twice");
 }

@@ -1,9 +1,9 @@
 // Adam exactly as PyTorch's (spec 7).
 #pragma once
 
+#include "nn/config/config_reader.h"
 #include "nn/module.h"
 #include "nn/weights/safetensors.h"
-#include "nn/config/config_reader.h"
 
 namespace restage {
 

@@ -34,11 +34,10 @@ DeformationStage::DeformationStage(const Config& config, const StageInput& in)
       weights_(add_network<DeformationModel>(config.model,
                                              RngKey{in.seed, 0}.fold("deformation/weights"))),
       offsets_(config.offsets
-                   ? add_network<OffsetNet>("deformation.offsets", "deformation/offsets",
-                                            config.model.sizes,
-                                            RngKey{in.seed, 0}.fold("deformation/offsets"),
-                                            {{"keep_root_rotation",
-                                              config.keep_root_rotation ? "true" : "false"}})
+                   ? add_network<OffsetNet>(
+                         "deformation.offsets", "deformation/offsets", config.model.sizes,
+                         RngKey{in.seed, 0}.fold("deformation/offsets"),
+                         {{"keep_root_rotation", config.keep_root_rotation ? "true" : "false"}})
                    : nullptr),
       root_(config.root_net
                 ? add_network<RootNet>("deformation.root", "deformation/root", config.model.sizes,
@@ -99,8 +98,7 @@ NamedValues DeformationStage::validate() {
     const int64_t count = std::min(part, n - i);
     const DeformationBatch b = batch_of(validation_sampler_.batch(i, count));
     const auto share = static_cast<double>(count) / static_cast<double>(n);
-    with += share *
-            mean_distance(deform(ctx, *weights_, offsets_, b).posed.value, b.posed_points);
+    with += share * mean_distance(deform(ctx, *weights_, offsets_, b).posed.value, b.posed_points);
     without +=
         share * mean_distance(deform(ctx, *weights_, nullptr, b).posed.value, b.posed_points);
     if (root_ != nullptr) root += share * root_loss(ctx, b).value.item();

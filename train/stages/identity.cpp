@@ -89,12 +89,9 @@ std::vector<StageId> Identities::stages(const TrainConfig& config) {
 
 std::string Identities::trial(const TrainConfig& config,
                               const std::map<std::string, std::string>& more) {
-  Json json = {{"behaviour", kBehaviour},
-               {"data", data(config.data)},
-               {"seed", config.seed},
-               {"evaluation", keys_of(config.evaluation)},
-               {"stages", config.stages},
-               {"more", more}};
+  Json json = {{"behaviour", kBehaviour}, {"data", data(config.data)},
+               {"seed", config.seed},     {"evaluation", keys_of(config.evaluation)},
+               {"stages", config.stages}, {"more", more}};
   for (const StageId& stage : stages(config)) json["artifacts"][stage.stage] = stage.id;
   for (const std::string& name : config.stages)
     if (const auto& from = config.section(name).from) json["from"][name] = weights(*from);

@@ -1,8 +1,8 @@
-// What makes two results the same result. The id of an artifact or a trial is the first 12 hex digits
-// of the SHA-256 of all that determines it: the resolved keys that its training reads, the content of
-// its data and of weights that it starts from, the seed, the ids of the artifacts that it reads, and
-// the number of this program's behaviour. Names, folders, logging and thread counts are not part of
-// it, so the same question has the same id on any machine.
+// What makes two results the same result. The id of an artifact or a trial is the first 12 hex
+// digits of the SHA-256 of all that determines it: the resolved keys that its training reads, the
+// content of its data and of weights that it starts from, the seed, the ids of the artifacts that
+// it reads, and the number of this program's behaviour. Names, folders, logging and thread counts
+// are not part of it, so the same question has the same id on any machine.
 #pragma once
 
 #include <map>
@@ -20,15 +20,15 @@ inline constexpr int kBehaviour = 1;
 /// An artifact that a configuration trains.
 struct StageId {
   std::string stage, id;
-  std::string facts;  ///< what the id is the sum of, as JSON
+  std::string facts;                                     ///< what the id is the sum of, as JSON
   std::string name() const { return stage + "-" + id; }  ///< of its folder in a store
 };
 
 /// Finds identities; remembers those of files that it has read.
 class Identities {
  public:
-  /// Of bodies and motions: the bytes of a data set file, a benchmark's manifest, or the keys of the
-  /// built-in source. InputError if the file cannot be read.
+  /// Of bodies and motions: the bytes of a data set file, a benchmark's manifest, or the keys of
+  /// the built-in source. InputError if the file cannot be read.
   std::string data(const CorpusSource& source);
   /// Of a weights file, run or artifact: its bytes.
   std::string weights(const std::string& path);

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <thread>
+#include <vector>
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/interrupt.h"
@@ -49,11 +50,29 @@ Json last_validation(const std::string& metrics) {
   return line.is_discarded() ? Json() : line;
 }
 
+/// What processes that were killed have left of the making of an artifact: `.STAGE-ID.partial` and
+/// the like.
+std::vector<fs::path> leftovers(const std::string& dir, const std::string& name) {
+  std::vector<fs::path> out;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(dir, ignored)) {
+    const std::string file = entry.path().filename().string();
+    if (file.starts_with(".") && file.find(name) != std::string::npos) out.push_back(entry.path());
+  }
+  return out;
+}
+
+/// All of it but the lease, which the caller holds.
+void remove_leftovers(const std::string& dir, const std::string& name) {
+  std::error_code ignored;
+  for (const fs::path& path : leftovers(dir, name))
+    if (path.filename().string().find(".lease") == std::string::npos) fs::remove_all(path, ignored);
+}
+
 RunDir open_run(const std::string& folder, const std::string& stage, const std::string& yaml,
                 const std::string& facts) {
   std::error_code ignored;
-  if (fs::exists(fs::path(folder) / "config.yaml", ignored))
-    return RunDir::resume(folder, {stage});
+  if (fs::exists(fs::path(folder) / "config.yaml", ignored)) return RunDir::resume(folder, {stage});
   fs::remove_all(folder, ignored);
   return RunDir::create_at(folder, yaml, facts, {stage});
 }
@@ -95,10 +114,13 @@ Bundle Store::get(const StageId& id, const std::string& config_yaml, const Make&
   const std::string lease_path = (fs::path(dir_) / ("." + id.name() + ".lease")).string();
   const StopScope stop;
   for (bool told = false;; told = true) {
-    if (auto found = find(id)) return std::move(*found);
+    auto there = find(id);
+    if (there && leftovers(dir_, id.name()).empty()) return std::move(*there);
     auto lease = Lease::take(lease_path, id.name());
+    if (there && !lease) return std::move(*there);  // somebody else tidies up
     if (lease) {
-      if (auto found = find(id)) {  // somebody has just finished it
+      if (auto found = find(id)) {  // its maker was killed before it could tidy up
+        remove_leftovers(dir_, id.name());
         lease->forget();
         return std::move(*found);
       }
@@ -110,7 +132,7 @@ Bundle Store::get(const StageId& id, const std::string& config_yaml, const Make&
       if (lease->lost())
         throw WorkError("another process has taken over " + id.name() + "; run it again");
       publish(id, aside.string(), config_yaml, bundle);
-      fs::remove_all(aside, error);
+      remove_leftovers(dir_, id.name());
       lease->forget();
       // What others read is what we use.
       if (auto found = find(id)) return std::move(*found);

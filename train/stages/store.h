@@ -5,9 +5,9 @@
 //   metrics.jsonl        its curves
 //   artifact.json        id, data, seed, what it read, its last validation, checksums of the others
 //
-// An artifact is complete or absent: it is made aside, in .STAGE-ID.partial, a run directory that the
-// next process goes on from, and then renamed. Its bytes are a function of its id: no time, host or
-// thread count is in it.
+// An artifact is complete or absent: it is made aside, in .STAGE-ID.partial, a run directory that
+// the next process goes on from, and then renamed. Its bytes are a function of its id: no time,
+// host or thread count is in it.
 #pragma once
 
 #include <functional>
@@ -32,8 +32,8 @@ class Store {
 
   /// Trains in the given run directory, which may hold the checkpoints of an earlier attempt.
   using Make = std::function<Bundle(RunDir& run)>;
-  /// The artifact, made if it is absent. While another process makes it, this one waits. Interrupted
-  /// on a signal; then the next call goes on.
+  /// The artifact, made if it is absent. While another process makes it, this one waits.
+  /// Interrupted on a signal; then the next call goes on.
   Bundle get(const StageId& id, const std::string& config_yaml, const Make& make) const;
 
  private:

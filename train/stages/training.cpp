@@ -20,9 +20,9 @@ void check_order(const TrainConfig& config, const StageType& type) {
   const auto self = std::find(stages.begin(), stages.end(), type.name);
   for (const std::string& read : type.reads)
     if (std::find(stages.begin(), self, read) == self)
-      throw InputError("", "stage '" + type.name + "' needs what '" + read + "' leaves",
-                       "name " + read + " before it in stages (" + read +
-                           ".from takes it from elsewhere)");
+      throw InputError(
+          "", "stage '" + type.name + "' needs what '" + read + "' leaves",
+          "name " + read + " before it in stages (" + read + ".from takes it from elsewhere)");
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// The stages of a configuration, trained: in a run directory (`restage train`), or each as an artifact
-// of a store that other trials share (sweeps).
+// The stages of a configuration, trained: in a run directory (`restage train`), or each as an
+// artifact of a store that other trials share (sweeps).
 #pragma once
 
 #include "train/stages/store.h"
@@ -16,13 +16,14 @@ struct TrainingData {
 };
 
 /// A stage with its weights to start from; null if it is taken as it is, and then its networks are
-/// put into `so_far`. InputError: weights that do not fit or hold nothing for the stage, a stage that
-/// it reads and that does not come before.
+/// put into `so_far`. InputError: weights that do not fit or hold nothing for the stage, a stage
+/// that it reads and that does not come before.
 std::unique_ptr<Stage> make_stage(const TrainConfig& config, const std::string& name,
                                   const TrainingData& data, Bundle* so_far);
 
-/// Finds everything that can be wrong with a configuration before any work: models of unknown names,
-/// sizes that do not fit together, windows longer than every motion, weights that are not there.
+/// Finds everything that can be wrong with a configuration before any work: models of unknown
+/// names, sizes that do not fit together, windows longer than every motion, weights that are not
+/// there.
 void check_stages(const TrainConfig& config, const TrainingData& data);
 
 /// All stages one after the other in a run directory.
@@ -33,7 +34,8 @@ struct StoreTraining {
   std::vector<StageId> artifacts;  ///< in the order of training
 };
 /// The same through a store: what is there is taken, what is not is made, or waited for if another
-/// process makes it. `last_stage`: no further than that. Data are read only if something is trained.
+/// process makes it. `last_stage`: no further than that. Data are read only if something is
+/// trained.
 StoreTraining train_in_store(const Store& store, const TrainConfig& config, Identities* identities,
                              const TrainOptions& options, const std::string& last_stage = "");
 
