@@ -129,7 +129,7 @@ def lite(weights):
 def register(restage, sequence, in_scans):
     clouds, options = source_clouds(restage, sequence, in_scans)
     result = sequence.scratch("result.h5")
-    restage("register", "--source", clouds, "--target", sequence.file("target.ply"), "--rest", sequence.file("rest.h5"),
+    restage("retarget", "--system", "register", "--source", clouds, "--target", sequence.file("target.ply"), "--rest", sequence.file("rest.h5"),
             "--every", EVERY, "--out", result)
     return measure(restage, sequence, result, "--every", EVERY, *options)
 

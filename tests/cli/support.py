@@ -137,8 +137,8 @@ def sphere(count=500, radius=0.5):
     return out
 
 
-def small_disk():
+def small_disk(limit=4096):
     """For `before`: files may not grow beyond 4 kB, as if the disk were full."""
     import resource
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))

@@ -168,7 +168,7 @@ class Runs(Train):
         self.assertFalse(os.path.exists(self.path(result.out.strip() + "/weights.safetensors")))
 
     def test_full_disk(self):
-        result = self.restage("train", "tiny.yaml", "--quiet", before=small_disk)
+        result = self.restage("train", "tiny.yaml", "--quiet", before=lambda: small_disk(1 << 14))
         self.one_line(result, 1, "checkpoints")
         run = result.out.strip()
         self.assertEqual(os.listdir(self.path(run + "/checkpoints")), [])

@@ -86,9 +86,9 @@ class Weights(CliTest):
         self.bad_input(["weights", "import", "--from", cut, *into], cut)
         self.bad_input(["weights", "import", "--from", good, "--model", "deformation/offset", "--out", "w.safetensors"], "deformation/offsets")
         self.bad_input(["weights", "import", "--from", good, "--map", self.write("m.yaml", "[1]"), *into], "m.yaml")
-        self.bad_input(["weights", "import", "--from", good, "--size", "hidde=3", *into], "hidden")
+        self.bad_input(["weights", "import", "--from", good, "--size", "widht=3", *into], "did you mean 'width'")
         for value in (-5, 0):
-            self.bad_input(["weights", "import", "--from", good, "--size=hidden=%d" % value, *into], "no size")
+            self.bad_input(["weights", "import", "--from", good, "--size=width=%d" % value, *into], "width", "from 1 to")
         self.bad_input(["weights", "export", "--from", good, "--model", "smrm", "--out", "s.safetensors"], good)
         self.bad_input(["weights", "import", "--from", good, "--model", "deformation/offsets", "--out", "nowhere/w.safetensors"], "nowhere")
 

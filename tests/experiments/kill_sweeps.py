@@ -253,7 +253,7 @@ def main():
         start = time.monotonic()
         world.finish("whole")
         world.seconds = time.monotonic() - start
-        world.little_memory = 220 << 20
+        world.little_memory = 96 << 20
         say("undisturbed: %.1f s, %d files" % (world.seconds, len(world.bytes_of("whole"))))
         for name in options.only.split(","):
             start = time.monotonic()

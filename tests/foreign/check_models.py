@@ -152,7 +152,7 @@ def calls(i, model, good, frames):
     yield ["data", "verify", model], [], True
     yield ["render", frames, "--out", "x.png"], ["x.png"], False
     yield ["render", result, "--source", model, "--out", "x.html"], ["x.html"], False
-    register = ["register", "--rest", f"{good}/rest.h5", "--out", "x.h5", "--every", 1000]
+    register = ["retarget", "--system", "register", "--rest", f"{good}/rest.h5", "--out", "x.h5", "--every", 1000]
     if i % 4 == 1:  # a second each
         yield [*register, "--source", walk, "--target", model], ["x.h5"], False
     if i % 4 == 3:

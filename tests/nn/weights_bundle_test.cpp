@@ -120,8 +120,7 @@ TEST(WeightsBundle, FilesFromElsewhereAreRefused) {
 }
 
 TEST(WeightsBundle, WrongModelsSizesAndTensorsAreRefused) {
-  expect_bad(edited("skeleton/patch_transformer", "skeleton/pointnet"),
-             "unknown key 'width'");
+  expect_bad(edited("skeleton/patch_transformer", "skeleton/pointnet"), "unknown key 'width'");
   expect_bad(edited("skeleton/patch_transformer", "smrm/rot6d"), "no model for skeleton");
   expect_bad(edited("skeleton/patch_transformer", "skeleton/unheard_of"), "no model for skeleton");
   expect_bad(edited("\"hidden\":8", "\"hidden\":9"), "does not fit smrm/rot6d");

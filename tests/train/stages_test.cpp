@@ -135,9 +135,9 @@ TEST(TrainStages, StateGoesThroughAFile) {
 }
 
 TEST(TrainStages, ReadingHasNoState) {
-  const std::vector<std::string> known = {
-      "skeleton.", "smrm.", "discriminator.", "deformation.", "adam.", "discriminator_adam.",
-      "balance"};
+  const std::vector<std::string> known = {"skeleton.",    "smrm.", "discriminator.",
+                                          "deformation.", "adam.", "discriminator_adam.",
+                                          "balance"};
   for (const std::string name : kStageNames) {
     const auto one = tiny_stage(name, tiny_training(8)), other = tiny_stage(name, tiny_training(8));
     one->read(5);  // as if it had been ahead
