@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "bench/inputs.h"
+#include "nn/models/skeleton.h"
 
 namespace restage::bench {
 
