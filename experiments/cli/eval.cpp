@@ -236,7 +236,8 @@ std::string to_text(const SystemEvaluation& scores, const EvaluationOptions& opt
                   1e3 * *scores.joint_error, 1e3 * *scores.tpose_joint_error);
     out += line;
   }
-  for (const std::string& missing : scores.missing) out += "\nNot measured: " + missing + ".\n";
+  if (!scores.missing.empty()) out += "\n";
+  for (const std::string& missing : scores.missing) out += "Not measured: " + missing + ".\n";
   return out;
 }
 

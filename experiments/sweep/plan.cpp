@@ -123,6 +123,12 @@ std::string shown(const Setting& setting) {
           b.settings[i].value.place.text(),
           shown(a.settings[i]) + " and " + shown(b.settings[i]) + " give the same trial",
           "leave one out; names, folders and logging change no result");
+  if (a.one == b.one && !b.settings.empty()) {
+    std::string keys;
+    for (const Setting& setting : b.settings) keys += (keys.empty() ? "" : ", ") + setting.key;
+    throw InputError(b.settings.back().value.place.text(), "a value of " + keys + " is given twice",
+                     "leave one out");
+  }
   throw InputError(b.one->place.text(),
                    "the cases " + in_quotes(a.one->name) + " and " + in_quotes(b.one->name) +
                        " give the same trial",
