@@ -136,6 +136,9 @@ void judge_test_clips(const Bundle& weights, const std::string& folder, uint64_t
                       SystemScores* scores, std::vector<std::string>* names) {
   const Corpus test = load_corpus({.source = folder}, "test");
   const size_t n = test.bodies.size();
+  if (n < 2)
+    throw InputError(folder, "has one body in its test split, and 'test' retargets to another",
+                     "leave the set 'test' out");
   for (size_t i = 0; i < test.motions.size(); ++i) {
     EvalSequence s;
     s.body_a = i % n;
