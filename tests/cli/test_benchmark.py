@@ -1,6 +1,7 @@
 """restage data build RECIPE, verify FOLDER, sheet, realism and fetch."""
 import gzip
 import hashlib
+import json
 import os
 import shutil
 import tarfile
@@ -114,6 +115,29 @@ class Benchmark(CliTest):
                                                                   "test.h5", "train.h5", "validation.h5"])
         size = sum(os.path.getsize(os.path.join(at, name)) for at, _, names in os.walk(self.path("small")) for name in names)
         self.assertLess(size, 20e6)
+
+    def test_a_sweep_measures_as_the_commands_do(self):
+        self.done("data", "build", os.path.join(ROOT, "configs", "data", "small_benchmark.yaml"), "out=small", "data=" + DATA)
+        lite = os.path.join(ROOT, "experiments", "weights", "lite.safetensors")
+        self.write("base.yaml", "".join("%s: {from: %s}\n" % (s, lite) for s in ("skeleton", "motion", "deformation")))
+        self.write("sweep.yaml", "base: base.yaml\nevaluate: {benchmark: small, sets: [naked, scans]}\n")
+        self.done("sweep", "run", "sweep.yaml", "--out", "d")
+        trial = os.listdir(self.path("d/trials"))[0]
+        found = json.loads(self.bytes("d/trials/%s/result.json" % trial))["metrics"]
+        for name, mended in (("naked", []), ("scans", ["--mended", "mended.h5"])):
+            folder = "small/%s/%s" % (name, found[name]["sequences"][0]["name"])
+            source, truth = folder + "/source.h5", folder + "/truth.h5"
+            if mended:
+                self.restage("doctor", source, "--fix", "mended.h5")  # exit code 1: not all can be mended
+            self.done("retarget", "--source", "mended.h5" if mended else source, "--target", folder + "/target.ply", "--weights", lite,
+                      "--out", name + ".h5")
+            judged = self.json("eval", "--pred", name + ".h5", "--truth", truth, "--source", source, "--rest", folder + "/rest.h5", *mended)
+            self.assertEqual(found[name]["mean"], judged["mean"])
+        # One test body has nobody to retarget to; it was a division by zero.
+        self.write("sweep.yaml", "base: base.yaml\nevaluate: {benchmark: small, sets: [test]}\n")
+        failed = self.restage("sweep", "run", "sweep.yaml", "--out", "alone")
+        self.assertEqual(failed.code, 1)
+        self.assertIn("one body in its test split", failed.err)
 
     def test_build_verify_and_use(self):
         made = self.json(*self.build("one", "--threads", 1))
