@@ -12,14 +12,13 @@
 #include "datasets/importers/gltf_character.h"
 #include "datasets/schema.h"
 #include "experiments/cli/doctor_repair.h"
-#include "experiments/cli/eval_world.h"
+#include "experiments/world_map.h"
 #include "nn/geometry/closed_form.h"
 
 namespace restage {
 namespace {
 
 namespace fs = std::filesystem;
-using metrics::Track;
 
 /// A folder that goes with its content.
 class Scratch {
@@ -43,45 +42,50 @@ class Scratch {
   fs::path path_;
 };
 
-Track track(const std::vector<double>& values, int64_t frames, int64_t points) {
-  return values.empty() ? Track{} : Track{values.data(), frames, points};
-}
-
-Joints first_joints(const Prediction& p) {
-  Joints out;
-  for (size_t j = 0; j < out.size(); ++j) out[j] = Eigen::Map<const Vec3>(&p.joints[3 * j]);
-  return out;
+std::string in(const std::string& folder, const char* file) {
+  return (fs::path(folder) / file).string();
 }
 
 /// What the target did, as a file of predictions would hold it.
 Prediction retargeted(const Bundle& weights, const std::string& folder, const std::string& clouds,
-                      uint64_t seed) {
+                      const BenchmarkOptions& how) {
   const auto frames = open_frames(clouds);
-  RetargetOptions options;
-  options.fps = frames->fps();
-  options.seed = seed;
-  options.samples = 4;
-  const std::string target = (fs::path(folder) / "target.ply").string();
-  Retargeter system(weights, "the trial's weights", read_target(target).mesh, target, options);
+  const SystemType& type = system_type(how.system);
+  SystemInput input;
+  input.weights = weights;
+  input.weights_name = "the trial's weights";
+  input.target_name = in(folder, "target.ply");
+  input.target = read_target(input.target_name).mesh;
+  input.options.fps = frames->fps();
+  input.options.seed = how.seed;
+  input.options.samples = 4;
+  if (!type.weights)
+    input.rest = joints_of(PredictionFile(in(folder, "rest.h5")).joints().slice(0, 1))[0];
+  const auto system = type.make(std::move(input));
   Prediction out;
   const auto keep = [&](const auto& points, std::vector<double>* to) {
     for (const auto& p : points)
       for (int c = 0; c < 3; ++c) to->push_back(static_cast<float>(p[c]));  // as in a file
   };
-  while (const auto frame = frames->next())
-    for (const RetargetedFrame& f : system.push(frame->points, frame->source)) {
-      keep(f.joints, &out.joints);
+  const auto keep_all = [&](std::span<const RetargetedFrame> made) {
+    for (const RetargetedFrame& f : made) {
+      if (system->rig() != nullptr) keep(f.joints, &out.joints);
       keep(f.vertices, &out.vertices);
       ++out.frames;
     }
-  out.vertex_count = static_cast<int64_t>(system.target().vertices.size());
+  };
+  for (int64_t i = 0; const auto frame = frames->next(); ++i)
+    if (i % how.every == 0) keep_all(system->push(frame->points, frame->source));
+  keep_all(system->finish());
+  out.vertex_count = static_cast<int64_t>(system->target().vertices.size());
   return out;
 }
 
 /// Scans have a frame of their own: mended by the doctor, and the result put back into the world.
-Prediction retargeted_scans(const Bundle& weights, const std::string& folder, uint64_t seed) {
-  const std::string source = (fs::path(folder) / "source.h5").string();
-  const std::string truth = (fs::path(folder) / "truth.h5").string();
+Prediction retargeted_scans(const Bundle& weights, const std::string& folder,
+                            const WorldMap& to_world, const PredictionFile& source_joints,
+                            const PredictionFile& rest, const BenchmarkOptions& how) {
+  const std::string source = in(folder, "source.h5");
   const Scratch scratch;
   const std::string mended = scratch.file("mended.h5");
   cli::Subject subject;
@@ -91,39 +95,55 @@ Prediction retargeted_scans(const Bundle& weights, const std::string& folder, ui
   const Diagnosis diagnosis = examine_frames(*subject.frames);
   subject.frames->rewind();
   cli::write_repaired(subject, mended, diagnosis);
-  Prediction out = retargeted(weights, folder, mended, seed);
-  const auto to_world = cli::source_to_world(truth);
-  if (!to_world)
-    throw InputError(truth, "does not say where its scans are", "build the benchmark again");
-  Prediction joints = read_prediction(source);
-  to_world->carry(joints.joints, false);
-  const double stretched = trajectory_scale(
-      first_joints(joints), first_joints(read_prediction((fs::path(folder) / "rest.h5").string())));
-  const cli::WorldMap map = cli::mended_to_world(mended, *to_world);
+  Prediction out = retargeted(weights, folder, mended, how);
+  const double stretched = trajectory_scale(joints_of(source_joints.joints().slice(0, 1))[0],
+                                            joints_of(rest.joints().slice(0, 1))[0]);
+  const WorldMap map = mended_to_world(mended, to_world);
   map.carry(out.joints, true, stretched);
   map.carry(out.vertices, true, stretched);
   return out;
 }
 
-void judge(const Bundle& weights, const std::string& folder, bool scans, uint64_t seed,
-           SystemScores* scores) {
-  const Prediction truth = read_prediction((fs::path(folder) / "truth.h5").string());
-  scores->frames.push_back(truth.frames);
+metrics::Values score(const PredictionFile& pred, const PredictionFile& truth, int64_t every) {
+  if (pred.data.frames != truth.data.frames)
+    throw InputError(pred.path,
+                     "gives " + std::to_string(pred.data.frames) + " frames instead of " +
+                         std::to_string(truth.data.frames),
+                     "build the benchmark again");
+  const auto metrics = metrics_of_every(every, metrics::table());
+  const auto views = cut(truth.data.sequence_offset, pred.joints(), pred.vertices(), truth);
+  return metrics::evaluate(views, metrics).sequences[0];
+}
+
+void add(References made, References* all) {
+  if (all->empty()) {
+    *all = std::move(made);
+    return;
+  }
+  for (size_t r = 0; r < all->size(); ++r)
+    (*all)[r].second.sequences.push_back(std::move(made[r].second.sequences[0]));
+}
+
+void judge(const Bundle& weights, const std::string& folder, bool scans,
+           const BenchmarkOptions& how, SystemScores* scores) {
+  PredictionFile truth(in(folder, "truth.h5")), source(in(folder, "source.h5")),
+      rest(in(folder, "rest.h5"));
+  const std::optional<WorldMap> to_world = source_to_world(truth.path);
+  if (scans && !to_world)
+    throw InputError(truth.path, "does not say where its scans are", "build the benchmark again");
+  if (to_world) to_world->carry(source.data.joints, false);
+  // Frames that a system leaves out are left out of the comparison, so references would be of
+  // other frames than those of systems that do not.
+  if (how.every == 1)
+    add(references(source, rest, truth, truth.data.sequence_offset, metrics::table()),
+        &scores->references);
+  truth.thin(how.every);
+  scores->frames.push_back(truth.data.frames);
   try {
-    const Prediction pred =
-        scans ? retargeted_scans(weights, folder, seed)
-              : retargeted(weights, folder, (fs::path(folder) / "source.h5").string(), seed);
-    if (pred.frames != truth.frames)
-      throw InputError(folder,
-                       "gives " + std::to_string(pred.frames) + " frames instead of " +
-                           std::to_string(truth.frames),
-                       "build the benchmark again");
-    const int64_t n = truth.frames;
-    const metrics::SequenceView view{track(pred.joints, n, kJoints),
-                                     track(truth.joints, n, kJoints),
-                                     track(pred.vertices, n, pred.vertex_count),
-                                     track(truth.vertices, n, truth.vertex_count), n};
-    scores->model.sequences.push_back(metrics::evaluate({&view, 1}).sequences[0]);
+    const PredictionFile pred(
+        folder, scans ? retargeted_scans(weights, folder, *to_world, source, rest, how)
+                      : retargeted(weights, folder, in(folder, "source.h5"), how));
+    scores->model.sequences.push_back(score(pred, truth, how.every));
   } catch (const InputError& error) {
     log_warning(folder + " is without a result: " + error.what());
     scores->model.sequences.emplace_back(metrics::table().size(), std::nullopt);
@@ -132,8 +152,8 @@ void judge(const Bundle& weights, const std::string& folder, bool scans, uint64_
 
 /// The AMASS-style set, by rule: clip i from body i, to the next body of the circle, then the one
 /// after, ... so that all bodies are sources and targets about equally often.
-void judge_test_clips(const Bundle& weights, const std::string& folder, uint64_t seed,
-                      SystemScores* scores, std::vector<std::string>* names) {
+void judge_test_clips(const Bundle& weights, const std::string& folder,
+                      const BenchmarkOptions& how, SystemScores* scores, std::vector<std::string>* names) {
   const Corpus test = load_corpus({.source = folder}, "test");
   const size_t n = test.bodies.size();
   if (n < 2)
@@ -150,7 +170,7 @@ void judge_test_clips(const Bundle& weights, const std::string& folder, uint64_t
                    scratch.folder());
     names->push_back(test.motions[i].id + "-" + test.bodies[s.body_a].id + "-" +
                      test.bodies[s.body_b].id);
-    judge(weights, scratch.folder(), false, seed, scores);
+    judge(weights, scratch.folder(), false, how, scores);
   }
 }
 
@@ -163,13 +183,14 @@ void check_benchmark_set(const std::string& set) {
 }
 
 SystemScores evaluate_benchmark_set(const Bundle& weights, const std::string& folder,
-                                    const std::string& set, uint64_t seed,
+                                    const std::string& set, const BenchmarkOptions& how,
                                     std::vector<std::string>* names) {
   check_benchmark_set(set);
-  for (const char* role : {"skeleton", "motion"}) weights.need(role, "the trial");
+  if (system_type(how.system).weights)
+    for (const char* role : {"skeleton", "motion"}) weights.need(role, "the trial");
   SystemScores out;
   if (set == "test") {
-    judge_test_clips(weights, folder, seed, &out, names);
+    judge_test_clips(weights, folder, how, &out, names);
   } else {
     std::vector<fs::path> places;
     std::error_code error;
@@ -180,10 +201,11 @@ SystemScores evaluate_benchmark_set(const Bundle& weights, const std::string& fo
     std::sort(places.begin(), places.end());
     for (const fs::path& place : places) {
       names->push_back(place.filename().string());
-      judge(weights, place.string(), set == "scans", seed, &out);
+      judge(weights, place.string(), set == "scans", how, &out);
     }
   }
   metrics::average(&out.model);
+  for (auto& [name, reference] : out.references) metrics::average(&reference);
   return out;
 }
 

@@ -11,12 +11,18 @@ namespace restage {
 /// InputError with the known names if there is no such set: test, naked, clothed, scans.
 void check_benchmark_set(const std::string& set);
 
+struct BenchmarkOptions {
+  std::string system = "chain";
+  int64_t every = 1;  ///< frame of a sequence; above 1 there are no references
+  uint64_t seed = 0;
+};
+
 /// Retargets every sequence of a set of the benchmark in `folder`, as `restage retarget` would, and
 /// compares with the true answer. Scans first go through the doctor, as a user's would; a sequence
 /// that cannot be retargeted gives a warning and has no values. `names`: of the sequences, in
 /// order. InputError if the folder is no such benchmark, or the weights lack a model.
 SystemScores evaluate_benchmark_set(const Bundle& weights, const std::string& folder,
-                                    const std::string& set, uint64_t seed,
+                                    const std::string& set, const BenchmarkOptions& how,
                                     std::vector<std::string>* names);
 
 }  // namespace restage

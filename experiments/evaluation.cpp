@@ -33,60 +33,63 @@ struct Sequence {
   std::optional<Joints> source_rest;
 };
 
-void add(const Predicted& p, const Sequence& s, metrics::Evaluation* into) {
+/// What is not every frame has no acceleration.
+void add(const Predicted& p, const Sequence& s, int64_t every, metrics::Evaluation* into) {
   const metrics::SequenceView view{p.joints.track(), s.joints.track(), p.vertices.track(),
                                    p.vertices.frames > 0 ? s.vertices.track() : metrics::Track{},
                                    s.joints.frames};
-  into->sequences.push_back(metrics::evaluate({&view, 1}).sequences[0]);
+  const auto metrics = metrics_of_every(every, metrics::table());
+  into->sequences.push_back(metrics::evaluate({&view, 1}, metrics).sequences[0]);
 }
 
-/// The rows that need no learning. Their surfaces use the model's skinning, since they have none.
-void add_references(const Sequence& s, const Retargeter& target, SystemScores* scores) {
+/// The rows that need no learning. Their surfaces use the system's skinning, since they have none.
+void add_references(const Sequence& s, const System& system, SystemScores* scores) {
+  const Joints& target = *system.target_joints();
   Predicted rest, unchanged, closed;
-  const auto poses = closed_form(s.source, target.rest(), s.source_rest);
-  const auto carried = rest_pose_joints(s.source, target.rest());
+  const auto poses = closed_form(s.source, target, s.source_rest);
+  const auto carried = rest_pose_joints(s.source, target);
   for (size_t f = 0; f < s.source.size(); ++f) {
-    closed.joints.push(forward_kinematics(target.rest(), poses[f]).joints);
+    closed.joints.push(forward_kinematics(target, poses[f]).joints);
     rest.joints.push(carried[f]);
     unchanged.joints.push(s.source[f]);
-    if (target.surface() == nullptr) continue;
-    closed.vertices.push((*target.surface())(poses[f]));
-    Points moved = target.target().vertices;
-    for (Point& p : moved) p += (carried[f][0] - target.rest()[0]).cast<float>();
+    if (system.rig() == nullptr) continue;
+    closed.vertices.push(system.posed(poses[f]));
+    Points moved = system.target().vertices;
+    for (Point& p : moved) p += (carried[f][0] - target[0]).cast<float>();
     rest.vertices.push(moved);
   }
   if (scores->references.empty())
     scores->references = {{"rest_pose", {}}, {"source_unchanged", {}}, {"closed_form", {}}};
-  add(rest, s, &scores->references[0].second);
-  add(unchanged, s, &scores->references[1].second);
-  add(closed, s, &scores->references[2].second);
+  add(rest, s, 1, &scores->references[0].second);
+  add(unchanged, s, 1, &scores->references[1].second);
+  add(closed, s, 1, &scores->references[2].second);
 }
 
-Sequence truth_of(const Performance& performance) {
+Sequence truth_of(const Performance& performance, int64_t every) {
   Sequence s;
-  for (size_t i = 0; i < performance.frames(); ++i) {
+  for (size_t i = 0; i < performance.frames(); i += static_cast<size_t>(every)) {
     s.joints.push(performance.joints_b(i));
     s.vertices.push(performance.vertices_b(i));
   }
   return s;
 }
 
-void judge_retargeting(const Performance& performance, Retargeter& retargeter, bool clouds,
-                       Sequence s, SystemScores* scores) {
+/// `push(i)`: frame i of the source, by whatever way the system takes it.
+template <class Push>
+void judge_retargeting(const Performance& performance, const System& system, const Push& push,
+                       int64_t every, Sequence s, SystemScores* scores) {
   Predicted model;
-  for (size_t i = 0; i < performance.frames(); ++i) {
-    const auto frames = clouds ? retargeter.push(performance.cloud(i), "frame " + std::to_string(i))
-                               : retargeter.push_joints(performance.joints_a(i));
-    s.source.push_back(*retargeter.source_joints());
-    for (const RetargetedFrame& f : frames) {
+  for (size_t i = 0; i < performance.frames(); i += static_cast<size_t>(every)) {
+    for (const RetargetedFrame& f : push(i)) {
       model.joints.push(f.joints);
-      if (retargeter.surface() != nullptr) model.vertices.push(f.vertices);
+      if (!f.vertices.empty()) model.vertices.push(f.vertices);
     }
+    if (system.source_joints() != nullptr) s.source.push_back(*system.source_joints());
   }
-  if (!clouds) s.source_rest = performance.source().joints;
-  add(model, s, &scores->model);
+  add(model, s, every, &scores->model);
   scores->frames.push_back(s.joints.frames);
-  add_references(s, retargeter, scores);
+  if (every == 1 && system.target_joints() != nullptr && !s.source.empty())
+    add_references(s, system, scores);
 }
 
 /// The surface alone; what stands still is the reference.
@@ -102,8 +105,8 @@ void judge_surface(const Performance& performance, const Surface& surface, const
     rest.vertices.push(moved);
   }
   if (scores->references.empty()) scores->references = {{"rest_pose", {}}};
-  add(model, s, &scores->model);
-  add(rest, s, &scores->references[0].second);
+  add(model, s, 1, &scores->model);
+  add(rest, s, 1, &scores->references[0].second);
   scores->frames.push_back(s.joints.frames);
 }
 
@@ -112,6 +115,14 @@ struct Condition {
   const char* name;
   std::vector<std::string> roles;
 };
+
+/// Known joints are for our own chain; other systems see clouds and nothing else.
+std::vector<Condition> conditions_of(bool chain) {
+  if (!chain) return {{"clouds", {}}};
+  return {{"clouds", {"skeleton", "motion"}},
+          {"true_skeletons", {"motion"}},
+          {"true_poses", {"deformation.weights"}}};
+}
 
 std::string lacking(const Condition& condition, const Bundle& weights) {
   for (const std::string& role : condition.roles)
@@ -156,38 +167,45 @@ EvaluationOptions evaluation_options(const TrainConfig& config, const Corpus& te
 
 SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weights_name,
                                  const Corpus& corpus, const EvaluationOptions& options) {
+  const SystemType& type = system_type(options.system);
+  const bool chain = type.name == EvaluationOptions().system;
   SystemEvaluation out;
-  for (const Condition& condition :
-       {Condition{"clouds", {"skeleton", "motion"}}, Condition{"true_skeletons", {"motion"}},
-        Condition{"true_poses", {"deformation.weights"}}}) {
+  for (const Condition& condition : conditions_of(chain)) {
     const std::string missing = lacking(condition, weights);
     if (!missing.empty())
       out.missing.push_back(missing);
     else
       out.conditions.emplace_back(condition.name, SystemScores{});
   }
-  if (weights.find("motion") != nullptr && weights.find("deformation.weights") == nullptr)
+  if (chain && weights.find("motion") != nullptr && weights.find("deformation.weights") == nullptr)
     out.missing.push_back("surfaces: no model for deformation.weights");
-  RetargetOptions retarget;
-  retarget.seed = options.seed;
-  retarget.force =
-      true;  // a badly extracted target counts with its error instead of ending the table
-  retarget.samples = 4;
-  retarget.anchor = options.anchor;
+  RetargetOptions how;
+  how.seed = options.seed;
+  how.force = true;  // a badly extracted target counts with its error instead of ending the table
+  how.samples = 4;
+  how.anchor = options.anchor;
   for (const EvalSequence& sequence : options.sequences) {
     const Performance performance(corpus, sequence, ScanConfig{}, options.seed);
-    const Sequence truth = truth_of(performance);
+    Sequence truth = truth_of(performance, options.every);
     const Body& target = performance.target();
     for (auto& [name, scores] : out.conditions) {
       if (name == "true_poses") {
         judge_surface(performance, Surface(weights, weights_name, target.rest, target.joints),
                       truth, &scores);
       } else if (name == "clouds") {
-        Retargeter retargeter(weights, weights_name, target.rest, target.id, retarget);
-        judge_retargeting(performance, retargeter, true, truth, &scores);
+        SystemInput input{weights, weights_name, target.rest, target.id, {}, how};
+        if (!type.weights) input.rest = target.joints;
+        const auto system = type.make(std::move(input));
+        const auto push = [&](size_t i) {
+          return system->push(performance.cloud(i), "frame " + std::to_string(i));
+        };
+        judge_retargeting(performance, *system, push, options.every, truth, &scores);
       } else {
-        Retargeter retargeter(weights, weights_name, target.rest, target.joints, retarget);
-        judge_retargeting(performance, retargeter, false, truth, &scores);
+        Retargeter system(weights, weights_name, target.rest, target.joints, how);
+        const auto push = [&](size_t i) { return system.push_joints(performance.joints_a(i)); };
+        truth.source_rest = performance.source().joints;
+        judge_retargeting(performance, system, push, 1, truth, &scores);
+        truth.source_rest.reset();
       }
     }
   }
@@ -195,7 +213,7 @@ SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weigh
     metrics::average(&scores.model);
     for (auto& reference : scores.references) metrics::average(&reference.second);
   }
-  judge_extractor(weights, corpus, options.clouds, &out);
+  if (chain) judge_extractor(weights, corpus, options.clouds, &out);
   return out;
 }
 

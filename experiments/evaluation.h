@@ -7,7 +7,8 @@
 #include <vector>
 
 #include "datasets/sampling/evaluation.h"
-#include "infer/retargeter.h"
+#include "experiments/predictions.h"
+#include "infer/systems.h"
 #include "nn/metrics/metrics.h"
 #include "train/stages/train_config.h"
 
@@ -17,8 +18,7 @@ namespace restage {
 struct SystemScores {
   metrics::Evaluation model;
   std::vector<int64_t> frames;
-  /// "rest_pose", "source_unchanged", "closed_form": no learning (nn/geometry/closed_form.h).
-  std::vector<std::pair<std::string, metrics::Evaluation>> references;
+  References references;
 };
 
 /// What weights can be judged on, and what they cannot.
@@ -39,6 +39,8 @@ struct SystemEvaluation {
 
 struct EvaluationOptions {
   uint64_t seed = 0;
+  std::string system = "chain";  ///< others are judged from clouds only
+  int64_t every = 1;             ///< frame of the sequences
   double anchor = RetargetOptions{}.anchor;
   std::vector<EvalSequence> sequences;
   CloudConfig clouds;  ///< of the extractor's own figures

@@ -47,6 +47,8 @@ class Retargeter final : public System {
 
   const Mesh& target() const override { return target_; }
   const SystemRig* rig() const override { return rig_ ? &*rig_ : nullptr; }
+  Points posed(const Pose& pose) const override { return surface_ ? (*surface_)(pose) : Points(); }
+  const Joints* target_joints() const override { return &rest_; }
   const Joints& rest() const { return rest_; }
   /// Null without a model for `deformation.weights`.
   const Surface* surface() const { return surface_ ? &*surface_ : nullptr; }

@@ -47,6 +47,10 @@ class System {
   virtual const Mesh& target() const = 0;
   /// Null: the system moves vertices only, so there is nothing to write as a skeleton.
   virtual const SystemRig* rig() const = 0;
+  /// The target in a pose of its rig(), by the skinning of the system; empty without a rig.
+  virtual Points posed(const Pose& pose) const = 0;
+  /// The target's joints in T-pose as the system knows them; null if it knows none.
+  virtual const Joints* target_joints() const = 0;
   /// The source's joints in the last cloud; null if the system finds none.
   virtual const Joints* source_joints() const = 0;
   /// What the last push() took.

@@ -32,14 +32,14 @@ const std::vector<SystemType>& systems() {
   return table;
 }
 
-const SystemType& system_type(const std::string& name) {
+const SystemType& system_type(const std::string& name, const std::string& where) {
   std::vector<std::string> names;
   for (const SystemType& type : systems()) {
     if (type.name == name) return type;
     names.push_back(type.name);
   }
   const std::string near = nearest(name, names);
-  throw InputError("", "there is no system '" + name + "'",
+  throw InputError(where, "there is no system '" + name + "'",
                    near.empty() ? "use chain or register" : "did you mean '" + near + "'?");
 }
 

@@ -27,7 +27,7 @@ struct SystemType {
 };
 
 const std::vector<SystemType>& systems();
-/// InputError with the nearest known name if there is no such system.
-const SystemType& system_type(const std::string& name);
+/// InputError with the nearest known name if there is no such system; `where` the name stands.
+const SystemType& system_type(const std::string& name, const std::string& where = "");
 
 }  // namespace restage

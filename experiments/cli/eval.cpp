@@ -9,17 +9,15 @@
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/eval_report.h"
-#include "experiments/cli/eval_world.h"
+#include "experiments/world_map.h"
 #include "experiments/evaluation.h"
+#include "experiments/predictions.h"
 #include "nn/config/config.h"
 #include "nn/geometry/closed_form.h"
 #include "train/run.h"
 
 namespace restage::cli {
 namespace {
-
-using metrics::SequenceView;
-using metrics::Track;
 
 struct EvalOptions {
   std::string run, pred, truth, source, rest, mended, out;
@@ -28,50 +26,9 @@ struct EvalOptions {
   std::optional<double> anchor;
 };
 
-struct File {
-  std::string path;
-  Prediction data;
-
-  explicit File(const std::string& name) : path(name), data(read_prediction(name)) {}
-  Track joints() const {
-    return data.joints.empty() ? Track{} : Track{data.joints.data(), data.frames, kJoints};
-  }
-  Track vertices() const {
-    return data.vertices.empty() ? Track{}
-                                 : Track{data.vertices.data(), data.frames, data.vertex_count};
-  }
-  int64_t sequences() const { return static_cast<int64_t>(data.sequence_offset.size()) - 1; }
-
-  /// Keeps every `step`-th frame of each sequence, from its first.
-  void thin(int64_t step) {
-    std::vector<int64_t> kept, offset{0};
-    for (int64_t s = 0; s < sequences(); ++s) {
-      const auto i = static_cast<size_t>(s);
-      for (int64_t f = data.sequence_offset[i]; f < data.sequence_offset[i + 1]; f += step)
-        kept.push_back(f);
-      offset.push_back(std::ssize(kept));
-    }
-    for (std::vector<double>* values : {&data.joints, &data.vertices}) {
-      const auto row = static_cast<std::ptrdiff_t>(values->size()) / data.frames;
-      for (size_t k = 0; k < kept.size(); ++k)
-        std::copy_n(values->begin() + kept[k] * row, row,
-                    values->begin() + static_cast<std::ptrdiff_t>(k) * row);
-      values->resize(kept.size() * static_cast<size_t>(row));
-    }
-    data.frames = std::ssize(kept);
-    data.sequence_offset = std::move(offset);
-  }
-};
+using File = PredictionFile;
 
 std::string counted(int64_t n, const std::string& what) { return std::to_string(n) + " " + what; }
-
-void check_same_frames(const File& file, const File& truth) {
-  if (file.data.frames == truth.data.frames) return;
-  throw InputError(file.path,
-                   "has " + counted(file.data.frames, "frames, but ") + truth.path + " has " +
-                       std::to_string(truth.data.frames),
-                   "give files of the same frames");
-}
 
 void check_pair(const File& pred, const File& truth) {
   check_same_frames(pred, truth);
@@ -96,88 +53,6 @@ std::vector<int64_t> common_sequences(const File& pred, const File& truth) {
   throw InputError(pred.path + ":/sequence_offset", "differs from that of " + truth.path,
                    "give files of the same sequences");
 }
-
-std::vector<SequenceView> cut(const std::vector<int64_t>& offset, const Track& pred_joints,
-                              const Track& pred_vertices, const File& truth) {
-  std::vector<SequenceView> views;
-  for (size_t s = 0; s + 1 < offset.size(); ++s) {
-    const int64_t begin = offset[s], end = offset[s + 1];
-    views.push_back({pred_joints.slice(begin, end), truth.joints().slice(begin, end),
-                     pred_vertices.slice(begin, end), truth.vertices().slice(begin, end),
-                     end - begin});
-  }
-  return views;
-}
-
-std::vector<Joints> joints_of(const Track& track) {
-  std::vector<Joints> frames(static_cast<size_t>(track.frames));
-  for (size_t f = 0; f < frames.size(); ++f)
-    for (int j = 0; j < kJoints; ++j) frames[f][j] = track.at(static_cast<int64_t>(f), j);
-  return frames;
-}
-
-/// The references for every sequence, as if they had been predicted.
-class References {
- public:
-  /// `source` and `rest` as read, in the world and of the truth's frames.
-  References(File source, File rest, const File& truth, const std::vector<int64_t>& offset)
-      : source_(std::move(source)), rest_(std::move(rest)) {
-    check_same_frames(source_, truth);
-    for (const File* file : {&source_, &rest_})
-      if (!file->joints().present())
-        throw InputError(file->path + ":/joints", "is missing",
-                         "store the joints as [frames, 22, 3]");
-    const auto sequences = static_cast<int64_t>(offset.size()) - 1;
-    if (rest_.data.frames != 1 && rest_.data.frames != sequences &&
-        rest_.data.frames != truth.data.frames)
-      throw InputError(
-          rest_.path + ":/joints",
-          "has " + counted(rest_.data.frames, "skeletons for ") + counted(sequences, "sequences"),
-          "give the rest joints of one body, or one row for every sequence");
-    for (int64_t s = 0; s < sequences; ++s) add(offset, s);
-  }
-
-  std::vector<std::pair<std::string, metrics::Evaluation>> evaluate(
-      const std::vector<int64_t>& offset, const File& truth,
-      std::span<const metrics::Metric> metrics) const {
-    const auto one = [&](const Track& joints, const Track& vertices) {
-      return metrics::evaluate(cut(offset, joints, vertices, truth), metrics);
-    };
-    const int64_t frames = source_.data.frames;
-    const bool surfaces = !rest_vertices_.empty() && truth.vertices().present() &&
-                          truth.data.vertex_count == rest_.data.vertex_count;
-    const Track carried =
-        surfaces ? Track{rest_vertices_.data(), frames, rest_.data.vertex_count} : Track{};
-    return {{"rest_pose", one({rest_pose_.data(), frames, kJoints}, carried)},
-            {"source_unchanged", one(source_.joints(), {})},
-            {"closed_form", one({closed_form_.data(), frames, kJoints}, {})}};
-  }
-
- private:
-  void add(const std::vector<int64_t>& offset, int64_t s) {
-    const auto i = static_cast<size_t>(s);
-    const int64_t rows = rest_.data.frames;
-    const int64_t row = rows == 1 ? 0 : rows == source_.data.frames ? offset[i] : s;
-    const auto source = joints_of(source_.joints().slice(offset[i], offset[i + 1]));
-    const Joints rest = joints_of(rest_.joints().slice(row, row + 1))[0];
-    append(rest_pose_joints(source, rest), rest_pose_);
-    append(closed_form_joints(source, rest), closed_form_);
-    if (!rest_.vertices().present()) return;
-    for (const Joints& joints : rest_pose_joints(source, rest))
-      for (int64_t v = 0; v < rest_.data.vertex_count; ++v) {
-        const Vec3 moved = rest_.vertices().at(row, v) + joints[0] - rest[0];
-        rest_vertices_.insert(rest_vertices_.end(), {moved.x(), moved.y(), moved.z()});
-      }
-  }
-
-  static void append(const std::vector<Joints>& frames, std::vector<double>& values) {
-    for (const Joints& joints : frames)
-      for (const Vec3& p : joints) values.insert(values.end(), {p.x(), p.y(), p.z()});
-  }
-
-  File source_, rest_;
-  std::vector<double> rest_pose_, closed_form_, rest_vertices_;
-};
 
 std::vector<double> errors_by_joint(const File& pred, const File& truth) {
   return metrics::mean_distance_by_point(pred.joints(), truth.joints(),
@@ -312,11 +187,7 @@ std::vector<metrics::Metric> chosen_metrics(const EvalOptions& options) {
   std::vector<metrics::Metric> out(metrics::table().begin(), metrics::table().end());
   if (options.variants)
     out.insert(out.end(), metrics::variants().begin(), metrics::variants().end());
-  // Frames that do not follow each other have no acceleration.
-  for (metrics::Metric& m : out)
-    if (options.every > 1 && std::string(m.name).find("acc") != std::string::npos)
-      m.compute = [](const SequenceView&) { return metrics::Value(); };
-  return out;
+  return metrics_of_every(options.every, out);
 }
 
 /// Options of the other way to call it would be of no effect.
@@ -373,8 +244,7 @@ int run_eval(const EvalOptions& options, const Common& common) {
   report.metrics = chosen;
   for (size_t s = 0; s + 1 < offset.size(); ++s) report.frames.push_back(offset[s + 1] - offset[s]);
   if (source)
-    report.references = References(std::move(*source), std::move(*rest), truth, offset)
-                            .evaluate(offset, truth, report.metrics);
+    report.references = references(*source, *rest, truth, offset, report.metrics);
   report.model =
       metrics::evaluate(cut(offset, pred.joints(), pred.vertices(), truth), report.metrics);
 

@@ -219,7 +219,7 @@ int run_run(const RunOptions& options, const Common& common) {
   finish_output();
   if (outcome.stop_requested && outcome.pending + outcome.stopped > 0)
     throw WorkError("stopped by 'restage sweep stop'; 'restage sweep run' goes on");
-  return outcome.done == std::ssize(dir.trials) ? 0 : 1;
+  return outcome.done + outcome.stopped_early == std::ssize(dir.trials) ? 0 : 1;
 }
 
 // ---- stop ----

@@ -26,11 +26,16 @@ void add_trial(Program& program) {
             print("stage " + options->stage + " of trial " + options->id + " is in the store\n");
           return 0;
         }
-        const bool fresh = sweep::perform_trial(options->dir, options->id, common.quiet);
+        const auto end = sweep::perform_trial(options->dir, options->id, common.quiet);
+        const auto result = read_result(sweep::read_sweep_dir(options->dir), options->id);
+        const std::string state = result ? result->state : "pending";  // removed since
         if (common.json)
-          print_json({{"id", options->id}, {"state", "done"}});
+          print_json({{"id", options->id}, {"state", state}});
+        else if (end == sweep::TrialEnd::before)
+          print("trial " + options->id + " was " + state + " before\n");
         else
-          print("trial " + options->id + (fresh ? " is done\n" : " was done before\n"));
+          print("trial " + options->id +
+                (end == sweep::TrialEnd::done ? " is done\n" : " was stopped early\n"));
         return 0;
       });
   app.add_option("DIR", options->dir, "folder of 'restage sweep plan --out'")->required();

@@ -6,6 +6,7 @@
 
 #include "autograd/base/nearest.h"
 #include "nn/config/config.h"
+#include "train/stages/registry.h"
 
 namespace restage::sweep {
 namespace {
@@ -165,9 +166,10 @@ class Planner {
       keys.push_back(setting.key);
     }
     check_read(tree, combination, keys);
-    const size_t seeds = std::max<size_t>(1, file_.seeds.size());
+    const bool own_seed = std::find(keys.begin(), keys.end(), "seed") != keys.end();
+    const size_t seeds = own_seed ? 1 : std::max<size_t>(1, file_.seeds.size());
     for (size_t s = 0; s < seeds; ++s) {
-      if (!file_.seeds.empty()) {
+      if (!own_seed && !file_.seeds.empty()) {
         ConfigNode seed;
         seed.kind = ConfigNode::Kind::scalar;
         seed.text = std::to_string(file_.seeds[s]);
@@ -223,13 +225,31 @@ class Planner {
   SweepPlan plan_;
 };
 
+/// The metric must be one that some trial's training gives.
+void check(const EarlyStop& rule, const SweepPlan& plan) {
+  std::vector<std::string> known;
+  for (const StageType& type : stage_types())
+    for (const std::string& figure : type.figures) known.push_back(type.name + "." + figure);
+  if (std::find(known.begin(), known.end(), rule.metric) == known.end()) {
+    const std::string close = nearest(rule.metric, known);
+    std::string all;
+    for (const std::string& name : known) all += (all.empty() ? "" : ", ") + name;
+    throw InputError(rule.place.text(), "no stage measures " + in_quotes(rule.metric),
+                     close.empty() ? "use one of " + all : "did you mean " + in_quotes(close) + "?");
+  }
+  for (const PlannedTrial& trial : plan.trials)
+    for (const StageArtifact& artifact : trial.artifacts)
+      if (artifact.stage == rule.stage()) return;
+  throw InputError(rule.place.text(), "no trial trains the stage " + in_quotes(rule.stage()),
+                   "name a metric of a stage that is trained");
+}
+
 }  // namespace
 
 SweepPlan plan_sweep(const SweepFile& file) {
-  if (file.early_stop)
-    throw InputError(file.early_stop->place.text(), "trials cannot be stopped early yet",
-                     "remove 'early_stop'");
-  return Planner(file).plan();
+  SweepPlan plan = Planner(file).plan();
+  if (file.early_stop) check(*file.early_stop, plan);
+  return plan;
 }
 
 Forecast measure(const SweepPlan& plan) {

@@ -28,7 +28,7 @@ double seconds_since(Clock::time_point start) {
 
 /// One trial as this pool sees it.
 struct Slot {
-  enum class State { waiting, running, elsewhere, done, failed, stopped };
+  enum class State { waiting, running, elsewhere, done, failed, stopped, early };
   State state = State::waiting;
   const TrialEntry* trial = nullptr;
   int pid = 0, failures = 0;
@@ -62,8 +62,7 @@ class Pool {
     for (const TrialEntry& trial : dir.trials) {
       Slot slot;
       slot.trial = &trial;
-      const auto result = read_result(dir, trial.id);
-      if (result && result->state == "done") slot.state = Slot::State::done;
+      slot.state = over(trial).value_or(Slot::State::waiting);
       slots_.push_back(slot);
     }
   }
@@ -84,6 +83,7 @@ class Pool {
       outcome_.done += slot.state == Slot::State::done;
       outcome_.failed += slot.state == Slot::State::failed;
       outcome_.stopped += slot.state == Slot::State::stopped;
+      outcome_.stopped_early += slot.state == Slot::State::early;
       outcome_.pending +=
           slot.state == Slot::State::waiting || slot.state == Slot::State::elsewhere;
     }
@@ -91,6 +91,12 @@ class Pool {
   }
 
  private:
+  /// The state of a trial with nothing left to do.
+  std::optional<Slot::State> over(const TrialEntry& trial) const {
+    const auto result = read_result(dir_, trial.id);
+    if (!result || !is_over(dir_, *result)) return std::nullopt;
+    return result->state == "done" ? Slot::State::done : Slot::State::early;
+  }
   bool has(Slot::State state) const {
     return std::any_of(slots_.begin(), slots_.end(),
                        [&](const Slot& slot) { return slot.state == state; });
@@ -133,9 +139,8 @@ class Pool {
     }
   }
   void start(Slot& slot) {
-    const auto result = read_result(dir_, slot.trial->id);
-    if (result && result->state == "done") {
-      slot.state = Slot::State::done;
+    if (const auto state = over(*slot.trial)) {
+      slot.state = *state;
       return;
     }
     if (Lease::holder(dir_.lease(slot.trial->id)) && slot.beat < 0) {
@@ -168,8 +173,8 @@ class Pool {
   void judge(Slot& slot, int status) {
     const auto result = read_result(dir_, slot.trial->id);
     const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 0;
-    if (result && result->state == "done") {
-      end(slot, Slot::State::done, "");
+    if (const auto state = over(*slot.trial)) {
+      end(slot, *state, "");
     } else if (Lease::holder(dir_.lease(slot.trial->id))) {
       slot.beat = -1;
       leave_to_others(slot);
@@ -208,6 +213,7 @@ class Pool {
     std::snprintf(time, sizeof time, "%.1f s", seconds_since(slot.started));
     if (state == Slot::State::done) log_info(name(slot) + " done in " + time);
     if (state == Slot::State::stopped) log_info(name(slot) + " stopped");
+    if (state == Slot::State::early) log_info(name(slot) + " stopped early");
     if (state == Slot::State::failed) log_warning(name(slot) + " failed: " + error);
   }
   /// A signal is passed on once; a trial writes a checkpoint and ends.
@@ -236,10 +242,9 @@ class Pool {
       if (slot.state == Slot::State::elsewhere) look_at(slot);
   }
   void look_at(Slot& slot) {
-    const auto result = read_result(dir_, slot.trial->id);
     const auto holder = Lease::holder(dir_.lease(slot.trial->id));
-    if (result && result->state == "done") {
-      end(slot, Slot::State::done, "");
+    if (const auto state = over(*slot.trial)) {
+      end(slot, *state, "");
     } else if (!holder) {
       slot.beat = -1;
       slot.state = Slot::State::waiting;

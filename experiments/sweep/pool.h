@@ -14,6 +14,7 @@ struct PoolOptions {
 
 struct PoolOutcome {
   int done = 0, failed = 0, stopped = 0, pending = 0;
+  int stopped_early = 0;        ///< as the sweep's rule says: nothing is left to do
   bool stop_requested = false;  ///< by `restage sweep stop`
 };
 

@@ -88,7 +88,7 @@ class Reader {
     }
     return out;
   }
-  SetResult set(const Json& entries) const {
+  SetResult set(const Json& entries, bool references = true) const {
     if (!entries.is_object()) fail("holds a set that is no section");
     SetResult out;
     out.mean = values(object(entries, "mean"));
@@ -100,6 +100,10 @@ class Reader {
       std::string name = text(sequence, "name");
       if (!names.insert(name).second) fail("has the sequence '" + name + "' twice");
       out.sequences.emplace_back(std::move(name), std::move(found));
+    }
+    if (const Json& more = at(entries, "references"); references && !more.is_null()) {
+      need(more.is_object(), "references", "a section");
+      for (const auto& [name, one] : more.items()) out.references.emplace_back(name, set(one, false));
     }
     return out;
   }

@@ -29,6 +29,8 @@ using MetricValues = std::map<std::string, double>;
 struct SetResult {
   MetricValues mean;
   std::vector<std::pair<std::string, MetricValues>> sequences;  ///< by name, names are unique
+  /// What needs no learning, on the same sequences: "source_unchanged" and others.
+  std::vector<std::pair<std::string, SetResult>> references;
 };
 
 /// Damaged: what is there cannot be used.

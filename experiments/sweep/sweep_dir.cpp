@@ -84,10 +84,11 @@ std::string resolved(const SweepFile& file, const std::string& dir) {
   }
   put(root, "retries", config_detail::write_leaf(file.retries));
   if (file.early_stop) {
+    const EarlyStop& rule = *file.early_stop;
     ConfigNode early;
-    put(early, "metric", text_node(file.early_stop->metric));
-    put(early, "rule", text_node(file.early_stop->rule));
-    put(early, "after", config_detail::write_leaf(file.early_stop->after));
+    put(early, "metric", text_node(rule.metric));
+    put(early, "rule", text_node(rule.rule));
+    put(early, "after", config_detail::write_leaf(rule.after));
     put(root, "early_stop", std::move(early));
   }
   return "# made from " + file.path + " and " + file.base + "\n" + config_to_yaml(root);
@@ -147,6 +148,11 @@ Json node_json(const ConfigNode& node) {
   return node.text;
 }
 
+Json early_stop_json(const std::optional<EarlyStop>& rule) {
+  if (!rule) return nullptr;
+  return {{"metric", rule->metric}, {"rule", rule->rule}, {"after", rule->after}};
+}
+
 }  // namespace
 
 const TrialEntry& SweepDir::trial(const std::string& id) const {
@@ -189,6 +195,7 @@ int write_sweep_dir(const std::string& dir, const SweepFile& file, const SweepPl
       {"store", file.store},
       {"evaluate", {{"benchmark", file.evaluate.benchmark}, {"sets", file.evaluate.sets}}},
       {"retries", file.retries},
+      {"early_stop", early_stop_json(file.early_stop)},
       {"trials", std::move(trials)}};
   write_if_new(dir + kPlan, document.dump(1) + "\n");
   int stale = 0;
@@ -208,6 +215,8 @@ SweepDir read_sweep_dir(const std::string& dir) {
     out.evaluate.benchmark = json.at("evaluate").at("benchmark");
     out.evaluate.sets = json.at("evaluate").at("sets").get<std::vector<std::string>>();
     out.retries = json.at("retries");
+    if (const Json rule = json.value("early_stop", Json()); !rule.is_null())
+      out.early_stop = {rule.at("metric"), rule.at("rule"), rule.at("after"), {}};
     for (const Json& entry : json.at("trials")) {
       TrialEntry trial{
           entry.at("id"), entry.at("case"), entry.at("seed"), entry.at("overrides"), {}};
@@ -232,10 +241,10 @@ std::optional<TrialResult> read_result(const SweepDir& dir, const std::string& i
 }
 
 void write_result(const SweepDir& dir, const TrialEntry& trial, const std::string& state,
-                  const std::string& error, const TrialOutcome& outcome, double seconds) {
+                  const std::string& error, const TrialOutcome& outcome, double seconds, bool early) {
   Json artifacts = Json::object();
   for (const auto& [stage, id] : outcome.artifacts) artifacts[stage] = id;
-  const Json document = {{"id", trial.id},
+  Json document = {{"id", trial.id},
                          {"case", trial.case_name},
                          {"seed", trial.seed},
                          {"overrides", trial.overrides},
@@ -246,8 +255,15 @@ void write_result(const SweepDir& dir, const TrialEntry& trial, const std::strin
                          {"seconds", std::round(1e3 * seconds) / 1e3},
                          {"host", host_name()},
                          {"command", "restage trial " + dir.path + " " + trial.id}};
+  if (early) document["early_stop"] = early_stop_json(dir.early_stop);
   write_file_atomically(dir.result(trial.id),
                         document.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+bool is_over(const SweepDir& dir, const TrialResult& result) {
+  return result.state == "done" ||
+         (result.state == "stopped" && dir.early_stop &&
+          result.document.value("early_stop", Json()) == early_stop_json(dir.early_stop));
 }
 
 TrialStatus status_of(const SweepDir& dir, const TrialEntry& trial) {

@@ -34,6 +34,7 @@ struct SweepDir {
   std::string store;      ///< seen from `directory`
   Evaluate evaluate;
   int retries = 0;
+  std::optional<EarlyStop> early_stop;
   std::vector<TrialEntry> trials;
 
   std::string folder(const std::string& id) const { return path + "/trials/" + id; }
@@ -57,9 +58,14 @@ struct TrialResult {
 };
 /// Nothing if the trial is not over. What cannot be read, or says another id, counts as not there.
 std::optional<TrialResult> read_result(const SweepDir& dir, const std::string& id);
-/// The document of the contract, by rename. `seconds` is of the last attempt.
+/// The document of the contract, by rename. `seconds` is of the last attempt. `early`: by the
+/// sweep's rule, and `error` says why.
 void write_result(const SweepDir& dir, const TrialEntry& trial, const std::string& state,
-                  const std::string& error, const TrialOutcome& outcome, double seconds);
+                  const std::string& error, const TrialOutcome& outcome, double seconds,
+                  bool early = false);
+
+/// Nothing is left to do: it is done, or was stopped early by the rule that the sweep still has.
+bool is_over(const SweepDir& dir, const TrialResult& result);
 
 /// Where a trial stands: a result's state, "running" if somebody holds its lease, or "pending".
 struct TrialStatus {

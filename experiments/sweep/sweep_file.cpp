@@ -43,8 +43,6 @@ void check_keys(const ConfigNode& map, const std::vector<std::string>& known) {
 }
 
 void check_key(const std::string& key, const ConfigPlace& place) {
-  if (key == "seed")
-    fail(place, "'seed' stands among the keys", "write 'seeds: [1, 2]' in the sweep file");
   bool good = !key.empty() && key.front() != '.' && key.back() != '.' &&
               key.find("..") == std::string::npos;
   for (const char c : key)
@@ -72,10 +70,18 @@ void flatten(const ConfigNode& node, const std::string& prefix, Settings& out) {
   }
 }
 
-Settings settings_of(const ConfigNode& map, const std::string& what) {
+void check_no_seed(const std::string& key, const ConfigPlace& place) {
+  if (key == "seed")
+    fail(place, "'seed' stands among the keys", "write 'seeds: [1, 2]' in the sweep file");
+}
+
+/// `seed`: one may be among them.
+Settings settings_of(const ConfigNode& map, const std::string& what, bool seed = false) {
   need(map, Kind::map, what);
   Settings out;
   flatten(map, "", out);
+  for (const Setting& setting : out)
+    if (!seed) check_no_seed(setting.key, setting.value.key_place);
   return out;
 }
 
@@ -256,7 +262,7 @@ class Reader {
       fail(node->key_place, "'cases' is empty", "name one, or leave it out");
     for (const ConfigNode& entry : node->children) {
       Case made{entry.key, entry.key_place, {}};
-      if (entry.kind != Kind::null) made.settings = settings_of(entry, "a section {key: value}");
+      if (entry.kind != Kind::null) made.settings = settings_of(entry, "a section {key: value}", true);
       for (const Setting& setting : made.settings)
         for (const Axis& axis : out_.axes)
           for (const Setting& first : axis.points[0])
@@ -276,6 +282,38 @@ class Reader {
   SweepFile out_;
 };
 
+/// evaluate.benchmark=FOLDER, evaluate.sets=[a, b] (or a,b).
+void add_evaluate(SweepFile& file, const SweepWord& word, const ConfigPlace& place) {
+  ConfigNode node, folder, sets;
+  folder.key = "benchmark";
+  folder.kind = Kind::scalar;
+  folder.text = file.evaluate.benchmark;
+  sets.key = "sets";
+  sets.kind = Kind::list;
+  for (const std::string& set : file.evaluate.sets) {
+    sets.children.emplace_back();
+    sets.children.back().kind = Kind::scalar;
+    sets.children.back().text = set;
+  }
+  const std::string key = word.key.substr(word.key.find('.') + 1);
+  if (key == "benchmark" && !word.several) {
+    folder = word.values[0];
+    folder.key = key;
+  } else if (key == "sets") {
+    const bool list = !word.several && word.values[0].kind == Kind::list;
+    sets.children = list ? word.values[0].children : word.values;
+    for (ConfigNode& set : sets.children) set.place = place;
+  } else {
+    fail(place, "is nothing of 'evaluate'", "give evaluate.benchmark=FOLDER or evaluate.sets=a,b");
+  }
+  if (folder.text.empty())
+    fail(place, "needs the benchmark's folder too", "give evaluate.benchmark=FOLDER");
+  node.kind = Kind::map;
+  node.place = node.key_place = folder.place = sets.place = place;
+  node.children = {folder, sets};
+  file.evaluate = evaluate_of(node);
+}
+
 /// Lays one argument over the file: it wins over `set` and over an axis of its own, but not over
 /// what moves together with others.
 void add_argument(SweepFile& file, const SweepWord& word) {
@@ -293,6 +331,10 @@ void add_argument(SweepFile& file, const SweepWord& word) {
     list.children = word.values;
     if (word.values.size() == 1 && word.values[0].kind == Kind::list) list = word.values[0];
     file.seeds = seeds_of(list);
+    return;
+  }
+  if (word.key.starts_with("evaluate.")) {
+    add_evaluate(file, word, place);
     return;
   }
   check_key(word.key, place);

@@ -29,7 +29,7 @@ struct Axis {
 struct Case {
   std::string name;  ///< "" if the file has no cases
   ConfigPlace place;
-  Settings settings;
+  Settings settings;  ///< with a `seed` of its own it is not multiplied by the sweep's
 };
 
 /// Combinations that have all of these values are left out.
@@ -50,6 +50,9 @@ struct EarlyStop {
   std::string rule = "median";  ///< or "asha"
   double after = 0.3;           ///< part of the stage's steps that every trial may do
   ConfigPlace place;
+
+  std::string stage() const { return metric.substr(0, metric.find('.')); }
+  std::string figure() const { return metric.substr(metric.find('.') + 1); }
 };
 
 struct SweepFile {
@@ -70,7 +73,8 @@ struct SweepFile {
 
 /// Reads `path`; `arguments` are those of the command line: `key=a,b`, `key=choice(a,b)` and
 /// `key=range(start,stop,step)` (stop left out) give or replace an axis, `key=value` a setting of
-/// all trials. Quotes keep a comma. `seed=` and `seeds=` give the seeds, `store=` the store.
+/// all trials. Quotes keep a comma. `seed=` and `seeds=` give the seeds, `store=` the store,
+/// `evaluate.benchmark=` and `evaluate.sets=` what trials are measured on.
 /// InputError: one line with file and line.
 SweepFile read_sweep_file(const std::string& path, const std::vector<std::string>& arguments = {});
 

@@ -15,6 +15,7 @@ using Json = nlohmann::json;
 struct Group {
   std::map<std::string, Json> key;  ///< what they were grouped by; the case as "case"
   std::vector<const TrialResult*> trials;
+  std::string reference;  ///< its values of this reference; empty: the trials' own
 };
 
 std::string joined(const std::vector<std::string>& words) {
@@ -60,10 +61,24 @@ std::vector<Group> group(const Results& results, const std::vector<std::string>&
       });
     auto at =
         std::find_if(groups.begin(), groups.end(), [&](const Group& g) { return g.key == key; });
-    if (at == groups.end()) at = groups.insert(at, {key, {}});
+    if (at == groups.end()) at = groups.insert(at, {key, {}, ""});
     at->trials.push_back(&trial);
   }
   return groups;
+}
+
+/// A row for each reference that some trial was measured beside, of all trials.
+std::vector<Group> reference_groups(const Results& results) {
+  std::vector<Group> out;
+  for (const TrialResult& trial : results.trials)
+    for (const auto& [set, values] : trial.sets)
+      for (const auto& [name, reference] : values.references) {
+        auto at = std::find_if(out.begin(), out.end(),
+                               [&](const Group& g) { return g.reference == name; });
+        if (at == out.end()) at = out.insert(at, {{}, {}, name});
+        if (at->trials.empty() || at->trials.back() != &trial) at->trials.push_back(&trial);
+      }
+  return out;
 }
 
 // ---- labels ------------------------------------------------------------------------------------
@@ -152,23 +167,55 @@ std::string pair_key(const TrialResult& trial, const Group& group) {
   return key;
 }
 
-Sample sample_of(const Group& group, const std::string& set, const std::string& metric) {
+template <class Values>
+const Values* find(const std::vector<std::pair<std::string, Values>>& list,
+                   const std::string& name) {
+  for (const auto& [key, values] : list)
+    if (key == name) return &values;
+  return nullptr;
+}
+
+/// `reference`: of the same trials, instead of the group's own values.
+Sample sample_of(const Group& group, const std::string& reference, const std::string& set,
+                 const std::string& metric) {
   Sample sample;
   for (const TrialResult* trial : group.trials) {
-    const auto at = std::find_if(trial->sets.begin(), trial->sets.end(),
-                                 [&](const auto& item) { return item.first == set; });
-    if (at == trial->sets.end() || !at->second.mean.contains(metric)) continue;
-    Repetition r{pair_key(*trial, group), at->second.mean.at(metric), {}};
-    for (const auto& [name, values] : at->second.sequences)
+    const SetResult* found = find(trial->sets, set);
+    if (found != nullptr && !reference.empty()) found = find(found->references, reference);
+    if (found == nullptr || !found->mean.contains(metric)) continue;
+    Repetition r{pair_key(*trial, group), found->mean.at(metric), {}};
+    for (const auto& [name, values] : found->sequences)
       if (values.contains(metric)) r.sequences[name] = values.at(metric);
     sample.push_back(std::move(r));
   }
   return sample;
 }
 
+/// What does not depend on the trial was measured by each of them and counts once.
+Sample without_repeats(Sample sample) {
+  const bool same = std::all_of(sample.begin(), sample.end(), [&](const Repetition& r) {
+    return r.mean == sample[0].mean && r.sequences == sample[0].sequences;
+  });
+  if (same && !sample.empty()) sample.resize(1);
+  return sample;
+}
+
+/// Differences are taken in pairs of one and the same trial where one side is a reference.
+Estimate difference(const Group& row, const Group& against, const std::string& set,
+                    const std::string& metric, Bootstrap* bootstrap) {
+  const Group& trials = row.reference.empty() ? row : against;
+  const bool beside = row.reference.empty() != against.reference.empty();
+  Sample pairs =
+      paired_difference(sample_of(beside ? trials : row, row.reference, set, metric),
+                        sample_of(beside ? trials : against, against.reference, set, metric));
+  const bool references = !row.reference.empty() && !against.reference.empty();
+  return bootstrap->estimate(references ? without_repeats(std::move(pairs)) : pairs);
+}
+
 Row head_of(const Group& group, const std::string& label) {
   Row row;
   row.label = label;
+  if (!group.reference.empty()) return row;
   row.overrides = group.trials.front()->overrides;
   row.case_name = group.trials.front()->case_name;
   for (const TrialResult* trial : group.trials) {
@@ -202,19 +249,19 @@ void tell_pooled(const std::vector<Group>& groups, std::vector<std::string>* not
 /// Metric by metric of one set, for all rows.
 void fill_set(const std::vector<Group>& groups, size_t set, Bootstrap* bootstrap, Table* table) {
   double contradiction = 0;
-  for (size_t c = 0; c < table->columns.size(); ++c) {
-    std::vector<Sample> samples;
-    for (const Group& g : groups)
-      samples.push_back(sample_of(g, table->sets[set], table->columns[c]->name));
+  const std::string& name = table->sets[set];
+  for (size_t c = 0; c < table->columns.size(); ++c)
     for (size_t r = 0; r < groups.size(); ++r) {
+      const Group& group = groups[r];
+      const std::string metric = table->columns[c]->name;
       Cell& cell = table->rows[r].cells[set][c];
-      cell.value = bootstrap->estimate(samples[r]);
-      contradiction = std::max(contradiction, largest_contradiction(samples[r]));
+      Sample sample = sample_of(group, group.reference, name, metric);
+      contradiction = std::max(contradiction, largest_contradiction(sample));
+      if (!group.reference.empty()) sample = without_repeats(std::move(sample));
+      cell.value = bootstrap->estimate(sample);
       if (table->against && r != *table->against)
-        cell.difference =
-            bootstrap->estimate(paired_difference(samples[r], samples[*table->against]));
+        cell.difference = difference(group, groups[*table->against], name, metric, bootstrap);
     }
-  }
   if (contradiction > 1e-6)
     table->notices.push_back("set '" + table->sets[set] +
                              "': some means are not the averages of their sequences; means are "
@@ -226,20 +273,30 @@ void fill_set(const std::vector<Group>& groups, size_t set, Bootstrap* bootstrap
 Table make_table(const Results& results, const TableOptions& options) {
   Table table;
   table.columns = columns(options.columns);
-  const std::vector<Group> groups = group(results, options.rows);
+  std::vector<Group> groups = group(results, options.rows);
   std::set<std::string> known;
   for (const TrialResult& trial : results.trials)
     for (const auto& [name, set] : trial.sets)
       if (known.insert(name).second) table.sets.push_back(name);
-  const std::vector<std::string> names = labels(groups);
+  std::vector<std::string> names = labels(groups);
+  for (Group& reference : reference_groups(results)) {
+    names.push_back(reference.reference);
+    std::replace(names.back().begin(), names.back().end(), '_', ' ');
+    groups.push_back(std::move(reference));
+    ++table.references;
+  }
   for (size_t r = 0; r < groups.size(); ++r) {
     Row& row = table.rows.emplace_back(head_of(groups[r], names[r]));
     row.cells.assign(table.sets.size(), std::vector<Cell>(table.columns.size()));
   }
   if (!options.against.empty()) table.against = find_row(table.rows, options.against);
-  tell_pooled(groups, &table.notices);
+  tell_pooled({groups.begin(), groups.end() - static_cast<std::ptrdiff_t>(table.references)},
+              &table.notices);
   Bootstrap bootstrap(options.seed);
   for (size_t s = 0; s < table.sets.size(); ++s) fill_set(groups, s, &bootstrap, &table);
+  for (size_t r = groups.size() - table.references; r < groups.size(); ++r)
+    for (const auto& set : table.rows[r].cells)
+      for (const Cell& cell : set) table.rows[r].n = std::max(table.rows[r].n, cell.value.n);
   return table;
 }
 

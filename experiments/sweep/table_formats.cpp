@@ -320,14 +320,17 @@ std::string to_svg(const Table& table) {
 }
 
 Json to_json(const Table& table, const Results& results) {
-  Json rows = Json::array(), counts = Json::object();
-  for (const Row& row : table.rows) rows.push_back(row_json(table, row));
+  Json rows = Json::array(), references = Json::array(), counts = Json::object();
+  const size_t trials = table.rows.size() - table.references;
+  for (size_t r = 0; r < table.rows.size(); ++r)
+    (r < trials ? rows : references).push_back(row_json(table, table.rows[r]));
   for (const TrialState state : {TrialState::done, TrialState::failed, TrialState::stopped,
                                  TrialState::pending, TrialState::damaged})
     counts[kTrialStates[static_cast<int>(state)]] = results.count(state);
   std::vector<std::string> notices = results.notices;
   notices.insert(notices.end(), table.notices.begin(), table.notices.end());
   return {{"rows", std::move(rows)},
+          {"references", std::move(references)},
           {"against", table.against ? Json(table.rows[*table.against].label) : Json(nullptr)},
           {"trials", std::move(counts)},
           {"resamples", kResamples},

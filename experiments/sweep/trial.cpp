@@ -9,10 +9,13 @@
 #include <atomic>
 #include <chrono>
 #include <filesystem>
+#include <map>
+#include <memory>
 #include <new>
 
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
+#include "experiments/sweep/early_stop.h"
 
 namespace restage::sweep {
 namespace {
@@ -49,6 +52,25 @@ std::string busy(const std::string& id, const std::optional<LeaseHolder>& holder
          "; wait for it, or stop it first";
 }
 
+/// Watches the stage that the sweep's rule is about; null without a rule, or if the trial has no
+/// such stage.
+std::unique_ptr<TrainObserver> early_stopper(const SweepDir& dir, const TrialEntry& trial) {
+  if (!dir.early_stop) return nullptr;
+  const std::string stage = dir.early_stop->stage();
+  std::optional<StageId> own;
+  std::map<std::string, StageId> all;
+  for (const TrialEntry& entry : dir.trials)
+    for (const auto& [name, id] : entry.artifacts) {
+      if (name != stage) continue;
+      all.emplace(id, StageId{stage, id, ""});
+      if (entry.id == trial.id) own = StageId{stage, id, ""};
+    }
+  if (!own) return nullptr;
+  std::vector<StageId> ids;
+  for (const auto& [id, artifact] : all) ids.push_back(artifact);
+  return std::make_unique<EarlyStopper>(*dir.early_stop, Store(dir.store), *own, std::move(ids));
+}
+
 }  // namespace
 
 void perform_stage(const std::string& path, const std::string& id, const std::string& stage,
@@ -61,17 +83,19 @@ void perform_stage(const std::string& path, const std::string& id, const std::st
     throw InputError("", "trial " + id + " trains no stage '" + stage + "'",
                      "name one of its artifacts in plan.json");
   const StopScope stop;
-  run_trial(dir.folder(id) + "/config.yaml", id, dir.evaluate, dir.store, quiet, stage);
+  TrainOptions options;
+  options.quiet = quiet;
+  run_trial(dir.folder(id) + "/config.yaml", id, dir.evaluate, dir.store, options, stage);
 }
 
-bool perform_trial(const std::string& path, const std::string& id, bool quiet) {
+TrialEnd perform_trial(const std::string& path, const std::string& id, bool quiet) {
   const SweepDir dir = enter(path);
   const TrialEntry& trial = dir.trial(id);
-  const auto is_done = [&] {
+  const auto over = [&] {
     const auto result = read_result(dir, id);
-    return result && result->state == "done";
+    return result && is_over(dir, *result);
   };
-  if (is_done()) return false;
+  if (over()) return TrialEnd::before;
 
   const StopScope stop;
   const std::string token = stop_token(dir.path);
@@ -82,9 +106,9 @@ bool perform_trial(const std::string& path, const std::string& id, bool quiet) {
                        }};
   std::optional<Lease> lease = Lease::take(dir.lease(id), "trial " + id, options);
   if (!lease) throw WorkError(busy(id, Lease::holder(dir.lease(id))));
-  if (is_done()) {
+  if (over()) {
     lease->forget();
-    return false;
+    return TrialEnd::before;
   }
   std::error_code ignored;
   fs::remove(dir.result(id), ignored);  // of an attempt that failed or was stopped
@@ -92,17 +116,26 @@ bool perform_trial(const std::string& path, const std::string& id, bool quiet) {
 
   const auto start = std::chrono::steady_clock::now();
   TrialOutcome outcome;
-  const auto finish = [&](const std::string& state, const std::string& error) {
+  const auto finish = [&](const std::string& state, const std::string& error, bool early = false) {
     if (lease->lost()) throw WorkError(busy(id, Lease::holder(dir.lease(id))));
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-    write_result(dir, trial, state, error, outcome, took.count());
+    write_result(dir, trial, state, error, outcome, took.count(), early);
   };
+  const auto watcher = early_stopper(dir, trial);
+  TrainOptions training;
+  training.quiet = quiet;
+  if (watcher) training.observers.push_back(watcher.get());
   try {
     log_info("trial " + id + ", seed " + std::to_string(trial.seed));
-    outcome = run_trial(dir.folder(id) + "/config.yaml", id, dir.evaluate, dir.store, quiet);
+    outcome = run_trial(dir.folder(id) + "/config.yaml", id, dir.evaluate, dir.store, training);
     finish("done", "");
     lease->forget();
-    return true;
+    return TrialEnd::done;
+  } catch (const StoppedEarly& why) {
+    log_info(why.what());
+    finish("stopped", why.what(), true);
+    lease->forget();
+    return TrialEnd::stopped_early;
   } catch (const Interrupted&) {
     finish("stopped", "");
     throw;

@@ -32,14 +32,22 @@ Json metrics_json(const metrics::Values& values) {
   return out;
 }
 
-Json scores_json(const SystemScores& scores, const std::vector<std::string>& names) {
+Json evaluation_json(const metrics::Evaluation& scores, const std::vector<std::string>& names,
+                     const std::vector<int64_t>& frames) {
   Json sequences = Json::array();
-  for (size_t s = 0; s < scores.model.sequences.size(); ++s) {
-    Json one = {{"name", names[s]}, {"frames", scores.frames[s]}};
-    one.update(metrics_json(scores.model.sequences[s]));
+  for (size_t s = 0; s < scores.sequences.size(); ++s) {
+    Json one = {{"name", names[s]}, {"frames", frames[s]}};
+    one.update(metrics_json(scores.sequences[s]));
     sequences.push_back(std::move(one));
   }
-  return {{"mean", metrics_json(scores.model.mean)}, {"sequences", std::move(sequences)}};
+  return {{"mean", metrics_json(scores.mean)}, {"sequences", std::move(sequences)}};
+}
+
+Json scores_json(const SystemScores& scores, const std::vector<std::string>& names) {
+  Json out = evaluation_json(scores.model, names, scores.frames);
+  for (const auto& [name, reference] : scores.references)
+    out["references"][name] = evaluation_json(reference, names, scores.frames);
+  return out;
 }
 
 std::vector<std::string> names_of(const std::vector<EvalSequence>& list, const Corpus& test) {
@@ -54,7 +62,9 @@ std::vector<std::string> names_of(const std::vector<EvalSequence>& list, const C
 /// same sequences for every seed, so that trials can be compared sequence by sequence.
 Json evaluate_held_out(const Bundle& models, const TrainConfig& config) {
   const Corpus test = load_corpus(config.data, "test");
-  const EvaluationOptions how = evaluation_options(config, test, 0);
+  EvaluationOptions how = evaluation_options(config, test, 0);
+  how.system = config.evaluation.system;
+  how.every = config.evaluation.every;
   const auto names = names_of(how.sequences, test);
   Json out = Json::object();
   for (const auto& [name, scores] : evaluate_system(models, "the trial", test, how).conditions)
@@ -62,15 +72,23 @@ Json evaluate_held_out(const Bundle& models, const TrainConfig& config) {
   return out;
 }
 
-Json evaluate_benchmark(const Bundle& models, const Evaluate& evaluate, uint64_t seed) {
+Json evaluate_benchmark(const Bundle& models, const Evaluate& evaluate, const TrainConfig& config) {
+  const BenchmarkOptions how{config.evaluation.system, config.evaluation.every, config.seed};
   Json out = Json::object();
   for (const std::string& set : evaluate.sets) {
     std::vector<std::string> names;
     const SystemScores scores =
-        evaluate_benchmark_set(models, evaluate.benchmark, set, seed, &names);
+        evaluate_benchmark_set(models, evaluate.benchmark, set, how, &names);
     out[set] = scores_json(scores, names);
   }
   return out;
+}
+
+/// Configurations cannot know which systems there are.
+void check_system(const ConfigNode& tree, const TrainConfig& config) {
+  const ConfigNode* node = tree.find("evaluation");
+  if (node != nullptr) node = node->find("system");
+  system_type(config.evaluation.system, node == nullptr ? "" : node->place.text());
 }
 
 }  // namespace
@@ -117,6 +135,7 @@ TrialPlanner::~TrialPlanner() = default;
 
 PlannedTrial TrialPlanner::plan(const ConfigNode& tree) {
   const TrainConfig config = read(tree);
+  check_system(tree, config);
   const std::vector<StageId> stages = memory_->identities.stages(config);
   memory_->check(config, stages);
   PlannedTrial out;
@@ -150,8 +169,8 @@ bool artifact_there(const std::string& store, const std::string& stage, const st
 }
 
 TrialOutcome run_trial(const std::string& config_yaml_path, const std::string& id,
-                       const Evaluate& evaluate, const std::string& store, bool quiet,
-                       const std::string& last_stage) {
+                       const Evaluate& evaluate, const std::string& store,
+                       const TrainOptions& options, const std::string& last_stage) {
   const ConfigNode tree = load_config_tree(config_yaml_path);
   const TrainConfig config = read(tree);
   const PlannedTrial planned = TrialPlanner(evaluate, store).plan(tree);
@@ -161,8 +180,6 @@ TrialOutcome run_trial(const std::string& config_yaml_path, const std::string& i
                      "its data or the program changed: plan the sweep again");
   TrialOutcome out;
   Identities identities;
-  TrainOptions options;
-  options.quiet = quiet;
   const StoreTraining trained =
       train_in_store(Store(store), config, &identities, options, last_stage);
   for (const StageId& s : trained.artifacts) out.artifacts[s.stage] = s.id;
@@ -170,7 +187,7 @@ TrialOutcome run_trial(const std::string& config_yaml_path, const std::string& i
   throw_if_stopped();
   out.metrics = evaluate.benchmark.empty()
                     ? evaluate_held_out(trained.bundle, config)
-                    : evaluate_benchmark(trained.bundle, evaluate, config.seed);
+                    : evaluate_benchmark(trained.bundle, evaluate, config);
   throw_if_stopped();
   return out;
 }

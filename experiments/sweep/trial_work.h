@@ -11,6 +11,7 @@
 
 #include "experiments/sweep/sweep_file.h"
 #include "nn/config/config_tree.h"
+#include "train/trainer.h"
 
 namespace restage::sweep {
 
@@ -61,8 +62,8 @@ struct TrialOutcome {
 /// May be called again after an interruption and goes on where it was. Throws Interrupted after a
 /// checkpoint if a signal came (the caller has a StopScope).
 TrialOutcome run_trial(const std::string& config_yaml_path, const std::string& id,
-                       const Evaluate& evaluate, const std::string& store, bool quiet,
-                       const std::string& last_stage = "");
+                       const Evaluate& evaluate, const std::string& store,
+                       const TrainOptions& options, const std::string& last_stage = "");
 
 /// What a few steps of a stage cost.
 struct Measured {

@@ -112,6 +112,8 @@ std::vector<RigState> Registration::starts(const std::vector<Vec3>& cloud) const
   return out;
 }
 
+Points Registration::posed(const Pose& pose) const { return linear_blend_skinning(body_, pose); }
+
 std::span<const RetargetedFrame> Registration::push(const Points& cloud,
                                                     const std::string& source) {
   const std::vector<Vec3> points = thinned(cloud, options_.grid, source);
@@ -137,7 +139,7 @@ std::span<const RetargetedFrame> Registration::push(const Points& cloud,
   out.pose = pose;
   out.pose.root = trajectory_scale(source_joints_, body_.joints) * source_joints_[0];
   out.joints = forward_kinematics(body_.joints, out.pose).joints;
-  out.vertices = linear_blend_skinning(body_, out.pose);
+  out.vertices = Registration::posed(out.pose);
   return {&frame_, 1};
 }
 

@@ -47,6 +47,8 @@ class Registration final : public System {
   const Joints* source_joints() const override { return &source_joints_; }
   const Mesh& target() const override { return body_.rest; }
   const SystemRig* rig() const override { return &system_rig_; }
+  Points posed(const Pose& pose) const override;
+  const Joints* target_joints() const override { return &body_.joints; }
 
  private:
   std::vector<RigState> starts(const std::vector<Vec3>& cloud) const;

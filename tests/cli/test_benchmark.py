@@ -133,6 +133,18 @@ class Benchmark(CliTest):
                       "--out", name + ".h5")
             judged = self.json("eval", "--pred", name + ".h5", "--truth", truth, "--source", source, "--rest", folder + "/rest.h5", *mended)
             self.assertEqual(found[name]["mean"], judged["mean"])
+            references = {n: r["mean"] for n, r in found[name]["references"].items()}
+            self.assertEqual(references, judged["references"])
+        # "Register then repose" is a system like any other.
+        self.write("sweep.yaml", "base: base.yaml\nset: {stages: [], evaluation.system: register, evaluation.every: 5}\n"
+                   "evaluate: {benchmark: small, sets: [naked]}\n")
+        self.done("sweep", "run", "sweep.yaml", "--out", "r")
+        trial = os.listdir(self.path("r/trials"))[0]
+        found = json.loads(self.bytes("r/trials/%s/result.json" % trial))["metrics"]
+        folder = "small/naked/" + found["naked"]["sequences"][0]["name"]
+        self.done("retarget", "--source", folder + "/source.h5", "--target", folder + "/target.ply", "--system", "register", "--rest",
+                  folder + "/rest.h5", "--every", "5", "--out", "r.h5")
+        self.assertEqual(found["naked"]["mean"], self.json("eval", "--pred", "r.h5", "--truth", folder + "/truth.h5", "--every", "5")["mean"])
         # One test body has nobody to retarget to; it was a division by zero.
         self.write("sweep.yaml", "base: base.yaml\nevaluate: {benchmark: small, sets: [test]}\n")
         failed = self.restage("sweep", "run", "sweep.yaml", "--out", "alone")

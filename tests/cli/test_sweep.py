@@ -154,7 +154,11 @@ class BadSweeps(Sweep):
             (base + "evaluate: {benchmarks: nowhere}\n", 2, "'benchmark'"),
             (base + "retries: many\n", 2, "retries"),
             (base + "early_stop: {metric: motion.pa_mpjpe, rule: best}\n", 2, "median"),
-            (base + "early_stop: {metric: motion.pa_mpjpe}\n", 2, "yet"),
+            (base + "early_stop: {metric: motion.pa_mpjp}\n", 2, "did you mean 'motion.pa_mpjpe'"),
+            (base + "early_stop: {metric: loss}\n", 2, "skeleton.joint_error_mm"),
+            (base + "set: {stages: [motion]}\nearly_stop: {metric: skeleton.joint_error_mm}\n", 3, "no trial trains"),
+            (base + "set: {evaluation.system: regster}\n", None, "did you mean 'register'"),
+            (base + "set: {stages: []}\n", None, "at least one"),
         ]
         for text, line, *contains in table:
             with self.subTest(text):
@@ -244,6 +248,48 @@ class Runs(Sweep):
                 self.assertEqual(trial["state"], "failed")
                 self.assertIn("skeleton/patch_transformer", trial["error"])
         self.assertIn("skeleton/patch_transformer", self.done("sweep", "status", "d"))
+
+    def test_early_stop(self):
+        text = ("base: configs/tiny.yaml\nset: {stages: [deformation], deformation.optimiser.steps: 60}\nseeds: [1, 2, 3]\n"
+                "grid: {deformation.optimiser.schedule.rate: [0.005, 1e-9]}\n")
+        rule = "early_stop: {metric: deformation.skinning_mm, rule: %s, after: 0.3}\n"
+        for name in ("median", "asha"):
+            self.write("sweep.yaml", text + rule % name)
+            run = self.restage("sweep", "run", "sweep.yaml", "--out", name, "store=store-" + name)
+            self.assertEqual((run.code, run.out), (0, "3 done, 3 stopped\n"), run.err)
+            for trial in self.json("sweep", "status", name)["trials"]:
+                bad = trial["overrides"]["deformation.optimiser.schedule.rate"] < 1e-3
+                self.assertEqual(trial["state"], "stopped" if bad else "done")
+                if bad:
+                    self.assertIn("stopped early by %s after 20 of 60 steps: deformation.skinning_mm" % name, trial["error"])
+                    self.assertEqual(self.result(trial["id"], name)["early_stop"]["rule"], name)
+                    self.assertEqual(self.done("trial", name, trial["id"]), "trial %s was stopped before\n" % trial["id"])
+            self.assertEqual(self.json("sweep", "table", name)["trials"]["stopped"], 3)
+            before = os.stat(self.path("store-" + name)).st_mtime_ns
+            self.assertEqual(self.done("sweep", "run", "sweep.yaml", "--out", name, "store=store-" + name), "3 done, 3 stopped\n")
+            self.assertEqual(os.stat(self.path("store-" + name)).st_mtime_ns, before, "nothing was left to do")
+        # Without the rule what was stopped goes on, to the bytes of a sweep that never had one.
+        self.write("sweep.yaml", text)
+        for out, store in (("median", "store-median"), ("whole", "store-whole")):
+            self.assertEqual(self.done("sweep", "run", "sweep.yaml", "--out", out, "store=" + store), "6 done\n")
+        self.assertEqual(sorted(os.listdir(self.path("store-median"))), sorted(os.listdir(self.path("store-whole"))))
+        for artifact in os.listdir(self.path("store-whole")):
+            self.assertEqual(self.bytes(f"store-median/{artifact}/artifact.json"), self.bytes(f"store-whole/{artifact}/artifact.json"))
+
+    def test_a_case_with_a_seed_of_its_own(self):
+        self.write("sweep.yaml", "base: configs/tiny.yaml\nseeds: [1, 2]\ncases:\n  learned: {stages: [motion]}\n"
+                   "  register: {stages: [], evaluation.system: register, evaluation.every: 2, evaluation.frames: 3, seed: 7}\n")
+        self.assertEqual([(t["case"], t["seed"]) for t in self.plan()["trials"]], [("learned", 1), ("learned", 2), ("register", 7)])
+        self.done("sweep", "run", "sweep.yaml", "--out", "d")
+        table = self.json("sweep", "table", "d")
+        self.assertEqual([(row["label"], row["n"]) for row in table["rows"]], [("learned", 2), ("register", 1)])
+        found = table["rows"][1]["metrics"]["clouds"]
+        self.assertLess(found["pa_mpjpe"]["mean"], 0.3)
+        self.assertIsNone(found["acc"]["mean"], "every second frame has no acceleration")
+        # What needs no learning stands beside what was learned.
+        self.assertEqual([row["label"] for row in table["references"]], ["closed form", "rest pose", "source unchanged"])
+        self.assertLess(table["references"][0]["metrics"]["true_skeletons"]["pa_mpjpe"]["mean"],
+                        table["rows"][0]["metrics"]["true_skeletons"]["pa_mpjpe"]["mean"])
 
     def test_one_trial_is_run_by_one(self):
         self.done("sweep", "plan", "sweep.yaml", "--out", "d", "skeleton.optimiser.steps=1000000")

@@ -233,5 +233,47 @@ TEST_F(TableTest, NamesCannotBreakTheFormats) {
   EXPECT_NE(error_of([&] { to_format(table, results, "x.pdf"); }).find(".svg"), std::string::npos);
 }
 
+TEST_F(TableTest, ReferencesOfAllTrialsAreRowsOfTheirOwn) {
+  int i = 0;
+  for (const char* name : {"quaternion", "6D"})
+    for (int seed = 1; seed <= 2; ++seed) {
+      ++i;
+      Json one = trial(i, name, seed, Json::object(), 0.1 * i);
+      Json copied = trial(i, name, seed, Json::object(), 0.15)["metrics"]["naked"];
+      Json noisy = trial(i, name, seed, Json::object(), 0.05 * i)["metrics"]["naked"];
+      one["metrics"]["naked"]["references"] = {{"source_unchanged", copied}, {"closed_form", noisy}};
+      put(one);
+    }
+  TableOptions options;
+  options.against = "source unchanged";
+  const Table table = make_table(read_results(dir_), options);
+  ASSERT_EQ(table.rows.size(), 4u);
+  EXPECT_EQ(table.references, 2u);
+  EXPECT_EQ(table.rows[2].label, "closed form");
+  EXPECT_EQ(table.rows[2].n, 4);
+  EXPECT_NEAR(*table.rows[2].cells[0][0].value.mean, 0.125, 1e-12);
+  // Measured by every trial, and the same each time: once.
+  EXPECT_EQ(table.rows[3].n, 1);
+  EXPECT_FALSE(table.rows[3].cells[0][0].value.deviation);
+  // A learned row is compared with the reference of its own trials, pair by pair.
+  EXPECT_EQ(table.rows[1].label, "quaternion");
+  EXPECT_EQ(table.rows[1].cells[0][0].difference->n, 2);
+  EXPECT_NEAR(*table.rows[1].cells[0][0].difference->mean, 0, 1e-12);
+  EXPECT_NEAR(*table.rows[0].cells[0][0].difference->mean, 0.2, 1e-12);
+  const Json json = to_json(table, read_results(dir_));
+  EXPECT_EQ(json["rows"].size(), 2u);
+  EXPECT_EQ(json["references"].size(), 2u);
+}
+
+TEST_F(TableTest, OurOwnBenchmarkCanBeRead) {
+  const std::string folder = std::string(RESTAGE_SOURCE_DIR) + "/experiments/benchmark";
+  const Table table = make_table(read_results(folder), {});
+  ASSERT_EQ(table.rows.size(), 5u);
+  EXPECT_EQ(table.rows[0].label, "Restage lite");
+  EXPECT_EQ(table.rows[0].n, 3);
+  EXPECT_EQ(table.sets.size(), 4u);
+  EXPECT_NEAR(*table.rows[0].cells[1][1].value.mean, 0.0285, 5e-5);  // naked, PA-MPJPE
+}
+
 }  // namespace
 }  // namespace restage::tables

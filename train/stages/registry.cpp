@@ -9,11 +9,12 @@ namespace {
 
 template <class S>
 StageType stage(const char* name, const char* help, std::vector<std::string> roles,
-                std::vector<std::string> reads = {}) {
+                std::vector<std::string> figures, std::vector<std::string> reads = {}) {
   return {name,
           help,
           AnyConfig(typename S::Config()),
           std::move(roles),
+          std::move(figures),
           std::move(reads),
           [](const AnyConfig& c, const StageInput& input) -> std::unique_ptr<Stage> {
             return std::make_unique<S>(c.as<typename S::Config>(), input);
@@ -24,10 +25,13 @@ StageType stage(const char* name, const char* help, std::vector<std::string> rol
 
 const std::vector<StageType>& stage_types() {
   static const std::vector<StageType> table = {
-      stage<SkeletonStage>("skeleton", "the skeleton extractor", {"skeleton"}),
-      stage<MotionStage>("motion", "the motion retargeting network", {"motion"}),
+      stage<SkeletonStage>("skeleton", "the skeleton extractor", {"skeleton"},
+                           {"joint_error_mm", "tpose_joint_error_mm"}),
+      stage<MotionStage>("motion", "the motion retargeting network", {"motion"},
+                         {"pa_mpjpe", "local_mpjpe", "cycle_mpjpe"}),
       stage<DeformationStage>("deformation", "skinning weights and offsets",
-                              {"deformation.weights", "deformation.offsets", "deformation.root"}),
+                              {"deformation.weights", "deformation.offsets", "deformation.root"},
+                              {"skinning_mm", "with_offsets_mm", "root_mse"}),
   };
   return table;
 }

@@ -81,6 +81,19 @@ RunDir open_run(const std::string& folder, const std::string& stage, const std::
 
 std::string Store::path(const StageId& id) const { return (fs::path(dir_) / id.name()).string(); }
 
+std::string Store::partial(const StageId& id) const {
+  return (fs::path(dir_) / ("." + id.name() + ".partial")).string();
+}
+
+std::string Store::metrics(const StageId& id) const {
+  std::error_code ignored;
+  for (const std::string& folder : {path(id), partial(id)}) {
+    const std::string file = folder + "/metrics.jsonl";
+    if (fs::is_regular_file(file, ignored)) return read_file(file);
+  }
+  return "";
+}
+
 bool Store::has(const StageId& id) const {
   std::error_code ignored;
   return fs::is_regular_file(fs::path(path(id)) / "artifact.json", ignored);
@@ -110,7 +123,7 @@ Bundle Store::get(const StageId& id, const std::string& config_yaml, const Make&
   if (error)
     throw InputError(dir_, "cannot be made (" + error.message() + ")",
                      "give store= a folder that you can write to");
-  const fs::path aside = fs::path(dir_) / ("." + id.name() + ".partial");
+  const std::string aside = partial(id);
   const std::string lease_path = (fs::path(dir_) / ("." + id.name() + ".lease")).string();
   const StopScope stop;
   for (bool told = false;; told = true) {
@@ -126,12 +139,12 @@ Bundle Store::get(const StageId& id, const std::string& config_yaml, const Make&
       }
       Bundle bundle;
       {
-        RunDir run = open_run(aside.string(), id.stage, config_yaml, id.facts);
+        RunDir run = open_run(aside, id.stage, config_yaml, id.facts);
         bundle = make(run);
       }
       if (lease->lost())
         throw WorkError("another process has taken over " + id.name() + "; run it again");
-      publish(id, aside.string(), config_yaml, bundle);
+      publish(id, aside, config_yaml, bundle);
       remove_leftovers(dir_, id.name());
       lease->forget();
       // What others read is what we use.

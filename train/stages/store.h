@@ -30,6 +30,9 @@ class Store {
   /// The artifact, or nothing. A damaged one gives a warning, is moved aside and counts as absent.
   std::optional<Bundle> find(const StageId& id) const;
 
+  /// Its curves so far (metrics.jsonl), also while it is made; empty if nobody has begun.
+  std::string metrics(const StageId& id) const;
+
   /// Trains in the given run directory, which may hold the checkpoints of an earlier attempt.
   using Make = std::function<Bundle(RunDir& run)>;
   /// The artifact, made if it is absent. While another process makes it, this one waits.
@@ -37,6 +40,7 @@ class Store {
   Bundle get(const StageId& id, const std::string& config_yaml, const Make& make) const;
 
  private:
+  std::string partial(const StageId& id) const;
   void publish(const StageId& id, const std::string& run, const std::string& config_yaml,
                const Bundle& bundle) const;
 

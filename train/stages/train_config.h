@@ -29,13 +29,16 @@ void visit(V& v, CorpusSource& c) {
 }
 
 struct EvaluationConfig {
-  int64_t sequences = 12, frames = 90;
+  int64_t sequences = 12, frames = 90, every = 1;
+  std::string system = "chain";  ///< infer/systems.h
 };
 
 template <class V>
 void visit(V& v, EvaluationConfig& c) {
   v("sequences", c.sequences, "held-out sequences of 'restage eval run=...'", positive());
   v("frames", c.frames, "frames of each", at_least(3));
+  v("system", c.system, "which system a sweep's trial is: 'restage retarget --system'");
+  v("every", c.every, "a sweep's trial is measured on every so many frames", positive());
 }
 
 inline EnumNames<MatmulPrecision> config_names(MatmulPrecision) {
@@ -102,7 +105,8 @@ void visit(V& v, TrainConfig& c) {
   v("loop", c.loop, "logging, validation, checkpoints");
   v("evaluation", c.evaluation, "what 'restage eval run=...' looks at");
   const std::set<std::string> once(c.stages.begin(), c.stages.end());
-  v.check("stages", !c.stages.empty() && once.size() == c.stages.size(),
+  const bool learned = c.evaluation.system == EvaluationConfig().system;
+  v.check("stages", (!learned || !c.stages.empty()) && once.size() == c.stages.size(),
           "must name each stage at most once, and at least one", "name each stage once");
 }
 

@@ -7,7 +7,7 @@
 
 #include "nn/geometry/skeleton.h"
 
-namespace restage::cli {
+namespace restage {
 
 /// p' = scale x rotation x p + shift.
 struct WorldMap {
@@ -26,4 +26,4 @@ std::optional<WorldMap> source_to_world(const std::string& truth);
 /// attribute.
 WorldMap mended_to_world(const std::string& mended, const WorldMap& to_world);
 
-}  // namespace restage::cli
+}  // namespace restage

@@ -1,4 +1,4 @@
-#include "experiments/cli/eval_world.h"
+#include "experiments/world_map.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include "datasets/schema.h"
 #include "experiments/cli/doctor_report.h"
 
-namespace restage::cli {
+namespace restage {
 
 void WorldMap::carry(std::vector<double>& points, bool rigid, double stretched) const {
   for (size_t i = 0; i + 2 < points.size(); i += 3) {
@@ -38,7 +38,7 @@ std::optional<WorldMap> source_to_world(const std::string& truth) {
 }
 
 WorldMap mended_to_world(const std::string& mended, const WorldMap& to_world) {
-  const std::optional<Similarity> repair = similarity_from(inspect(mended).transform);
+  const std::optional<Similarity> repair = cli::similarity_from(inspect(mended).transform);
   if (!repair)
     throw InputError(mended, "does not say how it was mended",
                      "give the file that restage doctor --fix wrote");
@@ -49,4 +49,4 @@ WorldMap mended_to_world(const std::string& mended, const WorldMap& to_world) {
   return out;
 }
 
-}  // namespace restage::cli
+}  // namespace restage
