@@ -43,6 +43,10 @@ Adam* Stage::add_optimiser(const std::string& name, const std::vector<std::strin
   for (const Network& n : networks_)
     if (std::find(roles.begin(), roles.end(), n.role) != roles.end())
       modules.emplace_back(prefix_of(n.role), n.model.net.get());
+  for (const auto& [prefix, module] : modules)
+    if (optimiser_.steps > 0 && count_parameters(*module) == 0)
+      throw InputError("", "the model of stage '" + name_ + "' has nothing to learn",
+                       "set " + name_ + ".optimiser.steps=0 to use it as it is");
   optimisers_.push_back({name, std::make_unique<Adam>(modules, config)});
   return optimisers_.back().adam.get();
 }

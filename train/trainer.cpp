@@ -44,6 +44,21 @@ void run_stage(Stage& stage, int64_t first, RunDir& run, const LoopConfig& loop,
   Throughput throughput;
   product_rate();
   const int64_t steps = stage.steps(), blocks_before = memory_stats().large_allocations;
+  const auto validate = [&](int64_t done) {
+    const NamedValues scores = stage.validate();
+    run.metrics(stage.name(), done, scores);
+    tell([&](TrainObserver& o) { o.on_validation(stage, done, scores); });
+    return stage.name() + " after " + std::to_string(done) + " steps: " + line(scores);
+  };
+  const auto checkpoint = [&](int64_t done) {
+    const std::string path = run.save_checkpoint(stage.name(), done, bytes_of(stage));
+    tell([&](TrainObserver& o) { o.on_checkpoint(stage, done, path); });
+  };
+  if (steps == 0) {
+    log_info(validate(0));
+    checkpoint(0);
+    return;
+  }
   reset_peak_memory();
   Progress progress(stage.name(), steps, standard_progress(options.quiet), first);
   for (int64_t step = first; step < steps; ++step) {
@@ -66,16 +81,8 @@ void run_stage(Stage& stage, int64_t first, RunDir& run, const LoopConfig& loop,
                  speed.end());
     progress.update(done, shown);
     tell([&](TrainObserver& o) { o.on_step(stage, done, values); });
-    if (done % loop.validate_every == 0 || last) {
-      const NamedValues scores = stage.validate();
-      run.metrics(stage.name(), done, scores);
-      progress.note(stage.name() + " after " + std::to_string(done) + " steps: " + line(scores));
-      tell([&](TrainObserver& o) { o.on_validation(stage, done, scores); });
-    }
-    if (done % loop.checkpoint_every == 0 || last || stopped) {
-      const std::string path = run.save_checkpoint(stage.name(), done, bytes_of(stage));
-      tell([&](TrainObserver& o) { o.on_checkpoint(stage, done, path); });
-    }
+    if (done % loop.validate_every == 0 || last) progress.note(validate(done));
+    if (done % loop.checkpoint_every == 0 || last || stopped) checkpoint(done);
     if (stopped) {
       progress.finish();
       throw_if_stopped();

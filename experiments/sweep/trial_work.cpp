@@ -203,7 +203,7 @@ Measured measure_stage(const ConfigNode& tree, const std::string& stage) {
     if (name == stage) break;
     if (made != nullptr) so_far.add(made->result());
   }
-  if (made == nullptr) return {};
+  if (made == nullptr || made->steps() == 0) return {};
   reset_peak_memory();
   auto start = std::chrono::steady_clock::now();
   for (int64_t i = 0; i < kWarm + kSteps; ++i) {

@@ -248,6 +248,29 @@ TEST_F(TrainTrainer, ObserversSeeEverything) {
   EXPECT_EQ(seen.checkpoints, 3);
 }
 
+TEST_F(TrainTrainer, AStageOfNoStepsLeavesItsNetworksAndACheckpoint) {
+  struct Stopping final : TrainObserver {
+    void on_step(const Stage& stage, int64_t done, const NamedValues&) override {
+      if (stage.name() == "motion" && done == 4) throw Killed();
+    }
+  } stopping;
+  const MakeStage make = [](const std::string& name, Bundle*) {
+    return tiny_stage(name, tiny_training(name == "skeleton" ? 0 : kSteps));
+  };
+  RunDir run = create("none");
+  const std::string got = weights(train(run, kAll, loop(), make, kQuiet));
+  TrainOptions options = kQuiet;
+  options.observers = {&stopping};
+  EXPECT_THROW(
+      {
+        RunDir other = create("none-stopped");
+        train(other, kAll, loop(), make, options);
+      },
+      Killed);
+  RunDir again = RunDir::resume(place("none-stopped"), kAll);
+  EXPECT_TRUE(weights(train(again, kAll, loop(), make, kQuiet)) == got);
+}
+
 TEST_F(TrainTrainer, TwoStopsInARow) {
   for (const int64_t when : {1, 3}) {
     RunDir run = when == 1 ? create("twice") : RunDir::resume(place("twice"), kAll);

@@ -15,7 +15,7 @@ struct OptimiserConfig {
 
 template <class V>
 void visit(V& v, OptimiserConfig& c) {
-  v("steps", c.steps, "optimiser steps", positive());
+  v("steps", c.steps, "optimiser steps; 0: the networks stay as they begin", at_least(0));
   v("batch", c.batch, "examples per step", positive());
   v("schedule", c.schedule, "learning rate");
   v("adam", c.adam, "optimiser");
