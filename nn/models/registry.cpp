@@ -1,6 +1,7 @@
 #include "nn/models/registry.h"
 
 #include "autograd/base/nearest.h"
+#include "nn/models/closed_form_motion.h"
 #include "nn/models/deformation.h"
 #include "nn/models/discriminator.h"
 #include "nn/models/patch_transformer.h"
@@ -47,6 +48,8 @@ const std::vector<ModelType>& models() {
                               "our small extractor for CPUs: patch tokens that vote"),
       smrm("smrm/rot6d", "the motion retargeting network with 6D rotations", RotationForm::sixd),
       smrm("smrm/quaternion", "the first version's, with quaternions", RotationForm::quaternion),
+      model<ClosedFormMotion>("motion/closed_form", "motion",
+                              "no network: the closed form of the joints, to compare with"),
       model<Discriminator>("smrm/discriminator", "discriminator",
                            "the motion discriminator of the adversarial loss"),
       model<WeightNet>("deformation/weights", "deformation.weights",

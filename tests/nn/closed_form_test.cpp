@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "autograd/base/rng.h"
+#include "nn/models/registry.h"
 
 namespace restage {
 namespace {
@@ -84,6 +85,43 @@ TEST(ClosedForm, DegenerateSkeletonsGiveRotations) {
       }
   EXPECT_EQ(trajectory_scale(collapsed, rest), 1.0);
   EXPECT_TRUE(closed_form({}, rest).empty());
+}
+
+TEST(ClosedForm, IsAMotionModel) {
+  const Joints rest = t_pose(1.2);
+  std::vector<Joints> motion;
+  for (uint64_t f = 0; f < 6; ++f)
+    motion.push_back(forward_kinematics(t_pose(1.8), random_pose(f)).joints);
+  const auto expected = closed_form_joints(motion, rest);
+  const auto model = make_model_as<MotionModel>("motion/closed_form", model_config("motion/closed_form"),
+                                                Init{RngKey{1, 0}, DType::f64});
+  const auto rows = [](const Joints& joints, int64_t frames, const std::vector<Joints>& all) {
+    std::vector<double> values;
+    for (const Joints& one : all)
+      for (const Vec3& p : one)
+        for (int c = 0; c < 3; ++c) values.push_back(p[c] - (all.size() > 1 ? one[0][c] : joints[0][c]));
+    return Tensor::from<double>(all.size() > 1 ? Shape{1, frames, kJoints, 3} : Shape{1, kJoints, 3},
+                                values);
+  };
+  const Tensor a = rows(rest, 6, motion), b = rows(rest, 1, {rest});
+  const Tensor velocity = Tensor::full({1, 6, 3}, 2, DType::f64);
+  Context ctx;
+  MotionState whole, pieces;
+  const MotionOutput all = model->forward(ctx, a, velocity, b, &whole);
+  for (int64_t f = 0; f < 6; ++f) {
+    const Tensor one = Tensor::from<double>(
+        {1, 1, kJoints, 3},
+        {a.data<double>() + f * 3 * kJoints, a.data<double>() + (f + 1) * 3 * kJoints});
+    const MotionOutput out = model->forward(ctx, one, Tensor::full({1, 1, 3}, 2, DType::f64), b, &pieces);
+    for (int j = 0; j < kJoints; ++j)
+      for (int c = 0; c < 3; ++c) {
+        const double whole_value = all.joints.value.data<double>()[(f * kJoints + j) * 3 + c];
+        EXPECT_EQ(out.joints.value.data<double>()[3 * j + c], whole_value);
+        const auto& frame = expected[static_cast<size_t>(f)];
+        EXPECT_NEAR(whole_value, frame[j][c] - frame[0][c], 1e-12);
+      }
+    EXPECT_NEAR(out.trans.value.data<double>()[0], 2 * trajectory_scale(motion[0], rest), 1e-12);
+  }
 }
 
 }  // namespace
