@@ -14,18 +14,6 @@ PairConfig held_out(PairConfig c) {
   return c;
 }
 
-/// The pelvis, which is the origin of both, seen from the centroid of the rest points: [n, 3].
-Tensor minus_centroid(const Tensor& points) {
-  const int64_t n = points.size(0), v = points.size(1);
-  Tensor out = Tensor::zeros({n, 3}, points.dtype());
-  for (int64_t s = 0; s < n; ++s)
-    for (int64_t i = 0; i < v; ++i)
-      for (int64_t c = 0; c < 3; ++c)
-        out.data<float>()[3 * s + c] -=
-            points.data<float>()[3 * (s * v + i) + c] / static_cast<float>(v);
-  return out;
-}
-
 }  // namespace
 
 DeformationStage::DeformationStage(const Config& config, const StageInput& in)
@@ -39,12 +27,7 @@ DeformationStage::DeformationStage(const Config& config, const StageInput& in)
                          RngKey{in.seed, 0}.fold("deformation/offsets"),
                          {{"keep_root_rotation", config.keep_root_rotation ? "true" : "false"}})
                    : nullptr),
-      root_(config.root_net
-                ? add_network<RootNet>("deformation.root", "deformation/root", config.model.sizes,
-                                       RngKey{in.seed, 0}.fold("deformation/root"))
-                : nullptr),
-      adam_(add_optimiser("adam",
-                          {"deformation.weights", "deformation.offsets", "deformation.root"},
+      adam_(add_optimiser("adam", {"deformation.weights", "deformation.offsets"},
                           config.optimiser.adam)),
       sampler_(in.train, config.pairs, RngKey{in.seed, 0}.fold("deformation.pairs").stream),
       validation_sampler_(in.validation, held_out(config.pairs), 1),
@@ -58,12 +41,6 @@ DeformationBatch DeformationStage::batch_of(const PairBatch& p) const {
       std::fill_n(b.axis_angle.data<float>() + i * 66, 3, 0.0f);
   }
   return b;
-}
-
-Var DeformationStage::root_loss(Context& ctx, const DeformationBatch& b) const {
-  const int64_t n = b.rest_points.size(0);
-  return mse((*root_)(ctx, Var(b.rest_joints.reshape({n, 3 * kJoints}))),
-             Var(minus_centroid(b.rest_points)));
 }
 
 PairBatch DeformationStage::batch(int64_t step) const {
@@ -80,10 +57,8 @@ NamedValues DeformationStage::step(int64_t step) {
     const DeformationOutput out = deform(ctx, *weights_, offsets, b);
     distance = mean_distance(out.posed.value, b.posed_points);
     // Sum over the points of a pair, mean over pairs.
-    Var total =
-        scale(squared_distance_sum(out.posed, b.posed_points), 1.0 / static_cast<double>(o.batch));
-    if (root_ != nullptr) total = total + root_loss(ctx, b);
-    return total;
+    return scale(squared_distance_sum(out.posed, b.posed_points),
+                 1.0 / static_cast<double>(o.batch));
   });
   const double rate = learning_rate(o.schedule, step, o.steps);
   adam_->step(d.gradients, rate, o.clip);
@@ -92,7 +67,7 @@ NamedValues DeformationStage::step(int64_t step) {
 
 NamedValues DeformationStage::validate() {
   Context ctx;
-  double with = 0, without = 0, root = 0;
+  double with = 0, without = 0;
   const int64_t n = config_.validation_pairs, part = 4;
   for (int64_t i = 0; i < n; i += part) {
     const int64_t count = std::min(part, n - i);
@@ -101,11 +76,9 @@ NamedValues DeformationStage::validate() {
     with += share * mean_distance(deform(ctx, *weights_, offsets_, b).posed.value, b.posed_points);
     without +=
         share * mean_distance(deform(ctx, *weights_, nullptr, b).posed.value, b.posed_points);
-    if (root_ != nullptr) root += share * root_loss(ctx, b).value.item();
   }
   NamedValues values{{"skinning_mm", 1e3 * without}};
   if (offsets_ != nullptr) values.push_back({"with_offsets_mm", 1e3 * with});
-  if (root_ != nullptr) values.push_back({"root_mse", root});
   return values;
 }
 

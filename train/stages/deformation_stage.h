@@ -22,7 +22,7 @@ struct DeformationStageConfig {
   OptimiserConfig optimiser;
   PairConfig pairs;
   int64_t skinning_steps = 0;
-  bool offsets = true, root_net = false, keep_root_rotation = true;
+  bool offsets = true, keep_root_rotation = true;
   int64_t validation_pairs = 60;
 };
 
@@ -34,7 +34,6 @@ void visit(V& v, DeformationStageConfig& c) {
   v("skinning_steps", c.skinning_steps, "first steps without offsets (the paper: one epoch)",
     at_least(0));
   v("offsets", c.offsets, "train pose-corrective offsets");
-  v("root_net", c.root_net, "also train the third MLP (docs/method.md)");
   v("keep_root_rotation", c.keep_root_rotation, "offsets see the root's rotation (false: zero)");
   v("validation_pairs", c.validation_pairs, "held-out pairs per validation", positive());
 }
@@ -50,12 +49,10 @@ class DeformationStage final : public Stage {
  private:
   PairBatch batch(int64_t step) const;
   DeformationBatch batch_of(const PairBatch& pairs) const;
-  Var root_loss(Context& ctx, const DeformationBatch& batch) const;
 
   Config config_;
   DeformationModel* weights_;
   OffsetNet* offsets_;  // null: none
-  RootNet* root_;       // null: none
   Adam* adam_;
   PairSampler sampler_, validation_sampler_;
   RngKey key_;

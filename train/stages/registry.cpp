@@ -30,8 +30,8 @@ const std::vector<StageType>& stage_types() {
       stage<MotionStage>("motion", "the motion retargeting network", {"motion"},
                          {"pa_mpjpe", "local_mpjpe", "cycle_mpjpe"}),
       stage<DeformationStage>("deformation", "skinning weights and offsets",
-                              {"deformation.weights", "deformation.offsets", "deformation.root"},
-                              {"skinning_mm", "with_offsets_mm", "root_mse"}),
+                              {"deformation.weights", "deformation.offsets"},
+                              {"skinning_mm", "with_offsets_mm"}),
   };
   return table;
 }
