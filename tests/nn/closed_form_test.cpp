@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "autograd/base/rng.h"
+#include "nn/models/motion.h"
 #include "nn/models/registry.h"
 
 namespace restage {

@@ -24,7 +24,7 @@ using testing::tiny_training;
 
 constexpr int64_t kSteps = 9;
 const TrainOptions kQuiet{.precision = MatmulPrecision::float32, .quiet = true, .observers = {}};
-const std::vector<std::string> kAll = {"skeleton", "motion", "deformation"};
+const std::vector<std::string> kAll = {"skeleton", "motion", "deformation", "root"};
 
 OptimiserConfig optimiser_of(const Stage& stage) {
   OptimiserConfig out;
@@ -210,8 +210,8 @@ TEST_F(TrainTrainer, PrecisionIsForStepsOnly) {
   const auto bfloat16 = MatmulPrecision::bfloat16;
   const std::string got = weights(
       train(run, kAll, loop(), watched, {.precision = bfloat16, .quiet = true, .observers = {}}));
-  EXPECT_EQ(steps, std::vector<MatmulPrecision>(3 * kSteps, bfloat16));
-  EXPECT_EQ(validations, std::vector<MatmulPrecision>(6, MatmulPrecision::float32));
+  EXPECT_EQ(steps, std::vector<MatmulPrecision>(4 * kSteps, bfloat16));
+  EXPECT_EQ(validations, std::vector<MatmulPrecision>(8, MatmulPrecision::float32));
   EXPECT_EQ(matmul_precision(), MatmulPrecision::float32);
   EXPECT_FALSE(got == whole().weights);
   EXPECT_THROW(

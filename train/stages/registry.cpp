@@ -2,6 +2,7 @@
 
 #include "train/stages/deformation_stage.h"
 #include "train/stages/motion_stage.h"
+#include "train/stages/root_stage.h"
 #include "train/stages/skeleton_stage.h"
 
 namespace restage {
@@ -32,6 +33,7 @@ const std::vector<StageType>& stage_types() {
       stage<DeformationStage>("deformation", "skinning weights and offsets",
                               {"deformation.weights", "deformation.offsets"},
                               {"skinning_mm", "with_offsets_mm"}),
+      stage<RootStage>("root", "the third MLP of the paper's count", {"deformation.root"}, {"root_mm"}),
   };
   return table;
 }
