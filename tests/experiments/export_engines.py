@@ -2,9 +2,10 @@
 """Runs the scripts of `restage sweep export` by the engines they are for: GNU parallel, Snakemake, and a Slurm of
 one node that this test starts itself. Usage: export_engines.py RESTAGE [unittest arguments].
 
-The trials are a stand-in (a shell script that writes result.json): what is tested is that every engine calls the
-right commands, whatever the folder is called, and that result files alone decide what is done. An engine that is
-not there is skipped with its reason; with RESTAGE_CI=1 that is a failure.
+Twice: with a stand-in for the trials (a shell script that writes result.json), to see that every engine calls the
+right commands, whatever the folder is called, and that result files alone decide what is done; and with real ones,
+whose artifacts must have the bytes that our own pool makes. An engine that is not there is skipped with its reason;
+with RESTAGE_CI=1 that is a failure.
 """
 import json
 import os
@@ -39,7 +40,87 @@ echo '{"state": "done"}' > "$result"
 """
 
 
-class Engines(unittest.TestCase):
+# Real trials: two motion networks with two seeds over one deformation stage a seed.
+BASE = """seed: 3
+stages: [motion, deformation]
+data:
+  bodies: {train: 2, validation: 2, test: 2}
+  motions: {train: 4, validation: 2, test: 2}
+motion: {sizes: {hidden: 16}, optimiser: {steps: 8, batch: 4}, windows: {frames: 8}, validation_windows: 2, validation_frames: 8}
+deformation: {optimiser: {steps: 8, batch: 2}, pairs: {points: 32}, validation_pairs: 2}
+evaluation: {sequences: 1, frames: 5}
+"""
+SWEEP = "base: base.yaml\ngrid: {motion.weights.smoothness: [0, 0.1]}\nseeds: [1, 2]\n"
+
+
+class NeedsPrograms(unittest.TestCase):
+    def need(self, *programs):
+        missing = [p for p in programs if not shutil.which(p, path=os.environ["PATH"] + ":/usr/sbin:/sbin")]
+        if missing and IN_CI:
+            self.fail(f"{', '.join(missing)} must be there in CI")
+        if missing:
+            self.skipTest(f"{', '.join(missing)} not installed")
+
+
+class RealTrials(NeedsPrograms):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.mkdtemp(prefix="restage-engines-")
+        cls.addClassCleanup(shutil.rmtree, cls.folder, ignore_errors=True)
+        for name, text in (("base.yaml", BASE), ("sweep.yaml", SWEEP)):
+            with open(os.path.join(cls.folder, name), "w") as f:
+                f.write(text)
+        cls.restage("sweep", "run", "sweep.yaml", "--out", "pool", "store=store-pool")
+
+    @classmethod
+    def restage(cls, *arguments):
+        done = subprocess.run([RESTAGE, *arguments, "--quiet"], cwd=cls.folder, capture_output=True, text=True)
+        if done.returncode != 0:
+            raise AssertionError(done.stderr)
+        return done.stdout
+
+    def artifacts(self, engine):
+        """{path: bytes} of a store; nothing that was in the making may be left."""
+        found = {}
+        for at, _, names in os.walk(os.path.join(self.folder, "store-" + engine)):
+            for name in names:
+                with open(os.path.join(at, name), "rb") as f:
+                    found[os.path.relpath(f.name, os.path.join(self.folder, "store-" + engine))] = f.read()
+        return found
+
+    def check(self, engine, run):
+        self.restage("sweep", "plan", "sweep.yaml", "--out", engine, "store=store-" + engine)
+        script = os.path.join(self.folder, engine + ".script")
+        self.restage("sweep", "export", engine, "--engine", engine, "--out", script)
+        self.assertEqual(run(script), 0)
+        counts = json.loads(self.restage("sweep", "status", engine, "--json"))["counts"]
+        self.assertEqual((counts["done"], counts["pending"] + counts["failed"] + counts["running"] + counts["stopped"]), (4, 0))
+        self.assertEqual(len(self.artifacts("pool")), 6 * 4)
+        self.assertEqual(self.artifacts(engine), self.artifacts("pool"))
+
+    def test_parallel(self):
+        self.need("parallel")
+
+        def run(script):
+            with open(script) as f:
+                return subprocess.run(["parallel", "--will-cite", "-j2"], stdin=f, capture_output=True, timeout=300).returncode
+        self.check("parallel", run)
+
+    def test_snakemake(self):
+        self.need("snakemake")
+        self.check("snakemake", lambda script: subprocess.run(
+            ["snakemake", "--cores", "2", "-s", script, "-d", self.folder], capture_output=True, timeout=300).returncode)
+
+    def test_slurm(self):
+        self.need("munged", "slurmctld", "slurmd", "sbatch")
+        if os.geteuid() != 0:
+            self.skipTest("a Slurm of one's own needs root")
+        with Slurm(self) as slurm:
+            self.check("slurm", lambda script: subprocess.run(
+                ["sbatch", "--wait", "--output=/dev/null", script], env=slurm.environment, capture_output=True, timeout=300).returncode)
+
+
+class Engines(NeedsPrograms):
     def setUp(self):
         base = tempfile.mkdtemp(prefix="restage-engines-")
         self.addCleanup(shutil.rmtree, base, ignore_errors=True)
@@ -61,13 +142,6 @@ class Engines(unittest.TestCase):
 
     def path(self, *names):
         return os.path.join(self.folder, *names)
-
-    def need(self, *programs):
-        missing = [p for p in programs if not shutil.which(p, path=os.environ["PATH"] + ":/usr/sbin:/sbin")]
-        if missing and IN_CI:
-            self.fail(f"{', '.join(missing)} must be there in CI")
-        if missing:
-            self.skipTest(f"{', '.join(missing)} not installed")
 
     def export(self, engine, *more):
         script = self.path(f"the {engine} script")
