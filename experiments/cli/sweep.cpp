@@ -100,7 +100,7 @@ std::string plan_text(const SweepPlan& plan) {
                     std::to_string(trial.seed), differs.empty() ? "-" : differs, artifacts});
   }
   return markdown_table(rows) + "\n" + std::to_string(plan.trials.size()) +
-         " trials; artifacts: " + std::to_string(plan.there) + " there, " +
+         (plan.trials.size() == 1 ? " trial" : " trials") + "; artifacts: " + std::to_string(plan.there) + " there, " +
          std::to_string(plan.to_make) + " to make, " + std::to_string(plan.shared) +
          " shared by several trials\n";
 }
@@ -117,8 +117,8 @@ int run_plan(const PlanOptions& options, const Common& common) {
     document["forecast"] = {{"seconds", forecast.seconds}, {"memory_bytes", forecast.memory_bytes}};
     char line[160];
     std::snprintf(line, sizeof line,
-                  "about %s of training one after the other on %d threads, %.0f MiB of tensors\n",
-                  duration_text(forecast.seconds).c_str(), threads(),
+                  "about %s of training one after the other on %d thread%s, %.0f MiB of tensors\n",
+                  duration_text(forecast.seconds).c_str(), threads(), threads() == 1 ? "" : "s",
                   static_cast<double>(forecast.memory_bytes) / 1048576.0);
     text += line;
   } else if (plan.to_make > 0) {

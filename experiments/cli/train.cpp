@@ -67,6 +67,9 @@ int run_train(const TrainArguments& options, const Program& program) {
   if (options.seed_given) overrides.push_back("seed=" + std::to_string(common.seed));
   load_config(request.resume.empty() ? request.config : run_config_path(request.resume), overrides,
               config);
+  if (config.stages.empty())
+    throw InputError(request.config, "names no stages, so there is nothing to train",
+                     "use it in a sweep, or name stages");
   const TrainingData data(config.data);
   RunInput input{config.seed, threads(), program.command_line(), {}, resolved_yaml(config)};
   if (config.data.source != "builtin")

@@ -286,6 +286,7 @@ class Runs(Sweep):
         found = table["rows"][1]["metrics"]["clouds"]
         self.assertLess(found["pa_mpjpe"]["mean"], 0.3)
         self.assertIsNone(found["acc"]["mean"], "every second frame has no acceleration")
+        self.bad_input(["train", "configs/tiny.yaml", "stages=[]", "evaluation.system=register"], "nothing to train")
         # What needs no learning stands beside what was learned.
         self.assertEqual([row["label"] for row in table["references"]], ["closed form", "rest pose", "source unchanged"])
         self.assertLess(table["references"][0]["metrics"]["true_skeletons"]["pa_mpjpe"]["mean"],
