@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "datasets/benchmark/batches.h"
+#include "datasets/importers/batches.h"
 
 namespace restage {
 

@@ -7,6 +7,7 @@
 
 #include "autograd/base/parallel.h"
 #include "datasets/benchmark/floor.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
 namespace {
@@ -64,8 +65,7 @@ std::vector<std::string> most_first(const Counts& counts) {
   for (const auto& [name, count] : counts) ordered.emplace_back(-count, name);
   std::sort(ordered.begin(), ordered.end());
   std::vector<std::string> out;
-  for (const auto& [count, name] : ordered)
-    out.push_back(name + " (" + std::to_string(-count) + ")");
+  for (const auto& [count, name] : ordered) out.push_back(cat(name, " (", -count, ")"));
   return out;
 }
 

@@ -1,6 +1,6 @@
 #include "datasets/benchmark/sequence.h"
 
-#include "datasets/benchmark/batches.h"
+#include "datasets/importers/batches.h"
 #include "datasets/readers/mesh_io.h"
 
 namespace restage {

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "autograd/base/error.h"
 #include "autograd/base/parallel.h"
 #include "datasets/builtin/body_shape.h"
 #include "datasets/builtin/body_weights.h"
 #include "datasets/builtin/surface_nets.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
 namespace {
@@ -77,15 +77,14 @@ Body builtin_body(uint64_t seed, const std::string& split, int index) {
     throw InputError("builtin bodies", "unknown split \"" + split + "\"",
                      "use train, validation or test");
   if (index < 0)
-    throw InputError("builtin bodies", "negative body number " + std::to_string(index),
-                     "count from 0");
+    throw InputError("builtin bodies", cat("negative body number ", index), "count from 0");
   const BodyShape shape = draw_body_shape(body_key(seed, split, index));
   const ImplicitSurface surface = shape_surface(shape);
   SurfaceMesh mesh = surface_nets([&](const Vec3& p) { return surface(p); }, grid_of(shape));
   relax(surface, .01, mesh);
 
   Body body;
-  body.id = "builtin_" + split + "_" + std::to_string(index);
+  body.id = cat("builtin_", split, "_", index);
   body.split = split;
   body.weights = shape_weights(shape, mesh);
   double lo = 1e9, hi = -1e9;

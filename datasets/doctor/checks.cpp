@@ -1,7 +1,5 @@
 // What `restage retarget` asks before it starts.
-#include <cmath>
 
-#include "autograd/base/error.h"
 #include "datasets/doctor/examine_detail.h"
 #include "datasets/doctor/orientation_model.h"
 #include "datasets/doctor/words.h"

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "autograd/base/error.h"
 #include "datasets/doctor/examine_detail.h"
 #include "datasets/doctor/words.h"
 
@@ -31,16 +30,15 @@ namespace {
 void judge_cover(Diagnosis& d, const Mesh& mesh, const PersonShape& shape) {
   const double one = one_sidedness(shape.points, shape.parts.spacing);
   if (one > kOneSided && shape.points.size() >= 200)
-    d.findings.push_back({"holes", Weight::note, "seen from one side only", 0.9,
-                          "rays through it hit a single surface: " + per_cent(one),
-                          "scan from more sides if you can"});
+    d.say({"holes", Weight::note, "seen from one side only", 0.9,
+           "rays through it hit a single surface: " + per_cent(one),
+           "scan from more sides if you can"});
   if (mesh.faces.empty()) return;
   const Borders open = borders(mesh);
   if (open.edges > 0)
-    d.findings.push_back(
-        {"holes", Weight::note,
-         counted(open.loops, "open border") + " with " + counted(open.edges, "edge"), 1,
-         "edges with one triangle", "close them in a mesh editor if they are not meant"});
+    d.say({"holes", Weight::note,
+           counted(open.loops, "open border") + " with " + counted(open.edges, "edge"), 1,
+           "edges with one triangle", "close them in a mesh editor if they are not meant"});
 }
 
 }  // namespace
@@ -87,8 +85,7 @@ Finding examine_skeletons(const std::vector<Joints>& frames) {
     heights.push_back(kHeight * (legs + spine));
   }
   if (heights.empty()) return {};
-  std::nth_element(heights.begin(), heights.begin() + std::ssize(heights) / 2, heights.end());
-  const double height = heights[heights.size() / 2];
+  const double height = median(std::move(heights));
   Diagnosis d;
   d.size = kSizeOfHeight * height;
   d.unit = guess_unit(d.size);

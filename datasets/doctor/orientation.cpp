@@ -59,7 +59,7 @@ void OrientationVote::add(const Points& cloud, bool faces) {
 }
 
 double OrientationVote::up(int index) const {
-  return clouds_ > 0 ? up_[static_cast<size_t>(index)] / clouds_ : 1.0 / kUps;
+  return clouds_ > 0 ? up_[index] / clouds_ : 1.0 / kUps;
 }
 
 Orientation OrientationVote::result() const {
@@ -75,7 +75,7 @@ Orientation OrientationVote::result(int known_up) const {
   out.up_sure = 1;
   out.facing = (known_up + 2) % 6;
   out.facing_sure = 1.0 / 4;
-  const auto& facing = facing_[static_cast<size_t>(out.up)];
+  const auto& facing = facing_[out.up];
   double total = 0, most = -1;
   for (const double x : facing) total += x;
   if (!(total > 0)) return out;
@@ -83,7 +83,7 @@ Orientation OrientationVote::result(int known_up) const {
   for (int quarter = 0; quarter < 4; ++quarter) {
     double mass = 0;
     for (int d = -kQuarter / 2; d <= kQuarter / 2; ++d)
-      mass += facing[static_cast<size_t>((quarter * kQuarter + d + kHeadings) % kHeadings)] *
+      mass += facing[(quarter * kQuarter + d + kHeadings) % kHeadings] *
               (std::abs(d) == kQuarter / 2 ? 0.5 : 1.0);
     if (mass > most) most = mass, best = quarter;
   }
@@ -91,7 +91,7 @@ Orientation OrientationVote::result(int known_up) const {
   out.facing_sure = most / total;
   double mass = 0;
   for (int d = -kQuarter / 2; d <= kQuarter / 2; ++d) {
-    const double p = facing[static_cast<size_t>((best * kQuarter + d + kHeadings) % kHeadings)];
+    const double p = facing[(best * kQuarter + d + kHeadings) % kHeadings];
     out.turned += p * d * 360 / kHeadings;
     mass += p;
   }

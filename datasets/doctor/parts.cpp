@@ -10,6 +10,7 @@
 
 #include "datasets/doctor/orientation_model.h"
 #include "datasets/doctor/planes.h"
+#include "datasets/doctor/shape.h"
 
 namespace restage {
 namespace {
@@ -44,12 +45,6 @@ std::vector<float> loneliness(const Tree& tree, const Points& points) {
     out[i] = n > 0 ? std::sqrt(squared[n - 1]) : 0;
   }
   return out;
-}
-
-float median(std::vector<float> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 struct Neighbourhood {
@@ -153,7 +148,7 @@ std::vector<size_t> evenly_spread(const Points& points) {
     const Point p = edge > 0 ? Point((points[i] - cloud.middle) / edge) : Point::Zero();
     std::array<int64_t, 3> cube;  // rounded, not cut: turning the axes round changes nothing
     for (int axis = 0; axis < 3; ++axis)
-      cube[static_cast<size_t>(axis)] = std::llround(std::clamp(p[axis], -1e9f, 1e9f));
+      cube[axis] = std::llround(std::clamp(p[axis], -1e9f, 1e9f));
     if (!(edge > 0) || taken.insert(cube).second) out.push_back(i);
   }
   if (out.size() <= kMostJudged) return out;

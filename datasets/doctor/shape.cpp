@@ -1,6 +1,5 @@
 #include "datasets/doctor/shape.h"
 
-#include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
@@ -20,9 +19,7 @@ constexpr double kNoPerson = 0.0111;  // density of "no person, or another unit"
 /// A mesh whose surface can be sampled.
 bool has_area(const Mesh& mesh) {
   return std::any_of(mesh.faces.begin(), mesh.faces.end(), [&](const Triangle& f) {
-    const auto at = [&](int k) {
-      return mesh.vertices[static_cast<size_t>(f[static_cast<size_t>(k)])];
-    };
+    const auto at = [&](int k) { return mesh.vertices[f[k]]; };
     const float area = (at(1) - at(0)).cross(at(2) - at(0)).norm();
     return area > 0 && std::isfinite(area);
   });
@@ -113,21 +110,18 @@ UnitGuess guess_unit(double size) {
   return out;
 }
 
-double median(std::vector<double> values) {
+double quantile(std::vector<double> values, double q) {
   if (values.empty()) return 0;
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
 }
 
 double quantile(const Points& points, const Vec3& axis, double q) {
-  if (points.empty()) return 0;
   std::vector<double> along;
   for (const Point& p : points) along.push_back(axis.dot(p.cast<double>()));
-  const auto at =
-      along.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(along.size() - 1));
-  std::nth_element(along.begin(), at, along.end());
-  return *at;
+  return quantile(std::move(along), q);
 }
 
 double one_sidedness(const Points& points, double spacing) {

@@ -3,10 +3,10 @@
 #include <cmath>
 #include <map>
 
-#include "autograd/base/error.h"
 #include "autograd/base/parallel.h"
 #include "datasets/hdf5/file.h"
 #include "datasets/importers/source_motion.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
 namespace {
@@ -43,7 +43,7 @@ CmuSkeleton read_skeleton(const h5::File& file, const std::string& name) {
   s.offsets = read_points(file, group + "/offsets", n);
   s.ends = read_points(file, group + "/end_offsets", n);
   s.has_end.assign(s.names.size(), 1);
-  out.map = map_joints(s, file.path() + ":" + group);
+  out.map = name_joints(s, file.path() + ":" + group).map;
   out.rest = rest_joints(s, out.map);
   return out;
 }
@@ -51,7 +51,7 @@ CmuSkeleton read_skeleton(const h5::File& file, const std::string& name) {
 std::string need_text(const h5::File& file, const std::string& group, const char* name) {
   const auto value = file.text(group, name);
   if (!value)
-    throw InputError(file.path() + ":" + group, "has no attribute '" + std::string(name) + "'",
+    throw InputError(file.path() + ":" + group, cat("has no attribute '", name, "'"),
                      "fetch the file again");
   return *value;
 }
@@ -110,16 +110,11 @@ CmuClip convert(const RawClip& raw, bool with_joints, const std::string& where) 
     for (size_t j = 0; j < n; ++j) one.local[0][j] = unpack(&raw.rotations[(f * n + j) * 4], where);
     one.position[0][0] = Vec3(raw.root[3 * f], raw.root[3 * f + 1], raw.root[3 * f + 2]);
     if (!one.position[0][0].allFinite())
-      throw InputError(where, "frame " + std::to_string(f) + " has no finite position",
-                       "fetch it again");
+      throw InputError(where, cat("frame ", f, " has no finite position"), "fetch it again");
     poses[f] = source_pose(one, raw.skeleton->map, 0);
     if (with_joints) out.joints.push_back(poses[f].joints);
   }
-  out.motion = to_motion(poses, raw.skeleton->rest, raw.floor_y);
-  out.motion.id = raw.labels.id;
-  out.motion.subject = raw.labels.subject;
-  out.motion.split = raw.labels.split;
-  out.motion.action = raw.labels.action;
+  out.motion = to_motion(poses, raw.skeleton->rest, raw.floor_y, raw.labels);
   return out;
 }
 

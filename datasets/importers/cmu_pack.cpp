@@ -9,11 +9,11 @@
 #include <string_view>
 
 #include "autograd/base/atomic_file.h"
-#include "autograd/base/error.h"
 #include "autograd/base/interrupt.h"
 #include "datasets/hdf5/file.h"
 #include "datasets/importers/amc.h"
 #include "datasets/importers/bvh.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/folders.h"
 #include "datasets/readers/packed_text.h"
 #include "datasets/readers/sha256.h"
@@ -69,8 +69,8 @@ PackedClip pack_clip(const Recording& recording, const CmuOriginal& entry,
   const size_t joints = motion.skeleton.size();
   if (entry.first + entry.frames > motion.local.size())
     throw InputError(where,
-                     "has " + std::to_string(motion.local.size()) + " frames, clip " + entry.clip +
-                         " ends with frame " + std::to_string(entry.first + entry.frames),
+                     cat("has ", motion.local.size(), " frames, clip ", entry.clip,
+                         " ends with frame ", entry.first + entry.frames),
                      "fetch it again");
   PackedClip out;
   out.names = motion.skeleton.names;
@@ -243,7 +243,7 @@ CmuOriginals read_cmu_originals(const std::string& list) {
   std::string line;
   for (size_t number = 1; std::getline(lines, line); ++number) {
     if (line.find_first_not_of(" \t\r") == std::string::npos || line[0] == '#') continue;
-    const std::string where = list + ":" + std::to_string(number);
+    const std::string where = cat(list, ":", number);
     std::istringstream words(line);
     if (line[0] != '@') {
       out.clips.push_back(clip_of(words, where));

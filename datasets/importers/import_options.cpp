@@ -1,8 +1,8 @@
 // Which options belong to which kind of input (--force, a permission, goes with all).
 #include <algorithm>
 
-#include "autograd/base/error.h"
 #include "datasets/importers/import_detail.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
 namespace {
@@ -61,10 +61,9 @@ void check_options(const Kinds& kinds, const std::string& source, const ImportOp
     const bool taken = std::any_of(kinds.begin(), kinds.end(),
                                    [&](InputKind kind) { return one.takers.count(kind) > 0; });
     if (one.given && !taken)
-      throw InputError(
-          source,
-          std::string("has nothing to do with ") + one.option + ", which is for " + one.whose,
-          std::string("leave ") + one.option + " out");
+      throw InputError(source,
+                       cat("has nothing to do with ", one.option, ", which is for ", one.whose),
+                       cat("leave ", one.option, " out"));
   }
 }
 

@@ -1,10 +1,9 @@
 #include "datasets/importers/makehuman.h"
 
 #include <algorithm>
-#include <cmath>
 
-#include "autograd/base/error.h"
 #include "datasets/hdf5/file.h"
+#include "datasets/readers/errors.h"
 #include "nn/geometry/skinning.h"
 
 namespace restage {
@@ -26,7 +25,7 @@ void check_indices(const std::vector<int32_t>& values, size_t limit, int32_t low
                    const std::string& where) {
   for (const int32_t v : values)
     if (v < lowest || (v >= 0 && static_cast<size_t>(v) >= limit))
-      broken(where, "holds the index " + std::to_string(v) + " of " + std::to_string(limit));
+      broken(where, cat("holds the index ", v, " of ", limit));
 }
 
 /// From the rest joints to a posed skeleton, in place.
@@ -130,7 +129,7 @@ void MakeHuman::read_rig(const h5::File& file) {
   }
   for (const char* name : kBones)
     if (heads_[bone_index(name)].empty())
-      broken(path_ + ":/rig/head_vertices", "has no head of " + std::string(name));
+      broken(path_ + ":/rig/head_vertices", cat("has no head of ", name));
 
   read_weights(file, joint);
 }

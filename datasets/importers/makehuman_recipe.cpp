@@ -5,8 +5,8 @@
 #include <set>
 
 #include "autograd/base/atomic_file.h"
-#include "autograd/base/error.h"
 #include "datasets/importers/makehuman.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
 namespace {
@@ -39,9 +39,7 @@ double slider_value(const std::string& text, const std::string& column, const st
 BodyRecipe recipe_of(const std::vector<std::string>& header, const std::vector<std::string>& cells,
                      const std::string& where) {
   if (cells.size() != header.size())
-    throw InputError(where,
-                     "has " + std::to_string(cells.size()) + " columns, the header has " +
-                         std::to_string(header.size()),
+    throw InputError(where, cat("has ", cells.size(), " columns, the header has ", header.size()),
                      "mend the row");
   BodyRecipe out;
   for (size_t c = 0; c < header.size(); ++c) {
@@ -116,7 +114,7 @@ std::vector<BodyRecipe> read_recipes(const std::string& csv) {
     const size_t end = std::min(text.find('\n', at), text.size());
     const std::string_view line = std::string_view(text).substr(at, end - at);
     at = end + 1;
-    const std::string where = csv + ":" + std::to_string(++number);
+    const std::string where = cat(csv, ":", ++number);
     if (line.find_first_not_of(" \r\t") == std::string_view::npos) continue;
     if (!header.empty()) {
       out.push_back(recipe_of(header, split_line(line), where));
@@ -131,7 +129,7 @@ std::vector<BodyRecipe> read_recipes(const std::string& csv) {
     header = split_line(line);
     for (const char* name : kMacros)
       if (std::find(header.begin(), header.end(), name) == header.end())
-        throw InputError(where, "has no column '" + std::string(name) + "'", "give a bodies.csv");
+        throw InputError(where, cat("has no column '", name, "'"), "give a bodies.csv");
   }
   if (out.empty()) throw InputError(csv, "holds no bodies", "give a bodies.csv with rows");
   return out;

@@ -1,12 +1,10 @@
 #include "datasets/importers/motion_clip.h"
 
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 
-#include "autograd/base/error.h"
 #include "autograd/base/format.h"
-#include "datasets/importers/length_units.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/word_lines.h"
 
 namespace restage {
@@ -54,9 +52,8 @@ void check_root(const SourceMotion& motion, double limit, const std::string& pat
     const double speed = step.norm() * motion.fps;
     if (speed > limit)
       throw InputError(path,
-                       "the root jumps " + format("%.4g", step.norm()) + " m from frame " +
-                           std::to_string(f - 1) + " to " + std::to_string(f) + " (" +
-                           format("%.4g", speed) + " m/s)",
+                       cat("the root jumps ", format("%.4g", step.norm()), " m from frame ", f - 1,
+                           " to ", f, " (", format("%.4g", speed), " m/s)"),
                        "the recording is broken there: cut it, or check frame rate and scale");
   }
 }
@@ -91,16 +88,14 @@ void cut_frames(SourceMotion& motion, const Profile& profile, const MotionOption
   const size_t first =
       asked ? static_cast<size_t>(options.drop_leading) : lead_of(motion.local, profile);
   if (first >= n)
-    throw InputError(path, "has only " + std::to_string(n) + " frames",
-                     "leave out fewer at its beginning");
+    throw InputError(path, cat("has only ", n, " frames"), "leave out fewer at its beginning");
   const size_t count = options.keep_frames ? std::min(options.keep_frames, n - first) : n - first;
   if (first > 0)
     report.fact("beginning",
-                std::to_string(first) + (first == 1 ? " frame" : " frames") + " left out, " +
-                    (asked ? "as asked"
-                           : std::string("a T-pose") + (first > 1 ? " and a blend out of it" : "") +
-                                 " that " + profile.title +
-                                 " files begin with (--drop-leading 0 keeps it)"));
+                cat(first, first == 1 ? " frame" : " frames", " left out, ",
+                    asked ? "as asked"
+                          : cat("a T-pose", first > 1 ? " and a blend out of it" : "", " that ",
+                                profile.title, " files begin with (--drop-leading 0 keeps it)")));
   const auto cut = [&](auto& frames) {
     frames.erase(frames.begin() + static_cast<std::ptrdiff_t>(first + count), frames.end());
     frames.erase(frames.begin(), frames.begin() + static_cast<std::ptrdiff_t>(first));
@@ -138,13 +133,12 @@ std::string subject_of(const std::string& name, const std::string& id) {
 }
 
 void report_names(const Recording& recording, ImportReport& report) {
-  report.fact("format", recording.format + ", " + std::to_string(recording.motion.skeleton.size()) +
-                            " joints, " + std::to_string(recording.motion.local.size()) +
-                            " frames");
+  report.fact("format", cat(recording.format, ", ", recording.motion.skeleton.size(), " joints, ",
+                            recording.motion.local.size(), " frames"));
   const Profile& profile = *recording.names.profile;
   std::string placed;
   for (const int j : recording.names.placed)
-    placed += (placed.empty() ? "; placed: " : ", ") + std::string(kJointNames[j]);
+    placed += cat(placed.empty() ? "; placed: " : ", ", kJointNames[j]);
   report.fact("names", profile.title + " (profile " + profile.name + ")" + placed);
 }
 
@@ -152,9 +146,8 @@ void report_names(const Recording& recording, ImportReport& report) {
 void report_positions(const BonePositions& found, double scale, ImportReport& report) {
   constexpr double kSeen = 0.001;  // metres
   if (found.off_offset * scale > kSeen)
-    report.fact("offsets", "by the position channels of " + std::to_string(found.joints) +
-                               " joints, up to " + format("%.3f", found.off_offset * scale) +
-                               " m from OFFSET");
+    report.fact("offsets", cat("by the position channels of ", found.joints, " joints, up to ",
+                               format("%.3f", found.off_offset * scale), " m from OFFSET"));
   if (found.stray * scale > kSeen)
     report.remark("the position channels stretch bones: " + found.stray_joint + " strays up to " +
                   format("%.3f", found.stray * scale) + " m from its mean place, which is taken");
@@ -197,9 +190,8 @@ MotionClip make_clip(Recording recording, const std::string& path, const MotionO
   const Poses poses = poses_at_30_fps(std::move(motion), map, rest, recording.bytes, path);
   clip.joints.reserve(poses.size());
   report.fact("rate", (fps == kFps ? "30 fps, taken as they are"
-                                   : format("%.6g", fps) +
-                                         " fps -> 30 fps, slerp: " + std::to_string(frames) +
-                                         " frames -> " + std::to_string(poses.size())) +
+                                   : cat(format("%.6g", fps), " fps -> 30 fps, slerp: ", frames,
+                                         " frames -> ", poses.size())) +
                           (options.fps > 0        ? " (as given; " + recording.rate_of_file + ")"
                            : recording.rate_known ? std::string()
                                                   : " (" + recording.rate_of_file + ")"));

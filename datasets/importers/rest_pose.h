@@ -3,7 +3,6 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include "datasets/importers/axis.h"
 #include "datasets/importers/report.h"
@@ -29,6 +28,18 @@ struct RestPose {
   Rotations frame;  ///< from the T-pose to the joint's axes at zero rotations
   Mat3 align;       ///< from the file's axes to ours
 };
+
+/// A thigh, shin, upper arm or forearm of a T-pose and where it points.
+struct Limb {
+  int from, to;
+  Vec3 wanted;
+};
+const std::vector<Limb>& t_pose_limbs();
+
+/// A rest pose whose left and right are exchanged makes a mirror image of every motion: InputError
+/// in the doctor's words, or a remark if it is forced. `rest` in our frame.
+void check_handedness(const Joints& rest, bool force, const std::string& path,
+                      ImportReport& report);
 
 /// The zero pose (or the frame asked for), turned with the whole world so that the person stands
 /// upright and faces +z. A zero pose with a limb more than 120 degrees off a T-pose's (LAFAN1, some

@@ -3,12 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
-namespace {
 
-/// Zero-pose positions of all source joints.
 std::vector<Vec3> zero_positions(const SourceSkeleton& skeleton) {
   std::vector<Vec3> out(skeleton.size());
   for (size_t j = 0; j < out.size(); ++j) {
@@ -17,8 +15,6 @@ std::vector<Vec3> zero_positions(const SourceSkeleton& skeleton) {
   }
   return out;
 }
-
-}  // namespace
 
 Joints rest_joints(const SourceSkeleton& skeleton, const JointMap& map) {
   const std::vector<Vec3> zero = zero_positions(skeleton);
@@ -36,8 +32,8 @@ void check_length(size_t frames, size_t joints, double fps, uint64_t bytes,
   // 22 positions of a frame are 528 bytes; a joint's three angles take at least 6 in a text.
   if (most > 100'000 + payload / 66 || most * static_cast<double>(joints) > 6e6 + payload / 2)
     throw InputError(path,
-                     "would make " + std::to_string(static_cast<int64_t>(most)) + " frames of " +
-                         std::to_string(joints) + " joints, far more than is in the file",
+                     cat("would make ", static_cast<int64_t>(most), " frames of ", joints,
+                         " joints, far more than is in the file"),
                      "check its frame rate, or cut it");
 }
 
@@ -113,8 +109,8 @@ double floor_height(const Poses& poses) {
   return floor_height(std::move(lowest));
 }
 
-Motion to_motion(const Poses& poses, const Joints& rest, double floor_y) {
-  Motion out;
+Motion to_motion(const Poses& poses, const Joints& rest, double floor_y, Motion named) {
+  Motion out = std::move(named);
   out.rest = rest;
   out.global.resize(poses.size());
   out.hips.resize(poses.size());

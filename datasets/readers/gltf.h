@@ -23,6 +23,9 @@ struct GltfNode {
   Vec3 translation = Vec3::Zero();
   Quat rotation = Quat::Identity();
   Vec3 scale = Vec3::Ones();
+  Eigen::Affine3d local() const {
+    return Eigen::Affine3d().fromPositionOrientationScale(translation, rotation, scale);
+  }
 };
 
 /// What moves vertices: a node, seen from the space in which the vertices are stored.

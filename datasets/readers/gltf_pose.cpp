@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/gltf.h"
 #include "datasets/readers/text.h"
 
@@ -63,10 +63,8 @@ Eigen::Vector4d value_at(const GltfTrack& track, const Between& at) {
 GltfTransforms to_world(const std::vector<GltfNode>& nodes) {
   GltfTransforms out(nodes.size());
   for (size_t n = 0; n < nodes.size(); ++n) {
-    const GltfNode& node = nodes[n];
-    Eigen::Affine3d local;
-    local.fromPositionOrientationScale(node.translation, node.rotation, node.scale);
-    out[n] = node.parent < 0 ? local : out[node.parent] * local;
+    const int p = nodes[n].parent;
+    out[n] = p < 0 ? nodes[n].local() : out[p] * nodes[n].local();
   }
   return out;
 }
@@ -102,7 +100,7 @@ void gltf_skin(const Gltf& file, const GltfTransforms& nodes, Points& out) {
     const Eigen::Vector4d at = file.vertices[v].cast<double>().homogeneous();
     out[v] = (sum * at).cast<float>();
     if (!out[v].allFinite())
-      throw InputError(file.path, "its transforms put vertex " + std::to_string(v) + " nowhere",
+      throw InputError(file.path, cat("its transforms put vertex ", v, " nowhere"),
                        "export it again with finite scales");
   }
 }

@@ -1,9 +1,8 @@
-#include "datasets/readers/ply.h"
-
 #include <array>
 #include <cmath>
 
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
+#include "datasets/readers/mesh_parsers.h"
 #include "datasets/readers/numbers.h"
 #include "datasets/readers/text.h"
 
@@ -46,9 +45,7 @@ const Number* number_named(std::string_view name) {
   return nullptr;
 }
 
-std::string at_line(const std::string& path, int64_t line) {
-  return path + ":" + std::to_string(line);
-}
+std::string at_line(const std::string& path, int64_t line) { return cat(path, ":", line); }
 
 // ---- header ------------------------------------------------------------------------------------
 
@@ -170,9 +167,8 @@ class Rows {
   }
 
   std::string where() const {
-    return format_ == Format::ascii
-               ? at_line(path_, lines_.number())
-               : path_ + ":" + element_->name.substr(0, 40) + " " + std::to_string(row_ - 1);
+    return format_ == Format::ascii ? at_line(path_, lines_.number())
+                                    : cat(path_, ":", element_->name.substr(0, 40), " ", row_ - 1);
   }
 
  private:
@@ -195,8 +191,8 @@ class Rows {
 
   [[noreturn]] void throw_short() const {
     throw InputError(path_,
-                     "is cut short: element " + text::quote(element_->name) + " should have " +
-                         std::to_string(element_->count) + " rows",
+                     cat("is cut short: element ", text::quote(element_->name), " should have ",
+                         element_->count, " rows"),
                      kExportAgain);
   }
 

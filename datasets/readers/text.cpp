@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 
 #include "autograd/base/error.h"
 #include "datasets/readers/word_lines.h"
