@@ -105,7 +105,7 @@ std::vector<Body> builtin_bodies(uint64_t seed, int train, int validation, int t
   if (train < 0 || validation < 0 || test < 0)
     throw InputError("builtin bodies", "a negative count", "ask for 0 or more bodies per split");
   std::vector<Body> out(static_cast<size_t>(train) + validation + test);
-  parallel_for(static_cast<int64_t>(out.size()), 1, [&](int64_t begin, int64_t end) {
+  parallel_for(out.size(), 1, [&](int64_t begin, int64_t end) {
     for (int64_t i = begin; i < end; ++i) {
       if (i < train)
         out[i] = builtin_body(seed, "train", static_cast<int>(i));

@@ -124,12 +124,6 @@ std::vector<PosedSkeleton> posed_frames(const Choreography& p, const Temper& tem
   return frames;
 }
 
-void check_split(const std::string& split) {
-  if (split != "train" && split != "validation" && split != "test")
-    throw InputError("builtin motions", "unknown split \"" + split + "\"",
-                     "use train, validation or test");
-}
-
 }  // namespace
 
 const std::vector<std::string>& builtin_actions() {
@@ -142,7 +136,9 @@ const std::vector<std::string>& builtin_actions() {
 }
 
 Motion builtin_motion(uint64_t seed, const std::string& split, int index) {
-  check_split(split);
+  if (split != "train" && split != "validation" && split != "test")
+    throw InputError("builtin motions", "unknown split \"" + split + "\"",
+                     "use train, validation or test");
   if (index < 0)
     throw InputError("builtin motions", cat("negative motion number ", index), "count from 0");
   const RngKey key = motion_key(seed, split);

@@ -47,8 +47,8 @@ Diagnosis doctor_detail::judge_surface(const Mesh& mesh, const PersonShape& shap
                                        const ExamineOptions& options) {
   Diagnosis d;
   d.kind = mesh.faces.empty() ? "cloud" : "mesh";
-  d.faces = static_cast<int64_t>(mesh.faces.size());
-  d.fewest_points = d.most_points = static_cast<int64_t>(mesh.vertices.size());
+  d.faces = mesh.faces.size();
+  d.fewest_points = d.most_points = mesh.vertices.size();
   judge_points(d, mesh.vertices.size() - equal);
   Seen seen;
   seen.vote.add(shape.points);
@@ -98,10 +98,7 @@ Finding examine_skeletons(const std::vector<Joints>& frames) {
 
 std::optional<bool> is_mirrored(const Joints& joints, const Vec3& up) {
   Vec3 toes = Vec3::Zero();
-  for (const int side : {0, 1}) {
-    const auto ankle = static_cast<size_t>(7 + side), foot = static_cast<size_t>(10 + side);
-    toes += joints[foot] - joints[ankle];
-  }
+  for (const int side : {0, 1}) toes += joints[10 + side] - joints[7 + side];
   const Vec3 left = joints[1] - joints[2] + joints[16] - joints[17];
   const Vec3 forward = toes - toes.dot(up) * up;
   if (!(forward.norm() > 0.25 * toes.norm())) return std::nullopt;  // on tiptoe: noise

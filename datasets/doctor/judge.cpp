@@ -27,7 +27,7 @@ void recognise(Diagnosis& d, const Seen& seen, const ExamineOptions& options) {
   if (d.unit.unit.metres != 1)
     d.unit.sure *= std::max(0.0, (d.orientation.up_sure - by_chance) / (1 - by_chance)) *
                    (1 - seen.stray_share);
-  if (options.scale) d.unit = {{"", *options.scale}, 1, d.unit.deviation};
+  if (options.scale) d.unit = {{"", *options.scale}, 1};
   if (options.up) d.orientation = seen.vote.result(*options.up);
   if (!options.facing) return;
   if (*options.facing / 2 == d.orientation.up / 2)

@@ -58,14 +58,10 @@ void OrientationVote::add(const Points& cloud, bool faces) {
   ++clouds_;
 }
 
-double OrientationVote::up(int index) const {
-  return clouds_ > 0 ? up_[index] / clouds_ : 1.0 / kUps;
-}
-
 Orientation OrientationVote::result() const {
   const int best = static_cast<int>(std::max_element(up_.begin(), up_.end()) - up_.begin());
   Orientation out = result(clouds_ > 0 ? best : 2);
-  out.up_sure = up(out.up);
+  out.up_sure = clouds_ > 0 ? up_[best] / clouds_ : 1.0 / kUps;
   return out;
 }
 
@@ -79,21 +75,23 @@ Orientation OrientationVote::result(int known_up) const {
   double total = 0, most = -1;
   for (const double x : facing) total += x;
   if (!(total > 0)) return out;
+  // Of the heading that is `d` from the middle of a quarter.
+  const auto near = [&](int quarter, int d) {
+    return facing[(quarter * kQuarter + d + kHeadings) % kHeadings];
+  };
   int best = 0;
   for (int quarter = 0; quarter < 4; ++quarter) {
     double mass = 0;
     for (int d = -kQuarter / 2; d <= kQuarter / 2; ++d)
-      mass += facing[(quarter * kQuarter + d + kHeadings) % kHeadings] *
-              (std::abs(d) == kQuarter / 2 ? 0.5 : 1.0);
+      mass += near(quarter, d) * (std::abs(d) == kQuarter / 2 ? 0.5 : 1.0);
     if (mass > most) most = mass, best = quarter;
   }
   out.facing = index_of(hypothesis(out.up, best * kQuarter).row(2).transpose().cast<double>());
   out.facing_sure = most / total;
   double mass = 0;
   for (int d = -kQuarter / 2; d <= kQuarter / 2; ++d) {
-    const double p = facing[(best * kQuarter + d + kHeadings) % kHeadings];
-    out.turned += p * d * 360 / kHeadings;
-    mass += p;
+    out.turned += near(best, d) * d * 360 / kHeadings;
+    mass += near(best, d);
   }
   out.turned /= mass;
   return out;

@@ -31,8 +31,6 @@ class OrientationVote {
   Orientation result() const;
   /// The same where `up` is known.
   Orientation result(int up) const;
-  /// Probability that direction `index` is up.
-  double up(int index) const;
 
  private:
   static constexpr int kHeadings = 24;

@@ -99,10 +99,7 @@ const OrientationNet& orientation_net() {
 }
 
 Eigen::Matrix3f hypothesis(int up, int heading) {
-  const int axis = up / 2;
-  Vec3 y = Vec3::Zero(), z = Vec3::Zero();
-  y[axis] = up % 2 == 0 ? 1 : -1;
-  z[(axis + 1) % 3] = 1;
+  const Vec3 y = direction(up), z = Vec3::Unit((up / 2 + 1) % 3);
   Mat3 stand;  // rows: across, up, forward
   stand << y.cross(z).transpose(), y.transpose(), z.transpose();
   Mat3 turn = turn_about_y(-2 * std::numbers::pi * heading / kHeadings) * stand;

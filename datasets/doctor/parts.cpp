@@ -157,6 +157,20 @@ std::vector<size_t> evenly_spread(const Points& points) {
   return out;
 }
 
+/// Of points without a floor and walls.
+Parts find_pieces(const Points& points) {
+  if (points.empty()) return {};
+  const std::vector<size_t> judged = evenly_spread(points);
+  Points some;
+  for (const size_t i : judged) some.push_back(points[i]);
+  Parts out = judge(some);
+  out.judged = judged;
+  if (judged.size() < points.size()) out.part = parts_at(points, some, out);
+  out.stray = static_cast<size_t>(std::count(out.part.begin(), out.part.end(), Part::stray));
+  out.other = static_cast<size_t>(std::count(out.part.begin(), out.part.end(), Part::other));
+  return out;
+}
+
 }  // namespace
 
 Pieces::Pieces(size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), size_t{0}); }
@@ -176,24 +190,6 @@ std::vector<Part> parts_at(const Points& others, const Points& points, const Par
   }
   return out;
 }
-
-namespace {
-
-/// Of points without a floor and walls.
-Parts find_pieces(const Points& points) {
-  if (points.empty()) return {};
-  const std::vector<size_t> judged = evenly_spread(points);
-  Points some;
-  for (const size_t i : judged) some.push_back(points[i]);
-  Parts out = judge(some);
-  out.judged = judged;
-  if (judged.size() < points.size()) out.part = parts_at(points, some, out);
-  out.stray = static_cast<size_t>(std::count(out.part.begin(), out.part.end(), Part::stray));
-  out.other = static_cast<size_t>(std::count(out.part.begin(), out.part.end(), Part::other));
-  return out;
-}
-
-}  // namespace
 
 Parts find_parts(const Points& points) {
   const Planes planes = find_planes(points);

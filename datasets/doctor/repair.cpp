@@ -17,7 +17,7 @@ std::vector<bool> points_to_keep(const Points& points) {
 std::vector<bool> vertices_to_keep(const Mesh& mesh) {
   Pieces pieces(mesh.vertices.size());
   for (const Triangle& f : mesh.faces)
-    for (const size_t k : {1, 2}) pieces.join(static_cast<size_t>(f[0]), static_cast<size_t>(f[k]));
+    for (const size_t k : {1, 2}) pieces.join(f[0], f[k]);
   const std::vector<size_t> first = first_equals(mesh.vertices);
   for (size_t i = 0; i < first.size(); ++i) pieces.join(first[i], i);
 

@@ -42,7 +42,7 @@ class Sequence {
     d_.kind = "frames";
     d_.fps = source_.fps();
     read();
-    d_.frames = static_cast<int64_t>(frames_.size());
+    d_.frames = frames_.size();
     d_.sequences = frames_.back().sequence + 1;
     d_.shown = worst_ ? worst_frame_ : stray_frame_;
     seen_.size = median(sizes_);
@@ -55,7 +55,7 @@ class Sequence {
     judge_up(d_, looked_);
     judge_walk();
     judge_facing(d_, false);
-    const auto up = static_cast<size_t>(d_.orientation.up);
+    const int up = d_.orientation.up;
     std::vector<double> low;
     double high = -1e300;
     for (const auto& ends : ends_) {
@@ -144,10 +144,10 @@ class Sequence {
     d_.fewest_points = INT64_MAX;
     Mesh before;
     for (int64_t i = 0; auto frame = source_.next(); ++i) {
-      const auto n = static_cast<int64_t>(frame->points.size());
+      const int64_t n = frame->points.size();
       d_.fewest_points = std::min(d_.fewest_points, n);
       d_.most_points = std::max(d_.most_points, n);
-      d_.faces = static_cast<int64_t>(frame->faces.size());
+      d_.faces = frame->faces.size();
       non_finite_ += frame->left_out;
       non_finite_frames_ += frame->left_out > 0;
       const Points once = without_repeats(frame->points);
@@ -174,7 +174,7 @@ class Sequence {
     for (size_t i = 1; i < frames_.size(); ++i) {
       const double ratio = double{frames_[i].size} / frames_[i - 1].size;
       if (!jumps(frames_[i - 1].size, frames_[i].size)) continue;
-      at.push_back(static_cast<int64_t>(i));
+      at.push_back(i);
       if (std::abs(std::log(ratio)) > std::abs(std::log(factor))) factor = ratio;
     }
     if (at.empty()) return true;
@@ -184,7 +184,7 @@ class Sequence {
       for (size_t i = begin; i < end; ++i) sizes.push_back(double{frames_[i].size});
       return median(std::move(sizes));
     };
-    const auto turn = static_cast<size_t>(at[0]);
+    const size_t turn = at[0];
     const bool lasts = jumps(size_of(0, turn), size_of(turn, frames_.size()));
     d_.say({"sizes", lasts ? Weight::wrong : Weight::note,
             "the size changes " + number(std::max(factor, 1 / factor)) + " times before " +
@@ -226,8 +226,8 @@ class Sequence {
     for (size_t i = 1; i < frames_.size(); ++i) {
       if (frames_[i].content == frames_[i - 1].content &&
           frames_[i].sequence == frames_[i - 1].sequence) {
-        at.push_back(static_cast<int64_t>(i));
-        d_.repeated.insert(static_cast<int64_t>(i));
+        at.push_back(i);
+        d_.repeated.insert(i);
         ++runs.back();
       } else {
         runs.push_back(1);
@@ -269,7 +269,7 @@ class Sequence {
     for (size_t i = 1; i < frames_.size(); ++i) {
       const int64_t ahead = (frames_[i].number - frames_[i - 1].number) / usual;
       if (ahead <= 1) continue;
-      d_.gap[static_cast<int64_t>(i)] = ahead - 1;
+      d_.gap[i] = ahead - 1;
       missing += ahead - 1;
       filled = filled && d_.is_filled(ahead - 1);
       at.push_back(frames_[i].number);
@@ -277,9 +277,8 @@ class Sequence {
     if (missing > 0)
       d_.say(
           {"missing frames", Weight::note,
-           counted(static_cast<size_t>(missing), "number") +
-               " missing in the files' names, before " + frame_list(at),
-           1, "the numbering has gaps",
+           counted(missing, "number") + " missing in the files' names, before " + frame_list(at), 1,
+           "the numbering has gaps",
            filled
                ? "--fix puts the nearest frame in their place, so that the timing is right"
                : "--fix fills gaps of up to a second with the nearest frame; cut the sequence at "
@@ -289,8 +288,7 @@ class Sequence {
   void judge_jumps() {
     std::vector<double> steps(frames_.size(), -1);  // -1: the first of a sequence, or a repetition
     for (size_t i = 1; i < frames_.size(); ++i)
-      if (frames_[i].sequence == frames_[i - 1].sequence &&
-          !d_.repeated.contains(static_cast<int64_t>(i)))
+      if (frames_[i].sequence == frames_[i - 1].sequence && !d_.repeated.contains(i))
         steps[i] = step(frames_[i], frames_[i - 1]) * metres();
     std::vector<int64_t> at;
     for (int64_t i = 1; i < std::ssize(steps); ++i) {
@@ -318,8 +316,7 @@ class Sequence {
   void judge_speed() {
     std::vector<double> speeds;
     for (size_t i = 1; i < frames_.size(); ++i)
-      if (frames_[i].sequence == frames_[i - 1].sequence &&
-          !d_.repeated.contains(static_cast<int64_t>(i)))
+      if (frames_[i].sequence == frames_[i - 1].sequence && !d_.repeated.contains(i))
         speeds.push_back((frames_[i].middle - frames_[i - 1].middle).norm() * metres() * d_.fps);
     Finding f{"frame rate", Weight::fact, number(d_.fps) + " frames a second", 1, "", ""};
     if (speeds.size() < 5 || d_.unit.sure < kUnsure) {

@@ -76,8 +76,7 @@ ShapePoints located_shape_points(const Mesh& mesh) {
   const SurfaceSamples samples =
       SurfaceSampler(body).draw(RngKey{0, 0}.fold("doctor"), kSurfacePoints);
   out.points = samples.on_rest(body);
-  for (size_t i = 0; i < samples.size(); ++i)
-    out.vertex.push_back(static_cast<size_t>(samples.vertices[3 * i]));
+  for (size_t i = 0; i < samples.size(); ++i) out.vertex.push_back(samples.vertices[3 * i]);
   return out;
 }
 
@@ -95,18 +94,14 @@ PersonShape shape_of(const Mesh& mesh) {
 
 UnitGuess guess_unit(double size) {
   UnitGuess out;
-  out.deviation = 1e9;
   if (!(size > 0) || !std::isfinite(size)) return out;
-  double total = kNoPerson;
+  double total = kNoPerson, least = 1e9;
   for (const LengthUnit& unit : kUnits) {
     const double deviation = (std::log(size * unit.metres) - kMeanLogSize) / kDeviation;
     total += std::exp(-0.5 * deviation * deviation);
-    if (std::abs(deviation) < std::abs(out.deviation)) {
-      out.unit = unit;
-      out.deviation = deviation;
-    }
+    if (std::abs(deviation) < std::abs(least)) out.unit = unit, least = deviation;
   }
-  out.sure = std::exp(-0.5 * out.deviation * out.deviation) / total;
+  out.sure = std::exp(-0.5 * least * least) / total;
   return out;
 }
 
@@ -173,9 +168,8 @@ Borders borders(const Mesh& mesh) {
     while (end < edges.size() && edges[end] == edges[i]) ++end;
     if (end - i == 1) {
       ++out.edges;
-      const auto a = static_cast<size_t>(edges[i][0]), b = static_cast<size_t>(edges[i][1]);
-      lines.join(a, b);
-      on_border.insert(on_border.end(), {a, b});
+      lines.join(edges[i][0], edges[i][1]);
+      on_border.insert(on_border.end(), edges[i].begin(), edges[i].end());
     }
     i = end;
   }

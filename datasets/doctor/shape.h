@@ -47,8 +47,7 @@ inline constexpr std::array<LengthUnit, 5> kUnits = {
 
 struct UnitGuess {
   LengthUnit unit = kUnits[0];
-  double sure = 0;       ///< probability; low if no unit makes a person of it
-  double deviation = 0;  ///< from a usual person, in standard deviations
+  double sure = 0;  ///< probability; low if no unit makes a person of it
 };
 /// By PersonShape::size.
 UnitGuess guess_unit(double size);

@@ -34,10 +34,7 @@ std::string text_of(const Npz& file, const char* name, ImportReport& report) {
   if (!file.has(name)) return "";
   try {
     if (!file.header(name).is_text()) return "";
-    std::string out = lower_case(file.array(name).text()).substr(0, 40);
-    for (char& c : out)
-      if (c < 32 || c > 126) c = '?';  // it is printed
-    return out;
+    return WordLines::quoted(lower_case(file.array(name).text()));
   } catch (const InputError& e) {
     report.remark(cat(name, " counts as not stated: ", e.what()));
     return "";

@@ -34,7 +34,7 @@ CmuSkeleton read_skeleton(const h5::File& file, const std::string& name) {
   CmuSkeleton out;
   SourceSkeleton& s = out.skeleton;
   s.names = file.dataset(group + "/names").read_text();
-  const int64_t n = static_cast<int64_t>(s.names.size());
+  const int64_t n = s.names.size();
   s.parents = file.read<int32_t>(group + "/parents", {n});
   for (size_t j = 0; j < s.parents.size(); ++j)
     if (s.parents[j] >= static_cast<int>(j) || s.parents[j] < -1 || (j > 0) != (s.parents[j] >= 0))
@@ -73,7 +73,7 @@ RawClip read_clip(const h5::File& file, const std::string& name,
   const std::string skeleton = need_text(file, group, "skeleton");
   if (skeletons.count(skeleton) == 0) skeletons[skeleton] = read_skeleton(file, skeleton);
   out.skeleton = &skeletons[skeleton];
-  const int64_t joints = static_cast<int64_t>(out.skeleton->skeleton.size());
+  const int64_t joints = out.skeleton->skeleton.size();
   const h5::Dataset rotations = file.dataset(group + "/local_rotations", {-1, joints, 4});
   out.rotations = rotations.read<int16_t>();
   out.root = file.read<double>(group + "/root_translation", {rotations.rows(), 3});
@@ -129,11 +129,9 @@ std::vector<CmuClip> read_cmu(const std::string& path, bool with_joints) {
   std::vector<RawClip> raw;
   for (const std::string& name : names) raw.push_back(read_clip(file, name, skeletons));
   std::vector<CmuClip> out(raw.size());
-  parallel_for(static_cast<int64_t>(raw.size()), 4, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i) {
-      const size_t k = static_cast<size_t>(i);
+  parallel_for(raw.size(), 4, [&](int64_t begin, int64_t end) {
+    for (int64_t k = begin; k < end; ++k)
       out[k] = convert(raw[k], with_joints, path + ":/clips/" + raw[k].name);
-    }
   });
   return out;
 }

@@ -171,7 +171,7 @@ std::string write_skeleton(h5::File& file, const CmuOriginal& entry, const Packe
   const std::string name = kind + "_" + sum_of_skeleton(clip).hex().substr(0, 8);
   const std::string group = "/skeletons/" + name;
   if (file.has(group)) return name;
-  const auto joints = static_cast<int64_t>(clip.parents.size());
+  const int64_t joints = clip.parents.size();
   file.write_text(group + "/names", clip.names);
   file.write<int32_t>(group + "/parents", {joints}, clip.parents);
   file.write<float>(group + "/offsets", {joints, 3}, clip.offsets);
@@ -198,7 +198,7 @@ PackedClip read_packed(const h5::File& file, const std::string& name) {
                     skeleton = "/skeletons/" + file.text(clip, "skeleton").value_or("");
   PackedClip out;
   out.names = file.dataset(skeleton + "/names").read_text();
-  const auto joints = static_cast<int64_t>(out.names.size());
+  const int64_t joints = out.names.size();
   out.parents = file.read<int32_t>(skeleton + "/parents", {joints});
   for (const int32_t parent : out.parents)
     if (parent >= joints) throw InputError(skeleton, "has a parent that is not there", "mend it");

@@ -159,7 +159,7 @@ Character read_character(const std::string& path, const MotionOptions& options,
   const bool loose = !skinned && !file.vertices.empty();
   if (loose && file.clips.empty()) throw_no_skin(path);
   const GltfRig rig = find_rig(file, options, out.report);
-  check_handedness(t_pose_joints(rig), options.force, path, out.report);
+  check_handedness(t_pose_joints(rig), options.force, out.report);
   if (loose) out.report.remark("left out its mesh, which belongs to no skin");
   if (skinned) {
     out.body = body_of(file, rig);
@@ -191,7 +191,7 @@ TargetMesh read_target(const std::string& path) {
     return out;
   }
   const GltfRig rig = find_rig(file, {}, out.report);
-  check_handedness(t_pose_joints(rig), true, path, out.report);
+  check_handedness(t_pose_joints(rig), true, out.report);
   out.mesh = t_pose_mesh(file, rig);
   out.joints = t_pose_joints(rig);
   const Vec3 moved = put_on_floor(out.mesh, (*out.joints)[0]);

@@ -194,8 +194,7 @@ NamedJoints map_names(SourceSkeleton& skeleton, const Profile* profile, const st
 
 // ---- units and axes ----------------------------------------------------------------------------
 
-double find_scale(const Joints& joints, double given, const std::string& path,
-                  ImportReport& report) {
+double find_scale(const Joints& joints, double given, ImportReport& report) {
   const double leg = leg_length(joints);
   double scale = given;
   std::string how = "as given";
@@ -207,7 +206,8 @@ double find_scale(const Joints& joints, double given, const std::string& path,
             : leg >= 1400 && leg < 4000 ? 0.001
                                         : 0.0;
     if (scale == 0)
-      throw InputError(path, "a leg of " + format("%.3g", leg) + " units is no person's in metres",
+      throw InputError(report.file,
+                       "a leg of " + format("%.3g", leg) + " units is no person's in metres",
                        "give --scale (metres per unit)");
     how = scale == 1.0 ? "the format's" : unit_name(scale) + " by the leg";
   }
@@ -356,7 +356,7 @@ GltfRig find_rig(const Gltf& file, const MotionOptions& options, ImportReport& r
   Joints joints;
   for (size_t j = 0; j < kJoints; ++j)
     joints[j] = rig.bind[rig.node[j]].translation() + rig.offset[j];
-  rig.scale = find_scale(joints, options.scale, file.path, report);
+  rig.scale = find_scale(joints, options.scale, report);
   rig.turn = find_up(joints, options.rest.up, report);
   Joints upright;
   for (size_t j = 0; j < kJoints; ++j) upright[j] = rig.to_ours(joints[j]);

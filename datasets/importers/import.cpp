@@ -100,6 +100,21 @@ std::vector<std::string> inputs_of(const std::string& source, const ImportOption
   return out;
 }
 
+/// InputError for an id that another entry has, of this file or of another.
+template <class T>
+void check_ids(const std::string& file, const std::vector<T>& entries, const std::string& what,
+               const std::map<std::string, std::string>& taken) {
+  std::set<std::string> own;
+  for (const T& entry : entries) {
+    const auto at = taken.find(entry.id);
+    if (at == taken.end() && own.insert(entry.id).second) continue;
+    throw InputError(file,
+                     "its " + what + " '" + entry.id.substr(0, 60) + "' has the name of one in " +
+                         (at == taken.end() ? "the same file" : at->second),
+                     "rename one of the two");
+  }
+}
+
 }  // namespace
 
 FileInfo data_folder_info(bool bodies, bool clips) {
@@ -131,24 +146,6 @@ FileInfo file_info(const std::string& source, const ImportOptions& options) {
   info.provenance = "imported from " + absolute_path(source).filename().string();
   return info;
 }
-
-namespace {
-
-template <class T>
-void check_ids(const std::string& file, const std::vector<T>& entries, const std::string& what,
-               const std::map<std::string, std::string>& taken) {
-  std::set<std::string> own;
-  for (const T& entry : entries) {
-    const auto at = taken.find(entry.id);
-    if (at == taken.end() && own.insert(entry.id).second) continue;
-    throw InputError(file,
-                     "its " + what + " '" + entry.id.substr(0, 60) + "' has the name of one in " +
-                         (at == taken.end() ? "the same file" : at->second),
-                     "rename one of the two");
-  }
-}
-
-}  // namespace
 
 void ImportWriter::add(const std::string& file, const std::vector<Body>& bodies,
                        const std::vector<Motion>& motions) {

@@ -7,6 +7,7 @@
 #include "autograd/base/atomic_file.h"
 #include "datasets/importers/makehuman.h"
 #include "datasets/readers/errors.h"
+#include "datasets/readers/text.h"
 
 namespace restage {
 namespace {
@@ -105,16 +106,13 @@ void add_macros(const std::map<std::string, double>& value, TargetWeights& out) 
 }  // namespace
 
 std::vector<BodyRecipe> read_recipes(const std::string& csv) {
-  const std::string text = read_file(csv, uint64_t{64} << 20);
+  const std::string content = read_file(csv, uint64_t{64} << 20);
   std::vector<BodyRecipe> out;
   std::vector<std::string> header;
   std::set<std::string> ids;
-  size_t number = 0;
-  for (size_t at = 0; at < text.size();) {
-    const size_t end = std::min(text.find('\n', at), text.size());
-    const std::string_view line = std::string_view(text).substr(at, end - at);
-    at = end + 1;
-    const std::string where = cat(csv, ":", ++number);
+  text::Lines lines(content);
+  for (std::string_view line; lines.next(line);) {
+    const std::string where = cat(csv, ":", lines.number());
     if (line.find_first_not_of(" \r\t") == std::string_view::npos) continue;
     if (!header.empty()) {
       out.push_back(recipe_of(header, split_line(line), where));

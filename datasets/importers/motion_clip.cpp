@@ -13,8 +13,7 @@ namespace {
 constexpr size_t kMaxFrames = size_t{1} << 20;  // 9.7 hours at 30 fps
 
 /// Metres per unit; see MotionOptions::scale.
-double find_scale(const Recording& recording, double given, const std::string& path,
-                  ImportReport& report) {
+double find_scale(const Recording& recording, double given, ImportReport& report) {
   const double leg = leg_length(rest_joints(recording.motion.skeleton, recording.names.map));
   const auto says = [&](double metres, const std::string& why) {
     report.fact("units", unit_name(metres) + ", " + why + ": a leg of " + format("%.4g", leg) +
@@ -29,7 +28,7 @@ double find_scale(const Recording& recording, double given, const std::string& p
                   " m: found by the leg instead");
   }
   if (const LegUnit* unit = unit_of_leg(leg)) return says(unit->metres, "by the legs");
-  throw InputError(path,
+  throw InputError(report.file,
                    "a leg of " + format("%.4g", leg) + " units is no person's in any known unit",
                    "give the scale (metres per unit)");
 }
@@ -82,13 +81,14 @@ size_t lead_of(const std::vector<std::vector<Quat>>& local, const Profile& profi
 }
 
 void cut_frames(SourceMotion& motion, const Profile& profile, const MotionOptions& options,
-                const std::string& path, ImportReport& report) {
+                ImportReport& report) {
   const size_t n = motion.local.size();
   const bool asked = options.drop_leading >= 0;
   const size_t first =
       asked ? static_cast<size_t>(options.drop_leading) : lead_of(motion.local, profile);
   if (first >= n)
-    throw InputError(path, cat("has only ", n, " frames"), "leave out fewer at its beginning");
+    throw InputError(report.file, cat("has only ", n, " frames"),
+                     "leave out fewer at its beginning");
   const size_t count = options.keep_frames ? std::min(options.keep_frames, n - first) : n - first;
   if (first > 0)
     report.fact("beginning",
@@ -97,8 +97,8 @@ void cut_frames(SourceMotion& motion, const Profile& profile, const MotionOption
                           : cat("a T-pose", first > 1 ? " and a blend out of it" : "", " that ",
                                 profile.title, " files begin with (--drop-leading 0 keeps it)")));
   const auto cut = [&](auto& frames) {
-    frames.erase(frames.begin() + static_cast<std::ptrdiff_t>(first + count), frames.end());
-    frames.erase(frames.begin(), frames.begin() + static_cast<std::ptrdiff_t>(first));
+    frames.erase(frames.begin() + (first + count), frames.end());
+    frames.erase(frames.begin(), frames.begin() + first);
   };
   cut(motion.local);
   cut(motion.position);
@@ -175,16 +175,16 @@ MotionClip make_clip(Recording recording, const std::string& path, const MotionO
   ImportReport& report = clip.report;
   report.file = path;
   report_names(recording, report);
-  clip.scale = find_scale(recording, options.scale, path, report);
+  clip.scale = find_scale(recording, options.scale, report);
   scale_lengths(recording, clip.scale);
   report_positions(recording.positions, clip.scale, report);
   SourceMotion& motion = recording.motion;
   if (options.fps > 0) motion.fps = options.fps;
   check_root(motion, options.max_root_speed, path);
   const JointMap& map = recording.names.map;
-  const RestPose rest = find_rest_pose(motion, map, options.rest, path, report);
-  check_handedness(rest.joints, options.force, path, report);
-  cut_frames(motion, *recording.names.profile, options, path, report);
+  const RestPose rest = find_rest_pose(motion, map, options.rest, report);
+  check_handedness(rest.joints, options.force, report);
+  cut_frames(motion, *recording.names.profile, options, report);
   const double fps = motion.fps;
   const size_t frames = motion.local.size();
   const Poses poses = poses_at_30_fps(std::move(motion), map, rest, recording.bytes, path);

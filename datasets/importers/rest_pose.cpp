@@ -33,7 +33,7 @@ bool along_an_axis(const Vec3& v, double length) {
 }
 
 Axis find_up(const SourceMotion& motion, const JointMap& map, const Joints& rest, Axis given,
-             const std::string& path, ImportReport& report) {
+             ImportReport& report) {
   if (given != Axis::automatic) {
     report.fact("up", to_string(given) + ", as given");
     return given;
@@ -55,7 +55,8 @@ Axis find_up(const SourceMotion& motion, const JointMap& map, const Joints& rest
     return by_rest;
   }
   if (!motion_stands)
-    throw InputError(path, "neither the rest pose nor the recording stands, so up is not known",
+    throw InputError(report.file,
+                     "neither the rest pose nor the recording stands, so up is not known",
                      "say which axis is up (--up)");
   report.fact("up", to_string(by_motion) + ", by the recording");
   return by_motion;
@@ -105,8 +106,8 @@ std::string limbs_off(const Joints& rest) {
 }
 
 RestPose built_pose(const SourceMotion& motion, const JointMap& map, const Joints& zero,
-                    const Mat3& up, const std::string& path, ImportReport& report) {
-  const Rotations turned = build_t_pose(motion, map, up, path);
+                    const Mat3& up, ImportReport& report) {
+  const Rotations turned = build_t_pose(motion, map, up, report.file);
   RestPose out;
   out.align = up;
   Joints stood;  // the zero pose as a whole, its trunk upright
@@ -133,16 +134,17 @@ const std::vector<Limb>& t_pose_limbs() {
   return all;
 }
 
-void check_handedness(const Joints& rest, bool force, const std::string& path,
-                      ImportReport& report) {
+void check_handedness(const Joints& rest, bool force, ImportReport& report) {
   if (!is_mirrored(rest).value_or(false)) return;
   const std::string wrong = cat(kMirrored, " (", kMirroredBecause, ")");
-  if (!force) throw InputError(path, wrong, cat(kMirroredFix, "; --force takes it as it is"));
+  if (!force)
+    throw InputError(report.file, wrong, cat(kMirroredFix, "; --force takes it as it is"));
   report.remark(wrong + ": taken as it is");
 }
 
 RestPose find_rest_pose(const SourceMotion& motion, const JointMap& map, const RestOptions& options,
-                        const std::string& path, ImportReport& report) {
+                        ImportReport& report) {
+  const std::string& path = report.file;
   PosedSkeleton pose;
   pose.joints = rest_joints(motion.skeleton, map);
   pose.global.fill(Mat3::Identity());
@@ -152,7 +154,7 @@ RestPose find_rest_pose(const SourceMotion& motion, const JointMap& map, const R
       throw InputError(path, cat("has no frame ", options.frame), "name a rest frame of it");
     pose = source_pose(motion, map, static_cast<size_t>(options.frame));
   }
-  const Mat3 up = upright(find_up(motion, map, pose.joints, options.up, path, report));
+  const Mat3 up = upright(find_up(motion, map, pose.joints, options.up, report));
   Joints upright_joints;
   for (size_t j = 0; j < kJoints; ++j) upright_joints[j] = up * (pose.joints[j] - pose.joints[0]);
   const Vec3 given =
@@ -171,7 +173,7 @@ RestPose find_rest_pose(const SourceMotion& motion, const JointMap& map, const R
   if (!wrong.empty() && framed)
     throw InputError(path, cat("frame ", options.frame, " is no T-pose: ", wrong),
                      "name a frame that is a T-pose as the rest frame");
-  if (!wrong.empty()) return built_pose(motion, map, pose.joints, up, path, report);
+  if (!wrong.empty()) return built_pose(motion, map, pose.joints, up, report);
 
   const Vec3 front = out.align.transpose() * Vec3::UnitZ();
   report.fact("facing",

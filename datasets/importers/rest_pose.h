@@ -38,8 +38,7 @@ const std::vector<Limb>& t_pose_limbs();
 
 /// A rest pose whose left and right are exchanged makes a mirror image of every motion: InputError
 /// in the doctor's words, or a remark if it is forced. `rest` in our frame.
-void check_handedness(const Joints& rest, bool force, const std::string& path,
-                      ImportReport& report);
+void check_handedness(const Joints& rest, bool force, ImportReport& report);
 
 /// The zero pose (or the frame asked for), turned with the whole world so that the person stands
 /// upright and faces +z. A zero pose with a limb more than 120 degrees off a T-pose's (LAFAN1, some
@@ -56,6 +55,6 @@ void check_handedness(const Joints& rest, bool force, const std::string& path,
 /// InputError: the frame asked for is no T-pose, nothing tells up from down, no T-pose can be
 /// built.
 RestPose find_rest_pose(const SourceMotion& motion, const JointMap& map, const RestOptions& options,
-                        const std::string& path, ImportReport& report);
+                        ImportReport& report);
 
 }  // namespace restage

@@ -97,7 +97,7 @@ void SmplModel::read_skeleton(const Npz& file) {
 }
 
 void SmplModel::read_regressor() {
-  const auto n = static_cast<int64_t>(template_.size());
+  const int64_t n = template_.size();
   check_shape(regressor_, {static_cast<int64_t>(parents_.size()), n});
   joint_vertices_.resize(kJoints);
   for (int64_t i = 0; i < kJoints * n; ++i) {
@@ -110,7 +110,7 @@ void SmplModel::read_regressor() {
 
 void SmplModel::read_weights(const Npz& file) {
   const NpyArray array = file.array("weights");
-  const auto joints = static_cast<int64_t>(parents_.size());
+  const int64_t joints = parents_.size();
   check_shape(array, {static_cast<int64_t>(template_.size()), joints});
   weights_.setZero(array.shape()[0], kJoints);
   for (int64_t v = 0; v < array.shape()[0]; ++v) {
@@ -146,7 +146,7 @@ void SmplModel::read_faces(const Npz& file) {
 void SmplModel::read_blend_shapes(const Npz& file) {
   if (!file.has("posedirs")) return;
   const NpyArray array = file.array("posedirs");
-  const auto n = static_cast<int64_t>(template_.size());
+  const int64_t n = template_.size();
   const auto width = 9 * (static_cast<int64_t>(parents_.size()) - 1);
   check_shape(array, {n, 3, width});
   const auto shapes = std::make_shared<PoseBlendShapes>();
@@ -207,7 +207,7 @@ std::vector<Betas> read_betas(const std::string& path, uint64_t max_memory) {
     throw InputError(array.where(), "has the shape " + shape_text(shape),
                      "give betas as [B], or [P, B] for several people");
   const std::vector<double> values = array.finite();
-  const auto width = static_cast<std::ptrdiff_t>(shape.back());
+  const auto width = shape.back();
   std::vector<Betas> out;
   for (auto at = values.begin(); at != values.end(); at += width) out.emplace_back(at, at + width);
   for (const double value : values)

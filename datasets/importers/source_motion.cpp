@@ -37,20 +37,20 @@ void check_length(size_t frames, size_t joints, double fps, uint64_t bytes,
                      "check its frame rate, or cut it");
 }
 
-SourceMotion resample(const SourceMotion& motion, double fps) {
+SourceMotion resample(const SourceMotion& motion) {
   SourceMotion out;
   out.skeleton = motion.skeleton;
   out.moving = motion.moving;
-  out.fps = fps;
+  out.fps = kFps;
   const size_t n = motion.local.size();
   if (n == 0) return out;
   // A hair more than the last frame's time: 1 / 0.00833333 s is not exactly 120.
   const double last = static_cast<double>(n - 1);
-  const size_t frames = static_cast<size_t>(std::floor(last / motion.fps * fps + 1e-3)) + 1;
+  const size_t frames = static_cast<size_t>(std::floor(last / motion.fps * kFps + 1e-3)) + 1;
   out.local.resize(frames);
   out.position.resize(frames);
   for (size_t k = 0; k < frames; ++k) {
-    const double at = std::min(last, static_cast<double>(k) / fps * motion.fps);
+    const double at = std::min(last, static_cast<double>(k) / kFps * motion.fps);
     const size_t a = static_cast<size_t>(at), b = std::min(a + 1, n - 1);
     const double t = at - static_cast<double>(a);
     out.local[k].resize(motion.skeleton.size());
@@ -77,14 +77,14 @@ PosedSkeleton source_pose(const SourceMotion& motion, const JointMap& map, size_
       global[j] = local;
       position[j] = offset;
     } else {
-      const size_t p = static_cast<size_t>(s.parents[j]);
+      const int p = s.parents[j];
       global[j] = global[p] * local;
       position[j] = position[p] + global[p] * offset;
     }
   }
   PosedSkeleton out;
   for (int j = 0; j < kJoints; ++j) {
-    const size_t source = static_cast<size_t>(map[j].joint);
+    const int source = map[j].joint;
     out.global[j] = global[source];
     out.joints[j] = position[source] + global[source] * map[j].offset;
   }

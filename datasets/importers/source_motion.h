@@ -55,7 +55,7 @@ void check_length(size_t frames, size_t joints, double fps, uint64_t bytes,
                   const std::string& path);
 
 /// Slerp of local rotations and linear interpolation of translations at t = k / 30 s.
-SourceMotion resample(const SourceMotion& motion, double fps = kFps);
+SourceMotion resample(const SourceMotion& motion);
 
 /// Global rotations and positions of the 22 joints in one frame.
 PosedSkeleton source_pose(const SourceMotion& motion, const JointMap& map, size_t frame);

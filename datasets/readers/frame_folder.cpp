@@ -39,7 +39,7 @@ class FileFrames : public FrameSource {
   }
   void skip() override { at_ = std::min(at_ + 1, files_.size()); }
   void rewind() override { at_ = 0; }
-  int64_t frames() const override { return static_cast<int64_t>(files_.size()); }
+  int64_t frames() const override { return files_.size(); }
   double fps() const override { return kFps; }
 
  private:

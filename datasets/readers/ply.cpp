@@ -45,8 +45,6 @@ const Number* number_named(std::string_view name) {
   return nullptr;
 }
 
-std::string at_line(const std::string& path, int64_t line) { return cat(path, ":", line); }
-
 // ---- header ------------------------------------------------------------------------------------
 
 Property parse_property(std::string_view line, const std::string& where) {
@@ -95,7 +93,7 @@ Header parse_header(text::Lines& lines, const std::string& path) {
   std::string_view line;
   lines.next(line);  // the magic word, checked by the caller
   while (lines.next(line)) {
-    const std::string where = at_line(path, lines.number());
+    const std::string where = cat(path, ":", lines.number());
     const std::string_view word = text::take_word(line);
     if (word == "end_header") {
       if (!has_format) throw InputError(where, "the PLY header names no format", kExportAgain);
@@ -167,7 +165,7 @@ class Rows {
   }
 
   std::string where() const {
-    return format_ == Format::ascii ? at_line(path_, lines_.number())
+    return format_ == Format::ascii ? cat(path_, ":", lines_.number())
                                     : cat(path_, ":", element_->name.substr(0, 40), " ", row_ - 1);
   }
 
