@@ -6,17 +6,17 @@
 #include <set>
 
 #include "autograd/base/atomic_file.h"
-#include "autograd/base/error.h"
 #include "autograd/base/log.h"
 #include "autograd/base/temporary.h"
-#include "datasets/benchmark/batches.h"
 #include "datasets/benchmark/characters.h"
 #include "datasets/benchmark/floor.h"
 #include "datasets/benchmark/manifest.h"
 #include "datasets/benchmark/scans.h"
 #include "datasets/benchmark/sequence.h"
+#include "datasets/importers/batches.h"
 #include "datasets/importers/cmu.h"
 #include "datasets/importers/import.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
 namespace {
@@ -136,8 +136,8 @@ class Builder {
       const auto frames = static_cast<int64_t>(clip(m.clip).frames());
       if (m.first >= frames || m.frames > frames - m.first)
         throw InputError(where_,
-                         "motion '" + m.id + "' ends after clip '" + m.clip + "', which has " +
-                             std::to_string(frames) + " frames",
+                         cat("motion '", m.id, "' ends after clip '", m.clip, "', which has ",
+                             frames, " frames"),
                          "choose first and frames inside it");
     }
   }
@@ -154,8 +154,7 @@ class Builder {
 
   void write_split(const std::string& split, const SplitRecipe& lists, const std::string& folder) {
     if (lists.bodies.empty() && lists.clips.empty()) return;
-    log_info(split + ".h5: " + std::to_string(lists.bodies.size()) + " bodies, " +
-             std::to_string(lists.clips.size()) + " clips");
+    log_info(cat(split, ".h5: ", lists.bodies.size(), " bodies, ", lists.clips.size(), " clips"));
     DatasetWriter writer(folder + "/" + split + ".h5", info_);
     in_batches<Body>(
         lists.bodies.size(),
@@ -225,11 +224,11 @@ class Builder {
     for (const ScanRecipe& s : r_.scans) {
       const size_t seen = points_in_first_frame(scene(s));
       if (seen < kLeastPoints)
-        throw InputError(where_,
-                         "scanner '" + s.scanner + "' sees " + std::to_string(seen) +
-                             " points of '" + s.source + "' in motion '" + s.motion +
-                             "', at least " + std::to_string(kLeastPoints) + " are needed",
-                         "bring it nearer, or give it more pixels and less dropout");
+        throw InputError(
+            where_,
+            cat("scanner '", s.scanner, "' sees ", seen, " points of '", s.source, "' in motion '",
+                s.motion, "', at least ", kLeastPoints, " are needed"),
+            "bring it nearer, or give it more pixels and less dropout");
     }
   }
 
@@ -268,7 +267,7 @@ BenchmarkSummary build_benchmark(const BenchmarkRecipe& recipe, const std::strin
   check_recipe(recipe, where);
   Builder builder(recipe, where, data);
   StagingFolder staging(out);
-  log_info("building " + out + " with seed " + std::to_string(recipe.seed));  // inputs are fine
+  log_info(cat("building ", out, " with seed ", recipe.seed));  // inputs are fine
   builder.build(staging.path());
   write_file_atomically(staging.path() + "/recipe.yaml", recipe_text);
   Manifest manifest;

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "datasets/benchmark/batches.h"
+#include "datasets/importers/batches.h"
 
 namespace restage {
 
@@ -34,13 +34,12 @@ std::vector<int32_t> outermost_vertices(const Body& body) {
 std::vector<double> lowest_heights(const Motion& motion, const Body& body,
                                    const std::vector<int32_t>& vertices) {
   std::vector<double> out(motion.frames());
-  parallel_for(static_cast<int64_t>(out.size()), 16, [&](int64_t begin, int64_t end) {
+  parallel_for(out.size(), 16, [&](int64_t begin, int64_t end) {
     for (int64_t f = begin; f < end; ++f) {
-      const auto frame = static_cast<size_t>(f);
       double lowest = std::numeric_limits<double>::infinity();
-      for (const Point& p : pose_surface(body, pose_on(motion, body, frame), &vertices))
+      for (const Point& p : pose_surface(body, pose_on(motion, body, f), &vertices))
         lowest = std::min(lowest, static_cast<double>(p.y()));
-      out[frame] = lowest;
+      out[f] = lowest;
     }
   });
   return out;

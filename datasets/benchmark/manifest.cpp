@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "autograd/base/atomic_file.h"
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/folders.h"
 #include "datasets/readers/sha256.h"
 #include "datasets/schema.h"
@@ -81,8 +81,8 @@ void check_file(const std::string& folder, const std::string& name, const Manife
   if (failed) {
     problems.push_back(path + ": is missing; build or copy the folder again");
   } else if (bytes != listed.bytes) {
-    problems.push_back(path + ": has " + std::to_string(bytes) + " bytes instead of " +
-                       std::to_string(listed.bytes) + "; build or copy the folder again");
+    problems.push_back(cat(path, ": has ", bytes, " bytes instead of ", listed.bytes,
+                           "; build or copy the folder again"));
   } else if (sha256_of_file(path) != listed.sha256) {
     problems.push_back(path + ": is not what the manifest says; build or copy the folder again");
   } else if (path.ends_with(".h5")) {

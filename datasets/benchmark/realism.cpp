@@ -7,6 +7,7 @@
 
 #include "autograd/base/parallel.h"
 #include "datasets/benchmark/floor.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
 namespace {
@@ -43,7 +44,7 @@ double cone_volume(const Points& x, const std::vector<Triangle>& faces, const Ve
 double percentile(std::vector<double> values, double p) {
   if (values.empty()) return 0;
   const auto k = static_cast<size_t>(std::lround(p * static_cast<double>(values.size() - 1)));
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(k), values.end());
+  std::nth_element(values.begin(), values.begin() + k, values.end());
   return values[k];
 }
 
@@ -64,8 +65,7 @@ std::vector<std::string> most_first(const Counts& counts) {
   for (const auto& [name, count] : counts) ordered.emplace_back(-count, name);
   std::sort(ordered.begin(), ordered.end());
   std::vector<std::string> out;
-  for (const auto& [count, name] : ordered)
-    out.push_back(name + " (" + std::to_string(-count) + ")");
+  for (const auto& [count, name] : ordered) out.push_back(cat(name, " (", -count, ")"));
   return out;
 }
 
@@ -78,7 +78,7 @@ void measure_bodies(const std::vector<Body>& bodies, RealismReport& out, Counts&
     std::vector<std::string> outside, buried_at;
   };
   std::vector<Row> rows(bodies.size());
-  parallel_for(static_cast<int64_t>(bodies.size()), 1, [&](int64_t begin, int64_t end) {
+  parallel_for(bodies.size(), 1, [&](int64_t begin, int64_t end) {
     for (int64_t i = begin; i < end; ++i) {
       const Body& body = bodies[i];
       Row& row = rows[i];
@@ -120,9 +120,8 @@ void measure_poses(const std::vector<Body>& bodies, const std::vector<Motion>& m
     std::vector<std::string> outside;
   };
   std::vector<Row> rows(motions.size());
-  parallel_for(static_cast<int64_t>(rows.size()), 1, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i) {
-      const auto m = static_cast<size_t>(i);
+  parallel_for(rows.size(), 1, [&](int64_t begin, int64_t end) {
+    for (int64_t m = begin; m < end; ++m) {
       const Body& body = bodies[m % bodies.size()];
       const Pose pose = pose_on(motions[m], body, motions[m].frames() / 2);
       rows[m].inside =

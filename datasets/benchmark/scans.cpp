@@ -4,9 +4,10 @@
 #include <cmath>
 #include <numbers>
 
-#include "autograd/base/error.h"
-#include "datasets/benchmark/batches.h"
 #include "datasets/benchmark/sequence.h"
+#include "datasets/importers/batches.h"
+#include "datasets/readers/errors.h"
+#include "datasets/readers/non_finite.h"
 
 namespace restage {
 namespace {
@@ -40,23 +41,17 @@ std::vector<DepthCamera> cameras_of(const ScannerRecipe& s, const Path& path) {
 
 /// Forearm and hand of a posed body, the hand 25 cm from A's chest, reaching from A's left.
 Mesh reaching_arm(const Body& body, const Joints& a) {
-  Mesh out;
+  Mesh out = body.rest;
   const Vec3 across = (a[16] - a[17]).normalized();  // A's right to left
   const Vec3 bone = body.joints[kWrist] - body.joints[kElbow];
   const Mat3 turn = shortest_arc(bone, -across + Vec3(0, 0.15, 0));
   const Vec3 hand = a[9] + 0.45 * across + Vec3(0, 0.1, 0);
-  std::vector<int32_t> moved(body.rest.vertices.size(), -1);
-  for (size_t v = 0; v < moved.size(); ++v) {
-    const auto row = body.weights.row(v);
-    if (row[kElbow] + row[kWrist] < 0.5f) continue;
-    moved[v] = static_cast<int32_t>(out.vertices.size());
-    const Vec3 x = body.rest.vertices[v].cast<double>();
-    out.vertices.push_back((hand + turn * (x - body.joints[kWrist])).cast<float>());
-  }
-  for (Triangle t : body.rest.faces) {
-    for (int32_t& v : t) v = moved[v];
-    if (*std::min_element(t.begin(), t.end()) >= 0) out.faces.push_back(t);
-  }
+  std::vector<bool> of_arm;
+  for (size_t v = 0; v < out.vertices.size(); ++v)
+    of_arm.push_back(!(body.weights(v, kElbow) + body.weights(v, kWrist) < 0.5f));
+  keep_points(of_arm, out.vertices, out.faces);
+  for (Point& p : out.vertices)
+    p = (hand + turn * (p.cast<double>() - body.joints[kWrist])).cast<float>();
   return out;
 }
 
@@ -144,9 +139,8 @@ void write_scan_sequence(const ScanScene& scene, bool known_frame, const FileInf
       },
       [&](size_t i, const Points& cloud) {
         if (cloud.size() < kLeastPoints)
-          throw WorkError(folder + ": frame " + std::to_string(i) + " has " +
-                          std::to_string(cloud.size()) +
-                          " points, too few for anybody; bring the scanner nearer");
+          throw WorkError(cat(folder, ": frame ", i, " has ", cloud.size(),
+                              " points, too few for anybody; bring the scanner nearer"));
         Joints joints = performance.joints_a(i);
         for (Vec3& x : joints) x = to_source(x);
         scans.append(cloud, joints);

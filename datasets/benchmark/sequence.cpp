@@ -1,6 +1,6 @@
 #include "datasets/benchmark/sequence.h"
 
-#include "datasets/benchmark/batches.h"
+#include "datasets/importers/batches.h"
 #include "datasets/readers/mesh_io.h"
 
 namespace restage {
@@ -22,7 +22,7 @@ void write_sequence(const Performance& performance, const FileInfo& info,
 void write_truth(const Performance& performance, const FileInfo& info, const std::string& folder,
                  const Eigen::Matrix<double, 3, 4>* source_to_world) {
   const Body& target = performance.target();
-  const auto vertices = static_cast<int64_t>(target.rest.vertices.size());
+  const int64_t vertices = target.rest.vertices.size();
   PredictionWriter truth(folder + "/truth.h5", vertices, target.rest.faces, info);
   if (source_to_world) truth.set_source_to_world(*source_to_world);
   in_batches<Points>(

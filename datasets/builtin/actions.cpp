@@ -1,7 +1,6 @@
 #include "datasets/builtin/actions.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "datasets/builtin/action_tools.h"
 

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "autograd/base/error.h"
 #include "autograd/base/parallel.h"
 #include "datasets/builtin/body_shape.h"
 #include "datasets/builtin/body_weights.h"
 #include "datasets/builtin/surface_nets.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
 namespace {
@@ -77,15 +77,14 @@ Body builtin_body(uint64_t seed, const std::string& split, int index) {
     throw InputError("builtin bodies", "unknown split \"" + split + "\"",
                      "use train, validation or test");
   if (index < 0)
-    throw InputError("builtin bodies", "negative body number " + std::to_string(index),
-                     "count from 0");
+    throw InputError("builtin bodies", cat("negative body number ", index), "count from 0");
   const BodyShape shape = draw_body_shape(body_key(seed, split, index));
   const ImplicitSurface surface = shape_surface(shape);
   SurfaceMesh mesh = surface_nets([&](const Vec3& p) { return surface(p); }, grid_of(shape));
   relax(surface, .01, mesh);
 
   Body body;
-  body.id = "builtin_" + split + "_" + std::to_string(index);
+  body.id = cat("builtin_", split, "_", index);
   body.split = split;
   body.weights = shape_weights(shape, mesh);
   double lo = 1e9, hi = -1e9;
@@ -106,7 +105,7 @@ std::vector<Body> builtin_bodies(uint64_t seed, int train, int validation, int t
   if (train < 0 || validation < 0 || test < 0)
     throw InputError("builtin bodies", "a negative count", "ask for 0 or more bodies per split");
   std::vector<Body> out(static_cast<size_t>(train) + validation + test);
-  parallel_for(static_cast<int64_t>(out.size()), 1, [&](int64_t begin, int64_t end) {
+  parallel_for(out.size(), 1, [&](int64_t begin, int64_t end) {
     for (int64_t i = begin; i < end; ++i) {
       if (i < train)
         out[i] = builtin_body(seed, "train", static_cast<int>(i));

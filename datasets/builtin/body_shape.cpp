@@ -1,7 +1,6 @@
 #include "datasets/builtin/body_shape.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace restage {
 namespace {

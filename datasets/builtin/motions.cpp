@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "autograd/base/error.h"
 #include "datasets/builtin/actions.h"
 #include "datasets/builtin/bodies.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
 namespace {
@@ -124,12 +124,6 @@ std::vector<PosedSkeleton> posed_frames(const Choreography& p, const Temper& tem
   return frames;
 }
 
-void check_split(const std::string& split) {
-  if (split != "train" && split != "validation" && split != "test")
-    throw InputError("builtin motions", "unknown split \"" + split + "\"",
-                     "use train, validation or test");
-}
-
 }  // namespace
 
 const std::vector<std::string>& builtin_actions() {
@@ -142,10 +136,11 @@ const std::vector<std::string>& builtin_actions() {
 }
 
 Motion builtin_motion(uint64_t seed, const std::string& split, int index) {
-  check_split(split);
+  if (split != "train" && split != "validation" && split != "test")
+    throw InputError("builtin motions", "unknown split \"" + split + "\"",
+                     "use train, validation or test");
   if (index < 0)
-    throw InputError("builtin motions", "negative motion number " + std::to_string(index),
-                     "count from 0");
+    throw InputError("builtin motions", cat("negative motion number ", index), "count from 0");
   const RngKey key = motion_key(seed, split);
   const int subject = index / kMotionsPerSubject;
   const Action& action = actions()[index % actions().size()];
@@ -155,8 +150,8 @@ Motion builtin_motion(uint64_t seed, const std::string& split, int index) {
   performance.seconds = std::clamp(performance.seconds, 2.0, 6.0);
 
   Motion m;
-  m.id = "builtin_" + split + "_" + std::to_string(index) + "_" + action.name;
-  m.subject = "builtin_" + split + "_subject_" + std::to_string(subject);
+  m.id = cat("builtin_", split, "_", index, "_", action.name);
+  m.subject = cat("builtin_", split, "_subject_", subject);
   m.split = split;
   m.action = action.name;
   m.rest = builtin_rest_joints();

@@ -1,7 +1,5 @@
 // What `restage retarget` asks before it starts.
-#include <cmath>
 
-#include "autograd/base/error.h"
 #include "datasets/doctor/examine_detail.h"
 #include "datasets/doctor/orientation_model.h"
 #include "datasets/doctor/words.h"
@@ -22,7 +20,7 @@ class Given final : public FrameSource {
     return Frame{"", frame.vertices, frame.faces, 0};
   }
   void rewind() override { at_ = 0; }
-  int64_t frames() const override { return static_cast<int64_t>(frames_.size()); }
+  int64_t frames() const override { return frames_.size(); }
   double fps() const override { return kFps; }
 
  private:

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "autograd/base/error.h"
 #include "datasets/doctor/examine_detail.h"
 #include "datasets/doctor/words.h"
 
@@ -31,16 +30,15 @@ namespace {
 void judge_cover(Diagnosis& d, const Mesh& mesh, const PersonShape& shape) {
   const double one = one_sidedness(shape.points, shape.parts.spacing);
   if (one > kOneSided && shape.points.size() >= 200)
-    d.findings.push_back({"holes", Weight::note, "seen from one side only", 0.9,
-                          "rays through it hit a single surface: " + per_cent(one),
-                          "scan from more sides if you can"});
+    d.say({"holes", Weight::note, "seen from one side only", 0.9,
+           "rays through it hit a single surface: " + per_cent(one),
+           "scan from more sides if you can"});
   if (mesh.faces.empty()) return;
   const Borders open = borders(mesh);
   if (open.edges > 0)
-    d.findings.push_back(
-        {"holes", Weight::note,
-         counted(open.loops, "open border") + " with " + counted(open.edges, "edge"), 1,
-         "edges with one triangle", "close them in a mesh editor if they are not meant"});
+    d.say({"holes", Weight::note,
+           counted(open.loops, "open border") + " with " + counted(open.edges, "edge"), 1,
+           "edges with one triangle", "close them in a mesh editor if they are not meant"});
 }
 
 }  // namespace
@@ -49,8 +47,8 @@ Diagnosis doctor_detail::judge_surface(const Mesh& mesh, const PersonShape& shap
                                        const ExamineOptions& options) {
   Diagnosis d;
   d.kind = mesh.faces.empty() ? "cloud" : "mesh";
-  d.faces = static_cast<int64_t>(mesh.faces.size());
-  d.fewest_points = d.most_points = static_cast<int64_t>(mesh.vertices.size());
+  d.faces = mesh.faces.size();
+  d.fewest_points = d.most_points = mesh.vertices.size();
   judge_points(d, mesh.vertices.size() - equal);
   Seen seen;
   seen.vote.add(shape.points);
@@ -87,8 +85,7 @@ Finding examine_skeletons(const std::vector<Joints>& frames) {
     heights.push_back(kHeight * (legs + spine));
   }
   if (heights.empty()) return {};
-  std::nth_element(heights.begin(), heights.begin() + std::ssize(heights) / 2, heights.end());
-  const double height = heights[heights.size() / 2];
+  const double height = median(std::move(heights));
   Diagnosis d;
   d.size = kSizeOfHeight * height;
   d.unit = guess_unit(d.size);
@@ -101,10 +98,7 @@ Finding examine_skeletons(const std::vector<Joints>& frames) {
 
 std::optional<bool> is_mirrored(const Joints& joints, const Vec3& up) {
   Vec3 toes = Vec3::Zero();
-  for (const int side : {0, 1}) {
-    const auto ankle = static_cast<size_t>(7 + side), foot = static_cast<size_t>(10 + side);
-    toes += joints[foot] - joints[ankle];
-  }
+  for (const int side : {0, 1}) toes += joints[10 + side] - joints[7 + side];
   const Vec3 left = joints[1] - joints[2] + joints[16] - joints[17];
   const Vec3 forward = toes - toes.dot(up) * up;
   if (!(forward.norm() > 0.25 * toes.norm())) return std::nullopt;  // on tiptoe: noise

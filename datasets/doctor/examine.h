@@ -4,8 +4,8 @@
 // alike, so a mirrored scan cannot be told from a right one (check_handedness() needs joints).
 #pragma once
 
-#include <functional>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "datasets/doctor/finding.h"
@@ -42,6 +42,7 @@ struct Diagnosis {
 
   /// Whether so many missing frames are replaced by those around them: up to a second of them.
   bool is_filled(int64_t missing) const { return static_cast<double>(missing) <= fps; }
+  void say(const Finding& finding) { findings.push_back(finding); }
   bool usable() const;  ///< no finding that makes the result nonsense
   const Finding* find(const std::string& topic) const;
 };

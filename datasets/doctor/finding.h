@@ -2,9 +2,7 @@
 // the transform that brings the data into our frame (metres, y up, facing +z, floor at y = 0).
 #pragma once
 
-#include <optional>
 #include <string>
-#include <vector>
 
 #include "nn/geometry/body.h"
 

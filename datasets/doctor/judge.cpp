@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "autograd/base/error.h"
 #include "datasets/doctor/examine_detail.h"
 #include "datasets/doctor/pose.h"
 #include "datasets/doctor/words.h"
@@ -28,14 +27,13 @@ void recognise(Diagnosis& d, const Seen& seen, const ExamineOptions& options) {
   if (d.unit.unit.metres != 1)
     d.unit.sure *= std::max(0.0, (d.orientation.up_sure - by_chance) / (1 - by_chance)) *
                    (1 - seen.stray_share);
-  if (options.scale) d.unit = {{"", *options.scale}, 1, d.unit.deviation};
+  if (options.scale) d.unit = {{"", *options.scale}, 1};
   if (options.up) d.orientation = seen.vote.result(*options.up);
   if (!options.facing) return;
   if (*options.facing / 2 == d.orientation.up / 2)
     throw InputError("",
-                     std::string("nobody whose head points along ") +
-                         kDirections[static_cast<size_t>(d.orientation.up)] + " faces " +
-                         kDirections[static_cast<size_t>(*options.facing)],
+                     cat("nobody whose head points along ", kDirections[d.orientation.up],
+                         " faces ", kDirections[*options.facing]),
                      "give two directions at right angles, --up and --facing");
   d.orientation.facing = *options.facing;
   d.orientation.facing_sure = 1;
@@ -66,16 +64,15 @@ void judge_units(Diagnosis& d) {
   } else if (guess.unit.metres == 1) {
     f.what = "metres";
   } else {
-    f.what = std::string("1 unit is 1 ") + guess.unit.name + ", not 1 m";
+    f.what = cat("1 unit is 1 ", guess.unit.name, ", not 1 m");
     f.fix = "--fix; or give retarget --scale " + number(guess.unit.metres);
   }
-  d.findings.push_back(f);
+  d.say(f);
 }
 
 void judge_up(Diagnosis& d, size_t clouds) {
   const Orientation& o = d.orientation;
-  Finding f{"up",      Weight::fact, std::string(kDirections[static_cast<size_t>(o.up)]) + " is up",
-            o.up_sure, "",           ""};
+  Finding f{"up", Weight::fact, cat(kDirections[o.up], " is up"), o.up_sure, "", ""};
   f.evidence = "where a person's points lie, in 144 attitudes" +
                (clouds > 1 ? ", over " + counted(clouds, "frame") : std::string());
   if (o.up_sure < kNobody) {
@@ -84,8 +81,7 @@ void judge_up(Diagnosis& d, size_t clouds) {
     f.fix = "is it one whole person, and nothing else? If so, say --up";
   } else if (o.up_sure < kUnsure) {
     f.weight = Weight::note;
-    f.what = std::string("which axis is up cannot be told (perhaps ") +
-             kDirections[static_cast<size_t>(o.up)] + ")";
+    f.what = cat("which axis is up cannot be told (perhaps ", kDirections[o.up], ")");
     f.fix = "say it with --up; is it one whole person?";
   } else if (o.up != 2) {
     // What is of no person's size may be no person: then only a note.
@@ -93,7 +89,7 @@ void judge_up(Diagnosis& d, size_t clouds) {
     f.what += ", not +y";
     f.fix = o.up == 4 ? "--fix turns it; or give retarget --source-up z" : "--fix turns it";
   }
-  d.findings.push_back(f);
+  d.say(f);
 }
 
 void judge_facing(Diagnosis& d, bool target) {
@@ -103,10 +99,9 @@ void judge_facing(Diagnosis& d, bool target) {
   f.evidence = "feet, knees, seat and chest are not the same before and behind";
   if (o.facing_sure < kUnsure) {
     f.weight = Weight::note;
-    f.what = std::string("which way the person faces cannot be told (perhaps ") +
-             kDirections[static_cast<size_t>(o.facing)] + ")";
+    f.what = cat("which way the person faces cannot be told (perhaps ", kDirections[o.facing], ")");
   } else {
-    f.what = std::string("faces ") + kDirections[static_cast<size_t>(o.facing)];
+    f.what = cat("faces ", kDirections[o.facing]);
     if (std::abs(o.turned) > 20)
       f.what += ", turned by about " + number(std::round(std::abs(o.turned) / 5) * 5) +
                 " degrees to their " + (o.turned > 0 ? "left" : "right");
@@ -116,7 +111,7 @@ void judge_facing(Diagnosis& d, bool target) {
       f.fix = "--fix turns it; a target has to face +z";
     }
   }
-  d.findings.push_back(f);
+  d.say(f);
 }
 
 /// The proper turn: as found where that is sure, else as few axes exchanged as possible.
@@ -132,9 +127,8 @@ Mat3 best_turn(const Orientation& o) {
 
 void judge_frame(Diagnosis& d, double lowest, double highest) {
   if (d.unit.sure < kUnsure || d.orientation.up_sure < kUnsure) {
-    d.findings.push_back({"transform", Weight::note,
-                          "how to bring it into our frame cannot be told", 1,
-                          "units or up axis are unsure", ""});
+    d.say({"transform", Weight::note, "how to bring it into our frame cannot be told", 1,
+           "units or up axis are unsure", ""});
     return;
   }
   Similarity t;
@@ -144,23 +138,22 @@ void judge_frame(Diagnosis& d, double lowest, double highest) {
   const double floor = t.scale * lowest;
   if (std::abs(floor) > kFloorMatters) t.offset = lowest * direction(d.orientation.up);
   d.transform = t;
-  d.findings.push_back({"height", Weight::fact, number(d.height) + " m from the floor to the top",
-                        1, "in the pose that it shows", ""});
+  d.say({"height", Weight::fact, number(d.height) + " m from the floor to the top", 1,
+         "in the pose that it shows", ""});
   Finding f{"floor", Weight::fact, "at 0", 1, "lowest points of the person", ""};
   if (!t.offset.isZero()) {
     f.weight = Weight::note;
     f.what = "at " + number(floor) + " m, not 0";
     f.fix = "--fix moves it";
   }
-  d.findings.push_back(f);
+  d.say(f);
 }
 
 void judge_points(Diagnosis& d, size_t distinct) {
   if (distinct >= kEnoughPoints) return;
-  d.findings.push_back({"points", Weight::wrong,
-                        "only " + std::to_string(distinct) + " distinct points; networks need " +
-                            std::to_string(kEnoughPoints),
-                        1, "counted", "scan it more finely"});
+  d.say({"points", Weight::wrong,
+         cat("only ", distinct, " distinct points; networks need ", kEnoughPoints), 1, "counted",
+         "scan it more finely"});
 }
 
 void judge_plane(Diagnosis& d, const Parts& parts, const std::string& where) {
@@ -170,11 +163,10 @@ void judge_plane(Diagnosis& d, const Parts& parts, const std::string& where) {
   const char* what = d.orientation.up_sure < kUnsure ? "a floor or a wall"
                      : level                         ? "a floor"
                                                      : "a wall";
-  d.findings.push_back({"plane", share >= kPlaneMatters ? Weight::wrong : Weight::note,
-                        std::string(what) + " is in view (" + counted(parts.flat, "point") + ", " +
-                            per_cent(share) + ")" + where,
-                        0.95, "points in one plane that reaches far beyond the person",
-                        "--fix removes it"});
+  d.say(
+      {"plane", share >= kPlaneMatters ? Weight::wrong : Weight::note,
+       cat(what, " is in view (", counted(parts.flat, "point"), ", ", per_cent(share), ")", where),
+       0.95, "points in one plane that reaches far beyond the person", "--fix removes it"});
 }
 
 void judge_parts(Diagnosis& d, const PersonShape& shape, const std::string& where) {
@@ -183,10 +175,10 @@ void judge_parts(Diagnosis& d, const PersonShape& shape, const std::string& wher
   judge_plane(d, parts, where);
   const double metres = d.unit.sure >= kUnsure ? d.unit.unit.metres : 1;
   if (parts.stray > 0)
-    d.findings.push_back({"outliers", Weight::note,
-                          counted(parts.stray, "stray point") + " (" +
-                              per_cent(static_cast<double>(parts.stray) / all) + ")" + where,
-                          1, "far from all others", "--fix removes them"});
+    d.say({"outliers", Weight::note,
+           counted(parts.stray, "stray point") + " (" +
+               per_cent(static_cast<double>(parts.stray) / all) + ")" + where,
+           1, "far from all others", "--fix removes them"});
   if (parts.other > 0) {
     const auto person = static_cast<double>(shape.points.size());
     const bool somebody = static_cast<double>(parts.largest_other) > 0.4 * person;
@@ -195,12 +187,11 @@ void judge_parts(Diagnosis& d, const PersonShape& shape, const std::string& wher
              (" (" + counted(parts.other, "point")) + ")" + where;
     f.evidence = "a separate piece, " + number(parts.gap * metres) +
                  (d.unit.sure >= kUnsure ? " m" : " units") + " from the person";
-    d.findings.push_back(f);
+    d.say(f);
   }
   if (parts.pieces > 1)
-    d.findings.push_back({"holes", Weight::note,
-                          "the person is in " + std::to_string(parts.pieces) + " pieces" + where, 1,
-                          "gaps between groups of points", "scan from more sides if you can"});
+    d.say({"holes", Weight::note, cat("the person is in ", parts.pieces, " pieces", where), 1,
+           "gaps between groups of points", "scan from more sides if you can"});
 }
 
 void judge_pose(Diagnosis& d, const PersonShape& shape, bool target) {
@@ -209,7 +200,7 @@ void judge_pose(Diagnosis& d, const PersonShape& shape, bool target) {
   if (o.up_sure < kUnsure) {
     f.weight = Weight::note;
     f.what = "whether it stands in T-pose cannot be told, as the up axis is unsure";
-    if (target) d.findings.push_back(f);
+    if (target) d.say(f);
     return;
   }
   if (!target && o.facing_sure < kUnsure) return;
@@ -224,7 +215,7 @@ void judge_pose(Diagnosis& d, const PersonShape& shape, bool target) {
     f.what = "T-pose";
     f.evidence = "arms within " + number(std::ceil(arms)) + " degrees of where they belong";
     if (target) f.evidence += "; retarget also measures them by the joints that its network finds";
-    d.findings.push_back(f);
+    d.say(f);
     return;
   }
   if (target) f.weight = o.up_sure >= kPoseSure ? Weight::wrong : Weight::note;
@@ -242,14 +233,14 @@ void judge_pose(Diagnosis& d, const PersonShape& shape, bool target) {
     f.evidence = "arms point " + degrees(angles->below[0]) + " and " + degrees(angles->below[1]) +
                  " degrees below the horizontal";
   }
-  d.findings.push_back(f);
+  d.say(f);
 }
 
 void judge_duplicates(Diagnosis& d, size_t equal, bool cloud, const std::string& where) {
   if (equal == 0) return;
-  d.findings.push_back({"duplicates", cloud ? Weight::note : Weight::fact,
-                        counted(equal, "point") + " equal to another" + where, 1, "counted",
-                        cloud ? "--fix removes them" : ""});
+  d.say({"duplicates", cloud ? Weight::note : Weight::fact,
+         counted(equal, "point") + " equal to another" + where, 1, "counted",
+         cloud ? "--fix removes them" : ""});
 }
 
 }  // namespace doctor_detail

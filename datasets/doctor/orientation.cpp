@@ -58,14 +58,10 @@ void OrientationVote::add(const Points& cloud, bool faces) {
   ++clouds_;
 }
 
-double OrientationVote::up(int index) const {
-  return clouds_ > 0 ? up_[static_cast<size_t>(index)] / clouds_ : 1.0 / kUps;
-}
-
 Orientation OrientationVote::result() const {
   const int best = static_cast<int>(std::max_element(up_.begin(), up_.end()) - up_.begin());
   Orientation out = result(clouds_ > 0 ? best : 2);
-  out.up_sure = up(out.up);
+  out.up_sure = clouds_ > 0 ? up_[best] / clouds_ : 1.0 / kUps;
   return out;
 }
 
@@ -75,25 +71,27 @@ Orientation OrientationVote::result(int known_up) const {
   out.up_sure = 1;
   out.facing = (known_up + 2) % 6;
   out.facing_sure = 1.0 / 4;
-  const auto& facing = facing_[static_cast<size_t>(out.up)];
+  const auto& facing = facing_[out.up];
   double total = 0, most = -1;
   for (const double x : facing) total += x;
   if (!(total > 0)) return out;
+  // Of the heading that is `d` from the middle of a quarter.
+  const auto near = [&](int quarter, int d) {
+    return facing[(quarter * kQuarter + d + kHeadings) % kHeadings];
+  };
   int best = 0;
   for (int quarter = 0; quarter < 4; ++quarter) {
     double mass = 0;
     for (int d = -kQuarter / 2; d <= kQuarter / 2; ++d)
-      mass += facing[static_cast<size_t>((quarter * kQuarter + d + kHeadings) % kHeadings)] *
-              (std::abs(d) == kQuarter / 2 ? 0.5 : 1.0);
+      mass += near(quarter, d) * (std::abs(d) == kQuarter / 2 ? 0.5 : 1.0);
     if (mass > most) most = mass, best = quarter;
   }
   out.facing = index_of(hypothesis(out.up, best * kQuarter).row(2).transpose().cast<double>());
   out.facing_sure = most / total;
   double mass = 0;
   for (int d = -kQuarter / 2; d <= kQuarter / 2; ++d) {
-    const double p = facing[static_cast<size_t>((best * kQuarter + d + kHeadings) % kHeadings)];
-    out.turned += p * d * 360 / kHeadings;
-    mass += p;
+    out.turned += near(best, d) * d * 360 / kHeadings;
+    mass += near(best, d);
   }
   out.turned /= mass;
   return out;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <string>
 
 #include "nn/geometry/body.h"
 
@@ -32,8 +31,6 @@ class OrientationVote {
   Orientation result() const;
   /// The same where `up` is known.
   Orientation result(int up) const;
-  /// Probability that direction `index` is up.
-  double up(int index) const;
 
  private:
   static constexpr int kHeadings = 24;

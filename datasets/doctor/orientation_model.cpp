@@ -4,26 +4,20 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <set>
 #include <string>
 
-#include "datasets/doctor/orientation_weights.h"
+#include "datasets/doctor/shape.h"
 #include "nn/weights/state.h"
 
 namespace restage::doctor_detail {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr size_t kMostLooked = 4096;  // of a large cloud, evenly spaced in the list
 constexpr float kThin = 0.12f;        // one point per cube of this edge, in units of the size
 
 constexpr float kFar = 1e4f;  // in the same unit
-
-float median(std::vector<float>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Moves the median to the origin and makes the median distance 1.
 void normalise(NormalisedCloud& cloud) {
@@ -105,13 +99,10 @@ const OrientationNet& orientation_net() {
 }
 
 Eigen::Matrix3f hypothesis(int up, int heading) {
-  const int axis = up / 2;
-  Vec3 y = Vec3::Zero(), z = Vec3::Zero();
-  y[axis] = up % 2 == 0 ? 1 : -1;
-  z[(axis + 1) % 3] = 1;
+  const Vec3 y = direction(up), z = Vec3::Unit((up / 2 + 1) % 3);
   Mat3 stand;  // rows: across, up, forward
   stand << y.cross(z).transpose(), y.transpose(), z.transpose();
-  Mat3 turn = turn_about_y(-2 * kPi * heading / kHeadings) * stand;
+  Mat3 turn = turn_about_y(-2 * std::numbers::pi * heading / kHeadings) * stand;
   if (heading % (kHeadings / 4) == 0) turn = turn.array().round();  // exactly a permutation
   return turn.cast<float>();
 }

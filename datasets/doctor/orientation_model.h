@@ -5,6 +5,7 @@
 #pragma once
 
 #include <span>
+#include <string_view>
 
 #include "nn/geometry/body.h"
 #include "nn/layers/mlp.h"
@@ -42,6 +43,8 @@ struct OrientationNet : Module {
   const char* kind() const override { return "OrientationNet"; }
   ReluChain layers;
 };
+/// The bytes of orientation.safetensors.
+std::string_view orientation_weights();
 /// With the weights that are part of the program.
 const OrientationNet& orientation_net();
 

@@ -10,6 +10,7 @@
 
 #include "datasets/doctor/orientation_model.h"
 #include "datasets/doctor/planes.h"
+#include "datasets/doctor/shape.h"
 
 namespace restage {
 namespace {
@@ -44,12 +45,6 @@ std::vector<float> loneliness(const Tree& tree, const Points& points) {
     out[i] = n > 0 ? std::sqrt(squared[n - 1]) : 0;
   }
   return out;
-}
-
-float median(std::vector<float> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 struct Neighbourhood {
@@ -153,12 +148,26 @@ std::vector<size_t> evenly_spread(const Points& points) {
     const Point p = edge > 0 ? Point((points[i] - cloud.middle) / edge) : Point::Zero();
     std::array<int64_t, 3> cube;  // rounded, not cut: turning the axes round changes nothing
     for (int axis = 0; axis < 3; ++axis)
-      cube[static_cast<size_t>(axis)] = std::llround(std::clamp(p[axis], -1e9f, 1e9f));
+      cube[axis] = std::llround(std::clamp(p[axis], -1e9f, 1e9f));
     if (!(edge > 0) || taken.insert(cube).second) out.push_back(i);
   }
   if (out.size() <= kMostJudged) return out;
   for (size_t k = 0; k < kMostJudged; ++k) out[k] = out[k * out.size() / kMostJudged];
   out.resize(kMostJudged);
+  return out;
+}
+
+/// Of points without a floor and walls.
+Parts find_pieces(const Points& points) {
+  if (points.empty()) return {};
+  const std::vector<size_t> judged = evenly_spread(points);
+  Points some;
+  for (const size_t i : judged) some.push_back(points[i]);
+  Parts out = judge(some);
+  out.judged = judged;
+  if (judged.size() < points.size()) out.part = parts_at(points, some, out);
+  out.stray = static_cast<size_t>(std::count(out.part.begin(), out.part.end(), Part::stray));
+  out.other = static_cast<size_t>(std::count(out.part.begin(), out.part.end(), Part::other));
   return out;
 }
 
@@ -181,24 +190,6 @@ std::vector<Part> parts_at(const Points& others, const Points& points, const Par
   }
   return out;
 }
-
-namespace {
-
-/// Of points without a floor and walls.
-Parts find_pieces(const Points& points) {
-  if (points.empty()) return {};
-  const std::vector<size_t> judged = evenly_spread(points);
-  Points some;
-  for (const size_t i : judged) some.push_back(points[i]);
-  Parts out = judge(some);
-  out.judged = judged;
-  if (judged.size() < points.size()) out.part = parts_at(points, some, out);
-  out.stray = static_cast<size_t>(std::count(out.part.begin(), out.part.end(), Part::stray));
-  out.other = static_cast<size_t>(std::count(out.part.begin(), out.part.end(), Part::other));
-  return out;
-}
-
-}  // namespace
 
 Parts find_parts(const Points& points) {
   const Planes planes = find_planes(points);

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "autograd/base/rng.h"
+#include "datasets/doctor/shape.h"
 
 namespace restage {
 namespace {
@@ -129,9 +130,7 @@ double noise_of(const Points& points, const Plane& plane) {
   std::vector<double> away;
   for (const Point& p : points)
     if (plane.has(p)) away.push_back(std::abs(plane.above(p)));
-  const auto middle = away.begin() + std::ssize(away) / 2;
-  std::nth_element(away.begin(), middle, away.end());
-  return 6 * *middle;  // four standard deviations
+  return 6 * median(std::move(away));  // four standard deviations
 }
 
 }  // namespace

@@ -53,17 +53,14 @@ std::optional<TPoseAngles> t_pose_angles(const Points& points) {
     const double sign = side == 0 ? 1 : -1;
     std::vector<double> outwards;
     for (const Vec3& p : normal) outwards.push_back(sign * p.x());
-    const auto at = outwards.begin() +
-                    static_cast<std::ptrdiff_t>(0.985 * static_cast<double>(outwards.size() - 1));
-    std::nth_element(outwards.begin(), at, outwards.end());
-    const double reach = *at;
+    const double reach = quantile(std::move(outwards), 0.985);
     const Vec3 hand = *middle_of(normal, [&](const Vec3& p) { return sign * p.x() >= reach; });
     if (sign * hand.x() < kShortestReach) return std::nullopt;
     const double level = std::hypot(hand.x(), hand.z());
     const double down = std::atan2(kShoulderHeight - hand.y(), level - kShoulderWidth),
                  aside = std::atan2(hand.z(), sign * hand.x());
-    out.below[static_cast<size_t>(side)] = down * kDegrees;
-    out.arms[static_cast<size_t>(side)] = std::acos(std::cos(down) * std::cos(aside)) * kDegrees;
+    out.below[side] = down * kDegrees;
+    out.arms[side] = std::acos(std::cos(down) * std::cos(aside)) * kDegrees;
     // Towards the left: the left hand goes back, the right one forwards.
     out.turned -= sign * aside * kDegrees / 2;
     const auto foot =

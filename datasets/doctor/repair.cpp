@@ -1,24 +1,8 @@
 #include "datasets/doctor/examine.h"
+#include "datasets/readers/non_finite.h"
 
 namespace restage {
 namespace {
-
-/// The vertices of a mesh that are kept, and the triangles all of whose corners are.
-Mesh kept(const Mesh& mesh, const std::vector<bool>& keep) {
-  Mesh out;
-  std::vector<int32_t> index(mesh.vertices.size(), -1);
-  for (size_t i = 0; i < mesh.vertices.size(); ++i)
-    if (keep[i]) {
-      index[i] = static_cast<int32_t>(out.vertices.size());
-      out.vertices.push_back(mesh.vertices[i]);
-    }
-  for (const Triangle& f : mesh.faces) {
-    const Triangle moved = {index[static_cast<size_t>(f[0])], index[static_cast<size_t>(f[1])],
-                            index[static_cast<size_t>(f[2])]};
-    if (moved[0] >= 0 && moved[1] >= 0 && moved[2] >= 0) out.faces.push_back(moved);
-  }
-  return out;
-}
 
 std::vector<bool> points_to_keep(const Points& points) {
   const std::vector<size_t> once = distinct(points);
@@ -33,7 +17,7 @@ std::vector<bool> points_to_keep(const Points& points) {
 std::vector<bool> vertices_to_keep(const Mesh& mesh) {
   Pieces pieces(mesh.vertices.size());
   for (const Triangle& f : mesh.faces)
-    for (const size_t k : {1, 2}) pieces.join(static_cast<size_t>(f[0]), static_cast<size_t>(f[k]));
+    for (const size_t k : {1, 2}) pieces.join(f[0], f[k]);
   const std::vector<size_t> first = first_equals(mesh.vertices);
   for (size_t i = 0; i < first.size(); ++i) pieces.join(first[i], i);
 
@@ -66,8 +50,9 @@ std::vector<bool> vertices_to_keep(const Mesh& mesh) {
 }  // namespace
 
 Mesh mended(const Mesh& mesh, const Diagnosis& diagnosis) {
-  Mesh out =
-      kept(mesh, mesh.faces.empty() ? points_to_keep(mesh.vertices) : vertices_to_keep(mesh));
+  Mesh out = mesh;
+  keep_points(mesh.faces.empty() ? points_to_keep(mesh.vertices) : vertices_to_keep(mesh),
+              out.vertices, out.faces);
   if (diagnosis.transform)
     for (Point& p : out.vertices) p = (*diagnosis.transform)(p);
   return out;

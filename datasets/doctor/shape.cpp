@@ -1,6 +1,5 @@
 #include "datasets/doctor/shape.h"
 
-#include <algorithm>
 #include <cmath>
 #include <map>
 #include <set>
@@ -20,9 +19,7 @@ constexpr double kNoPerson = 0.0111;  // density of "no person, or another unit"
 /// A mesh whose surface can be sampled.
 bool has_area(const Mesh& mesh) {
   return std::any_of(mesh.faces.begin(), mesh.faces.end(), [&](const Triangle& f) {
-    const auto at = [&](int k) {
-      return mesh.vertices[static_cast<size_t>(f[static_cast<size_t>(k)])];
-    };
+    const auto at = [&](int k) { return mesh.vertices[f[k]]; };
     const float area = (at(1) - at(0)).cross(at(2) - at(0)).norm();
     return area > 0 && std::isfinite(area);
   });
@@ -79,8 +76,7 @@ ShapePoints located_shape_points(const Mesh& mesh) {
   const SurfaceSamples samples =
       SurfaceSampler(body).draw(RngKey{0, 0}.fold("doctor"), kSurfacePoints);
   out.points = samples.on_rest(body);
-  for (size_t i = 0; i < samples.size(); ++i)
-    out.vertex.push_back(static_cast<size_t>(samples.vertices[3 * i]));
+  for (size_t i = 0; i < samples.size(); ++i) out.vertex.push_back(samples.vertices[3 * i]);
   return out;
 }
 
@@ -98,36 +94,29 @@ PersonShape shape_of(const Mesh& mesh) {
 
 UnitGuess guess_unit(double size) {
   UnitGuess out;
-  out.deviation = 1e9;
   if (!(size > 0) || !std::isfinite(size)) return out;
-  double total = kNoPerson;
+  double total = kNoPerson, least = 1e9;
   for (const LengthUnit& unit : kUnits) {
     const double deviation = (std::log(size * unit.metres) - kMeanLogSize) / kDeviation;
     total += std::exp(-0.5 * deviation * deviation);
-    if (std::abs(deviation) < std::abs(out.deviation)) {
-      out.unit = unit;
-      out.deviation = deviation;
-    }
+    if (std::abs(deviation) < std::abs(least)) out.unit = unit, least = deviation;
   }
-  out.sure = std::exp(-0.5 * out.deviation * out.deviation) / total;
+  out.sure = std::exp(-0.5 * least * least) / total;
   return out;
 }
 
-double median(std::vector<double> values) {
+double quantile(std::vector<double> values, double q) {
   if (values.empty()) return 0;
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
 }
 
 double quantile(const Points& points, const Vec3& axis, double q) {
-  if (points.empty()) return 0;
   std::vector<double> along;
   for (const Point& p : points) along.push_back(axis.dot(p.cast<double>()));
-  const auto at =
-      along.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(along.size() - 1));
-  std::nth_element(along.begin(), at, along.end());
-  return *at;
+  return quantile(std::move(along), q);
 }
 
 double one_sidedness(const Points& points, double spacing) {
@@ -179,9 +168,8 @@ Borders borders(const Mesh& mesh) {
     while (end < edges.size() && edges[end] == edges[i]) ++end;
     if (end - i == 1) {
       ++out.edges;
-      const auto a = static_cast<size_t>(edges[i][0]), b = static_cast<size_t>(edges[i][1]);
-      lines.join(a, b);
-      on_border.insert(on_border.end(), {a, b});
+      lines.join(edges[i][0], edges[i][1]);
+      on_border.insert(on_border.end(), edges[i].begin(), edges[i].end());
     }
     i = end;
   }

@@ -1,8 +1,8 @@
 // What one cloud or surface shows, in its own units and axes; the pieces of examine.h.
 #pragma once
 
+#include <algorithm>
 #include <array>
-#include <string>
 
 #include "datasets/doctor/orientation.h"
 #include "datasets/doctor/parts.h"
@@ -47,8 +47,7 @@ inline constexpr std::array<LengthUnit, 5> kUnits = {
 
 struct UnitGuess {
   LengthUnit unit = kUnits[0];
-  double sure = 0;       ///< probability; low if no unit makes a person of it
-  double deviation = 0;  ///< from a usual person, in standard deviations
+  double sure = 0;  ///< probability; low if no unit makes a person of it
 };
 /// By PersonShape::size.
 UnitGuess guess_unit(double size);
@@ -63,10 +62,18 @@ inline bool is_person_sized(double metres) {
 /// The size of somebody who stands, times their height.
 inline constexpr double kSizeOfHeight = 0.23;
 
-/// Value of `points` along `axis` that a share `q` of them lie below.
+/// Value that a share `q` of them lie below; 0 if there are none.
+double quantile(std::vector<double> values, double q);
+/// The same of points along `axis`.
 double quantile(const Points& points, const Vec3& axis, double q);
 /// The middle one, of an even number the upper of the two; 0 if there are none.
-double median(std::vector<double> values);
+template <class T>
+T median(std::vector<T> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + std::ssize(values) / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
 
 /// Share of the rays through the cloud, from the direction where it is largest, that hit one side
 /// only: about 0.3 of a closed body, 0.8 of what one depth camera saw.

@@ -58,10 +58,8 @@ Summary summary_of(const Frame& frame, const Points& points, bool numbered) {
   const size_t n = std::min<size_t>(points.size(), 2000);
   for (size_t i = 0; i < n; ++i) some.push_back(points[i * points.size() / n]);
   for (int i = 0; i < kExtents; ++i) {
-    out.extent[static_cast<size_t>(2 * i)] =
-        static_cast<float>(quantile(some, extent_direction(i), 0.02));
-    out.extent[static_cast<size_t>(2 * i + 1)] =
-        static_cast<float>(quantile(some, extent_direction(i), 0.98));
+    out.extent[2 * i] = static_cast<float>(quantile(some, extent_direction(i), 0.02));
+    out.extent[2 * i + 1] = static_cast<float>(quantile(some, extent_direction(i), 0.98));
   }
   for (int axis = 0; axis < 3; ++axis)
     out.middle[axis] = static_cast<float>(quantile(some, direction(2 * axis), 0.5));

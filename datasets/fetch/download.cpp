@@ -41,7 +41,8 @@ void download(const std::string& address, const std::string& part, uint64_t byte
   init_once();
   std::error_code none;
   uint64_t have = std::filesystem::file_size(part, none);
-  if (none || have >= bytes) have = 0;
+  if (!none && have == bytes) return;
+  if (none || have > bytes) have = 0;
   const std::unique_ptr<FILE, int (*)(FILE*)> file(std::fopen(part.c_str(), have > 0 ? "ab" : "wb"),
                                                    std::fclose);
   if (!file) throw WorkError(part + ": cannot be written; check space and permissions");
@@ -75,6 +76,18 @@ void download(const std::string& address, const std::string& part, uint64_t byte
                                     : curl_easy_strerror(done);
   throw WorkError(address + ": cannot be fetched (" + why +
                   "); check the network and run it again, or give --from FOLDER");
+}
+
+void make_folder_of(const std::string& path) {
+  std::error_code failed;
+  std::filesystem::create_directories(std::filesystem::path(path).parent_path(), failed);
+  if (failed) throw WorkError(path + ": its folder cannot be made; check space and permissions");
+}
+
+void put_in_place(const std::string& part, const std::string& target) {
+  std::error_code failed;
+  std::filesystem::rename(part, target, failed);
+  if (failed) throw WorkError(target + ": cannot be put in place; check permissions");
 }
 
 }  // namespace restage

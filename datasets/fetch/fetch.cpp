@@ -5,18 +5,17 @@
 #include <charconv>
 #include <filesystem>
 #include <map>
-#include <memory>
 #include <set>
 #include <sstream>
 #include <string_view>
 
 #include "autograd/base/atomic_file.h"
-#include "autograd/base/error.h"
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 #include "datasets/fetch/download.h"
 #include "datasets/fetch/fetch_cmu.h"
 #include "datasets/importers/makehuman_pack.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/folders.h"
 #include "datasets/readers/packed_text.h"
 #include "datasets/readers/sha256.h"
@@ -123,7 +122,7 @@ bool is_right(const FetchEntry& e, const std::string& path, const std::string& l
 void bring(const FetchEntry& e, const std::string& target) {
   const std::string part = target + ".part";
   std::error_code none;
-  if (fs::file_size(part, none) != e.bytes || none) download(e.address, part, e.bytes);
+  download(e.address, part, e.bytes);
   if (!is_right(e, part, false)) {
     fs::remove(part, none);
     throw WorkError(e.address + ": is not the file that the list pins (SHA-256 " +
@@ -134,8 +133,7 @@ void bring(const FetchEntry& e, const std::string& target) {
     fs::remove(part, none);
     return;
   }
-  fs::rename(part, target, none);
-  if (none) throw WorkError(target + ": cannot be put in place; check permissions");
+  put_in_place(part, target);
 }
 
 // ---- what is to be done, found out before anything is ------------------------------------------
@@ -212,10 +210,8 @@ void perform(const Step& step, const Folders& folders) {
   throw_if_stopped();
   const FetchEntry& e = step.entry;
   const std::string target = folders.out + "/" + e.path;
-  std::error_code failed;
-  fs::create_directories(fs::path(target).parent_path(), failed);
-  if (failed) throw WorkError(target + ": its folder cannot be made; check space and permissions");
-  log_info("fetching " + e.path + " (" + std::to_string((e.bytes + 999) / 1000) + " kB)");
+  make_folder_of(target);
+  log_info(cat("fetching ", e.path, " (", (e.bytes + 999) / 1000, " kB)"));
   if (step.way == Way::copy) copy_in(step.source, target);
   if (step.way == Way::download) bring(e, target);
   if (step.way == Way::makehuman) {
@@ -226,7 +222,7 @@ void perform(const Step& step, const Folders& folders) {
     const CmuOriginals originals = read_cmu_originals(step.source);
     const std::string found = folders.from.empty() ? folders.out + "/cmu/originals" : folders.from;
     if (folders.from.empty()) fetch_cmu_originals(originals, found);
-    log_info("packing " + std::to_string(originals.clips.size()) + " clips");
+    log_info(cat("packing ", originals.clips.size(), " clips"));
     pack_cmu(originals, found, target);
   }
 }
@@ -242,7 +238,7 @@ std::vector<FetchEntry> read_fetch_list(const std::string& list) {
   std::string line;
   for (size_t number = 1; std::getline(lines, line); ++number) {
     if (line.find_first_not_of(" \t\r") == std::string::npos || line[0] == '#') continue;
-    const std::string where = list + ":" + std::to_string(number);
+    const std::string where = cat(list, ":", number);
     if (line[0] == '@') {
       std::istringstream words(line);
       std::string name, address, rest;

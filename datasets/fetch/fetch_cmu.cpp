@@ -2,17 +2,16 @@
 
 #include <cctype>
 #include <filesystem>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string_view>
 #include <vector>
 
 #include "autograd/base/atomic_file.h"
-#include "autograd/base/error.h"
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 #include "datasets/fetch/download.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/folders.h"
 #include "datasets/readers/sha256.h"
 
@@ -41,19 +40,7 @@ std::set<std::string> wanted_files(const CmuOriginals& originals) {
 
 /// Git's name of a file: SHA-1 over a word, its length and its bytes.
 std::string git_sum(const std::string& bytes) {
-  return sha1("blob " + std::to_string(bytes.size()) + '\0' + bytes);
-}
-
-void make_folder_of(const std::string& path) {
-  std::error_code failed;
-  fs::create_directories(fs::path(path).parent_path(), failed);
-  if (failed) throw WorkError(path + ": its folder cannot be made; check space and permissions");
-}
-
-void put_in_place(const std::string& part, const std::string& target) {
-  std::error_code failed;
-  fs::rename(part, target, failed);
-  if (failed) throw WorkError(target + ": cannot be put in place; check permissions");
+  return sha1(cat("blob ", bytes.size(), '\0', bytes));
 }
 
 /// The list of a commit's files, which never changes: fetched once.
@@ -94,7 +81,7 @@ std::string escaped(const std::string& path) {
     if ((byte < 128 && std::isalnum(byte) != 0) || kPlain.find(c) != std::string_view::npos)
       out += c;
     else
-      out += std::string("%") + "0123456789ABCDEF"[byte >> 4] + "0123456789ABCDEF"[byte & 15];
+      out += cat("%", "0123456789ABCDEF"[byte >> 4], "0123456789ABCDEF"[byte & 15]);
   }
   return out;
 }
@@ -104,10 +91,10 @@ void fetch_blob(const Blob& blob, const CmuRepository& repository, const std::st
   if (fs::file_size(target, none) == blob.bytes && !none &&
       git_sum(read_file(target, kMostFile)) == blob.sha1)
     return;
-  log_info("fetching " + blob.path + " (" + std::to_string((blob.bytes + 999) / 1000) + " kB)");
+  log_info(cat("fetching ", blob.path, " (", (blob.bytes + 999) / 1000, " kB)"));
   make_folder_of(target);
   const std::string part = target + ".part", address = repository.files + "/" + escaped(blob.path);
-  if (fs::file_size(part, none) != blob.bytes || none) download(address, part, blob.bytes);
+  download(address, part, blob.bytes);
   if (git_sum(read_file(part, kMostFile)) != blob.sha1) {
     fs::remove(part, none);
     throw WorkError(address + ": is not the file that its repository lists; run it again");
@@ -139,10 +126,9 @@ void fetch_cmu_originals(const CmuOriginals& originals, const std::string& folde
       }
   }
   if (!missing.empty())
-    throw WorkError(
-        folder + ": none of the listed repositories has " + *missing.begin() +
-        (missing.size() > 1 ? " or " + std::to_string(missing.size() - 1) + " others" : "") +
-        "; correct the list, or put them there by hand");
+    throw WorkError(folder + ": none of the listed repositories has " + *missing.begin() +
+                    (missing.size() > 1 ? cat(" or ", missing.size() - 1, " others") : "") +
+                    "; correct the list, or put them there by hand");
 }
 
 }  // namespace restage

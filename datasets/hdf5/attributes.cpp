@@ -41,17 +41,11 @@ Attribute open_attribute(const File::State& state, const std::string& object,
   return {std::move(id), std::move(type), where};
 }
 
-[[noreturn]] void throw_damaged(const std::string& where) {
-  throw InputError(where, "is damaged", "copy or make the file again");
-}
-
 std::string read_text_attribute(const Attribute& attribute) {
   if (H5Tget_class(attribute.type) != H5T_STRING)
     throw InputError(attribute.where, "is not text", "store a string");
   if (H5Tis_variable_str(attribute.type) > 0) {
-    const Handle memory(H5Tcopy(H5T_C_S1), H5Tclose);
-    H5Tset_size(memory, H5T_VARIABLE);
-    H5Tset_cset(memory, H5Tget_cset(attribute.type));
+    const Handle memory = text_type(H5T_VARIABLE, H5Tget_cset(attribute.type));
     char* raw = nullptr;
     if (H5Aread(attribute.id, memory, &raw) < 0) throw_damaged(attribute.where);
     const std::string value = raw == nullptr ? "" : raw;
@@ -88,16 +82,13 @@ std::vector<std::string> File::children(const std::string& group) const {
   if (id < 0) throw InputError(where, "is not a group", "give a file of the documented schema");
   std::vector<std::string> names;
   if (H5Literate(id, order_of(id), H5_ITER_INC, nullptr, collect_name, &names) < 0)
-    throw InputError(where, "is damaged", "copy or make the file again");
+    throw_damaged(where);
   return names;
 }
 
 void File::set_text(const std::string& object, const std::string& name, const std::string& value) {
   const Lock lock;
-  const Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
-  H5Tset_size(type, std::max<size_t>(value.size(), 1));
-  H5Tset_strpad(type, H5T_STR_NULLPAD);
-  H5Tset_cset(type, H5T_CSET_UTF8);
+  const Handle type = text_type(std::max<size_t>(value.size(), 1), H5T_CSET_UTF8);
   write_attribute(*state_, object, name, type, value.c_str());
 }
 

@@ -45,12 +45,6 @@ bool is_one_of(hid_t type, std::initializer_list<hid_t> known) {
 
 Lock::Lock() : lock_(library_mutex()) { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
 
-File::State::~State() {
-  if (id < 0) return;
-  const Lock lock;
-  H5Fclose(id);
-}
-
 std::string File::State::where(const std::string& name) const {
   return path + ":" + (name.empty() || name[0] != '/' ? "/" : "") + printable(name);
 }
@@ -61,11 +55,23 @@ Handle file_access() {
   return access;
 }
 
+Handle text_type(size_t width, H5T_cset_t letters) {
+  Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
+  H5Tset_size(type, width);
+  if (width != H5T_VARIABLE) H5Tset_strpad(type, H5T_STR_NULLPAD);
+  H5Tset_cset(type, letters);
+  return type;
+}
+
 std::string printable(const std::string& name) {
   std::string text = name.substr(0, 80);
   for (char& c : text)
     if (static_cast<unsigned char>(c) < 32 || c == 127) c = '?';
   return text;
+}
+
+void throw_damaged(const std::string& where) {
+  throw InputError(where, "is damaged", "copy or make the file again");
 }
 
 void throw_write_error(const std::string& path) {

@@ -7,7 +7,6 @@
 #include <mutex>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "autograd/base/atomic_file.h"
 #include "datasets/hdf5/file.h"
@@ -23,31 +22,18 @@ class Lock {
   std::unique_lock<std::recursive_mutex> lock_;
 };
 
-/// An identifier of the library that is closed at the end of its scope (if it is one).
-class Handle {
- public:
-  Handle(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close) {}
-  Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, -1)), close_(other.close_) {}
-  Handle& operator=(Handle&&) = delete;
-  ~Handle() {
-    if (id_ >= 0) close_(id_);
-  }
-  operator hid_t() const { return id_; }
-
- private:
-  hid_t id_;
-  herr_t (*close_)(hid_t);
-};
+/// How handles are closed that live longer than a Lock.
+template <herr_t (*close)(hid_t)>
+herr_t locked(hid_t id) {
+  const Lock lock;
+  return close(id);
+}
 
 struct File::State {
   std::string path;
-  hid_t id = -1;
-  std::unique_ptr<AtomicFile> target;  ///< null when reading
+  std::unique_ptr<AtomicFile> target = nullptr;  ///< null when reading
+  Handle id{-1, locked<H5Fclose>};
 
-  explicit State(std::string p) : path(std::move(p)) {}
-  State(const State&) = delete;
-  State& operator=(const State&) = delete;
-  ~State();
   /// "file:/name" for messages.
   std::string where(const std::string& name) const;
 };
@@ -55,8 +41,12 @@ struct File::State {
 /// How every file is opened: closing it closes all that is in it. (A file that is open already can
 /// only be opened again in the same way.)
 Handle file_access();
+/// Strings of this many bytes (H5T_VARIABLE: any number), in memory or, padded with zeros, in a
+/// file.
+Handle text_type(size_t width, H5T_cset_t letters);
 /// A name from a file, made fit for a one-line message.
 std::string printable(const std::string& name);
+[[noreturn]] void throw_damaged(const std::string& where);
 /// WorkError with the system's reason (disk full) from the library's error stack.
 [[noreturn]] void throw_write_error(const std::string& path);
 /// What a file's type holds. InputError but for plain machine types and text: odd bit layouts exist

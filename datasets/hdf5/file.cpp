@@ -9,9 +9,9 @@
 #include <limits>
 #include <type_traits>
 
-#include "autograd/base/error.h"
 #include "datasets/hdf5/detail.h"
 #include "datasets/hdf5/probe.h"
+#include "datasets/readers/errors.h"
 
 namespace restage::h5 {
 namespace {
@@ -41,9 +41,8 @@ void check_filters(hid_t properties, const std::string& where) {
                                                &values, nullptr, 0, nullptr, nullptr);
     if (filter != H5Z_FILTER_DEFLATE && filter != H5Z_FILTER_SHUFFLE &&
         filter != H5Z_FILTER_FLETCHER32)
-      throw InputError(
-          where, "is compressed by filter " + std::to_string(filter) + ", which is not read here",
-          "repack it with: h5repack -f GZIP=4 OLD NEW");
+      throw InputError(where, cat("is compressed by filter ", filter, ", which is not read here"),
+                       "repack it with: h5repack -f GZIP=4 OLD NEW");
   }
 }
 
@@ -87,8 +86,8 @@ void check_probe(Probe probed, const std::string& path) {
                      "copy or make the file again");
   if (probed == Probe::memory)
     throw InputError(path,
-                     "takes more than " + std::to_string(kProbeMemory >> 20) +
-                         " MiB to read, which no file of this kind needs",
+                     cat("takes more than ", kProbeMemory >> 20,
+                         " MiB to read, which no file of this kind needs"),
                      "make it again with smaller chunks (h5repack)");
   if (probed == Probe::time)
     throw InputError(path, "is an HDF5 file whose reading finds no end",
@@ -106,6 +105,18 @@ int64_t product(const Shape& shape, size_t from = 0) {
   return n;
 }
 
+/// Selects rows [first, first + count) of a data set's space; the space of their values, which is
+/// none (< 0) if that fails.
+Handle select_rows(hid_t space, const Shape& shape, int64_t first, int64_t count) {
+  std::vector<hsize_t> start(shape.size(), 0), size(shape.begin(), shape.end());
+  start[0] = static_cast<hsize_t>(first);
+  size[0] = static_cast<hsize_t>(count);
+  const herr_t done =
+      H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, size.data(), nullptr);
+  const int axes = static_cast<int>(size.size());
+  return {done < 0 ? -1 : H5Screate_simple(axes, size.data(), nullptr), H5Sclose};
+}
+
 }  // namespace
 
 std::string to_string(const Shape& shape) {
@@ -117,24 +128,6 @@ std::string to_string(const Shape& shape) {
 
 // ---- Dataset -----------------------------------------------------------------------------------
 
-Dataset::Dataset(Dataset&& other) noexcept { *this = std::move(other); }
-
-Dataset& Dataset::operator=(Dataset&& other) noexcept {
-  std::swap(id_, other.id_);
-  std::swap(shape_, other.shape_);
-  std::swap(type_, other.type_);
-  std::swap(where_, other.where_);
-  std::swap(path_, other.path_);
-  std::swap(wide_, other.wide_);
-  return *this;
-}
-
-Dataset::~Dataset() {
-  if (id_ < 0) return;
-  const Lock lock;
-  H5Dclose(id_);
-}
-
 int64_t Dataset::row_size() const { return product(shape_, 1); }
 
 void Dataset::check_memory(int64_t values, size_t value_size) const {
@@ -143,19 +136,13 @@ void Dataset::check_memory(int64_t values, size_t value_size) const {
 }
 
 void Dataset::read_raw(int64_t first, int64_t count, int64_t type, void* out) const {
-  const Handle space(H5Dget_space(id_), H5Sclose);
   herr_t done = -1;
   if (shape_.empty()) {
     done = H5Dread(id_, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, out);
   } else {
-    std::vector<hsize_t> start(shape_.size(), 0), size(shape_.begin(), shape_.end());
-    start[0] = static_cast<hsize_t>(first);
-    size[0] = static_cast<hsize_t>(count);
-    const Handle memory(H5Screate_simple(static_cast<int>(size.size()), size.data(), nullptr),
-                        H5Sclose);
-    if (H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, size.data(), nullptr) >=
-        0)
-      done = H5Dread(id_, type, memory, space, H5P_DEFAULT, out);
+    const Handle space(H5Dget_space(id_), H5Sclose),
+        memory = select_rows(space, shape_, first, count);
+    if (memory >= 0) done = H5Dread(id_, type, memory, space, H5P_DEFAULT, out);
   }
   if (done < 0) throw InputError(where_, "is damaged or cut short", "copy or make the file again");
 }
@@ -166,9 +153,7 @@ void Dataset::read_rows(int64_t first, int64_t count, std::vector<T>& out) const
   if (std::is_integral_v<T> && type_ != Type::integer)
     throw InputError(where_, "holds fractions where integers are expected", "store integers");
   if (first < 0 || count < 0 || first > rows() || count > rows() - first)
-    throw InputError(where_,
-                     "has " + std::to_string(rows()) + " rows, row " +
-                         std::to_string(first + count) + " was asked for",
+    throw InputError(where_, cat("has ", rows(), " rows, row ", first + count, " was asked for"),
                      "make the file again");
   const int64_t values = count * row_size();
   const bool narrow = std::is_integral_v<T> && !std::is_same_v<T, int64_t> &&
@@ -183,7 +168,7 @@ void Dataset::read_rows(int64_t first, int64_t count, std::vector<T>& out) const
     read_raw(first, count, H5T_NATIVE_INT64, wide.data());
     for (size_t i = 0; i < wide.size(); ++i) {
       if (wide[i] < std::numeric_limits<T>::min() || wide[i] > std::numeric_limits<T>::max())
-        throw InputError(where_, "holds " + std::to_string(wide[i]) + ", which is out of range",
+        throw InputError(where_, cat("holds ", wide[i], ", which is out of range"),
                          "correct the value");
       out[i] = static_cast<T>(wide[i]);
     }
@@ -206,9 +191,7 @@ std::vector<std::string> Dataset::read_text() const {
   if (H5Tis_variable_str(type) > 0) {
     check_memory(static_cast<int64_t>(n), sizeof(char*));
     std::vector<char*> raw(n, nullptr);
-    const Handle memory(H5Tcopy(H5T_C_S1), H5Tclose);
-    H5Tset_size(memory, H5T_VARIABLE);
-    H5Tset_cset(memory, H5Tget_cset(type));
+    const Handle memory = text_type(H5T_VARIABLE, H5Tget_cset(type));
     read_raw(0, rows(), memory, raw.data());
     for (char* item : raw) {
       out.emplace_back(item == nullptr ? "" : item);
@@ -232,23 +215,14 @@ void Dataset::append(std::span<const T> values) {
   const Lock lock;
   const int64_t row = row_size(), count = row == 0 ? 0 : static_cast<int64_t>(values.size()) / row;
   if (count * row != static_cast<int64_t>(values.size()))
-    throw ShapeError(where_ + ": " + std::to_string(values.size()) +
-                     " values are no whole rows of " + std::to_string(row));
-  std::vector<hsize_t> start(shape_.size(), 0), size(shape_.begin(), shape_.end());
-  start[0] = size[0];
-  size[0] += static_cast<hsize_t>(count);
-  if (H5Dset_extent(id_, size.data()) < 0) throw_write_error(path_);
-  size[0] = static_cast<hsize_t>(count);
-  if (!values.empty()) {
-    const Handle space(H5Dget_space(id_), H5Sclose);
-    const Handle memory(H5Screate_simple(static_cast<int>(size.size()), size.data(), nullptr),
-                        H5Sclose);
-    if (H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, size.data(), nullptr) <
-            0 ||
-        H5Dwrite(id_, memory_type<T>(), memory, space, H5P_DEFAULT, values.data()) < 0)
-      throw_write_error(path_);
-  }
-  shape_[0] += count;
+    throw ShapeError(cat(where_, ": ", values.size(), " values are no whole rows of ", row));
+  const int64_t first = rows();
+  truncate(first + count);
+  if (values.empty()) return;
+  const Handle space(H5Dget_space(id_), H5Sclose),
+      memory = select_rows(space, shape_, first, count);
+  if (memory < 0 || H5Dwrite(id_, memory_type<T>(), memory, space, H5P_DEFAULT, values.data()) < 0)
+    throw_write_error(path_);
 }
 
 void Dataset::truncate(int64_t rows) {
@@ -270,8 +244,7 @@ const std::string& File::path() const { return state_->path; }
 File File::open(const std::string& path) {
   struct stat info {};
   if (::stat(path.c_str(), &info) != 0)
-    throw InputError(path, std::string("cannot be read (") + std::strerror(errno) + ")",
-                     "check the path");
+    throw InputError(path, cat("cannot be read (", std::strerror(errno), ")"), "check the path");
   if (!S_ISREG(info.st_mode)) throw InputError(path, "is not a file", "give an HDF5 file");
   const Lock lock;
   auto state = std::make_unique<State>(path);
@@ -279,7 +252,7 @@ File File::open(const std::string& path) {
   if (H5Fis_hdf5(path.c_str()) <= 0)
     throw InputError(path, "is not an HDF5 file", "give an HDF5 file (.h5)");
   check_probe(probe(path), path);
-  state->id = H5Fopen(path.c_str(), H5F_ACC_RDONLY, access);
+  state->id = Handle(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access), locked<H5Fclose>);
   if (state->id < 0) check_probe(Probe::damaged, path);
   return File(std::move(state));
 }
@@ -295,17 +268,16 @@ File File::create(const std::string& path) {
   const Handle creation(H5Pcreate(H5P_FILE_CREATE), H5Pclose);
   H5Pset_link_creation_order(creation, H5P_CRT_ORDER_TRACKED | H5P_CRT_ORDER_INDEXED);
   H5Pset_obj_track_times(creation, false);
-  state->id = H5Fcreate(state->target->path().c_str(), H5F_ACC_TRUNC, creation, access);
+  state->id = Handle(H5Fcreate(state->target->path().c_str(), H5F_ACC_TRUNC, creation, access),
+                     locked<H5Fclose>);
   if (state->id < 0) throw_write_error(path);
   return File(std::move(state));
 }
 
 void File::commit() {
   const Lock lock;
-  const hid_t id = state_->id;
-  if (H5Fflush(id, H5F_SCOPE_GLOBAL) < 0) throw_write_error(state_->path);
-  state_->id = -1;
-  if (H5Fclose(id) < 0) throw_write_error(state_->path);
+  if (H5Fflush(state_->id, H5F_SCOPE_GLOBAL) < 0) throw_write_error(state_->path);
+  if (H5Fclose(state_->id.release()) < 0) throw_write_error(state_->path);
   state_->target->commit();
 }
 
@@ -324,14 +296,13 @@ Dataset File::dataset(const std::string& name) const {
   const Handle access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);
   H5Pset_chunk_cache(access, 521, size_t{32} << 20,
                      1.0);  // streaming must not unpack a chunk twice
-  set.id_ = H5Dopen2(state_->id, name.c_str(), access);
+  set.id_ = Handle(H5Dopen2(state_->id, name.c_str(), access), locked<H5Dclose>);
   if (set.id_ < 0)
     throw InputError(set.where_, "is no data set or damaged",
                      "give a file of the documented schema");
   const Handle type(H5Dget_type(set.id_), H5Tclose), space(H5Dget_space(set.id_), H5Sclose),
       creation(H5Dget_create_plist(set.id_), H5Pclose);
-  if (type < 0 || space < 0 || creation < 0)
-    throw InputError(set.where_, "is damaged", "copy or make the file again");
+  if (type < 0 || space < 0 || creation < 0) throw_damaged(set.where_);
   set.type_ = classify(type, set.where_);
   set.wide_ = set.type_ == Type::integer && is_wide_integer(type);
   set.shape_ = extent_of(space, set.where_);
@@ -339,8 +310,7 @@ Dataset File::dataset(const std::string& name) const {
   const auto stored = std::min<uint64_t>(H5Dget_storage_size(set.id_), file_size(state_->path));
   const uint64_t claimed = static_cast<uint64_t>(product(set.shape_)) * H5Tget_size(type);
   if (claimed > kAlwaysAllowed && claimed / kMostCompression > stored)
-    throw InputError(set.where_,
-                     "claims " + std::to_string(claimed) + " bytes, far more than the file stores",
+    throw InputError(set.where_, cat("claims ", claimed, " bytes, far more than the file stores"),
                      "make the file again");
   return set;
 }
@@ -373,7 +343,7 @@ void File::create_group(const std::string& name) {
   }
 }
 
-int64_t File::make_dataset(const std::string& name, const Shape& shape, int64_t type, bool grows) {
+Handle File::make_dataset(const std::string& name, const Shape& shape, int64_t type, bool grows) {
   const size_t slash = name.rfind('/');
   if (slash != std::string::npos && slash > 0) create_group(name.substr(0, slash));
   std::vector<hsize_t> dims(shape.begin(), shape.end()), most = dims, chunk = dims;
@@ -396,8 +366,8 @@ int64_t File::make_dataset(const std::string& name, const Shape& shape, int64_t 
       dims.empty() ? H5Screate(H5S_SCALAR)
                    : H5Screate_simple(static_cast<int>(dims.size()), dims.data(), most.data()),
       H5Sclose);
-  const hid_t id =
-      H5Dcreate2(state_->id, name.c_str(), type, space, H5P_DEFAULT, creation, H5P_DEFAULT);
+  Handle id(H5Dcreate2(state_->id, name.c_str(), type, space, H5P_DEFAULT, creation, H5P_DEFAULT),
+            locked<H5Dclose>);
   if (id < 0) throw_write_error(state_->path);
   return id;
 }
@@ -405,10 +375,10 @@ int64_t File::make_dataset(const std::string& name, const Shape& shape, int64_t 
 template <class T>
 void File::write(const std::string& name, const Shape& shape, std::span<const T> values) {
   if (product(shape) != static_cast<int64_t>(values.size()))
-    throw ShapeError(state_->where(name) + ": " + std::to_string(values.size()) +
-                     " values for shape " + to_string(shape));
+    throw ShapeError(
+        cat(state_->where(name), ": ", values.size(), " values for shape ", to_string(shape)));
   const Lock lock;
-  const Handle id(make_dataset(name, shape, memory_type<T>(), false), H5Dclose);
+  const Handle id = make_dataset(name, shape, memory_type<T>(), false);
   if (values.empty()) return;
   if (H5Dwrite(id, memory_type<T>(), H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0)
     throw_write_error(state_->path);
@@ -418,13 +388,11 @@ void File::write_text(const std::string& name, const std::vector<std::string>& v
   size_t width = 1;
   for (const std::string& value : values) width = std::max(width, value.size());
   std::string rows;
-  for (const std::string& value : values) rows += value + std::string(width - value.size(), '\0');
+  for (const std::string& value : values)
+    rows += cat(value, std::string(width - value.size(), '\0'));
   const Lock lock;
-  const Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
-  H5Tset_size(type, width);
-  H5Tset_strpad(type, H5T_STR_NULLPAD);
-  H5Tset_cset(type, H5T_CSET_UTF8);
-  const Handle id(make_dataset(name, {static_cast<int64_t>(values.size())}, type, false), H5Dclose);
+  const Handle type = text_type(width, H5T_CSET_UTF8);
+  const Handle id = make_dataset(name, {static_cast<int64_t>(values.size())}, type, false);
   if (!values.empty() && H5Dwrite(id, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, rows.data()) < 0)
     throw_write_error(state_->path);
 }

@@ -10,6 +10,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace restage::h5 {
@@ -19,6 +20,27 @@ using Shape = std::vector<int64_t>;  ///< lengths of the axes, slowest first; em
 /// "[10, 22, 3]"; -1 (any length) is written as *.
 std::string to_string(const Shape& shape);
 
+/// An identifier of the library that is closed at the end of its scope (if it is one).
+class Handle {
+ public:
+  Handle(int64_t id, int (*close)(int64_t)) : id_(id), close_(close) {}
+  Handle(Handle&& other) noexcept : id_(other.release()), close_(other.close_) {}
+  Handle& operator=(Handle&& other) noexcept {
+    std::swap(id_, other.id_);
+    std::swap(close_, other.close_);
+    return *this;
+  }
+  ~Handle() {
+    if (id_ >= 0) close_(id_);
+  }
+  operator int64_t() const { return id_; }
+  int64_t release() { return std::exchange(id_, -1); }  ///< not to be closed here any more
+
+ private:
+  int64_t id_;
+  int (*close_)(int64_t);
+};
+
 enum class Type { floating, integer, text };
 
 /// One open data set. T below is double, float, int64_t, int32_t, int16_t or uint8_t; values are
@@ -26,10 +48,6 @@ enum class Type { floating, integer, text };
 /// an InputError.
 class Dataset {
  public:
-  Dataset(Dataset&&) noexcept;
-  Dataset& operator=(Dataset&&) noexcept;
-  ~Dataset();
-
   const Shape& shape() const { return shape_; }
   Type type() const { return type_; }
   int64_t rows() const { return shape_.empty() ? 1 : shape_[0]; }
@@ -55,7 +73,7 @@ class Dataset {
   void check_memory(int64_t values, size_t value_size) const;
   void read_raw(int64_t first, int64_t count, int64_t memory_type, void* out) const;
 
-  int64_t id_ = -1;
+  Handle id_{-1, nullptr};
   Shape shape_;
   Type type_ = Type::floating;
   std::string where_, path_;
@@ -119,7 +137,7 @@ class File {
 
  private:
   explicit File(std::unique_ptr<State> state);
-  int64_t make_dataset(const std::string& name, const Shape& shape, int64_t type, bool grows);
+  Handle make_dataset(const std::string& name, const Shape& shape, int64_t type, bool grows);
   std::unique_ptr<State> state_;
 };
 

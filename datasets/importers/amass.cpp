@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 
-#include "autograd/base/error.h"
 #include "autograd/base/format.h"
 #include "datasets/importers/import_detail.h"
-#include "datasets/importers/source_motion.h"
 #include "datasets/readers/array_frames.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/folders.h"
 #include "datasets/readers/word_lines.h"
 
@@ -36,12 +34,9 @@ std::string text_of(const Npz& file, const char* name, ImportReport& report) {
   if (!file.has(name)) return "";
   try {
     if (!file.header(name).is_text()) return "";
-    std::string out = lower_case(file.array(name).text()).substr(0, 40);
-    for (char& c : out)
-      if (c < 32 || c > 126) c = '?';  // it is printed
-    return out;
+    return WordLines::quoted(lower_case(file.array(name).text()));
   } catch (const InputError& e) {
-    report.remark(std::string(name) + " counts as not stated: " + e.what());
+    report.remark(cat(name, " counts as not stated: ", e.what()));
     return "";
   }
 }
@@ -121,11 +116,10 @@ SourceMotion read_motion(const Npz& file, const Joints& rest, const Mat3& up) {
   const NpyArray poses = file.array("poses"), trans = file.array("trans");
   const int64_t frames = poses.shape()[0], width = poses.shape()[1];
   if (frames == 0 || frames > kMaxFrames)
-    throw InputError(poses.where(), "has " + std::to_string(frames) + " frames",
-                     "give 1 to " + std::to_string(kMaxFrames));
-  if (trans.is_text() || trans.shape() != std::vector<int64_t>{frames, 3})
+    throw InputError(poses.where(), cat("has ", frames, " frames"), cat("give 1 to ", kMaxFrames));
+  if (!trans.is_shaped({frames, 3}))
     throw InputError(trans.where(), "has the shape " + shape_text(trans.shape()),
-                     "it needs one position a frame: [" + std::to_string(frames) + ", 3]");
+                     cat("it needs one position a frame: [", frames, ", 3]"));
   const auto vector = [](const NpyArray& array, int64_t at) {
     const Vec3 out(array[at], array[at + 1], array[at + 2]);
     if (!(out.cwiseAbs().maxCoeff() < 1e5))
@@ -155,10 +149,9 @@ std::string resampled(SourceMotion& motion, uint64_t bytes, const std::string& f
     throw InputError(path, "lasts more than 9 hours at " + format("%.6g", motion.fps) + " fps",
                      "cut it, or give the true rate with --fps");
   check_length(frames, kJoints, motion.fps, bytes, path);
-  if (motion.fps == kFps) return before + std::to_string(frames) + " frames, kept";
+  if (motion.fps == kFps) return cat(before, frames, " frames, kept");
   motion = resample(motion);
-  return before + std::to_string(frames) + " frames -> 30 fps, " +
-         std::to_string(motion.local.size()) + " frames (slerp, linear)";
+  return cat(before, frames, " frames -> 30 fps, ", motion.local.size(), " frames (slerp, linear)");
 }
 
 /// Remarks on a body that lies: an option that is wrong, or a motion on the floor.
@@ -197,8 +190,7 @@ BodyModels::BodyModels(const std::string& path, uint64_t max_memory)
   }
   if (!entries_.empty()) return;
   const std::string none = "holds no SMPL, SMPL-H or SMPL-X model (.npz)";
-  if (!first.empty())
-    refuse_all(path, none + " among " + std::to_string(files.size()) + " files", first);
+  if (!first.empty()) refuse_all(path, cat(none, " among ", files.size(), " files"), first);
   if (const auto pickles = files_below(path, is_pickle_name); !pickles.empty())
     refuse_pickle(pickles[0]);
   throw InputError(path, none, "give a model or a folder of them as --body-model");
@@ -214,9 +206,9 @@ const SmplModel& BodyModels::find(SmplFamily family, const std::string& gender,
   }
   if (usable.empty())
     throw InputError(clip,
-                     "moves a " + std::string(to_string(family)) + " body, " + path_ + " is " +
-                         to_string(entries_[0].family) + ", whose shapes are others",
-                     "give a " + std::string(to_string(family)) + " model as --body-model");
+                     cat("moves a ", to_string(family), " body, ", path_, " is ",
+                         to_string(entries_[0].family), ", whose shapes are others"),
+                     cat("give a ", to_string(family), " model as --body-model"));
   const std::string wanted = gender.empty() ? "neutral" : gender;
   const Entry* chosen = usable.size() == 1 ? usable[0] : nullptr;
   for (const Entry* entry : usable)
@@ -245,25 +237,23 @@ bool is_amass_motion(const Npz& file) { return file.has("poses") && file.has("tr
 
 bool is_amass_shape(const Npz& file) { return file.has("betas") && !file.has("poses"); }
 
-Motion import_amass(const Npz& file, BodyModels& models, const AmassOptions& options,
+Motion import_amass(const Npz& file, BodyModels& models, const MotionOptions& options,
                     ImportReport& report) {
   report.file = file.path();
   const NpyHeader poses = file.header("poses");
   const SmplFamily family = family_of(file, poses, report);
-  report.fact("layout", std::string(to_string(family)) + ", poses " + shape_text(poses.shape));
+  report.fact("layout", cat(to_string(family), ", poses ", shape_text(poses.shape)));
   const std::string gender = text_of(file, "gender", report);
   report.fact("gender", gender.empty() ? "not stated" : gender);
   const SmplModel& model = models.find(family, gender, file.path(), report.remarks);
   const Betas betas = betas_of(file);
-  report.fact("body model", model.path() + ", " +
-                                std::to_string(std::min(betas.size(), model.shapes())) + " of " +
-                                std::to_string(betas.size()) + " betas");
+  report.fact("body model", cat(model.path(), ", ", std::min(betas.size(), model.shapes()), " of ",
+                                betas.size(), " betas"));
 
   const Joints rest = model.joints(betas);
-  SourceMotion motion =
-      read_motion(file, rest, upright(options.up == Axis::automatic ? Axis::z : options.up));
-  report.fact("up", options.up == Axis::automatic ? "z (AMASS), turned to y"
-                                                  : to_string(options.up) + " (--up)");
+  const Axis up = options.rest.up;
+  SourceMotion motion = read_motion(file, rest, upright(up == Axis::automatic ? Axis::z : up));
+  report.fact("up", up == Axis::automatic ? "z (AMASS), turned to y" : to_string(up) + " (--up)");
   std::string from;
   motion.fps = rate_of(file, options.fps, from);
   report.fact("rate", resampled(motion, poses.bytes(), from, file.path()));

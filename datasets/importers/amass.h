@@ -8,8 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "datasets/importers/axis.h"
-#include "datasets/importers/report.h"
+#include "datasets/importers/motion_clip.h"
 #include "datasets/importers/smpl.h"
 
 namespace restage {
@@ -41,19 +40,14 @@ class BodyModels {
   std::map<std::string, std::unique_ptr<SmplModel>> loaded_;
 };
 
-struct AmassOptions {
-  Axis up = Axis::automatic;  ///< automatic: z, as in all of AMASS
-  double fps = 0;             ///< the true rate, where the file's is wrong; 0: the file's
-  std::string id, subject, split = "train", action;
-};
-
 /// `poses` make a motion; `betas` without poses a shape only (shape.npz, neutral_stagei.npz).
 bool is_amass_motion(const Npz& file);
 bool is_amass_shape(const Npz& file);
 
-/// One clip at 30 fps, and what was done to it. InputError: another layout, no rate, not finite,
-/// no model that fits.
-Motion import_amass(const Npz& file, BodyModels& models, const AmassOptions& options,
+/// One clip at 30 fps, and what was done to it. Of the options the rate, the names and the up axis
+/// count (automatic: z, as in all of AMASS). InputError: another layout, no rate, not finite, no
+/// model that fits.
+Motion import_amass(const Npz& file, BodyModels& models, const MotionOptions& options,
                     ImportReport& report);
 
 }  // namespace restage

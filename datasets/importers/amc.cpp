@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/packed_text.h"
 #include "datasets/readers/word_lines.h"
 
@@ -29,8 +29,8 @@ std::string find_asf(const std::string& amc_path) {
   if (best.empty())
     throw InputError(amc_path,
                      all.empty() ? "there is no skeleton (.asf) in its folder"
-                                 : "none of the " + std::to_string(all.size()) +
-                                       " skeletons (.asf) in its folder has a name it begins with",
+                                 : cat("none of the ", all.size(),
+                                       " skeletons (.asf) in its folder has a name it begins with"),
                      "give one with --asf FILE.asf");
   return best;
 }

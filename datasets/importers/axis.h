@@ -1,4 +1,5 @@
-// The axes of foreign files: which one is up, which one somebody faces.
+// The axes of foreign files (which one is up, which one somebody faces) and their units of length,
+// told by the length of a leg.
 #pragma once
 
 #include <string>
@@ -26,5 +27,17 @@ Mat3 upright(Axis up);
 Mat3 turn_in_quarters(double& yaw);
 /// Radians; 0 if either has no length.
 double angle_between(const Vec3& a, const Vec3& b);
+
+struct LegUnit {
+  const char* name;
+  double from, to;  ///< a person's leg (hip-knee-ankle) in units: 0.4 to 1.4 m
+  double metres;
+};
+
+/// Metres, decimetres, inches / 0.45 (the CMU set), inches, centimetres or millimetres; null if the
+/// leg is no person's in any.
+const LegUnit* unit_of_leg(double leg);
+/// "centimetres" for 0.01; others as "0.123 m".
+std::string unit_name(double metres);
 
 }  // namespace restage

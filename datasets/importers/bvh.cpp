@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "autograd/base/format.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/packed_text.h"
 
 namespace restage {
@@ -47,8 +48,8 @@ Place place_of(const BvhFile& file, size_t joint, const Vec3& otherwise) {
   const auto at = [&](const std::vector<double>& frame) {
     Vec3 out = otherwise;
     for (size_t c = 0; c < file.channels[joint].size(); ++c)
-      if (file.channels[joint][c] < Channel::x_rotation)
-        out[static_cast<int>(file.channels[joint][c])] = frame[file.first_channel[joint] + c];
+      if (const Channel channel = file.channels[joint][c]; !is_rotation(channel))
+        out[axis_of(channel)] = frame[file.first_channel[joint] + c];
     return out;
   };
   Place out;
@@ -73,8 +74,7 @@ std::vector<size_t> told_joints(const BvhFile& file, const JointMap& map) {
   std::vector<size_t> out;
   for (size_t j = 0; j < moves.size(); ++j)
     if (used[j] && !moves[j] &&
-        std::any_of(file.channels[j].begin(), file.channels[j].end(),
-                    [](Channel c) { return c < Channel::x_rotation; }))
+        !std::all_of(file.channels[j].begin(), file.channels[j].end(), is_rotation))
       out.push_back(j);
   return out;
 }
@@ -110,7 +110,7 @@ SourceMotion bvh_motion(BvhFile file, int hips) {
   SourceMotion out;
   out.fps = frame_rate(file).fps;
   std::vector<uint8_t> moves(file.skeleton.size(), 0);
-  for (int j = hips; j >= 0; j = file.skeleton.parents[j]) moves[j] = 1;
+  mark_upwards(file.skeleton, hips, moves);
   for (size_t j = 0; j < moves.size(); ++j)
     if (moves[j]) out.moving.push_back(static_cast<int>(j));
   out.local.reserve(file.frames.size());
@@ -123,10 +123,10 @@ SourceMotion bvh_motion(BvhFile file, int hips) {
       for (size_t c = 0; c < file.channels[j].size(); ++c) {
         const Channel channel = file.channels[j][c];
         const double value = frame[file.first_channel[j] + c];
-        if (channel >= Channel::x_rotation)
+        if (is_rotation(channel))
           local[j] = local[j] * channel_rotation(channel, value);
         else
-          offset[static_cast<int>(channel)] = value;
+          offset[axis_of(channel)] = value;
       }
       if (moves[j]) position.push_back(offset);
     }
@@ -156,8 +156,8 @@ MotionClip convert_bvh(std::string_view text, const std::string& path,
   MotionClip clip = make_clip(std::move(recording), path, options);
   if (left_out > 0)
     clip.report.remarks.push_back(
-        "'Frames:' announces " + std::to_string(frames) +
-        "; left out what follows them, in as many more lines: " + std::to_string(left_out));
+        cat("'Frames:' announces ", frames,
+            "; left out what follows them, in as many more lines: ", left_out));
   return clip;
 }
 

@@ -3,10 +3,10 @@
 #include <cmath>
 #include <map>
 
-#include "autograd/base/error.h"
 #include "autograd/base/parallel.h"
 #include "datasets/hdf5/file.h"
 #include "datasets/importers/source_motion.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
 namespace {
@@ -34,7 +34,7 @@ CmuSkeleton read_skeleton(const h5::File& file, const std::string& name) {
   CmuSkeleton out;
   SourceSkeleton& s = out.skeleton;
   s.names = file.dataset(group + "/names").read_text();
-  const int64_t n = static_cast<int64_t>(s.names.size());
+  const int64_t n = s.names.size();
   s.parents = file.read<int32_t>(group + "/parents", {n});
   for (size_t j = 0; j < s.parents.size(); ++j)
     if (s.parents[j] >= static_cast<int>(j) || s.parents[j] < -1 || (j > 0) != (s.parents[j] >= 0))
@@ -43,7 +43,7 @@ CmuSkeleton read_skeleton(const h5::File& file, const std::string& name) {
   s.offsets = read_points(file, group + "/offsets", n);
   s.ends = read_points(file, group + "/end_offsets", n);
   s.has_end.assign(s.names.size(), 1);
-  out.map = map_joints(s, file.path() + ":" + group);
+  out.map = name_joints(s, file.path() + ":" + group).map;
   out.rest = rest_joints(s, out.map);
   return out;
 }
@@ -51,7 +51,7 @@ CmuSkeleton read_skeleton(const h5::File& file, const std::string& name) {
 std::string need_text(const h5::File& file, const std::string& group, const char* name) {
   const auto value = file.text(group, name);
   if (!value)
-    throw InputError(file.path() + ":" + group, "has no attribute '" + std::string(name) + "'",
+    throw InputError(file.path() + ":" + group, cat("has no attribute '", name, "'"),
                      "fetch the file again");
   return *value;
 }
@@ -73,7 +73,7 @@ RawClip read_clip(const h5::File& file, const std::string& name,
   const std::string skeleton = need_text(file, group, "skeleton");
   if (skeletons.count(skeleton) == 0) skeletons[skeleton] = read_skeleton(file, skeleton);
   out.skeleton = &skeletons[skeleton];
-  const int64_t joints = static_cast<int64_t>(out.skeleton->skeleton.size());
+  const int64_t joints = out.skeleton->skeleton.size();
   const h5::Dataset rotations = file.dataset(group + "/local_rotations", {-1, joints, 4});
   out.rotations = rotations.read<int16_t>();
   out.root = file.read<double>(group + "/root_translation", {rotations.rows(), 3});
@@ -110,16 +110,11 @@ CmuClip convert(const RawClip& raw, bool with_joints, const std::string& where) 
     for (size_t j = 0; j < n; ++j) one.local[0][j] = unpack(&raw.rotations[(f * n + j) * 4], where);
     one.position[0][0] = Vec3(raw.root[3 * f], raw.root[3 * f + 1], raw.root[3 * f + 2]);
     if (!one.position[0][0].allFinite())
-      throw InputError(where, "frame " + std::to_string(f) + " has no finite position",
-                       "fetch it again");
+      throw InputError(where, cat("frame ", f, " has no finite position"), "fetch it again");
     poses[f] = source_pose(one, raw.skeleton->map, 0);
     if (with_joints) out.joints.push_back(poses[f].joints);
   }
-  out.motion = to_motion(poses, raw.skeleton->rest, raw.floor_y);
-  out.motion.id = raw.labels.id;
-  out.motion.subject = raw.labels.subject;
-  out.motion.split = raw.labels.split;
-  out.motion.action = raw.labels.action;
+  out.motion = to_motion(poses, raw.skeleton->rest, raw.floor_y, raw.labels);
   return out;
 }
 
@@ -134,11 +129,9 @@ std::vector<CmuClip> read_cmu(const std::string& path, bool with_joints) {
   std::vector<RawClip> raw;
   for (const std::string& name : names) raw.push_back(read_clip(file, name, skeletons));
   std::vector<CmuClip> out(raw.size());
-  parallel_for(static_cast<int64_t>(raw.size()), 4, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i) {
-      const size_t k = static_cast<size_t>(i);
+  parallel_for(raw.size(), 4, [&](int64_t begin, int64_t end) {
+    for (int64_t k = begin; k < end; ++k)
       out[k] = convert(raw[k], with_joints, path + ":/clips/" + raw[k].name);
-    }
   });
   return out;
 }

@@ -9,11 +9,11 @@
 #include <string_view>
 
 #include "autograd/base/atomic_file.h"
-#include "autograd/base/error.h"
 #include "autograd/base/interrupt.h"
 #include "datasets/hdf5/file.h"
 #include "datasets/importers/amc.h"
 #include "datasets/importers/bvh.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/folders.h"
 #include "datasets/readers/packed_text.h"
 #include "datasets/readers/sha256.h"
@@ -69,8 +69,8 @@ PackedClip pack_clip(const Recording& recording, const CmuOriginal& entry,
   const size_t joints = motion.skeleton.size();
   if (entry.first + entry.frames > motion.local.size())
     throw InputError(where,
-                     "has " + std::to_string(motion.local.size()) + " frames, clip " + entry.clip +
-                         " ends with frame " + std::to_string(entry.first + entry.frames),
+                     cat("has ", motion.local.size(), " frames, clip ", entry.clip,
+                         " ends with frame ", entry.first + entry.frames),
                      "fetch it again");
   PackedClip out;
   out.names = motion.skeleton.names;
@@ -171,7 +171,7 @@ std::string write_skeleton(h5::File& file, const CmuOriginal& entry, const Packe
   const std::string name = kind + "_" + sum_of_skeleton(clip).hex().substr(0, 8);
   const std::string group = "/skeletons/" + name;
   if (file.has(group)) return name;
-  const auto joints = static_cast<int64_t>(clip.parents.size());
+  const int64_t joints = clip.parents.size();
   file.write_text(group + "/names", clip.names);
   file.write<int32_t>(group + "/parents", {joints}, clip.parents);
   file.write<float>(group + "/offsets", {joints, 3}, clip.offsets);
@@ -198,7 +198,7 @@ PackedClip read_packed(const h5::File& file, const std::string& name) {
                     skeleton = "/skeletons/" + file.text(clip, "skeleton").value_or("");
   PackedClip out;
   out.names = file.dataset(skeleton + "/names").read_text();
-  const auto joints = static_cast<int64_t>(out.names.size());
+  const int64_t joints = out.names.size();
   out.parents = file.read<int32_t>(skeleton + "/parents", {joints});
   for (const int32_t parent : out.parents)
     if (parent >= joints) throw InputError(skeleton, "has a parent that is not there", "mend it");
@@ -243,7 +243,7 @@ CmuOriginals read_cmu_originals(const std::string& list) {
   std::string line;
   for (size_t number = 1; std::getline(lines, line); ++number) {
     if (line.find_first_not_of(" \t\r") == std::string::npos || line[0] == '#') continue;
-    const std::string where = list + ":" + std::to_string(number);
+    const std::string where = cat(list, ":", number);
     std::istringstream words(line);
     if (line[0] != '@') {
       out.clips.push_back(clip_of(words, where));

@@ -1,21 +1,18 @@
 #include "datasets/importers/gltf_character.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <set>
 
-#include "autograd/base/error.h"
 #include "autograd/base/format.h"
-#include "datasets/importers/source_motion.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/mesh_io.h"
 #include "datasets/readers/text.h"
 
 namespace restage {
 namespace {
 
-std::string id_of(const std::string& path, const CharacterOptions& options) {
+std::string id_of(const std::string& path, const MotionOptions& options) {
   return options.id.empty() ? std::filesystem::path(path).stem().string() : options.id;
 }
 
@@ -23,11 +20,9 @@ void describe(const Gltf& file, ImportReport& report) {
   report.file = file.path;
   size_t joints = 0;
   for (const GltfBone& bone : file.bones) joints += bone.skin >= 0;
-  report.fact("holds", std::to_string(file.vertices.size()) + " vertices, " +
-                           std::to_string(file.faces.size()) + " triangles, " +
-                           std::to_string(file.skin_nodes.size()) + " skins with " +
-                           std::to_string(joints) + " joints, " +
-                           std::to_string(file.clips.size()) + " animations");
+  report.fact("holds", cat(file.vertices.size(), " vertices, ", file.faces.size(), " triangles, ",
+                           file.skin_nodes.size(), " skins with ", joints, " joints, ",
+                           file.clips.size(), " animations"));
   report.remarks.insert(report.remarks.end(), file.remarks.begin(), file.remarks.end());
 }
 
@@ -98,8 +93,7 @@ Motion motion_of(const Gltf& file, const GltfRig& rig, const GltfClip& clip, int
     for (size_t j = 0; j < kJoints; ++j) {
       if (!pose.joints[j].allFinite() || !pose.global[j].allFinite())
         throw InputError(file.path,
-                         "frame " + std::to_string(f) + " of " + text::quote(clip.name) +
-                             " puts a joint nowhere",
+                         cat("frame ", f, " of ", text::quote(clip.name), " puts a joint nowhere"),
                          "export it again with finite scales");
       global[j] = Quat(pose.global[j]).normalized().cast<float>();
     }
@@ -111,11 +105,11 @@ Motion motion_of(const Gltf& file, const GltfRig& rig, const GltfClip& clip, int
   return motion;
 }
 
-std::vector<Motion> motions_of(const Gltf& file, const GltfRig& rig,
-                               const CharacterOptions& options, ImportReport& report) {
+std::vector<Motion> motions_of(const Gltf& file, const GltfRig& rig, const MotionOptions& options,
+                               const std::string& only, ImportReport& report) {
   std::vector<const GltfClip*> clips;
-  if (!options.clip.empty())
-    clips.push_back(&find_clip(file, options.clip));
+  if (!only.empty())
+    clips.push_back(&find_clip(file, only));
   else
     for (const GltfClip& clip : file.clips) clips.push_back(&clip);
   std::vector<Motion> out;
@@ -133,11 +127,10 @@ std::vector<Motion> motions_of(const Gltf& file, const GltfRig& rig,
                        "import them one by one (--clip), or cut them");
     Motion motion = motion_of(file, rig, *clip, frames);
     std::string id = id_of(file.path, options);
-    if (clips.size() > 1 || !options.clip.empty()) id += "_" + clip->name;
+    if (clips.size() > 1 || !only.empty()) id += "_" + clip->name;
     std::replace(id.begin(), id.end(), '/', '_');
     motion.id = id;
-    for (int again = 2; !ids.insert(motion.id).second; ++again)
-      motion.id = id + "_" + std::to_string(again);
+    for (int again = 2; !ids.insert(motion.id).second; ++again) motion.id = cat(id, "_", again);
     motion.subject = options.subject.empty() ? id_of(file.path, options) : options.subject;
     motion.split = options.split;
     motion.action = options.action.empty() ? clip->name : options.action;
@@ -155,7 +148,8 @@ std::vector<Motion> motions_of(const Gltf& file, const GltfRig& rig,
 
 }  // namespace
 
-Character read_character(const std::string& path, const CharacterOptions& options) {
+Character read_character(const std::string& path, const MotionOptions& options,
+                         const std::string& clip) {
   const Gltf file = read_gltf(path);
   Character out;
   describe(file, out.report);
@@ -164,15 +158,15 @@ Character read_character(const std::string& path, const CharacterOptions& option
                   [&](const GltfInfluence& by) { return file.bones[by.bone].skin >= 0; });
   const bool loose = !skinned && !file.vertices.empty();
   if (loose && file.clips.empty()) throw_no_skin(path);
-  const GltfRig rig = find_rig(file, options.rig, out.report);
-  check_handedness(t_pose_joints(rig), options.force, path, out.report);
+  const GltfRig rig = find_rig(file, options, out.report);
+  check_handedness(t_pose_joints(rig), options.force, out.report);
   if (loose) out.report.remark("left out its mesh, which belongs to no skin");
   if (skinned) {
     out.body = body_of(file, rig);
     out.body->id = id_of(path, options);
     out.body->split = options.split;
   }
-  out.motions = motions_of(file, rig, options, out.report);
+  out.motions = motions_of(file, rig, options, clip, out.report);
   if (loose && out.motions.empty()) throw_no_skin(path);
   if (!out.body && out.motions.empty())
     throw InputError(path, "holds neither a mesh nor an animation of a person",
@@ -197,7 +191,7 @@ TargetMesh read_target(const std::string& path) {
     return out;
   }
   const GltfRig rig = find_rig(file, {}, out.report);
-  check_handedness(t_pose_joints(rig), true, path, out.report);
+  check_handedness(t_pose_joints(rig), true, out.report);
   out.mesh = t_pose_mesh(file, rig);
   out.joints = t_pose_joints(rig);
   const Vec3 moved = put_on_floor(out.mesh, (*out.joints)[0]);

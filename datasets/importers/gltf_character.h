@@ -10,14 +10,6 @@
 
 namespace restage {
 
-struct CharacterOptions {
-  GltfRigOptions rig;
-  std::string clip;  ///< import this animation only; empty: all
-  /// Empty id: the file's name. Empty subject: the id. Empty action: the clip's name.
-  std::string id, subject, split = "train", action;
-  bool force = false;  ///< take one whose left and right are exchanged, with a remark
-};
-
 struct Character {
   std::optional<Body> body;     ///< none, if the file holds no mesh or none with a skin
   std::vector<Motion> motions;  ///< one per animation that moves the 22 joints
@@ -27,10 +19,13 @@ struct Character {
 /// The body stands in T-pose on y = 0 with its pelvis over the origin; weights are those of the
 /// file's bones, each counted for the nearest of the 22 joints at it or above it. The motions are
 /// relative to the same T-pose, sampled at 30 fps by the file's own interpolation (slerp for
-/// LINEAR), over the floor. InputError: see read_gltf() and find_rig(); neither a mesh with a skin
-/// nor motion; left and right exchanged;
-/// no such clip; more frames than a file of this size can mean.
-Character read_character(const std::string& path, const CharacterOptions& options = {});
+/// LINEAR), over the floor. `clip`: this animation only; empty: all. Of the options, beside what
+/// find_rig() takes, `force` and the names count; empty id: the file's name, subject: the id,
+/// action: the clip's name. InputError: see read_gltf() and find_rig(); neither a mesh with a skin
+/// nor motion; left and right exchanged; no such clip; more frames than a file of this size can
+/// mean.
+Character read_character(const std::string& path, const MotionOptions& options = {},
+                         const std::string& clip = "");
 
 struct TargetMesh {
   Mesh mesh;

@@ -2,13 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <optional>
 
-#include "autograd/base/error.h"
 #include "autograd/base/format.h"
-#include "datasets/importers/length_units.h"
-#include "datasets/importers/source_motion.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/text.h"
 #include "datasets/readers/word_lines.h"
 
@@ -103,10 +100,7 @@ GltfTransforms bind_pose(const Gltf& file, ImportReport& report) {
   for (size_t n = 0; n < out.size(); ++n) {
     if (known[n]) continue;
     const int p = file.nodes[n].parent;
-    Eigen::Affine3d local;
-    local.fromPositionOrientationScale(file.nodes[n].translation, file.nodes[n].rotation,
-                                       file.nodes[n].scale);
-    out[n] = p < 0 ? local : out[p] * local;
+    out[n] = p < 0 ? file.nodes[n].local() : out[p] * file.nodes[n].local();
   }
   return out;
 }
@@ -200,10 +194,9 @@ NamedJoints map_names(SourceSkeleton& skeleton, const Profile* profile, const st
 
 // ---- units and axes ----------------------------------------------------------------------------
 
-double find_scale(const Joints& joints, const GltfRigOptions& options, const std::string& path,
-                  ImportReport& report) {
+double find_scale(const Joints& joints, double given, ImportReport& report) {
   const double leg = leg_length(joints);
-  double scale = options.scale;
+  double scale = given;
   std::string how = "as given";
   if (scale <= 0) {
     const LegUnit* unit = unit_of_leg(leg);
@@ -213,7 +206,8 @@ double find_scale(const Joints& joints, const GltfRigOptions& options, const std
             : leg >= 1400 && leg < 4000 ? 0.001
                                         : 0.0;
     if (scale == 0)
-      throw InputError(path, "a leg of " + format("%.3g", leg) + " units is no person's in metres",
+      throw InputError(report.file,
+                       "a leg of " + format("%.3g", leg) + " units is no person's in metres",
                        "give --scale (metres per unit)");
     how = scale == 1.0 ? "the format's" : unit_name(scale) + " by the leg";
   }
@@ -240,24 +234,16 @@ Mat3 find_front(const Joints& upright, ImportReport& report) {
 }
 
 void check_standing(const Joints& joints, const std::string& path) {
-  struct Limb {
-    int from, to;
-    Vec3 wanted;
-    double limit;  ///< degrees
-  };
-  const Vec3 x = Vec3::UnitX(), y = Vec3::UnitY();
-  const Limb limbs[] = {{1, 4, -y, 60},   {2, 5, -y, 60},    {4, 7, -y, 60},
-                        {5, 8, -y, 60},   {16, 18, x, 120},  {17, 19, -x, 120},
-                        {18, 20, x, 120}, {19, 21, -x, 120}, {0, 15, y, 60}};
-  for (const Limb& limb : limbs) {
+  const auto check = [&](const Limb& limb, double most) {
     const Vec3 bone = joints[limb.to] - joints[limb.from];
-    if (!(bone.norm() > 1e-4) || angle_between(bone, limb.wanted) > limb.limit * kDegree)
+    if (!(bone.norm() > 1e-4) || angle_between(bone, limb.wanted) > most * kDegree)
       throw InputError(path,
-                       "the skin was not made standing: " + std::string(kJointNames[limb.from]) +
-                           " to " + std::string(kJointNames[limb.to]) +
-                           " does not point as in a T-pose or an A-pose",
+                       cat("the skin was not made standing: ", kJointNames[limb.from], " to ",
+                           kJointNames[limb.to], " does not point as in a T-pose or an A-pose"),
                        "export it with the rest pose of its rig");
-  }
+  };
+  for (const Limb& limb : t_pose_limbs()) check(limb, limb.from < 16 ? 60 : 120);
+  check({0, 15, Vec3::UnitY()}, 60);
 }
 
 // ---- T-pose ------------------------------------------------------------------------------------
@@ -339,9 +325,9 @@ void find_nodes(const Gltf& file, GltfRig& rig, const JointMap& map, const std::
     rig.offset[j] = map[j].offset;
     int& owned = owner[rig.node[j]];
     if (owned < 0 || map[j].offset.isZero()) owned = static_cast<int>(j);
-    words += (words.empty() ? "" : ", ") + std::string(kJointNames[j]) + " = " +
-             text::quote(file.nodes[rig.node[j]].name) +
-             (map[j].offset.isZero() ? "" : " (beside it)");
+    words += cat(words.empty() ? "" : ", ", kJointNames[j], " = ",
+                 text::quote(file.nodes[rig.node[j]].name),
+                 map[j].offset.isZero() ? "" : " (beside it)");
   }
   report.fact("joints", words);
   rig.joint.assign(file.nodes.size(), 0);
@@ -353,23 +339,25 @@ void find_nodes(const Gltf& file, GltfRig& rig, const JointMap& map, const std::
 
 }  // namespace
 
-GltfRig find_rig(const Gltf& file, const GltfRigOptions& options, ImportReport& report) {
+GltfRig find_rig(const Gltf& file, const MotionOptions& options, ImportReport& report) {
+  const std::optional<Profile> asked = asked_profile(options);
+  const Profile* const profile = asked ? &*asked : nullptr;
   GltfRig rig;
   rig.bind = bind_pose(file, report);
   const std::vector<int> nodes = bone_nodes(file);
-  SourceSkeleton skeleton = skeleton_of(file, nodes, rig.bind, by_list(file, options.profile));
-  const NamedJoints names = map_names(skeleton, options.profile, file.path);
+  SourceSkeleton skeleton = skeleton_of(file, nodes, rig.bind, by_list(file, profile));
+  const NamedJoints names = map_names(skeleton, profile, file.path);
   const JointMap& map = names.map;
-  if (by_list(file, options.profile))
+  if (by_list(file, profile))
     report.fact("names", "VRM's list of bones, not the nodes' names");
-  else if (options.profile)
+  else if (profile)
     report.fact("names", names.profile->title + " (profile " + names.profile->name + ")");
   find_nodes(file, rig, map, nodes, report);
   Joints joints;
   for (size_t j = 0; j < kJoints; ++j)
     joints[j] = rig.bind[rig.node[j]].translation() + rig.offset[j];
-  rig.scale = find_scale(joints, options, file.path, report);
-  rig.turn = find_up(joints, options.up, report);
+  rig.scale = find_scale(joints, options.scale, report);
+  rig.turn = find_up(joints, options.rest.up, report);
   Joints upright;
   for (size_t j = 0; j < kJoints; ++j) upright[j] = rig.to_ours(joints[j]);
   const Mat3 front = find_front(upright, report);

@@ -1,13 +1,7 @@
 // Whose bones they are: the rig of a glTF character in terms of the 22 joints, and its T-pose.
 #pragma once
 
-#include <array>
-#include <string>
-#include <vector>
-
-#include "datasets/importers/axis.h"
-#include "datasets/importers/profiles.h"
-#include "datasets/importers/report.h"
+#include "datasets/importers/motion_clip.h"
 #include "datasets/readers/gltf.h"
 
 namespace restage {
@@ -29,23 +23,17 @@ struct GltfRig {
   Vec3 to_ours(const Vec3& x) const { return scale * (turn * x); }
 };
 
-struct GltfRigOptions {
-  /// Metres per unit. 0: by the leg (hip-knee-ankle): [0.1, 4) units are metres, as the format has
-  /// it, longer ones as of recordings (length_units.h), giants in centimetres up to 400 and in
-  /// millimetres up to 4000; else InputError.
-  double scale = 0;
-  /// automatic: the axis along which the head is furthest from the ankles.
-  Axis up = Axis::automatic;
-  /// Whose names the bones have; null: VRM's list of bones if there is one, else the built-in
-  /// profile that fits.
-  const Profile* profile = nullptr;
-};
-
-/// Finds the joints by VRM's list of bones or by name (map_joints(); a prefix that all names share
+/// Finds the joints by VRM's list of bones or by name (name_joints(); a prefix that all names share
 /// and a number at all their ends are left out where needed). Adds to the report what was found.
+/// Of the options these count, if they are given:
+/// - scale; else by the leg (hip-knee-ankle): [0.1, 4) units are metres, as the format has it,
+///   longer ones as of recordings (axis.h), giants in centimetres up to 400 and in
+///   millimetres up to 4000;
+/// - rest.up; else the axis along which the head is furthest from the ankles;
+/// - profile; else VRM's list of bones if there is one, else the built-in profile that fits.
 /// InputError: names of no known family, a bind pose that does not stand with its arms out, to the
 /// front or down, unknown units.
-GltfRig find_rig(const Gltf& file, const GltfRigOptions& options, ImportReport& report);
+GltfRig find_rig(const Gltf& file, const MotionOptions& options, ImportReport& report);
 
 /// Whether find_rig() would find all joints that it needs.
 bool has_known_joints(const Gltf& file);

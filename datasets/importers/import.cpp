@@ -5,13 +5,13 @@
 #include <filesystem>
 #include <set>
 
-#include "autograd/base/error.h"
 #include "autograd/base/output_check.h"
-#include "autograd/base/parallel.h"
+#include "datasets/importers/batches.h"
 #include "datasets/importers/cmu.h"
 #include "datasets/importers/import_detail.h"
 #include "datasets/importers/makehuman.h"
 #include "datasets/readers/array_frames.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/folders.h"
 #include "datasets/readers/mesh_io.h"
 
@@ -24,16 +24,9 @@ void add_bodies(const std::string& folder, const std::string& garment, ImportWri
   const MakeHuman model(folder);
   const std::string list = folder + "/bodies.csv";
   const std::vector<BodyRecipe> recipes = read_recipes(list);
-  constexpr size_t kBatch = 16;  // built by all threads, written by one
-  for (size_t begin = 0; begin < recipes.size(); begin += kBatch) {
-    const size_t n = std::min(kBatch, recipes.size() - begin);
-    std::vector<Body> bodies(n);
-    parallel_for(static_cast<int64_t>(n), 1, [&](int64_t from, int64_t to) {
-      for (int64_t i = from; i < to; ++i)
-        bodies[i] = model.build(recipes[begin + static_cast<size_t>(i)], garment);
-    });
-    writer.add(list, bodies, {});
-  }
+  in_batches<Body>(
+      recipes.size(), [&](size_t i) { return model.build(recipes[i], garment); },
+      [&](size_t, const Body& body) { writer.add(list, {body}, {}); });
 }
 
 ImportSummary import_data_folder(const std::string& folder, bool bodies, bool clips,
@@ -107,39 +100,7 @@ std::vector<std::string> inputs_of(const std::string& source, const ImportOption
   return out;
 }
 
-}  // namespace
-
-FileInfo data_folder_info(bool bodies, bool clips) {
-  FileInfo info;
-  info.license = info.provenance = "";
-  if (bodies) {
-    info.license = "bodies: CC0 1.0";
-    info.provenance =
-        "bodies: MakeHuman base mesh, targets and game-engine rig (makehumancommunity)";
-  }
-  if (clips) {
-    info.license += std::string(bodies ? "; " : "") +
-                    "motions: free for research and commercial use with acknowledgement, not to be "
-                    "resold as data";
-    info.provenance += std::string(bodies ? "; " : "") + "motions: " + kCmuAcknowledgement;
-  }
-  return info;
-}
-
-fs::path absolute_path(const fs::path& path) {
-  const fs::path out = fs::absolute(path).lexically_normal();
-  return out.has_filename() ? out : out.parent_path();
-}
-
-FileInfo file_info(const std::string& source, const ImportOptions& options) {
-  FileInfo info;
-  info.license = options.license;
-  info.provenance = "imported from " + absolute_path(source).filename().string();
-  return info;
-}
-
-namespace {
-
+/// InputError for an id that another entry has, of this file or of another.
 template <class T>
 void check_ids(const std::string& file, const std::vector<T>& entries, const std::string& what,
                const std::map<std::string, std::string>& taken) {
@@ -155,6 +116,36 @@ void check_ids(const std::string& file, const std::vector<T>& entries, const std
 }
 
 }  // namespace
+
+FileInfo data_folder_info(bool bodies, bool clips) {
+  FileInfo info;
+  info.license = info.provenance = "";
+  if (bodies) {
+    info.license = "bodies: CC0 1.0";
+    info.provenance =
+        "bodies: MakeHuman base mesh, targets and game-engine rig (makehumancommunity)";
+  }
+  if (clips) {
+    info.license +=
+        cat(bodies ? "; " : "",
+            "motions: free for research and commercial use with acknowledgement, not to be "
+            "resold as data");
+    info.provenance += cat(bodies ? "; " : "", "motions: ", kCmuAcknowledgement);
+  }
+  return info;
+}
+
+fs::path absolute_path(const fs::path& path) {
+  const fs::path out = fs::absolute(path).lexically_normal();
+  return out.has_filename() ? out : out.parent_path();
+}
+
+FileInfo file_info(const std::string& source, const ImportOptions& options) {
+  FileInfo info;
+  info.license = options.license;
+  info.provenance = "imported from " + absolute_path(source).filename().string();
+  return info;
+}
 
 void ImportWriter::add(const std::string& file, const std::vector<Body>& bodies,
                        const std::vector<Motion>& motions) {
@@ -181,13 +172,13 @@ void refuse_all(const std::string& where, const std::string& what, const std::st
 
 void check_any(const ImportSummary& summary, const std::string& source) {
   if (summary.bodies + summary.motions + summary.sequences > 0) return;
-  const std::string shapes = std::to_string(summary.shapes) + " files with a shape and no motion";
+  const std::string shapes = cat(summary.shapes, " files with a shape and no motion");
   if (summary.skipped.empty())
     throw InputError(source, "holds nothing but " + shapes,
                      "import the body model and give them as --betas");
   refuse_all(source,
-             "all " + std::to_string(summary.skipped.size()) + " files were skipped" +
-                 (summary.shapes > 0 ? " besides " + shapes : ""),
+             cat("all ", summary.skipped.size(), " files were skipped",
+                 summary.shapes > 0 ? " besides " + shapes : ""),
              summary.skipped[0]);
 }
 

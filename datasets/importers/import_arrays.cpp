@@ -2,13 +2,13 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "autograd/base/error.h"
 #include "autograd/base/output_check.h"
 #include "datasets/importers/amass.h"
 #include "datasets/importers/import_detail.h"
 #include "datasets/importers/scans.h"
 #include "datasets/importers/smpl.h"
 #include "datasets/readers/array_frames.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/folders.h"
 #include "datasets/readers/mesh_io.h"
 
@@ -17,25 +17,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-double checked_fps(const ImportOptions& options) {
+void check_fps(const ImportOptions& options) {
   const double fps = options.motion.fps;
   if (fps != 0 && !(fps >= 1 && fps <= 2000))
     throw InputError("", "--fps is out of range", "give frames per second, 1 to 2000");
-  return fps;
 }
 
 // ---- AMASS -------------------------------------------------------------------------------------
 
 /// Names a clip by where it lies below `root`: the folder is the subject, the path the id.
-AmassOptions amass_options(const fs::path& file, const fs::path& root,
-                           const ImportOptions& options) {
-  AmassOptions out;
-  out.up = options.motion.rest.up;
-  out.fps = options.motion.fps;
-  out.split = options.motion.split;
-  out.action = options.motion.action;
+MotionOptions amass_options(const fs::path& file, const fs::path& root,
+                            const ImportOptions& options) {
+  MotionOptions out = options.motion;
   const fs::path below = absolute_path(file).lexically_relative(absolute_path(root));
-  out.subject = options.motion.subject;
   if (out.subject.empty()) out.subject = below.parent_path().generic_string();
   if (out.subject.empty()) out.subject = absolute_path(root).filename().string();
   out.id = below.generic_string();
@@ -53,7 +47,7 @@ ImportSummary import_amass_files(const std::vector<std::string>& files, const st
   if (options.body_model.empty())
     throw InputError(source, "holds AMASS motions, whose skeletons are in a body model beside them",
                      "give your SMPL-H or SMPL-X model with --body-model MODEL.npz");
-  checked_fps(options);
+  check_fps(options);
   check_output(out, files);
   BodyModels models(options.body_model, options.max_memory);
   FileInfo info = file_info(source, options);
@@ -85,7 +79,7 @@ ImportSummary import_amass_files(const std::vector<std::string>& files, const st
 std::string body_id(const std::string& model, const std::string& betas, size_t index,
                     size_t count) {
   std::string out = fs::path(model).stem().string() + "_" + fs::path(betas).stem().string();
-  return count > 1 ? out + "_" + std::to_string(index) : out;
+  return count > 1 ? cat(out, "_", index) : out;
 }
 
 ImportSummary import_model(const std::string& source, const std::string& out,
@@ -103,16 +97,14 @@ ImportSummary import_model(const std::string& source, const std::string& out,
         name == "zeros" ? std::vector<Betas>(1) : read_betas(name, options.max_memory);
     ImportReport report{name == "zeros" ? source : name, {}, {}};
     report.facts = {
-        {"body model", std::string(to_string(model.family())) + ", " +
-                           std::to_string(model.vertices()) + " vertices"},
+        {"body model", cat(to_string(model.family()), ", ", model.vertices(), " vertices")},
         {"pose", model.has_blend_shapes() ? "the model's blend shapes (posedirs)"
                                           : "no blend shapes: bends by our own rule"},
         {"people", std::to_string(people.size())},
         {"betas", name == "zeros" ? "zeros: the mean person"
-                                  : std::to_string(people[0].size()) + ", the model has " +
-                                        std::to_string(model.shapes())}};
+                                  : cat(people[0].size(), ", the model has ", model.shapes())}};
     if (people[0].size() > model.shapes())
-      report.remark("betas beyond the model's " + std::to_string(model.shapes()) + " are left out");
+      report.remark(cat("betas beyond the model's ", model.shapes(), " are left out"));
     for (size_t i = 0; i < people.size(); ++i) {
       Body body = model.body(people[i]);
       body.id = body_id(source, name, i, people.size());
@@ -139,14 +131,14 @@ ImportSummary import_scan_files(const std::string& source, const std::string& ou
         "holds nothing to import" +
             (summary.skipped.empty() ? "" : " (" + summary.skipped[0].substr(0, 200) + ")"),
         "give a data folder, BVH files, AMASS motions, a body model or scans");
-  const ScanOptions scans{checked_fps(options), options.motion.scale, options.motion.rest.up,
-                          options.max_memory};
+  check_fps(options);
   for (const ScanSequence& sequence : sequences) check_output(out, sequence.files);
   ScanWriter writer(out, file_info(source, options));
   for (const ScanSequence& sequence : sequences) {
     try {
       ImportReport report;
-      summary.frames += static_cast<size_t>(import_scans(sequence, scans, writer, report));
+      summary.frames += static_cast<size_t>(
+          import_scans(sequence, options.motion, options.max_memory, writer, report));
       summary.reports.push_back(std::move(report));
       ++summary.sequences;
     } catch (const InputError& error) {

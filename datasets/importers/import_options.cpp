@@ -1,8 +1,8 @@
 // Which options belong to which kind of input (--force, a permission, goes with all).
 #include <algorithm>
 
-#include "autograd/base/error.h"
 #include "datasets/importers/import_detail.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
 namespace {
@@ -22,28 +22,25 @@ std::vector<Given> all_of(const ImportOptions& options) {
   const Kinds recordings = {bvh, amc}, moving = {bvh, amc, character},
               motions = {bvh, amc, character, amass},
               bodies = {bvh, amc, character, amass, body_model},
-              files = {bvh, amc, character, amass, body_model, scans};
+              files = {bvh, amc, character, amass, body_model, scans},
+              scaled = {bvh, amc, character, scans}, timed = {bvh, amc, amass, scans},
+              turned = {bvh, amc, character, amass, scans};
   const char *of_recordings = "BVH and AMC recordings",
-             *of_moving = "recordings and glTF characters";
+             *of_moving = "recordings and glTF characters",
+             *of_scaled = "recordings, glTF characters and scans",
+             *of_timed = "recordings, AMASS motions and scans (glTF files state their key times)",
+             *of_turned = "recordings, characters, AMASS motions and scans";
   const ImportOptions none;
+  const RestOptions& rest = motion.rest;
   return {
       {"--license", options.license != none.license, files, "files whose licence is not known"},
       {"--subject", !motion.subject.empty(), motions, "motions"},
       {"--split", motion.split != none.motion.split, bodies, "motions and bodies"},
-      {"--scale",
-       motion.scale > 0,
-       {bvh, amc, character, scans},
-       "recordings, glTF characters and scans"},
-      {"--fps",
-       motion.fps > 0,
-       {bvh, amc, amass, scans},
-       "recordings, AMASS motions and scans (glTF files state their key times)"},
-      {"--up",
-       motion.rest.up != Axis::automatic,
-       {bvh, amc, character, amass, scans},
-       "recordings, characters, AMASS motions and scans"},
-      {"--facing", motion.rest.facing != Axis::automatic, recordings, of_recordings},
-      {"--rest-frame", motion.rest.frame >= 0, recordings, of_recordings},
+      {"--scale", motion.scale > 0, scaled, of_scaled},
+      {"--fps", motion.fps > 0, timed, of_timed},
+      {"--up", rest.up != Axis::automatic, turned, of_turned},
+      {"--facing", rest.facing != Axis::automatic, recordings, of_recordings},
+      {"--rest-frame", rest.frame >= 0, recordings, of_recordings},
       {"--drop-leading", motion.drop_leading >= 0, recordings, of_recordings},
       {"--profile", !motion.profile.empty(), moving, of_moving},
       {"--asf", !options.asf.empty(), {amc}, "AMC recordings"},
@@ -61,10 +58,9 @@ void check_options(const Kinds& kinds, const std::string& source, const ImportOp
     const bool taken = std::any_of(kinds.begin(), kinds.end(),
                                    [&](InputKind kind) { return one.takers.count(kind) > 0; });
     if (one.given && !taken)
-      throw InputError(
-          source,
-          std::string("has nothing to do with ") + one.option + ", which is for " + one.whose,
-          std::string("leave ") + one.option + " out");
+      throw InputError(source,
+                       cat("has nothing to do with ", one.option, ", which is for ", one.whose),
+                       cat("leave ", one.option, " out"));
   }
 }
 

@@ -34,16 +34,7 @@ void check_file_options(const std::string& file, ImportOptions options) {
 
 void add_character(const std::string& file, const ImportOptions& options, ImportWriter& writer,
                    ImportSummary& summary) {
-  const std::optional<Profile> profile = asked_profile(options.motion);
-  CharacterOptions how;
-  how.rig = {options.motion.scale, options.motion.rest.up, profile ? &*profile : nullptr};
-  how.force = options.motion.force;
-  how.clip = options.clip;
-  how.id = options.motion.id;
-  how.subject = options.motion.subject;
-  how.split = options.motion.split;
-  how.action = options.motion.action;
-  Character character = read_character(file, how);
+  Character character = read_character(file, options.motion, options.clip);
   std::vector<Body> bodies;
   if (character.body) bodies.push_back(std::move(*character.body));
   writer.add(file, bodies, character.motions);

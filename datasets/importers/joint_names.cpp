@@ -126,12 +126,11 @@ class Placer {
  public:
   Placer(const SourceSkeleton& skeleton, const BoneNames& names, const Found& found,
          const std::string& where)
-      : skeleton_(skeleton), names_(names), found_(found), where_(where) {
-    zero_.resize(skeleton.size());
-    for (size_t j = 0; j < skeleton.size(); ++j) {
-      const int p = skeleton.parents[j];
-      zero_[j] = p < 0 ? Vec3::Zero() : Vec3(zero_[p] + skeleton.offsets[j]);
-    }
+      : skeleton_(skeleton),
+        names_(names),
+        found_(found),
+        where_(where),
+        zero_(zero_positions(skeleton)) {
     for (size_t j = 0; j < kJoints; ++j) out_.map[j].joint = found.joints[j];
   }
 
@@ -219,7 +218,7 @@ class Placer {
   const BoneNames& names_;
   const Found& found_;
   const std::string& where_;
-  std::vector<Vec3> zero_;
+  const std::vector<Vec3> zero_;
   NamedJoints out_;
 };
 
@@ -230,11 +229,6 @@ NamedJoints name_joints(const SourceSkeleton& skeleton, const std::string& where
   const BoneNames names(skeleton);
   const Found found = best_match(skeleton, names, profile, where);
   return Placer(skeleton, names, found, where).place();
-}
-
-JointMap map_joints(const SourceSkeleton& skeleton, const std::string& where,
-                    const Profile* profile) {
-  return name_joints(skeleton, where, profile).map;
 }
 
 }  // namespace restage

@@ -1,10 +1,9 @@
 #include "datasets/importers/makehuman.h"
 
 #include <algorithm>
-#include <cmath>
 
-#include "autograd/base/error.h"
 #include "datasets/hdf5/file.h"
+#include "datasets/readers/errors.h"
 #include "nn/geometry/skinning.h"
 
 namespace restage {
@@ -26,7 +25,7 @@ void check_indices(const std::vector<int32_t>& values, size_t limit, int32_t low
                    const std::string& where) {
   for (const int32_t v : values)
     if (v < lowest || (v >= 0 && static_cast<size_t>(v) >= limit))
-      broken(where, "holds the index " + std::to_string(v) + " of " + std::to_string(limit));
+      broken(where, cat("holds the index ", v, " of ", limit));
 }
 
 /// From the rest joints to a posed skeleton, in place.
@@ -50,13 +49,12 @@ void append_bare(const SkinnedSurface& skin, const std::vector<uint8_t>& hidden,
     for (const int32_t v : quad) bare = bare && hidden[v] == 0;
     if (!bare) continue;
     for (int32_t& v : quad) {
-      const auto old = static_cast<size_t>(v);
-      if (moved[old] < 0) {
-        moved[old] = static_cast<int32_t>(out.vertices.size());
-        out.vertices.push_back(skin.vertices[old]);
-        out.weights.push_back(skin.weights[old]);
+      if (moved[v] < 0) {
+        moved[v] = static_cast<int32_t>(out.vertices.size());
+        out.vertices.push_back(skin.vertices[v]);
+        out.weights.push_back(skin.weights[v]);
       }
-      v = moved[old];
+      v = moved[v];
     }
     out.quads.push_back(quad);
   }
@@ -105,7 +103,7 @@ MakeHuman::MakeHuman(const std::string& folder) : folder_(folder), path_(folder 
 
 void MakeHuman::read_rig(const h5::File& file) {
   bones_ = file.dataset("/rig/bone_names").read_text();
-  const int64_t n = static_cast<int64_t>(bones_.size());
+  const int64_t n = bones_.size();
   const std::vector<int32_t> parents = file.read<int32_t>("/rig/bone_parent", {n});
   const h5::Dataset heads = file.dataset("/rig/head_vertices", {n, -1});
   const std::vector<int32_t> head_vertices = heads.read<int32_t>();
@@ -130,14 +128,14 @@ void MakeHuman::read_rig(const h5::File& file) {
   }
   for (const char* name : kBones)
     if (heads_[bone_index(name)].empty())
-      broken(path_ + ":/rig/head_vertices", "has no head of " + std::string(name));
+      broken(path_ + ":/rig/head_vertices", cat("has no head of ", name));
 
   read_weights(file, joint);
 }
 
 void MakeHuman::read_weights(const h5::File& file, const std::vector<size_t>& joint_of_bone) {
   const std::vector<double> value = file.read<double>("/rig/weight_value", {-1});
-  const int64_t count = static_cast<int64_t>(value.size());
+  const int64_t count = value.size();
   const std::vector<int32_t> bone = file.read<int32_t>("/rig/weight_bone", {count});
   const std::vector<int32_t> vertex = file.read<int32_t>("/rig/weight_vertex", {count});
   check_indices(bone, bones_.size(), 0, path_ + ":/rig/weight_bone");
@@ -160,11 +158,11 @@ void MakeHuman::read_weights(const h5::File& file, const std::vector<size_t>& jo
 
 void MakeHuman::read_targets(const h5::File& file) {
   const std::vector<std::string> names = file.dataset("/targets/names").read_text();
-  const int64_t n = static_cast<int64_t>(names.size());
+  const int64_t n = names.size();
   const std::vector<int64_t> start = file.read<int64_t>("/targets/start", {n});
   const std::vector<int64_t> count = file.read<int64_t>("/targets/count", {n});
   target_vertex_ = file.read<int32_t>("/targets/index", {-1});
-  const int64_t total = static_cast<int64_t>(target_vertex_.size());
+  const int64_t total = target_vertex_.size();
   target_delta_ = file.read<int16_t>("/targets/delta_milli", {total, 3});
   check_indices(target_vertex_, base_.size(), 0, path_ + ":/targets/index");
   for (size_t t = 0; t < names.size(); ++t) {
@@ -205,8 +203,7 @@ Rotations MakeHuman::t_pose_rotations(const std::vector<Vec3>& vertices, const J
   Rotations out;
   out.fill(Mat3::Identity());
   for (const int side : {0, 1}) {
-    const size_t shoulder = static_cast<size_t>(16 + side), elbow = shoulder + 2,
-                 wrist = shoulder + 4;
+    const int shoulder = 16 + side, elbow = shoulder + 2, wrist = shoulder + 4;
     const Vec3 x(side == 0 ? 1.0 : -1.0, 0, 0);
     const Vec3 knuckle = bone_head(vertices, bone_index(side == 0 ? "middle_01_l" : "middle_01_r"));
     out[shoulder] = shortest_arc(j[elbow] - j[shoulder], x);
@@ -217,7 +214,7 @@ Rotations MakeHuman::t_pose_rotations(const std::vector<Vec3>& vertices, const J
 }
 
 SkinnedSurface MakeHuman::skin_of(const std::vector<Vec3>& vertices) const {
-  const auto skin = static_cast<std::ptrdiff_t>(skin_);
+  const auto skin = skin_;
   return {std::vector<Vec3>(vertices.begin(), vertices.begin() + skin),
           std::vector<JointWeights>(weights_.begin(), weights_.begin() + skin), quads_};
 }

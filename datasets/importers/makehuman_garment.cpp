@@ -80,8 +80,8 @@ void read_scale(const WordLines& lines, const std::vector<Vec3>& body, Vec3& sca
   const auto& words = lines.words();
   if (words.size() < 4) lines.fail("lacks numbers", kFetchAgain);
   const int k = words[0][0] - 'x';
-  const auto a = static_cast<size_t>(vertex_named(lines, words[1], 0, body.size()));
-  const auto b = static_cast<size_t>(vertex_named(lines, words[2], 0, body.size()));
+  const int32_t a = vertex_named(lines, words[1], 0, body.size());
+  const int32_t b = vertex_named(lines, words[2], 0, body.size());
   const double base = lines.number(words[3]);
   if (!(base > 1e-9)) lines.fail("scales by zero", kFetchAgain);
   scale[k] = std::abs(body[a][k] - body[b][k]) / base;

@@ -5,8 +5,9 @@
 #include <set>
 
 #include "autograd/base/atomic_file.h"
-#include "autograd/base/error.h"
 #include "datasets/importers/makehuman.h"
+#include "datasets/readers/errors.h"
+#include "datasets/readers/text.h"
 
 namespace restage {
 namespace {
@@ -39,9 +40,7 @@ double slider_value(const std::string& text, const std::string& column, const st
 BodyRecipe recipe_of(const std::vector<std::string>& header, const std::vector<std::string>& cells,
                      const std::string& where) {
   if (cells.size() != header.size())
-    throw InputError(where,
-                     "has " + std::to_string(cells.size()) + " columns, the header has " +
-                         std::to_string(header.size()),
+    throw InputError(where, cat("has ", cells.size(), " columns, the header has ", header.size()),
                      "mend the row");
   BodyRecipe out;
   for (size_t c = 0; c < header.size(); ++c) {
@@ -107,16 +106,13 @@ void add_macros(const std::map<std::string, double>& value, TargetWeights& out) 
 }  // namespace
 
 std::vector<BodyRecipe> read_recipes(const std::string& csv) {
-  const std::string text = read_file(csv, uint64_t{64} << 20);
+  const std::string content = read_file(csv, uint64_t{64} << 20);
   std::vector<BodyRecipe> out;
   std::vector<std::string> header;
   std::set<std::string> ids;
-  size_t number = 0;
-  for (size_t at = 0; at < text.size();) {
-    const size_t end = std::min(text.find('\n', at), text.size());
-    const std::string_view line = std::string_view(text).substr(at, end - at);
-    at = end + 1;
-    const std::string where = csv + ":" + std::to_string(++number);
+  text::Lines lines(content);
+  for (std::string_view line; lines.next(line);) {
+    const std::string where = cat(csv, ":", lines.number());
     if (line.find_first_not_of(" \r\t") == std::string_view::npos) continue;
     if (!header.empty()) {
       out.push_back(recipe_of(header, split_line(line), where));
@@ -131,7 +127,7 @@ std::vector<BodyRecipe> read_recipes(const std::string& csv) {
     header = split_line(line);
     for (const char* name : kMacros)
       if (std::find(header.begin(), header.end(), name) == header.end())
-        throw InputError(where, "has no column '" + std::string(name) + "'", "give a bodies.csv");
+        throw InputError(where, cat("has no column '", name, "'"), "give a bodies.csv");
   }
   if (out.empty()) throw InputError(csv, "holds no bodies", "give a bodies.csv with rows");
   return out;

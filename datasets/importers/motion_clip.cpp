@@ -1,12 +1,10 @@
 #include "datasets/importers/motion_clip.h"
 
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 
-#include "autograd/base/error.h"
 #include "autograd/base/format.h"
-#include "datasets/importers/length_units.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/word_lines.h"
 
 namespace restage {
@@ -15,8 +13,7 @@ namespace {
 constexpr size_t kMaxFrames = size_t{1} << 20;  // 9.7 hours at 30 fps
 
 /// Metres per unit; see MotionOptions::scale.
-double find_scale(const Recording& recording, double given, const std::string& path,
-                  ImportReport& report) {
+double find_scale(const Recording& recording, double given, ImportReport& report) {
   const double leg = leg_length(rest_joints(recording.motion.skeleton, recording.names.map));
   const auto says = [&](double metres, const std::string& why) {
     report.fact("units", unit_name(metres) + ", " + why + ": a leg of " + format("%.4g", leg) +
@@ -31,7 +28,7 @@ double find_scale(const Recording& recording, double given, const std::string& p
                   " m: found by the leg instead");
   }
   if (const LegUnit* unit = unit_of_leg(leg)) return says(unit->metres, "by the legs");
-  throw InputError(path,
+  throw InputError(report.file,
                    "a leg of " + format("%.4g", leg) + " units is no person's in any known unit",
                    "give the scale (metres per unit)");
 }
@@ -54,9 +51,8 @@ void check_root(const SourceMotion& motion, double limit, const std::string& pat
     const double speed = step.norm() * motion.fps;
     if (speed > limit)
       throw InputError(path,
-                       "the root jumps " + format("%.4g", step.norm()) + " m from frame " +
-                           std::to_string(f - 1) + " to " + std::to_string(f) + " (" +
-                           format("%.4g", speed) + " m/s)",
+                       cat("the root jumps ", format("%.4g", step.norm()), " m from frame ", f - 1,
+                           " to ", f, " (", format("%.4g", speed), " m/s)"),
                        "the recording is broken there: cut it, or check frame rate and scale");
   }
 }
@@ -85,25 +81,24 @@ size_t lead_of(const std::vector<std::vector<Quat>>& local, const Profile& profi
 }
 
 void cut_frames(SourceMotion& motion, const Profile& profile, const MotionOptions& options,
-                const std::string& path, ImportReport& report) {
+                ImportReport& report) {
   const size_t n = motion.local.size();
   const bool asked = options.drop_leading >= 0;
   const size_t first =
       asked ? static_cast<size_t>(options.drop_leading) : lead_of(motion.local, profile);
   if (first >= n)
-    throw InputError(path, "has only " + std::to_string(n) + " frames",
+    throw InputError(report.file, cat("has only ", n, " frames"),
                      "leave out fewer at its beginning");
   const size_t count = options.keep_frames ? std::min(options.keep_frames, n - first) : n - first;
   if (first > 0)
     report.fact("beginning",
-                std::to_string(first) + (first == 1 ? " frame" : " frames") + " left out, " +
-                    (asked ? "as asked"
-                           : std::string("a T-pose") + (first > 1 ? " and a blend out of it" : "") +
-                                 " that " + profile.title +
-                                 " files begin with (--drop-leading 0 keeps it)"));
+                cat(first, first == 1 ? " frame" : " frames", " left out, ",
+                    asked ? "as asked"
+                          : cat("a T-pose", first > 1 ? " and a blend out of it" : "", " that ",
+                                profile.title, " files begin with (--drop-leading 0 keeps it)")));
   const auto cut = [&](auto& frames) {
-    frames.erase(frames.begin() + static_cast<std::ptrdiff_t>(first + count), frames.end());
-    frames.erase(frames.begin(), frames.begin() + static_cast<std::ptrdiff_t>(first));
+    frames.erase(frames.begin() + (first + count), frames.end());
+    frames.erase(frames.begin(), frames.begin() + first);
   };
   cut(motion.local);
   cut(motion.position);
@@ -138,13 +133,12 @@ std::string subject_of(const std::string& name, const std::string& id) {
 }
 
 void report_names(const Recording& recording, ImportReport& report) {
-  report.fact("format", recording.format + ", " + std::to_string(recording.motion.skeleton.size()) +
-                            " joints, " + std::to_string(recording.motion.local.size()) +
-                            " frames");
+  report.fact("format", cat(recording.format, ", ", recording.motion.skeleton.size(), " joints, ",
+                            recording.motion.local.size(), " frames"));
   const Profile& profile = *recording.names.profile;
   std::string placed;
   for (const int j : recording.names.placed)
-    placed += (placed.empty() ? "; placed: " : ", ") + std::string(kJointNames[j]);
+    placed += cat(placed.empty() ? "; placed: " : ", ", kJointNames[j]);
   report.fact("names", profile.title + " (profile " + profile.name + ")" + placed);
 }
 
@@ -152,9 +146,8 @@ void report_names(const Recording& recording, ImportReport& report) {
 void report_positions(const BonePositions& found, double scale, ImportReport& report) {
   constexpr double kSeen = 0.001;  // metres
   if (found.off_offset * scale > kSeen)
-    report.fact("offsets", "by the position channels of " + std::to_string(found.joints) +
-                               " joints, up to " + format("%.3f", found.off_offset * scale) +
-                               " m from OFFSET");
+    report.fact("offsets", cat("by the position channels of ", found.joints, " joints, up to ",
+                               format("%.3f", found.off_offset * scale), " m from OFFSET"));
   if (found.stray * scale > kSeen)
     report.remark("the position channels stretch bones: " + found.stray_joint + " strays up to " +
                   format("%.3f", found.stray * scale) + " m from its mean place, which is taken");
@@ -182,24 +175,23 @@ MotionClip make_clip(Recording recording, const std::string& path, const MotionO
   ImportReport& report = clip.report;
   report.file = path;
   report_names(recording, report);
-  clip.scale = find_scale(recording, options.scale, path, report);
+  clip.scale = find_scale(recording, options.scale, report);
   scale_lengths(recording, clip.scale);
   report_positions(recording.positions, clip.scale, report);
   SourceMotion& motion = recording.motion;
   if (options.fps > 0) motion.fps = options.fps;
   check_root(motion, options.max_root_speed, path);
   const JointMap& map = recording.names.map;
-  const RestPose rest = find_rest_pose(motion, map, options.rest, path, report);
-  check_handedness(rest.joints, options.force, path, report);
-  cut_frames(motion, *recording.names.profile, options, path, report);
+  const RestPose rest = find_rest_pose(motion, map, options.rest, report);
+  check_handedness(rest.joints, options.force, report);
+  cut_frames(motion, *recording.names.profile, options, report);
   const double fps = motion.fps;
   const size_t frames = motion.local.size();
   const Poses poses = poses_at_30_fps(std::move(motion), map, rest, recording.bytes, path);
   clip.joints.reserve(poses.size());
   report.fact("rate", (fps == kFps ? "30 fps, taken as they are"
-                                   : format("%.6g", fps) +
-                                         " fps -> 30 fps, slerp: " + std::to_string(frames) +
-                                         " frames -> " + std::to_string(poses.size())) +
+                                   : cat(format("%.6g", fps), " fps -> 30 fps, slerp: ", frames,
+                                         " frames -> ", poses.size())) +
                           (options.fps > 0        ? " (as given; " + recording.rate_of_file + ")"
                            : recording.rate_known ? std::string()
                                                   : " (" + recording.rate_of_file + ")"));

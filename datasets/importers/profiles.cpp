@@ -3,13 +3,11 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 
 #include "autograd/base/atomic_file.h"
-#include "autograd/base/error.h"
 #include "autograd/base/nearest.h"
-#include "datasets/importers/builtin_profiles.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
 namespace {
@@ -30,8 +28,7 @@ class Reader {
     try {
       root = YAML::Load(std::string(yaml));
     } catch (const YAML::Exception& e) {
-      throw InputError(path_ + ":" + std::to_string(std::max(e.mark.line, 0) + 1), "is not YAML",
-                       kFix);
+      throw InputError(cat(path_, ":", std::max(e.mark.line, 0) + 1), "is not YAML", kFix);
     }
     Profile out;
     out.name = std::filesystem::path(path_).stem().string();
@@ -46,8 +43,7 @@ class Reader {
     if (out.title.empty()) throw InputError(path_, "has no title", kFix);
     for (const int j : {0, 1, 2, 4, 5, 7, 8, 15, 16, 17, 18, 19, 20, 21})
       if (out.bones[j].empty())
-        throw InputError(path_, "names no bone for " + std::string(kJointNames[j]),
-                         "add it under 'joints'");
+        throw InputError(path_, cat("names no bone for ", kJointNames[j]), "add it under 'joints'");
     return out;
   }
 
@@ -57,7 +53,7 @@ class Reader {
     std::string line = wrong;  // a quoted key may hold anything
     for (char& c : line)
       if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';
-    throw InputError(path_ + ":" + std::to_string(std::max(node.Mark().line, 0) + 1), line, fix);
+    throw InputError(cat(path_, ":", std::max(node.Mark().line, 0) + 1), line, fix);
   }
 
   std::string text(const YAML::Node& node) const {
@@ -159,7 +155,7 @@ const std::vector<Profile>& builtin_profiles() {
   static const std::vector<Profile> profiles = [] {
     std::vector<Profile> out;
     for (const ProfileText& text : builtin_profile_texts())
-      out.push_back(parse_profile(text.yaml, std::string(text.name) + ".yaml"));
+      out.push_back(parse_profile(text.yaml, cat(text.name, ".yaml")));
     return out;
   }();
   return profiles;

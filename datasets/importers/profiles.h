@@ -4,6 +4,7 @@
 
 #include <array>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -32,6 +33,12 @@ struct Profile {
   /// it. A file that does not begin so keeps all frames.
   size_t lead = 0;
 };
+
+/// The texts of datasets/importers/profiles/*.yaml, by name; CMake writes their source file.
+struct ProfileText {
+  std::string_view name, yaml;
+};
+std::span<const ProfileText> builtin_profile_texts();
 
 /// All built-in profiles, by name.
 const std::vector<Profile>& builtin_profiles();

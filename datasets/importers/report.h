@@ -6,8 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "nn/geometry/skeleton.h"
-
 namespace restage {
 
 struct ImportReport {
@@ -17,10 +15,5 @@ struct ImportReport {
   void fact(const std::string& name, const std::string& value) { facts.emplace_back(name, value); }
   void remark(const std::string& text) { remarks.push_back(text); }
 };
-
-/// A rest pose whose left and right are exchanged makes a mirror image of every motion: InputError
-/// in the doctor's words, or a remark if it is forced. `rest` in our frame.
-void check_handedness(const Joints& rest, bool force, const std::string& path,
-                      ImportReport& report);
 
 }  // namespace restage

@@ -1,10 +1,10 @@
 #include "datasets/importers/rest_pose.h"
 
 #include <cmath>
-#include <iterator>
 
-#include "autograd/base/error.h"
+#include "datasets/doctor/examine.h"
 #include "datasets/importers/t_pose.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
 namespace {
@@ -13,18 +13,6 @@ constexpr double kDegrees = 180.0 / M_PI;
 constexpr double kShownAngle = 5;  // limbs further off are listed
 constexpr double kMostTrunk = 45;  // more off the vertical is no standing pose
 constexpr double kMostLimb = 120;  // more cannot be corrected by shortest arcs
-
-/// A bone of a T-pose and where it points.
-struct Limb {
-  int from, to;
-  Vec3 wanted;
-};
-const std::vector<Limb>& limbs() {
-  static const Vec3 x = Vec3::UnitX(), y = Vec3::UnitY();
-  static const std::vector<Limb> all = {{1, 4, -y},  {2, 5, -y},   {4, 7, -y},  {5, 8, -y},
-                                        {16, 18, x}, {17, 19, -x}, {18, 20, x}, {19, 21, -x}};
-  return all;
-}
 
 double degrees_between(const Vec3& a, const Vec3& b) { return angle_between(a, b) * kDegrees; }
 
@@ -45,7 +33,7 @@ bool along_an_axis(const Vec3& v, double length) {
 }
 
 Axis find_up(const SourceMotion& motion, const JointMap& map, const Joints& rest, Axis given,
-             const std::string& path, ImportReport& report) {
+             ImportReport& report) {
   if (given != Axis::automatic) {
     report.fact("up", to_string(given) + ", as given");
     return given;
@@ -67,7 +55,8 @@ Axis find_up(const SourceMotion& motion, const JointMap& map, const Joints& rest
     return by_rest;
   }
   if (!motion_stands)
-    throw InputError(path, "neither the rest pose nor the recording stands, so up is not known",
+    throw InputError(report.file,
+                     "neither the rest pose nor the recording stands, so up is not known",
                      "say which axis is up (--up)");
   report.fact("up", to_string(by_motion) + ", by the recording");
   return by_motion;
@@ -96,11 +85,11 @@ Mat3 facing_front(const Joints& rest, const Vec3& given, bool framed, const std:
 std::string unlike_t_pose(const Joints& rest) {
   const double trunk = degrees_between(rest[15] - rest[0], Vec3::UnitY());
   if (!(trunk <= kMostTrunk)) return "its trunk is not upright";
-  for (const Limb& limb : limbs()) {
+  for (const Limb& limb : t_pose_limbs()) {
     const Vec3 bone = rest[limb.to] - rest[limb.from];
     if (!(bone.norm() > 1e-4) || !(degrees_between(bone, limb.wanted) <= kMostLimb))
-      return "its " + std::string(kJointNames[limb.from]) + " does not point towards the " +
-             std::string(kJointNames[limb.to]) + " as a standing person's";
+      return cat("its ", kJointNames[limb.from], " does not point towards the ",
+                 kJointNames[limb.to], " as a standing person's");
   }
   return "";
 }
@@ -108,18 +97,17 @@ std::string unlike_t_pose(const Joints& rest) {
 /// "left_hip 20, right_hip 20 degrees": limbs off a T-pose.
 std::string limbs_off(const Joints& rest) {
   std::string out;
-  for (const Limb& limb : limbs()) {
+  for (const Limb& limb : t_pose_limbs()) {
     const double angle = degrees_between(rest[limb.to] - rest[limb.from], limb.wanted);
     if (angle < kShownAngle) continue;
-    out += (out.empty() ? "" : ", ") + std::string(kJointNames[limb.from]) + " " +
-           std::to_string(std::lround(angle));
+    out += cat(out.empty() ? "" : ", ", kJointNames[limb.from], " ", std::lround(angle));
   }
   return out.empty() ? out : out + " degrees";
 }
 
 RestPose built_pose(const SourceMotion& motion, const JointMap& map, const Joints& zero,
-                    const Mat3& up, const std::string& path, ImportReport& report) {
-  const Rotations turned = build_t_pose(motion, map, up, path);
+                    const Mat3& up, ImportReport& report) {
+  const Rotations turned = build_t_pose(motion, map, up, report.file);
   RestPose out;
   out.align = up;
   Joints stood;  // the zero pose as a whole, its trunk upright
@@ -139,19 +127,34 @@ RestPose built_pose(const SourceMotion& motion, const JointMap& map, const Joint
 
 }  // namespace
 
+const std::vector<Limb>& t_pose_limbs() {
+  static const Vec3 x = Vec3::UnitX(), y = Vec3::UnitY();
+  static const std::vector<Limb> all = {{1, 4, -y},  {2, 5, -y},   {4, 7, -y},  {5, 8, -y},
+                                        {16, 18, x}, {17, 19, -x}, {18, 20, x}, {19, 21, -x}};
+  return all;
+}
+
+void check_handedness(const Joints& rest, bool force, ImportReport& report) {
+  if (!is_mirrored(rest).value_or(false)) return;
+  const std::string wrong = cat(kMirrored, " (", kMirroredBecause, ")");
+  if (!force)
+    throw InputError(report.file, wrong, cat(kMirroredFix, "; --force takes it as it is"));
+  report.remark(wrong + ": taken as it is");
+}
+
 RestPose find_rest_pose(const SourceMotion& motion, const JointMap& map, const RestOptions& options,
-                        const std::string& path, ImportReport& report) {
+                        ImportReport& report) {
+  const std::string& path = report.file;
   PosedSkeleton pose;
   pose.joints = rest_joints(motion.skeleton, map);
   pose.global.fill(Mat3::Identity());
   const bool framed = options.frame >= 0;
   if (framed) {
     if (static_cast<size_t>(options.frame) >= motion.local.size())
-      throw InputError(path, "has no frame " + std::to_string(options.frame),
-                       "name a rest frame of it");
+      throw InputError(path, cat("has no frame ", options.frame), "name a rest frame of it");
     pose = source_pose(motion, map, static_cast<size_t>(options.frame));
   }
-  const Mat3 up = upright(find_up(motion, map, pose.joints, options.up, path, report));
+  const Mat3 up = upright(find_up(motion, map, pose.joints, options.up, report));
   Joints upright_joints;
   for (size_t j = 0; j < kJoints; ++j) upright_joints[j] = up * (pose.joints[j] - pose.joints[0]);
   const Vec3 given =
@@ -168,16 +171,16 @@ RestPose find_rest_pose(const SourceMotion& motion, const JointMap& map, const R
     wrong = unlike_t_pose(out.joints);
   }
   if (!wrong.empty() && framed)
-    throw InputError(path, "frame " + std::to_string(options.frame) + " is no T-pose: " + wrong,
+    throw InputError(path, cat("frame ", options.frame, " is no T-pose: ", wrong),
                      "name a frame that is a T-pose as the rest frame");
-  if (!wrong.empty()) return built_pose(motion, map, pose.joints, up, path, report);
+  if (!wrong.empty()) return built_pose(motion, map, pose.joints, up, report);
 
   const Vec3 front = out.align.transpose() * Vec3::UnitZ();
   report.fact("facing",
               to_string(axis_near(front)) +
                   (given.isZero() ? ", by the left and right joints" : ", as given") +
                   (degrees_between(front, vector_of(axis_near(front))) > 1 ? " (about)" : ""));
-  report.fact("rest pose", framed ? "frame " + std::to_string(options.frame) : "zero rotations");
+  report.fact("rest pose", framed ? cat("frame ", options.frame) : "zero rotations");
   const std::string off = limbs_off(out.joints);
   if (!off.empty()) report.fact("off a T-pose", off + " (corrected bone by bone for each body)");
   return out;

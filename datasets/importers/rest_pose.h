@@ -3,7 +3,6 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include "datasets/importers/axis.h"
 #include "datasets/importers/report.h"
@@ -30,6 +29,17 @@ struct RestPose {
   Mat3 align;       ///< from the file's axes to ours
 };
 
+/// A thigh, shin, upper arm or forearm of a T-pose and where it points.
+struct Limb {
+  int from, to;
+  Vec3 wanted;
+};
+const std::vector<Limb>& t_pose_limbs();
+
+/// A rest pose whose left and right are exchanged makes a mirror image of every motion: InputError
+/// in the doctor's words, or a remark if it is forced. `rest` in our frame.
+void check_handedness(const Joints& rest, bool force, ImportReport& report);
+
 /// The zero pose (or the frame asked for), turned with the whole world so that the person stands
 /// upright and faces +z. A zero pose with a limb more than 120 degrees off a T-pose's (LAFAN1, some
 /// SOMA files: all bones along one axis) cannot be corrected bone by bone, so a T-pose is built:
@@ -45,6 +55,6 @@ struct RestPose {
 /// InputError: the frame asked for is no T-pose, nothing tells up from down, no T-pose can be
 /// built.
 RestPose find_rest_pose(const SourceMotion& motion, const JointMap& map, const RestOptions& options,
-                        const std::string& path, ImportReport& report);
+                        ImportReport& report);
 
 }  // namespace restage

@@ -3,16 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <optional>
 #include <set>
 
-#include "autograd/base/error.h"
 #include "autograd/base/format.h"
 #include "datasets/doctor/orientation_model.h"
 #include "datasets/doctor/shape.h"
 #include "datasets/readers/array_frames.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/folders.h"
 #include "datasets/readers/frame_folder.h"
 #include "nn/geometry/box.h"
@@ -85,15 +84,13 @@ void convert(Frame& frame, const Eigen::Matrix3f& to_ours) {
 }
 
 std::string rate_fact(double fps, const std::string& from, int64_t frames, const Clock& clock) {
-  const std::string before =
-      format("%.6g fps (", fps) + from + "), " + std::to_string(frames) + " frames";
+  const std::string before = cat(format("%.6g fps (", fps), from, "), ", frames, " frames");
   if (fps == kFps) return before + ", kept";
   const int64_t count = clock.count();
   int64_t used = 1;
   for (int64_t k = 1; k < count; ++k) used += clock.source(k) != clock.source(k - 1);
-  return before + " -> 30 fps, " + std::to_string(count) +
-         " frames (the nearest in time: " + std::to_string(frames - used) + " left out, " +
-         std::to_string(count - used) + " repeated)";
+  return cat(before, " -> 30 fps, ", count, " frames (the nearest in time: ", frames - used,
+             " left out, ", count - used, " repeated)");
 }
 
 /// InputError unless there are 64 different points, as many as retargeting needs.
@@ -102,8 +99,7 @@ void check_count(const Frame& frame) {
   std::set<std::array<float, 3>> different;
   for (const Point& p : frame.points)
     if (different.insert({p.x(), p.y(), p.z()}).second && different.size() == kFewest) return;
-  throw InputError(frame.source,
-                   "has only " + std::to_string(different.size()) + " different points",
+  throw InputError(frame.source, cat("has only ", different.size(), " different points"),
                    "give scans of 64 points or more");
 }
 
@@ -149,20 +145,20 @@ std::vector<ScanSequence> find_scans(const std::string& path, uint64_t max_memor
     else if (!files.empty())
       out.push_back({folder, files});
     if (const size_t n = count_pickles(folder))
-      skipped.push_back(folder + ": " + std::to_string(n) +
-                        " pickles (.pkl), which can run code and are never read; docs/data.md "
-                        "shows how to convert them");
+      skipped.push_back(cat(folder, ": ", n,
+                            " pickles (.pkl), which can run code and are never read; docs/data.md "
+                            "shows how to convert them"));
   }
   return out;
 }
 
-int64_t import_scans(const ScanSequence& sequence, const ScanOptions& options, ScanWriter& out,
-                     ImportReport& report) {
+int64_t import_scans(const ScanSequence& sequence, const MotionOptions& options,
+                     uint64_t max_memory, ScanWriter& out, ImportReport& report) {
   const bool one = sequence.files.size() == 1;
-  const auto source = one ? open_frames(sequence.files[0], {"", options.max_memory})
-                          : open_frame_files(sequence.files, {"", options.max_memory});
+  const auto source = one ? open_frames(sequence.files[0], {"", max_memory})
+                          : open_frame_files(sequence.files, {"", max_memory});
   const bool stated =
-      one && is_array_name(sequence.files[0]) && stated_fps(sequence.files[0], options.max_memory);
+      one && is_array_name(sequence.files[0]) && stated_fps(sequence.files[0], max_memory);
   const double fps = options.fps > 0 ? options.fps : source->fps();
   const double scale = options.scale > 0 ? options.scale : 1;
   const Clock clock(source->frames(), fps);
@@ -174,9 +170,9 @@ int64_t import_scans(const ScanSequence& sequence, const ScanOptions& options, S
                                 source->frames(), clock));
   report.fact("scale", options.scale > 0 ? format("%.6g m a unit (--scale)", scale)
                                          : "metres (taken for granted: --scale)");
-  const Axis up = options.up == Axis::automatic ? Axis::y : options.up;
-  report.fact("up", to_string(up) +
-                        (options.up == Axis::automatic ? " (taken for granted: --up)" : " (--up)"));
+  const bool given_up = options.rest.up != Axis::automatic;
+  const Axis up = given_up ? options.rest.up : Axis::y;
+  report.fact("up", to_string(up) + (given_up ? " (--up)" : " (taken for granted: --up)"));
   const Eigen::Matrix3f to_ours = (scale * upright(up)).cast<float>();
 
   int64_t at = 0;  // of the source, the frame that next() gives
@@ -199,8 +195,7 @@ int64_t import_scans(const ScanSequence& sequence, const ScanOptions& options, S
     out.append(points);
   }
   out.end_sequence();
-  report.fact("points", fewest == most ? std::to_string(most)
-                                       : std::to_string(fewest) + " to " + std::to_string(most));
+  report.fact("points", fewest == most ? std::to_string(most) : cat(fewest, " to ", most));
   return count;
 }
 

@@ -5,19 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "datasets/importers/axis.h"
-#include "datasets/importers/report.h"
+#include "datasets/importers/motion_clip.h"
 #include "datasets/readers/byte_stream.h"
 #include "datasets/schema.h"
 
 namespace restage {
-
-struct ScanOptions {
-  double fps = 0;             ///< true frames per second; 0: the file's, else 30
-  double scale = 0;           ///< metres per unit; 0: 1
-  Axis up = Axis::automatic;  ///< automatic: y
-  uint64_t max_memory = kMaxMemory;
-};
 
 /// One sequence: a single file that holds all its frames, or its frames' files in order.
 struct ScanSequence {
@@ -33,9 +25,10 @@ std::vector<ScanSequence> find_scans(const std::string& path, uint64_t max_memor
 
 /// Appends a sequence to `out` in metres, y up and at 30 fps, in constant memory. Clouds cannot be
 /// interpolated: each frame is the nearest one in time, and the report says how many were left out
-/// or repeated. Faces are dropped. Returns the number of frames. InputError: see open_frames();
-/// the frames before it are in `out`, until its drop_sequence().
-int64_t import_scans(const ScanSequence& sequence, const ScanOptions& options, ScanWriter& out,
-                     ImportReport& report);
+/// or repeated. Faces are dropped. Of the options fps (0: the file's, else 30), scale (0: 1) and up
+/// axis (automatic: y) count. Returns the number of frames. InputError: see open_frames(); the
+/// frames before it are in `out`, until its drop_sequence().
+int64_t import_scans(const ScanSequence& sequence, const MotionOptions& options,
+                     uint64_t max_memory, ScanWriter& out, ImportReport& report);
 
 }  // namespace restage

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
 namespace {
@@ -17,14 +17,13 @@ constexpr double kMostMetres = 100;  // nobody is larger: other units, or no mod
 }
 
 void check_shape(const NpyArray& array, const std::vector<int64_t>& wanted) {
-  if (array.is_text() || array.shape() != wanted) misfit(array, shape_text(wanted));
+  if (!array.is_shaped(wanted)) misfit(array, shape_text(wanted));
 }
 
 SmplFamily family_of(const NpyArray& kintree) {
-  const bool table = !kintree.is_text() && kintree.shape().size() == 2 && kintree.shape()[0] == 2;
-  if (table && kintree.shape()[1] == 24) return SmplFamily::smpl;
-  if (table && kintree.shape()[1] == 52) return SmplFamily::smplh;
-  if (table && kintree.shape()[1] == 55) return SmplFamily::smplx;
+  if (kintree.is_shaped({2, 24})) return SmplFamily::smpl;
+  if (kintree.is_shaped({2, 52})) return SmplFamily::smplh;
+  if (kintree.is_shaped({2, 55})) return SmplFamily::smplx;
   misfit(kintree, "[2, 24] (SMPL), [2, 52] (SMPL-H) or [2, 55] (SMPL-X)");
 }
 
@@ -38,14 +37,7 @@ size_t shapes_of(SmplFamily family, size_t directions) {
 }  // namespace
 
 const char* to_string(SmplFamily family) {
-  switch (family) {
-    case SmplFamily::smpl:
-      return "SMPL";
-    case SmplFamily::smplh:
-      return "SMPL-H";
-    default:
-      return "SMPL-X";
-  }
+  return family == SmplFamily::smpl ? "SMPL" : family == SmplFamily::smplh ? "SMPL-H" : "SMPL-X";
 }
 
 bool is_smpl_model(const Npz& file) {
@@ -68,25 +60,22 @@ SmplModel::SmplModel(const Npz& file)
     throw InputError(path_, "does not stand with y up and its left towards +x", kFix);
   const double height = (rest[15] - 0.5 * (rest[7] + rest[8])).norm();
   if (!(height > 0.3 && height < 3))
-    throw InputError(path_,
-                     "is no person's size in metres: from ankles to head " + std::to_string(height),
+    throw InputError(path_, cat("is no person's size in metres: from ankles to head ", height),
                      kFix);
 }
 
 void SmplModel::read_template(const Npz& file) {
   const NpyArray array = file.array("v_template");
-  if (array.is_text() || array.shape().size() != 2 || array.shape()[1] != 3 || array.size() == 0)
-    misfit(array, "[V, 3]");
+  if (!array.is_shaped({-1, 3}) || array.size() == 0) misfit(array, "[V, 3]");
   const std::vector<double> values = array.finite();
   template_.resize(values.size() / 3);
   for (size_t v = 0; v < template_.size(); ++v) {
-    template_[v] = Vec3(values[3 * v], values[3 * v + 1], values[3 * v + 2]);
+    template_[v] = Vec3(&values[3 * v]);
     if (!(template_[v].cwiseAbs().maxCoeff() < kMostMetres))
       throw InputError(array.where(), "is larger than any person in metres", kFix);
   }
-  const auto& shape = directions_.shape();
-  if (directions_.is_text() || shape.size() != 3 || shape[0] != array.shape()[0] || shape[1] != 3)
-    misfit(directions_, "[" + std::to_string(template_.size()) + ", 3, B]");
+  if (!directions_.is_shaped({array.shape()[0], 3, -1}))
+    misfit(directions_, cat("[", template_.size(), ", 3, B]"));
   for (int64_t i = 0; i < directions_.size(); ++i)
     if (!(std::abs(directions_[i]) < kMostMetres))
       throw InputError(directions_.where(), "holds a number that is no length in metres", kFix);
@@ -102,14 +91,13 @@ void SmplModel::read_skeleton(const Npz& file) {
     const bool known = j < kJoints ? j == 0 || parent == kParents[j]
                                    : parent >= 0 && parent < static_cast<double>(j);
     if (!known)
-      throw InputError(table.where(),
-                       "gives joint " + std::to_string(j) + " another parent than SMPL", kFix);
+      throw InputError(table.where(), cat("gives joint ", j, " another parent than SMPL"), kFix);
     parents_.push_back(j == 0 ? -1 : static_cast<int>(parent));
   }
 }
 
 void SmplModel::read_regressor() {
-  const auto n = static_cast<int64_t>(template_.size());
+  const int64_t n = template_.size();
   check_shape(regressor_, {static_cast<int64_t>(parents_.size()), n});
   joint_vertices_.resize(kJoints);
   for (int64_t i = 0; i < kJoints * n; ++i) {
@@ -122,7 +110,7 @@ void SmplModel::read_regressor() {
 
 void SmplModel::read_weights(const Npz& file) {
   const NpyArray array = file.array("weights");
-  const auto joints = static_cast<int64_t>(parents_.size());
+  const int64_t joints = parents_.size();
   check_shape(array, {static_cast<int64_t>(template_.size()), joints});
   weights_.setZero(array.shape()[0], kJoints);
   for (int64_t v = 0; v < array.shape()[0]; ++v) {
@@ -137,16 +125,14 @@ void SmplModel::read_weights(const Npz& file) {
       row[ours] += std::max(weight, 0.0);
       sum += std::max(weight, 0.0);
     }
-    if (!(sum > 0))
-      throw InputError(array.where(), "gives vertex " + std::to_string(v) + " no weight", kFix);
+    if (!(sum > 0)) throw InputError(array.where(), cat("gives vertex ", v, " no weight"), kFix);
     for (int j = 0; j < kJoints; ++j) weights_(v, j) = static_cast<float>(row[j] / sum);
   }
 }
 
 void SmplModel::read_faces(const Npz& file) {
   const NpyArray array = file.array("f");
-  if (array.is_text() || array.shape().size() != 2 || array.shape()[1] != 3)
-    misfit(array, "[T, 3]");
+  if (!array.is_shaped({-1, 3})) misfit(array, "[T, 3]");
   faces_.resize(array.shape()[0]);
   for (int64_t i = 0; i < array.size(); ++i) {
     const double index = array[i];
@@ -160,7 +146,7 @@ void SmplModel::read_faces(const Npz& file) {
 void SmplModel::read_blend_shapes(const Npz& file) {
   if (!file.has("posedirs")) return;
   const NpyArray array = file.array("posedirs");
-  const auto n = static_cast<int64_t>(template_.size());
+  const int64_t n = template_.size();
   const auto width = 9 * (static_cast<int64_t>(parents_.size()) - 1);
   check_shape(array, {n, 3, width});
   const auto shapes = std::make_shared<PoseBlendShapes>();
@@ -221,7 +207,7 @@ std::vector<Betas> read_betas(const std::string& path, uint64_t max_memory) {
     throw InputError(array.where(), "has the shape " + shape_text(shape),
                      "give betas as [B], or [P, B] for several people");
   const std::vector<double> values = array.finite();
-  const auto width = static_cast<std::ptrdiff_t>(shape.back());
+  const auto width = shape.back();
   std::vector<Betas> out;
   for (auto at = values.begin(); at != values.end(); at += width) out.emplace_back(at, at + width);
   for (const double value : values)

@@ -3,12 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
-namespace {
 
-/// Zero-pose positions of all source joints.
 std::vector<Vec3> zero_positions(const SourceSkeleton& skeleton) {
   std::vector<Vec3> out(skeleton.size());
   for (size_t j = 0; j < out.size(); ++j) {
@@ -17,8 +15,6 @@ std::vector<Vec3> zero_positions(const SourceSkeleton& skeleton) {
   }
   return out;
 }
-
-}  // namespace
 
 Joints rest_joints(const SourceSkeleton& skeleton, const JointMap& map) {
   const std::vector<Vec3> zero = zero_positions(skeleton);
@@ -36,25 +32,25 @@ void check_length(size_t frames, size_t joints, double fps, uint64_t bytes,
   // 22 positions of a frame are 528 bytes; a joint's three angles take at least 6 in a text.
   if (most > 100'000 + payload / 66 || most * static_cast<double>(joints) > 6e6 + payload / 2)
     throw InputError(path,
-                     "would make " + std::to_string(static_cast<int64_t>(most)) + " frames of " +
-                         std::to_string(joints) + " joints, far more than is in the file",
+                     cat("would make ", static_cast<int64_t>(most), " frames of ", joints,
+                         " joints, far more than is in the file"),
                      "check its frame rate, or cut it");
 }
 
-SourceMotion resample(const SourceMotion& motion, double fps) {
+SourceMotion resample(const SourceMotion& motion) {
   SourceMotion out;
   out.skeleton = motion.skeleton;
   out.moving = motion.moving;
-  out.fps = fps;
+  out.fps = kFps;
   const size_t n = motion.local.size();
   if (n == 0) return out;
   // A hair more than the last frame's time: 1 / 0.00833333 s is not exactly 120.
   const double last = static_cast<double>(n - 1);
-  const size_t frames = static_cast<size_t>(std::floor(last / motion.fps * fps + 1e-3)) + 1;
+  const size_t frames = static_cast<size_t>(std::floor(last / motion.fps * kFps + 1e-3)) + 1;
   out.local.resize(frames);
   out.position.resize(frames);
   for (size_t k = 0; k < frames; ++k) {
-    const double at = std::min(last, static_cast<double>(k) / fps * motion.fps);
+    const double at = std::min(last, static_cast<double>(k) / kFps * motion.fps);
     const size_t a = static_cast<size_t>(at), b = std::min(a + 1, n - 1);
     const double t = at - static_cast<double>(a);
     out.local[k].resize(motion.skeleton.size());
@@ -81,14 +77,14 @@ PosedSkeleton source_pose(const SourceMotion& motion, const JointMap& map, size_
       global[j] = local;
       position[j] = offset;
     } else {
-      const size_t p = static_cast<size_t>(s.parents[j]);
+      const int p = s.parents[j];
       global[j] = global[p] * local;
       position[j] = position[p] + global[p] * offset;
     }
   }
   PosedSkeleton out;
   for (int j = 0; j < kJoints; ++j) {
-    const size_t source = static_cast<size_t>(map[j].joint);
+    const int source = map[j].joint;
     out.global[j] = global[source];
     out.joints[j] = position[source] + global[source] * map[j].offset;
   }
@@ -113,8 +109,8 @@ double floor_height(const Poses& poses) {
   return floor_height(std::move(lowest));
 }
 
-Motion to_motion(const Poses& poses, const Joints& rest, double floor_y) {
-  Motion out;
+Motion to_motion(const Poses& poses, const Joints& rest, double floor_y, Motion named) {
+  Motion out = std::move(named);
   out.rest = rest;
   out.global.resize(poses.size());
   out.hips.resize(poses.size());

@@ -43,10 +43,8 @@ struct NamedJoints {
 /// missing and the nearest name that is there, if no names fit.
 NamedJoints name_joints(const SourceSkeleton& skeleton, const std::string& where,
                         const Profile* profile = nullptr);
-/// name_joints(), the joints alone.
-JointMap map_joints(const SourceSkeleton& skeleton, const std::string& where,
-                    const Profile* profile = nullptr);
-
+/// Positions of all its joints at zero rotations, relative to the root.
+std::vector<Vec3> zero_positions(const SourceSkeleton& skeleton);
 /// Positions of the 22 joints at zero rotations, relative to the pelvis.
 Joints rest_joints(const SourceSkeleton& skeleton, const JointMap& map);
 
@@ -57,7 +55,7 @@ void check_length(size_t frames, size_t joints, double fps, uint64_t bytes,
                   const std::string& path);
 
 /// Slerp of local rotations and linear interpolation of translations at t = k / 30 s.
-SourceMotion resample(const SourceMotion& motion, double fps = kFps);
+SourceMotion resample(const SourceMotion& motion);
 
 /// Global rotations and positions of the 22 joints in one frame.
 PosedSkeleton source_pose(const SourceMotion& motion, const JointMap& map, size_t frame);
@@ -71,7 +69,8 @@ double floor_height(const Poses& poses);
 double floor_height(std::vector<double> lowest);
 double lowest_foot(const PosedSkeleton& pose);
 
-/// World rotations and hips over the floor. The frames must be at 30 fps already.
-Motion to_motion(const Poses& poses, const Joints& rest, double floor_y);
+/// World rotations and hips over the floor, in a motion named so. The frames must be at 30 fps
+/// already.
+Motion to_motion(const Poses& poses, const Joints& rest, double floor_y, Motion named = {});
 
 }  // namespace restage

@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "autograd/base/error.h"
+#include "datasets/doctor/shape.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
 namespace {
@@ -51,7 +52,7 @@ class Builder {
   Rotations build() {
     stand_trunk();
     for (int j = 1; j < kJoints; ++j) {
-      out_[at(j)] = out_[at(kParents[at(j)])] * turned(j);
+      out_[j] = out_[kParents[j]] * turned(j);
       if (j == 1 || j == 2) twist(j, -Vec3::UnitZ());   // knees bend backwards
       if (j == 16 || j == 17) twist(j, Vec3::UnitZ());  // elbows bend forwards
     }
@@ -59,20 +60,18 @@ class Builder {
   }
 
  private:
-  static size_t at(int j) { return static_cast<size_t>(j); }
   static bool in_trunk(int j) { return j == 3 || j == 6 || j == 9 || j == 12; }
 
-  Vec3 bone(int j) const { return direction(zero_[at(kBone[j])] - zero_[at(j)]); }
+  Vec3 bone(int j) const { return direction(zero_[kBone[j]] - zero_[j]); }
   /// Rotation of joint j against its parent.
   static Mat3 local(const PosedSkeleton& pose, int j) {
-    return pose.global[at(kParents[at(j)])].transpose() * pose.global[at(j)];
+    return pose.global[kParents[j]].transpose() * pose.global[j];
   }
 
   /// Whether pelvis, spine and head lie on a line in the zero pose.
   bool straight() const {
     double length = 0;
-    for (const int j : {3, 6, 9, 12, 15})
-      length += (zero_[at(j)] - zero_[at(kParents[at(j)])]).norm();
+    for (const int j : {3, 6, 9, 12, 15}) length += (zero_[j] - zero_[kParents[j]]).norm();
     return zero_[15].norm() > 0.8 * length;
   }
 
@@ -108,18 +107,15 @@ class Builder {
   Vec3 foot_direction(int ankle) const {
     std::vector<std::pair<double, double>> height_and_pitch;
     for (const PosedSkeleton& pose : poses_) {
-      const Vec3 foot =
-          direction(align_ * (pose.joints[at(kBone[ankle])] - pose.joints[at(ankle)]));
-      height_and_pitch.emplace_back((align_ * pose.joints[at(ankle)]).y(),
+      const Vec3 foot = direction(align_ * (pose.joints[kBone[ankle]] - pose.joints[ankle]));
+      height_and_pitch.emplace_back((align_ * pose.joints[ankle]).y(),
                                     std::asin(std::clamp(foot.y(), -1.0, 1.0)));
     }
     std::sort(height_and_pitch.begin(), height_and_pitch.end());
     const size_t lowest = (height_and_pitch.size() + 3) / 4;
     std::vector<double> pitch;
     for (size_t i = 0; i < lowest; ++i) pitch.push_back(height_and_pitch[i].second);
-    std::nth_element(pitch.begin(), pitch.begin() + static_cast<std::ptrdiff_t>(lowest / 2),
-                     pitch.end());
-    const double angle = std::clamp(pitch[lowest / 2], -M_PI / 3, M_PI / 9);
+    const double angle = std::clamp(median(std::move(pitch)), -M_PI / 3, M_PI / 9);
     return Vec3(0, std::sin(angle), std::cos(angle));
   }
 
@@ -133,7 +129,7 @@ class Builder {
       for (const PosedSkeleton& pose : poses_) mean.add(local(pose, j), 1.0);
       return mean.mean();
     }
-    const Vec3 wanted = out_[at(kParents[at(j)])].transpose() * target(j), along = bone(j);
+    const Vec3 wanted = out_[kParents[j]].transpose() * target(j), along = bone(j);
     for (const PosedSkeleton& pose : poses_) {
       const Mat3 rotation = local(pose, j);
       const Vec3 now = rotation * along;
@@ -143,9 +139,8 @@ class Builder {
     }
     if (along.isZero() || mean.weight() < 1e-3 * static_cast<double>(poses_.size()))
       throw InputError(path_,
-                       "the zero pose is no T-pose, and none can be built: the " +
-                           std::string(kJointNames[at(j)]) +
-                           " never points anywhere near its place in one",
+                       cat("the zero pose is no T-pose, and none can be built: the ",
+                           kJointNames[j], " never points anywhere near its place in one"),
                        "name a frame that is a T-pose as the rest frame");
     return mean.mean();
   }
@@ -159,9 +154,9 @@ class Builder {
     for (const PosedSkeleton& pose : poses_) bend += local(pose, next) * next_along;
     bend -= along * along.dot(bend);
     if (!(bend.norm() > kBends * static_cast<double>(poses_.size()))) return;
-    const Vec3 axis = out_[at(j)] * along, now = direction(out_[at(j)] * bend);
+    const Vec3 axis = out_[j] * along, now = direction(out_[j] * bend);
     const double angle = std::atan2(axis.dot(now.cross(side)), now.dot(side));
-    out_[at(j)] = Eigen::AngleAxisd(angle, axis).toRotationMatrix() * out_[at(j)];
+    out_[j] = Eigen::AngleAxisd(angle, axis).toRotationMatrix() * out_[j];
   }
 
   const std::string& path_;

@@ -1,9 +1,9 @@
 // The frames of an AMC file; its skeleton is in asf.cpp.
-#include <cmath>
 #include <map>
 
 #include "autograd/base/nearest.h"
 #include "datasets/readers/asf.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/word_lines.h"
 
 namespace restage {
@@ -50,8 +50,8 @@ class AmcParser {
     if (!amc_.frames.empty()) end_frame();
     const double number = lines_.number(lines_.words()[0]);
     if (!amc_.frames.empty() && number != number_ + 1)
-      lines_.fail("frame " + std::string(lines_.words()[0].substr(0, 20)) + " follows frame " +
-                      std::to_string(static_cast<long long>(number_)),
+      lines_.fail(cat("frame ", lines_.words()[0].substr(0, 20), " follows frame ",
+                      static_cast<long long>(number_)),
                   "give the whole recording, frame by frame");
     number_ = number;
     amc_.frames.emplace_back(width_, 0.0);
@@ -61,9 +61,9 @@ class AmcParser {
   void end_frame() const {
     for (size_t b = 0; b < given_.size(); ++b)
       if (!given_[b] && !skeleton_.bones[b].freedoms.empty())
-        lines_.fail("frame " + std::to_string(static_cast<long long>(number_)) + " lacks bone " +
-                        skeleton_.bones[b].name,
-                    "give the whole file, with its own skeleton");
+        lines_.fail(
+            cat("frame ", static_cast<long long>(number_), " lacks bone ", skeleton_.bones[b].name),
+            "give the whole file, with its own skeleton");
   }
 
   void bone_values() {
@@ -81,8 +81,8 @@ class AmcParser {
     const size_t bone = at->second, count = skeleton_.bones[bone].freedoms.size();
     if (given_[bone]) lines_.fail("bone " + name + " twice in one frame", "keep one");
     if (words.size() != count + 1)
-      lines_.fail("bone " + name + " has " + std::to_string(words.size() - 1) +
-                      " values, its skeleton has " + std::to_string(count) + " freedoms",
+      lines_.fail(cat("bone ", name, " has ", words.size() - 1, " values, its skeleton has ", count,
+                      " freedoms"),
                   "give the ASF file that belongs to it");
     given_[bone] = 1;
     for (size_t i = 0; i < count; ++i)

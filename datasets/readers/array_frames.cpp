@@ -1,8 +1,6 @@
 #include "datasets/readers/array_frames.h"
 
-#include <cmath>
-
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/precision.h"
 #include "datasets/readers/text.h"
 
@@ -69,7 +67,7 @@ class ArrayFrames : public FrameSource {
       array_.in->rewind();
       whole_.emplace(*array_.in, max_memory);
     } else if (bytes_per_frame() > max_memory) {
-      throw InputError(path, "has frames of " + std::to_string(bytes_per_frame()) + " bytes",
+      throw InputError(path, cat("has frames of ", bytes_per_frame(), " bytes"),
                        "allow more with --max-memory");
     }
   }
@@ -77,11 +75,8 @@ class ArrayFrames : public FrameSource {
   std::optional<Frame> next() override {
     if (at_ == frames_) return std::nullopt;
     Frame frame;
-    frame.source = array_.header.shape.size() == 3 ? path_ + ":" + std::to_string(at_) : path_;
-    if (whole_)
-      pick(frame);
-    else
-      read(frame);
+    frame.source = array_.header.shape.size() == 3 ? cat(path_, ":", at_) : path_;
+    read(frame);
     ++at_;
     if (how_ == NonFinite::mark) {
       frame.left_out = leave_out_non_finite(frame.points, frame.faces);
@@ -111,27 +106,20 @@ class ArrayFrames : public FrameSource {
     return static_cast<uint64_t>(points_) * 3 * array_.header.width;
   }
 
-  /// The next frame of the stream; a cloud [N, 3] in Fortran order lies there axis by axis.
+  /// The next frame: of the stream, where a cloud [N, 3] in Fortran order lies axis by axis.
   void read(Frame& frame) {
-    const std::vector<char> bytes = array_.in->take(bytes_per_frame());
-    const auto n = static_cast<size_t>(points_);
-    frame.points.resize(n);
-    for (size_t i = 0; i < n; ++i)
-      for (size_t axis = 0; axis < 3; ++axis) {
-        const size_t element = array_.header.fortran ? axis * n + i : 3 * i + axis;
-        put(frame, i, axis, array_.header.number(bytes.data() + element * array_.header.width));
-      }
-  }
-  void pick(Frame& frame) {
+    const std::vector<char> bytes =
+        whole_ ? std::vector<char>() : array_.in->take(bytes_per_frame());
+    const NpyHeader& header = array_.header;
     frame.points.resize(points_);
-    for (size_t i = 0; i < frame.points.size(); ++i)
-      for (size_t axis = 0; axis < 3; ++axis)
-        put(frame, i, axis,
-            (*whole_)[(at_ * points_ + static_cast<int64_t>(i)) * 3 + static_cast<int64_t>(axis)]);
-  }
-  void put(Frame& frame, size_t point, size_t axis, double value) const {
-    frame.points[point][static_cast<int>(axis)] = text::coordinate(
-        value, [&] { return frame.source + ": point " + std::to_string(point); }, how_);
+    for (int64_t i = 0; i < points_; ++i)
+      for (int axis = 0; axis < 3; ++axis) {
+        const int64_t element = header.fortran ? axis * points_ + i : 3 * i + axis;
+        const double value = whole_ ? (*whole_)[3 * (at_ * points_ + i) + axis]
+                                    : header.number(bytes.data() + element * header.width);
+        frame.points[i][axis] = text::coordinate(
+            value, [&] { return cat(frame.source, ": point ", i); }, how_);
+      }
   }
 
   std::string path_;
@@ -200,10 +188,9 @@ std::unique_ptr<FrameSource> open_array_frames(const std::string& path,
 Frame read_array_frame(const std::string& path, const FrameOptions& options) {
   ArrayFrames frames(path, options);
   if (frames.frames() != 1)
-    throw InputError(
-        path,
-        "is a sequence of " + std::to_string(frames.frames()) + " frames where one frame belongs",
-        "give this file by itself");
+    throw InputError(path,
+                     cat("is a sequence of ", frames.frames(), " frames where one frame belongs"),
+                     "give this file by itself");
   return *frames.next();
 }
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <map>
 
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/word_lines.h"
 
 namespace restage {
@@ -28,10 +28,7 @@ std::array<Channel, 3> axis_order(const WordLines& lines, std::string_view word)
 
 Quat in_order(const std::array<Channel, 3>& axes, const Vec3& degrees) {
   Quat out = Quat::Identity();
-  for (const Channel axis : axes) {
-    const int i = static_cast<int>(axis) - static_cast<int>(Channel::x_rotation);
-    out = channel_rotation(axis, degrees[i]) * out;
-  }
+  for (const Channel axis : axes) out = channel_rotation(axis, degrees[axis_of(axis)]) * out;
   return out;
 }
 
@@ -40,7 +37,7 @@ Channel freedom(const WordLines& lines, std::string_view word, bool may_move) {
       {"rx", Channel::x_rotation}, {"ry", Channel::y_rotation}, {"rz", Channel::z_rotation},
       {"tx", Channel::x_position}, {"ty", Channel::y_position}, {"tz", Channel::z_position}};
   for (const auto& [name, channel] : kNames)
-    if (same_word(word, name) && (may_move || channel >= Channel::x_rotation)) return channel;
+    if (same_word(word, name) && (may_move || is_rotation(channel))) return channel;
   lines.fail("'" + WordLines::quoted(word) + "' is no freedom of a bone",
              may_move ? "use TX, TY, TZ, RX, RY, RZ" : "use rx, ry, rz: bones of a person turn");
 }
@@ -77,8 +74,7 @@ class AsfParser {
 
  private:
   Vec3 vector(size_t first, const char* what) const {
-    if (words().size() < first + 3)
-      lines_.fail(std::string(what) + " needs three numbers", "write them");
+    if (words().size() < first + 3) lines_.fail(cat(what, " needs three numbers"), "write them");
     return Vec3(lines_.number(words()[first]), lines_.number(words()[first + 1]),
                 lines_.number(words()[first + 2]));
   }
@@ -156,7 +152,7 @@ class AsfParser {
   /// "(-160.0 20.0)", with any blanks.
   void limits(AsfBone& bone, size_t first) {
     std::string text;
-    for (size_t i = first; i < words().size(); ++i) text += std::string(words()[i]) + " ";
+    for (size_t i = first; i < words().size(); ++i) text += cat(words()[i], " ");
     for (char& c : text)
       if (c == '(' || c == ')' || c == ',') c = ' ';
     std::vector<double> values;
@@ -276,12 +272,12 @@ std::vector<Quat> asf_pose(const AsfFile& asf, const std::vector<double>& values
     Vec3 root_angles = Vec3::Zero();
     for (const Channel channel : bone.freedoms) {
       const double value = values[next++];
-      if (channel < Channel::x_rotation) {
-        position[static_cast<int>(channel)] += value;
+      if (!is_rotation(channel)) {
+        position[axis_of(channel)] += value;
         continue;
       }
       const double degrees = radians ? value * kDegrees : value;
-      root_angles[static_cast<int>(channel) - static_cast<int>(Channel::x_rotation)] = degrees;
+      root_angles[axis_of(channel)] = degrees;
       turn = channel_rotation(channel, degrees) * turn;
     }
     if (bone.parent < 0) turn = in_order(asf.root_axes, root_angles);

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/word_lines.h"
 
 namespace restage {
@@ -151,7 +151,7 @@ std::string header_value(WordLines& lines, const std::string& title) {
   if (lines.next())
     for (const std::string_view word : lines.words()) {
       if (joined.size() > 100) break;
-      joined += (joined.empty() ? "" : " ") + std::string(word.substr(0, 100));
+      joined += cat(joined.empty() ? "" : " ", word.substr(0, 100));
     }
   const size_t colon = joined.find(':');
   const size_t end = joined.find_last_not_of(' ', colon - (colon > 0 ? 1 : 0)) + 1;
@@ -178,7 +178,7 @@ void parse_frames(WordLines& lines, BvhFile& file) {
   file.frame_time = lines.number(frame_time);
   file.frame_time_digit = last_digit(frame_time);
   if (!(file.frame_time >= 1e-4 && file.frame_time <= 1.0))
-    lines.fail("frame time " + std::to_string(file.frame_time) + " s is not usable",
+    lines.fail(cat("frame time ", file.frame_time, " s is not usable"),
                "write seconds per frame, between 0.0001 and 1");
   while (lines.next()) {
     if (static_cast<double>(file.frames.size()) >= announced) {
@@ -187,18 +187,18 @@ void parse_frames(WordLines& lines, BvhFile& file) {
     }
     const auto& words = lines.words();
     if (words.size() != file.channel_count)
-      lines.fail(
-          "frame " + std::to_string(file.frames.size()) + " has " + std::to_string(words.size()) +
-              " values, the hierarchy has " + std::to_string(file.channel_count) + " channels",
-          words.size() == 2 * file.channel_count ? "write decimals with points, not with commas"
-                                                 : "give the whole file, one frame a line");
+      lines.fail(cat("frame ", file.frames.size(), " has ", words.size(),
+                     " values, the hierarchy has ", file.channel_count, " channels"),
+                 words.size() == 2 * file.channel_count
+                     ? "write decimals with points, not with commas"
+                     : "give the whole file, one frame a line");
     std::vector<double>& frame = file.frames.emplace_back();
     frame.reserve(words.size());
     for (const std::string_view word : words) frame.push_back(lines.number(word));
   }
   if (static_cast<double>(file.frames.size()) != announced)
-    lines.fail("ends after " + std::to_string(file.frames.size()) + " of " +
-                   std::to_string(static_cast<long long>(announced)) + " frames",
+    lines.fail(cat("ends after ", file.frames.size(), " of ", static_cast<long long>(announced),
+                   " frames"),
                "give the whole file");
 }
 

@@ -6,7 +6,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
 namespace {
@@ -14,15 +14,14 @@ namespace {
 constexpr uint64_t kPiece = uint64_t{1} << 20;
 
 [[noreturn]] void throw_unreadable(const std::string& path) {
-  throw InputError(path, std::string("cannot be read (") + std::strerror(errno) + ")",
-                   "check the path");
+  throw InputError(path, cat("cannot be read (", std::strerror(errno), ")"), "check the path");
 }
 
 }  // namespace
 
 void ByteStream::read(char* out, size_t n) {
   if (n > left())
-    throw InputError(where_, "ends after " + std::to_string(size_) + " bytes, in the middle of it",
+    throw InputError(where_, cat("ends after ", size_, " bytes, in the middle of it"),
                      "it is cut short: copy or export it again");
   if (n > 0) do_read(out, n);
   position_ += n;

@@ -1,11 +1,10 @@
 #include "datasets/readers/frame_folder.h"
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 
-#include "autograd/base/error.h"
 #include "datasets/readers/array_frames.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/gltf.h"
 #include "datasets/readers/mesh_io.h"
 #include "datasets/readers/precision.h"
@@ -40,7 +39,7 @@ class FileFrames : public FrameSource {
   }
   void skip() override { at_ = std::min(at_ + 1, files_.size()); }
   void rewind() override { at_ = 0; }
-  int64_t frames() const override { return static_cast<int64_t>(files_.size()); }
+  int64_t frames() const override { return files_.size(); }
   double fps() const override { return kFps; }
 
  private:
@@ -51,9 +50,9 @@ class FileFrames : public FrameSource {
 
 void check_sequence(const std::string& path, int64_t sequence, int64_t sequences) {
   if (sequence >= 0 && sequence < sequences) return;
-  throw InputError(path, "has no sequence number " + std::to_string(sequence),
-                   sequences == 1 ? "it holds one, number 0"
-                                  : "give a number from 0 to " + std::to_string(sequences - 1));
+  throw InputError(
+      path, cat("has no sequence number ", sequence),
+      sequences == 1 ? "it holds one, number 0" : cat("give a number from 0 to ", sequences - 1));
 }
 
 /// Scans or the vertices of a prediction: a data set of which a frame is some rows.
@@ -83,7 +82,7 @@ class Hdf5Frames : public FrameSource {
   std::optional<Frame> next() override {
     if (at_ == end_) return std::nullopt;
     Frame frame;
-    frame.source = file_.path() + ":" + std::to_string(at_);
+    frame.source = cat(file_.path(), ":", at_);
     std::vector<float> values;
     set_.read_rows(row(at_), row(at_ + 1) - row(at_), values);
     check_finite(set_.where(), values, std::max<int64_t>(set_.row_size(), 1), row(at_));
@@ -147,8 +146,7 @@ class ClipFrames : public FrameSource {
     if (at_ == frames_) return std::nullopt;
     const double seconds = clip_->begin + static_cast<double>(at_) / kFps;
     Mesh mesh = gltf_mesh(file_, gltf_pose(file_, *clip_, seconds));
-    return Frame{file_.path + ":" + std::to_string(at_++), std::move(mesh.vertices),
-                 std::move(mesh.faces), 0};
+    return Frame{cat(file_.path, ":", at_++), std::move(mesh.vertices), std::move(mesh.faces), 0};
   }
   void rewind() override { at_ = 0; }
   int64_t frames() const override { return frames_; }

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <tuple>
 
 #include "autograd/base/atomic_file.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/gltf_detail.h"
 #include "datasets/readers/text.h"
 
@@ -20,17 +20,14 @@ using gltf::Document;
 
 constexpr double kLargest = 1e9;  // of a length; anything larger is a broken file
 
-std::string name_of(const char* kind, size_t index) {
-  return std::string(kind) + " " + std::to_string(index);
-}
+std::string name_of(const char* kind, size_t index) { return cat(kind, " ", index); }
 
 /// Numbers of a node's property: none, or exactly `count` finite ones.
 bool has_numbers(const std::vector<double>& values, size_t count, const std::string& path,
                  const std::string& what) {
   if (values.empty()) return false;
   if (values.size() != count)
-    broken(path, what + " has " + std::to_string(values.size()) + " numbers, not " +
-                     std::to_string(count));
+    broken(path, cat(what, " has ", values.size(), " numbers, not ", count));
   for (const double x : values)
     if (!(std::abs(x) < kLargest)) broken(path, what + " is out of range");
   return true;
@@ -38,9 +35,7 @@ bool has_numbers(const std::vector<double>& values, size_t count, const std::str
 
 /// A matrix without shear as translation, rotation and scale (a mirror goes into the x scale).
 void decompose(const std::vector<double>& m, GltfNode& node) {
-  Mat3 linear;
-  for (int c = 0; c < 3; ++c)
-    for (int r = 0; r < 3; ++r) linear(r, c) = m[4 * c + r];
+  const Mat3 linear = Eigen::Matrix4d(m.data()).topLeftCorner<3, 3>();
   node.translation = Vec3(m[12], m[13], m[14]);
   node.scale = linear.colwise().norm().transpose();
   if (linear.determinant() < 0) node.scale.x() = -node.scale.x();
@@ -122,9 +117,9 @@ class Builder {
     if (const int p = parent_[order_[at]]; p >= 0) node.parent = place_[p];
     if (has_numbers(in.matrix, 16, path_, "the matrix of " + where)) decompose(in.matrix, node);
     if (has_numbers(in.translation, 3, path_, "the translation of " + where))
-      node.translation = Vec3(in.translation[0], in.translation[1], in.translation[2]);
+      node.translation = Vec3(in.translation.data());
     if (has_numbers(in.scale, 3, path_, "the scale of " + where))
-      node.scale = Vec3(in.scale[0], in.scale[1], in.scale[2]);
+      node.scale = Vec3(in.scale.data());
     if (has_numbers(in.rotation, 4, path_, "the rotation of " + where)) {
       const Quat q(in.rotation[3], in.rotation[0], in.rotation[1], in.rotation[2]);
       if (!(q.norm() > 1e-6)) broken(path_, "the rotation of " + where + " is none");
@@ -158,8 +153,7 @@ class Builder {
         bone.inverse_bind.matrix().topRows<3>() = m.topRows<3>().cast<double>();
         const double size = std::abs(bone.inverse_bind.linear().determinant());
         if (!(size > 1e-30) || m.cwiseAbs().maxCoeff() > kLargest)
-          broken(path_, "inverse bind matrix " + std::to_string(j) + " of " + where +
-                            " cannot be inverted");
+          broken(path_, cat("inverse bind matrix ", j, " of ", where, " cannot be inverted"));
       }
       out_.bones.push_back(bone);
     }
@@ -253,8 +247,8 @@ class Builder {
     std::vector<std::vector<uint32_t>> joints;
     std::vector<std::vector<float>> weights;
     for (int set = 0; set < 4; ++set) {
-      const auto j = primitive.attributes.find("JOINTS_" + std::to_string(set));
-      const auto w = primitive.attributes.find("WEIGHTS_" + std::to_string(set));
+      const auto j = primitive.attributes.find(cat("JOINTS_", set));
+      const auto w = primitive.attributes.find(cat("WEIGHTS_", set));
       if (j == primitive.attributes.end() || w == primitive.attributes.end()) break;
       joints.push_back(
           gltf::read_integers(document_, j->second, TINYGLTF_TYPE_VEC4, "joints", allowance_));
@@ -316,7 +310,7 @@ class Builder {
     } else if (mode == TINYGLTF_MODE_TRIANGLE_FAN) {
       for (size_t i = 1; i + 1 < index.size(); ++i) add(0, i, i + 1);
     } else {
-      broken(path_, "has a mesh of the unknown kind " + std::to_string(mode));
+      broken(path_, cat("has a mesh of the unknown kind ", mode));
     }
   }
 
@@ -393,18 +387,18 @@ class Builder {
 
   void report() {
     if (loose_ > 0)
-      out_.remarks.push_back("left out " + std::to_string(loose_) +
-                             " meshes that belong to no skin: " + loose_names_ +
-                             (loose_ > 3 ? ", ..." : ""));
+      out_.remarks.push_back(cat("left out ", loose_, " meshes that belong to no skin: ",
+                                 loose_names_, loose_ > 3 ? ", ..." : ""));
     if (lines_ > 0) out_.remarks.push_back("left out lines: only points and triangles are read");
     if (morphs_)
       out_.remarks.push_back("morph targets are left out: the face rests as it is modelled");
     if (weightless_ > 0)
-      out_.remarks.push_back(std::to_string(weightless_) +
-                             " vertices without weights hang on the first joint of their skin");
+      out_.remarks.push_back(
+          cat(weightless_, " vertices without weights hang on the first joint of their skin"));
     if (unknown_tracks_ > 0)
-      out_.remarks.push_back("left out " + std::to_string(unknown_tracks_) +
-                             " animated properties other than translation, rotation and scale");
+      out_.remarks.push_back(
+          cat("left out ", unknown_tracks_,
+              " animated properties other than translation, rotation and scale"));
   }
 
   const Document& document_;

@@ -23,6 +23,9 @@ struct GltfNode {
   Vec3 translation = Vec3::Zero();
   Quat rotation = Quat::Identity();
   Vec3 scale = Vec3::Ones();
+  Eigen::Affine3d local() const {
+    return Eigen::Affine3d().fromPositionOrientationScale(translation, rotation, scale);
+  }
 };
 
 /// What moves vertices: a node, seen from the space in which the vertices are stored.
@@ -87,12 +90,11 @@ GltfTransforms gltf_rest(const Gltf& file);
 GltfTransforms gltf_pose(const Gltf& file, const GltfClip& clip, double seconds);
 
 /// Linear blend skinning: all vertices where the nodes put them.
-void gltf_skin(const Gltf& file, const GltfTransforms& nodes, Points& out);
 Mesh gltf_mesh(const Gltf& file, const GltfTransforms& nodes);
 
 /// The clip of this name (empty: the first). InputError with the names there are if there is none.
 const GltfClip& find_clip(const Gltf& file, const std::string& name);
-/// How many frames a clip has at `fps`: at k / fps seconds after its begin. InputError beyond 9 h.
-int64_t clip_frames(const Gltf& file, const GltfClip& clip, double fps = kFps);
+/// How many frames a clip has at kFps: at k / kFps seconds after its begin. InputError beyond 9 h.
+int64_t clip_frames(const Gltf& file, const GltfClip& clip);
 
 }  // namespace restage

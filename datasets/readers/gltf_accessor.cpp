@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "datasets/readers/errors.h"
 #include "datasets/readers/gltf_detail.h"
 #include "datasets/readers/numbers.h"
 
@@ -9,35 +10,16 @@ namespace restage::gltf {
 namespace {
 
 const Number& component(int type, const std::string& path, const std::string& what) {
-  switch (type) {
-    case TINYGLTF_COMPONENT_TYPE_BYTE:
-      return kNumber<int8_t>;
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-      return kNumber<uint8_t>;
-    case TINYGLTF_COMPONENT_TYPE_SHORT:
-      return kNumber<int16_t>;
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-      return kNumber<uint16_t>;
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
-      return kNumber<uint32_t>;
-    case TINYGLTF_COMPONENT_TYPE_FLOAT:
-      return kNumber<float>;
-    default:
-      broken(path, what + " are of the unknown component type " + std::to_string(type));
-  }
-}
-
-size_t components_of(int type) {
-  switch (type) {
-    case TINYGLTF_TYPE_SCALAR:
-      return 1;
-    case TINYGLTF_TYPE_VEC3:
-      return 3;
-    case TINYGLTF_TYPE_VEC4:
-      return 4;
-    default:
-      return 16;  // MAT4; nothing else is asked for
-  }
+  static constexpr std::pair<int, const Number*> kKnown[] = {
+      {TINYGLTF_COMPONENT_TYPE_BYTE, &kNumber<int8_t>},
+      {TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE, &kNumber<uint8_t>},
+      {TINYGLTF_COMPONENT_TYPE_SHORT, &kNumber<int16_t>},
+      {TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, &kNumber<uint16_t>},
+      {TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT, &kNumber<uint32_t>},
+      {TINYGLTF_COMPONENT_TYPE_FLOAT, &kNumber<float>}};
+  for (const auto& [known, number] : kKnown)
+    if (type == known) return *number;
+  broken(path, cat(what, " are of the unknown component type ", type));
 }
 
 /// `count` elements of `size` bytes, `stride` apart.
@@ -54,9 +36,9 @@ Span elements(const Document& document, int view_index, uint64_t offset, uint64_
   const std::string_view buffer =
       document.buffers[checked(view.buffer, document.buffers.size(), path, "buffer")];
   if (view.byteOffset > buffer.size() || view.byteLength > buffer.size() - view.byteOffset)
-    broken(path, "buffer view " + std::to_string(view_index) + " lies outside of its buffer");
+    broken(path, cat("buffer view ", view_index, " lies outside of its buffer"));
   const size_t stride = may_stride && view.byteStride != 0 ? view.byteStride : size;
-  if (stride < size) broken(path, what + " overlap (stride " + std::to_string(stride) + ")");
+  if (stride < size) broken(path, cat(what, " overlap (stride ", stride, ")"));
   // offset + (count - 1) * stride + size <= byteLength, without overflow
   const bool fits = offset <= view.byteLength && size <= view.byteLength - offset &&
                     (count - 1) <= (view.byteLength - offset - size) / stride;
@@ -105,7 +87,7 @@ template <class T>
 std::vector<T> read_values(const Document& document, const tinygltf::Accessor& accessor,
                            const Number& kind, double factor, const std::string& what,
                            Allowance& allowance) {
-  const size_t width = components_of(accessor.type);
+  const auto width = static_cast<size_t>(tinygltf::GetNumComponentsInType(accessor.type));
   allowance.spend(accessor.count, width * sizeof(T));
   std::vector<T> out;
   if (accessor.bufferView >= 0) {

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "autograd/base/atomic_file.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/gltf_detail.h"
 #include "datasets/readers/text.h"
 
@@ -63,12 +64,10 @@ Chunks split_glb(std::string_view content, const std::string& path) {
   static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "GLB is read as it lies in the file");
   if (content.size() < 20) broken(path, "is cut short in the header of a GLB file");
   if (word(content, 4) != 2)
-    throw InputError(path, "is of glTF version " + std::to_string(word(content, 4)),
-                     "export it as glTF 2.0");
+    throw InputError(path, cat("is of glTF version ", word(content, 4)), "export it as glTF 2.0");
   const size_t length = word(content, 8);
   if (length > content.size())
-    broken(path, "is cut short: " + std::to_string(content.size()) + " of " +
-                     std::to_string(length) + " bytes");
+    broken(path, cat("is cut short: ", content.size(), " of ", length, " bytes"));
   Chunks out;
   for (size_t at = 12; at + 8 <= length;) {
     const size_t size = word(content, at);
@@ -104,7 +103,7 @@ Json parse_json(std::string_view text, uint64_t payload, const std::string& path
     if (!root.is_object()) broken(path, "is no glTF file");
     return root;
   } catch (const Json::parse_error& error) {
-    broken(path, "is not valid JSON at byte " + std::to_string(error.byte) + " of its structure");
+    broken(path, cat("is not valid JSON at byte ", error.byte, " of its structure"));
   } catch (const Json::exception&) {
     broken(path, "is not valid JSON");
   }
@@ -129,8 +128,7 @@ int node_number(const Json& bone) {
 std::vector<std::pair<std::string, int>> read_humanoid(const Json& root) {
   std::vector<std::pair<std::string, int>> out;
   for (const char* name : {"VRM", "VRMC_vrm"}) {
-    const auto pointer =
-        Json::json_pointer("/extensions/" + std::string(name) + "/humanoid/humanBones");
+    const auto pointer = Json::json_pointer(cat("/extensions/", name, "/humanoid/humanBones"));
     if (!root.contains(pointer)) continue;
     const Json& bones = root.at(pointer);
     if (!bones.is_structured()) continue;
@@ -200,7 +198,7 @@ void read_buffers(const Json& root, std::string_view binary, Document& document)
   document.storage.reserve(list->size());  // views into short strings must not move
   for (const Json& item : *list) {
     const size_t number = document.buffers.size();
-    const std::string title = "buffer " + std::to_string(number);
+    const std::string title = cat("buffer ", number);
     if (!item.is_object() || !item.contains("byteLength") ||
         !item["byteLength"].is_number_unsigned())
       broken(path, title + " has no length");
@@ -215,8 +213,7 @@ void read_buffers(const Json& root, std::string_view binary, Document& document)
       if (!uri.starts_with("data:")) document.payload += bytes.size();
     }
     if (length > bytes.size())
-      broken(path, title + " has " + std::to_string(bytes.size()) + " of its " +
-                       std::to_string(length) + " bytes");
+      broken(path, cat(title, " has ", bytes.size(), " of its ", length, " bytes"));
     document.buffers.push_back(bytes.substr(0, length));
   }
 }
@@ -241,7 +238,7 @@ void broken(const std::string& path, const std::string& what) {
 
 size_t checked(int64_t index, size_t size, const std::string& path, const std::string& what) {
   if (index < 0 || static_cast<uint64_t>(index) >= size)
-    broken(path, "names " + what + " " + std::to_string(index) + " of " + std::to_string(size));
+    broken(path, cat("names ", what, " ", index, " of ", size));
   return static_cast<size_t>(index);
 }
 

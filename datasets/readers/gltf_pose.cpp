@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/gltf.h"
 #include "datasets/readers/text.h"
 
@@ -63,12 +63,43 @@ Eigen::Vector4d value_at(const GltfTrack& track, const Between& at) {
 GltfTransforms to_world(const std::vector<GltfNode>& nodes) {
   GltfTransforms out(nodes.size());
   for (size_t n = 0; n < nodes.size(); ++n) {
-    const GltfNode& node = nodes[n];
-    Eigen::Affine3d local;
-    local.fromPositionOrientationScale(node.translation, node.rotation, node.scale);
-    out[n] = node.parent < 0 ? local : out[node.parent] * local;
+    const int p = nodes[n].parent;
+    out[n] = p < 0 ? nodes[n].local() : out[p] * nodes[n].local();
   }
   return out;
+}
+
+/// Linear blend skinning.
+Points skinned(const Gltf& file, const GltfTransforms& nodes) {
+  using Rows = Eigen::Matrix<double, 3, 4>;
+  std::vector<Rows> bones;
+  bones.reserve(file.bones.size());
+  for (const GltfBone& bone : file.bones)
+    bones.push_back((nodes[bone.node] * bone.inverse_bind).affine());
+  Points out(file.vertices.size());
+  for (size_t v = 0; v < out.size(); ++v) {
+    Rows sum = Rows::Zero();
+    for (uint32_t i = file.first_influence[v]; i < file.first_influence[v + 1]; ++i)
+      sum += double{file.influences[i].weight} * bones[file.influences[i].bone];
+    const Eigen::Vector4d at = file.vertices[v].cast<double>().homogeneous();
+    out[v] = (sum * at).cast<float>();
+    if (!out[v].allFinite())
+      throw InputError(file.path, cat("its transforms put vertex ", v, " nowhere"),
+                       "export it again with finite scales");
+  }
+  return out;
+}
+
+/// A mirror turns a surface inside out: triangles whose bones mirror are turned round.
+void keep_outside_out(const Gltf& file, const GltfTransforms& nodes, std::vector<Triangle>& faces) {
+  std::vector<bool> mirrors;
+  for (const GltfBone& bone : file.bones)
+    mirrors.push_back((nodes[bone.node] * bone.inverse_bind).linear().determinant() < 0);
+  if (std::find(mirrors.begin(), mirrors.end(), true) == mirrors.end()) return;
+  for (Triangle& face : faces) {
+    const uint32_t first = file.first_influence[face[0]];
+    if (mirrors[file.influences[first].bone]) std::swap(face[1], face[2]);
+  }
 }
 
 }  // namespace
@@ -88,47 +119,10 @@ GltfTransforms gltf_pose(const Gltf& file, const GltfClip& clip, double seconds)
   return to_world(nodes);
 }
 
-void gltf_skin(const Gltf& file, const GltfTransforms& nodes, Points& out) {
-  using Rows = Eigen::Matrix<double, 3, 4>;
-  std::vector<Rows> bones;
-  bones.reserve(file.bones.size());
-  for (const GltfBone& bone : file.bones)
-    bones.push_back((nodes[bone.node] * bone.inverse_bind).affine());
-  out.resize(file.vertices.size());
-  for (size_t v = 0; v < out.size(); ++v) {
-    Rows sum = Rows::Zero();
-    for (uint32_t i = file.first_influence[v]; i < file.first_influence[v + 1]; ++i)
-      sum += double{file.influences[i].weight} * bones[file.influences[i].bone];
-    const Eigen::Vector4d at = file.vertices[v].cast<double>().homogeneous();
-    out[v] = (sum * at).cast<float>();
-    if (!out[v].allFinite())
-      throw InputError(file.path, "its transforms put vertex " + std::to_string(v) + " nowhere",
-                       "export it again with finite scales");
-  }
-}
-
-namespace {
-
-/// A mirror turns a surface inside out: triangles whose bones mirror are turned round.
-void keep_outside_out(const Gltf& file, const GltfTransforms& nodes, std::vector<Triangle>& faces) {
-  std::vector<bool> mirrors;
-  for (const GltfBone& bone : file.bones)
-    mirrors.push_back((nodes[bone.node] * bone.inverse_bind).linear().determinant() < 0);
-  if (std::find(mirrors.begin(), mirrors.end(), true) == mirrors.end()) return;
-  for (Triangle& face : faces) {
-    const uint32_t first = file.first_influence[face[0]];
-    if (mirrors[file.influences[first].bone]) std::swap(face[1], face[2]);
-  }
-}
-
-}  // namespace
-
 Mesh gltf_mesh(const Gltf& file, const GltfTransforms& nodes) {
   if (file.vertices.empty())
     throw InputError(file.path, "holds no mesh", "export the character with its mesh");
-  Mesh out;
-  gltf_skin(file, nodes, out.vertices);
-  out.faces = file.faces;
+  Mesh out{skinned(file, nodes), file.faces};
   keep_outside_out(file, nodes, out.faces);
   return out;
 }
@@ -144,13 +138,13 @@ const GltfClip& find_clip(const Gltf& file, const std::string& name) {
   throw InputError(file.path, "holds no clip " + text::quote(name), "name one of " + known);
 }
 
-int64_t clip_frames(const Gltf& file, const GltfClip& clip, double fps) {
+int64_t clip_frames(const Gltf& file, const GltfClip& clip) {
   constexpr double kLongest = 9 * 3600;
   const double seconds = clip.end - clip.begin;
   if (!(seconds <= kLongest))
     throw InputError(file.path, "clip " + text::quote(clip.name) + " lasts longer than 9 hours",
                      "cut it into shorter ones");
-  return static_cast<int64_t>(std::floor(seconds * fps + 1e-3)) + 1;
+  return static_cast<int64_t>(std::floor(seconds * kFps + 1e-3)) + 1;
 }
 
 }  // namespace restage

@@ -1,10 +1,9 @@
 #include "datasets/readers/mesh_io.h"
 
 #include "autograd/base/atomic_file.h"
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/gltf.h"
-#include "datasets/readers/obj.h"
-#include "datasets/readers/ply.h"
+#include "datasets/readers/mesh_parsers.h"
 #include "datasets/readers/precision.h"
 #include "datasets/readers/text.h"
 #include "nn/geometry/mesh_file.h"
@@ -29,9 +28,8 @@ void check_mesh(const Mesh& mesh, const std::string& path) {
     for (const int32_t index : mesh.faces[i])
       if (index < 0 || static_cast<size_t>(index) >= mesh.vertices.size())
         throw InputError(path,
-                         "triangle " + std::to_string(i) + " has vertex index " +
-                             std::to_string(index) + " (from 0), out of range for " +
-                             std::to_string(mesh.vertices.size()) + " vertices",
+                         cat("triangle ", i, " has vertex index ", index,
+                             " (from 0), out of range for ", mesh.vertices.size(), " vertices"),
                          "correct the face list");
 }
 

@@ -2,11 +2,11 @@
 
 namespace restage {
 
-size_t leave_out_non_finite(Points& points, std::vector<Triangle>& faces) {
+size_t keep_points(const std::vector<bool>& keep, Points& points, std::vector<Triangle>& faces) {
   std::vector<int32_t> index(points.size(), -1);
   size_t kept = 0;
   for (size_t i = 0; i < points.size(); ++i) {
-    if (!points[i].allFinite()) continue;
+    if (!keep[i]) continue;
     index[i] = static_cast<int32_t>(kept);
     points[kept++] = points[i];
   }
@@ -21,6 +21,12 @@ size_t leave_out_non_finite(Points& points, std::vector<Triangle>& faces) {
     return false;
   });
   return left_out;
+}
+
+size_t leave_out_non_finite(Points& points, std::vector<Triangle>& faces) {
+  std::vector<bool> finite;
+  for (const Point& p : points) finite.push_back(p.allFinite());
+  return keep_points(finite, points, faces);
 }
 
 }  // namespace restage

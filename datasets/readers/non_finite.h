@@ -10,7 +10,10 @@ enum class NonFinite {
   mark,    ///< NaN, for leave_out_non_finite()
 };
 
-/// Takes points with a NaN out, and the triangles at them; the order of the rest stays. How many.
+/// Takes out the points that are not to be kept, and the triangles at them; the order of the rest
+/// stays. How many.
+size_t keep_points(const std::vector<bool>& keep, Points& points, std::vector<Triangle>& faces);
+/// The same of points with a NaN.
 size_t leave_out_non_finite(Points& points, std::vector<Triangle>& faces);
 
 }  // namespace restage

@@ -2,105 +2,48 @@
 
 #include <cmath>
 #include <cstring>
-#include <limits>
+#include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/text.h"
 
 namespace restage {
 namespace {
 
+using Json = nlohmann::json;
+
 constexpr size_t kMaxHeader = 1 << 16;
 constexpr size_t kMaxAxes = 32;
 constexpr const char* kAgain = "save it again with numpy.save or savez";
 
-/// The header's Python literal, {'descr': '<f8', 'fortran_order': False, 'shape': (3, 4), }.
-class HeaderParser {
- public:
-  HeaderParser(std::string_view text, const std::string& where) : rest_(text), where_(where) {}
+[[noreturn]] void unreadable(const std::string& where) {
+  throw InputError(where, "has no readable NPY header", kAgain);
+}
 
-  NpyHeader parse() {
-    expect('{');
-    while (!accept('}')) {
-      const std::string key = quoted();
-      expect(':');
-      value_of(key);
-      if (!accept(',') && peek() != '}') fail();
-    }
-    skip_blanks();
-    if (!rest_.empty() || !has_type_ || !has_order_ || !has_shape_) fail();
-    return out_;
-  }
-
- private:
-  [[noreturn]] void fail() const { throw InputError(where_, "has no readable NPY header", kAgain); }
-  void skip_blanks() {
-    while (!rest_.empty() && (rest_[0] == ' ' || rest_[0] == '\n')) rest_.remove_prefix(1);
-  }
-  char peek() {
-    skip_blanks();
-    return rest_.empty() ? '\0' : rest_[0];
-  }
-  bool accept(char c) {
-    if (peek() != c) return false;
-    rest_.remove_prefix(1);
-    return true;
-  }
-  void expect(char c) {
-    if (!accept(c)) fail();
-  }
-  bool accept_word(std::string_view word) {
-    skip_blanks();
-    if (!rest_.starts_with(word)) return false;
-    rest_.remove_prefix(word.size());
-    return true;
-  }
-  std::string quoted() {
-    const char mark = peek();
-    if (mark != '\'' && mark != '"') fail();
-    const size_t end = rest_.find(mark, 1);
-    if (end == std::string_view::npos) fail();
-    std::string out(rest_.substr(1, end - 1));
-    rest_.remove_prefix(end + 1);
-    return out;
-  }
-  void value_of(const std::string& key) {
-    if (key == "descr" && !has_type_) {
-      read_type();
-      has_type_ = true;
-    } else if (key == "fortran_order" && !has_order_) {
-      out_.fortran = accept_word("True");
-      if (!out_.fortran && !accept_word("False")) fail();
-      has_order_ = true;
-    } else if (key == "shape" && !has_shape_) {
-      read_shape();
-      has_shape_ = true;
-    } else {
-      fail();
+/// The header's Python literal, {'descr': '<f8', 'fortran_order': False, 'shape': (3, 4), }, as
+/// JSON: brackets for tuples, no comma behind the last item, no "L" as Python 2 wrote it.
+std::string json_of(std::string_view literal) {
+  std::string out;
+  char quote = 0;
+  for (const char c : literal) {
+    if (c == quote || (quote == 0 && (c == '\'' || c == '"'))) {
+      quote = quote == 0 ? c : '\0';
+      out += '"';
+    } else if (quote != 0) {
+      out += c;
+    } else if (c == ')' || c == ']' || c == '}') {
+      out.resize(out.find_last_not_of(" \n") + 1);
+      if (out.ends_with(',')) out.pop_back();
+      out += c == ')' ? ']' : c;
+    } else if (c == 'T' || c == 'F') {
+      out += c == 'T' ? 't' : 'f';
+    } else if (c != 'L') {
+      out += c == '(' ? '[' : c;
     }
   }
-  void read_shape() {
-    expect('(');
-    while (!accept(')')) {
-      peek();
-      size_t digits = 0;
-      while (digits < rest_.size() && rest_[digits] >= '0' && rest_[digits] <= '9') ++digits;
-      int64_t length = 0;
-      if (!text::parse(rest_.substr(0, digits), length) || out_.shape.size() == kMaxAxes) fail();
-      out_.shape.push_back(length);
-      rest_.remove_prefix(digits);
-      accept('L');  // as Python 2 wrote it
-      if (!accept(',') && peek() != ')') fail();
-    }
-  }
-  void read_type();
-
-  std::string_view rest_;
-  const std::string& where_;
-  NpyHeader out_;
-  bool has_type_ = false, has_order_ = false, has_shape_ = false;
-};
+  return out;
+}
 
 /// The kind of number that numpy names so; null for another.
 const Number* number_of(char kind, size_t width) {
@@ -118,26 +61,44 @@ const Number* number_of(char kind, size_t width) {
   return nullptr;
 }
 
-void HeaderParser::read_type() {
-  if (peek() == '[' || peek() == '(')
-    throw InputError(where_, "holds records (a structured array)", "save each field by itself");
-  const std::string type = quoted();
+void read_type(const std::string& type, const std::string& where, NpyHeader& out) {
   const size_t at = !type.empty() && std::strchr("<>|=", type[0]) != nullptr ? 1 : 0;
   const std::string digits = type.substr(std::min(type.size(), at + 1));
   if (type.size() > at && type[at] == 'O')
-    throw InputError(where_,
+    throw InputError(where,
                      "holds Python objects (a pickle), which are never read: they can run code",
                      "save plain numbers (docs/data.md shows how)");
   int64_t width = 0;
-  if (type.size() <= at || !text::parse(digits, width) || width < 0 || width > (1 << 16)) fail();
-  out_.kind = type[at];
-  out_.big_endian = type[0] == '>';
-  out_.width = static_cast<size_t>(width) * (out_.kind == 'U' ? 4 : 1);
-  out_.type = number_of(out_.kind, out_.width);
-  if (out_.type == nullptr && !out_.is_text())
-    throw InputError(where_,
-                     "holds values of the type " + text::quote(type) + ", which is not read",
+  if (type.size() <= at || !text::parse(digits, width) || width < 0 || width > (1 << 16))
+    unreadable(where);
+  out.kind = type[at];
+  out.big_endian = type[0] == '>';
+  out.width = static_cast<size_t>(width) * (out.kind == 'U' ? 4 : 1);
+  out.type = number_of(out.kind, out.width);
+  if (out.type == nullptr && !out.is_text())
+    throw InputError(where,
+                     cat("holds values of the type ", text::quote(type), ", which is not read"),
                      "save it as float32, float64 or whole numbers");
+}
+
+NpyHeader parse_header(std::string_view text, const std::string& where) {
+  NpyHeader out;
+  try {
+    const Json json = Json::parse(json_of(text));
+    if (json.at("descr").is_structured())
+      throw InputError(where, "holds records (a structured array)", "save each field by itself");
+    read_type(json.at("descr").get<std::string>(), where, out);
+    out.fortran = json.at("fortran_order").get<bool>();
+    const Json& shape = json.at("shape");
+    if (!shape.is_array() || shape.size() > kMaxAxes || json.size() != 3) unreadable(where);
+    for (const Json& length : shape) {
+      if (!length.is_number_unsigned() || length.get<uint64_t>() > INT64_MAX) unreadable(where);
+      out.shape.push_back(length.get<int64_t>());
+    }
+  } catch (const Json::exception&) {
+    unreadable(where);
+  }
+  return out;
 }
 
 void count_elements(NpyHeader& header, const std::string& where) {
@@ -185,16 +146,16 @@ NpyHeader read_npy_header(ByteStream& in) {
   unsigned char length[4] = {0, 0, 0, 0};
   in.read(reinterpret_cast<char*>(length), version == 1 ? 2 : 4);
   const size_t n = length[0] | length[1] << 8 | length[2] << 16 | size_t{length[3]} << 24;
-  if (n > kMaxHeader) throw InputError(in.where(), "has no readable NPY header", kAgain);
+  if (n > kMaxHeader) unreadable(in.where());
   std::string text(n, '\0');
   in.read(text.data(), n);
-  NpyHeader out = HeaderParser(text, in.where()).parse();
+  NpyHeader out = parse_header(text, in.where());
   count_elements(out, in.where());
   if (out.bytes() != in.left())
     throw InputError(
         in.where(),
-        "should hold " + std::to_string(out.bytes()) + " bytes for its shape " +
-            shape_text(out.shape) + ", but holds " + std::to_string(in.left()),
+        cat("should hold ", out.bytes(), " bytes for its shape ", shape_text(out.shape),
+            ", but holds ", in.left()),
         in.left() < out.bytes() ? "it is cut short: copy it again" : "save one array a file");
   return out;
 }
@@ -202,11 +163,16 @@ NpyHeader read_npy_header(ByteStream& in) {
 NpyArray::NpyArray(ByteStream& in, uint64_t max_memory)
     : header_(read_npy_header(in)), where_(in.where()) {
   if (header_.bytes() > max_memory)
-    throw InputError(where_,
-                     "takes " + std::to_string(header_.bytes()) + " bytes, more than the " +
-                         std::to_string(max_memory) + " allowed",
-                     "allow more with --max-memory");
+    throw InputError(
+        where_, cat("takes ", header_.bytes(), " bytes, more than the ", max_memory, " allowed"),
+        "allow more with --max-memory");
   bytes_ = in.take(header_.bytes());
+}
+
+bool NpyArray::is_shaped(const std::vector<int64_t>& wanted) const {
+  return !is_text() &&
+         std::equal(wanted.begin(), wanted.end(), shape().begin(), shape().end(),
+                    [](int64_t want, int64_t length) { return want < 0 || want == length; });
 }
 
 double NpyArray::operator[](int64_t i) const {
@@ -229,8 +195,7 @@ std::vector<double> NpyArray::finite() const {
     out[i] = (*this)[static_cast<int64_t>(i)];
     if (!std::isfinite(out[i]))
       throw InputError(where_,
-                       "holds " + std::string(std::isnan(out[i]) ? "NaN" : "infinity") +
-                           " at element " + std::to_string(i),
+                       cat("holds ", std::isnan(out[i]) ? "NaN" : "infinity", " at element ", i),
                        "store finite numbers");
   }
   return out;
@@ -254,8 +219,7 @@ NpyArray read_npy(const std::string& path, uint64_t max_memory) {
 
 std::string shape_text(const std::vector<int64_t>& shape) {
   std::string out = "[";
-  for (size_t i = 0; i < shape.size() && i < 8; ++i)
-    out += (i > 0 ? ", " : "") + std::to_string(shape[i]);
+  for (size_t i = 0; i < shape.size() && i < 8; ++i) out += cat(i > 0 ? ", " : "", shape[i]);
   return out + (shape.size() > 8 ? ", ...]" : "]");
 }
 

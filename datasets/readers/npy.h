@@ -42,6 +42,8 @@ class NpyArray {
   const std::vector<int64_t>& shape() const { return header_.shape; }
   int64_t size() const { return header_.count; }
   bool is_text() const { return header_.is_text(); }
+  /// Whether it holds numbers, in this shape; -1: any length.
+  bool is_shaped(const std::vector<int64_t>& wanted) const;
   const std::string& where() const { return where_; }
 
   /// Element i in C order, whatever the file's order is; NaN for text.

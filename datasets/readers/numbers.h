@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <bit>
 #include <cstddef>
-#include <cstdint>
 #include <cstring>
 #include <limits>
 

@@ -1,8 +1,7 @@
-#include "datasets/readers/obj.h"
-
 #include <algorithm>
 
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
+#include "datasets/readers/mesh_parsers.h"
 #include "datasets/readers/text.h"
 
 namespace restage {
@@ -32,8 +31,7 @@ int32_t parse_corner(std::string_view word, size_t vertices, const Where& where)
   const int64_t zero_based = index < 0 ? static_cast<int64_t>(vertices) + index : index - 1;
   if (zero_based < 0 || zero_based > 0x7fffffff)
     throw InputError(where(),
-                     "face index " + std::to_string(index) + " is out of range (" +
-                         std::to_string(vertices) + " vertices so far)",
+                     cat("face index ", index, " is out of range (", vertices, " vertices so far)"),
                      "correct the face");
   return static_cast<int32_t>(zero_based);
 }
@@ -80,7 +78,7 @@ Mesh parse_obj(std::string_view content, const std::string& path, const Vec3& or
   while (lines.next(line)) {
     const std::string_view keyword = text::take_word(line);
     if (keyword != "v" && keyword != "f") continue;  // normals, groups, materials, comments
-    const auto where = [&] { return path + ":" + std::to_string(lines.number()); };
+    const auto where = [&] { return cat(path, ":", lines.number()); };
     if (keyword == "v") {
       mesh.vertices.push_back(parse_vertex(line, origin, how, where));
       continue;

@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "autograd/base/atomic_file.h"
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
 namespace {
@@ -30,14 +30,14 @@ std::string unpack_xz(const std::string& packed, const std::string& path, uint64
     const lzma_ret state = lzma_code(&stream, LZMA_FINISH);
     out.append(piece, 0, piece.size() - stream.avail_out);
     if (out.size() > limit)
-      throw InputError(path, "unpacks to more than " + std::to_string(limit >> 20) + " MiB",
+      throw InputError(path, cat("unpacks to more than ", limit >> 20, " MiB"),
                        "cut the recording into shorter files");
     if (state == LZMA_STREAM_END) return out;
     if (state == LZMA_MEMLIMIT_ERROR)
-      throw InputError(path,
-                       "takes more than " + std::to_string(kDecoderMemory >> 20) +
-                           " MiB to unpack, beyond what xz -9 needs",
-                       "pack it again, or give the text");
+      throw InputError(
+          path,
+          cat("takes more than ", kDecoderMemory >> 20, " MiB to unpack, beyond what xz -9 needs"),
+          "pack it again, or give the text");
     if (state != LZMA_OK)
       throw InputError(path, "is no whole xz file", "give the text or an undamaged .xz file");
   }

@@ -1,9 +1,8 @@
-#include "datasets/readers/ply.h"
-
 #include <array>
 #include <cmath>
 
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
+#include "datasets/readers/mesh_parsers.h"
 #include "datasets/readers/numbers.h"
 #include "datasets/readers/text.h"
 
@@ -44,10 +43,6 @@ const Number* number_named(std::string_view name) {
   for (const Named& known : kNames)
     if (name == known.old_name || name == known.name) return known.type;
   return nullptr;
-}
-
-std::string at_line(const std::string& path, int64_t line) {
-  return path + ":" + std::to_string(line);
 }
 
 // ---- header ------------------------------------------------------------------------------------
@@ -98,7 +93,7 @@ Header parse_header(text::Lines& lines, const std::string& path) {
   std::string_view line;
   lines.next(line);  // the magic word, checked by the caller
   while (lines.next(line)) {
-    const std::string where = at_line(path, lines.number());
+    const std::string where = cat(path, ":", lines.number());
     const std::string_view word = text::take_word(line);
     if (word == "end_header") {
       if (!has_format) throw InputError(where, "the PLY header names no format", kExportAgain);
@@ -170,9 +165,8 @@ class Rows {
   }
 
   std::string where() const {
-    return format_ == Format::ascii
-               ? at_line(path_, lines_.number())
-               : path_ + ":" + element_->name.substr(0, 40) + " " + std::to_string(row_ - 1);
+    return format_ == Format::ascii ? cat(path_, ":", lines_.number())
+                                    : cat(path_, ":", element_->name.substr(0, 40), " ", row_ - 1);
   }
 
  private:
@@ -195,8 +189,8 @@ class Rows {
 
   [[noreturn]] void throw_short() const {
     throw InputError(path_,
-                     "is cut short: element " + text::quote(element_->name) + " should have " +
-                         std::to_string(element_->count) + " rows",
+                     cat("is cut short: element ", text::quote(element_->name), " should have ",
+                         element_->count, " rows"),
                      kExportAgain);
   }
 

@@ -27,25 +27,18 @@ std::string hex_of(const unsigned char* digest, unsigned length) {
 
 }  // namespace
 
-struct Sha256::State {
-  EVP_MD_CTX* context = EVP_MD_CTX_new();
-  ~State() { EVP_MD_CTX_free(context); }
-};
-
-Sha256::Sha256() : state_(std::make_unique<State>()) {
-  check(state_->context != nullptr && EVP_DigestInit_ex(state_->context, EVP_sha256(), nullptr));
+Sha256::Sha256() : context_(EVP_MD_CTX_new(), EVP_MD_CTX_free) {
+  check(context_ != nullptr && EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr));
 }
-Sha256::Sha256(Sha256&&) noexcept = default;
-Sha256::~Sha256() = default;
 
 void Sha256::add(std::string_view bytes) {
-  check(EVP_DigestUpdate(state_->context, bytes.data(), bytes.size()));
+  check(EVP_DigestUpdate(context_.get(), bytes.data(), bytes.size()));
 }
 
 std::string Sha256::hex() {
   std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
   unsigned length = 0;
-  check(EVP_DigestFinal_ex(state_->context, digest.data(), &length));
+  check(EVP_DigestFinal_ex(context_.get(), digest.data(), &length));
   return hex_of(digest.data(), length);
 }
 

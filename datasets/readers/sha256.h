@@ -5,20 +5,19 @@
 #include <string>
 #include <string_view>
 
+struct evp_md_ctx_st;  // OpenSSL's EVP_MD_CTX
+
 namespace restage {
 
 /// Takes bytes piece by piece.
 class Sha256 {
  public:
   Sha256();
-  Sha256(Sha256&&) noexcept;
-  ~Sha256();
   void add(std::string_view bytes);
   std::string hex();  ///< 64 digits; ends the sum
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  std::unique_ptr<evp_md_ctx_st, void (*)(evp_md_ctx_st*)> context_;
 };
 
 std::string sha256(std::string_view bytes);

@@ -28,12 +28,12 @@ struct SourceSkeleton {
 
 enum class Channel { x_position, y_position, z_position, x_rotation, y_rotation, z_rotation };
 
+inline bool is_rotation(Channel channel) { return channel >= Channel::x_rotation; }
+/// x, y or z: 0, 1 or 2.
+inline int axis_of(Channel channel) { return static_cast<int>(channel) % 3; }
 /// Rotation by `degrees` about the axis of a rotation channel.
 inline Quat channel_rotation(Channel channel, double degrees) {
-  const Vec3 axis = channel == Channel::x_rotation   ? Vec3::UnitX()
-                    : channel == Channel::y_rotation ? Vec3::UnitY()
-                                                     : Vec3::UnitZ();
-  return Quat(Eigen::AngleAxisd(degrees * (M_PI / 180.0), axis));
+  return Quat(Eigen::AngleAxisd(degrees * (M_PI / 180.0), Vec3::Unit(axis_of(channel))));
 }
 
 }  // namespace restage

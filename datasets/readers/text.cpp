@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/word_lines.h"
 
 namespace restage::text {
@@ -59,9 +58,7 @@ bool ends_in(std::string_view name, std::initializer_list<std::string_view> endi
 }
 
 std::string quote(std::string_view word) {
-  std::string out = "'";
-  for (const char c : word.substr(0, 40)) out += c >= 32 && c < 127 ? c : '?';
-  return out + (word.size() > 40 ? "...'" : "'");
+  return cat("'", WordLines::quoted(word), word.size() > 40 ? "...'" : "'");
 }
 
 void throw_no_coordinate(double value, const std::string& where) {

@@ -3,7 +3,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/text.h"
 
 namespace restage {
@@ -46,7 +46,7 @@ bool WordLines::next() {
 }
 
 void WordLines::fail(const std::string& wrong, const std::string& fix) const {
-  throw InputError(number_ > 0 ? path_ + ":" + std::to_string(number_) : path_, wrong, fix);
+  throw InputError(number_ > 0 ? cat(path_, ":", number_) : path_, wrong, fix);
 }
 
 double WordLines::number(std::string_view word) const {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/text.h"
 
 namespace restage {
@@ -36,9 +36,8 @@ void check_size(const ZipFile::Member& member, const std::string& path) {
   const bool possible = member.method == ZIP_CM_STORE ? member.size == member.packed
                                                       : member.size / kMostFold <= member.packed;
   if (!possible)
-    damaged(path, "its member " + text::quote(member.name) + " claims to unpack from " +
-                      std::to_string(member.packed) + " to " + std::to_string(member.size) +
-                      " bytes, which cannot be");
+    damaged(path, cat("its member ", text::quote(member.name), " claims to unpack from ",
+                      member.packed, " to ", member.size, " bytes, which cannot be"));
 }
 
 /// The bytes of a member, unpacked as they are read.
@@ -56,13 +55,11 @@ class MemberStream : public ByteStream {
   void do_read(char* out, size_t n) override {
     for (size_t got = 0; n > 0; out += got, n -= got, done_ += got) {
       got = piece(out, n);
-      if (got == 0)
-        damaged(where(),
-                "unpacks to fewer than the " + std::to_string(size()) + " bytes it claims");
+      if (got == 0) damaged(where(), cat("unpacks to fewer than the ", size(), " bytes it claims"));
     }
     char more = 0;
     if (done_ == size() && piece(&more, 1) > 0)  // at the end libzip compares the checksum
-      damaged(where(), "holds more than the " + std::to_string(size()) + " bytes it claims");
+      damaged(where(), cat("holds more than the ", size(), " bytes it claims"));
   }
   void do_rewind() override {
     file_ = {zip_fopen_index(archive_.get(), index_, 0), &zip_fclose};
@@ -122,7 +119,7 @@ std::unique_ptr<ByteStream> ZipFile::open(const Member& member) const {
   if (member.encrypted)
     throw InputError(path_, named + " is encrypted", "save it without a password");
   if (member.method != ZIP_CM_STORE && member.method != ZIP_CM_DEFLATE)
-    throw InputError(path_, named + " is packed by method " + std::to_string(member.method),
+    throw InputError(path_, cat(named, " is packed by method ", member.method),
                      "save it with numpy's savez or savez_compressed");
   return std::make_unique<MemberStream>(path_, archive_, &member - members_.data(), member);
 }

@@ -1,7 +1,5 @@
 #include "datasets/sampling/augment.h"
 
-#include <cmath>
-
 namespace restage {
 namespace {
 

@@ -5,28 +5,21 @@
 #include <numeric>
 #include <utility>
 
-#include "autograd/base/error.h"
 #include "autograd/base/parallel.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
-void check(bool ok, const char* key, const char* range) {
-  if (!ok)
-    throw InputError("", std::string("cloud setting '") + key + "' is out of range",
-                     std::string("use ") + range);
-}
-
 CloudConfig checked(const CloudConfig& c) {
-  check(c.points >= 1 && c.points <= 1 << 20, "points", "1 to 1048576");
-  check(c.noise >= 0 && std::isfinite(c.noise), "noise", "metres, 0 or more");
-  check(c.tpose_share >= 0 && c.tpose_share <= 1, "tpose_share", "0 to 1");
-  check(c.tpose_heading >= 0 && c.tpose_heading <= 180, "tpose_heading", "0 to 180 degrees");
-  check(c.scale_jitter >= 0 && c.scale_jitter < 1, "scale_jitter", "0 to below 1");
-  check(c.frame_step >= 1, "frame_step", "1 or more");
-  check(c.min_fraction > 0 && c.min_fraction <= 1, "min_fraction", "above 0 to 1");
+  check_setting("cloud", c.points >= 1 && c.points <= 1 << 20, "points", "1 to 1048576");
+  check_setting("cloud", c.noise >= 0 && std::isfinite(c.noise), "noise", "metres, 0 or more");
+  check_setting("cloud", c.tpose_share >= 0 && c.tpose_share <= 1, "tpose_share", "0 to 1");
+  check_setting("cloud", c.tpose_heading >= 0 && c.tpose_heading <= 180, "tpose_heading",
+                "0 to 180 degrees");
+  check_setting("cloud", c.scale_jitter >= 0 && c.scale_jitter < 1, "scale_jitter", "0 to below 1");
+  check_setting("cloud", c.frame_step >= 1, "frame_step", "1 or more");
+  check_setting("cloud", c.min_fraction > 0 && c.min_fraction <= 1, "min_fraction", "above 0 to 1");
   return c;
 }
 
@@ -68,7 +61,7 @@ CloudSubject CloudSampler::subject(int64_t index) const {
   out.rest = rng.uniform() < config_.tpose_share;
   out.body = rng.below(corpus_.bodies.size());
   out.at = frames_.at(rng.below(frames_.count()));
-  const double range = out.rest ? config_.tpose_heading * kPi / 180 : kPi;
+  const double range = out.rest ? config_.tpose_heading * M_PI / 180 : M_PI;
   out.augmentation = draw_augmentation(rng, config_.heading ? range : 0.0, config_.mirror);
   out.scale = 1 + rng.uniform(-1.0, 1.0) * config_.scale_jitter;
   return out;

@@ -1,15 +1,14 @@
 #include "datasets/sampling/evaluation.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <utility>
 
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 /// 0 ... n - 1 in random order.
 std::vector<size_t> shuffled(Rng& rng, size_t n) {
@@ -38,7 +37,7 @@ std::vector<CloudSubject> evaluation_clouds(const Corpus& corpus, size_t count, 
     const double at = (static_cast<double>(i) + rng.uniform()) / static_cast<double>(count);
     const auto place = static_cast<uint64_t>(at * static_cast<double>(frames.count()));
     out[i].at = frames.at(std::min(place, frames.count() - 1));
-    out[i].augmentation = draw_augmentation(rng, kPi, false);
+    out[i].augmentation = draw_augmentation(rng, M_PI, false);
   }
   return out;
 }
@@ -52,7 +51,7 @@ std::vector<CloudSubject> evaluation_tposes(const Corpus& corpus, size_t per_bod
       CloudSubject subject;
       subject.body = body;
       subject.rest = true;
-      subject.augmentation = draw_augmentation(rng, heading * kPi / 180, false);
+      subject.augmentation = draw_augmentation(rng, heading * M_PI / 180, false);
       out.push_back(subject);
     }
   return out;
@@ -63,8 +62,7 @@ std::vector<EvalSequence> evaluation_sequences(const Corpus& corpus, size_t coun
   const size_t bodies = corpus.bodies.size(), motions = corpus.motions.size();
   if (bodies < 2 || motions == 0)
     throw InputError("",
-                     std::to_string(bodies) + " bodies and " + std::to_string(motions) +
-                         " motions make no retargeting sequence",
+                     cat(bodies, " bodies and ", motions, " motions make no retargeting sequence"),
                      "give at least two bodies and one motion in this split");
   Rng rng(RngKey{seed, 0}.fold("evaluation sequences"));
   const std::vector<size_t> order = shuffled(rng, motions);
@@ -106,8 +104,7 @@ Performance::Performance(const Corpus& corpus, const EvalSequence& sequence, con
 
 size_t Performance::frame(size_t i) const {
   if (i >= sequence_.frames)
-    throw ShapeError("Performance: frame " + std::to_string(i) + " of " +
-                     std::to_string(sequence_.frames));
+    throw ShapeError(cat("Performance: frame ", i, " of ", sequence_.frames));
   return sequence_.first + i;
 }
 

@@ -2,9 +2,14 @@
 
 #include <algorithm>
 
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 
 namespace restage {
+
+void check_setting(const char* kind, bool good, const char* key, const char* range) {
+  if (!good)
+    throw InputError("", cat(kind, " setting '", key, "' is out of range"), cat("use ", range));
+}
 
 FrameIndex::FrameIndex(const std::vector<Motion>& motions, size_t window, size_t step)
     : step_(std::max<size_t>(1, step)) {
@@ -19,16 +24,14 @@ FrameIndex::FrameIndex(const std::vector<Motion>& motions, size_t window, size_t
   }
   if (ends_.empty())
     throw InputError("",
-                     "no motion has " + std::to_string(window) + " frames (" +
-                         std::to_string(motions.size()) + " motions, the longest has " +
-                         std::to_string(longest) + ")",
+                     cat("no motion has ", window, " frames (", motions.size(),
+                         " motions, the longest has ", longest, ")"),
                      "use shorter windows or longer motions");
 }
 
 FrameRef FrameIndex::at(uint64_t i) const {
   const auto end = std::upper_bound(ends_.begin(), ends_.end(), i);
-  if (end == ends_.end())
-    throw ShapeError("FrameIndex: place " + std::to_string(i) + " of " + std::to_string(count()));
+  if (end == ends_.end()) throw ShapeError(cat("FrameIndex: place ", i, " of ", count()));
   const auto k = static_cast<size_t>(end - ends_.begin());
   return {motion_[k], step_ * static_cast<size_t>(i - (k > 0 ? ends_[k - 1] : 0))};
 }

@@ -7,6 +7,10 @@
 
 namespace restage {
 
+/// InputError that names the setting `key` of a kind of samples, and its range, unless it is
+/// `good`.
+void check_setting(const char* kind, bool good, const char* key, const char* range);
+
 struct FrameRef {
   size_t motion = 0, frame = 0;
 };

@@ -1,14 +1,13 @@
 #include "datasets/sampling/pairs.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "autograd/base/error.h"
 #include "autograd/base/parallel.h"
 
 namespace restage {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 void write(float* to, const Points& points, const Vec3& origin) {
   const Point o = origin.cast<float>();
@@ -24,10 +23,8 @@ PairSampler::PairSampler(const Corpus& corpus, const PairConfig& config, uint64_
       frames_(corpus.motions, 1, static_cast<size_t>(std::max(1, config.frame_step))),
       surfaces_(surface_samplers(corpus.bodies)) {
   if (surfaces_.empty()) throw InputError("", "no bodies to draw pairs from", "add bodies");
-  if (config_.points < 1 || config_.points > 1 << 20)
-    throw InputError("", "pair setting 'points' is out of range", "use 1 to 1048576");
-  if (config_.frame_step < 1)
-    throw InputError("", "pair setting 'frame_step' is out of range", "use 1 or more");
+  check_setting("pair", config_.points >= 1 && config_.points <= 1 << 20, "points", "1 to 1048576");
+  check_setting("pair", config_.frame_step >= 1, "frame_step", "1 or more");
 }
 
 PairBatch PairSampler::make(int64_t n) const {
@@ -73,7 +70,7 @@ PairBatch PairSampler::batch(int64_t first, int64_t n) const {
       const size_t body = rng.below(corpus_.bodies.size());
       const FrameRef at = frames_.at(rng.below(frames_.count()));
       const Augmentation augmentation =
-          draw_augmentation(rng, config_.heading ? kPi : 0.0, config_.mirror);
+          draw_augmentation(rng, config_.heading ? M_PI : 0.0, config_.mirror);
       const Pose pose = pose_on(corpus_.motions[at.motion], corpus_.bodies[body], at.frame);
       fill(out, i, key, body, pose, augmentation);
     }

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 #include "datasets/sampling/normals.h"
 
 namespace restage {
@@ -15,8 +15,8 @@ float unit(uint32_t word) { return static_cast<float>(word >> 8) * 0x1.0p-24f; }
 
 Points SurfaceSamples::on(const Points& picked) const {
   if (picked.size() != vertices.size())
-    throw ShapeError("SurfaceSamples::on: " + std::to_string(picked.size()) + " vertices for " +
-                     std::to_string(size()) + " points of three");
+    throw ShapeError(
+        cat("SurfaceSamples::on: ", picked.size(), " vertices for ", size(), " points of three"));
   Points out(size());
   for (size_t i = 0; i < out.size(); ++i)
     out[i] = weights[3 * i] * picked[3 * i] + weights[3 * i + 1] * picked[3 * i + 1] +
@@ -42,9 +42,7 @@ SurfaceSampler::SurfaceSampler(const Body& body) : faces_(body.rest.faces) {
   for (const Triangle& f : faces_) {
     for (const int32_t v : f)
       if (v < 0 || static_cast<size_t>(v) >= x.size())
-        throw InputError(
-            where, "a face names vertex " + std::to_string(v) + " of " + std::to_string(x.size()),
-            "mend the mesh");
+        throw InputError(where, cat("a face names vertex ", v, " of ", x.size()), "mend the mesh");
     const Point &a = x[f[0]], &b = x[f[1]], &c = x[f[2]];
     sum += 0.5 * static_cast<double>((b - a).cross(c - a).norm());
     ends_.push_back(sum);

@@ -4,26 +4,19 @@
 #include <cmath>
 #include <vector>
 
-#include "autograd/base/error.h"
 #include "autograd/base/parallel.h"
+#include "datasets/readers/errors.h"
 #include "datasets/sampling/normals.h"
 
 namespace restage {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
-void check(bool ok, const char* key, const char* range) {
-  if (!ok)
-    throw InputError("", std::string("window setting '") + key + "' is out of range",
-                     std::string("use ") + range);
-}
-
 WindowConfig checked(const WindowConfig& c) {
-  check(c.frames >= 2 && c.frames <= 100000, "frames", "2 to 100000");
-  check(c.self_share >= 0 && c.self_share <= 1, "self_share", "0 to 1");
-  check(c.noise >= 0 && std::isfinite(c.noise), "noise", "metres, 0 or more");
-  check(c.noise_correlation >= 0 && c.noise_correlation < 1, "noise_correlation", "0 to below 1");
+  check_setting("window", c.frames >= 2 && c.frames <= 100000, "frames", "2 to 100000");
+  check_setting("window", c.self_share >= 0 && c.self_share <= 1, "self_share", "0 to 1");
+  check_setting("window", c.noise >= 0 && std::isfinite(c.noise), "noise", "metres, 0 or more");
+  check_setting("window", c.noise_correlation >= 0 && c.noise_correlation < 1, "noise_correlation",
+                "0 to below 1");
   return c;
 }
 
@@ -133,13 +126,6 @@ WindowBatch make_batch(int64_t n, int64_t t, bool truth) {
 
 }  // namespace
 
-Translation translation_of(const std::string& name) {
-  if (name == "velocity") return Translation::velocity;
-  if (name == "relative") return Translation::relative;
-  if (name == "absolute") return Translation::absolute;
-  throw InputError("", "unknown translation '" + name + "'", "use velocity, relative or absolute");
-}
-
 WindowSampler::WindowSampler(const Corpus& corpus, const WindowConfig& config, uint64_t seed)
     : corpus_(corpus),
       config_(checked(config)),
@@ -172,9 +158,9 @@ WindowSubject WindowSampler::subject(int64_t index) const {
   out.body_b = out.self ? out.body_a : other + (other >= out.body_a ? 1 : 0);
   out.clip = place(rng);
   out.real = place(rng);
-  out.augmentation = draw_augmentation(rng, config_.heading ? kPi : 0.0, config_.mirror);
+  out.augmentation = draw_augmentation(rng, config_.heading ? M_PI : 0.0, config_.mirror);
   // B is one body in one sample, so its real window is mirrored with it.
-  out.real_augmentation = draw_augmentation(rng, config_.heading ? kPi : 0.0, false);
+  out.real_augmentation = draw_augmentation(rng, config_.heading ? M_PI : 0.0, false);
   out.real_augmentation.mirror = out.augmentation.mirror;
   return out;
 }

@@ -6,8 +6,6 @@
 // here, so "the same subject as B" (Q3) means: B's body performing any clip.
 #pragma once
 
-#include <string>
-
 #include "autograd/tensor/tensor.h"
 #include "datasets/corpus.h"
 #include "datasets/sampling/augment.h"
@@ -21,8 +19,6 @@ enum class Translation {
   relative,  ///< r_i - r_1
   absolute,  ///< r_i, floor at y = 0
 };
-/// By name; InputError for another.
-Translation translation_of(const std::string& name);
 
 struct WindowConfig {
   int frames = 30;

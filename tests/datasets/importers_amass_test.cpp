@@ -228,7 +228,7 @@ TEST_F(ImportersAmass, BothLayoutsEqualTheModelsFormulaAt30Fps) {
                           .rate_key = x ? "mocap_frame_rate" : "mocap_framerate",
                           .type = x};
       BodyModels models(dir.write("model.npz", tiny.file()));
-      AmassOptions options;
+      MotionOptions options;
       options.id = "walk";
       options.subject = "ann";
       options.split = "test";
@@ -276,8 +276,8 @@ TEST_F(ImportersAmass, OptionsOverrideAndDoubtsAreRemarked) {
   BodyModels models(dir.write("male.npz", TinySmpl().file()));
   ImportReport plain, report;
   EXPECT_EQ(import_amass(file, models, {}, plain).frames(), 61u);  // 59.99 means 60
-  AmassOptions other;
-  other.up = Axis::y;
+  MotionOptions other;
+  other.rest.up = Axis::y;
   other.fps = 30;
   EXPECT_EQ(import_amass(file, models, other, report).frames(), 121u);
   EXPECT_HAS(fact(report, "body model"), "4 of 16 betas");

@@ -34,7 +34,7 @@ class ImportersGltf : public FileTest {
     return write(name, CharacterMaker(known_, style).parts);
   }
   /// What is read of hero.glb.
-  Character hero(const RigStyle& style, const CharacterOptions& options = {}) const {
+  Character hero(const RigStyle& style, const MotionOptions& options = {}) const {
     return read_character(write("hero.glb", style), options);
   }
 
@@ -147,8 +147,8 @@ TEST_F(ImportersGltf, AxesAndUnitsOfEveryKindComeOutRight) {
     }
   RigStyle style = plain_style();
   style.world = scaled(1 / 0.0254);
-  CharacterOptions inches;
-  inches.rig.scale = 0.0254;
+  MotionOptions inches;
+  inches.scale = 0.0254;
   expect_known(hero(style, inches), 0.05, 1e-4);
   expect_known(hero(style), 0.05, 1e-4);  // and found by the leg
   style.world = scaled(0.05);
@@ -196,12 +196,9 @@ TEST_F(ImportersGltf, ClipsAreChosenByName) {
   EXPECT_EQ(all.motions[0].id, "hero_walk");
   EXPECT_EQ(all.motions[1].id, "hero_run_fast");
   EXPECT_EQ(all.motions[2].id, "hero_walk_2");
-  CharacterOptions options;
-  options.clip = "run/fast";
-  EXPECT_EQ(read_character(file, options).motions.size(), 1u);
+  EXPECT_EQ(read_character(file, {}, "run/fast").motions.size(), 1u);
   EXPECT_EQ(open_frames(file, {"run/fast"})->frames(), 31);
-  options.clip = "jump";
-  EXPECT_THROW(read_character(file, options), InputError);
+  EXPECT_THROW(read_character(file, {}, "jump"), InputError);
   EXPECT_THROW(open_frames(file, {"jump"}), InputError);
 }
 

@@ -6,7 +6,7 @@
 #include <map>
 
 #include "datasets/builtin/bodies.h"
-#include "datasets/importers/builtin_profiles.h"
+#include "datasets/importers/profiles.h"
 #include "datasets/sampling/surface.h"
 #include "datasets/schema.h"
 #include "experiments/cli/benchmark_config.h"
