@@ -47,9 +47,6 @@ class SkeletonOnline : public Item {
     inputs.load(*net_, variant, "skeleton");
     make_dense(*net_, variant);
   }
-  static std::unique_ptr<Item> make(const Inputs& i, const std::string& v, bool d) {
-    return std::make_unique<SkeletonOnline>(i, v, d);
-  }
   void run() override { joints_ = extract(frames_.next()); }
   std::vector<double> check() override {
     joints_ = extract(0);
@@ -77,9 +74,6 @@ class MotionOnline : public Item {
         trans_(Tensor::zeros({1, 1, 3})),
         frames_(joints_.size(0)) {
     inputs.load(net_, variant, "smrm");
-  }
-  static std::unique_ptr<Item> make(const Inputs& i, const std::string& v, bool d) {
-    return std::make_unique<MotionOnline>(i, v, d);
   }
   void prepare() override {
     if (flushed) flush_.run();
@@ -135,9 +129,6 @@ class DeformationOnline : public Item {
             Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(r + 9 * j).cast<double>();
     }
   }
-  static std::unique_ptr<Item> make(const Inputs& i, const std::string& v, bool d) {
-    return std::make_unique<DeformationOnline>(i, v, d);
-  }
   void run() override { points_ = surface_(poses_[static_cast<size_t>(frames_.next())], dense_); }
   std::vector<double> check() override {
     points_ = surface_(poses_[0], dense_);
@@ -155,15 +146,14 @@ class DeformationOnline : public Item {
 /// Cloud in, posed target out.
 class FrameOnline : public Item {
  public:
+  FrameOnline(const Inputs& inputs, const std::string& variant, bool)
+      : FrameOnline(inputs, paper_models(inputs, variant)) {}
   FrameOnline(const Inputs& inputs, const Bundle& models)
       : retargeter_(models, "bench", target_of(inputs), joints_of(inputs.at("target.joints")), {}) {
     const Tensor& clouds = inputs.at("frames.clouds");
     for (int64_t i = 0; i < clouds.size(0); ++i)
       clouds_.push_back(points_of(clouds.rows(i, i + 1)));
     frames_ = Frames(clouds.size(0));
-  }
-  static std::unique_ptr<Item> make(const Inputs& inputs, const std::string& variant, bool) {
-    return std::make_unique<FrameOnline>(inputs, paper_models(inputs, variant));
   }
   static std::unique_ptr<Item> make_lite(const Inputs& inputs, const std::string&, bool) {
     return std::make_unique<FrameOnline>(inputs, load_bundle(inputs.lite()));
@@ -191,52 +181,19 @@ class FrameOnline : public Item {
 
 std::vector<ItemInfo> online_items() {
   const double deformation = offsets_gflop(kSurfacePoints) + skinning_gflop(kSurfacePoints);
-  return {{"skeleton_online",
-           "point transformer",
-           "frame",
-           1,
-           extractor_gflop(),
-           {"skeleton"},
-           SkeletonOnline::make,
-           {"dense"}},
-          {"smrm_online",
-           "SMRM, caches flushed before every frame",
-           "frame",
-           1,
-           motion_gflop(),
-           {},
-           MotionOnline<true>::make},
-          {"smrm_online_warm",
-           "SMRM, caches as the last frame left them",
-           "frame",
-           1,
-           motion_gflop(),
-           {},
-           MotionOnline<false>::make},
-          {"deformation_online",
-           "offsets and skinning of 6,890 points",
-           "frame",
-           1,
-           deformation,
-           {"offsets"},
-           DeformationOnline::make,
-           {"dense"}},
-          {"frame_online",
-           "whole frame, paper's models",
-           "frame",
-           1,
-           extractor_gflop() + motion_gflop() + deformation,
-           {"skeleton", "offsets"},
-           FrameOnline::make},
-          {"frame_online_lite",
-           "whole frame, lite models",
-           "frame",
-           1,
-           0,
-           {},
-           FrameOnline::make_lite,
-           {},
-           "lite"}};
+  return {ItemInfo("skeleton_online", "point transformer", "frame", 1, extractor_gflop(),
+                   make_item<SkeletonOnline>, {"skeleton"}, {"dense"}),
+          ItemInfo("smrm_online", "SMRM, caches flushed before every frame", "frame", 1,
+                   motion_gflop(), make_item<MotionOnline<true>>),
+          ItemInfo("smrm_online_warm", "SMRM, caches as the last frame left them", "frame", 1,
+                   motion_gflop(), make_item<MotionOnline<false>>),
+          ItemInfo("deformation_online", "offsets and skinning of 6,890 points", "frame", 1,
+                   deformation, make_item<DeformationOnline>, {"offsets"}, {"dense"}),
+          ItemInfo("frame_online", "whole frame, paper's models", "frame", 1,
+                   extractor_gflop() + motion_gflop() + deformation, make_item<FrameOnline>,
+                   {"skeleton", "offsets"}),
+          ItemInfo("frame_online_lite", "whole frame, lite models", "frame", 1, 0,
+                   FrameOnline::make_lite, {}, {}, "lite")};
 }
 
 }  // namespace restage::bench
