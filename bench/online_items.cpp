@@ -1,5 +1,7 @@
 // Online frames: each part by itself, and whole frames as `restage retarget` does them.
-#include "bench/flush.h"
+#include <unistd.h>
+
+#include "autograd/base/parallel_each.h"
 #include "bench/items.h"
 #include "bench/work.h"
 #include "infer/retargeter.h"
@@ -31,12 +33,6 @@ Points points_of(const Tensor& t) {
   return out;
 }
 
-Tensor tensor_of(const Points& points) {
-  Tensor t = Tensor::empty({static_cast<int64_t>(points.size()), 3});
-  std::copy_n(points[0].data(), t.numel(), t.data<float>());
-  return t;
-}
-
 class SkeletonOnline : public Item {
  public:
   SkeletonOnline(const Inputs& inputs, const std::string& variant, bool)
@@ -61,6 +57,27 @@ class SkeletonOnline : public Item {
   std::shared_ptr<SkeletonModel> net_;
   Tensor clouds_, joints_;
   Frames frames_;
+};
+
+/// As large as the last cache, at least 64 and at most 512 MiB. LibTorch's program does the same.
+int64_t flush_bytes() {
+  const int64_t l3 = sysconf(_SC_LEVEL3_CACHE_SIZE);
+  return std::clamp<int64_t>(l3, 64 << 20, 512 << 20);
+}
+
+/// Empties the caches between repetitions, so that weights have to come from memory.
+class CacheFlush {
+ public:
+  /// Without `on`, run() is not to be called and no memory is taken.
+  explicit CacheFlush(bool on) : buffer_(on ? static_cast<size_t>(flush_bytes() / 8) : 0) {}
+  /// Reads and writes the whole buffer, all threads a part of it.
+  void run() {
+    const auto n = static_cast<int64_t>(buffer_.size());
+    parallel_each(n, (n + threads() - 1) / threads(), [&](int64_t i) { buffer_[i] += 1; });
+  }
+
+ private:
+  std::vector<int64_t> buffer_;
 };
 
 /// `flushed`: the weights come from memory, as they do when an extractor ran in between.
@@ -125,11 +142,11 @@ class DeformationOnline : public Item {
     for (int64_t i = 0; i < local.size(0); ++i) {
       const float* r = local.data<float>() + i * kJoints * 9;
       for (size_t j = 0; j < kJoints; ++j)
-        poses_[static_cast<size_t>(i)].local[j] =
+        poses_[i].local[j] =
             Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(r + 9 * j).cast<double>();
     }
   }
-  void run() override { points_ = surface_(poses_[static_cast<size_t>(frames_.next())], dense_); }
+  void run() override { points_ = surface_(poses_[frames_.next()], dense_); }
   std::vector<double> check() override {
     points_ = surface_(poses_[0], dense_);
     return summary(tensor_of(points_));
@@ -168,9 +185,7 @@ class FrameOnline : public Item {
   }
 
  private:
-  void push(int64_t frame) {
-    answer_ = retargeter_.push(clouds_[static_cast<size_t>(frame)], "bench");
-  }
+  void push(int64_t frame) { answer_ = retargeter_.push(clouds_[frame], "bench"); }
   Retargeter retargeter_;
   std::vector<Points> clouds_;
   std::span<const RetargetedFrame> answer_;
