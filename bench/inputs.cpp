@@ -28,14 +28,7 @@ constexpr Model kModels[] = {{"skeleton", "skeleton/point_transformer"},
                              {"weights", "deformation/weights"},
                              {"offsets", "deformation/offsets"}};
 
-Tensor tensor_of(const Points& points) {
-  Tensor t = Tensor::empty({static_cast<int64_t>(points.size()), 3});
-  for (size_t i = 0; i < points.size(); ++i)
-    for (int c = 0; c < 3; ++c) t.data<float>()[3 * i + static_cast<size_t>(c)] = points[i][c];
-  return t;
-}
-
-Tensor tensor_of(const Joints& joints, const Vec3& origin) {
+Tensor relative(const Joints& joints, const Vec3& origin) {
   Points p;
   for (const Vec3& j : joints) p.push_back((j - origin).cast<float>());
   return tensor_of(p);
@@ -68,7 +61,7 @@ void add_performance(TensorFile& file, const Corpus& corpus) {
     Point centre;
     clouds.push_back(tensor_of(in_order(performance.cloud(i), &centre)));
     const Joints a = performance.joints_a(i);
-    joints.push_back(tensor_of(a, a[0]));
+    joints.push_back(relative(a, a[0]));
     roots.push_back(tensor_of(Points{a[0].cast<float>()}));
   }
   file.tensors["frames.clouds"] = stack(clouds);
@@ -80,7 +73,7 @@ void add_performance(TensorFile& file, const Corpus& corpus) {
   Points points = surface.on_rest(b);
   for (Point& p : points) p -= b.joints[0].cast<float>();
   file.tensors["target.points"] = tensor_of(points);
-  file.tensors["target.joints"] = tensor_of(b.joints, b.joints[0]);
+  file.tensors["target.joints"] = relative(b.joints, b.joints[0]);
 }
 
 void add_batches(TensorFile& file, const Corpus& corpus) {
@@ -157,6 +150,12 @@ void write_training(const std::string& folder, const InputSettings& settings,
 }
 
 }  // namespace
+
+Tensor tensor_of(const Points& points) {
+  Tensor t = Tensor::empty({std::ssize(points), 3});
+  std::copy_n(points[0].data(), t.numel(), t.data<float>());
+  return t;
+}
 
 void make_inputs(const std::string& folder, const InputSettings& settings) {
   std::filesystem::remove_all(folder + "/trained");

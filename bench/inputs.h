@@ -16,6 +16,9 @@ namespace restage::bench {
 inline constexpr int64_t kSurfacePoints = 6890;  ///< of deformation, as many as SMPL has vertices
 inline constexpr int64_t kFrames = 48;           ///< of the performance that online items play
 
+/// At least one point, as rows.
+Tensor tensor_of(const Points& points);
+
 struct InputSettings {
   std::string data = "builtin";     ///< or a data set file
   std::string trained;              ///< weights file with a paper-size extractor, may be empty

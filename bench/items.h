@@ -30,23 +30,42 @@ void make_dense(SkeletonModel& net, const std::string& variant);
 /// What an item's check() may say of a result: the sum of its absolute values and three of them.
 std::vector<double> summary(const Tensor& x);
 
+/// `dropout` false: none, for check().
+using MakeItem = std::unique_ptr<Item> (*)(const Inputs& inputs, const std::string& variant,
+                                           bool dropout);
+
+template <class T>
+std::unique_ptr<Item> make_item(const Inputs& inputs, const std::string& variant, bool dropout) {
+  return std::make_unique<T>(inputs, variant, dropout);
+}
+
 struct ItemInfo {
+  ItemInfo(std::string n, std::string w, std::string p, int count, double flop, MakeItem maker,
+           std::vector<std::string> changing = {}, std::vector<std::string> further = {},
+           std::string starts = "initial")
+      : name(std::move(n)),
+        what(std::move(w)),
+        per(std::move(p)),
+        examples(count),
+        gflop(flop),
+        make(maker),
+        models(std::move(changing)),
+        also(std::move(further)),
+        variant(std::move(starts)) {}
+
   std::string name;
   std::string what;  ///< for tables
   std::string per;   ///< what one of `examples` is
-  int examples = 1;  ///< per repetition
-  double gflop =
-      0;  ///< of one example by the plain algorithm (docs/performance.md); 0: not counted
+  int examples;      ///< per repetition
+  double gflop;  ///< of one example by the plain algorithm (docs/performance.md); 0: not counted
+  MakeItem make;
   /// Models whose weights may change its speed: the item also exists with trained weights if there
   /// are any of one of them.
   std::vector<std::string> models;
-  /// `dropout` false: none, for check().
-  std::unique_ptr<Item> (*make)(const Inputs& inputs, const std::string& variant, bool dropout);
   /// Further variants, with initial weights: "dense" leaves nothing out, "bfloat16" multiplies in
   /// it (only where the processor has a unit for that). No ratio counts them.
-  std::vector<std::string> also = {};
-  /// What it is called with the weights it starts with.
-  std::string variant = "initial";
+  std::vector<std::string> also;
+  std::string variant;  ///< what it is called with the weights it starts with
 };
 
 /// All items, in the order of the tables.

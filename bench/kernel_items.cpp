@@ -17,9 +17,7 @@ namespace {
 template <int64_t m, int64_t k, int64_t n, bool transpose_a = false>
 class Product : public Item {
  public:
-  static std::unique_ptr<Item> make(const Inputs&, const std::string&, bool) {
-    return std::make_unique<Product>();
-  }
+  Product(const Inputs&, const std::string&, bool) {}
   void run() override { c_ = matmul(a_, b_, transpose_a).value; }
   std::vector<double> check() override {
     run();
@@ -62,16 +60,13 @@ class Layer : public Item {
 template <bool backward>
 class Attention : public Layer {
  public:
-  Attention(const Inputs& inputs, const std::string& variant)
+  Attention(const Inputs& inputs, const std::string& variant, bool)
       : Layer(backward),
         block_(32, 512, 16, Init{}),
         xyz_(inputs.at("clouds.points").rows(0, 1)),
         features_(inputs.at("kernel.features")) {
     inputs.load(block_, variant, "skeleton", "backbone.transformer1.");
     block_.dense = variant == "dense";
-  }
-  static std::unique_ptr<Item> make(const Inputs& i, const std::string& v, bool) {
-    return std::make_unique<Attention>(i, v);
   }
 
  private:
@@ -83,12 +78,9 @@ class Attention : public Layer {
 /// SMRM's decoder on 16 windows of 30 frames.
 class Recurrent : public Layer {
  public:
-  Recurrent(const Inputs& inputs, const std::string& variant)
+  Recurrent(const Inputs& inputs, const std::string& variant, bool)
       : Layer(true), gru_(578, 512, 2, 0, Init{}), sequence_(inputs.at("kernel.sequence")) {
     inputs.load(gru_, variant, "smrm", "dec.");
-  }
-  static std::unique_ptr<Item> make(const Inputs& i, const std::string& v, bool) {
-    return std::make_unique<Recurrent>(i, v);
   }
 
  private:
@@ -106,50 +98,18 @@ std::vector<ItemInfo> kernel_items() {
   constexpr double pairs = 16384, width = 512, cube = 1024;
   const double wide = gflop_of(pairs * width * width);
   const double attention = attention_gflop(1024, 32), gru = 16 * 30 * gru_gflop(578, 512, 2);
-  return {{"sgemm_pairs",
-           "[16384 x 512] [512 x 512]",
-           "product",
-           1,
-           wide,
-           {},
-           Product<16384, 512, 512>::make},
-          {"sgemm_gradient",
-           "[16384 x 512]^T [16384 x 512]",
-           "product",
-           1,
-           wide,
-           {},
-           Product<512, 16384, 512, true>::make},
-          {"sgemm_square",
-           "[1024 x 1024] [1024 x 1024]",
-           "product",
-           1,
-           gflop_of(cube * cube * cube),
-           {},
-           Product<1024, 1024, 1024>::make},
-          {"attention",
-           "first attention block, forward",
-           "cloud",
-           1,
-           attention,
-           {"skeleton"},
-           Attention<false>::make,
-           {"dense"}},
-          {"attention_train",
-           "first attention block, forward and backward",
-           "cloud",
-           1,
-           3 * attention,
-           {"skeleton"},
-           Attention<true>::make,
-           {"dense"}},
-          {"gru_train",
-           "SMRM's decoder GRU, batch 16, forward and backward",
-           "step",
-           1,
-           3 * gru,
-           {},
-           Recurrent::make}};
+  return {ItemInfo("sgemm_pairs", "[16384 x 512] [512 x 512]", "product", 1, wide,
+                   make_item<Product<16384, 512, 512>>),
+          ItemInfo("sgemm_gradient", "[16384 x 512]^T [16384 x 512]", "product", 1, wide,
+                   make_item<Product<512, 16384, 512, true>>),
+          ItemInfo("sgemm_square", "[1024 x 1024] [1024 x 1024]", "product", 1,
+                   gflop_of(cube * cube * cube), make_item<Product<1024, 1024, 1024>>),
+          ItemInfo("attention", "first attention block, forward", "cloud", 1, attention,
+                   make_item<Attention<false>>, {"skeleton"}, {"dense"}),
+          ItemInfo("attention_train", "first attention block, forward and backward", "cloud", 1,
+                   3 * attention, make_item<Attention<true>>, {"skeleton"}, {"dense"}),
+          ItemInfo("gru_train", "SMRM's decoder GRU, batch 16, forward and backward", "step", 1,
+                   3 * gru, make_item<Recurrent>)};
 }
 
 void make_dense(SkeletonModel& net, const std::string& variant) {

@@ -1,5 +1,7 @@
 // Online frames: each part by itself, and whole frames as `restage retarget` does them.
-#include "bench/flush.h"
+#include <unistd.h>
+
+#include "autograd/base/parallel_each.h"
 #include "bench/items.h"
 #include "bench/work.h"
 #include "infer/retargeter.h"
@@ -31,12 +33,6 @@ Points points_of(const Tensor& t) {
   return out;
 }
 
-Tensor tensor_of(const Points& points) {
-  Tensor t = Tensor::empty({static_cast<int64_t>(points.size()), 3});
-  std::copy_n(points[0].data(), t.numel(), t.data<float>());
-  return t;
-}
-
 class SkeletonOnline : public Item {
  public:
   SkeletonOnline(const Inputs& inputs, const std::string& variant, bool)
@@ -46,9 +42,6 @@ class SkeletonOnline : public Item {
         frames_(clouds_.size(0)) {
     inputs.load(*net_, variant, "skeleton");
     make_dense(*net_, variant);
-  }
-  static std::unique_ptr<Item> make(const Inputs& i, const std::string& v, bool d) {
-    return std::make_unique<SkeletonOnline>(i, v, d);
   }
   void run() override { joints_ = extract(frames_.next()); }
   std::vector<double> check() override {
@@ -66,6 +59,27 @@ class SkeletonOnline : public Item {
   Frames frames_;
 };
 
+/// As large as the last cache, at least 64 and at most 512 MiB. LibTorch's program does the same.
+int64_t flush_bytes() {
+  const int64_t l3 = sysconf(_SC_LEVEL3_CACHE_SIZE);
+  return std::clamp<int64_t>(l3, 64 << 20, 512 << 20);
+}
+
+/// Empties the caches between repetitions, so that weights have to come from memory.
+class CacheFlush {
+ public:
+  /// Without `on`, run() is not to be called and no memory is taken.
+  explicit CacheFlush(bool on) : buffer_(on ? static_cast<size_t>(flush_bytes() / 8) : 0) {}
+  /// Reads and writes the whole buffer, all threads a part of it.
+  void run() {
+    const auto n = static_cast<int64_t>(buffer_.size());
+    parallel_each(n, (n + threads() - 1) / threads(), [&](int64_t i) { buffer_[i] += 1; });
+  }
+
+ private:
+  std::vector<int64_t> buffer_;
+};
+
 /// `flushed`: the weights come from memory, as they do when an extractor ran in between.
 template <bool flushed>
 class MotionOnline : public Item {
@@ -77,9 +91,6 @@ class MotionOnline : public Item {
         trans_(Tensor::zeros({1, 1, 3})),
         frames_(joints_.size(0)) {
     inputs.load(net_, variant, "smrm");
-  }
-  static std::unique_ptr<Item> make(const Inputs& i, const std::string& v, bool d) {
-    return std::make_unique<MotionOnline>(i, v, d);
   }
   void prepare() override {
     if (flushed) flush_.run();
@@ -131,14 +142,11 @@ class DeformationOnline : public Item {
     for (int64_t i = 0; i < local.size(0); ++i) {
       const float* r = local.data<float>() + i * kJoints * 9;
       for (size_t j = 0; j < kJoints; ++j)
-        poses_[static_cast<size_t>(i)].local[j] =
+        poses_[i].local[j] =
             Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(r + 9 * j).cast<double>();
     }
   }
-  static std::unique_ptr<Item> make(const Inputs& i, const std::string& v, bool d) {
-    return std::make_unique<DeformationOnline>(i, v, d);
-  }
-  void run() override { points_ = surface_(poses_[static_cast<size_t>(frames_.next())], dense_); }
+  void run() override { points_ = surface_(poses_[frames_.next()], dense_); }
   std::vector<double> check() override {
     points_ = surface_(poses_[0], dense_);
     return summary(tensor_of(points_));
@@ -155,15 +163,14 @@ class DeformationOnline : public Item {
 /// Cloud in, posed target out.
 class FrameOnline : public Item {
  public:
+  FrameOnline(const Inputs& inputs, const std::string& variant, bool)
+      : FrameOnline(inputs, paper_models(inputs, variant)) {}
   FrameOnline(const Inputs& inputs, const Bundle& models)
       : retargeter_(models, "bench", target_of(inputs), joints_of(inputs.at("target.joints")), {}) {
     const Tensor& clouds = inputs.at("frames.clouds");
     for (int64_t i = 0; i < clouds.size(0); ++i)
       clouds_.push_back(points_of(clouds.rows(i, i + 1)));
     frames_ = Frames(clouds.size(0));
-  }
-  static std::unique_ptr<Item> make(const Inputs& inputs, const std::string& variant, bool) {
-    return std::make_unique<FrameOnline>(inputs, paper_models(inputs, variant));
   }
   static std::unique_ptr<Item> make_lite(const Inputs& inputs, const std::string&, bool) {
     return std::make_unique<FrameOnline>(inputs, load_bundle(inputs.lite()));
@@ -178,9 +185,7 @@ class FrameOnline : public Item {
   }
 
  private:
-  void push(int64_t frame) {
-    answer_ = retargeter_.push(clouds_[static_cast<size_t>(frame)], "bench");
-  }
+  void push(int64_t frame) { answer_ = retargeter_.push(clouds_[frame], "bench"); }
   Retargeter retargeter_;
   std::vector<Points> clouds_;
   std::span<const RetargetedFrame> answer_;
@@ -191,52 +196,19 @@ class FrameOnline : public Item {
 
 std::vector<ItemInfo> online_items() {
   const double deformation = offsets_gflop(kSurfacePoints) + skinning_gflop(kSurfacePoints);
-  return {{"skeleton_online",
-           "point transformer",
-           "frame",
-           1,
-           extractor_gflop(),
-           {"skeleton"},
-           SkeletonOnline::make,
-           {"dense"}},
-          {"smrm_online",
-           "SMRM, caches flushed before every frame",
-           "frame",
-           1,
-           motion_gflop(),
-           {},
-           MotionOnline<true>::make},
-          {"smrm_online_warm",
-           "SMRM, caches as the last frame left them",
-           "frame",
-           1,
-           motion_gflop(),
-           {},
-           MotionOnline<false>::make},
-          {"deformation_online",
-           "offsets and skinning of 6,890 points",
-           "frame",
-           1,
-           deformation,
-           {"offsets"},
-           DeformationOnline::make,
-           {"dense"}},
-          {"frame_online",
-           "whole frame, paper's models",
-           "frame",
-           1,
-           extractor_gflop() + motion_gflop() + deformation,
-           {"skeleton", "offsets"},
-           FrameOnline::make},
-          {"frame_online_lite",
-           "whole frame, lite models",
-           "frame",
-           1,
-           0,
-           {},
-           FrameOnline::make_lite,
-           {},
-           "lite"}};
+  return {ItemInfo("skeleton_online", "point transformer", "frame", 1, extractor_gflop(),
+                   make_item<SkeletonOnline>, {"skeleton"}, {"dense"}),
+          ItemInfo("smrm_online", "SMRM, caches flushed before every frame", "frame", 1,
+                   motion_gflop(), make_item<MotionOnline<true>>),
+          ItemInfo("smrm_online_warm", "SMRM, caches as the last frame left them", "frame", 1,
+                   motion_gflop(), make_item<MotionOnline<false>>),
+          ItemInfo("deformation_online", "offsets and skinning of 6,890 points", "frame", 1,
+                   deformation, make_item<DeformationOnline>, {"offsets"}, {"dense"}),
+          ItemInfo("frame_online", "whole frame, paper's models", "frame", 1,
+                   extractor_gflop() + motion_gflop() + deformation, make_item<FrameOnline>,
+                   {"skeleton", "offsets"}),
+          ItemInfo("frame_online_lite", "whole frame, lite models", "frame", 1, 0,
+                   FrameOnline::make_lite, {}, {}, "lite")};
 }
 
 }  // namespace restage::bench

@@ -71,18 +71,17 @@ template <size_t which>
 ItemInfo info() {
   const Subject& s = kSubjects[which];
   const std::string stage = s.stage;
-  const bool surfaces = stage != "motion";  // windows are of every frame
+  const std::string per = stage == "skeleton" ? "cloud" : stage == "motion" ? "window" : "pair";
+  std::vector<std::string> also = {"loader"};
+  if (stage != "motion") also.push_back("loader_1fps");  // windows are of every frame
   return {"reading_" + stage + "_" + s.size,
           stage + ", " + s.size,
-          stage == "skeleton" ? "cloud"
-          : stage == "motion" ? "window"
-                              : "pair",
+          per,
           s.batch,
           0,
-          {},
           Reading::make<which>,
-          surfaces ? std::vector<std::string>{"loader", "loader_1fps"}
-                   : std::vector<std::string>{"loader"},
+          {},
+          also,
           "training"};
 }
 

@@ -97,10 +97,6 @@ class MotionTraining : public Training {
       return motion_losses(ctx, net_, nullptr, b, MotionWeights{}).total;
     });
   }
-  static std::unique_ptr<Item> make(const Inputs& inputs, const std::string& variant,
-                                    bool dropout) {
-    return std::make_unique<MotionTraining>(inputs, variant, dropout);
-  }
 
  private:
   static SmrmConfig config(bool dropout) {
@@ -128,10 +124,6 @@ class DeformationTraining : public Training {
                    1.0 / kClouds);
     });
   }
-  static std::unique_ptr<Item> make(const Inputs& inputs, const std::string& variant,
-                                    bool dropout) {
-    return std::make_unique<DeformationTraining>(inputs, variant, dropout);
-  }
 
  private:
   static MlpConfig config(bool dropout) { return {MlpConfig().width, dropout ? 0.2 : 0.0}; }
@@ -147,45 +139,16 @@ std::vector<ItemInfo> training_items() {
   const double inputs =
       2 * gflop_of(static_cast<double>(kSurfacePoints * (3 * kJoints + 3) * MlpConfig().width));
   const double pair = 3 * (weights_gflop(kSurfacePoints) + offsets_gflop(kSurfacePoints)) - inputs;
-  return {{"skeleton_train",
-           "point transformer, batch 4",
-           "cloud",
-           kClouds,
-           extractor,
-           {"skeleton"},
-           skeleton,
-           {"dense", "bfloat16"}},
-          {"smrm_train_b16",
-           "SMRM, batch 16, windows of 30",
-           "window",
-           16,
-           window,
-           {},
-           MotionTraining<16>::make,
-           {"bfloat16"}},
-          {"smrm_train_b64",
-           "SMRM, batch 64, windows of 30",
-           "window",
-           64,
-           window,
-           {},
-           MotionTraining<64>::make,
-           {"bfloat16"}},
-          {"deformation_train",
-           "skinning weights and offsets, batch 4 of 6,890 points",
-           "pair",
-           kClouds,
-           pair,
-           {},
-           DeformationTraining::make,
-           {"bfloat16"}},
-          {"pointnet_train",
-           "PointNet, batch 4",
-           "cloud",
-           kClouds,
-           3 * pointnet_gflop(),
-           {},
-           pointnet}};
+  return {ItemInfo("skeleton_train", "point transformer, batch 4", "cloud", kClouds, extractor,
+                   skeleton, {"skeleton"}, {"dense", "bfloat16"}),
+          ItemInfo("smrm_train_b16", "SMRM, batch 16, windows of 30", "window", 16, window,
+                   make_item<MotionTraining<16>>, {}, {"bfloat16"}),
+          ItemInfo("smrm_train_b64", "SMRM, batch 64, windows of 30", "window", 64, window,
+                   make_item<MotionTraining<64>>, {}, {"bfloat16"}),
+          ItemInfo("deformation_train", "skinning weights and offsets, batch 4 of 6,890 points",
+                   "pair", kClouds, pair, make_item<DeformationTraining>, {}, {"bfloat16"}),
+          ItemInfo("pointnet_train", "PointNet, batch 4", "cloud", kClouds, 3 * pointnet_gflop(),
+                   pointnet)};
 }
 
 }  // namespace restage::bench

@@ -7,6 +7,7 @@
 
 #include "autograd/base/error.h"
 #include "autograd/kernels/matmul.h"
+#include "autograd/kernels/point_tiles.h"
 
 namespace restage {
 namespace {
@@ -17,33 +18,6 @@ void require(const Tensor& t, const Shape& shape, const char* what) {
   if (t.shape() == shape && t.dtype() == DType::f32) return;
   throw ShapeError(std::string("deformer: ") + what + " must be float32 " + shape.str() + ", not " +
                    name_of(t.dtype()) + " " + t.shape().str());
-}
-
-/// Sorts [begin, end) of the points into tiles: halved at the median of the longest side, on whole
-/// groups while there are several, so that a group's tiles are neighbours too.
-void sort_tiles(const float* x, int32_t* begin, int32_t* end) {
-  const int64_t tiles = (end - begin + P - 1) / P;
-  if (tiles <= 1) {
-    std::sort(begin, end);
-    return;
-  }
-  int64_t half = (tiles + 1) / 2;
-  if (tiles > kDeformGroup) half = (half + kDeformGroup - 1) / kDeformGroup * kDeformGroup;
-  int axis = 0;
-  float longest = -1;
-  for (int c = 0; c < 3; ++c) {
-    const auto [low, high] = std::minmax_element(
-        begin, end, [&](int32_t a, int32_t b) { return x[3 * a + c] < x[3 * b + c]; });
-    const float side = x[3 * *high + c] - x[3 * *low + c];
-    if (side > longest) longest = side, axis = c;
-  }
-  int32_t* middle = begin + half * P;
-  std::nth_element(begin, middle, end, [&](int32_t a, int32_t b) {
-    const float u = x[3 * a + axis], v = x[3 * b + axis];
-    return u < v || (u == v && a < b);
-  });
-  sort_tiles(x, begin, middle);
-  sort_tiles(x, middle, end);
 }
 
 /// Rows [v, c] -> [t, c, P] in the tiles' order.
@@ -96,7 +70,7 @@ Deformer::Deformer(const Tensor& points, const Tensor& weights, const Mlp3* offs
   order_ = Tensor::empty({t, P}, DType::i32);
   int32_t* order = order_.data<int32_t>();
   std::iota(order, order + count_, 0);
-  sort_tiles(points.data<float>(), order, order + count_);
+  sort_into_tiles(points.data<float>(), order, order + count_, P, kDeformGroup);
   // The last tile is filled up with its last point, which is then computed again to the same bits.
   std::fill(order + count_, order + t * P, count_ > 0 ? order[count_ - 1] : 0);
   points_ = in_tiles(points, order_);

@@ -1,7 +1,6 @@
 #include "infer/extraction.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace restage {
 namespace {
@@ -85,9 +84,7 @@ Points surface_points(const Mesh& mesh, size_t n, const RngKey& key) {
   std::vector<double> ends;
   double total = 0;
   for (const Triangle& t : mesh.faces) {
-    const auto at = [&](int i) {
-      return mesh.vertices[static_cast<size_t>(t[static_cast<size_t>(i)])];
-    };
+    const auto at = [&](int i) { return mesh.vertices[t[i]]; };
     total += 0.5 * static_cast<double>((at(1) - at(0)).cross(at(2) - at(0)).norm());
     ends.push_back(total);
   }
@@ -101,9 +98,7 @@ Points surface_points(const Mesh& mesh, size_t n, const RngKey& key) {
     double u = rng.uniform(), v = rng.uniform();
     if (u + v > 1) u = 1 - u, v = 1 - v;
     const Triangle& t = mesh.faces[face];
-    const Point &a = mesh.vertices[static_cast<size_t>(t[0])],
-                &b = mesh.vertices[static_cast<size_t>(t[1])],
-                &c = mesh.vertices[static_cast<size_t>(t[2])];
+    const Point &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]], &c = mesh.vertices[t[2]];
     out.push_back(a + static_cast<float>(u) * (b - a) + static_cast<float>(v) * (c - a));
   }
   return out;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "autograd/base/format.h"
 #include "autograd/kernels/rotation.h"
 #include "autograd/ops/layout.h"
 
@@ -60,10 +61,10 @@ void require_tpose(const Joints& j, const std::string& where) {
     const double angle =
         std::acos(std::clamp(side * arm[0] / std::max(arm.norm(), 1e-9), -1.0, 1.0)) * 180 / M_PI;
     if (angle <= kTposeLimit) continue;
-    char text[96];
-    std::snprintf(text, sizeof text, "is not in T-pose: the %s arm is %.0f degrees from %sx",
-                  side > 0 ? "left" : "right", angle, side > 0 ? "+" : "-");
-    throw InputError(where, text, "give the target in T-pose facing +z, y up, or add --force");
+    throw InputError(where,
+                     format("is not in T-pose: the %s arm is %.0f degrees from %sx",
+                            side > 0 ? "left" : "right", angle, side > 0 ? "+" : "-"),
+                     "give the target in T-pose facing +z, y up, or add --force");
   }
 }
 

@@ -11,16 +11,15 @@
 #include <charconv>
 #include <chrono>
 #include <condition_variable>
-#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <thread>
-#include <vector>
 
 #include "autograd/base/error.h"
+#include "autograd/base/format.h"
 
 namespace restage {
 namespace {
@@ -91,11 +90,9 @@ struct Record {
                                          {"who", holder.who},   {"start", start},
                                          {"world", world},      {"token", token}};
     std::string out = json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
-    char changing[80];
-    std::snprintf(changing, sizeof changing, ",\"released\":%d,\"beat\":%20lld}", released ? 1 : 0,
-                  static_cast<long long>(holder.beat));
     out.back() = ' ';
-    out += changing;
+    out += format(",\"released\":%d,\"beat\":%20lld}", released ? 1 : 0,
+                  static_cast<long long>(holder.beat));
     out.resize(kRecord - 1, ' ');
     return out + "\n";
   }

@@ -5,9 +5,10 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
+
+#include "autograd/base/format.h"
 
 namespace restage {
 namespace {
@@ -15,12 +16,6 @@ namespace {
 constexpr double kRedraw = 0.1, kLineEvery = 10.0, kRateWindow = 30.0;  // seconds
 constexpr int kWidestBar = 30, kNarrowestBar = 8;
 constexpr const char* kClearLine = "\r\x1b[K";
-
-std::string format(const char* pattern, double value) {
-  char text[64];
-  std::snprintf(text, sizeof text, pattern, value);
-  return text;
-}
 
 }  // namespace
 
@@ -50,13 +45,8 @@ ProgressOutput standard_progress(bool quiet) {
 
 std::string duration_text(double seconds) {
   const auto whole = static_cast<long long>(std::clamp(seconds, 0.0, 1e9) + 0.5);
-  char text[40];
-  if (whole >= 3600)
-    std::snprintf(text, sizeof text, "%lld:%02lld:%02lld", whole / 3600, whole / 60 % 60,
-                  whole % 60);
-  else
-    std::snprintf(text, sizeof text, "%lld:%02lld", whole / 60, whole % 60);
-  return text;
+  if (whole < 3600) return format("%lld:%02lld", whole / 60, whole % 60);
+  return format("%lld:%02lld:%02lld", whole / 3600, whole / 60 % 60, whole % 60);
 }
 
 Progress::Progress(std::string title, int64_t total, ProgressOutput output, int64_t done)
@@ -96,14 +86,12 @@ double Progress::rate() const {
 
 /// "42% 1234/3000", rate and time left.
 std::string Progress::numbers(bool last) const {
-  char text[96];
   const int percent =
       total_ > 0
           ? static_cast<int>(100.0 * static_cast<double>(done_) / static_cast<double>(total_))
           : 100;
-  std::snprintf(text, sizeof text, "%3d%% %lld/%lld", percent, static_cast<long long>(done_),
-                static_cast<long long>(total_));
-  std::string out = text;
+  std::string out = format("%3d%% %lld/%lld", percent, static_cast<long long>(done_),
+                           static_cast<long long>(total_));
   if (last) return out + "  took " + duration_text(history_.back().first - start_);
   const double speed = rate();
   if (speed <= 0) return out;

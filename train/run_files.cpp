@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "autograd/base/format.h"
 #include "autograd/base/log.h"
 
 namespace restage::run_files {
@@ -63,9 +63,8 @@ void remove_file(const std::string& path) {
 }  // namespace
 
 std::string checkpoint_name(const std::string& stage, int64_t step, std::string_view bytes) {
-  char number[32];
-  std::snprintf(number, sizeof number, "-%09lld-", static_cast<long long>(step));
-  return stage + number + checksum(bytes) + std::string(kSuffix);
+  return stage + format("-%09lld-", static_cast<long long>(step)) + checksum(bytes) +
+         std::string(kSuffix);
 }
 
 std::vector<Entry> list_checkpoints(const std::string& dir,

@@ -10,6 +10,7 @@
 #include <filesystem>
 
 #include "autograd/base/error.h"
+#include "autograd/base/format.h"
 
 namespace restage {
 namespace {
@@ -126,9 +127,7 @@ std::string checksum(std::string_view bytes) {
   }
   for (; i < bytes.size(); ++i) h = (h ^ static_cast<unsigned char>(bytes[i])) * 0x100000001b3ull;
   h ^= h >> 32;
-  char text[17];
-  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(h));
-  return text;
+  return format("%016llx", static_cast<unsigned long long>(h));
 }
 
 }  // namespace restage

@@ -4,7 +4,6 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
 #include <atomic>
 #include <climits>
@@ -35,8 +34,8 @@ int take_slot(const std::string& path) {
 
 void free_slot(int slot) {
   if (slot < 0) return;
-  slots[static_cast<size_t>(slot)].live = false;
-  slots[static_cast<size_t>(slot)].taken = false;
+  slots[slot].live = false;
+  slots[slot].taken = false;
 }
 
 /// std::filesystem takes memory, which a signal handler may not.

@@ -34,7 +34,7 @@ T* scores(const Attention<T>& a, int64_t t, const T* hidden, const T* u, const T
   product(pairs, d, k, left, pack_rows_right(memory.rows, d, memory.right), e, d);
   for (int64_t p = 0; p < pairs; ++p) {
     T* HWY_RESTRICT row = e + p * d;
-    const T* HWY_RESTRICT key = linear + (columns + memory.slot[static_cast<size_t>(p)]) * d;
+    const T* HWY_RESTRICT key = linear + (columns + memory.slot[p]) * d;
     for (int64_t c = 0; c < d; ++c) row[c] -= key[c];
   }
   return e;

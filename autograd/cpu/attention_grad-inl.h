@@ -103,7 +103,7 @@ void pool_grad(const Backward<T>& b, int64_t t, T* st, T* e, GroupSums<T>& sums)
 template <class T>
 void unit_grad(const Attention<T>& a, int64_t t, const T* r, const T* hidden, T* gz,
                GroupSums<T>& sums, TileMemory<T>& memory) {
-  const std::vector<int32_t>& units = a.active[static_cast<size_t>(t)];
+  const std::vector<int32_t>& units = a.active[t];
   const int64_t pairs = a.tile_rows(t) * a.k, columns = a.columns(t), m = std::ssize(units);
   T* sum = memory.y.at_least(4 * m);
   std::fill_n(sum, 4 * m, T(0));
@@ -123,8 +123,7 @@ void unit_grad(const Attention<T>& a, int64_t t, const T* r, const T* hidden, T*
   }
   T* total = sums.hidden.template data<T>();
   for (int64_t c = 0; c < 4; ++c)
-    for (int64_t i = 0; i < m; ++i)
-      total[c * a.d + units[static_cast<size_t>(i)]] += sum[c * m + i];
+    for (int64_t i = 0; i < m; ++i) total[c * a.d + units[i]] += sum[c * m + i];
 }
 
 template <class T>
@@ -138,7 +137,7 @@ T dot(int64_t n, const T* x, const T* y) {
 template <class T, class F>
 void offset_grad(const Backward<T>& b, int64_t t, const T* gz, GroupSums<T>& sums, F&& on) {
   const Attention<T>& a = b.a;
-  const std::vector<int32_t>& units = a.active[static_cast<size_t>(t)];
+  const std::vector<int32_t>& units = a.active[t];
   const int64_t m = std::ssize(units);
   const auto out = [&](int64_t row, int64_t c) -> T& {
     return sums.xyz.template data<T>()[3 * (row - sums.first_row) + c];

@@ -44,7 +44,7 @@ template <class T>
 void both_grad(Backward<T>& b, int64_t t, const T* hidden, const T* g_st, GroupSums<T>& sums,
                TileMemory<T>& memory) {
   const Attention<T>& a = b.a;
-  const std::vector<int32_t>& units = a.active[static_cast<size_t>(t)];
+  const std::vector<int32_t>& units = a.active[t];
   const int64_t pairs = a.tile_rows(t) * a.k, columns = a.columns(t), m = std::ssize(units),
                 width = 2 * a.d;
   const T* left = pack_left<T>({hidden, 1, columns}, columns, pairs, memory.left);
@@ -52,7 +52,7 @@ void both_grad(Backward<T>& b, int64_t t, const T* hidden, const T* g_st, GroupS
   T* g = memory.more.at_least(columns * width);
   product(columns, width, pairs, left, right, g, width);
   for (int64_t i = 0; i < m; ++i) {
-    T* row = sums.both_t.template data<T>() + units[static_cast<size_t>(i)] * width;
+    T* row = sums.both_t.template data<T>() + units[i] * width;
     const T* from = g + i * width;
     for (int64_t c = 0; c < width; ++c) row[c] += from[c];
   }
@@ -65,15 +65,14 @@ template <class T>
 void hidden_grad(const Backward<T>& b, int64_t t, const T* r, const T* hidden, const T* g_st,
                  GroupSums<T>& sums, TileMemory<T>& memory) {
   const Attention<T>& a = b.a;
-  const std::vector<int32_t>& units = a.active[static_cast<size_t>(t)];
+  const std::vector<int32_t>& units = a.active[t];
   const int64_t pairs = a.tile_rows(t) * a.k, m = std::ssize(units), width = 2 * a.d;
   if (m == 0) return;
   const T* right = b.full_right.data();
-  if (!a.full[static_cast<size_t>(t)]) {
+  if (!a.full[t]) {
     T* chosen = memory.more.at_least(m * width);
     for (int64_t i = 0; i < m; ++i)
-      std::copy_n(a.both_t.template data<T>() + units[static_cast<size_t>(i)] * width, width,
-                  chosen + i * width);
+      std::copy_n(a.both_t.template data<T>() + units[i] * width, width, chosen + i * width);
     right = pack_right<T>({chosen, 1, width}, width, m, memory.right);
   }
   T* gz = memory.gz.at_least(pairs * m);
@@ -88,7 +87,7 @@ void xyz_grad(const Backward<T>& b, int64_t t, const T* gz, const T* g_st, Group
   const Attention<T>& a = b.a;
   const int64_t width = 2 * a.d;
   const T* affine = a.affine.template data<T>() + 4 * t * width;
-  const bool full = a.full[static_cast<size_t>(t)];
+  const bool full = a.full[t];
   offset_grad(b, t, gz, sums, [&](int64_t pair, int64_t c) {
     return full ? T(0) : dot(width, g_st + pair * width, affine + c * width);
   });
@@ -136,12 +135,12 @@ void affine_grad(const Backward<T>& b, Tensor& g_both_t, Tensor& g_hidden) {
   const Tensor moments = b.moments.reshape({rows, 2 * d});
   cpu::matmul(
       {a.on.reshape({rows, d}), moments, g_both_t, true, false, nullptr, Activation::none, true});
-  Tensor through = Tensor::empty({rows, d}, b.moments.dtype(), b.moments.device());
+  Tensor through = empty_like(b.moments, {rows, d});
   cpu::matmul({moments, b.args.in.both, through});
   T* g = g_hidden.data<T>();
   parallel_for(d, 64, [&](int64_t from, int64_t to) HWY_ATTR {
     for (int64_t t = 0; t < a.tiles.tiles(); ++t) {
-      if (a.full[static_cast<size_t>(t)]) continue;
+      if (a.full[t]) continue;
       const uint8_t* sign = a.sign.data() + t * d;
       for (int64_t c = 0; c < 4; ++c) {
         const T* x = through.data<T>() + (4 * t + c) * d;
@@ -171,9 +170,7 @@ template <class T>
 void weight_grads(Backward<T>& b) {
   const int64_t d = b.a.d;
   const auto& args = b.args;
-  const auto empty = [&](const Shape& shape) {
-    return Tensor::empty(shape, args.gy.dtype(), args.gy.device());
-  };
+  const auto empty = [&](const Shape& shape) { return empty_like(args.gy, shape); };
   Tensor both_t = empty({d, 2 * d}), hidden = empty({4, d}), gamma_t = empty({d, d});
   add_groups(b.groups, &GroupSums<T>::gamma_t, 0, gamma_t);
   add_groups(b.groups, &GroupSums<T>::both_t, 0, both_t);
@@ -194,7 +191,7 @@ void backward(const NeighbourAttentionGradArgs& args) {
   Backward<T> b(args);
   parallel_for(std::ssize(b.groups), 1, [&](int64_t from, int64_t to) HWY_ATTR {
     for (int64_t g = from; g < to; ++g) {
-      GroupSums<T>& sums = b.groups[static_cast<size_t>(g)];
+      GroupSums<T>& sums = b.groups[g];
       make_sums(b, sums);
       for (int64_t t = sums.from; t < sums.to; ++t) tile_grad(b, t, sums);
     }

@@ -54,19 +54,17 @@ const T* gamma_grad(const Split& s, const T* columns, const T* rows, const T* e,
   T* by_other = seen + s.width() * d;
   std::fill_n(by_other, s.others * d, T(0));
   for (int64_t p = 0; p < s.pairs; ++p) {
-    T* HWY_RESTRICT to = by_other + memory.slot[static_cast<size_t>(p)] * d;
+    T* HWY_RESTRICT to = by_other + memory.slot[p] * d;
     const T* HWY_RESTRICT from = e + p * d;
     for (int64_t c = 0; c < d; ++c) to[c] -= from[c];
   }
   T* g = sums.gamma_t.template data<T>();
-  for (int64_t i = 0; i < s.active; ++i)
-    add_row(seen + i * d, d, g + memory.active[static_cast<size_t>(i)] * d);
+  for (int64_t i = 0; i < s.active; ++i) add_row(seen + i * d, d, g + memory.active[i] * d);
   const T* on = seen + s.active * d;
   T* part = memory.chosen.at_least(s.on * d);
   product(s.on, d, s.rows(), pack_left<T>({rows, 1, s.on}, s.on, s.rows(), memory.left),
           pack_right<T>({on, d, 1}, s.rows(), d, memory.right), part, d);
-  for (int64_t i = 0; i < s.on; ++i)
-    add_row(part + i * d, d, g + memory.on[static_cast<size_t>(i)] * d);
+  for (int64_t i = 0; i < s.on; ++i) add_row(part + i * d, d, g + memory.on[i] * d);
   return on;
 }
 
@@ -99,16 +97,15 @@ void query_key_grad(const Backward<T>& b, int64_t t, const Split& s, const T* co
     std::fill_n(g_query, s.d, T(0));
     std::fill_n(total, s.active, T(0));
     for (int64_t p = i * a.k; p < (i + 1) * a.k; ++p) {
-      T* key = g_key(memory.others[static_cast<size_t>(memory.slot[static_cast<size_t>(p)])]);
+      T* key = g_key(memory.others[memory.slot[p]]);
       const T* g = gu + p * s.active;
       add_row(g, s.active, total);
-      for (int64_t c = 0; c < s.active; ++c) key[memory.active[static_cast<size_t>(c)]] -= g[c];
+      for (int64_t c = 0; c < s.active; ++c) key[memory.active[c]] -= g[c];
     }
     add_chosen(total, memory.active, g_query);
   }
   for (int64_t j = 0; j < s.others; ++j)
-    add_chosen(on + (s.columns + j) * s.on, memory.on,
-               g_key(memory.others[static_cast<size_t>(j)]));
+    add_chosen(on + (s.columns + j) * s.on, memory.on, g_key(memory.others[j]));
 }
 
 /// The gradient of M and of the moments: hidden columns times the gradients of s (gu, on) and of t.
@@ -116,7 +113,7 @@ template <class T>
 void split_both_grad(Backward<T>& b, int64_t t, const Split& s, const T* hidden, const T* gu,
                      const T* on, const T* g_st, GroupSums<T>& sums, TileMemory<T>& memory) {
   const Attention<T>& a = b.a;
-  const std::vector<int32_t>& units = a.active[static_cast<size_t>(t)];
+  const std::vector<int32_t>& units = a.active[t];
   const int64_t d = s.d;
   const T* left = pack_left<T>({hidden, 1, s.columns}, s.columns, s.pairs, memory.left);
   T* of_s = memory.chosen.at_least(s.columns * (s.active + d));
@@ -127,7 +124,7 @@ void split_both_grad(Backward<T>& b, int64_t t, const Split& s, const T* hidden,
           pack_right<T>({g_st + d, 2 * d, 1}, s.pairs, d, memory.right), of_t, d);
   for (int64_t l = 0; l < s.columns; ++l) {
     T* row = l < std::ssize(units)
-                 ? sums.both_t.template data<T>() + units[static_cast<size_t>(l)] * 2 * d
+                 ? sums.both_t.template data<T>() + units[l] * 2 * d
                  : b.moments.template data<T>() + (4 * t + l - std::ssize(units)) * 2 * d;
     add_chosen(of_s + l * s.active, memory.active, row);
     add_chosen(on + l * s.on, memory.on, row);
@@ -141,13 +138,13 @@ template <class T>
 T* split_hidden_grad(const Backward<T>& b, int64_t t, const Split& s, const T* on_scores,
                      const T* e, const T* gu, const T* g_st, TileMemory<T>& memory) {
   const Attention<T>& a = b.a;
-  const std::vector<int32_t>& units = a.active[static_cast<size_t>(t)];
+  const std::vector<int32_t>& units = a.active[t];
   const int64_t m = std::ssize(units), d = s.d;
   T* gz = memory.gz.at_least(s.pairs * m);
   T* chosen = memory.chosen.at_least(m * (d + s.active));
   T* to = chosen + m * d;
   for (int64_t i = 0; i < m; ++i, to += s.active) {
-    const T* row = a.both_t.template data<T>() + units[static_cast<size_t>(i)] * 2 * d;
+    const T* row = a.both_t.template data<T>() + units[i] * 2 * d;
     std::copy_n(row + d, d, chosen + i * d);
     choose(row, memory.active, to);
   }

@@ -55,11 +55,9 @@ struct Attention {
   Buffer<T> full_right;  // both_t, packed, if a tile needs it
 
   int64_t tile_rows(int64_t t) const {
-    return tiles.start[static_cast<size_t>(t) + 1] - tiles.start[static_cast<size_t>(t)];
+    return tiles.start[static_cast<size_t>(t) + 1] - tiles.start[t];
   }
-  int32_t point(int64_t t, int64_t i) const {
-    return tiles.order[static_cast<size_t>(tiles.start[static_cast<size_t>(t)] + i)];
-  }
+  int32_t point(int64_t t, int64_t i) const { return tiles.order[tiles.start[t] + i]; }
   /// Row of the neighbour j of a point (a row of the batch).
   int64_t neighbour(int64_t point_row, int64_t j) const {
     return point_row / v * v + index[point_row * k + j];
@@ -172,8 +170,8 @@ void unit_signs(const T* hidden, int64_t d, const T* r, int64_t pairs, uint8_t* 
 
 template <class T>
 void Attention<T>::transpose_weights() {
-  hidden = Tensor::empty({4, d}, in.w.dtype(), in.w.device());
-  both_t = Tensor::empty({d, 2 * d}, in.w.dtype(), in.w.device());
+  hidden = empty_like(in.w, {4, d});
+  both_t = empty_like(in.w, {d, 2 * d});
   const T *w = in.w.data<T>(), *b = in.b.data<T>(), *m = in.both.data<T>();
   T *h = hidden.data<T>(), *mt = both_t.data<T>();
   for (int64_t u = 0; u < d; ++u) {
@@ -181,7 +179,7 @@ void Attention<T>::transpose_weights() {
     h[3 * d + u] = b[u];
   }
   transpose_matrix(m, 2 * d, d, mt);
-  gamma_t = Tensor::empty({d, d}, in.w.dtype(), in.w.device());
+  gamma_t = empty_like(in.w, {d, d});
   transpose_matrix(in.gamma.data<T>(), d, d, gamma_t.data<T>());
 }
 
@@ -201,7 +199,7 @@ void Attention<T>::classify(int64_t t, Buffer<T>& offsets) {
     for (int64_t u = 0; u < d; ++u) row[c * d + u] = !full[i] && s[u] == kOn ? h[c * d + u] : T(0);
   if (!full[i]) return;
   active[i].resize(static_cast<size_t>(d));
-  for (int64_t u = 0; u < d; ++u) active[i][static_cast<size_t>(u)] = static_cast<int32_t>(u);
+  for (int64_t u = 0; u < d; ++u) active[i][u] = static_cast<int32_t>(u);
 }
 
 template <class T>
@@ -222,8 +220,8 @@ Attention<T>::Attention(const NeighbourAttentionInputs& inputs)
       full(static_cast<size_t>(tiles.tiles())) {
   transpose_weights();
   finite = all_finite<T>(in.query) && all_finite<T>(in.key) && all_finite<T>(in.gamma);
-  on = Tensor::empty({tiles.tiles(), 4, d}, in.w.dtype(), in.w.device());
-  affine = Tensor::empty({tiles.tiles(), 4, 2 * d}, in.w.dtype(), in.w.device());
+  on = empty_like(in.w, {tiles.tiles(), 4, d});
+  affine = empty_like(in.w, {tiles.tiles(), 4, 2 * d});
   parallel_for(tiles.tiles(), 4, [&](int64_t from, int64_t to) HWY_ATTR {
     Buffer<T> offsets;
     for (int64_t t = from; t < to; ++t) classify(t, offsets);
@@ -242,12 +240,12 @@ Attention<T>::Attention(const NeighbourAttentionInputs& inputs)
 /// relu(z) of the active units, then r and 1 unless the tile is done in full: [pairs, columns].
 template <class T>
 T* hidden_columns(const Attention<T>& a, int64_t t, const T* r, TileMemory<T>& memory) {
-  const std::vector<int32_t>& units = a.active[static_cast<size_t>(t)];
+  const std::vector<int32_t>& units = a.active[t];
   const int64_t m = std::ssize(units), columns = a.columns(t), pairs = a.tile_rows(t) * a.k;
   T* w = memory.weights.at_least(4 * m);
   const T* all = a.hidden.template data<T>();
   for (int64_t c = 0; c < 4; ++c)
-    for (int64_t i = 0; i < m; ++i) w[c * m + i] = all[c * a.d + units[static_cast<size_t>(i)]];
+    for (int64_t i = 0; i < m; ++i) w[c * m + i] = all[c * a.d + units[i]];
   T* out = memory.hidden.at_least(pairs * columns);
   for (int64_t p = 0; p < pairs; ++p) {
     const T* x = r + 4 * p;
@@ -265,8 +263,7 @@ T* hidden_columns(const Attention<T>& a, int64_t t, const T* r, TileMemory<T>& m
 template <class T>
 void column_rows(const Attention<T>& a, int64_t t, std::vector<const T*>* rows) {
   rows->clear();
-  for (const int32_t u : a.active[static_cast<size_t>(t)])
-    rows->push_back(a.both_t.template data<T>() + u * 2 * a.d);
+  for (const int32_t u : a.active[t]) rows->push_back(a.both_t.template data<T>() + u * 2 * a.d);
   for (int64_t c = 0; c < 4; ++c)
     rows->push_back(a.affine.template data<T>() + (4 * t + c) * 2 * a.d);
 }
@@ -277,7 +274,7 @@ T* pair_products(const Attention<T>& a, int64_t t, const T* hidden, TileMemory<T
   const int64_t pairs = a.tile_rows(t) * a.k, columns = a.columns(t);
   const T* left = pack_left<T>({hidden, columns, 1}, pairs, columns, memory.left);
   const T* right = a.full_right.data();
-  if (!a.full[static_cast<size_t>(t)]) {
+  if (!a.full[t]) {
     column_rows(a, t, &memory.rows);
     right = pack_rows_right(memory.rows, 2 * a.d, memory.right);
   }
@@ -319,7 +316,7 @@ template <class T>
 bool split_scores(const Attention<T>& a, int64_t t, TileMemory<T>& memory) {
   memory.active.clear();
   memory.on.clear();
-  if (a.full[static_cast<size_t>(t)] || !a.finite) return false;
+  if (a.full[t] || !a.finite) return false;
   const T *lo = memory.range.data(), *hi = lo + a.d;
   for (int64_t c = 0; c < a.d; ++c) {
     if (lo[c] > T(0)) {
@@ -340,14 +337,14 @@ void find_others(const Attention<T>& a, int64_t t, TileMemory<T>& memory) {
   for (int64_t i = 0; i < a.tile_rows(t); ++i)
     for (int64_t j = 0; j < a.k; ++j) {
       const int64_t row = a.neighbour(a.point(t, i), j);
-      int32_t& place = memory.place[static_cast<size_t>(row)];
+      int32_t& place = memory.place[row];
       if (place < 0) {
         place = static_cast<int32_t>(memory.others.size());
         memory.others.push_back(row);
       }
       memory.slot.push_back(place);
     }
-  for (const int64_t row : memory.others) memory.place[static_cast<size_t>(row)] = -1;
+  for (const int64_t row : memory.others) memory.place[row] = -1;
 }
 
 /// Copies the chosen columns of some rows.

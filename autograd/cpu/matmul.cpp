@@ -193,7 +193,7 @@ void tile(const Product<T>& p, const Packed<T>& packed, int64_t i0, int64_t i1, 
       if (!packed.b) pack_b(p.b.from(l0, j), l, std::min<int64_t>(cols, j1 - j), own_b);
       for (int64_t i = i0; i < i1; i += kRows) {
         const int64_t rows = std::min<int64_t>(kRows, i1 - i);
-        kernels[static_cast<size_t>(rows - 1)](p, at(i, j), l, a + (i - i0) * l, b);
+        kernels[rows - 1](p, at(i, j), l, a + (i - i0) * l, b);
       }
     }
   }

@@ -37,8 +37,8 @@ void two_sums(int64_t n, int64_t inner, double* a, double* b, bool parallel, F&&
   for (int64_t i = 0; i < inner; ++i) {
     a[i] = b[i] = 0;
     for (int64_t p = 0; p < parts; ++p) {
-      a[i] += partial[static_cast<size_t>(2 * p * inner + i)];
-      b[i] += partial[static_cast<size_t>((2 * p + 1) * inner + i)];
+      a[i] += partial[2 * p * inner + i];
+      b[i] += partial[(2 * p + 1) * inner + i];
     }
   }
 }
@@ -68,8 +68,7 @@ template <class T>
 Scratch<double> along_inner(const Tensor* t, Affine affine, int64_t inner, double none) {
   Scratch<double> out(static_cast<size_t>(inner), none);
   if (t == nullptr || affine != Affine::inner) return out;
-  for (int64_t i = 0; i < inner; ++i)
-    out[static_cast<size_t>(i)] = static_cast<double>(t->data<T>()[i]);
+  for (int64_t i = 0; i < inner; ++i) out[i] = static_cast<double>(t->data<T>()[i]);
   return out;
 }
 
@@ -88,8 +87,7 @@ void norm_columns(const NormArgs& args) {
              [&](int64_t r, double* a, double*) HWY_ATTR {
                for (int64_t i = 0; i < inner; ++i) a[i] += static_cast<double>(x[r * inner + i]);
              });
-    for (int64_t i = 0; i < inner; ++i)
-      mean[i] = sums[static_cast<size_t>(i)] / static_cast<double>(n);
+    for (int64_t i = 0; i < inner; ++i) mean[i] = sums[i] / static_cast<double>(n);
     two_sums(n, inner, sums.data(), unused.data(), parallel,
              [&](int64_t r, double* a, double*) HWY_ATTR {
                for (int64_t i = 0; i < inner; ++i) {
@@ -98,7 +96,7 @@ void norm_columns(const NormArgs& args) {
                }
              });
     for (int64_t i = 0; i < inner; ++i)
-      rstd[i] = 1.0 / std::sqrt(sums[static_cast<size_t>(i)] / static_cast<double>(n) + args.eps);
+      rstd[i] = 1.0 / std::sqrt(sums[i] / static_cast<double>(n) + args.eps);
     const double *sc = scale.data(), *sh = shift.data();
     for_block_rows(n, inner, parallel, [&](int64_t r) HWY_ATTR {
       for (int64_t i = 0; i < inner; ++i)
@@ -222,8 +220,8 @@ void norm_rows_grad(const NormGradArgs& args) {
   for (int64_t i = 0; i < n; ++i) {
     double g_scale = 0, g_shift = 0;
     for (int64_t p = 0; p < parts; ++p) {
-      g_scale += partial[static_cast<size_t>(2 * p * n + i)];
-      g_shift += partial[static_cast<size_t>((2 * p + 1) * n + i)];
+      g_scale += partial[2 * p * n + i];
+      g_shift += partial[(2 * p + 1) * n + i];
     }
     args.g_scale->data<T>()[i] = static_cast<T>(g_scale);
     args.g_shift->data<T>()[i] = static_cast<T>(g_shift);

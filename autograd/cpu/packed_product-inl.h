@@ -48,7 +48,7 @@ const T* pack_rows_right(const std::vector<const T*>& rows, int64_t n, Buffer<T>
   for (int64_t l0 = 0; l0 < k; l0 += kDepth)
     for (int64_t j = 0; j < n; j += cols)
       for (int64_t l = l0; l < std::min(k, l0 + kDepth); ++l, to += cols) {
-        const T* from = rows[static_cast<size_t>(l)] + j;
+        const T* from = rows[l] + j;
         if (n - j >= cols) {
           copy_fixed<cols>(from, to);
         } else {

@@ -27,9 +27,9 @@ struct Cloud {
       : x(static_cast<size_t>(v + kPadding)), y(x.size()), z(x.size()), size(v) {}
   void set(const T* points) {
     for (int64_t i = 0; i < size; ++i) {
-      x[static_cast<size_t>(i)] = points[3 * i];
-      y[static_cast<size_t>(i)] = points[3 * i + 1];
-      z[static_cast<size_t>(i)] = points[3 * i + 2];
+      x[i] = points[3 * i];
+      y[i] = points[3 * i + 1];
+      z[i] = points[3 * i + 2];
     }
   }
   int64_t size;

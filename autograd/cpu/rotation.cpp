@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "autograd/base/parallel_each.h"
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/kernels.h"
 
@@ -167,21 +168,19 @@ void to_matrix(const ToMatrixArgs& args) {
   const int64_t width = args.x.size(-1);
   dispatch(args.out.dtype(), [&](auto zero) {
     using T = decltype(zero);
-    parallel_for(args.out.numel() / 9, 512, [&](int64_t from, int64_t to) {
-      for (int64_t i = from; i < to; ++i) {
-        const T* x = args.x.data<T>() + i * width;
-        Eigen::Map<M3<T>> r(args.out.data<T>() + 9 * i);
-        switch (args.form) {
-          case RotationForm::sixd:
-            r = from_sixd(x);
-            break;
-          case RotationForm::quaternion:
-            r = from_quaternion(x);
-            break;
-          case RotationForm::axis_angle:
-            r = from_axis_angle(x);
-            break;
-        }
+    parallel_each(args.out.numel() / 9, 512, [&](int64_t i) {
+      const T* x = args.x.data<T>() + i * width;
+      Eigen::Map<M3<T>> r(args.out.data<T>() + 9 * i);
+      switch (args.form) {
+        case RotationForm::sixd:
+          r = from_sixd(x);
+          break;
+        case RotationForm::quaternion:
+          r = from_quaternion(x);
+          break;
+        case RotationForm::axis_angle:
+          r = from_axis_angle(x);
+          break;
       }
     });
   });
@@ -191,22 +190,20 @@ void to_matrix_grad(const ToMatrixGradArgs& args) {
   const int64_t width = args.x.size(-1);
   dispatch(args.out.dtype(), [&](auto zero) {
     using T = decltype(zero);
-    parallel_for(args.gy.numel() / 9, 512, [&](int64_t from, int64_t to) {
-      for (int64_t i = from; i < to; ++i) {
-        const T* x = args.x.data<T>() + i * width;
-        const M3<T> g = Eigen::Map<const M3<T>>(args.gy.data<T>() + 9 * i);
-        T* out = args.out.data<T>() + i * width;
-        switch (args.form) {
-          case RotationForm::sixd:
-            sixd_grad(x, g, out);
-            break;
-          case RotationForm::quaternion:
-            quaternion_grad(x, g, out);
-            break;
-          case RotationForm::axis_angle:
-            axis_angle_grad(x, g, out);
-            break;
-        }
+    parallel_each(args.gy.numel() / 9, 512, [&](int64_t i) {
+      const T* x = args.x.data<T>() + i * width;
+      const M3<T> g = Eigen::Map<const M3<T>>(args.gy.data<T>() + 9 * i);
+      T* out = args.out.data<T>() + i * width;
+      switch (args.form) {
+        case RotationForm::sixd:
+          sixd_grad(x, g, out);
+          break;
+        case RotationForm::quaternion:
+          quaternion_grad(x, g, out);
+          break;
+        case RotationForm::axis_angle:
+          axis_angle_grad(x, g, out);
+          break;
       }
     });
   });
@@ -216,15 +213,13 @@ void from_matrix(const FromMatrixArgs& args) {
   const int64_t width = args.out.size(-1);
   dispatch(args.out.dtype(), [&](auto zero) {
     using T = decltype(zero);
-    parallel_for(args.x.numel() / 9, 512, [&](int64_t from, int64_t to) {
-      for (int64_t i = from; i < to; ++i) {
-        const T* x = args.x.data<T>() + 9 * i;
-        T* out = args.out.data<T>() + i * width;
-        if (args.form == RotationForm::quaternion) {
-          to_quaternion(x, out);
-        } else {
-          to_axis_angle(x, out);
-        }
+    parallel_each(args.x.numel() / 9, 512, [&](int64_t i) {
+      const T* x = args.x.data<T>() + 9 * i;
+      T* out = args.out.data<T>() + i * width;
+      if (args.form == RotationForm::quaternion) {
+        to_quaternion(x, out);
+      } else {
+        to_axis_angle(x, out);
       }
     });
   });
@@ -235,9 +230,8 @@ void atan2(const Atan2Args& args) {
     using T = decltype(zero);
     const T *y = args.y.data<T>(), *x = args.x.data<T>();
     T* out = args.out.data<T>();
-    parallel_for(args.out.numel(), 512, [&](int64_t from, int64_t to) {
-      for (int64_t i = from; i < to; ++i)
-        out[i] = static_cast<T>(std::atan2(static_cast<double>(y[i]), static_cast<double>(x[i])));
+    parallel_each(args.out.numel(), 512, [&](int64_t i) {
+      out[i] = static_cast<T>(std::atan2(static_cast<double>(y[i]), static_cast<double>(x[i])));
     });
   });
 }
@@ -248,13 +242,11 @@ void atan2_grad(const Atan2GradArgs& args) {
     using T = decltype(zero);
     const T *y = args.y.data<T>(), *x = args.x.data<T>(), *g = args.gy.data<T>();
     T *g_y = args.out.data<T>(), *g_x = args.g_x.data<T>();
-    parallel_for(args.out.numel(), 512, [&](int64_t from, int64_t to) {
-      for (int64_t i = from; i < to; ++i) {
-        const double a = y[i], b = x[i], square = a * a + b * b;
-        const double factor = square <= least ? 0 : g[i] / square;  // NaN stays NaN
-        g_y[i] = static_cast<T>(factor * b);
-        g_x[i] = static_cast<T>(-factor * a);
-      }
+    parallel_each(args.out.numel(), 512, [&](int64_t i) {
+      const double a = y[i], b = x[i], square = a * a + b * b;
+      const double factor = square <= least ? 0 : g[i] / square;  // NaN stays NaN
+      g_y[i] = static_cast<T>(factor * b);
+      g_x[i] = static_cast<T>(-factor * a);
     });
   });
 }

@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "autograd/base/parallel_each.h"
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/kernels.h"
 
@@ -24,7 +25,7 @@ void fk_one(const FkArgs& args, int64_t s) {
   for (int64_t j = 0; j < joints; ++j) {
     const Eigen::Map<const M3<T>> local(args.local.data<T>() + (s * joints + j) * 9);
     Eigen::Map<M34<T>> t(out + 12 * j);
-    const int p = args.parents[static_cast<size_t>(j)];
+    const int p = args.parents[j];
     if (p < 0) {
       t.template leftCols<3>() = local;
       t.col(3) = Eigen::Map<const V3<T>>(args.root.data<T>() + 3 * s);
@@ -48,14 +49,14 @@ void fk_grad_one(const FkGradArgs& args, int64_t s) {
   Eigen::Map<V3<T>> g_root(args.g_root.data<T>() + 3 * s);
   g_root.setZero();
   for (int64_t j = 0; j < joints; ++j) {
-    g[static_cast<size_t>(j)] = Eigen::Map<const M34<T>>(args.gy.data<T>() + (s * joints + j) * 12);
+    g[j] = Eigen::Map<const M34<T>>(args.gy.data<T>() + (s * joints + j) * 12);
     Eigen::Map<V3<T>>(g_rest + 3 * j).setZero();
   }
   for (int64_t j = joints - 1; j >= 0; --j) {
-    const M34<T>& gj = g[static_cast<size_t>(j)];
+    const M34<T>& gj = g[j];
     const Eigen::Map<const M3<T>> local(args.local.data<T>() + (s * joints + j) * 9);
     Eigen::Map<M3<T>> g_local(args.out.data<T>() + (s * joints + j) * 9);
-    const int p = args.parents[static_cast<size_t>(j)];
+    const int p = args.parents[j];
     if (p < 0) {
       g_local = gj.template leftCols<3>();
       g_root += gj.col(3);  // there may be several roots, or no joint at all
@@ -64,7 +65,7 @@ void fk_grad_one(const FkGradArgs& args, int64_t s) {
     const M3<T> parent = Eigen::Map<const M34<T>>(transforms + 12 * p).template leftCols<3>();
     const V3<T> bone =
         Eigen::Map<const V3<T>>(rest + 3 * j) - Eigen::Map<const V3<T>>(rest + 3 * p);
-    M34<T>& gp = g[static_cast<size_t>(p)];
+    M34<T>& gp = g[p];
     g_local = parent.transpose() * gj.template leftCols<3>();
     gp.template leftCols<3>() +=
         gj.template leftCols<3>() * local.transpose() + gj.col(3) * bone.transpose();
@@ -75,25 +76,17 @@ void fk_grad_one(const FkGradArgs& args, int64_t s) {
   }
 }
 
-/// Runs f(s) for every sample in parallel.
-template <class F>
-void for_samples(int64_t n, int64_t grain, F&& f) {
-  parallel_for(n, grain, [&](int64_t from, int64_t to) {
-    for (int64_t s = from; s < to; ++s) f(s);
-  });
-}
-
 }  // namespace
 
 void fk(const FkArgs& args) {
   dispatch(args.out.dtype(), [&](auto zero) {
-    for_samples(args.local.size(0), 16, [&](int64_t s) { fk_one<decltype(zero)>(args, s); });
+    parallel_each(args.local.size(0), 16, [&](int64_t s) { fk_one<decltype(zero)>(args, s); });
   });
 }
 
 void fk_grad(const FkGradArgs& args) {
   dispatch(args.out.dtype(), [&](auto zero) {
-    for_samples(args.local.size(0), 16, [&](int64_t s) { fk_grad_one<decltype(zero)>(args, s); });
+    parallel_each(args.local.size(0), 16, [&](int64_t s) { fk_grad_one<decltype(zero)>(args, s); });
   });
 }
 

@@ -130,8 +130,7 @@ void skin_grad_piece(const LbsGradArgs& args, const T* transforms, int64_t first
   std::vector<T> across(static_cast<size_t>(kEntries * many), T(0));  // transforms, joints inside
   std::vector<T> w(static_cast<size_t>(many), T(0)), gw(w);
   for (int64_t j = 0; j < joints; ++j)
-    for (int64_t e = 0; e < kEntries; ++e)
-      across[static_cast<size_t>(e * many + j)] = transforms[kStride * j + e];
+    for (int64_t e = 0; e < kEntries; ++e) across[e * many + j] = transforms[kStride * j + e];
   const T* weights = args.weights.data<T>() + first * joints;
   blend_all(weights, last - first, joints, transforms, blends.data());
   for (int64_t i = first; i < last; ++i, weights += joints) {

@@ -80,7 +80,7 @@ double squared_norm_typed(const T* x, int64_t n) {
   Scratch<double> sums(static_cast<size_t>(parts));
   parallel_for(parts, 1, [&](int64_t from, int64_t to) HWY_ATTR {
     for (int64_t p = from; p < to; ++p)
-      sums[static_cast<size_t>(p)] = squares(x + p * kGrain, std::min(kGrain, n - p * kGrain));
+      sums[p] = squares(x + p * kGrain, std::min(kGrain, n - p * kGrain));
   });
   return std::accumulate(sums.begin(), sums.end(), 0.0);
 }

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
+#include "autograd/base/format.h"
 #include "autograd/base/parallel.h"
 #include "autograd/gradcheck/evaluate.h"
 #include "autograd/tensor/nan_memory.h"
@@ -13,11 +13,7 @@ namespace {
 
 constexpr double kRelative = 1e-6, kAbsolute = 1e-8;
 
-std::string number(double v) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.12g", v);
-  return text;
-}
+std::string number(double v) { return format("%.12g", v); }
 
 /// Collects failures under the name of one sample.
 class Findings {
@@ -299,28 +295,6 @@ std::string Report::text() const {
   return all;
 }
 
-OpSamples& OpSamples::add(const std::string& title, std::vector<Tensor> inputs, Build build) {
-  samples.push_back({title, std::move(inputs), std::move(build)});
-  return *this;
-}
-
-OpSamples& OpSamples::large(const std::string& title, std::vector<Tensor> inputs, Build build) {
-  samples.push_back({title, std::move(inputs), std::move(build), Sample::Kind::large});
-  return *this;
-}
-
-OpSamples& OpSamples::kink(const std::string& title, std::vector<Tensor> inputs, Build build,
-                           std::vector<Tensor> expected) {
-  samples.push_back({title, std::move(inputs), std::move(build), Sample::Kind::kink});
-  samples.back().expected = std::move(expected);
-  return *this;
-}
-
-OpSamples& OpSamples::error(const std::string& title, std::vector<Tensor> inputs, Build build) {
-  samples.push_back({title, std::move(inputs), std::move(build), Sample::Kind::error});
-  return *this;
-}
-
 Report check_sample(const OpSamples& op, const Sample& sample) {
   Findings f(op, sample);
   try {
@@ -369,13 +343,6 @@ Tensor random(const Shape& shape, uint64_t stream, double gap) {
     const double v = rng.normal();
     t.data<double>()[i] = v + (v < 0 ? -gap : gap);
   }
-  return t;
-}
-
-Tensor random_between(const Shape& shape, uint64_t stream, double lo, double hi) {
-  Rng rng(RngKey{12, stream});
-  Tensor t = Tensor::empty(shape, DType::f64);
-  for (int64_t i = 0; i < t.numel(); ++i) t.data<double>()[i] = rng.uniform(lo, hi);
   return t;
 }
 

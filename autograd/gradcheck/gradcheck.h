@@ -9,6 +9,7 @@
 
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "autograd/base/rng.h"
@@ -43,11 +44,22 @@ struct OpSamples {
   /// A random valid case: shapes and values are functions of the generator. Null: none.
   std::function<Sample(Rng&)> random = nullptr;
 
-  OpSamples& add(const std::string& title, std::vector<Tensor> inputs, Build build);
-  OpSamples& large(const std::string& title, std::vector<Tensor> inputs, Build build);
-  OpSamples& kink(const std::string& title, std::vector<Tensor> inputs, Build build,
-                  std::vector<Tensor> expected);
-  OpSamples& error(const std::string& title, std::vector<Tensor> inputs, Build build);
+  /// Add one sample each; what else it is to say can be set in what comes back.
+  Sample& add(const std::string& title, std::vector<Tensor> inputs, Build build,
+              Sample::Kind kind = Sample::Kind::smooth) {
+    return samples.emplace_back(Sample{title, std::move(inputs), std::move(build), kind});
+  }
+  Sample& large(const std::string& title, std::vector<Tensor> inputs, Build build) {
+    return add(title, std::move(inputs), std::move(build), Sample::Kind::large);
+  }
+  Sample& error(const std::string& title, std::vector<Tensor> inputs, Build build) {
+    return add(title, std::move(inputs), std::move(build), Sample::Kind::error);
+  }
+  void kink(const std::string& title, std::vector<Tensor> inputs, Build build,
+            std::vector<Tensor> expected) {
+    add(title, std::move(inputs), std::move(build), Sample::Kind::kink).expected =
+        std::move(expected);
+  }
 };
 
 template <class Op>
@@ -85,7 +97,5 @@ const std::vector<OpSamples>& all_samples();
 
 /// Standard normal float64 numbers; `stream` picks others. Away from zero by at least `gap`.
 Tensor random(const Shape& shape, uint64_t stream, double gap = 0);
-/// Uniform in [lo, hi).
-Tensor random_between(const Shape& shape, uint64_t stream, double lo, double hi);
 
 }  // namespace restage::gradcheck

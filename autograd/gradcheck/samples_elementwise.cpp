@@ -94,8 +94,7 @@ OpSamples expand_samples() {
   s.add("[1] to [5]", {random({1}, 2)}, to({5}));
   s.add("[] to [2, 2]", {random({}, 3)}, to({2, 2}));
   s.add("[2, 3] to itself", {random({2, 3}, 4)}, to({2, 3}));
-  s.add("[1, 3] to [0, 3]", {random({1, 3}, 5)}, to({0, 3}));
-  s.samples.back().zero_gradient = true;
+  s.add("[1, 3] to [0, 3]", {random({1, 3}, 5)}, to({0, 3})).zero_gradient = true;
   s.add("[0, 1] to [0, 3]", {random({0, 1}, 6)}, to({0, 3}));
   s.large("many", {random({300, 1, 9}, 6)}, to({300, 21, 9}));
   s.error("[3] to [4]", {random({3}, 1)}, to({4}));

@@ -65,8 +65,7 @@ OpSamples slice_samples() {
   s.add("middle", {random({2, 5, 3}, 1)}, part(1, 1, 4));
   s.add("last axis", {random({2, 5}, 2)}, part(-1, 3, 5));
   s.add("all of [1]", {random({1}, 3)}, part(0, 0, 1));
-  s.add("nothing", {random({2, 3}, 4)}, part(1, 2, 2));
-  s.samples.back().zero_gradient = true;
+  s.add("nothing", {random({2, 3}, 4)}, part(1, 2, 2)).zero_gradient = true;
   s.add("[0, 4]", {random({0, 4}, 5)}, part(1, 1, 3));
   s.large("many", {random({kRows, kCols}, 6)}, part(1, 3, 50));
   s.error("beyond the end", {random({2, 3}, 1)}, part(1, 1, 4));
@@ -124,8 +123,7 @@ OpSamples gather_samples() {
   s.add("repeated rows", {random({2, 3, 2}, 1)}, at(i32({2, 4}, {0, 2, 2, 2, 1, 1, 0, 0})));
   s.add("neighbourhoods", {random({1, 4, 3}, 2)}, at(i32({1, 2, 3}, {3, 0, 3, 1, 1, 2})));
   s.add("one row", {random({1, 1, 1}, 3)}, at(i32({1, 1}, {0})));
-  s.add("no index", {random({2, 3, 2}, 4)}, at(i32({2, 0}, {})));
-  s.samples.back().zero_gradient = true;
+  s.add("no index", {random({2, 3, 2}, 4)}, at(i32({2, 0}, {}))).zero_gradient = true;
   s.add("no sample", {random({0, 3, 2}, 5)}, at(i32({0, 4}, {})));
   s.add("no column", {random({1, 3, 0}, 6)}, at(i32({1, 2}, {0, 1})));
   s.large("many", {random({3, 70, 130}, 7)}, at(random_index({3, 90, 2}, rng, 70)));
@@ -178,8 +176,7 @@ OpSamples unfold_samples() {
   s.add("beyond both ends", {random({1, 2, 2}, 3)}, windows(5, 1, 2, 4));
   s.add("one", {random({1, 1, 1}, 4)}, windows(1, 1, 0, 1));
   s.add("empty sequence", {random({1, 0, 2}, 5)}, windows(3, 1, 1, 2));
-  s.add("no step", {random({1, 4, 2}, 6)}, windows(3, 1, 1, 0));
-  s.samples.back().zero_gradient = true;
+  s.add("no step", {random({1, 4, 2}, 6)}, windows(3, 1, 1, 0)).zero_gradient = true;
   s.large("many", {random({4, 120, 33}, 7)}, windows(3, 2, 1, 60));
   s.error("two axes", {random({4, 2}, 1)}, windows(3, 1, 1, 4));
   s.error("kernel of 0", {random({1, 4, 2}, 1)}, windows(0, 1, 1, 4));
@@ -205,8 +202,7 @@ OpSamples conv1d_samples() {
   s.add("same length", inputs({2, 5, 3}, 4, 3), conv(1, 1, 5));
   s.add("strided", inputs({1, 7, 2}, 3, 4), conv(2, 1, 3));
   s.add("one", inputs({1, 1, 1}, 1, 1), conv(1, 0, 1));
-  s.add("no sequence", inputs({0, 4, 2}, 2, 3), conv(1, 1, 4));
-  s.samples.back().zero_gradient = true;
+  s.add("no sequence", inputs({0, 4, 2}, 2, 3), conv(1, 1, 4)).zero_gradient = true;
   s.large("many", inputs({5, 90, 20}, 40, 3), conv(1, 1, 90));
   s.error("c differs", {random({1, 4, 2}, 1), random({3, 3, 3}, 2), random({3}, 3)}, conv(1, 1, 4));
   s.error("o differs", {random({1, 4, 2}, 1), random({3, 2, 3}, 2), random({2}, 3)}, conv(1, 1, 4));

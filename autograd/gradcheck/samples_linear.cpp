@@ -76,10 +76,10 @@ void add_matmul(Table& t) {
       s.add("batches" + how, factors(2, 2, 3, 4, 5, ta, tb, rng), matmul_with(ta, tb));
       s.add("shared second" + how, factors(2, -1, 3, 1, 2, ta, tb, rng), matmul_with(ta, tb));
       s.add("shared first" + how, factors(-1, 2, 1, 3, 2, ta, tb, rng), matmul_with(ta, tb));
-      s.add("no m" + how, factors(-1, -1, 0, 3, 2, ta, tb, rng), matmul_with(ta, tb));
-      s.samples.back().zero_gradient = true;
-      s.add("empty batch" + how, factors(0, -1, 2, 3, 2, ta, tb, rng), matmul_with(ta, tb));
-      s.samples.back().zero_gradient = true;
+      s.add("no m" + how, factors(-1, -1, 0, 3, 2, ta, tb, rng), matmul_with(ta, tb))
+          .zero_gradient = true;
+      s.add("empty batch" + how, factors(0, -1, 2, 3, 2, ta, tb, rng), matmul_with(ta, tb))
+          .zero_gradient = true;
       s.add("no k" + how, factors(2, 2, 3, 0, 2, ta, tb, rng), matmul_with(ta, tb));
       s.large("large" + how, factors(-1, -1, 130, 270, 141, ta, tb, rng), matmul_with(ta, tb));
     }

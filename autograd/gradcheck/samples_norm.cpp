@@ -43,8 +43,7 @@ void add_norm(Table& t) {
   t.push_back(samples_for<LayerNorm>());
   const Build layer = [](Args x) { return layer_norm(x[0], x[1], x[2]); };
   affine_samples(t.back(), layer, 1);
-  t.back().add("no row", affine_inputs({0, 3}, 1), layer);
-  t.back().samples.back().zero_gradient = true;
+  t.back().add("no row", affine_inputs({0, 3}, 1), layer).zero_gradient = true;
 
   t.push_back(samples_for<InstanceNorm>());
   OpSamples& s = t.back();
@@ -52,8 +51,7 @@ void add_norm(Table& t) {
   for (const Shape& x :
        {Shape{2, 5, 3}, Shape{1, 4, 1}, Shape{0, 4, 3}, Shape{2, 3, 0}, Shape{3, 2, 17}})
     s.add(x.str(), {random(x, 53)}, instance);
-  s.add("one point", {random({2, 1, 3}, 54)}, instance);
-  s.samples.back().zero_gradient = true;
+  s.add("one point", {random({2, 1, 3}, 54)}, instance).zero_gradient = true;
   s.large("many points", {random({3, 1100, 9}, 55)}, instance);
   s.large("one sample of many points", {random({1, 1100, 19}, 56)}, instance);
   s.error("two axes", {random({4, 3}, 1)}, instance);

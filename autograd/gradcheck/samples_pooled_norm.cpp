@@ -49,12 +49,10 @@ void add_pooled_norm(Table& t) {
   };
   add_variant(s, "", plain);
   add_variant(s, ", relu", with_relu);
-  s.add("no channel", inputs_of(2, 3, 2, 0, 1), plain);
-  s.samples.back().zero_gradient = true;
+  s.add("no channel", inputs_of(2, 3, 2, 0, 1), plain).zero_gradient = true;
   std::vector<Tensor> inputs = inputs_of(2, 3, 2, 2, 87);
   inputs[4] = f64({2}, {-9, -9});
-  s.add("all clipped", inputs, with_relu);
-  s.samples.back().zero_gradient = true;
+  s.add("all clipped", inputs, with_relu).zero_gradient = true;
   add_kinks(s, plain, with_relu);
   s.error("i differs",
           {random({2, 3, 2}, 1), random({4, 3}, 2), random({4}, 3), random({4}, 4), random({4}, 5)},

@@ -10,8 +10,8 @@ using AxisOp = std::function<Var(const Var&, int)>;
 void along_axis(OpSamples& s, const AxisOp& op, bool empty_ok, bool flat_if_single) {
   const auto on = [op](int axis) { return Build([op, axis](Args x) { return op(x[0], axis); }); };
   const auto add = [&](const Shape& shape, int axis) {
-    s.add(shape.str() + " axis " + std::to_string(axis), {random(shape, 41)}, on(axis));
-    s.samples.back().zero_gradient = flat_if_single && shape[axis] == 1;
+    s.add(shape.str() + " axis " + std::to_string(axis), {random(shape, 41)}, on(axis))
+        .zero_gradient = flat_if_single && shape[axis] == 1;
   };
   add({3, 4}, 0);
   add({3, 4}, 1);
@@ -29,10 +29,8 @@ void along_axis(OpSamples& s, const AxisOp& op, bool empty_ok, bool flat_if_sing
   }
   // Numbers up to 26; partial sums round at 6e-8 of their size. All of these ops stay below 2.5e-7
   // of the largest result.
-  s.large("many rows", {distinct({1001, 51})}, on(1));
-  s.samples.back().f32_tolerance = 2e-6;
-  s.large("many columns", {distinct({1203, 40})}, on(0));
-  s.samples.back().f32_tolerance = 2e-6;
+  s.large("many rows", {distinct({1001, 51})}, on(1)).f32_tolerance = 2e-6;
+  s.large("many columns", {distinct({1203, 40})}, on(0)).f32_tolerance = 2e-6;
   s.error("no such axis", {random({2, 3}, 1)}, on(2));
   s.error("no such axis from the end", {random({2, 3}, 1)}, on(-3));
   s.error("integers", {i32({2}, {1, 2})}, on(0));

@@ -17,10 +17,8 @@ void add_rnn(Table& table) {
   Rng rng(RngKey{23, 0});
   s.add("three steps", gru_inputs(3, 2, 4, 3, rng), build);
   s.add("one of everything", gru_inputs(1, 1, 1, 1, rng), build);
-  s.add("no step", gru_inputs(0, 2, 3, 2, rng), build);
-  s.samples.back().zero_gradient = true;
-  s.add("no sequence", gru_inputs(3, 0, 3, 2, rng), build);
-  s.samples.back().zero_gradient = true;
+  s.add("no step", gru_inputs(0, 2, 3, 2, rng), build).zero_gradient = true;
+  s.add("no sequence", gru_inputs(3, 0, 3, 2, rng), build).zero_gradient = true;
   s.add("no input number", gru_inputs(2, 2, 0, 2, rng), build);
   s.large("many sequences", gru_inputs(3, 290, 5, 32, rng), build);
   s.large("a frame: weights read as they lie", gru_inputs(1, 2, 69, 320, rng), build);

@@ -84,8 +84,7 @@ OpSamples fk_samples() {
   s.add("fork", fk_inputs(1, 5, rng), tree({-1, 0, 0, 1, 1}));
   s.add("one joint", fk_inputs(2, 1, rng), tree({-1}));
   s.add("two roots", fk_inputs(2, 4, rng), tree({-1, 0, -1, 2}));
-  s.add("no joint", fk_inputs(2, 0, rng), tree({}));
-  s.samples.back().zero_gradient = true;
+  s.add("no joint", fk_inputs(2, 0, rng), tree({})).zero_gradient = true;
   s.add("no frame", fk_inputs(0, 3, rng), tree({-1, 0, 1}));
   s.large("many frames", fk_inputs(50, 5, rng), tree({-1, 0, 1, 1, 3}));
   const auto broken = [&](const std::string& title, size_t which, const Shape& shape) {
@@ -125,10 +124,8 @@ OpSamples lbs_samples() {
   Rng rng(RngKey{27, 0});
   s.add("two bodies", lbs_inputs(2, 4, 3, rng), build);
   s.add("one of everything", lbs_inputs(1, 1, 1, rng), build);
-  s.add("no vertex", lbs_inputs(2, 0, 3, rng), build);
-  s.samples.back().zero_gradient = true;
-  s.add("no joint", lbs_inputs(1, 2, 0, rng), build);
-  s.samples.back().zero_gradient = true;
+  s.add("no vertex", lbs_inputs(2, 0, 3, rng), build).zero_gradient = true;
+  s.add("no joint", lbs_inputs(1, 2, 0, rng), build).zero_gradient = true;
   s.add("no body", lbs_inputs(0, 2, 3, rng), build);
   s.large("many vertices", lbs_inputs(4, 300, 5, rng), build);
   const auto broken = [&](const std::string& title, size_t which, const Shape& shape) {

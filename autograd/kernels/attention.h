@@ -27,7 +27,6 @@ struct NeighbourAttentionInputs {
 
 /// out [n, v, d]; weights [n, v, k, d] keeps the softmax for the backward pass (null: nobody asks).
 struct NeighbourAttentionArgs {
-  static constexpr std::string_view name = "neighbour_attention";
   NeighbourAttentionInputs in;
   Tensor& out;
   Tensor* weights;
@@ -35,7 +34,6 @@ struct NeighbourAttentionArgs {
 
 /// Gradients of the inputs; g_xyz is null where none is wanted.
 struct NeighbourAttentionGradArgs {
-  static constexpr std::string_view name = "neighbour_attention_grad";
   NeighbourAttentionInputs in;
   const Tensor& weights;
   const Tensor& y;

@@ -26,7 +26,6 @@ struct OffsetField {
 /// whose sign no point of a tile changes are affine in x there and need no product (exactly: only
 /// the order of sums differs from the plain network).
 struct DeformArgs {
-  static constexpr std::string_view name = "deform";
   const Tensor& points;       ///< [t, 3, kDeformTile]
   const Tensor& weights;      ///< [t, j, kDeformTile]
   const Tensor& order;        ///< i32 [t, kDeformTile]; a place may occur twice in one tile

@@ -23,7 +23,6 @@ enum class Unary {
 };
 /// out = f(x); `alpha` is the slope of leaky_relu, the factor of scale, the addend of add_scalar.
 struct UnaryArgs {
-  static constexpr std::string_view name = "unary";
   Unary op;
   const Tensor& x;
   Tensor& out;
@@ -49,7 +48,6 @@ constexpr Derivative derivative(Unary op) {
 }
 /// out = gy * f'(x). At kinks (relu, abs at 0) the derivative is 0.
 struct UnaryGradArgs {
-  static constexpr std::string_view name = "unary_grad";
   Unary op;
   const Tensor* kept;  ///< x or y = f(x), as derivative(op) says; null where it needs neither
   const Tensor& gy;
@@ -60,7 +58,6 @@ struct UnaryGradArgs {
 enum class Binary { add, sub, mul, div };
 /// out = f(a, b), numpy broadcasting; out has the broadcast shape.
 struct BinaryArgs {
-  static constexpr std::string_view name = "binary";
   Binary op;
   const Tensor& a;
   const Tensor& b;
@@ -68,14 +65,12 @@ struct BinaryArgs {
 };
 /// out += a (same shape): accumulation of gradients.
 struct AccumulateArgs {
-  static constexpr std::string_view name = "accumulate";
   const Tensor& a;
   Tensor& out;
 };
 /// out[i] = keep(i) ? x[i] / (1 - p) : 0, keep a function of (key, i) (see rng.h); relu(x) for x on
 /// request.
 struct DropoutArgs {
-  static constexpr std::string_view name = "dropout";
   const Tensor& x;
   Tensor& out;
   double p;
@@ -85,7 +80,6 @@ struct DropoutArgs {
 /// Gradient of DropoutArgs with relu, from its result y, whose zeros are those of both:
 /// out = y > 0 ? gy / (1 - p) : 0.
 struct ReluDropoutGradArgs {
-  static constexpr std::string_view name = "relu_dropout_grad";
   const Tensor& y;
   const Tensor& gy;
   Tensor& out;
@@ -93,13 +87,11 @@ struct ReluDropoutGradArgs {
 };
 /// out = x repeated to out's shape (numpy broadcasting).
 struct ExpandArgs {
-  static constexpr std::string_view name = "expand";
   const Tensor& x;
   Tensor& out;
 };
 /// out[0] = 1 if any element of x is NaN or infinite, else 0.
 struct NonFiniteArgs {
-  static constexpr std::string_view name = "non_finite";
   const Tensor& x;
   Tensor& out;
 };

@@ -14,10 +14,10 @@ Backend& backend(Device device) {
   return cpu_backend();
 }
 
-Backend::Function Backend::find(std::string_view kernel) const {
-  const auto it = table_.find(kernel);
+Backend::Function Backend::find(std::type_index args) const {
+  const auto it = table_.find(args);
   if (it == table_.end())
-    throw Error("kernel '" + std::string(kernel) + "' is not on " + std::string(name()));
+    throw Error(std::string("no kernel for ") + args.name() + " on " + std::string(name()));
   return it->second;
 }
 

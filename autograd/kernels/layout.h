@@ -10,28 +10,24 @@ namespace restage {
 /// For every o: out[o*out_stride + out_offset + i] = x[o*x_stride + x_offset + i], i < count.
 /// Slices and concatenation along one axis are both of this kind.
 struct CopyBlocksArgs {
-  static constexpr std::string_view name = "copy_blocks";
   const Tensor& x;
   Tensor& out;
   int64_t outer, count, x_stride, x_offset, out_stride, out_offset;
 };
 /// out axis i = x axis order[i].
 struct PermuteArgs {
-  static constexpr std::string_view name = "permute";
   const Tensor& x;
   Tensor& out;
   std::array<int, Shape::kMaxRank> order;
 };
 /// x [n, v, c], index i32 [n, m] -> out [n, m, c].
 struct GatherArgs {
-  static constexpr std::string_view name = "gather";
   const Tensor& x;
   const Tensor& index;
   Tensor& out;
 };
 /// out [n, v, c] = sum of gy rows [n, m, c] by index, in order of m.
 struct ScatterAddArgs {
-  static constexpr std::string_view name = "scatter_add";
   const Tensor& gy;
   const Tensor& index;
   Tensor& out;
@@ -39,14 +35,12 @@ struct ScatterAddArgs {
 /// Windows of a sequence: x [n, l, c] -> out [n, steps, c * k], channel-major (PyTorch's conv
 /// layout); positions outside [0, l) are 0; step s starts at s * stride - pad_left.
 struct UnfoldArgs {
-  static constexpr std::string_view name = "unfold";
   const Tensor& x;
   Tensor& out;
   int64_t k, stride, pad_left;
 };
 /// The transpose of unfold: out [n, l, c] = sums of gy [n, steps, c * k].
 struct FoldArgs {
-  static constexpr std::string_view name = "fold";
   const Tensor& gy;
   Tensor& out;
   int64_t k, stride, pad_left;

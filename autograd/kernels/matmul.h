@@ -18,7 +18,6 @@ enum class Activation { none, relu };
 /// out[b] = act(op(a[b]) op(bm[b]) + bias) (+ out if accumulate); a [batch?, m, k], bm [batch?, k,
 /// n], both transposed on request; a matrix without batch axis is shared. bias [n] or null.
 struct MatmulArgs {
-  static constexpr std::string_view name = "matmul";
   const Tensor& a;
   const Tensor& b;
   Tensor& out;

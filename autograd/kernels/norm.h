@@ -15,7 +15,6 @@ enum class Affine {
 /// out = (x - mean) * rstd * scale + shift, biased variance; mean, rstd [outer, inner] are outputs,
 /// always f64: over few rows the gradient all but cancels and needs them exactly.
 struct NormArgs {
-  static constexpr std::string_view name = "norm";
   const Tensor& x;
   const Tensor* scale;
   const Tensor* shift;
@@ -28,7 +27,6 @@ struct NormArgs {
 };
 /// Gradients of all three inputs; out is the gradient of x. g_scale, g_shift null when not wanted.
 struct NormGradArgs {
-  static constexpr std::string_view name = "norm_grad";
   const Tensor& x;
   const Tensor* scale;
   const Tensor& mean;

@@ -8,7 +8,6 @@ namespace restage {
 /// query [n, m, 3], points [n, v, 3] -> out i32 [n, m, k]: the k nearest points, nearest first,
 /// ties to the lower index (spec 2.2).
 struct KnnArgs {
-  static constexpr std::string_view name = "knn";
   const Tensor& query;
   const Tensor& points;
   Tensor& out;
@@ -16,14 +15,12 @@ struct KnnArgs {
 /// points [n, v, 3] -> out i32 [n, m]: farthest point sampling, started at the point farthest from
 /// the centroid, ties to the lower index (spec 2.2).
 struct FpsArgs {
-  static constexpr std::string_view name = "fps";
   const Tensor& points;
   Tensor& out;
 };
 /// score, value [p, k, d] -> out [p, d] = sum over k of softmax_k(score * scale) * value;
 /// weights [p, k, d] keeps the softmax.
 struct AttentionPoolArgs {
-  static constexpr std::string_view name = "attention_pool";
   const Tensor& score;
   const Tensor& value;
   Tensor& out;
@@ -32,7 +29,6 @@ struct AttentionPoolArgs {
 };
 /// Gradients of score and value (out).
 struct AttentionPoolGradArgs {
-  static constexpr std::string_view name = "attention_pool_grad";
   const Tensor& value;
   const Tensor& weights;
   const Tensor& y;

@@ -14,7 +14,6 @@ namespace restage {
 /// over all points; mean, variance, rstd [o] are f64. x [n, v, i], weight [o, i]; bias, scale,
 /// shift [o].
 struct PooledNormArgs {
-  static constexpr std::string_view name = "pooled_norm";
   const Tensor& x;
   const Tensor& weight;
   const Tensor& bias;
@@ -32,7 +31,6 @@ struct PooledNormArgs {
 };
 /// Gradients of x (out), weight, scale and shift; that of the bias is zero. y: the forward result.
 struct PooledNormGradArgs {
-  static constexpr std::string_view name = "pooled_norm_grad";
   const Tensor& centred;
   const Tensor& weight;
   const Tensor& scale;

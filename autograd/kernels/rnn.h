@@ -11,7 +11,6 @@ namespace restage {
 /// -> out [t, n, h]; gates [t, n, 4h], or null, keeps r, z, n and W_hn h + b_hn of every step for
 /// the backward pass.
 struct GruArgs {
-  static constexpr std::string_view name = "gru";
   const Tensor& x;
   const Tensor& h0;
   const Tensor& w_ih;
@@ -25,7 +24,6 @@ struct GruArgs {
 /// gy [t, n, h] and y = out of GruArgs -> g_gi [t, n, 3h], g_gh [t, n, 3h] (gradients of W_i x +
 /// b_i and of W_h h + b_h), out [n, h] = gradient of h0.
 struct GruGradArgs {
-  static constexpr std::string_view name = "gru_grad";
   const Tensor& gates;
   const Tensor& y;
   const Tensor& h0;

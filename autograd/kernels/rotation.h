@@ -11,13 +11,11 @@ enum class RotationForm { sixd, quaternion, axis_angle };
 
 /// x [n, 6 | 4 | 3] -> out [n, 9] (row-major 3x3).
 struct ToMatrixArgs {
-  static constexpr std::string_view name = "to_matrix";
   RotationForm form;
   const Tensor& x;
   Tensor& out;
 };
 struct ToMatrixGradArgs {
-  static constexpr std::string_view name = "to_matrix_grad";
   RotationForm form;
   const Tensor& x;
   const Tensor& gy;
@@ -25,14 +23,12 @@ struct ToMatrixGradArgs {
 };
 /// x [n, 9] -> out [n, 4] (w >= 0) or [n, 3] (angle in [0, pi]). No gradient.
 struct FromMatrixArgs {
-  static constexpr std::string_view name = "from_matrix";
   RotationForm form;
   const Tensor& x;
   Tensor& out;
 };
 /// out = angle of (x, y) in (-pi, pi], computed in double; y, x and out have one shape.
 struct Atan2Args {
-  static constexpr std::string_view name = "atan2";
   const Tensor& y;
   const Tensor& x;
   Tensor& out;
@@ -40,7 +36,6 @@ struct Atan2Args {
 /// Gradients of y (out) and x: gy x / r^2 and -gy y / r^2, r^2 = x^2 + y^2; zero within 1e-6 of the
 /// origin, where the angle means nothing.
 struct Atan2GradArgs {
-  static constexpr std::string_view name = "atan2_grad";
   const Tensor& y;
   const Tensor& x;
   const Tensor& gy;
@@ -49,7 +44,6 @@ struct Atan2GradArgs {
 };
 /// local [n, j, 9], rest [n, j, 3], root [n, 3] -> out [n, j, 12] = rows of [G | P].
 struct FkArgs {
-  static constexpr std::string_view name = "fk";
   const Tensor& local;
   const Tensor& rest;
   const Tensor& root;
@@ -58,7 +52,6 @@ struct FkArgs {
 };
 /// out is the gradient of local.
 struct FkGradArgs {
-  static constexpr std::string_view name = "fk_grad";
   const Tensor& local;
   const Tensor& rest;
   const Tensor& transforms;
@@ -70,7 +63,6 @@ struct FkGradArgs {
 };
 /// points [n, v, 3], weights [n, v, j], transforms [n, j, 12], rest [n, j, 3] -> out [n, v, 3].
 struct LbsArgs {
-  static constexpr std::string_view name = "lbs";
   const Tensor& points;
   const Tensor& weights;
   const Tensor& transforms;
@@ -79,7 +71,6 @@ struct LbsArgs {
 };
 /// out is the gradient of points.
 struct LbsGradArgs {
-  static constexpr std::string_view name = "lbs_grad";
   const Tensor& points;
   const Tensor& weights;
   const Tensor& transforms;

@@ -7,7 +7,6 @@ namespace restage {
 
 /// Adam exactly as PyTorch's (spec 7); `step` counts from 1; v_max is the AMSGrad memory or null.
 struct AdamArgs {
-  static constexpr std::string_view name = "adam";
   const Tensor& gradient;
   Tensor& out;  ///< the parameter
   Tensor& m;
@@ -19,7 +18,6 @@ struct AdamArgs {
 
 /// out [1], f64: the sum of the squares of x, in double, in an order that the size alone decides.
 struct SquaredNormArgs {
-  static constexpr std::string_view name = "squared_norm";
   const Tensor& x;
   Tensor& out;
 };

@@ -38,11 +38,10 @@ void NeighbourAttention::check(Inputs x) const {
 }
 
 Tensor NeighbourAttention::forward(Inputs x, Saved& saved) const {
-  Tensor y = Tensor::empty(x[1].shape(), x[1].dtype(), x[1].device());
+  Tensor y = empty_like(x[1]);
   Tensor weights;
   if (saved.on())
-    weights = Tensor::empty({x[1].size(0), x[1].size(1), index.size(2), x[1].size(2)}, x[1].dtype(),
-                            x[1].device());
+    weights = empty_like(x[1], {x[1].size(0), x[1].size(1), index.size(2), x[1].size(2)});
   launch(
       NeighbourAttentionArgs{kernel_inputs(*this, x.data()), y, saved.on() ? &weights : nullptr});
   saved.keep({x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], weights, y, index});
@@ -52,7 +51,7 @@ Tensor NeighbourAttention::forward(Inputs x, Saved& saved) const {
 Grads NeighbourAttention::backward(const Saved& saved, const Tensor& gy, Needs needs) const {
   Grads g(9);
   for (size_t i = 0; i < 8; ++i)
-    if (i > 0 || needs[0]) g[i] = Tensor::empty(saved[i].shape(), gy.dtype(), gy.device());
+    if (i > 0 || needs[0]) g[i] = empty_like(gy, saved[i].shape());
   launch(NeighbourAttentionGradArgs{kernel_inputs(*this, &saved[0]), saved[8], saved[9], gy,
                                     needs[0] ? &g[0] : nullptr, g[1], g[2], g[3], g[4], g[5], g[6],
                                     g[7]});

@@ -6,7 +6,7 @@ namespace restage {
 namespace {
 
 Tensor negative(const Tensor& t) {
-  Tensor out = Tensor::empty(t.shape(), t.dtype(), t.device());
+  Tensor out = empty_like(t);
   launch(UnaryArgs{Unary::neg, t, out});
   return out;
 }
@@ -27,7 +27,7 @@ Tensor sum_to(const Tensor& t, const Shape& shape) {
     while (from > 0 && summed(from - 1)) --from;
     Shape next = current.shape();
     for (int i = from; i <= axis; ++i) next.set(i, 1);
-    Tensor out = Tensor::empty(next, t.dtype(), t.device());
+    Tensor out = empty_like(t, next);
     launch(SumArgs{current, out, current.shape().product(0, from),
                    current.shape().product(from, axis + 1),
                    current.shape().product(axis + 1, t.rank())});
@@ -39,32 +39,10 @@ Tensor sum_to(const Tensor& t, const Shape& shape) {
 
 Tensor binary(Binary op, const Tensor& a, const Tensor& b) {
   bool ok = true;
-  Tensor out = Tensor::empty(broadcast_shape(a.shape(), b.shape(), &ok), a.dtype(), a.device());
+  Tensor out = empty_like(a, broadcast_shape(a.shape(), b.shape(), &ok));
   if (!ok) shape_error(name_of(op), "a[...], b[...]", std::array{a, b}, "shapes do not broadcast");
   launch(BinaryArgs{op, a, b, out});
   return out;
-}
-
-template <Unary U>
-void UnaryOp<U>::check(Inputs x) const {
-  require_floats(name, letters, x);
-}
-
-template <Unary U>
-Tensor UnaryOp<U>::forward(Inputs x, Saved& saved) const {
-  Tensor y = Tensor::empty(x[0].shape(), x[0].dtype(), x[0].device());
-  launch(UnaryArgs{U, x[0], y, alpha});
-  if constexpr (derivative(U) == Derivative::of_x) saved.keep({x[0]});
-  if constexpr (derivative(U) == Derivative::of_y) saved.keep({y});
-  return y;
-}
-
-template <Unary U>
-Grads UnaryOp<U>::backward(const Saved& saved, const Tensor& gy, Needs) const {
-  Tensor gx = Tensor::empty(gy.shape(), gy.dtype(), gy.device());
-  const Tensor* kept = derivative(U) == Derivative::of_nothing ? nullptr : &saved[0];
-  launch(UnaryGradArgs{U, kept, gy, gx, alpha});
-  return {gx};
 }
 
 template <Binary B>
@@ -112,7 +90,7 @@ void Expand::check(Inputs x) const {
 }
 
 Tensor Expand::forward(Inputs x, Saved&) const {
-  Tensor y = Tensor::empty(shape, x[0].dtype(), x[0].device());
+  Tensor y = empty_like(x[0], shape);
   launch(ExpandArgs{x[0], y});
   return y;
 }
@@ -127,14 +105,14 @@ void Dropout::check(Inputs x) const {
 }
 
 Tensor Dropout::forward(Inputs x, Saved& saved) const {
-  Tensor y = Tensor::empty(x[0].shape(), x[0].dtype(), x[0].device());
+  Tensor y = empty_like(x[0]);
   launch(DropoutArgs{x[0], y, p, key, relu});
   if (relu) saved.keep({y});
   return y;
 }
 
 Grads Dropout::backward(const Saved& saved, const Tensor& gy, Needs) const {
-  Tensor gx = Tensor::empty(gy.shape(), gy.dtype(), gy.device());
+  Tensor gx = empty_like(gy);
   if (relu) {
     launch(ReluDropoutGradArgs{saved[0], gy, gx, p});
   } else {
@@ -143,19 +121,6 @@ Grads Dropout::backward(const Saved& saved, const Tensor& gy, Needs) const {
   return {gx};
 }
 
-template struct UnaryOp<Unary::neg>;
-template struct UnaryOp<Unary::exp>;
-template struct UnaryOp<Unary::log>;
-template struct UnaryOp<Unary::sqrt>;
-template struct UnaryOp<Unary::square>;
-template struct UnaryOp<Unary::abs>;
-template struct UnaryOp<Unary::sigmoid>;
-template struct UnaryOp<Unary::tanh>;
-template struct UnaryOp<Unary::relu>;
-template struct UnaryOp<Unary::leaky_relu>;
-template struct UnaryOp<Unary::softplus>;
-template struct UnaryOp<Unary::scale>;
-template struct UnaryOp<Unary::add_scalar>;
 template struct BinaryOp<Binary::add>;
 template struct BinaryOp<Binary::sub>;
 template struct BinaryOp<Binary::mul>;

@@ -23,9 +23,20 @@ struct UnaryOp {
   static constexpr const char* name = name_of(U);
   static constexpr const char* letters = "x[...]";
   double alpha = 0;
-  void check(Inputs x) const;
-  Tensor forward(Inputs x, Saved& saved) const;
-  Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
+  void check(Inputs x) const { require_floats(name, letters, x); }
+  Tensor forward(Inputs x, Saved& saved) const {
+    Tensor y = empty_like(x[0]);
+    launch(UnaryArgs{U, x[0], y, alpha});
+    if constexpr (derivative(U) == Derivative::of_x) saved.keep({x[0]});
+    if constexpr (derivative(U) == Derivative::of_y) saved.keep({y});
+    return y;
+  }
+  Grads backward(const Saved& saved, const Tensor& gy, Needs) const {
+    Tensor gx = empty_like(gy);
+    const Tensor* kept = derivative(U) == Derivative::of_nothing ? nullptr : &saved[0];
+    launch(UnaryGradArgs{U, kept, gy, gx, alpha});
+    return {gx};
+  }
 };
 
 /// y = f(a, b), numpy broadcasting.

@@ -36,8 +36,8 @@ void Permute::check(Inputs x) const {
   std::array<bool, Shape::kMaxRank> seen{};
   bool ok = static_cast<int>(order.size()) == x[0].rank();
   for (const int axis : order) {
-    if (axis < 0 || axis >= x[0].rank() || seen[static_cast<size_t>(axis)]) ok = false;
-    if (axis >= 0 && axis < Shape::kMaxRank) seen[static_cast<size_t>(axis)] = true;
+    if (axis < 0 || axis >= x[0].rank() || seen[axis]) ok = false;
+    if (axis >= 0 && axis < Shape::kMaxRank) seen[axis] = true;
   }
   if (!ok) shape_error(name, letters, x, "order must name every axis once");
   require_floats(name, letters, x);
@@ -50,15 +50,14 @@ Tensor Permute::forward(Inputs x, Saved&) const {
     shape.push_back(x[0].size(order[i]));
     axes[i] = order[i];
   }
-  Tensor y = Tensor::empty(shape, x[0].dtype(), x[0].device());
+  Tensor y = empty_like(x[0], shape);
   launch(PermuteArgs{x[0], y, axes});
   return y;
 }
 
 Grads Permute::backward(const Saved&, const Tensor& gy, Needs) const {
   Permute inverse{order};
-  for (size_t i = 0; i < order.size(); ++i)
-    inverse.order[static_cast<size_t>(order[i])] = static_cast<int>(i);
+  for (size_t i = 0; i < order.size(); ++i) inverse.order[order[i]] = static_cast<int>(i);
   Saved nothing;
   return {inverse.forward({&gy, 1}, nothing)};
 }
@@ -74,7 +73,7 @@ void Slice::check(Inputs x) const {
 Tensor Slice::forward(Inputs x, Saved&) const {
   Shape shape = x[0].shape();
   shape.set(axis, to - from);
-  Tensor y = Tensor::empty(shape, x[0].dtype(), x[0].device());
+  Tensor y = empty_like(x[0], shape);
   copy_axis(x[0], y, axis, from, 0, to - from);
   return y;
 }
@@ -103,7 +102,7 @@ Tensor Concat::forward(Inputs x, Saved&) const {
   int64_t total = 0;
   for (const Tensor& t : x) total += t.size(axis);
   shape.set(axis, total);
-  Tensor y = Tensor::empty(shape, x[0].dtype(), x[0].device());
+  Tensor y = empty_like(x[0], shape);
   int64_t at = 0;
   for (const Tensor& t : x) {
     copy_axis(t, y, axis, 0, at, t.size(axis));
@@ -118,7 +117,7 @@ Grads Concat::backward(const Saved& saved, const Tensor& gy, Needs needs) const 
   for (size_t i = 0; i < needs.size(); ++i) {
     const int64_t n = saved.shape(i)[axis];
     if (needs[i]) {
-      g[i] = Tensor::empty(saved.shape(i), gy.dtype(), gy.device());
+      g[i] = empty_like(gy, saved.shape(i));
       copy_axis(gy, g[i], axis, at, 0, n);
     }
     at += n;
@@ -148,7 +147,7 @@ void Gather::check(Inputs x) const {
 Tensor Gather::forward(Inputs x, Saved& saved) const {
   Shape shape = index.shape();
   shape.push_back(x[0].size(2));
-  Tensor y = Tensor::empty(shape, x[0].dtype(), x[0].device());
+  Tensor y = empty_like(x[0], shape);
   const Tensor flat = index.reshape({index.size(0), -1});
   launch(GatherArgs{x[0], flat, y});
   saved.keep({flat});
@@ -156,7 +155,7 @@ Tensor Gather::forward(Inputs x, Saved& saved) const {
 }
 
 Grads Gather::backward(const Saved& saved, const Tensor& gy, Needs) const {
-  Tensor gx = Tensor::empty(saved.shape(0), gy.dtype(), gy.device());
+  Tensor gx = empty_like(gy, saved.shape(0));
   launch(ScatterAddArgs{gy, saved[0], gx});
   return {gx};
 }
@@ -169,14 +168,14 @@ void ScatterAdd::check(Inputs x) const {
 }
 
 Tensor ScatterAdd::forward(Inputs x, Saved& saved) const {
-  Tensor y = Tensor::empty({x[0].size(0), rows, x[0].size(2)}, x[0].dtype(), x[0].device());
+  Tensor y = empty_like(x[0], {x[0].size(0), rows, x[0].size(2)});
   launch(ScatterAddArgs{x[0], index, y});
   saved.keep({index});
   return y;
 }
 
 Grads ScatterAdd::backward(const Saved& saved, const Tensor& gy, Needs) const {
-  Tensor gx = Tensor::empty(saved.shape(0), gy.dtype(), gy.device());
+  Tensor gx = empty_like(gy, saved.shape(0));
   launch(GatherArgs{gy, saved[0], gx});
   return {gx};
 }
@@ -189,13 +188,13 @@ void Unfold::check(Inputs x) const {
 }
 
 Tensor Unfold::forward(Inputs x, Saved&) const {
-  Tensor y = Tensor::empty({x[0].size(0), steps, x[0].size(2) * k}, x[0].dtype(), x[0].device());
+  Tensor y = empty_like(x[0], {x[0].size(0), steps, x[0].size(2) * k});
   launch(UnfoldArgs{x[0], y, k, stride, pad_left});
   return y;
 }
 
 Grads Unfold::backward(const Saved& saved, const Tensor& gy, Needs) const {
-  Tensor gx = Tensor::empty(saved.shape(0), gy.dtype(), gy.device());
+  Tensor gx = empty_like(gy, saved.shape(0));
   launch(FoldArgs{gy, gx, k, stride, pad_left});
   return {gx};
 }

@@ -12,7 +12,7 @@ Tensor product(const Tensor& a, const Tensor& b, bool ta, bool tb, MatmulPrecisi
   if (a.rank() == 3 || b.rank() == 3) shape.push_back(a.rank() == 3 ? a.size(0) : b.size(0));
   shape.push_back(a.size(ta ? -1 : -2));
   shape.push_back(b.size(tb ? -2 : -1));
-  Tensor y = Tensor::empty(shape, a.dtype(), a.device());
+  Tensor y = empty_like(a, shape);
   launch(MatmulArgs{
       .a = a, .b = b, .out = y, .transpose_a = ta, .transpose_b = tb, .precision = precision});
   return y;
@@ -37,7 +37,7 @@ Tensor LinearOp::forward(Inputs x, Saved& saved) const {
   const Tensor flat = x[0].reshape({x[0].shape().product(0, x[0].rank() - 1), x[0].size(-1)});
   Shape shape = x[0].shape();
   shape.set(-1, x[1].size(0));
-  Tensor y = Tensor::empty(shape, x[0].dtype(), x[0].device());
+  Tensor y = empty_like(x[0], shape);
   Tensor rows = y.reshape({flat.size(0), x[1].size(0)});
   launch(MatmulArgs{.a = flat,
                     .b = x[1],
@@ -56,7 +56,7 @@ Grads LinearOp::backward(const Saved& saved, const Tensor& gy, Needs needs) cons
   const int64_t rows = x.product(0, x.rank() - 1), i = saved.shape(1)[1], o = saved.shape(1)[0];
   Tensor g = gy;
   if (activation == Activation::relu) {
-    g = Tensor::empty(gy.shape(), gy.dtype(), gy.device());
+    g = empty_like(gy);
     launch(UnaryGradArgs{Unary::relu, &saved[2], gy, g});
   }
   g = g.reshape({rows, o});
@@ -64,7 +64,7 @@ Grads LinearOp::backward(const Saved& saved, const Tensor& gy, Needs needs) cons
   if (needs[0]) out[0] = product(g, saved[1], false, false, precision).reshape(x);
   if (needs[1]) out[1] = product(g, saved[0].reshape({rows, i}), true, false, precision);
   if (needs.size() > 2 && needs[2]) {
-    out[2] = Tensor::empty({o}, gy.dtype(), gy.device());
+    out[2] = empty_like(gy, {o});
     launch(SumArgs{g, out[2], 1, rows, o});
   }
   return out;

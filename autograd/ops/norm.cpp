@@ -11,7 +11,7 @@ struct Layout {
 Tensor normalise(Inputs x, Saved& saved, const Layout& l, double eps, Tensor* mean_out,
                  Tensor* rstd_out) {
   const bool affine = l.affine != Affine::none;
-  Tensor y = Tensor::empty(x[0].shape(), x[0].dtype(), x[0].device());
+  Tensor y = empty_like(x[0]);
   Tensor mean = Tensor::empty({l.outer, l.inner}, DType::f64, x[0].device());
   Tensor rstd = Tensor::empty({l.outer, l.inner}, DType::f64, x[0].device());
   launch(NormArgs{x[0], affine ? &x[1] : nullptr, affine ? &x[2] : nullptr, y, mean, rstd, l.outer,
@@ -31,10 +31,10 @@ Tensor normalise(Inputs x, Saved& saved, const Layout& l, double eps, Tensor* me
 Grads normalise_grad(const Saved& saved, const Tensor& gy, Needs needs, const Layout& l) {
   const bool affine = l.affine != Affine::none;
   Grads g(needs.size());
-  g[0] = Tensor::empty(gy.shape(), gy.dtype(), gy.device());
+  g[0] = empty_like(gy);
   if (affine) {
-    g[1] = Tensor::empty(saved[3].shape(), gy.dtype(), gy.device());
-    g[2] = Tensor::empty(saved[3].shape(), gy.dtype(), gy.device());
+    g[1] = empty_like(gy, saved[3].shape());
+    g[2] = empty_like(gy, saved[3].shape());
   }
   launch(NormGradArgs{saved[0], affine ? &saved[3] : nullptr, saved[1], saved[2], gy, g[0],
                       affine ? &g[1] : nullptr, affine ? &g[2] : nullptr, l.outer, l.n, l.inner,

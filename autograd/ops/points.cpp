@@ -35,16 +35,16 @@ void AttentionPool::check(Inputs x) const {
 }
 
 Tensor AttentionPool::forward(Inputs x, Saved& saved) const {
-  Tensor y = Tensor::empty({x[0].size(0), x[0].size(2)}, x[0].dtype(), x[0].device());
-  Tensor weights = Tensor::empty(x[0].shape(), x[0].dtype(), x[0].device());
+  Tensor y = empty_like(x[0], {x[0].size(0), x[0].size(2)});
+  Tensor weights = empty_like(x[0]);
   launch(AttentionPoolArgs{x[0], x[1], y, weights, scale});
   saved.keep({x[1], weights, y});
   return y;
 }
 
 Grads AttentionPool::backward(const Saved& saved, const Tensor& gy, Needs) const {
-  Tensor g_score = Tensor::empty(saved[0].shape(), gy.dtype(), gy.device());
-  Tensor g_value = Tensor::empty(saved[0].shape(), gy.dtype(), gy.device());
+  Tensor g_score = empty_like(gy, saved[0].shape());
+  Tensor g_value = empty_like(gy, saved[0].shape());
   launch(AttentionPoolGradArgs{saved[0], saved[1], saved[2], gy, g_score, g_value, scale});
   return {g_score, g_value};
 }

@@ -36,10 +36,7 @@ Tensor PooledNorm::forward(Inputs x, Saved& saved) const {
 
 Grads PooledNorm::backward(const Saved& s, const Tensor& gy, Needs needs) const {
   const Tensor& scale = s[2];
-  const auto like = [&](const Tensor& t) {
-    return Tensor::empty(t.shape(), gy.dtype(), gy.device());
-  };
-  Grads g{like(s[0]), like(s[1]), Tensor(), like(scale), like(scale)};
+  Grads g{empty_like(s[0]), empty_like(s[1]), Tensor(), empty_like(scale), empty_like(scale)};
   launch(PooledNormGradArgs{s[0], s[1], scale, s[3], s[4], s[5], s[6], gy, g[0], g[1], g[3], g[4],
                             activation});
   if (needs[2]) g[2] = Tensor::zeros(scale.shape(), gy.dtype(), gy.device());

@@ -32,14 +32,14 @@ void Sum::check(Inputs x) const { check_axis(name, letters, x, axis, false); }
 
 Tensor Sum::forward(Inputs x, Saved&) const {
   const Around a(x[0].shape(), axis);
-  Tensor y = Tensor::empty(a.without, x[0].dtype(), x[0].device());
+  Tensor y = empty_like(x[0], a.without);
   launch(SumArgs{x[0], y, a.outer, a.n, a.inner});
   return y;
 }
 
 Grads Sum::backward(const Saved& saved, const Tensor& gy, Needs) const {
   const Around a(saved.shape(0), axis);
-  Tensor gx = Tensor::empty({a.outer, a.n, a.inner}, gy.dtype(), gy.device());
+  Tensor gx = empty_like(gy, {a.outer, a.n, a.inner});
   launch(ExpandArgs{gy.reshape({a.outer, 1, a.inner}), gx});
   return {gx.reshape(saved.shape(0))};
 }
@@ -48,7 +48,7 @@ void Max::check(Inputs x) const { check_axis(name, letters, x, axis, true); }
 
 Tensor Max::forward(Inputs x, Saved& saved) const {
   const Around a(x[0].shape(), axis);
-  Tensor y = Tensor::empty(a.without, x[0].dtype(), x[0].device());
+  Tensor y = empty_like(x[0], a.without);
   Tensor index = Tensor::empty(a.without, DType::i32, x[0].device());
   launch(MaxArgs{x[0], y, index, a.outer, a.n, a.inner});
   saved.keep({index});
@@ -57,7 +57,7 @@ Tensor Max::forward(Inputs x, Saved& saved) const {
 
 Grads Max::backward(const Saved& saved, const Tensor& gy, Needs) const {
   const Around a(saved.shape(0), axis);
-  Tensor gx = Tensor::empty(saved.shape(0), gy.dtype(), gy.device());
+  Tensor gx = empty_like(gy, saved.shape(0));
   launch(MaxGradArgs{gy, saved[0], gx, a.outer, a.n, a.inner});
   return {gx};
 }
@@ -66,7 +66,7 @@ void Softmax::check(Inputs x) const { check_axis(name, letters, x, axis, true); 
 
 Tensor Softmax::forward(Inputs x, Saved& saved) const {
   const Around a(x[0].shape(), axis);
-  Tensor y = Tensor::empty(x[0].shape(), x[0].dtype(), x[0].device());
+  Tensor y = empty_like(x[0]);
   launch(SoftmaxArgs{x[0], y, a.outer, a.n, a.inner});
   saved.keep({y});
   return y;
@@ -74,7 +74,7 @@ Tensor Softmax::forward(Inputs x, Saved& saved) const {
 
 Grads Softmax::backward(const Saved& saved, const Tensor& gy, Needs) const {
   const Around a(gy.shape(), axis);
-  Tensor gx = Tensor::empty(gy.shape(), gy.dtype(), gy.device());
+  Tensor gx = empty_like(gy);
   launch(SoftmaxGradArgs{saved[0], gy, gx, a.outer, a.n, a.inner});
   return {gx};
 }

@@ -13,7 +13,7 @@ namespace restage {
 namespace {
 
 Tensor column_sum(const Tensor& g) {  // [t, n, c] -> [c]
-  Tensor out = Tensor::empty({g.size(2)}, g.dtype(), g.device());
+  Tensor out = empty_like(g, {g.size(2)});
   launch(SumArgs{g, out, 1, g.size(0) * g.size(1), g.size(2)});
   return out;
 }
@@ -38,8 +38,8 @@ void Gru::check(Inputs x) const {
 Tensor Gru::forward(Inputs in, Saved& saved) const {
   const Tensor &x = in[0], &h0 = in[1], &w_ih = in[2], &w_hh = in[3];
   const int64_t t_count = x.size(0), n = x.size(1), h = h0.size(1);
-  Tensor y = Tensor::empty({t_count, n, h}, x.dtype(), x.device()), gates;
-  if (saved.on()) gates = Tensor::empty({t_count, n, 4 * h}, x.dtype(), x.device());
+  Tensor y = empty_like(x, {t_count, n, h}), gates;
+  if (saved.on()) gates = empty_like(x, {t_count, n, 4 * h});
   launch(GruArgs{x, h0, w_ih, w_hh, in[4], in[5], y, saved.on() ? &gates : nullptr, precision});
   saved.keep({x, h0, w_ih, w_hh, y, gates});
   return y;
@@ -49,9 +49,9 @@ Grads Gru::backward(const Saved& saved, const Tensor& gy, Needs needs) const {
   const Tensor &x = saved[0], &h0 = saved[1], &w_ih = saved[2], &w_hh = saved[3], &y = saved[4],
                &gates = saved[5];
   const int64_t t_count = x.size(0), n = x.size(1), h = h0.size(1);
-  Tensor g_gi = Tensor::empty({t_count, n, 3 * h}, x.dtype(), x.device());
-  Tensor g_gh = Tensor::empty({t_count, n, 3 * h}, x.dtype(), x.device());
-  Tensor g_h0 = Tensor::empty({n, h}, x.dtype(), x.device());
+  Tensor g_gi = empty_like(x, {t_count, n, 3 * h});
+  Tensor g_gh = empty_like(x, {t_count, n, 3 * h});
+  Tensor g_h0 = empty_like(x, {n, h});
   launch(GruGradArgs{gates, y, h0, w_hh, gy, g_gi, g_gh, g_h0});
   const auto product = [this](const Tensor& a, const Tensor& b, Tensor& out, bool transpose_a) {
     launch(
@@ -59,24 +59,24 @@ Grads Gru::backward(const Saved& saved, const Tensor& gy, Needs needs) const {
   };
   Grads g(6);
   if (needs[0]) {
-    g[0] = Tensor::empty(x.shape(), x.dtype(), x.device());
+    g[0] = empty_like(x);
     Tensor rows = flat(g[0]);
     product(flat(g_gi), w_ih, rows, false);
   }
   if (needs[1]) g[1] = g_h0;
   if (needs[2]) {
-    g[2] = Tensor::empty(w_ih.shape(), x.dtype(), x.device());
+    g[2] = empty_like(x, w_ih.shape());
     product(flat(g_gi), flat(x), g[2], true);
   }
   if (needs[3]) {
     // States before each step: h0 followed by all but the last output.
-    Tensor before = Tensor::empty(y.shape(), x.dtype(), x.device());
+    Tensor before = empty_like(x, y.shape());
     launch(CopyBlocksArgs{h0, before, t_count > 0 ? 1 : 0, n * h, n * h, 0, n * h, 0});
     if (t_count > 1) {
       Tensor rest = before.rows(1, t_count);
       launch(CopyBlocksArgs{y, rest, t_count - 1, n * h, n * h, 0, n * h, 0});
     }
-    g[3] = Tensor::empty(w_hh.shape(), x.dtype(), x.device());
+    g[3] = empty_like(x, w_hh.shape());
     product(flat(g_gh), flat(before), g[3], true);
   }
   if (needs[4]) g[4] = column_sum(g_gi);

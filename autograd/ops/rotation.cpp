@@ -20,7 +20,7 @@ Shape with_tail(const Shape& s, int drop, std::initializer_list<int64_t> tail) {
 Tensor from_matrix(const Tensor& r, RotationForm form) {
   if (r.rank() < 2 || r.size(-1) != 3 || r.size(-2) != 3)
     shape_error("from_matrix", "R[..., 3, 3]", std::array{r}, "needs matrices");
-  Tensor out = Tensor::empty(with_tail(r.shape(), 2, {width_of(form)}), r.dtype(), r.device());
+  Tensor out = empty_like(r, with_tail(r.shape(), 2, {width_of(form)}));
   launch(FromMatrixArgs{form, r, out});
   return out;
 }
@@ -35,14 +35,14 @@ void ToMatrix::check(Inputs x) const {
 }
 
 Tensor ToMatrix::forward(Inputs x, Saved& saved) const {
-  Tensor y = Tensor::empty(with_tail(x[0].shape(), 1, {3, 3}), x[0].dtype(), x[0].device());
+  Tensor y = empty_like(x[0], with_tail(x[0].shape(), 1, {3, 3}));
   launch(ToMatrixArgs{form, x[0], y});
   saved.keep({x[0]});
   return y;
 }
 
 Grads ToMatrix::backward(const Saved& saved, const Tensor& gy, Needs) const {
-  Tensor gx = Tensor::empty(saved[0].shape(), gy.dtype(), gy.device());
+  Tensor gx = empty_like(gy, saved[0].shape());
   launch(ToMatrixGradArgs{form, saved[0], gy, gx});
   return {gx};
 }
@@ -53,15 +53,14 @@ void Atan2::check(Inputs x) const {
 }
 
 Tensor Atan2::forward(Inputs x, Saved& saved) const {
-  Tensor y = Tensor::empty(x[0].shape(), x[0].dtype(), x[0].device());
+  Tensor y = empty_like(x[0]);
   launch(Atan2Args{x[0], x[1], y});
   saved.keep({x[0], x[1]});
   return y;
 }
 
 Grads Atan2::backward(const Saved& saved, const Tensor& gy, Needs) const {
-  Grads g{Tensor::empty(gy.shape(), gy.dtype(), gy.device()),
-          Tensor::empty(gy.shape(), gy.dtype(), gy.device())};
+  Grads g{empty_like(gy), empty_like(gy)};
   launch(Atan2GradArgs{saved[0], saved[1], gy, g[0], g[1]});
   return g;
 }
@@ -81,7 +80,7 @@ void ForwardKinematics::check(Inputs x) const {
 }
 
 Tensor ForwardKinematics::forward(Inputs x, Saved& saved) const {
-  Tensor y = Tensor::empty({x[0].size(0), x[0].size(1), 3, 4}, x[0].dtype(), x[0].device());
+  Tensor y = empty_like(x[0], {x[0].size(0), x[0].size(1), 3, 4});
   launch(FkArgs{x[0], x[1], x[2], parents, y});
   saved.keep({x[0], x[1], y});
   return y;
@@ -107,7 +106,7 @@ void LinearBlendSkinning::check(Inputs x) const {
 }
 
 Tensor LinearBlendSkinning::forward(Inputs x, Saved& saved) const {
-  Tensor y = Tensor::empty(x[0].shape(), x[0].dtype(), x[0].device());
+  Tensor y = empty_like(x[0]);
   launch(LbsArgs{x[0], x[1], x[2], x[3], y});
   saved.keep({x[0], x[1], x[2], x[3]});
   return y;
@@ -115,8 +114,7 @@ Tensor LinearBlendSkinning::forward(Inputs x, Saved& saved) const {
 
 Grads LinearBlendSkinning::backward(const Saved& saved, const Tensor& gy, Needs) const {
   Grads g;
-  for (size_t i = 0; i < 4; ++i)
-    g.push_back(Tensor::empty(saved[i].shape(), gy.dtype(), gy.device()));
+  for (size_t i = 0; i < 4; ++i) g.push_back(empty_like(gy, saved[i].shape()));
   launch(LbsGradArgs{saved[0], saved[1], saved[2], saved[3], gy, g[0], g[1], g[2], g[3]});
   return g;
 }

@@ -22,12 +22,12 @@ Shape::Shape(std::initializer_list<int64_t> dims) {
 void Shape::push_back(int64_t size) {
   if (rank_ == kMaxRank) throw ShapeError("shape: more than six dimensions");
   if (size < -1) throw ShapeError("shape: negative dimension");
-  dims_[static_cast<size_t>(rank_++)] = size;
+  dims_[rank_++] = size;
 }
 
 int64_t Shape::product(int from, int to) const {
   int64_t n = 1;
-  for (int i = from; i < to; ++i) n *= dims_[static_cast<size_t>(i)];
+  for (int i = from; i < to; ++i) n *= dims_[i];
   return n;
 }
 
@@ -195,7 +195,7 @@ double Tensor::item(int64_t i) const {
 template <class T>
 std::vector<T> Tensor::to_vector() const {
   std::vector<T> out(static_cast<size_t>(numel_));
-  for (int64_t i = 0; i < numel_; ++i) out[static_cast<size_t>(i)] = static_cast<T>(item(i));
+  for (int64_t i = 0; i < numel_; ++i) out[i] = static_cast<T>(item(i));
   return out;
 }
 

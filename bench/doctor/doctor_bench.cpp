@@ -8,7 +8,6 @@
 // Options of measure: split, seed, scans, once=1 (each scan in one case instead of 120), dressed=1
 // (in random clothes), one_side=0.5 (share of scans by one depth camera).
 #include <array>
-#include <cmath>
 #include <cstdio>
 #include <functional>
 #include <iostream>
@@ -16,7 +15,8 @@
 #include <vector>
 
 #include "autograd/base/error.h"
-#include "autograd/base/parallel.h"
+#include "autograd/base/format.h"
+#include "autograd/base/parallel_each.h"
 #include "autograd/base/rng.h"
 #include "bench/doctor/dress.h"
 #include "bench/doctor/fit.h"
@@ -112,6 +112,7 @@ struct Confusion {
     for (const auto& row : count) sum += row[N];
     return sum;
   }
+  int missed() const { return all() - right(); }
   int all() const {
     int sum = 0;
     for (const auto& row : count)
@@ -167,11 +168,9 @@ void judge(const TrueScan& scan, int up, int facing, size_t unit, Tally& tally) 
 
 template <size_t N>
 std::string row(const std::string& question, const Confusion<N>& c) {
-  char text[160];
-  std::snprintf(text, sizeof text, "| %s | %.2f %% | %.2f %% | %.2f %% |\n", question.c_str(),
+  return format("| %s | %.2f %% | %.2f %% | %.2f %% |\n", question.c_str(),
                 100.0 * c.right() / c.all(), 100.0 * c.unsure() / c.all(),
-                100.0 * (c.all() - c.right() - c.unsure()) / c.all());
-  return text;
+                100.0 * (c.missed() - c.unsure()) / c.all());
 }
 
 struct MeasureOptions {
@@ -202,12 +201,10 @@ int measure(const std::string& file, const MeasureOptions& options) {
   const ScanMaker maker(corpus, recipe, options.seed);
   std::vector<Tally> tallies(static_cast<size_t>(scans));
   std::vector<std::string> what(tallies.size());
-  parallel_for(scans, 1, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i) {
-      const TrueScan scan = maker.make(static_cast<uint64_t>(i));
-      what[static_cast<size_t>(i)] = scan.what;
-      judge(scan, static_cast<size_t>(i), options.once, tallies[static_cast<size_t>(i)]);
-    }
+  parallel_each(scans, 1, [&](int64_t i) {
+    const TrueScan scan = maker.make(static_cast<uint64_t>(i));
+    what[i] = scan.what;
+    judge(scan, static_cast<size_t>(i), options.once, tallies[i]);
   });
   Tally all;
   std::string faults;
@@ -219,12 +216,12 @@ int measure(const std::string& file, const MeasureOptions& options) {
     add(all.up, tallies[i].up);
     add(all.facing, tallies[i].facing);
     add(all.unit, tallies[i].unit);
-    const auto missed = [](const auto& c) { return c.all() - c.right(); };
-    if (missed(tallies[i].up) + missed(tallies[i].facing) + missed(tallies[i].unit) > 0)
-      faults += "* " + what[i] + ": not right in " + std::to_string(missed(tallies[i].up)) +
-                " (up), " + std::to_string(missed(tallies[i].facing)) + " (facing), " +
-                std::to_string(missed(tallies[i].unit)) + " (unit) of " +
-                std::to_string(tallies[i].up.all()) + " cases\n";
+    const int up = tallies[i].up.missed(), facing = tallies[i].facing.missed(),
+              unit = tallies[i].unit.missed();
+    if (up + facing + unit > 0)
+      faults += "* " + what[i] +
+                format(": not right in %d (up), %d (facing), %d (unit) of %d cases\n", up, facing,
+                       unit, tallies[i].up.all());
   }
   const auto direction_name = [](size_t i) { return std::string(kDirections[i]); };
   std::cout << (options.once ? "" : "24 permutations of axes x 5 units x ") << scans

@@ -3,7 +3,7 @@
 #include <array>
 #include <cmath>
 
-#include "autograd/base/parallel.h"
+#include "autograd/base/parallel_each.h"
 #include "datasets/benchmark/characters.h"
 
 namespace restage::bench {
@@ -30,9 +30,9 @@ std::array<double, kJoints> draw_outfit(Rng& rng) {
 Points normals(const Mesh& mesh) {
   Points out(mesh.vertices.size(), Point::Zero());
   for (const Triangle& f : mesh.faces) {
-    const auto at = [&](size_t k) { return mesh.vertices[static_cast<size_t>(f[k])]; };
+    const auto at = [&](size_t k) { return mesh.vertices[f[k]]; };
     const Point n = (at(1) - at(0)).cross(at(2) - at(0));
-    for (const int32_t v : f) out[static_cast<size_t>(v)] += n;
+    for (const int32_t v : f) out[v] += n;
   }
   for (Point& n : out)
     if (n.squaredNorm() > 0) n.normalize();
@@ -63,9 +63,9 @@ Body dressed(const Body& body, const RngKey& key) {
 Corpus dressed(const Corpus& corpus, uint64_t seed) {
   Corpus out = corpus;
   const RngKey key = RngKey{seed, 0}.fold("dressed");
-  parallel_for(static_cast<int64_t>(out.bodies.size()), 1, [&](int64_t begin, int64_t end) {
-    for (auto b = static_cast<size_t>(begin); b < static_cast<size_t>(end); ++b)
-      out.bodies[b] = dressed(corpus.bodies[b], key.fold(b));
+  parallel_each(std::ssize(out.bodies), 1, [&](int64_t i) {
+    const auto b = static_cast<size_t>(i);
+    out.bodies[b] = dressed(corpus.bodies[b], key.fold(b));
   });
   return out;
 }

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "autograd/base/parallel.h"
+#include "autograd/base/parallel_each.h"
 #include "autograd/base/rng.h"
 #include "autograd/ops/reduce.h"
 #include "train/optim/adam.h"
@@ -83,17 +83,15 @@ void start(OrientationNet& net, const RngKey& key) {
 void fill(const std::function<FitExample(uint64_t)>& example, uint64_t first, double tilt,
           const RngKey& key, Batch& batch) {
   static const int right = true_turn();
-  parallel_for(kBatch, 1, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i) {
-      const auto number = static_cast<uint64_t>(i);
-      const FitExample e = example(first + number);
-      look_around(e.points, tilt, Rng(key.fold(number)),
-                  batch.seen.data<float>() + i * kTurns * kPlaces);
-      float* truth = batch.truth.data<float>() + i * kTurns;
-      for (int t = 0; t < kTurns; ++t)
-        truth[t] = e.person ? (t == right ? 1.0f : 0.0f)
-                            : static_cast<float>(stands_for(t) / (kFitHeadings + kOthers));
-    }
+  parallel_each(kBatch, 1, [&](int64_t i) {
+    const auto number = static_cast<uint64_t>(i);
+    const FitExample e = example(first + number);
+    look_around(e.points, tilt, Rng(key.fold(number)),
+                batch.seen.data<float>() + i * kTurns * kPlaces);
+    float* truth = batch.truth.data<float>() + i * kTurns;
+    for (int t = 0; t < kTurns; ++t)
+      truth[t] = e.person ? (t == right ? 1.0f : 0.0f)
+                          : static_cast<float>(stands_for(t) / (kFitHeadings + kOthers));
   });
 }
 

@@ -3,7 +3,6 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <memory>
 
 #include "autograd/base/rng.h"
 #include "datasets/sampling/frames.h"
@@ -59,9 +58,9 @@ Pose mixed(const Body& body, const Pose& legs, const Pose& trunk, const Pose& ar
   constexpr std::array kArms = {16, 17, 18, 19, 20, 21};
   Rotations bones = facing_forward(body, trunk);
   const Rotations below = facing_forward(body, legs);
-  for (const int j : kLegs) bones[static_cast<size_t>(j)] = below[static_cast<size_t>(j)];
+  for (const int j : kLegs) bones[j] = below[j];
   Pose out{to_local(bones), legs.root};
-  for (const int j : kArms) out.local[static_cast<size_t>(j)] = arms.local[static_cast<size_t>(j)];
+  for (const int j : kArms) out.local[j] = arms.local[j];
   return out;
 }
 

@@ -118,7 +118,7 @@ class Online : public Item {
   }
 
  private:
-  /// As large as the last cache, like ../flush.h.
+  /// As large as the last cache, like ../online_items.cpp.
   static size_t flush_numbers() {
     const int64_t l3 = sysconf(_SC_LEVEL3_CACHE_SIZE);
     return static_cast<size_t>(std::min<int64_t>(std::max<int64_t>(l3, 64 << 20), 512 << 20) / 8);

@@ -1,6 +1,5 @@
 // restage compare: runs and trials side by side.
 #include <filesystem>
-#include <memory>
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
@@ -41,10 +40,7 @@ int run_compare(const Arguments& a, const Common& common) {
     if (a.out.ends_with("/")) std::filesystem::create_directories(a.out, ignored);
     write_file_atomically(place, tables::comparison_svg(all));
   }
-  if (common.json)
-    print_json(tables::comparison_json(all));
-  else
-    print(tables::comparison_markdown(all));
+  print(common.json, tables::comparison_json(all), tables::comparison_markdown(all));
   if (!place.empty()) log_info("wrote " + place);
   return 0;
 }
@@ -52,14 +48,12 @@ int run_compare(const Arguments& a, const Common& common) {
 }  // namespace
 
 void add_compare(Program& program) {
-  const auto a = std::make_shared<Arguments>();
-  CLI::App& app = program.add("compare", "runs and trials side by side: settings, figures, curves",
+  auto [app, a] = program.add("compare", "runs and trials side by side: settings, figures, curves",
                               "restage compare runs/lite-1 runs/lite-2 --out curves.svg\n"
                               "restage compare runs/smoothness/trials/* --json",
-                              [a, &program] { return run_compare(*a, program.common()); });
-  app.add_option("RUN_OR_TRIAL", a->folders, "run directories, DIR/trials/ID of sweeps")
-      ->required();
-  app.add_option("--out", a->out, "curves as F.svg, or a folder for them")->allow_extra_args(false);
+                              run_compare);
+  app.add_option("RUN_OR_TRIAL", a.folders, "run directories, DIR/trials/ID of sweeps")->required();
+  app.add_option("--out", a.out, "curves as F.svg, or a folder for them")->allow_extra_args(false);
 }
 
 }  // namespace restage::cli

@@ -1,6 +1,5 @@
 // restage data: making and looking at data files (HDF5, datasets/README.md).
 #include <filesystem>
-#include <memory>
 
 #include "datasets/benchmark/manifest.h"
 #include "datasets/schema.h"
@@ -20,13 +19,11 @@ int run_verify(const std::string& file, const Common& common) {
 }
 
 void add_verify(Program& program, CLI::App& group) {
-  const auto file = std::make_shared<std::string>();
-  CLI::App& app =
-      program.add(group, "verify",
-                  "read all of a file or benchmark folder and list what is wrong (exit code 1)",
-                  "restage data verify data.h5\nrestage data verify open_benchmark/ --json",
-                  [file, &program] { return run_verify(*file, program.common()); });
-  app.add_option("FILE", *file, "an HDF5 file, or a folder made by restage data build")->required();
+  auto [app, file] = program.add(
+      group, "verify",
+      "read all of a file or benchmark folder and list what is wrong (exit code 1)",
+      "restage data verify data.h5\nrestage data verify open_benchmark/ --json", run_verify);
+  app.add_option("FILE", file, "an HDF5 file, or a folder made by restage data build")->required();
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 // restage data build: the built-in source as a file, or a recipe as a benchmark folder.
 #include <cstdlib>
 #include <filesystem>
-#include <memory>
 
 #include "autograd/base/error.h"
 #include "autograd/base/log.h"
@@ -21,9 +20,8 @@ constexpr int kMostBodies = 10000;  // guards against typing errors, not a limit
 
 struct BuildOptions {
   std::vector<std::string> arguments;  ///< RECIPE.yaml, out=, data= and key=value; none: built-in
-  bool seed_given = false, counts_given = false;
   std::string out;
-  std::vector<int> bodies{24, 4, 4}, motions{60, 20, 20};  ///< train, validation, test
+  std::vector<int> bodies, motions;  ///< train, validation, test; none: the usual numbers
 };
 
 void check_counts(const std::string& name, const std::vector<int>& counts) {
@@ -36,7 +34,8 @@ void check_counts(const std::string& name, const std::vector<int>& counts) {
 int total(const std::vector<int>& counts) { return counts[0] + counts[1] + counts[2]; }
 
 int build_builtin(const BuildOptions& options, const Common& common) {
-  const auto &b = options.bodies, &m = options.motions;
+  const std::vector<int> b = options.bodies.empty() ? std::vector{24, 4, 4} : options.bodies,
+                         m = options.motions.empty() ? std::vector{60, 20, 20} : options.motions;
   if (options.out.empty())
     throw InputError("", "there is no place to write to", "give --out FILE.h5");
   check_counts("--bodies", b);
@@ -73,7 +72,7 @@ std::string usual_data_folder() {
 Request read_request(const BuildOptions& options, const Common& common) {
   Request out;
   out.out = options.out;
-  if (options.counts_given)
+  if (!options.bodies.empty() || !options.motions.empty())
     throw InputError("", "--bodies and --motions are of built-in data, a recipe names its own",
                      "leave them out, or override train.bodies and the like");
   const auto once = [](std::string& place, const std::string& argument) {
@@ -95,7 +94,7 @@ Request read_request(const BuildOptions& options, const Common& common) {
       throw InputError("", "there are two recipes, '" + out.recipe + "' and '" + a + "'",
                        "give one");
   }
-  if (options.seed_given) out.overrides.push_back("seed=" + std::to_string(common.seed));
+  if (common.seed_given) out.overrides.push_back("seed=" + std::to_string(common.seed));
   if (const char* folder = std::getenv("RESTAGE_DATA"); folder && out.data.empty())
     out.data = folder;
   if (out.data.empty()) out.data = usual_data_folder();
@@ -127,31 +126,26 @@ int build_recipe(const BuildOptions& options, const Common& common) {
   return 0;
 }
 
+int run_build(const BuildOptions& options, const Common& common) {
+  return options.arguments.empty() ? build_builtin(options, common) : build_recipe(options, common);
+}
+
 }  // namespace
 
 void add_data_build(Program& program, CLI::App& group) {
-  const auto options = std::make_shared<BuildOptions>();
-  const auto self = std::make_shared<CLI::App*>(nullptr);
-  CLI::App& app = program.add(
+  auto [app, options] = program.add(
       group, "build", "make the open benchmark from its recipe, or parametric data from nothing",
       "restage data build configs/data/open_benchmark.yaml out=benchmark data=DATA_FOLDER\n"
       "restage data build --out data.h5\n"
       "restage data build --bodies 40 5 5 --motions 120 20 20 --seed 1 --out data.h5",
-      [options, self, &program] {
-        options->seed_given = (*self)->count("--seed") > 0;
-        options->counts_given = (*self)->count("--bodies") + (*self)->count("--motions") > 0;
-        return options->arguments.empty() ? build_builtin(*options, program.common())
-                                          : build_recipe(*options, program.common());
-      });
-  app.add_option("ARGUMENTS", options->arguments,
+      run_build);
+  app.add_option("ARGUMENTS", options.arguments,
                  "RECIPE.yaml, out=DIR, data=DIR and key=value overrides");
-  app.add_option("--out", options->out, "file (or folder, of a recipe) to write");
-  app.add_option("--bodies", options->bodies, "built-in bodies for training, validation and test")
+  app.add_option("--out", options.out, "file (or folder, of a recipe) to write");
+  app.add_option("--bodies", options.bodies, "built-in bodies for training, validation and test")
       ->expected(3);
-  app.add_option("--motions", options->motions,
-                 "built-in motions for training, validation and test")
+  app.add_option("--motions", options.motions, "built-in motions for training, validation and test")
       ->expected(3);
-  *self = &app;
 }
 
 }  // namespace restage::cli

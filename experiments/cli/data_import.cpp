@@ -1,7 +1,6 @@
 // restage data import: what users hold, into one data file.
 #include <cstdlib>
 #include <map>
-#include <memory>
 
 #include "autograd/base/error.h"
 #include "datasets/importers/import.h"
@@ -83,8 +82,7 @@ int run_import(ImportArguments arguments, const Common& common) {
 }  // namespace
 
 void add_data_import(Program& program, CLI::App& group) {
-  const auto given = std::make_shared<ImportArguments>();
-  CLI::App& app =
+  auto [app, given] =
       program.add(group, "import", "turn bodies, motions, characters or scans into a data file",
                   "restage data import DATA_FOLDER --out real.h5\n"
                   "restage data import walk.bvh --subject ann --license CC0-1.0 --out walk.h5\n"
@@ -93,22 +91,22 @@ void add_data_import(Program& program, CLI::App& group) {
                   "restage data import AMASS/ --body-model smplh/ --out amass.h5\n"
                   "restage data import SMPLX_NEUTRAL.npz --betas zeros people.npz --out bodies.h5\n"
                   "restage data import scans/ --fps 60 --scale 0.001 --out scans.h5",
-                  [given, &program] { return run_import(*given, program.common()); });
-  ImportOptions& options = given->options;
+                  run_import);
+  ImportOptions& options = given.options;
   MotionOptions& motion = options.motion;
-  app.add_option("SOURCE", given->source,
+  app.add_option("SOURCE", given.source,
                  "data folder; recording (.bvh, .amc; also .xz); character (.glb, .gltf, .vrm); "
                  "AMASS motion or body model (.npz); scans (.ply, .obj, .npy, .npz); or a folder "
                  "of one kind")
       ->required();
-  app.add_option("--out", given->out, "file to write")->required();
+  app.add_option("--out", given.out, "file to write")->required();
   app.add_option("--license", options.license, "licence of the files");
   app.add_option("--subject", motion.subject, "who moves (default: by the file's name)");
   app.add_option("--split", motion.split, "train, validation or test");
   app.add_option("--scale", motion.scale, "metres per unit of the file")->check(positive);
   app.add_option("--fps", motion.fps, "true frame rate")->check(positive);
-  app.add_option("--up", given->up, "up axis of the file: auto, x, y, z, -x, -y or -z");
-  app.add_option("--facing", given->facing,
+  app.add_option("--up", given.up, "up axis of the file: auto, x, y, z, -x, -y or -z");
+  app.add_option("--facing", given.facing,
                  "recordings: axis that the rest pose faces: auto, z, -y ...");
   app.add_option("--rest-frame", motion.rest.frame, "recordings: a frame that is a T-pose")
       ->check(not_negative);

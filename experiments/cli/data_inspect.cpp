@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <memory>
 #include <optional>
 
 #include "autograd/base/error.h"
@@ -241,19 +240,18 @@ int run_inspect(const InspectOptions& options, const Common& common) {
 }  // namespace
 
 void add_data_inspect(Program& program, CLI::App& group) {
-  const auto options = std::make_shared<InspectOptions>();
-  CLI::App& app =
+  auto [app, options] =
       program.add(group, "inspect", "say what a file holds, and draw it",
                   "restage data inspect data.h5\nrestage data inspect data.h5 --plot sheet.png\n"
                   "restage data inspect walk.bvh\nrestage data inspect hero.glb --plot hero.png\n"
                   "restage data inspect data.h5 --json",
-                  [options, &program] { return run_inspect(*options, program.common()); });
+                  run_inspect);
   app.add_option(
-         "FILE", options->file,
+         "FILE", options.file,
          "bodies, motions, scans or a prediction (HDF5), or what 'restage data import' takes")
       ->required();
-  app.add_option("--body-model", options->body_model, "for an AMASS motion: its SMPL model (.npz)");
-  app.add_option("--plot", options->plot, "draw bodies, poses or frames on a contact sheet (PNG)");
+  app.add_option("--body-model", options.body_model, "for an AMASS motion: its SMPL model (.npz)");
+  app.add_option("--plot", options.plot, "draw bodies, poses or frames on a contact sheet (PNG)");
 }
 
 }  // namespace restage::cli

@@ -1,5 +1,4 @@
 // restage data merge: several data files as one.
-#include <memory>
 
 #include "datasets/merge.h"
 #include "experiments/cli/commands.h"
@@ -30,15 +29,14 @@ int run_merge(const MergeArguments& given, const Common& common) {
 }  // namespace
 
 void add_data_merge(Program& program, CLI::App& group) {
-  const auto given = std::make_shared<MergeArguments>();
-  CLI::App& app =
+  auto [app, given] =
       program.add(group, "merge", "put the bodies and motions of several data files into one",
                   "restage data merge real.h5 walk.h5 --out all.h5\n"
                   "restage data merge a.h5 b.h5 --prefix --out both.h5",
-                  [given, &program] { return run_merge(*given, program.common()); });
-  app.add_option("FILES", given->files, "data files with bodies, motions or both")->required();
-  app.add_option("--out", given->out, "file to write")->required();
-  app.add_flag("--prefix", given->options.prefix, "put each file's name before its ids");
+                  run_merge);
+  app.add_option("FILES", given.files, "data files with bodies, motions or both")->required();
+  app.add_option("--out", given.out, "file to write")->required();
+  app.add_flag("--prefix", given.options.prefix, "put each file's name before its ids");
 }
 
 }  // namespace restage::cli

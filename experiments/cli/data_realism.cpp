@@ -1,5 +1,4 @@
 // restage data realism: how believable the bodies and motions of a data file are when posed.
-#include <memory>
 
 #include "autograd/base/error.h"
 #include "autograd/base/format.h"
@@ -76,12 +75,10 @@ int run_realism(const std::string& file, const Common& common) {
 }  // namespace
 
 void add_data_realism(Program& program, CLI::App& group) {
-  const auto file = std::make_shared<std::string>();
-  CLI::App& app = program.add(group, "realism",
-                              "volume at bent joints, joints inside the body, feet on the floor",
-                              "restage data realism benchmark/test.h5",
-                              [file, &program] { return run_realism(*file, program.common()); });
-  app.add_option("FILE", *file, "data file with bodies and motions (HDF5)")->required();
+  auto [app, file] = program.add(group, "realism",
+                                 "volume at bent joints, joints inside the body, feet on the floor",
+                                 "restage data realism benchmark/test.h5", run_realism);
+  app.add_option("FILE", file, "data file with bodies and motions (HDF5)")->required();
 }
 
 }  // namespace restage::cli

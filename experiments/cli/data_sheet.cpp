@@ -2,7 +2,6 @@
 // one picture.
 #include <algorithm>
 #include <filesystem>
-#include <memory>
 
 #include "autograd/base/error.h"
 #include "autograd/base/output_check.h"
@@ -116,17 +115,16 @@ int run_sheet(const SheetArguments& a, const Common& common) {
 }  // namespace
 
 void add_data_sheet(Program& program, CLI::App& group) {
-  const auto a = std::make_shared<SheetArguments>();
-  CLI::App& app = program.add(group, "sheet",
+  auto [app, a] = program.add(group, "sheet",
                               "draw all bodies and motions of a file, or all sequences of a folder",
                               "restage data sheet benchmark/test.h5 --out test.png\n"
                               "restage data sheet benchmark/scans --out scans.png",
-                              [a, &program] { return run_sheet(*a, program.common()); });
-  app.add_option("INPUT", a->input, "data file with bodies (HDF5), or naked/, clothed/ or scans/")
+                              run_sheet);
+  app.add_option("INPUT", a.input, "data file with bodies (HDF5), or naked/, clothed/ or scans/")
       ->required();
-  app.add_option("--out", a->out, "sheet.png")->required();
-  app.add_option("--columns", a->columns, "figures in a row");
-  app.add_option("--title", a->title, "a line at the top");
+  app.add_option("--out", a.out, "sheet.png")->required();
+  app.add_option("--columns", a.columns, "figures in a row");
+  app.add_option("--title", a.title, "a line at the top");
 }
 
 }  // namespace restage::cli

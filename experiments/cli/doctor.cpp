@@ -5,11 +5,11 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
-#include <memory>
 #include <utility>
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "autograd/base/format.h"
 #include "autograd/base/output_check.h"
 #include "datasets/doctor/examine.h"
 #include "datasets/importers/amc.h"
@@ -110,10 +110,8 @@ void judge_origin(Report& out) {
   const Vec3& origin = out.subject.origin;
   if (origin.isZero(0)) return;
   Finding f{"origin", Weight::wrong, "", 1, "", "--fix moves it to the origin"};
-  char text[96];
-  std::snprintf(text, sizeof text, "lies around (%.7g %.7g %.7g), far from the origin", origin.x(),
-                origin.y(), origin.z());
-  f.what = text;
+  f.what = format("lies around (%.7g %.7g %.7g), far from the origin", origin.x(), origin.y(),
+                  origin.z());
   f.evidence = "retargeting works in single precision, which is too coarse there";
   if (on_grid(out.subject.mesh->vertices, origin)) {
     f.what += ", and was rounded to the coarse steps of single precision there";
@@ -373,7 +371,8 @@ std::vector<Finding> still_wrong(const Options& options) {
   return out;
 }
 
-int run_doctor(const Options& options, const Common& common) {
+int run_doctor(Options options, const Common& common) {
+  options.max_memory = common.max_memory;
   if (options.fix) repair_kind(*options.fix);
   check_output(options.fix.value_or(""), {options.path});
   check_output(options.picture, {options.path});
@@ -407,27 +406,23 @@ int run_doctor(const Options& options, const Common& common) {
 }  // namespace
 
 void add_doctor(Program& program) {
-  const auto options = std::make_shared<Options>();
-  CLI::App& app = program.add(
+  auto [app, options] = program.add(
       "doctor", "say what a file is, what is wrong with it, and mend it",
       "restage doctor scan.ply\nrestage doctor frames/ --json\n"
       "restage doctor hero.obj --target --picture sheet.png\nrestage doctor frames/ --fix mended/\n"
       "exit code: 0 usable, 1 read but not usable as it is, 2 not readable",
-      [options, &program] {
-        options->max_memory = program.common().max_memory;
-        return run_doctor(*options, program.common());
-      });
-  app.add_option("FILE", options->path,
+      run_doctor);
+  app.add_option("FILE", options.path,
                  "HDF5, PLY, OBJ, BVH, safetensors, YAML, or a folder of frames")
       ->required();
-  app.add_option("--picture", options->picture, "draw it from front, side and top (PNG)");
-  app.add_option("--fix", options->fix,
+  app.add_option("--picture", options.picture, "draw it from front, side and top (PNG)");
+  app.add_option("--fix", options.fix,
                  "write it mended: X.ply or X.obj (one cloud or surface), X.h5 (a sequence), or a "
                  "folder of frames");
-  app.add_flag("--target", options->target, "it is meant as a target: in T-pose, facing +z");
-  app.add_option("--scale", options->scale, "metres per unit, where you know better");
-  app.add_option("--up", options->up, "the direction that is up: x, y, z, --up=-x ...");
-  app.add_option("--facing", options->facing, "the direction that the person faces, as --up");
+  app.add_flag("--target", options.target, "it is meant as a target: in T-pose, facing +z");
+  app.add_option("--scale", options.scale, "metres per unit, where you know better");
+  app.add_option("--up", options.up, "the direction that is up: x, y, z, --up=-x ...");
+  app.add_option("--facing", options.facing, "the direction that the person faces, as --up");
 }
 
 }  // namespace restage::cli

@@ -160,12 +160,12 @@ void write_mended_prediction(const Subject& subject, const std::string& out, con
                         std::vector<double>& to) {
     if (from.empty()) return;
     for (int64_t i = 3 * frame * row; i < 3 * (frame + 1) * row; i += 3) {
-      const Vec3 p = (*d.transform)(Vec3(Eigen::Map<const Vec3>(&from[static_cast<size_t>(i)])));
+      const Vec3 p = (*d.transform)(Vec3(Eigen::Map<const Vec3>(&from[i])));
       to.insert(to.end(), p.begin(), p.end());
     }
   };
   for (int64_t f = 0, sequence = 0; f < data.frames; ++f) {
-    if (f == data.sequence_offset[static_cast<size_t>(sequence)]) {
+    if (f == data.sequence_offset[sequence]) {
       kept.sequence_offset.push_back(kept.frames);
       ++sequence;
     }

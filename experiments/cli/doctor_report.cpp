@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "autograd/base/error.h"
+#include "autograd/base/format.h"
 #include "infer/render/figures.h"
 
 namespace restage::cli {
@@ -12,11 +12,7 @@ namespace {
 
 constexpr uint32_t kPerson = 0x4a8bc9, kStray = 0xd23c3c, kOther = 0xe8892a, kMark = 0x3a9d5d;
 
-std::string digits(double x) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", x == 0 ? 0.0 : x);  // no minus zero
-  return text;
-}
+std::string digits(double x) { return format("%.6g", x == 0 ? 0.0 : x); }  // no minus zero
 
 // ---- picture -----------------------------------------------------------------------------------
 
@@ -78,7 +74,7 @@ Json to_json(const Finding& f) {
 Json frame_json(const Diagnosis& d) {
   const auto told = [](bool sure, Json value) { return sure ? value : Json(nullptr); };
   const bool unit = d.unit.sure >= 0.5, up = d.orientation.up_sure >= 0.5;
-  const auto axis = [](int index) { return Json(kDirections[static_cast<size_t>(index)]); };
+  const auto axis = [](int index) { return Json(kDirections[index]); };
   return {{"unit", told(unit && *d.unit.unit.name != 0, d.unit.unit.name)},
           {"metres_per_unit", told(unit, d.unit.unit.metres)},
           {"up", told(up, axis(d.orientation.up))},
@@ -116,9 +112,7 @@ std::optional<Similarity> similarity_from(const std::string& json) {
 }
 
 std::string to_text(const Finding& f) {
-  char head[64];
-  std::snprintf(head, sizeof head, "  %-6s%-16s", name(f.weight), f.topic.c_str());
-  std::string text = head + f.what;
+  std::string text = format("  %-6s%-16s", name(f.weight), f.topic.c_str()) + f.what;
   if (f.sure < 1) text += " (sure " + digits(std::floor(100 * f.sure)) + " %)";
   text += "\n";
   const std::string margin(24, ' ');

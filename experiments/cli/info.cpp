@@ -1,5 +1,4 @@
 // restage info: the layers of a model and how many parameters each has, counted from the model.
-#include <memory>
 
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
@@ -62,12 +61,11 @@ std::string model_names() {
 }  // namespace
 
 void add_info(Program& program) {
-  const auto name = std::make_shared<std::string>();
-  CLI::App& app = program.add("info", "layers and parameter counts of a model",
-                              "restage info skeleton/point_transformer\n"
-                              "restage info smrm/rot6d --json",
-                              [name, &program] { return run_info(*name, program.common()); });
-  app.add_option("MODEL", *name, "one of:" + model_names())->required();
+  auto [app, name] = program.add("info", "layers and parameter counts of a model",
+                                 "restage info skeleton/point_transformer\n"
+                                 "restage info smrm/rot6d --json",
+                                 run_info);
+  app.add_option("MODEL", name, "one of:" + model_names())->required();
 }
 
 }  // namespace restage::cli

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
+
+#include "autograd/base/format.h"
 
 namespace restage::cli {
 namespace {
@@ -34,11 +35,8 @@ std::vector<std::string> Profile::lines() const {
   const Json table = json();
   std::vector<std::string> out = {"ms a frame        p50      p95      p99      max"};
   for (const auto& [part, row] : table.items()) {
-    char line[96];
-    int at = std::snprintf(line, sizeof line, "%-12s", part.c_str());
-    for (const auto& [name, p] : kColumns)
-      at += std::snprintf(line + at, sizeof line - static_cast<size_t>(at), "%9.2f",
-                          row[name].get<double>());
+    std::string line = format("%-12s", part.c_str());
+    for (const auto& [name, p] : kColumns) line += format("%9.2f", row[name].get<double>());
     out.push_back(line);
   }
   return out;

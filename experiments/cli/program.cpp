@@ -12,10 +12,10 @@
 #include "autograd/base/error.h"
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
+#include "autograd/base/nearest.h"
 #include "autograd/base/parallel.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
-#include "experiments/cli/usage.h"
 
 #ifndef RESTAGE_VERSION
 #define RESTAGE_VERSION "unknown"
@@ -50,11 +50,57 @@ std::string with_heading(const std::string& examples) {
   return text;
 }
 
+/// The command that was chosen, or was being read.
+const CLI::App& innermost(const CLI::App& app) {
+  return app.get_subcommands().empty() ? app : innermost(*app.get_subcommands().back());
+}
+
+/// The words that name a command: "restage data import".
+std::string words_of(const CLI::App& command) {
+  const CLI::App* group = command.get_parent();
+  return (group == nullptr ? "" : words_of(*group) + " ") + command.get_name();
+}
+
+/// The command's own options before those of every command, which were added first.
+std::vector<std::string> option_names(const CLI::App& command) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : command.get_options())
+    for (const std::string& name : option->get_lnames()) names.insert(names.begin(), "--" + name);
+  return names;
+}
+
+std::vector<std::string> command_names(const CLI::App& command) {
+  std::vector<std::string> names;
+  for (const CLI::App* sub : command.get_subcommands([](const CLI::App*) { return true; }))
+    names.push_back(sub->get_name());
+  return names;
+}
+
+/// What was wrong with the arguments that `app` just refused, with the nearest known name.
+InputError usage_error(const CLI::App& app, const CLI::ParseError& error) {
+  const CLI::App& command = innermost(app);
+  const std::string words = words_of(command);
+  const std::string help = "see '" + words + " --help'";
+  const std::vector<std::string> known = command_names(command);
+  const std::vector<std::string> extras = app.remaining(true);
+  if (!extras.empty()) {
+    const std::string word = extras.front().substr(0, extras.front().find('='));
+    const bool is_option = word.size() > 1 && word[0] == '-';
+    const std::string kind = is_option ? "option" : known.empty() ? "argument" : "command";
+    const std::string near =
+        is_option ? nearest(word, option_names(command)) : nearest(word, known);
+    return InputError("", "unknown " + kind + " '" + word + "' of '" + words + "'",
+                      near.empty() ? help : "did you mean '" + near + "'? (" + help + ")");
+  }
+  if (!known.empty() && command.get_subcommands().empty() &&
+      dynamic_cast<const CLI::RequiredError*>(&error) != nullptr)
+    return InputError("", "'" + words + "' needs a command", help);
+  return InputError("", error.what(), help);
+}
+
 /// Results are files or folders, of every command.
-void check_out(const CLI::App& app) {
-  const CLI::App* command = &app;
-  while (!command->get_subcommands().empty()) command = command->get_subcommands().back();
-  const CLI::Option* out = command->get_option_no_throw("--out");
+void check_out(const CLI::App& command) {
+  const CLI::Option* out = command.get_option_no_throw("--out");
   if (out == nullptr || out->count() == 0) return;
   const std::string& place = out->results().back();
   if (place.empty() || place == "-")
@@ -121,8 +167,8 @@ CLI::App& Program::add_group(const std::string& name, const std::string& help) {
 }
 
 int Program::run(int argc, char** argv) {
-  command_line_.assign(argv, argv + argc);
-  if (argc > 0) command_line_[0] = "restage";  // not where it lies on this machine
+  common_.command_line.assign(argv, argv + argc);
+  if (argc > 0) common_.command_line[0] = "restage";  // not where it lies on this machine
   try {
     app_.parse(argc, argv);
   } catch (const CLI::CallForVersion& version) {
@@ -142,7 +188,8 @@ int Program::run(int argc, char** argv) {
   if (common_.threads < 0 || common_.threads > kMaxThreads)
     throw InputError("", "--threads " + std::to_string(common_.threads) + " is out of range",
                      "give a number from 0 (all cores) to " + std::to_string(kMaxThreads));
-  check_out(app_);
+  check_out(innermost(app_));
+  common_.seed_given = innermost(app_).count("--seed") > 0;
   set_threads(common_.threads);
   set_log_level(common_.quiet     ? LogLevel::quiet
                 : common_.verbose ? LogLevel::debug

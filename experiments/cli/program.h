@@ -7,7 +7,9 @@
 #include <CLI/Formatter.hpp>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "datasets/readers/byte_stream.h"
@@ -18,9 +20,19 @@ namespace restage::cli {
 struct Common {
   int threads = 0;  ///< 0: all cores; already handed to base/parallel.h
   uint64_t seed = 0;
+  bool seed_given = false;              ///< behind the command's name
   bool quiet = false, verbose = false;  ///< already handed to base/log.h
   bool json = false;
   uint64_t max_memory = kMaxMemory;  ///< what unpacking one compressed file may take, bytes
+  /// All words that the program was called with, its own name first.
+  std::vector<std::string> command_line;
+};
+
+/// A command, and the arguments that it is run with; both live as long as the program.
+template <class A>
+struct Command {
+  CLI::App& app;
+  A& arguments;
 };
 
 class Program {
@@ -37,9 +49,21 @@ class Program {
   CLI::App& add(CLI::App& group, const std::string& name, const std::string& help,
                 const std::string& examples, std::function<int()> action);
 
+  /// The same with arguments of the command's own: runs work(arguments, common()).
+  template <class A>
+  Command<std::remove_cvref_t<A>> add(CLI::App& group, const std::string& name,
+                                      const std::string& help, const std::string& examples,
+                                      int (*work)(A, const Common&)) {
+    const auto arguments = std::make_shared<std::remove_cvref_t<A>>();
+    return {add(group, name, help, examples, [=, this] { return work(*arguments, common_); }),
+            *arguments};
+  }
+  template <class A>
+  Command<std::remove_cvref_t<A>> add(const std::string& name, const std::string& help,
+                                      const std::string& examples, int (*work)(A, const Common&)) {
+    return add(app_, name, help, examples, work);
+  }
   const Common& common() const { return common_; }
-  /// All words that the program was called with, its own name first.
-  const std::vector<std::string>& command_line() const { return command_line_; }
 
   /// Reads the arguments and runs the chosen command. Throws.
   int run(int argc, char** argv);
@@ -49,7 +73,6 @@ class Program {
 
   CLI::App app_;
   Common common_;
-  std::vector<std::string> command_line_;
   std::function<int()> action_;
 };
 

@@ -1,5 +1,4 @@
 // restage render: a contact sheet or a page that plays source, result and truth.
-#include <memory>
 
 #include "autograd/base/error.h"
 #include "autograd/base/output_check.h"
@@ -52,31 +51,27 @@ int run_render(const RenderOptions& options, const Common& common) {
     if (!options.title.empty()) page.title = options.title;
     write_page(options.out, clips, page);
   }
-  if (common.json)
-    print_json({{"out", options.out}});
-  else
-    print("wrote " + options.out + "\n");
+  print(common.json, {{"out", options.out}}, "wrote " + options.out + "\n");
   return 0;
 }
 
 }  // namespace
 
 void add_render(Program& program) {
-  const auto options = std::make_shared<RenderOptions>();
-  CLI::App& app =
+  auto [app, options] =
       program.add("render", "draw a result as a contact sheet or a page that plays it",
                   "restage render result.h5 --source scans/ --out sheet.png\n"
                   "restage render result.h5 --source scans.h5 --truth truth.h5 --out page.html",
-                  [options, &program] { return run_render(*options, program.common()); });
-  app.add_option("RESULT", options->result, "prediction or scans (HDF5), or a folder of PLY or OBJ")
+                  run_render);
+  app.add_option("RESULT", options.result, "prediction or scans (HDF5), or a folder of PLY or OBJ")
       ->required();
-  app.add_option("--source", options->source, "what the motion was taken from");
-  app.add_option("--truth", options->truth, "the true motion, if it is known");
-  app.add_option("--out", options->out, "sheet.png or page.html")->required();
-  app.add_option("--columns", options->columns, "moments on a sheet");
-  app.add_option("--fps", options->fps, "frames per second of the input");
-  app.add_option("--sequence", options->sequence, "which sequence of an HDF5 file, from 0");
-  app.add_option("--title", options->title, "a line at the top");
+  app.add_option("--source", options.source, "what the motion was taken from");
+  app.add_option("--truth", options.truth, "the true motion, if it is known");
+  app.add_option("--out", options.out, "sheet.png or page.html")->required();
+  app.add_option("--columns", options.columns, "moments on a sheet");
+  app.add_option("--fps", options.fps, "frames per second of the input");
+  app.add_option("--sequence", options.sequence, "which sequence of an HDF5 file, from 0");
+  app.add_option("--title", options.title, "a line at the top");
 }
 
 }  // namespace restage::cli

@@ -1,8 +1,10 @@
 // restage retarget: clouds of one body in, the same motion by another body out, frame by frame.
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <optional>
 
+#include "autograd/base/format.h"
 #include "autograd/base/log.h"
 #include "autograd/base/output_check.h"
 #include "datasets/doctor/examine.h"
@@ -32,12 +34,10 @@ struct RetargetCommand {
   int64_t every = 1;
 };
 
-/// Where results go; one class for each kind of file.
-class Sink {
- public:
-  virtual ~Sink() = default;
-  virtual void push(const RetargetedFrame& frame) = 0;
-  virtual void commit() = 0;
+/// Where results go: what a writer takes of each frame, and how it ends.
+struct Sink {
+  std::function<void(const RetargetedFrame&)> push;
+  std::function<void()> commit;
 };
 
 /// What the skeleton's files are made of.
@@ -48,52 +48,34 @@ const SystemRig& rig_of(const System& system, const std::string& out) {
   return *system.rig();
 }
 
-struct GlbSink final : Sink {
-  GlbSink(const std::string& path, const System& s)
-      : writer(path, s.target(), rig_of(s, path).rest, rig_of(s, path).weights) {}
-  void push(const RetargetedFrame& f) override { writer.push(f.pose); }
-  void commit() override {
-    const InfluenceError e = writer.commit();
-    char text[160];
-    std::snprintf(text, sizeof text,
-                  "four weights per vertex instead of 22: %.2f mm on average, at most %.2f mm",
-                  1e3 * e.mean, 1e3 * e.max);
-    log_info(text);
+Sink make_sink(const RetargetCommand& c, const System& s) {
+  if (c.out.ends_with(".glb")) {
+    const SystemRig& rig = rig_of(s, c.out);
+    const auto writer = std::make_shared<GlbWriter>(c.out, s.target(), rig.rest, rig.weights);
+    const auto commit = [writer] {
+      const InfluenceError e = writer->commit();
+      log_info(format("four weights per vertex instead of 22: %.2f mm on average, at most %.2f mm",
+                      1e3 * e.mean, 1e3 * e.max));
+    };
+    return {[writer](const RetargetedFrame& f) { writer->push(f.pose); }, commit};
   }
-  GlbWriter writer;
-};
-
-struct BvhSink final : Sink {
-  BvhSink(const std::string& path, const System& s) : writer(path, rig_of(s, path).rest) {}
-  void push(const RetargetedFrame& f) override { writer.push(f.pose); }
-  void commit() override { writer.commit(); }
-  BvhWriter writer;
-};
-
-struct H5Sink final : Sink {
-  H5Sink(const std::string& path, const System& s, double fps)
-      : writer(path, static_cast<int64_t>(s.target().vertices.size()), s.target().faces, FileInfo{},
-               fps) {}
-  void push(const RetargetedFrame& f) override { writer.append(f.joints, f.vertices); }
-  void commit() override { writer.commit(); }
-  PredictionWriter writer;
-};
-
-struct FolderSink final : Sink {
-  FolderSink(const std::string& path, const System& s, MeshFormat format)
-      : writer(path, s.target().faces, format) {}
-  void push(const RetargetedFrame& f) override { writer.push(f.vertices); }
-  void commit() override { writer.commit(); }
-  FrameFolderWriter writer;
-};
-
-std::unique_ptr<Sink> make_sink(const RetargetCommand& c, const System& s) {
-  if (c.out.ends_with(".glb")) return std::make_unique<GlbSink>(c.out, s);
-  if (c.out.ends_with(".bvh")) return std::make_unique<BvhSink>(c.out, s);
-  if (c.out.ends_with(".h5"))
-    return std::make_unique<H5Sink>(c.out, s, kFps / static_cast<double>(c.every));
-  return std::make_unique<FolderSink>(c.out, s,
-                                      c.format == "obj" ? MeshFormat::obj : MeshFormat::ply);
+  if (c.out.ends_with(".bvh")) {
+    const auto writer = std::make_shared<BvhWriter>(c.out, rig_of(s, c.out).rest);
+    return {[writer](const RetargetedFrame& f) { writer->push(f.pose); },
+            [writer] { writer->commit(); }};
+  }
+  const Mesh& target = s.target();
+  if (c.out.ends_with(".h5")) {
+    const auto writer =
+        std::make_shared<PredictionWriter>(c.out, std::ssize(target.vertices), target.faces,
+                                           FileInfo{}, kFps / static_cast<double>(c.every));
+    return {[writer](const RetargetedFrame& f) { writer->append(f.joints, f.vertices); },
+            [writer] { writer->commit(); }};
+  }
+  const auto writer = std::make_shared<FrameFolderWriter>(
+      c.out, target.faces, c.format == "obj" ? MeshFormat::obj : MeshFormat::ply);
+  return {[writer](const RetargetedFrame& f) { writer->push(f.vertices); },
+          [writer] { writer->commit(); }};
 }
 
 void check(const RetargetCommand& c) {
@@ -159,10 +141,8 @@ double seconds_since(Clock::time_point start) {
 
 void log_profile(const Profile& profile) {
   for (const std::string& line : profile.lines()) log_info(line);
-  char text[96];
-  std::snprintf(text, sizeof text, "peak of tensors %.1f MiB",
-                static_cast<double>(memory_stats().peak) / 1048576.0);
-  log_info(text);
+  log_info(
+      format("peak of tensors %.1f MiB", static_cast<double>(memory_stats().peak) / 1048576.0));
 }
 
 /// How a character was brought into T-pose; nothing for a plain mesh. Said when all is done: bad
@@ -221,11 +201,11 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   };
   auto frame = next();
   if (!frame) throw InputError(c.source, "holds no frames", "give at least one cloud");
-  const auto sink = make_sink(c, *system);
+  const Sink sink = make_sink(c, *system);
   Profile profile({"read", "extract", "motion", "deformation", "write", "frame"});
   int64_t in = 0, out = 0;
   const auto write_all = [&](std::span<const RetargetedFrame> made) {
-    for (const RetargetedFrame& f : made) sink->push(f);
+    for (const RetargetedFrame& f : made) sink.push(f);
     out += std::ssize(made);
   };
   for (; frame; frame = next(), ++in) {
@@ -240,63 +220,56 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
     profile.add({read, times.extract, times.motion, times.deformation, write, read + work});
   }
   write_all(system->finish());
-  sink->commit();
+  sink.commit();
   log_target(target.report);
   if (c.profile) log_profile(profile);
-  if (common.json) {
-    Json document = {{"out", c.out},
-                     {"source_frames", in},
-                     {"frames", out},
-                     {"fps", kFps},
-                     {"seed", common.seed}};
-    if (c.profile) document["profile"] = profile.json();
-    print_json(document);
-  } else {
-    print("wrote " + c.out + ": " + std::to_string(out) + " frames (seed " +
-          std::to_string(common.seed) + ")\n");
-  }
+  Json document = {
+      {"out", c.out}, {"source_frames", in}, {"frames", out}, {"fps", kFps}, {"seed", common.seed}};
+  if (c.profile) document["profile"] = profile.json();
+  print(common.json, document,
+        "wrote " + c.out + ": " + std::to_string(out) + " frames (seed " +
+            std::to_string(common.seed) + ")\n");
   return 0;
 }
 
 }  // namespace
 
 void add_retarget(Program& program) {
-  const auto c = std::make_shared<RetargetCommand>();
-  CLI::App& app = program.add(
+  auto [app, c] = program.add(
       "retarget", "a target performs the motion of a sequence of clouds",
       "restage retarget --source scans/ --target hero.obj --weights w.safetensors --out hero.glb\n"
       "restage retarget --source scans.h5 --target hero.ply --weights runs/demo-1 --out result.h5\n"
       "restage retarget --source scans.h5 --target hero.ply --system register --rest rest.h5 "
       "--out r.h5",
-      [c, &program] { return run_retarget(*c, program.common()); });
-  app.add_option("--source", c->source,
+      run_retarget);
+  app.add_option("--source", c.source,
                  "folder of clouds, file of them (HDF5, NPZ, NPY), or glTF animation")
       ->required();
-  app.add_option("--target", c->target,
+  app.add_option("--target", c.target,
                  "mesh or cloud in T-pose, y up, facing +z; or a glTF character")
       ->required();
-  app.add_option("--weights", c->weights, "weights file, run or artifact");
-  app.add_option("--system", c->system,
+  app.add_option("--weights", c.weights, "weights file, run or artifact");
+  app.add_option("--system", c.system,
                  "chain: the networks of --weights; register: the target is registered to each "
                  "cloud and reposed, without learning")
       ->capture_default_str();
-  app.add_option("--rest", c->rest, "the target's 22 rest joints (HDF5, /joints [1, 22, 3])");
-  app.add_option("--every", c->every, "only every so many frames of the source; for X.h5");
-  app.add_option("--out", c->out, "X.glb, X.bvh, X.h5, or a folder for PLY or OBJ frames")
+  app.add_option("--rest", c.rest, "the target's 22 rest joints (HDF5, /joints [1, 22, 3])");
+  app.add_option("--every", c.every, "only every so many frames of the source; for X.h5");
+  app.add_option("--out", c.out, "X.glb, X.bvh, X.h5, or a folder for PLY or OBJ frames")
       ->required();
-  app.add_option("--clip", c->clip, "animation of a glTF source (default: the first)");
-  app.add_option("--sequence", c->sequence, "which sequence of an HDF5 source, from 0");
-  app.add_option("--fps", c->fps, "frames per second of the source (default: the file's, else 30)");
-  app.add_option("--source-up", c->up, "the source's up axis, y or z");
-  app.add_option("--scale", c->scale, "the source's units in metres");
-  app.add_option("--format", c->format, "of a folder's frames: ply or obj");
-  app.add_option("--samples", c->samples, "random choices of points per frame to average");
-  app.add_option("--anchor", c->anchor,
+  app.add_option("--clip", c.clip, "animation of a glTF source (default: the first)");
+  app.add_option("--sequence", c.sequence, "which sequence of an HDF5 source, from 0");
+  app.add_option("--fps", c.fps, "frames per second of the source (default: the file's, else 30)");
+  app.add_option("--source-up", c.up, "the source's up axis, y or z");
+  app.add_option("--scale", c.scale, "the source's units in metres");
+  app.add_option("--format", c.format, "of a folder's frames: ply or obj");
+  app.add_option("--samples", c.samples, "random choices of points per frame to average");
+  app.add_option("--anchor", c.anchor,
                  "seconds in which the path goes back to the source's, scaled to the target's legs "
                  "(0: never)");
-  app.add_flag("--force", c->force,
+  app.add_flag("--force", c.force,
                "accept a target that is no T-pose, and what else the doctor calls wrong");
-  app.add_flag("--profile", c->profile,
+  app.add_flag("--profile", c.profile,
                "say how long a frame and its parts take: p50, p95, p99, max");
 }
 

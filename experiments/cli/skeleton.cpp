@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "autograd/base/format.h"
 #include "autograd/base/output_check.h"
 #include "datasets/readers/frame_folder.h"
 #include "datasets/schema.h"
@@ -26,12 +27,9 @@ Json json_of(const Joints& joints) {
 
 std::string text_of(const Joints& joints) {
   std::string out;
-  for (size_t j = 0; j < kJoints; ++j) {
-    char line[100];
-    std::snprintf(line, sizeof line, "  %-15s %9.4f %9.4f %9.4f\n",
-                  std::string(kJointNames[j]).c_str(), joints[j][0], joints[j][1], joints[j][2]);
-    out += line;
-  }
+  for (size_t j = 0; j < kJoints; ++j)
+    out += format("  %-15s %9.4f %9.4f %9.4f\n", std::string(kJointNames[j]).c_str(), joints[j][0],
+                  joints[j][1], joints[j][2]);
   return out;
 }
 
@@ -81,17 +79,16 @@ int run_skeleton(const SkeletonOptions& options, const Common& common) {
 }  // namespace
 
 void add_skeleton(Program& program) {
-  const auto options = std::make_shared<SkeletonOptions>();
-  CLI::App& app =
+  auto [app, options] =
       program.add("skeleton", "the 22 joints of clouds",
                   "restage skeleton --weights w.safetensors --input scan.ply --json\n"
                   "restage skeleton --weights w.safetensors --input scans/ --out joints.h5",
-                  [options, &program] { return run_skeleton(*options, program.common()); });
-  app.add_option("--weights", options->weights, "weights file or run directory")->required();
-  app.add_option("--input", options->input, "cloud, folder of clouds, or HDF5 file of scans")
+                  run_skeleton);
+  app.add_option("--weights", options.weights, "weights file or run directory")->required();
+  app.add_option("--input", options.input, "cloud, folder of clouds, or HDF5 file of scans")
       ->required();
-  app.add_option("--out", options->out, "HDF5 file for the joints");
-  app.add_option("--samples", options->samples, "random choices of points to average");
+  app.add_option("--out", options.out, "HDF5 file for the joints");
+  app.add_option("--samples", options.samples, "random choices of points to average");
 }
 
 }  // namespace restage::cli

@@ -1,6 +1,4 @@
 // restage train: all stages of a configuration, or the rest of an interrupted run.
-#include <memory>
-
 #include "autograd/base/log.h"
 #include "autograd/base/parallel.h"
 #include "autograd/kernels/matmul_precision.h"
@@ -12,11 +10,6 @@
 
 namespace restage::cli {
 namespace {
-
-struct TrainArguments {
-  std::vector<std::string> arguments;
-  bool seed_given = false;
-};
 
 /// CONFIG.yaml and key=value, in any order; resume=RUN stands alone.
 struct Request {
@@ -57,21 +50,20 @@ std::string products_in(MatmulPrecision precision) {
          (matrix_unit() ? "by the matrix unit (AMX)" : "by float32 vectors");
 }
 
-int run_train(const TrainArguments& options, const Program& program) {
-  const Request request = read_request(options.arguments);
-  const Common& common = program.common();
-  if (!request.resume.empty() && options.seed_given)
+int run_train(const std::vector<std::string>& arguments, const Common& common) {
+  const Request request = read_request(arguments);
+  if (!request.resume.empty() && common.seed_given)
     throw InputError("", "--seed cannot change a resumed run", "leave it out, or train anew");
   TrainConfig config;
   std::vector<std::string> overrides = request.overrides;
-  if (options.seed_given) overrides.push_back("seed=" + std::to_string(common.seed));
+  if (common.seed_given) overrides.push_back("seed=" + std::to_string(common.seed));
   load_config(request.resume.empty() ? request.config : run_config_path(request.resume), overrides,
               config);
   if (config.stages.empty())
     throw InputError(request.config, "names no stages, so there is nothing to train",
                      "use it in a sweep, or name stages");
   const TrainingData data(config.data);
-  RunInput input{config.seed, threads(), program.command_line(), {}, resolved_yaml(config)};
+  RunInput input{config.seed, threads(), common.command_line, {}, resolved_yaml(config)};
   if (config.data.source != "builtin")
     input.data.push_back({config.data.source, checksum(data.train) + checksum(data.validation)});
   if (!request.resume.empty()) check_same_run(request.resume, input);
@@ -81,11 +73,7 @@ int run_train(const TrainArguments& options, const Program& program) {
                    ? RunDir::create(config.run_root, config.name, input.resolved_yaml,
                                     provenance_json(input), config.stages)
                    : RunDir::resume(request.resume, config.stages);
-  if (common.json) {
-    print_json({{"run", run.dir()}, {"seed", config.seed}});
-  } else {
-    print(run.dir() + "\n");
-  }
+  print(common.json, {{"run", run.dir()}, {"seed", config.seed}}, run.dir() + "\n");
   finish_output();
   log_info("seed " + std::to_string(config.seed) + ", " + std::to_string(threads()) + " threads; " +
            std::to_string(data.train.bodies.size()) + " bodies and " +
@@ -99,23 +87,16 @@ int run_train(const TrainArguments& options, const Program& program) {
 }  // namespace
 
 void add_train(Program& program) {
-  const auto options = std::make_shared<TrainArguments>();
-  const auto self = std::make_shared<CLI::App*>(nullptr);
-  CLI::App& app = program.add(
+  auto [app, arguments] = program.add(
       "train", "train the stages of a configuration",
       "restage train configs/demo.yaml\n"
       "restage train configs/lite/all.yaml data.source=data.h5 motion.optimiser.steps=2000\n"
       "restage train configs/lite/all.yaml skeleton.from=experiments/weights/lite.safetensors "
       "motion.init=experiments/weights/lite.safetensors\n"
       "restage train resume=runs/demo-20260101-120000-1",
-      [options, self, &program] {
-        options->seed_given = (*self)->count("--seed") > 0;
-        return run_train(*options, program);
-      });
-  app.add_option("ARGUMENTS", options->arguments,
-                 "CONFIG.yaml and key=value overrides, or resume=RUN_DIR")
+      run_train);
+  app.add_option("ARGUMENTS", arguments, "CONFIG.yaml and key=value overrides, or resume=RUN_DIR")
       ->required();
-  *self = &app;
 }
 
 }  // namespace restage::cli

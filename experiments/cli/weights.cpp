@@ -1,5 +1,4 @@
 // restage weights: what a weights file holds; single models into and out of it.
-#include <memory>
 
 #include "autograd/base/error.h"
 #include "autograd/base/output_check.h"
@@ -56,17 +55,13 @@ struct Transfer {
 
 /// All that does not fit goes to standard output, since the error has but one line.
 void print_misfits(const StateError& e, const Common& common) {
-  if (common.json)
-    print_json({{"missing", e.missing}, {"unexpected", e.unexpected}, {"unfit", e.unfit}});
-  else
-    print(e.details());
+  print(common.json, {{"missing", e.missing}, {"unexpected", e.unexpected}, {"unfit", e.unfit}},
+        e.details());
 }
 
 int report(const Transfer& t, const TensorFile& written, const Common& common) {
-  if (common.json)
-    print_json({{"out", t.out}, {"model", t.model}, {"tensors", written.tensors.size()}});
-  else
-    print("wrote " + t.out + ": " + std::to_string(written.tensors.size()) + " tensors\n");
+  print(common.json, {{"out", t.out}, {"model", t.model}, {"tensors", written.tensors.size()}},
+        "wrote " + t.out + ": " + std::to_string(written.tensors.size()) + " tensors\n");
   return 0;
 }
 
@@ -99,46 +94,42 @@ int run_export(const Transfer& t, const Common& common) {
 }
 
 void add_import(Program& program, CLI::App& group) {
-  const auto t = std::make_shared<Transfer>();
-  CLI::App& app = program.add(
+  auto [app, t] = program.add(
       group, "import", "put a state dict from elsewhere into a weights file",
       "restage weights import --from pt.safetensors --model skeleton/point_transformer "
       "--out w.safetensors\n"
       "restage weights import --from smrm.safetensors --map names.yaml --model smrm/rot6d "
       "--with w.safetensors --out all.safetensors",
-      [t, &program] { return run_import(*t, program.common()); });
-  app.add_option("--from", t->from, "state dict (safetensors; docs/convert_pytorch.py makes one)")
+      run_import);
+  app.add_option("--from", t.from, "state dict (safetensors; docs/convert_pytorch.py makes one)")
       ->required();
-  app.add_option("--model", t->model, "which model it is, as in 'restage info'")->required();
-  app.add_option("--map", t->map, "YAML lines \"foreign name: our name\", * for any text");
-  app.add_option("--size", t->sizes, "a size unlike the paper's, such as hidden=256")
+  app.add_option("--model", t.model, "which model it is, as in 'restage info'")->required();
+  app.add_option("--map", t.map, "YAML lines \"foreign name: our name\", * for any text");
+  app.add_option("--size", t.sizes, "a size unlike the paper's, such as hidden=256")
       ->allow_extra_args(false);
-  app.add_option("--with", t->with, "weights file whose other models are kept");
-  app.add_option("--out", t->out, "weights file to write")->required();
+  app.add_option("--with", t.with, "weights file whose other models are kept");
+  app.add_option("--out", t.out, "weights file to write")->required();
 }
 
 void add_export(Program& program, CLI::App& group) {
-  const auto t = std::make_shared<Transfer>();
-  CLI::App& app =
+  auto [app, t] =
       program.add(group, "export", "take one model out of a weights file, as a plain state dict",
                   "restage weights export --from w.safetensors --model smrm --out smrm.safetensors",
-                  [t, &program] { return run_export(*t, program.common()); });
-  app.add_option("--from", t->from, "weights file")->required();
-  app.add_option("--model", t->model, "its name (smrm/rot6d), role (motion) or prefix (smrm)")
+                  run_export);
+  app.add_option("--from", t.from, "weights file")->required();
+  app.add_option("--model", t.model, "its name (smrm/rot6d), role (motion) or prefix (smrm)")
       ->required();
-  app.add_option("--out", t->out, "state dict to write (safetensors)")->required();
+  app.add_option("--out", t.out, "state dict to write (safetensors)")->required();
 }
 
 }  // namespace
 
 void add_weights(Program& program) {
   CLI::App& group = program.add_group("weights", "look into weights files, import and export");
-  const auto file = std::make_shared<std::string>();
-  CLI::App& show =
-      program.add(group, "show", "list what a safetensors file holds",
-                  "restage weights show w.safetensors\nrestage weights show w.safetensors --json",
-                  [file, &program] { return run_show(*file, program.common()); });
-  show.add_option("FILE", *file, "safetensors file")->required();
+  auto [show, file] = program.add(
+      group, "show", "list what a safetensors file holds",
+      "restage weights show w.safetensors\nrestage weights show w.safetensors --json", run_show);
+  show.add_option("FILE", file, "safetensors file")->required();
   add_import(program, group);
   add_export(program, group);
 }

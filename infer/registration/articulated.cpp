@@ -16,7 +16,7 @@ constexpr int kPlace = 0, kSize = 3, kTurn = 4, kStretch = kTurn + 3 * kJoints,
 using Normal = Eigen::Matrix<double, kUnknowns, kUnknowns>;
 using Step = Eigen::Matrix<double, kUnknowns, 1>;
 
-int pair_of(int joint) { return std::min(joint, kMirror[static_cast<size_t>(joint)]); }
+int pair_of(int joint) { return std::min(joint, kMirror[joint]); }
 
 Mat3 cross_matrix(const Vec3& v) {
   Mat3 m;
@@ -90,26 +90,12 @@ struct Pull {
   }
 };
 
-/// Geman and McClure: the weight of a squared distance.
-double kernel(double squared, double width) {
-  const double w = width * width / (width * width + squared);
-  return w * w;
-}
-
 std::vector<Pull> matches(const PosedRig& posed, const std::vector<Vec3>& cloud,
                           const NearestPoint& in_cloud, double width) {
   std::vector<Pull> out(posed.nodes.size());
-  const double per_node = 1.0 / static_cast<double>(posed.nodes.size());
-  for (size_t i = 0; i < posed.nodes.size(); ++i) {
-    const auto [k, squared] = in_cloud(posed.nodes[i]);
-    out[i].add(posed.nodes[i], posed.normals[i], cloud[k], per_node * kernel(squared, width));
-  }
-  const NearestPoint in_rig(posed.nodes);
-  const double per_point = 1.0 / static_cast<double>(cloud.size());
-  for (const Vec3& p : cloud) {
-    const auto [i, squared] = in_rig(p);
-    out[i].add(posed.nodes[i], posed.normals[i], p, per_point * kernel(squared, width));
-  }
+  for_matches(posed.nodes, cloud, in_cloud, width, [&](size_t i, const Vec3& p, double w) {
+    out[i].add(posed.nodes[i], posed.normals[i], p, w);
+  });
   return out;
 }
 
@@ -137,11 +123,10 @@ class NodeDerivative {
     for (int c = 0; c < 3; ++c) column(kPlace + c, Vec3::Unit(c));
     column(kSize, posed_.nodes[i] - posed_.skeleton.joints[0]);
     for (int k = 0; k < kJoints; ++k) {
-      const double w = share_[static_cast<size_t>(k)];
+      const double w = share_[k];
       if (!(w > 0)) continue;
       const Mat3 frame = k == 0 ? Mat3::Identity() : posed_.skeleton.global[parent(k)];
-      const Vec3 arm =
-          moment_[static_cast<size_t>(k)] - w * posed_.skeleton.joints[static_cast<size_t>(k)];
+      const Vec3 arm = moment_[k] - w * posed_.skeleton.joints[k];
       const Mat3 turn = -cross_matrix(arm) * frame;
       for (int c = 0; c < 3; ++c) column(kTurn + 3 * k + c, turn.col(c));
       if (k > 0) column(kStretch + pair_of(k), w * state_.scale * (frame * bone(k)));
@@ -151,15 +136,14 @@ class NodeDerivative {
     const Eigen::MatrixXd h = j.transpose() * pull.weight * j;
     const Eigen::VectorXd g = j.transpose() * pull.residual;
     for (Eigen::Index a = 0; a < n; ++a) {
-      e.g[columns_[static_cast<size_t>(a)]] += g[a];
-      for (Eigen::Index b = 0; b < n; ++b)
-        e.h(columns_[static_cast<size_t>(a)], columns_[static_cast<size_t>(b)]) += h(a, b);
+      e.g[columns_[a]] += g[a];
+      for (Eigen::Index b = 0; b < n; ++b) e.h(columns_[a], columns_[b]) += h(a, b);
     }
   }
 
  private:
-  static size_t parent(int k) { return static_cast<size_t>(kParents[static_cast<size_t>(k)]); }
-  Vec3 bone(int k) const { return rig_.joints[static_cast<size_t>(k)] - rig_.joints[parent(k)]; }
+  static size_t parent(int k) { return static_cast<size_t>(kParents[k]); }
+  Vec3 bone(int k) const { return rig_.joints[k] - rig_.joints[parent(k)]; }
 
   /// By joint: how much of the node it carries, itself or through its children, and where to.
   void gather(size_t i) {
@@ -171,9 +155,9 @@ class NodeDerivative {
       const Vec3 carried =
           posed_.skeleton.joints[j] +
           state_.scale * (posed_.skeleton.global[j] * (node.rest - rig_.joints[j]));
-      for (int k = node.joint[m]; k >= 0; k = kParents[static_cast<size_t>(k)]) {
-        share_[static_cast<size_t>(k)] += node.weight[m];
-        moment_[static_cast<size_t>(k)] += node.weight[m] * carried;
+      for (int k = node.joint[m]; k >= 0; k = kParents[k]) {
+        share_[k] += node.weight[m];
+        moment_[k] += node.weight[m] * carried;
       }
     }
   }
@@ -194,18 +178,15 @@ class NodeDerivative {
 
 void add_priors(const RigState& state, const ArticulatedOptions& options, Equations& e) {
   for (int k = 0; k < kJoints; ++k) {
-    const Vec3 weight = stiffness(k),
-               angle = rotation_vector(state.pose.local[static_cast<size_t>(k)]);
+    const Vec3 weight = stiffness(k), angle = rotation_vector(state.pose.local[k]);
     for (int c = 0; c < 3; ++c) e.prior(kTurn + 3 * k + c, options.turns * weight[c], angle[c]);
   }
   for (const Hinge& hinge : kHinges) {
-    const double angle =
-        rotation_vector(state.pose.local[static_cast<size_t>(hinge.joint)])[hinge.axis];
+    const double angle = rotation_vector(state.pose.local[hinge.joint])[hinge.axis];
     if (angle * hinge.sign < 0) e.prior(kTurn + 3 * hinge.joint + hinge.axis, kOtherWay, angle);
   }
   e.prior(kSize, options.size, std::log(state.scale));
-  for (int k = 0; k < kJoints; ++k)
-    e.prior(kStretch + k, options.stretch, state.stretch[static_cast<size_t>(k)] - 1);
+  for (int k = 0; k < kJoints; ++k) e.prior(kStretch + k, options.stretch, state.stretch[k] - 1);
   e.h.diagonal().array() += kDamping;
 }
 
@@ -213,9 +194,9 @@ void take(const Step& step, RigState& state) {
   state.pose.root += step.segment<3>(kPlace);
   state.scale = std::clamp(state.scale * std::exp(step[kSize]), 0.3, 3.0);
   for (int k = 0; k < kJoints; ++k) {
-    auto& local = state.pose.local[static_cast<size_t>(k)];
+    auto& local = state.pose.local[k];
     local = rotation_by(step.segment<3>(kTurn + 3 * k)) * local;
-    double& stretch = state.stretch[static_cast<size_t>(k)];
+    double& stretch = state.stretch[k];
     stretch = std::clamp(stretch + step[kStretch + pair_of(k)], 0.5, 2.0);
   }
 }

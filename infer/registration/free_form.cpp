@@ -21,7 +21,7 @@ void add_stiffness(const Rig& rig, const std::vector<Vec3>& nodes, double alpha,
   const double weight = alpha / static_cast<double>(8 * nodes.size());
   for (size_t i = 0; i < nodes.size(); ++i)
     for (const int other : rig.nodes[i].neighbours) {
-      const Vec3 half = 0.5 * (nodes[static_cast<size_t>(other)] - nodes[i]);
+      const Vec3 half = 0.5 * (nodes[other] - nodes[i]);
       Eigen::Matrix<double, 8, 1> row;
       row << half, 1, half, -1;
       const auto at = [&](int r) {
@@ -39,11 +39,6 @@ void add_stiffness(const Rig& rig, const std::vector<Vec3>& nodes, double alpha,
     }
 }
 
-double kernel(double squared, double width) {
-  const double w = width * width / (width * width + squared);
-  return w * w;
-}
-
 /// Matches of all nodes: summed weights, and weighted sums of the points.
 struct Targets {
   std::vector<double> weight;
@@ -53,21 +48,10 @@ struct Targets {
 Targets matches(const std::vector<Vec3>& nodes, const std::vector<Vec3>& cloud,
                 const NearestPoint& in_cloud, double width) {
   Targets out{std::vector<double>(nodes.size(), 0), std::vector<Vec3>(nodes.size(), Vec3::Zero())};
-  const auto add = [&](size_t i, const Vec3& p, double w) {
+  for_matches(nodes, cloud, in_cloud, width, [&](size_t i, const Vec3& p, double w) {
     out.weight[i] += w;
     out.sum[i] += w * p;
-  };
-  const double per_node = 1.0 / static_cast<double>(nodes.size());
-  for (size_t i = 0; i < nodes.size(); ++i) {
-    const auto [k, squared] = in_cloud(nodes[i]);
-    add(i, cloud[k], per_node * kernel(squared, width));
-  }
-  const NearestPoint in_nodes(nodes);
-  const double per_point = 1.0 / static_cast<double>(cloud.size());
-  for (const Vec3& p : cloud) {
-    const auto [i, squared] = in_nodes(p);
-    add(i, p, per_point * kernel(squared, width));
-  }
+  });
   return out;
 }
 
@@ -99,8 +83,7 @@ std::vector<Vec3> fit_free_form(const Rig& rig, const PosedRig& posed,
       const Eigen::MatrixXd maps = solver.solve(right);
       if (!maps.allFinite()) return moved;
       for (Eigen::Index i = 0; i < n; ++i)
-        moved[static_cast<size_t>(i)] =
-            posed.nodes[static_cast<size_t>(i)] + maps.row(4 * i + 3).transpose();
+        moved[i] = posed.nodes[i] + maps.row(4 * i + 3).transpose();
     }
   }
   return moved;
@@ -112,7 +95,7 @@ Pose refit_pose(const Rig& rig, const PosedRig& posed, const std::vector<Vec3>& 
   pose.root = posed.skeleton.joints[0];
   std::array<Mat3, kJoints> turned;
   for (size_t j = 0; j < global.size(); ++j) {
-    turned[j] = j == 0 ? Mat3::Identity() : turned[static_cast<size_t>(kParents[j])];
+    turned[j] = j == 0 ? Mat3::Identity() : turned[kParents[j]];
     double total = 0;
     Vec3 before = Vec3::Zero(), after = Vec3::Zero();
     const auto each = [&](const auto& visit) {

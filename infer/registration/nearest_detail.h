@@ -1,4 +1,4 @@
-// The nearest of a set of points, by a k-d tree.
+// The nearest of a set of points, by a k-d tree, and how two sets are matched by it.
 #pragma once
 
 #include <limits>
@@ -42,5 +42,28 @@ class NearestPoint {
                                       uint32_t>
       tree_{3, cloud_, nanoflann::KDTreeSingleIndexAdaptorParams(10)};
 };
+
+/// visit(node's index, point, weight) for the nearest point of every node and for the nearest node
+/// of every point. Weights are Geman and McClure's of the squared distance; those of either way sum
+/// to one where all distances are zero.
+template <class F>
+void for_matches(const std::vector<Vec3>& nodes, const std::vector<Vec3>& cloud,
+                 const NearestPoint& in_cloud, double width, F&& visit) {
+  const auto kernel = [&](double squared) {
+    const double w = width * width / (width * width + squared);
+    return w * w;
+  };
+  const double per_node = 1.0 / static_cast<double>(nodes.size());
+  for (size_t i = 0; i < nodes.size(); ++i) {
+    const auto [k, squared] = in_cloud(nodes[i]);
+    visit(i, cloud[k], per_node * kernel(squared));
+  }
+  const NearestPoint in_nodes(nodes);
+  const double per_point = 1.0 / static_cast<double>(cloud.size());
+  for (const Vec3& p : cloud) {
+    const auto [i, squared] = in_nodes(p);
+    visit(i, p, per_point * kernel(squared));
+  }
+}
 
 }  // namespace restage

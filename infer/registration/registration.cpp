@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "autograd/base/error.h"
-#include "autograd/base/parallel.h"
+#include "autograd/base/parallel_each.h"
 #include "infer/extraction.h"
 #include "nn/geometry/closed_form.h"
 
@@ -30,8 +30,7 @@ std::vector<Vec3> thinned(const Points& cloud, double width, const std::string& 
                        "remove such points, and give metres");
     std::array<int64_t, 3> at;
     for (int c = 0; c < 3; ++c)
-      at[static_cast<size_t>(c)] =
-          static_cast<int64_t>(std::floor(static_cast<double>(p[c]) / width));
+      at[c] = static_cast<int64_t>(std::floor(static_cast<double>(p[c]) / width));
     Sum& cube = cubes[at];
     cube.sum += p.cast<double>();
     cube.count += 1;
@@ -90,18 +89,16 @@ std::vector<RigState> Registration::starts(const std::vector<Vec3>& cloud) const
     build.scale = previous_->scale;
     build.stretch = previous_->stretch;
   }
-  parallel_for(static_cast<int64_t>(all.size()), 1, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i) {
-      RigState state = build;
-      state.pose.local.fill(Mat3::Identity());
-      state.pose.local[0] =
-          turn_about_y(2 * std::numbers::pi * static_cast<double>(i % kHeadings) / kHeadings);
-      const double arms = kArms[static_cast<size_t>(i / kHeadings)];
-      state.pose.local[16] = Eigen::AngleAxisd(-arms, Vec3::UnitZ()).toRotationMatrix();
-      state.pose.local[17] = Eigen::AngleAxisd(arms, Vec3::UnitZ()).toRotationMatrix();
-      state = placed(rig_, state, cloud);
-      all[static_cast<size_t>(i)] = {misfit(pose_rig(rig_, state), cloud, kStartWidth), state};
-    }
+  parallel_each(static_cast<int64_t>(all.size()), 1, [&](int64_t i) {
+    RigState state = build;
+    state.pose.local.fill(Mat3::Identity());
+    state.pose.local[0] =
+        turn_about_y(2 * std::numbers::pi * static_cast<double>(i % kHeadings) / kHeadings);
+    const double arms = kArms[i / kHeadings];
+    state.pose.local[16] = Eigen::AngleAxisd(-arms, Vec3::UnitZ()).toRotationMatrix();
+    state.pose.local[17] = Eigen::AngleAxisd(arms, Vec3::UnitZ()).toRotationMatrix();
+    state = placed(rig_, state, cloud);
+    all[i] = {misfit(pose_rig(rig_, state), cloud, kStartWidth), state};
   });
   std::stable_sort(all.begin(), all.end(),
                    [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
@@ -119,12 +116,10 @@ std::span<const RetargetedFrame> Registration::push(const Points& cloud,
   const std::vector<Vec3> points = thinned(cloud, options_.grid, source);
   std::vector<RigState> fitted = starts(points);
   std::vector<double> costs(fitted.size());
-  parallel_for(std::ssize(fitted), 1, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i) {
-      const auto k = static_cast<size_t>(i);
-      fitted[k] = fit_articulated(rig_, points, fitted[k], options_.articulated);
-      costs[k] = misfit(pose_rig(rig_, fitted[k]), points, kLastWidth);
-    }
+  parallel_each(std::ssize(fitted), 1, [&](int64_t i) {
+    const auto k = static_cast<size_t>(i);
+    fitted[k] = fit_articulated(rig_, points, fitted[k], options_.articulated);
+    costs[k] = misfit(pose_rig(rig_, fitted[k]), points, kLastWidth);
   });
   const auto best =
       static_cast<size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());

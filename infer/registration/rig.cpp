@@ -19,12 +19,11 @@ std::vector<Segment> bones_of(const Joints& rest) {
   std::vector<Segment> out;
   std::array<bool, kJoints> has_child{};
   for (int j = 1; j < kJoints; ++j) {
-    has_child[static_cast<size_t>(kParents[j])] = true;
+    has_child[kParents[j]] = true;
     out.push_back({kParents[j], rest[kParents[j]], rest[j]});
   }
   for (int j = 1; j < kJoints; ++j)
-    if (!has_child[static_cast<size_t>(j)])
-      out.push_back({j, rest[j], 2 * rest[j] - rest[kParents[j]]});
+    if (!has_child[j]) out.push_back({j, rest[j], 2 * rest[j] - rest[kParents[j]]});
   return out;
 }
 
@@ -60,11 +59,9 @@ std::vector<size_t> spread(const Points& points, size_t count) {
 std::vector<Vec3> normals_of(const Mesh& mesh) {
   std::vector<Vec3> out(mesh.vertices.size(), Vec3::Zero());
   for (const Triangle& t : mesh.faces) {
-    const auto at = [&](size_t k) {
-      return mesh.vertices[static_cast<size_t>(t[k])].cast<double>();
-    };
+    const auto at = [&](size_t k) { return mesh.vertices[t[k]].cast<double>(); };
     const Vec3 normal = (at(1) - at(0)).cross(at(2) - at(0));
-    for (const int32_t v : t) out[static_cast<size_t>(v)] += normal;
+    for (const int32_t v : t) out[v] += normal;
   }
   for (Vec3& n : out)
     if (n.norm() > 0) n.normalize();
@@ -75,9 +72,7 @@ void connect(std::vector<RigNode>& nodes) {
   std::vector<int> order(nodes.size());
   for (size_t i = 0; i < nodes.size(); ++i) {
     std::iota(order.begin(), order.end(), 0);
-    const auto squared = [&](int k) {
-      return (nodes[static_cast<size_t>(k)].rest - nodes[i].rest).squaredNorm();
-    };
+    const auto squared = [&](int k) { return (nodes[k].rest - nodes[i].rest).squaredNorm(); };
     const size_t wanted = nodes[i].neighbours.size() + 1;  // the nearest is itself
     std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(wanted),
                       order.end(), [&](int a, int b) {
@@ -107,18 +102,15 @@ SkinWeights bone_distance_weights(const Points& points, const Joints& rest) {
     std::array<double, kJoints> near;
     near.fill(std::numeric_limits<double>::infinity());
     for (const Segment& bone : bones) {
-      double& best = near[static_cast<size_t>(bone.joint)];
+      double& best = near[bone.joint];
       best = std::min(best, distance(points[v].cast<double>(), bone));
     }
     std::array<int, kJoints> order;
     std::iota(order.begin(), order.end(), 0);
-    std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
-      return near[static_cast<size_t>(a)] < near[static_cast<size_t>(b)];
-    });
+    std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return near[a] < near[b]; });
     auto row = out.row(static_cast<Eigen::Index>(v));
     for (int k = 0; k < 4; ++k)
-      row[order[static_cast<size_t>(k)]] = static_cast<float>(std::pow(
-          std::max(kTouching, near[static_cast<size_t>(order[static_cast<size_t>(k)])]), -4));
+      row[order[k]] = static_cast<float>(std::pow(std::max(kTouching, near[order[k]]), -4));
     row /= row.sum();
   }
   return out;

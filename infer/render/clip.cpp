@@ -1,11 +1,20 @@
 #include "infer/render/clip.h"
 
 #include <algorithm>
-#include <limits>
 
 #include "autograd/base/error.h"
 
 namespace restage {
+namespace {
+
+/// The value that has `place` smaller ones.
+float ranked(std::vector<float>& values, size_t place) {
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(place);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+}  // namespace
 
 void check_clips(const std::string& where, const std::vector<Clip>& clips) {
   if (clips.empty() || clips.size() > 3)
@@ -47,12 +56,9 @@ Point clip_centre(const Points& points) {
     for (const Point& p : points)
       if (p.allFinite()) values.push_back(p[axis]);
     if (values.empty()) return centre;
-    const auto low = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 50);
-    std::nth_element(values.begin(), low, values.end());
-    const float first = *low;
-    const auto high = values.end() - 1 - static_cast<std::ptrdiff_t>(values.size() / 50);
-    std::nth_element(values.begin(), high, values.end());
-    centre[axis] = 0.5f * (first + *high);
+    const size_t stray = values.size() / 50;
+    const float low = ranked(values, stray), high = ranked(values, values.size() - 1 - stray);
+    centre[axis] = 0.5f * (low + high);
   }
   return centre;
 }
@@ -64,15 +70,12 @@ float clip_floor(const Clip& clip) {
     for (const Point& p : points)
       if (p.allFinite()) heights.push_back(p.y());
     if (heights.empty()) continue;
-    const auto low = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 500);
-    std::nth_element(heights.begin(), low, heights.end());
-    lowest.push_back(*low);
+    lowest.push_back(ranked(heights, heights.size() / 500));
   }
   if (lowest.empty()) return 0;
-  const auto low = lowest.begin() + static_cast<std::ptrdiff_t>(lowest.size() / 50);
-  std::nth_element(lowest.begin(), low, lowest.end());
+  const float low = ranked(lowest, lowest.size() / 50);
   // Feet stand a little over or in the floor; data whose floor is y = 0 keeps it.
-  return *low > -0.1f && *low < 0.1f ? 0 : *low;
+  return low > -0.1f && low < 0.1f ? 0 : low;
 }
 
 }  // namespace restage

@@ -4,21 +4,17 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <functional>
 #include <numbers>
 
 #include "autograd/base/error.h"
+#include "autograd/base/format.h"
 
 namespace restage {
 namespace {
 
 constexpr int kCountWidth = 10;  // room for the number of frames, known only at the end
 
-std::string vector_text(const Vec3& v) {
-  char text[96];
-  std::snprintf(text, sizeof text, "%.6f %.6f %.6f", v.x(), v.y(), v.z());
-  return text;
-}
+std::string vector_text(const Vec3& v) { return format("%.6f %.6f %.6f", v.x(), v.y(), v.z()); }
 
 bool is_leaf(int joint) {
   return std::find(kParents.begin(), kParents.end(), joint) == kParents.end();
@@ -84,9 +80,7 @@ BvhWriter::BvhWriter(std::string path, const Joints& rest, BvhWriterOptions opti
   list_joint(rest, 0, 0, options_.units_per_metre, text, order_, listed);
   text += "MOTION\nFrames: ";
   count_at_ = static_cast<long>(text.size());
-  char line[64];
-  std::snprintf(line, sizeof line, "%*d\nFrame Time: %.16g\n", kCountWidth, 0, 1.0 / options_.fps);
-  write(text + line);
+  write(text + format("%*d\nFrame Time: %.16g\n", kCountWidth, 0, 1.0 / options_.fps));
 }
 
 void BvhWriter::write(const std::string& text) {
@@ -111,11 +105,9 @@ void BvhWriter::push(const Pose& pose) {
 }
 
 void BvhWriter::commit() {
-  char count[32];
-  std::snprintf(count, sizeof count, "%*zu", kCountWidth, frames_);
   if (std::fseek(out_.get(), count_at_, SEEK_SET) != 0)
     throw WorkError(path_ + ": could not be written (" + std::strerror(errno) + ")");
-  write(count);
+  write(format("%*zu", kCountWidth, frames_));
   if (std::fclose(out_.release()) != 0)
     throw WorkError(path_ + ": could not be written (" + std::strerror(errno) +
                     "); free some space and run it again");

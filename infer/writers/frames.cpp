@@ -5,11 +5,11 @@
 
 #include <cerrno>
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "autograd/base/format.h"
 
 namespace restage {
 namespace {
@@ -92,8 +92,7 @@ FrameFolderWriter::FrameFolderWriter(std::string folder, std::vector<Triangle> f
 }
 
 void FrameFolderWriter::push(const Points& vertices, const std::vector<Triangle>& faces) {
-  char name[48];
-  std::snprintf(name, sizeof name, "/frame_%06zu.%s", frames_, extension(format_));
+  const std::string name = format("/frame_%06zu.%s", frames_, extension(format_));
   check_mesh(folder_ + name, vertices, faces);
   write_plain(temporary_.path() + name, mesh_bytes(format_, vertices, faces), folder_);
   ++frames_;

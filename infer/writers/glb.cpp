@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <nlohmann/json.hpp>
 #include <numeric>
 
@@ -40,8 +39,8 @@ class Buffer {
   }
   // The format wants these for positions and times.
   void set_bounds(int accessor, const std::vector<float>& low, const std::vector<float>& high) {
-    accessors_[static_cast<size_t>(accessor)]["min"] = low;
-    accessors_[static_cast<size_t>(accessor)]["max"] = high;
+    accessors_[accessor]["min"] = low;
+    accessors_[accessor]["max"] = high;
   }
   void describe(Json& root) const {
     root["buffers"] = Json::array({{{"byteLength", bytes_.size()}}});
@@ -215,9 +214,7 @@ GlbWriter::GlbWriter(std::string path, Mesh mesh, const Joints& rest, const Skin
   lost_ = weights;
   for (Eigen::Index v = 0; v < lost_.rows(); ++v) {
     lost_.row(v) /= -lost_.row(v).sum();
-    for (size_t k = 0; k < 4; ++k)
-      lost_(v, influences_.joints[static_cast<size_t>(v)][k]) +=
-          influences_.weights[static_cast<size_t>(v)][k];
+    for (size_t k = 0; k < 4; ++k) lost_(v, influences_.joints[v][k]) += influences_.weights[v][k];
   }
 }
 
@@ -237,7 +234,7 @@ void GlbWriter::push(const Pose& pose) {
                                                 c[2] * before[j][2] + c[3] * before[j][3]
                                           : c[3];
     if (side < 0) c = -c;
-    for (int k = 0; k < 4; ++k) turns[j][static_cast<size_t>(k)] = static_cast<float>(c[k]);
+    for (int k = 0; k < 4; ++k) turns[j][k] = static_cast<float>(c[k]);
   }
   turns_.insert(turns_.end(), turns.begin(), turns.end());
   for (int k = 0; k < 3; ++k) roots_.push_back(static_cast<float>(pose.root[k]));
@@ -263,7 +260,7 @@ void GlbWriter::measure_cut(const Pose& pose) {
     const Eigen::Index count = std::min(kBlock, lost_.rows() - start);
     moved.noalias() = lost_.middleRows(start, count) * transforms;
     for (Eigen::Index v = 0; v < count; ++v) {
-      const Eigen::Vector4f at = mesh_.vertices[static_cast<size_t>(start + v)].homogeneous();
+      const Eigen::Vector4f at = mesh_.vertices[start + v].homogeneous();
       const Eigen::Map<const Eigen::Matrix<float, 3, 4, Eigen::RowMajor>> m(moved.row(v).data());
       const double error = (m * at).norm();
       error_sum_ += error;

@@ -37,21 +37,21 @@ std::string got(const ConfigNode& node) {
   return (node.quoted ? "the text " : "") + in_quotes(node.text);
 }
 
-std::string number_text(double value) {
+template <class T>
+std::string shortest(T value) {
   char text[32];
-  const auto end = std::to_chars(text, text + sizeof text, value).ptr;
-  return std::string(text, end);
+  return std::string(text, std::to_chars(text, text + sizeof text, value).ptr);
 }
 
 /// The range of a rule: " > 0", " from 0 to 1".
 std::string range_text(const Rule& rule) {
   const bool low = std::isfinite(rule.low), high = std::isfinite(rule.high);
   if (low && high && !rule.low_open && !rule.high_open)
-    return " from " + number_text(rule.low) + " to " + number_text(rule.high);
+    return " from " + shortest(rule.low) + " to " + shortest(rule.high);
   std::string out;
-  if (low) out += (rule.low_open ? " > " : " >= ") + number_text(rule.low);
+  if (low) out += (rule.low_open ? " > " : " >= ") + shortest(rule.low);
   if (low && high) out += " and";
-  if (high) out += (rule.high_open ? " < " : " <= ") + number_text(rule.high);
+  if (high) out += (rule.high_open ? " < " : " <= ") + shortest(rule.high);
   return out;
 }
 
@@ -86,12 +86,6 @@ ConfigNode scalar(std::string text, bool is_quoted = false) {
   node.text = std::move(text);
   node.quoted = is_quoted;
   return node;
-}
-
-template <class T>
-std::string shortest(T value) {
-  char text[32];
-  return std::string(text, std::to_chars(text, text + sizeof text, value).ptr);
 }
 
 /// Texts that YAML or this reader would take for something else stand in quotes.

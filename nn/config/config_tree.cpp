@@ -2,8 +2,9 @@
 
 #include <cctype>
 #include <charconv>
-#include <cstdio>
 #include <utility>
+
+#include "autograd/base/format.h"
 
 namespace restage {
 namespace {
@@ -24,9 +25,7 @@ std::string escaped(std::string_view text, bool yaml) {
     } else if (c == '\n') {
       out += "\\n";
     } else if (byte < 0x20 || byte == 0x7f) {
-      char code[8];
-      std::snprintf(code, sizeof code, "\\x%02x", byte);
-      out += code;
+      out += format("\\x%02x", byte);
     } else {
       out += c;
     }

@@ -1,7 +1,5 @@
 #include "nn/geometry/closed_form.h"
 
-#include <cmath>
-
 namespace restage {
 namespace {
 

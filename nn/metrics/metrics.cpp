@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "autograd/base/error.h"
-#include "autograd/base/parallel.h"
+#include "autograd/base/parallel_each.h"
 
 namespace restage::metrics {
 namespace {
@@ -27,9 +27,7 @@ Value mean_over_frames(int64_t first, int64_t last,
   const int64_t n = last - first;
   if (n <= 0) return std::nullopt;
   std::vector<double> each(static_cast<size_t>(n));
-  parallel_for(n, 1, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i) each[i] = of_frame(first + i);
-  });
+  parallel_each(n, 1, [&](int64_t i) { each[i] = of_frame(first + i); });
   double total = 0;
   for (const double x : each) total += x;
   return finite(total / static_cast<double>(n));
@@ -97,10 +95,9 @@ std::vector<Similarity> align(const Track& pred, const Track& truth, const Align
       maps.assign(frames, procrustes(pred.data, truth.data, pred.frames * pred.points, how.scale));
       break;
     case Alignment::Mode::frame:
-      parallel_for(pred.frames, 1, [&](int64_t begin, int64_t end) {
-        for (int64_t f = begin; f < end; ++f)
-          maps[f] = procrustes(pred.slice(f, f + 1).data, truth.slice(f, f + 1).data, pred.points,
-                               how.scale);
+      parallel_each(pred.frames, 1, [&](int64_t f) {
+        maps[f] = procrustes(pred.slice(f, f + 1).data, truth.slice(f, f + 1).data, pred.points,
+                             how.scale);
       });
       break;
   }

@@ -48,7 +48,7 @@ Var bone_vectors(const Var& rest) {
   Tensor parents = Tensor::empty({n, kJoints - 1}, DType::i32);
   for (int64_t i = 0; i < n; ++i)
     for (int64_t j = 1; j < kJoints; ++j)
-      parents.data<int32_t>()[i * (kJoints - 1) + j - 1] = kParents[static_cast<size_t>(j)];
+      parents.data<int32_t>()[i * (kJoints - 1) + j - 1] = kParents[j];
   return reshape(slice(rest, 1, 1, kJoints) - gather(rest, parents), {n, 3 * (kJoints - 1)});
 }
 

@@ -24,8 +24,8 @@ Smrm::Smrm(const SmrmConfig& c, const Init& init)
   const int64_t width = rotation_width(c.rotation);
   std::vector<double> rest_pose(static_cast<size_t>(c.joints * width), 0.0);
   for (int64_t j = 0; j < c.joints; ++j) {
-    rest_pose[static_cast<size_t>(j * width)] = 1;
-    if (width == 6) rest_pose[static_cast<size_t>(j * width + 4)] = 1;
+    rest_pose[j * width] = 1;
+    if (width == 6) rest_pose[j * width + 4] = 1;
   }
   if (c.rest_pose_start) {
     std::vector<double> w = fc_rot.weight.value.to_vector<double>();

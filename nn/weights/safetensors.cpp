@@ -57,17 +57,10 @@ float from_half(uint16_t h) {
     const float small = static_cast<float>(fraction) * 0x1p-24f;
     return sign != 0 ? -small : small;
   }
-  float out;
-  std::memcpy(&out, &bits, 4);
-  return out;
+  return std::bit_cast<float>(bits);
 }
 
-float from_bfloat(uint16_t h) {
-  const uint32_t bits = static_cast<uint32_t>(h) << 16;
-  float out;
-  std::memcpy(&out, &bits, 4);
-  return out;
-}
+float from_bfloat(uint16_t h) { return std::bit_cast<float>(static_cast<uint32_t>(h) << 16); }
 
 /// What the header says of a tensor; nothing of it is believed yet.
 struct Claim {

@@ -49,8 +49,8 @@ MotionStatistics::Columns columns(const std::vector<Tensor>& parts, int64_t n, d
   for (const Tensor& t : parts) {
     const float* x = t.data<float>();
     for (int64_t i = 0; i < t.numel(); ++i) {
-      s[static_cast<size_t>(i % n)] += x[i];
-      q[static_cast<size_t>(i % n)] += static_cast<double>(x[i]) * x[i];
+      s[i % n] += x[i];
+      q[i % n] += static_cast<double>(x[i]) * x[i];
     }
     rows += t.numel() / n;
   }
