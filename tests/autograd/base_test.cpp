@@ -1,144 +1,120 @@
+// The base library; and that the include directions of docs/design/architecture.md hold.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <atomic>
-#include <filesystem>
-#include <fstream>
+#include <cstdlib>
 #include <set>
 
 #include "autograd/base/atomic_file.h"
-#include "autograd/base/error.h"
 #include "autograd/base/inline_vector.h"
 #include "autograd/base/output_check.h"
-#include "autograd/base/parallel.h"
 #include "autograd/base/rng.h"
+#include "tests/support/files.h"
 #include "tests/support/lacking.h"
+#include "tests/support/use_set.h"
 
 namespace restage {
 namespace {
 
 namespace fs = std::filesystem;
-
-class AtomicFiles : public testing::Test {
- protected:
-  void SetUp() override {
-    std::string pattern = (fs::temp_directory_path() / "restage-base-XXXXXX").string();
-    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-  std::string at(const std::string& name) const { return (folder_ / name).string(); }
-  size_t entries() const {
-    return static_cast<size_t>(
-        std::distance(fs::directory_iterator(folder_), fs::directory_iterator{}));
-  }
-  fs::path folder_;
-};
+using namespace test;
+using AtomicFiles = FileTest;
 
 TEST_F(AtomicFiles, AppearWholeAndReadBack) {
   const std::string text("a\0b\n", 4);
-  write_file_atomically(at("x"), text);
-  EXPECT_EQ(read_file(at("x")), text);
-  write_file_atomically(at("x"), "");
-  EXPECT_EQ(read_file(at("x")), "");
-  EXPECT_EQ(entries(), 1u);
+  write_file_atomically(dir / "x", text);
+  EXPECT_EQ(read_file(dir / "x"), text);
+  write_file_atomically(dir / "x", "");
+  EXPECT_EQ(read_file(dir / "x"), "");
+  EXPECT_EQ(names_in(dir.path()).size(), 1u);
 }
 
 TEST_F(AtomicFiles, WithoutCommitLeaveNothingAndKeepTheOld) {
-  write_file_atomically(at("x"), "old");
+  write_file_atomically(dir / "x", "old");
   {
-    const AtomicFile file(at("x"));
+    const AtomicFile file(dir / "x");
     std::ofstream(file.path()) << "half";
-    EXPECT_EQ(read_file(at("x")), "old");
-    EXPECT_EQ(entries(), 2u);
+    EXPECT_EQ(read_file(dir / "x"), "old");
+    EXPECT_EQ(names_in(dir.path()).size(), 2u);
   }
-  EXPECT_EQ(read_file(at("x")), "old");
-  EXPECT_EQ(entries(), 1u);
+  EXPECT_EQ(read_file(dir / "x"), "old");
+  EXPECT_EQ(names_in(dir.path()).size(), 1u);
 }
 
 TEST_F(AtomicFiles, NameTheTargetThatCannotBeWritten) {
-  for (const std::string& bad : {at("no/such/folder/x"), folder_.string()}) {
-    try {
-      write_file_atomically(bad, "x");
-      ADD_FAILURE() << bad << " was written";
-    } catch (const InputError& error) {
-      EXPECT_NE(std::string(error.what()).find(bad), std::string::npos) << error.what();
-      EXPECT_EQ(error.exit_code, 2);
-    }
-  }
+  for (const std::string& bad : {dir / "no/such/folder/x", dir.path()})
+    expect_error<InputError>([&] { write_file_atomically(bad, "x"); }, {bad});
 }
 
 TEST_F(AtomicFiles, AFullDiskIsAWorkError) {
   if (!fs::exists("/dev/full")) RESTAGE_LACKS("there is no /dev/full here");
   // The temporary file of this process, already there as a link to the full device.
-  fs::create_symlink("/dev/full", at("x") + ".part" + std::to_string(::getpid()));
-  try {
-    write_file_atomically(at("x"), std::string(100000, 'x'));
-    ADD_FAILURE() << "a full disk went unnoticed";
-  } catch (const WorkError& error) {
-    EXPECT_EQ(error.exit_code, 1);
-    EXPECT_NE(std::string(error.what()).find(at("x") + ": "), std::string::npos) << error.what();
-  }
-  EXPECT_EQ(entries(), 0u);
+  fs::create_symlink("/dev/full", dir / "x" + ".part" + std::to_string(::getpid()));
+  expect_error<WorkError>([&] { write_file_atomically(dir / "x", std::string(100000, 'x')); },
+                          {dir / "x" + ": "});
+  EXPECT_EQ(names_in(dir.path()).size(), 0u);
 }
 
 TEST_F(AtomicFiles, LeadThroughLinksAndLeavePipesAlone) {
-  fs::create_symlink("x", at("link"));
-  write_file_atomically(at("link"), "new");
-  EXPECT_TRUE(fs::is_symlink(at("link")));
-  EXPECT_EQ(read_file(at("x")), "new");
-  ASSERT_EQ(::mkfifo(at("pipe").c_str(), 0600), 0);
-  EXPECT_THROW(write_file_atomically(at("pipe"), "x"), InputError);
-  EXPECT_TRUE(fs::is_fifo(at("pipe")));
-  EXPECT_THROW(read_file(at("pipe")), InputError);
+  fs::create_symlink("x", dir / "link");
+  write_file_atomically(dir / "link", "new");
+  EXPECT_TRUE(fs::is_symlink(dir / "link"));
+  EXPECT_EQ(read_file(dir / "x"), "new");
+  ASSERT_EQ(::mkfifo((dir / "pipe").c_str(), 0600), 0);
+  EXPECT_THROW(write_file_atomically(dir / "pipe", "x"), InputError);
+  EXPECT_TRUE(fs::is_fifo(dir / "pipe"));
+  EXPECT_THROW(read_file(dir / "pipe"), InputError);
 }
 
 TEST_F(AtomicFiles, NamesMayBeAsLongAsTheFileSystemHolds) {
   const std::string longest(255, 'x');
-  write_file_atomically(at(longest), "1");
-  EXPECT_EQ(read_file(at(longest)), "1");
-  EXPECT_THROW(write_file_atomically(at(longest + "x"), "1"), InputError);
+  write_file_atomically(dir / longest, "1");
+  EXPECT_EQ(read_file(dir / longest), "1");
+  EXPECT_THROW(write_file_atomically(dir / longest + "x", "1"), InputError);
 }
 
 TEST_F(AtomicFiles, ASignalRemovesWhatIsUnderWay) {
-  write_file_atomically(at("kept"), "1");
-  const AtomicFile file(at("kept"));
-  const Temporary folder(at("folder"));
-  fs::create_directories(at("folder/a/b"));
-  for (const char* name : {"folder/1", "folder/a/2", "folder/a/b/3"}) std::ofstream(at(name));
-  fs::create_directory_symlink(folder_ / "kept", at("folder/link"));
+  write_file_atomically(dir / "kept", "1");
+  const AtomicFile file(dir / "kept");
+  const Temporary folder(dir / "folder");
+  fs::create_directories(dir / "folder/a/b");
+  for (const char* name : {"folder/1", "folder/a/2", "folder/a/b/3"}) std::ofstream(dir / name);
+  fs::create_directory_symlink(dir / "kept", dir / "folder/link");
   {
-    Temporary other(at("other"));
-    std::ofstream(at("other"));
+    Temporary other(dir / "other");
+    std::ofstream(dir / "other");
     other.keep();
   }
   remove_temporaries();
-  EXPECT_EQ(entries(), 2u);  // "kept" and "other"
-  EXPECT_EQ(read_file(at("kept")), "1");
+  EXPECT_EQ(names_in(dir.path()).size(), 2u);  // "kept" and "other"
+  EXPECT_EQ(read_file(dir / "kept"), "1");
 }
 
 TEST_F(AtomicFiles, OutputsMustNotLieOverInputs) {
-  fs::create_directories(at("folder/in"));
-  write_file_atomically(at("folder/in/x"), "1");
-  fs::create_hard_link(at("folder/in/x"), at("twin"));
-  fs::create_symlink(at("folder/in"), at("link"));
-  const std::string x = at("folder/in/x");
-  for (const std::string& out : {x, at("twin"), at("link") + "/x", at("folder"), at("link"),
-                                 at("folder/../folder/in/x"), at("folder/")})
-    EXPECT_THROW(check_output(out, {"", at("missing"), x}), InputError) << out;
-  EXPECT_THROW(check_output(at("link"), {at("folder/in")}), InputError);
-  fs::create_directory(at("folder/other"));
-  for (const std::string& out : {at("new"), at("folder/in/new"), at("folder/other"), std::string()})
-    EXPECT_NO_THROW(check_output(out, {x, at("folder")})) << out;
+  fs::create_directories(dir / "folder/in");
+  write_file_atomically(dir / "folder/in/x", "1");
+  fs::create_hard_link(dir / "folder/in/x", dir / "twin");
+  fs::create_symlink(dir / "folder/in", dir / "link");
+  const std::string x = dir / "folder/in/x";
+  for (const std::string& out : {x, dir / "twin", dir / "link" + "/x", dir / "folder", dir / "link",
+                                 dir / "folder/../folder/in/x", dir / "folder/"})
+    EXPECT_THROW(check_output(out, {"", dir / "missing", x}), InputError) << out;
+  EXPECT_THROW(check_output(dir / "link", {dir / "folder/in"}), InputError);
+  fs::create_directory(dir / "folder/other");
+  for (const std::string& out :
+       {dir / "new", dir / "folder/in/new", dir / "folder/other", std::string()})
+    EXPECT_NO_THROW(check_output(out, {x, dir / "folder"})) << out;
 }
 
 TEST_F(AtomicFiles, ReadingHasLimits) {
-  write_file_atomically(at("x"), "12345");
-  EXPECT_EQ(read_file(at("x"), 5), "12345");
-  EXPECT_THROW(read_file(at("x"), 4), InputError);
-  EXPECT_THROW(read_file(at("missing")), InputError);
-  EXPECT_THROW(read_file(folder_.string()), InputError);
+  write_file_atomically(dir / "x", "12345");
+  EXPECT_EQ(read_file(dir / "x", 5), "12345");
+  EXPECT_THROW(read_file(dir / "x", 4), InputError);
+  EXPECT_THROW(read_file(dir / "missing"), InputError);
+  EXPECT_THROW(read_file(dir.path()), InputError);
 }
 
 TEST(Checksums, SeeEverySingleByte) {
@@ -177,9 +153,8 @@ TEST(InlineVector, HoldsValuesUpToItsSize) {
 }
 
 TEST(ParallelFor, CoversEveryItemOnceForOddSizes) {
-  const int before = threads();
   for (const int t : {1, 2, 3}) {
-    set_threads(t);
+    const testing::UseThreads use(t);
     for (const int64_t n : {0, 1, 2, 7, 64, 1001})
       for (const int64_t grain : {0, 1, 3, 64, 5000}) {
         std::vector<std::atomic<int>> hits(static_cast<size_t>(n));
@@ -192,12 +167,10 @@ TEST(ParallelFor, CoversEveryItemOnceForOddSizes) {
         for (const auto& h : hits) ASSERT_EQ(h, 1) << n << " " << grain << " " << t;
       }
   }
-  set_threads(before);
 }
 
 TEST(ParallelFor, NestsAndPassesErrorsOn) {
-  const int before = threads();
-  set_threads(3);
+  const testing::UseThreads use(3);
   std::atomic<int> count{0};
   parallel_for(10, 1, [&](int64_t, int64_t) {
     parallel_for(10, 1, [&](int64_t from, int64_t to) { count += static_cast<int>(to - from); });
@@ -208,7 +181,6 @@ TEST(ParallelFor, NestsAndPassesErrorsOn) {
                               if (from == 57) throw WorkError("piece 57");
                             }),
                WorkError);
-  set_threads(before);
 }
 
 TEST(Random, PhiloxGivesThePublishedNumbers) {
@@ -270,6 +242,39 @@ TEST(Errors, CarryTheirExitCodes) {
   EXPECT_EQ(WorkError("x").exit_code, 1);
   EXPECT_EQ(ShapeError("x").exit_code, 1);
   EXPECT_EQ(NonFiniteError("x").exit_code, 1);
+}
+
+/// Exit code of the script for a source tree, -1 if there is no Python.
+int check_layers(const std::string& root, const std::string& output = "") {
+  if (std::system("python3 -c pass > /dev/null 2>&1") != 0) return -1;
+  const std::string command =
+      "python3 '" RESTAGE_SOURCE_DIR "/cmake/check_layers.py' '" + root + "'" + output;
+  return WEXITSTATUS(std::system(command.c_str()));
+}
+
+TEST(Layers, PointOneWay) {
+  const int code = check_layers(RESTAGE_SOURCE_DIR);
+  if (code < 0) RESTAGE_LACKS("python3 is missing");
+  EXPECT_EQ(code, 0) << "see the lines above; the rule is in docs/design/architecture.md";
+}
+
+TEST(Layers, ABrokenArrowIsSeen) {
+  const auto with = [](const std::string& file, const std::string& line) {
+    const test::TempDir root;
+    root.write(file, line + "\n");
+    return check_layers(root.path(), " > /dev/null");
+  };
+  const int fine = with("autograd/ops/x.h", "#include \"autograd/tape/tape.h\"");
+  if (fine < 0) RESTAGE_LACKS("python3 is missing");
+  EXPECT_EQ(fine, 0);
+  EXPECT_EQ(with("train/stages/x.cpp", "#include \"datasets/schema.h\""), 0);
+  EXPECT_EQ(with("autograd/tape/x.h", "#include \"autograd/ops/reduce.h\""), 1);
+  EXPECT_EQ(with("autograd/ops/x.cpp", "#include \"autograd/cpu/pool.h\""), 1);
+  EXPECT_EQ(with("train/trainer.cpp", "#include \"datasets/schema.h\""), 1);
+  EXPECT_EQ(with("infer/x.cpp", "#include \"train/run.h\""), 1);
+  EXPECT_EQ(with("nn/models/x.cpp", "#include \"train/run.h\""), 1);
+  EXPECT_EQ(with("nn/models/x.cpp", "#include <tbb/parallel_for.h>"), 1);
+  EXPECT_EQ(with("autograd/unknown/x.cpp", "#include \"autograd/base/rng.h\""), 1);
 }
 
 }  // namespace

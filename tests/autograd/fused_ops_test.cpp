@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 
-#include "autograd/base/parallel.h"
 #include "autograd/gradcheck/evaluate.h"
 #include "autograd/kernels/stats.h"
 #include "autograd/ops/attention.h"
@@ -50,29 +49,23 @@ void expect_fused(const std::vector<Tensor>& inputs, const Build& fused, const B
 }
 
 TEST(FusedOps, GruIsItsReference) {
-  for (const int64_t h : {1, 5, 16}) {
-    expect_fused(
-        {random({7, 3, 4}, 1), random({3, h}, 2), random({3 * h, 4}, 3), random({3 * h, h}, 4),
-         random({3 * h}, 5), random({3 * h}, 6)},
-        [](Args x) { return gru(x[0], x[1], x[2], x[3], x[4], x[5]); },
-        [](Args x) { return gru_reference(x[0], x[1], x[2], x[3], x[4], x[5]); });
-  }
-}
-
-TEST(FusedOps, GruOfManyRowsAndOfOneFrameIsItsReference) {
   struct Sizes {
     int64_t t, n, i, h;
   };
-  // More rows than a panel and more units than a block; then frames: of few rows and whole blocks
-  // of units, whose weights are read as they lie, and of more rows or other numbers of units.
+  // Then more rows than a panel and more units than a block; then frames: of few rows and whole
+  // blocks of units, whose weights are read as they lie, and of more rows or other numbers of
+  // units.
   for (const auto& [t, n, i, h] :
-       {Sizes{3, 14, 5, 40}, Sizes{1, 1, 69, 64}, Sizes{1, 2, 64, 32}, Sizes{1, 3, 1, 96},
-        Sizes{1, 4, 20, 320}, Sizes{1, 5, 20, 64}, Sizes{1, 2, 7, 33}, Sizes{1, 1, 0, 32}})
+       {Sizes{7, 3, 4, 1}, Sizes{7, 3, 4, 5}, Sizes{7, 3, 4, 16}, Sizes{3, 14, 5, 40},
+        Sizes{1, 1, 69, 64}, Sizes{1, 2, 64, 32}, Sizes{1, 3, 1, 96}, Sizes{1, 4, 20, 320},
+        Sizes{1, 5, 20, 64}, Sizes{1, 2, 7, 33}, Sizes{1, 1, 0, 32}}) {
+    SCOPED_TRACE((Shape{t, n, i, h}).str());
     expect_fused(
         {random({t, n, i}, 1), random({n, h}, 2), random({3 * h, i}, 3), random({3 * h, h}, 4),
          random({3 * h}, 5), random({3 * h}, 6)},
         [](Args x) { return gru(x[0], x[1], x[2], x[3], x[4], x[5]); },
         [](Args x) { return gru_reference(x[0], x[1], x[2], x[3], x[4], x[5]); });
+  }
 }
 
 /// Every frame of x [t, n, i] alone, on a tape or without, as gru() gives them all together.
@@ -90,7 +83,6 @@ void expect_frames_of_the_sequence(const Tensor& x, const Tensor& h0, const Buil
 }
 
 TEST(FusedOps, AFrameOfAGruAloneHasTheBitsOfTheSequence) {
-  const int before = threads();
   for (const int64_t n : {1, 2, 3, 4, 5})
     for (const int64_t h : {33, 64, 320}) {
       SCOPED_TRACE(std::to_string(n) + " rows, " + std::to_string(h) + " units");
@@ -98,7 +90,7 @@ TEST(FusedOps, AFrameOfAGruAloneHasTheBitsOfTheSequence) {
       for (const Shape& shape : {Shape{3 * h, 69}, Shape{3 * h, h}, Shape{3 * h}, Shape{3 * h}})
         weights.emplace_back(random(shape, 2 + weights.size()).cast(DType::f32));
       for (const int count : {1, 2, 3}) {
-        set_threads(count);
+        const testing::UseThreads use(count);
         expect_frames_of_the_sequence(random({4, n, 69}, 1).cast(DType::f32),
                                       random({n, h}, 6).cast(DType::f32), [&](Args x) {
                                         return gru(x[0], x[1], weights[0], weights[1], weights[2],
@@ -106,7 +98,6 @@ TEST(FusedOps, AFrameOfAGruAloneHasTheBitsOfTheSequence) {
                                       });
       }
     }
-  set_threads(before);
 }
 
 TEST(FusedOps, AFrameOfAGruWithoutATapeHasTheSameBitsOnAllVectorSets) {
@@ -145,32 +136,37 @@ Tensor alike(const Shape& shape, uint64_t seed, double spread) {
   return x;
 }
 
+/// Points and features that differ by `spread`, and weights.
+std::vector<Tensor> attention(const Shape& rows, double spread) {
+  const int64_t d = rows[-1];
+  return {alike({rows[0], rows[1], 3}, 1, spread),
+          alike(rows, 2, spread),
+          alike(rows, 3, spread),
+          random(rows, 4),
+          random({d, 3}, 5),
+          random({d}, 6, 0.01),
+          random({2 * d, d}, 7),
+          random({d, d}, 8),
+          random({d}, 9)};
+}
+Var attend(Args x, const Tensor& index, bool dense = false) {
+  return neighbour_attention({x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]}, index, 0.05,
+                             dense);
+}
+Var attend_reference(Args x, const Tensor& index) {
+  return neighbour_attention_reference({x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]},
+                                       index, 0.05);
+}
+
 TEST(FusedOps, NeighbourAttentionIsItsReference) {
-  const int64_t v = 200, k = 5, d = 33;
   for (const double spread : {1.0, 0.02, 1e-4}) {  // most units active, some, none
-    const Shape rows{2, v, d};
-    const Tensor xyz = alike({2, v, 3}, 1, spread), index = knn(xyz, xyz, k);
-    const std::vector<Tensor> inputs = {xyz,
-                                        alike(rows, 2, spread),
-                                        alike(rows, 3, spread),
-                                        random(rows, 4),
-                                        random({d, 3}, 5),
-                                        random({d}, 6, 0.01),
-                                        random({2 * d, d}, 7),
-                                        random({d, d}, 8),
-                                        random({d}, 9)};
+    const std::vector<Tensor> inputs = attention({2, 200, 33}, spread);
+    const Tensor index = knn(inputs[0], inputs[0], 5);
     for (const bool dense : {false, true}) {
       take_kernel_stats();
       expect_fused(
-          inputs,
-          [&](Args x) {
-            return neighbour_attention({x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]},
-                                       index, 0.05, dense);
-          },
-          [&](Args x) {
-            return neighbour_attention_reference(
-                {x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]}, index, 0.05);
-          });
+          inputs, [&](Args x) { return attend(x, index, dense); },
+          [&](Args x) { return attend_reference(x, index); });
       const KernelStats stats = take_kernel_stats();
       EXPECT_EQ(stats.active_share < 0.5, !dense && spread < 1);
       EXPECT_EQ(stats.active_score_share < 0.5, !dense && spread < 1);
@@ -179,12 +175,7 @@ TEST(FusedOps, NeighbourAttentionIsItsReference) {
 }
 
 TEST(FusedOps, NeighbourAttentionShowsWhatIsNotFinite) {
-  const int64_t v = 60, d = 33;
-  const Shape rows{1, v, d};
-  const std::vector<Tensor> inputs = {
-      alike({1, v, 3}, 1, 1e-4), alike(rows, 2, 1e-4), alike(rows, 3, 1e-4),
-      random(rows, 4),           random({d, 3}, 5),    random({d}, 6, 0.01),
-      random({2 * d, d}, 7),     random({d, d}, 8),    random({d}, 9)};
+  const std::vector<Tensor> inputs = attention({1, 60, 33}, 1e-4);
   const Tensor index = knn(inputs[0], inputs[0], 5);
   for (size_t k = 0; k + 1 < inputs.size(); ++k)  // the last, g, is not seen by the softmax
     for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity()}) {
@@ -197,11 +188,8 @@ TEST(FusedOps, NeighbourAttentionShowsWhatIsNotFinite) {
         for (const double e : y.value.to_vector<double>()) sum += e;
         return std::isfinite(sum);
       };
-      const Var reference = neighbour_attention_reference(
-          {a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8]}, index, 0.05);
-      const Var fused =
-          neighbour_attention({a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8]}, index, 0.05);
-      EXPECT_TRUE(finite(reference) || !finite(fused)) << "input " << k << " with " << bad;
+      EXPECT_TRUE(finite(attend_reference(a, index)) || !finite(attend(a, index)))
+          << "input " << k << " with " << bad;
     }
 }
 

@@ -9,7 +9,6 @@
 #include <cstring>
 
 #include "autograd/base/error.h"
-#include "autograd/base/parallel.h"
 #include "autograd/gradcheck/evaluate.h"
 #include "autograd/kernels/matmul.h"
 #include "autograd/ops/linear.h"
@@ -44,12 +43,6 @@ struct UseUnit {
   bool before = matrix_unit();
   explicit UseUnit(bool use) { use_matrix_unit(use); }
   ~UseUnit() { use_matrix_unit(before); }
-};
-
-struct Threads {
-  int before = threads();
-  explicit Threads(int n) { set_threads(n); }
-  ~Threads() { set_threads(before); }
 };
 
 /// A product as the kernel gets it.
@@ -249,7 +242,7 @@ TEST(MatmulPrecision, AllMeansAndThreadsGiveTheSameBits) {
       EXPECT_TRUE(same_bits(c.run(), first)) << means << ", " << c.str();
     });
     for (const int n : {1, 2, 3}) {
-      const Threads use(n);
+      const testing::UseThreads use(n);
       EXPECT_TRUE(same_bits(c.run(), first)) << n << " threads, " << c.str();
     }
   }

@@ -7,13 +7,13 @@
 #include <cstring>
 #include <limits>
 
-#include "autograd/base/parallel.h"
 #include "autograd/gradcheck/evaluate.h"
 #include "autograd/ops/linear.h"
 #include "autograd/ops/points.h"
 #include "autograd/ops/reduce.h"
 #include "autograd/ops/rotation.h"
 #include "tests/support/expect_near.h"
+#include "tests/support/use_set.h"
 
 namespace restage {
 namespace {
@@ -202,14 +202,12 @@ TEST(Neighbours, SurviveNaNAndRefuseNonsense) {
 /// Runs f with 1, 2, 3 and 7 threads and compares the bits.
 template <class F>
 void expect_same_for_all_threads(F&& f) {
-  const int before = threads();
-  set_threads(1);
-  const Tensor first = f();
-  for (const int n : {2, 3, 7}) {
-    set_threads(n);
-    EXPECT_TRUE(same_bits(first, f())) << n << " threads";
-  }
-  set_threads(before);
+  const auto with = [&](int n) {
+    const testing::UseThreads use(n);
+    return f();
+  };
+  const Tensor first = with(1);
+  for (const int n : {2, 3, 7}) EXPECT_TRUE(same_bits(first, with(n))) << n << " threads";
 }
 
 TEST(Threads, SumsOfManyNumbersHaveTheSameBits) {

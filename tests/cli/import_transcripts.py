@@ -4,7 +4,7 @@
     python3 tests/cli/import_transcripts.py BUILD_DIR DATA_FOLDER > docs/import_transcripts.md
 
 Commands run as they stand there, in a folder in which `data` is the data folder (docs/data.md) and
-`samples` what BUILD_DIR/tests/make_samples wrote. test_transcripts.py runs those of the samples."""
+`samples` what BUILD_DIR/tests/make_samples wrote. test_import.py runs those of the samples."""
 import os
 import shlex
 import subprocess

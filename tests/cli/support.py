@@ -37,6 +37,13 @@ class CliTest(unittest.TestCase):
         return Result(subprocess.run([PROGRAM, *map(str, arguments)], cwd=self.folder, stdout=stdout, stderr=subprocess.PIPE,
                                      text=True, timeout=timeout, preexec_fn=before, errors="replace"))
 
+    def start(self, *arguments):
+        """The command in the background, which ends with the test."""
+        process = subprocess.Popen([PROGRAM, *arguments], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        for clean in (process.stderr.close, process.stdout.close, process.wait, process.kill):
+            self.addCleanup(clean)
+        return process
+
     def done(self, *arguments):
         """The command succeeds; its standard output."""
         result = self.restage(*arguments)

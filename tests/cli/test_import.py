@@ -1,10 +1,13 @@
 """restage data import: what is found in recordings is told, what does not fit is refused, nothing is ignored."""
 import os
 
-from support import CliTest
+import import_transcripts
+from support import CliTest, PROGRAM
 from test_data import JOINTS, NAMES, toy_bvh
 
 RESTS = " 0" * 66
+SAMPLES = os.path.join(os.path.dirname(os.environ["RESTAGE_MAKE_H5"]), "make_samples")
+PAGE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "docs", "import_transcripts.md")
 
 
 def frames(motion, seconds="0.0333333"):
@@ -191,3 +194,21 @@ class Import(CliTest):
         self.done("data", "import", ply("cm.ply", 170), "--scale", 0.01, "--out", "x.h5")
         found = self.json("data", "import", ply("cm.ply", 170), "--out", "x.h5")
         self.assertIn("--scale 0.01", found["reports"][0]["remarks"][0])
+
+
+class Transcripts(CliTest):
+    """The commands of docs/import_transcripts.md, as far as their files are made here."""
+
+    def test_every_importer_reads_its_sample(self):
+        import_transcripts.prepare(self.folder, SAMPLES)
+        with open(PAGE, encoding="utf-8") as f:
+            page = f.read()
+        for _, _, command in import_transcripts.CASES:
+            with self.subTest(command=command):
+                self.assertIn("\n$ " + command + "\n", page, "renew docs/import_transcripts.md (import_transcripts.py)")
+                if "samples/" in command:
+                    code, text = import_transcripts.run(PROGRAM, self.folder, command)
+                    self.assertEqual(code, 0, text)
+                    self.assertIn("\nwrote ", text)
+                    self.assertNotIn("skipped", text)
+                    self.assertEqual(self.json("data", "verify", command.split()[-1])["problems"], [])

@@ -38,12 +38,6 @@ class Sweep(CliTest):
     def plan(self, *arguments):
         return self.json("sweep", "plan", "sweep.yaml", *arguments)
 
-    def start(self, *arguments):
-        process = subprocess.Popen([PROGRAM, *arguments], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        for clean in (process.stderr.close, process.stdout.close, process.wait, process.kill):
-            self.addCleanup(clean)
-        return process
-
     def result(self, trial, folder="d"):
         return json.loads(self.bytes("%s/trials/%s/result.json" % (folder, trial)))
 
@@ -52,6 +46,12 @@ class Sweep(CliTest):
         while not condition():
             self.assertLess(time.monotonic(), end, "waited too long")
             time.sleep(0.02)
+
+    def sweeper(self, *arguments):
+        """A sweep in the background, of which a trial runs."""
+        process = self.start("sweep", "run", "sweep.yaml", "--out", "d", *arguments)
+        self.wait_for(lambda: os.path.exists(self.path("d/plan.json")) and self.running())
+        return process
 
     def running(self, folder="d"):
         return [t["id"] for t in self.json("sweep", "status", folder)["trials"] if t["state"] == "running"]
@@ -324,8 +324,7 @@ class Runs(Sweep):
         self.write("sweep.yaml", "base: configs/tiny.yaml\nset: {stages: [deformation], deformation.optimiser.steps: 800}\nseeds: [1, 2, 3]\n")
         whole = self.restage("sweep", "run", "sweep.yaml", "--out", "whole", "store=whole-store")
         self.assertEqual(whole.code, 0, whole.err)
-        sweeper = self.start("sweep", "run", "sweep.yaml", "--out", "d", "store=d-store", "--jobs", "2")
-        self.wait_for(lambda: os.path.exists(self.path("d/plan.json")) and self.running())
+        sweeper = self.sweeper("store=d-store", "--jobs", "2")
         self.done("sweep", "stop", "d")
         self.assertEqual(sweeper.wait(60), 1)
         self.assertIn("goes on", sweeper.stderr.read())
@@ -378,8 +377,7 @@ class Runs(Sweep):
 
     def test_signals_are_passed_on(self):
         for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
-            sweeper = self.start("sweep", "run", "sweep.yaml", "--out", "d", "skeleton.optimiser.steps=1000000")
-            self.wait_for(lambda: os.path.exists(self.path("d/plan.json")) and self.running())
+            sweeper = self.sweeper("skeleton.optimiser.steps=1000000")
             sweeper.send_signal(number)
             sweeper.stderr.read()
             self.assertEqual(sweeper.wait(60), code)
@@ -387,8 +385,7 @@ class Runs(Sweep):
             self.assertEqual(self.json("sweep", "status", "d")["counts"]["stopped"], 1)
 
     def test_a_killed_trial_is_told(self):
-        sweeper = self.start("sweep", "run", "sweep.yaml", "--out", "d", "skeleton.optimiser.steps=1000000", "motion.optimiser.steps=2")
-        self.wait_for(lambda: os.path.exists(self.path("d/plan.json")) and self.running())
+        sweeper = self.sweeper("skeleton.optimiser.steps=1000000", "motion.optimiser.steps=2")
         holder = self.json("sweep", "status", "d")["trials"][0]["holder"]
         os.kill(int(holder.split()[1]), signal.SIGKILL)
         self.assertEqual(sweeper.wait(60), 1)

@@ -3,10 +3,9 @@ import json
 import os
 import random
 import signal
-import subprocess
 import time
 
-from support import PROGRAM, CliTest, small_disk
+from support import CliTest, small_disk
 from tiny_run import CONFIG
 
 LONG = ["stages=[skeleton]", "skeleton.optimiser.steps=1000000", "loop.checkpoint_every=1000000", "loop.validate_every=1000000"]
@@ -27,13 +26,9 @@ class Train(CliTest):
     def checkpoints(self, run):
         return [n for n in sorted(os.listdir(self.path(run + "/checkpoints"))) if n.endswith(".safetensors")]
 
-    def start(self, *arguments):
+    def begin(self, *arguments):
         """A training in the background and its run directory, which is the first that it prints."""
-        process = subprocess.Popen([PROGRAM, "train", *arguments], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        self.addCleanup(process.stderr.close)
-        self.addCleanup(process.stdout.close)
-        self.addCleanup(process.wait)
-        self.addCleanup(process.kill)
+        process = self.start("train", *arguments)
         return process, process.stdout.readline().strip()
 
 
@@ -180,7 +175,7 @@ class Resume(Train):
     def test_killed_at_any_moment(self):
         whole = self.train("tiny.yaml", "loop.checkpoint_every=1")
         r, kills = random.Random(), 0
-        process, run = self.start("tiny.yaml", "loop.checkpoint_every=1", "--quiet")
+        process, run = self.begin("tiny.yaml", "loop.checkpoint_every=1", "--quiet")
         while True:
             time.sleep(r.uniform(0, 0.02 + 0.06 * kills))
             process.kill()
@@ -188,7 +183,7 @@ class Resume(Train):
             kills += code == -signal.SIGKILL
             if code == 0 or kills == 4:
                 break
-            process, again = self.start("resume=" + run, "--quiet")
+            process, again = self.begin("resume=" + run, "--quiet")
             self.assertEqual(again, run)
         self.assertGreater(kills, 0)
         self.assertEqual(self.done("train", "resume=" + run, "--quiet").strip(), run)
@@ -198,7 +193,7 @@ class Resume(Train):
 
     def test_signals_write_a_checkpoint(self):
         for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
-            process, run = self.start("tiny.yaml", *LONG)
+            process, run = self.begin("tiny.yaml", *LONG)
             while "1/1000000" not in process.stderr.readline():
                 pass
             process.send_signal(number)
@@ -210,7 +205,7 @@ class Resume(Train):
     def test_stopped_and_resumed_is_the_same_as_at_one_go(self):
         arguments = ["tiny.yaml", "stages=[skeleton]", "skeleton.optimiser.steps=400", "loop.checkpoint_every=1000", "loop.validate_every=150"]
         whole = self.train(*arguments)
-        process, run = self.start(*arguments)
+        process, run = self.begin(*arguments)
         process.stderr.readline()
         process.stderr.readline()
         process.send_signal(signal.SIGTERM)
@@ -237,7 +232,7 @@ class Resume(Train):
         self.bad_input(["train", "tiny.yaml", "precision=float16"], "precision", "bfloat16")
 
     def test_run_in_use(self):
-        process, run = self.start("tiny.yaml", *LONG)
+        process, run = self.begin("tiny.yaml", *LONG)
         self.bad_input(["train", "resume=" + run], run, "another process")
         process.kill()
 

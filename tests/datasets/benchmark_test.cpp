@@ -8,7 +8,6 @@
 #include <numbers>
 #include <set>
 
-#include "autograd/base/parallel.h"
 #include "datasets/benchmark/build.h"
 #include "datasets/benchmark/characters.h"
 #include "datasets/benchmark/floor.h"
@@ -20,8 +19,9 @@
 #include "datasets/readers/sha256.h"
 #include "datasets/sampling/frames.h"
 #include "datasets/schema.h"
-#include "tests/datasets/schema_support.h"
 #include "tests/support/data_folder.h"
+#include "tests/support/files.h"
+#include "tests/support/use_set.h"
 
 namespace restage {
 namespace {
@@ -70,9 +70,7 @@ TEST(BenchmarkRecipe, IsCheckedAsAWhole) {
   for (const auto& [spoil, words] : cases) {
     BenchmarkRecipe r = small_recipe();
     spoil(r);
-    const std::string said = error_of([&] { check_recipe(r, "r.yaml"); });
-    EXPECT_HAS(said, words);
-    EXPECT_EQ(said.find("r.yaml: "), 0u) << said;
+    expect_refused([&] { check_recipe(r, "r.yaml"); }, "r.yaml: ", words);
   }
 }
 
@@ -279,10 +277,9 @@ TEST(BenchmarkRealism, FeetThatFloatAndSlideAreMeasured) {
 class BenchmarkBuild : public FileTest {
  protected:
   void SetUp() override { RESTAGE_NEED_DATA(); }
-  void TearDown() override { set_threads(0); }
   std::string build(const std::string& name, int with_threads,
                     const BenchmarkRecipe& recipe = small_recipe()) {
-    set_threads(with_threads);
+    const testing::UseThreads use(with_threads);
     build_benchmark(recipe, "text\n", "r.yaml", test::data_folder(), dir / name);
     return dir / name;
   }
@@ -420,9 +417,8 @@ TEST_F(BenchmarkBuild, WrongNamesAndTakenPlacesLeaveNothing) {
   for (const auto& [spoil, words] : cases) {
     BenchmarkRecipe r = small_recipe();
     spoil(r);
-    const std::string said =
-        error_of([&] { build_benchmark(r, "", "r.yaml", test::data_folder(), dir / "out"); });
-    EXPECT_HAS(said, words);
+    expect_refused([&] { build_benchmark(r, "", "r.yaml", test::data_folder(), dir / "out"); }, "",
+                   words);
     EXPECT_TRUE(names_in(dir.path()).empty());
   }
   fs::create_directories(dir / "taken/x");

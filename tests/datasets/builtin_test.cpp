@@ -8,12 +8,12 @@
 #include <set>
 
 #include "autograd/base/error.h"
-#include "autograd/base/parallel.h"
 #include "datasets/benchmark/realism.h"
 #include "datasets/builtin/bodies.h"
 #include "datasets/builtin/motions.h"
 #include "datasets/builtin/pose_channels.h"
 #include "tests/support/tiny_body.h"
+#include "tests/support/use_set.h"
 
 namespace restage {
 namespace {
@@ -174,12 +174,11 @@ TEST(BuiltinBodies, AreFunctionsOfSeedSplitAndNumber) {
 }
 
 TEST(BuiltinBodies, ThreadsDoNotChangeBits) {
-  const int before = threads();
-  set_threads(1);
-  const std::vector<Body> one = builtin_bodies(5, 2, 0, 1);
-  set_threads(3);
-  const std::vector<Body> three = builtin_bodies(5, 2, 0, 1);
-  set_threads(before);
+  const auto made = [](int n) {
+    const testing::UseThreads use(n);
+    return builtin_bodies(5, 2, 0, 1);
+  };
+  const std::vector<Body> one = made(1), three = made(3);
   for (size_t i = 0; i < one.size(); ++i) EXPECT_TRUE(same(one[i], three[i]));
 }
 

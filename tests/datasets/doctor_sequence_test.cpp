@@ -1,8 +1,16 @@
-// The doctor on sequences, and what retargeting asks of it.
+// The doctor on sequences, and what retargeting asks of it; what it mends, and points that are too
+// far away to be read.
 #include <gtest/gtest.h>
 
+#include <fstream>
+
 #include "autograd/base/error.h"
+#include "datasets/doctor/examine.h"
+#include "datasets/readers/mesh_io.h"
+#include "datasets/readers/precision.h"
 #include "tests/support/doctor_people.h"
+#include "tests/support/errors.h"
+#include "tests/support/files.h"
 
 namespace restage {
 namespace {
@@ -106,38 +114,29 @@ TEST(DoctorSequence, NobodyRunsThatFast) {
 }
 
 TEST(DoctorChecks, RefuseNonsenseWithTheOptionThatMendsIt) {
-  const auto words = [](const auto& call) -> std::string {
-    try {
-      call();
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "";
-  };
   const auto source = [&](const Mat3& turn, double scale, const SourceFrame& given = {}) {
     std::vector<Mesh> frames;
     for (const Points& p : performance(kSourceFrames))
       frames.push_back(cloud(moved(p, turn, scale)));
-    return words([&] { check_source(frames, "scans", given); });
+    return test::refusal_of([&] { check_source(frames, "scans", given); });
   };
   // What was given already counts: metres read as centimetres, y up read as z up.
-  EXPECT_NE(source(Mat3::Identity(), 0.01, {0.01, false}).find("leave --scale out"),
-            std::string::npos);
-  EXPECT_NE(source(Mat3::Identity(), 10, {0.1, false}).find("--scale 0.01"), std::string::npos);
-  EXPECT_NE(source(into_foreign(5, 2), 1, {1, true}).find("leave --source-up out"),
-            std::string::npos);
-  EXPECT_NE(source(Mat3::Identity(), 3e4).find("--scale"), std::string::npos);
+  EXPECT_HAS(source(Mat3::Identity(), 0.01, {0.01, false}), "leave --scale out");
+  EXPECT_HAS(source(Mat3::Identity(), 10, {0.1, false}), "--scale 0.01");
+  EXPECT_HAS(source(into_foreign(5, 2), 1, {1, true}), "leave --source-up out");
+  EXPECT_HAS(source(Mat3::Identity(), 3e4), "--scale");
   EXPECT_EQ(source(Mat3::Identity(), 1), "");
-  EXPECT_NE(source(into_foreign(4, 1), 1).find("--source-up z"), std::string::npos);
-  EXPECT_NE(source(into_foreign(0, 4), 1).find("--fix"), std::string::npos);
-  EXPECT_NE(source(Mat3::Identity(), 100).find("--scale 0.01"), std::string::npos);
+  EXPECT_HAS(source(into_foreign(4, 1), 1), "--source-up z");
+  EXPECT_HAS(source(into_foreign(0, 4), 1), "--fix");
+  EXPECT_HAS(source(Mat3::Identity(), 100), "--scale 0.01");
   const auto target = [&](const Mat3& turn, double scale) {
-    return words([&] { check_target(cloud(moved(scan(somebody()), turn, scale)), "hero"); });
+    return test::refusal_of(
+        [&] { check_target(cloud(moved(scan(somebody()), turn, scale)), "hero"); });
   };
   EXPECT_EQ(target(Mat3::Identity(), 1), "");
-  EXPECT_NE(target(into_foreign(4, 1), 1).find("+z"), std::string::npos);
-  EXPECT_NE(target(into_foreign(2, 5), 1).find("faces -z"), std::string::npos);
-  EXPECT_NE(target(Mat3::Identity(), 1000).find("1 mm"), std::string::npos);
+  EXPECT_HAS(target(into_foreign(4, 1), 1), "+z");
+  EXPECT_HAS(target(into_foreign(2, 5), 1), "faces -z");
+  EXPECT_HAS(target(Mat3::Identity(), 1000), "1 mm");
 }
 
 TEST(DoctorChecks, GoodInputIsNeverRefused) {
@@ -156,6 +155,90 @@ TEST(DoctorChecks, GoodInputIsNeverRefused) {
     }
     EXPECT_NO_THROW(check_source(frames, motion.id)) << motion.action;
   }
+}
+
+/// Both as one mesh, `a` first.
+Mesh together(Mesh a, const Mesh& b, const Point& by) {
+  const auto first = static_cast<int32_t>(a.vertices.size());
+  for (const Point& p : b.vertices) a.vertices.push_back(p + by);
+  for (const Triangle& f : b.faces) a.faces.push_back({f[0] + first, f[1] + first, f[2] + first});
+  return a;
+}
+
+Mesh plate(float size) {
+  return {{{0, 0, 0}, {size, 0, 0}, {size, 0, size}, {0, 0, size}}, {{0, 1, 2}, {0, 2, 3}}};
+}
+
+/// Mended where it stands.
+Mesh mended_here(const Mesh& mesh) { return mended(mesh, Diagnosis{}); }
+
+TEST(DoctorRepair, ASurfaceAloneStaysAsItIs) {
+  const Mesh out = mended_here(somebody().rest);
+  EXPECT_EQ(out.vertices, somebody().rest.vertices);
+  EXPECT_EQ(out.faces, somebody().rest.faces);
+}
+
+TEST(DoctorRepair, WholePiecesThatAreNotThePersonAreLeftOut) {
+  const Mesh both = together(plate(0.7f), somebody().rest, Point(3, 0, 0));
+  const Mesh out = mended_here(both);
+  EXPECT_EQ(out.faces, somebody().rest.faces) << "in their order, with new numbers";
+  ASSERT_EQ(out.vertices.size(), somebody().rest.vertices.size());
+  EXPECT_EQ(out.vertices[0], both.vertices[4]);
+}
+
+TEST(DoctorRepair, SeamsHoldASurfaceTogetherAndTinyPiecesGoWithTheirPlace) {
+  // As exporters write it: every triangle with vertices of its own.
+  Mesh soup;
+  for (const Triangle& f : somebody().rest.faces)
+    for (const int32_t v : f)
+      soup.vertices.push_back(somebody().rest.vertices[static_cast<size_t>(v)]);
+  for (int32_t i = 0; i < static_cast<int32_t>(soup.vertices.size()); i += 3)
+    soup.faces.push_back({i, i + 1, i + 2});
+  EXPECT_EQ(mended_here(soup).faces.size(), soup.faces.size());
+  // Too small for a sample of the surface: on the skin it stays, far from it it goes.
+  const Point skin = somebody().rest.vertices[10];
+  EXPECT_EQ(mended_here(together(somebody().rest, plate(1e-4f), skin)).faces.size(),
+            somebody().rest.faces.size() + 2);
+  EXPECT_EQ(mended_here(together(somebody().rest, plate(1e-4f), Point(2, 1, 2))).faces.size(),
+            somebody().rest.faces.size());
+}
+
+TEST(DoctorRepair, OfEqualPointsTheFirstStays) {
+  Mesh cloud{somebody().rest.vertices, {}};
+  cloud.vertices.push_back(cloud.vertices[3]);
+  cloud.vertices.insert(cloud.vertices.begin(), cloud.vertices[5]);
+  const Mesh out = mended_here(cloud);
+  ASSERT_EQ(out.vertices.size(), somebody().rest.vertices.size());
+  EXPECT_EQ(out.vertices[0], somebody().rest.vertices[5]);
+}
+
+TEST(DoctorRepair, TransformsFollowEachOther) {
+  const Mat3 turn = Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()).toRotationMatrix();
+  const Similarity first{0.01, turn, Vec3(3, -4, 5)}, then{2, turn.transpose(), Vec3(1, 2, -3)};
+  const Vec3 p(7, 8, 9);
+  EXPECT_TRUE(then.after(first)(p).isApprox(then(first(p)), 1e-12));
+}
+
+TEST(Precision, FarPointsAreRefusedOrReadRelativeToThem) {
+  EXPECT_FALSE(is_blurred(somebody().rest.vertices));
+  EXPECT_FALSE(is_blurred({}));
+  EXPECT_FALSE(is_blurred({Point(5e6f, 0, 0), Point(5e6f, 0, 0)})) << "one place";
+  EXPECT_FALSE(is_blurred({Point(5e6f, 0, 0), Point(0, 5e6f, 0)})) << "as large as far";
+  EXPECT_TRUE(is_blurred({Point(5e6f, 0, 0), Point(5e6f, 2, 0)}));
+  EXPECT_EQ(rounding_step({Point(5e6f, 0, 0)}), 0.5);
+
+  const test::TempDir dir;
+  const std::string path = dir / "far.obj";
+  std::ofstream(path) << "v 5000000.125 0 1\nv 5000000.25 1.5 1\nv 5000001 0 0.5\n";
+  EXPECT_THROW(read_mesh(path), InputError);
+  Vec3 origin;
+  size_t left_out = 0;
+  const Mesh mesh = read_mesh(path, left_out, origin);
+  EXPECT_EQ(mesh.vertices[1].x() + origin.x(), 5000000.25);
+  EXPECT_EQ(mesh.vertices[1].y() + origin.y(), 1.5);
+  write_obj(dir / "near.obj", somebody().rest);
+  read_mesh(dir / "near.obj", left_out, origin);
+  EXPECT_TRUE(origin.isZero(0));
 }
 
 }  // namespace

@@ -16,8 +16,8 @@
 #include "datasets/importers/makehuman_pack.h"
 #include "datasets/readers/sha256.h"
 #include "tests/datasets/npz_support.h"
-#include "tests/datasets/schema_support.h"
 #include "tests/support/data_folder.h"
+#include "tests/support/files.h"
 
 namespace restage {
 namespace {

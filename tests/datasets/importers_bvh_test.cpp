@@ -2,15 +2,14 @@
 // Files that are cut, flipped, deep or announce what they do not hold are refused with a line:
 // never a crash, never much memory.
 #include <gtest/gtest.h>
-#include <lzma.h>
 
 #include <cmath>
 
-#include "autograd/base/rng.h"
 #include "datasets/importers/bvh.h"
 #include "datasets/readers/bvh.h"
 #include "tests/datasets/importers_bvh_text.h"
 #include "tests/datasets/importers_support.h"
+#include "tests/datasets/npz_support.h"
 
 namespace restage {
 namespace {
@@ -148,23 +147,8 @@ TEST_F(ImportersBvh, JumpingRootIsRefused) {
   EXPECT_NO_THROW(convert_bvh(text, "test.bvh", options));
 }
 
-/// xz's packing of a text, whose unpacking takes so many MiB.
-std::string packed(const std::string& text, uint32_t mebibytes) {
-  lzma_options_lzma options;
-  lzma_lzma_preset(&options, 0);
-  options.dict_size = mebibytes << 20;
-  const lzma_filter filters[] = {{LZMA_FILTER_LZMA2, &options}, {LZMA_VLI_UNKNOWN, nullptr}};
-  std::string out(lzma_stream_buffer_bound(text.size()), '\0');
-  size_t size = 0;
-  EXPECT_EQ(lzma_stream_buffer_encode(const_cast<lzma_filter*>(filters), LZMA_CHECK_CRC64, nullptr,
-                                      reinterpret_cast<const uint8_t*>(text.data()), text.size(),
-                                      reinterpret_cast<uint8_t*>(out.data()), &size, out.size()),
-            LZMA_OK);
-  return out.substr(0, size);
-}
-
 TEST_F(ImportersBvh, ReadsPlainAndXzFiles) {
-  const std::string text = bvh_test::text({}), xz = packed(text, 8);
+  const std::string text = bvh_test::text({}), xz = xz_of(text, 8);
   const std::string plain = dir.write("07_01.bvh", text), file = dir.write("07_01.bvh.xz", xz);
   MotionOptions options;
   options.drop_leading = 0;
@@ -209,60 +193,12 @@ TEST_F(ImportersBvh, BadFilesAreNamedWithTheirLine) {
   for (size_t percent = 0; percent < 100; ++percent)
     bad.push_back(good.substr(0, good.size() * percent / 100));
   for (const std::string& text : bad) {
-    const std::string said = error_of([&] { convert_bvh(text, "some.bvh"); });
-    EXPECT_EQ(said.find("some.bvh:"), 0u) << said << "\n" << text.substr(0, 300);
+    SCOPED_TRACE(text.substr(0, 300));
+    expect_refused([&] { convert_bvh(text, "some.bvh"); }, "some.bvh:", "");
   }
-}
-
-TEST_F(ImportersBvh, MutatedFilesNeverCrash) {
-  const std::string good = bvh_test::text({.frames = 6});
-  const std::string pieces[] = {"nan",
-                                "-",
-                                "1e308",
-                                "{",
-                                "}",
-                                "\nJOINT x",
-                                "\nEnd Site",
-                                "\nCHANNELS 3",
-                                "\0x",
-                                "1e9",
-                                "\nOFFSET 0 0 0",
-                                "\nMOTION",
-                                "\nFrames: 4",
-                                " ",
-                                "\n",
-                                "999999999999"};
-  const RngKey key{7, 1};
-  int usable = 0;
-  for (uint64_t i = 0; i < 900; ++i) {
-    Rng rng(key.fold(i));
-    std::string text = good;
-    for (uint64_t n = 1 + rng.below(3); n > 0; --n) {
-      const size_t at = rng.below(text.size());
-      const uint64_t kind = rng.below(5);
-      if (kind == 0)
-        text[at] = static_cast<char>(rng.below(256));
-      else if (kind == 1)
-        text.erase(at, 1 + rng.below(60));
-      else if (kind == 2)
-        text.insert(at, pieces[rng.below(std::size(pieces))]);
-      else if (kind == 3)
-        text.insert(at, text.substr(rng.below(text.size()), rng.below(200)));
-      else
-        text.resize(at + 1);
-    }
-    refusal_of([&] {
-      const MotionClip clip = convert_bvh(text, "fuzz.bvh");
-      ++usable;
-      for (const Joints& joints : clip.joints)
-        for (const Vec3& x : joints) ASSERT_TRUE(x.allFinite()) << i;
-    });
-  }
-  EXPECT_GT(usable, 0);  // some changes only alter a number
 }
 
 // ---- files that ask for too much
-// -----------------------------------------------------------------
 
 std::string complaint(const std::string& text) {
   return refusal_of([&] { convert_bvh(text, "x.bvh"); });
@@ -302,7 +238,7 @@ TEST_F(ReadersRecordings, AnnouncedCountsAreNotBelieved) {
 /// The unpacker would take the memory that the file asks for.
 TEST_F(ReadersRecordings, PackedTextsThatAskForMuchMemoryAreRefused) {
   const auto refusal = [&](uint32_t mebibytes) {
-    dir.write("x.bvh.xz", packed(small_file(), mebibytes));
+    dir.write("x.bvh.xz", xz_of(small_file(), mebibytes));
     return refusal_of([&] { read_bvh(dir / "x.bvh.xz"); });
   };
   EXPECT_EQ(refusal(64), "");  // xz -9

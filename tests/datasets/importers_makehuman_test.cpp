@@ -11,8 +11,8 @@
 #include "datasets/importers/gltf_character.h"
 #include "datasets/importers/makehuman.h"
 #include "tests/datasets/gltf_maker.h"
-#include "tests/datasets/schema_support.h"
 #include "tests/support/data_folder.h"
+#include "tests/support/files.h"
 
 namespace restage {
 namespace {

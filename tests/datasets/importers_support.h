@@ -4,7 +4,7 @@
 #include <string>
 
 #include "datasets/importers/report.h"
-#include "tests/datasets/schema_support.h"
+#include "tests/support/files.h"
 
 namespace restage::test {
 

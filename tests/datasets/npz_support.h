@@ -1,11 +1,13 @@
-// NPY and NPZ files made by hand, right and wrong ones.
+// NPY and NPZ files made by hand, right and wrong ones, and texts packed by xz.
 #pragma once
 
+#include <lzma.h>
 #include <zlib.h>
 
 #include <cstdint>
 #include <cstring>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -89,6 +91,22 @@ inline std::string deflated(const std::string& bytes) {
   out.resize(state.total_out);
   deflateEnd(&state);
   return out;
+}
+
+/// xz's packing of a text, whose unpacking takes so many MiB.
+inline std::string xz_of(const std::string& text, uint32_t mebibytes) {
+  lzma_options_lzma options;
+  lzma_lzma_preset(&options, 0);
+  options.dict_size = mebibytes << 20;
+  const lzma_filter filters[] = {{LZMA_FILTER_LZMA2, &options}, {LZMA_VLI_UNKNOWN, nullptr}};
+  std::string out(lzma_stream_buffer_bound(text.size()), '\0');
+  size_t size = 0;
+  if (lzma_stream_buffer_encode(const_cast<lzma_filter*>(filters), LZMA_CHECK_CRC64, nullptr,
+                                reinterpret_cast<const uint8_t*>(text.data()), text.size(),
+                                reinterpret_cast<uint8_t*>(out.data()), &size,
+                                out.size()) != LZMA_OK)
+    throw std::runtime_error("xz packs nothing");
+  return out.substr(0, size);
 }
 
 /// The archive; `comment` at its end.

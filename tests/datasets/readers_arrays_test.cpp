@@ -9,7 +9,7 @@
 #include "datasets/readers/array_frames.h"
 #include "datasets/readers/npz.h"
 #include "tests/datasets/npz_support.h"
-#include "tests/datasets/schema_support.h"
+#include "tests/support/files.h"
 
 namespace restage {
 namespace {
@@ -375,7 +375,8 @@ TEST_F(ReadersArrays, WhichArrayIsTheCloud) {
       {{{"poses", npy<float>({2}, {1, 2})}}, "holds no points (its arrays: 'poses')"},
       {{{"points", npy<float>({0, 3}, {})}}, "holds no points"},
       {{{"points", npy<float>({1, 3}, {1, NAN, 3})}}, "NaN"},
-      {{{"points", cloud}, {"fps", npy<float>({}, {0})}}, "fps: is no frame rate"}};
+      {{{"points", cloud}, {"fps", npy<float>({}, {0})}}, "fps: is no frame rate"},
+      {{{"points", cloud}, {"fps", npy_text("30")}}, "fps: is no frame rate"}};
   for (const auto& [arrays, says] : without)
     EXPECT_HAS(error_of([&, &held = arrays] { first(held); }), says);
   dir.write("b.npy", npy<float>({4}, {1, 2, 3, 4}));

@@ -8,7 +8,8 @@
 #include "datasets/readers/frame_folder.h"
 #include "datasets/readers/mesh_io.h"
 #include "datasets/schema.h"
-#include "tests/datasets/schema_support.h"
+#include "tests/datasets/npz_support.h"
+#include "tests/support/files.h"
 
 namespace restage {
 namespace {
@@ -27,20 +28,6 @@ void expect_equal(const Mesh& a, const Mesh& b) {
   EXPECT_EQ(a.vertices, b.vertices);
   EXPECT_EQ(a.faces, b.faces);
 }
-
-/// Appends values in the byte order asked for.
-struct Binary {
-  std::string out;
-  bool big = false;
-  template <class T>
-  Binary& add(T value) {
-    char raw[sizeof(T)];
-    std::memcpy(raw, &value, sizeof value);
-    if (big) std::reverse(raw, raw + sizeof value);
-    out.append(raw, sizeof value);
-    return *this;
-  }
-};
 
 TEST_F(Readers, WritesAndReadsPlyAndObjBitForBit) {
   write_ply(dir / "a.ply", square());
@@ -75,24 +62,21 @@ TEST_F(Readers, ReadsPlyOfAnyOrderTypeAndEncoding) {
   expect_equal(read_mesh(dir / "a.ply"), expected);
 
   for (const bool big : {false, true}) {
-    Binary b;
-    b.big = big;
-    b.add<uint8_t>(2).add<int16_t>(7).add<int16_t>(-8).add<uint8_t>(0);
+    const auto one = [&](auto value) {
+      const std::string bytes = raw(value);
+      return big ? std::string(bytes.rbegin(), bytes.rend()) : bytes;
+    };
+    const auto all = [&](auto... values) { return (one(values) + ...); };
+    std::string bytes = all(uint8_t{2}, int16_t{7}, int16_t{-8}, uint8_t{0});
     for (const Point& p : expected.vertices)
-      b.add<double>(p[2])
-          .add<uint8_t>(200)
-          .add<int16_t>(static_cast<int16_t>(p[0]))
-          .add<float>(p[1]);
-    b.add<float>(0.5f).add<uint16_t>(3).add<uint32_t>(0).add<uint32_t>(1).add<uint32_t>(2);
-    b.add<int8_t>(1).add<float>(0.25f);
-    b.add<float>(1).add<uint16_t>(5);
-    for (uint32_t i = 0; i < 5; ++i) b.add<uint32_t>(i);
-    b.add<int8_t>(0);
+      bytes += all(double{p[2]}, uint8_t{200}, static_cast<int16_t>(p[0]), p[1]);
+    bytes += all(0.5f, uint16_t{3}, 0u, 1u, 2u, int8_t{1}, 0.25f);
+    bytes += all(1.0f, uint16_t{5}, 0u, 1u, 2u, 3u, 4u, int8_t{0});
     const std::string format = big ? "binary_big_endian" : "binary_little_endian";
-    expect_equal(read_mesh(dir.write("b.ply", "ply\r\nformat " + format + header + b.out)),
+    expect_equal(read_mesh(dir.write("b.ply", "ply\r\nformat " + format + header + bytes)),
                  expected);
     write_bytes(dir / "b.ply",
-                "ply\r\nformat " + format + header + b.out.substr(0, b.out.size() - 1));
+                "ply\r\nformat " + format + header + bytes.substr(0, bytes.size() - 1));
     EXPECT_HAS(error_of([&] { read_mesh(dir / "b.ply"); }), "b.ply: is cut short");
   }
 }

@@ -17,8 +17,7 @@ namespace {
 using namespace testing;
 
 TEST(SamplingClouds, CentredOnThePointsWithJointsInside) {
-  const Corpus& corpus = training_corpus();
-  const CloudBatch batch = CloudSampler(corpus, {.points = 512}, 1).batch(0, 20);
+  const CloudBatch batch = CloudSampler(training_corpus(), {.points = 512}, 1).batch(0, 20);
   EXPECT_EQ(batch.points.shape(), (Shape{20, 512, 3}));
   EXPECT_EQ(batch.joints.shape(), (Shape{20, kJoints, 3}));
   for (int64_t i = 0; i < 20; ++i) {
@@ -54,16 +53,15 @@ TEST(SamplingClouds, MirroredCloudsBelongToMirroredJoints) {
 }
 
 TEST(SamplingClouds, SkinWeightsBelongToTheirPoints) {
-  const Corpus& corpus = training_corpus();
   CloudConfig config{.points = 128, .noise = 0, .min_fraction = 0.5};
-  EXPECT_FALSE(CloudSampler(corpus, config, 1).batch(0, 1).weights.defined());
+  EXPECT_FALSE(CloudSampler(training_corpus(), config, 1).batch(0, 1).weights.defined());
   config.skin_weights = true;
   CloudSubject subject;
   subject.rest = true;
   CloudSubject image = subject;
   image.augmentation.mirror = true;
-  const CloudBatch plain = CloudSampler(corpus, config, 1).clouds({subject});
-  const CloudBatch mirrored = CloudSampler(corpus, config, 1).clouds({image});
+  const CloudBatch plain = CloudSampler(training_corpus(), config, 1).clouds({subject});
+  const CloudBatch mirrored = CloudSampler(training_corpus(), config, 1).clouds({image});
   ASSERT_EQ(plain.weights.shape(), (Shape{1, 128, kJoints}));
   for (int i = 0; i < 128; ++i) {
     const float* w = plain.weights.data<float>() + i * kJoints;
@@ -83,8 +81,7 @@ TEST(SamplingClouds, SkinWeightsBelongToTheirPoints) {
 }
 
 TEST(SamplingClouds, SharesOfTposesMirrorsAndHeadings) {
-  const Corpus& corpus = training_corpus();
-  const CloudSampler sampler(corpus, {.tpose_share = 0.2}, 2);
+  const CloudSampler sampler(training_corpus(), {.tpose_share = 0.2}, 2);
   const int n = 4000;
   int rest = 0, mirrored = 0, away = 0;
   std::set<size_t> bodies, motions;
@@ -94,7 +91,7 @@ TEST(SamplingClouds, SharesOfTposesMirrorsAndHeadings) {
     mirrored += s.augmentation.mirror;
     bodies.insert(s.body);
     motions.insert(s.at.motion);
-    EXPECT_LT(s.at.frame, corpus.motions[s.at.motion].frames());
+    EXPECT_LT(s.at.frame, training_corpus().motions[s.at.motion].frames());
     if (s.rest)
       EXPECT_LE(std::abs(s.augmentation.heading), 30 * 3.14160 / 180);
     else
@@ -104,18 +101,18 @@ TEST(SamplingClouds, SharesOfTposesMirrorsAndHeadings) {
   EXPECT_NEAR(rest / double(n), 0.2, 5 * sigma);
   EXPECT_NEAR(mirrored / double(n), 0.5, 5 * sigma);
   EXPECT_NEAR(away / double(n - rest), 0.5, 6 * sigma);
-  EXPECT_EQ(bodies.size(), corpus.bodies.size());
-  EXPECT_EQ(motions.size(), corpus.motions.size());
+  EXPECT_EQ(bodies.size(), training_corpus().bodies.size());
+  EXPECT_EQ(motions.size(), training_corpus().motions.size());
 }
 
 TEST(SamplingClouds, TposesShowTheRestJoints) {
-  const Corpus& corpus = training_corpus();
   const CloudSampler sampler(
-      corpus, {.heading = false, .mirror = false, .tpose_share = 1, .scale_jitter = 0.1}, 3);
+      training_corpus(), {.heading = false, .mirror = false, .tpose_share = 1, .scale_jitter = 0.1},
+      3);
   const CloudBatch batch = sampler.batch(0, 4);
   for (int i = 0; i < 4; ++i) {
     const CloudSubject s = sampler.subject(i);
-    const Joints& rest = corpus.bodies[s.body].joints;
+    const Joints& rest = training_corpus().bodies[s.body].joints;
     EXPECT_LE(std::abs(s.scale - 1), 0.1);
     for (int j = 1; j < kJoints; ++j) {
       const Vec3 bone = at(batch.joints, i, j) - at(batch.joints, i, 0);
@@ -125,9 +122,8 @@ TEST(SamplingClouds, TposesShowTheRestJoints) {
 }
 
 TEST(SamplingClouds, PoorScansRepeatPoints) {
-  const Corpus& corpus = training_corpus();
   const CloudBatch batch =
-      CloudSampler(corpus, {.points = 200, .min_fraction = 0.25}, 4).batch(0, 40);
+      CloudSampler(training_corpus(), {.points = 200, .min_fraction = 0.25}, 4).batch(0, 40);
   size_t least = 200, most = 0;
   for (int64_t i = 0; i < 40; ++i) {
     std::set<std::array<double, 3>> distinct;
@@ -144,10 +140,9 @@ TEST(SamplingClouds, PoorScansRepeatPoints) {
 }
 
 TEST(SamplingClouds, SettingsOutOfRangeAreErrors) {
-  const Corpus& corpus = training_corpus();
   for (const CloudConfig& bad :
        {CloudConfig{.points = 0}, CloudConfig{.noise = -1}, CloudConfig{.min_fraction = 0}})
-    EXPECT_THROW(CloudSampler(corpus, bad, 1), InputError);
+    EXPECT_THROW(CloudSampler(training_corpus(), bad, 1), InputError);
   EXPECT_THROW(CloudSampler(Corpus{}, {}, 1), InputError);
 }
 

@@ -10,13 +10,13 @@
 #include <memory>
 #include <set>
 
-#include "autograd/base/parallel.h"
 #include "datasets/sampling/clouds.h"
 #include "datasets/sampling/pairs.h"
 #include "datasets/sampling/windows.h"
 #include "datasets/schema.h"
 #include "tests/datasets/sampling_support.h"
-#include "tests/datasets/schema_support.h"
+#include "tests/support/files.h"
+#include "tests/support/use_set.h"
 
 #ifdef __has_feature
 #if __has_feature(address_sanitizer)
@@ -191,7 +191,6 @@ std::string bits(const std::vector<Tensor>& batch, int64_t row) {
 
 class SamplingEpoch : public ::testing::Test {
  protected:
-  ~SamplingEpoch() override { set_threads(0); }
   const Corpus& corpus_ = training_corpus();
 };
 
@@ -199,14 +198,13 @@ TEST_F(SamplingEpoch, SamplesAreFunctionsOfSeedAndIndex) {
   const std::vector<int64_t> indices = {0, 1, 6, 31, 64999};
   for (size_t which = 0; which < 3; ++which) {
     const auto fresh = [&](uint64_t seed) { return loaders(corpus_, 20, seed)[which]; };
-    set_threads(1);
     std::vector<std::string> direct;  // each the first thing that its sampler draws
     for (const int64_t i : indices) direct.push_back(bits(fresh(3).batch(i, 1), 0));
     for (size_t k = 1; k < indices.size(); ++k) EXPECT_FALSE(direct[k] == direct[k - 1]);
     EXPECT_FALSE(bits(fresh(4).batch(6, 1), 0) == direct[2]) << "the seed is of no effect";
 
     for (const int n : {1, 2, 3}) {
-      set_threads(n);
+      const UseThreads use(n);
       const Loader one = fresh(3);  // draws everything, last index first, alone and in batches
       for (size_t k = indices.size(); k-- > 0;)
         for (const int64_t batch : {1, 7, 16}) {

@@ -61,8 +61,7 @@ TEST(SamplingWindows, RotationsGiveTheJointsMirroredOrNot) {
 }
 
 TEST(SamplingWindows, SelfSamplesHaveOneBody) {
-  const Corpus& corpus = training_corpus();
-  const WindowSampler sampler(corpus, {.self_share = 0.4, .truth = true}, 2);
+  const WindowSampler sampler(training_corpus(), {.self_share = 0.4, .truth = true}, 2);
   const WindowBatch batch = sampler.batch(0, 60);
   for (int64_t i = 0; i < 60; ++i) {
     const WindowSubject s = sampler.subject(i);
@@ -79,16 +78,15 @@ TEST(SamplingWindows, SelfSamplesHaveOneBody) {
     selves += s.self;
     couples.insert({s.body_a, s.body_b});
     // The motion of ten frames is too short.
-    EXPECT_LE(s.clip.frame + 30, corpus.motions[s.clip.motion].frames());
-    EXPECT_LE(s.real.frame + 30, corpus.motions[s.real.motion].frames());
+    EXPECT_LE(s.clip.frame + 30, training_corpus().motions[s.clip.motion].frames());
+    EXPECT_LE(s.real.frame + 30, training_corpus().motions[s.real.motion].frames());
   }
   EXPECT_NEAR(selves / 3000.0, 0.4, 5 * std::sqrt(0.24 / 3000));
   EXPECT_EQ(couples.size(), 9u);
 }
 
 TEST(SamplingWindows, TheDiscriminatorsWindowHasBsBones) {
-  const Corpus& corpus = training_corpus();
-  const WindowBatch batch = WindowSampler(corpus, {}, 3).batch(0, 10);
+  const WindowBatch batch = WindowSampler(training_corpus(), {}, 3).batch(0, 10);
   for (int64_t i = 0; i < 10; ++i) {
     const Joints rest = joints_at(batch.rest_b, i), real = joints_at(batch.real_b, i, 17);
     for (int j = 1; j < kJoints; ++j)
@@ -97,12 +95,11 @@ TEST(SamplingWindows, TheDiscriminatorsWindowHasBsBones) {
 }
 
 TEST(SamplingWindows, TranslationsDescribeThePath) {
-  const Corpus& corpus = training_corpus();
   WindowConfig config{.truth = true};
   std::vector<WindowBatch> batches;
   for (const auto kind : {Translation::velocity, Translation::relative, Translation::absolute}) {
     config.translation = kind;
-    batches.push_back(WindowSampler(corpus, config, 4).batch(0, 5));
+    batches.push_back(WindowSampler(training_corpus(), config, 4).batch(0, 5));
   }
   for (int64_t i = 0; i < 5; ++i)
     for (int64_t t = 0; t < config.frames; ++t) {
@@ -118,11 +115,10 @@ TEST(SamplingWindows, TranslationsDescribeThePath) {
 }
 
 TEST(SamplingWindows, RemovedHeadingsFaceForwardAndKeepTheMotion) {
-  const Corpus& corpus = training_corpus();
   WindowConfig config{.truth = true};
-  const WindowBatch free = WindowSampler(corpus, config, 4).batch(0, 6);
+  const WindowBatch free = WindowSampler(training_corpus(), config, 4).batch(0, 6);
   config.remove_heading = true;
-  const WindowBatch faced = WindowSampler(corpus, config, 4).batch(0, 6);
+  const WindowBatch faced = WindowSampler(training_corpus(), config, 4).batch(0, 6);
   double turned = 0;
   for (int64_t i = 0; i < 6; ++i)
     for (int64_t t = 0; t < config.frames; ++t) {
@@ -142,11 +138,10 @@ TEST(SamplingWindows, RemovedHeadingsFaceForwardAndKeepTheMotion) {
 }
 
 TEST(SamplingWindows, NoiseIsOnTheInputOnly) {
-  const Corpus& corpus = training_corpus();
-  const WindowBatch clean = WindowSampler(corpus, {}, 4).batch(0, 20);
+  const WindowBatch clean = WindowSampler(training_corpus(), {}, 4).batch(0, 20);
   EXPECT_TRUE(same_bits(clean.input_a, clean.joints_a));
   const WindowConfig config{.noise = 0.02, .noise_correlation = 0.6, .noisy_translation = true};
-  const WindowBatch noisy = WindowSampler(corpus, config, 4).batch(0, 20);
+  const WindowBatch noisy = WindowSampler(training_corpus(), config, 4).batch(0, 20);
   EXPECT_TRUE(same_bits(clean.joints_a, noisy.joints_a));
   EXPECT_TRUE(same_bits(clean.trans_a, noisy.trans_a));
   EXPECT_FALSE(same_bits(noisy.trans_a, noisy.input_trans_a));
@@ -173,19 +168,17 @@ TEST(SamplingWindows, NoiseIsOnTheInputOnly) {
 }
 
 TEST(SamplingWindows, SettingsOutOfRangeAreErrors) {
-  const Corpus& corpus = training_corpus();
   for (const WindowConfig& bad :
        {WindowConfig{.frames = 1}, WindowConfig{.frames = 1000}, WindowConfig{.self_share = 2}})
-    EXPECT_THROW(WindowSampler(corpus, bad, 1), InputError);
-  Corpus lonely = corpus;
+    EXPECT_THROW(WindowSampler(training_corpus(), bad, 1), InputError);
+  Corpus lonely = training_corpus();
   lonely.bodies.resize(1);
   EXPECT_THROW(WindowSampler(lonely, {}, 1), InputError);
   EXPECT_EQ(WindowSampler(lonely, {.self_share = 1}, 1).batch(0, 2).self_mask.item(1), 1.0);
 }
 
 TEST(SamplingPairs, TheRestPoseGivesTheRestPoints) {
-  const Corpus& corpus = training_corpus();
-  const PairSampler sampler(corpus, {200, false, false}, 1);
+  const PairSampler sampler(training_corpus(), {200, false, false}, 1);
   Pose rest;
   rest.local.fill(Mat3::Identity());
   rest.root = Vec3(3, 1, -2);
@@ -236,14 +229,13 @@ TEST(SamplingPairs, PointsCorrespondThroughTheBones) {
 }
 
 TEST(SamplingPairs, RandomPairsMoveAndSettingsAreChecked) {
-  const Corpus& corpus = training_corpus();
-  const PairBatch batch = PairSampler(corpus, {50, true, false}, 1).batch(0, 3);
+  const PairBatch batch = PairSampler(training_corpus(), {50, true, false}, 1).batch(0, 3);
   double moved = 0;
   for (int64_t i = 0; i < 3; ++i)
     for (int k = 0; k < 50; ++k)
       moved += (at(batch.rest_points, i, k) - at(batch.posed_points, i, k)).norm() / 150;
   EXPECT_GT(moved, 0.05);
-  EXPECT_THROW(PairSampler(corpus, {0, true, false}, 1), InputError);
+  EXPECT_THROW(PairSampler(training_corpus(), {0, true, false}, 1), InputError);
   EXPECT_THROW(PairSampler(Corpus{}, {}, 1), InputError);
 }
 

@@ -8,8 +8,9 @@
 
 #include "autograd/base/error.h"
 #include "datasets/hdf5/file.h"
-#include "tests/datasets/schema_support.h"
+#include "datasets/schema.h"
 #include "tests/fuzz/old_layout.h"
+#include "tests/support/files.h"
 
 namespace restage {
 namespace {
@@ -139,13 +140,16 @@ class RawFile {
   explicit RawFile(const std::string& path)
       : id_(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT)) {}
   ~RawFile() { H5Fclose(id_); }
+  /// `values` are of `memory`'s type; none: nothing is written.
   void add(const char* name, hid_t type, std::vector<hsize_t> dims, std::vector<hsize_t> chunk,
-           int filter = 0) {
+           int filter = 0, const void* values = nullptr, hid_t memory = 0) {
     const hid_t space = H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr);
     const hid_t plist = H5Pcreate(H5P_DATASET_CREATE);
     if (!chunk.empty()) H5Pset_chunk(plist, static_cast<int>(chunk.size()), chunk.data());
     if (filter == H5Z_FILTER_NBIT) H5Pset_nbit(plist);
-    H5Dclose(H5Dcreate2(id_, name, type, space, H5P_DEFAULT, plist, H5P_DEFAULT));
+    const hid_t set = H5Dcreate2(id_, name, type, space, H5P_DEFAULT, plist, H5P_DEFAULT);
+    if (values != nullptr) H5Dwrite(set, memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, values);
+    H5Dclose(set);
     H5Pclose(plist);
     H5Sclose(space);
   }
@@ -198,6 +202,7 @@ TEST_F(SchemaHdf5, AFileThatCannotBeWalkedToItsEndIsRefusedWhole) {
   const std::string path = dir / "old.h5";
   write_old_layout(path);
   EXPECT_EQ(h5::File::open(path).children(), Names{"joints"});
+  EXPECT_EQ(read_prediction(path).frames, 6);
   std::string bytes = bytes_of(path);
   ASSERT_EQ(bytes.substr(136, 4), "TREE") << "the library lays the file out in another way";
   bytes.replace(128, 8, 8, '\xff');  // the address of the names
@@ -271,28 +276,19 @@ TEST_F(SchemaHdf5, ReadsForeignByteOrdersAndText) {
   const std::string path = dir / "foreign.h5";
   {
     RawFile raw(path);
-    const hsize_t n = 2;
-    const hid_t space = H5Screate_simple(1, &n, nullptr);
-    const hid_t set =
-        H5Dcreate2(raw.id(), "/big", H5T_IEEE_F32BE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
     const double values[2] = {0.5, -3};
-    H5Dwrite(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values);
-    H5Dclose(set);
+    raw.add("/big", H5T_IEEE_F32BE, {2}, {}, 0, values, H5T_NATIVE_DOUBLE);
     const hid_t text = H5Tcopy(H5T_C_S1);
     H5Tset_size(text, H5T_VARIABLE);
     H5Tset_cset(text, H5T_CSET_UTF8);
     const char* words[2] = {"left_hip", ""};
-    const hid_t names =
-        H5Dcreate2(raw.id(), "/names", text, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-    H5Dwrite(names, text, H5S_ALL, H5S_ALL, H5P_DEFAULT, words);
-    H5Dclose(names);
+    raw.add("/names", text, {2}, {}, 0, words, text);
     const hid_t one = H5Screate(H5S_SCALAR);
     const hid_t attribute = H5Acreate2(raw.id(), "kind", text, one, H5P_DEFAULT, H5P_DEFAULT);
     H5Awrite(attribute, text, &words[0]);
     H5Aclose(attribute);
     H5Sclose(one);
     H5Tclose(text);
-    H5Sclose(space);
   }
   const h5::File file = h5::File::open(path);
   EXPECT_EQ(file.read<double>("/big", {2}), (std::vector<double>{0.5, -3}));

@@ -9,7 +9,7 @@
 #include <limits>
 
 #include "datasets/merge.h"
-#include "tests/datasets/schema_support.h"
+#include "tests/support/files.h"
 #include "tests/support/tiny_body.h"
 
 namespace restage {

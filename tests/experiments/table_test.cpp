@@ -1,29 +1,21 @@
 // Results of trials, however damaged, and the rows that are made of them.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <filesystem>
 #include <nlohmann/json.hpp>
-#include <string>
 
-#include "autograd/base/atomic_file.h"
-#include "autograd/base/error.h"
 #include "experiments/sweep/table_formats.h"
+#include "tests/support/files.h"
 
 namespace restage::tables {
 namespace {
 
 namespace fs = std::filesystem;
+using namespace test;
 using Json = nlohmann::json;
 
-class TableTest : public testing::Test {
+class TableTest : public FileTest {
  protected:
-  void SetUp() override {
-    dir_ = (fs::temp_directory_path() / ("restage-table-" + std::to_string(getpid()))).string();
-    fs::remove_all(dir_);
-    fs::create_directories(dir_ + "/trials");
-  }
-  void TearDown() override { fs::remove_all(dir_); }
+  void SetUp() override { fs::create_directories(dir / "trials"); }
 
   static std::string id(int i) {
     const std::string digits = std::to_string(i);
@@ -44,12 +36,8 @@ class TableTest : public testing::Test {
              {{"naked",
                {{"mean", {{"mpjpe", value}, {"mpvd", nullptr}}}, {"sequences", {one, two}}}}}}};
   }
-  void write(const std::string& name, const std::string& text) const {
-    fs::create_directories(fs::path(dir_ + "/" + name).parent_path());
-    write_file_atomically(dir_ + "/" + name, text);
-  }
   void put(const Json& result) const {
-    write("trials/" + result["id"].get<std::string>() + "/result.json", result.dump());
+    dir.write("trials/" + result["id"].get<std::string>() + "/result.json", result.dump());
   }
   /// Cases quaternion and 6D, each with a = 0 and 1 and seeds 1, 2, 3.
   void put_sweep() const {
@@ -60,12 +48,11 @@ class TableTest : public testing::Test {
           put(trial(++i, name, seed, {{"a", a}, {"model", std::string("m/") + name}},
                     0.1 + 0.02 * a + 0.001 * seed * seed + (name[0] == '6' ? 0.05 : 0)));
   }
-  std::string dir_;
 };
 
 TEST_F(TableTest, RowsAreCasesAndOverridesAndSeedsAreRepetitions) {
   put_sweep();
-  const Results results = read_results(dir_);
+  const Results results = read_results(dir.path());
   EXPECT_TRUE(results.notices.empty());
   const Table table = make_table(results, {});
   ASSERT_EQ(table.rows.size(), 4u);
@@ -85,10 +72,8 @@ TEST_F(TableTest, RowsAreCasesAndOverridesAndSeedsAreRepetitions) {
 
 TEST_F(TableTest, DifferencesArePairedBySeed) {
   put_sweep();
-  TableOptions options;
-  options.against = "quaternion, a=0";
-  options.columns = {"mpjpe"};
-  const Table table = make_table(read_results(dir_), options);
+  const Table table =
+      make_table(read_results(dir.path()), {.columns = {"mpjpe"}, .against = "quaternion, a=0"});
   const Estimate d = *table.rows[0].cells[0][0].difference;
   EXPECT_EQ(d.n, 3);
   EXPECT_NEAR(*d.mean, 0.05, 1e-12);
@@ -98,39 +83,26 @@ TEST_F(TableTest, DifferencesArePairedBySeed) {
 
 TEST_F(TableTest, RowsByAKeyPoolTheOthersAndSaySo) {
   put_sweep();
-  TableOptions options;
-  options.rows = {"a"};
-  options.against = "a=0";
-  const Table table = make_table(read_results(dir_), options);
+  const Table table = make_table(read_results(dir.path()), {.rows = {"a"}, .against = "a=0"});
   ASSERT_EQ(table.rows.size(), 2u);
   EXPECT_EQ(table.rows[0].n, 6);
   EXPECT_EQ(table.rows[0].seeds.size(), 3u);
   EXPECT_NEAR(*table.rows[1].cells[0][0].difference->mean, 0.02, 1e-12);
   EXPECT_EQ(table.rows[1].cells[0][0].difference->n, 6);  // paired by case and seed
   ASSERT_EQ(table.notices.size(), 1u);
-  EXPECT_NE(table.notices[0].find("'case'"), std::string::npos);
-}
-
-template <class Call>
-std::string error_of(Call call) {
-  try {
-    call();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "no error";
+  EXPECT_HAS(table.notices[0], "'case'");
 }
 
 TEST_F(TableTest, UnknownNamesAreToldWithWhatThereIs) {
   put_sweep();
-  const Results results = read_results(dir_);
+  const Results results = read_results(dir.path());
   const auto error = [&](const TableOptions& options) {
     return error_of([&] { make_table(results, options); });
   };
-  EXPECT_NE(error({.rows = {"mode"}}).find("did you mean 'model'?"), std::string::npos);
-  EXPECT_NE(error({.columns = {"mpjep"}}).find("did you mean 'mpjpe'?"), std::string::npos);
-  EXPECT_NE(error({.against = "8D"}).find("the rows are '6D, a=0', '6D, a=1'"), std::string::npos);
-  EXPECT_NE(error({.against = "6D"}).find("beginning of 2 rows"), std::string::npos);
+  EXPECT_HAS(error({.rows = {"mode"}}), "did you mean 'model'?");
+  EXPECT_HAS(error({.columns = {"mpjep"}}), "did you mean 'mpjpe'?");
+  EXPECT_HAS(error({.against = "8D"}), "the rows are '6D, a=0', '6D, a=1'");
+  EXPECT_HAS(error({.against = "6D"}), "beginning of 2 rows");
   EXPECT_EQ(make_table(results, {.against = "quaternion, a=1"}).against, 3u);
 }
 
@@ -140,8 +112,8 @@ TEST_F(TableTest, WhatIsNotDoneIsCountedAndNotAveraged) {
   failed["state"] = "failed";
   failed["error"] = "restage: the loss is not finite";
   put(failed);
-  fs::create_directories(dir_ + "/trials/" + id(77));
-  const Results results = read_results(dir_);
+  fs::create_directories(dir / "trials/" + id(77));
+  const Results results = read_results(dir.path());
   EXPECT_EQ(counts_text(results), "11 done, 1 failed, 1 pending");
   const Table table = make_table(results, {});
   EXPECT_EQ(table.rows[2].n, 2);
@@ -187,14 +159,14 @@ TEST_F(TableTest, DamagedAndForeignResultsAreToldAndNotUsed) {
                                         with("/seconds", "long"),
                                         "{\"id\": 1e999}"};
   for (const std::string& text : bad) {
-    write("trials/" + id(1) + "/result.json", text);
-    const Results results = read_results(dir_);
+    dir.write("trials/" + id(1) + "/result.json", text);
+    const Results results = read_results(dir.path());
     EXPECT_EQ(results.notices.size(), 1u) << text;
     EXPECT_EQ(counts_text(results), "11 done, 1 damaged") << text;
     EXPECT_EQ(make_table(results, {}).rows[2].n, 2) << text;
   }
-  write("trials/" + id(1) + "/result.json", good);
-  EXPECT_EQ(counts_text(read_results(dir_)), "12 done");
+  dir.write("trials/" + id(1) + "/result.json", good);
+  EXPECT_EQ(counts_text(read_results(dir.path())), "12 done");
 }
 
 TEST_F(TableTest, ThePlanSaysWhatBelongs) {
@@ -204,33 +176,31 @@ TEST_F(TableTest, ThePlanSaysWhatBelongs) {
     Json entry = trial(seed < 4 ? 6 + seed : 99, "6D", seed, {{"a", 0}, {"model", "m/6D"}}, 0);
     plan["trials"].push_back(entry);
   }
-  write("plan.json", plan.dump());
-  const Results results = read_results(dir_);
+  dir.write("plan.json", plan.dump());
+  const Results results = read_results(dir.path());
   EXPECT_EQ(counts_text(results), "3 done, 1 pending");
   EXPECT_EQ(results.notices.size(), 9u);  // of an earlier plan
   EXPECT_EQ(make_table(results, {}).rows.size(), 1u);
   // A result that answers another question than the plan asks under this id.
   plan["trials"][0]["seed"] = 5;
-  write("plan.json", plan.dump());
-  EXPECT_EQ(counts_text(read_results(dir_)), "2 done, 1 pending, 1 damaged");
-  EXPECT_NE(error_of([&] { read_results(dir_ + "/trials"); }).find("holds no trials"),
-            std::string::npos);
+  dir.write("plan.json", plan.dump());
+  EXPECT_EQ(counts_text(read_results(dir.path())), "2 done, 1 pending, 1 damaged");
+  EXPECT_HAS(error_of([&] { read_results(dir / "trials"); }), "holds no trials");
 }
 
 TEST_F(TableTest, NamesCannotBreakTheFormats) {
   const std::string name = "a|b_&<\"%\n\\x,y";
   for (int seed = 1; seed <= 2; ++seed) put(trial(seed, name, seed, Json::object(), 0.1 * seed));
-  const Results results = read_results(dir_);
+  const Results results = read_results(dir.path());
   const Table table = make_table(results, {});
-  EXPECT_NE(to_csv(table).find("\"a|b_&<\"\"%\n\\x,y\""), std::string::npos);
-  EXPECT_NE(to_csv(table).find(",naked,mpjpe,m,0.15000000000000002,"), std::string::npos);
-  EXPECT_NE(to_tex(table, results).find("a|b\\_\\&<\"\\% \\textbackslash{}x,y & 2"),
-            std::string::npos);
-  EXPECT_NE(to_markdown(table, results).find("| a\\|b_&<\"% \\x,y |"), std::string::npos);
-  EXPECT_NE(to_svg(table).find("a|b_&amp;&lt;&quot;% \\x,y"), std::string::npos);
+  EXPECT_HAS(to_csv(table), "\"a|b_&<\"\"%\n\\x,y\"");
+  EXPECT_HAS(to_csv(table), ",naked,mpjpe,m,0.15000000000000002,");
+  EXPECT_HAS(to_tex(table, results), "a|b\\_\\&<\"\\% \\textbackslash{}x,y & 2");
+  EXPECT_HAS(to_markdown(table, results), "| a\\|b_&<\"% \\x,y |");
+  EXPECT_HAS(to_svg(table), "a|b_&amp;&lt;&quot;% \\x,y");
   EXPECT_EQ(to_svg(table).find("script"), std::string::npos);
   EXPECT_EQ(to_format(table, results, "x.csv"), to_csv(table));
-  EXPECT_NE(error_of([&] { to_format(table, results, "x.pdf"); }).find(".svg"), std::string::npos);
+  EXPECT_HAS(error_of([&] { to_format(table, results, "x.pdf"); }), ".svg");
 }
 
 TEST_F(TableTest, ReferencesOfAllTrialsAreRowsOfTheirOwn) {

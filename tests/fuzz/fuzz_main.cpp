@@ -1,7 +1,7 @@
 // All targets in one program:
-//   restage_fuzz --list                        names, longest input (bytes), largest allocation
-//   (MiB) restage_fuzz --target=NAME --seeds=FOLDER  writes its seeds restage_fuzz --target=NAME
-//   ...             libFuzzer; -help=1 lists its options
+//   restage_fuzz --list    names, longest input (bytes), largest allocation (MiB), dictionary
+//   restage_fuzz --target=NAME --seeds=FOLDER    writes its seeds
+//   restage_fuzz --target=NAME ...               libFuzzer; -help=1 lists its options
 // An input may be read or refused by InputError in one short line. Everything else is a finding.
 #include <cstdio>
 #include <cstdlib>
@@ -51,8 +51,8 @@ extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
   using namespace restage::fuzz;
   if (*argc == 2 && std::string_view((*argv)[1]) == "--list") {
     for (const Target& target : targets())
-      std::printf("%s %zu %zu\n", std::string(target.name).c_str(), target.longest,
-                  target.allocation);
+      std::printf("%s %zu %zu %s\n", std::string(target.name).c_str(), target.longest,
+                  target.allocation, std::string(target.words).c_str());
     std::exit(0);
   }
   choose(option(*argc, *argv, "--target"));

@@ -20,12 +20,6 @@ import tempfile
 import time
 
 HERE = pathlib.Path(__file__).resolve().parent
-# Texts have words that chance finds slowly.
-DICTIONARY = {"ply": "ply", "obj": "obj", "gltf": "gltf", "character": "gltf", "bvh": "bvh", "asf": "asf",
-              "amc": "asf", "npy": "npy", "npz": "npy", "amass": "npy", "smpl": "npy", "safetensors": "safetensors",
-              "config": "yaml", "recipe": "yaml",
-              "profile": "yaml", "names": "yaml", "doctor": "obj", "sequence": "npy", "import": "bvh", "skeleton": "obj",
-              "retarget": "obj"}
 
 
 def arguments():
@@ -51,7 +45,7 @@ def environment(scratch):
                 UBSAN_OPTIONS="print_stacktrace=1:halt_on_error=1")
 
 
-def fuzz(options, name, longest, allocation):
+def fuzz(options, name, longest, allocation, words=None):
     """One run; a row of the table."""
     corpus, findings = options.corpus / name, options.findings / name
     for folder in (corpus, findings):
@@ -64,11 +58,10 @@ def fuzz(options, name, longest, allocation):
     try:
         subprocess.run(program + [f"--seeds={corpus}"], check=True, env=environment(scratch))
         limit = f"-runs={options.inputs}" if options.inputs else f"-max_total_time={options.seconds}"
-        words = HERE / "dictionaries" / f"{DICTIONARY.get(name)}.dict"
         command = program + [limit, f"-max_len={longest}", f"-malloc_limit_mb={allocation}", "-rss_limit_mb=1536",
                              "-timeout=30", f"-seed={options.seed}", f"-artifact_prefix={findings}/", "-print_final_stats=1",
                              "-verbosity=1", "-use_value_profile=1"]
-        command += [f"-dict={words}"] if words.exists() else []
+        command += [f"-dict={HERE}/dictionaries/{words}.dict"] if words else []  # words that chance finds slowly
         start = time.monotonic()
         done = subprocess.run(command + [str(corpus)], env=environment(scratch), stdin=subprocess.DEVNULL,
                               stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace")
@@ -97,7 +90,7 @@ def main():
     targets = [line.split() for line in listed.splitlines()]
     if options.targets:
         wanted = options.targets.split(",")
-        unknown = set(wanted) - {name for name, _, _ in targets}
+        unknown = set(wanted) - {t[0] for t in targets}
         if unknown:
             sys.exit(f"run_fuzz: no target {sorted(unknown)[0]}; there are " + ", ".join(t[0] for t in targets))
         targets = [t for t in targets if t[0] in wanted]
@@ -105,7 +98,7 @@ def main():
           "|---|---|---|---|---|---|", flush=True)
     rows = []
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
-        jobs = [pool.submit(fuzz, options, name, longest, allocation) for name, longest, allocation in targets]
+        jobs = [pool.submit(fuzz, options, *target) for target in targets]
         for job in jobs:
             row = job.result()
             rows.append(row)

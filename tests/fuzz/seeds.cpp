@@ -1,6 +1,4 @@
 // Small valid files of every kind, as other programs write them.
-#include <lzma.h>
-
 #include <cmath>
 #include <functional>
 #include <map>
@@ -14,12 +12,13 @@
 #include "nn/weights/bundle.h"
 #include "tests/datasets/gltf_maker.h"
 #include "tests/datasets/importers_bvh_text.h"
-#include "tests/datasets/schema_support.h"
 #include "tests/datasets/smpl_support.h"
 #include "tests/fuzz/old_layout.h"
 #include "tests/fuzz/targets.h"
+#include "tests/support/files.h"
 #include "tests/support/small_models.h"
 #include "tests/support/tiny_body.h"
+#include "tests/support/toy_asf.h"
 #include "train/stages/train_config.h"
 
 namespace restage::fuzz {
@@ -162,98 +161,6 @@ Seeds bvh_seeds() {
   odd.rotations = "YXZ";
   odd.rotations_first = odd.reversed = odd.all_positions = odd.wrapped = odd.z_up = true;
   return {{"plain", bvh_test::text(plain)}, {"odd", bvh_test::text(odd)}};
-}
-
-constexpr std::string_view kSkeleton =
-    R"(# the least of a person
-:version 1.10
-:name toy
-:units
-  mass 1.0
-  length 0.45
-  angle deg
-:documentation
-  anything
-:root
-  order TX TY TZ RX RY RZ
-  axis XYZ
-  position 0 0 0
-  orientation 0 0 0
-:bonedata
-)";
-
-struct Bone {
-  const char *name, *parent, *direction, *length, *freedoms;
-};
-constexpr Bone kBones[] = {{"lowerback", "root", "0 1 0", "1.8", "rx ry rz"},
-                           {"upperback", "lowerback", "0 1 0", "2.1", "rx ry rz"},
-                           {"thorax", "upperback", "0 1 0.02", "3.5", "rx"},
-                           {"lowerneck", "thorax", "0 1 0", "1.4", "rx"},
-                           {"upperneck", "lowerneck", "0 1 0", "1.2", ""},
-                           {"head", "upperneck", "0 1 0", "2.3", "rz rx"},
-                           {"lhipjoint", "root", "0.9 -0.5 0", "1.8", ""},
-                           {"lfemur", "lhipjoint", "0 -1 0", "7.1", "rx ry rz"},
-                           {"ltibia", "lfemur", "0 -1 0", "7.4", "rx"},
-                           {"lfoot", "ltibia", "0 -0.4 0.9", "2.5", "rx"},
-                           {"ltoes", "lfoot", "0 0 1", "1.1", "rx"},
-                           {"rhipjoint", "root", "-0.9 -0.5 0", "1.8", ""},
-                           {"rfemur", "rhipjoint", "0 -1 0", "7.1", "rx ry rz"},
-                           {"rtibia", "rfemur", "0 -1 0", "7.4", "rx"},
-                           {"rfoot", "rtibia", "0 -0.4 0.9", "2.5", "rx"},
-                           {"rtoes", "rfoot", "0 0 1", "1.1", "rx"},
-                           {"lclavicle", "thorax", "1 0.1 0", "3.2", "ry rz"},
-                           {"lhumerus", "lclavicle", "1 0 0", "4.8", "rx ry rz"},
-                           {"lradius", "lhumerus", "1 0 0", "2.7", "rx"},
-                           {"lwrist", "lradius", "1 0 0", "1.8", "ry"},
-                           {"lhand", "lwrist", "1 0 0", "0.9", "rx rz"},
-                           {"rclavicle", "thorax", "-1 0.1 0", "3.2", "ry rz"},
-                           {"rhumerus", "rclavicle", "-1 0 0", "4.8", "rx ry rz"},
-                           {"rradius", "rhumerus", "-1 0 0", "2.7", "rx"},
-                           {"rwrist", "rradius", "-1 0 0", "1.8", "ry"},
-                           {"rhand", "rwrist", "-1 0 0", "0.9", "rx rz"}};
-
-std::string asf_text() {
-  std::string out(kSkeleton);
-  int id = 0;
-  for (const Bone& bone : kBones) {
-    out += "  begin\n    id " + std::to_string(++id) + "\n    name " + bone.name +
-           "\n    direction " + bone.direction + "\n    length " + bone.length +
-           "\n    axis 10 -20 15 XYZ\n";
-    if (*bone.freedoms != '\0') {
-      const std::string freedoms = bone.freedoms;
-      out += "    dof " + freedoms + "\n    limits";
-      for (size_t i = 0; i < (freedoms.size() + 1) / 3; ++i) out += " (-160.0 20.0)\n";
-    }
-    out += "  end\n";
-  }
-  out += ":hierarchy\n  begin\n";
-  for (const Bone& bone : kBones) out += std::string("    ") + bone.parent + " " + bone.name + "\n";
-  return out + "  end\n";
-}
-
-std::string amc_text(int frames) {
-  std::string out = "#!OML:ASF\n:FULLY-SPECIFIED\n:DEGREES\n";
-  for (int f = 1; f <= frames; ++f) {
-    out += std::to_string(f) + "\nroot 0.1 16.5 0." + std::to_string(f) + " 5 20 -3\n";
-    for (const Bone& bone : kBones) {
-      if (*bone.freedoms == '\0') continue;
-      out += bone.name;
-      for (const char* c = bone.freedoms; *c != '\0'; ++c)
-        if (*c == 'r') out += " " + std::to_string(f) + ".25";
-      out += "\n";
-    }
-  }
-  return out;
-}
-
-std::string packed(const std::string& text) {
-  std::string out(lzma_stream_buffer_bound(text.size()), '\0');
-  size_t used = 0;
-  lzma_easy_buffer_encode(0, LZMA_CHECK_CRC32, nullptr,
-                          reinterpret_cast<const uint8_t*>(text.data()), text.size(),
-                          reinterpret_cast<uint8_t*>(out.data()), &used, out.size());
-  out.resize(used);
-  return out;
 }
 
 // ---- arrays ------------------------------------------------------------------------------------
@@ -437,11 +344,6 @@ Seeds import_seeds() {
 
 }  // namespace
 
-std::string_view amc_skeleton() {
-  static const std::string text = asf_text();
-  return text;
-}
-
 std::vector<Seed> seeds(std::string_view target) {
   static const std::map<std::string_view, std::function<Seeds()>> makers = {
       {"ply", ply_seeds},
@@ -451,15 +353,15 @@ std::vector<Seed> seeds(std::string_view target) {
       {"bvh", bvh_seeds},
       {"asf",
        [] {
-         return Seeds{{"toy", asf_text()}};
+         return Seeds{{"toy", asf_test::asf_text()}};
        }},
       {"amc",
        [] {
-         return Seeds{{"toy", amc_text(3), Cut::any}};
+         return Seeds{{"toy", asf_test::amc_text(3), Cut::any}};
        }},
       {"xz",
        [] {
-         return Seeds{{"plain", packed(bvh_seeds()[0].bytes)}};
+         return Seeds{{"plain", test::xz_of(bvh_seeds()[0].bytes, 8)}};
        }},
       {"npy", npy_seeds},
       {"npz", npz_seeds},

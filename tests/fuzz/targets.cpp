@@ -20,9 +20,10 @@
 #include "nn/config/config.h"
 #include "nn/weights/bundle.h"
 #include "nn/weights/state.h"
-#include "tests/datasets/schema_support.h"
 #include "tests/datasets/smpl_support.h"
 #include "tests/fuzz/after_reading.h"
+#include "tests/support/files.h"
+#include "tests/support/toy_asf.h"
 #include "train/stages/train_config.h"
 
 namespace restage::fuzz {
@@ -84,7 +85,13 @@ void read_rigged(const std::string& bytes) {
 
 // ---- recordings --------------------------------------------------------------------------------
 
-void read_bvh_text(const std::string& bytes) { convert_bvh(bytes, "x.bvh"); }
+void finite(const MotionClip& clip) {
+  for (const Joints& joints : clip.joints)
+    for (const Vec3& x : joints)
+      if (!x.allFinite()) throw std::logic_error("a joint is not finite");
+}
+
+void read_bvh_text(const std::string& bytes) { finite(convert_bvh(bytes, "x.bvh")); }
 
 void read_asf(const std::string& bytes) {
   const AsfFile asf = parse_asf(bytes, "x.asf");
@@ -93,10 +100,13 @@ void read_asf(const std::string& bytes) {
   for (const AsfBone& bone : asf.bones) values += bone.freedoms.size();
   Vec3 position;
   asf_pose(asf, std::vector<double>(values, 1.0), asf.radians, position);
+  static const std::string recording = asf_test::amc_text(3);
+  finite(convert_amc(recording, "x.amc", bytes, "x.asf"));
 }
 
 void read_amc_text(const std::string& bytes) {
-  convert_amc(bytes, "x.amc", amc_skeleton(), "x.asf");
+  static const std::string skeleton = asf_test::asf_text();
+  finite(convert_amc(bytes, "x.amc", skeleton, "x.asf"));
 }
 
 void read_packed(const std::string& bytes) { read_bvh(file_of(bytes, "x.bvh.xz")); }
@@ -227,29 +237,31 @@ void read_hdf5(const std::string& bytes) {
 // take 1 GiB (datasets/hdf5/probe.h); what the file claims is checked against what it stores.
 const std::vector<Target>& targets() {
   constexpr size_t kLong = size_t{64} << 10, kModel = 3 * kLong, kShort = size_t{16} << 10;
-  static const std::vector<Target> all = {{"ply", kShort, 65, read_ply},
-                                          {"obj", kShort, 65, read_obj},
-                                          {"gltf", kLong, 65, read_scene},
-                                          {"character", kLong, 65, read_rigged},
-                                          {"bvh", kLong, 65, read_bvh_text},
-                                          {"asf", kShort, 65, read_asf},
-                                          {"amc", kShort, 65, read_amc_text},
-                                          {"xz", kShort, 320, read_packed},
-                                          {"npy", kShort, 65, read_npy_file},
-                                          {"npz", kShort, 192, read_npz_file},
-                                          {"amass", kLong, 65, read_motion},
-                                          {"smpl", kModel, 66, read_body_model},
-                                          {"safetensors", kLong, 65, read_weights},
-                                          {"config", kShort, 65, read_training},
-                                          {"recipe", kShort, 65, read_recipe},
-                                          {"profile", kShort, 65, read_profile},
-                                          {"names", kShort, 65, read_names},
-                                          {"hdf5", kLong, 1040, read_hdf5},
-                                          {"doctor", kShort, 65, doctor_surface},
-                                          {"sequence", kShort, 65, doctor_sequence},
-                                          {"import", kShort, 65, import_file},
-                                          {"skeleton", kShort, 65, extract},
-                                          {"retarget", kShort, 65, retarget}};
+  static const std::vector<Target> all = {
+      {"ply", "ply", kShort, 65, 1000, read_ply},
+      {"obj", "obj", kShort, 65, 500, read_obj},
+      {"gltf", "gltf", kLong, 65, 3000, read_scene},
+      {"character", "gltf", kLong, 65, 3000, read_rigged},
+      {"bvh", "bvh", kLong, 65, 900, read_bvh_text},
+      {"asf", "asf", kShort, 65, 600, read_asf},
+      {"amc", "asf", kShort, 65, 600, read_amc_text},
+      {"xz", "", kShort, 320, 200, read_packed},
+      {"npy", "npy", kShort, 65, 500, read_npy_file},
+      {"npz", "npy", kShort, 192, 800, read_npz_file},
+      {"amass", "npy", kLong, 65, 600, read_motion},
+      {"smpl", "npy", kModel, 66, 300, read_body_model},
+      {"safetensors", "safetensors", kLong, 65, 3000, read_weights},
+      {"config", "yaml", kShort, 65, 3000, read_training},
+      {"recipe", "yaml", kShort, 65, 300, read_recipe},
+      {"profile", "yaml", kShort, 65, 300, read_profile},
+      {"names", "yaml", kShort, 65, 300, read_names},
+      {"hdf5", "", kLong, 1040, 1100, read_hdf5},
+      {"doctor", "obj", kShort, 65, 10, doctor_surface},
+      {"sequence", "npy", kShort, 65, 20, doctor_sequence},
+      {"import", "bvh", kShort, 65, 20, import_file},
+      {"skeleton", "obj", kShort, 65, 20, extract},
+      {"retarget", "obj", kShort, 65, 20, retarget},
+  };
   return all;
 }
 

@@ -10,8 +10,10 @@ namespace restage::fuzz {
 
 struct Target {
   std::string_view name;
-  size_t longest;     ///< bytes of an input
-  size_t allocation;  ///< MiB that one allocation may take; targets.cpp has the arithmetic
+  std::string_view words;  ///< its dictionary: dictionaries/WORDS.dict
+  size_t longest;          ///< bytes of an input
+  size_t allocation;       ///< MiB that one allocation may take; targets.cpp has the arithmetic
+  int damaged;             ///< so many damaged files are read in the ordinary tests
   /// Reads the bytes in every way there is. InputError if they are refused; nothing else may come
   /// out.
   void (*read)(const std::string& bytes);
@@ -38,8 +40,5 @@ std::string file_of(const std::string& bytes, const std::string& name);
 /// Arrays of an NPZ one after the other, without the checksums that would keep damage from the
 /// importers: name, zero, length (4 bytes), bytes.
 std::string framed(const std::vector<std::pair<std::string, std::string>>& arrays);
-
-/// The skeleton of the target "amc".
-std::string_view amc_skeleton();
 
 }  // namespace restage::fuzz

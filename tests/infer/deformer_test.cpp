@@ -6,7 +6,6 @@
 #include <cmath>
 #include <string>
 
-#include "autograd/base/parallel.h"
 #include "autograd/base/rng.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/rotation.h"
@@ -165,14 +164,11 @@ TEST(InferDeformer, BitsDoNotDependOnThreads) {
   const Surface s = surface(4000);
   const auto offsets = net();
   const Deformer deformer(s.points, s.weights, offsets.get());
-  const int before = threads();
-  set_threads(1);
-  const Tensor one = deformer(s.pose, s.bones);
-  for (const int n : {2, 3, 7}) {
-    set_threads(n);
-    EXPECT_TRUE(same_bits(deformer(s.pose, s.bones), one)) << n;
-  }
-  set_threads(before);
+  const auto with = [&](int n) {
+    const testing::UseThreads use(n);
+    return deformer(s.pose, s.bones);
+  };
+  for (const int n : {2, 3, 7}) EXPECT_TRUE(same_bits(with(n), with(1))) << n;
 }
 
 TEST(InferDeformer, BitsAreTheSameOnAllVectorSets) {

@@ -6,10 +6,10 @@
 #include <limits>
 
 #include "autograd/base/error.h"
-#include "autograd/base/parallel.h"
 #include "autograd/base/rng.h"
 #include "datasets/builtin/bodies.h"
 #include "datasets/sampling/surface.h"
+#include "tests/support/use_set.h"
 
 namespace restage {
 namespace {
@@ -88,12 +88,11 @@ TEST(Registration, TheSameBitsForAnyNumberOfThreads) {
   const Points cloud = scan(body(), step_pose(body()));
   std::vector<RetargetedFrame> found;
   for (const int n : {1, 2, 3}) {
-    set_threads(n);
+    const testing::UseThreads use(n);
     Registration registration(body().rest, body().joints, "target");
     registration.push(cloud, "first");
     found.push_back(registration.push(cloud, "second")[0]);  // with a frame before
   }
-  set_threads(0);
   for (size_t k = 1; k < found.size(); ++k)
     for (size_t v = 0; v < found[0].vertices.size(); ++v)
       ASSERT_EQ(found[k].vertices[v], found[0].vertices[v]) << v;

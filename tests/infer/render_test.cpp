@@ -11,8 +11,8 @@
 #include "infer/render/page.h"
 #include "infer/render/rasteriser.h"
 #include "infer/render/sheet.h"
-#include "tests/datasets/schema_support.h"
 #include "tests/infer/toy_body.h"
+#include "tests/support/files.h"
 
 namespace restage {
 namespace {
@@ -160,8 +160,7 @@ std::string base64_of(const std::string& page, const std::string& id) {
 }
 
 TEST(Page, IsOneFileThatAsksForNothing) {
-  PageOptions options;
-  options.title = "walk <onto> \"another\" & body @DATA@";
+  const PageOptions options{.title = "walk <onto> \"another\" & body @DATA@"};
   auto clips = toy_clips();
   clips[1].label = "</script><b>result \xff";
   const std::string page = page_html(clips, options);
@@ -180,11 +179,9 @@ TEST(Page, IsOneFileThatAsksForNothing) {
 
 TEST(Page, LongSequencesStayBelowTheLimit) {
   auto clips = toy_clips(60);
-  PageOptions options;
-  const size_t whole = page_html(clips, options).size();
+  const size_t whole = page_html(clips, {}).size();
   for (const size_t limit : {whole / 3, whole / 10, size_t{150000}}) {
-    options.max_bytes = limit;
-    const std::string page = page_html(clips, options);
+    const std::string page = page_html(clips, {.max_bytes = limit});
     EXPECT_LE(page.size(), limit * 11 / 10 + 30000);
     EXPECT_HAS(page, "Holds one frame in");
   }

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "autograd/ops/elementwise.h"
+#include "tests/support/errors.h"
 #include "tests/support/small_models.h"
 #include "tests/support/tiny_body.h"
 
@@ -55,6 +56,13 @@ std::vector<RetargetedFrame> run(Retargeter& r, const std::vector<Joints>& sourc
   for (const Joints& j : source)
     for (const RetargetedFrame& f : r.push_joints(j)) out.push_back(f);
   return out;
+}
+
+/// What becomes of a source on the target.
+std::vector<RetargetedFrame> retargeted(const Bundle& models, const std::vector<Joints>& source,
+                                        const RetargetOptions& options = {}) {
+  Retargeter r(models, "w", target().rest, target().joints, options);
+  return run(r, source);
 }
 
 double apart(const Joints& a, const Joints& b) {
@@ -133,9 +141,8 @@ TEST(InferRetargeter, TheAnchorBoundsDriftAndLeavesThePoseAlone) {
   const Bundle models = untrained();
   const std::vector<Joints> source = performance(120);
   const double scale = leg_length(target().joints) / leg_length(source[0]), seconds = 0.25;
-  Retargeter summed(models, "w", target().rest, target().joints, {.anchor = 0});
-  Retargeter anchored(models, "w", target().rest, target().joints, {.anchor = seconds});
-  const std::vector<RetargetedFrame> far = run(summed, source), near = run(anchored, source);
+  const std::vector<RetargetedFrame> far = retargeted(models, source, {.anchor = 0}),
+                                     near = retargeted(models, source, {.anchor = seconds});
   const auto off = [&](const RetargetedFrame& frame, size_t f) {
     return Vec3(frame.pose.root - scale * source[f][0]);
   };
@@ -158,8 +165,7 @@ TEST(InferRetargeter, LegsThatSeemToGrowMoveNobodyWhoIsFarAway) {
     std::vector<Joints> source(60, performance(1)[0]);
     for (size_t f = 0; f < source.size(); ++f)
       for (Vec3& x : source[f]) x = (1 + 0.02 * static_cast<double>(f) / 60) * x + Vec3(away, 0, 0);
-    Retargeter r(models, "w", target().rest, target().joints, {});
-    const std::vector<RetargetedFrame> out = run(r, source);
+    const std::vector<RetargetedFrame> out = retargeted(models, source);
     return Vec3(out.back().pose.root - out.front().pose.root);
   };
   EXPECT_LT((way(1000) - way(0)).norm(), 0.02 * 3);
@@ -198,10 +204,8 @@ TEST(InferRetargeter, FramesOfOtherRatesFallOnTheThirtyPerSecondGrid) {
   const Bundle models = untrained();
   const std::vector<Joints> source = performance(40);
   const auto frames = [&](double fps, size_t n) {
-    RetargetOptions options;
-    options.fps = fps;
-    Retargeter r(models, "w", target().rest, target().joints, options);
-    return run(r, {source.begin(), source.begin() + static_cast<std::ptrdiff_t>(n)});
+    return retargeted(models, {source.begin(), source.begin() + static_cast<std::ptrdiff_t>(n)},
+                      {.fps = fps});
   };
   EXPECT_EQ(frames(30, 40).size(), 40u);
   EXPECT_EQ(frames(60, 40).size(), 20u);
@@ -219,10 +223,8 @@ TEST(InferRetargeter, FramesOfOtherRatesFallOnTheThirtyPerSecondGrid) {
     for (size_t j = 0; j < kJoints; ++j) middle[j] = (source[f][j] + source[f + 1][j]) / 2;
     if (f < 19) doubled.push_back(middle);
   }
-  Retargeter plain(models, "w", target().rest, target().joints, {});
-  const auto from60 = frames(60, 40), direct = run(plain, half);
-  plain.restart();
-  const auto from15 = frames(15, 20), midpoints = run(plain, doubled);
+  const auto from60 = frames(60, 40), direct = retargeted(models, half);
+  const auto from15 = frames(15, 20), midpoints = retargeted(models, doubled);
   for (size_t f = 0; f < direct.size(); ++f)
     EXPECT_LT(apart(from60[f].joints, direct[f].joints), 1e-6) << f;
   for (size_t f = 0; f < midpoints.size(); ++f)
@@ -310,9 +312,7 @@ TEST(InferRetargeter, TranslationsMeanWhatTheWeightsSay) {
     for (Vec3& j : joints) j += step;
   for (const std::string kind : {"velocity", "relative", "absolute"}) {
     const Bundle models = testing::with_setting(untrained(), "motion", "translation", kind);
-    Retargeter a(models, "w", target().rest, target().joints, {}),
-        b(models, "w", target().rest, target().joints, {});
-    const auto x = run(a, source), y = run(b, elsewhere);
+    const auto x = retargeted(models, source), y = retargeted(models, elsewhere);
     const double ratio = leg_length(target().joints) / leg_length(source[0]);
     if (kind == "velocity") {
       EXPECT_LT((x[0].pose.root - ratio * source[0][0]).norm(), 1e-5);
@@ -332,16 +332,13 @@ TEST(InferRetargeter, TranslationsMeanWhatTheWeightsSay) {
 }
 
 TEST(InferRetargeter, WithoutHeadingTheResultTurnsWithTheSource) {
-  Bundle models = untrained();
-  models = testing::with_setting(models, "motion", "remove_heading", "true");
+  const Bundle models = testing::with_setting(untrained(), "motion", "remove_heading", "true");
   const std::vector<Joints> source = performance(8);
   std::vector<Joints> turned = source;
   const Mat3 turn = turn_about_y(1.1);
   for (Joints& joints : turned)
     for (Vec3& j : joints) j = turn * j;
-  Retargeter a(models, "w", target().rest, target().joints, {}),
-      b(models, "w", target().rest, target().joints, {});
-  const auto x = run(a, source), y = run(b, turned);
+  const auto x = retargeted(models, source), y = retargeted(models, turned);
   for (size_t f = 0; f < x.size(); ++f) {
     Joints expected = x[f].joints;
     for (Vec3& j : expected) j = turn * j;
@@ -375,19 +372,16 @@ Joints arms_down(double degrees, bool both) {
 }
 
 TEST(InferRetargeter, TargetsThatAreNoTPose) {
-  RetargetOptions force;
-  force.force = true;
   const auto refused = [&](const Joints& joints) {
     const Bundle models = with_extractor(joints);
-    EXPECT_NO_THROW(Retargeter(models, "w", target().rest, "hero.obj", force));
-    try {
-      const Retargeter r(models, "w", target().rest, "hero.obj", {});
-    } catch (const InputError& e) {
-      EXPECT_EQ(std::string(e.what()).rfind("hero.obj: is not in T-pose", 0), 0u) << e.what();
-      EXPECT_NE(std::string(e.what()).find("--force"), std::string::npos) << e.what();
-      return true;
+    EXPECT_NO_THROW(Retargeter(models, "w", target().rest, "hero.obj", {.force = true}));
+    const std::string said =
+        test::refusal_of([&] { Retargeter(models, "w", target().rest, "hero.obj", {}); });
+    if (!said.empty()) {
+      EXPECT_TRUE(said.starts_with("hero.obj: is not in T-pose")) << said;
+      EXPECT_HAS(said, "--force");
     }
-    return false;
+    return !said.empty();
   };
   EXPECT_FALSE(refused(arms_down(0, true)));
   EXPECT_FALSE(refused(arms_down(29, true)));
@@ -405,12 +399,8 @@ TEST(InferRetargeter, TargetsThatAreNoTPose) {
 
 TEST(InferRetargeter, WhatCannotBeAnsweredIsSaid) {
   const Bundle models = untrained();
-  for (const double fps : {0.0, -30.0, 0.01, 1e9, std::nan("")}) {
-    RetargetOptions options;
-    options.fps = fps;
-    EXPECT_THROW(Retargeter(models, "w", target().rest, target().joints, options), InputError)
-        << fps;
-  }
+  for (const double fps : {0.0, -30.0, 0.01, 1e9, std::nan("")})
+    EXPECT_THROW(retargeted(models, {}, {.fps = fps}), InputError) << fps;
   Retargeter r(models, "w", target().rest, target().joints, {});
   Joints huge = tiny_joints();
   for (Vec3& j : huge) j *= 1e60;
@@ -419,9 +409,7 @@ TEST(InferRetargeter, WhatCannotBeAnsweredIsSaid) {
 
 TEST(InferRetargeter, CloudsGoThroughTheExtractor) {
   Bundle models = untrained();
-  RetargetOptions options;
-  options.force = true;
-  options.samples = 2;
+  const RetargetOptions options{.force = true, .samples = 2};
   Retargeter a(models, "w", target().rest, "hero.obj", options),
       b(models, "w", target().rest, "hero.obj", options);
   EXPECT_EQ(a.rest(), b.rest());

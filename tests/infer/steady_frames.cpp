@@ -7,10 +7,10 @@
 #include <atomic>
 #include <cstdio>
 
-#include "autograd/base/parallel.h"
 #include "infer/retargeter.h"
 #include "tests/support/small_models.h"
 #include "tests/support/tiny_body.h"
+#include "tests/support/use_set.h"
 
 namespace {
 std::atomic<long> taken{0};
@@ -59,9 +59,7 @@ std::vector<Points> clouds() {
 
 class SteadyFrames : public ::testing::TestWithParam<int> {
  protected:
-  SteadyFrames() : before_(threads()) { set_threads(GetParam()); }
-  ~SteadyFrames() override { set_threads(before_); }
-  int before_;
+  const testing::UseThreads use_{GetParam()};
 };
 
 TEST(Counting, SeesTheHeap) {
@@ -73,9 +71,7 @@ TEST(Counting, SeesTheHeap) {
 TEST_P(SteadyFrames, TakeNothingFromTheHeapAndDoNotGrow) {
   const Bundle models = testing::untrained_bundle("smrm/rot6d", {"hidden=32"}, 2);
   const Body target = testing::tiny_body("b", "test", 1.1, 1.2);
-  RetargetOptions options;
-  options.samples = 2;
-  Retargeter r(models, "w", target.rest, target.joints, options);
+  Retargeter r(models, "w", target.rest, target.joints, {.samples = 2});
   const std::vector<Points> source = clouds();
   const std::string name = "frame";
   double moved = 0;

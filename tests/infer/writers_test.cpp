@@ -10,8 +10,8 @@
 #include "infer/writers/bvh.h"
 #include "infer/writers/frames.h"
 #include "infer/writers/glb.h"
-#include "tests/datasets/schema_support.h"
 #include "tests/infer/toy_body.h"
+#include "tests/support/files.h"
 
 namespace restage {
 namespace {

@@ -5,22 +5,12 @@
 #include "autograd/base/rng.h"
 #include "nn/models/motion.h"
 #include "nn/models/registry.h"
+#include "tests/support/tiny_body.h"
 
 namespace restage {
 namespace {
 
-/// A T-pose of plausible proportions, `size` metres tall.
-Joints t_pose(double size) {
-  const double table[kJoints][3] = {
-      {0, .55, 0},     {.05, .52, 0},    {-.05, .52, 0},   {0, .61, -.01},    {.06, .28, 0},
-      {-.06, .28, 0},  {0, .68, -.01},   {.06, .04, -.02}, {-.06, .04, -.02}, {0, .75, 0},
-      {.07, .01, .06}, {-.07, .01, .06}, {0, .86, -.01},   {.04, .82, 0},     {-.04, .82, 0},
-      {0, .92, .01},   {.11, .83, 0},    {-.11, .83, 0},   {.26, .83, 0},     {-.26, .83, 0},
-      {.40, .83, 0},   {-.40, .83, 0}};
-  Joints joints;
-  for (int j = 0; j < kJoints; ++j) joints[j] = size * Vec3(table[j][0], table[j][1], table[j][2]);
-  return joints;
-}
+using testing::tiny_joints;
 
 Pose random_pose(uint64_t seed) {
   Rng rng({seed, 0});
@@ -34,7 +24,7 @@ Pose random_pose(uint64_t seed) {
 }
 
 TEST(ClosedForm, ReturnsTheJointsOfASkeletonOnItself) {
-  const Joints rest = t_pose(1.7);
+  const Joints rest = tiny_joints();
   std::vector<Joints> motion;
   for (uint64_t f = 0; f < 20; ++f)
     motion.push_back(forward_kinematics(rest, random_pose(f)).joints);
@@ -46,7 +36,7 @@ TEST(ClosedForm, ReturnsTheJointsOfASkeletonOnItself) {
 }
 
 TEST(ClosedForm, ScalesTheTrajectoryByLegLength) {
-  const Joints small = t_pose(1.5), tall = t_pose(1.8);
+  const Joints small = tiny_joints(1.5), tall = tiny_joints(1.8);
   std::vector<Joints> motion;
   for (uint64_t f = 0; f < 4; ++f)
     motion.push_back(forward_kinematics(small, random_pose(f)).joints);
@@ -63,8 +53,8 @@ TEST(ClosedForm, ScalesTheTrajectoryByLegLength) {
 }
 
 TEST(ClosedForm, SourceRestRemovesTheDifferenceOfRestPoses) {
-  const Joints target = t_pose(1.7);
-  Joints source = t_pose(1.7);
+  const Joints target = tiny_joints();
+  Joints source = tiny_joints();
   source[4].x() += 0.1;  // legs spread
   source[7].x() += 0.2;
   source[10].x() += 0.2;
@@ -77,7 +67,7 @@ TEST(ClosedForm, SourceRestRemovesTheDifferenceOfRestPoses) {
 TEST(ClosedForm, DegenerateSkeletonsGiveRotations) {
   Joints collapsed;
   collapsed.fill(Vec3(1, 2, 3));
-  const Joints rest = t_pose(1.7);
+  const Joints rest = tiny_joints();
   for (const auto& [a, b] : {std::pair{rest, collapsed}, {collapsed, rest}, {collapsed, collapsed}})
     for (const Pose& pose : closed_form({a}, b))
       for (const Mat3& local : pose.local) {

@@ -12,8 +12,8 @@
 #include <nlohmann/json.hpp>
 
 #include "autograd/base/error.h"
-#include "autograd/base/parallel.h"
 #include "autograd/base/rng.h"
+#include "tests/support/use_set.h"
 
 namespace restage::metrics {
 namespace {
@@ -149,13 +149,11 @@ TEST(Metrics, SameBitsForAnyNumberOfThreads) {
   const auto a = noise(9 * 50 * 3, 9), b = noise(9 * 50 * 3, 10);
   const Track x{a.data(), 9, 50}, y{b.data(), 9, 50};
   const std::vector<SequenceView> views{{x, y, x, y, 9}};
-  set_threads(1);
-  const Values one = evaluate(views).mean;
-  for (const int n : {2, 3}) {
-    set_threads(n);
-    EXPECT_EQ(evaluate(views).mean, one) << n << " threads";
-  }
-  set_threads(0);
+  const auto mean = [&](int n) {
+    const testing::UseThreads use(n);
+    return evaluate(views).mean;
+  };
+  for (const int n : {2, 3}) EXPECT_EQ(mean(n), mean(1)) << n << " threads";
 }
 
 TEST(Metrics, ErrorsByPointAverageToTheMeanDistance) {

@@ -17,21 +17,7 @@ using gradcheck::same_bits;
 constexpr double kPi = 3.14159265358979323846;
 
 struct Players {
-  Players()
-      : net(
-            [] {
-              SmrmConfig c;
-              c.hidden = 4;
-              return c;
-            }(),
-            Init{RngKey{1, 0}, DType::f64}),
-        judge(
-            [] {
-              DiscriminatorConfig c;
-              c.widths = {2, 2, 2, 2};
-              return c;
-            }(),
-            Init{RngKey{2, 0}, DType::f64}) {
+  Players() {
     batch.joints = batch.input = random({3, 9, kJoints, 3}, 1);
     batch.trans = batch.true_trans = random({3, 9, 3}, 2);
     batch.rest_a = random({3, kJoints, 3}, 3);
@@ -44,8 +30,8 @@ struct Players {
     Context ctx{&tape, true, RngKey{8, 0}};
     return tape.backward(motion_losses(ctx, net, &judge, batch, {}, of_judge).total);
   }
-  Smrm net;
-  Discriminator judge;
+  Smrm net{{.hidden = 4}, Init{RngKey{1, 0}, DType::f64}};
+  Discriminator judge{{.widths = {2, 2, 2, 2}}, Init{RngKey{2, 0}, DType::f64}};
   MotionBatch batch;
 };
 

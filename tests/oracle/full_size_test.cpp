@@ -204,20 +204,6 @@ TEST(FullSizeModels, ParametersStandInTheOraclesOrder) {
   }
 }
 
-TEST(FullSizeModels, ParameterCounts) {
-  const std::map<std::string, int64_t> counts = {{"skeleton/point_transformer", 9585730},
-                                                 {"skeleton/pointnet", 1620811},
-                                                 {"smrm/rot6d", 5793927},
-                                                 {"smrm/quaternion", 5771355},
-                                                 {"smrm/discriminator", 280285},
-                                                 {"deformation/weights", 89366},
-                                                 {"deformation/offsets", 84483},
-                                                 {"deformation/root", 83715},
-                                                 {"deformation/v1_field", 88598}};
-  for (const auto& [name, count] : counts)
-    EXPECT_EQ(count_parameters(*make_model(name, model_config(name), Init{})), count) << name;
-}
-
 struct Vector7 : Module {
   Parameter w{hash_fill({7}, 3)};
   void visit(Fields& f) override { f("w", w); }

@@ -90,15 +90,15 @@ class Case {
       if (e.parameter != nullptr) leaves_.emplace_back("g." + e.name, e.parameter->id);
   }
 
-  void out(const std::string& name, const Var& value) {
-    answer_.tensors["out." + name] = value.value;
+  void out(const std::vector<std::pair<std::string, Var>>& values) {
+    for (const auto& [name, value] : values) answer_.tensors["out." + name] = value.value;
   }
   void index(const std::string& name, const Tensor& value) {
     answer_.tensors["idx." + name] = value;
   }
   /// The loss, its gradients, and the buffers after the call.
   void finish(const Var& loss) {
-    out("loss", loss);
+    out({{"loss", loss}});
     const Gradients gradients = tape_.backward(loss);
     for (const auto& [name, id] : leaves_)
       if (const Tensor* g = gradients.find(id)) answer_.tensors[name] = *g;
@@ -132,11 +132,11 @@ Var dot(const Var& x, const Tensor& probe) { return sum_all(x * Var(probe)); }
 void rotations(Case& c) {
   const Var aa = axis_angle_to_matrix(c.in("aa")), sixd = sixd_to_matrix(c.in("sixd")),
             quat = quaternion_to_matrix(c.in("quat"));
-  c.out("aa", aa);
-  c.out("sixd", sixd);
-  c.out("quat", quat);
-  c.out("aa_back", matrix_to_axis_angle(sixd.value));
-  c.out("quat_back", matrix_to_quaternion(sixd.value));
+  c.out({{"aa", aa},
+         {"sixd", sixd},
+         {"quat", quat},
+         {"aa_back", matrix_to_axis_angle(sixd.value)},
+         {"quat_back", matrix_to_quaternion(sixd.value)}});
   const Tensor probe = c.probe();
   const auto part = [&](int64_t i, const Var& x) {
     return dot(x, probe.rows(i, i + 1).reshape(x.shape()));
@@ -149,10 +149,7 @@ void fk_lbs(Case& c) {
   const Var posed = forward_kinematics(local, c.in("tpose"), c.in("root"), joint_parents());
   const Var joints = joints_of(posed);
   const Var verts = linear_blend_skinning(c.in("points"), c.in("weights"), posed, c.in("tpose"));
-  c.out("R", local);
-  c.out("G", rotations_of(posed));
-  c.out("joints", joints);
-  c.out("verts", verts);
+  c.out({{"R", local}, {"G", rotations_of(posed)}, {"joints", joints}, {"verts", verts}});
   c.finish(dot(joints, c.probe("probe_j")) + dot(verts, c.probe("probe_v")));
 }
 
@@ -181,8 +178,7 @@ void gru_case(Case& c) {
   c.load(gru);
   Var state = c.in("h0");
   const Var y = gru(c.ctx(), c.in("x"), &state);
-  c.out("y", y);
-  c.out("hn", state);
+  c.out({{"y", y}, {"hn", state}});
   c.finish(dot(y, c.probe()) + sum_all(state));
 }
 
@@ -191,7 +187,7 @@ void vector_attention(Case& c) {
   c.load(net);
   const Var xyz = c.in("xyz");
   const Var y = net(c.ctx(), xyz, c.in("f"));
-  c.out("y", y);
+  c.out({{"y", y}});
   c.index("knn", knn(xyz.value, xyz.value, c.count("k")));
   c.finish(dot(y, c.probe()));
 }
@@ -199,7 +195,7 @@ void vector_attention(Case& c) {
 void run_extractor(Case& c, SkeletonModel& net) {
   c.load(net);
   const Var joints = net.forward(c.ctx(), c.in("cloud")).joints;
-  c.out("joints", joints);
+  c.out({{"joints", joints}});
   c.finish(mse(joints, c.in("target")));
 }
 
@@ -259,12 +255,12 @@ void smrm(Case& c) {
   MotionState state;
   const MotionOutput y =
       net->forward(c.ctx(), c.in("joints"), c.in("trans"), c.in("tpose"), &state);
-  c.out("raw", y.raw);
-  c.out("R", y.rotations);
-  c.out("joints", y.joints);
-  c.out("trans", y.trans);
-  c.out("h_enc", state[0]);
-  c.out("h_dec", state[1]);
+  c.out({{"raw", y.raw},
+         {"R", y.rotations},
+         {"joints", y.joints},
+         {"trans", y.trans},
+         {"h_enc", state[0]},
+         {"h_dec", state[1]}});
   c.finish(mse(y.joints, c.in("target")) + mean_all(square(y.trans)));
 }
 
@@ -281,13 +277,13 @@ void motion_generator(Case& c) {
   b.sixd = c.in("th6A");
   b.self_mask = c.constant("self_mask");
   const MotionLosses l = motion_losses(c.ctx(), *net, dis.get(), b, MotionWeights{}, true);
-  c.out("cyc", l.cycle);
-  c.out("rot", l.rotation);
-  c.out("smooth", l.smoothness);
-  c.out("adv", l.adversarial);
-  c.out("self", l.self);
-  c.out("B_joints", l.joints_b);
-  c.out("B_trans", l.trans_b);
+  c.out({{"cyc", l.cycle},
+         {"rot", l.rotation},
+         {"smooth", l.smoothness},
+         {"adv", l.adversarial},
+         {"self", l.self},
+         {"B_joints", l.joints_b},
+         {"B_trans", l.trans_b}});
   c.finish(l.total);
 }
 
@@ -307,11 +303,11 @@ void motion_self(Case& c) {
   weights.rotation = c.number("rotation_weight");
   weights.smoothness = c.number("smoothness_weight");
   const MotionLosses l = self_losses(c.ctx(), *net, b, weights);
-  c.out("cyc", l.cycle);
-  c.out("rot", l.rotation);
-  c.out("smooth", l.smoothness);
-  c.out("joints", l.joints_b);
-  c.out("trans", l.trans_b);
+  c.out({{"cyc", l.cycle},
+         {"rot", l.rotation},
+         {"smooth", l.smoothness},
+         {"joints", l.joints_b},
+         {"trans", l.trans_b}});
   c.finish(l.total);
 }
 
@@ -321,8 +317,7 @@ void motion_discriminator(Case& c) {
   const DiscriminatorLosses l =
       discriminator_losses(c.ctx(), *dis, c.in("real"), c.in("t_real"), c.in("tp_real"),
                            c.constant("fake"), c.constant("t_fake"), c.in("tp_fake"));
-  c.out("real", l.real);
-  c.out("fake", l.fake);
+  c.out({{"real", l.real}, {"fake", l.fake}});
   c.finish(l.total);
 }
 
@@ -330,7 +325,7 @@ void discriminator_nkn(Case& c) {
   const auto dis = make_discriminator(c, "", true);
   c.load(*dis);
   const Var logit = (*dis)(c.ctx(), c.in("x"), c.in("cond"));
-  c.out("logit", logit);
+  c.out({{"logit", logit}});
   c.finish(mean_all(softplus(neg(logit))));
 }
 
@@ -351,9 +346,7 @@ void deformation(Case& c) {
   const Var local = axis_angle_to_matrix(aa);
   const DeformationOutput y = deform(c.ctx(), weights, &offsets, c.in("p"), c.in("tpose"), local,
                                      aa.reshape({aa.size(0), -1}));
-  c.out("weights", y.weights);
-  c.out("offsets", y.offsets);
-  c.out("posed", y.posed);
+  c.out({{"weights", y.weights}, {"offsets", y.offsets}, {"posed", y.posed}});
   c.finish(squared_distance_sum(y.posed, c.in("q")));
 }
 
@@ -361,7 +354,7 @@ void mlp_dropout_masks(Case& c) {
   const auto net = make_mlp(c, "", true, c.number("p"));
   c.load(*net);
   const Var y = net->with_masks(c.ctx(), c.in("x"), c.constant("mask1"), c.constant("mask2"));
-  c.out("y", y);
+  c.out({{"y", y}});
   c.finish(dot(y, c.probe()));
 }
 
@@ -370,7 +363,7 @@ void mlp(Case& c) {
   const auto net = make_mlp(c, "", softmax, 0);
   c.load(*net);
   const Var y = (*net)(c.ctx(), c.in("x"));
-  c.out("y", y);
+  c.out({{"y", y}});
   c.finish(sum_all(square(y - c.in("target"))));
 }
 

@@ -55,6 +55,13 @@ inline bool notes(const Diagnosis& d, const std::string& topic, const std::strin
   return false;
 }
 
+/// Examined as what retargeting moves.
+inline Diagnosis examine_target(const Mesh& mesh) {
+  ExamineOptions options;
+  options.target = true;
+  return examine_surface(mesh, options);
+}
+
 /// Frames in memory.
 class Frames : public FrameSource {
  public:

@@ -1,9 +1,10 @@
-// Instruction sets in tests.
+// Instruction sets and threads in tests.
 #pragma once
 
 #include <string>
 #include <vector>
 
+#include "autograd/base/parallel.h"
 #include "autograd/kernels/instruction_sets.h"
 
 namespace restage::testing {
@@ -20,6 +21,18 @@ class UseSet {
 
  private:
   std::string before_;
+};
+
+/// So many threads work while the object lives.
+class UseThreads {
+ public:
+  explicit UseThreads(int n) : before_(threads()) { set_threads(n); }
+  ~UseThreads() { set_threads(before_); }
+  UseThreads(const UseThreads&) = delete;
+  UseThreads& operator=(const UseThreads&) = delete;
+
+ private:
+  int before_;
 };
 
 /// All but the baseline.

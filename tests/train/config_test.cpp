@@ -1,11 +1,18 @@
+// Configurations: reading, overriding and what is said of mistakes; schedules; and that
+// docs/config_reference.md, written by hand, names every key with its true default and no other.
 #include "nn/config/config.h"
 
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <map>
+#include <regex>
+#include <set>
+
 #include "autograd/base/nearest.h"
-#include "autograd/base/rng.h"
-#include "tests/datasets/schema_support.h"
+#include "tests/support/files.h"
 #include "train/schedule.h"
+#include "train/stages/train_config.h"
 
 namespace restage {
 namespace {
@@ -353,38 +360,7 @@ TEST_F(TrainConfig, ReferenceListsEveryKey) {
   EXPECT_HAS(config_reference_table(config_reference<Needy>()), "| `data` | text | `(required)` |");
 }
 
-// Whatever the bytes, the answer is a config or one InputError.
-TEST_F(TrainConfig, RandomDamageNeverCrashes) {
-  const std::string good =
-      "name: 'a b'\nnet: {space: rot6d, batch: 3}\nlayers:\n  - &x {width: 3}\n  - *x\n"
-      "milestones: [1, 2]\n# end\nrate: 1e-3\n";
-  const std::string alphabet = "[]{}:,-&*!|>'\"%@`#?~ \n\t\\0a<=\x01\xff\xc3";
-  Rng rng({7, 1});
-  int accepted = 0;
-  for (int round = 0; round < 3000; ++round) {
-    std::string text = good;
-    for (uint64_t edits = 1 + rng.below(4); edits > 0; --edits) {
-      const size_t at = rng.below(text.size());
-      const char c = alphabet[rng.below(alphabet.size())];
-      if (rng.below(3) == 0)
-        text.erase(at, rng.below(5));
-      else if (rng.below(2) == 0)
-        text.insert(at, 1, c);
-      else
-        text[at] = c;
-      if (text.empty()) text = " ";
-    }
-    accepted += test::refusal_of([&] {
-                  Everything config;
-                  read_config(parse_yaml(text, "x.yaml"), config);
-                }).empty();
-  }
-  EXPECT_GT(accepted, 10);
-  EXPECT_LT(accepted, 2500);
-}
-
 // ---- schedules
-// -----------------------------------------------------------------------------------
 
 ScheduleConfig from(const std::string& yaml) {
   ScheduleConfig config;
@@ -436,6 +412,45 @@ TEST(TrainSchedule, BadConfigs) {
   for (const auto& [yaml, says] : cases)
     EXPECT_EQ(test::error_of([&, text = yaml] { from(text); }), says);
   EXPECT_THROW(from("final_fraction: 1.5"), InputError);
+}
+
+/// Key as the page has it: what several stages share stands there once, without the stage.
+std::string on_the_page(const std::string& key) {
+  std::string out = std::regex_replace(key, std::regex("^\\w+\\.discriminator_adam\\."), "adam.");
+  for (const char* shared : {".optimiser.", ".sizes."})
+    if (const size_t at = out.find(shared); at != std::string::npos)
+      out = out.substr(at + std::string(shared).size());
+  return out;
+}
+
+bool same_value(const std::string& a, const std::string& b) {
+  char *end_a = nullptr, *end_b = nullptr;
+  const double x = std::strtod(a.c_str(), &end_a), y = std::strtod(b.c_str(), &end_b);
+  const bool numbers = end_a != a.c_str() && end_b != b.c_str() && *end_a == 0 && *end_b == 0;
+  return numbers ? x == y : a == b;
+}
+
+TEST(ConfigReferencePage, NamesEveryKeyWithItsDefault) {
+  std::ifstream file(RESTAGE_SOURCE_DIR "/docs/config_reference.md");
+  ASSERT_TRUE(file) << "docs/config_reference.md is missing";
+  const std::regex row("^\\| `([^`]+)` \\| [^|]+ \\| `?([^|`]*)`? \\|.*");
+  std::multimap<std::string, std::string> page;
+  std::smatch found;
+  for (std::string line; std::getline(file, line);)
+    if (std::regex_match(line, found, row)) page.emplace(found[1], found[2]);
+
+  std::set<std::string> keys;
+  for (const ConfigReference::Row& wanted : config_reference<restage::TrainConfig>()) {
+    const std::string key = page.contains(wanted.key) ? wanted.key : on_the_page(wanted.key);
+    keys.insert(key);
+    if (wanted.type == "section" && page.count(key) == 0 && key != wanted.key) continue;
+    EXPECT_EQ(page.count(key), 1u) << wanted.key;
+    for (auto [at, end] = page.equal_range(key); at != end; ++at)
+      EXPECT_TRUE(same_value(at->second, wanted.value))
+          << wanted.key << ": the page says '" << at->second << "', the code '" << wanted.value
+          << "'";
+  }
+  for (const auto& [key, value] : page) EXPECT_TRUE(keys.contains(key)) << key << " is no key";
 }
 
 }  // namespace

@@ -8,33 +8,17 @@
 
 #include <atomic>
 #include <chrono>
-#include <filesystem>
-#include <fstream>
 #include <thread>
-#include <vector>
 
-#include "autograd/base/error.h"
+#include "tests/support/files.h"
 
 namespace restage {
 namespace {
 
-namespace fs = std::filesystem;
-
-class LeaseTest : public ::testing::Test {
+class LeaseTest : public test::FileTest {
  protected:
-  void SetUp() override {
-    std::string name = ::testing::TempDir() + "restage-lease-XXXXXX";
-    folder_ = ::mkdtemp(name.data());
-    path_ = folder_ + "/lease";
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  size_t files() const {
-    return static_cast<size_t>(std::distance(fs::directory_iterator(folder_), {}));
-  }
   std::string text(int number) const {
-    std::ifstream file(path_ + "." + std::to_string(number));
-    return {std::istreambuf_iterator<char>(file), {}};
+    return test::bytes_of(path_ + "." + std::to_string(number));
   }
   /// Makes the last lease one of another host with this heartbeat.
   void move_to_another_host(int number, int beat) {
@@ -52,7 +36,7 @@ class LeaseTest : public ::testing::Test {
     std::fstream(path_ + "." + std::to_string(number), std::ios::in | std::ios::out) << record;
   }
 
-  std::string folder_, path_;
+  const std::string path_ = dir / "lease";
 };
 
 TEST_F(LeaseTest, OneHolderAtATime) {
@@ -64,7 +48,7 @@ TEST_F(LeaseTest, OneHolderAtATime) {
     ASSERT_TRUE(holder);
     EXPECT_EQ(holder->pid, ::getpid());
     EXPECT_TRUE(holder->here);
-    EXPECT_NE(holder->text().find("trial a"), std::string::npos);
+    EXPECT_HAS(holder->text(), "trial a");
     EXPECT_FALSE(first->lost());
     Lease moved = std::move(*first);
     EXPECT_FALSE(Lease::take(path_, "trial a"));
@@ -73,7 +57,7 @@ TEST_F(LeaseTest, OneHolderAtATime) {
   auto second = Lease::take(path_, "trial a");
   ASSERT_TRUE(second);
   second->forget();
-  EXPECT_EQ(files(), 0U);
+  EXPECT_TRUE(test::names_in(dir.path()).empty());
 }
 
 TEST_F(LeaseTest, AKilledHolderIsDeadAtOnce) {
@@ -178,7 +162,7 @@ TEST_F(LeaseTest, ManyProcessesOneHolder) {
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
         continue;
       }
-      const std::string inside = folder_ + "/inside";
+      const std::string inside = dir / "inside";
       if (::mkdir(inside.c_str(), 0755) != 0) ::_exit(1);
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
       if (::rmdir(inside.c_str()) != 0) ::_exit(1);
@@ -197,8 +181,8 @@ TEST_F(LeaseTest, ManyProcessesOneHolder) {
 }
 
 TEST_F(LeaseTest, AFolderThatIsNotThere) {
-  EXPECT_THROW(Lease::take(folder_ + "/none/lease", "a"), WorkError);
-  EXPECT_FALSE(Lease::holder(folder_ + "/none/lease"));
+  EXPECT_THROW(Lease::take(dir / "none/lease", "a"), WorkError);
+  EXPECT_FALSE(Lease::holder(dir / "none/lease"));
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 
 #include <cstdlib>
 
-#include "tests/datasets/schema_support.h"
+#include "tests/support/files.h"
 
 namespace restage {
 namespace {

@@ -13,7 +13,7 @@
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/log.h"
 #include "autograd/base/rng.h"
-#include "tests/datasets/schema_support.h"
+#include "tests/support/files.h"
 #include "train/run_provenance.h"
 
 namespace restage {

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <limits>
 
-#include "autograd/base/parallel.h"
 #include "autograd/kernels/matmul_precision.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/reduce.h"
 #include "nn/layers/linear.h"
+#include "tests/support/errors.h"
 #include "tests/support/use_set.h"
 #include "tests/train/tiny_training.h"
 
@@ -34,11 +34,6 @@ double value_of(const NamedValues& values, const std::string& name) {
   ADD_FAILURE() << "no value '" << name << "'";
   return 0;
 }
-
-struct Threads {
-  int before = threads();
-  ~Threads() { set_threads(before); }
-};
 
 /// Sizes at which ops are cut into several pieces.
 TrainConfig wide(int64_t steps) {
@@ -68,11 +63,10 @@ TEST(TrainStages, FiveStepsGiveTheSameBitsOnAllVectorSets) {
 }
 
 TEST(TrainStages, TwentyStepsWithOneTwoAndThreeThreadsGiveTheSameBits) {
-  const Threads restore;
   for (const std::string name : kStageNames) {
     std::string first;
     for (const int n : {1, 2, 3}) {
-      set_threads(n);
+      const testing::UseThreads use(n);
       const auto stage = tiny_stage(name, wide(20));
       for (int64_t i = 0; i < 20; ++i) stage->step(i);
       stage->validate();  // must leave no trace
@@ -83,12 +77,11 @@ TEST(TrainStages, TwentyStepsWithOneTwoAndThreeThreadsGiveTheSameBits) {
 }
 
 TEST(TrainStages, StepsInBfloat16HaveTheSameBitsForAnyThreadsAndMeans) {
-  const Threads restore;
   const bool unit = matrix_unit();
   const MatmulPrecisionScope scope(MatmulPrecision::bfloat16);
   for (const std::string name : kStageNames) {
     const auto trained = [&](int n) {
-      set_threads(n);
+      const testing::UseThreads use_threads(n);
       const auto stage = tiny_stage(name, wide(8));
       for (int64_t i = 0; i < 8; ++i) stage->step(i);
       return bytes_of(*stage);
@@ -306,16 +299,6 @@ TEST(TrainStages, DiscriminatorRestsWhileItWins) {
     EXPECT_NE(name, "discriminator") << value;
 }
 
-std::string failure(const std::function<void()>& f) {
-  try {
-    f();
-  } catch (const NonFiniteError& e) {
-    EXPECT_EQ(e.exit_code, 1);
-    return e.what();
-  }
-  return "no NonFiniteError";
-}
-
 /// A checkpoint of the stage in which `name` holds the largest numbers.
 TensorFile poisoned(const Stage& stage, const std::string& name) {
   TensorFile file = parse_safetensors(bytes_of(stage), "c");
@@ -337,9 +320,9 @@ TEST(TrainStages, NonFiniteValuesAreNamedWithOpAndModule) {
     const auto stage = tiny_stage(c.stage, tiny_training(4));
     stage->load(poisoned(*stage, c.parameter), "c");
     const std::string before = bytes_of(*stage);
-    const std::string what = failure([&] { stage->step(0); });
-    EXPECT_NE(what.find(c.op), std::string::npos) << what;
-    EXPECT_NE(what.find(c.path), std::string::npos) << what;
+    const std::string what = test::message_of<NonFiniteError>([&] { stage->step(0); });
+    EXPECT_HAS(what, c.op);
+    EXPECT_HAS(what, c.path);
     EXPECT_EQ(what.find('\n'), std::string::npos) << what;
     EXPECT_FALSE(FiniteCheck::active());
     // The parameters stand as they were before the step.
@@ -361,11 +344,10 @@ TEST(TrainStages, HugeRateIsCaughtInTheStepWhereItShows) {
       o->clip = 0;
     }
     const auto stage = tiny_stage(name, c);
-    const std::string what = failure([&] {
+    const auto steps = [&] {
       for (int64_t i = 0; i < 6; ++i) stage->step(i);
-    });
-    EXPECT_NE(what.find(" in "), std::string::npos) << what;
-    EXPECT_EQ(what.find("no NonFiniteError"), std::string::npos) << name;
+    };
+    EXPECT_HAS(test::message_of<NonFiniteError>(steps), " in ") << name;
   }
 }
 

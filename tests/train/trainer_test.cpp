@@ -1,11 +1,11 @@
-// The loop around the stages: files of a run, resume after a stop and after a kill, metrics.
+// The loop around the stages: files of a run, resume after a stop and after a kill, metrics. And
+// clipping by the norm of what is optimised.
 #include "train/trainer.h"
 
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <unistd.h>
 
-#include <filesystem>
+#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -13,7 +13,11 @@
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
+#include "autograd/gradcheck/evaluate.h"
+#include "nn/layers/linear.h"
+#include "tests/support/files.h"
 #include "tests/train/tiny_training.h"
+#include "train/optim/adam.h"
 
 namespace restage {
 namespace {
@@ -70,23 +74,18 @@ struct Killed : std::runtime_error {
   Killed() : std::runtime_error("killed") {}
 };
 
-class TrainTrainer : public ::testing::Test {
+class TrainTrainer : public test::FileTest {
  protected:
   void SetUp() override {
-    root_ = ::testing::TempDir() + "restage_trainer_" + std::to_string(::getpid());
-    fs::remove_all(root_);
-    fs::create_directories(root_);
     set_log_level(LogLevel::quiet);
     handle_signals();
   }
   void TearDown() override {
     for (const int number : {SIGINT, SIGTERM, SIGPIPE}) ::signal(number, SIG_DFL);
     set_log_level(LogLevel::info);
-    fs::remove_all(root_);
   }
-  std::string place(const std::string& name) const { return root_ + "/" + name; }
   RunDir create(const std::string& name) const {
-    return RunDir::create_at(place(name), "x: 1\n", "{}\n", kAll);
+    return RunDir::create_at(dir / name, "x: 1\n", "{}\n", kAll);
   }
 
   static MakeStage plain() {
@@ -101,16 +100,10 @@ class TrainTrainer : public ::testing::Test {
       return std::make_unique<Disturbed>(std::move(stage), when, what);
     };
   }
-  static LoopConfig loop() {
-    LoopConfig c;
-    c.log_every = 2;
-    c.validate_every = 5;
-    c.checkpoint_every = 4;
-    return c;
-  }
+  static LoopConfig loop() { return {.log_every = 2, .validate_every = 5, .checkpoint_every = 4}; }
   static std::string weights(const Bundle& set) { return safetensors_bytes(to_file(set)); }
   std::string metrics(const std::string& name) const {
-    return read_file(place(name) + "/metrics.jsonl");
+    return read_file(dir / name + "/metrics.jsonl");
   }
 
   /// What an undisturbed training gives, made once.
@@ -128,11 +121,10 @@ class TrainTrainer : public ::testing::Test {
   }
   /// Resumes `name`, which must then be the same as the undisturbed training.
   void expect_completes(const std::string& name) {
-    RunDir run = RunDir::resume(place(name), kAll);
+    RunDir run = RunDir::resume(dir / name, kAll);
     EXPECT_TRUE(weights(train(run, kAll, loop(), plain(), kQuiet)) == whole().weights) << name;
     EXPECT_EQ(metrics(name), whole().metrics) << name;
   }
-  std::string root_;
 };
 
 TEST_F(TrainTrainer, MetricsSayWhatHappened) {
@@ -174,7 +166,7 @@ TEST_F(TrainTrainer, StopByASignalWritesACheckpointAndResumesToTheSameBits) {
         EXPECT_EQ(stopped.exit_code, 143);
       }
     }
-    const auto last = latest_checkpoint(place(stage), kAll);
+    const auto last = latest_checkpoint(dir / stage, kAll);
     ASSERT_TRUE(last) << stage;
     EXPECT_EQ(last->stage, stage);
     EXPECT_EQ(last->step, 6);  // the step in which the signal came is finished
@@ -222,7 +214,7 @@ TEST_F(TrainTrainer, PrecisionIsForStepsOnly) {
       },
       Killed);
   EXPECT_EQ(matmul_precision(), MatmulPrecision::float32) << "after an error";
-  RunDir again = RunDir::resume(place("stopped"), kAll);
+  RunDir again = RunDir::resume(dir / "stopped", kAll);
   EXPECT_TRUE(weights(train(again, kAll, loop(), plain(),
                             {.precision = bfloat16, .quiet = true, .observers = {}})) == got);
 }
@@ -273,7 +265,7 @@ TEST_F(TrainTrainer, AStageOfNoStepsLeavesItsNetworksAndACheckpoint) {
 
 TEST_F(TrainTrainer, TwoStopsInARow) {
   for (const int64_t when : {1, 3}) {
-    RunDir run = when == 1 ? create("twice") : RunDir::resume(place("twice"), kAll);
+    RunDir run = when == 1 ? create("twice") : RunDir::resume(dir / "twice", kAll);
     EXPECT_THROW(
         train(run, kAll, loop(), disturbed("motion", when, [] { ::raise(SIGINT); }), kQuiet),
         Interrupted);
@@ -309,14 +301,10 @@ TEST_F(TrainTrainer, MissingCheckpointOfAnEarlierStageIsSaid) {
     EXPECT_THROW(train(run, kAll, loop(), disturbed("motion", 6, [] { throw Killed(); }), kQuiet),
                  Killed);
   }
-  fs::remove(latest_checkpoint(place("gap"), {"skeleton"})->path);
-  RunDir run = RunDir::resume(place("gap"), kAll);
-  try {
-    train(run, kAll, loop(), plain(), kQuiet);
-    FAIL();
-  } catch (const InputError& e) {
-    EXPECT_NE(std::string(e.what()).find("'skeleton'"), std::string::npos) << e.what();
-  }
+  fs::remove(latest_checkpoint(dir / "gap", {"skeleton"})->path);
+  RunDir run = RunDir::resume(dir / "gap", kAll);
+  test::expect_error<InputError>([&] { train(run, kAll, loop(), plain(), kQuiet); },
+                                 {"'skeleton'"});
 }
 
 TEST_F(TrainTrainer, DivergenceIsAFailureThatNamesThePlace) {
@@ -327,14 +315,43 @@ TEST_F(TrainTrainer, DivergenceIsAFailureThatNamesThePlace) {
     testing::skeleton(c).optimiser.schedule.rate = 1e25;
     return tiny_stage(name, c);
   };
-  try {
-    train(run, kAll, loop(), make, kQuiet);
-    FAIL();
-  } catch (const NonFiniteError& e) {
-    EXPECT_EQ(e.exit_code, 1);
-    EXPECT_NE(std::string(e.what()).find("skeleton/patch_transformer"), std::string::npos)
-        << e.what();
-  }
+  test::expect_error<NonFiniteError>([&] { train(run, kAll, loop(), make, kQuiet); },
+                                     {"skeleton/patch_transformer"});
+}
+
+/// The weights after one step on gradients of `own` each; `foreign`: of a parameter of somebody
+/// else that took part.
+Tensor after_step(double own, double foreign, double clip) {
+  Linear layer(2, 2, Init{RngKey{1, 0}, DType::f64}, false);
+  const Parameter other(Tensor::zeros({2}, DType::f64));
+  Gradients g;
+  g.set(layer.weight.id, Tensor::full({2, 2}, own, DType::f64));
+  if (foreign > 0) g.set(other.id, Tensor::full({2}, foreign, DType::f64));
+  AdamConfig config;
+  config.eps = 1e3;  // so that the size of a step follows that of the gradient
+  Adam({{"", &layer}}, config).step(g, 1, clip);
+  return layer.weight.value;
+}
+
+TEST(Clipping, IsByTheNormOfWhatIsOptimisedAndNothingElse) {
+  using gradcheck::same_bits;
+  const Tensor alone = after_step(3, 0, 1);
+  EXPECT_TRUE(same_bits(alone, after_step(3, 1e6, 1)));
+  EXPECT_FALSE(same_bits(alone, after_step(3, 0, 0))) << "a norm of 6 is clipped to 1";
+  EXPECT_TRUE(same_bits(after_step(0.1, 1e6, 1), after_step(0.1, 0, 0))) << "one of 0.2 is not";
+}
+
+TEST(GradientNorms, AreOfTheLeavesThatAreNamed) {
+  Gradients g;
+  g.set(1, Tensor::full({2}, 3, DType::f64));
+  g.set(7, Tensor::full({1}, 4, DType::f64));
+  const std::vector<uint64_t> first{1}, both{1, 7}, with_absent{1, 5};
+  EXPECT_DOUBLE_EQ(g.norm(first), std::sqrt(18.0));
+  EXPECT_DOUBLE_EQ(g.norm(with_absent), std::sqrt(18.0));
+  EXPECT_DOUBLE_EQ(g.norm(both), g.norm());
+  EXPECT_DOUBLE_EQ(g.norm(), std::sqrt(34.0));
+  g.set(7, Tensor::full({1}, 0, DType::f64));  // no stale part remains
+  EXPECT_DOUBLE_EQ(g.norm(), std::sqrt(18.0));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Temporary folders, files and error texts: for all tests that read or write.
+// Temporary folders and files: for all tests that read or write.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "autograd/base/error.h"
+#include "tests/support/errors.h"
 
 namespace restage::test {
 
@@ -93,30 +93,4 @@ class FileSizeLimit {
   void (*old_handler_)(int);
 };
 
-/// What an error of class `Error` says that `action` throws: one line of under 400 characters that
-/// also says how to mend it. Empty if it throws none.
-template <class Error = InputError, class Action>
-std::string refusal_of(const Action& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    const std::string text = error.what();
-    EXPECT_EQ(text.find('\n'), std::string::npos) << text;
-    EXPECT_LT(text.size(), 390u) << text;
-    EXPECT_NE(text.find("; "), std::string::npos) << text;
-    return text;
-  }
-  return "";
-}
-
-/// The same of an action that must throw: it is a test failure if it does not.
-template <class Error = InputError, class Action>
-std::string error_of(const Action& action) {
-  const std::string text = refusal_of<Error>(action);
-  if (text.empty()) ADD_FAILURE() << "nothing is refused";
-  return text;
-}
-
 }  // namespace restage::test
-
-#define EXPECT_HAS(text, part) EXPECT_PRED_FORMAT2(::testing::IsSubstring, part, text)
