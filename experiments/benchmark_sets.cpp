@@ -152,8 +152,8 @@ void judge(const Bundle& weights, const std::string& folder, bool scans,
 
 /// The AMASS-style set, by rule: clip i from body i, to the next body of the circle, then the one
 /// after, ... so that all bodies are sources and targets about equally often.
-void judge_test_clips(const Bundle& weights, const std::string& folder,
-                      const BenchmarkOptions& how, SystemScores* scores, std::vector<std::string>* names) {
+void judge_test_clips(const Bundle& weights, const std::string& folder, const BenchmarkOptions& how,
+                      SystemScores* scores, std::vector<std::string>* names) {
   const Corpus test = load_corpus({.source = folder}, "test");
   const size_t n = test.bodies.size();
   if (n < 2)

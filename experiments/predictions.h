@@ -20,7 +20,8 @@ struct PredictionFile {
   Prediction data;
 
   explicit PredictionFile(const std::string& name) : path(name), data(read_prediction(name)) {}
-  PredictionFile(std::string name, Prediction made) : path(std::move(name)), data(std::move(made)) {}
+  PredictionFile(std::string name, Prediction made)
+      : path(std::move(name)), data(std::move(made)) {}
 
   metrics::Track joints() const;
   metrics::Track vertices() const;
@@ -34,8 +35,8 @@ void check_same_frames(const PredictionFile& file, const PredictionFile& truth);
 
 /// The sequences that `offset` cuts both into.
 std::vector<metrics::SequenceView> cut(const std::vector<int64_t>& offset,
-                                       const metrics::Track& joints,
-                                       const metrics::Track& vertices, const PredictionFile& truth);
+                                       const metrics::Track& joints, const metrics::Track& vertices,
+                                       const PredictionFile& truth);
 
 /// What the references achieve on every sequence (nn/geometry/closed_form.h). `source`: its true
 /// joints in the world, in the truth's frames; `rest`: the target's rest joints, one row, one for

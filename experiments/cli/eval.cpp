@@ -9,9 +9,9 @@
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/eval_report.h"
-#include "experiments/world_map.h"
 #include "experiments/evaluation.h"
 #include "experiments/predictions.h"
+#include "experiments/world_map.h"
 #include "nn/config/config.h"
 #include "nn/geometry/closed_form.h"
 #include "train/run.h"
@@ -243,8 +243,7 @@ int run_eval(const EvalOptions& options, const Common& common) {
   const std::vector<metrics::Metric> chosen = chosen_metrics(options);
   report.metrics = chosen;
   for (size_t s = 0; s + 1 < offset.size(); ++s) report.frames.push_back(offset[s + 1] - offset[s]);
-  if (source)
-    report.references = references(*source, *rest, truth, offset, report.metrics);
+  if (source) report.references = references(*source, *rest, truth, offset, report.metrics);
   report.model =
       metrics::evaluate(cut(offset, pred.joints(), pred.vertices(), truth), report.metrics);
 

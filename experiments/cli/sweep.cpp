@@ -100,9 +100,9 @@ std::string plan_text(const SweepPlan& plan) {
                     std::to_string(trial.seed), differs.empty() ? "-" : differs, artifacts});
   }
   return markdown_table(rows) + "\n" + std::to_string(plan.trials.size()) +
-         (plan.trials.size() == 1 ? " trial" : " trials") + "; artifacts: " + std::to_string(plan.there) + " there, " +
-         std::to_string(plan.to_make) + " to make, " + std::to_string(plan.shared) +
-         " shared by several trials\n";
+         (plan.trials.size() == 1 ? " trial" : " trials") +
+         "; artifacts: " + std::to_string(plan.there) + " there, " + std::to_string(plan.to_make) +
+         " to make, " + std::to_string(plan.shared) + " shared by several trials\n";
 }
 
 int run_plan(const PlanOptions& options, const Common& common) {

@@ -104,8 +104,10 @@ std::string reason_to_stop(const EarlyStop& rule, const Curve& mine, int64_t ste
 }
 
 EarlyStopper::EarlyStopper(EarlyStop rule, Store store, StageId own, std::vector<StageId> all)
-    : rule_(std::move(rule)), store_(std::move(store)), own_(std::move(own)), all_(std::move(all)) {
-}
+    : rule_(std::move(rule)),
+      store_(std::move(store)),
+      own_(std::move(own)),
+      all_(std::move(all)) {}
 
 void EarlyStopper::on_validation(const Stage& stage, int64_t /*done*/, const NamedValues&) {
   if (stage.name() != rule_.stage()) return;

@@ -234,8 +234,9 @@ void check(const EarlyStop& rule, const SweepPlan& plan) {
     const std::string close = nearest(rule.metric, known);
     std::string all;
     for (const std::string& name : known) all += (all.empty() ? "" : ", ") + name;
-    throw InputError(rule.place.text(), "no stage measures " + in_quotes(rule.metric),
-                     close.empty() ? "use one of " + all : "did you mean " + in_quotes(close) + "?");
+    throw InputError(
+        rule.place.text(), "no stage measures " + in_quotes(rule.metric),
+        close.empty() ? "use one of " + all : "did you mean " + in_quotes(close) + "?");
   }
   for (const PlannedTrial& trial : plan.trials)
     for (const StageArtifact& artifact : trial.artifacts)

@@ -103,7 +103,8 @@ class Reader {
     }
     if (const Json& more = at(entries, "references"); references && !more.is_null()) {
       need(more.is_object(), "references", "a section");
-      for (const auto& [name, one] : more.items()) out.references.emplace_back(name, set(one, false));
+      for (const auto& [name, one] : more.items())
+        out.references.emplace_back(name, set(one, false));
     }
     return out;
   }

@@ -241,20 +241,21 @@ std::optional<TrialResult> read_result(const SweepDir& dir, const std::string& i
 }
 
 void write_result(const SweepDir& dir, const TrialEntry& trial, const std::string& state,
-                  const std::string& error, const TrialOutcome& outcome, double seconds, bool early) {
+                  const std::string& error, const TrialOutcome& outcome, double seconds,
+                  bool early) {
   Json artifacts = Json::object();
   for (const auto& [stage, id] : outcome.artifacts) artifacts[stage] = id;
   Json document = {{"id", trial.id},
-                         {"case", trial.case_name},
-                         {"seed", trial.seed},
-                         {"overrides", trial.overrides},
-                         {"state", state},
-                         {"error", error.empty() ? Json(nullptr) : Json(error)},
-                         {"artifacts", std::move(artifacts)},
-                         {"metrics", outcome.metrics},
-                         {"seconds", std::round(1e3 * seconds) / 1e3},
-                         {"host", host_name()},
-                         {"command", "restage trial " + dir.path + " " + trial.id}};
+                   {"case", trial.case_name},
+                   {"seed", trial.seed},
+                   {"overrides", trial.overrides},
+                   {"state", state},
+                   {"error", error.empty() ? Json(nullptr) : Json(error)},
+                   {"artifacts", std::move(artifacts)},
+                   {"metrics", outcome.metrics},
+                   {"seconds", std::round(1e3 * seconds) / 1e3},
+                   {"host", host_name()},
+                   {"command", "restage trial " + dir.path + " " + trial.id}};
   if (early) document["early_stop"] = early_stop_json(dir.early_stop);
   write_file_atomically(dir.result(trial.id),
                         document.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");

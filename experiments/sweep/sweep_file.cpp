@@ -262,7 +262,8 @@ class Reader {
       fail(node->key_place, "'cases' is empty", "name one, or leave it out");
     for (const ConfigNode& entry : node->children) {
       Case made{entry.key, entry.key_place, {}};
-      if (entry.kind != Kind::null) made.settings = settings_of(entry, "a section {key: value}", true);
+      if (entry.kind != Kind::null)
+        made.settings = settings_of(entry, "a section {key: value}", true);
       for (const Setting& setting : made.settings)
         for (const Axis& axis : out_.axes)
           for (const Setting& first : axis.points[0])

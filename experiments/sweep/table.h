@@ -30,14 +30,14 @@ struct Row {
   std::map<std::string, nlohmann::json> overrides;  ///< those that all its trials share
   std::vector<uint64_t> seeds;                      ///< of the trials that are done, sorted
   int n = 0;  ///< trials that are done; of a reference those that measured it, equal ones once
-  std::vector<std::vector<Cell>> cells;             ///< [set][column]
+  std::vector<std::vector<Cell>> cells;  ///< [set][column]
 };
 
 struct Table {
   std::vector<std::string> sets;
   std::vector<const metrics::Metric*> columns;
-  std::vector<Row> rows;       ///< of trials, then of references
-  size_t references = 0;       ///< how many of the rows are of what needs no learning
+  std::vector<Row> rows;             ///< of trials, then of references
+  size_t references = 0;             ///< how many of the rows are of what needs no learning
   std::optional<size_t> against;     ///< index of the row that differences are to
   std::vector<std::string> notices;  ///< what a reader of the figures must know, a line each
 };

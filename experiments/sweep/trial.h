@@ -17,8 +17,8 @@ enum class TrialEnd { done, stopped_early, before };
 /// signal or `restage sweep stop` came, and a checkpoint was written.
 TrialEnd perform_trial(const std::string& dir, const std::string& id, bool quiet);
 
-/// Makes the trial's artifacts up to that stage, to their last steps, and no result: for engines that run stages which
-/// several trials share as jobs of their own.
+/// Makes the trial's artifacts up to that stage, to their last steps, and no result: for engines
+/// that run stages which several trials share as jobs of their own.
 void perform_stage(const std::string& dir, const std::string& id, const std::string& stage,
                    bool quiet);
 

@@ -185,9 +185,8 @@ TrialOutcome run_trial(const std::string& config_yaml_path, const std::string& i
   for (const StageId& s : trained.artifacts) out.artifacts[s.stage] = s.id;
   if (!last_stage.empty()) return out;
   throw_if_stopped();
-  out.metrics = evaluate.benchmark.empty()
-                    ? evaluate_held_out(trained.bundle, config)
-                    : evaluate_benchmark(trained.bundle, evaluate, config);
+  out.metrics = evaluate.benchmark.empty() ? evaluate_held_out(trained.bundle, config)
+                                           : evaluate_benchmark(trained.bundle, evaluate, config);
   throw_if_stopped();
   return out;
 }

@@ -211,12 +211,13 @@ TEST_F(TableTest, ReferencesOfAllTrialsAreRowsOfTheirOwn) {
       Json one = trial(i, name, seed, Json::object(), 0.1 * i);
       Json copied = trial(i, name, seed, Json::object(), 0.15)["metrics"]["naked"];
       Json noisy = trial(i, name, seed, Json::object(), 0.05 * i)["metrics"]["naked"];
-      one["metrics"]["naked"]["references"] = {{"source_unchanged", copied}, {"closed_form", noisy}};
+      one["metrics"]["naked"]["references"] = {{"source_unchanged", copied},
+                                               {"closed_form", noisy}};
       put(one);
     }
   TableOptions options;
   options.against = "source unchanged";
-  const Table table = make_table(read_results(dir_), options);
+  const Table table = make_table(read_results(dir.path()), options);
   ASSERT_EQ(table.rows.size(), 4u);
   EXPECT_EQ(table.references, 2u);
   EXPECT_EQ(table.rows[2].label, "closed form");
@@ -230,7 +231,7 @@ TEST_F(TableTest, ReferencesOfAllTrialsAreRowsOfTheirOwn) {
   EXPECT_EQ(table.rows[1].cells[0][0].difference->n, 2);
   EXPECT_NEAR(*table.rows[1].cells[0][0].difference->mean, 0, 1e-12);
   EXPECT_NEAR(*table.rows[0].cells[0][0].difference->mean, 0.2, 1e-12);
-  const Json json = to_json(table, read_results(dir_));
+  const Json json = to_json(table, read_results(dir.path()));
   EXPECT_EQ(json["rows"].size(), 2u);
   EXPECT_EQ(json["references"].size(), 2u);
 }

@@ -79,20 +79,21 @@ TEST(ClosedForm, DegenerateSkeletonsGiveRotations) {
 }
 
 TEST(ClosedForm, IsAMotionModel) {
-  const Joints rest = t_pose(1.2);
+  const Joints rest = tiny_joints(1.2);
   std::vector<Joints> motion;
   for (uint64_t f = 0; f < 6; ++f)
-    motion.push_back(forward_kinematics(t_pose(1.8), random_pose(f)).joints);
+    motion.push_back(forward_kinematics(tiny_joints(1.8), random_pose(f)).joints);
   const auto expected = closed_form_joints(motion, rest);
-  const auto model = make_model_as<MotionModel>("motion/closed_form", model_config("motion/closed_form"),
-                                                Init{RngKey{1, 0}, DType::f64});
+  const auto model = make_model_as<MotionModel>(
+      "motion/closed_form", model_config("motion/closed_form"), Init{RngKey{1, 0}, DType::f64});
   const auto rows = [](const Joints& joints, int64_t frames, const std::vector<Joints>& all) {
     std::vector<double> values;
     for (const Joints& one : all)
       for (const Vec3& p : one)
-        for (int c = 0; c < 3; ++c) values.push_back(p[c] - (all.size() > 1 ? one[0][c] : joints[0][c]));
-    return Tensor::from<double>(all.size() > 1 ? Shape{1, frames, kJoints, 3} : Shape{1, kJoints, 3},
-                                values);
+        for (int c = 0; c < 3; ++c)
+          values.push_back(p[c] - (all.size() > 1 ? one[0][c] : joints[0][c]));
+    return Tensor::from<double>(
+        all.size() > 1 ? Shape{1, frames, kJoints, 3} : Shape{1, kJoints, 3}, values);
   };
   const Tensor a = rows(rest, 6, motion), b = rows(rest, 1, {rest});
   const Tensor velocity = Tensor::full({1, 6, 3}, 2, DType::f64);
@@ -103,7 +104,8 @@ TEST(ClosedForm, IsAMotionModel) {
     const Tensor one = Tensor::from<double>(
         {1, 1, kJoints, 3},
         {a.data<double>() + f * 3 * kJoints, a.data<double>() + (f + 1) * 3 * kJoints});
-    const MotionOutput out = model->forward(ctx, one, Tensor::full({1, 1, 3}, 2, DType::f64), b, &pieces);
+    const MotionOutput out =
+        model->forward(ctx, one, Tensor::full({1, 1, 3}, 2, DType::f64), b, &pieces);
     for (int j = 0; j < kJoints; ++j)
       for (int c = 0; c < 3; ++c) {
         const double whole_value = all.joints.value.data<double>()[(f * kJoints + j) * 3 + c];

@@ -259,7 +259,7 @@ TEST_F(TrainTrainer, AStageOfNoStepsLeavesItsNetworksAndACheckpoint) {
         train(other, kAll, loop(), make, options);
       },
       Killed);
-  RunDir again = RunDir::resume(place("none-stopped"), kAll);
+  RunDir again = RunDir::resume(dir / "none-stopped", kAll);
   EXPECT_TRUE(weights(train(again, kAll, loop(), make, kQuiet)) == got);
 }
 

@@ -33,7 +33,8 @@ const std::vector<StageType>& stage_types() {
       stage<DeformationStage>("deformation", "skinning weights and offsets",
                               {"deformation.weights", "deformation.offsets"},
                               {"skinning_mm", "with_offsets_mm"}),
-      stage<RootStage>("root", "the third MLP of the paper's count", {"deformation.root"}, {"root_mm"}),
+      stage<RootStage>("root", "the third MLP of the paper's count", {"deformation.root"},
+                       {"root_mm"}),
   };
   return table;
 }

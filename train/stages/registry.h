@@ -13,10 +13,10 @@ namespace restage {
 
 struct StageType {
   std::string name, help;
-  AnyConfig config;                ///< at its defaults
-  std::vector<std::string> roles;  ///< what it may leave in a bundle; the first always
+  AnyConfig config;                  ///< at its defaults
+  std::vector<std::string> roles;    ///< what it may leave in a bundle; the first always
   std::vector<std::string> figures;  ///< of validate(); lower is better
-  std::vector<std::string> reads;  ///< stages whose networks it needs; they are trained before
+  std::vector<std::string> reads;    ///< stages whose networks it needs; they are trained before
   std::unique_ptr<Stage> (*make)(const AnyConfig& config, const StageInput& input);
 };
 

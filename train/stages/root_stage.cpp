@@ -34,7 +34,8 @@ RootStage::RootStage(const Config& config, const StageInput& in)
       config_(config),
       net_(add_network<RootNet>(config.model, RngKey{in.seed, 0}.fold("deformation/root"))),
       adam_(add_optimiser("adam", {"deformation.root"}, config.optimiser.adam)),
-      sampler_(in.train, bodies(config.points, true), RngKey{in.seed, 0}.fold("root.bodies").stream),
+      sampler_(in.train, bodies(config.points, true),
+               RngKey{in.seed, 0}.fold("root.bodies").stream),
       validation_sampler_(in.validation, bodies(config.points, false), 1),
       key_(RngKey{in.seed, 0}.fold("root.step")) {}
 

@@ -1,5 +1,5 @@
-// Training of the third MLP that the paper's count implies (spec 5.4, H1; docs/method.md): where the
-// rest pelvis is, seen from the centroid of the rest points. No other stage needs it.
+// Training of the third MLP that the paper's count implies (spec 5.4, H1; docs/method.md): where
+// the rest pelvis is, seen from the centroid of the rest points. No other stage needs it.
 #pragma once
 
 #include "datasets/sampling/pairs.h"
