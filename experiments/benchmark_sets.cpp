@@ -11,7 +11,7 @@
 #include "datasets/benchmark/sequence.h"
 #include "datasets/importers/gltf_character.h"
 #include "datasets/schema.h"
-#include "experiments/cli/doctor_repair.h"
+#include "experiments/doctor_repair.h"
 #include "experiments/world_map.h"
 #include "nn/geometry/closed_form.h"
 
@@ -88,13 +88,13 @@ Prediction retargeted_scans(const Bundle& weights, const std::string& folder,
   const std::string source = in(folder, "source.h5");
   const Scratch scratch;
   const std::string mended = scratch.file("mended.h5");
-  cli::Subject subject;
+  Subject subject;
   subject.path = source;
   subject.frames = open_frames(source);
   subject.stored = inspect(source);
   const Diagnosis diagnosis = examine_frames(*subject.frames);
   subject.frames->rewind();
-  cli::write_repaired(subject, mended, diagnosis);
+  write_repaired(subject, mended, diagnosis);
   Prediction out = retargeted(weights, folder, mended, how);
   const double stretched = trajectory_scale(joints_of(source_joints.joints().slice(0, 1))[0],
                                             joints_of(rest.joints().slice(0, 1))[0]);

@@ -6,7 +6,7 @@
 
 #include "autograd/base/error.h"
 #include "datasets/schema.h"
-#include "experiments/cli/doctor_report.h"
+#include "experiments/doctor_repair.h"
 
 namespace restage {
 
@@ -38,7 +38,7 @@ std::optional<WorldMap> source_to_world(const std::string& truth) {
 }
 
 WorldMap mended_to_world(const std::string& mended, const WorldMap& to_world) {
-  const std::optional<Similarity> repair = cli::similarity_from(inspect(mended).transform);
+  const std::optional<Similarity> repair = similarity_from(inspect(mended).transform);
   if (!repair)
     throw InputError(mended, "does not say how it was mended",
                      "give the file that restage doctor --fix wrote");

@@ -20,8 +20,8 @@
 #include "datasets/readers/precision.h"
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
-#include "experiments/cli/doctor_repair.h"
 #include "experiments/cli/doctor_report.h"
+#include "experiments/doctor_repair.h"
 #include "nn/config/config.h"
 #include "nn/weights/safetensors.h"
 

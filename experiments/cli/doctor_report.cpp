@@ -82,35 +82,6 @@ Json frame_json(const Diagnosis& d) {
           {"height", told(d.transform.has_value(), d.height)}};
 }
 
-Json to_json(const Similarity& t) {
-  Json rotation = Json::array();
-  for (int i = 0; i < 3; ++i)
-    rotation.push_back({t.rotation(i, 0), t.rotation(i, 1), t.rotation(i, 2)});
-  return {{"formula", "p' = scale * rotation * (p - offset)"},
-          {"scale", t.scale},
-          {"rotation", rotation},
-          {"offset", {t.offset.x(), t.offset.y(), t.offset.z()}}};
-}
-
-std::optional<Similarity> similarity_from(const std::string& json) {
-  const Json note = Json::parse(json, nullptr, false);
-  Similarity out;
-  try {
-    out.scale = note.at("scale").get<double>();
-    for (int r = 0; r < 3; ++r) {
-      out.offset[r] = note.at("offset").at(static_cast<size_t>(r)).get<double>();
-      for (int c = 0; c < 3; ++c)
-        out.rotation(r, c) =
-            note.at("rotation").at(static_cast<size_t>(r)).at(static_cast<size_t>(c)).get<double>();
-    }
-  } catch (const Json::exception&) {
-    return std::nullopt;
-  }
-  const bool good = out.scale > 0 && std::isfinite(out.scale) && out.rotation.allFinite() &&
-                    out.offset.allFinite();
-  return good ? std::optional(out) : std::nullopt;
-}
-
 std::string to_text(const Finding& f) {
   std::string text = format("  %-6s%-16s", name(f.weight), f.topic.c_str()) + f.what;
   if (f.sure < 1) text += " (sure " + digits(std::floor(100 * f.sure)) + " %)";

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "datasets/doctor/examine.h"
-#include "experiments/cli/doctor_repair.h"
 #include "experiments/cli/output.h"
+#include "experiments/doctor_repair.h"
 
 namespace restage::cli {
 
@@ -14,10 +14,6 @@ namespace restage::cli {
 /// metres; null where it is unsure (below one half).
 Json frame_json(const Diagnosis& diagnosis);
 Json to_json(const Finding& finding);
-/// {"scale", "rotation" (rows), "offset", "formula"}.
-Json to_json(const Similarity& transform);
-/// The same read again; nothing if the text is no such document.
-std::optional<Similarity> similarity_from(const std::string& json);
 /// {"file", "transform_file", "usable", "still_wrong", "remarks"}.
 Json to_json(const Repaired& repaired);
 /// One finding as a few lines of text.

@@ -191,13 +191,15 @@ Sample sample_of(const Group& group, const std::string& reference, const std::st
   return sample;
 }
 
-/// What does not depend on the trial was measured by each of them and counts once.
-Sample without_repeats(Sample sample) {
-  const bool same = std::all_of(sample.begin(), sample.end(), [&](const Repetition& r) {
-    return r.mean == sample[0].mean && r.sequences == sample[0].sequences;
-  });
-  if (same && !sample.empty()) sample.resize(1);
-  return sample;
+/// Trials that share what a reference depends on (an extractor, or nothing) measured it again.
+Sample without_repeats(const Sample& sample) {
+  Sample out;
+  for (const Repetition& r : sample)
+    if (std::none_of(out.begin(), out.end(), [&](const Repetition& o) {
+          return o.mean == r.mean && o.sequences == r.sequences;
+        }))
+      out.push_back(r);
+  return out;
 }
 
 /// Differences are taken in pairs of one and the same trial where one side is a reference.
@@ -209,13 +211,14 @@ Estimate difference(const Group& row, const Group& against, const std::string& s
       paired_difference(sample_of(beside ? trials : row, row.reference, set, metric),
                         sample_of(beside ? trials : against, against.reference, set, metric));
   const bool references = !row.reference.empty() && !against.reference.empty();
-  return bootstrap->estimate(references ? without_repeats(std::move(pairs)) : pairs);
+  return bootstrap->estimate(references ? without_repeats(pairs) : pairs);
 }
 
 Row head_of(const Group& group, const std::string& label) {
   Row row;
   row.label = label;
-  if (!group.reference.empty()) return row;
+  row.reference = !group.reference.empty();
+  if (row.reference) return row;
   row.overrides = group.trials.front()->overrides;
   row.case_name = group.trials.front()->case_name;
   for (const TrialResult* trial : group.trials) {
@@ -257,7 +260,7 @@ void fill_set(const std::vector<Group>& groups, size_t set, Bootstrap* bootstrap
       Cell& cell = table->rows[r].cells[set][c];
       Sample sample = sample_of(group, group.reference, name, metric);
       contradiction = std::max(contradiction, largest_contradiction(sample));
-      if (!group.reference.empty()) sample = without_repeats(std::move(sample));
+      if (!group.reference.empty()) sample = without_repeats(sample);
       cell.value = bootstrap->estimate(sample);
       if (table->against && r != *table->against)
         cell.difference = difference(group, groups[*table->against], name, metric, bootstrap);
@@ -294,9 +297,6 @@ Table make_table(const Results& results, const TableOptions& options) {
               &table.notices);
   Bootstrap bootstrap(options.seed);
   for (size_t s = 0; s < table.sets.size(); ++s) fill_set(groups, s, &bootstrap, &table);
-  for (size_t r = groups.size() - table.references; r < groups.size(); ++r)
-    for (const auto& set : table.rows[r].cells)
-      for (const Cell& cell : set) table.rows[r].n = std::max(table.rows[r].n, cell.value.n);
   return table;
 }
 

@@ -46,7 +46,7 @@ std::vector<size_t> filled(const Table& table, size_t set) {
 /// Trials whose figures count; a metric that some of them lack says so in its cell.
 std::string cell_text(const Row& row, const Estimate& e) {
   std::string text = brief(e);
-  if (e.mean && e.n != row.n) text += " (n = " + std::to_string(e.n) + ")";
+  if (e.mean && !row.reference && e.n != row.n) text += " (n = " + std::to_string(e.n) + ")";
   return text;
 }
 
@@ -55,7 +55,9 @@ Rows value_rows(const Table& table, size_t set) {
   const std::vector<size_t> columns = filled(table, set);
   for (const size_t c : columns) rows[0].push_back(heading(*table.columns[c]));
   for (const Row& row : table.rows) {
-    auto& line = rows.emplace_back(Rows::value_type{row.label, std::to_string(row.n)});
+    int n = row.n;
+    for (const size_t c : columns) n = std::max(n, row.reference ? row.cells[set][c].value.n : 0);
+    auto& line = rows.emplace_back(Rows::value_type{row.label, std::to_string(n)});
     for (const size_t c : columns) line.push_back(cell_text(row, row.cells[set][c].value));
   }
   return rows;

@@ -221,10 +221,10 @@ TEST_F(TableTest, ReferencesOfAllTrialsAreRowsOfTheirOwn) {
   ASSERT_EQ(table.rows.size(), 4u);
   EXPECT_EQ(table.references, 2u);
   EXPECT_EQ(table.rows[2].label, "closed form");
-  EXPECT_EQ(table.rows[2].n, 4);
+  EXPECT_EQ(table.rows[2].cells[0][0].value.n, 4);
   EXPECT_NEAR(*table.rows[2].cells[0][0].value.mean, 0.125, 1e-12);
   // Measured by every trial, and the same each time: once.
-  EXPECT_EQ(table.rows[3].n, 1);
+  EXPECT_EQ(table.rows[3].cells[0][0].value.n, 1);
   EXPECT_FALSE(table.rows[3].cells[0][0].value.deviation);
   // A learned row is compared with the reference of its own trials, pair by pair.
   EXPECT_EQ(table.rows[1].label, "quaternion");

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,7 +11,7 @@
 #include "datasets/readers/frame_folder.h"
 #include "datasets/schema.h"
 
-namespace restage::cli {
+namespace restage {
 
 /// What is examined, drawn and repaired: one and the same, whatever file it came from.
 struct Subject {
@@ -30,6 +31,11 @@ inline Similarity from_file(const Subject& subject, const Similarity& transform)
 /// The mesh, or frame number `index`.
 Mesh frame_of(const Subject& subject, int64_t index);
 
+/// {"scale", "rotation" (rows), "offset", "formula"}.
+nlohmann::ordered_json to_json(const Similarity& transform);
+/// The same read again; nothing if the text is no such document.
+std::optional<Similarity> similarity_from(const std::string& json);
+
 enum class RepairKind { ply, obj, hdf5, folder };
 
 /// By the name alone, before anything is read. InputError with the list of what can be written.
@@ -47,4 +53,4 @@ struct Repaired {
 /// or a file of that kind cannot hold it.
 Repaired write_repaired(const Subject& subject, const std::string& out, const Diagnosis& diagnosis);
 
-}  // namespace restage::cli
+}  // namespace restage

@@ -1,4 +1,4 @@
-#include "experiments/cli/doctor_repair.h"
+#include "experiments/doctor_repair.h"
 
 #include <algorithm>
 #include <cctype>
@@ -8,11 +8,12 @@
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
 #include "datasets/readers/mesh_io.h"
-#include "experiments/cli/doctor_report.h"
 #include "infer/writers/frames.h"
 
-namespace restage::cli {
+namespace restage {
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 constexpr const char* kWhatCanBeWritten =
     "end it in .ply or .obj (one cloud or surface), .h5 (a sequence), or / (a folder of frames)";
@@ -250,6 +251,35 @@ void tell_losses(const Subject& subject, RepairKind kind, const Diagnosis& d,
 
 }  // namespace
 
+Json to_json(const Similarity& t) {
+  Json rotation = Json::array();
+  for (int i = 0; i < 3; ++i)
+    rotation.push_back({t.rotation(i, 0), t.rotation(i, 1), t.rotation(i, 2)});
+  return {{"formula", "p' = scale * rotation * (p - offset)"},
+          {"scale", t.scale},
+          {"rotation", rotation},
+          {"offset", {t.offset.x(), t.offset.y(), t.offset.z()}}};
+}
+
+std::optional<Similarity> similarity_from(const std::string& json) {
+  const Json note = Json::parse(json, nullptr, false);
+  Similarity out;
+  try {
+    out.scale = note.at("scale").get<double>();
+    for (int r = 0; r < 3; ++r) {
+      out.offset[r] = note.at("offset").at(static_cast<size_t>(r)).get<double>();
+      for (int c = 0; c < 3; ++c)
+        out.rotation(r, c) =
+            note.at("rotation").at(static_cast<size_t>(r)).at(static_cast<size_t>(c)).get<double>();
+    }
+  } catch (const Json::exception&) {
+    return std::nullopt;
+  }
+  const bool good = out.scale > 0 && std::isfinite(out.scale) && out.rotation.allFinite() &&
+                    out.offset.allFinite();
+  return good ? std::optional(out) : std::nullopt;
+}
+
 Mesh frame_of(const Subject& subject, int64_t index) {
   if (subject.mesh) return *subject.mesh;
   subject.frames->rewind();
@@ -304,4 +334,4 @@ Repaired write_repaired(const Subject& subject, const std::string& out, const Di
   return done;
 }
 
-}  // namespace restage::cli
+}  // namespace restage
