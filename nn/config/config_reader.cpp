@@ -204,8 +204,9 @@ void ConfigReader::finish() const {
       if (std::find(known_.begin(), known_.end(), entry.key) != known_.end()) continue;
       const std::string close = nearest(entry.key, known_);
       throw InputError(entry.key_place.text(), "unknown key " + in_quotes(full(entry.key)),
-                       close.empty() ? "the keys here are " + joined(known_)
-                                     : "did you mean " + in_quotes(close) + "?");
+                       known_.empty()  ? "there are no keys here; " + path_ + "={} leaves them out"
+                       : close.empty() ? "the keys here are " + joined(known_)
+                                       : "did you mean " + in_quotes(close) + "?");
     }
   }
   if (!missing_.empty())

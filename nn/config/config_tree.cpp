@@ -150,6 +150,8 @@ void merge_config(ConfigNode& base, ConfigNode over) {
     base.key = std::move(key);
     return;
   }
+  // `section: {}`; a file that only includes others is no such section.
+  if (over.children.empty() && !base.key.empty()) base.children.clear();
   for (auto& entry : over.children) {
     if (ConfigNode* old = base.find(entry.key))
       merge_config(*old, std::move(entry));

@@ -294,14 +294,14 @@ class Runs(Sweep):
 
     def test_a_motion_model_without_a_network(self):
         self.write("sweep.yaml", "base: configs/tiny.yaml\ncases:\n  network: {}\n"
-                   "  closed form: {motion.model: motion/closed_form, motion.optimiser.steps: 0}\n")
+                   "  closed form: {motion.model: motion/closed_form, motion.sizes: {}, motion.optimiser.steps: 0}\n")
         self.done("sweep", "run", "sweep.yaml", "--out", "d")
         table = self.json("sweep", "table", "d")
         closed = next(row for row in table["rows"] if row["label"] == "closed form")["metrics"]
         reference = next(row for row in table["references"] if row["label"] == "closed form")["metrics"]
         # From clouds it does what the reference does with the same extracted joints.
         self.assertAlmostEqual(closed["clouds"]["pa_mpjpe"]["mean"], reference["clouds"]["pa_mpjpe"]["mean"], places=5)
-        self.bad_input(["train", "configs/tiny.yaml", "motion.model=motion/closed_form"], "motion", "nothing to learn", "optimiser.steps=0")
+        self.bad_input(["train", "configs/tiny.yaml", "motion.model=motion/closed_form", "motion.sizes={}"], "motion", "nothing to learn", "optimiser.steps=0")
 
     def test_one_trial_is_run_by_one(self):
         self.done("sweep", "plan", "sweep.yaml", "--out", "d", "skeleton.optimiser.steps=1000000")

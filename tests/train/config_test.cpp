@@ -262,6 +262,16 @@ TEST_F(TrainConfig, IncludesMergeAndTheFileItselfWins) {
   want.net = {Space::quaternion, 2, 3.0};
   EXPECT_EQ(c, want);
   EXPECT_EQ(find_config(tree, "net.space")->place.text(), dir / "sub/deep.yaml:3");
+  // {} empties a section, nothing behind its name does nothing, and so does a file that only
+  // includes
+  Everything emptied;
+  load_config(put("y.yaml", "include: x.yaml\nnet: {}\n"), {}, emptied);
+  EXPECT_EQ(emptied.net, Net());
+  for (const char* text : {"include: x.yaml\n", "include: x.yaml\nnet:\n"}) {
+    Everything same;
+    load_config(put("y.yaml", text), {}, same);
+    EXPECT_EQ(same, want);
+  }
   // an error in an included file names that file
   put("sub/deep.yaml", "\nnmae: deep\n");
   EXPECT_EQ(error_of(dir / "x.yaml"), "sub/deep.yaml:2: unknown key 'nmae'; did you mean 'name'?");
