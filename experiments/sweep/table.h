@@ -29,8 +29,8 @@ struct Row {
   std::string case_name;  ///< empty: none, or several
   std::map<std::string, nlohmann::json> overrides;  ///< those that all its trials share
   std::vector<uint64_t> seeds;                      ///< of the trials that are done, sorted
-  bool reference = false;  ///< what needs no learning; each cell has an n of its own
-  int n = 0;               ///< trials that are done
+  bool reference = false;                ///< what needs no learning; each cell has an n of its own
+  int n = 0;                             ///< trials that are done
   std::vector<std::vector<Cell>> cells;  ///< [set][column]
 };
 

@@ -45,8 +45,8 @@ inline constexpr size_t kConfigMaxKeys = 1000;
 /// broken YAML, duplicate keys, tags, merge keys, more than one document, too deep or too large.
 ConfigNode parse_yaml(std::string_view text, const std::string& source, bool any_root = false);
 
-/// Lays `over` on `base`: maps are merged key by key, everything else is replaced. An empty map `{}`
-/// empties the section that it is laid on; `section:` with nothing behind it changes nothing.
+/// Lays `over` on `base`: maps are merged key by key, everything else is replaced. An empty map
+/// `{}` empties the section that it is laid on; `section:` with nothing behind it changes nothing.
 void merge_config(ConfigNode& base, ConfigNode over);
 
 /// Applies `key.sub=value`; the value is YAML (`[1, 2]` is a list), list items are numbered from 0.
