@@ -247,7 +247,8 @@ File File::open(const std::string& path) {
     throw InputError(path, cat("cannot be read (", std::strerror(errno), ")"), "check the path");
   if (!S_ISREG(info.st_mode)) throw InputError(path, "is not a file", "give an HDF5 file");
   const Lock lock;
-  auto state = std::make_unique<State>(path);
+  auto state = std::make_unique<State>();
+  state->path = path;
   const Handle access = file_access();
   if (H5Fis_hdf5(path.c_str()) <= 0)
     throw InputError(path, "is not an HDF5 file", "give an HDF5 file (.h5)");
@@ -259,7 +260,8 @@ File File::open(const std::string& path) {
 
 File File::create(const std::string& path) {
   const Lock lock;
-  auto state = std::make_unique<State>(path);
+  auto state = std::make_unique<State>();
+  state->path = path;
   state->target = std::make_unique<AtomicFile>(path);
   const Handle access = file_access();
   // The newest layout has checksums over its structure too; no times, so equal content is equal
