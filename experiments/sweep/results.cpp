@@ -88,9 +88,9 @@ class Reader {
     }
     return out;
   }
-  SetResult set(const Json& entries, bool references = true) const {
+  Scores scores(const Json& entries) const {
     if (!entries.is_object()) fail("holds a set that is no section");
-    SetResult out;
+    Scores out;
     out.mean = values(object(entries, "mean"));
     const Json& sequences = at(entries, "sequences");
     need(sequences.is_array(), "sequences", "a list");
@@ -101,11 +101,15 @@ class Reader {
       if (!names.insert(name).second) fail("has the sequence '" + name + "' twice");
       out.sequences.emplace_back(std::move(name), std::move(found));
     }
-    if (const Json& more = at(entries, "references"); references && !more.is_null()) {
-      need(more.is_object(), "references", "a section");
-      for (const auto& [name, one] : more.items())
-        out.references.emplace_back(name, set(one, false));
-    }
+    return out;
+  }
+  SetResult set(const Json& entries) const {
+    SetResult out{scores(entries), {}};
+    const Json& references = at(entries, "references");
+    if (references.is_null()) return out;
+    need(references.is_object(), "references", "a section");
+    for (const auto& [name, one] : references.items())
+      out.references.emplace_back(name, scores(one));
     return out;
   }
 

@@ -26,11 +26,14 @@ struct PlannedTrial {
 /// Values by METRIC (nn/metrics/metrics.h, table()); what is null is not there.
 using MetricValues = std::map<std::string, double>;
 
-struct SetResult {
+struct Scores {
   MetricValues mean;
   std::vector<std::pair<std::string, MetricValues>> sequences;  ///< by name, names are unique
+};
+
+struct SetResult : Scores {
   /// What needs no learning, on the same sequences: "source_unchanged" and others.
-  std::vector<std::pair<std::string, SetResult>> references;
+  std::vector<std::pair<std::string, Scores>> references;
 };
 
 /// Damaged: what is there cannot be used.

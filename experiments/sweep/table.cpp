@@ -72,10 +72,10 @@ std::vector<Group> reference_groups(const Results& results) {
   std::vector<Group> out;
   for (const TrialResult& trial : results.trials)
     for (const auto& [set, values] : trial.sets)
-      for (const auto& [name, reference] : values.references) {
+      for (const auto& reference : values.references) {
         auto at = std::find_if(out.begin(), out.end(),
-                               [&](const Group& g) { return g.reference == name; });
-        if (at == out.end()) at = out.insert(at, {{}, {}, name});
+                               [&](const Group& g) { return g.reference == reference.first; });
+        if (at == out.end()) at = out.insert(at, {{}, {}, reference.first});
         if (at->trials.empty() || at->trials.back() != &trial) at->trials.push_back(&trial);
       }
   return out;
@@ -180,8 +180,9 @@ Sample sample_of(const Group& group, const std::string& reference, const std::st
                  const std::string& metric) {
   Sample sample;
   for (const TrialResult* trial : group.trials) {
-    const SetResult* found = find(trial->sets, set);
-    if (found != nullptr && !reference.empty()) found = find(found->references, reference);
+    const SetResult* measured = find(trial->sets, set);
+    const Scores* found = measured;
+    if (measured != nullptr && !reference.empty()) found = find(measured->references, reference);
     if (found == nullptr || !found->mean.contains(metric)) continue;
     Repetition r{pair_key(*trial, group), found->mean.at(metric), {}};
     for (const auto& [name, values] : found->sequences)
