@@ -93,11 +93,11 @@ void judge_retargeting(const Performance& performance, const System& system, con
 }
 
 /// The surface alone; what stands still is the reference.
-void judge_surface(const Performance& performance, const Surface& surface, const Sequence& s,
-                   SystemScores* scores) {
+void judge_surface(const Performance& performance, const Surface& surface, int64_t every,
+                   const Sequence& s, SystemScores* scores) {
   const Body& body = performance.target();
   Predicted model, rest;
-  for (size_t i = 0; i < performance.frames(); ++i) {
+  for (size_t i = 0; i < performance.frames(); i += static_cast<size_t>(every)) {
     const Pose pose = performance.pose_b(i);
     model.vertices.push(surface(pose));
     Points moved = body.rest.vertices;
@@ -105,8 +105,8 @@ void judge_surface(const Performance& performance, const Surface& surface, const
     rest.vertices.push(moved);
   }
   if (scores->references.empty()) scores->references = {{"rest_pose", {}}};
-  add(model, s, 1, &scores->model);
-  add(rest, s, 1, &scores->references[0].second);
+  add(model, s, every, &scores->model);
+  add(rest, s, every, &scores->references[0].second);
   scores->frames.push_back(s.joints.frames);
 }
 
@@ -191,7 +191,7 @@ SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weigh
     for (auto& [name, scores] : out.conditions) {
       if (name == "true_poses") {
         judge_surface(performance, Surface(weights, weights_name, target.rest, target.joints),
-                      truth, &scores);
+                      options.every, truth, &scores);
       } else if (name == "clouds") {
         SystemInput input{weights, weights_name, target.rest, target.id, {}, how};
         if (!type.weights) input.rest = target.joints;
@@ -204,7 +204,7 @@ SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weigh
         Retargeter system(weights, weights_name, target.rest, target.joints, how);
         const auto push = [&](size_t i) { return system.push_joints(performance.joints_a(i)); };
         truth.source_rest = performance.source().joints;
-        judge_retargeting(performance, system, push, 1, truth, &scores);
+        judge_retargeting(performance, system, push, options.every, truth, &scores);
         truth.source_rest.reset();
       }
     }

@@ -292,6 +292,15 @@ class Runs(Sweep):
         self.assertLess(table["references"][0]["metrics"]["true_skeletons"]["pa_mpjpe"]["mean"],
                         table["rows"][0]["metrics"]["true_skeletons"]["pa_mpjpe"]["mean"])
 
+    def test_every_second_frame_in_all_conditions(self):
+        self.write("sweep.yaml", "base: configs/tiny.yaml\nset: {evaluation.every: 2}\n")
+        self.done("sweep", "run", "sweep.yaml", "--out", "d")
+        found = self.result(os.listdir(self.path("d/trials"))[0])["metrics"]
+        self.assertEqual(sorted(found), ["clouds", "true_poses", "true_skeletons"])
+        for name, scores in found.items():
+            self.assertEqual(scores["sequences"][0]["frames"], 3, name)  # of five
+            self.assertIsNone(scores["mean"]["acc"], name)
+
     def test_a_motion_model_without_a_network(self):
         self.write("sweep.yaml", "base: configs/tiny.yaml\ncases:\n  network: {}\n"
                    "  closed form: {motion.model: motion/closed_form, motion.sizes: {}, motion.optimiser.steps: 0}\n")
