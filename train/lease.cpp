@@ -17,7 +17,9 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <thread>
+#include <vector>
 
+#include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
 #include "autograd/base/format.h"
 
@@ -31,6 +33,7 @@ using Seconds = std::chrono::duration<double>;
 /// A record is one text of this size, so that a heartbeat replaces it at one blow.
 constexpr size_t kRecord = 1024;
 constexpr int kTries = 1000;
+constexpr char kDraft = '-';
 
 std::string first_line(const std::string& path) {
   std::ifstream file(path);
@@ -145,19 +148,27 @@ std::optional<Record> read_record(const std::string& file) {
   return out;
 }
 
-/// The highest number there is; 0: none.
-int64_t last_number(const std::string& path) {
+/// What follows `path` and `mark` in the names of the files beside it.
+std::vector<std::string> ends_of_names(const std::string& path, char mark) {
   const fs::path folder = fs::path(path).parent_path();
-  const std::string prefix = fs::path(path).filename().string() + ".";
-  int64_t last = 0;
+  const std::string prefix = fs::path(path).filename().string() + mark;
+  std::vector<std::string> out;
   std::error_code error;
   for (fs::directory_iterator it(folder.empty() ? "." : folder, error), end; !error && it != end;
        it.increment(error)) {
     const std::string name = it->path().filename().string();
-    if (!name.starts_with(prefix)) continue;
+    if (name.starts_with(prefix)) out.push_back(name.substr(prefix.size()));
+  }
+  return out;
+}
+
+/// The highest number there is; 0: none.
+int64_t last_number(const std::string& path) {
+  int64_t last = 0;
+  for (const std::string& name : ends_of_names(path, '.')) {
     int64_t number = 0;
     const char* stop = name.data() + name.size();
-    const auto found = std::from_chars(name.data() + prefix.size(), stop, number);
+    const auto found = std::from_chars(name.data(), stop, number);
     if (found.ec == std::errc() && found.ptr == stop) last = std::max(last, number);
   }
   return last;
@@ -169,16 +180,11 @@ bool surely_free(const Record& record) {
   return record.holder.here && !runs(record.holder.pid, record.start);
 }
 
-[[noreturn]] void fail(const std::string& path) {
-  throw WorkError(path + ": the lease could not be written (" + std::strerror(errno) +
-                  "); free some space, or make the folder writable");
-}
-
 /// The file of a lease to be, complete, under a name that nobody else uses.
 std::string draft(const std::string& path, const Record& record) {
-  const std::string name = path + "-" + record.token;
+  const std::string name = path + kDraft + record.token;
   const int fd = ::open(name.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0644);
-  if (fd < 0) fail(path);
+  if (fd < 0) throw_unwritable(path, errno);
   const std::string text = record.text();
   const bool good = ::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size()) &&
                     ::fsync(fd) == 0;
@@ -186,8 +192,16 @@ std::string draft(const std::string& path, const Record& record) {
   ::close(fd);
   if (good) return name;
   ::unlink(name.c_str());
-  errno = code == 0 ? ENOSPC : code;
-  fail(path);
+  throw_unwritable(path, code == 0 ? ENOSPC : code);
+}
+
+/// Drafts of processes that were killed before they could remove them.
+void remove_dead_drafts(const std::string& path) {
+  for (const std::string& token : ends_of_names(path, kDraft)) {
+    const std::string name = path + kDraft + token;
+    const std::optional<Record> record = read_record(name);
+    if (record && surely_free(*record)) ::unlink(name.c_str());
+  }
 }
 
 /// One name for a file, for one process only. A network file system may do it and answer that it
@@ -332,7 +346,7 @@ std::optional<Lease> Lease::take(const std::string& path, const std::string& who
       state->thread = std::thread([raw = state.get()] { raw->beat_until_end(); });
       return Lease(std::move(state));
     }
-    if (errno != EEXIST) fail(path);
+    if (errno != EEXIST) throw_unwritable(path, errno);
     number = std::max(number + 1, last_number(path));
   }
   throw WorkError(path + ": the lease changes hands all the time; try again later");
@@ -357,6 +371,7 @@ void Lease::forget() {
   const int64_t last = state_->number;
   for (int64_t number = 1; number <= last; ++number)
     ::unlink(numbered(state_->path, number).c_str());
+  remove_dead_drafts(state_->path);
 }
 
 }  // namespace restage

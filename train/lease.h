@@ -46,8 +46,8 @@ struct LeaseHolder {
 class Lease {
  public:
   /// The lease, or nothing if somebody alive holds it. If the holder is on another host this waits
-  /// until its heartbeat moves or `patience` is over. `who`: for people. WorkError: the folder of
-  /// `path` is not there or cannot be written.
+  /// until its heartbeat moves or `patience` is over. `who`: for people. InputError: the folder of
+  /// `path` is not there or may not be written; WorkError: no space.
   static std::optional<Lease> take(const std::string& path, const std::string& who,
                                    LeaseOptions options = {});
   /// Who holds it, at once: nothing if it is free or its holder was on this host and is dead. One
@@ -60,7 +60,8 @@ class Lease {
 
   /// Somebody else holds it now, or might: this process was, or will be, taken for dead.
   bool lost() const;
-  /// The work is done and will be seen to be done: removes the lease's files.
+  /// The work is done and will be seen to be done: removes the lease's files, and those of
+  /// processes that died at it.
   void forget();
 
  private:

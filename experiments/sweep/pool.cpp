@@ -80,6 +80,8 @@ class Pool {
     }
     throw_if_stopped();
     for (const Slot& slot : slots_) {
+      if (slot.state == Slot::State::done || slot.state == Slot::State::early)
+        tidy(dir_, slot.trial->id);
       outcome_.done += slot.state == Slot::State::done;
       outcome_.failed += slot.state == Slot::State::failed;
       outcome_.stopped += slot.state == Slot::State::stopped;

@@ -4,12 +4,15 @@
 #include <unistd.h>
 
 #include <charconv>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <set>
+#include <thread>
 
 #include "autograd/base/atomic_file.h"
+#include "autograd/base/interrupt.h"
 #include "autograd/base/nearest.h"
 #include "nn/config/config_reader.h"
 
@@ -94,11 +97,35 @@ std::string resolved(const SweepFile& file, const std::string& dir) {
   return "# made from " + file.path + " and " + file.base + "\n" + config_to_yaml(root);
 }
 
-/// The file is left alone if it holds this already: what is complete is not touched.
-void write_if_new(const std::string& path, const std::string& content) {
-  std::ifstream file(path, std::ios::binary);
-  if (file && std::string(std::istreambuf_iterator<char>(file), {}) == content) return;
-  write_file_atomically(path, content);
+using Files = std::vector<std::pair<std::string, std::string>>;  // path, content
+
+/// Those that do not hold this already.
+Files new_ones(const Files& files) {
+  Files out;
+  for (const auto& [path, content] : files) {
+    std::ifstream file(path, std::ios::binary);
+    if (!file || std::string(std::istreambuf_iterator<char>(file), {}) != content)
+      out.emplace_back(path, content);
+  }
+  return out;
+}
+
+/// Drafts of `target` (name_beside), whose writers are known to be gone.
+void remove_drafts_of(const fs::path& target) {
+  std::error_code ignored;
+  const std::string prefix = target.filename().string() + ".part";
+  for (const auto& entry : fs::directory_iterator(target.parent_path(), ignored))
+    if (entry.path().filename().string().starts_with(prefix)) fs::remove(entry.path(), ignored);
+}
+
+/// Waits for another process that plans in this folder.
+Lease planning(const std::string& dir) {
+  const StopScope stop;
+  while (true) {
+    if (auto lease = Lease::take(dir + "/lease", "planning")) return std::move(*lease);
+    throw_if_stopped();
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
 }
 
 void make_folder(const std::string& path) {
@@ -176,11 +203,12 @@ int write_sweep_dir(const std::string& dir, const SweepFile& file, const SweepPl
   make_folder(dir + "/trials");
   Json trials = Json::array();
   std::set<std::string> ids;
+  Files files;
   for (const PlannedTrial& trial : plan.trials) {
     ids.insert(trial.id);
     const std::string folder = dir + "/trials/" + trial.id;
     make_folder(folder);
-    write_if_new(folder + "/config.yaml", trial.config_yaml);
+    files.emplace_back(folder + "/config.yaml", trial.config_yaml);
     Json entry = {{"id", trial.id}, {"case", trial.case_name}, {"seed", trial.seed}};
     entry["overrides"] = Json::object();
     for (const auto& [key, value] : trial.overrides) entry["overrides"][key] = as_json(value);
@@ -189,7 +217,6 @@ int write_sweep_dir(const std::string& dir, const SweepFile& file, const SweepPl
       entry["artifacts"][artifact.stage] = artifact.id;
     trials.push_back(std::move(entry));
   }
-  write_if_new(dir + "/sweep.yaml", resolved(file, dir));
   const Json document = {
       {"directory", fs::relative(fs::current_path(), dir).string()},
       {"store", file.store},
@@ -197,7 +224,16 @@ int write_sweep_dir(const std::string& dir, const SweepFile& file, const SweepPl
       {"retries", file.retries},
       {"early_stop", early_stop_json(file.early_stop)},
       {"trials", std::move(trials)}};
-  write_if_new(dir + kPlan, document.dump(1) + "\n");
+  files.emplace_back(dir + "/sweep.yaml", resolved(file, dir));
+  files.emplace_back(dir + kPlan, document.dump(1) + "\n");
+  if (!new_ones(files).empty()) {
+    Lease lease = planning(dir);
+    for (const auto& [path, content] : new_ones(files)) {
+      remove_drafts_of(path);
+      write_file_atomically(path, content);
+    }
+    lease.forget();
+  }
   int stale = 0;
   for (const auto& entry : fs::directory_iterator(dir + "/trials", ignored))
     stale += !ids.contains(entry.path().filename().string());
@@ -265,6 +301,22 @@ bool is_over(const SweepDir& dir, const TrialResult& result) {
   return result.state == "done" ||
          (result.state == "stopped" && dir.early_stop &&
           result.document.value("early_stop", Json()) == early_stop_json(dir.early_stop));
+}
+
+void remove_drafts(const SweepDir& dir, const std::string& id) { remove_drafts_of(dir.result(id)); }
+
+void tidy(const SweepDir& dir, const std::string& id) {
+  std::error_code ignored;
+  bool untidy = false;
+  for (const auto& entry : fs::directory_iterator(dir.folder(id), ignored)) {
+    const std::string name = entry.path().filename().string();
+    untidy |= name.starts_with("lease") || name.starts_with("result.json.part");
+  }
+  if (!untidy || Lease::holder(dir.lease(id))) return;
+  if (auto lease = Lease::take(dir.lease(id), "tidying up")) {
+    remove_drafts(dir, id);
+    lease->forget();
+  }
 }
 
 TrialStatus status_of(const SweepDir& dir, const TrialEntry& trial) {

@@ -2,6 +2,7 @@
 //
 //   sweep.yaml             the sweep file, resolved; reading it again gives the same trials
 //   plan.json              the trials that it stands for, and where relative paths begin
+//   lease.N                who plans just now
 //   stop                   changes when the trials that run now are asked to end
 //   trials/ID/config.yaml  resolved configuration
 //   trials/ID/result.json  when the trial is over
@@ -45,7 +46,8 @@ struct SweepDir {
   const TrialEntry& trial(const std::string& id) const;
 };
 
-/// Writes or renews the folder. Returns how many trials of earlier plans stay in it unused.
+/// Writes or renews the folder, one process at a time; what is there already is not touched.
+/// Returns how many trials of earlier plans stay in it unused.
 /// InputError: `dir` is a folder of something else.
 int write_sweep_dir(const std::string& dir, const SweepFile& file, const SweepPlan& plan);
 /// InputError: no sweep's folder.
@@ -66,6 +68,11 @@ void write_result(const SweepDir& dir, const TrialEntry& trial, const std::strin
 
 /// Nothing is left to do: it is done, or was stopped early by the rule that the sweep still has.
 bool is_over(const SweepDir& dir, const TrialResult& result);
+
+/// Removes drafts of results whose writers were killed. The caller holds the trial's lease.
+void remove_drafts(const SweepDir& dir, const std::string& id);
+/// Of a trial that is over: what processes that were killed have left in its folder.
+void tidy(const SweepDir& dir, const std::string& id);
 
 /// Where a trial stands: a result's state, "running" if somebody holds its lease, or "pending".
 struct TrialStatus {

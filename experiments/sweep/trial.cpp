@@ -95,7 +95,10 @@ TrialEnd perform_trial(const std::string& path, const std::string& id, bool quie
     const auto result = read_result(dir, id);
     return result && is_over(dir, *result);
   };
-  if (over()) return TrialEnd::before;
+  if (over()) {
+    tidy(dir, id);
+    return TrialEnd::before;
+  }
 
   const StopScope stop;
   const std::string token = stop_token(dir.path);
@@ -112,6 +115,7 @@ TrialEnd perform_trial(const std::string& path, const std::string& id, bool quie
   }
   std::error_code ignored;
   fs::remove(dir.result(id), ignored);  // of an attempt that failed or was stopped
+  remove_drafts(dir, id);
   if (!is_standard_error(dir.log(id))) set_log_file(dir.log(id));
 
   const auto start = std::chrono::steady_clock::now();

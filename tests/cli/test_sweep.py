@@ -384,6 +384,22 @@ class Runs(Sweep):
         self.bad_input(["sweep", "plan", "sweep.yaml", "skeleton.optimiser.steps=3"], "skeleton.optimiser.steps")
         self.bad_input(["sweep", "plan", "sweep.yaml", "motion.init=nowhere.safetensors"], "nowhere.safetensors")
 
+    def test_what_killed_processes_left_is_tidied_up(self):
+        self.done("sweep", "run", "sweep.yaml", "--out", "d")
+        files = lambda: sorted(os.path.join(f, n) for f, _, names in os.walk(self.path("d")) for n in names)
+        whole = files()
+        first, second = (self.path("d/trials/" + t) for t in sorted(os.listdir(self.path("d/trials"))))
+        for name in (first + "/lease.2", first + "/lease-0123456789abcdef", first + "/result.json.part77", second + "/result.json.part78",
+                     self.path("d/plan.json.part79")):
+            self.write(name, "torn")
+        os.remove(second + "/result.json")  # killed while it wrote this; and a sweeper while it planned
+        os.remove(self.path("d/plan.json"))
+        self.done("sweep", "run", "sweep.yaml", "--out", "d")
+        self.assertEqual(files(), whole)
+        self.write(first + "/lease.1", "torn")  # engines call trials
+        self.done("trial", "d", os.path.basename(first))
+        self.assertEqual(files(), whole)
+
     def test_signals_are_passed_on(self):
         for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
             sweeper = self.sweeper("skeleton.optimiser.steps=1000000")

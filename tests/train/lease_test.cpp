@@ -181,7 +181,7 @@ TEST_F(LeaseTest, ManyProcessesOneHolder) {
 }
 
 TEST_F(LeaseTest, AFolderThatIsNotThere) {
-  EXPECT_THROW(Lease::take(dir / "none/lease", "a"), WorkError);
+  EXPECT_THROW(Lease::take(dir / "none/lease", "a"), InputError);
   EXPECT_FALSE(Lease::holder(dir / "none/lease"));
 }
 
