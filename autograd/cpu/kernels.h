@@ -55,6 +55,8 @@
   K(atan2_grad, Atan2GradArgs)                            \
   K(fk, FkArgs)                                           \
   K(fk_grad, FkGradArgs)                                  \
+  K(swing_twist, SwingTwistArgs)                          \
+  K(swing_twist_grad, SwingTwistGradArgs)                 \
   K(lbs, LbsArgs)                                         \
   K(lbs_grad, LbsGradArgs)                                \
   K(squared_norm, SquaredNormArgs)                        \

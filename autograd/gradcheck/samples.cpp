@@ -15,6 +15,7 @@ const std::vector<OpSamples>& all_samples() {
     add_reduce(t);
     add_rnn(t);
     add_rotation(t);
+    add_swing(t);
     return t;
   }();
   return table;

@@ -61,6 +61,34 @@ struct FkGradArgs {
   Tensor& g_rest;
   Tensor& g_root;
 };
+/// How a joint of swing_twist turns. A leaf (no child) turns with its parent. A joint with `left`
+/// and `right` is turned by the frame of (right -> left, itself -> child) as far as it has one; any
+/// other by the shortest arc from its bone, carried along by the parent, to the posed bone, then by
+/// its twist about that. A bone or frame without a direction turns with the parent.
+struct SwingJoint {
+  int parent = -1, child = -1, left = -1, right = -1;  ///< -1: none
+};
+/// rest, posed [n, j, 3], twist [n, j] radians -> out [n, j, 9] local rotations. f32 is computed in
+/// double.
+struct SwingTwistArgs {
+  const Tensor& rest;
+  const Tensor& posed;
+  const Tensor& twist;
+  std::span<const SwingJoint> joints;
+  Tensor& out;
+};
+/// out is the gradient of posed. That of an arc of more than 172 degrees, whose axis means little,
+/// is zero.
+struct SwingTwistGradArgs {
+  const Tensor& rest;
+  const Tensor& posed;
+  const Tensor& twist;
+  const Tensor& gy;
+  std::span<const SwingJoint> joints;
+  Tensor& out;
+  Tensor& g_rest;
+  Tensor& g_twist;
+};
 /// points [n, v, 3], weights [n, v, j], transforms [n, j, 12], rest [n, j, 3] -> out [n, v, 3].
 struct LbsArgs {
   const Tensor& points;

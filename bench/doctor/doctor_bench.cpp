@@ -18,9 +18,9 @@
 #include "autograd/base/format.h"
 #include "autograd/base/parallel_each.h"
 #include "autograd/base/rng.h"
-#include "bench/doctor/dress.h"
 #include "bench/doctor/fit.h"
 #include "datasets/doctor/examine.h"
+#include "datasets/sampling/dress.h"
 #include "nn/weights/state.h"
 
 namespace restage::bench {

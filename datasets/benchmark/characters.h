@@ -11,8 +11,4 @@ namespace restage {
 Body make_character(const CharacterRecipe& recipe, const MakeHuman& model,
                     const std::vector<BodyRecipe>& rows, const RngKey& key);
 
-/// Pushes the scalp outwards by about `thickness`, in locks: an outline as hair has it. The face,
-/// ears and neck stay.
-void add_hair(Body& body, double thickness, const RngKey& key);
-
 }  // namespace restage

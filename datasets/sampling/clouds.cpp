@@ -1,12 +1,14 @@
 #include "datasets/sampling/clouds.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <utility>
 
 #include "autograd/base/parallel.h"
 #include "datasets/readers/errors.h"
+#include "datasets/sampling/dress.h"
 
 namespace restage {
 namespace {
@@ -19,6 +21,10 @@ CloudConfig checked(const CloudConfig& c) {
                 "0 to 180 degrees");
   check_setting("cloud", c.scale_jitter >= 0 && c.scale_jitter < 1, "scale_jitter", "0 to below 1");
   check_setting("cloud", c.frame_step >= 1, "frame_step", "1 or more");
+  check_setting("cloud", c.recombined >= 0 && c.recombined <= 1, "recombined", "0 to 1");
+  for (const double share : {c.dressed, c.one_camera, c.camera_ring, c.one_camera + c.camera_ring})
+    check_setting("cloud", share >= 0 && share <= 1, "dressed, one_camera, camera_ring",
+                  "0 to 1, and one_camera + camera_ring at most 1");
   check_setting("cloud", c.min_fraction > 0 && c.min_fraction <= 1, "min_fraction", "above 0 to 1");
   return c;
 }
@@ -32,16 +38,6 @@ std::vector<size_t> repeat_some(const RngKey& key, size_t distinct, size_t n) {
   while (order.size() < n) order.push_back(rng.below(distinct));
   for (size_t i = n; i > 1; --i) std::swap(order[i - 1], order[rng.below(i)]);
   return order;
-}
-
-/// Skin weights of sample `i`, each side under the other's name in a mirror image.
-void put_weights(const Body& body, const SurfaceSamples& samples, size_t i, bool mirror,
-                 float* to) {
-  std::fill_n(to, kJoints, 0.0f);
-  for (size_t corner = 3 * i; corner < 3 * i + 3; ++corner)
-    for (int j = 0; j < kJoints; ++j)
-      to[mirror ? kMirror[j] : j] +=
-          samples.weights[corner] * body.weights(samples.vertices[corner], j);
 }
 
 }  // namespace
@@ -64,42 +60,94 @@ CloudSubject CloudSampler::subject(int64_t index) const {
   const double range = out.rest ? config_.tpose_heading * M_PI / 180 : M_PI;
   out.augmentation = draw_augmentation(rng, config_.heading ? range : 0.0, config_.mirror);
   out.scale = 1 + rng.uniform(-1.0, 1.0) * config_.scale_jitter;
+  const double sensor = rng.uniform();
+  if (!out.rest && sensor < config_.one_camera + config_.camera_ring)
+    out.sensor = sensor < config_.one_camera ? Sensor::one_camera : Sensor::ring;
+  out.dressed = rng.uniform() < config_.dressed;
+  if (rng.uniform() < config_.recombined) {
+    constexpr std::array<int, 6> kLimbs = {1, 2, 3, 3, 13, 14};  // legs, upper body, arms
+    out.limb = kLimbs[rng.below(kLimbs.size())];
+    out.limb_at = frames_.at(rng.below(frames_.count()));
+  }
+  return out;
+}
+
+Pose CloudSampler::pose(const CloudSubject& subject) const {
+  const Body& body = corpus_.bodies.at(subject.body);
+  const auto at = [&](const FrameRef& frame) {
+    return pose_on(corpus_.motions.at(frame.motion), body, frame.frame);
+  };
+  Pose out = at(subject.at);
+  if (subject.limb < 0) return out;
+  const Pose other = at(subject.limb_at);
+  std::array<bool, kJoints> hangs{};
+  for (int j = 0; j < kJoints; ++j) {
+    hangs[j] = j == subject.limb || (kParents[j] >= 0 && hangs[kParents[j]]);
+    if (hangs[j]) out.local[j] = other.local[j];
+  }
+  return out;
+}
+
+CloudSampler::Drawn CloudSampler::draw(const CloudSubject& subject, const SurfaceSamples& samples,
+                                       const RngKey& key) const {
+  const Body& body = corpus_.bodies.at(subject.body);
+  Drawn out{{}, {}, body.joints};
+  const SurfaceSampler& surface = surfaces_[subject.body];
+  Points picked;
+  if (subject.rest) {
+    picked = samples.rest_vertices(body);
+  } else {
+    const Pose posed = pose(subject);
+    picked = pose_surface(body, posed, &samples.vertices);
+    out.joints = forward_kinematics(body.joints, posed).joints;
+  }
+  out.points = samples.on(picked);
+  if (subject.dressed || subject.sensor != Sensor::none)
+    out.normals = surface.normals(samples, picked);
+  if (subject.dressed) {
+    Rng rng(key);
+    const Outfit outfit = draw_outfit(rng, body.joints);
+    const Points rest = samples.on_rest(body);
+    std::array<float, kJoints> weights;
+    for (size_t i = 0; i < out.points.size(); ++i) {
+      samples.skin_weights(body, i, false, weights.data());
+      out.points[i] += outfit.thickness(weights.data(), rest[i]) * out.normals[i];
+    }
+  }
+  augment(subject.augmentation, out.points);
+  augment(subject.augmentation, out.normals);
+  for (Point& p : out.points) p *= static_cast<float>(subject.scale);
+  out.joints = augmented(subject.augmentation, out.joints);
+  for (Vec3& joint : out.joints) joint *= subject.scale;
   return out;
 }
 
 void CloudSampler::fill(const CloudSubject& subject, const RngKey& key, float* points,
                         float* joints, float* weights) const {
-  const Body& body = corpus_.bodies.at(subject.body);
   const auto n = static_cast<size_t>(config_.points);
   Rng rng(key.fold("count"));
   const auto least = static_cast<size_t>(std::ceil(config_.min_fraction * config_.points));
+  const size_t wanted = least + rng.below(n - least + 1);
   const SurfaceSamples samples =
-      surfaces_[subject.body].draw(key.fold("surface"), least + rng.below(n - least + 1));
-
-  Points cloud;
-  Joints skeleton = body.joints;
-  if (subject.rest) {
-    cloud = samples.on_rest(body);
-  } else {
-    const Pose pose = pose_on(corpus_.motions.at(subject.at.motion), body, subject.at.frame);
-    cloud = samples.on_pose(body, pose);
-    skeleton = forward_kinematics(body.joints, pose).joints;
-  }
-  augment(subject.augmentation, cloud);
-  for (Point& p : cloud) p *= static_cast<float>(subject.scale);
-  add_noise(key.fold("noise"), config_.noise, cloud);
-  const std::vector<size_t> order = repeat_some(key.fold("repeat"), cloud.size(), n);
+      surfaces_[subject.body].draw(key.fold("surface"), candidates(subject.sensor, wanted));
+  Drawn drawn = draw(subject, samples, key.fold("outfit"));
+  std::vector<size_t> which(drawn.points.size());  // of the samples, each point is
+  std::iota(which.begin(), which.end(), size_t{0});
+  if (subject.sensor != Sensor::none)
+    drawn.points =
+        sensed(subject.sensor, drawn.points, drawn.normals, wanted, key.fold("sensor"), &which);
+  add_noise(key.fold("noise"), config_.noise, drawn.points);
+  const std::vector<size_t> order = repeat_some(key.fold("repeat"), drawn.points.size(), n);
   Points chosen;
-  for (const size_t i : order) chosen.push_back(cloud[i]);
+  for (const size_t i : order) chosen.push_back(drawn.points[i]);
 
   const Point centre = centroid(chosen);
-  skeleton = augmented(subject.augmentation, skeleton);
   for (size_t i = 0; i < n; ++i) Eigen::Map<Point>(points + 3 * i) = chosen[i] - centre;
   for (size_t i = 0; weights != nullptr && i < n; ++i)
-    put_weights(body, samples, order[i], subject.augmentation.mirror, weights + i * kJoints);
+    samples.skin_weights(corpus_.bodies[subject.body], which[order[i]], subject.augmentation.mirror,
+                         weights + i * kJoints);
   for (int j = 0; j < kJoints; ++j)
-    Eigen::Map<Point>(joints + 3 * j) =
-        (subject.scale * skeleton[j] - centre.cast<double>()).cast<float>();
+    Eigen::Map<Point>(joints + 3 * j) = (drawn.joints[j] - centre.cast<double>()).cast<float>();
 }
 
 CloudBatch CloudSampler::make(int64_t first, int64_t n,

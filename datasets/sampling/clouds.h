@@ -5,6 +5,7 @@
 #include "datasets/corpus.h"
 #include "datasets/sampling/augment.h"
 #include "datasets/sampling/frames.h"
+#include "datasets/sampling/sensors.h"
 #include "datasets/sampling/surface.h"
 
 namespace restage {
@@ -20,6 +21,10 @@ struct CloudConfig {
   double min_fraction = 1.0;  ///< below 1: as few as this part of the points are distinct, others
                               ///< repeat them, as in a scan with too few points
   int frame_step = 1;         ///< only every so many frames of a motion; 30: one per second
+  double recombined = 0;      ///< part in which a limb or the upper body performs another frame
+  double dressed = 0;         ///< part of the clouds whose person wears clothes and hair (dress.h)
+  double one_camera = 0;      ///< part that one depth camera sees (sensors.h)
+  double camera_ring = 0;     ///< part that three to seven cameras around see
   bool skin_weights = false;  ///< also fill CloudBatch::weights
 };
 
@@ -35,8 +40,12 @@ struct CloudSubject {
   size_t body = 0;
   bool rest = false;
   FrameRef at;
+  int limb = -1;  ///< what hangs on this joint is posed as in `limb_at`; -1: nothing
+  FrameRef limb_at;
   Augmentation augmentation;
   double scale = 1;
+  Sensor sensor = Sensor::none;
+  bool dressed = false;
 };
 
 class CloudSampler {
@@ -50,8 +59,16 @@ class CloudSampler {
   CloudSubject subject(int64_t index) const;
   /// The clouds of given subjects, the i-th with the noise and points of sample i.
   CloudBatch clouds(const std::vector<CloudSubject>& subjects) const;
+  Pose pose(const CloudSubject& subject) const;
 
  private:
+  /// Points of a surface, and their normals where clothes or sensors need them, turned, mirrored
+  /// and scaled together with the joints.
+  struct Drawn {
+    Points points, normals;
+    Joints joints;
+  };
+  Drawn draw(const CloudSubject& subject, const SurfaceSamples& samples, const RngKey& key) const;
   /// `weights` may be null.
   void fill(const CloudSubject& subject, const RngKey& key, float* points, float* joints,
             float* weights) const;

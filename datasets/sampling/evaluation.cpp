@@ -5,7 +5,10 @@
 #include <numeric>
 #include <utility>
 
+#include "autograd/base/parallel.h"
 #include "datasets/readers/errors.h"
+#include "datasets/sampling/dress.h"
+#include "datasets/sampling/scanner.h"
 
 namespace restage {
 namespace {
@@ -54,6 +57,46 @@ std::vector<CloudSubject> evaluation_tposes(const Corpus& corpus, size_t per_bod
       subject.augmentation = draw_augmentation(rng, heading * M_PI / 180, false);
       out.push_back(subject);
     }
+  return out;
+}
+
+CloudBatch evaluation_scans(const Corpus& corpus, const std::vector<CloudSubject>& subjects,
+                            int cameras, int points, uint64_t seed) {
+  const auto n = std::ssize(subjects);
+  CloudBatch out;
+  out.points = Tensor::empty({n, points, 3});
+  out.joints = Tensor::empty({n, kJoints, 3});
+  float *to_points = out.points.data<float>(), *to_joints = out.joints.data<float>();
+  parallel_for(n, 1, [&](int64_t from, int64_t to) {
+    for (int64_t i = from; i < to; ++i) {
+      const CloudSubject& s = subjects[static_cast<size_t>(i)];
+      const RngKey key = RngKey{seed, 0}.fold("evaluation scans").fold(static_cast<uint64_t>(i));
+      const Body body = dressed(corpus.bodies.at(s.body), key.fold("outfit"));
+      const Pose pose = pose_on(corpus.motions.at(s.at.motion), body, s.at.frame);
+      Rng rng(key);
+      const Vec3 centre = pose.root + Vec3(0, 0.1, 0);
+      const auto ring = camera_ring(cameras, rng.uniform(2.2, 3.2), rng.uniform(0, 2 * M_PI),
+                                    centre, {0.2, 1.2, 2.0});
+      Points cloud =
+          scan_surface({pose_surface(body, pose), body.rest.faces}, ring, {}, key.fold("scan"));
+      for (size_t k = 0; k < cloud.size(); ++k)
+        std::swap(cloud[k], cloud[k + rng.below(cloud.size() - k)]);
+      const size_t distinct = std::min<size_t>(cloud.size(), static_cast<size_t>(points));
+      if (distinct == 0)
+        throw InputError("body '" + body.id + "'", "no camera sees it",
+                         "give bodies of a person's size in metres");
+      cloud.resize(distinct);
+      while (std::ssize(cloud) < points) cloud.push_back(cloud[rng.below(distinct)]);
+      const Point middle = centroid(cloud);
+      for (int64_t k = 0; k < points; ++k)
+        Eigen::Map<Point>(to_points + 3 * (i * points + k)) =
+            cloud[static_cast<size_t>(k)] - middle;
+      const Joints joints = forward_kinematics(body.joints, pose).joints;
+      for (size_t j = 0; j < kJoints; ++j)
+        Eigen::Map<Point>(to_joints + 3 * (i * kJoints + static_cast<int64_t>(j))) =
+            (joints[j] - middle.cast<double>()).cast<float>();
+    }
+  });
   return out;
 }
 

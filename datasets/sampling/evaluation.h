@@ -17,6 +17,12 @@ std::vector<CloudSubject> evaluation_clouds(const Corpus& corpus, size_t count, 
 std::vector<CloudSubject> evaluation_tposes(const Corpus& corpus, size_t per_body, double heading,
                                             uint64_t seed);
 
+/// What depth cameras measure of the subjects, dressed, by ray casting (scanner.h): one camera
+/// before, beside or behind them, or a ring of `cameras`; `points` of each cloud, relative to their
+/// centroid.
+CloudBatch evaluation_scans(const Corpus& corpus, const std::vector<CloudSubject>& subjects,
+                            int cameras, int points, uint64_t seed);
+
 /// Body A's performance of part of a motion, to be retargeted to body B. Indices into a corpus.
 struct EvalSequence {
   size_t body_a = 0, body_b = 0, motion = 0;

@@ -1,10 +1,13 @@
 #include "datasets/sampling/pairs.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "autograd/base/error.h"
 #include "autograd/base/parallel.h"
+#include "datasets/sampling/dress.h"
+#include "datasets/sampling/normals.h"
 
 namespace restage {
 namespace {
@@ -34,6 +37,9 @@ PairBatch PairSampler::make(int64_t n) const {
   out.rest_joints = Tensor::empty({n, kJoints, 3});
   out.local = Tensor::empty({n, kJoints, 3, 3});
   out.axis_angle = Tensor::empty({n, 3 * kJoints});
+  out.seen_points = Tensor::empty({n, config_.points, 3});
+  out.seen_joints = Tensor::empty({n, kJoints, 3});
+  if (config_.skin_weights) out.weights = Tensor::empty({n, config_.points, kJoints});
   return out;
 }
 
@@ -59,6 +65,38 @@ void PairSampler::fill(PairBatch& batch, int64_t row, const RngKey& key, size_t 
     Eigen::Map<Point>(batch.rest_joints.data<float>() + 3 * at) =
         (joints[j] - joints[0]).cast<float>();
   }
+  show(batch, row, key.fold("seen"), body_index, samples, augmentation);
+}
+
+/// The networks' view of the pair, and the skin weights that are asked of them.
+void PairSampler::show(PairBatch& batch, int64_t row, const RngKey& key, size_t body_index,
+                       const SurfaceSamples& samples, const Augmentation& augmentation) const {
+  const Body& body = corpus_.bodies[body_index];
+  const size_t n = samples.size();
+  Rng rng(key);
+  const bool clothes = rng.uniform() < config_.dressed;
+  const Outfit outfit = clothes ? draw_outfit(rng, body.joints) : Outfit{};
+  const Points picked = samples.rest_vertices(body);
+  Points seen = samples.on(picked), normals;
+  std::array<float, kJoints> weights;
+  if (clothes) normals = surfaces_[body_index].normals(samples, picked);
+  for (size_t i = 0; i < n && (clothes || config_.skin_weights); ++i) {
+    samples.skin_weights(body, i, false, weights.data());
+    if (clothes) seen[i] += outfit.thickness(weights.data(), seen[i]) * normals[i];
+    if (!config_.skin_weights) continue;
+    float* to =
+        batch.weights.data<float>() + (row * config_.points + static_cast<int64_t>(i)) * kJoints;
+    for (int j = 0; j < kJoints; ++j) to[augmentation.mirror ? kMirror[j] : j] = weights[j];
+  }
+  augment({0.0, augmentation.mirror}, seen);
+  Joints joints = augmented_rest(augmentation, body.joints);
+  for (size_t j = 0; j < kJoints; ++j)
+    joints[j] += config_.joint_noise * normal3(key.fold("joints"), j).cast<double>();
+  write(batch.seen_points.data<float>() + row * config_.points * 3, seen, joints[0]);
+  for (size_t j = 0; j < kJoints; ++j)
+    Eigen::Map<Point>(batch.seen_joints.data<float>() +
+                      3 * (row * kJoints + static_cast<int64_t>(j))) =
+        (joints[j] - joints[0]).cast<float>();
 }
 
 PairBatch PairSampler::batch(int64_t first, int64_t n) const {

@@ -11,9 +11,12 @@ namespace restage {
 
 struct PairConfig {
   int points = 1024;
-  bool heading = true;  ///< turn the pose by any angle about y
-  bool mirror = false;  ///< every second sample is a mirror image
-  int frame_step = 1;   ///< only every so many frames of a motion; 30: one per second
+  bool heading = true;        ///< turn the pose by any angle about y
+  bool mirror = false;        ///< every second sample is a mirror image
+  int frame_step = 1;         ///< only every so many frames of a motion; 30: one per second
+  double joint_noise = 0;     ///< of PairBatch::seen_joints, standard deviation per coordinate, m
+  double dressed = 0;         ///< part of the pairs that PairBatch::seen_points shows in clothes
+  bool skin_weights = false;  ///< also fill PairBatch::weights
 };
 
 /// float32, metres.
@@ -23,6 +26,9 @@ struct PairBatch {
   Tensor rest_joints;   ///< [N, 22, 3] relative to the rest pelvis
   Tensor local;         ///< [N, 22, 3, 3] local rotations, root = global orientation
   Tensor axis_angle;    ///< [N, 66] the same as axis x angle, angle in [0, pi]
+  Tensor seen_points;   ///< [N, V, 3] rest_points as a target shows them, in clothes perhaps
+  Tensor seen_joints;   ///< [N, 22, 3] rest_joints as an extractor sees them, with noise
+  Tensor weights;       ///< [N, V, 22] the data's; only with PairConfig::skin_weights
 };
 
 class PairSampler {
@@ -40,6 +46,8 @@ class PairSampler {
   PairBatch make(int64_t n) const;
   void fill(PairBatch& batch, int64_t row, const RngKey& key, size_t body, const Pose& pose,
             const Augmentation& augmentation) const;
+  void show(PairBatch& batch, int64_t row, const RngKey& key, size_t body,
+            const SurfaceSamples& samples, const Augmentation& augmentation) const;
 
   const Corpus& corpus_;
   PairConfig config_;

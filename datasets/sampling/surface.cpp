@@ -24,29 +24,40 @@ Points SurfaceSamples::on(const Points& picked) const {
   return out;
 }
 
-Points SurfaceSamples::on_rest(const Body& body) const {
+Points SurfaceSamples::rest_vertices(const Body& body) const {
   Points picked(vertices.size());
   for (size_t i = 0; i < picked.size(); ++i) picked[i] = body.rest.vertices.at(vertices[i]);
-  return on(picked);
+  return picked;
 }
+
+Points SurfaceSamples::on_rest(const Body& body) const { return on(rest_vertices(body)); }
 
 Points SurfaceSamples::on_pose(const Body& body, const Pose& pose) const {
   return on(pose_surface(body, pose, &vertices));
+}
+
+void SurfaceSamples::skin_weights(const Body& body, size_t i, bool mirror, float* to) const {
+  std::fill_n(to, kJoints, 0.0f);
+  for (size_t corner = 3 * i; corner < 3 * i + 3; ++corner)
+    for (int j = 0; j < kJoints; ++j)
+      to[mirror ? kMirror[j] : j] += weights[corner] * body.weights(vertices[corner], j);
 }
 
 SurfaceSampler::SurfaceSampler(const Body& body) : faces_(body.rest.faces) {
   const Points& x = body.rest.vertices;
   const std::string where = "body '" + body.id + "'";
   ends_.reserve(faces_.size());
-  double sum = 0;
+  double sum = 0, volume = 0;
   for (const Triangle& f : faces_) {
     for (const int32_t v : f)
       if (v < 0 || static_cast<size_t>(v) >= x.size())
         throw InputError(where, cat("a face names vertex ", v, " of ", x.size()), "mend the mesh");
     const Point &a = x[f[0]], &b = x[f[1]], &c = x[f[2]];
     sum += 0.5 * static_cast<double>((b - a).cross(c - a).norm());
+    volume += static_cast<double>(a.dot(b.cross(c)));
     ends_.push_back(sum);
   }
+  outwards_ = volume < 0 ? -1.0f : 1.0f;
   if (!(sum > 0) || !std::isfinite(sum))
     throw InputError(where, "no surface to draw points from", "give a mesh with triangles");
 }
@@ -69,6 +80,15 @@ SurfaceSamples SurfaceSampler::draw(const RngKey& key, size_t n) const {
     out.weights[3 * i] = 1.0f - u - v;
     out.weights[3 * i + 1] = u;
     out.weights[3 * i + 2] = v;
+  }
+  return out;
+}
+
+Points SurfaceSampler::normals(const SurfaceSamples& samples, const Points& picked) const {
+  Points out(samples.size());
+  for (size_t i = 0; i < out.size(); ++i) {
+    const Point &a = picked[3 * i], &b = picked[3 * i + 1], &c = picked[3 * i + 2];
+    out[i] = outwards_ * (b - a).cross(c - a).stableNormalized();
   }
   return out;
 }

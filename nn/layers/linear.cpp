@@ -24,6 +24,13 @@ Var Linear::operator()(Context& ctx, const Var& x, Activation activation) const 
   return linear(x, w);
 }
 
+void Linear::start_small() {
+  std::vector<double> w = weight.value.to_vector<double>();
+  for (double& v : w) v *= 0.01;
+  weight.value = Tensor::from<double>(weight.value.shape(), w).cast(weight.value.dtype());
+  if (with_bias_) bias.value = Tensor::zeros(bias.value.shape(), bias.value.dtype());
+}
+
 void Linear::visit(Fields& f) {
   f("weight", weight);
   if (with_bias_) f("bias", bias);

@@ -12,6 +12,8 @@ namespace restage {
 struct Linear : Module {
   Linear(int64_t in, int64_t out, const Init& init, bool with_bias = true, int tail = 0);
   Var operator()(Context& ctx, const Var& x, Activation activation = Activation::none) const;
+  /// Weights to a hundredth, biases to zero: an answer near none before training.
+  void start_small();
   void visit(Fields& f) override;
   const char* kind() const override {
     return tail_ == 0 ? "Linear" : tail_ == 1 ? "Conv1d" : "Conv2d";

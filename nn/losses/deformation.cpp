@@ -10,15 +10,18 @@
 
 namespace restage {
 
+namespace {
+
+/// `seen_*` is what the networks read, the others what is skinned.
 DeformationOutput deform(Context& ctx, const DeformationModel& weights, const OffsetNet* offsets,
-                         const Var& rest_points, const Var& rest_joints, const Var& local,
-                         const Var& axis_angle) {
+                         const Var& seen_points, const Var& seen_joints, const Var& rest_points,
+                         const Var& rest_joints, const Var& local, const Var& axis_angle) {
   const int64_t n = rest_points.size(0);
   DeformationOutput out;
-  out.weights = weights.weights(ctx, rest_joints, rest_points);
+  out.weights = weights.weights(ctx, seen_joints, seen_points);
   Var x = rest_points;
   if (offsets != nullptr) {
-    out.offsets = offsets->at_points(ctx, axis_angle, rest_points);
+    out.offsets = offsets->at_points(ctx, axis_angle, seen_points);
     x = x + out.offsets;
   }
   const Var root = reshape(slice(rest_joints, 1, 0, 1), {n, 3});
@@ -27,9 +30,25 @@ DeformationOutput deform(Context& ctx, const DeformationModel& weights, const Of
   return out;
 }
 
+}  // namespace
+
+DeformationOutput deform(Context& ctx, const DeformationModel& weights, const OffsetNet* offsets,
+                         const Var& rest_points, const Var& rest_joints, const Var& local,
+                         const Var& axis_angle) {
+  return deform(ctx, weights, offsets, rest_points, rest_joints, rest_points, rest_joints, local,
+                axis_angle);
+}
+
 DeformationOutput deform(Context& ctx, const DeformationModel& weights, const OffsetNet* offsets,
                          const DeformationBatch& b) {
-  return deform(ctx, weights, offsets, b.rest_points, b.rest_joints, b.local, b.axis_angle);
+  const Tensor& points = b.seen_points.defined() ? b.seen_points : b.rest_points;
+  const Tensor& joints = b.seen_joints.defined() ? b.seen_joints : b.rest_joints;
+  return deform(ctx, weights, offsets, points, joints, b.rest_points, b.rest_joints, b.local,
+                b.axis_angle);
+}
+
+Var skin_cross_entropy(const Var& weights, const Tensor& truth) {
+  return neg(sum_all(log(add_scalar(weights, 1e-6)) * Var(truth)));
 }
 
 Var squared_distance_sum(const Var& posed, const Var& truth) {

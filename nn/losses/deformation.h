@@ -9,6 +9,8 @@ namespace restage {
 /// pelvis.
 struct DeformationBatch {
   Tensor rest_points, posed_points, rest_joints, local, axis_angle;
+  /// What the networks are shown in the place of rest_points and rest_joints, if it is another.
+  Tensor seen_points = {}, seen_joints = {};
 };
 
 struct DeformationOutput {
@@ -22,6 +24,8 @@ DeformationOutput deform(Context& ctx, const DeformationModel& weights, const Of
 DeformationOutput deform(Context& ctx, const DeformationModel& weights, const OffsetNet* offsets,
                          const Var& rest_points, const Var& rest_joints, const Var& local,
                          const Var& axis_angle);
+/// Cross-entropy of weights [n, v, 22] against the data's, summed over points and pairs.
+Var skin_cross_entropy(const Var& weights, const Tensor& truth);
 /// Eq. 4: squared distances, summed over all points and pairs.
 Var squared_distance_sum(const Var& posed, const Var& truth);
 /// Mean distance per point, metres (a number to report, not to differentiate).

@@ -1,7 +1,7 @@
 // `motion/closed_form`: no network. The rotations are the closed form of the joints as they come
 // (nn/geometry/closed_form.h), the path that of A times the length of the legs: what every learned
 // motion network has to beat, as a model like any other. It has nothing to learn
-// (motion.optimiser.steps=0) and gives no gradients.
+// (motion.optimiser.steps=0).
 #pragma once
 
 #include "nn/models/motion.h"
@@ -13,16 +13,15 @@ struct ClosedFormMotionConfig {};
 template <class V>
 void visit(V&, ClosedFormMotionConfig&) {}
 
-/// The state is {how much longer B's legs are than A's in the first frame}, [n].
+/// The state is {how much longer B's legs are than A's in the first frame}, [n, 1, 1].
 struct ClosedFormMotion final : MotionModel {
   using Config = ClosedFormMotionConfig;
-  ClosedFormMotion(const ClosedFormMotionConfig&, const Init& init) : type(init.type) {}
+  ClosedFormMotion(const ClosedFormMotionConfig&, const Init&) {}
   MotionOutput forward(Context& ctx, const Var& joints, const Var& trans, const Var& rest,
                        MotionState* state) const override;
   void standardise(const MotionStatistics&) override {}
   void visit(Fields&) override {}
   const char* kind() const override { return "closed form"; }
-  DType type;
 };
 
 }  // namespace restage

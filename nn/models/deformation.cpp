@@ -7,12 +7,14 @@
 
 namespace restage {
 
-Mlp3::Mlp3(int64_t in, int64_t out, int64_t width, double dropout, bool softmax, const Init& init)
-    : fc1(in, width, init.sub("fc1")),
-      fc2(width, width, init.sub("fc2")),
-      fc3(width, out, init.sub("fc3")),
-      dropout_rate(dropout),
-      with_softmax(softmax) {}
+Mlp3::Mlp3(int64_t in, int64_t out, const MlpConfig& c, bool softmax, const Init& init)
+    : fc1(in, c.width, init.sub("fc1")),
+      fc2(c.width, c.width, init.sub("fc2")),
+      fc3(c.width, out, init.sub("fc3")),
+      dropout_rate(c.dropout),
+      with_softmax(softmax) {
+  if (c.small_start) fc3.start_small();
+}
 
 // ReLU and dropout commute, since the mask is never negative; without dropout ReLU is part of the
 // product.

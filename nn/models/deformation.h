@@ -7,9 +7,22 @@
 
 namespace restage {
 
+struct MlpConfig {
+  int64_t width = 256;
+  double dropout = 0.2;
+  bool small_start = false;
+};
+
+template <class V>
+void visit(V& v, MlpConfig& c) {
+  v("width", c.width, "of the hidden layers", between(1, kMostWidth));
+  v("dropout", c.dropout, "dropout rate", below(0, 1));
+  v("small_start", c.small_start, "the last layer starts near zero: offsets at none");
+}
+
 /// Linear - dropout - ReLU, twice, then Linear and possibly softmax. Names fc1, fc2, fc3.
 struct Mlp3 : Module {
-  Mlp3(int64_t in, int64_t out, int64_t width, double dropout, bool softmax, const Init& init);
+  Mlp3(int64_t in, int64_t out, const MlpConfig& config, bool softmax, const Init& init);
   Var operator()(Context& ctx, const Var& x) const;
   /// The same for join_points(vector, points): what a sample's vector [n, c] gives the first layer
   /// is computed once and not for each of its points [n, v, 3].
@@ -30,17 +43,6 @@ struct Mlp3 : Module {
   Var from_first(Context& ctx, const Var& h1) const;
 };
 
-struct MlpConfig {
-  int64_t width = 256;
-  double dropout = 0.2;
-};
-
-template <class V>
-void visit(V& v, MlpConfig& c) {
-  v("width", c.width, "of the hidden layers", between(1, kMostWidth));
-  v("dropout", c.dropout, "dropout rate", below(0, 1));
-}
-
 /// How a target's surface follows its joints; the role `deformation.weights`.
 struct DeformationModel : Module {
   /// rest joints [n, 22, 3] and points [n, v, 3], both relative to the rest pelvis, metres ->
@@ -51,8 +53,7 @@ struct DeformationModel : Module {
 /// W_net [rest joints (66), p (3)] -> 22 weights.
 struct WeightNet final : DeformationModel {
   using Config = MlpConfig;
-  WeightNet(const MlpConfig& c, const Init& init)
-      : net(3 * kJoints + 3, kJoints, c.width, c.dropout, true, init) {}
+  WeightNet(const MlpConfig& c, const Init& init) : net(3 * kJoints + 3, kJoints, c, true, init) {}
   Var weights(Context& ctx, const Var& rest, const Var& points) const override;
   void visit(Fields& f) override { net.visit(f); }
   const char* kind() const override { return net.kind(); }
@@ -62,8 +63,7 @@ struct WeightNet final : DeformationModel {
 /// The first version's field: [p - J_j (66)] -> 22 weights.
 struct V1Field final : DeformationModel {
   using Config = MlpConfig;
-  V1Field(const MlpConfig& c, const Init& init)
-      : net(3 * kJoints, kJoints, c.width, c.dropout, true, init) {}
+  V1Field(const MlpConfig& c, const Init& init) : net(3 * kJoints, kJoints, c, true, init) {}
   Var weights(Context& ctx, const Var& rest, const Var& points) const override;
   void visit(Fields& f) override { net.visit(f); }
   const char* kind() const override { return net.kind(); }
@@ -73,16 +73,14 @@ struct V1Field final : DeformationModel {
 /// O_net [22 axis-angles (66), p (3)] -> offset, metres; the role `deformation.offsets`.
 struct OffsetNet final : Mlp3 {
   using Config = MlpConfig;
-  OffsetNet(const MlpConfig& c, const Init& init)
-      : Mlp3(3 * kJoints + 3, 3, c.width, c.dropout, false, init) {}
+  OffsetNet(const MlpConfig& c, const Init& init) : Mlp3(3 * kJoints + 3, 3, c, false, init) {}
 };
 
 /// The third MLP that the paper's count implies (spec 5.4, H1): rest joints relative to the pelvis
 /// (66) -> rest pelvis minus the centroid of the rest points; the role `deformation.root`.
 struct RootNet final : Mlp3 {
   using Config = MlpConfig;
-  RootNet(const MlpConfig& c, const Init& init)
-      : Mlp3(3 * kJoints, 3, c.width, c.dropout, false, init) {}
+  RootNet(const MlpConfig& c, const Init& init) : Mlp3(3 * kJoints, 3, c, false, init) {}
 };
 
 /// Joins a vector per sample [n, c] with every point [n, v, 3]: [n, v, c + 3].

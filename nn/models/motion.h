@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "autograd/kernels/rotation.h"
 #include "nn/geometry/skeleton.h"
 #include "nn/module.h"
 
@@ -35,7 +36,20 @@ struct MotionModel : Module {
   virtual void standardise(const MotionStatistics& statistics) = 0;
 };
 
+/// x in units of the training set's deviation from its mean.
+Var in_units(const Var& x, const MotionStatistics::Columns& of);
+/// rest [n, 22, 3] -> [n * frames, 22, 3].
+Var rest_of_each_frame(const Var& rest, int64_t frames);
+/// Length of a leg, hip to ankle, the mean of both: [n, 22, 3] -> [n].
+Var leg_lengths(const Var& joints);
+/// Rotations and joints of an output from local rotations [n * t, 22, 3, 3] of n motions.
+void put_pose(const Var& local, const Var& rest_rows, int64_t n, MotionOutput* out);
+
 /// Parents of the 22 joints as the kinematics op takes them.
 inline std::span<const int> joint_parents() { return kParents; }
+
+/// How each of them is turned by the op swing_twist: as in the closed form
+/// (nn/geometry/closed_form.h).
+std::span<const SwingJoint> joint_swings();
 
 }  // namespace restage

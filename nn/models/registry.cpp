@@ -1,9 +1,11 @@
 #include "nn/models/registry.h"
 
 #include "autograd/base/nearest.h"
+#include "nn/models/bone_field.h"
 #include "nn/models/closed_form_motion.h"
 #include "nn/models/deformation.h"
 #include "nn/models/discriminator.h"
+#include "nn/models/hybrid.h"
 #include "nn/models/patch_transformer.h"
 #include "nn/models/point_transformer.h"
 #include "nn/models/pointnet.h"
@@ -48,6 +50,8 @@ const std::vector<ModelType>& models() {
                               "our small extractor for CPUs: patch tokens that vote"),
       smrm("smrm/rot6d", "the motion retargeting network with 6D rotations", RotationForm::sixd),
       smrm("smrm/quaternion", "the first version's, with quaternions", RotationForm::quaternion),
+      model<Hybrid>("smrm/hybrid", "motion",
+                    "closed form of joints that a recurrent network corrects, twists and ends"),
       model<ClosedFormMotion>("motion/closed_form", "motion",
                               "no network: the closed form of the joints, to compare with"),
       model<Discriminator>("smrm/discriminator", "discriminator",
@@ -58,6 +62,8 @@ const std::vector<ModelType>& models() {
                        "pose-corrective offset of a rest point"),
       model<RootNet>("deformation/root", "deformation.root",
                      "the third MLP: rest joints to pelvis in the scan"),
+      model<BoneField>("deformation/bones", "deformation.weights",
+                       "skinning weights from distances to the bones"),
       model<V1Field>("deformation/v1_field", "deformation.weights",
                      "the first version's skinning field"),
   };

@@ -9,10 +9,6 @@ namespace {
 
 int64_t rotation_width(RotationForm form) { return form == RotationForm::sixd ? 6 : 4; }
 
-Var in_units(const Var& x, const Tensor& mean, const Tensor& deviation) {
-  return (x - Var(mean)) / Var(deviation);
-}
-
 }  // namespace
 
 Smrm::Smrm(const SmrmConfig& c, const Init& init)
@@ -28,12 +24,9 @@ Smrm::Smrm(const SmrmConfig& c, const Init& init)
     if (width == 6) rest_pose[j * width + 4] = 1;
   }
   if (c.rest_pose_start) {
-    std::vector<double> w = fc_rot.weight.value.to_vector<double>();
-    for (double& v : w) v *= 0.01;
-    fc_rot.weight.value = Tensor::from<double>(fc_rot.weight.value.shape(), w).cast(init.type);
-    fc_rot.bias.value = c.standardise
-                            ? Tensor::full({c.joints * width}, 0, init.type)
-                            : Tensor::from<double>({c.joints * width}, rest_pose).cast(init.type);
+    fc_rot.start_small();
+    if (!c.standardise)
+      fc_rot.bias.value = Tensor::from<double>({c.joints * width}, rest_pose).cast(init.type);
   }
   if (c.standardise) {
     const auto constant = [&](int64_t n, double v) { return Tensor::full({n}, v, init.type); };
@@ -59,9 +52,9 @@ MotionOutput Smrm::forward(Context& ctx, const Var& joints, const Var& trans, co
   const int64_t n = joints.size(0), t = joints.size(1), j = config.joints;
   Var a = reshape(joints, {n, t, 3 * j}), v = trans, b = reshape(rest, {n, 1, 3 * j});
   if (config.standardise) {
-    a = in_units(a, joint_mean, joint_std);
-    v = in_units(v, trans_mean, trans_std);
-    b = in_units(b, rest_mean, rest_std);
+    a = in_units(a, {joint_mean, joint_std});
+    v = in_units(v, {trans_mean, trans_std});
+    b = in_units(b, {rest_mean, rest_std});
   }
   state->resize(2);
   const Var code = enc(ctx, concat({a, v}, 2), &(*state)[0]);
@@ -76,11 +69,7 @@ MotionOutput Smrm::forward(Context& ctx, const Var& joints, const Var& trans, co
   const Var rows = reshape(out.raw, {n * t, j, rotation_width(config.rotation)});
   const Var local =
       config.rotation == RotationForm::sixd ? sixd_to_matrix(rows) : quaternion_to_matrix(rows);
-  const Var rest_rows = reshape(expand(reshape(rest, {n, 1, j, 3}), {n, t, j, 3}), {n * t, j, 3});
-  const Tensor origin = Tensor::zeros({n * t, 3}, joints.dtype());
-  const Var posed = forward_kinematics(local, rest_rows, origin, joint_parents());
-  out.rotations = reshape(local, {n, t, j, 3, 3});
-  out.joints = reshape(joints_of(posed), {n, t, j, 3});
+  put_pose(local, rest_of_each_frame(rest, t), n, &out);
   return out;
 }
 

@@ -273,6 +273,7 @@ TEST(SavedTensors, AreThoseOfTheTable) {
       {"to_matrix", "x0"},
       {"atan2", "x0 x1"},
       {"forward_kinematics", "x0 x1 y"},
+      {"swing_twist", "x0 x1 x2"},
       {"linear_blend_skinning", "x0 x1 x2 x3"},
   };
   size_t seen = 0;

@@ -334,7 +334,8 @@ void discriminator_nkn(Case& c) {
 std::unique_ptr<Mlp3> make_mlp(const Case& c, const std::string& prefix, bool softmax,
                                double dropout) {
   return std::make_unique<Mlp3>(c.size(prefix + "fc1.weight", 1), c.size(prefix + "fc3.weight", 0),
-                                c.size(prefix + "fc1.weight", 0), dropout, softmax, c.init());
+                                MlpConfig{c.size(prefix + "fc1.weight", 0), dropout}, softmax,
+                                c.init());
 }
 
 void deformation(Case& c) {

@@ -88,7 +88,7 @@ const Shape kMask = {kRows, kWidth};
 
 /// The network of the case; weights as they were drawn, see below for others.
 struct Net : Mlp3 {
-  explicit Net(bool softmax) : Mlp3(kIn, kOut, kWidth, kRate, softmax, Init{}) {
+  explicit Net(bool softmax) : Mlp3(kIn, kOut, {kWidth, kRate}, softmax, Init{}) {
     cast_module(*this, DType::f64);
     name_scopes(*this, "net");
   }

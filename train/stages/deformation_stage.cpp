@@ -1,6 +1,7 @@
 #include "train/stages/deformation_stage.h"
 
 #include <algorithm>
+#include <array>
 
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
@@ -9,9 +10,28 @@
 namespace restage {
 namespace {
 
+PairConfig with_weights(PairConfig c, bool weights) {
+  c.skin_weights = weights;
+  return c;
+}
+
 PairConfig held_out(PairConfig c) {
   c.mirror = false;
+  c.dressed = 0;
+  c.skin_weights = true;
   return c;
+}
+
+/// Adds to `skin` how much of the points each joint moves in the data, and to `kept` how much of
+/// that it moves by the predicted weights as well.
+void add_shared_skin(const Tensor& predicted, const Tensor& truth,
+                     std::array<double, kJoints>* skin, std::array<double, kJoints>* kept) {
+  const float *p = predicted.data<float>(), *t = truth.data<float>();
+  for (int64_t i = 0; i < truth.numel(); ++i) {
+    const auto j = static_cast<size_t>(i % kJoints);
+    (*skin)[j] += static_cast<double>(t[i]);
+    (*kept)[j] += static_cast<double>(std::min(p[i], t[i]));
+  }
 }
 
 }  // namespace
@@ -29,12 +49,14 @@ DeformationStage::DeformationStage(const Config& config, const StageInput& in)
                    : nullptr),
       adam_(add_optimiser("adam", {"deformation.weights", "deformation.offsets"},
                           config.optimiser.adam)),
-      sampler_(in.train, config.pairs, RngKey{in.seed, 0}.fold("deformation.pairs").stream),
+      sampler_(in.train, with_weights(config.pairs, config.supervision > 0),
+               RngKey{in.seed, 0}.fold("deformation.pairs").stream),
       validation_sampler_(in.validation, held_out(config.pairs), 1),
       key_(RngKey{in.seed, 0}.fold("deformation.step")) {}
 
 DeformationBatch DeformationStage::batch_of(const PairBatch& p) const {
-  DeformationBatch b{p.rest_points, p.posed_points, p.rest_joints, p.local, p.axis_angle};
+  DeformationBatch b{p.rest_points, p.posed_points, p.rest_joints, p.local,
+                     p.axis_angle,  p.seen_points,  p.seen_joints};
   if (!config_.keep_root_rotation) {
     b.axis_angle = b.axis_angle.clone();
     for (int64_t i = 0; i < b.axis_angle.size(0); ++i)
@@ -48,17 +70,25 @@ PairBatch DeformationStage::batch(int64_t step) const {
   return sampler_.batch(step * n, n);
 }
 
+/// Sums over the points of a pair, means over pairs.
+Var DeformationStage::loss(Context& ctx, const PairBatch& pairs, int64_t step,
+                           double* distance) const {
+  const DeformationBatch b = batch_of(pairs);
+  const DeformationOutput out =
+      deform(ctx, *weights_, step >= config_.skinning_steps ? offsets_ : nullptr, b);
+  *distance = mean_distance(out.posed.value, b.posed_points);
+  Var total = squared_distance_sum(out.posed, b.posed_points);
+  if (config_.supervision > 0)
+    total = total + scale(skin_cross_entropy(out.weights, pairs.weights), config_.supervision);
+  return scale(total, 1.0 / static_cast<double>(config_.optimiser.batch));
+}
+
 NamedValues DeformationStage::step(int64_t step) {
   const OptimiserConfig& o = config_.optimiser;
-  const DeformationBatch b = batch_of(batch(step));
-  const OffsetNet* offsets = step >= config_.skinning_steps ? offsets_ : nullptr;
+  const PairBatch pairs = batch(step);
   double distance = 0;
   const Differentiated d = differentiate(key_.fold(static_cast<uint64_t>(step)), [&](Context& ctx) {
-    const DeformationOutput out = deform(ctx, *weights_, offsets, b);
-    distance = mean_distance(out.posed.value, b.posed_points);
-    // Sum over the points of a pair, mean over pairs.
-    return scale(squared_distance_sum(out.posed, b.posed_points),
-                 1.0 / static_cast<double>(o.batch));
+    return loss(ctx, pairs, step, &distance);
   });
   const double rate = learning_rate(o.schedule, step, o.steps);
   adam_->step(d.gradients, rate, o.clip);
@@ -68,16 +98,22 @@ NamedValues DeformationStage::step(int64_t step) {
 NamedValues DeformationStage::validate() {
   Context ctx;
   double with = 0, without = 0;
+  std::array<double, kJoints> skin{}, kept{};
   const int64_t n = config_.validation_pairs, part = 4;
   for (int64_t i = 0; i < n; i += part) {
     const int64_t count = std::min(part, n - i);
-    const DeformationBatch b = batch_of(validation_sampler_.batch(i, count));
+    const PairBatch pairs = validation_sampler_.batch(i, count);
+    const DeformationBatch b = batch_of(pairs);
     const auto share = static_cast<double>(count) / static_cast<double>(n);
     with += share * mean_distance(deform(ctx, *weights_, offsets_, b).posed.value, b.posed_points);
-    without +=
-        share * mean_distance(deform(ctx, *weights_, nullptr, b).posed.value, b.posed_points);
+    const DeformationOutput plain = deform(ctx, *weights_, nullptr, b);
+    without += share * mean_distance(plain.posed.value, b.posed_points);
+    add_shared_skin(plain.weights.value, pairs.weights, &skin, &kept);
   }
-  NamedValues values{{"skinning_mm", 1e3 * without}};
+  double least = 1;
+  for (int j = 0; j < kJoints; ++j)
+    if (skin[j] > 0) least = std::min(least, kept[j] / skin[j]);
+  NamedValues values{{"skinning_mm", 1e3 * without}, {"least_skin_kept", least}};
   if (offsets_ != nullptr) values.push_back({"with_offsets_mm", 1e3 * with});
   return values;
 }

@@ -11,6 +11,9 @@ namespace restage {
 template <class V>
 void visit(V& v, PairConfig& c) {
   v("points", c.points, "points per pair", positive());
+  v("joint_noise", c.joint_noise, "Gaussian noise on the rest joints that the networks see, metres",
+    at_least(0));
+  v("dressed", c.dressed, "part of the pairs whose rest points are seen in clothes", between(0, 1));
   v("heading", c.heading, "turn poses by any angle about y");
   v("mirror", c.mirror, "every second pair mirrored");
   v("frame_step", c.frame_step, "only every so many frames of a motion (30: one a second)",
@@ -22,6 +25,7 @@ struct DeformationStageConfig {
   OptimiserConfig optimiser;
   PairConfig pairs;
   int64_t skinning_steps = 0;
+  double supervision = 0;
   bool offsets = true, keep_root_rotation = true;
   int64_t validation_pairs = 60;
 };
@@ -32,6 +36,9 @@ void visit(V& v, DeformationStageConfig& c) {
   v("optimiser", c.optimiser, "steps, batch, rate");
   v("pairs", c.pairs, "how training pairs are made");
   v("skinning_steps", c.skinning_steps, "first steps without offsets (the paper: one epoch)",
+    at_least(0));
+  v("supervision", c.supervision,
+    "weight of the cross-entropy against the data's skin weights; 0: distances alone (the paper)",
     at_least(0));
   v("offsets", c.offsets, "train pose-corrective offsets");
   v("keep_root_rotation", c.keep_root_rotation, "offsets see the root's rotation (false: zero)");
@@ -49,6 +56,7 @@ class DeformationStage final : public Stage {
  private:
   PairBatch batch(int64_t step) const;
   DeformationBatch batch_of(const PairBatch& pairs) const;
+  Var loss(Context& ctx, const PairBatch& pairs, int64_t step, double* distance) const;
 
   Config config_;
   DeformationModel* weights_;

@@ -27,6 +27,7 @@ CloudConfig held_out(CloudConfig c, const SkeletonModel& model) {
   c = with_points(c, model);
   c.mirror = false;
   c.scale_jitter = 0;
+  c.dressed = c.one_camera = c.camera_ring = c.recombined = 0;
   return c;
 }
 
@@ -42,7 +43,13 @@ SkeletonStage::SkeletonStage(const Config& config, const StageInput& in)
       validation_sampler_(in.validation, held_out(config.clouds, *model_), 1),
       posed_(evaluation_clouds(in.validation, static_cast<size_t>(config.validation_clouds), 1)),
       tposes_(evaluation_tposes(in.validation, 4, config.clouds.tpose_heading, 1)),
-      key_(RngKey{in.seed, 0}.fold("skeleton.step")) {}
+      key_(RngKey{in.seed, 0}.fold("skeleton.step")) {
+  const auto scans = [&](int cameras) {
+    return evaluation_scans(in.validation, posed_, cameras, static_cast<int>(model_->points()), 1);
+  };
+  if (config.clouds.one_camera > 0) one_camera_ = scans(1);
+  if (config.clouds.camera_ring > 0) ring_ = scans(6);
+}
 
 Var SkeletonStage::loss(Context& ctx, const CloudBatch& batch) const {
   const SkeletonOutput out = model_->forward(ctx, batch.points);
@@ -94,9 +101,15 @@ double joint_error(SkeletonModel& model, const CloudBatch& clouds) {
 }
 
 NamedValues SkeletonStage::validate() {
-  return {
-      {"joint_error_mm", 1e3 * joint_error(*model_, validation_sampler_.clouds(posed_))},
-      {"tpose_joint_error_mm", 1e3 * joint_error(*model_, validation_sampler_.clouds(tposes_))}};
+  NamedValues out;
+  const auto put = [&](const char* name, const CloudBatch& clouds) {
+    if (clouds.points.defined()) out.push_back({name, 1e3 * joint_error(*model_, clouds)});
+  };
+  put("joint_error_mm", validation_sampler_.clouds(posed_));
+  put("tpose_joint_error_mm", validation_sampler_.clouds(tposes_));
+  put("ring_joint_error_mm", ring_);
+  put("one_camera_joint_error_mm", one_camera_);
+  return out;
 }
 
 }  // namespace restage

@@ -17,6 +17,11 @@ void visit(V& v, CloudConfig& c) {
   v("tpose_heading", c.tpose_heading, "rest poses turn by up to this, degrees", between(0, 180));
   v("scale_jitter", c.scale_jitter, "bodies scaled by 1 +- this", below(0, 1));
   v("min_fraction", c.min_fraction, "least part of distinct points", between(0.05, 1));
+  v("recombined", c.recombined, "part in which a limb or the upper body performs another frame",
+    between(0, 1));
+  v("dressed", c.dressed, "part of the clouds in clothes and hair", between(0, 1));
+  v("one_camera", c.one_camera, "part of the clouds that one depth camera sees", between(0, 1));
+  v("camera_ring", c.camera_ring, "part that three to seven cameras around see", between(0, 1));
   v("frame_step", c.frame_step, "only every so many frames of a motion (30: one a second)",
     between(1, 100000));
 }
@@ -65,6 +70,7 @@ class SkeletonStage final : public Stage {
   Adam* adam_;
   CloudSampler sampler_, validation_sampler_;
   std::vector<CloudSubject> posed_, tposes_;
+  CloudBatch one_camera_, ring_;  ///< held-out scans by ray casting; undefined if not trained for
   RngKey key_;
 };
 

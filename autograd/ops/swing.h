@@ -1,0 +1,26 @@
+// Rotations that put a skeleton's bones where given joints are, and turn them about themselves.
+#pragma once
+
+#include "autograd/kernels/rotation.h"
+#include "autograd/tape/tape.h"
+
+namespace restage {
+
+/// Rest joints, posed joints and a twist about each posed bone (radians) -> local rotations
+/// [n, j, 3, 3]. With twists of zero this is the closed form of retargeting. Which joint turns how
+/// is said by `joints` (kernels/rotation.h).
+struct SwingTwist {
+  static constexpr const char* name = "swing_twist";
+  static constexpr const char* letters = "rest[n, j, 3], posed[n, j, 3], twist[n, j]";
+  std::span<const SwingJoint> joints;  ///< parents come before children. Outlives the tape
+  void check(Inputs x) const;
+  Tensor forward(Inputs x, Saved& saved) const;
+  Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
+};
+
+inline Var swing_twist(const Var& rest, const Var& posed, const Var& twist,
+                       std::span<const SwingJoint> joints) {
+  return call(SwingTwist{joints}, {rest, posed, twist});
+}
+
+}  // namespace restage

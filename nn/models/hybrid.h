@@ -1,0 +1,45 @@
+// `smrm/hybrid`: geometry does what it can, the network the rest.
+//
+// SMRM (spec 3) has to learn the identity before it can be of use: fed with true skeletons it is
+// worse than the closed form of them, and than copying (docs/method.md, "Past SMRM"). Here the same
+// recurrent layers give, per frame, a correction of A's joints, the twist about each bone, and the
+// rotations of head, hands and feet; all other rotations are the closed form of the corrected
+// joints on B's rest joints, inside the tape. Before training that is the closed form itself.
+#pragma once
+
+#include "nn/config/rules.h"
+#include "nn/layers/gru.h"
+#include "nn/layers/linear.h"
+#include "nn/models/motion.h"
+
+namespace restage {
+
+struct HybridConfig {
+  int64_t hidden = 256;
+  int layers = 2;
+  double dropout = 0;
+};
+
+template <class V>
+void visit(V& v, HybridConfig& c) {
+  v("hidden", c.hidden, "size of the hidden states", between(1, kMostWidth));
+  v("dropout", c.dropout, "between the layers", below(0, 1));
+}
+
+/// The state is {encoder, decoder}, both [layers, n, hidden].
+struct Hybrid final : MotionModel {
+  using Config = HybridConfig;
+  Hybrid(const HybridConfig& c, const Init& init);
+  MotionOutput forward(Context& ctx, const Var& joints, const Var& trans, const Var& rest,
+                       MotionState* state) const override;
+  void standardise(const MotionStatistics& statistics) override;
+  void visit(Fields& f) override;
+  const char* kind() const override { return "Hybrid"; }
+
+  HybridConfig config;
+  GruLayer enc, dec;
+  Linear correction, twist, leaves, path;  ///< all near none at the start
+  MotionStatistics units;                  ///< all but `sixd`
+};
+
+}  // namespace restage

@@ -1,0 +1,51 @@
+#include "nn/models/motion.h"
+
+#include <array>
+
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+#include "autograd/ops/reduce.h"
+#include "autograd/ops/rotation.h"
+
+namespace restage {
+
+std::span<const SwingJoint> joint_swings() {
+  static const std::vector<SwingJoint> table = [] {
+    std::vector<SwingJoint> out(kJoints);
+    for (int j = kJoints - 1; j >= 0; --j) {
+      out[j].parent = kParents[j];
+      if (kParents[j] >= 0) out[kParents[j]].child = j;  // in the end the first one
+    }
+    out[0] = {-1, 3, 1, 2};    // spine1, left hip, right hip
+    out[9] = {6, 12, 13, 14};  // spine3: neck, left collar, right collar
+    return out;
+  }();
+  return table;
+}
+
+Var in_units(const Var& x, const MotionStatistics::Columns& of) {
+  return (x - Var(of.mean)) / Var(of.deviation);
+}
+
+Var rest_of_each_frame(const Var& rest, int64_t frames) {
+  const int64_t n = rest.size(0);
+  return reshape(expand(reshape(rest, {n, 1, kJoints, 3}), {n, frames, kJoints, 3}),
+                 {n * frames, kJoints, 3});
+}
+
+Var leg_lengths(const Var& joints) {
+  const Var hips = slice(joints, 1, 1, 3), knees = slice(joints, 1, 4, 6),
+            ankles = slice(joints, 1, 7, 9);
+  const auto lengths = [](const Var& d) { return sqrt(add_scalar(sum(square(d), -1), 1e-20)); };
+  return mean(lengths(hips - knees) + lengths(knees - ankles), 1);
+}
+
+void put_pose(const Var& local, const Var& rest_rows, int64_t n, MotionOutput* out) {
+  const int64_t t = local.size(0) / std::max<int64_t>(1, n);
+  const Tensor origin = Tensor::zeros({n * t, 3}, local.dtype());
+  const Var posed = forward_kinematics(local, rest_rows, origin, joint_parents());
+  out->rotations = reshape(local, {n, t, kJoints, 3, 3});
+  out->joints = reshape(joints_of(posed), {n, t, kJoints, 3});
+}
+
+}  // namespace restage
