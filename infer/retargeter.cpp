@@ -76,7 +76,7 @@ Retargeter::Retargeter(const Bundle& weights, const std::string& weights_name, M
   auto& skeleton = models_.need_as<SkeletonModel>("skeleton", weights_name);
   const RngKey key = RngKey{options.seed, 0}.fold("target");
   rest_ = extract_joints(skeleton, surface_points(target_, kTargetPoints, key.fold("surface")),
-                         where, key, kTargetSamples);
+                         where, key, kTargetSamples, kRestPoses);
   if (!options.force) require_tpose(rest_, where);
   prepare(weights_name);
 }

@@ -5,9 +5,9 @@
 #include <optional>
 #include <span>
 
-#include "infer/extraction.h"
 #include "infer/surface.h"
 #include "infer/system.h"
+#include "nn/models/extraction.h"
 #include "nn/models/motion.h"
 #include "nn/weights/bundle.h"
 

@@ -122,32 +122,44 @@ CloudSampler::Drawn CloudSampler::draw(const CloudSubject& subject, const Surfac
   return out;
 }
 
+CloudSampler::Seen CloudSampler::see(const CloudSubject& subject, size_t n, const RngKey& scene,
+                                     const RngKey& key) const {
+  Seen out;
+  out.samples = surfaces_[subject.body].draw(key.fold("surface"), candidates(subject.sensor, n));
+  Drawn drawn = draw(subject, out.samples, scene.fold("outfit"));
+  out.joints = drawn.joints;
+  out.points = std::move(drawn.points);
+  out.which.resize(out.points.size());
+  std::iota(out.which.begin(), out.which.end(), size_t{0});
+  if (subject.sensor != Sensor::none)
+    out.points = sensed(subject.sensor, out.points, drawn.normals, n, scene.fold("cameras"),
+                        key.fold("sensor"), &out.which);
+  add_noise(key.fold("noise"), config_.noise, out.points);
+  return out;
+}
+
+Points CloudSampler::cloud(const CloudSubject& subject, size_t n, const RngKey& scene,
+                           const RngKey& key) const {
+  return see(subject, n, scene, key).points;
+}
+
 void CloudSampler::fill(const CloudSubject& subject, const RngKey& key, float* points,
                         float* joints, float* weights) const {
   const auto n = static_cast<size_t>(config_.points);
   Rng rng(key.fold("count"));
   const auto least = static_cast<size_t>(std::ceil(config_.min_fraction * config_.points));
-  const size_t wanted = least + rng.below(n - least + 1);
-  const SurfaceSamples samples =
-      surfaces_[subject.body].draw(key.fold("surface"), candidates(subject.sensor, wanted));
-  Drawn drawn = draw(subject, samples, key.fold("outfit"));
-  std::vector<size_t> which(drawn.points.size());  // of the samples, each point is
-  std::iota(which.begin(), which.end(), size_t{0});
-  if (subject.sensor != Sensor::none)
-    drawn.points =
-        sensed(subject.sensor, drawn.points, drawn.normals, wanted, key.fold("sensor"), &which);
-  add_noise(key.fold("noise"), config_.noise, drawn.points);
-  const std::vector<size_t> order = repeat_some(key.fold("repeat"), drawn.points.size(), n);
+  const Seen seen = see(subject, least + rng.below(n - least + 1), key, key);
+  const std::vector<size_t> order = repeat_some(key.fold("repeat"), seen.points.size(), n);
   Points chosen;
-  for (const size_t i : order) chosen.push_back(drawn.points[i]);
+  for (const size_t i : order) chosen.push_back(seen.points[i]);
 
   const Point centre = centroid(chosen);
   for (size_t i = 0; i < n; ++i) Eigen::Map<Point>(points + 3 * i) = chosen[i] - centre;
   for (size_t i = 0; weights != nullptr && i < n; ++i)
-    samples.skin_weights(corpus_.bodies[subject.body], which[order[i]], subject.augmentation.mirror,
-                         weights + i * kJoints);
+    seen.samples.skin_weights(corpus_.bodies[subject.body], seen.which[order[i]],
+                              subject.augmentation.mirror, weights + i * kJoints);
   for (int j = 0; j < kJoints; ++j)
-    Eigen::Map<Point>(joints + 3 * j) = (drawn.joints[j] - centre.cast<double>()).cast<float>();
+    Eigen::Map<Point>(joints + 3 * j) = (seen.joints[j] - centre.cast<double>()).cast<float>();
 }
 
 CloudBatch CloudSampler::make(int64_t first, int64_t n,

@@ -60,6 +60,9 @@ class CloudSampler {
   /// The clouds of given subjects, the i-th with the noise and points of sample i.
   CloudBatch clouds(const std::vector<CloudSubject>& subjects) const;
   Pose pose(const CloudSubject& subject) const;
+  /// At most `n` points in the world. Clothes and cameras are functions of `scene`, which the
+  /// frames of a sequence share, all else of `key`.
+  Points cloud(const CloudSubject& subject, size_t n, const RngKey& scene, const RngKey& key) const;
 
  private:
   /// Points of a surface, and their normals where clothes or sensors need them, turned, mirrored
@@ -69,6 +72,14 @@ class CloudSampler {
     Joints joints;
   };
   Drawn draw(const CloudSubject& subject, const SurfaceSamples& samples, const RngKey& key) const;
+  /// What a sensor sees of it; which of the samples each point is.
+  struct Seen {
+    SurfaceSamples samples;
+    std::vector<size_t> which;
+    Points points;
+    Joints joints;
+  };
+  Seen see(const CloudSubject& subject, size_t n, const RngKey& scene, const RngKey& key) const;
   /// `weights` may be null.
   void fill(const CloudSubject& subject, const RngKey& key, float* points, float* joints,
             float* weights) const;

@@ -105,19 +105,19 @@ size_t candidates(Sensor sensor, size_t n) {
 }
 
 Points sensed(Sensor sensor, const Points& points, const Points& normals, size_t n,
-              const RngKey& key, std::vector<size_t>* which) {
-  Rng rng(key);
+              const RngKey& camera_key, const RngKey& key, std::vector<size_t>* which) {
+  Rng rng(key), camera_rng(camera_key);
   std::vector<float> seen(points.size(), sensor == Sensor::none ? 1.0f : 0.0f);
   const std::vector<Camera> cameras =
-      sensor == Sensor::none ? std::vector<Camera>{} : draw_cameras(sensor, rng);
+      sensor == Sensor::none ? std::vector<Camera>{} : draw_cameras(sensor, camera_rng);
   for (const Camera& camera : cameras) look(camera, points, normals, &seen);
   if (!cameras.empty()) lose_part(points, rng, &seen);
   *which = draw(seen, n, rng);
   Points out;
   for (const size_t i : *which) out.push_back(points[i]);
   if (cameras.empty()) return out;
-  const double along = rng.uniform(0, 0.008), mixed = rng.uniform(0, 0.03),
-               outliers = rng.uniform(0, 0.01);
+  const double along = camera_rng.uniform(0, 0.008), mixed = camera_rng.uniform(0, 0.03),
+               outliers = camera_rng.uniform(0, 0.01);
   const Box box = box_of(out);
   for (Point& p : out) {
     const Camera& camera = cameras[rng.below(cameras.size())];

@@ -126,11 +126,21 @@ WindowBatch make_batch(int64_t n, int64_t t, bool truth) {
 
 }  // namespace
 
-WindowSampler::WindowSampler(const Corpus& corpus, const WindowConfig& config, uint64_t seed)
+WindowSampler::WindowSampler(const Corpus& corpus, const WindowConfig& config, uint64_t seed,
+                             const std::vector<JointTrack>* tracks)
     : corpus_(corpus),
       config_(checked(config)),
       key_(RngKey{seed, 0}.fold("windows")),
-      frames_(corpus.motions, static_cast<size_t>(config.frames)) {
+      frames_(corpus.motions, static_cast<size_t>(config.frames)),
+      tracks_(tracks) {
+  if (tracks != nullptr)
+    check_setting("window",
+                  !tracks->empty() && std::all_of(tracks->begin(), tracks->end(),
+                                                  [&](const JointTrack& track) {
+                                                    return std::ssize(track.joints) >=
+                                                           config.frames;
+                                                  }),
+                  "frames", "at most those of the answers' sequences");
   if (corpus.bodies.empty()) throw InputError("", "no bodies to draw windows from", "add bodies");
   if (corpus.bodies.size() == 1 && config_.self_share < 1)
     throw InputError("",
@@ -153,10 +163,18 @@ WindowSubject WindowSampler::subject(int64_t index) const {
   WindowSubject out;
   out.self = rng.uniform() < config_.self_share;
   out.body_a = rng.below(bodies);
+  if (tracks_ != nullptr) {
+    out.track = &(*tracks_)[rng.below(tracks_->size())];
+    out.body_a = out.track->body;
+  }
   // Any other body: skip over A.
   const size_t other = bodies > 1 ? rng.below(bodies - 1) : 0;
   out.body_b = out.self ? out.body_a : other + (other >= out.body_a ? 1 : 0);
   out.clip = place(rng);
+  if (out.track != nullptr) {
+    const auto later = out.track->joints.size() - static_cast<size_t>(config_.frames) + 1;
+    out.clip = {out.track->motion, out.track->first + rng.below(later)};
+  }
   out.real = place(rng);
   out.augmentation = draw_augmentation(rng, config_.heading ? M_PI : 0.0, config_.mirror);
   // B is one body in one sample, so its real window is mirrored with it.
@@ -172,9 +190,11 @@ void WindowSampler::fill(WindowBatch& batch, int64_t row, int64_t index) const {
   const Window a = perform(body_a, clip, s.clip.frame, config_.frames, s.augmentation);
   const Window real = perform(body_b, corpus_.motions[s.real.motion], s.real.frame, config_.frames,
                               s.real_augmentation);
-  const std::vector<Joints> seen =
-      noisy(a.joints, key_.fold(static_cast<uint64_t>(index)).fold("noise"), config_.noise,
-            config_.noise_correlation);
+  std::vector<Joints> seen = a.joints;
+  for (size_t t = 0; s.track != nullptr && t < seen.size(); ++t)
+    seen[t] = augmented(s.augmentation, s.track->joints[s.clip.frame - s.track->first + t]);
+  seen = noisy(seen, key_.fold(static_cast<uint64_t>(index)).fold("noise"), config_.noise,
+               config_.noise_correlation);
   std::vector<Vec3> path = a.path(), seen_path = path;
   if (config_.noisy_translation)
     for (size_t t = 0; t < path.size(); ++t) seen_path[t] = seen[t][0];

@@ -10,6 +10,7 @@
 #include "datasets/corpus.h"
 #include "datasets/sampling/augment.h"
 #include "datasets/sampling/frames.h"
+#include "datasets/sampling/tracks.h"
 
 namespace restage {
 
@@ -61,14 +62,18 @@ struct WindowBatch {
 struct WindowSubject {
   size_t body_a = 0, body_b = 0;
   bool self = false;
-  FrameRef clip, real;  ///< first frames of A's window and of B's own
+  FrameRef clip, real;                ///< first frames of A's window and of B's own
+  const JointTrack* track = nullptr;  ///< of A, if it was seen
   Augmentation augmentation, real_augmentation;
 };
 
 class WindowSampler {
  public:
   /// Keeps a reference to `corpus`. InputError: settings out of range, no motion of that length.
-  WindowSampler(const Corpus& corpus, const WindowConfig& config, uint64_t seed);
+  /// With `tracks` (kept by reference), A performs parts of them and is seen as they say, every
+  /// track as likely. InputError also if one is shorter than a window.
+  WindowSampler(const Corpus& corpus, const WindowConfig& config, uint64_t seed,
+                const std::vector<JointTrack>* tracks = nullptr);
 
   /// Samples number first ... first + n - 1. Sample i is a function of (corpus, config, seed, i).
   WindowBatch batch(int64_t first, int64_t n) const;
@@ -84,6 +89,7 @@ class WindowSampler {
   WindowConfig config_;
   RngKey key_;
   FrameIndex frames_;
+  const std::vector<JointTrack>* tracks_;
 };
 
 }  // namespace restage

@@ -8,7 +8,7 @@
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
-#include "infer/extraction.h"
+#include "nn/models/extraction.h"
 #include "nn/weights/bundle.h"
 
 namespace restage::cli {

@@ -7,8 +7,8 @@
 
 #include "autograd/base/error.h"
 #include "autograd/base/parallel_each.h"
-#include "infer/extraction.h"
 #include "nn/geometry/closed_form.h"
+#include "nn/models/extraction.h"
 
 namespace restage {
 namespace {

@@ -10,6 +10,13 @@
 namespace restage {
 namespace {
 
+/// Errors of x, whose last axis holds `width` numbers that belong together.
+Var errors(const Var& x, MotionDistance measure, int64_t width = 3) {
+  if (measure == MotionDistance::mse) return square(x);
+  const Var rows = reshape(x, {x.size(0), x.value.numel() / (x.size(0) * width), width});
+  return sqrt(add_scalar(sum(square(rows), -1), 1e-10));
+}
+
 /// Mean of x over everything but axis 0.
 Var per_sample(const Var& x) { return mean(reshape(x, {x.size(0), -1}), 1); }
 
@@ -31,10 +38,19 @@ Tensor complement(const Tensor& mask) {
   return Tensor::from<double>(mask.shape(), out).cast(mask.dtype());
 }
 
+/// Cycle, rotation and smoothness of a motion that ought to be A's.
+void put_reconstruction(const MotionOutput& to_a, const MotionBatch& b, const MotionWeights& w,
+                        MotionLosses* out) {
+  const auto apart = [&](const Var& x, const Var& y) { return mean_all(errors(x - y, w.measure)); };
+  out->cycle = apart(to_a.joints, b.joints) + scale(apart(to_a.trans, b.true_trans), w.translation);
+  out->rotation = rotation_loss(to_a.rotations, b.sixd, w.measure);
+  out->smoothness = apart(differences(to_a.joints), differences(b.joints));
+}
+
 }  // namespace
 
-Var rotation_loss(const Var& rotations, const Var& sixd) {
-  return mse(reshape(matrix_to_sixd(rotations), sixd.shape()), sixd);
+Var rotation_loss(const Var& rotations, const Var& sixd, MotionDistance measure) {
+  return mean_all(errors(reshape(matrix_to_sixd(rotations), sixd.shape()) - sixd, measure, 6));
 }
 
 Var twist_loss(const Var& rotations) {
@@ -54,14 +70,12 @@ MotionLosses motion_losses(Context& ctx, const MotionModel& net, Discriminator* 
   const MotionOutput to_a = net.forward(ctx, to_b.joints, to_b.trans, b.rest_a, &back);
   out.joints_b = to_b.joints;
   out.trans_b = to_b.trans;
-  out.cycle = mse(to_a.joints, b.joints) + mse(to_a.trans, b.true_trans);
-  out.rotation = rotation_loss(to_a.rotations, b.sixd);
-  out.smoothness = mse(differences(to_a.joints), differences(b.joints));
-  Var self =
-      per_sample(square(to_b.joints - b.joints)) + per_sample(square(to_b.trans - b.true_trans));
+  put_reconstruction(to_a, b, w, &out);
+  Var self = per_sample(errors(to_b.joints - b.joints, w.measure)) +
+             scale(per_sample(errors(to_b.trans - b.true_trans, w.measure)), w.translation);
   if (w.self_rotation > 0) {
     const Var d = reshape(matrix_to_sixd(to_b.rotations), b.sixd.shape()) - b.sixd;
-    self = self + scale(per_sample(square(d)), w.self_rotation);
+    self = self + scale(per_sample(errors(d, w.measure, 6)), w.self_rotation);
   }
   out.self = masked_mean(self, b.self_mask);
   out.total = scale(out.cycle, w.cycle) + scale(out.rotation, w.rotation) +
@@ -87,9 +101,7 @@ MotionLosses self_losses(Context& ctx, const MotionModel& net, const MotionBatch
   const MotionOutput to_a = net.forward(ctx, b.input, b.trans, b.rest_a, &state);
   out.joints_b = to_a.joints;
   out.trans_b = to_a.trans;
-  out.cycle = mse(to_a.joints, b.joints) + mse(to_a.trans, b.true_trans);
-  out.rotation = rotation_loss(to_a.rotations, b.sixd);
-  out.smoothness = mse(differences(to_a.joints), differences(b.joints));
+  put_reconstruction(to_a, b, w, &out);
   out.self = out.cycle + scale(out.rotation, w.rotation) + scale(out.smoothness, w.smoothness);
   out.total = scale(out.self, w.self);
   return out;

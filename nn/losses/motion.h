@@ -6,10 +6,17 @@
 
 namespace restage {
 
+/// How far two motions are apart: means of squares (the papers), or of distances, which weigh an
+/// error of 5 cm ten times as much as one of 5 mm and not a hundred times (docs/method.md, "Past
+/// SMRM").
+enum class MotionDistance { mse, distance };
+
 struct MotionWeights {
   double cycle = 1, adversarial = 1, rotation = 0.01, smoothness = 0.1, self = 1;
   double self_rotation = 0;  ///< rotation loss also on the first pass of self samples
+  double translation = 1;    ///< of the translation beside the joints, in cycle and self
   double twist = 0;          ///< NKN's twist loss (spec 4.3)
+  MotionDistance measure = MotionDistance::mse;
 };
 
 /// One batch: motions of A, skeletons of both. Shapes as in MotionModel; self_mask [n] is 1 where B
@@ -48,8 +55,10 @@ DiscriminatorLosses discriminator_losses(Context& ctx, Discriminator& net, const
                                          const Var& fake_rest);
 
 /// Mean of (6D(predicted) - target)^2 over all numbers, 6D the first two columns of the matrices
-/// (Q5). Quaternion networks are compared as matrices too, which needs no choice of sign (Q6).
-Var rotation_loss(const Var& rotations, const Var& sixd);
+/// (Q5), or of the lengths of each joint's six differences. Quaternion networks are compared as
+/// matrices too, which needs no choice of sign (Q6).
+Var rotation_loss(const Var& rotations, const Var& sixd,
+                  MotionDistance measure = MotionDistance::mse);
 
 /// Mean of max(0, |e| - 100 degrees)^2 over joints 1 ... of rotations [n, t, j, 3, 3], with
 /// e = atan2(-R20, R00) the angle about y for the order y-z-x (spec 4.3), as NKN.

@@ -23,9 +23,13 @@ struct FixedExtractor final : SkeletonModel {
   SkeletonOutput forward(Context&, const Var& cloud) override {
     const int64_t n = cloud.size(0);
     Tensor out = Tensor::empty({n, kJoints, 3});
-    for (int64_t i = 0; i < 3 * n * kJoints; ++i)
-      out.data<float>()[i] =
-          static_cast<float>(joints[static_cast<size_t>(i / 3 % kJoints)][i % 3]);
+    for (int64_t i = 0; i < n * kJoints; ++i) {
+      const int j = static_cast<int>(i % kJoints);
+      const bool mirrored = i / kJoints % 2 == 1;  // every second view is
+      Point p = joints[mirrored ? kMirror[j] : j].cast<float>();
+      if (mirrored) p.x() = -p.x();
+      Eigen::Map<Point>(out.data<float>() + 3 * i) = p;
+    }
     SkeletonOutput result;
     result.joints = Var(out);
     return result;

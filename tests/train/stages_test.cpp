@@ -153,6 +153,55 @@ TEST(TrainStages, ReadingHasNoState) {
   }
 }
 
+/// A motion stage that asks an extractor, as steps and validation leave it.
+std::string asked(const TrainConfig& config) {
+  Bundle so_far;
+  so_far.add(tiny_stage("skeleton", config)->result());
+  const auto stage = make_stage(config, "motion", testing::tiny_data(), &so_far);
+  for (int64_t i = 0; i < 3; ++i) stage->step(i);
+  return bytes_of(*stage) + std::to_string(value_of(stage->validate(), "pa_mpjpe"));
+}
+
+TEST(TrainStages, MotionLearnsFromWhatTheExtractorAnswers) {
+  TrainConfig c = tiny_training(6);
+  motion(c).answers.tracks.sequences = 4;
+  motion(c).answers.tracks.frames = 16;
+  motion(c).answers.tracks.clouds.one_camera = 0.5;
+  motion(c).answers.views = 2;
+  motion(c).paired_share = 0.5;
+  motion(c).self_first_pass = true;
+  testing::choose(motion(c).model, "smrm/hybrid", {"hidden=16"});
+  motion(c).weights.measure = MotionDistance::distance;
+  std::string first;
+  for (const int n : {1, 2, 3}) {
+    const testing::UseThreads use(n);
+    if (n == 1) first = asked(c);
+    EXPECT_TRUE(asked(c) == first) << n << " threads";
+  }
+  motion(c).answers.views = 1;
+  EXPECT_FALSE(asked(c) == first);
+  EXPECT_EQ(stage_type("motion").reads(c.section("motion").config),
+            std::vector<std::string>{"skeleton"});
+  c.stages = {"motion"};
+  EXPECT_HAS(test::refusal_of([&] { tiny_stage("motion", c); }), "needs what 'skeleton' leaves");
+}
+
+TEST(TrainStages, SupervisedSkinningKeepsEveryJointsSkin) {
+  double lost[2];
+  for (const bool supervised : {false, true}) {
+    TrainConfig c = tiny_training(60);
+    testing::choose(deformation(c).model, "deformation/bones",
+                    {"width=64", "dropout=0", "small_start=true"});
+    deformation(c).supervision = supervised ? 0.05 : 0;
+    deformation(c).pairs.joint_noise = 0.005;
+    deformation(c).pairs.dressed = 0.5;
+    const auto stage = tiny_stage("deformation", c);
+    for (int64_t i = 0; i < 60; ++i) stage->step(i);
+    lost[supervised] = value_of(stage->validate(), "skin_lost");
+  }
+  EXPECT_LT(lost[true], 0.8 * lost[false]);
+}
+
 TEST(TrainStages, StateOfAnotherStageIsRefused) {
   for (const std::string name : kStageNames) {
     const auto stage = tiny_stage(name, tiny_training(2));

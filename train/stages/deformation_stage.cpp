@@ -110,10 +110,10 @@ NamedValues DeformationStage::validate() {
     without += share * mean_distance(plain.posed.value, b.posed_points);
     add_shared_skin(plain.weights.value, pairs.weights, &skin, &kept);
   }
-  double least = 1;
+  double lost = 0;  // by the joint that loses most
   for (int j = 0; j < kJoints; ++j)
-    if (skin[j] > 0) least = std::min(least, kept[j] / skin[j]);
-  NamedValues values{{"skinning_mm", 1e3 * without}, {"least_skin_kept", least}};
+    if (skin[j] > 0) lost = std::max(lost, 1 - kept[j] / skin[j]);
+  NamedValues values{{"skinning_mm", 1e3 * without}, {"skin_lost", lost}};
   if (offsets_ != nullptr) values.push_back({"with_offsets_mm", 1e3 * with});
   return values;
 }

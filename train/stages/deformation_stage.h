@@ -48,6 +48,7 @@ void visit(V& v, DeformationStageConfig& c) {
 class DeformationStage final : public Stage {
  public:
   using Config = DeformationStageConfig;
+  static std::vector<std::string> reads(const Config&) { return {}; }
   DeformationStage(const Config& config, const StageInput& input);
   NamedValues step(int64_t step) override;
   void read(int64_t step) const override { batch(step); }

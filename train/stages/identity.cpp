@@ -80,7 +80,8 @@ std::vector<StageId> Identities::stages(const TrainConfig& config) {
       json["init"] = weights(*section.init);
       json["init_names"] = section.init_names;
     }
-    for (const std::string& read : stage_type(name).reads) json["reads"][read] = left[read];
+    for (const std::string& read : stage_type(name).reads(section.config))
+      json["reads"][read] = left[read];
     left[name] = short_id(json.dump());
     out.push_back({name, left[name], json.dump()});
   }

@@ -2,8 +2,10 @@
 
 #include <cmath>
 
+#include "autograd/base/log.h"
 #include "autograd/ops/elementwise.h"
 #include "nn/metrics/metrics.h"
+#include "nn/models/extraction.h"
 
 namespace restage {
 namespace {
@@ -33,13 +35,35 @@ WindowConfig cycle_windows(const MotionStageConfig& c) {
 }
 WindowConfig self_windows(const MotionStageConfig& c) {
   WindowConfig w = c.windows;
-  w.self_share = 1;
+  w.self_share = 1 - c.paired_share;
+  w.truth = c.paired_share > 0;
   return w;
 }
 
 MotionBatch motion_batch(const WindowBatch& w) {
   return {w.joints_a, w.input_a, w.trans_a, w.input_trans_a,
           w.rest_a,   w.rest_b,  w.sixd_a,  w.self_mask};
+}
+
+/// One pass whose answer is known: of A itself, or of B.
+MotionBatch supervised_batch(const WindowBatch& w) {
+  if (!w.truth_b.defined()) return motion_batch(w);
+  return {w.truth_b, w.input_a, w.truth_trans_b, w.input_trans_a,
+          w.rest_b,  w.rest_b,  w.truth_sixd_b,  w.self_mask};
+}
+
+/// What the skeleton stage's network answers to clouds of a corpus; empty if it is not asked.
+std::vector<JointTrack> ask(const Corpus& corpus, const AnswersConfig& config, int64_t sequences,
+                            const Bundle& given, uint64_t seed) {
+  if (config.tracks.sequences == 0) return {};
+  const std::string where = "the skeleton stage";
+  JointExtractor extractor(given.need_as<SkeletonModel>("skeleton", where), config.views);
+  TrackConfig tracks = config.tracks;
+  tracks.sequences = sequences;
+  log_info("motion: the extractor is asked about " + std::to_string(sequences) + " sequences");
+  return make_tracks(corpus, tracks, seed, [&](const Points& cloud, const RngKey& key) {
+    return extractor(cloud, where, key);
+  });
 }
 
 /// Mean and deviation per column of rows of width n; deviations are at least `least`.
@@ -65,6 +89,31 @@ MotionStatistics::Columns columns(const std::vector<Tensor>& parts, int64_t n, d
 
 }  // namespace
 
+struct MotionStage::Windows {
+  Windows(const MotionStage& s)
+      : seen(ask(s.train_, s.config_.answers, s.config_.answers.tracks.sequences, s.given_,
+                 RngKey{s.seed_, 0}.fold("motion.answers").stream)),
+        held_out_seen(
+            ask(s.validation_, s.config_.answers, s.config_.validation_windows, s.given_, 1)),
+        cycle(s.train_, cycle_windows(s.config_), stream(s, "motion.windows"), tracks(seen)),
+        self(s.train_, self_windows(s.config_), stream(s, "motion.self"), tracks(seen)),
+        validation(s.validation_, held_out(s.config_.windows, s.config_.validation_frames), 1,
+                   tracks(held_out_seen)) {}
+  static uint64_t stream(const MotionStage& s, const char* name) {
+    return RngKey{s.seed_, 0}.fold(name).stream;
+  }
+  static const std::vector<JointTrack>* tracks(const std::vector<JointTrack>& of) {
+    return of.empty() ? nullptr : &of;
+  }
+  const std::vector<JointTrack> seen, held_out_seen;
+  const WindowSampler cycle, self, validation;
+};
+
+std::vector<std::string> MotionStage::reads(const Config& config) {
+  if (config.answers.tracks.sequences == 0) return {};
+  return {"skeleton"};
+}
+
 MotionStage::MotionStage(const Config& config, const StageInput& in)
     : Stage("motion", config.optimiser),
       config_(config),
@@ -76,17 +125,26 @@ MotionStage::MotionStage(const Config& config, const StageInput& in)
       adam_(add_optimiser("adam", {"motion"}, config.optimiser.adam)),
       discriminator_adam_(
           add_optimiser("discriminator_adam", {"discriminator"}, config.discriminator_adam)),
-      sampler_(in.train, cycle_windows(config), RngKey{in.seed, 0}.fold("motion.windows").stream),
-      self_sampler_(in.train, self_windows(config), RngKey{in.seed, 0}.fold("motion.self").stream),
-      validation_sampler_(in.validation, held_out(config.windows, config.validation_frames), 1),
+      train_(in.train),
+      validation_(in.validation),
+      seed_(in.seed),
+      given_(in.given),
       key_(RngKey{in.seed, 0}.fold("motion.step")) {
+  if (config.answers.tracks.sequences == 0) windows();  // what is wrong with them is said at once
   model_->standardise(statistics());
+}
+
+const MotionStage::Windows& MotionStage::windows() const {
+  std::call_once(asked_, [&] { windows_ = std::make_shared<const Windows>(*this); });
+  return *windows_;
 }
 
 MotionStatistics MotionStage::statistics() const {
   std::vector<Tensor> joints, rest, trans, rotations;
+  const WindowSampler sampler(train_, cycle_windows(config_),
+                              RngKey{seed_, 0}.fold("motion.windows").stream);
   for (int64_t i = 0; i < 32; ++i) {
-    const WindowBatch b = sampler_.batch(i * 16, 16);
+    const WindowBatch b = sampler.batch(i * 16, 16);
     joints.push_back(b.joints_a);
     rest.push_back(b.rest_a);
     trans.push_back(b.trans_a);
@@ -123,8 +181,8 @@ MotionStage::Batch MotionStage::batch(int64_t step) const {
   if (config_.self_first_pass)
     out.self = std::llround(config_.windows.self_share * static_cast<double>(n));
   out.cycle = n - out.self;
-  if (out.cycle > 0) out.windows = sampler_.batch(step * out.cycle, out.cycle);
-  if (out.self > 0) out.own = self_sampler_.batch(step * out.self, out.self);
+  if (out.cycle > 0) out.windows = windows().cycle.batch(step * out.cycle, out.cycle);
+  if (out.self > 0) out.own = windows().self.batch(step * out.self, out.self);
   return out;
 }
 
@@ -141,7 +199,7 @@ NamedValues MotionStage::step(int64_t step) {
   const Differentiated d = differentiate(key_.fold(static_cast<uint64_t>(step)), [&](Context& ctx) {
     Var total;
     if (self > 0) {
-      s = self_losses(ctx, *model_, motion_batch(b.own), config_.weights);
+      s = self_losses(ctx, *model_, supervised_batch(b.own), config_.weights);
       total = scale(s.total, self_part);
     }
     if (cycle > 0) {
@@ -175,7 +233,7 @@ NamedValues MotionStage::validate() {
   const int64_t n = config_.validation_windows, frames = config_.validation_frames;
   for (int64_t i = 0; i < n; i += 16) {
     const int64_t count = std::min<int64_t>(16, n - i);
-    const WindowBatch b = validation_sampler_.batch(i, count);
+    const WindowBatch b = windows().validation.batch(i, count);
     MotionState forth, back;
     const MotionOutput to_b = model_->forward(ctx, b.input_a, b.trans_a, b.rest_b, &forth);
     const MotionOutput to_a = model_->forward(ctx, to_b.joints, to_b.trans, b.rest_a, &back);

@@ -2,12 +2,18 @@
 // (spec 4; the paper's second stage).
 #pragma once
 
+#include <mutex>
+
 #include "datasets/sampling/windows.h"
 #include "nn/losses/motion.h"
 #include "train/stage.h"
 #include "train/stages/stage_input.h"
 
 namespace restage {
+
+inline EnumNames<MotionDistance> config_names(MotionDistance) {
+  return {{"mse", MotionDistance::mse}, {"distance", MotionDistance::distance}};
+}
 
 template <class V>
 void visit(V& v, MotionWeights& c) {
@@ -18,7 +24,10 @@ void visit(V& v, MotionWeights& c) {
   v("smoothness", c.smoothness, "frame differences after A -> B -> A", at_least(0));
   v("self", c.self, "reconstruction of self samples", at_least(0));
   v("self_rotation", c.self_rotation, "rotations of self samples against the data's", at_least(0));
+  v("translation", c.translation, "the translation beside the joints, in cycle and self",
+    at_least(0));
   v("twist", c.twist, "NKN's twist limit", at_least(0));
+  v("measure", c.measure, "mse (the papers) or distance: metres in the place of their squares");
 }
 
 inline EnumNames<Translation> config_names(Translation) {
@@ -41,6 +50,28 @@ void visit(V& v, WindowConfig& c) {
   v("remove_heading", c.remove_heading, "turn every frame to face +z before the network");
 }
 
+/// What an extractor answers, as the input of training windows.
+struct AnswersConfig {
+  TrackConfig tracks;
+  int views = 4;
+};
+
+template <class V>
+void visit(V& v, AnswersConfig& c) {
+  v("sequences", c.tracks.sequences,
+    "performances that the skeleton stage's network is asked about; 0: true joints, with noise",
+    at_least(0));
+  v("frames", c.tracks.frames, "frames of each", at_least(2));
+  v("views", c.views, "of each cloud, as retarget --samples", between(1, 256));
+  v("noise", c.tracks.clouds.noise, "Gaussian noise per coordinate of a cloud, metres",
+    at_least(0));
+  v("dressed", c.tracks.clouds.dressed, "part of the performers in clothes and hair",
+    between(0, 1));
+  v("one_camera", c.tracks.clouds.one_camera, "part that one depth camera sees", between(0, 1));
+  v("camera_ring", c.tracks.clouds.camera_ring, "part that three to seven cameras see",
+    between(0, 1));
+}
+
 /// The defaults are what trains; configs/paper/as_printed.yaml keeps the paper's letter
 /// (docs/method.md).
 struct MotionStageConfig {
@@ -51,6 +82,8 @@ struct MotionStageConfig {
   AdamConfig discriminator_adam;
   double balance_limit = 0.3;
   bool self_first_pass = true;
+  double paired_share = 0;
+  AnswersConfig answers;
   int64_t validation_windows = 64, validation_frames = 60;
 };
 
@@ -65,6 +98,10 @@ void visit(V& v, MotionStageConfig& c) {
     "the discriminator rests while its running score of fakes is below this", between(0, 1));
   v("self_first_pass", c.self_first_pass,
     "self samples do one supervised pass A -> A instead of the cycle");
+  v("paired_share", c.paired_share,
+    "part of that pass whose target is another body, of which the data knows the answer",
+    between(0, 1));
+  v("answers", c.answers, "what the network sees of A: an extractor's answers to clouds");
   v("validation_windows", c.validation_windows, "held-out windows per validation", positive());
   v("validation_frames", c.validation_frames, "frames of each", at_least(3));
 }
@@ -72,6 +109,7 @@ void visit(V& v, MotionStageConfig& c) {
 class MotionStage final : public Stage {
  public:
   using Config = MotionStageConfig;
+  static std::vector<std::string> reads(const Config& config);
   MotionStage(const Config& config, const StageInput& input);
   NamedValues step(int64_t step) override;
   void read(int64_t step) const override { batch(step); }
@@ -87,6 +125,9 @@ class MotionStage final : public Stage {
   };
   Batch batch(int64_t step) const;
   MotionStatistics statistics() const;
+  /// Made when they are first asked for: an extractor has to answer first.
+  struct Windows;
+  const Windows& windows() const;
   /// Discriminator's own step, unless it is winning clearly (spec 4.4).
   void update_discriminator(int64_t step, const WindowBatch& batch, double rate,
                             NamedValues* values);
@@ -97,8 +138,12 @@ class MotionStage final : public Stage {
   MotionModel* model_;
   Discriminator* discriminator_;
   Adam *adam_, *discriminator_adam_;
-  WindowSampler sampler_, self_sampler_, validation_sampler_;
+  const Corpus &train_, &validation_;
+  uint64_t seed_;
+  Bundle given_;  ///< the extractor, if it is asked
   RngKey key_;
+  mutable std::once_flag asked_;
+  mutable std::shared_ptr<const Windows> windows_;
   double balance_ = 0.5;
 };
 

@@ -10,13 +10,13 @@ namespace {
 
 template <class S>
 StageType stage(const char* name, const char* help, std::vector<std::string> roles,
-                std::vector<std::string> figures, std::vector<std::string> reads = {}) {
+                std::vector<std::string> figures) {
   return {name,
           help,
           AnyConfig(typename S::Config()),
           std::move(roles),
           std::move(figures),
-          std::move(reads),
+          [](const AnyConfig& c) { return S::reads(c.as<typename S::Config>()); },
           [](const AnyConfig& c, const StageInput& input) -> std::unique_ptr<Stage> {
             return std::make_unique<S>(c.as<typename S::Config>(), input);
           }};
@@ -27,12 +27,13 @@ StageType stage(const char* name, const char* help, std::vector<std::string> rol
 const std::vector<StageType>& stage_types() {
   static const std::vector<StageType> table = {
       stage<SkeletonStage>("skeleton", "the skeleton extractor", {"skeleton"},
-                           {"joint_error_mm", "tpose_joint_error_mm"}),
+                           {"joint_error_mm", "tpose_joint_error_mm", "ring_joint_error_mm",
+                            "one_camera_joint_error_mm"}),
       stage<MotionStage>("motion", "the motion retargeting network", {"motion"},
                          {"pa_mpjpe", "local_mpjpe", "cycle_mpjpe"}),
       stage<DeformationStage>("deformation", "skinning weights and offsets",
                               {"deformation.weights", "deformation.offsets"},
-                              {"skinning_mm", "with_offsets_mm"}),
+                              {"skinning_mm", "skin_lost", "with_offsets_mm"}),
       stage<RootStage>("root", "the third MLP of the paper's count", {"deformation.root"},
                        {"root_mm"}),
   };

@@ -16,7 +16,8 @@ struct StageType {
   AnyConfig config;                  ///< at its defaults
   std::vector<std::string> roles;    ///< what it may leave in a bundle; the first always
   std::vector<std::string> figures;  ///< of validate(); lower is better
-  std::vector<std::string> reads;    ///< stages whose networks it needs; they are trained before
+  /// Stages whose networks it needs, as it is configured; they are trained before.
+  std::vector<std::string> (*reads)(const AnyConfig& config);
   std::unique_ptr<Stage> (*make)(const AnyConfig& config, const StageInput& input);
 };
 

@@ -27,6 +27,7 @@ void visit(V& v, RootStageConfig& c) {
 class RootStage final : public Stage {
  public:
   using Config = RootStageConfig;
+  static std::vector<std::string> reads(const Config&) { return {}; }
   RootStage(const Config& config, const StageInput& input);
   NamedValues step(int64_t step) override;
   void read(int64_t step) const override;

@@ -56,6 +56,7 @@ void visit(V& v, SkeletonStageConfig& c) {
 class SkeletonStage final : public Stage {
  public:
   using Config = SkeletonStageConfig;
+  static std::vector<std::string> reads(const Config&) { return {}; }
   SkeletonStage(const Config& config, const StageInput& input);
   NamedValues step(int64_t step) override;
   void read(int64_t step) const override { batch(step); }

@@ -15,10 +15,10 @@ Bundle taken_from(const StageType& type, const std::string& path) {
   return out;
 }
 
-void check_order(const TrainConfig& config, const StageType& type) {
+void check_order(const TrainConfig& config, const StageType& type, const AnyConfig& own) {
   const auto& stages = config.stages;
   const auto self = std::find(stages.begin(), stages.end(), type.name);
-  for (const std::string& read : type.reads)
+  for (const std::string& read : type.reads(own))
     if (std::find(stages.begin(), self, read) == self)
       throw InputError(
           "", "stage '" + type.name + "' needs what '" + read + "' leaves",
@@ -35,7 +35,7 @@ std::unique_ptr<Stage> make_stage(const TrainConfig& config, const std::string& 
     so_far->add(taken_from(type, *section.from));
     return nullptr;
   }
-  check_order(config, type);
+  check_order(config, type, section.config);
   auto stage = type.make(section.config, {data.train, data.validation, config.seed, *so_far});
   if (section.init)
     stage->start_from(load_bundle(*section.init), section.init_names, *section.init);

@@ -1,4 +1,4 @@
-// Joints of single clouds: the points are put in order, sampled, centred and given to the
+// Joints of single clouds: the points are put in order, sampled, turned, centred and given to the
 // extractor.
 #pragma once
 
@@ -10,11 +10,17 @@ namespace restage {
 
 inline constexpr size_t kLeastDistinctPoints = 64;
 
+/// Headings over which an extractor's views of a cloud are spread, radians.
+inline constexpr double kAllAround = 6.283185307179586;
+inline constexpr double kRestPoses = 0.7;  ///< of a target, which faces +z
+
 /// The 22 joints of clouds. Keeps its working memory between clouds.
 class JointExtractor {
  public:
-  /// `samples` > 1 averages the answers for several random choices of points.
-  explicit JointExtractor(SkeletonModel& model, int samples = 1);
+  /// `samples` > 1 takes several views of a cloud, each a random choice of its points, turned about
+  /// y by another part of `around`, every second one mirrored; of their answers, per coordinate,
+  /// the median. An extractor errs differently on each (docs/method.md, "Views").
+  explicit JointExtractor(SkeletonModel& model, int samples = 1, double around = kAllAround);
   /// Metres, in the cloud's frame. Points are sorted lexicographically first and exact repeats
   /// left out, so neither their order in a file nor pixels without depth matter to the last bit.
   /// InputError naming `source`: fewer than 64 distinct points, values that are not finite.
@@ -23,15 +29,18 @@ class JointExtractor {
  private:
   void sort(const Points& cloud, const std::string& source);
   void choose(const RngKey& key);
+  double heading(size_t view) const;
 
   SkeletonModel& model_;
+  double around_;
   Points sorted_, chosen_;
   std::vector<Vec3> centres_;
+  std::vector<Joints> answers_;
 };
 
 /// The joints of one cloud.
 Joints extract_joints(SkeletonModel& model, const Points& cloud, const std::string& source,
-                      const RngKey& key, int samples = 1);
+                      const RngKey& key, int samples = 1, double around = kAllAround);
 
 /// `n` points of a surface, uniform by area; of a mesh without faces, its vertices as they are.
 Points surface_points(const Mesh& mesh, size_t n, const RngKey& key);

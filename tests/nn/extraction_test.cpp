@@ -1,4 +1,4 @@
-#include "infer/extraction.h"
+#include "nn/models/extraction.h"
 
 #include <gtest/gtest.h>
 
@@ -73,17 +73,61 @@ TEST(InferExtraction, JointsMoveWithTheCloud) {
     EXPECT_LT((there[j] - here[j] - far.cast<double>()).norm(), 1e-4);
 }
 
-TEST(InferExtraction, SamplesAreAveraged) {
-  const auto model = small("skeleton/patch_transformer");
-  const Points points = cloud(300);
-  const RngKey key{9, 0};
-  const Joints both = extract_joints(*model, points, "c", key, 2);
-  // The first choice of two is the only choice of one.
-  const Joints one = extract_joints(*model, points, "c", key, 1);
-  double apart = 0;
-  for (size_t j = 0; j < kJoints; ++j) apart = std::max(apart, (both[j] - one[j]).norm());
-  EXPECT_GT(apart, 1e-6);
-  EXPECT_LT(apart, 0.1);
+/// Every joint at the cloud's highest point. The first `wrong` views are answered wrongly.
+struct HighestPoint final : SkeletonModel {
+  SkeletonOutput forward(Context&, const Var& cloud) override {
+    const int64_t n = cloud.size(0);
+    Tensor out = Tensor::zeros({n, kJoints, 3});
+    for (int64_t s = 0; s < n; ++s) {
+      const float* x = cloud.value.data<float>() + s * 64 * 3;
+      const float* top = x;
+      for (int64_t i = 0; i < 64; ++i)
+        if (x[3 * i + 1] > top[1]) top = x + 3 * i;
+      for (int64_t j = 0; j < kJoints; ++j)
+        for (int64_t c = 0; c < 3; ++c)
+          out.data<float>()[(s * kJoints + j) * 3 + c] = top[c] + (s < wrong ? 5.0f : 0.0f);
+    }
+    return {.joints = Var(out), .votes = {}, .segmentation = {}, .centres = {}};
+  }
+  int64_t points() const override { return 64; }
+  void visit(Fields&) override {}
+  const char* kind() const override { return "test"; }
+  int64_t wrong = 0;
+};
+
+TEST(InferExtraction, ViewsAreTurnedBackAndWrongOnesOutvoted) {
+  HighestPoint model;
+  const Points points = cloud(64);
+  const Point top = *std::max_element(points.begin(), points.end(),
+                                      [](const auto& a, const auto& b) { return a.y() < b.y(); });
+  for (const int views : {1, 2, 3, 4, 8, 16}) {
+    for (model.wrong = 0; 2 * model.wrong < std::max(1, views - 1); ++model.wrong) {
+      const Joints joints = extract_joints(model, points, "c", RngKey{9, 0}, views);
+      for (size_t j = 0; j < kJoints; ++j)
+        EXPECT_LT((joints[j] - top.cast<double>()).norm(), 1e-5) << views << " " << model.wrong;
+    }
+  }
+}
+
+TEST(InferExtraction, MirroredViewsChangeSides) {
+  // Whatever the view shows, left is where x is positive in it.
+  struct Sides final : SkeletonModel {
+    SkeletonOutput forward(Context&, const Var& cloud) override {
+      Tensor out = Tensor::zeros({cloud.size(0), kJoints, 3});
+      for (int64_t i = 0; i < out.numel() / 3; ++i)
+        out.data<float>()[3 * i] =
+            static_cast<float>(tiny_body("b", "test").joints[i % kJoints].x());
+      return {.joints = Var(out), .votes = {}, .segmentation = {}, .centres = {}};
+    }
+    int64_t points() const override { return 64; }
+    void visit(Fields&) override {}
+    const char* kind() const override { return "test"; }
+  } model;
+  const Points points = cloud(64);
+  const Joints one = extract_joints(model, points, "c", RngKey{9, 0}, 1),
+               two = extract_joints(model, points, "c", RngKey{9, 0}, 2);
+  EXPECT_GT(one[20].x(), one[21].x());
+  for (size_t j = 0; j < kJoints; ++j) EXPECT_LT((one[j] - two[j]).norm(), 1e-5);
 }
 
 TEST(InferExtraction, TooFewDistinctPoints) {

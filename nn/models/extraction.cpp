@@ -1,6 +1,7 @@
-#include "infer/extraction.h"
+#include "nn/models/extraction.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace restage {
 namespace {
@@ -9,10 +10,37 @@ bool before(const Point& a, const Point& b) {
   return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
 }
 
+bool mirrored(size_t view) { return view % 2 == 1; }
+
+/// The median of each coordinate; of an even number the mean of both in the middle.
+Joints middle(const std::vector<Joints>& answers, const std::string& source) {
+  Joints out;
+  std::vector<double> values(answers.size());
+  const size_t n = values.size();
+  for (size_t j = 0; j < kJoints; ++j) {
+    for (int c = 0; c < 3; ++c) {
+      for (size_t s = 0; s < n; ++s) values[s] = answers[s][j][c];
+      if (!std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); }))
+        throw InputError(source, "gives joints that are not finite", "check its units: metres");
+      std::sort(values.begin(), values.end());
+      out[j][c] = 0.5 * (values[(n - 1) / 2] + values[n / 2]);
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
-JointExtractor::JointExtractor(SkeletonModel& model, int samples)
-    : model_(model), centres_(static_cast<size_t>(samples)) {}
+JointExtractor::JointExtractor(SkeletonModel& model, int samples, double around)
+    : model_(model),
+      around_(around),
+      centres_(static_cast<size_t>(samples)),
+      answers_(static_cast<size_t>(samples)) {}
+
+double JointExtractor::heading(size_t view) const {
+  const auto pairs = static_cast<double>((centres_.size() + 1) / 2);
+  return around_ * ((static_cast<double>(view / 2) + 0.5) / pairs - 0.5);
+}
 
 void JointExtractor::sort(const Points& cloud, const std::string& source) {
   for (const Point& p : cloud)
@@ -46,37 +74,39 @@ Joints JointExtractor::operator()(const Points& cloud, const std::string& source
                                   const RngKey& key) {
   sort(cloud, source);
   const auto n = static_cast<size_t>(model_.points());
-  const size_t samples = centres_.size();
-  Tensor batch = Tensor::empty({static_cast<int64_t>(samples), static_cast<int64_t>(n), 3});
-  for (size_t s = 0; s < samples; ++s) {
+  const size_t views = centres_.size();
+  Tensor batch = Tensor::empty({static_cast<int64_t>(views), static_cast<int64_t>(n), 3});
+  for (size_t s = 0; s < views; ++s) {
     choose(key.fold(s));
     Vec3& centre = centres_[s];
     centre.setZero();
     for (const Point& p : chosen_) centre += p.cast<double>();
     centre /= static_cast<double>(n);
+    const Eigen::Matrix3f turn = turn_about_y(heading(s)).cast<float>();
+    const float side = mirrored(s) ? -1.0f : 1.0f;
     float* row = batch.data<float>() + s * n * 3;
-    for (size_t i = 0; i < n; ++i)
-      for (int c = 0; c < 3; ++c)
-        row[3 * i + static_cast<size_t>(c)] = static_cast<float>(chosen_[i][c] - centre[c]);
+    for (size_t i = 0; i < n; ++i) {
+      Eigen::Map<Point> to(row + 3 * i);
+      to = turn * (chosen_[i].cast<double>() - centre).cast<float>();
+      to.x() *= side;
+    }
   }
   Context ctx;
   const Tensor joints = model_.forward(ctx, batch).joints.value;
-  Joints out;
-  for (size_t j = 0; j < kJoints; ++j) {
-    out[j].setZero();
-    for (size_t s = 0; s < samples; ++s) {
-      const float* x = joints.data<float>() + (s * kJoints + j) * 3;
-      out[j] += (Vec3(x[0], x[1], x[2]) + centres_[s]) / static_cast<double>(samples);
+  for (size_t s = 0; s < views; ++s) {
+    const Mat3 back = turn_about_y(-heading(s));
+    for (size_t j = 0; j < kJoints; ++j) {
+      const size_t from = mirrored(s) ? static_cast<size_t>(kMirror[j]) : j;
+      const float* x = joints.data<float>() + (s * kJoints + from) * 3;
+      answers_[s][j] = back * Vec3(mirrored(s) ? -x[0] : x[0], x[1], x[2]) + centres_[s];
     }
-    if (!out[j].allFinite())
-      throw InputError(source, "gives joints that are not finite", "check its units: metres");
   }
-  return out;
+  return middle(answers_, source);
 }
 
 Joints extract_joints(SkeletonModel& model, const Points& cloud, const std::string& source,
-                      const RngKey& key, int samples) {
-  return JointExtractor(model, samples)(cloud, source, key);
+                      const RngKey& key, int samples, double around) {
+  return JointExtractor(model, samples, around)(cloud, source, key);
 }
 
 Points surface_points(const Mesh& mesh, size_t n, const RngKey& key) {

@@ -1,0 +1,206 @@
+// Clouds as cameras see them, people in clothes, and what an extractor is asked about.
+#include "datasets/sampling/sensors.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "autograd/base/error.h"
+#include "datasets/sampling/clouds.h"
+#include "datasets/sampling/dress.h"
+#include "datasets/sampling/evaluation.h"
+#include "datasets/sampling/tracks.h"
+#include "datasets/sampling/windows.h"
+#include "tests/datasets/sampling_support.h"
+
+namespace restage {
+namespace {
+
+using namespace testing;
+
+/// A ball of the size of a trunk, and a small one at its centre that nobody can see.
+struct Balls {
+  Balls() {
+    for (uint64_t i = 0; i < 3000; ++i) {
+      Rng rng(RngKey{i, 1});
+      const Point way = Vec3(rng.normal(), rng.normal(), rng.normal()).normalized().cast<float>();
+      points.push_back((i % 3 == 0 ? 0.06f : 0.35f) * way);
+      normals.push_back(way);
+    }
+  }
+  Points points, normals;
+};
+
+TEST(SamplingSensors, SeeTheNearSideAndNothingInside) {
+  const Balls balls;
+  for (uint64_t k = 0; k < 30; ++k) {
+    for (const Sensor sensor : {Sensor::one_camera, Sensor::ring}) {
+      std::vector<size_t> which;
+      const Points seen =
+          sensed(sensor, balls.points, balls.normals, 400, RngKey{k, 0}, RngKey{k, 1}, &which);
+      ASSERT_EQ(seen.size(), which.size());
+      EXPECT_LE(seen.size(), 400u);
+      EXPECT_GE(seen.size(), 128u);
+      EXPECT_EQ(std::set<size_t>(which.begin(), which.end()).size(), which.size());
+      Point mean = Point::Zero();
+      size_t inside = 0, moved = 0;
+      for (size_t i = 0; i < seen.size(); ++i) {
+        mean += balls.points[which[i]] / static_cast<float>(seen.size());
+        inside += which[i] % 3 == 0;
+        moved += (seen[i] - balls.points[which[i]]).norm() > 0.04f;
+      }
+      EXPECT_LT(static_cast<double>(inside), 0.02 * static_cast<double>(seen.size()));
+      EXPECT_LT(static_cast<double>(moved), 0.08 * static_cast<double>(seen.size()));
+      if (sensor == Sensor::one_camera) {
+        EXPECT_GT(mean.norm(), 0.16f) << "one side only";
+        for (const size_t i : which) EXPECT_GT(balls.points[i].dot(mean.normalized()), -0.16f);
+      } else {
+        EXPECT_LT(mean.norm(), 0.16f);
+      }
+    }
+  }
+}
+
+TEST(SamplingSensors, NormalsPointOutHoweverFacesAreWound) {
+  Body body = tiny_body("b", "train");
+  const auto check = [&] {
+    const SurfaceSampler sampler(body);
+    const SurfaceSamples samples = sampler.draw({1, 0}, 300);
+    const Points picked = samples.rest_vertices(body), at = samples.on(picked),
+                 normals = sampler.normals(samples, picked);
+    Points out;
+    for (size_t i = 0; i < at.size(); ++i) {
+      EXPECT_NEAR(normals[i].norm(), 1, 1e-5);
+      out.push_back(normals[i]);
+    }
+    return out;
+  };
+  const Points before = check();
+  for (Triangle& f : body.rest.faces) std::swap(f[1], f[2]);
+  const Points after = check();
+  size_t same = 0;
+  for (size_t i = 0; i < before.size(); ++i) same += (before[i] - after[i]).norm() < 1e-4f;
+  EXPECT_GT(same, 0u);
+}
+
+/// Mean distance of a cloud's points from the pelvis: more in thicker clothes.
+double spread(const CloudSampler& sampler, const CloudSubject& subject) {
+  double sum = 0;
+  for (uint64_t k = 0; k < 20; ++k)
+    for (const Point& p : sampler.cloud(subject, 400, RngKey{k, 0}, RngKey{k, 1}))
+      sum += static_cast<double>(p.norm());
+  return sum;
+}
+
+TEST(SamplingSensors, ClothesStandOutAndScenesStay) {
+  const CloudSampler sampler(training_corpus(), {.points = 256, .noise = 0}, 1);
+  CloudSubject naked;
+  naked.at = {0, 3};
+  CloudSubject dressed = naked;
+  dressed.dressed = true;
+  EXPECT_NE(spread(sampler, naked), spread(sampler, dressed));
+  // One scene, two frames: the same clothes and cameras, other points.
+  dressed.sensor = Sensor::one_camera;
+  const auto centre = [&](uint64_t scene, uint64_t key) {
+    return centroid(sampler.cloud(dressed, 400, RngKey{scene, 0}, RngKey{key, 1}));
+  };
+  EXPECT_NE(centre(1, 1), centre(1, 2));
+  EXPECT_LT((centre(1, 1) - centre(1, 2)).norm(), (centre(1, 1) - centre(4, 1)).norm() + 0.05f);
+}
+
+TEST(SamplingSensors, RecombinedPosesMoveOneLimbOnly) {
+  const CloudSampler sampler(training_corpus(), {.points = 64}, 1);
+  CloudSubject subject;
+  subject.at = {0, 3};
+  const Pose plain = sampler.pose(subject);
+  subject.limb = 13;  // the left arm
+  subject.limb_at = {0, 25};
+  const Pose mixed = sampler.pose(subject);
+  for (int j = 0; j < kJoints; ++j) {
+    const bool arm = j == 13 || j == 16 || j == 18 || j == 20;
+    EXPECT_EQ(plain.local[j] != mixed.local[j], arm) << kJointNames[j];
+  }
+}
+
+TEST(SamplingSensors, ShareOfEachKindAndEverybodyOtherwise) {
+  CloudConfig config{.points = 96};
+  const CloudSampler plain(training_corpus(), config, 1);
+  config.one_camera = 0.4;
+  config.camera_ring = 0.3;
+  config.dressed = config.recombined = 0.5;
+  const CloudSampler mixed(training_corpus(), config, 1);
+  std::map<Sensor, int> sensors;
+  int dressed = 0, limbs = 0;
+  for (int64_t i = 0; i < 1000; ++i) {
+    const CloudSubject a = plain.subject(i), b = mixed.subject(i);
+    EXPECT_EQ(a.body, b.body);  // a switch does not change what else is drawn
+    EXPECT_EQ(a.at.frame, b.at.frame);
+    EXPECT_EQ(a.limb, -1);
+    ++sensors[b.sensor];
+    dressed += b.dressed;
+    limbs += b.limb >= 0;
+  }
+  EXPECT_NEAR(sensors[Sensor::one_camera], 380, 60);
+  EXPECT_NEAR(sensors[Sensor::ring], 285, 60);
+  EXPECT_NEAR(dressed, 500, 60);
+  EXPECT_NEAR(limbs, 500, 60);
+  const CloudBatch batch = mixed.batch(0, 40);
+  for (int64_t i = 0; i < batch.points.numel(); ++i)
+    ASSERT_TRUE(std::isfinite(batch.points.data<float>()[i]));
+  config.one_camera = 0.8;
+  EXPECT_THROW(CloudSampler(training_corpus(), config, 1), InputError);
+}
+
+TEST(SamplingSensors, EvaluationScansShowTheirJoints) {
+  const auto subjects = evaluation_clouds(training_corpus(), 4, 1);
+  for (const int cameras : {1, 6}) {
+    const CloudBatch scans = evaluation_scans(training_corpus(), subjects, cameras, 200, 1);
+    EXPECT_TRUE(same_bits(scans.points,
+                          evaluation_scans(training_corpus(), subjects, cameras, 200, 1).points));
+    for (int64_t i = 0; i < 4; ++i)
+      for (int j = 0; j < kJoints; ++j) EXPECT_LT(at(scans.joints, i, j).norm(), 2.0);
+  }
+}
+
+TEST(SamplingTracks, WindowsSeeWhatWasAnswered) {
+  TrackConfig config{.sequences = 5, .frames = 20, .least = 100, .most = 200, .clouds = {}};
+  int asked = 0;
+  const Point offset(0, 3, 0);
+  const auto extract = [&](const Points& cloud, const RngKey&) {
+    ++asked;
+    Joints out;
+    for (size_t j = 0; j < kJoints; ++j)
+      out[j] =
+          (centroid(cloud) + offset).cast<double>() + Vec3(0, 0.01 * static_cast<double>(j), 0);
+    return out;
+  };
+  const auto tracks = make_tracks(training_corpus(), config, 3, extract);
+  ASSERT_EQ(tracks.size(), 5u);
+  EXPECT_EQ(asked, 100);
+  const WindowConfig windows{.frames = 12, .mirror = false, .remove_heading = false};
+  const WindowSampler sampler(training_corpus(), windows, 1, &tracks);
+  const WindowBatch batch = sampler.batch(0, 8);
+  for (int64_t i = 0; i < 8; ++i) {
+    const WindowSubject s = sampler.subject(i);
+    ASSERT_NE(s.track, nullptr);
+    EXPECT_EQ(s.body_a, s.track->body);
+    EXPECT_EQ(s.clip.motion, s.track->motion);
+    EXPECT_GE(s.clip.frame, s.track->first);
+    EXPECT_LE(s.clip.frame + 12, s.track->first + 20);
+    // Answers are in the world, whatever heading the extractor was shown.
+    const Joints& answer = s.track->joints[s.clip.frame - s.track->first];
+    const Pose pose = pose_on(training_corpus().motions[s.clip.motion],
+                              training_corpus().bodies[s.body_a], s.clip.frame);
+    EXPECT_LT((answer[0] - offset.cast<double>() - pose.root).norm(), 0.5);
+    for (int j = 0; j < kJoints; ++j) EXPECT_NEAR(at(batch.input_a, i, j).y(), 0.01 * j, 1e-5);
+    EXPECT_GT(at(batch.joints_a, i, 15).y(), 0.2) << "what is true stays";
+  }
+  config.frames = 10;
+  const auto shorter = make_tracks(training_corpus(), config, 3, extract);
+  EXPECT_THROW(WindowSampler(training_corpus(), windows, 1, &shorter), InputError);
+}
+
+}  // namespace
+}  // namespace restage

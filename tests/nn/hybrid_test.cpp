@@ -1,0 +1,152 @@
+// smrm/hybrid and deformation/bones: what they are before training, and that all of them learns.
+#include "nn/models/hybrid.h"
+
+#include <gtest/gtest.h>
+
+#include "autograd/base/rng.h"
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+#include "autograd/ops/reduce.h"
+#include "nn/geometry/closed_form.h"
+#include "nn/models/bone_field.h"
+#include "nn/models/registry.h"
+#include "tests/support/tiny_body.h"
+
+namespace restage {
+namespace {
+
+using testing::tiny_joints;
+
+constexpr int64_t kFrames = 6;
+
+struct Input {
+  Tensor joints = Tensor::empty({2, kFrames, kJoints, 3}, DType::f64),
+         trans = Tensor::full({2, kFrames, 3}, 0.5, DType::f64),
+         rest = Tensor::empty({2, kJoints, 3}, DType::f64);
+  std::vector<Joints> posed[2];
+  Joints rests[2] = {tiny_joints(1.1), tiny_joints(0.9, 1.2)};
+
+  Input() {
+    const Motion motion = testing::tiny_motion("m", "s", "test", kFrames);
+    for (int64_t n = 0; n < 2; ++n) {
+      const Body body = testing::tiny_body("a", "test", n == 0 ? 1.0 : 1.2);
+      for (int j = 0; j < kJoints; ++j)
+        Eigen::Map<Vec3>(rest.data<double>() + 3 * (n * kJoints + j)) = rests[n][j] - rests[n][0];
+      for (int64_t t = 0; t < kFrames; ++t) {
+        const Joints x =
+            forward_kinematics(body.joints, pose_on(motion, body, static_cast<size_t>(t))).joints;
+        posed[n].push_back(x);
+        for (int j = 0; j < kJoints; ++j)
+          Eigen::Map<Vec3>(joints.data<double>() + 3 * ((n * kFrames + t) * kJoints + j)) =
+              x[j] - x[0];
+      }
+    }
+  }
+};
+
+std::shared_ptr<MotionModel> hybrid() {
+  return make_model_as<MotionModel>("smrm/hybrid", model_config("smrm/hybrid", {"hidden=16"}),
+                                    Init{RngKey{2, 0}, DType::f64});
+}
+
+TEST(Hybrid, BeginsAsTheClosedForm) {
+  const Input in;
+  Context ctx;
+  MotionState state;
+  const MotionOutput out = hybrid()->forward(ctx, in.joints, in.trans, in.rest, &state);
+  for (int64_t n = 0; n < 2; ++n) {
+    const auto expected = closed_form_joints(in.posed[n], in.rests[n]);
+    for (int64_t t = 0; t < kFrames; ++t)
+      for (int j = 0; j < kJoints; ++j) {
+        const Vec3 got = Eigen::Map<const Vec3>(out.joints.value.data<double>() +
+                                                3 * ((n * kFrames + t) * kJoints + j));
+        const Joints& want = expected[static_cast<size_t>(t)];
+        EXPECT_LT((got - (want[j] - want[0])).norm(), 5e-3) << n << " " << t << kJointNames[j];
+      }
+  }
+}
+
+TEST(Hybrid, FrameByFrameAsAtOnce) {
+  const Input in;
+  const auto net = hybrid();
+  Context ctx;
+  MotionState whole, parts;
+  const MotionOutput all = net->forward(ctx, in.joints, in.trans, in.rest, &whole);
+  for (int64_t t = 0; t < kFrames; ++t) {
+    const MotionOutput one = net->forward(ctx, slice(Var(in.joints), 1, t, t + 1),
+                                          slice(Var(in.trans), 1, t, t + 1), in.rest, &parts);
+    const Tensor expected = slice(all.joints, 1, t, t + 1).value;
+    for (int64_t i = 0; i < expected.numel(); ++i)
+      EXPECT_NEAR(one.joints.value.item(i), expected.item(i), 1e-12) << t;
+  }
+}
+
+TEST(Hybrid, EveryParameterGetsAGradient) {
+  const Input in;
+  const auto net = hybrid();
+  Tape tape;
+  Context ctx;
+  ctx.tape = &tape;
+  ctx.training = true;
+  MotionState state;
+  const MotionOutput out = net->forward(ctx, in.joints, in.trans, in.rest, &state);
+  const Gradients g = tape.backward(mean_all(square(out.joints)) + mean_all(square(out.trans)) +
+                                    mean_all(square(add_scalar(out.rotations, -0.3))));
+  for (const StateEntry& entry : state_of(*net)) {
+    if (entry.parameter == nullptr) continue;
+    const Tensor* gradient = g.find(entry.parameter->id);
+    ASSERT_NE(gradient, nullptr) << entry.name;
+    double sum = 0;
+    for (int64_t i = 0; i < gradient->numel(); ++i) sum += std::abs(gradient->item(i));
+    EXPECT_GT(sum, 0) << entry.name;
+  }
+}
+
+TEST(BoneField, DistancesAreThoseToSegments) {
+  const Joints rest = tiny_joints();
+  Tensor joints = Tensor::empty({1, kJoints, 3}, DType::f64),
+         points = Tensor::empty({1, 3, 3}, DType::f64);
+  for (int j = 0; j < kJoints; ++j) Eigen::Map<Vec3>(joints.data<double>() + 3 * j) = rest[j];
+  // Beside the middle of the left forearm, before its elbow's end, and beyond its wrist.
+  const Vec3 elbow = rest[18], wrist = rest[20], along = (wrist - elbow).normalized();
+  const Vec3 places[] = {0.5 * (elbow + wrist) + Vec3(0, 0.1, 0), elbow - 0.2 * along,
+                         wrist + 0.3 * along};
+  for (int i = 0; i < 3; ++i) Eigen::Map<Vec3>(points.data<double>() + 3 * i) = places[i];
+  const Tensor d = bone_distances(points, joints, bones_of(Var(joints))).value;
+  const Vec3 up(0, 0.1, 0);
+  EXPECT_NEAR(d.item(18), (up - along * along.dot(up)).norm(), 1e-6);
+  EXPECT_NEAR(d.item(kJoints + 18), 0.2, 1e-6);
+  EXPECT_NEAR(d.item(2 * kJoints + 18), 0.3, 1e-6);
+}
+
+TEST(BoneField, BeginsAtTheNearestBone) {
+  const Body body = testing::tiny_body("b", "test");
+  const auto net = make_model_as<DeformationModel>(
+      "deformation/bones", model_config("deformation/bones", {"small_start=true"}),
+      Init{RngKey{3, 0}, DType::f32});
+  const auto v = static_cast<int64_t>(body.rest.vertices.size());
+  Tensor points = Tensor::empty({1, v, 3}), joints = Tensor::empty({1, kJoints, 3});
+  for (int64_t i = 0; i < v; ++i)
+    Eigen::Map<Point>(points.data<float>() + 3 * i) = body.rest.vertices[static_cast<size_t>(i)];
+  for (int j = 0; j < kJoints; ++j)
+    Eigen::Map<Point>(joints.data<float>() + 3 * j) = body.joints[j].cast<float>();
+  Context ctx;
+  const Tensor w = net->weights(ctx, joints, points).value;
+  for (int64_t i = 0; i < v; ++i) {
+    float sum = 0;
+    for (int j = 0; j < kJoints; ++j) sum += w.data<float>()[i * kJoints + j];
+    EXPECT_NEAR(sum, 1, 1e-5);
+  }
+  // Vertices come in eights about each bone; the first four are at its near end.
+  for (const int joint : {4, 7, 18, 19, 20}) {
+    const int parent = kParents[joint];
+    const int64_t middle = 8 * (joint - 1);
+    double of_bone = 0;
+    for (int64_t i = middle; i < middle + 8; ++i)
+      of_bone += static_cast<double>(w.data<float>()[i * kJoints + parent]);
+    EXPECT_GT(of_bone / 8, 0.3) << kJointNames[parent];
+  }
+}
+
+}  // namespace
+}  // namespace restage
