@@ -11,9 +11,10 @@
 namespace restage {
 namespace {
 
-constexpr float kCell = 0.035f;   // of the grid across a camera's view, metres
-constexpr float kBehind = 0.05f;  // points up to here behind the nearest of their cell are seen
-constexpr float kGrazing = 0.1f;  // cosine below which a surface gives no answer
+constexpr float kCell = 0.035f;       // of the grid across a camera's view, metres
+constexpr float kBehind = 0.05f;      // points up to here behind the nearest of their cell are seen
+constexpr float kBehindNear = 0.12f;  // and up to here behind that of a cell beside it: no gaps
+constexpr float kGrazing = 0.1f;      // cosine below which a surface gives no answer
 constexpr size_t kLeast = 64;
 
 struct Camera {
@@ -43,27 +44,48 @@ std::vector<Camera> draw_cameras(Sensor sensor, Rng& rng) {
   return out;
 }
 
+/// The nearest depths of a camera's picture, cell by cell.
+class DepthMap {
+ public:
+  explicit DepthMap(const Points& view) : low_(box_of(view).min()) {
+    const Point size = box_of(view).sizes();
+    width_ = std::max(kCell, std::max(size.x(), size.y()) / 1000);  // of giants' cells
+    columns_ = static_cast<int>(size.x() / width_) + 3;             // with an empty margin
+    rows_ = static_cast<int>(size.y() / width_) + 3;
+    nearest_.assign(static_cast<size_t>(columns_ * rows_), std::numeric_limits<float>::lowest());
+    for (const Point& p : view) nearest_[cell(p)] = std::max(nearest_[cell(p)], p.z());
+  }
+  bool hides(const Point& p) const {
+    const size_t own = cell(p);
+    if (p.z() < nearest_[own] - kBehind) return true;
+    for (const int row : {-1, 0, 1})
+      for (const int column : {-1, 0, 1})
+        if (p.z() < nearest_[own + static_cast<size_t>(row * columns_ + column)] - kBehindNear)
+          return true;
+    return false;
+  }
+
+ private:
+  size_t cell(const Point& p) const {
+    return static_cast<size_t>(static_cast<int>((p.y() - low_.y()) / width_ + 1) * columns_ +
+                               static_cast<int>((p.x() - low_.x()) / width_ + 1));
+  }
+  Point low_;
+  float width_ = kCell;
+  int columns_ = 0, rows_ = 0;
+  std::vector<float> nearest_;
+};
+
 /// Adds to `seen` the cosine at which the camera sees each point, if it does.
 void look(const Camera& camera, const Points& points, const Points& normals,
           std::vector<float>* seen) {
-  std::vector<Point> view(points.size());
-  Box box;
-  for (size_t i = 0; i < points.size(); ++i) {
-    view[i] = Point(camera.across.dot(points[i]), camera.up.dot(points[i]),
-                    camera.towards.dot(points[i]));
-    box.extend(view[i]);
-  }
-  const auto columns = static_cast<size_t>((box.max().x() - box.min().x()) / kCell) + 1;
-  const auto rows = static_cast<size_t>((box.max().y() - box.min().y()) / kCell) + 1;
-  std::vector<float> nearest(columns * rows, -std::numeric_limits<float>::max());
-  const auto cell = [&](const Point& p) {
-    return static_cast<size_t>((p.y() - box.min().y()) / kCell) * columns +
-           static_cast<size_t>((p.x() - box.min().x()) / kCell);
-  };
-  for (const Point& p : view) nearest[cell(p)] = std::max(nearest[cell(p)], p.z());
+  Points view;
+  for (const Point& p : points)
+    view.emplace_back(camera.across.dot(p), camera.up.dot(p), camera.towards.dot(p));
+  const DepthMap map(view);
   for (size_t i = 0; i < points.size(); ++i) {
     const float cosine = camera.towards.dot(normals[i]);
-    if (cosine > kGrazing && view[i].z() > nearest[cell(view[i])] - kBehind) (*seen)[i] += cosine;
+    if (cosine > kGrazing && !map.hides(view[i])) (*seen)[i] += cosine;
   }
 }
 
