@@ -103,6 +103,8 @@ void Retargeter::prepare(const std::string& weights_name) {
           : translation == "relative" ? Path::relative
                                       : Path::absolute;
   remove_heading_ = motion.setting("remove_heading", {"false", "true"}) == "true";
+  steady_heading_ = motion.setting("steady_heading", {"false", "true"}) == "true";
+  heading_ = Heading(steady_heading_);
   rest_tensor_ = tensor_of(rest_, rest_[0]);
   if (models_.find("deformation.weights") != nullptr)
     surface_.emplace(models_, weights_name, target_, rest_);
@@ -111,6 +113,7 @@ void Retargeter::prepare(const std::string& weights_name) {
 
 void Retargeter::restart() {
   state_ = {};
+  heading_ = Heading(steady_heading_);
   previous_.reset();
   received_.reset();
   frame_ = grid_ = 0;
@@ -170,7 +173,7 @@ void Retargeter::step(const Joints& a, RetargetedFrame* out) {
 
 /// The motion model's answer to A's joints.
 void Retargeter::advance(const Joints& a, Pose* pose) {
-  const double heading = remove_heading_ ? heading_angle(a) : 0;
+  const double heading = remove_heading_ ? heading_(a) : 0;
   const Mat3 turn = turn_about_y(heading), back = turn.transpose();
   Joints local;
   for (size_t j = 0; j < kJoints; ++j) local[j] = back * (a[j] - a[0]);

@@ -72,7 +72,8 @@ class Retargeter final : public System {
   Tensor rest_tensor_;  // relative to the rest pelvis
   // How the models were trained:
   enum class Path { velocity, relative, absolute } path_ = Path::velocity;
-  bool remove_heading_ = false;
+  bool remove_heading_ = false, steady_heading_ = false;
+  Heading heading_{false};
   MotionState state_;
   std::optional<Joints> previous_;  ///< A on the 30 fps grid, one step ago
   std::optional<Joints> received_;  ///< A as last pushed

@@ -59,11 +59,12 @@ std::vector<Joints> noisy(const std::vector<Joints>& joints, const RngKey& key, 
   return out;
 }
 
-/// Headings of every frame, or zeros.
-std::vector<Mat3> turns_of(const std::vector<Joints>& seen, bool wanted) {
+/// What takes every frame's heading away, if that is wanted.
+std::vector<Mat3> turns_of(const std::vector<Joints>& seen, const WindowConfig& c) {
+  Heading heading(c.steady_heading);
   std::vector<Mat3> out;
   for (const Joints& x : seen)
-    out.push_back(wanted ? turn_about_y(-heading_angle(x)) : Mat3(Mat3::Identity()));
+    out.push_back(c.remove_heading ? turn_about_y(-heading(x)) : Mat3(Mat3::Identity()));
   return out;
 }
 
@@ -199,8 +200,8 @@ void WindowSampler::fill(WindowBatch& batch, int64_t row, int64_t index) const {
   if (config_.noisy_translation)
     for (size_t t = 0; t < path.size(); ++t) seen_path[t] = seen[t][0];
 
-  const std::vector<Mat3> turns = turns_of(seen, config_.remove_heading);
-  const std::vector<Mat3> own_turns = turns_of(real.joints, config_.remove_heading);
+  const std::vector<Mat3> turns = turns_of(seen, config_);
+  const std::vector<Mat3> own_turns = turns_of(real.joints, config_);
   put_joints(row_of(batch.joints_a, row), a.joints, turns);
   put_joints(row_of(batch.input_a, row), seen, turns);
   put_translation(row_of(batch.trans_a, row), path, config_.translation, turns);

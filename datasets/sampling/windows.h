@@ -33,6 +33,7 @@ struct WindowConfig {
   Translation translation = Translation::velocity;
   bool remove_heading = false;  ///< every frame is turned to face +z: by A's heading as seen in its
                                 ///< input joints (real_b: by its own)
+  bool steady_heading = false;  ///< that heading is averaged over the last frames (Heading)
   bool truth = false;           ///< also make the last group of WindowBatch
 };
 

@@ -37,10 +37,26 @@ double leg_length(const Joints& x) {
   return 0.5 * (side(1, 4, 7) + side(2, 5, 8));
 }
 
-double heading_angle(const Joints& x) {
-  const Vec3 across = (x[16] - x[17]) + (x[1] - x[2]);
+namespace {
+
+/// From right to left, by shoulders and hips.
+Vec3 across_of(const Joints& x) { return (x[16] - x[17]) + (x[1] - x[2]); }
+
+double heading_of(const Vec3& across) {
   if (across[0] * across[0] + across[2] * across[2] < 1e-12) return 0;
   return std::atan2(-across[2], across[0]);
+}
+
+}  // namespace
+
+double heading_angle(const Joints& x) { return heading_of(across_of(x)); }
+
+double Heading::operator()(const Joints& joints) {
+  constexpr double kMemory = 0.2;  // seconds
+  static const double fresh = 1 - std::exp(-1 / (kFps * kMemory));
+  const Vec3 across = across_of(joints);
+  across_ = steady_ && !across_.isZero() ? Vec3(across_ + fresh * (across - across_)) : across;
+  return heading_of(across_);
 }
 
 Mat3 turn_about_y(double angle) {

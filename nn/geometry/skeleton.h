@@ -50,6 +50,17 @@ double leg_length(const Joints& joints);
 /// Angle about y by which a posed body faces away from +z (spec 3.3: across = left minus right
 /// shoulder plus left minus right hip), radians; 0 if it cannot be told.
 double heading_angle(const Joints& joints);
+/// The heading of somebody seen frame by frame at kFps. Steady: the average of the last 0.2 s or so
+/// (exponential), since noise of the joints would turn what is seen from frame to frame.
+class Heading {
+ public:
+  explicit Heading(bool steady) : steady_(steady) {}
+  double operator()(const Joints& joints);
+
+ private:
+  bool steady_;
+  Vec3 across_ = Vec3::Zero();
+};
 /// Rotation by `angle` about y.
 Mat3 turn_about_y(double angle);
 /// Smallest rotation that takes direction a onto direction b (half turn about any axis if

@@ -93,6 +93,7 @@ void add_older_settings(const Json& metadata, const std::string& where, Bundle* 
   static const std::map<std::string, std::string> roles = {
       {"translation", "motion"},
       {"remove_heading", "motion"},
+      {"steady_heading", "motion"},
       {"keep_root_rotation", "deformation.offsets"}};
   for (const auto& [name, value] : settings_of(object_at(metadata, "extra"), where)) {
     const auto role = roles.find(name);

@@ -137,6 +137,26 @@ TEST(SamplingWindows, RemovedHeadingsFaceForwardAndKeepTheMotion) {
   EXPECT_GT(turned, 1.0);
 }
 
+TEST(SamplingWindows, ASteadyHeadingIsLessRestless) {
+  WindowConfig config{.noise = 0.03, .mirror = false, .remove_heading = true};
+  double restless[2];
+  for (const bool steady : {false, true}) {
+    config.steady_heading = steady;
+    const WindowBatch batch = WindowSampler(training_corpus(), config, 4).batch(0, 8);
+    restless[steady] = 0;
+    for (int64_t i = 0; i < 8; ++i)
+      for (int64_t t = 2; t < config.frames; ++t) {
+        const auto angle = [&](int64_t f) {
+          return heading_angle(joints_at(batch.joints_a, i, f));
+        };
+        // Of what is true, turned by what was seen: its second differences are noise.
+        restless[steady] +=
+            std::abs(std::remainder(angle(t) - 2 * angle(t - 1) + angle(t - 2), 2 * M_PI));
+      }
+  }
+  EXPECT_LT(restless[true], 0.5 * restless[false]);
+}
+
 TEST(SamplingWindows, NoiseIsOnTheInputOnly) {
   const WindowBatch clean = WindowSampler(training_corpus(), {}, 4).batch(0, 20);
   EXPECT_TRUE(same_bits(clean.input_a, clean.joints_a));

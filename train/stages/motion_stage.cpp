@@ -13,6 +13,7 @@ namespace {
 /// What must be known of the training to use the network.
 Settings settings_of(const MotionStageConfig& c) {
   Settings out{{"remove_heading", c.windows.remove_heading ? "true" : "false"}};
+  if (c.windows.steady_heading) out["steady_heading"] = "true";
   for (const auto& [name, value] : config_names(Translation{}))
     if (value == c.windows.translation) out["translation"] = name;
   return out;

@@ -48,6 +48,7 @@ void visit(V& v, WindowConfig& c) {
   v("per_motion", c.per_motion, "every motion as likely (else every frame)");
   v("translation", c.translation, "velocity, relative or absolute");
   v("remove_heading", c.remove_heading, "turn every frame to face +z before the network");
+  v("steady_heading", c.steady_heading, "that heading is an average of the last frames");
 }
 
 /// What an extractor answers, as the input of training windows.
