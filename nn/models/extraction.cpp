@@ -12,18 +12,20 @@ bool before(const Point& a, const Point& b) {
 
 bool mirrored(size_t view) { return view % 2 == 1; }
 
-/// The median of each coordinate; of an even number the mean of both in the middle.
+/// The mean of each coordinate, without a quarter of the values at either end from eight on.
 Joints middle(const std::vector<Joints>& answers, const std::string& source) {
   Joints out;
   std::vector<double> values(answers.size());
-  const size_t n = values.size();
+  const size_t n = values.size(), out_of_it = n < 8 ? 0 : n / 4;
   for (size_t j = 0; j < kJoints; ++j) {
     for (int c = 0; c < 3; ++c) {
       for (size_t s = 0; s < n; ++s) values[s] = answers[s][j][c];
       if (!std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); }))
         throw InputError(source, "gives joints that are not finite", "check its units: metres");
       std::sort(values.begin(), values.end());
-      out[j][c] = 0.5 * (values[(n - 1) / 2] + values[n / 2]);
+      out[j][c] = 0;
+      for (size_t s = out_of_it; s < n - out_of_it; ++s)
+        out[j][c] += values[s] / static_cast<double>(n - 2 * out_of_it);
     }
   }
   return out;

@@ -18,8 +18,9 @@ inline constexpr double kRestPoses = 0.7;  ///< of a target, which faces +z
 class JointExtractor {
  public:
   /// `samples` > 1 takes several views of a cloud, each a random choice of its points, turned about
-  /// y by another part of `around`, every second one mirrored; of their answers, per coordinate,
-  /// the median. An extractor errs differently on each (docs/method.md, "Views").
+  /// y by another part of `around`, every second one mirrored; of their answers the mean, from
+  /// eight on without a quarter at either end of each coordinate. An extractor errs differently on
+  /// each (docs/method.md, "Views").
   explicit JointExtractor(SkeletonModel& model, int samples = 1, double around = kAllAround);
   /// Metres, in the cloud's frame. Points are sorted lexicographically first and exact repeats
   /// left out, so neither their order in a file nor pixels without depth matter to the last bit.
