@@ -40,7 +40,7 @@ Vec from_direction(const Vec& g, const Vec& u, double length) {
 
 /// x along `across`, y along the rest of `up`, z at right angles.
 struct Frame {
-  Frame(const Vec& across, const Vec& up) : length(across.norm()), up(up) {
+  Frame(const Vec& across, const Vec& upwards) : length(across.norm()), up(upwards) {
     x = across / std::max(length, kTiny);
     const Vec rest = up - x.dot(up) * x;
     height = rest.norm();
@@ -94,8 +94,8 @@ void turn_grad(const Vec& u, double angle, const Mat& g, Vec* gu, double* g_angl
 /// One skeleton: world rotations on the way down, gradients on the way up.
 template <class T>
 struct Walk {
-  Walk(std::span<const SwingJoint> joints, const T* rest, const T* posed, const T* twist)
-      : joints(joints), rest(rest), posed(posed), twist(twist), world(joints.size()) {
+  Walk(std::span<const SwingJoint> of, const T* at_rest, const T* as_posed, const T* twisted)
+      : joints(of), rest(at_rest), posed(as_posed), twist(twisted), world(of.size()) {
     for (size_t j = 0; j < joints.size(); ++j) world[j] = rotation(joints[j], static_cast<int>(j));
   }
   Mat above(const SwingJoint& joint) const {
