@@ -13,10 +13,11 @@ bool before(const Point& a, const Point& b) {
 bool mirrored(size_t view) { return view % 2 == 1; }
 
 /// The mean of each coordinate, without a quarter of the values at either end from eight on.
-Joints middle(const std::vector<Joints>& answers, const std::string& source) {
+/// `values`: room for one coordinate of each.
+Joints middle(const std::vector<Joints>& answers, const std::string& source,
+              std::vector<double>& values) {
   Joints out;
-  std::vector<double> values(answers.size());
-  const size_t n = values.size(), out_of_it = n < 8 ? 0 : n / 4;
+  const size_t n = answers.size(), out_of_it = n < 8 ? 0 : n / 4;
   for (size_t j = 0; j < kJoints; ++j) {
     for (int c = 0; c < 3; ++c) {
       for (size_t s = 0; s < n; ++s) values[s] = answers[s][j][c];
@@ -37,7 +38,8 @@ JointExtractor::JointExtractor(SkeletonModel& model, int samples, double around)
     : model_(model),
       around_(around),
       centres_(static_cast<size_t>(samples)),
-      answers_(static_cast<size_t>(samples)) {}
+      answers_(static_cast<size_t>(samples)),
+      values_(static_cast<size_t>(samples)) {}
 
 double JointExtractor::heading(size_t view) const {
   const auto pairs = static_cast<double>((centres_.size() + 1) / 2);
@@ -103,7 +105,7 @@ Joints JointExtractor::operator()(const Points& cloud, const std::string& source
       answers_[s][j] = back * Vec3(mirrored(s) ? -x[0] : x[0], x[1], x[2]) + centres_[s];
     }
   }
-  return middle(answers_, source);
+  return middle(answers_, source, values_);
 }
 
 Joints extract_joints(SkeletonModel& model, const Points& cloud, const std::string& source,

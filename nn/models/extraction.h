@@ -37,6 +37,7 @@ class JointExtractor {
   Points sorted_, chosen_;
   std::vector<Vec3> centres_;
   std::vector<Joints> answers_;
+  std::vector<double> values_;
 };
 
 /// The joints of one cloud.

@@ -40,7 +40,9 @@ class Runs(Train):
         self.assertEqual((held["anchor"], summed["anchor"], len(held["sequences"])), (0.25, 0, 2))
         for found in (held, held["true_skeletons"]):
             self.assertEqual(sorted(found["references"]), ["closed_form", "rest_pose", "source_unchanged"])
-            self.assertLess(found["references"]["closed_form"]["mpjpe"], found["mean"]["mpjpe"], "ten steps of training")
+        # From true skeletons. (What ten steps make of an extractor is good for neither.)
+        closed, trained = held["true_skeletons"]["references"]["closed_form"]["mpjpe"], held["true_skeletons"]["mean"]["mpjpe"]
+        self.assertLess(closed, trained, "ten steps of training")
         # The anchor moves the path and nothing else.
         self.assertAlmostEqual(held["mean"]["pa_mpjpe"], summed["mean"]["pa_mpjpe"], 6)
         self.assertNotAlmostEqual(held["mean"]["mpjpe"], summed["mean"]["mpjpe"], 3)
