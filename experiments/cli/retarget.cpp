@@ -263,7 +263,8 @@ void add_retarget(Program& program) {
   app.add_option("--source-up", c.up, "the source's up axis, y or z");
   app.add_option("--scale", c.scale, "the source's units in metres");
   app.add_option("--format", c.format, "of a folder's frames: ply or obj");
-  app.add_option("--samples", c.samples, "random choices of points per frame to average");
+  app.add_option("--samples", c.samples,
+                 "views of a cloud to average: choices of its points, turned and mirrored");
   app.add_option("--anchor", c.anchor,
                  "seconds in which the path goes back to the source's, scaled to the target's legs "
                  "(0: never)");

@@ -88,7 +88,8 @@ void add_skeleton(Program& program) {
   app.add_option("--input", options.input, "cloud, folder of clouds, or HDF5 file of scans")
       ->required();
   app.add_option("--out", options.out, "HDF5 file for the joints");
-  app.add_option("--samples", options.samples, "random choices of points to average");
+  app.add_option("--samples", options.samples,
+                 "views of a cloud to average: choices of its points, turned and mirrored");
 }
 
 }  // namespace restage::cli
