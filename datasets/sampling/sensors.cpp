@@ -93,7 +93,7 @@ void look(const Camera& camera, const Points& points, const Points& normals,
 void lose_part(const Points& points, Rng& rng, std::vector<float>* seen) {
   std::vector<float> kept = *seen;
   if (rng.uniform() < 0.2) {
-    const Point centre = points[rng.below(points.size())];
+    const Point& centre = points[rng.below(points.size())];
     const auto radius = static_cast<float>(rng.uniform(0.08, 0.25));
     for (size_t i = 0; i < points.size(); ++i)
       if ((points[i] - centre).norm() < radius) kept[i] = 0;

@@ -42,8 +42,8 @@ JointExtractor::JointExtractor(SkeletonModel& model, int samples, double around)
       values_(static_cast<size_t>(samples)) {}
 
 double JointExtractor::heading(size_t view) const {
-  const auto pairs = static_cast<double>((centres_.size() + 1) / 2);
-  return around_ * ((static_cast<double>(view / 2) + 0.5) / pairs - 0.5);
+  const size_t pairs = (centres_.size() + 1) / 2, pair = view / 2;
+  return around_ * ((static_cast<double>(pair) + 0.5) / static_cast<double>(pairs) - 0.5);
 }
 
 void JointExtractor::sort(const Points& cloud, const std::string& source) {
