@@ -95,8 +95,14 @@ void turn_grad(const Vec& u, double angle, const Mat& g, Vec* gu, double* g_angl
 template <class T>
 struct Walk {
   Walk(std::span<const SwingJoint> of, const T* at_rest, const T* as_posed, const T* twisted)
-      : joints(of), rest(at_rest), posed(as_posed), twist(twisted), world(of.size()) {
+      : joints(of), rest(at_rest), posed(as_posed), twist(twisted), world(room(of.size())) {
     for (size_t j = 0; j < joints.size(); ++j) world[j] = rotation(joints[j], static_cast<int>(j));
+  }
+  /// Kept by the thread: a steady frame takes no memory.
+  static std::vector<Mat>& room(size_t n) {
+    thread_local std::vector<Mat> kept;
+    kept.resize(n);
+    return kept;
   }
   Mat above(const SwingJoint& joint) const {
     return joint.parent < 0 ? Mat(Mat::Identity()) : world[static_cast<size_t>(joint.parent)];
@@ -128,7 +134,7 @@ struct Walk {
 
   std::span<const SwingJoint> joints;
   const T *rest, *posed, *twist;
-  std::vector<Mat> world;
+  std::vector<Mat>& world;
 };
 
 template <class T>
