@@ -143,9 +143,11 @@ void judge_extractor(const Bundle& weights, const Corpus& corpus, CloudConfig cl
   clouds.mirror = false;
   clouds.scale_jitter = 0;
   const CloudSampler sampler(corpus, clouds, 2);
-  out->joint_error = joint_error(*model, sampler.clouds(evaluation_clouds(corpus, 400, 2)));
+  out->joint_error =
+      skeleton_errors(*model, sampler.clouds(evaluation_clouds(corpus, 400, 2))).joints;
   out->tpose_joint_error =
-      joint_error(*model, sampler.clouds(evaluation_tposes(corpus, 8, clouds.tpose_heading, 2)));
+      skeleton_errors(*model, sampler.clouds(evaluation_tposes(corpus, 8, clouds.tpose_heading, 2)))
+          .joints;
 }
 
 }  // namespace

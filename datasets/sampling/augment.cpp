@@ -18,6 +18,13 @@ Mat3 flipped(Mat3 r) {
   return r;
 }
 
+/// Each side's under the other's name.
+Rotations flipped(const Rotations& of) {
+  Rotations out;
+  for (int j = 0; j < kJoints; ++j) out[j] = flipped(of[kMirror[j]]);
+  return out;
+}
+
 }  // namespace
 
 Augmentation draw_augmentation(Rng& rng, double heading_range, bool mirror) {
@@ -59,10 +66,16 @@ Pose augmented(const Augmentation& a, const Pose& pose) {
   out.local[0] = r * pose.local[0];
   out.root = r * pose.root;
   if (!a.mirror) return out;
-  const Rotations local = out.local;
-  for (int j = 0; j < kJoints; ++j) out.local[j] = flipped(local[kMirror[j]]);
+  out.local = flipped(out.local);
   out.root = flipped(out.root);
   return out;
+}
+
+Rotations augmented(const Augmentation& a, const Rotations& global) {
+  const Mat3 r = turn(a);
+  Rotations out;
+  for (int j = 0; j < kJoints; ++j) out[j] = r * global[j];
+  return a.mirror ? flipped(out) : out;
 }
 
 }  // namespace restage

@@ -22,5 +22,7 @@ Joints augmented(const Augmentation& a, const Joints& posed);
 /// Rest joints: mirrored only, since headings belong to poses.
 Joints augmented_rest(const Augmentation& a, const Joints& rest);
 Pose augmented(const Augmentation& a, const Pose& pose);
+/// Every joint's rotation in the world.
+Rotations augmented(const Augmentation& a, const Rotations& global);
 
 }  // namespace restage

@@ -91,7 +91,8 @@ Pose CloudSampler::pose(const CloudSubject& subject) const {
 CloudSampler::Drawn CloudSampler::draw(const CloudSubject& subject, const SurfaceSamples& samples,
                                        const RngKey& key) const {
   const Body& body = corpus_.bodies.at(subject.body);
-  Drawn out{{}, {}, body.joints};
+  Drawn out{{}, {}, body.joints, {}};
+  out.turns.fill(Mat3::Identity());
   const SurfaceSampler& surface = surfaces_[subject.body];
   Points picked;
   if (subject.rest) {
@@ -99,7 +100,9 @@ CloudSampler::Drawn CloudSampler::draw(const CloudSubject& subject, const Surfac
   } else {
     const Pose posed = pose(subject);
     picked = pose_surface(body, posed, &samples.vertices);
-    out.joints = forward_kinematics(body.joints, posed).joints;
+    const PosedSkeleton skeleton = forward_kinematics(body.joints, posed);
+    out.joints = skeleton.joints;
+    out.turns = skeleton.global;
   }
   out.points = samples.on(picked);
   if (subject.dressed || subject.sensor != Sensor::none)
@@ -118,6 +121,7 @@ CloudSampler::Drawn CloudSampler::draw(const CloudSubject& subject, const Surfac
   augment(subject.augmentation, out.normals);
   for (Point& p : out.points) p *= static_cast<float>(subject.scale);
   out.joints = augmented(subject.augmentation, out.joints);
+  out.turns = augmented(subject.augmentation, out.turns);
   for (Vec3& joint : out.joints) joint *= subject.scale;
   return out;
 }
@@ -128,6 +132,7 @@ CloudSampler::Seen CloudSampler::see(const CloudSubject& subject, size_t n, cons
   out.samples = surfaces_[subject.body].draw(key.fold("surface"), candidates(subject.sensor, n));
   Drawn drawn = draw(subject, out.samples, scene.fold("outfit"));
   out.joints = drawn.joints;
+  out.turns = drawn.turns;
   out.points = std::move(drawn.points);
   out.which.resize(out.points.size());
   std::iota(out.which.begin(), out.which.end(), size_t{0});
@@ -143,8 +148,8 @@ Points CloudSampler::cloud(const CloudSubject& subject, size_t n, const RngKey& 
   return see(subject, n, scene, key).points;
 }
 
-void CloudSampler::fill(const CloudSubject& subject, const RngKey& key, float* points,
-                        float* joints, float* weights) const {
+void CloudSampler::fill(const CloudSubject& subject, const RngKey& key, int64_t row,
+                        CloudBatch& to) const {
   const auto n = static_cast<size_t>(config_.points);
   Rng rng(key.fold("count"));
   const auto least = static_cast<size_t>(std::ceil(config_.min_fraction * config_.points));
@@ -154,12 +159,17 @@ void CloudSampler::fill(const CloudSubject& subject, const RngKey& key, float* p
   for (const size_t i : order) chosen.push_back(seen.points[i]);
 
   const Point centre = centroid(chosen);
+  const auto at = [&](Tensor& t) { return t.data<float>() + row * (t.numel() / t.size(0)); };
+  float *points = at(to.points), *joints = at(to.joints);
   for (size_t i = 0; i < n; ++i) Eigen::Map<Point>(points + 3 * i) = chosen[i] - centre;
-  for (size_t i = 0; weights != nullptr && i < n; ++i)
-    seen.samples.skin_weights(corpus_.bodies[subject.body], seen.which[order[i]],
-                              subject.augmentation.mirror, weights + i * kJoints);
   for (int j = 0; j < kJoints; ++j)
     Eigen::Map<Point>(joints + 3 * j) = (seen.joints[j] - centre.cast<double>()).cast<float>();
+  for (size_t i = 0; to.weights.defined() && i < n; ++i)
+    seen.samples.skin_weights(corpus_.bodies[subject.body], seen.which[order[i]],
+                              subject.augmentation.mirror, at(to.weights) + i * kJoints);
+  for (int j = 0; to.turns.defined() && j < kJoints; ++j)
+    Eigen::Map<Eigen::Matrix<float, 3, 2>>(at(to.turns) + 6 * j) =
+        seen.turns[j].leftCols<2>().cast<float>();
 }
 
 CloudBatch CloudSampler::make(int64_t first, int64_t n,
@@ -168,15 +178,11 @@ CloudBatch CloudSampler::make(int64_t first, int64_t n,
   out.points = Tensor::empty({n, config_.points, 3});
   out.joints = Tensor::empty({n, kJoints, 3});
   if (config_.skin_weights) out.weights = Tensor::empty({n, config_.points, kJoints});
-  float* weights = config_.skin_weights ? out.weights.data<float>() : nullptr;
-  float* points = out.points.data<float>();
-  float* joints = out.joints.data<float>();
+  if (config_.rotations) out.turns = Tensor::empty({n, kJoints, 6});
   parallel_for(n, 1, [&](int64_t from, int64_t to) {
     for (int64_t i = from; i < to; ++i)
-      fill(subjects ? (*subjects)[i] : subject(first + i),
-           key_.fold(static_cast<uint64_t>(first + i)), points + i * config_.points * 3,
-           joints + i * kJoints * 3,
-           weights != nullptr ? weights + i * config_.points * kJoints : nullptr);
+      fill(subjects ? (*subjects)[static_cast<size_t>(i)] : subject(first + i),
+           key_.fold(static_cast<uint64_t>(first + i)), i, out);
   });
   return out;
 }

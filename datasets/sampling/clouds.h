@@ -26,6 +26,7 @@ struct CloudConfig {
   double one_camera = 0;      ///< part that one depth camera sees (sensors.h)
   double camera_ring = 0;     ///< part that three to seven cameras around see
   bool skin_weights = false;  ///< also fill CloudBatch::weights
+  bool rotations = false;     ///< also fill CloudBatch::turns
 };
 
 /// float32, metres. Points and joints are relative to the centroid of the points.
@@ -33,6 +34,8 @@ struct CloudBatch {
   Tensor points;   ///< [N, V, 3]
   Tensor joints;   ///< [N, 22, 3]
   Tensor weights;  ///< [N, V, 22] which joints move each point; only with CloudConfig::skin_weights
+  Tensor turns;  ///< [N, 22, 6] rotation of each joint from the T-pose, two columns of its matrix;
+                 ///< only with CloudConfig::rotations
 };
 
 /// What a cloud shows; `rest` means the T-pose, whatever `at` says.
@@ -70,6 +73,7 @@ class CloudSampler {
   struct Drawn {
     Points points, normals;
     Joints joints;
+    Rotations turns;
   };
   Drawn draw(const CloudSubject& subject, const SurfaceSamples& samples, const RngKey& key) const;
   /// What a sensor sees of it; which of the samples each point is.
@@ -78,11 +82,11 @@ class CloudSampler {
     std::vector<size_t> which;
     Points points;
     Joints joints;
+    Rotations turns;
   };
   Seen see(const CloudSubject& subject, size_t n, const RngKey& scene, const RngKey& key) const;
-  /// `weights` may be null.
-  void fill(const CloudSubject& subject, const RngKey& key, float* points, float* joints,
-            float* weights) const;
+  /// Row i of a batch.
+  void fill(const CloudSubject& subject, const RngKey& key, int64_t i, CloudBatch& to) const;
   CloudBatch make(int64_t first, int64_t n, const std::vector<CloudSubject>* subjects) const;
 
   const Corpus& corpus_;

@@ -7,6 +7,11 @@
 #include "nn/layers/vector_attention.h"
 
 namespace restage {
+namespace {
+
+constexpr double kUsualError = -4;  // log of 2 cm: where an untrained uncertainty begins
+
+}  // namespace
 
 PatchTransformer::PatchTransformer(const PatchTransformerConfig& c, const Init& init)
     : config(c),
@@ -18,6 +23,8 @@ PatchTransformer::PatchTransformer(const PatchTransformerConfig& c, const Init& 
       segment(c.width, kJoints, init.sub("segment")) {
   for (int64_t i = 0; i < c.layers; ++i)
     layers.emplace(c.width, c.heads, 2 * c.width, init.sub("layers." + std::to_string(i)));
+  if (c.orientation) orientation.emplace(c.width, kJoints * 7, init.sub("orientation"));
+  if (c.uncertainty) uncertainty.emplace(c.width, kJoints, init.sub("uncertainty"));
 }
 
 SkeletonOutput PatchTransformer::forward(Context& ctx, const Var& cloud) {
@@ -37,6 +44,17 @@ SkeletonOutput PatchTransformer::forward(Context& ctx, const Var& cloud) {
               reshape(centres, {n, t, 1, 3});
   const Var weight = reshape(softmax(slice(head, 2, 0, kJoints), 1), {n, t, kJoints, 1});
   out.joints = sum(weight * out.votes, 1);
+  if (orientation) {
+    const Var all = (*orientation)(ctx, x);
+    const Var share = reshape(softmax(slice(all, 2, 0, kJoints), 1), {n, t, kJoints, 1});
+    out.turns = sum(share * reshape(slice(all, 2, kJoints, 7 * kJoints), {n, t, kJoints, 6}), 1);
+  }
+  if (uncertainty) {  // learns from the tokens as they are: where joints are believed is not its to
+                      // change
+    const Var by_token = (*uncertainty)(ctx, Var(x.value));
+    out.uncertainty =
+        add_scalar(sum(by_token * Var(weight.value.reshape({n, t, kJoints})), 1), kUsualError);
+  }
   if (ctx.training) out.segmentation = segment(ctx, x);
   return out;
 }
@@ -49,6 +67,8 @@ void PatchTransformer::visit(Fields& f) {
   f("norm", norm);
   f("vote", vote);
   f("segment", segment);
+  if (orientation) f("orientation", *orientation);
+  if (uncertainty) f("uncertainty", *uncertainty);
 }
 
 }  // namespace restage

@@ -2,6 +2,8 @@
 // the farthest points become tokens of a transformer; every token votes for every joint.
 #pragma once
 
+#include <optional>
+
 #include "nn/config/rules.h"
 #include "nn/layers/mlp.h"
 #include "nn/layers/self_attention.h"
@@ -12,6 +14,7 @@ namespace restage {
 struct PatchTransformerConfig {
   int64_t points = 512, centres = 64, neighbours = 16, patch = 64, width = 128, layers = 4,
           heads = 4;
+  bool orientation = false, uncertainty = false;
   double patch_scale = 10, centre_scale = 2;  ///< bring offsets and positions to order one
 };
 
@@ -22,6 +25,8 @@ void visit(V& v, PatchTransformerConfig& c) {
   v("layers", c.layers, "layers of the transformer", between(0, 64));
   v("centres", c.centres, "patches, each a token", between(1, kMostPoints));
   v("neighbours", c.neighbours, "points of a patch", between(1, kMostPoints));
+  v("orientation", c.orientation, "also the rotation of each joint");
+  v("uncertainty", c.uncertainty, "also how far each joint may be off");
   v.check("width", c.width % c.heads == 0, "does not fit the heads",
           "give a multiple of " + std::to_string(c.heads));
 }
@@ -40,6 +45,8 @@ struct PatchTransformer : SkeletonModel {
   LayerNormLayer norm;
   Linear vote;     ///< 22 logits and 22 offsets per token
   Linear segment;  ///< which joint moves the centre (used by the training loss only)
+  std::optional<Linear> orientation;  ///< 22 logits and 22 x 6 numbers per token
+  std::optional<Linear> uncertainty;  ///< 22 per token, weighted as the votes are
 };
 
 }  // namespace restage

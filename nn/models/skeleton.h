@@ -8,6 +8,10 @@ namespace restage {
 
 struct SkeletonOutput {
   Var joints;  ///< [n, 22, 3], in the frame of the input
+  // What a model may say beside them; undefined where it does not.
+  Var turns;        ///< [n, 22, 6]: rotation of each joint from the T-pose, two columns, not
+                    ///< orthonormal; joints alone do not show twist, the surface does
+  Var uncertainty;  ///< [n, 22]: logarithm of the s in p(error) ~ s^-3 exp(-|error| / s), metres
   // What a voting head offers to its training loss; undefined for the other heads.
   Var votes;         ///< [n, c, 22, 3]: where each centre believes each joint to be
   Var segmentation;  ///< [n, c, 22]: logits of the joint that moves each centre

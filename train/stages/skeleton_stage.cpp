@@ -1,12 +1,21 @@
 #include "train/stages/skeleton_stage.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
 #include "autograd/ops/reduce.h"
+#include "autograd/ops/rotation.h"
 #include "nn/losses/deformation.h"
 
 namespace restage {
 namespace {
+
+constexpr double kNinety = 5.3223;  ///< |error| / s that 90 % stay below (SkeletonOutput)
+/// The uncertainty's head learns alone, so this only says how much of the clip of all gradients is
+/// its own; Adam makes up for the rest.
+constexpr double kUncertaintyWeight = 0.01;
 
 /// Euclidean lengths along the last axis (3), smooth at 0.
 Var lengths(const Var& d) { return sqrt(add_scalar(sum(square(d), -1), 1e-8)); }
@@ -19,6 +28,23 @@ CloudConfig with_points(CloudConfig c, const SkeletonModel& model) {
 CloudConfig training_clouds(const SkeletonStageConfig& c, const SkeletonModel& model) {
   CloudConfig out = with_points(c.clouds, model);
   out.skin_weights = c.vote_weight > 0 || c.segmentation_weight > 0;
+  out.rotations = c.orientation_weight > 0;
+  return out;
+}
+
+/// Sum of the angles between rotations given as two columns [n, 22, 6].
+double total_angle(const Tensor& a, const Tensor& b) {
+  const auto matrices = [](const Tensor& sixd) {
+    return sixd_to_matrix(Var(sixd.reshape({sixd.size(0), kJoints, 6}))).value;
+  };
+  const Tensor x = matrices(a), y = matrices(b);
+  double out = 0;
+  for (int64_t k = 0; k < x.numel(); k += 9) {
+    double trace = 0;
+    for (int64_t i = 0; i < 9; ++i)
+      trace += static_cast<double>(x.data<float>()[k + i]) * y.data<float>()[k + i];
+    out += std::acos(std::clamp((trace - 1) / 2, -1.0, 1.0));
+  }
   return out;
 }
 
@@ -28,6 +54,7 @@ CloudConfig held_out(CloudConfig c, const SkeletonModel& model) {
   c.mirror = false;
   c.scale_jitter = 0;
   c.dressed = c.one_camera = c.camera_ring = c.recombined = 0;
+  c.rotations = true;
   return c;
 }
 
@@ -56,9 +83,24 @@ Var SkeletonStage::loss(Context& ctx, const CloudBatch& batch) const {
   Var total = config_.loss == SkeletonStageConfig::Loss::mse
                   ? mse(out.joints, Var(batch.joints))
                   : mean_all(lengths(out.joints - Var(batch.joints)));
+  if (out.turns.value.defined() && batch.turns.defined()) {
+    const Var columns =
+        reshape(out.turns - Var(batch.turns), {batch.turns.size(0), 2 * kJoints, 3});
+    total = total + scale(mean_all(lengths(columns)), config_.orientation_weight);
+  }
+  if (out.uncertainty.value.defined()) {
+    const Tensor error = lengths(Var(out.joints.value) - Var(batch.joints)).value;
+    const Var in_s = Var(error) * exp(neg(out.uncertainty));
+    total = total + scale(mean_all(scale(out.uncertainty, 3) + in_s), kUncertaintyWeight);
+  }
   if (!out.centres.defined() || !batch.weights.defined()) return total;
+  return total + voting_loss(out, batch);
+}
+
+Var SkeletonStage::voting_loss(const SkeletonOutput& out, const CloudBatch& batch) const {
   const int64_t n = batch.points.size(0), c = out.centres.size(1);
   const Var moved_by = gather(Var(batch.weights), out.centres);  // [n, c, 22] skin weights
+  Var total(Tensor::zeros({}));
   if (config_.vote_weight > 0) {
     const Var miss = lengths(out.votes - Var(batch.joints.reshape({n, 1, kJoints, 3})));
     total =
@@ -87,28 +129,48 @@ NamedValues SkeletonStage::step(int64_t step) {
   return {{"loss", d.loss}, {"gradient_norm", d.norm}, {"rate", rate}};
 }
 
-double joint_error(SkeletonModel& model, const CloudBatch& clouds) {
+SkeletonErrors skeleton_errors(SkeletonModel& model, const CloudBatch& clouds) {
   Context ctx;
-  double total = 0;
+  double joints = 0, turns = 0, outside = 0;
+  bool gives_turns = false, gives_uncertainty = false;
   const int64_t n = clouds.points.size(0), part = 16;
   for (int64_t i = 0; i < n; i += part) {
     const int64_t to = std::min(n, i + part);
     const SkeletonOutput out = model.forward(ctx, clouds.points.rows(i, to));
-    total +=
-        mean_distance(out.joints.value, clouds.joints.rows(i, to)) * static_cast<double>(to - i);
+    const Tensor truth = clouds.joints.rows(i, to);
+    joints += mean_distance(out.joints.value, truth) * static_cast<double>(to - i);
+    gives_turns = out.turns.value.defined() && clouds.turns.defined();
+    gives_uncertainty = out.uncertainty.value.defined();
+    if (gives_turns) turns += total_angle(out.turns.value, clouds.turns.rows(i, to));
+    const Tensor error = lengths(out.joints - Var(truth)).value;
+    for (int64_t k = 0; gives_uncertainty && k < error.numel(); ++k)
+      outside +=
+          error.data<float>()[k] > kNinety * std::exp(out.uncertainty.value.data<float>()[k]);
   }
-  return total / static_cast<double>(n);
+  const auto count = static_cast<double>(n * kJoints);
+  SkeletonErrors mean{joints / static_cast<double>(n), {}, {}};
+  if (gives_turns) mean.turns = turns / count;
+  if (gives_uncertainty) mean.outside = outside / count;
+  return mean;
 }
 
 NamedValues SkeletonStage::validate() {
   NamedValues out;
+  std::optional<double> turns, miscalibration;  // of the worst kind of cloud
+  const auto worst = [](std::optional<double>& of, double x) { of = std::max(of.value_or(x), x); };
   const auto put = [&](const char* name, const CloudBatch& clouds) {
-    if (clouds.points.defined()) out.push_back({name, 1e3 * joint_error(*model_, clouds)});
+    if (!clouds.points.defined()) return;
+    const SkeletonErrors errors = skeleton_errors(*model_, clouds);
+    out.push_back({name, 1e3 * errors.joints});
+    if (errors.turns) worst(turns, *errors.turns * 180 / M_PI);
+    if (errors.outside) worst(miscalibration, std::abs(*errors.outside - 0.1));
   };
   put("joint_error_mm", validation_sampler_.clouds(posed_));
   put("tpose_joint_error_mm", validation_sampler_.clouds(tposes_));
   put("ring_joint_error_mm", ring_);
   put("one_camera_joint_error_mm", one_camera_);
+  if (turns) out.push_back({"turn_error_degrees", *turns});
+  if (miscalibration) out.push_back({"miscalibration", *miscalibration});
   return out;
 }
 

@@ -32,7 +32,7 @@ struct SkeletonStageConfig {
   OptimiserConfig optimiser;
   CloudConfig clouds;
   Loss loss = Loss::mse;
-  double vote_weight = 0, segmentation_weight = 0;
+  double vote_weight = 0, segmentation_weight = 0, orientation_weight = 0.05;
   int64_t validation_clouds = 200;
 };
 
@@ -50,6 +50,8 @@ void visit(V& v, SkeletonStageConfig& c) {
   v("vote_weight", c.vote_weight, "voting models: weight of each centre's own votes", at_least(0));
   v("segmentation_weight", c.segmentation_weight,
     "voting models: weight of naming the moving joint", at_least(0));
+  v("orientation_weight", c.orientation_weight,
+    "models that give rotations: weight of their columns' distance", at_least(0));
   v("validation_clouds", c.validation_clouds, "held-out clouds per validation", positive());
 }
 
@@ -65,6 +67,7 @@ class SkeletonStage final : public Stage {
  private:
   CloudBatch batch(int64_t step) const;
   Var loss(Context& ctx, const CloudBatch& batch) const;
+  Var voting_loss(const SkeletonOutput& out, const CloudBatch& batch) const;
 
   Config config_;
   SkeletonModel* model_;
@@ -75,7 +78,12 @@ class SkeletonStage final : public Stage {
   RngKey key_;
 };
 
-/// Mean joint distance of a model on given clouds, metres (evaluation mode).
-double joint_error(SkeletonModel& model, const CloudBatch& clouds);
+/// How a model does on given clouds (evaluation mode); means over joints.
+struct SkeletonErrors {
+  double joints = 0;              ///< distance, metres
+  std::optional<double> turns;    ///< angle, radians; empty if not given or not known
+  std::optional<double> outside;  ///< part of the joints outside their 90 % regions
+};
+SkeletonErrors skeleton_errors(SkeletonModel& model, const CloudBatch& clouds);
 
 }  // namespace restage
