@@ -25,9 +25,35 @@ Tensor tensor_of(const Joints& joints, const Vec3& origin) {
   return t;
 }
 
-Joints blend(const Joints& a, const Joints& b, double t) {
-  Joints out;
-  for (size_t j = 0; j < kJoints; ++j) out[j] = (1 - t) * a[j] + t * b[j];
+/// Between two moments; what is no position is that of the nearer one.
+SeenJoints blend(const SeenJoints& a, const SeenJoints& b, double t) {
+  SeenJoints out = t < 0.5 ? a : b;
+  for (size_t j = 0; j < kJoints; ++j) out.joints[j] = (1 - t) * a.joints[j] + t * b.joints[j];
+  return out;
+}
+
+/// What the network sees of A: about its pelvis, turned; in the network's terms.
+MotionInput input_of(const SeenJoints& seen, const Mat3& turn, const Vec3& moved,
+                     const Tensor& rest) {
+  SeenJoints local = turned(turn, seen);
+  const auto number = [](const Shape& shape) { return Tensor::empty(shape); };
+  MotionInput out{Var(tensor_of(local.joints, local.joints[0]).reshape({1, 1, kJoints, 3})),
+                  Var(number({1, 1, 3})),
+                  Var(rest),
+                  {},
+                  {}};
+  Eigen::Map<Point>(out.trans.value.data<float>()) = moved.cast<float>();
+  if (local.turns) {
+    out.turns = number({1, 1, kJoints, 3, 3});
+    for (size_t j = 0; j < kJoints; ++j)
+      Eigen::Map<Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(out.turns.data<float>() + 9 * j) =
+          (*local.turns)[j].cast<float>();
+  }
+  if (local.uncertainty) {
+    out.uncertainty = number({1, 1, kJoints});
+    for (size_t j = 0; j < kJoints; ++j)
+      out.uncertainty.data<float>()[j] = static_cast<float>((*local.uncertainty)[j]);
+  }
   return out;
 }
 
@@ -122,22 +148,22 @@ void Retargeter::restart() {
 
 std::span<const RetargetedFrame> Retargeter::push(const Points& cloud, const std::string& source) {
   const RngKey key = RngKey{options_.seed, 0}.fold("frame").fold(static_cast<uint64_t>(frame_));
-  Joints joints;
+  SeenJoints seen;
   double seconds = 0;
   {
     const Stopwatch watch(&seconds);
     if (!extractor_)
       throw InputError(source, "cannot be read without a model for skeleton",
                        "give weights that have one");
-    joints = (*extractor_)(cloud, source, key);
+    seen = (*extractor_)(cloud, source, key);
   }
-  const auto out = push_joints(joints);
+  const auto out = push_joints(seen);
   times_.extract = seconds;
   return out;
 }
 
-std::span<const RetargetedFrame> Retargeter::push_joints(const Joints& joints) {
-  last_source_ = joints;
+std::span<const RetargetedFrame> Retargeter::push_joints(const SeenJoints& seen) {
+  last_source_ = seen.joints;
   times_ = {};
   size_t count = 0;
   const double now = static_cast<double>(frame_) / options_.fps;
@@ -146,19 +172,19 @@ std::span<const RetargetedFrame> Retargeter::push_joints(const Joints& joints) {
     const double back =
         (now - static_cast<double>(grid_) / kFps) * options_.fps;  // in source frames
     if (frames_.size() == count) frames_.emplace_back();
-    step(received_ && back > 1e-9 ? blend(joints, *received_, std::min(back, 1.0)) : joints,
+    step(received_ && back > 1e-9 ? blend(seen, *received_, std::min(back, 1.0)) : seen,
          &frames_[count++]);
     ++grid_;
   }
-  received_ = joints;
+  received_ = seen;
   ++frame_;
   return {frames_.data(), count};
 }
 
-void Retargeter::step(const Joints& a, RetargetedFrame* out) {
+void Retargeter::step(const SeenJoints& seen, RetargetedFrame* out) {
   {
     const Stopwatch watch(&times_.motion);
-    advance(a, &out->pose);
+    advance(seen, &out->pose);
   }
   const Stopwatch watch(&times_.deformation);
   const PosedSkeleton posed = forward_kinematics(rest_, out->pose);
@@ -171,12 +197,11 @@ void Retargeter::step(const Joints& a, RetargetedFrame* out) {
                      "check that source and target are in metres");
 }
 
-/// The motion model's answer to A's joints.
-void Retargeter::advance(const Joints& a, Pose* pose) {
+/// The motion model's answer to what is seen of A.
+void Retargeter::advance(const SeenJoints& seen, Pose* pose) {
+  const Joints& a = seen.joints;
   const double heading = remove_heading_ ? heading_(a) : 0;
   const Mat3 turn = turn_about_y(heading), back = turn.transpose();
-  Joints local;
-  for (size_t j = 0; j < kJoints; ++j) local[j] = back * (a[j] - a[0]);
   if (!previous_) {  // B begins where A does, in proportion to its legs
     const double scale = leg_length(rest_) / std::max(leg_length(a), 1e-6);
     start_a_ = a[0];
@@ -188,12 +213,9 @@ void Retargeter::advance(const Joints& a, Pose* pose) {
                       : path_ == Path::relative ? start_a_
                                                 : Vec3(Vec3::Zero());
   const Vec3 moved = (path_ == Path::velocity ? kFps : 1.0) * (back * (a[0] - before));
-  Tensor trans = Tensor::empty({1, 1, 3});
-  for (int c = 0; c < 3; ++c) trans.data<float>()[c] = static_cast<float>(moved[c]);
   Context ctx;
   const MotionOutput answer =
-      motion_->forward(ctx, Var(tensor_of(local, Vec3::Zero()).reshape({1, 1, kJoints, 3})),
-                       Var(trans), Var(rest_tensor_), &state_);
+      motion_->forward(ctx, input_of(seen, back, moved, rest_tensor_), &state_);
   const float* r = answer.rotations.value.data<float>();
   for (size_t j = 0; j < kJoints; ++j)
     pose->local[j] =

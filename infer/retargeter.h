@@ -41,8 +41,8 @@ class Retargeter final : public System {
   /// At 30 fps each cloud gives one frame, else those of the 30 fps grid that it ends. A steady
   /// frame takes no memory.
   std::span<const RetargetedFrame> push(const Points& cloud, const std::string& source) override;
-  /// The same from joints of A in the world.
-  std::span<const RetargetedFrame> push_joints(const Joints& joints);
+  /// The same from joints of A in the world, and what else is seen of them.
+  std::span<const RetargetedFrame> push_joints(const SeenJoints& seen);
   void restart() override;
 
   const Mesh& target() const override { return target_; }
@@ -57,8 +57,8 @@ class Retargeter final : public System {
 
  private:
   void prepare(const std::string& weights_name);
-  void step(const Joints& a, RetargetedFrame* out);
-  void advance(const Joints& a, Pose* pose);
+  void step(const SeenJoints& seen, RetargetedFrame* out);
+  void advance(const SeenJoints& seen, Pose* pose);
   void sum_path(const Joints& a, const Vec3& velocity);
 
   Bundle models_;
@@ -75,8 +75,8 @@ class Retargeter final : public System {
   bool remove_heading_ = false, steady_heading_ = false;
   Heading heading_{false};
   MotionState state_;
-  std::optional<Joints> previous_;  ///< A on the 30 fps grid, one step ago
-  std::optional<Joints> received_;  ///< A as last pushed
+  std::optional<Joints> previous_;      ///< A on the 30 fps grid, one step ago
+  std::optional<SeenJoints> received_;  ///< A as last pushed
   Joints last_source_;
   Vec3 start_a_ = Vec3::Zero(), start_b_ = Vec3::Zero();  ///< pelvis in the first frame
   Vec3 root_b_ = Vec3::Zero();

@@ -42,6 +42,8 @@
   K(pooled_norm_grad, PooledNormGradArgs)                 \
   K(gru, GruArgs)                                         \
   K(gru_grad, GruGradArgs)                                \
+  K(recurrence, RecurrenceArgs)                           \
+  K(recurrence_grad, RecurrenceGradArgs)                  \
   K(knn, KnnArgs)                                         \
   K(fps, FpsArgs)                                         \
   K(neighbour_attention, NeighbourAttentionArgs)          \

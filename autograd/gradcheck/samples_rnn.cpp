@@ -9,9 +9,46 @@ std::vector<Tensor> gru_inputs(int64_t t, int64_t n, int64_t i, int64_t h, Rng& 
           random({3 * h, h}, rng), random({3 * h}, rng), random({3 * h}, rng)};
 }
 
+std::vector<Tensor> recurrence_inputs(int64_t n, int64_t t, int64_t m, Rng& rng) {
+  return {random({n, t, m}, rng), random({n, t, m}, rng), random({n, m}, rng)};
+}
+
+void add_recurrence(Table& table) {
+  OpSamples s = samples_for<Recurrence>();
+  const Build build = [](Args x) { return recurrence(x[0], x[1], x[2]); };
+  Rng rng(RngKey{29, 0});
+  s.add("four steps", recurrence_inputs(2, 4, 3, rng), build);
+  s.add("one of everything", recurrence_inputs(1, 1, 1, rng), build);
+  s.add("no step", recurrence_inputs(2, 0, 3, rng), build).zero_gradient = true;
+  s.add("no row", recurrence_inputs(0, 3, 2, rng), build).zero_gradient = true;
+  s.large("many rows", recurrence_inputs(70, 9, 118, rng), build);
+  const auto broken = [&](const std::string& title, size_t which, const Shape& shape) {
+    std::vector<Tensor> inputs = recurrence_inputs(2, 3, 4, rng);
+    inputs[which] = random(shape, 1);
+    s.error(title, inputs, build);
+  };
+  broken("a of two axes", 0, {2, 4});
+  broken("b differs", 1, {2, 3, 5});
+  broken("n differs", 2, {3, 4});
+  broken("m differs", 2, {2, 5});
+  std::vector<Tensor> mixed = recurrence_inputs(2, 3, 4, rng);
+  mixed[1] = mixed[1].cast(DType::f32);
+  s.error("two dtypes", mixed, build);
+  std::vector<Tensor> integers;
+  for (const Tensor& in : recurrence_inputs(1, 1, 1, rng)) integers.push_back(in.cast(DType::i32));
+  s.error("integers", integers, build);
+  s.random = [build](Rng& r) {
+    return Sample{
+        "", recurrence_inputs(random_size(r, 1, 4), random_size(r, 1, 4), random_size(r, 1, 5), r),
+        build};
+  };
+  table.push_back(s);
+}
+
 }  // namespace
 
 void add_rnn(Table& table) {
+  add_recurrence(table);
   OpSamples s = samples_for<Gru>();
   const Build build = [](Args x) { return gru(x[0], x[1], x[2], x[3], x[4], x[5]); };
   Rng rng(RngKey{23, 0});

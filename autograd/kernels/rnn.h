@@ -1,5 +1,6 @@
-// A GRU layer (PyTorch's equations, spec 3.2), gates stacked r, z, n. Sums are those of matmul.h: a
-// step alone has the bits of the same step of a sequence, a row those of the row in a batch.
+// Recurrences. A GRU layer (PyTorch's equations, spec 3.2), gates stacked r, z, n. Sums are those
+// of matmul.h: a step alone has the bits of the same step of a sequence, a row those of the row in
+// a batch.
 #pragma once
 
 #include "autograd/kernels/kernel.h"
@@ -31,6 +32,25 @@ struct GruGradArgs {
   const Tensor& gy;
   Tensor& g_gi;
   Tensor& g_gh;
+  Tensor& out;
+};
+
+/// y_t = a_t y_(t-1) + b_t, number by number: a, b [n, t, m], first [n, m] -> out [n, t, m].
+struct RecurrenceArgs {
+  const Tensor& a;
+  const Tensor& b;
+  const Tensor& first;
+  Tensor& out;
+};
+/// gy [n, t, m] and y = out of RecurrenceArgs -> g_a, out [n, t, m] = gradient of b, g_first [n,
+/// m].
+struct RecurrenceGradArgs {
+  const Tensor& a;
+  const Tensor& y;
+  const Tensor& first;
+  const Tensor& gy;
+  Tensor& g_a;
+  Tensor& g_first;
   Tensor& out;
 };
 

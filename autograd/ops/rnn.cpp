@@ -84,6 +84,27 @@ Grads Gru::backward(const Saved& saved, const Tensor& gy, Needs needs) const {
   return g;
 }
 
+void Recurrence::check(Inputs x) const {
+  if (x[0].rank() != 3 || x[2].rank() != 2) shape_error(name, letters, x, "wrong number of axes");
+  if (!(x[0].shape() == x[1].shape())) shape_error(name, letters, x, "a and b must agree");
+  if (x[2].size(0) != x[0].size(0)) shape_error(name, letters, x, "n must agree");
+  if (x[2].size(1) != x[0].size(2)) shape_error(name, letters, x, "m must agree");
+  require_floats(name, letters, x);
+}
+
+Tensor Recurrence::forward(Inputs x, Saved& saved) const {
+  Tensor y = empty_like(x[0]);
+  launch(RecurrenceArgs{x[0], x[1], x[2], y});
+  saved.keep({x[0], x[2], y});
+  return y;
+}
+
+Grads Recurrence::backward(const Saved& saved, const Tensor& gy, Needs) const {
+  Grads g{empty_like(gy), empty_like(gy), empty_like(saved[1])};
+  launch(RecurrenceGradArgs{saved[0], saved[2], saved[1], gy, g[0], g[2], g[1]});
+  return g;
+}
+
 Var gru_reference(const Var& x, const Var& h0, const Var& w_ih, const Var& w_hh, const Var& b_ih,
                   const Var& b_hh) {
   const int64_t n = x.size(1), h = h0.size(1);

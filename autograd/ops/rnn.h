@@ -19,6 +19,19 @@ struct Gru {
   Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
 };
 
+/// y_t = a_t y_(t-1) + b_t, number by number, y_0 = `first`: a filter whose gain may change. Rows
+/// first, unlike Gru.
+struct Recurrence {
+  static constexpr const char* name = "recurrence";
+  static constexpr const char* letters = "a[n, t, m], b[n, t, m], first[n, m]";
+  void check(Inputs x) const;
+  Tensor forward(Inputs x, Saved& saved) const;
+  Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
+};
+inline Var recurrence(const Var& a, const Var& b, const Var& first) {
+  return call(Recurrence{}, {a, b, first});
+}
+
 /// y [t, n, h]: hidden states of all steps.
 inline Var gru(const Var& x, const Var& h0, const Var& w_ih, const Var& w_hh, const Var& b_ih,
                const Var& b_hh) {

@@ -54,9 +54,7 @@ std::vector<JointTrack> make_tracks(const Corpus& corpus, const TrackConfig& con
     const auto clouds =
         clouds_of(sampler, subject, static_cast<size_t>(config.frames), config, own);
     for (size_t f = 0; f < clouds.size(); ++f) {
-      Joints joints = extract(clouds[f], own.fold("extract").fold(f));
-      for (Vec3& joint : joints) joint = back * joint;
-      out[i].joints.push_back(joints);
+      out[i].frames.push_back(turned(back, extract(clouds[f], own.fold("extract").fold(f))));
     }
   }
   return out;

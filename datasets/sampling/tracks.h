@@ -8,13 +8,14 @@
 
 #include "datasets/corpus.h"
 #include "datasets/sampling/clouds.h"
+#include "nn/models/extraction.h"
 
 namespace restage {
 
 /// Part of a performance as somebody saw it.
 struct JointTrack {
   size_t body = 0, motion = 0, first = 0;  ///< indices into the corpus, the first frame
-  std::vector<Joints> joints;              ///< one per frame, in the world
+  std::vector<SeenJoints> frames;          ///< in the world
 };
 
 struct TrackConfig {
@@ -24,8 +25,8 @@ struct TrackConfig {
   CloudConfig clouds;            ///< noise, dressed, one_camera, camera_ring: each of a whole track
 };
 
-/// Joints of a cloud, in its frame; `key` for what is random.
-using Extract = std::function<Joints(const Points& cloud, const RngKey& key)>;
+/// What is seen in a cloud, in its frame; `key` for what is random.
+using Extract = std::function<SeenJoints(const Points& cloud, const RngKey& key)>;
 
 /// Track i is a function of (corpus, config, seed, i, extract). `extract` is called from one
 /// thread. InputError: no motion, settings out of range.

@@ -84,6 +84,12 @@ void put_joints(float* to, const std::vector<Joints>& frames, const std::vector<
   for (size_t t = 0; t < frames.size(); ++t) put_joints(to + 3 * kJoints * t, frames[t], turns[t]);
 }
 
+void put_rotations(float* to, const Rotations& global, const Mat3& turn) {
+  for (size_t j = 0; j < kJoints; ++j)
+    Eigen::Map<Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(to + 9 * j) =
+        (turn * global[j]).cast<float>();
+}
+
 void put_path(float* to, const std::vector<Vec3>& path) {
   for (size_t t = 0; t < path.size(); ++t) put(to + 3 * t, path[t]);
 }
@@ -111,6 +117,13 @@ void put_sixd(float* to, const std::vector<Pose>& poses, const std::vector<Mat3>
     }
 }
 
+/// What all frames of all tracks know.
+bool all_know(const std::vector<JointTrack>* tracks, bool (*knows)(const SeenJoints&)) {
+  return tracks != nullptr && std::all_of(tracks->begin(), tracks->end(), [&](const auto& track) {
+           return std::all_of(track.frames.begin(), track.frames.end(), knows);
+         });
+}
+
 WindowBatch make_batch(int64_t n, int64_t t, bool truth) {
   WindowBatch b;
   for (Tensor* x : {&b.joints_a, &b.input_a, &b.real_b}) *x = Tensor::empty({n, t, kJoints, 3});
@@ -133,12 +146,15 @@ WindowSampler::WindowSampler(const Corpus& corpus, const WindowConfig& config, u
       config_(checked(config)),
       key_(RngKey{seed, 0}.fold("windows")),
       frames_(corpus.motions, static_cast<size_t>(config.frames)),
-      tracks_(tracks) {
+      tracks_(tracks),
+      know_turns_(all_know(tracks, [](const SeenJoints& f) { return f.turns.has_value(); })),
+      know_uncertainty_(
+          all_know(tracks, [](const SeenJoints& f) { return f.uncertainty.has_value(); })) {
   if (tracks != nullptr)
     check_setting("window",
                   !tracks->empty() && std::all_of(tracks->begin(), tracks->end(),
                                                   [&](const JointTrack& track) {
-                                                    return std::ssize(track.joints) >=
+                                                    return std::ssize(track.frames) >=
                                                            config.frames;
                                                   }),
                   "frames", "at most those of the answers' sequences");
@@ -173,7 +189,7 @@ WindowSubject WindowSampler::subject(int64_t index) const {
   out.body_b = out.self ? out.body_a : other + (other >= out.body_a ? 1 : 0);
   out.clip = place(rng);
   if (out.track != nullptr) {
-    const auto later = out.track->joints.size() - static_cast<size_t>(config_.frames) + 1;
+    const auto later = out.track->frames.size() - static_cast<size_t>(config_.frames) + 1;
     out.clip = {out.track->motion, out.track->first + rng.below(later)};
   }
   out.real = place(rng);
@@ -192,8 +208,11 @@ void WindowSampler::fill(WindowBatch& batch, int64_t row, int64_t index) const {
   const Window real = perform(body_b, corpus_.motions[s.real.motion], s.real.frame, config_.frames,
                               s.real_augmentation);
   std::vector<Joints> seen = a.joints;
+  const auto frame = [&](size_t t) -> const SeenJoints& {
+    return s.track->frames[s.clip.frame - s.track->first + t];
+  };
   for (size_t t = 0; s.track != nullptr && t < seen.size(); ++t)
-    seen[t] = augmented(s.augmentation, s.track->joints[s.clip.frame - s.track->first + t]);
+    seen[t] = augmented(s.augmentation, frame(t).joints);
   seen = noisy(seen, key_.fold(static_cast<uint64_t>(index)).fold("noise"), config_.noise,
                config_.noise_correlation);
   std::vector<Vec3> path = a.path(), seen_path = path;
@@ -204,6 +223,13 @@ void WindowSampler::fill(WindowBatch& batch, int64_t row, int64_t index) const {
   const std::vector<Mat3> own_turns = turns_of(real.joints, config_);
   put_joints(row_of(batch.joints_a, row), a.joints, turns);
   put_joints(row_of(batch.input_a, row), seen, turns);
+  for (size_t t = 0; batch.turns.defined() && t < seen.size(); ++t)
+    put_rotations(row_of(batch.turns, row) + 9 * kJoints * t,
+                  augmented(s.augmentation, *frame(t).turns), turns[t]);
+  for (size_t t = 0; batch.uncertainty.defined() && t < seen.size(); ++t)
+    for (size_t j = 0; j < kJoints; ++j)
+      row_of(batch.uncertainty, row)[kJoints * t + j] = static_cast<float>(
+          (*frame(t).uncertainty)[s.augmentation.mirror ? static_cast<size_t>(kMirror[j]) : j]);
   put_translation(row_of(batch.trans_a, row), path, config_.translation, turns);
   put_translation(row_of(batch.input_trans_a, row), seen_path, config_.translation, turns);
   put_joints(row_of(batch.rest_a, row), a.rest);
@@ -224,6 +250,8 @@ void WindowSampler::fill(WindowBatch& batch, int64_t row, int64_t index) const {
 
 WindowBatch WindowSampler::batch(int64_t first, int64_t n) const {
   WindowBatch out = make_batch(n, config_.frames, config_.truth);
+  if (know_turns_) out.turns = Tensor::empty({n, config_.frames, kJoints, 3, 3});
+  if (know_uncertainty_) out.uncertainty = Tensor::empty({n, config_.frames, kJoints});
   parallel_for(n, 1, [&](int64_t from, int64_t to) {
     for (int64_t i = from; i < to; ++i) fill(out, i, first + i);
   });

@@ -44,6 +44,8 @@ struct WindowBatch {
   Tensor input_a;        ///< [N, T, 22, 3] the same as an extractor may see them: with noise
   Tensor trans_a;        ///< [N, T, 3]
   Tensor input_trans_a;  ///< [N, T, 3] trans_a unless `noisy_translation`
+  Tensor turns;          ///< [N, T, 22, 3, 3] and
+  Tensor uncertainty;    ///< [N, T, 22] of MotionInput, as tracks know them; undefined without
   Tensor rest_a;         ///< [N, 22, 3] rest joints
   Tensor rest_b;         ///< [N, 22, 3] equal to rest_a for self samples
   Tensor sixd_a;         ///< [N, T, 132] A's local rotations: per joint columns 0 and 1
@@ -91,6 +93,7 @@ class WindowSampler {
   RngKey key_;
   FrameIndex frames_;
   const std::vector<JointTrack>* tracks_;
+  bool know_turns_, know_uncertainty_;
 };
 
 }  // namespace restage

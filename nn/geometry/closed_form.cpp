@@ -1,5 +1,7 @@
 #include "nn/geometry/closed_form.h"
 
+#include <cmath>
+
 namespace restage {
 namespace {
 
@@ -33,6 +35,34 @@ int only_child(int joint) {
   return -1;
 }
 
+/// A joint's rotation by its bones alone, and the bone that it can twist about.
+struct Swung {
+  Mat3 rotation;
+  std::optional<Vec3> bone;  ///< posed direction; none at frames, leaves and bones without length
+};
+
+/// `global` holds the rotations of its ancestors.
+Swung swung(int j, const Rotations& global, const Joints& rest, const Joints& posed) {
+  const int parent = kParents[j], child = only_child(j);
+  const Mat3 above = parent < 0 ? Mat3(Mat3::Identity()) : global[parent];
+  if (j == kPelvis)
+    return {turn(rest, posed, kLeftHip, kRightHip, kPelvis, kSpine1, above), std::nullopt};
+  if (j == kSpine3)
+    return {turn(rest, posed, kLeftCollar, kRightCollar, kSpine3, kNeck, above), std::nullopt};
+  if (child < 0) return {above, std::nullopt};
+  const Vec3 bone = above * (rest[child] - rest[j]), wanted = posed[child] - posed[j];
+  if (!(bone.norm() > kTiny && wanted.norm() > kTiny)) return {above, std::nullopt};
+  return {shortest_arc(bone, wanted) * above, wanted.normalized()};
+}
+
+/// Angle of the part of a rotation that turns about a direction, -pi to pi.
+double twist_about(const Vec3& axis, const Mat3& rotation) {
+  const Quat q(rotation);
+  const double along = q.vec().dot(axis);
+  if (std::hypot(along, q.w()) < 1e-6) return 0;  // half a turn about something else
+  return std::remainder(2 * std::atan2(along, q.w()), 2 * M_PI);
+}
+
 std::vector<Vec3> pelvis_path(const std::vector<Joints>& source, const Joints& target_rest) {
   std::vector<Vec3> path;
   if (source.empty()) return path;
@@ -45,20 +75,23 @@ std::vector<Vec3> pelvis_path(const std::vector<Joints>& source, const Joints& t
 
 Rotations closed_form_rotations(const Joints& rest, const Joints& posed) {
   Rotations global;
-  for (int j = 0; j < kJoints; ++j) {
-    const int parent = kParents[j], child = only_child(j);
-    global[j] = parent < 0 ? Mat3::Identity() : global[parent];
-    if (j == kPelvis) {
-      global[j] = turn(rest, posed, kLeftHip, kRightHip, kPelvis, kSpine1, global[j]);
-    } else if (j == kSpine3) {
-      global[j] = turn(rest, posed, kLeftCollar, kRightCollar, kSpine3, kNeck, global[j]);
-    } else if (child >= 0) {
-      const Vec3 bone = global[j] * (rest[child] - rest[j]), wanted = posed[child] - posed[j];
-      if (bone.norm() > kTiny && wanted.norm() > kTiny)
-        global[j] = shortest_arc(bone, wanted) * global[j];
-    }
-  }
+  for (int j = 0; j < kJoints; ++j) global[j] = swung(j, global, rest, posed).rotation;
   return global;
+}
+
+TwistReading read_twist(const Joints& rest, const Joints& posed, const Rotations& measured) {
+  Rotations global;
+  TwistReading out;
+  for (int j = 0; j < kJoints; ++j) {
+    const Swung own = swung(j, global, rest, posed);
+    global[j] = own.rotation;
+    if (own.bone) {
+      out.twist[j] = twist_about(*own.bone, measured[j] * own.rotation.transpose());
+      global[j] = Eigen::AngleAxisd(out.twist[j], *own.bone) * own.rotation;
+    }
+    out.beyond[j] = global[j].transpose() * measured[j];
+  }
+  return out;
 }
 
 double trajectory_scale(const Joints& source, const Joints& target_rest) {

@@ -16,6 +16,15 @@ namespace restage {
 /// Directions of zero length leave the parent's rotation as it is.
 Rotations closed_form_rotations(const Joints& rest, const Joints& posed);
 
+/// What measured rotations of the joints (from the T-pose, global) say beyond their positions.
+struct TwistReading {
+  std::array<double, kJoints> twist{};  ///< about each posed bone, radians; 0 at frames and leaves
+  Rotations beyond;  ///< what is left of each joint's rotation then, in its own axes; of a leaf all
+                     ///< of it, from its parent's
+};
+/// The closed form, twisted joint by joint as measured.
+TwistReading read_twist(const Joints& rest, const Joints& posed, const Rotations& measured);
+
 /// How much larger B's steps are than A's: ratio of leg lengths (spec 3.3). 1 if A has no legs.
 double trajectory_scale(const Joints& source, const Joints& target_rest);
 

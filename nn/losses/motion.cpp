@@ -66,8 +66,8 @@ MotionLosses motion_losses(Context& ctx, const MotionModel& net, Discriminator* 
                            bool discriminator_gradients) {
   MotionLosses out;
   MotionState forth, back;
-  const MotionOutput to_b = net.forward(ctx, b.input, b.trans, b.rest_b, &forth);
-  const MotionOutput to_a = net.forward(ctx, to_b.joints, to_b.trans, b.rest_a, &back);
+  const MotionOutput to_b = net.forward(ctx, b.seen(b.rest_b), &forth);
+  const MotionOutput to_a = net.forward(ctx, {to_b.joints, to_b.trans, b.rest_a, {}, {}}, &back);
   out.joints_b = to_b.joints;
   out.trans_b = to_b.trans;
   put_reconstruction(to_a, b, w, &out);
@@ -98,7 +98,7 @@ MotionLosses self_losses(Context& ctx, const MotionModel& net, const MotionBatch
                          const MotionWeights& w) {
   MotionLosses out;
   MotionState state;
-  const MotionOutput to_a = net.forward(ctx, b.input, b.trans, b.rest_a, &state);
+  const MotionOutput to_a = net.forward(ctx, b.seen(b.rest_a), &state);
   out.joints_b = to_a.joints;
   out.trans_b = to_a.trans;
   put_reconstruction(to_a, b, w, &out);

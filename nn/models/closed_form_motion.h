@@ -17,8 +17,7 @@ void visit(V&, ClosedFormMotionConfig&) {}
 struct ClosedFormMotion final : MotionModel {
   using Config = ClosedFormMotionConfig;
   ClosedFormMotion(const ClosedFormMotionConfig&, const Init&) {}
-  MotionOutput forward(Context& ctx, const Var& joints, const Var& trans, const Var& rest,
-                       MotionState* state) const override;
+  MotionOutput forward(Context& ctx, const MotionInput& in, MotionState* state) const override;
   void standardise(const MotionStatistics&) override {}
   void visit(Fields&) override {}
   const char* kind() const override { return "closed form"; }

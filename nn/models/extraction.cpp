@@ -12,6 +12,15 @@ bool before(const Point& a, const Point& b) {
 
 bool mirrored(size_t view) { return view % 2 == 1; }
 
+/// With x along `first`, y along the rest of `second`; none if they span no plane.
+Mat3 rotation_of(const Vec3& first, const Vec3& second) {
+  const Vec3 x = first.normalized(), y = (second - x.dot(second) * x).normalized();
+  if (!(first.norm() > 1e-9) || !(y.squaredNorm() > 0.5)) return Mat3::Identity();
+  Mat3 out;
+  out << x, y, x.cross(y);
+  return out;
+}
+
 /// The mean of each coordinate, without a quarter of the values at either end from eight on.
 /// `values`: room for one coordinate of each.
 Joints middle(const std::vector<Joints>& answers, const std::string& source,
@@ -74,8 +83,8 @@ void JointExtractor::choose(const RngKey& key) {
   std::sort(chosen_.begin(), chosen_.end(), before);
 }
 
-Joints JointExtractor::operator()(const Points& cloud, const std::string& source,
-                                  const RngKey& key) {
+SeenJoints JointExtractor::operator()(const Points& cloud, const std::string& source,
+                                      const RngKey& key) {
   sort(cloud, source);
   const auto n = static_cast<size_t>(model_.points());
   const size_t views = centres_.size();
@@ -96,7 +105,8 @@ Joints JointExtractor::operator()(const Points& cloud, const std::string& source
     }
   }
   Context ctx;
-  const Tensor joints = model_.forward(ctx, batch).joints.value;
+  const SkeletonOutput answer = model_.forward(ctx, batch);
+  const Tensor joints = answer.joints.value;
   for (size_t s = 0; s < views; ++s) {
     const Mat3 back = turn_about_y(-heading(s));
     for (size_t j = 0; j < kJoints; ++j) {
@@ -105,12 +115,57 @@ Joints JointExtractor::operator()(const Points& cloud, const std::string& source
       answers_[s][j] = back * Vec3(mirrored(s) ? -x[0] : x[0], x[1], x[2]) + centres_[s];
     }
   }
-  return middle(answers_, source, values_);
+  SeenJoints out = middle(answers_, source, values_);
+  if (answer.turns.value.defined()) out.turns = mean_turns(answer.turns.value);
+  if (answer.uncertainty.value.defined())
+    out.uncertainty = mean_uncertainty(answer.uncertainty.value);
+  return out;
+}
+
+/// Of the columns that the views [s, 22, 6] give, turned back; then made a rotation.
+Rotations JointExtractor::mean_turns(const Tensor& turns) const {
+  Rotations out;
+  const float* x = turns.data<float>();
+  for (size_t j = 0; j < kJoints; ++j) {
+    Eigen::Matrix<double, 3, 2> columns = Eigen::Matrix<double, 3, 2>::Zero();
+    for (size_t s = 0; s < centres_.size(); ++s) {
+      const size_t from = mirrored(s) ? static_cast<size_t>(kMirror[j]) : j;
+      Eigen::Matrix<double, 3, 2> own =
+          Eigen::Map<const Eigen::Matrix<float, 3, 2>>(x + 6 * (s * kJoints + from)).cast<double>();
+      if (mirrored(s)) {  // M R M with M = diag(-1, 1, 1)
+        own.row(0) *= -1;
+        own.col(0) *= -1;
+      }
+      columns += turn_about_y(-heading(s)) * own;
+    }
+    out[j] = rotation_of(columns.col(0), columns.col(1));
+  }
+  return out;
+}
+
+/// Of logarithms [s, 22].
+std::array<double, kJoints> JointExtractor::mean_uncertainty(const Tensor& logs) const {
+  std::array<double, kJoints> out{};
+  for (size_t s = 0; s < centres_.size(); ++s)
+    for (size_t j = 0; j < kJoints; ++j) {
+      const size_t from = mirrored(s) ? static_cast<size_t>(kMirror[j]) : j;
+      out[j] += static_cast<double>(logs.data<float>()[s * kJoints + from]);
+    }
+  for (double& x : out) x = std::exp(x / static_cast<double>(centres_.size()));
+  return out;
+}
+
+SeenJoints turned(const Mat3& turn, const SeenJoints& seen) {
+  SeenJoints out = seen;
+  for (Vec3& joint : out.joints) joint = turn * joint;
+  if (out.turns)
+    for (Mat3& r : *out.turns) r = turn * r;
+  return out;
 }
 
 Joints extract_joints(SkeletonModel& model, const Points& cloud, const std::string& source,
                       const RngKey& key, int samples, double around) {
-  return JointExtractor(model, samples, around)(cloud, source, key);
+  return JointExtractor(model, samples, around)(cloud, source, key).joints;
 }
 
 Points surface_points(const Mesh& mesh, size_t n, const RngKey& key) {

@@ -2,6 +2,9 @@
 // extractor.
 #pragma once
 
+#include <array>
+#include <optional>
+
 #include "autograd/base/rng.h"
 #include "nn/geometry/body.h"
 #include "nn/models/skeleton.h"
@@ -14,6 +17,17 @@ inline constexpr size_t kLeastDistinctPoints = 64;
 inline constexpr double kAllAround = 6.283185307179586;
 inline constexpr double kRestPoses = 0.7;  ///< of a target, which faces +z
 
+/// What an extractor answers to a cloud.
+struct SeenJoints {
+  SeenJoints() = default;
+  SeenJoints(const Joints& known) : joints(known) {}
+  Joints joints{};  ///< metres
+  // Where the model gives them (SkeletonOutput); of several views the mean.
+  std::optional<Rotations> turns;                          ///< from the T-pose
+  std::optional<std::array<double, kJoints>> uncertainty;  ///< metres
+};
+SeenJoints turned(const Mat3& turn, const SeenJoints& seen);
+
 /// The 22 joints of clouds. Keeps its working memory between clouds.
 class JointExtractor {
  public:
@@ -25,19 +39,21 @@ class JointExtractor {
   /// Metres, in the cloud's frame. Points are sorted lexicographically first and exact repeats
   /// left out, so neither their order in a file nor pixels without depth matter to the last bit.
   /// InputError naming `source`: fewer than 64 distinct points, values that are not finite.
-  Joints operator()(const Points& cloud, const std::string& source, const RngKey& key);
+  SeenJoints operator()(const Points& cloud, const std::string& source, const RngKey& key);
 
  private:
   void sort(const Points& cloud, const std::string& source);
   void choose(const RngKey& key);
   double heading(size_t view) const;
+  Rotations mean_turns(const Tensor& turns) const;
+  std::array<double, kJoints> mean_uncertainty(const Tensor& logs) const;
 
   SkeletonModel& model_;
   double around_;
   Points sorted_, chosen_;
   std::vector<Vec3> centres_;
   std::vector<Joints> answers_;
-  std::vector<double> values_;
+  std::vector<double> values_;  // one coordinate of each
 };
 
 /// The joints of one cloud.

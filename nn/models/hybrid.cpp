@@ -1,52 +1,59 @@
 #include "nn/models/hybrid.h"
 
-#include <array>
+#include <cmath>
 
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
+#include "autograd/ops/rnn.h"
 #include "autograd/ops/rotation.h"
 #include "autograd/ops/swing.h"
+#include "nn/models/surface_turns.h"
 
 namespace restage {
 namespace {
 
 constexpr double kCorrection =
     0.02;  // metres, radians and 6D numbers that an answer of 1 stands for
+constexpr double kUsualUncertainty = 0.01;  // metres
 constexpr double kTwist = 0.3, kLeaf = 0.3, kPath = 0.3;
-constexpr std::array<int, 5> kLeaves = {10, 11, 15, 20, 21};
+constexpr double kTrusting = 4;  // log odds of an untrained gate: what is seen counts for 98 %
+constexpr int64_t kEnds = std::ssize(kLeaves);
 
-/// The identity's first two columns, for each leaf.
-Tensor rest_sixd(DType type) {
-  std::vector<double> out;
-  for (size_t i = 0; i < kLeaves.size(); ++i) out.insert(out.end(), {1, 0, 0, 0, 1, 0});
-  return Tensor::from<double>({std::ssize(out)}, out).cast(type);
+/// y_t = g_t x_t + (1 - g_t) y_(t-1) over [n, t, m]; before the first frame y is x. `last` [n, m]
+/// is read and replaced.
+Var filtered(const Var& x, const Var& g, Var* last) {
+  const int64_t n = x.size(0), t = x.size(1), m = x.size(2);
+  if (!last->value.defined()) *last = reshape(slice(x, 1, 0, 1), {n, m});
+  const Var y = recurrence(add_scalar(neg(g), 1), g * x, *last);
+  *last = reshape(slice(y, 1, t - 1, t), {n, m});
+  return y;
 }
 
-/// Rotations [n, 22, 3, 3] with those of the leaves [n, 5, 3, 3] in their places.
-Var with_leaves(const Var& rotations, const Var& leaves) {
-  Var out;
-  int done = 0;
-  const auto append = [&](const Var& x) { out = out.value.defined() ? concat({out, x}, 1) : x; };
-  for (int i = 0; i < static_cast<int>(kLeaves.size()); ++i) {
-    if (kLeaves[i] > done) append(slice(rotations, 1, done, kLeaves[i]));
-    append(slice(leaves, 1, i, i + 1));
-    done = kLeaves[i] + 1;
-  }
-  if (done < kJoints) append(slice(rotations, 1, done, kJoints));
-  return out;
+/// Gates of 22 joints, 22 twists and the leaves [n, t, 22 + 22 + 5] for each of their numbers.
+Var for_each_number(const Var& gates) {
+  const int64_t n = gates.size(0), t = gates.size(1);
+  const auto repeated = [&](int64_t from, int64_t count, int64_t times) {
+    const Var one = reshape(slice(gates, 2, from, from + count), {n, t, count, 1});
+    return reshape(expand(one, {n, t, count, times}), {n, t, count * times});
+  };
+  return concat({repeated(0, kJoints, 3), slice(gates, 2, kJoints, 2 * kJoints),
+                 repeated(2 * kJoints, kEnds, 6)},
+                2);
 }
 
 }  // namespace
 
 Hybrid::Hybrid(const HybridConfig& c, const Init& init)
     : config(c),
-      enc(3 * (kJoints + 1), c.hidden, c.layers, c.dropout, init.sub("enc")),
+      enc(3 * (kJoints + 1) + (c.orientation ? 4 * kJoints : 0) + (c.uncertainty ? kJoints : 0),
+          c.hidden, c.layers, c.dropout, init.sub("enc")),
       dec(c.hidden + 3 * kJoints, c.hidden, c.layers, c.dropout, init.sub("dec")),
+      gate(c.hidden, 2 * kJoints + kEnds, init.sub("gate")),
       correction(c.hidden, 3 * kJoints, init.sub("correction")),
       twist(c.hidden, kJoints, init.sub("twist")),
-      leaves(c.hidden, 6 * std::ssize(kLeaves), init.sub("leaves")),
+      leaves(c.hidden, 6 * kEnds, init.sub("leaves")),
       path(c.hidden, 3, init.sub("path")) {
-  for (Linear* head : {&correction, &twist, &leaves, &path}) head->start_small();
+  for (Linear* head : {&gate, &correction, &twist, &leaves, &path}) head->start_small();
   const auto constant = [&](int64_t n, double v) { return Tensor::full({n}, v, init.type); };
   units.joints = {constant(3 * kJoints, 0), constant(3 * kJoints, 1)};
   units.rest = {constant(3 * kJoints, 0), constant(3 * kJoints, 1)};
@@ -57,37 +64,59 @@ void Hybrid::standardise(const MotionStatistics& s) {
   units.joints = s.joints, units.rest = s.rest, units.trans = s.trans;
 }
 
-MotionOutput Hybrid::forward(Context& ctx, const Var& joints, const Var& trans, const Var& rest,
-                             MotionState* state) const {
+/// What the encoder sees of A.
+Var Hybrid::seen(const MotionInput& in, const SurfaceTurns& surface) const {
+  const int64_t n = in.joints.size(0), t = in.joints.size(1);
+  Var out = concat({in_units(reshape(in.joints, {n, t, 3 * kJoints}), units.joints),
+                    in_units(in.trans, units.trans)},
+                   2);
+  if (config.orientation)
+    out = concat({out, reshape(Var(surface.twist), {n, t, kJoints}),
+                  reshape(Var(surface.beyond), {n, t, 3 * kJoints})},
+                 2);
+  if (!config.uncertainty) return out;
+  const Var usual(Tensor::full({n, t, kJoints}, kUsualUncertainty, in.joints.dtype()));
+  const Var off = in.uncertainty.defined() ? Var(in.uncertainty) : usual;
+  return concat({out, log(off / usual)}, 2);
+}
+
+MotionOutput Hybrid::forward(Context& ctx, const MotionInput& in, MotionState* state) const {
   const ModuleScope scope_of_this(scope);
-  const int64_t n = joints.size(0), t = joints.size(1), w = 3 * kJoints;
-  const Var a = in_units(reshape(joints, {n, t, w}), units.joints);
-  const Var v = in_units(trans, units.trans);
-  const Var b = in_units(reshape(rest, {n, 1, w}), units.rest);
-  state->resize(2);
-  const Var code = enc(ctx, concat({a, v}, 2), &(*state)[0]);
+  const int64_t n = in.joints.size(0), t = in.joints.size(1), w = 3 * kJoints;
+  const SurfaceTurns surface = surface_turns(in);
+  const Var b = in_units(reshape(in.rest, {n, 1, w}), units.rest);
+  state->resize(3);
+  const Var code = enc(ctx, seen(in, surface), &(*state)[0]);
   const Var decoded = dec(ctx, concat({code, expand(b, {n, t, w})}, 2), &(*state)[1]);
 
-  const Var moved = reshape(joints, {n, t, w}) + scale(correction(ctx, decoded), kCorrection);
+  const Var gates = sigmoid(add_scalar(gate(ctx, decoded), kTrusting));
+  const Var ends = reshape(matrix_to_sixd(Var(surface.leaves)), {n, t, 6 * kEnds});
+  const Var now = concat(
+      {reshape(in.joints, {n, t, w}), reshape(Var(surface.twist), {n, t, kJoints}), ends}, 2);
+  const Var calm = filtered(now, for_each_number(gates), &(*state)[2]);
+  const Var moved = slice(calm, 2, 0, w) + scale(correction(ctx, decoded), kCorrection),
+            twisted = slice(calm, 2, w, w + kJoints) + scale(twist(ctx, decoded), kTwist),
+            sixd = slice(calm, 2, w + kJoints, w + kJoints + 6 * kEnds) +
+                   scale(leaves(ctx, decoded), kLeaf);
+
   const Var posed = reshape(moved, {n * t, kJoints, 3});
-  const Var rest_rows = rest_of_each_frame(rest, t);
-  const Var turns = reshape(scale(twist(ctx, decoded), kTwist), {n * t, kJoints});
-  const Var swung = swing_twist(rest_rows, posed, turns, joint_swings());
-  const Var sixd = scale(leaves(ctx, decoded), kLeaf) + Var(rest_sixd(joints.dtype()));
-  const Var ends = sixd_to_matrix(reshape(sixd, {n * t, std::ssize(kLeaves), 6}));
-  const Var local = with_leaves(swung, ends);
+  const Var rest_rows = rest_of_each_frame(in.rest, t);
+  const Var swung =
+      swing_twist(rest_rows, posed, reshape(twisted, {n * t, kJoints}), joint_swings());
+  const Var local = with_leaves(swung, sixd_to_matrix(reshape(sixd, {n * t, kEnds, 6})));
 
   MotionOutput out;
   out.raw = reshape(matrix_to_sixd(local), {n, t, 6 * kJoints});
   put_pose(local, rest_rows, n, &out);
   const Var longer = reshape(leg_lengths(rest_rows) / leg_lengths(posed), {n, t, 1});
-  out.trans = trans * longer + scale(path(ctx, decoded), kPath) * Var(units.trans.deviation);
+  out.trans = in.trans * longer + scale(path(ctx, decoded), kPath) * Var(units.trans.deviation);
   return out;
 }
 
 void Hybrid::visit(Fields& f) {
   f("enc", enc);
   f("dec", dec);
+  f("gate", gate);
   f("correction", correction);
   f("twist", twist);
   f("leaves", leaves);

@@ -2,15 +2,18 @@
 //
 // SMRM (spec 3) has to learn the identity before it can be of use: fed with true skeletons it is
 // worse than the closed form of them, and than copying (docs/method.md, "Past SMRM"). Here the same
-// recurrent layers give, per frame, a correction of A's joints, the twist about each bone, and the
-// rotations of head, hands and feet; all other rotations are the closed form of the corrected
-// joints on B's rest joints, inside the tape. Before training that is the closed form itself.
+// recurrent layers say, per frame, how much of what is seen of each joint is to be believed against
+// what was believed before (a filter whose gain is learned), and correct the joints, the twist
+// about each bone, and the rotations of head, hands and feet; all other rotations are the closed
+// form of these joints on B's rest joints, inside the tape. Before training that is very nearly the
+// closed form itself.
 #pragma once
 
 #include "nn/config/rules.h"
 #include "nn/layers/gru.h"
 #include "nn/layers/linear.h"
 #include "nn/models/motion.h"
+#include "nn/models/surface_turns.h"
 
 namespace restage {
 
@@ -18,28 +21,33 @@ struct HybridConfig {
   int64_t hidden = 256;
   int layers = 2;
   double dropout = 0;
+  bool orientation = true, uncertainty = true;
 };
 
 template <class V>
 void visit(V& v, HybridConfig& c) {
   v("hidden", c.hidden, "size of the hidden states", between(1, kMostWidth));
   v("dropout", c.dropout, "between the layers", below(0, 1));
+  v("orientation", c.orientation, "sees the rotations that the extractor reads from the surface");
+  v("uncertainty", c.uncertainty, "sees how far the extractor's joints may be off");
 }
 
-/// The state is {encoder, decoder}, both [layers, n, hidden].
+/// The state is {encoder, decoder}, both [layers, n, hidden], and what is believed, [n, 118].
 struct Hybrid final : MotionModel {
   using Config = HybridConfig;
   Hybrid(const HybridConfig& c, const Init& init);
-  MotionOutput forward(Context& ctx, const Var& joints, const Var& trans, const Var& rest,
-                       MotionState* state) const override;
+  MotionOutput forward(Context& ctx, const MotionInput& in, MotionState* state) const override;
   void standardise(const MotionStatistics& statistics) override;
   void visit(Fields& f) override;
   const char* kind() const override { return "Hybrid"; }
 
   HybridConfig config;
   GruLayer enc, dec;
-  Linear correction, twist, leaves, path;  ///< all near none at the start
-  MotionStatistics units;                  ///< all but `sixd`
+  Linear gate, correction, twist, leaves, path;  ///< all near none at the start
+  MotionStatistics units;                        ///< all but `sixd`
+
+ private:
+  Var seen(const MotionInput& in, const SurfaceTurns& surface) const;
 };
 
 }  // namespace restage

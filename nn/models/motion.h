@@ -1,6 +1,7 @@
 // What every motion network is: joints and translation of A in, the motion of B out (spec 3.1).
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "autograd/kernels/rotation.h"
@@ -11,6 +12,16 @@ namespace restage {
 
 /// What a network carries from frame to frame, in a form of its own; empty at the start.
 using MotionState = std::vector<Var>;
+
+/// What is seen of A, and who is to perform it. The last two are what an extractor may say beside
+/// the joints; undefined where it does not, and no network needs them.
+struct MotionInput {
+  Var joints;          ///< [n, t, 22, 3] of A relative to its root
+  Var trans;           ///< [n, t, 3], in the configured meaning
+  Var rest;            ///< [n, 22, 3] of B relative to its root
+  Tensor turns;        ///< [n, t, 22, 3, 3] rotation of each joint of A from the T-pose
+  Tensor uncertainty;  ///< [n, t, 22] of A's joints, metres (SkeletonOutput)
+};
 
 struct MotionOutput {
   Var raw;        ///< what the network gives before it becomes rotations, [n, t, 22 * numbers]
@@ -28,10 +39,8 @@ struct MotionStatistics {
 };
 
 struct MotionModel : Module {
-  /// joints [n, t, 22, 3] of A relative to its root; trans [n, t, 3]; rest [n, 22, 3] of B relative
-  /// to its root. `state` is read and replaced.
-  virtual MotionOutput forward(Context& ctx, const Var& joints, const Var& trans, const Var& rest,
-                               MotionState* state) const = 0;
+  /// `state` is read and replaced.
+  virtual MotionOutput forward(Context& ctx, const MotionInput& in, MotionState* state) const = 0;
   /// Called once before a training; a network that takes numbers as they are ignores it.
   virtual void standardise(const MotionStatistics& statistics) = 0;
 };

@@ -46,11 +46,10 @@ void Smrm::standardise(const MotionStatistics& s) {
   if (config.rotation == RotationForm::sixd) rot_mean = s.sixd.mean, rot_std = s.sixd.deviation;
 }
 
-MotionOutput Smrm::forward(Context& ctx, const Var& joints, const Var& trans, const Var& rest,
-                           MotionState* state) const {
+MotionOutput Smrm::forward(Context& ctx, const MotionInput& in, MotionState* state) const {
   const ModuleScope path(scope);
-  const int64_t n = joints.size(0), t = joints.size(1), j = config.joints;
-  Var a = reshape(joints, {n, t, 3 * j}), v = trans, b = reshape(rest, {n, 1, 3 * j});
+  const int64_t n = in.joints.size(0), t = in.joints.size(1), j = config.joints;
+  Var a = reshape(in.joints, {n, t, 3 * j}), v = in.trans, b = reshape(in.rest, {n, 1, 3 * j});
   if (config.standardise) {
     a = in_units(a, {joint_mean, joint_std});
     v = in_units(v, {trans_mean, trans_std});
@@ -69,7 +68,7 @@ MotionOutput Smrm::forward(Context& ctx, const Var& joints, const Var& trans, co
   const Var rows = reshape(out.raw, {n * t, j, rotation_width(config.rotation)});
   const Var local =
       config.rotation == RotationForm::sixd ? sixd_to_matrix(rows) : quaternion_to_matrix(rows);
-  put_pose(local, rest_of_each_frame(rest, t), n, &out);
+  put_pose(local, rest_of_each_frame(in.rest, t), n, &out);
   return out;
 }
 

@@ -31,8 +31,7 @@ void visit(V& v, SmrmConfig& c) {
 struct Smrm final : MotionModel {
   using Config = SmrmConfig;
   Smrm(const SmrmConfig& c, const Init& init);
-  MotionOutput forward(Context& ctx, const Var& joints, const Var& trans, const Var& rest,
-                       MotionState* state) const override;
+  MotionOutput forward(Context& ctx, const MotionInput& in, MotionState* state) const override;
   void standardise(const MotionStatistics& statistics) override;
   void visit(Fields& f) override;
   const char* kind() const override { return "SMRM"; }

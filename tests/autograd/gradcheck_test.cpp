@@ -274,6 +274,7 @@ TEST(SavedTensors, AreThoseOfTheTable) {
       {"atan2", "x0 x1"},
       {"forward_kinematics", "x0 x1 y"},
       {"swing_twist", "x0 x1 x2"},
+      {"recurrence", "x0 x2 y"},
       {"linear_blend_skinning", "x0 x1 x2 x3"},
   };
   size_t seen = 0;

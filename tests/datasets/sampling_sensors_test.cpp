@@ -170,16 +170,21 @@ TEST(SamplingTracks, WindowsSeeWhatWasAnswered) {
   const Point offset(0, 3, 0);
   const auto extract = [&](const Points& cloud, const RngKey&) {
     ++asked;
-    Joints out;
-    for (size_t j = 0; j < kJoints; ++j)
-      out[j] =
+    SeenJoints out;
+    out.turns.emplace();
+    out.uncertainty.emplace();
+    for (size_t j = 0; j < kJoints; ++j) {
+      out.joints[j] =
           (centroid(cloud) + offset).cast<double>() + Vec3(0, 0.01 * static_cast<double>(j), 0);
+      (*out.turns)[j] = Mat3::Identity();
+      (*out.uncertainty)[j] = 0.001 * static_cast<double>(j);
+    }
     return out;
   };
   const auto tracks = make_tracks(training_corpus(), config, 3, extract);
   ASSERT_EQ(tracks.size(), 5u);
   EXPECT_EQ(asked, 100);
-  const WindowConfig windows{.frames = 12, .mirror = false, .remove_heading = false};
+  WindowConfig windows{.frames = 12, .mirror = false, .remove_heading = false};
   const WindowSampler sampler(training_corpus(), windows, 1, &tracks);
   const WindowBatch batch = sampler.batch(0, 8);
   for (int64_t i = 0; i < 8; ++i) {
@@ -190,13 +195,35 @@ TEST(SamplingTracks, WindowsSeeWhatWasAnswered) {
     EXPECT_GE(s.clip.frame, s.track->first);
     EXPECT_LE(s.clip.frame + 12, s.track->first + 20);
     // Answers are in the world, whatever heading the extractor was shown.
-    const Joints& answer = s.track->joints[s.clip.frame - s.track->first];
+    const Joints& answer = s.track->frames[s.clip.frame - s.track->first].joints;
     const Pose pose = pose_on(training_corpus().motions[s.clip.motion],
                               training_corpus().bodies[s.body_a], s.clip.frame);
     EXPECT_LT((answer[0] - offset.cast<double>() - pose.root).norm(), 0.5);
     for (int j = 0; j < kJoints; ++j) EXPECT_NEAR(at(batch.input_a, i, j).y(), 0.01 * j, 1e-5);
     EXPECT_GT(at(batch.joints_a, i, 15).y(), 0.2) << "what is true stays";
   }
+  windows.mirror = true;
+  const WindowSampler mirroring(training_corpus(), windows, 1, &tracks);
+  const WindowBatch mirrored = mirroring.batch(0, 8);
+  ASSERT_EQ(mirrored.turns.shape(), (Shape{8, 12, kJoints, 3, 3}));
+  for (int64_t i = 0; i < 8; ++i) {
+    const WindowSubject s = mirroring.subject(i);
+    const SeenJoints& answer = s.track->frames[s.clip.frame - s.track->first];
+    for (int j = 0; j < kJoints; ++j) {
+      const int from = s.augmentation.mirror ? kMirror[static_cast<size_t>(j)] : j;
+      EXPECT_FLOAT_EQ(mirrored.uncertainty.data<float>()[i * 12 * kJoints + j],
+                      1e-3f * static_cast<float>(from));
+      // An answer turned as the sample is: about y, by its heading or against it.
+      const Mat3 turn = augmented(s.augmentation, *answer.turns)[static_cast<size_t>(j)];
+      const float* got = mirrored.turns.data<float>() + 9 * (i * 12 * kJoints + j);
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c) EXPECT_NEAR(got[3 * r + c], turn(r, c), 1e-5);
+    }
+  }
+  const auto joints_only = make_tracks(training_corpus(), config, 3,
+                                       [](const Points&, const RngKey&) { return Joints{}; });
+  EXPECT_FALSE(
+      WindowSampler(training_corpus(), windows, 1, &joints_only).batch(0, 1).turns.defined());
   config.frames = 10;
   const auto shorter = make_tracks(training_corpus(), config, 3, extract);
   EXPECT_THROW(WindowSampler(training_corpus(), windows, 1, &shorter), InputError);

@@ -104,7 +104,7 @@ std::vector<Pose> whole_sequence(const Bundle& models, const std::vector<Joints>
   Context ctx;
   MotionState state;
   const MotionOutput out = models.need_as<MotionModel>("motion", "test")
-                               .forward(ctx, Var(joints), Var(trans), Var(rest), &state);
+                               .forward(ctx, {Var(joints), Var(trans), Var(rest), {}, {}}, &state);
   std::vector<Pose> poses(source.size());
   Vec3 root = leg_length(target().joints) / leg_length(source[0]) * source[0][0];
   for (size_t f = 0; f < source.size(); ++f) {

@@ -78,6 +78,29 @@ TEST(ClosedForm, DegenerateSkeletonsGiveRotations) {
   EXPECT_TRUE(closed_form({}, rest).empty());
 }
 
+TEST(ClosedForm, ReadsTwistFromMeasuredRotations) {
+  const Body body = testing::tiny_body("a", "test");
+  const Motion motion = testing::tiny_motion("m", "s", "test", 8);
+  double largest = 0;
+  for (size_t f = 0; f < 8; ++f) {
+    const Pose pose = pose_on(motion, body, f);
+    const PosedSkeleton true_pose = forward_kinematics(body.joints, pose);
+    const TwistReading read = read_twist(body.joints, true_pose.joints, true_pose.global);
+    for (size_t j = 0; j < kJoints; ++j) {
+      const bool leaf = std::count(kParents.begin(), kParents.end(), static_cast<int>(j)) == 0;
+      const Mat3 left = leaf ? pose.local[j] : Mat3(Mat3::Identity());
+      EXPECT_LT((read.beyond[j] - left).norm(), 1e-6) << f << " " << kJointNames[j];
+      largest = std::max(largest, std::abs(read.twist[j]));
+    }
+  }
+  EXPECT_GT(largest, 0.1) << "nothing was twisted";
+  // A twist that is put on is read.
+  Rotations turned = closed_form_rotations(body.joints, body.joints);
+  turned[18] =
+      Eigen::AngleAxisd(0.7, (body.joints[20] - body.joints[18]).normalized()) * turned[18];
+  EXPECT_NEAR(read_twist(body.joints, body.joints, turned).twist[18], 0.7, 1e-9);
+}
+
 TEST(ClosedForm, IsAMotionModel) {
   const Joints rest = tiny_joints(1.2);
   std::vector<Joints> motion;
@@ -99,13 +122,13 @@ TEST(ClosedForm, IsAMotionModel) {
   const Tensor velocity = Tensor::full({1, 6, 3}, 2, DType::f64);
   Context ctx;
   MotionState whole, pieces;
-  const MotionOutput all = model->forward(ctx, a, velocity, b, &whole);
+  const MotionOutput all = model->forward(ctx, {a, velocity, b, {}, {}}, &whole);
   for (int64_t f = 0; f < 6; ++f) {
     const Tensor one = Tensor::from<double>(
         {1, 1, kJoints, 3},
         {a.data<double>() + f * 3 * kJoints, a.data<double>() + (f + 1) * 3 * kJoints});
     const MotionOutput out =
-        model->forward(ctx, one, Tensor::full({1, 1, 3}, 2, DType::f64), b, &pieces);
+        model->forward(ctx, {one, Tensor::full({1, 1, 3}, 2, DType::f64), b, {}, {}}, &pieces);
     for (int j = 0; j < kJoints; ++j)
       for (int c = 0; c < 3; ++c) {
         const double whole_value = all.joints.value.data<double>()[(f * kJoints + j) * 3 + c];

@@ -87,7 +87,9 @@ struct HighestPoint final : SkeletonModel {
         for (int64_t c = 0; c < 3; ++c)
           out.data<float>()[(s * kJoints + j) * 3 + c] = top[c] + (s < wrong ? 5.0f : 0.0f);
     }
-    return {.joints = Var(out), .votes = {}, .segmentation = {}, .centres = {}};
+    SkeletonOutput answer;
+    answer.joints = Var(out);
+    return answer;
   }
   int64_t points() const override { return 64; }
   void visit(Fields&) override {}
@@ -109,6 +111,44 @@ TEST(InferExtraction, ViewsAreTurnedBackAndWrongOnesOutvoted) {
   }
 }
 
+TEST(InferExtraction, ViewsAgreeOnRotations) {
+  // A vector of the cloud as the second column, and a cross product with it as the first: what a
+  // mirror does to a rotation, it does to these.
+  struct Pointing final : SkeletonModel {
+    SkeletonOutput forward(Context&, const Var& cloud) override {
+      const int64_t n = cloud.size(0);
+      SkeletonOutput out;
+      Tensor turns = Tensor::zeros({n, kJoints, 6});
+      for (int64_t i = 0; i < n; ++i) {
+        const Point* p = reinterpret_cast<const Point*>(cloud.value.data<float>() + i * 64 * 3);
+        const Point far = *std::max_element(
+            p, p + 64, [](const Point& a, const Point& b) { return a.norm() < b.norm(); });
+        const Point across = far.cross(Point(0, 1, 0));
+        for (int64_t j = 0; j < kJoints; ++j)
+          for (int64_t c = 0; c < 3; ++c) {
+            turns.data<float>()[6 * (i * kJoints + j) + c] = across[c];
+            turns.data<float>()[6 * (i * kJoints + j) + 3 + c] = far[c];
+          }
+      }
+      out.joints = Var(Tensor::zeros({n, kJoints, 3}));
+      out.turns = Var(turns);
+      out.uncertainty = Var(Tensor::full({n, kJoints}, -3));
+      return out;
+    }
+    int64_t points() const override { return 64; }
+    void visit(Fields&) override {}
+    const char* kind() const override { return "Pointing"; }
+  } model;
+  const Points points = cloud(64);
+  const SeenJoints one = JointExtractor(model, 1)(points, "c", RngKey{9, 0}),
+                   eight = JointExtractor(model, 8)(points, "c", RngKey{9, 0});
+  for (size_t j = 0; j < kJoints; ++j) {
+    EXPECT_LT(((*one.turns)[j] - (*eight.turns)[j]).norm(), 1e-5);
+    EXPECT_NEAR((*one.turns)[j].determinant(), 1, 1e-9);
+    EXPECT_NEAR((*eight.uncertainty)[j], std::exp(-3.0), 1e-6);
+  }
+}
+
 TEST(InferExtraction, MirroredViewsChangeSides) {
   // Whatever the view shows, left is where x is positive in it.
   struct Sides final : SkeletonModel {
@@ -117,7 +157,9 @@ TEST(InferExtraction, MirroredViewsChangeSides) {
       for (int64_t i = 0; i < out.numel() / 3; ++i)
         out.data<float>()[3 * i] =
             static_cast<float>(tiny_body("b", "test").joints[i % kJoints].x());
-      return {.joints = Var(out), .votes = {}, .segmentation = {}, .centres = {}};
+      SkeletonOutput answer;
+      answer.joints = Var(out);
+      return answer;
     }
     int64_t points() const override { return 64; }
     void visit(Fields&) override {}

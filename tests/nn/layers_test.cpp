@@ -63,8 +63,8 @@ TEST(DropoutMasks, TheTwoPassesOfACycleDiffer) {
                rest = random({1, kJoints, 3}, 3);
   Context ctx = training_step();
   MotionState forth, back;
-  const Tensor first = net.forward(ctx, joints, trans, rest, &forth).raw.value;
-  const Tensor second = net.forward(ctx, joints, trans, rest, &back).raw.value;
+  const Tensor first = net.forward(ctx, {joints, trans, rest, {}, {}}, &forth).raw.value;
+  const Tensor second = net.forward(ctx, {joints, trans, rest, {}, {}}, &back).raw.value;
   EXPECT_FALSE(same_bits(first, second));
 }
 

@@ -152,7 +152,7 @@ TEST_P(FullSize, Smrm) {
     auto model = make(form == "6d" ? "smrm/rot6d" : "smrm/quaternion");
     MotionState state;
     const MotionOutput y = dynamic_cast<MotionModel&>(*model).forward(
-        ctx, in(inputs.joints), in(inputs.trans), in(inputs.rest), &state);
+        ctx, {in(inputs.joints), in(inputs.trans), in(inputs.rest), {}, {}}, &state);
     expect("smrm_" + form + "_joints", y.joints);
     expect("smrm_" + form + "_trans", y.trans);
     expect("smrm_" + form + "_raw", y.raw);

@@ -254,7 +254,7 @@ void smrm(Case& c) {
   c.load(*net);
   MotionState state;
   const MotionOutput y =
-      net->forward(c.ctx(), c.in("joints"), c.in("trans"), c.in("tpose"), &state);
+      net->forward(c.ctx(), {c.in("joints"), c.in("trans"), c.in("tpose"), {}, {}}, &state);
   c.out({{"raw", y.raw},
          {"R", y.rotations},
          {"joints", y.joints},

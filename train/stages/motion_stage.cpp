@@ -5,6 +5,7 @@
 #include "autograd/base/log.h"
 #include "autograd/ops/elementwise.h"
 #include "nn/metrics/metrics.h"
+#include "nn/models/closed_form_motion.h"
 #include "nn/models/extraction.h"
 
 namespace restage {
@@ -42,15 +43,15 @@ WindowConfig self_windows(const MotionStageConfig& c) {
 }
 
 MotionBatch motion_batch(const WindowBatch& w) {
-  return {w.joints_a, w.input_a, w.trans_a, w.input_trans_a,
-          w.rest_a,   w.rest_b,  w.sixd_a,  w.self_mask};
+  return {w.joints_a, w.input_a, w.trans_a,   w.input_trans_a, w.rest_a,
+          w.rest_b,   w.sixd_a,  w.self_mask, w.turns,         w.uncertainty};
 }
 
 /// One pass whose answer is known: of A itself, or of B.
 MotionBatch supervised_batch(const WindowBatch& w) {
   if (!w.truth_b.defined()) return motion_batch(w);
-  return {w.truth_b, w.input_a, w.truth_trans_b, w.input_trans_a,
-          w.rest_b,  w.rest_b,  w.truth_sixd_b,  w.self_mask};
+  return {w.truth_b, w.input_a,      w.truth_trans_b, w.input_trans_a, w.rest_b,
+          w.rest_b,  w.truth_sixd_b, w.self_mask,     w.turns,         w.uncertainty};
 }
 
 /// What the skeleton stage's network answers to clouds of a corpus; empty if it is not asked.
@@ -87,6 +88,37 @@ MotionStatistics::Columns columns(const std::vector<Tensor>& parts, int64_t n, d
   return {Tensor::from<double>({n}, s).cast(DType::f32),
           Tensor::from<double>({n}, q).cast(DType::f32)};
 }
+
+/// Sum of a metric over the windows [n, t, 22, 3] of a batch.
+template <class Metric>
+double window_error(Metric metric, const Tensor& predicted, const Tensor& truth,
+                    metrics::Alignment::Mode mode) {
+  double out = 0;
+  for (int64_t s = 0; s < truth.size(0); ++s) {
+    const Tensor p = predicted.rows(s, s + 1).cast(DType::f64),
+                 t = truth.rows(s, s + 1).cast(DType::f64);
+    const metrics::Track a{p.data<double>(), truth.size(1), kJoints},
+        b{t.data<double>(), truth.size(1), kJoints};
+    out += metric(a, b, {mode, true}).value_or(std::nan(""));
+  }
+  return out;
+}
+
+/// Sums over windows of what an answer gets wrong: joints in metres (and metres per squared frame),
+/// local rotations as the mean length of the difference of their two columns.
+struct Judged {
+  double pa = 0, local = 0, acceleration = 0, rotation = 0;
+  void add(const MotionOutput& out, const WindowBatch& b) {
+    using Mode = metrics::Alignment::Mode;
+    const Tensor& joints = out.joints.value;
+    pa += window_error(metrics::mean_distance, joints, b.truth_b, Mode::frame);
+    local += window_error(metrics::mean_distance, joints, b.truth_b, Mode::none);
+    acceleration += window_error(metrics::acceleration_error, joints, b.truth_b, Mode::none);
+    rotation +=
+        rotation_loss(out.rotations, Var(b.truth_sixd_b), MotionDistance::distance).value.item() *
+        static_cast<double>(b.truth_b.size(0));
+  }
+};
 
 }  // namespace
 
@@ -164,7 +196,7 @@ void MotionStage::update_discriminator(int64_t step, const WindowBatch& batch, d
         Context plain;  // the generator gets no gradient from this step
         MotionState state;
         const MotionOutput fake =
-            model_->forward(plain, batch.input_a, batch.input_trans_a, batch.rest_b, &state);
+            model_->forward(plain, motion_batch(batch).seen(batch.rest_b), &state);
         const DiscriminatorLosses l =
             discriminator_losses(ctx, *discriminator_, batch.real_b, batch.real_trans_b,
                                  batch.rest_b, fake.joints.value, fake.trans.value, batch.rest_b);
@@ -230,33 +262,30 @@ NamedValues MotionStage::step(int64_t step) {
 
 NamedValues MotionStage::validate() {
   Context ctx;
-  double pa = 0, local = 0, cycle = 0;
-  const int64_t n = config_.validation_windows, frames = config_.validation_frames;
+  Judged network, closed_form;
+  double cycle = 0;
+  const int64_t n = config_.validation_windows;
   for (int64_t i = 0; i < n; i += 16) {
-    const int64_t count = std::min<int64_t>(16, n - i);
-    const WindowBatch b = windows().validation.batch(i, count);
-    MotionState forth, back;
-    const MotionOutput to_b = model_->forward(ctx, b.input_a, b.trans_a, b.rest_b, &forth);
-    const MotionOutput to_a = model_->forward(ctx, to_b.joints, to_b.trans, b.rest_a, &back);
-    const auto error = [&](const Tensor& p, const Tensor& t, int64_t s, bool align) {
-      const Tensor pred = p.rows(s, s + 1).cast(DType::f64),
-                   truth = t.rows(s, s + 1).cast(DType::f64);
-      const metrics::Track a{pred.data<double>(), frames, kJoints},
-          c{truth.data<double>(), frames, kJoints};
-      return metrics::mean_distance(
-                 a, c,
-                 {align ? metrics::Alignment::Mode::frame : metrics::Alignment::Mode::none, true})
-          .value_or(std::nan(""));
-    };
-    for (int64_t s = 0; s < count; ++s) {
-      pa += error(to_b.joints.value, b.truth_b, s, true);
-      local += error(to_b.joints.value, b.truth_b, s, false);
-      cycle += error(to_a.joints.value, b.joints_a, s, false);
-    }
+    const WindowBatch b = windows().validation.batch(i, std::min<int64_t>(16, n - i));
+    const MotionInput seen = motion_batch(b).seen(b.rest_b);
+    MotionState forth, back, none;
+    const MotionOutput to_b = model_->forward(ctx, seen, &forth);
+    const MotionOutput to_a =
+        model_->forward(ctx, {to_b.joints, to_b.trans, b.rest_a, {}, {}}, &back);
+    network.add(to_b, b);
+    closed_form.add(ClosedFormMotion({}, {}).forward(ctx, seen, &none), b);
+    cycle += window_error(metrics::mean_distance, to_a.joints.value, b.joints_a,
+                          metrics::Alignment::Mode::none);
   }
-  const auto mean_of = [&](double x) { return x / static_cast<double>(n); };
-  return {
-      {"pa_mpjpe", mean_of(pa)}, {"local_mpjpe", mean_of(local)}, {"cycle_mpjpe", mean_of(cycle)}};
+  const auto count = static_cast<double>(n);
+  return {{"pa_mpjpe", network.pa / count},
+          {"local_mpjpe", network.local / count},
+          {"cycle_mpjpe", cycle / count},
+          {"acceleration", network.acceleration / count},
+          {"rotation", network.rotation / count},
+          {"closed_form_pa_mpjpe", closed_form.pa / count},
+          {"closed_form_acceleration", closed_form.acceleration / count},
+          {"closed_form_rotation", closed_form.rotation / count}};
 }
 
 void MotionStage::save_more(TensorFile& file) const {

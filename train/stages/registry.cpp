@@ -29,8 +29,10 @@ const std::vector<StageType>& stage_types() {
       stage<SkeletonStage>("skeleton", "the skeleton extractor", {"skeleton"},
                            {"joint_error_mm", "tpose_joint_error_mm", "ring_joint_error_mm",
                             "one_camera_joint_error_mm", "turn_error_degrees", "miscalibration"}),
-      stage<MotionStage>("motion", "the motion retargeting network", {"motion"},
-                         {"pa_mpjpe", "local_mpjpe", "cycle_mpjpe"}),
+      stage<MotionStage>(
+          "motion", "the motion retargeting network", {"motion"},
+          {"pa_mpjpe", "local_mpjpe", "cycle_mpjpe", "acceleration", "rotation",
+           "closed_form_pa_mpjpe", "closed_form_acceleration", "closed_form_rotation"}),
       stage<DeformationStage>("deformation", "skinning weights and offsets",
                               {"deformation.weights", "deformation.offsets"},
                               {"skinning_mm", "skin_lost", "with_offsets_mm"}),
