@@ -190,6 +190,26 @@ void ScanWriter::commit() {
 
 // ---- predictions -------------------------------------------------------------------------------
 
+static std::vector<double> read_confidence(const h5::File& file, int64_t frames) {
+  if (!file.has("/confidence")) return {};
+  const h5::Dataset set = file.dataset("/confidence", {frames});
+  std::vector<double> out = read_finite<double>(file, "/confidence", {frames});
+  for (const double x : out)
+    if (!(x >= 0 && x <= 1))
+      throw InputError(set.where(), "holds a number that is no confidence", "give 0 to 1");
+  return out;
+}
+
+std::vector<double> read_confidence(const std::string& path, int64_t sequence) {
+  const h5::File file = open_schema_file(path);
+  if (!file.has("/confidence")) return {};
+  const std::vector<double> all = read_confidence(file, file.dataset("/confidence", {-1}).rows());
+  const std::vector<int64_t> offset = sequence_offsets(file, std::ssize(all));
+  const auto s = static_cast<size_t>(sequence);
+  if (sequence < 0 || s + 1 >= offset.size()) return {};
+  return {all.begin() + offset[s], all.begin() + offset[s + 1]};
+}
+
 Prediction read_prediction(const std::string& path) {
   const h5::File file = open_schema_file(path);
   const bool has_joints = file.has("/joints"), has_vertices = file.has("/vertices");
@@ -221,6 +241,7 @@ Prediction read_prediction(const std::string& path) {
   if (has_vertices) out.vertices = read_finite<double>(file, "/vertices", {-1, -1, 3});
   if (file.has("/faces"))
     out.faces = read_faces(file, "/faces", has_vertices ? out.vertex_count : int64_t{1} << 31);
+  out.confidence = read_confidence(file, out.frames);
   return out;
 }
 
@@ -249,12 +270,14 @@ PredictionWriter::PredictionWriter(const std::string& path, int64_t vertex_count
   if (!faces.empty()) write_faces(file_, "/faces", faces);
 }
 
-void PredictionWriter::append(const Joints& joints, const Points& vertices) {
+void PredictionWriter::append(const Joints& joints, const Points& vertices,
+                              std::optional<double> confidence) {
   if (static_cast<int64_t>(vertices.size()) != vertex_count_)
     throw ShapeError("prediction writer: " + std::to_string(vertices.size()) +
                      " vertices instead of " + std::to_string(vertex_count_));
   joints_.append<float>(flat_joints(joints));
   if (vertices_) vertices_->append<float>(as_floats(vertices));
+  if (confidence) confidence_.push_back(static_cast<float>(*confidence));
 }
 
 void PredictionWriter::set_source_to_world(const Eigen::Matrix<double, 3, 4>& transform) {
@@ -266,6 +289,11 @@ void PredictionWriter::end_sequence() {
 }
 
 void PredictionWriter::commit() {
+  if (!confidence_.empty()) {
+    if (std::ssize(confidence_) != joints_.rows())
+      throw ShapeError("prediction writer: confidence for some frames only");
+    file_.write<float>("/confidence", {joints_.rows()}, confidence_);
+  }
   write_sequence_offset(file_, sequence_offset_, joints_.rows());
   file_.commit();
 }

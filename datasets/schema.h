@@ -103,6 +103,7 @@ struct Prediction {
   std::vector<double> vertices;          ///< F x V x 3; empty if absent
   std::vector<int64_t> sequence_offset;  ///< S + 1, from 0 to F; {0, F} for one sequence
   std::vector<Triangle> faces;           ///< empty if absent
+  std::vector<double> confidence;        ///< F, 0 to 1; empty if absent
   // Written, not read:
   double fps = kFps;
   /// PredictionWriter::set_source_to_world().
@@ -110,8 +111,10 @@ struct Prediction {
 };
 
 /// /joints [F,22,3] and /vertices [F,V,3] (float32 or float64, either may be absent),
-/// /sequence_offset [S+1] and /faces [T,3] (both optional).
+/// /sequence_offset [S+1], /faces [T,3] and /confidence [F] (all optional).
 Prediction read_prediction(const std::string& path);
+/// Of one sequence of a file; empty where there is none.
+std::vector<double> read_confidence(const std::string& path, int64_t sequence);
 void write_prediction(const std::string& path, const Prediction& prediction, const FileInfo& info);
 
 /// Writes a prediction frame by frame in constant memory (float32).
@@ -120,7 +123,9 @@ class PredictionWriter {
   /// `vertex_count` 0: no vertices. `faces` may be empty.
   PredictionWriter(const std::string& path, int64_t vertex_count,
                    const std::vector<Triangle>& faces, const FileInfo& info, double fps = kFps);
-  void append(const Joints& joints, const Points& vertices);
+  /// `confidence` for all frames or for none.
+  void append(const Joints& joints, const Points& vertices,
+              std::optional<double> confidence = std::nullopt);
   /// How the source's scans relate to the world: world = A p + b, rows of [A | b]. Written as
   /// /source_to_world [3,4].
   void set_source_to_world(const Eigen::Matrix<double, 3, 4>& transform);
@@ -132,6 +137,7 @@ class PredictionWriter {
   int64_t vertex_count_ = 0;
   h5::Dataset joints_;
   std::optional<h5::Dataset> vertices_;
+  std::vector<float> confidence_;
   std::vector<int64_t> sequence_offset_{0};
 };
 

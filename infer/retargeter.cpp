@@ -25,6 +25,17 @@ Tensor tensor_of(const Joints& joints, const Vec3& origin) {
   return t;
 }
 
+/// Mean chance of a joint to be within kNearby: p(error) ~ s^-3 exp(-|error| / s) (SkeletonOutput).
+std::optional<double> confidence_of(const SeenJoints& seen) {
+  if (!seen.uncertainty) return std::nullopt;
+  double sum = 0;
+  for (const double s : *seen.uncertainty) {
+    const double r = kNearby / s;
+    sum += 1 - std::exp(-r) * (1 + r + r * r / 2);
+  }
+  return sum / kJoints;
+}
+
 /// Between two moments; what is no position is that of the nearer one.
 SeenJoints blend(const SeenJoints& a, const SeenJoints& b, double t) {
   SeenJoints out = t < 0.5 ? a : b;
@@ -119,6 +130,8 @@ void Retargeter::prepare(const std::string& weights_name) {
                      "give --fps from 1 to 1000");
   if (!(options_.anchor >= 0))
     throw InputError("", "the anchor's time is out of range", "give --anchor 0 or more seconds");
+  if (!(options_.min_confidence >= 0 && options_.min_confidence <= 1))
+    throw InputError("", "the least confidence is out of range", "give --min-confidence 0 to 1");
   if (auto* skeleton = models_.find_as<SkeletonModel>("skeleton"))
     extractor_.emplace(*skeleton, options_.samples);
   const TrainedModel& motion = models_.need("motion", weights_name);
@@ -142,6 +155,7 @@ void Retargeter::restart() {
   heading_ = Heading(steady_heading_);
   previous_.reset();
   received_.reset();
+  believed_.reset();
   frame_ = grid_ = 0;
   legs_a_ = 0;
 }
@@ -186,6 +200,8 @@ void Retargeter::step(const SeenJoints& seen, RetargetedFrame* out) {
     const Stopwatch watch(&times_.motion);
     advance(seen, &out->pose);
   }
+  out->confidence = confidence_of(seen);
+  hold_doubtful(out);
   const Stopwatch watch(&times_.deformation);
   const PosedSkeleton posed = forward_kinematics(rest_, out->pose);
   out->joints = posed.joints;
@@ -195,6 +211,23 @@ void Retargeter::step(const SeenJoints& seen, RetargetedFrame* out) {
       !std::all_of(out->vertices.begin(), out->vertices.end(), finite))
     throw InputError("", "frame " + std::to_string(grid_) + " of the result is not finite",
                      "check that source and target are in metres");
+}
+
+void Retargeter::hold_doubtful(RetargetedFrame* out) {
+  if (!out->confidence && options_.min_confidence > 0)
+    throw InputError("", "these weights do not say how sure they are of a frame",
+                     "leave --min-confidence out, or give weights whose extractor has sizes."
+                     "uncertainty");
+  if (!out->confidence || *out->confidence >= options_.min_confidence) {
+    believed_ = out->pose;
+    return;
+  }
+  if (!believed_) {
+    out->pose.local.fill(Mat3::Identity());
+    out->pose.local[0] = turn_about_y(heading_angle(last_source_));
+    believed_ = out->pose;
+  }
+  out->pose = *believed_;
 }
 
 /// The motion model's answer to what is seen of A.

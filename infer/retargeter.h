@@ -21,6 +21,9 @@ struct RetargetOptions {
   /// Seconds in which B's path, a sum of velocities, goes back to A's in proportion to the legs, so
   /// that errors do not add up. 0: never, as in the papers (docs/method.md, "Drift").
   double anchor = 0.25;
+  /// Frames of less confidence than this are not guessed: the target keeps the pose of the last one
+  /// before, or its rest pose. 0: every frame is answered.
+  double min_confidence = 0;
 };
 
 /// Our chain of three networks.
@@ -59,6 +62,7 @@ class Retargeter final : public System {
   void prepare(const std::string& weights_name);
   void step(const SeenJoints& seen, RetargetedFrame* out);
   void advance(const SeenJoints& seen, Pose* pose);
+  void hold_doubtful(RetargetedFrame* out);
   void sum_path(const Joints& a, const Vec3& velocity);
 
   Bundle models_;
@@ -76,6 +80,7 @@ class Retargeter final : public System {
   Heading heading_{false};
   MotionState state_;
   std::optional<Joints> previous_;      ///< A on the 30 fps grid, one step ago
+  std::optional<Pose> believed_;        ///< the last pose that was
   std::optional<SeenJoints> received_;  ///< A as last pushed
   Joints last_source_;
   Vec3 start_a_ = Vec3::Zero(), start_b_ = Vec3::Zero();  ///< pelvis in the first frame

@@ -23,6 +23,7 @@ Clip stick_figure(const std::string& path, const std::string& label, int64_t seq
                      "count sequences from 0");
   Clip clip;
   clip.label = label;
+  clip.confidence = read_confidence(path, sequence);
   for (int64_t f = data.sequence_offset[s]; f < data.sequence_offset[s + 1]; ++f) {
     const auto joint = [&](int j) {
       return Eigen::Map<const Vec3>(data.joints.data() + 3 * (f * kJoints + j));
@@ -58,6 +59,7 @@ Clip read_clip(const std::string& path, const std::string& label, int64_t sequen
     clip.frames.push_back(std::move(frame->points));
   }
   if (!surface) clip.faces.clear();
+  if (ends_with_hdf5(path)) clip.confidence = read_confidence(path, sequence);
   return clip;
 }
 

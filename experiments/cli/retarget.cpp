@@ -1,5 +1,6 @@
 // restage retarget: clouds of one body in, the same motion by another body out, frame by frame.
 #include <chrono>
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -31,6 +32,7 @@ struct RetargetCommand {
   double scale = 1, anchor = RetargetOptions{}.anchor;
   bool force = false, profile = false;
   int samples = 4;
+  double min_confidence = 0;
   int64_t every = 1;
 };
 
@@ -57,7 +59,7 @@ Sink make_sink(const RetargetCommand& c, const System& s) {
       log_info(format("four weights per vertex instead of 22: %.2f mm on average, at most %.2f mm",
                       1e3 * e.mean, 1e3 * e.max));
     };
-    return {[writer](const RetargetedFrame& f) { writer->push(f.pose); }, commit};
+    return {[writer](const RetargetedFrame& f) { writer->push(f.pose, f.confidence); }, commit};
   }
   if (c.out.ends_with(".bvh")) {
     const auto writer = std::make_shared<BvhWriter>(c.out, rig_of(s, c.out).rest);
@@ -69,8 +71,9 @@ Sink make_sink(const RetargetCommand& c, const System& s) {
     const auto writer =
         std::make_shared<PredictionWriter>(c.out, std::ssize(target.vertices), target.faces,
                                            FileInfo{}, kFps / static_cast<double>(c.every));
-    return {[writer](const RetargetedFrame& f) { writer->append(f.joints, f.vertices); },
-            [writer] { writer->commit(); }};
+    return {
+        [writer](const RetargetedFrame& f) { writer->append(f.joints, f.vertices, f.confidence); },
+        [writer] { writer->commit(); }};
   }
   const auto writer = std::make_shared<FrameFolderWriter>(
       c.out, target.faces, c.format == "obj" ? MeshFormat::obj : MeshFormat::ply);
@@ -96,6 +99,8 @@ void check(const RetargetCommand& c) {
     throw InputError("", "--every is out of range", "give 1 or more frames");
   if (c.every > 1 && !c.out.ends_with(".h5"))
     throw InputError(c.out, "is played at 30 frames a second", "end --out in .h5 with --every");
+  if (!(c.min_confidence >= 0 && c.min_confidence <= 1))
+    throw InputError("", "--min-confidence is out of range", "give 0 to 1");
   if (c.samples < 1 || c.samples > 256)
     throw InputError("", "--samples is out of range", "give 1 to 256");
   const auto dot = c.out.find_last_of('.');
@@ -182,6 +187,7 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   options.seed = common.seed;
   options.samples = c.samples;
   options.anchor = c.anchor;
+  options.min_confidence = c.min_confidence;
   TargetMesh target = read_target(c.target);
   check_inputs(c, *frames, target);
   if (!c.rest.empty()) input.rest = rest_joints(c.rest);
@@ -203,9 +209,15 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   if (!frame) throw InputError(c.source, "holds no frames", "give at least one cloud");
   const Sink sink = make_sink(c, *system);
   Profile profile({"read", "extract", "motion", "deformation", "write", "frame"});
-  int64_t in = 0, out = 0;
+  int64_t in = 0, out = 0, held = 0;
+  Json confidence = Json::array();
   const auto write_all = [&](std::span<const RetargetedFrame> made) {
-    for (const RetargetedFrame& f : made) sink.push(f);
+    for (const RetargetedFrame& f : made) {
+      sink.push(f);
+      if (!f.confidence) continue;
+      confidence.push_back(std::round(*f.confidence * 1e3) / 1e3);
+      held += *f.confidence < c.min_confidence;
+    }
     out += std::ssize(made);
   };
   for (; frame; frame = next(), ++in) {
@@ -225,10 +237,15 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   if (c.profile) log_profile(profile);
   Json document = {
       {"out", c.out}, {"source_frames", in}, {"frames", out}, {"fps", kFps}, {"seed", common.seed}};
+  if (!confidence.empty()) {
+    document["held"] = held;
+    document["confidence"] = confidence;
+  }
   if (c.profile) document["profile"] = profile.json();
   print(common.json, document,
         "wrote " + c.out + ": " + std::to_string(out) + " frames (seed " +
-            std::to_string(common.seed) + ")\n");
+            std::to_string(common.seed) + ")" +
+            (held > 0 ? "; in " + std::to_string(held) + " of them the target waits" : "") + "\n");
   return 0;
 }
 
@@ -268,6 +285,8 @@ void add_retarget(Program& program) {
   app.add_option("--anchor", c.anchor,
                  "seconds in which the path goes back to the source's, scaled to the target's legs "
                  "(0: never)");
+  app.add_option("--min-confidence", c.min_confidence,
+                 "the target waits where the extractor is less sure than this, 0 to 1 (0: never)");
   app.add_flag("--force", c.force,
                "accept a target that is no T-pose, and what else the doctor calls wrong");
   app.add_flag("--profile", c.profile,

@@ -15,6 +15,7 @@ struct Clip {
   std::string label;
   std::vector<Points> frames;
   std::vector<Triangle> faces;
+  std::vector<double> confidence = {};  ///< of each frame, 0 to 1; empty if nobody says
 };
 
 /// InputError when there is nothing to draw (no clips, more than three, a clip without frames) or a

@@ -248,6 +248,11 @@ Packed pack(const Clip& clip, const Surface& surface, const Plan& plan, size_t n
                  {"faces", surface.faces.size()},
                  {"counts", counts},
                  {"centres", middles}};
+  if (!clip.confidence.empty()) {
+    Json& list = packed.meta["confidence"] = Json::array();
+    for (size_t f = 0; f < plan.frames; ++f)
+      list.push_back(std::round(clip.confidence[f * plan.stride] * 1e3) / 1e3);
+  }
   const auto element = [&](const char* name, const void* bytes, size_t size) {
     packed.elements += "<script id=\"" + std::string(name) + std::to_string(number) +
                        "\" type=\"text/plain\">" + base64(bytes, size) + "</script>\n";
@@ -305,7 +310,7 @@ std::string page_html(const std::vector<Clip>& clips, const PageOptions& options
     const std::string label = escaped(clips[c].label);
     panels += "<div class=\"panel\" id=\"panel" + std::to_string(c) +
               "\"><span><i style=\"background:" + hex(kClipColours[c]) + "\"></i>" + label +
-              "</span></div>\n";
+              "<b></b></span></div>\n";
     description += (c > 0 ? "; " : "") + label;
   }
   meta["width"] = width;

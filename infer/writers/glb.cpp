@@ -218,7 +218,7 @@ GlbWriter::GlbWriter(std::string path, Mesh mesh, const Joints& rest, const Skin
   }
 }
 
-void GlbWriter::push(const Pose& pose) {
+void GlbWriter::push(const Pose& pose, std::optional<double> confidence) {
   bool finite = pose.root.allFinite();
   for (const Mat3& r : pose.local) finite = finite && r.allFinite();
   if (!finite)
@@ -238,6 +238,7 @@ void GlbWriter::push(const Pose& pose) {
   }
   turns_.insert(turns_.end(), turns.begin(), turns.end());
   for (int k = 0; k < 3; ++k) roots_.push_back(static_cast<float>(pose.root[k]));
+  if (confidence) confidence_.push_back(std::round(*confidence * 1e3) / 1e3);
   measure_cut(pose);
 }
 
@@ -313,6 +314,7 @@ std::string GlbWriter::bytes() const {
                                       {"roughnessFactor", 0.75}}}}});
   root["skins"] = Json::array({skin(buffer, rest_)});
   if (frames() > 0) root["animations"] = Json::array({animation(buffer, turns_, roots_, fps_)});
+  if (!confidence_.empty()) root["animations"][0]["extras"] = {{"confidence", confidence_}};
   buffer.describe(root);
   const std::string text = root.dump();
   const uint64_t size = 12 + 8 + (text.size() + 3) / 4 * 4 + 8 + buffer.bytes().size();

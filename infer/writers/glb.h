@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -37,8 +38,9 @@ class GlbWriter {
   /// InputError for an unusable mesh, ShapeError if the rows of `weights` are not the vertices.
   GlbWriter(std::string path, Mesh mesh, const Joints& rest, const SkinWeights& weights,
             double fps = kFps);
-  /// WorkError if the pose is not finite.
-  void push(const Pose& pose);
+  /// WorkError if the pose is not finite. `confidence` for all frames or for none: it goes into the
+  /// animation's extras.
+  void push(const Pose& pose, std::optional<double> confidence = std::nullopt);
   /// Writes the file; also in its `asset.extras`: fps, units and the influence error in mm.
   InfluenceError commit();
   InfluenceError influence_error() const;
@@ -56,7 +58,8 @@ class GlbWriter {
   SkinWeights lost_;                         ///< weights in the file minus all weights
   std::vector<std::array<float, 4>> turns_;  ///< frame-major, 22 per frame, (x, y, z, w)
   std::vector<float> roots_;                 ///< 3 per frame
-  std::vector<uint64_t> histogram_;          ///< of errors, kBin metres each, for the percentile
+  std::vector<double> confidence_;
+  std::vector<uint64_t> histogram_;  ///< of errors, kBin metres each, for the percentile
   double error_sum_ = 0, error_max_ = 0;
 };
 

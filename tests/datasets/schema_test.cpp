@@ -203,6 +203,25 @@ TEST_F(Schema, PredictionWriterStreamsAndIsAtomic) {
   EXPECT_EQ(names_in(dir.path()), Names{"p.h5"});
 }
 
+TEST_F(Schema, ConfidenceIsOfAllFramesOrOfNone) {
+  const std::string path = dir / "p.h5";
+  {
+    PredictionWriter writer(path, 0, {}, kInfo);
+    for (const double sure : {0.25, 1.0}) writer.append(tiny_joints(), {}, sure);
+    writer.end_sequence();
+    writer.append(tiny_joints(), {}, 0.5);
+    writer.commit();
+  }
+  EXPECT_EQ(read_prediction(path).confidence, (std::vector<double>{0.25, 1.0, 0.5}));
+  EXPECT_EQ(read_confidence(path, 0), (std::vector<double>{0.25, 1.0}));
+  EXPECT_EQ(read_confidence(path, 1), (std::vector<double>{0.5}));
+  EXPECT_TRUE(verify(path).empty());
+  PredictionWriter writer(path, 0, {}, kInfo);
+  writer.append(tiny_joints(), {}, 0.5);
+  writer.append(tiny_joints(), {});
+  EXPECT_THROW(writer.commit(), ShapeError);
+}
+
 TEST_F(Schema, RefusesEveryBadPrediction) {
   const std::string path = dir / "p.h5";
   const auto refuse = [&](const std::function<void(Bare&)>& fill, const std::string& says) {

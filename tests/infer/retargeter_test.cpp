@@ -83,6 +83,30 @@ double apart(const Points& a, const Points& b) {
   return most;
 }
 
+TEST(InferRetargeter, WaitsWhereItDoubts) {
+  const auto source = performance(12);
+  std::vector<SeenJoints> seen(source.begin(), source.end());
+  for (size_t f = 0; f < seen.size(); ++f) {
+    seen[f].uncertainty.emplace().fill(0.002);
+    if (f < 2 || f == 6 || f == 7) seen[f].uncertainty->fill(0.2);
+  }
+  const auto frames = [&](double least) {
+    Retargeter r(untrained(), "w", target().rest, target().joints, {.min_confidence = least});
+    std::vector<RetargetedFrame> out;
+    for (const SeenJoints& s : seen) out.push_back(r.push_joints(s)[0]);
+    return out;
+  };
+  const auto answered = frames(0), held = frames(0.5);
+  EXPECT_GT(*answered[3].confidence, 0.99);
+  EXPECT_LT(*answered[6].confidence, 0.1);
+  for (size_t f = 2; f < 12; ++f)
+    EXPECT_EQ(apart(held[f].joints, answered[f == 6 || f == 7 ? 5 : f].joints), 0) << f;
+  for (const Mat3& r : held[1].pose.local) EXPECT_NEAR(r.col(1).y(), 1, 1e-9) << "stands at rest";
+  EXPECT_GT(apart(answered[6].joints, answered[5].joints), 1e-4);
+  Retargeter silent(untrained(), "w", target().rest, target().joints, {.min_confidence = 0.5});
+  EXPECT_THROW(silent.push_joints(source[0]), InputError);
+}
+
 /// The whole sequence in one forward pass of the network, velocities in the world's directions.
 std::vector<Pose> whole_sequence(const Bundle& models, const std::vector<Joints>& source) {
   const auto frames = static_cast<int64_t>(source.size());
