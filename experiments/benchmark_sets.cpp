@@ -58,7 +58,6 @@ Prediction retargeted(const Bundle& weights, const std::string& folder, const st
   input.target = read_target(input.target_name).mesh;
   input.options.fps = frames->fps();
   input.options.seed = how.seed;
-  input.options.samples = 4;
   if (!type.weights)
     input.rest = joints_of(PredictionFile(in(folder, "rest.h5")).joints().slice(0, 1))[0];
   const auto system = type.make(std::move(input));

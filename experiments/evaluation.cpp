@@ -184,7 +184,6 @@ SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weigh
   RetargetOptions how;
   how.seed = options.seed;
   how.force = true;  // a badly extracted target counts with its error instead of ending the table
-  how.samples = 4;
   how.anchor = options.anchor;
   for (const EvalSequence& sequence : options.sequences) {
     const Performance performance(corpus, sequence, ScanConfig{}, options.seed);

@@ -17,7 +17,7 @@ struct RetargetOptions {
   double fps = kFps;   ///< of the source; other rates are resampled to 30
   bool force = false;  ///< accept a target that does not look like a T-pose
   uint64_t seed = 0;   ///< of the choice of points
-  int samples = 1;     ///< views of a frame that are averaged (nn/models/extraction.h)
+  int samples = 4;     ///< views of a frame that are averaged (nn/models/extraction.h)
   /// Seconds in which B's path, a sum of velocities, goes back to A's in proportion to the legs, so
   /// that errors do not add up. 0: never, as in the papers (docs/method.md, "Drift").
   double anchor = 0.25;

@@ -29,10 +29,9 @@ struct RetargetCommand {
   std::string system = "chain", rest;
   std::optional<double> fps;        ///< of the source
   std::optional<int64_t> sequence;  ///< of the source, from 0
-  double scale = 1, anchor = RetargetOptions{}.anchor;
-  bool force = false, profile = false;
-  int samples = 4;
-  double min_confidence = 0;
+  RetargetOptions options;
+  double scale = 1;
+  bool profile = false;
   int64_t every = 1;
 };
 
@@ -99,9 +98,9 @@ void check(const RetargetCommand& c) {
     throw InputError("", "--every is out of range", "give 1 or more frames");
   if (c.every > 1 && !c.out.ends_with(".h5"))
     throw InputError(c.out, "is played at 30 frames a second", "end --out in .h5 with --every");
-  if (!(c.min_confidence >= 0 && c.min_confidence <= 1))
+  if (!(c.options.min_confidence >= 0 && c.options.min_confidence <= 1))
     throw InputError("", "--min-confidence is out of range", "give 0 to 1");
-  if (c.samples < 1 || c.samples > 256)
+  if (c.options.samples < 1 || c.options.samples > 256)
     throw InputError("", "--samples is out of range", "give 1 to 256");
   const auto dot = c.out.find_last_of('.');
   const auto slash = c.out.find_last_of('/');
@@ -125,7 +124,7 @@ void to_metres(const RetargetCommand& c, Points& points) {
 
 /// The doctor's words on what would make the result nonsense.
 void check_inputs(const RetargetCommand& c, FrameSource& frames, const TargetMesh& target) {
-  if (c.force) return;
+  if (c.options.force) return;
   check_target(target.mesh, c.target, target.joints ? &*target.joints : nullptr);
   std::vector<Mesh> first;
   while (first.size() < kSourceFrames) {
@@ -181,13 +180,9 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   if (!c.sequence && frames->sequences() > 1)
     throw InputError(c.source, "holds " + std::to_string(frames->sequences()) + " sequences",
                      "choose one with --sequence N, from 0");
-  RetargetOptions& options = input.options;
-  options.fps = c.fps.value_or(frames->fps());
-  options.force = c.force;
-  options.seed = common.seed;
-  options.samples = c.samples;
-  options.anchor = c.anchor;
-  options.min_confidence = c.min_confidence;
+  input.options = c.options;
+  input.options.fps = c.fps.value_or(frames->fps());
+  input.options.seed = common.seed;
   TargetMesh target = read_target(c.target);
   check_inputs(c, *frames, target);
   if (!c.rest.empty()) input.rest = rest_joints(c.rest);
@@ -216,14 +211,14 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
       sink.push(f);
       if (!f.confidence) continue;
       confidence.push_back(std::round(*f.confidence * 1e3) / 1e3);
-      held += *f.confidence < c.min_confidence;
+      held += *f.confidence < c.options.min_confidence;
     }
     out += std::ssize(made);
   };
   for (; frame; frame = next(), ++in) {
     if (in % c.every != 0) continue;
     const Clock::time_point start = Clock::now();
-    if (!c.force) check_frame(frame->points, frame->source);
+    if (!c.options.force) check_frame(frame->points, frame->source);
     const auto made = system->push(frame->points, frame->source);
     const Clock::time_point pushed = Clock::now();
     write_all(made);
@@ -280,14 +275,14 @@ void add_retarget(Program& program) {
   app.add_option("--source-up", c.up, "the source's up axis, y or z");
   app.add_option("--scale", c.scale, "the source's units in metres");
   app.add_option("--format", c.format, "of a folder's frames: ply or obj");
-  app.add_option("--samples", c.samples,
+  app.add_option("--samples", c.options.samples,
                  "views of a cloud to average: choices of its points, turned and mirrored");
-  app.add_option("--anchor", c.anchor,
+  app.add_option("--anchor", c.options.anchor,
                  "seconds in which the path goes back to the source's, scaled to the target's legs "
                  "(0: never)");
-  app.add_option("--min-confidence", c.min_confidence,
+  app.add_option("--min-confidence", c.options.min_confidence,
                  "the target waits where the extractor is less sure than this, 0 to 1 (0: never)");
-  app.add_flag("--force", c.force,
+  app.add_flag("--force", c.options.force,
                "accept a target that is no T-pose, and what else the doctor calls wrong");
   app.add_flag("--profile", c.profile,
                "say how long a frame and its parts take: p50, p95, p99, max");

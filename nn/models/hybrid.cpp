@@ -12,9 +12,8 @@
 namespace restage {
 namespace {
 
-constexpr double kCorrection =
-    0.02;  // metres, radians and 6D numbers that an answer of 1 stands for
 constexpr double kUsualUncertainty = 0.01;  // metres
+// What an answer of 1 stands for: radians, 6D numbers, and deviations of the path.
 constexpr double kTwist = 0.3, kLeaf = 0.3, kPath = 0.3;
 constexpr double kTrusting = 4;  // log odds of an untrained gate: what is seen counts for 98 %
 constexpr int64_t kEnds = std::ssize(kLeaves);
@@ -94,7 +93,7 @@ MotionOutput Hybrid::forward(Context& ctx, const MotionInput& in, MotionState* s
   const Var now = concat(
       {reshape(in.joints, {n, t, w}), reshape(Var(surface.twist), {n, t, kJoints}), ends}, 2);
   const Var calm = filtered(now, for_each_number(gates), &(*state)[2]);
-  const Var moved = slice(calm, 2, 0, w) + scale(correction(ctx, decoded), kCorrection),
+  const Var moved = slice(calm, 2, 0, w) + scale(tanh(correction(ctx, decoded)), config.reach),
             twisted = slice(calm, 2, w, w + kJoints) + scale(twist(ctx, decoded), kTwist),
             sixd = slice(calm, 2, w + kJoints, w + kJoints + 6 * kEnds) +
                    scale(leaves(ctx, decoded), kLeaf);

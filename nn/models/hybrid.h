@@ -21,6 +21,7 @@ struct HybridConfig {
   int64_t hidden = 256;
   int layers = 2;
   double dropout = 0;
+  double reach = 0.02;
   bool orientation = true, uncertainty = true;
 };
 
@@ -28,6 +29,8 @@ template <class V>
 void visit(V& v, HybridConfig& c) {
   v("hidden", c.hidden, "size of the hidden states", between(1, kMostWidth));
   v("dropout", c.dropout, "between the layers", below(0, 1));
+  v("reach", c.reach, "farthest that a coordinate of a joint is corrected, metres; 0: gates alone",
+    at_least(0));
   v("orientation", c.orientation, "sees the rotations that the extractor reads from the surface");
   v("uncertainty", c.uncertainty, "sees how far the extractor's joints may be off");
 }
