@@ -12,19 +12,32 @@
 namespace restage {
 namespace {
 
-constexpr double kUsualUncertainty = 0.01;  // metres
+constexpr double kUsualUncertainty = 0.005;  // metres; also where nobody says
 // What an answer of 1 stands for: radians, 6D numbers, and deviations of the path.
 constexpr double kTwist = 0.3, kLeaf = 0.3, kPath = 0.3;
 constexpr double kTrusting = 4;  // log odds of an untrained gate: what is seen counts for 98 %
-constexpr int64_t kEnds = std::ssize(kLeaves);
+constexpr int64_t kEnds = std::ssize(kLeaves), kGates = 2 * kJoints + kEnds;
+constexpr double kTrend = -2;  // log odds of an untrained trend's gain: 12 %
 
-/// y_t = g_t x_t + (1 - g_t) y_(t-1) over [n, t, m]; before the first frame y is x. `last` [n, m]
-/// is read and replaced.
-Var filtered(const Var& x, const Var& g, Var* last) {
+/// Holt's filter with gains that change, over x, g, h [n, t, m]:
+///   v_t = h_t (x_t - x_(t-1)) + (1 - h_t) v_(t-1),  y_t = g_t x_t + (1 - g_t) (y_(t-1) + v_t);
+/// before the first frame y is x and v none. What moves steadily is followed without delay.
+/// `state`, three of [n, m], is read and replaced: x, v and y of the last frame.
+Var filtered(const Var& x, const Var& g, const Var& h, Var* state) {
   const int64_t n = x.size(0), t = x.size(1), m = x.size(2);
-  if (!last->value.defined()) *last = reshape(slice(x, 1, 0, 1), {n, m});
-  const Var y = recurrence(add_scalar(neg(g), 1), g * x, *last);
-  *last = reshape(slice(y, 1, t - 1, t), {n, m});
+  const auto frame = [&](const Var& of, int64_t i) {
+    return reshape(slice(of, 1, i, i + 1), {n, m});
+  };
+  const auto rest = [](const Var& gain) { return add_scalar(neg(gain), 1); };
+  if (!state[0].value.defined()) {
+    state[0] = state[2] = frame(x, 0);
+    state[1] = Var(Tensor::zeros({n, m}, x.dtype()));
+  }
+  const Var first = reshape(state[0], {n, 1, m});
+  const Var before = t == 1 ? first : concat({first, slice(x, 1, 0, t - 1)}, 1);
+  const Var v = recurrence(rest(h), h * (x - before), state[1]);
+  const Var y = recurrence(rest(g), g * x + rest(g) * v, state[2]);
+  state[0] = frame(x, t - 1), state[1] = frame(v, t - 1), state[2] = frame(y, t - 1);
   return y;
 }
 
@@ -40,6 +53,12 @@ Var for_each_number(const Var& gates) {
                 2);
 }
 
+/// [n, t, 22] -> [n, t, 66]
+Var each_thrice(const Var& x) {
+  const int64_t n = x.size(0), t = x.size(1);
+  return reshape(expand(reshape(x, {n, t, kJoints, 1}), {n, t, kJoints, 3}), {n, t, 3 * kJoints});
+}
+
 }  // namespace
 
 Hybrid::Hybrid(const HybridConfig& c, const Init& init)
@@ -47,12 +66,13 @@ Hybrid::Hybrid(const HybridConfig& c, const Init& init)
       enc(3 * (kJoints + 1) + (c.orientation ? 4 * kJoints : 0) + (c.uncertainty ? kJoints : 0),
           c.hidden, c.layers, c.dropout, init.sub("enc")),
       dec(c.hidden + 3 * kJoints, c.hidden, c.layers, c.dropout, init.sub("dec")),
-      gate(c.hidden, 2 * kJoints + kEnds, init.sub("gate")),
+      gate(c.hidden, kGates, init.sub("gate")),
+      trend(c.hidden, kGates, init.sub("trend")),
       correction(c.hidden, 3 * kJoints, init.sub("correction")),
       twist(c.hidden, kJoints, init.sub("twist")),
       leaves(c.hidden, 6 * kEnds, init.sub("leaves")),
       path(c.hidden, 3, init.sub("path")) {
-  for (Linear* head : {&gate, &correction, &twist, &leaves, &path}) head->start_small();
+  for (Linear* head : {&gate, &trend, &correction, &twist, &leaves, &path}) head->start_small();
   const auto constant = [&](int64_t n, double v) { return Tensor::full({n}, v, init.type); };
   units.joints = {constant(3 * kJoints, 0), constant(3 * kJoints, 1)};
   units.rest = {constant(3 * kJoints, 0), constant(3 * kJoints, 1)};
@@ -64,7 +84,7 @@ void Hybrid::standardise(const MotionStatistics& s) {
 }
 
 /// What the encoder sees of A.
-Var Hybrid::seen(const MotionInput& in, const SurfaceTurns& surface) const {
+Var Hybrid::seen(const MotionInput& in, const SurfaceTurns& surface, const Var& uncertainty) const {
   const int64_t n = in.joints.size(0), t = in.joints.size(1);
   Var out = concat({in_units(reshape(in.joints, {n, t, 3 * kJoints}), units.joints),
                     in_units(in.trans, units.trans)},
@@ -74,9 +94,7 @@ Var Hybrid::seen(const MotionInput& in, const SurfaceTurns& surface) const {
                   reshape(Var(surface.beyond), {n, t, 3 * kJoints})},
                  2);
   if (!config.uncertainty) return out;
-  const Var usual(Tensor::full({n, t, kJoints}, kUsualUncertainty, in.joints.dtype()));
-  const Var off = in.uncertainty.defined() ? Var(in.uncertainty) : usual;
-  return concat({out, log(off / usual)}, 2);
+  return concat({out, log(scale(uncertainty, 1 / kUsualUncertainty))}, 2);
 }
 
 MotionOutput Hybrid::forward(Context& ctx, const MotionInput& in, MotionState* state) const {
@@ -84,16 +102,23 @@ MotionOutput Hybrid::forward(Context& ctx, const MotionInput& in, MotionState* s
   const int64_t n = in.joints.size(0), t = in.joints.size(1), w = 3 * kJoints;
   const SurfaceTurns surface = surface_turns(in);
   const Var b = in_units(reshape(in.rest, {n, 1, w}), units.rest);
-  state->resize(3);
-  const Var code = enc(ctx, seen(in, surface), &(*state)[0]);
+  state->resize(5);
+  const Var uncertainty =
+      config.uncertainty && in.uncertainty.defined()
+          ? Var(in.uncertainty)
+          : Var(Tensor::full({n, t, kJoints}, kUsualUncertainty, in.joints.dtype()));
+  const Var code = enc(ctx, seen(in, surface, uncertainty), &(*state)[0]);
   const Var decoded = dec(ctx, concat({code, expand(b, {n, t, w})}, 2), &(*state)[1]);
 
-  const Var gates = sigmoid(add_scalar(gate(ctx, decoded), kTrusting));
+  const auto gains = [&](const Linear& head, double start) {
+    return for_each_number(sigmoid(add_scalar(head(ctx, decoded), start)));
+  };
   const Var ends = reshape(matrix_to_sixd(Var(surface.leaves)), {n, t, 6 * kEnds});
   const Var now = concat(
       {reshape(in.joints, {n, t, w}), reshape(Var(surface.twist), {n, t, kJoints}), ends}, 2);
-  const Var calm = filtered(now, for_each_number(gates), &(*state)[2]);
-  const Var moved = slice(calm, 2, 0, w) + scale(tanh(correction(ctx, decoded)), config.reach),
+  const Var calm = filtered(now, gains(gate, kTrusting), gains(trend, kTrend), &(*state)[2]);
+  const Var moved = slice(calm, 2, 0, w) +
+                    scale(tanh(correction(ctx, decoded)), config.reach) * each_thrice(uncertainty),
             twisted = slice(calm, 2, w, w + kJoints) + scale(twist(ctx, decoded), kTwist),
             sixd = slice(calm, 2, w + kJoints, w + kJoints + 6 * kEnds) +
                    scale(leaves(ctx, decoded), kLeaf);
@@ -116,6 +141,7 @@ void Hybrid::visit(Fields& f) {
   f("enc", enc);
   f("dec", dec);
   f("gate", gate);
+  f("trend", trend);
   f("correction", correction);
   f("twist", twist);
   f("leaves", leaves);

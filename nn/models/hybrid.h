@@ -21,7 +21,7 @@ struct HybridConfig {
   int64_t hidden = 256;
   int layers = 2;
   double dropout = 0;
-  double reach = 0.02;
+  double reach = 2;
   bool orientation = true, uncertainty = true;
 };
 
@@ -29,13 +29,14 @@ template <class V>
 void visit(V& v, HybridConfig& c) {
   v("hidden", c.hidden, "size of the hidden states", between(1, kMostWidth));
   v("dropout", c.dropout, "between the layers", below(0, 1));
-  v("reach", c.reach, "farthest that a coordinate of a joint is corrected, metres; 0: gates alone",
-    at_least(0));
+  v("reach", c.reach,
+    "farthest that a coordinate of a joint is corrected, in units of its uncertainty", at_least(0));
   v("orientation", c.orientation, "sees the rotations that the extractor reads from the surface");
   v("uncertainty", c.uncertainty, "sees how far the extractor's joints may be off");
 }
 
-/// The state is {encoder, decoder}, both [layers, n, hidden], and what is believed, [n, 118].
+/// The state is {encoder, decoder}, both [layers, n, hidden], and the filter's three,
+/// [n, 118].
 struct Hybrid final : MotionModel {
   using Config = HybridConfig;
   Hybrid(const HybridConfig& c, const Init& init);
@@ -46,11 +47,11 @@ struct Hybrid final : MotionModel {
 
   HybridConfig config;
   GruLayer enc, dec;
-  Linear gate, correction, twist, leaves, path;  ///< all near none at the start
-  MotionStatistics units;                        ///< all but `sixd`
+  Linear gate, trend, correction, twist, leaves, path;  ///< all near none at the start
+  MotionStatistics units;                               ///< all but `sixd`
 
  private:
-  Var seen(const MotionInput& in, const SurfaceTurns& surface) const;
+  Var seen(const MotionInput& in, const SurfaceTurns& surface, const Var& uncertainty) const;
 };
 
 }  // namespace restage
