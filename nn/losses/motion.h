@@ -25,7 +25,7 @@ struct MotionWeights {
 struct MotionBatch {
   Var joints, input, true_trans, trans, rest_a, rest_b, sixd;
   Tensor self_mask;
-  Tensor turns, uncertainty;  ///< of MotionInput
+  Tensor turns = {}, uncertainty = {};  ///< of MotionInput
   MotionInput seen(const Var& target_rest) const {
     return {input, trans, target_rest, turns, uncertainty};
   }
