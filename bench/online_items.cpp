@@ -104,8 +104,8 @@ class MotionOnline : public Item {
  private:
   void step(int64_t frame) {
     Context ctx;
-    answer_ = net_.forward(ctx, joints_.rows(frame, frame + 1).reshape({1, 1, kJoints, 3}), trans_,
-                           rest_, &state_);
+    const Tensor joints = joints_.rows(frame, frame + 1).reshape({1, 1, kJoints, 3});
+    answer_ = net_.forward(ctx, {joints, trans_, rest_, {}, {}}, &state_);
   }
   CacheFlush flush_{flushed};
   Smrm net_;
