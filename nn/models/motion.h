@@ -1,7 +1,6 @@
 // What every motion network is: joints and translation of A in, the motion of B out (spec 3.1).
 #pragma once
 
-#include <array>
 #include <vector>
 
 #include "autograd/kernels/rotation.h"

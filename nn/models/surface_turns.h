@@ -2,6 +2,8 @@
 // closed form of the joints, which shows all but twist and the leaves.
 #pragma once
 
+#include <array>
+
 #include "nn/models/motion.h"
 
 namespace restage {
