@@ -164,6 +164,21 @@ TEST(SamplingSensors, EvaluationScansShowTheirJoints) {
   }
 }
 
+TEST(SamplingTracks, RotationsAreAugmentedAsJointsAre) {
+  const Body& body = training_corpus().bodies[0];
+  const Pose pose = pose_on(training_corpus().motions[0], body, 3);
+  const PosedSkeleton posed = forward_kinematics(body.joints, pose);
+  for (const Augmentation a : {Augmentation{0.7, false}, Augmentation{-1.2, true}}) {
+    const Joints rest = augmented_rest(a, body.joints), joints = augmented(a, posed.joints);
+    const Rotations global = augmented(a, posed.global);
+    for (size_t j = 1; j < kJoints; ++j) {
+      const auto parent = static_cast<size_t>(kParents[j]);
+      const Vec3 bone = global[parent] * (rest[j] - rest[parent]);
+      EXPECT_LT((joints[j] - joints[parent] - bone).norm(), 1e-9) << kJointNames[j] << a.mirror;
+    }
+  }
+}
+
 TEST(SamplingTracks, WindowsSeeWhatWasAnswered) {
   TrackConfig config{.sequences = 5, .frames = 20, .least = 100, .most = 200, .clouds = {}};
   int asked = 0;
