@@ -15,6 +15,7 @@ namespace {
 constexpr int kTargetSamples = 16;  // a target is looked at once: average many choices of points
 constexpr size_t kTargetPoints = 8192;
 constexpr double kTposeLimit = 30.0;  // degrees
+constexpr double kRemembering = 8;    // frames per second from which on one is like the one before
 
 Tensor tensor_of(const Joints& joints, const Vec3& origin) {
   Tensor t = Tensor::empty({1, kJoints, 3});
@@ -169,7 +170,8 @@ std::span<const RetargetedFrame> Retargeter::push(const Points& cloud, const std
     if (!extractor_)
       throw InputError(source, "cannot be read without a model for skeleton",
                        "give weights that have one");
-    seen = (*extractor_)(cloud, source, key);
+    const bool remembers = received_ && options_.fps > kRemembering;
+    seen = (*extractor_)(cloud, source, key, remembers ? &*received_ : nullptr);
   }
   const auto out = push_joints(seen);
   times_.extract = seconds;

@@ -9,6 +9,7 @@
 #include "autograd/base/parallel.h"
 #include "datasets/readers/errors.h"
 #include "datasets/sampling/dress.h"
+#include "datasets/sampling/memory.h"
 
 namespace restage {
 namespace {
@@ -25,6 +26,7 @@ CloudConfig checked(const CloudConfig& c) {
   for (const double share : {c.dressed, c.one_camera, c.camera_ring, c.one_camera + c.camera_ring})
     check_setting("cloud", share >= 0 && share <= 1, "dressed, one_camera, camera_ring",
                   "0 to 1, and one_camera + camera_ring at most 1");
+  check_setting("cloud", c.remembered >= 0 && c.remembered <= 1, "remembered", "0 to 1");
   check_setting("cloud", c.min_fraction > 0 && c.min_fraction <= 1, "min_fraction", "above 0 to 1");
   return c;
 }
@@ -38,6 +40,13 @@ std::vector<size_t> repeat_some(const RngKey& key, size_t distinct, size_t n) {
   while (order.size() < n) order.push_back(rng.below(distinct));
   for (size_t i = n; i > 1; --i) std::swap(order[i - 1], order[rng.below(i)]);
   return order;
+}
+
+/// The same, its frames earlier, but not before the first.
+CloudSubject step_back(CloudSubject subject) {
+  for (FrameRef* at : {&subject.at, &subject.limb_at})
+    at->frame -= std::min(at->frame, subject.step_back);
+  return subject;
 }
 
 }  // namespace
@@ -68,6 +77,10 @@ CloudSubject CloudSampler::subject(int64_t index) const {
     constexpr std::array<int, 6> kLimbs = {1, 2, 3, 3, 13, 14};  // legs, upper body, arms
     out.limb = kLimbs[rng.below(kLimbs.size())];
     out.limb_at = frames_.at(rng.below(frames_.count()));
+  }
+  if (rng.uniform() < config_.remembered) {
+    out.memory = rng.uniform() < 0.5 ? CloudSubject::Memory::drawn : CloudSubject::Memory::asked;
+    out.step_back = 1 + rng.below(3);
   }
   return out;
 }
@@ -148,49 +161,96 @@ Points CloudSampler::cloud(const CloudSubject& subject, size_t n, const RngKey& 
   return see(subject, n, scene, key).points;
 }
 
-void CloudSampler::fill(const CloudSubject& subject, const RngKey& key, int64_t row,
-                        CloudBatch& to) const {
+Joints CloudSampler::true_joints(const CloudSubject& subject) const {
+  const Body& body = corpus_.bodies.at(subject.body);
+  Joints out =
+      augmented(subject.augmentation,
+                subject.rest ? body.joints : forward_kinematics(body.joints, pose(subject)).joints);
+  for (Vec3& joint : out) joint *= subject.scale;
+  return out;
+}
+
+/// `to`: 22 x 4 numbers, zero so far.
+void CloudSampler::fill_past(const Row& row, const Point& centre, float* to) const {
+  if (row.subject.memory == CloudSubject::Memory::none) return;
+  Rng rng(row.key.fold("memory"));
+  CloudSubject other = row.subject;
+  other.at = frames_.at(rng.below(frames_.count()));
+  const Memory memory = draw_memory(rng, true_joints(step_back(row.subject)), true_joints(other));
+  for (int j = 0; j < kJoints; ++j) {
+    Eigen::Map<Point>(to + 4 * j) = (memory.joints[j] - centre.cast<double>()).cast<float>();
+    to[4 * j + 3] = static_cast<float>(memory.trust[j]);
+  }
+}
+
+void CloudSampler::fill(const Row& row, int64_t i, CloudBatch& to) const {
   const auto n = static_cast<size_t>(config_.points);
-  Rng rng(key.fold("count"));
+  Rng rng(row.key.fold("count"));
   const auto least = static_cast<size_t>(std::ceil(config_.min_fraction * config_.points));
-  const Seen seen = see(subject, least + rng.below(n - least + 1), key, key);
-  const std::vector<size_t> order = repeat_some(key.fold("repeat"), seen.points.size(), n);
+  const Seen seen = see(row.subject, least + rng.below(n - least + 1), row.scene, row.key);
+  const std::vector<size_t> order = repeat_some(row.key.fold("repeat"), seen.points.size(), n);
   Points chosen;
-  for (const size_t i : order) chosen.push_back(seen.points[i]);
+  for (const size_t k : order) chosen.push_back(seen.points[k]);
 
   const Point centre = centroid(chosen);
-  const auto at = [&](Tensor& t) { return t.data<float>() + row * (t.numel() / t.size(0)); };
+  const auto at = [&](Tensor& t) { return t.data<float>() + i * (t.numel() / t.size(0)); };
   float *points = at(to.points), *joints = at(to.joints);
-  for (size_t i = 0; i < n; ++i) Eigen::Map<Point>(points + 3 * i) = chosen[i] - centre;
+  Eigen::Map<Point>(at(to.centres)) = centre;
+  for (size_t k = 0; k < n; ++k) Eigen::Map<Point>(points + 3 * k) = chosen[k] - centre;
   for (int j = 0; j < kJoints; ++j)
     Eigen::Map<Point>(joints + 3 * j) = (seen.joints[j] - centre.cast<double>()).cast<float>();
-  for (size_t i = 0; to.weights.defined() && i < n; ++i)
-    seen.samples.skin_weights(corpus_.bodies[subject.body], seen.which[order[i]],
-                              subject.augmentation.mirror, at(to.weights) + i * kJoints);
+  for (size_t k = 0; to.weights.defined() && k < n; ++k)
+    seen.samples.skin_weights(corpus_.bodies[row.subject.body], seen.which[order[k]],
+                              row.subject.augmentation.mirror, at(to.weights) + k * kJoints);
   for (int j = 0; to.turns.defined() && j < kJoints; ++j)
     Eigen::Map<Eigen::Matrix<float, 3, 2>>(at(to.turns) + 6 * j) =
         seen.turns[j].leftCols<2>().cast<float>();
+  if (to.past.defined()) fill_past(row, centre, at(to.past));
 }
 
-CloudBatch CloudSampler::make(int64_t first, int64_t n,
-                              const std::vector<CloudSubject>* subjects) const {
+CloudBatch CloudSampler::make(const std::vector<Row>& rows) const {
+  const auto n = std::ssize(rows);
   CloudBatch out;
   out.points = Tensor::empty({n, config_.points, 3});
   out.joints = Tensor::empty({n, kJoints, 3});
+  out.centres = Tensor::empty({n, 3});
   if (config_.skin_weights) out.weights = Tensor::empty({n, config_.points, kJoints});
   if (config_.rotations) out.turns = Tensor::empty({n, kJoints, 6});
+  if (config_.remembered > 0) out.past = Tensor::zeros({n, kJoints, 4});
+  for (int64_t i = 0; i < n; ++i)
+    if (rows[static_cast<size_t>(i)].subject.memory == CloudSubject::Memory::asked)
+      out.asked.push_back(i);
   parallel_for(n, 1, [&](int64_t from, int64_t to) {
-    for (int64_t i = from; i < to; ++i)
-      fill(subjects ? (*subjects)[static_cast<size_t>(i)] : subject(first + i),
-           key_.fold(static_cast<uint64_t>(first + i)), i, out);
+    for (int64_t i = from; i < to; ++i) fill(rows[static_cast<size_t>(i)], i, out);
   });
   return out;
 }
 
-CloudBatch CloudSampler::batch(int64_t first, int64_t n) const { return make(first, n, nullptr); }
+CloudBatch CloudSampler::batch(int64_t first, int64_t n) const {
+  std::vector<Row> rows;
+  for (int64_t i = first; i < first + n; ++i) {
+    const RngKey key = key_.fold(static_cast<uint64_t>(i));
+    rows.push_back({subject(i), key, key});
+  }
+  return make(rows);
+}
+
+CloudBatch CloudSampler::before(int64_t first, const CloudBatch& batch) const {
+  std::vector<Row> rows;
+  for (const int64_t i : batch.asked) {
+    const RngKey key = key_.fold(static_cast<uint64_t>(first + i));
+    rows.push_back({step_back(subject(first + i)), key, key.fold("before")});
+  }
+  return make(rows);
+}
 
 CloudBatch CloudSampler::clouds(const std::vector<CloudSubject>& subjects) const {
-  return make(0, static_cast<int64_t>(subjects.size()), &subjects);
+  std::vector<Row> rows;
+  for (const CloudSubject& s : subjects) {
+    const RngKey key = key_.fold(rows.size());
+    rows.push_back({s, key, key});
+  }
+  return make(rows);
 }
 
 }  // namespace restage

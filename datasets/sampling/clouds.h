@@ -25,6 +25,7 @@ struct CloudConfig {
   double dressed = 0;         ///< part of the clouds whose person wears clothes and hair (dress.h)
   double one_camera = 0;      ///< part that one depth camera sees (sensors.h)
   double camera_ring = 0;     ///< part that three to seven cameras around see
+  double remembered = 0;      ///< part with a memory of the frame before (CloudBatch::past)
   bool skin_weights = false;  ///< also fill CloudBatch::weights
   bool rotations = false;     ///< also fill CloudBatch::turns
 };
@@ -36,6 +37,9 @@ struct CloudBatch {
   Tensor weights;  ///< [N, V, 22] which joints move each point; only with CloudConfig::skin_weights
   Tensor turns;  ///< [N, 22, 6] rotation of each joint from the T-pose, two columns of its matrix;
                  ///< only with CloudConfig::rotations
+  Tensor past;   ///< [N, 22, 4] as SkeletonInput has it; only with CloudConfig::remembered
+  Tensor centres;              ///< [N, 3] the centroids, in the world
+  std::vector<int64_t> asked;  ///< rows whose memory is to be the answer to CloudSampler::before()
 };
 
 /// What a cloud shows; `rest` means the T-pose, whatever `at` says.
@@ -49,6 +53,8 @@ struct CloudSubject {
   double scale = 1;
   Sensor sensor = Sensor::none;
   bool dressed = false;
+  enum class Memory { none, drawn, asked } memory = Memory::none;
+  size_t step_back = 1;  ///< how many frames ago the remembered one is
 };
 
 class CloudSampler {
@@ -62,6 +68,9 @@ class CloudSampler {
   CloudSubject subject(int64_t index) const;
   /// The clouds of given subjects, the i-th with the noise and points of sample i.
   CloudBatch clouds(const std::vector<CloudSubject>& subjects) const;
+  /// The same people in the same clothes before the same cameras, a frame before: of those rows of
+  /// batch(first, n) whose memory is asked for.
+  CloudBatch before(int64_t first, const CloudBatch& batch) const;
   Pose pose(const CloudSubject& subject) const;
   /// At most `n` points in the world. Clothes and cameras are functions of `scene`, which the
   /// frames of a sequence share, all else of `key`.
@@ -85,9 +94,15 @@ class CloudSampler {
     Rotations turns;
   };
   Seen see(const CloudSubject& subject, size_t n, const RngKey& scene, const RngKey& key) const;
-  /// Row i of a batch.
-  void fill(const CloudSubject& subject, const RngKey& key, int64_t i, CloudBatch& to) const;
-  CloudBatch make(int64_t first, int64_t n, const std::vector<CloudSubject>* subjects) const;
+  /// One row of a batch.
+  struct Row {
+    CloudSubject subject;
+    RngKey scene, key;
+  };
+  void fill(const Row& row, int64_t i, CloudBatch& to) const;
+  void fill_past(const Row& row, const Point& centre, float* to) const;
+  CloudBatch make(const std::vector<Row>& rows) const;
+  Joints true_joints(const CloudSubject& subject) const;
 
   const Corpus& corpus_;
   CloudConfig config_;

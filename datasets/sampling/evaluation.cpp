@@ -60,25 +60,45 @@ std::vector<CloudSubject> evaluation_tposes(const Corpus& corpus, size_t per_bod
   return out;
 }
 
+std::vector<CloudSubject> following(const Corpus& corpus, const std::vector<CloudSubject>& subjects,
+                                    size_t count, size_t frames) {
+  std::vector<CloudSubject> out;
+  for (size_t i = 0; i < count; ++i) {
+    CloudSubject s = subjects[i * subjects.size() / count];
+    const size_t length = corpus.motions.at(s.at.motion).frames();
+    const size_t first = std::min(s.at.frame, length - std::min(length, frames));
+    for (size_t f = 0; f < frames; ++f) {
+      s.at.frame = std::min(first + f, length - 1);
+      out.push_back(s);
+    }
+  }
+  return out;
+}
+
 CloudBatch evaluation_scans(const Corpus& corpus, const std::vector<CloudSubject>& subjects,
-                            int cameras, int points, uint64_t seed) {
+                            int cameras, int points, uint64_t seed, size_t frames) {
   const auto n = std::ssize(subjects);
   CloudBatch out;
   out.points = Tensor::empty({n, points, 3});
   out.joints = Tensor::empty({n, kJoints, 3});
-  float *to_points = out.points.data<float>(), *to_joints = out.joints.data<float>();
+  out.centres = Tensor::empty({n, 3});
+  const auto at = [](Tensor& t, int64_t i) { return t.data<float>() + i * t.numel() / t.size(0); };
   parallel_for(n, 1, [&](int64_t from, int64_t to) {
     for (int64_t i = from; i < to; ++i) {
+      const auto frame = static_cast<size_t>(i) % frames, first = static_cast<size_t>(i) - frame;
+      const RngKey scene = RngKey{seed, 0}.fold("evaluation scans").fold(first / frames);
       const CloudSubject& s = subjects[static_cast<size_t>(i)];
-      const RngKey key = RngKey{seed, 0}.fold("evaluation scans").fold(static_cast<uint64_t>(i));
-      const Body body = dressed(corpus.bodies.at(s.body), key.fold("outfit"));
-      const Pose pose = pose_on(corpus.motions.at(s.at.motion), body, s.at.frame);
-      Rng rng(key);
-      const Vec3 centre = pose.root + Vec3(0, 0.1, 0);
+      const Body body = dressed(corpus.bodies.at(s.body), scene.fold("outfit"));
+      const auto pose_of = [&](const CloudSubject& subject) {
+        return pose_on(corpus.motions.at(subject.at.motion), body, subject.at.frame);
+      };
+      Rng rng(scene);
+      const Vec3 centre = pose_of(subjects[first]).root + Vec3(0, 0.1, 0);
       const auto ring = camera_ring(cameras, rng.uniform(2.2, 3.2), rng.uniform(0, 2 * M_PI),
                                     centre, {0.2, 1.2, 2.0});
-      Points cloud =
-          scan_surface({pose_surface(body, pose), body.rest.faces}, ring, {}, key.fold("scan"));
+      const Pose pose = pose_of(s);
+      Points cloud = scan_surface({pose_surface(body, pose), body.rest.faces}, ring, {},
+                                  (frame == 0 ? scene : scene.fold(frame)).fold("scan"));
       for (size_t k = 0; k < cloud.size(); ++k)
         std::swap(cloud[k], cloud[k + rng.below(cloud.size() - k)]);
       const size_t distinct = std::min<size_t>(cloud.size(), static_cast<size_t>(points));
@@ -88,12 +108,12 @@ CloudBatch evaluation_scans(const Corpus& corpus, const std::vector<CloudSubject
       cloud.resize(distinct);
       while (std::ssize(cloud) < points) cloud.push_back(cloud[rng.below(distinct)]);
       const Point middle = centroid(cloud);
+      Eigen::Map<Point>(at(out.centres, i)) = middle;
       for (int64_t k = 0; k < points; ++k)
-        Eigen::Map<Point>(to_points + 3 * (i * points + k)) =
-            cloud[static_cast<size_t>(k)] - middle;
+        Eigen::Map<Point>(at(out.points, i) + 3 * k) = cloud[static_cast<size_t>(k)] - middle;
       const Joints joints = forward_kinematics(body.joints, pose).joints;
       for (size_t j = 0; j < kJoints; ++j)
-        Eigen::Map<Point>(to_joints + 3 * (i * kJoints + static_cast<int64_t>(j))) =
+        Eigen::Map<Point>(at(out.joints, i) + 3 * j) =
             (joints[j] - middle.cast<double>()).cast<float>();
     }
   });

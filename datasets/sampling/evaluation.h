@@ -17,11 +17,15 @@ std::vector<CloudSubject> evaluation_clouds(const Corpus& corpus, size_t count, 
 std::vector<CloudSubject> evaluation_tposes(const Corpus& corpus, size_t per_body, double heading,
                                             uint64_t seed);
 
+/// `count` of them, each for `frames` frames, one sequence after the other.
+std::vector<CloudSubject> following(const Corpus& corpus, const std::vector<CloudSubject>& subjects,
+                                    size_t count, size_t frames);
+
 /// What depth cameras measure of the subjects, dressed, by ray casting (scanner.h): one camera
 /// before, beside or behind them, or a ring of `cameras`; `points` of each cloud, relative to their
-/// centroid.
+/// centroid. `frames` subjects after each other wear the same clothes before the same cameras.
 CloudBatch evaluation_scans(const Corpus& corpus, const std::vector<CloudSubject>& subjects,
-                            int cameras, int points, uint64_t seed);
+                            int cameras, int points, uint64_t seed, size_t frames = 1);
 
 /// Body A's performance of part of a motion, to be retargeted to body B. Indices into a corpus.
 struct EvalSequence {

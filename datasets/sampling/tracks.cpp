@@ -53,8 +53,10 @@ std::vector<JointTrack> make_tracks(const Corpus& corpus, const TrackConfig& con
     const Mat3 back = turn_about_y(-subject.augmentation.heading);
     const auto clouds =
         clouds_of(sampler, subject, static_cast<size_t>(config.frames), config, own);
+    SeenJoints seen;
     for (size_t f = 0; f < clouds.size(); ++f) {
-      out[i].frames.push_back(turned(back, extract(clouds[f], own.fold("extract").fold(f))));
+      seen = extract(clouds[f], own.fold("extract").fold(f), f > 0 ? &seen : nullptr);
+      out[i].frames.push_back(turned(back, seen));
     }
   }
   return out;

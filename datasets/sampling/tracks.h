@@ -25,8 +25,10 @@ struct TrackConfig {
   CloudConfig clouds;            ///< noise, dressed, one_camera, camera_ring: each of a whole track
 };
 
-/// What is seen in a cloud, in its frame; `key` for what is random.
-using Extract = std::function<SeenJoints(const Points& cloud, const RngKey& key)>;
+/// What is seen in a cloud, in its frame; `key` for what is random, `before`: what was seen in the
+/// frame before, null in the first.
+using Extract =
+    std::function<SeenJoints(const Points& cloud, const RngKey& key, const SeenJoints* before)>;
 
 /// Track i is a function of (corpus, config, seed, i, extract). `extract` is called from one
 /// thread. InputError: no motion, settings out of range.

@@ -6,6 +6,8 @@
 namespace restage {
 namespace {
 
+constexpr double kLost = 1;  // metres that nobody moves from one frame to the next
+
 bool before(const Point& a, const Point& b) {
   return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
 }
@@ -84,7 +86,7 @@ void JointExtractor::choose(const RngKey& key) {
 }
 
 SeenJoints JointExtractor::operator()(const Points& cloud, const std::string& source,
-                                      const RngKey& key) {
+                                      const RngKey& key, const SeenJoints* before) {
   sort(cloud, source);
   const auto n = static_cast<size_t>(model_.points());
   const size_t views = centres_.size();
@@ -105,7 +107,8 @@ SeenJoints JointExtractor::operator()(const Points& cloud, const std::string& so
     }
   }
   Context ctx;
-  const SkeletonOutput answer = model_.forward(ctx, batch);
+  const SkeletonOutput answer =
+      model_.forward(ctx, {batch, before != nullptr ? past(*before) : Tensor()});
   const Tensor joints = answer.joints.value;
   for (size_t s = 0; s < views; ++s) {
     const Mat3 back = turn_about_y(-heading(s));
@@ -119,6 +122,25 @@ SeenJoints JointExtractor::operator()(const Points& cloud, const std::string& so
   if (answer.turns.value.defined()) out.turns = mean_turns(answer.turns.value);
   if (answer.uncertainty.value.defined())
     out.uncertainty = mean_uncertainty(answer.uncertainty.value);
+  return out;
+}
+
+/// As each view has it: turned, mirrored, about its centre.
+Tensor JointExtractor::past(const SeenJoints& before) const {
+  Vec3 middle = Vec3::Zero();
+  for (const Vec3& joint : before.joints) middle += joint / kJoints;
+  if (!((middle - centres_[0]).norm() < kLost)) return {};
+  Tensor out = Tensor::empty({std::ssize(centres_), kJoints, 4});
+  float* to = out.data<float>();
+  for (size_t s = 0; s < centres_.size(); ++s) {
+    const Mat3 turn = turn_about_y(heading(s));
+    for (size_t j = 0; j < kJoints; ++j, to += 4) {
+      const size_t from = mirrored(s) ? static_cast<size_t>(kMirror[j]) : j;
+      Eigen::Map<Point>{to} = (turn * (before.joints[from] - centres_[s])).cast<float>();
+      if (mirrored(s)) to[0] = -to[0];
+      to[3] = static_cast<float>(before.uncertainty ? trust_of((*before.uncertainty)[from]) : 1.0);
+    }
+  }
   return out;
 }
 

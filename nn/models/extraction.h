@@ -38,13 +38,17 @@ class JointExtractor {
   explicit JointExtractor(SkeletonModel& model, int samples = 1, double around = kAllAround);
   /// Metres, in the cloud's frame. Points are sorted lexicographically first and exact repeats
   /// left out, so neither their order in a file nor pixels without depth matter to the last bit.
+  /// `before`: the answer to the frame before, in the same frame; null where there was none. It is
+  /// forgotten where the cloud is more than a metre from it.
   /// InputError naming `source`: fewer than 64 distinct points, values that are not finite.
-  SeenJoints operator()(const Points& cloud, const std::string& source, const RngKey& key);
+  SeenJoints operator()(const Points& cloud, const std::string& source, const RngKey& key,
+                        const SeenJoints* before = nullptr);
 
  private:
   void sort(const Points& cloud, const std::string& source);
   void choose(const RngKey& key);
   double heading(size_t view) const;
+  Tensor past(const SeenJoints& before) const;
   Rotations mean_turns(const Tensor& turns) const;
   std::array<double, kJoints> mean_uncertainty(const Tensor& logs) const;
 

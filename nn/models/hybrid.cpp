@@ -13,8 +13,10 @@ namespace restage {
 namespace {
 
 constexpr double kUsualUncertainty = 0.005;  // metres; also where nobody says
-// What an answer of 1 stands for: radians, 6D numbers, and deviations of the path.
-constexpr double kTwist = 0.3, kLeaf = 0.3, kPath = 0.3;
+// Farthest that a twist (radians) and a leaf's 6D numbers are corrected at the usual uncertainty;
+// what an answer of 1 stands for in deviations of the path.
+constexpr double kTurn = 0.05, kPath = 0.3;
+constexpr double kBlind = 6;     // times as far for rotations where none are read from the surface
 constexpr double kTrusting = 4;  // log odds of an untrained gate: what is seen counts for 98 %
 constexpr int64_t kEnds = std::ssize(kLeaves), kGates = 2 * kJoints + kEnds;
 constexpr double kTrend = -2;  // log odds of an untrained trend's gain: 12 %
@@ -57,6 +59,15 @@ Var for_each_number(const Var& gates) {
 Var each_thrice(const Var& x) {
   const int64_t n = x.size(0), t = x.size(1);
   return reshape(expand(reshape(x, {n, t, kJoints, 1}), {n, t, kJoints, 3}), {n, t, 3 * kJoints});
+}
+
+/// [n, t, 22] -> [n, t, 30]: that of each leaf, six times.
+Var of_leaves(const Var& x) {
+  const int64_t n = x.size(0), t = x.size(1);
+  const auto one = [&](int64_t j) { return slice(x, 2, j, j + 1); };
+  const Var five = concat(
+      {one(kLeaves[0]), one(kLeaves[1]), one(kLeaves[2]), one(kLeaves[3]), one(kLeaves[4])}, 2);
+  return reshape(expand(reshape(five, {n, t, kEnds, 1}), {n, t, kEnds, 6}), {n, t, 6 * kEnds});
 }
 
 }  // namespace
@@ -117,11 +128,14 @@ MotionOutput Hybrid::forward(Context& ctx, const MotionInput& in, MotionState* s
   const Var now = concat(
       {reshape(in.joints, {n, t, w}), reshape(Var(surface.twist), {n, t, kJoints}), ends}, 2);
   const Var calm = filtered(now, gains(gate, kTrusting), gains(trend, kTrend), &(*state)[2]);
+  const Var off = scale(uncertainty, 1 / kUsualUncertainty);
+  const double turning = kTurn * (config.orientation ? 1 : kBlind);
   const Var moved = slice(calm, 2, 0, w) +
                     scale(tanh(correction(ctx, decoded)), config.reach) * each_thrice(uncertainty),
-            twisted = slice(calm, 2, w, w + kJoints) + scale(twist(ctx, decoded), kTwist),
+            twisted =
+                slice(calm, 2, w, w + kJoints) + scale(tanh(twist(ctx, decoded)), turning) * off,
             sixd = slice(calm, 2, w + kJoints, w + kJoints + 6 * kEnds) +
-                   scale(leaves(ctx, decoded), kLeaf);
+                   scale(tanh(leaves(ctx, decoded)), turning) * of_leaves(off);
 
   const Var posed = reshape(moved, {n * t, kJoints, 3});
   const Var rest_rows = rest_of_each_frame(in.rest, t);

@@ -11,6 +11,25 @@ namespace {
 
 constexpr double kUsualError = -4;  // log of 2 cm: where an untrained uncertainty begins
 
+/// Per centre [n, t, 3]: where each remembered joint lies from it, by the trust in it, and that
+/// trust. [n, t, 88], constant; all zero where nothing is remembered.
+Tensor seen_from(const Tensor& centres, const Tensor& past, double scale) {
+  const int64_t n = centres.size(0), t = centres.size(1), w = 4 * kJoints;
+  Tensor out = Tensor::zeros({n, t, w});
+  if (!past.defined()) return out;
+  for (int64_t row = 0; row < n * t; ++row) {
+    const float* centre = centres.data<float>() + 3 * row;
+    for (int64_t j = 0; j < kJoints; ++j) {
+      const float* joint = past.data<float>() + 4 * (row / t * kJoints + j);
+      float* to = out.data<float>() + w * row + 4 * j;
+      for (int64_t c = 0; c < 3; ++c)
+        to[c] = joint[3] * static_cast<float>(scale) * (joint[c] - centre[c]);
+      to[3] = joint[3];
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 PatchTransformer::PatchTransformer(const PatchTransformerConfig& c, const Init& init)
@@ -25,10 +44,16 @@ PatchTransformer::PatchTransformer(const PatchTransformerConfig& c, const Init& 
     layers.emplace(c.width, c.heads, 2 * c.width, init.sub("layers." + std::to_string(i)));
   if (c.orientation) orientation.emplace(c.width, kJoints * 7, init.sub("orientation"));
   if (c.uncertainty) uncertainty.emplace(c.width, kJoints, init.sub("uncertainty"));
+  if (c.memory) {
+    memory.emplace(std::initializer_list<int64_t>{4 * kJoints, c.width, c.width},
+                   init.sub("memory"));
+    (*memory)[1].start_small();
+  }
 }
 
-SkeletonOutput PatchTransformer::forward(Context& ctx, const Var& cloud) {
+SkeletonOutput PatchTransformer::forward(Context& ctx, const SkeletonInput& in) {
   const ModuleScope path(scope);
+  const Var& cloud = in.cloud;
   const int64_t n = cloud.size(0), t = config.centres;
   SkeletonOutput out;
   out.centres = fps(cloud.value, t);
@@ -37,6 +62,7 @@ SkeletonOutput PatchTransformer::forward(Context& ctx, const Var& cloud) {
   const Var offsets = neighbour_offsets(cloud, centres, index);
   const Var patch = max(point(ctx, scale(offsets, config.patch_scale)), 2);
   Var x = mix(ctx, relu(patch)) + position(ctx, scale(centres, config.centre_scale));
+  if (memory) x = x + (*memory)(ctx, seen_from(centres.value, in.past, config.memory_scale));
   for (size_t i = 0; i < layers.size(); ++i) x = layers[i](ctx, x);
   x = norm(ctx, x);
   const Var head = vote(ctx, x);
@@ -69,6 +95,7 @@ void PatchTransformer::visit(Fields& f) {
   f("segment", segment);
   if (orientation) f("orientation", *orientation);
   if (uncertainty) f("uncertainty", *uncertainty);
+  if (memory) f("memory", *memory);
 }
 
 }  // namespace restage

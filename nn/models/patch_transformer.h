@@ -14,8 +14,9 @@ namespace restage {
 struct PatchTransformerConfig {
   int64_t points = 512, centres = 64, neighbours = 16, patch = 64, width = 128, layers = 4,
           heads = 4;
-  bool orientation = false, uncertainty = false;
-  double patch_scale = 10, centre_scale = 2;  ///< bring offsets and positions to order one
+  bool orientation = false, uncertainty = false, memory = false;
+  // Bring offsets and positions to order one.
+  double patch_scale = 10, centre_scale = 2, memory_scale = 4;
 };
 
 template <class V>
@@ -27,6 +28,7 @@ void visit(V& v, PatchTransformerConfig& c) {
   v("neighbours", c.neighbours, "points of a patch", between(1, kMostPoints));
   v("orientation", c.orientation, "also the rotation of each joint");
   v("uncertainty", c.uncertainty, "also how far each joint may be off");
+  v("memory", c.memory, "also reads where the joints were a frame before");
   v.check("width", c.width % c.heads == 0, "does not fit the heads",
           "give a multiple of " + std::to_string(c.heads));
 }
@@ -34,7 +36,7 @@ void visit(V& v, PatchTransformerConfig& c) {
 struct PatchTransformer : SkeletonModel {
   using Config = PatchTransformerConfig;
   PatchTransformer(const PatchTransformerConfig& c, const Init& init);
-  SkeletonOutput forward(Context& ctx, const Var& cloud) override;
+  SkeletonOutput forward(Context& ctx, const SkeletonInput& in) override;
   int64_t points() const override { return config.points; }
   void visit(Fields& f) override;
   const char* kind() const override { return "PatchTransformer"; }
@@ -47,6 +49,7 @@ struct PatchTransformer : SkeletonModel {
   Linear segment;  ///< which joint moves the centre (used by the training loss only)
   std::optional<Linear> orientation;  ///< 22 logits and 22 x 6 numbers per token
   std::optional<Linear> uncertainty;  ///< 22 per token, weighted as the votes are
+  std::optional<ReluChain> memory;    ///< of where a centre lies from each remembered joint
 };
 
 }  // namespace restage

@@ -43,8 +43,9 @@ PointTransformer::PointTransformer(const PointTransformerConfig& c, const Init& 
       backbone(c, init.sub("backbone")),
       fc2({c.base << c.blocks, c.head1, c.head2, kJoints * 3}, init.sub("fc2")) {}
 
-SkeletonOutput PointTransformer::forward(Context& ctx, const Var& cloud) {
+SkeletonOutput PointTransformer::forward(Context& ctx, const SkeletonInput& in) {
   const ModuleScope path(scope);
+  const Var& cloud = in.cloud;
   SkeletonOutput out;
   out.joints = reshape(fc2(ctx, mean(backbone(ctx, cloud), 1)), {cloud.size(0), kJoints, 3});
   return out;

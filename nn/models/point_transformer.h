@@ -46,7 +46,7 @@ struct PointTransformerBackbone : Module {
 struct PointTransformer : SkeletonModel {
   using Config = PointTransformerConfig;
   PointTransformer(const PointTransformerConfig& c, const Init& init);
-  SkeletonOutput forward(Context& ctx, const Var& cloud) override;
+  SkeletonOutput forward(Context& ctx, const SkeletonInput& in) override;
   int64_t points() const override { return config.points; }
   void visit(Fields& f) override;
   const char* kind() const override { return "PointTransformer"; }

@@ -65,8 +65,9 @@ PointNet::PointNet(const PointNetConfig& c, const Init& init)
       bn4(c.widths[3], init),
       bn5(c.widths[4], init) {}
 
-SkeletonOutput PointNet::forward(Context& ctx, const Var& cloud) {
+SkeletonOutput PointNet::forward(Context& ctx, const SkeletonInput& in) {
   const ModuleScope path(scope);
+  const Var& cloud = in.cloud;
   Var x = matmul(cloud, stn(ctx, cloud));  // points as rows: p A
   x = relu(bn1(ctx, conv1(ctx, x)));
   if (fstn) x = matmul(x, (*fstn)(ctx, x));

@@ -43,7 +43,7 @@ struct SpatialTransformer : Module {
 struct PointNet : SkeletonModel {
   using Config = PointNetConfig;
   PointNet(const PointNetConfig& c, const Init& init);
-  SkeletonOutput forward(Context& ctx, const Var& cloud) override;
+  SkeletonOutput forward(Context& ctx, const SkeletonInput& in) override;
   int64_t points() const override { return config.points; }
   void visit(Fields& f) override;
   const char* kind() const override { return "PointNet"; }

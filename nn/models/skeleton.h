@@ -18,10 +18,24 @@ struct SkeletonOutput {
   Tensor centres;    ///< i32 [n, c]: which input points the centres are
 };
 
+struct SkeletonInput {
+  SkeletonInput(Var points) : cloud(std::move(points)) {}
+  SkeletonInput(Tensor points) : cloud(std::move(points)) {}
+  SkeletonInput(Tensor points, Tensor remembered)
+      : cloud(std::move(points)), past(std::move(remembered)) {}
+  Var cloud;    ///< [n, points(), 3], centred on its centroid, metres
+  Tensor past;  ///< [n, 22, 4]: joints of the frame before, in the frame of the cloud, metres, and
+                ///< the trust in each (trust_of()); undefined where no frame came before
+};
+
+/// Trust in a remembered joint: 1 where its uncertainty (SkeletonOutput, metres) is none, 1/2 at
+/// 3 cm; 0 stands for a joint that nobody knows.
+inline double trust_of(double uncertainty) { return 0.03 / (0.03 + uncertainty); }
+
 struct SkeletonModel : Module {
-  /// cloud [n, points(), 3], centred on its centroid, metres. A cloud on a tape gets a gradient;
-  /// who is a neighbour of whom counts as constant.
-  virtual SkeletonOutput forward(Context& ctx, const Var& cloud) = 0;
+  /// A cloud on a tape gets a gradient; who is a neighbour of whom counts as constant. A model that
+  /// has no use for the past leaves it.
+  virtual SkeletonOutput forward(Context& ctx, const SkeletonInput& in) = 0;
   virtual int64_t points() const = 0;
 };
 

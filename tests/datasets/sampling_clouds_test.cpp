@@ -9,6 +9,7 @@
 
 #include "autograd/base/error.h"
 #include "datasets/sampling/evaluation.h"
+#include "datasets/sampling/memory.h"
 #include "tests/datasets/sampling_support.h"
 
 namespace restage {
@@ -137,6 +138,65 @@ TEST(SamplingClouds, PoorScansRepeatPoints) {
   EXPECT_GE(least, 50u);
   EXPECT_LT(least, 100u);
   EXPECT_GT(most, 150u);
+}
+
+TEST(SamplingClouds, MemoriesAreOfTheFrameBefore) {
+  CloudConfig config{.points = 64, .noise = 0};
+  const CloudBatch plain = CloudSampler(training_corpus(), config, 1).batch(0, 4);
+  EXPECT_FALSE(plain.past.defined());
+  config.remembered = 0.8;
+  const CloudSampler sampler(training_corpus(), config, 1);
+  const CloudBatch batch = sampler.batch(0, 400);
+  EXPECT_EQ(at(batch.points, 3, 5), at(plain.points, 3, 5));  // the same people in the same poses
+  int known = 0;
+  for (int64_t i = 0; i < 400; ++i) {
+    const float* past = batch.past.data<float>() + i * kJoints * 4;
+    EXPECT_EQ(past[3] > 0, sampler.subject(i).memory != CloudSubject::Memory::none);
+    known += past[3] > 0;
+  }
+  EXPECT_NEAR(known, 320, 40);
+}
+
+TEST(SamplingClouds, MemoriesErrAsFarAsTheySay) {
+  const Joints truth = training_corpus().bodies[0].joints;
+  Joints elsewhere = truth;
+  for (Vec3& joint : elsewhere) joint.z() += 5;
+  Rng rng(RngKey{1, 0});
+  int exchanged = 0, lost = 0;
+  double ratio = 0;
+  const int n = 4000;
+  for (int i = 0; i < n; ++i) {
+    const Memory memory = draw_memory(rng, truth, elsewhere);
+    lost += memory.joints[0].z() - truth[0].z() > 2.5;
+    exchanged += memory.joints[20].x() < memory.joints[21].x();
+    for (int j = 0; j < kJoints && kMirror[j] == j; ++j) {  // the pelvis, which has no side
+      const double s = 0.03 / memory.trust[j] - 0.03;
+      ratio += std::min((memory.joints[j] - truth[j]).norm() / (3 * s), 10.0) / n;
+    }
+  }
+  EXPECT_NEAR(exchanged, n / 16.0, 60);
+  EXPECT_NEAR(lost, n / 30.0, 40);
+  EXPECT_NEAR(ratio, 1.3, 0.1);  // 1, and 10 for those of elsewhere
+}
+
+TEST(SamplingClouds, FramesBeforeAreOfTheSameScene) {
+  CloudConfig config{.points = 64, .noise = 0};
+  config.remembered = 1;
+  config.dressed = 0.5;
+  const CloudSampler sampler(training_corpus(), config, 1);
+  const CloudBatch batch = sampler.batch(40, 60), before = sampler.before(40, batch);
+  EXPECT_NEAR(static_cast<double>(batch.asked.size()), 30, 12);
+  ASSERT_EQ(before.points.size(0), std::ssize(batch.asked));
+  for (size_t k = 0; k < batch.asked.size(); ++k) {
+    const int64_t now = batch.asked[k], then = static_cast<int64_t>(k);
+    EXPECT_EQ(sampler.subject(40 + now).memory, CloudSubject::Memory::asked);
+    const auto joint = [](const CloudBatch& of, int64_t row, int j) {
+      const float* c = of.centres.data<float>() + 3 * row;
+      return Vec3(at(of.joints, row, j) + Vec3(c[0], c[1], c[2]));
+    };
+    for (int j = 0; j < kJoints; ++j)
+      EXPECT_LT((joint(batch, now, j) - joint(before, then, j)).norm(), 0.3);
+  }
 }
 
 TEST(SamplingClouds, SettingsOutOfRangeAreErrors) {

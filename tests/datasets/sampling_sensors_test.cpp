@@ -183,7 +183,7 @@ TEST(SamplingTracks, WindowsSeeWhatWasAnswered) {
   TrackConfig config{.sequences = 5, .frames = 20, .least = 100, .most = 200, .clouds = {}};
   int asked = 0;
   const Point offset(0, 3, 0);
-  const auto extract = [&](const Points& cloud, const RngKey&) {
+  const auto extract = [&](const Points& cloud, const RngKey&, const SeenJoints*) {
     ++asked;
     SeenJoints out;
     out.turns.emplace();
@@ -235,8 +235,9 @@ TEST(SamplingTracks, WindowsSeeWhatWasAnswered) {
         for (int c = 0; c < 3; ++c) EXPECT_NEAR(got[3 * r + c], turn(r, c), 1e-5);
     }
   }
-  const auto joints_only = make_tracks(training_corpus(), config, 3,
-                                       [](const Points&, const RngKey&) { return Joints{}; });
+  const auto joints_only =
+      make_tracks(training_corpus(), config, 3,
+                  [](const Points&, const RngKey&, const SeenJoints*) { return Joints{}; });
   EXPECT_FALSE(
       WindowSampler(training_corpus(), windows, 1, &joints_only).batch(0, 1).turns.defined());
   config.frames = 10;

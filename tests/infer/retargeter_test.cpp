@@ -20,8 +20,8 @@ using testing::tiny_motion;
 /// Answers with the joints that it was given, at the centroid of the cloud.
 struct FixedExtractor final : SkeletonModel {
   Joints joints = tiny_joints();
-  SkeletonOutput forward(Context&, const Var& cloud) override {
-    const int64_t n = cloud.size(0);
+  SkeletonOutput forward(Context&, const SkeletonInput& in) override {
+    const int64_t n = in.cloud.size(0);
     Tensor out = Tensor::empty({n, kJoints, 3});
     for (int64_t i = 0; i < n * kJoints; ++i) {
       const int j = static_cast<int>(i % kJoints);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "autograd/gradcheck/evaluate.h"
 #include "nn/models/registry.h"
 #include "tests/support/files.h"
 #include "tests/support/tiny_body.h"
@@ -75,11 +76,11 @@ TEST(InferExtraction, JointsMoveWithTheCloud) {
 
 /// Every joint at the cloud's highest point. The first `wrong` views are answered wrongly.
 struct HighestPoint final : SkeletonModel {
-  SkeletonOutput forward(Context&, const Var& cloud) override {
-    const int64_t n = cloud.size(0);
+  SkeletonOutput forward(Context&, const SkeletonInput& in) override {
+    const int64_t n = in.cloud.size(0);
     Tensor out = Tensor::zeros({n, kJoints, 3});
     for (int64_t s = 0; s < n; ++s) {
-      const float* x = cloud.value.data<float>() + s * 64 * 3;
+      const float* x = in.cloud.value.data<float>() + s * 64 * 3;
       const float* top = x;
       for (int64_t i = 0; i < 64; ++i)
         if (x[3 * i + 1] > top[1]) top = x + 3 * i;
@@ -115,12 +116,12 @@ TEST(InferExtraction, ViewsAgreeOnRotations) {
   // A vector of the cloud as the second column, and a cross product with it as the first: what a
   // mirror does to a rotation, it does to these.
   struct Pointing final : SkeletonModel {
-    SkeletonOutput forward(Context&, const Var& cloud) override {
-      const int64_t n = cloud.size(0);
+    SkeletonOutput forward(Context&, const SkeletonInput& in) override {
+      const int64_t n = in.cloud.size(0);
       SkeletonOutput out;
       Tensor turns = Tensor::zeros({n, kJoints, 6});
       for (int64_t i = 0; i < n; ++i) {
-        const Point* p = reinterpret_cast<const Point*>(cloud.value.data<float>() + i * 64 * 3);
+        const Point* p = reinterpret_cast<const Point*>(in.cloud.value.data<float>() + i * 64 * 3);
         const Point far = *std::max_element(
             p, p + 64, [](const Point& a, const Point& b) { return a.norm() < b.norm(); });
         const Point across = far.cross(Point(0, 1, 0));
@@ -152,8 +153,8 @@ TEST(InferExtraction, ViewsAgreeOnRotations) {
 TEST(InferExtraction, MirroredViewsChangeSides) {
   // Whatever the view shows, left is where x is positive in it.
   struct Sides final : SkeletonModel {
-    SkeletonOutput forward(Context&, const Var& cloud) override {
-      Tensor out = Tensor::zeros({cloud.size(0), kJoints, 3});
+    SkeletonOutput forward(Context&, const SkeletonInput& in) override {
+      Tensor out = Tensor::zeros({in.cloud.size(0), kJoints, 3});
       for (int64_t i = 0; i < out.numel() / 3; ++i)
         out.data<float>()[3 * i] =
             static_cast<float>(tiny_body("b", "test").joints[i % kJoints].x());
@@ -170,6 +171,64 @@ TEST(InferExtraction, MirroredViewsChangeSides) {
                two = extract_joints(model, points, "c", RngKey{9, 0}, 2);
   EXPECT_GT(one[20].x(), one[21].x());
   for (size_t j = 0; j < kJoints; ++j) EXPECT_LT((one[j] - two[j]).norm(), 1e-5);
+}
+
+TEST(InferExtraction, EveryViewRemembersTheFrameBefore) {
+  // Answers what it remembers, and as uncertainty the trust in it.
+  struct Remembering final : SkeletonModel {
+    SkeletonOutput forward(Context&, const SkeletonInput& in) override {
+      Tensor joints = Tensor::zeros({in.cloud.size(0), kJoints, 3});
+      Tensor trust = Tensor::zeros({in.cloud.size(0), kJoints});
+      for (int64_t k = 0; in.past.defined() && k < trust.numel(); ++k) {
+        std::copy_n(in.past.data<float>() + 4 * k, 3, joints.data<float>() + 3 * k);
+        trust.data<float>()[k] = in.past.data<float>()[4 * k + 3];
+      }
+      SkeletonOutput out;
+      out.joints = Var(joints);
+      out.uncertainty = Var(trust);
+      return out;
+    }
+    int64_t points() const override { return 64; }
+    void visit(Fields&) override {}
+    const char* kind() const override { return "Remembering"; }
+  } model;
+  const Points points = cloud(64);
+  SeenJoints before(tiny_body("b", "test").joints);
+  before.joints[20] += Vec3(0.1, 0.2, 0.3);  // not the mirror image of the other wrist
+  before.uncertainty.emplace();
+  for (size_t j = 0; j < kJoints; ++j)
+    (*before.uncertainty)[j] = 0.001 * static_cast<double>(1 + j);
+  for (const int views : {1, 2, 4, 8}) {
+    JointExtractor extractor(model, views);
+    const SeenJoints seen = extractor(points, "c", RngKey{9, 0}, &before);
+    for (size_t j = 0; j < kJoints; ++j) {
+      EXPECT_LT((seen.joints[j] - before.joints[j]).norm(), 1e-5) << views;
+      EXPECT_NEAR(std::log((*seen.uncertainty)[j]), trust_of((*before.uncertainty)[j]), 1e-6);
+    }
+    SeenJoints elsewhere = before;
+    for (Vec3& joint : elsewhere.joints) joint.x() += 1.5;
+    EXPECT_EQ(extractor(points, "c", RngKey{9, 0}, &elsewhere).joints,
+              extractor(points, "c", RngKey{9, 0}).joints);
+  }
+}
+
+TEST(InferExtraction, WhatNobodyTrustsIsNotRemembered) {
+  const auto model = make_model_as<SkeletonModel>(
+      "skeleton/patch_transformer",
+      model_config("skeleton/patch_transformer", {"points=64", "width=32", "layers=1",
+                                                  "neighbours=8", "centres=24", "memory=true"}),
+      Init{RngKey{1, 0}, DType::f32});
+  const Tensor points = Tensor::full({1, 64, 3}, 0.5);
+  const auto answer = [&](float trust) {
+    Tensor past = Tensor::full({1, kJoints, 4}, 0.3);
+    for (int64_t j = 0; j < kJoints; ++j) past.data<float>()[4 * j + 3] = trust;
+    Context ctx;
+    return model->forward(ctx, {points, past}).joints.value;
+  };
+  Context ctx;
+  const Tensor nothing = model->forward(ctx, points).joints.value;
+  EXPECT_TRUE(gradcheck::same_bits(answer(0), nothing));
+  EXPECT_FALSE(gradcheck::same_bits(answer(1), nothing));
 }
 
 TEST(InferExtraction, TooFewDistinctPoints) {

@@ -44,7 +44,9 @@ inline TrainConfig tiny_training(int64_t steps) {
   c.seed = 7;
   SkeletonStageConfig& s = skeleton(c);
   choose(s.model, "skeleton/patch_transformer",
-         {"points=96", "width=32", "layers=1", "centres=24", "neighbours=8"});
+         {"points=96", "width=32", "layers=1", "centres=24", "neighbours=8", "uncertainty=true",
+          "memory=true"});
+  s.clouds.remembered = 0.5;
   s.vote_weight = 0.5;
   s.segmentation_weight = 0.5;
   s.validation_clouds = 4;

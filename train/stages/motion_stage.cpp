@@ -63,9 +63,10 @@ std::vector<JointTrack> ask(const Corpus& corpus, const AnswersConfig& config, i
   TrackConfig tracks = config.tracks;
   tracks.sequences = sequences;
   log_info("motion: the extractor is asked about " + std::to_string(sequences) + " sequences");
-  return make_tracks(corpus, tracks, seed, [&](const Points& cloud, const RngKey& key) {
-    return extractor(cloud, where, key);
-  });
+  return make_tracks(corpus, tracks, seed,
+                     [&](const Points& cloud, const RngKey& key, const SeenJoints* before) {
+                       return extractor(cloud, where, key, before);
+                     });
 }
 
 /// Mean and deviation per column of rows of width n; deviations are at least `least`.

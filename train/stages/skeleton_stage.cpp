@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <utility>
 
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
@@ -16,6 +18,7 @@ constexpr double kNinety = 5.3223;  ///< |error| / s that 90 % stay below (Skele
 /// The uncertainty's head learns alone, so this only says how much of the clip of all gradients is
 /// its own; Adam makes up for the rest.
 constexpr double kUncertaintyWeight = 0.01;
+constexpr int64_t kFollowed = 12;  // frames of a validation sequence
 
 /// Euclidean lengths along the last axis (3), smooth at 0.
 Var lengths(const Var& d) { return sqrt(add_scalar(sum(square(d), -1), 1e-8)); }
@@ -29,6 +32,18 @@ CloudConfig training_clouds(const SkeletonStageConfig& c, const SkeletonModel& m
   CloudConfig out = with_points(c.clouds, model);
   out.skin_weights = c.vote_weight > 0 || c.segmentation_weight > 0;
   out.rotations = c.orientation_weight > 0;
+  return out;
+}
+
+/// Of the leading axis.
+Tensor rows_of(const Tensor& t, const std::vector<int64_t>& rows) {
+  Shape shape = t.shape();
+  shape.set(0, std::ssize(rows));
+  Tensor out = Tensor::empty(shape);
+  const int64_t width = t.numel() / t.size(0);
+  for (size_t i = 0; i < rows.size(); ++i)
+    std::copy_n(t.data<float>() + rows[i] * width, width,
+                out.data<float>() + static_cast<int64_t>(i) * width);
   return out;
 }
 
@@ -53,7 +68,7 @@ CloudConfig held_out(CloudConfig c, const SkeletonModel& model) {
   c = with_points(c, model);
   c.mirror = false;
   c.scale_jitter = 0;
-  c.dressed = c.one_camera = c.camera_ring = c.recombined = 0;
+  c.dressed = c.one_camera = c.camera_ring = c.recombined = c.remembered = 0;
   c.rotations = true;
   return c;
 }
@@ -76,10 +91,16 @@ SkeletonStage::SkeletonStage(const Config& config, const StageInput& in)
   };
   if (config.clouds.one_camera > 0) one_camera_ = scans(1);
   if (config.clouds.camera_ring > 0) ring_ = scans(6);
+  if (config.clouds.remembered > 0)
+    followed_ = evaluation_scans(
+        in.validation,
+        following(in.validation, posed_, static_cast<size_t>(config.validation_clouds + 7) / 8,
+                  kFollowed),
+        1, static_cast<int>(model_->points()), 1, kFollowed);
 }
 
 Var SkeletonStage::loss(Context& ctx, const CloudBatch& batch) const {
-  const SkeletonOutput out = model_->forward(ctx, batch.points);
+  const SkeletonOutput out = model_->forward(ctx, {batch.points, batch.past});
   Var total = config_.loss == SkeletonStageConfig::Loss::mse
                   ? mse(out.joints, Var(batch.joints))
                   : mean_all(lengths(out.joints - Var(batch.joints)));
@@ -119,9 +140,28 @@ CloudBatch SkeletonStage::batch(int64_t step) const {
   return sampler_.batch(step * n, n);
 }
 
+/// Memories that are asked for are what this model says of the frame before: errors of today and
+/// of yesterday are alike, which none that is drawn would teach.
+void SkeletonStage::recall(int64_t step, CloudBatch* clouds) const {
+  if (clouds->asked.empty()) return;
+  const CloudBatch before = sampler_.before(step * config_.optimiser.batch, *clouds);
+  Context ctx;
+  const SkeletonOutput answer = model_->forward(ctx, {before.points, before.past});
+  // The step itself will find what makes it so, and name it.
+  const std::span joints(answer.joints.value.data<float>(),
+                         static_cast<size_t>(answer.joints.value.numel()));
+  if (!std::all_of(joints.begin(), joints.end(), [](float x) { return std::isfinite(x); })) return;
+  const Tensor past = remembered(answer, before.centres, rows_of(clouds->centres, clouds->asked));
+  const int64_t row = 4 * kJoints;
+  for (size_t k = 0; k < clouds->asked.size(); ++k)
+    std::copy_n(past.data<float>() + static_cast<int64_t>(k) * row, row,
+                clouds->past.data<float>() + clouds->asked[k] * row);
+}
+
 NamedValues SkeletonStage::step(int64_t step) {
   const OptimiserConfig& o = config_.optimiser;
-  const CloudBatch clouds = batch(step);
+  CloudBatch clouds = batch(step);
+  recall(step, &clouds);
   const Differentiated d = differentiate(key_.fold(static_cast<uint64_t>(step)),
                                          [&](Context& ctx) { return loss(ctx, clouds); });
   const double rate = learning_rate(o.schedule, step, o.steps);
@@ -154,6 +194,41 @@ SkeletonErrors skeleton_errors(SkeletonModel& model, const CloudBatch& clouds) {
   return mean;
 }
 
+Tensor remembered(const SkeletonOutput& answer, const Tensor& centres, const Tensor& now) {
+  const Tensor& joints = answer.joints.value;
+  Tensor out = Tensor::zeros({joints.size(0), kJoints, 4});
+  for (int64_t k = 0; k < joints.size(0) * kJoints; ++k) {
+    const int64_t n = k / kJoints;
+    float* to = out.data<float>() + 4 * k;
+    for (int64_t c = 0; c < 3; ++c)
+      to[c] = joints.data<float>()[3 * k + c] + centres.data<float>()[3 * n + c] -
+              now.data<float>()[3 * n + c];
+    to[3] = static_cast<float>(
+        answer.uncertainty.value.defined()
+            ? trust_of(std::exp(static_cast<double>(answer.uncertainty.value.data<float>()[k])))
+            : 1.0);
+  }
+  return out;
+}
+
+double followed_error(SkeletonModel& model, const CloudBatch& clouds, int64_t frames) {
+  const int64_t sequences = clouds.points.size(0) / frames;
+  SkeletonOutput answer;
+  double sum = 0;
+  std::vector<int64_t> rows;
+  for (int64_t f = 0; f < frames; ++f) {
+    const std::vector<int64_t> before = std::exchange(rows, {});
+    for (int64_t s = 0; s < sequences; ++s) rows.push_back(s * frames + f);
+    const Tensor past =
+        f == 0 ? Tensor()
+               : remembered(answer, rows_of(clouds.centres, before), rows_of(clouds.centres, rows));
+    Context ctx;
+    answer = model.forward(ctx, {rows_of(clouds.points, rows), past});
+    sum += mean_distance(answer.joints.value, rows_of(clouds.joints, rows));
+  }
+  return sum / static_cast<double>(frames);
+}
+
 NamedValues SkeletonStage::validate() {
   NamedValues out;
   std::optional<double> turns, miscalibration;  // of the worst kind of cloud
@@ -169,6 +244,8 @@ NamedValues SkeletonStage::validate() {
   put("tpose_joint_error_mm", validation_sampler_.clouds(tposes_));
   put("ring_joint_error_mm", ring_);
   put("one_camera_joint_error_mm", one_camera_);
+  if (followed_.points.defined())
+    out.push_back({"followed_joint_error_mm", 1e3 * followed_error(*model_, followed_, kFollowed)});
   if (turns) out.push_back({"turn_error_degrees", *turns});
   if (miscalibration) out.push_back({"miscalibration", *miscalibration});
   return out;

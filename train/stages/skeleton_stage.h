@@ -22,6 +22,7 @@ void visit(V& v, CloudConfig& c) {
   v("dressed", c.dressed, "part of the clouds in clothes and hair", between(0, 1));
   v("one_camera", c.one_camera, "part of the clouds that one depth camera sees", between(0, 1));
   v("camera_ring", c.camera_ring, "part that three to seven cameras around see", between(0, 1));
+  v("remembered", c.remembered, "part with a memory of the frame before", between(0, 1));
   v("frame_step", c.frame_step, "only every so many frames of a motion (30: one a second)",
     between(1, 100000));
 }
@@ -66,6 +67,7 @@ class SkeletonStage final : public Stage {
 
  private:
   CloudBatch batch(int64_t step) const;
+  void recall(int64_t step, CloudBatch* clouds) const;
   Var loss(Context& ctx, const CloudBatch& batch) const;
   Var voting_loss(const SkeletonOutput& out, const CloudBatch& batch) const;
 
@@ -75,6 +77,7 @@ class SkeletonStage final : public Stage {
   CloudSampler sampler_, validation_sampler_;
   std::vector<CloudSubject> posed_, tposes_;
   CloudBatch one_camera_, ring_;  ///< held-out scans by ray casting; undefined if not trained for
+  CloudBatch followed_;           ///< the same of people followed by one camera
   RngKey key_;
 };
 
@@ -85,5 +88,12 @@ struct SkeletonErrors {
   std::optional<double> outside;  ///< part of the joints outside their 90 % regions
 };
 SkeletonErrors skeleton_errors(SkeletonModel& model, const CloudBatch& clouds);
+
+/// An answer as what is remembered of it (SkeletonInput::past) by clouds whose centroids, as those
+/// of `clouds`, are given in the world [n, 3].
+Tensor remembered(const SkeletonOutput& answer, const Tensor& centres, const Tensor& now);
+/// Mean distance over joints of clouds that are `frames` frames of one sequence after the other,
+/// each seen with the answer to the one before in memory; metres.
+double followed_error(SkeletonModel& model, const CloudBatch& clouds, int64_t frames);
 
 }  // namespace restage
