@@ -153,6 +153,7 @@ void Retargeter::prepare(const std::string& weights_name) {
 
 void Retargeter::restart() {
   state_ = {};
+  feet_ = {};
   heading_ = Heading(steady_heading_);
   previous_.reset();
   received_.reset();
@@ -264,6 +265,12 @@ void Retargeter::advance(const SeenJoints& seen, Pose* pose) {
     root_b_ = path_ == Path::relative ? Vec3(start_b_ + t_b) : t_b;
   previous_ = a;
   pose->root = root_b_;
+  if (!options_.foot_lock || !answer.standing.value.defined()) return;
+  std::array<double, 2> standing{};
+  for (size_t side = 0; side < 2; ++side)
+    standing[side] =
+        1 / (1 + std::exp(-static_cast<double>(answer.standing.value.data<float>()[side])));
+  feet_(rest_, standing, pose);
 }
 
 /// Velocities that are a little too large or askew would carry B away from A for ever.

@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 
+#include "infer/foot_lock.h"
 #include "infer/surface.h"
 #include "infer/system.h"
 #include "nn/models/extraction.h"
@@ -24,6 +25,8 @@ struct RetargetOptions {
   /// Frames of less confidence than this are not guessed: the target keeps the pose of the last one
   /// before, or its rest pose. 0: every frame is answered.
   double min_confidence = 0;
+  /// Feet that stand are held where they landed, by weights that say which do.
+  bool foot_lock = true;
 };
 
 /// Our chain of three networks.
@@ -79,6 +82,7 @@ class Retargeter final : public System {
   bool remove_heading_ = false, steady_heading_ = false;
   Heading heading_{false};
   MotionState state_;
+  FootLock feet_;
   std::optional<Joints> previous_;      ///< A on the 30 fps grid, one step ago
   std::optional<Pose> believed_;        ///< the last pose that was
   std::optional<SeenJoints> received_;  ///< A as last pushed

@@ -7,6 +7,7 @@
 #include "autograd/base/parallel.h"
 #include "datasets/readers/errors.h"
 #include "datasets/sampling/normals.h"
+#include "nn/geometry/contact.h"
 
 namespace restage {
 namespace {
@@ -117,6 +118,11 @@ void put_sixd(float* to, const std::vector<Pose>& poses, const std::vector<Mat3>
     }
 }
 
+void put_standing(float* to, const std::vector<Joints>& frames) {
+  for (const auto& feet : standing_feet(frames))
+    for (const bool stands : feet) *to++ = stands ? 1.0f : 0.0f;
+}
+
 /// What all frames of all tracks know.
 bool all_know(const std::vector<JointTrack>* tracks, bool (*knows)(const SeenJoints&)) {
   return tracks != nullptr && std::all_of(tracks->begin(), tracks->end(), [&](const auto& track) {
@@ -131,6 +137,7 @@ WindowBatch make_batch(int64_t n, int64_t t, bool truth) {
   for (Tensor* x : {&b.rest_a, &b.rest_b}) *x = Tensor::empty({n, kJoints, 3});
   b.sixd_a = Tensor::empty({n, t, 6 * kJoints});
   b.self_mask = Tensor::empty({n});
+  b.standing = Tensor::empty({n, t, 2});
   if (!truth) return b;
   b.truth_b = Tensor::empty({n, t, kJoints, 3});
   b.truth_sixd_b = Tensor::empty({n, t, 6 * kJoints});
@@ -235,6 +242,7 @@ void WindowSampler::fill(WindowBatch& batch, int64_t row, int64_t index) const {
   put_joints(row_of(batch.rest_a, row), a.rest);
   put_joints(row_of(batch.rest_b, row), real.rest);
   put_sixd(row_of(batch.sixd_a, row), a.poses, turns);
+  put_standing(row_of(batch.standing, row), a.joints);
   *row_of(batch.self_mask, row) = s.self ? 1.0f : 0.0f;
   put_joints(row_of(batch.real_b, row), real.joints, own_turns);
   put_translation(row_of(batch.real_trans_b, row), real.path(), config_.translation, own_turns);

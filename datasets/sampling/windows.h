@@ -49,6 +49,7 @@ struct WindowBatch {
   Tensor rest_a;         ///< [N, 22, 3] rest joints
   Tensor rest_b;         ///< [N, 22, 3] equal to rest_a for self samples
   Tensor sixd_a;         ///< [N, T, 132] A's local rotations: per joint columns 0 and 1
+  Tensor standing;       ///< [N, T, 2] 1 where A's left, right foot stands, and B's with it
   Tensor self_mask;      ///< [N] 1 for self samples, else 0
   Tensor real_b;         ///< [N, T, 22, 3] B's body performing some clip (discriminator)
   Tensor real_trans_b;   ///< [N, T, 3]

@@ -282,6 +282,8 @@ void add_retarget(Program& program) {
                  "(0: never)");
   app.add_option("--min-confidence", c.options.min_confidence,
                  "the target waits where the extractor is less sure than this, 0 to 1 (0: never)");
+  app.add_flag("!--no-foot-lock", c.options.foot_lock,
+               "feet that stand are not held where they landed");
   app.add_flag("--force", c.options.force,
                "accept a target that is no T-pose, and what else the doctor calls wrong");
   app.add_flag("--profile", c.profile,

@@ -32,6 +32,13 @@ Var differences(const Var& joints) {
   return slice(joints, 1, 1, t) - slice(joints, 1, 0, t - 1);
 }
 
+/// Cross-entropy of which feet stand; 0 where the network does not say or nobody knows.
+Var contact_loss(const MotionOutput& out, const MotionBatch& b) {
+  if (!out.standing.value.defined() || !b.standing.defined())
+    return Var(Tensor::zeros({}, b.joints.dtype()));
+  return mean_all(softplus(out.standing) - out.standing * Var(b.standing));
+}
+
 Tensor complement(const Tensor& mask) {
   std::vector<double> out;
   for (int64_t i = 0; i < mask.numel(); ++i) out.push_back(1 - mask.item(i));
@@ -80,6 +87,7 @@ MotionLosses motion_losses(Context& ctx, const MotionModel& net, Discriminator* 
   out.self = masked_mean(self, b.self_mask);
   out.total = scale(out.cycle, w.cycle) + scale(out.rotation, w.rotation) +
               scale(out.smoothness, w.smoothness) + scale(out.self, w.self);
+  if (w.contact > 0) out.total = out.total + scale(contact_loss(to_b, b), w.contact);
   if (discriminator != nullptr) {
     std::optional<Frozen> judge;
     if (!discriminator_gradients) judge.emplace(ctx);
@@ -104,6 +112,7 @@ MotionLosses self_losses(Context& ctx, const MotionModel& net, const MotionBatch
   put_reconstruction(to_a, b, w, &out);
   out.self = out.cycle + scale(out.rotation, w.rotation) + scale(out.smoothness, w.smoothness);
   out.total = scale(out.self, w.self);
+  if (w.contact > 0) out.total = out.total + scale(contact_loss(to_a, b), w.contact);
   return out;
 }
 

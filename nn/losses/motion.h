@@ -16,6 +16,7 @@ struct MotionWeights {
   double self_rotation = 0;  ///< rotation loss also on the first pass of self samples
   double translation = 1;    ///< of the translation beside the joints, in cycle and self
   double twist = 0;          ///< NKN's twist loss (spec 4.3)
+  double contact = 0;        ///< cross-entropy of which feet stand, where the network says
   MotionDistance measure = MotionDistance::mse;
 };
 
@@ -26,6 +27,7 @@ struct MotionBatch {
   Var joints, input, true_trans, trans, rest_a, rest_b, sixd;
   Tensor self_mask;
   Tensor turns = {}, uncertainty = {};  ///< of MotionInput
+  Tensor standing = {};                 ///< [n, t, 2] 1 where the left, the right foot stands
   MotionInput seen(const Var& target_rest) const {
     return {input, trans, target_rest, turns, uncertainty};
   }

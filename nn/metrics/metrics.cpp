@@ -2,12 +2,14 @@
 
 #include <Eigen/LU>
 #include <Eigen/SVD>
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
 
 #include "autograd/base/error.h"
 #include "autograd/base/parallel_each.h"
+#include "nn/geometry/contact.h"
 
 namespace restage::metrics {
 namespace {
@@ -194,6 +196,51 @@ Value pmd_npt(const Track& pred, const Track& truth) {
   });
 }
 
+namespace {
+
+/// The value that a share of the others is below.
+Value percentile(std::vector<double> values, double share) {
+  if (values.empty()) return std::nullopt;
+  const auto k = static_cast<ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + k, values.end());
+  return finite(values[static_cast<size_t>(k)]);
+}
+
+double lowest_point(const Track& track, int64_t frame) {
+  double out = std::numeric_limits<double>::infinity();
+  for (int64_t i = 0; i < track.points; ++i) out = std::min(out, track.at(frame, i).y());
+  return out;
+}
+
+}  // namespace
+
+Value foot_slide_mm(const Track& pred, const Track& truth) {
+  if (!pred.present() || !truth.present() || truth.points != kJoints) return std::nullopt;
+  std::vector<Joints> performance(static_cast<size_t>(truth.frames));
+  for (int64_t t = 0; t < truth.frames; ++t)
+    for (int64_t j = 0; j < kJoints; ++j)
+      performance[static_cast<size_t>(t)][static_cast<size_t>(j)] = truth.at(t, j);
+  const auto standing = standing_feet(performance);
+  std::vector<double> slides;
+  for (int64_t t = 1; t < truth.frames; ++t)
+    for (size_t side = 0; side < kFeet.size(); ++side) {
+      const auto now = static_cast<size_t>(t);
+      if (standing[now][side] && standing[now - 1][side])
+        slides.push_back(1e3 * (pred.at(t, kFeet[side]) - pred.at(t - 1, kFeet[side])).norm());
+    }
+  return percentile(std::move(slides), 0.5);
+}
+
+Value floor_penetration_mm(const Track& pred, const Track& truth) {
+  if (!pred.present() || !truth.present()) return std::nullopt;
+  double floor = std::numeric_limits<double>::infinity();
+  for (int64_t t = 0; t < truth.frames; ++t) floor = std::min(floor, lowest_point(truth, t));
+  std::vector<double> depths;
+  for (int64_t t = 0; t < pred.frames; ++t)
+    depths.push_back(1e3 * std::max(0.0, floor - lowest_point(pred, t)));
+  return percentile(std::move(depths), 0.95);
+}
+
 // ---- the table ---------------------------------------------------------------------------------
 
 namespace {
@@ -215,6 +262,10 @@ Value joint_acceleration(const SequenceView& s) {
 template <NeighbourFrame where>
 Value edge_lengths(const SequenceView& s) {
   return edge_length_difference_mm(s.pred_vertices, s.true_vertices, where);
+}
+Value foot_slide(const SequenceView& s) { return foot_slide_mm(s.pred_joints, s.true_joints); }
+Value floor_penetration(const SequenceView& s) {
+  return floor_penetration_mm(s.pred_vertices, s.true_vertices);
 }
 Value squared(const SequenceView& s) { return pmd(s.pred_vertices, s.true_vertices); }
 Value squared_npt(const SequenceView& s) { return pmd_npt(s.pred_vertices, s.true_vertices); }
@@ -254,6 +305,9 @@ constexpr Metric kVariants[] = {
      vertex_distance<Mode::frame, false>},
     {"pa_mpvd_sequence", "PA-MPVD, sequence", "m", "one alignment of the sequence, with scale",
      vertex_distance<Mode::sequence>},
+    {"foot_slide_mm", "foot slide", "mm/frame", "feet that truly stand, median", foot_slide},
+    {"floor_penetration_mm", "below the floor", "mm", "lowest vertex, 95th percentile",
+     floor_penetration},
     {"medl_first", "MEDL, first frame", "mm", "neighbours found in the first true frame only",
      edge_lengths<NeighbourFrame::first>},
 };

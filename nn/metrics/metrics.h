@@ -85,6 +85,13 @@ Value pmd(const Track& pred, const Track& truth);
 /// NPT's script: mean squared coordinate difference with bounding boxes centred, square metres.
 Value pmd_npt(const Track& pred, const Track& truth);
 
+/// How far feet that truly stand (standing_feet()) move from one frame to the next, median,
+/// millimetres; needs the 22 joints.
+Value foot_slide_mm(const Track& pred, const Track& truth);
+/// How far the lowest point is below the lowest of all true frames, 95th percentile of the frames,
+/// millimetres.
+Value floor_penetration_mm(const Track& pred, const Track& truth);
+
 // ---- the table ---------------------------------------------------------------------------------
 
 struct Metric {

@@ -1,5 +1,7 @@
 #include "nn/models/hybrid.h"
 
+#include "nn/geometry/contact.h"
+
 #include <cmath>
 
 #include "autograd/ops/elementwise.h"
@@ -83,6 +85,7 @@ Hybrid::Hybrid(const HybridConfig& c, const Init& init)
       twist(c.hidden, kJoints, init.sub("twist")),
       leaves(c.hidden, 6 * kEnds, init.sub("leaves")),
       path(c.hidden, 3, init.sub("path")) {
+  if (c.contact) contact.emplace(c.hidden, std::ssize(kFeet), init.sub("contact"));
   for (Linear* head : {&gate, &trend, &correction, &twist, &leaves, &path}) head->start_small();
   const auto constant = [&](int64_t n, double v) { return Tensor::full({n}, v, init.type); };
   units.joints = {constant(3 * kJoints, 0), constant(3 * kJoints, 1)};
@@ -148,6 +151,7 @@ MotionOutput Hybrid::forward(Context& ctx, const MotionInput& in, MotionState* s
   put_pose(local, rest_rows, n, &out);
   const Var longer = reshape(leg_lengths(rest_rows) / leg_lengths(posed), {n, t, 1});
   out.trans = in.trans * longer + scale(path(ctx, decoded), kPath) * Var(units.trans.deviation);
+  if (contact) out.standing = (*contact)(ctx, decoded);
   return out;
 }
 
@@ -160,6 +164,7 @@ void Hybrid::visit(Fields& f) {
   f("twist", twist);
   f("leaves", leaves);
   f("path", path);
+  if (contact) f("contact", *contact);
   f("joint_mean", units.joints.mean);
   f("joint_std", units.joints.deviation);
   f("rest_mean", units.rest.mean);

@@ -9,6 +9,8 @@
 // closed form itself.
 #pragma once
 
+#include <optional>
+
 #include "nn/config/rules.h"
 #include "nn/layers/gru.h"
 #include "nn/layers/linear.h"
@@ -22,7 +24,7 @@ struct HybridConfig {
   int layers = 2;
   double dropout = 0;
   double reach = 2;
-  bool orientation = true, uncertainty = true;
+  bool orientation = true, uncertainty = true, contact = false;
 };
 
 template <class V>
@@ -33,6 +35,7 @@ void visit(V& v, HybridConfig& c) {
     "farthest that a coordinate of a joint is corrected, in units of its uncertainty", at_least(0));
   v("orientation", c.orientation, "sees the rotations that the extractor reads from the surface");
   v("uncertainty", c.uncertainty, "sees how far the extractor's joints may be off");
+  v("contact", c.contact, "also says which feet stand");
 }
 
 /// The state is {encoder, decoder}, both [layers, n, hidden], and the filter's three,
@@ -48,7 +51,8 @@ struct Hybrid final : MotionModel {
   HybridConfig config;
   GruLayer enc, dec;
   Linear gate, trend, correction, twist, leaves, path;  ///< all near none at the start
-  MotionStatistics units;                               ///< all but `sixd`
+  std::optional<Linear> contact;
+  MotionStatistics units;  ///< all but `sixd`
 
  private:
   Var seen(const MotionInput& in, const SurfaceTurns& surface, const Var& uncertainty) const;

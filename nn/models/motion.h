@@ -27,6 +27,8 @@ struct MotionOutput {
   Var rotations;  ///< [n, t, 22, 3, 3] local
   Var joints;     ///< [n, t, 22, 3] relative to the root, metres
   Var trans;      ///< [n, t, 3], in the configured meaning (velocity: m/s)
+  Var standing;   ///< [n, t, 2] log odds that the left, the right foot stands; undefined where a
+                  ///< network does not say
 };
 
 /// Mean and deviation per column of what a training shows to its network.

@@ -55,7 +55,8 @@ struct Input {
 };
 
 std::shared_ptr<MotionModel> hybrid() {
-  return make_model_as<MotionModel>("smrm/hybrid", model_config("smrm/hybrid", {"hidden=16"}),
+  return make_model_as<MotionModel>("smrm/hybrid",
+                                    model_config("smrm/hybrid", {"hidden=16", "contact=true"}),
                                     Init{RngKey{2, 0}, DType::f64});
 }
 
@@ -129,7 +130,8 @@ TEST(Hybrid, EveryParameterGetsAGradient) {
   ctx.training = true;
   MotionState state;
   const MotionOutput out = net->forward(ctx, in.all(), &state);
-  const Gradients g = tape.backward(mean_all(square(out.joints)) + mean_all(square(out.trans)) +
+  const Gradients g = tape.backward(mean_all(square(out.standing)) + mean_all(square(out.joints)) +
+                                    mean_all(square(out.trans)) +
                                     mean_all(square(add_scalar(out.rotations, -0.3))));
   for (const StateEntry& entry : state_of(*net)) {
     if (entry.parameter == nullptr) continue;

@@ -13,6 +13,7 @@
 
 #include "autograd/base/error.h"
 #include "autograd/base/rng.h"
+#include "tests/support/errors.h"
 #include "tests/support/use_set.h"
 
 namespace restage::metrics {
@@ -52,6 +53,10 @@ TEST(Metrics, AgreeWithTheOracle) {
     const SequenceView view{pj.track, gj.track, pv.track, gv.track, pj.track.frames};
     for (const auto metrics : {table(), variants()})
       for (const Metric& metric : metrics) {
+        if (!c["values"].contains(metric.name)) {  // tests/nn/contact_test.cpp has these
+          EXPECT_HAS("foot_slide_mm floor_penetration_mm", metric.name);
+          continue;
+        }
         const Value got = metric.compute(view);
         const auto& want = c["values"].at(metric.name);
         SCOPED_TRACE(c["name"].get<std::string>() + " " + metric.name);

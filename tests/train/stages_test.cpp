@@ -170,7 +170,8 @@ TEST(TrainStages, MotionLearnsFromWhatTheExtractorAnswers) {
   motion(c).answers.views = 2;
   motion(c).paired_share = 0.5;
   motion(c).self_first_pass = true;
-  testing::choose(motion(c).model, "smrm/hybrid", {"hidden=16"});
+  testing::choose(motion(c).model, "smrm/hybrid", {"hidden=16", "contact=true"});
+  motion(c).weights.contact = 0.1;
   motion(c).weights.measure = MotionDistance::distance;
   std::string first;
   for (const int n : {1, 2, 3}) {

@@ -27,6 +27,7 @@ void visit(V& v, MotionWeights& c) {
   v("translation", c.translation, "the translation beside the joints, in cycle and self",
     at_least(0));
   v("twist", c.twist, "NKN's twist limit", at_least(0));
+  v("contact", c.contact, "which feet stand, of a network that says it", at_least(0));
   v("measure", c.measure, "mse (the papers) or distance: metres in the place of their squares");
 }
 
