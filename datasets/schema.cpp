@@ -190,7 +190,7 @@ void ScanWriter::commit() {
 
 // ---- predictions -------------------------------------------------------------------------------
 
-static std::vector<double> read_confidence(const h5::File& file, int64_t frames) {
+static std::vector<double> confidence_in(const h5::File& file, int64_t frames) {
   if (!file.has("/confidence")) return {};
   const h5::Dataset set = file.dataset("/confidence", {frames});
   std::vector<double> out = read_finite<double>(file, "/confidence", {frames});
@@ -203,7 +203,7 @@ static std::vector<double> read_confidence(const h5::File& file, int64_t frames)
 std::vector<double> read_confidence(const std::string& path, int64_t sequence) {
   const h5::File file = open_schema_file(path);
   if (!file.has("/confidence")) return {};
-  const std::vector<double> all = read_confidence(file, file.dataset("/confidence", {-1}).rows());
+  const std::vector<double> all = confidence_in(file, file.dataset("/confidence", {-1}).rows());
   const std::vector<int64_t> offset = sequence_offsets(file, std::ssize(all));
   const auto s = static_cast<size_t>(sequence);
   if (sequence < 0 || s + 1 >= offset.size()) return {};
@@ -241,7 +241,7 @@ Prediction read_prediction(const std::string& path) {
   if (has_vertices) out.vertices = read_finite<double>(file, "/vertices", {-1, -1, 3});
   if (file.has("/faces"))
     out.faces = read_faces(file, "/faces", has_vertices ? out.vertex_count : int64_t{1} << 31);
-  out.confidence = read_confidence(file, out.frames);
+  out.confidence = confidence_in(file, out.frames);
   return out;
 }
 

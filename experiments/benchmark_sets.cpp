@@ -70,6 +70,7 @@ Prediction retargeted(const Bundle& weights, const std::string& folder, const st
     for (const RetargetedFrame& f : made) {
       if (system->rig() != nullptr) keep(f.joints, &out.joints);
       keep(f.vertices, &out.vertices);
+      if (f.confidence) out.confidence.push_back(*f.confidence);
       ++out.frames;
     }
   };
@@ -114,6 +115,18 @@ metrics::Values score(const PredictionFile& pred, const PredictionFile& truth, i
   return metrics::evaluate(views, metrics).sequences[0];
 }
 
+/// Frames without joints, or whose joints coincide, say nothing.
+void add_frames(const PredictionFile& pred, const PredictionFile& truth, SystemScores* scores) {
+  for (int64_t f = 0; f < std::ssize(pred.data.confidence); ++f) {
+    const auto error =
+        metrics::mean_distance(pred.joints().slice(f, f + 1), truth.joints().slice(f, f + 1),
+                               {metrics::Alignment::Mode::frame, true});
+    if (!error) continue;
+    scores->confidence.push_back(pred.data.confidence[static_cast<size_t>(f)]);
+    scores->frame_errors.push_back(*error);
+  }
+}
+
 void add(References made, References* all) {
   if (all->empty()) {
     *all = std::move(made);
@@ -143,6 +156,7 @@ void judge(const Bundle& weights, const std::string& folder, bool scans,
         folder, scans ? retargeted_scans(weights, folder, *to_world, source, rest, how)
                       : retargeted(weights, folder, in(folder, "source.h5"), how));
     scores->model.sequences.push_back(score(pred, truth, how.every));
+    add_frames(pred, truth, scores);
   } catch (const InputError& error) {
     log_warning(folder + " is without a result: " + error.what());
     scores->model.sequences.emplace_back(metrics::table().size(), std::nullopt);

@@ -19,6 +19,8 @@ struct SystemScores {
   metrics::Evaluation model;
   std::vector<int64_t> frames;
   References references;
+  /// Of all frames that a system says its confidence of, and their PA-MPJPE in metres.
+  std::vector<double> confidence, frame_errors;
 };
 
 /// What weights can be judged on, and what they cannot.

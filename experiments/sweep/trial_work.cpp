@@ -45,6 +45,9 @@ Json evaluation_json(const metrics::Evaluation& scores, const std::vector<std::s
 
 Json scores_json(const SystemScores& scores, const std::vector<std::string>& names) {
   Json out = evaluation_json(scores.model, names, scores.frames);
+  for (const auto& [coverage, risk] :
+       metrics::risk_coverage(scores.confidence, scores.frame_errors))
+    out["risk_coverage"].push_back({{"coverage", coverage}, {"pa_mpjpe", risk}});
   for (const auto& [name, reference] : scores.references)
     out["references"][name] = evaluation_json(reference, names, scores.frames);
   return out;

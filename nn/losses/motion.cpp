@@ -45,13 +45,16 @@ Tensor complement(const Tensor& mask) {
   return Tensor::from<double>(mask.shape(), out).cast(mask.dtype());
 }
 
-/// Cycle, rotation and smoothness of a motion that ought to be A's.
+/// Cycle, rotation, smoothness and acceleration of a motion that ought to be A's.
 void put_reconstruction(const MotionOutput& to_a, const MotionBatch& b, const MotionWeights& w,
                         MotionLosses* out) {
   const auto apart = [&](const Var& x, const Var& y) { return mean_all(errors(x - y, w.measure)); };
   out->cycle = apart(to_a.joints, b.joints) + scale(apart(to_a.trans, b.true_trans), w.translation);
   out->rotation = rotation_loss(to_a.rotations, b.sixd, w.measure);
-  out->smoothness = apart(differences(to_a.joints), differences(b.joints));
+  const Var moved = differences(to_a.joints), truly = differences(b.joints);
+  out->smoothness = apart(moved, truly);
+  out->acceleration = w.acceleration > 0 ? apart(differences(moved), differences(truly))
+                                         : Var(Tensor::zeros({}, b.joints.dtype()));
 }
 
 }  // namespace
@@ -86,7 +89,8 @@ MotionLosses motion_losses(Context& ctx, const MotionModel& net, Discriminator* 
   }
   out.self = masked_mean(self, b.self_mask);
   out.total = scale(out.cycle, w.cycle) + scale(out.rotation, w.rotation) +
-              scale(out.smoothness, w.smoothness) + scale(out.self, w.self);
+              scale(out.smoothness, w.smoothness) + scale(out.acceleration, w.acceleration) +
+              scale(out.self, w.self);
   if (w.contact > 0) out.total = out.total + scale(contact_loss(to_b, b), w.contact);
   if (discriminator != nullptr) {
     std::optional<Frozen> judge;
@@ -110,7 +114,8 @@ MotionLosses self_losses(Context& ctx, const MotionModel& net, const MotionBatch
   out.joints_b = to_a.joints;
   out.trans_b = to_a.trans;
   put_reconstruction(to_a, b, w, &out);
-  out.self = out.cycle + scale(out.rotation, w.rotation) + scale(out.smoothness, w.smoothness);
+  out.self = out.cycle + scale(out.rotation, w.rotation) + scale(out.smoothness, w.smoothness) +
+             scale(out.acceleration, w.acceleration);
   out.total = scale(out.self, w.self);
   if (w.contact > 0) out.total = out.total + scale(contact_loss(to_a, b), w.contact);
   return out;

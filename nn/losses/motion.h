@@ -16,6 +16,7 @@ struct MotionWeights {
   double self_rotation = 0;  ///< rotation loss also on the first pass of self samples
   double translation = 1;    ///< of the translation beside the joints, in cycle and self
   double twist = 0;          ///< NKN's twist loss (spec 4.3)
+  double acceleration = 0;   ///< second differences, beside smoothness's first
   double contact = 0;        ///< cross-entropy of which feet stand, where the network says
   MotionDistance measure = MotionDistance::mse;
 };
@@ -34,7 +35,7 @@ struct MotionBatch {
 };
 
 struct MotionLosses {
-  Var cycle, rotation, smoothness, adversarial, self, total;
+  Var cycle, rotation, smoothness, acceleration, adversarial, self, total;
   Var joints_b, trans_b;  ///< the retargeted motion, for the discriminator's step
 };
 

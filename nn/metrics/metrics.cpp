@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numeric>
 
 #include "autograd/base/error.h"
 #include "autograd/base/parallel_each.h"
@@ -241,6 +242,38 @@ Value floor_penetration_mm(const Track& pred, const Track& truth) {
   return percentile(std::move(depths), 0.95);
 }
 
+Value peak_speed_ratio(const Track& pred, const Track& truth) {
+  if (!comparable(pred, truth) || truth.frames < 2) return std::nullopt;
+  const auto peaks = [](const Track& track) {
+    double sum = 0;
+    for (int64_t i = 0; i < track.points; ++i) {
+      std::vector<double> speeds;
+      for (int64_t t = 1; t < track.frames; ++t)
+        speeds.push_back((track.at(t, i) - track.at(t - 1, i)).norm());
+      sum += percentile(std::move(speeds), 0.99).value_or(std::nan(""));
+    }
+    return sum;
+  };
+  return finite(peaks(pred) / peaks(truth));
+}
+
+std::vector<RiskAtCoverage> risk_coverage(std::span<const double> confidence,
+                                          std::span<const double> errors) {
+  std::vector<size_t> order(std::min(confidence.size(), errors.size()));
+  std::iota(order.begin(), order.end(), size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](size_t a, size_t b) { return confidence[a] > confidence[b]; });
+  std::vector<RiskAtCoverage> out;
+  for (const double coverage : {1.0, 0.95, 0.9, 0.8, 0.7, 0.5}) {
+    const auto n = static_cast<size_t>(std::llround(coverage * static_cast<double>(order.size())));
+    if (n == 0) continue;
+    double sum = 0;
+    for (size_t i = 0; i < n; ++i) sum += errors[order[i]];
+    out.push_back({coverage, sum / static_cast<double>(n)});
+  }
+  return out;
+}
+
 // ---- the table ---------------------------------------------------------------------------------
 
 namespace {
@@ -264,6 +297,7 @@ Value edge_lengths(const SequenceView& s) {
   return edge_length_difference_mm(s.pred_vertices, s.true_vertices, where);
 }
 Value foot_slide(const SequenceView& s) { return foot_slide_mm(s.pred_joints, s.true_joints); }
+Value peak_speed(const SequenceView& s) { return peak_speed_ratio(s.pred_joints, s.true_joints); }
 Value floor_penetration(const SequenceView& s) {
   return floor_penetration_mm(s.pred_vertices, s.true_vertices);
 }
@@ -306,6 +340,8 @@ constexpr Metric kVariants[] = {
     {"pa_mpvd_sequence", "PA-MPVD, sequence", "m", "one alignment of the sequence, with scale",
      vertex_distance<Mode::sequence>},
     {"foot_slide_mm", "foot slide", "mm/frame", "feet that truly stand, median", foot_slide},
+    {"peak_speed", "peak speed", "of the truth's", "99th percentile of each joint's speed",
+     peak_speed},
     {"floor_penetration_mm", "below the floor", "mm", "lowest vertex, 95th percentile",
      floor_penetration},
     {"medl_first", "MEDL, first frame", "mm", "neighbours found in the first true frame only",

@@ -92,6 +92,18 @@ Value foot_slide_mm(const Track& pred, const Track& truth);
 /// millimetres.
 Value floor_penetration_mm(const Track& pred, const Track& truth);
 
+/// Whether sharp motions stay sharp: over the points, the sum of each one's fastest speed (99th
+/// percentile of the frames) in the prediction by that of the truth. Empty if nothing moves.
+Value peak_speed_ratio(const Track& pred, const Track& truth);
+
+/// What is gained by answering only the surest frames: their share of all, and their mean error.
+struct RiskAtCoverage {
+  double coverage = 0, risk = 0;
+};
+/// At coverages from 1 down to 0.5; of equally sure frames the earlier ones. Empty without frames.
+std::vector<RiskAtCoverage> risk_coverage(std::span<const double> confidence,
+                                          std::span<const double> errors);
+
 // ---- the table ---------------------------------------------------------------------------------
 
 struct Metric {

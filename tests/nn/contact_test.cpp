@@ -122,6 +122,20 @@ TEST(Contact, FeetThatAreFarFromTheirPlaceAreLetGo) {
   }
 }
 
+TEST(Contact, SharpMotionsHaveTheirPeaks) {
+  std::vector<double> clap, smooth;
+  for (int t = 0; t < 40; ++t)
+    for (int axis = 0; axis < 3; ++axis) {
+      clap.push_back(t >= 20 && t < 24 ? 0.1 * (t - 20) : 0);
+      smooth.push_back(0.5 * clap.back());
+    }
+  const metrics::Track truth{clap.data(), 40, 1}, half{smooth.data(), 40, 1};
+  EXPECT_NEAR(*metrics::peak_speed_ratio(truth, truth), 1, 1e-12);
+  EXPECT_NEAR(*metrics::peak_speed_ratio(half, truth), 0.5, 1e-12);
+  const std::vector<double> still(120, 1.0);
+  EXPECT_FALSE(metrics::peak_speed_ratio(truth, {still.data(), 40, 1}));
+}
+
 TEST(Contact, SlidesAndDepthsAreMeasured) {
   std::vector<double> truth, slides, sinks;
   for (const Joints& joints : stands_then_lifts()) {

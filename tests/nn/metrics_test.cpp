@@ -54,7 +54,7 @@ TEST(Metrics, AgreeWithTheOracle) {
     for (const auto metrics : {table(), variants()})
       for (const Metric& metric : metrics) {
         if (!c["values"].contains(metric.name)) {  // tests/nn/contact_test.cpp has these
-          EXPECT_HAS("foot_slide_mm floor_penetration_mm", metric.name);
+          EXPECT_HAS("foot_slide_mm peak_speed floor_penetration_mm", metric.name);
           continue;
         }
         const Value got = metric.compute(view);
@@ -66,6 +66,16 @@ TEST(Metrics, AgreeWithTheOracle) {
         }
       }
   }
+}
+
+TEST(Metrics, SureFramesAreCountedFirst) {
+  const std::vector<double> confidence = {0.9, 0.1, 0.9, 0.5}, errors = {1, 8, 2, 5};
+  const auto curve = risk_coverage(confidence, errors);
+  ASSERT_EQ(curve.size(), 6u);
+  EXPECT_NEAR(curve.front().risk, 4, 1e-12);
+  EXPECT_NEAR(curve[3].risk, (1 + 2 + 5) / 3.0, 1e-12) << "80 % of four are three";
+  EXPECT_NEAR(curve.back().risk, 1.5, 1e-12);
+  EXPECT_TRUE(risk_coverage({}, {}).empty());
 }
 
 TEST(Metrics, WhatCannotBeComputedHasNoValue) {

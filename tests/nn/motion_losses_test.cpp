@@ -61,6 +61,61 @@ TEST(MotionLosses, AConstantDiscriminatorStillKeepsItsRunningStatistics) {
   EXPECT_FALSE(same_bits(a.judge.bns[0].running_mean, start));
 }
 
+/// Answers joints, and how sure it is that feet stand, as they were given to it.
+struct Given final : MotionModel {
+  MotionOutput forward(Context&, const MotionInput& in, MotionState*) const override {
+    MotionOutput out;
+    out.joints = joints;
+    out.trans = in.trans;
+    out.rotations = Var(Tensor::zeros({3, 9, kJoints, 3, 3}, DType::f64));
+    out.standing = standing;
+    return out;
+  }
+  void standardise(const MotionStatistics&) override {}
+  void visit(Fields&) override {}
+  const char* kind() const override { return "Given"; }
+  Tensor joints, standing;
+};
+
+TEST(MotionLosses, AccelerationIsOfSecondDifferences) {
+  Players p;
+  Given net;
+  net.joints = p.batch.joints.value.clone();
+  net.standing = Tensor::zeros({3, 9, 2}, DType::f64);
+  for (int64_t i = 0; i < 3 * 9; ++i)  // a steady drift, and one frame that is 1 m off in x
+    for (int64_t j = 0; j < kJoints; ++j)
+      net.joints.data<double>()[3 * (i * kJoints + j)] +=
+          0.1 * static_cast<double>(i % 9) + (i % 9 == 4 ? 1 : 0);
+  const auto losses = [&](MotionWeights w) {
+    Context ctx;
+    return self_losses(ctx, net, p.batch, w);
+  };
+  MotionWeights w{.cycle = 1, .rotation = 0, .smoothness = 0};
+  w.measure = MotionDistance::distance;
+  const double plain = losses(w).total.value.item();
+  w.acceleration = 0.5;
+  const MotionLosses with = losses(w);
+  EXPECT_NEAR(with.acceleration.value.item(), (1.0 + 2.0 + 1.0) / 7, 1e-3) << "a drift has none";
+  EXPECT_NEAR(with.total.value.item() - plain, 0.5 * 4.0 / 7, 1e-3);
+}
+
+TEST(MotionLosses, FeetThatStandAreACrossEntropy) {
+  Players p;
+  Given net;
+  net.joints = p.batch.joints.value;
+  net.standing = Tensor::full({3, 9, 2}, 2, DType::f64);
+  MotionWeights w;
+  Context ctx;
+  const double nobody_knows = self_losses(ctx, net, p.batch, w).total.value.item();
+  w.contact = 0.1;
+  EXPECT_EQ(self_losses(ctx, net, p.batch, w).total.value.item(), nobody_knows);
+  for (const double truth : {0.0, 1.0}) {
+    p.batch.standing = Tensor::full({3, 9, 2}, truth, DType::f64);
+    EXPECT_NEAR(self_losses(ctx, net, p.batch, w).total.value.item() - nobody_knows,
+                0.1 * std::log(1 + std::exp(truth > 0 ? -2.0 : 2.0)), 1e-9);
+  }
+}
+
 /// Rotations [1, 1, j, 3, 3] whose R00 and R20 belong to angles about y, degrees.
 Tensor about_y(const std::vector<double>& angles, double radius = 1) {
   const auto j = static_cast<int64_t>(angles.size());

@@ -22,6 +22,7 @@ void visit(V& v, MotionWeights& c) {
     at_least(0));
   v("rotation", c.rotation, "rotations after A -> B -> A against the data's", at_least(0));
   v("smoothness", c.smoothness, "frame differences after A -> B -> A", at_least(0));
+  v("acceleration", c.acceleration, "second differences after A -> B -> A", at_least(0));
   v("self", c.self, "reconstruction of self samples", at_least(0));
   v("self_rotation", c.self_rotation, "rotations of self samples against the data's", at_least(0));
   v("translation", c.translation, "the translation beside the joints, in cycle and self",
@@ -104,6 +105,8 @@ void visit(V& v, MotionStageConfig& c) {
     "part of that pass whose target is another body, of which the data knows the answer",
     between(0, 1));
   v("answers", c.answers, "what the network sees of A: an extractor's answers to clouds");
+  v.check("weights", !(c.weights.acceleration > 0) || c.windows.frames > 2,
+          "asks for accelerations of windows of two frames", "give windows.frames of 3 or more");
   v("validation_windows", c.validation_windows, "held-out windows per validation", positive());
   v("validation_frames", c.validation_frames, "frames of each", at_least(3));
 }
