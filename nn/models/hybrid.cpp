@@ -15,10 +15,8 @@ namespace restage {
 namespace {
 
 constexpr double kUsualUncertainty = 0.005;  // metres; also where nobody says
-// Farthest that a twist (radians) and a leaf's 6D numbers are corrected at the usual uncertainty;
-// what an answer of 1 stands for in deviations of the path.
-constexpr double kTurn = 0.05, kPath = 0.3;
-constexpr double kBlind = 6;     // times as far for rotations where none are read from the surface
+constexpr double kPath = 0.3;    // what an answer of 1 stands for in deviations of the path
+constexpr double kBlind = 2;     // times as far for rotations where none are read from the surface
 constexpr double kTrusting = 4;  // log odds of an untrained gate: what is seen counts for 98 %
 constexpr int64_t kEnds = std::ssize(kLeaves), kGates = 2 * kJoints + kEnds;
 constexpr double kTrend = -2;  // log odds of an untrained trend's gain: 12 %
@@ -132,7 +130,7 @@ MotionOutput Hybrid::forward(Context& ctx, const MotionInput& in, MotionState* s
       {reshape(in.joints, {n, t, w}), reshape(Var(surface.twist), {n, t, kJoints}), ends}, 2);
   const Var calm = filtered(now, gains(gate, kTrusting), gains(trend, kTrend), &(*state)[2]);
   const Var off = scale(uncertainty, 1 / kUsualUncertainty);
-  const double turning = kTurn * (config.orientation ? 1 : kBlind);
+  const double turning = config.turn_reach * (config.orientation ? 1 : kBlind);
   const Var moved = slice(calm, 2, 0, w) +
                     scale(tanh(correction(ctx, decoded)), config.reach) * each_thrice(uncertainty),
             twisted =

@@ -23,7 +23,7 @@ struct HybridConfig {
   int64_t hidden = 256;
   int layers = 2;
   double dropout = 0;
-  double reach = 2;
+  double reach = 2, turn_reach = 0.15;
   bool orientation = true, uncertainty = true, contact = false;
 };
 
@@ -33,6 +33,9 @@ void visit(V& v, HybridConfig& c) {
   v("dropout", c.dropout, "between the layers", below(0, 1));
   v("reach", c.reach,
     "farthest that a coordinate of a joint is corrected, in units of its uncertainty", at_least(0));
+  v("turn_reach", c.turn_reach,
+    "farthest that a twist or a leaf is corrected, radians for every 5 mm of uncertainty",
+    at_least(0));
   v("orientation", c.orientation, "sees the rotations that the extractor reads from the surface");
   v("uncertainty", c.uncertainty, "sees how far the extractor's joints may be off");
   v("contact", c.contact, "also says which feet stand");
