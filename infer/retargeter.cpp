@@ -26,17 +26,6 @@ Tensor tensor_of(const Joints& joints, const Vec3& origin) {
   return t;
 }
 
-/// Mean chance of a joint to be within kNearby: p(error) ~ s^-3 exp(-|error| / s) (SkeletonOutput).
-std::optional<double> confidence_of(const SeenJoints& seen) {
-  if (!seen.uncertainty) return std::nullopt;
-  double sum = 0;
-  for (const double s : *seen.uncertainty) {
-    const double r = kNearby / s;
-    sum += 1 - std::exp(-r) * (1 + r + r * r / 2);
-  }
-  return sum / kJoints;
-}
-
 /// Between two moments; what is no position is that of the nearer one.
 SeenJoints blend(const SeenJoints& a, const SeenJoints& b, double t) {
   SeenJoints out = t < 0.5 ? a : b;
@@ -203,7 +192,8 @@ void Retargeter::step(const SeenJoints& seen, RetargetedFrame* out) {
     const Stopwatch watch(&times_.motion);
     advance(seen, &out->pose);
   }
-  out->confidence = confidence_of(seen);
+  out->confidence.reset();
+  if (seen.uncertainty) out->confidence = confidence(*seen.uncertainty);
   hold_doubtful(out);
   const Stopwatch watch(&times_.deformation);
   const PosedSkeleton posed = forward_kinematics(rest_, out->pose);

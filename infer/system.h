@@ -16,11 +16,10 @@ struct RetargetedFrame {
   Pose pose;        ///< local rotations, pelvis in the world
   Joints joints;    ///< posed, world
   Points vertices;  ///< posed, world, in the target's order
-  /// Chance that a joint of the source is where it is believed to be, within kNearby: mean of the
-  /// 22, by the extractor's own estimate. Empty: nobody says.
+  /// Chance that a joint of the source is where it is believed to be, within kNearby
+  /// (nn/models/views.h): mean of the 22, by the extractor's own estimate. Empty: nobody says.
   std::optional<double> confidence;
 };
-inline constexpr double kNearby = 0.05;  ///< metres
 
 /// Seconds that the parts of one push() took.
 struct FrameTimes {

@@ -14,43 +14,13 @@ bool before(const Point& a, const Point& b) {
 
 bool mirrored(size_t view) { return view % 2 == 1; }
 
-/// With x along `first`, y along the rest of `second`; none if they span no plane.
-Mat3 rotation_of(const Vec3& first, const Vec3& second) {
-  const Vec3 x = first.normalized(), y = (second - x.dot(second) * x).normalized();
-  if (!(first.norm() > 1e-9) || !(y.squaredNorm() > 0.5)) return Mat3::Identity();
-  Mat3 out;
-  out << x, y, x.cross(y);
-  return out;
-}
-
-/// The mean of each coordinate, without a quarter of the values at either end from eight on.
-/// `values`: room for one coordinate of each.
-Joints middle(const std::vector<Joints>& answers, const std::string& source,
-              std::vector<double>& values) {
-  Joints out;
-  const size_t n = answers.size(), out_of_it = n < 8 ? 0 : n / 4;
-  for (size_t j = 0; j < kJoints; ++j) {
-    for (int c = 0; c < 3; ++c) {
-      for (size_t s = 0; s < n; ++s) values[s] = answers[s][j][c];
-      if (!std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); }))
-        throw InputError(source, "gives joints that are not finite", "check its units: metres");
-      std::sort(values.begin(), values.end());
-      out[j][c] = 0;
-      for (size_t s = out_of_it; s < n - out_of_it; ++s)
-        out[j][c] += values[s] / static_cast<double>(n - 2 * out_of_it);
-    }
-  }
-  return out;
-}
-
 }  // namespace
 
 JointExtractor::JointExtractor(SkeletonModel& model, int samples, double around)
     : model_(model),
       around_(around),
       centres_(static_cast<size_t>(samples)),
-      answers_(static_cast<size_t>(samples)),
-      values_(static_cast<size_t>(samples)) {}
+      views_(static_cast<size_t>(samples)) {}
 
 double JointExtractor::heading(size_t view) const {
   const size_t pairs = (centres_.size() + 1) / 2, pair = view / 2;
@@ -109,19 +79,11 @@ SeenJoints JointExtractor::operator()(const Points& cloud, const std::string& so
   Context ctx;
   const SkeletonOutput answer =
       model_.forward(ctx, {batch, before != nullptr ? past(*before) : Tensor()});
-  const Tensor joints = answer.joints.value;
-  for (size_t s = 0; s < views; ++s) {
-    const Mat3 back = turn_about_y(-heading(s));
-    for (size_t j = 0; j < kJoints; ++j) {
-      const size_t from = mirrored(s) ? static_cast<size_t>(kMirror[j]) : j;
-      const float* x = joints.data<float>() + (s * kJoints + from) * 3;
-      answers_[s][j] = back * Vec3(mirrored(s) ? -x[0] : x[0], x[1], x[2]) + centres_[s];
-    }
-  }
-  SeenJoints out = middle(answers_, source, values_);
-  if (answer.turns.value.defined()) out.turns = mean_turns(answer.turns.value);
-  if (answer.uncertainty.value.defined())
-    out.uncertainty = mean_uncertainty(answer.uncertainty.value);
+  read(answer);
+  if (before != nullptr) keep_sides(*before, &views_);
+  SeenJoints out =
+      combined(views_, answer.turns.value.defined(), answer.uncertainty.value.defined(), source);
+  remember_sides(before, &out);
   return out;
 }
 
@@ -144,45 +106,32 @@ Tensor JointExtractor::past(const SeenJoints& before) const {
   return out;
 }
 
-/// Of the columns that the views [s, 22, 6] give, turned back; then made a rotation.
-Rotations JointExtractor::mean_turns(const Tensor& turns) const {
-  Rotations out;
-  const float* x = turns.data<float>();
-  for (size_t j = 0; j < kJoints; ++j) {
-    Eigen::Matrix<double, 3, 2> columns = Eigen::Matrix<double, 3, 2>::Zero();
-    for (size_t s = 0; s < centres_.size(); ++s) {
-      const size_t from = mirrored(s) ? static_cast<size_t>(kMirror[j]) : j;
-      Eigen::Matrix<double, 3, 2> own =
-          Eigen::Map<const Eigen::Matrix<float, 3, 2>>(x + 6 * (s * kJoints + from)).cast<double>();
-      if (mirrored(s)) {  // M R M with M = diag(-1, 1, 1)
-        own.row(0) *= -1;
-        own.col(0) *= -1;
-      }
-      columns += turn_about_y(-heading(s)) * own;
-    }
-    out[j] = rotation_of(columns.col(0), columns.col(1));
-  }
-  return out;
-}
-
-/// Of logarithms [s, 22].
-std::array<double, kJoints> JointExtractor::mean_uncertainty(const Tensor& logs) const {
-  std::array<double, kJoints> out{};
-  for (size_t s = 0; s < centres_.size(); ++s)
+/// Every view's answer, turned and mirrored back.
+void JointExtractor::read(const SkeletonOutput& answer) {
+  const Tensor &joints = answer.joints.value, &turns = answer.turns.value,
+               &uncertainty = answer.uncertainty.value;
+  for (size_t s = 0; s < views_.size(); ++s) {
+    View& view = views_[s];
+    const Mat3 back = turn_about_y(-heading(s));
     for (size_t j = 0; j < kJoints; ++j) {
-      const size_t from = mirrored(s) ? static_cast<size_t>(kMirror[j]) : j;
-      out[j] += static_cast<double>(logs.data<float>()[s * kJoints + from]);
+      const size_t row = s * kJoints + (mirrored(s) ? static_cast<size_t>(kMirror[j]) : j);
+      const float* x = joints.data<float>() + row * 3;
+      view.joints[j] = back * Vec3(mirrored(s) ? -x[0] : x[0], x[1], x[2]) + centres_[s];
+      view.turns[j].setZero();
+      if (turns.defined()) {
+        View::Columns own =
+            Eigen::Map<const Eigen::Matrix<float, 3, 2>>(turns.data<float>() + row * 6)
+                .cast<double>();
+        if (mirrored(s)) {  // M R M with M = diag(-1, 1, 1)
+          own.row(0) *= -1;
+          own.col(0) *= -1;
+        }
+        view.turns[j] = back * own;
+      }
+      view.log_uncertainty[j] =
+          uncertainty.defined() ? static_cast<double>(uncertainty.data<float>()[row]) : 0;
     }
-  for (double& x : out) x = std::exp(x / static_cast<double>(centres_.size()));
-  return out;
-}
-
-SeenJoints turned(const Mat3& turn, const SeenJoints& seen) {
-  SeenJoints out = seen;
-  for (Vec3& joint : out.joints) joint = turn * joint;
-  if (out.turns)
-    for (Mat3& r : *out.turns) r = turn * r;
-  return out;
+  }
 }
 
 Joints extract_joints(SkeletonModel& model, const Points& cloud, const std::string& source,

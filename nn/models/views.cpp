@@ -1,0 +1,123 @@
+#include "nn/models/views.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "autograd/base/error.h"
+
+namespace restage {
+namespace {
+
+constexpr double kSure = 0.8;       // confidence from which on sides are believed
+constexpr int kRemembered = 15;     // frames
+constexpr double kOpposite = -0.3;  // cosine
+constexpr double kFollowed = 0.1;   // of the way to an unsure answer's left, per frame
+
+/// With x along `first`, y along the rest of `second`; none if they span no plane.
+Mat3 rotation_of(const Vec3& first, const Vec3& second) {
+  const Vec3 x = first.normalized(), y = (second - x.dot(second) * x).normalized();
+  if (!(first.norm() > 1e-9) || !(y.squaredNorm() > 0.5)) return Mat3::Identity();
+  Mat3 out;
+  out << x, y, x.cross(y);
+  return out;
+}
+
+/// Mean without `left_out` values at either end.
+double middle_of(std::vector<double>& values, size_t left_out) {
+  std::sort(values.begin(), values.end());
+  double sum = 0;
+  for (size_t s = left_out; s < values.size() - left_out; ++s) sum += values[s];
+  return sum / static_cast<double>(values.size() - 2 * left_out);
+}
+
+/// Direction of the body's left: of hips and shoulders. Zero if they coincide.
+Vec3 left_of(const Joints& joints) {
+  const Vec3 across = joints[1] - joints[2] + joints[16] - joints[17];
+  return across.norm() > 1e-9 ? Vec3(across.normalized()) : Vec3(Vec3::Zero());
+}
+
+/// What is left is right, and so the other way: front and back change places.
+View exchanged(const View& view) {
+  View out;
+  for (size_t j = 0; j < kJoints; ++j) {
+    const auto other = static_cast<size_t>(kMirror[j]);
+    out.joints[j] = view.joints[other];
+    out.log_uncertainty[j] = view.log_uncertainty[other];
+    // Times half a turn about the body's own y.
+    out.turns[j] << -view.turns[other].col(0), view.turns[other].col(1);
+  }
+  return out;
+}
+
+double mean_confidence(const std::vector<View>& views) {
+  double sum = 0;
+  for (const View& view : views) {
+    std::array<double, kJoints> s;
+    for (size_t j = 0; j < kJoints; ++j) s[j] = std::exp(view.log_uncertainty[j]);
+    sum += confidence(s) / static_cast<double>(views.size());
+  }
+  return sum;
+}
+
+}  // namespace
+
+SeenJoints turned(const Mat3& turn, const SeenJoints& seen) {
+  SeenJoints out = seen;
+  for (Vec3& joint : out.joints) joint = turn * joint;
+  if (out.turns)
+    for (Mat3& r : *out.turns) r = turn * r;
+  if (out.left) out.left = turn * *out.left;
+  return out;
+}
+
+double confidence(const std::array<double, kJoints>& uncertainty) {
+  double sum = 0;
+  for (const double s : uncertainty) {
+    const double r = kNearby / s;
+    sum += 1 - std::exp(-r) * (1 + r + r * r / 2);
+  }
+  return sum / kJoints;
+}
+
+SeenJoints combined(const std::vector<View>& views, bool turns, bool uncertainty,
+                    const std::string& source) {
+  SeenJoints out;
+  if (turns) out.turns.emplace();
+  if (uncertainty) out.uncertainty.emplace();
+  const size_t n = views.size(), left_out = n < 8 ? 0 : n / 4;
+  std::vector<double> values(n);
+  for (size_t j = 0; j < kJoints; ++j) {
+    for (int c = 0; c < 3; ++c) {
+      for (size_t s = 0; s < n; ++s) values[s] = views[s].joints[j][c];
+      if (!std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); }))
+        throw InputError(source, "gives joints that are not finite", "check its units: metres");
+      out.joints[j][c] = middle_of(values, left_out);
+    }
+    View::Columns columns = View::Columns::Zero();
+    double logs = 0;
+    for (const View& view : views) columns += view.turns[j], logs += view.log_uncertainty[j];
+    if (turns) (*out.turns)[j] = rotation_of(columns.col(0), columns.col(1));
+    if (uncertainty) (*out.uncertainty)[j] = std::exp(logs / static_cast<double>(n));
+  }
+  return out;
+}
+
+void keep_sides(const SeenJoints& before, std::vector<View>* views) {
+  if (!before.left || before.since >= kRemembered || mean_confidence(*views) >= kSure) return;
+  for (View& view : *views)
+    if (left_of(view.joints).dot(*before.left) < kOpposite) view = exchanged(view);
+}
+
+void remember_sides(const SeenJoints* before, SeenJoints* answer) {
+  const Vec3 left = left_of(answer->joints);
+  if (answer->uncertainty && confidence(*answer->uncertainty) >= kSure) {
+    answer->left = left;
+    return;
+  }
+  if (before == nullptr || !before->left) return;
+  answer->since = before->since + 1;
+  const Vec3 followed = *before->left + kFollowed * (left - *before->left);
+  answer->left = followed.norm() > 1e-9 ? Vec3(followed.normalized()) : *before->left;
+}
+
+}  // namespace restage

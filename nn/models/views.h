@@ -1,0 +1,54 @@
+// What an extractor answers to several views of a cloud, made one answer (docs/method.md, "Views",
+// "Memory").
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "nn/geometry/skeleton.h"
+
+namespace restage {
+
+/// What is seen of somebody in a cloud.
+struct SeenJoints {
+  SeenJoints() = default;
+  SeenJoints(const Joints& known) : joints(known) {}
+  Joints joints{};  ///< metres
+  // Where the model gives them (SkeletonOutput); of several views the mean.
+  std::optional<Rotations> turns;                          ///< from the T-pose
+  std::optional<std::array<double, kJoints>> uncertainty;  ///< metres
+  /// Which way the body's left was when the extractor was last sure of it, and how many frames ago.
+  std::optional<Vec3> left;
+  int since = 0;
+};
+SeenJoints turned(const Mat3& turn, const SeenJoints& seen);
+
+inline constexpr double kNearby = 0.05;  ///< metres
+/// Mean chance of a joint to be within kNearby of where it is seen, of 22 uncertainties (metres).
+double confidence(const std::array<double, kJoints>& uncertainty);
+
+/// The answer to one view, in the cloud's frame.
+struct View {
+  using Columns = Eigen::Matrix<double, 3, 2>;
+  Joints joints;
+  std::array<Columns, kJoints> turns;           ///< as the model gives them, not orthonormal
+  std::array<double, kJoints> log_uncertainty;  ///< of metres
+};
+
+/// Joints: the mean, from eight views on without a quarter of the values of each coordinate at
+/// either end. `turns`, `uncertainty`: whether the model gives them. InputError naming `source`:
+/// joints that are not finite.
+SeenJoints combined(const std::vector<View>& views, bool turns, bool uncertainty,
+                    const std::string& source);
+
+/// An extractor that takes somebody's front for the back gives every limb the other side's name,
+/// and is unsure of it. While it is, for half a second at most, views whose left points where
+/// `before` was sure to have the right are exchanged: each side under the other's name.
+void keep_sides(const SeenJoints& before, std::vector<View>* views);
+/// What is remembered of that in an answer: its own sides where it is sure, else those of before
+/// (null: none), which turn with it a little.
+void remember_sides(const SeenJoints* before, SeenJoints* answer);
+
+}  // namespace restage
