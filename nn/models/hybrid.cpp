@@ -18,8 +18,9 @@ constexpr double kUsualUncertainty = 0.005;  // metres; also where nobody says
 constexpr double kPath = 0.3;    // what an answer of 1 stands for in deviations of the path
 constexpr double kBlind = 2;     // times as far for rotations where none are read from the surface
 constexpr double kTrusting = 4;  // log odds of an untrained gate: what is seen counts for 98 %
-constexpr int64_t kEnds = std::ssize(kLeaves), kGates = 2 * kJoints + kEnds;
-constexpr double kTrend = -2;  // log odds of an untrained trend's gain: 12 %
+constexpr int64_t kEnds = std::ssize(kLeaves), kGates = 2 * kJoints + kEnds + 1;
+constexpr int64_t kPathAt = 4 * kJoints + 6 * kEnds;  // in what is filtered
+constexpr double kTrend = -2;                         // log odds of an untrained trend's gain: 12 %
 
 /// Holt's filter with gains that change, over x, g, h [n, t, m]:
 ///   v_t = h_t (x_t - x_(t-1)) + (1 - h_t) v_(t-1),  y_t = g_t x_t + (1 - g_t) (y_(t-1) + v_t);
@@ -43,7 +44,8 @@ Var filtered(const Var& x, const Var& g, const Var& h, Var* state) {
   return y;
 }
 
-/// Gates of 22 joints, 22 twists and the leaves [n, t, 22 + 22 + 5] for each of their numbers.
+/// Gates of 22 joints, 22 twists, the leaves and the path [n, t, 22 + 22 + 5 + 1] for each of their
+/// numbers.
 Var for_each_number(const Var& gates) {
   const int64_t n = gates.size(0), t = gates.size(1);
   const auto repeated = [&](int64_t from, int64_t count, int64_t times) {
@@ -51,7 +53,7 @@ Var for_each_number(const Var& gates) {
     return reshape(expand(one, {n, t, count, times}), {n, t, count * times});
   };
   return concat({repeated(0, kJoints, 3), slice(gates, 2, kJoints, 2 * kJoints),
-                 repeated(2 * kJoints, kEnds, 6)},
+                 repeated(2 * kJoints, kEnds, 6), repeated(2 * kJoints + kEnds, 1, 3)},
                 2);
 }
 
@@ -127,7 +129,8 @@ MotionOutput Hybrid::forward(Context& ctx, const MotionInput& in, MotionState* s
   };
   const Var ends = reshape(matrix_to_sixd(Var(surface.leaves)), {n, t, 6 * kEnds});
   const Var now = concat(
-      {reshape(in.joints, {n, t, w}), reshape(Var(surface.twist), {n, t, kJoints}), ends}, 2);
+      {reshape(in.joints, {n, t, w}), reshape(Var(surface.twist), {n, t, kJoints}), ends, in.trans},
+      2);
   const Var calm = filtered(now, gains(gate, kTrusting), gains(trend, kTrend), &(*state)[2]);
   const Var off = scale(uncertainty, 1 / kUsualUncertainty);
   const double turning = config.turn_reach * (config.orientation ? 1 : kBlind);
@@ -148,7 +151,8 @@ MotionOutput Hybrid::forward(Context& ctx, const MotionInput& in, MotionState* s
   out.raw = reshape(matrix_to_sixd(local), {n, t, 6 * kJoints});
   put_pose(local, rest_rows, n, &out);
   const Var longer = reshape(leg_lengths(rest_rows) / leg_lengths(posed), {n, t, 1});
-  out.trans = in.trans * longer + scale(path(ctx, decoded), kPath) * Var(units.trans.deviation);
+  out.trans = slice(calm, 2, kPathAt, kPathAt + 3) * longer +
+              scale(path(ctx, decoded), kPath) * Var(units.trans.deviation);
   if (contact) out.standing = (*contact)(ctx, decoded);
   return out;
 }

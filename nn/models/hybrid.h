@@ -42,7 +42,7 @@ void visit(V& v, HybridConfig& c) {
 }
 
 /// The state is {encoder, decoder}, both [layers, n, hidden], and the filter's three,
-/// [n, 118].
+/// [n, 121].
 struct Hybrid final : MotionModel {
   using Config = HybridConfig;
   Hybrid(const HybridConfig& c, const Init& init);
