@@ -76,16 +76,20 @@ Sequence truth_of(const Performance& performance, int64_t every) {
 
 /// `push(i)`: frame i of the source, by whatever way the system takes it.
 template <class Push>
-void judge_retargeting(const Performance& performance, const System& system, const Push& push,
+void judge_retargeting(const Performance& performance, System& system, const Push& push,
                        int64_t every, Sequence s, SystemScores* scores) {
   Predicted model;
-  for (size_t i = 0; i < performance.frames(); i += static_cast<size_t>(every)) {
-    for (const RetargetedFrame& f : push(i)) {
+  const auto keep = [&](std::span<const RetargetedFrame> frames) {
+    for (const RetargetedFrame& f : frames) {
       model.joints.push(f.joints);
       if (!f.vertices.empty()) model.vertices.push(f.vertices);
     }
+  };
+  for (size_t i = 0; i < performance.frames(); i += static_cast<size_t>(every)) {
+    keep(push(i));
     if (system.source_joints() != nullptr) s.source.push_back(*system.source_joints());
   }
+  keep(system.finish());
   add(model, s, every, &scores->model);
   scores->frames.push_back(s.joints.frames);
   if (every == 1 && system.target_joints() != nullptr && !s.source.empty())

@@ -126,6 +126,7 @@ void Retargeter::prepare(const std::string& weights_name) {
     extractor_.emplace(*skeleton, options_.samples);
   const TrainedModel& motion = models_.need("motion", weights_name);
   motion_ = &models_.need_as<MotionModel>("motion", weights_name);
+  asked_.resize(static_cast<size_t>(motion_->latency()) + 1);
   const std::string translation =
       motion.setting("translation", {"velocity", "relative", "absolute"});
   path_ = translation == "velocity"   ? Path::velocity
@@ -147,7 +148,7 @@ void Retargeter::restart() {
   previous_.reset();
   received_.reset();
   believed_.reset();
-  frame_ = grid_ = 0;
+  frame_ = grid_ = answered_ = 0;
   legs_a_ = 0;
 }
 
@@ -178,19 +179,37 @@ std::span<const RetargetedFrame> Retargeter::push_joints(const SeenJoints& seen)
     const double back =
         (now - static_cast<double>(grid_) / kFps) * options_.fps;  // in source frames
     if (frames_.size() == count) frames_.emplace_back();
-    step(received_ && back > 1e-9 ? blend(seen, *received_, std::min(back, 1.0)) : seen,
-         &frames_[count++]);
-    ++grid_;
+    count += step(received_ && back > 1e-9 ? blend(seen, *received_, std::min(back, 1.0)) : seen,
+                  &frames_[count]);
   }
   received_ = seen;
   ++frame_;
   return {frames_.data(), count};
 }
 
-void Retargeter::step(const SeenJoints& seen, RetargetedFrame* out) {
+std::span<const RetargetedFrame> Retargeter::finish() {
+  if (grid_ == 0) return {};
+  const SeenJoints last = asked_[static_cast<size_t>((grid_ - 1) % std::ssize(asked_))].seen;
+  size_t count = 0;
+  for (const int64_t all = grid_; answered_ < all;) {
+    if (frames_.size() == count) frames_.emplace_back();
+    count += step(last, &frames_[count]);
+  }
+  return {frames_.data(), count};
+}
+
+bool Retargeter::step(const SeenJoints& now, RetargetedFrame* out) {
+  SeenJoints seen = now;
   {
     const Stopwatch watch(&times_.motion);
-    advance(seen, &out->pose);
+    const double heading = remove_heading_ ? heading_(now.joints) : 0;
+    const MotionOutput said = answer(now, turn_about_y(heading));
+    const int64_t room = std::ssize(asked_);
+    asked_[static_cast<size_t>(grid_ % room)] = {now, turn_about_y(heading)};
+    if (++grid_ < room) return false;
+    const Asked& then = asked_[static_cast<size_t>(grid_ % room)];  // the oldest
+    seen = then.seen;
+    perform(said, seen.joints, then.turn, &out->pose);
   }
   out->confidence.reset();
   if (seen.uncertainty) out->confidence = confidence(*seen.uncertainty);
@@ -202,8 +221,9 @@ void Retargeter::step(const SeenJoints& seen, RetargetedFrame* out) {
   const auto finite = [](const auto& x) { return x.allFinite(); };
   if (!std::all_of(out->joints.begin(), out->joints.end(), finite) ||
       !std::all_of(out->vertices.begin(), out->vertices.end(), finite))
-    throw InputError("", "frame " + std::to_string(grid_) + " of the result is not finite",
+    throw InputError("", "frame " + std::to_string(answered_ - 1) + " of the result is not finite",
                      "check that source and target are in metres");
+  return true;
 }
 
 void Retargeter::hold_doubtful(RetargetedFrame* out) {
@@ -223,11 +243,10 @@ void Retargeter::hold_doubtful(RetargetedFrame* out) {
   out->pose = *believed_;
 }
 
-/// The motion model's answer to what is seen of A.
-void Retargeter::advance(const SeenJoints& seen, Pose* pose) {
+/// The motion model's answer to what is seen of A, whose heading `turn` is.
+MotionOutput Retargeter::answer(const SeenJoints& seen, const Mat3& turn) {
   const Joints& a = seen.joints;
-  const double heading = remove_heading_ ? heading_(a) : 0;
-  const Mat3 turn = turn_about_y(heading), back = turn.transpose();
+  const Mat3 back = turn.transpose();
   if (!previous_) {  // B begins where A does, in proportion to its legs
     const double scale = leg_length(rest_) / std::max(leg_length(a), 1e-6);
     start_a_ = a[0];
@@ -239,9 +258,15 @@ void Retargeter::advance(const SeenJoints& seen, Pose* pose) {
                       : path_ == Path::relative ? start_a_
                                                 : Vec3(Vec3::Zero());
   const Vec3 moved = (path_ == Path::velocity ? kFps : 1.0) * (back * (a[0] - before));
+  previous_ = a;
   Context ctx;
-  const MotionOutput answer =
-      motion_->forward(ctx, input_of(seen, back, moved, rest_tensor_), &state_);
+  return motion_->forward(ctx, input_of(seen, back, moved, rest_tensor_), &state_);
+}
+
+/// What B does while A is as in `a`.
+void Retargeter::perform(const MotionOutput& answer, const Joints& a, const Mat3& turn,
+                         Pose* pose) {
+  ++answered_;
   const float* r = answer.rotations.value.data<float>();
   for (size_t j = 0; j < kJoints; ++j)
     pose->local[j] =
@@ -253,7 +278,6 @@ void Retargeter::advance(const SeenJoints& seen, Pose* pose) {
     sum_path(a, t_b);
   else
     root_b_ = path_ == Path::relative ? Vec3(start_b_ + t_b) : t_b;
-  previous_ = a;
   pose->root = root_b_;
   if (!options_.foot_lock || !answer.standing.value.defined()) return;
   std::array<double, 2> standing{};
@@ -265,9 +289,8 @@ void Retargeter::advance(const SeenJoints& seen, Pose* pose) {
 
 /// Velocities that are a little too large or askew would carry B away from A for ever.
 void Retargeter::sum_path(const Joints& a, const Vec3& velocity) {
-  const auto n = static_cast<double>(grid_ + 1);
-  legs_a_ += (leg_length(a) - legs_a_) / n;
-  if (!previous_) return;
+  legs_a_ += (leg_length(a) - legs_a_) / static_cast<double>(answered_);
+  if (answered_ == 1) return;
   root_b_ += velocity / kFps;
   if (!(options_.anchor > 0)) return;
   const double scale = leg_length(rest_) / std::max(legs_a_, 1e-6);

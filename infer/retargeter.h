@@ -44,11 +44,14 @@ class Retargeter final : public System {
   Retargeter(const Bundle& weights, const std::string& weights_name, Mesh target,
              const Joints& rest, const RetargetOptions& options);
 
-  /// At 30 fps each cloud gives one frame, else those of the 30 fps grid that it ends. A steady
-  /// frame takes no memory.
+  /// At 30 fps each cloud gives one frame, else those of the 30 fps grid that it ends; of a network
+  /// that looks ahead (MotionModel::latency) those so many frames before. A steady frame takes no
+  /// memory.
   std::span<const RetargetedFrame> push(const Points& cloud, const std::string& source) override;
   /// The same from joints of A in the world, and what else is seen of them.
   std::span<const RetargetedFrame> push_joints(const SeenJoints& seen);
+  /// The frames that the network has not answered yet: the source stands still in the end.
+  std::span<const RetargetedFrame> finish() override;
   void restart() override;
 
   const Mesh& target() const override { return target_; }
@@ -63,8 +66,10 @@ class Retargeter final : public System {
 
  private:
   void prepare(const std::string& weights_name);
-  void step(const SeenJoints& seen, RetargetedFrame* out);
-  void advance(const SeenJoints& seen, Pose* pose);
+  /// False: there is no answer yet.
+  bool step(const SeenJoints& seen, RetargetedFrame* out);
+  MotionOutput answer(const SeenJoints& seen, const Mat3& turn);
+  void perform(const MotionOutput& answer, const Joints& a, const Mat3& turn, Pose* pose);
   void hold_doubtful(RetargetedFrame* out);
   void sum_path(const Joints& a, const Vec3& velocity);
 
@@ -91,7 +96,14 @@ class Retargeter final : public System {
   Vec3 root_b_ = Vec3::Zero();
   Vec3 centre_a_ = Vec3::Zero(), centre_b_ = Vec3::Zero();  ///< what paths are scaled about
   double legs_a_ = 0;                                       ///< mean leg length of A so far
-  int64_t frame_ = 0, grid_ = 0;         ///< source frames received, grid frames produced
+  /// What was seen on the grid and how it was turned, as many frames as answers come late.
+  struct Asked {
+    SeenJoints seen;
+    Mat3 turn;
+  };
+  std::vector<Asked> asked_;
+  int64_t frame_ = 0, grid_ = 0;         ///< source frames received, grid frames seen
+  int64_t answered_ = 0;                 ///< grid frames produced
   std::vector<RetargetedFrame> frames_;  ///< of the last push, and room for more
   FrameTimes times_;
 };

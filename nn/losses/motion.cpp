@@ -45,6 +45,13 @@ Tensor complement(const Tensor& mask) {
   return Tensor::from<double>(mask.shape(), out).cast(mask.dtype());
 }
 
+/// What is true of the first frames.
+MotionBatch first_frames(MotionBatch b, int64_t frames) {
+  for (Var* x : {&b.joints, &b.true_trans, &b.sixd}) *x = slice(*x, 1, 0, frames);
+  if (b.standing.defined()) b.standing = slice(Var(b.standing), 1, 0, frames).value;
+  return b;
+}
+
 /// Cycle, rotation, smoothness and acceleration of a motion that ought to be A's.
 void put_reconstruction(const MotionOutput& to_a, const MotionBatch& b, const MotionWeights& w,
                         MotionLosses* out) {
@@ -110,14 +117,16 @@ MotionLosses self_losses(Context& ctx, const MotionModel& net, const MotionBatch
                          const MotionWeights& w) {
   MotionLosses out;
   MotionState state;
-  const MotionOutput to_a = net.forward(ctx, b.seen(b.rest_a), &state);
+  const int64_t t = b.joints.size(1), late = net.latency();
+  const MotionOutput to_a = frames_of(net.forward(ctx, b.seen(b.rest_a), &state), late, t);
+  const MotionBatch known = first_frames(b, t - late);
   out.joints_b = to_a.joints;
   out.trans_b = to_a.trans;
-  put_reconstruction(to_a, b, w, &out);
+  put_reconstruction(to_a, known, w, &out);
   out.self = out.cycle + scale(out.rotation, w.rotation) + scale(out.smoothness, w.smoothness) +
              scale(out.acceleration, w.acceleration);
   out.total = scale(out.self, w.self);
-  if (w.contact > 0) out.total = out.total + scale(contact_loss(to_a, b), w.contact);
+  if (w.contact > 0) out.total = out.total + scale(contact_loss(to_a, known), w.contact);
   return out;
 }
 

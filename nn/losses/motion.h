@@ -39,14 +39,15 @@ struct MotionLosses {
   Var joints_b, trans_b;  ///< the retargeted motion, for the discriminator's step
 };
 
-/// Generator side: A -> B -> A through the same network. `discriminator` null leaves the
-/// adversarial term out. It judges as it is: its parameters are constants, and have gradients only
-/// for who asks for them.
+/// Generator side: A -> B -> A through the same network, whose latency() is 0. `discriminator` null
+/// leaves the adversarial term out. It judges as it is: its parameters are constants, and have
+/// gradients only for who asks for them.
 MotionLosses motion_losses(Context& ctx, const MotionModel& net, Discriminator* discriminator,
                            const MotionBatch& batch, const MotionWeights& weights,
                            bool discriminator_gradients = false);
 
-/// Self-reconstruction alone: one pass A -> A, whose answer is known. cycle and trans errors,
+/// Self-reconstruction alone: one pass A -> A, whose answer is known; of a network with latency()
+/// the frames that it has answered. cycle and trans errors,
 /// rotation and smoothness are those of this pass; `self` is their weighted sum.
 MotionLosses self_losses(Context& ctx, const MotionModel& net, const MotionBatch& batch,
                          const MotionWeights& weights);

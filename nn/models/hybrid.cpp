@@ -44,6 +44,17 @@ Var filtered(const Var& x, const Var& g, const Var& h, Var* state) {
   return y;
 }
 
+/// x [n, t, m] so many frames later; before the first frame it stood still. `state`, those frames,
+/// is read and replaced.
+Var delayed(const Var& x, int64_t frames, Var* state) {
+  if (frames == 0) return x;
+  const int64_t n = x.size(0), t = x.size(1), m = x.size(2);
+  if (!state->value.defined()) *state = expand(slice(x, 1, 0, 1), {n, frames, m});
+  const Var all = concat({*state, x}, 1);
+  *state = slice(all, 1, t, t + frames);
+  return slice(all, 1, 0, t);
+}
+
 /// Gates of 22 joints, 22 twists, the leaves and the path [n, t, 22 + 22 + 5 + 1] for each of their
 /// numbers.
 Var for_each_number(const Var& gates) {
@@ -116,7 +127,7 @@ MotionOutput Hybrid::forward(Context& ctx, const MotionInput& in, MotionState* s
   const int64_t n = in.joints.size(0), t = in.joints.size(1), w = 3 * kJoints;
   const SurfaceTurns surface = surface_turns(in);
   const Var b = in_units(reshape(in.rest, {n, 1, w}), units.rest);
-  state->resize(5);
+  state->resize(6);
   const Var uncertainty =
       config.uncertainty && in.uncertainty.defined()
           ? Var(in.uncertainty)
@@ -128,14 +139,18 @@ MotionOutput Hybrid::forward(Context& ctx, const MotionInput& in, MotionState* s
     return for_each_number(sigmoid(add_scalar(head(ctx, decoded), start)));
   };
   const Var ends = reshape(matrix_to_sixd(Var(surface.leaves)), {n, t, 6 * kEnds});
-  const Var now = concat(
-      {reshape(in.joints, {n, t, w}), reshape(Var(surface.twist), {n, t, kJoints}), ends, in.trans},
-      2);
-  const Var calm = filtered(now, gains(gate, kTrusting), gains(trend, kTrend), &(*state)[2]);
-  const Var off = scale(uncertainty, 1 / kUsualUncertainty);
+  const Var now =
+      delayed(concat({reshape(in.joints, {n, t, w}), reshape(Var(surface.twist), {n, t, kJoints}),
+                      ends, in.trans, uncertainty},
+                     2),
+              config.latency, &(*state)[5]);
+  const Var believed = slice(now, 2, kPathAt + 3, kPathAt + 3 + kJoints);
+  const Var calm = filtered(slice(now, 2, 0, kPathAt + 3), gains(gate, kTrusting),
+                            gains(trend, kTrend), &(*state)[2]);
+  const Var off = scale(believed, 1 / kUsualUncertainty);
   const double turning = config.turn_reach * (config.orientation ? 1 : kBlind);
   const Var moved = slice(calm, 2, 0, w) +
-                    scale(tanh(correction(ctx, decoded)), config.reach) * each_thrice(uncertainty),
+                    scale(tanh(correction(ctx, decoded)), config.reach) * each_thrice(believed),
             twisted =
                 slice(calm, 2, w, w + kJoints) + scale(tanh(twist(ctx, decoded)), turning) * off,
             sixd = slice(calm, 2, w + kJoints, w + kJoints + 6 * kEnds) +

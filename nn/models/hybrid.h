@@ -22,6 +22,7 @@ namespace restage {
 struct HybridConfig {
   int64_t hidden = 256;
   int layers = 2;
+  int64_t latency = 0;
   double dropout = 0;
   double reach = 2, turn_reach = 0.15;
   bool orientation = true, uncertainty = true, contact = false;
@@ -31,6 +32,7 @@ template <class V>
 void visit(V& v, HybridConfig& c) {
   v("hidden", c.hidden, "size of the hidden states", between(1, kMostWidth));
   v("dropout", c.dropout, "between the layers", below(0, 1));
+  v("latency", c.latency, "frames that it looks ahead: so much later it answers", between(0, 60));
   v("reach", c.reach,
     "farthest that a coordinate of a joint is corrected, in units of its uncertainty", at_least(0));
   v("turn_reach", c.turn_reach,
@@ -41,13 +43,14 @@ void visit(V& v, HybridConfig& c) {
   v("contact", c.contact, "also says which feet stand");
 }
 
-/// The state is {encoder, decoder}, both [layers, n, hidden], and the filter's three,
-/// [n, 121].
+/// The state is {encoder, decoder}, both [layers, n, hidden], the filter's three, [n, 121], and the
+/// last `latency` frames of what is filtered.
 struct Hybrid final : MotionModel {
   using Config = HybridConfig;
   Hybrid(const HybridConfig& c, const Init& init);
   MotionOutput forward(Context& ctx, const MotionInput& in, MotionState* state) const override;
   void standardise(const MotionStatistics& statistics) override;
+  int64_t latency() const override { return config.latency; }
   void visit(Fields& f) override;
   const char* kind() const override { return "Hybrid"; }
 

@@ -23,6 +23,12 @@ std::span<const SwingJoint> joint_swings() {
   return table;
 }
 
+MotionOutput frames_of(const MotionOutput& out, int64_t from, int64_t to) {
+  const auto part = [&](const Var& x) { return x.value.defined() ? slice(x, 1, from, to) : x; };
+  return {part(out.raw), part(out.rotations), part(out.joints), part(out.trans),
+          part(out.standing)};
+}
+
 Var in_units(const Var& x, const MotionStatistics::Columns& of) {
   return (x - Var(of.mean)) / Var(of.deviation);
 }

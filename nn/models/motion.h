@@ -42,10 +42,14 @@ struct MotionStatistics {
 struct MotionModel : Module {
   /// `state` is read and replaced.
   virtual MotionOutput forward(Context& ctx, const MotionInput& in, MotionState* state) const = 0;
+  /// How many frames an answer is later than what it answers: answer t is of frame t - latency().
+  virtual int64_t latency() const { return 0; }
   /// Called once before a training; a network that takes numbers as they are ignores it.
   virtual void standardise(const MotionStatistics& statistics) = 0;
 };
 
+/// Frames [from, to) of an answer.
+MotionOutput frames_of(const MotionOutput& out, int64_t from, int64_t to);
 /// x in units of the training set's deviation from its mean.
 Var in_units(const Var& x, const MotionStatistics::Columns& of);
 /// rest [n, 22, 3] -> [n * frames, 22, 3].

@@ -228,6 +228,29 @@ TEST(InferRetargeter, MemoryDoesNotGrowWithTheFrames) {
   EXPECT_EQ(after.large_allocations, before.large_allocations);
 }
 
+TEST(InferRetargeter, WhoLooksAheadAnswersEveryFrameLater) {
+  const auto with = [](int64_t latency) {
+    return testing::with_setting(
+        testing::untrained_bundle("smrm/hybrid",
+                                  {"hidden=8", "latency=" + std::to_string(latency)}),
+        "motion", "remove_heading", "true");
+  };
+  for (const size_t length : {1u, 2u, 3u, 12u}) {
+    const auto source = performance(length);
+    const auto at_once = retargeted(with(0), source);
+    Retargeter late(with(3), "w", target().rest, target().joints, {});
+    for (const int round : {0, 1}) {
+      std::vector<RetargetedFrame> frames = run(late, source);
+      EXPECT_EQ(frames.size(), length > 3 ? length - 3 : 0);
+      for (const RetargetedFrame& f : late.finish()) frames.push_back(f);
+      ASSERT_EQ(frames.size(), length) << round;
+      for (size_t f = 0; f < length; ++f)
+        EXPECT_LT(apart(frames[f].joints, at_once[f].joints), 0.03) << length << " " << f;
+      late.restart();
+    }
+  }
+}
+
 TEST(InferRetargeter, FramesOfOtherRatesFallOnTheThirtyPerSecondGrid) {
   const Bundle models = untrained();
   const std::vector<Joints> source = performance(40);

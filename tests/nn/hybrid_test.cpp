@@ -54,10 +54,12 @@ struct Input {
   }
 };
 
-std::shared_ptr<MotionModel> hybrid() {
-  return make_model_as<MotionModel>("smrm/hybrid",
-                                    model_config("smrm/hybrid", {"hidden=16", "contact=true"}),
-                                    Init{RngKey{2, 0}, DType::f64});
+std::shared_ptr<MotionModel> hybrid(int64_t latency = 0) {
+  return make_model_as<MotionModel>(
+      "smrm/hybrid",
+      model_config("smrm/hybrid",
+                   {"hidden=16", "contact=true", "latency=" + std::to_string(latency)}),
+      Init{RngKey{2, 0}, DType::f64});
 }
 
 TEST(Hybrid, BeginsAsTheClosedForm) {
@@ -116,6 +118,28 @@ TEST(Hybrid, FrameByFrameAsAtOnce) {
   for (int64_t t = 0; t < kFrames; ++t) {
     const MotionOutput one = net->forward(ctx, in.frame(t), &parts);
     const Tensor expected = slice(all.joints, 1, t, t + 1).value;
+    for (int64_t i = 0; i < expected.numel(); ++i)
+      EXPECT_NEAR(one.joints.value.item(i), expected.item(i), 1e-12) << t;
+  }
+}
+
+TEST(Hybrid, WithLatencyItAnswersTheFrameSoManyBefore) {
+  const Input in;
+  Context ctx;
+  MotionState at_once, later, parts;
+  const MotionOutput now = hybrid()->forward(ctx, in.all(), &at_once);
+  const auto net = hybrid(2);
+  EXPECT_EQ(net->latency(), 2);
+  const MotionOutput late = net->forward(ctx, in.all(), &later);
+  const MotionOutput answered = frames_of(late, 2, kFrames), asked = frames_of(now, 0, kFrames - 2);
+  ASSERT_EQ(answered.joints.shape(), asked.joints.shape());
+  double apart = 0;  // untrained, both are nearly the closed form
+  for (int64_t i = 0; i < asked.joints.value.numel(); ++i)
+    apart = std::max(apart, std::abs(answered.joints.value.item(i) - asked.joints.value.item(i)));
+  EXPECT_LT(apart, 0.02);
+  for (int64_t t = 0; t < kFrames; ++t) {
+    const MotionOutput one = net->forward(ctx, in.frame(t), &parts);
+    const Tensor expected = slice(late.joints, 1, t, t + 1).value;
     for (int64_t i = 0; i < expected.numel(); ++i)
       EXPECT_NEAR(one.joints.value.item(i), expected.item(i), 1e-12) << t;
   }

@@ -187,6 +187,20 @@ TEST(TrainStages, MotionLearnsFromWhatTheExtractorAnswers) {
   EXPECT_HAS(test::refusal_of([&] { tiny_stage("motion", c); }), "needs what 'skeleton' leaves");
 }
 
+TEST(TrainStages, LatencyNeedsPassesWhoseAnswerIsKnown) {
+  TrainConfig c = tiny_training(6);
+  testing::choose(motion(c).model, "smrm/hybrid", {"hidden=16", "latency=3"});
+  EXPECT_HAS(test::refusal_of([&] { tiny_stage("motion", c); }), "self_share");
+  motion(c).windows.self_share = 1;
+  motion(c).self_first_pass = true;
+  motion(c).weights.adversarial = 0;
+  const auto stage = tiny_stage("motion", c);
+  for (int64_t i = 0; i < 3; ++i) EXPECT_TRUE(std::isfinite(value_of(stage->step(i), "loss")));
+  for (const auto& [name, value] : stage->validate()) EXPECT_TRUE(std::isfinite(value)) << name;
+  motion(c).windows.frames = 5;
+  EXPECT_HAS(test::refusal_of([&] { tiny_stage("motion", c); }), "longer windows.frames");
+}
+
 /// Answers what it remembers; where it remembers nothing, zeros.
 struct Echo final : SkeletonModel {
   SkeletonOutput forward(Context&, const SkeletonInput& in) override {

@@ -4,6 +4,8 @@
 
 #include "autograd/base/log.h"
 #include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+#include "datasets/readers/errors.h"
 #include "nn/metrics/metrics.h"
 #include "nn/models/closed_form_motion.h"
 #include "nn/models/extraction.h"
@@ -105,19 +107,25 @@ double window_error(Metric metric, const Tensor& predicted, const Tensor& truth,
   return out;
 }
 
+Tensor first_frames(const Tensor& x, int64_t frames) { return slice(Var(x), 1, 0, frames).value; }
+
 /// Sums over windows of what an answer gets wrong: joints in metres (and metres per squared frame),
 /// local rotations as the mean length of the difference of their two columns.
 struct Judged {
   double pa = 0, local = 0, acceleration = 0, rotation = 0;
-  void add(const MotionOutput& out, const WindowBatch& b) {
+  /// `late`: frames that the answer is behind.
+  void add(const MotionOutput& answer, const WindowBatch& b, int64_t late) {
     using Mode = metrics::Alignment::Mode;
-    const Tensor& joints = out.joints.value;
-    pa += window_error(metrics::mean_distance, joints, b.truth_b, Mode::frame);
-    local += window_error(metrics::mean_distance, joints, b.truth_b, Mode::none);
-    acceleration += window_error(metrics::acceleration_error, joints, b.truth_b, Mode::none);
-    rotation +=
-        rotation_loss(out.rotations, Var(b.truth_sixd_b), MotionDistance::distance).value.item() *
-        static_cast<double>(b.truth_b.size(0));
+    const int64_t t = b.truth_b.size(1);
+    const MotionOutput out = frames_of(answer, late, t);
+    const Tensor &joints = out.joints.value, truth = first_frames(b.truth_b, t - late);
+    pa += window_error(metrics::mean_distance, joints, truth, Mode::frame);
+    local += window_error(metrics::mean_distance, joints, truth, Mode::none);
+    acceleration += window_error(metrics::acceleration_error, joints, truth, Mode::none);
+    rotation += rotation_loss(out.rotations, first_frames(b.truth_sixd_b, t - late),
+                              MotionDistance::distance)
+                    .value.item() *
+                static_cast<double>(truth.size(0));
   }
 };
 
@@ -164,6 +172,15 @@ MotionStage::MotionStage(const Config& config, const StageInput& in)
       seed_(in.seed),
       given_(in.given),
       key_(RngKey{in.seed, 0}.fold("motion.step")) {
+  const int64_t late = model_->latency();
+  if (late > 0 && (config.windows.self_share < 1 || !config.self_first_pass))
+    throw InputError("motion.sizes.latency", "is for passes whose answer is known, not for cycles",
+                     "set windows.self_share to 1 and self_first_pass to true");
+  if (config.windows.frames < late + 3 || config.validation_frames < 2 * late + 3)
+    throw InputError("motion.sizes.latency",
+                     cat("of ", late, " leaves nothing of windows of ", config.windows.frames,
+                         " frames (validation: ", config.validation_frames, ")"),
+                     "give longer windows.frames and validation_frames");
   if (config.answers.tracks.sequences == 0) windows();  // what is wrong with them is said at once
   model_->standardise(statistics());
 }
@@ -273,10 +290,11 @@ NamedValues MotionStage::validate() {
     const MotionOutput to_b = model_->forward(ctx, seen, &forth);
     const MotionOutput to_a =
         model_->forward(ctx, {to_b.joints, to_b.trans, b.rest_a, {}, {}}, &back);
-    network.add(to_b, b);
-    closed_form.add(ClosedFormMotion({}, {}).forward(ctx, seen, &none), b);
-    cycle += window_error(metrics::mean_distance, to_a.joints.value, b.joints_a,
-                          metrics::Alignment::Mode::none);
+    const int64_t late = model_->latency(), t = b.joints_a.size(1);
+    network.add(to_b, b, late);
+    closed_form.add(ClosedFormMotion({}, {}).forward(ctx, seen, &none), b, 0);
+    cycle += window_error(metrics::mean_distance, frames_of(to_a, 2 * late, t).joints.value,
+                          first_frames(b.joints_a, t - 2 * late), metrics::Alignment::Mode::none);
   }
   const auto count = static_cast<double>(n);
   return {{"pa_mpjpe", network.pa / count},
