@@ -3,7 +3,7 @@
 namespace restage {
 namespace {
 
-constexpr double kLands = 0.6, kLifts = 0.4;  // chances
+constexpr double kLands = 0.5, kLifts = 0.3;  // chances
 constexpr double kLeak = 0.02, kRelease = 0.25;
 constexpr double kFar = 0.06;  // metres
 
