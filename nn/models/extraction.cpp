@@ -81,8 +81,8 @@ SeenJoints JointExtractor::operator()(const Points& cloud, const std::string& so
       model_.forward(ctx, {batch, before != nullptr ? past(*before) : Tensor()});
   read(answer);
   if (before != nullptr) keep_sides(*before, &views_);
-  SeenJoints out =
-      combined(views_, answer.turns.value.defined(), answer.uncertainty.value.defined(), source);
+  SeenJoints out = combined(views_, answer.turns.value.defined(),
+                            answer.uncertainty.value.defined(), source, values_);
   remember_sides(before, &out);
   return out;
 }

@@ -42,6 +42,7 @@ class JointExtractor {
   Points sorted_, chosen_;
   std::vector<Vec3> centres_;
   std::vector<View> views_;
+  std::vector<double> values_;  // one coordinate of each
 };
 
 /// The joints of one cloud.

@@ -80,12 +80,12 @@ double confidence(const std::array<double, kJoints>& uncertainty) {
 }
 
 SeenJoints combined(const std::vector<View>& views, bool turns, bool uncertainty,
-                    const std::string& source) {
+                    const std::string& source, std::vector<double>& values) {
   SeenJoints out;
   if (turns) out.turns.emplace();
   if (uncertainty) out.uncertainty.emplace();
   const size_t n = views.size(), left_out = n < 8 ? 0 : n / 4;
-  std::vector<double> values(n);
+  values.resize(n);
   for (size_t j = 0; j < kJoints; ++j) {
     for (int c = 0; c < 3; ++c) {
       for (size_t s = 0; s < n; ++s) values[s] = views[s].joints[j][c];

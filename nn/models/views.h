@@ -39,9 +39,9 @@ struct View {
 
 /// Joints: the mean, from eight views on without a quarter of the values of each coordinate at
 /// either end. `turns`, `uncertainty`: whether the model gives them. InputError naming `source`:
-/// joints that are not finite.
+/// joints that are not finite. `values`: room for a coordinate of each view.
 SeenJoints combined(const std::vector<View>& views, bool turns, bool uncertainty,
-                    const std::string& source);
+                    const std::string& source, std::vector<double>& values);
 
 /// An extractor that takes somebody's front for the back gives every limb the other side's name,
 /// and is unsure of it. While it is, for half a second at most, views whose left points where

@@ -28,7 +28,10 @@ View seen(double heading, double log_uncertainty, bool confused = false) {
 
 constexpr double kSure = -6, kUnsure = -3;  // 2.5 mm and 5 cm
 
-SeenJoints answer(const std::vector<View>& views) { return combined(views, true, true, "test"); }
+SeenJoints answer(const std::vector<View>& views) {
+  std::vector<double> values;
+  return combined(views, true, true, "test", values);
+}
 
 SeenJoints remembered() {
   SeenJoints out = answer({seen(0.3, kSure)});
