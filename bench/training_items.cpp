@@ -8,7 +8,7 @@
 #include "bench/work.h"
 #include "nn/losses/deformation.h"
 #include "nn/losses/motion.h"
-#include "train/optim/adam.h"
+#include "train/optim/optimiser.h"
 #include "train/stage.h"
 
 namespace restage::bench {
@@ -26,7 +26,7 @@ class Training : public Item {
       : precision_(variant == "bfloat16" ? MatmulPrecision::bfloat16 : MatmulPrecision::float32) {}
   void run() override {
     const MatmulPrecisionScope scope(precision_);
-    adam_->step(differentiate(key_.fold(step_++), loss_).gradients, kRate, 0);
+    adam_->step(differentiate(key_.fold(step_++), loss_).gradients, kRate);
   }
   std::vector<double> check() override {
     const Differentiated d = differentiate(key_, loss_);
@@ -35,13 +35,13 @@ class Training : public Item {
 
  protected:
   void train(const std::vector<std::pair<std::string, Module*>>& modules, Loss loss) {
-    adam_ = std::make_unique<Adam>(modules, AdamConfig{});
+    adam_ = std::make_unique<Optimiser>(modules, OptimiserConfig{});
     loss_ = std::move(loss);
   }
 
  private:
   MatmulPrecision precision_;
-  std::unique_ptr<Adam> adam_;
+  std::unique_ptr<Optimiser> adam_;
   Loss loss_;
   RngKey key_ = RngKey{0, 0}.fold("bench");
   uint64_t step_ = 0;

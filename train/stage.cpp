@@ -37,29 +37,29 @@ void copy_matching(Module& to, Module* from, const std::string& prefix,
 
 }  // namespace
 
-Adam* Stage::add_optimiser(const std::string& name, const std::vector<std::string>& roles,
-                           const AdamConfig& config) {
+Optimiser* Stage::add_optimiser(const std::string& name, const std::vector<std::string>& roles,
+                                const OptimiserConfig& config) {
   std::vector<std::pair<std::string, Module*>> modules;
   for (const Network& n : networks_)
     if (std::find(roles.begin(), roles.end(), n.role) != roles.end())
       modules.emplace_back(prefix_of(n.role), n.model.net.get());
   for (const auto& [prefix, module] : modules)
-    if (optimiser_.steps > 0 && count_parameters(*module) == 0)
+    if (optimisation_.steps > 0 && count_parameters(*module) == 0)
       throw InputError("", "the model of stage '" + name_ + "' has nothing to learn",
                        "set " + name_ + ".optimiser.steps=0 to use it as it is");
-  optimisers_.push_back({name, std::make_unique<Adam>(modules, config)});
-  return optimisers_.back().adam.get();
+  optimisers_.push_back({name, std::make_unique<Optimiser>(modules, config)});
+  return optimisers_.back().optimiser.get();
 }
 
 void Stage::save(TensorFile& file) const {
   for (const Network& n : networks_) append(&file, *n.model.net, prefix_of(n.role));
-  for (const Optimiser& o : optimisers_) o.adam->save(o.name + ".", file);
+  for (const NamedOptimiser& o : optimisers_) o.optimiser->save(o.name + ".", file);
   save_more(file);
 }
 
 void Stage::load(const TensorFile& file, const std::string& where) {
   for (const Network& n : networks_) load_state(*n.model.net, file, prefix_of(n.role), where);
-  for (const Optimiser& o : optimisers_) o.adam->load(o.name + ".", file, where);
+  for (const NamedOptimiser& o : optimisers_) o.optimiser->load(o.name + ".", file, where);
   load_more(file, where);
 }
 

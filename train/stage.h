@@ -22,15 +22,15 @@ using NamedValues = std::vector<std::pair<std::string, double>>;
 class Stage {
  public:
   Stage(std::string name, OptimiserConfig optimiser)
-      : optimiser_(std::move(optimiser)), name_(std::move(name)) {}
+      : optimisation_(std::move(optimiser)), name_(std::move(name)) {}
   virtual ~Stage() = default;
   Stage(const Stage&) = delete;
   Stage& operator=(const Stage&) = delete;
 
   const std::string& name() const { return name_; }
-  int64_t steps() const { return optimiser_.steps; }
+  int64_t steps() const { return optimisation_.steps; }
   /// Clouds, windows or pairs of bodies in a step.
-  int64_t examples_per_step() const { return optimiser_.batch; }
+  int64_t examples_per_step() const { return optimisation_.batch; }
   /// Optimiser step number `step` (from 0). Everything random is a function of (seed, step), so a
   /// resumed run repeats the same bits. Returns what to log.
   virtual NamedValues step(int64_t step) = 0;
@@ -65,13 +65,13 @@ class Stage {
     return add_network<M>(choice.role, choice.name, choice.sizes, key, std::move(settings));
   }
   /// An optimiser of the networks of some roles.
-  Adam* add_optimiser(const std::string& name, const std::vector<std::string>& roles,
-                      const AdamConfig& config);
+  Optimiser* add_optimiser(const std::string& name, const std::vector<std::string>& roles,
+                           const OptimiserConfig& config);
   /// Whatever else is carried from step to step.
   virtual void save_more(TensorFile&) const {}
   virtual void load_more(const TensorFile&, const std::string& /*where*/) {}
 
-  const OptimiserConfig optimiser_;
+  const OptimiserConfig optimisation_;
 
  private:
   struct Network {
@@ -79,13 +79,13 @@ class Stage {
     TrainedModel model;
     bool handed_on;
   };
-  struct Optimiser {
+  struct NamedOptimiser {
     std::string name;
-    std::unique_ptr<Adam> adam;
+    std::unique_ptr<Optimiser> optimiser;
   };
   std::string name_;
   std::vector<Network> networks_;
-  std::vector<Optimiser> optimisers_;
+  std::vector<NamedOptimiser> optimisers_;
 };
 
 /// One differentiation: runs `loss` on a fresh tape in training mode and returns the gradients of

@@ -63,6 +63,7 @@
   K(lbs_grad, LbsGradArgs)                                \
   K(squared_norm, SquaredNormArgs)                        \
   K(adam, AdamArgs)                                       \
+  K(mix, MixArgs)                                         \
   K(deform, DeformArgs)
 
 namespace restage::cpu {

@@ -1,6 +1,6 @@
-// Norms of gradients, and Adam in one pass over the parameter, its gradient and its moments: 28
-// bytes a number, of which every written one was read just before, so there is nothing to stream
-// past the caches.
+// Norms of gradients, averages, and Adam in one pass over the parameter, its gradient and its
+// moments: 28 bytes a number, of which every written one was read just before, so there is nothing
+// to stream past the caches.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "autograd/cpu/update.cpp"
 #include <hwy/foreach_target.h>  // once per instruction set
@@ -85,12 +85,28 @@ double squared_norm_typed(const T* x, int64_t n) {
   return std::accumulate(sums.begin(), sums.end(), 0.0);
 }
 
+template <class T>
+void mix_typed(const MixArgs& args) {
+  const T keep = static_cast<T>(args.keep), add = static_cast<T>(args.add);
+  parallel_for(args.out.numel(), kGrain, [&](int64_t from, int64_t to) HWY_ATTR {
+    const hn::ScalableTag<T> tag;
+    const auto step = [&](auto& y, auto x) HWY_ATTR {
+      y = hn::MulAdd(hn::Set(tag, keep), y, hn::Mul(hn::Set(tag, add), x));
+    };
+    update(to - from, step, args.out.data<T>() + from, args.x.data<T>() + from);
+  });
+}
+
 }  // namespace
 
 void squared_norm(const SquaredNormArgs& args) {
   dispatch(args.x.dtype(), [&](auto zero) HWY_ATTR {
     *args.out.data<double>() = squared_norm_typed(args.x.data<decltype(zero)>(), args.x.numel());
   });
+}
+
+void mix(const MixArgs& args) {
+  dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { mix_typed<decltype(zero)>(args); });
 }
 
 void adam(const AdamArgs& args) {
@@ -104,5 +120,6 @@ HWY_AFTER_NAMESPACE();
 namespace restage::cpu {
 RESTAGE_KERNEL(squared_norm, SquaredNormArgs)
 RESTAGE_KERNEL(adam, AdamArgs)
+RESTAGE_KERNEL(mix, MixArgs)
 }  // namespace restage::cpu
 #endif

@@ -16,6 +16,13 @@ struct AdamArgs {
   int64_t step;
 };
 
+/// out = keep * out + add * x, of one shape.
+struct MixArgs {
+  const Tensor& x;
+  Tensor& out;
+  double keep, add;
+};
+
 /// out [1], f64: the sum of the squares of x, in double, in an order that the size alone decides.
 struct SquaredNormArgs {
   const Tensor& x;

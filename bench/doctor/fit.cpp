@@ -7,7 +7,7 @@
 #include "autograd/base/parallel_each.h"
 #include "autograd/base/rng.h"
 #include "autograd/ops/reduce.h"
-#include "train/optim/adam.h"
+#include "train/optim/optimiser.h"
 #include "train/stage.h"
 
 namespace restage::bench {
@@ -102,7 +102,7 @@ void fit_orientation_net(const std::function<FitExample(uint64_t)>& example,
                          OrientationNet& net) {
   const RngKey key = RngKey{options.seed, 0}.fold("fit orientation");
   start(net, key);
-  Adam adam({{"", &net}}, {});
+  Optimiser adam({{"", &net}}, {});
   Batch batch;
   const int64_t a_line = std::max<int64_t>(options.steps / 10, 1);
   double loss = 0;
@@ -114,7 +114,7 @@ void fit_orientation_net(const std::function<FitExample(uint64_t)>& example,
         differentiate(now, [&](Context& ctx) { return cross_entropy(ctx, net, batch); });
     const double done = static_cast<double>(step) / static_cast<double>(options.steps),
                  warm = std::min(1.0, static_cast<double>(step + 1) / kWarmUp);
-    adam.step(d.gradients, options.rate * warm * (0.5 + 0.5 * std::cos(kPi * done)), 0);
+    adam.step(d.gradients, options.rate * warm * (0.5 + 0.5 * std::cos(kPi * done)));
     loss += d.loss;
     if ((step + 1) % a_line == 0) {
       say("step " + std::to_string(step + 1) + " of " + std::to_string(options.steps) +

@@ -47,6 +47,7 @@ inline TrainConfig tiny_training(int64_t steps) {
          {"points=96", "width=32", "layers=1", "centres=24", "neighbours=8", "uncertainty=true",
           "memory=true"});
   s.clouds.remembered = 0.5;
+  s.optimiser.kind = OptimiserConfig::Kind::muon;
   s.vote_weight = 0.5;
   s.segmentation_weight = 0.5;
   s.validation_clouds = 4;

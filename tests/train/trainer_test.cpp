@@ -17,7 +17,7 @@
 #include "nn/layers/linear.h"
 #include "tests/support/files.h"
 #include "tests/train/tiny_training.h"
-#include "train/optim/adam.h"
+#include "train/optim/optimiser.h"
 
 namespace restage {
 namespace {
@@ -327,9 +327,10 @@ Tensor after_step(double own, double foreign, double clip) {
   Gradients g;
   g.set(layer.weight.id, Tensor::full({2, 2}, own, DType::f64));
   if (foreign > 0) g.set(other.id, Tensor::full({2}, foreign, DType::f64));
-  AdamConfig config;
-  config.eps = 1e3;  // so that the size of a step follows that of the gradient
-  Adam({{"", &layer}}, config).step(g, 1, clip);
+  OptimiserConfig config;
+  config.clip = clip;
+  config.adam.eps = 1e3;  // so that the size of a step follows that of the gradient
+  Optimiser({{"", &layer}}, config).step(g, 1);
   return layer.weight.value;
 }
 

@@ -2,8 +2,7 @@
 #pragma once
 
 #include "nn/config/config_reader.h"
-#include "nn/module.h"
-#include "nn/weights/safetensors.h"
+#include "train/optim/parameters.h"
 
 namespace restage {
 
@@ -23,25 +22,20 @@ void visit(V& v, AdamConfig& c) {
 
 class Adam {
  public:
-  /// Optimises the parameters of `modules`, each under its prefix (names of the saved state).
-  Adam(const std::vector<std::pair<std::string, Module*>>& modules, const AdamConfig& config);
-  /// One update; a parameter without gradient stays, as in PyTorch. `clip`: largest norm of the
-  /// gradient of the parameters that this optimises (0: none), whatever else `gradients` holds; the
-  /// gradient is scaled down to it as torch's clip_grad_norm_ does.
-  void step(const Gradients& gradients, double rate, double clip);
+  Adam(const std::vector<NamedParameter>& parameters, const AdamConfig& config);
+  /// One update by the gradients times `scale`; a parameter without gradient stays, as in PyTorch.
+  void step(const Gradients& gradients, double rate, double scale);
   void save(const std::string& prefix, TensorFile& file) const;
   /// InputError if the state does not fit.
   void load(const std::string& prefix, const TensorFile& file, const std::string& where);
 
  private:
   struct Slot {
-    std::string name;
-    Parameter* parameter;
+    NamedParameter of;
     Tensor m, v, v_max;
     int64_t steps = 0;
   };
   std::vector<Slot> slots_;
-  std::vector<uint64_t> ids_;  // of the parameters, ascending
   AdamConfig config_;
 };
 

@@ -47,8 +47,8 @@ DeformationStage::DeformationStage(const Config& config, const StageInput& in)
                          RngKey{in.seed, 0}.fold("deformation/offsets"),
                          {{"keep_root_rotation", config.keep_root_rotation ? "true" : "false"}})
                    : nullptr),
-      adam_(add_optimiser("adam", {"deformation.weights", "deformation.offsets"},
-                          config.optimiser.adam)),
+      optimiser_(
+          add_optimiser("adam", {"deformation.weights", "deformation.offsets"}, config.optimiser)),
       sampler_(in.train, with_weights(config.pairs, config.supervision > 0),
                RngKey{in.seed, 0}.fold("deformation.pairs").stream),
       validation_sampler_(in.validation, held_out(config.pairs), 1),
@@ -91,7 +91,7 @@ NamedValues DeformationStage::step(int64_t step) {
     return loss(ctx, pairs, step, &distance);
   });
   const double rate = learning_rate(o.schedule, step, o.steps);
-  adam_->step(d.gradients, rate, o.clip);
+  optimiser_->step(d.gradients, rate);
   return {{"loss", d.loss}, {"distance_mm", 1e3 * distance}, {"rate", rate}};
 }
 

@@ -62,7 +62,7 @@ class DeformationStage final : public Stage {
   Config config_;
   DeformationModel* weights_;
   OffsetNet* offsets_;  // null: none
-  Adam* adam_;
+  Optimiser* optimiser_;
   PairSampler sampler_, validation_sampler_;
   RngKey key_;
 };

@@ -156,6 +156,15 @@ std::vector<std::string> MotionStage::reads(const Config& config) {
   return {"skeleton"};
 }
 
+namespace {
+OptimiserConfig of_discriminator(const MotionStageConfig& c) {
+  OptimiserConfig out = c.optimiser;
+  out.kind = OptimiserConfig::Kind::adam;
+  out.adam = c.discriminator_adam;
+  return out;
+}
+}  // namespace
+
 MotionStage::MotionStage(const Config& config, const StageInput& in)
     : Stage("motion", config.optimiser),
       config_(config),
@@ -164,9 +173,9 @@ MotionStage::MotionStage(const Config& config, const StageInput& in)
       discriminator_(add_network<Discriminator>(
           "discriminator", "smrm/discriminator", model_type("smrm/discriminator").training,
           RngKey{in.seed, 0}.fold("discriminator.init"), {}, false)),
-      adam_(add_optimiser("adam", {"motion"}, config.optimiser.adam)),
-      discriminator_adam_(
-          add_optimiser("discriminator_adam", {"discriminator"}, config.discriminator_adam)),
+      optimiser_(add_optimiser("adam", {"motion"}, config.optimiser)),
+      discriminator_optimiser_(
+          add_optimiser("discriminator_adam", {"discriminator"}, of_discriminator(config))),
       train_(in.train),
       validation_(in.validation),
       seed_(in.seed),
@@ -222,7 +231,7 @@ void MotionStage::update_discriminator(int64_t step, const WindowBatch& batch, d
         return l.total;
       });
   balance_ = 0.99 * balance_ + 0.01 * score;
-  discriminator_adam_->step(d.gradients, rate, config_.optimiser.clip);
+  discriminator_optimiser_->step(d.gradients, rate);
   values->push_back({"discriminator", d.loss});
 }
 
@@ -261,7 +270,7 @@ NamedValues MotionStage::step(int64_t step) {
     }
     return total;
   });
-  adam_->step(d.gradients, rate, o.clip);
+  optimiser_->step(d.gradients, rate);
   values.insert(values.begin(), {"loss", d.loss});
   if (adversarial) {
     // softplus(-x) = -log sigmoid(x): the batch's mean score, recovered from the loss.

@@ -142,7 +142,7 @@ class MotionStage final : public Stage {
   Config config_;
   MotionModel* model_;
   Discriminator* discriminator_;
-  Adam *adam_, *discriminator_adam_;
+  Optimiser *optimiser_, *discriminator_optimiser_;
   const Corpus &train_, &validation_;
   uint64_t seed_;
   Bundle given_;  ///< the extractor, if it is asked

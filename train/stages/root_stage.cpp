@@ -33,7 +33,7 @@ RootStage::RootStage(const Config& config, const StageInput& in)
     : Stage("root", config.optimiser),
       config_(config),
       net_(add_network<RootNet>(config.model, RngKey{in.seed, 0}.fold("deformation/root"))),
-      adam_(add_optimiser("adam", {"deformation.root"}, config.optimiser.adam)),
+      optimiser_(add_optimiser("adam", {"deformation.root"}, config.optimiser)),
       sampler_(in.train, bodies(config.points, true),
                RngKey{in.seed, 0}.fold("root.bodies").stream),
       validation_sampler_(in.validation, bodies(config.points, false), 1),
@@ -55,7 +55,7 @@ NamedValues RootStage::step(int64_t step) {
   const Differentiated d = differentiate(key_.fold(static_cast<uint64_t>(step)),
                                          [&](Context& ctx) { return loss(ctx, b); });
   const double rate = learning_rate(o.schedule, step, o.steps);
-  adam_->step(d.gradients, rate, o.clip);
+  optimiser_->step(d.gradients, rate);
   return {{"loss", d.loss}, {"rate", rate}};
 }
 

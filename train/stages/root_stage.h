@@ -39,7 +39,7 @@ class RootStage final : public Stage {
 
   Config config_;
   RootNet* net_;
-  Adam* adam_;
+  Optimiser* optimiser_;
   PairSampler sampler_, validation_sampler_;
   RngKey key_;
 };

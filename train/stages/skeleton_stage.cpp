@@ -79,7 +79,7 @@ SkeletonStage::SkeletonStage(const Config& config, const StageInput& in)
     : Stage("skeleton", config.optimiser),
       config_(config),
       model_(add_network<SkeletonModel>(config.model, RngKey{in.seed, 0}.fold("skeleton.init"))),
-      adam_(add_optimiser("adam", {"skeleton"}, config.optimiser.adam)),
+      optimiser_(add_optimiser("adam", {"skeleton"}, config.optimiser)),
       sampler_(in.train, training_clouds(config, *model_),
                RngKey{in.seed, 0}.fold("skeleton.clouds").stream),
       validation_sampler_(in.validation, held_out(config.clouds, *model_), 1),
@@ -165,7 +165,7 @@ NamedValues SkeletonStage::step(int64_t step) {
   const Differentiated d = differentiate(key_.fold(static_cast<uint64_t>(step)),
                                          [&](Context& ctx) { return loss(ctx, clouds); });
   const double rate = learning_rate(o.schedule, step, o.steps);
-  adam_->step(d.gradients, rate, o.clip);
+  optimiser_->step(d.gradients, rate);
   return {{"loss", d.loss}, {"gradient_norm", d.norm}, {"rate", rate}};
 }
 

@@ -73,7 +73,7 @@ class SkeletonStage final : public Stage {
 
   Config config_;
   SkeletonModel* model_;
-  Adam* adam_;
+  Optimiser* optimiser_;
   CloudSampler sampler_, validation_sampler_;
   std::vector<CloudSubject> posed_, tposes_;
   CloudBatch one_camera_, ring_;  ///< held-out scans by ray casting; undefined if not trained for

@@ -1,0 +1,106 @@
+#include "train/optim/muon.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "autograd/kernels/matmul.h"
+#include "autograd/kernels/update.h"
+
+namespace restage {
+namespace {
+
+constexpr int kIterations = 5;
+// s -> a s + b s^3 + c s^5 for every singular value s: Jordan's, which grows small ones fastest and
+// keeps them about one, not at it.
+constexpr double kA = 3.4445, kB = -4.7750, kC = 2.0315;
+
+enum class Transposed { none, first, second };
+
+/// Of each pair of matrices [b, rows, columns].
+Tensor product(const Tensor& a, const Tensor& b, Transposed which = Transposed::none) {
+  const bool first = which == Transposed::first, second = which == Transposed::second;
+  Tensor out = empty_like(a, {a.size(0), a.size(first ? 2 : 1), b.size(second ? 1 : 2)});
+  launch(MatmulArgs{a, b, out, first, second});
+  return out;
+}
+
+double norm_of(const Tensor& x) {
+  Tensor squares = Tensor::zeros({1}, DType::f64);
+  launch(SquaredNormArgs{x, squares});
+  return std::sqrt(squares.item());
+}
+
+}  // namespace
+
+Tensor orthogonalised(const Tensor& x) {
+  Tensor y = Tensor::zeros(x.shape(), x.dtype());
+  for (int64_t i = 0; i < x.size(0); ++i) {
+    const Tensor one = x.rows(i, i + 1);
+    Tensor scaled = y.rows(i, i + 1);
+    if (const double norm = norm_of(one); norm > 0) launch(MixArgs{one, scaled, 0, 1 / norm});
+  }
+  const bool wide = x.size(1) <= x.size(2);
+  for (int i = 0; i < kIterations; ++i) {
+    const Tensor gram = product(y, y, wide ? Transposed::second : Transposed::first);
+    Tensor polynomial = product(gram, gram);
+    launch(MixArgs{gram, polynomial, kC, kB});
+    launch(MixArgs{wide ? product(polynomial, y) : product(y, polynomial), y, kA, 1});
+  }
+  return y;
+}
+
+bool Muon::takes(const Parameter& p) {
+  const Tensor& w = p.value;
+  return w.rank() == 2 && std::min(w.size(0), w.size(1)) >= kLeastSide;
+}
+
+Muon::Muon(const std::vector<NamedParameter>& matrices, const MuonConfig& config)
+    : config_(config) {
+  for (const NamedParameter& p : matrices) {
+    const Shape& shape = p.parameter->value.shape();
+    const auto like = std::find_if(groups_.begin(), groups_.end(),
+                                   [&](const auto& group) { return group[0].m.shape() == shape; });
+    auto& group = like != groups_.end() ? *like : groups_.emplace_back();
+    group.push_back({p, Tensor::zeros(shape, p.parameter->value.dtype())});
+  }
+}
+
+void Muon::step(const Gradients& gradients, double rate, double scale) {
+  for (std::vector<Slot>& group : groups_) {
+    std::vector<Slot*> moving;
+    for (Slot& s : group)
+      if (gradients.find(s.of.parameter->id) != nullptr) moving.push_back(&s);
+    if (moving.empty()) continue;
+    const int64_t rows = group[0].m.size(0), columns = group[0].m.size(1);
+    const auto row = [&](const Tensor& stack, size_t i) {
+      const auto at = static_cast<int64_t>(i);
+      return stack.rows(at, at + 1).reshape({rows, columns});
+    };
+    const Tensor ahead = Tensor::zeros({std::ssize(moving), rows, columns}, group[0].m.dtype());
+    for (size_t i = 0; i < moving.size(); ++i) {
+      const Tensor& g = *gradients.find(moving[i]->of.parameter->id);
+      Tensor here = row(ahead, i);
+      launch(MixArgs{g, moving[i]->m, config_.momentum, scale});
+      launch(MixArgs{moving[i]->m, here, 0, 1});
+      launch(MixArgs{g, here, config_.momentum, scale});
+    }
+    const Tensor steps = orthogonalised(ahead);
+    // An orthogonal matrix has entries of 1 / sqrt(its longer side), on average.
+    const double side = std::sqrt(static_cast<double>(std::max(rows, columns)));
+    for (size_t i = 0; i < moving.size(); ++i)
+      launch(
+          MixArgs{row(steps, i), moving[i]->of.parameter->value, 1, -rate * config_.step * side});
+  }
+}
+
+void Muon::save(const std::string& prefix, TensorFile& file) const {
+  for (const std::vector<Slot>& group : groups_)
+    for (const Slot& s : group) file.tensors[prefix + s.of.name + ".m"] = s.m;
+}
+
+void Muon::load(const std::string& prefix, const TensorFile& file, const std::string& where) {
+  for (std::vector<Slot>& group : groups_)
+    for (Slot& s : group) s.m = saved_state(file, prefix + s.of.name + ".m", s.m.shape(), where);
+}
+
+}  // namespace restage

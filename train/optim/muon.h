@@ -1,0 +1,51 @@
+// Muon (Jordan 2024): a matrix moves along its orthogonalised momentum, so that it learns in all
+// directions alike and not only in the few that its gradient is large in. Steps have the size that
+// Adam's have (Liu et al. 2025, "Muon is scalable for LLM training", eq. 4), so one rate serves
+// both.
+#pragma once
+
+#include "nn/config/config_reader.h"
+#include "train/optim/parameters.h"
+
+namespace restage {
+
+struct MuonConfig {
+  double momentum = 0.95, step = 0.2;
+};
+
+template <class V>
+void visit(V& v, MuonConfig& c) {
+  v("momentum", c.momentum, "decay of the average gradient (Nesterov's)", below(0, 1));
+  v("step", c.step, "root mean square of a matrix's step, in rates", positive());
+}
+
+class Muon {
+ public:
+  /// Matrices of fewer rows or columns than this are bound by their shape, not by the optimiser.
+  static constexpr int64_t kLeastSide = 32;
+  /// Whether a parameter is a matrix that Muon is for.
+  static bool takes(const Parameter& p);
+
+  Muon(const std::vector<NamedParameter>& matrices, const MuonConfig& config);
+  /// One update by the gradients times `scale`; a matrix without gradient stays.
+  void step(const Gradients& gradients, double rate, double scale);
+  void save(const std::string& prefix, TensorFile& file) const;
+  /// InputError if the state does not fit.
+  void load(const std::string& prefix, const TensorFile& file, const std::string& where);
+
+ private:
+  struct Slot {
+    NamedParameter of;
+    Tensor m;
+  };
+  /// Of equal shape each, so that threads share them and not the rows of one.
+  std::vector<std::vector<Slot>> groups_;
+  MuonConfig config_;
+};
+
+/// Matrices x [n, rows, columns] with their singular values brought to between 0.7 and 1.2 (those
+/// over 1e-3 of the norm), singular vectors kept: five steps of a Newton-Schulz iteration. Zero
+/// stays zero.
+Tensor orthogonalised(const Tensor& x);
+
+}  // namespace restage
