@@ -141,6 +141,8 @@ void Retargeter::prepare(const std::string& weights_name) {
   if (surface_) rig_.emplace(SystemRig{rest_, surface_->weights()});
 }
 
+bool Retargeter::frame_by_frame() const { return options_.fps == kFps && motion_->latency() == 0; }
+
 void Retargeter::restart() {
   state_ = {};
   feet_ = {};

@@ -59,6 +59,8 @@ class Retargeter final : public System {
   Points posed(const Pose& pose) const override { return surface_ ? (*surface_)(pose) : Points(); }
   const Joints* target_joints() const override { return &rest_; }
   const Joints& rest() const { return rest_; }
+  /// Whether every cloud is answered at once, by one frame of its own moment.
+  bool frame_by_frame() const;
   /// Null without a model for `deformation.weights`.
   const Surface* surface() const { return surface_ ? &*surface_ : nullptr; }
   const Joints* source_joints() const override { return &last_source_; }

@@ -1,17 +1,25 @@
 #include "infer/systems.h"
 
 #include "autograd/base/nearest.h"
+#include "infer/registration/refinement.h"
 #include "infer/registration/registration.h"
 
 namespace restage {
 namespace {
 
-std::unique_ptr<System> make_chain(SystemInput in) {
+std::unique_ptr<Retargeter> make_retargeter(SystemInput in) {
   if (in.rest)
     return std::make_unique<Retargeter>(in.weights, in.weights_name, std::move(in.target), *in.rest,
                                         in.options);
   return std::make_unique<Retargeter>(in.weights, in.weights_name, std::move(in.target),
                                       in.target_name, in.options);
+}
+
+std::unique_ptr<System> make_chain(SystemInput in) { return make_retargeter(std::move(in)); }
+
+std::unique_ptr<System> make_refinement(SystemInput in) {
+  const std::string where = in.target_name;
+  return std::make_unique<Refinement>(make_retargeter(std::move(in)), where);
 }
 
 std::unique_ptr<System> make_registration(SystemInput in) {
@@ -26,6 +34,7 @@ std::unique_ptr<System> make_registration(SystemInput in) {
 const std::vector<SystemType>& systems() {
   static const std::vector<SystemType> table = {
       {"chain", "extractor, motion network and deformation of the weights", true, make_chain},
+      {"refine", "the chain's answer, then fitted to each cloud", true, make_refinement},
       {"register", "no learning: the target is registered to each cloud, then reposed", false,
        make_registration},
   };
@@ -40,7 +49,7 @@ const SystemType& system_type(const std::string& name, const std::string& where)
   }
   const std::string near = nearest(name, names);
   throw InputError(where, "there is no system '" + name + "'",
-                   near.empty() ? "use chain or register" : "did you mean '" + near + "'?");
+                   near.empty() ? "use chain, refine or register" : "did you mean '" + near + "'?");
 }
 
 }  // namespace restage

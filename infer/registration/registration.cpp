@@ -17,7 +17,28 @@ constexpr int kHeadings = 8;
 constexpr std::array<double, 3> kArms = {0.0, 0.8, 1.3};  // lowered from the T-pose, radians
 constexpr double kStartWidth = 0.2, kLastWidth = 0.06;    // of the kernel that compares, metres
 
-/// One point, the mean, for each occupied cube of a grid, in the order of the cubes.
+/// The median by coordinate: stray points do not move it.
+Vec3 middle(const std::vector<Vec3>& points) {
+  Vec3 out;
+  for (int c = 0; c < 3; ++c) {
+    std::vector<double> values;
+    values.reserve(points.size());
+    for (const Vec3& p : points) values.push_back(p[c]);
+    const auto half = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), half, values.end());
+    out[c] = *half;
+  }
+  return out;
+}
+
+/// A pose of the rig whose middle is that of the cloud.
+RigState placed(const Rig& rig, RigState state, const std::vector<Vec3>& cloud) {
+  state.pose.root += middle(cloud) - middle(pose_rig(rig, state).nodes);
+  return state;
+}
+
+}  // namespace
+
 std::vector<Vec3> thinned(const Points& cloud, double width, const std::string& source) {
   struct Sum {
     Vec3 sum = Vec3::Zero();
@@ -44,28 +65,6 @@ std::vector<Vec3> thinned(const Points& cloud, double width, const std::string& 
   for (const auto& [at, cube] : cubes) out.push_back(cube.sum / cube.count);
   return out;
 }
-
-/// The median by coordinate: stray points do not move it.
-Vec3 middle(const std::vector<Vec3>& points) {
-  Vec3 out;
-  for (int c = 0; c < 3; ++c) {
-    std::vector<double> values;
-    values.reserve(points.size());
-    for (const Vec3& p : points) values.push_back(p[c]);
-    const auto half = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), half, values.end());
-    out[c] = *half;
-  }
-  return out;
-}
-
-/// A pose of the rig whose middle is that of the cloud.
-RigState placed(const Rig& rig, RigState state, const std::vector<Vec3>& cloud) {
-  state.pose.root += middle(cloud) - middle(pose_rig(rig, state).nodes);
-  return state;
-}
-
-}  // namespace
 
 Registration::Registration(Mesh target, const Joints& rest, const std::string& where,
                            const RegistrationOptions& options)

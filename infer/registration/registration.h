@@ -22,10 +22,16 @@
 
 namespace restage {
 
+/// One point, the mean, for each occupied cube of a grid of that width (metres), in the order of
+/// the cubes. InputError naming `source`: fewer than 64 of them, values that are not finite.
+std::vector<Vec3> thinned(const Points& cloud, double width, const std::string& source);
+
+inline constexpr double kCloudGrid = 0.03;
+
 struct RegistrationOptions {
   size_t nodes = kRigNodes;
-  int searched = 12;   ///< starts that are fitted, besides the frame before
-  double grid = 0.03;  ///< the cloud is thinned to one point a cube of this width, metres
+  int searched = 12;  ///< starts that are fitted, besides the frame before
+  double grid = kCloudGrid;
   bool free_form = true;
   ArticulatedOptions articulated;
   FreeFormOptions free_form_options;

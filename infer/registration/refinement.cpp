@@ -1,0 +1,47 @@
+#include "infer/registration/refinement.h"
+
+#include "infer/registration/registration.h"
+#include "nn/geometry/closed_form.h"
+
+namespace restage {
+namespace {
+
+/// The answer is near: the kernel begins at a hand's length.
+ArticulatedOptions near() {
+  ArticulatedOptions out;
+  out.iterations = 15;
+  out.widest = 0.12;
+  return out;
+}
+
+}  // namespace
+
+Refinement::Refinement(std::unique_ptr<Retargeter> chain, const std::string& where)
+    : chain_(std::move(chain)), rig_(make_rig(chain_->target(), chain_->rest(), where)) {
+  if (!chain_->frame_by_frame())
+    throw InputError(
+        where, "is to be refined from a source that is resampled, or by weights that look ahead",
+        "use the system 'chain', or a source of 30 frames per second");
+}
+
+std::span<const RetargetedFrame> Refinement::push(const Points& cloud, const std::string& source) {
+  const std::span<const RetargetedFrame> answers = chain_->push(cloud, source);
+  if (answers.empty()) return answers;
+  frame_ = answers.front();
+  const Joints& seen = *chain_->source_joints();
+  RigState start;
+  start.pose = frame_.pose;
+  start.pose.root = seen[0];
+  start.scale = 1 / trajectory_scale(seen, chain_->rest());
+  const RigState fitted = fit_articulated(rig_, thinned(cloud, kCloudGrid, source), start, near());
+  source_joints_ = forward_kinematics(built(chain_->rest(), fitted), fitted.pose).joints;
+  // The path stays the chain's, which is held to the source's over time; turns are the fit's.
+  const Vec3 root = frame_.pose.root;
+  frame_.pose = fitted.pose;
+  frame_.pose.root = root;
+  frame_.joints = forward_kinematics(chain_->rest(), frame_.pose).joints;
+  frame_.vertices = chain_->posed(frame_.pose);
+  return {&frame_, 1};
+}
+
+}  // namespace restage

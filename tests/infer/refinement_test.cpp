@@ -1,0 +1,109 @@
+// The chain's answer fitted to the cloud: nearer to what the cloud shows than the answer was.
+#include "infer/registration/refinement.h"
+
+#include <gtest/gtest.h>
+
+#include "datasets/builtin/bodies.h"
+#include "datasets/sampling/surface.h"
+#include "tests/support/errors.h"
+#include "tests/support/small_models.h"
+
+namespace restage {
+namespace {
+
+const Body& body() {
+  static const Body made = builtin_body(1, "test", 0);
+  return made;
+}
+
+Mat3 turn(double angle, const Vec3& axis) {
+  return Eigen::AngleAxisd(angle, axis).toRotationMatrix();
+}
+
+/// Arms lowered, a knee bent; `more`: limbs further by that, radians.
+Pose standing(double more) {
+  Pose pose;
+  pose.local.fill(Mat3::Identity());
+  pose.local[16] = turn(-0.9 - more, Vec3::UnitZ());
+  pose.local[17] = turn(0.9 - more, Vec3::UnitZ());
+  pose.local[1] = turn(-0.4 + more, Vec3::UnitX());
+  pose.local[4] = turn(0.5, Vec3::UnitX());
+  pose.root = body().joints[0];
+  return pose;
+}
+
+/// Answers every cloud with the same joints, about its centroid.
+struct WrongBy final : SkeletonModel {
+  Joints joints;
+  SkeletonOutput forward(Context&, const SkeletonInput& in) override {
+    const int64_t n = in.cloud.size(0);
+    SkeletonOutput out;
+    Tensor all = Tensor::empty({n, kJoints, 3});
+    for (int64_t i = 0; i < n * kJoints; ++i)
+      Eigen::Map<Point>(all.data<float>() + 3 * i) =
+          joints[static_cast<size_t>(i % kJoints)].cast<float>();
+    out.joints = Var(all);
+    return out;
+  }
+  int64_t points() const override { return 256; }
+  void visit(Fields&) override {}
+  const char* kind() const override { return "WrongBy"; }
+};
+
+struct Scene {
+  Points cloud;
+  Joints truth;
+  Bundle models;
+};
+
+/// A person and an extractor whose limbs are off by 0.3 radians.
+Scene scene() {
+  Scene out;
+  const Pose pose = standing(0);
+  out.cloud = SurfaceSampler(body()).draw(RngKey{5, 0}, 1500).on_pose(body(), pose);
+  out.truth = forward_kinematics(body().joints, pose).joints;
+  Point middle = Point::Zero();
+  for (const Point& p : out.cloud) middle += p / static_cast<float>(out.cloud.size());
+  auto extractor = std::make_shared<WrongBy>();
+  extractor->joints = forward_kinematics(body().joints, standing(0.3)).joints;
+  for (Vec3& j : extractor->joints) j -= middle.cast<double>();
+  out.models = testing::untrained_bundle("motion/closed_form", {});
+  TrainedModel model = out.models.need("skeleton", "test");
+  model.net = extractor;
+  out.models.put("skeleton", model);
+  return out;
+}
+
+double apart(const Joints& a, const Joints& b) {
+  double sum = 0;
+  for (size_t j = 0; j < kJoints; ++j) sum += (a[j] - b[j]).norm() / kJoints;
+  return sum;
+}
+
+std::unique_ptr<Retargeter> chain(const Scene& s, double fps = kFps) {
+  RetargetOptions options;
+  options.fps = fps;
+  options.samples = 1;
+  return std::make_unique<Retargeter>(s.models, "w", body().rest, body().joints, options);
+}
+
+TEST(Refinement, BringsLimbsToWhereTheCloudIs) {
+  const Scene s = scene();
+  const Joints answer = chain(s)->push(s.cloud, "cloud")[0].joints;
+  Refinement refined(chain(s), "target");
+  const RetargetedFrame frame = refined.push(s.cloud, "cloud")[0];
+  EXPECT_GT(apart(answer, s.truth), 0.03);
+  EXPECT_LT(apart(frame.joints, s.truth), 0.5 * apart(answer, s.truth));
+  EXPECT_LT(apart(*refined.source_joints(), s.truth), 0.5 * apart(answer, s.truth));
+  EXPECT_EQ(frame.vertices.size(), body().rest.vertices.size());
+  EXPECT_NEAR((frame.pose.root - answer[0]).norm(), 0, 1e-9) << "the path is the chain's";
+}
+
+TEST(Refinement, IsForCloudsThatAreAnsweredAtOnce) {
+  const Scene s = scene();
+  test::expect_error<InputError>([&] { Refinement(chain(s, 60), "target"); },
+                                 {"target", "30 frames per second"});
+}
+
+}  // namespace
+}  // namespace restage
