@@ -201,17 +201,25 @@ std::vector<T> Tensor::to_vector() const {
 
 Tensor Tensor::cast(DType type) const {
   if (type == dtype_) return *this;
+  Tensor out = empty(shape_, type);
+  const auto fill = [&]<class T>(T* to) {
+    for (int64_t i = 0; i < numel_; ++i) to[i] = static_cast<T>(item(i));
+  };
   switch (type) {
     case DType::f32:
-      return from(shape_, to_vector<float>());
+      fill(out.data<float>());
+      break;
     case DType::f64:
-      return from(shape_, to_vector<double>());
+      fill(out.data<double>());
+      break;
     case DType::i32:
-      return from(shape_, to_vector<int32_t>());
+      fill(out.data<int32_t>());
+      break;
     case DType::i64:
-      return from(shape_, to_vector<int64_t>());
+      fill(out.data<int64_t>());
+      break;
   }
-  return {};
+  return out;
 }
 
 #define RESTAGE_INSTANTIATE(T)                                          \
