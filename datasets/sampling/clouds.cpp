@@ -9,10 +9,13 @@
 #include "autograd/base/parallel.h"
 #include "datasets/readers/errors.h"
 #include "datasets/sampling/dress.h"
+#include "datasets/sampling/intruder.h"
 #include "datasets/sampling/memory.h"
 
 namespace restage {
 namespace {
+
+constexpr size_t kNobody = static_cast<size_t>(-1);
 
 CloudConfig checked(const CloudConfig& c) {
   check_setting("cloud", c.points >= 1 && c.points <= 1 << 20, "points", "1 to 1048576");
@@ -26,6 +29,7 @@ CloudConfig checked(const CloudConfig& c) {
   for (const double share : {c.dressed, c.one_camera, c.camera_ring, c.one_camera + c.camera_ring})
     check_setting("cloud", share >= 0 && share <= 1, "dressed, one_camera, camera_ring",
                   "0 to 1, and one_camera + camera_ring at most 1");
+  check_setting("cloud", c.intruder >= 0 && c.intruder <= 1, "intruder", "0 to 1");
   check_setting("cloud", c.remembered >= 0 && c.remembered <= 1, "remembered", "0 to 1");
   check_setting("cloud", c.min_fraction > 0 && c.min_fraction <= 1, "min_fraction", "above 0 to 1");
   return c;
@@ -82,6 +86,7 @@ CloudSubject CloudSampler::subject(int64_t index) const {
     out.memory = rng.uniform() < 0.5 ? CloudSubject::Memory::drawn : CloudSubject::Memory::asked;
     out.step_back = 1 + rng.below(3);
   }
+  out.intruder = out.sensor != Sensor::none && rng.uniform() < config_.intruder;
   return out;
 }
 
@@ -152,8 +157,38 @@ CloudSampler::Seen CloudSampler::see(const CloudSubject& subject, size_t n, cons
   if (subject.sensor != Sensor::none)
     out.points = sensed(subject.sensor, out.points, drawn.normals, n, scene.fold("cameras"),
                         key.fold("sensor"), &out.which);
+  if (subject.intruder) intrude(scene.fold("intruder"), key.fold("intruder"), &out);
   add_noise(key.fold("noise"), config_.noise, out.points);
   return out;
+}
+
+/// A few points of the person make way for those of a limb: as many as a camera near it would see
+/// of it, on the side that it sees.
+void CloudSampler::intrude(const RngKey& scene, const RngKey& key, Seen* seen) const {
+  Rng scene_rng(scene), rng(key);
+  const Intruder intruder = draw_intruder(scene_rng, corpus_.bodies.size());
+  const double share = scene_rng.uniform(0.03, 0.12), side = scene_rng.uniform(-M_PI, M_PI);
+  const Body& body = corpus_.bodies[intruder.body];
+  const SurfaceSamples samples = surfaces_[intruder.body].draw(key.fold("limb"), 1500);
+  const Points rest = samples.on_rest(body);
+  Points limb;
+  std::array<float, kJoints> weights;
+  for (size_t i = 0; i < rest.size(); ++i) {
+    samples.skin_weights(body, i, false, weights.data());
+    if (hangs_on(intruder.joint, weights) >= 0.5f) limb.push_back(rest[i]);
+  }
+  put_intruder(intruder, centroid(seen->points).cast<double>(), limb);
+  const Point middle = centroid(limb);
+  const Point towards(static_cast<float>(std::cos(side)), 0, static_cast<float>(std::sin(side)));
+  std::erase_if(limb, [&](const Point& p) { return (p - middle).dot(towards) < 0; });
+  const size_t n =
+      std::min(limb.size(), static_cast<size_t>(share * static_cast<double>(seen->points.size())));
+  for (size_t k = 0; k < n; ++k) {
+    std::swap(limb[k], limb[k + rng.below(limb.size() - k)]);
+    const size_t i = rng.below(seen->points.size());
+    seen->points[i] = limb[k];
+    seen->which[i] = kNobody;
+  }
 }
 
 Points CloudSampler::cloud(const CloudSubject& subject, size_t n, const RngKey& scene,
@@ -199,9 +234,15 @@ void CloudSampler::fill(const Row& row, int64_t i, CloudBatch& to) const {
   for (size_t k = 0; k < n; ++k) Eigen::Map<Point>(points + 3 * k) = chosen[k] - centre;
   for (int j = 0; j < kJoints; ++j)
     Eigen::Map<Point>(joints + 3 * j) = (seen.joints[j] - centre.cast<double>()).cast<float>();
-  for (size_t k = 0; to.weights.defined() && k < n; ++k)
+  for (size_t k = 0; to.weights.defined() && k < n; ++k) {
+    float* weights = at(to.weights) + k * kJoints;
+    if (seen.which[order[k]] == kNobody) {
+      std::fill_n(weights, kJoints, 0.0f);
+      continue;
+    }
     seen.samples.skin_weights(corpus_.bodies[row.subject.body], seen.which[order[k]],
-                              row.subject.augmentation.mirror, at(to.weights) + k * kJoints);
+                              row.subject.augmentation.mirror, weights);
+  }
   for (int j = 0; to.turns.defined() && j < kJoints; ++j)
     Eigen::Map<Eigen::Matrix<float, 3, 2>>(at(to.turns) + 6 * j) =
         seen.turns[j].leftCols<2>().cast<float>();

@@ -25,6 +25,7 @@ struct CloudConfig {
   double dressed = 0;         ///< part of the clouds whose person wears clothes and hair (dress.h)
   double one_camera = 0;      ///< part that one depth camera sees (sensors.h)
   double camera_ring = 0;     ///< part that three to seven cameras around see
+  double intruder = 0;        ///< part of what cameras see with somebody else's limb beside it
   double remembered = 0;      ///< part with a memory of the frame before (CloudBatch::past)
   bool skin_weights = false;  ///< also fill CloudBatch::weights
   bool rotations = false;     ///< also fill CloudBatch::turns
@@ -53,6 +54,7 @@ struct CloudSubject {
   double scale = 1;
   Sensor sensor = Sensor::none;
   bool dressed = false;
+  bool intruder = false;
   enum class Memory { none, drawn, asked } memory = Memory::none;
   size_t step_back = 1;  ///< how many frames ago the remembered one is
 };
@@ -85,7 +87,7 @@ class CloudSampler {
     Rotations turns;
   };
   Drawn draw(const CloudSubject& subject, const SurfaceSamples& samples, const RngKey& key) const;
-  /// What a sensor sees of it; which of the samples each point is.
+  /// What a sensor sees of it; which of the samples each point is, kNobody of somebody else.
   struct Seen {
     SurfaceSamples samples;
     std::vector<size_t> which;
@@ -94,6 +96,7 @@ class CloudSampler {
     Rotations turns;
   };
   Seen see(const CloudSubject& subject, size_t n, const RngKey& scene, const RngKey& key) const;
+  void intrude(const RngKey& scene, const RngKey& key, Seen* seen) const;
   /// One row of a batch.
   struct Row {
     CloudSubject subject;

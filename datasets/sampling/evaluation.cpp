@@ -8,6 +8,7 @@
 #include "autograd/base/parallel.h"
 #include "datasets/readers/errors.h"
 #include "datasets/sampling/dress.h"
+#include "datasets/sampling/intruder.h"
 #include "datasets/sampling/scanner.h"
 
 namespace restage {
@@ -60,6 +61,26 @@ std::vector<CloudSubject> evaluation_tposes(const Corpus& corpus, size_t per_bod
   return out;
 }
 
+namespace {
+
+/// A limb of one of the bodies beside somebody whose middle is `middle`.
+Mesh intruding_limb(const Corpus& corpus, const RngKey& scene, const Vec3& middle) {
+  Rng rng(scene.fold("intruder"));
+  const Intruder intruder = draw_intruder(rng, corpus.bodies.size());
+  Mesh out = limb_of(corpus.bodies[intruder.body], intruder.joint);
+  put_intruder(intruder, middle, out.vertices);
+  return out;
+}
+
+void append(const Mesh& part, Mesh* whole) {
+  const auto first = static_cast<int32_t>(whole->vertices.size());
+  whole->vertices.insert(whole->vertices.end(), part.vertices.begin(), part.vertices.end());
+  for (const Triangle& t : part.faces)
+    whole->faces.push_back({t[0] + first, t[1] + first, t[2] + first});
+}
+
+}  // namespace
+
 std::vector<CloudSubject> following(const Corpus& corpus, const std::vector<CloudSubject>& subjects,
                                     size_t count, size_t frames) {
   std::vector<CloudSubject> out;
@@ -76,8 +97,9 @@ std::vector<CloudSubject> following(const Corpus& corpus, const std::vector<Clou
 }
 
 CloudBatch evaluation_scans(const Corpus& corpus, const std::vector<CloudSubject>& subjects,
-                            int cameras, int points, uint64_t seed, size_t frames) {
+                            const EvaluationScans& how, uint64_t seed) {
   const auto n = std::ssize(subjects);
+  const int points = how.points;
   CloudBatch out;
   out.points = Tensor::empty({n, points, 3});
   out.joints = Tensor::empty({n, kJoints, 3});
@@ -85,8 +107,9 @@ CloudBatch evaluation_scans(const Corpus& corpus, const std::vector<CloudSubject
   const auto at = [](Tensor& t, int64_t i) { return t.data<float>() + i * t.numel() / t.size(0); };
   parallel_for(n, 1, [&](int64_t from, int64_t to) {
     for (int64_t i = from; i < to; ++i) {
-      const auto frame = static_cast<size_t>(i) % frames, first = static_cast<size_t>(i) - frame;
-      const RngKey scene = RngKey{seed, 0}.fold("evaluation scans").fold(first / frames);
+      const auto frame = static_cast<size_t>(i) % how.frames,
+                 first = static_cast<size_t>(i) - frame;
+      const RngKey scene = RngKey{seed, 0}.fold("evaluation scans").fold(first / how.frames);
       const CloudSubject& s = subjects[static_cast<size_t>(i)];
       const Body body = dressed(corpus.bodies.at(s.body), scene.fold("outfit"));
       const auto pose_of = [&](const CloudSubject& subject) {
@@ -94,11 +117,13 @@ CloudBatch evaluation_scans(const Corpus& corpus, const std::vector<CloudSubject
       };
       Rng rng(scene);
       const Vec3 centre = pose_of(subjects[first]).root + Vec3(0, 0.1, 0);
-      const auto ring = camera_ring(cameras, rng.uniform(2.2, 3.2), rng.uniform(0, 2 * M_PI),
+      const auto ring = camera_ring(how.cameras, rng.uniform(2.2, 3.2), rng.uniform(0, 2 * M_PI),
                                     centre, {0.2, 1.2, 2.0});
       const Pose pose = pose_of(s);
-      Points cloud = scan_surface({pose_surface(body, pose), body.rest.faces}, ring, {},
-                                  (frame == 0 ? scene : scene.fold(frame)).fold("scan"));
+      Mesh surface{pose_surface(body, pose), body.rest.faces};
+      if (how.intruder) append(intruding_limb(corpus, scene, pose.root), &surface);
+      Points cloud =
+          scan_surface(surface, ring, {}, (frame == 0 ? scene : scene.fold(frame)).fold("scan"));
       for (size_t k = 0; k < cloud.size(); ++k)
         std::swap(cloud[k], cloud[k + rng.below(cloud.size() - k)]);
       const size_t distinct = std::min<size_t>(cloud.size(), static_cast<size_t>(points));

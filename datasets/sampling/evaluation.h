@@ -21,11 +21,16 @@ std::vector<CloudSubject> evaluation_tposes(const Corpus& corpus, size_t per_bod
 std::vector<CloudSubject> following(const Corpus& corpus, const std::vector<CloudSubject>& subjects,
                                     size_t count, size_t frames);
 
-/// What depth cameras measure of the subjects, dressed, by ray casting (scanner.h): one camera
-/// before, beside or behind them, or a ring of `cameras`; `points` of each cloud, relative to their
-/// centroid. `frames` subjects after each other wear the same clothes before the same cameras.
+struct EvaluationScans {
+  int cameras = 1;        ///< before, beside or behind somebody; more than one: a ring
+  int points = 512;       ///< of each cloud
+  bool intruder = false;  ///< with a limb of somebody else beside them
+  size_t frames = 1;      ///< subjects after each other that are of one scene
+};
+/// What depth cameras measure of the subjects, dressed, by ray casting (scanner.h), relative to the
+/// centroid of each cloud. A scene's subjects wear the same clothes before the same cameras.
 CloudBatch evaluation_scans(const Corpus& corpus, const std::vector<CloudSubject>& subjects,
-                            int cameras, int points, uint64_t seed, size_t frames = 1);
+                            const EvaluationScans& how, uint64_t seed);
 
 /// Body A's performance of part of a motion, to be retargeted to body B. Indices into a corpus.
 struct EvalSequence {

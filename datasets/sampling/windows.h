@@ -54,7 +54,8 @@ struct WindowBatch {
   Tensor real_b;         ///< [N, T, 22, 3] B's body performing some clip (discriminator)
   Tensor real_trans_b;   ///< [N, T, 3]
 
-  // Never for training: what B performing A's clip would be. Undefined unless `truth`.
+  // What B performing A's clip would be, for validation and for training on pairs
+  // (motion.paired_share). Undefined unless `truth`.
   Tensor truth_b;        ///< [N, T, 22, 3]
   Tensor truth_trans_b;  ///< [N, T, 3]
   Tensor truth_sixd_b;   ///< [N, T, 132]

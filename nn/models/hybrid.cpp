@@ -20,7 +20,8 @@ constexpr double kBlind = 2;     // times as far for rotations where none are re
 constexpr double kTrusting = 4;  // log odds of an untrained gate: what is seen counts for 98 %
 constexpr int64_t kEnds = std::ssize(kLeaves), kGates = 2 * kJoints + kEnds + 1;
 constexpr int64_t kPathAt = 4 * kJoints + 6 * kEnds;  // in what is filtered
-constexpr double kTrend = -2;                         // log odds of an untrained trend's gain: 12 %
+constexpr int64_t kFooting = 16, kFootingHidden = 32;
+constexpr double kTrend = -2;  // log odds of an untrained trend's gain: 12 %
 
 /// Holt's filter with gains that change, over x, g, h [n, t, m]:
 ///   v_t = h_t (x_t - x_(t-1)) + (1 - h_t) v_(t-1),  y_t = g_t x_t + (1 - g_t) (y_(t-1) + v_t);
@@ -83,6 +84,35 @@ Var of_leaves(const Var& x) {
   return reshape(expand(reshape(five, {n, t, kEnds, 1}), {n, t, kEnds, 6}), {n, t, 6 * kEnds});
 }
 
+/// How ankles and feet move in the world (m/s, small ones told apart) and lie below the pelvis, per
+/// frame: [n, t, 16], constant. `before`: the joints of the frame before [n, 1, 22, 3], replaced.
+/// Whether a foot rests is the difference of two large numbers, its velocity about the pelvis and
+/// the pelvis' own, which recurrent layers do not find.
+Tensor footing_of(const MotionInput& in, Var* before) {
+  const int64_t n = in.joints.size(0), t = in.joints.size(1);
+  const Tensor joints = in.joints.value.cast(DType::f64), trans = in.trans.value.cast(DType::f64),
+               last = before->value.defined() ? before->value.cast(DType::f64) : Tensor();
+  Tensor out = Tensor::zeros({n, t, kFooting}, DType::f64);
+  const auto at = [&](const Tensor& x, int64_t row, int joint) {
+    return Eigen::Map<const Vec3>(x.data<double>() + 3 * (row * kJoints + joint));
+  };
+  for (int64_t i = 0; i < n * t; ++i) {
+    double* to = out.data<double>() + i * kFooting;
+    for (const int joint : {7, 8, 10, 11}) {
+      const Vec3 now = at(joints, i, joint);
+      const bool first = i % t == 0;
+      const Vec3 then = !first           ? Vec3(at(joints, i - 1, joint))
+                        : last.defined() ? Vec3(at(last, i / t, joint))
+                                         : now;
+      const Vec3 v = kFps * (now - then) + Eigen::Map<const Vec3>(trans.data<double>() + 3 * i);
+      for (int c = 0; c < 3; ++c) *to++ = std::tanh(2 * v[c]);
+      *to++ = now.y() + 0.8;
+    }
+  }
+  *before = Var(slice(in.joints, 1, t - 1, t).value);
+  return out.cast(in.joints.dtype());
+}
+
 }  // namespace
 
 Hybrid::Hybrid(const HybridConfig& c, const Init& init)
@@ -96,7 +126,10 @@ Hybrid::Hybrid(const HybridConfig& c, const Init& init)
       twist(c.hidden, kJoints, init.sub("twist")),
       leaves(c.hidden, 6 * kEnds, init.sub("leaves")),
       path(c.hidden, 3, init.sub("path")) {
-  if (c.contact) contact.emplace(c.hidden, std::ssize(kFeet), init.sub("contact"));
+  if (c.contact) {
+    footing.emplace(kFooting, kFootingHidden, 1, 0.0, init.sub("footing"));
+    contact.emplace(kFootingHidden, std::ssize(kFeet), init.sub("contact"));
+  }
   for (Linear* head : {&gate, &trend, &correction, &twist, &leaves, &path}) head->start_small();
   const auto constant = [&](int64_t n, double v) { return Tensor::full({n}, v, init.type); };
   units.joints = {constant(3 * kJoints, 0), constant(3 * kJoints, 1)};
@@ -127,7 +160,7 @@ MotionOutput Hybrid::forward(Context& ctx, const MotionInput& in, MotionState* s
   const int64_t n = in.joints.size(0), t = in.joints.size(1), w = 3 * kJoints;
   const SurfaceTurns surface = surface_turns(in);
   const Var b = in_units(reshape(in.rest, {n, 1, w}), units.rest);
-  state->resize(6);
+  state->resize(8);
   const Var uncertainty =
       config.uncertainty && in.uncertainty.defined()
           ? Var(in.uncertainty)
@@ -168,7 +201,9 @@ MotionOutput Hybrid::forward(Context& ctx, const MotionInput& in, MotionState* s
   const Var longer = reshape(leg_lengths(rest_rows) / leg_lengths(posed), {n, t, 1});
   out.trans = slice(calm, 2, kPathAt, kPathAt + 3) * longer +
               scale(path(ctx, decoded), kPath) * Var(units.trans.deviation);
-  if (contact) out.standing = (*contact)(ctx, decoded);
+  if (contact)
+    out.standing =
+        (*contact)(ctx, (*footing)(ctx, Var(footing_of(in, &(*state)[7])), &(*state)[6]));
   return out;
 }
 
@@ -181,6 +216,7 @@ void Hybrid::visit(Fields& f) {
   f("twist", twist);
   f("leaves", leaves);
   f("path", path);
+  if (footing) f("footing", *footing);
   if (contact) f("contact", *contact);
   f("joint_mean", units.joints.mean);
   f("joint_std", units.joints.deviation);

@@ -44,7 +44,8 @@ void visit(V& v, HybridConfig& c) {
 }
 
 /// The state is {encoder, decoder}, both [layers, n, hidden], the filter's three, [n, 121], and the
-/// last `latency` frames of what is filtered.
+/// last `latency` frames of what is filtered; with `contact` also the footing's, and
+/// the joints of the last frame.
 struct Hybrid final : MotionModel {
   using Config = HybridConfig;
   Hybrid(const HybridConfig& c, const Init& init);
@@ -57,6 +58,7 @@ struct Hybrid final : MotionModel {
   HybridConfig config;
   GruLayer enc, dec;
   Linear gate, trend, correction, twist, leaves, path;  ///< all near none at the start
+  std::optional<GruLayer> footing;                      ///< reads how the feet move in the world
   std::optional<Linear> contact;
   MotionStatistics units;  ///< all but `sixd`
 

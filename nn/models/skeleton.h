@@ -28,6 +28,9 @@ struct SkeletonInput {
                 ///< the trust in each (trust_of()); undefined where no frame came before
 };
 
+/// |error| / s that nine in ten stay below, of SkeletonOutput's uncertainty s.
+inline constexpr double kNinety = 5.3223;
+
 /// Trust in a remembered joint: 1 where its uncertainty (SkeletonOutput, metres) is none, 1/2 at
 /// 3 cm; 0 stands for a joint that nobody knows.
 inline double trust_of(double uncertainty) { return 0.03 / (0.03 + uncertainty); }

@@ -4,7 +4,7 @@ import os
 import random
 import struct
 
-from support import CliTest, small_disk
+from support import ROOT, CliTest, points, small_disk
 
 COUNTS = {"skeleton/point_transformer": 9585730, "skeleton/pointnet": 1620811, "smrm/rot6d": 5793927, "smrm/quaternion": 5771355,
           "smrm/discriminator": 280285, "deformation/weights": 89366, "deformation/offsets": 84483, "deformation/root": 83715,
@@ -41,6 +41,13 @@ class Info(CliTest):
 
 
 class Weights(CliTest):
+    def test_what_is_shipped_fits_this_program(self):
+        self.ply("a.ply", points(300, 1))
+        for name in ("lite", "standard"):
+            shipped = os.path.join(ROOT, "experiments", "weights", name + ".safetensors")
+            found = self.json("skeleton", "--weights", shipped, "--input", "a.ply")["frames"]
+            self.assertEqual(len(found[0]["joints"]), 22, name)
+
     def test_out_and_in_again(self):
         self.write("o.safetensors", tensors(OFFSETS))
         self.done("weights", "import", "--from", "o.safetensors", "--model", "deformation/offsets", "--out", "w.safetensors")

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
+
 #include <cmath>
 #include <map>
 #include <set>
@@ -11,6 +13,7 @@
 #include "datasets/sampling/clouds.h"
 #include "datasets/sampling/dress.h"
 #include "datasets/sampling/evaluation.h"
+#include "datasets/sampling/intruder.h"
 #include "datasets/sampling/tracks.h"
 #include "datasets/sampling/windows.h"
 #include "tests/datasets/sampling_support.h"
@@ -156,11 +159,75 @@ TEST(SamplingSensors, ShareOfEachKindAndEverybodyOtherwise) {
 TEST(SamplingSensors, EvaluationScansShowTheirJoints) {
   const auto subjects = evaluation_clouds(training_corpus(), 4, 1);
   for (const int cameras : {1, 6}) {
-    const CloudBatch scans = evaluation_scans(training_corpus(), subjects, cameras, 200, 1);
-    EXPECT_TRUE(same_bits(scans.points,
-                          evaluation_scans(training_corpus(), subjects, cameras, 200, 1).points));
+    EvaluationScans how{.cameras = cameras, .points = 200};
+    const CloudBatch scans = evaluation_scans(training_corpus(), subjects, how, 1);
+    EXPECT_TRUE(
+        same_bits(scans.points, evaluation_scans(training_corpus(), subjects, how, 1).points));
     for (int64_t i = 0; i < 4; ++i)
       for (int j = 0; j < kJoints; ++j) EXPECT_LT(at(scans.joints, i, j).norm(), 2.0);
+    how.intruder = true;
+    const CloudBatch two = evaluation_scans(training_corpus(), subjects, how, 1);
+    int strangers = 0;
+    for (int64_t i = 0; i < 4; ++i)
+      for (int p = 0; p < 200; ++p) {
+        double nearest = 1e9;
+        for (int j = 0; j < kJoints; ++j)
+          nearest = std::min(nearest, (at(two.points, i, p) - at(two.joints, i, j)).norm());
+        strangers += nearest > 0.3;
+      }
+    EXPECT_GT(strangers, 20);
+    EXPECT_LT(strangers, 400);
+  }
+}
+
+TEST(SamplingSensors, IntrudersAreNobodysPoints) {
+  CloudConfig config{.points = 256, .noise = 0};
+  config.one_camera = 1;
+  config.skin_weights = true;
+  const CloudSampler alone(training_corpus(), config, 1);
+  config.intruder = 1;
+  const CloudSampler sampler(training_corpus(), config, 1);
+  const CloudBatch batch = sampler.batch(0, 40), without = alone.batch(0, 40);
+  int strangers = 0;
+  for (int64_t i = 0; i < 40; ++i) {
+    EXPECT_EQ(sampler.subject(i).intruder, !sampler.subject(i).rest);
+    int own = 0;
+    for (int64_t p = 0; p < 256; ++p) {
+      const float* w = batch.weights.data<float>() + (i * 256 + p) * kJoints;
+      const float sum = std::accumulate(w, w + kJoints, 0.0f);
+      const bool stranger = sum == 0;
+      if (!stranger) {
+        EXPECT_NEAR(sum, 1, 1e-4);
+      }
+      own += !stranger;
+      strangers += stranger;
+    }
+    EXPECT_GT(own, 256 * 0.87);
+  }
+  EXPECT_GT(strangers, 40 * 256 * 0.02);
+  for (int64_t k = 0; k < without.weights.numel() / kJoints; ++k) {
+    const float* w = without.weights.data<float>() + k * kJoints;
+    EXPECT_NEAR(std::accumulate(w, w + kJoints, 0.0f), 1, 1e-4);
+  }
+}
+
+TEST(SamplingSensors, LimbsAreWhatHangsOnAJoint) {
+  const Body& body = training_corpus().bodies[0];
+  Mesh arm = limb_of(body, 18);
+  ASSERT_GT(arm.vertices.size(), 4u);
+  ASSERT_FALSE(arm.faces.empty());
+  for (const Point& p : arm.vertices) EXPECT_GT(p.x(), body.joints[16].x());
+  for (const Triangle& t : arm.faces)
+    for (const int v : t) EXPECT_LT(static_cast<size_t>(v), arm.vertices.size());
+  Rng rng(RngKey{1, 0});
+  for (int i = 0; i < 50; ++i) {
+    const Intruder intruder = draw_intruder(rng, 3);
+    EXPECT_LT(intruder.body, 3u);
+    put_intruder(intruder, Vec3(5, 1, 5), arm.vertices);
+    const Vec3 middle = centroid(arm.vertices).cast<double>() - Vec3(5, 1, 5);
+    EXPECT_GT(std::hypot(middle.x(), middle.z()), 0.29);
+    EXPECT_LT(std::hypot(middle.x(), middle.z()), 0.91);
+    EXPECT_LT(std::abs(middle.y()), 0.61);
   }
 }
 

@@ -47,8 +47,8 @@ DeformationStage::DeformationStage(const Config& config, const StageInput& in)
                          RngKey{in.seed, 0}.fold("deformation/offsets"),
                          {{"keep_root_rotation", config.keep_root_rotation ? "true" : "false"}})
                    : nullptr),
-      optimiser_(
-          add_optimiser("adam", {"deformation.weights", "deformation.offsets"}, config.optimiser)),
+      optimiser_(add_optimiser("optimiser", {"deformation.weights", "deformation.offsets"},
+                               config.optimiser)),
       sampler_(in.train, with_weights(config.pairs, config.supervision > 0),
                RngKey{in.seed, 0}.fold("deformation.pairs").stream),
       validation_sampler_(in.validation, held_out(config.pairs), 1),

@@ -14,8 +14,9 @@
 namespace restage {
 
 /// Raised whenever the same configuration gives other results than before.
-/// 1: as of the first artifacts.
-inline constexpr int kBehaviour = 1;
+/// 2: smrm/hybrid filters its path too, corrects in units of uncertainty and has a footing for
+/// contact. 1: as of the first artifacts.
+inline constexpr int kBehaviour = 2;
 
 /// An artifact that a configuration trains.
 struct StageId {

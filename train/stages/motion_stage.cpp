@@ -173,9 +173,9 @@ MotionStage::MotionStage(const Config& config, const StageInput& in)
       discriminator_(add_network<Discriminator>(
           "discriminator", "smrm/discriminator", model_type("smrm/discriminator").training,
           RngKey{in.seed, 0}.fold("discriminator.init"), {}, false)),
-      optimiser_(add_optimiser("adam", {"motion"}, config.optimiser)),
+      optimiser_(add_optimiser("optimiser", {"motion"}, config.optimiser)),
       discriminator_optimiser_(
-          add_optimiser("discriminator_adam", {"discriminator"}, of_discriminator(config))),
+          add_optimiser("discriminator_optimiser", {"discriminator"}, of_discriminator(config))),
       train_(in.train),
       validation_(in.validation),
       seed_(in.seed),

@@ -73,6 +73,8 @@ void visit(V& v, AnswersConfig& c) {
   v("one_camera", c.tracks.clouds.one_camera, "part that one depth camera sees", between(0, 1));
   v("camera_ring", c.tracks.clouds.camera_ring, "part that three to seven cameras see",
     between(0, 1));
+  v("intruder", c.tracks.clouds.intruder, "part of what cameras see with somebody else's limb",
+    between(0, 1));
 }
 
 /// The defaults are what trains; configs/paper/as_printed.yaml keeps the paper's letter

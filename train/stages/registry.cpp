@@ -28,8 +28,8 @@ const std::vector<StageType>& stage_types() {
   static const std::vector<StageType> table = {
       stage<SkeletonStage>("skeleton", "the skeleton extractor", {"skeleton"},
                            {"joint_error_mm", "tpose_joint_error_mm", "ring_joint_error_mm",
-                            "one_camera_joint_error_mm", "followed_joint_error_mm",
-                            "turn_error_degrees", "miscalibration"}),
+                            "one_camera_joint_error_mm", "intruder_joint_error_mm",
+                            "followed_joint_error_mm", "turn_error_degrees", "miscalibration"}),
       stage<MotionStage>(
           "motion", "the motion retargeting network", {"motion"},
           {"pa_mpjpe", "local_mpjpe", "cycle_mpjpe", "acceleration", "rotation",

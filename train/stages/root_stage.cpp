@@ -33,7 +33,7 @@ RootStage::RootStage(const Config& config, const StageInput& in)
     : Stage("root", config.optimiser),
       config_(config),
       net_(add_network<RootNet>(config.model, RngKey{in.seed, 0}.fold("deformation/root"))),
-      optimiser_(add_optimiser("adam", {"deformation.root"}, config.optimiser)),
+      optimiser_(add_optimiser("optimiser", {"deformation.root"}, config.optimiser)),
       sampler_(in.train, bodies(config.points, true),
                RngKey{in.seed, 0}.fold("root.bodies").stream),
       validation_sampler_(in.validation, bodies(config.points, false), 1),

@@ -14,11 +14,10 @@
 namespace restage {
 namespace {
 
-constexpr double kNinety = 5.3223;  ///< |error| / s that 90 % stay below (SkeletonOutput)
 /// The uncertainty's head learns alone, so this only says how much of the clip of all gradients is
 /// its own; Adam makes up for the rest.
 constexpr double kUncertaintyWeight = 0.01;
-constexpr int64_t kFollowed = 12;  // frames of a validation sequence
+constexpr size_t kFollowed = 12;  // frames of a validation sequence
 
 /// Euclidean lengths along the last axis (3), smooth at 0.
 Var lengths(const Var& d) { return sqrt(add_scalar(sum(square(d), -1), 1e-8)); }
@@ -68,7 +67,7 @@ CloudConfig held_out(CloudConfig c, const SkeletonModel& model) {
   c = with_points(c, model);
   c.mirror = false;
   c.scale_jitter = 0;
-  c.dressed = c.one_camera = c.camera_ring = c.recombined = c.remembered = 0;
+  c.dressed = c.one_camera = c.camera_ring = c.recombined = c.intruder = c.remembered = 0;
   c.rotations = true;
   return c;
 }
@@ -79,24 +78,26 @@ SkeletonStage::SkeletonStage(const Config& config, const StageInput& in)
     : Stage("skeleton", config.optimiser),
       config_(config),
       model_(add_network<SkeletonModel>(config.model, RngKey{in.seed, 0}.fold("skeleton.init"))),
-      optimiser_(add_optimiser("adam", {"skeleton"}, config.optimiser)),
+      optimiser_(add_optimiser("optimiser", {"skeleton"}, config.optimiser)),
       sampler_(in.train, training_clouds(config, *model_),
                RngKey{in.seed, 0}.fold("skeleton.clouds").stream),
       validation_sampler_(in.validation, held_out(config.clouds, *model_), 1),
       posed_(evaluation_clouds(in.validation, static_cast<size_t>(config.validation_clouds), 1)),
       tposes_(evaluation_tposes(in.validation, 4, config.clouds.tpose_heading, 1)),
       key_(RngKey{in.seed, 0}.fold("skeleton.step")) {
-  const auto scans = [&](int cameras) {
-    return evaluation_scans(in.validation, posed_, cameras, static_cast<int>(model_->points()), 1);
+  const auto scans = [&](EvaluationScans how) {
+    how.points = static_cast<int>(model_->points());
+    return evaluation_scans(in.validation, posed_, how, 1);
   };
-  if (config.clouds.one_camera > 0) one_camera_ = scans(1);
-  if (config.clouds.camera_ring > 0) ring_ = scans(6);
+  if (config.clouds.one_camera > 0) one_camera_ = scans({});
+  if (config.clouds.camera_ring > 0) ring_ = scans({.cameras = 6});
+  if (config.clouds.intruder > 0) intruded_ = scans({.intruder = true});
   if (config.clouds.remembered > 0)
     followed_ = evaluation_scans(
         in.validation,
         following(in.validation, posed_, static_cast<size_t>(config.validation_clouds + 7) / 8,
                   kFollowed),
-        1, static_cast<int>(model_->points()), 1, kFollowed);
+        {.points = static_cast<int>(model_->points()), .frames = kFollowed}, 1);
 }
 
 Var SkeletonStage::loss(Context& ctx, const CloudBatch& batch) const {
@@ -244,8 +245,10 @@ NamedValues SkeletonStage::validate() {
   put("tpose_joint_error_mm", validation_sampler_.clouds(tposes_));
   put("ring_joint_error_mm", ring_);
   put("one_camera_joint_error_mm", one_camera_);
+  put("intruder_joint_error_mm", intruded_);
   if (followed_.points.defined())
-    out.push_back({"followed_joint_error_mm", 1e3 * followed_error(*model_, followed_, kFollowed)});
+    out.push_back({"followed_joint_error_mm",
+                   1e3 * followed_error(*model_, followed_, static_cast<int64_t>(kFollowed))});
   if (turns) out.push_back({"turn_error_degrees", *turns});
   if (miscalibration) out.push_back({"miscalibration", *miscalibration});
   return out;

@@ -22,6 +22,8 @@ void visit(V& v, CloudConfig& c) {
   v("dressed", c.dressed, "part of the clouds in clothes and hair", between(0, 1));
   v("one_camera", c.one_camera, "part of the clouds that one depth camera sees", between(0, 1));
   v("camera_ring", c.camera_ring, "part that three to seven cameras around see", between(0, 1));
+  v("intruder", c.intruder, "part of what cameras see with somebody else's limb beside it",
+    between(0, 1));
   v("remembered", c.remembered, "part with a memory of the frame before", between(0, 1));
   v("frame_step", c.frame_step, "only every so many frames of a motion (30: one a second)",
     between(1, 100000));
@@ -76,8 +78,9 @@ class SkeletonStage final : public Stage {
   Optimiser* optimiser_;
   CloudSampler sampler_, validation_sampler_;
   std::vector<CloudSubject> posed_, tposes_;
-  CloudBatch one_camera_, ring_;  ///< held-out scans by ray casting; undefined if not trained for
-  CloudBatch followed_;           ///< the same of people followed by one camera
+  // Held-out scans by ray casting; undefined if not trained for.
+  CloudBatch one_camera_, ring_, intruded_;
+  CloudBatch followed_;  ///< the same of people followed by one camera
   RngKey key_;
 };
 
