@@ -210,6 +210,15 @@ std::vector<double> read_confidence(const std::string& path, int64_t sequence) {
   return {all.begin() + offset[s], all.begin() + offset[s + 1]};
 }
 
+static std::vector<double> radius_in(const h5::File& file, int64_t frames) {
+  if (!file.has("/radius")) return {};
+  const h5::Dataset set = file.dataset("/radius", {frames, kJoints});
+  std::vector<double> out = read_finite<double>(file, "/radius", {frames, kJoints});
+  for (const double x : out)
+    if (!(x > 0)) throw InputError(set.where(), "holds a number that is no radius", "give metres");
+  return out;
+}
+
 Prediction read_prediction(const std::string& path) {
   const h5::File file = open_schema_file(path);
   const bool has_joints = file.has("/joints"), has_vertices = file.has("/vertices");
@@ -242,6 +251,7 @@ Prediction read_prediction(const std::string& path) {
   if (file.has("/faces"))
     out.faces = read_faces(file, "/faces", has_vertices ? out.vertex_count : int64_t{1} << 31);
   out.confidence = confidence_in(file, out.frames);
+  out.radius = radius_in(file, out.frames);
   return out;
 }
 
@@ -280,6 +290,12 @@ void PredictionWriter::append(const Joints& joints, const Points& vertices,
   if (confidence) confidence_.push_back(static_cast<float>(*confidence));
 }
 
+void PredictionWriter::append_joints(const Joints& joints,
+                                     const std::array<double, kJoints>& radius) {
+  append(joints, {});
+  radius_.insert(radius_.end(), radius.begin(), radius.end());
+}
+
 void PredictionWriter::set_source_to_world(const Eigen::Matrix<double, 3, 4>& transform) {
   write_source_to_world(file_, transform);
 }
@@ -293,6 +309,11 @@ void PredictionWriter::commit() {
     if (std::ssize(confidence_) != joints_.rows())
       throw ShapeError("prediction writer: confidence for some frames only");
     file_.write<float>("/confidence", {joints_.rows()}, confidence_);
+  }
+  if (!radius_.empty()) {
+    if (std::ssize(radius_) != joints_.rows() * static_cast<int64_t>(kJoints))
+      throw ShapeError("prediction writer: radius for some frames only");
+    file_.write<float>("/radius", {joints_.rows(), kJoints}, radius_);
   }
   write_sequence_offset(file_, sequence_offset_, joints_.rows());
   file_.commit();

@@ -104,6 +104,7 @@ struct Prediction {
   std::vector<int64_t> sequence_offset;  ///< S + 1, from 0 to F; {0, F} for one sequence
   std::vector<Triangle> faces;           ///< empty if absent
   std::vector<double> confidence;        ///< F, 0 to 1; empty if absent
+  std::vector<double> radius;            ///< F x 22, metres (see PredictionWriter); empty if absent
   // Written, not read:
   double fps = kFps;
   /// PredictionWriter::set_source_to_world().
@@ -111,7 +112,7 @@ struct Prediction {
 };
 
 /// /joints [F,22,3] and /vertices [F,V,3] (float32 or float64, either may be absent),
-/// /sequence_offset [S+1], /faces [T,3] and /confidence [F] (all optional).
+/// /sequence_offset [S+1], /faces [T,3], /confidence [F] and /radius [F,22] (all optional).
 Prediction read_prediction(const std::string& path);
 /// Of one sequence of a file; empty where there is none.
 std::vector<double> read_confidence(const std::string& path, int64_t sequence);
@@ -126,6 +127,8 @@ class PredictionWriter {
   /// `confidence` for all frames or for none.
   void append(const Joints& joints, const Points& vertices,
               std::optional<double> confidence = std::nullopt);
+  /// Joints alone, each with the radius about it that should hold the true one nine times in ten.
+  void append_joints(const Joints& joints, const std::array<double, kJoints>& radius);
   /// How the source's scans relate to the world: world = A p + b, rows of [A | b]. Written as
   /// /source_to_world [3,4].
   void set_source_to_world(const Eigen::Matrix<double, 3, 4>& transform);
@@ -137,7 +140,7 @@ class PredictionWriter {
   int64_t vertex_count_ = 0;
   h5::Dataset joints_;
   std::optional<h5::Dataset> vertices_;
-  std::vector<float> confidence_;
+  std::vector<float> confidence_, radius_;
   std::vector<int64_t> sequence_offset_{0};
 };
 

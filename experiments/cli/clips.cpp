@@ -14,25 +14,34 @@ bool ends_with_hdf5(const std::string& path) {
   return path.ends_with(".h5") || path.ends_with(".hdf5");
 }
 
-/// Joints alone: enough points along each bone to see a stick figure.
-Clip stick_figure(const std::string& path, const std::string& label, int64_t sequence) {
+/// Of one sequence.
+std::vector<Joints> read_joints(const std::string& path, int64_t sequence) {
   const Prediction data = read_prediction(path);
   const auto s = static_cast<size_t>(sequence);
   if (sequence < 0 || s + 1 >= data.sequence_offset.size())
     throw InputError(path, "has no sequence number " + std::to_string(sequence),
                      "count sequences from 0");
+  if (data.joints.empty()) throw InputError(path + ":/joints", "is missing", "leave --focus out");
+  std::vector<Joints> out;
+  for (int64_t f = data.sequence_offset[s]; f < data.sequence_offset[s + 1]; ++f)
+    for (size_t j = 0; j < kJoints; ++j) {
+      if (j == 0) out.emplace_back();
+      out.back()[j] = Eigen::Map<const Vec3>(data.joints.data() + 3 * (f * kJoints + j));
+    }
+  return out;
+}
+
+/// Joints alone: enough points along each bone to see a stick figure.
+Clip stick_figure(const std::string& path, const std::string& label, int64_t sequence) {
   Clip clip;
   clip.label = label;
   clip.confidence = read_confidence(path, sequence);
-  for (int64_t f = data.sequence_offset[s]; f < data.sequence_offset[s + 1]; ++f) {
-    const auto joint = [&](int j) {
-      return Eigen::Map<const Vec3>(data.joints.data() + 3 * (f * kJoints + j));
-    };
+  for (const Joints& joints : read_joints(path, sequence)) {
     Points& points = clip.frames.emplace_back();
     for (int j = 1; j < kJoints; ++j)
       for (int k = 0; k <= kPointsPerBone; ++k) {
         const double t = static_cast<double>(k) / kPointsPerBone;
-        points.push_back(((1 - t) * joint(kParents[j]) + t * joint(j)).cast<float>());
+        points.push_back(((1 - t) * joints[kParents[j]] + t * joints[j]).cast<float>());
       }
   }
   return clip;
@@ -61,6 +70,15 @@ Clip read_clip(const std::string& path, const std::string& label, int64_t sequen
   if (!surface) clip.faces.clear();
   if (ends_with_hdf5(path)) clip.confidence = read_confidence(path, sequence);
   return clip;
+}
+
+std::vector<Point> read_focus(const std::string& path, size_t joint, int64_t sequence) {
+  if (!ends_with_hdf5(path))
+    throw InputError(path, "does not say where its joints are", "give HDF5 with /joints");
+  std::vector<Point> out;
+  for (const Joints& joints : read_joints(path, sequence))
+    out.push_back(joints[joint].cast<float>());
+  return out;
 }
 
 }  // namespace restage::cli

@@ -11,5 +11,7 @@ namespace restage::cli {
 /// A surface stays one only if all frames have the same faces; a prediction of joints alone becomes
 /// a cloud of points along the bones. InputError if there is no such sequence.
 Clip read_clip(const std::string& path, const std::string& label, int64_t sequence = 0);
+/// Where a joint is in each of the sequence's frames, metres. InputError: not HDF5, no /joints.
+std::vector<Point> read_focus(const std::string& path, size_t joint, int64_t sequence = 0);
 
 }  // namespace restage::cli

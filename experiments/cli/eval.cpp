@@ -1,9 +1,9 @@
 // restage eval: metrics of a prediction beside its ground truth and beside references.
 #include <filesystem>
-#include <memory>
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "autograd/base/format.h"
 #include "autograd/base/output_check.h"
 #include "datasets/benchmark/sequence.h"
 #include "datasets/schema.h"
@@ -57,6 +57,14 @@ std::vector<int64_t> common_sequences(const File& pred, const File& truth) {
 std::vector<double> errors_by_joint(const File& pred, const File& truth) {
   return metrics::mean_distance_by_point(pred.joints(), truth.joints(),
                                          {metrics::Alignment::Mode::frame});
+}
+
+/// Of a prediction that says how far its joints may be off, how often it is right; joints as they
+/// are, without alignment.
+metrics::Value claim_held(const File& pred, const File& truth) {
+  if (pred.data.radius.empty() || !pred.joints().present() || !truth.joints().present())
+    return std::nullopt;
+  return metrics::share_within(pred.joints(), truth.joints(), pred.data.radius);
 }
 
 void print_per_joint(const std::vector<double>& errors) {
@@ -155,10 +163,7 @@ int run_eval_run(const EvalOptions& options, const Common& common) {
     write_sequence(Performance(test, how.sequences[0], ScanConfig{}, common.seed),
                    {test.license, test.description}, options.out);
   }
-  if (common.json)
-    print_json(to_json(scores, how));
-  else
-    print(text);
+  print(common.json, to_json(scores, how), text);
   return 0;
 }
 
@@ -247,11 +252,13 @@ int run_eval(const EvalOptions& options, const Common& common) {
   report.model =
       metrics::evaluate(cut(offset, pred.joints(), pred.vertices(), truth), report.metrics);
 
+  const metrics::Value within = claim_held(pred, truth);
   const auto by_joint = options.per_joint ? errors_by_joint(pred, truth) : std::vector<double>();
   if (common.json) {
     Json document = to_json(report);
     for (size_t j = 0; j < by_joint.size(); ++j)
       document["pa_mpjpe_by_joint"][std::string(kJointNames[j])] = by_joint[j];
+    if (within) document["joints_within_radius"] = *within;
     if (mended)
       document["mended"] = {{"scale_error", 1 / mended->scale}, {"tilt_degrees", mended->tilt()}};
     print_json(document);
@@ -259,35 +266,37 @@ int run_eval(const EvalOptions& options, const Common& common) {
   }
   print(to_markdown(report));
   if (!by_joint.empty()) print_per_joint(by_joint);
+  if (within)
+    print(format("\n%.1f %% of the true joints lie within /radius of the predicted ones.\n",
+                 100 * *within));
   return 0;
 }
 
 }  // namespace
 
 void add_eval(Program& program) {
-  const auto options = std::make_shared<EvalOptions>();
-  CLI::App& app =
+  auto [app, options] =
       program.add("eval", "measure a prediction against its ground truth",
                   "restage eval run=runs/demo-1 --out demo/\n"
                   "restage eval --pred result.h5 --truth truth.h5\n"
                   "restage eval --pred result.h5 --truth truth.h5 --source a.h5 --rest b.h5 --json",
-                  [options, &program] { return run_eval(*options, program.common()); });
-  app.add_option("RUN", options->run, "run=RUN_DIR: the trained system on its held-out data");
-  app.add_option("--out", options->out,
+                  run_eval);
+  app.add_option("RUN", options.run, "run=RUN_DIR: the trained system on its held-out data");
+  app.add_option("--out", options.out,
                  "with run=: folder for the table and the files of one sequence");
-  app.add_option("--anchor", options->anchor,
+  app.add_option("--anchor", options.anchor,
                  "with run=: as in 'restage retarget'; 0: the papers' sum of velocities");
-  app.add_option("--pred", options->pred, "predicted /joints and /vertices (HDF5)");
-  app.add_option("--truth", options->truth, "true /joints and /vertices (HDF5)");
-  app.add_option("--source", options->source, "joints of the source, for the references");
-  app.add_option("--rest", options->rest,
+  app.add_option("--pred", options.pred, "predicted /joints and /vertices (HDF5)");
+  app.add_option("--truth", options.truth, "true /joints and /vertices (HDF5)");
+  app.add_option("--source", options.source, "joints of the source, for the references");
+  app.add_option("--rest", options.rest,
                  "rest joints of the target (one row, or one a sequence), for the references");
-  app.add_option("--every", options->every,
+  app.add_option("--every", options.every,
                  "the prediction holds only every so many frames of the truth's sequences");
-  app.add_option("--mended", options->mended,
+  app.add_option("--mended", options.mended,
                  "what restage doctor --fix made of the scans that the prediction is from");
-  app.add_flag("--variants", options->variants, "further alignments: rigid, sequence, root");
-  app.add_flag("--per-joint", options->per_joint, "also the aligned error of every joint");
+  app.add_flag("--variants", options.variants, "further alignments: rigid, sequence, root");
+  app.add_flag("--per-joint", options.per_joint, "also the aligned error of every joint");
 }
 
 }  // namespace restage::cli

@@ -1,20 +1,24 @@
 // restage render: a contact sheet or a page that plays source, result and truth.
 
+#include <algorithm>
+
 #include "autograd/base/error.h"
+#include "autograd/base/nearest.h"
 #include "autograd/base/output_check.h"
 #include "experiments/cli/clips.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
 #include "infer/render/page.h"
 #include "infer/render/sheet.h"
+#include "nn/geometry/skeleton.h"
 
 namespace restage::cli {
 namespace {
 
 struct RenderOptions {
-  std::string result, source, truth, out, title;
+  std::string result, source, truth, out, title, focus;
   int columns = 8;
-  double fps = kFps;
+  double fps = kFps, within = 0.25, azimuth = SheetOptions{}.azimuth;
   int64_t sequence = 0;
 };
 
@@ -27,14 +31,31 @@ void check(const RenderOptions& options) {
                      "give a number from 1 to 64");
   if (!(options.fps > 0) || options.fps > 1000)
     throw InputError("", "--fps is out of range", "give frames per second above 0");
+  if (!(options.within > 0) || options.within > 10)
+    throw InputError("", "--within is out of range", "give metres above 0, at most 10");
+  if (!options.focus.empty() && options.out.ends_with(".html"))
+    throw InputError("", "--focus goes with a sheet only", "end --out in .png, or leave it out");
   check_output(options.out, {options.result, options.source, options.truth});
+}
+
+size_t joint_of(const std::string& name) {
+  const std::vector<std::string> names(kJointNames.begin(), kJointNames.end());
+  const auto at = std::find(names.begin(), names.end(), name);
+  if (at != names.end()) return static_cast<size_t>(at - names.begin());
+  const std::string near = nearest(name, names);
+  throw InputError(
+      "", "there is no joint '" + name + "'",
+      near.empty() ? "use a name as restage skeleton prints them" : "did you mean '" + near + "'?");
 }
 
 int run_render(const RenderOptions& options, const Common& common) {
   check(options);
   std::vector<Clip> clips;
   const auto add = [&](const std::string& path, const std::string& label) {
-    if (!path.empty()) clips.push_back(read_clip(path, label, options.sequence));
+    if (path.empty()) return;
+    clips.push_back(read_clip(path, label, options.sequence));
+    if (!options.focus.empty())
+      clips.back().focus = read_focus(path, joint_of(options.focus), options.sequence);
   };
   add(options.source, "source");
   add(options.result, "result");
@@ -44,6 +65,8 @@ int run_render(const RenderOptions& options, const Common& common) {
     sheet.columns = options.columns;
     sheet.fps = options.fps;
     sheet.title = options.title;
+    sheet.azimuth = options.azimuth;
+    if (!options.focus.empty()) sheet.close_up = options.within;
     write_contact_sheet(options.out, clips, sheet);
   } else {
     PageOptions page;
@@ -61,7 +84,8 @@ void add_render(Program& program) {
   auto [app, options] =
       program.add("render", "draw a result as a contact sheet or a page that plays it",
                   "restage render result.h5 --source scans/ --out sheet.png\n"
-                  "restage render result.h5 --source scans.h5 --truth truth.h5 --out page.html",
+                  "restage render result.h5 --source scans.h5 --truth truth.h5 --out page.html\n"
+                  "restage render result.h5 --focus left_wrist --azimuth 60 --out hand.png",
                   run_render);
   app.add_option("RESULT", options.result, "prediction or scans (HDF5), or a folder of PLY or OBJ")
       ->required();
@@ -71,6 +95,13 @@ void add_render(Program& program) {
   app.add_option("--columns", options.columns, "moments on a sheet");
   app.add_option("--fps", options.fps, "frames per second of the input");
   app.add_option("--sequence", options.sequence, "which sequence of an HDF5 file, from 0");
+  app.add_option("--focus", options.focus,
+                 "joint of a close-up, such as left_wrist; of files with /joints, on a sheet");
+  app.add_option("--within", options.within, "metres to either side of --focus")
+      ->capture_default_str();
+  app.add_option("--azimuth", options.azimuth,
+                 "where a sheet is seen from, degrees from the front towards the body's left")
+      ->capture_default_str();
   app.add_option("--title", options.title, "a line at the top");
 }
 

@@ -25,12 +25,27 @@ Json json_of(const Joints& joints) {
   return rows;
 }
 
-std::string text_of(const Joints& joints) {
+using Radius = std::optional<std::array<double, kJoints>>;
+
+Radius radius_of(const SeenJoints& seen) {
+  return seen.uncertainty ? Radius(radius_of_90(*seen.uncertainty)) : std::nullopt;
+}
+
+std::string text_of(const Joints& joints, const Radius& radius) {
   std::string out;
-  for (size_t j = 0; j < kJoints; ++j)
-    out += format("  %-15s %9.4f %9.4f %9.4f\n", std::string(kJointNames[j]).c_str(), joints[j][0],
+  for (size_t j = 0; j < kJoints; ++j) {
+    out += format("  %-15s %9.4f %9.4f %9.4f", std::string(kJointNames[j]).c_str(), joints[j][0],
                   joints[j][1], joints[j][2]);
+    out += radius ? format("  +- %.3f\n", (*radius)[j]) : "\n";
+  }
   return out;
+}
+
+void write(const Joints& joints, const Radius& radius, PredictionWriter* to) {
+  if (radius)
+    to->append_joints(joints, *radius);
+  else
+    to->append(joints, {});
 }
 
 /// Frames of a folder too, as --out may have any name.
@@ -57,13 +72,16 @@ int run_skeleton(const SkeletonOptions& options, const Common& common) {
   std::string text;
   // The same points give the same joints wherever they stand, so every frame has the same key.
   const RngKey key = RngKey{common.seed, 0}.fold("skeleton");
+  JointExtractor extract(model, options.samples);
   while (const auto frame = frames->next()) {
-    const Joints joints = extract_joints(model, frame->points, frame->source, key, options.samples);
-    if (writer) writer->append(joints, {});
+    const SeenJoints seen = extract(frame->points, frame->source, key);
+    const auto radius = radius_of(seen);
+    if (writer) write(seen.joints, radius, writer.get());
     if (common.json) {
-      list.push_back({{"source", frame->source}, {"joints", json_of(joints)}});
+      list.push_back({{"source", frame->source}, {"joints", json_of(seen.joints)}});
+      if (radius) list.back()["radius"] = *radius;
     } else if (!writer) {
-      text += frame->source + "\n" + text_of(joints);
+      text += frame->source + "\n" + text_of(seen.joints, radius);
     }
   }
   if (writer) writer->commit();

@@ -26,6 +26,9 @@ void check_clips(const std::string& where, const std::vector<Clip>& clips) {
     if (!clip.confidence.empty() && clip.confidence.size() != clip.frames.size())
       throw InputError(where, "\"" + clip.label + "\" has confidence for other frames than its own",
                        "write one number per frame, or none");
+    if (!clip.focus.empty() && clip.focus.size() != clip.frames.size())
+      throw InputError(where, "\"" + clip.label + "\" has a focus for other frames than its own",
+                       "write one point per frame, or none");
     const size_t count = clip.frames.front().size();
     for (size_t f = 0; f < clip.frames.size(); ++f) {
       const std::string frame = "frame " + std::to_string(f) + " of \"" + clip.label + "\"";

@@ -16,6 +16,7 @@ struct Clip {
   std::vector<Points> frames;
   std::vector<Triangle> faces;
   std::vector<double> confidence = {};  ///< of each frame, 0 to 1; empty if nobody says
+  std::vector<Point> focus = {};        ///< of each frame, what a close-up looks at; may be empty
 };
 
 /// InputError when there is nothing to draw (no clips, more than three, a clip without frames) or a

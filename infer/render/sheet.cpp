@@ -16,7 +16,7 @@ constexpr float kView = 0.36f;  // a long lens: little perspective
 
 struct Frame {
   const Points* points;
-  Point centre;  // at half the common height over the floor
+  Point centre;  // at half the common height over the floor; of a close-up its focus
 };
 
 struct Layout {
@@ -49,7 +49,7 @@ Layout lay_out(const std::vector<Clip>& clips, const SheetOptions& options) {
     layout.cells.emplace_back();
     for (const size_t moment : layout.moments) {
       const Points& points = clip.frames[moment];
-      const Point centre = clip_centre(points);
+      const Point centre = options.close_up > 0 ? clip.focus.at(moment) : clip_centre(points);
       layout.cells.back().push_back({&points, centre});
       for (const Point& p : points) {
         if (!p.allFinite()) continue;
@@ -70,9 +70,11 @@ Image draw_cell(const Clip& clip, const Frame& frame, float floor, uint32_t colo
   camera.azimuth = static_cast<float>(options.azimuth * std::numbers::pi / 180);
   camera.elevation = static_cast<float>(options.elevation * std::numbers::pi / 180);
   camera.view = kView;
-  const float tall = 1.16f * layout.high + 0.12f;
+  const auto reach = static_cast<float>(options.close_up);
+  const float tall = reach > 0 ? 2 * reach : 1.16f * layout.high + 0.12f;
   camera.distance = 0.5f * tall / std::tan(0.5f * kView);
-  camera.target = {frame.centre.x(), floor + 0.5f * layout.high - 0.01f * tall, frame.centre.z()};
+  camera.target = frame.centre;
+  if (reach <= 0) camera.target.y() = floor + 0.5f * layout.high - 0.01f * tall;
   canvas.begin(camera, floor, *frame.points, clip.faces);
   if (clip.faces.empty())
     canvas.draw_cloud(*frame.points, colour_of(colour));
@@ -92,8 +94,10 @@ Image contact_sheet(const std::vector<Clip>& clips, const SheetOptions& options)
   check_clips("", clips);
   const Layout layout = lay_out(clips, options);
   const double per_metre = options.cell_height / (1.16 * layout.high + 0.12);
-  const int cell_width = std::clamp(static_cast<int>(per_metre * (2.0 * layout.half_width + 0.16)),
-                                    options.cell_height / 2, options.cell_height * 3 / 2);
+  const int figure_width =
+      std::clamp(static_cast<int>(per_metre * (2.0 * layout.half_width + 0.16)),
+                 options.cell_height / 2, options.cell_height * 3 / 2);
+  const int cell_width = options.close_up > 0 ? options.cell_height : figure_width;
   const int columns = static_cast<int>(layout.moments.size()),
             rows = static_cast<int>(clips.size());
   const int top = kMargin + (options.title.empty() ? 0 : kTitle),

@@ -11,6 +11,7 @@ struct SheetOptions {
   int cell_height = 300;  ///< pixels
   double azimuth = 32;    ///< degrees from the front towards the body's left
   double elevation = 9;   ///< degrees
+  double close_up = 0;    ///< metres to either side of the clips' focus; 0: whole figures
   double fps = kFps;      ///< for the times under the columns
   std::string title;      ///< one line at the top; empty: none
 };

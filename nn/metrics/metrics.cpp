@@ -107,6 +107,15 @@ std::vector<Similarity> align(const Track& pred, const Track& truth, const Align
   return maps;
 }
 
+Value share_within(const Track& pred, const Track& truth, std::span<const double> radius) {
+  const int64_t n = pred.frames * pred.points;
+  int64_t within = 0;
+  for (int64_t i = 0; i < n; ++i)
+    within += (pred.at(0, i) - truth.at(0, i)).norm() <= radius[static_cast<size_t>(i)];
+  if (n == 0) return std::nullopt;
+  return static_cast<double>(within) / static_cast<double>(n);
+}
+
 Value mean_distance(const Track& pred, const Track& truth, const Alignment& how) {
   if (!comparable(pred, truth)) return std::nullopt;
   const auto maps = align(pred, truth, how);

@@ -66,6 +66,9 @@ Value mean_distance(const Track& pred, const Track& truth, const Alignment& how 
 /// Mean distance of every point over the frames, metres (per-joint errors). Empty if no frames.
 std::vector<double> mean_distance_by_point(const Track& pred, const Track& truth,
                                            const Alignment& how = {});
+/// Share of the true points that lie within `radius` (frames x points, metres) of the predicted
+/// ones: what a claim to hold nine in ten is held against.
+Value share_within(const Track& pred, const Track& truth, std::span<const double> radius);
 /// Mean difference of second differences, metres per frame squared; needs 3 frames.
 Value acceleration_error(const Track& pred, const Track& truth, const Alignment& how = {});
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "autograd/base/error.h"
+#include "nn/models/skeleton.h"
 
 namespace restage {
 namespace {
@@ -77,6 +78,12 @@ double confidence(const std::array<double, kJoints>& uncertainty) {
     sum += 1 - std::exp(-r) * (1 + r + r * r / 2);
   }
   return sum / kJoints;
+}
+
+std::array<double, kJoints> radius_of_90(const std::array<double, kJoints>& uncertainty) {
+  std::array<double, kJoints> out;
+  for (size_t j = 0; j < kJoints; ++j) out[j] = kNinety * uncertainty[j];
+  return out;
 }
 
 SeenJoints combined(const std::vector<View>& views, bool turns, bool uncertainty,

@@ -29,6 +29,9 @@ inline constexpr double kNearby = 0.05;  ///< metres
 /// Mean chance of a joint to be within kNearby of where it is seen, of 22 uncertainties (metres).
 double confidence(const std::array<double, kJoints>& uncertainty);
 
+/// How far about a joint the true one should be nine times in ten, for each uncertainty (metres).
+std::array<double, kJoints> radius_of_90(const std::array<double, kJoints>& uncertainty);
+
 /// The answer to one view, in the cloud's frame.
 struct View {
   using Columns = Eigen::Matrix<double, 3, 2>;

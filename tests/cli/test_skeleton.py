@@ -30,6 +30,19 @@ class Joints(Skeleton):
         self.assertIn("left_wrist", text.lower().replace(" ", "_"))
         self.assertIn("seed 0", text)
 
+    def test_an_extractor_that_knows_says_how_far_it_may_be_off(self):
+        self.ply("a.ply", self.cloud)
+        sure = weights("sure", "skeleton.sizes.uncertainty=true", "stages=[skeleton]")
+        call = ("skeleton", "--weights", sure, "--input", "a.ply")
+        radius = self.json(*call)["frames"][0]["radius"]
+        self.assertEqual(len(radius), 22)
+        self.assertIn("+- %.3f" % radius[21], self.done(*call))
+        self.done(*call, "--out", "claimed.h5")
+        evaluated = ("eval", "--pred", "claimed.h5", "--truth", "claimed.h5")
+        self.assertEqual(self.json(*evaluated)["joints_within_radius"], 1)
+        self.assertIn("100.0 % of the true joints", self.done(*evaluated))
+        self.assertNotIn("radius", self.json("skeleton", "--weights", self.w, "--input", "a.ply")["frames"][0])
+
     def test_order_of_points_does_not_matter(self):
         for count in (64, 300, 1200):
             cloud = points(count, count)

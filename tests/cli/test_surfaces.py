@@ -147,6 +147,17 @@ class Render(CliTest):
         for outside in ("src=\"http", "href=\"http", "@import", "fetch("):
             self.assertNotIn(outside, page)
 
+    def test_close_up_of_a_joint(self):
+        width = lambda name: int.from_bytes(self.bytes(name)[16:20], "big")
+        self.done("render", "result.h5", "--focus", "left_wrist", "--within", "0.2", "--azimuth", "90", "--out", "hand.png", "--columns", "3")
+        self.done("render", "result.h5", "--focus", "head", "--within", "0.2", "--azimuth", "90", "--out", "head.png", "--columns", "3")
+        self.assertEqual(width("hand.png"), width("head.png"))
+        self.assertNotEqual(self.bytes("hand.png"), self.bytes("head.png"))
+        self.bad_input(["render", "result.h5", "--focus", "left_rist", "--out", "a.png"], "left_wrist")
+        self.bad_input(["render", "result.h5", "--focus", "head", "--out", "a.html"], "--focus")
+        self.bad_input(["render", "result.h5", "--source", "scans", "--focus", "head", "--out", "a.png"], "scans", "joints")
+        self.bad_input(["render", "result.h5", "--focus", "head", "--within", "0", "--out", "a.png"], "--within")
+
     def test_joints_alone_and_single_meshes(self):
         self.h5("joints.h5", joints=([2, 22, 3], numbers(132, 1)))
         self.done("render", "joints.h5", "--out", "a.png")

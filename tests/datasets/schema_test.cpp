@@ -222,6 +222,25 @@ TEST_F(Schema, ConfidenceIsOfAllFramesOrOfNone) {
   EXPECT_THROW(writer.commit(), ShapeError);
 }
 
+TEST_F(Schema, RadiusIsOfAllFramesOrOfNone) {
+  const std::string path = dir / "p.h5";
+  std::array<double, kJoints> radius;
+  for (size_t j = 0; j < kJoints; ++j) radius[j] = 0.25 * static_cast<double>(j + 1);
+  {
+    PredictionWriter writer(path, 0, {}, kInfo);
+    for (int f = 0; f < 2; ++f) writer.append_joints(tiny_joints(), radius);
+    writer.commit();
+  }
+  const Prediction read = read_prediction(path);
+  ASSERT_EQ(read.radius.size(), 2 * kJoints);
+  EXPECT_EQ(read.radius[kJoints + 3], 1.0);
+  EXPECT_TRUE(verify(path).empty());
+  PredictionWriter writer(path, 0, {}, kInfo);
+  writer.append_joints(tiny_joints(), radius);
+  writer.append(tiny_joints(), {});
+  EXPECT_THROW(writer.commit(), ShapeError);
+}
+
 TEST_F(Schema, RefusesEveryBadPrediction) {
   const std::string path = dir / "p.h5";
   const auto refuse = [&](const std::function<void(Bare&)>& fill, const std::string& says) {

@@ -68,6 +68,15 @@ TEST(Metrics, AgreeWithTheOracle) {
   }
 }
 
+TEST(Metrics, ClaimsOfWhereAPointIsAreCounted) {
+  const std::vector<double> truth = {0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3};
+  std::vector<double> pred = truth;
+  pred[1] += 0.3, pred[3] += 0.3, pred[8] -= 0.4, pred[6] += 0.3;  // off by 0.3, 0.3, 0.5, 0
+  const std::vector<double> radius = {0.31, 0.29, 0.5 + 1e-9, 1e-9};
+  EXPECT_EQ(share_within({pred.data(), 2, 2}, {truth.data(), 2, 2}, radius), 0.75);
+  EXPECT_FALSE(share_within({}, {}, {}));
+}
+
 TEST(Metrics, SureFramesAreCountedFirst) {
   const std::vector<double> confidence = {0.9, 0.1, 0.9, 0.5}, errors = {1, 8, 2, 5};
   const auto curve = risk_coverage(confidence, errors);

@@ -49,6 +49,19 @@ double off(const View& view) {  // from what is true
   return worst;
 }
 
+TEST(Views, NineInTenErrorsAreWithinTheRadius) {
+  std::array<double, kJoints> s;
+  s.fill(0.02);
+  const double r = radius_of_90(s)[21] / 0.02;  // of p(r) = r^2 exp(-r) / 2
+  double held = 0;
+  constexpr int kSteps = 100000;
+  for (int i = 0; i < kSteps; ++i) {
+    const double x = r * (i + 0.5) / kSteps;
+    held += x * x * std::exp(-x) / 2 * r / kSteps;
+  }
+  EXPECT_NEAR(held, 0.9, 1e-5);
+}
+
 TEST(Views, ConfusedSidesAreExchangedWhileTheExtractorIsUnsure) {
   SeenJoints before = remembered();
   ASSERT_TRUE(before.left);
