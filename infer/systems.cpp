@@ -43,13 +43,15 @@ const std::vector<SystemType>& systems() {
 
 const SystemType& system_type(const std::string& name, const std::string& where) {
   std::vector<std::string> names;
+  std::string all;
   for (const SystemType& type : systems()) {
     if (type.name == name) return type;
     names.push_back(type.name);
+    all += (all.empty() ? "" : ", ") + type.name;
   }
   const std::string near = nearest(name, names);
   throw InputError(where, "there is no system '" + name + "'",
-                   near.empty() ? "use chain, refine or register" : "did you mean '" + near + "'?");
+                   near.empty() ? "use one of " + all : "did you mean '" + near + "'?");
 }
 
 }  // namespace restage

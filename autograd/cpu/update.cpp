@@ -43,19 +43,11 @@ void adam_typed(const AdamArgs& args) {
     };
     T *w = args.out.data<T>() + from, *m = args.m.data<T>() + from, *v = args.v.data<T>() + from;
     const T* g = args.gradient.data<T>() + from;
-    if (args.v_max == nullptr) {
-      const auto step = [&](V& wv, V& mv, V& vv, V gv) HWY_ATTR {
-        moments(wv, mv, vv, gv);
-        wv = move(wv, mv, vv);
-      };
-      return update(to - from, step, w, m, v, g);
-    }
-    const auto step = [&](V& wv, V& mv, V& vv, V& top, V gv) HWY_ATTR {
+    const auto step = [&](V& wv, V& mv, V& vv, V gv) HWY_ATTR {
       moments(wv, mv, vv, gv);
-      top = hn::IfThenElse(hn::Lt(vv, top), top, vv);  // NaN in v shows
-      wv = move(wv, mv, top);
+      wv = move(wv, mv, vv);
     };
-    update(to - from, step, w, m, v, args.v_max->data<T>() + from, g);
+    update(to - from, step, w, m, v, g);
   });
 }
 

@@ -5,13 +5,12 @@
 
 namespace restage {
 
-/// Adam exactly as PyTorch's (spec 7); `step` counts from 1; v_max is the AMSGrad memory or null.
+/// Adam exactly as PyTorch's (spec 7); `step` counts from 1.
 struct AdamArgs {
   const Tensor& gradient;
   Tensor& out;  ///< the parameter
   Tensor& m;
   Tensor& v;
-  Tensor* v_max;
   double lr, beta1, beta2, eps, weight_decay, gradient_scale;
   int64_t step;
 };

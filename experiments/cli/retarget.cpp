@@ -244,6 +244,13 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   return 0;
 }
 
+std::string help_of_systems() {
+  std::string out;
+  for (const SystemType& type : systems())
+    out += (out.empty() ? "" : "; ") + type.name + ": " + type.help;
+  return out;
+}
+
 }  // namespace
 
 void add_retarget(Program& program) {
@@ -261,10 +268,7 @@ void add_retarget(Program& program) {
                  "mesh or cloud in T-pose, y up, facing +z; or a glTF character")
       ->required();
   app.add_option("--weights", c.weights, "weights file, run or artifact");
-  app.add_option("--system", c.system,
-                 "chain: the networks of --weights; register: the target is registered to each "
-                 "cloud and reposed, without learning")
-      ->capture_default_str();
+  app.add_option("--system", c.system, help_of_systems())->capture_default_str();
   app.add_option("--rest", c.rest, "the target's 22 rest joints (HDF5, /joints [1, 22, 3])");
   app.add_option("--every", c.every, "only every so many frames of the source; for X.h5");
   app.add_option("--out", c.out, "X.glb, X.bvh, X.h5, or a folder for PLY or OBJ frames")

@@ -6,7 +6,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <map>
-#include <memory>
 #include <thread>
 
 #include "autograd/base/interrupt.h"
@@ -29,14 +28,18 @@ using sweep::SweepPlan;
 struct PlanOptions {
   std::vector<std::string> arguments;
   std::string out;
-  bool measure = false, seed_given = false;
+  bool measure = false;
 };
 
 struct RunOptions {
   std::vector<std::string> arguments;
   std::string out;
   int jobs = 1;
-  bool seed_given = false;
+};
+
+struct StopOptions {
+  std::string dir;
+  double wait = 60;  ///< seconds
 };
 
 /// SWEEP.yaml and key=value, in any order.
@@ -107,7 +110,7 @@ std::string plan_text(const SweepPlan& plan) {
 
 int run_plan(const PlanOptions& options, const Common& common) {
   auto [path, words] = split(options.arguments);
-  if (options.seed_given) words.push_back("seed=" + std::to_string(common.seed));
+  if (common.seed_given) words.push_back("seed=" + std::to_string(common.seed));
   const sweep::SweepFile file = sweep::read_sweep_file(path, words);
   const SweepPlan plan = sweep::plan_sweep(file);
   Json document = plan_json(plan);
@@ -130,10 +133,7 @@ int run_plan(const PlanOptions& options, const Common& common) {
       log_warning(std::to_string(stale) + " trials in " + options.out +
                   " are not of this sweep: they stay and are not counted");
   }
-  if (common.json)
-    print_json(document);
-  else
-    print(text);
+  print(common.json, document, text);
   return 0;
 }
 
@@ -179,6 +179,12 @@ std::string status_text(const Json& status) {
   return out;
 }
 
+int run_status(const std::string& dir, const Common& common) {
+  const Json status = status_json(sweep::read_sweep_dir(dir));
+  print(common.json, status, status_text(status));
+  return 0;
+}
+
 // ---- run ----
 
 /// Planning reads data and builds models; a process of its own takes that memory with it.
@@ -190,7 +196,7 @@ int plan_in_a_process(const RunOptions& options, const Common& common) {
                                     options.out,
                                     "--threads",
                                     std::to_string(common.threads)};
-  if (options.seed_given) words.insert(words.end(), {"--seed", std::to_string(common.seed)});
+  if (common.seed_given) words.insert(words.end(), {"--seed", std::to_string(common.seed)});
   if (common.quiet) words.emplace_back("--quiet");
   words.insert(words.end(), options.arguments.begin(), options.arguments.end());
   const int pid = sweep::spawn_self(words, "", false);
@@ -212,10 +218,7 @@ int run_run(const RunOptions& options, const Common& common) {
   const int each = std::max(1, threads() / options.jobs);
   const sweep::PoolOutcome outcome = sweep::run_pool(dir, {options.jobs, each});
   const Json status = status_json(dir);
-  if (common.json)
-    print_json(status);
-  else
-    print(counts_text(status));
+  print(common.json, status, counts_text(status));
   finish_output();
   if (outcome.stop_requested && outcome.pending + outcome.stopped > 0)
     throw WorkError("stopped by 'restage sweep stop'; 'restage sweep run' goes on");
@@ -224,9 +227,9 @@ int run_run(const RunOptions& options, const Common& common) {
 
 // ---- stop ----
 
-int run_stop(const std::string& path, double wait, const Common& common) {
-  const SweepDir dir = sweep::read_sweep_dir(path);
-  sweep::request_stop(path);
+int run_stop(const StopOptions& options, const Common& common) {
+  const SweepDir dir = sweep::read_sweep_dir(options.dir);
+  sweep::request_stop(options.dir);
   const auto running = [&] {
     std::vector<std::string> ids;
     for (const sweep::TrialEntry& trial : dir.trials)
@@ -237,17 +240,15 @@ int run_stop(const std::string& path, double wait, const Common& common) {
   std::vector<std::string> left = running();
   log_info("asked " + std::to_string(left.size()) + " running trials to stop");
   while (!left.empty() &&
-         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() < wait) {
+         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() <
+             options.wait) {
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
     left = running();
   }
   const Json status = status_json(dir);
-  if (common.json)
-    print_json(status);
-  else
-    print(counts_text(status));
+  print(common.json, status, counts_text(status));
   if (left.empty()) return 0;
-  throw WorkError("trial " + left.front() + " still runs after " + duration_text(wait) +
+  throw WorkError("trial " + left.front() + " still runs after " + duration_text(options.wait) +
                   "; it ends at its next step, or give --wait SECONDS");
 }
 
@@ -256,59 +257,36 @@ int run_stop(const std::string& path, double wait, const Common& common) {
 void add_sweep(Program& program) {
   CLI::App& group = program.add_group("sweep", "many trainings from one file");
 
-  const auto plan = std::make_shared<PlanOptions>();
-  const auto plan_app = std::make_shared<CLI::App*>(nullptr);
-  CLI::App& p = program.add(
+  auto [p, plan] = program.add(
       group, "plan", "list the trials of a sweep file; with --out, write them ready to run",
       "restage sweep plan experiments/smoothness.yaml\n"
       "restage sweep plan sweep.yaml motion.weights.smoothness=0,0.1 motion.optimiser.steps=500\n"
       "restage sweep plan sweep.yaml 'seeds=range(1,6)' --out runs/sweep",
-      [plan, plan_app, &program] {
-        plan->seed_given = (*plan_app)->count("--seed") > 0;
-        return run_plan(*plan, program.common());
-      });
-  *plan_app = &p;
-  p.add_option("SWEEP", plan->arguments, "SWEEP.yaml and key=value, key=a,b, key=range(a,b,step)")
+      run_plan);
+  p.add_option("SWEEP", plan.arguments, "SWEEP.yaml and key=value, key=a,b, key=range(a,b,step)")
       ->required();
-  p.add_option("--out", plan->out, "folder to write");
-  p.add_flag("--measure", plan->measure, "forecast time and memory from a few steps of each stage");
+  p.add_option("--out", plan.out, "folder to write");
+  p.add_flag("--measure", plan.measure, "forecast time and memory from a few steps of each stage");
 
-  const auto run = std::make_shared<RunOptions>();
-  const auto run_app = std::make_shared<CLI::App*>(nullptr);
-  CLI::App& r = program.add(
+  auto [r, run] = program.add(
       group, "run", "run every trial of a sweep that is not done; called again it goes on",
       "restage sweep run experiments/smoothness.yaml --out runs/smoothness\n"
       "restage sweep run sweep.yaml --out runs/sweep --jobs 4 motion.optimiser.steps=500",
-      [run, run_app, &program] {
-        run->seed_given = (*run_app)->count("--seed") > 0;
-        return run_run(*run, program.common());
-      });
-  *run_app = &r;
-  r.add_option("SWEEP", run->arguments, "SWEEP.yaml and key=value, as in 'sweep plan'")->required();
-  r.add_option("--out", run->out, "folder of the sweep")->required();
-  r.add_option("--jobs", run->jobs, "trials at once; they share the threads (1)");
+      run_run);
+  r.add_option("SWEEP", run.arguments, "SWEEP.yaml and key=value, as in 'sweep plan'")->required();
+  r.add_option("--out", run.out, "folder of the sweep")->required();
+  r.add_option("--jobs", run.jobs, "trials at once; they share the threads (1)");
 
-  const auto dir = std::make_shared<std::string>();
-  CLI::App& status = program.add(group, "status", "counts, and a line for every trial",
-                                 "restage sweep status runs/smoothness\n"
-                                 "restage sweep status runs/smoothness --json",
-                                 [dir, &program] {
-                                   const Json found = status_json(sweep::read_sweep_dir(*dir));
-                                   if (program.common().json)
-                                     print_json(found);
-                                   else
-                                     print(status_text(found));
-                                   return 0;
-                                 });
-  status.add_option("DIR", *dir, "folder of the sweep")->required();
+  auto [st, dir] = program.add(group, "status", "counts, and a line for every trial",
+                               "restage sweep status runs/smoothness\n"
+                               "restage sweep status runs/smoothness --json",
+                               run_status);
+  st.add_option("DIR", dir, "folder of the sweep")->required();
 
-  const auto wait = std::make_shared<double>(60);
-  CLI::App& stop = program.add(group, "stop", "running trials write a checkpoint and end",
-                               "restage sweep stop runs/smoothness", [dir, wait, &program] {
-                                 return run_stop(*dir, *wait, program.common());
-                               });
-  stop.add_option("DIR", *dir, "folder of the sweep")->required();
-  stop.add_option("--wait", *wait, "seconds to wait for them (60)");
+  auto [s, stop] = program.add(group, "stop", "running trials write a checkpoint and end",
+                               "restage sweep stop runs/smoothness", run_stop);
+  s.add_option("DIR", stop.dir, "folder of the sweep")->required();
+  s.add_option("--wait", stop.wait, "seconds to wait for them (60)");
   add_sweep_table(program, group);
   add_sweep_export(program, group);
 }

@@ -1,6 +1,5 @@
 // restage sweep export: a script that lets Slurm, GNU parallel or Snakemake run the trials.
 #include <filesystem>
-#include <memory>
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
@@ -43,29 +42,27 @@ int run_export(const Arguments& a, const Common& common) {
                             : engine == tables::Engine::parallel
                                 ? "parallel < " + a.out
                                 : "snakemake --cores all -k -s " + a.out;
-  if (common.json)
-    print_json({{"out", a.out}, {"engine", a.engine}, {"trials", plan->size()}, {"start", start}});
-  else
-    print("wrote " + a.out + ": " + std::to_string(plan->size()) + " trials\nstart it with " +
-          start + "\n");
+  print(common.json,
+        {{"out", a.out}, {"engine", a.engine}, {"trials", plan->size()}, {"start", start}},
+        "wrote " + a.out + ": " + std::to_string(plan->size()) + " trials\nstart it with " + start +
+            "\n");
   return 0;
 }
 
 }  // namespace
 
 void add_sweep_export(Program& program, CLI::App& group) {
-  const auto a = std::make_shared<Arguments>();
-  CLI::App& app = program.add(
+  auto [app, a] = program.add(
       group, "export", "a script for Slurm, GNU parallel or Snakemake that runs the trials",
       "restage sweep export runs/smoothness --engine slurm --out s.sbatch && sbatch s.sbatch\n"
       "restage sweep export runs/smoothness --engine parallel --out s.txt && parallel < s.txt\n"
       "restage sweep export runs/smoothness --engine snakemake --out s.smk && "
       "snakemake --cores 4 -k -s s.smk",
-      [a, &program] { return run_export(*a, program.common()); });
-  app.add_option("DIR", a->dir, "folder of a planned sweep ('sweep plan --out DIR')")->required();
-  app.add_option("--engine", a->engine, "slurm, parallel or snakemake")->required();
-  app.add_option("--out", a->out, "script to write")->required();
-  app.add_option("--program", a->program, "restage as the machines see it (this program)");
+      run_export);
+  app.add_option("DIR", a.dir, "folder of a planned sweep ('sweep plan --out DIR')")->required();
+  app.add_option("--engine", a.engine, "slurm, parallel or snakemake")->required();
+  app.add_option("--out", a.out, "script to write")->required();
+  app.add_option("--program", a.program, "restage as the machines see it (this program)");
 }
 
 }  // namespace restage::cli

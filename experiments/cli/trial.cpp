@@ -1,46 +1,42 @@
 // restage trial: one trial of a sweep's folder. What every engine calls.
-#include <memory>
-
+#include "experiments/sweep/trial.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
-#include "experiments/sweep/trial.h"
 
 namespace restage::cli {
+namespace {
+
+struct TrialOptions {
+  std::string dir, id, stage;
+};
+
+int run_trial(const TrialOptions& o, const Common& common) {
+  if (!o.stage.empty()) {
+    sweep::perform_stage(o.dir, o.id, o.stage, common.quiet);
+    print(common.json, {{"id", o.id}, {"stage", o.stage}},
+          "stage " + o.stage + " of trial " + o.id + " is in the store\n");
+    return 0;
+  }
+  const auto end = sweep::perform_trial(o.dir, o.id, common.quiet);
+  const auto result = read_result(sweep::read_sweep_dir(o.dir), o.id);
+  const std::string state = result ? result->state : "pending";  // removed since
+  const std::string said = end == sweep::TrialEnd::before ? "was " + state + " before"
+                           : end == sweep::TrialEnd::done ? "is done"
+                                                          : "was stopped early";
+  print(common.json, {{"id", o.id}, {"state", state}}, "trial " + o.id + " " + said + "\n");
+  return 0;
+}
+
+}  // namespace
 
 void add_trial(Program& program) {
-  struct Options {
-    std::string dir, id, stage;
-  };
-  const auto options = std::make_shared<Options>();
-  CLI::App& app = program.add(
-      "trial", "run one trial of a sweep's folder, start to finish",
-      "restage trial runs/smoothness 4f2a90c1d3e5\n"
-      "restage trial runs/smoothness 4f2a90c1d3e5 --threads 4",
-      [options, &program] {
-        const Common& common = program.common();
-        if (!options->stage.empty()) {
-          sweep::perform_stage(options->dir, options->id, options->stage, common.quiet);
-          if (common.json)
-            print_json({{"id", options->id}, {"stage", options->stage}});
-          else
-            print("stage " + options->stage + " of trial " + options->id + " is in the store\n");
-          return 0;
-        }
-        const auto end = sweep::perform_trial(options->dir, options->id, common.quiet);
-        const auto result = read_result(sweep::read_sweep_dir(options->dir), options->id);
-        const std::string state = result ? result->state : "pending";  // removed since
-        if (common.json)
-          print_json({{"id", options->id}, {"state", state}});
-        else if (end == sweep::TrialEnd::before)
-          print("trial " + options->id + " was " + state + " before\n");
-        else
-          print("trial " + options->id +
-                (end == sweep::TrialEnd::done ? " is done\n" : " was stopped early\n"));
-        return 0;
-      });
-  app.add_option("DIR", options->dir, "folder of 'restage sweep plan --out'")->required();
-  app.add_option("ID", options->id, "of the trial")->required();
-  app.add_option("--stage", options->stage, "make only the artifacts up to this stage");
+  auto [app, options] = program.add("trial", "run one trial of a sweep's folder, start to finish",
+                                    "restage trial runs/smoothness 4f2a90c1d3e5\n"
+                                    "restage trial runs/smoothness 4f2a90c1d3e5 --threads 4",
+                                    run_trial);
+  app.add_option("DIR", options.dir, "folder of 'restage sweep plan --out'")->required();
+  app.add_option("ID", options.id, "of the trial")->required();
+  app.add_option("--stage", options.stage, "make only the artifacts up to this stage");
 }
 
 }  // namespace restage::cli

@@ -1,4 +1,4 @@
-// What the trials of a sweep left behind (../shared/spec is the contract; docs/experiments.md):
+// What the trials of a sweep left behind (docs/experiments.md):
 // DIR/plan.json, what was planned, and DIR/trials/ID/result.json, what came of each. Results may
 // come from any machine and engine, so nothing in them is believed: what is damaged, or belongs to
 // another trial or plan, is told in one line and not used.
@@ -57,7 +57,7 @@ struct Results {
 
 /// 12 lower-case hex digits.
 bool is_trial_id(const std::string& text);
-/// DIR/plan.json, the document of `restage sweep plan --json`; nothing if it is not there.
+/// DIR/plan.json (docs/design/experiments.md); nothing if it is not there.
 /// InputError: damaged.
 std::optional<std::vector<PlannedTrial>> read_plan(const std::string& dir);
 /// The folder of artifacts as DIR/plan.json names it; empty if it does not.

@@ -4,12 +4,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <map>
 #include <regex>
 #include <set>
 
 #include "autograd/base/nearest.h"
+#include "nn/models/registry.h"
 #include "tests/support/files.h"
 #include "train/schedule.h"
 #include "train/stages/train_config.h"
@@ -461,6 +463,31 @@ TEST(ConfigReferencePage, NamesEveryKeyWithItsDefault) {
           << "'";
   }
   for (const auto& [key, value] : page) EXPECT_TRUE(keys.contains(key)) << key << " is no key";
+}
+
+/// The page's line of a model that no stage has by default.
+TEST(ConfigReferencePage, NamesTheSizesOfEveryModel) {
+  std::ifstream file(RESTAGE_SOURCE_DIR "/docs/config_reference.md");
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(file, line);) lines.push_back(line);
+  const std::set<std::string> by_default = {"skeleton/point_transformer", "smrm/rot6d",
+                                            "deformation/weights", "deformation/offsets",
+                                            "deformation/root"};
+  for (const ModelType& type : models()) {
+    std::vector<ConfigReference::Row> rows;
+    ConfigReference reference(rows);
+    AnyConfig sizes = type.config;
+    sizes.visit_held(reference);
+    if (by_default.contains(type.name) || type.role == "discriminator" || rows.empty()) continue;
+    const auto line = std::find_if(lines.begin(), lines.end(), [&](const std::string& text) {
+      return text.starts_with("| ") && text.find(type.name) < text.find("|", 2);
+    });
+    ASSERT_NE(line, lines.end()) << type.name;
+    if (line->find("those of ") != std::string::npos) continue;
+    for (const ConfigReference::Row& row : rows)
+      EXPECT_NE(line->find(row.key + " " + row.value), std::string::npos)
+          << type.name << ": " << row.key << " " << row.value;
+  }
 }
 
 }  // namespace

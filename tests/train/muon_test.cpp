@@ -107,8 +107,8 @@ TEST(Muon, LeavesTheRestOfANetworkToAdam) {
                    muon = state(OptimiserConfig::Kind::muon);
   int others = 0, matrices = 0;
   for (const auto& [name, value] : adam.tensors) {
-    if (!name.starts_with("adam.") || !name.ends_with(".v")) continue;
-    const std::string weight = name.substr(5, name.size() - 7);
+    if (!name.starts_with("optimiser.") || !name.ends_with(".v")) continue;
+    const std::string weight = name.substr(10, name.size() - 12);
     const bool same = gradcheck::same_bits(adam.tensors.at(weight), muon.tensors.at(weight));
     const bool by_adam = muon.find(name) != nullptr;
     EXPECT_EQ(same, by_adam) << weight;

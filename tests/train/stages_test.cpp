@@ -128,8 +128,8 @@ TEST(TrainStages, StateGoesThroughAFile) {
 }
 
 TEST(TrainStages, ReadingHasNoState) {
-  const std::vector<std::string> known = {"skeleton.",    "smrm.", "discriminator.",
-                                          "deformation.", "adam.", "discriminator_adam.",
+  const std::vector<std::string> known = {"skeleton.",    "smrm.",      "discriminator.",
+                                          "deformation.", "optimiser.", "discriminator_optimiser.",
                                           "balance"};
   for (const std::string name : kStageNames) {
     const auto one = tiny_stage(name, tiny_training(8)), other = tiny_stage(name, tiny_training(8));
@@ -427,7 +427,7 @@ TEST(TrainStages, NonFiniteValuesAreNamedWithOpAndModule) {
     const TensorFile then = parse_safetensors(before, "b"),
                      now = parse_safetensors(bytes_of(*stage), "a");
     for (const auto& [name, tensor] : then.tensors) {
-      if (name.starts_with("adam.") || name.starts_with("discriminator")) continue;
+      if (name.starts_with("optimiser.") || name.starts_with("discriminator")) continue;
       EXPECT_TRUE(tensor.to_vector<float>() == now.at(name, "a").to_vector<float>()) << name;
     }
   }

@@ -10,7 +10,7 @@ Adam::Adam(const std::vector<NamedParameter>& parameters, const AdamConfig& conf
     const auto zeros = [&] {
       return Tensor::zeros(p.parameter->value.shape(), p.parameter->value.dtype());
     };
-    slots_.push_back({p, zeros(), zeros(), config.amsgrad ? zeros() : Tensor(), 0});
+    slots_.push_back({p, zeros(), zeros(), 0});
   }
 }
 
@@ -20,9 +20,8 @@ void Adam::step(const Gradients& gradients, double rate, double scale) {
     const Tensor* g = gradients.find(p.id);
     if (g == nullptr) continue;
     ++s.steps;
-    launch(AdamArgs{*g, p.value, s.m, s.v, config_.amsgrad ? &s.v_max : nullptr, rate,
-                    config_.beta1, config_.beta2, config_.eps, config_.weight_decay, scale,
-                    s.steps});
+    launch(AdamArgs{*g, p.value, s.m, s.v, rate, config_.beta1, config_.beta2, config_.eps,
+                    config_.weight_decay, scale, s.steps});
   }
 }
 
@@ -31,7 +30,6 @@ void Adam::save(const std::string& prefix, TensorFile& file) const {
     const std::string name = prefix + s.of.name;
     file.tensors[name + ".m"] = s.m;
     file.tensors[name + ".v"] = s.v;
-    if (config_.amsgrad) file.tensors[name + ".v_max"] = s.v_max;
     file.tensors[name + ".steps"] = Tensor::from<int64_t>({1}, {s.steps});
   }
 }
@@ -42,7 +40,6 @@ void Adam::load(const std::string& prefix, const TensorFile& file, const std::st
     const Shape& shape = s.of.parameter->value.shape();
     s.m = saved_state(file, name + ".m", shape, where);
     s.v = saved_state(file, name + ".v", shape, where);
-    if (config_.amsgrad) s.v_max = saved_state(file, name + ".v_max", shape, where);
     s.steps = saved_state(file, name + ".steps", {1}, where).data<int64_t>()[0];
   }
 }

@@ -8,7 +8,6 @@ namespace restage {
 
 struct AdamConfig {
   double beta1 = 0.9, beta2 = 0.999, eps = 1e-8, weight_decay = 0;
-  bool amsgrad = false;
 };
 
 template <class V>
@@ -17,7 +16,6 @@ void visit(V& v, AdamConfig& c) {
   v("beta2", c.beta2, "decay of the second moment", below(0, 1));
   v("eps", c.eps, "added to the root of the second moment", positive());
   v("weight_decay", c.weight_decay, "L2 term added to the gradient", at_least(0));
-  v("amsgrad", c.amsgrad, "keep the largest second moment");
 }
 
 class Adam {
@@ -32,7 +30,7 @@ class Adam {
  private:
   struct Slot {
     NamedParameter of;
-    Tensor m, v, v_max;
+    Tensor m, v;
     int64_t steps = 0;
   };
   std::vector<Slot> slots_;
