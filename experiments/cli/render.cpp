@@ -1,6 +1,9 @@
 // restage render: a contact sheet or a page that plays source, result and truth.
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
 
 #include "autograd/base/error.h"
 #include "autograd/base/nearest.h"
@@ -15,10 +18,13 @@
 namespace restage::cli {
 namespace {
 
+constexpr double kCloseUp = 0.25;  // metres to either side
+
 struct RenderOptions {
   std::string result, source, truth, out, title, focus;
   int columns = 8;
-  double fps = kFps, within = 0.25, azimuth = SheetOptions{}.azimuth;
+  double fps = kFps;
+  std::optional<double> within, azimuth;
   int64_t sequence = 0;
 };
 
@@ -31,10 +37,17 @@ void check(const RenderOptions& options) {
                      "give a number from 1 to 64");
   if (!(options.fps > 0) || options.fps > 1000)
     throw InputError("", "--fps is out of range", "give frames per second above 0");
-  if (!(options.within > 0) || options.within > 10)
+  if (options.within && (!(*options.within > 0) || *options.within > 10))
     throw InputError("", "--within is out of range", "give metres above 0, at most 10");
-  if (!options.focus.empty() && options.out.ends_with(".html"))
-    throw InputError("", "--focus goes with a sheet only", "end --out in .png, or leave it out");
+  if (options.within && options.focus.empty())
+    throw InputError("", "--within belongs to --focus", "give both, or leave it out");
+  if (options.azimuth && !(std::abs(*options.azimuth) <= 360))
+    throw InputError("", "--azimuth is out of range", "give degrees from -360 to 360");
+  for (const auto& [given, name] : {std::pair(!options.focus.empty(), "--focus"),
+                                    std::pair(options.azimuth.has_value(), "--azimuth")})
+    if (given && options.out.ends_with(".html"))
+      throw InputError("", std::string(name) + " goes with a sheet only",
+                       "end --out in .png, or leave it out");
   check_output(options.out, {options.result, options.source, options.truth});
 }
 
@@ -65,8 +78,8 @@ int run_render(const RenderOptions& options, const Common& common) {
     sheet.columns = options.columns;
     sheet.fps = options.fps;
     sheet.title = options.title;
-    sheet.azimuth = options.azimuth;
-    if (!options.focus.empty()) sheet.close_up = options.within;
+    sheet.azimuth = options.azimuth.value_or(sheet.azimuth);
+    if (!options.focus.empty()) sheet.close_up = options.within.value_or(kCloseUp);
     write_contact_sheet(options.out, clips, sheet);
   } else {
     PageOptions page;
@@ -97,11 +110,9 @@ void add_render(Program& program) {
   app.add_option("--sequence", options.sequence, "which sequence of an HDF5 file, from 0");
   app.add_option("--focus", options.focus,
                  "joint of a close-up, such as left_wrist; of files with /joints, on a sheet");
-  app.add_option("--within", options.within, "metres to either side of --focus")
-      ->capture_default_str();
+  app.add_option("--within", options.within, "metres to either side of --focus (0.25)");
   app.add_option("--azimuth", options.azimuth,
-                 "where a sheet is seen from, degrees from the front towards the body's left")
-      ->capture_default_str();
+                 "where a sheet is seen from, degrees from the front towards the body's left (32)");
   app.add_option("--title", options.title, "a line at the top");
 }
 

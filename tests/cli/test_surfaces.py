@@ -157,6 +157,9 @@ class Render(CliTest):
         self.bad_input(["render", "result.h5", "--focus", "head", "--out", "a.html"], "--focus")
         self.bad_input(["render", "result.h5", "--source", "scans", "--focus", "head", "--out", "a.png"], "scans", "joints")
         self.bad_input(["render", "result.h5", "--focus", "head", "--within", "0", "--out", "a.png"], "--within")
+        self.bad_input(["render", "result.h5", "--within", "0.2", "--out", "a.png"], "--within", "--focus")
+        self.bad_input(["render", "result.h5", "--azimuth", "nan", "--out", "a.png"], "--azimuth")
+        self.bad_input(["render", "result.h5", "--azimuth", "9", "--out", "a.html"], "--azimuth", "sheet")
 
     def test_joints_alone_and_single_meshes(self):
         self.h5("joints.h5", joints=([2, 22, 3], numbers(132, 1)))
