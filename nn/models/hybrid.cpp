@@ -84,10 +84,11 @@ Var of_leaves(const Var& x) {
   return reshape(expand(reshape(five, {n, t, kEnds, 1}), {n, t, kEnds, 6}), {n, t, 6 * kEnds});
 }
 
-/// How ankles and feet move in the world (m/s, small ones told apart) and lie below the pelvis, per
-/// frame: [n, t, 16], constant. `before`: the joints of the frame before [n, 1, 22, 3], replaced.
-/// Whether a foot rests is the difference of two large numbers, its velocity about the pelvis and
-/// the pelvis' own, which recurrent layers do not find.
+/// How ankles and feet move over the ground (m/s, small ones told apart; that the person's own
+/// frame turns is left out) and lie below the pelvis, per frame: [n, t, 16], constant. `before`:
+/// the joints of the frame before [n, 1, 22, 3], replaced. Whether a foot rests is the difference
+/// of two large numbers, its velocity about the pelvis and the pelvis' own, which recurrent layers
+/// do not find.
 Tensor footing_of(const MotionInput& in, Var* before) {
   const int64_t n = in.joints.size(0), t = in.joints.size(1);
   const Tensor joints = in.joints.value.cast(DType::f64), trans = in.trans.value.cast(DType::f64),

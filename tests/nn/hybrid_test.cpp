@@ -120,7 +120,38 @@ TEST(Hybrid, FrameByFrameAsAtOnce) {
     const Tensor expected = slice(all.joints, 1, t, t + 1).value;
     for (int64_t i = 0; i < expected.numel(); ++i)
       EXPECT_NEAR(one.joints.value.item(i), expected.item(i), 1e-12) << t;
+    for (int64_t i = 0; i < 4; ++i)
+      EXPECT_NEAR(one.standing.value.item(i),
+                  all.standing.value.item((i / 2 * kFrames + t) * 2 + i % 2), 1e-12)
+          << t;
   }
+}
+
+/// Most that contact differs from that of `in` as it is, if from the second frame on the joints
+/// drift by -`drift` m/s and the path by `path` m/s.
+double contact_changed_by(double drift, double path) {
+  Input in, other;
+  for (int64_t n = 0; n < 2; ++n)
+    for (int64_t t = 1; t < kFrames; ++t) {
+      other.trans.data<double>()[3 * (n * kFrames + t)] += path;
+      for (int64_t j = 0; j < kJoints; ++j)
+        other.joints.data<double>()[3 * ((n * kFrames + t) * kJoints + j)] -=
+            drift * static_cast<double>(t) / kFps;
+    }
+  const auto net = hybrid();
+  Context ctx;
+  MotionState one, two;
+  const Tensor a = net->forward(ctx, in.all(), &one).standing.value,
+               b = net->forward(ctx, other.all(), &two).standing.value;
+  double most = 0;
+  for (int64_t i = 0; i < a.numel(); ++i) most = std::max(most, std::abs(a.item(i) - b.item(i)));
+  return most;
+}
+
+TEST(Hybrid, ContactSeesHowFeetMoveOverTheGroundAndNothingElse) {
+  EXPECT_GT(contact_changed_by(0, 0.5), 1e-3);
+  EXPECT_GT(contact_changed_by(0.5, 0), 1e-3);
+  EXPECT_LT(contact_changed_by(0.5, 0.5), 1e-9) << "the same feet over the same ground";
 }
 
 TEST(Hybrid, WithLatencyItAnswersTheFrameSoManyBefore) {
