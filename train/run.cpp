@@ -124,6 +124,16 @@ std::optional<Checkpoint> latest_checkpoint(const std::string& dir,
   return {};
 }
 
+Checkpoint checkpoint_of(const std::string& dir, const std::string& stage, int64_t step) {
+  for (const auto& entry : run_files::list_checkpoints(dir, {stage}))
+    if (entry.step == step)
+      if (auto found = run_files::load(entry)) return std::move(*found);
+  throw InputError(dir,
+                   "the checkpoint of stage '" + stage + "' at step " + std::to_string(step) +
+                       " is missing or damaged",
+                   "train again from the start");
+}
+
 RunDir::RunDir(std::string dir, std::vector<std::string> stages, int lock)
     : dir_(std::move(dir)), stages_(std::move(stages)), lock_(lock) {}
 
@@ -226,13 +236,20 @@ void RunDir::metrics(const std::string& stage, int64_t step,
 }
 
 std::string RunDir::save_checkpoint(const std::string& stage, int64_t step, std::string_view bytes,
-                                    int keep) {
+                                    const KeepRule& keep) {
   if (::fsync(metrics_) != 0 && errno != EINVAL) disk_error(inside(dir_, "metrics.jsonl"));
   const fs::path folder = fs::path(dir_) / "checkpoints";
   const std::string path = (folder / run_files::checkpoint_name(stage, step, bytes)).string();
   write_file_atomically(path, bytes);
-  run_files::prune(run_files::list_checkpoints(dir_, stages_), stage, keep, path);
+  std::error_code ignored;
+  for (const auto& entry : run_files::list_checkpoints(dir_, {stage}))
+    if (entry.step == step && entry.path != path) fs::remove(entry.path, ignored);
+  prune(stage, keep);
   return path;
+}
+
+void RunDir::prune(const std::string& stage, const KeepRule& keep) const {
+  run_files::prune(run_files::list_checkpoints(dir_, {stage}), keep);
 }
 
 }  // namespace restage

@@ -27,11 +27,20 @@ struct Checkpoint {
   std::string bytes;
 };
 
+/// Which checkpoints of a stage stay.
+struct KeepRule {
+  int64_t last = 2;   ///< the newest
+  int64_t every = 0;  ///< those whose step is a multiple of this; 0: none
+  int64_t best = -1;  ///< that of this step
+};
+
 /// The newest undamaged checkpoint of a run, in the order of the stages and of the steps in each;
 /// reads only, needs no lock. Each damaged one that is passed over gives a warning in the log.
 /// InputError if `dir` is no run directory. A single stage gives its newest one.
 std::optional<Checkpoint> latest_checkpoint(const std::string& dir,
                                             const std::vector<std::string>& stages);
+/// That of a step. InputError: it is not there, or damaged.
+Checkpoint checkpoint_of(const std::string& dir, const std::string& stage, int64_t step);
 /// `dir`/config.yaml; InputError if `dir` is no run directory.
 std::string run_config_path(const std::string& dir);
 
@@ -63,10 +72,12 @@ class RunDir {
   /// Appends one line. Non-finite values become null. WorkError on a full disk, and no torn line.
   void metrics(const std::string& stage, int64_t step,
                const std::vector<std::pair<std::string, double>>& values);
-  /// Makes the metrics and then `bytes` durable, and prunes: the last `keep` of this stage and the
-  /// last one of each earlier stage stay. Returns the path.
+  /// Makes the metrics and then `bytes` durable, and prunes what the stage has beyond `keep`.
+  /// Returns the path.
   std::string save_checkpoint(const std::string& stage, int64_t step, std::string_view bytes,
-                              int keep = 2);
+                              const KeepRule& keep = {});
+  /// Prunes the checkpoints of a stage.
+  void prune(const std::string& stage, const KeepRule& keep) const;
 
  private:
   RunDir(std::string dir, std::vector<std::string> stages, int lock);

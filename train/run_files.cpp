@@ -95,16 +95,12 @@ std::optional<Checkpoint> load(const Entry& entry) {
   return {};
 }
 
-void prune(const std::vector<Entry>& entries, const std::string& stage, int keep,
-           const std::string& keep_path) {
-  std::string newer_stage;
-  int kept = 0;
-  for (auto entry = entries.rbegin(); entry != entries.rend(); ++entry) {
-    if (entry->stage != newer_stage) kept = 0;
-    newer_stage = entry->stage;
-    ++kept;
-    if (entry->path != keep_path && kept > (entry->stage == stage ? std::max(keep, 1) : 1))
-      remove_file(entry->path);
+void prune(const std::vector<Entry>& entries, const KeepRule& keep) {
+  const int64_t first = std::ssize(entries) - std::max<int64_t>(keep.last, 1);
+  for (int64_t i = 0; i < first; ++i) {
+    const Entry& entry = entries[static_cast<size_t>(i)];
+    const bool marked = keep.every > 0 && entry.step % keep.every == 0;
+    if (!marked && entry.step != keep.best) remove_file(entry.path);
   }
 }
 

@@ -23,10 +23,8 @@ std::string checkpoint_name(const std::string& stage, int64_t step, std::string_
 std::vector<Entry> list_checkpoints(const std::string& dir, const std::vector<std::string>& stages);
 /// The checkpoint, or nothing and a warning in the log if its bytes do not fit its checksum.
 std::optional<Checkpoint> load(const Entry& entry);
-/// Removes all entries but `keep_path` and the newest `keep` of `stage` and the newest of the
-/// others.
-void prune(const std::vector<Entry>& entries, const std::string& stage, int keep,
-           const std::string& keep_path);
+/// Removes those of a stage that are not to stay; `entries` oldest first.
+void prune(const std::vector<Entry>& entries, const KeepRule& keep);
 /// Removes temporary files that a killed process left.
 void remove_leftovers(const std::string& dir);
 /// Keeps the lines of metrics.jsonl up to `last` (none: no lines); drops torn and foreign lines.

@@ -92,6 +92,15 @@ Bundle Stage::result() const {
   return out;
 }
 
+std::vector<StateEntry> Stage::weights() const {
+  std::vector<StateEntry> out;
+  for (const Network& n : networks_)
+    if (n.handed_on)
+      for (StateEntry& entry : state_of(*n.model.net, prefix_of(n.role)))
+        out.push_back(std::move(entry));
+  return out;
+}
+
 Differentiated differentiate(const RngKey& key, const std::function<Var(Context&)>& loss) {
   const auto run = [&] {
     Tape tape;

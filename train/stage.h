@@ -50,6 +50,8 @@ class Stage {
                   const std::string& where);
   /// The networks to be used later, by role. They are shared with the stage.
   virtual Bundle result() const;
+  /// Their parameters and buffers, under the names of a checkpoint.
+  virtual std::vector<StateEntry> weights() const;
 
  protected:
   /// Builds a network that the stage trains. `handed_on`: it is needed after the training.

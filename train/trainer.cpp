@@ -13,12 +13,6 @@
 namespace restage {
 namespace {
 
-std::string bytes_of(const Stage& stage) {
-  TensorFile file;
-  stage.save(file);
-  return safetensors_bytes(file);
-}
-
 std::string line(const NamedValues& values) {
   std::string out;
   for (const auto& [name, value] : values) {
@@ -29,74 +23,163 @@ std::string line(const NamedValues& values) {
   return out;
 }
 
-NamedValues step_with(MatmulPrecision precision, Stage& stage, int64_t step) {
-  const MatmulPrecisionScope scope(precision);
-  return stage.step(step);
-}
-
-/// Steps `first` ... of one stage.
-void run_stage(Stage& stage, int64_t first, RunDir& run, const LoopConfig& loop,
-               const TrainOptions& options) {
-  const auto tell = [&](auto&& event) {
-    for (TrainObserver* observer : options.observers) event(*observer);
-  };
-  const StopScope stop;
-  Throughput throughput;
-  product_rate();
-  const int64_t steps = stage.steps(), blocks_before = memory_stats().large_allocations;
-  const auto validate = [&](int64_t done) {
-    const NamedValues scores = stage.validate();
-    run.metrics(stage.name(), done, scores);
-    tell([&](TrainObserver& o) { o.on_validation(stage, done, scores); });
-    return stage.name() + " after " + std::to_string(done) + " steps: " + line(scores);
-  };
-  const auto checkpoint = [&](int64_t done) {
-    const std::string path = run.save_checkpoint(stage.name(), done, bytes_of(stage));
-    tell([&](TrainObserver& o) { o.on_checkpoint(stage, done, path); });
-  };
-  if (steps == 0) {
-    log_info(validate(0));
-    checkpoint(0);
-    return;
+/// One stage's way through its steps.
+class StageRun {
+ public:
+  StageRun(Stage& stage, RunDir& run, const LoopConfig& loop, const TrainOptions& options)
+      : stage_(stage),
+        run_(run),
+        loop_(loop),
+        options_(options),
+        best_(monitored(loop.selection, stage.name()), loop.selection.min_delta) {
+    if (loop.selection.ema > 0) average_.emplace(stage, loop.selection.ema);
   }
-  reset_peak_memory();
-  Progress progress(stage.name(), steps, standard_progress(options.quiet), first);
-  for (int64_t step = first; step < steps; ++step) {
-    take_kernel_stats();  // not what validation did
-    const auto start = std::chrono::steady_clock::now();
-    NamedValues values = step_with(options.precision, stage, step);
-    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-    const KernelStats work = take_kernel_stats();
-    throughput.add(stage.examples_per_step(), took.count(), work.flops);
-    if (std::isfinite(work.active_share)) {
-      values.emplace_back("active_share", work.active_share);
-      values.emplace_back("active_score_share", work.active_score_share);
+
+  void go_on_from(const Checkpoint& checkpoint) {
+    const TensorFile file = parse_safetensors(checkpoint.bytes, checkpoint.path);
+    stage_.load(file, checkpoint.path);
+    if (average_) average_->load(file, checkpoint.path);
+    if (loop_.selection.judges()) best_.load(file, checkpoint.path);
+    done_ = checkpoint.step;
+  }
+
+  /// To the end; the stage then holds what it hands on.
+  void run() {
+    const StopScope stop;
+    if (stage_.steps() == 0) {
+      log_info(validate());
+      checkpoint();
+      return;
     }
-    const int64_t done = step + 1;
-    const bool last = done == steps, stopped = stop_requested();
-    if (done % loop.log_every == 0 || last) run.metrics(stage.name(), done, values);
+    if (!over()) all_steps();
+    hand_on();
+  }
+
+ private:
+  bool ended_early() const {
+    const int64_t patience = loop_.selection.patience;
+    return patience > 0 && best_.worse() >= patience;
+  }
+  bool hands_on_best() const {
+    return loop_.selection.choice == SelectionConfig::Export::best && best_.step() >= 0;
+  }
+  bool over() const { return done_ == stage_.steps() || ended_early(); }
+  bool due(int64_t every) const { return done_ % every == 0 || done_ == stage_.steps(); }
+  template <class Event>
+  void tell(Event&& event) {
+    for (TrainObserver* observer : options_.observers) event(*observer);
+  }
+
+  void all_steps();
+  NamedValues step();
+  std::string validate();
+  void checkpoint();
+  void hand_on();
+  void report(int64_t steps, int64_t blocks_before) const;
+
+  Stage& stage_;
+  RunDir& run_;
+  const LoopConfig& loop_;
+  const TrainOptions& options_;
+  std::optional<WeightAverage> average_;
+  BestSoFar best_;
+  Throughput throughput_;
+  int64_t done_ = 0;
+};
+
+void StageRun::all_steps() {
+  product_rate();
+  reset_peak_memory();
+  const int64_t first = done_, blocks_before = memory_stats().large_allocations;
+  Progress progress(stage_.name(), stage_.steps(), standard_progress(options_.quiet), first);
+  while (!over()) {
+    const NamedValues values = step();
+    const bool stopped = stop_requested();
+    if (due(loop_.log_every)) run_.metrics(stage_.name(), done_, values);
     NamedValues shown = values;  // the loss first, then speed
-    const NamedValues speed = throughput.values();
+    const NamedValues speed = throughput_.values();
     shown.insert(shown.begin() + std::min<std::ptrdiff_t>(1, std::ssize(shown)), speed.begin(),
                  speed.end());
-    progress.update(done, shown);
-    tell([&](TrainObserver& o) { o.on_step(stage, done, values); });
-    if (done % loop.validate_every == 0 || last) progress.note(validate(done));
-    if (done % loop.checkpoint_every == 0 || last || stopped) checkpoint(done);
+    progress.update(done_, shown);
+    tell([&](TrainObserver& o) { o.on_step(stage_, done_, values); });
+    if (due(loop_.validate_every)) progress.note(validate());
+    const bool keeps_best = loop_.selection.judges() && best_.step() == done_;
+    if (due(loop_.checkpoint_every) || stopped || keeps_best || ended_early()) checkpoint();
     if (stopped) {
       progress.finish();
       throw_if_stopped();
     }
   }
   progress.finish();
-  if (first >= steps) return;
+  report(done_ - first, blocks_before);
+}
+
+NamedValues StageRun::step() {
+  take_kernel_stats();  // not what validation did
+  const auto start = std::chrono::steady_clock::now();
+  NamedValues values;
+  {
+    const MatmulPrecisionScope scope(options_.precision);
+    values = stage_.step(done_);
+  }
+  ++done_;
+  if (average_) average_->add(done_);
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  const KernelStats work = take_kernel_stats();
+  throughput_.add(stage_.examples_per_step(), took.count(), work.flops);
+  if (std::isfinite(work.active_share)) {
+    values.emplace_back("active_share", work.active_share);
+    values.emplace_back("active_score_share", work.active_score_share);
+  }
+  return values;
+}
+
+std::string StageRun::validate() {
+  if (average_) average_->exchange();
+  NamedValues scores = stage_.validate();
+  if (average_) average_->exchange();
+  std::string out = stage_.name() + " after " + std::to_string(done_) + " steps: " + line(scores);
+  if (loop_.selection.judges()) {
+    best_.add(done_, scores);
+    if (best_.step() != done_) out += " (" + best_.text() + ")";
+    if (ended_early())
+      out += "; ends here, " + std::to_string(best_.worse()) + " validations without a better one";
+  }
+  if (hands_on_best()) scores.emplace_back("best_step", static_cast<double>(best_.step()));
+  run_.metrics(stage_.name(), done_, scores);
+  tell([&](TrainObserver& o) { o.on_validation(stage_, done_, scores); });
+  return out;
+}
+
+void StageRun::checkpoint() {
+  TensorFile file;
+  stage_.save(file);
+  if (average_) average_->save(&file);
+  if (loop_.selection.judges()) best_.save(&file);
+  const std::string path = run_.save_checkpoint(stage_.name(), done_, safetensors_bytes(file),
+                                                {loop_.keep, loop_.keep_every, best_.step()});
+  tell([&](TrainObserver& o) { o.on_checkpoint(stage_, done_, path); });
+}
+
+void StageRun::hand_on() {
+  run_.prune(stage_.name(), {1, loop_.keep_every, best_.step()});
+  if (hands_on_best() && best_.step() != done_) {
+    const int64_t end = done_;
+    go_on_from(checkpoint_of(run_.dir(), stage_.name(), best_.step()));
+    log_info(stage_.name() + ": hands on its " + best_.text() + ", not step " +
+             std::to_string(end));
+  }
+  if (average_) average_->exchange();
+}
+
+void StageRun::report(int64_t steps, int64_t blocks_before) const {
   char text[300];
   std::snprintf(text, sizeof text,
                 "%s: %lld steps, %.1f ms a step, %s, peak of tensors %.0f MiB, %lld "
                 "large blocks taken",
-                stage.name().c_str(), static_cast<long long>(steps - first),
-                1e3 * throughput.seconds() / static_cast<double>(steps - first),
-                line(throughput.values()).c_str(),
+                stage_.name().c_str(), static_cast<long long>(steps),
+                1e3 * throughput_.seconds() / static_cast<double>(steps),
+                line(throughput_.values()).c_str(),
                 static_cast<double>(memory_stats().peak) / 1048576.0,
                 static_cast<long long>(memory_stats().large_allocations - blocks_before));
   log_info(text);
@@ -113,7 +196,7 @@ Bundle train(RunDir& run, const std::vector<std::string>& stages, const LoopConf
   for (size_t i = 0; i < stages.size(); ++i) {
     const auto stage = make(stages[i], &result);
     if (stage == nullptr) continue;
-    int64_t first = 0;
+    StageRun stage_run(*stage, run, loop, options);
     const auto index = static_cast<std::ptrdiff_t>(i);
     if (resumed && index <= begin) {
       // The stage that was interrupted, or an earlier one that is complete.
@@ -121,10 +204,9 @@ Bundle train(RunDir& run, const std::vector<std::string>& stages, const LoopConf
       if (!checkpoint)
         throw InputError(run.dir(), "the checkpoint of stage '" + stages[i] + "' is missing",
                          "train again from the start");
-      stage->load(parse_safetensors(checkpoint->bytes, checkpoint->path), checkpoint->path);
-      first = checkpoint->step;
+      stage_run.go_on_from(*checkpoint);
     }
-    run_stage(*stage, first, run, loop, options);
+    stage_run.run();
     result.add(stage->result());
   }
   return result;

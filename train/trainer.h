@@ -5,12 +5,14 @@
 #include "nn/config/config_reader.h"
 #include "train/progress.h"
 #include "train/run.h"
-#include "train/stage.h"
+#include "train/selection.h"
 
 namespace restage {
 
 struct LoopConfig {
   int64_t log_every = 50, validate_every = 1000, checkpoint_every = 1000;
+  int64_t keep = 2, keep_every = 0;
+  SelectionConfig selection = {};
 };
 
 template <class V>
@@ -18,6 +20,9 @@ void visit(V& v, LoopConfig& c) {
   v("log_every", c.log_every, "steps between lines of metrics.jsonl", positive());
   v("validate_every", c.validate_every, "steps between validations", positive());
   v("checkpoint_every", c.checkpoint_every, "steps between checkpoints", positive());
+  v("keep", c.keep, "checkpoints of a stage that stay", between(1, 1000000));
+  v("keep_every", c.keep_every, "those of every so many steps stay as well; 0: none", at_least(0));
+  visit(v, c.selection);
 }
 
 /// Watches a training; one hangs on the loop for each thing that wants to know. Called on the

@@ -140,7 +140,8 @@ TEST_F(TrainRun, CheckpointsKeepTheLast) {
     run.save_checkpoint("skeleton", step, "s" + std::to_string(step));
   EXPECT_EQ(checkpoints(run.dir()),
             (std::vector<std::string>{"skeleton-000000030", "skeleton-000000040"}));
-  // an earlier stage keeps its last one, whatever the steps of the later stage are
+  // a stage that is over keeps its last one, whatever the steps of the later stage are
+  run.prune("skeleton", {.last = 1});
   for (int64_t step = 1; step <= 3; ++step)
     run.save_checkpoint("smrm", step, "m" + std::to_string(step));
   EXPECT_EQ(checkpoints(run.dir()),
@@ -154,10 +155,25 @@ TEST_F(TrainRun, CheckpointsKeepTheLast) {
   EXPECT_FALSE(latest_checkpoint(run.dir(), {"deformation"}));
   // saving the same again, and one step of a stage with other bytes
   run.save_checkpoint("smrm", 3, "m3");
-  EXPECT_EQ(read_file(run.save_checkpoint("smrm", 3, "other", 1)), "other");
+  EXPECT_EQ(read_file(run.save_checkpoint("smrm", 3, "other", {.last = 1})), "other");
   EXPECT_EQ(latest_checkpoint(run.dir(), kStages)->bytes, "other");
   EXPECT_EQ(read_file(run.save_checkpoint("smrm", 4, "")), "");
   EXPECT_EQ(latest_checkpoint(run.dir(), kStages)->bytes, "");
+}
+
+TEST_F(TrainRun, CheckpointsOfChosenStepsStay) {
+  RunDir run = make();
+  for (int64_t step = 1; step <= 9; ++step)
+    run.save_checkpoint("skeleton", step, "s" + std::to_string(step),
+                        {.last = 1, .every = 4, .best = step < 3 ? -1 : 3});
+  EXPECT_EQ(checkpoints(run.dir()),
+            (std::vector<std::string>{"skeleton-000000003", "skeleton-000000004",
+                                      "skeleton-000000008", "skeleton-000000009"}));
+  EXPECT_EQ(checkpoint_of(run.dir(), "skeleton", 4).bytes, "s4");
+  EXPECT_NE(error([&] { checkpoint_of(run.dir(), "skeleton", 5); }), "");
+  run.prune("skeleton", {.last = 1, .best = 3});
+  EXPECT_EQ(checkpoints(run.dir()),
+            (std::vector<std::string>{"skeleton-000000003", "skeleton-000000009"}));
 }
 
 TEST_F(TrainRun, DamagedCheckpointsArePassedOver) {

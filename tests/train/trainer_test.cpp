@@ -23,37 +23,13 @@ namespace restage {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::Forwarding;
 using testing::tiny_stage;
 using testing::tiny_training;
 
 constexpr int64_t kSteps = 9;
 const TrainOptions kQuiet{.precision = MatmulPrecision::float32, .quiet = true, .observers = {}};
 const std::vector<std::string> kAll = {"skeleton", "motion", "deformation", "root"};
-
-OptimiserConfig optimiser_of(const Stage& stage) {
-  OptimiserConfig out;
-  out.steps = stage.steps();
-  out.batch = stage.examples_per_step();
-  return out;
-}
-
-/// Hands everything on to another stage; tests change what they want to see.
-class Forwarding : public Stage {
- public:
-  explicit Forwarding(std::unique_ptr<Stage> stage)
-      : Stage(stage->name(), optimiser_of(*stage)), stage_(std::move(stage)) {}
-  NamedValues step(int64_t step) override { return stage_->step(step); }
-  void read(int64_t step) const override { stage_->read(step); }
-  NamedValues validate() override { return stage_->validate(); }
-  void save(TensorFile& file) const override { stage_->save(file); }
-  void load(const TensorFile& file, const std::string& where) override {
-    stage_->load(file, where);
-  }
-  Bundle result() const override { return stage_->result(); }
-
- private:
-  std::unique_ptr<Stage> stage_;
-};
 
 /// Does something of the test's own before one of its steps.
 class Disturbed final : public Forwarding {

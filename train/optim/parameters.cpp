@@ -15,7 +15,7 @@ Tensor saved_state(const TensorFile& file, const std::string& name, const Shape&
                    const std::string& where) {
   const Tensor* t = file.find(name);
   if (t == nullptr || !(t->shape() == shape))
-    throw InputError(where, "optimiser state '" + name + "' is missing or of another size",
+    throw InputError(where, "state '" + name + "' is missing or of another size",
                      "resume with the configuration that the run was made with");
   return t->clone();
 }

@@ -114,7 +114,8 @@ NamedValues DeformationStage::validate() {
   for (int j = 0; j < kJoints; ++j)
     if (skin[j] > 0) lost = std::max(lost, 1 - kept[j] / skin[j]);
   NamedValues values{{"skinning_mm", 1e3 * without}, {"skin_lost", lost}};
-  if (offsets_ != nullptr) values.push_back({"with_offsets_mm", 1e3 * with});
+  // First, since it is what the surface comes to.
+  if (offsets_ != nullptr) values.insert(values.begin(), {"with_offsets_mm", 1e3 * with});
   return values;
 }
 

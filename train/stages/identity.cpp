@@ -30,6 +30,8 @@ Json to_json(const ConfigNode& node) {
   return out;
 }
 
+std::string number(double value) { return config_detail::write_leaf(value).text; }
+
 template <class C>
 Json keys_of(const C& config) {
   return to_json(write_config(config));
@@ -76,6 +78,14 @@ std::vector<StageId> Identities::stages(const TrainConfig& config) {
                  {"seed", config.seed},
                  {"precision", static_cast<int>(config.precision)},
                  {"reads", Json::object()}};
+    const SelectionConfig& selection = config.loop.selection;
+    if (selection.ema > 0) json["ema"] = number(selection.ema);
+    if (selection.judges())
+      json["selection"] = {{"export", static_cast<int>(selection.choice)},
+                           {"patience", selection.patience},
+                           {"min_delta", number(selection.min_delta)},
+                           {"monitor", monitored(selection, name)},
+                           {"validate_every", config.loop.validate_every}};
     if (section.init) {
       json["init"] = weights(*section.init);
       json["init_names"] = section.init_names;

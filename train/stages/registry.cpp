@@ -36,7 +36,7 @@ const std::vector<StageType>& stage_types() {
            "closed_form_pa_mpjpe", "closed_form_acceleration", "closed_form_rotation"}),
       stage<DeformationStage>("deformation", "skinning weights and offsets",
                               {"deformation.weights", "deformation.offsets"},
-                              {"skinning_mm", "skin_lost", "with_offsets_mm"}),
+                              {"with_offsets_mm", "skinning_mm", "skin_lost"}),
       stage<RootStage>("root", "the third MLP of the paper's count", {"deformation.root"},
                        {"root_mm"}),
   };
@@ -47,6 +47,16 @@ std::vector<std::string> stage_names() {
   std::vector<std::string> out;
   for (const StageType& type : stage_types()) out.push_back(type.name);
   return out;
+}
+
+std::string unknown_figure(const std::vector<std::string>& names) {
+  for (const std::string& name : names) {
+    bool known = false;
+    for (const StageType& type : stage_types())
+      for (const std::string& figure : type.figures) known |= name == type.name + "." + figure;
+    if (!known) return name;
+  }
+  return "";
 }
 
 const StageType& stage_type(const std::string& name) {

@@ -23,6 +23,8 @@ struct StageType {
 
 const std::vector<StageType>& stage_types();
 std::vector<std::string> stage_names();
+/// The first of these that is no STAGE.FIGURE; "" if all are.
+std::string unknown_figure(const std::vector<std::string>& names);
 /// InputError if there is no such stage.
 const StageType& stage_type(const std::string& name);
 

@@ -4,7 +4,9 @@
 
 #include <chrono>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <thread>
 #include <vector>
 
@@ -40,14 +42,19 @@ std::string damage(const fs::path& folder) {
   return "";
 }
 
-/// The last line of a stage's metrics: its last validation.
-Json last_validation(const std::string& metrics) {
-  const size_t end = metrics.find_last_not_of('\n');
-  if (end == std::string::npos) return nullptr;
-  const size_t begin = metrics.rfind('\n', end);
-  const size_t first = begin == std::string::npos ? 0 : begin + 1;
-  const Json line = Json::parse(metrics.substr(first, end + 1 - first), nullptr, false);
-  return line.is_discarded() ? Json() : line;
+/// The validation of what a stage hands on: the last line of its metrics, or that of the step which
+/// it names as the best.
+Json validation_of(const std::string& metrics) {
+  std::istringstream lines(metrics);
+  std::map<int64_t, Json> last;  // of each step
+  Json out;
+  for (std::string text; std::getline(lines, text);) {
+    out = Json::parse(text, nullptr, false);
+    if (!out.is_object() || !out.contains("step")) return nullptr;
+    last[out["step"]] = out;
+  }
+  const auto best = out.is_object() ? out.find("best_step") : out.end();
+  return best == out.end() ? out : last[*best];
 }
 
 /// What processes that were killed have left of the making of an artifact: `.STAGE-ID.partial` and
@@ -173,7 +180,7 @@ void Store::publish(const StageId& id, const std::string& run, const std::string
   write_file_atomically((ready / "config.yaml").string(), config_yaml);
   write_file_atomically((ready / "metrics.jsonl").string(), metrics);
   Json json = {{"id", id.id}, {"stage", id.stage}, {"made_from", Json::parse(id.facts)}};
-  json["metrics"] = last_validation(metrics);
+  json["metrics"] = validation_of(metrics);
   for (const char* name : kFiles) json["files"][name] = sha256_of_file((ready / name).string());
   write_file_atomically((ready / "artifact.json").string(), json.dump(2) + "\n");
   fs::rename(ready, path(id), error);

@@ -104,6 +104,9 @@ void visit(V& v, TrainConfig& c) {
   for (auto& [name, section] : c.sections) v(name, section, stage_type(name).help);
   v("loop", c.loop, "logging, validation, checkpoints");
   v("evaluation", c.evaluation, "what 'restage eval run=...' looks at");
+  const std::string unknown = unknown_figure(c.loop.selection.monitor);
+  v.check("loop", unknown.empty(), "monitors '" + unknown + "', which no stage measures",
+          "give STAGE.FIGURE, such as motion.pa_mpjpe");
   const std::set<std::string> once(c.stages.begin(), c.stages.end());
   const bool learned = c.evaluation.system == EvaluationConfig().system;
   v.check("stages", (!learned || !c.stages.empty()) && once.size() == c.stages.size(),

@@ -1,0 +1,198 @@
+// Which weights a stage hands on: the best validation's, averages, an early end; and that a
+// training which was stopped anywhere decides as an undisturbed one.
+#include "train/selection.h"
+
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "autograd/base/atomic_file.h"
+#include "autograd/base/interrupt.h"
+#include "autograd/base/log.h"
+#include "nn/config/config.h"
+#include "tests/support/files.h"
+#include "tests/train/tiny_training.h"
+#include "train/trainer.h"
+
+namespace restage {
+namespace {
+
+using testing::Forwarding;
+using testing::tiny_stage;
+using testing::tiny_training;
+
+constexpr int64_t kSteps = 12;
+const double kNaN = std::numeric_limits<double>::quiet_NaN();
+const TrainOptions kQuiet{.precision = MatmulPrecision::float32, .quiet = true, .observers = {}};
+
+/// A stage whose validations, one every two steps, say what the test wants; a signal may come.
+class Scripted final : public Forwarding {
+ public:
+  Scripted(std::vector<double> scores, int64_t stop_at)
+      : Forwarding(tiny_stage("deformation", tiny_training(kSteps))),
+        scores_(std::move(scores)),
+        stop_at_(stop_at) {}
+  NamedValues step(int64_t step) override {
+    if (step == stop_at_) ::raise(SIGTERM);
+    done_ = step + 1;
+    return Forwarding::step(step);
+  }
+  NamedValues validate() override {
+    return {{"other", 1}, {"figure", scores_[static_cast<size_t>(done_ / 2 - 1)]}};
+  }
+
+ private:
+  std::vector<double> scores_;
+  int64_t stop_at_, done_ = 0;
+};
+
+class TrainSelection : public test::FileTest {
+ protected:
+  void SetUp() override {
+    set_log_level(LogLevel::quiet);
+    handle_signals();
+    loop_.log_every = 100;
+    loop_.validate_every = 2;
+    loop_.checkpoint_every = 5;
+    loop_.selection.monitor = {"deformation.figure"};
+  }
+  void TearDown() override {
+    for (const int number : {SIGINT, SIGTERM, SIGPIPE}) ::signal(number, SIG_DFL);
+    set_log_level(LogLevel::info);
+  }
+
+  /// Weights after a training in a new folder, or in one that is there.
+  std::string trained(RunDir&& run, const std::vector<double>& scores, int64_t stop_at = -1) {
+    const MakeStage make = [&](const std::string&, Bundle*) {
+      return std::make_unique<Scripted>(scores, stop_at);
+    };
+    return safetensors_bytes(to_file(train(run, {"deformation"}, loop_, make, kQuiet)));
+  }
+  RunDir create(const std::string& name) {
+    return RunDir::create_at(dir / name, "x: 1\n", "{}\n", {"deformation"});
+  }
+  std::string trained(const std::string& name, const std::vector<double>& scores) {
+    return trained(create(name), scores);
+  }
+  std::string metrics(const std::string& name) { return read_file(dir / name + "/metrics.jsonl"); }
+
+  /// The networks in the checkpoint of a step.
+  std::string weights_at(const std::string& name, int64_t step, const std::string& prefix = "") {
+    const Checkpoint c = checkpoint_of(dir / name, "deformation", step);
+    const TensorFile file = parse_safetensors(c.bytes, c.path);
+    TensorFile out;
+    for (const auto& [key, value] : file.tensors)
+      if (key.starts_with(prefix + "deformation.")) out.tensors[key.substr(prefix.size())] = value;
+    return safetensors_bytes(out);
+  }
+  static std::string tensors_of(const std::string& bytes) {
+    TensorFile file = parse_safetensors(bytes, "weights");
+    file.metadata.clear();
+    return safetensors_bytes(file);
+  }
+
+  LoopConfig loop_;
+};
+
+TEST_F(TrainSelection, TheBestValidationIsHandedOn) {
+  const std::vector<double> scores = {5, 3, kNaN, 3, 4, 6};  // at steps 2, 4 ... 12
+  loop_.keep = 100;
+  const std::string last = trained("last", scores);
+  EXPECT_TRUE(tensors_of(last) == weights_at("last", 12));
+  loop_.selection.choice = SelectionConfig::Export::best;
+  loop_.keep = 2;
+  const std::string best = trained("best", scores);
+  EXPECT_TRUE(tensors_of(best) == weights_at("best", 4));
+  EXPECT_FALSE(tensors_of(last) == weights_at("best", 4));
+  const std::string lines = metrics("best");
+  const auto end = nlohmann::json::parse(lines.substr(lines.rfind('\n', lines.size() - 2) + 1));
+  EXPECT_EQ(end["step"], 12);
+  EXPECT_EQ(end["best_step"], 4);
+  // by less than min_delta is not better
+  loop_.selection.min_delta = 2.5;
+  const std::string delta = trained("delta", scores);
+  EXPECT_TRUE(tensors_of(delta) == weights_at("delta", 2));
+}
+
+TEST_F(TrainSelection, PatienceEndsAStage) {
+  loop_.selection.patience = 2;
+  const std::string got = trained("patient", {5, 3, 4, kNaN, 1, 1});
+  EXPECT_TRUE(tensors_of(got) == weights_at("patient", 8)) << "without export: best, the last";
+  EXPECT_EQ(latest_checkpoint(dir / "patient", {"deformation"})->step, 8);
+  loop_.selection.choice = SelectionConfig::Export::best;
+  const std::string both = trained("both", {5, 3, 4, kNaN, 1, 1});
+  EXPECT_TRUE(tensors_of(both) == weights_at("both", 4));
+}
+
+TEST_F(TrainSelection, AnAverageIsHandedOnAndTheWeightsGoOn) {
+  loop_.keep_every = 1;
+  loop_.checkpoint_every = 1;
+  trained("plain", std::vector<double>(6, 1));
+  loop_.selection.ema = 0.5;
+  const std::string got = trained("averaged", std::vector<double>(6, 1));
+  const auto tensor = [&](const std::string& name, int64_t step, const std::string& key) {
+    const Checkpoint c = checkpoint_of(dir / name, "deformation", step);
+    return parse_safetensors(c.bytes, c.path).tensors.at(key);
+  };
+  const std::string key = "deformation.weights.fc2.weight";
+  for (const int64_t step : {1, 7, 12})
+    EXPECT_TRUE(weights_at("plain", step) == weights_at("averaged", step)) << step;
+  std::vector<double> expected;
+  for (int64_t t = 1; t <= kSteps; ++t) {
+    const Tensor w = tensor("plain", t, key);
+    if (expected.empty()) {  // as it was before the first step
+      const Scripted untrained({}, -1);
+      for (const StateEntry& entry : untrained.weights())
+        if (entry.name == key)
+          expected.assign(entry.value->data<float>(), entry.value->data<float>() + w.numel());
+    }
+    const double keep =
+        std::min(0.5, (1.0 + static_cast<double>(t)) / (10.0 + static_cast<double>(t)));
+    for (int64_t i = 0; i < w.numel(); ++i)
+      expected[static_cast<size_t>(i)] = keep * expected[static_cast<size_t>(i)] +
+                                         (1 - keep) * static_cast<double>(w.data<float>()[i]);
+  }
+  const TensorFile handed_on = parse_safetensors(got, "weights");
+  const Tensor& average = handed_on.tensors.at(key);
+  for (int64_t i = 0; i < average.numel(); ++i)
+    EXPECT_NEAR(static_cast<double>(average.data<float>()[i]), expected[static_cast<size_t>(i)],
+                1e-6);
+  EXPECT_TRUE(tensors_of(got) == weights_at("averaged", 12, "loop.ema."));
+}
+
+TEST_F(TrainSelection, StoppedAnywhereItEndsAsUndisturbed) {
+  loop_.selection.choice = SelectionConfig::Export::best;
+  loop_.selection.patience = 3;
+  loop_.selection.ema = 0.9;
+  const std::vector<double> scores = {5, 3, 4, 3.5, 3.2, 6};
+  const std::string whole = trained("whole", scores);
+  for (int64_t when = 0; when < 10; ++when) {
+    const std::string name = "stopped" + std::to_string(when);
+    EXPECT_THROW(trained(create(name), scores, when), Interrupted);
+    RunDir again = RunDir::resume(dir / name, {"deformation"});
+    EXPECT_TRUE(trained(std::move(again), scores) == whole) << when;
+    EXPECT_EQ(metrics(name), metrics("whole")) << when;
+  }
+  // and one that had ended already
+  EXPECT_TRUE(trained(RunDir::resume(dir / "whole", {"deformation"}), scores) == whole);
+}
+
+TEST(TrainConfigLoop, MonitorsNamedFiguresOnly) {
+  TrainConfig config;
+  const auto read = [&](const std::string& figures) {
+    ConfigNode tree = write_config(config);
+    apply_override(tree, "loop.monitor=[" + figures + "]");
+    read_config(tree, config);
+  };
+  read("motion.pa_mpjpe, skeleton.one_camera_joint_error_mm");
+  EXPECT_EQ(monitored(config.loop.selection, "skeleton"), "one_camera_joint_error_mm");
+  EXPECT_EQ(monitored(config.loop.selection, "deformation"), "");
+  EXPECT_THROW(read("motion.pa_mpjep"), InputError);
+}
+
+}  // namespace
+}  // namespace restage
