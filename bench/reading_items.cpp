@@ -36,7 +36,7 @@ class Reading : public Item {
     if (trains_)
       stage_->step(step_++);
     else
-      stage_->read(step_++);
+      stage_->examples(step_++);
   }
   /// LibTorch has no part in this.
   std::vector<double> check() override { return {}; }

@@ -37,6 +37,20 @@ void copy_matching(Module& to, Module* from, const std::string& prefix,
 
 }  // namespace
 
+Points points_of(const Tensor& points, int64_t row, int64_t count) {
+  Points out;
+  for (int64_t i = row * count; i < (row + 1) * count; ++i)
+    out.emplace_back(Eigen::Map<const Point>(points.data<float>() + 3 * i));
+  return out;
+}
+
+Joints joints_of(const Tensor& joints, int64_t row) {
+  Joints out;
+  const Points points = points_of(joints, row, kJoints);
+  for (size_t j = 0; j < kJoints; ++j) out[j] = points[j].cast<double>();
+  return out;
+}
+
 Optimiser* Stage::add_optimiser(const std::string& name, const std::vector<std::string>& roles,
                                 const OptimiserConfig& config) {
   std::vector<std::pair<std::string, Module*>> modules;

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "nn/geometry/body.h"
 #include "nn/module.h"
 #include "nn/weights/bundle.h"
 #include "nn/weights/state.h"
@@ -18,6 +19,17 @@
 namespace restage {
 
 using NamedValues = std::vector<std::pair<std::string, double>>;
+
+/// A row of a picture: clouds or skeletons, one a column. World metres or centred.
+struct Shown {
+  std::string label;
+  std::vector<Points> clouds;
+  std::vector<Joints> skeletons = {};
+};
+/// Points `row` * count to (`row` + 1) * count of a tensor [..., 3].
+Points points_of(const Tensor& points, int64_t row, int64_t count);
+/// Skeleton number `row` of a tensor [..., 22, 3].
+Joints joints_of(const Tensor& joints, int64_t row);
 
 class Stage {
  public:
@@ -31,13 +43,18 @@ class Stage {
   int64_t steps() const { return optimisation_.steps; }
   /// Clouds, windows or pairs of bodies in a step.
   int64_t examples_per_step() const { return optimisation_.batch; }
+  /// Every `batches` steps the same examples come again: can it learn them by heart? 0: never.
+  void repeat_batches(int64_t batches) { repeated_ = batches; }
   /// Optimiser step number `step` (from 0). Everything random is a function of (seed, step), so a
   /// resumed run repeats the same bits. Returns what to log.
   virtual NamedValues step(int64_t step) = 0;
-  /// Draws the examples of that step and forgets them: what reading alone costs (bench/README.md).
-  virtual void read(int64_t step) const = 0;
+  /// The examples of that step, as its losses read them.
+  virtual NamedTensors examples(int64_t step) const = 0;
   /// Held-out figures by the evaluation's own metrics.
   virtual NamedValues validate() = 0;
+
+  /// Held-out examples with what the stage makes of them, at most three rows; may be empty.
+  virtual std::vector<Shown> show() { return {}; }
 
   /// All that a checkpoint needs: networks, optimisers, anything carried from step to step.
   virtual void save(TensorFile& file) const;
@@ -73,6 +90,9 @@ class Stage {
   virtual void save_more(TensorFile&) const {}
   virtual void load_more(const TensorFile&, const std::string& /*where*/) {}
 
+  /// The step whose examples are drawn in this one.
+  int64_t drawn(int64_t step) const { return repeated_ > 0 ? step % repeated_ : step; }
+
   const OptimiserConfig optimisation_;
 
  private:
@@ -86,6 +106,7 @@ class Stage {
     std::unique_ptr<Optimiser> optimiser;
   };
   std::string name_;
+  int64_t repeated_ = 0;
   std::vector<Network> networks_;
   std::vector<NamedOptimiser> optimisers_;
 };

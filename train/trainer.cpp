@@ -4,14 +4,21 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 
+#include "autograd/base/atomic_file.h"
+#include "autograd/base/format.h"
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 #include "autograd/kernels/stats.h"
+#include "train/failure.h"
+#include "train/forecast.h"
 #include "train/throughput.h"
 
 namespace restage {
 namespace {
+
+constexpr int64_t kForecastAfter = 30;  // steps
 
 std::string line(const NamedValues& values) {
   std::string out;
@@ -26,8 +33,11 @@ std::string line(const NamedValues& values) {
 /// One stage's way through its steps.
 class StageRun {
  public:
-  StageRun(Stage& stage, RunDir& run, const LoopConfig& loop, const TrainOptions& options)
+  /// `given`: what earlier stages have left.
+  StageRun(Stage& stage, const Bundle& given, RunDir& run, const LoopConfig& loop,
+           const TrainOptions& options)
       : stage_(stage),
+        given_(given),
         run_(run),
         loop_(loop),
         options_(options),
@@ -46,6 +56,7 @@ class StageRun {
   /// To the end; the stage then holds what it hands on.
   void run() {
     const StopScope stop;
+    tell([&](TrainObserver& o) { o.on_begin(stage_, done_); });
     if (stage_.steps() == 0) {
       log_info(validate());
       checkpoint();
@@ -75,9 +86,12 @@ class StageRun {
   std::string validate();
   void checkpoint();
   void hand_on();
+  std::string keep_failure(const NonFiniteError& error) const;
+  std::string forecast() const;
   void report(int64_t steps, int64_t blocks_before) const;
 
   Stage& stage_;
+  const Bundle& given_;
   RunDir& run_;
   const LoopConfig& loop_;
   const TrainOptions& options_;
@@ -91,16 +105,24 @@ void StageRun::all_steps() {
   product_rate();
   reset_peak_memory();
   const int64_t first = done_, blocks_before = memory_stats().large_allocations;
+  log_info(format("%s: %lld parameters, %lld steps of %lld", stage_.name().c_str(),
+                  static_cast<long long>(count_parameters(stage_)),
+                  static_cast<long long>(stage_.steps()),
+                  static_cast<long long>(stage_.examples_per_step())));
   Progress progress(stage_.name(), stage_.steps(), standard_progress(options_.quiet), first);
   while (!over()) {
     const NamedValues values = step();
     const bool stopped = stop_requested();
-    if (due(loop_.log_every)) run_.metrics(stage_.name(), done_, values);
+    if (due(loop_.log_every)) {
+      run_.metrics(stage_.name(), done_, values);
+      tell([&](TrainObserver& o) { o.on_log(stage_, done_, values); });
+    }
     NamedValues shown = values;  // the loss first, then speed
     const NamedValues speed = throughput_.values();
     shown.insert(shown.begin() + std::min<std::ptrdiff_t>(1, std::ssize(shown)), speed.begin(),
                  speed.end());
     progress.update(done_, shown);
+    if (done_ - first == kForecastAfter && stage_.steps() > 10 * done_) progress.note(forecast());
     tell([&](TrainObserver& o) { o.on_step(stage_, done_, values); });
     if (due(loop_.validate_every)) progress.note(validate());
     const bool keeps_best = loop_.selection.judges() && best_.step() == done_;
@@ -118,9 +140,12 @@ NamedValues StageRun::step() {
   take_kernel_stats();  // not what validation did
   const auto start = std::chrono::steady_clock::now();
   NamedValues values;
-  {
+  try {
     const MatmulPrecisionScope scope(options_.precision);
     values = stage_.step(done_);
+  } catch (const NonFiniteError& error) {
+    throw NonFiniteError(std::string(error.what()) + "; 'restage replay " + keep_failure(error) +
+                         "' repeats the step");
   }
   ++done_;
   if (average_) average_->add(done_);
@@ -134,10 +159,30 @@ NamedValues StageRun::step() {
   return values;
 }
 
+/// Returns the file.
+std::string StageRun::keep_failure(const NonFiniteError& error) const {
+  Failure failure;
+  failure.stage = stage_.name(), failure.said = error.what(), failure.step = done_;
+  failure.config_yaml = read_file(run_config_path(run_.dir()));
+  // What the step has changed by now is not what it began with, so it is repeated from there.
+  if (const auto last = latest_checkpoint(run_.dir(), {stage_.name()})) {
+    failure.from = last->step;
+    failure.state = parse_safetensors(last->bytes, last->path);
+  }
+  failure.examples = stage_.examples(done_);
+  failure.given = given_;
+  const std::string folder = run_.dir() + "/nonfinite";
+  std::error_code ignored;  // writing says what is wrong
+  std::filesystem::create_directories(folder, ignored);
+  const std::string path =
+      folder + "/" + stage_.name() + "-" + std::to_string(done_) + ".safetensors";
+  write_failure(path, failure);
+  return path;
+}
+
 std::string StageRun::validate() {
   if (average_) average_->exchange();
   NamedValues scores = stage_.validate();
-  if (average_) average_->exchange();
   std::string out = stage_.name() + " after " + std::to_string(done_) + " steps: " + line(scores);
   if (loop_.selection.judges()) {
     best_.add(done_, scores);
@@ -148,6 +193,7 @@ std::string StageRun::validate() {
   if (hands_on_best()) scores.emplace_back("best_step", static_cast<double>(best_.step()));
   run_.metrics(stage_.name(), done_, scores);
   tell([&](TrainObserver& o) { o.on_validation(stage_, done_, scores); });
+  if (average_) average_->exchange();
   return out;
 }
 
@@ -170,6 +216,15 @@ void StageRun::hand_on() {
              std::to_string(end));
   }
   if (average_) average_->exchange();
+}
+
+/// Of the steps that are left, by those so far.
+std::string StageRun::forecast() const {
+  const double left =
+      throughput_.seconds() / kForecastAfter * static_cast<double>(stage_.steps() - done_);
+  return format("%s: about %s to go without validations, tensors take %.0f MiB",
+                stage_.name().c_str(), duration_text(left).c_str(),
+                static_cast<double>(memory_stats().peak) / 1048576.0);
 }
 
 void StageRun::report(int64_t steps, int64_t blocks_before) const {
@@ -196,7 +251,9 @@ Bundle train(RunDir& run, const std::vector<std::string>& stages, const LoopConf
   for (size_t i = 0; i < stages.size(); ++i) {
     const auto stage = make(stages[i], &result);
     if (stage == nullptr) continue;
-    StageRun stage_run(*stage, run, loop, options);
+    Bundle given = options.given;
+    given.add(result);
+    StageRun stage_run(*stage, given, run, loop, options);
     const auto index = static_cast<std::ptrdiff_t>(i);
     if (resumed && index <= begin) {
       // The stage that was interrupted, or an earlier one that is complete.

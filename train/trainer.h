@@ -11,7 +11,7 @@ namespace restage {
 
 struct LoopConfig {
   int64_t log_every = 50, validate_every = 1000, checkpoint_every = 1000;
-  int64_t keep = 2, keep_every = 0;
+  int64_t keep = 2, keep_every = 0, overfit_batches = 0;
   SelectionConfig selection = {};
 };
 
@@ -22,6 +22,9 @@ void visit(V& v, LoopConfig& c) {
   v("checkpoint_every", c.checkpoint_every, "steps between checkpoints", positive());
   v("keep", c.keep, "checkpoints of a stage that stay", between(1, 1000000));
   v("keep_every", c.keep_every, "those of every so many steps stay as well; 0: none", at_least(0));
+  v("overfit_batches", c.overfit_batches,
+    "the same so many batches again and again, to see whether they can be learned; 0: no",
+    at_least(0));
   visit(v, c.selection);
 }
 
@@ -30,8 +33,13 @@ void visit(V& v, LoopConfig& c) {
 class TrainObserver {
  public:
   virtual ~TrainObserver() = default;
+  /// A stage begins, `done` of its steps lie behind it.
+  virtual void on_begin(const Stage&, int64_t /*done*/) {}
   virtual void on_step(const Stage&, int64_t /*done*/, const NamedValues&) {}
-  virtual void on_validation(const Stage&, int64_t /*done*/, const NamedValues&) {}
+  /// What a line of metrics.jsonl says of training steps.
+  virtual void on_log(const Stage&, int64_t /*done*/, const NamedValues&) {}
+  /// The stage holds the weights that were validated (averaged ones, with loop.ema).
+  virtual void on_validation(Stage&, int64_t /*done*/, const NamedValues&) {}
   /// A checkpoint is on the disk.
   virtual void on_checkpoint(const Stage&, int64_t /*done*/, const std::string& /*path*/) {}
 };
@@ -40,7 +48,8 @@ struct TrainOptions {
   /// Of the steps' products; validation has float32's, like everything that uses the models later.
   MatmulPrecision precision = MatmulPrecision::float32;
   bool quiet = false;
-  std::vector<TrainObserver*> observers;
+  std::vector<TrainObserver*> observers = {};
+  Bundle given = {};  ///< what stages trained elsewhere have left, for the file of a failed step
 };
 
 /// Builds a stage when its turn comes, from what those before it left. Null: there is nothing to

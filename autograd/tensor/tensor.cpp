@@ -233,4 +233,9 @@ RESTAGE_INSTANTIATE(int32_t)
 RESTAGE_INSTANTIATE(int64_t)
 #undef RESTAGE_INSTANTIATE
 
+NamedTensors defined(NamedTensors tensors) {
+  std::erase_if(tensors, [](const auto& named) { return !named.second.defined(); });
+  return tensors;
+}
+
 }  // namespace restage

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <memory>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "autograd/tensor/shape.h"
@@ -76,6 +78,10 @@ class Tensor {
   int64_t numel_ = 0;
   DType dtype_ = DType::f32;
 };
+
+using NamedTensors = std::vector<std::pair<std::string, Tensor>>;
+/// Those that are not undefined.
+NamedTensors defined(NamedTensors tensors);
 
 /// Memory of the pooled allocator, bytes.
 struct MemoryStats {

@@ -19,7 +19,10 @@ struct ImportOptions {
   std::string clip;     ///< of glTF files: this animation only; empty: all
   std::string garment;  ///< dress the bodies in this garment of body/clothes; empty: skin
   std::string license = "unknown";  ///< of all but a data folder, whose licence is known
-  std::string body_model;           ///< a SMPL, SMPL-H or SMPL-X model or a folder; AMASS needs it
+  /// Regular expression (ECMAScript) whose first group in a file's path below the folder names who
+  /// moves; empty: as each kind of file has it.
+  std::string subjects;
+  std::string body_model;  ///< a SMPL, SMPL-H or SMPL-X model or a folder; AMASS needs it
   /// For a body model as source: files of betas (read_betas), or "zeros" for the mean person.
   std::vector<std::string> betas;
   uint64_t max_memory = kMaxMemory;  ///< what unpacking one array may take

@@ -55,6 +55,7 @@ ImportSummary import_amass_files(const std::vector<std::string>& files, const st
       " (AMASS), skeletons of " + absolute_path(options.body_model).filename().string();
   ImportSummary summary;
   ImportWriter writer(out, info, summary);
+  const std::map<std::string, std::string> people = subjects_of(files, root, options.subjects);
   add_each(files, summary, [&](const std::string& path) {
     const Npz file(path, options.max_memory);
     if (is_amass_shape(file)) {
@@ -65,7 +66,9 @@ ImportSummary import_amass_files(const std::vector<std::string>& files, const st
       throw InputError(path, "holds no motion (it has " + list_of(file.names()) + ")",
                        "AMASS motions have poses and trans");
     ImportReport report;
-    writer.add(path, {}, {import_amass(file, models, amass_options(path, root, options), report)});
+    MotionOptions how = amass_options(path, root, options);
+    if (const auto who = people.find(path); who != people.end()) how.subject = who->second;
+    writer.add(path, {}, {import_amass(file, models, how, report)});
     summary.reports.push_back(std::move(report));
   });
   check_any(summary, source);

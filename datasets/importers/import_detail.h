@@ -55,6 +55,12 @@ void check_any(const ImportSummary& summary, const std::string& source);
 void add_each(const std::vector<std::string>& files, ImportSummary& summary,
               const std::function<void(const std::string&)>& add);
 
+/// Who moves in each file, by ImportOptions::subjects; empty without. InputError: an expression
+/// that is none or has no group, files that do not match (the first of them, and how many).
+std::map<std::string, std::string> subjects_of(const std::vector<std::string>& files,
+                                               const std::string& root,
+                                               const std::string& expression);
+
 /// BVH, AMC and glTF files (import_recordings.cpp).
 bool is_recording_name(const std::string& path);
 ImportSummary import_recordings(const std::vector<std::string>& files, const std::string& source,

@@ -1,5 +1,6 @@
 // Which options belong to which kind of input (--force, a permission, goes with all).
 #include <algorithm>
+#include <regex>
 
 #include "datasets/importers/import_detail.h"
 #include "datasets/readers/errors.h"
@@ -35,6 +36,7 @@ std::vector<Given> all_of(const ImportOptions& options) {
   return {
       {"--license", options.license != none.license, files, "files whose licence is not known"},
       {"--subject", !motion.subject.empty(), motions, "motions"},
+      {"--subjects", !options.subjects.empty(), motions, "motions"},
       {"--split", motion.split != none.motion.split, bodies, "motions and bodies"},
       {"--scale", motion.scale > 0, scaled, of_scaled},
       {"--fps", motion.fps > 0, timed, of_timed},
@@ -62,6 +64,40 @@ void check_options(const Kinds& kinds, const std::string& source, const ImportOp
                        cat("has nothing to do with ", one.option, ", which is for ", one.whose),
                        cat("leave ", one.option, " out"));
   }
+}
+
+std::map<std::string, std::string> subjects_of(const std::vector<std::string>& files,
+                                               const std::string& root,
+                                               const std::string& expression) {
+  std::map<std::string, std::string> out;
+  if (expression.empty()) return out;
+  std::regex wanted;
+  try {
+    wanted = std::regex(expression);
+  } catch (const std::regex_error& error) {
+    throw InputError("", "--subjects '" + expression + "' is no regular expression",
+                     "put who moves into a group, as in '([^/]+)/.*' for folders of people");
+  }
+  if (wanted.mark_count() == 0)
+    throw InputError("", "--subjects '" + expression + "' has no group",
+                     "put who moves into one, as in '([^/]+)/.*' for folders of people");
+  std::vector<std::string> strangers;
+  for (const std::string& file : files) {
+    const std::string below =
+        absolute_path(file).lexically_relative(absolute_path(root)).generic_string();
+    const std::string path = below == "." ? std::filesystem::path(file).filename().string() : below;
+    std::smatch found;
+    if (std::regex_search(path, found, wanted) && found[1].length() > 0)
+      out[file] = found[1];
+    else
+      strangers.push_back(path);
+  }
+  if (!strangers.empty())
+    throw InputError(root,
+                     cat("does not name who moves in ", strangers.size(), " of ", files.size(),
+                         " files by --subjects, the first being ", strangers[0].substr(0, 120)),
+                     "widen the expression, or move those files away");
+  return out;
 }
 
 }  // namespace restage

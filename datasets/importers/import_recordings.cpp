@@ -91,10 +91,12 @@ ImportSummary import_recordings(const std::vector<std::string>& files, const std
   ImportSummary summary;
   ImportWriter writer(out, file_info(source, options), summary);
   const std::map<std::string, std::string> ids = ids_by_place(files, source);
+  const std::map<std::string, std::string> people = subjects_of(files, source, options.subjects);
   add_each(files, summary, [&](const std::string& file) {
     check_file_options(file, options);
     ImportOptions how = options;
     if (const auto id = ids.find(file); id != ids.end()) how.motion.id = id->second;
+    if (const auto who = people.find(file); who != people.end()) how.motion.subject = who->second;
     is_gltf_name(file) ? add_character(file, how, writer, summary)
                        : add_recording(file, how, writer, summary);
   });

@@ -55,6 +55,15 @@ CloudSubject step_back(CloudSubject subject) {
 
 }  // namespace
 
+NamedTensors CloudBatch::tensors() const {
+  return defined({{"points", points},
+                  {"joints", joints},
+                  {"weights", weights},
+                  {"turns", turns},
+                  {"past", past},
+                  {"centres", centres}});
+}
+
 CloudSampler::CloudSampler(const Corpus& corpus, const CloudConfig& config, uint64_t seed)
     : corpus_(corpus),
       config_(checked(config)),

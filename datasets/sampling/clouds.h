@@ -41,6 +41,8 @@ struct CloudBatch {
   Tensor past;   ///< [N, 22, 4] as SkeletonInput has it; only with CloudConfig::remembered
   Tensor centres;              ///< [N, 3] the centroids, in the world
   std::vector<int64_t> asked;  ///< rows whose memory is to be the answer to CloudSampler::before()
+
+  NamedTensors tensors() const;  ///< those that are defined
 };
 
 /// What a cloud shows; `rest` means the T-pose, whatever `at` says.

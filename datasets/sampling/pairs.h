@@ -29,6 +29,8 @@ struct PairBatch {
   Tensor seen_points;   ///< [N, V, 3] rest_points as a target shows them, in clothes perhaps
   Tensor seen_joints;   ///< [N, 22, 3] rest_joints as an extractor sees them, with noise
   Tensor weights;       ///< [N, V, 22] the data's; only with PairConfig::skin_weights
+
+  NamedTensors tensors() const;  ///< those that are defined
 };
 
 class PairSampler {

@@ -61,6 +61,8 @@ struct WindowBatch {
   Tensor truth_sixd_b;   ///< [N, T, 132]
   Tensor root_a;         ///< [N, T, 3] pelvis of A in the world
   Tensor truth_root_b;   ///< [N, T, 3] pelvis of B in the world
+
+  NamedTensors tensors() const;  ///< those that are defined
 };
 
 /// Which bodies and clips a sample uses (indices into the corpus).

@@ -8,8 +8,6 @@
 namespace restage::cli {
 namespace {
 
-constexpr int kPointsPerBone = 12;
-
 bool ends_with_hdf5(const std::string& path) {
   return path.ends_with(".h5") || path.ends_with(".hdf5");
 }
@@ -31,19 +29,12 @@ std::vector<Joints> read_joints(const std::string& path, int64_t sequence) {
   return out;
 }
 
-/// Joints alone: enough points along each bone to see a stick figure.
-Clip stick_figure(const std::string& path, const std::string& label, int64_t sequence) {
+Clip skeletons(const std::string& path, const std::string& label, int64_t sequence) {
   Clip clip;
   clip.label = label;
   clip.confidence = read_confidence(path, sequence);
-  for (const Joints& joints : read_joints(path, sequence)) {
-    Points& points = clip.frames.emplace_back();
-    for (int j = 1; j < kJoints; ++j)
-      for (int k = 0; k <= kPointsPerBone; ++k) {
-        const double t = static_cast<double>(k) / kPointsPerBone;
-        points.push_back(((1 - t) * joints[kParents[j]] + t * joints[j]).cast<float>());
-      }
-  }
+  for (const Joints& joints : read_joints(path, sequence))
+    clip.frames.push_back(stick_figure(joints));
   return clip;
 }
 
@@ -56,7 +47,7 @@ bool has_joints_only(const std::string& path) {
 }  // namespace
 
 Clip read_clip(const std::string& path, const std::string& label, int64_t sequence) {
-  if (has_joints_only(path)) return stick_figure(path, label, sequence);
+  if (has_joints_only(path)) return skeletons(path, label, sequence);
   const auto source = open_frames(path, {.clip = "", .sequence = sequence});
   Clip clip;
   clip.label = label;

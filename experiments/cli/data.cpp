@@ -34,6 +34,7 @@ void add_data(Program& program) {
   add_data_fetch(program, group);
   add_data_import(program, group);
   add_data_merge(program, group);
+  add_data_split(program, group);
   add_data_perform(program, group);
   add_data_sheet(program, group);
   add_data_realism(program, group);

@@ -86,6 +86,7 @@ void add_data_import(Program& program, CLI::App& group) {
       program.add(group, "import", "turn bodies, motions, characters or scans into a data file",
                   "restage data import DATA_FOLDER --out real.h5\n"
                   "restage data import walk.bvh --subject ann --license CC0-1.0 --out walk.h5\n"
+                  "restage data import recordings/ --subjects '([^/]+)/.*' --out people.h5\n"
                   "restage data import 07_01.amc --asf 07.asf --out walk.h5\n"
                   "restage data import hero.glb --license CC0-1.0 --out hero.h5\n"
                   "restage data import AMASS/ --body-model smplh/ --out amass.h5\n"
@@ -102,6 +103,9 @@ void add_data_import(Program& program, CLI::App& group) {
   app.add_option("--out", given.out, "file to write")->required();
   app.add_option("--license", options.license, "licence of the files");
   app.add_option("--subject", motion.subject, "who moves (default: by the file's name)");
+  app.add_option("--subjects", options.subjects,
+                 "folders: regular expression on a file's path below SOURCE whose first group "
+                 "names who moves");
   app.add_option("--split", motion.split, "train, validation or test");
   app.add_option("--scale", motion.scale, "metres per unit of the file")->check(positive);
   app.add_option("--fps", motion.fps, "true frame rate")->check(positive);

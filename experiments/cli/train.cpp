@@ -1,15 +1,29 @@
 // restage train: all stages of a configuration, or the rest of an interrupted run.
+#include <filesystem>
+#include <memory>
+
+#include "autograd/base/format.h"
 #include "autograd/base/log.h"
 #include "autograd/base/parallel.h"
+#include "autograd/base/temporary.h"
 #include "autograd/kernels/matmul_precision.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
+#include "experiments/observers/loggers.h"
 #include "nn/config/config.h"
 #include "train/run_provenance.h"
+#include "train/stages/motion_stage.h"
 #include "train/stages/training.h"
 
 namespace restage::cli {
 namespace {
+
+struct TrainArguments {
+  std::vector<std::string> words;
+  int64_t overfit_batches = 0;
+  bool fast_dev_run = false, dry_run = false, print_config = false;
+  bool tensorboard = false, csv = false;
+};
 
 /// CONFIG.yaml and key=value, in any order; resume=RUN stands alone.
 struct Request {
@@ -17,9 +31,22 @@ struct Request {
   std::vector<std::string> overrides;
 };
 
-Request read_request(const std::vector<std::string>& arguments) {
+void check_resumed(const Request& request, const TrainArguments& a, const Common& common) {
+  const std::pair<bool, const char*> others[] = {{common.seed_given, "--seed"},
+                                                 {a.overfit_batches > 0, "--overfit-batches"},
+                                                 {a.fast_dev_run, "--fast-dev-run"}};
+  for (const auto& [given, name] : others)
+    if (given)
+      throw InputError("", std::string(name) + " cannot change a resumed run",
+                       "leave it out, or train anew");
+  if (!request.overrides.empty())
+    throw InputError("", "'" + request.overrides[0] + "' cannot change a resumed run",
+                     "leave it out, or train anew");
+}
+
+Request read_request(const TrainArguments& arguments, const Common& common) {
   Request out;
-  for (const std::string& a : arguments) {
+  for (const std::string& a : arguments.words) {
     if (a.starts_with("resume=")) {
       out.resume = a.substr(7);
     } else if (a.find('=') != std::string::npos) {
@@ -37,10 +64,37 @@ Request read_request(const std::vector<std::string>& arguments) {
         out.config.empty() ? "no configuration was given"
                            : "a resumed run has its own configuration",
         "use 'restage train CONFIG.yaml [key=value ...]' or 'restage train resume=RUN_DIR'");
-  if (!out.resume.empty() && !out.overrides.empty())
-    throw InputError("", "'" + out.overrides[0] + "' cannot change a resumed run",
-                     "leave it out, or train anew");
+  if (!out.resume.empty()) check_resumed(out, arguments, common);
+  if (arguments.overfit_batches < 0)
+    throw InputError("", "--overfit-batches is out of range", "give 1 or more");
+  if (common.seed_given) out.overrides.push_back("seed=" + std::to_string(common.seed));
+  if (arguments.overfit_batches > 0)
+    out.overrides.push_back("loop.overfit_batches=" + std::to_string(arguments.overfit_batches));
   return out;
+}
+
+TrainConfig configured(const Request& request) {
+  TrainConfig config;
+  load_config(request.resume.empty() ? request.config : run_config_path(request.resume),
+              request.overrides, config);
+  if (config.stages.empty())
+    throw InputError(request.config, "names no stages, so there is nothing to train",
+                     "use it in a sweep, or name stages");
+  return config;
+}
+
+/// Of every stage that would be trained three steps and a validation.
+TrainConfig shortened(Request request, const TrainConfig& whole) {
+  constexpr int64_t kSteps = 3, kAsked = 4;
+  for (const std::string& stage : whole.stages) {
+    if (whole.section(stage).from) continue;
+    request.overrides.push_back(format("%s.optimiser.steps=%d", stage.c_str(), int{kSteps}));
+    if (stage != "motion") continue;
+    const auto& motion = whole.section(stage).config.as<MotionStageConfig>();
+    if (motion.answers.tracks.sequences > kAsked)
+      request.overrides.push_back(format("motion.answers.sequences=%d", int{kAsked}));
+  }
+  return configured(request);
 }
 
 /// For the first lines of a run; nothing for float32.
@@ -50,24 +104,85 @@ std::string products_in(MatmulPrecision precision) {
          (matrix_unit() ? "by the matrix unit (AMX)" : "by float32 vectors");
 }
 
-int run_train(const std::vector<std::string>& arguments, const Common& common) {
-  const Request request = read_request(arguments);
-  if (!request.resume.empty() && common.seed_given)
-    throw InputError("", "--seed cannot change a resumed run", "leave it out, or train anew");
-  TrainConfig config;
-  std::vector<std::string> overrides = request.overrides;
-  if (common.seed_given) overrides.push_back("seed=" + std::to_string(common.seed));
-  load_config(request.resume.empty() ? request.config : run_config_path(request.resume), overrides,
-              config);
-  if (config.stages.empty())
-    throw InputError(request.config, "names no stages, so there is nothing to train",
-                     "use it in a sweep, or name stages");
-  const TrainingData data(config.data);
-  RunInput input{config.seed, threads(), common.command_line, {}, resolved_yaml(config)};
+RunInput provenance_of(const TrainConfig& config, const TrainingData& data, const Common& common) {
+  RunInput out{config.seed, threads(), common.command_line, {}, resolved_yaml(config)};
   if (config.data.source != "builtin")
-    input.data.push_back({config.data.source, checksum(data.train) + checksum(data.validation)});
+    out.data.push_back({config.data.source, checksum(data.train) + checksum(data.validation)});
+  return out;
+}
+
+/// Trains in a run directory and leaves its weights there.
+void train_in(RunDir& run, const TrainConfig& config, const TrainingData& data,
+              const TrainArguments& arguments, const Common& common) {
+  log_info("seed " + std::to_string(config.seed) + ", " + std::to_string(threads()) + " threads; " +
+           std::to_string(data.train.bodies.size()) + " bodies and " +
+           std::to_string(data.train.motions.size()) + " motions to train on" +
+           products_in(config.precision));
+  TensorBoardLog tensorboard(run.dir());
+  CsvLog csv(run.dir());
+  TrainOptions options;
+  options.quiet = common.quiet;
+  if (arguments.tensorboard) options.observers.push_back(&tensorboard);
+  if (arguments.csv) options.observers.push_back(&csv);
+  save_bundle(run.dir() + "/weights.safetensors", train_run(run, config, data, options));
+}
+
+int dry_run(const TrainConfig& config, const TrainingData& data, const Common& common) {
+  const std::vector<StageForecast> stages = forecast(config, data);
+  std::vector<std::vector<std::string>> rows{
+      {"stage", "parameters", "steps", "ms a step", "before", "time", "memory"}};
+  Json list = Json::array();
+  double seconds = 0;
+  for (const StageForecast& f : stages) {
+    const double whole = f.seconds(config.loop.validate_every);
+    const double mebibytes = static_cast<double>(f.memory) / 1048576.0;
+    seconds += whole;
+    rows.push_back({f.stage, std::to_string(f.parameters), std::to_string(f.steps),
+                    format("%.1f", 1e3 * f.per_step), duration_text(f.before), duration_text(whole),
+                    format("%.0f MiB", mebibytes)});
+    list.push_back({{"stage", f.stage},
+                    {"parameters", f.parameters},
+                    {"steps", f.steps},
+                    {"seconds", whole},
+                    {"memory_bytes", f.memory}});
+  }
+  print(common.json, {{"stages", list}, {"seconds", seconds}},
+        markdown_table(rows) + "\nabout " + duration_text(seconds) + " on " +
+            std::to_string(threads()) + " threads; nothing was written\n");
+  return 0;
+}
+
+/// Everything a training does, in a folder that is removed.
+int fast_dev_run(const TrainConfig& config, const TrainingData& data,
+                 const TrainArguments& arguments, const Common& common) {
+  const std::filesystem::path root = std::filesystem::temp_directory_path();
+  const Temporary folder(name_beside((root / "restage-fast-dev-run").string()));
+  const RunInput input = provenance_of(config, data, common);
+  {
+    RunDir run = RunDir::create_at(folder.path(), input.resolved_yaml, provenance_json(input),
+                                   config.stages);
+    train_in(run, config, data, arguments, common);
+    load_bundle(run.dir());
+  }
+  print(common.json, {{"fast_dev_run", true}, {"stages", config.stages}},
+        "every stage ran some steps, was validated and saved; nothing was kept\n");
+  return 0;
+}
+
+int run_train(const TrainArguments& arguments, const Common& common) {
+  const Request request = read_request(arguments, common);
+  TrainConfig config = configured(request);
+  if (arguments.fast_dev_run) config = shortened(request, config);
+  if (arguments.print_config) {
+    print(common.json, {{"config", resolved_yaml(config)}}, resolved_yaml(config));
+    return 0;
+  }
+  const TrainingData data(config.data);
+  const RunInput input = provenance_of(config, data, common);
   if (!request.resume.empty()) check_same_run(request.resume, input);
   check_stages(config, data);
+  if (arguments.dry_run) return dry_run(config, data, common);
+  if (arguments.fast_dev_run) return fast_dev_run(config, data, arguments, common);
 
   RunDir run = request.resume.empty()
                    ? RunDir::create(config.run_root, config.name, input.resolved_yaml,
@@ -75,11 +190,7 @@ int run_train(const std::vector<std::string>& arguments, const Common& common) {
                    : RunDir::resume(request.resume, config.stages);
   print(common.json, {{"run", run.dir()}, {"seed", config.seed}}, run.dir() + "\n");
   finish_output();
-  log_info("seed " + std::to_string(config.seed) + ", " + std::to_string(threads()) + " threads; " +
-           std::to_string(data.train.bodies.size()) + " bodies and " +
-           std::to_string(data.train.motions.size()) + " motions to train on" +
-           products_in(config.precision));
-  save_bundle(run.dir() + "/weights.safetensors", train_run(run, config, data, common.quiet));
+  train_in(run, config, data, arguments, common);
   log_info("weights: " + run.dir() + "/weights.safetensors");
   return 0;
 }
@@ -87,16 +198,28 @@ int run_train(const std::vector<std::string>& arguments, const Common& common) {
 }  // namespace
 
 void add_train(Program& program) {
-  auto [app, arguments] = program.add(
+  auto [app, a] = program.add(
       "train", "train the stages of a configuration",
       "restage train configs/demo.yaml\n"
       "restage train configs/lite/all.yaml data.source=data.h5 motion.optimiser.steps=2000\n"
       "restage train configs/lite/all.yaml skeleton.from=experiments/weights/lite.safetensors "
       "motion.init=experiments/weights/lite.safetensors\n"
+      "restage train configs/lite/all.yaml data.source=data.h5 --dry-run\n"
+      "restage train configs/lite/all.yaml loop.export=best loop.patience=5 --tensorboard\n"
+      "restage train configs/lite/all.yaml stages=[skeleton] --overfit-batches 1\n"
       "restage train resume=runs/demo-20260101-120000-1",
       run_train);
-  app.add_option("ARGUMENTS", arguments, "CONFIG.yaml and key=value overrides, or resume=RUN_DIR")
+  app.add_option("ARGUMENTS", a.words, "CONFIG.yaml and key=value overrides, or resume=RUN_DIR")
       ->required();
+  app.add_flag("--print-config", a.print_config, "print the resolved configuration and end");
+  app.add_flag("--dry-run", a.dry_run,
+               "check all, forecast time and memory from some steps of each stage, write nothing");
+  app.add_flag("--fast-dev-run", a.fast_dev_run,
+               "three steps, a validation and a checkpoint of each stage; keep nothing");
+  app.add_option("--overfit-batches", a.overfit_batches,
+                 "train on the same N batches again and again: can they be learned?");
+  app.add_flag("--tensorboard", a.tensorboard, "event files in RUN/tensorboard");
+  app.add_flag("--csv", a.csv, "RUN/metrics.csv besides metrics.jsonl");
 }
 
 }  // namespace restage::cli

@@ -109,7 +109,7 @@ EarlyStopper::EarlyStopper(EarlyStop rule, Store store, StageId own, std::vector
       own_(std::move(own)),
       all_(std::move(all)) {}
 
-void EarlyStopper::on_validation(const Stage& stage, int64_t /*done*/, const NamedValues&) {
+void EarlyStopper::on_validation(Stage& stage, int64_t /*done*/, const NamedValues&) {
   if (stage.name() != rule_.stage()) return;
   std::vector<Curve> others;
   for (const StageId& id : all_)

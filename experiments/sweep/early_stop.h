@@ -43,7 +43,7 @@ class EarlyStopper final : public TrainObserver {
  public:
   /// `all`: the artifacts of the rule's stage in all trials of the sweep.
   EarlyStopper(EarlyStop rule, Store store, StageId own, std::vector<StageId> all);
-  void on_validation(const Stage& stage, int64_t done, const NamedValues&) override;
+  void on_validation(Stage& stage, int64_t done, const NamedValues&) override;
 
  private:
   EarlyStop rule_;

@@ -6,7 +6,7 @@
 
 #include "autograd/base/nearest.h"
 #include "nn/config/config.h"
-#include "train/stages/registry.h"
+#include "train/stages/train_config.h"
 
 namespace restage::sweep {
 namespace {
@@ -255,19 +255,27 @@ SweepPlan plan_sweep(const SweepFile& file) {
 
 Forecast measure(const SweepPlan& plan) {
   Forecast out;
-  std::set<std::string> counted;                // artifacts
-  std::map<std::string, Measured> by_question;  // everything but the seed, and the stage
-  for (const PlannedTrial& trial : plan.trials)
+  std::set<std::string> counted;                                  // artifacts
+  std::map<std::string, std::vector<StageForecast>> by_question;  // everything but the seed
+  for (const PlannedTrial& trial : plan.trials) {
+    const bool nothing = std::all_of(
+        trial.artifacts.begin(), trial.artifacts.end(),
+        [&](const StageArtifact& a) { return a.there || counted.contains(a.stage + a.id); });
+    if (nothing) continue;
+    const ConfigNode tree = parse_yaml(trial.config_yaml, trial.id);
+    auto [stages, is_new] = by_question.try_emplace(trial.case_name + "|" + describe(trial));
+    if (is_new) stages->second = measure(tree);
+    TrainConfig config;
+    read_config(tree, config);
     for (const StageArtifact& artifact : trial.artifacts) {
       if (artifact.there || !counted.insert(artifact.stage + artifact.id).second) continue;
-      const std::string question = trial.case_name + "|" + describe(trial) + "|" + artifact.stage;
-      if (!by_question.contains(question))
-        by_question[question] =
-            measure_stage(parse_yaml(trial.config_yaml, trial.id), artifact.stage);
-      const Measured& one = by_question[question];
-      out.seconds += one.seconds_per_step * static_cast<double>(one.steps);
-      out.memory_bytes = std::max(out.memory_bytes, one.memory_bytes);
+      for (const StageForecast& one : stages->second) {
+        if (one.stage != artifact.stage) continue;
+        out.seconds += one.seconds(config.loop.validate_every);
+        out.memory_bytes = std::max(out.memory_bytes, one.memory);
+      }
     }
+  }
   return out;
 }
 

@@ -194,27 +194,9 @@ TrialOutcome run_trial(const std::string& config_yaml_path, const std::string& i
   return out;
 }
 
-Measured measure_stage(const ConfigNode& tree, const std::string& stage) {
-  constexpr int64_t kWarm = 1, kSteps = 3;
+std::vector<StageForecast> measure(const ConfigNode& tree) {
   const TrainConfig config = read(tree);
-  const TrainingData data(config.data);
-  Bundle so_far;
-  std::unique_ptr<Stage> made;
-  for (const std::string& name : config.stages) {
-    made = make_stage(config, name, data, &so_far);
-    if (name == stage) break;
-    if (made != nullptr) so_far.add(made->result());
-  }
-  if (made == nullptr || made->steps() == 0) return {};
-  reset_peak_memory();
-  auto start = std::chrono::steady_clock::now();
-  for (int64_t i = 0; i < kWarm + kSteps; ++i) {
-    if (i == kWarm) start = std::chrono::steady_clock::now();
-    const MatmulPrecisionScope scope(config.precision);
-    made->step(i);
-  }
-  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-  return {took.count() / kSteps, made->steps(), memory_stats().peak};
+  return forecast(config, TrainingData(config.data));
 }
 
 }  // namespace restage::sweep

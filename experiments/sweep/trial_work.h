@@ -11,6 +11,7 @@
 
 #include "experiments/sweep/sweep_file.h"
 #include "nn/config/config_tree.h"
+#include "train/forecast.h"
 #include "train/trainer.h"
 
 namespace restage::sweep {
@@ -65,12 +66,7 @@ TrialOutcome run_trial(const std::string& config_yaml_path, const std::string& i
                        const Evaluate& evaluate, const std::string& store,
                        const TrainOptions& options, const std::string& last_stage = "");
 
-/// What a few steps of a stage cost.
-struct Measured {
-  double seconds_per_step = 0;
-  int64_t steps = 0, memory_bytes = 0;
-};
-/// Trains a few steps of `stage` and forgets them.
-Measured measure_stage(const ConfigNode& tree, const std::string& stage);
+/// What the stages of a configuration cost.
+std::vector<StageForecast> measure(const ConfigNode& tree);
 
 }  // namespace restage::sweep

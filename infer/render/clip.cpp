@@ -16,6 +16,17 @@ float ranked(std::vector<float>& values, size_t place) {
 
 }  // namespace
 
+Points stick_figure(const Joints& joints) {
+  constexpr int kPointsPerBone = 12;
+  Points out;
+  for (int j = 1; j < kJoints; ++j)
+    for (int k = 0; k <= kPointsPerBone; ++k) {
+      const double t = static_cast<double>(k) / kPointsPerBone;
+      out.push_back(((1 - t) * joints[kParents[j]] + t * joints[j]).cast<float>());
+    }
+  return out;
+}
+
 void check_clips(const std::string& where, const std::vector<Clip>& clips) {
   if (clips.empty() || clips.size() > 3)
     throw InputError(where, std::to_string(clips.size()) + " sequences to draw",

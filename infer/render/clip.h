@@ -19,6 +19,9 @@ struct Clip {
   std::vector<Point> focus = {};        ///< of each frame, what a close-up looks at; may be empty
 };
 
+/// Enough points along each bone to see it.
+Points stick_figure(const Joints& joints);
+
 /// InputError when there is nothing to draw (no clips, more than three, a clip without frames) or a
 /// clip breaks the rules above. Points that are not finite are allowed in clouds only and not
 /// drawn.

@@ -133,9 +133,9 @@ TEST(TrainStages, ReadingHasNoState) {
                                           "balance"};
   for (const std::string name : kStageNames) {
     const auto one = tiny_stage(name, tiny_training(8)), other = tiny_stage(name, tiny_training(8));
-    one->read(5);  // as if it had been ahead
+    one->examples(5);  // as if it had been ahead
     one->step(0);
-    one->read(0);
+    one->examples(0);
     one->step(1);
     other->step(0);
     other->step(1);

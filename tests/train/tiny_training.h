@@ -113,7 +113,7 @@ class Forwarding : public Stage {
   explicit Forwarding(std::unique_ptr<Stage> stage)
       : Stage(stage->name(), optimiser_of(*stage)), stage_(std::move(stage)) {}
   NamedValues step(int64_t step) override { return stage_->step(step); }
-  void read(int64_t step) const override { stage_->read(step); }
+  NamedTensors examples(int64_t step) const override { return stage_->examples(step); }
   NamedValues validate() override { return stage_->validate(); }
   void save(TensorFile& file) const override { stage_->save(file); }
   void load(const TensorFile& file, const std::string& where) override {

@@ -199,7 +199,7 @@ TEST_F(TrainTrainer, PrecisionIsForStepsOnly) {
 struct Counting final : TrainObserver {
   int steps = 0, validations = 0, checkpoints = 0;
   void on_step(const Stage&, int64_t, const NamedValues&) override { ++steps; }
-  void on_validation(const Stage&, int64_t, const NamedValues&) override { ++validations; }
+  void on_validation(Stage&, int64_t, const NamedValues&) override { ++validations; }
   void on_checkpoint(const Stage&, int64_t, const std::string& path) override {
     checkpoints += fs::exists(path) ? 1 : 0;
   }

@@ -67,7 +67,7 @@ DeformationBatch DeformationStage::batch_of(const PairBatch& p) const {
 
 PairBatch DeformationStage::batch(int64_t step) const {
   const int64_t n = config_.optimiser.batch;
-  return sampler_.batch(step * n, n);
+  return sampler_.batch(drawn(step) * n, n);
 }
 
 /// Sums over the points of a pair, means over pairs.
@@ -117,6 +117,19 @@ NamedValues DeformationStage::validate() {
   // First, since it is what the surface comes to.
   if (offsets_ != nullptr) values.insert(values.begin(), {"with_offsets_mm", 1e3 * with});
   return values;
+}
+
+std::vector<Shown> DeformationStage::show() {
+  const int64_t n = std::min<int64_t>(8, config_.validation_pairs);
+  const DeformationBatch b = batch_of(validation_sampler_.batch(0, n));
+  Context ctx;
+  const Tensor posed = deform(ctx, *weights_, offsets_, b).posed.value;
+  Shown answered{"posed points", {}}, truth{"true points", {}};
+  for (int64_t i = 0; i < n; ++i) {
+    answered.clouds.push_back(points_of(posed, i, posed.size(1)));
+    truth.clouds.push_back(points_of(b.posed_points, i, posed.size(1)));
+  }
+  return {answered, truth};
 }
 
 }  // namespace restage

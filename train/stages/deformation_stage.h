@@ -51,8 +51,9 @@ class DeformationStage final : public Stage {
   static std::vector<std::string> reads(const Config&) { return {}; }
   DeformationStage(const Config& config, const StageInput& input);
   NamedValues step(int64_t step) override;
-  void read(int64_t step) const override { batch(step); }
+  NamedTensors examples(int64_t step) const override { return batch(step).tensors(); }
   NamedValues validate() override;
+  std::vector<Shown> show() override;
 
  private:
   PairBatch batch(int64_t step) const;

@@ -79,6 +79,7 @@ std::vector<StageId> Identities::stages(const TrainConfig& config) {
                  {"precision", static_cast<int>(config.precision)},
                  {"reads", Json::object()}};
     const SelectionConfig& selection = config.loop.selection;
+    if (config.loop.overfit_batches > 0) json["overfit_batches"] = config.loop.overfit_batches;
     if (selection.ema > 0) json["ema"] = number(selection.ema);
     if (selection.judges())
       json["selection"] = {{"export", static_cast<int>(selection.choice)},

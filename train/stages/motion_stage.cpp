@@ -241,8 +241,16 @@ MotionStage::Batch MotionStage::batch(int64_t step) const {
   if (config_.self_first_pass)
     out.self = std::llround(config_.windows.self_share * static_cast<double>(n));
   out.cycle = n - out.self;
-  if (out.cycle > 0) out.windows = windows().cycle.batch(step * out.cycle, out.cycle);
-  if (out.self > 0) out.own = windows().self.batch(step * out.self, out.self);
+  if (out.cycle > 0) out.windows = windows().cycle.batch(drawn(step) * out.cycle, out.cycle);
+  if (out.self > 0) out.own = windows().self.batch(drawn(step) * out.self, out.self);
+  return out;
+}
+
+NamedTensors MotionStage::examples(int64_t step) const {
+  const Batch b = batch(step);
+  NamedTensors out;
+  for (const auto& [kind, windows] : {std::pair("cycle.", &b.windows), std::pair("self.", &b.own)})
+    for (auto& [name, tensor] : windows->tensors()) out.emplace_back(kind + name, tensor);
   return out;
 }
 
@@ -314,6 +322,23 @@ NamedValues MotionStage::validate() {
           {"closed_form_pa_mpjpe", closed_form.pa / count},
           {"closed_form_acceleration", closed_form.acceleration / count},
           {"closed_form_rotation", closed_form.rotation / count}};
+}
+
+std::vector<Shown> MotionStage::show() {
+  constexpr int64_t kMoments = 8;
+  const WindowBatch b = windows().validation.batch(0, 1);
+  Context ctx;
+  MotionState state;
+  const Tensor answer = model_->forward(ctx, motion_batch(b).seen(b.rest_b), &state).joints.value;
+  const int64_t late = model_->latency(), t = b.joints_a.size(1) - late;
+  Shown source{"source", {}}, answered{"answer", {}}, truth{"truth", {}};
+  for (int64_t k = 0; k < std::min(kMoments, t); ++k) {
+    const int64_t frame = k * (t - 1) / std::max<int64_t>(1, std::min(kMoments, t) - 1);
+    source.skeletons.push_back(joints_of(b.joints_a, frame));
+    answered.skeletons.push_back(joints_of(answer, frame + late));
+    truth.skeletons.push_back(joints_of(b.truth_b, frame));
+  }
+  return {source, answered, truth};
 }
 
 void MotionStage::save_more(TensorFile& file) const {

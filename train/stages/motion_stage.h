@@ -119,10 +119,11 @@ class MotionStage final : public Stage {
   static std::vector<std::string> reads(const Config& config);
   MotionStage(const Config& config, const StageInput& input);
   NamedValues step(int64_t step) override;
-  void read(int64_t step) const override { batch(step); }
+  NamedTensors examples(int64_t step) const override;
   /// Errors against the true motion of B, as the evaluation measures them, and the two losses whose
   /// drifting apart shows B becoming a hidden code for A.
   NamedValues validate() override;
+  std::vector<Shown> show() override;
 
  private:
   /// Windows of a step: for the cycle, and self samples apart; either may be undefined.

@@ -45,13 +45,14 @@ Var RootStage::loss(Context& ctx, const PairBatch& b) const {
              Var(minus_centroid(b.rest_points)));
 }
 
-void RootStage::read(int64_t step) const {
-  sampler_.batch(step * config_.optimiser.batch, config_.optimiser.batch);
+NamedTensors RootStage::examples(int64_t step) const {
+  const int64_t n = config_.optimiser.batch;
+  return sampler_.batch(drawn(step) * n, n).tensors();
 }
 
 NamedValues RootStage::step(int64_t step) {
   const OptimiserConfig& o = config_.optimiser;
-  const PairBatch b = sampler_.batch(step * o.batch, o.batch);
+  const PairBatch b = sampler_.batch(drawn(step) * o.batch, o.batch);
   const Differentiated d = differentiate(key_.fold(static_cast<uint64_t>(step)),
                                          [&](Context& ctx) { return loss(ctx, b); });
   const double rate = learning_rate(o.schedule, step, o.steps);

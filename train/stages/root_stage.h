@@ -30,7 +30,7 @@ class RootStage final : public Stage {
   static std::vector<std::string> reads(const Config&) { return {}; }
   RootStage(const Config& config, const StageInput& input);
   NamedValues step(int64_t step) override;
-  void read(int64_t step) const override;
+  NamedTensors examples(int64_t step) const override;
   NamedValues validate() override;
 
  private:

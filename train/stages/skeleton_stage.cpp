@@ -138,14 +138,14 @@ Var SkeletonStage::voting_loss(const SkeletonOutput& out, const CloudBatch& batc
 
 CloudBatch SkeletonStage::batch(int64_t step) const {
   const int64_t n = config_.optimiser.batch;
-  return sampler_.batch(step * n, n);
+  return sampler_.batch(drawn(step) * n, n);
 }
 
 /// Memories that are asked for are what this model says of the frame before: errors of today and
 /// of yesterday are alike, which none that is drawn would teach.
 void SkeletonStage::recall(int64_t step, CloudBatch* clouds) const {
   if (clouds->asked.empty()) return;
-  const CloudBatch before = sampler_.before(step * config_.optimiser.batch, *clouds);
+  const CloudBatch before = sampler_.before(drawn(step) * config_.optimiser.batch, *clouds);
   Context ctx;
   const SkeletonOutput answer = model_->forward(ctx, {before.points, before.past});
   // The step itself will find what makes it so, and name it.
@@ -252,6 +252,21 @@ NamedValues SkeletonStage::validate() {
   if (turns) out.push_back({"turn_error_degrees", *turns});
   if (miscalibration) out.push_back({"miscalibration", *miscalibration});
   return out;
+}
+
+std::vector<Shown> SkeletonStage::show() {
+  const size_t n = std::min<size_t>(8, posed_.size());
+  const CloudBatch clouds =
+      validation_sampler_.clouds({posed_.begin(), posed_.begin() + static_cast<std::ptrdiff_t>(n)});
+  Context ctx;
+  const Tensor answer = model_->forward(ctx, clouds.points).joints.value;
+  Shown seen{"cloud", {}}, answered{"joints", {}}, truth{"true joints", {}};
+  for (int64_t i = 0; i < static_cast<int64_t>(n); ++i) {
+    seen.clouds.push_back(points_of(clouds.points, i, clouds.points.size(1)));
+    answered.skeletons.push_back(joints_of(answer, i));
+    truth.skeletons.push_back(joints_of(clouds.joints, i));
+  }
+  return {seen, answered, truth};
 }
 
 }  // namespace restage

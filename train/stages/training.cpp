@@ -4,9 +4,12 @@
 #include <memory>
 
 #include "nn/config/config.h"
+#include "train/stages/motion_stage.h"
 
 namespace restage {
 namespace {
+
+constexpr int64_t kAsked = 8;  // sequences, in a forecast
 
 /// The stage's networks in weights from elsewhere.
 Bundle taken_from(const StageType& type, const std::string& path) {
@@ -37,6 +40,7 @@ std::unique_ptr<Stage> make_stage(const TrainConfig& config, const std::string& 
   }
   check_order(config, type, section.config);
   auto stage = type.make(section.config, {data.train, data.validation, config.seed, *so_far});
+  stage->repeat_batches(config.loop.overfit_batches);
   if (section.init)
     stage->start_from(load_bundle(*section.init), section.init_names, *section.init);
   return stage;
@@ -48,16 +52,33 @@ void check_stages(const TrainConfig& config, const TrainingData& data) {
     if (const auto stage = make_stage(config, name, data, &so_far)) so_far.add(stage->result());
 }
 
-Bundle train_run(RunDir& run, const TrainConfig& config, const TrainingData& data, bool quiet) {
-  TrainOptions options;
+Bundle train_run(RunDir& run, const TrainConfig& config, const TrainingData& data,
+                 TrainOptions options) {
   options.precision = config.precision;
-  options.quiet = quiet;
   return train(
       run, config.stages, config.loop,
       [&](const std::string& name, Bundle* so_far) {
         return make_stage(config, name, data, so_far);
       },
       options);
+}
+
+std::vector<StageForecast> forecast(TrainConfig config, const TrainingData& data) {
+  // Asking an extractor for all that a stage learns on would take minutes.
+  auto& motion = config.section("motion").config.as<MotionStageConfig>();
+  const int64_t all = motion.answers.tracks.sequences, asked = std::min<int64_t>(all, kAsked);
+  motion.answers.tracks.sequences = asked;
+  std::vector<StageForecast> out;
+  Bundle so_far;
+  for (const std::string& name : config.stages) {
+    const auto stage = make_stage(config, name, data, &so_far);
+    if (stage == nullptr) continue;
+    so_far.add(stage->result());
+    out.push_back(forecast(*stage, config.precision, true));
+    if (name == "motion" && asked > 0)
+      out.back().before *= static_cast<double>(all) / static_cast<double>(asked);
+  }
+  return out;
 }
 
 StoreTraining train_in_store(const Store& store, const TrainConfig& config, Identities* identities,
@@ -76,6 +97,7 @@ StoreTraining train_in_store(const Store& store, const TrainConfig& config, Iden
                                    [&](const StageId& s) { return s.stage == name; });
       out.bundle.add(store.get(*id, resolved_yaml(section.config), [&](RunDir& run) {
         if (data == nullptr) data = std::make_unique<TrainingData>(config.data);
+        own.given = out.bundle;
         return train(
             run, {name}, config.loop,
             [&](const std::string&, Bundle*) {

@@ -2,6 +2,7 @@
 // artifact of a store that other trials share (sweeps).
 #pragma once
 
+#include "train/forecast.h"
 #include "train/stages/store.h"
 #include "train/stages/train_config.h"
 
@@ -26,8 +27,13 @@ std::unique_ptr<Stage> make_stage(const TrainConfig& config, const std::string& 
 /// there.
 void check_stages(const TrainConfig& config, const TrainingData& data);
 
-/// All stages one after the other in a run directory.
-Bundle train_run(RunDir& run, const TrainConfig& config, const TrainingData& data, bool quiet);
+/// All stages one after the other in a run directory, in the precision of the configuration.
+Bundle train_run(RunDir& run, const TrainConfig& config, const TrainingData& data,
+                 TrainOptions options);
+
+/// What each stage that is trained would cost, by some of its steps. A stage that reads another's
+/// networks gets them untrained: that changes no time.
+std::vector<StageForecast> forecast(TrainConfig config, const TrainingData& data);
 
 struct StoreTraining {
   Bundle bundle;

@@ -1,0 +1,26 @@
+// What a stage will cost, from a few of its steps.
+#pragma once
+
+#include "autograd/kernels/matmul_precision.h"
+#include "train/stage.h"
+
+namespace restage {
+
+struct StageForecast {
+  std::string stage;
+  int64_t parameters = 0;  ///< of what it hands on
+  int64_t steps = 0;
+  double per_step = 0, before = 0,
+         validation = 0;  ///< seconds; `before`: what the first step waits for
+  int64_t memory = 0;     ///< most that tensors took, bytes
+
+  /// Seconds of the whole stage, validated every so many steps.
+  double seconds(int64_t validate_every) const;
+};
+
+/// Changes the stage. `validate`: one validation too.
+StageForecast forecast(Stage& stage, MatmulPrecision precision, bool validate);
+
+int64_t count_parameters(const Stage& stage);
+
+}  // namespace restage
