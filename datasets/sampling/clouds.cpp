@@ -69,6 +69,7 @@ CloudSampler::CloudSampler(const Corpus& corpus, const CloudConfig& config, uint
       config_(checked(config)),
       key_(RngKey{seed, 0}.fold("clouds")),
       frames_(corpus.motions, 1, static_cast<size_t>(config_.frame_step)),
+      own_(corpus),
       surfaces_(surface_samplers(corpus.bodies)) {
   if (surfaces_.empty()) throw InputError("", "no bodies to draw clouds from", "add bodies");
 }
@@ -96,6 +97,7 @@ CloudSubject CloudSampler::subject(int64_t index) const {
     out.step_back = 1 + rng.below(3);
   }
   out.intruder = out.sensor != Sensor::none && rng.uniform() < config_.intruder;
+  if (!out.rest) out.body = own_.or_own(out.body, out.at.motion, rng);
   return out;
 }
 

@@ -113,6 +113,7 @@ class CloudSampler {
   CloudConfig config_;
   RngKey key_;
   FrameIndex frames_;
+  OwnBodies own_;
   std::vector<SurfaceSampler> surfaces_;
 };
 

@@ -154,6 +154,7 @@ std::vector<EvalSequence> evaluation_sequences(const Corpus& corpus, size_t coun
                      "give at least two bodies and one motion in this split");
   Rng rng(RngKey{seed, 0}.fold("evaluation sequences"));
   const std::vector<size_t> order = shuffled(rng, motions);
+  const OwnBodies own(corpus);
   std::vector<EvalSequence> out(count);
   for (size_t i = 0; i < count; ++i) {
     EvalSequence& s = out[i];
@@ -165,6 +166,7 @@ std::vector<EvalSequence> evaluation_sequences(const Corpus& corpus, size_t coun
     s.frames = std::clamp<size_t>(frames, 1, length);
     s.first = rng.below(length - s.frames + 1);
     s.body_a = rng.below(bodies);
+    s.body_a = own.of(s.motion).value_or(s.body_a);
     s.body_b = rng.below(bodies - 1);
     if (s.body_b >= s.body_a) ++s.body_b;
   }

@@ -1,6 +1,7 @@
 #include "datasets/sampling/frames.h"
 
 #include <algorithm>
+#include <map>
 
 #include "datasets/readers/errors.h"
 
@@ -9,6 +10,26 @@ namespace restage {
 void check_setting(const char* kind, bool good, const char* key, const char* range) {
   if (!good)
     throw InputError("", cat(kind, " setting '", key, "' is out of range"), cat("use ", range));
+}
+
+OwnBodies::OwnBodies(const Corpus& corpus) {
+  std::map<std::string, int64_t> known;
+  for (size_t b = 0; b < corpus.bodies.size(); ++b)
+    known.emplace(corpus.bodies[b].id, static_cast<int64_t>(b));
+  for (const Motion& motion : corpus.motions) {
+    const auto found = known.find(motion.subject);
+    body_.push_back(found == known.end() ? -1 : found->second);
+  }
+}
+
+std::optional<size_t> OwnBodies::of(size_t motion) const {
+  const int64_t body = body_.at(motion);
+  return body < 0 ? std::nullopt : std::optional(static_cast<size_t>(body));
+}
+
+size_t OwnBodies::or_own(size_t drawn, size_t motion, Rng& rng) const {
+  const auto own = of(motion);
+  return own && rng.uniform() < 0.5 ? *own : drawn;
 }
 
 FrameIndex::FrameIndex(const std::vector<Motion>& motions, size_t window, size_t step)

@@ -1,9 +1,11 @@
 // Frames of a set of motions, numbered through.
 #pragma once
 
+#include <optional>
 #include <vector>
 
-#include "nn/geometry/body.h"
+#include "autograd/base/rng.h"
+#include "datasets/corpus.h"
 
 namespace restage {
 
@@ -13,6 +15,20 @@ void check_setting(const char* kind, bool good, const char* key, const char* ran
 
 struct FrameRef {
   size_t motion = 0, frame = 0;
+};
+
+/// Whose body performs a motion. Where the data hold the body of who was recorded (its id is the
+/// motion's subject), it takes every second sample of that motion, and evaluation's source is it.
+class OwnBodies {
+ public:
+  explicit OwnBodies(const Corpus& corpus);
+  /// Nothing if the corpus does not have it.
+  std::optional<size_t> of(size_t motion) const;
+  /// `drawn`, or the motion's own. Draws only where there is one.
+  size_t or_own(size_t drawn, size_t motion, Rng& rng) const;
+
+ private:
+  std::vector<int64_t> body_;  // of each motion; -1: none
 };
 
 /// All places where `window` consecutive frames of one motion begin; with a `step`, only every

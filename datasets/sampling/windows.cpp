@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "autograd/base/parallel.h"
@@ -174,6 +175,7 @@ WindowSampler::WindowSampler(const Corpus& corpus, const WindowConfig& config, u
       config_(checked(config)),
       key_(RngKey{seed, 0}.fold("windows")),
       frames_(corpus.motions, static_cast<size_t>(config.frames)),
+      own_(corpus),
       tracks_(tracks),
       know_turns_(all_know(tracks, [](const SeenJoints& f) { return f.turns.has_value(); })),
       know_uncertainty_(
@@ -225,6 +227,10 @@ WindowSubject WindowSampler::subject(int64_t index) const {
   // B is one body in one sample, so its real window is mirrored with it.
   out.real_augmentation = draw_augmentation(rng, config_.heading ? M_PI : 0.0, false);
   out.real_augmentation.mirror = out.augmentation.mirror;
+  if (out.track != nullptr) return out;
+  const size_t drawn = std::exchange(out.body_a, own_.or_own(out.body_a, out.clip.motion, rng));
+  if (out.self) out.body_b = out.body_a;
+  if (!out.self && out.body_b == out.body_a) out.body_b = drawn;
   return out;
 }
 

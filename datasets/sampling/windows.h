@@ -96,6 +96,7 @@ class WindowSampler {
   WindowConfig config_;
   RngKey key_;
   FrameIndex frames_;
+  OwnBodies own_;
   const std::vector<JointTrack>* tracks_;
   bool know_turns_, know_uncertainty_;
 };
