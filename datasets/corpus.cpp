@@ -4,6 +4,7 @@
 #include <cstring>
 #include <filesystem>
 #include <map>
+#include <set>
 
 #include "autograd/base/error.h"
 #include "autograd/base/format.h"
@@ -160,6 +161,30 @@ Corpus subset(const Corpus& corpus, const std::string& split) {
   out.description = corpus.description;
   out.license = corpus.license;
   check_not_empty(out, "data", split);
+  return out;
+}
+
+std::vector<std::string> remarks(const CorpusSource& source, const Corpus& train) {
+  constexpr size_t kFewBodies = 4;
+  std::vector<std::string> out;
+  if (source.source == "builtin") return out;
+  std::set<std::string> people;
+  for (const Motion& motion : train.motions) people.insert(motion.subject);
+  if (people.size() == 1 && !people.begin()->empty())
+    out.push_back("all motions to train on are of one subject ('" + *people.begin() +
+                  "'): what is learned may hold for nobody else");
+  if (train.bodies.size() < kFewBodies)
+    out.push_back("there are " + std::to_string(train.bodies.size()) +
+                  " bodies to train on; more of them can be put in with 'restage data merge'");
+  std::error_code ignored;
+  if (std::filesystem::is_directory(source.source, ignored)) return out;
+  const Inspection about = inspect(source.source);
+  const auto test = about.splits.find("test");
+  for (const char* what : {"bodies", "motions"})
+    if (test == about.splits.end() || !test->second.contains(what))
+      out.push_back(source.source + " has no " + what +
+                    " of split 'test', so 'restage eval run=' has nothing to measure on; "
+                    "'restage data split' deals them");
   return out;
 }
 

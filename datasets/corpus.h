@@ -36,6 +36,11 @@ Corpus load_corpus(const CorpusSource& source, const std::string& split = "");
 /// The bodies and the motions of one split. InputError if either is missing.
 Corpus subset(const Corpus& corpus, const std::string& split);
 
+/// What may be wrong with data before anybody has trained on them, a line each: motions of one
+/// person only, few bodies, no split to measure on; nothing of
+/// the built-in source. `train`: what would be trained on.
+std::vector<std::string> remarks(const CorpusSource& source, const Corpus& train);
+
 /// 16 hexadecimal digits that change with any number, id or split: provenance of a run.
 std::string checksum(const Corpus& corpus);
 

@@ -181,6 +181,7 @@ int run_train(const TrainArguments& arguments, const Common& common) {
   const RunInput input = provenance_of(config, data, common);
   if (!request.resume.empty()) check_same_run(request.resume, input);
   check_stages(config, data);
+  for (const std::string& remark : remarks(config.data, data.train)) log_warning(remark);
   if (arguments.dry_run) return dry_run(config, data, common);
   if (arguments.fast_dev_run) return fast_dev_run(config, data, arguments, common);
 

@@ -3,6 +3,7 @@ import random
 
 from support import CliTest
 from test_data import toy_bvh
+from tiny_run import CONFIG
 
 SPLITS = ("train", "validation", "test")
 
@@ -98,3 +99,16 @@ class Split(People):
         self.bad_input(call + ["--by", "day"], "--by", "subject")
         self.bad_input(["data", "split", "people.h5", "--out", "people.h5"], "people.h5")
         self.bad_input(["data", "split", "none.h5", "--out", "x.h5"], "none.h5")
+
+
+class Told(People):
+    def test_what_is_wrong_with_data_before_training(self):
+        self.write("tiny.yaml", CONFIG)
+        self.people({"ann": [40, 40, 40]})
+        self.imported()
+        self.done("data", "build", "--bodies", 2, 2, 0, "--motions", 0, 2, 0, "--out", "others.h5")
+        self.done("data", "merge", "others.h5", "people.h5", "--out", "data.h5")
+        result = self.restage("train", "tiny.yaml", "data.source=data.h5", "stages=[skeleton]", "--dry-run")
+        self.assertEqual(result.code, 0, result.err)
+        for words in ("one subject ('ann')", "2 bodies to train on", "no bodies of split 'test'", "no motions of split 'test'"):
+            self.assertIn(words, result.err)

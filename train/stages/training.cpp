@@ -64,10 +64,11 @@ Bundle train_run(RunDir& run, const TrainConfig& config, const TrainingData& dat
 }
 
 std::vector<StageForecast> forecast(TrainConfig config, const TrainingData& data) {
-  // Asking an extractor for all that a stage learns on would take minutes.
+  // Asking an extractor for all that a stage learns on and is judged on would take minutes.
   auto& motion = config.section("motion").config.as<MotionStageConfig>();
-  const int64_t all = motion.answers.tracks.sequences, asked = std::min<int64_t>(all, kAsked);
-  motion.answers.tracks.sequences = asked;
+  int64_t &learned = motion.answers.tracks.sequences, &judged = motion.validation_windows;
+  const int64_t all = learned + judged;
+  if (learned > 0) learned = std::min(learned, kAsked), judged = std::min(judged, kAsked);
   std::vector<StageForecast> out;
   Bundle so_far;
   for (const std::string& name : config.stages) {
@@ -75,8 +76,8 @@ std::vector<StageForecast> forecast(TrainConfig config, const TrainingData& data
     if (stage == nullptr) continue;
     so_far.add(stage->result());
     out.push_back(forecast(*stage, config.precision, true));
-    if (name == "motion" && asked > 0)
-      out.back().before *= static_cast<double>(all) / static_cast<double>(asked);
+    if (name == "motion" && learned > 0)
+      out.back().before *= static_cast<double>(all) / static_cast<double>(learned + judged);
   }
   return out;
 }
