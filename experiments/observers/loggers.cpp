@@ -43,7 +43,7 @@ void TensorBoardLog::on_validation(Stage& stage, int64_t done, const NamedValues
       file_->histogram(done, entry.name,
                        {entry.value->data<float>(), static_cast<size_t>(entry.value->numel())});
   if (const std::vector<Clip> clips = clips_of(stage.show()); !clips.empty()) {
-    const Image sheet = contact_sheet(clips);
+    const Image sheet = contact_sheet(clips, {.fps = 0});
     file_->picture(done, stage.name() + "/held out", sheet.width, sheet.height, png_bytes(sheet));
   }
   file_->flush();

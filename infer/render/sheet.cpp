@@ -115,7 +115,7 @@ Image contact_sheet(const std::vector<Clip>& clips, const SheetOptions& options)
     fill_rectangle(sheet, kMargin, y + 4, 12, 12, bytes_of(kClipColours[clip]));
     draw_text(sheet, kMargin + 20, y + 4, 12, kInk, clips[clip].label);
   }
-  for (int c = 0; c < columns; ++c) {
+  for (int c = 0; c < columns && options.fps > 0; ++c) {
     const std::string time = format("%.2f s", static_cast<double>(layout.moments[c]) / options.fps);
     draw_text(sheet, kMargin + c * cell_width + (cell_width - text_width(10, time)) / 2,
               top + rows * row_height + 8, 10, kPale, time);

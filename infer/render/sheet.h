@@ -12,7 +12,7 @@ struct SheetOptions {
   double azimuth = 32;    ///< degrees from the front towards the body's left
   double elevation = 9;   ///< degrees
   double close_up = 0;    ///< metres to either side of the clips' focus; 0: whole figures
-  double fps = kFps;      ///< for the times under the columns
+  double fps = kFps;      ///< for the times under the columns; 0: none
   std::string title;      ///< one line at the top; empty: none
 };
 
