@@ -7,13 +7,13 @@
 namespace restage {
 
 struct SheetOptions {
-  int columns = 8;        ///< moments, spread evenly over the common length (at most its frames)
-  int cell_height = 300;  ///< pixels
-  double azimuth = 32;    ///< degrees from the front towards the body's left
-  double elevation = 9;   ///< degrees
-  double close_up = 0;    ///< metres to either side of the clips' focus; 0: whole figures
-  double fps = kFps;      ///< for the times under the columns; 0: none
-  std::string title;      ///< one line at the top; empty: none
+  int columns = 8;         ///< moments, spread evenly over the common length (at most its frames)
+  int cell_height = 300;   ///< pixels
+  double azimuth = 32;     ///< degrees from the front towards the body's left
+  double elevation = 9;    ///< degrees
+  double close_up = 0;     ///< metres to either side of the clips' focus; 0: whole figures
+  double fps = kFps;       ///< for the times under the columns; 0: none
+  std::string title = {};  ///< one line at the top; empty: none
 };
 
 /// All cells of a column have the same camera, which follows the figure of its own clip level over
