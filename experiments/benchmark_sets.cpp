@@ -1,7 +1,5 @@
 #include "experiments/benchmark_sets.h"
 
-#include <stdlib.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <memory>
@@ -12,6 +10,7 @@
 #include "datasets/importers/gltf_character.h"
 #include "datasets/schema.h"
 #include "experiments/doctor_repair.h"
+#include "experiments/scratch.h"
 #include "experiments/world_map.h"
 #include "nn/geometry/closed_form.h"
 
@@ -19,28 +18,6 @@ namespace restage {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// A folder that goes with its content.
-class Scratch {
- public:
-  Scratch() {
-    std::string name = (fs::temp_directory_path() / "restage-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr)
-      throw WorkError(name + ": could not be made; give TMPDIR a folder that you can write to");
-    path_ = name;
-  }
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-  ~Scratch() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  std::string file(const char* name) const { return (path_ / name).string(); }
-  std::string folder() const { return path_.string(); }
-
- private:
-  fs::path path_;
-};
 
 std::string in(const std::string& folder, const char* file) {
   return (fs::path(folder) / file).string();
@@ -58,6 +35,7 @@ Prediction retargeted(const Bundle& weights, const std::string& folder, const st
   input.target = read_target(input.target_name).mesh;
   input.options.fps = frames->fps();
   input.options.seed = how.seed;
+  input.options.force = how.force;
   if (!type.weights)
     input.rest = joints_of(PredictionFile(in(folder, "rest.h5")).joints().slice(0, 1))[0];
   const auto system = type.make(std::move(input));
@@ -83,9 +61,11 @@ Prediction retargeted(const Bundle& weights, const std::string& folder, const st
 
 /// Scans have a frame of their own: mended by the doctor, and the result put back into the world.
 Prediction retargeted_scans(const Bundle& weights, const std::string& folder,
-                            const WorldMap& to_world, const PredictionFile& source_joints,
-                            const PredictionFile& rest, const BenchmarkOptions& how) {
+                            const WorldMap& to_world, const BenchmarkOptions& how) {
   const std::string source = in(folder, "source.h5");
+  PredictionFile source_joints(source);
+  to_world.carry(source_joints.data.joints, false);
+  const PredictionFile rest(in(folder, "rest.h5"));
   const Scratch scratch;
   const std::string mended = scratch.file("mended.h5");
   Subject subject;
@@ -152,9 +132,7 @@ void judge(const Bundle& weights, const std::string& folder, bool scans,
   truth.thin(how.every);
   scores->frames.push_back(truth.data.frames);
   try {
-    const PredictionFile pred(
-        folder, scans ? retargeted_scans(weights, folder, *to_world, source, rest, how)
-                      : retargeted(weights, folder, in(folder, "source.h5"), how));
+    const PredictionFile pred(folder, retarget_sequence(weights, folder, how));
     scores->model.sequences.push_back(score(pred, truth, how.every));
     add_frames(pred, truth, scores);
   } catch (const InputError& error) {
@@ -193,6 +171,13 @@ void check_benchmark_set(const std::string& set) {
   if (set != "test" && set != "naked" && set != "clothed" && set != "scans")
     throw InputError("", "there is no set '" + set + "' in the open benchmark",
                      "use test, naked, clothed or scans");
+}
+
+Prediction retarget_sequence(const Bundle& weights, const std::string& folder,
+                             const BenchmarkOptions& how) {
+  const std::optional<WorldMap> to_world = source_to_world(in(folder, "truth.h5"));
+  return to_world ? retargeted_scans(weights, folder, *to_world, how)
+                  : retargeted(weights, folder, in(folder, "source.h5"), how);
 }
 
 SystemScores evaluate_benchmark_set(const Bundle& weights, const std::string& folder,

@@ -15,7 +15,14 @@ struct BenchmarkOptions {
   std::string system = "chain";
   int64_t every = 1;  ///< frame of a sequence; above 1 there are no references
   uint64_t seed = 0;
+  bool force = false;  ///< 'restage retarget --force'
 };
+
+/// Retargets the sequence in a folder (datasets/benchmark/sequence.h) as `restage retarget` would.
+/// Scans that are in a frame of their own first go through the doctor, as a user's would, and the
+/// result is put back into the world. Without joints if the system has no rig.
+Prediction retarget_sequence(const Bundle& weights, const std::string& folder,
+                             const BenchmarkOptions& how = {});
 
 /// Retargets every sequence of a set of the benchmark in `folder`, as `restage retarget` would, and
 /// compares with the true answer. Scans first go through the doctor, as a user's would; a sequence

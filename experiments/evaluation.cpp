@@ -162,6 +162,14 @@ const SystemScores* SystemEvaluation::find(const std::string& condition) const {
   return nullptr;
 }
 
+std::vector<std::string> sequence_names(const std::vector<EvalSequence>& list, const Corpus& test) {
+  std::vector<std::string> out;
+  for (const EvalSequence& s : list)
+    out.push_back(test.motions[s.motion].id + "@" + std::to_string(s.first) + ":" +
+                  test.bodies[s.body_a].id + ">" + test.bodies[s.body_b].id);
+  return out;
+}
+
 EvaluationOptions evaluation_options(const TrainConfig& config, const Corpus& test, uint64_t seed) {
   EvaluationOptions out;
   out.seed = seed;

@@ -52,6 +52,8 @@ struct EvaluationOptions {
 SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weights_name,
                                  const Corpus& corpus, const EvaluationOptions& options);
 
+/// A name for each sequence: motion, first frame, both bodies.
+std::vector<std::string> sequence_names(const std::vector<EvalSequence>& list, const Corpus& test);
 /// What `restage eval run=` looks at: the sequences and clouds of a training's configuration.
 EvaluationOptions evaluation_options(const TrainConfig& config, const Corpus& test, uint64_t seed);
 

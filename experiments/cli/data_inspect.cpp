@@ -16,10 +16,10 @@
 #include "datasets/doctor/shape.h"
 #include "datasets/importers/import.h"
 #include "datasets/schema.h"
-#include "experiments/cli/clips.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/import_text.h"
 #include "experiments/cli/output.h"
+#include "experiments/clips.h"
 #include "infer/render/figures.h"
 
 namespace restage::cli {

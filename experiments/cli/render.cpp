@@ -8,9 +8,9 @@
 #include "autograd/base/error.h"
 #include "autograd/base/nearest.h"
 #include "autograd/base/output_check.h"
-#include "experiments/cli/clips.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
+#include "experiments/clips.h"
 #include "infer/render/page.h"
 #include "infer/render/sheet.h"
 #include "nn/geometry/skeleton.h"
@@ -73,6 +73,10 @@ int run_render(const RenderOptions& options, const Common& common) {
   add(options.source, "source");
   add(options.result, "result");
   add(options.truth, "truth");
+  if (!options.truth.empty()) {
+    const size_t result = options.source.empty() ? 0 : 1;
+    add_errors(clips[result + 1], &clips[result]);
+  }
   if (options.out.ends_with(".png")) {
     SheetOptions sheet;
     sheet.columns = options.columns;
@@ -103,7 +107,8 @@ void add_render(Program& program) {
   app.add_option("RESULT", options.result, "prediction or scans (HDF5), or a folder of PLY or OBJ")
       ->required();
   app.add_option("--source", options.source, "what the motion was taken from");
-  app.add_option("--truth", options.truth, "the true motion, if it is known");
+  app.add_option("--truth", options.truth,
+                 "the true motion, if it is known; a page shows how far each vertex is off");
   app.add_option("--out", options.out, "sheet.png or page.html")->required();
   app.add_option("--columns", options.columns, "moments on a sheet");
   app.add_option("--fps", options.fps, "frames per second of the input");

@@ -10,6 +10,7 @@
 #include "autograd/base/error.h"
 #include "experiments/sweep/results.h"
 #include "experiments/sweep/svg.h"
+#include "experiments/sweep/table_formats.h"
 #include "nn/config/config_tree.h"
 
 namespace restage::tables {
@@ -83,14 +84,6 @@ std::vector<std::string> figure_names(const std::vector<Compared>& all) {
   return {names.begin(), names.end()};
 }
 
-/// Bars and line breaks must not end a cell.
-std::string cell(const std::string& text) {
-  std::string out;
-  for (const char c : cli::on_one_line(text))
-    out += c == '|' ? std::string("\\|") : std::string(1, c);
-  return out;
-}
-
 void draw_panel(const std::vector<Compared>& all, const std::string& name, double x, double y,
                 Svg* svg) {
   constexpr double kWidth = 300, kHeight = 150;
@@ -156,13 +149,13 @@ std::vector<std::string> differing_keys(const std::vector<Compared>& all) {
 std::string comparison_markdown(const std::vector<Compared>& all) {
   std::vector<std::vector<std::string>> rows{{"what differs"}}, figures{{"at the end"}};
   for (auto* table : {&rows, &figures})
-    for (const Compared& run : all) table->front().push_back(cell(run.name));
+    for (const Compared& run : all) table->front().push_back(for_markdown(run.name));
   for (const std::string& key : differing_keys(all)) {
-    auto& row = rows.emplace_back(std::vector<std::string>{cell(key)});
-    for (const Compared& run : all) row.push_back(cell(value_or_dash(run, key)));
+    auto& row = rows.emplace_back(std::vector<std::string>{for_markdown(key)});
+    for (const Compared& run : all) row.push_back(for_markdown(value_or_dash(run, key)));
   }
   for (const std::string& name : figure_names(all)) {
-    auto& row = figures.emplace_back(std::vector<std::string>{cell(name)});
+    auto& row = figures.emplace_back(std::vector<std::string>{for_markdown(name)});
     for (const Compared& run : all)
       row.push_back(run.figures.contains(name) ? short_number(run.figures.at(name)) : "-");
   }

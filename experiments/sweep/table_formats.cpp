@@ -55,6 +55,10 @@ Rows value_rows(const Table& table, size_t set) {
   const std::vector<size_t> columns = filled(table, set);
   for (const size_t c : columns) rows[0].push_back(heading(*table.columns[c]));
   for (const Row& row : table.rows) {
+    const bool any = std::any_of(columns.begin(), columns.end(), [&](size_t c) {
+      return row.cells[set][c].value.mean.has_value();
+    });
+    if (row.reference && !any) continue;
     int n = row.n;
     for (const size_t c : columns) n = std::max(n, row.reference ? row.cells[set][c].value.n : 0);
     auto& line = rows.emplace_back(Rows::value_type{row.label, std::to_string(n)});
@@ -94,16 +98,6 @@ void each_table(const Table& table,
 std::string note() {
   return "mean ± sample deviation over n trials [95 % interval: bootstrap over sequences and "
          "seeds]";
-}
-
-// ---- Markdown ----------------------------------------------------------------------------------
-
-/// A cell must not end early: bars and line breaks of names.
-std::string for_markdown(const std::string& text) {
-  std::string out;
-  for (const char c : cli::on_one_line(text))
-    out += c == '|' ? std::string("\\|") : std::string(1, c);
-  return out;
 }
 
 // ---- CSV ---------------------------------------------------------------------------------------
@@ -237,6 +231,13 @@ Json row_json(const Table& table, const Row& row) {
 }
 
 }  // namespace
+
+std::string for_markdown(const std::string& text) {
+  std::string out;
+  for (const char c : cli::on_one_line(text))
+    out += c == '|' ? std::string("\\|") : std::string(1, c);
+  return out;
+}
 
 std::string counts_text(const Results& results) {
   std::string text;

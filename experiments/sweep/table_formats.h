@@ -9,6 +9,8 @@
 
 namespace restage::tables {
 
+/// A cell that does not end early: bars and line breaks of names.
+std::string for_markdown(const std::string& text);
 /// "3 done, 1 failed, 2 pending": what the rows stand on, and what they lack.
 std::string counts_text(const Results& results);
 

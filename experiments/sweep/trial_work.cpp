@@ -53,14 +53,6 @@ Json scores_json(const SystemScores& scores, const std::vector<std::string>& nam
   return out;
 }
 
-std::vector<std::string> names_of(const std::vector<EvalSequence>& list, const Corpus& test) {
-  std::vector<std::string> out;
-  for (const EvalSequence& s : list)
-    out.push_back(test.motions[s.motion].id + "@" + std::to_string(s.first) + ":" +
-                  test.bodies[s.body_a].id + ">" + test.bodies[s.body_b].id);
-  return out;
-}
-
 /// The run's own held-out data: a set for every condition that its stages can be judged on. The
 /// same sequences for every seed, so that trials can be compared sequence by sequence.
 Json evaluate_held_out(const Bundle& models, const TrainConfig& config) {
@@ -68,7 +60,7 @@ Json evaluate_held_out(const Bundle& models, const TrainConfig& config) {
   EvaluationOptions how = evaluation_options(config, test, 0);
   how.system = config.evaluation.system;
   how.every = config.evaluation.every;
-  const auto names = names_of(how.sequences, test);
+  const auto names = sequence_names(how.sequences, test);
   Json out = Json::object();
   for (const auto& [name, scores] : evaluate_system(models, "the trial", test, how).conditions)
     out[name] = scores_json(scores, names);

@@ -41,6 +41,12 @@ void check_clips(const std::string& where, const std::vector<Clip>& clips) {
       throw InputError(where, "\"" + clip.label + "\" has a focus for other frames than its own",
                        "write one point per frame, or none");
     const size_t count = clip.frames.front().size();
+    const bool fits = std::all_of(clip.errors.begin(), clip.errors.end(),
+                                  [&](const auto& list) { return list.size() == count; });
+    if (!clip.errors.empty() &&
+        (clip.faces.empty() || clip.errors.size() != clip.frames.size() || !fits))
+      throw InputError(where, "\"" + clip.label + "\" has errors of other vertices than its own",
+                       "write one number per vertex and frame of a surface, or none");
     for (size_t f = 0; f < clip.frames.size(); ++f) {
       const std::string frame = "frame " + std::to_string(f) + " of \"" + clip.label + "\"";
       const Points& points = clip.frames[f];

@@ -17,6 +17,9 @@ struct Clip {
   std::vector<Triangle> faces;
   std::vector<double> confidence = {};  ///< of each frame, 0 to 1; empty if nobody says
   std::vector<Point> focus = {};        ///< of each frame, what a close-up looks at; may be empty
+  /// Of each vertex (innermost) of each frame, how far it is off, metres: a page shows them as
+  /// colours. Surfaces only; may be empty.
+  std::vector<std::vector<float>> errors = {};
 };
 
 /// Enough points along each bone to see it.

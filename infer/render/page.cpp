@@ -8,6 +8,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/format.h"
+#include "infer/render/html.h"
 #include "infer/render/sheet.h"
 #include "nn/geometry/box.h"
 
@@ -25,56 +26,13 @@ constexpr const char* kStyle =
 constexpr const char* kScript =
 #include "infer/render/viewer/viewer.js.inc"
     ;
+constexpr const char* kErrorsBox =
+    "<label><input id=\"errors\" type=\"checkbox\" checked> errors</label>\n";
 constexpr size_t kMostStride = 4;         // of frames, before surfaces are thinned
 constexpr size_t kFewestVertices = 1200;  // a person is still one
 constexpr float kReach = 4.0f;            // metres from the middle of a cloud
-
-std::string base64(const void* data, size_t size) {
-  static constexpr char digits[] =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  const auto* bytes = static_cast<const unsigned char*>(data);
-  std::string out;
-  out.reserve((size + 2) / 3 * 4);
-  for (size_t k = 0; k < size; k += 3) {
-    const size_t left = size - k;
-    const uint32_t three = uint32_t{bytes[k]} << 16 |
-                           (left > 1 ? uint32_t{bytes[k + 1]} << 8 : 0u) |
-                           (left > 2 ? uint32_t{bytes[k + 2]} : 0u);
-    out += digits[three >> 18];
-    out += digits[three >> 12 & 63];
-    out += left > 1 ? digits[three >> 6 & 63] : '=';
-    out += left > 2 ? digits[three & 63] : '=';
-  }
-  return out;
-}
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '&')
-      out += "&amp;";
-    else if (c == '<')
-      out += "&lt;";
-    else if (c == '>')
-      out += "&gt;";
-    else if (c == '"')
-      out += "&quot;";
-    else
-      out += c;
-  }
-  return out;
-}
-
-// JSON inside a script element: no '<' may end the element.
-std::string script_json(const Json& json) {
-  std::string out;
-  for (const char c : json.dump(-1, ' ', true, Json::error_handler_t::replace))
-    if (c == '<')
-      out += "\\u003c";
-    else
-      out += c;
-  return out;
-}
+// Metres at the end of the scale of errors: the first that 98 % of them are within.
+constexpr double kErrorScales[] = {0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1};
 
 std::string hex(uint32_t colour) { return format("#%06x", colour & 0xffffffu); }
 
@@ -138,6 +96,7 @@ size_t text_bytes(const std::vector<Clip>& clips, const std::vector<Surface>& su
                                                     : surfaces[c].kept.size();
     bytes += 8.0 * static_cast<double>(count) * static_cast<double>(frames) +
              16.0 * static_cast<double>(surfaces[c].faces.size()) +
+             (clips[c].errors.empty() ? 0 : 1.4 * static_cast<double>(count * frames)) +
              30.0 * static_cast<double>(frames);
   }
   return static_cast<size_t>(bytes);
@@ -203,6 +162,31 @@ Json numbers(const Point& p) {
   return list;
 }
 
+double error_scale(const std::vector<std::vector<float>>& errors) {
+  std::vector<float> all;
+  for (const auto& frame : errors) all.insert(all.end(), frame.begin(), frame.end());
+  const auto place = all.begin() + static_cast<std::ptrdiff_t>(all.size() * 98 / 100);
+  std::nth_element(all.begin(), place, all.end());
+  for (const double scale : kErrorScales)
+    if (*place <= scale) return scale;
+  return kErrorScales[std::size(kErrorScales) - 1];
+}
+
+// A byte for each vertex that is kept, of each frame that is kept.
+std::vector<uint8_t> packed_errors(const Clip& clip, const Surface& surface, const Plan& plan,
+                                   double scale) {
+  std::vector<uint8_t> out;
+  for (size_t f = 0; f < plan.frames; ++f) {
+    const std::vector<float>& errors = clip.errors[f * plan.stride];
+    const size_t count = surface.kept.empty() ? errors.size() : surface.kept.size();
+    for (size_t v = 0; v < count; ++v) {
+      const double e = errors[surface.kept.empty() ? v : static_cast<size_t>(surface.kept[v])];
+      out.push_back(static_cast<uint8_t>(std::lround(255 * std::clamp(e / scale, 0.0, 1.0))));
+    }
+  }
+  return out;
+}
+
 struct Packed {
   Json meta;
   std::string elements;               // script elements with the data
@@ -259,7 +243,20 @@ Packed pack(const Clip& clip, const Surface& surface, const Plan& plan, size_t n
   };
   element("frames", data.data(), data.size() * 2);
   if (!surface.faces.empty()) element("faces", surface.faces.data(), surface.faces.size() * 12);
+  if (!clip.errors.empty()) {
+    const double scale = error_scale(clip.errors);
+    packed.meta["error_scale"] = scale;
+    const std::vector<uint8_t> errors = packed_errors(clip, surface, plan, scale);
+    element("errors", errors.data(), errors.size());
+  }
   return packed;
+}
+
+std::string error_legend(const Clip& clip) {
+  return format(
+      "<small class=\"scale\" hidden>off the truth, after aligning the frame: 0 <i></i> "
+      "%g cm</small>",
+      100 * error_scale(clip.errors));
 }
 
 std::string thinning_note(const Plan& plan) {
@@ -267,29 +264,6 @@ std::string thinning_note(const Plan& plan) {
   if (plan.stride > 1) note += " Holds one frame in " + std::to_string(plan.stride) + ".";
   if (plan.thinned) note += " Surfaces are thinned to keep the page small.";
   return note;
-}
-
-// One pass over the template, so that nothing in a label is taken for a name.
-std::string filled(const std::string& page, const std::map<std::string, std::string>& values) {
-  std::string out;
-  size_t at = 0;
-  while (at < page.size()) {
-    const size_t open = page.find('@', at);
-    const size_t close = open == std::string::npos ? open : page.find('@', open + 1);
-    const auto value = close == std::string::npos
-                           ? values.end()
-                           : values.find(page.substr(open + 1, close - open - 1));
-    if (value == values.end()) {
-      const size_t end = open == std::string::npos ? page.size() : open + 1;
-      out.append(page, at, end - at);
-      at = end;
-    } else {
-      out.append(page, at, open - at);
-      out += value->second;
-      at = close + 1;
-    }
-  }
-  return out;
 }
 
 }  // namespace
@@ -307,23 +281,27 @@ std::string page_html(const std::vector<Clip>& clips, const PageOptions& options
     data += packed.elements;
     width = std::max(width, packed.width);
     height = std::max(height, packed.height);
-    const std::string label = escaped(clips[c].label);
+    const std::string label = escape_html(clips[c].label);
     panels += "<div class=\"panel\" id=\"panel" + std::to_string(c) +
               "\"><span><i style=\"background:" + hex(kClipColours[c]) + "\"></i>" + label +
-              "<b></b></span></div>\n";
+              "<b></b></span>" + (clips[c].errors.empty() ? "" : error_legend(clips[c])) +
+              "</div>\n";
     description += (c > 0 ? "; " : "") + label;
   }
+  const bool any_errors = std::any_of(clips.begin(), clips.end(),
+                                      [](const Clip& clip) { return !clip.errors.empty(); });
   meta["width"] = width;
   meta["height"] = height;
   meta["clips"] = std::move(list);
-  return filled(kPage, {{"TITLE", escaped(options.title)},
-                        {"STYLE", kStyle},
-                        {"DESCRIPTION", description},
-                        {"PANELS", panels},
-                        {"NOTE", thinning_note(plan)},
-                        {"META", script_json(meta)},
-                        {"DATA", data},
-                        {"SCRIPT", kScript}});
+  return fill_page(kPage, {{"TITLE", escape_html(options.title)},
+                           {"STYLE", kStyle},
+                           {"DESCRIPTION", description},
+                           {"PANELS", panels},
+                           {"NOTE", thinning_note(plan)},
+                           {"ERRORS", any_errors ? kErrorsBox : ""},
+                           {"META", script_json(meta)},
+                           {"DATA", data},
+                           {"SCRIPT", kScript}});
 }
 
 void write_page(const std::string& path, const std::vector<Clip>& clips,

@@ -127,17 +127,22 @@ Value mean_distance(const Track& pred, const Track& truth, const Alignment& how)
   });
 }
 
-std::vector<double> mean_distance_by_point(const Track& pred, const Track& truth,
-                                           const Alignment& how) {
+std::vector<double> distances(const Track& pred, const Track& truth, const Alignment& how) {
   if (!comparable(pred, truth)) return {};
   const auto maps = align(pred, truth, how);
-  std::vector<double> mean(static_cast<size_t>(pred.points), 0.0);
-  for (int64_t i = 0; i < pred.points; ++i) {
-    double sum = 0;
-    for (int64_t f = 0; f < pred.frames; ++f)
-      sum += (apply(maps[f], pred.at(f, i)) - truth.at(f, i)).norm();
-    mean[i] = sum / static_cast<double>(pred.frames);
-  }
+  std::vector<double> out;
+  for (int64_t f = 0; f < pred.frames; ++f)
+    for (int64_t i = 0; i < pred.points; ++i)
+      out.push_back((apply(maps[f], pred.at(f, i)) - truth.at(f, i)).norm());
+  return out;
+}
+
+std::vector<double> mean_distance_by_point(const Track& pred, const Track& truth,
+                                           const Alignment& how) {
+  const std::vector<double> all = distances(pred, truth, how);
+  std::vector<double> mean(all.empty() ? 0 : static_cast<size_t>(pred.points), 0.0);
+  for (size_t k = 0; k < all.size(); ++k) mean[k % mean.size()] += all[k];
+  for (double& value : mean) value /= static_cast<double>(pred.frames);
   return mean;
 }
 

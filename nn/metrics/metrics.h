@@ -63,6 +63,8 @@ using Value = std::optional<double>;
 
 /// Mean distance (MPJPE on joints, MPVD on vertices; PA-... with an alignment), metres.
 Value mean_distance(const Track& pred, const Track& truth, const Alignment& how = {});
+/// Distance of every point of every frame [frames x points], metres. Empty if no frames.
+std::vector<double> distances(const Track& pred, const Track& truth, const Alignment& how = {});
 /// Mean distance of every point over the frames, metres (per-joint errors). Empty if no frames.
 std::vector<double> mean_distance_by_point(const Track& pred, const Track& truth,
                                            const Alignment& how = {});

@@ -1,38 +1,17 @@
 // Opens a viewer page from disk in headless Chromium, with WebGL and with the 2D canvas, and checks
 // that it drew: node page_screenshot.mjs PAGE.html [FOLDER for the pictures]
 // Exit code 0: good; 1: blank, wrong renderer or script errors; 77: no Chromium (set CHROMIUM).
-import { spawnSync } from 'node:child_process';
 import { existsSync, mkdtempSync, readFileSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
-import { join, resolve } from 'node:path';
+import { join } from 'node:path';
 import { inflateSync } from 'node:zlib';
+import { browse, check, finish, scriptErrors } from './browser.mjs';
 
 const [page, folder] = process.argv.slice(2);
 if (!page) {
   console.error('usage: node page_screenshot.mjs PAGE.html [FOLDER]');
   process.exit(2);
 }
-const chromium = [process.env.CHROMIUM, '/usr/bin/chromium', '/usr/bin/chromium-browser', '/usr/bin/google-chrome']
-  .find((path) => path && existsSync(path));
-if (!chromium) {
-  console.log('skipped: no Chromium found (set CHROMIUM)');
-  process.exit(77);
-}
-
-function browse(hash, ...more) {
-  const profile = mkdtempSync(join(tmpdir(), 'restage-chromium-'));
-  const result = spawnSync(chromium, [
-    '--headless', '--no-sandbox', '--disable-gpu', '--disable-quic', '--no-first-run',
-    '--disable-background-networking', '--disable-component-update', '--disable-sync',
-    '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--hide-scrollbars',
-    '--host-resolver-rules=MAP * ~NOTFOUND', '--enable-logging=stderr', '--v=0',
-    '--window-size=1200,700', '--virtual-time-budget=3000', `--user-data-dir=${profile}`,
-    ...more, `file://${resolve(page)}#frame=5&light${hash}`,
-  ], { encoding: 'utf8', timeout: 120000, maxBuffer: 1 << 28 });
-  rmSync(profile, { recursive: true, force: true, maxRetries: 5 });
-  return result;
-}
-
 // 8-bit RGB or RGBA pixels of a PNG without interlacing.
 function decode(png) {
   const width = png.readUInt32BE(16), height = png.readUInt32BE(20), size = png[25] === 6 ? 4 : 3;
@@ -62,20 +41,16 @@ function coloured({ width, height, size, out }, from, to) {
   return count;
 }
 
-let bad = 0;
-const check = (good, text) => {
-  console.log(`${good ? 'ok  ' : 'FAIL'} ${text}`);
-  bad += !good;
-};
+const show = (hash, ...more) => browse(page, `frame=5&light${hash}`, '1200,700', ...more);
 for (const [name, hash] of [['webgl', ''], ['canvas2d', '&2d']]) {
-  const dom = browse(hash, '--dump-dom');
+  const dom = show(hash, '--dump-dom');
   const renderer = /data-renderer="(\w+)"/.exec(dom.stdout)?.[1], views = (dom.stdout.match(/id="panel\d"/g) ?? []).length;
   check(renderer === name, `drawn with ${renderer}, expected ${name}`);
   check(/data-ready="\d+x\d+"/.test(dom.stdout), 'first frame was drawn');
-  const errors = dom.stderr.split('\n').filter((l) => /CONSOLE.*(Error|Uncaught|violat)/i.test(l) && !/GL Driver Message/.test(l));
+  const errors = scriptErrors(dom);
   check(errors.length === 0, `no script errors ${errors.slice(0, 3).join(' | ')}`);
   const shots = folder ?? mkdtempSync(join(tmpdir(), 'restage-shots-')), file = join(shots, `page_${name}.png`);
-  browse(hash, `--screenshot=${file}`);
+  show(hash, `--screenshot=${file}`);
   const picture = existsSync(file) ? decode(readFileSync(file)) : null;
   check(picture !== null, 'a screenshot was taken');
   for (let v = 0; picture && v < views; ++v) {
@@ -84,4 +59,4 @@ for (const [name, hash] of [['webgl', ''], ['canvas2d', '&2d']]) {
   }
   if (!folder) rmSync(shots, { recursive: true });
 }
-process.exit(bad ? 1 : 0);
+finish();

@@ -11,33 +11,14 @@
 #include "infer/render/page.h"
 #include "infer/render/rasteriser.h"
 #include "infer/render/sheet.h"
-#include "tests/infer/toy_body.h"
+#include "tests/infer/toy_clips.h"
 #include "tests/support/files.h"
 
 namespace restage {
 namespace {
 
-// Source cloud of changing size, result, truth.
-std::vector<Clip> toy_clips(size_t frames = 12) {
-  const Body body = testing::toy_body();
-  std::vector<Clip> clips = {
-      {"source cloud", {}, {}}, {"result", {}, body.rest.faces}, {"truth", {}, body.rest.faces}};
-  for (size_t f = 0; f < frames; ++f) {
-    const Points surface =
-        linear_blend_skinning(body, testing::toy_pose(body, static_cast<double>(f) / 24));
-    clips[0].frames.push_back(
-        Points(surface.begin(), surface.end() - static_cast<std::ptrdiff_t>(10 * f)));
-    clips[1].frames.push_back(surface);
-    clips[2].frames.push_back(surface);
-  }
-  return clips;
-}
-
-// RESTAGE_KEEP=FOLDER keeps the files for the browser and for a look.
-void keep(const std::string& name, const std::string& bytes) {
-  if (const char* folder = std::getenv("RESTAGE_KEEP"))
-    write_file_atomically(std::string(folder) + "/" + name, bytes);
-}
+using testing::keep;
+using testing::toy_clips;
 
 // Pixels of a column-row cell that are clearly coloured as the clip is (its hue, not grey).
 int coloured(const Image& image, int x0, int x1, int y0, int y1, uint32_t colour) {
@@ -175,6 +156,23 @@ TEST(Page, IsOneFileThatAsksForNothing) {
   EXPECT_EQ(page, page_html(clips, options));
   const std::string plain = page_html(toy_clips(), {});
   keep("page.html", plain);
+}
+
+TEST(Page, ErrorsAreABytePerVertexAndFrame) {
+  auto clips = toy_clips(3);
+  EXPECT_EQ(page_html(clips, {}).find("id=\"errors"), std::string::npos);
+  const size_t vertices = clips[1].frames[0].size();
+  for (size_t f = 0; f < 3; ++f)
+    clips[1].errors.emplace_back(vertices, 0.02f * static_cast<float>(f));
+  const std::string page = page_html(clips, {});
+  EXPECT_HAS(page, "5 cm</small>");
+  const std::string errors = base64_of(page, "errors1");
+  EXPECT_EQ(errors.size(), (3 * vertices + 2) / 3 * 4);
+  EXPECT_TRUE(errors.starts_with("AAAA"));
+  EXPECT_TRUE(errors.ends_with("zMzM") || errors.ends_with("zMw=") || errors.ends_with("zA=="))
+      << errors.substr(errors.size() - 8) << ": 4 of 5 cm are 204";
+  clips[1].errors[1].pop_back();
+  EXPECT_THROW(page_html(clips, {}), InputError);
 }
 
 TEST(Page, LongSequencesStayBelowTheLimit) {

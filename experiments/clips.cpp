@@ -1,11 +1,12 @@
-#include "experiments/cli/clips.h"
+#include "experiments/clips.h"
 
 #include "autograd/base/error.h"
 #include "datasets/readers/frame_folder.h"
 #include "datasets/schema.h"
 #include "nn/geometry/skeleton.h"
+#include "nn/metrics/metrics.h"
 
-namespace restage::cli {
+namespace restage {
 namespace {
 
 bool ends_with_hdf5(const std::string& path) {
@@ -44,6 +45,13 @@ bool has_joints_only(const std::string& path) {
   return found.kind == "prediction" && found.counts.count("vertices") == 0;
 }
 
+std::vector<double> coordinates(const Clip& clip) {
+  std::vector<double> out;
+  for (const Points& frame : clip.frames)
+    for (const Point& p : frame) out.insert(out.end(), p.begin(), p.end());
+  return out;
+}
+
 }  // namespace
 
 Clip read_clip(const std::string& path, const std::string& label, int64_t sequence) {
@@ -72,4 +80,20 @@ std::vector<Point> read_focus(const std::string& path, size_t joint, int64_t seq
   return out;
 }
 
-}  // namespace restage::cli
+bool add_errors(const Clip& truth, Clip* result) {
+  const size_t frames = result->frames.size(), vertices = result->frames[0].size();
+  if (result->faces.empty() || truth.faces.empty() || truth.frames.size() != frames ||
+      truth.frames[0].size() != vertices)
+    return false;
+  const std::vector<double> a = coordinates(*result), b = coordinates(truth);
+  const auto track = [&](const std::vector<double>& values) {
+    return metrics::Track{values.data(), static_cast<int64_t>(frames),
+                          static_cast<int64_t>(vertices)};
+  };
+  const auto off = metrics::distances(track(a), track(b), {metrics::Alignment::Mode::frame});
+  for (auto at = off.begin(); at != off.end(); at += static_cast<std::ptrdiff_t>(vertices))
+    result->errors.emplace_back(at, at + static_cast<std::ptrdiff_t>(vertices));
+  return true;
+}
+
+}  // namespace restage

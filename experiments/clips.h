@@ -5,7 +5,7 @@
 
 #include "infer/render/clip.h"
 
-namespace restage::cli {
+namespace restage {
 
 /// One sequence of a prediction or scan file (HDF5), a folder of PLY/OBJ frames, or a single mesh.
 /// A surface stays one only if all frames have the same faces; a prediction of joints alone becomes
@@ -13,5 +13,9 @@ namespace restage::cli {
 Clip read_clip(const std::string& path, const std::string& label, int64_t sequence = 0);
 /// Where a joint is in each of the sequence's frames, metres. InputError: not HDF5, no /joints.
 std::vector<Point> read_focus(const std::string& path, size_t joint, int64_t sequence = 0);
+/// How far each vertex of `result` is from its true place once the frame is aligned (PA-MPVD), as
+/// its colours on a page. False, and nothing done, unless both are surfaces of the same vertices
+/// and frames.
+bool add_errors(const Clip& truth, Clip* result);
 
-}  // namespace restage::cli
+}  // namespace restage

@@ -1,0 +1,76 @@
+#include "infer/render/html.h"
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+
+namespace restage {
+
+std::string base64(const void* data, size_t size) {
+  static constexpr char digits[] =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  const auto* bytes = static_cast<const unsigned char*>(data);
+  std::string out;
+  out.reserve((size + 2) / 3 * 4);
+  for (size_t k = 0; k < size; k += 3) {
+    const size_t left = size - k;
+    const uint32_t three = uint32_t{bytes[k]} << 16 |
+                           (left > 1 ? uint32_t{bytes[k + 1]} << 8 : 0u) |
+                           (left > 2 ? uint32_t{bytes[k + 2]} : 0u);
+    out += digits[three >> 18];
+    out += digits[three >> 12 & 63];
+    out += left > 1 ? digits[three >> 6 & 63] : '=';
+    out += left > 2 ? digits[three & 63] : '=';
+  }
+  return out;
+}
+
+std::string escape_html(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '&')
+      out += "&amp;";
+    else if (c == '<')
+      out += "&lt;";
+    else if (c == '>')
+      out += "&gt;";
+    else if (c == '"')
+      out += "&quot;";
+    else
+      out += c;
+  }
+  return out;
+}
+
+std::string script_json(const nlohmann::ordered_json& json) {
+  std::string out;
+  for (const char c : json.dump(-1, ' ', true, nlohmann::ordered_json::error_handler_t::replace))
+    if (c == '<')
+      out += "\\u003c";
+    else
+      out += c;
+  return out;
+}
+
+std::string fill_page(const std::string& page, const std::map<std::string, std::string>& values) {
+  std::string out;
+  size_t at = 0;
+  while (at < page.size()) {
+    const size_t open = page.find('@', at);
+    const size_t close = open == std::string::npos ? open : page.find('@', open + 1);
+    const auto value = close == std::string::npos
+                           ? values.end()
+                           : values.find(page.substr(open + 1, close - open - 1));
+    if (value == values.end()) {
+      const size_t end = open == std::string::npos ? page.size() : open + 1;
+      out.append(page, at, end - at);
+      at = end;
+    } else {
+      out.append(page, at, open - at);
+      out += value->second;
+      at = close + 1;
+    }
+  }
+  return out;
+}
+
+}  // namespace restage
