@@ -14,22 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Adds the parts of `text` ("a; b") that `all` does not have.
-void join(const std::string& text, std::vector<std::string>& all) {
-  for (size_t at = 0; at <= text.size();) {
-    const size_t end = std::min(text.find("; ", at), text.size());
-    const std::string part = text.substr(at, end - at);
-    if (!part.empty() && std::find(all.begin(), all.end(), part) == all.end()) all.push_back(part);
-    at = end + 2;
-  }
-}
-
-std::string joined(const std::vector<std::string>& parts) {
-  std::string out;
-  for (const std::string& part : parts) out += (out.empty() ? "" : "; ") + part;
-  return out;
-}
-
 /// What a file holds, without its values.
 struct Content {
   std::vector<std::string> bodies, motions;
@@ -50,8 +34,8 @@ class Plan {
     for (const std::string& file : files) look_at(file, licenses, provenances);
     refuse(body_clashes_, "bodies");
     refuse(motion_clashes_, "motions");
-    info.license = joined(licenses);
-    info.provenance = joined(provenances);
+    info.license = joined_texts(licenses);
+    info.provenance = joined_texts(provenances);
   }
 
   std::string id(const std::string& file, const std::string& name) const {
@@ -81,8 +65,8 @@ class Plan {
       note(path, name, motions_, motion_clashes_);
       check_subject(path, file, "/motions/" + name);
     }
-    join(file.text("/", "license").value_or("unknown"), licenses);
-    join(file.text("/", "provenance").value_or("unknown"), provenances);
+    licenses.push_back(file.text("/", "license").value_or("unknown"));
+    provenances.push_back(file.text("/", "provenance").value_or("unknown"));
   }
 
   void note(const std::string& path, const std::string& name,

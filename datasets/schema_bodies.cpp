@@ -226,4 +226,20 @@ std::vector<Motion> read_motions(const std::string& path, const std::string& spl
   return read_members<Motion>(path, "/motions", split, read_motion);
 }
 
+std::string joined_texts(const std::vector<std::string>& texts) {
+  std::vector<std::string> parts;
+  std::string out;
+  for (const std::string& text : texts)
+    for (size_t at = 0; at <= text.size();) {
+      const size_t end = std::min(text.find("; ", at), text.size());
+      const std::string part = text.substr(at, end - at);
+      if (!part.empty() && std::find(parts.begin(), parts.end(), part) == parts.end()) {
+        parts.push_back(part);
+        out += (out.empty() ? "" : "; ") + part;
+      }
+      at = end + 2;
+    }
+  return out;
+}
+
 }  // namespace restage

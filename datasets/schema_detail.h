@@ -50,4 +50,8 @@ using SharedShapes = std::map<std::string, std::shared_ptr<const PoseBlendShapes
 Body read_body(const h5::File& file, const std::string& id, SharedShapes& shared);
 Motion read_motion(const h5::File& file, const std::string& id);
 
+/// Licences or provenances of files that become one: the parts of each ("a; b"), what several say
+/// once.
+std::string joined_texts(const std::vector<std::string>& texts);
+
 }  // namespace restage

@@ -8,6 +8,8 @@
 #include "autograd/base/log.h"
 #include "autograd/base/output_check.h"
 #include "autograd/base/rng.h"
+#include "datasets/builtin/bodies.h"
+#include "datasets/corpus.h"
 #include "datasets/schema.h"
 #include "datasets/schema_detail.h"
 
@@ -91,12 +93,37 @@ void need_enough(const std::string& path, const Sizes& of, const char* what, siz
                    fix);
 }
 
+/// Bodies that come along.
+struct Guests {
+  std::vector<Body> bodies;
+  FileInfo info;
+};
+
+Guests guests_from(const SplitOptions& options) {
+  Guests out;
+  if (options.bodies == "builtin") {
+    const SplitCounts count = CorpusSource().bodies;
+    out.bodies = builtin_bodies(0, count.train, count.validation, count.test);
+    out.info = {"Apache-2.0", "restage's built-in bodies"};
+    return out;
+  }
+  const h5::File file = open_schema_file(options.bodies);
+  if (!file.has("/bodies"))
+    throw InputError(options.bodies, "holds no bodies", "give a file with some, or builtin");
+  SharedShapes shared;
+  for (const std::string& id : file.children("/bodies"))
+    out.bodies.push_back(read_body(file, id, shared));
+  out.info.license = file.text("/", "license").value_or("unknown");
+  out.info.provenance = file.text("/", "provenance").value_or("unknown");
+  return out;
+}
+
 }  // namespace
 
 SplitSummary split_data(const std::string& path, const std::string& out,
                         const SplitOptions& options) {
   check_shares(options.shares);
-  check_output(out, {path});
+  check_output(out, {path, options.bodies});
   const h5::File file = open_schema_file(path);
   const Members members(path, file, options.by_clip);
   const auto wanted = static_cast<size_t>(
@@ -105,9 +132,14 @@ SplitSummary split_data(const std::string& path, const std::string& out,
               options.by_clip ? "import more, or give a share of 0"
                               : "import more people, or deal clips with --by clip (the test then "
                                 "meets people that training has seen)");
-  if (!members.bodies.empty() && members.bodies.size() < wanted)
+  const Guests guests = options.bodies.empty() ? Guests() : guests_from(options);
+  for (const Body& guest : guests.bodies)
+    if (members.bodies.contains(guest.id))
+      throw InputError(options.bodies, "has a body '" + guest.id + "', and so has " + path,
+                       "rename one of them");
+  if (!members.bodies.empty() && guests.bodies.empty() && members.bodies.size() < wanted)
     log_warning(path + " holds " + std::to_string(members.bodies.size()) +
-                " bodies, too few for every split; add others with 'restage data merge'");
+                " bodies, too few for every split; add others with --bodies");
   const RngKey key = RngKey{options.seed, 0}.fold("data.split");
   const Places subjects = deal(members.subjects, options.shares, key.fold("subjects"), {});
   Places own;  // bodies of subjects
@@ -118,6 +150,10 @@ SplitSummary split_data(const std::string& path, const std::string& out,
   FileInfo info;
   info.license = file.text("/", "license").value_or("unknown");
   info.provenance = file.text("/", "provenance").value_or("unknown");
+  if (!guests.bodies.empty()) {
+    info.license = joined_texts({info.license, guests.info.license});
+    info.provenance = joined_texts({info.provenance, guests.info.provenance});
+  }
   DatasetWriter writer(out, info);
   SharedShapes shared;
   SplitSummary summary;
@@ -128,6 +164,13 @@ SplitSummary split_data(const std::string& path, const std::string& out,
       body.split = kSplits[bodies.at(id)];
       writer.add(body);
     }
+  for (Body guest : guests.bodies) {
+    if (const auto at = subjects.find(guest.id); at != subjects.end())
+      guest.split = kSplits[at->second];
+    writer.add(guest);
+    const auto split = std::find(kSplits.begin(), kSplits.end(), guest.split);
+    summary[static_cast<size_t>(split - kSplits.begin())].bodies.push_back(guest.id);
+  }
   if (!members.subjects.empty())
     for (const std::string& id : file.children("/motions")) {
       Motion motion = read_motion(file, id);

@@ -79,6 +79,7 @@ void Stage::load(const TensorFile& file, const std::string& where) {
 
 void Stage::start_from(const Bundle& weights, const std::vector<std::string>& names,
                        const std::string& where) {
+  started_from_weights_ = true;
   std::vector<bool> used(names.size(), false);
   for (const Network& n : networks_) {
     if (!n.handed_on) continue;

@@ -65,6 +65,7 @@ class Stage {
   /// matches nothing, a tensor that is missing or does not fit.
   void start_from(const Bundle& weights, const std::vector<std::string>& names,
                   const std::string& where);
+  bool started_from_weights() const { return started_from_weights_; }
   /// The networks to be used later, by role. They are shared with the stage.
   virtual Bundle result() const;
   /// Their parameters and buffers, under the names of a checkpoint.
@@ -107,6 +108,7 @@ class Stage {
   };
   std::string name_;
   int64_t repeated_ = 0;
+  bool started_from_weights_ = false;
   std::vector<Network> networks_;
   std::vector<NamedOptimiser> optimisers_;
 };

@@ -51,6 +51,7 @@ class StageRun {
     if (average_) average_->load(file, checkpoint.path);
     if (loop_.selection.judges()) best_.load(file, checkpoint.path);
     done_ = checkpoint.step;
+    resumed_ = true;
   }
 
   /// To the end; the stage then holds what it hands on.
@@ -99,6 +100,7 @@ class StageRun {
   BestSoFar best_;
   Throughput throughput_;
   int64_t done_ = 0;
+  bool resumed_ = false;
 };
 
 void StageRun::all_steps() {
@@ -110,6 +112,11 @@ void StageRun::all_steps() {
                   static_cast<long long>(stage_.steps()),
                   static_cast<long long>(stage_.examples_per_step())));
   Progress progress(stage_.name(), stage_.steps(), standard_progress(options_.quiet), first);
+  if (stage_.started_from_weights() && !resumed_) {
+    // What training must beat, and what is handed on if it does not.
+    progress.note(validate());
+    if (loop_.selection.judges()) checkpoint();
+  }
   while (!over()) {
     const NamedValues values = step();
     const bool stopped = stop_requested();

@@ -9,7 +9,7 @@ namespace restage::cli {
 namespace {
 
 struct SplitArguments {
-  std::string file, out, by = "subject";
+  std::string file, out, by = "subject", bodies;
   std::vector<double> shares = {0.8, 0.1, 0.1};
 };
 
@@ -28,7 +28,8 @@ int run_split(const SplitArguments& a, const Common& common) {
   if (a.shares.size() != 3)
     throw InputError("", format("--shares has %zu numbers", a.shares.size()),
                      "give three, of training, validation and test: 0.8,0.1,0.1");
-  SplitOptions options{{a.shares[0], a.shares[1], a.shares[2]}, common.seed, a.by == "clip"};
+  SplitOptions options{
+      {a.shares[0], a.shares[1], a.shares[2]}, common.seed, a.by == "clip", a.bodies};
   const SplitSummary done = split_data(a.file, a.out, options);
   Json document = {{"out", a.out}, {"seed", common.seed}};
   std::vector<std::vector<std::string>> rows{{"split", "seconds", "subjects", "bodies"}};
@@ -50,6 +51,7 @@ void add_data_split(Program& program, CLI::App& group) {
   auto [app, a] =
       program.add(group, "split", "deal people and bodies to training, validation and test",
                   "restage data split people.h5 --out data.h5\n"
+                  "restage data split recordings.h5 --bodies builtin --out data.h5\n"
                   "restage data split people.h5 --shares 0.7,0.15,0.15 --seed 3 --out "
                   "data.h5\n"
                   "restage data split one_person.h5 --by clip --out data.h5",
@@ -59,6 +61,9 @@ void add_data_split(Program& program, CLI::App& group) {
   app.add_option("--shares", a.shares, "of training, validation and test, by seconds of motion")
       ->delimiter(',')
       ->capture_default_str();
+  app.add_option("--bodies", a.bodies,
+                 "data file whose bodies come along, in the splits that they have there; or "
+                 "builtin");
   app.add_option("--by", a.by, "subject, or clip where there are too few people")
       ->capture_default_str();
 }

@@ -177,8 +177,8 @@ std::string page(const Report& report) {
     names.push_back(report.runs[r].name);
   }
   std::string body = sections_html(report.before);
-  if (!curves.empty()) body += section_html("Curves", curves_html(report, thinned));
   if (!report.plays.empty()) body += section_html("Sequences", plays_html(report.plays));
+  if (!curves.empty()) body += section_html("Curves", curves_html(report, thinned));
   body += sections_html(report.after);
   if (!report.files.empty()) body += section_html("Files", files_html(report.files));
   const Json data = {{"names", names}, {"colours", colours}, {"curves", curves}};

@@ -253,16 +253,15 @@ Packed pack(const Clip& clip, const Surface& surface, const Plan& plan, size_t n
 }
 
 std::string error_legend(const Clip& clip) {
-  return format(
-      "<small class=\"scale\" hidden>off the truth, after aligning the frame: 0 <i></i> "
-      "%g cm</small>",
-      100 * error_scale(clip.errors));
+  return format("<small class=\"scale\" hidden>off by 0 <i></i> %g cm</small>",
+                100 * error_scale(clip.errors));
 }
 
-std::string thinning_note(const Plan& plan) {
+std::string note_of(const Plan& plan, bool errors) {
   std::string note;
   if (plan.stride > 1) note += " Holds one frame in " + std::to_string(plan.stride) + ".";
   if (plan.thinned) note += " Surfaces are thinned to keep the page small.";
+  if (errors) note += " Colours: how far each vertex is off once the frame is aligned (PA-MPVD).";
   return note;
 }
 
@@ -297,7 +296,7 @@ std::string page_html(const std::vector<Clip>& clips, const PageOptions& options
                            {"STYLE", kStyle},
                            {"DESCRIPTION", description},
                            {"PANELS", panels},
-                           {"NOTE", thinning_note(plan)},
+                           {"NOTE", note_of(plan, any_errors)},
                            {"ERRORS", any_errors ? kErrorsBox : ""},
                            {"META", script_json(meta)},
                            {"DATA", data},

@@ -42,7 +42,8 @@ class Scripted final : public Forwarding {
     return Forwarding::step(step);
   }
   NamedValues validate() override {
-    return {{"other", 1}, {"figure", scores_[static_cast<size_t>(done_ / 2 - 1)]}};
+    const int64_t at = done_ / 2 - (started_from_weights() ? 0 : 1);
+    return {{"other", 1}, {"figure", scores_[static_cast<size_t>(at)]}};
   }
 
  private:
@@ -68,7 +69,9 @@ class TrainSelection : public test::FileTest {
   /// Weights after a training in a new folder, or in one that is there.
   std::string trained(RunDir&& run, const std::vector<double>& scores, int64_t stop_at = -1) {
     const MakeStage make = [&](const std::string&, Bundle*) {
-      return std::make_unique<Scripted>(scores, stop_at);
+      auto stage = std::make_unique<Scripted>(scores, stop_at);
+      if (fine_tuning_) stage->start_from({}, {}, "given weights");
+      return stage;
     };
     return safetensors_bytes(to_file(train(run, {"deformation"}, loop_, make, kQuiet)));
   }
@@ -96,6 +99,7 @@ class TrainSelection : public test::FileTest {
   }
 
   LoopConfig loop_;
+  bool fine_tuning_ = false;
 };
 
 TEST_F(TrainSelection, TheBestValidationIsHandedOn) {
@@ -116,6 +120,23 @@ TEST_F(TrainSelection, TheBestValidationIsHandedOn) {
   loop_.selection.min_delta = 2.5;
   const std::string delta = trained("delta", scores);
   EXPECT_TRUE(tensors_of(delta) == weights_at("delta", 2));
+}
+
+TEST_F(TrainSelection, FineTuningThatMakesWorseHandsOnWhatItBeganWith) {
+  fine_tuning_ = true;
+  loop_.selection.choice = SelectionConfig::Export::best;
+  const std::vector<double> worse = {2, 5, 3, 4, 3, 4, 6}, better = {2, 5, 1, 4, 3, 4, 6};
+  const std::string got = trained("worse", worse);
+  EXPECT_TRUE(tensors_of(got) == weights_at("worse", 0));
+  EXPECT_EQ(metrics("worse").find("\"step\":0,"), 1u) << metrics("worse").substr(0, 60);
+  const std::string other = trained("better", better);
+  EXPECT_TRUE(tensors_of(other) == weights_at("better", 4));
+  for (const int64_t when : {0, 1, 5, 9}) {
+    const std::string name = "stopped" + std::to_string(when);
+    EXPECT_THROW(trained(create(name), worse, when), Interrupted);
+    EXPECT_TRUE(trained(RunDir::resume(dir / name, {"deformation"}), worse) == got) << when;
+    EXPECT_EQ(metrics(name), metrics("worse")) << when;
+  }
 }
 
 TEST_F(TrainSelection, PatienceEndsAStage) {

@@ -109,6 +109,9 @@ void visit(V& v, MotionStageConfig& c) {
   v("answers", c.answers, "what the network sees of A: an extractor's answers to clouds");
   v.check("weights", !(c.weights.acceleration > 0) || c.windows.frames > 2,
           "asks for accelerations of windows of two frames", "give windows.frames of 3 or more");
+  v.check("windows", c.answers.tracks.sequences == 0 || c.windows.frames <= c.answers.tracks.frames,
+          "is of more frames than an answer has (answers.frames)",
+          "give windows.frames of at most that");
   v("validation_windows", c.validation_windows, "held-out windows per validation", positive());
   v("validation_frames", c.validation_frames, "frames of each", at_least(3));
 }
