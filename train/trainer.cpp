@@ -45,6 +45,9 @@ class StageRun {
     if (loop.selection.ema > 0) average_.emplace(stage, loop.selection.ema);
   }
 
+  /// What a stage keeps once a later one has begun.
+  void tidy() const { run_.prune(stage_.name(), {1, loop_.keep_every, best_.step()}); }
+
   void go_on_from(const Checkpoint& checkpoint) {
     const TensorFile file = parse_safetensors(checkpoint.bytes, checkpoint.path);
     stage_.load(file, checkpoint.path);
@@ -215,7 +218,6 @@ void StageRun::checkpoint() {
 }
 
 void StageRun::hand_on() {
-  run_.prune(stage_.name(), {1, loop_.keep_every, best_.step()});
   if (hands_on_best() && best_.step() != done_) {
     const int64_t end = done_;
     go_on_from(checkpoint_of(run_.dir(), stage_.name(), best_.step()));
@@ -271,6 +273,7 @@ Bundle train(RunDir& run, const std::vector<std::string>& stages, const LoopConf
       stage_run.go_on_from(*checkpoint);
     }
     stage_run.run();
+    if (i + 1 < stages.size()) stage_run.tidy();
     result.add(stage->result());
   }
   return result;
