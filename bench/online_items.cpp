@@ -141,9 +141,7 @@ class DeformationOnline : public Item {
     const Tensor& local = inputs.at("pairs.local");
     for (int64_t i = 0; i < local.size(0); ++i) {
       const float* r = local.data<float>() + i * kJoints * 9;
-      for (size_t j = 0; j < kJoints; ++j)
-        poses_[i].local[j] =
-            Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(r + 9 * j).cast<double>();
+      for (size_t j = 0; j < kJoints; ++j) poses_[i].local[j] = matrix_at(r + 9 * j).cast<double>();
     }
   }
   void run() override { points_ = surface_(poses_[frames_.next()], dense_); }

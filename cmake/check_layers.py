@@ -36,12 +36,13 @@ MAY_USE = {
     "infer/*": ENGINE + NN + ["infer/*"],
     "train/stages": ENGINE + NN + ["train/*", "datasets/*"],
     "train/*": ENGINE + NN + ["train/*"],
-    "experiments/*": ENGINE + NN + ["autograd/gradcheck", "datasets/*", "train/*", "infer/*",
-                                    "experiments/*"],
+    "experiments/cli": ENGINE + NN + ["autograd/gradcheck", "datasets/*", "train/*", "infer/*", "experiments/*"],
+    "experiments/*": ENGINE + NN + ["datasets/*", "train/*", "infer/*", "experiments", "experiments/sweep",
+                                    "experiments/report", "experiments/observers"],
 }
 
 # Single files that may reach further: memory comes from the backend.
-ALSO = {"autograd/tensor/tensor.cpp": ["autograd/kernels/scratch.h"]}
+ALSO = {"autograd/tensor/tensor.cpp": ["autograd/kernels/scratch.h"], "experiments/main.cpp": ["experiments/cli/program.h"]}
 
 # Third-party (and a few system) headers and the only places that may know them.
 ONLY_IN = {

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <map>
+#include <set>
 
 #include "autograd/base/error.h"
 #include "autograd/base/log.h"
@@ -58,17 +60,26 @@ Places deal(const Sizes& sizes, const std::array<double, 3>& shares, const RngKe
   return out;
 }
 
+bool same_file(const std::string& a, const std::string& b) {
+  std::error_code ignored;
+  return std::filesystem::equivalent(a, b, ignored);
+}
+
 /// What the file holds, without its values.
 class Members {
  public:
-  Members(const std::string& path, const h5::File& file, bool by_clip) {
-    if (file.has("/bodies"))
+  Members(const std::string& path, const h5::File& file, const SplitOptions& options) {
+    if (file.has("/bodies") && !same_file(path, options.bodies))
       for (const std::string& id : file.children("/bodies")) bodies[id] = 1;
     if (file.has("/motions")) {
       const double fps = read_fps(file);
       for (const std::string& id : file.children("/motions")) {
         const std::string subject = file.text("/motions/" + id, "subject").value_or("");
-        subject_of[id] = by_clip           ? (subject.empty() ? id : subject + "/" + id)
+        people.insert(subject);
+        if (!options.only.empty() &&
+            std::find(options.only.begin(), options.only.end(), subject) == options.only.end())
+          continue;
+        subject_of[id] = options.by_clip   ? (subject.empty() ? id : subject + "/" + id)
                          : subject.empty() ? id
                                            : subject;
         const auto frames =
@@ -76,12 +87,17 @@ class Members {
         subjects[subject_of[id]] += frames / fps;
       }
     }
+    for (const std::string& name : options.only)
+      if (!people.contains(name))
+        throw InputError(path, "has no person '" + name.substr(0, 40) + "'",
+                         "'restage data inspect' lists its people");
     if (bodies.empty() && subjects.empty())
       throw InputError(path, "holds neither bodies nor motions",
                        "give a file that 'restage data build' or 'import' wrote");
   }
   Sizes bodies, subjects;                         // one each; seconds
-  std::map<std::string, std::string> subject_of;  // by motion
+  std::map<std::string, std::string> subject_of;  // by motion, of those that stay
+  std::set<std::string> people;                   // of all motions
 };
 
 void need_enough(const std::string& path, const Sizes& of, const char* what, size_t wanted,
@@ -125,7 +141,7 @@ SplitSummary split_data(const std::string& path, const std::string& out,
   check_shares(options.shares);
   check_output(out, {path, options.bodies});
   const h5::File file = open_schema_file(path);
-  const Members members(path, file, options.by_clip);
+  const Members members(path, file, options);
   const auto wanted = static_cast<size_t>(
       std::count_if(options.shares.begin(), options.shares.end(), [](double x) { return x > 0; }));
   need_enough(path, members.subjects, options.by_clip ? "clips" : "subjects", wanted,
@@ -173,8 +189,10 @@ SplitSummary split_data(const std::string& path, const std::string& out,
   }
   if (!members.subjects.empty())
     for (const std::string& id : file.children("/motions")) {
+      const auto subject = members.subject_of.find(id);
+      if (subject == members.subject_of.end()) continue;
       Motion motion = read_motion(file, id);
-      motion.subject = members.subject_of.at(id);
+      motion.subject = subject->second;
       motion.split = kSplits[subjects.at(motion.subject)];
       writer.add(motion);
     }

@@ -17,8 +17,10 @@ struct SplitOptions {
   /// subject of its own ("ann/walk_01"), since no subject may be in two splits.
   bool by_clip = false;
   /// A data file whose bodies come along, or "builtin": recordings alone have nobody to be trained
-  /// on. They keep the splits that they have there, but for a body whose id is a subject's.
+  /// on. They keep the splits that they have there, but for a body whose id is a subject's. The
+  /// file itself: its bodies are not dealt anew.
   std::string bodies = {};
+  std::vector<std::string> only = {};  ///< these people, all others are left out; empty: everybody
 };
 
 struct SplitPart {
@@ -31,8 +33,8 @@ using SplitSummary = std::array<SplitPart, 3>;
 /// subjects by seconds of motion, and bodies by number; a body whose id is a subject's goes where
 /// the subject goes. Everybody is in one split, and each whose share is above 0 has somebody who
 /// moves; too few bodies for that are told in the log. InputError: shares that are no shares, fewer
-/// subjects (clips) than splits, two bodies of one id, a file that is damaged or holds neither
-/// bodies nor motions, `out` is `file`.
+/// subjects (clips) than splits, people in `only` whom the file does not know, two bodies of one
+/// id, a file that is damaged or holds neither bodies nor motions, `out` is `file`.
 SplitSummary split_data(const std::string& file, const std::string& out,
                         const SplitOptions& options);
 

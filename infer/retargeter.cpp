@@ -35,7 +35,7 @@ SeenJoints blend(const SeenJoints& a, const SeenJoints& b, double t) {
 
 /// What the network sees of A: about its pelvis, turned; in the network's terms.
 MotionInput input_of(const SeenJoints& seen, const Mat3& turn, const Vec3& moved,
-                     const Tensor& rest) {
+                     const Mat3& reframed, const Tensor& rest) {
   SeenJoints local = turned(turn, seen);
   const auto number = [](const Shape& shape) { return Tensor::empty(shape); };
   MotionInput out{Var(tensor_of(local.joints, local.joints[0]).reshape({1, 1, kJoints, 3})),
@@ -44,11 +44,12 @@ MotionInput input_of(const SeenJoints& seen, const Mat3& turn, const Vec3& moved
                   {},
                   {}};
   Eigen::Map<Point>(out.trans.value.data<float>()) = moved.cast<float>();
+  out.reframed = number({1, 1, 3, 3});
+  matrix_at(out.reframed.data<float>()) = reframed.cast<float>();
   if (local.turns) {
     out.turns = number({1, 1, kJoints, 3, 3});
     for (size_t j = 0; j < kJoints; ++j)
-      Eigen::Map<Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(out.turns.data<float>() + 9 * j) =
-          (*local.turns)[j].cast<float>();
+      matrix_at(out.turns.data<float>() + 9 * j) = (*local.turns)[j].cast<float>();
   }
   if (local.uncertainty) {
     out.uncertainty = number({1, 1, kJoints});
@@ -148,6 +149,7 @@ void Retargeter::restart() {
   feet_ = {};
   heading_ = Heading(steady_heading_);
   previous_.reset();
+  back_before_.reset();
   received_.reset();
   believed_.reset();
   frame_ = grid_ = answered_ = 0;
@@ -262,7 +264,9 @@ MotionOutput Retargeter::answer(const SeenJoints& seen, const Mat3& turn) {
   const Vec3 moved = (path_ == Path::velocity ? kFps : 1.0) * (back * (a[0] - before));
   previous_ = a;
   Context ctx;
-  return motion_->forward(ctx, input_of(seen, back, moved, rest_tensor_), &state_);
+  const Mat3 reframed = back * back_before_.value_or(back).transpose();
+  back_before_ = back;
+  return motion_->forward(ctx, input_of(seen, back, moved, reframed, rest_tensor_), &state_);
 }
 
 /// What B does while A is as in `a`.
@@ -270,9 +274,7 @@ void Retargeter::perform(const MotionOutput& answer, const Joints& a, const Mat3
                          Pose* pose) {
   ++answered_;
   const float* r = answer.rotations.value.data<float>();
-  for (size_t j = 0; j < kJoints; ++j)
-    pose->local[j] =
-        Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(r + 9 * j).cast<double>();
+  for (size_t j = 0; j < kJoints; ++j) pose->local[j] = matrix_at(r + 9 * j).cast<double>();
   pose->local[0] = turn * pose->local[0];
   const float* t = answer.trans.value.data<float>();
   const Vec3 t_b = turn * Vec3(t[0], t[1], t[2]);

@@ -91,6 +91,7 @@ class Retargeter final : public System {
   MotionState state_;
   FootLock feet_;
   std::optional<Joints> previous_;      ///< A on the 30 fps grid, one step ago
+  std::optional<Mat3> back_before_;     ///< what took A's heading away then
   std::optional<Pose> believed_;        ///< the last pose that was
   std::optional<SeenJoints> received_;  ///< A as last pushed
   Joints last_source_;

@@ -32,10 +32,9 @@ Surface::Surface(const Bundle& models, const std::string& where, const Mesh& tar
 void Surface::operator()(const Pose& pose, const PosedSkeleton& posed, Points* out,
                          bool dense) const {
   Tensor local = Tensor::empty({kJoints, 9}), bones = Tensor::empty({kJoints, 3, 4});
-  using Rows = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
   using Bone = Eigen::Matrix<float, 3, 4, Eigen::RowMajor>;
   for (size_t j = 0; j < kJoints; ++j) {
-    Eigen::Map<Rows>(local.data<float>() + 9 * j) = pose.local[j].cast<float>();
+    matrix_at(local.data<float>() + 9 * j) = pose.local[j].cast<float>();
     Eigen::Map<Bone> bone(bones.data<float>() + 12 * j);
     bone.leftCols<3>() = posed.global[j].cast<float>();
     bone.col(3) = (posed.joints[j] - posed.global[j] * (rest_[j] - rest_[0])).cast<float>();

@@ -24,14 +24,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string errno_text() { return std::strerror(errno); }
 std::string inside(const std::string& dir, const char* name) {
   return (fs::path(dir) / name).string();
-}
-
-[[noreturn]] void disk_error(const std::string& path) {
-  throw WorkError(path + ": could not be written (" + errno_text() +
-                  "); free some space and resume the run");
 }
 
 void check_stages(const std::vector<std::string>& stages) {
@@ -47,8 +41,7 @@ void check_stages(const std::vector<std::string>& stages) {
 int take_lock(const std::string& folder, const std::string& shown) {
   const std::string path = inside(folder, ".lock");
   const int fd = ::open(path.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0644);
-  if (fd < 0)
-    throw InputError(shown, "cannot be locked (" + errno_text() + ")", "make the folder writable");
+  if (fd < 0) throw_unwritable(path, errno);
   if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
     ::close(fd);
     throw InputError(shown, "another process trains in this run", "wait for it or stop it first");
@@ -64,11 +57,7 @@ struct Draft {
     std::error_code error;
     fs::remove_all(path, error);
     if (fs::create_directories(path, error) && !error) return;
-    if (error == std::errc::no_space_on_device)
-      throw WorkError(path + ": could not be made (" + error.message() +
-                      "); free some space and run it again");
-    throw InputError(path, "the run directory cannot be made (" + error.message() + ")",
-                     "choose a folder that you can write to");
+    throw_unwritable(path, error.value());
   }
   Draft(const Draft&) = delete;
   Draft& operator=(const Draft&) = delete;
@@ -80,14 +69,14 @@ struct Draft {
   bool move_to(const std::string& target) {
     if (::rename(path.c_str(), target.c_str()) == 0) return moved = true;
     if (errno == EEXIST || errno == ENOTEMPTY || errno == ENOTDIR) return false;
-    throw InputError(target, "the run directory cannot be made (" + errno_text() + ")",
-                     "choose a folder that does not exist yet");
+    throw_unwritable(target, errno);
   }
 };
 
 /// Fills a draft beside the later place; returns its lock.
 int fill(const Draft& draft, const std::string& yaml, const std::string& provenance) {
-  if (::mkdir(inside(draft.path, "checkpoints").c_str(), 0755) != 0) disk_error(draft.path);
+  if (::mkdir(inside(draft.path, "checkpoints").c_str(), 0755) != 0)
+    throw_unwritable(draft.path, errno);
   write_file_atomically(inside(draft.path, "provenance.json"), provenance);
   write_file_atomically(inside(draft.path, "metrics.jsonl"), "");
   write_file_atomically(inside(draft.path, "log.txt"), "");
@@ -155,7 +144,7 @@ RunDir::~RunDir() {
 void RunDir::open_metrics() {
   const std::string path = inside(dir_, "metrics.jsonl");
   metrics_ = ::open(path.c_str(), O_CREAT | O_WRONLY | O_APPEND | O_CLOEXEC, 0644);
-  if (metrics_ < 0) disk_error(path);
+  if (metrics_ < 0) throw_unwritable(path, errno);
   set_log_file(inside(dir_, "log.txt"));
 }
 
@@ -225,19 +214,17 @@ void RunDir::metrics(const std::string& stage, int64_t step,
   const std::string text =
       line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
   const off_t before = ::lseek(metrics_, 0, SEEK_END);
-  const ssize_t written = ::write(metrics_, text.data(), text.size());
-  if (written == static_cast<ssize_t>(text.size())) return;
-  if (written >= 0) errno = ENOSPC;
-  const int code = errno;
+  const int code = write_all(metrics_, text);
+  if (code == 0) return;
   if (before >= 0 && ::ftruncate(metrics_, before) != 0)
     log_debug("metrics.jsonl ends with a torn line");
-  errno = code;
-  disk_error(inside(dir_, "metrics.jsonl"));
+  throw_unwritable(inside(dir_, "metrics.jsonl"), code);
 }
 
 std::string RunDir::save_checkpoint(const std::string& stage, int64_t step, std::string_view bytes,
                                     const KeepRule& keep) {
-  if (::fsync(metrics_) != 0 && errno != EINVAL) disk_error(inside(dir_, "metrics.jsonl"));
+  if (::fsync(metrics_) != 0 && errno != EINVAL)
+    throw_unwritable(inside(dir_, "metrics.jsonl"), errno);
   const fs::path folder = fs::path(dir_) / "checkpoints";
   const std::string path = (folder / run_files::checkpoint_name(stage, step, bytes)).string();
   write_file_atomically(path, bytes);

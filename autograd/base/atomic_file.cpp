@@ -57,8 +57,20 @@ void throw_unwritable(const std::string& target, int code) {
     if (code == users)
       throw InputError(target, "cannot be written (" + why + ")",
                        "give a path in a folder you can write to");
-  throw WorkError(target + ": could not be written (" + why +
-                  "); free some space and run it again");
+  const bool full = code == ENOSPC || code == EDQUOT || code == EFBIG;
+  throw WorkError(target + ": could not be written (" + why + "); " +
+                  (full ? "free some space" : "look after the disk") + " and run it again");
+}
+
+int write_all(int fd, std::string_view content) {
+  while (!content.empty()) {
+    const ssize_t written = ::write(fd, content.data(), content.size());
+    if (written >= 0)
+      content.remove_prefix(static_cast<size_t>(written));
+    else if (errno != EINTR)
+      return errno;
+  }
+  return 0;
 }
 
 AtomicFile::AtomicFile(std::string target)
@@ -69,13 +81,11 @@ AtomicFile::AtomicFile(std::string target)
 }
 
 void AtomicFile::write(std::string_view content) {
-  std::FILE* out = std::fopen(path().c_str(), "wb");
-  if (out == nullptr) throw_unwritable(target_, errno);
-  const size_t written = std::fwrite(content.data(), 1, content.size(), out);
-  const int code = errno;
-  const bool closed = std::fclose(out) == 0;
-  if (written != content.size()) throw_unwritable(target_, code);
-  if (!closed) throw_unwritable(target_, errno);
+  const int fd = ::open(path().c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC);
+  if (fd < 0) throw_unwritable(target_, errno);
+  int code = write_all(fd, content);
+  if (::close(fd) != 0 && code == 0) code = errno;
+  if (code != 0) throw_unwritable(target_, code);
 }
 
 void AtomicFile::commit() {

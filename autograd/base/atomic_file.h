@@ -28,6 +28,8 @@ class AtomicFile {
 
 /// InputError or WorkError, by the system's error number, for a `target` that cannot be written.
 [[noreturn]] void throw_unwritable(const std::string& target, int code);
+/// All of `content` to an open file, however many calls it takes; 0, or the system's error number.
+int write_all(int fd, std::string_view content);
 /// The whole content at once.
 void write_file_atomically(const std::string& target, std::string_view content);
 /// Reads a whole file; InputError if it cannot be read, is no plain file (a pipe could keep us

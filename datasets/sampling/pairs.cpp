@@ -68,8 +68,7 @@ void PairSampler::fill(PairBatch& batch, int64_t row, const RngKey& key, size_t 
   write(batch.posed_points.data<float>() + row * config_.points * 3, posed, turned.root);
   for (int j = 0; j < kJoints; ++j) {
     const int64_t at = row * kJoints + j;
-    using RowMajor = Eigen::Matrix<float, 3, 3, Eigen::RowMajor>;
-    Eigen::Map<RowMajor>(batch.local.data<float>() + 9 * at) = turned.local[j].cast<float>();
+    matrix_at(batch.local.data<float>() + 9 * at) = turned.local[j].cast<float>();
     const Eigen::AngleAxisd turn{Quat(turned.local[j])};
     Eigen::Map<Point>(batch.axis_angle.data<float>() + 3 * at) =
         (turn.angle() * turn.axis()).cast<float>();

@@ -87,9 +87,7 @@ void put_joints(float* to, const std::vector<Joints>& frames, const std::vector<
 }
 
 void put_rotations(float* to, const Rotations& global, const Mat3& turn) {
-  for (size_t j = 0; j < kJoints; ++j)
-    Eigen::Map<Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(to + 9 * j) =
-        (turn * global[j]).cast<float>();
+  for (size_t j = 0; j < kJoints; ++j) matrix_at(to + 9 * j) = (turn * global[j]).cast<float>();
 }
 
 void put_path(float* to, const std::vector<Vec3>& path) {
@@ -155,6 +153,7 @@ NamedTensors WindowBatch::tensors() const {
                   {"input_trans_a", input_trans_a},
                   {"turns", turns},
                   {"uncertainty", uncertainty},
+                  {"reframed", reframed},
                   {"rest_a", rest_a},
                   {"rest_b", rest_b},
                   {"sixd_a", sixd_a},
@@ -264,6 +263,9 @@ void WindowSampler::fill(WindowBatch& batch, int64_t row, int64_t index) const {
     for (size_t j = 0; j < kJoints; ++j)
       row_of(batch.uncertainty, row)[kJoints * t + j] = static_cast<float>(
           (*frame(t).uncertainty)[s.augmentation.mirror ? static_cast<size_t>(kMirror[j]) : j]);
+  for (size_t t = 0; batch.reframed.defined() && t < turns.size(); ++t)
+    matrix_at(row_of(batch.reframed, row) + 9 * t) =
+        (turns[t] * turns[std::max<size_t>(t, 1) - 1].transpose()).cast<float>();
   put_translation(row_of(batch.trans_a, row), path, config_.translation, turns);
   put_translation(row_of(batch.input_trans_a, row), seen_path, config_.translation, turns);
   put_joints(row_of(batch.rest_a, row), a.rest);
@@ -287,6 +289,7 @@ WindowBatch WindowSampler::batch(int64_t first, int64_t n) const {
   WindowBatch out = make_batch(n, config_.frames, config_.truth);
   if (know_turns_) out.turns = Tensor::empty({n, config_.frames, kJoints, 3, 3});
   if (know_uncertainty_) out.uncertainty = Tensor::empty({n, config_.frames, kJoints});
+  if (config_.remove_heading) out.reframed = Tensor::empty({n, config_.frames, 3, 3});
   parallel_for(n, 1, [&](int64_t from, int64_t to) {
     for (int64_t i = from; i < to; ++i) fill(out, i, first + i);
   });

@@ -46,6 +46,7 @@ struct WindowBatch {
   Tensor input_trans_a;  ///< [N, T, 3] trans_a unless `noisy_translation`
   Tensor turns;          ///< [N, T, 22, 3, 3] and
   Tensor uncertainty;    ///< [N, T, 22] of MotionInput, as tracks know them; undefined without
+  Tensor reframed;       ///< [N, T, 3, 3] of MotionInput; undefined unless `remove_heading`
   Tensor rest_a;         ///< [N, 22, 3] rest joints
   Tensor rest_b;         ///< [N, 22, 3] equal to rest_a for self samples
   Tensor sixd_a;         ///< [N, T, 132] A's local rotations: per joint columns 0 and 1

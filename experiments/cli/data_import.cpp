@@ -82,17 +82,21 @@ int run_import(ImportArguments arguments, const Common& common) {
 }  // namespace
 
 void add_data_import(Program& program, CLI::App& group) {
-  auto [app, given] =
-      program.add(group, "import", "turn bodies, motions, characters or scans into a data file",
-                  "restage data import DATA_FOLDER --out real.h5\n"
-                  "restage data import walk.bvh --subject ann --license CC0-1.0 --out walk.h5\n"
-                  "restage data import recordings/ --subjects '([^/]+)/.*' --out people.h5\n"
-                  "restage data import 07_01.amc --asf 07.asf --out walk.h5\n"
-                  "restage data import hero.glb --license CC0-1.0 --out hero.h5\n"
-                  "restage data import AMASS/ --body-model smplh/ --out amass.h5\n"
-                  "restage data import SMPLX_NEUTRAL.npz --betas zeros people.npz --out bodies.h5\n"
-                  "restage data import scans/ --fps 60 --scale 0.001 --out scans.h5",
-                  run_import);
+  auto [app, given] = program.add(
+      group, "import", "turn bodies, motions, characters or scans into a data file",
+      "restage data import DATA_FOLDER --out real.h5\n"
+      "restage data import walk.bvh --subject ann --license CC0-1.0 --out walk.h5\n"
+      "restage data import recordings/ --subjects '([^/]+)/.*' --out people.h5\n"
+      "restage data import 07_01.amc --asf 07.asf --out walk.h5\n"
+      "restage data import hero.glb --license CC0-1.0 --out hero.h5\n"
+      "restage data import AMASS/ --body-model smplh/ --out amass.h5\n"
+      "restage data import SMPLX_NEUTRAL.npz --betas zeros people.npz --out bodies.h5\n"
+      "restage data import scans/ --fps 60 --scale 0.001 --out scans.h5\n"
+      "restage data import a.bvh --profile mixamo --up z --facing x --split test --out a.h5\n"
+      "restage data import a.bvh --rest-frame 0 --drop-leading 1 --force --out a.h5\n"
+      "restage data import hero.glb --clip Walk --out walk.h5\n"
+      "restage data import DATA_FOLDER --garment male_casualsuit04 --out dressed.h5",
+      run_import);
   ImportOptions& options = given.options;
   MotionOptions& motion = options.motion;
   app.add_option("SOURCE", given.source,

@@ -244,7 +244,8 @@ void add_data_inspect(Program& program, CLI::App& group) {
       program.add(group, "inspect", "say what a file holds, and draw it",
                   "restage data inspect data.h5\nrestage data inspect data.h5 --plot sheet.png\n"
                   "restage data inspect walk.bvh\nrestage data inspect hero.glb --plot hero.png\n"
-                  "restage data inspect data.h5 --json",
+                  "restage data inspect data.h5 --json\n"
+                  "restage data inspect walk_poses.npz --body-model SMPLH_MALE.npz",
                   run_inspect);
   app.add_option(
          "FILE", options.file,

@@ -62,7 +62,8 @@ void add_data_perform(Program& program, CLI::App& group) {
   auto [app, o] = program.add(
       group, "perform", "scans of a body performing a motion, and the truth for a target",
       "restage data perform --bodies data.h5 --body b140 --motion 02_01 --target b150 --out walk/\n"
-      "restage data perform --bodies data.h5 --motions walk.h5 --body b140 --out walk/",
+      "restage data perform --bodies data.h5 --motions walk.h5 --body b140 --out walk/\n"
+      "restage data perform --bodies data.h5 --first 30 --frames 60 --out two_seconds/",
       run_perform);
   app.add_option("--bodies", o.bodies, "data file with bodies")->required();
   app.add_option("--motions", o.motions, "data file with motions (default: the same)");

@@ -11,6 +11,7 @@ namespace {
 struct SplitArguments {
   std::string file, out, by = "subject", bodies;
   std::vector<double> shares = {0.8, 0.1, 0.1};
+  std::vector<std::string> only;
 };
 
 std::string first_names(const std::vector<std::string>& names) {
@@ -29,7 +30,7 @@ int run_split(const SplitArguments& a, const Common& common) {
     throw InputError("", format("--shares has %zu numbers", a.shares.size()),
                      "give three, of training, validation and test: 0.8,0.1,0.1");
   SplitOptions options{
-      {a.shares[0], a.shares[1], a.shares[2]}, common.seed, a.by == "clip", a.bodies};
+      {a.shares[0], a.shares[1], a.shares[2]}, common.seed, a.by == "clip", a.bodies, a.only};
   const SplitSummary done = split_data(a.file, a.out, options);
   Json document = {{"out", a.out}, {"seed", common.seed}};
   std::vector<std::vector<std::string>> rows{{"split", "seconds", "subjects", "bodies"}};
@@ -54,6 +55,7 @@ void add_data_split(Program& program, CLI::App& group) {
                   "restage data split recordings.h5 --bodies builtin --out data.h5\n"
                   "restage data split people.h5 --shares 0.7,0.15,0.15 --seed 3 --out "
                   "data.h5\n"
+                  "restage data split all.h5 --only ann,ben,eve --bodies all.h5 --out few.h5\n"
                   "restage data split one_person.h5 --by clip --out data.h5",
                   run_split);
   app.add_option("FILE", a.file, "data file with bodies, motions or both")->required();
@@ -62,8 +64,9 @@ void add_data_split(Program& program, CLI::App& group) {
       ->delimiter(',')
       ->capture_default_str();
   app.add_option("--bodies", a.bodies,
-                 "data file whose bodies come along, in the splits that they have there; or "
-                 "builtin");
+                 "data file (FILE too) whose bodies come along, in the splits that they have "
+                 "there; or builtin");
+  app.add_option("--only", a.only, "these people and nobody else")->delimiter(',');
   app.add_option("--by", a.by, "subject, or clip where there are too few people")
       ->capture_default_str();
 }

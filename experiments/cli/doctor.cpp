@@ -409,6 +409,7 @@ void add_doctor(Program& program) {
   auto [app, options] = program.add(
       "doctor", "say what a file is, what is wrong with it, and mend it",
       "restage doctor scan.ply\nrestage doctor frames/ --json\n"
+      "restage doctor scan.ply --scale 0.001 --up z --facing=-y --fix mended.ply\n"
       "restage doctor hero.obj --target --picture sheet.png\nrestage doctor frames/ --fix mended/\n"
       "exit code: 0 usable, 1 read but not usable as it is, 2 not readable",
       run_doctor);

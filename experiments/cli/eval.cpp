@@ -275,12 +275,15 @@ int run_eval(const EvalOptions& options, const Common& common) {
 }  // namespace
 
 void add_eval(Program& program) {
-  auto [app, options] =
-      program.add("eval", "measure a prediction against its ground truth",
-                  "restage eval run=runs/demo-1 --out demo/\n"
-                  "restage eval --pred result.h5 --truth truth.h5\n"
-                  "restage eval --pred result.h5 --truth truth.h5 --source a.h5 --rest b.h5 --json",
-                  run_eval);
+  auto [app, options] = program.add(
+      "eval", "measure a prediction against its ground truth",
+      "restage eval run=runs/demo-1 --out demo/\n"
+      "restage eval --pred result.h5 --truth truth.h5\n"
+      "restage eval --pred result.h5 --truth truth.h5 --source a.h5 --rest b.h5 --json\n"
+      "restage eval run=runs/demo-1 --anchor 0\n"
+      "restage eval --pred result.h5 --truth truth.h5 --every 3 --variants --per-joint\n"
+      "restage eval --pred r.h5 --truth t.h5 --source a.h5 --rest b.h5 --mended mended.h5",
+      run_eval);
   app.add_option("RUN", options.run, "run=RUN_DIR: the trained system on its held-out data");
   app.add_option("--out", options.out,
                  "with run=: folder for the table and the files of one sequence");

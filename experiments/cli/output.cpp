@@ -1,6 +1,5 @@
 #include "experiments/cli/output.h"
 
-#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -10,19 +9,9 @@
 namespace restage::cli {
 namespace {
 
-constexpr size_t kMaxLine = 398;
-
 [[noreturn]] void fail() {
   throw WorkError(std::string("standard output could not be written (") + std::strerror(errno) +
                   "); free some space or keep the reader of the pipe open");
-}
-
-bool continues_character(char c) { return (static_cast<unsigned char>(c) & 0xC0) == 0x80; }
-
-/// Characters as a terminal counts them (UTF-8, no wide ones).
-size_t width(const std::string& text) {
-  return text.size() -
-         static_cast<size_t>(std::count_if(text.begin(), text.end(), continues_character));
 }
 
 }  // namespace
@@ -44,46 +33,6 @@ void finish_output() {
   if (std::fflush(stdout) != 0) fail();
 }
 
-std::string on_one_line(std::string text) {
-  for (char& c : text)
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
-  return text;
-}
-
-std::string error_line(const std::string& text) {
-  std::string line = on_one_line("restage: " + text);
-  if (line.size() <= kMaxLine) return line;
-  // Too long: shorten the middle; the place stands at the front, the fix at the end.
-  constexpr size_t kTail = 200;
-  size_t head = kMaxLine - kTail - 3, tail = line.size() - kTail;
-  while (continues_character(line[head])) --head;
-  while (tail < line.size() && continues_character(line[tail])) ++tail;
-  return line.substr(0, head) + "..." + line.substr(tail);
-}
-
 void print_error(const std::string& text) { std::fputs((error_line(text) + "\n").c_str(), stderr); }
-
-std::string markdown_table(const std::vector<std::vector<std::string>>& rows) {
-  std::vector<size_t> widths;
-  for (const auto& row : rows)
-    for (size_t c = 0; c < row.size(); ++c) {
-      if (c >= widths.size()) widths.push_back(3);
-      widths[c] = std::max(widths[c], width(row[c]));
-    }
-  std::string text;
-  for (size_t r = 0; r < rows.size(); ++r) {
-    for (size_t c = 0; c < rows[r].size(); ++c) {
-      const std::string pad(widths[c] - width(rows[r][c]), ' ');
-      text += c == 0 ? "| " + rows[r][c] + pad + " |" : " " + pad + rows[r][c] + " |";
-    }
-    text += "\n";
-    if (r > 0) continue;
-    for (size_t c = 0; c < widths.size(); ++c)
-      text += c == 0 ? "|" + std::string(widths[c] + 2, '-') + "|"
-                     : std::string(widths[c] + 1, '-') + ":|";
-    text += "\n";
-  }
-  return text;
-}
 
 }  // namespace restage::cli

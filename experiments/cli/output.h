@@ -3,7 +3,8 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
-#include <vector>
+
+#include "experiments/text.h"
 
 namespace restage::cli {
 
@@ -18,16 +19,7 @@ void print(bool json, const Json& document, const std::string& text);
 /// Flushes standard output. WorkError if something printed did not arrive.
 void finish_output();
 
-/// Names in files may hold line breaks and the like; here they become blanks.
-std::string on_one_line(std::string text);
-
-/// `restage: <text>` to standard error as exactly one line of under 400 characters.
+/// error_line() (experiments/text.h) to standard error.
 void print_error(const std::string& text);
-/// What print_error() prints, without the line's end.
-std::string error_line(const std::string& text);
-
-/// A Markdown table with columns of equal width; the first row is the heading, the first column is
-/// aligned left, the others right.
-std::string markdown_table(const std::vector<std::vector<std::string>>& rows);
 
 }  // namespace restage::cli

@@ -98,12 +98,14 @@ int run_render(const RenderOptions& options, const Common& common) {
 }  // namespace
 
 void add_render(Program& program) {
-  auto [app, options] =
-      program.add("render", "draw a result as a contact sheet or a page that plays it",
-                  "restage render result.h5 --source scans/ --out sheet.png\n"
-                  "restage render result.h5 --source scans.h5 --truth truth.h5 --out page.html\n"
-                  "restage render result.h5 --focus left_wrist --azimuth 60 --out hand.png",
-                  run_render);
+  auto [app, options] = program.add(
+      "render", "draw a result as a contact sheet or a page that plays it",
+      "restage render result.h5 --source scans/ --out sheet.png\n"
+      "restage render result.h5 --source scans.h5 --truth truth.h5 --out page.html\n"
+      "restage render result.h5 --focus left_wrist --azimuth 60 --out hand.png\n"
+      "restage render result.h5 --focus left_foot --within 0.1 --columns 4 --out foot.png\n"
+      "restage render scans.h5 --sequence 2 --fps 60 --title 'take 2' --out page.html",
+      run_render);
   app.add_option("RESULT", options.result, "prediction or scans (HDF5), or a folder of PLY or OBJ")
       ->required();
   app.add_option("--source", options.source, "what the motion was taken from");

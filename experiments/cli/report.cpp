@@ -59,7 +59,8 @@ void add_report(Program& program) {
       "report", "one page about runs or a sweep: results, curves, sequences, configurations",
       "restage report runs/lite-1 --out report.html\n"
       "restage report runs/lite-1 runs/lite-2 --out report.html --no-play\n"
-      "restage report runs/smoothness --sequence benchmark/naked/dance-male-female --out r.html",
+      "restage report runs/smoothness --sequence benchmark/naked/dance-male-female --out r.html\n"
+      "restage report runs/s --sequence walk/ --trial 4f2a90c1d3e5 --out r.html",
       run_report);
   app.add_option("RUN_OR_DIR", a.folders, "run directories, or the folder of one sweep")
       ->required();

@@ -258,6 +258,18 @@ void add_retarget(Program& program) {
       "retarget", "a target performs the motion of a sequence of clouds",
       "restage retarget --source scans/ --target hero.obj --weights w.safetensors --out hero.glb\n"
       "restage retarget --source scans.h5 --target hero.ply --weights runs/demo-1 --out result.h5\n"
+      "restage retarget --source mm/ --fps 60 --source-up z --scale 0.001 --target a.obj --weights "
+      "w "
+      "--out a.glb\n"
+      "restage retarget --source walk.glb --clip Walk --target hero.vrm --weights w --out "
+      "hero.bvh\n"
+      "restage retarget --source s.h5 --sequence 2 --target a.obj --weights w --out f/ --format "
+      "ply\n"
+      "restage retarget --source s.h5 --target a.ply --weights w --out r.h5 --every 3 --samples 8\n"
+      "restage retarget --source s.h5 --target a.ply --weights w --out r.h5 --force --profile\n"
+      "restage retarget --source s.h5 --target a.ply --weights w --out r.h5 --min-confidence 0.5\n"
+      "restage retarget --source s.h5 --target a.ply --weights w --out r.h5 --anchor 0 "
+      "--no-foot-lock\n"
       "restage retarget --source scans.h5 --target hero.ply --system register --rest rest.h5 "
       "--out r.h5",
       run_retarget);

@@ -100,7 +100,8 @@ void add_skeleton(Program& program) {
   auto [app, options] =
       program.add("skeleton", "the 22 joints of clouds",
                   "restage skeleton --weights w.safetensors --input scan.ply --json\n"
-                  "restage skeleton --weights w.safetensors --input scans/ --out joints.h5",
+                  "restage skeleton --weights w.safetensors --input scans/ --out joints.h5\n"
+                  "restage skeleton --weights w.safetensors --input scan.ply --samples 8",
                   run_skeleton);
   app.add_option("--weights", options.weights, "weights file or run directory")->required();
   app.add_option("--input", options.input, "cloud, folder of clouds, or HDF5 file of scans")

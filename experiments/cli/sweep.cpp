@@ -62,23 +62,9 @@ std::pair<std::string, std::vector<std::string>> split(const std::vector<std::st
 
 // ---- plan ----
 
-sweep::Json overrides_json(const PlannedTrial& trial) {
-  sweep::Json out = sweep::Json::object();
-  for (const auto& [key, value] : trial.overrides) out[key] = sweep::as_json(value);
-  return out;
-}
-
 Json plan_json(const SweepPlan& plan) {
   Json trials = Json::array();
-  for (const PlannedTrial& trial : plan.trials) {
-    Json artifacts = Json::object();
-    for (const auto& artifact : trial.artifacts) artifacts[artifact.stage] = artifact.id;
-    trials.push_back({{"id", trial.id},
-                      {"case", trial.case_name},
-                      {"seed", trial.seed},
-                      {"overrides", overrides_json(trial)},
-                      {"artifacts", std::move(artifacts)}});
-  }
+  for (const PlannedTrial& trial : plan.trials) trials.push_back(entry_json(entry_of(trial)));
   return {
       {"trials", std::move(trials)},
       {"artifacts", {{"there", plan.there}, {"to_make", plan.to_make}, {"shared", plan.shared}}}};
@@ -145,14 +131,13 @@ Json status_json(const SweepDir& dir) {
   for (const sweep::TrialEntry& trial : dir.trials) {
     const sweep::TrialStatus status = status_of(dir, trial);
     counts[status.state] = counts.value(status.state, 0) + 1;
-    trials.push_back({{"id", trial.id},
-                      {"case", trial.case_name},
-                      {"seed", trial.seed},
-                      {"overrides", trial.overrides},
-                      {"state", status.state},
-                      {"error", status.error.empty() ? Json(nullptr) : Json(status.error)},
-                      {"seconds", status.seconds},
-                      {"holder", status.holder ? Json(status.holder->text()) : Json(nullptr)}});
+    Json entry = entry_json(trial);
+    entry.erase("artifacts");
+    entry.update({{"state", status.state},
+                  {"error", status.error.empty() ? Json(nullptr) : Json(status.error)},
+                  {"seconds", status.seconds},
+                  {"holder", status.holder ? Json(status.holder->text()) : Json(nullptr)}});
+    trials.push_back(std::move(entry));
   }
   return {{"counts", std::move(counts)}, {"trials", std::move(trials)}};
 }
@@ -261,7 +246,8 @@ void add_sweep(Program& program) {
       group, "plan", "list the trials of a sweep file; with --out, write them ready to run",
       "restage sweep plan experiments/smoothness.yaml\n"
       "restage sweep plan sweep.yaml motion.weights.smoothness=0,0.1 motion.optimiser.steps=500\n"
-      "restage sweep plan sweep.yaml 'seeds=range(1,6)' --out runs/sweep",
+      "restage sweep plan sweep.yaml 'seeds=range(1,6)' --out runs/sweep\n"
+      "restage sweep plan sweep.yaml --measure",
       run_plan);
   p.add_option("SWEEP", plan.arguments, "SWEEP.yaml and key=value, key=a,b, key=range(a,b,step)")
       ->required();
@@ -284,7 +270,9 @@ void add_sweep(Program& program) {
   st.add_option("DIR", dir, "folder of the sweep")->required();
 
   auto [s, stop] = program.add(group, "stop", "running trials write a checkpoint and end",
-                               "restage sweep stop runs/smoothness", run_stop);
+                               "restage sweep stop runs/smoothness\n"
+                               "restage sweep stop runs/smoothness --wait 300",
+                               run_stop);
   s.add_option("DIR", stop.dir, "folder of the sweep")->required();
   s.add_option("--wait", stop.wait, "seconds to wait for them (60)");
   add_sweep_table(program, group);

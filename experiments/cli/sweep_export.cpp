@@ -27,7 +27,7 @@ std::string this_program() {
 
 int run_export(const Arguments& a, const Common& common) {
   const tables::Engine engine = tables::engine_named(a.engine);
-  const auto plan = tables::read_plan(a.dir);
+  const auto plan = sweep::read_plan_file(a.dir);
   if (!plan)
     throw InputError(a.dir, "holds no planned sweep (plan.json)",
                      "write it with 'restage sweep plan SWEEP.yaml --out DIR'");
@@ -37,15 +37,15 @@ int run_export(const Arguments& a, const Common& common) {
   const tables::ExportOptions options{
       a.program.empty() ? this_program() : fs::canonical(a.program).string(),
       fs::canonical(a.dir).string(), common.threads};
-  write_file_atomically(a.out, tables::export_script(engine, *plan, options));
+  write_file_atomically(a.out, tables::export_script(engine, plan->trials, options));
   const std::string start = engine == tables::Engine::slurm ? "sbatch " + a.out
                             : engine == tables::Engine::parallel
                                 ? "parallel < " + a.out
                                 : "snakemake --cores all -k -s " + a.out;
   print(common.json,
-        {{"out", a.out}, {"engine", a.engine}, {"trials", plan->size()}, {"start", start}},
-        "wrote " + a.out + ": " + std::to_string(plan->size()) + " trials\nstart it with " + start +
-            "\n");
+        {{"out", a.out}, {"engine", a.engine}, {"trials", plan->trials.size()}, {"start", start}},
+        "wrote " + a.out + ": " + std::to_string(plan->trials.size()) + " trials\nstart it with " +
+            start + "\n");
   return 0;
 }
 
@@ -56,6 +56,8 @@ void add_sweep_export(Program& program, CLI::App& group) {
       group, "export", "a script for Slurm, GNU parallel or Snakemake that runs the trials",
       "restage sweep export runs/smoothness --engine slurm --out s.sbatch && sbatch s.sbatch\n"
       "restage sweep export runs/smoothness --engine parallel --out s.txt && parallel < s.txt\n"
+      "restage sweep export runs/s --engine slurm --program /opt/restage/bin/restage --out "
+      "s.sbatch\n"
       "restage sweep export runs/smoothness --engine snakemake --out s.smk && "
       "snakemake --cores 4 -k -s s.smk",
       run_export);

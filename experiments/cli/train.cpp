@@ -206,8 +206,10 @@ void add_train(Program& program) {
       "restage train configs/lite/all.yaml skeleton.from=experiments/weights/lite.safetensors "
       "motion.init=experiments/weights/lite.safetensors\n"
       "restage train configs/lite/all.yaml data.source=data.h5 --dry-run\n"
-      "restage train configs/lite/all.yaml loop.export=best loop.patience=5 --tensorboard\n"
+      "restage train configs/lite/all.yaml loop.export=best loop.patience=5 --tensorboard --csv\n"
       "restage train configs/lite/all.yaml stages=[skeleton] --overfit-batches 1\n"
+      "restage train configs/lite/all.yaml data.source=data.h5 --print-config\n"
+      "restage train configs/lite/all.yaml data.source=data.h5 --fast-dev-run\n"
       "restage train resume=runs/demo-20260101-120000-1",
       run_train);
   app.add_option("ARGUMENTS", a.words, "CONFIG.yaml and key=value overrides, or resume=RUN_DIR")

@@ -19,7 +19,8 @@ int run_trial(const TrialOptions& o, const Common& common) {
   }
   const auto end = sweep::perform_trial(o.dir, o.id, common.quiet);
   const auto result = read_result(sweep::read_sweep_dir(o.dir), o.id);
-  const std::string state = result ? result->state : "pending";  // removed since
+  const std::string state =
+      result ? tables::kTrialStates[static_cast<int>(result->state)] : "pending";  // removed since
   const std::string said = end == sweep::TrialEnd::before ? "was " + state + " before"
                            : end == sweep::TrialEnd::done ? "is done"
                                                           : "was stopped early";
@@ -32,7 +33,8 @@ int run_trial(const TrialOptions& o, const Common& common) {
 void add_trial(Program& program) {
   auto [app, options] = program.add("trial", "run one trial of a sweep's folder, start to finish",
                                     "restage trial runs/smoothness 4f2a90c1d3e5\n"
-                                    "restage trial runs/smoothness 4f2a90c1d3e5 --threads 4",
+                                    "restage trial runs/smoothness 4f2a90c1d3e5 --threads 4\n"
+                                    "restage trial runs/smoothness 4f2a90c1d3e5 --stage skeleton",
                                     run_trial);
   app.add_option("DIR", options.dir, "folder of 'restage sweep plan --out'")->required();
   app.add_option("ID", options.id, "of the trial")->required();

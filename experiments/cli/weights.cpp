@@ -98,6 +98,8 @@ void add_import(Program& program, CLI::App& group) {
       group, "import", "put a state dict from elsewhere into a weights file",
       "restage weights import --from pt.safetensors --model skeleton/point_transformer "
       "--out w.safetensors\n"
+      "restage weights import --from s.safetensors --model smrm/rot6d --size hidden=256 --out "
+      "w.safetensors\n"
       "restage weights import --from smrm.safetensors --map names.yaml --model smrm/rot6d "
       "--with w.safetensors --out all.safetensors",
       run_import);

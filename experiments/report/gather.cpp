@@ -15,6 +15,7 @@
 #include "experiments/scratch.h"
 #include "experiments/sweep/sweep_dir.h"
 #include "experiments/sweep/table_formats.h"
+#include "experiments/text.h"
 #include "infer/render/page.h"
 #include "nn/config/config.h"
 
@@ -52,7 +53,7 @@ std::string provenance_text(const std::string& folder) {
     }
     rows.push_back({key, text});
   }
-  return cli::markdown_table(rows);
+  return markdown_table(rows);
 }
 
 // ---- playing ------------------------------------------------------------------------------------
@@ -225,7 +226,8 @@ Section results_section(const tables::Results& results, const GatherOptions& how
 // ---- sweeps -------------------------------------------------------------------------------------
 
 std::string trials_text(const tables::Results& results) {
-  std::vector<std::vector<std::string>> rows{{"trial", "case", "seed", "state", "s", "overrides"}};
+  std::vector<std::vector<std::string>> rows{
+      {"trial", "case", "seed", "state", "s", "overrides", "host", "command"}};
   for (const tables::TrialResult& trial : results.trials) {
     std::string overrides;
     for (const auto& [key, value] : trial.overrides)
@@ -233,11 +235,11 @@ std::string trials_text(const tables::Results& results) {
     std::string state = tables::kTrialStates[static_cast<int>(trial.state)];
     if (!trial.error.empty()) state += ": " + trial.error;
     rows.push_back({trial.id, trial.case_name, std::to_string(trial.seed), state,
-                    format("%.0f", trial.seconds), overrides});
+                    format("%.0f", trial.seconds), overrides, trial.host, trial.command});
   }
   for (auto& row : rows)
     for (std::string& cell : row) cell = tables::for_markdown(cell);
-  return tables::counts_text(results) + "\n\n" + cli::markdown_table(rows);
+  return tables::counts_text(results) + "\n\n" + markdown_table(rows);
 }
 
 /// The trial that is asked for, or the one with the least error over all sets.
@@ -318,7 +320,7 @@ Report of_runs(const std::vector<std::string>& folders, const GatherOptions& how
                                       : played_folders(measured[r]->weights, how);
   }
   if (!unmeasured.empty()) {
-    log_warning(cli::on_one_line(unmeasured));
+    log_warning(on_one_line(unmeasured));
     out.before.push_back({"Not measured", unmeasured});
   }
   if (!results.trials.empty()) out.before.push_back(results_section(results, how));

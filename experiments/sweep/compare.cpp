@@ -11,12 +11,14 @@
 #include "experiments/sweep/results.h"
 #include "experiments/sweep/svg.h"
 #include "experiments/sweep/table_formats.h"
+#include "experiments/text.h"
 #include "nn/config/config_tree.h"
 
 namespace restage::tables {
 namespace {
 
 namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
 
 /// Lists of plain values stay whole; sections and lists of sections are walked.
 void flatten(const ConfigNode& node, const std::string& key,
@@ -65,10 +67,12 @@ void read_trial(const fs::path& folder, Compared* out) {
       read_result((folder / "result.json").string(), folder.filename().string());
   for (const auto& [set, values] : result.sets)
     for (const auto& [name, value] : values.mean) out->figures[set + ": " + name] = value;
-  const std::string store = store_of(folder.parent_path().parent_path().string());
-  if (store.empty()) return;
+  const fs::path dir = folder.parent_path().parent_path();
+  const auto plan = sweep::read_plan_file(dir.string());
+  if (!plan || plan->store.empty()) return;
+  const std::string store = dir / plan->directory / plan->store;
   for (const auto& [stage, id] : result.artifacts)
-    if (is_trial_id(id) && stage.find('/') == std::string::npos)
+    if (sweep::is_trial_id(id) && stage.find('/') == std::string::npos)
       read_curves(store + "/" + stage + "-" + id + "/metrics.jsonl", out);
 }
 
@@ -159,17 +163,16 @@ std::string comparison_markdown(const std::vector<Compared>& all) {
     for (const Compared& run : all)
       row.push_back(run.figures.contains(name) ? short_number(run.figures.at(name)) : "-");
   }
-  if (rows.size() == 1)
-    return "The configurations are the same.\n\n" + cli::markdown_table(figures);
-  return cli::markdown_table(rows) + "\n" + cli::markdown_table(figures);
+  if (rows.size() == 1) return "The configurations are the same.\n\n" + markdown_table(figures);
+  return markdown_table(rows) + "\n" + markdown_table(figures);
 }
 
-cli::Json comparison_json(const std::vector<Compared>& all) {
-  cli::Json differs = cli::Json::object(), runs = cli::Json::array();
+Json comparison_json(const std::vector<Compared>& all) {
+  Json differs = Json::object(), runs = Json::array();
   for (const std::string& key : differing_keys(all)) {
-    cli::Json& values = differs[key] = cli::Json::array();
+    Json& values = differs[key] = Json::array();
     for (const Compared& run : all)
-      values.push_back(run.config.contains(key) ? cli::Json(run.config.at(key)) : cli::Json());
+      values.push_back(run.config.contains(key) ? Json(run.config.at(key)) : Json());
   }
   for (const Compared& run : all) runs.push_back({{"name", run.name}, {"metrics", run.figures}});
   return {{"differs", std::move(differs)}, {"runs", std::move(runs)}};

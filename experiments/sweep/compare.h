@@ -4,11 +4,10 @@
 #pragma once
 
 #include <map>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
-
-#include "experiments/cli/output.h"
 
 namespace restage::tables {
 
@@ -29,7 +28,7 @@ Compared read_compared(const std::string& folder);
 std::vector<std::string> differing_keys(const std::vector<Compared>& all);
 
 std::string comparison_markdown(const std::vector<Compared>& all);
-cli::Json comparison_json(const std::vector<Compared>& all);
+nlohmann::ordered_json comparison_json(const std::vector<Compared>& all);
 /// A panel for every curve that one of them has.
 std::string comparison_svg(const std::vector<Compared>& all);
 

@@ -37,9 +37,9 @@ std::string job_name(const std::string& dir) {
 
 // ---- Slurm -------------------------------------------------------------------------------------
 
-std::string slurm_script(const std::vector<PlannedTrial>& plan, const ExportOptions& o) {
+std::string slurm_script(const std::vector<sweep::TrialEntry>& plan, const ExportOptions& o) {
   std::string ids;
-  for (const PlannedTrial& trial : plan) ids += "  " + trial.id + "\n";
+  for (const sweep::TrialEntry& trial : plan) ids += "  " + trial.id + "\n";
   const size_t tasks = std::min(plan.size(), kMaxTasks);
   return "#!/bin/bash\n"
          "# The trials of a sweep: sbatch FILE (options given to sbatch win over those below).\n"
@@ -83,9 +83,9 @@ exit "$code"
 
 // ---- GNU parallel ------------------------------------------------------------------------------
 
-std::string parallel_list(const std::vector<PlannedTrial>& plan, const ExportOptions& o) {
+std::string parallel_list(const std::vector<sweep::TrialEntry>& plan, const ExportOptions& o) {
   std::string text;
-  for (const PlannedTrial& trial : plan)
+  for (const sweep::TrialEntry& trial : plan)
     text += quoted(o.program) + " trial " + quoted(o.dir) + " " + trial.id + " --threads " +
             std::to_string(std::max(1, o.threads)) + "\n";
   return text;
@@ -96,20 +96,20 @@ std::string parallel_list(const std::vector<PlannedTrial>& plan, const ExportOpt
 /// An artifact that several trials use.
 struct Shared {
   std::string name, stage;
-  std::vector<const PlannedTrial*> users;
+  std::vector<const sweep::TrialEntry*> users;
   std::set<std::string> after;  ///< shared artifacts that all of its users have as well
 };
 
-bool uses(const PlannedTrial& trial, const std::string& name) {
+bool uses(const sweep::TrialEntry& trial, const std::string& name) {
   return std::any_of(trial.artifacts.begin(), trial.artifacts.end(),
                      [&](const auto& a) { return a.first + "-" + a.second == name; });
 }
 
 /// A plan does not say which artifact reads which. One that stands earlier in every trial that uses
 /// the later one may be read by it, and is made before it.
-std::vector<Shared> shared_artifacts(const std::vector<PlannedTrial>& plan) {
+std::vector<Shared> shared_artifacts(const std::vector<sweep::TrialEntry>& plan) {
   std::vector<Shared> out;
-  for (const PlannedTrial& trial : plan)
+  for (const sweep::TrialEntry& trial : plan)
     for (const auto& [stage, id] : trial.artifacts) {
       const std::string name = stage + "-" + id;
       auto at =
@@ -123,7 +123,7 @@ std::vector<Shared> shared_artifacts(const std::vector<PlannedTrial>& plan) {
       if (stage == later.stage) break;
       const std::string name = stage + "-" + id;
       if (std::all_of(later.users.begin(), later.users.end(),
-                      [&](const PlannedTrial* t) { return uses(*t, name); }))
+                      [&](const sweep::TrialEntry* t) { return uses(*t, name); }))
         later.after.insert(name);
     }
   return out;
@@ -132,10 +132,10 @@ std::vector<Shared> shared_artifacts(const std::vector<PlannedTrial>& plan) {
 /// JSON text of strings, lists and maps is Python's too; characters stay as they are.
 std::string python(const Json& value) { return value.dump(2); }
 
-std::string snakefile(const std::vector<PlannedTrial>& plan, const ExportOptions& o) {
+std::string snakefile(const std::vector<sweep::TrialEntry>& plan, const ExportOptions& o) {
   const std::vector<Shared> shared = shared_artifacts(plan);
   Json trials = Json::object(), stages = Json::object();
-  for (const PlannedTrial& trial : plan) {
+  for (const sweep::TrialEntry& trial : plan) {
     Json& needs = trials[trial.id] = Json::array();
     for (const Shared& s : shared)
       if (uses(trial, s.name)) needs.push_back(s.name);
@@ -214,7 +214,7 @@ Engine engine_named(const std::string& name) {
       near.empty() ? "there are slurm, parallel and snakemake" : "did you mean '" + near + "'?");
 }
 
-std::string export_script(Engine engine, const std::vector<PlannedTrial>& plan,
+std::string export_script(Engine engine, const std::vector<sweep::TrialEntry>& plan,
                           const ExportOptions& options) {
   for (const std::string& path : {options.program, options.dir}) {
     refuse(path, "\r\n", "a line break");

@@ -26,7 +26,7 @@ struct ExportOptions {
 /// for `snakemake -s FILE`; artifacts that several trials use are jobs of their own, made before
 /// the trials by `restage trial DIR ID --stage STAGE`.
 /// InputError: a path that the engine cannot be told (line breaks; for snakemake also braces).
-std::string export_script(Engine engine, const std::vector<PlannedTrial>& plan,
+std::string export_script(Engine engine, const std::vector<sweep::TrialEntry>& plan,
                           const ExportOptions& options);
 
 }  // namespace restage::tables

@@ -1,6 +1,8 @@
 #include "experiments/sweep/plan.h"
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <map>
 #include <set>
 
@@ -245,6 +247,31 @@ void check(const EarlyStop& rule, const SweepPlan& plan) {
                    "name a metric of a stage that is trained");
 }
 
+/// Numbers, true, false, null, text, lists.
+Json node_json(const ConfigNode& node) {
+  if (node.kind == ConfigNode::Kind::null) return nullptr;
+  if (node.kind == ConfigNode::Kind::list || node.kind == ConfigNode::Kind::map) {
+    Json out = node.kind == ConfigNode::Kind::list ? Json::array() : Json::object();
+    for (const ConfigNode& child : node.children) {
+      if (node.kind == ConfigNode::Kind::list)
+        out.push_back(node_json(child));
+      else
+        out[child.key] = node_json(child);
+    }
+    return out;
+  }
+  if (node.quoted) return node.text;
+  if (node.text == "true" || node.text == "false") return node.text == "true";
+  const char *begin = node.text.data(), *end = begin + node.text.size();
+  int64_t whole = 0;
+  if (const auto r = std::from_chars(begin, end, whole); r.ec == std::errc() && r.ptr == end)
+    return whole;
+  double real = 0;
+  const auto r = std::from_chars(begin, end, real);
+  if (r.ec == std::errc() && r.ptr == end && std::isfinite(real)) return real;
+  return node.text;
+}
+
 }  // namespace
 
 SweepPlan plan_sweep(const SweepFile& file) {
@@ -276,6 +303,15 @@ Forecast measure(const SweepPlan& plan) {
       }
     }
   }
+  return out;
+}
+
+TrialEntry entry_of(const PlannedTrial& trial) {
+  TrialEntry out{trial.id, trial.case_name, trial.seed};
+  for (const auto& [key, value] : trial.overrides)
+    out.overrides[key] = node_json(parse_yaml(value, "", true));
+  for (const StageArtifact& artifact : trial.artifacts)
+    out.artifacts.emplace_back(artifact.stage, artifact.id);
   return out;
 }
 

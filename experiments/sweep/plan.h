@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "experiments/sweep/plan_file.h"
 #include "experiments/sweep/sweep_file.h"
 #include "experiments/sweep/trial_work.h"
 
@@ -29,6 +30,8 @@ SweepPlan plan_sweep(const SweepFile& file);
 /// measured once.
 Forecast measure(const SweepPlan& plan);
 
+/// As plan.json knows it.
+TrialEntry entry_of(const PlannedTrial& trial);
 /// "a=1, b=[2, 3]": what distinguishes a trial, for people.
 std::string describe(const PlannedTrial& trial);
 

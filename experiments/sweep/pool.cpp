@@ -14,6 +14,8 @@
 #include "autograd/base/log.h"
 
 namespace restage::sweep {
+
+using tables::TrialState;
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -97,7 +99,7 @@ class Pool {
   std::optional<Slot::State> over(const TrialEntry& trial) const {
     const auto result = read_result(dir_, trial.id);
     if (!result || !is_over(dir_, *result)) return std::nullopt;
-    return result->state == "done" ? Slot::State::done : Slot::State::early;
+    return result->state == TrialState::done ? Slot::State::done : Slot::State::early;
   }
   bool has(Slot::State state) const {
     return std::any_of(slots_.begin(), slots_.end(),
@@ -106,8 +108,7 @@ class Pool {
   std::string name(const Slot& slot) const {
     std::string out = "trial " + slot.trial->id + " (";
     if (!slot.trial->case_name.empty()) out += slot.trial->case_name + ", ";
-    for (const auto& [key, value] : slot.trial->overrides.items())
-      out += key + "=" + value.dump() + ", ";
+    for (const auto& [key, value] : slot.trial->overrides) out += key + "=" + value.dump() + ", ";
     return out + "seed " + std::to_string(slot.trial->seed) + ")";
   }
 
@@ -180,12 +181,11 @@ class Pool {
     } else if (Lease::holder(dir_.lease(slot.trial->id))) {
       slot.beat = -1;
       leave_to_others(slot);
-    } else if ((result && result->state == "stopped") || code == 128 + SIGTERM ||
+    } else if ((result && result->state == TrialState::stopped) || code == 128 + SIGTERM ||
                code == 128 + SIGINT || terminated_) {
       end(slot, Slot::State::stopped, "");
-    } else if (result && result->state == "failed") {
-      const Json error = result->document.value("error", Json());
-      failed(slot, error.is_string() ? error.get<std::string>() : "", false);
+    } else if (result && result->state == TrialState::failed) {
+      failed(slot, result->error, false);
     } else {
       failed(slot, how_it_ended(status, last_line(dir_.log(slot.trial->id))), true);
     }
@@ -204,7 +204,7 @@ class Pool {
     try {
       const auto lease = Lease::take(dir_.lease(slot.trial->id), "the pool", {});
       if (!lease || read_result(dir_, slot.trial->id)) return;
-      write_result(dir_, *slot.trial, "failed", error, {}, seconds_since(slot.started));
+      write_result(dir_, *slot.trial, TrialState::failed, error, {}, seconds_since(slot.started));
     } catch (const Error& why) {
       log_warning(why.what());
     }

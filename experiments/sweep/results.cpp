@@ -6,7 +6,6 @@
 #include <set>
 #include <tuple>
 
-#include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
 #include "nn/metrics/metrics.h"
 
@@ -16,67 +15,11 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
-constexpr uint64_t kMaxBytes = uint64_t{1} << 28;
-constexpr int kMaxDepth = 8;  ///< of an override's value
-
-/// A JSON file whose parts are asked for by kind; everything else is an InputError that names it.
-/// Results are read as sorted JSON, which a hostile file cannot make slow; plans as ordered JSON,
-/// since the order of a trial's artifacts is that of their making.
-template <class Json>
-class Reader {
+/// Reads the scores of a result.
+class Reader : public sweep::JsonReader<Json> {
  public:
-  Reader(std::string path, std::string fix) : path_(std::move(path)), fix_(std::move(fix)) {}
+  using JsonReader::JsonReader;
 
-  Json parse() const {
-    Json document = Json::parse(read_file(path_, kMaxBytes), nullptr, false);
-    if (document.is_discarded()) fail("is no JSON document");
-    return document;
-  }
-  [[noreturn]] void fail(const std::string& wrong) const { throw InputError(path_, wrong, fix_); }
-  void need(bool holds, const std::string& name, const char* what) const {
-    if (!holds) fail("'" + name + "' is not " + what);
-  }
-  /// The entry `name` of an object; null if it is not there.
-  const Json& at(const Json& object, const std::string& name) const {
-    static const Json null;
-    const auto found = object.find(name);
-    return found == object.end() ? null : *found;
-  }
-  std::string text(const Json& object, const std::string& name) const {
-    const Json& value = at(object, name);
-    need(value.is_string(), name, "text");
-    return value.template get<std::string>();
-  }
-  /// Text; empty for null.
-  std::string optional_text(const Json& object, const std::string& name) const {
-    return at(object, name).is_null() ? "" : text(object, name);
-  }
-  uint64_t count(const Json& object, const std::string& name) const {
-    const Json& value = at(object, name);
-    need(value.is_number_unsigned(), name, "a number from 0");
-    return value.template get<uint64_t>();
-  }
-  const Json& object(const Json& parent, const std::string& name) const {
-    const Json& value = at(parent, name);
-    need(value.is_object(), name, "a section");
-    return value;
-  }
-  /// Id, case, seed, overrides, artifacts.
-  void head(const Json& trial, PlannedTrial* out) const {
-    if (!trial.is_object()) fail("holds a trial that is no section");
-    out->id = text(trial, "id");
-    need(is_trial_id(out->id), "id", "12 hex digits");
-    out->case_name = optional_text(trial, "case");
-    out->seed = count(trial, "seed");
-    for (const auto& [key, value] : object(trial, "overrides").items()) {
-      need(depth(value) <= kMaxDepth, "overrides", "so deep elsewhere");
-      out->overrides[key] = value;
-    }
-    for (const auto& [stage, id] : object(trial, "artifacts").items()) {
-      need(id.is_string(), "artifacts", "a section of ids");
-      out->artifacts.emplace_back(stage, id.template get<std::string>());
-    }
-  }
   MetricValues values(const Json& entries) const {
     if (!entries.is_object()) fail("holds metrics that are no section");
     MetricValues out;
@@ -91,11 +34,9 @@ class Reader {
   Scores scores(const Json& entries) const {
     if (!entries.is_object()) fail("holds a set that is no section");
     Scores out;
-    out.mean = values(object(entries, "mean"));
-    const Json& sequences = at(entries, "sequences");
-    need(sequences.is_array(), "sequences", "a list");
+    out.mean = values(section(entries, "mean"));
     std::set<std::string> names;
-    for (const Json& sequence : sequences) {
+    for (const Json& sequence : list(entries, "sequences")) {
       MetricValues found = values(sequence);
       std::string name = text(sequence, "name");
       if (!names.insert(name).second) fail("has the sequence '" + name + "' twice");
@@ -112,25 +53,6 @@ class Reader {
       out.references.emplace_back(name, scores(one));
     return out;
   }
-
- private:
-  static int depth(const Json& value) {
-    if (!value.is_structured()) return 0;
-    // Counted level by level: a hostile file must not exhaust the stack.
-    std::vector<const Json*> level{&value};
-    int levels = 0;
-    while (!level.empty() && levels <= kMaxDepth) {
-      std::vector<const Json*> next;
-      for (const Json* item : level)
-        for (const Json& child : *item)
-          if (child.is_structured()) next.push_back(&child);
-      level = std::move(next);
-      ++levels;
-    }
-    return levels;
-  }
-
-  std::string path_, fix_;
 };
 
 /// Numbers by size and before text.
@@ -168,15 +90,15 @@ std::vector<std::string> trial_folders(const std::string& dir) {
   return names;
 }
 
-bool same_question(const PlannedTrial& a, const PlannedTrial& b) {
+bool same_question(const sweep::TrialEntry& a, const sweep::TrialEntry& b) {
   return a.case_name == b.case_name && a.seed == b.seed && a.overrides == b.overrides;
 }
 
 /// The plan's view of its trials is what counts; a result must answer the question that it asks.
-TrialResult result_of(const std::string& dir, const std::string& id, const PlannedTrial* planned,
-                      Results* results) {
+TrialResult result_of(const std::string& dir, const std::string& id,
+                      const sweep::TrialEntry* planned, Results* results) {
   TrialResult pending;
-  if (planned != nullptr) static_cast<PlannedTrial&>(pending) = *planned;
+  if (planned != nullptr) static_cast<sweep::TrialEntry&>(pending) = *planned;
   pending.id = id;
   pending.described = planned != nullptr;
   const std::string path = dir + "/trials/" + id + "/result.json";
@@ -211,51 +133,14 @@ int Results::count(TrialState state) const {
                                         [&](const TrialResult& t) { return t.state == state; }));
 }
 
-bool is_trial_id(const std::string& text) {
-  return text.size() == 12 && text.find_first_not_of("0123456789abcdef") == std::string::npos;
-}
-
 std::string plain_text(const Json& value) {
   return value.is_string() ? value.get<std::string>() : value.dump();
 }
 
-std::optional<std::vector<PlannedTrial>> read_plan(const std::string& dir) {
-  const std::string path = dir + "/plan.json";
-  std::error_code ignored;
-  if (!fs::exists(path, ignored)) return std::nullopt;
-  const Reader<nlohmann::ordered_json> reader(
-      path, "write it again with 'restage sweep plan SWEEP.yaml --out " + dir + "'");
-  const auto document = reader.parse();
-  if (!document.is_object() || !reader.at(document, "trials").is_array())
-    reader.fail("holds no list of trials");
-  std::vector<PlannedTrial> plan;
-  std::set<std::string> ids;
-  for (const auto& trial : document["trials"]) {
-    reader.head(trial, &plan.emplace_back());
-    if (!ids.insert(plan.back().id).second)
-      reader.fail("has the trial " + plan.back().id + " twice");
-  }
-  return plan;
-}
-
-std::string store_of(const std::string& dir) {
-  std::error_code ignored;
-  if (!fs::exists(dir + "/plan.json", ignored)) return "";
-  const Json plan = Json::parse(read_file(dir + "/plan.json", kMaxBytes), nullptr, false);
-  const auto text = [&](const char* key) {
-    return plan.is_object() && plan.contains(key) && plan[key].is_string()
-               ? plan[key].get<std::string>()
-               : "";
-  };
-  // The store is seen from where the sweep was planned, and that place from the sweep's folder.
-  return text("store").empty() ? "" : (fs::path(dir) / text("directory") / text("store")).string();
-}
-
 TrialResult read_result(const std::string& path, const std::string& id) {
-  const Reader<Json> reader(path, "it is not used; remove it and run the trial again");
+  const Reader reader(path, "it is not used; remove it and run the trial again");
   const Json document = reader.parse();
-  TrialResult out;
-  reader.head(document, &out);
+  TrialResult out{read_entry<Json>(reader, document)};
   if (out.id != id) reader.fail("is the result of another trial (" + out.id + ")");
   const std::string state = reader.text(document, "state");
   const auto* over = std::begin(kTrialStates) + 3;  // of which the first three are
@@ -263,34 +148,35 @@ TrialResult read_result(const std::string& path, const std::string& id) {
   reader.need(known != over, "state", "one of done, failed and stopped");
   out.state = static_cast<TrialState>(known - std::begin(kTrialStates));
   out.error = reader.optional_text(document, "error");
-  const Json& seconds = reader.at(document, "seconds");
-  reader.need(seconds.is_number() || seconds.is_null(), "seconds", "a number");
-  out.seconds = seconds.is_null() ? 0 : seconds.get<double>();
+  if (!reader.at(document, "seconds").is_null()) out.seconds = reader.number(document, "seconds");
+  out.host = reader.optional_text(document, "host");
+  out.command = reader.optional_text(document, "command");
+  out.early_stop = reader.at(document, "early_stop");
   if (out.state != TrialState::done) return out;
-  for (const auto& [name, set] : reader.object(document, "metrics").items())
+  for (const auto& [name, set] : reader.section(document, "metrics").items())
     out.sets.emplace_back(name, reader.set(set));
   return out;
 }
 
 Results read_results(const std::string& dir) {
   Results out;
-  std::optional<std::vector<PlannedTrial>> plan;
+  std::optional<sweep::PlanFile> plan;
   const std::vector<std::string> folders = trial_folders(dir);
   try {
-    plan = read_plan(dir);
+    plan = sweep::read_plan_file(dir);
   } catch (const Error& error) {
     out.notices.emplace_back(error.what());
   }
   std::set<std::string> known;
   if (plan)
-    for (const PlannedTrial& trial : *plan) {
+    for (const sweep::TrialEntry& trial : plan->trials) {
       out.trials.push_back(result_of(dir, trial.id, &trial, &out));
       known.insert(trial.id);
     }
   for (const std::string& name : folders) {
     if (known.contains(name)) continue;
     const std::string path = dir + "/trials/" + name;
-    if (!is_trial_id(name))
+    if (!sweep::is_trial_id(name))
       out.notices.push_back(path + ": is no trial's folder; it is not used, remove it");
     else if (plan)
       out.notices.push_back(path +

@@ -4,24 +4,15 @@
 // another trial or plan, is told in one line and not used.
 #pragma once
 
-#include <cstdint>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-namespace restage::tables {
+#include "experiments/sweep/plan_file.h"
 
-/// What a plan says about a trial.
-struct PlannedTrial {
-  std::string id;         ///< 12 hex digits
-  std::string case_name;  ///< empty: no cases
-  uint64_t seed = 0;
-  std::map<std::string, nlohmann::json> overrides;             ///< by key
-  std::vector<std::pair<std::string, std::string>> artifacts;  ///< stage and id, as made
-};
+namespace restage::tables {
 
 /// Values by METRIC (nn/metrics/metrics.h, table()); what is null is not there.
 using MetricValues = std::map<std::string, double>;
@@ -40,12 +31,14 @@ struct SetResult : Scores {
 enum class TrialState { done, failed, stopped, pending, damaged };
 inline constexpr const char* kTrialStates[] = {"done", "failed", "stopped", "pending", "damaged"};
 
-struct TrialResult : PlannedTrial {
+struct TrialResult : sweep::TrialEntry {
   TrialState state = TrialState::pending;
-  bool described = true;  ///< false: neither plan nor result says more than the id
-  std::string error;      ///< of a failed one
+  bool described = true;   ///< false: neither plan nor result says more than the id
+  std::string error = {};  ///< of a failed one
   double seconds = 0;
-  std::vector<std::pair<std::string, SetResult>> sets;  ///< of one that is done
+  std::string host = {}, command = {};                       ///< where and how it was made
+  nlohmann::json early_stop = nullptr;                       ///< the rule that stopped it
+  std::vector<std::pair<std::string, SetResult>> sets = {};  ///< of one that is done
 };
 
 struct Results {
@@ -55,13 +48,6 @@ struct Results {
   int count(TrialState state) const;
 };
 
-/// 12 lower-case hex digits.
-bool is_trial_id(const std::string& text);
-/// DIR/plan.json (docs/design/experiments.md); nothing if it is not there.
-/// InputError: damaged.
-std::optional<std::vector<PlannedTrial>> read_plan(const std::string& dir);
-/// The folder of artifacts as DIR/plan.json names it; empty if it does not.
-std::string store_of(const std::string& dir);
 /// One result file. InputError: damaged, or the result of another trial.
 TrialResult read_result(const std::string& path, const std::string& id);
 /// All trials of a sweep. InputError: `dir` holds no sweep.

@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -17,12 +16,14 @@
 #include "nn/config/config_reader.h"
 
 namespace restage::sweep {
+
+using tables::TrialResult;
+using tables::TrialState;
+
 namespace {
 
 namespace fs = std::filesystem;
 using Kind = ConfigNode::Kind;
-
-constexpr const char* kPlan = "/plan.json";
 
 ConfigNode text_node(const std::string& text) { return config_detail::write_leaf(text); }
 
@@ -138,46 +139,9 @@ void make_folder(const std::string& path) {
                    "choose a folder that you can write to");
 }
 
-Json parsed(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return nullptr;
-  const std::string text(std::istreambuf_iterator<char>(file), {});
-  Json json = Json::parse(text, nullptr, false);
-  return json.is_discarded() ? Json(nullptr) : json;
-}
-
 std::string host_name() {
   char name[256] = "";
   return ::gethostname(name, sizeof name - 1) == 0 ? name : "unknown";
-}
-
-Json node_json(const ConfigNode& node) {
-  if (node.kind == Kind::null) return nullptr;
-  if (node.kind == Kind::list || node.kind == Kind::map) {
-    Json out = node.kind == Kind::list ? Json::array() : Json::object();
-    for (const ConfigNode& child : node.children) {
-      if (node.kind == Kind::list)
-        out.push_back(node_json(child));
-      else
-        out[child.key] = node_json(child);
-    }
-    return out;
-  }
-  if (node.quoted) return node.text;
-  if (node.text == "true" || node.text == "false") return node.text == "true";
-  const char *begin = node.text.data(), *end = begin + node.text.size();
-  int64_t whole = 0;
-  if (const auto r = std::from_chars(begin, end, whole); r.ec == std::errc() && r.ptr == end)
-    return whole;
-  double real = 0;
-  const auto r = std::from_chars(begin, end, real);
-  if (r.ec == std::errc() && r.ptr == end && std::isfinite(real)) return real;
-  return node.text;
-}
-
-Json early_stop_json(const std::optional<EarlyStop>& rule) {
-  if (!rule) return nullptr;
-  return {{"metric", rule->metric}, {"rule", rule->rule}, {"after", rule->after}};
 }
 
 }  // namespace
@@ -201,7 +165,12 @@ int write_sweep_dir(const std::string& dir, const SweepFile& file, const SweepPl
       (!fs::is_directory(dir, ignored) || !fs::is_empty(dir, ignored)))
     throw InputError(dir, "exists and is no sweep's folder", "choose another folder for --out");
   make_folder(dir + "/trials");
-  Json trials = Json::array();
+  PlanFile written{fs::relative(fs::current_path(), dir).string(),
+                   file.store,
+                   file.evaluate,
+                   file.retries,
+                   file.early_stop,
+                   {}};
   std::set<std::string> ids;
   Files files;
   for (const PlannedTrial& trial : plan.trials) {
@@ -209,23 +178,10 @@ int write_sweep_dir(const std::string& dir, const SweepFile& file, const SweepPl
     const std::string folder = dir + "/trials/" + trial.id;
     make_folder(folder);
     files.emplace_back(folder + "/config.yaml", trial.config_yaml);
-    Json entry = {{"id", trial.id}, {"case", trial.case_name}, {"seed", trial.seed}};
-    entry["overrides"] = Json::object();
-    for (const auto& [key, value] : trial.overrides) entry["overrides"][key] = as_json(value);
-    entry["artifacts"] = Json::object();
-    for (const StageArtifact& artifact : trial.artifacts)
-      entry["artifacts"][artifact.stage] = artifact.id;
-    trials.push_back(std::move(entry));
+    written.trials.push_back(entry_of(trial));
   }
-  const Json document = {
-      {"directory", fs::relative(fs::current_path(), dir).string()},
-      {"store", file.store},
-      {"evaluate", {{"benchmark", file.evaluate.benchmark}, {"sets", file.evaluate.sets}}},
-      {"retries", file.retries},
-      {"early_stop", early_stop_json(file.early_stop)},
-      {"trials", std::move(trials)}};
   files.emplace_back(dir + "/sweep.yaml", resolved(file, dir));
-  files.emplace_back(dir + kPlan, document.dump(1) + "\n");
+  files.emplace_back(dir + "/plan.json", plan_file_text(written));
   if (!new_ones(files).empty()) {
     Lease lease = planning(dir);
     for (const auto& [path, content] : new_ones(files)) {
@@ -241,66 +197,44 @@ int write_sweep_dir(const std::string& dir, const SweepFile& file, const SweepPl
 }
 
 SweepDir read_sweep_dir(const std::string& dir) {
-  const Json json = parsed(dir + kPlan);
-  SweepDir out;
-  out.path = dir;
-  while (out.path.size() > 1 && out.path.back() == '/') out.path.pop_back();
-  try {
-    out.directory = json.at("directory");
-    out.store = json.at("store");
-    out.evaluate.benchmark = json.at("evaluate").at("benchmark");
-    out.evaluate.sets = json.at("evaluate").at("sets").get<std::vector<std::string>>();
-    out.retries = json.at("retries");
-    if (const Json rule = json.value("early_stop", Json()); !rule.is_null())
-      out.early_stop = {rule.at("metric"), rule.at("rule"), rule.at("after"), {}};
-    for (const Json& entry : json.at("trials")) {
-      TrialEntry trial{
-          entry.at("id"), entry.at("case"), entry.at("seed"), entry.at("overrides"), {}};
-      for (const auto& [stage, id] : entry.at("artifacts").items())
-        trial.artifacts.emplace_back(stage, id);
-      out.trials.push_back(std::move(trial));
-    }
-  } catch (const nlohmann::json::exception&) {
-    throw InputError(dir, "is no sweep's folder (no plan.json that can be read)",
+  std::optional<PlanFile> plan = read_plan_file(dir);
+  if (!plan)
+    throw InputError(dir, "is no sweep's folder (it has no plan.json)",
                      "make it with 'restage sweep plan SWEEP.yaml --out " + dir + "'");
-  }
+  SweepDir out{std::move(*plan), dir};
+  while (out.path.size() > 1 && out.path.back() == '/') out.path.pop_back();
   return out;
 }
 
-std::optional<TrialResult> read_result(const SweepDir& dir, const std::string& id) {
-  Json json = parsed(dir.result(id));
-  if (!json.is_object() || !json.contains("state") || !json["state"].is_string() ||
-      json.value("id", Json()) != Json(id))
+std::optional<tables::TrialResult> read_result(const SweepDir& dir, const std::string& id) {
+  try {
+    return tables::read_result(dir.result(id), id);
+  } catch (const Error&) {
     return std::nullopt;
-  std::string state = json["state"];
-  return TrialResult{std::move(state), std::move(json)};
+  }
 }
 
-void write_result(const SweepDir& dir, const TrialEntry& trial, const std::string& state,
+void write_result(const SweepDir& dir, const TrialEntry& trial, TrialState state,
                   const std::string& error, const TrialOutcome& outcome, double seconds,
                   bool early) {
-  Json artifacts = Json::object();
-  for (const auto& [stage, id] : outcome.artifacts) artifacts[stage] = id;
-  Json document = {{"id", trial.id},
-                   {"case", trial.case_name},
-                   {"seed", trial.seed},
-                   {"overrides", trial.overrides},
-                   {"state", state},
+  TrialEntry made = trial;
+  made.artifacts.assign(outcome.artifacts.begin(), outcome.artifacts.end());
+  Json document = entry_json(made);
+  document.update({{"state", tables::kTrialStates[static_cast<int>(state)]},
                    {"error", error.empty() ? Json(nullptr) : Json(error)},
-                   {"artifacts", std::move(artifacts)},
                    {"metrics", outcome.metrics},
                    {"seconds", std::round(1e3 * seconds) / 1e3},
                    {"host", host_name()},
-                   {"command", "restage trial " + dir.path + " " + trial.id}};
+                   {"command", "restage trial " + dir.path + " " + trial.id}});
   if (early) document["early_stop"] = early_stop_json(dir.early_stop);
   write_file_atomically(dir.result(trial.id),
                         document.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 bool is_over(const SweepDir& dir, const TrialResult& result) {
-  return result.state == "done" ||
-         (result.state == "stopped" && dir.early_stop &&
-          result.document.value("early_stop", Json()) == early_stop_json(dir.early_stop));
+  return result.state == TrialState::done ||
+         (result.state == TrialState::stopped && dir.early_stop &&
+          result.early_stop == nlohmann::json(early_stop_json(dir.early_stop)));
 }
 
 void remove_drafts(const SweepDir& dir, const std::string& id) { remove_drafts_of(dir.result(id)); }
@@ -323,12 +257,11 @@ TrialStatus status_of(const SweepDir& dir, const TrialEntry& trial) {
   TrialStatus out;
   out.holder = Lease::holder(dir.lease(trial.id));
   const std::optional<TrialResult> result = read_result(dir, trial.id);
-  if (result && (result->state == "done" || !out.holder)) {
-    out.state = result->state;
-    out.seconds = result->document.value("seconds", 0.0);
-    const Json error = result->document.value("error", Json());
-    if (error.is_string()) out.error = error;
-    if (out.state == "done") out.holder.reset();
+  if (result && (result->state == TrialState::done || !out.holder)) {
+    out.state = tables::kTrialStates[static_cast<int>(result->state)];
+    out.seconds = result->seconds;
+    out.error = result->error;
+    if (result->state == TrialState::done) out.holder.reset();
   } else {
     out.state = out.holder ? "running" : "pending";
   }
@@ -352,8 +285,6 @@ std::string stop_token(const std::string& dir) {
   std::getline(file, token);
   return token;
 }
-
-Json as_json(const std::string& yaml) { return node_json(parse_yaml(yaml, "", true)); }
 
 std::string last_line(const std::string& path) {
   constexpr std::streamoff kTail = 4096;

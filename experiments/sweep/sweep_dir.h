@@ -17,26 +17,13 @@
 #include <vector>
 
 #include "experiments/sweep/plan.h"
+#include "experiments/sweep/results.h"
 #include "train/lease.h"
 
 namespace restage::sweep {
 
-/// A trial as plan.json knows it.
-struct TrialEntry {
-  std::string id, case_name;
-  uint64_t seed = 0;
-  Json overrides = Json::object();                             ///< typed values
-  std::vector<std::pair<std::string, std::string>> artifacts;  ///< stage, id
-};
-
-struct SweepDir {
-  std::string path;       ///< as given
-  std::string directory;  ///< from which the sweep was planned: relative paths begin here
-  std::string store;      ///< seen from `directory`
-  Evaluate evaluate;
-  int retries = 0;
-  std::optional<EarlyStop> early_stop;
-  std::vector<TrialEntry> trials;
+struct SweepDir : PlanFile {
+  std::string path;  ///< as given
 
   std::string folder(const std::string& id) const { return path + "/trials/" + id; }
   std::string lease(const std::string& id) const { return folder(id) + "/lease"; }
@@ -53,21 +40,17 @@ int write_sweep_dir(const std::string& dir, const SweepFile& file, const SweepPl
 /// InputError: no sweep's folder.
 SweepDir read_sweep_dir(const std::string& dir);
 
-/// What a trial came to.
-struct TrialResult {
-  std::string state;  ///< "done", "failed", "stopped"
-  Json document;
-};
-/// Nothing if the trial is not over. What cannot be read, or says another id, counts as not there.
-std::optional<TrialResult> read_result(const SweepDir& dir, const std::string& id);
+/// What a trial came to; nothing if it is not over. What cannot be read, or is of another trial,
+/// counts as not there.
+std::optional<tables::TrialResult> read_result(const SweepDir& dir, const std::string& id);
 /// The document of the contract, by rename. `seconds` is of the last attempt. `early`: by the
 /// sweep's rule, and `error` says why.
-void write_result(const SweepDir& dir, const TrialEntry& trial, const std::string& state,
+void write_result(const SweepDir& dir, const TrialEntry& trial, tables::TrialState state,
                   const std::string& error, const TrialOutcome& outcome, double seconds,
                   bool early = false);
 
 /// Nothing is left to do: it is done, or was stopped early by the rule that the sweep still has.
-bool is_over(const SweepDir& dir, const TrialResult& result);
+bool is_over(const SweepDir& dir, const tables::TrialResult& result);
 
 /// Removes drafts of results whose writers were killed. The caller holds the trial's lease.
 void remove_drafts(const SweepDir& dir, const std::string& id);
@@ -87,8 +70,6 @@ void request_stop(const std::string& dir);
 /// Changes with every request; what runs remembers it and compares.
 std::string stop_token(const std::string& dir);
 
-/// YAML on one line as JSON: numbers, true, false, null, text, lists.
-Json as_json(const std::string& yaml);
 /// The last line of a file that is not blank, at most 300 characters; "" without one.
 std::string last_line(const std::string& path);
 

@@ -7,11 +7,12 @@
 
 #include "autograd/base/error.h"
 #include "experiments/sweep/svg.h"
+#include "experiments/text.h"
 
 namespace restage::tables {
 namespace {
 
-using cli::Json;
+using Json = nlohmann::ordered_json;
 using Rows = std::vector<std::vector<std::string>>;
 
 /// The shortest text that reads back to the same bits.
@@ -156,7 +157,7 @@ std::string for_tex(const std::string& text) {
 std::string tex_line(const std::vector<std::string>& cells) {
   std::string line;
   for (size_t c = 0; c < cells.size(); ++c)
-    line += (c > 0 ? " & " : "{}") + for_tex(cli::on_one_line(cells[c]));
+    line += (c > 0 ? " & " : "{}") + for_tex(on_one_line(cells[c]));
   return line + " \\\\\n";
 }
 
@@ -234,8 +235,7 @@ Json row_json(const Table& table, const Row& row) {
 
 std::string for_markdown(const std::string& text) {
   std::string out;
-  for (const char c : cli::on_one_line(text))
-    out += c == '|' ? std::string("\\|") : std::string(1, c);
+  for (const char c : on_one_line(text)) out += c == '|' ? std::string("\\|") : std::string(1, c);
   return out;
 }
 
@@ -254,7 +254,7 @@ std::string to_markdown(const Table& table, const Results& results) {
   each_table(table, [&](const std::string& title, Rows rows) {
     for (auto& row : rows)
       for (std::string& cell : row) cell = for_markdown(cell);
-    text += "\n**" + cli::on_one_line(title) + "**\n\n" + cli::markdown_table(rows);
+    text += "\n**" + on_one_line(title) + "**\n\n" + markdown_table(rows);
   });
   if (!table.sets.empty()) text += "\n" + note() + "\n";
   return text;
@@ -290,7 +290,7 @@ std::string to_csv(const Table& table) {
 std::string to_tex(const Table& table, const Results& results) {
   std::string text = "% needs \\usepackage{booktabs}; trials: " + counts_text(results) + "\n";
   each_table(table, [&](const std::string& title, const Rows& rows) {
-    text += "% " + cli::on_one_line(title) + "\n\\begin{tabular}{l" +
+    text += "% " + on_one_line(title) + "\n\\begin{tabular}{l" +
             std::string(rows[0].size() - 1, 'r') + "}\n\\toprule\n" + tex_line(rows[0]) +
             "\\midrule\n";
     for (size_t r = 1; r < rows.size(); ++r) text += tex_line(rows[r]);

@@ -2,9 +2,9 @@
 // (booktabs), a plot as SVG, JSON as the contract says (docs/experiments.md).
 #pragma once
 
+#include <nlohmann/json.hpp>
 #include <string>
 
-#include "experiments/cli/output.h"
 #include "experiments/sweep/table.h"
 
 namespace restage::tables {
@@ -23,7 +23,7 @@ std::string to_csv(const Table& table);
 std::string to_tex(const Table& table, const Results& results);
 /// Means as dots with their intervals, a panel for each set and metric; no script, no fonts.
 std::string to_svg(const Table& table);
-cli::Json to_json(const Table& table, const Results& results);
+nlohmann::ordered_json to_json(const Table& table, const Results& results);
 
 /// By the ending of `path`: md, csv, tex or svg. InputError for any other.
 std::string to_format(const Table& table, const Results& results, const std::string& path);

@@ -18,6 +18,8 @@
 #include "experiments/sweep/early_stop.h"
 
 namespace restage::sweep {
+
+using tables::TrialState;
 namespace {
 
 namespace fs = std::filesystem;
@@ -120,7 +122,7 @@ TrialEnd perform_trial(const std::string& path, const std::string& id, bool quie
 
   const auto start = std::chrono::steady_clock::now();
   TrialOutcome outcome;
-  const auto finish = [&](const std::string& state, const std::string& error, bool early = false) {
+  const auto finish = [&](TrialState state, const std::string& error, bool early = false) {
     if (lease->lost()) throw WorkError(busy(id, Lease::holder(dir.lease(id))));
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
     write_result(dir, trial, state, error, outcome, took.count(), early);
@@ -132,26 +134,26 @@ TrialEnd perform_trial(const std::string& path, const std::string& id, bool quie
   try {
     log_info("trial " + id + ", seed " + std::to_string(trial.seed));
     outcome = run_trial(dir.folder(id) + "/config.yaml", id, dir.evaluate, dir.store, training);
-    finish("done", "");
+    finish(TrialState::done, "");
     lease->forget();
     return TrialEnd::done;
   } catch (const StoppedEarly& why) {
     log_info(why.what());
-    finish("stopped", why.what(), true);
+    finish(TrialState::stopped, why.what(), true);
     lease->forget();
     return TrialEnd::stopped_early;
   } catch (const Interrupted&) {
-    finish("stopped", "");
+    finish(TrialState::stopped, "");
     throw;
   } catch (const Error& error) {
-    finish("failed", error.what());
+    finish(TrialState::failed, error.what());
     throw;
   } catch (const std::bad_alloc&) {
     const WorkError error("not enough memory; give the trial more, or make it smaller");
-    finish("failed", error.what());
+    finish(TrialState::failed, error.what());
     throw error;
   } catch (const std::exception& error) {
-    finish("failed", error.what());
+    finish(TrialState::failed, error.what());
     throw WorkError(error.what());
   }
 }

@@ -152,8 +152,9 @@ std::vector<std::string> TrialPlanner::unread(const ConfigNode& tree,
   for (const std::string& key : keys) {
     const std::string section = key.substr(0, key.find('.'));
     if (!has(all, section)) continue;
+    // A stage that is not trained reads nothing else; 'init', which 'from' excludes, may be none.
     const bool taken = has(config.stages, section) && config.section(section).from &&
-                       key != section + ".from";  // a stage that is not trained reads nothing else
+                       key != section + ".from" && key != section + ".init";
     if (!has(config.stages, section) || taken) out.push_back(key);
   }
   return out;

@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <string_view>
+#include <type_traits>
 
 namespace restage {
 
@@ -29,6 +30,13 @@ using Mat3 = Eigen::Matrix3d;
 using Quat = Eigen::Quaterniond;
 using Joints = std::array<Vec3, kJoints>;     ///< positions
 using Rotations = std::array<Mat3, kJoints>;  ///< local or global, said where used
+
+/// The nine numbers at `x` as they lie in tensors, row by row.
+template <class T>
+auto matrix_at(T* x) {
+  using Rows = Eigen::Matrix<std::remove_const_t<T>, 3, 3, Eigen::RowMajor>;
+  return Eigen::Map<std::conditional_t<std::is_const_v<T>, const Rows, Rows>>(x);
+}
 
 struct Pose {
   Rotations local;           ///< local rotations, root = global orientation

@@ -29,8 +29,9 @@ struct MotionBatch {
   Tensor self_mask;
   Tensor turns = {}, uncertainty = {};  ///< of MotionInput
   Tensor standing = {};                 ///< [n, t, 2] 1 where the left, the right foot stands
+  Tensor reframed = {};                 ///< of MotionInput
   MotionInput seen(const Var& target_rest) const {
-    return {input, trans, target_rest, turns, uncertainty};
+    return {input, trans, target_rest, turns, uncertainty, reframed};
   }
 };
 

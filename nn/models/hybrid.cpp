@@ -84,28 +84,31 @@ Var of_leaves(const Var& x) {
   return reshape(expand(reshape(five, {n, t, kEnds, 1}), {n, t, kEnds, 6}), {n, t, 6 * kEnds});
 }
 
-/// How ankles and feet move over the ground (m/s, small ones told apart; that the person's own
-/// frame turns is left out) and lie below the pelvis, per frame: [n, t, 16], constant. `before`:
-/// the joints of the frame before [n, 1, 22, 3], replaced. Whether a foot rests is the difference
-/// of two large numbers, its velocity about the pelvis and the pelvis' own, which recurrent layers
-/// do not find.
+/// How ankles and feet move over the ground (m/s, small ones told apart) and lie below the pelvis,
+/// per frame: [n, t, 16], constant. `before`: the joints of the frame before [n, 1, 22, 3],
+/// replaced. Whether a foot rests is the difference of two large numbers, its velocity about the
+/// pelvis and the pelvis' own, which recurrent layers do not find.
 Tensor footing_of(const MotionInput& in, Var* before) {
   const int64_t n = in.joints.size(0), t = in.joints.size(1);
   const Tensor joints = in.joints.value.cast(DType::f64), trans = in.trans.value.cast(DType::f64),
-               last = before->value.defined() ? before->value.cast(DType::f64) : Tensor();
+               last = before->value.defined() ? before->value.cast(DType::f64) : Tensor(),
+               turned = in.reframed.defined() ? in.reframed.cast(DType::f64) : Tensor();
   Tensor out = Tensor::zeros({n, t, kFooting}, DType::f64);
   const auto at = [&](const Tensor& x, int64_t row, int joint) {
     return Eigen::Map<const Vec3>(x.data<double>() + 3 * (row * kJoints + joint));
   };
   for (int64_t i = 0; i < n * t; ++i) {
     double* to = out.data<double>() + i * kFooting;
+    Mat3 turn = Mat3::Identity();
+    if (turned.defined()) turn = matrix_at(turned.data<double>() + 9 * i);
     for (const int joint : {7, 8, 10, 11}) {
       const Vec3 now = at(joints, i, joint);
       const bool first = i % t == 0;
       const Vec3 then = !first           ? Vec3(at(joints, i - 1, joint))
                         : last.defined() ? Vec3(at(last, i / t, joint))
                                          : now;
-      const Vec3 v = kFps * (now - then) + Eigen::Map<const Vec3>(trans.data<double>() + 3 * i);
+      const Vec3 v =
+          kFps * (now - turn * then) + Eigen::Map<const Vec3>(trans.data<double>() + 3 * i);
       for (int c = 0; c < 3; ++c) *to++ = std::tanh(2 * v[c]);
       *to++ = now.y() + 0.8;
     }

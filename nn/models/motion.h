@@ -12,14 +12,17 @@ namespace restage {
 /// What a network carries from frame to frame, in a form of its own; empty at the start.
 using MotionState = std::vector<Var>;
 
-/// What is seen of A, and who is to perform it. The last two are what an extractor may say beside
-/// the joints; undefined where it does not, and no network needs them.
+/// What is seen of A, and who is to perform it. No network needs the last three, which may be
+/// undefined: what an extractor may say beside the joints, and how the directions in which all is
+/// given turn with A's heading.
 struct MotionInput {
-  Var joints;          ///< [n, t, 22, 3] of A relative to its root
-  Var trans;           ///< [n, t, 3], in the configured meaning
-  Var rest;            ///< [n, 22, 3] of B relative to its root
-  Tensor turns;        ///< [n, t, 22, 3, 3] rotation of each joint of A from the T-pose
-  Tensor uncertainty;  ///< [n, t, 22] of A's joints, metres (SkeletonOutput)
+  Var joints;            ///< [n, t, 22, 3] of A relative to its root
+  Var trans;             ///< [n, t, 3], in the configured meaning
+  Var rest;              ///< [n, 22, 3] of B relative to its root
+  Tensor turns;          ///< [n, t, 22, 3, 3] rotation of each joint of A from the T-pose
+  Tensor uncertainty;    ///< [n, t, 22] of A's joints, metres (SkeletonOutput)
+  Tensor reframed = {};  ///< [n, t, 3, 3] takes what was in the directions of the frame before to
+                         ///< this frame's; undefined where they stay
 };
 
 struct MotionOutput {

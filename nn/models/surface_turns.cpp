@@ -6,8 +6,6 @@
 namespace restage {
 namespace {
 
-using Row3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
 Joints joints_at(const double* x) {
   Joints out;
   for (int j = 0; j < kJoints; ++j) out[j] = Eigen::Map<const Vec3>(x + 3 * j);
@@ -27,14 +25,14 @@ SurfaceTurns surface_turns(const MotionInput& in) {
                    Tensor::zeros({n * t, leaves, 3, 3}, DType::f64),
                    Tensor::zeros({n * t, 3 * kJoints}, DType::f64)};
   for (int64_t k = 0; k < n * t * leaves; ++k)
-    Eigen::Map<Row3>(out.leaves.data<double>() + 9 * k).setIdentity();
+    matrix_at(out.leaves.data<double>() + 9 * k).setIdentity();
   if (in.turns.defined()) {
     const Tensor joints = in.joints.value.cast(DType::f64), rest = in.rest.value.cast(DType::f64),
                  turns = in.turns.cast(DType::f64);
     for (int64_t k = 0; k < n * t; ++k) {
       Rotations measured;
       for (int j = 0; j < kJoints; ++j)
-        measured[j] = Eigen::Map<const Row3>(turns.data<double>() + 9 * (k * kJoints + j));
+        measured[j] = matrix_at(turns.data<double>() + 9 * (k * kJoints + j));
       const TwistReading read =
           read_twist(joints_at(rest.data<double>() + 3 * kJoints * (k / t)),
                      joints_at(joints.data<double>() + 3 * kJoints * k), measured);
@@ -44,8 +42,7 @@ SurfaceTurns surface_turns(const MotionInput& in) {
             rotation_vector(read.beyond[j]);
       }
       for (int64_t i = 0; i < leaves; ++i)
-        Eigen::Map<Row3>(out.leaves.data<double>() + 9 * (k * leaves + i)) =
-            read.beyond[kLeaves[i]];
+        matrix_at(out.leaves.data<double>() + 9 * (k * leaves + i)) = read.beyond[kLeaves[i]];
     }
   }
   for (Tensor* x : {&out.twist, &out.leaves, &out.beyond}) *x = x->cast(in.joints.dtype());

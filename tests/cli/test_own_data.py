@@ -79,6 +79,19 @@ class Split(People):
                 self.assertLessEqual(set(own), set(found[split]["bodies"]), split)
             self.assertEqual(sorted(name for s in SPLITS for name in found[s]["bodies"]), bodies)
 
+    def test_some_people_and_bodies_that_stay_where_they_are(self):
+        self.done("data", "build", "--bodies", 4, 2, 2, "--motions", 0, 0, 0, "--out", "bodies.h5")
+        where = {s: c["bodies"] for s, c in self.json("data", "inspect", "bodies.h5")["splits"].items()}
+        self.people({name: [10] for name in ("ann", "bob", "eve", "zoe")})
+        self.imported()
+        self.done("data", "merge", "bodies.h5", "people.h5", "--out", "all.h5")
+        found = self.json("data", "split", "all.h5", "--only", "ann,bob,eve", "--bodies", "all.h5", "--out", "few.h5")
+        self.assertEqual(sorted(n for s in SPLITS for n in found[s]["subjects"]), ["ann", "bob", "eve"])
+        few = self.json("data", "inspect", "few.h5")
+        self.assertEqual(few["subjects"], {"ann": 1, "bob": 1, "eve": 1})
+        self.assertEqual({s: c["bodies"] for s, c in few["splits"].items()}, where)
+        self.bad_input(["data", "split", "all.h5", "--only", "ann,tom", "--out", "x.h5"], "all.h5", "'tom'")
+
     def test_too_few_people(self):
         self.people({"ann": [30, 40], "bob": [50]})
         self.imported()

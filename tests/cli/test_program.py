@@ -1,5 +1,6 @@
 """The program as a whole: usage, help, exit codes, standard output."""
 import os
+import re
 import signal
 import subprocess
 import time
@@ -18,6 +19,21 @@ class Usage(CliTest):
             text = self.done(*command, "--help")
             self.assertIn("Examples:", text)
             self.assertIn("restage " + " ".join(command), text)
+
+    def commands(self, *words):
+        """Every command with its help, groups walked through."""
+        text = self.done(*words, "--help")
+        below = re.findall(r"^  ([a-z]+) {2,}", text.partition("ubcommands:")[2], re.M)
+        return [found for word in below for found in self.commands(*words, word)] if below else [(words, text)]
+
+    def test_every_flag_has_an_example(self):
+        found = self.commands()
+        self.assertGreater(len(found), 25)
+        for words, text in found:
+            own, examples = text.partition("Common options")[0], text.partition("Examples:")[2]
+            for flag in re.findall(r"^  (?:-\w,)?(--[a-z-]+)", own, re.M):
+                if flag != "--help":
+                    self.assertRegex(examples, re.escape(flag) + "(?![a-z-])", "restage " + " ".join(words))
 
     def test_wrong_usage(self):
         self.bad_input([], "needs a command")

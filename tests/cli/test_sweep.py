@@ -7,7 +7,7 @@ import subprocess
 import time
 
 from support import PROGRAM, CliTest
-from tiny_run import CONFIG
+from tiny_run import CONFIG, weights
 
 # About a second a trial, half of which is evaluation.
 BASE = CONFIG.replace("motions: {train: 4, validation: 2, test: 1}", "motions: {train: 4, validation: 2, test: 2}").replace(
@@ -107,6 +107,13 @@ class Plans(Sweep):
         again = self.json("sweep", "plan", "d/sweep.yaml")  # the resolved file stands for itself
         self.assertEqual(sorted(os.listdir(self.path("d"))), ["plan.json", "sweep.yaml", "trials"])
         self.assertEqual(sorted(os.listdir(self.path("d/trials"))), sorted(t["id"] for t in again["trials"]))
+
+    def test_before_and_after_fine_tuning(self):
+        self.write("fine.yaml", CONFIG.replace("motion:\n  sizes", "motion:\n  init: %s\n  sizes" % weights("tiny")))
+        before = "cases: {before: {motion.init: none, motion.from: %s}, after: {}}\n" % weights("tiny")
+        self.write("sweep.yaml", "base: fine.yaml\n" + before)
+        stages = [sorted(t["artifacts"]) for t in self.json("sweep", "plan", "sweep.yaml")["trials"]]
+        self.assertEqual(stages, [["deformation", "skeleton"], ["deformation", "motion", "skeleton"]])
 
     def test_measured_forecast(self):
         found = self.plan("--measure")["forecast"]

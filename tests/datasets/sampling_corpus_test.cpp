@@ -11,6 +11,7 @@
 #include <set>
 
 #include "datasets/sampling/clouds.h"
+#include "datasets/sampling/evaluation.h"
 #include "datasets/sampling/pairs.h"
 #include "datasets/sampling/windows.h"
 #include "datasets/schema.h"
@@ -247,6 +248,47 @@ TEST_F(SamplingEpoch, MemoryIsFlatOverAnEpochOf65000Examples) {
     }
     EXPECT_EQ(memory_stats().in_use, tensors) << loader.name;
     EXPECT_LT(heap_bytes() - heap, kGrowth) << loader.name;
+  }
+}
+
+/// Shares of samples in which body 1 performs the motion of the person whose id it has, and any
+/// other motion.
+template <class Drawn>
+std::pair<double, double> shares_of_own(const Drawn& drawn) {
+  constexpr int kSamples = 3000;
+  double own = 0, all_own = 0, other = 0, all_other = 0;
+  for (int64_t i = 0; i < kSamples; ++i) {
+    const auto [body, motion] = drawn(i);
+    if (motion == 0)
+      all_own += 1, own += body == 1;
+    else
+      all_other += 1, other += body == 1;
+  }
+  return {own / all_own, other / all_other};
+}
+
+TEST(SamplingOwnBodies, EverySecondSampleOfAPersonsMotionIsOfTheirOwnBody) {
+  Corpus corpus = training_corpus();
+  ASSERT_EQ(corpus.bodies.size(), 3u);
+  corpus.bodies[1].id = corpus.motions[0].subject;
+  const CloudSampler clouds(corpus, {.tpose_share = 0}, 1);
+  const WindowSampler windows(corpus, {.frames = 8}, 1);
+  const auto of_clouds = shares_of_own([&](int64_t i) {
+    const CloudSubject s = clouds.subject(i);
+    return std::pair(s.body, s.at.motion);
+  });
+  const auto of_windows = shares_of_own([&](int64_t i) {
+    const WindowSubject s = windows.subject(i);
+    EXPECT_EQ(s.self, s.body_a == s.body_b);
+    return std::pair(s.body_a, s.clip.motion);
+  });
+  for (const auto& [own, other] : {of_clouds, of_windows}) {
+    EXPECT_NEAR(own, 0.5 + 0.5 / 3, 0.06);
+    EXPECT_NEAR(other, 1.0 / 3, 0.06);
+  }
+  for (const EvalSequence& s : evaluation_sequences(corpus, 12, 8, 1)) {
+    EXPECT_TRUE(s.motion != 0 || s.body_a == 1);
+    EXPECT_NE(s.body_a, s.body_b);
   }
 }
 

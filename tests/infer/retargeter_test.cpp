@@ -136,9 +136,8 @@ std::vector<Pose> whole_sequence(const Bundle& models, const std::vector<Joints>
     if (f > 0) root += Vec3(t[0], t[1], t[2]) / kFps;
     poses[f].root = root;
     for (size_t j = 0; j < kJoints; ++j)
-      poses[f].local[j] = Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(
-                              out.rotations.value.data<float>() + (f * kJoints + j) * 9)
-                              .cast<double>();
+      poses[f].local[j] =
+          matrix_at(out.rotations.value.data<float>() + (f * kJoints + j) * 9).cast<double>();
   }
   return poses;
 }

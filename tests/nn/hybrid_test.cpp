@@ -41,8 +41,7 @@ struct Input {
         for (int j = 0; j < kJoints; ++j) {
           const int64_t at = (n * kFrames + t) * kJoints + j;
           Eigen::Map<Vec3>(joints.data<double>() + 3 * at) = x.joints[j] - x.joints[0];
-          Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(turns.data<double>() + 9 * at) =
-              x.global[j];
+          matrix_at(turns.data<double>() + 9 * at) = x.global[j];
         }
       }
     }
@@ -94,13 +93,12 @@ TEST(Hybrid, TurnsOfTheSurfaceAreWhereItBegins) {
     for (int64_t n = 0; n < 2; ++n) {
       Rotations global;
       for (int j = 0; j < kJoints; ++j) {
-        const Mat3 local = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
-            out.rotations.value.data<double>() + 9 * (n * kFrames * kJoints + j));
+        const Mat3 local =
+            matrix_at(out.rotations.value.data<double>() + 9 * (n * kFrames * kJoints + j));
         global[j] = kParents[j] < 0 ? local : Mat3(global[kParents[j]] * local);
-        worst = std::max(
-            worst, (global[j] - Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(
-                                    in.turns.data<double>() + 9 * (n * kFrames * kJoints + j)))
-                       .norm());
+        worst = std::max(worst, (global[j] - matrix_at(in.turns.data<double>() +
+                                                       9 * (n * kFrames * kJoints + j)))
+                                    .norm());
       }
     }
     return worst;
@@ -146,6 +144,38 @@ double contact_changed_by(double drift, double path) {
   double most = 0;
   for (int64_t i = 0; i < a.numel(); ++i) most = std::max(most, std::abs(a.item(i) - b.item(i)));
   return most;
+}
+
+/// Contact of somebody who stands still and is looked at in directions that turn by `turn` radians
+/// a frame, known (`told`) or not.
+Tensor contact_of_still_feet(double turn, bool told) {
+  Input in;
+  Tensor reframed = Tensor::zeros({2, kFrames, 3, 3}, DType::f64);
+  for (int64_t row = 0; row < 2 * kFrames; ++row) {
+    const int64_t t = row % kFrames, first = row - t;
+    for (int64_t j = 0; j < kJoints; ++j)
+      Eigen::Map<Vec3>(in.joints.data<double>() + 3 * (row * kJoints + j)) =
+          turn_about_y(turn * static_cast<double>(t)) *
+          Vec3(Eigen::Map<const Vec3>(in.joints.data<double>() + 3 * (first * kJoints + j)));
+    Eigen::Map<Vec3>(in.trans.data<double>() + 3 * row).setZero();
+    matrix_at(reframed.data<double>() + 9 * row) = turn_about_y(t == 0 ? 0 : turn);
+  }
+  MotionInput seen = in.all();
+  if (told) seen.reframed = reframed;
+  Context ctx;
+  MotionState state;
+  return hybrid()->forward(ctx, seen, &state).standing.value;
+}
+
+TEST(Hybrid, ThatAPersonTurnsMovesNoFeet) {
+  const Tensor still = contact_of_still_feet(0, false), told = contact_of_still_feet(0.3, true),
+               untold = contact_of_still_feet(0.3, false);
+  double most = 0;
+  for (int64_t i = 0; i < still.numel(); ++i) {
+    EXPECT_NEAR(told.item(i), still.item(i), 1e-9);
+    most = std::max(most, std::abs(untold.item(i) - still.item(i)));
+  }
+  EXPECT_GT(most, 1e-3);
 }
 
 TEST(Hybrid, ContactSeesHowFeetMoveOverTheGroundAndNothingElse) {

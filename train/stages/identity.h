@@ -14,9 +14,9 @@
 namespace restage {
 
 /// Raised whenever the same configuration gives other results than before.
-/// 2: smrm/hybrid filters its path too, corrects in units of uncertainty and has a footing for
-/// contact. 1: as of the first artifacts.
-inline constexpr int kBehaviour = 2;
+/// 3: its footing knows how the person turns. 2: smrm/hybrid filters its path too, corrects in
+/// units of uncertainty and has a footing for contact. 1: as of the first artifacts.
+inline constexpr int kBehaviour = 3;
 
 /// An artifact that a configuration trains.
 struct StageId {

@@ -45,15 +45,15 @@ WindowConfig self_windows(const MotionStageConfig& c) {
 }
 
 MotionBatch motion_batch(const WindowBatch& w) {
-  return {w.joints_a, w.input_a,   w.trans_a, w.input_trans_a, w.rest_a,  w.rest_b,
-          w.sixd_a,   w.self_mask, w.turns,   w.uncertainty,   w.standing};
+  return {w.joints_a, w.input_a,   w.trans_a, w.input_trans_a, w.rest_a,   w.rest_b,
+          w.sixd_a,   w.self_mask, w.turns,   w.uncertainty,   w.standing, w.reframed};
 }
 
 /// One pass whose answer is known: of A itself, or of B.
 MotionBatch supervised_batch(const WindowBatch& w) {
   if (!w.truth_b.defined()) return motion_batch(w);
-  return {w.truth_b,      w.input_a,   w.truth_trans_b, w.input_trans_a, w.rest_b,  w.rest_b,
-          w.truth_sixd_b, w.self_mask, w.turns,         w.uncertainty,   w.standing};
+  return {w.truth_b,      w.input_a,   w.truth_trans_b, w.input_trans_a, w.rest_b,   w.rest_b,
+          w.truth_sixd_b, w.self_mask, w.turns,         w.uncertainty,   w.standing, w.reframed};
 }
 
 /// What the skeleton stage's network answers to clouds of a corpus; empty if it is not asked.

@@ -1,0 +1,17 @@
+// Text for people: one line of anything, tables.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace restage {
+
+/// Names in files may hold line breaks and the like; here they become blanks.
+std::string on_one_line(std::string text);
+/// `restage: <text>` as exactly one line of under 400 characters.
+std::string error_line(const std::string& text);
+/// A Markdown table with columns of equal width; the first row is the heading, the first column is
+/// aligned left, the others right.
+std::string markdown_table(const std::vector<std::vector<std::string>>& rows);
+
+}  // namespace restage
