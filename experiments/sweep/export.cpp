@@ -65,16 +65,20 @@ std::string slurm_script(const std::vector<sweep::TrialEntry>& plan, const Expor
          "tasks=" +
          std::to_string(tasks) +
          "\n"
-         R"(code=0 stopping=
+         R"(code=0 stopping= trial=
 # Before the time is up, Slurm tells this shell, and the trial must hear of it to write a checkpoint.
-trap 'stopping=1; kill -TERM "$trial" 2> /dev/null' TERM
+trap 'stopping=1; [ -z "$trial" ] || kill -TERM "$trial" 2> /dev/null' TERM
 for ((i = SLURM_ARRAY_TASK_ID; i < ${#ids[@]}; i += tasks)); do
   "$restage" trial "$dir" "${ids[i]}" --threads "${SLURM_CPUS_PER_TASK:-1}" &
   trial=$!
+  # Told before the trial's number was known: it has not been passed on yet.
+  [ -z "$stopping" ] || kill -TERM "$trial" 2> /dev/null
+  # Not `wait` alone: told in the moment before it blocks, this shell would hear of it when the trial has ended.
+  while kill -0 "$trial" 2> /dev/null; do sleep 0.5; done
   wait "$trial"
   ended=$?
-  # A trap ends the first wait; the second one hears how the trial ended.
-  if [ -n "$stopping" ]; then wait "$trial"; exit $?; fi
+  [ -z "$stopping" ] || exit "$ended"
+  trial=
   [ "$ended" = 0 ] || code=$ended
 done
 exit "$code"

@@ -7,6 +7,7 @@ right commands, whatever the folder is called, and that result files alone decid
 whose artifacts must have the bytes that our own pool makes. An engine that is not there is skipped with its reason;
 with RESTAGE_CI=1 that is a failure.
 """
+import contextlib
 import json
 import os
 import shutil
@@ -237,8 +238,14 @@ class Engines(NeedsPrograms):
         with open(self.program, "w") as f:
             f.write('#!/bin/bash\ntrap \'sleep 1; echo checkpoint > "$2/checkpoint"; exit 143\' TERM\n'
                     'echo > "$2/started"; while true; do sleep 0.1; done\n')
-        job = subprocess.Popen(["bash", self.export("slurm")], env=dict(os.environ, SLURM_ARRAY_TASK_ID="4"))
-        self.addCleanup(job.kill)
+        job = subprocess.Popen(["bash", self.export("slurm")], env=dict(os.environ, SLURM_ARRAY_TASK_ID="4"),
+                               start_new_session=True)
+
+        def end_all():  # what the shell started must not outlive it: it holds this test's output open
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(job.pid, signal.SIGKILL)
+            job.wait()
+        self.addCleanup(end_all)
         end = time.monotonic() + 30
         while not os.path.exists(self.path("started")) and time.monotonic() < end:
             time.sleep(0.05)
