@@ -29,6 +29,7 @@ CloudConfig checked(const CloudConfig& c) {
   for (const double share : {c.dressed, c.one_camera, c.camera_ring, c.one_camera + c.camera_ring})
     check_setting("cloud", share >= 0 && share <= 1, "dressed, one_camera, camera_ring",
                   "0 to 1, and one_camera + camera_ring at most 1");
+  check_setting("cloud", c.bend >= 0 && c.bend <= 90, "bend", "0 to 90 degrees");
   check_setting("cloud", c.intruder >= 0 && c.intruder <= 1, "intruder", "0 to 1");
   check_setting("cloud", c.remembered >= 0 && c.remembered <= 1, "remembered", "0 to 1");
   check_setting("cloud", c.min_fraction > 0 && c.min_fraction <= 1, "min_fraction", "above 0 to 1");
@@ -51,6 +52,19 @@ CloudSubject step_back(CloudSubject subject) {
   for (FrameRef* at : {&subject.at, &subject.limb_at})
     at->frame -= std::min(at->frame, subject.step_back);
   return subject;
+}
+
+/// Turns every joint but the pelvis about a random axis by a normally distributed angle: poses
+/// between and around those that were recorded.
+void bend(const RngKey& key, double angle, Pose* pose) {
+  Rng rng(key);
+  for (size_t j = 1; j < kJoints; ++j) {
+    Vec3 axis;
+    for (int c = 0; c < 3; ++c) axis[c] = rng.normal();
+    const double by = angle * rng.normal();
+    if (axis.norm() > 1e-9)
+      pose->local[j] = pose->local[j] * Eigen::AngleAxisd(by, axis.normalized());
+  }
 }
 
 }  // namespace
@@ -97,6 +111,10 @@ CloudSubject CloudSampler::subject(int64_t index) const {
     out.step_back = 1 + rng.below(3);
   }
   out.intruder = out.sensor != Sensor::none && rng.uniform() < config_.intruder;
+  if (config_.bend > 0) {
+    out.bend = config_.bend * M_PI / 180;
+    out.bend_key = key_.fold(static_cast<uint64_t>(index)).fold("bend");
+  }
   if (!out.rest) out.body = own_.or_own(out.body, out.at.motion, rng);
   return out;
 }
@@ -107,13 +125,15 @@ Pose CloudSampler::pose(const CloudSubject& subject) const {
     return pose_on(corpus_.motions.at(frame.motion), body, frame.frame);
   };
   Pose out = at(subject.at);
-  if (subject.limb < 0) return out;
-  const Pose other = at(subject.limb_at);
-  std::array<bool, kJoints> hangs{};
-  for (int j = 0; j < kJoints; ++j) {
-    hangs[j] = j == subject.limb || (kParents[j] >= 0 && hangs[kParents[j]]);
-    if (hangs[j]) out.local[j] = other.local[j];
+  if (subject.limb >= 0) {
+    const Pose other = at(subject.limb_at);
+    std::array<bool, kJoints> hangs{};
+    for (int j = 0; j < kJoints; ++j) {
+      hangs[j] = j == subject.limb || (kParents[j] >= 0 && hangs[kParents[j]]);
+      if (hangs[j]) out.local[j] = other.local[j];
+    }
   }
+  if (subject.bend > 0) bend(subject.bend_key, subject.bend, &out);
   return out;
 }
 

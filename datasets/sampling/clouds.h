@@ -22,6 +22,7 @@ struct CloudConfig {
                               ///< repeat them, as in a scan with too few points
   int frame_step = 1;         ///< only every so many frames of a motion; 30: one per second
   double recombined = 0;      ///< part in which a limb or the upper body performs another frame
+  double bend = 0;            ///< every joint but the pelvis turned by about this, degrees
   double dressed = 0;         ///< part of the clouds whose person wears clothes and hair (dress.h)
   double one_camera = 0;      ///< part that one depth camera sees (sensors.h)
   double camera_ring = 0;     ///< part that three to seven cameras around see
@@ -52,6 +53,8 @@ struct CloudSubject {
   FrameRef at;
   int limb = -1;  ///< what hangs on this joint is posed as in `limb_at`; -1: nothing
   FrameRef limb_at;
+  double bend = 0;    ///< radians, as CloudConfig::bend
+  RngKey bend_key{};  ///< of the directions
   Augmentation augmentation;
   double scale = 1;
   Sensor sensor = Sensor::none;

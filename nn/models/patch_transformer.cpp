@@ -49,6 +49,8 @@ PatchTransformer::PatchTransformer(const PatchTransformerConfig& c, const Init& 
                    init.sub("memory"));
     (*memory)[1].start_small();
   }
+  for (int64_t i = 1; i < c.looks; ++i)
+    again.emplace(c.patch, c.width, c.heads, init.sub("again." + std::to_string(i - 1)));
 }
 
 SkeletonOutput PatchTransformer::forward(Context& ctx, const SkeletonInput& in) {
@@ -82,6 +84,10 @@ SkeletonOutput PatchTransformer::forward(Context& ctx, const SkeletonInput& in) 
         add_scalar(sum(by_token * Var(weight.value.reshape({n, t, kJoints})), 1), kUsualError);
   }
   if (ctx.training) out.segmentation = segment(ctx, x);
+  for (size_t i = 0; i < again.size(); ++i) {
+    out.before.push_back(out);
+    static_cast<SkeletonAnswer&>(out) = again[i](ctx, cloud, out.before.back());
+  }
   return out;
 }
 
@@ -96,6 +102,7 @@ void PatchTransformer::visit(Fields& f) {
   if (orientation) f("orientation", *orientation);
   if (uncertainty) f("uncertainty", *uncertainty);
   if (memory) f("memory", *memory);
+  if (again.size() > 0) f("again", again);
 }
 
 }  // namespace restage

@@ -7,7 +7,7 @@
 #include "nn/config/rules.h"
 #include "nn/layers/mlp.h"
 #include "nn/layers/self_attention.h"
-#include "nn/models/skeleton.h"
+#include "nn/models/second_look.h"
 
 namespace restage {
 
@@ -15,6 +15,7 @@ struct PatchTransformerConfig {
   int64_t points = 512, centres = 64, neighbours = 16, patch = 64, width = 128, layers = 4,
           heads = 4;
   bool orientation = false, uncertainty = false, memory = false;
+  int64_t looks = 1;
   // Bring offsets and positions to order one.
   double patch_scale = 10, centre_scale = 2, memory_scale = 4;
 };
@@ -29,6 +30,7 @@ void visit(V& v, PatchTransformerConfig& c) {
   v("orientation", c.orientation, "also the rotation of each joint");
   v("uncertainty", c.uncertainty, "also how far each joint may be off");
   v("memory", c.memory, "also reads where the joints were a frame before");
+  v("looks", c.looks, "how often it looks: after the first time around each joint", between(1, 4));
   v.check("width", c.width % c.heads == 0, "does not fit the heads",
           "give a multiple of " + std::to_string(c.heads));
 }
@@ -50,6 +52,7 @@ struct PatchTransformer : SkeletonModel {
   std::optional<Linear> orientation;  ///< 22 logits and 22 x 6 numbers per token
   std::optional<Linear> uncertainty;  ///< 22 per token, weighted as the votes are
   std::optional<ReluChain> memory;    ///< of where a centre lies from each remembered joint
+  ModuleList<SecondLook> again;       ///< looks - 1
 };
 
 }  // namespace restage

@@ -1,17 +1,24 @@
 // What every skeleton extractor is: a cloud in, 22 joints out (spec 2.1).
 #pragma once
 
+#include <vector>
+
 #include "nn/geometry/skeleton.h"
 #include "nn/module.h"
 
 namespace restage {
 
-struct SkeletonOutput {
+struct SkeletonAnswer {
   Var joints;  ///< [n, 22, 3], in the frame of the input
   // What a model may say beside them; undefined where it does not.
   Var turns;        ///< [n, 22, 6]: rotation of each joint from the T-pose, two columns, not
                     ///< orthonormal; joints alone do not show twist, the surface does
   Var uncertainty;  ///< [n, 22]: logarithm of the s in p(error) ~ s^-3 exp(-|error| / s), metres
+};
+
+struct SkeletonOutput : SkeletonAnswer {
+  /// What a model that looks again believed before, look by look; each has its own training loss.
+  std::vector<SkeletonAnswer> before;
   // What a voting head offers to its training loss; undefined for the other heads.
   Var votes;         ///< [n, c, 22, 3]: where each centre believes each joint to be
   Var segmentation;  ///< [n, c, 22]: logits of the joint that moves each centre

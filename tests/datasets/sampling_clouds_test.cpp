@@ -199,6 +199,28 @@ TEST(SamplingClouds, FramesBeforeAreOfTheSameScene) {
   }
 }
 
+TEST(SamplingClouds, BentPosesKeepTheirBonesAndTheirTpose) {
+  const CloudSampler straight(training_corpus(), {.tpose_share = 0.3}, 1),
+      bent(training_corpus(), {.tpose_share = 0.3, .bend = 10}, 1);
+  double turned = 0;
+  int joints = 0;
+  for (int64_t i = 0; i < 40; ++i) {
+    const CloudSubject plain = straight.subject(i), subject = bent.subject(i);
+    ASSERT_EQ(plain.rest, subject.rest);
+    EXPECT_EQ(plain.at.frame, subject.at.frame);
+    const Pose before = straight.pose(plain), after = bent.pose(subject);
+    EXPECT_EQ(before.local[0], after.local[0]);
+    EXPECT_EQ(before.root, after.root);
+    for (size_t j = 1; j < kJoints; ++j, ++joints)
+      turned += Eigen::AngleAxisd(before.local[j].transpose() * after.local[j]).angle();
+    EXPECT_EQ(bent.pose(subject).local[5], after.local[5]);
+  }
+  EXPECT_NEAR(turned / joints * 180 / M_PI, 10 * std::sqrt(2 / M_PI), 1);  // mean of |normal|
+  const CloudBatch a = straight.batch(0, 40), b = bent.batch(0, 40);
+  for (int64_t i = 0; i < 40; ++i)
+    EXPECT_EQ(at(a.joints, i, 15) == at(b.joints, i, 15), straight.subject(i).rest) << i;
+}
+
 TEST(SamplingClouds, SettingsOutOfRangeAreErrors) {
   for (const CloudConfig& bad :
        {CloudConfig{.points = 0}, CloudConfig{.noise = -1}, CloudConfig{.min_fraction = 0}})

@@ -67,7 +67,7 @@ CloudConfig held_out(CloudConfig c, const SkeletonModel& model) {
   c = with_points(c, model);
   c.mirror = false;
   c.scale_jitter = 0;
-  c.dressed = c.one_camera = c.camera_ring = c.recombined = c.intruder = c.remembered = 0;
+  c.dressed = c.one_camera = c.camera_ring = c.recombined = c.intruder = c.remembered = c.bend = 0;
   c.rotations = true;
   return c;
 }
@@ -100,21 +100,27 @@ SkeletonStage::SkeletonStage(const Config& config, const StageInput& in)
         {.points = static_cast<int>(model_->points()), .frames = kFollowed}, 1);
 }
 
-Var SkeletonStage::loss(Context& ctx, const CloudBatch& batch) const {
-  const SkeletonOutput out = model_->forward(ctx, {batch.points, batch.past});
+Var SkeletonStage::loss(const SkeletonAnswer& answer, const CloudBatch& batch) const {
   Var total = config_.loss == SkeletonStageConfig::Loss::mse
-                  ? mse(out.joints, Var(batch.joints))
-                  : mean_all(lengths(out.joints - Var(batch.joints)));
-  if (out.turns.value.defined() && batch.turns.defined()) {
+                  ? mse(answer.joints, Var(batch.joints))
+                  : mean_all(lengths(answer.joints - Var(batch.joints)));
+  if (answer.turns.value.defined() && batch.turns.defined()) {
     const Var columns =
-        reshape(out.turns - Var(batch.turns), {batch.turns.size(0), 2 * kJoints, 3});
+        reshape(answer.turns - Var(batch.turns), {batch.turns.size(0), 2 * kJoints, 3});
     total = total + scale(mean_all(lengths(columns)), config_.orientation_weight);
   }
-  if (out.uncertainty.value.defined()) {
-    const Tensor error = lengths(Var(out.joints.value) - Var(batch.joints)).value;
-    const Var in_s = Var(error) * exp(neg(out.uncertainty));
-    total = total + scale(mean_all(scale(out.uncertainty, 3) + in_s), kUncertaintyWeight);
+  if (answer.uncertainty.value.defined()) {
+    const Tensor error = lengths(Var(answer.joints.value) - Var(batch.joints)).value;
+    const Var in_s = Var(error) * exp(neg(answer.uncertainty));
+    total = total + scale(mean_all(scale(answer.uncertainty, 3) + in_s), kUncertaintyWeight);
   }
+  return total;
+}
+
+Var SkeletonStage::loss(Context& ctx, const CloudBatch& batch) const {
+  const SkeletonOutput out = model_->forward(ctx, {batch.points, batch.past});
+  Var total = loss(out, batch);
+  for (const SkeletonAnswer& before : out.before) total = total + loss(before, batch);
   if (!out.centres.defined() || !batch.weights.defined()) return total;
   return total + voting_loss(out, batch);
 }

@@ -24,6 +24,7 @@ void visit(V& v, CloudConfig& c) {
   v("camera_ring", c.camera_ring, "part that three to seven cameras around see", between(0, 1));
   v("intruder", c.intruder, "part of what cameras see with somebody else's limb beside it",
     between(0, 1));
+  v("bend", c.bend, "every joint but the pelvis turned by about this, degrees", between(0, 90));
   v("remembered", c.remembered, "part with a memory of the frame before", between(0, 1));
   v("frame_step", c.frame_step, "only every so many frames of a motion (30: one a second)",
     between(1, 100000));
@@ -72,6 +73,7 @@ class SkeletonStage final : public Stage {
   CloudBatch batch(int64_t step) const;
   void recall(int64_t step, CloudBatch* clouds) const;
   Var loss(Context& ctx, const CloudBatch& batch) const;
+  Var loss(const SkeletonAnswer& answer, const CloudBatch& batch) const;
   Var voting_loss(const SkeletonOutput& out, const CloudBatch& batch) const;
 
   Config config_;
