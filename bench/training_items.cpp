@@ -120,7 +120,7 @@ class DeformationTraining : public Training {
                              inputs.at("pairs.rest_joints"), inputs.at("pairs.local"),
                              inputs.at("pairs.axis_angle").reshape({-1, 3 * kJoints})};
     train({{"weights.", &weights_}, {"offsets.", &offsets_}}, [=, this](Context& ctx) {
-      return scale(squared_distance_sum(deform(ctx, weights_, &offsets_, b).posed, b.posed_points),
+      return scale(distance_sum(deform(ctx, weights_, &offsets_, b).posed, b.posed_points),
                    1.0 / kClouds);
     });
   }

@@ -84,13 +84,14 @@ Prediction retargeted_scans(const Bundle& weights, const std::string& folder,
   return out;
 }
 
-metrics::Values score(const PredictionFile& pred, const PredictionFile& truth, int64_t every) {
+metrics::Values score(const PredictionFile& pred, const PredictionFile& truth,
+                      const BenchmarkOptions& how) {
   if (pred.data.frames != truth.data.frames)
     throw InputError(pred.path,
                      "gives " + std::to_string(pred.data.frames) + " frames instead of " +
                          std::to_string(truth.data.frames),
                      "build the benchmark again");
-  const auto metrics = metrics_of_every(every, metrics::table());
+  const auto metrics = metrics_of_every(how.every, how.metrics);
   const auto views = cut(truth.data.sequence_offset, pred.joints(), pred.vertices(), truth);
   return metrics::evaluate(views, metrics).sequences[0];
 }
@@ -127,17 +128,17 @@ void judge(const Bundle& weights, const std::string& folder, bool scans,
   // Frames that a system leaves out are left out of the comparison, so references would be of
   // other frames than those of systems that do not.
   if (how.every == 1)
-    add(references(source, rest, truth, truth.data.sequence_offset, metrics::table()),
+    add(references(source, rest, truth, truth.data.sequence_offset, how.metrics),
         &scores->references);
   truth.thin(how.every);
   scores->frames.push_back(truth.data.frames);
   try {
     const PredictionFile pred(folder, retarget_sequence(weights, folder, how));
-    scores->model.sequences.push_back(score(pred, truth, how.every));
+    scores->model.sequences.push_back(score(pred, truth, how));
     add_frames(pred, truth, scores);
   } catch (const InputError& error) {
     log_warning(folder + " is without a result: " + error.what());
-    scores->model.sequences.emplace_back(metrics::table().size(), std::nullopt);
+    scores->model.sequences.emplace_back(how.metrics.size(), std::nullopt);
   }
 }
 

@@ -34,16 +34,18 @@ struct Sequence {
 };
 
 /// What is not every frame has no acceleration.
-void add(const Predicted& p, const Sequence& s, int64_t every, metrics::Evaluation* into) {
+void add(const Predicted& p, const Sequence& s, const EvaluationOptions& how,
+         metrics::Evaluation* into) {
   const metrics::SequenceView view{p.joints.track(), s.joints.track(), p.vertices.track(),
                                    p.vertices.frames > 0 ? s.vertices.track() : metrics::Track{},
                                    s.joints.frames};
-  const auto metrics = metrics_of_every(every, metrics::table());
+  const auto metrics = metrics_of_every(how.every, how.metrics);
   into->sequences.push_back(metrics::evaluate({&view, 1}, metrics).sequences[0]);
 }
 
 /// The rows that need no learning. Their surfaces use the system's skinning, since they have none.
-void add_references(const Sequence& s, const System& system, SystemScores* scores) {
+void add_references(const Sequence& s, const System& system, const EvaluationOptions& how,
+                    SystemScores* scores) {
   const Joints& target = *system.target_joints();
   Predicted rest, unchanged, closed;
   const auto poses = closed_form(s.source, target, s.source_rest);
@@ -60,9 +62,9 @@ void add_references(const Sequence& s, const System& system, SystemScores* score
   }
   if (scores->references.empty())
     scores->references = {{"rest_pose", {}}, {"source_unchanged", {}}, {"closed_form", {}}};
-  add(rest, s, 1, &scores->references[0].second);
-  add(unchanged, s, 1, &scores->references[1].second);
-  add(closed, s, 1, &scores->references[2].second);
+  add(rest, s, how, &scores->references[0].second);
+  add(unchanged, s, how, &scores->references[1].second);
+  add(closed, s, how, &scores->references[2].second);
 }
 
 Sequence truth_of(const Performance& performance, int64_t every) {
@@ -77,7 +79,7 @@ Sequence truth_of(const Performance& performance, int64_t every) {
 /// `push(i)`: frame i of the source, by whatever way the system takes it.
 template <class Push>
 void judge_retargeting(const Performance& performance, System& system, const Push& push,
-                       int64_t every, Sequence s, SystemScores* scores) {
+                       const EvaluationOptions& how, Sequence s, SystemScores* scores) {
   Predicted model;
   const auto keep = [&](std::span<const RetargetedFrame> frames) {
     for (const RetargetedFrame& f : frames) {
@@ -85,23 +87,23 @@ void judge_retargeting(const Performance& performance, System& system, const Pus
       if (!f.vertices.empty()) model.vertices.push(f.vertices);
     }
   };
-  for (size_t i = 0; i < performance.frames(); i += static_cast<size_t>(every)) {
+  for (size_t i = 0; i < performance.frames(); i += static_cast<size_t>(how.every)) {
     keep(push(i));
     if (system.source_joints() != nullptr) s.source.push_back(*system.source_joints());
   }
   keep(system.finish());
-  add(model, s, every, &scores->model);
+  add(model, s, how, &scores->model);
   scores->frames.push_back(s.joints.frames);
-  if (every == 1 && system.target_joints() != nullptr && !s.source.empty())
-    add_references(s, system, scores);
+  if (how.every == 1 && system.target_joints() != nullptr && !s.source.empty())
+    add_references(s, system, how, scores);
 }
 
 /// The surface alone; what stands still is the reference.
-void judge_surface(const Performance& performance, const Surface& surface, int64_t every,
-                   const Sequence& s, SystemScores* scores) {
+void judge_surface(const Performance& performance, const Surface& surface,
+                   const EvaluationOptions& how, const Sequence& s, SystemScores* scores) {
   const Body& body = performance.target();
   Predicted model, rest;
-  for (size_t i = 0; i < performance.frames(); i += static_cast<size_t>(every)) {
+  for (size_t i = 0; i < performance.frames(); i += static_cast<size_t>(how.every)) {
     const Pose pose = performance.pose_b(i);
     model.vertices.push(surface(pose));
     Points moved = body.rest.vertices;
@@ -109,8 +111,29 @@ void judge_surface(const Performance& performance, const Surface& surface, int64
     rest.vertices.push(moved);
   }
   if (scores->references.empty()) scores->references = {{"rest_pose", {}}};
-  add(model, s, every, &scores->model);
-  add(rest, s, every, &scores->references[0].second);
+  add(model, s, how, &scores->model);
+  add(rest, s, how, &scores->references[0].second);
+  scores->frames.push_back(s.joints.frames);
+}
+
+/// The extractor alone: of the source's clouds, or of the target's T-pose.
+void judge_extraction(const Performance& performance, SkeletonModel& model, bool rest,
+                      const EvaluationOptions& how, SystemScores* scores) {
+  JointExtractor extract(model, RetargetOptions{}.samples);
+  const RngKey key = RngKey{how.seed, 0}.fold("skeleton");
+  Predicted found;
+  Sequence s;
+  const auto judge = [&](const Points& cloud, const Joints& truth, const std::string& name) {
+    found.joints.push(extract(cloud, name, key).joints);
+    s.joints.push(truth);
+  };
+  if (rest) {
+    judge(performance.target().rest.vertices, performance.target().joints, "the T-pose");
+  } else {
+    for (size_t i = 0; i < performance.frames(); i += static_cast<size_t>(how.every))
+      judge(performance.cloud(i), performance.joints_a(i), "frame " + std::to_string(i));
+  }
+  add(found, s, how, &scores->model);
   scores->frames.push_back(s.joints.frames);
 }
 
@@ -120,9 +143,12 @@ struct Condition {
   std::vector<std::string> roles;
 };
 
-/// Known joints are for our own chain; other systems see clouds and nothing else.
-std::vector<Condition> conditions_of(bool chain) {
+/// Known joints are for our own chain; other systems see clouds and nothing else. What is nothing
+/// but an extractor is judged as one.
+std::vector<Condition> conditions_of(bool chain, const Bundle& weights) {
   if (!chain) return {{"clouds", {}}};
+  if (weights.find("motion") == nullptr && weights.find("deformation.weights") == nullptr)
+    return {{"source_joints", {"skeleton"}}, {"rest_joints", {"skeleton"}}};
   return {{"clouds", {"skeleton", "motion"}},
           {"true_skeletons", {"motion"}},
           {"true_poses", {"deformation.weights"}}};
@@ -184,7 +210,7 @@ SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weigh
   const SystemType& type = system_type(options.system);
   const bool chain = type.name == EvaluationOptions().system;
   SystemEvaluation out;
-  for (const Condition& condition : conditions_of(chain)) {
+  for (const Condition& condition : conditions_of(chain, weights)) {
     const std::string missing = lacking(condition, weights);
     if (!missing.empty())
       out.missing.push_back(missing);
@@ -204,7 +230,10 @@ SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weigh
     for (auto& [name, scores] : out.conditions) {
       if (name == "true_poses") {
         judge_surface(performance, Surface(weights, weights_name, target.rest, target.joints),
-                      options.every, truth, &scores);
+                      options, truth, &scores);
+      } else if (name == "source_joints" || name == "rest_joints") {
+        judge_extraction(performance, weights.need_as<SkeletonModel>("skeleton", weights_name),
+                         name == "rest_joints", options, &scores);
       } else if (name == "clouds") {
         SystemInput input{weights, weights_name, target.rest, target.id, {}, how};
         if (!type.weights) input.rest = target.joints;
@@ -212,12 +241,12 @@ SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weigh
         const auto push = [&](size_t i) {
           return system->push(performance.cloud(i), "frame " + std::to_string(i));
         };
-        judge_retargeting(performance, *system, push, options.every, truth, &scores);
+        judge_retargeting(performance, *system, push, options, truth, &scores);
       } else {
         Retargeter system(weights, weights_name, target.rest, target.joints, how);
         const auto push = [&](size_t i) { return system.push_joints(performance.joints_a(i)); };
         truth.source_rest = performance.source().joints;
-        judge_retargeting(performance, system, push, options.every, truth, &scores);
+        judge_retargeting(performance, system, push, options, truth, &scores);
         truth.source_rest.reset();
       }
     }

@@ -28,6 +28,8 @@ struct SystemEvaluation {
   /// By condition, as far as there are models for it:
   ///   "clouds"          clouds in, the target's joints extracted: end to end (skeleton, motion)
   ///   "true_skeletons"  true joints of source and target: no extractor (motion)
+  ///   "source_joints", "rest_joints"  of weights that are an extractor alone: its joints of the
+  ///                     source's clouds and of the target's T-pose (skeleton)
   ///   "true_poses"      true joints and rotations of the target: its surface alone (deformation)
   std::vector<std::pair<std::string, SystemScores>> conditions;
   /// Extractor alone, metres; empty without one.
@@ -46,6 +48,7 @@ struct EvaluationOptions {
   double anchor = RetargetOptions{}.anchor;
   std::vector<EvalSequence> sequences;
   CloudConfig clouds;  ///< of the extractor's own figures
+  std::span<const metrics::Metric> metrics = metrics::table();
 };
 
 /// Judges the models of `weights` on the bodies and motions of `corpus`.

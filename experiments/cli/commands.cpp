@@ -8,6 +8,7 @@ void add_commands(Program& program) {
   add_train(program);
   add_sweep(program);
   add_trial(program);
+  add_reproduce(program);
   add_replay(program);
   add_retarget(program);
   add_skeleton(program);

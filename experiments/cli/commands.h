@@ -23,6 +23,7 @@ void add_info(Program& program);
 void add_render(Program& program);
 void add_replay(Program& program);
 void add_report(Program& program);
+void add_reproduce(Program& program);
 void add_retarget(Program& program);
 void add_skeleton(Program& program);
 void add_sweep(Program& program);

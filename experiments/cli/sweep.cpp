@@ -1,6 +1,4 @@
 // restage sweep plan, run, status, stop: many trainings from one file.
-#include <sys/wait.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -172,33 +170,16 @@ int run_status(const std::string& dir, const Common& common) {
 
 // ---- run ----
 
-/// Planning reads data and builds models; a process of its own takes that memory with it.
-int plan_in_a_process(const RunOptions& options, const Common& common) {
-  std::vector<std::string> words = {"restage",
-                                    "sweep",
-                                    "plan",
-                                    "--out",
-                                    options.out,
-                                    "--threads",
-                                    std::to_string(common.threads)};
-  if (common.seed_given) words.insert(words.end(), {"--seed", std::to_string(common.seed)});
-  if (common.quiet) words.emplace_back("--quiet");
-  words.insert(words.end(), options.arguments.begin(), options.arguments.end());
-  const int pid = sweep::spawn_self(words, "", false);
-  int status = 0;
-  while (::waitpid(pid, &status, 0) < 0 && errno == EINTR) {
-  }
-  if (WIFEXITED(status)) return WEXITSTATUS(status);
-  throw WorkError("planning was killed by signal " + std::to_string(WTERMSIG(status)));
-}
-
 int run_run(const RunOptions& options, const Common& common) {
   split(options.arguments);
   if (options.jobs < 1)
     throw InputError("", "--jobs " + std::to_string(options.jobs) + " is out of range",
                      "give 1 or more");
   const StopScope stop;
-  if (const int code = plan_in_a_process(options, common); code != 0) return code;
+  std::vector<std::string> words = options.arguments;
+  if (common.seed_given) words.push_back("seed=" + std::to_string(common.seed));
+  if (const int code = sweep::plan_in_a_process(options.out, words, common.quiet); code != 0)
+    return code;
   SweepDir dir = sweep::read_sweep_dir(options.out);
   const int each = std::max(1, threads() / options.jobs);
   const sweep::PoolOutcome outcome = sweep::run_pool(dir, {options.jobs, each});

@@ -29,4 +29,9 @@ PoolOutcome run_pool(const SweepDir& dir, const PoolOptions& options);
 int spawn_self(const std::vector<std::string>& arguments, const std::string& output,
                bool own_group);
 
+/// `restage sweep plan ARGUMENTS --out DIR` in a process of its own: planning reads data and builds
+/// models, and takes that memory with it. Returns its exit code; what is wrong it has said.
+int plan_in_a_process(const std::string& dir, const std::vector<std::string>& arguments,
+                      bool quiet);
+
 }  // namespace restage::sweep

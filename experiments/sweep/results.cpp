@@ -23,7 +23,7 @@ class Reader : public sweep::JsonReader<Json> {
   MetricValues values(const Json& entries) const {
     if (!entries.is_object()) fail("holds metrics that are no section");
     MetricValues out;
-    for (const metrics::Metric& metric : metrics::table()) {
+    for (const metrics::Metric& metric : metrics::recorded()) {
       const Json& value = at(entries, metric.name);
       if (value.is_null()) continue;
       need(value.is_number(), metric.name, "a number");

@@ -14,7 +14,7 @@
 
 namespace restage::tables {
 
-/// Values by METRIC (nn/metrics/metrics.h, table()); what is null is not there.
+/// Values by METRIC (nn/metrics/metrics.h, recorded()); what is null is not there.
 using MetricValues = std::map<std::string, double>;
 
 struct Scores {

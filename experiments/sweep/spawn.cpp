@@ -1,9 +1,12 @@
 #include <fcntl.h>
 #include <spawn.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstring>
 
+#include "autograd/base/parallel.h"
 #include "experiments/sweep/pool.h"
 
 namespace restage::sweep {
@@ -39,6 +42,20 @@ int spawn_self(const std::vector<std::string>& arguments, const std::string& out
   if (code != 0)
     throw WorkError(std::string("a process could not be started (") + std::strerror(code) + ")");
   return pid;
+}
+
+int plan_in_a_process(const std::string& dir, const std::vector<std::string>& arguments,
+                      bool quiet) {
+  std::vector<std::string> words = {
+      "restage", "sweep", "plan", "--out", dir, "--threads", std::to_string(threads())};
+  if (quiet) words.emplace_back("--quiet");
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  const int pid = spawn_self(words, "", false);
+  int status = 0;
+  while (::waitpid(pid, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (WIFEXITED(status)) return WEXITSTATUS(status);
+  throw WorkError("planning was killed by signal " + std::to_string(WTERMSIG(status)));
 }
 
 }  // namespace restage::sweep

@@ -325,6 +325,14 @@ void add_argument(SweepFile& file, const SweepWord& word) {
     file.store = word.values[0].text;
     return;
   }
+  if (word.key == "base") {
+    std::error_code ignored;
+    if (word.values.size() != 1 || !fs::is_regular_file(word.values[0].text, ignored))
+      fail(place, "is no file", "write base=CONFIG.yaml, seen from the working directory");
+    file.base = word.values[0].text;
+    file.base_place = place;
+    return;
+  }
   if (word.key == "seed" || word.key == "seeds") {
     ConfigNode list;
     list.kind = Kind::list;

@@ -74,6 +74,7 @@ struct SweepFile {
 /// Reads `path`; `arguments` are those of the command line: `key=a,b`, `key=choice(a,b)` and
 /// `key=range(start,stop,step)` (stop left out) give or replace an axis, `key=value` a setting of
 /// all trials. Quotes keep a comma. `seed=` and `seeds=` give the seeds, `store=` the store,
+/// `base=` another configuration (seen from the working directory),
 /// `evaluate.benchmark=` and `evaluate.sets=` what trials are measured on.
 /// InputError: one line with file and line.
 SweepFile read_sweep_file(const std::string& path, const std::vector<std::string>& arguments = {});

@@ -142,10 +142,9 @@ size_t find_row(const std::vector<Row>& rows, const std::string& wanted) {
 std::vector<const metrics::Metric*> columns(const std::vector<std::string>& names) {
   std::vector<const metrics::Metric*> out;
   std::vector<std::string> known;
-  for (const metrics::Metric& metric : metrics::table()) {
-    known.emplace_back(metric.name);
-    if (names.empty()) out.push_back(&metric);
-  }
+  for (const metrics::Metric& metric : metrics::recorded()) known.emplace_back(metric.name);
+  if (names.empty())
+    for (const metrics::Metric& metric : metrics::table()) out.push_back(&metric);
   for (const std::string& name : names) {
     const auto at = std::find(known.begin(), known.end(), name);
     if (at == known.end()) {
@@ -154,7 +153,7 @@ std::vector<const metrics::Metric*> columns(const std::vector<std::string>& name
           "", "there is no metric '" + name + "'",
           near.empty() ? "there are " + joined(known) : "did you mean '" + near + "'?");
     }
-    out.push_back(&metrics::table()[static_cast<size_t>(at - known.begin())]);
+    out.push_back(&metrics::recorded()[static_cast<size_t>(at - known.begin())]);
   }
   return out;
 }

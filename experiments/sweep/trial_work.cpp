@@ -28,7 +28,7 @@ TrainConfig read(const ConfigNode& tree) {
 Json metrics_json(const metrics::Values& values) {
   Json out = Json::object();
   for (size_t m = 0; m < values.size(); ++m)
-    out[metrics::table()[m].name] = values[m] ? Json(*values[m]) : Json(nullptr);
+    out[metrics::recorded()[m].name] = values[m] ? Json(*values[m]) : Json(nullptr);
   return out;
 }
 
@@ -60,6 +60,7 @@ Json evaluate_held_out(const Bundle& models, const TrainConfig& config) {
   EvaluationOptions how = evaluation_options(config, test, 0);
   how.system = config.evaluation.system;
   how.every = config.evaluation.every;
+  how.metrics = metrics::recorded();
   const auto names = sequence_names(how.sequences, test);
   Json out = Json::object();
   for (const auto& [name, scores] : evaluate_system(models, "the trial", test, how).conditions)
@@ -68,7 +69,8 @@ Json evaluate_held_out(const Bundle& models, const TrainConfig& config) {
 }
 
 Json evaluate_benchmark(const Bundle& models, const Evaluate& evaluate, const TrainConfig& config) {
-  const BenchmarkOptions how{config.evaluation.system, config.evaluation.every, config.seed};
+  BenchmarkOptions how{config.evaluation.system, config.evaluation.every, config.seed};
+  how.metrics = metrics::recorded();
   Json out = Json::object();
   for (const std::string& set : evaluate.sets) {
     std::vector<std::string> names;

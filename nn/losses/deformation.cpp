@@ -51,8 +51,8 @@ Var skin_cross_entropy(const Var& weights, const Tensor& truth) {
   return neg(sum_all(log(add_scalar(weights, 1e-6)) * Var(truth)));
 }
 
-Var squared_distance_sum(const Var& posed, const Var& truth) {
-  return sum_all(square(posed - truth));
+Var distance_sum(const Var& posed, const Var& truth, Measure measure) {
+  return sum_all(errors(posed - truth, measure));
 }
 
 double mean_distance(const Tensor& a, const Tensor& b) {

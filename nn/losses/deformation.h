@@ -1,6 +1,7 @@
 // The loss of deformation (spec 5.2, 5.3).
 #pragma once
 
+#include "nn/losses/measure.h"
 #include "nn/models/deformation.h"
 
 namespace restage {
@@ -26,8 +27,8 @@ DeformationOutput deform(Context& ctx, const DeformationModel& weights, const Of
                          const Var& axis_angle);
 /// Cross-entropy of weights [n, v, 22] against the data's, summed over points and pairs.
 Var skin_cross_entropy(const Var& weights, const Tensor& truth);
-/// Eq. 4: squared distances, summed over all points and pairs.
-Var squared_distance_sum(const Var& posed, const Var& truth);
+/// Squared distances (v2, eq. 4) or distances (v1), summed over all points and pairs.
+Var distance_sum(const Var& posed, const Var& truth, Measure measure = Measure::mse);
 /// Mean distance per point, metres (a number to report, not to differentiate).
 double mean_distance(const Tensor& a, const Tensor& b);
 

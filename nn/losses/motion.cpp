@@ -10,13 +10,6 @@
 namespace restage {
 namespace {
 
-/// Errors of x, whose last axis holds `width` numbers that belong together.
-Var errors(const Var& x, MotionDistance measure, int64_t width = 3) {
-  if (measure == MotionDistance::mse) return square(x);
-  const Var rows = reshape(x, {x.size(0), x.value.numel() / (x.size(0) * width), width});
-  return sqrt(add_scalar(sum(square(rows), -1), 1e-10));
-}
-
 /// Mean of x over everything but axis 0.
 Var per_sample(const Var& x) { return mean(reshape(x, {x.size(0), -1}), 1); }
 
@@ -38,6 +31,9 @@ Var contact_loss(const MotionOutput& out, const MotionBatch& b) {
     return Var(Tensor::zeros({}, b.joints.dtype()));
   return mean_all(softplus(out.standing) - out.standing * Var(b.standing));
 }
+
+/// v1's smoothness: a path's change of velocity.
+Var path_loss(const Var& trans) { return mean_all(square(differences(trans))); }
 
 Tensor complement(const Tensor& mask) {
   std::vector<double> out;
@@ -66,7 +62,7 @@ void put_reconstruction(const MotionOutput& to_a, const MotionBatch& b, const Mo
 
 }  // namespace
 
-Var rotation_loss(const Var& rotations, const Var& sixd, MotionDistance measure) {
+Var rotation_loss(const Var& rotations, const Var& sixd, Measure measure) {
   return mean_all(errors(reshape(matrix_to_sixd(rotations), sixd.shape()) - sixd, measure, 6));
 }
 
@@ -99,6 +95,9 @@ MotionLosses motion_losses(Context& ctx, const MotionModel& net, Discriminator* 
               scale(out.smoothness, w.smoothness) + scale(out.acceleration, w.acceleration) +
               scale(out.self, w.self);
   if (w.contact > 0) out.total = out.total + scale(contact_loss(to_b, b), w.contact);
+  if (w.path_smoothness > 0)
+    out.total =
+        out.total + scale(path_loss(to_b.trans) + path_loss(to_a.trans), 0.5 * w.path_smoothness);
   if (discriminator != nullptr) {
     std::optional<Frozen> judge;
     if (!discriminator_gradients) judge.emplace(ctx);
@@ -127,6 +126,8 @@ MotionLosses self_losses(Context& ctx, const MotionModel& net, const MotionBatch
              scale(out.acceleration, w.acceleration);
   out.total = scale(out.self, w.self);
   if (w.contact > 0) out.total = out.total + scale(contact_loss(to_a, known), w.contact);
+  if (w.path_smoothness > 0)
+    out.total = out.total + scale(path_loss(to_a.trans), w.path_smoothness);
   return out;
 }
 

@@ -1,15 +1,11 @@
 // The losses of motion retargeting (spec 4). All are scalars of shape [1].
 #pragma once
 
+#include "nn/losses/measure.h"
 #include "nn/models/discriminator.h"
 #include "nn/models/motion.h"
 
 namespace restage {
-
-/// How far two motions are apart: means of squares (the papers), or of distances, which weigh an
-/// error of 5 cm ten times as much as one of 5 mm and not a hundred times (docs/method.md, "Past
-/// SMRM").
-enum class MotionDistance { mse, distance };
 
 struct MotionWeights {
   double cycle = 1, adversarial = 1, rotation = 0.01, smoothness = 0.1, self = 1;
@@ -18,7 +14,10 @@ struct MotionWeights {
   double twist = 0;          ///< NKN's twist loss (spec 4.3)
   double acceleration = 0;   ///< second differences, beside smoothness's first
   double contact = 0;        ///< cross-entropy of which feet stand, where the network says
-  MotionDistance measure = MotionDistance::mse;
+  /// Mean square of the path's acceleration, of B and of A again: v1's smoothness, after NKN's,
+  /// whose translation is a velocity (spec 4.4).
+  double path_smoothness = 0;
+  Measure measure = Measure::mse;
 };
 
 /// One batch: motions of A, skeletons of both. Shapes as in MotionModel; self_mask [n] is 1 where B
@@ -66,8 +65,7 @@ DiscriminatorLosses discriminator_losses(Context& ctx, Discriminator& net, const
 /// Mean of (6D(predicted) - target)^2 over all numbers, 6D the first two columns of the matrices
 /// (Q5), or of the lengths of each joint's six differences. Quaternion networks are compared as
 /// matrices too, which needs no choice of sign (Q6).
-Var rotation_loss(const Var& rotations, const Var& sixd,
-                  MotionDistance measure = MotionDistance::mse);
+Var rotation_loss(const Var& rotations, const Var& sixd, Measure measure = Measure::mse);
 
 /// Mean of max(0, |e| - 100 degrees)^2 over joints 1 ... of rotations [n, t, j, 3, 3], with
 /// e = atan2(-R20, R00) the angle about y for the order y-z-x (spec 4.3), as NKN.

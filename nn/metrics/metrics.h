@@ -101,6 +101,11 @@ Value floor_penetration_mm(const Track& pred, const Track& truth);
 /// percentile of the frames) in the prediction by that of the truth. Empty if nothing moves.
 Value peak_speed_ratio(const Track& pred, const Track& truth);
 
+/// PA-MPVD of the vertices that are nearest to head, wrists or feet in the first true frame: joints
+/// whose rotation moves no other joint, so that the surface alone shows it. Metres; needs the 22
+/// joints.
+Value leaf_vertex_distance(const Track& pred, const Track& truth, const Track& joints);
+
 /// What is gained by answering only the surest frames: their share of all, and their mean error.
 struct RiskAtCoverage {
   double coverage = 0, risk = 0;
@@ -119,9 +124,12 @@ struct Metric {
   Value (*compute)(const SequenceView&);
 };
 
-/// The metrics of `restage eval`, in the order of its tables.
+/// The papers' metrics: those of `restage eval`, in the order of its tables.
 std::span<const Metric> table();
-/// Further alignments of the same metrics (rigid, one map per sequence, root), for `--variants`.
+/// Those that the result of a trial holds: the papers', then leaves, contact and speed.
+std::span<const Metric> recorded();
+/// All that are not in table(), for `--variants`: leaves, contact and speed, then further
+/// alignments (rigid, one map per sequence, root).
 std::span<const Metric> variants();
 
 /// Values beside the metrics of a table, in its order.

@@ -91,7 +91,7 @@ TEST(MotionLosses, AccelerationIsOfSecondDifferences) {
     return self_losses(ctx, net, p.batch, w);
   };
   MotionWeights w{.cycle = 1, .rotation = 0, .smoothness = 0};
-  w.measure = MotionDistance::distance;
+  w.measure = Measure::distance;
   const double plain = losses(w).total.value.item();
   w.acceleration = 0.5;
   const MotionLosses with = losses(w);

@@ -348,7 +348,7 @@ void deformation(Case& c) {
   const DeformationOutput y = deform(c.ctx(), weights, &offsets, c.in("p"), c.in("tpose"), local,
                                      aa.reshape({aa.size(0), -1}));
   c.out({{"weights", y.weights}, {"offsets", y.offsets}, {"posed", y.posed}});
-  c.finish(squared_distance_sum(y.posed, c.in("q")));
+  c.finish(distance_sum(y.posed, c.in("q")));
 }
 
 void mlp_dropout_masks(Case& c) {

@@ -172,7 +172,7 @@ TEST(TrainStages, MotionLearnsFromWhatTheExtractorAnswers) {
   motion(c).self_first_pass = true;
   testing::choose(motion(c).model, "smrm/hybrid", {"hidden=16", "contact=true"});
   motion(c).weights.contact = 0.1;
-  motion(c).weights.measure = MotionDistance::distance;
+  motion(c).weights.measure = Measure::distance;
   std::string first;
   for (const int n : {1, 2, 3}) {
     const testing::UseThreads use(n);

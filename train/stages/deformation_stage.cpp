@@ -77,7 +77,7 @@ Var DeformationStage::loss(Context& ctx, const PairBatch& pairs, int64_t step,
   const DeformationOutput out =
       deform(ctx, *weights_, step >= config_.skinning_steps ? offsets_ : nullptr, b);
   *distance = mean_distance(out.posed.value, b.posed_points);
-  Var total = squared_distance_sum(out.posed, b.posed_points);
+  Var total = distance_sum(out.posed, b.posed_points, config_.loss);
   if (config_.supervision > 0)
     total = total + scale(skin_cross_entropy(out.weights, pairs.weights), config_.supervision);
   return scale(total, 1.0 / static_cast<double>(config_.optimiser.batch));

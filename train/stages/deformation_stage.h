@@ -24,6 +24,7 @@ struct DeformationStageConfig {
   ModelChoice model{"deformation/weights"};  ///< the sizes are those of the offsets too
   OptimiserConfig optimiser;
   PairConfig pairs;
+  Measure loss = Measure::mse;
   int64_t skinning_steps = 0;
   double supervision = 0;
   bool offsets = true, keep_root_rotation = true;
@@ -35,6 +36,7 @@ void visit(V& v, DeformationStageConfig& c) {
   visit_choice(v, c.model);
   v("optimiser", c.optimiser, "steps, batch, rate");
   v("pairs", c.pairs, "how training pairs are made");
+  v("loss", c.loss, "mse (the paper) or mean distance (its first version)");
   v("skinning_steps", c.skinning_steps, "first steps without offsets (the paper: one epoch)",
     at_least(0));
   v("supervision", c.supervision,

@@ -122,10 +122,10 @@ struct Judged {
     pa += window_error(metrics::mean_distance, joints, truth, Mode::frame);
     local += window_error(metrics::mean_distance, joints, truth, Mode::none);
     acceleration += window_error(metrics::acceleration_error, joints, truth, Mode::none);
-    rotation += rotation_loss(out.rotations, first_frames(b.truth_sixd_b, t - late),
-                              MotionDistance::distance)
-                    .value.item() *
-                static_cast<double>(truth.size(0));
+    rotation +=
+        rotation_loss(out.rotations, first_frames(b.truth_sixd_b, t - late), Measure::distance)
+            .value.item() *
+        static_cast<double>(truth.size(0));
   }
 };
 

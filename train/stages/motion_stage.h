@@ -11,10 +11,6 @@
 
 namespace restage {
 
-inline EnumNames<MotionDistance> config_names(MotionDistance) {
-  return {{"mse", MotionDistance::mse}, {"distance", MotionDistance::distance}};
-}
-
 template <class V>
 void visit(V& v, MotionWeights& c) {
   v("cycle", c.cycle, "joints and translation after A -> B -> A", at_least(0));
@@ -29,6 +25,8 @@ void visit(V& v, MotionWeights& c) {
     at_least(0));
   v("twist", c.twist, "NKN's twist limit", at_least(0));
   v("contact", c.contact, "which feet stand, of a network that says it", at_least(0));
+  v("path_smoothness", c.path_smoothness, "change of the path's velocity, of B and of A again (v1)",
+    at_least(0));
   v("measure", c.measure, "mse (the papers) or distance: metres in the place of their squares");
 }
 

@@ -10,6 +10,7 @@
 #include "autograd/ops/reduce.h"
 #include "autograd/ops/rotation.h"
 #include "nn/losses/deformation.h"
+#include "nn/models/discriminator.h"
 
 namespace restage {
 namespace {
@@ -100,10 +101,20 @@ SkeletonStage::SkeletonStage(const Config& config, const StageInput& in)
         {.points = static_cast<int>(model_->points()), .frames = kFollowed}, 1);
 }
 
+namespace {
+
+Var bone_lengths(const Var& joints) {
+  return lengths(reshape(bone_vectors(joints), {joints.size(0), kJoints - 1, 3}));
+}
+
+}  // namespace
+
 Var SkeletonStage::loss(const SkeletonAnswer& answer, const CloudBatch& batch) const {
-  Var total = config_.loss == SkeletonStageConfig::Loss::mse
-                  ? mse(answer.joints, Var(batch.joints))
-                  : mean_all(lengths(answer.joints - Var(batch.joints)));
+  Var total = config_.loss == Measure::mse ? mse(answer.joints, Var(batch.joints))
+                                           : mean_all(lengths(answer.joints - Var(batch.joints)));
+  if (config_.bone_weight > 0)
+    total = total + scale(mse(bone_lengths(answer.joints), bone_lengths(Var(batch.joints))),
+                          config_.bone_weight);
   if (answer.turns.value.defined() && batch.turns.defined()) {
     const Var columns =
         reshape(answer.turns - Var(batch.turns), {batch.turns.size(0), 2 * kJoints, 3});

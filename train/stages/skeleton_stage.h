@@ -31,19 +31,13 @@ void visit(V& v, CloudConfig& c) {
 }
 
 struct SkeletonStageConfig {
-  enum class Loss { mse, distance };
   ModelChoice model{"skeleton/point_transformer"};
   OptimiserConfig optimiser;
   CloudConfig clouds;
-  Loss loss = Loss::mse;
-  double vote_weight = 0, segmentation_weight = 0, orientation_weight = 0.05;
+  Measure loss = Measure::mse;
+  double bone_weight = 0, vote_weight = 0, segmentation_weight = 0, orientation_weight = 0.05;
   int64_t validation_clouds = 200;
 };
-
-inline EnumNames<SkeletonStageConfig::Loss> config_names(SkeletonStageConfig::Loss) {
-  return {{"mse", SkeletonStageConfig::Loss::mse},
-          {"distance", SkeletonStageConfig::Loss::distance}};
-}
 
 template <class V>
 void visit(V& v, SkeletonStageConfig& c) {
@@ -51,6 +45,8 @@ void visit(V& v, SkeletonStageConfig& c) {
   v("optimiser", c.optimiser, "steps, batch, rate");
   v("clouds", c.clouds, "how training clouds are made");
   v("loss", c.loss, "mse (the paper) or mean distance");
+  v("bone_weight", c.bone_weight, "mean squared error of the bones' lengths (v1's trial)",
+    at_least(0));
   v("vote_weight", c.vote_weight, "voting models: weight of each centre's own votes", at_least(0));
   v("segmentation_weight", c.segmentation_weight,
     "voting models: weight of naming the moving joint", at_least(0));

@@ -2,9 +2,15 @@
 #pragma once
 
 #include "datasets/corpus.h"
+#include "nn/config/rules.h"
+#include "nn/losses/measure.h"
 #include "nn/weights/bundle.h"
 
 namespace restage {
+
+inline EnumNames<Measure> config_names(Measure) {
+  return {{"mse", Measure::mse}, {"distance", Measure::distance}};
+}
 
 struct StageInput {
   const Corpus& train;       ///< kept by reference

@@ -1,0 +1,122 @@
+// restage reproduce: the experiments of a paper, run and judged.
+#include "autograd/base/interrupt.h"
+#include "autograd/base/log.h"
+#include "autograd/base/parallel.h"
+#include "experiments/cli/commands.h"
+#include "experiments/cli/output.h"
+#include "experiments/reproduce/page.h"
+#include "experiments/sweep/pool.h"
+
+namespace restage::cli {
+namespace {
+
+using reproduce::Evidence;
+
+struct ReproduceOptions {
+  std::string paper, table, budget, out, page;
+  std::string from = "experiments";
+  std::vector<std::string> words;
+  int jobs = 1;
+  bool no_run = false, keep = false;
+};
+
+/// "restage reproduce ..." as it was typed, for the page.
+std::string typed(const Common& common) {
+  std::string text = "restage";
+  for (size_t i = 1; i < common.command_line.size(); ++i) text += " " + common.command_line[i];
+  return on_one_line(text);
+}
+
+void check(const ReproduceOptions& o) {
+  if (o.jobs < 1)
+    throw InputError("", "--jobs " + std::to_string(o.jobs) + " is out of range", "give 1 or more");
+  for (const std::string& word : o.words)
+    if (word.find('=') == std::string::npos)
+      throw InputError("", "'" + word + "' is no key=value", "write motion.optimiser.steps=500");
+  if (o.no_run && !o.words.empty())
+    throw InputError("", "--no-run plans nothing, so '" + o.words[0] + "' has no effect",
+                     "leave out one of the two");
+}
+
+/// All sweeps are planned before one runs, so that bad input is told at once.
+int plan(const ReproduceOptions& o, const Common& common, const std::vector<Evidence>& all) {
+  for (const Evidence& one : all) {
+    if (!one.runs()) continue;
+    if (o.no_run) {
+      if (!take_plan(one, o.budget)) continue;
+    } else {
+      std::vector<std::string> words = {one.sweep_file(), "store=" + o.out + "/store"};
+      for (const auto* more : {&one.asked.budget(o.budget).words, &o.words})
+        words.insert(words.end(), more->begin(), more->end());
+      if (common.seed_given) words.push_back("seed=" + std::to_string(common.seed));
+      const int code = sweep::plan_in_a_process(one.dir, words, common.quiet);
+      if (code != 0) return code;
+    }
+    if (const int taken = take_results(one); taken > 0)
+      log_info(one.name + ": " + std::to_string(taken) + " results are there already, in " +
+               one.folder + "/results");
+  }
+  return 0;
+}
+
+/// Whether all trials are done.
+bool run_trials(const ReproduceOptions& o, const std::vector<Evidence>& all) {
+  bool done = true;
+  for (const Evidence& one : all) {
+    if (!one.runs()) continue;
+    log_info(one.name + ": " + one.asked.table + ", " + one.asked.title);
+    const sweep::SweepDir dir = sweep::read_sweep_dir(one.dir);
+    const auto outcome = run_pool(dir, {o.jobs, std::max(1, threads() / o.jobs)});
+    if (outcome.stop_requested && outcome.pending + outcome.stopped > 0)
+      throw WorkError("stopped by 'restage sweep stop'; the same command goes on");
+    done &= outcome.done + outcome.stopped_early == std::ssize(dir.trials);
+    if (o.keep) keep_results(one, o.budget);
+  }
+  return done;
+}
+
+int run_reproduce(ReproduceOptions o, const Common& common) {
+  check(o);
+  if (o.page.empty()) o.page = o.out;
+  const std::vector<Evidence> all = reproduce::find_evidence(o.from, o.paper, o.table, o.out);
+  const StopScope stop;
+  if (const int code = plan(o, common, all); code != 0) return code;
+  const bool done = o.no_run || run_trials(o, all);
+  const reproduce::PageOptions options{o.paper, o.budget, typed(common), common.seed};
+  std::vector<reproduce::Found> found;
+  for (const Evidence& one : all) found.push_back(reproduce::found(one, options));
+  for (const auto& one : found)
+    for (const std::string& notice : one.results.notices) log_warning(on_one_line(notice));
+  write_page(found, options, o.page, o.from);
+  print(common.json, page_json(found, options), o.page + "/" + o.paper + ".md\n");
+  return done ? 0 : 1;
+}
+
+}  // namespace
+
+void add_reproduce(Program& program) {
+  auto [app, o] = program.add(
+      "reproduce", "run a paper's experiments, and judge its claims by them",
+      "restage reproduce rekik2024 --budget smoke --out runs/smoke\n"
+      "restage reproduce rekik2024 --table 4 --budget lite --out runs/rekik2024 --jobs 2\n"
+      "restage reproduce rekik2024 --budget lite --out runs/rekik2024 --keep --page "
+      "docs/reproduction\n"
+      "restage reproduce rekik2024 --budget lite --out runs/page --no-run --from experiments\n"
+      "restage reproduce marsot2023 --budget paper --out runs/marsot2023 data.source=amass.h5",
+      run_reproduce);
+  app.add_option("PAPER", o.paper, "rekik2024, marsot2023 or chen2023")->required();
+  app.add_option("WORDS", o.words, "key=value for all of its sweeps, as in 'sweep run'");
+  app.add_option("--table", o.table, "only this one, such as 4 (all)");
+  app.add_option("--budget", o.budget,
+                 "smoke (minutes: does it run?), lite (hours on 2 cores) or paper (its schedule)")
+      ->required()
+      ->check(CLI::IsMember({"smoke", "lite", "paper"}));
+  app.add_option("--out", o.out, "folder of the sweeps and the page")->required();
+  app.add_option("--page", o.page, "another folder for the page");
+  app.add_option("--from", o.from, "folder of the experiments (experiments)");
+  app.add_option("--jobs", o.jobs, "trials at once; they share the threads (1)");
+  app.add_flag("--no-run", o.no_run, "only the page, from results that are there");
+  app.add_flag("--keep", o.keep, "put results into the experiments' folders, to be committed");
+}
+
+}  // namespace restage::cli

@@ -1,0 +1,141 @@
+#include "experiments/reproduce/evidence.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <set>
+
+#include "autograd/base/atomic_file.h"
+#include "autograd/base/log.h"
+#include "autograd/base/nearest.h"
+#include "experiments/sweep/sweep_dir.h"
+
+namespace restage::reproduce {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_file(const std::string& path) {
+  std::error_code ignored;
+  return fs::is_regular_file(path, ignored);
+}
+
+void make_folder(const std::string& path) {
+  std::error_code code;
+  fs::create_directories(path, code);
+  if (code) throw WorkError(path + " could not be made (" + code.message() + ")");
+}
+
+std::string kept(const Evidence& evidence, const std::string& name) {
+  return evidence.folder + "/results/" + name + ".json";
+}
+
+constexpr uint64_t kMostBytes = uint64_t{1} << 28;
+void copy(const std::string& from, const std::string& to) {
+  write_file_atomically(to, read_file(from, kMostBytes));
+}
+
+/// Whose machine it was is nobody's business.
+void copy_result(const std::string& from, const std::string& to) {
+  auto document = nlohmann::ordered_json::parse(read_file(from, kMostBytes));
+  document.erase("host");
+  document.erase("command");
+  write_file_atomically(to, document.dump(1) + "\n");
+}
+
+/// All folders with a paper.yaml, sorted.
+std::vector<std::string> folders(const std::string& from) {
+  std::vector<std::string> out;
+  std::error_code code;
+  for (fs::directory_iterator at(from, code), end; !code && at != end; at.increment(code))
+    if (is_file(at->path().string() + "/paper.yaml")) out.push_back(at->path().filename().string());
+  if (code || out.empty())
+    throw InputError(from, "holds no experiments with a paper.yaml",
+                     "run this in the folder of the clone, or give --from FOLDER");
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+std::string listed(const std::set<std::string>& names) {
+  std::string out;
+  for (const std::string& name : names) out += (out.empty() ? "" : ", ") + name;
+  return out;
+}
+
+}  // namespace
+
+std::vector<Evidence> find_evidence(const std::string& from, const std::string& paper,
+                                    const std::string& table, const std::string& out) {
+  std::vector<Evidence> found;
+  std::set<std::string> papers, tables;
+  for (const std::string& name : folders(from)) {
+    Evidence one{name, from + "/" + name, out + "/" + name, {}};
+    one.asked = read_paper_file(one.folder + "/paper.yaml");
+    papers.insert(one.asked.paper);
+    if (one.asked.paper != paper) continue;
+    tables.insert(one.asked.table);
+    if (!table.empty() && one.asked.table != table) continue;
+    if (one.runs() && !is_file(one.sweep_file()))
+      throw InputError(one.folder, "has rows to be run and no sweep.yaml",
+                       "write it, or say 'not_run' for each row in paper.yaml");
+    found.push_back(std::move(one));
+  }
+  if (!found.empty()) return found;
+  if (tables.empty()) {
+    const std::string close = nearest(paper, {papers.begin(), papers.end()});
+    throw InputError("", "there are no experiments of " + in_quotes(paper) + " in " + from,
+                     close.empty() ? "there are those of " + listed(papers)
+                                   : "did you mean " + in_quotes(close) + "?");
+  }
+  throw InputError("", paper + " has no table " + in_quotes(table) + " here",
+                   "there are " + listed(tables));
+}
+
+int take_results(const Evidence& evidence) {
+  const sweep::SweepDir dir = sweep::read_sweep_dir(evidence.dir);
+  int taken = 0;
+  for (const sweep::TrialEntry& trial : dir.trials) {
+    const std::string path = kept(evidence, trial.id);
+    if (!is_file(path)) continue;
+    const auto own = sweep::read_result(dir, trial.id);
+    if (own && own->state == tables::TrialState::done) continue;
+    try {
+      if (tables::read_result(path, trial.id).state != tables::TrialState::done) continue;
+    } catch (const InputError& error) {
+      log_warning(error.what());
+      continue;
+    }
+    make_folder(dir.folder(trial.id));
+    copy(path, dir.result(trial.id));
+    ++taken;
+  }
+  return taken;
+}
+
+bool take_plan(const Evidence& evidence, const std::string& budget) {
+  if (is_file(evidence.dir + "/plan.json")) return true;
+  if (!is_file(kept(evidence, budget))) return false;
+  make_folder(evidence.dir + "/trials");
+  copy(kept(evidence, budget), evidence.dir + "/plan.json");
+  return true;
+}
+
+void keep_results(const Evidence& evidence, const std::string& budget) {
+  const sweep::SweepDir dir = sweep::read_sweep_dir(evidence.dir);
+  make_folder(evidence.folder + "/results");
+  for (const sweep::TrialEntry& trial : dir.trials) {
+    const auto result = sweep::read_result(dir, trial.id);
+    if (result && result->state == tables::TrialState::done && !is_file(kept(evidence, trial.id)))
+      copy_result(dir.result(trial.id), kept(evidence, trial.id));
+  }
+  sweep::PlanFile plan = dir;
+  plan.directory = ".";
+  plan.store.clear();
+  write_file_atomically(kept(evidence, budget), plan_file_text(plan));
+}
+
+tables::Results results_of(const Evidence& evidence) {
+  if (!is_file(evidence.dir + "/plan.json")) return {};
+  return tables::read_results(evidence.dir);
+}
+
+}  // namespace restage::reproduce

@@ -1,0 +1,302 @@
+#include "experiments/reproduce/page.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+
+#include "autograd/base/atomic_file.h"
+#include "experiments/sweep/svg.h"
+#include "experiments/sweep/table_formats.h"
+#include "experiments/text.h"
+#include "train/progress.h"
+
+namespace restage::reproduce {
+namespace {
+
+namespace fs = std::filesystem;
+using tables::Estimate;
+using tables::Results;
+using tables::Table;
+using Rows = std::vector<std::vector<std::string>>;
+
+constexpr size_t kWorst = 5;
+
+std::string number(const std::optional<double>& value) {
+  return value ? tables::short_number(*value) : "-";
+}
+
+std::string signed_number(double value) {
+  return (value > 0 ? "+" : "") + tables::short_number(value);
+}
+
+std::string with_interval(const Estimate& e, bool sign = false) {
+  if (!e.mean) return "-";
+  std::string text = sign ? signed_number(*e.mean) : tables::short_number(*e.mean);
+  if (e.deviation) text += " ± " + tables::short_number(*e.deviation);
+  if (e.low)
+    text += " [" + tables::short_number(*e.low) + ", " + tables::short_number(*e.high) + "]";
+  return text;
+}
+
+std::string heading(const metrics::Metric& metric) {
+  return std::string(metric.title) + " [" + metric.unit + "]";
+}
+
+const tables::Row* row_of(const Table& table, const std::string& label) {
+  for (const tables::Row& row : table.rows)
+    if (row.label == label) return &row;
+  return nullptr;
+}
+
+std::optional<size_t> set_of(const Table& table, const std::string& name) {
+  for (size_t s = 0; s < table.sets.size(); ++s)
+    if (table.sets[s] == name) return s;
+  return std::nullopt;
+}
+
+std::string table_text(Rows rows) {
+  for (auto& row : rows)
+    for (std::string& cell : row) cell = tables::for_markdown(cell);
+  return markdown_table(rows);
+}
+
+/// "experiments/x/sweep.yaml" in the words of the command line.
+std::string sweep_command(const Found& f, const Budget& budget) {
+  std::string text = "restage sweep run " + f.evidence.sweep_file();
+  for (const std::string& word : budget.words)
+    text += word.find_first_of(" (,[{") == std::string::npos ? " " + word : " '" + word + "'";
+  return text + " --out runs/" + f.evidence.name;
+}
+
+// ---- a table -----------------------------------------------------------------------------------
+
+/// The paper's line and ours of every row, then what needs no learning.
+Rows beside_each_other(const PaperFile& asked, const PaperTable& printed, const Table& table,
+                       const std::string& set_name) {
+  Rows rows{{"", "n"}};
+  for (const auto* metric : table.columns) rows[0].push_back(heading(*metric));
+  const auto set = set_of(table, set_name);
+  for (const PaperRow& row : printed.rows) {
+    auto& paper = rows.emplace_back(
+        Rows::value_type{(row.printed_as.empty() ? row.row : row.printed_as) + " (paper)", ""});
+    for (size_t c = 0; c < table.columns.size(); ++c)
+      paper.push_back(c < asked.metrics.size() && c < row.printed.size() ? number(row.printed[c])
+                                                                         : "");
+    const tables::Row* ours = row_of(table, row.row);
+    auto& line = rows.emplace_back(Rows::value_type{
+        "**" + row.row + "**", ours != nullptr ? std::to_string(ours->n) : "not run"});
+    for (size_t c = 0; c < table.columns.size(); ++c)
+      line.push_back(ours != nullptr && set ? with_interval(ours->cells[*set][c].value) : "-");
+  }
+  for (const tables::Row& row : table.rows) {
+    if (!row.reference || !set) continue;
+    auto& line = rows.emplace_back(Rows::value_type{row.label + " (learns nothing)", ""});
+    for (size_t c = 0; c < table.columns.size(); ++c)
+      line.push_back(number(row.cells[*set][c].value.mean));
+  }
+  return rows;
+}
+
+std::string reasons(const PaperTable& printed) {
+  std::string text;
+  for (const PaperRow& row : printed.rows)
+    if (!row.not_run.empty()) text += "* " + row.row + " is not run: " + row.not_run + "\n";
+  return text.empty() ? "" : "\n" + text;
+}
+
+// ---- claims ------------------------------------------------------------------------------------
+
+std::string claim_text(const Claim& claim, const Judgement& judgement) {
+  std::string text = "> " + on_one_line(claim.says) + " (" + claim.where + ")\n\n**" +
+                     kVerdicts[static_cast<int>(judgement.verdict)] + "**: " + claim.better +
+                     " against " + claim.than +
+                     (claim.most ? ", three quarters of the comparisons needed" : "") + ".\n";
+  if (judgement.verdict != Verdict::not_run) {
+    Rows rows{{"set, metric", "pairs of seeds", claim.better + " - " + claim.than, ""}};
+    for (const Finding& f : judgement.findings)
+      rows.push_back({f.set + ", " + f.metric, std::to_string(f.difference.n),
+                      with_interval(f.difference, true), kVerdicts[static_cast<int>(f.verdict)]});
+    text += "\n" + table_text(rows);
+  }
+  if (!claim.tried.empty()) text += "\nTried: " + claim.tried + "\n";
+  return text + "\n";
+}
+
+// ---- what the paper does not ask ---------------------------------------------------------------
+
+/// PA-MPJPE of every sequence of a row, over its seeds.
+std::vector<std::pair<double, std::string>> by_sequence(const Results& results,
+                                                        const std::string& set, const Table& table,
+                                                        const std::string& label) {
+  const tables::Row* row = row_of(table, label);
+  std::map<std::string, std::pair<double, int>> sums;
+  for (const tables::TrialResult& trial : results.trials) {
+    if (row == nullptr || trial.case_name != row->case_name) continue;
+    for (const auto& [name, scores] : trial.sets) {
+      if (name != set) continue;
+      for (const auto& [sequence, values] : scores.sequences)
+        if (const auto found = values.find("pa_mpjpe"); found != values.end()) {
+          sums[sequence].first += found->second;
+          ++sums[sequence].second;
+        }
+    }
+  }
+  std::vector<std::pair<double, std::string>> out;
+  for (const auto& [name, sum] : sums) out.emplace_back(sum.first / sum.second, name);
+  std::sort(out.rbegin(), out.rend());
+  return out;
+}
+
+std::string worst_text(const Results& results, const std::string& set, const Table& table,
+                       const std::string& label) {
+  const auto all = by_sequence(results, set, table, label);
+  if (all.size() < 2) return "";
+  std::string text = "Worst sequences of " + label + " (PA-MPJPE in m, over its seeds): ";
+  for (size_t i = 0; i < std::min(kWorst, all.size()); ++i)
+    text += (i > 0 ? ", " : "") + all[i].second + " " + tables::short_number(all[i].first);
+  return text + "; the best: " + all.back().second + " " + tables::short_number(all.back().first) +
+         ".\n\n";
+}
+
+std::string effort_text(const Results& results) {
+  double seconds = 0;
+  for (const tables::TrialResult& trial : results.trials) seconds += trial.seconds;
+  return "Trials: " + tables::counts_text(results) + "; " + duration_text(seconds) +
+         " of work, stages that several share counted once.\n\n";
+}
+
+std::vector<std::string> columns_of(const PaperFile& asked) {
+  std::vector<std::string> out = asked.metrics;
+  for (const std::string& metric : asked.beside)
+    if (std::find(out.begin(), out.end(), metric) == out.end()) out.push_back(metric);
+  return out;
+}
+
+std::string section(const Found& f, const PageOptions& options, const std::string& files,
+                    const std::string& home) {
+  const PaperFile& asked = f.evidence.asked;
+  const Budget& budget = asked.budget(options.budget);
+  std::string text = "## " + asked.table + ": " + asked.title + "\n\n[" + f.evidence.name + "](" +
+                     home + "/" + f.evidence.name +
+                     "/README.md) says what is the same here and what is not.";
+  if (!budget.note.empty()) text += " " + budget.note;
+  text += "\n\n";
+  const Table table = tables::make_table(f.results, {{}, columns_of(asked), "", options.seed});
+  for (const PaperTable& printed : asked.tables) {
+    const std::string& set = measured_set(budget, printed);
+    text += "**" + printed.set + (set == printed.set ? "" : ", measured on " + set) + "**\n\n" +
+            table_text(beside_each_other(asked, printed, table, set)) + reasons(printed) + "\n";
+    if (f.evidence.runs()) text += worst_text(f.results, set, table, printed.rows.back().row);
+    if (!budget.set.empty()) break;
+  }
+  for (size_t c = 0; c < asked.claims.size(); ++c)
+    text += claim_text(asked.claims[c], f.judgements[c]);
+  if (!f.evidence.runs()) return text;
+  const std::string base = files + "/" + f.evidence.name;
+  return text + effort_text(f.results) + "Alone: `" + sweep_command(f, budget) + "`. [CSV](" +
+         base + ".csv), [LaTeX](" + base + ".tex), [SVG](" + base + ".svg).\n\n";
+}
+
+std::string summary(const std::vector<Found>& all) {
+  Rows rows{{"claim", "", "verdict"}};
+  std::map<Verdict, int> counts;
+  for (const Found& f : all)
+    for (size_t c = 0; c < f.judgements.size(); ++c) {
+      const Verdict verdict = f.judgements[c].verdict;
+      ++counts[verdict];
+      rows.push_back({on_one_line(f.evidence.asked.claims[c].says), f.evidence.asked.table,
+                      kVerdicts[static_cast<int>(verdict)]});
+    }
+  std::string text;
+  for (const auto& [verdict, n] : counts)
+    text +=
+        (text.empty() ? "" : ", ") + std::to_string(n) + " " + kVerdicts[static_cast<int>(verdict)];
+  return "Claims: " + (text.empty() ? "none" : text) + ".\n\n" + table_text(rows) + "\n";
+}
+
+const char* const kRule =
+    "A claim is judged by paired differences over seeds and sequences: it **holds** if the 95 % "
+    "interval of every\ncomparison lies on its side, **does not hold** if one lies on the other, "
+    "and **cannot be told** otherwise or with fewer\nthan three seeds. The rule was written before "
+    "the runs (`experiments/reproduce/verdict.h`). Orders are judged, never\nfigures: other data "
+    "and other budgets than the paper's. Ours: mean ± sample deviation over n seeds [95 % "
+    "interval:\nbootstrap over sequences and seeds]; with three seeds such an interval holds the "
+    "truth in some 75 of 100 cases\n(docs/experiments.md).\n\n";
+
+}  // namespace
+
+Found found(const Evidence& evidence, const PageOptions& options) {
+  Found out{evidence, results_of(evidence)};
+  const Budget& budget = evidence.asked.budget(options.budget);
+  for (const Claim& claim : evidence.asked.claims)
+    out.judgements.push_back(judge(evidence.asked, budget, claim, out.results, options.seed));
+  return out;
+}
+
+std::string page_markdown(const std::vector<Found>& all, const PageOptions& options,
+                          const std::string& tables, const std::string& home) {
+  std::string text = "# " + options.paper + ", run again\n\nBudget: " + options.budget +
+                     ". Made by\n\n```\n" + options.command + "\n```\n\n" + kRule + summary(all);
+  for (const Found& f : all) text += section(f, options, tables, home);
+  while (text.ends_with("\n\n")) text.pop_back();
+  return text;
+}
+
+nlohmann::ordered_json page_json(const std::vector<Found>& all, const PageOptions& options) {
+  nlohmann::ordered_json claims = nlohmann::ordered_json::array();
+  nlohmann::ordered_json trials = nlohmann::ordered_json::object();
+  for (const Found& f : all) {
+    trials[f.evidence.name] = {{"done", f.results.count(tables::TrialState::done)},
+                               {"all", f.results.trials.size()}};
+    for (size_t c = 0; c < f.judgements.size(); ++c) {
+      const Claim& claim = f.evidence.asked.claims[c];
+      nlohmann::ordered_json findings = nlohmann::ordered_json::array();
+      for (const Finding& finding : f.judgements[c].findings) {
+        const auto value = [](const std::optional<double>& v) {
+          return v ? nlohmann::ordered_json(*v) : nlohmann::ordered_json(nullptr);
+        };
+        findings.push_back({{"set", finding.set},
+                            {"metric", finding.metric},
+                            {"difference", value(finding.difference.mean)},
+                            {"low", value(finding.difference.low)},
+                            {"high", value(finding.difference.high)},
+                            {"n", finding.difference.n},
+                            {"verdict", kVerdicts[static_cast<int>(finding.verdict)]}});
+      }
+      claims.push_back({{"experiment", f.evidence.name},
+                        {"table", f.evidence.asked.table},
+                        {"says", claim.says},
+                        {"better", claim.better},
+                        {"than", claim.than},
+                        {"verdict", kVerdicts[static_cast<int>(f.judgements[c].verdict)]},
+                        {"findings", std::move(findings)}});
+    }
+  }
+  return {{"paper", options.paper},
+          {"budget", options.budget},
+          {"claims", std::move(claims)},
+          {"trials", std::move(trials)}};
+}
+
+void write_page(const std::vector<Found>& all, const PageOptions& options,
+                const std::string& folder, const std::string& from) {
+  const std::string files = folder + "/" + options.paper;
+  std::error_code code;
+  fs::create_directories(files, code);
+  if (code) throw WorkError(files + " could not be made (" + code.message() + ")");
+  for (const Found& f : all) {
+    if (!f.evidence.runs()) continue;
+    const Table table =
+        tables::make_table(f.results, {{}, columns_of(f.evidence.asked), "", options.seed});
+    for (const char* ending : {".csv", ".tex", ".svg"}) {
+      const std::string path = files + "/" + f.evidence.name + ending;
+      write_file_atomically(path, tables::to_format(table, f.results, path));
+    }
+  }
+  const std::string home = fs::relative(from, folder, code).string();
+  write_file_atomically(folder + "/" + options.paper + ".md",
+                        page_markdown(all, options, options.paper, home));
+}
+
+}  // namespace restage::reproduce

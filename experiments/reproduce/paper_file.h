@@ -1,0 +1,64 @@
+// paper.yaml: what a paper prints about one experiment, and what it claims from it, beside the
+// sweep.yaml that runs the experiment here (docs/design/reproduction.md).
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace restage::reproduce {
+
+/// A row of a printed table.
+struct PaperRow {
+  std::string row;                             ///< label of the sweep's row, mostly its case
+  std::string printed_as;                      ///< its name in the paper
+  std::vector<std::optional<double>> printed;  ///< in the order of the metrics, in their units
+  std::string not_run;                         ///< why there is no such row here; empty: there is
+};
+
+struct PaperTable {
+  std::string set;  ///< of sequences, as the sweep's results name it
+  std::vector<PaperRow> rows;
+};
+
+/// A sentence of the paper as comparisons: on each metric and set, `better` has less than `than`.
+struct Claim {
+  std::string says;   ///< in the paper's words
+  std::string where;  ///< in the paper
+  std::string better, than;
+  std::vector<std::string> metrics;  ///< empty: those of the tables
+  /// The claim is that the two differ by less than this: an equivalence, in the metrics' unit.
+  std::optional<double> within;
+  bool most = false;  ///< "almost all": three quarters of the comparisons will do
+  std::string tried;  ///< what was tried where it does not hold
+};
+
+/// What a budget adds to the sweep.
+struct Budget {
+  std::vector<std::string> words;  ///< as `restage sweep run` takes them
+  std::string set;                 ///< measured in the place of the paper's sets; empty: those
+  std::string note;                ///< what a reader of its figures must know
+};
+
+inline constexpr const char* kBudgets[] = {"smoke", "lite", "paper"};
+
+struct PaperFile {
+  std::string paper;  ///< such as rekik2024
+  std::string table;  ///< what --table selects: "4", "section 4.4"
+  std::string title;
+  std::vector<std::string> metrics;  ///< METRIC; those of the printed figures
+  std::vector<std::string> beside;   ///< further ones that are shown of ours
+  std::vector<PaperTable> tables;
+  std::vector<Claim> claims;
+  Budget smoke, lite, full;
+
+  const Budget& budget(const std::string& name) const;
+  /// Nothing of it runs here.
+  bool none_runs() const;
+};
+
+/// InputError at file and line: unknown keys and metrics, rows with too many or too few figures,
+/// rows that stand twice, claims about rows that are not there.
+PaperFile read_paper_file(const std::string& path);
+
+}  // namespace restage::reproduce
