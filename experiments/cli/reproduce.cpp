@@ -1,4 +1,6 @@
 // restage reproduce: the experiments of a paper, run and judged.
+#include <algorithm>
+
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 #include "autograd/base/parallel.h"
@@ -38,6 +40,28 @@ void check(const ReproduceOptions& o) {
                      "leave out one of the two");
 }
 
+std::string key_of(const std::string& word) {
+  const std::string key = word.substr(0, word.find('='));
+  return key == "seed" ? "seeds" : key;
+}
+
+/// What a sweep is planned with: the words of the user win over those of the budget.
+std::vector<std::string> words_of(const ReproduceOptions& o, const Common& common,
+                                  const Evidence& one) {
+  std::vector<std::string> own = o.words;
+  if (common.seed_given) own.push_back("seed=" + std::to_string(common.seed));
+  std::vector<std::string> before = {"store=" + o.out + "/store"};
+  const std::vector<std::string>& budget = one.asked.budget(o.budget).words;
+  before.insert(before.end(), budget.begin(), budget.end());
+  std::erase_if(before, [&](const std::string& word) {
+    return std::any_of(own.begin(), own.end(),
+                       [&](const std::string& mine) { return key_of(mine) == key_of(word); });
+  });
+  std::vector<std::string> words = {one.sweep_file()};
+  for (const auto* part : {&before, &own}) words.insert(words.end(), part->begin(), part->end());
+  return words;
+}
+
 /// All sweeps are planned before one runs, so that bad input is told at once.
 int plan(const ReproduceOptions& o, const Common& common, const std::vector<Evidence>& all) {
   for (const Evidence& one : all) {
@@ -45,11 +69,7 @@ int plan(const ReproduceOptions& o, const Common& common, const std::vector<Evid
     if (o.no_run) {
       if (!take_plan(one, o.budget)) continue;
     } else {
-      std::vector<std::string> words = {one.sweep_file(), "store=" + o.out + "/store"};
-      for (const auto* more : {&one.asked.budget(o.budget).words, &o.words})
-        words.insert(words.end(), more->begin(), more->end());
-      if (common.seed_given) words.push_back("seed=" + std::to_string(common.seed));
-      const int code = sweep::plan_in_a_process(one.dir, words, common.quiet);
+      const int code = sweep::plan_in_a_process(one.dir, words_of(o, common, one), common.quiet);
       if (code != 0) return code;
     }
     if (const int taken = take_results(one); taken > 0)

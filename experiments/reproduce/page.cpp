@@ -72,17 +72,17 @@ std::string sweep_command(const Found& f, const Budget& budget) {
 // ---- a table -----------------------------------------------------------------------------------
 
 /// The paper's line and ours of every row, then what needs no learning.
-Rows beside_each_other(const PaperFile& asked, const PaperTable& printed, const Table& table,
-                       const std::string& set_name) {
+Rows beside_each_other(const PaperTable& printed, const Table& table, const std::string& set_name) {
   Rows rows{{"", "n"}};
   for (const auto* metric : table.columns) rows[0].push_back(heading(*metric));
   const auto set = set_of(table, set_name);
   for (const PaperRow& row : printed.rows) {
-    auto& paper = rows.emplace_back(
-        Rows::value_type{(row.printed_as.empty() ? row.row : row.printed_as) + " (paper)", ""});
-    for (size_t c = 0; c < table.columns.size(); ++c)
-      paper.push_back(c < asked.metrics.size() && c < row.printed.size() ? number(row.printed[c])
-                                                                         : "");
+    if (!row.printed.empty()) {
+      auto& paper = rows.emplace_back(
+          Rows::value_type{(row.printed_as.empty() ? row.row : row.printed_as) + " (paper)", ""});
+      for (size_t c = 0; c < table.columns.size(); ++c)
+        paper.push_back(c < row.printed.size() ? number(row.printed[c]) : "");
+    }
     const tables::Row* ours = row_of(table, row.row);
     auto& line = rows.emplace_back(Rows::value_type{
         "**" + row.row + "**", ours != nullptr ? std::to_string(ours->n) : "not run"});
@@ -186,7 +186,7 @@ std::string section(const Found& f, const PageOptions& options, const std::strin
   for (const PaperTable& printed : asked.tables) {
     const std::string& set = measured_set(budget, printed);
     text += "**" + printed.set + (set == printed.set ? "" : ", measured on " + set) + "**\n\n" +
-            table_text(beside_each_other(asked, printed, table, set)) + reasons(printed) + "\n";
+            table_text(beside_each_other(printed, table, set)) + reasons(printed) + "\n";
     if (f.evidence.runs()) text += worst_text(f.results, set, table, printed.rows.back().row);
     if (!budget.set.empty()) break;
   }
@@ -199,13 +199,14 @@ std::string section(const Found& f, const PageOptions& options, const std::strin
 }
 
 std::string summary(const std::vector<Found>& all) {
-  Rows rows{{"claim", "", "verdict"}};
+  Rows rows{{"claim", "table", "compared", "verdict"}};
   std::map<Verdict, int> counts;
   for (const Found& f : all)
     for (size_t c = 0; c < f.judgements.size(); ++c) {
       const Verdict verdict = f.judgements[c].verdict;
       ++counts[verdict];
-      rows.push_back({on_one_line(f.evidence.asked.claims[c].says), f.evidence.asked.table,
+      const Claim& claim = f.evidence.asked.claims[c];
+      rows.push_back({claim.says, f.evidence.asked.table, claim.better + " against " + claim.than,
                       kVerdicts[static_cast<int>(verdict)]});
     }
   std::string text;

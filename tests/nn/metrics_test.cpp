@@ -13,6 +13,7 @@
 
 #include "autograd/base/error.h"
 #include "autograd/base/rng.h"
+#include "nn/geometry/skeleton.h"
 #include "tests/support/errors.h"
 #include "tests/support/use_set.h"
 
@@ -53,8 +54,8 @@ TEST(Metrics, AgreeWithTheOracle) {
     const SequenceView view{pj.track, gj.track, pv.track, gv.track, pj.track.frames};
     for (const auto metrics : {table(), variants()})
       for (const Metric& metric : metrics) {
-        if (!c["values"].contains(metric.name)) {  // tests/nn/contact_test.cpp has these
-          EXPECT_HAS("foot_slide_mm peak_speed floor_penetration_mm", metric.name);
+        if (!c["values"].contains(metric.name)) {  // below, and in tests/nn/contact_test.cpp
+          EXPECT_HAS("leaf_pa_mpvd foot_slide_mm peak_speed floor_penetration_mm", metric.name);
           continue;
         }
         const Value got = metric.compute(view);
@@ -66,6 +67,25 @@ TEST(Metrics, AgreeWithTheOracle) {
         }
       }
   }
+}
+
+TEST(Metrics, LeavesAreTheVerticesAroundHeadHandsAndFeet) {
+  std::vector<double> joints;  // on a line, so that what is nearest is plain
+  for (int j = 0; j < kJoints; ++j) joints.insert(joints.end(), {1.0 * j, 0, 0});
+  std::vector<double> truth = joints;  // a vertex at every joint
+  for (size_t j = 0; j < static_cast<size_t>(kJoints); ++j) truth[3 * j + 1] = 0.1 * (j % 3);
+  for (size_t j = 0; j < static_cast<size_t>(kJoints); ++j) truth[3 * j + 2] = 0.1 * (j % 5);
+  std::vector<double> pred = truth;
+  for (const size_t leaf : {10, 11, 15, 20, 21}) pred[3 * leaf + 1] += 0.2;
+  const auto track = [](const std::vector<double>& v) { return Track{v.data(), 1, kJoints}; };
+  const Alignment frame{Alignment::Mode::frame, true};
+  const auto each = distances(track(pred), track(truth), frame);
+  EXPECT_NEAR(*leaf_vertex_distance(track(pred), track(truth), track(joints)),
+              (each[10] + each[11] + each[15] + each[20] + each[21]) / 5, 1e-12);
+  EXPECT_GT(*leaf_vertex_distance(track(pred), track(truth), track(joints)),
+            *mean_distance(track(pred), track(truth), frame));
+  EXPECT_FALSE(leaf_vertex_distance(track(pred), track(truth), {}));
+  EXPECT_FALSE(leaf_vertex_distance({}, track(truth), track(joints)));
 }
 
 TEST(Metrics, ClaimsOfWhereAPointIsAreCounted) {

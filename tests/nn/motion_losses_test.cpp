@@ -99,6 +99,24 @@ TEST(MotionLosses, AccelerationIsOfSecondDifferences) {
   EXPECT_NEAR(with.total.value.item() - plain, 0.5 * 4.0 / 7, 1e-3);
 }
 
+TEST(MotionLosses, TheFirstVersionSmoothsThePath) {
+  Players p;
+  Given net;
+  net.joints = p.batch.joints.value;
+  net.standing = Tensor::zeros({3, 9, 2}, DType::f64);
+  p.batch.trans = Var(Tensor::zeros({3, 9, 3}, DType::f64));
+  for (int64_t i = 0; i < 3 * 9; ++i)  // velocities: steadily faster in x, one kick in z
+    p.batch.trans.value.data<double>()[3 * i] = 0.5 * static_cast<double>(i % 9),
+                                           p.batch.trans.value.data<double>()[3 * i + 2] =
+                                               i % 9 == 4;
+  MotionWeights w;
+  Context ctx;
+  const double plain = self_losses(ctx, net, p.batch, w).total.value.item();
+  w.path_smoothness = 0.1;
+  EXPECT_NEAR(self_losses(ctx, net, p.batch, w).total.value.item() - plain,
+              0.1 * (8 * 0.25 + 2 * 1.0) / (8 * 3), 1e-9);
+}
+
 TEST(MotionLosses, FeetThatStandAreACrossEntropy) {
   Players p;
   Given net;

@@ -250,6 +250,24 @@ TEST(TrainStages, SupervisedSkinningKeepsEveryJointsSkin) {
   EXPECT_LT(lost[true], 0.8 * lost[false]);
 }
 
+TEST(TrainStages, TheFirstVersionsLossesAreDistancesAndBoneLengths) {
+  TrainConfig c = tiny_training(2);
+  deformation(c).loss = Measure::distance;
+  deformation(c).skinning_steps = 2;
+  const NamedValues first = tiny_stage("deformation", c)->step(0);
+  EXPECT_NEAR(
+      value_of(first, "loss"),
+      static_cast<double>(deformation(c).pairs.points) * 1e-3 * value_of(first, "distance_mm"),
+      1e-3 * value_of(first, "loss"));
+  double loss[3];
+  for (int w = 0; w < 3; ++w) {
+    skeleton(c).bone_weight = w;
+    loss[w] = value_of(tiny_stage("skeleton", c)->step(0), "loss");
+  }
+  EXPECT_GT(loss[1], loss[0]);
+  EXPECT_NEAR(loss[2] - loss[1], loss[1] - loss[0], 1e-4 * loss[1]);
+}
+
 TEST(TrainStages, StateOfAnotherStageIsRefused) {
   for (const std::string name : kStageNames) {
     const auto stage = tiny_stage(name, tiny_training(2));

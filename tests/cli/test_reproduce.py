@@ -1,0 +1,119 @@
+"""restage reproduce: a paper's experiments from their folder to a page with verdicts."""
+import os
+
+from support import ROOT, CliTest
+from tiny_run import CONFIG
+
+BASE = CONFIG.replace("motions: {train: 4, validation: 2, test: 1}", "motions: {train: 4, validation: 2, test: 2}").replace(
+    "bodies: {train: 2, validation: 2, test: 1}", "bodies: {train: 2, validation: 2, test: 2}") + "evaluation: {sequences: 2, frames: 6}\n"
+SWEEP = """base: ../../tiny.yaml
+set: {stages: [motion]}
+cases:
+  untrained: {motion.optimiser.steps: 0}
+  trained: {motion.optimiser.steps: 60}
+seeds: [1, 2, 3]
+"""
+PAPER = """paper: somebody2024
+table: "1"
+title: does training help
+metrics: [mpjpe, pa_mpjpe]
+beside: [foot_slide_mm, peak_speed]
+tables:
+  - set: naked
+    rows:
+      - {row: untrained, printed: [0.5, 0.4]}
+      - {row: trained, printed_as: ours, printed: [0.2, 0.1]}
+      - {row: theirs, printed: [0.3, 0.2], not_run: it is nobody's}
+claims:
+  - {says: training helps, where: section 1, better: trained, than: untrained}
+  - {says: ours beats theirs, where: section 2, better: trained, than: theirs}
+smoke: {words: ["seeds=[1]", motion.windows.frames=6], set: true_skeletons}
+lite: {set: true_skeletons, note: Tiny.}
+"""
+
+
+class Reproduce(CliTest):
+    def setUp(self):
+        super().setUp()
+        self.write("tiny.yaml", BASE)
+        self.write("experiments/one/sweep.yaml", SWEEP)
+        self.write("experiments/one/paper.yaml", PAPER)
+        self.write("experiments/one/README.md", "# One\n")
+
+    def reproduce(self, *words):
+        return self.json("reproduce", "somebody2024", "--quiet", *words)
+
+    def text(self, name):
+        return self.bytes(name).decode()
+
+    def test_runs_judges_keeps_and_makes_the_page_again(self):
+        found = self.reproduce("--budget", "lite", "--out", "r", "--keep", "--jobs", 2)
+        self.assertEqual(found["trials"], {"one": {"done": 6, "all": 6}})
+        helps, beats = found["claims"]
+        self.assertEqual([f["metric"] for f in helps["findings"]], ["mpjpe", "pa_mpjpe"])
+        self.assertEqual({f["n"] for f in helps["findings"]}, {3})
+        for f in helps["findings"]:
+            self.assertEqual(f["verdict"], "holds" if f["high"] < 0 else "does not hold" if f["low"] > 0 else "cannot be told")
+        self.assertEqual(beats["verdict"], "not run")
+        page = self.text("r/somebody2024.md")
+        for part in ("training helps", "ours (paper)", "theirs is not run: it is nobody's", "| **trained**", "Tiny.", "foot slide",
+                     "(experiments/one/README.md)", "restage sweep run experiments/one/sweep.yaml"):
+            self.assertIn(part.replace("(experiments", "(../experiments"), page)
+        self.assertEqual(sorted(os.listdir(self.path("r/somebody2024"))), ["one.csv", "one.svg", "one.tex"])
+        kept = sorted(os.listdir(self.path("experiments/one/results")))
+        self.assertEqual((len(kept), kept[-1]), (7, "lite.json"))
+        self.assertNotIn("host", self.text("experiments/one/results/" + kept[0]))
+
+        before = {name: self.bytes("r/one/trials/%s/result.json" % name[:-5]) for name in kept[:-1]}
+        self.assertEqual(self.reproduce("--budget", "lite", "--out", "r"), found)
+        self.assertEqual(before, {name: self.bytes("r/one/trials/%s/result.json" % name[:-5]) for name in kept[:-1]}, "nothing is done twice")
+
+        # What is committed is as good as what was run: planned, but not made again; and without any planning.
+        self.assertEqual(self.reproduce("--budget", "lite", "--out", "again"), found)
+        self.assertFalse(os.path.exists(self.path("again/store")))
+        os.remove(self.path("tiny.yaml"))
+        self.assertEqual(self.reproduce("--budget", "lite", "--out", "page/work", "--page", "page", "--no-run"), found)
+        head = lambda text: text[text.index("Claims:"):]
+        self.assertEqual(head(self.text("page/somebody2024.md")), head(page))
+
+    def test_too_few_seeds_tell_nothing_and_words_make_other_trials(self):
+        found = self.reproduce("--budget", "smoke", "--out", "r")
+        self.assertEqual(found["claims"][0]["verdict"], "cannot be told")
+        self.assertEqual(found["trials"]["one"]["all"], 2)
+        more = self.reproduce("--budget", "smoke", "--out", "r", "seeds=1,2,3")
+        self.assertEqual(more["trials"]["one"], {"done": 6, "all": 6})
+        self.assertEqual(self.text("r/somebody2024.md").count("* theirs is not run"), 1)
+
+    def test_nothing_was_run(self):
+        found = self.reproduce("--budget", "lite", "--out", "r", "--no-run")
+        self.assertEqual({c["verdict"] for c in found["claims"]}, {"not run"})
+        self.assertEqual(found["trials"]["one"]["done"], 0)
+
+    def test_bad_input(self):
+        how = ["--budget", "smoke", "--out", "r"]
+        self.bad_input(["reproduce", "somebody2023", *how], "somebody2023", "somebody2024")
+        self.bad_input(["reproduce", "somebody2024", "--table", "7", *how], "'7'", "there are 1")
+        self.bad_input(["reproduce", "somebody2024", "--budget", "big", "--out", "r"], "big")
+        self.bad_input(["reproduce", "somebody2024", *how, "--jobs", "0"], "--jobs 0")
+        self.bad_input(["reproduce", "somebody2024", *how, "seeds"], "'seeds'")
+        self.bad_input(["reproduce", "somebody2024", *how, "--no-run", "seeds=1"], "'seeds=1'")
+        self.bad_input(["reproduce", "somebody2024", *how, "--from", "nowhere"], "nowhere", "--from")
+        self.bad_input(["reproduce", "somebody2024", *how, "motion.windos.frames=5"], "windos")
+        self.write("experiments/one/paper.yaml", PAPER.replace("row: trained", "row: traind"))
+        self.bad_input(["reproduce", "somebody2024", *how], "paper.yaml:", "traind")
+        os.remove(self.path("experiments/one/sweep.yaml"))
+        self.write("experiments/one/paper.yaml", PAPER)
+        self.bad_input(["reproduce", "somebody2024", *how], "sweep.yaml")
+        self.assertFalse(os.path.exists(self.path("r/somebody2024.md")))
+
+
+class OurFolders(CliTest):
+    """Every experiment of the repository can be read, and its page made of what is committed."""
+
+    def test_pages(self):
+        for name in ("experiments", "configs"):
+            os.symlink(os.path.join(ROOT, name), self.path(name))
+        for paper in ("rekik2024", "marsot2023", "chen2023"):
+            found = self.json("reproduce", paper, "--budget", "lite", "--out", "r", "--no-run", "--quiet")
+            self.assertGreater(len(found["claims"]), 0)
+            self.assertIn("# " + paper, self.bytes("r/%s.md" % paper).decode())

@@ -1,0 +1,205 @@
+// Verdicts on made-up results, and the files that ask for them.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "experiments/reproduce/page.h"
+#include "tests/support/files.h"
+
+namespace restage::reproduce {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace test;
+using Json = nlohmann::json;
+
+constexpr const char* kPaper = R"(paper: somebody2024
+table: "4"
+title: "a | b"
+metrics: [mpjpe, acc]
+beside: [foot_slide_mm]
+tables:
+  - set: naked
+    rows:
+      - {row: old, printed_as: theirs, printed: [0.16, 0.02]}
+      - {row: new, printed: [0.15, null]}
+      - {row: absent, not_run: nobody wrote it}
+claims:
+  - {says: new is better, where: section 4, better: new, than: old}
+lite: {words: [motion.optimiser.steps=7]}
+)";
+
+class Reproduce : public FileTest {
+ protected:
+  void SetUp() override {
+    fs::create_directories(dir / "x/trials");
+    write(kPaper);
+  }
+  void write(const std::string& text) const { dir.write("x/paper.yaml", text); }
+
+  /// Results of one row: for each seed an error on each of four sequences, hard ones the same for
+  /// all.
+  void put(const std::string& row, int seeds, double mpjpe, double acc, double scatter) {
+    for (int seed = 1; seed <= seeds; ++seed) {
+      Json sequences = Json::array();
+      double sum = 0;
+      for (int s = 0; s < 4; ++s) {
+        const double value = mpjpe + 0.03 * s + scatter * ((seed * 7 + s * 3) % 5 - 2);
+        sum += value / 4;
+        sequences.push_back({{"name", "s" + std::to_string(s)}, {"mpjpe", value}, {"acc", acc}});
+      }
+      const std::string id = "00000000000" + std::to_string(++made_);
+      const Json result = {
+          {"id", id.substr(id.size() - 12)},
+          {"case", row},
+          {"seed", seed},
+          {"overrides", Json::object()},
+          {"state", "done"},
+          {"error", nullptr},
+          {"artifacts", Json::object()},
+          {"seconds", 60},
+          {"metrics",
+           {{"naked", {{"mean", {{"mpjpe", sum}, {"acc", acc}}}, {"sequences", sequences}}}}}};
+      dir.write("x/trials/" + id.substr(id.size() - 12) + "/result.json", result.dump());
+    }
+  }
+  Judgement judged() const {
+    const PaperFile file = read_paper_file(dir / "x/paper.yaml");
+    return judge(file, file.lite, file.claims[0], tables::read_results(dir / "x"), 0);
+  }
+
+ private:
+  int made_ = 0;
+};
+
+TEST_F(Reproduce, AKnownOrderHoldsAndItsOppositeDoesNot) {
+  put("old", 3, 0.10, 0.02, 0.001);
+  put("new", 3, 0.09, 0.01, 0.001);
+  const Judgement found = judged();
+  EXPECT_EQ(found.verdict, Verdict::holds);
+  ASSERT_EQ(found.findings.size(), 2u);
+  EXPECT_EQ(found.findings[0].metric, "mpjpe");
+  EXPECT_NEAR(*found.findings[0].difference.mean, -0.01, 1e-12);
+  EXPECT_EQ(found.findings[0].difference.n, 3);
+  write(replaced(kPaper, "better: new, than: old", "better: old, than: new"));
+  EXPECT_EQ(judged().verdict, Verdict::does_not_hold);
+}
+
+TEST_F(Reproduce, ATieCannotBeTold) {
+  put("old", 3, 0.10, 0.02, 0.004);
+  put("new", 3, 0.10, 0.02, -0.004);
+  EXPECT_EQ(judged().verdict, Verdict::cannot_be_told);
+  write(replaced(kPaper, "than: old}", "than: old, within: 0.1}"));
+  EXPECT_EQ(judged().verdict, Verdict::holds) << "they differ by less than 10 cm";
+  write(replaced(kPaper, "than: old}", "than: old, within: 0.001, metrics: [mpjpe]}"));
+  EXPECT_EQ(judged().verdict, Verdict::cannot_be_told) << "the interval is wider than that";
+}
+
+TEST_F(Reproduce, WhatDiffersIsNotAlike) {
+  put("old", 3, 0.10, 0.02, 0.001);
+  put("new", 3, 0.06, 0.02, 0.001);
+  write(replaced(kPaper, "than: old}", "than: old, within: 0.01, metrics: [mpjpe]}"));
+  EXPECT_EQ(judged().verdict, Verdict::does_not_hold);
+}
+
+TEST_F(Reproduce, TwoSeedsTellNothing) {
+  put("old", 2, 0.20, 0.02, 0.001);
+  put("new", 2, 0.05, 0.01, 0.001);
+  EXPECT_EQ(judged().verdict, Verdict::cannot_be_told);
+}
+
+TEST_F(Reproduce, OneMetricThatIsWorseEndsAClaimButNotOneOfMost) {
+  put("old", 3, 0.10, 0.01, 0.001);
+  put("new", 3, 0.09, 0.02, 0.001);
+  EXPECT_EQ(judged().verdict, Verdict::does_not_hold);
+  std::vector<Finding> findings(4);
+  for (Finding& f : findings) f.verdict = Verdict::holds;
+  EXPECT_EQ(verdict_of(findings, false), Verdict::holds);
+  findings[0].verdict = Verdict::does_not_hold;
+  EXPECT_EQ(verdict_of(findings, true), Verdict::holds) << "three of four";
+  EXPECT_EQ(verdict_of(findings, false), Verdict::does_not_hold);
+  findings[1].verdict = Verdict::cannot_be_told;
+  EXPECT_EQ(verdict_of(findings, true), Verdict::cannot_be_told);
+  findings[1].verdict = Verdict::does_not_hold;
+  EXPECT_EQ(verdict_of(findings, true), Verdict::does_not_hold);
+  findings[2].verdict = Verdict::not_run;
+  EXPECT_EQ(verdict_of(findings, true), Verdict::not_run);
+  EXPECT_EQ(verdict_of(std::vector<Finding>{}, true), Verdict::not_run);
+}
+
+TEST_F(Reproduce, WhatWasNotRunIsNotJudged) {
+  put("old", 3, 0.10, 0.01, 0.001);
+  EXPECT_EQ(judged().verdict, Verdict::not_run);
+}
+
+TEST_F(Reproduce, ThePageHasBothFiguresAndTheVerdict) {
+  put("old", 3, 0.10, 0.02, 0.001);
+  put("new", 3, 0.09, 0.01, 0.001);
+  dir.write("x/sweep.yaml", "base: nothing.yaml\n");
+  dir.write("x/plan.json", R"({"trials": []})");
+  const std::vector<Evidence> all = find_evidence(dir.path(), "somebody2024", "", dir.path());
+  ASSERT_EQ(all.size(), 1u);
+  Found one{all[0], tables::Results{}};
+  one.results = [&] {
+    fs::remove(dir / "x/plan.json");
+    return tables::read_results(dir / "x");
+  }();
+  one.judgements = {judge(all[0].asked, all[0].asked.lite, all[0].asked.claims[0], one.results, 0)};
+  const PageOptions options{"somebody2024", "lite", "restage reproduce somebody2024", 0};
+  const std::string page = page_markdown({one}, options, "somebody2024", "..");
+  EXPECT_HAS(page, "a | b");
+  EXPECT_HAS(page, "theirs (paper)");
+  EXPECT_HAS(page, "0.16");
+  EXPECT_HAS(page, "**holds**: new against old");
+  EXPECT_HAS(page, "absent is not run: nobody wrote it");
+  EXPECT_HAS(page, "Claims: 1 holds.");
+  EXPECT_HAS(page, "motion.optimiser.steps=7");
+  EXPECT_EQ(page_json({one}, options)["claims"][0]["verdict"], "holds");
+  EXPECT_EQ(page_markdown({one}, options, "somebody2024", ".."), page) << "the same bytes again";
+}
+
+TEST_F(Reproduce, MistakesInAPaperFileAreToldWithTheirLine) {
+  const auto fails = [&](const std::string& what, const std::string& by,
+                         const std::string& message) {
+    write(replaced(kPaper, what, by));
+    EXPECT_HAS(error_of([&] { read_paper_file(dir / "x/paper.yaml"); }), message);
+  };
+  fails("metrics: [mpjpe, acc]", "metrics: [mpjpe, akk]", "paper.yaml:4");
+  fails("title", "titel", "titel");
+  fails("[0.16, 0.02]", "[0.16]", "paper.yaml:9");
+  fails("row: new", "row: old", "stands here twice");
+  fails("better: new", "better: now", "did you mean 'new'");
+  fails("better: new", "better: old", "names one row twice");
+}
+
+TEST_F(Reproduce, CommittedResultsAreTakenAndKept) {
+  write(kPaper);
+  dir.write("x/sweep.yaml", "base: nothing.yaml\n");
+  fs::create_directories(dir / "out");
+  Evidence one = find_evidence(dir.path(), "somebody2024", "4", dir / "out")[0];
+  EXPECT_FALSE(take_plan(one, "lite"));
+  put("new", 1, 0.09, 0.01, 0.001);
+  const std::string id = "000000000001";
+  fs::create_directories(dir / "x/results");
+  fs::rename(dir / ("x/trials/" + id + "/result.json"), dir / ("x/results/" + id + ".json"));
+  dir.write(
+      "x/results/lite.json",
+      R"({"trials": [{"id": "000000000001", "case": "new", "seed": 1, "overrides": {}, "artifacts": {}},
+                           {"id": "000000000002", "case": "old", "seed": 1, "overrides": {}, "artifacts": {}}]})");
+  dir.write("x/results/000000000002.json", "{}");
+  EXPECT_TRUE(take_plan(one, "lite"));
+  EXPECT_EQ(take_results(one), 1) << "the damaged one is left out";
+  EXPECT_EQ(take_results(one), 0) << "it is there now";
+  EXPECT_EQ(results_of(one).count(tables::TrialState::done), 1);
+  fs::remove(dir / ("x/results/" + id + ".json"));
+  keep_results(one, "lite");
+  EXPECT_EQ(tables::read_result(dir / ("x/results/" + id + ".json"), id).case_name, "new");
+  const auto refused = [&](const std::string& paper, const std::string& table) {
+    return error_of([&] { find_evidence(dir.path(), paper, table, dir / "out"); });
+  };
+  EXPECT_HAS(refused("somebody2023", ""), "somebody2024");
+  EXPECT_HAS(refused("somebody2024", "5"), "there are 4");
+}
+
+}  // namespace
+}  // namespace restage::reproduce
