@@ -283,34 +283,41 @@ class Reader {
   SweepFile out_;
 };
 
-/// evaluate.benchmark=FOLDER, evaluate.sets=[a, b] (or a,b).
-void add_evaluate(SweepFile& file, const SweepWord& word, const ConfigPlace& place) {
-  ConfigNode node, folder, sets;
-  folder.key = "benchmark";
-  folder.kind = Kind::scalar;
-  folder.text = file.evaluate.benchmark;
-  sets.key = "sets";
-  sets.kind = Kind::list;
-  for (const std::string& set : file.evaluate.sets) {
-    sets.children.emplace_back();
-    sets.children.back().kind = Kind::scalar;
-    sets.children.back().text = set;
-  }
-  const std::string key = word.key.substr(word.key.find('.') + 1);
-  if (key == "benchmark" && !word.several) {
-    folder = word.values[0];
-    folder.key = key;
-  } else if (key == "sets") {
-    const bool list = !word.several && word.values[0].kind == Kind::list;
-    sets.children = list ? word.values[0].children : word.values;
-    for (ConfigNode& set : sets.children) set.place = place;
-  } else {
-    fail(place, "is nothing of 'evaluate'", "give evaluate.benchmark=FOLDER or evaluate.sets=a,b");
+/// evaluate.benchmark=FOLDER, evaluate.sets=[a, b] (or a,b): each alone changes one of what the
+/// file says, both together need no file that says any.
+void add_evaluate(SweepFile& file, const std::vector<SweepWord>& words) {
+  if (words.empty()) return;
+  const ConfigPlace last{"override " + in_quotes(words.back().text), 0, 0};
+  const auto leaf = [&](const std::string& key, Kind kind, const std::string& text) {
+    ConfigNode node;
+    node.key = key;
+    node.kind = kind;
+    node.text = text;
+    node.place = node.key_place = last;
+    return node;
+  };
+  ConfigNode folder = leaf("benchmark", Kind::scalar, file.evaluate.benchmark);
+  ConfigNode sets = leaf("sets", Kind::list, "");
+  for (const std::string& set : file.evaluate.sets)
+    sets.children.push_back(leaf("", Kind::scalar, set));
+  for (const SweepWord& word : words) {
+    const std::string key = word.key.substr(word.key.find('.') + 1);
+    if (key == "benchmark" && !word.several) {
+      folder = word.values[0];
+      folder.key = key;
+      folder.place = folder.key_place = last;
+    } else if (key == "sets") {
+      const bool list = !word.several && word.values[0].kind == Kind::list;
+      sets.children = list ? word.values[0].children : word.values;
+      for (ConfigNode& set : sets.children) set.place = last;
+    } else {
+      fail({"override " + in_quotes(word.text), 0, 0}, "is nothing of 'evaluate'",
+           "give evaluate.benchmark=FOLDER or evaluate.sets=a,b");
+    }
   }
   if (folder.text.empty())
-    fail(place, "needs the benchmark's folder too", "give evaluate.benchmark=FOLDER");
-  node.kind = Kind::map;
-  node.place = node.key_place = folder.place = sets.place = place;
+    fail(last, "needs the benchmark's folder too", "give evaluate.benchmark=FOLDER");
+  ConfigNode node = leaf("evaluate", Kind::map, "");
   node.children = {folder, sets};
   file.evaluate = evaluate_of(node);
 }
@@ -340,10 +347,6 @@ void add_argument(SweepFile& file, const SweepWord& word) {
     list.children = word.values;
     if (word.values.size() == 1 && word.values[0].kind == Kind::list) list = word.values[0];
     file.seeds = seeds_of(list);
-    return;
-  }
-  if (word.key.starts_with("evaluate.")) {
-    add_evaluate(file, word, place);
     return;
   }
   check_key(word.key, place);
@@ -382,12 +385,17 @@ bool as_number(const ConfigNode& node, double& value) {
 SweepFile read_sweep_file(const std::string& path, const std::vector<std::string>& arguments) {
   SweepFile file = Reader(path).read();
   std::set<std::string> seen;
+  std::vector<SweepWord> evaluate;
   for (const std::string& argument : arguments) {
     const SweepWord word = read_sweep_word(argument);
     if (!seen.insert(word.key).second)
       fail({"override " + in_quotes(argument), 0, 0}, "gives the key a second time", "keep one");
-    add_argument(file, word);
+    if (word.key.starts_with("evaluate."))
+      evaluate.push_back(word);
+    else
+      add_argument(file, word);
   }
+  add_evaluate(file, evaluate);
   return file;
 }
 

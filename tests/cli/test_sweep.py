@@ -101,6 +101,21 @@ class Plans(Sweep):
         self.assertEqual({t["seed"] for t in self.plan("--seed", 8)["trials"]}, {8})
         self.bad_input(["sweep", "plan", "sweep.yaml", "data.source='a,b'"], "a,b")  # quotes keep a comma: one file, missing
 
+    def test_what_trials_are_measured_on_may_come_from_the_command_line(self):
+        for words in (["evaluate.benchmark=nowhere", "evaluate.sets=[naked]"], ["evaluate.sets=naked,clothed", "evaluate.benchmark=nowhere"]):
+            self.bad_input(["sweep", "plan", "sweep.yaml", *words], "nowhere", "no benchmark")
+        self.bad_input(["sweep", "plan", "sweep.yaml", "evaluate.benchmark=nowhere"], "'sets' is empty")
+        self.bad_input(["sweep", "plan", "sweep.yaml", "evaluate.sets=[naked]"], "evaluate.benchmark=FOLDER")
+        self.bad_input(["sweep", "plan", "sweep.yaml", "evaluate.set=[naked]"], "nothing of 'evaluate'")
+
+    def test_another_base_may_come_from_the_command_line(self):
+        first = [t["id"] for t in self.plan()["trials"]]
+        self.write("other.yaml", BASE.replace("hidden: 16", "hidden: 8"))
+        self.write("same.yaml", BASE)
+        self.assertEqual([t["id"] for t in self.plan("base=same.yaml")["trials"]], first)
+        self.assertFalse(set(first) & {t["id"] for t in self.plan("base=other.yaml")["trials"]})
+        self.bad_input(["sweep", "plan", "sweep.yaml", "base=none.yaml"], "none.yaml", "is no file")
+
     def test_out_is_ready_for_any_engine(self):
         self.write("sweep.yaml", SWEEP)
         self.done("sweep", "plan", "sweep.yaml", "--out", "d", "deformation.optimiser.steps=2,3")
