@@ -135,6 +135,7 @@ void judge(const Bundle& weights, const std::string& folder, bool scans,
   try {
     const PredictionFile pred(folder, retarget_sequence(weights, folder, how));
     scores->model.sequences.push_back(score(pred, truth, how));
+    scores->joint_errors.push_back(joint_errors(pred.joints(), truth.joints()));
     add_frames(pred, truth, scores);
   } catch (const InputError& error) {
     log_warning(folder + " is without a result: " + error.what());

@@ -93,6 +93,7 @@ void judge_retargeting(const Performance& performance, System& system, const Pus
   }
   keep(system.finish());
   add(model, s, how, &scores->model);
+  scores->joint_errors.push_back(joint_errors(model.joints.track(), s.joints.track()));
   scores->frames.push_back(s.joints.frames);
   if (how.every == 1 && system.target_joints() != nullptr && !s.source.empty())
     add_references(s, system, how, scores);
@@ -134,6 +135,7 @@ void judge_extraction(const Performance& performance, SkeletonModel& model, bool
       judge(performance.cloud(i), performance.joints_a(i), "frame " + std::to_string(i));
   }
   add(found, s, how, &scores->model);
+  scores->joint_errors.push_back(joint_errors(found.joints.track(), s.joints.track()));
   scores->frames.push_back(s.joints.frames);
 }
 
@@ -186,6 +188,10 @@ const SystemScores* SystemEvaluation::find(const std::string& condition) const {
   for (const auto& [name, scores] : conditions)
     if (name == condition) return &scores;
   return nullptr;
+}
+
+std::vector<double> joint_errors(const metrics::Track& pred, const metrics::Track& truth) {
+  return metrics::mean_distance_by_point(pred, truth, {metrics::Alignment::Mode::frame, true});
 }
 
 std::vector<std::string> sequence_names(const std::vector<EvalSequence>& list, const Corpus& test) {

@@ -19,6 +19,8 @@ struct SystemScores {
   metrics::Evaluation model;
   std::vector<int64_t> frames;
   References references;
+  /// Of each sequence the mean error of every joint, every frame aligned with scale, metres.
+  std::vector<std::vector<double>> joint_errors;
   /// Of all frames that a system says its confidence of, and their PA-MPJPE in metres.
   std::vector<double> confidence, frame_errors;
 };
@@ -54,6 +56,9 @@ struct EvaluationOptions {
 /// Judges the models of `weights` on the bodies and motions of `corpus`.
 SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weights_name,
                                  const Corpus& corpus, const EvaluationOptions& options);
+
+/// Mean error of every joint over the frames, aligned with scale, metres; empty without joints.
+std::vector<double> joint_errors(const metrics::Track& pred, const metrics::Track& truth);
 
 /// A name for each sequence: motion, first frame, both bodies.
 std::vector<std::string> sequence_names(const std::vector<EvalSequence>& list, const Corpus& test);

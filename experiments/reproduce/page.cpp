@@ -1,7 +1,7 @@
 #include "experiments/reproduce/page.h"
 
 #include <algorithm>
-#include <cstdio>
+#include <cmath>
 #include <filesystem>
 #include <map>
 
@@ -125,38 +125,103 @@ std::string claim_text(const Claim& claim, const Judgement& judgement) {
 
 // ---- what the paper does not ask ---------------------------------------------------------------
 
-/// PA-MPJPE of every sequence of a row, over its seeds.
-std::vector<std::pair<double, std::string>> by_sequence(const Results& results,
-                                                        const std::string& set, const Table& table,
-                                                        const std::string& label) {
-  const tables::Row* row = row_of(table, label);
-  std::map<std::string, std::pair<double, int>> sums;
+/// Averages of values that many trials give.
+class Averages {
+ public:
+  void add(const std::string& name, double value) {
+    sums_[name].first += value;
+    ++sums_[name].second;
+  }
+  std::map<std::string, double> means() const {
+    std::map<std::string, double> out;
+    for (const auto& [name, sum] : sums_) out[name] = sum.first / sum.second;
+    return out;
+  }
+
+ private:
+  std::map<std::string, std::pair<double, int>> sums_;
+};
+
+/// PA-MPJPE of one row on one set over its seeds: by sequence, by the motion that a sequence's name
+/// begins with, by joint.
+struct Parts {
+  std::map<std::string, double> sequences, motions, joints;
+};
+
+std::string motion_of(const std::string& sequence) {
+  return sequence.substr(0, sequence.find_first_of("-@:"));
+}
+
+Parts parts_of(const Results& results, const std::string& set, const tables::Row& row) {
+  Averages sequences, motions, joints;
   for (const tables::TrialResult& trial : results.trials) {
-    if (row == nullptr || trial.case_name != row->case_name) continue;
+    if (trial.case_name != row.case_name) continue;
     for (const auto& [name, scores] : trial.sets) {
       if (name != set) continue;
       for (const auto& [sequence, values] : scores.sequences)
         if (const auto found = values.find("pa_mpjpe"); found != values.end()) {
-          sums[sequence].first += found->second;
-          ++sums[sequence].second;
+          sequences.add(sequence, found->second);
+          motions.add(motion_of(sequence), found->second);
         }
+      for (const auto& [joint, value] : scores.joints) joints.add(joint, value);
     }
   }
-  std::vector<std::pair<double, std::string>> out;
-  for (const auto& [name, sum] : sums) out.emplace_back(sum.first / sum.second, name);
-  std::sort(out.rbegin(), out.rend());
-  return out;
+  return {sequences.means(), motions.means(), joints.means()};
 }
 
-std::string worst_text(const Results& results, const std::string& set, const Table& table,
-                       const std::string& label) {
-  const auto all = by_sequence(results, set, table, label);
+std::string in_mm(double metres) { return tables::short_number(std::round(1e4 * metres) / 10); }
+
+/// A line for each name, a column for each row.
+std::string split_table(const std::string& what, const std::vector<std::string>& labels,
+                        const std::vector<std::map<std::string, double>>& columns) {
+  std::map<std::string, std::vector<std::string>> lines;
+  for (size_t c = 0; c < columns.size(); ++c)
+    for (const auto& [name, value] : columns[c]) {
+      auto& line = lines.try_emplace(name, columns.size(), "-").first->second;
+      line[c] = in_mm(value);
+    }
+  if (lines.empty()) return "";
+  Rows rows{{what}};
+  rows[0].insert(rows[0].end(), labels.begin(), labels.end());
+  for (const auto& [name, line] : lines) {
+    rows.push_back({name});
+    rows.back().insert(rows.back().end(), line.begin(), line.end());
+  }
+  return table_text(rows) + "\n";
+}
+
+std::string worst_text(const std::string& label, const std::map<std::string, double>& sequences) {
+  std::vector<std::pair<double, std::string>> all;
+  for (const auto& [name, value] : sequences) all.emplace_back(value, name);
+  std::sort(all.rbegin(), all.rend());
   if (all.size() < 2) return "";
-  std::string text = "Worst sequences of " + label + " (PA-MPJPE in m, over its seeds): ";
+  std::string text = "Worst sequences of " + label + ": ";
   for (size_t i = 0; i < std::min(kWorst, all.size()); ++i)
-    text += (i > 0 ? ", " : "") + all[i].second + " " + tables::short_number(all[i].first);
-  return text + "; the best: " + all.back().second + " " + tables::short_number(all.back().first) +
-         ".\n\n";
+    text += (i > 0 ? ", " : "") + all[i].second + " " + in_mm(all[i].first);
+  return text + "; the best: " + all.back().second + " " + in_mm(all.back().first) + ".\n\n";
+}
+
+/// Where the errors are: by motion, by joint, the worst sequences. Folded, since it is long.
+std::string where_text(const Results& results, const PaperTable& printed, const std::string& set,
+                       const Table& table) {
+  std::vector<std::string> labels;
+  std::vector<std::map<std::string, double>> motions, joints;
+  std::string worst;
+  for (const PaperRow& asked : printed.rows) {
+    const tables::Row* row = row_of(table, asked.row);
+    if (row == nullptr || row->n == 0) continue;
+    const Parts parts = parts_of(results, set, *row);
+    if (parts.sequences.empty()) continue;
+    labels.push_back(asked.row);
+    motions.push_back(parts.motions);
+    joints.push_back(parts.joints);
+    worst += worst_text(asked.row, parts.sequences);
+  }
+  if (labels.empty()) return "";
+  return "<details><summary>Where the errors are: PA-MPJPE in mm by motion and by joint, the worst "
+         "sequences</summary>\n\n" +
+         split_table("motion", labels, motions) + split_table("joint", labels, joints) + worst +
+         "</details>\n\n";
 }
 
 std::string effort_text(const Results& results) {
@@ -187,7 +252,7 @@ std::string section(const Found& f, const PageOptions& options, const std::strin
     const std::string& set = measured_set(budget, printed);
     text += "**" + printed.set + (set == printed.set ? "" : ", measured on " + set) + "**\n\n" +
             table_text(beside_each_other(printed, table, set)) + reasons(printed) + "\n";
-    if (f.evidence.runs()) text += worst_text(f.results, set, table, printed.rows.back().row);
+    text += where_text(f.results, printed, set, table);
     if (!budget.set.empty()) break;
   }
   for (size_t c = 0; c < asked.claims.size(); ++c)

@@ -45,7 +45,12 @@ class Reader : public sweep::JsonReader<Json> {
     return out;
   }
   SetResult set(const Json& entries) const {
-    SetResult out{scores(entries), {}};
+    SetResult out{scores(entries), {}, {}};
+    if (const Json& joints = at(entries, "joints"); joints.is_object())
+      for (const auto& [name, value] : joints.items()) {
+        need(value.is_number(), name, "a number");
+        out.joints[name] = value.template get<double>();
+      }
     const Json& references = at(entries, "references");
     if (references.is_null()) return out;
     need(references.is_object(), "references", "a section");

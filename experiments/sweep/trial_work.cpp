@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <set>
 
@@ -43,11 +44,25 @@ Json evaluation_json(const metrics::Evaluation& scores, const std::vector<std::s
   return {{"mean", metrics_json(scores.mean)}, {"sequences", std::move(sequences)}};
 }
 
+/// PA-MPJPE by joint, over the sequences that have values.
+Json joints_json(const std::vector<std::vector<double>>& errors) {
+  Json out = Json::object();
+  for (size_t j = 0; j < static_cast<size_t>(kJoints); ++j) {
+    double sum = 0;
+    int count = 0;
+    for (const std::vector<double>& sequence : errors)
+      if (j < sequence.size() && std::isfinite(sequence[j])) sum += sequence[j], ++count;
+    if (count > 0) out[std::string(kJointNames[j])] = sum / count;
+  }
+  return out;
+}
+
 Json scores_json(const SystemScores& scores, const std::vector<std::string>& names) {
   Json out = evaluation_json(scores.model, names, scores.frames);
   for (const auto& [coverage, risk] :
        metrics::risk_coverage(scores.confidence, scores.frame_errors))
     out["risk_coverage"].push_back({{"coverage", coverage}, {"pa_mpjpe", risk}});
+  if (Json joints = joints_json(scores.joint_errors); !joints.empty()) out["joints"] = joints;
   for (const auto& [name, reference] : scores.references)
     out["references"][name] = evaluation_json(reference, names, scores.frames);
   return out;

@@ -277,6 +277,10 @@ namespace {
 /// Head, wrists and balls of the feet: no joint hangs on them.
 constexpr std::array<int64_t, 5> kLeaves = {10, 11, 15, 20, 21};
 
+/// The left joints of legs and arms.
+constexpr std::array<std::array<size_t, 4>, 2> kLimbs = {{{1, 4, 7, 10}, {13, 16, 18, 20}}};
+constexpr double kClearlySwapped = 0.05;  ///< metres a joint
+
 }  // namespace
 
 Value leaf_vertex_distance(const Track& pred, const Track& truth, const Track& joints) {
@@ -296,6 +300,27 @@ Value leaf_vertex_distance(const Track& pred, const Track& truth, const Track& j
   for (size_t i = 0; i < apart.size(); ++i)
     if (chosen[i % chosen.size()]) sum += apart[i], count += 1;
   return finite(sum / count);
+}
+
+Value side_swaps(const Track& pred, const Track& truth) {
+  if (!comparable(pred, truth) || truth.points != kJoints) return std::nullopt;
+  double swapped = 0;
+  for (int64_t t = 0; t < truth.frames; ++t) {
+    bool here = false;
+    for (const auto& limb : kLimbs) {
+      double gained = 0;
+      for (const size_t joint : limb) {
+        const auto left = static_cast<int64_t>(joint);
+        const int64_t right = kMirror[joint];
+        for (const auto& [j, other] : {std::pair{left, right}, std::pair{right, left}})
+          gained +=
+              (pred.at(t, j) - truth.at(t, j)).norm() - (pred.at(t, other) - truth.at(t, j)).norm();
+      }
+      here |= gained > kClearlySwapped * 2 * static_cast<double>(limb.size());
+    }
+    swapped += here ? 1 : 0;
+  }
+  return finite(swapped / static_cast<double>(truth.frames));
 }
 
 std::vector<RiskAtCoverage> risk_coverage(std::span<const double> confidence,
@@ -337,6 +362,7 @@ template <NeighbourFrame where>
 Value edge_lengths(const SequenceView& s) {
   return edge_length_difference_mm(s.pred_vertices, s.true_vertices, where);
 }
+Value swaps(const SequenceView& s) { return side_swaps(s.pred_joints, s.true_joints); }
 Value foot_slide(const SequenceView& s) { return foot_slide_mm(s.pred_joints, s.true_joints); }
 Value peak_speed(const SequenceView& s) { return peak_speed_ratio(s.pred_joints, s.true_joints); }
 Value floor_penetration(const SequenceView& s) {
@@ -367,6 +393,7 @@ constexpr Metric kAll[] = {
     // further: kPapers of them are above
     {"leaf_pa_mpvd", "PA-MPVD, leaves", "m",
      "of the vertices nearest to head, wrists and feet, every frame aligned as a whole", leaves},
+    {"side_swaps", "sides swapped", "of frames", "legs or arms nearer with left for right", swaps},
     {"foot_slide_mm", "foot slide", "mm/frame", "feet that truly stand, median", foot_slide},
     {"floor_penetration_mm", "below the floor", "mm", "lowest vertex, 95th percentile",
      floor_penetration},
@@ -393,7 +420,7 @@ constexpr Metric kAll[] = {
      edge_lengths<NeighbourFrame::first>},
 };
 
-constexpr size_t kPapers = 9, kRecorded = 13;
+constexpr size_t kPapers = 9, kRecorded = 14;
 static_assert(std::string_view(kAll[kPapers].name) == "leaf_pa_mpvd" &&
               std::string_view(kAll[kRecorded].name) == "mpjpe_root");
 

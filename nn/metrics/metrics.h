@@ -106,6 +106,10 @@ Value peak_speed_ratio(const Track& pred, const Track& truth);
 /// joints.
 Value leaf_vertex_distance(const Track& pred, const Track& truth, const Track& joints);
 
+/// Part of the frames in which the legs or the arms of the prediction would be nearer to the truth
+/// with left and right exchanged, by 5 cm a joint at least; needs the 22 joints.
+Value side_swaps(const Track& pred, const Track& truth);
+
 /// What is gained by answering only the surest frames: their share of all, and their mean error.
 struct RiskAtCoverage {
   double coverage = 0, risk = 0;
@@ -126,9 +130,9 @@ struct Metric {
 
 /// The papers' metrics: those of `restage eval`, in the order of its tables.
 std::span<const Metric> table();
-/// Those that the result of a trial holds: the papers', then leaves, contact and speed.
+/// Those that the result of a trial holds: the papers', then leaves, sides, contact and speed.
 std::span<const Metric> recorded();
-/// All that are not in table(), for `--variants`: leaves, contact and speed, then further
+/// All that are not in table(), for `--variants`: leaves, sides, contact and speed, then further
 /// alignments (rigid, one map per sequence, root).
 std::span<const Metric> variants();
 

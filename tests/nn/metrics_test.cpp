@@ -55,7 +55,8 @@ TEST(Metrics, AgreeWithTheOracle) {
     for (const auto metrics : {table(), variants()})
       for (const Metric& metric : metrics) {
         if (!c["values"].contains(metric.name)) {  // below, and in tests/nn/contact_test.cpp
-          EXPECT_HAS("leaf_pa_mpvd foot_slide_mm peak_speed floor_penetration_mm", metric.name);
+          EXPECT_HAS("leaf_pa_mpvd side_swaps foot_slide_mm peak_speed floor_penetration_mm",
+                     metric.name);
           continue;
         }
         const Value got = metric.compute(view);
@@ -67,6 +68,25 @@ TEST(Metrics, AgreeWithTheOracle) {
         }
       }
   }
+}
+
+TEST(Metrics, SidesAreSwappedWhereLeftIsNearerToRight) {
+  std::vector<double> truth;  // two frames, 40 cm between the sides
+  for (int t = 0; t < 2; ++t)
+    for (int j = 0; j < kJoints; ++j) {
+      const int other = kMirror[static_cast<size_t>(j)];
+      truth.insert(truth.end(), {other > j ? 0.2 : other < j ? -0.2 : 0.0, 0.1 * j, 0.0});
+    }
+  std::vector<double> pred = truth;
+  const auto track = [](const std::vector<double>& v) { return Track{v.data(), 2, kJoints}; };
+  EXPECT_EQ(side_swaps(track(pred), track(truth)), 0.0);
+  for (const size_t leg : {1, 2, 4, 5, 7, 8, 10, 11})  // of the second frame
+    pred[3 * (static_cast<size_t>(kJoints) + leg)] *= -1;
+  EXPECT_EQ(side_swaps(track(pred), track(truth)), 0.5);
+  for (double& x : truth) x *= 0.1;  // sides so near that it means nothing
+  for (double& x : pred) x *= 0.1;
+  EXPECT_EQ(side_swaps(track(pred), track(truth)), 0.0);
+  EXPECT_FALSE(side_swaps({pred.data(), 4, 11}, {truth.data(), 4, 11}));
 }
 
 TEST(Metrics, LeavesAreTheVerticesAroundHeadHandsAndFeet) {
