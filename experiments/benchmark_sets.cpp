@@ -35,6 +35,7 @@ Prediction retargeted(const Bundle& weights, const std::string& folder, const st
   input.target = read_target(input.target_name).mesh;
   input.options.fps = frames->fps();
   input.options.seed = how.seed;
+  input.options.anchor = how.anchor;
   input.options.force = how.force;
   if (!type.weights)
     input.rest = joints_of(PredictionFile(in(folder, "rest.h5")).joints().slice(0, 1))[0];

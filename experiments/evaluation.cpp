@@ -149,11 +149,13 @@ struct Condition {
 /// but an extractor is judged as one.
 std::vector<Condition> conditions_of(bool chain, const Bundle& weights) {
   if (!chain) return {{"clouds", {}}};
-  if (weights.find("motion") == nullptr && weights.find("deformation.weights") == nullptr)
-    return {{"source_joints", {"skeleton"}}, {"rest_joints", {"skeleton"}}};
-  return {{"clouds", {"skeleton", "motion"}},
-          {"true_skeletons", {"motion"}},
-          {"true_poses", {"deformation.weights"}}};
+  std::vector<Condition> out = {{"clouds", {"skeleton", "motion"}},
+                                {"true_skeletons", {"motion"}},
+                                {"true_poses", {"deformation.weights"}}};
+  if (weights.find("skeleton") != nullptr && weights.find("motion") == nullptr &&
+      weights.find("deformation.weights") == nullptr)
+    for (const char* name : {"source_joints", "rest_joints"}) out.push_back({name, {"skeleton"}});
+  return out;
 }
 
 std::string lacking(const Condition& condition, const Bundle& weights) {
@@ -205,6 +207,8 @@ std::vector<std::string> sequence_names(const std::vector<EvalSequence>& list, c
 EvaluationOptions evaluation_options(const TrainConfig& config, const Corpus& test, uint64_t seed) {
   EvaluationOptions out;
   out.seed = seed;
+  out.anchor = config.evaluation.anchor;
+  out.scans = config.evaluation.scans;
   out.clouds = config.section("skeleton").config.as<SkeletonStageConfig>().clouds;
   out.sequences = evaluation_sequences(test, static_cast<size_t>(config.evaluation.sequences),
                                        static_cast<size_t>(config.evaluation.frames), seed);
@@ -230,7 +234,7 @@ SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weigh
   how.force = true;  // a badly extracted target counts with its error instead of ending the table
   how.anchor = options.anchor;
   for (const EvalSequence& sequence : options.sequences) {
-    const Performance performance(corpus, sequence, ScanConfig{}, options.seed);
+    const Performance performance(corpus, sequence, options.scans, options.seed);
     Sequence truth = truth_of(performance, options.every);
     const Body& target = performance.target();
     for (auto& [name, scores] : out.conditions) {

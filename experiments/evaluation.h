@@ -49,6 +49,7 @@ struct EvaluationOptions {
   int64_t every = 1;             ///< frame of the sequences
   double anchor = RetargetOptions{}.anchor;
   std::vector<EvalSequence> sequences;
+  ScanConfig scans;
   CloudConfig clouds;  ///< of the extractor's own figures
   std::span<const metrics::Metric> metrics = metrics::table();
 };

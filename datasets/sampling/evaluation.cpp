@@ -216,7 +216,13 @@ Points Performance::cloud(size_t i) const {
   Rng rng(key.fold("count"));
   const uint64_t n = static_cast<uint64_t>(scan_.least) +
                      rng.below(static_cast<uint64_t>(scan_.most - scan_.least) + 1);
-  Points out = surface_a_.draw(key.fold("surface"), n).on_pose(a_, pose_a(i));
+  const Pose pose = pose_a(i);
+  Points out = surface_a_.draw(key.fold("surface"), n).on_pose(a_, pose);
+  if (scan_.hole > 0) {
+    const Point centre = surface_a_.draw(key_.fold("hole"), 1).on_pose(a_, pose)[0];
+    const auto radius = static_cast<float>(scan_.hole);
+    std::erase_if(out, [&](const Point& p) { return (p - centre).norm() < radius; });
+  }
   add_noise(key.fold("noise"), scan_.noise, out);
   return out;
 }

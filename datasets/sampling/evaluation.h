@@ -47,6 +47,11 @@ std::vector<EvalSequence> evaluation_sequences(const Corpus& corpus, size_t coun
 struct ScanConfig {
   int least = 900, most = 1400;  ///< points per frame
   double noise = 0.005;          ///< standard deviation per coordinate, metres
+  /// Nothing is seen within so many metres of one point of the body, which is another in each
+  /// sequence and stays where it is on the body.
+  double hole = 0;
+
+  bool operator==(const ScanConfig&) const = default;
 };
 
 /// Everything about one sequence, frame by frame, in the world. Keeps a reference to `corpus`.

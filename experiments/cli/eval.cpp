@@ -97,6 +97,8 @@ std::vector<std::string> result_files(const std::string& folder) {
 std::string heading(const std::string& condition) {
   if (condition == "clouds") return "From clouds alone (extracted skeletons)";
   if (condition == "true_skeletons") return "From true skeletons";
+  if (condition == "source_joints") return "Extractor alone, clouds of the source";
+  if (condition == "rest_joints") return "Extractor alone, the targets' T-poses";
   return "Surface alone (true skeletons and rotations of the target)";
 }
 
@@ -160,7 +162,7 @@ int run_eval_run(const EvalOptions& options, const Common& common) {
   if (!options.out.empty()) {
     std::filesystem::create_directories(options.out);
     write_file_atomically(options.out + "/metrics.md", text);
-    write_sequence(Performance(test, how.sequences[0], ScanConfig{}, common.seed),
+    write_sequence(Performance(test, how.sequences[0], how.scans, common.seed),
                    {test.license, test.description}, options.out);
   }
   print(common.json, to_json(scores, how), text);

@@ -194,7 +194,7 @@ std::vector<Play> played_extremes(const Measured& run, uint64_t seed) {
   for (const auto& [place, rank] : chosen) {
     const auto& [error, s] = ranked[rank];
     const Scratch scratch;
-    write_sequence(Performance(run.test, run.how.sequences[s], ScanConfig{}, seed),
+    write_sequence(Performance(run.test, run.how.sequences[s], run.how.scans, seed),
                    {run.test.license, run.test.description}, scratch.folder());
     out.push_back(
         played(run.weights, scratch.folder(),

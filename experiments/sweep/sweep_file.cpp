@@ -350,11 +350,15 @@ void add_argument(SweepFile& file, const SweepWord& word) {
     return;
   }
   check_key(word.key, place);
-  for (const Case& one : file.cases)
-    for (const Setting& setting : one.settings)
-      if (setting.key == word.key)
-        fail(place, "the case " + in_quotes(one.name) + " says it in " + setting.value.place.text(),
-             "change it there");
+  const auto says = [&](const Case& one) {
+    return std::any_of(one.settings.begin(), one.settings.end(),
+                       [&](const Setting& setting) { return setting.key == word.key; });
+  };
+  // As in 'set', what a case says wins; a word that no case lets through would be of no effect.
+  if (std::all_of(file.cases.begin(), file.cases.end(), says))
+    fail(place, "is said by every case of " + file.path, "change it there");
+  if (word.several && std::any_of(file.cases.begin(), file.cases.end(), says))
+    fail(place, "has values, but a case of " + file.path + " says it", "change it there");
   std::erase_if(file.set, [&](const Setting& setting) { return setting.key == word.key; });
   for (auto axis = file.axes.begin(); axis != file.axes.end(); ++axis) {
     if (std::find(axis->keys.begin(), axis->keys.end(), word.key) == axis->keys.end()) continue;

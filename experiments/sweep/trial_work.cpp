@@ -86,6 +86,7 @@ Json evaluate_held_out(const Bundle& models, const TrainConfig& config) {
 Json evaluate_benchmark(const Bundle& models, const Evaluate& evaluate, const TrainConfig& config) {
   BenchmarkOptions how{config.evaluation.system, config.evaluation.every, config.seed};
   how.metrics = metrics::recorded();
+  how.anchor = config.evaluation.anchor;
   Json out = Json::object();
   for (const std::string& set : evaluate.sets) {
     std::vector<std::string> names;
@@ -96,11 +97,17 @@ Json evaluate_benchmark(const Bundle& models, const Evaluate& evaluate, const Tr
   return out;
 }
 
-/// Configurations cannot know which systems there are.
-void check_system(const ConfigNode& tree, const TrainConfig& config) {
-  const ConfigNode* node = tree.find("evaluation");
-  if (node != nullptr) node = node->find("system");
-  system_type(config.evaluation.system, node == nullptr ? "" : node->place.text());
+/// Configurations cannot know which systems there are, nor that the benchmark's scans are files.
+void check_evaluation(const ConfigNode& tree, const TrainConfig& config, const Evaluate& evaluate) {
+  const ConfigNode* evaluation = tree.find("evaluation");
+  const auto place = [&](const char* key) {
+    const ConfigNode* node = evaluation == nullptr ? nullptr : evaluation->find(key);
+    return node == nullptr ? std::string() : node->key_place.text();
+  };
+  system_type(config.evaluation.system, place("system"));
+  if (!evaluate.benchmark.empty() && config.evaluation.scans != ScanConfig{})
+    throw InputError(place("scans"), "the benchmark's scans are as they are",
+                     "leave out evaluation.scans, or evaluate on the run's own held-out data");
 }
 
 }  // namespace
@@ -147,7 +154,7 @@ TrialPlanner::~TrialPlanner() = default;
 
 PlannedTrial TrialPlanner::plan(const ConfigNode& tree) {
   const TrainConfig config = read(tree);
-  check_system(tree, config);
+  check_evaluation(tree, config, memory_->evaluate);
   const std::vector<StageId> stages = memory_->identities.stages(config);
   memory_->check(config, stages);
   PlannedTrial out;

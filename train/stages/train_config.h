@@ -7,6 +7,7 @@
 
 #include "autograd/kernels/matmul_precision.h"
 #include "datasets/corpus.h"
+#include "datasets/sampling/evaluation.h"
 #include "train/stages/registry.h"
 #include "train/trainer.h"
 
@@ -31,13 +32,26 @@ void visit(V& v, CorpusSource& c) {
 struct EvaluationConfig {
   int64_t sequences = 12, frames = 90, every = 1;
   std::string system = "chain";  ///< infer/systems.h
+  double anchor = 0.25;          ///< of RetargetOptions
+  ScanConfig scans;
 };
+
+template <class V>
+void visit(V& v, ScanConfig& c) {
+  v("least", c.least, "fewest points of a frame", at_least(64));
+  v("most", c.most, "most points of a frame", between(64, 1'000'000));
+  v.check("most", c.most >= c.least, "is less than 'least'", "give at least as many");
+  v("noise", c.noise, "Gaussian noise per coordinate, metres", at_least(0));
+  v("hole", c.hole, "nothing is seen so many metres around one point of the body", at_least(0));
+}
 
 template <class V>
 void visit(V& v, EvaluationConfig& c) {
   v("sequences", c.sequences, "held-out sequences of 'restage eval run=...'", positive());
   v("frames", c.frames, "frames of each", at_least(3));
   v("system", c.system, "which system a sweep's trial is: 'restage retarget --system'");
+  v("anchor", c.anchor, "'restage retarget --anchor', seconds; 0: off", at_least(0));
+  v("scans", c.scans, "held-out sequences as they are seen");
   v("every", c.every, "a sweep's trial is measured on every so many frames", positive());
 }
 
