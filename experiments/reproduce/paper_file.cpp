@@ -122,8 +122,8 @@ const Budget& PaperFile::budget(const std::string& name) const {
 }
 
 bool PaperFile::none_runs() const {
-  return std::all_of(tables.begin(), tables.end(), [](const PaperTable& table) {
-    return std::all_of(table.rows.begin(), table.rows.end(),
+  return std::all_of(tables.begin(), tables.end(), [](const PaperTable& printed) {
+    return std::all_of(printed.rows.begin(), printed.rows.end(),
                        [](const PaperRow& row) { return !row.not_run.empty(); });
   });
 }
