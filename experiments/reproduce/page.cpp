@@ -228,7 +228,7 @@ std::string effort_text(const Results& results) {
   double seconds = 0;
   for (const tables::TrialResult& trial : results.trials) seconds += trial.seconds;
   return "Trials: " + tables::counts_text(results) + "; " + duration_text(seconds) +
-         " of work, stages that several share counted once.\n\n";
+         " of work in their last attempts.\n\n";
 }
 
 std::vector<std::string> columns_of(const PaperFile& asked) {
