@@ -23,6 +23,12 @@ std::string on_one_line(std::string text) {
   return text;
 }
 
+std::string shell_word(const std::string& text) {
+  std::string out = "'";
+  for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return out + "'";
+}
+
 std::string error_line(const std::string& text) {
   std::string line = on_one_line("restage: " + text);
   if (line.size() <= kMaxLine) return line;

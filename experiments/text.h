@@ -8,6 +8,8 @@ namespace restage {
 
 /// Names in files may hold line breaks and the like; here they become blanks.
 std::string on_one_line(std::string text);
+/// One word of a POSIX shell, in quotes.
+std::string shell_word(const std::string& text);
 /// `restage: <text>` as exactly one line of under 400 characters.
 std::string error_line(const std::string& text);
 /// A Markdown table with columns of equal width; the first row is the heading, the first column is

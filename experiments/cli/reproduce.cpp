@@ -22,13 +22,6 @@ struct ReproduceOptions {
   bool no_run = false, keep = false;
 };
 
-/// "restage reproduce ..." as it was typed, for the page.
-std::string typed(const Common& common) {
-  std::string text = "restage";
-  for (size_t i = 1; i < common.command_line.size(); ++i) text += " " + common.command_line[i];
-  return on_one_line(text);
-}
-
 void check(const ReproduceOptions& o) {
   if (o.jobs < 1)
     throw InputError("", "--jobs " + std::to_string(o.jobs) + " is out of range", "give 1 or more");
@@ -102,7 +95,8 @@ int run_reproduce(ReproduceOptions o, const Common& common) {
   const StopScope stop;
   if (const int code = plan(o, common, all); code != 0) return code;
   const bool done = o.no_run || run_trials(o, all);
-  const reproduce::PageOptions options{o.paper, o.budget, typed(common), common.seed};
+  reproduce::PageOptions options{o.paper, o.budget, common.command_line, common.seed};
+  options.command[0] = "restage";
   std::vector<reproduce::Found> found;
   for (const Evidence& one : all) found.push_back(reproduce::found(one, options));
   for (const auto& one : found)

@@ -1,9 +1,11 @@
 #include "experiments/reproduce/page.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <string_view>
 
 #include "autograd/base/atomic_file.h"
 #include "experiments/sweep/svg.h"
@@ -61,12 +63,24 @@ std::string table_text(Rows rows) {
   return markdown_table(rows);
 }
 
-/// "experiments/x/sweep.yaml" in the words of the command line.
+/// As it may be typed; quotes only where a shell would make something else of a word.
+std::string typed(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) {
+    const bool plain = std::all_of(word.begin(), word.end(), [](unsigned char c) {
+      return std::isalnum(c) != 0 ||
+             std::string_view("_-./=,:+").find(char(c)) != std::string::npos;
+    });
+    text += (text.empty() ? "" : " ") + (plain ? on_one_line(word) : shell_word(on_one_line(word)));
+  }
+  return text;
+}
+
 std::string sweep_command(const Found& f, const Budget& budget) {
-  std::string text = "restage sweep run " + f.evidence.sweep_file();
-  for (const std::string& word : budget.words)
-    text += word.find_first_of(" (,[{") == std::string::npos ? " " + word : " '" + word + "'";
-  return text + " --out runs/" + f.evidence.name;
+  std::vector<std::string> words = {"restage", "sweep", "run", f.evidence.sweep_file()};
+  words.insert(words.end(), budget.words.begin(), budget.words.end());
+  words.insert(words.end(), {"--out", "runs/" + f.evidence.name});
+  return typed(words);
 }
 
 // ---- a table -----------------------------------------------------------------------------------
@@ -303,7 +317,8 @@ Found found(const Evidence& evidence, const PageOptions& options) {
 std::string page_markdown(const std::vector<Found>& all, const PageOptions& options,
                           const std::string& tables, const std::string& home) {
   std::string text = "# " + options.paper + ", run again\n\nBudget: " + options.budget +
-                     ". Made by\n\n```\n" + options.command + "\n```\n\n" + kRule + summary(all);
+                     ". Made by\n\n```\n" + typed(options.command) + "\n```\n\n" + kRule +
+                     summary(all);
   for (const Found& f : all) text += section(f, options, tables, home);
   while (text.ends_with("\n\n")) text.pop_back();
   return text;

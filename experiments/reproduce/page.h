@@ -12,8 +12,8 @@ namespace restage::reproduce {
 
 struct PageOptions {
   std::string paper, budget;
-  std::string command;  ///< that makes the page again
-  uint64_t seed = 0;    ///< of the resampling
+  std::vector<std::string> command;  ///< that makes the page again, word by word
+  uint64_t seed = 0;                 ///< of the resampling
 };
 
 /// One experiment with all that was found.

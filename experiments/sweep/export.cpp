@@ -7,6 +7,7 @@
 
 #include "autograd/base/error.h"
 #include "autograd/base/nearest.h"
+#include "experiments/text.h"
 
 namespace restage::tables {
 namespace {
@@ -14,13 +15,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr size_t kMaxTasks = 1000;  ///< Slurm's MaxArraySize is 1001 unless somebody raised it
-
-/// One word of a POSIX shell.
-std::string quoted(const std::string& text) {
-  std::string out = "'";
-  for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return out + "'";
-}
 
 void refuse(const std::string& path, const std::string& characters, const std::string& what) {
   if (path.find_first_of(characters) == std::string::npos) return;
@@ -54,10 +48,10 @@ std::string slurm_script(const std::vector<sweep::TrialEntry>& plan, const Expor
          "#SBATCH --open-mode=append\n"
          "#SBATCH --signal=B:TERM@120\n" +
          (o.threads > 0 ? "#SBATCH --cpus-per-task=" + std::to_string(o.threads) + "\n" : "") +
-         "restage=" + quoted(o.program) +
+         "restage=" + shell_word(o.program) +
          "\n"
          "dir=" +
-         quoted(o.dir) +
+         shell_word(o.dir) +
          "\n"
          "ids=(\n" +
          ids +
@@ -90,7 +84,7 @@ exit "$code"
 std::string parallel_list(const std::vector<sweep::TrialEntry>& plan, const ExportOptions& o) {
   std::string text;
   for (const sweep::TrialEntry& trial : plan)
-    text += quoted(o.program) + " trial " + quoted(o.dir) + " " + trial.id + " --threads " +
+    text += shell_word(o.program) + " trial " + shell_word(o.dir) + " " + trial.id + " --threads " +
             std::to_string(std::max(1, o.threads)) + "\n";
   return text;
 }

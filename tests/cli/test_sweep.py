@@ -108,6 +108,21 @@ class Plans(Sweep):
         self.bad_input(["sweep", "plan", "sweep.yaml", "evaluate.sets=[naked]"], "evaluate.benchmark=FOLDER")
         self.bad_input(["sweep", "plan", "sweep.yaml", "evaluate.set=[naked]"], "nothing of 'evaluate'")
 
+    def test_scans_and_the_anchor_are_part_of_the_question(self):
+        self.write("sweep.yaml", "base: configs/tiny.yaml\ncases:\n  a: {}\n  noisy: {evaluation.scans.noise: 0.05}\n"
+                   "  holed: {evaluation.scans.hole: 0.3}\n  free: {evaluation.anchor: 0}\n")
+        self.done("sweep", "run", "sweep.yaml", "--out", "d")
+        found = {}
+        for trial in os.listdir(self.path("d/trials")):
+            result = self.result(trial)
+            found[result["case"]] = result["metrics"]["clouds"]["mean"]
+        for case in ("noisy", "holed"):
+            self.assertNotEqual(found[case]["pa_mpjpe"], found["a"]["pa_mpjpe"], case)
+        self.assertAlmostEqual(found["free"]["pa_mpjpe"], found["a"]["pa_mpjpe"], 6)
+        self.assertNotEqual(found["free"]["mpjpe"], found["a"]["mpjpe"])
+        self.write("small/manifest.json", "{}")
+        self.bad_input(["sweep", "plan", "sweep.yaml", "evaluate.benchmark=small", "evaluate.sets=[naked]"], "benchmark's scans are as they are")
+
     def test_another_base_may_come_from_the_command_line(self):
         first = [t["id"] for t in self.plan()["trials"]]
         self.write("other.yaml", BASE.replace("hidden: 16", "hidden: 8"))

@@ -292,5 +292,22 @@ TEST(SamplingEvaluation, PerformancesAreScansOfTheTruth) {
   EXPECT_THROW(Performance(corpus, sequence, {10, 5}, 1), InputError);
 }
 
+TEST(SamplingEvaluation, AHoleStaysWhereItIsOnTheBody) {
+  const Corpus corpus = subset(tiny_corpus(), "test");
+  const EvalSequence sequence = evaluation_sequences(corpus, 1, 8, 3).at(0);
+  const Performance whole(corpus, sequence, {900, 1400, 0}, 11);
+  const Performance holed(corpus, sequence, {900, 1400, 0, 0.15}, 11);
+  for (size_t i = 0; i < whole.frames(); ++i) {
+    const Points all = whole.cloud(i), seen = holed.cloud(i);
+    ASSERT_LT(seen.size(), all.size()) << i;
+    Points lost;
+    for (const Point& p : all)
+      if (std::find(seen.begin(), seen.end(), p) == seen.end()) lost.push_back(p);
+    EXPECT_EQ(lost.size() + seen.size(), all.size()) << "the others are as they were";
+    const Point middle = centroid(lost);
+    for (const Point& p : lost) EXPECT_LT((p - middle).norm(), 0.3f) << "one place";
+  }
+}
+
 }  // namespace
 }  // namespace restage

@@ -145,9 +145,11 @@ TEST_F(Reproduce, ThePageHasBothFiguresAndTheVerdict) {
     return tables::read_results(dir / "x");
   }();
   one.judgements = {judge(all[0].asked, all[0].asked.lite, all[0].asked.claims[0], one.results, 0)};
-  const PageOptions options{"somebody2024", "lite", "restage reproduce somebody2024", 0};
+  const PageOptions options{
+      "somebody2024", "lite", {"restage", "reproduce", "it's", "seeds=1,2"}, 0};
   const std::string page = page_markdown({one}, options, "somebody2024", "..");
   EXPECT_HAS(page, "a | b");
+  EXPECT_HAS(page, "restage reproduce 'it'\\''s' seeds=1,2\n");
   EXPECT_HAS(page, "theirs (paper)");
   EXPECT_HAS(page, "0.16");
   EXPECT_HAS(page, "**holds**: new against old");

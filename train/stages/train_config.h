@@ -42,7 +42,7 @@ void visit(V& v, ScanConfig& c) {
   v("most", c.most, "most points of a frame", between(64, 1'000'000));
   v.check("most", c.most >= c.least, "is less than 'least'", "give at least as many");
   v("noise", c.noise, "Gaussian noise per coordinate, metres", at_least(0));
-  v("hole", c.hole, "nothing is seen so many metres around one point of the body", at_least(0));
+  v("hole", c.hole, "nothing is seen so many metres around one point of the body", between(0, 0.5));
 }
 
 template <class V>
