@@ -88,7 +88,11 @@ TEST_F(Reproduce, AKnownOrderHoldsAndItsOppositeDoesNot) {
 TEST_F(Reproduce, ATieCannotBeTold) {
   put("old", 3, 0.10, 0.02, 0.004);
   put("new", 3, 0.10, 0.02, -0.004);
-  EXPECT_EQ(judged().verdict, Verdict::cannot_be_told);
+  const Judgement tie = judged();
+  EXPECT_EQ(tie.verdict, Verdict::cannot_be_told);
+  EXPECT_LT(*tie.findings[0].difference.low, 0);
+  EXPECT_GT(*tie.findings[0].difference.high, 0);
+  for (const Finding& f : tie.findings) EXPECT_EQ(f.verdict, Verdict::cannot_be_told) << f.metric;
   write(replaced(kPaper, "than: old}", "than: old, within: 0.1}"));
   EXPECT_EQ(judged().verdict, Verdict::holds) << "they differ by less than 10 cm";
   write(replaced(kPaper, "than: old}", "than: old, within: 0.001, metrics: [mpjpe]}"));
