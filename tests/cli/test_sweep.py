@@ -267,6 +267,21 @@ class Runs(Sweep):
         self.assertEqual(self.json("sweep", "status", "d")["counts"]["done"], 2)
         self.assertEqual(self.json("sweep", "status", "d")["counts"], {"pending": 0, "running": 0, "done": 2, "failed": 0, "stopped": 0})
 
+    def test_motion_networks_share_what_their_extractor_was_asked(self):
+        self.write("sweep.yaml", SHORT + "set: {motion.answers.sequences: 3, motion.answers.frames: 12}\n")
+        self.done("sweep", "run", "sweep.yaml", "--out", "d", "store=store")
+        logs = [self.bytes("d/trials/%s/log.txt" % t["id"]).decode() for t in self.plan()["trials"]]
+        self.assertEqual(sorted(log.count("the extractor is asked") for log in logs), [0, 2])
+        self.assertEqual([name[:8] for name in os.listdir(self.path("store/answers"))], ["answers-"] * 2)
+        # The same bytes as without: they are a place to look, and nothing that a result depends on.
+        shutil.rmtree(self.path("store/answers"))
+        first = self.result(self.plan()["trials"][0]["id"])
+        shutil.rmtree(self.path("store/motion-" + first["artifacts"]["motion"]))
+        shutil.rmtree(self.path("d"))
+        self.done("sweep", "run", "sweep.yaml", "--out", "d", "store=store")
+        again = self.result(first["id"])
+        self.assertEqual((again["artifacts"], again["metrics"]), (first["artifacts"], first["metrics"]))
+
     def test_from_another_folder(self):
         self.done("sweep", "plan", "sweep.yaml", "--out", "d")
         trial = self.plan()["trials"][0]["id"]

@@ -25,6 +25,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, os.path.join(HERE, "..", "cli"))
 
 SWEEP = """base: tiny.yaml
+set: {motion.answers.sequences: 3, motion.answers.frames: 12}
 grid: {motion.optimiser.steps: [6, 9]}
 seeds: [1, 2]
 retries: 1000

@@ -50,7 +50,7 @@ DeformationStage::DeformationStage(const Config& config, const StageInput& in)
       optimiser_(add_optimiser("optimiser", {"deformation.weights", "deformation.offsets"},
                                config.optimiser)),
       sampler_(in.train, with_weights(config.pairs, config.supervision > 0),
-               RngKey{in.seed, 0}.fold("deformation.pairs").stream),
+               sampler_seed(in.seed, "deformation.pairs")),
       validation_sampler_(in.validation, held_out(config.pairs), 1),
       key_(RngKey{in.seed, 0}.fold("deformation.step")) {}
 

@@ -39,6 +39,8 @@ Json keys_of(const C& config) {
 
 }  // namespace
 
+std::string keys_text(const ConfigNode& keys) { return to_json(keys).dump(); }
+
 std::string short_id(const std::string& text) { return sha256(text).substr(0, 12); }
 
 std::string Identities::data(const CorpusSource& source) {

@@ -8,7 +8,6 @@
 #include "datasets/readers/errors.h"
 #include "nn/metrics/metrics.h"
 #include "nn/models/closed_form_motion.h"
-#include "nn/models/extraction.h"
 
 namespace restage {
 namespace {
@@ -56,19 +55,10 @@ MotionBatch supervised_batch(const WindowBatch& w) {
           w.truth_sixd_b, w.self_mask, w.turns,         w.uncertainty,   w.standing, w.reframed};
 }
 
-/// What the skeleton stage's network answers to clouds of a corpus; empty if it is not asked.
-std::vector<JointTrack> ask(const Corpus& corpus, const AnswersConfig& config, int64_t sequences,
-                            const Bundle& given, uint64_t seed) {
-  if (config.tracks.sequences == 0) return {};
-  const std::string where = "the skeleton stage";
-  JointExtractor extractor(given.need_as<SkeletonModel>("skeleton", where), config.views);
-  TrackConfig tracks = config.tracks;
-  tracks.sequences = sequences;
-  log_info("motion: the extractor is asked about " + std::to_string(sequences) + " sequences");
-  return make_tracks(corpus, tracks, seed,
-                     [&](const Points& cloud, const RngKey& key, const SeenJoints* before) {
-                       return extractor(cloud, where, key, before);
-                     });
+AnswersConfig asked_for(const MotionStageConfig& c, int64_t sequences) {
+  AnswersConfig out = c.answers;
+  out.tracks.sequences = out.tracks.sequences == 0 ? 0 : sequences;
+  return out;
 }
 
 /// Mean and deviation per column of rows of width n; deviations are at least `least`.
@@ -133,16 +123,17 @@ struct Judged {
 
 struct MotionStage::Windows {
   Windows(const MotionStage& s)
-      : seen(ask(s.train_, s.config_.answers, s.config_.answers.tracks.sequences, s.given_,
-                 RngKey{s.seed_, 0}.fold("motion.answers").stream)),
-        held_out_seen(
-            ask(s.validation_, s.config_.answers, s.config_.validation_windows, s.given_, 1)),
-        cycle(s.train_, cycle_windows(s.config_), stream(s, "motion.windows"), tracks(seen)),
-        self(s.train_, self_windows(s.config_), stream(s, "motion.self"), tracks(seen)),
+      : seen(ask(s.train_, "train", s.config_.answers, s.given_, seed(s, "motion.answers"),
+                 s.answers_)),
+        held_out_seen(ask(s.validation_, "validation",
+                          asked_for(s.config_, s.config_.validation_windows), s.given_, 1,
+                          s.answers_)),
+        cycle(s.train_, cycle_windows(s.config_), seed(s, "motion.windows"), tracks(seen)),
+        self(s.train_, self_windows(s.config_), seed(s, "motion.self"), tracks(seen)),
         validation(s.validation_, held_out(s.config_.windows, s.config_.validation_frames), 1,
                    tracks(held_out_seen)) {}
-  static uint64_t stream(const MotionStage& s, const char* name) {
-    return RngKey{s.seed_, 0}.fold(name).stream;
+  static uint64_t seed(const MotionStage& s, const char* name) {
+    return sampler_seed(s.seed_, name);
   }
   static const std::vector<JointTrack>* tracks(const std::vector<JointTrack>& of) {
     return of.empty() ? nullptr : &of;
@@ -180,6 +171,7 @@ MotionStage::MotionStage(const Config& config, const StageInput& in)
       validation_(in.validation),
       seed_(in.seed),
       given_(in.given),
+      answers_(in.answers),
       key_(RngKey{in.seed, 0}.fold("motion.step")) {
   const int64_t late = model_->latency();
   if (late > 0 && (config.windows.self_share < 1 || !config.self_first_pass))
@@ -202,7 +194,7 @@ const MotionStage::Windows& MotionStage::windows() const {
 MotionStatistics MotionStage::statistics() const {
   std::vector<Tensor> joints, rest, trans, rotations;
   const WindowSampler sampler(train_, cycle_windows(config_),
-                              RngKey{seed_, 0}.fold("motion.windows").stream);
+                              sampler_seed(seed_, "motion.windows"));
   for (int64_t i = 0; i < 32; ++i) {
     const WindowBatch b = sampler.batch(i * 16, 16);
     joints.push_back(b.joints_a);

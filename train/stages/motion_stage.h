@@ -7,6 +7,7 @@
 #include "datasets/sampling/windows.h"
 #include "nn/losses/motion.h"
 #include "train/stage.h"
+#include "train/stages/answers.h"
 #include "train/stages/stage_input.h"
 
 namespace restage {
@@ -49,30 +50,6 @@ void visit(V& v, WindowConfig& c) {
   v("translation", c.translation, "velocity, relative or absolute");
   v("remove_heading", c.remove_heading, "turn every frame to face +z before the network");
   v("steady_heading", c.steady_heading, "that heading is an average of the last frames");
-}
-
-/// What an extractor answers, as the input of training windows.
-struct AnswersConfig {
-  TrackConfig tracks;
-  int views = 4;
-};
-
-template <class V>
-void visit(V& v, AnswersConfig& c) {
-  v("sequences", c.tracks.sequences,
-    "performances that the skeleton stage's network is asked about; 0: true joints, with noise",
-    at_least(0));
-  v("frames", c.tracks.frames, "frames of each", at_least(2));
-  v("views", c.views, "of each cloud, as retarget --samples", between(1, 256));
-  v("noise", c.tracks.clouds.noise, "Gaussian noise per coordinate of a cloud, metres",
-    at_least(0));
-  v("dressed", c.tracks.clouds.dressed, "part of the performers in clothes and hair",
-    between(0, 1));
-  v("one_camera", c.tracks.clouds.one_camera, "part that one depth camera sees", between(0, 1));
-  v("camera_ring", c.tracks.clouds.camera_ring, "part that three to seven cameras see",
-    between(0, 1));
-  v("intruder", c.tracks.clouds.intruder, "part of what cameras see with somebody else's limb",
-    between(0, 1));
 }
 
 /// The defaults are what trains; configs/paper/as_printed.yaml keeps the paper's letter
@@ -150,6 +127,7 @@ class MotionStage final : public Stage {
   const Corpus &train_, &validation_;
   uint64_t seed_;
   Bundle given_;  ///< the extractor, if it is asked
+  std::optional<AnswerFolder> answers_;
   RngKey key_;
   mutable std::once_flag asked_;
   mutable std::shared_ptr<const Windows> windows_;

@@ -34,8 +34,7 @@ RootStage::RootStage(const Config& config, const StageInput& in)
       config_(config),
       net_(add_network<RootNet>(config.model, RngKey{in.seed, 0}.fold("deformation/root"))),
       optimiser_(add_optimiser("optimiser", {"deformation.root"}, config.optimiser)),
-      sampler_(in.train, bodies(config.points, true),
-               RngKey{in.seed, 0}.fold("root.bodies").stream),
+      sampler_(in.train, bodies(config.points, true), sampler_seed(in.seed, "root.bodies")),
       validation_sampler_(in.validation, bodies(config.points, false), 1),
       key_(RngKey{in.seed, 0}.fold("root.step")) {}
 

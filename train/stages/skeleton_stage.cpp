@@ -81,7 +81,7 @@ SkeletonStage::SkeletonStage(const Config& config, const StageInput& in)
       model_(add_network<SkeletonModel>(config.model, RngKey{in.seed, 0}.fold("skeleton.init"))),
       optimiser_(add_optimiser("optimiser", {"skeleton"}, config.optimiser)),
       sampler_(in.train, training_clouds(config, *model_),
-               RngKey{in.seed, 0}.fold("skeleton.clouds").stream),
+               sampler_seed(in.seed, "skeleton.clouds")),
       validation_sampler_(in.validation, held_out(config.clouds, *model_), 1),
       posed_(evaluation_clouds(in.validation, static_cast<size_t>(config.validation_clouds), 1)),
       tposes_(evaluation_tposes(in.validation, 4, config.clouds.tpose_heading, 1)),

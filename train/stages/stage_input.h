@@ -1,10 +1,12 @@
 // What a stage is given besides its configuration.
 #pragma once
 
+#include "autograd/base/rng.h"
 #include "datasets/corpus.h"
 #include "nn/config/rules.h"
 #include "nn/losses/measure.h"
 #include "nn/weights/bundle.h"
+#include "train/stages/answers.h"
 
 namespace restage {
 
@@ -12,11 +14,19 @@ inline EnumNames<Measure> config_names(Measure) {
   return {{"mse", Measure::mse}, {"distance", Measure::distance}};
 }
 
+/// The seed of one of a stage's samplers: another one for another name, and for another seed of the
+/// training, so that trainings differ in what they see and not only in where they begin.
+inline uint64_t sampler_seed(uint64_t seed, std::string_view sampler) {
+  const auto words = philox(RngKey{seed, 0}.fold(sampler), 0);
+  return (uint64_t{words[0]} << 32) | words[1];
+}
+
 struct StageInput {
   const Corpus& train;       ///< kept by reference
   const Corpus& validation;  ///< kept by reference
   uint64_t seed = 0;
-  const Bundle& given;  ///< what the stages that it reads have left
+  const Bundle& given;                       ///< what the stages that it reads have left
+  std::optional<AnswerFolder> answers = {};  ///< where those about the corpora are kept
 };
 
 }  // namespace restage

@@ -1,20 +1,14 @@
 #include "train/stages/store.h"
 
-#include <unistd.h>
-
-#include <chrono>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
-#include <thread>
-#include <vector>
 
 #include "autograd/base/atomic_file.h"
-#include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 #include "datasets/readers/sha256.h"
-#include "train/lease.h"
+#include "train/stages/made_once.h"
 
 namespace restage {
 namespace {
@@ -57,25 +51,6 @@ Json validation_of(const std::string& metrics) {
   return best == out.end() ? out : last[*best];
 }
 
-/// What processes that were killed have left of the making of an artifact: `.STAGE-ID.partial` and
-/// the like.
-std::vector<fs::path> leftovers(const std::string& dir, const std::string& name) {
-  std::vector<fs::path> out;
-  std::error_code ignored;
-  for (const auto& entry : fs::directory_iterator(dir, ignored)) {
-    const std::string file = entry.path().filename().string();
-    if (file.starts_with(".") && file.find(name) != std::string::npos) out.push_back(entry.path());
-  }
-  return out;
-}
-
-/// All of it but the lease, which the caller holds.
-void remove_leftovers(const std::string& dir, const std::string& name) {
-  std::error_code ignored;
-  for (const fs::path& path : leftovers(dir, name))
-    if (path.filename().string().find(".lease") == std::string::npos) fs::remove_all(path, ignored);
-}
-
 RunDir open_run(const std::string& folder, const std::string& stage, const std::string& yaml,
                 const std::string& facts) {
   std::error_code ignored;
@@ -89,8 +64,10 @@ RunDir open_run(const std::string& folder, const std::string& stage, const std::
 std::string Store::path(const StageId& id) const { return (fs::path(dir_) / id.name()).string(); }
 
 std::string Store::partial(const StageId& id) const {
-  return (fs::path(dir_) / ("." + id.name() + ".partial")).string();
+  return path_aside(dir_, id.name(), ".partial");
 }
+
+std::string Store::answers() const { return (fs::path(dir_) / "answers").string(); }
 
 std::string Store::metrics(const StageId& id) const {
   std::error_code ignored;
@@ -125,51 +102,24 @@ std::optional<Bundle> Store::find(const StageId& id) const {
 }
 
 Bundle Store::get(const StageId& id, const std::string& config_yaml, const Make& make) const {
-  std::error_code error;
-  fs::create_directories(dir_, error);
-  if (error)
-    throw InputError(dir_, "cannot be made (" + error.message() + ")",
-                     "give store= a folder that you can write to");
-  const std::string aside = partial(id);
-  const std::string lease_path = (fs::path(dir_) / ("." + id.name() + ".lease")).string();
-  const StopScope stop;
-  for (bool told = false;; told = true) {
-    auto there = find(id);
-    if (there && leftovers(dir_, id.name()).empty()) return std::move(*there);
-    auto lease = Lease::take(lease_path, id.name());
-    if (there && !lease) return std::move(*there);  // somebody else tidies up
-    if (lease) {
-      if (auto found = find(id)) {  // its maker was killed before it could tidy up
-        remove_leftovers(dir_, id.name());
-        lease->forget();
-        return std::move(*found);
-      }
-      Bundle bundle;
-      {
-        RunDir run = open_run(aside, id.stage, config_yaml, id.facts);
-        bundle = make(run);
-      }
-      if (lease->lost())
-        throw WorkError("another process has taken over " + id.name() + "; run it again");
-      publish(id, aside, config_yaml, bundle);
-      remove_leftovers(dir_, id.name());
-      lease->forget();
-      // What others read is what we use.
-      if (auto found = find(id)) return std::move(*found);
-      throw WorkError(path(id) + " could not be read back; free some space and run it again");
-    }
-    if (!told) {
-      const auto holder = Lease::holder(lease_path);
-      log_info("waiting for " + id.name() + (holder ? ", which " + holder->text() + " makes" : ""));
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(500));
-    throw_if_stopped();
-  }
+  return made_once<Bundle>(
+      dir_, id.name(), [&] { return find(id); },
+      [&](const Lease& lease) {
+        const std::string aside = partial(id);
+        Bundle bundle;
+        {
+          RunDir run = open_run(aside, id.stage, config_yaml, id.facts);
+          bundle = make(run);
+        }
+        if (lease.lost())
+          throw WorkError("another process has taken over " + id.name() + "; run it again");
+        publish(id, aside, config_yaml, bundle);
+      });
 }
 
 void Store::publish(const StageId& id, const std::string& run, const std::string& config_yaml,
                     const Bundle& bundle) const {
-  const fs::path ready = fs::path(dir_) / ("." + id.name() + ".ready");
+  const fs::path ready = path_aside(dir_, id.name(), ".ready");
   std::error_code error;
   fs::remove_all(ready, error);
   if (!fs::create_directory(ready, error) || error)

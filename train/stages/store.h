@@ -7,7 +7,8 @@
 //
 // An artifact is complete or absent: it is made aside, in .STAGE-ID.partial, a run directory that
 // the next process goes on from, and then renamed. Its bytes are a function of its id: no time,
-// host or thread count is in it.
+// host or thread count is in it. Beside them lies answers/: what extractors were asked by the
+// training of motion networks; it may be removed at any time.
 #pragma once
 
 #include <functional>
@@ -32,6 +33,9 @@ class Store {
 
   /// Its curves so far (metrics.jsonl), also while it is made; empty if nobody has begun.
   std::string metrics(const StageId& id) const;
+
+  /// The folder of what extractors were asked (train/stages/answers.h).
+  std::string answers() const;
 
   /// Trains in the given run directory, which may hold the checkpoints of an earlier attempt.
   using Make = std::function<Bundle(RunDir& run)>;

@@ -39,7 +39,8 @@ std::unique_ptr<Stage> make_stage(const TrainConfig& config, const std::string& 
     return nullptr;
   }
   check_order(config, type, section.config);
-  auto stage = type.make(section.config, {data.train, data.validation, config.seed, *so_far});
+  auto stage =
+      type.make(section.config, {data.train, data.validation, config.seed, *so_far, data.answers});
   stage->repeat_batches(config.loop.overfit_batches);
   if (section.init)
     stage->start_from(load_bundle(*section.init), section.init_names, *section.init);
@@ -97,7 +98,10 @@ StoreTraining train_in_store(const Store& store, const TrainConfig& config, Iden
       const auto id = std::find_if(out.artifacts.begin(), out.artifacts.end(),
                                    [&](const StageId& s) { return s.stage == name; });
       out.bundle.add(store.get(*id, resolved_yaml(section.config), [&](RunDir& run) {
-        if (data == nullptr) data = std::make_unique<TrainingData>(config.data);
+        if (data == nullptr) {
+          data = std::make_unique<TrainingData>(config.data);
+          data->answers = {store.answers(), identities->data(config.data)};
+        }
         own.given = out.bundle;
         return train(
             run, {name}, config.loop,

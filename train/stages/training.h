@@ -14,6 +14,7 @@ struct TrainingData {
   explicit TrainingData(const CorpusSource& source)
       : train(load_corpus(source, "train")), validation(load_corpus(source, "validation")) {}
   Corpus train, validation;
+  std::optional<AnswerFolder> answers;  ///< where an extractor's answers to them are kept
 };
 
 /// A stage with its weights to start from; null if it is taken as it is, and then its networks are

@@ -1,0 +1,170 @@
+#include "train/stages/answers.h"
+
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "autograd/base/log.h"
+#include "autograd/kernels/matmul_precision.h"
+#include "datasets/readers/errors.h"
+#include "datasets/readers/sha256.h"
+#include "nn/weights/safetensors.h"
+#include "train/stages/identity.h"
+#include "train/stages/made_once.h"
+
+namespace restage {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kWhere = "the skeleton stage";
+
+std::vector<JointTrack> asked(const Corpus& corpus, const AnswersConfig& config,
+                              const Bundle& given, uint64_t seed) {
+  JointExtractor extractor(given.need_as<SkeletonModel>("skeleton", kWhere), config.views);
+  log_info("motion: the extractor is asked about " + std::to_string(config.tracks.sequences) +
+           " sequences");
+  return make_tracks(corpus, config.tracks, seed,
+                     [&](const Points& cloud, const RngKey& key, const SeenJoints* before) {
+                       return extractor(cloud, kWhere, key, before);
+                     });
+}
+
+// ---- as a file
+// -------------------------------------------------------------------------------------- All
+// numbers in double precision, so that what is read is what was asked for. Of each frame 22 rows:
+// joint, rotation, uncertainty; then one row for the sides that are remembered.
+
+constexpr int64_t kJointNumbers = 3 + 9 + 1, kFrame = kJoints * kJointNumbers + 4;
+
+void put(const SeenJoints& seen, double* out) {
+  for (size_t j = 0; j < kJoints; ++j, out += kJointNumbers) {
+    Eigen::Map<Vec3>(out, 3) = seen.joints[j];
+    if (seen.turns) Eigen::Map<Mat3>(out + 3) = (*seen.turns)[j];
+    if (seen.uncertainty) out[12] = (*seen.uncertainty)[j];
+  }
+  Eigen::Map<Vec3>(out, 3) = seen.left.value_or(Vec3::Constant(std::nan("")));
+  out[3] = seen.since;
+}
+
+SeenJoints get(const double* in, bool turns, bool uncertainty) {
+  SeenJoints out;
+  if (turns) out.turns.emplace();
+  if (uncertainty) out.uncertainty.emplace();
+  for (size_t j = 0; j < kJoints; ++j, in += kJointNumbers) {
+    out.joints[j] = Eigen::Map<const Vec3>(in, 3);
+    if (turns) (*out.turns)[j] = Eigen::Map<const Mat3>(in + 3);
+    if (uncertainty) (*out.uncertainty)[j] = in[12];
+  }
+  if (!std::isnan(in[0])) out.left = Eigen::Map<const Vec3>(in, 3);
+  out.since = static_cast<int>(in[3]);
+  return out;
+}
+
+std::string sum_of(const TensorFile& file) {
+  Sha256 sum;
+  for (const auto& [name, t] : file.tensors)
+    sum.add(
+        {static_cast<const char*>(t.raw()), static_cast<size_t>(t.numel()) * size_of(t.dtype())});
+  return sum.hex();
+}
+
+TensorFile to_file(const std::vector<JointTrack>& tracks, const std::string& facts) {
+  const auto n = std::ssize(tracks), frames = std::ssize(tracks.at(0).frames);
+  Tensor places = Tensor::empty({n, 3}, DType::i64),
+         seen = Tensor::zeros({n, frames, kFrame}, DType::f64);
+  for (int64_t i = 0; i < n; ++i) {
+    const JointTrack& track = tracks[static_cast<size_t>(i)];
+    const size_t place[] = {track.body, track.motion, track.first};
+    for (int64_t k = 0; k < 3; ++k)
+      places.data<int64_t>()[3 * i + k] = static_cast<int64_t>(place[k]);
+    for (int64_t f = 0; f < frames; ++f)
+      put(track.frames[static_cast<size_t>(f)], seen.data<double>() + (i * frames + f) * kFrame);
+  }
+  const SeenJoints& first = tracks[0].frames.at(0);
+  TensorFile out;
+  out.tensors = {{"places", places}, {"seen", seen}};
+  out.metadata = {{"turns", first.turns ? "true" : "false"},
+                  {"uncertainty", first.uncertainty ? "true" : "false"},
+                  {"facts", facts},
+                  {"sha256", sum_of(out)}};
+  return out;
+}
+
+std::vector<JointTrack> from_file(const std::string& path, const std::string& facts,
+                                  const TrackConfig& config) {
+  TensorFile file = read_safetensors(path);
+  const auto says = [&](const char* name) { return file.metadata[name]; };
+  const Tensor &places = file.at("places", path), &seen = file.at("seen", path);
+  const Shape wanted{config.sequences, config.frames, kFrame};
+  if (says("sha256") != sum_of(file) || says("facts") != facts ||
+      places.shape() != Shape{config.sequences, 3} || places.dtype() != DType::i64 ||
+      seen.shape() != wanted || seen.dtype() != DType::f64)
+    throw InputError(path, "does not fit its checksum", "nothing needs to be done");
+  std::vector<JointTrack> out(static_cast<size_t>(config.sequences));
+  for (size_t i = 0; i < out.size(); ++i) {
+    const int64_t* place = places.data<int64_t>() + 3 * i;
+    out[i] = {static_cast<size_t>(place[0]),
+              static_cast<size_t>(place[1]),
+              static_cast<size_t>(place[2]),
+              {}};
+    for (size_t f = 0; f < static_cast<size_t>(config.frames); ++f)
+      out[i].frames.push_back(
+          get(seen.data<double>() + (i * static_cast<size_t>(config.frames) + f) * kFrame,
+              says("turns") == "true", says("uncertainty") == "true"));
+  }
+  return out;
+}
+
+std::optional<std::vector<JointTrack>> find(const std::string& path, const std::string& facts,
+                                            const TrackConfig& config) {
+  std::error_code ignored;
+  if (!fs::exists(path, ignored)) return std::nullopt;
+  try {
+    return from_file(path, facts, config);
+  } catch (const InputError& error) {
+    log_warning("damaged answers are asked for again: " + std::string(error.what()));
+    fs::remove(path, ignored);
+    return std::nullopt;
+  }
+}
+
+/// All that answers depend on.
+std::string facts_of(const std::string& data, const std::string& split, const AnswersConfig& config,
+                     const Bundle& given, uint64_t seed) {
+  const std::string extractor = safetensors_bytes(restage::to_file(given.only({"skeleton"})));
+  return nlohmann::json{{"behaviour", kBehaviour},
+                        {"data", data},
+                        {"split", split},
+                        {"answers", keys_text(write_config(config))},
+                        {"extractor", sha256(extractor)},
+                        {"precision", static_cast<int>(matmul_precision())},
+                        {"seed", seed}}
+      .dump();
+}
+
+}  // namespace
+
+std::vector<JointTrack> ask(const Corpus& corpus, const std::string& split,
+                            const AnswersConfig& config, const Bundle& given, uint64_t seed,
+                            const std::optional<AnswerFolder>& folder) {
+  if (config.tracks.sequences == 0) return {};
+  if (!folder) return asked(corpus, config, given, seed);
+  const std::string facts = facts_of(folder->data, split, config, given, seed);
+  const std::string name = "answers-" + short_id(facts),
+                    path = (fs::path(folder->path) / (name + ".safetensors")).string();
+  return made_once<std::vector<JointTrack>>(
+      folder->path, name, [&] { return find(path, facts, config.tracks); },
+      [&](const Lease&) {  // two who make it make the same bytes
+        const std::string ready = path_aside(folder->path, name, ".ready");
+        write_safetensors(ready, to_file(asked(corpus, config, given, seed), facts));
+        std::error_code error;
+        fs::rename(ready, path, error);
+        if (error)
+          throw WorkError(path + ": could not be put into the store (" + error.message() +
+                          "); run it again");
+      });
+}
+
+}  // namespace restage
