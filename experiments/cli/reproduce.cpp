@@ -98,7 +98,7 @@ int run_reproduce(ReproduceOptions o, const Common& common) {
   reproduce::PageOptions options{o.paper, o.budget, common.command_line, common.seed};
   options.command[0] = "restage";
   std::vector<reproduce::Found> found;
-  for (const Evidence& one : all) found.push_back(reproduce::found(one, options));
+  for (const Evidence& one : all) found.push_back(reproduce::found(one, options, o.page));
   for (const auto& one : found)
     for (const std::string& notice : one.results.notices) log_warning(on_one_line(notice));
   write_page(found, options, o.page, o.from);

@@ -271,6 +271,9 @@ std::string section(const Found& f, const PageOptions& options, const std::strin
   }
   for (size_t c = 0; c < asked.claims.size(); ++c)
     text += claim_text(asked.claims[c], f.judgements[c]);
+  for (const Drawn& picture : f.pictures)
+    text += "![" + on_one_line(picture.says) + "](" + files + "/" + picture.file + ")\n\n" +
+            on_one_line(picture.says) + "\n\n";
   if (!f.evidence.runs()) return text;
   const std::string base = files + "/" + f.evidence.name;
   return text + effort_text(f.results) + "Alone: `" + sweep_command(f, budget) + "`. [CSV](" +
@@ -304,13 +307,23 @@ const char* const kRule =
     "interval:\nbootstrap over sequences and seeds]; with three seeds such an interval holds the "
     "truth in some 75 of 100 cases\n(docs/experiments.md).\n\n";
 
+/// Of what is beside the page; made if it is not there.
+std::string files_folder(const std::string& folder, const PageOptions& options) {
+  const std::string files = folder + "/" + options.paper;
+  std::error_code code;
+  fs::create_directories(files, code);
+  if (code) throw WorkError(files + " could not be made (" + code.message() + ")");
+  return files;
+}
+
 }  // namespace
 
-Found found(const Evidence& evidence, const PageOptions& options) {
+Found found(const Evidence& evidence, const PageOptions& options, const std::string& folder) {
   Found out{evidence, results_of(evidence)};
   const Budget& budget = evidence.asked.budget(options.budget);
   for (const Claim& claim : evidence.asked.claims)
     out.judgements.push_back(judge(evidence.asked, budget, claim, out.results, options.seed));
+  out.pictures = draw_pictures(evidence, out.results, files_folder(folder, options));
   return out;
 }
 
@@ -362,10 +375,7 @@ nlohmann::ordered_json page_json(const std::vector<Found>& all, const PageOption
 
 void write_page(const std::vector<Found>& all, const PageOptions& options,
                 const std::string& folder, const std::string& from) {
-  const std::string files = folder + "/" + options.paper;
-  std::error_code code;
-  fs::create_directories(files, code);
-  if (code) throw WorkError(files + " could not be made (" + code.message() + ")");
+  const std::string files = files_folder(folder, options);
   for (const Found& f : all) {
     if (!f.evidence.runs()) continue;
     const Table table =
@@ -375,6 +385,7 @@ void write_page(const std::vector<Found>& all, const PageOptions& options,
       write_file_atomically(path, tables::to_format(table, f.results, path));
     }
   }
+  std::error_code code;
   const std::string home = fs::relative(from, folder, code).string();
   write_file_atomically(folder + "/" + options.paper + ".md",
                         page_markdown(all, options, options.paper, home));

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "experiments/reproduce/evidence.h"
+#include "experiments/reproduce/pictures.h"
 #include "experiments/reproduce/verdict.h"
 
 namespace restage::reproduce {
@@ -21,10 +22,11 @@ struct Found {
   Evidence evidence;
   tables::Results results;
   std::vector<Judgement> judgements = {};  ///< of its claims, in their order
+  std::vector<Drawn> pictures = {};
 };
 
-/// Judges every claim.
-Found found(const Evidence& evidence, const PageOptions& options);
+/// Judges every claim and draws every picture; `folder`: where the page will be.
+Found found(const Evidence& evidence, const PageOptions& options, const std::string& folder);
 
 /// Markdown. `tables`: folder of each experiment's CSV, LaTeX and SVG, seen from the page; `home`:
 /// the clone's folder, seen from the page.
@@ -32,8 +34,8 @@ std::string page_markdown(const std::vector<Found>& all, const PageOptions& opti
                           const std::string& tables, const std::string& home);
 nlohmann::ordered_json page_json(const std::vector<Found>& all, const PageOptions& options);
 
-/// Writes FOLDER/PAPER.md and FOLDER/PAPER/NAME.csv, .tex and .svg. `from`: where the experiments
-/// are.
+/// Writes FOLDER/PAPER.md and FOLDER/PAPER/NAME.csv, .tex and .svg, beside the pictures. `from`:
+/// where the experiments are.
 void write_page(const std::vector<Found>& all, const PageOptions& options,
                 const std::string& folder, const std::string& from);
 

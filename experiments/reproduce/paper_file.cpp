@@ -47,6 +47,20 @@ void visit(V& v, Claim& c) {
 }
 
 template <class V>
+void visit(V& v, Picture& c) {
+  v("says", c.says, "the line under it", required());
+  v("set", c.set, "of the benchmark", required(one_of({"naked", "clothed", "scans"})));
+  v("sequence", c.sequence, "of the set");
+  v("worst", c.worst, "in its place, so many on which the first row is farthest off",
+    between(0, 20));
+  v("moments", c.moments, "seconds", at_least(0));
+  v("rows", c.rows, "drawn between source and truth", required());
+  v("azimuth", c.azimuth, "degrees from the front towards the body's left", between(-360, 360));
+  v.check("sequence", c.sequence.empty() == (c.worst > 0), "and 'worst' are one or the other",
+          "name a sequence, or say how many of the worst");
+}
+
+template <class V>
 void visit(V& v, Budget& c) {
   v("words", c.words, "key=value of the sweep");
   v("set", c.set, "measured in the place of the paper's");
@@ -62,6 +76,7 @@ void visit(V& v, PaperFile& c) {
   v("beside", c.beside, "further metrics shown of ours", metric_names());
   v("tables", c.tables, "printed", required());
   v("claims", c.claims, "what the paper says of them");
+  v("pictures", c.pictures, "of rows at the same moments");
   v("smoke", c.smoke, "minutes");
   v("lite", c.lite, "hours");
   v("full", c.full, "the paper's own schedule");
@@ -78,20 +93,28 @@ class Checker {
     if (file_.tables.empty())
       throw config_error(root_, "tables", "'tables' is empty", "name one set with its rows");
     for (size_t t = 0; t < file_.tables.size(); ++t) check_table(t);
-    std::vector<std::string> rows(rows_.begin(), rows_.end());
     for (size_t c = 0; c < file_.claims.size(); ++c)
-      for (const auto& [key, row] : {std::pair{"better", &file_.claims[c].better},
-                                     std::pair{"than", &file_.claims[c].than}}) {
-        if (rows_.contains(*row)) continue;
-        const std::string close = nearest(*row, rows);
-        throw config_error(
-            root_, "claims." + std::to_string(c) + "." + key,
-            in_quotes(*row) + " is no row of the tables",
-            close.empty() ? "name one of their rows" : "did you mean " + in_quotes(close) + "?");
-      }
+      for (const auto& [key, row] :
+           {std::pair{"better", &file_.claims[c].better}, std::pair{"than", &file_.claims[c].than}})
+        check_row("claims." + std::to_string(c) + "." + key, *row);
+    for (size_t p = 0; p < file_.pictures.size(); ++p) {
+      const std::string at = "pictures." + std::to_string(p) + ".rows";
+      if (file_.pictures[p].rows.empty())
+        throw config_error(root_, at, "'rows' is empty", "name one of the tables' rows");
+      for (size_t r = 0; r < file_.pictures[p].rows.size(); ++r)
+        check_row(at + "." + std::to_string(r), file_.pictures[p].rows[r]);
+    }
   }
 
  private:
+  void check_row(const std::string& at, const std::string& row) const {
+    if (rows_.contains(row)) return;
+    const std::string close = nearest(row, {rows_.begin(), rows_.end()});
+    throw config_error(
+        root_, at, in_quotes(row) + " is no row of the tables",
+        close.empty() ? "name one of their rows" : "did you mean " + in_quotes(close) + "?");
+  }
+
   void check_table(size_t t) {
     std::set<std::string> here;
     const std::string path = "tables." + std::to_string(t) + ".rows";

@@ -33,6 +33,17 @@ struct Claim {
   std::string tried;  ///< what was tried where it does not hold
 };
 
+/// What rows make of sequences of the benchmark, at the same moments (pictures.h).
+struct Picture {
+  std::string says;               ///< the line under it
+  std::string set;                ///< of the benchmark: naked, clothed or scans
+  std::string sequence;           ///< of the set
+  int worst = 0;                  ///< in its place: those on which the first row is farthest off
+  std::vector<double> moments;    ///< seconds; empty: six, evenly spread
+  std::vector<std::string> rows;  ///< of the tables
+  double azimuth = 32;            ///< degrees from the front towards the body's left
+};
+
 /// What a budget adds to the sweep.
 struct Budget {
   std::vector<std::string> words;  ///< as `restage sweep run` takes them
@@ -50,6 +61,7 @@ struct PaperFile {
   std::vector<std::string> beside;   ///< further ones that are shown of ours
   std::vector<PaperTable> tables;
   std::vector<Claim> claims;
+  std::vector<Picture> pictures;
   Budget smoke, lite, full;
 
   const Budget& budget(const std::string& name) const;
@@ -58,7 +70,7 @@ struct PaperFile {
 };
 
 /// InputError at file and line: unknown keys and metrics, rows with too many or too few figures,
-/// rows that stand twice, claims about rows that are not there.
+/// rows that stand twice, claims about rows and pictures of rows that are not there.
 PaperFile read_paper_file(const std::string& path);
 
 }  // namespace restage::reproduce

@@ -83,10 +83,15 @@ Json evaluate_held_out(const Bundle& models, const TrainConfig& config) {
   return out;
 }
 
-Json evaluate_benchmark(const Bundle& models, const Evaluate& evaluate, const TrainConfig& config) {
+BenchmarkOptions benchmark_options(const TrainConfig& config) {
   BenchmarkOptions how{config.evaluation.system, config.evaluation.every, config.seed};
   how.metrics = metrics::recorded();
   how.anchor = config.evaluation.anchor;
+  return how;
+}
+
+Json evaluate_benchmark(const Bundle& models, const Evaluate& evaluate, const TrainConfig& config) {
+  const BenchmarkOptions how = benchmark_options(config);
   Json out = Json::object();
   for (const std::string& set : evaluate.sets) {
     std::vector<std::string> names;
@@ -209,6 +214,16 @@ TrialOutcome run_trial(const std::string& config_yaml_path, const std::string& i
                                            : evaluate_benchmark(trained.bundle, evaluate, config);
   throw_if_stopped();
   return out;
+}
+
+std::optional<Prediction> perform(const std::string& config_yaml_path, const std::string& store,
+                                  const std::string& sequence_folder) {
+  const TrainConfig config = read(load_config_tree(config_yaml_path));
+  Identities identities;
+  for (const StageId& stage : identities.stages(config))
+    if (!Store(store).has(stage)) return std::nullopt;
+  const StoreTraining trained = train_in_store(Store(store), config, &identities, {});
+  return retarget_sequence(trained.bundle, sequence_folder, benchmark_options(config));
 }
 
 std::vector<StageForecast> measure(const ConfigNode& tree) {

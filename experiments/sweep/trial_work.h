@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "datasets/schema.h"
 #include "experiments/sweep/sweep_file.h"
 #include "nn/config/config_tree.h"
 #include "train/forecast.h"
@@ -65,6 +66,11 @@ struct TrialOutcome {
 TrialOutcome run_trial(const std::string& config_yaml_path, const std::string& id,
                        const Evaluate& evaluate, const std::string& store,
                        const TrainOptions& options, const std::string& last_stage = "");
+
+/// What a trial's system makes of a sequence of the benchmark, as it is evaluated; nothing while
+/// the store lacks one of its artifacts.
+std::optional<Prediction> perform(const std::string& config_yaml_path, const std::string& store,
+                                  const std::string& sequence_folder);
 
 /// What the stages of a configuration cost.
 std::vector<StageForecast> measure(const ConfigNode& tree);

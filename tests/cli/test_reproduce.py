@@ -1,7 +1,9 @@
 """restage reproduce: a paper's experiments from their folder to a page with verdicts."""
 import os
+import shutil
+import struct
 
-from support import ROOT, CliTest
+from support import DATA, ROOT, CliTest
 from tiny_run import CONFIG
 
 BASE = CONFIG.replace("motions: {train: 4, validation: 2, test: 1}", "motions: {train: 4, validation: 2, test: 2}").replace(
@@ -75,6 +77,42 @@ class Reproduce(CliTest):
         self.assertEqual(self.reproduce("--budget", "lite", "--out", "page/work", "--page", "page", "--no-run"), found)
         head = lambda text: text[text.index("Claims:"):]
         self.assertEqual(head(self.text("page/somebody2024.md")), head(page))
+
+    def test_pictures(self):
+        self.done("data", "build", os.path.join(ROOT, "configs", "data", "small_benchmark.yaml"), "out=small", "data=" + DATA)
+        sequence = os.listdir(self.path("small/scans"))[0]
+        pictures = ("pictures:\n  - {says: Two moments, set: scans, sequence: %s, rows: [trained, untrained], moments: [0.1, 0.3]}\n"
+                    "  - {says: The worst, set: naked, worst: 1, rows: [trained]}\n" % sequence)
+        own = PAPER.replace("lite: {set: true_skeletons", "lite: {words: ['seeds=[2, 1]', evaluate.benchmark=small, 'evaluate.sets=[naked]']")
+        self.write("experiments/one/paper.yaml", own + pictures)
+        lite = os.path.join(ROOT, "experiments", "weights", "lite.safetensors")
+        self.write("experiments/one/sweep.yaml", SWEEP.replace("{stages: [motion]}", "{skeleton.from: %s, deformation.from: %s}" % (lite, lite)))
+        self.reproduce("--budget", "lite", "--out", "r", "--keep")
+        shapes = []
+        for number in (1, 2):
+            name = "r/somebody2024/one-%d.png" % number
+            self.assertIn("(%s)" % name[2:], self.text("r/somebody2024.md"))
+            shapes.append(struct.unpack(">II", self.bytes(name)[16:24]))
+        # Lines of cells: source, rows, truth; columns: moments.
+        self.assertAlmostEqual(shapes[0][1] / shapes[1][1], 4 / 3, 1)
+        self.assertAlmostEqual(shapes[0][0] / shapes[1][0], 2 / 6, 1)
+        self.assertIn("The worst: " + os.listdir(self.path("small/naked"))[0], self.text("r/somebody2024.md"))
+        # The lowest seed's; the same bytes again; from results without weights the picture stays as it is.
+        first = [self.bytes("r/somebody2024/one-%d.png" % n) for n in (1, 2)]
+        self.reproduce("--budget", "lite", "--out", "r")
+        self.assertEqual([self.bytes("r/somebody2024/one-%d.png" % n) for n in (1, 2)], first)
+        shutil.rmtree(self.path("r/store"))
+        self.write("r/somebody2024/one-1.png", "kept")
+        os.remove(self.path("r/somebody2024/one-2.png"))
+        self.reproduce("--budget", "lite", "--out", "r", "--no-run")
+        self.assertEqual(self.bytes("r/somebody2024/one-1.png"), b"kept")
+        self.assertIn("one-1.png", self.text("r/somebody2024.md"))
+        self.assertNotIn("one-2.png", self.text("r/somebody2024.md"))
+        # Bad recipes.
+        for change, *contains in ((("rows: [trained]", "rows: [traind]"), "traind", "trained"), (("worst: 1, ", ""), "'worst'"),
+                                  (("set: scans", "set: scan"), "scan"), (("rows: [trained]", "rows: []"), "'rows' is empty")):
+            self.write("experiments/one/paper.yaml", own + pictures.replace(*change))
+            self.bad_input(["reproduce", "somebody2024", "--budget", "lite", "--out", "r"], "paper.yaml:", *contains)
 
     def test_too_few_seeds_tell_nothing_and_words_make_other_trials(self):
         found = self.reproduce("--budget", "smoke", "--out", "r")
