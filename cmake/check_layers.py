@@ -56,6 +56,7 @@ ONLY_IN = {
     "nlohmann/": ["nn/weights/", "datasets/readers/", "datasets/benchmark/manifest.cpp",
                   "datasets/importers/makehuman_pack.cpp", "datasets/fetch/fetch_cmu.cpp", "train/", "infer/",
                   "experiments/"],
+    "mpi.h": ["train/mpi/"],
     "openssl/": ["datasets/readers/sha256.cpp"],
     "stb/": ["infer/render/"],
     "lzma.h": ["datasets/readers/"],

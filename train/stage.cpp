@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 
 #include "autograd/base/log.h"
 
@@ -113,6 +114,114 @@ std::vector<StateEntry> Stage::weights() const {
     if (n.handed_on)
       for (StateEntry& entry : state_of(*n.model.net, prefix_of(n.role)))
         out.push_back(std::move(entry));
+  return out;
+}
+
+void Stage::cut_steps(int64_t micro_batches, Team& team) {
+  if (examples_per_step() % micro_batches != 0)
+    throw InputError(name_ + ".optimiser.batch",
+                     "of " + std::to_string(examples_per_step()) + " cannot be cut into " +
+                         std::to_string(micro_batches) + " micro-batches",
+                     "give a batch that loop.micro_batches divides");
+  if (micro_batches % team.size() != 0)
+    throw InputError("loop.micro_batches",
+                     "is " + std::to_string(micro_batches) + ", which " +
+                         std::to_string(team.size()) + " processes cannot divide",
+                     "give a multiple of that, or start fewer");
+  micro_batches_ = micro_batches;
+  team_ = &team;
+}
+
+std::vector<StateEntry> Stage::state() const {
+  std::vector<StateEntry> out;
+  for (const Network& n : networks_)
+    for (StateEntry& entry : state_of(*n.model.net, prefix_of(n.role)))
+      out.push_back(std::move(entry));
+  return out;
+}
+
+namespace {
+
+/// Gradients and buffers of a micro-batch as one row of numbers.
+class Row {
+ public:
+  /// Those that a micro-batch has or changes; all have and change the same.
+  explicit Row(std::vector<StateEntry> entries) : entries_(std::move(entries)) {
+    for (const StateEntry& entry : entries_) width_ += static_cast<size_t>(entry.value->numel());
+  }
+  size_t width() const { return width_; }
+
+  std::vector<float> of(const Gradients& gradients) const {
+    std::vector<float> out;
+    out.reserve(width_);
+    for (const StateEntry& entry : entries_) {
+      const Tensor& t =
+          entry.parameter == nullptr ? *entry.value : *gradients.find(entry.parameter->id);
+      out.insert(out.end(), t.data<float>(), t.data<float>() + t.numel());
+    }
+    return out;
+  }
+  /// Buffers go to where they are, gradients into `gradients`.
+  void spread(const std::vector<float>& row, Gradients* gradients) const {
+    const float* from = row.data();
+    for (const StateEntry& entry : entries_) {
+      Tensor t = Tensor::empty(entry.value->shape());
+      std::copy_n(from, t.numel(), t.data<float>());
+      from += t.numel();
+      if (entry.parameter == nullptr)
+        *entry.value = t;
+      else
+        gradients->set(entry.parameter->id, t);
+    }
+  }
+
+ private:
+  std::vector<StateEntry> entries_;
+  size_t width_ = 0;
+};
+
+}  // namespace
+
+Differentiated Stage::parts(const std::function<Differentiated(const MicroBatch&)>& compute) {
+  if (micro_batches_ == 1) return compute({});
+  const std::vector<StateEntry> all = state();
+  std::map<Tensor*, Tensor> before, began;  // what buffers are, and copies that a micro-batch gets
+  for (const StateEntry& entry : all)
+    if (entry.parameter == nullptr) before[entry.value] = *entry.value;
+  const auto belongs = [&](const StateEntry& entry, const Gradients& gradients) {
+    if (entry.parameter != nullptr) return gradients.find(entry.parameter->id) != nullptr;
+    const Tensor &now = *entry.value, &then = began[entry.value];
+    return now.raw() != then.raw() || now.version() != then.version();
+  };
+  std::optional<Row> row;
+  std::unique_ptr<Team::Sum> sum;
+  std::vector<std::vector<double>> mine;
+  for (int64_t i = team_->rank(); i < micro_batches_; i += team_->size()) {
+    for (const auto& [buffer, value] : before) *buffer = began[buffer] = value.clone();
+    const Differentiated d = compute({i, micro_batches_});
+    if (!row) {
+      std::vector<StateEntry> those;
+      std::copy_if(all.begin(), all.end(), std::back_inserter(those),
+                   [&](const StateEntry& entry) { return belongs(entry, d.gradients); });
+      row.emplace(std::move(those));
+      sum = team_->sum(row->width());
+    }
+    sum->give(row->of(d.gradients));
+    mine.push_back(d.values);
+    mine.back().push_back(d.loss);
+  }
+  const double share = 1.0 / static_cast<double>(micro_batches_);
+  Differentiated out;
+  std::vector<float> total = sum->total();
+  for (float& x : total) x *= static_cast<float>(share);
+  row->spread(total, &out.gradients);
+  out.norm = out.gradients.norm();
+  for (const auto& values : team_->all(mine)) {  // in order
+    out.values.resize(values.size());
+    for (size_t i = 0; i < values.size(); ++i) out.values[i] += share * values[i];
+  }
+  out.loss = out.values.back();
+  out.values.pop_back();
   return out;
 }
 

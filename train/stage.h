@@ -15,6 +15,7 @@
 #include "nn/weights/state.h"
 #include "train/model_choice.h"
 #include "train/optim/optimiser.h"
+#include "train/team.h"
 
 namespace restage {
 
@@ -31,6 +32,28 @@ Points points_of(const Tensor& points, int64_t row, int64_t count);
 /// Skeleton number `row` of a tensor [..., 22, 3].
 Joints joints_of(const Tensor& joints, int64_t row);
 
+/// One differentiation: runs `loss` on a fresh tape in training mode and returns the gradients of
+/// its first result. If loss or gradient is not finite the same step is repeated under FiniteCheck,
+/// which names the op and module where the first such value appears (NonFiniteError).
+struct Differentiated {
+  Gradients gradients;
+  double loss = 0, norm = 0;
+  std::vector<double> values = {};  ///< what else a stage wants to know of it, as means
+};
+Differentiated differentiate(const RngKey& key, const std::function<Var(Context&)>& loss);
+
+/// A micro-batch: number `index` of those `of` that a step's examples are cut into.
+struct MicroBatch {
+  int64_t index = 0, of = 1;
+  int64_t count(int64_t batch) const { return batch / of; }
+  /// The first of its examples, of those of a step that begin at number `first`.
+  int64_t from(int64_t first, int64_t batch) const { return first + index * count(batch); }
+  /// What is random in it.
+  RngKey key(const RngKey& step) const {
+    return of == 1 ? step : step.fold("part").fold(static_cast<uint64_t>(index));
+  }
+};
+
 class Stage {
  public:
   Stage(std::string name, OptimiserConfig optimiser)
@@ -45,6 +68,10 @@ class Stage {
   int64_t examples_per_step() const { return optimisation_.batch; }
   /// Every `batches` steps the same examples come again: can it learn them by heart? 0: never.
   void repeat_batches(int64_t batches) { repeated_ = batches; }
+  /// Cuts every step into micro-batches, of which each process of a team computes some
+  /// (docs/design/devices.md). InputError: the batch cannot be divided by their number, or their
+  /// number by that of the processes.
+  void cut_steps(int64_t micro_batches, Team& team);
   /// Optimiser step number `step` (from 0). Everything random is a function of (seed, step), so a
   /// resumed run repeats the same bits. Returns what to log.
   virtual NamedValues step(int64_t step) = 0;
@@ -91,6 +118,11 @@ class Stage {
   virtual void save_more(TensorFile&) const {}
   virtual void load_more(const TensorFile&, const std::string& /*where*/) {}
 
+  int64_t micro_batches() const { return micro_batches_; }
+  /// The mean of what `compute` gives for each micro-batch of a step; those of other processes
+  /// come from there.
+  Differentiated parts(const std::function<Differentiated(const MicroBatch&)>& compute);
+
   /// The step whose examples are drawn in this one.
   int64_t drawn(int64_t step) const { return repeated_ > 0 ? step % repeated_ : step; }
 
@@ -106,20 +138,15 @@ class Stage {
     std::string name;
     std::unique_ptr<Optimiser> optimiser;
   };
+  /// All networks, under the names of a checkpoint.
+  std::vector<StateEntry> state() const;
+
   std::string name_;
-  int64_t repeated_ = 0;
+  int64_t repeated_ = 0, micro_batches_ = 1;
+  Team* team_ = &alone();
   bool started_from_weights_ = false;
   std::vector<Network> networks_;
   std::vector<NamedOptimiser> optimisers_;
 };
-
-/// One differentiation: runs `loss` on a fresh tape in training mode and returns the gradients of
-/// its first result. If loss or gradient is not finite the same step is repeated under FiniteCheck,
-/// which names the op and module where the first such value appears (NonFiniteError).
-struct Differentiated {
-  Gradients gradients;
-  double loss = 0, norm = 0;
-};
-Differentiated differentiate(const RngKey& key, const std::function<Var(Context&)>& loss);
 
 }  // namespace restage

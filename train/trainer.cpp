@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <filesystem>
 
@@ -122,7 +123,7 @@ void StageRun::all_steps() {
   }
   while (!over()) {
     const NamedValues values = step();
-    const bool stopped = stop_requested();
+    const bool stopped = options_.team->any(stop_requested());
     if (due(loop_.log_every)) {
       run_.metrics(stage_.name(), done_, values);
       tell([&](TrainObserver& o) { o.on_log(stage_, done_, values); });
@@ -140,6 +141,7 @@ void StageRun::all_steps() {
     if (stopped) {
       progress.finish();
       throw_if_stopped();
+      throw Interrupted(SIGTERM);  // it was another process of the team
     }
   }
   progress.finish();

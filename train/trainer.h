@@ -11,7 +11,7 @@ namespace restage {
 
 struct LoopConfig {
   int64_t log_every = 50, validate_every = 1000, checkpoint_every = 1000;
-  int64_t keep = 2, keep_every = 0, overfit_batches = 0;
+  int64_t keep = 2, keep_every = 0, overfit_batches = 0, micro_batches = 1;
   SelectionConfig selection = {};
 };
 
@@ -25,6 +25,9 @@ void visit(V& v, LoopConfig& c) {
   v("overfit_batches", c.overfit_batches,
     "the same so many batches again and again, to see whether they can be learned; 0: no",
     at_least(0));
+  v("micro_batches", c.micro_batches,
+    "parts of a step that are computed by themselves and added in order; processes share them",
+    positive());
   visit(v, c.selection);
 }
 
@@ -49,6 +52,7 @@ struct TrainOptions {
   MatmulPrecision precision = MatmulPrecision::float32;
   bool quiet = false;
   std::vector<TrainObserver*> observers = {};
+  Team* team = &alone();  ///< whose stages' steps these are; all end after the same one
   Bundle given = {};  ///< what stages trained elsewhere have left, for the file of a failed step
 };
 

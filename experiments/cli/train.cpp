@@ -1,8 +1,11 @@
 // restage train: all stages of a configuration, or the rest of an interrupted run.
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <sstream>
 
 #include "autograd/base/format.h"
+#include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 #include "autograd/base/parallel.h"
 #include "autograd/base/temporary.h"
@@ -10,6 +13,7 @@
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
 #include "experiments/observers/loggers.h"
+#include "experiments/scratch.h"
 #include "nn/config/config.h"
 #include "train/run_provenance.h"
 #include "train/stages/motion_stage.h"
@@ -121,7 +125,8 @@ void train_in(RunDir& run, const TrainConfig& config, const TrainingData& data,
   TensorBoardLog tensorboard(run.dir());
   CsvLog csv(run.dir());
   TrainOptions options;
-  options.quiet = common.quiet;
+  options.team = data.team;
+  options.quiet = common.quiet || data.team->rank() > 0;
   if (arguments.tensorboard) options.observers.push_back(&tensorboard);
   if (arguments.csv) options.observers.push_back(&csv);
   save_bundle(run.dir() + "/weights.safetensors", train_run(run, config, data, options));
@@ -169,7 +174,45 @@ int fast_dev_run(const TrainConfig& config, const TrainingData& data,
   return 0;
 }
 
-int run_train(const TrainArguments& arguments, const Common& common) {
+/// The run, at its newest checkpoint if it is resumed. The first process of a team keeps it; the
+/// others begin with what it has, in `scratch`.
+RunDir run_of(const Request& request, const TrainConfig& config, const RunInput& input, Team& team,
+              std::optional<Scratch>* scratch) {
+  const std::string provenance = provenance_json(input);
+  std::string bytes, place;
+  if (team.rank() == 0) {
+    RunDir run = request.resume.empty()
+                     ? RunDir::create(config.run_root, config.name, input.resolved_yaml, provenance,
+                                      config.stages)
+                     : RunDir::resume(request.resume, config.stages);
+    const auto last = latest_checkpoint(run.dir(), config.stages);
+    for (const std::string& stage : last ? config.stages : std::vector<std::string>{}) {
+      const auto own = latest_checkpoint(run.dir(), {stage});
+      if (own)
+        place += stage + " " + std::to_string(own->step) + " " + std::to_string(own->bytes.size()) +
+                 "\n";
+      if (own) bytes += own->bytes;
+    }
+    team.of_first(place);
+    team.of_first(bytes);
+    return run;
+  }
+  place = team.of_first("");
+  bytes = team.of_first("");
+  scratch->emplace();
+  const std::string folder = (*scratch)->file("run");
+  {
+    RunDir run = RunDir::create_at(folder, input.resolved_yaml, provenance, config.stages);
+    std::istringstream lines(place);
+    std::string stage;
+    int64_t step = 0;
+    for (size_t size = 0, at = 0; lines >> stage >> step >> size; at += size)
+      run.save_checkpoint(stage, step, std::string_view(bytes).substr(at, size));
+  }
+  return RunDir::resume(folder, config.stages);
+}
+
+int train_with(Team& team, const TrainArguments& arguments, const Common& common) {
   const Request request = read_request(arguments, common);
   TrainConfig config = configured(request);
   if (arguments.fast_dev_run) config = shortened(request, config);
@@ -177,23 +220,44 @@ int run_train(const TrainArguments& arguments, const Common& common) {
     print(common.json, {{"config", resolved_yaml(config)}}, resolved_yaml(config));
     return 0;
   }
-  const TrainingData data(config.data);
+  TrainingData data(config.data);
+  data.team = &team;
   const RunInput input = provenance_of(config, data, common);
-  if (!request.resume.empty()) check_same_run(request.resume, input);
+  if (!request.resume.empty() && team.rank() == 0) check_same_run(request.resume, input);
   check_stages(config, data);
   for (const std::string& remark : remarks(config.data, data.train)) log_warning(remark);
   if (arguments.dry_run) return dry_run(config, data, common);
   if (arguments.fast_dev_run) return fast_dev_run(config, data, arguments, common);
 
-  RunDir run = request.resume.empty()
-                   ? RunDir::create(config.run_root, config.name, input.resolved_yaml,
-                                    provenance_json(input), config.stages)
-                   : RunDir::resume(request.resume, config.stages);
-  print(common.json, {{"run", run.dir()}, {"seed", config.seed}}, run.dir() + "\n");
+  std::optional<Scratch> scratch;
+  RunDir run = run_of(request, config, input, team, &scratch);
+  if (team.rank() == 0)
+    print(common.json, {{"run", run.dir()}, {"seed", config.seed}}, run.dir() + "\n");
   finish_output();
   train_in(run, config, data, arguments, common);
-  log_info("weights: " + run.dir() + "/weights.safetensors");
+  if (team.rank() == 0) log_info("weights: " + run.dir() + "/weights.safetensors");
   return 0;
+}
+
+int run_train(const TrainArguments& arguments, const Common& common) {
+  Team& team = team_of_processes();
+  if (team.size() == 1) return train_with(team, arguments, common);
+  if (team.rank() > 0) set_log_level(LogLevel::warning);
+  // One that fails by itself would leave the others waiting for it.
+  try {
+    return train_with(team, arguments, common);
+  } catch (const Interrupted& error) {  // all of them, after the same step
+    team.any(true);  // mpirun kills the others as soon as one has ended: all checkpoints are there
+    if (team.rank() == 0) throw;
+    return error.exit_code;
+  } catch (const Error& error) {
+    print_error(team.name() + ": " + error.what());
+    team.abort(error.exit_code);
+  } catch (const std::exception& error) {
+    print_error(team.name() + ": " + error.what());
+    team.abort(1);
+  }
+  return 1;
 }
 
 }  // namespace

@@ -139,6 +139,18 @@ class Runs(Train):
         self.assertNotEqual(self.weights_of(a), self.weights_of(b))
         self.assertEqual(self.weights_of(b), self.weights_of(c))
 
+    def test_other_processes_are_not_passed_over(self):
+        os.environ["SLURM_STEP_NUM_TASKS"] = "3"  # srun without what the program needs: three times the same training
+        self.addCleanup(os.environ.pop, "SLURM_STEP_NUM_TASKS")
+        self.bad_input(["train", "tiny.yaml"], "3", "MPI")
+        self.assertFalse(os.path.exists(self.path("runs")))
+
+    def test_micro_batches(self):
+        self.bad_input(["train", "tiny.yaml", "loop.micro_batches=3"], "cannot be cut into 3")
+        whole, cut, again = (self.weights_of(self.train("tiny.yaml", "loop.micro_batches=%d" % n)) for n in (1, 2, 2))
+        self.assertEqual(cut, again)
+        self.assertNotEqual(whole, cut)
+
     def test_any_number_of_threads_gives_the_same_bytes(self):
         runs = [self.train("tiny.yaml", "--threads", n) for n in (1, 2, 3)]
         for run in runs[1:]:

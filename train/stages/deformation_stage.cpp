@@ -65,9 +65,9 @@ DeformationBatch DeformationStage::batch_of(const PairBatch& p) const {
   return b;
 }
 
-PairBatch DeformationStage::batch(int64_t step) const {
+PairBatch DeformationStage::batch(int64_t step, const MicroBatch& part) const {
   const int64_t n = config_.optimiser.batch;
-  return sampler_.batch(drawn(step) * n, n);
+  return sampler_.batch(part.from(drawn(step) * n, n), part.count(n));
 }
 
 /// Sums over the points of a pair, means over pairs.
@@ -80,19 +80,23 @@ Var DeformationStage::loss(Context& ctx, const PairBatch& pairs, int64_t step,
   Var total = distance_sum(out.posed, b.posed_points, config_.loss);
   if (config_.supervision > 0)
     total = total + scale(skin_cross_entropy(out.weights, pairs.weights), config_.supervision);
-  return scale(total, 1.0 / static_cast<double>(config_.optimiser.batch));
+  return scale(total, 1.0 / static_cast<double>(b.posed_points.size(0)));
 }
 
 NamedValues DeformationStage::step(int64_t step) {
   const OptimiserConfig& o = config_.optimiser;
-  const PairBatch pairs = batch(step);
-  double distance = 0;
-  const Differentiated d = differentiate(key_.fold(static_cast<uint64_t>(step)), [&](Context& ctx) {
-    return loss(ctx, pairs, step, &distance);
+  const Differentiated d = parts([&](const MicroBatch& part) {
+    const PairBatch pairs = batch(step, part);
+    double distance = 0;
+    Differentiated out =
+        differentiate(part.key(key_.fold(static_cast<uint64_t>(step))),
+                      [&](Context& ctx) { return loss(ctx, pairs, step, &distance); });
+    out.values = {distance};
+    return out;
   });
   const double rate = learning_rate(o.schedule, step, o.steps);
   optimiser_->step(d.gradients, rate);
-  return {{"loss", d.loss}, {"distance_mm", 1e3 * distance}, {"rate", rate}};
+  return {{"loss", d.loss}, {"distance_mm", 1e3 * d.values[0]}, {"rate", rate}};
 }
 
 NamedValues DeformationStage::validate() {

@@ -58,7 +58,7 @@ class DeformationStage final : public Stage {
   std::vector<Shown> show() override;
 
  private:
-  PairBatch batch(int64_t step) const;
+  PairBatch batch(int64_t step, const MicroBatch& part = {}) const;
   DeformationBatch batch_of(const PairBatch& pairs) const;
   Var loss(Context& ctx, const PairBatch& pairs, int64_t step, double* distance) const;
 

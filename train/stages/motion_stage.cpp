@@ -1,6 +1,7 @@
 #include "train/stages/motion_stage.h"
 
 #include <cmath>
+#include <map>
 
 #include "autograd/base/log.h"
 #include "autograd/ops/elementwise.h"
@@ -31,12 +32,12 @@ WindowConfig held_out(WindowConfig c, int64_t frames) {
 }
 
 /// With self samples apart, the cycle's windows have none and the others are nothing else.
-WindowConfig cycle_windows(const MotionStageConfig& c) {
+WindowConfig windows_of_cycle(const MotionStageConfig& c) {
   WindowConfig w = c.windows;
   if (c.self_first_pass) w.self_share = 0;
   return w;
 }
-WindowConfig self_windows(const MotionStageConfig& c) {
+WindowConfig windows_of_self(const MotionStageConfig& c) {
   WindowConfig w = c.windows;
   w.self_share = 1 - c.paired_share;
   w.truth = c.paired_share > 0;
@@ -128,8 +129,8 @@ struct MotionStage::Windows {
         held_out_seen(ask(s.validation_, "validation",
                           asked_for(s.config_, s.config_.validation_windows), s.given_, 1,
                           s.answers_)),
-        cycle(s.train_, cycle_windows(s.config_), seed(s, "motion.windows"), tracks(seen)),
-        self(s.train_, self_windows(s.config_), seed(s, "motion.self"), tracks(seen)),
+        cycle(s.train_, windows_of_cycle(s.config_), seed(s, "motion.windows"), tracks(seen)),
+        self(s.train_, windows_of_self(s.config_), seed(s, "motion.self"), tracks(seen)),
         validation(s.validation_, held_out(s.config_.windows, s.config_.validation_frames), 1,
                    tracks(held_out_seen)) {}
   static uint64_t seed(const MotionStage& s, const char* name) {
@@ -193,7 +194,7 @@ const MotionStage::Windows& MotionStage::windows() const {
 
 MotionStatistics MotionStage::statistics() const {
   std::vector<Tensor> joints, rest, trans, rotations;
-  const WindowSampler sampler(train_, cycle_windows(config_),
+  const WindowSampler sampler(train_, windows_of_cycle(config_),
                               sampler_seed(seed_, "motion.windows"));
   for (int64_t i = 0; i < 32; ++i) {
     const WindowBatch b = sampler.batch(i * 16, 16);
@@ -206,35 +207,48 @@ MotionStatistics MotionStage::statistics() const {
           columns(trans, 3, 0.05), columns(rotations, 6 * kJoints, 0.01)};
 }
 
-void MotionStage::update_discriminator(int64_t step, const WindowBatch& batch, double rate,
+void MotionStage::update_discriminator(const RngKey& step, double rate, const Drawn& batch,
                                        NamedValues* values) {
   if (balance_ <= config_.balance_limit) return;
-  double score = 0;
-  const Differentiated d = differentiate(
-      key_.fold("discriminator").fold(static_cast<uint64_t>(step)), [&](Context& ctx) {
-        Context plain;  // the generator gets no gradient from this step
-        MotionState state;
-        const MotionOutput fake =
-            model_->forward(plain, motion_batch(batch).seen(batch.rest_b), &state);
-        const DiscriminatorLosses l =
-            discriminator_losses(ctx, *discriminator_, batch.real_b, batch.real_trans_b,
-                                 batch.rest_b, fake.joints.value, fake.trans.value, batch.rest_b);
-        score = l.fake_score;
-        return l.total;
-      });
-  balance_ = 0.99 * balance_ + 0.01 * score;
+  const Differentiated d = parts([&](const MicroBatch& part) {
+    const WindowBatch& windows = batch(part).windows;
+    double score = 0;
+    Differentiated out = differentiate(part.key(step), [&](Context& ctx) {
+      Context plain;  // the generator gets no gradient from this step
+      MotionState state;
+      const MotionOutput fake =
+          model_->forward(plain, motion_batch(windows).seen(windows.rest_b), &state);
+      const DiscriminatorLosses l =
+          discriminator_losses(ctx, *discriminator_, windows.real_b, windows.real_trans_b,
+                               windows.rest_b, fake.joints.value, fake.trans.value, windows.rest_b);
+      score = l.fake_score;
+      return l.total;
+    });
+    out.values = {score};
+    return out;
+  });
+  balance_ = 0.99 * balance_ + 0.01 * d.values[0];
   discriminator_optimiser_->step(d.gradients, rate);
   values->push_back({"discriminator", d.loss});
 }
 
-MotionStage::Batch MotionStage::batch(int64_t step) const {
+int64_t MotionStage::cycle_windows() const {
   const int64_t n = config_.optimiser.batch;
+  if (!config_.self_first_pass) return n;
+  return n - std::llround(config_.windows.self_share * static_cast<double>(n));
+}
+
+MotionStage::Batch MotionStage::batch(int64_t step, const MicroBatch& part) const {
+  // Self samples are dealt as evenly as can be; the cycle's are the others.
+  const int64_t self = self_windows(), n = part.count(config_.optimiser.batch);
+  const int64_t from = self * part.index / part.of, to = self * (part.index + 1) / part.of;
   Batch out;
-  if (config_.self_first_pass)
-    out.self = std::llround(config_.windows.self_share * static_cast<double>(n));
+  out.self = to - from;
   out.cycle = n - out.self;
-  if (out.cycle > 0) out.windows = windows().cycle.batch(drawn(step) * out.cycle, out.cycle);
-  if (out.self > 0) out.own = windows().self.batch(drawn(step) * out.self, out.self);
+  if (out.cycle > 0)
+    out.windows =
+        windows().cycle.batch(drawn(step) * cycle_windows() + part.index * n - from, out.cycle);
+  if (out.self > 0) out.own = windows().self.batch(drawn(step) * self + from, out.self);
   return out;
 }
 
@@ -246,43 +260,67 @@ NamedTensors MotionStage::examples(int64_t step) const {
   return out;
 }
 
-NamedValues MotionStage::step(int64_t step) {
-  const OptimiserConfig& o = config_.optimiser;
-  const double rate = learning_rate(o.schedule, step, o.steps);
-  const Batch b = batch(step);
-  const int64_t cycle = b.cycle, self = b.self;
-  const double self_part = static_cast<double>(self) / static_cast<double>(o.batch);
-  NamedValues values;
+Differentiated MotionStage::learn(const RngKey& key, const Batch& b, bool judged) {
+  const double self_part = static_cast<double>(b.self) / static_cast<double>(b.self + b.cycle);
   MotionLosses l, s;
-  const bool adversarial = config_.weights.adversarial > 0 && cycle > 1;
-  if (adversarial) update_discriminator(step, b.windows, rate, &values);
-  const Differentiated d = differentiate(key_.fold(static_cast<uint64_t>(step)), [&](Context& ctx) {
+  Differentiated out = differentiate(key, [&](Context& ctx) {
     Var total;
-    if (self > 0) {
+    if (b.self > 0) {
       s = self_losses(ctx, *model_, supervised_batch(b.own), config_.weights);
       total = scale(s.total, self_part);
     }
-    if (cycle > 0) {
-      l = motion_losses(ctx, *model_, adversarial ? discriminator_ : nullptr,
-                        motion_batch(b.windows), config_.weights);
-      const Var part = scale(l.total, 1 - self_part);
-      total = self > 0 ? total + part : part;
+    if (b.cycle > 0) {
+      l = motion_losses(ctx, *model_, judged ? discriminator_ : nullptr, motion_batch(b.windows),
+                        config_.weights);
+      const Var rest = scale(l.total, 1 - self_part);
+      total = b.self > 0 ? total + rest : rest;
     }
     return total;
   });
+  // Means over micro-batches of what is a mean over their windows of one kind.
+  const auto value = [&](const Var& v, int64_t here, int64_t all) {
+    const double part = static_cast<double>(here * config_.optimiser.batch) /
+                        static_cast<double>(std::max<int64_t>(1, all * (b.self + b.cycle)));
+    return v.value.defined() ? part * v.value.item() : 0;
+  };
+  const auto of_cycle = [&](const Var& v) { return value(v, b.cycle, cycle_windows()); };
+  out.values = {of_cycle(l.cycle), of_cycle(l.rotation), of_cycle(l.smoothness),
+                self_windows() > 0 ? value(s.self, b.self, self_windows()) : of_cycle(l.self),
+                of_cycle(l.adversarial)};
+  return out;
+}
+
+NamedValues MotionStage::step(int64_t step) {
+  const OptimiserConfig& o = config_.optimiser;
+  const double rate = learning_rate(o.schedule, step, o.steps);
+  std::map<int64_t, Batch> drawn;  // two rounds may ask for the same
+  const Drawn batch_of = [&](const MicroBatch& part) -> const Batch& {
+    const auto [at, fresh] = drawn.try_emplace(part.index);
+    if (fresh) at->second = batch(step, part);
+    return at->second;
+  };
+  const auto number = static_cast<uint64_t>(step);
+  const int64_t cycle = cycle_windows();
+  const bool judged = adversarial() && cycle / micro_batches() > 1;
+  NamedValues values;
+  if (judged)
+    update_discriminator(key_.fold("discriminator").fold(number), rate, batch_of, &values);
+  const Differentiated d = parts([&](const MicroBatch& part) {
+    return learn(part.key(key_.fold(number)), batch_of(part), judged);
+  });
   optimiser_->step(d.gradients, rate);
   values.insert(values.begin(), {"loss", d.loss});
-  if (adversarial) {
+  if (judged) {
     // softplus(-x) = -log sigmoid(x): the batch's mean score, recovered from the loss.
-    balance_ = 0.99 * balance_ + 0.01 * std::exp(-l.adversarial.value.item());
-    values.push_back({"adversarial", l.adversarial.value.item()});
+    balance_ = 0.99 * balance_ + 0.01 * std::exp(-d.values[4]);
+    values.push_back({"adversarial", d.values[4]});
   }
   if (cycle > 0) {
-    values.push_back({"cycle", l.cycle.value.item()});
-    values.push_back({"rotation", l.rotation.value.item()});
-    values.push_back({"smoothness", l.smoothness.value.item()});
+    values.push_back({"cycle", d.values[0]});
+    values.push_back({"rotation", d.values[1]});
+    values.push_back({"smoothness", d.values[2]});
   }
-  values.push_back({"self", self > 0 ? s.self.value.item() : l.self.value.item()});
+  values.push_back({"self", d.values[3]});
   values.push_back({"rate", rate});
   return values;
 }

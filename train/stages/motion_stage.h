@@ -109,14 +109,23 @@ class MotionStage final : public Stage {
     int64_t cycle = 0, self = 0;  ///< how many
     WindowBatch windows, own;
   };
-  Batch batch(int64_t step) const;
+  /// Of a step's windows, how many are for the cycle and how many are self samples in a pass of
+  /// their own.
+  int64_t cycle_windows() const;
+  int64_t self_windows() const { return config_.optimiser.batch - cycle_windows(); }
+  Batch batch(int64_t step, const MicroBatch& part = {}) const;
+  using Drawn = std::function<const Batch&(const MicroBatch&)>;
   MotionStatistics statistics() const;
   /// Made when they are first asked for: an extractor has to answer first.
   struct Windows;
   const Windows& windows() const;
   /// Discriminator's own step, unless it is winning clearly (spec 4.4).
-  void update_discriminator(int64_t step, const WindowBatch& batch, double rate,
+  void update_discriminator(const RngKey& step, double rate, const Drawn& batch,
                             NamedValues* values);
+  /// The network's gradient on a micro-batch; its values are the losses cycle, rotation,
+  /// smoothness, self and adversarial. `judged`: by the discriminator, too.
+  Differentiated learn(const RngKey& key, const Batch& batch, bool judged);
+  bool adversarial() const { return config_.weights.adversarial > 0; }
   void save_more(TensorFile& file) const override;
   void load_more(const TensorFile& file, const std::string& where) override;
 

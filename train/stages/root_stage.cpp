@@ -51,9 +51,12 @@ NamedTensors RootStage::examples(int64_t step) const {
 
 NamedValues RootStage::step(int64_t step) {
   const OptimiserConfig& o = config_.optimiser;
-  const PairBatch b = sampler_.batch(drawn(step) * o.batch, o.batch);
-  const Differentiated d = differentiate(key_.fold(static_cast<uint64_t>(step)),
-                                         [&](Context& ctx) { return loss(ctx, b); });
+  const Differentiated d = parts([&](const MicroBatch& part) {
+    const PairBatch b =
+        sampler_.batch(part.from(drawn(step) * o.batch, o.batch), part.count(o.batch));
+    return differentiate(part.key(key_.fold(static_cast<uint64_t>(step))),
+                         [&](Context& ctx) { return loss(ctx, b); });
+  });
   const double rate = learning_rate(o.schedule, step, o.steps);
   optimiser_->step(d.gradients, rate);
   return {{"loss", d.loss}, {"rate", rate}};

@@ -153,16 +153,17 @@ Var SkeletonStage::voting_loss(const SkeletonOutput& out, const CloudBatch& batc
   return total;
 }
 
-CloudBatch SkeletonStage::batch(int64_t step) const {
+CloudBatch SkeletonStage::batch(int64_t step, const MicroBatch& part) const {
   const int64_t n = config_.optimiser.batch;
-  return sampler_.batch(drawn(step) * n, n);
+  return sampler_.batch(part.from(drawn(step) * n, n), part.count(n));
 }
 
 /// Memories that are asked for are what this model says of the frame before: errors of today and
 /// of yesterday are alike, which none that is drawn would teach.
-void SkeletonStage::recall(int64_t step, CloudBatch* clouds) const {
+void SkeletonStage::recall(int64_t step, const MicroBatch& part, CloudBatch* clouds) const {
   if (clouds->asked.empty()) return;
-  const CloudBatch before = sampler_.before(drawn(step) * config_.optimiser.batch, *clouds);
+  const int64_t n = config_.optimiser.batch;
+  const CloudBatch before = sampler_.before(part.from(drawn(step) * n, n), *clouds);
   Context ctx;
   const SkeletonOutput answer = model_->forward(ctx, {before.points, before.past});
   // The step itself will find what makes it so, and name it.
@@ -178,10 +179,12 @@ void SkeletonStage::recall(int64_t step, CloudBatch* clouds) const {
 
 NamedValues SkeletonStage::step(int64_t step) {
   const OptimiserConfig& o = config_.optimiser;
-  CloudBatch clouds = batch(step);
-  recall(step, &clouds);
-  const Differentiated d = differentiate(key_.fold(static_cast<uint64_t>(step)),
-                                         [&](Context& ctx) { return loss(ctx, clouds); });
+  const Differentiated d = parts([&](const MicroBatch& part) {
+    CloudBatch clouds = batch(step, part);
+    recall(step, part, &clouds);
+    return differentiate(part.key(key_.fold(static_cast<uint64_t>(step))),
+                         [&](Context& ctx) { return loss(ctx, clouds); });
+  });
   const double rate = learning_rate(o.schedule, step, o.steps);
   optimiser_->step(d.gradients, rate);
   return {{"loss", d.loss}, {"gradient_norm", d.norm}, {"rate", rate}};

@@ -66,8 +66,8 @@ class SkeletonStage final : public Stage {
   std::vector<Shown> show() override;
 
  private:
-  CloudBatch batch(int64_t step) const;
-  void recall(int64_t step, CloudBatch* clouds) const;
+  CloudBatch batch(int64_t step, const MicroBatch& part = {}) const;
+  void recall(int64_t step, const MicroBatch& part, CloudBatch* clouds) const;
   Var loss(Context& ctx, const CloudBatch& batch) const;
   Var loss(const SkeletonAnswer& answer, const CloudBatch& batch) const;
   Var voting_loss(const SkeletonOutput& out, const CloudBatch& batch) const;

@@ -42,6 +42,7 @@ std::unique_ptr<Stage> make_stage(const TrainConfig& config, const std::string& 
   auto stage =
       type.make(section.config, {data.train, data.validation, config.seed, *so_far, data.answers});
   stage->repeat_batches(config.loop.overfit_batches);
+  stage->cut_steps(config.loop.micro_batches, data.team != nullptr ? *data.team : alone());
   if (section.init)
     stage->start_from(load_bundle(*section.init), section.init_names, *section.init);
   return stage;

@@ -14,6 +14,7 @@ struct TrainingData {
   explicit TrainingData(const CorpusSource& source)
       : train(load_corpus(source, "train")), validation(load_corpus(source, "validation")) {}
   Corpus train, validation;
+  Team* team = nullptr;  ///< processes that train on them together; null: this one alone
   std::optional<AnswerFolder> answers;  ///< where an extractor's answers to them are kept
 };
 

@@ -1,0 +1,182 @@
+// Steps cut into micro-batches, computed by one process or by several: the same bits. Here the
+// processes are threads; tests/train/mpi_team.py does the same with MPI.
+#include <gtest/gtest.h>
+
+#include <barrier>
+#include <cstdlib>
+#include <thread>
+
+#include "tests/support/errors.h"
+#include "tests/train/tiny_training.h"
+#include "train/team.h"
+
+namespace restage {
+namespace {
+
+using testing::bytes_of;
+using testing::choose;
+using testing::deformation;
+using testing::motion;
+using testing::optimisers;
+using testing::resize;
+using testing::root;
+using testing::skeleton;
+using testing::tiny_stage;
+using testing::tiny_training;
+
+/// What threads that play processes have in common.
+struct Table {
+  explicit Table(int n) : size(n), together(n), rows(n), numbers(n), flags(n), bytes(n) {}
+  const int size;
+  std::barrier<> together;
+  std::vector<std::vector<std::vector<float>>> rows;      // of each rank
+  std::vector<std::vector<std::vector<double>>> numbers;  // of each rank
+  std::vector<int> flags;
+  std::vector<std::string> bytes;
+};
+
+class Thread final : public Team {
+ public:
+  Thread(Table* table, int rank) : table_(table), rank_(rank) {}
+  int rank() const override { return rank_; }
+  int size() const override { return table_->size; }
+  std::unique_ptr<Sum> sum(size_t) override { return std::make_unique<Rows>(table_, rank_); }
+  std::vector<std::vector<double>> all(const std::vector<std::vector<double>>& mine) override {
+    table_->numbers[static_cast<size_t>(rank_)] = mine;
+    table_->together.arrive_and_wait();
+    std::vector<std::vector<double>> out;
+    for (size_t round = 0; round < mine.size(); ++round)
+      for (const auto& of_rank : table_->numbers) out.push_back(of_rank.at(round));
+    table_->together.arrive_and_wait();
+    return out;
+  }
+  bool any(bool mine) override { return mine; }
+  std::string of_first(std::string mine) override { return mine; }
+  std::string name() const override { return "thread"; }
+  [[noreturn]] void abort(int) override { std::abort(); }
+
+ private:
+  class Rows final : public Sum {
+   public:
+    Rows(Table* table, int rank) : table_(table), mine_(table->rows[static_cast<size_t>(rank)]) {
+      mine_.clear();
+    }
+    void give(std::vector<float> row) override { mine_.push_back(std::move(row)); }
+    std::vector<float> total() override {
+      table_->together.arrive_and_wait();
+      std::vector<float> out;
+      for (size_t round = 0; round < mine_.size(); ++round)
+        for (const auto& of_rank : table_->rows) {
+          const auto& row = of_rank.at(round);
+          if (out.empty())
+            out = row;
+          else
+            for (size_t i = 0; i < row.size(); ++i) out[i] += row[i];
+        }
+      table_->together.arrive_and_wait();
+      return out;
+    }
+
+   private:
+    Table* table_;
+    std::vector<std::vector<float>>& mine_;
+  };
+  Table* table_;
+  int rank_;
+};
+
+/// Three steps of a stage by so many processes, as each of them leaves it.
+std::vector<std::string> trained(const std::string& name, TrainConfig config, int64_t micro_batches,
+                                 int processes, std::vector<double>* losses = nullptr) {
+  config.loop.micro_batches = 1;  // cut below, for a team of our own
+  Table table(processes);
+  std::vector<std::string> out(static_cast<size_t>(processes));
+  std::vector<std::thread> threads;
+  for (int rank = 0; rank < processes; ++rank)
+    threads.emplace_back([&, rank] {
+      Thread team(&table, rank);
+      const auto stage = tiny_stage(name, config);
+      stage->cut_steps(micro_batches, team);
+      for (int64_t i = 0; i < 3; ++i) {
+        const NamedValues values = stage->step(i);
+        for (const auto& value : values)
+          if (rank == 0 && losses != nullptr) losses->push_back(value.second);
+      }
+      out[static_cast<size_t>(rank)] = bytes_of(*stage);
+    });
+  for (std::thread& thread : threads) thread.join();
+  return out;
+}
+
+/// Dropout, batch norm, a discriminator and its balance, windows of both kinds.
+TrainConfig everything() {
+  TrainConfig c = tiny_training(6);
+  for (OptimiserConfig* o : optimisers(c)) o->batch = 8;
+  choose(skeleton(c).model, "skeleton/pointnet", {"points=64", "dropout=0.3"});
+  motion(c).weights.adversarial = 0.01;
+  motion(c).balance_limit = 0.0;
+  motion(c).windows.self_share = 0.5;
+  deformation(c).skinning_steps = 1;
+  return c;
+}
+
+TEST(Team, HowManyShareAStepChangesNoBit) {
+  for (const std::string name : {"skeleton", "motion", "deformation", "root"}) {
+    const std::string one = trained(name, everything(), 4, 1)[0];
+    for (const int processes : {2, 4})
+      for (const std::string& each : trained(name, everything(), 4, processes))
+        EXPECT_TRUE(each == one) << name << ", " << processes << " processes";
+    // Dropout and statistics are of a micro-batch, so another number of them is another training.
+    EXPECT_FALSE(trained(name, everything(), 2, 1)[0] == one) << name;
+  }
+}
+
+TEST(Team, MicroBatchesAddUpToTheStep) {
+  // Where nothing depends on who is in a micro-batch, it is the same sum in another order.
+  TrainConfig c = tiny_training(6);
+  for (OptimiserConfig* o : optimisers(c)) o->batch = 8;
+  motion(c).weights.adversarial = 0;
+  motion(c).self_first_pass = true;
+  resize(deformation(c).model, {"dropout=0"});
+  resize(root(c).model, {"dropout=0"});
+  resize(motion(c).model, {"dropout=0"});
+  for (const std::string name : {"skeleton", "motion", "deformation", "root"}) {
+    std::vector<double> whole, cut;
+    trained(name, c, 1, 1, &whole);
+    trained(name, c, 4, 1, &cut);
+    for (size_t i = 0; i < whole.size(); ++i)
+      EXPECT_NEAR(cut[i], whole[i], 2e-3 * std::abs(whole[i])) << name << ", value " << i;
+  }
+}
+
+TEST(Team, BuffersThatNobodyChangesStayAsTheyAre) {
+  TrainConfig c = tiny_training(6);
+  for (OptimiserConfig* o : optimisers(c)) o->batch = 9;
+  const auto constants = [&](int64_t steps) {
+    const auto stage = tiny_stage("motion", c);
+    stage->cut_steps(3, alone());  // thirds do not add up to one
+    for (int64_t i = 0; i < steps; ++i) stage->step(i);
+    std::string out;
+    for (const StateEntry& entry : stage->weights())
+      if (entry.parameter == nullptr)
+        out.append(static_cast<const char*>(entry.value->raw()),
+                   static_cast<size_t>(entry.value->numel()) * size_of(entry.value->dtype()));
+    return out;
+  };
+  ASSERT_FALSE(constants(0).empty());
+  EXPECT_TRUE(constants(0) == constants(2));
+}
+
+TEST(Team, WhatCannotBeDividedIsRefused) {
+  TrainConfig c = tiny_training(6);
+  c.loop.micro_batches = 3;  // batches are of 4
+  for (const std::string name : {"skeleton", "motion", "deformation", "root"})
+    EXPECT_HAS(test::refusal_of([&] { tiny_stage(name, c); }), "loop.micro_batches divides");
+  Table table(3);
+  Thread team(&table, 0);
+  EXPECT_HAS(test::refusal_of([&] { tiny_stage("root", tiny_training(6))->cut_steps(4, team); }),
+             "3 processes cannot divide");
+}
+
+}  // namespace
+}  // namespace restage

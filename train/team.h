@@ -1,0 +1,50 @@
+// Processes that train together. Each computes some of a step's micro-batches; all add up the same
+// numbers in the same order, so how many they are changes no bit (docs/design/devices.md).
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace restage {
+
+class Team {
+ public:
+  virtual ~Team() = default;
+  virtual int rank() const = 0;  ///< from 0
+  virtual int size() const = 0;
+
+  /// A sum of rows, each given by one process.
+  class Sum {
+   public:
+    virtual ~Sum() = default;
+    /// The next row of this process: number rank, rank + size, rank + 2 size, ... It travels while
+    /// the caller goes on. All processes give equally many.
+    virtual void give(std::vector<float> row) = 0;
+    /// Of all rows, added in the order of their numbers; waits for the others.
+    virtual std::vector<float> total() = 0;
+  };
+  /// Of rows of so many numbers.
+  virtual std::unique_ptr<Sum> sum(size_t width) = 0;
+  /// The rows of all processes in the order of their numbers. For few numbers.
+  virtual std::vector<std::vector<double>> all(const std::vector<std::vector<double>>& mine) = 0;
+  /// Whether it is so for any of them.
+  virtual bool any(bool mine) = 0;
+  /// The first one's bytes.
+  virtual std::string of_first(std::string mine) = 0;
+
+  /// "rank 2 of 4 on HOST"; empty for one process.
+  virtual std::string name() const = 0;
+  /// Ends all processes at once.
+  [[noreturn]] virtual void abort(int code) = 0;
+};
+
+/// This process by itself.
+Team& alone();
+
+/// The processes that mpirun or srun has started with this one; alone() if none. InputError: there
+/// are others and the program was built without MPI, or Slurm says another number of them.
+Team& team_of_processes();
+
+}  // namespace restage
