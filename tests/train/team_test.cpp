@@ -4,6 +4,7 @@
 
 #include <barrier>
 #include <cstdlib>
+#include <mutex>
 #include <thread>
 
 #include "tests/support/errors.h"
@@ -24,15 +25,21 @@ using testing::skeleton;
 using testing::tiny_stage;
 using testing::tiny_training;
 
-/// What threads that play processes have in common.
+/// What threads that play processes have in common. One works at a time: processes share no memory,
+/// so what threads would do to each other is not the question.
 struct Table {
-  explicit Table(int n) : size(n), together(n), rows(n), numbers(n), flags(n), bytes(n) {}
+  explicit Table(int n)
+      : size(n), together(n), rows(static_cast<size_t>(n)), numbers(static_cast<size_t>(n)) {}
   const int size;
+  std::mutex turn;
   std::barrier<> together;
+  void wait() {
+    turn.unlock();
+    together.arrive_and_wait();
+    turn.lock();
+  }
   std::vector<std::vector<std::vector<float>>> rows;      // of each rank
   std::vector<std::vector<std::vector<double>>> numbers;  // of each rank
-  std::vector<int> flags;
-  std::vector<std::string> bytes;
 };
 
 class Thread final : public Team {
@@ -43,11 +50,11 @@ class Thread final : public Team {
   std::unique_ptr<Sum> sum(size_t) override { return std::make_unique<Rows>(table_, rank_); }
   std::vector<std::vector<double>> all(const std::vector<std::vector<double>>& mine) override {
     table_->numbers[static_cast<size_t>(rank_)] = mine;
-    table_->together.arrive_and_wait();
+    table_->wait();
     std::vector<std::vector<double>> out;
     for (size_t round = 0; round < mine.size(); ++round)
       for (const auto& of_rank : table_->numbers) out.push_back(of_rank.at(round));
-    table_->together.arrive_and_wait();
+    table_->wait();
     return out;
   }
   bool any(bool mine) override { return mine; }
@@ -63,7 +70,7 @@ class Thread final : public Team {
     }
     void give(std::vector<float> row) override { mine_.push_back(std::move(row)); }
     std::vector<float> total() override {
-      table_->together.arrive_and_wait();
+      table_->wait();
       std::vector<float> out;
       for (size_t round = 0; round < mine_.size(); ++round)
         for (const auto& of_rank : table_->rows) {
@@ -73,7 +80,7 @@ class Thread final : public Team {
           else
             for (size_t i = 0; i < row.size(); ++i) out[i] += row[i];
         }
-      table_->together.arrive_and_wait();
+      table_->wait();
       return out;
     }
 
@@ -94,6 +101,7 @@ std::vector<std::string> trained(const std::string& name, TrainConfig config, in
   std::vector<std::thread> threads;
   for (int rank = 0; rank < processes; ++rank)
     threads.emplace_back([&, rank] {
+      const std::lock_guard turn(table.turn);
       Thread team(&table, rank);
       const auto stage = tiny_stage(name, config);
       stage->cut_steps(micro_batches, team);
