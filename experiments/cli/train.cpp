@@ -4,6 +4,7 @@
 #include <optional>
 #include <sstream>
 
+#include "autograd/base/atomic_file.h"
 #include "autograd/base/format.h"
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
@@ -21,6 +22,8 @@
 
 namespace restage::cli {
 namespace {
+
+namespace fs = std::filesystem;
 
 struct TrainArguments {
   std::vector<std::string> words;
@@ -175,7 +178,7 @@ int fast_dev_run(const TrainConfig& config, const TrainingData& data,
 }
 
 /// The run, at its newest checkpoint if it is resumed. The first process of a team keeps it; the
-/// others begin with what it has, in `scratch`.
+/// others begin with its checkpoints, in `scratch`.
 RunDir run_of(const Request& request, const TrainConfig& config, const RunInput& input, Team& team,
               std::optional<Scratch>* scratch) {
   const std::string provenance = provenance_json(input);
@@ -185,13 +188,9 @@ RunDir run_of(const Request& request, const TrainConfig& config, const RunInput&
                      ? RunDir::create(config.run_root, config.name, input.resolved_yaml, provenance,
                                       config.stages)
                      : RunDir::resume(request.resume, config.stages);
-    const auto last = latest_checkpoint(run.dir(), config.stages);
-    for (const std::string& stage : last ? config.stages : std::vector<std::string>{}) {
-      const auto own = latest_checkpoint(run.dir(), {stage});
-      if (own)
-        place += stage + " " + std::to_string(own->step) + " " + std::to_string(own->bytes.size()) +
-                 "\n";
-      if (own) bytes += own->bytes;
+    for (const auto& entry : fs::directory_iterator(run.dir() + "/checkpoints")) {
+      bytes += read_file(entry.path().string());
+      place += entry.path().filename().string() + " " + std::to_string(bytes.size()) + "\n";
     }
     team.of_first(place);
     team.of_first(bytes);
@@ -201,14 +200,12 @@ RunDir run_of(const Request& request, const TrainConfig& config, const RunInput&
   bytes = team.of_first("");
   scratch->emplace();
   const std::string folder = (*scratch)->file("run");
-  {
-    RunDir run = RunDir::create_at(folder, input.resolved_yaml, provenance, config.stages);
-    std::istringstream lines(place);
-    std::string stage;
-    int64_t step = 0;
-    for (size_t size = 0, at = 0; lines >> stage >> step >> size; at += size)
-      run.save_checkpoint(stage, step, std::string_view(bytes).substr(at, size));
-  }
+  RunDir::create_at(folder, input.resolved_yaml, provenance, config.stages);
+  std::istringstream lines(place);
+  std::string name;
+  for (size_t end = 0, at = 0; lines >> name >> end; at = end)
+    write_file_atomically(folder + "/checkpoints/" + name,
+                          std::string_view(bytes).substr(at, end - at));
   return RunDir::resume(folder, config.stages);
 }
 

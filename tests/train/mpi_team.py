@@ -66,7 +66,8 @@ class MpiTeam(unittest.TestCase):
         self.assertEqual(self.trained(2, *words), self.trained(1, *words))
 
     def test_stopped_by_a_signal_and_resumed_by_another_number(self):
-        words = ["tiny.yaml", "loop.micro_batches=4", "skeleton.optimiser.steps=60", "loop.checkpoint_every=1000"]
+        words = ["tiny.yaml", "loop.micro_batches=4", "skeleton.optimiser.steps=60", "loop.checkpoint_every=1000",
+                 "loop.export=best", "loop.validate_every=3"]
         whole = self.trained(1, *words)
         process = subprocess.Popen(self.words(2, *words), cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         run = process.stdout.readline().strip()

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <filesystem>
-#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "autograd/base/log.h"
@@ -31,10 +30,8 @@ std::vector<JointTrack> asked(const Corpus& corpus, const AnswersConfig& config,
                      });
 }
 
-// ---- as a file
-// -------------------------------------------------------------------------------------- All
-// numbers in double precision, so that what is read is what was asked for. Of each frame 22 rows:
-// joint, rotation, uncertainty; then one row for the sides that are remembered.
+// As a file: all numbers in double precision, so that what is read is what was asked for. Of each
+// frame 22 rows (joint, rotation, uncertainty), then one for the sides that are remembered.
 
 constexpr int64_t kJointNumbers = 3 + 9 + 1, kFrame = kJoints * kJointNumbers + 4;
 
@@ -93,7 +90,7 @@ TensorFile to_file(const std::vector<JointTrack>& tracks, const std::string& fac
 }
 
 std::vector<JointTrack> from_file(const std::string& path, const std::string& facts,
-                                  const TrackConfig& config) {
+                                  const Corpus& corpus, const TrackConfig& config) {
   TensorFile file = read_safetensors(path);
   const auto says = [&](const char* name) { return file.metadata[name]; };
   const Tensor &places = file.at("places", path), &seen = file.at("seen", path);
@@ -105,6 +102,12 @@ std::vector<JointTrack> from_file(const std::string& path, const std::string& fa
   std::vector<JointTrack> out(static_cast<size_t>(config.sequences));
   for (size_t i = 0; i < out.size(); ++i) {
     const int64_t* place = places.data<int64_t>() + 3 * i;
+    const auto in = [](int64_t x, int64_t end) { return x >= 0 && x < end; };
+    if (!in(place[0], std::ssize(corpus.bodies)) || !in(place[1], std::ssize(corpus.motions)) ||
+        !in(place[2], static_cast<int64_t>(corpus.motions[static_cast<size_t>(place[1])].frames()) -
+                          config.frames + 1))
+      throw InputError(path, "is about somebody who is not in the data",
+                       "nothing needs to be done");
     out[i] = {static_cast<size_t>(place[0]),
               static_cast<size_t>(place[1]),
               static_cast<size_t>(place[2]),
@@ -118,11 +121,11 @@ std::vector<JointTrack> from_file(const std::string& path, const std::string& fa
 }
 
 std::optional<std::vector<JointTrack>> find(const std::string& path, const std::string& facts,
-                                            const TrackConfig& config) {
+                                            const Corpus& corpus, const TrackConfig& config) {
   std::error_code ignored;
   if (!fs::exists(path, ignored)) return std::nullopt;
   try {
-    return from_file(path, facts, config);
+    return from_file(path, facts, corpus, config);
   } catch (const InputError& error) {
     log_warning("damaged answers are asked for again: " + std::string(error.what()));
     fs::remove(path, ignored);
@@ -155,7 +158,7 @@ std::vector<JointTrack> ask(const Corpus& corpus, const std::string& split,
   const std::string name = "answers-" + short_id(facts),
                     path = (fs::path(folder->path) / (name + ".safetensors")).string();
   return made_once<std::vector<JointTrack>>(
-      folder->path, name, [&] { return find(path, facts, config.tracks); },
+      folder->path, name, [&] { return find(path, facts, corpus, config.tracks); },
       [&](const Lease&) {  // two who make it make the same bytes
         const std::string ready = path_aside(folder->path, name, ".ready");
         write_safetensors(ready, to_file(asked(corpus, config, given, seed), facts));
