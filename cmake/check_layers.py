@@ -41,8 +41,8 @@ MAY_USE = {
                                     "experiments/report", "experiments/observers"],
 }
 
-# Single files that may reach further: memory comes from the backend.
-ALSO = {"autograd/tensor/tensor.cpp": ["autograd/kernels/scratch.h"], "experiments/main.cpp": ["experiments/cli/program.h"]}
+# Single files that may reach further: memory and conversions come from the backend.
+ALSO = {"autograd/tensor/tensor.cpp": ["autograd/kernels/scratch.h", "autograd/kernels/elementwise.h"], "experiments/main.cpp": ["experiments/cli/program.h"]}
 
 # Third-party (and a few system) headers and the only places that may know them.
 ONLY_IN = {

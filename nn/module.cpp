@@ -68,6 +68,10 @@ void cast_module(Module& module, DType type) {
   for (const StateEntry& e : state_of(module)) *e.value = e.value->cast(type);
 }
 
+void move_module(Module& module, Device device) {
+  for (const StateEntry& e : state_of(module)) *e.value = e.value->to(device);
+}
+
 Tensor Init::uniform(const Shape& shape, double bound, const std::string& name) const {
   if (budget != nullptr) {
     *budget -= shape.numel();

@@ -94,6 +94,8 @@ int64_t count_parameters(Module& module);
 void name_scopes(Module& root, const std::string& name);
 /// Casts every parameter and buffer.
 void cast_module(Module& module, DType type);
+/// Takes every parameter and buffer to a device.
+void move_module(Module& module, Device device);
 
 /// PyTorch's default start: uniform in +-1/sqrt(fan_in) (spec 7), from a named stream.
 struct Init {

@@ -37,12 +37,13 @@ void WeightAverage::exchange() {
 
 void WeightAverage::save(TensorFile* file) const {
   for (size_t i = 0; i < weights_.size(); ++i)
-    file->tensors[kAverage + weights_[i].name] = average_[i];
+    file->tensors[kAverage + weights_[i].name] = average_[i].cpu();
 }
 
 void WeightAverage::load(const TensorFile& file, const std::string& where) {
   for (size_t i = 0; i < weights_.size(); ++i)
-    average_[i] = saved_state(file, kAverage + weights_[i].name, average_[i].shape(), where);
+    average_[i] = saved_state(file, kAverage + weights_[i].name, average_[i].shape(), where,
+                              average_[i].device());
 }
 
 bool BestSoFar::add(int64_t done, const NamedValues& figures) {

@@ -32,8 +32,16 @@ void copy_matching(Module& to, Module* from, const std::string& prefix,
                        "has no tensor " + name_in_quotes(prefix + entry.name) + " of shape " +
                            entry.value->shape().str(),
                        "take weights of the same model and sizes, or name fewer in init_names");
-    *entry.value = found->second->clone();
+    *entry.value = found->second->clone().to(entry.value->device());
   }
+}
+
+/// A model of the same weights in the host's memory.
+TrainedModel copied(const TrainedModel& of) {
+  TrainedModel out = of;
+  out.net = make_model(of.model, of.config, Init{RngKey{}, DType::f32});
+  load_state(*out.net, to_file(*of.net), "", of.model);
+  return out;
 }
 
 }  // namespace
@@ -104,7 +112,7 @@ void Stage::start_from(const Bundle& weights, const std::vector<std::string>& na
 Bundle Stage::result() const {
   Bundle out;
   for (const Network& n : networks_)
-    if (n.handed_on) out.put(n.role, n.model);
+    if (n.handed_on) out.put(n.role, device_ == Device{} ? n.model : copied(n.model));
   return out;
 }
 
@@ -157,7 +165,8 @@ class Row {
     for (const StateEntry& entry : entries_) {
       const Tensor& t =
           entry.parameter == nullptr ? *entry.value : *gradients.find(entry.parameter->id);
-      out.insert(out.end(), t.data<float>(), t.data<float>() + t.numel());
+      const Tensor here = t.cpu();
+      out.insert(out.end(), here.data<float>(), here.data<float>() + t.numel());
     }
     return out;
   }
@@ -165,9 +174,10 @@ class Row {
   void spread(const std::vector<float>& row, Gradients* gradients) const {
     const float* from = row.data();
     for (const StateEntry& entry : entries_) {
-      Tensor t = Tensor::empty(entry.value->shape());
-      std::copy_n(from, t.numel(), t.data<float>());
-      from += t.numel();
+      Tensor here = Tensor::empty(entry.value->shape());
+      std::copy_n(from, here.numel(), here.data<float>());
+      from += here.numel();
+      const Tensor t = here.to(entry.value->device());
       if (entry.parameter == nullptr)
         *entry.value = t;
       else
@@ -191,7 +201,7 @@ Differentiated Stage::parts(const std::function<Differentiated(const MicroBatch&
   const auto belongs = [&](const StateEntry& entry, const Gradients& gradients) {
     if (entry.parameter != nullptr) return gradients.find(entry.parameter->id) != nullptr;
     const Tensor &now = *entry.value, &then = began[entry.value];
-    return now.raw() != then.raw() || now.version() != then.version();
+    return now.address() != then.address() || now.version() != then.version();
   };
   std::optional<Row> row;
   std::unique_ptr<Team::Sum> sum;
@@ -231,8 +241,8 @@ Differentiated differentiate(const RngKey& key, const std::function<Var(Context&
     Context ctx{&tape, true, key};
     const Var value = loss(ctx);
     Differentiated out;
-    out.loss = value.value.item();
     out.gradients = tape.backward(value);
+    out.loss = value.value.cpu().item();
     out.norm = out.gradients.norm();
     return out;
   };

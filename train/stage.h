@@ -56,8 +56,9 @@ struct MicroBatch {
 
 class Stage {
  public:
-  Stage(std::string name, OptimiserConfig optimiser)
-      : optimisation_(std::move(optimiser)), name_(std::move(name)) {}
+  /// Its networks and optimisers live on `device`; examples are made in the host's memory.
+  Stage(std::string name, OptimiserConfig optimiser, Device device = {})
+      : optimisation_(std::move(optimiser)), name_(std::move(name)), device_(device) {}
   virtual ~Stage() = default;
   Stage(const Stage&) = delete;
   Stage& operator=(const Stage&) = delete;
@@ -93,7 +94,8 @@ class Stage {
   void start_from(const Bundle& weights, const std::vector<std::string>& names,
                   const std::string& where);
   bool started_from_weights() const { return started_from_weights_; }
-  /// The networks to be used later, by role. They are shared with the stage.
+  /// The networks to be used later, by role. They are shared with the stage where it works in the
+  /// host's memory, and copies in it otherwise.
   virtual Bundle result() const;
   /// Their parameters and buffers, under the names of a checkpoint.
   virtual std::vector<StateEntry> weights() const;
@@ -104,6 +106,7 @@ class Stage {
   M* add_network(const std::string& role, const std::string& model, const AnyConfig& sizes,
                  const RngKey& key, Settings settings = {}, bool handed_on = true) {
     auto net = make_model_as<M>(model, sizes, Init{key, DType::f32});
+    move_module(*net, device_);
     networks_.push_back({role, {model, sizes, net, std::move(settings)}, handed_on});
     return net.get();
   }
@@ -118,6 +121,7 @@ class Stage {
   virtual void save_more(TensorFile&) const {}
   virtual void load_more(const TensorFile&, const std::string& /*where*/) {}
 
+  Device device() const { return device_; }
   int64_t micro_batches() const { return micro_batches_; }
   /// The mean of what `compute` gives for each micro-batch of a step; those of other processes
   /// come from there.
@@ -142,6 +146,7 @@ class Stage {
   std::vector<StateEntry> state() const;
 
   std::string name_;
+  Device device_;
   int64_t repeated_ = 0, micro_batches_ = 1;
   Team* team_ = &alone();
   bool started_from_weights_ = false;

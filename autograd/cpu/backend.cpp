@@ -19,6 +19,10 @@ class CpuBackend final : public Backend {
   void fill_zero(void* data, size_t bytes) override {
     if (bytes > 0) std::memset(data, 0, bytes);
   }
+  void copy_in(void* to, const void* from, size_t bytes) override { copy(to, from, bytes); }
+  void copy(void* to, const void* from, size_t bytes) override { std::memcpy(to, from, bytes); }
+  void copy_out(void* to, const void* from, size_t bytes) override { copy(to, from, bytes); }
+  void synchronise() override {}
 };
 
 }  // namespace

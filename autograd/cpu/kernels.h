@@ -23,6 +23,7 @@
   K(dropout, DropoutArgs)                                 \
   K(relu_dropout_grad, ReluDropoutGradArgs)               \
   K(expand, ExpandArgs)                                   \
+  K(cast, CastArgs)                                       \
   K(non_finite, NonFiniteArgs)                            \
   K(sum, SumArgs)                                         \
   K(max, MaxArgs)                                         \

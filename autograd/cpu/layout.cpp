@@ -6,11 +6,40 @@
 #include "autograd/cpu/kernels.h"
 
 namespace restage::cpu {
+namespace {
+
+/// Calls f with the tensor's numbers, whatever they are.
+template <class F>
+void with_numbers(DType type, F&& f) {
+  switch (type) {
+    case DType::f32:
+      return f(float{});
+    case DType::f64:
+      return f(double{});
+    case DType::i32:
+      return f(int32_t{});
+    case DType::i64:
+      return f(int64_t{});
+  }
+}
+
+}  // namespace
+
+void cast(const CastArgs& args) {
+  with_numbers(args.x.dtype(), [&](auto from) {
+    with_numbers(args.out.dtype(), [&](auto to) {
+      const auto* x = args.x.data<decltype(from)>();
+      auto* out = args.out.data<decltype(to)>();
+      for (int64_t i = 0; i < args.x.numel(); ++i)
+        out[i] = static_cast<decltype(to)>(static_cast<double>(x[i]));
+    });
+  });
+}
 
 void copy_blocks(const CopyBlocksArgs& args) {
   const auto width = static_cast<int64_t>(size_of(args.out.dtype()));
-  const char* x = static_cast<const char*>(args.x.raw());
-  char* out = static_cast<char*>(args.out.raw());
+  const char* x = static_cast<const char*>(args.x.bytes());
+  char* out = static_cast<char*>(args.out.bytes());
   if (args.count == 0) return;
   parallel_each(args.outer, row_grain(args.count), [&](int64_t o) {
     std::memcpy(out + (o * args.out_stride + args.out_offset) * width,

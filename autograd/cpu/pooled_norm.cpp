@@ -112,8 +112,8 @@ void find_peaks(const PooledNormArgs& args, double* squares) {
   const int64_t n = args.x.size(0), v = args.x.size(1), k = args.x.size(2), o = args.out.size(1);
   const int64_t row_panels = (v + kRows - 1) / kRows, col_panels = (o + cols - 1) / cols;
   const int64_t a_size = row_panels * kRows * k, b_size = cols * k;
-  Tensor a = Tensor::empty({n * a_size}, args.out.dtype());
-  Tensor b = Tensor::empty({col_panels * b_size}, args.out.dtype());
+  Tensor a = empty_like(args.out, {n * a_size});
+  Tensor b = empty_like(args.out, {col_panels * b_size});
   const T *h = args.centred.data<T>(), *w = args.weight.data<T>();
   T *pa = a.data<T>(), *pb = b.data<T>();
   parallel_for(n + col_panels, 1, [&](int64_t from, int64_t to) HWY_ATTR {
@@ -183,8 +183,8 @@ void finish(const PooledNormArgs& args, const double* squares, const T* mean) {
 template <class T>
 void forward(const PooledNormArgs& args) {
   const int64_t n = args.x.size(0), v = args.x.size(1), k = args.x.size(2), o = args.out.size(1);
-  Tensor x_mean = Tensor::empty({1, k}, args.out.dtype());
-  Tensor z_mean = Tensor::empty({1, o}, args.out.dtype());
+  Tensor x_mean = empty_like(args.out, {1, k});
+  Tensor z_mean = empty_like(args.out, {1, o});
   centre<T>(args.x, n * v, k, x_mean, args.centred);
   cpu::matmul({x_mean, args.weight, z_mean, false, true, &args.bias});
   std::vector<double> squares(static_cast<size_t>(n * o));
@@ -204,8 +204,7 @@ Factors factors(const PooledNormGradArgs& args) {
   const int64_t n = args.gy.size(0), o = args.gy.size(1);
   const double rows = static_cast<double>(n * args.centred.size(1));
   const bool relu = args.activation == Activation::relu;
-  const DType type = args.gy.dtype();
-  Factors f{Tensor::empty({n, o}, type), Tensor::empty({1, o}, type), Tensor::empty({o}, type)};
+  Factors f{empty_like(args.gy), empty_like(args.gy, {1, o}), empty_like(args.gy, {o})};
   const T *gy = args.gy.data<T>(), *y = args.y.data<T>(), *xhat = args.peak.data<T>();
   T* peak = f.peak.data<T>();
   for (int64_t c = 0; c < o; ++c) {
@@ -240,7 +239,7 @@ void weight_gradient(const PooledNormGradArgs& args, const Factors& f) {
   const int64_t n = args.gy.size(0), o = args.gy.size(1), v = args.centred.size(1),
                 k = args.centred.size(2);
   const Tensor h = args.centred.reshape({n * v, k});
-  Tensor gram = Tensor::empty({k, k}, h.dtype());
+  Tensor gram = empty_like(h, {k, k});
   cpu::matmul({h, h, gram, true, false});
   cpu::matmul({args.weight, gram, args.g_weight});
   const int32_t* index = args.index.data<int32_t>();
@@ -263,9 +262,9 @@ void input_gradient(const PooledNormGradArgs& args, const Factors& f) {
   const int64_t n = args.gy.size(0), o = args.gy.size(1), v = args.centred.size(1),
                 k = args.centred.size(2);
   const T* w = args.weight.data<T>();
-  Tensor scaled = Tensor::empty({o, k}, args.gy.dtype());
-  Tensor m = Tensor::empty({k, k}, args.gy.dtype());
-  Tensor everywhere = Tensor::empty({1, k}, args.gy.dtype());
+  Tensor scaled = empty_like(args.gy, {o, k});
+  Tensor m = empty_like(args.gy, {k, k});
+  Tensor everywhere = empty_like(args.gy, {1, k});
   scale_rows(f.slope.data<T>(), w, o, k, scaled.data<T>());
   cpu::matmul({args.weight, scaled, m, true, false});
   cpu::matmul({f.constant, args.weight, everywhere});

@@ -50,7 +50,7 @@ void sum_typed(const SumArgs& args) {
     });
     return;
   }
-  Tensor scratch = Tensor::empty({args.outer, parts, inner}, args.out.dtype());
+  Tensor scratch = empty_like(args.out, {args.outer, parts, inner});
   T* partial = scratch.data<T>();
   parallel_for(args.outer * parts, row_grain(kPart * inner),
                [&](int64_t from, int64_t to) HWY_ATTR {

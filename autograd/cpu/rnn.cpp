@@ -219,7 +219,7 @@ struct Sequence {
   static constexpr int cols = Simd<T>::cols;
   Sequence(const Layer<T>& layer, const GruArgs& args)
       : of(layer),
-        gi(Tensor::empty({of.steps * of.n, 3 * of.h}, args.x.dtype())),
+        gi(empty_like(args.x, {of.steps * of.n, 3 * of.h})),
         packed(3 * round_up(of.h, cols) * of.h) {
     cpu::matmul(MatmulArgs{.a = args.x.reshape({of.steps * of.n, of.i}),
                            .b = args.w_ih,

@@ -11,7 +11,9 @@ struct Evaluation {
   std::vector<Tensor> gradients;  ///< one per input; undefined: it received none
 };
 
-/// Result for these inputs, without a tape.
+/// What is built of these inputs on the sample's device, without a tape.
+Var built(const Sample& s, const std::vector<Tensor>& inputs);
+/// Its result, in the host's memory.
 Tensor value_of(const Sample& s, const std::vector<Tensor>& inputs);
 
 /// Value, and gradients of sum(u * value), with the inputs that `on_tape` picks (null: all) as

@@ -132,9 +132,10 @@ void check_bits(const Sample& s, const Tensor& u, const Evaluation& e, Findings&
   }
   set_threads(before);
   f.require(same_bits(e, evaluate(s, u)), "other bits the next time (is every output written?)");
-  const Var plain = s.build({s.inputs.begin(), s.inputs.end()});
+  const Var plain = built(s, s.inputs);
   f.require(plain.tape == nullptr, "something was recorded without a tape");
-  f.require(same_bits(plain.value, e.value), "without a tape the value differs");
+  f.require(plain.value.device() == s.device, "the result lives on another device");
+  f.require(same_bits(plain.value.cpu(), e.value), "without a tape the value differs");
 }
 
 void check_needs(const Sample& s, const Tensor& u, const Evaluation& e, Findings& f) {
@@ -241,15 +242,29 @@ void check_kink(const Sample& s, Findings& f) {
   }
 }
 
+/// What only a kernel can see (an index) is told by its device to whoever waits.
+bool refused_late(Device device, const OpSamples& op, Findings& f) {
+  try {
+    backend(device).synchronise();
+    return false;
+  } catch (const Error& error) {
+    const std::string what = error.what();
+    f.require(what.find("'" + op.op + "' in probe.layer") != std::string::npos,
+              "the error does not name the op: " + what);
+    return true;
+  }
+}
+
 void check_error(const OpSamples& op, const Sample& s, Findings& f) {
   Tape tape;
   std::vector<Var> leaves;
-  for (size_t k = 0; k < s.inputs.size(); ++k) leaves.push_back(tape.leaf(s.inputs[k], k + 1));
+  for (size_t k = 0; k < s.inputs.size(); ++k) leaves.push_back(tape.leaf(s.inputs[k].to(s.device), k + 1));
   const size_t before = tape.size();
   std::string what;
   try {
     const ModuleScope outer("probe"), inner("layer");
     s.build(leaves);
+    if (refused_late(s.device, op, f)) return;
     return f.fail("was not refused");
   } catch (const ShapeError& error) {
     what = error.what();
@@ -316,9 +331,10 @@ Report check_sample(const OpSamples& op, const Sample& sample) {
   return std::move(f.report);
 }
 
-Report check(const OpSamples& op, int random_cases) {
+Report check(const OpSamples& op, int random_cases, Device device) {
   Report all;
-  const auto take = [&](const Sample& s) {
+  const auto take = [&](Sample s) {
+    s.device = device;
     const Report r = check_sample(op, s);
     all.failures.insert(all.failures.end(), r.failures.begin(), r.failures.end());
     all.compared += r.compared;

@@ -34,6 +34,7 @@ struct Sample {
   std::vector<Tensor> expected = {};  ///< of kinks: one per input, undefined: not looked at
   bool zero_gradient = false;         ///< the true gradient of every input is zero here
   double f32_tolerance = 1e-4;        ///< float32 gradients, relative to the largest float64 one
+  Device device = {};                 ///< where it is computed; inputs and results are the host's
 };
 
 /// All that is known about one op.
@@ -88,9 +89,10 @@ struct Report {
 /// - float32 agrees within f32_tolerance.
 Report check_sample(const OpSamples& op, const Sample& sample);
 
-/// All samples and `random_cases` random ones, and that the table is complete: a sample with a
-/// dimension of 1, one with 0 (or an error that refuses it), an error and a generator.
-Report check(const OpSamples& op, int random_cases = 12);
+/// All samples and `random_cases` random ones, computed on a device, and that the table is
+/// complete: a sample with a dimension of 1, one with 0 (or an error that refuses it), an error and
+/// a generator.
+Report check(const OpSamples& op, int random_cases = 12, Device device = {});
 
 /// Samples of every op of autograd/ops and of the functions composed of them (conv1d, mse, ...).
 const std::vector<OpSamples>& all_samples();

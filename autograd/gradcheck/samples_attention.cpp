@@ -34,8 +34,8 @@ std::vector<Tensor> inputs(const Sizes& s, Rng& rng, double spread) {
 
 Build with(const Tensor& index, bool dense) {
   return [index, dense](Args x) {
-    return neighbour_attention({x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]}, index, 0.3,
-                               dense);
+    return neighbour_attention({x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]},
+                               index.to(x[0].value.device()), 0.3, dense);
   };
 }
 

@@ -117,7 +117,7 @@ OpSamples concat_samples() {
 OpSamples gather_samples() {
   OpSamples s = samples_for<Gather>();
   const auto at = [](const Tensor& index) {
-    return Build([index](Args x) { return gather(x[0], index); });
+    return Build([index](Args x) { return gather(x[0], index.to(x[0].value.device())); });
   };
   Rng rng(RngKey{24, 0});
   s.add("repeated rows", {random({2, 3, 2}, 1)}, at(i32({2, 4}, {0, 2, 2, 2, 1, 1, 0, 0})));
@@ -145,7 +145,7 @@ OpSamples gather_samples() {
 OpSamples scatter_samples() {
   OpSamples s = samples_for<ScatterAdd>();
   const auto into = [](const Tensor& index, int64_t rows) {
-    return Build([index, rows](Args x) { return scatter_add(x[0], index, rows); });
+    return Build([index, rows](Args x) { return scatter_add(x[0], index.to(x[0].value.device()), rows); });
   };
   Rng rng(RngKey{25, 0});
   s.add("repeated rows", {random({2, 3, 2}, 1)}, into(i32({2, 3}, {0, 3, 0, 1, 1, 1}), 4));

@@ -90,6 +90,11 @@ struct ExpandArgs {
   const Tensor& x;
   Tensor& out;
 };
+/// out = x in out's dtype, which differs: any of the four, by way of float64.
+struct CastArgs {
+  const Tensor& x;
+  Tensor& out;
+};
 /// out[0] = 1 if any element of x is NaN or infinite, else 0.
 struct NonFiniteArgs {
   const Tensor& x;

@@ -1,24 +1,75 @@
 #include "autograd/kernels/kernel.h"
 
+#include <algorithm>
+#include <mutex>
+#include <set>
 #include <string>
+#include <vector>
 
 #include "autograd/base/error.h"
+#include "autograd/base/log.h"
+#include "autograd/base/module_path.h"
 
 namespace restage {
 
 Backend& cpu_backend();  // autograd/cpu/backend.cpp
 
-Backend& backend(Device device) {
-  if (device.kind != 0)
-    throw Error("device " + std::to_string(device.kind) + " is not built in; only 0 (cpu) is");
-  return cpu_backend();
+namespace {
+
+/// By kind. Devices are entered before the work begins.
+std::vector<Backend*>& backends() {
+  static std::vector<Backend*> all{&cpu_backend()};
+  return all;
 }
 
-Backend::Function Backend::find(std::type_index args) const {
-  const auto it = table_.find(args);
+}  // namespace
+
+Backend& backend(Device device) {
+  if (device.kind == 0) return cpu_backend();
+  if (device.kind >= backends().size())
+    throw Error("device " + std::to_string(device.kind) + " is not built in");
+  return *backends()[device.kind];
+}
+
+Device add_device(Backend& backend) {
+  for (const Backend* known : backends())
+    if (known->name() == backend.name())
+      throw Error("there is a device '" + std::string(backend.name()) + "' already");
+  backends().push_back(&backend);
+  return {static_cast<uint8_t>(backends().size() - 1), 0};
+}
+
+std::string name_of(Device device) { return std::string(backend(device).name()); }
+
+Device device_of(std::string_view name) {
+  std::string known;
+  for (size_t i = 0; i < backends().size(); ++i) {
+    if (backends()[i]->name() == name) return {static_cast<uint8_t>(i), 0};
+    known += (i > 0 ? ", " : "") + std::string(backends()[i]->name());
+  }
+  throw InputError("", "there is no device '" + std::string(name) + "' in this program",
+                   "take one of: " + known);
+}
+
+bool has_fused(Device device, const char* op, std::initializer_list<std::type_index> contracts) {
+  const Backend& b = backend(device);
+  const auto has = [&](std::type_index args) { return b.supports(args); };
+  if (std::all_of(contracts.begin(), contracts.end(), has)) return true;
+  static std::mutex mutex;
+  static std::set<std::string> told;
+  const std::string line =
+      "device '" + std::string(b.name()) + "' has no kernel for " + op + ": composed of others";
+  const std::lock_guard lock(mutex);
+  if (told.insert(line).second) log_info(line);
+  return false;
+}
+
+void Backend::run(std::type_index args_type, const void* args) {
+  const auto it = table_.find(args_type);
   if (it == table_.end())
-    throw Error(std::string("no kernel for ") + args.name() + " on " + std::string(name()));
-  return it->second;
+    throw Error(std::string("no kernel for ") + args_type.name() + " on " + std::string(name()) +
+                " (" + running_op() + ")");
+  it->second(args);
 }
 
 }  // namespace restage

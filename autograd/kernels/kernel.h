@@ -1,6 +1,8 @@
 // How an op reaches a device. A kernel is a struct of arguments (its contract, in the headers
 // beside this one); a backend is a table from contracts to functions, plus memory. Adding a device
 // is adding a folder with a table; an op that calls a kernel the device lacks gets a named error.
+// Kernels and copies of a device run in the order in which they are launched, perhaps later. What
+// arguments point to on the host (spans, the structs themselves) is read before launch() returns.
 #pragma once
 
 #include <string_view>
@@ -17,10 +19,19 @@ class Backend {
   virtual ~Backend() = default;
   virtual std::string_view name() const = 0;
   virtual void* allocate(size_t bytes) = 0;
+  /// Kernels that were launched before may still use it.
   virtual void release(void* data, size_t bytes) = 0;
   virtual void fill_zero(void* data, size_t bytes) = 0;
+  virtual void copy_in(void* to, const void* from_host, size_t bytes) = 0;
+  virtual void copy(void* to, const void* from, size_t bytes) = 0;  ///< within its memory
+  /// Returns when the numbers are there; throws what synchronise() does.
+  virtual void copy_out(void* to_host, const void* from, size_t bytes) = 0;
+  /// Returns when all that was launched is done. Error naming the kernel if one failed.
+  virtual void synchronise() = 0;
 
-  Function find(std::type_index args) const;  ///< Error naming both if there is none for such
+  virtual bool supports(std::type_index args) const { return table_.contains(args); }
+  /// Error naming both if it has no such kernel.
+  virtual void run(std::type_index args_type, const void* args);
 
  protected:
   /// add<MatmulArgs, cpu::matmul>() enters a function under its contract.
@@ -33,8 +44,16 @@ class Backend {
   std::unordered_map<std::type_index, Function> table_;
 };
 
-/// The backend of a device (autograd/kernels/kernel.cpp lists them).
+/// The backend of a device; that of Device{} is the CPU's.
 Backend& backend(Device device);
+/// Enters a backend, which must outlive all its tensors. Error if one of its name is there.
+Device add_device(Backend& backend);
+/// The device of this name ("cpu"); InputError listing those that are built in.
+Device device_of(std::string_view name);
+
+/// Whether the device has kernels for all of these contracts. If not, an op takes those it is
+/// composed of, and that is logged once for each device and op: such a device is slower there.
+bool has_fused(Device device, const char* op, std::initializer_list<std::type_index> contracts);
 
 /// Room for a result: a tensor of the dtype and on the device of another, not initialised.
 inline Tensor empty_like(const Tensor& t, const Shape& shape) {
@@ -46,7 +65,7 @@ inline Tensor empty_like(const Tensor& t) { return empty_like(t, t.shape()); }
 /// changes memory which others may hold does so in `out`.
 template <class Args>
 void launch(const Args& args) {
-  backend(args.out.device()).find(typeid(Args))(&args);
+  backend(args.out.device()).run(typeid(Args), &args);
   args.out.written();
 }
 

@@ -1,8 +1,7 @@
 #include "autograd/ops/attention.h"
 
-#include <algorithm>
-
 #include "autograd/kernels/attention.h"
+#include "autograd/kernels/layout.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
 #include "autograd/ops/linear.h"
@@ -31,8 +30,8 @@ void NeighbourAttention::check(Inputs x) const {
       index.size(1) != v || index.size(2) < 1)
     shape_error(name, letters, x, "the index must be i32 [n, v, k > 0]");
   if (!(scale > 0)) shape_error(name, letters, x, "the scale must be positive");
-  const int32_t* i = index.data<int32_t>();
-  if (std::any_of(i, i + index.numel(), [v](int32_t j) { return j < 0 || j >= v; }))
+  require_one_device(std::array{x[0], index});
+  if (index.device() == Device{} && !index_within(index, v))
     shape_error(name, letters, x, "an index is out of range");
   require_floats(name, letters, x);
 }
@@ -59,6 +58,14 @@ Grads NeighbourAttention::backward(const Saved& saved, const Tensor& gy, Needs n
   for (size_t i = 0; i < g.size(); ++i)
     if (!needs[i]) g[i] = Tensor();
   return g;
+}
+
+Var neighbour_attention(std::initializer_list<Var> inputs, const Tensor& index, double scale,
+                        bool dense) {
+  if (!has_fused(index.device(), NeighbourAttention::name,
+                 {typeid(NeighbourAttentionArgs), typeid(NeighbourAttentionGradArgs)}))
+    return neighbour_attention_reference(inputs, index, scale);
+  return call(NeighbourAttention{index, scale, dense}, inputs);
 }
 
 Var neighbour_attention_reference(std::initializer_list<Var> inputs, const Tensor& index,

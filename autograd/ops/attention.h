@@ -24,11 +24,10 @@ struct NeighbourAttention {
 };
 
 /// inputs: xyz, query, key, value, W, b, M, G, g.
-inline Var neighbour_attention(std::initializer_list<Var> inputs, const Tensor& index, double scale,
-                               bool dense = false) {
-  return call(NeighbourAttention{index, scale, dense}, inputs);
-}
-/// The same from products, gathers and attention_pool(): what tests compare it with.
+Var neighbour_attention(std::initializer_list<Var> inputs, const Tensor& index, double scale,
+                        bool dense = false);
+/// The same from products, gathers and attention_pool(): what tests compare it with, and what
+/// devices do that have no kernel for it.
 Var neighbour_attention_reference(std::initializer_list<Var> inputs, const Tensor& index,
                                   double scale);
 

@@ -132,9 +132,9 @@ void check_index(const char* name, const char* letters, Inputs x, const Tensor& 
   if (x[0].rank() != 3 || index.rank() < 2 || index.size(0) != x[0].size(0) ||
       index.dtype() != DType::i32)
     shape_error(name, letters, x, "needs x[n, v, c] and int32 index " + index.shape().str());
-  const int32_t* at = index.data<int32_t>();
-  for (int64_t i = 0; i < index.numel(); ++i)
-    if (at[i] < 0 || at[i] >= limit) shape_error(name, letters, x, "an index is outside [0, v)");
+  require_one_device(std::array{x[0], index});
+  if (index.device() == Device{} && !index_within(index, limit))
+    shape_error(name, letters, x, "an index is outside [0, v)");
   require_floats(name, letters, x);
 }
 

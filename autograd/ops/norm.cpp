@@ -1,5 +1,7 @@
 #include "autograd/ops/norm.h"
 
+#include "autograd/ops/elementwise.h"
+
 namespace restage {
 namespace {
 
@@ -73,10 +75,9 @@ Tensor BatchNorm::forward(Inputs x, Saved& saved) const {
   if (statistics != nullptr) {
     statistics->mean = mean.reshape({l.inner});
     statistics->count = l.n;
-    std::vector<double> variance;
-    for (int64_t i = 0; i < l.inner; ++i)
-      variance.push_back(1.0 / (rstd.item(i) * rstd.item(i)) - eps);
-    statistics->variance = Tensor::from<double>({l.inner}, variance);
+    const Var r(rstd.reshape({l.inner}));
+    const Var one(Tensor::full({1}, 1, DType::f64, rstd.device()));
+    statistics->variance = add_scalar(one / (r * r), -eps).value;
   }
   return y;
 }

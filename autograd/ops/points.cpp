@@ -13,8 +13,9 @@ Tensor knn(const Tensor& query, const Tensor& points, int64_t k) {
   if (!ok)
     shape_error("knn", "query[n, m, 3], points[n, v, 3]", std::array{query, points},
                 "shapes do not fit");
-  Tensor out =
-      Tensor::empty({query.size(0), query.size(1), std::min(k, points.size(1))}, DType::i32);
+  require_one_device(std::array{query, points});
+  Tensor out = Tensor::empty({query.size(0), query.size(1), std::min(k, points.size(1))},
+                             DType::i32, points.device());
   launch(KnnArgs{query, points, out});
   return out;
 }
@@ -22,7 +23,7 @@ Tensor knn(const Tensor& query, const Tensor& points, int64_t k) {
 Tensor fps(const Tensor& points, int64_t m) {
   if (points.rank() != 3 || points.size(2) != 3 || m < 0 || points.size(1) < 1)
     shape_error("fps", "points[n, v, 3]", std::array{points}, "needs m >= 0 and v > 0");
-  Tensor out = Tensor::empty({points.size(0), m}, DType::i32);
+  Tensor out = Tensor::empty({points.size(0), m}, DType::i32, points.device());
   launch(FpsArgs{points, out});
   return out;
 }
@@ -47,6 +48,13 @@ Grads AttentionPool::backward(const Saved& saved, const Tensor& gy, Needs) const
   Tensor g_value = empty_like(gy, saved[0].shape());
   launch(AttentionPoolGradArgs{saved[0], saved[1], saved[2], gy, g_score, g_value, scale});
   return {g_score, g_value};
+}
+
+Var attention_pool(const Var& score, const Var& value, double scale) {
+  if (!has_fused(score.value.device(), AttentionPool::name,
+                 {typeid(AttentionPoolArgs), typeid(AttentionPoolGradArgs)}))
+    return attention_pool_reference(score, value, scale);
+  return call(AttentionPool{scale}, {score, value});
 }
 
 Var attention_pool_reference(const Var& score, const Var& value, double scale_) {

@@ -21,10 +21,9 @@ struct AttentionPool {
   Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
 };
 
-inline Var attention_pool(const Var& score, const Var& value, double scale) {
-  return call(AttentionPool{scale}, {score, value});
-}
-/// The same from softmax, product and sum: what tests compare attention_pool() with.
+Var attention_pool(const Var& score, const Var& value, double scale);
+/// The same from softmax, product and sum: what tests compare attention_pool() with, and what
+/// devices do that have no kernel for it.
 Var attention_pool_reference(const Var& score, const Var& value, double scale);
 
 }  // namespace restage

@@ -1,5 +1,6 @@
 #include "autograd/ops/pooled_norm.h"
 
+#include "autograd/kernels/pooled_norm.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/linear.h"
 #include "autograd/ops/reduce.h"
@@ -41,6 +42,14 @@ Grads PooledNorm::backward(const Saved& s, const Tensor& gy, Needs needs) const 
                             activation});
   if (needs[2]) g[2] = Tensor::zeros(scale.shape(), gy.dtype(), gy.device());
   return g;
+}
+
+Var pooled_norm(const Var& x, const Var& weight, const Var& bias, const Var& scale,
+                const Var& shift, Activation activation, double eps, BatchStatistics* statistics) {
+  if (!has_fused(x.value.device(), PooledNorm::name,
+                 {typeid(PooledNormArgs), typeid(PooledNormGradArgs)}))
+    return pooled_norm_reference(x, weight, bias, scale, shift, activation, eps, statistics);
+  return call(PooledNorm{activation, eps, statistics}, {x, weight, bias, scale, shift});
 }
 
 Var pooled_norm_reference(const Var& x, const Var& weight, const Var& bias, const Var& scale,

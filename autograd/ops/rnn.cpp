@@ -105,9 +105,17 @@ Grads Recurrence::backward(const Saved& saved, const Tensor& gy, Needs) const {
   return g;
 }
 
+Var gru(const Var& x, const Var& h0, const Var& w_ih, const Var& w_hh, const Var& b_ih,
+        const Var& b_hh) {
+  if (!has_fused(x.value.device(), Gru::name, {typeid(GruArgs), typeid(GruGradArgs)}))
+    return gru_reference(x, h0, w_ih, w_hh, b_ih, b_hh);
+  return call(Gru{}, {x, h0, w_ih, w_hh, b_ih, b_hh});
+}
+
 Var gru_reference(const Var& x, const Var& h0, const Var& w_ih, const Var& w_hh, const Var& b_ih,
                   const Var& b_hh) {
   const int64_t n = x.size(1), h = h0.size(1);
+  if (x.size(0) == 0) return slice(reshape(h0, {1, n, h}), 0, 0, 0);
   Var state = h0, out;
   for (int64_t t = 0; t < x.size(0); ++t) {
     const Var gi = linear(reshape(slice(x, 0, t, t + 1), {n, x.size(2)}), w_ih, b_ih);

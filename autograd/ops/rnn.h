@@ -33,11 +33,10 @@ inline Var recurrence(const Var& a, const Var& b, const Var& first) {
 }
 
 /// y [t, n, h]: hidden states of all steps.
-inline Var gru(const Var& x, const Var& h0, const Var& w_ih, const Var& w_hh, const Var& b_ih,
-               const Var& b_hh) {
-  return call(Gru{}, {x, h0, w_ih, w_hh, b_ih, b_hh});
-}
-/// The same from elementary ops: what tests compare gru() with.
+Var gru(const Var& x, const Var& h0, const Var& w_ih, const Var& w_hh, const Var& b_ih,
+        const Var& b_hh);
+/// The same from elementary ops: what tests compare gru() with, and what devices do that have no
+/// kernel for it.
 Var gru_reference(const Var& x, const Var& h0, const Var& w_ih, const Var& w_hh, const Var& b_ih,
                   const Var& b_hh);
 

@@ -87,8 +87,8 @@ Tensor ForwardKinematics::forward(Inputs x, Saved& saved) const {
 }
 
 Grads ForwardKinematics::backward(const Saved& saved, const Tensor& gy, Needs) const {
-  Grads g{Tensor::empty(saved[0].shape(), gy.dtype()), Tensor::empty(saved[1].shape(), gy.dtype()),
-          Tensor::empty({gy.size(0), 3}, gy.dtype())};
+  Grads g{empty_like(gy, saved[0].shape()), empty_like(gy, saved[1].shape()),
+          empty_like(gy, {gy.size(0), 3})};
   launch(FkGradArgs{saved[0], saved[1], saved[2], gy, parents, g[0], g[1], g[2]});
   return g;
 }

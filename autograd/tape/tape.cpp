@@ -10,7 +10,6 @@
 namespace restage {
 namespace {
 
-thread_local std::string current_path;  // of ModuleScope
 std::atomic<int> finite_checks{0};
 
 std::string text_of(const Tensor& t) {
@@ -19,25 +18,15 @@ std::string text_of(const Tensor& t) {
 
 }  // namespace
 
-ModuleScope::ModuleScope(const std::string& name) : previous_(current_path.size()) {
-  if (name.empty()) return;
-  if (!current_path.empty()) current_path += '.';
-  current_path += name;
-}
-
-ModuleScope::~ModuleScope() { current_path.resize(previous_); }
-
-std::string module_path() { return current_path.empty() ? "(no module)" : current_path; }
-
 FiniteCheck::FiniteCheck() { ++finite_checks; }
 FiniteCheck::~FiniteCheck() { --finite_checks; }
 bool FiniteCheck::active() { return finite_checks > 0; }
 
 void require_finite(const Tensor& t, const char* op, const std::string& path, const char* pass) {
   if (!t.defined() || (t.dtype() != DType::f32 && t.dtype() != DType::f64)) return;
-  Tensor found = Tensor::empty({1}, DType::i32);
+  Tensor found = Tensor::empty({1}, DType::i32, t.device());
   launch(NonFiniteArgs{t, found});
-  if (found.item() != 0)
+  if (found.cpu().item() != 0)
     throw NonFiniteError(std::string("a value became infinite or NaN in the ") + pass +
                          " pass of '" + op + "' in " + path);
 }
@@ -59,6 +48,18 @@ void require_floats(const char* op, const char* letters, Inputs inputs) {
   for (const Tensor& t : inputs)
     if (t.dtype() != inputs[0].dtype() || (t.dtype() != DType::f32 && t.dtype() != DType::f64))
       shape_error(op, letters, inputs, "needs equal float dtypes");
+}
+
+void require_one_device(Inputs tensors) {
+  const Tensor* first = nullptr;
+  for (const Tensor& t : tensors) {
+    if (!t.defined()) continue;
+    if (first != nullptr && t.device() != first->device())
+      throw Error(running_op() + " is given tensors of two devices, " +
+                  name_of(first->device()) + " and " + name_of(t.device()) +
+                  "; take to() of one of them first");
+    first = &t;
+  }
 }
 
 Saved::Saved(Inputs inputs, Needs needs) {
@@ -85,18 +86,30 @@ const Tensor* Gradients::find(uint64_t id) const {
   return it == by_id_.end() ? nullptr : &it->second.gradient;
 }
 
+/// Sums of squares that are not known yet: all are computed before the first is waited for.
+void Gradients::measure(std::span<const uint64_t> ids) const {
+  std::vector<const Leaf*> open;
+  for (const uint64_t id : ids) {
+    const auto it = by_id_.find(id);
+    if (it != by_id_.end() && !it->second.squares) open.push_back(&it->second);
+  }
+  if (open.empty()) return;
+  const Tensor sums =
+      Tensor::empty({std::ssize(open)}, DType::f64, open.front()->gradient.device());
+  for (size_t i = 0; i < open.size(); ++i) {
+    Tensor one = sums.rows(static_cast<int64_t>(i), static_cast<int64_t>(i) + 1);
+    launch(SquaredNormArgs{open[i]->gradient, one});
+  }
+  const Tensor known = sums.cpu();
+  for (size_t i = 0; i < open.size(); ++i) open[i]->squares = known.item(static_cast<int64_t>(i));
+}
+
 double Gradients::norm(std::span<const uint64_t> ids) const {
+  measure(ids);
   double total = 0;
   for (const uint64_t id : ids) {
     const auto it = by_id_.find(id);
-    if (it == by_id_.end()) continue;
-    const Leaf& leaf = it->second;
-    if (!leaf.squares) {
-      Tensor squares = Tensor::empty({1}, DType::f64);
-      launch(SquaredNormArgs{leaf.gradient, squares});
-      leaf.squares = squares.item();
-    }
-    total += *leaf.squares;
+    if (it != by_id_.end()) total += *it->second.squares;
   }
   return std::sqrt(total);
 }
@@ -152,6 +165,7 @@ Grads Tape::Node::backward(const Tensor& gy) const {
   };
   if (!saved.intact())
     fail("a tensor that it keeps was changed after the forward pass; change a clone");
+  const OpScope running(name());
   InlineVector<bool, kMaxInputs> needs;
   for (const int64_t input : inputs) needs.push_back(input >= 0);
   Grads g = function->backward(gy, Needs(needs.data(), needs.size()));
@@ -181,7 +195,7 @@ Gradients Tape::backward(const Var& loss) {
   nodes_.clear();
   leaves_.clear();
   std::vector<Tensor> grads(nodes.size());
-  grads[at(loss.node)] = Tensor::full(loss.shape(), 1.0, loss.dtype());
+  grads[at(loss.node)] = Tensor::full(loss.shape(), 1.0, loss.dtype(), loss.value.device());
   Gradients result;
   for (size_t i = at(loss.node) + 1; i-- > 0;) {
     Node& node = nodes[i];

@@ -13,7 +13,7 @@
 
 #include "autograd/base/error.h"
 #include "autograd/base/inline_vector.h"
-#include "autograd/tape/module_path.h"
+#include "autograd/base/module_path.h"
 #include "autograd/tensor/tensor.h"
 
 namespace restage {
@@ -94,6 +94,7 @@ class Gradients {
     Tensor gradient;
     mutable std::optional<double> squares;  // their sum
   };
+  void measure(std::span<const uint64_t> ids) const;
   std::unordered_map<uint64_t, Leaf> by_id_;
 };
 
@@ -163,6 +164,8 @@ void require_finite(const Tensor& t, const char* op, const std::string& path, co
 [[noreturn]] void too_many_inputs(const char* op, const char* letters, std::span<const Var> inputs);
 /// ShapeError unless all inputs have the same floating dtype.
 void require_floats(const char* op, const char* letters, Inputs inputs);
+/// Error naming the op that runs and both devices, unless all that are defined live on one.
+void require_one_device(Inputs tensors);
 
 namespace detail {
 
@@ -196,6 +199,8 @@ Var call(const Op& op, std::span<const Var> inputs) {
     if (v.tape != nullptr) tape = v.tape;
   }
   const Inputs in(values.data(), values.size());
+  const OpScope running(Op::name);
+  require_one_device(in);
   op.check(in);
   Saved saved = tape ? Saved(in, Needs(needs.data(), needs.size())) : Saved();
   Tensor y = op.forward(in, saved);

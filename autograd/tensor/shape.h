@@ -18,6 +18,7 @@ struct Device {
   uint8_t index = 0;
   bool operator==(const Device&) const = default;
 };
+std::string name_of(Device device);  ///< "cpu"
 
 /// Up to six dimensions, row-major, no heap.
 class Shape {

@@ -1,12 +1,41 @@
 #include "autograd/tensor/tensor.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cstring>
 
 #include "autograd/base/error.h"
+#include "autograd/base/module_path.h"
+#include "autograd/kernels/elementwise.h"
 #include "autograd/kernels/scratch.h"
+#include "autograd/tensor/host_view.h"
 
 namespace restage {
+namespace {
+
+/// Whose memory data() may give now, and how far from where tensors say it is (HostView).
+std::atomic<uint8_t> viewed{0};
+std::atomic<std::ptrdiff_t> view_distance{0};
+
+[[noreturn]] void not_readable(Device device) {
+  const std::string name = name_of(device);
+  if (viewed != 0)
+    throw Error("a kernel of device '" + name_of(Device{viewed}) + "' was given memory of '" +
+                name + "' (" + running_op() + ")");
+  throw Error("the host reads memory of device '" + name + "' (" + running_op() +
+              "); take cpu() of the tensor first");
+}
+
+}  // namespace
+
+HostView::HostView(Device device, std::ptrdiff_t distance) {
+  viewed = device.kind;
+  view_distance = distance;
+}
+HostView::~HostView() {
+  viewed = 0;
+  view_distance = 0;
+}
 
 size_t size_of(DType type) { return type == DType::f64 || type == DType::i64 ? 8 : 4; }
 
@@ -90,11 +119,11 @@ Tensor Tensor::empty(const Shape& shape, DType type, Device device) {
 
 Tensor Tensor::zeros(const Shape& shape, DType type, Device device) {
   Tensor t = empty(shape, type, device);
-  backend(device).fill_zero(t.base_, static_cast<size_t>(t.numel_) * size_of(type));
+  backend(device).fill_zero(t.base_, t.size_in_bytes());
   return t;
 }
 
-Tensor Tensor::full(const Shape& shape, double value, DType type) {
+Tensor Tensor::full(const Shape& shape, double value, DType type, Device device) {
   Tensor t = empty(shape, type);
   for (int64_t i = 0; i < t.numel_; ++i) {
     if (type == DType::f32)
@@ -106,7 +135,7 @@ Tensor Tensor::full(const Shape& shape, double value, DType type) {
     else
       t.data<int64_t>()[i] = static_cast<int64_t>(value);
   }
-  return t;
+  return t.to(device);
 }
 
 template <class T>
@@ -132,7 +161,13 @@ T* Tensor::data() {
   if (dtype_ != DTypeOf<T>::value)
     throw ShapeError(std::string("tensor holds ") + name_of(dtype_) + ", not " +
                      name_of(DTypeOf<T>::value));
-  return static_cast<T*>(base_);
+  return static_cast<T*>(bytes());
+}
+
+void* Tensor::bytes() {
+  if (!storage_) return nullptr;
+  if (storage_->device.kind != viewed.load(std::memory_order_relaxed)) not_readable(device());
+  return static_cast<char*>(base_) + view_distance.load(std::memory_order_relaxed);
 }
 
 template <class T>
@@ -174,7 +209,20 @@ Tensor Tensor::rows(int64_t from, int64_t to) const {
 
 Tensor Tensor::clone() const {
   Tensor t = empty(shape_, dtype_, device());
-  if (numel_ > 0) std::memcpy(t.base_, base_, static_cast<size_t>(numel_) * size_of(dtype_));
+  if (numel_ > 0) backend(device()).copy(t.base_, base_, size_in_bytes());
+  return t;
+}
+
+Tensor Tensor::to(Device to) const {
+  const Device from = device();
+  if (!defined() || from == to) return *this;
+  if (from.kind != 0 && to.kind != 0) return cpu().to(to);
+  Tensor t = empty(shape_, dtype_, to);
+  if (numel_ == 0) return t;
+  if (from.kind == 0)
+    backend(to).copy_in(t.base_, base_, size_in_bytes());
+  else
+    backend(from).copy_out(t.base_, base_, size_in_bytes());
   return t;
 }
 
@@ -201,24 +249,8 @@ std::vector<T> Tensor::to_vector() const {
 
 Tensor Tensor::cast(DType type) const {
   if (type == dtype_) return *this;
-  Tensor out = empty(shape_, type);
-  const auto fill = [&]<class T>(T* to) {
-    for (int64_t i = 0; i < numel_; ++i) to[i] = static_cast<T>(item(i));
-  };
-  switch (type) {
-    case DType::f32:
-      fill(out.data<float>());
-      break;
-    case DType::f64:
-      fill(out.data<double>());
-      break;
-    case DType::i32:
-      fill(out.data<int32_t>());
-      break;
-    case DType::i64:
-      fill(out.data<int64_t>());
-      break;
-  }
+  Tensor out = empty(shape_, type, device());
+  if (numel_ > 0) launch(CastArgs{*this, out});
   return out;
 }
 
@@ -232,10 +264,5 @@ RESTAGE_INSTANTIATE(double)
 RESTAGE_INSTANTIATE(int32_t)
 RESTAGE_INSTANTIATE(int64_t)
 #undef RESTAGE_INSTANTIATE
-
-NamedTensors defined(NamedTensors tensors) {
-  std::erase_if(tensors, [](const auto& named) { return !named.second.defined(); });
-  return tensors;
-}
 
 }  // namespace restage

@@ -37,7 +37,7 @@ class Tensor {
   Tensor() = default;
   static Tensor empty(const Shape& shape, DType type = DType::f32, Device device = {});
   static Tensor zeros(const Shape& shape, DType type = DType::f32, Device device = {});
-  static Tensor full(const Shape& shape, double value, DType type = DType::f32);
+  static Tensor full(const Shape& shape, double value, DType type = DType::f32, Device device = {});
   template <class T>
   static Tensor from(const Shape& shape, const std::vector<T>& values);
 
@@ -49,13 +49,17 @@ class Tensor {
   DType dtype() const { return dtype_; }
   Device device() const;
 
-  /// Host pointer; T must match the dtype (Error otherwise).
+  /// Host pointer; T must match the dtype. Error naming the op that runs where the host may not read
+  /// the device's memory: what it needs there it takes with cpu().
   template <class T>
   T* data();
   template <class T>
   const T* data() const;
-  void* raw() { return base_; }
-  const void* raw() const { return base_; }
+  /// The same whatever the dtype.
+  void* bytes();
+  const void* bytes() const { return const_cast<Tensor*>(this)->bytes(); }
+  /// Where the memory begins on its device, for kernels of that device and to tell tensors apart.
+  const void* address() const { return base_; }
 
   /// How often the memory was written to, counted for all tensors that share it: what a tape keeps
   /// for the backward pass must not change until then. launch() counts a kernel's output; who
@@ -66,12 +70,18 @@ class Tensor {
   Tensor reshape(const Shape& shape) const;     ///< same memory; one dimension may be -1
   Tensor rows(int64_t from, int64_t to) const;  ///< leading-axis range, same memory
   Tensor clone() const;
+  /// The same numbers on a device: the only way from one to another. The same handle if they are
+  /// there already; to the CPU it waits for them.
+  Tensor to(Device device) const;
+  Tensor cpu() const { return to(Device{}); }
   Tensor cast(DType type) const;         ///< the same handle if the type is equal
-  double item(int64_t index = 0) const;  ///< one element as double
+  double item(int64_t index = 0) const;  ///< one element as double; of host memory, as data()
   template <class T>
-  std::vector<T> to_vector() const;
+  std::vector<T> to_vector() const;  ///< of host memory, as data()
 
  private:
+  size_t size_in_bytes() const { return static_cast<size_t>(numel_) * size_of(dtype_); }
+
   std::shared_ptr<Storage> storage_;
   void* base_ = nullptr;
   Shape shape_;
@@ -80,8 +90,21 @@ class Tensor {
 };
 
 using NamedTensors = std::vector<std::pair<std::string, Tensor>>;
-/// Those that are not undefined.
-NamedTensors defined(NamedTensors tensors);
+/// Of a batch that names its tensors (each(f) calls f(name, tensor)): those that are not undefined.
+template <class Batch>
+NamedTensors named_tensors(Batch batch) {
+  NamedTensors out;
+  batch.each([&](const char* name, const Tensor& t) {
+    if (t.defined()) out.emplace_back(name, t);
+  });
+  return out;
+}
+/// The same batch on a device.
+template <class Batch>
+Batch moved(Batch batch, Device device) {
+  batch.each([&](const char*, Tensor& t) { t = t.to(device); });
+  return batch;
+}
 
 /// Memory of the pooled allocator, bytes.
 struct MemoryStats {

@@ -69,15 +69,6 @@ void bend(const RngKey& key, double angle, Pose* pose) {
 
 }  // namespace
 
-NamedTensors CloudBatch::tensors() const {
-  return defined({{"points", points},
-                  {"joints", joints},
-                  {"weights", weights},
-                  {"turns", turns},
-                  {"past", past},
-                  {"centres", centres}});
-}
-
 CloudSampler::CloudSampler(const Corpus& corpus, const CloudConfig& config, uint64_t seed)
     : corpus_(corpus),
       config_(checked(config)),

@@ -43,7 +43,16 @@ struct CloudBatch {
   Tensor centres;              ///< [N, 3] the centroids, in the world
   std::vector<int64_t> asked;  ///< rows whose memory is to be the answer to CloudSampler::before()
 
-  NamedTensors tensors() const;  ///< those that are defined
+  /// named_tensors() and moved() of it.
+  template <class F>
+  void each(F&& f) {
+    f("points", points);
+    f("joints", joints);
+    f("weights", weights);
+    f("turns", turns);
+    f("past", past);
+    f("centres", centres);
+  }
 };
 
 /// What a cloud shows; `rest` means the T-pose, whatever `at` says.

@@ -19,17 +19,6 @@ void write(float* to, const Points& points, const Vec3& origin) {
 
 }  // namespace
 
-NamedTensors PairBatch::tensors() const {
-  return defined({{"rest_points", rest_points},
-                  {"posed_points", posed_points},
-                  {"rest_joints", rest_joints},
-                  {"local", local},
-                  {"axis_angle", axis_angle},
-                  {"seen_points", seen_points},
-                  {"seen_joints", seen_joints},
-                  {"weights", weights}});
-}
-
 PairSampler::PairSampler(const Corpus& corpus, const PairConfig& config, uint64_t seed)
     : corpus_(corpus),
       config_(config),

@@ -30,7 +30,18 @@ struct PairBatch {
   Tensor seen_joints;   ///< [N, 22, 3] rest_joints as an extractor sees them, with noise
   Tensor weights;       ///< [N, V, 22] the data's; only with PairConfig::skin_weights
 
-  NamedTensors tensors() const;  ///< those that are defined
+  /// named_tensors() and moved() of it.
+  template <class F>
+  void each(F&& f) {
+    f("rest_points", rest_points);
+    f("posed_points", posed_points);
+    f("rest_joints", rest_joints);
+    f("local", local);
+    f("axis_angle", axis_angle);
+    f("seen_points", seen_points);
+    f("seen_joints", seen_joints);
+    f("weights", weights);
+  }
 };
 
 class PairSampler {

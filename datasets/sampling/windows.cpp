@@ -146,28 +146,6 @@ WindowBatch make_batch(int64_t n, int64_t t, bool truth) {
 
 }  // namespace
 
-NamedTensors WindowBatch::tensors() const {
-  return defined({{"joints_a", joints_a},
-                  {"input_a", input_a},
-                  {"trans_a", trans_a},
-                  {"input_trans_a", input_trans_a},
-                  {"turns", turns},
-                  {"uncertainty", uncertainty},
-                  {"reframed", reframed},
-                  {"rest_a", rest_a},
-                  {"rest_b", rest_b},
-                  {"sixd_a", sixd_a},
-                  {"standing", standing},
-                  {"self_mask", self_mask},
-                  {"real_b", real_b},
-                  {"real_trans_b", real_trans_b},
-                  {"truth_b", truth_b},
-                  {"truth_trans_b", truth_trans_b},
-                  {"truth_sixd_b", truth_sixd_b},
-                  {"root_a", root_a},
-                  {"truth_root_b", truth_root_b}});
-}
-
 WindowSampler::WindowSampler(const Corpus& corpus, const WindowConfig& config, uint64_t seed,
                              const std::vector<JointTrack>* tracks)
     : corpus_(corpus),

@@ -63,7 +63,29 @@ struct WindowBatch {
   Tensor root_a;         ///< [N, T, 3] pelvis of A in the world
   Tensor truth_root_b;   ///< [N, T, 3] pelvis of B in the world
 
-  NamedTensors tensors() const;  ///< those that are defined
+  /// named_tensors() and moved() of it.
+  template <class F>
+  void each(F&& f) {
+    f("joints_a", joints_a);
+    f("input_a", input_a);
+    f("trans_a", trans_a);
+    f("input_trans_a", input_trans_a);
+    f("turns", turns);
+    f("uncertainty", uncertainty);
+    f("reframed", reframed);
+    f("rest_a", rest_a);
+    f("rest_b", rest_b);
+    f("sixd_a", sixd_a);
+    f("standing", standing);
+    f("self_mask", self_mask);
+    f("real_b", real_b);
+    f("real_trans_b", real_trans_b);
+    f("truth_b", truth_b);
+    f("truth_trans_b", truth_trans_b);
+    f("truth_sixd_b", truth_sixd_b);
+    f("root_a", root_a);
+    f("truth_root_b", truth_root_b);
+  }
 };
 
 /// Which bodies and clips a sample uses (indices into the corpus).

@@ -39,9 +39,8 @@ void TensorBoardLog::on_log(const Stage& stage, int64_t done, const NamedValues&
 void TensorBoardLog::on_validation(Stage& stage, int64_t done, const NamedValues& figures) {
   on_log(stage, done, figures);
   for (const StateEntry& entry : stage.weights())
-    if (entry.value->dtype() == DType::f32)
-      file_->histogram(done, entry.name,
-                       {entry.value->data<float>(), static_cast<size_t>(entry.value->numel())});
+    if (const Tensor t = entry.value->cpu(); t.dtype() == DType::f32)
+      file_->histogram(done, entry.name, {t.data<float>(), static_cast<size_t>(t.numel())});
   if (const std::vector<Clip> clips = clips_of(stage.show()); !clips.empty()) {
     const Image sheet = contact_sheet(clips, {.fps = 0});
     file_->picture(done, stage.name() + "/held out", sheet.width, sheet.height, png_bytes(sheet));

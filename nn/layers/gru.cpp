@@ -32,7 +32,7 @@ Var GruLayer::operator()(Context& ctx, const Var& x, Var* state) const {
     const auto index = static_cast<int64_t>(l);
     const Var h0 = state->value.defined()
                        ? reshape(slice(*state, 0, index, index + 1), {n, hidden_})
-                       : Var(Tensor::zeros({n, hidden_}, x.dtype()));
+                       : Var(Tensor::zeros({n, hidden_}, x.dtype(), x.value.device()));
     if (l > 0) y = dropout(ctx, y, dropout_);
     y = gru(y, h0, ctx.bind(w.w_ih), ctx.bind(w.w_hh), ctx.bind(w.b_ih), ctx.bind(w.b_hh));
     last.push_back(t > 0 ? slice(y, 0, t - 1, t) : reshape(h0, {1, n, hidden_}));

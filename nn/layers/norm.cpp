@@ -1,7 +1,5 @@
 #include "nn/layers/norm.h"
 
-#include <cmath>
-
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
 #include "autograd/ops/pooled_norm.h"
@@ -24,11 +22,9 @@ Var BatchNormLayer::operator()(Context& ctx, const Var& x) {
     update(batch);
     return y;
   }
-  std::vector<double> inverse;
-  for (int64_t i = 0; i < running_var.numel(); ++i)
-    inverse.push_back(1.0 / std::sqrt(running_var.item(i) + eps));
-  const Tensor rstd = Tensor::from<double>(running_var.shape(), inverse).cast(x.dtype());
-  const Var factor = mul(ctx.bind(weight), rstd);
+  const Var one(Tensor::full({1}, 1, DType::f64, x.value.device()));
+  const Var deviation = sqrt(add_scalar(Var(running_var.cast(DType::f64)), eps));
+  const Var factor = mul(ctx.bind(weight), (one / deviation).value.cast(x.dtype()));
   return add(mul(x, factor), sub(ctx.bind(bias), mul(running_mean, factor)));
 }
 
@@ -50,10 +46,8 @@ void BatchNormLayer::update(const BatchStatistics& batch) {
   // The running variance takes the unbiased one (n / (n - 1)).
   const double unbias = static_cast<double>(batch.count) / static_cast<double>(batch.count - 1);
   const auto blend = [&](const Tensor& old, const Tensor& fresh, double factor) {
-    std::vector<double> out;
-    for (int64_t i = 0; i < old.numel(); ++i)
-      out.push_back((1 - momentum) * old.item(i) + momentum * factor * fresh.item(i));
-    return Tensor::from<double>(old.shape(), out).cast(old.dtype());
+    const Var kept = scale(Var(old.cast(DType::f64)), 1 - momentum);
+    return (kept + scale(Var(fresh), momentum * factor)).value.cast(old.dtype());
   };
   running_mean = blend(running_mean, batch.mean, 1.0);
   running_var = blend(running_var, batch.variance, unbias);

@@ -14,10 +14,11 @@ namespace {
 Var per_sample(const Var& x) { return mean(reshape(x, {x.size(0), -1}), 1); }
 
 /// Sum of per-sample values [n] times mask [n], divided by max(sum of mask, 1).
-Var masked_mean(const Var& values, const Tensor& mask) {
-  double count = 0;
-  for (int64_t i = 0; i < mask.numel(); ++i) count += mask.item(i);
-  return scale(sum(values * Var(mask), 0), 1.0 / std::max(count, 1.0));
+Var masked_mean(const Var& values, const Var& mask) {
+  const Tensor ones = mask.value.cast(DType::f64);
+  const Var more = relu(add_scalar(sum(Var(ones), 0), -1));
+  const Var one(Tensor::full({1}, 1, DType::f64, ones.device()));
+  return sum(values * mask, 0) * Var((one / add_scalar(more, 1)).value.cast(values.dtype()));
 }
 
 Var differences(const Var& joints) {
@@ -25,21 +26,19 @@ Var differences(const Var& joints) {
   return slice(joints, 1, 1, t) - slice(joints, 1, 0, t - 1);
 }
 
+Var nothing(const MotionBatch& b) {
+  return Var(Tensor::zeros({}, b.joints.dtype(), b.joints.value.device()));
+}
+
 /// Cross-entropy of which feet stand; 0 where the network does not say or nobody knows.
 Var contact_loss(const MotionOutput& out, const MotionBatch& b) {
   if (!out.standing.value.defined() || !b.standing.defined())
-    return Var(Tensor::zeros({}, b.joints.dtype()));
+    return nothing(b);
   return mean_all(softplus(out.standing) - out.standing * Var(b.standing));
 }
 
 /// v1's smoothness: a path's change of velocity.
 Var path_loss(const Var& trans) { return mean_all(square(differences(trans))); }
-
-Tensor complement(const Tensor& mask) {
-  std::vector<double> out;
-  for (int64_t i = 0; i < mask.numel(); ++i) out.push_back(1 - mask.item(i));
-  return Tensor::from<double>(mask.shape(), out).cast(mask.dtype());
-}
 
 /// What is true of the first frames.
 MotionBatch first_frames(MotionBatch b, int64_t frames) {
@@ -57,7 +56,7 @@ void put_reconstruction(const MotionOutput& to_a, const MotionBatch& b, const Mo
   const Var moved = differences(to_a.joints), truly = differences(b.joints);
   out->smoothness = apart(moved, truly);
   out->acceleration = w.acceleration > 0 ? apart(differences(moved), differences(truly))
-                                         : Var(Tensor::zeros({}, b.joints.dtype()));
+                                         : nothing(b);
 }
 
 }  // namespace
@@ -90,7 +89,7 @@ MotionLosses motion_losses(Context& ctx, const MotionModel& net, Discriminator* 
     const Var d = reshape(matrix_to_sixd(to_b.rotations), b.sixd.shape()) - b.sixd;
     self = self + scale(per_sample(errors(d, w.measure, 6)), w.self_rotation);
   }
-  out.self = masked_mean(self, b.self_mask);
+  out.self = masked_mean(self, Var(b.self_mask));
   out.total = scale(out.cycle, w.cycle) + scale(out.rotation, w.rotation) +
               scale(out.smoothness, w.smoothness) + scale(out.acceleration, w.acceleration) +
               scale(out.self, w.self);
@@ -103,7 +102,7 @@ MotionLosses motion_losses(Context& ctx, const MotionModel& net, Discriminator* 
     if (!discriminator_gradients) judge.emplace(ctx);
     const Var logit =
         (*discriminator)(ctx, discriminator_input(to_b.joints, to_b.trans), bone_vectors(b.rest_b));
-    out.adversarial = masked_mean(softplus(neg(logit)), complement(b.self_mask));
+    out.adversarial = masked_mean(softplus(neg(logit)), add_scalar(neg(Var(b.self_mask)), 1));
     out.total = out.total + scale(out.adversarial, w.adversarial);
   }
   if (w.twist > 0)
@@ -141,7 +140,7 @@ DiscriminatorLosses discriminator_losses(Context& ctx, Discriminator& net, const
   out.real = bce_with_logits(on_real, 1);
   out.fake = bce_with_logits(on_fake, 0);
   out.total = out.real + out.fake;
-  out.fake_score = mean_all(sigmoid(on_fake.detach())).value.item();
+  out.fake_score = mean_all(sigmoid(on_fake.detach())).value.cpu().item();
   return out;
 }
 

@@ -42,7 +42,7 @@ Var lengths(const Var& x) { return sqrt(add_scalar(sum(square(x), -1), 1e-12)); 
 Var bones_of(const Var& rest) {
   const int64_t n = rest.size(0);
   const Var rows = reshape(permute(rest, {0, 2, 1}), {3 * n, kJoints});
-  const Var bones = linear(rows, Var(bone_matrix(rest.dtype())));
+  const Var bones = linear(rows, Var(bone_matrix(rest.dtype()).to(rest.value.device())));
   return permute(reshape(bones, {n, 3, kJoints}), {0, 2, 1});
 }
 

@@ -50,7 +50,7 @@ Var Mlp3::at_points(Context& ctx, const Var& vector, const Var& points) const {
   const Var w = ctx.bind(fc1.weight);
   const Var of_vectors = linear(vector, slice(w, 1, 0, c), ctx.bind(fc1.bias));
   const Var both = concat({slice(w, 1, c, c + 3), permute(of_vectors, {1, 0})}, 1);
-  const Var x = concat({points, Var(one)}, 2);
+  const Var x = concat({points, Var(one.to(points.value.device()))}, 2);
   return from_first(ctx, hidden(ctx, [&](Activation a) { return call(LinearOp{a}, {x, both}); }));
 }
 

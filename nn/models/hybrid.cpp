@@ -35,7 +35,7 @@ Var filtered(const Var& x, const Var& g, const Var& h, Var* state) {
   const auto rest = [](const Var& gain) { return add_scalar(neg(gain), 1); };
   if (!state[0].value.defined()) {
     state[0] = state[2] = frame(x, 0);
-    state[1] = Var(Tensor::zeros({n, m}, x.dtype()));
+    state[1] = Var(Tensor::zeros({n, m}, x.dtype(), x.value.device()));
   }
   const Var first = reshape(state[0], {n, 1, m});
   const Var before = t == 1 ? first : concat({first, slice(x, 1, 0, t - 1)}, 1);
@@ -90,9 +90,11 @@ Var of_leaves(const Var& x) {
 /// pelvis and the pelvis' own, which recurrent layers do not find.
 Tensor footing_of(const MotionInput& in, Var* before) {
   const int64_t n = in.joints.size(0), t = in.joints.size(1);
-  const Tensor joints = in.joints.value.cast(DType::f64), trans = in.trans.value.cast(DType::f64),
-               last = before->value.defined() ? before->value.cast(DType::f64) : Tensor(),
-               turned = in.reframed.defined() ? in.reframed.cast(DType::f64) : Tensor();
+  const auto seen = [](const Tensor& x) {
+    return x.defined() ? x.cpu().cast(DType::f64) : Tensor();
+  };
+  const Tensor joints = seen(in.joints.value), trans = seen(in.trans.value),
+               last = seen(before->value), turned = seen(in.reframed);
   Tensor out = Tensor::zeros({n, t, kFooting}, DType::f64);
   const auto at = [&](const Tensor& x, int64_t row, int joint) {
     return Eigen::Map<const Vec3>(x.data<double>() + 3 * (row * kJoints + joint));
@@ -114,7 +116,7 @@ Tensor footing_of(const MotionInput& in, Var* before) {
     }
   }
   *before = Var(slice(in.joints, 1, t - 1, t).value);
-  return out.cast(in.joints.dtype());
+  return out.cast(in.joints.dtype()).to(in.joints.value.device());
 }
 
 }  // namespace
@@ -168,7 +170,8 @@ MotionOutput Hybrid::forward(Context& ctx, const MotionInput& in, MotionState* s
   const Var uncertainty =
       config.uncertainty && in.uncertainty.defined()
           ? Var(in.uncertainty)
-          : Var(Tensor::full({n, t, kJoints}, kUsualUncertainty, in.joints.dtype()));
+          : Var(Tensor::full({n, t, kJoints}, kUsualUncertainty, in.joints.dtype(),
+                             in.joints.value.device()));
   const Var code = enc(ctx, seen(in, surface, uncertainty), &(*state)[0]);
   const Var decoded = dec(ctx, concat({code, expand(b, {n, t, w})}, 2), &(*state)[1]);
 

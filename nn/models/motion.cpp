@@ -23,6 +23,11 @@ std::span<const SwingJoint> joint_swings() {
   return table;
 }
 
+MotionOutput on_host(const MotionOutput& out) {
+  return {out.raw.value.cpu(), out.rotations.value.cpu(), out.joints.value.cpu(),
+          out.trans.value.cpu(), out.standing.value.cpu()};
+}
+
 MotionOutput frames_of(const MotionOutput& out, int64_t from, int64_t to) {
   const auto part = [&](const Var& x) { return x.value.defined() ? slice(x, 1, from, to) : x; };
   return {part(out.raw), part(out.rotations), part(out.joints), part(out.trans),
@@ -48,7 +53,7 @@ Var leg_lengths(const Var& joints) {
 
 void put_pose(const Var& local, const Var& rest_rows, int64_t n, MotionOutput* out) {
   const int64_t t = local.size(0) / std::max<int64_t>(1, n);
-  const Tensor origin = Tensor::zeros({n * t, 3}, local.dtype());
+  const Tensor origin = Tensor::zeros({n * t, 3}, local.dtype(), local.value.device());
   const Var posed = forward_kinematics(local, rest_rows, origin, joint_parents());
   out->rotations = reshape(local, {n, t, kJoints, 3, 3});
   out->joints = reshape(joints_of(posed), {n, t, kJoints, 3});

@@ -51,6 +51,8 @@ struct MotionModel : Module {
   virtual void standardise(const MotionStatistics& statistics) = 0;
 };
 
+/// The answer as constants in the host's memory.
+MotionOutput on_host(const MotionOutput& out);
 /// Frames [from, to) of an answer.
 MotionOutput frames_of(const MotionOutput& out, int64_t from, int64_t to);
 /// x in units of the training set's deviation from its mean.

@@ -13,10 +13,12 @@ constexpr double kUsualError = -4;  // log of 2 cm: where an untrained uncertain
 
 /// Per centre [n, t, 3]: where each remembered joint lies from it, by the trust in it, and that
 /// trust. [n, t, 88], constant; all zero where nothing is remembered.
-Tensor seen_from(const Tensor& centres, const Tensor& past, double scale) {
-  const int64_t n = centres.size(0), t = centres.size(1), w = 4 * kJoints;
-  Tensor out = Tensor::zeros({n, t, w});
-  if (!past.defined()) return out;
+Tensor seen_from(const Tensor& centres_there, const Tensor& past_there, double scale) {
+  const int64_t n = centres_there.size(0), t = centres_there.size(1), w = 4 * kJoints;
+  const Device device = centres_there.device();
+  if (!past_there.defined()) return Tensor::zeros({n, t, w}, DType::f32, device);
+  const Tensor centres = centres_there.cpu(), past = past_there.cpu();
+  Tensor out = Tensor::empty({n, t, w});
   for (int64_t row = 0; row < n * t; ++row) {
     const float* centre = centres.data<float>() + 3 * row;
     for (int64_t j = 0; j < kJoints; ++j) {
@@ -27,7 +29,7 @@ Tensor seen_from(const Tensor& centres, const Tensor& past, double scale) {
       to[3] = joint[3];
     }
   }
-  return out;
+  return out.to(device);
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ Var SpatialTransformer::operator()(Context& ctx, const Var& x) {
   h = relu(bn5(ctx, fc2(ctx, h)));
   std::vector<double> eye(static_cast<size_t>(k_ * k_), 0.0);
   for (int64_t i = 0; i < k_; ++i) eye[i * k_ + i] = 1.0;
-  const Tensor identity = Tensor::from<double>({k_ * k_}, eye).cast(x.dtype());
+  const Tensor identity = Tensor::from<double>({k_ * k_}, eye).cast(x.dtype()).to(x.value.device());
   return reshape(fc3(ctx, h) + Var(identity), {x.size(0), k_, k_});
 }
 

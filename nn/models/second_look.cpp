@@ -25,7 +25,7 @@ Tensor axes(const SkeletonAnswer& first) {
   Tensor out = Tensor::zeros({n * kJoints, 3, 3});
   for (int64_t k = 0; k < n * kJoints; ++k)
     for (int64_t c = 0; c < 3; ++c) out.data<float>()[9 * k + 4 * c] = 1;
-  return out;
+  return out.to(first.joints.value.device());
 }
 
 /// Per joint: where every joint lies in its axes, the logarithm of its uncertainty, and a mark on
@@ -33,9 +33,10 @@ Tensor axes(const SkeletonAnswer& first) {
 Tensor pose_around(const SkeletonAnswer& first, const Tensor& axes) {
   const int64_t n = first.joints.size(0);
   Tensor out = Tensor::zeros({n, kJoints, kJoints * kPose});
-  const float *joints = first.joints.value.data<float>(), *axis = axes.data<float>();
-  const float* unsure =
-      first.uncertainty.value.defined() ? first.uncertainty.value.data<float>() : nullptr;
+  const Tensor seen = first.joints.value.cpu(), turned = axes.cpu(),
+               doubted = first.uncertainty.value.cpu();
+  const float *joints = seen.data<float>(), *axis = turned.data<float>();
+  const float* unsure = doubted.defined() ? doubted.data<float>() : nullptr;
   float* to = out.data<float>();
   for (int64_t row = 0; row < n * kJoints; ++row)
     for (int64_t j = 0; j < kJoints; ++j, to += kPose) {
@@ -47,7 +48,7 @@ Tensor pose_around(const SkeletonAnswer& first, const Tensor& axes) {
       to[3] = unsure != nullptr ? unsure[other] + 4 : 0;  // about zero: e^-4 is 2 cm
       to[4] = row % kJoints == j ? 1 : 0;
     }
-  return out;
+  return out.to(axes.device());
 }
 
 }  // namespace

@@ -16,6 +16,9 @@ struct SkeletonAnswer {
   Var uncertainty;  ///< [n, 22]: logarithm of the s in p(error) ~ s^-3 exp(-|error| / s), metres
 };
 
+/// The answer as constants in the host's memory.
+SkeletonAnswer on_host(const SkeletonAnswer& answer);
+
 struct SkeletonOutput : SkeletonAnswer {
   /// What a model that looks again believed before, look by look; each has its own training loss.
   std::vector<SkeletonAnswer> before;

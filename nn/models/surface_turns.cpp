@@ -27,8 +27,9 @@ SurfaceTurns surface_turns(const MotionInput& in) {
   for (int64_t k = 0; k < n * t * leaves; ++k)
     matrix_at(out.leaves.data<double>() + 9 * k).setIdentity();
   if (in.turns.defined()) {
-    const Tensor joints = in.joints.value.cast(DType::f64), rest = in.rest.value.cast(DType::f64),
-                 turns = in.turns.cast(DType::f64);
+    const Tensor joints = in.joints.value.cpu().cast(DType::f64),
+                 rest = in.rest.value.cpu().cast(DType::f64),
+                 turns = in.turns.cpu().cast(DType::f64);
     for (int64_t k = 0; k < n * t; ++k) {
       Rotations measured;
       for (int j = 0; j < kJoints; ++j)
@@ -45,7 +46,7 @@ SurfaceTurns surface_turns(const MotionInput& in) {
         matrix_at(out.leaves.data<double>() + 9 * (k * leaves + i)) = read.beyond[kLeaves[i]];
     }
   }
-  for (Tensor* x : {&out.twist, &out.leaves, &out.beyond}) *x = x->cast(in.joints.dtype());
+  for (Tensor* x : {&out.twist, &out.leaves, &out.beyond}) *x = x->cast(in.joints.dtype()).to(in.joints.value.device());
   return out;
 }
 

@@ -268,7 +268,7 @@ class Reader {
     const auto n = static_cast<size_t>(out.numel());
     if (n == 0) return out;
     if (e.kind->coding != Coding::f16 && e.kind->coding != Coding::bf16) {
-      std::memcpy(out.raw(), from, e.end - e.begin);
+      std::memcpy(out.bytes(), from, e.end - e.begin);
       return out;
     }
     auto* to = out.data<float>();
@@ -337,7 +337,7 @@ std::string safetensors_bytes(const TensorFile& file) {
   out += text;
   for (const auto& item : file.tensors) {
     const Tensor& t = item.second;
-    out.append(static_cast<const char*>(t.raw()),
+    out.append(static_cast<const char*>(t.bytes()),
                static_cast<size_t>(t.numel()) * size_of(t.dtype()));
   }
   return out;

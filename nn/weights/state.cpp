@@ -80,7 +80,7 @@ bool may_nest_deeply(const std::string& yaml) {
 }  // namespace
 
 void append(TensorFile* file, Module& module, const std::string& prefix) {
-  for (const StateEntry& e : state_of(module, prefix)) file->tensors[e.name] = e.value->clone();
+  for (const StateEntry& e : state_of(module, prefix)) file->tensors[e.name] = e.value->clone().cpu();
 }
 
 TensorFile to_file(Module& module, const std::string& prefix) {
@@ -133,7 +133,7 @@ void load_state(Module& module, const TensorFile& file, const std::string& prefi
     throw error;
   }
   for (const auto& [to, from] : pairs)
-    *to = from->dtype() == to->dtype() ? from->clone() : from->cast(to->dtype());
+    *to = (from->dtype() == to->dtype() ? from->clone() : from->cast(to->dtype())).to(to->device());
 }
 
 NameMap NameMap::read(const std::string& path) { return parse(read_file(path, kLongestMap), path); }

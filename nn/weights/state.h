@@ -11,7 +11,8 @@
 
 namespace restage {
 
-/// Copies of all parameters and buffers of a module, under `prefix` + their state-dict names.
+/// Copies of all parameters and buffers of a module, under `prefix` + their state-dict names, in
+/// the host's memory.
 TensorFile to_file(Module& module, const std::string& prefix = "");
 void append(TensorFile* file, Module& module, const std::string& prefix);
 
@@ -26,7 +27,7 @@ class StateError : public InputError {
   std::string details() const;
 };
 
-/// Copies the tensors of `file` whose names begin with `prefix` into the module, cast to its dtype.
+/// Copies the tensors of `file` whose names begin with `prefix` into the module, cast to its dtype, on its device.
 /// Strict: if a name is missing, unexpected, of another shape or holds NaN, StateError tells all
 /// and nothing is loaded. Names ending in num_batches_tracked are ignored.
 void load_state(Module& module, const TensorFile& file, const std::string& prefix,

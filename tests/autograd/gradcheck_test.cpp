@@ -119,7 +119,7 @@ struct Product {
     if (D == Defect::needs && !(needs[0] && needs[1])) return Grads(2);
     if (D == Defect::one_missing && g[0].numel() > 0) {
       Tensor holes = Tensor::empty(g[0].shape(), g[0].dtype());
-      std::memcpy(holes.raw(), g[0].raw(),
+      std::memcpy(holes.bytes(), g[0].bytes(),
                   static_cast<size_t>(g[0].numel() - 1) * size_of(g[0].dtype()));
       g[0] = holes;
     }
@@ -212,8 +212,8 @@ std::string kept_by(const Saved& saved, const std::vector<Var>& inputs, const Va
     std::string name =
         t.defined() ? std::to_string(t.numel() * static_cast<int64_t>(size_of(t.dtype()))) : "-";
     for (size_t k = inputs.size(); t.defined() && k-- > 0;)
-      if (t.raw() == inputs[k].value.raw()) name = "x" + std::to_string(k);
-    if (t.defined() && t.raw() == result.value.raw()) name = "y";
+      if (t.address() == inputs[k].value.address()) name = "x" + std::to_string(k);
+    if (t.defined() && t.address() == result.value.address()) name = "y";
     text += (text.empty() ? "" : " ") + name;
   }
   return text;

@@ -43,7 +43,7 @@ TEST(TensorShape, BroadcastsLikeNumpy) {
 TEST(Tensors, AreAlignedWhateverTheirSize) {
   for (const int64_t n : {0, 1, 3, 16, 17, 1000, 70000, 300000})
     for (const DType type : {DType::f32, DType::f64, DType::i32, DType::i64})
-      EXPECT_EQ(reinterpret_cast<uintptr_t>(Tensor::empty({n}, type).raw()) % 64, 0u);
+      EXPECT_EQ(reinterpret_cast<uintptr_t>(Tensor::empty({n}, type).address()) % 64, 0u);
 }
 
 TEST(Tensors, RefuseImpossibleSizes) {
@@ -97,7 +97,7 @@ TEST(Tensors, ConvertAndGuardTheirDtype) {
   EXPECT_EQ(t.cast(DType::f32).item(0), 1.5);
   EXPECT_EQ(t.cast(DType::i32).item(1), -2);
   EXPECT_EQ(t.cast(DType::i64).to_vector<double>(), (std::vector<double>{1, -2, 3}));
-  EXPECT_EQ(t.cast(DType::f64).raw(), t.raw());
+  EXPECT_EQ(t.cast(DType::f64).address(), t.address());
   EXPECT_THROW(t.data<float>(), ShapeError);
   EXPECT_EQ(Tensor::full({2}, 7, DType::i64).item(1), 7);
 }
@@ -149,9 +149,9 @@ TEST(PooledMemory, ABlockIsUsedAgain) {
   const void* first = nullptr;
   {
     const Tensor t = Tensor::empty({3000000});
-    first = t.raw();
+    first = t.address();
   }
-  EXPECT_EQ(Tensor::empty({2999999}).raw(), first);  // the same size class
+  EXPECT_EQ(Tensor::empty({2999999}).address(), first);  // the same size class
 }
 
 TEST(PooledMemory, InferenceKeepsNothing) {

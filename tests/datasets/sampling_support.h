@@ -15,7 +15,7 @@ inline const Corpus& training_corpus() {
 
 inline bool same_bits(const Tensor& a, const Tensor& b) {
   return a.shape() == b.shape() &&
-         std::memcmp(a.raw(), b.raw(), static_cast<size_t>(a.numel()) * sizeof(float)) == 0;
+         std::memcmp(a.bytes(), b.bytes(), static_cast<size_t>(a.numel()) * sizeof(float)) == 0;
 }
 
 /// Three numbers from position 3 i of row `row`.

@@ -29,7 +29,8 @@ bool starts_with(const std::string& text, const std::string& begin) {
 /// A case while it is computed: its inputs as leaves, its modules, its answer.
 class Case {
  public:
-  Case(const TensorFile& file, const std::string& where) : file_(file), where_(where) {
+  Case(const TensorFile& file, const std::string& where, Device device)
+      : file_(file), where_(where), device_(device) {
     type_ = text("dtype") == "f64" ? DType::f64 : DType::f32;
     ctx_.tape = &tape_;
     ctx_.training = text("train") == "True";
@@ -63,8 +64,12 @@ class Case {
     leaves_.emplace_back("g.in." + name, id);
     return inputs_[name] = tape_.leaf(constant(name), id);
   }
-  Tensor constant(const std::string& name) const { return file_.at("in." + name, where_); }
-  Tensor probe(const std::string& name = "probe") const { return file_.at("out." + name, where_); }
+  Tensor constant(const std::string& name) const {
+    return file_.at("in." + name, where_).to(device_);
+  }
+  Tensor probe(const std::string& name = "probe") const {
+    return file_.at("out." + name, where_).to(device_);
+  }
 
   bool has_parameter(const std::string& name) const { return file_.find("p." + name) != nullptr; }
   bool has_buffer(const std::string& name) const { return file_.find("buf." + name) != nullptr; }
@@ -85,27 +90,28 @@ class Case {
         if (starts_with(name, kind + prefix))
           state.tensors.emplace(name.substr(kind.size() + prefix.size()), tensor);
     load_state(module, state, "", where_);
+    move_module(module, device_);
     modules_.emplace_back(&module, prefix);
     for (const StateEntry& e : state_of(module, prefix))
       if (e.parameter != nullptr) leaves_.emplace_back("g." + e.name, e.parameter->id);
   }
 
   void out(const std::vector<std::pair<std::string, Var>>& values) {
-    for (const auto& [name, value] : values) answer_.tensors["out." + name] = value.value;
+    for (const auto& [name, value] : values) put("out." + name, value.value);
   }
   void index(const std::string& name, const Tensor& value) {
-    answer_.tensors["idx." + name] = value;
+    put("idx." + name, value);
   }
   /// The loss, its gradients, and the buffers after the call.
   void finish(const Var& loss) {
     out({{"loss", loss}});
     const Gradients gradients = tape_.backward(loss);
     for (const auto& [name, id] : leaves_)
-      if (const Tensor* g = gradients.find(id)) answer_.tensors[name] = *g;
+      if (const Tensor* g = gradients.find(id)) put(name, *g);
     if (!ctx_.training) return;
     for (const auto& [module, prefix] : modules_)
       for (const StateEntry& e : state_of(*module, prefix))
-        if (e.parameter == nullptr) answer_.tensors["out.buf." + e.name] = *e.value;
+        if (e.parameter == nullptr) put("out.buf." + e.name, *e.value);
   }
 
   Context& ctx() { return ctx_; }
@@ -113,8 +119,11 @@ class Case {
   TensorFile& answer() { return answer_; }
 
  private:
+  void put(const std::string& name, const Tensor& value) { answer_.tensors[name] = value.cpu(); }
+
   const TensorFile& file_;
   const std::string& where_;
+  Device device_;
   DType type_ = DType::f64;
   Tape tape_;
   Context ctx_;
@@ -414,8 +423,8 @@ double error(const Tensor& got, const Tensor& want, double top, bool exact, bool
 
 }  // namespace
 
-TensorFile answer(const TensorFile& question, const std::string& where) {
-  Case c(question, where);
+TensorFile answer(const TensorFile& question, const std::string& where, Device device) {
+  Case c(question, where, device);
   const std::string name = c.text("case");
   for (const Entry& entry : kCases) {
     if (!starts_with(name, entry.name)) continue;

@@ -9,9 +9,10 @@
 
 namespace restage::oracle {
 
-/// out.*, idx.*, g.* and g.in.* of a case whose metadata name it and its dtype; sizes come from the
-/// metadata and the shapes. InputError for an unknown case or one that lacks something.
-TensorFile answer(const TensorFile& question, const std::string& where);
+/// out.*, idx.*, g.* and g.in.* of a case whose metadata name it and its dtype, computed on a
+/// device; sizes come from the metadata and the shapes. InputError for an unknown case or one that
+/// lacks something.
+TensorFile answer(const TensorFile& question, const std::string& where, Device device = {});
 
 /// One tensor that differs by more than is allowed, or is missing.
 struct Difference {

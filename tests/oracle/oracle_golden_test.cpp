@@ -16,6 +16,7 @@
 #include "nn/weights/state.h"
 #include "tests/oracle/oracle_case.h"
 #include "tests/support/expect_near.h"
+#include "tests/support/fake_device.h"
 
 namespace restage::oracle {
 namespace {
@@ -48,6 +49,13 @@ TEST_P(OracleGolden, AgreesInValuesAndGradients) {
   const std::vector<Difference> found =
       differences(question, answer(question, path), f64 ? 1e-8 : 1e-4);
   EXPECT_TRUE(found.empty()) << report(found);
+}
+
+TEST_P(OracleGolden, GivesTheSameBitsOnAnotherDevice) {
+  const std::string path = folder() + GetParam() + ".safetensors";
+  const TensorFile question = read_safetensors(path);
+  EXPECT_TRUE(safetensors_bytes(answer(question, path, fake_device())) ==
+              safetensors_bytes(answer(question, path)));
 }
 
 INSTANTIATE_TEST_SUITE_P(Cases, OracleGolden, testing::ValuesIn(cases()),

@@ -167,7 +167,7 @@ TEST(Team, BuffersThatNobodyChangesStayAsTheyAre) {
     std::string out;
     for (const StateEntry& entry : stage->weights())
       if (entry.parameter == nullptr)
-        out.append(static_cast<const char*>(entry.value->raw()),
+        out.append(static_cast<const char*>(entry.value->bytes()),
                    static_cast<size_t>(entry.value->numel()) * size_of(entry.value->dtype()));
     return out;
   };

@@ -8,7 +8,8 @@ Adam::Adam(const std::vector<NamedParameter>& parameters, const AdamConfig& conf
     : config_(config) {
   for (const NamedParameter& p : parameters) {
     const auto zeros = [&] {
-      return Tensor::zeros(p.parameter->value.shape(), p.parameter->value.dtype());
+      const Tensor& t = p.parameter->value;
+      return Tensor::zeros(t.shape(), t.dtype(), t.device());
     };
     slots_.push_back({p, zeros(), zeros(), 0});
   }
@@ -28,8 +29,8 @@ void Adam::step(const Gradients& gradients, double rate, double scale) {
 void Adam::save(const std::string& prefix, TensorFile& file) const {
   for (const Slot& s : slots_) {
     const std::string name = prefix + s.of.name;
-    file.tensors[name + ".m"] = s.m;
-    file.tensors[name + ".v"] = s.v;
+    file.tensors[name + ".m"] = s.m.cpu();
+    file.tensors[name + ".v"] = s.v.cpu();
     file.tensors[name + ".steps"] = Tensor::from<int64_t>({1}, {s.steps});
   }
 }
@@ -38,8 +39,8 @@ void Adam::load(const std::string& prefix, const TensorFile& file, const std::st
   for (Slot& s : slots_) {
     const std::string name = prefix + s.of.name;
     const Shape& shape = s.of.parameter->value.shape();
-    s.m = saved_state(file, name + ".m", shape, where);
-    s.v = saved_state(file, name + ".v", shape, where);
+    s.m = saved_state(file, name + ".m", shape, where, s.m.device());
+    s.v = saved_state(file, name + ".v", shape, where, s.v.device());
     s.steps = saved_state(file, name + ".steps", {1}, where).data<int64_t>()[0];
   }
 }

@@ -24,20 +24,27 @@ Tensor product(const Tensor& a, const Tensor& b, Transposed which = Transposed::
   return out;
 }
 
-double norm_of(const Tensor& x) {
-  Tensor squares = Tensor::zeros({1}, DType::f64);
-  launch(SquaredNormArgs{x, squares});
-  return std::sqrt(squares.item());
+/// Of each of x [n, rows, columns].
+std::vector<double> norms_of(const Tensor& x) {
+  const Tensor squares = Tensor::empty({x.size(0)}, DType::f64, x.device());
+  for (int64_t i = 0; i < x.size(0); ++i) {
+    Tensor one = squares.rows(i, i + 1);
+    launch(SquaredNormArgs{x.rows(i, i + 1), one});
+  }
+  std::vector<double> out = squares.cpu().to_vector<double>();
+  for (double& square : out) square = std::sqrt(square);
+  return out;
 }
 
 }  // namespace
 
 Tensor orthogonalised(const Tensor& x) {
-  Tensor y = Tensor::zeros(x.shape(), x.dtype());
+  Tensor y = Tensor::zeros(x.shape(), x.dtype(), x.device());
+  const std::vector<double> norms = norms_of(x);
   for (int64_t i = 0; i < x.size(0); ++i) {
-    const Tensor one = x.rows(i, i + 1);
     Tensor scaled = y.rows(i, i + 1);
-    if (const double norm = norm_of(one); norm > 0) launch(MixArgs{one, scaled, 0, 1 / norm});
+    if (const double norm = norms[static_cast<size_t>(i)]; norm > 0)
+      launch(MixArgs{x.rows(i, i + 1), scaled, 0, 1 / norm});
   }
   const bool wide = x.size(1) <= x.size(2);
   for (int i = 0; i < kIterations; ++i) {
@@ -61,7 +68,8 @@ Muon::Muon(const std::vector<NamedParameter>& matrices, const MuonConfig& config
     const auto like = std::find_if(groups_.begin(), groups_.end(),
                                    [&](const auto& group) { return group[0].m.shape() == shape; });
     auto& group = like != groups_.end() ? *like : groups_.emplace_back();
-    group.push_back({p, Tensor::zeros(shape, p.parameter->value.dtype())});
+    const Tensor& t = p.parameter->value;
+    group.push_back({p, Tensor::zeros(shape, t.dtype(), t.device())});
   }
 }
 
@@ -76,7 +84,8 @@ void Muon::step(const Gradients& gradients, double rate, double scale) {
       const auto at = static_cast<int64_t>(i);
       return stack.rows(at, at + 1).reshape({rows, columns});
     };
-    const Tensor ahead = Tensor::zeros({std::ssize(moving), rows, columns}, group[0].m.dtype());
+    const Tensor ahead = Tensor::zeros({std::ssize(moving), rows, columns}, group[0].m.dtype(),
+                                       group[0].m.device());
     for (size_t i = 0; i < moving.size(); ++i) {
       const Tensor& g = *gradients.find(moving[i]->of.parameter->id);
       Tensor here = row(ahead, i);
@@ -95,12 +104,13 @@ void Muon::step(const Gradients& gradients, double rate, double scale) {
 
 void Muon::save(const std::string& prefix, TensorFile& file) const {
   for (const std::vector<Slot>& group : groups_)
-    for (const Slot& s : group) file.tensors[prefix + s.of.name + ".m"] = s.m;
+    for (const Slot& s : group) file.tensors[prefix + s.of.name + ".m"] = s.m.cpu();
 }
 
 void Muon::load(const std::string& prefix, const TensorFile& file, const std::string& where) {
   for (std::vector<Slot>& group : groups_)
-    for (Slot& s : group) s.m = saved_state(file, prefix + s.of.name + ".m", s.m.shape(), where);
+    for (Slot& s : group)
+      s.m = saved_state(file, prefix + s.of.name + ".m", s.m.shape(), where, s.m.device());
 }
 
 }  // namespace restage

@@ -12,12 +12,12 @@ std::vector<NamedParameter> named_parameters(
 }
 
 Tensor saved_state(const TensorFile& file, const std::string& name, const Shape& shape,
-                   const std::string& where) {
+                   const std::string& where, Device device) {
   const Tensor* t = file.find(name);
   if (t == nullptr || !(t->shape() == shape))
     throw InputError(where, "state '" + name + "' is missing or of another size",
                      "resume with the configuration that the run was made with");
-  return t->clone();
+  return t->clone().to(device);
 }
 
 }  // namespace restage

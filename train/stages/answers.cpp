@@ -63,7 +63,7 @@ std::string sum_of(const TensorFile& file) {
   Sha256 sum;
   for (const auto& [name, t] : file.tensors)
     sum.add(
-        {static_cast<const char*>(t.raw()), static_cast<size_t>(t.numel()) * size_of(t.dtype())});
+        {static_cast<const char*>(t.bytes()), static_cast<size_t>(t.numel()) * size_of(t.dtype())});
   return sum.hex();
 }
 

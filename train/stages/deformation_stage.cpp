@@ -37,7 +37,7 @@ void add_shared_skin(const Tensor& predicted, const Tensor& truth,
 }  // namespace
 
 DeformationStage::DeformationStage(const Config& config, const StageInput& in)
-    : Stage("deformation", config.optimiser),
+    : Stage("deformation", config.optimiser, in.device),
       config_(config),
       weights_(add_network<DeformationModel>(config.model,
                                              RngKey{in.seed, 0}.fold("deformation/weights"))),
@@ -58,9 +58,8 @@ DeformationBatch DeformationStage::batch_of(const PairBatch& p) const {
   DeformationBatch b{p.rest_points, p.posed_points, p.rest_joints, p.local,
                      p.axis_angle,  p.seen_points,  p.seen_joints};
   if (!config_.keep_root_rotation) {
-    b.axis_angle = b.axis_angle.clone();
-    for (int64_t i = 0; i < b.axis_angle.size(0); ++i)
-      std::fill_n(b.axis_angle.data<float>() + i * 66, 3, 0.0f);
+    const Tensor none = Tensor::zeros({p.axis_angle.size(0), 3}, DType::f32, p.axis_angle.device());
+    b.axis_angle = concat({Var(none), slice(Var(p.axis_angle), 1, 3, 3 * kJoints)}, 1).value;
   }
   return b;
 }
@@ -72,11 +71,11 @@ PairBatch DeformationStage::batch(int64_t step, const MicroBatch& part) const {
 
 /// Sums over the points of a pair, means over pairs.
 Var DeformationStage::loss(Context& ctx, const PairBatch& pairs, int64_t step,
-                           double* distance) const {
+                           Tensor* posed) const {
   const DeformationBatch b = batch_of(pairs);
   const DeformationOutput out =
       deform(ctx, *weights_, step >= config_.skinning_steps ? offsets_ : nullptr, b);
-  *distance = mean_distance(out.posed.value, b.posed_points);
+  *posed = out.posed.value;
   Var total = distance_sum(out.posed, b.posed_points, config_.loss);
   if (config_.supervision > 0)
     total = total + scale(skin_cross_entropy(out.weights, pairs.weights), config_.supervision);
@@ -86,12 +85,12 @@ Var DeformationStage::loss(Context& ctx, const PairBatch& pairs, int64_t step,
 NamedValues DeformationStage::step(int64_t step) {
   const OptimiserConfig& o = config_.optimiser;
   const Differentiated d = parts([&](const MicroBatch& part) {
-    const PairBatch pairs = batch(step, part);
-    double distance = 0;
+    const PairBatch pairs = batch(step, part), there = moved(pairs, device());
+    Tensor posed;
     Differentiated out =
         differentiate(part.key(key_.fold(static_cast<uint64_t>(step))),
-                      [&](Context& ctx) { return loss(ctx, pairs, step, &distance); });
-    out.values = {distance};
+                      [&](Context& ctx) { return loss(ctx, there, step, &posed); });
+    out.values = {mean_distance(posed.cpu(), pairs.posed_points)};
     return out;
   });
   const double rate = learning_rate(o.schedule, step, o.steps);
@@ -107,12 +106,15 @@ NamedValues DeformationStage::validate() {
   for (int64_t i = 0; i < n; i += part) {
     const int64_t count = std::min(part, n - i);
     const PairBatch pairs = validation_sampler_.batch(i, count);
-    const DeformationBatch b = batch_of(pairs);
-    const auto share = static_cast<double>(count) / static_cast<double>(n);
-    with += share * mean_distance(deform(ctx, *weights_, offsets_, b).posed.value, b.posed_points);
+    const DeformationBatch b = batch_of(moved(pairs, device()));
+    const auto error = [&](const DeformationOutput& out) {
+      return static_cast<double>(count) / static_cast<double>(n) *
+             mean_distance(out.posed.value.cpu(), pairs.posed_points);
+    };
+    with += error(deform(ctx, *weights_, offsets_, b));
     const DeformationOutput plain = deform(ctx, *weights_, nullptr, b);
-    without += share * mean_distance(plain.posed.value, b.posed_points);
-    add_shared_skin(plain.weights.value, pairs.weights, &skin, &kept);
+    without += error(plain);
+    add_shared_skin(plain.weights.value.cpu(), pairs.weights, &skin, &kept);
   }
   double lost = 0;  // by the joint that loses most
   for (int j = 0; j < kJoints; ++j)
@@ -125,13 +127,14 @@ NamedValues DeformationStage::validate() {
 
 std::vector<Shown> DeformationStage::show() {
   const int64_t n = std::min<int64_t>(8, config_.validation_pairs);
-  const DeformationBatch b = batch_of(validation_sampler_.batch(0, n));
+  const PairBatch pairs = validation_sampler_.batch(0, n);
   Context ctx;
-  const Tensor posed = deform(ctx, *weights_, offsets_, b).posed.value;
+  const Tensor posed =
+      deform(ctx, *weights_, offsets_, batch_of(moved(pairs, device()))).posed.value.cpu();
   Shown answered{"posed points", {}}, truth{"true points", {}};
   for (int64_t i = 0; i < n; ++i) {
     answered.clouds.push_back(points_of(posed, i, posed.size(1)));
-    truth.clouds.push_back(points_of(b.posed_points, i, posed.size(1)));
+    truth.clouds.push_back(points_of(pairs.posed_points, i, posed.size(1)));
   }
   return {answered, truth};
 }

@@ -53,14 +53,14 @@ class DeformationStage final : public Stage {
   static std::vector<std::string> reads(const Config&) { return {}; }
   DeformationStage(const Config& config, const StageInput& input);
   NamedValues step(int64_t step) override;
-  NamedTensors examples(int64_t step) const override { return batch(step).tensors(); }
+  NamedTensors examples(int64_t step) const override { return named_tensors(batch(step)); }
   NamedValues validate() override;
   std::vector<Shown> show() override;
 
  private:
   PairBatch batch(int64_t step, const MicroBatch& part = {}) const;
   DeformationBatch batch_of(const PairBatch& pairs) const;
-  Var loss(Context& ctx, const PairBatch& pairs, int64_t step, double* distance) const;
+  Var loss(Context& ctx, const PairBatch& pairs, int64_t step, Tensor* posed) const;
 
   Config config_;
   DeformationModel* weights_;

@@ -158,7 +158,7 @@ OptimiserConfig of_discriminator(const MotionStageConfig& c) {
 }  // namespace
 
 MotionStage::MotionStage(const Config& config, const StageInput& in)
-    : Stage("motion", config.optimiser),
+    : Stage("motion", config.optimiser, in.device),
       config_(config),
       model_(add_network<MotionModel>(config.model, RngKey{in.seed, 0}.fold("motion.init"),
                                       settings_of(config))),
@@ -185,6 +185,7 @@ MotionStage::MotionStage(const Config& config, const StageInput& in)
                      "give longer windows.frames and validation_frames");
   if (config.answers.tracks.sequences == 0) windows();  // what is wrong with them is said at once
   model_->standardise(statistics());
+  move_module(*model_, device());
 }
 
 const MotionStage::Windows& MotionStage::windows() const {
@@ -256,7 +257,7 @@ NamedTensors MotionStage::examples(int64_t step) const {
   const Batch b = batch(step);
   NamedTensors out;
   for (const auto& [kind, windows] : {std::pair("cycle.", &b.windows), std::pair("self.", &b.own)})
-    for (auto& [name, tensor] : windows->tensors()) out.emplace_back(kind + name, tensor);
+    for (auto& [name, tensor] : named_tensors(*windows)) out.emplace_back(kind + name, tensor);
   return out;
 }
 
@@ -281,7 +282,7 @@ Differentiated MotionStage::learn(const RngKey& key, const Batch& b, bool judged
   const auto value = [&](const Var& v, int64_t here, int64_t all) {
     const double part = static_cast<double>(here * config_.optimiser.batch) /
                         static_cast<double>(std::max<int64_t>(1, all * (b.self + b.cycle)));
-    return v.value.defined() ? part * v.value.item() : 0;
+    return v.value.defined() ? part * v.value.cpu().item() : 0;
   };
   const auto of_cycle = [&](const Var& v) { return value(v, b.cycle, cycle_windows()); };
   out.values = {of_cycle(l.cycle), of_cycle(l.rotation), of_cycle(l.smoothness),
@@ -296,7 +297,10 @@ NamedValues MotionStage::step(int64_t step) {
   std::map<int64_t, Batch> drawn;  // two rounds may ask for the same
   const Drawn batch_of = [&](const MicroBatch& part) -> const Batch& {
     const auto [at, fresh] = drawn.try_emplace(part.index);
-    if (fresh) at->second = batch(step, part);
+    if (fresh) {
+      at->second = batch(step, part);
+      for (WindowBatch* b : {&at->second.windows, &at->second.own}) *b = moved(*b, device());
+    }
     return at->second;
   };
   const auto number = static_cast<uint64_t>(step);
@@ -332,14 +336,16 @@ NamedValues MotionStage::validate() {
   const int64_t n = config_.validation_windows;
   for (int64_t i = 0; i < n; i += 16) {
     const WindowBatch b = windows().validation.batch(i, std::min<int64_t>(16, n - i));
-    const MotionInput seen = motion_batch(b).seen(b.rest_b);
+    const WindowBatch there = moved(b, device());
     MotionState forth, back, none;
-    const MotionOutput to_b = model_->forward(ctx, seen, &forth);
-    const MotionOutput to_a =
-        model_->forward(ctx, {to_b.joints, to_b.trans, b.rest_a, {}, {}}, &back);
+    const MotionOutput to_b =
+        model_->forward(ctx, motion_batch(there).seen(there.rest_b), &forth);
+    const MotionOutput to_a = on_host(
+        model_->forward(ctx, {to_b.joints, to_b.trans, there.rest_a, {}, {}}, &back));
     const int64_t late = model_->latency(), t = b.joints_a.size(1);
-    network.add(to_b, b, late);
-    closed_form.add(ClosedFormMotion({}, {}).forward(ctx, seen, &none), b, 0);
+    network.add(on_host(to_b), b, late);
+    closed_form.add(
+        ClosedFormMotion({}, {}).forward(ctx, motion_batch(b).seen(b.rest_b), &none), b, 0);
     cycle += window_error(metrics::mean_distance, frames_of(to_a, 2 * late, t).joints.value,
                           first_frames(b.joints_a, t - 2 * late), metrics::Alignment::Mode::none);
   }
@@ -359,7 +365,9 @@ std::vector<Shown> MotionStage::show() {
   const WindowBatch b = windows().validation.batch(0, 1);
   Context ctx;
   MotionState state;
-  const Tensor answer = model_->forward(ctx, motion_batch(b).seen(b.rest_b), &state).joints.value;
+  const WindowBatch there = moved(b, device());
+  const Tensor answer =
+      model_->forward(ctx, motion_batch(there).seen(there.rest_b), &state).joints.value.cpu();
   const int64_t late = model_->latency(), t = b.joints_a.size(1) - late;
   Shown source{"source", {}}, answered{"answer", {}}, truth{"truth", {}};
   for (int64_t k = 0; k < std::min(kMoments, t); ++k) {

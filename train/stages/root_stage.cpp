@@ -30,7 +30,7 @@ Tensor minus_centroid(const Tensor& points) {
 }  // namespace
 
 RootStage::RootStage(const Config& config, const StageInput& in)
-    : Stage("root", config.optimiser),
+    : Stage("root", config.optimiser, in.device),
       config_(config),
       net_(add_network<RootNet>(config.model, RngKey{in.seed, 0}.fold("deformation/root"))),
       optimiser_(add_optimiser("optimiser", {"deformation.root"}, config.optimiser)),
@@ -40,13 +40,13 @@ RootStage::RootStage(const Config& config, const StageInput& in)
 
 Var RootStage::loss(Context& ctx, const PairBatch& b) const {
   const int64_t n = b.rest_points.size(0);
-  return mse((*net_)(ctx, Var(b.rest_joints.reshape({n, 3 * kJoints}))),
-             Var(minus_centroid(b.rest_points)));
+  return mse((*net_)(ctx, Var(b.rest_joints.reshape({n, 3 * kJoints}).to(device()))),
+             Var(minus_centroid(b.rest_points).to(device())));
 }
 
 NamedTensors RootStage::examples(int64_t step) const {
   const int64_t n = config_.optimiser.batch;
-  return sampler_.batch(drawn(step) * n, n).tensors();
+  return named_tensors(sampler_.batch(drawn(step) * n, n));
 }
 
 NamedValues RootStage::step(int64_t step) {
@@ -65,7 +65,7 @@ NamedValues RootStage::step(int64_t step) {
 NamedValues RootStage::validate() {
   Context ctx;
   const PairBatch b = validation_sampler_.batch(0, config_.validation_bodies);
-  return {{"root_mm", 1e3 * std::sqrt(3 * loss(ctx, b).value.item())}};
+  return {{"root_mm", 1e3 * std::sqrt(3 * loss(ctx, b).value.cpu().item())}};
 }
 
 }  // namespace restage

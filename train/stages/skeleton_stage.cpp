@@ -76,7 +76,7 @@ CloudConfig held_out(CloudConfig c, const SkeletonModel& model) {
 }  // namespace
 
 SkeletonStage::SkeletonStage(const Config& config, const StageInput& in)
-    : Stage("skeleton", config.optimiser),
+    : Stage("skeleton", config.optimiser, in.device),
       config_(config),
       model_(add_network<SkeletonModel>(config.model, RngKey{in.seed, 0}.fold("skeleton.init"))),
       optimiser_(add_optimiser("optimiser", {"skeleton"}, config.optimiser)),
@@ -139,7 +139,7 @@ Var SkeletonStage::loss(Context& ctx, const CloudBatch& batch) const {
 Var SkeletonStage::voting_loss(const SkeletonOutput& out, const CloudBatch& batch) const {
   const int64_t n = batch.points.size(0), c = out.centres.size(1);
   const Var moved_by = gather(Var(batch.weights), out.centres);  // [n, c, 22] skin weights
-  Var total(Tensor::zeros({}));
+  Var total(Tensor::zeros({}, DType::f32, batch.points.device()));
   if (config_.vote_weight > 0) {
     const Var miss = lengths(out.votes - Var(batch.joints.reshape({n, 1, kJoints, 3})));
     total =
@@ -165,7 +165,8 @@ void SkeletonStage::recall(int64_t step, const MicroBatch& part, CloudBatch* clo
   const int64_t n = config_.optimiser.batch;
   const CloudBatch before = sampler_.before(part.from(drawn(step) * n, n), *clouds);
   Context ctx;
-  const SkeletonOutput answer = model_->forward(ctx, {before.points, before.past});
+  const SkeletonAnswer answer =
+      on_host(model_->forward(ctx, {before.points.to(device()), before.past.to(device())}));
   // The step itself will find what makes it so, and name it.
   const std::span joints(answer.joints.value.data<float>(),
                          static_cast<size_t>(answer.joints.value.numel()));
@@ -182,6 +183,7 @@ NamedValues SkeletonStage::step(int64_t step) {
   const Differentiated d = parts([&](const MicroBatch& part) {
     CloudBatch clouds = batch(step, part);
     recall(step, part, &clouds);
+    clouds = moved(std::move(clouds), device());
     return differentiate(part.key(key_.fold(static_cast<uint64_t>(step))),
                          [&](Context& ctx) { return loss(ctx, clouds); });
   });
@@ -190,14 +192,15 @@ NamedValues SkeletonStage::step(int64_t step) {
   return {{"loss", d.loss}, {"gradient_norm", d.norm}, {"rate", rate}};
 }
 
-SkeletonErrors skeleton_errors(SkeletonModel& model, const CloudBatch& clouds) {
+SkeletonErrors skeleton_errors(SkeletonModel& model, const CloudBatch& clouds, Device device) {
   Context ctx;
   double joints = 0, turns = 0, outside = 0;
   bool gives_turns = false, gives_uncertainty = false;
   const int64_t n = clouds.points.size(0), part = 16;
   for (int64_t i = 0; i < n; i += part) {
     const int64_t to = std::min(n, i + part);
-    const SkeletonOutput out = model.forward(ctx, clouds.points.rows(i, to));
+    const SkeletonAnswer out =
+        on_host(model.forward(ctx, clouds.points.rows(i, to).to(device)));
     const Tensor truth = clouds.joints.rows(i, to);
     joints += mean_distance(out.joints.value, truth) * static_cast<double>(to - i);
     gives_turns = out.turns.value.defined() && clouds.turns.defined();
@@ -215,7 +218,7 @@ SkeletonErrors skeleton_errors(SkeletonModel& model, const CloudBatch& clouds) {
   return mean;
 }
 
-Tensor remembered(const SkeletonOutput& answer, const Tensor& centres, const Tensor& now) {
+Tensor remembered(const SkeletonAnswer& answer, const Tensor& centres, const Tensor& now) {
   const Tensor& joints = answer.joints.value;
   Tensor out = Tensor::zeros({joints.size(0), kJoints, 4});
   for (int64_t k = 0; k < joints.size(0) * kJoints; ++k) {
@@ -232,9 +235,10 @@ Tensor remembered(const SkeletonOutput& answer, const Tensor& centres, const Ten
   return out;
 }
 
-double followed_error(SkeletonModel& model, const CloudBatch& clouds, int64_t frames) {
+double followed_error(SkeletonModel& model, const CloudBatch& clouds, int64_t frames,
+                      Device device) {
   const int64_t sequences = clouds.points.size(0) / frames;
-  SkeletonOutput answer;
+  SkeletonAnswer answer;
   double sum = 0;
   std::vector<int64_t> rows;
   for (int64_t f = 0; f < frames; ++f) {
@@ -244,7 +248,7 @@ double followed_error(SkeletonModel& model, const CloudBatch& clouds, int64_t fr
         f == 0 ? Tensor()
                : remembered(answer, rows_of(clouds.centres, before), rows_of(clouds.centres, rows));
     Context ctx;
-    answer = model.forward(ctx, {rows_of(clouds.points, rows), past});
+    answer = on_host(model.forward(ctx, {rows_of(clouds.points, rows).to(device), past.to(device)}));
     sum += mean_distance(answer.joints.value, rows_of(clouds.joints, rows));
   }
   return sum / static_cast<double>(frames);
@@ -256,7 +260,7 @@ NamedValues SkeletonStage::validate() {
   const auto worst = [](std::optional<double>& of, double x) { of = std::max(of.value_or(x), x); };
   const auto put = [&](const char* name, const CloudBatch& clouds) {
     if (!clouds.points.defined()) return;
-    const SkeletonErrors errors = skeleton_errors(*model_, clouds);
+    const SkeletonErrors errors = skeleton_errors(*model_, clouds, device());
     out.push_back({name, 1e3 * errors.joints});
     if (errors.turns) worst(turns, *errors.turns * 180 / M_PI);
     if (errors.outside) worst(miscalibration, std::abs(*errors.outside - 0.1));
@@ -268,7 +272,7 @@ NamedValues SkeletonStage::validate() {
   put("intruder_joint_error_mm", intruded_);
   if (followed_.points.defined())
     out.push_back({"followed_joint_error_mm",
-                   1e3 * followed_error(*model_, followed_, static_cast<int64_t>(kFollowed))});
+                   1e3 * followed_error(*model_, followed_, static_cast<int64_t>(kFollowed), device())});
   if (turns) out.push_back({"turn_error_degrees", *turns});
   if (miscalibration) out.push_back({"miscalibration", *miscalibration});
   return out;
@@ -279,7 +283,7 @@ std::vector<Shown> SkeletonStage::show() {
   const CloudBatch clouds =
       validation_sampler_.clouds({posed_.begin(), posed_.begin() + static_cast<std::ptrdiff_t>(n)});
   Context ctx;
-  const Tensor answer = model_->forward(ctx, clouds.points).joints.value;
+  const Tensor answer = model_->forward(ctx, clouds.points.to(device())).joints.value.cpu();
   Shown seen{"cloud", {}}, answered{"joints", {}}, truth{"true joints", {}};
   for (int64_t i = 0; i < static_cast<int64_t>(n); ++i) {
     seen.clouds.push_back(points_of(clouds.points, i, clouds.points.size(1)));

@@ -61,7 +61,7 @@ class SkeletonStage final : public Stage {
   static std::vector<std::string> reads(const Config&) { return {}; }
   SkeletonStage(const Config& config, const StageInput& input);
   NamedValues step(int64_t step) override;
-  NamedTensors examples(int64_t step) const override { return batch(step).tensors(); }
+  NamedTensors examples(int64_t step) const override { return named_tensors(batch(step)); }
   NamedValues validate() override;
   std::vector<Shown> show() override;
 
@@ -89,13 +89,14 @@ struct SkeletonErrors {
   std::optional<double> turns;    ///< angle, radians; empty if not given or not known
   std::optional<double> outside;  ///< part of the joints outside their 90 % regions
 };
-SkeletonErrors skeleton_errors(SkeletonModel& model, const CloudBatch& clouds);
+SkeletonErrors skeleton_errors(SkeletonModel& model, const CloudBatch& clouds, Device device = {});
 
 /// An answer as what is remembered of it (SkeletonInput::past) by clouds whose centroids, as those
 /// of `clouds`, are given in the world [n, 3].
-Tensor remembered(const SkeletonOutput& answer, const Tensor& centres, const Tensor& now);
+Tensor remembered(const SkeletonAnswer& answer, const Tensor& centres, const Tensor& now);
 /// Mean distance over joints of clouds that are `frames` frames of one sequence after the other,
 /// each seen with the answer to the one before in memory; metres.
-double followed_error(SkeletonModel& model, const CloudBatch& clouds, int64_t frames);
+double followed_error(SkeletonModel& model, const CloudBatch& clouds, int64_t frames,
+                      Device device = {});
 
 }  // namespace restage

@@ -27,6 +27,7 @@ struct StageInput {
   uint64_t seed = 0;
   const Bundle& given;                       ///< what the stages that it reads have left
   std::optional<AnswerFolder> answers = {};  ///< where those about the corpora are kept
+  Device device = {};                        ///< where the stage's networks live and are trained
 };
 
 }  // namespace restage

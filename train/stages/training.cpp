@@ -39,8 +39,8 @@ std::unique_ptr<Stage> make_stage(const TrainConfig& config, const std::string& 
     return nullptr;
   }
   check_order(config, type, section.config);
-  auto stage =
-      type.make(section.config, {data.train, data.validation, config.seed, *so_far, data.answers});
+  auto stage = type.make(section.config, {data.train, data.validation, config.seed, *so_far,
+                                          data.answers, data.device});
   stage->repeat_batches(config.loop.overfit_batches);
   stage->cut_steps(config.loop.micro_batches, data.team != nullptr ? *data.team : alone());
   if (section.init)

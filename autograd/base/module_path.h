@@ -17,7 +17,21 @@ class ModuleScope {
   size_t previous_;
 };
 
+/// Enters an op, forwards or backwards.
+class OpScope {
+ public:
+  explicit OpScope(const char* name);
+  ~OpScope();
+  OpScope(const OpScope&) = delete;
+  OpScope& operator=(const OpScope&) = delete;
+
+ private:
+  const char* previous_;
+};
+
 /// Path of the innermost scope, "(no module)" outside of all.
 std::string module_path();
+/// The same with the op that runs, if one does: "'gather' in smrm.enc".
+std::string running_op();
 
 }  // namespace restage

@@ -1,0 +1,154 @@
+// What a second device must hold to: tensors cross only where they are told to, ops work where their
+// inputs are, and whoever reads its memory on the host is told which op that was.
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "autograd/gradcheck/evaluate.h"
+#include "autograd/gradcheck/gradcheck.h"
+#include "autograd/kernels/attention.h"
+#include "autograd/kernels/points.h"
+#include "autograd/kernels/pooled_norm.h"
+#include "autograd/kernels/rnn.h"
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+#include "autograd/ops/points.h"
+#include "autograd/ops/reduce.h"
+#include "tests/support/errors.h"
+#include "tests/support/fake_device.h"
+
+namespace restage {
+namespace {
+
+using gradcheck::all_samples;
+using gradcheck::same_bits;
+using test::expect_error;
+
+Tensor numbers(const Shape& shape) {
+  std::vector<double> values(static_cast<size_t>(shape.numel()));
+  std::iota(values.begin(), values.end(), 1.0);
+  return Tensor::from<double>(shape, values);
+}
+
+TEST(Device, NumbersComeBackAsTheyWent) {
+  for (const DType type : {DType::f32, DType::f64, DType::i32, DType::i64}) {
+    const Tensor here = numbers({3, 5}).cast(type), there = here.to(fake_device());
+    EXPECT_EQ(there.device(), fake_device());
+    EXPECT_TRUE(same_bits(there.cpu(), here));
+    EXPECT_TRUE(same_bits(there.clone().cpu(), here));
+    EXPECT_TRUE(same_bits(there.rows(1, 3).cpu(), here.rows(1, 3)));
+    EXPECT_TRUE(same_bits(there.cast(DType::f32).cpu(), here.cast(DType::f32)));
+    EXPECT_TRUE(same_bits(Tensor::full({2}, 3, type, fake_device()).cpu(), Tensor::full({2}, 3, type)));
+  }
+  const Tensor here = numbers({4});
+  EXPECT_EQ(here.cpu().address(), here.address()) << "nothing is copied that is there already";
+  EXPECT_NE(here.to(fake_device()).address(), here.address());
+  EXPECT_FALSE(Tensor().to(fake_device()).defined());
+  EXPECT_EQ(Tensor::empty({0, 3}).to(fake_device()).shape(), Shape({0, 3}));
+}
+
+TEST(Device, WhoReadsItOnTheHostIsToldByName) {
+  const Tensor there = numbers({2, 2}).to(fake_device());
+  for (const auto& read : std::vector<std::function<void()>>{
+           [&] { (void)there.item(); }, [&] { (void)there.to_vector<double>(); },
+           [&] { (void)there.data<double>(); }, [&] { (void)there.bytes(); }})
+    expect_error<Error>(read, {"the host reads memory of device 'fake'", "cpu()"});
+  const ModuleScope outer("net"), inner("fc1");
+  const OpScope op("gather");
+  expect_error<Error>([&] { (void)there.item(); }, {"'gather' in net.fc1"});
+}
+
+TEST(DeviceDeathTest, ItsAddressesAreNoMemoryOfTheHost) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const Tensor there = numbers({2}).to(fake_device());
+  EXPECT_DEATH((void)*static_cast<const volatile double*>(there.address()), "");
+}
+
+TEST(Device, AMixedCallNamesBoth) {
+  const Tensor here = numbers({2, 3, 4}), there = here.to(fake_device());
+  const ModuleScope scope("net");
+  expect_error<Error>([&] { add(here, there); }, {"'add' in net", "cpu and fake"});
+  expect_error<Error>([&] { concat({there, here}, 0); }, {"'concat' in net", "fake and cpu"});
+  const Tensor index = Tensor::from<int32_t>({2, 1}, {0, 0});
+  expect_error<Error>([&] { gather(there, index); }, {"'gather' in net", "fake and cpu"});
+  const Tensor points = numbers({1, 4, 3});
+  expect_error<Error>([&] { knn(points.to(fake_device()), points, 1); }, {"fake and cpu"});
+}
+
+TEST(Device, AnIndexOutsideIsToldToWhoWaits) {
+  const Tensor x = numbers({1, 2, 3}).to(fake_device());
+  const Tensor index = Tensor::from<int32_t>({1, 1}, {2}).to(fake_device());
+  const ModuleScope scope("net");
+  const Var y = gather(x, index);  // nobody has looked yet
+  expect_error<Error>([&] { (void)y.value.cpu(); }, {"'gather' in net", "an index is outside"});
+  (void)x.cpu();  // once told it is over
+}
+
+TEST(Device, AnUnknownOneIsRefused) {
+  EXPECT_EQ(device_of("cpu"), Device{});
+  EXPECT_EQ(device_of("fake"), fake_device());
+  expect_error<InputError>([] { device_of("abacus"); }, {"'abacus'", "cpu, fake"});
+}
+
+class DeviceOps : public testing::TestWithParam<size_t> {};
+
+TEST_P(DeviceOps, PassTheHarnessThere) {
+  const int64_t before = fake_counts().kernels;
+  const gradcheck::Report r = check(all_samples()[GetParam()], 4, fake_device());
+  EXPECT_TRUE(r.ok()) << r.text();
+  EXPECT_GT(fake_counts().kernels, before);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, DeviceOps, testing::Range(size_t{0}, all_samples().size()),
+                         [](const auto& param) { return all_samples()[param.param].op; });
+
+/// Ops that have a kernel of their own and a composition, with the contracts of the former.
+TEST(Device, WithoutAFusedKernelAnOpIsComposed) {
+  const std::map<std::string, std::vector<std::type_index>> fused = {
+      {"neighbour_attention", {typeid(NeighbourAttentionArgs), typeid(NeighbourAttentionGradArgs)}},
+      {"attention_pool", {typeid(AttentionPoolArgs), typeid(AttentionPoolGradArgs)}},
+      {"pooled_norm", {typeid(PooledNormArgs), typeid(PooledNormGradArgs)}},
+      {"gru", {typeid(GruArgs), typeid(GruGradArgs)}}};
+  size_t found = 0;
+  for (const gradcheck::OpSamples& op : all_samples()) {
+    const auto contracts = fused.find(op.op);
+    if (contracts == fused.end()) continue;
+    ++found;
+    for (const std::type_index& missing : contracts->second) {
+      const WithoutKernels lacking({missing});
+      for (gradcheck::Sample s : op.samples) {
+        if (s.kind != gradcheck::Sample::Kind::smooth) continue;
+        const Tensor here = value_of(s, s.inputs);
+        s.device = fake_device();
+        const Tensor there = value_of(s, s.inputs);
+        ASSERT_EQ(here.shape(), there.shape()) << op.op << " " << s.title;
+        for (int64_t i = 0; i < here.numel(); ++i)
+          ASSERT_NEAR(here.item(i), there.item(i), 1e-9 * (1 + std::abs(here.item(i))))
+              << op.op << " " << s.title;
+      }
+    }
+  }
+  EXPECT_EQ(found, fused.size());
+}
+
+TEST(Device, AKernelThatItLacksIsNamed) {
+  const WithoutKernels lacking({typeid(BinaryArgs)});
+  const Tensor there = numbers({2}).to(fake_device());
+  expect_error<Error>([&] { add(there, there); }, {"no kernel for", "BinaryArgs", "fake"});
+}
+
+TEST(Device, GradientsAreWaitedForOnce) {
+  Tape tape;
+  std::vector<Var> leaves;
+  for (uint64_t id = 1; id <= 20; ++id) leaves.push_back(tape.leaf(numbers({3}).to(fake_device()), id));
+  Var total = leaves[0];
+  for (size_t i = 1; i < leaves.size(); ++i) total = total + leaves[i];
+  const int64_t before = fake_counts().waits;
+  const Gradients gradients = tape.backward(sum_all(square(total)));
+  EXPECT_EQ(fake_counts().waits, before) << "a step is launched without waiting";
+  EXPECT_GT(gradients.norm(), 0);
+  EXPECT_EQ(fake_counts().waits, before + 1);
+}
+
+}  // namespace
+}  // namespace restage
