@@ -8,7 +8,7 @@ import pathlib
 import re
 import sys
 
-SOURCES = {".h", ".hpp", ".cpp", ".inc"}
+SOURCES = {".h", ".hpp", ".cpp", ".cu", ".inc"}
 TOP = ("autograd", "nn", "datasets", "train", "infer", "experiments")
 
 BASE, TENSOR = "autograd/base", "autograd/tensor"
@@ -21,6 +21,7 @@ MAY_USE = {
     TENSOR: [BASE],
     "autograd/kernels": [BASE, TENSOR],
     "autograd/cpu": [BASE, TENSOR, "autograd/kernels"],
+    "autograd/cuda": [BASE, TENSOR, "autograd/kernels"],
     "autograd/tape": [BASE, TENSOR, "autograd/kernels"],
     "autograd/ops": [BASE, TENSOR, "autograd/kernels", "autograd/tape"],
     "autograd/gradcheck": ENGINE,
@@ -64,7 +65,10 @@ ONLY_IN = {
     "zlib.h": ["datasets/readers/", "datasets/fetch/"],
     "curl/": ["datasets/fetch/download.cpp"],
     "hwy/": ["autograd/cpu/"],
-    "Eigen/": ["autograd/cpu/", "nn/", "datasets/", "train/", "infer/", "experiments/"],
+    "cublas_v2.h": ["autograd/cuda/"],
+    "cuda_runtime.h": ["autograd/cuda/"],
+    "Eigen/": ["autograd/cpu/", "autograd/kernels/rotation_rows.h", "autograd/kernels/swing_rows.h",
+              "nn/", "datasets/", "train/", "infer/", "experiments/"],
     "tiny_gltf.h": ["datasets/readers/"],
     "random": [],  # random numbers come from autograd/base/rng.h
     "iostream": ["experiments/"],  # nothing below prints

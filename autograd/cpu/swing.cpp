@@ -1,213 +1,26 @@
-// Swing and twist (kernels/rotation.h): a few small products a joint, in double, baseline code.
-#include <Eigen/Core>
-#include <Eigen/Geometry>
-#include <cmath>
+// Swing and twist: baseline code.
 #include <vector>
 
 #include "autograd/base/parallel_each.h"
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/kernels.h"
+#include "autograd/kernels/swing_rows.h"
 
 namespace restage::cpu {
 namespace {
 
-using Vec = Eigen::Vector3d;
-using Mat = Eigen::Matrix3d;
-
-constexpr double kTiny = 1e-9;      // metres: no direction
-constexpr double kReversed = 1e-2;  // 1 + cosine below which an arc has no gradient (172 degrees)
-
-template <class T>
-Vec vec_at(const T* p) {
-  return Eigen::Map<const Eigen::Matrix<T, 3, 1>>(p).template cast<double>();
-}
-template <class T>
-Mat mat_at(const T* p) {
-  return Eigen::Map<const Eigen::Matrix<T, 3, 3, Eigen::RowMajor>>(p).template cast<double>();
-}
-
-Mat cross_matrix(const Vec& v) {
-  Mat m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-/// Gradient of v from that of cross_matrix(v).
-Vec from_cross(const Mat& g) { return {g(2, 1) - g(1, 2), g(0, 2) - g(2, 0), g(1, 0) - g(0, 1)}; }
-/// Gradient of x from that of its direction u = x / length.
-Vec from_direction(const Vec& g, const Vec& u, double length) {
-  return (g - u * u.dot(g)) / length;
-}
-
-/// x along `across`, y along the rest of `up`, z at right angles.
-struct Frame {
-  Frame(const Vec& across, const Vec& upwards) : length(across.norm()), up(upwards) {
-    x = across / std::max(length, kTiny);
-    const Vec rest = up - x.dot(up) * x;
-    height = rest.norm();
-    good = length > kTiny && height > 1e-6 * up.norm() && height > kTiny;
-    y = rest / std::max(height, kTiny);
+struct Arc {
+  swing_rows::Mat operator()(const swing_rows::Vec& a, const swing_rows::Vec& b) const {
+    return Eigen::Quaterniond::FromTwoVectors(a, b).toRotationMatrix();
   }
-  Mat matrix() const {
-    Mat m;
-    m << x, y, x.cross(y);
-    return m;
-  }
-  void grad(const Mat& g, Vec* g_across, Vec* g_up) const {
-    const Vec gz = g.col(2), gy = g.col(1) + gz.cross(x);
-    const Vec g_rest = from_direction(gy, y, height);
-    *g_up = g_rest - x * x.dot(g_rest);
-    const Vec gx = g.col(0) + y.cross(gz) - x.dot(up) * g_rest - up * x.dot(g_rest);
-    *g_across = from_direction(gx, x, length);
-  }
-  double length, height;
-  Vec up, x, y;
-  bool good;
 };
 
-/// The rotation of least angle from unit vector a to unit vector b; about any axis if they are
-/// opposite.
-Mat arc(const Vec& a, const Vec& b) {
-  return Eigen::Quaterniond::FromTwoVectors(a, b).toRotationMatrix();
+/// Kept by the thread: a steady frame takes no memory.
+double* room(int64_t count) {
+  thread_local std::vector<double> kept;
+  kept.resize(static_cast<size_t>(count));
+  return kept.data();
 }
-void arc_grad(const Vec& a, const Vec& b, const Mat& g, Vec* ga, Vec* gb) {
-  ga->setZero();
-  gb->setZero();
-  const double c = a.dot(b), k = 1 + c;
-  if (k < kReversed) return;
-  const Vec v = a.cross(b);  // the matrix is c + [v] + v v' / (1 + c)
-  const double gc = g.trace() - v.dot(g * v) / (k * k);
-  const Vec gv = from_cross(g) + (g + g.transpose()) * v / k;
-  *ga = b.cross(gv) + gc * b;
-  *gb = gv.cross(a) + gc * a;
-}
-
-Mat turn(const Vec& axis, double angle) {
-  return Eigen::AngleAxisd(angle, axis).toRotationMatrix();
-}
-void turn_grad(const Vec& u, double angle, const Mat& g, Vec* gu, double* g_angle) {
-  const double s = std::sin(angle), c = std::cos(angle);
-  *g_angle =
-      (g.cwiseProduct(-s * Mat::Identity() + c * cross_matrix(u) + s * u * u.transpose())).sum();
-  *gu = s * from_cross(g) + (1 - c) * (g + g.transpose()) * u;
-}
-
-/// One skeleton: world rotations on the way down, gradients on the way up.
-template <class T>
-struct Walk {
-  Walk(std::span<const SwingJoint> of, const T* at_rest, const T* as_posed, const T* twisted)
-      : joints(of), rest(at_rest), posed(as_posed), twist(twisted), world(room(of.size())) {
-    for (size_t j = 0; j < joints.size(); ++j) world[j] = rotation(joints[j], static_cast<int>(j));
-  }
-  /// Kept by the thread: a steady frame takes no memory.
-  static std::vector<Mat>& room(size_t n) {
-    thread_local std::vector<Mat> kept;
-    kept.resize(n);
-    return kept;
-  }
-  Mat above(const SwingJoint& joint) const {
-    return joint.parent < 0 ? Mat(Mat::Identity()) : world[static_cast<size_t>(joint.parent)];
-  }
-  static Vec bone(const T* x, int from, int to) {
-    return vec_at(x + 3 * to) - vec_at(x + 3 * from);
-  }
-  static Frame frame(const T* x, const SwingJoint& s, int j) {
-    return {bone(x, s.right, s.left), bone(x, j, s.child)};
-  }
-  Mat rotation(const SwingJoint& s, int j) const {
-    const Mat parent = above(s);
-    if (s.child < 0) return parent;
-    if (s.left >= 0) {
-      const Frame a = frame(rest, s, j), b = frame(posed, s, j);
-      return a.good && b.good ? Mat(b.matrix() * a.matrix().transpose()) : parent;
-    }
-    const Vec from = parent * bone(rest, j, s.child), to = bone(posed, j, s.child);
-    if (from.norm() <= kTiny || to.norm() <= kTiny) return parent;
-    const Vec b = to.normalized();
-    return turn(b, static_cast<double>(twist[j])) * arc(from.normalized(), b) * parent;
-  }
-  void write(T* out) const {
-    for (size_t j = 0; j < joints.size(); ++j) {
-      const Mat local = above(joints[j]).transpose() * world[j];
-      Eigen::Map<Eigen::Matrix<T, 3, 3, Eigen::RowMajor>>(out + 9 * j) = local.cast<T>();
-    }
-  }
-
-  std::span<const SwingJoint> joints;
-  const T *rest, *posed, *twist;
-  std::vector<Mat>& world;
-};
-
-template <class T>
-struct WalkBack : Walk<T> {
-  using Walk<T>::Walk;
-  using Walk<T>::joints, Walk<T>::rest, Walk<T>::posed, Walk<T>::twist, Walk<T>::world;
-
-  void run(const T* gy, T* to_rest, T* to_posed, T* to_twist) {
-    const size_t n = joints.size();
-    g.assign(n, Mat::Zero());
-    g_rest.assign(n, Vec::Zero());
-    g_posed.assign(n, Vec::Zero());
-    for (size_t j = n; j-- > 0;) {
-      const SwingJoint& s = joints[j];
-      const Mat gl = mat_at(gy + 9 * j), parent = this->above(s);
-      g[j] += parent * gl;  // local = parent' world
-      Mat g_parent = world[j] * gl.transpose();
-      to_twist[j] = static_cast<T>(back(s, static_cast<int>(j), g[j], parent, &g_parent));
-      if (s.parent >= 0) g[static_cast<size_t>(s.parent)] += g_parent;
-    }
-    for (size_t j = 0; j < n; ++j) {
-      Eigen::Map<Eigen::Matrix<T, 3, 1>>(to_rest + 3 * j) = g_rest[j].template cast<T>();
-      Eigen::Map<Eigen::Matrix<T, 3, 1>>(to_posed + 3 * j) = g_posed[j].template cast<T>();
-    }
-  }
-
- private:
-  static void add_bone(std::vector<Vec>* to, int from, int end, const Vec& value) {
-    (*to)[static_cast<size_t>(end)] += value;
-    (*to)[static_cast<size_t>(from)] -= value;
-  }
-  void add_frame(std::vector<Vec>* to, const SwingJoint& s, int j, const Frame& f, const Mat& gf) {
-    Vec across, up;
-    f.grad(gf, &across, &up);
-    add_bone(to, s.right, s.left, across);
-    add_bone(to, j, s.child, up);
-  }
-  /// From the gradient of a joint's world rotation to those of what it was made of; returns that of
-  /// the twist.
-  double back(const SwingJoint& s, int j, const Mat& gw, const Mat& parent, Mat* g_parent) {
-    if (s.child >= 0 && s.left >= 0) {
-      const Frame a = this->frame(rest, s, j), b = this->frame(posed, s, j);
-      if (a.good && b.good) {
-        add_frame(&g_posed, s, j, b, gw * a.matrix());
-        add_frame(&g_rest, s, j, a, gw.transpose() * b.matrix());
-        return 0;
-      }
-    } else if (s.child >= 0) {
-      const Vec bone = this->bone(rest, j, s.child), from = parent * bone;
-      const Vec to = this->bone(posed, j, s.child);
-      if (from.norm() > kTiny && to.norm() > kTiny) {
-        const Vec a = from.normalized(), b = to.normalized();
-        const double angle = static_cast<double>(twist[j]);
-        const Mat swing = arc(a, b), swung = swing * parent, t = turn(b, angle);
-        Vec gu, ga, gb;
-        double g_angle = 0;
-        turn_grad(b, angle, gw * swung.transpose(), &gu, &g_angle);
-        const Mat g_swung = t.transpose() * gw;
-        arc_grad(a, b, g_swung * parent.transpose(), &ga, &gb);
-        add_bone(&g_posed, j, s.child, from_direction(gu + gb, b, to.norm()));
-        const Vec g_from = from_direction(ga, a, from.norm());
-        *g_parent += swing.transpose() * g_swung + g_from * bone.transpose();
-        add_bone(&g_rest, j, s.child, parent.transpose() * g_from);
-        return g_angle;
-      }
-    }
-    *g_parent += gw;
-    return 0;
-  }
-
-  std::vector<Mat> g;
-  std::vector<Vec> g_rest, g_posed;
-};
 
 }  // namespace
 
@@ -216,8 +29,9 @@ void swing_twist(const SwingTwistArgs& args) {
   dispatch(args.out.dtype(), [&](auto zero) {
     using T = decltype(zero);
     parallel_each(args.posed.size(0), 16, [&](int64_t s) {
-      Walk<T>(args.joints, args.rest.data<T>() + 3 * j * s, args.posed.data<T>() + 3 * j * s,
-              args.twist.data<T>() + j * s)
+      swing_rows::Walk<T, Arc>(args.joints.data(), j, args.rest.data<T>() + 3 * j * s,
+                               args.posed.data<T>() + 3 * j * s, args.twist.data<T>() + j * s,
+                               room(swing_rows::kWalkRoom * j))
           .write(args.out.data<T>() + 9 * j * s);
     });
   });
@@ -228,8 +42,9 @@ void swing_twist_grad(const SwingTwistGradArgs& args) {
   dispatch(args.out.dtype(), [&](auto zero) {
     using T = decltype(zero);
     parallel_each(args.posed.size(0), 16, [&](int64_t s) {
-      WalkBack<T>(args.joints, args.rest.data<T>() + 3 * j * s, args.posed.data<T>() + 3 * j * s,
-                  args.twist.data<T>() + j * s)
+      swing_rows::WalkBack<T, Arc>(args.joints.data(), j, args.rest.data<T>() + 3 * j * s,
+                                   args.posed.data<T>() + 3 * j * s, args.twist.data<T>() + j * s,
+                                   room(swing_rows::kWalkBackRoom * j))
           .run(args.gy.data<T>() + 9 * j * s, args.g_rest.data<T>() + 3 * j * s,
                args.out.data<T>() + 3 * j * s, args.g_twist.data<T>() + j * s);
     });

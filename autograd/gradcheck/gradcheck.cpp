@@ -243,14 +243,14 @@ void check_kink(const Sample& s, Findings& f) {
 }
 
 /// What only a kernel can see (an index) is told by its device to whoever waits.
-bool refused_late(Device device, const OpSamples& op, Findings& f) {
+bool refused_late(Device device, Findings& f) {
   try {
     backend(device).synchronise();
     return false;
   } catch (const Error& error) {
     const std::string what = error.what();
-    f.require(what.find("'" + op.op + "' in probe.layer") != std::string::npos,
-              "the error does not name the op: " + what);
+    f.require(what.find("in probe.layer") != std::string::npos,
+              "the error does not say where: " + what);
     return true;
   }
 }
@@ -258,13 +258,14 @@ bool refused_late(Device device, const OpSamples& op, Findings& f) {
 void check_error(const OpSamples& op, const Sample& s, Findings& f) {
   Tape tape;
   std::vector<Var> leaves;
-  for (size_t k = 0; k < s.inputs.size(); ++k) leaves.push_back(tape.leaf(s.inputs[k].to(s.device), k + 1));
+  for (size_t k = 0; k < s.inputs.size(); ++k)
+    leaves.push_back(tape.leaf(s.inputs[k].to(s.device), k + 1));
   const size_t before = tape.size();
   std::string what;
   try {
     const ModuleScope outer("probe"), inner("layer");
     s.build(leaves);
-    if (refused_late(s.device, op, f)) return;
+    if (refused_late(s.device, f)) return;
     return f.fail("was not refused");
   } catch (const ShapeError& error) {
     what = error.what();

@@ -13,6 +13,7 @@
 namespace restage {
 
 Backend& cpu_backend();  // autograd/cpu/backend.cpp
+bool add_cuda_device();  // autograd/cuda/backend.cu, with RESTAGE_CUDA: whether there is a GPU
 
 namespace {
 
@@ -20,6 +21,14 @@ namespace {
 std::vector<Backend*>& backends() {
   static std::vector<Backend*> all{&cpu_backend()};
   return all;
+}
+
+const char* cuda_missing() {
+#ifdef RESTAGE_CUDA
+  return "cuda finds no GPU on this machine";
+#else
+  return "cuda is not in this program, which was configured without -DRESTAGE_CUDA=ON";
+#endif
 }
 
 }  // namespace
@@ -42,12 +51,16 @@ Device add_device(Backend& backend) {
 std::string name_of(Device device) { return std::string(backend(device).name()); }
 
 Device device_of(std::string_view name) {
+#ifdef RESTAGE_CUDA
+  static const bool found [[maybe_unused]] = add_cuda_device();  // on the first call
+#endif
   std::string known;
   for (size_t i = 0; i < backends().size(); ++i) {
     if (backends()[i]->name() == name) return {static_cast<uint8_t>(i), 0};
     known += (i > 0 ? ", " : "") + std::string(backends()[i]->name());
   }
-  throw InputError("", "there is no device '" + std::string(name) + "' in this program",
+  if (name == "cuda") throw InputError("device", cuda_missing(), "take one of: " + known);
+  throw InputError("device", "'" + std::string(name) + "' is none that this program knows",
                    "take one of: " + known);
 }
 

@@ -62,10 +62,13 @@ Grads NeighbourAttention::backward(const Saved& saved, const Tensor& gy, Needs n
 
 Var neighbour_attention(std::initializer_list<Var> inputs, const Tensor& index, double scale,
                         bool dense) {
+  const NeighbourAttention op{index, scale, dense};
   if (!has_fused(index.device(), NeighbourAttention::name,
-                 {typeid(NeighbourAttentionArgs), typeid(NeighbourAttentionGradArgs)}))
+                 {typeid(NeighbourAttentionArgs), typeid(NeighbourAttentionGradArgs)})) {
+    check_call(op, inputs);
     return neighbour_attention_reference(inputs, index, scale);
-  return call(NeighbourAttention{index, scale, dense}, inputs);
+  }
+  return call(op, inputs);
 }
 
 Var neighbour_attention_reference(std::initializer_list<Var> inputs, const Tensor& index,

@@ -51,10 +51,13 @@ Grads AttentionPool::backward(const Saved& saved, const Tensor& gy, Needs) const
 }
 
 Var attention_pool(const Var& score, const Var& value, double scale) {
+  const AttentionPool op{scale};
   if (!has_fused(score.value.device(), AttentionPool::name,
-                 {typeid(AttentionPoolArgs), typeid(AttentionPoolGradArgs)}))
+                 {typeid(AttentionPoolArgs), typeid(AttentionPoolGradArgs)})) {
+    check_call(op, {score, value});
     return attention_pool_reference(score, value, scale);
-  return call(AttentionPool{scale}, {score, value});
+  }
+  return call(op, {score, value});
 }
 
 Var attention_pool_reference(const Var& score, const Var& value, double scale_) {

@@ -46,10 +46,13 @@ Grads PooledNorm::backward(const Saved& s, const Tensor& gy, Needs needs) const 
 
 Var pooled_norm(const Var& x, const Var& weight, const Var& bias, const Var& scale,
                 const Var& shift, Activation activation, double eps, BatchStatistics* statistics) {
+  const PooledNorm op{activation, eps, statistics};
   if (!has_fused(x.value.device(), PooledNorm::name,
-                 {typeid(PooledNormArgs), typeid(PooledNormGradArgs)}))
+                 {typeid(PooledNormArgs), typeid(PooledNormGradArgs)})) {
+    check_call(op, {x, weight, bias, scale, shift});
     return pooled_norm_reference(x, weight, bias, scale, shift, activation, eps, statistics);
-  return call(PooledNorm{activation, eps, statistics}, {x, weight, bias, scale, shift});
+  }
+  return call(op, {x, weight, bias, scale, shift});
 }
 
 Var pooled_norm_reference(const Var& x, const Var& weight, const Var& bias, const Var& scale,

@@ -107,9 +107,12 @@ Grads Recurrence::backward(const Saved& saved, const Tensor& gy, Needs) const {
 
 Var gru(const Var& x, const Var& h0, const Var& w_ih, const Var& w_hh, const Var& b_ih,
         const Var& b_hh) {
-  if (!has_fused(x.value.device(), Gru::name, {typeid(GruArgs), typeid(GruGradArgs)}))
+  const Gru op;
+  if (!has_fused(x.value.device(), Gru::name, {typeid(GruArgs), typeid(GruGradArgs)})) {
+    check_call(op, {x, h0, w_ih, w_hh, b_ih, b_hh});
     return gru_reference(x, h0, w_ih, w_hh, b_ih, b_hh);
-  return call(Gru{}, {x, h0, w_ih, w_hh, b_ih, b_hh});
+  }
+  return call(op, {x, h0, w_ih, w_hh, b_ih, b_hh});
 }
 
 Var gru_reference(const Var& x, const Var& h0, const Var& w_ih, const Var& w_hh, const Var& b_ih,

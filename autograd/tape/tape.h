@@ -215,4 +215,15 @@ Var call(const Op& op, std::initializer_list<Var> inputs) {
   return call(op, std::span<const Var>(inputs.begin(), inputs.size()));
 }
 
+/// Refuses what call() would refuse, for an op that is composed of others where a device lacks its
+/// kernel.
+template <class Op>
+void check_call(const Op& op, std::initializer_list<Var> inputs) {
+  std::vector<Tensor> values;
+  for (const Var& v : inputs) values.push_back(v.value);
+  const OpScope running(Op::name);
+  require_one_device(values);
+  op.check(values);
+}
+
 }  // namespace restage

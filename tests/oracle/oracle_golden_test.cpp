@@ -15,6 +15,7 @@
 #include "nn/weights/safetensors.h"
 #include "nn/weights/state.h"
 #include "tests/oracle/oracle_case.h"
+#include "tests/support/emulated_gpu.h"
 #include "tests/support/expect_near.h"
 #include "tests/support/fake_device.h"
 
@@ -56,6 +57,15 @@ TEST_P(OracleGolden, GivesTheSameBitsOnAnotherDevice) {
   const TensorFile question = read_safetensors(path);
   EXPECT_TRUE(safetensors_bytes(answer(question, path, fake_device())) ==
               safetensors_bytes(answer(question, path)));
+}
+
+TEST_P(OracleGolden, AgreesWithTheKernelsOfTheGpu) {
+  const std::string path = folder() + GetParam() + ".safetensors";
+  const TensorFile question = read_safetensors(path);
+  const bool f64 = question.metadata.at("dtype") == "f64";
+  const std::vector<Difference> found =
+      differences(question, answer(question, path, emulated_gpu()), f64 ? 1e-8 : 1e-4);
+  EXPECT_TRUE(found.empty()) << report(found);
 }
 
 INSTANTIATE_TEST_SUITE_P(Cases, OracleGolden, testing::ValuesIn(cases()),

@@ -88,8 +88,8 @@ inline const TrainingData& tiny_data() {
   return data;
 }
 
-inline std::unique_ptr<Stage> tiny_stage(const std::string& name, const TrainConfig& config) {
-  Bundle so_far;
+inline std::unique_ptr<Stage> tiny_stage(const std::string& name, const TrainConfig& config,
+                                         Bundle so_far = {}) {
   return make_stage(config, name, tiny_data(), &so_far);
 }
 

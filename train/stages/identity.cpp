@@ -81,6 +81,7 @@ std::vector<StageId> Identities::stages(const TrainConfig& config) {
                  {"precision", static_cast<int>(config.precision)},
                  {"reads", Json::object()}};
     const SelectionConfig& selection = config.loop.selection;
+    if (config.device != "cpu") json["device"] = config.device;  // rounds in other ways
     if (config.loop.overfit_batches > 0) json["overfit_batches"] = config.loop.overfit_batches;
     if (config.loop.micro_batches > 1) json["micro_batches"] = config.loop.micro_batches;
     if (selection.ema > 0) json["ema"] = number(selection.ema);

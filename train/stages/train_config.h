@@ -98,6 +98,7 @@ struct TrainConfig {
   std::string run_root = "runs";
   uint64_t seed = 0;
   MatmulPrecision precision = MatmulPrecision::float32;
+  std::string device = "cpu";
   std::vector<std::string> stages = {"skeleton", "motion", "deformation"};
   CorpusSource data;
   std::vector<std::pair<std::string, StageSection>> sections;  ///< of every stage there is
@@ -113,6 +114,7 @@ void visit(V& v, TrainConfig& c) {
   v("run_root", c.run_root, "folder of run directories");
   v("seed", c.seed, "of everything random");
   v("precision", c.precision, "of the matrix products of training steps; all else is float32");
+  v("device", c.device, "where networks are trained: cpu, or cuda in a program built for it");
   v("stages", c.stages, "which stages, in order", one_of(stage_names()));
   v("data", c.data, "bodies and motions");
   for (auto& [name, section] : c.sections) v(name, section, stage_type(name).help);

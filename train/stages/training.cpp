@@ -40,7 +40,7 @@ std::unique_ptr<Stage> make_stage(const TrainConfig& config, const std::string& 
   }
   check_order(config, type, section.config);
   auto stage = type.make(section.config, {data.train, data.validation, config.seed, *so_far,
-                                          data.answers, data.device});
+                                          data.answers, device_of(config.device)});
   stage->repeat_batches(config.loop.overfit_batches);
   stage->cut_steps(config.loop.micro_batches, data.team != nullptr ? *data.team : alone());
   if (section.init)

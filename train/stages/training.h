@@ -16,7 +16,6 @@ struct TrainingData {
   Corpus train, validation;
   Team* team = nullptr;  ///< processes that train on them together; null: this one alone
   std::optional<AnswerFolder> answers;  ///< where an extractor's answers to them are kept
-  Device device;                        ///< that stages are trained on
 };
 
 /// A stage with its weights to start from; null if it is taken as it is, and then its networks are

@@ -1,0 +1,172 @@
+// What kernels of this folder are written in: loops over numbers and over groups of threads. nvcc
+// makes them CUDA's; any other compiler makes them loops of the host, in another order than a GPU
+// would take on purpose, which is how tests run them where there is no GPU (tests/support).
+//
+// A kernel is a function of a contract (autograd/kernels) that takes addresses out of tensors and
+// calls each() or groups(). Inside a group, what one thread leaves for another lies in memory that
+// they share, and is read after the each() or sum() that wrote it: all threads meet there.
+#pragma once
+
+#include <math.h>  // exp, fma and others for float as well, by the names that nvcc knows
+
+#include <algorithm>
+#include <cstdint>
+#include <string>
+#include <type_traits>
+
+#include "autograd/base/error.h"
+#include "autograd/base/module_path.h"
+#include "autograd/kernels/kernel.h"
+
+#ifdef __CUDACC__
+#include "autograd/cuda/runtime.h"
+#define RESTAGE_DEVICE __device__
+#else
+#define RESTAGE_DEVICE
+#endif
+
+namespace restage::cuda {
+
+inline constexpr int kThreads = 256;  ///< of a group
+
+/// Calls f<float>() or f<double>() by dtype. nvcc wants no generic lambda around a kernel.
+#define RESTAGE_FLOATS(type, function, args)                                             \
+  switch (type) {                                                                        \
+    case DType::f32:                                                                     \
+      return function<float>(args);                                                      \
+    case DType::f64:                                                                     \
+      return function<double>(args);                                                     \
+    default:                                                                             \
+      throw Error(std::string("kernel of the GPU has no variant for ") + name_of(type)); \
+  }
+
+/// The numbers of a tensor as kernels see them. Error if they are the host's.
+template <class T>
+T* at(const Tensor& t) {
+#ifdef __CUDACC__
+  if (t.defined() && t.device() == Device{})
+    throw Error("a kernel of the GPU was given memory of the host (" + running_op() + ")");
+  return static_cast<T*>(const_cast<void*>(t.address()));
+#else
+  return const_cast<Tensor&>(t).data<T>();
+#endif
+}
+template <class T>
+T* at(const Tensor* t) {
+  return t == nullptr ? nullptr : at<T>(*t);
+}
+
+/// Doubles for the time of a kernel.
+inline Tensor scratch(const Tensor& like, int64_t count) {
+  return Tensor::empty({count}, DType::f64, like.device());
+}
+
+/// Threads that work on one thing together.
+struct Group {
+#ifdef __CUDACC__
+  /// f(i) for all i below n; all threads meet before and after.
+  template <class F>
+  __device__ void each(int64_t n, F f) const {
+    __syncthreads();
+    for (int64_t i = threadIdx.x; i < n; i += blockDim.x) f(i);
+    __syncthreads();
+  }
+#else
+  template <class F>
+  void each(int64_t n, F f) const {
+    for (int64_t i = n; i-- > 0;) f(i);
+  }
+#endif
+  /// Sum of f(i) over i below n, in an order that n alone decides. Everybody gets it.
+  template <class F>
+  RESTAGE_DEVICE double sum(int64_t n, F f) const {
+    double* parts = room;
+    each(kThreads, [&](int64_t t) {
+      double s = 0;
+      for (int64_t i = t; i < n; i += kThreads) s += f(i);
+      parts[t] = s;
+    });
+    for (int64_t half = kThreads / 2; half > 0; half /= 2)
+      each(half, [&](int64_t t) { parts[t] += parts[t + half]; });
+    const double total = parts[0];
+    each(0, [](int64_t) {});  // nobody writes before all have read
+    return total;
+  }
+  /// The i below n of the largest f(i), the first of equal ones; 0 if all are NaN.
+  template <class F>
+  RESTAGE_DEVICE int64_t first_largest(int64_t n, F f) const {
+    double* best = room;
+    double* which = room + kThreads;
+    each(kThreads, [&](int64_t t) {
+      double top = -INFINITY;
+      int64_t index = n;
+      for (int64_t i = t; i < n; i += kThreads) {
+        const double x = f(i);
+        if (x > top) top = x, index = i;
+      }
+      best[t] = top;
+      which[t] = static_cast<double>(index);
+    });
+    for (int64_t half = kThreads / 2; half > 0; half /= 2)
+      each(half, [&](int64_t t) {
+        const double b = best[t + half], w = which[t + half];
+        if (b > best[t] || (b == best[t] && w < which[t])) best[t] = b, which[t] = w;
+      });
+    const auto index = static_cast<int64_t>(which[0]);
+    each(0, [](int64_t) {});
+    return index < n ? index : 0;
+  }
+  double* room;  ///< 2 * kThreads numbers
+};
+
+#ifdef __CUDACC__
+
+template <class F>
+__global__ void each_kernel(int64_t n, F f) {
+  const int64_t step = static_cast<int64_t>(gridDim.x) * blockDim.x;
+  for (int64_t i = static_cast<int64_t>(blockIdx.x) * blockDim.x + threadIdx.x; i < n; i += step)
+    f(i);
+}
+
+template <class F>
+__global__ void groups_kernel(int64_t n, F f) {
+  __shared__ double room[2 * kThreads];
+  for (int64_t i = blockIdx.x; i < n; i += gridDim.x) f(Group{room}, i);
+}
+
+inline unsigned grid(int64_t blocks) {
+  return static_cast<unsigned>(std::min<int64_t>(blocks, 1 << 20));
+}
+
+/// f(i) for all i below n, each in a thread of its own.
+template <class F>
+void each(int64_t n, F f) {
+  if (n == 0) return;
+  each_kernel<<<grid((n + kThreads - 1) / kThreads), kThreads, 0, stream()>>>(n, f);
+  launched();
+}
+
+/// f(group, i) for all i below n, each by a group of threads.
+template <class F>
+void groups(int64_t n, F f) {
+  if (n == 0) return;
+  groups_kernel<<<grid(n), kThreads, 0, stream()>>>(n, f);
+  launched();
+}
+
+#else
+
+template <class F>
+void each(int64_t n, F f) {
+  for (int64_t i = n; i-- > 0;) f(i);
+}
+
+template <class F>
+void groups(int64_t n, F f) {
+  double room[2 * kThreads];
+  for (int64_t i = n; i-- > 0;) f(Group{room}, i);
+}
+
+#endif
+
+}  // namespace restage::cuda

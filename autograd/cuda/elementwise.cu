@@ -1,0 +1,242 @@
+// One thread a number. All of these are bound by memory, so a switch over the operation, which is
+// the same for all threads, costs nothing.
+#include "autograd/cuda/kernels.h"
+#include "autograd/cuda/philox.h"
+
+namespace restage::cuda {
+namespace {
+
+template <class T>
+RESTAGE_DEVICE T sigmoid_of(T x) {
+  const T e = exp(-fabs(x));
+  return x >= T(0) ? T(1) / (T(1) + e) : e / (T(1) + e);
+}
+
+template <class T>
+RESTAGE_DEVICE T value_of(Unary op, T x, T alpha) {
+  switch (op) {
+    case Unary::neg:
+      return -x;
+    case Unary::exp:
+      return exp(x);
+    case Unary::log:
+      return log(x);
+    case Unary::sqrt:
+      return sqrt(x);
+    case Unary::square:
+      return x * x;
+    case Unary::abs:
+      return fabs(x);
+    case Unary::sigmoid:
+      return sigmoid_of(x);
+    case Unary::tanh:
+      return tanh(x);
+    case Unary::relu:
+      return x <= T(0) ? T(0) : x;  // NaN stays NaN
+    case Unary::leaky_relu:
+      return x > T(0) ? x : alpha * x;
+    case Unary::softplus:
+      return (x > T(0) ? x : T(0)) + log1p(exp(-fabs(x)));
+    case Unary::scale:
+      return alpha * x;
+    case Unary::add_scalar:
+      return x + alpha;
+  }
+  return x;
+}
+
+/// g f'(x) from what is kept: x or y = f(x).
+template <class T>
+RESTAGE_DEVICE T slope_times(Unary op, T kept, T g, T alpha) {
+  switch (op) {
+    case Unary::neg:
+      return -g;
+    case Unary::exp:
+      return g * kept;
+    case Unary::log:
+      return g / kept;
+    case Unary::sqrt:
+      return g / (kept + kept);
+    case Unary::square:
+      return (g + g) * kept;
+    case Unary::abs:  // 0 at 0
+      return kept > T(0) ? g : kept < T(0) ? -g : g * kept;
+    case Unary::sigmoid:
+      return g * kept * (T(1) - kept);
+    case Unary::tanh:
+      return g * (T(1) - kept * kept);
+    case Unary::relu:
+      return kept <= T(0) ? T(0) : g;
+    case Unary::leaky_relu:
+      return kept > T(0) ? g : alpha * g;
+    case Unary::softplus:
+      return g * sigmoid_of(kept);
+    case Unary::scale:
+      return alpha * g;
+    case Unary::add_scalar:
+      return g;
+  }
+  return g;
+}
+
+/// Where the numbers of a broadcast operand lie: steps of its axes, 0 where it is repeated.
+struct Steps {
+  int rank = 0;
+  int64_t size[Shape::kMaxRank] = {}, step[Shape::kMaxRank] = {};
+  Steps(const Shape& of, const Shape& to) : rank(to.rank()) {
+    int64_t stride = 1;
+    for (int i = rank - 1; i >= 0; --i) {
+      const int own = i - (rank - of.rank());
+      const int64_t n = own < 0 ? 1 : of[own];
+      size[i] = to[i];
+      step[i] = n == 1 ? 0 : stride;
+      stride *= n;
+    }
+  }
+  RESTAGE_DEVICE int64_t at(int64_t i) const {
+    int64_t offset = 0;
+    for (int axis = rank - 1; axis >= 0; --axis) {
+      offset += i % size[axis] * step[axis];
+      i /= size[axis];
+    }
+    return offset;
+  }
+};
+
+template <class T>
+void unary_of(const UnaryArgs& args) {
+  const T *x = at<T>(args.x), alpha = static_cast<T>(args.alpha);
+  T* out = at<T>(args.out);
+  const Unary op = args.op;
+  each(args.out.numel(), [=] RESTAGE_DEVICE(int64_t i) { out[i] = value_of(op, x[i], alpha); });
+}
+
+template <class T>
+void unary_grad_of(const UnaryGradArgs& args) {
+  const T *kept = at<T>(args.kept), *g = at<T>(args.gy), alpha = static_cast<T>(args.alpha);
+  T* out = at<T>(args.out);
+  const Unary op = args.op;
+  each(args.out.numel(), [=] RESTAGE_DEVICE(int64_t i) {
+    out[i] = slope_times(op, kept == nullptr ? T(0) : kept[i], g[i], alpha);
+  });
+}
+
+template <class T>
+void binary_of(const BinaryArgs& args) {
+  const T *a = at<T>(args.a), *b = at<T>(args.b);
+  T* out = at<T>(args.out);
+  const Steps of_a(args.a.shape(), args.out.shape()), of_b(args.b.shape(), args.out.shape());
+  const Binary op = args.op;
+  each(args.out.numel(), [=] RESTAGE_DEVICE(int64_t i) {
+    const T x = a[of_a.at(i)], y = b[of_b.at(i)];
+    out[i] = op == Binary::add   ? x + y
+             : op == Binary::sub ? x - y
+             : op == Binary::mul ? x * y
+                                 : x / y;
+  });
+}
+
+template <class T>
+void accumulate_of(const AccumulateArgs& args) {
+  const T* a = at<T>(args.a);
+  T* out = at<T>(args.out);
+  each(args.out.numel(), [=] RESTAGE_DEVICE(int64_t i) { out[i] += a[i]; });
+}
+
+template <class T>
+void expand_of(const ExpandArgs& args) {
+  const T* x = at<T>(args.x);
+  T* out = at<T>(args.out);
+  const Steps of(args.x.shape(), args.out.shape());
+  each(args.out.numel(), [=] RESTAGE_DEVICE(int64_t i) { out[i] = x[of.at(i)]; });
+}
+
+/// The CPU's masks: the four words of a draw are those of four neighbours.
+template <class T>
+void dropout_of(const DropoutArgs& args) {
+  const T* x = at<T>(args.x);
+  T* out = at<T>(args.out);
+  const RngKey key = args.key;
+  const auto limit = static_cast<uint32_t>(args.p * 4294967296.0);
+  const T kept = static_cast<T>(1.0 / (1.0 - args.p));
+  const bool relu = args.relu;
+  const int64_t n = args.out.numel();
+  each((n + 3) / 4, [=] RESTAGE_DEVICE(int64_t draw) {
+    const Words words = philox_words(key.seed, key.stream, static_cast<uint64_t>(draw));
+    for (int64_t k = 0; k < 4 && 4 * draw + k < n; ++k) {
+      const T v = x[4 * draw + k];
+      out[4 * draw + k] = words.at[k] < limit || (relu && v <= T(0)) ? T(0) : v * kept;
+    }
+  });
+}
+
+template <class T>
+void relu_dropout_grad_of(const ReluDropoutGradArgs& args) {
+  const T *y = at<T>(args.y), *g = at<T>(args.gy), kept = static_cast<T>(1.0 / (1.0 - args.p));
+  T* out = at<T>(args.out);
+  each(args.out.numel(),
+       [=] RESTAGE_DEVICE(int64_t i) { out[i] = y[i] <= T(0) ? T(0) : g[i] * kept; });
+}
+
+/// Every thread that finds one writes the same.
+template <class T>
+void non_finite_of(const NonFiniteArgs& args) {
+  const T* x = at<T>(args.x);
+  int32_t* out = at<int32_t>(args.out);
+  each(1, [=] RESTAGE_DEVICE(int64_t) { out[0] = 0; });
+  each(args.x.numel(), [=] RESTAGE_DEVICE(int64_t i) {
+    if (x[i] - x[i] != T(0)) out[0] = 1;
+  });
+}
+
+template <class From, class To>
+void cast_from_to(const CastArgs& args) {
+  const From* x = at<From>(args.x);
+  To* out = at<To>(args.out);
+  each(args.out.numel(),
+       [=] RESTAGE_DEVICE(int64_t i) { out[i] = static_cast<To>(static_cast<double>(x[i])); });
+}
+
+template <class From>
+void cast_from(const CastArgs& args) {
+  switch (args.out.dtype()) {
+    case DType::f32:
+      return cast_from_to<From, float>(args);
+    case DType::f64:
+      return cast_from_to<From, double>(args);
+    case DType::i32:
+      return cast_from_to<From, int32_t>(args);
+    case DType::i64:
+      return cast_from_to<From, int64_t>(args);
+  }
+}
+
+}  // namespace
+
+void unary(const UnaryArgs& args) { RESTAGE_FLOATS(args.out.dtype(), unary_of, args) }
+void unary_grad(const UnaryGradArgs& args) { RESTAGE_FLOATS(args.out.dtype(), unary_grad_of, args) }
+void binary(const BinaryArgs& args) { RESTAGE_FLOATS(args.out.dtype(), binary_of, args) }
+void accumulate(const AccumulateArgs& args) {
+  RESTAGE_FLOATS(args.out.dtype(), accumulate_of, args)
+}
+void expand(const ExpandArgs& args) { RESTAGE_FLOATS(args.out.dtype(), expand_of, args) }
+void dropout(const DropoutArgs& args) { RESTAGE_FLOATS(args.out.dtype(), dropout_of, args) }
+void relu_dropout_grad(const ReluDropoutGradArgs& args) {
+  RESTAGE_FLOATS(args.out.dtype(), relu_dropout_grad_of, args)
+}
+void non_finite(const NonFiniteArgs& args) { RESTAGE_FLOATS(args.x.dtype(), non_finite_of, args) }
+
+void cast(const CastArgs& args) {
+  switch (args.x.dtype()) {
+    case DType::f32:
+      return cast_from<float>(args);
+    case DType::f64:
+      return cast_from<double>(args);
+    case DType::i32:
+      return cast_from<int32_t>(args);
+    case DType::i64:
+      return cast_from<int64_t>(args);
+  }
+}
+
+}  // namespace restage::cuda

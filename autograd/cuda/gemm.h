@@ -1,0 +1,26 @@
+// Products of matrices in columns, as cuBLAS has them.
+#pragma once
+
+#include "autograd/cuda/device_code.h"
+
+namespace restage::cuda {
+
+/// C = op(A) op(B) + beta C for a batch, all stored by columns: op(A) is m x k, op(B) k x n.
+struct Gemm {
+  bool transpose_a, transpose_b;
+  int64_t m, n, k;
+  const void* a;
+  int64_t a_columns_apart, a_apart;  ///< leading dimension; from one of the batch to the next
+  const void* b;
+  int64_t b_columns_apart, b_apart;
+  double beta;
+  void* c;
+  int64_t c_columns_apart, c_apart;
+  int64_t batch;
+  DType type;     ///< f32 or f64
+  bool bfloat16;  ///< f32 operands may be rounded to it
+};
+/// By cuBLAS; tests have one of their own.
+void multiply(const Gemm& g);
+
+}  // namespace restage::cuda

@@ -1,0 +1,97 @@
+// Normalisation over the middle axis of [outer, n, inner]; statistics in double.
+#include "autograd/cuda/kernels.h"
+#include "autograd/cuda/sums.h"
+
+namespace restage::cuda {
+namespace {
+
+/// Scale or shift of a number, 1 or 0 where there is none.
+template <class T>
+struct Factor {
+  const T* values;
+  Affine along;
+  double none;
+  RESTAGE_DEVICE double at(int64_t r, int64_t i) const {
+    if (values == nullptr || along == Affine::none) return none;
+    return static_cast<double>(values[along == Affine::inner ? i : r]);
+  }
+};
+
+template <class T>
+void norm_of(const NormArgs& args) {
+  const T* x = at<T>(args.x);
+  T* out = at<T>(args.out);
+  double *mean = at<double>(args.mean), *rstd = at<double>(args.rstd);
+  const int64_t n = args.n, inner = args.inner, columns = args.outer * inner;
+  const double count = static_cast<double>(n), eps = args.eps;
+  const Factor<T> scale{at<T>(args.scale), args.affine, 1},
+      shift{at<T>(args.shift), args.affine, 0};
+  sums(args.out, args.outer, n, inner, mean, [=] RESTAGE_DEVICE(int64_t o, int64_t r, int64_t i) {
+    return static_cast<double>(x[(o * n + r) * inner + i]);
+  });
+  each(columns, [=] RESTAGE_DEVICE(int64_t k) { mean[k] /= count; });
+  sums(args.out, args.outer, n, inner, rstd, [=] RESTAGE_DEVICE(int64_t o, int64_t r, int64_t i) {
+    const double d = static_cast<double>(x[(o * n + r) * inner + i]) - mean[o * inner + i];
+    return d * d;
+  });
+  each(columns, [=] RESTAGE_DEVICE(int64_t k) { rstd[k] = 1.0 / sqrt(rstd[k] / count + eps); });
+  each(args.out.numel(), [=] RESTAGE_DEVICE(int64_t k) {
+    const int64_t o = k / (n * inner), r = k / inner % n, i = k % inner, c = o * inner + i;
+    out[k] = static_cast<T>((static_cast<double>(x[k]) - mean[c]) * rstd[c] * scale.at(r, i) +
+                            shift.at(r, i));
+  });
+}
+
+template <class T>
+void norm_grad_of(const NormGradArgs& args) {
+  const T *x = at<T>(args.x), *gy = at<T>(args.gy);
+  T* out = at<T>(args.out);
+  const double *mean = at<double>(args.mean), *rstd = at<double>(args.rstd);
+  const int64_t outer = args.outer, n = args.n, inner = args.inner, columns = outer * inner;
+  const Factor<T> scale{at<T>(args.scale), args.affine, 1};
+  Tensor room = scratch(args.out, 2 * columns);
+  double *g_sum = at<double>(room), *gx_sum = g_sum + columns;
+  sums(args.out, outer, n, inner, g_sum, [=] RESTAGE_DEVICE(int64_t o, int64_t r, int64_t i) {
+    return static_cast<double>(gy[(o * n + r) * inner + i]) * scale.at(r, i);
+  });
+  sums(args.out, outer, n, inner, gx_sum, [=] RESTAGE_DEVICE(int64_t o, int64_t r, int64_t i) {
+    const int64_t k = (o * n + r) * inner + i, c = o * inner + i;
+    return static_cast<double>(gy[k]) * scale.at(r, i) *
+           ((static_cast<double>(x[k]) - mean[c]) * rstd[c]);
+  });
+  const double inv = n > 0 ? 1.0 / static_cast<double>(n) : 0;
+  each(args.out.numel(), [=] RESTAGE_DEVICE(int64_t k) {
+    const int64_t r = k / inner % n, i = k % inner, c = k / (n * inner) * inner + i;
+    const double h = (static_cast<double>(x[k]) - mean[c]) * rstd[c];
+    const double g = static_cast<double>(gy[k]) * scale.at(r, i);
+    out[k] = static_cast<T>(rstd[c] * (g - inv * (g_sum[c] + h * gx_sum[c])));
+  });
+  if (args.g_scale == nullptr) return;
+  // Along the inner axis there is one block; along the middle one the columns are what is summed.
+  const int64_t width = args.affine == Affine::inner ? inner : n,
+                rows = args.affine == Affine::inner ? n : outer;
+  const bool by_inner = args.affine == Affine::inner;
+  Tensor more = scratch(args.out, 2 * width);
+  double *a = at<double>(more), *b = a + width;
+  sums(args.out, 1, rows, width, a, [=] RESTAGE_DEVICE(int64_t, int64_t r, int64_t i) {
+    const int64_t k = r * width + i, c = by_inner ? i : r;
+    return static_cast<double>(gy[k]) * ((static_cast<double>(x[k]) - mean[c]) * rstd[c]);
+  });
+  sums(args.out, 1, rows, width, b, [=] RESTAGE_DEVICE(int64_t, int64_t r, int64_t i) {
+    return static_cast<double>(gy[r * width + i]);
+  });
+  T *g_scale = at<T>(args.g_scale), *g_shift = at<T>(args.g_shift);
+  each(width, [=] RESTAGE_DEVICE(int64_t i) {
+    g_scale[i] = static_cast<T>(a[i]);
+    g_shift[i] = static_cast<T>(b[i]);
+  });
+}
+
+}  // namespace
+
+void norm(const NormArgs& args) {
+  if (args.x.numel() > 0) RESTAGE_FLOATS(args.out.dtype(), norm_of, args)
+}
+void norm_grad(const NormGradArgs& args) { RESTAGE_FLOATS(args.out.dtype(), norm_grad_of, args) }
+
+}  // namespace restage::cuda

@@ -1,0 +1,103 @@
+// Reductions over the middle axis of [outer, n, inner]. Sums are in double, in an order that sizes
+// decide.
+#include "autograd/cuda/kernels.h"
+#include "autograd/cuda/sums.h"
+
+namespace restage::cuda {
+namespace {
+
+template <class T>
+void sum_of(const SumArgs& args) {
+  const T* x = at<T>(args.x);
+  T* out = at<T>(args.out);
+  const int64_t n = args.n, inner = args.inner, count = args.outer * inner;
+  Tensor totals = scratch(args.out, count);
+  double* total = at<double>(totals);
+  sums(args.out, args.outer, n, inner, total, [=] RESTAGE_DEVICE(int64_t o, int64_t r, int64_t i) {
+    return static_cast<double>(x[(o * n + r) * inner + i]);
+  });
+  each(count, [=] RESTAGE_DEVICE(int64_t k) { out[k] = static_cast<T>(total[k]); });
+}
+
+template <class T>
+void max_of(const MaxArgs& args) {
+  const T* x = at<T>(args.x);
+  T* out = at<T>(args.out);
+  int32_t* index = at<int32_t>(args.index);
+  const int64_t n = args.n, inner = args.inner;
+  each(args.outer * inner, [=] RESTAGE_DEVICE(int64_t k) {
+    const T* column = x + k / inner * n * inner + k % inner;
+    T best = column[0];
+    int32_t which = 0;
+    for (int64_t r = 1; r < n; ++r) {
+      const T v = column[r * inner];
+      if (v > best || (v != v && best == best))
+        best = v, which = static_cast<int32_t>(r);  // NaN wins
+    }
+    out[k] = best;
+    index[k] = which;
+  });
+}
+
+template <class T>
+void max_grad_of(const MaxGradArgs& args) {
+  const T* gy = at<T>(args.gy);
+  T* out = at<T>(args.out);
+  const int32_t* index = at<int32_t>(args.index);
+  const int64_t n = args.n, inner = args.inner;
+  each(args.outer * n * inner, [=] RESTAGE_DEVICE(int64_t k) {
+    const int64_t o = k / (n * inner), r = k / inner % n, i = k % inner;
+    out[k] = index[o * inner + i] == r ? gy[o * inner + i] : T(0);
+  });
+}
+
+/// Columns of at most some dozens of numbers, a thread each.
+template <class T>
+void softmax_of(const SoftmaxArgs& args) {
+  const T* x = at<T>(args.x);
+  T* out = at<T>(args.out);
+  const int64_t n = args.n, inner = args.inner;
+  each(args.outer * inner, [=] RESTAGE_DEVICE(int64_t k) {
+    const int64_t from = k / inner * n * inner + k % inner;
+    T top = x[from];
+    for (int64_t r = 1; r < n; ++r)
+      if (x[from + r * inner] > top) top = x[from + r * inner];
+    double total = 0;
+    for (int64_t r = 0; r < n; ++r) {
+      const T e = exp(x[from + r * inner] - top);
+      out[from + r * inner] = e;
+      total += static_cast<double>(e);
+    }
+    const T all = static_cast<T>(total);
+    for (int64_t r = 0; r < n; ++r) out[from + r * inner] /= all;
+  });
+}
+
+template <class T>
+void softmax_grad_of(const SoftmaxGradArgs& args) {
+  const T *y = at<T>(args.y), *gy = at<T>(args.gy);
+  T* out = at<T>(args.out);
+  const int64_t n = args.n, inner = args.inner;
+  each(args.outer * inner, [=] RESTAGE_DEVICE(int64_t k) {
+    const int64_t from = k / inner * n * inner + k % inner;
+    double total = 0;
+    for (int64_t r = 0; r < n; ++r)
+      total += static_cast<double>(y[from + r * inner]) * static_cast<double>(gy[from + r * inner]);
+    for (int64_t r = 0; r < n; ++r)
+      out[from + r * inner] = y[from + r * inner] * (gy[from + r * inner] - static_cast<T>(total));
+  });
+}
+
+}  // namespace
+
+void sum(const SumArgs& args) { RESTAGE_FLOATS(args.out.dtype(), sum_of, args) }
+void max(const MaxArgs& args) { RESTAGE_FLOATS(args.out.dtype(), max_of, args) }
+void max_grad(const MaxGradArgs& args) { RESTAGE_FLOATS(args.out.dtype(), max_grad_of, args) }
+void softmax(const SoftmaxArgs& args) {
+  if (args.n > 0) RESTAGE_FLOATS(args.out.dtype(), softmax_of, args)
+}
+void softmax_grad(const SoftmaxGradArgs& args) {
+  RESTAGE_FLOATS(args.out.dtype(), softmax_grad_of, args)
+}
+
+}  // namespace restage::cuda

@@ -1,0 +1,75 @@
+#include "tests/support/emulated_gpu.h"
+
+#include "autograd/cuda/elementwise.cu"
+#include "autograd/cuda/gemm.h"
+#include "autograd/cuda/layout.cu"
+#include "autograd/cuda/matmul.cu"
+#include "autograd/cuda/norm.cu"
+#include "autograd/cuda/points.cu"
+#include "autograd/cuda/recurrent.cu"
+#include "autograd/cuda/reduce.cu"
+#include "autograd/cuda/rotation.cu"
+#include "autograd/cuda/skeleton.cu"
+#include "autograd/cuda/swing.cu"
+#include "autograd/cuda/update.cu"
+
+namespace restage {
+namespace cuda {
+namespace {
+
+template <class T>
+void multiply_columns(const Gemm& g) {
+  for (int64_t s = 0; s < g.batch; ++s) {
+    const T *a = static_cast<const T*>(g.a) + s * g.a_apart,
+            *b = static_cast<const T*>(g.b) + s * g.b_apart;
+    T* c = static_cast<T*>(g.c) + s * g.c_apart;
+    for (int64_t column = 0; column < g.n; ++column)
+      for (int64_t row = 0; row < g.m; ++row) {
+        T total = 0;
+        for (int64_t i = 0; i < g.k; ++i)
+          total +=
+              a[g.transpose_a ? row * g.a_columns_apart + i : i * g.a_columns_apart + row] *
+              b[g.transpose_b ? i * g.b_columns_apart + column : column * g.b_columns_apart + i];
+        T& to = c[column * g.c_columns_apart + row];
+        to = g.beta == 0 ? total : static_cast<T>(g.beta) * to + total;
+      }
+  }
+}
+
+}  // namespace
+
+/// What cuBLAS does, in order.
+void multiply(const Gemm& g) {
+  g.type == DType::f64 ? multiply_columns<double>(g) : multiply_columns<float>(g);
+}
+
+}  // namespace cuda
+
+namespace {
+
+class EmulatedGpu final : public GuardedBackend {
+ public:
+  EmulatedGpu() : GuardedBackend("emulated gpu") {
+#define RESTAGE_ENTER(kernel, Args) add<Args, cuda::kernel>();
+    RESTAGE_CUDA_KERNELS(RESTAGE_ENTER)
+#undef RESTAGE_ENTER
+  }
+
+ private:
+  void run_kernel(std::type_index args_type, const void* args) override {
+    run_own(args_type, args);
+  }
+  std::string take_fault() override { return cuda::take_index_fault(); }
+};
+
+EmulatedGpu& gpu() {
+  static EmulatedGpu* instance = new EmulatedGpu;
+  return *instance;
+}
+
+}  // namespace
+
+Device emulated_gpu() { return gpu().device(); }
+DeviceCounts emulated_counts() { return gpu().counts; }
+
+}  // namespace restage
