@@ -145,7 +145,8 @@ OpSamples gather_samples() {
 OpSamples scatter_samples() {
   OpSamples s = samples_for<ScatterAdd>();
   const auto into = [](const Tensor& index, int64_t rows) {
-    return Build([index, rows](Args x) { return scatter_add(x[0], index.to(x[0].value.device()), rows); });
+    return Build(
+        [index, rows](Args x) { return scatter_add(x[0], index.to(x[0].value.device()), rows); });
   };
   Rng rng(RngKey{25, 0});
   s.add("repeated rows", {random({2, 3, 2}, 1)}, into(i32({2, 3}, {0, 3, 0, 1, 1, 1}), 4));

@@ -55,9 +55,8 @@ void require_one_device(Inputs tensors) {
   for (const Tensor& t : tensors) {
     if (!t.defined()) continue;
     if (first != nullptr && t.device() != first->device())
-      throw Error(running_op() + " is given tensors of two devices, " +
-                  name_of(first->device()) + " and " + name_of(t.device()) +
-                  "; take to() of one of them first");
+      throw Error(running_op() + " is given tensors of two devices, " + name_of(first->device()) +
+                  " and " + name_of(t.device()) + "; take to() of one of them first");
     first = &t;
   }
 }

@@ -49,8 +49,8 @@ class Tensor {
   DType dtype() const { return dtype_; }
   Device device() const;
 
-  /// Host pointer; T must match the dtype. Error naming the op that runs where the host may not read
-  /// the device's memory: what it needs there it takes with cpu().
+  /// Host pointer; T must match the dtype. Error naming the op that runs where the host may not
+  /// read the device's memory: what it needs there it takes with cpu().
   template <class T>
   T* data();
   template <class T>

@@ -32,8 +32,7 @@ Var nothing(const MotionBatch& b) {
 
 /// Cross-entropy of which feet stand; 0 where the network does not say or nobody knows.
 Var contact_loss(const MotionOutput& out, const MotionBatch& b) {
-  if (!out.standing.value.defined() || !b.standing.defined())
-    return nothing(b);
+  if (!out.standing.value.defined() || !b.standing.defined()) return nothing(b);
   return mean_all(softplus(out.standing) - out.standing * Var(b.standing));
 }
 
@@ -55,8 +54,8 @@ void put_reconstruction(const MotionOutput& to_a, const MotionBatch& b, const Mo
   out->rotation = rotation_loss(to_a.rotations, b.sixd, w.measure);
   const Var moved = differences(to_a.joints), truly = differences(b.joints);
   out->smoothness = apart(moved, truly);
-  out->acceleration = w.acceleration > 0 ? apart(differences(moved), differences(truly))
-                                         : nothing(b);
+  out->acceleration =
+      w.acceleration > 0 ? apart(differences(moved), differences(truly)) : nothing(b);
 }
 
 }  // namespace

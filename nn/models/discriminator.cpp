@@ -49,7 +49,8 @@ Var bone_vectors(const Var& rest) {
   for (int64_t i = 0; i < n; ++i)
     for (int64_t j = 1; j < kJoints; ++j)
       parents.data<int32_t>()[i * (kJoints - 1) + j - 1] = kParents[j];
-  return reshape(slice(rest, 1, 1, kJoints) - gather(rest, parents.to(rest.value.device())), {n, 3 * (kJoints - 1)});
+  return reshape(slice(rest, 1, 1, kJoints) - gather(rest, parents.to(rest.value.device())),
+                 {n, 3 * (kJoints - 1)});
 }
 
 }  // namespace restage

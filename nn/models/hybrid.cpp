@@ -167,11 +167,10 @@ MotionOutput Hybrid::forward(Context& ctx, const MotionInput& in, MotionState* s
   const SurfaceTurns surface = surface_turns(in);
   const Var b = in_units(reshape(in.rest, {n, 1, w}), units.rest);
   state->resize(8);
-  const Var uncertainty =
-      config.uncertainty && in.uncertainty.defined()
-          ? Var(in.uncertainty)
-          : Var(Tensor::full({n, t, kJoints}, kUsualUncertainty, in.joints.dtype(),
-                             in.joints.value.device()));
+  const Var uncertainty = config.uncertainty && in.uncertainty.defined()
+                              ? Var(in.uncertainty)
+                              : Var(Tensor::full({n, t, kJoints}, kUsualUncertainty,
+                                                 in.joints.dtype(), in.joints.value.device()));
   const Var code = enc(ctx, seen(in, surface, uncertainty), &(*state)[0]);
   const Var decoded = dec(ctx, concat({code, expand(b, {n, t, w})}, 2), &(*state)[1]);
 

@@ -46,7 +46,8 @@ SurfaceTurns surface_turns(const MotionInput& in) {
         matrix_at(out.leaves.data<double>() + 9 * (k * leaves + i)) = read.beyond[kLeaves[i]];
     }
   }
-  for (Tensor* x : {&out.twist, &out.leaves, &out.beyond}) *x = x->cast(in.joints.dtype()).to(in.joints.value.device());
+  for (Tensor* x : {&out.twist, &out.leaves, &out.beyond})
+    *x = x->cast(in.joints.dtype()).to(in.joints.value.device());
   return out;
 }
 

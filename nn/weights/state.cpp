@@ -80,7 +80,8 @@ bool may_nest_deeply(const std::string& yaml) {
 }  // namespace
 
 void append(TensorFile* file, Module& module, const std::string& prefix) {
-  for (const StateEntry& e : state_of(module, prefix)) file->tensors[e.name] = e.value->clone().cpu();
+  for (const StateEntry& e : state_of(module, prefix))
+    file->tensors[e.name] = e.value->clone().cpu();
 }
 
 TensorFile to_file(Module& module, const std::string& prefix) {

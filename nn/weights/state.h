@@ -27,9 +27,9 @@ class StateError : public InputError {
   std::string details() const;
 };
 
-/// Copies the tensors of `file` whose names begin with `prefix` into the module, cast to its dtype, on its device.
-/// Strict: if a name is missing, unexpected, of another shape or holds NaN, StateError tells all
-/// and nothing is loaded. Names ending in num_batches_tracked are ignored.
+/// Copies the tensors of `file` whose names begin with `prefix` into the module, cast to its dtype,
+/// on its device. Strict: if a name is missing, unexpected, of another shape or holds NaN,
+/// StateError tells all and nothing is loaded. Names ending in num_batches_tracked are ignored.
 void load_state(Module& module, const TensorFile& file, const std::string& prefix,
                 const std::string& where);
 

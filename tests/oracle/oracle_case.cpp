@@ -99,9 +99,7 @@ class Case {
   void out(const std::vector<std::pair<std::string, Var>>& values) {
     for (const auto& [name, value] : values) put("out." + name, value.value);
   }
-  void index(const std::string& name, const Tensor& value) {
-    put("idx." + name, value);
-  }
+  void index(const std::string& name, const Tensor& value) { put("idx." + name, value); }
   /// The loss, its gradients, and the buffers after the call.
   void finish(const Var& loss) {
     out({{"loss", loss}});

@@ -84,8 +84,8 @@ void Muon::step(const Gradients& gradients, double rate, double scale) {
       const auto at = static_cast<int64_t>(i);
       return stack.rows(at, at + 1).reshape({rows, columns});
     };
-    const Tensor ahead = Tensor::zeros({std::ssize(moving), rows, columns}, group[0].m.dtype(),
-                                       group[0].m.device());
+    const Tensor ahead =
+        Tensor::zeros({std::ssize(moving), rows, columns}, group[0].m.dtype(), group[0].m.device());
     for (size_t i = 0; i < moving.size(); ++i) {
       const Tensor& g = *gradients.find(moving[i]->of.parameter->id);
       Tensor here = row(ahead, i);

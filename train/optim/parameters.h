@@ -19,7 +19,8 @@ struct NamedParameter {
 std::vector<NamedParameter> named_parameters(
     const std::vector<std::pair<std::string, Module*>>& modules);
 
-/// The saved state `name`, a copy on a device; InputError naming `where` if it is missing or of another size.
+/// The saved state `name`, a copy on a device; InputError naming `where` if it is missing or of
+/// another size.
 Tensor saved_state(const TensorFile& file, const std::string& name, const Shape& shape,
                    const std::string& where, Device device = {});
 

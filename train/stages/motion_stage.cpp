@@ -338,14 +338,13 @@ NamedValues MotionStage::validate() {
     const WindowBatch b = windows().validation.batch(i, std::min<int64_t>(16, n - i));
     const WindowBatch there = moved(b, device());
     MotionState forth, back, none;
-    const MotionOutput to_b =
-        model_->forward(ctx, motion_batch(there).seen(there.rest_b), &forth);
-    const MotionOutput to_a = on_host(
-        model_->forward(ctx, {to_b.joints, to_b.trans, there.rest_a, {}, {}}, &back));
+    const MotionOutput to_b = model_->forward(ctx, motion_batch(there).seen(there.rest_b), &forth);
+    const MotionOutput to_a =
+        on_host(model_->forward(ctx, {to_b.joints, to_b.trans, there.rest_a, {}, {}}, &back));
     const int64_t late = model_->latency(), t = b.joints_a.size(1);
     network.add(on_host(to_b), b, late);
-    closed_form.add(
-        ClosedFormMotion({}, {}).forward(ctx, motion_batch(b).seen(b.rest_b), &none), b, 0);
+    closed_form.add(ClosedFormMotion({}, {}).forward(ctx, motion_batch(b).seen(b.rest_b), &none), b,
+                    0);
     cycle += window_error(metrics::mean_distance, frames_of(to_a, 2 * late, t).joints.value,
                           first_frames(b.joints_a, t - 2 * late), metrics::Alignment::Mode::none);
   }

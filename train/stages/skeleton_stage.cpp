@@ -199,8 +199,7 @@ SkeletonErrors skeleton_errors(SkeletonModel& model, const CloudBatch& clouds, D
   const int64_t n = clouds.points.size(0), part = 16;
   for (int64_t i = 0; i < n; i += part) {
     const int64_t to = std::min(n, i + part);
-    const SkeletonAnswer out =
-        on_host(model.forward(ctx, clouds.points.rows(i, to).to(device)));
+    const SkeletonAnswer out = on_host(model.forward(ctx, clouds.points.rows(i, to).to(device)));
     const Tensor truth = clouds.joints.rows(i, to);
     joints += mean_distance(out.joints.value, truth) * static_cast<double>(to - i);
     gives_turns = out.turns.value.defined() && clouds.turns.defined();
@@ -248,7 +247,8 @@ double followed_error(SkeletonModel& model, const CloudBatch& clouds, int64_t fr
         f == 0 ? Tensor()
                : remembered(answer, rows_of(clouds.centres, before), rows_of(clouds.centres, rows));
     Context ctx;
-    answer = on_host(model.forward(ctx, {rows_of(clouds.points, rows).to(device), past.to(device)}));
+    answer =
+        on_host(model.forward(ctx, {rows_of(clouds.points, rows).to(device), past.to(device)}));
     sum += mean_distance(answer.joints.value, rows_of(clouds.joints, rows));
   }
   return sum / static_cast<double>(frames);
@@ -271,8 +271,9 @@ NamedValues SkeletonStage::validate() {
   put("one_camera_joint_error_mm", one_camera_);
   put("intruder_joint_error_mm", intruded_);
   if (followed_.points.defined())
-    out.push_back({"followed_joint_error_mm",
-                   1e3 * followed_error(*model_, followed_, static_cast<int64_t>(kFollowed), device())});
+    out.push_back(
+        {"followed_joint_error_mm",
+         1e3 * followed_error(*model_, followed_, static_cast<int64_t>(kFollowed), device())});
   if (turns) out.push_back({"turn_error_degrees", *turns});
   if (miscalibration) out.push_back({"miscalibration", *miscalibration});
   return out;
