@@ -126,7 +126,9 @@ void Retargeter::prepare(const std::string& weights_name) {
   if (auto* skeleton = models_.find_as<SkeletonModel>("skeleton"))
     extractor_.emplace(*skeleton, options_.samples);
   const TrainedModel& motion = models_.need("motion", weights_name);
-  motion_ = &models_.need_as<MotionModel>("motion", weights_name);
+  auto& network = models_.need_as<MotionModel>("motion", weights_name);
+  motion_ = &network;
+  motion_device_ = device_of(network);
   asked_.resize(static_cast<size_t>(motion_->latency()) + 1);
   const std::string translation =
       motion.setting("translation", {"velocity", "relative", "absolute"});
@@ -266,7 +268,8 @@ MotionOutput Retargeter::answer(const SeenJoints& seen, const Mat3& turn) {
   Context ctx;
   const Mat3 reframed = back * back_before_.value_or(back).transpose();
   back_before_ = back;
-  return motion_->forward(ctx, input_of(seen, back, moved, reframed, rest_tensor_), &state_);
+  const MotionInput in = input_of(seen, back, moved, reframed, rest_tensor_);
+  return on_host(motion_->forward(ctx, restage::moved(in, motion_device_), &state_));
 }
 
 /// What B does while A is as in `a`.

@@ -29,7 +29,8 @@ struct RetargetOptions {
   bool foot_lock = true;
 };
 
-/// Our chain of three networks.
+/// Our chain of three networks. Extractor and motion network work where they are (move_networks());
+/// the surface is the CPU's.
 class Retargeter final : public System {
  public:
   /// `weights` come from the file `weights_name` (for errors) and need at least a model for
@@ -80,6 +81,7 @@ class Retargeter final : public System {
   RetargetOptions options_;
   std::optional<JointExtractor> extractor_;
   const MotionModel* motion_ = nullptr;
+  Device motion_device_;
   Joints rest_;
   std::optional<Surface> surface_;
   std::optional<SystemRig> rig_;

@@ -72,6 +72,11 @@ void move_module(Module& module, Device device) {
   for (const StateEntry& e : state_of(module)) *e.value = e.value->to(device);
 }
 
+Device device_of(Module& module) {
+  const std::vector<StateEntry> entries = state_of(module);
+  return entries.empty() ? Device{} : entries.front().value->device();
+}
+
 Tensor Init::uniform(const Shape& shape, double bound, const std::string& name) const {
   if (budget != nullptr) {
     *budget -= shape.numel();

@@ -96,6 +96,8 @@ void name_scopes(Module& root, const std::string& name);
 void cast_module(Module& module, DType type);
 /// Takes every parameter and buffer to a device.
 void move_module(Module& module, Device device);
+/// Where they are; the CPU's of a module that has none.
+Device device_of(Module& module);
 
 /// PyTorch's default start: uniform in +-1/sqrt(fan_in) (spec 7), from a named stream.
 struct Init {

@@ -8,6 +8,8 @@
 #include <optional>
 
 #include "autograd/base/log.h"
+#include "autograd/base/parallel.h"
+#include "autograd/base/thread_groups.h"
 
 namespace restage {
 namespace {
@@ -158,6 +160,10 @@ class Row {
     for (const StateEntry& entry : entries_) width_ += static_cast<size_t>(entry.value->numel());
   }
   size_t width() const { return width_; }
+  bool has_buffers() const {
+    return std::any_of(entries_.begin(), entries_.end(),
+                       [](const StateEntry& entry) { return entry.parameter == nullptr; });
+  }
 
   std::vector<float> of(const Gradients& gradients) const {
     std::vector<float> out;
@@ -192,6 +198,11 @@ class Row {
 
 }  // namespace
 
+/// Micro-batches whose networks have batch norm change them, and take turns; so do a GPU's.
+bool Stage::side_by_side() const {
+  return buffers_change_ && !*buffers_change_ && device_ == Device{} && threads() > 1;
+}
+
 Differentiated Stage::parts(const std::function<Differentiated(const MicroBatch&)>& compute) {
   if (micro_batches_ == 1) return compute({});
   const std::vector<StateEntry> all = state();
@@ -206,19 +217,34 @@ Differentiated Stage::parts(const std::function<Differentiated(const MicroBatch&
   std::optional<Row> row;
   std::unique_ptr<Team::Sum> sum;
   std::vector<std::vector<double>> mine;
-  for (int64_t i = team_->rank(); i < micro_batches_; i += team_->size()) {
-    for (const auto& [buffer, value] : before) *buffer = began[buffer] = value.clone();
-    const Differentiated d = compute({i, micro_batches_});
+  const auto give = [&](const Differentiated& d) {
     if (!row) {
       std::vector<StateEntry> those;
       std::copy_if(all.begin(), all.end(), std::back_inserter(those),
                    [&](const StateEntry& entry) { return belongs(entry, d.gradients); });
       row.emplace(std::move(those));
       sum = team_->sum(row->width());
+      buffers_change_ = buffers_change_.value_or(false) || row->has_buffers();
     }
     sum->give(row->of(d.gradients));
     mine.push_back(d.values);
     mine.back().push_back(d.loss);
+  };
+  const auto number = [&](int64_t k) {
+    return MicroBatch{team_->rank() + k * team_->size(), micro_batches_};
+  };
+  const int64_t own = micro_batches_ / team_->size();
+  if (side_by_side()) {
+    std::vector<Differentiated> done(static_cast<size_t>(own));
+    in_groups(own, threads(),
+              [&](int64_t k) { done[static_cast<size_t>(k)] = compute(number(k)); });
+    for (const auto& [buffer, value] : before) began[buffer] = value;  // nobody changes them
+    for (const Differentiated& d : done) give(d);
+  } else {
+    for (int64_t k = 0; k < own; ++k) {
+      for (const auto& [buffer, value] : before) *buffer = began[buffer] = value.clone();
+      give(compute(number(k)));
+    }
   }
   const double share = 1.0 / static_cast<double>(micro_batches_);
   Differentiated out;

@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -124,7 +125,8 @@ class Stage {
   Device device() const { return device_; }
   int64_t micro_batches() const { return micro_batches_; }
   /// The mean of what `compute` gives for each micro-batch of a step; those of other processes
-  /// come from there.
+  /// come from there. Micro-batches that change nothing but their own gradients are computed side
+  /// by side on groups of threads, so `compute` may be called by several at once.
   Differentiated parts(const std::function<Differentiated(const MicroBatch&)>& compute);
 
   /// The step whose examples are drawn in this one.
@@ -145,8 +147,12 @@ class Stage {
   /// All networks, under the names of a checkpoint.
   std::vector<StateEntry> state() const;
 
+  bool side_by_side() const;
+
   std::string name_;
   Device device_;
+  std::optional<bool>
+      buffers_change_;  ///< by any micro-batch so far; nobody knows before the first
   int64_t repeated_ = 0, micro_batches_ = 1;
   Team* team_ = &alone();
   bool started_from_weights_ = false;

@@ -6,8 +6,13 @@
 
 #include <algorithm>
 #include <atomic>
+#include <exception>
 #include <memory>
 #include <mutex>
+#include <utility>
+#include <vector>
+
+#include "autograd/base/thread_groups.h"
 
 namespace restage {
 namespace {
@@ -15,6 +20,13 @@ std::unique_ptr<tbb::global_control> limit;
 std::unique_ptr<tbb::task_arena> arena;
 std::mutex limit_mutex;
 int requested = 0;
+
+/// The threads of a group, where one works.
+struct GroupOfThreads {
+  tbb::task_arena* arena;
+  int size;
+};
+thread_local const GroupOfThreads* group = nullptr;
 
 // ThreadSanitizer cannot see how oneTBB, which is not compiled for it, hands work out and waits for
 // it. Two marks tell it: every piece comes after the fork, the join after every piece. No piece
@@ -33,6 +45,19 @@ void see(char) {}
 #endif
 }  // namespace
 
+namespace {
+/// On the threads that there are to be.
+template <class F>
+void run_all(const F& work) {
+  if (group != nullptr)
+    group->arena->execute(work);
+  else if (arena)
+    arena->execute(work);
+  else
+    work();
+}
+}  // namespace
+
 void set_threads(int n) {
   const std::lock_guard lock(limit_mutex);
   requested = n;
@@ -45,14 +70,17 @@ void set_threads(int n) {
   arena = std::make_unique<tbb::task_arena>(n);
 }
 
-int threads() { return requested > 0 ? requested : tbb::this_task_arena::max_concurrency(); }
+int threads() {
+  if (group != nullptr) return group->size;
+  return requested > 0 ? requested : tbb::this_task_arena::max_concurrency();
+}
 
 void parallel_for(int64_t n, int64_t grain, PieceRef body) {
   if (n <= 0) return;
   grain = std::max<int64_t>(1, grain);
   const int64_t pieces = (n + grain - 1) / grain;
   const auto piece = [&](int64_t i) { body(i * grain, std::min(n, (i + 1) * grain)); };
-  if (pieces == 1 || requested == 1) {
+  if (pieces == 1 || (group != nullptr ? group->size : requested) == 1) {
     for (int64_t i = 0; i < pieces; ++i) piece(i);
     return;
   }
@@ -67,12 +95,37 @@ void parallel_for(int64_t n, int64_t grain, PieceRef body) {
   const int64_t takers = std::min<int64_t>(pieces, threads());
   const auto work = [&] { tbb::parallel_for(int64_t{0}, takers, take, tbb::simple_partitioner()); };
   leave(forked);
-  if (arena) {
-    arena->execute(work);
-  } else {
-    work();
-  }
+  run_all(work);
   see(joined);
+}
+
+void in_groups(int64_t n, int groups, const std::function<void(int64_t)>& body) {
+  const int all = threads();
+  groups = static_cast<int>(std::clamp<int64_t>(groups, 1, std::min<int64_t>(all, n)));
+  if (groups <= 1) {
+    for (int64_t i = 0; i < n; ++i) body(i);
+    return;
+  }
+  std::vector<std::exception_ptr> failed(static_cast<size_t>(groups));
+  const auto of_group = [&](int g) {
+    see(forked);
+    const int size = all / groups + (g < all % groups ? 1 : 0);
+    tbb::task_arena own(size);  // whoever waits in it takes no other group's work
+    const GroupOfThreads threads_of_it{&own, size};
+    const GroupOfThreads* outer = std::exchange(group, &threads_of_it);
+    try {
+      for (int64_t i = g; i < n; i += groups) body(i);
+    } catch (...) {
+      failed[static_cast<size_t>(g)] = std::current_exception();
+    }
+    group = outer;
+    leave(joined);
+  };
+  leave(forked);
+  run_all([&] { tbb::parallel_for(0, groups, of_group, tbb::simple_partitioner()); });
+  see(joined);
+  for (const std::exception_ptr& e : failed)
+    if (e) std::rethrow_exception(e);
 }
 
 }  // namespace restage

@@ -8,6 +8,7 @@
 #include "autograd/base/format.h"
 #include "autograd/base/log.h"
 #include "autograd/base/output_check.h"
+#include "autograd/kernels/kernel.h"
 #include "datasets/doctor/examine.h"
 #include "datasets/importers/gltf_character.h"
 #include "datasets/readers/frame_folder.h"
@@ -25,7 +26,7 @@ namespace restage::cli {
 namespace {
 
 struct RetargetCommand {
-  std::string source, target, weights, out, clip, up = "y", format = "ply";
+  std::string source, target, weights, out, clip, up = "y", format = "ply", device = "cpu";
   std::string system = "chain", rest;
   std::optional<double> fps;        ///< of the source
   std::optional<int64_t> sequence;  ///< of the source, from 0
@@ -175,6 +176,7 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
     input.weights = load_bundle(c.weights);
     for (const char* role : {"skeleton", "motion", "deformation.weights"})
       if (system_type(c.system).weights) input.weights.need(role, input.weights_name);
+    move_networks(input.weights, {"skeleton", "motion"}, device_of(c.device));
   }
   const auto frames = open_frames(c.source, {c.clip, common.max_memory, c.sequence});
   if (!c.sequence && frames->sequences() > 1)
@@ -291,6 +293,8 @@ void add_retarget(Program& program) {
   app.add_option("--source-up", c.up, "the source's up axis, y or z");
   app.add_option("--scale", c.scale, "the source's units in metres");
   app.add_option("--format", c.format, "of a folder's frames: ply or obj");
+  app.add_option("--device", c.device,
+                 "where extractor and motion network run: cpu, or cuda in a program built for it");
   app.add_option("--samples", c.options.samples,
                  "views of a cloud to average: choices of its points, turned and mirrored");
   app.add_option("--anchor", c.options.anchor,

@@ -4,6 +4,7 @@
 
 #include "autograd/base/format.h"
 #include "autograd/base/output_check.h"
+#include "autograd/kernels/kernel.h"
 #include "datasets/readers/frame_folder.h"
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
@@ -15,7 +16,7 @@ namespace restage::cli {
 namespace {
 
 struct SkeletonOptions {
-  std::string weights, input, out;
+  std::string weights, input, out, device = "cpu";
   int samples = 1;
 };
 
@@ -63,6 +64,7 @@ int run_skeleton(const SkeletonOptions& options, const Common& common) {
   check_output(options.out, inputs_of(options));
   const Bundle models = load_bundle(options.weights);
   auto& model = models.need_as<SkeletonModel>("skeleton", weights_path(options.weights));
+  move_module(model, device_of(options.device));
   const auto frames = open_frames(options.input, {"", common.max_memory});
   std::unique_ptr<PredictionWriter> writer;
   if (!options.out.empty())
@@ -107,6 +109,8 @@ void add_skeleton(Program& program) {
   app.add_option("--input", options.input, "cloud, folder of clouds, or HDF5 file of scans")
       ->required();
   app.add_option("--out", options.out, "HDF5 file for the joints");
+  app.add_option("--device", options.device,
+                 "where the network runs: cpu, or cuda in a program built for it");
   app.add_option("--samples", options.samples,
                  "views of a cloud to average: choices of its points, turned and mirrored");
 }

@@ -18,6 +18,7 @@ bool mirrored(size_t view) { return view % 2 == 1; }
 
 JointExtractor::JointExtractor(SkeletonModel& model, int samples, double around)
     : model_(model),
+      device_(device_of(model)),
       around_(around),
       centres_(static_cast<size_t>(samples)),
       views_(static_cast<size_t>(samples)) {}
@@ -77,8 +78,9 @@ SeenJoints JointExtractor::operator()(const Points& cloud, const std::string& so
     }
   }
   Context ctx;
-  const SkeletonOutput answer =
-      model_.forward(ctx, {batch, before != nullptr ? past(*before) : Tensor()});
+  const Tensor remembered = before != nullptr ? past(*before) : Tensor();
+  const SkeletonAnswer answer =
+      on_host(model_.forward(ctx, {batch.to(device_), remembered.to(device_)}));
   read(answer);
   if (before != nullptr) keep_sides(*before, &views_);
   SeenJoints out = combined(views_, answer.turns.value.defined(),
@@ -107,7 +109,7 @@ Tensor JointExtractor::past(const SeenJoints& before) const {
 }
 
 /// Every view's answer, turned and mirrored back.
-void JointExtractor::read(const SkeletonOutput& answer) {
+void JointExtractor::read(const SkeletonAnswer& answer) {
   const Tensor &joints = answer.joints.value, &turns = answer.turns.value,
                &uncertainty = answer.uncertainty.value;
   for (size_t s = 0; s < views_.size(); ++s) {

@@ -35,9 +35,10 @@ class JointExtractor {
   void choose(const RngKey& key);
   double heading(size_t view) const;
   Tensor past(const SeenJoints& before) const;
-  void read(const SkeletonOutput& answer);
+  void read(const SkeletonAnswer& answer);
 
   SkeletonModel& model_;
+  Device device_;  // the model's
   double around_;
   Points sorted_, chosen_;
   std::vector<Vec3> centres_;

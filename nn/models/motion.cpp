@@ -23,6 +23,12 @@ std::span<const SwingJoint> joint_swings() {
   return table;
 }
 
+MotionInput moved(MotionInput in, Device device) {
+  for (Var* x : {&in.joints, &in.trans, &in.rest}) x->value = x->value.to(device);
+  for (Tensor* x : {&in.turns, &in.uncertainty, &in.reframed}) *x = x->to(device);
+  return in;
+}
+
 MotionOutput on_host(const MotionOutput& out) {
   return {out.raw.value.cpu(), out.rotations.value.cpu(), out.joints.value.cpu(),
           out.trans.value.cpu(), out.standing.value.cpu()};

@@ -51,6 +51,8 @@ struct MotionModel : Module {
   virtual void standardise(const MotionStatistics& statistics) = 0;
 };
 
+/// What is seen, on a device.
+MotionInput moved(MotionInput in, Device device);
 /// The answer as constants in the host's memory.
 MotionOutput on_host(const MotionOutput& out);
 /// Frames [from, to) of an answer.

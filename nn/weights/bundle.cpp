@@ -155,6 +155,11 @@ TrainedModel model_of(const std::string& place, const Json& entry, const TensorF
 
 }  // namespace
 
+void move_networks(const Bundle& bundle, const std::vector<std::string>& roles, Device device) {
+  for (const std::string& role : roles)
+    if (const TrainedModel* model = bundle.find(role)) move_module(*model->net, device);
+}
+
 std::string prefix_of(const std::string& role) { return (role == "motion" ? "smrm" : role) + "."; }
 
 std::string TrainedModel::setting(const std::string& name,

@@ -70,6 +70,9 @@ class Bundle {
   std::map<std::string, TrainedModel> by_role_;
 };
 
+/// Takes the networks of some roles to a device, for all who share them.
+void move_networks(const Bundle& bundle, const std::vector<std::string>& roles, Device device);
+
 /// The prefix of a role's tensors in a weights file.
 std::string prefix_of(const std::string& role);
 

@@ -12,6 +12,7 @@
 #include "autograd/base/inline_vector.h"
 #include "autograd/base/output_check.h"
 #include "autograd/base/rng.h"
+#include "autograd/base/thread_groups.h"
 #include "tests/support/files.h"
 #include "tests/support/lacking.h"
 #include "tests/support/use_set.h"
@@ -181,6 +182,39 @@ TEST(ParallelFor, NestsAndPassesErrorsOn) {
                               if (from == 57) throw WorkError("piece 57");
                             }),
                WorkError);
+}
+
+TEST(ThreadGroups, ShareTheThreadsAndTakeEveryItemOnce) {
+  for (const int all : {1, 2, 5}) {
+    const testing::UseThreads use(all);
+    for (const int groups : {1, 2, 9}) {
+      std::vector<std::atomic<int>> hits(7);
+      std::atomic<int64_t> inner{0};
+      in_groups(7, groups, [&](int64_t i) {
+        ++hits[static_cast<size_t>(i)];
+        const int own = threads(), many = std::min(groups, all);
+        EXPECT_GE(own, all / many);
+        EXPECT_LE(own, (all + many - 1) / many);
+        parallel_for(100, 1, [&](int64_t from, int64_t to) { inner += to - from; });
+      });
+      EXPECT_EQ(inner, 700);
+      for (const auto& h : hits) ASSERT_EQ(h, 1);
+      EXPECT_EQ(threads(), all) << "outside of a group nothing has changed";
+    }
+  }
+  in_groups(0, 3, [](int64_t) { FAIL(); });
+}
+
+TEST(ThreadGroups, PassErrorsOn) {
+  const testing::UseThreads use(2);
+  std::atomic<int> done{0};
+  EXPECT_THROW(in_groups(4, 2,
+                         [&](int64_t i) {
+                           if (i == 1) throw WorkError("item 1");
+                           ++done;
+                         }),
+               WorkError);
+  EXPECT_EQ(done, 2) << "the other group goes on to its end";
 }
 
 TEST(Random, PhiloxGivesThePublishedNumbers) {

@@ -7,6 +7,7 @@
 
 #include "autograd/ops/elementwise.h"
 #include "tests/support/errors.h"
+#include "tests/support/fake_device.h"
 #include "tests/support/small_models.h"
 #include "tests/support/tiny_body.h"
 
@@ -475,6 +476,28 @@ TEST(InferRetargeter, CloudsGoThroughTheExtractor) {
     EXPECT_EQ(*a.source_joints(), *b.source_joints());
   }
   EXPECT_THROW(a.push(Points(3, Point(0, 0, 0)), "f1.ply"), InputError);
+}
+
+TEST(Retargeter, NetworksOnAnotherDeviceAnswerAlike) {
+  const auto frames = [](Device device) {
+    const Bundle models = testing::untrained_bundle("smrm/hybrid", {"hidden=16", "contact=true"});
+    move_networks(models, {"skeleton", "motion"}, device);
+    Retargeter r(models, "w", target().rest, target().joints, {.samples = 2});
+    std::vector<RetargetedFrame> out;
+    for (int f = 0; f < 3; ++f) {
+      Points cloud = surface_points(target().rest, 300, RngKey{3, static_cast<uint64_t>(f)});
+      for (const RetargetedFrame& frame : r.push(cloud, "cloud")) out.push_back(frame);
+    }
+    return out;
+  };
+  const int64_t before = fake_counts().kernels;
+  const auto here = frames(Device{}), there = frames(fake_device());
+  EXPECT_GT(fake_counts().kernels, before);
+  ASSERT_EQ(here.size(), there.size());
+  for (size_t f = 0; f < here.size(); ++f) {
+    EXPECT_EQ(here[f].joints, there[f].joints);
+    EXPECT_EQ(here[f].vertices, there[f].vertices);
+  }
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <thread>
 
+#include "autograd/base/parallel.h"
 #include "tests/support/errors.h"
 #include "tests/train/tiny_training.h"
 #include "train/team.h"
@@ -137,6 +138,21 @@ TEST(Team, HowManyShareAStepChangesNoBit) {
     // Dropout and statistics are of a micro-batch, so another number of them is another training.
     EXPECT_FALSE(trained(name, everything(), 2, 1)[0] == one) << name;
   }
+}
+
+TEST(Team, GroupsOfThreadsChangeNoBit) {
+  TrainConfig c = everything();  // whose skeleton has batch norm, and takes turns
+  motion(c).weights.adversarial = 0;
+  const int before = threads();
+  for (const std::string name : {"skeleton", "motion", "deformation", "root"}) {
+    set_threads(1);
+    const std::string one = trained(name, c, 4, 1)[0];
+    for (const int n : {2, 3, 8}) {
+      set_threads(n);
+      EXPECT_TRUE(trained(name, c, 4, 1)[0] == one) << name << ", " << n << " threads";
+    }
+  }
+  set_threads(before);
 }
 
 TEST(Team, MicroBatchesAddUpToTheStep) {

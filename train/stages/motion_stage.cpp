@@ -295,7 +295,9 @@ NamedValues MotionStage::step(int64_t step) {
   const OptimiserConfig& o = config_.optimiser;
   const double rate = learning_rate(o.schedule, step, o.steps);
   std::map<int64_t, Batch> drawn;  // two rounds may ask for the same
+  std::mutex several_ask;
   const Drawn batch_of = [&](const MicroBatch& part) -> const Batch& {
+    const std::lock_guard lock(several_ask);
     const auto [at, fresh] = drawn.try_emplace(part.index);
     if (fresh) {
       at->second = batch(step, part);
