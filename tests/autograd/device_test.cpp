@@ -17,6 +17,7 @@
 #include "tests/support/emulated_gpu.h"
 #include "tests/support/errors.h"
 #include "tests/support/fake_device.h"
+#include "tests/support/gpu.h"
 
 namespace restage {
 namespace {
@@ -106,6 +107,14 @@ TEST_P(DeviceOps, PassTheHarnessWithTheKernelsOfTheGpu) {
   const gradcheck::Report r = check(all_samples()[GetParam()], 4, emulated_gpu());
   EXPECT_TRUE(r.ok()) << r.text();
   EXPECT_GT(emulated_counts().kernels, before);
+}
+
+TEST(DeviceGpu, EveryOpPassesTheHarness) {
+  RESTAGE_GPU_OR_SKIP(gpu);
+  for (const gradcheck::OpSamples& op : all_samples()) {
+    const gradcheck::Report r = check(op, 4, gpu);
+    EXPECT_TRUE(r.ok()) << r.text();
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(All, DeviceOps, testing::Range(size_t{0}, all_samples().size()),

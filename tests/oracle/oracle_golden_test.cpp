@@ -18,6 +18,7 @@
 #include "tests/support/emulated_gpu.h"
 #include "tests/support/expect_near.h"
 #include "tests/support/fake_device.h"
+#include "tests/support/gpu.h"
 
 namespace restage::oracle {
 namespace {
@@ -70,6 +71,18 @@ TEST_P(OracleGolden, AgreesWithTheKernelsOfTheGpu) {
 
 INSTANTIATE_TEST_SUITE_P(Cases, OracleGolden, testing::ValuesIn(cases()),
                          [](const auto& param) { return param.param; });
+
+TEST(DeviceGpu, AgreesWithTheOracle) {
+  RESTAGE_GPU_OR_SKIP(gpu);
+  for (const std::string& name : cases()) {
+    const std::string path = folder() + name + ".safetensors";
+    const TensorFile question = read_safetensors(path);
+    const bool f64 = question.metadata.at("dtype") == "f64";
+    const std::vector<Difference> found =
+        differences(question, answer(question, path, gpu), f64 ? 1e-8 : 1e-4);
+    EXPECT_TRUE(found.empty()) << name << "\n" << report(found);
+  }
+}
 
 TEST(OracleMeasure, AllCasesArePresent) { EXPECT_EQ(cases().size(), 42u); }
 

@@ -6,6 +6,7 @@
 
 #include "tests/support/emulated_gpu.h"
 #include "tests/support/fake_device.h"
+#include "tests/support/gpu.h"
 #include "tests/train/tiny_training.h"
 
 namespace restage {
@@ -102,11 +103,8 @@ TEST(DeviceStages, TheHybridOnWhatAnExtractorAnswers) {
 
 /// What two devices that round in other ways come to: the same step, and from there not quite the
 /// same training, since Adam's first steps go by the sign of gradients that may be next to nothing.
-void expect_alike(const std::string& name, const TrainConfig& config) {
-  const Outcome here = trained(Device{}, name, config);
-  const int64_t before = emulated_counts().kernels;
-  const Outcome there = trained(emulated_gpu(), name, config);
-  EXPECT_GT(emulated_counts().kernels, before + 100) << name;
+void expect_alike(const std::string& name, const TrainConfig& config, Device device) {
+  const Outcome here = trained(Device{}, name, config), there = trained(device, name, config);
   ASSERT_EQ(here.logged.size(), there.logged.size());
   for (size_t i = 0; i < here.logged.size(); ++i) {
     const double value = here.logged[i].second, share = i < here.logged.size() / 5 ? 1e-3 : 0.1;
@@ -120,13 +118,28 @@ void expect_alike(const std::string& name, const TrainConfig& config) {
         << name << " " << here.judged[i].first;
 }
 
-TEST(DeviceStages, TheKernelsOfTheGpuTrainAlike) {
+TrainConfig papers_networks() {
   TrainConfig c = tiny_training(6);
   skeleton(c).clouds.remembered = 0;
   choose(skeleton(c).model, "skeleton/point_transformer",
          {"points=64", "neighbours=4", "width=32", "layers=2"});
+  return c;
+}
+
+TEST(DeviceStages, TheKernelsOfTheGpuTrainAlike) {
+  const int64_t before = emulated_counts().kernels;
   for (const std::string name : {"skeleton", "motion", "deformation", "root"})
-    expect_alike(name, c);
+    expect_alike(name, papers_networks(), emulated_gpu());
+  EXPECT_GT(emulated_counts().kernels, before + 1000);
+}
+
+TEST(DeviceGpu, StagesTrainAlikeAndRepeatTheirBits) {
+  RESTAGE_GPU_OR_SKIP(gpu);
+  for (const std::string name : {"skeleton", "motion", "deformation", "root"}) {
+    expect_alike(name, papers_networks(), gpu);
+    const Outcome once = trained(gpu, name, papers_networks());
+    EXPECT_TRUE(once.bytes == trained(gpu, name, papers_networks()).bytes) << name;
+  }
 }
 
 TEST(DeviceStages, BonesAndMicroBatches) {
