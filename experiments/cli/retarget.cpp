@@ -270,6 +270,7 @@ void add_retarget(Program& program) {
       "restage retarget --source s.h5 --target a.ply --weights w --out r.h5 --every 3 --samples 8\n"
       "restage retarget --source s.h5 --target a.ply --weights w --out r.h5 --force --profile\n"
       "restage retarget --source s.h5 --target a.ply --weights w --out r.h5 --min-confidence 0.5\n"
+      "restage retarget --source s.h5 --target a.ply --weights w --out r.h5 --device cuda\n"
       "restage retarget --source s.h5 --target a.ply --weights w --out r.h5 --anchor 0 "
       "--no-foot-lock\n"
       "restage retarget --source scans.h5 --target hero.ply --system register --rest rest.h5 "

@@ -103,7 +103,8 @@ void add_skeleton(Program& program) {
       program.add("skeleton", "the 22 joints of clouds",
                   "restage skeleton --weights w.safetensors --input scan.ply --json\n"
                   "restage skeleton --weights w.safetensors --input scans/ --out joints.h5\n"
-                  "restage skeleton --weights w.safetensors --input scan.ply --samples 8",
+                  "restage skeleton --weights w.safetensors --input scan.ply --samples 8\n"
+                  "restage skeleton --weights w.safetensors --input scans/ --device cuda",
                   run_skeleton);
   app.add_option("--weights", options.weights, "weights file or run directory")->required();
   app.add_option("--input", options.input, "cloud, folder of clouds, or HDF5 file of scans")

@@ -230,6 +230,12 @@ class Resume(Train):
         self.assertEqual(self.weights_of(run), self.weights_of(whole))
         self.assertEqual(self.bytes(run + "/metrics.jsonl"), self.bytes(whole + "/metrics.jsonl"))
 
+    def test_a_device_that_is_not_there_is_refused(self):
+        before = sorted(os.listdir(self.path(".")))
+        for device, why in (("cuda", "cuda is not in this program"), ("abacus", "'abacus' is none")):
+            self.one_line(self.restage("train", "tiny.yaml", "device=" + device), 2, "device", why, "take one of: cpu")
+        self.assertEqual(sorted(os.listdir(self.path("."))), before)
+
     def test_precision_is_kept(self):
         plain = self.train("tiny.yaml", "stages=[skeleton]")
         self.assertIn("precision: float32\n", self.bytes(plain + "/config.yaml").decode())
