@@ -235,11 +235,14 @@ Differentiated Stage::parts(const std::function<Differentiated(const MicroBatch&
   };
   const int64_t own = micro_batches_ / team_->size();
   if (side_by_side()) {
-    std::vector<Differentiated> done(static_cast<size_t>(own));
-    in_groups(own, threads(),
-              [&](int64_t k) { done[static_cast<size_t>(k)] = compute(number(k)); });
     for (const auto& [buffer, value] : before) began[buffer] = value;  // nobody changes them
-    for (const Differentiated& d : done) give(d);
+    const int64_t at_once = std::min<int64_t>(own, threads());
+    for (int64_t from = 0; from < own; from += at_once) {  // gradients travel in the meantime
+      std::vector<Differentiated> done(static_cast<size_t>(std::min(at_once, own - from)));
+      in_groups(std::ssize(done), threads(),
+                [&](int64_t k) { done[static_cast<size_t>(k)] = compute(number(from + k)); });
+      for (const Differentiated& d : done) give(d);
+    }
   } else {
     for (int64_t k = 0; k < own; ++k) {
       for (const auto& [buffer, value] : before) *buffer = began[buffer] = value.clone();
