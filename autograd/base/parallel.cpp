@@ -100,6 +100,7 @@ void parallel_for(int64_t n, int64_t grain, PieceRef body) {
 }
 
 void in_groups(int64_t n, int groups, const std::function<void(int64_t)>& body) {
+  if (n <= 0) return;
   const int all = threads();
   groups = static_cast<int>(std::clamp<int64_t>(groups, 1, std::min<int64_t>(all, n)));
   if (groups <= 1) {
