@@ -8,10 +8,6 @@ namespace {
 
 constexpr double kLost = 1;  // metres that nobody moves from one frame to the next
 
-bool before(const Point& a, const Point& b) {
-  return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
-}
-
 bool mirrored(size_t view) { return view % 2 == 1; }
 
 }  // namespace
@@ -28,42 +24,27 @@ double JointExtractor::heading(size_t view) const {
   return around_ * ((static_cast<double>(pair) + 0.5) / static_cast<double>(pairs) - 0.5);
 }
 
-void JointExtractor::sort(const Points& cloud, const std::string& source) {
+void JointExtractor::arrange(const Points& cloud, const std::string& source) {
   for (const Point& p : cloud)
     if (!p.allFinite())
       throw InputError(source, "holds a coordinate that is not finite", "remove such points");
-  sorted_ = cloud;
-  std::sort(sorted_.begin(), sorted_.end(), before);
-  sorted_.erase(std::unique(sorted_.begin(), sorted_.end()), sorted_.end());
-  if (sorted_.size() < kLeastDistinctPoints)
+  points_.arrange(cloud);
+  if (points_.size() < kLeastDistinctPoints)
     throw InputError(
-        source, "holds " + std::to_string(sorted_.size()) + " distinct points, too few for a body",
+        source, "holds " + std::to_string(points_.size()) + " distinct points, too few for a body",
         "give at least " + std::to_string(kLeastDistinctPoints) + ", better a thousand");
-}
-
-/// Exactly as many of the sorted points as the model takes: a random subset, or all of them and
-/// random repetitions; sorted.
-void JointExtractor::choose(const RngKey& key) {
-  const auto n = static_cast<size_t>(model_.points());
-  chosen_ = sorted_;
-  Rng rng(key);
-  if (chosen_.size() > n) {
-    for (size_t i = 0; i < n; ++i)
-      std::swap(chosen_[i], chosen_[i + rng.below(chosen_.size() - i)]);
-    chosen_.resize(n);
-  }
-  while (chosen_.size() < n) chosen_.push_back(sorted_[rng.below(sorted_.size())]);
-  std::sort(chosen_.begin(), chosen_.end(), before);
 }
 
 SeenJoints JointExtractor::operator()(const Points& cloud, const std::string& source,
                                       const RngKey& key, const SeenJoints* before) {
-  sort(cloud, source);
+  arrange(cloud, source);
   const auto n = static_cast<size_t>(model_.points());
   const size_t views = centres_.size();
   Tensor batch = Tensor::empty({static_cast<int64_t>(views), static_cast<int64_t>(n), 3});
+  const double start = Rng(key).uniform();
   for (size_t s = 0; s < views; ++s) {
-    choose(key.fold(s));
+    const double offset = start + static_cast<double>(s) / static_cast<double>(views);
+    points_.choose(n, offset - std::floor(offset), &chosen_);
     Vec3& centre = centres_[s];
     centre.setZero();
     for (const Point& p : chosen_) centre += p.cast<double>();

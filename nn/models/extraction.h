@@ -4,6 +4,7 @@
 
 #include "autograd/base/rng.h"
 #include "nn/geometry/body.h"
+#include "nn/models/even_points.h"
 #include "nn/models/skeleton.h"
 #include "nn/models/views.h"
 
@@ -18,12 +19,13 @@ inline constexpr double kRestPoses = 0.7;  ///< of a target, which faces +z
 /// The 22 joints of clouds. Keeps its working memory between clouds.
 class JointExtractor {
  public:
-  /// `samples` > 1 takes several views of a cloud, each a random choice of its points, turned about
-  /// y by another part of `around`, every second one mirrored. An extractor errs differently on
-  /// each; their answers are combined() (docs/method.md, "Views").
+  /// `samples` > 1 takes several views of a cloud, each of other points of it, turned about y by
+  /// another part of `around`, every second one mirrored. An extractor errs differently on each;
+  /// their answers are combined() (docs/method.md, "Views").
   explicit JointExtractor(SkeletonModel& model, int samples = 1, double around = kAllAround);
-  /// Metres, in the cloud's frame. Points are sorted lexicographically first and exact repeats
-  /// left out, so neither their order in a file nor pixels without depth matter to the last bit.
+  /// Metres, in the cloud's frame. Points are sorted first and exact repeats left out, so neither
+  /// their order in a file nor pixels without depth matter to the last bit. `key` says where the
+  /// choices of points begin.
   /// `before`: the answer to the frame before, in the same frame; null where there was none. It is
   /// forgotten where the cloud is more than a metre from it.
   /// InputError naming `source`: fewer than 64 distinct points, values that are not finite.
@@ -31,8 +33,7 @@ class JointExtractor {
                         const SeenJoints* before = nullptr);
 
  private:
-  void sort(const Points& cloud, const std::string& source);
-  void choose(const RngKey& key);
+  void arrange(const Points& cloud, const std::string& source);
   double heading(size_t view) const;
   Tensor past(const SeenJoints& before) const;
   void read(const SkeletonAnswer& answer);
@@ -40,7 +41,8 @@ class JointExtractor {
   SkeletonModel& model_;
   Device device_;  // the model's
   double around_;
-  Points sorted_, chosen_;
+  EvenPoints points_;
+  Points chosen_;
   std::vector<Vec3> centres_;
   std::vector<View> views_;
   std::vector<double> values_;  // one coordinate of each
