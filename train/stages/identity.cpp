@@ -4,6 +4,9 @@
 #include <nlohmann/json.hpp>
 
 #include "datasets/readers/sha256.h"
+#include "nn/weights/bundle.h"
+#include "nn/weights/safetensors.h"
+#include "train/stages/registry.h"
 
 namespace restage {
 namespace {
@@ -64,13 +67,20 @@ std::string Identities::weights(const std::string& path) {
   return known;
 }
 
+std::string Identities::networks(const std::string& stage, const std::string& path) {
+  std::string& known = seen_[stage + " of " + path];
+  if (known.empty())
+    known = sha256(safetensors_bytes(to_file(networks_of(stage_type(stage), path))));
+  return known;
+}
+
 std::vector<StageId> Identities::stages(const TrainConfig& config) {
   std::vector<StageId> out;
   std::map<std::string, std::string> left;  // what a later stage would read
   for (const std::string& name : config.stages) {
     const StageSection& section = config.section(name);
     if (section.from) {
-      left[name] = weights(*section.from);
+      left[name] = networks(name, *section.from);
       continue;
     }
     Json json = {{"behaviour", kBehaviour},
@@ -110,7 +120,7 @@ std::string Identities::trial(const TrainConfig& config,
                {"stages", config.stages}, {"more", more}};
   for (const StageId& stage : stages(config)) json["artifacts"][stage.stage] = stage.id;
   for (const std::string& name : config.stages)
-    if (const auto& from = config.section(name).from) json["from"][name] = weights(*from);
+    if (const auto& from = config.section(name).from) json["from"][name] = networks(name, *from);
   return short_id(json.dump());
 }
 

@@ -35,6 +35,8 @@ class Identities {
   std::string data(const CorpusSource& source);
   /// Of a weights file, run or artifact: its bytes.
   std::string weights(const std::string& path);
+  /// Of a stage's networks in such a file: what else the file holds does not matter.
+  std::string networks(const std::string& stage, const std::string& path);
   /// The stages that `config` trains, in order; those taken `from` elsewhere have none.
   std::vector<StageId> stages(const TrainConfig& config);
   /// Of all that determines what `config` trains; `more` is what else determines a result, such as

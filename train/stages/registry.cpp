@@ -65,4 +65,10 @@ const StageType& stage_type(const std::string& name) {
   throw InputError("", "there is no stage '" + name + "'", "use one of those in the configuration");
 }
 
+Bundle networks_of(const StageType& stage, const std::string& path) {
+  const Bundle out = load_bundle(path).only(stage.roles);
+  out.need(stage.roles.front(), path);
+  return out;
+}
+
 }  // namespace restage

@@ -27,5 +27,7 @@ std::vector<std::string> stage_names();
 std::string unknown_figure(const std::vector<std::string>& names);
 /// InputError if there is no such stage.
 const StageType& stage_type(const std::string& name);
+/// What a stage would leave, from a weights file, run or artifact. InputError if it has no such.
+Bundle networks_of(const StageType& stage, const std::string& path);
 
 }  // namespace restage

@@ -11,13 +11,6 @@ namespace {
 
 constexpr int64_t kAsked = 8;  // sequences, in a forecast
 
-/// The stage's networks in weights from elsewhere.
-Bundle taken_from(const StageType& type, const std::string& path) {
-  const Bundle out = load_bundle(path).only(type.roles);
-  out.need(type.roles.front(), path);
-  return out;
-}
-
 void check_order(const TrainConfig& config, const StageType& type, const AnyConfig& own) {
   const auto& stages = config.stages;
   const auto self = std::find(stages.begin(), stages.end(), type.name);
@@ -35,7 +28,7 @@ std::unique_ptr<Stage> make_stage(const TrainConfig& config, const std::string& 
   const StageType& type = stage_type(name);
   const StageSection& section = config.section(name);
   if (section.from) {
-    so_far->add(taken_from(type, *section.from));
+    so_far->add(networks_of(type, *section.from));
     return nullptr;
   }
   check_order(config, type, section.config);
@@ -94,7 +87,7 @@ StoreTraining train_in_store(const Store& store, const TrainConfig& config, Iden
   for (const std::string& name : config.stages) {
     const StageSection& section = config.section(name);
     if (section.from) {
-      out.bundle.add(taken_from(stage_type(name), *section.from));
+      out.bundle.add(networks_of(stage_type(name), *section.from));
     } else {
       const auto id = std::find_if(out.artifacts.begin(), out.artifacts.end(),
                                    [&](const StageId& s) { return s.stage == name; });
