@@ -16,9 +16,9 @@ class EvenPoints {
   void arrange(const Points& points);
   /// How many different points there are.
   size_t size() const { return row_.size(); }
-  /// `n` points in equal steps along the row, repeated if there are fewer; the first lies the part
-  /// `offset` (0 to 1) of a step behind the beginning. Choices at the offsets 0, 1/k, 2/k ... share
-  /// the points among them: what one leaves out another has.
+  /// `n` points, of a cloud that has any, in equal steps along the row, repeated if there are
+  /// fewer; the first lies the part `offset` (0 to 1) of a step behind the beginning. Choices at
+  /// the offsets 0, 1/k, 2/k ... share the points among them: what one leaves out another has.
   void choose(size_t n, double offset, Points* out) const;
 
  private:

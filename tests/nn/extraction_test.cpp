@@ -74,6 +74,33 @@ TEST(InferExtraction, JointsMoveWithTheCloud) {
     EXPECT_LT((there[j] - here[j] - far.cast<double>()).norm(), 1e-4);
 }
 
+TEST(InferExtraction, ViewsTogetherSeeTheWholeCloud) {
+  struct Centre final : SkeletonModel {  // of its view's points
+    SkeletonOutput forward(Context&, const SkeletonInput& in) override {
+      SkeletonOutput out;
+      out.joints = Var(Tensor::zeros({in.cloud.size(0), kJoints, 3}));
+      return out;
+    }
+    int64_t points() const override { return 64; }
+    void visit(Fields&) override {}
+    const char* kind() const override { return "Centre"; }
+  } model;
+  const Points points = [] {
+    Points out;  // no two in a cell
+    Rng rng(RngKey{3, 0});
+    for (int i = 0; i < 256; ++i)
+      out.emplace_back(0.05f * static_cast<float>(i % 16), 0.05f * static_cast<float>(i / 16),
+                       static_cast<float>(rng.uniform()));
+    return out;
+  }();
+  Vec3 mean = Vec3::Zero();
+  for (const Point& p : points) mean += p.cast<double>() / 256;
+  for (uint64_t seed = 0; seed < 5; ++seed) {
+    const Joints joints = extract_joints(model, points, "c", RngKey{seed, 0}, 4);
+    EXPECT_LT((joints[0] - mean).norm(), 1e-6) << "every point is in one of the four views";
+  }
+}
+
 /// Every joint at the cloud's highest point. The first `wrong` views are answered wrongly.
 struct HighestPoint final : SkeletonModel {
   SkeletonOutput forward(Context&, const SkeletonInput& in) override {
