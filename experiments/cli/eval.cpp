@@ -160,7 +160,10 @@ int run_eval_run(const EvalOptions& options, const Common& common) {
   const TrainedModel* motion = weights.find("motion");
   const std::string text = to_text(scores, how, motion ? motion->model : "");
   if (!options.out.empty()) {
-    std::filesystem::create_directories(options.out);
+    std::error_code failed;
+    std::filesystem::create_directories(options.out, failed);
+    if (failed)
+      throw InputError(options.out, "cannot be made a folder", "give a place you can write to");
     write_file_atomically(options.out + "/metrics.md", text);
     write_sequence(Performance(test, how.sequences[0], how.scans, common.seed),
                    {test.license, test.description}, options.out);

@@ -41,7 +41,9 @@ std::string provenance_text(const std::string& folder) {
   std::error_code ignored;
   const std::string path = in(folder, "provenance.json");
   if (!fs::exists(path, ignored)) return "";
-  const auto facts = nlohmann::ordered_json::parse(read_file(path), nullptr, false);
+  // What lies deeper than any run writes is left out: it would be printed by recursion.
+  const auto shallow = [](int depth, auto, auto&) { return depth < 16; };
+  const auto facts = nlohmann::ordered_json::parse(read_file(path), shallow, false);
   if (!facts.is_object()) return "";
   std::vector<std::vector<std::string>> rows{{"", ""}};
   for (const auto& [key, value] : facts.items()) {

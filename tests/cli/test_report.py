@@ -67,6 +67,14 @@ class Report(CliTest):
         self.bad_input(["report", "s", "--sequence", "nowhere", "--out", "t.html"])
         self.assertFalse(os.path.exists(self.path("t.html")))
 
+    def test_what_a_run_says_of_itself_may_be_nested_without_end(self):
+        run = self.train("stages=[skeleton]")
+        facts = json.loads(self.bytes(os.path.join(run, "provenance.json")))
+        facts["deep"] = "DEEP"
+        self.write(os.path.join(run, "provenance.json"), json.dumps(facts).replace('"DEEP"', "[" * 200000 + "]" * 200000))
+        self.done("report", run, "--out", "r.html", "--no-play")
+        self.assertIn("tiny.yaml", self.page("r.html"))
+
     def test_bad_input(self):
         run = self.train("stages=[skeleton]")
         before = self.bytes(os.path.join(run, "config.yaml"))

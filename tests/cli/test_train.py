@@ -49,6 +49,7 @@ class Runs(Train):
         self.assertIn("within 0.25 s", self.bytes("judged/metrics.md").decode())
         self.assertEqual(sorted(os.listdir(self.path("judged"))), ["metrics.md", "rest.h5", "source.h5", "target.ply", "truth.h5"])
         self.bad_input(["eval", "run=" + run, "--anchor", "-1"], "--anchor")
+        self.bad_input(["eval", "run=" + run, "--out", "tiny.yaml"], "tiny.yaml", "cannot be made a folder")
         self.bad_input(["eval", "run=nowhere"], "nowhere")
 
     def test_any_stages_can_be_judged(self):
