@@ -8,6 +8,7 @@
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
 #include "datasets/readers/mesh_io.h"
+#include "experiments/text.h"
 #include "infer/writers/frames.h"
 
 namespace restage {
@@ -305,8 +306,8 @@ Repaired write_repaired(const Subject& subject, const std::string& out, const Di
   const RepairKind kind = repair_kind(out);
   check(subject, out, kind, d);
   Json note = to_json(from_first(subject, *d.transform));
-  note["from"] = name_of(subject.path);
-  if (!subject.taken_as.empty()) note["of"] = subject.taken_as;
+  note["from"] = valid_utf8(name_of(subject.path));
+  if (!subject.taken_as.empty()) note["of"] = valid_utf8(subject.taken_as);
   const FileInfo info = info_of(subject, note);
   Repaired done;
   done.file = out;

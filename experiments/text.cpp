@@ -1,6 +1,7 @@
 #include "experiments/text.h"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 namespace restage {
 namespace {
@@ -17,10 +18,15 @@ size_t width(const std::string& text) {
 
 }  // namespace
 
+std::string valid_utf8(const std::string& text) {
+  using Json = nlohmann::json;
+  return Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
 std::string on_one_line(std::string text) {
   for (char& c : text)
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = ' ';
-  return text;
+  return valid_utf8(text);
 }
 
 std::string shell_word(const std::string& text) {

@@ -6,7 +6,9 @@
 
 namespace restage {
 
-/// Names in files may hold line breaks and the like; here they become blanks.
+/// Names of files may hold any bytes: here what is not UTF-8 becomes U+FFFD.
+std::string valid_utf8(const std::string& text);
+/// The same; line breaks and the like become blanks.
 std::string on_one_line(std::string text);
 /// One word of a POSIX shell, in quotes.
 std::string shell_word(const std::string& text);

@@ -105,9 +105,9 @@ std::string numbered(const std::string& path, int64_t number) {
   return path + "." + std::to_string(number);
 }
 
-/// The first bytes of a file; nothing: no such file.
+/// The first bytes of a file, none of a pipe; nothing: no such file.
 std::optional<std::string> read_bytes(const std::string& file) {
-  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (fd < 0) return std::nullopt;
   std::string bytes(kRecord, ' ');
   const ssize_t n = ::pread(fd, bytes.data(), bytes.size(), 0);

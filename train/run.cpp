@@ -93,6 +93,20 @@ std::string timestamp() {
   return text;
 }
 
+/// What goes on from `last` needs the stages before it. Bad input is told before anything changes.
+void check_resumable(const std::string& dir, const std::vector<std::string>& stages,
+                     const std::optional<Checkpoint>& last) {
+  for (const char* name : {"metrics.jsonl", "log.txt", "weights.safetensors"})
+    AtomicFile(inside(dir, name));  // nothing in its way?
+  std::vector<std::string> ignored;
+  for (const std::string& stage : stages) {
+    if (!last || stage == last->stage) return;
+    if (!run_files::newest_good(run_files::list_checkpoints(dir, {stage}), ignored))
+      throw InputError(dir, "the checkpoint of stage '" + stage + "' is missing or damaged",
+                       "train again from the start");
+  }
+}
+
 }  // namespace
 
 std::string run_config_path(const std::string& dir) {
@@ -107,16 +121,17 @@ std::string run_config_path(const std::string& dir) {
 std::optional<Checkpoint> latest_checkpoint(const std::string& dir,
                                             const std::vector<std::string>& stages) {
   run_config_path(dir);
-  const auto entries = run_files::list_checkpoints(dir, stages);
-  for (auto entry = entries.rbegin(); entry != entries.rend(); ++entry)
-    if (auto found = run_files::load(*entry)) return found;
-  return {};
+  std::vector<std::string> passed_over;
+  auto found = run_files::newest_good(run_files::list_checkpoints(dir, stages), passed_over);
+  for (const std::string& why : passed_over) log_warning(why);
+  return found;
 }
 
 Checkpoint checkpoint_of(const std::string& dir, const std::string& stage, int64_t step) {
-  for (const auto& entry : run_files::list_checkpoints(dir, {stage}))
-    if (entry.step == step)
-      if (auto found = run_files::load(entry)) return std::move(*found);
+  auto entries = run_files::list_checkpoints(dir, {stage});
+  std::erase_if(entries, [step](const auto& entry) { return entry.step != step; });
+  std::vector<std::string> passed_over;
+  if (auto found = run_files::newest_good(entries, passed_over)) return std::move(*found);
   throw InputError(dir,
                    "the checkpoint of stage '" + stage + "' at step " + std::to_string(step) +
                        " is missing or damaged",
@@ -187,7 +202,10 @@ RunDir RunDir::resume(const std::string& dir, std::vector<std::string> stages) {
   run_config_path(dir);
   RunDir run(dir, std::move(stages), take_lock(dir, dir));
   run_files::remove_leftovers(dir);
-  run.resumed_ = latest_checkpoint(dir, run.stages_);
+  std::vector<std::string> passed_over;
+  run.resumed_ = run_files::newest_good(run_files::list_checkpoints(dir, run.stages_), passed_over);
+  check_resumable(dir, run.stages_, run.resumed_);
+  for (const std::string& why : passed_over) log_warning(why);
   run_files::cut_metrics(dir, run.stages_, run.resumed_);
   // What is newer than the newest good one is damaged: away with it, it would count when pruning.
   for (const auto& entry : run_files::list_checkpoints(dir, run.stages_)) {

@@ -8,7 +8,6 @@
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
 #include "autograd/base/format.h"
-#include "autograd/base/log.h"
 
 namespace restage::run_files {
 namespace {
@@ -84,13 +83,16 @@ std::vector<Entry> list_checkpoints(const std::string& dir,
   return entries;
 }
 
-std::optional<Checkpoint> load(const Entry& entry) {
-  try {
-    Checkpoint found{entry.path, entry.stage, entry.step, read_file(entry.path)};
-    if (checksum(found.bytes) == entry.checksum) return found;
-    log_warning(entry.path + ": the checkpoint is damaged and passed over");
-  } catch (const Error& error) {
-    log_warning(std::string(error.what()) + " (the checkpoint is passed over)");
+std::optional<Checkpoint> newest_good(const std::vector<Entry>& entries,
+                                      std::vector<std::string>& passed_over) {
+  for (auto entry = entries.rbegin(); entry != entries.rend(); ++entry) {
+    try {
+      Checkpoint found{entry->path, entry->stage, entry->step, read_file(entry->path)};
+      if (checksum(found.bytes) == entry->checksum) return found;
+      passed_over.push_back(entry->path + ": the checkpoint is damaged and passed over");
+    } catch (const Error& error) {
+      passed_over.push_back(std::string(error.what()) + " (the checkpoint is passed over)");
+    }
   }
   return {};
 }

@@ -268,11 +268,8 @@ Bundle train(RunDir& run, const std::vector<std::string>& stages, const LoopConf
     const auto index = static_cast<std::ptrdiff_t>(i);
     if (resumed && index <= begin) {
       // The stage that was interrupted, or an earlier one that is complete.
-      const auto checkpoint = index == begin ? resumed : latest_checkpoint(run.dir(), {stages[i]});
-      if (!checkpoint)
-        throw InputError(run.dir(), "the checkpoint of stage '" + stages[i] + "' is missing",
-                         "train again from the start");
-      stage_run.go_on_from(*checkpoint);
+      stage_run.go_on_from(index == begin ? *resumed
+                                          : latest_checkpoint(run.dir(), {stages[i]}).value());
     }
     stage_run.run();
     if (i + 1 < stages.size()) stage_run.tidy();

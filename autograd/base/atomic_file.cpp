@@ -49,17 +49,19 @@ std::string place_of(const std::string& target) {
 
 }  // namespace
 
-void throw_unwritable(const std::string& target, int code) {
-  const std::string why = std::strerror(code);
-  if (code == ENAMETOOLONG)
-    throw InputError(target, "cannot be written (" + why + ")", "shorten it");
+void throw_refused(const std::string& place, const std::string& done, int code) {
+  const std::string why = done + " (" + std::strerror(code) + ")";
+  if (code == ENAMETOOLONG) throw InputError(place, "cannot be " + why, "shorten it");
   for (const int users : {ENOENT, ENOTDIR, EACCES, EPERM, EISDIR, EROFS, EEXIST, ELOOP})
     if (code == users)
-      throw InputError(target, "cannot be written (" + why + ")",
-                       "give a path in a folder you can write to");
+      throw InputError(place, "cannot be " + why, "give a path in a folder you can write to");
   const bool full = code == ENOSPC || code == EDQUOT || code == EFBIG;
-  throw WorkError(target + ": could not be written (" + why + "); " +
+  throw WorkError(place + ": could not be " + why + "; " +
                   (full ? "free some space" : "look after the disk") + " and run it again");
+}
+
+void throw_unwritable(const std::string& target, int code) {
+  throw_refused(target, "written", code);
 }
 
 int write_all(int fd, std::string_view content) {

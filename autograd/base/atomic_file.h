@@ -26,7 +26,8 @@ class AtomicFile {
   Temporary temporary_;
 };
 
-/// InputError or WorkError, by the system's error number, for a `target` that cannot be written.
+/// InputError or WorkError, by the system's error number, for a `place` that cannot be `done` to.
+[[noreturn]] void throw_refused(const std::string& place, const std::string& done, int code);
 [[noreturn]] void throw_unwritable(const std::string& target, int code);
 /// All of `content` to an open file, however many calls it takes; 0, or the system's error number.
 int write_all(int fd, std::string_view content);

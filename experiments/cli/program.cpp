@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <filesystem>
 #include <map>
 #include <new>
 #include <span>
 #include <string_view>
 #include <utility>
 
+#include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
@@ -197,14 +199,27 @@ int Program::run(int argc, char** argv) {
   return action_();
 }
 
-int run(int argc, char** argv) {
-  handle_signals();
+namespace {
+
+int run_program(int argc, char** argv) {
   try {
     Program program;
     add_commands(program);
     const int code = program.run(argc, argv);
     finish_output();
     return code;
+  } catch (const std::filesystem::filesystem_error& error) {
+    // Whatever we asked the system about a place that the user named, it would not hear of it.
+    throw_refused(error.path1().string(), "used", error.code().value());
+  }
+}
+
+}  // namespace
+
+int run(int argc, char** argv) {
+  handle_signals();
+  try {
+    return run_program(argc, argv);
   } catch (const Error& error) {
     print_error(error.what());
     return error.exit_code;

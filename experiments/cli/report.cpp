@@ -35,6 +35,7 @@ void check(const Arguments& a) {
   if (a.no_play && !a.how.sequences.empty())
     throw InputError("", "--no-play and --sequence do not go together", "give one of them");
   for (const std::string& folder : a.folders) check_output(a.out, report::inputs_of(folder));
+  const AtomicFile before_the_work(a.out);
 }
 
 int run_report(Arguments a, const Common& common) {
@@ -43,7 +44,7 @@ int run_report(Arguments a, const Common& common) {
   a.how.play = !a.no_play;
   const report::Report made = report::is_sweep(a.folders[0]) ? report::of_sweep(a.folders[0], a.how)
                                                              : report::of_runs(a.folders, a.how);
-  write_file_atomically(a.out, report::page(made));
+  write_file_atomically(a.out, valid_utf8(report::page(made)));
   Json played = Json::array();
   for (const report::Play& play : made.plays) played.push_back(play.title);
   print(common.json,

@@ -37,6 +37,9 @@ int run_export(const Arguments& a, const Common& common) {
   const tables::ExportOptions options{
       a.program.empty() ? this_program() : fs::canonical(a.program).string(),
       fs::canonical(a.dir).string(), common.threads};
+  for (const std::string& place : {options.program, options.dir})
+    if (engine == tables::Engine::snakemake && valid_utf8(place) != place)
+      throw InputError(place, "is no UTF-8, as a Snakefile must be", "rename it");
   write_file_atomically(a.out, tables::export_script(engine, plan->trials, options));
   const std::string start = engine == tables::Engine::slurm ? "sbatch " + a.out
                             : engine == tables::Engine::parallel

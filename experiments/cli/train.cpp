@@ -93,8 +93,7 @@ TrainConfig configured(const Request& request) {
 /// Of every stage that would be trained three steps and a validation.
 TrainConfig shortened(Request request, const TrainConfig& whole) {
   constexpr int64_t kSteps = 3, kAsked = 4;
-  for (const std::string& stage : whole.stages) {
-    if (whole.section(stage).from) continue;
+  for (const std::string& stage : whole.trained()) {
     request.overrides.push_back(format("%s.optimiser.steps=%d", stage.c_str(), int{kSteps}));
     if (stage != "motion") continue;
     const auto& motion = whole.section(stage).config.as<MotionStageConfig>();
@@ -168,7 +167,7 @@ int fast_dev_run(const TrainConfig& config, const TrainingData& data,
   const RunInput input = provenance_of(config, data, common);
   {
     RunDir run = RunDir::create_at(folder.path(), input.resolved_yaml, provenance_json(input),
-                                   config.stages);
+                                   config.trained());
     train_in(run, config, data, arguments, common);
     load_bundle(run.dir());
   }
@@ -186,9 +185,11 @@ RunDir run_of(const Request& request, const TrainConfig& config, const RunInput&
   if (team.rank() == 0) {
     RunDir run = request.resume.empty()
                      ? RunDir::create(config.run_root, config.name, input.resolved_yaml, provenance,
-                                      config.stages)
-                     : RunDir::resume(request.resume, config.stages);
+                                      config.trained())
+                     : RunDir::resume(request.resume, config.trained());
+    if (team.size() == 1) return run;
     for (const auto& entry : fs::directory_iterator(run.dir() + "/checkpoints")) {
+      if (entry.path().extension() != ".safetensors") continue;  // put aside as damaged
       bytes += read_file(entry.path().string());
       place += entry.path().filename().string() + " " + std::to_string(bytes.size()) + "\n";
     }
@@ -200,13 +201,13 @@ RunDir run_of(const Request& request, const TrainConfig& config, const RunInput&
   bytes = team.of_first("");
   scratch->emplace();
   const std::string folder = (*scratch)->file("run");
-  RunDir::create_at(folder, input.resolved_yaml, provenance, config.stages);
+  RunDir::create_at(folder, input.resolved_yaml, provenance, config.trained());
   std::istringstream lines(place);
   std::string name;
   for (size_t end = 0, at = 0; lines >> name >> end; at = end)
     write_file_atomically(folder + "/checkpoints/" + name,
                           std::string_view(bytes).substr(at, end - at));
-  return RunDir::resume(folder, config.stages);
+  return RunDir::resume(folder, config.trained());
 }
 
 int train_with(Team& team, const TrainArguments& arguments, const Common& common) {

@@ -33,7 +33,7 @@ std::string in(const std::string& folder, const std::string& file) {
 }
 
 std::string last_part(const std::string& folder) {
-  return fs::path(folder + "/.").lexically_normal().parent_path().filename().string();
+  return valid_utf8(fs::path(folder + "/.").lexically_normal().parent_path().filename().string());
 }
 
 /// "key: value" a line, of those facts of a provenance.json that are of use to a reader.

@@ -132,7 +132,6 @@ TrialEnd perform_trial(const std::string& path, const std::string& id, bool quie
   training.quiet = quiet;
   if (watcher) training.observers.push_back(watcher.get());
   try {
-    log_info("trial " + id + ", seed " + std::to_string(trial.seed));
     outcome = run_trial(dir.folder(id) + "/config.yaml", id, dir.evaluate, dir.store, training);
     finish(TrialState::done, "");
     lease->forget();

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "autograd/base/interrupt.h"
+#include "autograd/base/log.h"
 #include "autograd/kernels/matmul_precision.h"
 #include "datasets/benchmark/manifest.h"
 #include "datasets/readers/sha256.h"
@@ -126,13 +127,16 @@ struct TrialPlanner::Memory {
   std::string loaded;                       // identity of `data`
   std::unique_ptr<TrainingData> data;
 
-  /// Models of unknown names, sizes that do not fit together, windows longer than every motion.
+  /// Models of unknown names, sizes that do not fit together, windows longer than every motion, and
+  /// too little held out to measure anything on.
   void check(const TrainConfig& config, const std::vector<StageId>& stages) {
+    const std::string wanted = identities.data(config.data);
+    if (evaluate.benchmark.empty() && good.insert("held out of " + wanted).second)
+      evaluation_options(config, load_corpus(config.data, "test"), 0);
     const bool known = std::all_of(stages.begin(), stages.end(), [&](const StageId& s) {
       return good.contains(s.id) || store.has(s);
     });
     if (known) return;
-    const std::string wanted = identities.data(config.data);
     if (loaded != wanted) data = std::make_unique<TrainingData>(config.data);
     loaded = wanted;
     check_stages(config, *data);
@@ -203,6 +207,7 @@ TrialOutcome run_trial(const std::string& config_yaml_path, const std::string& i
     throw InputError(config_yaml_path,
                      "asks another question (" + planned.id + ") than it was planned for",
                      "its data or the program changed: plan the sweep again");
+  log_info("trial " + id + ", seed " + std::to_string(config.seed));
   TrialOutcome out;
   Identities identities;
   const StoreTraining trained =

@@ -43,15 +43,21 @@ std::string shortest(T value) {
   return std::string(text, std::to_chars(text, text + sizeof text, value).ptr);
 }
 
+/// 100000, not 1e+05.
+std::string bound(double value) {
+  const bool whole = std::abs(value) < 1e15 && value == std::round(value);
+  return whole ? shortest(static_cast<int64_t>(value)) : shortest(value);
+}
+
 /// The range of a rule: " > 0", " from 0 to 1".
 std::string range_text(const Rule& rule) {
   const bool low = std::isfinite(rule.low), high = std::isfinite(rule.high);
   if (low && high && !rule.low_open && !rule.high_open)
-    return " from " + shortest(rule.low) + " to " + shortest(rule.high);
+    return " from " + bound(rule.low) + " to " + bound(rule.high);
   std::string out;
-  if (low) out += (rule.low_open ? " > " : " >= ") + shortest(rule.low);
+  if (low) out += (rule.low_open ? " > " : " >= ") + bound(rule.low);
   if (low && high) out += " and";
-  if (high) out += (rule.high_open ? " < " : " <= ") + shortest(rule.high);
+  if (high) out += (rule.high_open ? " < " : " <= ") + bound(rule.high);
   return out;
 }
 

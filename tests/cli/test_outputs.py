@@ -1,4 +1,5 @@
 """What every command owes to files: what it reads stays, what it writes appears whole or not at all."""
+import json
 import os
 import shutil
 import signal
@@ -125,6 +126,22 @@ class Places(CliTest):
         self.bad_input(self.call("x" * 300 + ".h5"), "too long", "shorten")
         self.bad_input(["retarget", "--force", "--weights", weights("tiny"), "--source", self.ply("a.ply", points(90, 1)), "--target", "a.ply",
                         "--out", "y" * 300 + "/"], "too long", "shorten")
+
+        self.bad_input(["data", "verify", "z" * 300], "too long", "shorten")
+        self.person()
+        self.bad_input(["doctor", "walk", "--fix", "z" * 300 + "/"], "too long", "shorten")
+
+    def test_a_link_to_itself_as_input_is_refused(self):
+        os.symlink("loop", self.path("loop"))
+        self.bad_input(["data", "verify", "loop"], "loop", "links")
+        self.bad_input(["doctor", "."], "loop", "links")
+
+    def test_names_that_are_no_text(self):
+        odd = os.fsdecode(b"odd\xff.ply")
+        self.ply(odd, self.person())
+        self.done("doctor", odd, "--fix", "mended.ply")
+        self.assertEqual(json.loads(self.bytes("mended.ply.transform.json"))["from"], "odd\ufffd.ply")
+        self.bad_input(["info", odd], "odd\ufffd.ply")
 
     def test_a_pipe_as_input_is_refused(self):
         """Nobody writes into it: to open it would be to wait for ever."""

@@ -75,6 +75,17 @@ class Report(CliTest):
         self.done("report", run, "--out", "r.html", "--no-play")
         self.assertIn("tiny.yaml", self.page("r.html"))
 
+    def test_the_page_can_be_written_is_asked_first(self):
+        run = self.train("stages=[skeleton]")
+        for out in ("/proc/page.html", "x" * 300 + ".html", run + "/config.yaml/page.html"):
+            self.bad_input(["report", run, "--out", out], "page.html" if "page" in out else "x.html", "cannot be written")
+
+    def test_names_that_are_no_text(self):
+        run = self.train("stages=[skeleton]")
+        os.rename(self.path(run), os.fsencode(self.path("odd")) + b"\xff")
+        self.done("report", os.fsdecode(b"odd\xff"), "--out", "page.html", "--quiet")
+        self.assertIn("odd\ufffd", self.page("page.html"))
+
     def test_bad_input(self):
         run = self.train("stages=[skeleton]")
         before = self.bytes(os.path.join(run, "config.yaml"))

@@ -141,7 +141,7 @@ class Plans(Sweep):
     def test_before_and_after_fine_tuning(self):
         self.write("fine.yaml", CONFIG.replace("motion:\n  sizes", "motion:\n  init: %s\n  sizes" % weights("tiny")))
         before = "cases: {before: {motion.init: none, motion.from: %s}, after: {}}\n" % weights("tiny")
-        self.write("sweep.yaml", "base: fine.yaml\n" + before)
+        self.write("sweep.yaml", "base: fine.yaml\nset: {data.bodies.test: 2}\n" + before)
         stages = [sorted(t["artifacts"]) for t in self.json("sweep", "plan", "sweep.yaml")["trials"]]
         self.assertEqual(stages, [["deformation", "skeleton"], ["deformation", "motion", "skeleton"]])
 
@@ -234,6 +234,9 @@ class BadSweeps(Sweep):
         self.bad_input(["trial", "nowhere", "0123456789ab"], "nowhere")
         self.done("sweep", "plan", "sweep.yaml", "--out", "d")
         self.bad_input(["trial", "d", "0123456789ab"], "no trial")
+        os.rename(self.path("d"), os.fsencode(self.path("d")) + b"\xff")
+        self.bad_input(["sweep", "export", os.fsdecode(b"d\xff"), "--engine", "snakemake", "--out", "Snakefile"], "UTF-8", "rename")
+        self.bad_input(["sweep", "plan", "sweep.yaml", "data.bodies.test=1"], "no retargeting sequence")
 
 
 class Runs(Sweep):

@@ -2,6 +2,7 @@
 import json
 import os
 import random
+import shutil
 import signal
 import time
 
@@ -271,6 +272,30 @@ class Resume(Train):
         self.assertIn(os.path.basename(newest), result.err)
         self.assertEqual(self.weights_of(run), good)
 
+    def test_what_cannot_go_on_is_told_before_anything_else(self):
+        run = self.train("tiny.yaml")
+        shutil.copytree(self.path(run), self.path("good"))
+
+        def broken(name, *contains):
+            self.bad_input(["train", "resume=" + run], name, *contains)
+            shutil.rmtree(self.path(run))
+            shutil.copytree(self.path("good"), self.path(run))
+
+        for name in ("metrics.jsonl", "log.txt", "weights.safetensors"):
+            os.remove(self.path(run + "/" + name))
+            os.mkfifo(self.path(run + "/" + name))
+            broken(name, "pipe")
+            os.remove(self.path(run + "/" + name))
+            os.symlink(name, self.path(run + "/" + name))
+            broken(name, "links")
+        first = [n for n in self.checkpoints(run) if n.startswith("skeleton")][-1]
+        self.write(run + "/checkpoints/" + first, "damage")
+        broken(run, "'skeleton'", "missing or damaged")
+        last = self.path(run + "/checkpoints/" + [n for n in self.checkpoints(run) if n.startswith("deformation")][-1])
+        os.remove(last)
+        os.mkdir(last)
+        self.done("train", "resume=" + run, "--quiet")  # from the one before
+
     def test_bad_resume(self):
         run = self.train("tiny.yaml", "stages=[deformation]")
         self.bad_input(["train", "resume=nowhere"], "nowhere", "run directory")
@@ -301,6 +326,7 @@ class BadTraining(Train):
     def test_values(self):
         self.bad(CONFIG.replace("seed: 3", "seed: three"), "bad.yaml:2: ")
         self.bad(CONFIG.replace("batch: 4", "batch: 0"), "bad.yaml:", "batch")
+        self.bad(CONFIG.replace("batch: 4", "batch: 2147483647"), "bad.yaml:", "batch", "100000")
         self.bad(CONFIG.replace("batch: 4", "batch: [4]"), "bad.yaml:", "batch")
         self.bad(CONFIG + "stages: [skelton]\n", "bad.yaml:", "skeleton")
         self.bad(CONFIG.replace("patch_transformer", "patch_transformr"), "skeleton/patch_transformer")

@@ -24,8 +24,8 @@ inline EnumNames<OptimiserConfig::Kind> config_names(OptimiserConfig::Kind) {
 
 template <class V>
 void visit(V& v, OptimiserConfig& c) {
-  v("steps", c.steps, "optimiser steps; 0: the networks stay as they begin", at_least(0));
-  v("batch", c.batch, "examples per step", positive());
+  v("steps", c.steps, "optimiser steps; 0: the networks stay as they begin", between(0, 1e9));
+  v("batch", c.batch, "examples per step", between(1, 1e5));
   v("schedule", c.schedule, "learning rate");
   v("kind", c.kind, "Adam for all parameters, or Muon for matrices and Adam for the rest");
   v("adam", c.adam, "Adam");

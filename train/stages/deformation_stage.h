@@ -44,7 +44,7 @@ void visit(V& v, DeformationStageConfig& c) {
     at_least(0));
   v("offsets", c.offsets, "train pose-corrective offsets");
   v("keep_root_rotation", c.keep_root_rotation, "offsets see the root's rotation (false: zero)");
-  v("validation_pairs", c.validation_pairs, "held-out pairs per validation", positive());
+  v("validation_pairs", c.validation_pairs, "held-out pairs per validation", between(1, 1e6));
 }
 
 class DeformationStage final : public Stage {

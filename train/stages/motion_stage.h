@@ -87,8 +87,8 @@ void visit(V& v, MotionStageConfig& c) {
   v.check("windows", c.answers.tracks.sequences == 0 || c.windows.frames <= c.answers.tracks.frames,
           "is of more frames than an answer has (answers.frames)",
           "give windows.frames of at most that");
-  v("validation_windows", c.validation_windows, "held-out windows per validation", positive());
-  v("validation_frames", c.validation_frames, "frames of each", at_least(3));
+  v("validation_windows", c.validation_windows, "held-out windows per validation", between(1, 1e6));
+  v("validation_frames", c.validation_frames, "frames of each", between(3, 1e6));
 }
 
 class MotionStage final : public Stage {

@@ -21,7 +21,7 @@ void visit(V& v, RootStageConfig& c) {
   visit_choice(v, c.model);
   v("optimiser", c.optimiser, "steps, batch, rate");
   v("points", c.points, "points of a body", positive());
-  v("validation_bodies", c.validation_bodies, "held-out bodies per validation", positive());
+  v("validation_bodies", c.validation_bodies, "held-out bodies per validation", between(1, 1e6));
 }
 
 class RootStage final : public Stage {

@@ -52,7 +52,7 @@ void visit(V& v, SkeletonStageConfig& c) {
     "voting models: weight of naming the moving joint", at_least(0));
   v("orientation_weight", c.orientation_weight,
     "models that give rotations: weight of their columns' distance", at_least(0));
-  v("validation_clouds", c.validation_clouds, "held-out clouds per validation", positive());
+  v("validation_clouds", c.validation_clouds, "held-out clouds per validation", between(1, 1e6));
 }
 
 class SkeletonStage final : public Stage {

@@ -15,9 +15,9 @@ namespace restage {
 
 template <class V>
 void visit(V& v, SplitCounts& c) {
-  v("train", c.train, "how many to train on", positive());
-  v("validation", c.validation, "how many to validate on", positive());
-  v("test", c.test, "how many to test on", positive());
+  v("train", c.train, "how many to train on", between(1, 1e5));
+  v("validation", c.validation, "how many to validate on", between(1, 1e5));
+  v("test", c.test, "how many to test on", between(1, 1e5));
 }
 
 template <class V>
@@ -47,8 +47,8 @@ void visit(V& v, ScanConfig& c) {
 
 template <class V>
 void visit(V& v, EvaluationConfig& c) {
-  v("sequences", c.sequences, "held-out sequences of 'restage eval run=...'", positive());
-  v("frames", c.frames, "frames of each", at_least(3));
+  v("sequences", c.sequences, "held-out sequences of 'restage eval run=...'", between(1, 1e5));
+  v("frames", c.frames, "frames of each", between(3, 1e6));
   v("system", c.system, "which system a sweep's trial is: 'restage retarget --system'");
   v("anchor", c.anchor, "'restage retarget --anchor', seconds; 0: off", at_least(0));
   v("scans", c.scans, "held-out sequences as they are seen");
@@ -92,6 +92,14 @@ struct TrainConfig {
   }
   const StageSection& section(const std::string& stage) const {
     return const_cast<TrainConfig*>(this)->section(stage);
+  }
+
+  /// Those of `stages` that are not taken as they are.
+  std::vector<std::string> trained() const {
+    std::vector<std::string> out = stages;
+    std::erase_if(out,
+                  [this](const std::string& stage) { return section(stage).from.has_value(); });
+    return out;
   }
 
   std::string name = "restage";
