@@ -210,6 +210,7 @@ TEST_F(TrainRun, ResumeCutsTheMetricsAtTheCheckpoint) {
     RunDir run = make();
     for (int64_t step = 1; step <= 3; ++step)
       run.metrics("skeleton", step, {{"loss", 0.1 * static_cast<double>(step)}});
+    run.save_checkpoint("skeleton", 3, "first");
     run.metrics("smrm", 1, {{"loss", 1e-3}, {"odd \"name\"\n", std::nan("")}});
     run.metrics("smrm", 2, {});
     run.save_checkpoint("smrm", 2, "state");
