@@ -157,17 +157,25 @@ class Averages {
 };
 
 /// PA-MPJPE of one row on one set over its seeds: by sequence, by the motion that a sequence's name
-/// begins with, by joint.
+/// begins with and its length, by the bodies that it ends with, by joint.
 struct Parts {
-  std::map<std::string, double> sequences, motions, joints;
+  std::map<std::string, double> sequences, motions, bodies, joints;
 };
 
-std::string motion_of(const std::string& sequence) {
-  return sequence.substr(0, sequence.find_first_of("-@:"));
+std::string motion_of(const std::string& sequence, const tables::SetResult& scores) {
+  const std::string name = sequence.substr(0, sequence.find_first_of("-@:"));
+  const auto frames = scores.frames.find(sequence);
+  return frames == scores.frames.end() ? name
+                                       : name + ", " + std::to_string(frames->second) + " frames";
+}
+
+std::string bodies_of(const std::string& sequence) {
+  const size_t at = sequence.find_first_of("-:");
+  return at == std::string::npos ? sequence : sequence.substr(at + 1);
 }
 
 Parts parts_of(const Results& results, const std::string& set, const tables::Row& row) {
-  Averages sequences, motions, joints;
+  Averages sequences, motions, bodies, joints;
   for (const tables::TrialResult& trial : results.trials) {
     if (trial.case_name != row.case_name) continue;
     for (const auto& [name, scores] : trial.sets) {
@@ -175,12 +183,13 @@ Parts parts_of(const Results& results, const std::string& set, const tables::Row
       for (const auto& [sequence, values] : scores.sequences)
         if (const auto found = values.find("pa_mpjpe"); found != values.end()) {
           sequences.add(sequence, found->second);
-          motions.add(motion_of(sequence), found->second);
+          motions.add(motion_of(sequence, scores), found->second);
+          bodies.add(bodies_of(sequence), found->second);
         }
       for (const auto& [joint, value] : scores.joints) joints.add(joint, value);
     }
   }
-  return {sequences.means(), motions.means(), joints.means()};
+  return {sequences.means(), motions.means(), bodies.means(), joints.means()};
 }
 
 std::string in_mm(double metres) { return tables::short_number(std::round(1e4 * metres) / 10); }
@@ -215,11 +224,12 @@ std::string worst_text(const std::string& label, const std::map<std::string, dou
   return text + "; the best: " + all.back().second + " " + in_mm(all.back().first) + ".\n\n";
 }
 
-/// Where the errors are: by motion, by joint, the worst sequences. Folded, since it is long.
+/// Where the errors are: by motion, bodies and joint, the worst sequences. Folded, since it is
+/// long.
 std::string where_text(const Results& results, const PaperTable& printed, const std::string& set,
                        const Table& table) {
   std::vector<std::string> labels;
-  std::vector<std::map<std::string, double>> motions, joints;
+  std::vector<std::map<std::string, double>> motions, bodies, joints;
   std::string worst;
   for (const PaperRow& asked : printed.rows) {
     const tables::Row* row = row_of(table, asked.row);
@@ -228,14 +238,16 @@ std::string where_text(const Results& results, const PaperTable& printed, const 
     if (parts.sequences.empty()) continue;
     labels.push_back(asked.row);
     motions.push_back(parts.motions);
+    const bool shared = parts.bodies.size() < parts.sequences.size();
+    bodies.push_back(shared ? parts.bodies : std::map<std::string, double>());
     joints.push_back(parts.joints);
     worst += worst_text(asked.row, parts.sequences);
   }
   if (labels.empty()) return "";
-  return "<details><summary>Where the errors are: PA-MPJPE in mm by motion and by joint, the worst "
-         "sequences</summary>\n\n" +
-         split_table("motion", labels, motions) + split_table("joint", labels, joints) + worst +
-         "</details>\n\n";
+  return "<details><summary>Where the errors are: PA-MPJPE in mm by motion, bodies and joint, the "
+         "worst sequences</summary>\n\n" +
+         split_table("motion", labels, motions) + split_table("bodies", labels, bodies) +
+         split_table("joint", labels, joints) + worst + "</details>\n\n";
 }
 
 std::string effort_text(const Results& results) {

@@ -23,7 +23,8 @@ struct Scores {
 };
 
 struct SetResult : Scores {
-  std::map<std::string, double> joints;  ///< PA-MPJPE by joint, metres
+  std::map<std::string, int64_t> frames;  ///< by sequence
+  std::map<std::string, double> joints;   ///< PA-MPJPE by joint, metres
   /// What needs no learning, on the same sequences: "source_unchanged" and others.
   std::vector<std::pair<std::string, Scores>> references;
 };

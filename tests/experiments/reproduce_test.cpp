@@ -46,7 +46,12 @@ class Reproduce : public FileTest {
       for (int s = 0; s < 4; ++s) {
         const double value = mpjpe + 0.03 * s + scatter * ((seed * 7 + s * 3) % 5 - 2);
         sum += value / 4;
-        sequences.push_back({{"name", "s" + std::to_string(s)}, {"mpjpe", value}, {"acc", acc}});
+        sequences.push_back({{"name", s < 2 ? "walk-a-b" : "run-a-b"},
+                             {"frames", s < 2 ? 90 : 30},
+                             {"mpjpe", value},
+                             {"pa_mpjpe", value / 2},
+                             {"acc", acc}});
+        if (s % 2 == 1) sequences.back()["name"] = s < 2 ? "walk-b-a" : "run-b-a";
       }
       const std::string id = "00000000000" + std::to_string(++made_);
       const Json result = {
@@ -162,6 +167,17 @@ TEST_F(Reproduce, ThePageHasBothFiguresAndTheVerdict) {
   EXPECT_HAS(page, "motion.optimiser.steps=7");
   EXPECT_EQ(page_json({one}, options)["claims"][0]["verdict"], "holds");
   EXPECT_EQ(page_markdown({one}, options, "somebody2024", ".."), page) << "the same bytes again";
+}
+
+TEST_F(Reproduce, ThePageSaysWhereTheErrorsAre) {
+  put("new", 1, 0.10, 0.02, 0);  // 100, 130, 160, 190 mm; half of that in aligned joints
+  const Evidence evidence{"x", "experiments/x", dir / "x", read_paper_file(dir / "x/paper.yaml")};
+  const Found one{evidence, tables::read_results(dir / "x"), {judged()}};
+  const std::string text = page_markdown({one}, {"somebody2024", "lite", {"restage"}}, "t", "..");
+  for (const char* line :
+       {"| walk, 90 frames | 57.5 |", "| run, 30 frames  | 87.5 |", "| a-b    |  65 |",
+        "| b-a    |  80 |", "Worst sequences of new: run-b-a 95, run-a-b 80, walk-b-a 65, "})
+    EXPECT_HAS(text, line);
 }
 
 TEST_F(Reproduce, MistakesInAPaperFileAreToldWithTheirLine) {
