@@ -93,7 +93,7 @@ class StageRun {
   void hand_on();
   std::string keep_failure(const NonFiniteError& error) const;
   std::string forecast() const;
-  void report(int64_t steps, int64_t blocks_before) const;
+  void report(int64_t steps, int64_t blocks_before, double waited_before) const;
 
   Stage& stage_;
   const Bundle& given_;
@@ -111,6 +111,7 @@ void StageRun::all_steps() {
   product_rate();
   reset_peak_memory();
   const int64_t first = done_, blocks_before = memory_stats().large_allocations;
+  const double waited_before = options_.team->waited();
   log_info(format("%s: %lld parameters, %lld steps of %lld", stage_.name().c_str(),
                   static_cast<long long>(count_parameters(stage_)),
                   static_cast<long long>(stage_.steps()),
@@ -145,7 +146,7 @@ void StageRun::all_steps() {
     }
   }
   progress.finish();
-  report(done_ - first, blocks_before);
+  report(done_ - first, blocks_before, waited_before);
 }
 
 NamedValues StageRun::step() {
@@ -238,7 +239,7 @@ std::string StageRun::forecast() const {
                 static_cast<double>(memory_stats().peak) / 1048576.0);
 }
 
-void StageRun::report(int64_t steps, int64_t blocks_before) const {
+void StageRun::report(int64_t steps, int64_t blocks_before, double waited_before) const {
   char text[300];
   std::snprintf(text, sizeof text,
                 "%s: %lld steps, %.1f ms a step, %s, peak of tensors %.0f MiB, %lld "
@@ -249,6 +250,9 @@ void StageRun::report(int64_t steps, int64_t blocks_before) const {
                 static_cast<double>(memory_stats().peak) / 1048576.0,
                 static_cast<long long>(memory_stats().large_allocations - blocks_before));
   log_info(text);
+  if (options_.team->size() > 1)
+    log_info(format("%s: waited %.2f ms a step for the other processes", stage_.name().c_str(),
+                    1e3 * (options_.team->waited() - waited_before) / static_cast<double>(steps)));
 }
 
 }  // namespace

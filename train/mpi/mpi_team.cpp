@@ -5,8 +5,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <climits>
 #include <cstdlib>
+#include <thread>
 
 #include "autograd/base/error.h"
 #include "train/team.h"
@@ -42,8 +44,12 @@ struct Slices {
 
 class MpiSum final : public Team::Sum {
  public:
-  MpiSum(size_t width, int rank, int size)
-      : width_(width), size_(size), slices_(width, size), mine_(slices_.count[rank]) {
+  MpiSum(size_t width, int rank, int size, double* waited)
+      : width_(width),
+        size_(size),
+        slices_(width, size),
+        mine_(slices_.count[rank]),
+        waited_(*waited) {
     for (int r = 0; r < size; ++r) {
       received_count_.push_back(mine_);
       received_first_.push_back(r * mine_);
@@ -58,21 +64,36 @@ class MpiSum final : public Team::Sum {
     MPI_Ialltoallv(sent_.data(), slices_.count.data(), slices_.first.data(), MPI_FLOAT,
                    received_.data(), received_count_.data(), received_first_.data(), MPI_FLOAT,
                    MPI_COMM_WORLD, &request_);
+    mover_ = std::jthread([this](const std::stop_token& stop) { move(stop); });
   }
 
   std::vector<float> total() override {
     finish_round();
     std::vector<float> out(width_);
+    const double start = MPI_Wtime();
     MPI_Allgatherv(slice_.data(), mine_, MPI_FLOAT, out.data(), slices_.count.data(),
                    slices_.first.data(), MPI_FLOAT, MPI_COMM_WORLD);
+    waited_ += MPI_Wtime() - start;
     return out;
   }
 
  private:
+  /// MPI moves nothing while nobody calls it, and the caller computes: so it is asked now and then.
+  void move(const std::stop_token& stop) {
+    for (int done = 0; !done && !stop.stop_requested();) {
+      MPI_Test(&request_, &done, MPI_STATUS_IGNORE);
+      if (!done) std::this_thread::sleep_for(std::chrono::microseconds(100));
+    }
+  }
+
   /// Adds what the last round brought, in the order of the ranks: that of the rows' numbers.
   void finish_round() {
-    if (request_ == MPI_REQUEST_NULL) return;
+    if (!mover_.joinable()) return;
+    const double start = MPI_Wtime();
+    mover_.request_stop();
+    mover_.join();
     MPI_Wait(&request_, MPI_STATUS_IGNORE);
+    waited_ += MPI_Wtime() - start;
     const float* row = received_.data();
     int r = 0;
     if (slice_.empty()) {
@@ -87,15 +108,20 @@ class MpiSum final : public Team::Sum {
   const int size_;
   const Slices slices_;
   const int mine_;  // numbers of this rank's slice
+  double& waited_;
   std::vector<int> received_count_, received_first_;
   std::vector<float> sent_, received_, slice_;
   MPI_Request request_ = MPI_REQUEST_NULL;
+  std::jthread mover_;  // the only one that calls MPI while it is there
 };
 
 class MpiTeam final : public Team {
  public:
   MpiTeam() {
-    MPI_Init(nullptr, nullptr);
+    int threads = 0;
+    MPI_Init_thread(nullptr, nullptr, MPI_THREAD_SERIALIZED, &threads);
+    if (threads < MPI_THREAD_SERIALIZED)
+      throw WorkError("this MPI library lets one thread only call it; build with another");
     MPI_Comm_rank(MPI_COMM_WORLD, &rank_);
     MPI_Comm_size(MPI_COMM_WORLD, &size_);
     std::atexit([] { MPI_Finalize(); });
@@ -103,7 +129,7 @@ class MpiTeam final : public Team {
   int rank() const override { return rank_; }
   int size() const override { return size_; }
   std::unique_ptr<Sum> sum(size_t width) override {
-    return std::make_unique<MpiSum>(width, rank_, size_);
+    return std::make_unique<MpiSum>(width, rank_, size_, &waited_);
   }
 
   std::vector<std::vector<double>> all(const std::vector<std::vector<double>>& mine) override {
@@ -139,6 +165,7 @@ class MpiTeam final : public Team {
     return mine;
   }
 
+  double waited() const override { return waited_; }
   std::string name() const override {
     return "rank " + std::to_string(rank_) + " of " + std::to_string(size_) + " on " + host();
   }
@@ -149,6 +176,7 @@ class MpiTeam final : public Team {
 
  private:
   int rank_ = 0, size_ = 1;
+  double waited_ = 0;
 };
 
 [[noreturn]] void refuse(int slurm, int here) {
