@@ -168,7 +168,7 @@ tables::TrialResult result_of(const std::string& name, const Measured& run) {
   out.case_name = name;
   out.state = TrialState::done;
   for (const auto& [condition, scores] : run.scores.conditions) {
-    tables::SetResult set{scores_of(scores.model, run.names), {}, {}};
+    tables::SetResult set{scores_of(scores.model, run.names)};
     for (const auto& [reference, values] : scores.references)
       set.references.emplace_back(reference, scores_of(values, run.names));
     out.sets.emplace_back(condition, std::move(set));

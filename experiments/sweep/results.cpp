@@ -45,7 +45,7 @@ class Reader : public sweep::JsonReader<Json> {
     return out;
   }
   SetResult set(const Json& entries) const {
-    SetResult out{scores(entries), {}, {}, {}};
+    SetResult out{scores(entries)};
     for (const Json& sequence : list(entries, "sequences"))
       if (const Json& frames = at(sequence, "frames"); frames.is_number_integer())
         out.frames[text(sequence, "name")] = frames.template get<int64_t>();

@@ -23,10 +23,10 @@ struct Scores {
 };
 
 struct SetResult : Scores {
-  std::map<std::string, int64_t> frames;  ///< by sequence
-  std::map<std::string, double> joints;   ///< PA-MPJPE by joint, metres
+  std::map<std::string, int64_t> frames = {};  ///< by sequence
+  std::map<std::string, double> joints = {};   ///< PA-MPJPE by joint, metres
   /// What needs no learning, on the same sequences: "source_unchanged" and others.
-  std::vector<std::pair<std::string, Scores>> references;
+  std::vector<std::pair<std::string, Scores>> references = {};
 };
 
 /// Damaged: what is there cannot be used.
