@@ -28,7 +28,6 @@ class Alone final : public Team {
   }
   bool any(bool mine) override { return mine; }
   std::string of_first(std::string mine) override { return mine; }
-  double waited() const override { return 0; }
   std::string name() const override { return ""; }
   [[noreturn]] void abort(int code) override { std::exit(code); }
 };

@@ -20,7 +20,7 @@ namespace restage::cli {
 namespace {
 
 struct EvalOptions {
-  std::string run, pred, truth, source, rest, mended, out;
+  std::string run, pred, truth, source, rest, mended, out, device;
   int64_t every = 1;
   bool variants = false, per_joint = false;
   std::optional<double> anchor;
@@ -153,6 +153,8 @@ int run_eval_run(const EvalOptions& options, const Common& common) {
   for (const std::string& file : result_files(options.out))
     check_output(file, {run_config_path(folder), weights_name, config.data.source});
   const Bundle weights = load_bundle(folder);
+  if (!options.device.empty())
+    move_networks(weights, {"skeleton", "motion"}, device_of(options.device));
   const Corpus test = load_corpus(config.data, "test");
   EvaluationOptions how = evaluation_options(config, test, common.seed);
   if (options.anchor) how.anchor = *options.anchor;
@@ -207,7 +209,8 @@ void check_way(const EvalOptions& o) {
       {run && !o.source.empty(), "--source"}, {run && !o.rest.empty(), "--rest"},
       {run && !o.mended.empty(), "--mended"}, {run && o.every != 1, "--every"},
       {run && o.variants, "--variants"},      {run && o.per_joint, "--per-joint"},
-      {!run && !o.out.empty(), "--out"},      {!run && o.anchor, "--anchor"}};
+      {!run && !o.out.empty(), "--out"},      {!run && o.anchor, "--anchor"},
+      {!run && !o.device.empty(), "--device"}};
   for (const auto& [given, name] : others)
     if (given)
       throw InputError(
@@ -286,6 +289,7 @@ void add_eval(Program& program) {
       "restage eval --pred result.h5 --truth truth.h5\n"
       "restage eval --pred result.h5 --truth truth.h5 --source a.h5 --rest b.h5 --json\n"
       "restage eval run=runs/demo-1 --anchor 0\n"
+      "restage eval run=runs/demo-1 --device cuda\n"
       "restage eval --pred result.h5 --truth truth.h5 --every 3 --variants --per-joint\n"
       "restage eval --pred r.h5 --truth t.h5 --source a.h5 --rest b.h5 --mended mended.h5",
       run_eval);
@@ -294,6 +298,8 @@ void add_eval(Program& program) {
                  "with run=: folder for the table and the files of one sequence");
   app.add_option("--anchor", options.anchor,
                  "with run=: as in 'restage retarget'; 0: the papers' sum of velocities");
+  app.add_option("--device", options.device,
+                 "with run=: where extractor and motion network run, cpu or cuda (cpu)");
   app.add_option("--pred", options.pred, "predicted /joints and /vertices (HDF5)");
   app.add_option("--truth", options.truth, "true /joints and /vertices (HDF5)");
   app.add_option("--source", options.source, "joints of the source, for the references");

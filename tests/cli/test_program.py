@@ -53,6 +53,7 @@ class Usage(CliTest):
         self.bad_input(["eval", "--pred", "a.h5", "--truth", "b.h5", "--anchor", 1], "--anchor")
         self.bad_input(["eval", "--pred", "a.h5", "--truth", "b.h5", "--out", "x"], "--out")
         self.bad_input(["eval", "run=x", "--every", 2], "--every")
+        self.bad_input(["eval", "--pred", "p.h5", "--truth", "t.h5", "--device", "cpu"], "--device")
 
     def test_error_is_one_short_line_for_any_file_name(self):
         self.bad_input(["doctor", "no\nsuch\x1b[31mfile"], "cannot be read")

@@ -51,6 +51,8 @@ class Runs(Train):
         self.assertEqual(sorted(os.listdir(self.path("judged"))), ["metrics.md", "rest.h5", "source.h5", "target.ply", "truth.h5"])
         self.bad_input(["eval", "run=" + run, "--anchor", "-1"], "--anchor")
         self.bad_input(["eval", "run=" + run, "--out", "tiny.yaml"], "tiny.yaml", "cannot be made a folder")
+        self.bad_input(["eval", "run=" + run, "--device", "abacus"], "'abacus' is none", "take one of: cpu")
+        self.assertEqual(self.json("eval", "run=" + run, "--device", "cpu"), held)
         self.bad_input(["eval", "run=nowhere"], "nowhere")
 
     def test_any_stages_can_be_judged(self):

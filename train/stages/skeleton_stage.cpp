@@ -192,8 +192,9 @@ NamedValues SkeletonStage::step(int64_t step) {
   return {{"loss", d.loss}, {"gradient_norm", d.norm}, {"rate", rate}};
 }
 
-SkeletonErrors skeleton_errors(SkeletonModel& model, const CloudBatch& clouds, Device device) {
+SkeletonErrors skeleton_errors(SkeletonModel& model, const CloudBatch& clouds) {
   Context ctx;
+  const Device device = device_of(model);
   double joints = 0, turns = 0, outside = 0;
   bool gives_turns = false, gives_uncertainty = false;
   const int64_t n = clouds.points.size(0), part = 16;
@@ -260,7 +261,7 @@ NamedValues SkeletonStage::validate() {
   const auto worst = [](std::optional<double>& of, double x) { of = std::max(of.value_or(x), x); };
   const auto put = [&](const char* name, const CloudBatch& clouds) {
     if (!clouds.points.defined()) return;
-    const SkeletonErrors errors = skeleton_errors(*model_, clouds, device());
+    const SkeletonErrors errors = skeleton_errors(*model_, clouds);
     out.push_back({name, 1e3 * errors.joints});
     if (errors.turns) worst(turns, *errors.turns * 180 / M_PI);
     if (errors.outside) worst(miscalibration, std::abs(*errors.outside - 0.1));

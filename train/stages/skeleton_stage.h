@@ -89,7 +89,7 @@ struct SkeletonErrors {
   std::optional<double> turns;    ///< angle, radians; empty if not given or not known
   std::optional<double> outside;  ///< part of the joints outside their 90 % regions
 };
-SkeletonErrors skeleton_errors(SkeletonModel& model, const CloudBatch& clouds, Device device = {});
+SkeletonErrors skeleton_errors(SkeletonModel& model, const CloudBatch& clouds);
 
 /// An answer as what is remembered of it (SkeletonInput::past) by clouds whose centroids, as those
 /// of `clouds`, are given in the world [n, 3].
