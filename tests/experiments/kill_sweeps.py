@@ -181,7 +181,7 @@ def no_memory(world, *_):
 def hungry_trial(world, *_):
     """One trial of a sweep takes all memory; the others are done."""
     with open(world.path("hungry.yaml"), "w") as f:
-        f.write("base: tiny.yaml\ncases:\n  modest: {}\n  hungry: {motion.optimiser.batch: 8000000}\n")
+        f.write("base: tiny.yaml\ncases:\n  modest: {}\n  hungry: {motion.optimiser.batch: 100000, motion.sizes.hidden: 512}\n")
     def limit():
         resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
     words, code = world.run("sweep", "run", "hungry.yaml", "--out", "hungry", before=limit)
