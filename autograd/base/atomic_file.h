@@ -26,7 +26,8 @@ class AtomicFile {
   Temporary temporary_;
 };
 
-/// InputError or WorkError, by the system's error number, for a `place` that cannot be `done` to.
+/// InputError or WorkError, by the system's error number, for a `place` that cannot be "written",
+/// "used" or what else was to be `done`.
 [[noreturn]] void throw_refused(const std::string& place, const std::string& done, int code);
 [[noreturn]] void throw_unwritable(const std::string& target, int code);
 /// All of `content` to an open file, however many calls it takes; 0, or the system's error number.

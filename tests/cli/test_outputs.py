@@ -126,7 +126,6 @@ class Places(CliTest):
         self.bad_input(self.call("x" * 300 + ".h5"), "too long", "shorten")
         self.bad_input(["retarget", "--force", "--weights", weights("tiny"), "--source", self.ply("a.ply", points(90, 1)), "--target", "a.ply",
                         "--out", "y" * 300 + "/"], "too long", "shorten")
-
         self.bad_input(["data", "verify", "z" * 300], "too long", "shorten")
         self.person()
         self.bad_input(["doctor", "walk", "--fix", "z" * 300 + "/"], "too long", "shorten")

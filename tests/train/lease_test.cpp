@@ -180,10 +180,13 @@ TEST_F(LeaseTest, ManyProcessesOneHolder) {
   EXPECT_TRUE(Lease::take(path_, "last"));
 }
 
-TEST_F(LeaseTest, AFolderThatIsNotThere) {
-  ASSERT_EQ(::mkfifo((path_ + ".1").c_str(), 0600), 0);  // a pipe is nobody's, and none waits at it
+TEST_F(LeaseTest, APipeIsNobodysAndNoneWaitsAtIt) {
+  ASSERT_EQ(::mkfifo((path_ + ".1").c_str(), 0600), 0);
   EXPECT_FALSE(Lease::holder(path_));
   EXPECT_TRUE(Lease::take(path_, "a"));
+}
+
+TEST_F(LeaseTest, AFolderThatIsNotThere) {
   EXPECT_THROW(Lease::take(dir / "none/lease", "a"), InputError);
   EXPECT_FALSE(Lease::holder(dir / "none/lease"));
 }
