@@ -123,6 +123,7 @@ class Stage {
   virtual void load_more(const TensorFile&, const std::string& /*where*/) {}
 
   Device device() const { return device_; }
+  Team& team() const { return *team_; }
   int64_t micro_batches() const { return micro_batches_; }
   /// The mean of what `compute` gives for each micro-batch of a step; those of other processes
   /// come from there. Micro-batches that change nothing but their own gradients are computed side

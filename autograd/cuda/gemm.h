@@ -2,6 +2,7 @@
 #pragma once
 
 #include "autograd/cuda/device_code.h"
+#include "autograd/kernels/matmul_precision.h"
 
 namespace restage::cuda {
 
@@ -17,8 +18,8 @@ struct Gemm {
   void* c;
   int64_t c_columns_apart, c_apart;
   int64_t batch;
-  DType type;     ///< f32 or f64
-  bool bfloat16;  ///< f32 operands may be rounded to it
+  DType type;                 ///< f32 or f64
+  MatmulPrecision precision;  ///< to which f32 operands may be rounded
 };
 /// By cuBLAS; tests have one of their own.
 void multiply(const Gemm& g);

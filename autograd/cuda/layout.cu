@@ -1,32 +1,9 @@
 // Moving numbers, a thread for each of the result.
-#include <utility>
-
+#include "autograd/cuda/indices.h"
 #include "autograd/cuda/kernels.h"
 
 namespace restage::cuda {
 namespace {
-
-/// 1 where a kernel met an index outside; read and cleared by take_index_fault().
-Tensor& index_flag(const Tensor& like) {
-  static Tensor* flag = new Tensor;
-  if (!flag->defined()) *flag = Tensor::zeros({1}, DType::i32, like.device());
-  return *flag;
-}
-std::string& faulty_op() {
-  static auto* op = new std::string;
-  return *op;
-}
-
-/// Notes an index outside of [0, limit). The op is named as the last one that took an index if more
-/// than one ran since somebody waited.
-void look_at(const Tensor& index, int64_t limit) {
-  const int32_t* of = at<int32_t>(index);
-  int32_t* flag = at<int32_t>(index_flag(index));
-  faulty_op() = running_op();
-  each(index.numel(), [=] RESTAGE_DEVICE(int64_t i) {
-    if (of[i] < 0 || of[i] >= limit) *flag = 1;
-  });
-}
 
 template <class T>
 void copy_blocks_of(const CopyBlocksArgs& args) {
@@ -77,23 +54,17 @@ void gather_of(const GatherArgs& args) {
   });
 }
 
-/// A group for each row of the result looks for its terms, a thread for each column: sums in order,
-/// without atomics. The index is read v times, from the cache.
 template <class T>
 void scatter_add_of(const ScatterAddArgs& args) {
   look_at(args.index, args.out.size(1));
+  const Askers askers = askers_of(args.index, args.out.size(1));
+  const AskersAt rows(askers);
   const T* g = at<T>(args.gy);
-  const int32_t* index = at<int32_t>(args.index);
   T* out = at<T>(args.out);
-  const int64_t v = args.out.size(1), c = args.out.size(2), m = args.index.size(1);
-  groups(args.out.size(0) * v, [=] RESTAGE_DEVICE(const Group& group, int64_t row) {
-    const int64_t s = row / v, own = row % v;
-    group.each(c, [&](int64_t i) {
-      double total = 0;
-      for (int64_t k = 0; k < m; ++k)
-        if (index[s * m + k] == own) total += static_cast<double>(g[(s * m + k) * c + i]);
-      out[row * c + i] = static_cast<T>(total);
-    });
+  const int64_t c = args.out.size(2);
+  each(args.out.numel(), [=] RESTAGE_DEVICE(int64_t k) {
+    out[k] = static_cast<T>(
+        rows.sum(k / c, [&](int64_t row) { return static_cast<double>(g[row * c + k % c]); }));
   });
 }
 
@@ -129,15 +100,6 @@ void fold_of(const FoldArgs& args) {
 }
 
 }  // namespace
-
-std::string take_index_fault() {
-  const std::string op = std::exchange(faulty_op(), "");
-  if (op.empty()) return "";  // also while the copy below waits
-  Tensor& flag = index_flag(Tensor());
-  if (flag.cpu().item() == 0) return "";
-  flag = Tensor();  // the next one is clear
-  return op + " on the GPU: an index is outside";
-}
 
 /// Whatever the numbers are, of their width.
 void copy_blocks(const CopyBlocksArgs& args) {

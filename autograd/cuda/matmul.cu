@@ -47,7 +47,7 @@ void product_of(const MatmulArgs& args) {
          .c_apart = m * n,
          .batch = batch,
          .type = args.out.dtype(),
-         .bfloat16 = args.precision == MatmulPrecision::bfloat16 && k >= MatmulArgs::kLeastTerms});
+         .precision = k < MatmulArgs::kLeastTerms ? MatmulPrecision::float32 : args.precision});
   }
   if (args.bias != nullptr || args.activation != Activation::none) finish<T>(args);
 }

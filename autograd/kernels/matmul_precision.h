@@ -5,13 +5,15 @@
 // bfloat16: the operands of a product are rounded to bfloat16 (8 bits of significand, float32's
 // range; to nearest, ties to even; NaN stays NaN) while they are packed. Products of two such
 // numbers are exact in float32 and are summed in float32, in the order that kernels/matmul.h says.
+// tf32: NVIDIA's, operands with 11 bits of significand; the CPU has no such products, computes them
+// in float32, and configurations refuse it there.
 // Everything that is stored - weights, gradients, the optimiser's state, activations - stays
 // float32. Which products take part is for MatmulArgs to say; float64 never does.
 #pragma once
 
 namespace restage {
 
-enum class MatmulPrecision { float32, bfloat16 };
+enum class MatmulPrecision { float32, bfloat16, tf32 };
 
 /// The one in use: what ops that are made now compute with.
 MatmulPrecision matmul_precision();

@@ -28,7 +28,7 @@ std::vector<Points> clouds_of(const CloudSampler& sampler, const CloudSubject& s
 }  // namespace
 
 std::vector<JointTrack> make_tracks(const Corpus& corpus, const TrackConfig& config, uint64_t seed,
-                                    const Extract& extract) {
+                                    const Extract& extract, Share share) {
   check_setting("track", config.frames >= 2 && config.frames <= 100000, "frames", "2 to 100000");
   check_setting("track", config.sequences >= 0, "sequences", "0 or more");
   check_setting("track", config.least >= 64 && config.most >= config.least, "least, most",
@@ -50,6 +50,7 @@ std::vector<JointTrack> make_tracks(const Corpus& corpus, const TrackConfig& con
     subject.augmentation.mirror = false;
     subject.scale = 1;
     out[i] = {subject.body, subject.at.motion, subject.at.frame, {}};
+    if (static_cast<int64_t>(i) % share.step != share.first) continue;
     const Mat3 back = turn_about_y(-subject.augmentation.heading);
     const auto clouds =
         clouds_of(sampler, subject, static_cast<size_t>(config.frames), config, own);

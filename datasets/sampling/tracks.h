@@ -30,9 +30,15 @@ struct TrackConfig {
 using Extract =
     std::function<SeenJoints(const Points& cloud, const RngKey& key, const SeenJoints* before)>;
 
+/// Those of many things that somebody makes: number first, first + step, ...
+struct Share {
+  int64_t first = 0, step = 1;
+};
+
 /// Track i is a function of (corpus, config, seed, i, extract). `extract` is called from one
-/// thread. InputError: no motion, settings out of range.
+/// thread. Tracks that are not in the `share` have their place, and no frames. InputError: no
+/// motion, settings out of range.
 std::vector<JointTrack> make_tracks(const Corpus& corpus, const TrackConfig& config, uint64_t seed,
-                                    const Extract& extract);
+                                    const Extract& extract, Share share = {});
 
 }  // namespace restage

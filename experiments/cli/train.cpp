@@ -104,10 +104,13 @@ TrainConfig shortened(Request request, const TrainConfig& whole) {
 }
 
 /// For the first lines of a run; nothing for float32.
-std::string products_in(MatmulPrecision precision) {
-  if (precision == MatmulPrecision::float32) return "";
-  return std::string("; products in bfloat16 ") +
-         (matrix_unit() ? "by the matrix unit (AMX)" : "by float32 vectors");
+std::string products_in(const TrainConfig& config) {
+  if (config.precision == MatmulPrecision::float32) return "";
+  const std::string where = config.device != "cpu" ? "on " + config.device
+                            : matrix_unit()        ? "by the matrix unit (AMX)"
+                                                   : "by float32 vectors";
+  const char* name = config.precision == MatmulPrecision::tf32 ? "tf32 " : "bfloat16 ";
+  return std::string("; products in ") + name + where;
 }
 
 RunInput provenance_of(const TrainConfig& config, const TrainingData& data, const Common& common) {
@@ -123,7 +126,7 @@ void train_in(RunDir& run, const TrainConfig& config, const TrainingData& data,
   log_info("seed " + std::to_string(config.seed) + ", " + std::to_string(threads()) + " threads; " +
            std::to_string(data.train.bodies.size()) + " bodies and " +
            std::to_string(data.train.motions.size()) + " motions to train on" +
-           products_in(config.precision));
+           products_in(config));
   TensorBoardLog tensorboard(run.dir());
   CsvLog csv(run.dir());
   TrainOptions options;

@@ -250,11 +250,25 @@ std::string where_text(const Results& results, const PaperTable& printed, const 
          split_table("joint", labels, joints) + worst + "</details>\n\n";
 }
 
-std::string effort_text(const Results& results) {
+/// What the trials took: together, and one of each row.
+std::string effort_text(const Results& results, const Table& table) {
   double seconds = 0;
-  for (const tables::TrialResult& trial : results.trials) seconds += trial.seconds;
+  Averages by_case;
+  for (const tables::TrialResult& trial : results.trials) {
+    seconds += trial.seconds;
+    if (trial.state == tables::TrialState::done) by_case.add(trial.case_name, trial.seconds);
+  }
+  const auto means = by_case.means();
+  std::string rows;
+  for (const tables::Row& row : table.rows) {
+    const auto mean = means.find(row.case_name);
+    if (row.reference || row.case_name.empty() || mean == means.end()) continue;
+    rows += (rows.empty() ? " A trial of " : ", of ") + row.label + " took " +
+            duration_text(mean->second);
+  }
   return "Trials: " + tables::counts_text(results) + "; " + duration_text(seconds) +
-         " of work in their last attempts.\n\n";
+         " of work in their last attempts, beside whatever else the machine did." + rows +
+         (rows.empty() ? "\n\n" : ".\n\n");
 }
 
 std::vector<std::string> columns_of(const PaperFile& asked) {
@@ -288,8 +302,8 @@ std::string section(const Found& f, const PageOptions& options, const std::strin
             on_one_line(picture.says) + "\n\n";
   if (!f.evidence.runs()) return text;
   const std::string base = files + "/" + f.evidence.name;
-  return text + effort_text(f.results) + "Alone: `" + sweep_command(f, budget) + "`. [CSV](" +
-         base + ".csv), [LaTeX](" + base + ".tex), [SVG](" + base + ".svg).\n\n";
+  return text + effort_text(f.results, table) + "Alone: `" + sweep_command(f, budget) +
+         "`. [CSV](" + base + ".csv), [LaTeX](" + base + ".tex), [SVG](" + base + ".svg).\n\n";
 }
 
 std::string summary(const std::vector<Found>& all) {

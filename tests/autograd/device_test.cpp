@@ -10,8 +10,10 @@
 #include "autograd/kernels/points.h"
 #include "autograd/kernels/pooled_norm.h"
 #include "autograd/kernels/rnn.h"
+#include "autograd/ops/attention.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
+#include "autograd/ops/linear.h"
 #include "autograd/ops/points.h"
 #include "autograd/ops/reduce.h"
 #include "tests/support/emulated_gpu.h"
@@ -119,6 +121,55 @@ TEST(DeviceGpu, EveryOpPassesTheHarness) {
 
 INSTANTIATE_TEST_SUITE_P(All, DeviceOps, testing::Range(size_t{0}, all_samples().size()),
                          [](const auto& param) { return all_samples()[param.param].op; });
+
+TEST(Device, TheGpuRoundsWhatItMultipliesAsItIsTold) {
+  // 1 + 2^-9 has more bits than bfloat16 keeps, 1 + 2^-12 more than tf32 does.
+  for (const auto& [precision, lost] :
+       std::map<MatmulPrecision, double>{{MatmulPrecision::float32, 0},
+                                         {MatmulPrecision::tf32, 1 / 4096.},
+                                         {MatmulPrecision::bfloat16, 1 / 512. + 1 / 4096.}}) {
+    const MatmulPrecisionScope scope(precision);
+    Tensor x = Tensor::zeros({1, 32}), w = Tensor::zeros({1, 32});
+    x.data<float>()[0] = static_cast<float>(1 + 1 / 512. + 1 / 4096.);
+    w.data<float>()[0] = 1;
+    const Var y = linear(x.to(emulated_gpu()), w.to(emulated_gpu()));
+    EXPECT_EQ(1 + 1 / 512. + 1 / 4096. - y.value.cpu().item(), lost);
+  }
+}
+
+/// Value and gradients of an attention, in the host's memory.
+std::vector<Tensor> attended(Device device, const std::vector<Tensor>& inputs,
+                             const Tensor& index) {
+  Tape tape;
+  std::vector<Var> x;
+  for (const Tensor& t : inputs) x.push_back(tape.leaf(t.to(device), x.size() + 1));
+  const Var y = neighbour_attention({x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]},
+                                    index.to(device), 0.7);
+  const Gradients gradients = tape.backward(sum_all(square(y)));
+  std::vector<Tensor> out{y.value.cpu()};
+  for (size_t i = 1; i <= x.size(); ++i) out.push_back(gradients.find(i)->cpu());
+  return out;
+}
+
+TEST(Device, TheGpusAttentionGoesThroughABatchInParts) {
+  // Two clouds of more pairs each than it handles at once.
+  const int64_t n = 2, v = 129, k = 512, d = 2;
+  Rng rng(RngKey{1, 0});
+  std::vector<Tensor> x;
+  for (const Shape& shape : {Shape{n, v, 3}, Shape{n, v, d}, Shape{n, v, d}, Shape{n, v, d},
+                             Shape{d, 3}, Shape{d}, Shape{2 * d, d}, Shape{d, d}, Shape{d}}) {
+    x.push_back(Tensor::empty(shape, DType::f64));
+    for (int64_t i = 0; i < x.back().numel(); ++i) x.back().data<double>()[i] = rng.normal();
+  }
+  Tensor index = Tensor::empty({n, v, k}, DType::i32);
+  for (int64_t i = 0; i < index.numel(); ++i)
+    index.data<int32_t>()[i] = static_cast<int32_t>(rng.below(static_cast<uint64_t>(v)));
+  const auto here = attended({}, x, index), there = attended(emulated_gpu(), x, index);
+  for (size_t t = 0; t < here.size(); ++t)
+    for (int64_t i = 0; i < here[t].numel(); ++i)
+      ASSERT_NEAR(there[t].item(i), here[t].item(i), 1e-9 * (1 + std::abs(here[t].item(i))))
+          << "tensor " << t << ", number " << i;
+}
 
 /// Ops that have a kernel of their own and a composition, with the contracts of the former.
 TEST(Device, WithoutAFusedKernelAnOpIsComposed) {

@@ -266,6 +266,13 @@ TEST(SamplingTracks, WindowsSeeWhatWasAnswered) {
   const auto tracks = make_tracks(training_corpus(), config, 3, extract);
   ASSERT_EQ(tracks.size(), 5u);
   EXPECT_EQ(asked, 100);
+  const auto part = make_tracks(training_corpus(), config, 3, extract, {1, 3});
+  EXPECT_EQ(asked, 140) << "two of five";
+  for (size_t i = 0; i < 5; ++i) {
+    EXPECT_EQ(part[i].first, tracks[i].first);
+    EXPECT_EQ(part[i].frames.size(), i % 3 == 1 ? 20u : 0u);
+  }
+  EXPECT_EQ(part[4].frames[7].joints, tracks[4].frames[7].joints);
   WindowConfig windows{.frames = 12, .mirror = false, .remove_heading = false};
   const WindowSampler sampler(training_corpus(), windows, 1, &tracks);
   const WindowBatch batch = sampler.batch(0, 8);

@@ -176,7 +176,8 @@ TEST_F(Reproduce, ThePageSaysWhereTheErrorsAre) {
   const std::string text = page_markdown({one}, {"somebody2024", "lite", {"restage"}}, "t", "..");
   for (const char* line :
        {"| walk, 90 frames | 57.5 |", "| run, 30 frames  | 87.5 |", "| a-b    |  65 |",
-        "| b-a    |  80 |", "Worst sequences of new: run-b-a 95, run-a-b 80, walk-b-a 65, "})
+        "| b-a    |  80 |", "Worst sequences of new: run-b-a 95, run-a-b 80, walk-b-a 65, ",
+        "A trial of new took 1:00."})
     EXPECT_HAS(text, line);
 }
 

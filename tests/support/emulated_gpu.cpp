@@ -1,7 +1,11 @@
 #include "tests/support/emulated_gpu.h"
 
+#include <bit>
+
+#include "autograd/cuda/attention.cu"
 #include "autograd/cuda/elementwise.cu"
 #include "autograd/cuda/gemm.h"
+#include "autograd/cuda/indices.cu"
 #include "autograd/cuda/layout.cu"
 #include "autograd/cuda/matmul.cu"
 #include "autograd/cuda/norm.cu"
@@ -17,6 +21,14 @@ namespace restage {
 namespace cuda {
 namespace {
 
+/// An operand with as many bits as a precision leaves it; what is left out is cut off.
+template <class T>
+T rounded(T x, MatmulPrecision precision) {
+  if (!std::is_same_v<T, float> || precision == MatmulPrecision::float32) return x;
+  const auto bits = std::bit_cast<uint32_t>(static_cast<float>(x));
+  return std::bit_cast<float>(bits & (precision == MatmulPrecision::tf32 ? ~0x1fffu : ~0xffffu));
+}
+
 template <class T>
 void multiply_columns(const Gemm& g) {
   for (int64_t s = 0; s < g.batch; ++s) {
@@ -28,8 +40,11 @@ void multiply_columns(const Gemm& g) {
         T total = 0;
         for (int64_t i = 0; i < g.k; ++i)
           total +=
-              a[g.transpose_a ? row * g.a_columns_apart + i : i * g.a_columns_apart + row] *
-              b[g.transpose_b ? i * g.b_columns_apart + column : column * g.b_columns_apart + i];
+              rounded(a[g.transpose_a ? row * g.a_columns_apart + i : i * g.a_columns_apart + row],
+                      g.precision) *
+              rounded(b[g.transpose_b ? i * g.b_columns_apart + column
+                                      : column * g.b_columns_apart + i],
+                      g.precision);
         T& to = c[column * g.c_columns_apart + row];
         to = g.beta == 0 ? total : static_cast<T>(g.beta) * to + total;
       }

@@ -357,6 +357,12 @@ TEST_F(TrainConfig, ResolvedYamlReadsBackToTheSame) {
             "a:\n  b: [1, [2]]\n  c:\n    - d: 1\n      e: []\n    - {}\nf: {}\n");
 }
 
+TEST_F(TrainConfig, Tf32IsForGpus) {
+  using Training = restage::TrainConfig;
+  EXPECT_HAS(error<Training>("precision: tf32\n"), "tf32, which only GPUs have; give float32");
+  EXPECT_EQ(error<Training>("precision: tf32\ndevice: cuda\n"), "");
+}
+
 TEST_F(TrainConfig, ReferenceListsEveryKey) {
   const std::string table = config_reference_table(config_reference<Everything>());
   for (const char* line :

@@ -4,6 +4,7 @@
 
 #include <barrier>
 #include <cstdlib>
+#include <functional>
 #include <mutex>
 #include <thread>
 
@@ -93,27 +94,34 @@ class Thread final : public Team {
   int rank_;
 };
 
-/// Three steps of a stage by so many processes, as each of them leaves it.
-std::vector<std::string> trained(const std::string& name, TrainConfig config, int64_t micro_batches,
-                                 int processes, std::vector<double>* losses = nullptr) {
-  config.loop.micro_batches = 1;  // cut below, for a team of our own
+/// What each of so many processes does.
+void by_processes(int processes, const std::function<void(Team&)>& what) {
   Table table(processes);
-  std::vector<std::string> out(static_cast<size_t>(processes));
   std::vector<std::thread> threads;
   for (int rank = 0; rank < processes; ++rank)
     threads.emplace_back([&, rank] {
       const std::lock_guard turn(table.turn);
       Thread team(&table, rank);
-      const auto stage = tiny_stage(name, config);
-      stage->cut_steps(micro_batches, team);
-      for (int64_t i = 0; i < 3; ++i) {
-        const NamedValues values = stage->step(i);
-        for (const auto& value : values)
-          if (rank == 0 && losses != nullptr) losses->push_back(value.second);
-      }
-      out[static_cast<size_t>(rank)] = bytes_of(*stage);
+      what(team);
     });
   for (std::thread& thread : threads) thread.join();
+}
+
+/// Three steps of a stage by so many processes, as each of them leaves it.
+std::vector<std::string> trained(const std::string& name, TrainConfig config, int64_t micro_batches,
+                                 int processes, std::vector<double>* losses = nullptr) {
+  config.loop.micro_batches = 1;  // cut below, for a team of our own
+  std::vector<std::string> out(static_cast<size_t>(processes));
+  by_processes(processes, [&](Team& team) {
+    const auto stage = tiny_stage(name, config);
+    stage->cut_steps(micro_batches, team);
+    for (int64_t i = 0; i < 3; ++i) {
+      const NamedValues values = stage->step(i);
+      for (const auto& value : values)
+        if (team.rank() == 0 && losses != nullptr) losses->push_back(value.second);
+    }
+    out[static_cast<size_t>(team.rank())] = bytes_of(*stage);
+  });
   return out;
 }
 
@@ -138,6 +146,40 @@ TEST(Team, HowManyShareAStepChangesNoBit) {
     // Dropout and statistics are of a micro-batch, so another number of them is another training.
     EXPECT_FALSE(trained(name, everything(), 2, 1)[0] == one) << name;
   }
+}
+
+/// Every number of what was seen, for comparison; what is not there counts as well.
+std::vector<double> numbers_of(const SeenJoints& seen) {
+  std::vector<double> out{static_cast<double>(seen.since), seen.turns ? 1.0 : 0.0,
+                          seen.uncertainty ? 1.0 : 0.0, seen.left ? 1.0 : 0.0};
+  const auto add = [&](const auto& v) { out.insert(out.end(), v.data(), v.data() + v.size()); };
+  for (const auto& joint : seen.joints) add(joint);
+  if (seen.turns)
+    for (const auto& turn : *seen.turns) add(turn);
+  if (seen.uncertainty) out.insert(out.end(), seen.uncertainty->begin(), seen.uncertainty->end());
+  if (seen.left) add(*seen.left);
+  return out;
+}
+
+TEST(Team, TheyAskTheExtractorTogether) {
+  TrainConfig c = tiny_training(6);
+  AnswersConfig& answers = motion(c).answers;
+  answers.tracks.sequences = 5;  // which three processes cannot divide
+  answers.tracks.frames = 3;
+  answers.views = 1;
+  Bundle network;
+  network.add(tiny_stage("skeleton", c)->result());
+  const Corpus& corpus = testing::tiny_data().train;
+  const auto all = [&](Team& team) {
+    std::vector<std::vector<double>> out;
+    for (const JointTrack& track : ask(corpus, "train", answers, network, 3, {}, team))
+      for (const SeenJoints& seen : track.frames) out.push_back(numbers_of(seen));
+    return out;
+  };
+  const auto one = all(alone());
+  ASSERT_EQ(one.size(), 15u);
+  by_processes(3, [&](Team& team) { EXPECT_EQ(all(team), one) << team.rank(); });
+  by_processes(7, [&](Team& team) { EXPECT_EQ(all(team), one) << "some of them ask for nothing"; });
 }
 
 TEST(Team, GroupsOfThreadsChangeNoBit) {

@@ -1,9 +1,11 @@
 #include "train/stages/answers.h"
 
 #include <cmath>
+#include <csignal>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 #include "autograd/kernels/matmul_precision.h"
 #include "datasets/readers/errors.h"
@@ -19,19 +21,8 @@ namespace fs = std::filesystem;
 
 constexpr const char* kWhere = "the skeleton stage";
 
-std::vector<JointTrack> asked(const Corpus& corpus, const AnswersConfig& config,
-                              const Bundle& given, uint64_t seed) {
-  JointExtractor extractor(given.need_as<SkeletonModel>("skeleton", kWhere), config.views);
-  log_info("motion: the extractor is asked about " + std::to_string(config.tracks.sequences) +
-           " sequences");
-  return make_tracks(corpus, config.tracks, seed,
-                     [&](const Points& cloud, const RngKey& key, const SeenJoints* before) {
-                       return extractor(cloud, kWhere, key, before);
-                     });
-}
-
-// As a file: all numbers in double precision, so that what is read is what was asked for. Of each
-// frame 22 rows (joint, rotation, uncertainty), then one for the sides that are remembered.
+// As numbers, all in double precision, so that what is read is what was asked for. Of each frame 22
+// rows (joint, rotation, uncertainty), then one for the sides that are remembered.
 
 constexpr int64_t kJointNumbers = 3 + 9 + 1, kFrame = kJoints * kJointNumbers + 4;
 
@@ -59,6 +50,59 @@ SeenJoints get(const double* in, bool turns, bool uncertainty) {
   return out;
 }
 
+void put(const std::vector<SeenJoints>& frames, double* out) {
+  for (size_t f = 0; f < frames.size(); ++f) put(frames[f], out + f * kFrame);
+}
+
+std::vector<SeenJoints> get(const double* in, size_t frames, bool turns, bool uncertainty) {
+  std::vector<SeenJoints> out;
+  for (size_t f = 0; f < frames; ++f) out.push_back(get(in + f * kFrame, turns, uncertainty));
+  return out;
+}
+
+// ---- asking ------------------------------------------------------------------------------------
+
+/// Fills the tracks that other processes have asked for. A message holds a track of each process,
+/// after whether it has rotations and uncertainties.
+void exchange(std::vector<JointTrack>* tracks, size_t frames, Team& team) {
+  const auto rank = static_cast<size_t>(team.rank()), size = static_cast<size_t>(team.size());
+  for (size_t from = 0; from < tracks->size(); from += size) {
+    std::vector<double> mine(2 + frames * kFrame);
+    if (from + rank < tracks->size()) {
+      const std::vector<SeenJoints>& own = (*tracks)[from + rank].frames;
+      mine[0] = own.at(0).turns ? 1 : 0;
+      mine[1] = own[0].uncertainty ? 1 : 0;
+      put(own, mine.data() + 2);
+    }
+    const auto all = team.all({mine});
+    for (size_t r = 0; r < size && from + r < tracks->size(); ++r)
+      (*tracks)[from + r].frames = get(all[r].data() + 2, frames, all[r][0] != 0, all[r][1] != 0);
+  }
+}
+
+std::vector<JointTrack> asked(const Corpus& corpus, const AnswersConfig& config,
+                              const Bundle& given, uint64_t seed, Team& team) {
+  JointExtractor extractor(given.need_as<SkeletonModel>("skeleton", kWhere), config.views);
+  log_info("motion: the extractor is asked about " + std::to_string(config.tracks.sequences) +
+           " sequences");
+  const auto extract = [&](const Points& cloud, const RngKey& key, const SeenJoints* before) {
+    return extractor(cloud, kWhere, key, before);
+  };
+  std::vector<JointTrack> out;
+  try {
+    out = make_tracks(corpus, config.tracks, seed, extract, {team.rank(), team.size()});
+  } catch (const Interrupted&) {
+    team.any(true);
+    throw;
+  }
+  if (team.size() == 1) return out;
+  if (team.any(false)) throw Interrupted(SIGTERM);  // it was another process of the team
+  exchange(&out, static_cast<size_t>(config.tracks.frames), team);
+  return out;
+}
+
+// ---- a file ------------------------------------------------------------------------------------
+
 std::string sum_of(const TensorFile& file) {
   Sha256 sum;
   for (const auto& [name, t] : file.tensors)
@@ -76,8 +120,7 @@ TensorFile to_file(const std::vector<JointTrack>& tracks, const std::string& fac
     const size_t place[] = {track.body, track.motion, track.first};
     for (int64_t k = 0; k < 3; ++k)
       places.data<int64_t>()[3 * i + k] = static_cast<int64_t>(place[k]);
-    for (int64_t f = 0; f < frames; ++f)
-      put(track.frames[static_cast<size_t>(f)], seen.data<double>() + (i * frames + f) * kFrame);
+    put(track.frames, seen.data<double>() + i * frames * kFrame);
   }
   const SeenJoints& first = tracks[0].frames.at(0);
   TensorFile out;
@@ -108,14 +151,11 @@ std::vector<JointTrack> from_file(const std::string& path, const std::string& fa
                           config.frames + 1))
       throw InputError(path, "is about somebody who is not in the data",
                        "nothing needs to be done");
-    out[i] = {static_cast<size_t>(place[0]),
-              static_cast<size_t>(place[1]),
+    const auto frames = static_cast<size_t>(config.frames);
+    out[i] = {static_cast<size_t>(place[0]), static_cast<size_t>(place[1]),
               static_cast<size_t>(place[2]),
-              {}};
-    for (size_t f = 0; f < static_cast<size_t>(config.frames); ++f)
-      out[i].frames.push_back(
-          get(seen.data<double>() + (i * static_cast<size_t>(config.frames) + f) * kFrame,
-              says("turns") == "true", says("uncertainty") == "true"));
+              get(seen.data<double>() + i * frames * kFrame, frames, says("turns") == "true",
+                  says("uncertainty") == "true")};
   }
   return out;
 }
@@ -151,9 +191,9 @@ std::string facts_of(const std::string& data, const std::string& split, const An
 
 std::vector<JointTrack> ask(const Corpus& corpus, const std::string& split,
                             const AnswersConfig& config, const Bundle& given, uint64_t seed,
-                            const std::optional<AnswerFolder>& folder) {
+                            const std::optional<AnswerFolder>& folder, Team& team) {
   if (config.tracks.sequences == 0) return {};
-  if (!folder) return asked(corpus, config, given, seed);
+  if (!folder) return asked(corpus, config, given, seed, team);
   const std::string facts = facts_of(folder->data, split, config, given, seed);
   const std::string name = "answers-" + short_id(facts),
                     path = (fs::path(folder->path) / (name + ".safetensors")).string();
@@ -161,7 +201,7 @@ std::vector<JointTrack> ask(const Corpus& corpus, const std::string& split,
       folder->path, name, [&] { return find(path, facts, corpus, config.tracks); },
       [&](const Lease&) {  // two who make it make the same bytes
         const std::string ready = path_aside(folder->path, name, ".ready");
-        write_safetensors(ready, to_file(asked(corpus, config, given, seed), facts));
+        write_safetensors(ready, to_file(asked(corpus, config, given, seed, alone()), facts));
         std::error_code error;
         fs::rename(ready, path, error);
         if (error)

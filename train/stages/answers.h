@@ -8,6 +8,7 @@
 #include "datasets/sampling/tracks.h"
 #include "nn/config/rules.h"
 #include "nn/weights/bundle.h"
+#include "train/team.h"
 
 namespace restage {
 
@@ -43,9 +44,10 @@ struct AnswerFolder {
 /// The answers of `given`'s extractor about performances of a corpus; `split`: its name in the
 /// data. With a folder those that are kept there, for the same question, are taken; others are
 /// asked for and kept, by one process while the others wait. A damaged file gives a warning and is
-/// made again. The bits are the same with and without a folder.
+/// made again. Without a folder each process of a team asks about some and tells the others. The
+/// bits are the same either way.
 std::vector<JointTrack> ask(const Corpus& corpus, const std::string& split,
                             const AnswersConfig& config, const Bundle& given, uint64_t seed,
-                            const std::optional<AnswerFolder>& folder);
+                            const std::optional<AnswerFolder>& folder, Team& team = alone());
 
 }  // namespace restage

@@ -125,10 +125,10 @@ struct Judged {
 struct MotionStage::Windows {
   Windows(const MotionStage& s)
       : seen(ask(s.train_, "train", s.config_.answers, s.given_, seed(s, "motion.answers"),
-                 s.answers_)),
+                 s.answers_, s.team())),
         held_out_seen(ask(s.validation_, "validation",
                           asked_for(s.config_, s.config_.validation_windows), s.given_, 1,
-                          s.answers_)),
+                          s.answers_, s.team())),
         cycle(s.train_, windows_of_cycle(s.config_), seed(s, "motion.windows"), tracks(seen)),
         self(s.train_, windows_of_self(s.config_), seed(s, "motion.self"), tracks(seen)),
         validation(s.validation_, held_out(s.config_.windows, s.config_.validation_frames), 1,

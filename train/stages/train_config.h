@@ -56,7 +56,9 @@ void visit(V& v, EvaluationConfig& c) {
 }
 
 inline EnumNames<MatmulPrecision> config_names(MatmulPrecision) {
-  return {{"float32", MatmulPrecision::float32}, {"bfloat16", MatmulPrecision::bfloat16}};
+  return {{"float32", MatmulPrecision::float32},
+          {"bfloat16", MatmulPrecision::bfloat16},
+          {"tf32", MatmulPrecision::tf32}};
 }
 
 /// One stage of a configuration: trained as its own keys say, or taken as it is.
@@ -123,6 +125,8 @@ void visit(V& v, TrainConfig& c) {
   v("seed", c.seed, "of everything random");
   v("precision", c.precision, "of the matrix products of training steps; all else is float32");
   v("device", c.device, "where networks are trained: cpu, or cuda in a program built for it");
+  v.check("precision", c.precision != MatmulPrecision::tf32 || c.device != "cpu",
+          "is tf32, which only GPUs have", "give float32 or bfloat16, or device: cuda");
   v("stages", c.stages, "which stages, in order", one_of(stage_names()));
   v("data", c.data, "bodies and motions");
   for (auto& [name, section] : c.sections) v(name, section, stage_type(name).help);
