@@ -62,8 +62,8 @@ Tensor bound(const Tensor& points, const Tensor& w1, float sign) {
 
 }  // namespace
 
-Deformer::Deformer(const Tensor& points, const Tensor& weights, const Mlp3* offsets)
-    : count_(points.size(0)), with_offsets_(offsets != nullptr) {
+Deformer::Deformer(const Tensor& points, const Tensor& weights, const Mlp3* offsets, Device device)
+    : count_(points.size(0)), device_(device), with_offsets_(offsets != nullptr) {
   require(points, {count_, 3}, "points");
   require(weights, {count_, weights.size(-1)}, "weights");
   const int64_t t = (count_ + P - 1) / P;
@@ -75,20 +75,25 @@ Deformer::Deformer(const Tensor& points, const Tensor& weights, const Mlp3* offs
   std::fill(order + count_, order + t * P, count_ > 0 ? order[count_ - 1] : 0);
   points_ = in_tiles(points, order_);
   weights_ = in_tiles(weights, order_);
-  if (!with_offsets_) return;
-  const Tensor &w1 = offsets->fc1.weight.value, &w2 = offsets->fc2.weight.value,
-               &w3 = offsets->fc3.weight.value;
+  if (with_offsets_) take_offsets(*offsets);
+  for (Tensor* own : {&points_, &weights_, &order_, &pose_weights_, &bias1_, &field_.w1, &field_.w2,
+                      &field_.b2, &field_.w3, &field_.b3, &field_.low, &field_.high})
+    if (own->defined()) *own = own->to(device_);
+}
+
+void Deformer::take_offsets(const Mlp3& net) {
+  const Tensor &w1 = net.fc1.weight.value, &w2 = net.fc2.weight.value, &w3 = net.fc3.weight.value;
   const int64_t u = w1.size(0), c = w1.size(1) - 3;
   const int64_t p = (u + kDeformAlign - 1) / kDeformAlign * kDeformAlign;
   require(w1, {u, c + 3}, "fc1");
   require(w3, {3, u}, "fc3");
   pose_weights_ = columns(w1, 0, c, false, c);
-  bias1_ = offsets->fc1.bias.value;
+  bias1_ = net.fc1.bias.value;
   field_.w1 = columns(w1, c, c + 3, false, 3);
   field_.w2 = columns(w2, 0, u, true, p);
-  field_.b2 = columns(offsets->fc2.bias.value.reshape({1, u}), 0, u, false, p);
+  field_.b2 = columns(net.fc2.bias.value.reshape({1, u}), 0, u, false, p);
   field_.w3 = columns(w3, 0, u, false, p);
-  field_.b3 = offsets->fc3.bias.value;
+  field_.b3 = net.fc3.bias.value;
   field_.low = bound(points_, field_.w1, 1);
   field_.high = bound(points_, field_.w1, -1);
 }
@@ -100,8 +105,9 @@ Tensor Deformer::operator()(const Tensor& pose, const Tensor& bones, bool dense)
 double Deformer::active_share(const Tensor& pose) const {
   const int64_t t = order_.size(0);
   if (!with_offsets_ || t == 0) return 0;
-  Tensor active = Tensor::empty({t}, DType::i32);
+  Tensor active = Tensor::empty({t}, DType::i32, device_);
   run(pose, Tensor::zeros({weights_.size(1), 3, 4}), false, &active);
+  active = active.cpu();
   double total = 0;
   for (int64_t i = 0; i < t; ++i) total += active.item(i);
   return total / static_cast<double>(t * field_.w1.size(0));
@@ -109,18 +115,19 @@ double Deformer::active_share(const Tensor& pose) const {
 
 Tensor Deformer::run(const Tensor& pose, const Tensor& bones, bool dense, Tensor* active) const {
   require(bones, {weights_.size(1), 3, 4}, "bones");
-  Tensor out = Tensor::empty({count_, 3});
+  const Tensor there = bones.to(device_);
+  Tensor out = Tensor::empty({count_, 3}, DType::f32, device_);
   if (!with_offsets_) {
-    launch(DeformArgs{points_, weights_, order_, bones, nullptr, out});
-    return out;
+    launch(DeformArgs{points_, weights_, order_, there, nullptr, out});
+    return out.cpu();
   }
   require(pose, {1, pose_weights_.size(1)}, "pose");
   OffsetField field = field_;
-  Tensor b1 = Tensor::empty({1, bias1_.size(0)});
-  launch(MatmulArgs{pose, pose_weights_, b1, false, true, &bias1_});
+  Tensor b1 = Tensor::empty({1, bias1_.size(0)}, DType::f32, device_);
+  launch(MatmulArgs{pose.to(device_), pose_weights_, b1, false, true, &bias1_});
   field.b1 = b1;
-  launch(DeformArgs{points_, weights_, order_, bones, &field, out, active, dense});
-  return out;
+  launch(DeformArgs{points_, weights_, order_, there, &field, out, active, dense});
+  return out.cpu();
 }
 
 }  // namespace restage

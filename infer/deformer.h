@@ -11,8 +11,9 @@ namespace restage {
 class Deformer {
  public:
   /// points [v, 3] at rest; weights [v, j]; `offsets` maps [c numbers, point] to an offset (null:
-  /// none) and is copied. float32. ShapeError if they do not fit.
-  Deformer(const Tensor& points, const Tensor& weights, const Mlp3* offsets);
+  /// none) and is copied. float32. ShapeError if they do not fit. Computes on `device`; what goes
+  /// in and comes out is the host's.
+  Deformer(const Tensor& points, const Tensor& weights, const Mlp3* offsets, Device device = {});
 
   /// The posed points [v, 3]. `pose` [1, c] is what the offset network gets besides the point;
   /// `bones` [j, 3, 4] takes a rest point to where each joint alone would carry it. `dense`
@@ -23,9 +24,11 @@ class Deformer {
   double active_share(const Tensor& pose) const;
 
  private:
+  void take_offsets(const Mlp3& net);
   Tensor run(const Tensor& pose, const Tensor& bones, bool dense, Tensor* active) const;
 
   int64_t count_;
+  Device device_;
   Tensor points_, weights_, order_;  // in tiles, as DeformArgs has them
   bool with_offsets_;
   OffsetField field_;            // b1 is of no frame yet

@@ -140,7 +140,7 @@ void Retargeter::prepare(const std::string& weights_name) {
   heading_ = Heading(steady_heading_);
   rest_tensor_ = tensor_of(rest_, rest_[0]);
   if (models_.find("deformation.weights") != nullptr)
-    surface_.emplace(models_, weights_name, target_, rest_);
+    surface_.emplace(models_, weights_name, target_, rest_, motion_device_);
   if (surface_) rig_.emplace(SystemRig{rest_, surface_->weights()});
 }
 

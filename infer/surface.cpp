@@ -5,7 +5,7 @@
 namespace restage {
 
 Surface::Surface(const Bundle& models, const std::string& where, const Mesh& target,
-                 const Joints& rest)
+                 const Joints& rest, Device device)
     : rest_(rest) {
   const auto& skinning = models.need_as<DeformationModel>("deformation.weights", where);
   const auto* offsets = models.find_as<OffsetNet>("deformation.offsets");
@@ -26,7 +26,7 @@ Surface::Surface(const Bundle& models, const std::string& where, const Mesh& tar
   const Tensor weights =
       skinning.weights(ctx, Var(joints), Var(points)).value.reshape({v, kJoints});
   weights_ = Eigen::Map<const SkinWeights>(weights.data<float>(), v, kJoints);
-  deformer_.emplace(points.reshape({v, 3}), weights, offsets);
+  deformer_.emplace(points.reshape({v, 3}), weights, offsets, device);
 }
 
 void Surface::operator()(const Pose& pose, const PosedSkeleton& posed, Points* out,

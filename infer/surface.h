@@ -13,8 +13,10 @@ namespace restage {
 class Surface {
  public:
   /// `models` come from `where` (for errors) and need `deformation.weights`; without offsets
-  /// skinning is all. `rest`: the target's joints. The networks are copied.
-  Surface(const Bundle& models, const std::string& where, const Mesh& target, const Joints& rest);
+  /// skinning is all. `rest`: the target's joints. The networks are copied; frames are computed on
+  /// `device`.
+  Surface(const Bundle& models, const std::string& where, const Mesh& target, const Joints& rest,
+          Device device = {});
 
   /// Posed vertices, world, in the target's order. `posed`: forward_kinematics(rest, pose).
   /// `dense`: nothing is left out, to compare with. A steady frame takes no memory.

@@ -12,6 +12,7 @@ namespace {
 
 std::atomic<int> scopes{0};
 std::atomic<int> caught{0};
+std::atomic<bool> asked{false};
 static_assert(std::atomic<int>::is_always_lock_free, "used in a signal handler");
 
 void on_signal(int signal) {
@@ -35,15 +36,20 @@ void handle_signals() {
 
 // A signal that an earlier scope answered is no reason to stop this one.
 StopScope::StopScope() {
-  if (scopes.load() == 0) caught = 0;
+  if (scopes.load() == 0) caught = 0, asked = false;
   ++scopes;
 }
 StopScope::~StopScope() { --scopes; }
 
-bool stop_requested() { return caught.load() != 0; }
+void ask_to_stop() {
+  if (scopes.load() > 0) asked = true;
+}
+
+bool stop_requested() { return caught.load() != 0 || asked.load(); }
 
 void throw_if_stopped() {
   if (const int signal = caught.load(); signal != 0) throw Interrupted(signal);
+  if (asked.load()) throw Interrupted(SIGTERM);
 }
 
 }  // namespace restage

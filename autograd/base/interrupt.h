@@ -27,7 +27,11 @@ class StopScope {
   StopScope& operator=(const StopScope&) = delete;
 };
 
-/// True after a signal in a StopScope.
+/// Does what a first signal in a StopScope does, for who was asked to stop in another way. A signal
+/// that comes as well, from whoever was asked too, is still the first.
+void ask_to_stop();
+
+/// True after a signal in a StopScope, or ask_to_stop().
 bool stop_requested();
 /// Throws Interrupted if stop_requested().
 void throw_if_stopped();

@@ -6,6 +6,7 @@
 #include <hwy/foreach_target.h>  // once per instruction set
 
 #include "autograd/cpu/attention_split_grad-inl.h"
+#include "autograd/cpu/flush.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
@@ -190,6 +191,7 @@ template <class T>
 void backward(const NeighbourAttentionGradArgs& args) {
   Backward<T> b(args);
   parallel_for(std::ssize(b.groups), 1, [&](int64_t from, int64_t to) HWY_ATTR {
+    const FlushSubnormals flush;  // a softmax that has made up its mind is full of them
     for (int64_t g = from; g < to; ++g) {
       GroupSums<T>& sums = b.groups[g];
       make_sums(b, sums);

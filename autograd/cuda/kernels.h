@@ -6,6 +6,7 @@
 
 #include "autograd/cuda/device_code.h"
 #include "autograd/kernels/attention.h"
+#include "autograd/kernels/deform.h"
 #include "autograd/kernels/elementwise.h"
 #include "autograd/kernels/layout.h"
 #include "autograd/kernels/matmul.h"
@@ -61,6 +62,7 @@
   K(swing_twist_grad, SwingTwistGradArgs)                 \
   K(lbs, LbsArgs)                                         \
   K(lbs_grad, LbsGradArgs)                                \
+  K(deform, DeformArgs)                                   \
   K(squared_norm, SquaredNormArgs)                        \
   K(adam, AdamArgs)                                       \
   K(mix, MixArgs)

@@ -1,12 +1,10 @@
 #include "experiments/sweep/trial.h"
 
 #include <fcntl.h>
-#include <signal.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <filesystem>
 #include <map>
@@ -104,10 +102,8 @@ TrialEnd perform_trial(const std::string& path, const std::string& id, bool quie
 
   const StopScope stop;
   const std::string token = stop_token(dir.path);
-  std::atomic<bool> asked = false;
   LeaseOptions options{kBeat, kPatience, [&] {
-                         if (stop_token(dir.path) != token && !asked.exchange(true))
-                           ::kill(::getpid(), SIGTERM);
+                         if (stop_token(dir.path) != token) ask_to_stop();
                        }};
   std::optional<Lease> lease = Lease::take(dir.lease(id), "trial " + id, options);
   if (!lease) throw WorkError(busy(id, Lease::holder(dir.lease(id))));

@@ -9,6 +9,7 @@
 #include "autograd/gradcheck/evaluate.h"
 #include "autograd/kernels/stats.h"
 #include "autograd/ops/attention.h"
+#include "autograd/ops/elementwise.h"
 #include "autograd/ops/linear.h"
 #include "autograd/ops/norm.h"
 #include "autograd/ops/points.h"
@@ -172,6 +173,28 @@ TEST(FusedOps, NeighbourAttentionIsItsReference) {
       EXPECT_EQ(stats.active_score_share < 0.5, !dense && spread < 1);
     }
   }
+}
+
+TEST(FusedOps, NeighbourAttentionsBackwardMakesNoSubnormals) {
+  // Products of them are many times slower, and a softmax that is all for one neighbour is full of
+  // them. How many there are depends on the scale of the scores.
+  const std::vector<Tensor> inputs = attention({1, 60, 33}, 1);
+  Tensor index = Tensor::zeros({1, 60, 2}, DType::i32);  // itself, and the first
+  for (int32_t i = 0; i < 60; ++i) index.data<int32_t>()[2 * i] = i;
+  const float smallest = std::numeric_limits<float>::min();
+  for (const double scale : {10., 30.}) {
+    Tape tape;
+    std::vector<Var> x;
+    for (const Tensor& t : inputs) x.push_back(tape.leaf(t.cast(DType::f32), x.size() + 1));
+    const Var y =
+        neighbour_attention({x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]}, index, scale);
+    const Gradients gradients = tape.backward(sum_all(square(y)) * 1e-5);
+    for (const uint64_t id : {2, 3, 4})  // query, key, value
+      for (const float g : gradients.find(id)->to_vector<float>())
+        EXPECT_TRUE(g == 0 || std::fabs(g) >= smallest) << g << ", input " << id << ", " << scale;
+  }
+  const volatile float small = smallest / 4;
+  EXPECT_GT(small * 1.0f, 0.0f) << "the caller's thread goes on as it was";
 }
 
 TEST(FusedOps, NeighbourAttentionShowsWhatIsNotFinite) {

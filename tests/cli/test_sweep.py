@@ -439,6 +439,15 @@ class Runs(Sweep):
         self.bad_input(["sweep", "plan", "sweep.yaml", "skeleton.optimiser.steps=3"], "skeleton.optimiser.steps")
         self.bad_input(["sweep", "plan", "sweep.yaml", "motion.init=nowhere.safetensors"], "nowhere.safetensors")
 
+    def test_a_stop_waits_for_the_step(self):
+        # Sweeper and trial both see the request, while a step is on.
+        sweeper = self.sweeper("skeleton.optimiser.steps=1000000", "skeleton.optimiser.batch=6000", "store=d-store")
+        self.done("sweep", "stop", "d")
+        self.assertEqual(sweeper.wait(120), 1, sweeper.stderr.read())
+        self.assertEqual(self.json("sweep", "status", "d")["counts"]["stopped"], 1, "it ended by itself")
+        kept = [n for f, _, names in os.walk(self.path("d-store")) for n in names if n.startswith("skeleton-0")]
+        self.assertEqual(len(kept), 1, "with a checkpoint")
+
     def test_what_killed_processes_left_is_tidied_up(self):
         self.done("sweep", "run", "sweep.yaml", "--out", "d")
         files = lambda: sorted(os.path.join(f, n) for f, _, names in os.walk(self.path("d")) for n in names)

@@ -10,6 +10,7 @@
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/rotation.h"
 #include "nn/weights/bundle.h"
+#include "tests/support/emulated_gpu.h"
 #include "tests/support/use_set.h"
 
 namespace restage {
@@ -158,6 +159,19 @@ TEST(InferDeformer, SkinsAloneWithoutOffsets) {
     EXPECT_LT(apart(deformer(s.pose, s.bones), reference(s, nullptr)), 1e-6);
     EXPECT_EQ(deformer.active_share(s.pose), 0);
   }
+}
+
+TEST(InferDeformer, AGpuGivesTheSame) {
+  const Surface s = surface(500);
+  for (const int64_t width : {0, 5, 300}) {
+    const auto offsets = width > 0 ? net(width) : nullptr;
+    const Deformer here(s.points, s.weights, offsets.get()),
+        there(s.points, s.weights, offsets.get(), emulated_gpu());
+    EXPECT_LT(apart(there(s.pose, s.bones), here(s.pose, s.bones)), 2e-6) << width;
+    EXPECT_EQ(there.active_share(s.pose), here.active_share(s.pose)) << width;
+  }
+  const Deformer none(surface(0).points, surface(0).weights, net().get(), emulated_gpu());
+  EXPECT_EQ(none(s.pose, s.bones).numel(), 0);
 }
 
 TEST(InferDeformer, BitsDoNotDependOnThreads) {

@@ -3,6 +3,7 @@
 #include <bit>
 
 #include "autograd/cuda/attention.cu"
+#include "autograd/cuda/deform.cu"
 #include "autograd/cuda/elementwise.cu"
 #include "autograd/cuda/gemm.h"
 #include "autograd/cuda/indices.cu"
