@@ -1,4 +1,5 @@
 """restage sweep plan, run, status, stop and restage trial (the contract of experiments)."""
+import glob
 import json
 import os
 import shutil
@@ -442,6 +443,8 @@ class Runs(Sweep):
     def test_a_stop_waits_for_the_step(self):
         # Sweeper and trial both see the request, while a step is on.
         sweeper = self.sweeper("skeleton.optimiser.steps=1000000", "skeleton.optimiser.batch=6000", "store=d-store")
+        logs = self.path("d-store/.skeleton-*.partial/log.txt")
+        self.wait_for(lambda: any("1000000 steps" in open(f).read() for f in glob.glob(logs)))  # from here on steps are made
         self.done("sweep", "stop", "d")
         self.assertEqual(sweeper.wait(120), 1, sweeper.stderr.read())
         self.assertEqual(self.json("sweep", "status", "d")["counts"]["stopped"], 1, "it ended by itself")
