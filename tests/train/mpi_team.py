@@ -65,6 +65,12 @@ class MpiTeam(unittest.TestCase):
         words = ["tiny.yaml", "loop.micro_batches=2", "loop.export=best", "loop.validate_every=2"]
         self.assertEqual(self.trained(2, *words), self.trained(1, *words))
 
+    def test_they_ask_the_extractor_together(self):
+        words = ["tiny.yaml", "loop.micro_batches=4", "motion.answers.sequences=6", "motion.answers.frames=40", "motion.self_first_pass=true"]
+        first = self.trained(1, *words)
+        for ranks in (2, 4):
+            self.assertEqual(self.trained(ranks, *words), first, "%d ranks" % ranks)
+
     def test_stopped_by_a_signal_and_resumed_by_another_number(self):
         words = ["tiny.yaml", "loop.micro_batches=4", "skeleton.optimiser.steps=60", "loop.checkpoint_every=1000",
                  "loop.export=best", "loop.validate_every=3"]
