@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # What a machine with a GPU is asked first: whether all tests of the GPU pass there, and how long the papers'
-# schedules would take, from measured steps of each stage in each precision of products. Ten minutes at most.
+# schedules would take, from measured steps of each stage in each precision of products.
 #
 #   cmake --preset release -B build/cuda -DRESTAGE_CUDA=ON && ninja -C build/cuda
 #   bench/on_gpu.sh build/cuda OUT
