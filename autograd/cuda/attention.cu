@@ -119,13 +119,14 @@ template <class T>
 void cloud_answers(const NeighbourAttentionArgs& args, const Pairs<T>& p, int64_t first,
                    int64_t last) {
   const Shape rows{p.count, p.d};
+  const MatmulPrecision precision = args.in.precision;
   Tensor st = empty_like(args.out, {p.count, 2 * p.d}),
          e = args.weights == nullptr ? empty_like(args.out, rows)
                                      : args.weights->rows(first, last).reshape(rows);
   const Tensor h = hidden(args.in, p, offsets(args.in, p));
-  matmul({.a = h, .b = args.in.both, .out = st, .transpose_b = true});
+  matmul({.a = h, .b = args.in.both, .out = st, .transpose_b = true, .precision = precision});
   const Tensor u = score_inputs(args.in, p, st);
-  matmul({.a = u, .b = args.in.gamma, .out = e, .transpose_b = true});
+  matmul({.a = u, .b = args.in.gamma, .out = e, .transpose_b = true, .precision = precision});
   pool(p, at<T>(st), at<T>(e), at<T>(args.out) + first * p.v * p.d);
 }
 
@@ -200,24 +201,33 @@ void cloud_gradients(const NeighbourAttentionGradArgs& args, const Pairs<T>& p, 
   const NeighbourAttentionInputs& in = args.in;
   const auto room = [&](int64_t width) { return empty_like(args.gy, {p.count, width}); };
   const int64_t at_point = first * p.v, d = p.d;
+  const MatmulPrecision precision = in.precision;
+  const auto add_product = [&](const Tensor& a, const Tensor& b, Tensor& sum) {  // sum += a^T b
+    matmul({.a = a,
+            .b = b,
+            .out = sum,
+            .transpose_a = true,
+            .accumulate = true,
+            .precision = precision});
+  };
   const Tensor r = offsets(in, p), h = hidden(in, p, r);
   Tensor st = room(2 * d), g_st = room(2 * d), g_h = room(d);
-  matmul({.a = h, .b = in.both, .out = st, .transpose_b = true});
+  matmul({.a = h, .b = in.both, .out = st, .transpose_b = true, .precision = precision});
   const Tensor u = score_inputs(in, p, st);
   const Tensor g_e =
       score_gradients(p, at<T>(st), at<T>(args.weights) + at_point * p.k * d,
                       at<T>(args.y) + at_point * d, at<T>(args.gy) + at_point * d, g_st);
-  matmul({.a = g_e, .b = u, .out = args.out, .transpose_a = true, .accumulate = true});
-  matmul({.a = g_e, .b = in.gamma, .out = g_h});  // for now that of u
+  add_product(g_e, u, args.out);
+  matmul({.a = g_e, .b = in.gamma, .out = g_h, .precision = precision});  // for now that of u
   keep_on(p, u, g_h, g_st);
-  matmul({.a = g_st, .b = h, .out = args.g_both, .transpose_a = true, .accumulate = true});
-  matmul({.a = g_st, .b = in.both, .out = g_h});
+  add_product(g_st, h, args.g_both);
+  matmul({.a = g_st, .b = in.both, .out = g_h, .precision = precision});
   const T* after = at<T>(h);
   T* g = at<T>(g_h);
   each(p.count * d, [=] RESTAGE_DEVICE(int64_t i) {
     if (after[i] <= T(0)) g[i] = T(0);
   });
-  matmul({.a = g_h, .b = r, .out = g_wb, .transpose_a = true, .accumulate = true});
+  add_product(g_h, r, g_wb);
 
   const Askers list = askers_of(in.index.rows(first, last), p.v);
   const AskersAt askers(list);
@@ -226,7 +236,7 @@ void cloud_gradients(const NeighbourAttentionGradArgs& args, const Pairs<T>& p, 
   sum_asked(p, askers, at<T>(g_st), {d, d, 2 * d}, 0, 1, at<T>(args.g_value) + at_point * d);
   if (args.g_xyz == nullptr) return;
   Tensor g_r = room(3);
-  matmul({.a = g_h, .b = in.w, .out = g_r});
+  matmul({.a = g_h, .b = in.w, .out = g_r, .precision = precision});
   T* g_xyz = at<T>(args.g_xyz) + at_point * 3;
   sum_own(p, at<T>(g_r), {0, 3, 3}, g_xyz);
   sum_asked(p, askers, at<T>(g_r), {0, 3, 3}, 1, -1, g_xyz);

@@ -12,6 +12,7 @@
 #include "autograd/kernels/matmul.h"
 #include "autograd/kernels/norm.h"
 #include "autograd/kernels/points.h"
+#include "autograd/kernels/pooled_norm.h"
 #include "autograd/kernels/reduce.h"
 #include "autograd/kernels/rnn.h"
 #include "autograd/kernels/rotation.h"
@@ -41,6 +42,8 @@
   K(fold, FoldArgs)                                       \
   K(norm, NormArgs)                                       \
   K(norm_grad, NormGradArgs)                              \
+  K(pooled_norm, PooledNormArgs)                          \
+  K(pooled_norm_grad, PooledNormGradArgs)                 \
   K(gru, GruArgs)                                         \
   K(gru_grad, GruGradArgs)                                \
   K(recurrence, RecurrenceArgs)                           \

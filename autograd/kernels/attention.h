@@ -5,6 +5,7 @@
 #pragma once
 
 #include "autograd/kernels/kernel.h"
+#include "autograd/kernels/matmul_precision.h"
 
 namespace restage {
 
@@ -23,6 +24,8 @@ struct NeighbourAttentionInputs {
   /// Do every product in full, instead of leaving out hidden units whose ReLU has the same sign for
   /// all pairs of a tile of neighbouring points. The result is the same up to rounding.
   bool dense = false;
+  /// Of the products over pairs, on a GPU. The CPU's are made inside of loops in float32.
+  MatmulPrecision precision = MatmulPrecision::float32;
 };
 
 /// out [n, v, d]; weights [n, v, k, d] keeps the softmax for the backward pass (null: nobody asks).

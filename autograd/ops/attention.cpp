@@ -11,7 +11,8 @@ namespace restage {
 namespace {
 
 NeighbourAttentionInputs kernel_inputs(const NeighbourAttention& op, const Tensor* x) {
-  return {x[0], op.index, x[1], x[2], x[3], x[4], x[5], x[6], x[7], op.scale, op.dense};
+  return {x[0], op.index, x[1], x[2],     x[3],     x[4],
+          x[5], x[6],     x[7], op.scale, op.dense, op.precision};
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 // (spec 2.2; kernels/attention.h has the equations).
 #pragma once
 
+#include "autograd/kernels/matmul_precision.h"
 #include "autograd/tape/tape.h"
 
 namespace restage {
@@ -18,6 +19,7 @@ struct NeighbourAttention {
   Tensor index;        ///< i32 [n, v, k], k > 0: neighbours of each point within its cloud
   double scale = 1;    ///< positive
   bool dense = false;  ///< do every product in full (kernels/attention.h)
+  MatmulPrecision precision = matmul_precision();  ///< of a GPU's products (kernels/attention.h)
   void check(Inputs x) const;
   Tensor forward(Inputs x, Saved& saved) const;
   Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;

@@ -85,11 +85,18 @@ std::string sweep_command(const Found& f, const Budget& budget) {
 
 // ---- a table -----------------------------------------------------------------------------------
 
-/// The paper's line and ours of every row, then what needs no learning.
-Rows beside_each_other(const PaperTable& printed, const Table& table, const std::string& set_name) {
+/// The paper's line and ours of every row, then what needs no learning: once, or, if it sees what
+/// the row sees, below each.
+Rows beside_each_other(const PaperTable& printed, const Results& results, const Table& table,
+                       const std::string& set_name) {
   Rows rows{{"", "n"}};
   for (const auto* metric : table.columns) rows[0].push_back(heading(*metric));
   const auto set = set_of(table, set_name);
+  std::vector<std::pair<const tables::Row*, std::map<std::string, tables::MetricValues>>>
+      references;
+  for (const tables::Row& row : table.rows)
+    if (row.reference && set)
+      references.emplace_back(&row, tables::reference_by_case(results, set_name, row.label));
   for (const PaperRow& row : printed.rows) {
     if (!row.printed.empty()) {
       auto& paper = rows.emplace_back(
@@ -102,12 +109,22 @@ Rows beside_each_other(const PaperTable& printed, const Table& table, const std:
         "**" + row.row + "**", ours != nullptr ? std::to_string(ours->n) : "not run"});
     for (size_t c = 0; c < table.columns.size(); ++c)
       line.push_back(ours != nullptr && set ? with_interval(ours->cells[*set][c].value) : "-");
+    for (const auto& [reference, by_case] : references) {
+      const auto own = ours != nullptr ? by_case.find(ours->case_name) : by_case.end();
+      if (own == by_case.end()) continue;
+      auto& below = rows.emplace_back(
+          Rows::value_type{row.row + ": " + reference->label + " (learns nothing)", ""});
+      for (const auto* metric : table.columns) {
+        const auto value = own->second.find(metric->name);
+        below.push_back(value != own->second.end() ? tables::short_number(value->second) : "-");
+      }
+    }
   }
-  for (const tables::Row& row : table.rows) {
-    if (!row.reference || !set) continue;
-    auto& line = rows.emplace_back(Rows::value_type{row.label + " (learns nothing)", ""});
+  for (const auto& [row, by_case] : references) {
+    if (!by_case.empty()) continue;
+    auto& line = rows.emplace_back(Rows::value_type{row->label + " (learns nothing)", ""});
     for (size_t c = 0; c < table.columns.size(); ++c)
-      line.push_back(number(row.cells[*set][c].value.mean));
+      line.push_back(number(row->cells[*set][c].value.mean));
   }
   return rows;
 }
@@ -291,7 +308,7 @@ std::string section(const Found& f, const PageOptions& options, const std::strin
   for (const PaperTable& printed : asked.tables) {
     const std::string& set = measured_set(budget, printed);
     text += "**" + printed.set + (set == printed.set ? "" : ", measured on " + set) + "**\n\n" +
-            table_text(beside_each_other(printed, table, set)) + reasons(printed) + "\n";
+            table_text(beside_each_other(printed, f.results, table, set)) + reasons(printed) + "\n";
     text += where_text(f.results, printed, set, table);
     if (!budget.set.empty()) break;
   }

@@ -1,6 +1,7 @@
 #include "experiments/sweep/table.h"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "autograd/base/error.h"
@@ -65,6 +66,11 @@ std::vector<Group> group(const Results& results, const std::vector<std::string>&
     at->trials.push_back(&trial);
   }
   return groups;
+}
+
+std::string reference_label(std::string name) {
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name;
 }
 
 /// A row for each reference that some trial was measured beside, of all trials.
@@ -249,6 +255,17 @@ void tell_pooled(const std::vector<Group>& groups, std::vector<std::string>* not
                        "tell them apart");
 }
 
+void tell_averaged(const Results& results, Table* table) {
+  std::vector<std::string> averaged;
+  for (const Row& row : table->rows)
+    for (const std::string& set : table->sets)
+      if (row.reference && !reference_by_case(results, set, row.label).empty())
+        averaged.push_back(row.label + " on " + set);
+  if (!averaged.empty())
+    table->notices.push_back("not the same beside all rows, so that their lines are averages: " +
+                             joined(averaged) + "; --against takes each row's own");
+}
+
 /// Metric by metric of one set, for all rows.
 void fill_set(const std::vector<Group>& groups, size_t set, Bootstrap* bootstrap, Table* table) {
   double contradiction = 0;
@@ -273,6 +290,32 @@ void fill_set(const std::vector<Group>& groups, size_t set, Bootstrap* bootstrap
 
 }  // namespace
 
+std::map<std::string, MetricValues> reference_by_case(const Results& results,
+                                                      const std::string& set,
+                                                      const std::string& label) {
+  std::map<std::string, MetricValues> sums;
+  std::map<std::pair<std::string, std::string>, int> counts;
+  std::map<std::pair<uint64_t, std::string>, double> first;
+  bool agree = true;
+  for (const TrialResult& trial : results.trials) {
+    const SetResult* measured = find(trial.sets, set);
+    if (measured == nullptr) continue;
+    for (const auto& [name, scores] : measured->references) {
+      if (reference_label(name) != label) continue;
+      for (const auto& [metric, value] : scores.mean) {
+        sums[trial.case_name][metric] += value;
+        ++counts[{trial.case_name, metric}];
+        const double before = first.try_emplace({trial.seed, metric}, value).first->second;
+        agree = agree && std::abs(value - before) <= 1e-6 * std::abs(before);
+      }
+    }
+  }
+  if (agree) return {};
+  for (auto& [name, values] : sums)
+    for (auto& [metric, sum] : values) sum /= counts[{name, metric}];
+  return sums;
+}
+
 Table make_table(const Results& results, const TableOptions& options) {
   Table table;
   table.columns = columns(options.columns);
@@ -283,8 +326,7 @@ Table make_table(const Results& results, const TableOptions& options) {
       if (known.insert(name).second) table.sets.push_back(name);
   std::vector<std::string> names = labels(groups);
   for (Group& reference : reference_groups(results)) {
-    names.push_back(reference.reference);
-    std::replace(names.back().begin(), names.back().end(), '_', ' ');
+    names.push_back(reference_label(reference.reference));
     groups.push_back(std::move(reference));
     ++table.references;
   }
@@ -297,6 +339,7 @@ Table make_table(const Results& results, const TableOptions& options) {
               &table.notices);
   Bootstrap bootstrap(options.seed);
   for (size_t s = 0; s < table.sets.size(); ++s) fill_set(groups, s, &bootstrap, &table);
+  tell_averaged(results, &table);
   return table;
 }
 

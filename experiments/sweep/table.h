@@ -2,6 +2,7 @@
 // (experiments/sweep/statistics.h is the rule), differences to one row. table_formats.h writes it.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -42,6 +43,13 @@ struct Table {
   std::optional<size_t> against;     ///< index of the row that differences are to
   std::vector<std::string> notices;  ///< what a reader of the figures must know, a line each
 };
+
+/// The means of what needs no learning by case of the trials that it was measured beside; nothing
+/// if trials of a seed agree. They do not where cases differ in what it sees (clouds, extractor):
+/// then its row, an average, says little. `label`: that of its row.
+std::map<std::string, MetricValues> reference_by_case(const Results& results,
+                                                      const std::string& set,
+                                                      const std::string& label);
 
 /// InputError: unknown key, metric or row.
 Table make_table(const Results& results, const TableOptions& options);

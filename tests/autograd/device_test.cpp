@@ -2,6 +2,7 @@
 // their inputs are, and whoever reads its memory on the host is told which op that was.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numeric>
 
 #include "autograd/gradcheck/evaluate.h"
@@ -151,19 +152,52 @@ std::vector<Tensor> attended(Device device, const std::vector<Tensor>& inputs,
   return out;
 }
 
-TEST(Device, TheGpusAttentionGoesThroughABatchInParts) {
-  // Two clouds of more pairs each than it handles at once.
-  const int64_t n = 2, v = 129, k = 512, d = 2;
+/// Points, features, weights and neighbours of an attention, in that order.
+std::pair<std::vector<Tensor>, Tensor> attention_inputs(int64_t n, int64_t v, int64_t k, int64_t d,
+                                                        DType type) {
   Rng rng(RngKey{1, 0});
   std::vector<Tensor> x;
   for (const Shape& shape : {Shape{n, v, 3}, Shape{n, v, d}, Shape{n, v, d}, Shape{n, v, d},
                              Shape{d, 3}, Shape{d}, Shape{2 * d, d}, Shape{d, d}, Shape{d}}) {
-    x.push_back(Tensor::empty(shape, DType::f64));
-    for (int64_t i = 0; i < x.back().numel(); ++i) x.back().data<double>()[i] = rng.normal();
+    Tensor wide = Tensor::empty(shape, DType::f64);
+    for (int64_t i = 0; i < wide.numel(); ++i) wide.data<double>()[i] = rng.normal();
+    x.push_back(wide.cast(type));
   }
   Tensor index = Tensor::empty({n, v, k}, DType::i32);
   for (int64_t i = 0; i < index.numel(); ++i)
     index.data<int32_t>()[i] = static_cast<int32_t>(rng.below(static_cast<uint64_t>(v)));
+  return {x, index};
+}
+
+TEST(Device, TheGpusAttentionRoundsItsProductsAsItIsTold) {
+  const auto [x, index] = attention_inputs(1, 20, 4, 32, DType::f32);
+  const auto exact = attended(emulated_gpu(), x, index);
+  std::vector<double> off;
+  for (const MatmulPrecision precision : {MatmulPrecision::tf32, MatmulPrecision::bfloat16}) {
+    const MatmulPrecisionScope scope(precision);
+    const auto rounded = attended(emulated_gpu(), x, index);
+    for (size_t t = 0; t < exact.size(); ++t) {
+      double difference = 0, size = 0;
+      for (int64_t i = 0; i < exact[t].numel(); ++i) {
+        difference += std::pow(rounded[t].item(i) - exact[t].item(i), 2);
+        size += std::pow(exact[t].item(i), 2);
+      }
+      off.push_back(size > 0 ? std::sqrt(difference / size) : 0);
+    }
+  }
+  // Of the value, then of each gradient; that of the last input is zero.
+  for (size_t t = 0; t + 1 < exact.size(); ++t) {
+    const double tf32 = off[t], bfloat16 = off[exact.size() + t];
+    EXPECT_GT(tf32, 1e-5) << t;
+    EXPECT_LT(tf32, 1e-2) << t;
+    EXPECT_GT(bfloat16, 2 * tf32) << t;
+    EXPECT_LT(bfloat16, 0.5) << t;
+  }
+}
+
+TEST(Device, TheGpusAttentionGoesThroughABatchInParts) {
+  // Two clouds of more pairs each than it handles at once.
+  const auto [x, index] = attention_inputs(2, 129, 512, 2, DType::f64);
   const auto here = attended({}, x, index), there = attended(emulated_gpu(), x, index);
   for (size_t t = 0; t < here.size(); ++t)
     for (int64_t i = 0; i < here[t].numel(); ++i)

@@ -54,17 +54,19 @@ class Reproduce : public FileTest {
         if (s % 2 == 1) sequences.back()["name"] = s < 2 ? "walk-b-a" : "run-b-a";
       }
       const std::string id = "00000000000" + std::to_string(++made_);
-      const Json result = {
-          {"id", id.substr(id.size() - 12)},
-          {"case", row},
-          {"seed", seed},
-          {"overrides", Json::object()},
-          {"state", "done"},
-          {"error", nullptr},
-          {"artifacts", Json::object()},
-          {"seconds", 60},
-          {"metrics",
-           {{"naked", {{"mean", {{"mpjpe", sum}, {"acc", acc}}}, {"sequences", sequences}}}}}};
+      const Json result = {{"id", id.substr(id.size() - 12)},
+                           {"case", row},
+                           {"seed", seed},
+                           {"overrides", Json::object()},
+                           {"state", "done"},
+                           {"error", nullptr},
+                           {"artifacts", Json::object()},
+                           {"seconds", 60},
+                           {"metrics",
+                            {{"naked",
+                              {{"mean", {{"mpjpe", sum}, {"acc", acc}}},
+                               {"sequences", sequences},
+                               {"references", references_}}}}}};
       dir.write("x/trials/" + id.substr(id.size() - 12) + "/result.json", result.dump());
     }
   }
@@ -72,6 +74,8 @@ class Reproduce : public FileTest {
     const PaperFile file = read_paper_file(dir / "x/paper.yaml");
     return judge(file, file.lite, file.claims[0], tables::read_results(dir / "x"), 0);
   }
+
+  Json references_ = Json::object();  ///< of the rows that are put next
 
  private:
   int made_ = 0;
@@ -179,6 +183,34 @@ TEST_F(Reproduce, ThePageSaysWhereTheErrorsAre) {
         "| b-a    |  80 |", "Worst sequences of new: run-b-a 95, run-a-b 80, walk-b-a 65, ",
         "A trial of new took 1:00."})
     EXPECT_HAS(text, line);
+}
+
+TEST_F(Reproduce, WhatLearnsNothingStandsBelowTheRowWhoseInputItSees) {
+  const auto seen = [&](double noisy) {
+    const auto scores = [](double mpjpe) {
+      return Json{{"mean", {{"mpjpe", mpjpe}}}, {"sequences", Json::array()}};
+    };
+    references_ = {{"closed_form", scores(noisy)}, {"source_unchanged", scores(0.31)}};
+  };
+  seen(0.2);
+  put("old", 2, 0.12, 0.02, 0.001);
+  seen(0.4);
+  put("new", 2, 0.10, 0.02, 0.001);
+  const Evidence evidence{"x", "experiments/x", dir / "x", read_paper_file(dir / "x/paper.yaml")};
+  const Found one{evidence, tables::read_results(dir / "x"), {judged()}};
+  const std::string text = page_markdown({one}, {"somebody2024", "lite", {"restage"}}, "t", "..");
+  const auto value_of = [&](const std::string& label) {
+    const size_t at = text.find("| " + label);
+    if (at == std::string::npos || text.find("| " + label, at + 1) != std::string::npos)
+      return std::string();
+    const std::string line = text.substr(at, text.find('\n', at) - at);
+    const size_t value = line.find_first_not_of("| ", line.find('|', 2));
+    return line.substr(value, line.find(' ', value) - value);
+  };
+  EXPECT_EQ(value_of("old: closed form (learns nothing)"), "0.2");
+  EXPECT_EQ(value_of("new: closed form (learns nothing)"), "0.4");
+  EXPECT_EQ(value_of("source unchanged (learns nothing)"), "0.31");
+  EXPECT_EQ(text.find("| closed form"), std::string::npos) << "an average of the two says nothing";
 }
 
 TEST_F(Reproduce, MistakesInAPaperFileAreToldWithTheirLine) {

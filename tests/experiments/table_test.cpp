@@ -231,9 +231,18 @@ TEST_F(TableTest, ReferencesOfAllTrialsAreRowsOfTheirOwn) {
   EXPECT_EQ(table.rows[1].cells[0][0].difference->n, 2);
   EXPECT_NEAR(*table.rows[1].cells[0][0].difference->mean, 0, 1e-12);
   EXPECT_NEAR(*table.rows[0].cells[0][0].difference->mean, 0.2, 1e-12);
-  const Json json = to_json(table, read_results(dir.path()));
+  const Results results = read_results(dir.path());
+  const Json json = to_json(table, results);
   EXPECT_EQ(json["rows"].size(), 2u);
   EXPECT_EQ(json["references"].size(), 2u);
+  // It is told that an average of what rows were measured beside is one, and what it was beside
+  // each.
+  ASSERT_EQ(table.notices.size(), 1u);
+  EXPECT_HAS(table.notices[0], "averages: 'closed form on naked'; --against");
+  const auto by_case = reference_by_case(results, "naked", "closed form");
+  EXPECT_NEAR(by_case.at("quaternion").at("mpjpe"), 0.075, 1e-12);
+  EXPECT_NEAR(by_case.at("6D").at("mpjpe"), 0.175, 1e-12);
+  EXPECT_TRUE(reference_by_case(results, "naked", "source unchanged").empty());
 }
 
 TEST_F(TableTest, OurOwnBenchmarkCanBeRead) {

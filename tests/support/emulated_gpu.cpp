@@ -11,6 +11,7 @@
 #include "autograd/cuda/matmul.cu"
 #include "autograd/cuda/norm.cu"
 #include "autograd/cuda/points.cu"
+#include "autograd/cuda/pooled_norm.cu"
 #include "autograd/cuda/recurrent.cu"
 #include "autograd/cuda/reduce.cu"
 #include "autograd/cuda/rotation.cu"
