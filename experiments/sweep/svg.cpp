@@ -87,7 +87,7 @@ std::vector<double> Axis::marks() const {
   const double step = power * (raw / power >= 5 ? 5 : raw / power >= 2 ? 2 : 1);
   std::vector<double> out;
   for (double i = std::ceil(low / step); i * step <= high && out.size() < 10; ++i)
-    out.push_back(i * step);
+    out.push_back(i * step + 0.0);  // no -0
   return out;
 }
 

@@ -175,25 +175,63 @@ void draw_labels(const Table& table, double x, double y, Svg* svg) {
   }
 }
 
-/// A column with a value: dots and intervals of all rows below each other.
+struct Range {
+  double low = 1e300, high = -1e300;
+  bool empty() const { return low > high; }
+  void take(const Estimate& e) {
+    low = std::min(low, e.low.value_or(*e.mean));
+    high = std::max(high, e.high.value_or(*e.mean));
+  }
+};
+
+/// What the rows of trials span, and what needs no learning where it is not much farther: a rest
+/// pose may be twenty times as far, and on an axis for it all others are one dot.
+Range range_of(const Table& table, size_t set, size_t column) {
+  Range trials, all;
+  const auto each = [&](auto f) {
+    for (const Row& row : table.rows)
+      if (const Estimate& e = row.cells[set][column].value; e.mean) f(row, e);
+  };
+  each([&](const Row& row, const Estimate& e) {
+    all.take(e);
+    if (!row.reference) trials.take(e);
+  });
+  if (trials.empty()) return all;
+  const double far = 2 * (trials.high - trials.low);
+  Range out = trials;
+  each([&](const Row&, const Estimate& e) {
+    if (*e.mean >= trials.low - far && *e.mean <= trials.high + far) out.take(e);
+  });
+  return out;
+}
+
+/// A column with a value: dots and intervals of all rows below each other; beyond the axis the
+/// value and an arrow.
 void draw_panel(const Table& table, size_t set, size_t column, double x, double y, Svg* svg) {
   const double bottom = y + kStep * static_cast<double>(table.rows.size());
-  double low = 1e300, high = -1e300;
-  for (const Row& row : table.rows)
-    if (const Estimate& e = row.cells[set][column].value; e.mean) {
-      low = std::min(low, e.low.value_or(*e.mean));
-      high = std::max(high, e.high.value_or(*e.mean));
-    }
-  const Axis axis(low, high, x, x + kPanel);
+  const Range range = range_of(table, set, column);
+  const Axis axis(range.low, range.high, x, x + kPanel);
   svg->text(x, y - 10, table.sets[set] + ": " + heading(*table.columns[column]), "start", 12);
+  double written = -1e300;  // how far to the right numbers stand already
   for (const double mark : axis.marks()) {
+    const std::string number = short_number(mark);
+    const double half = 3.0 * static_cast<double>(number.size());
     svg->line(axis.at(mark), y, axis.at(mark), bottom, "#ddd");
-    svg->text(axis.at(mark), bottom + 14, short_number(mark), "middle", 10, "#555");
+    if (axis.at(mark) - half < written) continue;
+    svg->text(axis.at(mark), bottom + 14, number, "middle", 10, "#555");
+    written = axis.at(mark) + half + 4;
   }
   for (size_t r = 0; r < table.rows.size(); ++r) {
     const double at = y + kStep * (static_cast<double>(r) + 0.5);
     const Estimate& e = table.rows[r].cells[set][column].value;
     if (!e.mean) continue;
+    if (*e.mean < range.low || *e.mean > range.high) {
+      const bool below = *e.mean < range.low;
+      svg->text(below ? x + 2 : x + kPanel - 2, at + 4,
+                below ? "← " + short_number(*e.mean) : short_number(*e.mean) + " →",
+                below ? "start" : "end", 10, colour_of(r));
+      continue;
+    }
     if (e.low) svg->line(axis.at(*e.low), at, axis.at(*e.high), at, colour_of(r), 2);
     svg->dot(axis.at(*e.mean), at, 3.5, colour_of(r));
   }

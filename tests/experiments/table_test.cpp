@@ -245,6 +245,20 @@ TEST_F(TableTest, ReferencesOfAllTrialsAreRowsOfTheirOwn) {
   EXPECT_TRUE(reference_by_case(results, "naked", "source unchanged").empty());
 }
 
+TEST_F(TableTest, APictureIsDrawnForTheRowsOfTrials) {
+  for (int seed = 1; seed <= 2; ++seed) {
+    Json one = trial(seed, "6D", seed, Json::object(), 0.1 + 0.01 * seed);
+    one["metrics"]["naked"]["references"] = {
+        {"closed_form", trial(seed, "6D", seed, Json::object(), 0.125)["metrics"]["naked"]},
+        {"rest_pose", trial(seed, "6D", seed, Json::object(), 2.5)["metrics"]["naked"]}};
+    put(one);
+  }
+  const std::string svg = to_svg(make_table(read_results(dir.path()), {}));
+  EXPECT_HAS(svg, ">2.5 →</text>");
+  EXPECT_EQ(svg.find("0.125 →"), std::string::npos);
+  EXPECT_EQ(svg.find(">-0</text>"), std::string::npos);
+}
+
 TEST_F(TableTest, OurOwnBenchmarkCanBeRead) {
   const std::string folder = std::string(RESTAGE_SOURCE_DIR) + "/experiments/benchmark";
   const Table table = make_table(read_results(folder), {});
