@@ -16,6 +16,7 @@
 #include "autograd/ops/layout.h"
 #include "autograd/ops/linear.h"
 #include "autograd/ops/points.h"
+#include "autograd/ops/pooled_norm.h"
 #include "autograd/ops/reduce.h"
 #include "tests/support/emulated_gpu.h"
 #include "tests/support/errors.h"
@@ -203,6 +204,34 @@ TEST(Device, TheGpusAttentionGoesThroughABatchInParts) {
     for (int64_t i = 0; i < here[t].numel(); ++i)
       ASSERT_NEAR(there[t].item(i), here[t].item(i), 1e-9 * (1 + std::abs(here[t].item(i))))
           << "tensor " << t << ", number " << i;
+}
+
+TEST(Device, TheGpusPooledNormGoesThroughABatchInParts) {
+  // Two clouds, each with as many products as it has at once, of more points than a thread goes
+  // through.
+  const int64_t n = 2, v = 4200, i = 2, o = 2100;
+  Rng rng(RngKey{1, 0});
+  std::vector<Tensor> inputs;
+  for (const Shape& shape : {Shape{n, v, i}, Shape{o, i}, Shape{o}, Shape{o}, Shape{o}}) {
+    inputs.push_back(Tensor::empty(shape, DType::f64));
+    for (int64_t k = 0; k < inputs.back().numel(); ++k)
+      inputs.back().data<double>()[k] = rng.normal();
+  }
+  const auto pooled = [&](Device device) {
+    Tape tape;
+    std::vector<Var> x;
+    for (const Tensor& t : inputs) x.push_back(tape.leaf(t.to(device), x.size() + 1));
+    const Var y = pooled_norm(x[0], x[1], x[2], x[3], x[4], Activation::relu);
+    const Gradients gradients = tape.backward(sum_all(square(y)));
+    std::vector<Tensor> out{y.value.cpu()};
+    for (size_t k = 1; k <= x.size(); ++k) out.push_back(gradients.find(k)->cpu());
+    return out;
+  };
+  const auto here = pooled({}), there = pooled(emulated_gpu());
+  for (size_t t = 0; t < here.size(); ++t)
+    for (int64_t k = 0; k < here[t].numel(); ++k)
+      ASSERT_NEAR(there[t].item(k), here[t].item(k), 1e-9 * (1 + std::abs(here[t].item(k))))
+          << "tensor " << t << ", number " << k;
 }
 
 /// Ops that have a kernel of their own and a composition, with the contracts of the former.
