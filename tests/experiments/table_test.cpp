@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <regex>
 
 #include "experiments/sweep/table_formats.h"
 #include "tests/support/files.h"
@@ -246,17 +247,40 @@ TEST_F(TableTest, ReferencesOfAllTrialsAreRowsOfTheirOwn) {
 }
 
 TEST_F(TableTest, APictureIsDrawnForTheRowsOfTrials) {
-  for (int seed = 1; seed <= 2; ++seed) {
-    Json one = trial(seed, "6D", seed, Json::object(), 0.1 + 0.01 * seed);
+  int i = 0;
+  for (const double value : {0.02, 0.4}) {
+    Json one = trial(++i, i == 1 ? "6D" : "quaternion", 1, Json::object(), value);
     one["metrics"]["naked"]["references"] = {
-        {"closed_form", trial(seed, "6D", seed, Json::object(), 0.125)["metrics"]["naked"]},
-        {"rest_pose", trial(seed, "6D", seed, Json::object(), 2.5)["metrics"]["naked"]}};
+        {"closed_form", trial(i, "", 1, Json::object(), 0.125)["metrics"]["naked"]},
+        {"rest_pose", trial(i, "", 1, Json::object(), 2.5)["metrics"]["naked"]}};
     put(one);
   }
   const std::string svg = to_svg(make_table(read_results(dir.path()), {}));
   EXPECT_HAS(svg, ">2.5 →</text>");
   EXPECT_EQ(svg.find("0.125 →"), std::string::npos);
+  // The axis begins below zero, which has no sign.
+  EXPECT_HAS(svg, "fill=\"#555\">0</text>");
   EXPECT_EQ(svg.find(">-0</text>"), std::string::npos);
+}
+
+TEST_F(TableTest, NumbersOfAnAxisDoNotOverlap) {
+  int i = 0;
+  for (const double value : {0.000092, 0.000116}) {
+    Json one = trial(++i, std::to_string(i), 1, Json::object(), value);
+    one["metrics"]["naked"]["sequences"] = Json::array();
+    put(one);
+  }
+  const std::string svg = to_svg(make_table(read_results(dir.path()), {}));
+  const std::regex number(
+      "<text x=\"([0-9.]+)\"[^>]*font-size=\"10\" fill=\"#555\">([0-9.e-]+)</text>");
+  double written = 0;
+  int found = 0;
+  for (std::sregex_iterator at(svg.begin(), svg.end(), number), end; at != end; ++at, ++found) {
+    const double half = 3.0 * static_cast<double>((*at)[2].length());
+    EXPECT_GE(std::stod((*at)[1]) - half, written) << at->str();
+    written = std::stod((*at)[1]) + half;
+  }
+  EXPECT_GE(found, 2);
 }
 
 TEST_F(TableTest, OurOwnBenchmarkCanBeRead) {
