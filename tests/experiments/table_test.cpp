@@ -249,7 +249,8 @@ TEST_F(TableTest, ReferencesOfAllTrialsAreRowsOfTheirOwn) {
 TEST_F(TableTest, APictureIsDrawnForTheRowsOfTrials) {
   int i = 0;
   for (const double value : {0.02, 0.4}) {
-    Json one = trial(++i, i == 1 ? "6D" : "quaternion", 1, Json::object(), value);
+    ++i;
+    Json one = trial(i, i == 1 ? "6D" : "quaternion", 1, Json::object(), value);
     one["metrics"]["naked"]["references"] = {
         {"closed_form", trial(i, "", 1, Json::object(), 0.125)["metrics"]["naked"]},
         {"rest_pose", trial(i, "", 1, Json::object(), 2.5)["metrics"]["naked"]}};
@@ -266,7 +267,8 @@ TEST_F(TableTest, APictureIsDrawnForTheRowsOfTrials) {
 TEST_F(TableTest, NumbersOfAnAxisDoNotOverlap) {
   int i = 0;
   for (const double value : {0.000092, 0.000116}) {
-    Json one = trial(++i, std::to_string(i), 1, Json::object(), value);
+    ++i;
+    Json one = trial(i, std::to_string(i), 1, Json::object(), value);
     one["metrics"]["naked"]["sequences"] = Json::array();
     put(one);
   }
