@@ -8,15 +8,15 @@ namespace restage::cli {
 
 void add_compare(Program& program);
 void add_data(Program& program);
-void add_data_build(Program& program, CLI::App& group);  // of `data`, as all add_data_*
-void add_data_fetch(Program& program, CLI::App& group);
-void add_data_import(Program& program, CLI::App& group);
-void add_data_inspect(Program& program, CLI::App& group);
-void add_data_merge(Program& program, CLI::App& group);
-void add_data_perform(Program& program, CLI::App& group);
-void add_data_realism(Program& program, CLI::App& group);
-void add_data_sheet(Program& program, CLI::App& group);
-void add_data_split(Program& program, CLI::App& group);
+void add_data_build(Program& program, CommandOptions group);  // of `data`, as all add_data_*
+void add_data_fetch(Program& program, CommandOptions group);
+void add_data_import(Program& program, CommandOptions group);
+void add_data_inspect(Program& program, CommandOptions group);
+void add_data_merge(Program& program, CommandOptions group);
+void add_data_perform(Program& program, CommandOptions group);
+void add_data_realism(Program& program, CommandOptions group);
+void add_data_sheet(Program& program, CommandOptions group);
+void add_data_split(Program& program, CommandOptions group);
 void add_doctor(Program& program);
 void add_eval(Program& program);
 void add_info(Program& program);
@@ -27,8 +27,8 @@ void add_reproduce(Program& program);
 void add_retarget(Program& program);
 void add_skeleton(Program& program);
 void add_sweep(Program& program);
-void add_sweep_export(Program& program, CLI::App& group);  // of `sweep`, as all add_sweep_*
-void add_sweep_table(Program& program, CLI::App& group);
+void add_sweep_export(Program& program, CommandOptions group);  // of `sweep`, as all add_sweep_*
+void add_sweep_table(Program& program, CommandOptions group);
 void add_train(Program& program);
 void add_weights(Program& program);
 

@@ -52,8 +52,8 @@ void add_compare(Program& program) {
                               "restage compare runs/lite-1 runs/lite-2 --out curves.svg\n"
                               "restage compare runs/smoothness/trials/* --json",
                               run_compare);
-  app.add_option("RUN_OR_TRIAL", a.folders, "run directories, DIR/trials/ID of sweeps")->required();
-  app.add_option("--out", a.out, "curves as F.svg, or a folder for them")->allow_extra_args(false);
+  app.add_option("RUN_OR_TRIAL", a.folders, "run directories, DIR/trials/ID of sweeps").required();
+  app.add_option("--out", a.out, "curves as F.svg, or a folder for them").one_at_a_time();
 }
 
 }  // namespace restage::cli

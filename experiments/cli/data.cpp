@@ -18,18 +18,18 @@ int run_verify(const std::string& file, const Common& common) {
   return problems.empty() ? 0 : 1;
 }
 
-void add_verify(Program& program, CLI::App& group) {
+void add_verify(Program& program, CommandOptions group) {
   auto [app, file] = program.add(
       group, "verify",
       "read all of a file or benchmark folder and list what is wrong (exit code 1)",
       "restage data verify data.h5\nrestage data verify open_benchmark/ --json", run_verify);
-  app.add_option("FILE", file, "an HDF5 file, or a folder made by restage data build")->required();
+  app.add_option("FILE", file, "an HDF5 file, or a folder made by restage data build").required();
 }
 
 }  // namespace
 
 void add_data(Program& program) {
-  CLI::App& group = program.add_group("data", "make, import and check data files");
+  CommandOptions group = program.add_group("data", "make, import and check data files");
   add_data_build(program, group);
   add_data_fetch(program, group);
   add_data_import(program, group);

@@ -132,7 +132,7 @@ int run_build(const BuildOptions& options, const Common& common) {
 
 }  // namespace
 
-void add_data_build(Program& program, CLI::App& group) {
+void add_data_build(Program& program, CommandOptions group) {
   auto [app, options] = program.add(
       group, "build", "make the open benchmark from its recipe, or parametric data from nothing",
       "restage data build configs/data/open_benchmark.yaml out=benchmark data=DATA_FOLDER\n"
@@ -143,9 +143,9 @@ void add_data_build(Program& program, CLI::App& group) {
                  "RECIPE.yaml, out=DIR, data=DIR and key=value overrides");
   app.add_option("--out", options.out, "file (or folder, of a recipe) to write");
   app.add_option("--bodies", options.bodies, "built-in bodies for training, validation and test")
-      ->expected(3);
+      .count(3);
   app.add_option("--motions", options.motions, "built-in motions for training, validation and test")
-      ->expected(3);
+      .count(3);
 }
 
 }  // namespace restage::cli

@@ -38,14 +38,14 @@ int run_fetch(const FetchOptions& o, const Common& common) {
 
 }  // namespace
 
-void add_data_fetch(Program& program, CLI::App& group) {
+void add_data_fetch(Program& program, CommandOptions group) {
   auto [app, o] =
       program.add(group, "fetch", "fill a data folder from public addresses, checked by SHA-256",
                   "restage data fetch --out data\n"
                   "restage data fetch --out data --from /mnt/copy_of_data",
                   run_fetch);
   app.add_option("LIST", o.list, "lines 'SHA256 BYTES PATH ADDRESS' (default: " + o.list + ")");
-  app.add_option("--out", o.out, "data folder to fill")->required();
+  app.add_option("--out", o.out, "data folder to fill").required();
   app.add_option("--from", o.from,
                  "folder laid out alike to copy from, instead of the network; CMU's recordings may "
                  "lie anywhere in it");

@@ -81,7 +81,7 @@ int run_import(ImportArguments arguments, const Common& common) {
 
 }  // namespace
 
-void add_data_import(Program& program, CLI::App& group) {
+void add_data_import(Program& program, CommandOptions group) {
   auto [app, given] = program.add(
       group, "import", "turn bodies, motions, characters or scans into a data file",
       "restage data import DATA_FOLDER --out real.h5\n"
@@ -103,26 +103,26 @@ void add_data_import(Program& program, CLI::App& group) {
                  "data folder; recording (.bvh, .amc; also .xz); character (.glb, .gltf, .vrm); "
                  "AMASS motion or body model (.npz); scans (.ply, .obj, .npy, .npz); or a folder "
                  "of one kind")
-      ->required();
-  app.add_option("--out", given.out, "file to write")->required();
+      .required();
+  app.add_option("--out", given.out, "file to write").required();
   app.add_option("--license", options.license, "licence of the files");
   app.add_option("--subject", motion.subject, "who moves (default: by the file's name)");
   app.add_option("--subjects", options.subjects,
                  "folders: regular expression on a file's path below SOURCE whose first group "
                  "names who moves");
   app.add_option("--split", motion.split, "train, validation or test");
-  app.add_option("--scale", motion.scale, "metres per unit of the file")->check(positive);
-  app.add_option("--fps", motion.fps, "true frame rate")->check(positive);
+  app.add_option("--scale", motion.scale, "metres per unit of the file").check(positive);
+  app.add_option("--fps", motion.fps, "true frame rate").check(positive);
   app.add_option("--up", given.up, "up axis of the file: auto, x, y, z, -x, -y or -z");
   app.add_option("--facing", given.facing,
                  "recordings: axis that the rest pose faces: auto, z, -y ...");
   app.add_option("--rest-frame", motion.rest.frame, "recordings: a frame that is a T-pose")
-      ->check(not_negative);
+      .check(not_negative);
   app.add_option(
          "--drop-leading", motion.drop_leading,
          "recordings: frames to leave out at the beginning (default: the T-pose in front of "
          "the Daz release of CMU)")
-      ->check(not_negative);
+      .check(not_negative);
   app.add_option("--profile", motion.profile,
                  "recordings, characters: bone names, a known family or a .yaml file");
   app.add_flag("--force", motion.force,

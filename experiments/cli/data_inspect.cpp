@@ -239,7 +239,7 @@ int run_inspect(const InspectOptions& options, const Common& common) {
 
 }  // namespace
 
-void add_data_inspect(Program& program, CLI::App& group) {
+void add_data_inspect(Program& program, CommandOptions group) {
   auto [app, options] =
       program.add(group, "inspect", "say what a file holds, and draw it",
                   "restage data inspect data.h5\nrestage data inspect data.h5 --plot sheet.png\n"
@@ -250,7 +250,7 @@ void add_data_inspect(Program& program, CLI::App& group) {
   app.add_option(
          "FILE", options.file,
          "bodies, motions, scans or a prediction (HDF5), or what 'restage data import' takes")
-      ->required();
+      .required();
   app.add_option("--body-model", options.body_model, "for an AMASS motion: its SMPL model (.npz)");
   app.add_option("--plot", options.plot, "draw bodies, poses or frames on a contact sheet (PNG)");
 }

@@ -28,14 +28,14 @@ int run_merge(const MergeArguments& given, const Common& common) {
 
 }  // namespace
 
-void add_data_merge(Program& program, CLI::App& group) {
+void add_data_merge(Program& program, CommandOptions group) {
   auto [app, given] =
       program.add(group, "merge", "put the bodies and motions of several data files into one",
                   "restage data merge real.h5 walk.h5 --out all.h5\n"
                   "restage data merge a.h5 b.h5 --prefix --out both.h5",
                   run_merge);
-  app.add_option("FILES", given.files, "data files with bodies, motions or both")->required();
-  app.add_option("--out", given.out, "file to write")->required();
+  app.add_option("FILES", given.files, "data files with bodies, motions or both").required();
+  app.add_option("--out", given.out, "file to write").required();
   app.add_flag("--prefix", given.options.prefix, "put each file's name before its ids");
 }
 

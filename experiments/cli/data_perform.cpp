@@ -58,14 +58,14 @@ int run_perform(const PerformOptions& o, const Common& common) {
 
 }  // namespace
 
-void add_data_perform(Program& program, CLI::App& group) {
+void add_data_perform(Program& program, CommandOptions group) {
   auto [app, o] = program.add(
       group, "perform", "scans of a body performing a motion, and the truth for a target",
       "restage data perform --bodies data.h5 --body b140 --motion 02_01 --target b150 --out walk/\n"
       "restage data perform --bodies data.h5 --motions walk.h5 --body b140 --out walk/\n"
       "restage data perform --bodies data.h5 --first 30 --frames 60 --out two_seconds/",
       run_perform);
-  app.add_option("--bodies", o.bodies, "data file with bodies")->required();
+  app.add_option("--bodies", o.bodies, "data file with bodies").required();
   app.add_option("--motions", o.motions, "data file with motions (default: the same)");
   app.add_option("--body", o.body, "who is scanned (default: the first)");
   app.add_option("--motion", o.motion, "which motion (default: the first)");
@@ -73,7 +73,7 @@ void add_data_perform(Program& program, CLI::App& group) {
   app.add_option("--first", o.first, "first frame");
   app.add_option("--frames", o.frames, "how many (default: to the end)");
   app.add_option("--out", o.out, "folder for source.h5, target.ply, rest.h5 and truth.h5")
-      ->required();
+      .required();
 }
 
 }  // namespace restage::cli

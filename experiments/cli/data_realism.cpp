@@ -74,11 +74,11 @@ int run_realism(const std::string& file, const Common& common) {
 
 }  // namespace
 
-void add_data_realism(Program& program, CLI::App& group) {
+void add_data_realism(Program& program, CommandOptions group) {
   auto [app, file] = program.add(group, "realism",
                                  "volume at bent joints, joints inside the body, feet on the floor",
                                  "restage data realism benchmark/test.h5", run_realism);
-  app.add_option("FILE", file, "data file with bodies and motions (HDF5)")->required();
+  app.add_option("FILE", file, "data file with bodies and motions (HDF5)").required();
 }
 
 }  // namespace restage::cli

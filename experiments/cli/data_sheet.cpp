@@ -114,7 +114,7 @@ int run_sheet(const SheetArguments& a, const Common& common) {
 
 }  // namespace
 
-void add_data_sheet(Program& program, CLI::App& group) {
+void add_data_sheet(Program& program, CommandOptions group) {
   auto [app, a] = program.add(
       group, "sheet", "draw all bodies and motions of a file, or all sequences of a folder",
       "restage data sheet benchmark/test.h5 --out test.png\n"
@@ -122,8 +122,8 @@ void add_data_sheet(Program& program, CLI::App& group) {
       "restage data sheet data.h5 --columns 10 --title 'our people' --out people.png",
       run_sheet);
   app.add_option("INPUT", a.input, "data file with bodies (HDF5), or naked/, clothed/ or scans/")
-      ->required();
-  app.add_option("--out", a.out, "sheet.png")->required();
+      .required();
+  app.add_option("--out", a.out, "sheet.png").required();
   app.add_option("--columns", a.columns, "figures in a row");
   app.add_option("--title", a.title, "a line at the top");
 }

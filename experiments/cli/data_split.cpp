@@ -48,7 +48,7 @@ int run_split(const SplitArguments& a, const Common& common) {
 
 }  // namespace
 
-void add_data_split(Program& program, CLI::App& group) {
+void add_data_split(Program& program, CommandOptions group) {
   auto [app, a] =
       program.add(group, "split", "deal people and bodies to training, validation and test",
                   "restage data split people.h5 --out data.h5\n"
@@ -58,17 +58,16 @@ void add_data_split(Program& program, CLI::App& group) {
                   "restage data split all.h5 --only ann,ben,eve --bodies all.h5 --out few.h5\n"
                   "restage data split one_person.h5 --by clip --out data.h5",
                   run_split);
-  app.add_option("FILE", a.file, "data file with bodies, motions or both")->required();
-  app.add_option("--out", a.out, "file to write")->required();
+  app.add_option("FILE", a.file, "data file with bodies, motions or both").required();
+  app.add_option("--out", a.out, "file to write").required();
   app.add_option("--shares", a.shares, "of training, validation and test, by seconds of motion")
-      ->delimiter(',')
-      ->capture_default_str();
+      .separated_by(',')
+      .show_default();
   app.add_option("--bodies", a.bodies,
                  "data file (FILE too) whose bodies come along, in the splits that they have "
                  "there; or builtin");
-  app.add_option("--only", a.only, "these people and nobody else")->delimiter(',');
-  app.add_option("--by", a.by, "subject, or clip where there are too few people")
-      ->capture_default_str();
+  app.add_option("--only", a.only, "these people and nobody else").separated_by(',');
+  app.add_option("--by", a.by, "subject, or clip where there are too few people").show_default();
 }
 
 }  // namespace restage::cli

@@ -415,7 +415,7 @@ void add_doctor(Program& program) {
       run_doctor);
   app.add_option("FILE", options.path,
                  "HDF5, PLY, OBJ, BVH, safetensors, YAML, or a folder of frames")
-      ->required();
+      .required();
   app.add_option("--picture", options.picture, "draw it from front, side and top (PNG)");
   app.add_option("--fix", options.fix,
                  "write it mended: X.ply or X.obj (one cloud or surface), X.h5 (a sequence), or a "

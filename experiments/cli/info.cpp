@@ -65,7 +65,7 @@ void add_info(Program& program) {
                                  "restage info skeleton/point_transformer\n"
                                  "restage info smrm/rot6d --json",
                                  run_info);
-  app.add_option("MODEL", name, "one of:" + model_names())->required();
+  app.add_option("MODEL", name, "one of:" + model_names()).required();
 }
 
 }  // namespace restage::cli

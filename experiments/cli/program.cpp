@@ -1,5 +1,8 @@
 #include "experiments/cli/program.h"
 
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
 #include <algorithm>
 #include <cctype>
 #include <charconv>
@@ -112,22 +115,27 @@ void check_out(const CLI::App& command) {
 
 }  // namespace
 
-Program::Program() : app_("Correspondence-free retargeting of human motion.", "restage") {
-  app_.set_version_flag("--version", "restage " RESTAGE_VERSION, "print the version");
-  app_.require_subcommand(1);
-  app_.footer(
+Program::Program()
+    : app_(std::make_unique<CLI::App>("Correspondence-free retargeting of human motion.",
+                                      "restage")),
+      all_(*app_) {
+  app_->set_version_flag("--version", "restage " RESTAGE_VERSION, "print the version");
+  app_->require_subcommand(1);
+  app_->footer(
       with_heading("restage COMMAND --help\n"
                    "restage eval --pred result.h5 --truth truth.h5"));
-  add_common_options(app_);
+  add_common_options(all_);
 }
 
-void Program::add_common_options(CLI::App& app) {
-  app.set_help_flag("-h,--help", "print this page");
-  app.get_formatter()->column_width(36);
+Program::~Program() = default;
+
+void Program::add_common_options(CommandOptions app) {
+  app.app().set_help_flag("-h,--help", "print this page");
+  app.app().get_formatter()->column_width(36);
   const std::string group = "Common options";
-  app.add_option("--threads", common_.threads, "number of threads, 0 for all cores")->group(group);
+  app.add_option("--threads", common_.threads, "number of threads, 0 for all cores").group(group);
   app.add_option("--seed", common_.seed, "seed of all random numbers")
-      ->check([](const std::string& text) {
+      .check([](const std::string& text) {
         if (text.starts_with("-")) return "is '" + text + "', but cannot be negative";
         uint64_t value = 0;
         const auto end = text.data() + text.size();
@@ -135,44 +143,44 @@ void Program::add_common_options(CLI::App& app) {
                    ? "is '" + text + "', but cannot be above 2^64 - 1"
                    : std::string();
       })
-      ->group(group);
-  app.add_flag("--quiet", common_.quiet, "print results and errors only")->group(group);
-  app.add_flag("--verbose", common_.verbose, "print more about what is done")->group(group);
-  app.add_flag("--json", common_.json, "print one JSON document instead of text")->group(group);
-  app.add_option_function<std::string>(
+      .group(group);
+  app.add_flag("--quiet", common_.quiet, "print results and errors only").group(group);
+  app.add_flag("--verbose", common_.verbose, "print more about what is done").group(group);
+  app.add_flag("--json", common_.json, "print one JSON document instead of text").group(group);
+  app.add_text(
          "--max-memory",
          [this](const std::string& text) { common_.max_memory = parse_memory(text); },
          "most that unpacking a compressed file may take (4GB)")
-      ->group(group);
+      .group(group);
 }
 
-CLI::App& Program::add(CLI::App& group, const std::string& name, const std::string& help,
-                       const std::string& examples, std::function<int()> action) {
-  CLI::App& command = *group.add_subcommand(name, help);
-  add_common_options(command);
+CommandOptions Program::add(CommandOptions group, const std::string& name, const std::string& help,
+                            const std::string& examples, std::function<int()> action) {
+  CLI::App& command = *group.app().add_subcommand(name, help);
+  add_common_options(CommandOptions(command));
   command.footer(with_heading(examples));
   command.callback([this, run = std::move(action)] { action_ = run; });
-  return command;
+  return CommandOptions(command);
 }
 
-CLI::App& Program::add(const std::string& name, const std::string& help,
-                       const std::string& examples, std::function<int()> action) {
-  return add(app_, name, help, examples, std::move(action));
+CommandOptions Program::add(const std::string& name, const std::string& help,
+                            const std::string& examples, std::function<int()> action) {
+  return add(all_, name, help, examples, std::move(action));
 }
 
-CLI::App& Program::add_group(const std::string& name, const std::string& help) {
-  CLI::App& group = *app_.add_subcommand(name, help);
-  add_common_options(group);
+CommandOptions Program::add_group(const std::string& name, const std::string& help) {
+  CLI::App& group = *app_->add_subcommand(name, help);
+  add_common_options(CommandOptions(group));
   group.require_subcommand(1);
   group.footer("More about each: restage " + name + " COMMAND --help");
-  return group;
+  return CommandOptions(group);
 }
 
 int Program::run(int argc, char** argv) {
   common_.command_line.assign(argv, argv + argc);
   if (argc > 0) common_.command_line[0] = "restage";  // not where it lies on this machine
   try {
-    app_.parse(argc, argv);
+    app_->parse(argc, argv);
   } catch (const CLI::CallForVersion& version) {
     const std::span<char*> words(argv, static_cast<size_t>(argc));
     if (std::any_of(words.begin(), words.end(),
@@ -182,16 +190,16 @@ int Program::run(int argc, char** argv) {
       print(std::string(version.what()) + "\n");
     return 0;
   } catch (const CLI::Success&) {  // --help
-    print(app_.help());
+    print(app_->help());
     return 0;
   } catch (const CLI::ParseError& error) {
-    throw usage_error(app_, error);
+    throw usage_error(*app_, error);
   }
   if (common_.threads < 0 || common_.threads > kMaxThreads)
     throw InputError("", "--threads " + std::to_string(common_.threads) + " is out of range",
                      "give a number from 0 (all cores) to " + std::to_string(kMaxThreads));
-  check_out(innermost(app_));
-  common_.seed_given = innermost(app_).count("--seed") > 0;
+  check_out(innermost(*app_));
+  common_.seed_given = innermost(*app_).count("--seed") > 0;
   set_threads(common_.threads);
   set_log_level(common_.quiet     ? LogLevel::quiet
                 : common_.verbose ? LogLevel::debug

@@ -2,9 +2,6 @@
 // A command is one file with one function `void add_x(Program&)` and a line in commands.cpp.
 #pragma once
 
-#include <CLI/App.hpp>
-#include <CLI/Config.hpp>
-#include <CLI/Formatter.hpp>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -13,6 +10,7 @@
 #include <vector>
 
 #include "datasets/readers/byte_stream.h"
+#include "experiments/cli/command_options.h"
 
 namespace restage::cli {
 
@@ -31,27 +29,28 @@ struct Common {
 /// A command, and the arguments that it is run with; both live as long as the program.
 template <class A>
 struct Command {
-  CLI::App& app;
+  CommandOptions app;
   A& arguments;
 };
 
 class Program {
  public:
   Program();
+  ~Program();
 
   /// Adds a command that runs `action` (its result is the exit code) once all arguments are read.
   /// `examples` ends the help page, one example a line. The command's own options are added to the
-  /// CLI::App that comes back; it lives as long as the program.
-  CLI::App& add(const std::string& name, const std::string& help, const std::string& examples,
-                std::function<int()> action);
+  /// Arguments that come back; they live as long as the program.
+  CommandOptions add(const std::string& name, const std::string& help, const std::string& examples,
+                     std::function<int()> action);
   /// A command of commands, such as `data`; and its parts.
-  CLI::App& add_group(const std::string& name, const std::string& help);
-  CLI::App& add(CLI::App& group, const std::string& name, const std::string& help,
-                const std::string& examples, std::function<int()> action);
+  CommandOptions add_group(const std::string& name, const std::string& help);
+  CommandOptions add(CommandOptions group, const std::string& name, const std::string& help,
+                     const std::string& examples, std::function<int()> action);
 
   /// The same with arguments of the command's own: runs work(arguments, common()).
   template <class A>
-  Command<std::remove_cvref_t<A>> add(CLI::App& group, const std::string& name,
+  Command<std::remove_cvref_t<A>> add(CommandOptions group, const std::string& name,
                                       const std::string& help, const std::string& examples,
                                       int (*work)(A, const Common&)) {
     const auto arguments = std::make_shared<std::remove_cvref_t<A>>();
@@ -61,7 +60,7 @@ class Program {
   template <class A>
   Command<std::remove_cvref_t<A>> add(const std::string& name, const std::string& help,
                                       const std::string& examples, int (*work)(A, const Common&)) {
-    return add(app_, name, help, examples, work);
+    return add(all_, name, help, examples, work);
   }
   const Common& common() const { return common_; }
 
@@ -69,9 +68,10 @@ class Program {
   int run(int argc, char** argv);
 
  private:
-  void add_common_options(CLI::App& app);
+  void add_common_options(CommandOptions app);
 
-  CLI::App app_;
+  std::unique_ptr<CLI::App> app_;
+  CommandOptions all_;  ///< the commands themselves
   Common common_;
   std::function<int()> action_;
 };

@@ -107,11 +107,11 @@ void add_render(Program& program) {
       "restage render scans.h5 --sequence 2 --fps 60 --title 'take 2' --out page.html",
       run_render);
   app.add_option("RESULT", options.result, "prediction or scans (HDF5), or a folder of PLY or OBJ")
-      ->required();
+      .required();
   app.add_option("--source", options.source, "what the motion was taken from");
   app.add_option("--truth", options.truth,
                  "the true motion, if it is known; a page shows how far each vertex is off");
-  app.add_option("--out", options.out, "sheet.png or page.html")->required();
+  app.add_option("--out", options.out, "sheet.png or page.html").required();
   app.add_option("--columns", options.columns, "moments on a sheet");
   app.add_option("--fps", options.fps, "frames per second of the input");
   app.add_option("--sequence", options.sequence, "which sequence of an HDF5 file, from 0");

@@ -60,7 +60,7 @@ void add_replay(Program& program) {
   auto [app, path] = program.add(
       "replay", "repeat the step of a training whose loss was not finite",
       "restage replay runs/lite-20260101T120000-1/nonfinite/motion-812.safetensors", run_replay);
-  app.add_option("FILE", path, "what the training left in RUN/nonfinite")->required();
+  app.add_option("FILE", path, "what the training left in RUN/nonfinite").required();
 }
 
 }  // namespace restage::cli

@@ -63,13 +63,12 @@ void add_report(Program& program) {
       "restage report runs/smoothness --sequence benchmark/naked/dance-male-female --out r.html\n"
       "restage report runs/s --sequence walk/ --trial 4f2a90c1d3e5 --out r.html",
       run_report);
-  app.add_option("RUN_OR_DIR", a.folders, "run directories, or the folder of one sweep")
-      ->required();
-  app.add_option("--out", a.out, "the page, such as report.html")->required();
+  app.add_option("RUN_OR_DIR", a.folders, "run directories, or the folder of one sweep").required();
+  app.add_option("--out", a.out, "the page, such as report.html").required();
   app.add_option("--sequence", a.how.sequences,
                  "folder of a sequence with its truth to be played (restage data build, restage "
                  "eval --out); may be repeated. A run plays held-out ones of its own without it")
-      ->allow_extra_args(false);
+      .one_at_a_time();
   app.add_option("--trial", a.how.trial,
                  "whose answer is played, of a sweep; the one with the least error without it");
   app.add_flag("--no-play", a.no_play, "leave the sequences out");

@@ -118,14 +118,14 @@ void add_reproduce(Program& program) {
       "restage reproduce rekik2024 --budget lite --out runs/page --no-run --from experiments\n"
       "restage reproduce marsot2023 --budget paper --out runs/marsot2023 data.source=amass.h5",
       run_reproduce);
-  app.add_option("PAPER", o.paper, "rekik2024, marsot2023 or chen2023")->required();
+  app.add_option("PAPER", o.paper, "rekik2024, marsot2023 or chen2023").required();
   app.add_option("WORDS", o.words, "key=value for all of its sweeps, as in 'sweep run'");
   app.add_option("--table", o.table, "only this one, such as 4 (all)");
   app.add_option("--budget", o.budget,
                  "smoke (minutes: does it run?), lite (hours on 2 cores) or paper (its schedule)")
-      ->required()
-      ->check(CLI::IsMember({"smoke", "lite", "paper"}));
-  app.add_option("--out", o.out, "folder of the sweeps and the page")->required();
+      .required()
+      .one_of({"smoke", "lite", "paper"});
+  app.add_option("--out", o.out, "folder of the sweeps and the page").required();
   app.add_option("--page", o.page, "another folder for the page");
   app.add_option("--from", o.from, "folder of the experiments (experiments)");
   app.add_option("--jobs", o.jobs, "trials at once; they share the threads (1)");

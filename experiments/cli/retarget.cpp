@@ -278,16 +278,16 @@ void add_retarget(Program& program) {
       run_retarget);
   app.add_option("--source", c.source,
                  "folder of clouds, file of them (HDF5, NPZ, NPY), or glTF animation")
-      ->required();
+      .required();
   app.add_option("--target", c.target,
                  "mesh or cloud in T-pose, y up, facing +z; or a glTF character")
-      ->required();
+      .required();
   app.add_option("--weights", c.weights, "weights file, run or artifact");
-  app.add_option("--system", c.system, help_of_systems())->capture_default_str();
+  app.add_option("--system", c.system, help_of_systems()).show_default();
   app.add_option("--rest", c.rest, "the target's 22 rest joints (HDF5, /joints [1, 22, 3])");
   app.add_option("--every", c.every, "only every so many frames of the source; for X.h5");
   app.add_option("--out", c.out, "X.glb, X.bvh, X.h5, or a folder for PLY or OBJ frames")
-      ->required();
+      .required();
   app.add_option("--clip", c.clip, "animation of a glTF source (default: the first)");
   app.add_option("--sequence", c.sequence, "which sequence of an HDF5 source, from 0");
   app.add_option("--fps", c.fps, "frames per second of the source (default: the file's, else 30)");

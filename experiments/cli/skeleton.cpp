@@ -106,9 +106,9 @@ void add_skeleton(Program& program) {
                   "restage skeleton --weights w.safetensors --input scan.ply --samples 8\n"
                   "restage skeleton --weights w.safetensors --input scans/ --device cuda",
                   run_skeleton);
-  app.add_option("--weights", options.weights, "weights file or run directory")->required();
+  app.add_option("--weights", options.weights, "weights file or run directory").required();
   app.add_option("--input", options.input, "cloud, folder of clouds, or HDF5 file of scans")
-      ->required();
+      .required();
   app.add_option("--out", options.out, "HDF5 file for the joints");
   app.add_option("--device", options.device,
                  "where the network runs: cpu, or cuda in a program built for it");

@@ -221,7 +221,7 @@ int run_stop(const StopOptions& options, const Common& common) {
 }  // namespace
 
 void add_sweep(Program& program) {
-  CLI::App& group = program.add_group("sweep", "many trainings from one file");
+  CommandOptions group = program.add_group("sweep", "many trainings from one file");
 
   auto [p, plan] = program.add(
       group, "plan", "list the trials of a sweep file; with --out, write them ready to run",
@@ -231,7 +231,7 @@ void add_sweep(Program& program) {
       "restage sweep plan sweep.yaml --measure",
       run_plan);
   p.add_option("SWEEP", plan.arguments, "SWEEP.yaml and key=value, key=a,b, key=range(a,b,step)")
-      ->required();
+      .required();
   p.add_option("--out", plan.out, "folder to write");
   p.add_flag("--measure", plan.measure, "forecast time and memory from a few steps of each stage");
 
@@ -240,21 +240,21 @@ void add_sweep(Program& program) {
       "restage sweep run experiments/smoothness.yaml --out runs/smoothness\n"
       "restage sweep run sweep.yaml --out runs/sweep --jobs 4 motion.optimiser.steps=500",
       run_run);
-  r.add_option("SWEEP", run.arguments, "SWEEP.yaml and key=value, as in 'sweep plan'")->required();
-  r.add_option("--out", run.out, "folder of the sweep")->required();
+  r.add_option("SWEEP", run.arguments, "SWEEP.yaml and key=value, as in 'sweep plan'").required();
+  r.add_option("--out", run.out, "folder of the sweep").required();
   r.add_option("--jobs", run.jobs, "trials at once; they share the threads (1)");
 
   auto [st, dir] = program.add(group, "status", "counts, and a line for every trial",
                                "restage sweep status runs/smoothness\n"
                                "restage sweep status runs/smoothness --json",
                                run_status);
-  st.add_option("DIR", dir, "folder of the sweep")->required();
+  st.add_option("DIR", dir, "folder of the sweep").required();
 
   auto [s, stop] = program.add(group, "stop", "running trials write a checkpoint and end",
                                "restage sweep stop runs/smoothness\n"
                                "restage sweep stop runs/smoothness --wait 300",
                                run_stop);
-  s.add_option("DIR", stop.dir, "folder of the sweep")->required();
+  s.add_option("DIR", stop.dir, "folder of the sweep").required();
   s.add_option("--wait", stop.wait, "seconds to wait for them (60)");
   add_sweep_table(program, group);
   add_sweep_export(program, group);

@@ -54,7 +54,7 @@ int run_export(const Arguments& a, const Common& common) {
 
 }  // namespace
 
-void add_sweep_export(Program& program, CLI::App& group) {
+void add_sweep_export(Program& program, CommandOptions group) {
   auto [app, a] = program.add(
       group, "export", "a script for Slurm, GNU parallel or Snakemake that runs the trials",
       "restage sweep export runs/smoothness --engine slurm --out s.sbatch && sbatch s.sbatch\n"
@@ -64,9 +64,9 @@ void add_sweep_export(Program& program, CLI::App& group) {
       "restage sweep export runs/smoothness --engine snakemake --out s.smk && "
       "snakemake --cores 4 -k -s s.smk",
       run_export);
-  app.add_option("DIR", a.dir, "folder of a planned sweep ('sweep plan --out DIR')")->required();
-  app.add_option("--engine", a.engine, "slurm, parallel or snakemake")->required();
-  app.add_option("--out", a.out, "script to write")->required();
+  app.add_option("DIR", a.dir, "folder of a planned sweep ('sweep plan --out DIR')").required();
+  app.add_option("--engine", a.engine, "slurm, parallel or snakemake").required();
+  app.add_option("--out", a.out, "script to write").required();
   app.add_option("--program", a.program, "restage as the machines see it (this program)");
 }
 

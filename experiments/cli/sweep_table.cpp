@@ -52,20 +52,20 @@ int run_table(Arguments a, const Common& common) {
 
 }  // namespace
 
-void add_sweep_table(Program& program, CLI::App& group) {
+void add_sweep_table(Program& program, CommandOptions group) {
   auto [app, a] = program.add(
       group, "table", "mean, deviation and 95 % interval of a sweep's trials, in rows",
       "restage sweep table runs/smoothness\n"
       "restage sweep table runs/smoothness --columns pa_mpjpe,acc --against quaternion\n"
       "restage sweep table runs/smoothness --rows motion.weights.smoothness --out table.tex",
       run_table);
-  app.add_option("DIR", a.dir, "folder of the sweep")->required();
+  app.add_option("DIR", a.dir, "folder of the sweep").required();
   app.add_option("--rows", a.options.rows, "KEY,... to group by, also 'case' (case and overrides)")
-      ->delimiter(',')
-      ->allow_extra_args(false);
+      .separated_by(',')
+      .one_at_a_time();
   app.add_option("--columns", a.options.columns, "METRIC,... to show (all)")
-      ->delimiter(',')
-      ->allow_extra_args(false);
+      .separated_by(',')
+      .one_at_a_time();
   app.add_option("--against", a.options.against, "differences to the row with this label");
   app.add_option("--out", a.out, "F.md, F.csv, F.tex or F.svg to write");
 }

@@ -278,7 +278,7 @@ void add_train(Program& program) {
       "restage train resume=runs/demo-20260101-120000-1",
       run_train);
   app.add_option("ARGUMENTS", a.words, "CONFIG.yaml and key=value overrides, or resume=RUN_DIR")
-      ->required();
+      .required();
   app.add_flag("--print-config", a.print_config, "print the resolved configuration and end");
   app.add_flag("--dry-run", a.dry_run,
                "check all, forecast time and memory from some steps of each stage, write nothing");

@@ -36,8 +36,8 @@ void add_trial(Program& program) {
                                     "restage trial runs/smoothness 4f2a90c1d3e5 --threads 4\n"
                                     "restage trial runs/smoothness 4f2a90c1d3e5 --stage skeleton",
                                     run_trial);
-  app.add_option("DIR", options.dir, "folder of 'restage sweep plan --out'")->required();
-  app.add_option("ID", options.id, "of the trial")->required();
+  app.add_option("DIR", options.dir, "folder of 'restage sweep plan --out'").required();
+  app.add_option("ID", options.id, "of the trial").required();
   app.add_option("--stage", options.stage, "make only the artifacts up to this stage");
 }
 

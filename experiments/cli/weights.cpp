@@ -93,7 +93,7 @@ int run_export(const Transfer& t, const Common& common) {
   return report(t, out, common);
 }
 
-void add_import(Program& program, CLI::App& group) {
+void add_import(Program& program, CommandOptions group) {
   auto [app, t] = program.add(
       group, "import", "put a state dict from elsewhere into a weights file",
       "restage weights import --from pt.safetensors --model skeleton/point_transformer "
@@ -104,34 +104,34 @@ void add_import(Program& program, CLI::App& group) {
       "--with w.safetensors --out all.safetensors",
       run_import);
   app.add_option("--from", t.from, "state dict (safetensors; docs/convert_pytorch.py makes one)")
-      ->required();
-  app.add_option("--model", t.model, "which model it is, as in 'restage info'")->required();
+      .required();
+  app.add_option("--model", t.model, "which model it is, as in 'restage info'").required();
   app.add_option("--map", t.map, "YAML lines \"foreign name: our name\", * for any text");
   app.add_option("--size", t.sizes, "a size unlike the paper's, such as hidden=256")
-      ->allow_extra_args(false);
+      .one_at_a_time();
   app.add_option("--with", t.with, "weights file whose other models are kept");
-  app.add_option("--out", t.out, "weights file to write")->required();
+  app.add_option("--out", t.out, "weights file to write").required();
 }
 
-void add_export(Program& program, CLI::App& group) {
+void add_export(Program& program, CommandOptions group) {
   auto [app, t] =
       program.add(group, "export", "take one model out of a weights file, as a plain state dict",
                   "restage weights export --from w.safetensors --model smrm --out smrm.safetensors",
                   run_export);
-  app.add_option("--from", t.from, "weights file")->required();
+  app.add_option("--from", t.from, "weights file").required();
   app.add_option("--model", t.model, "its name (smrm/rot6d), role (motion) or prefix (smrm)")
-      ->required();
-  app.add_option("--out", t.out, "state dict to write (safetensors)")->required();
+      .required();
+  app.add_option("--out", t.out, "state dict to write (safetensors)").required();
 }
 
 }  // namespace
 
 void add_weights(Program& program) {
-  CLI::App& group = program.add_group("weights", "look into weights files, import and export");
+  CommandOptions group = program.add_group("weights", "look into weights files, import and export");
   auto [show, file] = program.add(
       group, "show", "list what a safetensors file holds",
       "restage weights show w.safetensors\nrestage weights show w.safetensors --json", run_show);
-  show.add_option("FILE", file, "safetensors file")->required();
+  show.add_option("FILE", file, "safetensors file").required();
   add_import(program, group);
   add_export(program, group);
 }
