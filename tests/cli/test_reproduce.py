@@ -3,7 +3,7 @@ import os
 import shutil
 import struct
 
-from support import DATA, ROOT, CliTest
+from support import DATA, ROOT, CliTest, needs_data
 from tiny_run import CONFIG
 
 BASE = CONFIG.replace("motions: {train: 4, validation: 2, test: 1}", "motions: {train: 4, validation: 2, test: 2}").replace(
@@ -78,6 +78,7 @@ class Reproduce(CliTest):
         head = lambda text: text[text.index("Claims:"):]
         self.assertEqual(head(self.text("page/somebody2024.md")), head(page))
 
+    @needs_data("body/makehuman.h5")
     def test_pictures(self):
         self.done("data", "build", os.path.join(ROOT, "configs", "data", "small_benchmark.yaml"), "out=small", "data=" + DATA)
         sequence = os.listdir(self.path("small/scans"))[0]
