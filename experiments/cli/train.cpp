@@ -18,7 +18,7 @@
 #include "nn/config/config.h"
 #include "train/run_provenance.h"
 #include "train/stages/motion_stage.h"
-#include "train/stages/training.h"
+#include "train/training/training.h"
 
 namespace restage::cli {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "autograd/base/nearest.h"
 #include "nn/config/config.h"
-#include "train/stages/train_config.h"
+#include "train/training/train_config.h"
 
 namespace restage::sweep {
 namespace {

@@ -14,7 +14,7 @@
 #include "experiments/benchmark_sets.h"
 #include "experiments/evaluation.h"
 #include "nn/config/config.h"
-#include "train/stages/training.h"
+#include "train/training/training.h"
 
 namespace restage::sweep {
 namespace {

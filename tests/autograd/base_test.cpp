@@ -305,6 +305,8 @@ TEST(Layers, ABrokenArrowIsSeen) {
   EXPECT_EQ(with("autograd/tape/x.h", "#include \"autograd/ops/reduce.h\""), 1);
   EXPECT_EQ(with("autograd/ops/x.cpp", "#include \"autograd/cpu/pool.h\""), 1);
   EXPECT_EQ(with("train/trainer.cpp", "#include \"datasets/schema.h\""), 1);
+  EXPECT_EQ(with("train/artifacts/x.h", "#include \"train/stages/registry.h\""), 1);
+  EXPECT_EQ(with("train/stages/x.h", "#include \"train/training/train_config.h\""), 1);
   EXPECT_EQ(with("infer/x.cpp", "#include \"train/run.h\""), 1);
   EXPECT_EQ(with("nn/models/x.cpp", "#include \"train/run.h\""), 1);
   EXPECT_EQ(with("nn/models/x.cpp", "#include <tbb/parallel_for.h>"), 1);

@@ -1,4 +1,4 @@
-#include "train/stages/made_once.h"
+#include "train/artifacts/made_once.h"
 
 #include <chrono>
 #include <filesystem>

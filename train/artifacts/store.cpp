@@ -1,4 +1,4 @@
-#include "train/stages/store.h"
+#include "train/artifacts/store.h"
 
 #include <filesystem>
 #include <map>
@@ -8,7 +8,7 @@
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/log.h"
 #include "datasets/readers/sha256.h"
-#include "train/stages/made_once.h"
+#include "train/artifacts/made_once.h"
 
 namespace restage {
 namespace {

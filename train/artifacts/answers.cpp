@@ -1,4 +1,4 @@
-#include "train/stages/answers.h"
+#include "train/artifacts/answers.h"
 
 #include <cmath>
 #include <csignal>
@@ -11,8 +11,8 @@
 #include "datasets/readers/errors.h"
 #include "datasets/readers/sha256.h"
 #include "nn/weights/safetensors.h"
-#include "train/stages/identity.h"
-#include "train/stages/made_once.h"
+#include "train/artifacts/artifact_id.h"
+#include "train/artifacts/made_once.h"
 
 namespace restage {
 namespace {
@@ -180,7 +180,7 @@ std::string facts_of(const std::string& data, const std::string& split, const An
   return nlohmann::json{{"behaviour", kBehaviour},
                         {"data", data},
                         {"split", split},
-                        {"answers", keys_text(write_config(config))},
+                        {"answers", keys_json(write_config(config)).dump()},
                         {"extractor", sha256(extractor)},
                         {"precision", static_cast<int>(matmul_precision())},
                         {"seed", seed}}

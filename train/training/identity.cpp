@@ -1,4 +1,4 @@
-#include "train/stages/identity.h"
+#include "train/training/identity.h"
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -13,38 +13,14 @@ namespace {
 
 using Json = nlohmann::json;  // keys in order of their names
 
-/// A tree with its numbers as text, so that how they are printed elsewhere does not matter.
-Json to_json(const ConfigNode& node) {
-  switch (node.kind) {
-    case ConfigNode::Kind::null:
-      return nullptr;
-    case ConfigNode::Kind::scalar:
-      return node.text;
-    case ConfigNode::Kind::list: {
-      Json out = Json::array();
-      for (const ConfigNode& child : node.children) out.push_back(to_json(child));
-      return out;
-    }
-    case ConfigNode::Kind::map:
-      break;
-  }
-  Json out = Json::object();
-  for (const ConfigNode& child : node.children) out[child.key] = to_json(child);
-  return out;
-}
-
 std::string number(double value) { return config_detail::write_leaf(value).text; }
 
 template <class C>
 Json keys_of(const C& config) {
-  return to_json(write_config(config));
+  return keys_json(write_config(config));
 }
 
 }  // namespace
-
-std::string keys_text(const ConfigNode& keys) { return to_json(keys).dump(); }
-
-std::string short_id(const std::string& text) { return sha256(text).substr(0, 12); }
 
 std::string Identities::data(const CorpusSource& source) {
   if (source.source == "builtin") return keys_of(source).dump();

@@ -16,8 +16,8 @@
 #include <string>
 
 #include "nn/weights/bundle.h"
+#include "train/artifacts/artifact_id.h"
 #include "train/run.h"
-#include "train/stages/identity.h"
 
 namespace restage {
 
@@ -34,7 +34,7 @@ class Store {
   /// Its curves so far (metrics.jsonl), also while it is made; empty if nobody has begun.
   std::string metrics(const StageId& id) const;
 
-  /// The folder of what extractors were asked (train/stages/answers.h).
+  /// The folder of what extractors were asked (train/artifacts/answers.h).
   std::string answers() const;
 
   /// Trains in the given run directory, which may hold the checkpoints of an earlier attempt.
