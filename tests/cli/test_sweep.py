@@ -456,7 +456,7 @@ class Runs(Sweep):
         files = lambda: sorted(os.path.join(f, n) for f, _, names in os.walk(self.path("d")) for n in names)
         whole = files()
         first, second = (self.path("d/trials/" + t) for t in sorted(os.listdir(self.path("d/trials"))))
-        for name in (first + "/lease.2", first + "/lease-0123456789abcdef", first + "/result.json.part77", second + "/result.json.part78",
+        for name in (first + "/lease.2", first + "/lease.part0123456789abcdef", first + "/result.json.part77", second + "/result.json.part78",
                      self.path("d/plan.json.part79")):
             self.write(name, "torn")
         os.remove(second + "/result.json")  # killed while it wrote this; and a sweeper while it planned

@@ -200,13 +200,7 @@ std::vector<JointTrack> ask(const Corpus& corpus, const std::string& split,
   return made_once<std::vector<JointTrack>>(
       folder->path, name, [&] { return find(path, facts, corpus, config.tracks); },
       [&](const Lease&) {  // two who make it make the same bytes
-        const std::string ready = path_aside(folder->path, name, ".ready");
-        write_safetensors(ready, to_file(asked(corpus, config, given, seed, alone()), facts));
-        std::error_code error;
-        fs::rename(ready, path, error);
-        if (error)
-          throw WorkError(path + ": could not be put into the store (" + error.message() +
-                          "); run it again");
+        write_safetensors(path, to_file(asked(corpus, config, given, seed, alone()), facts));
       });
 }
 

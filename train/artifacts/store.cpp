@@ -119,9 +119,9 @@ Bundle Store::get(const StageId& id, const std::string& config_yaml, const Make&
 
 void Store::publish(const StageId& id, const std::string& run, const std::string& config_yaml,
                     const Bundle& bundle) const {
-  const fs::path ready = path_aside(dir_, id.name(), ".ready");
+  Temporary draft(name_beside(path(id), "."));
+  const fs::path ready = draft.path();
   std::error_code error;
-  fs::remove_all(ready, error);
   if (!fs::create_directory(ready, error) || error)
     throw WorkError(ready.string() + ": could not be made (" + error.message() +
                     "); free some space and run it again");
@@ -137,6 +137,7 @@ void Store::publish(const StageId& id, const std::string& run, const std::string
   if (error)
     throw WorkError(path(id) + ": could not be put into the store (" + error.message() +
                     "); run it again");
+  draft.keep();
 }
 
 }  // namespace restage
