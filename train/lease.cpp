@@ -100,10 +100,15 @@ std::string numbered(const std::string& path, int64_t number) {
   return path + "." + std::to_string(number);
 }
 
-/// The first bytes of a file, none of a pipe; nothing: no such file.
+/// The first bytes of a file, none of a pipe; nothing: no such file. ReadError if they cannot be
+/// had: somebody may hold the lease.
 std::optional<std::string> read_bytes(const std::string& file) {
   const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (fd < 0) return std::nullopt;
+  if (fd < 0) {
+    const ReadError error(file, errno);
+    if (error.absent()) return std::nullopt;
+    throw error;
+  }
   std::string bytes(kRecord, ' ');
   const ssize_t n = ::pread(fd, bytes.data(), bytes.size(), 0);
   ::close(fd);
@@ -143,17 +148,19 @@ std::optional<Record> read_record(const std::string& file) {
   return out;
 }
 
-/// What follows `path` and `mark` in the names of the files beside it.
+/// What follows `path` and `mark` in the names of the files beside it. ReadError if the folder is
+/// there and cannot be read.
 std::vector<std::string> ends_of_names(const std::string& path, const char* mark) {
-  const fs::path folder = fs::path(path).parent_path();
+  const fs::path parent = fs::path(path).parent_path();
+  const std::string folder = parent.empty() ? "." : parent.string();
   const std::string prefix = fs::path(path).filename().string() + mark;
   std::vector<std::string> out;
   std::error_code error;
-  for (fs::directory_iterator it(folder.empty() ? "." : folder, error), end; !error && it != end;
-       it.increment(error)) {
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
     const std::string name = it->path().filename().string();
     if (name.starts_with(prefix)) out.push_back(name.substr(prefix.size()));
   }
+  if (error && is_there(folder)) throw ReadError(folder, error.value());
   return out;
 }
 
@@ -192,10 +199,13 @@ std::string draft(const std::string& path, const Record& record) {
 
 /// Drafts of processes that were killed before they could remove them.
 void remove_dead_drafts(const std::string& path) {
-  for (const std::string& token : ends_of_names(path, kDraft)) {
-    const std::string name = path + kDraft + token;
-    const std::optional<Record> record = read_record(name);
-    if (record && surely_free(*record)) ::unlink(name.c_str());
+  try {
+    for (const std::string& token : ends_of_names(path, kDraft)) {
+      const std::string name = path + kDraft + token;
+      const std::optional<Record> record = read_record(name);
+      if (record && surely_free(*record)) ::unlink(name.c_str());
+    }
+  } catch (const ReadError&) {  // left to whoever tidies up next
   }
 }
 

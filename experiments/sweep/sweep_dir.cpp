@@ -202,6 +202,9 @@ SweepDir read_sweep_dir(const std::string& dir) {
 std::optional<tables::TrialResult> read_result(const SweepDir& dir, const std::string& id) {
   try {
     return tables::read_result(dir.result(id), id);
+  } catch (const ReadError& error) {
+    if (!error.absent()) throw;
+    return std::nullopt;
   } catch (const Error&) {
     return std::nullopt;
   }
@@ -266,10 +269,7 @@ void request_stop(const std::string& dir) {
 }
 
 std::string stop_token(const std::string& dir) {
-  std::ifstream file(dir + "/stop");
-  std::string token;
-  std::getline(file, token);
-  return token;
+  return is_there(dir + "/stop") ? read_file(dir + "/stop") : "";
 }
 
 std::string last_line(const std::string& path) {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "autograd/base/atomic_file.h"
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 #include "autograd/kernels/matmul_precision.h"
@@ -162,12 +163,14 @@ std::vector<JointTrack> from_file(const std::string& path, const std::string& fa
 
 std::optional<std::vector<JointTrack>> find(const std::string& path, const std::string& facts,
                                             const Corpus& corpus, const TrackConfig& config) {
-  std::error_code ignored;
-  if (!fs::exists(path, ignored)) return std::nullopt;
+  if (!is_there(path)) return std::nullopt;
   try {
     return from_file(path, facts, corpus, config);
+  } catch (const ReadError&) {
+    throw;
   } catch (const InputError& error) {
     log_warning("damaged answers are asked for again: " + std::string(error.what()));
+    std::error_code ignored;
     fs::remove(path, ignored);
     return std::nullopt;
   }

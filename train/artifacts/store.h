@@ -25,10 +25,12 @@ class Store {
  public:
   explicit Store(std::string dir) : dir_(std::move(dir)) {}
 
-  /// Its folder is there; whether its content is undamaged is seen when it is read.
+  /// Its folder is there; whether its content is undamaged is seen when it is read. This and all
+  /// that reads throws ReadError where the disk does not say: that is neither absence nor damage.
   bool has(const StageId& id) const;
   std::string path(const StageId& id) const;
-  /// The artifact, or nothing. A damaged one gives a warning, is moved aside and counts as absent.
+  /// The artifact, or nothing. A damaged one, whose bytes do not fit their checksums, gives a
+  /// warning, is moved aside and counts as absent. InputError: whole, but no weights of ours.
   std::optional<Bundle> find(const StageId& id) const;
 
   /// Its curves so far (metrics.jsonl), also while it is made; empty if nobody has begun.

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "autograd/base/atomic_file.h"
 #include "datasets/readers/sha256.h"
 #include "nn/weights/bundle.h"
 #include "nn/weights/safetensors.h"
@@ -32,7 +33,7 @@ std::string Identities::data(const CorpusSource& source) {
   Json files = Json::object();
   for (const char* split : {"train", "validation", "test"}) {
     const fs::path file = fs::path(source.source) / (std::string(split) + ".h5");
-    if (fs::exists(file, ignored)) files[split] = sha256_of_file(file.string());
+    if (is_there(file.string())) files[split] = sha256_of_file(file.string());
   }
   return known = files.dump();
 }
