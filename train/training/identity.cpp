@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "autograd/base/atomic_file.h"
+#include "datasets/readers/file_sums.h"
 #include "datasets/readers/sha256.h"
 #include "nn/weights/bundle.h"
 #include "nn/weights/safetensors.h"
@@ -29,18 +30,18 @@ std::string Identities::data(const CorpusSource& source) {
   if (!known.empty()) return known;
   namespace fs = std::filesystem;
   std::error_code ignored;
-  if (!fs::is_directory(source.source, ignored)) return known = sha256_of_file(source.source);
+  if (!fs::is_directory(source.source, ignored)) return known = kept_sha256(source.source);
   Json files = Json::object();
   for (const char* split : {"train", "validation", "test"}) {
     const fs::path file = fs::path(source.source) / (std::string(split) + ".h5");
-    if (is_there(file.string())) files[split] = sha256_of_file(file.string());
+    if (is_there(file.string())) files[split] = kept_sha256(file.string());
   }
   return known = files.dump();
 }
 
 std::string Identities::weights(const std::string& path) {
   std::string& known = seen_["weights " + path];
-  if (known.empty()) known = sha256_of_file(weights_path(path));
+  if (known.empty()) known = kept_sha256(weights_path(path));
   return known;
 }
 

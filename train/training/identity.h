@@ -14,7 +14,8 @@
 
 namespace restage {
 
-/// Finds identities; remembers those of files that it has read.
+/// Finds identities; remembers those of files that it has read, and checksums of large files beyond
+/// its own life (datasets/readers/file_sums.h).
 class Identities {
  public:
   /// Of bodies and motions: the bytes of a data set file, a benchmark's manifest, or the keys of
