@@ -354,11 +354,11 @@ const char* const kRule =
     "A claim is judged by paired differences over seeds and sequences: it **holds** if the 95 % "
     "interval of every\ncomparison lies on its side, **does not hold** if one lies on the other, "
     "and **cannot be told** otherwise or with fewer\nthan three seeds. The rule was written before "
-    "the runs, but for one amendment that it names\n(`experiments/reproduce/verdict.h`). Orders "
-    "are judged, never figures: other data and other budgets than the paper's. Ours: mean ± sample "
-    "deviation over n seeds [95 % "
-    "interval:\nbootstrap over sequences and seeds]; with three seeds such an interval holds the "
-    "truth in some 75 of 100 cases\n(docs/experiments.md).\n\n";
+    "the runs, but for one amendment that it names (`experiments/reproduce/verdict.h`).\nOrders "
+    "are "
+    "judged, never figures: other data and other budgets than the paper's. Ours: mean ± sample "
+    "deviation over n seeds\n[95 % interval: bootstrap over sequences and seeds]; with three seeds "
+    "such an interval holds the truth in some 75 of 100 cases\n(docs/experiments.md).\n\n";
 
 /// Of what is beside the page; made if it is not there.
 std::string files_folder(const std::string& folder, const PageOptions& options) {
