@@ -10,6 +10,7 @@
 #include "datasets/sampling/pairs.h"
 #include "datasets/sampling/windows.h"
 #include "nn/config/config.h"
+#include "nn/models/even_points.h"
 #include "nn/weights/bundle.h"
 #include "nn/weights/state.h"
 
@@ -17,6 +18,7 @@ namespace restage::bench {
 namespace {
 
 constexpr int64_t kBatch = 4, kWindows = 64;
+constexpr int kCloudPoints = 1024;  ///< of a frame, and of what the paper's extractor sees
 
 struct Model {
   const char* file;  ///< in the folder
@@ -51,20 +53,36 @@ Points in_order(Points cloud, Point* centre) {
   return cloud;
 }
 
+/// The points of frame `i` that the retargeter shows its extractor, with one choice a frame and
+/// seed 0 (infer/retargeter.cpp, nn/models/extraction.cpp). LibTorch's program gets them from here,
+/// so that both do the same work on the same points; the retargeter chooses by itself, and is timed
+/// with that. If the rule changes there and not here, the comparison of answers fails.
+Points chosen_points(const Points& cloud, size_t i) {
+  const RngKey key = RngKey{0, 0}.fold("frame").fold(static_cast<uint64_t>(i));
+  EvenPoints even;
+  even.arrange(cloud);
+  Points out;
+  even.choose(kCloudPoints, Rng(key).uniform(), &out);
+  return out;
+}
+
 /// Frames of one body's performance as clouds of 1,024 points, and another body as target.
 void add_performance(TensorFile& file, const Corpus& corpus) {
   const EvalSequence sequence =
       evaluation_sequences(corpus, 1, static_cast<size_t>(kFrames), 0).at(0);
-  const Performance performance(corpus, sequence, ScanConfig{1024, 1024, 0.005}, 0);
-  std::vector<Tensor> clouds, joints, roots;
+  const Performance performance(corpus, sequence, ScanConfig{kCloudPoints, kCloudPoints, 0.005}, 0);
+  std::vector<Tensor> clouds, chosen, joints, roots;
   for (size_t i = 0; i < performance.frames(); ++i) {
     Point centre;
-    clouds.push_back(tensor_of(in_order(performance.cloud(i), &centre)));
+    const Points cloud = in_order(performance.cloud(i), &centre);
+    clouds.push_back(tensor_of(cloud));
+    chosen.push_back(tensor_of(chosen_points(cloud, i)));
     const Joints a = performance.joints_a(i);
     joints.push_back(relative(a, a[0]));
     roots.push_back(tensor_of(Points{a[0].cast<float>()}));
   }
   file.tensors["frames.clouds"] = stack(clouds);
+  file.tensors["frames.chosen"] = stack(chosen);
   file.tensors["frames.joints"] = stack(joints);
   file.tensors["frames.roots"] = stack(roots);
   const Body& b = performance.target();

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "nn/weights/bundle.h"
-#include "train/stages/train_config.h"
+#include "train/training/train_config.h"
 
 namespace restage::bench {
 

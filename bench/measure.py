@@ -312,7 +312,11 @@ def arguments():
     p.add_argument("--items", help="only these, separated by commas")
     p.add_argument("--minutes", type=float, default=8, help="about how long to measure (default 8)")
     p.add_argument("--quick", action="store_true", help="every item once: to try the program, not a result")
-    return p.parse_args()
+    p.add_argument("--answers", action="store_true", help="only whether both give the same answers: nothing is timed")
+    a = p.parse_args()
+    if a.answers and not a.libtorch:
+        p.error("--answers compares with LibTorch's program: give --libtorch")
+    return a
 
 
 def main():
@@ -334,6 +338,9 @@ def main():
     if a.libtorch:
         say("do both give the same answers?")
         out["agreement"] = agreement(programs, compared)
+    if a.answers:
+        print(report.agreement(out["agreement"]))
+        return
     quiet = Quiet(patience=0 if a.quick else 20)
     # A step of the large extractor takes longer than those of all others together.
     weight = {i["name"]: 5 if i["name"] in ("skeleton_train", "reading_skeleton_paper") else 1 for i in items}

@@ -3,7 +3,7 @@
 #include "bench/items.h"
 #include "train/stages/deformation_stage.h"
 #include "train/stages/skeleton_stage.h"
-#include "train/stages/training.h"
+#include "train/training/training.h"
 
 namespace restage::bench {
 namespace {

@@ -15,6 +15,11 @@ def table(head, rows):
     return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows])
 
 
+def agreement(found):
+    """The largest relative difference of the answers, by item."""
+    return table(["answers compared", "largest relative difference"], [[name, f"{worst:.1e}"] for name, worst in found.items()])
+
+
 def sgemm_rate(items):
     """The best rate of any wide product in this run, GFLOP/s, and whose it was."""
     rates = [(i["gflop"] / r["ms"] * 1e3, who) for i in items if i["name"].startswith("sgemm")

@@ -8,6 +8,7 @@
 #include "bench/work.h"
 #include "nn/losses/deformation.h"
 #include "nn/losses/motion.h"
+#include "nn/models/deformation.h"
 #include "train/optim/optimiser.h"
 #include "train/stage.h"
 

@@ -10,7 +10,7 @@
 #include "experiments/predictions.h"
 #include "infer/systems.h"
 #include "nn/metrics/metrics.h"
-#include "train/stages/train_config.h"
+#include "train/training/train_config.h"
 
 namespace restage {
 

@@ -1,23 +1,27 @@
 #include "experiments/scratch.h"
 
-#include <stdlib.h>
+#include <sys/stat.h>
+
+#include <filesystem>
 
 #include "autograd/base/error.h"
 
 namespace restage {
+namespace {
 
-namespace fs = std::filesystem;
-
-Scratch::Scratch() {
-  std::string name = (fs::temp_directory_path() / "restage-XXXXXX").string();
-  if (::mkdtemp(name.data()) == nullptr)
-    throw WorkError(name + ": could not be made; give TMPDIR a folder that you can write to");
-  path_ = name;
+std::string fresh_name() {
+  std::error_code error;
+  const std::filesystem::path root = std::filesystem::temp_directory_path(error);
+  if (error)
+    throw WorkError("there is no folder for temporary files; give TMPDIR one that is there");
+  return name_beside((root / "restage").string());
 }
 
-Scratch::~Scratch() {
-  std::error_code ignored;
-  fs::remove_all(path_, ignored);
+}  // namespace
+
+Scratch::Scratch() : folder_(fresh_name()) {
+  if (::mkdir(folder().c_str(), 0700) != 0)
+    throw WorkError(folder() + ": could not be made; give TMPDIR a folder that you can write to");
 }
 
 }  // namespace restage

@@ -1,8 +1,9 @@
-// A temporary folder that goes with its content.
+// A temporary folder that goes with its content, also when a signal ends the program.
 #pragma once
 
-#include <filesystem>
 #include <string>
+
+#include "autograd/base/temporary.h"
 
 namespace restage {
 
@@ -10,14 +11,11 @@ class Scratch {
  public:
   /// WorkError if the system's temporary folder (TMPDIR) cannot be written to.
   Scratch();
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-  ~Scratch();
-  std::string file(const char* name) const { return (path_ / name).string(); }
-  std::string folder() const { return path_.string(); }
+  std::string file(const char* name) const { return folder() + "/" + name; }
+  const std::string& folder() const { return folder_.path(); }
 
  private:
-  std::filesystem::path path_;
+  Temporary folder_;
 };
 
 }  // namespace restage

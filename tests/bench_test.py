@@ -54,6 +54,36 @@ class Ratios(unittest.TestCase):
         self.assertIsNone(measure.least({**alone, "ratios": {}}, "best"))
 
 
+class Answers(unittest.TestCase):
+    def agreement(self, theirs):
+        class Side:
+            def __init__(self, values):
+                self.values = values
+
+            def ask(self, request):
+                return {"values": self.values}
+
+            def close(self):
+                pass
+
+        class Programs:
+            def start(self, side):
+                return Side([1672.0, 0.5]) if side == "initial" else Side(theirs)
+
+        return measure.agreement(Programs(), [{"name": "frame_online", "variants": ["initial"]}])
+
+    def test_small_differences_are_told(self):
+        found = self.agreement([1672.1, 0.5])
+        self.assertAlmostEqual(found["frame_online"], 0.1 / 1672.1)
+        self.assertIn("| frame_online | 6.0e-05 |", report.agreement(found))
+
+    def test_other_answers_end_it(self):
+        for theirs in ([1782.0, 0.5], [1672.0]):
+            with self.assertRaises(SystemExit) as end:
+                self.agreement(theirs)
+            self.assertIn("they do not do the same work", str(end.exception))
+
+
 class Reading(unittest.TestCase):
     ITEM = {"name": "reading_skeleton_lite", "what": "x", "per": "cloud", "examples": 12, "gflop": 0, "libtorch": {},
             "ours": {"training": times(11, 6, 30, processor=[22, 12, 60]), "loader": times(1, 2, 3, processor=[2, 4, 2]),

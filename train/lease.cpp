@@ -22,6 +22,7 @@
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
 #include "autograd/base/format.h"
+#include "autograd/base/host.h"
 
 namespace restage {
 namespace {
@@ -33,7 +34,7 @@ using Seconds = std::chrono::duration<double>;
 /// A record is one text of this size, so that a heartbeat replaces it at one blow.
 constexpr size_t kRecord = 1024;
 constexpr int kTries = 1000;
-constexpr char kDraft = '-';
+constexpr const char* kDraft = ".part";  ///< as name_beside() has it
 
 std::string first_line(const std::string& path) {
   std::ifstream file(path);
@@ -51,12 +52,6 @@ const std::string& process_world() {
            std::string(name, n > 0 ? static_cast<size_t>(n) : 0);
   }();
   return world;
-}
-
-std::string host_name() {
-  char name[256] = "";
-  if (::gethostname(name, sizeof name - 1) != 0) return "unknown";
-  return name;
 }
 
 /// Ticks from the boot to the start of a process: "" if that cannot be seen, "dead" if it is dead
@@ -105,10 +100,15 @@ std::string numbered(const std::string& path, int64_t number) {
   return path + "." + std::to_string(number);
 }
 
-/// The first bytes of a file, none of a pipe; nothing: no such file.
+/// The first bytes of a file, none of a pipe; nothing: no such file. ReadError if they cannot be
+/// had: somebody may hold the lease.
 std::optional<std::string> read_bytes(const std::string& file) {
   const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (fd < 0) return std::nullopt;
+  if (fd < 0) {
+    const ReadError error(file, errno);
+    if (error.absent()) return std::nullopt;
+    throw error;
+  }
   std::string bytes(kRecord, ' ');
   const ssize_t n = ::pread(fd, bytes.data(), bytes.size(), 0);
   ::close(fd);
@@ -148,24 +148,26 @@ std::optional<Record> read_record(const std::string& file) {
   return out;
 }
 
-/// What follows `path` and `mark` in the names of the files beside it.
-std::vector<std::string> ends_of_names(const std::string& path, char mark) {
-  const fs::path folder = fs::path(path).parent_path();
+/// What follows `path` and `mark` in the names of the files beside it. ReadError if the folder is
+/// there and cannot be read.
+std::vector<std::string> ends_of_names(const std::string& path, const char* mark) {
+  const fs::path parent = fs::path(path).parent_path();
+  const std::string folder = parent.empty() ? "." : parent.string();
   const std::string prefix = fs::path(path).filename().string() + mark;
   std::vector<std::string> out;
   std::error_code error;
-  for (fs::directory_iterator it(folder.empty() ? "." : folder, error), end; !error && it != end;
-       it.increment(error)) {
+  for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
     const std::string name = it->path().filename().string();
     if (name.starts_with(prefix)) out.push_back(name.substr(prefix.size()));
   }
+  if (error && is_there(folder)) throw ReadError(folder, error.value());
   return out;
 }
 
 /// The highest number there is; 0: none.
 int64_t last_number(const std::string& path) {
   int64_t last = 0;
-  for (const std::string& name : ends_of_names(path, '.')) {
+  for (const std::string& name : ends_of_names(path, ".")) {
     int64_t number = 0;
     const char* stop = name.data() + name.size();
     const auto found = std::from_chars(name.data(), stop, number);
@@ -182,7 +184,7 @@ bool surely_free(const Record& record) {
 
 /// The file of a lease to be, complete, under a name that nobody else uses.
 std::string draft(const std::string& path, const Record& record) {
-  const std::string name = path + kDraft + record.token;
+  const std::string name = name_beside(path);
   const int fd = ::open(name.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0644);
   if (fd < 0) throw_unwritable(path, errno);
   const std::string text = record.text();
@@ -197,10 +199,13 @@ std::string draft(const std::string& path, const Record& record) {
 
 /// Drafts of processes that were killed before they could remove them.
 void remove_dead_drafts(const std::string& path) {
-  for (const std::string& token : ends_of_names(path, kDraft)) {
-    const std::string name = path + kDraft + token;
-    const std::optional<Record> record = read_record(name);
-    if (record && surely_free(*record)) ::unlink(name.c_str());
+  try {
+    for (const std::string& token : ends_of_names(path, kDraft)) {
+      const std::string name = path + kDraft + token;
+      const std::optional<Record> record = read_record(name);
+      if (record && surely_free(*record)) ::unlink(name.c_str());
+    }
+  } catch (const ReadError&) {  // left to whoever tidies up next
   }
 }
 
@@ -213,20 +218,6 @@ bool link_once(const std::string& from, const std::string& to) {
   if (::stat(from.c_str(), &found) == 0 && found.st_nlink == 2) return true;
   errno = code;
   return false;
-}
-
-std::string fresh_token() {
-  unsigned char bytes[8] = {};
-  const int fd = ::open("/dev/urandom", O_RDONLY | O_CLOEXEC);
-  if (fd < 0 || ::read(fd, bytes, sizeof bytes) != sizeof bytes)
-    throw WorkError("no random numbers from the system");
-  ::close(fd);
-  std::string out;
-  for (const unsigned char byte : bytes) {
-    out += "0123456789abcdef"[byte >> 4];
-    out += "0123456789abcdef"[byte & 15];
-  }
-  return out;
 }
 
 /// Waits until the heartbeat of the holder in `file` moves (true), or does not for `patience`. Time
@@ -315,7 +306,7 @@ std::optional<Lease> Lease::take(const std::string& path, const std::string& who
   state->record.holder = {host_name(), who.substr(0, 200), ::getpid(), 0, true};
   state->record.world = process_world();
   state->record.start = start_of(::getpid());
-  state->record.token = fresh_token();
+  state->record.token = unique_token();
   const std::string name = draft(path, state->record);
   struct Remove {
     const std::string& name;

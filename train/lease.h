@@ -31,7 +31,7 @@ namespace restage {
 struct LeaseOptions {
   double beat = 5;       ///< seconds between heartbeats
   double patience = 30;  ///< seconds without one after which a holder on another host is dead
-  /// Called after every heartbeat from a thread of its own; must not throw.
+  /// Called after every heartbeat from a thread of its own; what it throws is dropped.
   std::function<void()> on_beat;
 };
 

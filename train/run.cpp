@@ -49,39 +49,34 @@ int take_lock(const std::string& folder, const std::string& shown) {
   return fd;
 }
 
-/// A folder that vanishes with its content unless it was moved to its place.
-struct Draft {
-  std::string path;
-  bool moved = false;
-  explicit Draft(std::string where) : path(std::move(where)) {
+/// The folder of a run in the making, beside its later place.
+struct Draft : Temporary {
+  explicit Draft(const std::string& place) : Temporary(name_beside(place, ".")) {
     std::error_code error;
-    fs::remove_all(path, error);
-    if (fs::create_directories(path, error) && !error) return;
-    throw_unwritable(path, error.value());
-  }
-  Draft(const Draft&) = delete;
-  Draft& operator=(const Draft&) = delete;
-  ~Draft() {
-    std::error_code ignored;
-    if (!moved) fs::remove_all(path, ignored);
+    if (!fs::create_directories(path(), error) || error)
+      throw_unwritable(place, error ? error.value() : EEXIST);
   }
   /// False if there is something at `target` already.
   bool move_to(const std::string& target) {
-    if (::rename(path.c_str(), target.c_str()) == 0) return moved = true;
+    if (::rename(path().c_str(), target.c_str()) == 0) {
+      keep();
+      return moved = true;
+    }
     if (errno == EEXIST || errno == ENOTEMPTY || errno == ENOTDIR) return false;
     throw_unwritable(target, errno);
   }
+  bool moved = false;
 };
 
 /// Fills a draft beside the later place; returns its lock.
 int fill(const Draft& draft, const std::string& yaml, const std::string& provenance) {
-  if (::mkdir(inside(draft.path, "checkpoints").c_str(), 0755) != 0)
-    throw_unwritable(draft.path, errno);
-  write_file_atomically(inside(draft.path, "provenance.json"), provenance);
-  write_file_atomically(inside(draft.path, "metrics.jsonl"), "");
-  write_file_atomically(inside(draft.path, "log.txt"), "");
-  write_file_atomically(inside(draft.path, "config.yaml"), yaml);
-  return take_lock(draft.path, draft.path);
+  if (::mkdir(inside(draft.path(), "checkpoints").c_str(), 0755) != 0)
+    throw_unwritable(draft.path(), errno);
+  write_file_atomically(inside(draft.path(), "provenance.json"), provenance);
+  write_file_atomically(inside(draft.path(), "metrics.jsonl"), "");
+  write_file_atomically(inside(draft.path(), "log.txt"), "");
+  write_file_atomically(inside(draft.path(), "config.yaml"), yaml);
+  return take_lock(draft.path(), draft.path());
 }
 
 std::string timestamp() {
@@ -168,7 +163,7 @@ RunDir RunDir::create(const std::string& root, const std::string& name,
                       std::vector<std::string> stages) {
   check_stages(stages);
   constexpr int kTries = 10000;
-  Draft draft(inside(root, (".draft-" + std::to_string(::getpid())).c_str()));
+  Draft draft(inside(root, name.c_str()));
   RunDir run("", std::move(stages), fill(draft, resolved_yaml, provenance_json));
   const std::string stem = inside(root, name.c_str()) + "-" + timestamp() + "-";
   for (int n = 1; n <= kTries && !draft.moved; ++n) {
@@ -187,8 +182,7 @@ RunDir RunDir::create_at(const std::string& dir, const std::string& resolved_yam
   check_stages(stages);
   fs::path place = fs::absolute(dir).lexically_normal();
   if (!place.has_filename()) place = place.parent_path();  // "runs/x/"
-  const fs::path draft_path = place.parent_path() / ("." + place.filename().string() + ".draft");
-  Draft draft(draft_path.string() + std::to_string(::getpid()));
+  Draft draft(place.string());
   RunDir run(dir, std::move(stages), fill(draft, resolved_yaml, provenance_json));
   if (!draft.move_to(place.string()))
     throw InputError(dir, "exists already and is no empty folder",

@@ -69,8 +69,11 @@ std::string checkpoint_name(const std::string& stage, int64_t step, std::string_
 std::vector<Entry> list_checkpoints(const std::string& dir,
                                     const std::vector<std::string>& stages) {
   std::vector<Entry> entries;
-  std::error_code ignored;
-  for (const auto& item : fs::directory_iterator(fs::path(dir) / "checkpoints", ignored)) {
+  const std::string folder = (fs::path(dir) / "checkpoints").string();
+  std::error_code error;
+  const fs::directory_iterator items(folder, error);
+  if (error && is_there(folder)) throw ReadError(folder, error.value());
+  for (const auto& item : items) {
     auto entry = parse_name(item.path());
     if (entry && order_of(stages, entry->stage) < stages.size())
       entries.push_back(std::move(*entry));
@@ -90,6 +93,9 @@ std::optional<Checkpoint> newest_good(const std::vector<Entry>& entries,
       Checkpoint found{entry->path, entry->stage, entry->step, read_file(entry->path)};
       if (checksum(found.bytes) == entry->checksum) return found;
       passed_over.push_back(entry->path + ": the checkpoint is damaged and passed over");
+    } catch (const ReadError& error) {
+      if (!error.absent()) throw;  // it may be good
+      passed_over.push_back(entry->path + ": the checkpoint was removed in the meantime");
     } catch (const Error& error) {
       passed_over.push_back(std::string(error.what()) + " (the checkpoint is passed over)");
     }

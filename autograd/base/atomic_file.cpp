@@ -104,11 +104,41 @@ void write_file_atomically(const std::string& target, std::string_view content) 
   file.commit();
 }
 
+namespace {
+
+/// By what the user can do about it.
+std::string mend_of(int code) {
+  if (code == ENOENT || code == ENOTDIR || code == ELOOP || code == ENAMETOOLONG)
+    return "check the path";
+  if (code == EACCES || code == EPERM) return "ask for the right to read it";
+  if (code == EMFILE || code == ENFILE)
+    return "close other programs or allow more open files (ulimit -n), and run it again";
+  return "look after the disk and run it again";
+}
+
+}  // namespace
+
+ReadError::ReadError(const std::string& path, int code)
+    : InputError(path, std::string("cannot be read (") + std::strerror(code) + ")", mend_of(code)),
+      code_(code) {
+  for (const int users : {ENOENT, ENOTDIR, ELOOP, ENAMETOOLONG, EACCES, EPERM})
+    if (code == users) return;
+  exit_code = 1;
+}
+
+bool ReadError::absent() const { return code_ == ENOENT || code_ == ENOTDIR; }
+
+bool is_there(const std::string& path) {
+  struct stat info {};
+  if (::stat(path.c_str(), &info) == 0) return true;
+  const ReadError error(path, errno);
+  if (error.absent()) return false;
+  throw error;
+}
+
 std::string read_file(const std::string& path, uint64_t limit) {
   struct stat info {};
-  if (::stat(path.c_str(), &info) != 0)
-    throw InputError(path, std::string("cannot be read (") + std::strerror(errno) + ")",
-                     "check the path");
+  if (::stat(path.c_str(), &info) != 0) throw ReadError(path, errno);
   if (S_ISDIR(info.st_mode)) throw InputError(path, "is a folder, not a file", "give a file");
   if (!S_ISREG(info.st_mode))
     throw InputError(path, "is a device, pipe or socket, not a file", "give a file");
@@ -116,15 +146,15 @@ std::string read_file(const std::string& path, uint64_t limit) {
     throw InputError(path, "is too large (" + std::to_string(info.st_size) + " bytes)",
                      "give a smaller file");
   std::FILE* in = std::fopen(path.c_str(), "rb");
-  if (in == nullptr)
-    throw InputError(path, std::string("cannot be read (") + std::strerror(errno) + ")",
-                     "check the path");
+  if (in == nullptr) throw ReadError(path, errno);
   std::string content;
   char buffer[65536];
   size_t got = 0;
   while ((got = std::fread(buffer, 1, sizeof buffer, in)) > 0 && content.size() <= limit)
     content.append(buffer, got);
+  const int code = std::ferror(in) != 0 ? errno : 0;
   std::fclose(in);
+  if (code != 0) throw ReadError(path, code);
   return content;
 }
 

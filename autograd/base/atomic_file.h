@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "autograd/base/error.h"
 #include "autograd/base/temporary.h"
 
 namespace restage {
@@ -34,8 +35,22 @@ class AtomicFile {
 int write_all(int fd, std::string_view content);
 /// The whole content at once.
 void write_file_atomically(const std::string& target, std::string_view content);
-/// Reads a whole file; InputError if it cannot be read, is no plain file (a pipe could keep us
-/// waiting for ever) or has more than `limit` bytes.
+/// The bytes of a file could not be had: there is no such file, no permission, too many files are
+/// open, the disk fails. That says nothing about what is in the file: who replaces damaged files
+/// must pass this error on, and not take the file for damaged.
+class ReadError : public InputError {
+ public:
+  /// `code`: the system's error number. The exit code is 2 where the user can mend it by another
+  /// path or a permission, and 1 otherwise.
+  ReadError(const std::string& path, int code);
+  bool absent() const;  ///< there is no such file
+ private:
+  int code_;
+};
+/// Whether there is something at `path`. ReadError if that cannot be seen.
+bool is_there(const std::string& path);
+/// Reads a whole file. ReadError if the bytes cannot be had; InputError if it is no plain file (a
+/// pipe could keep us waiting for ever) or has more than `limit` bytes.
 std::string read_file(const std::string& path, uint64_t limit = uint64_t{1} << 32);
 /// 64-bit FNV-1a based checksum of bytes, as 16 hex digits (detects damage, not malice).
 std::string checksum(std::string_view bytes);

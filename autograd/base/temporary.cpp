@@ -10,6 +10,8 @@
 #include <cstring>
 #include <filesystem>
 
+#include "autograd/base/host.h"
+
 namespace restage {
 namespace {
 
@@ -60,7 +62,7 @@ void remove_at(int parent, const char* path, int depth) noexcept {
 
 std::string name_beside(const std::string& target, const std::string& prefix) {
   const std::filesystem::path path(target);
-  const std::string end = ".part" + std::to_string(::getpid());
+  const std::string end = ".part" + unique_token();
   const size_t room = NAME_MAX - prefix.size() - end.size();
   return (path.parent_path() / (prefix + path.filename().string().substr(0, room) + end)).string();
 }

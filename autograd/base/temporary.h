@@ -5,8 +5,9 @@
 
 namespace restage {
 
-/// A name beside a target for work in progress: `prefix` + its name + ".part" + the process's
-/// number, shortened where the file system could not hold it.
+/// A name for work in progress beside a target: `prefix` + the target's name + ".part" + a
+/// unique_token() (host.h). The target's name is shortened where the file system could not hold it
+/// all. All drafts of files and folders are named so: ".part" tells what a killed process has left.
 std::string name_beside(const std::string& target, const std::string& prefix = "");
 
 /// The file or folder `path`, which the owner makes, is removed in the end unless it was kept, also

@@ -192,19 +192,22 @@ std::unique_ptr<Item> deformation_online(const Inputs& in) {
       local.size(), [=](int64_t i) { return target->pose(local[i], angles[i], origin); });
 }
 
-/// Cloud in, posed target out; the pelvis moves with the velocities that SMRM gives.
+/// Cloud in, posed target out; the pelvis moves with the velocities that SMRM gives. The points of
+/// each frame were chosen before, as the other program chooses them (../inputs.cpp).
 std::unique_ptr<Item> frame_online(const Inputs& in) {
   const auto net = point_transformer();
   in.load(*net, "skeleton", kPointTransformerParameters);
   net->eval();
   const auto motion = std::make_shared<MotionState>(in);
   const auto target = std::make_shared<Target>(in);
-  const auto clouds = frames_of(in.at("frames.clouds"));
+  const auto clouds = frames_of(in.at("frames.chosen"));
   const auto pelvis = std::make_shared<Tensor>();
   return std::make_unique<Online>(
       clouds.size(),
       [=](int64_t i) {
-        const Tensor joints = net->forward(clouds[i]), root = joints.select(1, 0);
+        const Tensor centre = clouds[i].mean(1, true);
+        const Tensor joints = net->forward(clouds[i] - centre) + centre;
+        const Tensor root = joints.select(1, 0);
         const Tensor velocity = pelvis->defined() ? 30 * (root - *pelvis) : torch::zeros({1, 3});
         *pelvis = root;
         const SmrmOutput b = motion->step(joints - root.unsqueeze(1), velocity);

@@ -78,9 +78,9 @@ void check_file(const std::string& folder, const std::string& name, const Manife
   const std::string path = folder + "/" + name;
   std::error_code failed;
   const uint64_t bytes = fs::file_size(path, failed);
-  if (failed) {
+  if (!is_there(path)) {
     problems.push_back(path + ": is missing; build or copy the folder again");
-  } else if (bytes != listed.bytes) {
+  } else if (failed || bytes != listed.bytes) {
     problems.push_back(cat(path, ": has ", bytes, " bytes instead of ", listed.bytes,
                            "; build or copy the folder again"));
   } else if (sha256_of_file(path) != listed.sha256) {

@@ -3,10 +3,11 @@
 #include <openssl/evp.h>
 
 #include <array>
-#include <fstream>
+#include <cerrno>
+#include <cstdio>
 #include <vector>
 
-#include "autograd/base/error.h"
+#include "autograd/base/atomic_file.h"
 
 namespace restage {
 
@@ -60,15 +61,14 @@ bool is_sha256(std::string_view text) {
 }
 
 std::string sha256_of_file(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw InputError(path, "cannot be read", "check that it is there");
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"),
+                                                             std::fclose);
+  if (file == nullptr) throw ReadError(path, errno);
   Sha256 sum;
   std::vector<char> piece(size_t{1} << 20);
-  while (file) {
-    file.read(piece.data(), static_cast<std::streamsize>(piece.size()));
-    sum.add({piece.data(), static_cast<size_t>(file.gcount())});
-  }
-  if (file.bad()) throw InputError(path, "cannot be read to its end", "check the disk");
+  for (size_t got = 0; (got = std::fread(piece.data(), 1, piece.size(), file.get())) > 0;)
+    sum.add({piece.data(), got});
+  if (std::ferror(file.get()) != 0) throw ReadError(path, errno);
   return sum.hex();
 }
 

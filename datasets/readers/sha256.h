@@ -25,7 +25,7 @@ std::string sha256(std::string_view bytes);
 bool is_sha256(std::string_view text);
 /// 40 digits; only for what git names by it.
 std::string sha1(std::string_view bytes);
-/// Of a file, in constant memory. InputError if it cannot be read.
+/// Of a file, in constant memory. ReadError if it cannot be read to its end.
 std::string sha256_of_file(const std::string& path);
 
 }  // namespace restage

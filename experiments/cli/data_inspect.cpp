@@ -1,7 +1,5 @@
 // restage data inspect: what a file holds, in a screenful, and drawn. Files of others are looked at
 // as `restage data import` reads them.
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -11,7 +9,6 @@
 #include "autograd/base/error.h"
 #include "autograd/base/format.h"
 #include "autograd/base/output_check.h"
-#include "autograd/base/temporary.h"
 #include "datasets/builtin/bodies.h"
 #include "datasets/doctor/shape.h"
 #include "datasets/importers/import.h"
@@ -20,6 +17,7 @@
 #include "experiments/cli/import_text.h"
 #include "experiments/cli/output.h"
 #include "experiments/clips.h"
+#include "experiments/scratch.h"
 #include "infer/render/figures.h"
 
 namespace restage::cli {
@@ -191,21 +189,19 @@ std::vector<std::string> plot(const InspectOptions& options, const std::string& 
 /// A data file that goes away with the object.
 class Imported {
  public:
-  Imported(const InspectOptions& options, const Common& common)
-      : file_((std::filesystem::temp_directory_path() /
-               ("restage-inspect-" + std::to_string(::getpid()) + ".h5"))
-                  .string()) {
+  Imported(const InspectOptions& options, const Common& common) {
     ImportOptions how;
     how.body_model = options.body_model;
     how.motion.force = true;
     how.max_memory = common.max_memory;
-    reports_ = import_data(options.file, file_.path(), how).reports;
+    reports_ = import_data(options.file, path_, how).reports;
   }
-  const std::string& path() const { return file_.path(); }
+  const std::string& path() const { return path_; }
   const std::vector<ImportReport>& reports() const { return reports_; }
 
  private:
-  Temporary file_;
+  Scratch folder_;
+  std::string path_ = folder_.file("data.h5");
   std::vector<ImportReport> reports_;
 };
 

@@ -4,7 +4,7 @@
 #include "experiments/cli/output.h"
 #include "nn/config/config.h"
 #include "train/failure.h"
-#include "train/stages/training.h"
+#include "train/training/training.h"
 
 namespace restage::cli {
 namespace {

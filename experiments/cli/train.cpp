@@ -18,7 +18,7 @@
 #include "nn/config/config.h"
 #include "train/run_provenance.h"
 #include "train/stages/motion_stage.h"
-#include "train/stages/training.h"
+#include "train/training/training.h"
 
 namespace restage::cli {
 namespace {
@@ -165,11 +165,10 @@ int dry_run(const TrainConfig& config, const TrainingData& data, const Common& c
 /// Everything a training does, in a folder that is removed.
 int fast_dev_run(const TrainConfig& config, const TrainingData& data,
                  const TrainArguments& arguments, const Common& common) {
-  const std::filesystem::path root = std::filesystem::temp_directory_path();
-  const Temporary folder(name_beside((root / "restage-fast-dev-run").string()));
+  const Scratch scratch;
   const RunInput input = provenance_of(config, data, common);
   {
-    RunDir run = RunDir::create_at(folder.path(), input.resolved_yaml, provenance_json(input),
+    RunDir run = RunDir::create_at(scratch.file("run"), input.resolved_yaml, provenance_json(input),
                                    config.trained());
     train_in(run, config, data, arguments, common);
     load_bundle(run.dir());

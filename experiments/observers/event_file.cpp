@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "autograd/base/error.h"
+#include "autograd/base/host.h"
 
 namespace restage {
 namespace {
@@ -102,10 +103,8 @@ uint32_t masked_crc32c(std::string_view bytes) {
 }
 
 EventFile::EventFile(const std::string& folder, int64_t first_step) {
-  char host[256] = "host";
-  ::gethostname(host, sizeof host - 1);
   path_ = folder + "/events.out.tfevents." + std::to_string(static_cast<int64_t>(now())) + "." +
-          host + "." + std::to_string(::getpid());
+          host_name() + "." + std::to_string(::getpid());
   file_.reset(std::fopen(path_.c_str(), "wb"));
   if (file_ == nullptr)
     throw WorkError(path_ + ": could not be made (" + std::strerror(errno) + ")");

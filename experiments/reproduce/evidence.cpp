@@ -100,6 +100,8 @@ int take_results(const Evidence& evidence) {
     if (own && own->state == tables::TrialState::done) continue;
     try {
       if (tables::read_result(path, trial.id).state != tables::TrialState::done) continue;
+    } catch (const ReadError&) {
+      throw;
     } catch (const InputError& error) {
       log_warning(error.what());
       continue;

@@ -138,10 +138,19 @@ std::string reasons(const PaperTable& printed) {
 
 // ---- claims ------------------------------------------------------------------------------------
 
+/// What is claimed of two rows where it is not an order.
+std::string margin_text(const Claim& claim) {
+  if (claim.within)
+    return ", which are to differ by less than " + tables::short_number(*claim.within);
+  if (claim.no_better_by)
+    return ", than which it is to be no better by " + tables::short_number(*claim.no_better_by);
+  return "";
+}
+
 std::string claim_text(const Claim& claim, const Judgement& judgement) {
   std::string text = "> " + on_one_line(claim.says) + " (" + claim.where + ")\n\n**" +
                      kVerdicts[static_cast<int>(judgement.verdict)] + "**: " + claim.better +
-                     " against " + claim.than +
+                     " against " + claim.than + margin_text(claim) +
                      (claim.most ? ", three quarters of the comparisons needed" : "") + ".\n";
   if (judgement.verdict != Verdict::not_run) {
     Rows rows{{"set, metric", "pairs of seeds", claim.better + " - " + claim.than, ""}};
@@ -345,10 +354,11 @@ const char* const kRule =
     "A claim is judged by paired differences over seeds and sequences: it **holds** if the 95 % "
     "interval of every\ncomparison lies on its side, **does not hold** if one lies on the other, "
     "and **cannot be told** otherwise or with fewer\nthan three seeds. The rule was written before "
-    "the runs (`experiments/reproduce/verdict.h`). Orders are judged, never\nfigures: other data "
-    "and other budgets than the paper's. Ours: mean ± sample deviation over n seeds [95 % "
-    "interval:\nbootstrap over sequences and seeds]; with three seeds such an interval holds the "
-    "truth in some 75 of 100 cases\n(docs/experiments.md).\n\n";
+    "the runs, but for one amendment that it names (`experiments/reproduce/verdict.h`).\nOrders "
+    "are "
+    "judged, never figures: other data and other budgets than the paper's. Ours: mean ± sample "
+    "deviation over n seeds\n[95 % interval: bootstrap over sequences and seeds]; with three seeds "
+    "such an interval holds the truth in some 75 of 100 cases\n(docs/experiments.md).\n\n";
 
 /// Of what is beside the page; made if it is not there.
 std::string files_folder(const std::string& folder, const PageOptions& options) {

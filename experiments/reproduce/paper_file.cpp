@@ -40,7 +40,10 @@ void visit(V& v, Claim& c) {
   v("better", c.better, "row that has less", required());
   v("than", c.than, "row that it is compared with", required());
   v("metrics", c.metrics, "compared", metric_names());
-  v("within", c.within, "they differ by less than this", positive());
+  v("within", c.within, "they differ by less than this, either way", positive());
+  v("no_better_by", c.no_better_by, "'better' gains less than this; it may be worse", positive());
+  v.check("no_better_by", !c.within || !c.no_better_by, "and 'within' are two different claims",
+          "give one of them");
   v("most", c.most, "three quarters of the comparisons will do");
   v("tried", c.tried, "what was tried where it does not hold");
   v.check("than", c.better != c.than, "names one row twice", "name two rows");

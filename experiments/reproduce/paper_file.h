@@ -27,10 +27,11 @@ struct Claim {
   std::string where;  ///< in the paper
   std::string better, than;
   std::vector<std::string> metrics;  ///< empty: those of the tables
-  /// The claim is that the two differ by less than this: an equivalence, in the metrics' unit.
-  std::optional<double> within;
-  bool most = false;  ///< "almost all": three quarters of the comparisons will do
-  std::string tried;  ///< what was tried where it does not hold
+  // Other claims than an order; a margin is in the metrics' unit. At most one of the two is given.
+  std::optional<double> within;        ///< the two differ by less than this, either way
+  std::optional<double> no_better_by;  ///< `better` gains less than this; it may be worse
+  bool most = false;                   ///< "almost all": three quarters of the comparisons will do
+  std::string tried;                   ///< what was tried where it does not hold
 };
 
 /// What rows make of sequences of the benchmark, at the same moments (pictures.h).

@@ -1,6 +1,7 @@
 #include "experiments/reproduce/verdict.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "experiments/sweep/table.h"
 
@@ -31,16 +32,17 @@ const std::string& measured_set(const Budget& budget, const PaperTable& table) {
   return budget.set.empty() ? table.set : budget.set;
 }
 
-Verdict verdict_of(const tables::Estimate& difference, std::optional<double> within) {
+Verdict verdict_of(const tables::Estimate& difference, const Claim& claim) {
   if (difference.n == 0) return Verdict::not_run;
   if (difference.n < kFewestSeeds || !difference.low) return Verdict::cannot_be_told;
-  if (within) {
-    if (*difference.low > -*within && *difference.high < *within) return Verdict::holds;
-    return *difference.low > *within || *difference.high < -*within ? Verdict::does_not_hold
-                                                                    : Verdict::cannot_be_told;
-  }
-  if (*difference.high < 0) return Verdict::holds;
-  return *difference.low > 0 ? Verdict::does_not_hold : Verdict::cannot_be_told;
+  // The claim is that the difference lies between these two.
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  double from = -kFar, to = 0;
+  if (claim.within) from = -*claim.within, to = *claim.within;
+  if (claim.no_better_by) from = -*claim.no_better_by, to = kFar;
+  const double low = *difference.low, high = *difference.high;
+  if (low > from && high < to) return Verdict::holds;
+  return high < from || low > to ? Verdict::does_not_hold : Verdict::cannot_be_told;
 }
 
 Verdict verdict_of(const std::vector<Finding>& findings, bool most) {
@@ -75,7 +77,7 @@ Judgement judge(const PaperFile& file, const Budget& budget, const Claim& claim,
       Finding finding{name, metrics[c], {}};
       if (better && than && set)
         finding.difference = *table.rows[*better].cells[*set][c].difference;
-      finding.verdict = verdict_of(finding.difference, claim.within);
+      finding.verdict = verdict_of(finding.difference, claim);
       out.findings.push_back(std::move(finding));
     }
     if (!budget.set.empty()) break;  // one set stands for all

@@ -5,18 +5,23 @@
 //     holds            the 95 % interval of better - than lies below 0
 //     does not hold    it lies above 0: the order is the other way round
 //     cannot be told   it contains 0, or there are fewer than three pairs of seeds
-//   Where the claim is that two rows are alike (`within`): holds if the interval lies within that
-//   much of 0, does not hold if it lies outside, cannot be told otherwise.
+//   Where the claim is that two rows are alike (`within: m`), either way: holds if the interval
+//   lies between -m and m, does not hold if it lies outside, cannot be told otherwise. Where the
+//   claim is that there is no noticeable improvement (`no_better_by: m`), only a gain speaks
+//   against it: holds if the interval lies above -m (also if all of it is above 0: worse is no
+//   improvement), does not hold if it lies below -m, cannot be told otherwise.
 //     not run          one of the rows is not there
 //   A claim holds if all of its comparisons do (of `most`: three quarters), does not hold if so
 //   many are reversed that this cannot be (one; of `most`: more than a quarter), and cannot be told
 //   otherwise. One comparison that is not run leaves the claim not run.
 //
+// Amended once after a run: `no_better_by` came when "did not lead to any noticeable improvement"
+// (marsot2023, a loss on bone lengths) had been judged by `within`, which says something else.
+//
 // Only orders are judged. Figures of other data and other budgets are not the paper's, and are not
 // expected to be.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -42,7 +47,8 @@ struct Judgement {
   std::vector<Finding> findings;
 };
 
-Verdict verdict_of(const tables::Estimate& difference, std::optional<double> within = std::nullopt);
+/// Of one comparison: `difference` is that of the claim's two rows.
+Verdict verdict_of(const tables::Estimate& difference, const Claim& claim);
 Verdict verdict_of(const std::vector<Finding>& findings, bool most);
 
 /// The set of the results that stands for one of the paper's.

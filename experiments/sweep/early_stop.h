@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "experiments/sweep/sweep_file.h"
-#include "train/stages/store.h"
+#include "train/artifacts/store.h"
 #include "train/trainer.h"
 
 namespace restage::sweep {

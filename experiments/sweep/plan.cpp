@@ -8,7 +8,7 @@
 
 #include "autograd/base/nearest.h"
 #include "nn/config/config.h"
-#include "train/stages/train_config.h"
+#include "train/training/train_config.h"
 
 namespace restage::sweep {
 namespace {
@@ -149,8 +149,9 @@ class Planner {
   }
 
   SweepPlan plan() {
-    for (const Combination& combination : without_excluded(file_, combinations(file_)))
-      add(combination);
+    const std::vector<Combination> all = without_excluded(file_, combinations(file_));
+    for (const Combination& combination : all) trials_ += seeds_of(combination);
+    for (const Combination& combination : all) add(combination);
     for (const Setting& setting : file_.set)
       if (unread_.contains(setting.key)) fail_unread(setting);
     count();
@@ -158,6 +159,14 @@ class Planner {
   }
 
  private:
+  static bool has_seed(const Combination& combination) {
+    return std::any_of(combination.settings.begin(), combination.settings.end(),
+                       [](const Setting& setting) { return setting.key == "seed"; });
+  }
+  size_t seeds_of(const Combination& combination) const {
+    return has_seed(combination) ? 1 : std::max<size_t>(1, file_.seeds.size());
+  }
+
   void add(const Combination& combination) {
     ConfigNode tree = base_;
     std::map<std::string, std::string> overrides;
@@ -168,17 +177,16 @@ class Planner {
       keys.push_back(setting.key);
     }
     check_read(tree, combination, keys);
-    const bool own_seed = std::find(keys.begin(), keys.end(), "seed") != keys.end();
-    const size_t seeds = own_seed ? 1 : std::max<size_t>(1, file_.seeds.size());
-    for (size_t s = 0; s < seeds; ++s) {
-      if (!own_seed && !file_.seeds.empty()) {
+    for (size_t s = 0; s < seeds_of(combination); ++s) {
+      if (!has_seed(combination) && !file_.seeds.empty()) {
         ConfigNode seed;
         seed.kind = ConfigNode::Kind::scalar;
         seed.text = std::to_string(file_.seeds[s]);
         seed.place = seed.key_place = {file_.path, 0, 0};
         lay(tree, {"seed", seed});
       }
-      PlannedTrial trial = planner_.plan(tree);
+      PlannedTrial trial = planner_.plan(tree, "trial " + std::to_string(plan_.trials.size() + 1) +
+                                                   " of " + std::to_string(trials_));
       trial.case_name = combination.one->name;
       trial.overrides = overrides;
       const auto [found, fresh] = ids_.emplace(trial.id, combination);
@@ -224,6 +232,7 @@ class Planner {
   ConfigNode base_;
   std::set<std::string> unread_;  ///< keys of `set` that no trial has read so far
   std::map<std::string, Combination> ids_;
+  size_t trials_ = 0;  ///< how many there will be
   SweepPlan plan_;
 };
 

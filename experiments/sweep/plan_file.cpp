@@ -89,8 +89,7 @@ Json early_stop_json(const std::optional<EarlyStop>& rule) {
 
 std::optional<PlanFile> read_plan_file(const std::string& dir) {
   const std::string path = dir + "/plan.json";
-  std::error_code ignored;
-  if (!std::filesystem::exists(path, ignored)) return std::nullopt;
+  if (!is_there(path)) return std::nullopt;
   const Reader reader(path,
                       "write it again with 'restage sweep plan SWEEP.yaml --out " + dir + "'");
   const Json document = reader.parse();

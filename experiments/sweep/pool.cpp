@@ -69,6 +69,15 @@ class Pool {
     }
   }
 
+  Pool(const Pool&) = delete;
+  Pool& operator=(const Pool&) = delete;
+  /// After an error no trial may go on that nobody judges.
+  ~Pool() {
+    terminate();
+    for (const Slot& slot : slots_)
+      if (slot.pid > 0) ::waitpid(slot.pid, nullptr, 0);
+  }
+
   PoolOutcome run() {
     while (true) {
       reap();
@@ -223,7 +232,7 @@ class Pool {
     if (terminated_) return;
     terminated_ = true;
     for (const Slot& slot : slots_)
-      if (slot.state == Slot::State::running) ::kill(slot.pid, SIGTERM);
+      if (slot.pid > 0) ::kill(slot.pid, SIGTERM);
   }
 
   // ---- others ----

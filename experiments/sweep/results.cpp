@@ -110,13 +110,14 @@ TrialResult result_of(const std::string& dir, const std::string& id,
   pending.id = id;
   pending.described = planned != nullptr;
   const std::string path = dir + "/trials/" + id + "/result.json";
-  std::error_code ignored;
-  if (!fs::exists(path, ignored)) return pending;
+  if (!is_there(path)) return pending;
   try {
     TrialResult found = read_result(path, id);
     if (planned == nullptr || same_question(found, *planned)) return found;
     throw InputError(path, "its case, seed or overrides are not those of the plan",
                      "it is not used; remove it and run the trial again");
+  } catch (const ReadError&) {
+    throw;
   } catch (const Error& error) {
     results->notices.emplace_back(error.what());
     pending.state = TrialState::damaged;
@@ -172,6 +173,8 @@ Results read_results(const std::string& dir) {
   const std::vector<std::string> folders = trial_folders(dir);
   try {
     plan = sweep::read_plan_file(dir);
+  } catch (const ReadError&) {
+    throw;
   } catch (const Error& error) {
     out.notices.emplace_back(error.what());
   }

@@ -52,7 +52,8 @@ struct Results {
 
 /// One result file. InputError: damaged, or the result of another trial.
 TrialResult read_result(const std::string& path, const std::string& id);
-/// All trials of a sweep. InputError: `dir` holds no sweep.
+/// All trials of a sweep. InputError: `dir` holds no sweep. ReadError: a file of it cannot be read,
+/// which says nothing about its trial.
 Results read_results(const std::string& dir);
 
 /// A value of an override as a person writes it: text without quotes.

@@ -5,6 +5,9 @@
 #include <cstdio>
 #include <iterator>
 
+#include "experiments/text.h"
+#include "infer/render/html.h"
+
 namespace restage::tables {
 namespace {
 
@@ -15,27 +18,6 @@ std::string place(double x) {
 }
 
 }  // namespace
-
-std::string escape_xml(const std::string& text) {
-  std::string out;
-  for (const char c : text) switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? ' ' : c;
-    }
-  return out;
-}
 
 void Svg::line(double x1, double y1, double x2, double y2, const std::string& colour,
                double width) {
@@ -53,7 +35,7 @@ void Svg::text(double x, double y, const std::string& words, const std::string& 
                const std::string& colour) {
   body_ += "<text x=\"" + place(x) + "\" y=\"" + place(y) + "\" text-anchor=\"" + anchor +
            "\" font-size=\"" + std::to_string(size) + "\" fill=\"" + colour + "\">" +
-           escape_xml(words) + "</text>\n";
+           escape_html(on_one_line(words)) + "</text>\n";
 }
 
 void Svg::polyline(const std::vector<std::pair<double, double>>& points,

@@ -8,15 +8,12 @@
 
 namespace restage::tables {
 
-/// `&`, `<`, `>`, quotes and control characters made harmless.
-std::string escape_xml(const std::string& text);
-
 class Svg {
  public:
   void line(double x1, double y1, double x2, double y2, const std::string& colour,
             double width = 1);
   void dot(double x, double y, double radius, const std::string& colour);
-  /// `anchor`: start, middle or end.
+  /// One line of `words`, whatever is in them; `anchor`: start, middle or end.
   void text(double x, double y, const std::string& words, const std::string& anchor = "start",
             int size = 11, const std::string& colour = "#222");
   void polyline(const std::vector<std::pair<double, double>>& points, const std::string& colour);

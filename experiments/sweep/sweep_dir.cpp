@@ -1,8 +1,5 @@
 #include "experiments/sweep/sweep_dir.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -11,6 +8,7 @@
 #include <thread>
 
 #include "autograd/base/atomic_file.h"
+#include "autograd/base/host.h"
 #include "autograd/base/interrupt.h"
 #include "autograd/base/nearest.h"
 #include "nn/config/config_reader.h"
@@ -139,11 +137,6 @@ void make_folder(const std::string& path) {
                    "choose a folder that you can write to");
 }
 
-std::string host_name() {
-  char name[256] = "";
-  return ::gethostname(name, sizeof name - 1) == 0 ? name : "unknown";
-}
-
 }  // namespace
 
 const TrialEntry& SweepDir::trial(const std::string& id) const {
@@ -209,6 +202,9 @@ SweepDir read_sweep_dir(const std::string& dir) {
 std::optional<tables::TrialResult> read_result(const SweepDir& dir, const std::string& id) {
   try {
     return tables::read_result(dir.result(id), id);
+  } catch (const ReadError& error) {
+    if (!error.absent()) throw;
+    return std::nullopt;
   } catch (const Error&) {
     return std::nullopt;
   }
@@ -269,21 +265,11 @@ TrialStatus status_of(const SweepDir& dir, const TrialEntry& trial) {
 }
 
 void request_stop(const std::string& dir) {
-  unsigned char bytes[8] = {};
-  const int fd = ::open("/dev/urandom", O_RDONLY | O_CLOEXEC);
-  if (fd < 0 || ::read(fd, bytes, sizeof bytes) != sizeof bytes)
-    throw WorkError("no random numbers from the system");
-  ::close(fd);
-  std::string token;
-  for (const unsigned char byte : bytes) token += std::to_string(static_cast<int>(byte)) + ".";
-  write_file_atomically(dir + "/stop", token + "\n");
+  write_file_atomically(dir + "/stop", unique_token() + "\n");
 }
 
 std::string stop_token(const std::string& dir) {
-  std::ifstream file(dir + "/stop");
-  std::string token;
-  std::getline(file, token);
-  return token;
+  return is_there(dir + "/stop") ? read_file(dir + "/stop") : "";
 }
 
 std::string last_line(const std::string& path) {

@@ -40,8 +40,8 @@ int write_sweep_dir(const std::string& dir, const SweepFile& file, const SweepPl
 /// InputError: no sweep's folder.
 SweepDir read_sweep_dir(const std::string& dir);
 
-/// What a trial came to; nothing if it is not over. What cannot be read, or is of another trial,
-/// counts as not there.
+/// What a trial came to; nothing if it is not over. What is damaged, or is of another trial, counts
+/// as not there. ReadError if the bytes cannot be had: the trial may be over.
 std::optional<tables::TrialResult> read_result(const SweepDir& dir, const std::string& id);
 /// The document of the contract, by rename. `seconds` is of the last attempt. `early`: by the
 /// sweep's rule, and `error` says why.

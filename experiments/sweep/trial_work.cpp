@@ -13,8 +13,9 @@
 #include "datasets/readers/sha256.h"
 #include "experiments/benchmark_sets.h"
 #include "experiments/evaluation.h"
+#include "experiments/waiting.h"
 #include "nn/config/config.h"
-#include "train/stages/training.h"
+#include "train/training/training.h"
 
 namespace restage::sweep {
 namespace {
@@ -123,24 +124,34 @@ struct TrialPlanner::Memory {
   Store store{""};
   Identities identities;
   std::map<std::string, std::string> more;  // what else determines a trial
-  std::set<std::string> good;               // stages that were found to be so
+  std::set<std::string> good;               // stages, at seed 0, that were found to be so
   std::string loaded;                       // identity of `data`
   std::unique_ptr<TrainingData> data;
+  Waiting waiting;
 
   /// Models of unknown names, sizes that do not fit together, windows longer than every motion, and
-  /// too little held out to measure anything on.
-  void check(const TrainConfig& config, const std::vector<StageId>& stages) {
+  /// too little held out to measure anything on. None of it depends on the seed, so trials that
+  /// differ in nothing else are checked once.
+  void check(TrainConfig config, const std::vector<StageId>& stages, const std::string& name) {
     const std::string wanted = identities.data(config.data);
-    if (evaluate.benchmark.empty() && good.insert("held out of " + wanted).second)
+    if (evaluate.benchmark.empty() && good.insert("held out of " + wanted).second) {
+      waiting.on("reading the held-out data of " + config.data.source);
       evaluation_options(config, load_corpus(config.data, "test"), 0);
-    const bool known = std::all_of(stages.begin(), stages.end(), [&](const StageId& s) {
-      return good.contains(s.id) || store.has(s);
-    });
+    }
+    config.seed = 0;
+    const std::vector<StageId> seedless = identities.stages(config);
+    bool known = true;
+    for (size_t s = 0; s < stages.size(); ++s)
+      known = known && (good.contains(seedless[s].id) || store.has(stages[s]));
     if (known) return;
-    if (loaded != wanted) data = std::make_unique<TrainingData>(config.data);
+    if (loaded != wanted) {
+      waiting.on("reading the training data of " + config.data.source);
+      data = std::make_unique<TrainingData>(config.data);
+    }
     loaded = wanted;
+    waiting.on("setting up the stages of " + name + ", to find mistakes before any work");
     check_stages(config, *data);
-    for (const StageId& s : stages) good.insert(s.id);
+    for (const StageId& s : seedless) good.insert(s.id);
   }
 };
 
@@ -161,16 +172,18 @@ TrialPlanner::TrialPlanner(Evaluate evaluate, std::string store)
 
 TrialPlanner::~TrialPlanner() = default;
 
-PlannedTrial TrialPlanner::plan(const ConfigNode& tree) {
+PlannedTrial TrialPlanner::plan(const ConfigNode& tree, const std::string& name) {
   const TrainConfig config = read(tree);
   check_evaluation(tree, config, memory_->evaluate);
+  memory_->waiting.on("summing up the bytes of data and weights of " + name + ", its identity");
   const std::vector<StageId> stages = memory_->identities.stages(config);
-  memory_->check(config, stages);
+  memory_->check(config, stages, name);
   PlannedTrial out;
   out.id = memory_->identities.trial(config, memory_->more);
   out.seed = config.seed;
   out.config_yaml = resolved_yaml(config);
   for (const StageId& s : stages) out.artifacts.push_back({s.stage, s.id, memory_->store.has(s)});
+  memory_->waiting.on("");
   return out;
 }
 

@@ -33,7 +33,8 @@ struct PlannedTrial {
   std::vector<StageArtifact> artifacts;          ///< in the order of training
 };
 
-/// Makes PlannedTrials; remembers the checksums of data that it has read.
+/// Makes PlannedTrials; remembers the checksums of data that it has read, and which stages it has
+/// found to be trainable. Says what it is doing if that takes more than two seconds.
 class TrialPlanner {
  public:
   TrialPlanner(Evaluate evaluate, std::string store);
@@ -41,7 +42,8 @@ class TrialPlanner {
 
   /// `tree`: a whole configuration, the trial's settings laid over its base. It is read strictly
   /// and checked as `restage train` would. `case_name` and `overrides` are the caller's to fill in.
-  PlannedTrial plan(const ConfigNode& tree);
+  /// `name`: of the trial, such as "trial 3 of 15", where it is said what takes long.
+  PlannedTrial plan(const ConfigNode& tree, const std::string& name = "the trial");
   /// The keys among `keys` (dotted) that no stage of this configuration reads.
   static std::vector<std::string> unread(const ConfigNode& tree,
                                          const std::vector<std::string>& keys);

@@ -9,7 +9,7 @@
 namespace restage {
 
 std::string base64(const void* data, size_t size);
-/// For the text of an element or an attribute in double quotes.
+/// For the text of an element, or an attribute in double quotes, of HTML and of SVG.
 std::string escape_html(const std::string& text);
 /// JSON that may stand inside a script element: nothing in it ends the element. Bytes that are no
 /// UTF-8 are replaced.

@@ -13,4 +13,7 @@ enum class Measure { mse, distance };
 /// several such groups: their squares [n, ...], or the length of each group [n, groups].
 Var errors(const Var& x, Measure measure, int64_t width = 3);
 
+/// Mean distance per point, metres (a number to report, not to differentiate).
+double mean_distance(const Tensor& a, const Tensor& b);
+
 }  // namespace restage

@@ -6,6 +6,7 @@
 #include "autograd/ops/layout.h"
 #include "autograd/ops/reduce.h"
 #include "autograd/ops/rotation.h"
+#include "nn/models/skeleton.h"
 
 namespace restage {
 namespace {

@@ -4,6 +4,8 @@
 #include "autograd/ops/layout.h"
 #include "autograd/ops/linear.h"
 #include "autograd/ops/reduce.h"
+#include "autograd/ops/rotation.h"
+#include "nn/models/motion.h"
 
 namespace restage {
 
@@ -87,6 +89,43 @@ Var join_points(const Var& vector, const Var& points) {
 Var joint_differences(const Var& points, const Var& joints) {
   const int64_t n = points.size(0), v = points.size(1), j = joints.size(1);
   return reshape(reshape(points, {n, v, 1, 3}) - reshape(joints, {n, 1, j, 3}), {n, v, 3 * j});
+}
+
+namespace {
+
+/// `seen_*` is what the networks read, the others what is skinned.
+DeformationOutput deform(Context& ctx, const DeformationModel& weights, const OffsetNet* offsets,
+                         const Var& seen_points, const Var& seen_joints, const Var& rest_points,
+                         const Var& rest_joints, const Var& local, const Var& axis_angle) {
+  const int64_t n = rest_points.size(0);
+  DeformationOutput out;
+  out.weights = weights.weights(ctx, seen_joints, seen_points);
+  Var x = rest_points;
+  if (offsets != nullptr) {
+    out.offsets = offsets->at_points(ctx, axis_angle, seen_points);
+    x = x + out.offsets;
+  }
+  const Var root = reshape(slice(rest_joints, 1, 0, 1), {n, 3});
+  const Var transforms = forward_kinematics(local, rest_joints, root, joint_parents());
+  out.posed = linear_blend_skinning(x, out.weights, transforms, rest_joints);
+  return out;
+}
+
+}  // namespace
+
+DeformationOutput deform(Context& ctx, const DeformationModel& weights, const OffsetNet* offsets,
+                         const Var& rest_points, const Var& rest_joints, const Var& local,
+                         const Var& axis_angle) {
+  return deform(ctx, weights, offsets, rest_points, rest_joints, rest_points, rest_joints, local,
+                axis_angle);
+}
+
+DeformationOutput deform(Context& ctx, const DeformationModel& weights, const OffsetNet* offsets,
+                         const DeformationBatch& b) {
+  const Tensor& points = b.seen_points.defined() ? b.seen_points : b.rest_points;
+  const Tensor& joints = b.seen_joints.defined() ? b.seen_joints : b.rest_joints;
+  return deform(ctx, weights, offsets, points, joints, b.rest_points, b.rest_joints, b.local,
+                b.axis_angle);
 }
 
 }  // namespace restage

@@ -83,6 +83,26 @@ struct RootNet final : Mlp3 {
   RootNet(const MlpConfig& c, const Init& init) : Mlp3(3 * kJoints, 3, c, false, init) {}
 };
 
+/// Points of one batch; shapes [n, v, 3], [n, 22, 3], [n, 22, 3, 3], [n, 66]; all relative to the
+/// pelvis.
+struct DeformationBatch {
+  Tensor rest_points, posed_points, rest_joints, local, axis_angle;
+  /// What the networks are shown in the place of rest_points and rest_joints, if it is another.
+  Tensor seen_points = {}, seen_joints = {};
+};
+
+struct DeformationOutput {
+  Var weights, offsets, posed;  ///< [n, v, 22], [n, v, 3] (undefined without offsets), [n, v, 3]
+};
+
+/// Eq. 3: posed points from rest points. `offsets` null: none.
+DeformationOutput deform(Context& ctx, const DeformationModel& weights, const OffsetNet* offsets,
+                         const DeformationBatch& batch);
+/// The same with gradients to what is on a tape.
+DeformationOutput deform(Context& ctx, const DeformationModel& weights, const OffsetNet* offsets,
+                         const Var& rest_points, const Var& rest_joints, const Var& local,
+                         const Var& axis_angle);
+
 /// Joins a vector per sample [n, c] with every point [n, v, 3]: [n, v, c + 3].
 Var join_points(const Var& vector, const Var& points);
 /// p - J_j for all joints: points [n, v, 3], joints [n, 22, 3] -> [n, v, 66].

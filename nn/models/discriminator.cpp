@@ -3,7 +3,6 @@
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
 #include "autograd/ops/reduce.h"
-#include "nn/geometry/skeleton.h"
 
 namespace restage {
 
@@ -41,16 +40,6 @@ Var discriminator_input(const Var& joints, const Var& trans) {
   const int64_t n = joints.size(0), t = joints.size(1), width = joints.size(2) * 3;
   const Var flat = reshape(joints, {n, t, width});
   return concat({slice(flat, 1, 1, t) - slice(flat, 1, 0, t - 1), slice(trans, 1, 1, t)}, 2);
-}
-
-Var bone_vectors(const Var& rest) {
-  const int64_t n = rest.size(0);
-  Tensor parents = Tensor::empty({n, kJoints - 1}, DType::i32);
-  for (int64_t i = 0; i < n; ++i)
-    for (int64_t j = 1; j < kJoints; ++j)
-      parents.data<int32_t>()[i * (kJoints - 1) + j - 1] = kParents[j];
-  return reshape(slice(rest, 1, 1, kJoints) - gather(rest, parents.to(rest.value.device())),
-                 {n, 3 * (kJoints - 1)});
 }
 
 }  // namespace restage

@@ -37,7 +37,5 @@ struct Discriminator : Module {
 /// Frame differences of joints [n, t, 22, 3] joined with the later frame's translation: [n, t-1,
 /// 69].
 Var discriminator_input(const Var& joints, const Var& trans);
-/// Bone vectors of rest joints [n, 22, 3]: joint minus parent, [n, 63].
-Var bone_vectors(const Var& rest);
 
 }  // namespace restage

@@ -52,4 +52,7 @@ struct SkeletonModel : Module {
   virtual int64_t points() const = 0;
 };
 
+/// Bone vectors of rest joints [n, 22, 3]: joint minus parent, [n, 63].
+Var bone_vectors(const Var& rest);
+
 }  // namespace restage

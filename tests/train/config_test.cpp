@@ -14,7 +14,7 @@
 #include "nn/models/registry.h"
 #include "tests/support/files.h"
 #include "train/schedule.h"
-#include "train/stages/train_config.h"
+#include "train/training/train_config.h"
 
 namespace restage {
 namespace {

@@ -1,5 +1,5 @@
 // The same question has the same id, another one another.
-#include "train/stages/identity.h"
+#include "train/training/identity.h"
 
 #include <gtest/gtest.h>
 

@@ -10,7 +10,9 @@
 #include <chrono>
 #include <thread>
 
+#include "autograd/base/atomic_file.h"
 #include "tests/support/files.h"
+#include "tests/support/unreadable.h"
 
 namespace restage {
 namespace {
@@ -184,6 +186,21 @@ TEST_F(LeaseTest, APipeIsNobodysAndNoneWaitsAtIt) {
   ASSERT_EQ(::mkfifo((path_ + ".1").c_str(), 0600), 0);
   EXPECT_FALSE(Lease::holder(path_));
   EXPECT_TRUE(Lease::take(path_, "a"));
+}
+
+TEST_F(LeaseTest, WhatCannotBeReadIsNotFree) {
+  const auto lease = Lease::take(path_, "a");
+  {
+    const test::Unreadable loop(path_ + ".1");
+    EXPECT_THROW(Lease::take(path_, "b"), ReadError);
+    EXPECT_THROW(Lease::holder(path_), ReadError);
+  }
+  {
+    const test::NoMoreFiles limit;
+    EXPECT_THROW(Lease::holder(path_), ReadError);
+  }
+  EXPECT_TRUE(Lease::holder(path_));
+  EXPECT_FALSE(lease->lost());
 }
 
 TEST_F(LeaseTest, AFolderThatIsNotThere) {

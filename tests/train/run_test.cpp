@@ -14,6 +14,7 @@
 #include "autograd/base/log.h"
 #include "autograd/base/rng.h"
 #include "tests/support/files.h"
+#include "tests/support/unreadable.h"
 #include "train/run_provenance.h"
 
 namespace restage {
@@ -203,6 +204,27 @@ TEST_F(TrainRun, DamagedCheckpointsArePassedOver) {
   EXPECT_EQ(latest_checkpoint(run.dir(), kStages)->bytes, std::string(1000, 'c'));
   EXPECT_TRUE(fs::exists(state->path));
   EXPECT_TRUE(fs::exists(run.dir() + "/checkpoints/notes.txt"));
+}
+
+TEST_F(TrainRun, ACheckpointThatCannotBeReadIsNotDamaged) {
+  std::string newest;
+  {
+    RunDir run = make();
+    run.metrics("skeleton", 2, {{"loss", 1}});
+    run.save_checkpoint("skeleton", 1, "first");
+    newest = run.save_checkpoint("skeleton", 2, "second");
+  }
+  const std::string metrics = read_file(root + "/a/metrics.jsonl");
+  {
+    const test::Unreadable loop(newest);
+    EXPECT_THROW(RunDir::resume(root + "/a", kStages), ReadError) << "goes back to the first";
+  }
+  {
+    const test::Unreadable loop(root + "/a/checkpoints");
+    EXPECT_THROW(latest_checkpoint(root + "/a", kStages), Error) << "begins anew";
+  }
+  EXPECT_EQ(read_file(root + "/a/metrics.jsonl"), metrics);
+  EXPECT_EQ(RunDir::resume(root + "/a", kStages).take_resumed()->bytes, "second");
 }
 
 TEST_F(TrainRun, ResumeCutsTheMetricsAtTheCheckpoint) {

@@ -6,12 +6,14 @@
 #include <filesystem>
 #include <limits>
 
+#include "autograd/base/atomic_file.h"
 #include "autograd/kernels/matmul_precision.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/reduce.h"
 #include "nn/layers/linear.h"
 #include "tests/support/errors.h"
 #include "tests/support/files.h"
+#include "tests/support/unreadable.h"
 #include "tests/support/use_set.h"
 #include "tests/train/tiny_training.h"
 
@@ -264,6 +266,13 @@ TEST(TrainStages, KeptAnswersAreReadAndNotAskedForAgain) {
       EXPECT_EQ(first[i].frames[f].joints, again[i].frames[f].joints);
   const auto other = ask(others, "validation", motion(c).answers, network, 3, folder);
   EXPECT_NE(first[0].frames[0].joints, other[0].frames[0].joints);
+  // What cannot be read is not damaged.
+  const std::string kept = folder.path + "/" + test::names_in(folder.path).at(0);
+  {
+    const test::Unreadable loop(kept);
+    EXPECT_THROW(ask(others, "train", motion(c).answers, network, 3, folder), ReadError);
+  }
+  EXPECT_TRUE(std::filesystem::exists(kept));
   // Who is not there is not looked up: they are asked for again.
   others.bodies.resize(1);
   for (const JointTrack& track : ask(others, "train", motion(c).answers, network, 3, folder))

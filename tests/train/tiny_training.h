@@ -6,7 +6,7 @@
 #include "train/stages/motion_stage.h"
 #include "train/stages/root_stage.h"
 #include "train/stages/skeleton_stage.h"
-#include "train/stages/training.h"
+#include "train/training/training.h"
 
 namespace restage::testing {
 

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "autograd/base/error.h"
+#include "autograd/base/host.h"
 #include "train/team.h"
 
 namespace restage {
@@ -19,12 +20,6 @@ namespace {
 int number_in(const char* variable) {
   const char* value = std::getenv(variable);
   return value == nullptr ? 0 : std::atoi(value);
-}
-
-std::string host() {
-  char name[256] = "";
-  ::gethostname(name, sizeof name - 1);
-  return name;
 }
 
 /// Slices of a row, one for each rank, as even as can be.
@@ -167,7 +162,7 @@ class MpiTeam final : public Team {
 
   double waited() const override { return waited_; }
   std::string name() const override {
-    return "rank " + std::to_string(rank_) + " of " + std::to_string(size_) + " on " + host();
+    return "rank " + std::to_string(rank_) + " of " + std::to_string(size_) + " on " + host_name();
   }
   [[noreturn]] void abort(int code) override {
     MPI_Abort(MPI_COMM_WORLD, code);

@@ -3,6 +3,7 @@
 
 #include "datasets/sampling/pairs.h"
 #include "nn/losses/deformation.h"
+#include "nn/models/deformation.h"
 #include "train/stage.h"
 #include "train/stages/stage_input.h"
 

@@ -6,8 +6,8 @@
 
 #include "datasets/sampling/windows.h"
 #include "nn/losses/motion.h"
+#include "train/artifacts/answers.h"
 #include "train/stage.h"
-#include "train/stages/answers.h"
 #include "train/stages/stage_input.h"
 
 namespace restage {

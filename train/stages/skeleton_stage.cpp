@@ -9,8 +9,7 @@
 #include "autograd/ops/layout.h"
 #include "autograd/ops/reduce.h"
 #include "autograd/ops/rotation.h"
-#include "nn/losses/deformation.h"
-#include "nn/models/discriminator.h"
+#include "nn/losses/measure.h"
 
 namespace restage {
 namespace {

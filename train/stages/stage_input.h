@@ -6,7 +6,7 @@
 #include "nn/config/rules.h"
 #include "nn/losses/measure.h"
 #include "nn/weights/bundle.h"
-#include "train/stages/answers.h"
+#include "train/artifacts/answers.h"
 
 namespace restage {
 

@@ -1,8 +1,10 @@
-#include "train/stages/identity.h"
+#include "train/training/identity.h"
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "autograd/base/atomic_file.h"
+#include "datasets/readers/file_sums.h"
 #include "datasets/readers/sha256.h"
 #include "nn/weights/bundle.h"
 #include "nn/weights/safetensors.h"
@@ -13,38 +15,14 @@ namespace {
 
 using Json = nlohmann::json;  // keys in order of their names
 
-/// A tree with its numbers as text, so that how they are printed elsewhere does not matter.
-Json to_json(const ConfigNode& node) {
-  switch (node.kind) {
-    case ConfigNode::Kind::null:
-      return nullptr;
-    case ConfigNode::Kind::scalar:
-      return node.text;
-    case ConfigNode::Kind::list: {
-      Json out = Json::array();
-      for (const ConfigNode& child : node.children) out.push_back(to_json(child));
-      return out;
-    }
-    case ConfigNode::Kind::map:
-      break;
-  }
-  Json out = Json::object();
-  for (const ConfigNode& child : node.children) out[child.key] = to_json(child);
-  return out;
-}
-
 std::string number(double value) { return config_detail::write_leaf(value).text; }
 
 template <class C>
 Json keys_of(const C& config) {
-  return to_json(write_config(config));
+  return keys_json(write_config(config));
 }
 
 }  // namespace
-
-std::string keys_text(const ConfigNode& keys) { return to_json(keys).dump(); }
-
-std::string short_id(const std::string& text) { return sha256(text).substr(0, 12); }
 
 std::string Identities::data(const CorpusSource& source) {
   if (source.source == "builtin") return keys_of(source).dump();
@@ -52,18 +30,18 @@ std::string Identities::data(const CorpusSource& source) {
   if (!known.empty()) return known;
   namespace fs = std::filesystem;
   std::error_code ignored;
-  if (!fs::is_directory(source.source, ignored)) return known = sha256_of_file(source.source);
+  if (!fs::is_directory(source.source, ignored)) return known = kept_sha256(source.source);
   Json files = Json::object();
   for (const char* split : {"train", "validation", "test"}) {
     const fs::path file = fs::path(source.source) / (std::string(split) + ".h5");
-    if (fs::exists(file, ignored)) files[split] = sha256_of_file(file.string());
+    if (is_there(file.string())) files[split] = kept_sha256(file.string());
   }
   return known = files.dump();
 }
 
 std::string Identities::weights(const std::string& path) {
   std::string& known = seen_["weights " + path];
-  if (known.empty()) known = sha256_of_file(weights_path(path));
+  if (known.empty()) known = kept_sha256(weights_path(path));
   return known;
 }
 

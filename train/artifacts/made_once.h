@@ -11,8 +11,9 @@
 
 namespace restage {
 
-/// What its making keeps beside it is named `.NAME` and more, so that what a killed process leaves
-/// is known for what it is.
+/// A file or folder that the making of NAME keeps beside it for later processes: `.NAME` +
+/// `suffix`. (Drafts that nobody goes on from are named by name_beside().) By these names it is
+/// known what a killed process has left.
 std::string path_aside(const std::string& dir, const std::string& name, const char* suffix);
 
 namespace made_once_detail {

@@ -1,18 +1,19 @@
-#include "train/stages/answers.h"
+#include "train/artifacts/answers.h"
 
 #include <cmath>
 #include <csignal>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "autograd/base/atomic_file.h"
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 #include "autograd/kernels/matmul_precision.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/sha256.h"
 #include "nn/weights/safetensors.h"
-#include "train/stages/identity.h"
-#include "train/stages/made_once.h"
+#include "train/artifacts/artifact_id.h"
+#include "train/artifacts/made_once.h"
 
 namespace restage {
 namespace {
@@ -162,12 +163,14 @@ std::vector<JointTrack> from_file(const std::string& path, const std::string& fa
 
 std::optional<std::vector<JointTrack>> find(const std::string& path, const std::string& facts,
                                             const Corpus& corpus, const TrackConfig& config) {
-  std::error_code ignored;
-  if (!fs::exists(path, ignored)) return std::nullopt;
+  if (!is_there(path)) return std::nullopt;
   try {
     return from_file(path, facts, corpus, config);
+  } catch (const ReadError&) {
+    throw;
   } catch (const InputError& error) {
     log_warning("damaged answers are asked for again: " + std::string(error.what()));
+    std::error_code ignored;
     fs::remove(path, ignored);
     return std::nullopt;
   }
@@ -180,7 +183,7 @@ std::string facts_of(const std::string& data, const std::string& split, const An
   return nlohmann::json{{"behaviour", kBehaviour},
                         {"data", data},
                         {"split", split},
-                        {"answers", keys_text(write_config(config))},
+                        {"answers", keys_json(write_config(config)).dump()},
                         {"extractor", sha256(extractor)},
                         {"precision", static_cast<int>(matmul_precision())},
                         {"seed", seed}}
@@ -200,13 +203,7 @@ std::vector<JointTrack> ask(const Corpus& corpus, const std::string& split,
   return made_once<std::vector<JointTrack>>(
       folder->path, name, [&] { return find(path, facts, corpus, config.tracks); },
       [&](const Lease&) {  // two who make it make the same bytes
-        const std::string ready = path_aside(folder->path, name, ".ready");
-        write_safetensors(ready, to_file(asked(corpus, config, given, seed, alone()), facts));
-        std::error_code error;
-        fs::rename(ready, path, error);
-        if (error)
-          throw WorkError(path + ": could not be put into the store (" + error.message() +
-                          "); run it again");
+        write_safetensors(path, to_file(asked(corpus, config, given, seed, alone()), facts));
       });
 }
 

@@ -2,9 +2,10 @@
 // artifact of a store that other trials share (sweeps).
 #pragma once
 
+#include "train/artifacts/store.h"
 #include "train/forecast.h"
-#include "train/stages/store.h"
-#include "train/stages/train_config.h"
+#include "train/training/identity.h"
+#include "train/training/train_config.h"
 
 namespace restage {
 

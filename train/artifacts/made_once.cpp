@@ -1,4 +1,4 @@
-#include "train/stages/made_once.h"
+#include "train/artifacts/made_once.h"
 
 #include <chrono>
 #include <filesystem>
@@ -17,7 +17,8 @@ std::vector<fs::path> leftovers(const std::string& dir, const std::string& name)
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(dir, ignored)) {
     const std::string file = entry.path().filename().string();
-    if (file.starts_with(".") && file.find(name) != std::string::npos) out.push_back(entry.path());
+    const bool draft = file.starts_with(".") || file.find(".part") != std::string::npos;
+    if (draft && file.find(name) != std::string::npos) out.push_back(entry.path());
   }
   return out;
 }

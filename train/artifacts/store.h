@@ -16,8 +16,8 @@
 #include <string>
 
 #include "nn/weights/bundle.h"
+#include "train/artifacts/artifact_id.h"
 #include "train/run.h"
-#include "train/stages/identity.h"
 
 namespace restage {
 
@@ -25,16 +25,18 @@ class Store {
  public:
   explicit Store(std::string dir) : dir_(std::move(dir)) {}
 
-  /// Its folder is there; whether its content is undamaged is seen when it is read.
+  /// Its folder is there; whether its content is undamaged is seen when it is read. This and all
+  /// that reads throws ReadError where the disk does not say: that is neither absence nor damage.
   bool has(const StageId& id) const;
   std::string path(const StageId& id) const;
-  /// The artifact, or nothing. A damaged one gives a warning, is moved aside and counts as absent.
+  /// The artifact, or nothing. A damaged one, whose bytes do not fit their checksums, gives a
+  /// warning, is moved aside and counts as absent. InputError: whole, but no weights of ours.
   std::optional<Bundle> find(const StageId& id) const;
 
   /// Its curves so far (metrics.jsonl), also while it is made; empty if nobody has begun.
   std::string metrics(const StageId& id) const;
 
-  /// The folder of what extractors were asked (train/stages/answers.h).
+  /// The folder of what extractors were asked (train/artifacts/answers.h).
   std::string answers() const;
 
   /// Trains in the given run directory, which may hold the checkpoints of an earlier attempt.

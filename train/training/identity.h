@@ -9,25 +9,13 @@
 #include <string>
 #include <vector>
 
-#include "train/stages/train_config.h"
+#include "train/artifacts/artifact_id.h"
+#include "train/training/train_config.h"
 
 namespace restage {
 
-/// Raised whenever the same configuration gives other results than before.
-/// 5: a cloud's points are chosen evenly, which what extractors are asked about rests on. 4:
-/// another seed draws other examples too. 3: its footing knows how the person turns. 2:
-/// smrm/hybrid filters its path too, corrects in units of uncertainty and has a footing for
-/// contact. 1: as of the first artifacts.
-inline constexpr int kBehaviour = 5;
-
-/// An artifact that a configuration trains.
-struct StageId {
-  std::string stage, id;
-  std::string facts;                                     ///< what the id is the sum of, as JSON
-  std::string name() const { return stage + "-" + id; }  ///< of its folder in a store
-};
-
-/// Finds identities; remembers those of files that it has read.
+/// Finds identities; remembers those of files that it has read, and checksums of large files beyond
+/// its own life (datasets/readers/file_sums.h).
 class Identities {
  public:
   /// Of bodies and motions: the bytes of a data set file, a benchmark's manifest, or the keys of
@@ -46,10 +34,5 @@ class Identities {
  private:
   std::map<std::string, std::string> seen_;
 };
-
-/// Keys and values as JSON text, in the order of their names.
-std::string keys_text(const ConfigNode& keys);
-/// The first 12 hex digits of the SHA-256 of `text`.
-std::string short_id(const std::string& text);
 
 }  // namespace restage

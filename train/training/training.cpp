@@ -1,4 +1,4 @@
-#include "train/stages/training.h"
+#include "train/training/training.h"
 
 #include <algorithm>
 #include <memory>

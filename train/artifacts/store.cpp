@@ -1,4 +1,4 @@
-#include "train/stages/store.h"
+#include "train/artifacts/store.h"
 
 #include <filesystem>
 #include <map>
@@ -8,7 +8,7 @@
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/log.h"
 #include "datasets/readers/sha256.h"
-#include "train/stages/made_once.h"
+#include "train/artifacts/made_once.h"
 
 namespace restage {
 namespace {
@@ -18,20 +18,18 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kFiles[] = {"weights.safetensors", "config.yaml", "metrics.jsonl"};
 
-/// What is wrong with the artifact in `folder`; nothing if it is whole.
-std::string damage(const fs::path& folder) {
-  std::error_code error;
-  if (!fs::is_regular_file(folder / "artifact.json", error)) return "artifact.json is missing";
-  const Json json =
-      Json::parse(read_file((folder / "artifact.json").string(), 1 << 20), nullptr, false);
+/// What is wrong with the artifact in `folder`, by the bytes that were read; nothing if it is
+/// whole. ReadError if they cannot be read.
+std::string damage(const std::string& folder) {
+  if (!is_there(folder + "/artifact.json")) return "artifact.json is missing";
+  const Json json = Json::parse(read_file(folder + "/artifact.json"), nullptr, false);
   if (!json.is_object() || !json.contains("files") || !json["files"].is_object())
     return "artifact.json is damaged";
   for (const char* name : kFiles) {
+    const std::string file = folder + "/" + name;
     const auto sum = json["files"].find(name);
-    if (sum == json["files"].end() || !fs::is_regular_file(folder / name, error))
-      return std::string(name) + " is missing";
-    if (*sum != sha256_of_file((folder / name).string()))
-      return std::string(name) + " does not fit its checksum";
+    if (sum == json["files"].end() || !is_there(file)) return std::string(name) + " is missing";
+    if (*sum != sha256_of_file(file)) return std::string(name) + " does not fit its checksum";
   }
   return "";
 }
@@ -53,8 +51,8 @@ Json validation_of(const std::string& metrics) {
 
 RunDir open_run(const std::string& folder, const std::string& stage, const std::string& yaml,
                 const std::string& facts) {
+  if (is_there(folder + "/config.yaml")) return RunDir::resume(folder, {stage});
   std::error_code ignored;
-  if (fs::exists(fs::path(folder) / "config.yaml", ignored)) return RunDir::resume(folder, {stage});
   fs::remove_all(folder, ignored);
   return RunDir::create_at(folder, yaml, facts, {stage});
 }
@@ -70,34 +68,31 @@ std::string Store::partial(const StageId& id) const {
 std::string Store::answers() const { return (fs::path(dir_) / "answers").string(); }
 
 std::string Store::metrics(const StageId& id) const {
-  std::error_code ignored;
   for (const std::string& folder : {path(id), partial(id)}) {
     const std::string file = folder + "/metrics.jsonl";
-    if (fs::is_regular_file(file, ignored)) return read_file(file);
+    if (is_there(file)) return read_file(file);
   }
   return "";
 }
 
-bool Store::has(const StageId& id) const {
-  std::error_code ignored;
-  return fs::is_regular_file(fs::path(path(id)) / "artifact.json", ignored);
-}
+bool Store::has(const StageId& id) const { return is_there(path(id) + "/artifact.json"); }
 
 std::optional<Bundle> Store::find(const StageId& id) const {
-  const std::string folder = path(id);
-  std::error_code error;
-  if (!fs::exists(folder, error)) return std::nullopt;
+  const std::string folder = path(id), aside = folder + ".damaged";
+  if (!is_there(folder)) return std::nullopt;
   std::string wrong;
   try {
     wrong = damage(folder);
     if (wrong.empty()) return load_bundle(folder);
-  } catch (const InputError& e) {
-    wrong = e.what();
+  } catch (const ReadError& reading) {
+    if (!reading.absent()) throw;
+    return std::nullopt;  // another process has just moved it aside
   }
   log_warning(folder + " is damaged (" + wrong + ") and will be made again");
-  const std::string aside = folder + ".damaged";
+  std::error_code error;
   fs::remove_all(aside, error);
   fs::rename(folder, aside, error);
+  if (error && is_there(folder)) throw_refused(folder, "moved aside", error.value());
   return std::nullopt;
 }
 
@@ -119,9 +114,9 @@ Bundle Store::get(const StageId& id, const std::string& config_yaml, const Make&
 
 void Store::publish(const StageId& id, const std::string& run, const std::string& config_yaml,
                     const Bundle& bundle) const {
-  const fs::path ready = path_aside(dir_, id.name(), ".ready");
+  Temporary draft(name_beside(path(id), "."));
+  const fs::path ready = draft.path();
   std::error_code error;
-  fs::remove_all(ready, error);
   if (!fs::create_directory(ready, error) || error)
     throw WorkError(ready.string() + ": could not be made (" + error.message() +
                     "); free some space and run it again");
@@ -137,6 +132,7 @@ void Store::publish(const StageId& id, const std::string& run, const std::string
   if (error)
     throw WorkError(path(id) + ": could not be put into the store (" + error.message() +
                     "); run it again");
+  draft.keep();
 }
 
 }  // namespace restage
