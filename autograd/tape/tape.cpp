@@ -122,6 +122,13 @@ double Gradients::norm() const {
 
 bool Gradients::finite() const { return std::isfinite(norm()); }
 
+Tape* Var::tape() const {
+  if (link != nullptr && *link == nullptr)
+    throw Error("a value is used after the end of its tape (" + running_op() +
+                "); keep the tape, or take detach() of the value");
+  return link == nullptr ? nullptr : *link;
+}
+
 Var Tape::leaf(const Tensor& value, uint64_t id) {
   const auto [it, fresh] = leaves_.emplace(id, first_ + static_cast<int64_t>(nodes_.size()));
   if (fresh) {
@@ -130,13 +137,13 @@ Var Tape::leaf(const Tensor& value, uint64_t id) {
     nodes_.push_back(std::move(node));
   }
   Var v(value);
-  v.tape = this;
+  v.link = link_;
   v.node = it->second;
   return v;
 }
 
 void Tape::require_own(const Var& v) const {
-  if (v.tape != this) throw Error("an op was given values of two tapes");
+  if (v.tape() != this) throw Error("an op was given values of two tapes");
   if (v.node < first_)
     throw Error("a value is used after the backward pass that consumed its tape");
 }
@@ -146,11 +153,11 @@ Var Tape::record(std::unique_ptr<Function> function, std::span<const Var> inputs
   node.function = std::move(function);
   node.path = module_path();
   for (const Var& in : inputs) {
-    if (in.tape != nullptr) require_own(in);
-    node.inputs.push_back(in.tape == this ? in.node : -1);
+    if (in.on_tape()) require_own(in);
+    node.inputs.push_back(in.on_tape() ? in.node : -1);
   }
   Var v(std::move(output));
-  v.tape = this;
+  v.link = link_;
   v.node = first_ + static_cast<int64_t>(nodes_.size());
   nodes_.push_back(std::move(node));
   return v;
@@ -182,7 +189,8 @@ Grads Tape::Node::backward(const Tensor& gy) const {
 }
 
 Gradients Tape::backward(const Var& loss) {
-  if (loss.tape != this) throw Error("backward: the loss does not depend on anything of this tape");
+  if (loss.tape() != this)
+    throw Error("backward: the loss does not depend on anything of this tape");
   if (loss.value.numel() != 1)
     throw ShapeError("backward: the loss has shape " + loss.shape().str() + ", not one number");
   require_own(loss);

@@ -242,6 +242,7 @@ int train_with(Team& team, const TrainArguments& arguments, const Common& common
 
 int run_train(const TrainArguments& arguments, const Common& common) {
   Team& team = team_of_processes();
+  set_local_rank(team.local_rank());
   if (team.size() == 1) return train_with(team, arguments, common);
   if (team.rank() > 0) set_log_level(LogLevel::warning);
   // One that fails by itself would leave the others waiting for it.

@@ -49,6 +49,7 @@ class Thread final : public Team {
   Thread(Table* table, int rank) : table_(table), rank_(rank) {}
   int rank() const override { return rank_; }
   int size() const override { return table_->size; }
+  int local_rank() const override { return rank_; }
   std::unique_ptr<Sum> sum(size_t) override { return std::make_unique<Rows>(table_, rank_); }
   std::vector<std::vector<double>> all(const std::vector<std::vector<double>>& mine) override {
     table_->numbers[static_cast<size_t>(rank_)] = mine;
