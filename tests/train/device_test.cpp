@@ -5,9 +5,12 @@
 #include <cmath>
 
 #include "tests/support/emulated_gpu.h"
+#include "tests/support/errors.h"
 #include "tests/support/fake_device.h"
+#include "tests/support/files.h"
 #include "tests/support/gpu.h"
 #include "tests/train/tiny_training.h"
+#include "train/forecast.h"
 
 namespace restage {
 namespace {
@@ -140,6 +143,26 @@ TEST(DeviceGpu, StagesTrainAlikeAndRepeatTheirBits) {
     const Outcome once = trained(gpu, name, papers_networks());
     EXPECT_TRUE(once.bytes == trained(gpu, name, papers_networks()).bytes) << name;
   }
+}
+
+TEST(DeviceStages, SayWhatTheirTensorsTakeOnTheDevice) {
+  const Device gpu = emulated_gpu();
+  const auto stage = stage_on(gpu, "skeleton", tiny_training(40));
+  const StageForecast f = forecast(*stage, MatmulPrecision::float32, false);
+  EXPECT_EQ(f.memory, memory_stats(gpu).peak);
+  EXPECT_GT(f.memory, memory_stats(gpu).in_use);
+
+  const test::TempDir dir;
+  RunDir run = RunDir::create_at(dir / "run", "x: 1\n", "{}\n", {"skeleton"});
+  ::testing::internal::CaptureStderr();
+  train(run, {"skeleton"}, {},
+        [&](const std::string& name, Bundle*) { return stage_on(gpu, name, tiny_training(3)); },
+        {.quiet = true, .observers = {}});
+  const std::string said = ::testing::internal::GetCapturedStderr();
+  const std::string peak =
+      std::to_string(std::llround(static_cast<double>(memory_stats(gpu).peak) / 1048576.0));
+  EXPECT_HAS(said, "peak of tensors " + peak + " MiB on emulated gpu and ");
+  EXPECT_HAS(said, " MiB on the host, ");
 }
 
 TEST(DeviceStages, BonesAndMicroBatches) {

@@ -235,8 +235,17 @@ TEST_F(TrainTrainer, AStageOfNoStepsLeavesItsNetworksAndACheckpoint) {
         train(other, kAll, loop(), make, options);
       },
       Killed);
-  RunDir again = RunDir::resume(dir / "none-stopped", kAll);
-  EXPECT_TRUE(weights(train(again, kAll, loop(), make, kQuiet)) == got);
+  {
+    RunDir again = RunDir::resume(dir / "none-stopped", kAll);
+    EXPECT_TRUE(weights(train(again, kAll, loop(), make, kQuiet)) == got);
+  }
+  EXPECT_EQ(metrics("none-stopped"), metrics("none")) << "a stage of no steps is judged once";
+  Counting seen;
+  options.observers = {&seen};
+  RunDir complete = RunDir::resume(dir / "none-stopped", kAll);
+  EXPECT_TRUE(weights(train(complete, kAll, loop(), make, options)) == got);
+  EXPECT_EQ(seen.validations, 0);
+  EXPECT_EQ(seen.checkpoints, 0);
 }
 
 TEST_F(TrainTrainer, TwoStopsInARow) {
