@@ -62,7 +62,7 @@ void expect_same(const std::string& name, const TrainConfig& config, const Bundl
 }
 
 TEST(DeviceStages, ThoseOfTheTinyTraining) {
-  for (const std::string name : {"skeleton", "motion", "deformation", "root"})
+  for (const std::string name : {"skeleton", "motion", "deformation"})
     expect_same(name, tiny_training(6));
 }
 
@@ -131,14 +131,14 @@ TrainConfig papers_networks() {
 
 TEST(DeviceStages, TheKernelsOfTheGpuTrainAlike) {
   const int64_t before = emulated_counts().kernels;
-  for (const std::string name : {"skeleton", "motion", "deformation", "root"})
+  for (const std::string name : {"skeleton", "motion", "deformation"})
     expect_alike(name, papers_networks(), emulated_gpu());
   EXPECT_GT(emulated_counts().kernels, before + 1000);
 }
 
 TEST(DeviceGpu, StagesTrainAlikeAndRepeatTheirBits) {
   RESTAGE_GPU_OR_SKIP(gpu);
-  for (const std::string name : {"skeleton", "motion", "deformation", "root"}) {
+  for (const std::string name : {"skeleton", "motion", "deformation"}) {
     expect_alike(name, papers_networks(), gpu);
     const Outcome once = trained(gpu, name, papers_networks());
     EXPECT_TRUE(once.bytes == trained(gpu, name, papers_networks()).bytes) << name;

@@ -26,7 +26,6 @@ using testing::deformation;
 using testing::motion;
 using testing::optimisers;
 using testing::resize;
-using testing::root;
 using testing::skeleton;
 using testing::tiny_stage;
 using testing::tiny_training;
@@ -143,7 +142,7 @@ TrainConfig everything() {
 }
 
 TEST(Team, HowManyShareAStepChangesNoBit) {
-  for (const std::string name : {"skeleton", "motion", "deformation", "root"}) {
+  for (const std::string name : {"skeleton", "motion", "deformation"}) {
     const std::string one = trained(name, everything(), 4, 1)[0];
     for (const int processes : {2, 4})
       for (const std::string& each : trained(name, everything(), 4, processes))
@@ -191,7 +190,7 @@ TEST(Team, GroupsOfThreadsChangeNoBit) {
   TrainConfig c = everything();  // whose skeleton has batch norm, and takes turns
   motion(c).weights.adversarial = 0;
   const int before = threads();
-  for (const std::string name : {"skeleton", "motion", "deformation", "root"}) {
+  for (const std::string name : {"skeleton", "motion", "deformation"}) {
     set_threads(1);
     const std::string one = trained(name, c, 4, 1)[0];
     for (const int n : {2, 3, 8}) {
@@ -209,9 +208,8 @@ TEST(Team, MicroBatchesAddUpToTheStep) {
   motion(c).weights.adversarial = 0;
   motion(c).self_first_pass = true;
   resize(deformation(c).model, {"dropout=0"});
-  resize(root(c).model, {"dropout=0"});
   resize(motion(c).model, {"dropout=0"});
-  for (const std::string name : {"skeleton", "motion", "deformation", "root"}) {
+  for (const std::string name : {"skeleton", "motion", "deformation"}) {
     std::vector<double> whole, cut;
     trained(name, c, 1, 1, &whole);
     trained(name, c, 4, 1, &cut);
@@ -407,11 +405,11 @@ TEST(Team, EveryProcessOfAHostHasAGpuOfItsOwn) {
 TEST(Team, WhatCannotBeDividedIsRefused) {
   TrainConfig c = tiny_training(6);
   c.loop.micro_batches = 3;  // batches are of 4
-  for (const std::string name : {"skeleton", "motion", "deformation", "root"})
+  for (const std::string name : {"skeleton", "motion", "deformation"})
     EXPECT_HAS(test::refusal_of([&] { tiny_stage(name, c); }), "loop.micro_batches divides");
   Table table(3);
   Thread team(&table, 0);
-  EXPECT_HAS(test::refusal_of([&] { tiny_stage("root", tiny_training(6))->cut_steps(4, team); }),
+  EXPECT_HAS(test::refusal_of([&] { tiny_stage("motion", tiny_training(6))->cut_steps(4, team); }),
              "3 processes cannot divide");
 }
 

@@ -20,8 +20,8 @@ namespace {
 constexpr double kUncertaintyWeight = 0.01;
 constexpr size_t kFollowed = 12;  // frames of a validation sequence
 
-/// Euclidean lengths along the last axis (3), smooth at 0.
-Var lengths(const Var& d) { return sqrt(add_scalar(sum(square(d), -1), 1e-8)); }
+/// Lengths of vectors along the last axis, metres.
+Var lengths(const Var& d) { return smooth_length(d, 1e-8); }
 
 CloudConfig with_points(CloudConfig c, const SkeletonModel& model) {
   c.points = static_cast<int>(model.points());
