@@ -471,6 +471,26 @@ TEST(ConfigReferencePage, NamesEveryKeyWithItsDefault) {
   for (const auto& [key, value] : page) EXPECT_TRUE(keys.contains(key)) << key << " is no key";
 }
 
+TEST(TrainConfig, ARunOfAnEarlierVersionIsRead) {
+  const std::string left =
+      "stages: [motion]\nseed: 9\nroot: {points: 7, model: deformation/root}\n";
+  const auto read = [](const ConfigNode& tree) {
+    restage::TrainConfig c;
+    read_config(tree, c);
+    return c.seed;
+  };
+  EXPECT_EQ(read(of_this_version(parse_yaml(left, "run/config.yaml"))), 9u);
+  // Nobody else may name a stage that is no more: not a user, nor a run that trained it.
+  EXPECT_HAS(test::refusal_of([&] { read(parse_yaml(left, "mine.yaml")); }), "mine.yaml:3");
+  EXPECT_HAS(test::refusal_of([&] { read(parse_yaml("stages: [root]\n", "mine.yaml")); }),
+             "'root'");
+  EXPECT_HAS(test::refusal_of([&] {
+               read(of_this_version(
+                   parse_yaml(test::replaced(left, "motion", "root"), "run/config.yaml")));
+             }),
+             "root");
+}
+
 /// The page's line of a model that no stage has by default.
 TEST(ConfigReferencePage, NamesTheSizesOfEveryModel) {
   std::ifstream file(RESTAGE_SOURCE_DIR "/docs/config_reference.md");
