@@ -62,8 +62,7 @@ struct ItemInfo {
   /// Models whose weights may change its speed: the item also exists with trained weights if there
   /// are any of one of them.
   std::vector<std::string> models;
-  /// Further variants, with initial weights: "dense" leaves nothing out, "bfloat16" multiplies in
-  /// it (only where the processor has a unit for that). No ratio counts them.
+  /// Further variants, with initial weights: "dense" leaves nothing out. No ratio counts them.
   std::vector<std::string> also;
   std::string variant;  ///< what it is called with the weights it starts with
 };

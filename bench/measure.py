@@ -264,7 +264,7 @@ def memory_of_epoch(programs, item, quick):
 
 def least(item, kind):
     """Of initial and trained weights; other variants stand beside them."""
-    found = [r[kind] for variant, r in item.get("ratios", {}).items() if variant not in ("dense", "bfloat16")]
+    found = [r[kind] for variant, r in item.get("ratios", {}).items() if variant != "dense"]
     return min(found) if found else None
 
 

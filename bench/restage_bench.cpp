@@ -26,7 +26,6 @@
 #include <sstream>
 
 #include "autograd/base/parallel.h"
-#include "autograd/kernels/matmul_precision.h"
 #include "autograd/kernels/stats.h"
 #include "autograd/tensor/tensor.h"
 #include "bench/items.h"
@@ -43,8 +42,7 @@ json list(const Inputs& inputs) {
     if (std::any_of(i.models.begin(), i.models.end(),
                     [&](const std::string& m) { return inputs.has("trained", m); }))
       variants.push_back("trained");
-    for (const std::string& v : i.also)
-      if (v != "bfloat16" || has_matrix_unit()) variants.push_back(v);
+    variants.insert(variants.end(), i.also.begin(), i.also.end());
     out.push_back({{"name", i.name},
                    {"what", i.what},
                    {"per", i.per},

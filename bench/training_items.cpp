@@ -1,7 +1,6 @@
 // Full training steps as the trainer does them: forward, backward, Adam.
 #include <functional>
 
-#include "autograd/kernels/matmul_precision.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/reduce.h"
 #include "bench/items.h"
@@ -23,12 +22,7 @@ class Training : public Item {
  public:
   using Loss = std::function<Var(Context&)>;
 
-  explicit Training(const std::string& variant)
-      : precision_(variant == "bfloat16" ? MatmulPrecision::bfloat16 : MatmulPrecision::float32) {}
-  void run() override {
-    const MatmulPrecisionScope scope(precision_);
-    adam_->step(differentiate(key_.fold(step_++), loss_).gradients, kRate);
-  }
+  void run() override { adam_->step(differentiate(key_.fold(step_++), loss_).gradients, kRate); }
   std::vector<double> check() override {
     const Differentiated d = differentiate(key_, loss_);
     return {d.loss, d.norm};
@@ -41,7 +35,6 @@ class Training : public Item {
   }
 
  private:
-  MatmulPrecision precision_;
   std::unique_ptr<Optimiser> adam_;
   Loss loss_;
   RngKey key_ = RngKey{0, 0}.fold("bench");
@@ -60,7 +53,7 @@ class SkeletonTraining : public Training {
  public:
   SkeletonTraining(const Inputs& inputs, const std::string& variant, const std::string& model,
                    const std::string& file, bool dropout)
-      : Training(variant), net_(extractor_of(model, dropout)) {
+      : net_(extractor_of(model, dropout)) {
     inputs.load(*net_, variant, file);
     make_dense(*net_, variant);
     const Var points = inputs.at("clouds.points"), joints = inputs.at("clouds.joints");
@@ -87,7 +80,7 @@ template <int64_t batch>
 class MotionTraining : public Training {
  public:
   MotionTraining(const Inputs& inputs, const std::string& variant, bool dropout)
-      : Training(variant), net_(config(dropout), Init{}) {
+      : net_(config(dropout), Init{}) {
     inputs.load(net_, variant, "smrm");
     const auto part = [&](const char* name) {
       return inputs.at(std::string("windows.") + name).rows(0, batch);
@@ -112,7 +105,7 @@ class MotionTraining : public Training {
 class DeformationTraining : public Training {
  public:
   DeformationTraining(const Inputs& inputs, const std::string& variant, bool dropout)
-      : Training(variant), weights_(config(dropout), Init{}), offsets_(config(dropout), Init{}) {
+      : weights_(config(dropout), Init{}), offsets_(config(dropout), Init{}) {
     inputs.load(weights_, variant, "weights");
     inputs.load(offsets_, variant, "offsets");
     name_scopes(weights_, "weights");
@@ -141,13 +134,13 @@ std::vector<ItemInfo> training_items() {
       2 * gflop_of(static_cast<double>(kSurfacePoints * (3 * kJoints + 3) * MlpConfig().width));
   const double pair = 3 * (weights_gflop(kSurfacePoints) + offsets_gflop(kSurfacePoints)) - inputs;
   return {ItemInfo("skeleton_train", "point transformer, batch 4", "cloud", kClouds, extractor,
-                   skeleton, {"skeleton"}, {"dense", "bfloat16"}),
+                   skeleton, {"skeleton"}, {"dense"}),
           ItemInfo("smrm_train_b16", "SMRM, batch 16, windows of 30", "window", 16, window,
-                   make_item<MotionTraining<16>>, {}, {"bfloat16"}),
+                   make_item<MotionTraining<16>>),
           ItemInfo("smrm_train_b64", "SMRM, batch 64, windows of 30", "window", 64, window,
-                   make_item<MotionTraining<64>>, {}, {"bfloat16"}),
+                   make_item<MotionTraining<64>>),
           ItemInfo("deformation_train", "skinning weights and offsets, batch 4 of 6,890 points",
-                   "pair", kClouds, pair, make_item<DeformationTraining>, {}, {"bfloat16"}),
+                   "pair", kClouds, pair, make_item<DeformationTraining>),
           ItemInfo("pointnet_train", "PointNet, batch 4", "cloud", kClouds, 3 * pointnet_gflop(),
                    pointnet)};
 }

@@ -10,24 +10,28 @@ struct Collector final : Fields {
   std::string prefix;
   std::string path;
   const char* kind = "";
+  bool changes = false;
 
   void operator()(const std::string& name, Parameter& p) override {
-    entries.push_back({prefix + name, &p.value, &p, path, kind});
+    entries.push_back({prefix + name, &p.value, &p, path, kind, false});
   }
   void operator()(const std::string& name, Tensor& buffer) override {
-    entries.push_back({prefix + name, &buffer, nullptr, path, kind});
+    entries.push_back({prefix + name, &buffer, nullptr, path, kind, changes});
   }
   void operator()(const std::string& name, Module& child) override {
     const std::string old_prefix = prefix, old_path = path;
     const char* old_kind = kind;
+    const bool old_changes = changes;
     child.scope = name;
     path = prefix + name;
     prefix += name + ".";
     kind = child.kind();
+    changes = child.changes_buffers();
     child.visit(*this);
     prefix = old_prefix;
     path = old_path;
     kind = old_kind;
+    changes = old_changes;
   }
 };
 
@@ -42,6 +46,7 @@ std::vector<StateEntry> state_of(Module& module, const std::string& prefix) {
   Collector c;
   c.prefix = prefix;
   c.kind = module.kind();
+  c.changes = module.changes_buffers();
   module.visit(c);
   return c.entries;
 }

@@ -75,6 +75,8 @@ struct Module {
   virtual void visit(Fields& fields) = 0;
   /// Short kind for layer tables, e.g. "Linear".
   virtual const char* kind() const = 0;
+  /// Whether a training pass changes buffers of the module's own, as batch norm does its averages.
+  virtual bool changes_buffers() const { return false; }
   std::string scope;  ///< name within the parent, set by name_scopes(); for error messages
 };
 
@@ -85,6 +87,7 @@ struct StateEntry {
   Parameter* parameter;  ///< null: a buffer
   std::string module;    ///< path of the owning module, "backbone.fc1.0"
   const char* kind;      ///< its kind
+  bool changes;          ///< whether a training pass changes it: Module::changes_buffers()
 };
 /// All parameters and buffers, depth first in declaration order, names joined with dots.
 std::vector<StateEntry> state_of(Module& module, const std::string& prefix = "");

@@ -41,7 +41,7 @@ StageForecast forecast(Stage& stage, MatmulPrecision precision, bool validate) {
   out.parameters = count_parameters(stage);
   out.steps = stage.steps();
   if (out.steps == 0) return out;
-  reset_peak_memory();
+  reset_peak_memory(stage.device());
   std::vector<double> times;
   double spent = 0;
   const auto step = [&](int64_t i) {
@@ -57,7 +57,7 @@ StageForecast forecast(Stage& stage, MatmulPrecision precision, bool validate) {
   out.per_step = times[times.size() / 2];
   out.before = std::max(0.0, first - out.per_step);
   if (validate) out.validation = seconds_of([&] { stage.validate(); });
-  out.memory = memory_stats().peak;
+  out.memory = memory_stats(stage.device()).peak;
   return out;
 }
 

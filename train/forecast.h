@@ -12,7 +12,7 @@ struct StageForecast {
   int64_t steps = 0;
   double per_step = 0, before = 0,
          validation = 0;  ///< seconds; `before`: what the first step waits for
-  int64_t memory = 0;     ///< most that tensors took, bytes
+  int64_t memory = 0;     ///< most that tensors took on the stage's device, bytes
 
   /// Seconds of the whole stage, validated every so many steps.
   double seconds(int64_t validate_every) const;

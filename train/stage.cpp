@@ -152,81 +152,108 @@ std::vector<StateEntry> Stage::state() const {
 
 namespace {
 
-/// Gradients and buffers of a micro-batch as one row of numbers.
+/// What a micro-batch leaves, as a row of numbers that is the same width for all micro-batches of
+/// all processes: a flag for each optimised parameter and each buffer, then the numbers of all of
+/// them. The flag of a parameter says whether it has a gradient (else its numbers are zero), that
+/// of a buffer whether the micro-batch has changed it.
 class Row {
  public:
-  /// Those that a micro-batch has or changes; all have and change the same.
-  explicit Row(std::vector<StateEntry> entries) : entries_(std::move(entries)) {
-    for (const StateEntry& entry : entries_) width_ += static_cast<size_t>(entry.value->numel());
+  /// `optimised`: identities of parameters, ascending.
+  Row(const std::vector<StateEntry>& state, const std::vector<uint64_t>& optimised) {
+    for (const StateEntry& entry : state) {
+      const Parameter* p = entry.parameter;
+      if (p != nullptr && !std::binary_search(optimised.begin(), optimised.end(), p->id)) continue;
+      entries_.push_back({entry, *entry.value, *entry.value});
+      width_ += 1 + static_cast<size_t>(entry.value->numel());
+    }
   }
   size_t width() const { return width_; }
-  bool has_buffers() const {
-    return std::any_of(entries_.begin(), entries_.end(),
-                       [](const StateEntry& entry) { return entry.parameter == nullptr; });
+  /// Whether micro-batches can be computed at once: no pass changes a buffer that all of them use.
+  bool can_share() const {
+    return std::none_of(entries_.begin(), entries_.end(),
+                        [](const Entry& e) { return e.state.changes; });
+  }
+
+  /// Gives a micro-batch copies of the buffers as they were before the step.
+  void begin() {
+    for (Entry& e : entries_)
+      if (e.is_buffer()) *e.state.value = e.begun = e.before.clone();
+  }
+  /// Error if micro-batches that were computed at once have changed a buffer.
+  void require_unchanged() const {
+    for (const Entry& e : entries_)
+      if (e.is_buffer() && e.changed())
+        throw Error("micro-batches that were computed side by side have changed the buffer '" +
+                    e.state.name + "'; its module must say so (Module::changes_buffers)");
   }
 
   std::vector<float> of(const Gradients& gradients) const {
-    std::vector<float> out;
-    out.reserve(width_);
-    for (const StateEntry& entry : entries_) {
-      const Tensor& t =
-          entry.parameter == nullptr ? *entry.value : *gradients.find(entry.parameter->id);
-      const Tensor here = t.cpu();
-      out.insert(out.end(), here.data<float>(), here.data<float>() + t.numel());
+    std::vector<float> out(width_, 0.0f);
+    size_t flag = 0, at = entries_.size(), found = 0;
+    for (const Entry& e : entries_) {
+      const Tensor* t = e.is_buffer() ? e.state.value : gradients.find(e.state.parameter->id);
+      const bool takes_part = e.is_buffer() ? e.changed() : t != nullptr;
+      out[flag++] = takes_part ? 1.0f : 0.0f;
+      if (t != nullptr) {
+        const Tensor here = t->cpu();
+        std::copy_n(here.data<float>(), here.numel(),
+                    out.begin() + static_cast<std::ptrdiff_t>(at));
+        found += e.is_buffer() ? 0 : 1;
+      }
+      at += static_cast<size_t>(e.before.numel());
     }
+    if (found != gradients.size())
+      throw Error("a micro-batch gives gradients of " + std::to_string(gradients.size() - found) +
+                  " parameters that the step's optimiser does not hold");
     return out;
   }
-  /// Buffers go to where they are, gradients into `gradients`.
-  void spread(const std::vector<float>& row, Gradients* gradients) const {
-    const float* from = row.data();
-    for (const StateEntry& entry : entries_) {
-      Tensor here = Tensor::empty(entry.value->shape());
-      std::copy_n(from, here.numel(), here.data<float>());
-      from += here.numel();
-      const Tensor t = here.to(entry.value->device());
-      if (entry.parameter == nullptr)
-        *entry.value = t;
+
+  /// What the sum of the rows of `rows` micro-batches means: means of buffers go to where the
+  /// buffers are, means of gradients into `gradients`.
+  void spread(const std::vector<float>& sum, int64_t rows, Gradients* gradients) const {
+    const auto share = static_cast<float>(1.0 / static_cast<double>(rows));
+    size_t flag = 0, at = entries_.size();
+    for (const Entry& e : entries_) {
+      const float* from = sum.data() + at;
+      at += static_cast<size_t>(e.before.numel());
+      if (sum[flag++] == 0) {
+        if (e.is_buffer()) *e.state.value = e.before;
+        continue;
+      }
+      Tensor mean = Tensor::empty(e.before.shape());
+      for (int64_t i = 0; i < mean.numel(); ++i) mean.data<float>()[i] = from[i] * share;
+      mean = mean.to(e.before.device());
+      if (e.is_buffer())
+        *e.state.value = mean;
       else
-        gradients->set(entry.parameter->id, t);
+        gradients->set(e.state.parameter->id, mean);
     }
   }
 
  private:
-  std::vector<StateEntry> entries_;
+  struct Entry {
+    StateEntry state;
+    Tensor before;  ///< its value before the step
+    Tensor begun;   ///< a buffer: what the micro-batch began with
+    bool is_buffer() const { return state.parameter == nullptr; }
+    bool changed() const {
+      return state.value->address() != begun.address() || state.value->version() != begun.version();
+    }
+  };
+  std::vector<Entry> entries_;
   size_t width_ = 0;
 };
 
 }  // namespace
 
-/// Micro-batches whose networks have batch norm change them, and take turns; so do a GPU's.
-bool Stage::side_by_side() const {
-  return buffers_change_ && !*buffers_change_ && device_ == Device{} && threads() > 1;
-}
-
-Differentiated Stage::parts(const std::function<Differentiated(const MicroBatch&)>& compute) {
+Differentiated Stage::parts(const Optimiser& optimiser,
+                            const std::function<Differentiated(const MicroBatch&)>& compute) {
   if (micro_batches_ == 1) return compute({});
-  const std::vector<StateEntry> all = state();
-  std::map<Tensor*, Tensor> before, began;  // what buffers are, and copies that a micro-batch gets
-  for (const StateEntry& entry : all)
-    if (entry.parameter == nullptr) before[entry.value] = *entry.value;
-  const auto belongs = [&](const StateEntry& entry, const Gradients& gradients) {
-    if (entry.parameter != nullptr) return gradients.find(entry.parameter->id) != nullptr;
-    const Tensor &now = *entry.value, &then = began[entry.value];
-    return now.address() != then.address() || now.version() != then.version();
-  };
-  std::optional<Row> row;
-  std::unique_ptr<Team::Sum> sum;
+  Row row(state(), optimiser.parameters());
+  const std::unique_ptr<Team::Sum> sum = team_->sum(row.width());
   std::vector<std::vector<double>> mine;
   const auto give = [&](const Differentiated& d) {
-    if (!row) {
-      std::vector<StateEntry> those;
-      std::copy_if(all.begin(), all.end(), std::back_inserter(those),
-                   [&](const StateEntry& entry) { return belongs(entry, d.gradients); });
-      row.emplace(std::move(those));
-      sum = team_->sum(row->width());
-      buffers_change_ = buffers_change_.value_or(false) || row->has_buffers();
-    }
-    sum->give(row->of(d.gradients));
+    sum->give(row.of(d.gradients));
     mine.push_back(d.values);
     mine.back().push_back(d.loss);
   };
@@ -234,27 +261,25 @@ Differentiated Stage::parts(const std::function<Differentiated(const MicroBatch&
     return MicroBatch{team_->rank() + k * team_->size(), micro_batches_};
   };
   const int64_t own = micro_batches_ / team_->size();
-  if (side_by_side()) {
-    for (const auto& [buffer, value] : before) began[buffer] = value;  // nobody changes them
+  if (device_ == Device{} && row.can_share()) {
     const int64_t at_once = std::min<int64_t>(own, threads());
     for (int64_t from = 0; from < own; from += at_once) {  // gradients travel in the meantime
       std::vector<Differentiated> done(static_cast<size_t>(std::min(at_once, own - from)));
       in_groups(std::ssize(done), threads(),
                 [&](int64_t k) { done[static_cast<size_t>(k)] = compute(number(from + k)); });
+      row.require_unchanged();
       for (const Differentiated& d : done) give(d);
     }
-  } else {
+  } else {  // a GPU computes one after the other, too
     for (int64_t k = 0; k < own; ++k) {
-      for (const auto& [buffer, value] : before) *buffer = began[buffer] = value.clone();
+      row.begin();
       give(compute(number(k)));
     }
   }
-  const double share = 1.0 / static_cast<double>(micro_batches_);
   Differentiated out;
-  std::vector<float> total = sum->total();
-  for (float& x : total) x *= static_cast<float>(share);
-  row->spread(total, &out.gradients);
+  row.spread(sum->total(), micro_batches_, &out.gradients);
   out.norm = out.gradients.norm();
+  const double share = 1.0 / static_cast<double>(micro_batches_);
   for (const auto& values : team_->all(mine)) {  // in order
     out.values.resize(values.size());
     for (size_t i = 0; i < values.size(); ++i) out.values[i] += share * values[i];

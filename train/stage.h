@@ -66,6 +66,7 @@ class Stage {
 
   const std::string& name() const { return name_; }
   int64_t steps() const { return optimisation_.steps; }
+  Device device() const { return device_; }  ///< where its networks are
   /// Clouds, windows or pairs of bodies in a step.
   int64_t examples_per_step() const { return optimisation_.batch; }
   /// Every `batches` steps the same examples come again: can it learn them by heart? 0: never.
@@ -122,13 +123,15 @@ class Stage {
   virtual void save_more(TensorFile&) const {}
   virtual void load_more(const TensorFile&, const std::string& /*where*/) {}
 
-  Device device() const { return device_; }
   Team& team() const { return *team_; }
   int64_t micro_batches() const { return micro_batches_; }
-  /// The mean of what `compute` gives for each micro-batch of a step; those of other processes
-  /// come from there. Micro-batches that change nothing but their own gradients are computed side
-  /// by side on groups of threads, so `compute` may be called by several at once.
-  Differentiated parts(const std::function<Differentiated(const MicroBatch&)>& compute);
+  /// The mean of what `compute` gives for each micro-batch of a step, also for the micro-batches of
+  /// other processes. `optimiser` says whose gradients count: its parameters'. A micro-batch in
+  /// which a parameter takes no part counts as a gradient of zero; a parameter that takes part in
+  /// none of them has no gradient. Where no network has buffers that a pass changes, micro-batches
+  /// are computed side by side on groups of threads, so several threads may call `compute` at once.
+  Differentiated parts(const Optimiser& optimiser,
+                       const std::function<Differentiated(const MicroBatch&)>& compute);
 
   /// The step whose examples are drawn in this one.
   int64_t drawn(int64_t step) const { return repeated_ > 0 ? step % repeated_ : step; }
@@ -148,12 +151,8 @@ class Stage {
   /// All networks, under the names of a checkpoint.
   std::vector<StateEntry> state() const;
 
-  bool side_by_side() const;
-
   std::string name_;
   Device device_;
-  std::optional<bool>
-      buffers_change_;  ///< by any micro-batch so far; nobody knows before the first
   int64_t repeated_ = 0, micro_batches_ = 1;
   Team* team_ = &alone();
   bool started_from_weights_ = false;

@@ -14,6 +14,8 @@ class Team {
   virtual ~Team() = default;
   virtual int rank() const = 0;  ///< from 0
   virtual int size() const = 0;
+  /// The process's number among those of the team on its own host, from 0.
+  virtual int local_rank() const = 0;
 
   /// A sum of rows, each given by one process.
   class Sum {

@@ -31,6 +31,16 @@ std::string line(const NamedValues& values) {
   return out;
 }
 
+/// The most that tensors took since reset_peak_memory(), where there are any: "812 MiB", or of a
+/// stage on a GPU "812 MiB on cuda and 40 MiB on the host".
+std::string peak_of_tensors(Device device) {
+  const auto mebibytes = [](Device of) {
+    return format("%.0f MiB", static_cast<double>(memory_stats(of).peak) / 1048576.0);
+  };
+  if (device == Device{}) return mebibytes({});
+  return mebibytes(device) + " on " + name_of(device) + " and " + mebibytes({}) + " on the host";
+}
+
 /// One stage's way through its steps.
 class StageRun {
  public:
@@ -63,6 +73,7 @@ class StageRun {
     const StopScope stop;
     tell([&](TrainObserver& o) { o.on_begin(stage_, done_); });
     if (stage_.steps() == 0) {
+      if (resumed_) return;  // it was judged and saved then
       log_info(validate());
       checkpoint();
       return;
@@ -110,6 +121,7 @@ class StageRun {
 void StageRun::all_steps() {
   product_rate();
   reset_peak_memory();
+  if (stage_.device() != Device{}) reset_peak_memory(stage_.device());
   const int64_t first = done_, blocks_before = memory_stats().large_allocations;
   const double waited_before = options_.team->waited();
   log_info(format("%s: %lld parameters, %lld steps of %lld", stage_.name().c_str(),
@@ -234,22 +246,16 @@ void StageRun::hand_on() {
 std::string StageRun::forecast() const {
   const double left =
       throughput_.seconds() / kForecastAfter * static_cast<double>(stage_.steps() - done_);
-  return format("%s: about %s to go without validations, tensors take %.0f MiB",
-                stage_.name().c_str(), duration_text(left).c_str(),
-                static_cast<double>(memory_stats().peak) / 1048576.0);
+  return format("%s: about %s to go without validations, tensors take %s", stage_.name().c_str(),
+                duration_text(left).c_str(), peak_of_tensors(stage_.device()).c_str());
 }
 
 void StageRun::report(int64_t steps, int64_t blocks_before, double waited_before) const {
-  char text[300];
-  std::snprintf(text, sizeof text,
-                "%s: %lld steps, %.1f ms a step, %s, peak of tensors %.0f MiB, %lld "
-                "large blocks taken",
-                stage_.name().c_str(), static_cast<long long>(steps),
-                1e3 * throughput_.seconds() / static_cast<double>(steps),
-                line(throughput_.values()).c_str(),
-                static_cast<double>(memory_stats().peak) / 1048576.0,
-                static_cast<long long>(memory_stats().large_allocations - blocks_before));
-  log_info(text);
+  log_info(format("%s: %lld steps, %.1f ms a step, %s, peak of tensors %s, %lld large blocks taken",
+                  stage_.name().c_str(), static_cast<long long>(steps),
+                  1e3 * throughput_.seconds() / static_cast<double>(steps),
+                  line(throughput_.values()).c_str(), peak_of_tensors(stage_.device()).c_str(),
+                  static_cast<long long>(memory_stats().large_allocations - blocks_before)));
   if (options_.team->size() > 1)
     log_info(format("%s: waited %.2f ms a step for the other processes", stage_.name().c_str(),
                     1e3 * (options_.team->waited() - waited_before) / static_cast<double>(steps)));
@@ -278,6 +284,9 @@ Bundle train(RunDir& run, const std::vector<std::string>& stages, const LoopConf
     stage_run.run();
     if (i + 1 < stages.size()) stage_run.tidy();
     result.add(stage->result());
+    // The next stage's tensors have other sizes.
+    trim_memory();
+    if (stage->device() != Device{}) trim_memory(stage->device());
   }
   return result;
 }

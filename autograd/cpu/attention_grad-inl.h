@@ -143,7 +143,7 @@ void offset_grad(const Backward<T>& b, int64_t t, const T* gz, GroupSums<T>& sum
     return sums.xyz.template data<T>()[3 * (row - sums.first_row) + c];
   };
   for (int64_t c = 0; c < 3; ++c) {
-    std::vector<T> w(units.size());
+    Scratch<T> w(units.size());
     choose(a.hidden.template data<T>() + c * a.d, units, w.data());
     for (int64_t i = 0; i < a.tile_rows(t); ++i) {
       const int64_t p = a.point(t, i);

@@ -164,7 +164,7 @@ void split_xyz_grad(const Backward<T>& b, int64_t t, const Split& s, const T* on
                     const T* gu, const T* gz, const T* g_st, GroupSums<T>& sums,
                     const TileMemory<T>& memory) {
   const T* affine = b.a.affine.template data<T>() + 8 * t * s.d;
-  std::vector<T> chosen(static_cast<size_t>(3 * s.active));
+  Scratch<T> chosen(static_cast<size_t>(3 * s.active));
   for (int64_t c = 0; c < 3; ++c)
     choose(affine + c * 2 * s.d, memory.active, chosen.data() + c * s.active);
   offset_grad(b, t, gz, sums, [&](int64_t pair, int64_t c) {

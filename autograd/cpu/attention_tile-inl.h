@@ -22,6 +22,7 @@
 #include "autograd/cpu/kernels.h"
 #include "autograd/cpu/math-inl.h"
 #include "autograd/cpu/packed_product-inl.h"
+#include "autograd/kernels/scratch.h"
 #include "autograd/kernels/stats.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -87,15 +88,6 @@ struct TileMemory {
     return memory;
   }
 };
-
-/// Whether all elements are numbers below infinity.
-template <class T>
-bool all_finite(const Tensor& t) {
-  const T* x = t.data<T>();
-  T bad = 0;
-  for (int64_t i = 0; i < t.numel(); ++i) bad = x[i] - x[i] == T(0) ? bad : T(1);
-  return bad == T(0);
-}
 
 /// out [columns, rows] = the transpose of m [rows, columns].
 template <class T>
@@ -219,7 +211,12 @@ Attention<T>::Attention(const NeighbourAttentionInputs& inputs)
       active(static_cast<size_t>(tiles.tiles())),
       full(static_cast<size_t>(tiles.tiles())) {
   transpose_weights();
-  finite = all_finite<T>(in.query) && all_finite<T>(in.key) && all_finite<T>(in.gamma);
+  finite = true;
+  for (const Tensor* t : {&in.query, &in.key, &in.gamma}) {
+    Tensor found = Tensor::empty({1}, DType::i32, t->device());
+    cpu::non_finite({*t, found});
+    finite = finite && found.data<int32_t>()[0] == 0;
+  }
   on = empty_like(in.w, {tiles.tiles(), 4, d});
   affine = empty_like(in.w, {tiles.tiles(), 4, 2 * d});
   parallel_for(tiles.tiles(), 4, [&](int64_t from, int64_t to) HWY_ATTR {

@@ -23,6 +23,9 @@ class CpuBackend final : public Backend {
   void copy(void* to, const void* from, size_t bytes) override { std::memcpy(to, from, bytes); }
   void copy_out(void* to, const void* from, size_t bytes) override { copy(to, from, bytes); }
   void synchronise() override {}
+  MemoryStats memory() const override { return cpu::pool_stats(); }
+  void reset_peak() override { cpu::pool_reset_peak(); }
+  void trim() override { cpu::pool_trim(); }
 };
 
 }  // namespace

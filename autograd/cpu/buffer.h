@@ -1,27 +1,49 @@
-// Memory of a thread that grows to what was needed and stays.
+// Memory for numbers, from the pool: for the time of a kernel, or kept by a thread (thread_local)
+// where it grows to what was needed and stays. Lists of other things are Scratch
+// (kernels/scratch.h).
 #pragma once
 
-#include "autograd/cpu/workspace.h"
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+
+#include "autograd/cpu/pool.h"
 
 namespace restage::cpu {
 
-/// Aligned to cache lines. at_least() keeps nothing of what was there before.
+/// Not initialised, aligned to cache lines.
 template <class T>
 class Buffer {
  public:
+  Buffer() = default;
+  explicit Buffer(int64_t count) { at_least(count); }
+  ~Buffer() { release(); }
+  Buffer(const Buffer&) = delete;
+  Buffer& operator=(const Buffer&) = delete;
+
+  /// Room for `count` numbers; keeps nothing of what was there before.
   T* at_least(int64_t count) {
     if (count > size_) {
-      Workspace<T> larger(count);
-      memory_.swap(larger);
+      release();
+      data_ = static_cast<T*>(pool_allocate(static_cast<size_t>(count) * sizeof(T)));
       size_ = count;
     }
-    return memory_.data();
+    return data_;
   }
-  T* data() { return memory_.data(); }
-  const T* data() const { return memory_.data(); }
+  T* data() const { return data_; }
+  void swap(Buffer& other) {
+    std::swap(data_, other.data_);
+    std::swap(size_, other.size_);
+  }
 
  private:
-  Workspace<T> memory_{0};
+  void release() {
+    if (data_ != nullptr) pool_release(data_, static_cast<size_t>(size_) * sizeof(T));
+    data_ = nullptr;
+    size_ = 0;
+  }
+
+  T* data_ = nullptr;
   int64_t size_ = 0;
 };
 

@@ -6,11 +6,11 @@
 #include <hwy/foreach_target.h>  // once per instruction set
 
 #include <algorithm>
-#include <vector>
 
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/kernels.h"
 #include "autograd/cpu/targets.h"
+#include "autograd/kernels/scratch.h"
 #include "autograd/kernels/stats.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -36,11 +36,11 @@ struct Term {
 };
 
 /// Working memory of one thread, kept between calls.
-struct Scratch {
-  std::vector<int32_t> on, candidates, active;
-  std::vector<float> shared, affine;  // [4, p]: what the units that are on give, per x, y, z and 1
-  std::vector<float> values;          // [u, P] of the active units
-  std::vector<Term> terms;
+struct TileMemory {
+  Scratch<int32_t> on, candidates, active;
+  Scratch<float> shared, affine;  // [4, p]: what the units that are on give, per x, y, z and 1
+  Scratch<float> values;          // [u, P] of the active units
+  Scratch<Term> terms;
 
   void fit(size_t units, size_t width) {
     for (auto* list : {&on, &candidates, &active}) list->reserve(units);
@@ -70,8 +70,7 @@ struct Field {
 
 /// Puts unit i where its sign between `low` and `high` belongs: always positive, changing (or not
 /// a number), or nowhere, because it gives nothing.
-void sort_unit(int32_t i, float low, float high, std::vector<int32_t>& on,
-               std::vector<int32_t>& changing) {
+void sort_unit(int32_t i, float low, float high, Scratch<int32_t>& on, Scratch<int32_t>& changing) {
   if (low > 0) {
     on.push_back(i);
   } else if (!(high <= 0)) {
@@ -80,7 +79,7 @@ void sort_unit(int32_t i, float low, float high, std::vector<int32_t>& on,
 }
 
 /// affine [4, p] += what the units in `on` give to the second layer.
-void add_units(const Field& f, const std::vector<int32_t>& on, float* affine) {
+void add_units(const Field& f, const Scratch<int32_t>& on, float* affine) {
   const F d;
   for (int64_t at = 0; at < f.width; at += 2 * kLanes) {
     V acc[4][2];
@@ -102,7 +101,7 @@ void add_units(const Field& f, const std::vector<int32_t>& on, float* affine) {
 
 /// What the tiles [from, to) share: the affine part of the units that are on in all of them, and
 /// the units that may be anything.
-void prepare_group(const Field& f, int64_t from, int64_t to, bool dense, Scratch& s) {
+void prepare_group(const Field& f, int64_t from, int64_t to, bool dense, TileMemory& s) {
   s.on.clear();
   s.candidates.clear();
   for (int32_t i = 0; i < f.units; ++i) {
@@ -123,7 +122,7 @@ void prepare_group(const Field& f, int64_t from, int64_t to, bool dense, Scratch
 }
 
 /// The terms of tile t: three coordinates with the affine part, then the active units.
-void prepare_tile(const Field& f, int64_t t, const float* points, bool dense, Scratch& s) {
+void prepare_tile(const Field& f, int64_t t, const float* points, bool dense, TileMemory& s) {
   const F d;
   s.on.clear();
   s.active.clear();
@@ -156,7 +155,7 @@ void prepare_tile(const Field& f, int64_t t, const float* points, bool dense, Sc
 }
 
 /// Second and third layer of kVectors vectors of points: moved = points + offset, both [3, P].
-void offset_points(const Field& f, const Scratch& s, const float* points, float* moved) {
+void offset_points(const Field& f, const TileMemory& s, const float* points, float* moved) {
   const F d;
   const float* constant = s.affine.data() + 3 * f.width;
   V sum[3][kVectors];
@@ -209,7 +208,7 @@ void skin_points(const float* x, const float* weights, const float* bones, int64
 }
 
 void tiles(const DeformArgs& args, const Field* field, int64_t from, int64_t to) {
-  thread_local Scratch s;
+  thread_local TileMemory s;
   const int64_t joints = args.weights.size(1);
   if (field) {
     s.fit(static_cast<size_t>(field->units), static_cast<size_t>(field->width));

@@ -72,6 +72,5 @@ namespace restage::cpu {
 #define RESTAGE_DECLARE(kernel, Args) void kernel(const Args&);
 RESTAGE_CPU_KERNELS(RESTAGE_DECLARE)
 #undef RESTAGE_DECLARE
-void matmul_bf16(const MatmulArgs&);  // matmul() calls it
 
 }  // namespace restage::cpu

@@ -11,12 +11,12 @@
 #include <cstring>
 #include <utility>
 
+#include "autograd/cpu/buffer.h"
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/gemm_tile-inl.h"
 #include "autograd/cpu/kernels.h"
 #include "autograd/cpu/matmul_sizes.h"
 #include "autograd/cpu/targets.h"
-#include "autograd/cpu/workspace.h"
 #include "autograd/kernels/stats.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -182,7 +182,7 @@ void tile(const Product<T>& p, const Packed<T>& packed, int64_t i0, int64_t i1, 
   alignas(64) T own_b[kDepth * cols];
   thin_tiles(p, j0, thin_end);
   if (thin_end == j1) return;
-  const Workspace<T> own_a(packed.a ? 0 : round_up(i1 - i0, kRows) * std::min(kDepth, p.k));
+  const Buffer<T> own_a(packed.a ? 0 : round_up(i1 - i0, kRows) * std::min(kDepth, p.k));
   for (int64_t l0 = packed.begin; l0 < packed.end; l0 += kDepth) {
     const int64_t l = std::min(kDepth, packed.end - l0), before = l0 - packed.begin;
     const auto at = [&](int64_t i, int64_t j) { return Place{i, j, l0 == 0, l0 + l == p.k}; };
@@ -232,7 +232,7 @@ template <class T>
 void single(const Product<T>& p, const Cut& cut) {
   constexpr int cols = Simd<T>::cols;
   const int64_t m = round_up(p.m, kRows), n = round_up(p.n, cols);
-  const Workspace<T> a(cut.share_a ? m * cut.depth : 0), b(cut.share_b ? n * cut.depth : 0);
+  const Buffer<T> a(cut.share_a ? m * cut.depth : 0), b(cut.share_b ? n * cut.depth : 0);
   for (int64_t begin = 0; begin < p.k; begin += cut.depth) {
     const int64_t end = std::min(p.k, begin + cut.depth);
     if (cut.share_a)
@@ -295,9 +295,6 @@ void run(const MatmulArgs& args, const MatmulSizes& s) {
 
 void matmul(const MatmulArgs& args) {
   const MatmulSizes sizes(args);
-  if (args.precision == MatmulPrecision::bfloat16 && args.out.dtype() == DType::f32 &&
-      sizes.k >= MatmulArgs::kLeastTerms)
-    return cpu::matmul_bf16(args);
   dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR { run<decltype(zero)>(args, sizes); });
 }
 

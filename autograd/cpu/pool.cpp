@@ -1,5 +1,6 @@
 #include "autograd/cpu/pool.h"
 
+#include <malloc.h>
 #include <sys/mman.h>
 
 #include <algorithm>
@@ -13,7 +14,6 @@
 #include <vector>
 
 #include "autograd/tensor/nan_memory.h"
-#include "autograd/tensor/tensor.h"
 
 // Under AddressSanitizer free blocks, and the slack behind a tensor, may not be touched.
 #ifdef __has_feature
@@ -53,7 +53,7 @@ SizeClass size_class(size_t bytes) {
 /// The free blocks of one size class.
 struct FreeList {
   std::vector<void*> blocks;
-  size_t taken = 0;  // from the system so far
+  size_t taken = 0;  // from the system and not given back
 };
 
 struct Pool {
@@ -68,9 +68,27 @@ Pool& pool() {
   return *instance;
 }
 
-void* from_system(size_t bytes) {
-  const size_t align = bytes >= kHuge ? kHuge : kAlign;
-  void* data = std::aligned_alloc(align, (bytes + align - 1) / align * align);
+/// Gives the free blocks back to the system; the caller holds the lock.
+void trim(Pool& p) {
+  for (FreeList& list : p.free) {
+    for (void* data : list.blocks) std::free(data);
+    list.taken -= list.blocks.size();
+    list.blocks.clear();
+  }
+  p.stats.kept = 0;
+#ifdef __GLIBC__
+  ::malloc_trim(0);
+#endif
+}
+
+/// The caller holds the pool's lock.
+void* from_system(Pool& p, size_t bytes) {
+  const size_t align = bytes >= kHuge ? kHuge : kAlign, whole = (bytes + align - 1) / align * align;
+  void* data = std::aligned_alloc(align, whole);
+  if (data == nullptr) {  // blocks of other sizes may be all that is missing
+    trim(p);
+    data = std::aligned_alloc(align, whole);
+  }
   if (data == nullptr) throw std::bad_alloc();
   if (bytes >= kHuge) ::madvise(data, bytes, MADV_HUGEPAGE);
   return data;
@@ -97,12 +115,13 @@ void* cpu::pool_allocate(size_t bytes) {
   if (list.blocks.empty()) {
     // There is always room for all blocks of a class, so that giving one back takes no memory.
     if (list.blocks.capacity() <= list.taken) list.blocks.reserve(2 * list.taken + 8);
-    data = from_system(size);
+    data = from_system(p, size);
     ++list.taken;
     if (size >= kLarge) ++p.stats.large_allocations;
   } else {
     data = list.blocks.back();
     list.blocks.pop_back();
+    p.stats.kept -= static_cast<int64_t>(size);
   }
   p.stats.in_use += static_cast<int64_t>(size);
   p.stats.peak = std::max(p.stats.peak, p.stats.in_use);
@@ -117,17 +136,24 @@ void cpu::pool_release(void* data, size_t bytes) {
   Pool& p = pool();
   const std::lock_guard lock(p.mutex);
   p.stats.in_use -= static_cast<int64_t>(size);
+  p.stats.kept += static_cast<int64_t>(size);
   p.free[index].blocks.push_back(data);
   ASAN_POISON_MEMORY_REGION(data, size);
 }
 
-MemoryStats memory_stats() {
+void cpu::pool_trim() {
+  Pool& p = pool();
+  const std::lock_guard lock(p.mutex);
+  trim(p);
+}
+
+MemoryStats cpu::pool_stats() {
   Pool& p = pool();
   const std::lock_guard lock(p.mutex);
   return p.stats;
 }
 
-void reset_peak_memory() {
+void cpu::pool_reset_peak() {
   Pool& p = pool();
   const std::lock_guard lock(p.mutex);
   p.stats.peak = p.stats.in_use;

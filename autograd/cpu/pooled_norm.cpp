@@ -14,12 +14,12 @@
 
 #include <cmath>
 #include <limits>
-#include <vector>
 
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/gemm_tile-inl.h"
 #include "autograd/cpu/kernels.h"
 #include "autograd/cpu/targets.h"
+#include "autograd/kernels/scratch.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
@@ -187,7 +187,7 @@ void forward(const PooledNormArgs& args) {
   Tensor z_mean = empty_like(args.out, {1, o});
   centre<T>(args.x, n * v, k, x_mean, args.centred);
   cpu::matmul({x_mean, args.weight, z_mean, false, true, &args.bias});
-  std::vector<double> squares(static_cast<size_t>(n * o));
+  Scratch<double> squares(static_cast<size_t>(n * o));
   find_peaks<T>(args, squares.data());
   finish<T>(args, squares.data(), z_mean.data<T>());
 }

@@ -14,27 +14,48 @@ HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
 namespace {
 
-constexpr int64_t kPart = 512;  // terms per partial sum
+constexpr int64_t kPart = 512;     // terms per partial sum
+constexpr int64_t kColumns = 128;  // summed side by side
 
-/// Sums rows [from, to) of x [n, inner] into out [inner] (overwritten). Columns in double, since
-/// what is summed (gradients of a bias) may all but cancel.
+/// Columns [from, to) of a row of [outer, n, inner].
+struct Columns {
+  int64_t from, to;
+  int64_t count() const { return to - from; }
+};
+
+/// Calls f(o, columns) for all columns of every outer row of [outer, n, inner]: several rows, or a
+/// part of one, per piece.
+template <class F>
+void for_columns(int64_t outer, int64_t n, int64_t inner, F&& f) {
+  const int64_t blocks = std::max<int64_t>(1, row_grain(n) / kColumns), width = blocks * kColumns;
+  const int64_t pieces = (inner + width - 1) / width;
+  parallel_for(outer * pieces, row_grain(n * std::min(inner, width)),
+               [&](int64_t from, int64_t to) HWY_ATTR {
+                 for (int64_t t = from; t < to; ++t) {
+                   const int64_t i = t % pieces * width;
+                   f(t / pieces, Columns{i, std::min(inner, i + width)});
+                 }
+               });
+}
+
+/// Sums the columns of x [n, inner] into `out` (overwritten). In double, since what is summed
+/// (gradients of a bias) may all but cancel; a single column in the order of sum_of().
 template <class T>
-void sum_rows(const T* x, int64_t from, int64_t to, int64_t inner, T* out) {
+void sum_columns(const T* x, int64_t n, int64_t inner, Columns columns, T* out) {
   if (inner == 1) {
     *out = static_cast<T>(sum_of(
-        to - from, [](auto v) HWY_ATTR { return v; }, x + from));
+        n, [](auto v) HWY_ATTR { return v; }, x));
     return;
   }
-  constexpr int64_t kColumns = 128;  // at a time
   double total[kColumns];
-  for (int64_t i0 = 0; i0 < inner; i0 += kColumns) {
-    const int64_t columns = std::min(kColumns, inner - i0);
-    std::fill_n(total, columns, 0.0);
-    for (int64_t r = from; r < to; ++r) {
+  for (int64_t i0 = columns.from; i0 < columns.to; i0 += kColumns) {
+    const int64_t count = std::min(kColumns, columns.to - i0);
+    std::fill_n(total, count, 0.0);
+    for (int64_t r = 0; r < n; ++r) {
       const T* row = x + r * inner + i0;
-      for (int64_t i = 0; i < columns; ++i) total[i] += static_cast<double>(row[i]);
+      for (int64_t i = 0; i < count; ++i) total[i] += static_cast<double>(row[i]);
     }
-    for (int64_t i = 0; i < columns; ++i) out[i0 + i] = static_cast<T>(total[i]);
+    for (int64_t i = 0; i < count; ++i) out[i0 + i] = static_cast<T>(total[i]);
   }
 }
 
@@ -44,24 +65,20 @@ void sum_typed(const SumArgs& args) {
   T* out = args.out.data<T>();
   const int64_t n = args.n, inner = args.inner;
   const int64_t parts = std::max<int64_t>(1, (n + kPart - 1) / kPart);
-  if (parts == 1) {
-    parallel_for(args.outer, row_grain(n * inner), [&](int64_t from, int64_t to) HWY_ATTR {
-      for (int64_t o = from; o < to; ++o) sum_rows(x + o * n * inner, 0, n, inner, out + o * inner);
+  const auto sum_rows = [&](const T* from, int64_t rows, T* to) HWY_ATTR {
+    for_columns(args.outer, rows, inner, [&](int64_t o, Columns columns) HWY_ATTR {
+      sum_columns(from + o * rows * inner, rows, inner, columns, to + o * inner);
     });
-    return;
-  }
+  };
+  if (parts == 1) return sum_rows(x, n, out);
   Tensor scratch = empty_like(args.out, {args.outer, parts, inner});
   T* partial = scratch.data<T>();
-  parallel_for(args.outer * parts, row_grain(kPart * inner),
-               [&](int64_t from, int64_t to) HWY_ATTR {
-                 for (int64_t t = from; t < to; ++t) {
-                   const int64_t o = t / parts, p = t % parts;
-                   sum_rows(x + o * n * inner, p * kPart, std::min(n, (p + 1) * kPart), inner,
-                            partial + t * inner);
-                 }
-               });
-  for (int64_t o = 0; o < args.outer; ++o)
-    sum_rows(partial + o * parts * inner, 0, parts, inner, out + o * inner);
+  for_columns(args.outer * parts, kPart, inner, [&](int64_t t, Columns columns) HWY_ATTR {
+    const int64_t o = t / parts, first = t % parts * kPart;
+    sum_columns(x + (o * n + first) * inner, std::min(n - first, kPart), inner, columns,
+                partial + t * inner);
+  });
+  sum_rows(partial, parts, out);
 }
 
 /// Calls f(o) for every outer row, several per piece.
@@ -86,23 +103,25 @@ void softmax_row(const T* x, int64_t n, T* y) {
       n, y, [&](V v) HWY_ATTR { return hn::Div(v, total); }, y);
 }
 
-/// Along the rows of x [n, inner].
+/// Along the rows of x [n, inner], for some columns.
 template <class T>
-void softmax_columns(const T* x, int64_t n, int64_t inner, T* y) {
+void softmax_columns(const T* x, int64_t n, int64_t inner, Columns columns, T* y) {
   using V = hn::Vec<hn::ScalableTag<T>>;
-  Scratch<T> tops(x, x + inner), totals(static_cast<size_t>(inner), T(0));
+  const int64_t count = columns.count();
+  x += columns.from, y += columns.from;
+  Scratch<T> tops(x, x + count), totals(static_cast<size_t>(count), T(0));
   T *top = tops.data(), *total = totals.data();
   for (int64_t r = 1; r < n; ++r)
-    for (int64_t i = 0; i < inner; ++i)
+    for (int64_t i = 0; i < count; ++i)
       top[i] = x[r * inner + i] > top[i] ? x[r * inner + i] : top[i];
   const auto exponential = [](V& out, V& sum, V v, V t) HWY_ATTR {
     out = exp(hn::Sub(v, t));
     sum = hn::Add(sum, out);
   };
   for (int64_t r = 0; r < n; ++r)
-    update(inner, exponential, y + r * inner, total, x + r * inner, static_cast<const T*>(top));
+    update(count, exponential, y + r * inner, total, x + r * inner, static_cast<const T*>(top));
   for (int64_t r = 0; r < n; ++r)
-    for (int64_t i = 0; i < inner; ++i) y[r * inner + i] /= total[i];
+    for (int64_t i = 0; i < count; ++i) y[r * inner + i] /= total[i];
 }
 
 }  // namespace
@@ -115,15 +134,16 @@ void max(const MaxArgs& args) {
   dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
     using T = decltype(zero);
     const int64_t n = args.n, inner = args.inner;
-    for_rows(args.outer, n * inner, [&](int64_t o) HWY_ATTR {
-      const T* x = args.x.data<T>() + o * n * inner;
-      T* best = args.out.data<T>() + o * inner;
-      int32_t* at = args.index.data<int32_t>() + o * inner;
-      std::copy_n(x, inner, best);
-      std::fill_n(at, inner, 0);
+    for_columns(args.outer, n, inner, [&](int64_t o, Columns columns) HWY_ATTR {
+      const int64_t count = columns.count(), at_column = o * inner + columns.from;
+      const T* x = args.x.data<T>() + o * n * inner + columns.from;
+      T* best = args.out.data<T>() + at_column;
+      int32_t* at = args.index.data<int32_t>() + at_column;
+      std::copy_n(x, count, best);
+      std::fill_n(at, count, 0);
       for (int64_t r = 1; r < n; ++r) {
         const T* row = x + r * inner;
-        for (int64_t i = 0; i < inner; ++i) {
+        for (int64_t i = 0; i < count; ++i) {
           const bool better =
               row[i] > best[i] || (row[i] != row[i] && best[i] == best[i]);  // NaN wins
           best[i] = better ? row[i] : best[i];
@@ -138,12 +158,13 @@ void max_grad(const MaxGradArgs& args) {
   dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
     using T = decltype(zero);
     const int64_t n = args.n, inner = args.inner;
-    for_rows(args.outer, n * inner, [&](int64_t o) HWY_ATTR {
+    for_columns(args.outer, n, inner, [&](int64_t o, Columns columns) HWY_ATTR {
       T* out = args.out.data<T>() + o * n * inner;
       const T* gy = args.gy.data<T>() + o * inner;
       const int32_t* at = args.index.data<int32_t>() + o * inner;
-      std::fill_n(out, n * inner, T(0));
-      for (int64_t i = 0; i < inner; ++i) out[at[i] * inner + i] = gy[i];
+      for (int64_t r = 0; r < n; ++r)
+        std::fill_n(out + r * inner + columns.from, columns.count(), T(0));
+      for (int64_t i = columns.from; i < columns.to; ++i) out[at[i] * inner + i] = gy[i];
     });
   });
 }
@@ -152,10 +173,10 @@ void softmax(const SoftmaxArgs& args) {
   dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
     using T = decltype(zero);
     const int64_t n = args.n, inner = args.inner;
-    for_rows(args.outer, n * inner, [&](int64_t o) HWY_ATTR {
+    for_columns(args.outer, n, inner, [&](int64_t o, Columns columns) HWY_ATTR {
       const T* x = args.x.data<T>() + o * n * inner;
       T* y = args.out.data<T>() + o * n * inner;
-      inner == 1 ? softmax_row(x, n, y) : softmax_columns(x, n, inner, y);
+      inner == 1 ? softmax_row(x, n, y) : softmax_columns(x, n, inner, columns, y);
     });
   });
 }
@@ -164,22 +185,23 @@ void softmax_grad(const SoftmaxGradArgs& args) {
   dispatch(args.out.dtype(), [&](auto zero) HWY_ATTR {
     using T = decltype(zero);
     const int64_t n = args.n, inner = args.inner;
-    for_rows(args.outer, n * inner, [&](int64_t o) HWY_ATTR {
-      const T* y = args.y.data<T>() + o * n * inner;
-      const T* g = args.gy.data<T>() + o * n * inner;
-      T* out = args.out.data<T>() + o * n * inner;
+    for_columns(args.outer, n, inner, [&](int64_t o, Columns columns) HWY_ATTR {
+      const T* y = args.y.data<T>() + o * n * inner + columns.from;
+      const T* g = args.gy.data<T>() + o * n * inner + columns.from;
+      T* out = args.out.data<T>() + o * n * inner + columns.from;
       if (inner == 1) {
         const auto product = [](auto a, auto b) HWY_ATTR { return hn::Mul(a, b); };
         const auto total = static_cast<T>(sum_of(n, product, y, g));
         for (int64_t i = 0; i < n; ++i) out[i] = y[i] * (g[i] - total);
         return;
       }
-      Scratch<T> totals(static_cast<size_t>(inner), T(0));
+      const int64_t count = columns.count();
+      Scratch<T> totals(static_cast<size_t>(count), T(0));
       T* total = totals.data();
       for (int64_t r = 0; r < n; ++r)
-        for (int64_t i = 0; i < inner; ++i) total[i] += y[r * inner + i] * g[r * inner + i];
+        for (int64_t i = 0; i < count; ++i) total[i] += y[r * inner + i] * g[r * inner + i];
       for (int64_t r = 0; r < n; ++r)
-        for (int64_t i = 0; i < inner; ++i)
+        for (int64_t i = 0; i < count; ++i)
           out[r * inner + i] = y[r * inner + i] * (g[r * inner + i] - total[i]);
     });
   });

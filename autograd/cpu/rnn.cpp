@@ -7,12 +7,12 @@
 
 #include <algorithm>
 
+#include "autograd/cpu/buffer.h"
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/gemm_tile-inl.h"
 #include "autograd/cpu/kernels.h"
 #include "autograd/cpu/math-inl.h"
 #include "autograd/cpu/targets.h"
-#include "autograd/cpu/workspace.h"
 #include "autograd/kernels/stats.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -82,7 +82,7 @@ struct Panels {
     }
   }
   int64_t rows, k, tall;
-  Workspace<T> data;
+  Buffer<T> data;
 };
 
 /// One vector of hidden units of one row. in: gi (r, z, n), gh (r, z, n), bias (r, z, n), old
@@ -231,7 +231,7 @@ struct Sequence {
 
   const Layer<T>& of;
   Tensor gi;
-  Workspace<T> packed;
+  Buffer<T> packed;
   Panels<T> now{of.n, of.h}, next{of.n, of.h};
 
   T* weights(int64_t gate, int64_t unit) const {
@@ -240,7 +240,7 @@ struct Sequence {
 
   void step(int64_t t, int64_t j, int64_t width) {
     const int64_t n = of.n, h = of.h;
-    const Workspace<T> gh(3 * n * cols);
+    const Buffer<T> gh(3 * n * cols);
     for (int64_t g = 0; g < 3; ++g) now.times(weights(g, j), gh.data() + g * n * cols);
     of.cells(t, j, width, gi.data<T>() + t * n * 3 * h + j, h, 3 * h, gh.data());
     if (t + 1 < of.steps) next.put(of.out + t * n * h + j, h, j, width);
@@ -280,7 +280,7 @@ struct Backward {
   const int64_t steps, n, h;
   const T *gates, *y, *h0, *w_hh, *gy;
   T *g_gi, *g_gh, *out;
-  Workspace<T> packed, direct{n * h};
+  Buffer<T> packed, direct{n * h};
   Panels<T> now{n, 3 * h}, next{n, 3 * h};  // g_gh of the step after this and of this one
 
   /// g [n, cols]: gradient of some units of the state after step t; -1: of h0.
@@ -299,7 +299,7 @@ struct Backward {
   }
 
   void step(int64_t t, int64_t j, int64_t width) {
-    const Workspace<T> g(n * cols);
+    const Buffer<T> g(n * cols);
     carry(t, j, width, g.data());
     const T* state = (t > 0 ? y + (t - 1) * n * h : h0) + j;
     for (int64_t i = 0; i < n; ++i) {

@@ -1,10 +1,9 @@
 // Forward kinematics (spec 3.5): a few small products a sample, baseline code.
 #include <Eigen/Core>
-#include <vector>
-
 #include "autograd/base/parallel_each.h"
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/kernels.h"
+#include "autograd/kernels/scratch.h"
 
 namespace restage::cpu {
 namespace {
@@ -45,7 +44,7 @@ void fk_grad_one(const FkGradArgs& args, int64_t s) {
   const T* rest = args.rest.data<T>() + s * joints * 3;
   const T* transforms = args.transforms.data<T>() + s * joints * 12;
   T* g_rest = args.g_rest.data<T>() + s * joints * 3;
-  std::vector<M34<T>> g(static_cast<size_t>(joints));
+  Scratch<M34<T>> g(static_cast<size_t>(joints));
   Eigen::Map<V3<T>> g_root(args.g_root.data<T>() + 3 * s);
   g_root.setZero();
   for (int64_t j = 0; j < joints; ++j) {

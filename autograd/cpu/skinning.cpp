@@ -5,11 +5,11 @@
 #include <hwy/foreach_target.h>  // once per instruction set
 
 #include <algorithm>
-#include <vector>
 
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/kernels.h"
 #include "autograd/cpu/targets.h"
+#include "autograd/kernels/scratch.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
@@ -30,9 +30,9 @@ constexpr int64_t padded(int64_t joints) {
 
 /// [G | b] of every joint of every sample, [n, joints, kStride].
 template <class T>
-std::vector<T> skinning_transforms(const Tensor& transforms, const Tensor& rest) {
+Scratch<T> skinning_transforms(const Tensor& transforms, const Tensor& rest) {
   const int64_t count = transforms.size(0) * transforms.size(1);
-  std::vector<T> out(static_cast<size_t>(count * kStride), T(0));
+  Scratch<T> out(static_cast<size_t>(count * kStride), T(0));
   for (int64_t j = 0; j < count; ++j)
     for (int64_t r = 0; r < 3; ++r) {
       const T *row = transforms.data<T>() + kEntries * j + 4 * r, *at = rest.data<T>() + 3 * j;
@@ -87,9 +87,9 @@ void blend_all(const T* weights, int64_t vertices, int64_t joints, const T* tran
 template <class T>
 void skin(const LbsArgs& args) {
   const int64_t v = args.points.size(1), joints = args.transforms.size(1);
-  const std::vector<T> transforms = skinning_transforms<T>(args.transforms, args.rest);
+  const Scratch<T> transforms = skinning_transforms<T>(args.transforms, args.rest);
   for_pieces(args.points.size(0), v, [&](int64_t s, int64_t, int64_t first, int64_t last) HWY_ATTR {
-    std::vector<T> blends(static_cast<size_t>((last - first) * kStride));
+    Scratch<T> blends(static_cast<size_t>((last - first) * kStride));
     blend_all(args.weights.data<T>() + (s * v + first) * joints, last - first, joints,
               transforms.data() + s * joints * kStride, blends.data());
     const T *x = args.points.data<T>() + 3 * (s * v + first), *b = blends.data();
@@ -126,9 +126,9 @@ template <class T>
 void skin_grad_piece(const LbsGradArgs& args, const T* transforms, int64_t first, int64_t last,
                      T* g_transforms) {
   const int64_t joints = args.transforms.size(1), many = padded<T>(joints);
-  std::vector<T> blends(static_cast<size_t>((last - first) * kStride));
-  std::vector<T> across(static_cast<size_t>(kEntries * many), T(0));  // transforms, joints inside
-  std::vector<T> w(static_cast<size_t>(many), T(0)), gw(w);
+  Scratch<T> blends(static_cast<size_t>((last - first) * kStride));
+  Scratch<T> across(static_cast<size_t>(kEntries * many), T(0));  // transforms, joints inside
+  Scratch<T> w(static_cast<size_t>(many), T(0)), gw(w);
   for (int64_t j = 0; j < joints; ++j)
     for (int64_t e = 0; e < kEntries; ++e) across[e * many + j] = transforms[kStride * j + e];
   const T* weights = args.weights.data<T>() + first * joints;
@@ -172,8 +172,8 @@ template <class T>
 void skin_grad(const LbsGradArgs& args) {
   const int64_t n = args.points.size(0), v = args.points.size(1), joints = args.transforms.size(1);
   const int64_t pieces = (v + kVertices - 1) / kVertices, size = kEntries * padded<T>(joints);
-  const std::vector<T> transforms = skinning_transforms<T>(args.transforms, args.rest);
-  std::vector<T> partial(static_cast<size_t>(n * pieces * size), T(0));
+  const Scratch<T> transforms = skinning_transforms<T>(args.transforms, args.rest);
+  Scratch<T> partial(static_cast<size_t>(n * pieces * size), T(0));
   for_pieces(n, v, [&](int64_t s, int64_t p, int64_t first, int64_t last) HWY_ATTR {
     skin_grad_piece(args, transforms.data() + s * joints * kStride, s * v + first, s * v + last,
                     partial.data() + (s * pieces + p) * size);

@@ -1,7 +1,6 @@
 // Swing and twist: baseline code.
-#include <vector>
-
 #include "autograd/base/parallel_each.h"
+#include "autograd/cpu/buffer.h"
 #include "autograd/cpu/common.h"
 #include "autograd/cpu/kernels.h"
 #include "autograd/kernels/swing_rows.h"
@@ -17,9 +16,8 @@ struct Arc {
 
 /// Kept by the thread: a steady frame takes no memory.
 double* room(int64_t count) {
-  thread_local std::vector<double> kept;
-  kept.resize(static_cast<size_t>(count));
-  return kept.data();
+  thread_local Buffer<double> kept;
+  return kept.at_least(count);
 }
 
 }  // namespace

@@ -3,6 +3,9 @@
 
 #include <string>
 
+#include "autograd/base/format.h"
+#include "autograd/base/log.h"
+
 namespace restage {
 namespace cuda {
 
@@ -11,9 +14,13 @@ namespace {
 /// What is made once and stays for good, like the host's pool.
 struct Runtime {
   Runtime() {
+    int count = 0;
+    check(cudaGetDeviceCount(&count), "cudaGetDeviceCount");
+    gpu = gpu_of(local_rank(), count);
+    check(cudaSetDevice(gpu), "cudaSetDevice");
+    if (count > 1) log_info(format("device 'cuda' is GPU %d of %d", gpu, count));
     check(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), "cudaStreamCreate");
-    cudaMemPool_t pool;
-    check(cudaDeviceGetDefaultMemPool(&pool, 0), "cudaDeviceGetDefaultMemPool");
+    check(cudaDeviceGetDefaultMemPool(&pool, gpu), "cudaDeviceGetDefaultMemPool");
     uint64_t keep_all = UINT64_MAX;  // a step needs again what the last one gave back
     check(cudaMemPoolSetAttribute(pool, cudaMemPoolAttrReleaseThreshold, &keep_all),
           "cudaMemPoolSetAttribute");
@@ -22,13 +29,26 @@ struct Runtime {
     // Bits must not depend on what else runs: no atomics.
     check(cublasSetAtomicsMode(cublas, CUBLAS_ATOMICS_NOT_ALLOWED), "cublasSetAtomicsMode");
   }
+  int gpu;
+  cudaMemPool_t pool;
   cudaStream_t stream;
   cublasHandle_t cublas;
 };
 
 Runtime& runtime() {
   static Runtime* instance = new Runtime;
+  // CUDA remembers the GPU of each thread by itself; a new thread begins with GPU 0.
+  thread_local const bool chosen [[maybe_unused]] = [] {
+    check(cudaSetDevice(instance->gpu), "cudaSetDevice");
+    return true;
+  }();
   return *instance;
+}
+
+int64_t number_of(cudaMemPoolAttr what) {
+  uint64_t bytes = 0;
+  check(cudaMemPoolGetAttribute(runtime().pool, what, &bytes), "cudaMemPoolGetAttribute");
+  return static_cast<int64_t>(bytes);
 }
 
 }  // namespace
@@ -61,7 +81,14 @@ class CudaBackend final : public Backend {
   std::string_view name() const override { return "cuda"; }
   void* allocate(size_t bytes) override {
     void* data = nullptr;
-    check(cudaMallocAsync(&data, std::max<size_t>(bytes, 1), stream()), "cudaMallocAsync");
+    const size_t size = std::max<size_t>(bytes, 1);
+    if (cudaMallocAsync(&data, size, stream()) == cudaErrorMemoryAllocation) {
+      cudaGetLastError();  // of this call
+      trim();
+      check(cudaMallocAsync(&data, size, stream()), "cudaMallocAsync");
+    } else {
+      check(cudaGetLastError(), "cudaMallocAsync");
+    }
     return data;
   }
   void release(void* data, size_t) override { cudaFreeAsync(data, stream()); }
@@ -83,6 +110,22 @@ class CudaBackend final : public Backend {
   void synchronise() override {
     check(cudaStreamSynchronize(stream()), "what was launched");
     if (const std::string fault = take_index_fault(); !fault.empty()) throw Error(fault);
+  }
+  MemoryStats memory() const override {
+    MemoryStats out;
+    out.in_use = number_of(cudaMemPoolAttrUsedMemCurrent);
+    out.peak = number_of(cudaMemPoolAttrUsedMemHigh);
+    out.kept = number_of(cudaMemPoolAttrReservedMemCurrent) - out.in_use;
+    return out;
+  }
+  void reset_peak() override {
+    uint64_t none = 0;  // the only value that it takes
+    check(cudaMemPoolSetAttribute(runtime().pool, cudaMemPoolAttrUsedMemHigh, &none),
+          "cudaMemPoolSetAttribute");
+  }
+  void trim() override {
+    check(cudaStreamSynchronize(stream()), "what was launched");  // what was freed is free then
+    check(cudaMemPoolTrimTo(runtime().pool, 0), "cudaMemPoolTrimTo");
   }
 };
 

@@ -26,11 +26,11 @@ Evaluation evaluate(const Sample& s, const Tensor& u, const std::function<bool(s
   const Var y = s.build(x);
   Evaluation e{y.value.cpu(), std::vector<Tensor>(s.inputs.size())};
   Gradients g;
-  if (y.tape != nullptr) g = tape.backward(sum_all(mul(y, Var(u.to(s.device)))));
+  if (y.on_tape()) g = tape.backward(sum_all(mul(y, Var(u.to(s.device)))));
   for (size_t k = 0; k < s.inputs.size(); ++k) {
     if (const Tensor* found = g.find(k + 1)) {
       e.gradients[k] = found->cpu();
-    } else if (x[k].tape != nullptr) {
+    } else if (x[k].on_tape()) {
       e.gradients[k] = Tensor::zeros(s.inputs[k].shape(), s.inputs[k].dtype());
     }
   }

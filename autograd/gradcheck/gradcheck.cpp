@@ -133,7 +133,7 @@ void check_bits(const Sample& s, const Tensor& u, const Evaluation& e, Findings&
   set_threads(before);
   f.require(same_bits(e, evaluate(s, u)), "other bits the next time (is every output written?)");
   const Var plain = built(s, s.inputs);
-  f.require(plain.tape == nullptr, "something was recorded without a tape");
+  f.require(!plain.on_tape(), "something was recorded without a tape");
   f.require(plain.value.device() == s.device, "the result lives on another device");
   f.require(same_bits(plain.value.cpu(), e.value), "without a tape the value differs");
 }

@@ -1,6 +1,7 @@
 #include "autograd/kernels/kernel.h"
 
 #include <algorithm>
+#include <atomic>
 #include <mutex>
 #include <set>
 #include <string>
@@ -22,6 +23,8 @@ std::vector<Backend*>& backends() {
   static std::vector<Backend*> all{&cpu_backend()};
   return all;
 }
+
+std::atomic<int> rank_on_host{0};
 
 const char* cuda_missing() {
 #ifdef RESTAGE_CUDA
@@ -63,6 +66,14 @@ Device device_of(std::string_view name) {
   throw InputError("device", "'" + std::string(name) + "' is none that this program knows",
                    "take one of: " + known);
 }
+
+int gpu_of(int local_rank, int count) { return local_rank % count; }
+void set_local_rank(int local_rank) { rank_on_host = local_rank; }
+int local_rank() { return rank_on_host; }
+
+MemoryStats memory_stats(Device device) { return backend(device).memory(); }
+void reset_peak_memory(Device device) { backend(device).reset_peak(); }
+void trim_memory(Device device) { backend(device).trim(); }
 
 bool has_fused(Device device, const char* op, std::initializer_list<std::type_index> contracts) {
   const Backend& b = backend(device);

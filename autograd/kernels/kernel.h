@@ -28,6 +28,9 @@ class Backend {
   virtual void copy_out(void* to_host, const void* from, size_t bytes) = 0;
   /// Returns when all that was launched is done. Error naming the kernel if one failed.
   virtual void synchronise() = 0;
+  virtual MemoryStats memory() const = 0;
+  virtual void reset_peak() = 0;
+  virtual void trim() = 0;  ///< gives free memory back to the system
 
   virtual bool supports(std::type_index args) const { return table_.contains(args); }
   /// Error naming both if it has no such kernel.
@@ -50,6 +53,13 @@ Backend& backend(Device device);
 Device add_device(Backend& backend);
 /// The device of this name ("cpu"); InputError listing those that are built in.
 Device device_of(std::string_view name);
+
+/// Which GPU is "cuda" for the process number `local_rank` (from 0) of those that train together on
+/// one host with `count` GPUs: one each, in turn where there are more processes than GPUs.
+int gpu_of(int local_rank, int count);
+/// Says which of them this process is. Before the first device_of("cuda"); 0 if nobody says it.
+void set_local_rank(int local_rank);
+int local_rank();
 
 /// Whether the device has kernels for all of these contracts. If not, an op takes those it is
 /// composed of, and that is logged once for each device and op: such a device is slower there.

@@ -21,8 +21,13 @@ Tensor knn(const Tensor& query, const Tensor& points, int64_t k) {
 }
 
 Tensor fps(const Tensor& points, int64_t m) {
-  if (points.rank() != 3 || points.size(2) != 3 || m < 0 || points.size(1) < 1)
-    shape_error("fps", "points[n, v, 3]", std::array{points}, "needs m >= 0 and v > 0");
+  constexpr const char* letters = "points[n, v, 3], 0 <= m <= v";
+  if (points.rank() != 3 || points.size(2) != 3 || points.size(1) < 1)
+    shape_error("fps", letters, std::array{points}, "needs points");
+  if (m < 0 || m > points.size(1))
+    shape_error(
+        "fps", letters, std::array{points},
+        "cannot choose " + std::to_string(m) + " of " + std::to_string(points.size(1)) + " points");
   Tensor out = Tensor::empty({points.size(0), m}, DType::i32, points.device());
   launch(FpsArgs{points, out});
   return out;

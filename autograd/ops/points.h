@@ -8,7 +8,8 @@ namespace restage {
 /// Indices (i32) [n, m, min(k, v)] of the nearest of points [n, v, 3] to each of query [n, m, 3],
 /// nearest first, ties to the lower index. No gradient.
 Tensor knn(const Tensor& query, const Tensor& points, int64_t k);
-/// Farthest point sampling: indices (i32) [n, m] into points [n, v, 3], m <= v. No gradient.
+/// Farthest point sampling: indices (i32) [n, m] into points [n, v, 3]. ShapeError if m > v: a
+/// point would be chosen twice. No gradient.
 Tensor fps(const Tensor& points, int64_t m);
 
 /// y [p, d] = sum over k of softmax_k(score * scale) * value, per channel; score, value [p, k, d].

@@ -91,6 +91,10 @@ Var mean_all(const Var& x) {
   return scale(sum_all(x), 1.0 / static_cast<double>(x.value.numel()));
 }
 
+Var smooth_length(const Var& x, double epsilon) {
+  return sqrt(add_scalar(sum(square(x), -1), epsilon));
+}
+
 Var mse(const Var& a, const Var& b) {
   if (!(a.shape() == b.shape()) || a.value.numel() == 0)  // broadcasting here is always a mistake
     shape_error("mse", "a[...], b[...]", std::array{a.value, b.value},

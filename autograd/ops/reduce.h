@@ -43,6 +43,9 @@ Var mean(const Var& x, int axis);
 /// Sum and mean of all elements, as a scalar of shape [1].
 Var sum_all(const Var& x);
 Var mean_all(const Var& x);
+/// Lengths of vectors along the last axis (removed): sqrt(|x|^2 + epsilon), which has a derivative
+/// where a vector is zero.
+Var smooth_length(const Var& x, double epsilon);
 /// Mean squared error over all elements of two equal shapes (spec 7).
 Var mse(const Var& a, const Var& b);
 /// Mean binary cross-entropy of logits against a constant label in [0, 1].

@@ -27,6 +27,7 @@ void Gru::check(Inputs x) const {
                      x[3].rank() == 2 && x[4].rank() == 1 && x[5].rank() == 1;
   if (!ranks) shape_error(name, letters, x, "wrong number of axes");
   const int64_t n = x[0].size(1), i = x[0].size(2), h = x[1].size(1);
+  if (h < 1) shape_error(name, letters, x, "h must be positive: there is no hidden unit");
   if (x[1].size(0) != n) shape_error(name, letters, x, "n must agree");
   if (x[2].size(1) != i) shape_error(name, letters, x, "i must agree");
   if (x[2].size(0) != 3 * h || x[3].size(0) != 3 * h || x[3].size(1) != h ||

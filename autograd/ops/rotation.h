@@ -2,6 +2,7 @@
 #pragma once
 
 #include "autograd/kernels/rotation.h"
+#include "autograd/kernels/scratch.h"
 #include "autograd/tape/tape.h"
 
 namespace restage {
@@ -32,8 +33,7 @@ struct Atan2 {
 struct ForwardKinematics {
   static constexpr const char* name = "forward_kinematics";
   static constexpr const char* letters = "R[n, j, 3, 3], rest[n, j, 3], root[n, 3]";
-  std::span<const int> parents;  ///< -1 for the root; parents come before children. Outlives the
-                                 ///< tape
+  Scratch<int> parents;  ///< -1 for the root; parents come before children
   void check(Inputs x) const;
   Tensor forward(Inputs x, Saved& saved) const;
   Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
@@ -64,7 +64,7 @@ Tensor matrix_to_axis_angle(const Tensor& r);
 inline Var atan2(const Var& y, const Var& x) { return call(Atan2{}, {y, x}); }
 inline Var forward_kinematics(const Var& local, const Var& rest, const Var& root,
                               std::span<const int> parents) {
-  return call(ForwardKinematics{parents}, {local, rest, root});
+  return call(ForwardKinematics{{parents.begin(), parents.end()}}, {local, rest, root});
 }
 /// Positions [n, j, 3] and global rotations [n, j, 3, 3] of forward_kinematics' result.
 Var joints_of(const Var& transforms);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "autograd/kernels/rotation.h"
+#include "autograd/kernels/scratch.h"
 #include "autograd/tape/tape.h"
 
 namespace restage {
@@ -12,7 +13,7 @@ namespace restage {
 struct SwingTwist {
   static constexpr const char* name = "swing_twist";
   static constexpr const char* letters = "rest[n, j, 3], posed[n, j, 3], twist[n, j]";
-  std::span<const SwingJoint> joints;  ///< parents come before children. Outlives the tape
+  Scratch<SwingJoint> joints;  ///< parents come before children
   void check(Inputs x) const;
   Tensor forward(Inputs x, Saved& saved) const;
   Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
@@ -20,7 +21,7 @@ struct SwingTwist {
 
 inline Var swing_twist(const Var& rest, const Var& posed, const Var& twist,
                        std::span<const SwingJoint> joints) {
-  return call(SwingTwist{joints}, {rest, posed, twist});
+  return call(SwingTwist{{joints.begin(), joints.end()}}, {rest, posed, twist});
 }
 
 }  // namespace restage

@@ -24,9 +24,7 @@ bool FiniteCheck::active() { return finite_checks > 0; }
 
 void require_finite(const Tensor& t, const char* op, const std::string& path, const char* pass) {
   if (!t.defined() || (t.dtype() != DType::f32 && t.dtype() != DType::f64)) return;
-  Tensor found = Tensor::empty({1}, DType::i32, t.device());
-  launch(NonFiniteArgs{t, found});
-  if (found.cpu().item() != 0)
+  if (!all_finite(t))
     throw NonFiniteError(std::string("a value became infinite or NaN in the ") + pass +
                          " pass of '" + op + "' in " + path);
 }
@@ -122,6 +120,13 @@ double Gradients::norm() const {
 
 bool Gradients::finite() const { return std::isfinite(norm()); }
 
+Tape* Var::tape() const {
+  if (link != nullptr && *link == nullptr)
+    throw Error("a value is used after the end of its tape (" + running_op() +
+                "); keep the tape, or take detach() of the value");
+  return link == nullptr ? nullptr : *link;
+}
+
 Var Tape::leaf(const Tensor& value, uint64_t id) {
   const auto [it, fresh] = leaves_.emplace(id, first_ + static_cast<int64_t>(nodes_.size()));
   if (fresh) {
@@ -130,13 +135,13 @@ Var Tape::leaf(const Tensor& value, uint64_t id) {
     nodes_.push_back(std::move(node));
   }
   Var v(value);
-  v.tape = this;
+  v.link = link_;
   v.node = it->second;
   return v;
 }
 
 void Tape::require_own(const Var& v) const {
-  if (v.tape != this) throw Error("an op was given values of two tapes");
+  if (v.tape() != this) throw Error("an op was given values of two tapes");
   if (v.node < first_)
     throw Error("a value is used after the backward pass that consumed its tape");
 }
@@ -146,11 +151,11 @@ Var Tape::record(std::unique_ptr<Function> function, std::span<const Var> inputs
   node.function = std::move(function);
   node.path = module_path();
   for (const Var& in : inputs) {
-    if (in.tape != nullptr) require_own(in);
-    node.inputs.push_back(in.tape == this ? in.node : -1);
+    if (in.on_tape()) require_own(in);
+    node.inputs.push_back(in.on_tape() ? in.node : -1);
   }
   Var v(std::move(output));
-  v.tape = this;
+  v.link = link_;
   v.node = first_ + static_cast<int64_t>(nodes_.size());
   nodes_.push_back(std::move(node));
   return v;
@@ -182,7 +187,8 @@ Grads Tape::Node::backward(const Tensor& gy) const {
 }
 
 Gradients Tape::backward(const Var& loss) {
-  if (loss.tape != this) throw Error("backward: the loss does not depend on anything of this tape");
+  if (loss.tape() != this)
+    throw Error("backward: the loss does not depend on anything of this tape");
   if (loss.value.numel() != 1)
     throw ShapeError("backward: the loss has shape " + loss.shape().str() + ", not one number");
   require_own(loss);

@@ -20,10 +20,15 @@ namespace restage {
 
 class Tape;
 
-/// A value and, if it depends on something differentiable, its place on a tape.
+/// Whether a tape is still there: the tape and all values on it share one. Null at the tape's end.
+using TapeLink = std::shared_ptr<Tape*>;
+
+/// A value and, if it depends on something differentiable, its place on a tape. A value may outlive
+/// its tape: its numbers stay readable, and to compute with it is an Error (detach() makes a
+/// constant of it).
 struct Var {
   Tensor value;
-  Tape* tape = nullptr;
+  TapeLink link;  ///< null: a constant
   int64_t node = -1;
 
   Var() = default;
@@ -32,6 +37,9 @@ struct Var {
   int64_t size(int axis) const { return value.size(axis); }
   int rank() const { return value.rank(); }
   DType dtype() const { return value.dtype(); }
+  bool on_tape() const { return link != nullptr; }
+  /// The tape of a value that is on one; null for a constant. Error if the tape is gone.
+  Tape* tape() const;
   /// The same value without history.
   Var detach() const { return Var(value); }
 };
@@ -79,6 +87,7 @@ class Saved {
 /// (generator, discriminator) cannot mix their gradients.
 class Gradients {
  public:
+  size_t size() const { return by_id_.size(); }  ///< leaves that took part
   /// Gradient of a leaf with this identity (Parameter::id), or null if it did not take part.
   const Tensor* find(uint64_t id) const;
   void set(uint64_t id, Tensor gradient) { by_id_[id] = {std::move(gradient), {}}; }
@@ -100,7 +109,8 @@ class Gradients {
 
 class Tape {
  public:
-  Tape() = default;
+  Tape() : link_(std::make_shared<Tape*>(this)) {}
+  ~Tape() { *link_ = nullptr; }
   Tape(const Tape&) = delete;
   Tape& operator=(const Tape&) = delete;
 
@@ -139,6 +149,7 @@ class Tape {
   };
   void require_own(const Var& v) const;
 
+  TapeLink link_;
   std::vector<Node> nodes_;
   int64_t first_ = 0;  // number of nodes_[0]; grows with every backward, so stale values show
   std::unordered_map<uint64_t, int64_t> leaves_;
@@ -190,16 +201,16 @@ struct Recorded final : Tape::Function {
 template <class Op>
 Var call(const Op& op, std::span<const Var> inputs) {
   if (inputs.size() > kMaxInputs) too_many_inputs(Op::name, Op::letters, inputs);
+  const OpScope running(Op::name);
   InlineVector<Tensor, kMaxInputs> values;
   InlineVector<bool, kMaxInputs> needs;
   Tape* tape = nullptr;
   for (const Var& v : inputs) {
     values.push_back(v.value);
-    needs.push_back(v.tape != nullptr);
-    if (v.tape != nullptr) tape = v.tape;
+    needs.push_back(v.on_tape());
+    if (v.on_tape()) tape = v.tape();
   }
   const Inputs in(values.data(), values.size());
-  const OpScope running(Op::name);
   require_one_device(in);
   op.check(in);
   Saved saved = tape ? Saved(in, Needs(needs.data(), needs.size())) : Saved();

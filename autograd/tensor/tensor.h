@@ -106,13 +106,18 @@ Batch moved(Batch batch, Device device) {
   return batch;
 }
 
-/// Memory of the pooled allocator, bytes.
+/// Memory of a device's tensors, bytes. A device keeps the blocks that tensors give back and hands
+/// them out again.
 struct MemoryStats {
-  int64_t in_use = 0;
-  int64_t peak = 0;
-  int64_t large_allocations = 0;  ///< blocks of 1 MiB or more taken from the system so far
+  int64_t in_use = 0;             ///< by tensors
+  int64_t peak = 0;               ///< the most that was in use since reset_peak_memory()
+  int64_t kept = 0;               ///< free blocks that the device keeps
+  int64_t large_allocations = 0;  ///< host: blocks of 1 MiB or more taken from the system so far
 };
-MemoryStats memory_stats();
-void reset_peak_memory();
+MemoryStats memory_stats(Device device = {});
+void reset_peak_memory(Device device = {});
+/// Gives the free blocks that a device keeps back to the system. The device does so by itself
+/// before it says that there is no more memory.
+void trim_memory(Device device = {});
 
 }  // namespace restage

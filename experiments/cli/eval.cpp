@@ -148,7 +148,7 @@ Json to_json(const SystemEvaluation& scores, const EvaluationOptions& options) {
 int run_eval_run(const EvalOptions& options, const Common& common) {
   const std::string folder = options.run.substr(4);
   TrainConfig config;
-  load_config(run_config_path(folder), {}, config);
+  read_config(of_this_version(load_config_tree(run_config_path(folder))), config);
   const std::string weights_name = weights_path(folder);
   for (const std::string& file : result_files(options.out))
     check_output(file, {run_config_path(folder), weights_name, config.data.source});

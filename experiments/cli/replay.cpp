@@ -19,7 +19,7 @@ bool same(const NamedTensors& a, const NamedTensors& b) {
 int run_replay(const std::string& path, const Common& common) {
   const Failure failure = read_failure(path);
   TrainConfig config;
-  read_config(parse_yaml(failure.config_yaml, path), config);
+  read_config(of_this_version(parse_yaml(failure.config_yaml, path)), config);
   const TrainingData data(config.data);
   Bundle given = failure.given;
   const auto stage = make_stage(config, failure.stage, data, &given);

@@ -82,8 +82,10 @@ Request read_request(const TrainArguments& arguments, const Common& common) {
 
 TrainConfig configured(const Request& request) {
   TrainConfig config;
-  load_config(request.resume.empty() ? request.config : run_config_path(request.resume),
-              request.overrides, config);
+  if (request.resume.empty())
+    load_config(request.config, request.overrides, config);
+  else
+    read_config(of_this_version(load_config_tree(run_config_path(request.resume))), config);
   if (config.stages.empty())
     throw InputError(request.config, "names no stages, so there is nothing to train",
                      "use it in a sweep, or name stages");
@@ -106,11 +108,7 @@ TrainConfig shortened(Request request, const TrainConfig& whole) {
 /// For the first lines of a run; nothing for float32.
 std::string products_in(const TrainConfig& config) {
   if (config.precision == MatmulPrecision::float32) return "";
-  const std::string where = config.device != "cpu" ? "on " + config.device
-                            : matrix_unit()        ? "by the matrix unit (AMX)"
-                                                   : "by float32 vectors";
-  const char* name = config.precision == MatmulPrecision::tf32 ? "tf32 " : "bfloat16 ";
-  return std::string("; products in ") + name + where;
+  return "; products in tf32 on " + config.device;
 }
 
 RunInput provenance_of(const TrainConfig& config, const TrainingData& data, const Common& common) {
@@ -241,6 +239,7 @@ int train_with(Team& team, const TrainArguments& arguments, const Common& common
 
 int run_train(const TrainArguments& arguments, const Common& common) {
   Team& team = team_of_processes();
+  set_local_rank(team.local_rank());
   if (team.size() == 1) return train_with(team, arguments, common);
   if (team.rank() > 0) set_log_level(LogLevel::warning);
   // One that fails by itself would leave the others waiting for it.

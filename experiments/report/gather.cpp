@@ -133,7 +133,7 @@ std::optional<Measured> prepared(const std::string& folder, uint64_t seed, std::
   }
   try {
     TrainConfig config;
-    load_config(in(folder, "config.yaml"), {}, config);
+    read_config(of_this_version(load_config_tree(in(folder, "config.yaml"))), config);
     Measured out{load_bundle(folder), load_corpus(config.data, "test"), {}, {}, {}};
     out.how = evaluation_options(config, out.test, seed);
     out.names = sequence_names(out.how.sequences, out.test);
@@ -269,7 +269,7 @@ Bundle weights_of(const std::string& dir, const std::string& id) {
   const sweep::TrialEntry& trial = sweep.trial(id);
   const fs::path home = fs::path(dir) / sweep.directory;
   TrainConfig config;
-  load_config(in(sweep.folder(id), "config.yaml"), {}, config);
+  read_config(of_this_version(load_config_tree(in(sweep.folder(id), "config.yaml"))), config);
   Bundle out;
   for (const std::string& stage : config.stages) {
     const auto made = std::find_if(trial.artifacts.begin(), trial.artifacts.end(),

@@ -213,7 +213,7 @@ bool artifact_there(const std::string& store, const std::string& stage, const st
 TrialOutcome run_trial(const std::string& config_yaml_path, const std::string& id,
                        const Evaluate& evaluate, const std::string& store,
                        const TrainOptions& options, const std::string& last_stage) {
-  const ConfigNode tree = load_config_tree(config_yaml_path);
+  const ConfigNode tree = of_this_version(load_config_tree(config_yaml_path));
   const TrainConfig config = read(tree);
   const PlannedTrial planned = TrialPlanner(evaluate, store).plan(tree);
   if (planned.id != id)
@@ -236,7 +236,7 @@ TrialOutcome run_trial(const std::string& config_yaml_path, const std::string& i
 
 std::optional<Prediction> perform(const std::string& config_yaml_path, const std::string& store,
                                   const std::string& sequence_folder) {
-  const TrainConfig config = read(load_config_tree(config_yaml_path));
+  const TrainConfig config = read(of_this_version(load_config_tree(config_yaml_path)));
   Identities identities;
   for (const StageId& stage : identities.stages(config))
     if (!Store(store).has(stage)) return std::nullopt;

@@ -8,10 +8,11 @@
 //
 // Reading, the resolved YAML and the key reference all follow from it. Values may be bool, int,
 // int64_t, uint64_t, float, double, std::string, enums with a config_names(), structs with a
-// visit(), and std::optional (YAML: null or none) and std::vector of these. A visit may look at
-// values that it has read already, to decide which keys follow.
+// visit(), and std::optional (YAML: null or none), std::vector and std::array of these. A visit may
+// look at values that it has read already, to decide which keys follow.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -35,6 +36,12 @@ template <class T>
 struct ListOf : std::false_type {};
 template <class T>
 struct ListOf<std::vector<T>> : std::true_type {};
+template <class T>
+struct FixedListOf : std::false_type {};
+template <class T, size_t N>
+struct FixedListOf<std::array<T, N>> : std::true_type {};
+template <class T>
+inline constexpr bool is_list = ListOf<T>::value || FixedListOf<T>::value;
 template <class T>
 inline constexpr bool is_leaf = std::is_arithmetic_v<T> || std::is_same_v<T, std::string>;
 
@@ -114,6 +121,11 @@ class ConfigReader {
         if (!value) value.emplace();
         read(node, path, rule, *value);
       }
+    } else if constexpr (d::FixedListOf<T>::value) {
+      if (node.kind != ConfigNode::Kind::list || node.children.size() != value.size())
+        d::fail_type(node, path, "a list of " + std::to_string(value.size()) + " values");
+      for (size_t i = 0; i < value.size(); ++i)
+        read(node.children[i], path + "." + std::to_string(i), rule, value[i]);
     } else if constexpr (d::ListOf<T>::value) {
       if (node.kind != ConfigNode::Kind::list) d::fail_type(node, path, "a list such as [a, b]");
       value.clear();
@@ -145,16 +157,22 @@ void read_config(const ConfigNode& tree, C& config, const std::string& path = ""
 /// Visitor that makes the tree of a struct's values.
 class ConfigWriter {
  public:
+  /// `identity`: leaves out keys that have the value that was fixed before they were added.
+  explicit ConfigWriter(bool identity = false) : identity_(identity) {}
+
   template <class T>
-  void operator()(const std::string& key, T& value, const std::string& /*doc*/, const Rule& = {}) {
-    ConfigNode node = write(value);
+  void operator()(const std::string& key, T& value, const std::string& /*doc*/,
+                  const Rule& rule = {}) {
+    ConfigNode node = write(value, identity_);
+    if (identity_ && !rule.fixed_before.empty() && config_to_yaml(node) == rule.fixed_before + "\n")
+      return;
     node.key = key;
     map.children.push_back(std::move(node));
   }
   void check(const std::string&, bool, const std::string&, const std::string&) const {}
 
   template <class T>
-  static ConfigNode write(T& value) {
+  static ConfigNode write(T& value, bool identity = false) {
     namespace d = config_detail;
     if constexpr (d::is_leaf<T>) {
       return d::write_leaf(value);
@@ -163,14 +181,14 @@ class ConfigWriter {
         if (entry.second == value) return d::write_leaf(entry.first);
       return {};
     } else if constexpr (d::Wrapped<T>::value) {
-      return value ? write(*value) : ConfigNode{};
-    } else if constexpr (d::ListOf<T>::value) {
+      return value ? write(*value, identity) : ConfigNode{};
+    } else if constexpr (d::is_list<T>) {
       ConfigNode list;
       list.kind = ConfigNode::Kind::list;
-      for (typename T::value_type item : value) list.children.push_back(write(item));
+      for (typename T::value_type item : value) list.children.push_back(write(item, identity));
       return list;
     } else {
-      ConfigWriter inner;
+      ConfigWriter inner(identity);
       visit(inner, value);
       return std::move(inner.map);
     }
@@ -182,12 +200,23 @@ class ConfigWriter {
                  .place = {},
                  .text = {},
                  .children = {}};
+
+ private:
+  bool identity_;
 };
 
 template <class C>
 ConfigNode write_config(const C& config) {
   C copy = config;
   return ConfigWriter::write(copy);
+}
+
+/// What identifies a struct's values: the same tree without the keys that were added later and have
+/// the value that was fixed before (added()).
+template <class C>
+ConfigNode write_identity(const C& config) {
+  C copy = config;
+  return ConfigWriter::write(copy, true);
 }
 
 /// Visitor that lists a struct's keys for the documentation.
@@ -216,7 +245,7 @@ class ConfigReference {
       add(key, wrap + without_article(d::leaf_type(value, rule)), shown, doc);
     } else if constexpr (std::is_enum_v<T>) {
       add(key, wrap + d::leaf_type(std::string(), d::enum_rule<T>()), shown, doc);
-    } else if constexpr (d::Wrapped<T>::value || d::ListOf<T>::value) {
+    } else if constexpr (d::Wrapped<T>::value || d::is_list<T>) {
       typename T::value_type inner{};
       if constexpr (d::Wrapped<T>::value)
         if (value) inner = *value;

@@ -17,6 +17,9 @@ struct Rule {
   bool low_open = false, high_open = false;  ///< the bound itself is not allowed
   std::vector<std::string> choices;          ///< allowed texts (empty: all)
   bool required = false;                     ///< the key must be given
+  /// Of a key that was added later: the value that was fixed before, as YAML. An identity leaves
+  /// the key out where it has that value, so ids stay what they were (write_identity()).
+  std::string fixed_before = "";
 };
 inline Rule above(double low) { return {.low = low, .low_open = true, .choices = {}}; }
 inline Rule at_least(double low) { return {.low = low, .choices = {}}; }
@@ -29,6 +32,12 @@ inline Rule below(double low, double high) {
 inline Rule one_of(std::vector<std::string> choices) { return {.choices = std::move(choices)}; }
 inline Rule required(Rule rule = {}) {
   rule.required = true;
+  return rule;
+}
+
+/// A key that was added when all that had been trained had the value `fixed_before`.
+inline Rule added(std::string fixed_before, Rule rule = {}) {
+  rule.fixed_before = std::move(fixed_before);
   return rule;
 }
 

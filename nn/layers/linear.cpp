@@ -44,15 +44,23 @@ Conv1d::Conv1d(int64_t in, int64_t out, int64_t k, const Init& init) {
 
 Var Conv1d::same(Context& ctx, const Var& x, int64_t stride) const {
   const ModuleScope path(scope);
-  const int64_t l = x.size(1), k = weight.value.size(2), steps = (l + stride - 1) / stride;
+  const int64_t l = x.size(1), k = weight.value.size(2);
+  if (stride < 1)
+    shape_error("conv1d", "x[n, l, c], W[o, c, k], b[o]",
+                std::array{x.value, weight.value, bias.value}, "the stride must be positive");
+  const int64_t steps = (l + stride - 1) / stride;
   const int64_t pad = std::max<int64_t>((steps - 1) * stride + k - l, 0);
   return conv1d(x, ctx.bind(weight), ctx.bind(bias), stride, pad / 2, steps);
 }
 
 Var Conv1d::valid(Context& ctx, const Var& x, int64_t stride) const {
   const ModuleScope path(scope);
-  const int64_t steps = std::max<int64_t>(0, (x.size(1) - weight.value.size(2)) / stride + 1);
-  return conv1d(x, ctx.bind(weight), ctx.bind(bias), stride, 0, steps);
+  const int64_t l = x.size(1), k = weight.value.size(2);
+  if (l < k || stride < 1)
+    shape_error("conv1d", "x[n, l, c], W[o, c, k], b[o]",
+                std::array{x.value, weight.value, bias.value},
+                stride < 1 ? "the stride must be positive" : "l is shorter than k");
+  return conv1d(x, ctx.bind(weight), ctx.bind(bias), stride, 0, (l - k) / stride + 1);
 }
 
 void Conv1d::visit(Fields& f) {

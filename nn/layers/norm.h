@@ -16,6 +16,7 @@ struct BatchNormLayer : Module {
   Var pooled(Context& ctx, const Linear& map, const Var& x, Activation activation);
   void visit(Fields& f) override;
   const char* kind() const override { return "BatchNorm"; }
+  bool changes_buffers() const override { return true; }
   Parameter weight, bias;
   Tensor running_mean, running_var;
   double eps = 1e-5, momentum = 0.1;

@@ -8,7 +8,8 @@
 namespace restage {
 namespace {
 
-constexpr double kNearest = 8;  // how much the nearest bone is preferred at the start
+constexpr double kNearest = 8;     // how much the nearest bone is preferred at the start
+constexpr double kSmooth = 1e-12;  // of lengths, square metres
 
 /// Of the bone that leads to a leaf, how much follows behind it: skull, hand, toes.
 double behind_leaf(int joint) {
@@ -34,9 +35,6 @@ Tensor bone_matrix(DType type) {
   return Tensor::from<double>({kJoints, kJoints}, m).cast(type);
 }
 
-/// Of vectors along the last axis, which goes.
-Var lengths(const Var& x) { return sqrt(add_scalar(sum(square(x), -1), 1e-12)); }
-
 }  // namespace
 
 Var bones_of(const Var& rest) {
@@ -50,10 +48,10 @@ Var bone_distances(const Var& points, const Var& joints, const Var& bones) {
   const int64_t n = points.size(0), v = points.size(1);
   const Var way = reshape(joint_differences(points, joints), {n, v, kJoints, 3});
   const Var along = reshape(bones, {n, 1, kJoints, 3});
-  const Var length2 = add_scalar(reshape(sum(square(bones), -1), {n, 1, kJoints}), 1e-12);
+  const Var length2 = add_scalar(reshape(sum(square(bones), -1), {n, 1, kJoints}), kSmooth);
   const Var share = sum(way * along, -1) / length2;
   const Var inside = relu(share) - relu(add_scalar(share, -1));  // 0 to 1: on the bone
-  return lengths(way - reshape(inside, {n, v, kJoints, 1}) * along);
+  return smooth_length(way - reshape(inside, {n, v, kJoints, 1}) * along, kSmooth);
 }
 
 BoneField::BoneField(const MlpConfig& c, const Init& init)
@@ -63,7 +61,7 @@ Var BoneField::weights(Context& ctx, const Var& rest, const Var& points) const {
   const ModuleScope path(scope);
   const int64_t n = points.size(0);
   const Var bones = bones_of(rest);
-  const Var size = reshape(mean(lengths(bones), 1), {n, 1, 1});
+  const Var size = reshape(mean(smooth_length(bones, kSmooth), 1), {n, 1, 1});
   const Var distances = bone_distances(points, rest, bones) / size;
   const Var x = concat({joint_differences(points, rest) / size, distances}, 2);
   return softmax(net(ctx, x) - scale(distances, kNearest));

@@ -77,7 +77,8 @@ struct OffsetNet final : Mlp3 {
 };
 
 /// The third MLP that the paper's count implies (spec 5.4, H1): rest joints relative to the pelvis
-/// (66) -> rest pelvis minus the centroid of the rest points; the role `deformation.root`.
+/// (66) -> rest pelvis minus the centroid of the rest points; the role `deformation.root`. Nothing
+/// trains or uses it: it is there for the count, and for weights that are imported.
 struct RootNet final : Mlp3 {
   using Config = MlpConfig;
   RootNet(const MlpConfig& c, const Init& init) : Mlp3(3 * kJoints, 3, c, false, init) {}

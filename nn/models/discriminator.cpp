@@ -5,6 +5,11 @@
 #include "autograd/ops/reduce.h"
 
 namespace restage {
+namespace {
+
+constexpr int64_t kNknSteps = 59;  // between 60 frames; the last layer then gives one number
+
+}  // namespace
 
 Discriminator::Discriminator(const DiscriminatorConfig& c, const Init& init)
     : config(c), out(c.widths[3] + c.condition, 1, 4, init.sub("out")) {
@@ -19,6 +24,9 @@ Discriminator::Discriminator(const DiscriminatorConfig& c, const Init& init)
 Var Discriminator::operator()(Context& ctx, const Var& x, const Var& condition) {
   const ModuleScope path(scope);
   const int64_t n = x.size(0);
+  if (config.nkn_head && x.size(1) != kNknSteps)
+    shape_error("discriminator", "x[n, t - 1, in], condition[n, b]",
+                std::array{x.value, condition.value}, "with nkn_head t is 60 frames");
   Var h = leaky_relu(convs[0].same(ctx, x, 2), 0.2);
   for (size_t i = 1; i < convs.size(); ++i) {
     h = leaky_relu(bns[i - 1](ctx, convs[i].same(ctx, h, 2)), 0.2);
@@ -26,7 +34,7 @@ Var Discriminator::operator()(Context& ctx, const Var& x, const Var& condition) 
                           {n, h.size(1), condition.size(1)})},
                2);
   }
-  if (config.nkn_head) return reshape(slice(out.valid(ctx, h, 2), 1, 0, 1), {n});
+  if (config.nkn_head) return reshape(out.valid(ctx, h, 2), {n});
   return reshape(mean(out.same(ctx, h, 1), 1), {n});
 }
 

@@ -19,6 +19,8 @@ struct DiscriminatorConfig {
 template <class V>
 void visit(V& v, DiscriminatorConfig& c) {
   v("nkn_head", c.nkn_head, "NKN's last layer, for windows of exactly 60 frames");
+  v("widths", c.widths, "channels of the convolutions",
+    added("[32, 64, 128, 256]", between(1, kMostWidth)));
 }
 
 struct Discriminator : Module {

@@ -41,6 +41,7 @@ void visit(V& v, HybridConfig& c) {
   v("orientation", c.orientation, "sees the rotations that the extractor reads from the surface");
   v("uncertainty", c.uncertainty, "sees how far the extractor's joints may be off");
   v("contact", c.contact, "also says which feet stand");
+  v("layers", c.layers, "of the encoder and of the decoder", added("2", between(1, 16)));
 }
 
 /// The state is {encoder, decoder}, both [layers, n, hidden], the filter's three, [n, 121], and the

@@ -16,7 +16,7 @@ struct PatchTransformerConfig {
           heads = 4;
   bool orientation = false, uncertainty = false, memory = false;
   int64_t looks = 1;
-  // Bring offsets and positions to order one.
+  // What brings offsets and positions in metres to order one.
   double patch_scale = 10, centre_scale = 2, memory_scale = 4;
 };
 
@@ -29,10 +29,21 @@ void visit(V& v, PatchTransformerConfig& c) {
   v("neighbours", c.neighbours, "points of a patch", between(1, kMostPoints));
   v("orientation", c.orientation, "also the rotation of each joint");
   v("uncertainty", c.uncertainty, "also how far each joint may be off");
+  v("patch", c.patch, "channels of a point of a patch", added("64", between(1, kMostWidth)));
+  v("heads", c.heads, "of the attention; they share the channels of a token",
+    added("4", between(1, kMostWidth)));
+  v("patch_scale", c.patch_scale, "of a point's place in its patch, per metre",
+    added("10", positive()));
+  v("centre_scale", c.centre_scale, "of a patch's place in the cloud, per metre",
+    added("2", positive()));
+  v("memory_scale", c.memory_scale, "of where a joint was, seen from a patch, per metre",
+    added("4", positive()));
   v("memory", c.memory, "also reads where the joints were a frame before");
   v("looks", c.looks, "how often it looks: after the first time around each joint", between(1, 4));
   v.check("width", c.width % c.heads == 0, "does not fit the heads",
           "give a multiple of " + std::to_string(c.heads));
+  v.check("centres", c.centres <= c.points, "are more than the points",
+          "give at most " + std::to_string(c.points));
 }
 
 struct PatchTransformer : SkeletonModel {

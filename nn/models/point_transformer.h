@@ -19,6 +19,10 @@ void visit(V& v, PointTransformerConfig& c) {
   v("layers", c.blocks, "blocks; each takes a quarter of the points and doubles the channels",
     between(0, 8));
   v("neighbours", c.neighbours, "neighbours of a point", between(1, kMostPoints));
+  v("base", c.base, "channels of a point before the first block",
+    added("32", between(1, kMostWidth)));
+  v("head1", c.head1, "channels of the head's first layer", added("256", between(1, kMostWidth)));
+  v("head2", c.head2, "channels of the head's second layer", added("64", between(1, kMostWidth)));
   v.check("layers", (c.points >> (2 * c.blocks)) > 0, "leave no points",
           "give fewer layers or more points");
 }

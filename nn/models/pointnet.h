@@ -25,6 +25,8 @@ void visit(V& v, PointNetConfig& c) {
   v("dropout", c.dropout, "dropout rate", below(0, 1));
   v("feature_transform", c.feature_transform, "the 64x64 T-net of the first version's table");
   v("relu3", c.relu3, "ReLU before the maximum");
+  v("widths", c.widths, "channels of the three convolutions and the head's two layers",
+    added("[64, 128, 1024, 512, 256]", between(1, kMostWidth)));
 }
 
 /// T-net: a k x k matrix per cloud, identity added.

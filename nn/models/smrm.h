@@ -25,6 +25,7 @@ void visit(V& v, SmrmConfig& c) {
   v("dropout", c.dropout, "between the layers", below(0, 1));
   v("standardise", c.standardise, "inputs in units of the training set's deviation");
   v("rest_pose_start", c.rest_pose_start, "first output near the rest pose");
+  v("layers", c.layers, "of the encoder and of the decoder", added("2", between(1, 16)));
 }
 
 /// The state is {encoder, decoder}, both [layers, n, hidden].

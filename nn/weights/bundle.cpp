@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
 #include <nlohmann/json.hpp>
 
 #include "autograd/base/nearest.h"
@@ -25,14 +26,23 @@ std::string role_of(const std::string& place) { return place == "smrm" ? "motion
 
 // ---- sizes as JSON -----------------------------------------------------------------------------
 
-Json to_json(const AnyConfig& config) {
-  Json out = Json::object();
-  for (const ConfigNode& entry : write_config(config).children) {
-    const Json number = entry.quoted ? Json() : Json::parse(entry.text, nullptr, false);
-    out[entry.key] = number.is_null() || number.is_discarded() ? Json(entry.text) : number;
+Json value_of(const ConfigNode& node) {
+  if (node.kind == ConfigNode::Kind::list) {
+    Json out = Json::array();
+    for (const ConfigNode& item : node.children) out.push_back(value_of(item));
+    return out;
   }
+  const Json number = node.quoted ? Json() : Json::parse(node.text, nullptr, false);
+  return number.is_null() || number.is_discarded() ? Json(node.text) : number;
+}
+
+Json sizes_json(const ConfigNode& sizes) {
+  Json out = Json::object();
+  for (const ConfigNode& entry : sizes.children) out[entry.key] = value_of(entry);
   return out;
 }
+
+Json to_json(const AnyConfig& config) { return sizes_json(write_config(config)); }
 
 ConfigNode node_of(const Json& json, const std::string& where) {
   ConfigNode node;
@@ -204,16 +214,28 @@ Bundle Bundle::only(const std::vector<std::string>& roles) const {
   return out;
 }
 
-TensorFile to_file(const Bundle& bundle) {
+namespace {
+
+/// A bundle's file, with the sizes of each model as `sizes` gives them.
+TensorFile file_of(const Bundle& bundle, const std::function<ConfigNode(const AnyConfig&)>& sizes) {
   TensorFile out;
   Json json = {{"format", 1}, {"models", Json::object()}};
   for (const auto& [role, model] : bundle) {
     append(&out, *model.net, prefix_of(role));
-    json["models"][place_of(role)] = {
-        {"model", model.model}, {"sizes", to_json(model.config)}, {"settings", model.settings}};
+    json["models"][place_of(role)] = {{"model", model.model},
+                                      {"sizes", sizes_json(sizes(model.config))},
+                                      {"settings", model.settings}};
   }
   out.metadata[kKey] = json.dump();
   return out;
+}
+
+}  // namespace
+
+TensorFile to_file(const Bundle& bundle) { return file_of(bundle, write_config<AnyConfig>); }
+
+std::string identity_bytes(const Bundle& bundle) {
+  return safetensors_bytes(file_of(bundle, write_identity<AnyConfig>));
 }
 
 void save_bundle(const std::string& path, const Bundle& bundle) {

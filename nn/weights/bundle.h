@@ -77,6 +77,9 @@ void move_networks(const Bundle& bundle, const std::vector<std::string>& roles, 
 std::string prefix_of(const std::string& role);
 
 TensorFile to_file(const Bundle& bundle);
+/// What identifies the networks of a bundle: the bytes of its file, with sizes as write_identity()
+/// gives them.
+std::string identity_bytes(const Bundle& bundle);
 void save_bundle(const std::string& path, const Bundle& bundle);
 
 /// All models of a file, in float32. InputError naming `where` if a model is unknown, its sizes are

@@ -3,10 +3,10 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 
 #include "autograd/base/atomic_file.h"
+#include "autograd/kernels/elementwise.h"
 
 namespace restage {
 namespace {
@@ -20,21 +20,13 @@ bool ignored(const std::string& name) {
          name.compare(name.size() - ending.size(), ending.size(), ending) == 0;
 }
 
-template <class T>
-bool all_finite(const Tensor& t) {
-  const T* p = t.data<T>();
-  return std::all_of(p, p + t.numel(), [](T v) { return std::isfinite(v); });
-}
-
 /// What keeps `found` from becoming `wanted`; empty if nothing does.
 std::string misfit(const Tensor& found, const Tensor& wanted) {
   if (!(found.shape() == wanted.shape()))
     return found.shape().str() + " instead of " + wanted.shape().str();
   if (found.dtype() != DType::f32 && found.dtype() != DType::f64)
     return std::string("holds ") + name_of(found.dtype());
-  const bool finite =
-      found.dtype() == DType::f32 ? all_finite<float>(found) : all_finite<double>(found);
-  return finite ? "" : "holds NaN or infinity";
+  return all_finite(found) ? "" : "holds NaN or infinity";
 }
 
 /// "3 missing ('a', 'b', ...)"; at most `most` names, so that all fits into one line.

@@ -125,11 +125,9 @@ INSTANTIATE_TEST_SUITE_P(All, DeviceOps, testing::Range(size_t{0}, all_samples()
                          [](const auto& param) { return all_samples()[param.param].op; });
 
 TEST(Device, TheGpuRoundsWhatItMultipliesAsItIsTold) {
-  // 1 + 2^-9 has more bits than bfloat16 keeps, 1 + 2^-12 more than tf32 does.
-  for (const auto& [precision, lost] :
-       std::map<MatmulPrecision, double>{{MatmulPrecision::float32, 0},
-                                         {MatmulPrecision::tf32, 1 / 4096.},
-                                         {MatmulPrecision::bfloat16, 1 / 512. + 1 / 4096.}}) {
+  // 1 + 2^-12 has more bits than tf32 keeps.
+  for (const auto& [precision, lost] : std::map<MatmulPrecision, double>{
+           {MatmulPrecision::float32, 0}, {MatmulPrecision::tf32, 1 / 4096.}}) {
     const MatmulPrecisionScope scope(precision);
     Tensor x = Tensor::zeros({1, 32}), w = Tensor::zeros({1, 32});
     x.data<float>()[0] = static_cast<float>(1 + 1 / 512. + 1 / 4096.);
@@ -173,26 +171,18 @@ std::pair<std::vector<Tensor>, Tensor> attention_inputs(int64_t n, int64_t v, in
 TEST(Device, TheGpusAttentionRoundsItsProductsAsItIsTold) {
   const auto [x, index] = attention_inputs(1, 20, 4, 32, DType::f32);
   const auto exact = attended(emulated_gpu(), x, index);
-  std::vector<double> off;
-  for (const MatmulPrecision precision : {MatmulPrecision::tf32, MatmulPrecision::bfloat16}) {
-    const MatmulPrecisionScope scope(precision);
-    const auto rounded = attended(emulated_gpu(), x, index);
-    for (size_t t = 0; t < exact.size(); ++t) {
-      double difference = 0, size = 0;
-      for (int64_t i = 0; i < exact[t].numel(); ++i) {
-        difference += std::pow(rounded[t].item(i) - exact[t].item(i), 2);
-        size += std::pow(exact[t].item(i), 2);
-      }
-      off.push_back(size > 0 ? std::sqrt(difference / size) : 0);
-    }
-  }
-  // Of the value, then of each gradient; that of the last input is zero.
+  const MatmulPrecisionScope scope(MatmulPrecision::tf32);
+  const auto rounded = attended(emulated_gpu(), x, index);
+  // The value, then each gradient but that of the last input, which is zero.
   for (size_t t = 0; t + 1 < exact.size(); ++t) {
-    const double tf32 = off[t], bfloat16 = off[exact.size() + t];
-    EXPECT_GT(tf32, 1e-5) << t;
-    EXPECT_LT(tf32, 1e-2) << t;
-    EXPECT_GT(bfloat16, 2 * tf32) << t;
-    EXPECT_LT(bfloat16, 0.5) << t;
+    double difference = 0, size = 0;
+    for (int64_t i = 0; i < exact[t].numel(); ++i) {
+      difference += std::pow(rounded[t].item(i) - exact[t].item(i), 2);
+      size += std::pow(exact[t].item(i), 2);
+    }
+    const double off = std::sqrt(difference / size);
+    EXPECT_GT(off, 1e-5) << t;
+    EXPECT_LT(off, 1e-2) << t;
   }
 }
 

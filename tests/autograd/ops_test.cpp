@@ -5,13 +5,18 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <ctime>
 #include <limits>
 
 #include "autograd/gradcheck/evaluate.h"
+#include "autograd/kernels/reduce.h"
+#include "autograd/ops/elementwise.h"
 #include "autograd/ops/linear.h"
 #include "autograd/ops/points.h"
 #include "autograd/ops/reduce.h"
+#include "autograd/ops/rnn.h"
 #include "autograd/ops/rotation.h"
+#include "tests/support/errors.h"
 #include "tests/support/expect_near.h"
 #include "tests/support/use_set.h"
 
@@ -197,6 +202,17 @@ TEST(Neighbours, SurviveNaNAndRefuseNonsense) {
   EXPECT_THROW(fps(random({4, 3}, 1), 2), ShapeError);
   EXPECT_THROW(fps(random({1, 0, 3}, 1), 1), ShapeError);
   EXPECT_EQ(fps(points, 0).numel(), 0);
+  EXPECT_EQ(fps(points, 40).numel(), 40);
+  test::expect_error<ShapeError>([&] { fps(points, 41); },
+                                 {"fps", "cannot choose 41 of 40 points"});
+  EXPECT_THROW(fps(points, -1), ShapeError);
+}
+
+TEST(Recurrence, RefusesAStateWithoutUnits) {
+  const Var x(random({3, 2, 4}, 1)), h0(random({2, 0}, 2)), w_ih(random({0, 4}, 3)),
+      w_hh(random({0, 0}, 4)), bias(random({0}, 5));
+  test::expect_error<ShapeError>([&] { gru(x, h0, w_ih, w_hh, bias, bias); },
+                                 {"gru", "h must be positive"});
 }
 
 /// Runs f with 1, 2, 3 and 7 threads and compares the bits.
@@ -218,6 +234,59 @@ TEST(Threads, SumsOfManyNumbersHaveTheSameBits) {
   const Tensor index = knn(random({1, 900, 3}, 3), random({1, 50, 3}, 4), 5).reshape({1, 4500});
   const Tensor rows = random({1, 4500, 70}, 5).cast(DType::f32);
   expect_same_for_all_threads([&] { return scatter_add(Var(rows), index, 50).value; });
+}
+
+TEST(Threads, AFewLongRowsAreSharedByColumn) {
+  // [16, 3.5 million] over axis 0 was the work of one thread: all of it was one piece.
+  for (const auto& [n, inner] : {std::pair<int64_t, int64_t>{16, 100003}, {1500, 3001}, {1, 70001}})
+    for (const DType type : {DType::f32, DType::f64}) {
+      const Var x(random({n, inner}, 1).cast(type)), g(random({n, inner}, 2).cast(type));
+      expect_same_for_all_threads([&] { return sum(x, 0).value; });
+      expect_same_for_all_threads([&] { return max(x, 0).value; });
+      expect_same_for_all_threads([&] { return softmax(x, 0).value; });
+      for (const bool of_max : {true, false})
+        expect_same_for_all_threads([&] {
+          Tape tape;
+          const Var leaf = tape.leaf(x.value, 1);
+          const Var y = of_max ? mul(max(leaf, 0), Var(g.value.rows(0, 1).reshape({inner})))
+                               : mul(softmax(leaf, 0), g);
+          return *tape.backward(sum_all(y)).find(1);
+        });
+    }
+}
+
+/// Whether other threads than this one do a share of what f does: so much of the processor's time,
+/// after as many calls as that takes.
+template <class F>
+bool is_shared(F&& f) {
+  const auto seconds = [](clockid_t clock) {
+    timespec t;
+    ::clock_gettime(clock, &t);
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+  };
+  const testing::UseThreads use(2);
+  const double all = seconds(CLOCK_PROCESS_CPUTIME_ID), own = seconds(CLOCK_THREAD_CPUTIME_ID);
+  for (int i = 0; i < 200; ++i) {
+    f();
+    const double mine = seconds(CLOCK_THREAD_CPUTIME_ID) - own,
+                 total = seconds(CLOCK_PROCESS_CPUTIME_ID) - all;
+    if (i > 3 && total - mine > 0.2 * total) return true;
+  }
+  return false;
+}
+
+TEST(Threads, ShareAFewLongRows) {
+  const int64_t n = 16, inner = 300000;
+  const Tensor x = Tensor::full({n, inner}, 1.5);
+  Tensor row = Tensor::empty({inner}), all = Tensor::empty({n, inner}),
+         index = Tensor::zeros({inner}, DType::i32);
+  EXPECT_TRUE(is_shared([&] { launch(SumArgs{x, row, 1, n, inner}); })) << "sum";
+  EXPECT_TRUE(is_shared([&] { launch(MaxArgs{x, row, index, 1, n, inner}); })) << "max";
+  EXPECT_TRUE(is_shared([&] { launch(MaxGradArgs{row, index, all, 1, n, inner}); })) << "max, back";
+  EXPECT_TRUE(is_shared([&] { launch(SoftmaxArgs{x, all, 1, n, inner}); })) << "softmax";
+  EXPECT_TRUE(is_shared([&] {
+    launch(SoftmaxGradArgs{x, x, all, 1, n, inner});
+  })) << "its gradient";
 }
 
 TEST(Threads, SumsAreAccurate) {

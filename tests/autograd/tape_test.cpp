@@ -11,6 +11,8 @@
 #include "autograd/ops/layout.h"
 #include "autograd/ops/linear.h"
 #include "autograd/ops/reduce.h"
+#include "autograd/ops/rotation.h"
+#include "autograd/ops/swing.h"
 #include "tests/support/errors.h"
 
 namespace restage {
@@ -24,7 +26,7 @@ Tensor values(const std::vector<double>& v) {
 
 TEST(Tape, RecordsOnlyWhatDependsOnALeaf) {
   const Var a(values({1, 2})), b(values({3, 4}));
-  EXPECT_EQ((a + b).tape, nullptr);
+  EXPECT_FALSE((a + b).on_tape());
   Tape tape;
   EXPECT_EQ(tape.size(), 0u);
   const Var x = tape.leaf(values({5, 6}), 1);
@@ -33,7 +35,7 @@ TEST(Tape, RecordsOnlyWhatDependsOnALeaf) {
   EXPECT_EQ(tape.size(), 1u);
   const Var y = x * constant;
   EXPECT_EQ(tape.size(), 2u);
-  EXPECT_EQ((y.detach() * a).tape, nullptr);
+  EXPECT_FALSE((y.detach() * a).on_tape());
   EXPECT_EQ(tape.size(), 2u);
 }
 
@@ -128,6 +130,57 @@ TEST(Tape, RefusesStaleValues) {
   const Var fresh = tape.leaf(values({3}), 1);
   expect_error<Error>([&] { fresh + x; }, {"consumed"});
   EXPECT_DOUBLE_EQ(tape.backward(sum_all(square(fresh))).find(1)->item(), 6);
+}
+
+TEST(Tape, AValueThatOutlivesItsTapeIsAnErrorToComputeWith) {
+  Var x, y;
+  {
+    Tape tape;
+    x = tape.leaf(values({2}), 1);
+    y = square(x);
+  }
+  EXPECT_TRUE(y.on_tape());
+  EXPECT_DOUBLE_EQ(y.value.item(), 4) << "its numbers are there";
+  EXPECT_DOUBLE_EQ(exp(y.detach()).value.item(), std::exp(4.0));
+  expect_error<Error>([&] { exp(y); }, {"exp", "after the end of its tape", "detach()"});
+  Tape next;  // perhaps where the last one was
+  const Var z = next.leaf(values({3}), 1);
+  expect_error<Error>([&] { x* z; }, {"after the end of its tape"});
+  expect_error<Error>([&] { z* x; }, {"after the end of its tape"});
+  expect_error<Error>([&] { next.backward(sum_all(y)); }, {"after the end of its tape"});
+  expect_error<Error>([&] { next.backward(y); }, {"after the end of its tape"});
+}
+
+TEST(Tape, OpsKeepTheirOwnSkeletons) {
+  // The lists of joints that the calls were given are gone before the backward pass reads them.
+  Tape tape;
+  const auto skeleton = [&](uint64_t id, int64_t joints) {
+    Tensor local = Tensor::zeros({1, joints, 3, 3}, DType::f64);
+    for (int64_t j = 0; j < joints; ++j)
+      for (int64_t c = 0; c < 3; ++c) local.data<double>()[9 * j + 4 * c] = 1;
+    Tensor rest = Tensor::zeros({1, joints, 3}, DType::f64);
+    for (int64_t j = 0; j < joints; ++j) rest.data<double>()[3 * j + 1] = static_cast<double>(j);
+    auto parents = std::make_unique<std::vector<int>>();
+    for (int j = 0; j < joints; ++j) parents->push_back(j - 1);
+    const Var posed = forward_kinematics(tape.leaf(local, id), Var(rest),
+                                         Var(Tensor::zeros({1, 3}, DType::f64)), *parents);
+    std::fill(parents->begin(), parents->end(), 1 << 28);
+    auto swings = std::make_unique<std::vector<SwingJoint>>();
+    for (int j = 0; j < joints; ++j)
+      swings->push_back({j - 1, j + 1 < joints ? j + 1 : -1, -1, -1});
+    const Var turned = swing_twist(tape.leaf(rest, id + 1), Var(rest.clone()),
+                                   Var(Tensor::zeros({1, joints}, DType::f64)), *swings);
+    for (SwingJoint& s : *swings) s.parent = s.child = 1 << 28;
+    return sum_all(joints_of(posed)) + sum_all(turned);
+  };
+  const Gradients g = tape.backward(skeleton(1, 3) + skeleton(3, 5));
+  for (const uint64_t id : {1, 2, 3, 4}) ASSERT_NE(g.find(id), nullptr) << id;
+  // The position of joint 2 is that of joint 1 and G_1 (0, 1, 0): column 1 of the root's rotation
+  // moves two joints, the last by two bones.
+  for (int64_t row = 0; row < 3; ++row)
+    EXPECT_DOUBLE_EQ(g.find(1)->item(3 * row + 1), 3) << "1 + 2 bones below the root";
+  for (int64_t row = 0; row < 3; ++row)
+    EXPECT_DOUBLE_EQ(g.find(3)->item(3 * row + 1), 10) << "1 + 2 + 3 + 4 bones";
 }
 
 TEST(Tape, DeepChainsNeitherRecurseNorOverflow) {

@@ -3,7 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <cstdint>
+#include <cstdlib>
+#include <fstream>
+#include <new>
 
 #include "autograd/base/error.h"
 #include "autograd/ops/linear.h"
@@ -152,6 +158,64 @@ TEST(PooledMemory, ABlockIsUsedAgain) {
     first = t.address();
   }
   EXPECT_EQ(Tensor::empty({2999999}).address(), first);  // the same size class
+}
+
+TEST(PooledMemory, IsGivenBackWhenAsked) {
+  trim_memory();
+  EXPECT_EQ(memory_stats().kept, 0);
+  const int64_t in_use = memory_stats().in_use, taken = memory_stats().large_allocations;
+  { const Tensor t = Tensor::empty({3000000}), small = Tensor::empty({3}); }
+  EXPECT_GE(memory_stats().kept, 12000000);
+  EXPECT_EQ(memory_stats().in_use, in_use);
+  trim_memory();
+  EXPECT_EQ(memory_stats().kept, 0);
+  const Tensor again = Tensor::full({3000000}, 2);
+  EXPECT_EQ(memory_stats().large_allocations, taken + 2) << "it was there no more";
+  EXPECT_EQ(again.item(2999999), 2);
+  trim_memory();
+  EXPECT_EQ(again.item(2999999), 2) << "what is in use stays";
+}
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kTakesAllAddresses = true;
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+constexpr bool kTakesAllAddresses = true;
+#else
+constexpr bool kTakesAllAddresses = false;
+#endif
+#else
+constexpr bool kTakesAllAddresses = false;
+#endif
+
+/// Takes 600 MiB and gives them to the pool, then 700 MiB of another size, where there is room for
+/// a thousand. Exit code 0: there was memory in the end, and none where there really is none.
+[[noreturn]] void use_most_of_the_memory() {
+  int64_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  const rlim_t most = static_cast<rlim_t>(pages * ::sysconf(_SC_PAGESIZE)) + (rlim_t{1000} << 20);
+  const rlimit limit{most, most};
+  if (::setrlimit(RLIMIT_AS, &limit) != 0) std::_Exit(3);
+  constexpr int64_t mebi = (1 << 20) / 4;
+  for (const int64_t size : {600, 700, 500, 620}) {
+    try {
+      const Tensor t = Tensor::empty({size * mebi});
+    } catch (const std::bad_alloc&) {
+      std::_Exit(1);
+    }
+  }
+  try {
+    const Tensor t = Tensor::empty({2000 * mebi});
+  } catch (const std::bad_alloc&) {
+    std::_Exit(0);
+  }
+  std::_Exit(2);
+}
+
+TEST(PooledMemoryDeathTest, IsGivenBackBeforeThereIsNone) {
+  if (kTakesAllAddresses) GTEST_SKIP() << "a sanitizer needs all addresses";
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(use_most_of_the_memory(), ::testing::ExitedWithCode(0), "");
 }
 
 TEST(PooledMemory, InferenceKeepsNothing) {

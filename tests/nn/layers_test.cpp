@@ -11,7 +11,9 @@
 #include "nn/layers/gru.h"
 #include "nn/layers/norm.h"
 #include "nn/models/deformation.h"
+#include "nn/models/discriminator.h"
 #include "nn/models/smrm.h"
+#include "tests/support/errors.h"
 #include "tests/support/expect_near.h"
 
 namespace restage {
@@ -33,6 +35,44 @@ struct Recurrent {
     return layer(ctx, x, &state).value;
   }
 };
+
+TEST(Conv1d, ValidTakesWholeWindowsOnly) {
+  Conv1d layer(1, 1, 4, Init{RngKey{8, 0}, DType::f64});
+  layer.weight.value = Tensor::from<double>({1, 1, 4}, {1, 10, 100, 1000});
+  layer.bias.value = Tensor::zeros({1}, DType::f64);
+  Context ctx;
+  const auto ones = [](int64_t l) { return Var(Tensor::full({1, l, 1}, 1, DType::f64)); };
+  for (int64_t l = 4; l < 12; ++l)
+    for (const int64_t stride : {1, 2, 3, 5}) {
+      const Tensor y = layer.valid(ctx, ones(l), stride).value;
+      int64_t steps = 0;
+      while (steps * stride + 4 <= l) ++steps;
+      ASSERT_EQ(y.size(1), steps) << l << ", stride " << stride;
+      for (int64_t i = 0; i < steps; ++i) EXPECT_DOUBLE_EQ(y.item(i), 1111);
+    }
+  for (int64_t l = 0; l < 4; ++l)  // before, a stride of 2 made a window of 3 numbers and a zero
+    for (const int64_t stride : {1, 2, 3, 5})
+      test::expect_error<ShapeError>([&] { layer.valid(ctx, ones(l), stride); },
+                                     {"conv1d", "l is shorter than k"});
+  for (const int64_t stride : {0, -1}) {
+    test::expect_error<ShapeError>([&] { layer.valid(ctx, ones(9), stride); }, {"stride"});
+    test::expect_error<ShapeError>([&] { layer.same(ctx, ones(9), stride); }, {"stride"});
+  }
+}
+
+TEST(Discriminator, NknsLastLayerIsForSixtyFrames) {
+  Discriminator judge{{.nkn_head = true}, Init{RngKey{9, 0}, DType::f64}};
+  name_scopes(judge, "judge");
+  Context ctx{nullptr, true, kStep};
+  const Var condition(random({2, 63}, 2));
+  EXPECT_EQ(judge(ctx, Var(random({2, 59, 69}, 1)), condition).shape(), Shape({2}));
+  for (const int64_t steps : {29, 43, 58, 60, 119})
+    test::expect_error<ShapeError>(
+        [&] {
+          judge(ctx, Var(random({2, steps, 69}, 1)), condition);
+        },
+        {"60 frames"});
+}
 
 TEST(DropoutMasks, TwoPassesThroughOneNetworkDiffer) {
   const Recurrent net;

@@ -1,7 +1,15 @@
 // Weights files with all stages: models and sizes come back; what is missing or wrong is named.
 #include <gtest/gtest.h>
 
+#include <cmath>
+
+#include "autograd/gradcheck/evaluate.h"
 #include "nn/models/deformation.h"
+#include "nn/models/discriminator.h"
+#include "nn/models/hybrid.h"
+#include "nn/models/patch_transformer.h"
+#include "nn/models/point_transformer.h"
+#include "nn/models/pointnet.h"
 #include "nn/models/skeleton.h"
 #include "nn/models/smrm.h"
 #include "nn/weights/bundle.h"
@@ -139,6 +147,96 @@ TEST(WeightsBundle, SingleModelsGoOutAndIn) {
     EXPECT_EQ(to_file(bundle_of(to_file(other), "w")).tensors.size(),
               to_file(other).tensors.size());
   }
+}
+
+TEST(WeightsBundle, WhatChangesAModelsFunctionIsInItsFile) {
+  // The tensors have the same shapes with other heads and scales, so nothing else would tell.
+  const std::vector<std::string> sizes = {"points=64",    "width=16",    "layers=1", "centres=8",
+                                          "neighbours=4", "memory=true", "looks=2"},
+                                 others = {"heads=8", "heads=1", "patch_scale=3", "centre_scale=5",
+                                           "memory_scale=0.5"};
+  const Init init{{7, 1}, DType::f32};
+  SkeletonInput in{Var(Tensor::empty({1, 64, 3}))};
+  for (int64_t i = 0; i < 192; ++i)
+    in.cloud.value.data<float>()[i] = static_cast<float>(std::sin(static_cast<double>(i * i)));
+  in.past = Tensor::full({1, kJoints, 4}, 0.5);
+  const auto answer = [&](const Bundle& bundle) {
+    Context ctx;
+    return bundle.find_as<SkeletonModel>("skeleton")->forward(ctx, in).joints.value;
+  };
+  const auto bundle = [&](const std::vector<std::string>& with) {
+    Bundle out;
+    out.put("skeleton", testing::untrained_model("skeleton/patch_transformer", with, init));
+    return out;
+  };
+  const Tensor usual = answer(bundle(sizes));
+  for (const std::string& other : others) {
+    std::vector<std::string> with = sizes;
+    with.push_back(other);
+    const Bundle made = bundle(with);
+    EXPECT_FALSE(gradcheck::same_bits(answer(made), usual)) << other << " changes nothing";
+    EXPECT_TRUE(gradcheck::same_bits(answer(bundle_of(to_file(made), "w")), answer(made))) << other;
+  }
+  // A file of before has none of these keys: it means what was fixed then.
+  TensorFile file = to_file(bundle(sizes));
+  std::string& text = file.metadata["restage"];
+  for (const char* key : {"\"patch\":64,", "\"heads\":4,", "\"patch_scale\":10,",
+                          "\"centre_scale\":2,", "\"memory_scale\":4,"})
+    text = test::replaced(text, key, "");
+  EXPECT_EQ(text.find("heads"), std::string::npos);
+  EXPECT_TRUE(gradcheck::same_bits(answer(bundle_of(file, "w")), usual));
+}
+
+/// A value that becomes whatever a member is initialised with.
+struct Anything {
+  template <class T>
+  operator T() const;  // NOLINT: that is what it is for
+};
+/// How many members an aggregate has: as many as it can be initialised with.
+template <class C, class... Known>
+constexpr size_t members() {
+  if constexpr (requires { C{Known{}..., Anything{}}; })
+    return members<C, Known..., Anything>();
+  else
+    return sizeof...(Known);
+}
+
+/// `given`: members that are no keys, since the model's name or its input says them.
+template <class C>
+void expect_all_are_keys(const char* what, size_t given) {
+  EXPECT_EQ(write_config(AnyConfig(C{})).children.size() + given, members<C>()) << what;
+}
+
+TEST(WeightsBundle, EverySizeOfAModelIsAKey) {
+  expect_all_are_keys<PatchTransformerConfig>("patch transformer", 0);
+  expect_all_are_keys<PointTransformerConfig>("point transformer", 0);
+  expect_all_are_keys<PointNetConfig>("PointNet", 0);
+  expect_all_are_keys<SmrmConfig>("SMRM", 2);  // kind of rotation, 22 joints
+  expect_all_are_keys<HybridConfig>("hybrid", 0);
+  expect_all_are_keys<MlpConfig>("deformation networks", 0);
+  expect_all_are_keys<DiscriminatorConfig>("discriminator", 2);  // widths of its inputs
+}
+
+TEST(WeightsBundle, EveryShapeOfAModelComesBack) {
+  const std::pair<const char*, std::vector<std::string>> small[] = {
+      {"skeleton/patch_transformer", {"patch=8", "width=16", "layers=1", "heads=2"}},
+      {"skeleton/point_transformer", {"width=8", "base=4", "head1=6", "head2=5", "layers=1"}},
+      {"skeleton/pointnet", {"widths=[3, 4, 5, 6, 7]"}},
+      {"smrm/rot6d", {"hidden=4", "layers=3"}},
+      {"smrm/hybrid", {"hidden=4", "layers=1"}},
+      {"smrm/discriminator", {"widths=[2, 3, 4, 5]"}}};
+  for (const auto& [name, sizes] : small) {
+    Bundle made;
+    made.put(model_type(name).role, testing::untrained_model(name, sizes, {{7, 1}, DType::f32}));
+    const TensorFile file = to_file(made);
+    EXPECT_EQ(safetensors_bytes(to_file(bundle_of(file, name))), safetensors_bytes(file)) << name;
+  }
+  EXPECT_THROW(model_config("skeleton/pointnet", {"widths=[3, 4, 5, 6]"}), InputError);
+  EXPECT_THROW(model_config("skeleton/pointnet", {"widths=[3, 4, 5, 6, 0]"}), InputError);
+  EXPECT_THROW(model_config("skeleton/patch_transformer", {"heads=0"}), InputError);
+  EXPECT_THROW(model_config("skeleton/patch_transformer", {"heads=3"}), InputError);
+  EXPECT_THROW(model_config("skeleton/patch_transformer", {"points=63"}), InputError)
+      << "fewer points than centres";
 }
 
 TEST(WeightsBundle, SizesAreSetByName) {

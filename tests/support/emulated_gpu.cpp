@@ -23,12 +23,12 @@ namespace restage {
 namespace cuda {
 namespace {
 
-/// An operand with as many bits as a precision leaves it; what is left out is cut off.
+/// An operand with as many bits as a precision leaves it; the others are cut off.
 template <class T>
 T rounded(T x, MatmulPrecision precision) {
   if (!std::is_same_v<T, float> || precision == MatmulPrecision::float32) return x;
   const auto bits = std::bit_cast<uint32_t>(static_cast<float>(x));
-  return std::bit_cast<float>(bits & (precision == MatmulPrecision::tf32 ? ~0x1fffu : ~0xffffu));
+  return std::bit_cast<float>(bits & ~0x1fffu);
 }
 
 template <class T>

@@ -43,17 +43,22 @@ void* GuardedBackend::allocate(size_t bytes) {
   if (!spare.empty()) {
     data = spare.back();
     spare.pop_back();
+    stats_.kept -= static_cast<int64_t>(block_of(bytes));
   } else {
     if (kRange - used_ < block_of(bytes)) throw std::bad_alloc();
     data = addresses_ + used_;
     used_ += block_of(bytes);
   }
+  stats_.in_use += static_cast<int64_t>(block_of(bytes));
+  stats_.peak = std::max(stats_.peak, stats_.in_use);
   std::memset(there(data), 0xff, bytes);
   return data;
 }
 
 void GuardedBackend::release(void* data, size_t bytes) {
   const std::lock_guard lock(mutex_);
+  stats_.in_use -= static_cast<int64_t>(block_of(bytes));
+  stats_.kept += static_cast<int64_t>(block_of(bytes));
   free_[block_of(bytes)].push_back(static_cast<std::byte*>(data));
 }
 
@@ -72,6 +77,22 @@ void GuardedBackend::copy_out(void* to, const void* from, size_t bytes) {
 void GuardedBackend::synchronise() {
   ++counts.waits;
   if (const std::string fault = take_fault(); !fault.empty()) throw Error(fault);
+}
+
+MemoryStats GuardedBackend::memory() const {
+  const std::lock_guard lock(mutex_);
+  return stats_;
+}
+
+void GuardedBackend::reset_peak() {
+  const std::lock_guard lock(mutex_);
+  stats_.peak = stats_.in_use;
+}
+
+void GuardedBackend::trim() {
+  const std::lock_guard lock(mutex_);
+  free_.clear();
+  stats_.kept = 0;
 }
 
 void GuardedBackend::run(std::type_index args_type, const void* args) {

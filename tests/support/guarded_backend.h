@@ -33,6 +33,10 @@ class GuardedBackend : public Backend {
   /// Throws what the kernels since the last call found wrong.
   void synchronise() override;
   void run(std::type_index args_type, const void* args) override;
+  MemoryStats memory() const override;
+  void reset_peak() override;
+  /// Forgets the free blocks; their addresses are not used again.
+  void trim() override;
 
   Device device() const { return device_; }
   DeviceCounts counts;
@@ -51,7 +55,8 @@ class GuardedBackend : public Backend {
   std::byte *addresses_, *numbers_;
   Device device_;
   size_t used_ = 0;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
+  MemoryStats stats_;
   std::map<size_t, std::vector<std::byte*>> free_;
 };
 

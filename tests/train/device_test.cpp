@@ -5,9 +5,12 @@
 #include <cmath>
 
 #include "tests/support/emulated_gpu.h"
+#include "tests/support/errors.h"
 #include "tests/support/fake_device.h"
+#include "tests/support/files.h"
 #include "tests/support/gpu.h"
 #include "tests/train/tiny_training.h"
+#include "train/forecast.h"
 
 namespace restage {
 namespace {
@@ -59,7 +62,7 @@ void expect_same(const std::string& name, const TrainConfig& config, const Bundl
 }
 
 TEST(DeviceStages, ThoseOfTheTinyTraining) {
-  for (const std::string name : {"skeleton", "motion", "deformation", "root"})
+  for (const std::string name : {"skeleton", "motion", "deformation"})
     expect_same(name, tiny_training(6));
 }
 
@@ -128,18 +131,38 @@ TrainConfig papers_networks() {
 
 TEST(DeviceStages, TheKernelsOfTheGpuTrainAlike) {
   const int64_t before = emulated_counts().kernels;
-  for (const std::string name : {"skeleton", "motion", "deformation", "root"})
+  for (const std::string name : {"skeleton", "motion", "deformation"})
     expect_alike(name, papers_networks(), emulated_gpu());
   EXPECT_GT(emulated_counts().kernels, before + 1000);
 }
 
 TEST(DeviceGpu, StagesTrainAlikeAndRepeatTheirBits) {
   RESTAGE_GPU_OR_SKIP(gpu);
-  for (const std::string name : {"skeleton", "motion", "deformation", "root"}) {
+  for (const std::string name : {"skeleton", "motion", "deformation"}) {
     expect_alike(name, papers_networks(), gpu);
     const Outcome once = trained(gpu, name, papers_networks());
     EXPECT_TRUE(once.bytes == trained(gpu, name, papers_networks()).bytes) << name;
   }
+}
+
+TEST(DeviceStages, SayWhatTheirTensorsTakeOnTheDevice) {
+  const Device gpu = emulated_gpu();
+  const auto stage = stage_on(gpu, "skeleton", tiny_training(40));
+  const StageForecast f = forecast(*stage, MatmulPrecision::float32, false);
+  EXPECT_EQ(f.memory, memory_stats(gpu).peak);
+  EXPECT_GT(f.memory, memory_stats(gpu).in_use);
+
+  const test::TempDir dir;
+  RunDir run = RunDir::create_at(dir / "run", "x: 1\n", "{}\n", {"skeleton"});
+  ::testing::internal::CaptureStderr();
+  train(run, {"skeleton"}, {},
+        [&](const std::string& name, Bundle*) { return stage_on(gpu, name, tiny_training(3)); },
+        {.quiet = true, .observers = {}});
+  const std::string said = ::testing::internal::GetCapturedStderr();
+  const std::string peak =
+      std::to_string(std::llround(static_cast<double>(memory_stats(gpu).peak) / 1048576.0));
+  EXPECT_HAS(said, "peak of tensors " + peak + " MiB on emulated gpu and ");
+  EXPECT_HAS(said, " MiB on the host, ");
 }
 
 TEST(DeviceStages, BonesAndMicroBatches) {

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "nn/config/config.h"
+#include "nn/weights/bundle.h"
 #include "tests/support/files.h"
 #include "tests/train/tiny_training.h"
 
@@ -74,6 +76,64 @@ TEST(Identity, WhatChangesResultsChangesIt) {
   TrainConfig steps = over(path);
   ++motion(steps).optimiser.steps;
   EXPECT_NE(ids_of(steps).motion, first.motion);
+}
+
+/// Ids of the stages and of the trial that a configuration asks for.
+std::vector<std::string> all_ids(const std::string& yaml) {
+  TrainConfig c;
+  read_config(parse_yaml(yaml, "test.yaml"), c);
+  Identities identities;
+  std::vector<std::string> out;
+  for (const StageId& stage : identities.stages(c)) out.push_back(stage.name());
+  out.push_back(identities.trial(c, {}));
+  return out;
+}
+
+TEST(Identity, IsWhatItWasBeforeKeysWereAdded) {
+  // As the program gave them before heads, scales and other sizes of models became keys; results
+  // that are kept by id (experiments/*/results, stores on disks) are found by them.
+  EXPECT_EQ(all_ids("name: a\nseed: 5\n"),
+            (std::vector<std::string>{"skeleton-b1e92605893d", "motion-a147f27e1ec3",
+                                      "deformation-4a59121e61fc", "d9079e8e360f"}));
+  const std::string ours =
+      "skeleton: {model: skeleton/patch_transformer, sizes: {points: 256, memory: true, looks: "
+      "2}}\n"
+      "motion: {model: smrm/hybrid, sizes: {hidden: 64}}\n"
+      "deformation: {model: deformation/bones}\n";
+  EXPECT_EQ(all_ids(ours), (std::vector<std::string>{"skeleton-8659cbed9952", "motion-d7a80113bf39",
+                                                     "deformation-06b801a4f79b", "0dc619052a00"}));
+  EXPECT_EQ(all_ids("skeleton: {model: skeleton/pointnet}\nmotion: {model: smrm/quaternion}\n"
+                    "deformation: {optimiser: {steps: 7}}\n"),
+            (std::vector<std::string>{"skeleton-a3b241714384", "motion-f1849853ac1e",
+                                      "deformation-565c90fee58b", "c28e6a543bb2"}));
+  // The value that was fixed, said out loud, asks the same; another value asks something else.
+  const auto with = [&](const std::string& size) {
+    return all_ids(test::replaced(ours, "points: 256", "points: 256, " + size));
+  };
+  EXPECT_EQ(with("heads: 4"), all_ids(ours));
+  EXPECT_EQ(with("patch_scale: 10.0"), all_ids(ours));
+  for (const char* other : {"heads: 8", "patch: 32", "patch_scale: 9", "memory_scale: 4.5"})
+    EXPECT_NE(with(other).front(), all_ids(ours).front()) << other;
+  EXPECT_NE(all_ids("skeleton: {model: skeleton/pointnet, sizes: {widths: [8, 8, 8, 8, 8]}}\n")[0],
+            all_ids("skeleton: {model: skeleton/pointnet}\n")[0]);
+}
+
+TEST(Identity, OfNetworksIsWhatItWasBeforeKeysWereAdded) {
+  Bundle b;
+  for (const char* name : {"skeleton/patch_transformer", "smrm/hybrid", "deformation/weights"}) {
+    const AnyConfig sizes = model_config(name, {});
+    const Init init{RngKey{7, 0}, DType::f32};
+    b.put(model_type(name).role, {name, sizes, make_model(name, sizes, init), {{"a", "b"}}});
+  }
+  const test::TempDir dir;
+  save_bundle(dir / "w.safetensors", b);
+  Identities identities;
+  const std::pair<const char*, const char*> before[] = {
+      {"skeleton", "069a64d46eff47be15ee92e0a9feeb7f1ec54e080739456f74dfc87069120b32"},
+      {"motion", "d86182be5c37410299ee87f96ba251d03f0a562364dd93c513fec1251ce1553f"},
+      {"deformation", "1d33c9c9759dac4e6d98f078782d7009bd93f5ef014cd5a27dd8c190f9f365f2"}};
+  for (const auto& [stage, id] : before)
+    EXPECT_EQ(identities.networks(stage, dir / "w.safetensors"), id) << stage;
 }
 
 }  // namespace

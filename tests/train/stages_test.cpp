@@ -30,7 +30,7 @@ using testing::skeleton;
 using testing::tiny_stage;
 using testing::tiny_training;
 
-const char* const kStageNames[] = {"skeleton", "motion", "deformation", "root"};
+const char* const kStageNames[] = {"skeleton", "motion", "deformation"};
 
 double value_of(const NamedValues& values, const std::string& name) {
   for (const auto& [key, value] : values)
@@ -77,31 +77,6 @@ TEST(TrainStages, TwentyStepsWithOneTwoAndThreeThreadsGiveTheSameBits) {
       if (n == 1) first = bytes_of(*stage);
       EXPECT_TRUE(bytes_of(*stage) == first) << name << " with " << n << " threads";
     }
-  }
-}
-
-TEST(TrainStages, StepsInBfloat16HaveTheSameBitsForAnyThreadsAndMeans) {
-  const bool unit = matrix_unit();
-  const MatmulPrecisionScope scope(MatmulPrecision::bfloat16);
-  for (const std::string name : kStageNames) {
-    const auto trained = [&](int n) {
-      const testing::UseThreads use_threads(n);
-      const auto stage = tiny_stage(name, wide(8));
-      for (int64_t i = 0; i < 8; ++i) stage->step(i);
-      return bytes_of(*stage);
-    };
-    const std::string first = trained(1);
-    for (const int n : {2, 3})
-      EXPECT_TRUE(trained(n) == first) << name << " with " << n << " threads";
-    use_matrix_unit(false);
-    for (const std::string& set : testing::vector_sets()) {
-      const testing::UseSet use(set);
-      EXPECT_TRUE(trained(2) == first) << name << " with " << set;
-    }
-    use_matrix_unit(unit);
-    set_matmul_precision(MatmulPrecision::float32);
-    EXPECT_FALSE(trained(2) == first) << name << " does nothing in bfloat16";
-    set_matmul_precision(MatmulPrecision::bfloat16);
   }
 }
 
@@ -382,7 +357,6 @@ TEST(TrainStages, SteadyStepsTakeNoLargeBlocks) {
   motion(c).windows.frames = 40;
   deformation(c).pairs.points = 1024;
   for (const std::string name : kStageNames) {
-    if (name == "root") continue;  // a few numbers a body: no large blocks
     const auto stage = tiny_stage(name, c);
     reset_peak_memory();
     const int64_t before = memory_stats().in_use;
@@ -427,7 +401,6 @@ TEST(TrainStages, LossFallsInSixtySteps) {
     const auto stage = tiny_stage(name, c);
     const std::string figure = name == "skeleton" ? "joint_error_mm"
                                : name == "motion" ? "local_mpjpe"
-                               : name == "root"   ? "root_mm"
                                                   : "with_offsets_mm";
     const NamedValues found = stage->validate();
     const double before = value_of(found, figure);
@@ -436,21 +409,7 @@ TEST(TrainStages, LossFallsInSixtySteps) {
       EXPECT_NE(std::find(known.begin(), known.end(), one), known.end()) << name << ": " << one;
     const auto [first, last] = learn(*stage, 60);
     EXPECT_LT(last, 0.7 * first) << name;
-    if (name == "root") continue;  // two bodies to learn from tell nothing of a third
     EXPECT_LT(value_of(stage->validate(), figure), 0.8 * before) << name;
-  }
-}
-
-TEST(TrainStages, InBfloat16TheLossFallsAsInFloat32) {
-  for (const std::string name : kStageNames) {
-    std::pair<double, double> losses[2];
-    for (const auto precision : {MatmulPrecision::float32, MatmulPrecision::bfloat16}) {
-      const MatmulPrecisionScope scope(precision);
-      losses[precision == MatmulPrecision::bfloat16] = learn(*tiny_stage(name, sixty_steps()), 60);
-    }
-    EXPECT_NEAR(losses[1].first, losses[0].first, 0.03 * losses[0].first) << name;
-    EXPECT_NEAR(losses[1].second, losses[0].second, 0.1 * losses[0].second) << name;
-    EXPECT_NE(losses[1].second, losses[0].second) << name;
   }
 }
 

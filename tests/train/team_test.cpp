@@ -9,6 +9,10 @@
 #include <thread>
 
 #include "autograd/base/parallel.h"
+#include "autograd/ops/reduce.h"
+#include "nn/models/deformation.h"
+#include "nn/models/discriminator.h"
+#include "nn/models/smrm.h"
 #include "tests/support/errors.h"
 #include "tests/train/tiny_training.h"
 #include "train/team.h"
@@ -22,7 +26,6 @@ using testing::deformation;
 using testing::motion;
 using testing::optimisers;
 using testing::resize;
-using testing::root;
 using testing::skeleton;
 using testing::tiny_stage;
 using testing::tiny_training;
@@ -49,6 +52,7 @@ class Thread final : public Team {
   Thread(Table* table, int rank) : table_(table), rank_(rank) {}
   int rank() const override { return rank_; }
   int size() const override { return table_->size; }
+  int local_rank() const override { return rank_; }
   std::unique_ptr<Sum> sum(size_t) override { return std::make_unique<Rows>(table_, rank_); }
   std::vector<std::vector<double>> all(const std::vector<std::vector<double>>& mine) override {
     table_->numbers[static_cast<size_t>(rank_)] = mine;
@@ -138,7 +142,7 @@ TrainConfig everything() {
 }
 
 TEST(Team, HowManyShareAStepChangesNoBit) {
-  for (const std::string name : {"skeleton", "motion", "deformation", "root"}) {
+  for (const std::string name : {"skeleton", "motion", "deformation"}) {
     const std::string one = trained(name, everything(), 4, 1)[0];
     for (const int processes : {2, 4})
       for (const std::string& each : trained(name, everything(), 4, processes))
@@ -186,7 +190,7 @@ TEST(Team, GroupsOfThreadsChangeNoBit) {
   TrainConfig c = everything();  // whose skeleton has batch norm, and takes turns
   motion(c).weights.adversarial = 0;
   const int before = threads();
-  for (const std::string name : {"skeleton", "motion", "deformation", "root"}) {
+  for (const std::string name : {"skeleton", "motion", "deformation"}) {
     set_threads(1);
     const std::string one = trained(name, c, 4, 1)[0];
     for (const int n : {2, 3, 8}) {
@@ -204,9 +208,8 @@ TEST(Team, MicroBatchesAddUpToTheStep) {
   motion(c).weights.adversarial = 0;
   motion(c).self_first_pass = true;
   resize(deformation(c).model, {"dropout=0"});
-  resize(root(c).model, {"dropout=0"});
   resize(motion(c).model, {"dropout=0"});
-  for (const std::string name : {"skeleton", "motion", "deformation", "root"}) {
+  for (const std::string name : {"skeleton", "motion", "deformation"}) {
     std::vector<double> whole, cut;
     trained(name, c, 1, 1, &whole);
     trained(name, c, 4, 1, &cut);
@@ -233,14 +236,180 @@ TEST(Team, BuffersThatNobodyChangesStayAsTheyAre) {
   EXPECT_TRUE(constants(0) == constants(2));
 }
 
+/// A stage whose micro-batches do not all take the same part: what each of them does is given.
+class Uneven final : public Stage {
+ public:
+  using Part = std::function<void(Uneven&, Context&, int64_t, Var*)>;
+  explicit Uneven(Part part) : Stage("uneven", config(), {}), part_(std::move(part)) {
+    const std::string model = "deformation/weights", judge = "smrm/discriminator";
+    net = add_network<WeightNet>("deformation.weights", model, model_config(model, {"width=4"}),
+                                 RngKey{1, 0});
+    discriminator =
+        add_network<Discriminator>("discriminator", judge, model_config(judge), RngKey{2, 0});
+    optimiser_ = add_optimiser("optimiser", {"deformation.weights"}, config());
+  }
+  static OptimiserConfig config() {
+    OptimiserConfig out;
+    out.batch = 4;
+    return out;
+  }
+  NamedValues step(int64_t) override {
+    gradients = parts(*optimiser_, [&](const MicroBatch& micro) {
+                  return differentiate(RngKey{3, 0}, [&](Context& ctx) {
+                    Var total(Tensor::zeros({1}));
+                    part_(*this, ctx, micro.index, &total);
+                    return total;
+                  });
+                }).gradients;
+    return {};
+  }
+  NamedTensors examples(int64_t) const override { return {}; }
+  NamedValues validate() override { return {}; }
+
+  WeightNet* net;
+  Discriminator* discriminator;
+  Gradients gradients;
+
+ private:
+  Part part_;
+  Optimiser* optimiser_;
+};
+
+/// Adds to a loss what gives every number of a parameter this gradient.
+void pull(Context& ctx, const Parameter& p, double gradient, Var* total) {
+  *total = *total + reshape(scale(sum_all(ctx.bind(p)), gradient), {1});
+}
+
+TEST(Team, AParameterMayTakePartInSomeMicroBatchesOnly) {
+  const Uneven::Part part = [](Uneven& s, Context& ctx, int64_t micro, Var* total) {
+    Mlp3& net = s.net->net;
+    pull(ctx, net.fc2.bias, 0, total);                  // something is always differentiable
+    if (micro <= 1) pull(ctx, net.fc1.bias, 4, total);  // the first have it, later ones not
+    if (micro >= 1) pull(ctx, net.fc3.bias, 8.0 * static_cast<double>(micro), total);
+  };
+  for (const int processes : {1, 2, 4})
+    by_processes(processes, [&](Team& team) {
+      Uneven stage(part);
+      stage.cut_steps(4, team);
+      stage.step(0);
+      const Mlp3& net = stage.net->net;
+      const Gradients& g = stage.gradients;
+      ASSERT_NE(g.find(net.fc1.bias.id), nullptr) << processes << " processes";
+      ASSERT_NE(g.find(net.fc3.bias.id), nullptr) << processes << " processes";
+      EXPECT_EQ(g.find(net.fc1.bias.id)->item(), 2) << "4 in two of four micro-batches";
+      EXPECT_EQ(g.find(net.fc3.bias.id)->item(), 12) << "8, 16 and 24 in three of four";
+      EXPECT_EQ(g.find(net.fc2.bias.id)->item(), 0);
+      EXPECT_EQ(g.find(net.fc1.weight.id), nullptr) << "takes part in none";
+    });
+}
+
+TEST(Team, ABufferMayChangeInSomeMicroBatchesOnly) {
+  const auto running = [](const Uneven& stage, size_t layer) {
+    return stage.discriminator->bns[layer].running_mean.clone();
+  };
+  const auto judged = [](Uneven& s, Context& ctx, double input) {
+    const Frozen frozen(ctx);
+    (*s.discriminator)(ctx, Var(Tensor::full({2, 8, 69}, input)), Var(Tensor::full({2, 63}, 1)));
+  };
+  const auto stepped = [&](const std::vector<double>& inputs, Team& team, int64_t micro_batches) {
+    auto stage = std::make_unique<Uneven>([&](Uneven& s, Context& ctx, int64_t micro, Var* total) {
+      pull(ctx, s.net->net.fc1.bias, 1, total);
+      if (inputs[static_cast<size_t>(micro)] != 0)
+        judged(s, ctx, inputs[static_cast<size_t>(micro)]);
+    });
+    stage->cut_steps(micro_batches, team);
+    stage->step(0);
+    return stage;
+  };
+  const Tensor untouched = running(Uneven(nullptr), 0);
+  const Tensor whole = running(*stepped({5}, alone(), 1), 0);
+  ASSERT_GT(std::abs(whole.item(0) - untouched.item(0)), 1e-4);
+  for (const int processes : {1, 2, 4})
+    by_processes(processes, [&](Team& team) {
+      const auto stage = stepped({0, 0, 5, 0}, team, 4);
+      const Tensor now = running(*stage, 0);
+      for (int64_t i = 0; i < now.numel(); ++i)
+        EXPECT_NEAR(now.item(i), 0.75 * untouched.item(i) + 0.25 * whole.item(i), 1e-6)
+            << processes << " processes";
+      const Tensor none = running(*stepped({0, 0, 0, 0}, team, 4), 0);
+      for (int64_t i = 0; i < none.numel(); ++i) EXPECT_EQ(none.item(i), untouched.item(i));
+    });
+}
+
+TEST(Team, WhatAStepMustNotDoIsAnError) {
+  // Batch norm makes the stage above take turns; this one's micro-batches may be computed at once.
+  class SideBySide final : public Stage {
+   public:
+    explicit SideBySide(std::function<void(SideBySide&, Context&, int64_t, Var*)> part)
+        : Stage("side by side", Uneven::config(), {}), part_(std::move(part)) {
+      net = add_network<Smrm>("motion", "smrm/rot6d",
+                              model_config("smrm/rot6d", {"hidden=4", "standardise=true"}),
+                              RngKey{1, 0});
+      other =
+          add_network<WeightNet>("deformation.weights", "deformation/weights",
+                                 model_config("deformation/weights", {"width=4"}), RngKey{2, 0});
+      optimiser_ = add_optimiser("optimiser", {"motion"}, Uneven::config());
+    }
+    NamedValues step(int64_t) override {
+      parts(*optimiser_, [&](const MicroBatch& micro) {
+        return differentiate(RngKey{3, 0}, [&](Context& ctx) {
+          Var total(Tensor::zeros({1}));
+          pull(ctx, net->fc_trans.bias, 1, &total);
+          part_(*this, ctx, micro.index, &total);
+          return total;
+        });
+      });
+      return {};
+    }
+    NamedTensors examples(int64_t) const override { return {}; }
+    NamedValues validate() override { return {}; }
+    Smrm* net;
+    WeightNet* other;
+
+   private:
+    std::function<void(SideBySide&, Context&, int64_t, Var*)> part_;
+    Optimiser* optimiser_;
+  };
+  const auto with = [](const std::function<void(SideBySide&, Context&, int64_t, Var*)>& part) {
+    SideBySide stage(part);
+    stage.cut_steps(4, alone());
+    stage.step(0);
+  };
+  with([](SideBySide&, Context&, int64_t, Var*) {});
+  test::expect_error<Error>(
+      [&] {
+        with([](SideBySide& s, Context&, int64_t micro, Var*) {
+          if (micro == 2) s.net->joint_mean = s.net->joint_mean.clone();
+        });
+      },
+      {"have changed the buffer 'smrm.joint_mean'", "changes_buffers"});
+  test::expect_error<Error>(
+      [&] {
+        with([](SideBySide& s, Context& ctx, int64_t, Var* total) {
+          pull(ctx, s.other->net.fc1.bias, 1, total);
+        });
+      },
+      {"gradients of 1 parameters that the step's optimiser does not hold"});
+}
+
+TEST(Team, EveryProcessOfAHostHasAGpuOfItsOwn) {
+  EXPECT_EQ(alone().local_rank(), 0);
+  EXPECT_EQ(local_rank(), 0) << "until somebody says another";
+  for (const int count : {1, 2, 4, 8})
+    for (int rank = 0; rank < 9; ++rank) EXPECT_EQ(gpu_of(rank, count), rank % count);
+  set_local_rank(3);
+  EXPECT_EQ(local_rank(), 3);
+  set_local_rank(0);
+}
+
 TEST(Team, WhatCannotBeDividedIsRefused) {
   TrainConfig c = tiny_training(6);
   c.loop.micro_batches = 3;  // batches are of 4
-  for (const std::string name : {"skeleton", "motion", "deformation", "root"})
+  for (const std::string name : {"skeleton", "motion", "deformation"})
     EXPECT_HAS(test::refusal_of([&] { tiny_stage(name, c); }), "loop.micro_batches divides");
   Table table(3);
   Thread team(&table, 0);
-  EXPECT_HAS(test::refusal_of([&] { tiny_stage("root", tiny_training(6))->cut_steps(4, team); }),
+  EXPECT_HAS(test::refusal_of([&] { tiny_stage("motion", tiny_training(6))->cut_steps(4, team); }),
              "3 processes cannot divide");
 }
 

@@ -4,7 +4,6 @@
 #include "tests/support/tiny_body.h"
 #include "train/stages/deformation_stage.h"
 #include "train/stages/motion_stage.h"
-#include "train/stages/root_stage.h"
 #include "train/stages/skeleton_stage.h"
 #include "train/training/training.h"
 
@@ -19,12 +18,8 @@ inline MotionStageConfig& motion(TrainConfig& c) {
 inline DeformationStageConfig& deformation(TrainConfig& c) {
   return c.section("deformation").config.as<DeformationStageConfig>();
 }
-inline RootStageConfig& root(TrainConfig& c) {
-  return c.section("root").config.as<RootStageConfig>();
-}
 inline std::vector<OptimiserConfig*> optimisers(TrainConfig& c) {
-  return {&skeleton(c).optimiser, &motion(c).optimiser, &deformation(c).optimiser,
-          &root(c).optimiser};
+  return {&skeleton(c).optimiser, &motion(c).optimiser, &deformation(c).optimiser};
 }
 /// Sizes of the chosen model, as configurations give them: "width=32".
 inline void resize(ModelChoice& choice, const std::vector<std::string>& sizes) {
@@ -64,8 +59,6 @@ inline TrainConfig tiny_training(int64_t steps) {
   d.pairs.points = 48;
   d.skinning_steps = steps / 3;
   d.validation_pairs = 2;
-  root(c).points = 48;
-  root(c).validation_bodies = 2;
   for (OptimiserConfig* o : optimisers(c)) {
     o->steps = steps;
     o->batch = 4;

@@ -119,10 +119,15 @@ class MpiTeam final : public Team {
       throw WorkError("this MPI library lets one thread only call it; build with another");
     MPI_Comm_rank(MPI_COMM_WORLD, &rank_);
     MPI_Comm_size(MPI_COMM_WORLD, &size_);
+    MPI_Comm host = MPI_COMM_NULL;
+    MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, rank_, MPI_INFO_NULL, &host);
+    MPI_Comm_rank(host, &local_rank_);
+    MPI_Comm_free(&host);
     std::atexit([] { MPI_Finalize(); });
   }
   int rank() const override { return rank_; }
   int size() const override { return size_; }
+  int local_rank() const override { return local_rank_; }
   std::unique_ptr<Sum> sum(size_t width) override {
     return std::make_unique<MpiSum>(width, rank_, size_, &waited_);
   }
@@ -170,7 +175,7 @@ class MpiTeam final : public Team {
   }
 
  private:
-  int rank_ = 0, size_ = 1;
+  int rank_ = 0, size_ = 1, local_rank_ = 0;
   double waited_ = 0;
 };
 

@@ -42,12 +42,14 @@ class Optimiser {
   /// parameters that this optimises, whatever else `gradients` holds; the gradient is scaled down
   /// as torch's clip_grad_norm_ does.
   void step(const Gradients& gradients, double rate);
+  /// Identities of the parameters that it optimises, ascending.
+  const std::vector<uint64_t>& parameters() const { return ids_; }
   void save(const std::string& prefix, TensorFile& file) const;
   /// InputError if the state does not fit.
   void load(const std::string& prefix, const TensorFile& file, const std::string& where);
 
  private:
-  std::vector<uint64_t> ids_;  // of the parameters, ascending
+  std::vector<uint64_t> ids_;
   Muon muon_;
   Adam adam_;
   double clip_;

@@ -84,7 +84,7 @@ Var DeformationStage::loss(Context& ctx, const PairBatch& pairs, int64_t step,
 
 NamedValues DeformationStage::step(int64_t step) {
   const OptimiserConfig& o = config_.optimiser;
-  const Differentiated d = parts([&](const MicroBatch& part) {
+  const Differentiated d = parts(*optimiser_, [&](const MicroBatch& part) {
     const PairBatch pairs = batch(step, part), there = moved(pairs, device());
     Tensor posed;
     Differentiated out =

@@ -211,7 +211,7 @@ MotionStatistics MotionStage::statistics() const {
 void MotionStage::update_discriminator(const RngKey& step, double rate, const Drawn& batch,
                                        NamedValues* values) {
   if (balance_ <= config_.balance_limit) return;
-  const Differentiated d = parts([&](const MicroBatch& part) {
+  const Differentiated d = parts(*discriminator_optimiser_, [&](const MicroBatch& part) {
     const WindowBatch& windows = batch(part).windows;
     double score = 0;
     Differentiated out = differentiate(part.key(step), [&](Context& ctx) {
@@ -311,7 +311,7 @@ NamedValues MotionStage::step(int64_t step) {
   NamedValues values;
   if (judged)
     update_discriminator(key_.fold("discriminator").fold(number), rate, batch_of, &values);
-  const Differentiated d = parts([&](const MicroBatch& part) {
+  const Differentiated d = parts(*optimiser_, [&](const MicroBatch& part) {
     return learn(part.key(key_.fold(number)), batch_of(part), judged);
   });
   optimiser_->step(d.gradients, rate);

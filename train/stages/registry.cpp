@@ -2,7 +2,6 @@
 
 #include "train/stages/deformation_stage.h"
 #include "train/stages/motion_stage.h"
-#include "train/stages/root_stage.h"
 #include "train/stages/skeleton_stage.h"
 
 namespace restage {
@@ -37,8 +36,6 @@ const std::vector<StageType>& stage_types() {
       stage<DeformationStage>("deformation", "skinning weights and offsets",
                               {"deformation.weights", "deformation.offsets"},
                               {"with_offsets_mm", "skinning_mm", "skin_lost"}),
-      stage<RootStage>("root", "the third MLP of the paper's count", {"deformation.root"},
-                       {"root_mm"}),
   };
   return table;
 }

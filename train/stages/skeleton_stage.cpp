@@ -19,8 +19,8 @@ namespace {
 constexpr double kUncertaintyWeight = 0.01;
 constexpr size_t kFollowed = 12;  // frames of a validation sequence
 
-/// Euclidean lengths along the last axis (3), smooth at 0.
-Var lengths(const Var& d) { return sqrt(add_scalar(sum(square(d), -1), 1e-8)); }
+/// Lengths of vectors along the last axis, metres.
+Var lengths(const Var& d) { return smooth_length(d, 1e-8); }
 
 CloudConfig with_points(CloudConfig c, const SkeletonModel& model) {
   c.points = static_cast<int>(model.points());
@@ -179,7 +179,7 @@ void SkeletonStage::recall(int64_t step, const MicroBatch& part, CloudBatch* clo
 
 NamedValues SkeletonStage::step(int64_t step) {
   const OptimiserConfig& o = config_.optimiser;
-  const Differentiated d = parts([&](const MicroBatch& part) {
+  const Differentiated d = parts(*optimiser_, [&](const MicroBatch& part) {
     CloudBatch clouds = batch(step, part);
     recall(step, part, &clouds);
     clouds = moved(std::move(clouds), device());

@@ -19,7 +19,7 @@ std::string number(double value) { return config_detail::write_leaf(value).text;
 
 template <class C>
 Json keys_of(const C& config) {
-  return keys_json(write_config(config));
+  return keys_json(write_identity(config));
 }
 
 }  // namespace
@@ -47,8 +47,7 @@ std::string Identities::weights(const std::string& path) {
 
 std::string Identities::networks(const std::string& stage, const std::string& path) {
   std::string& known = seen_[stage + " of " + path];
-  if (known.empty())
-    known = sha256(safetensors_bytes(to_file(networks_of(stage_type(stage), path))));
+  if (known.empty()) known = sha256(identity_bytes(networks_of(stage_type(stage), path)));
   return known;
 }
 

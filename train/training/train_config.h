@@ -56,9 +56,7 @@ void visit(V& v, EvaluationConfig& c) {
 }
 
 inline EnumNames<MatmulPrecision> config_names(MatmulPrecision) {
-  return {{"float32", MatmulPrecision::float32},
-          {"bfloat16", MatmulPrecision::bfloat16},
-          {"tf32", MatmulPrecision::tf32}};
+  return {{"float32", MatmulPrecision::float32}, {"tf32", MatmulPrecision::tf32}};
 }
 
 /// One stage of a configuration: trained as its own keys say, or taken as it is.
@@ -116,6 +114,11 @@ struct TrainConfig {
   EvaluationConfig evaluation;
 };
 
+/// `left`: a configuration as a run or a trial has left it, perhaps one of an earlier version,
+/// which wrote a section for every stage that there was. Returns it without the sections of stages
+/// that are no more, unless `stages` names them.
+ConfigNode of_this_version(ConfigNode left);
+
 template <class V>
 void visit(V& v, TrainConfig& c) {
   v("name", c.name, "run directories are <run_root>/<name>-<time>-<n>");
@@ -126,7 +129,7 @@ void visit(V& v, TrainConfig& c) {
   v("precision", c.precision, "of the matrix products of training steps; all else is float32");
   v("device", c.device, "where networks are trained: cpu, or cuda in a program built for it");
   v.check("precision", c.precision != MatmulPrecision::tf32 || c.device != "cpu",
-          "is tf32, which only GPUs have", "give float32 or bfloat16, or device: cuda");
+          "is tf32, which only GPUs have", "give float32, or device: cuda");
   v("stages", c.stages, "which stages, in order", one_of(stage_names()));
   v("data", c.data, "bodies and motions");
   for (auto& [name, section] : c.sections) v(name, section, stage_type(name).help);
