@@ -288,6 +288,14 @@ bool File::has(const std::string& name) const {
   return link_exists(*state_, name);
 }
 
+bool File::is_group(const std::string& name) const {
+  const Lock lock;
+  H5O_info_t info;
+  return link_exists(*state_, name) &&
+         H5Oget_info_by_name(state_->id, name.c_str(), &info, H5P_DEFAULT) >= 0 &&
+         info.type == H5O_TYPE_GROUP;
+}
+
 Dataset File::dataset(const std::string& name) const {
   const Lock lock;
   Dataset set;
@@ -307,6 +315,7 @@ Dataset File::dataset(const std::string& name) const {
   if (type < 0 || space < 0 || creation < 0) throw_damaged(set.where_);
   set.type_ = classify(type, set.where_);
   set.wide_ = set.type_ == Type::integer && is_wide_integer(type);
+  set.value_size_ = H5Tget_size(type);
   set.shape_ = extent_of(space, set.where_);
   check_layout(creation, set.where_);
   const auto stored = std::min<uint64_t>(H5Dget_storage_size(set.id_), file_size(state_->path));
@@ -408,6 +417,7 @@ Dataset File::create_appendable(const std::string& name, const Shape& row) {
   set.where_ = state_->where(name);
   set.path_ = state_->path;
   set.type_ = std::is_integral_v<T> ? Type::integer : Type::floating;
+  set.value_size_ = sizeof(T);
   set.id_ = make_dataset(name, set.shape_, memory_type<T>(), true);
   return set;
 }

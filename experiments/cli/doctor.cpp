@@ -194,14 +194,14 @@ Report examine_character(const Options& options) {
 
 // ---- files with named joints -------------------------------------------------------------------
 
-std::vector<Joints> some_joints(const Prediction& data) {
+std::vector<Joints> some_joints(const PredictionReader& data) {
   std::vector<Joints> out;
-  for (int64_t k = 0; k < std::min<int64_t>(data.frames, 64); ++k) {
-    const int64_t f = k * data.frames / std::min<int64_t>(data.frames, 64);
+  std::vector<double> row;
+  const int64_t some = std::min<int64_t>(data.frames(), 64);
+  for (int64_t k = 0; k < some; ++k) {
+    data.read_joints(k * data.frames() / some, 1, row);
     Joints& joints = out.emplace_back();
-    for (size_t j = 0; j < joints.size(); ++j)
-      joints[j] =
-          Eigen::Map<const Vec3>(data.joints.data() + 3 * (f * kJoints + static_cast<int64_t>(j)));
+    for (size_t j = 0; j < joints.size(); ++j) joints[j] = Eigen::Map<const Vec3>(&row[3 * j]);
   }
   return out;
 }
@@ -229,7 +229,7 @@ Report examine_hdf5(const Options& options) {
                             out.diagnosis ? "--fix writes metres" : "convert it to metres"});
   out.facts["license"] = found.license;
   if (found.kind == "prediction" && found.counts.contains("joints")) {
-    const std::vector<Joints> joints = some_joints(read_prediction(path));
+    const std::vector<Joints> joints = some_joints(PredictionReader(path));
     if (!found.counts.contains("vertices")) out.findings.push_back(examine_skeletons(joints));
     judge_hands(out, joints);
   }
