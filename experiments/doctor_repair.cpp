@@ -7,6 +7,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "autograd/base/format.h"
 #include "datasets/readers/mesh_io.h"
 #include "experiments/doctor_carry.h"
 #include "experiments/text.h"
@@ -212,6 +213,13 @@ FileInfo info_of(const Subject& subject, const Json& note) {
   return info;
 }
 
+/// Of the angle beyond quarter turns.
+std::string turned_words(const Diagnosis& d) {
+  return format(
+      "%.1f degrees about the vertical, to the person's %s, so that they face +z as found",
+      std::abs(d.turned), d.turned > 0 ? "right" : "left");
+}
+
 /// The transform from what the data once were: repairs of a repaired file add up.
 Similarity from_first(const Subject& subject, const Similarity& transform) {
   const auto before = subject.stored ? similarity_from(subject.stored->transform) : std::nullopt;
@@ -302,9 +310,11 @@ Repaired write_repaired(const Subject& subject, const std::string& out, const Di
   Json note = to_json(from_first(subject, *d.transform));
   note["from"] = valid_utf8(name_of(subject.path));
   if (!subject.taken_as.empty()) note["of"] = valid_utf8(subject.taken_as);
+  if (d.turned != 0) note["turned"] = turned_words(d);
   const FileInfo info = info_of(subject, note);
   Repaired done;
   done.file = out;
+  if (d.turned != 0) done.remarks.push_back("turned by " + turned_words(d));
   if (kind == RepairKind::hdf5 && is_prediction(subject)) {
     write_mended_prediction(subject, out, info, d, done.remarks);
     return done;

@@ -57,11 +57,11 @@ Diagnosis doctor_detail::judge_surface(const Mesh& mesh, const PersonShape& shap
                      static_cast<double>(std::max<size_t>(shape.parts.part.size(), 1));
   recognise(d, seen, options);
   judge_units(d);
-  judge_up(d, 1);
-  judge_facing(d, options.target);
+  judge_up(d, seen, options, 1);
+  judge_facing(d, options);
   const Vec3 up = direction(d.orientation.up);
   judge_frame(d, quantile(shape.points, up, kLevel), quantile(shape.points, up, 1 - kLevel));
-  judge_pose(d, shape, options.target);
+  judge_pose(d, shape, options);
   judge_parts(d, shape, "");
   return d;
 }

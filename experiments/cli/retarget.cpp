@@ -126,7 +126,7 @@ void to_metres(const RetargetCommand& c, Points& points) {
 /// The doctor's words on what would make the result nonsense.
 void check_inputs(const RetargetCommand& c, FrameSource& frames, const TargetMesh& target) {
   if (c.options.force) return;
-  check_target(target.mesh, c.target, target.joints ? &*target.joints : nullptr);
+  check_target(target.mesh, c.target, target.known());
   std::vector<Mesh> first;
   while (first.size() < kSourceFrames) {
     auto frame = frames.next();
