@@ -1,8 +1,10 @@
 #include "experiments/doctor_carry.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <functional>
 #include <optional>
+#include <set>
 
 #include "autograd/base/error.h"
 
@@ -23,21 +25,25 @@ Meaning meaning_of(const std::string& name, const h5::Shape& shape) {
 /// What the writer of frames writes itself.
 bool is_written_anyway(const std::string& name) {
   for (const char* known :
-       {"/points", "/frame_offset", "/sequence_offset", "/faces", "/source_to_world"})
+       {"/points", "/frame_offset", "/sequence_offset", "/faces", "/source_to_world", "/filled"})
     if (name == known) return true;
   return false;
 }
 
-/// All data sets of a group and of the groups below it.
-void list_sets(const h5::File& file, const std::string& group, int depth,
-               const std::function<void(const std::string&)>& found) {
+using Visit = std::function<void(const std::string& name)>;
+
+/// All data sets of a group and of the groups below it, and those groups.
+void list_members(const h5::File& file, const std::string& group, int depth, const Visit& set,
+                  const Visit& below) {
   constexpr int kDeepest = 16;  // a group may hold itself
   for (const std::string& child : file.children(group.empty() ? "/" : group)) {
     const std::string name = group + "/" + child;
-    if (!file.is_group(name))
-      found(name);
-    else if (depth < kDeepest)
-      list_sets(file, name, depth + 1, found);
+    if (!file.is_group(name)) {
+      set(name);
+    } else if (depth < kDeepest) {
+      below(name);
+      list_members(file, name, depth + 1, set, below);
+    }
   }
 }
 
@@ -91,6 +97,28 @@ void carry_text(const h5::Dataset& set, const std::string& name, std::span<const
   to.write_text(name, kept);
 }
 
+/// Frames that have no cloud of the source behind them are numbered anew.
+void carry_filled(const h5::File& from, std::span<const int64_t> rows, h5::File& to) {
+  const std::vector<int64_t> was = from.read<int64_t>("/filled", {-1});
+  const std::set<int64_t> filled(was.begin(), was.end());
+  std::vector<int64_t> now;
+  for (int64_t k = 0; k < std::ssize(rows); ++k)
+    if (filled.contains(rows[static_cast<size_t>(k)])) now.push_back(k);
+  to.write<int64_t>("/filled", {std::ssize(now)}, now);
+}
+
+/// The path of a result's source, if it is relative, is so to the result's own folder.
+void move_source_path(const h5::File& from, h5::File& to) {
+  namespace fs = std::filesystem;
+  const std::optional<std::string> path = from.text("/source", "path");
+  if (!path || fs::path(*path).is_absolute()) return;
+  const auto folder = [](const h5::File& file) {
+    return fs::absolute(file.path()).lexically_normal().parent_path();
+  };
+  to.set_text("/source", "path",
+              (folder(from) / *path).lexically_normal().lexically_relative(folder(to)).string());
+}
+
 std::string joined(const std::vector<std::string>& names) {
   std::string out;
   for (const std::string& name : names) out += (out.empty() ? "" : ", ") + name;
@@ -101,9 +129,10 @@ std::string joined(const std::vector<std::string>& names) {
 
 std::vector<std::string> sets_of_frames(const h5::File& file, int64_t frames) {
   std::vector<std::string> out;
-  list_sets(file, "", 0, [&](const std::string& name) {
+  const auto set = [&](const std::string& name) {
     if (!is_written_anyway(name) && set_of_frames(file, name, frames)) out.push_back(name);
-  });
+  };
+  list_members(file, "", 0, set, [](const std::string&) {});
   return out;
 }
 
@@ -114,7 +143,7 @@ void carry_frames(const h5::File& from, int64_t frames, std::span<const int64_t>
     for (const std::string& name : to.copy_attributes(from, object))
       lost_attributes.push_back(name + " of " + object);
   };
-  list_sets(from, "", 0, [&](const std::string& name) {
+  const auto carry_set = [&](const std::string& name) {
     if (is_written_anyway(name)) return;
     const auto set = set_of_frames(from, name, frames);
     const bool text = set && set->type() == h5::Type::text;
@@ -134,8 +163,14 @@ void carry_frames(const h5::File& from, int64_t frames, std::span<const int64_t>
     note_attributes(name);
     if (meaning == Meaning::other && name != "/confidence" && !move.is_identity())
       as_they_stand.push_back(name);
+  };
+  list_members(from, "", 0, carry_set, [&](const std::string& group) {
+    to.create_group(group);
+    note_attributes(group);
   });
   note_attributes("/");
+  if (from.has("/filled")) carry_filled(from, rows, to);
+  if (from.has("/source")) move_source_path(from, to);
   if (!lost.empty())
     remarks.push_back("not kept, without a plain row for every frame: " + joined(lost));
   if (!lost_attributes.empty())

@@ -247,6 +247,8 @@ void tell_losses(const Subject& subject, RepairKind kind, const Diagnosis& d,
     for (const std::string& name : sets_of_frames(open_schema_file(subject.path), d.frames))
       if (name != "/vertices") lost += (lost.empty() ? "" : ", ") + name.substr(1);
   if (!lost.empty()) remarks.push_back(lost + " are not kept; an .h5 file keeps them");
+  if (!subject.taken_as.empty())
+    remarks.push_back("the rig is not kept; retarget takes the character's own file as its target");
   if (!subject.stored)
     remarks.push_back(
         "only points and triangles are kept: no normals, colours, texture coordinates or groups");

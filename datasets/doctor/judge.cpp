@@ -109,10 +109,9 @@ void judge_up(Diagnosis& d, const Seen& seen, const ExamineOptions& options, siz
   d.say(f);
 }
 
-/// Whether a repair turns by the very angle: never where the up axis is in question.
+/// Whether a repair turns by the very angle.
 bool turns_exactly(const Orientation& o) {
-  return o.up_sure >= kSure && o.facing_sure >= kUnsure && o.turned_sure >= kSure &&
-         std::abs(o.turned) > kTurnMatters;
+  return o.is_turn_sure() && std::abs(o.turned) > kTurnMatters;
 }
 
 void judge_facing(Diagnosis& d, const ExamineOptions& options) {

@@ -130,6 +130,13 @@ std::string to_string(const Shape& shape) {
 
 int64_t Dataset::row_size() const { return product(shape_, 1); }
 
+size_t Dataset::value_size() const {
+  const Lock lock;
+  const Handle type(H5Dget_type(id_), H5Tclose);
+  if (type < 0) throw_damaged(where_);
+  return H5Tget_size(type);
+}
+
 void Dataset::check_memory(int64_t values, size_t value_size) const {
   if (static_cast<uint64_t>(values) > kLargestRead / value_size)
     throw InputError(where_, "is too large to read at once", "split it into several files");
@@ -315,7 +322,6 @@ Dataset File::dataset(const std::string& name) const {
   if (type < 0 || space < 0 || creation < 0) throw_damaged(set.where_);
   set.type_ = classify(type, set.where_);
   set.wide_ = set.type_ == Type::integer && is_wide_integer(type);
-  set.value_size_ = H5Tget_size(type);
   set.shape_ = extent_of(space, set.where_);
   check_layout(creation, set.where_);
   const auto stored = std::min<uint64_t>(H5Dget_storage_size(set.id_), file_size(state_->path));
@@ -417,7 +423,6 @@ Dataset File::create_appendable(const std::string& name, const Shape& row) {
   set.where_ = state_->where(name);
   set.path_ = state_->path;
   set.type_ = std::is_integral_v<T> ? Type::integer : Type::floating;
-  set.value_size_ = sizeof(T);
   set.id_ = make_dataset(name, set.shape_, memory_type<T>(), true);
   return set;
 }

@@ -50,7 +50,7 @@ class Dataset {
  public:
   const Shape& shape() const { return shape_; }
   Type type() const { return type_; }
-  size_t value_size() const { return value_size_; }  ///< bytes of one value in the file
+  size_t value_size() const;  ///< bytes of one value in the file
   int64_t rows() const { return shape_.empty() ? 1 : shape_[0]; }
   int64_t row_size() const;                            ///< values in one step of axis 0
   const std::string& where() const { return where_; }  ///< "file:/name", for messages
@@ -77,7 +77,6 @@ class Dataset {
   Handle id_{-1, nullptr};
   Shape shape_;
   Type type_ = Type::floating;
-  size_t value_size_ = 0;
   std::string where_, path_;
   bool wide_ = false;  ///< integers that may not fit int32: 64 bits, or unsigned 32
 };

@@ -190,6 +190,7 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   if (!c.rest.empty()) input.rest = rest_joints(c.rest);
   // The joints that a rig names are where its maker put them, not where a network finds them.
   if (c.rest.empty() && !system_type(c.system).weights) input.rest = target.joints;
+  input.rig = target.joints;
   input.target = std::move(target.mesh);
   input.target_name = c.target;
   const auto system = system_type(c.system).make(std::move(input));
@@ -230,6 +231,9 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   }
   write_all(system->finish());
   sink.commit();
+  if (target.joints && c.rest.empty() && system_type(c.system).weights &&
+      *system->target_joints() == *target.joints)
+    target.report.remark("the network does not see its T-pose: the joints of its rig are taken");
   log_target(target.report);
   if (c.profile) log_profile(profile);
   Json document = {

@@ -234,6 +234,7 @@ void measure(const Surfaces& pred, const Surfaces& truth,
   std::vector<SurfaceMeter*> wanting;
   for (const auto& meter : meters)
     if (meter) wanting.push_back(meter.get());
+  if (wanting.empty()) return;
   const int64_t frames = truth.frames(),
                 step = std::max<int64_t>(1, kBlockBytes / (24 * truth.points()));
   std::vector<double> a, b;
