@@ -121,7 +121,7 @@ void judge_facing(Diagnosis& d, const ExamineOptions& options) {
   f.evidence = options.joints && o.up == 2
                    ? "the rig's joints"
                    : "feet, knees, seat and chest are not the same before and behind";
-  if (o.facing_sure < kUnsure) {
+  if (o.facing_sure < kUnsure && !o.is_turn_sure()) {
     f.weight = Weight::note;
     f.what = cat("which way the person faces cannot be told (perhaps ", kDirections[o.facing], ")");
   } else {
@@ -141,7 +141,7 @@ void judge_facing(Diagnosis& d, const ExamineOptions& options) {
 
 /// The proper turn: as found where that is sure, else as few axes exchanged as possible.
 Mat3 best_turn(const Orientation& o) {
-  if (o.facing_sure >= kUnsure) return o.turn();
+  if (o.facing_sure >= kUnsure || o.is_turn_sure()) return o.turn();
   Orientation guess = o;
   Mat3 best = Mat3::Zero();
   for (guess.facing = 0; guess.facing < 6; ++guess.facing)

@@ -19,7 +19,7 @@ struct Orientation {
   double turned = 0;       ///< degrees from that axis, towards their left; about -45 to 45
   double turned_sure = 0;  ///< probability that the person faces within 45 degrees of that angle
   /// Whether the angle is sure enough to turn by it: never where the up axis is in question.
-  bool is_turn_sure() const { return up_sure >= 0.9 && facing_sure >= 0.5 && turned_sure >= 0.9; }
+  bool is_turn_sure() const { return up_sure >= 0.9 && turned_sure >= 0.9; }
   /// The permutation of axes that brings `up` to +y and `facing` to +z.
   Mat3 turn() const;
   /// The turn that brings `up` to +y and the angle that is `turned` from `facing` to +z.

@@ -224,7 +224,7 @@ TEST(Metrics, SameBitsForAnyNumberOfThreads) {
 /// A long sequence is read some frames at a time: of all frames a few are ever held, and every
 /// metric has the bits that it has of tracks in memory.
 TEST(Metrics, SurfacesThatAreReadHaveTheSameBits) {
-  constexpr int64_t kFrames = 7, kPoints = 200000;
+  constexpr int64_t kFrames = 7, kPoints = 120000;
   std::vector<double> a = noise(3 * kPoints, 14), b = noise(3 * kPoints, 15);
   for (std::vector<double>* one : {&a, &b})  // cheaper than seven times as much noise
     for (int64_t i = 0; i < 3 * kPoints * (kFrames - 1); ++i)
@@ -261,7 +261,7 @@ TEST(Metrics, SurfacesThatAreReadHaveTheSameBits) {
 }
 
 TEST(Metrics, EdgesOfSurfacesThatAreReadHaveTheSameBits) {
-  constexpr int64_t kFrames = 40, kPoints = 30000;
+  constexpr int64_t kFrames = 13, kPoints = 60000;
   std::vector<double> a = noise(3 * kPoints, 18), b = noise(3 * kPoints, 19);
   const auto read = [&](const std::vector<double>& from) {  // all frames alike
     return [&](int64_t, int64_t count, std::vector<double>& out) {
