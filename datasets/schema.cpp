@@ -1,4 +1,5 @@
-// Scan and prediction files, and what all kinds share. Bodies and motions: schema_bodies.cpp.
+// Scan files, and what all kinds share. Bodies and motions: schema_bodies.cpp; predictions:
+// schema_predictions.cpp.
 #include "datasets/schema.h"
 
 #include <cmath>
@@ -7,47 +8,6 @@
 #include "datasets/schema_detail.h"
 
 namespace restage {
-namespace {
-
-const float* floats(const Points& points) { return points.empty() ? nullptr : points[0].data(); }
-
-std::span<const float> as_floats(const Points& points) {
-  return {floats(points), points.size() * 3};
-}
-
-std::array<float, kJoints * 3> flat_joints(const Joints& joints) {
-  std::array<float, kJoints * 3> flat;
-  for (size_t i = 0; i < flat.size(); ++i)
-    flat[i] = static_cast<float>(joints[i / 3][static_cast<int>(i % 3)]);
-  return flat;
-}
-
-/// [0, end] where the file has no offsets of its own.
-std::vector<int64_t> sequence_offsets(const h5::File& file, int64_t frames) {
-  if (!file.has("/sequence_offset")) return {0, frames};
-  return read_offsets(file, "/sequence_offset", frames, true);
-}
-
-void write_sequence_offset(h5::File& file, std::vector<int64_t> offset, int64_t frames) {
-  if (offset.empty()) offset.push_back(0);
-  if (offset.back() != frames) offset.push_back(frames);
-  file.write<int64_t>("/sequence_offset", {static_cast<int64_t>(offset.size())}, offset);
-}
-
-void write_source_to_world(h5::File& file, const Eigen::Matrix<double, 3, 4>& transform) {
-  std::vector<double> rows;
-  for (int r = 0; r < 3; ++r)
-    for (int c = 0; c < 4; ++c) rows.push_back(transform(r, c));
-  file.write<double>("/source_to_world", {3, 4}, rows);
-}
-
-void check_frames(const std::string& where, int64_t frames) {
-  if (frames == 0)
-    throw InputError(where, "holds no frames", "give a file with at least one frame");
-}
-
-}  // namespace
-
 bool is_split(const std::string& name) {
   return name == "train" || name == "validation" || name == "test";
 }
@@ -86,6 +46,28 @@ std::vector<int64_t> read_offsets(const h5::File& file, const std::string& name,
     throw InputError(set.where(), "does not rise from 0 to " + std::to_string(end),
                      "store the start of each part and the end");
   return offset;
+}
+
+std::vector<int64_t> sequence_offsets(const h5::File& file, int64_t frames) {
+  if (!file.has("/sequence_offset")) return {0, frames};
+  return read_offsets(file, "/sequence_offset", frames, true);
+}
+
+void write_sequence_offset(h5::File& file, std::vector<int64_t> offset, int64_t frames) {
+  if (offset.empty()) offset.push_back(0);
+  if (offset.back() != frames) offset.push_back(frames);
+  file.write<int64_t>("/sequence_offset", {static_cast<int64_t>(offset.size())}, offset);
+}
+
+std::span<const float> as_floats(const Points& points) {
+  return {points.empty() ? nullptr : points[0].data(), points.size() * 3};
+}
+
+std::array<float, kJoints * 3> flat_joints(const Joints& joints) {
+  std::array<float, kJoints * 3> flat;
+  for (size_t i = 0; i < flat.size(); ++i)
+    flat[i] = static_cast<float>(joints[i / 3][static_cast<int>(i % 3)]);
+  return flat;
 }
 
 std::vector<Triangle> read_faces(const h5::File& file, const std::string& name, int64_t vertices) {
@@ -185,137 +167,6 @@ void ScanWriter::commit() {
   file_.write<int64_t>("/frame_offset", {static_cast<int64_t>(frame_offset_.size())},
                        frame_offset_);
   write_sequence_offset(file_, sequence_offset_, static_cast<int64_t>(frame_offset_.size()) - 1);
-  file_.commit();
-}
-
-// ---- predictions -------------------------------------------------------------------------------
-
-static std::vector<double> confidence_in(const h5::File& file, int64_t frames) {
-  if (!file.has("/confidence")) return {};
-  const h5::Dataset set = file.dataset("/confidence", {frames});
-  std::vector<double> out = read_finite<double>(file, "/confidence", {frames});
-  for (const double x : out)
-    if (!(x >= 0 && x <= 1))
-      throw InputError(set.where(), "holds a number that is no confidence", "give 0 to 1");
-  return out;
-}
-
-std::vector<double> read_confidence(const std::string& path, int64_t sequence) {
-  const h5::File file = open_schema_file(path);
-  if (!file.has("/confidence")) return {};
-  const std::vector<double> all = confidence_in(file, file.dataset("/confidence", {-1}).rows());
-  const std::vector<int64_t> offset = sequence_offsets(file, std::ssize(all));
-  const auto s = static_cast<size_t>(sequence);
-  if (sequence < 0 || s + 1 >= offset.size()) return {};
-  return {all.begin() + offset[s], all.begin() + offset[s + 1]};
-}
-
-static std::vector<double> radius_in(const h5::File& file, int64_t frames) {
-  if (!file.has("/radius")) return {};
-  const h5::Dataset set = file.dataset("/radius", {frames, kJoints});
-  std::vector<double> out = read_finite<double>(file, "/radius", {frames, kJoints});
-  for (const double x : out)
-    if (!(x > 0)) throw InputError(set.where(), "holds a number that is no radius", "give metres");
-  return out;
-}
-
-Prediction read_prediction(const std::string& path) {
-  const h5::File file = open_schema_file(path);
-  const bool has_joints = file.has("/joints"), has_vertices = file.has("/vertices");
-  if (!has_joints && !has_vertices)
-    throw InputError(path + ":/joints", "is missing, and so is /vertices",
-                     "give a file with /joints [F, 22, 3] or /vertices [F, V, 3]");
-  Prediction out;
-  int64_t joint_frames = -1, vertex_frames = -1;
-  if (has_joints) {
-    joint_frames = file.dataset("/joints", {-1, kJoints, 3}).rows();
-    check_frames(path + ":/joints", joint_frames);
-  }
-  if (has_vertices) {
-    const h5::Dataset set = file.dataset("/vertices", {-1, -1, 3});
-    vertex_frames = set.rows();
-    out.vertex_count = set.shape()[1];
-    check_frames(set.where(), vertex_frames);
-    if (out.vertex_count == 0)
-      throw InputError(set.where(), "holds no vertices", "leave it out or fill it");
-  }
-  if (has_joints && has_vertices && joint_frames != vertex_frames)
-    throw InputError(path + ":/vertices",
-                     "has " + std::to_string(vertex_frames) + " frames but /joints has " +
-                         std::to_string(joint_frames),
-                     "store the same frames in both");
-  out.frames = has_joints ? joint_frames : vertex_frames;
-  out.sequence_offset = sequence_offsets(file, out.frames);
-  if (has_joints) out.joints = read_finite<double>(file, "/joints", {-1, kJoints, 3});
-  if (has_vertices) out.vertices = read_finite<double>(file, "/vertices", {-1, -1, 3});
-  if (file.has("/faces"))
-    out.faces = read_faces(file, "/faces", has_vertices ? out.vertex_count : int64_t{1} << 31);
-  out.confidence = confidence_in(file, out.frames);
-  out.radius = radius_in(file, out.frames);
-  return out;
-}
-
-void write_prediction(const std::string& path, const Prediction& prediction, const FileInfo& info) {
-  h5::File file = create_schema_file(path, "prediction", info);
-  if (!prediction.joints.empty())
-    file.write<double>("/joints", {prediction.frames, kJoints, 3}, prediction.joints);
-  if (!prediction.vertices.empty())
-    file.write<double>("/vertices", {prediction.frames, prediction.vertex_count, 3},
-                       prediction.vertices);
-  write_sequence_offset(file, prediction.sequence_offset, prediction.frames);
-  if (!prediction.faces.empty()) write_faces(file, "/faces", prediction.faces);
-  file.set_number("/", "fps", prediction.fps);
-  if (prediction.source_to_world) write_source_to_world(file, *prediction.source_to_world);
-  file.commit();
-}
-
-PredictionWriter::PredictionWriter(const std::string& path, int64_t vertex_count,
-                                   const std::vector<Triangle>& faces, const FileInfo& info,
-                                   double fps)
-    : file_(create_schema_file(path, "prediction", info)),
-      vertex_count_(vertex_count),
-      joints_(file_.create_appendable<float>("/joints", {kJoints, 3})) {
-  file_.set_number("/", "fps", fps);
-  if (vertex_count > 0) vertices_ = file_.create_appendable<float>("/vertices", {vertex_count, 3});
-  if (!faces.empty()) write_faces(file_, "/faces", faces);
-}
-
-void PredictionWriter::append(const Joints& joints, const Points& vertices,
-                              std::optional<double> confidence) {
-  if (static_cast<int64_t>(vertices.size()) != vertex_count_)
-    throw ShapeError("prediction writer: " + std::to_string(vertices.size()) +
-                     " vertices instead of " + std::to_string(vertex_count_));
-  joints_.append<float>(flat_joints(joints));
-  if (vertices_) vertices_->append<float>(as_floats(vertices));
-  if (confidence) confidence_.push_back(static_cast<float>(*confidence));
-}
-
-void PredictionWriter::append_joints(const Joints& joints,
-                                     const std::array<double, kJoints>& radius) {
-  append(joints, {});
-  radius_.insert(radius_.end(), radius.begin(), radius.end());
-}
-
-void PredictionWriter::set_source_to_world(const Eigen::Matrix<double, 3, 4>& transform) {
-  write_source_to_world(file_, transform);
-}
-
-void PredictionWriter::end_sequence() {
-  if (sequence_offset_.back() != joints_.rows()) sequence_offset_.push_back(joints_.rows());
-}
-
-void PredictionWriter::commit() {
-  if (!confidence_.empty()) {
-    if (std::ssize(confidence_) != joints_.rows())
-      throw ShapeError("prediction writer: confidence for some frames only");
-    file_.write<float>("/confidence", {joints_.rows()}, confidence_);
-  }
-  if (!radius_.empty()) {
-    if (std::ssize(radius_) != joints_.rows() * static_cast<int64_t>(kJoints))
-      throw ShapeError("prediction writer: radius for some frames only");
-    file_.write<float>("/radius", {joints_.rows(), kJoints}, radius_);
-  }
-  write_sequence_offset(file_, sequence_offset_, joints_.rows());
   file_.commit();
 }
 

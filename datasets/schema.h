@@ -85,6 +85,7 @@ class ScanWriter {
   void end_sequence();  ///< the next cloud starts another sequence; the last one ends by itself
   /// Takes back what was appended since the last end_sequence().
   void drop_sequence();
+  h5::File& file() { return file_; }  ///< for data sets beside those of a scan file
   void commit();
 
  private:
@@ -105,15 +106,37 @@ struct Prediction {
   std::vector<Triangle> faces;           ///< empty if absent
   std::vector<double> confidence;        ///< F, 0 to 1; empty if absent
   std::vector<double> radius;            ///< F x 22, metres (see PredictionWriter); empty if absent
-  // Written, not read:
-  double fps = kFps;
-  /// PredictionWriter::set_source_to_world().
-  std::optional<Eigen::Matrix<double, 3, 4>> source_to_world;
+  double fps = kFps;                     ///< written, not read
 };
 
 /// /joints [F,22,3] and /vertices [F,V,3] (float32 or float64, either may be absent),
 /// /sequence_offset [S+1], /faces [T,3], /confidence [F] and /radius [F,22] (all optional).
 Prediction read_prediction(const std::string& path);
+
+/// The same some frames at a time, as surfaces are large. Opening it checks shapes and offsets.
+class PredictionReader {
+ public:
+  explicit PredictionReader(const std::string& path);
+  int64_t frames() const { return frames_; }
+  int64_t vertex_count() const { return vertex_count_; }
+  bool has_joints() const { return joints_.has_value(); }
+  bool has_vertices() const { return vertices_.has_value(); }
+  const std::vector<int64_t>& sequence_offset() const { return sequence_offset_; }
+  /// Frames [first, first + count), count x 22 x 3 and count x V x 3.
+  void read_joints(int64_t first, int64_t count, std::vector<double>& out) const;
+  void read_vertices(int64_t first, int64_t count, std::vector<double>& out) const;
+  /// All of the file but its vertices: some hundred bytes a frame.
+  Prediction read_small() const;
+  /// Looks at every value; InputError as read_prediction().
+  void check() const;
+
+ private:
+  h5::File file_;
+  std::optional<h5::Dataset> joints_, vertices_;
+  int64_t frames_ = 0, vertex_count_ = 0;
+  std::vector<int64_t> sequence_offset_;
+};
+
 /// Of one sequence of a file; empty where there is none.
 std::vector<double> read_confidence(const std::string& path, int64_t sequence);
 void write_prediction(const std::string& path, const Prediction& prediction, const FileInfo& info);
@@ -169,6 +192,8 @@ std::vector<std::string> verify(const std::string& path);
 
 // ---- pieces that readers share ------------------------------------------------------------------
 
+/// A new file with the attributes of every kind; `kind` may be corrected before commit().
+h5::File create_schema_file(const std::string& path, const std::string& kind, const FileInfo& info);
 /// Opens and checks the schema version.
 h5::File open_schema_file(const std::string& path);
 /// Reads offsets and checks that they rise (strictly, if asked) from 0 to `end`.

@@ -1,9 +1,12 @@
 // Shared by schema*.cpp and the readers only.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -11,9 +14,6 @@
 #include "datasets/schema.h"
 
 namespace restage {
-
-/// A new file with the attributes of every kind; `kind` may be corrected before commit().
-h5::File create_schema_file(const std::string& path, const std::string& kind, const FileInfo& info);
 
 /// InputError with row and value if one is NaN or infinite.
 template <class T>
@@ -34,6 +34,35 @@ std::vector<T> read_finite(const h5::File& file, const std::string& name, const 
   check_finite(set.where(), values, std::max<int64_t>(set.row_size(), 1));
   return values;
 }
+
+/// Shows a data set's values to `look(values, first row, rows)` some rows at a time, in order.
+template <class T, class Look>
+void for_blocks(const h5::Dataset& set, Look&& look) {
+  constexpr int64_t kBlock = int64_t{4} << 20;  // bytes
+  const int64_t row = std::max<int64_t>(set.row_size(), 1) * static_cast<int64_t>(sizeof(T)),
+                step = std::max<int64_t>(1, kBlock / row);
+  std::vector<T> values;
+  for (int64_t first = 0; first < set.rows(); first += step) {
+    const int64_t rows = std::min(step, set.rows() - first);
+    set.read_rows(first, rows, values);
+    look(values, first, rows);
+  }
+}
+
+/// check_finite() of a whole data set, in memory that does not grow with it.
+template <class T>
+void check_all_finite(const h5::Dataset& set) {
+  for_blocks<T>(set, [&](const std::vector<T>& values, int64_t first, int64_t) {
+    check_finite(set.where(), values, std::max<int64_t>(set.row_size(), 1), first);
+  });
+}
+
+/// Where sequences begin, and the end; [0, frames] where the file does not say.
+std::vector<int64_t> sequence_offsets(const h5::File& file, int64_t frames);
+void write_sequence_offset(h5::File& file, std::vector<int64_t> offset, int64_t frames);
+/// What data sets of points and of joints hold.
+std::span<const float> as_floats(const Points& points);
+std::array<float, kJoints * 3> flat_joints(const Joints& joints);
 
 /// Faces [T,3]; every index is checked against the number of vertices.
 std::vector<Triangle> read_faces(const h5::File& file, const std::string& name, int64_t vertices);

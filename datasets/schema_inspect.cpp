@@ -110,10 +110,11 @@ void verify_members(const h5::File& file, std::vector<std::string>& problems) {
 }
 
 void verify_scans(const h5::File& file) {
-  const int64_t frames = read_scans(file.path()).frames();
-  if (!file.has("/joints")) return;
-  const h5::Dataset joints = file.dataset("/joints", {frames, kJoints, 3});
-  check_finite(joints.where(), joints.read<double>(), kJoints * 3);
+  const h5::Dataset points = file.dataset("/points", {-1, 3});
+  check_all_finite<float>(points);
+  const int64_t frames = std::ssize(read_offsets(file, "/frame_offset", points.rows(), false)) - 1;
+  sequence_offsets(file, frames);
+  if (file.has("/joints")) check_all_finite<double>(file.dataset("/joints", {frames, kJoints, 3}));
 }
 
 }  // namespace
@@ -158,7 +159,7 @@ std::vector<std::string> verify(const std::string& path) {
   if (kind == "scans") {
     collect(problems, [&] { verify_scans(file); });
   } else if (kind == "prediction")
-    collect(problems, [&] { read_prediction(path); });
+    collect(problems, [&] { PredictionReader(path).check(); });
   else
     collect(problems, [&] { verify_members(file, problems); });
   return problems;

@@ -65,7 +65,7 @@ Prediction retargeted_scans(const Bundle& weights, const std::string& folder,
                             const WorldMap& to_world, const BenchmarkOptions& how) {
   const std::string source = in(folder, "source.h5");
   PredictionFile source_joints(source);
-  to_world.carry(source_joints.data.joints, false);
+  source_joints.carry(to_world, false);
   const PredictionFile rest(in(folder, "rest.h5"));
   const Scratch scratch;
   const std::string mended = scratch.file("mended.h5");
@@ -125,7 +125,7 @@ void judge(const Bundle& weights, const std::string& folder, bool scans,
   const std::optional<WorldMap> to_world = source_to_world(truth.path);
   if (scans && !to_world)
     throw InputError(truth.path, "does not say where its scans are", "build the benchmark again");
-  if (to_world) to_world->carry(source.data.joints, false);
+  if (to_world) source.carry(*to_world, false);
   // Frames that a system leaves out are left out of the comparison, so references would be of
   // other frames than those of systems that do not.
   if (how.every == 1)

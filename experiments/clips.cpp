@@ -1,5 +1,7 @@
 #include "experiments/clips.h"
 
+#include <utility>
+
 #include "autograd/base/error.h"
 #include "datasets/readers/frame_folder.h"
 #include "datasets/schema.h"
@@ -15,18 +17,19 @@ bool ends_with_hdf5(const std::string& path) {
 
 /// Of one sequence.
 std::vector<Joints> read_joints(const std::string& path, int64_t sequence) {
-  const Prediction data = read_prediction(path);
+  const PredictionReader data(path);
   const auto s = static_cast<size_t>(sequence);
-  if (sequence < 0 || s + 1 >= data.sequence_offset.size())
+  if (sequence < 0 || s + 1 >= data.sequence_offset().size())
     throw InputError(path, "has no sequence number " + std::to_string(sequence),
                      "count sequences from 0");
-  if (data.joints.empty()) throw InputError(path + ":/joints", "is missing", "leave --focus out");
+  if (!data.has_joints()) throw InputError(path + ":/joints", "is missing", "leave --focus out");
   std::vector<Joints> out;
-  for (int64_t f = data.sequence_offset[s]; f < data.sequence_offset[s + 1]; ++f)
-    for (size_t j = 0; j < kJoints; ++j) {
-      if (j == 0) out.emplace_back();
-      out.back()[j] = Eigen::Map<const Vec3>(data.joints.data() + 3 * (f * kJoints + j));
-    }
+  std::vector<double> row;
+  for (int64_t f = data.sequence_offset()[s]; f < data.sequence_offset()[s + 1]; ++f) {
+    data.read_joints(f, 1, row);
+    Joints& joints = out.emplace_back();
+    for (size_t j = 0; j < kJoints; ++j) joints[j] = Eigen::Map<const Vec3>(&row[3 * j]);
+  }
   return out;
 }
 
@@ -45,10 +48,9 @@ bool has_joints_only(const std::string& path) {
   return found.kind == "prediction" && found.counts.count("vertices") == 0;
 }
 
-std::vector<double> coordinates(const Clip& clip) {
+std::vector<double> coordinates(const Points& frame) {
   std::vector<double> out;
-  for (const Points& frame : clip.frames)
-    for (const Point& p : frame) out.insert(out.end(), p.begin(), p.end());
+  for (const Point& p : frame) out.insert(out.end(), p.begin(), p.end());
   return out;
 }
 
@@ -85,14 +87,14 @@ bool add_errors(const Clip& truth, Clip* result) {
   if (result->faces.empty() || truth.faces.empty() || truth.frames.size() != frames ||
       truth.frames[0].size() != vertices)
     return false;
-  const std::vector<double> a = coordinates(*result), b = coordinates(truth);
-  const auto track = [&](const std::vector<double>& values) {
-    return metrics::Track{values.data(), static_cast<int64_t>(frames),
-                          static_cast<int64_t>(vertices)};
-  };
-  const auto off = metrics::distances(track(a), track(b), {metrics::Alignment::Mode::frame});
-  for (auto at = off.begin(); at != off.end(); at += static_cast<std::ptrdiff_t>(vertices))
-    result->errors.emplace_back(at, at + static_cast<std::ptrdiff_t>(vertices));
+  for (size_t f = 0; f < frames; ++f) {
+    const std::vector<double> a = coordinates(std::as_const(result->frames)[f]),
+                              b = coordinates(truth.frames[f]);
+    const auto n = static_cast<int64_t>(vertices);
+    const auto off =
+        metrics::distances({a.data(), 1, n}, {b.data(), 1, n}, {metrics::Alignment::Mode::frame});
+    result->errors.emplace_back(off.begin(), off.end());
+  }
   return true;
 }
 

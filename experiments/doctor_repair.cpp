@@ -7,7 +7,9 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "autograd/base/format.h"
 #include "datasets/readers/mesh_io.h"
+#include "experiments/doctor_carry.h"
 #include "experiments/text.h"
 #include "infer/writers/frames.h"
 
@@ -72,32 +74,30 @@ class FolderSink final : public Sink {
   int64_t written_ = 0;
 };
 
-/// Scans, with the true joints where the source has them.
+/// Scans, with all that the source holds of every frame.
 class ScanSink final : public Sink {
  public:
-  ScanSink(const std::string& out, const FileInfo& info, const Subject& subject, const Diagnosis& d)
-      : writer_(out, info, rate(d)), transform_(*d.transform) {
-    if (!subject.stored || !subject.stored->counts.contains("joints")) return;
-    file_.emplace(open_schema_file(subject.path));
-    joints_.emplace(file_->dataset("/joints", {d.frames, kJoints, 3}));
-  }
+  ScanSink(const std::string& out, const FileInfo& info, const Subject& subject, const Diagnosis& d,
+           std::vector<std::string>& remarks)
+      : writer_(out, info, rate(d)), subject_(subject), d_(d), remarks_(remarks) {}
   void push(const Mesh& mesh, int64_t from) override {
-    if (!joints_) return writer_.append(mesh.vertices);
-    joints_->read_rows(from, 1, row_);
-    Joints joints;
-    for (size_t j = 0; j < joints.size(); ++j)
-      joints[j] = transform_(Vec3(row_[3 * j], row_[3 * j + 1], row_[3 * j + 2]));
-    writer_.append(mesh.vertices, joints);
+    writer_.append(mesh.vertices);
+    rows_.push_back(from);
   }
   void end_sequence() override { writer_.end_sequence(); }
-  void commit() override { writer_.commit(); }
+  void commit() override {
+    if (subject_.stored)
+      carry_frames(open_schema_file(subject_.path), d_.frames, rows_, *d_.transform, writer_.file(),
+                   remarks_);
+    writer_.commit();
+  }
 
  private:
   ScanWriter writer_;
-  Similarity transform_;
-  std::optional<h5::File> file_;  // of the source
-  std::optional<h5::Dataset> joints_;
-  std::vector<double> row_;
+  const Subject& subject_;
+  const Diagnosis& d_;
+  std::vector<std::string>& remarks_;
+  std::vector<int64_t> rows_;  // of the source, one for each frame
 };
 
 // ---- from where they come ----------------------------------------------------------------------
@@ -149,43 +149,34 @@ void mend_frames(const Subject& subject, const Diagnosis& d, Mender& mend, Sink&
   }
 }
 
-/// Joints and vertices of every frame that is kept, all of them: their numbers are what the truth
-/// of `restage eval` goes by.
+/// Every frame that is kept, with all its vertices: their numbers are what the truth of `restage
+/// eval` goes by.
 void write_mended_prediction(const Subject& subject, const std::string& out, const FileInfo& info,
-                             const Diagnosis& d) {
-  const Prediction data = read_prediction(subject.path);
-  Prediction kept;
-  kept.vertex_count = data.vertex_count;
-  kept.faces = data.faces;
-  kept.fps = rate(d);
-  const auto copy = [&](const std::vector<double>& from, int64_t frame, int64_t row,
-                        std::vector<double>& to) {
-    if (from.empty()) return;
-    for (int64_t i = 3 * frame * row; i < 3 * (frame + 1) * row; i += 3) {
-      const Vec3 p = (*d.transform)(Vec3(Eigen::Map<const Vec3>(&from[i])));
-      to.insert(to.end(), p.begin(), p.end());
-    }
-  };
-  for (int64_t f = 0, sequence = 0; f < data.frames; ++f) {
-    if (f == data.sequence_offset[sequence]) {
-      kept.sequence_offset.push_back(kept.frames);
-      ++sequence;
-    }
-    if (f % d.keep_every != 0) continue;
-    copy(data.joints, f, kJoints, kept.joints);
-    copy(data.vertices, f, data.vertex_count, kept.vertices);
-    ++kept.frames;
+                             const Diagnosis& d, std::vector<std::string>& remarks) {
+  const PredictionReader reader(subject.path);
+  const h5::File from = open_schema_file(subject.path);
+  h5::File to = create_schema_file(out, "prediction", info);
+  to.set_number("/", "fps", rate(d));
+  std::vector<int64_t> rows, sequence_offset{0};
+  for (size_t s = 0; s + 1 < reader.sequence_offset().size(); ++s) {
+    for (int64_t f = reader.sequence_offset()[s]; f < reader.sequence_offset()[s + 1]; ++f)
+      if (f % d.keep_every == 0) rows.push_back(f);
+    if (std::ssize(rows) > sequence_offset.back()) sequence_offset.push_back(std::ssize(rows));
   }
-  kept.sequence_offset.push_back(kept.frames);
-  const h5::File file = open_schema_file(subject.path);
-  if (file.has("/source_to_world")) {  // p' = s R (A x + b - t)
-    const std::vector<double> m = file.read<double>("/source_to_world", {3, 4});
-    Eigen::Matrix<double, 3, 4> map =
-        Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(m.data());
+  to.write<int64_t>("/sequence_offset", {std::ssize(sequence_offset)}, sequence_offset);
+  if (from.has("/faces"))
+    to.write<int32_t>("/faces", from.dataset("/faces").shape(),
+                      from.read<int32_t>("/faces", {-1, 3}));
+  if (from.has("/source_to_world")) {  // p' = s R (A x + b - t)
+    const std::vector<double> m = from.read<double>("/source_to_world", {3, 4});
+    using Rows = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
+    Rows map = Eigen::Map<const Rows>(m.data());
     map.col(3) -= d.transform->offset;
-    kept.source_to_world = d.transform->scale * d.transform->rotation * map;
+    map = (d.transform->scale * d.transform->rotation * map).eval();
+    to.write<double>("/source_to_world", {3, 4}, std::span<const double>(map.data(), 12));
   }
-  write_prediction(out, kept, info);
+  carry_frames(from, reader.frames(), rows, *d.transform, to, remarks);
+  to.commit();
 }
 
 // ---- what is said of it ------------------------------------------------------------------------
@@ -222,6 +213,13 @@ FileInfo info_of(const Subject& subject, const Json& note) {
   return info;
 }
 
+/// Of the angle beyond quarter turns.
+std::string turned_words(const Diagnosis& d) {
+  return format(
+      "%.1f degrees about the vertical, to the person's %s, so that they face +z as found",
+      std::abs(d.turned), d.turned > 0 ? "right" : "left");
+}
+
 /// The transform from what the data once were: repairs of a repaired file add up.
 Similarity from_first(const Subject& subject, const Similarity& transform) {
   const auto before = subject.stored ? similarity_from(subject.stored->transform) : std::nullopt;
@@ -229,8 +227,9 @@ Similarity from_first(const Subject& subject, const Similarity& transform) {
 }
 
 std::unique_ptr<Sink> make_sink(const Subject& subject, const std::string& out, RepairKind kind,
-                                const FileInfo& info, const Diagnosis& d) {
-  if (kind == RepairKind::hdf5) return std::make_unique<ScanSink>(out, info, subject, d);
+                                const FileInfo& info, const Diagnosis& d,
+                                std::vector<std::string>& remarks) {
+  if (kind == RepairKind::hdf5) return std::make_unique<ScanSink>(out, info, subject, d, remarks);
   if (kind == RepairKind::folder) return std::make_unique<FolderSink>(out, rate(d));
   return std::make_unique<MeshSink>(out, kind == RepairKind::obj);
 }
@@ -243,8 +242,13 @@ void tell_losses(const Subject& subject, RepairKind kind, const Diagnosis& d,
                       std::string(rate(d) < kFps ? "repeated" : "thinned") +
                       " for that; an .h5 file keeps each once, and their rate");
   if (kind == RepairKind::hdf5) return;
-  if (subject.stored && subject.stored->counts.contains("joints"))
-    remarks.push_back("joints are not kept; an .h5 file keeps them");
+  std::string lost;
+  if (subject.stored)
+    for (const std::string& name : sets_of_frames(open_schema_file(subject.path), d.frames))
+      if (name != "/vertices") lost += (lost.empty() ? "" : ", ") + name.substr(1);
+  if (!lost.empty()) remarks.push_back(lost + " are not kept; an .h5 file keeps them");
+  if (!subject.taken_as.empty())
+    remarks.push_back("the rig is not kept; retarget takes the character's own file as its target");
   if (!subject.stored)
     remarks.push_back(
         "only points and triangles are kept: no normals, colours, texture coordinates or groups");
@@ -308,11 +312,13 @@ Repaired write_repaired(const Subject& subject, const std::string& out, const Di
   Json note = to_json(from_first(subject, *d.transform));
   note["from"] = valid_utf8(name_of(subject.path));
   if (!subject.taken_as.empty()) note["of"] = valid_utf8(subject.taken_as);
+  if (d.turned != 0) note["turned"] = turned_words(d);
   const FileInfo info = info_of(subject, note);
   Repaired done;
   done.file = out;
+  if (d.turned != 0) done.remarks.push_back("turned by " + turned_words(d));
   if (kind == RepairKind::hdf5 && is_prediction(subject)) {
-    write_mended_prediction(subject, out, info, d);
+    write_mended_prediction(subject, out, info, d, done.remarks);
     return done;
   }
   // It has to be possible to write both before either appears.
@@ -325,7 +331,7 @@ Repaired write_repaired(const Subject& subject, const std::string& out, const Di
     side.emplace(done.transform_file);
     side->write(note.dump(2) + "\n");
   }
-  const auto sink = make_sink(subject, out, kind, info, d);
+  const auto sink = make_sink(subject, out, kind, info, d, done.remarks);
   Mender mend(out, d);
   mend_frames(subject, d, mend, *sink);
   sink->commit();

@@ -9,6 +9,7 @@ namespace restage {
 namespace {
 
 using metrics::SequenceView;
+using metrics::Surfaces;
 using metrics::Track;
 
 std::string counted(int64_t n, const std::string& what) { return std::to_string(n) + " " + what; }
@@ -20,31 +21,84 @@ void append(const std::vector<Joints>& frames, std::vector<double>* values) {
 
 /// Frames of the references, as if they had been predicted.
 struct Made {
-  std::vector<double> rest_pose, closed_form, rest_vertices;
+  std::vector<double> rest_pose, closed_form;
 };
 
-void make(const std::vector<Joints>& source, const PredictionFile& rest, int64_t row, Made* out) {
-  const Joints target = joints_of(rest.joints().slice(row, row + 1))[0];
-  const std::vector<Joints> carried = rest_pose_joints(source, target);
-  append(carried, &out->rest_pose);
+void make(const std::vector<Joints>& source, const Joints& target, Made* out) {
+  append(rest_pose_joints(source, target), &out->rest_pose);
   append(closed_form_joints(source, target), &out->closed_form);
-  if (!rest.vertices().present()) return;
-  for (const Joints& joints : carried)
-    for (int64_t v = 0; v < rest.data.vertex_count; ++v) {
-      const Vec3 moved = rest.vertices().at(row, v) + joints[0] - target[0];
-      out->rest_vertices.insert(out->rest_vertices.end(), {moved.x(), moved.y(), moved.z()});
-    }
 }
 
+/// The target's rest surface, carried as its pelvis is, frame by frame.
+class CarriedRest {
+ public:
+  CarriedRest(Surfaces rest, std::vector<int64_t> offset)
+      : rest_(rest), offset_(std::move(offset)) {}
+  /// Of the next sequence: its row of the rest surfaces, the pelvis there and in every frame.
+  void add_sequence(int64_t row, const Vec3& pelvis) { targets_.push_back({row, pelvis}); }
+  void set_path(std::span<const double> rest_pose) { rest_pose_ = rest_pose; }
+
+  void read(int64_t first, int64_t count, std::vector<double>& out) {
+    out.clear();
+    for (int64_t f = first; f < first + count; ++f) {
+      const auto next = std::upper_bound(offset_.begin(), offset_.end(), f);
+      const auto& [row, pelvis] = targets_[static_cast<size_t>(next - offset_.begin() - 1)];
+      if (row != held_) surface_ = rest_.block(row, 1, memory_);
+      held_ = row;
+      const Vec3 path = Eigen::Map<const Vec3>(&rest_pose_[static_cast<size_t>(3 * f * kJoints)]);
+      for (int64_t v = 0; v < surface_.points; ++v) {
+        const Vec3 moved = surface_.at(0, v) + path - pelvis;
+        out.insert(out.end(), moved.begin(), moved.end());
+      }
+    }
+  }
+
+ private:
+  struct Target {
+    int64_t row;
+    Vec3 pelvis;
+  };
+  Surfaces rest_;
+  std::vector<int64_t> offset_;
+  std::vector<Target> targets_;
+  std::span<const double> rest_pose_;
+  std::vector<double> memory_;
+  Track surface_;
+  int64_t held_ = -1;
+};
+
 }  // namespace
+
+PredictionFile::PredictionFile(const std::string& name) : path(name) {
+  const auto reader = std::make_shared<PredictionReader>(name);
+  data = reader->read_small();
+  if (reader->has_vertices()) reader_ = reader;
+}
 
 Track PredictionFile::joints() const {
   return data.joints.empty() ? Track{} : Track{data.joints.data(), data.frames, kJoints};
 }
 
-Track PredictionFile::vertices() const {
-  return data.vertices.empty() ? Track{}
-                               : Track{data.vertices.data(), data.frames, data.vertex_count};
+Surfaces PredictionFile::vertices() const {
+  if (reader_ == nullptr)
+    return data.vertices.empty() ? Track{}
+                                 : Track{data.vertices.data(), data.frames, data.vertex_count};
+  const auto rows = std::make_shared<const std::vector<int64_t>>(rows_);
+  const auto read = [reader = reader_, rows, move = move_](int64_t first, int64_t count,
+                                                           std::vector<double>& out) {
+    if (rows->empty()) {
+      reader->read_vertices(first, count, out);
+    } else {
+      out.clear();
+      std::vector<double> row;
+      for (int64_t f = first; f < first + count; ++f) {
+        reader->read_vertices((*rows)[static_cast<size_t>(f)], 1, row);
+        out.insert(out.end(), row.begin(), row.end());
+      }
+    }
+    if (move) move(out);
+  };
+  return {data.frames, data.vertex_count, read};
 }
 
 void PredictionFile::thin(int64_t step) {
@@ -64,6 +118,21 @@ void PredictionFile::thin(int64_t step) {
   }
   data.frames = std::ssize(kept);
   data.sequence_offset = std::move(offset);
+  if (rows_.empty()) {
+    rows_ = std::move(kept);
+    return;
+  }
+  for (int64_t& f : kept) f = rows_[static_cast<size_t>(f)];
+  rows_ = std::move(kept);
+}
+
+void PredictionFile::carry(const WorldMap& map, bool rigid, double stretched) {
+  map.carry(data.joints, rigid, stretched);
+  map.carry(data.vertices, rigid, stretched);
+  move_ = [before = move_, map, rigid, stretched](std::span<double> points) {
+    if (before) before(points);
+    map.carry(points, rigid, stretched);
+  };
 }
 
 void check_same_frames(const PredictionFile& file, const PredictionFile& truth) {
@@ -75,12 +144,13 @@ void check_same_frames(const PredictionFile& file, const PredictionFile& truth) 
 }
 
 std::vector<SequenceView> cut(const std::vector<int64_t>& offset, const Track& joints,
-                              const Track& vertices, const PredictionFile& truth) {
+                              const Surfaces& vertices, const PredictionFile& truth) {
   std::vector<SequenceView> views;
+  const Surfaces true_vertices = truth.vertices();
   for (size_t s = 0; s + 1 < offset.size(); ++s) {
     const int64_t begin = offset[s], end = offset[s + 1];
     views.push_back({joints.slice(begin, end), truth.joints().slice(begin, end),
-                     vertices.slice(begin, end), truth.vertices().slice(begin, end), end - begin});
+                     vertices.slice(begin, end), true_vertices.slice(begin, end), end - begin});
   }
   return views;
 }
@@ -99,20 +169,27 @@ References references(const PredictionFile& source, const PredictionFile& rest,
                      "has " + counted(rows, "skeletons for ") + counted(sequences, "sequences"),
                      "give the rest joints of one body, or one row for every sequence");
   Made made;
+  const auto carried = std::make_shared<CarriedRest>(rest.vertices(), offset);
   for (int64_t s = 0; s < sequences; ++s) {
     const auto i = static_cast<size_t>(s);
     const int64_t row = rows == 1 ? 0 : rows == source.data.frames ? offset[i] : s;
-    make(joints_of(source.joints().slice(offset[i], offset[i + 1])), rest, row, &made);
+    const Joints target = joints_of(rest.joints().slice(row, row + 1))[0];
+    make(joints_of(source.joints().slice(offset[i], offset[i + 1])), target, &made);
+    carried->add_sequence(row, target[0]);
   }
-  const auto score = [&](const Track& joints, const Track& vertices) {
+  carried->set_path(made.rest_pose);
+  const auto score = [&](const Track& joints, const Surfaces& vertices) {
     return metrics::evaluate(cut(offset, joints, vertices, truth), metrics);
   };
   const int64_t frames = source.data.frames;
-  const bool surfaces = !made.rest_vertices.empty() && truth.vertices().present() &&
-                        truth.data.vertex_count == rest.data.vertex_count;
-  const Track carried =
-      surfaces ? Track{made.rest_vertices.data(), frames, rest.data.vertex_count} : Track{};
-  return {{"rest_pose", score({made.rest_pose.data(), frames, kJoints}, carried)},
+  Surfaces surfaces;
+  if (rest.vertices().present() && truth.vertices().present() &&
+      truth.data.vertex_count == rest.data.vertex_count)
+    surfaces = {frames, rest.data.vertex_count,
+                [carried](int64_t first, int64_t count, std::vector<double>& out) {
+                  carried->read(first, count, out);
+                }};
+  return {{"rest_pose", score({made.rest_pose.data(), frames, kJoints}, surfaces)},
           {"source_unchanged", score(source.joints(), {})},
           {"closed_form", score({made.closed_form.data(), frames, kJoints}, {})}};
 }
@@ -121,8 +198,7 @@ std::vector<metrics::Metric> metrics_of_every(int64_t step,
                                               std::span<const metrics::Metric> metrics) {
   std::vector<metrics::Metric> out(metrics.begin(), metrics.end());
   for (metrics::Metric& m : out)
-    if (step > 1 && std::string(m.name).find("acc") != std::string::npos)
-      m.compute = [](const SequenceView&) { return metrics::Value(); };
+    if (step > 1 && std::string(m.name).find("acc") != std::string::npos) m.of_joints = nullptr;
   return out;
 }
 

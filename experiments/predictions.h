@@ -2,11 +2,15 @@
 // eval --pred` and the sets of the open benchmark share.
 #pragma once
 
+#include <functional>
+#include <memory>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "datasets/schema.h"
+#include "experiments/world_map.h"
 #include "nn/metrics/metrics.h"
 
 namespace restage {
@@ -14,20 +18,28 @@ namespace restage {
 /// Names and scores of what needs no learning: "rest_pose", "source_unchanged", "closed_form".
 using References = std::vector<std::pair<std::string, metrics::Evaluation>>;
 
-/// A prediction, and where it is from (for errors).
+/// A prediction, and where it is from (for errors). Of a file the joints are held, the vertices
+/// read some frames at a time.
 struct PredictionFile {
   std::string path;
-  Prediction data;
+  Prediction data;  ///< of a file without its vertices
 
-  explicit PredictionFile(const std::string& name) : path(name), data(read_prediction(name)) {}
+  explicit PredictionFile(const std::string& name);
   PredictionFile(std::string name, Prediction made)
       : path(std::move(name)), data(std::move(made)) {}
 
   metrics::Track joints() const;
-  metrics::Track vertices() const;
+  metrics::Surfaces vertices() const;
   int64_t sequences() const { return std::ssize(data.sequence_offset) - 1; }
   /// Keeps every `step`-th frame of each sequence, from its first.
   void thin(int64_t step);
+  /// Moves joints and vertices (WorldMap::carry()).
+  void carry(const WorldMap& map, bool rigid, double stretched = 1);
+
+ private:
+  std::shared_ptr<const PredictionReader> reader_;  // of the vertices; null: they are in `data`
+  std::vector<int64_t> rows_;                       // of the file, frame by frame
+  std::function<void(std::span<double>)> move_;     // of vertices that are read
 };
 
 /// InputError unless both have as many frames.
@@ -35,7 +47,8 @@ void check_same_frames(const PredictionFile& file, const PredictionFile& truth);
 
 /// The sequences that `offset` cuts both into.
 std::vector<metrics::SequenceView> cut(const std::vector<int64_t>& offset,
-                                       const metrics::Track& joints, const metrics::Track& vertices,
+                                       const metrics::Track& joints,
+                                       const metrics::Surfaces& vertices,
                                        const PredictionFile& truth);
 
 /// What the references achieve on every sequence (nn/geometry/closed_form.h). `source`: its true

@@ -10,7 +10,7 @@
 
 namespace restage {
 
-void WorldMap::carry(std::vector<double>& points, bool rigid, double stretched) const {
+void WorldMap::carry(std::span<double> points, bool rigid, double stretched) const {
   for (size_t i = 0; i + 2 < points.size(); i += 3) {
     Eigen::Map<Vec3> p(&points[i]);
     p = ((rigid ? 1 : scale) * (rotation * p) + stretched * shift).eval();

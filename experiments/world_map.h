@@ -2,8 +2,8 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
-#include <vector>
 
 #include "nn/geometry/skeleton.h"
 
@@ -15,7 +15,7 @@ struct WorldMap {
   Vec3 shift = Vec3::Zero();
   double scale = 1;
   /// To [x, y, z] after [x, y, z]; without `scale` if `rigid`, the shift `stretched`.
-  void carry(std::vector<double>& points, bool rigid, double stretched = 1) const;
+  void carry(std::span<double> points, bool rigid, double stretched = 1) const;
   double tilt() const;  ///< by how much up is off, degrees
 };
 

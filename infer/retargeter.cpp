@@ -82,30 +82,35 @@ Vec3 scaling_centre(const Vec3& start) {
   return far <= kNear ? Vec3(0, 0, 0) : Vec3((1 - kNear / far) * Vec3(start[0], 0, start[2]));
 }
 
-void require_tpose(const Joints& j, const std::string& where) {
+/// What is wrong with joints that are not in T-pose; empty if they are.
+std::string off_tpose(const Joints& j) {
   for (const auto& [shoulder, wrist, side] :
        {std::tuple<size_t, size_t, double>{16, 20, 1.0}, {17, 21, -1.0}}) {
     const Vec3 arm = j[wrist] - j[shoulder];
     const double angle =
         std::acos(std::clamp(side * arm[0] / std::max(arm.norm(), 1e-9), -1.0, 1.0)) * 180 / M_PI;
     if (angle <= kTposeLimit) continue;
-    throw InputError(where,
-                     format("is not in T-pose: the %s arm is %.0f degrees from %sx",
-                            side > 0 ? "left" : "right", angle, side > 0 ? "+" : "-"),
-                     "give the target in T-pose facing +z, y up, or add --force");
+    return format("is not in T-pose: the %s arm is %.0f degrees from %sx",
+                  side > 0 ? "left" : "right", angle, side > 0 ? "+" : "-");
   }
+  return "";
 }
 
 }  // namespace
 
 Retargeter::Retargeter(const Bundle& weights, const std::string& weights_name, Mesh target,
-                       const std::string& where, const RetargetOptions& options)
+                       const std::string& where, const RetargetOptions& options,
+                       const std::optional<Joints>& rig)
     : models_(weights), target_(std::move(target)), options_(options) {
   auto& skeleton = models_.need_as<SkeletonModel>("skeleton", weights_name);
   const RngKey key = RngKey{options.seed, 0}.fold("target");
   rest_ = extract_joints(skeleton, surface_points(target_, kTargetPoints, key.fold("surface")),
                          where, key, kTargetSamples, kRestPoses);
-  if (!options.force) require_tpose(rest_, where);
+  if (const std::string off = off_tpose(rest_); !off.empty()) {
+    if (!rig && !options.force)
+      throw InputError(where, off, "give the target in T-pose facing +z, y up, or add --force");
+    if (rig) rest_ = *rig;
+  }
   prepare(weights_name);
 }
 

@@ -37,9 +37,11 @@ class Retargeter final : public System {
   /// skeleton and one for motion. Without `deformation.weights` frames have no vertices, without
   /// offsets skinning is all. `where` names the target. InputError: a model that is missing, a
   /// setting that is unknown, a target whose shoulder-wrist lines are more than 30 degrees from
-  /// +-x.
+  /// +-x. Of a target with a `rig`, which shows its T-pose, the extractor does not decide: where it
+  /// finds none, the rig's joints take the place of those that it finds.
   Retargeter(const Bundle& weights, const std::string& weights_name, Mesh target,
-             const std::string& where, const RetargetOptions& options);
+             const std::string& where, const RetargetOptions& options,
+             const std::optional<Joints>& rig = std::nullopt);
   /// The same from known rest joints of the target instead of extracted ones; the source is then
   /// given by push_joints() unless there is a model for skeleton.
   Retargeter(const Bundle& weights, const std::string& weights_name, Mesh target,

@@ -12,7 +12,7 @@ std::unique_ptr<Retargeter> make_retargeter(SystemInput in) {
     return std::make_unique<Retargeter>(in.weights, in.weights_name, std::move(in.target), *in.rest,
                                         in.options);
   return std::make_unique<Retargeter>(in.weights, in.weights_name, std::move(in.target),
-                                      in.target_name, in.options);
+                                      in.target_name, in.options, in.rig);
 }
 
 std::unique_ptr<System> make_chain(SystemInput in) { return make_retargeter(std::move(in)); }

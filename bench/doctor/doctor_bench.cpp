@@ -5,12 +5,19 @@
 //   doctor_bench measure FILE [name=value..]  2,400 cases: 24 permutations of axes x 5 units x 20
 //                                             scans of FILE's test split (or `builtin`), as
 //                                             Markdown
-// Options of measure: split, seed, scans, once=1 (each scan in one case instead of 120), dressed=1
+//   doctor_bench angles FILE [name=value..]   how far off the angle is by which the doctor turns
+//                                             people, who face anywhere
+// Options of measure and angles: split, seed, scans, dressed=1 (in random clothes), once=1 (each
+// scan in one case instead of 120; of measure)
 // (in random clothes), one_side=0.5 (share of scans by one depth camera).
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <functional>
 #include <iostream>
+#include <numbers>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -237,6 +244,56 @@ int measure(const std::string& file, const MeasureOptions& options) {
   return 0;
 }
 
+// ---- angles ------------------------------------------------------------------------------------
+
+/// How far off the angle is by which --fix turns, where up, facing and angle are sure.
+struct AngleErrors {
+  std::vector<double> off;  // degrees
+  int all = 0;
+  std::string row(const std::string& name) {
+    std::sort(off.begin(), off.end());
+    const auto at = [&](double share) {
+      const auto last = static_cast<double>(off.size() - 1);
+      return off.empty() ? 0.0 : off[static_cast<size_t>(share * last)];
+    };
+    return format("| %s | %d | %.1f %% | %.1f | %.1f | %.1f |\n", name.c_str(), all,
+                  100.0 * static_cast<double>(off.size()) / std::max(all, 1), at(0.5), at(0.95),
+                  at(1));
+  }
+};
+
+int angles(const std::string& file, const MeasureOptions& options) {
+  Corpus corpus = people(file, options.split);
+  if (options.dressed) corpus = dressed(corpus, options.seed);
+  ScanRecipe recipe;
+  recipe.heading = 180;
+  recipe.rest_share = 0.3;
+  recipe.one_side_share = options.one_side;
+  const ScanMaker maker(corpus, recipe, options.seed);
+  std::vector<std::pair<bool, std::optional<double>>> found(static_cast<size_t>(options.scans));
+  parallel_each(options.scans, 1, [&](int64_t i) {
+    const TrueScan scan = maker.make(static_cast<uint64_t>(i));
+    const Diagnosis d = examine_surface({scan.points, {}});
+    found[i].first = scan.rest;
+    if (!d.orientation.is_turn_sure()) return;
+    const Vec3 ahead = direction(d.orientation.facing);
+    const double heading =
+        std::atan2(ahead.x(), ahead.z()) * 180 / std::numbers::pi + d.orientation.turned;
+    found[i].second =
+        d.orientation.up == 2 ? std::abs(std::remainder(heading - scan.heading, 360)) : 180;
+  });
+  AngleErrors rest, moving;
+  for (const auto& [is_rest, off] : found) {
+    AngleErrors& to = is_rest ? rest : moving;
+    ++to.all;
+    if (off) to.off.push_back(*off);
+  }
+  std::cout << "| people | scans | sure of the angle | off by, median [degrees] | 95th percentile "
+               "| most |\n|---|---:|---:|---:|---:|---:|\n"
+            << rest.row("in T-pose") << moving.row("in motion");
+  return 0;
+}
+
 void set(const std::string& word, MeasureOptions& options) {
   const size_t is = word.find('=');
   const std::string name = word.substr(0, is), value = is < word.size() ? word.substr(is + 1) : "";
@@ -259,12 +316,12 @@ void set(const std::string& word, MeasureOptions& options) {
 int run(int argc, char** argv) {
   const std::vector<std::string> words(argv + 1, argv + argc);
   if (words.size() == 3 && words[0] == "fit") return fit(words[1], words[2]);
-  if (words.size() >= 2 && words[0] == "measure") {
+  if (words.size() >= 2 && (words[0] == "measure" || words[0] == "angles")) {
     MeasureOptions options;
     for (size_t i = 2; i < words.size(); ++i) set(words[i], options);
-    return measure(words[1], options);
+    return words[0] == "measure" ? measure(words[1], options) : angles(words[1], options);
   }
-  std::cerr << "doctor_bench fit OUT.inc FILE | measure FILE|builtin [split=test] [seed=1] "
+  std::cerr << "doctor_bench fit OUT.inc FILE | measure|angles FILE|builtin [split=test] [seed=1] "
                "[scans=20] [once=0] [dressed=0] [one_side=0]\n";
   return 2;
 }

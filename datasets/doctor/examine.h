@@ -22,6 +22,11 @@ struct ExamineOptions {
   // What the user knows better; the rest is still found.
   std::optional<double> scale;    ///< metres per unit
   std::optional<int> up, facing;  ///< indices of kDirections
+  std::optional<double> fps;      ///< of a sequence
+  // What the file says, which beats what its shape looks like.
+  /// Of a rig, in our frame: unit, up, facing and pose are those of its joints.
+  std::optional<Joints> joints;
+  bool y_up = false;  ///< it is a rigged figure of a format whose y axis is up
 };
 
 struct Diagnosis {
@@ -36,8 +41,9 @@ struct Diagnosis {
   std::vector<Finding> findings;
   /// Into our frame; nothing if up axis or units cannot be told.
   std::optional<Similarity> transform;
-  int keep_every = 1;              ///< every frame is there this many times in a row
-  std::set<int64_t> repeated;      ///< frames equal to the one before (from 0)
+  double turned = 0;           ///< degrees about the vertical that it turns beyond whole quarters
+  int keep_every = 1;          ///< every frame is there this many times in a row
+  std::set<int64_t> repeated;  ///< frames equal to the one before (from 0)
   std::map<int64_t, int64_t> gap;  ///< before frame (from 0): so many frames are missing
 
   /// Whether so many missing frames are replaced by those around them: up to a second of them.
@@ -81,14 +87,14 @@ struct SourceFrame {
 };
 
 /// Cheap checks before retargeting: what the doctor finds wrong is refused in the doctor's words, a
-/// target as examine_surface() judges it, a source by its first frames, brought into metres, y up,
-/// as `given`. What is only perhaps wrong passes. `where` names the input. InputError with the
-/// option that mends it (--scale, --source-up, --force).
+/// target as examine_surface() judges it with the same options (`target` is set here), a source by
+/// its first frames, brought into metres, y up, as `given`. What is only perhaps wrong passes.
+/// `where` names the input. InputError with the option that mends it (--scale, --source-up,
+/// --force). A rig of which left and right are exchanged is refused.
 inline constexpr int kSourceFrames = 8;  ///< that are enough for check_source()
 void check_source(const std::vector<Mesh>& first_frames, const std::string& where,
                   const SourceFrame& given = {});
-/// `named`: the joints of a rig (null: none), which show a mirror image.
-void check_target(const Mesh& target, const std::string& where, const Joints* named = nullptr);
+void check_target(const Mesh& target, const std::string& where, ExamineOptions options = {});
 /// The same for any later frame, cheaply: whether it is of a person's size.
 void check_frame(const Points& frame, const std::string& where);
 

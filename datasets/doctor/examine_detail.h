@@ -13,6 +13,7 @@ inline constexpr double kVerySure = 0.98;    // from here on retargeting refuses
 inline constexpr double kTPoseAngle = 30;    // degrees, as the retargeter asks
 inline constexpr double kLegAngle = 25;      // degrees from straight down; seated legs have 35
 inline constexpr double kOneSided = 0.75;
+inline constexpr double kTurnMatters = 20;  // degrees: less is as exact as the angle that is found
 inline constexpr double kLevel =
     0.003;  // share of a cloud's points that noise puts under the floor
 
@@ -26,13 +27,13 @@ struct Seen {
 /// Unit and orientation as found, or as the options say. InputError for options that contradict.
 void recognise(Diagnosis& d, const Seen& seen, const ExamineOptions& options);
 void judge_units(Diagnosis& d);
-void judge_up(Diagnosis& d, size_t clouds);
-void judge_facing(Diagnosis& d, bool target);
+void judge_up(Diagnosis& d, const Seen& seen, const ExamineOptions& options, size_t clouds);
+void judge_facing(Diagnosis& d, const ExamineOptions& options);
 /// Transform, height and floor; heights along the up axis found, in the data's units.
 void judge_frame(Diagnosis& d, double lowest, double highest);
 void judge_points(Diagnosis& d, size_t distinct);
-/// Scale and axes are of no consequence but for the up axis; `target`: a T-pose is a must.
-void judge_pose(Diagnosis& d, const PersonShape& shape, bool target);
+/// Scale and axes are of no consequence but for the up axis; a target must be in T-pose.
+void judge_pose(Diagnosis& d, const PersonShape& shape, const ExamineOptions& options);
 /// `where` is added to each sentence (" in frame 7"), and may be empty.
 void judge_duplicates(Diagnosis& d, size_t equal, bool cloud, const std::string& where);
 void judge_plane(Diagnosis& d, const Parts& parts, const std::string& where);

@@ -27,8 +27,15 @@ void recognise(Diagnosis& d, const Seen& seen, const ExamineOptions& options) {
   if (d.unit.unit.metres != 1)
     d.unit.sure *= std::max(0.0, (d.orientation.up_sure - by_chance) / (1 - by_chance)) *
                    (1 - seen.stray_share);
+  if (options.joints) {
+    d.unit = {kUnits[0], 1};
+    d.orientation = {2, 1, 4, 1};
+  } else if (options.y_up) {
+    d.orientation = seen.vote.result(2);
+  }
   if (options.scale) d.unit = {{"", *options.scale}, 1};
-  if (options.up) d.orientation = seen.vote.result(*options.up);
+  if (options.up && !(options.joints && *options.up == 2))
+    d.orientation = seen.vote.result(*options.up);
   if (!options.facing) return;
   if (*options.facing / 2 == d.orientation.up / 2)
     throw InputError("",
@@ -37,7 +44,7 @@ void recognise(Diagnosis& d, const Seen& seen, const ExamineOptions& options) {
                      "give two directions at right angles, --up and --facing");
   d.orientation.facing = *options.facing;
   d.orientation.facing_sure = 1;
-  d.orientation.turned = 0;
+  d.orientation.turned = d.orientation.turned_sure = 0;
 }
 
 void judge_units(Diagnosis& d) {
@@ -70,12 +77,22 @@ void judge_units(Diagnosis& d) {
   d.say(f);
 }
 
-void judge_up(Diagnosis& d, size_t clouds) {
+void judge_up(Diagnosis& d, const Seen& seen, const ExamineOptions& options, size_t clouds) {
   const Orientation& o = d.orientation;
   Finding f{"up", Weight::fact, cat(kDirections[o.up], " is up"), o.up_sure, "", ""};
   f.evidence = "where a person's points lie, in 144 attitudes" +
                (clouds > 1 ? ", over " + counted(clouds, "frame") : std::string());
-  if (o.up_sure < kNobody) {
+  const Orientation shape = seen.vote.result();
+  if (options.joints && o.up == 2) {
+    f.evidence = "the rig's joints";
+  } else if (options.y_up && !options.up) {
+    f.evidence = "the format says so";
+    if (shape.up != 2 && shape.up_sure >= kUnsure) {
+      f.weight = Weight::note;
+      f.what += cat(", though its shape looks as if ", kDirections[shape.up], " were");
+      f.fix = "say it with --up if the shape is right; name the rig's bones as a known family does";
+    }
+  } else if (o.up_sure < kNobody) {
     f.weight = Weight::wrong;
     f.what = "nobody can be made out, and which axis is up cannot be told";
     f.fix = "is it one whole person, and nothing else? If so, say --up";
@@ -92,21 +109,29 @@ void judge_up(Diagnosis& d, size_t clouds) {
   d.say(f);
 }
 
-void judge_facing(Diagnosis& d, bool target) {
+/// Whether a repair turns by the very angle.
+bool turns_exactly(const Orientation& o) {
+  return o.is_turn_sure() && std::abs(o.turned) > kTurnMatters;
+}
+
+void judge_facing(Diagnosis& d, const ExamineOptions& options) {
   const Orientation& o = d.orientation;
   if (o.up_sure < kUnsure) return;
   Finding f{"facing", Weight::fact, "", o.facing_sure, "", ""};
-  f.evidence = "feet, knees, seat and chest are not the same before and behind";
-  if (o.facing_sure < kUnsure) {
+  f.evidence = options.joints && o.up == 2
+                   ? "the rig's joints"
+                   : "feet, knees, seat and chest are not the same before and behind";
+  if (o.facing_sure < kUnsure && !o.is_turn_sure()) {
     f.weight = Weight::note;
     f.what = cat("which way the person faces cannot be told (perhaps ", kDirections[o.facing], ")");
   } else {
     f.what = cat("faces ", kDirections[o.facing]);
-    if (std::abs(o.turned) > 20)
+    if (std::abs(o.turned) > kTurnMatters)
       f.what += ", turned by about " + number(std::round(std::abs(o.turned) / 5) * 5) +
                 " degrees to their " + (o.turned > 0 ? "left" : "right");
+    if (turns_exactly(o)) f.fix = "--fix turns it by that angle";
     // With another up axis the turn is part of that repair.
-    if (target && o.up == 2 && o.facing != 4) {
+    if (options.target && o.up == 2 && o.facing != 4) {
       f.weight = o.facing_sure >= kSure ? Weight::wrong : Weight::note;
       f.fix = "--fix turns it; a target has to face +z";
     }
@@ -116,7 +141,7 @@ void judge_facing(Diagnosis& d, bool target) {
 
 /// The proper turn: as found where that is sure, else as few axes exchanged as possible.
 Mat3 best_turn(const Orientation& o) {
-  if (o.facing_sure >= kUnsure) return o.turn();
+  if (o.facing_sure >= kUnsure || o.is_turn_sure()) return o.turn();
   Orientation guess = o;
   Mat3 best = Mat3::Zero();
   for (guess.facing = 0; guess.facing < 6; ++guess.facing)
@@ -133,7 +158,9 @@ void judge_frame(Diagnosis& d, double lowest, double highest) {
   }
   Similarity t;
   t.scale = d.unit.unit.metres;
-  t.rotation = best_turn(d.orientation);
+  const bool exactly = turns_exactly(d.orientation);
+  t.rotation = exactly ? d.orientation.exact_turn() : best_turn(d.orientation);
+  if (exactly) d.turned = d.orientation.turned;
   d.height = t.scale * (highest - lowest);
   const double floor = t.scale * lowest;
   if (std::abs(floor) > kFloorMatters) t.offset = lowest * direction(d.orientation.up);
@@ -194,7 +221,8 @@ void judge_parts(Diagnosis& d, const PersonShape& shape, const std::string& wher
            "gaps between groups of points", "scan from more sides if you can"});
 }
 
-void judge_pose(Diagnosis& d, const PersonShape& shape, bool target) {
+void judge_pose(Diagnosis& d, const PersonShape& shape, const ExamineOptions& options) {
+  const bool target = options.target;
   const Orientation& o = d.orientation;
   Finding f{"pose", Weight::fact, "", std::min(0.95, o.up_sure), "", ""};
   if (o.up_sure < kUnsure) {
@@ -204,17 +232,26 @@ void judge_pose(Diagnosis& d, const PersonShape& shape, bool target) {
     return;
   }
   if (!target && o.facing_sure < kUnsure) return;
-  const Eigen::Matrix3f turn = best_turn(o).cast<float>();
-  Points ours;
-  for (const Point& p : shape.points) ours.push_back(turn * p);
-  const auto angles = t_pose_angles(ours);
+  const bool rig = options.joints && o.up == 2;
+  std::optional<TPoseAngles> angles;
+  if (rig) {
+    angles = t_pose_angles(*options.joints);
+  } else {
+    const Eigen::Matrix3f turn = best_turn(o).cast<float>();
+    Points ours;
+    for (const Point& p : shape.points) ours.push_back(turn * p);
+    angles = t_pose_angles(ours);
+  }
   const double arms = angles ? std::max(angles->arms[0], angles->arms[1]) : 90,
                legs = angles ? angles->legs : 0;
   const auto degrees = [](double x) { return number(std::round(x)); };
   if (arms <= kTPoseAngle && legs <= kLegAngle) {
     f.what = "T-pose";
     f.evidence = "arms within " + number(std::ceil(arms)) + " degrees of where they belong";
-    if (target) f.evidence += "; retarget also measures them by the joints that its network finds";
+    if (rig)
+      f.evidence += ", by the rig's joints";
+    else if (target)
+      f.evidence += "; retarget also measures them by the joints that its network finds";
     d.say(f);
     return;
   }

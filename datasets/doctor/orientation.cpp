@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "autograd/ops/reduce.h"
 #include "datasets/doctor/orientation_model.h"
@@ -45,6 +46,10 @@ Mat3 Orientation::turn() const {
   return out;
 }
 
+Mat3 Orientation::exact_turn() const {
+  return turn_about_y(-turned * std::numbers::pi / 180) * turn();
+}
+
 void OrientationVote::add(const Points& cloud, bool faces) {
   const NormalisedCloud seen = normalised(cloud);
   if (!(seen.size > 0)) return;
@@ -75,25 +80,34 @@ Orientation OrientationVote::result(int known_up) const {
   double total = 0, most = -1;
   for (const double x : facing) total += x;
   if (!(total > 0)) return out;
-  // Of the heading that is `d` from the middle of a quarter.
-  const auto near = [&](int quarter, int d) {
-    return facing[(quarter * kQuarter + d + kHeadings) % kHeadings];
+  // Of the heading that is `d` steps from another.
+  const auto near = [&](int heading, int d) {
+    return facing[(heading + d + kHeadings) % kHeadings];
   };
-  int best = 0;
-  for (int quarter = 0; quarter < 4; ++quarter) {
+  const auto mass_around = [&](int heading) {
     double mass = 0;
     for (int d = -kQuarter / 2; d <= kQuarter / 2; ++d)
-      mass += near(quarter, d) * (std::abs(d) == kQuarter / 2 ? 0.5 : 1.0);
-    if (mass > most) most = mass, best = quarter;
-  }
+      mass += near(heading, d) * (std::abs(d) == kQuarter / 2 ? 0.5 : 1.0);
+    return mass;
+  };
+  int best = 0, middle = 0;
+  for (int quarter = 0; quarter < 4; ++quarter)
+    if (const double mass = mass_around(quarter * kQuarter); mass > most)
+      most = mass, best = quarter;
   out.facing = index_of(hypothesis(out.up, best * kQuarter).row(2).transpose().cast<double>());
   out.facing_sure = most / total;
-  double mass = 0;
+  // The angle: mean over the quarter, wherever it begins, that has most.
+  most = -1;
+  for (int heading = 0; heading < kHeadings; ++heading)
+    if (const double mass = mass_around(heading); mass > most) most = mass, middle = heading;
+  double moment = 0, mass = 0;
   for (int d = -kQuarter / 2; d <= kQuarter / 2; ++d) {
-    out.turned += near(best, d) * d * 360 / kHeadings;
-    mass += near(best, d);
+    moment += near(middle, d) * d;
+    mass += near(middle, d);
   }
-  out.turned /= mass;
+  const double steps = std::remainder(middle + moment / mass - best * kQuarter, kHeadings);
+  out.turned = steps * 360 / kHeadings;
+  out.turned_sure = most / total;
   return out;
 }
 

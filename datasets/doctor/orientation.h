@@ -16,9 +16,14 @@ struct Orientation {
   double up_sure = 0;      ///< probability; 1/6 says nothing
   int facing = 4;          ///< the axis nearest to where the person faces, at right angles to `up`
   double facing_sure = 0;  ///< probability of that axis if `up` is right
-  double turned = 0;       ///< degrees from there, towards their left; within -45 and 45
+  double turned = 0;       ///< degrees from that axis, towards their left; about -45 to 45
+  double turned_sure = 0;  ///< probability that the person faces within 45 degrees of that angle
+  /// Whether the angle is sure enough to turn by it: never where the up axis is in question.
+  bool is_turn_sure() const { return up_sure >= 0.9 && turned_sure >= 0.9; }
   /// The permutation of axes that brings `up` to +y and `facing` to +z.
   Mat3 turn() const;
+  /// The turn that brings `up` to +y and the angle that is `turned` from `facing` to +z.
+  Mat3 exact_turn() const;
 };
 
 /// Sums up clouds of one person in one frame of reference. Order of points is of no consequence

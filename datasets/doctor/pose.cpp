@@ -43,7 +43,26 @@ std::vector<Vec3> normed(const Points& points) {
   return out;
 }
 
+double angle(const Vec3& bone, const Vec3& wanted) {
+  const double length = bone.norm();
+  return length > 0 ? std::acos(std::clamp(bone.dot(wanted) / length, -1.0, 1.0)) * kDegrees : 180;
+}
+
 }  // namespace
+
+TPoseAngles t_pose_angles(const Joints& joints) {
+  TPoseAngles out;
+  for (const int side : {0, 1}) {
+    const double sign = side == 0 ? 1 : -1;
+    const Vec3 arm = joints[20 + side] - joints[16 + side],
+               leg = joints[7 + side] - joints[1 + side];
+    out.arms[side] = angle(arm, sign * Vec3::UnitX());
+    out.below[side] = std::atan2(-arm.y(), std::hypot(arm.x(), arm.z())) * kDegrees;
+    out.turned -= sign * std::atan2(arm.z(), sign * arm.x()) * kDegrees / 2;
+    out.legs = std::max(out.legs, angle(leg, -Vec3::UnitY()));
+  }
+  return out;
+}
 
 std::optional<TPoseAngles> t_pose_angles(const Points& points) {
   const std::vector<Vec3> normal = normed(points);

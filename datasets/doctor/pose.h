@@ -15,6 +15,8 @@ struct TPoseAngles {
   double legs = 0;              ///< the leg farther from straight down, degrees
 };
 
+/// Of named joints, y up, facing +z.
+TPoseAngles t_pose_angles(const Joints& joints);
 /// Of points with y up, facing +z, in any unit. Nothing if there are no arms at the sides at all.
 std::optional<TPoseAngles> t_pose_angles(const Points& points);
 

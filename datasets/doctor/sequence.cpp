@@ -40,7 +40,7 @@ class Sequence {
 
   Diagnosis examine() {
     d_.kind = "frames";
-    d_.fps = source_.fps();
+    d_.fps = options_.fps.value_or(source_.fps());
     read();
     d_.frames = frames_.size();
     d_.sequences = frames_.back().sequence + 1;
@@ -52,9 +52,9 @@ class Sequence {
     judge_points(d_, fewest_distinct_);
     if (!judge_sizes()) d_.unit.sure = 0;
     judge_units(d_);
-    judge_up(d_, looked_);
+    judge_up(d_, seen_, options_, looked_);
     judge_walk();
-    judge_facing(d_, false);
+    judge_facing(d_, options_);
     const int up = d_.orientation.up;
     std::vector<double> low;
     double high = -1e300;
@@ -214,6 +214,7 @@ class Sequence {
       if (o.facing_sure < kUnsure && o.facing / 2 == i / 2) {
         o.facing = i;
         o.facing_sure = 0.8;
+        o.turned = o.turned_sure = 0;
       }
       d_.say({"walk", Weight::fact, cat("goes towards ", kDirections[i]), 1,
               number(far * metres()) + " m in " + counted(last, "frame"), ""});
@@ -320,7 +321,7 @@ class Sequence {
         speeds.push_back((frames_[i].middle - frames_[i - 1].middle).norm() * metres() * d_.fps);
     Finding f{"frame rate", Weight::fact, number(d_.fps) + " frames a second", 1, "", ""};
     if (speeds.size() < 5 || d_.unit.sure < kUnsure) {
-      f.evidence = "the file's, or 30 where it says none";
+      f.evidence = options_.fps ? "as given" : "the file's, or 30 where it says none";
       d_.say(f);
       return;
     }
@@ -330,7 +331,7 @@ class Sequence {
       f.weight = Weight::note;
       f.sure = 0.9;
       f.what += " cannot be: nobody runs that fast";
-      f.fix = "give retarget the true rate with --fps";
+      f.fix = "give the true rate with --fps, here or to retarget";
     }
     d_.say(f);
   }

@@ -20,6 +20,13 @@ herr_t collect_name(hid_t, const char* name, const H5L_info_t*, void* out) {
   return 0;
 }
 
+herr_t collect_attribute(hid_t, const char* name, const H5A_info_t*, void* out) {
+  auto* names = static_cast<std::vector<std::string>*>(out);
+  if (names->size() >= kMostMembers) return -1;
+  names->emplace_back(name);
+  return 0;
+}
+
 /// An open attribute with its type; `id` < 0 if there is none.
 struct Attribute {
   Handle id, type;
@@ -129,6 +136,30 @@ std::optional<int64_t> File::integer(const std::string& object, const std::strin
   int64_t value = 0;
   if (H5Aread(attribute.id, H5T_NATIVE_INT64, &value) < 0) throw_damaged(attribute.where);
   return value;
+}
+
+std::vector<std::string> File::copy_attributes(const File& from, const std::string& object) {
+  const Lock lock;
+  std::vector<std::string> names, lost;
+  if (H5Aiterate_by_name(from.state_->id, object.c_str(), H5_INDEX_NAME, H5_ITER_INC, nullptr,
+                         collect_attribute, &names, H5P_DEFAULT) < 0)
+    throw_damaged(from.state_->where(object));
+  for (const std::string& name : names) {
+    if (H5Aexists_by_name(state_->id, object.c_str(), name.c_str(), H5P_DEFAULT) > 0) continue;
+    try {
+      const Attribute attribute = open_attribute(*from.state_, object, name);
+      const Type type = classify(attribute.type, attribute.where);
+      if (type == Type::text)
+        set_text(object, name, read_text_attribute(attribute));
+      else if (type == Type::integer)
+        set_integer(object, name, *from.integer(object, name));
+      else
+        set_number(object, name, *from.number(object, name));
+    } catch (const InputError&) {
+      lost.push_back(name);
+    }
+  }
+  return lost;
 }
 
 }  // namespace restage::h5

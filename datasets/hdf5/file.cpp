@@ -130,6 +130,13 @@ std::string to_string(const Shape& shape) {
 
 int64_t Dataset::row_size() const { return product(shape_, 1); }
 
+size_t Dataset::value_size() const {
+  const Lock lock;
+  const Handle type(H5Dget_type(id_), H5Tclose);
+  if (type < 0) throw_damaged(where_);
+  return H5Tget_size(type);
+}
+
 void Dataset::check_memory(int64_t values, size_t value_size) const {
   if (static_cast<uint64_t>(values) > kLargestRead / value_size)
     throw InputError(where_, "is too large to read at once", "split it into several files");
@@ -286,6 +293,14 @@ void File::commit() {
 bool File::has(const std::string& name) const {
   const Lock lock;
   return link_exists(*state_, name);
+}
+
+bool File::is_group(const std::string& name) const {
+  const Lock lock;
+  H5O_info_t info;
+  return link_exists(*state_, name) &&
+         H5Oget_info_by_name(state_->id, name.c_str(), &info, H5P_DEFAULT) >= 0 &&
+         info.type == H5O_TYPE_GROUP;
 }
 
 Dataset File::dataset(const std::string& name) const {

@@ -50,6 +50,7 @@ class Dataset {
  public:
   const Shape& shape() const { return shape_; }
   Type type() const { return type_; }
+  size_t value_size() const;  ///< bytes of one value in the file
   int64_t rows() const { return shape_.empty() ? 1 : shape_[0]; }
   int64_t row_size() const;                            ///< values in one step of axis 0
   const std::string& where() const { return where_; }  ///< "file:/name", for messages
@@ -96,6 +97,7 @@ class File {
   const std::string& path() const;
 
   bool has(const std::string& name) const;  ///< a data set or group, "/a/b"
+  bool is_group(const std::string& name) const;
   /// Names of the members of a group: in the order they were made if the file keeps it (ours do),
   /// else by name.
   std::vector<std::string> children(const std::string& group = "/") const;
@@ -131,6 +133,9 @@ class File {
   std::optional<std::string> text(const std::string& object, const std::string& name) const;
   std::optional<double> number(const std::string& object, const std::string& name) const;
   std::optional<int64_t> integer(const std::string& object, const std::string& name) const;
+  /// Takes over the attributes of an object of another file that the object has not got here:
+  /// numbers and text. The names of those that could not be taken.
+  std::vector<std::string> copy_attributes(const File& from, const std::string& object);
 
  public:
   struct State;  ///< for the files of this folder

@@ -174,6 +174,13 @@ Character read_character(const std::string& path, const MotionOptions& options,
   return out;
 }
 
+ExamineOptions TargetMesh::known() const {
+  ExamineOptions out;
+  out.joints = joints;
+  out.y_up = rigged;
+  return out;
+}
+
 TargetMesh read_target(const std::string& path) {
   TargetMesh out;
   if (!is_gltf_name(path)) {
@@ -182,6 +189,7 @@ TargetMesh read_target(const std::string& path) {
   }
   const Gltf file = read_gltf(path);
   describe(file, out.report);
+  out.rigged = !file.skin_nodes.empty();
   if (file.skin_nodes.empty() || !has_known_joints(file)) {
     out.report.remark(
         file.skin_nodes.empty()

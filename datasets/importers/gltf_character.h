@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "datasets/doctor/examine.h"
 #include "datasets/importers/gltf_rig.h"
 
 namespace restage {
@@ -31,6 +32,9 @@ struct TargetMesh {
   Mesh mesh;
   ImportReport report;           ///< empty for PLY and OBJ
   std::optional<Joints> joints;  ///< of a known rig, by their names, beside the surface
+  bool rigged = false;           ///< it has a rig, known or not
+  /// What the doctor need not guess of it.
+  ExamineOptions known() const;
 };
 
 /// What `restage retarget --target` takes: of a glTF character the surface in T-pose, in metres, y

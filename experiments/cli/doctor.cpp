@@ -33,7 +33,7 @@ namespace fs = std::filesystem;
 struct Options {
   std::string path, picture, up, facing;
   std::optional<std::string> fix;
-  std::optional<double> scale;
+  std::optional<double> scale, fps;
   bool target = false;
   uint64_t max_memory = kMaxMemory;
 };
@@ -68,8 +68,13 @@ int direction_of(const std::string& option, const std::string& text) {
   throw InputError("", option + " '" + text + "' is no direction", "give one of +x -x +y -y +z -z");
 }
 
-ExamineOptions examine_options(const Options& options) {
-  ExamineOptions out;
+/// `known`: what the file says of itself.
+ExamineOptions examine_options(const Options& options, ExamineOptions known = {}) {
+  ExamineOptions out = std::move(known);
+  out.fps = options.fps;
+  if (out.fps && !(*out.fps >= 1 && *out.fps <= 1000))
+    throw InputError("", "--fps is out of range",
+                     "give the sequence's frames per second, 1 to 1000");
   out.target = options.target;
   out.scale = options.scale;
   if (out.scale && !(*out.scale >= kLeastScale && *out.scale <= kMostScale))
@@ -79,7 +84,8 @@ ExamineOptions examine_options(const Options& options) {
   return out;
 }
 
-Report examine_one(const std::string& kind, Mesh mesh, const Vec3& origin, const Options& options) {
+Report examine_one(const std::string& kind, Mesh mesh, const Vec3& origin, const Options& options,
+                   ExamineOptions known = {}) {
   Report out(kind);
   Point low = mesh.vertices[0], high = mesh.vertices[0];
   for (const Point& p : mesh.vertices) {
@@ -90,7 +96,7 @@ Report examine_one(const std::string& kind, Mesh mesh, const Vec3& origin, const
   out.facts["points"] = mesh.vertices.size();
   if (!mesh.faces.empty()) out.facts["faces"] = mesh.faces.size();
   out.facts["size"] = {size.x(), size.y(), size.z()};
-  out.diagnosis = examine_surface(mesh, examine_options(options));
+  out.diagnosis = examine_surface(mesh, examine_options(options, std::move(known)));
   out.findings = out.diagnosis->findings;
   out.subject = {options.path, std::move(mesh), nullptr, std::nullopt, "", origin};
   return out;
@@ -184,7 +190,8 @@ void add_remarks(Report& out, const ImportReport& report) {
 /// A rigged character, as retarget would take it: in T-pose, in our frame.
 Report examine_character(const Options& options) {
   TargetMesh target = read_target(options.path);
-  Report out = examine_one("character", std::move(target.mesh), Vec3::Zero(), options);
+  Report out =
+      examine_one("character", std::move(target.mesh), Vec3::Zero(), options, target.known());
   out.subject.taken_as = "the surface that retarget takes as its target";
   for (const auto& [name, value] : target.report.facts) out.facts[name] = value;
   if (target.joints) judge_hands(out, {*target.joints});
@@ -194,14 +201,14 @@ Report examine_character(const Options& options) {
 
 // ---- files with named joints -------------------------------------------------------------------
 
-std::vector<Joints> some_joints(const Prediction& data) {
+std::vector<Joints> some_joints(const PredictionReader& data) {
   std::vector<Joints> out;
-  for (int64_t k = 0; k < std::min<int64_t>(data.frames, 64); ++k) {
-    const int64_t f = k * data.frames / std::min<int64_t>(data.frames, 64);
+  std::vector<double> row;
+  const int64_t some = std::min<int64_t>(data.frames(), 64);
+  for (int64_t k = 0; k < some; ++k) {
+    data.read_joints(k * data.frames() / some, 1, row);
     Joints& joints = out.emplace_back();
-    for (size_t j = 0; j < joints.size(); ++j)
-      joints[j] =
-          Eigen::Map<const Vec3>(data.joints.data() + 3 * (f * kJoints + static_cast<int64_t>(j)));
+    for (size_t j = 0; j < joints.size(); ++j) joints[j] = Eigen::Map<const Vec3>(&row[3 * j]);
   }
   return out;
 }
@@ -229,7 +236,7 @@ Report examine_hdf5(const Options& options) {
                             out.diagnosis ? "--fix writes metres" : "convert it to metres"});
   out.facts["license"] = found.license;
   if (found.kind == "prediction" && found.counts.contains("joints")) {
-    const std::vector<Joints> joints = some_joints(read_prediction(path));
+    const std::vector<Joints> joints = some_joints(PredictionReader(path));
     if (!found.counts.contains("vertices")) out.findings.push_back(examine_skeletons(joints));
     judge_hands(out, joints);
   }
@@ -247,6 +254,7 @@ Report examine_recording(const Options& options) {
   const bool amc = file.ends_with(".amc") || file.ends_with(".amc.xz");
   MotionOptions how;
   how.force = true;  // mirrored or not is a finding here
+  how.fps = examine_options(options).fps.value_or(how.fps);
   const MotionClip clip = amc ? read_amc(options.path, "", how) : read_bvh(options.path, how);
   Report out(amc ? "amc" : "bvh");
   for (const auto& [name, value] : clip.report.facts) out.facts[name] = value;
@@ -377,6 +385,9 @@ int run_doctor(Options options, const Common& common) {
   check_output(options.fix.value_or(""), {options.path});
   check_output(options.picture, {options.path});
   const Report found = examine(options);
+  if (options.fps && !found.subject.frames && found.kind != "bvh" && found.kind != "amc")
+    throw InputError(options.path, "is no sequence of frames, so it has no rate",
+                     "leave --fps out");
   if (!found.diagnosis && (!options.picture.empty() || options.fix))
     throw InputError(
         options.path,
@@ -411,6 +422,7 @@ void add_doctor(Program& program) {
       "restage doctor scan.ply\nrestage doctor frames/ --json\n"
       "restage doctor scan.ply --scale 0.001 --up z --facing=-y --fix mended.ply\n"
       "restage doctor hero.obj --target --picture sheet.png\nrestage doctor frames/ --fix mended/\n"
+      "restage doctor frames60/ --fps 60 --fix mended.h5\n"
       "exit code: 0 usable, 1 read but not usable as it is, 2 not readable",
       run_doctor);
   app.add_option("FILE", options.path,
@@ -423,6 +435,9 @@ void add_doctor(Program& program) {
   app.add_flag("--target", options.target, "it is meant as a target: in T-pose, facing +z");
   app.add_option("--scale", options.scale, "metres per unit, where you know better");
   app.add_option("--up", options.up, "the direction that is up: x, y, z, --up=-x ...");
+  app.add_option("--fps", options.fps,
+                 "frames per second of a sequence, where you know better than the file (30 where "
+                 "it says none)");
   app.add_option("--facing", options.facing, "the direction that the person faces, as --up");
 }
 

@@ -79,6 +79,7 @@ Json frame_json(const Diagnosis& d) {
           {"metres_per_unit", told(unit, d.unit.unit.metres)},
           {"up", told(up, axis(d.orientation.up))},
           {"facing", told(up && d.orientation.facing_sure >= 0.5, axis(d.orientation.facing))},
+          {"turned", told(up && d.orientation.facing_sure >= 0.5, d.orientation.turned)},
           {"height", told(d.transform.has_value(), d.height)}};
 }
 

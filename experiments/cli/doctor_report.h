@@ -10,8 +10,9 @@
 
 namespace restage::cli {
 
-/// What the data's own frame is found to be: unit, metres_per_unit, up and facing ("+z"), height in
-/// metres; null where it is unsure (below one half).
+/// What the data's own frame is found to be: unit, metres_per_unit, up and facing ("+z"), degrees
+/// turned from there to the person's left, height in metres; null where it is unsure (below one
+/// half).
 Json frame_json(const Diagnosis& diagnosis);
 Json to_json(const Finding& finding);
 /// {"file", "transform_file", "usable", "still_wrong", "remarks"}.

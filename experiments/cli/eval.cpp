@@ -180,7 +180,7 @@ int run_eval_run(const EvalOptions& options, const Common& common) {
 std::optional<WorldMap> into_world(const EvalOptions& options, File& pred,
                                    std::optional<File>& source, const std::optional<File>& rest) {
   const std::optional<WorldMap> to_world = source_to_world(options.truth);
-  if (to_world && source) to_world->carry(source->data.joints, false);
+  if (to_world && source) source->carry(*to_world, false);
   if (options.mended.empty()) return std::nullopt;
   if (!to_world)
     throw InputError(options.truth, "does not say where its scans are",
@@ -190,8 +190,7 @@ std::optional<WorldMap> into_world(const EvalOptions& options, File& pred,
   const double stretched = joints ? trajectory_scale(joints_of(source->joints().slice(0, 1))[0],
                                                      joints_of(rest->joints().slice(0, 1))[0])
                                   : 1;
-  map.carry(pred.data.joints, true, stretched);
-  map.carry(pred.data.vertices, true, stretched);
+  pred.carry(map, true, stretched);
   return map;
 }
 

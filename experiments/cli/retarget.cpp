@@ -126,7 +126,7 @@ void to_metres(const RetargetCommand& c, Points& points) {
 /// The doctor's words on what would make the result nonsense.
 void check_inputs(const RetargetCommand& c, FrameSource& frames, const TargetMesh& target) {
   if (c.options.force) return;
-  check_target(target.mesh, c.target, target.joints ? &*target.joints : nullptr);
+  check_target(target.mesh, c.target, target.known());
   std::vector<Mesh> first;
   while (first.size() < kSourceFrames) {
     auto frame = frames.next();
@@ -190,6 +190,7 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   if (!c.rest.empty()) input.rest = rest_joints(c.rest);
   // The joints that a rig names are where its maker put them, not where a network finds them.
   if (c.rest.empty() && !system_type(c.system).weights) input.rest = target.joints;
+  input.rig = target.joints;
   input.target = std::move(target.mesh);
   input.target_name = c.target;
   const auto system = system_type(c.system).make(std::move(input));
@@ -230,6 +231,9 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   }
   write_all(system->finish());
   sink.commit();
+  if (target.joints && c.rest.empty() && system_type(c.system).weights &&
+      *system->target_joints() == *target.joints)
+    target.report.remark("the network does not see its T-pose: the joints of its rig are taken");
   log_target(target.report);
   if (c.profile) log_profile(profile);
   Json document = {

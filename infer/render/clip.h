@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "infer/render/frame_store.h"
 #include "nn/geometry/body.h"
 
 namespace restage {
@@ -13,13 +14,13 @@ namespace restage {
 /// by convention source, result, truth; the first frames of all belong together.
 struct Clip {
   std::string label;
-  std::vector<Points> frames;
+  FrameStore<Point> frames;
   std::vector<Triangle> faces;
   std::vector<double> confidence = {};  ///< of each frame, 0 to 1; empty if nobody says
   std::vector<Point> focus = {};        ///< of each frame, what a close-up looks at; may be empty
   /// Of each vertex (innermost) of each frame, how far it is off, metres: a page shows them as
   /// colours. Surfaces only; may be empty.
-  std::vector<std::vector<float>> errors = {};
+  FrameStore<float> errors = {};
 };
 
 /// Enough points along each bone to see it.

@@ -1,6 +1,7 @@
 #include "infer/render/page.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -48,11 +49,11 @@ struct Surface {
 Surface cluster(const Clip& clip, float cell) {
   Surface surface;
   std::map<std::array<int64_t, 3>, int32_t> cells;
-  std::vector<int32_t> place(clip.frames[0].size());
+  const Points& first = clip.frames[0];
+  std::vector<int32_t> place(first.size());
   for (size_t v = 0; v < place.size(); ++v) {
     std::array<int64_t, 3> key;
-    for (size_t k = 0; k < 3; ++k)
-      key[k] = static_cast<int64_t>(std::floor(clip.frames[0][v][k] / cell));
+    for (size_t k = 0; k < 3; ++k) key[k] = static_cast<int64_t>(std::floor(first[v][k] / cell));
     const auto [found, added] = cells.emplace(key, static_cast<int32_t>(surface.kept.size()));
     if (added) surface.kept.push_back(static_cast<int32_t>(v));
     place[v] = found->second;
@@ -162,13 +163,17 @@ Json numbers(const Point& p) {
   return list;
 }
 
-double error_scale(const std::vector<std::vector<float>>& errors) {
-  std::vector<float> all;
-  for (const auto& frame : errors) all.insert(all.end(), frame.begin(), frame.end());
-  const auto place = all.begin() + static_cast<std::ptrdiff_t>(all.size() * 98 / 100);
-  std::nth_element(all.begin(), place, all.end());
-  for (const double scale : kErrorScales)
-    if (*place <= scale) return scale;
+double error_scale(const FrameStore<float>& errors) {
+  std::array<size_t, std::size(kErrorScales)> within{};
+  size_t all = 0;
+  for (const auto& frame : errors) {
+    all += frame.size();
+    for (size_t s = 0; s < within.size(); ++s)
+      within[s] += std::count_if(frame.begin(), frame.end(),
+                                 [&](double error) { return error <= kErrorScales[s]; });
+  }
+  for (size_t s = 0; s < within.size(); ++s)
+    if (within[s] > all * 98 / 100) return kErrorScales[s];
   return kErrorScales[std::size(kErrorScales) - 1];
 }
 

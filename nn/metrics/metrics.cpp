@@ -12,18 +12,14 @@
 #include "autograd/base/error.h"
 #include "autograd/base/parallel_each.h"
 #include "nn/geometry/contact.h"
+#include "nn/metrics/alignment.h"
+#include "nn/metrics/surfaces.h"
 
 namespace restage::metrics {
 namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-
-Value finite(double x) { return std::isfinite(x) ? Value(x) : std::nullopt; }
-
-bool comparable(const Track& a, const Track& b) {
-  return a.present() && b.present() && a.frames > 0 && a.points > 0;
-}
 
 /// Mean of `of_frame` over frames [first, last): frames in parallel, added up in their order.
 Value mean_over_frames(int64_t first, int64_t last,
@@ -37,14 +33,8 @@ Value mean_over_frames(int64_t first, int64_t last,
   return finite(total / static_cast<double>(n));
 }
 
-Vector3d apply(const Similarity& map, const Vector3d& x) { return map.linear * x + map.shift; }
-
-/// Plain sum, then a division: rounds as the reference does, which decides whether points that
-/// coincide leave a spread of exactly 0 (undefined) or of one rounding error.
-Vector3d centre(const double* points, int64_t count) {
-  Vector3d sum = Vector3d::Zero();
+void add_points(const double* points, int64_t count, Vector3d& sum) {
   for (int64_t i = 0; i < count; ++i) sum += Eigen::Map<const Vector3d>(points + 3 * i);
-  return sum / static_cast<double>(count);
 }
 
 Similarity undefined() {
@@ -60,51 +50,73 @@ Track Track::slice(int64_t begin, int64_t end) const {
   return {data + 3 * points * begin, end - begin, points};
 }
 
-Similarity procrustes(const double* source, const double* target, int64_t count, bool scale) {
-  const Vector3d from = centre(source, count), to = centre(target, count);
-  Matrix3d cross = Matrix3d::Zero();
-  double spread = 0;
+void Procrustes::add_to_middles(const double* source, const double* target, int64_t count) {
+  add_points(source, count, from_);
+  add_points(target, count, to_);
+  count_ += count;
+}
+
+/// Plain sum, then a division: rounds as the reference does, which decides whether points that
+/// coincide leave a spread of exactly 0 (undefined) or of one rounding error.
+void Procrustes::end_middles() {
+  from_ = (from_ / static_cast<double>(count_)).eval();
+  to_ = (to_ / static_cast<double>(count_)).eval();
+}
+
+void Procrustes::add_to_map(const double* source, const double* target, int64_t count) {
   for (int64_t i = 0; i < count; ++i) {
-    const Vector3d x = Eigen::Map<const Vector3d>(source + 3 * i) - from;
-    const Vector3d y = Eigen::Map<const Vector3d>(target + 3 * i) - to;
-    cross += x * y.transpose();
-    spread += x.squaredNorm();
+    const Vector3d x = Eigen::Map<const Vector3d>(source + 3 * i) - from_;
+    const Vector3d y = Eigen::Map<const Vector3d>(target + 3 * i) - to_;
+    cross_ += x * y.transpose();
+    spread_ += x.squaredNorm();
   }
-  if (!cross.allFinite()) return undefined();
-  const Eigen::JacobiSVD<Matrix3d> svd(cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
+}
+
+Similarity Procrustes::map(bool scale) const {
+  if (!cross_.allFinite()) return undefined();
+  const Eigen::JacobiSVD<Matrix3d> svd(cross_, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const double sign = svd.matrixU().determinant() * svd.matrixV().determinant() < 0 ? -1 : 1;
   const Vector3d flip(1, 1, sign);
   const Matrix3d rotation = svd.matrixV() * flip.asDiagonal() * svd.matrixU().transpose();
-  const double s = scale ? svd.singularValues().dot(flip) / spread : 1.0;
+  const double s = scale ? svd.singularValues().dot(flip) / spread_ : 1.0;
   if (!std::isfinite(s)) return undefined();
   Similarity map;
   map.linear = s * rotation;
-  map.shift = to - map.linear * from;
+  map.shift = to_ - map.linear * from_;
   return map;
 }
 
+Similarity procrustes(const double* source, const double* target, int64_t count, bool scale) {
+  Procrustes out;
+  out.add_to_middles(source, target, count);
+  out.end_middles();
+  out.add_to_map(source, target, count);
+  return out.map(scale);
+}
+
+Similarity align_frame(const Track& pred, const Track& truth, int64_t f, const Alignment& how) {
+  if (how.mode == Alignment::Mode::frame)
+    return procrustes(pred.slice(f, f + 1).data, truth.slice(f, f + 1).data, pred.points,
+                      how.scale);
+  Similarity map;
+  if (how.mode == Alignment::Mode::root) map.shift = truth.at(f, 0) - pred.at(f, 0);
+  return map;
+}
+
+double frame_distance(const Track& pred, const Track& truth, int64_t f, const Similarity& map) {
+  double sum = 0;
+  for (int64_t i = 0; i < pred.points; ++i)
+    sum += (apply(map, pred.at(f, i)) - truth.at(f, i)).norm();
+  return sum / static_cast<double>(pred.points);
+}
+
 std::vector<Similarity> align(const Track& pred, const Track& truth, const Alignment& how) {
-  const auto frames = static_cast<size_t>(pred.frames);
-  std::vector<Similarity> maps(frames);
-  switch (how.mode) {
-    case Alignment::Mode::none:
-      break;
-    case Alignment::Mode::root:
-      for (size_t f = 0; f < frames; ++f) {
-        const auto i = static_cast<int64_t>(f);
-        maps[f].shift = truth.at(i, 0) - pred.at(i, 0);
-      }
-      break;
-    case Alignment::Mode::sequence:
-      maps.assign(frames, procrustes(pred.data, truth.data, pred.frames * pred.points, how.scale));
-      break;
-    case Alignment::Mode::frame:
-      parallel_each(pred.frames, 1, [&](int64_t f) {
-        maps[f] = procrustes(pred.slice(f, f + 1).data, truth.slice(f, f + 1).data, pred.points,
-                             how.scale);
-      });
-      break;
-  }
+  std::vector<Similarity> maps(static_cast<size_t>(pred.frames));
+  if (how.mode == Alignment::Mode::sequence)
+    maps.assign(maps.size(),
+                procrustes(pred.data, truth.data, pred.frames * pred.points, how.scale));
+  else
+    parallel_each(pred.frames, 1, [&](int64_t f) { maps[f] = align_frame(pred, truth, f, how); });
   return maps;
 }
 
@@ -120,12 +132,8 @@ Value share_within(const Track& pred, const Track& truth, std::span<const double
 Value mean_distance(const Track& pred, const Track& truth, const Alignment& how) {
   if (!comparable(pred, truth)) return std::nullopt;
   const auto maps = align(pred, truth, how);
-  return mean_over_frames(0, pred.frames, [&](int64_t f) {
-    double sum = 0;
-    for (int64_t i = 0; i < pred.points; ++i)
-      sum += (apply(maps[f], pred.at(f, i)) - truth.at(f, i)).norm();
-    return sum / static_cast<double>(pred.points);
-  });
+  return mean_over_frames(0, pred.frames,
+                          [&](int64_t f) { return frame_distance(pred, truth, f, maps[f]); });
 }
 
 std::vector<double> distances(const Track& pred, const Track& truth, const Alignment& how) {
@@ -162,74 +170,6 @@ Value acceleration_error(const Track& pred, const Track& truth, const Alignment&
   });
 }
 
-Value edge_length_difference_mm(const Track& pred, const Track& truth, NeighbourFrame where) {
-  if (!comparable(pred, truth) || pred.points <= kEdgeNeighbours) return std::nullopt;
-  for (int64_t i = 0; i < 3 * truth.frames * truth.points; ++i)
-    if (!std::isfinite(truth.data[i])) return std::nullopt;  // the search tree needs an order
-  std::vector<int32_t> fixed;
-  if (where == NeighbourFrame::first) fixed = nearest_neighbours(truth.data, truth.points);
-  const auto mean = mean_over_frames(0, pred.frames, [&](int64_t f) {
-    std::vector<int32_t> fresh;
-    if (fixed.empty()) fresh = nearest_neighbours(truth.slice(f, f + 1).data, truth.points);
-    const auto& near = fixed.empty() ? fresh : fixed;
-    double sum = 0;
-    for (int64_t i = 0; i < pred.points; ++i)
-      for (int k = 0; k < kEdgeNeighbours; ++k) {
-        const int64_t j = near[i * kEdgeNeighbours + k];
-        sum += std::abs((pred.at(f, i) - pred.at(f, j)).norm() -
-                        (truth.at(f, i) - truth.at(f, j)).norm());
-      }
-    return sum / static_cast<double>(pred.points * kEdgeNeighbours);
-  });
-  return mean ? finite(1000 * *mean) : std::nullopt;
-}
-
-Value pmd(const Track& pred, const Track& truth) {
-  if (!comparable(pred, truth)) return std::nullopt;
-  return mean_over_frames(0, pred.frames, [&](int64_t f) {
-    double sum = 0;
-    for (int64_t i = 0; i < pred.points; ++i) sum += (pred.at(f, i) - truth.at(f, i)).squaredNorm();
-    return sum / static_cast<double>(pred.points);
-  });
-}
-
-Value pmd_npt(const Track& pred, const Track& truth) {
-  if (!comparable(pred, truth)) return std::nullopt;
-  const auto box_centre = [](const Track& track, int64_t f) {
-    Vector3d low = track.at(f, 0), high = low;
-    for (int64_t i = 1; i < track.points; ++i) {
-      low = low.cwiseMin(track.at(f, i));
-      high = high.cwiseMax(track.at(f, i));
-    }
-    return Vector3d((low + high) / 2);
-  };
-  return mean_over_frames(0, pred.frames, [&](int64_t f) {
-    const Vector3d a = box_centre(pred, f), b = box_centre(truth, f);
-    double sum = 0;
-    for (int64_t i = 0; i < pred.points; ++i)
-      sum += ((pred.at(f, i) - a) - (truth.at(f, i) - b)).squaredNorm();
-    return sum / static_cast<double>(3 * pred.points);
-  });
-}
-
-namespace {
-
-/// The value that a share of the others is below.
-Value percentile(std::vector<double> values, double share) {
-  if (values.empty()) return std::nullopt;
-  const auto k = static_cast<ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + k, values.end());
-  return finite(values[static_cast<size_t>(k)]);
-}
-
-double lowest_point(const Track& track, int64_t frame) {
-  double out = std::numeric_limits<double>::infinity();
-  for (int64_t i = 0; i < track.points; ++i) out = std::min(out, track.at(frame, i).y());
-  return out;
-}
-
-}  // namespace
-
 Value foot_slide_mm(const Track& pred, const Track& truth) {
   if (!pred.present() || !truth.present() || truth.points != kJoints) return std::nullopt;
   std::vector<Joints> performance(static_cast<size_t>(truth.frames));
@@ -245,16 +185,6 @@ Value foot_slide_mm(const Track& pred, const Track& truth) {
         slides.push_back(1e3 * (pred.at(t, kFeet[side]) - pred.at(t - 1, kFeet[side])).norm());
     }
   return percentile(std::move(slides), 0.5);
-}
-
-Value floor_penetration_mm(const Track& pred, const Track& truth) {
-  if (!pred.present() || !truth.present()) return std::nullopt;
-  double floor = std::numeric_limits<double>::infinity();
-  for (int64_t t = 0; t < truth.frames; ++t) floor = std::min(floor, lowest_point(truth, t));
-  std::vector<double> depths;
-  for (int64_t t = 0; t < pred.frames; ++t)
-    depths.push_back(1e3 * std::max(0.0, floor - lowest_point(pred, t)));
-  return percentile(std::move(depths), 0.95);
 }
 
 Value peak_speed_ratio(const Track& pred, const Track& truth) {
@@ -274,33 +204,11 @@ Value peak_speed_ratio(const Track& pred, const Track& truth) {
 
 namespace {
 
-/// Head, wrists and balls of the feet: no joint hangs on them.
-constexpr std::array<int64_t, 5> kLeaves = {10, 11, 15, 20, 21};
-
 /// The left joints of legs and arms.
 constexpr std::array<std::array<size_t, 4>, 2> kLimbs = {{{1, 4, 7, 10}, {13, 16, 18, 20}}};
 constexpr double kClearlySwapped = 0.05;  ///< metres a joint
 
 }  // namespace
-
-Value leaf_vertex_distance(const Track& pred, const Track& truth, const Track& joints) {
-  if (!comparable(pred, truth) || joints.points != kJoints || joints.frames != truth.frames)
-    return std::nullopt;
-  std::vector<bool> chosen;
-  for (int64_t i = 0; i < truth.points; ++i) {
-    int64_t nearest = 0;
-    for (int64_t j = 1; j < kJoints; ++j)
-      if ((joints.at(0, j) - truth.at(0, i)).squaredNorm() <
-          (joints.at(0, nearest) - truth.at(0, i)).squaredNorm())
-        nearest = j;
-    chosen.push_back(std::find(kLeaves.begin(), kLeaves.end(), nearest) != kLeaves.end());
-  }
-  const auto apart = distances(pred, truth, {Alignment::Mode::frame, true});
-  double sum = 0, count = 0;
-  for (size_t i = 0; i < apart.size(); ++i)
-    if (chosen[i % chosen.size()]) sum += apart[i], count += 1;
-  return finite(sum / count);
-}
 
 Value side_swaps(const Track& pred, const Track& truth) {
   if (!comparable(pred, truth) || truth.points != kJoints) return std::nullopt;
@@ -351,28 +259,28 @@ Value joint_distance(const SequenceView& s) {
   return mean_distance(s.pred_joints, s.true_joints, {mode, scale});
 }
 template <Mode mode, bool scale = true>
-Value vertex_distance(const SequenceView& s) {
-  return mean_distance(s.pred_vertices, s.true_vertices, {mode, scale});
-}
-template <Mode mode, bool scale = true>
 Value joint_acceleration(const SequenceView& s) {
   return acceleration_error(s.pred_joints, s.true_joints, {mode, scale});
-}
-template <NeighbourFrame where>
-Value edge_lengths(const SequenceView& s) {
-  return edge_length_difference_mm(s.pred_vertices, s.true_vertices, where);
 }
 Value swaps(const SequenceView& s) { return side_swaps(s.pred_joints, s.true_joints); }
 Value foot_slide(const SequenceView& s) { return foot_slide_mm(s.pred_joints, s.true_joints); }
 Value peak_speed(const SequenceView& s) { return peak_speed_ratio(s.pred_joints, s.true_joints); }
-Value floor_penetration(const SequenceView& s) {
-  return floor_penetration_mm(s.pred_vertices, s.true_vertices);
+
+using Meter = std::unique_ptr<SurfaceMeter>;
+template <Mode mode, bool scale = true>
+Meter vertex_distance(const SequenceView&) {
+  return distance_meter({mode, scale});
 }
-Value leaves(const SequenceView& s) {
-  return leaf_vertex_distance(s.pred_vertices, s.true_vertices, s.true_joints);
+template <NeighbourFrame where>
+Meter edge_lengths(const SequenceView&) {
+  return edge_meter(where);
 }
-Value squared(const SequenceView& s) { return pmd(s.pred_vertices, s.true_vertices); }
-Value squared_npt(const SequenceView& s) { return pmd_npt(s.pred_vertices, s.true_vertices); }
+Meter floor_penetration(const SequenceView&) { return floor_meter(); }
+Meter leaves(const SequenceView& s) {
+  return s.true_joints.frames == s.true_vertices.frames() ? leaf_meter(s.true_joints) : nullptr;
+}
+Meter squared(const SequenceView&) { return squared_meter(); }
+Meter squared_npt(const SequenceView&) { return squared_npt_meter(); }
 
 constexpr Metric kAll[] = {
     {"mpjpe", "MPJPE", "m", "mean joint distance", joint_distance<Mode::none>},
@@ -382,20 +290,21 @@ constexpr Metric kAll[] = {
      joint_acceleration<Mode::none>},
     {"pa_acc", "PA-Acc", "m/frame²", "the same, every frame aligned with scale",
      joint_acceleration<Mode::frame>},
-    {"mpvd", "MPVD", "m", "mean vertex distance", vertex_distance<Mode::none>},
-    {"pa_mpvd", "PA-MPVD", "m", "the same, every frame aligned with scale",
+    {"mpvd", "MPVD", "m", "mean vertex distance", nullptr, vertex_distance<Mode::none>},
+    {"pa_mpvd", "PA-MPVD", "m", "the same, every frame aligned with scale", nullptr,
      vertex_distance<Mode::frame>},
-    {"medl", "MEDL", "mm", "mean difference of edge lengths, 6 nearest neighbours",
+    {"medl", "MEDL", "mm", "mean difference of edge lengths, 6 nearest neighbours", nullptr,
      edge_lengths<NeighbourFrame::every>},
-    {"pmd", "PMD", "m²", "mean squared vertex distance", squared},
-    {"pmd_npt", "PMD (NPT)", "m²", "mean squared coordinate difference, boxes centred",
+    {"pmd", "PMD", "m²", "mean squared vertex distance", nullptr, squared},
+    {"pmd_npt", "PMD (NPT)", "m²", "mean squared coordinate difference, boxes centred", nullptr,
      squared_npt},
     // further: kPapers of them are above
     {"leaf_pa_mpvd", "PA-MPVD, leaves", "m",
-     "of the vertices nearest to head, wrists and feet, every frame aligned as a whole", leaves},
+     "of the vertices nearest to head, wrists and feet, every frame aligned as a whole", nullptr,
+     leaves},
     {"side_swaps", "sides swapped", "of frames", "legs or arms nearer with left for right", swaps},
     {"foot_slide_mm", "foot slide", "mm/frame", "feet that truly stand, median", foot_slide},
-    {"floor_penetration_mm", "below the floor", "mm", "lowest vertex, 95th percentile",
+    {"floor_penetration_mm", "below the floor", "mm", "lowest vertex, 95th percentile", nullptr,
      floor_penetration},
     {"peak_speed", "peak speed", "of the truth's", "99th percentile of each joint's speed",
      peak_speed},
@@ -412,28 +321,48 @@ constexpr Metric kAll[] = {
      joint_acceleration<Mode::frame, false>},
     {"pa_acc_sequence", "PA-Acc, sequence", "m/frame²", "one alignment of the sequence, with scale",
      joint_acceleration<Mode::sequence>},
-    {"pa_mpvd_rigid", "PA-MPVD, rigid", "m", "every frame aligned without scale",
+    {"pa_mpvd_rigid", "PA-MPVD, rigid", "m", "every frame aligned without scale", nullptr,
      vertex_distance<Mode::frame, false>},
     {"pa_mpvd_sequence", "PA-MPVD, sequence", "m", "one alignment of the sequence, with scale",
-     vertex_distance<Mode::sequence>},
+     nullptr, vertex_distance<Mode::sequence>},
     {"medl_first", "MEDL, first frame", "mm", "neighbours found in the first true frame only",
-     edge_lengths<NeighbourFrame::first>},
+     nullptr, edge_lengths<NeighbourFrame::first>},
 };
 
 constexpr size_t kPapers = 9, kRecorded = 14;
 static_assert(std::string_view(kAll[kPapers].name) == "leaf_pa_mpvd" &&
               std::string_view(kAll[kRecorded].name) == "mpjpe_root");
 
-void check_pair(const Track& pred, const Track& truth, const char* what, size_t sequence) {
+void check_pair(const Surfaces& pred, const Surfaces& truth, const char* what, size_t sequence) {
   if (!pred.present() || !truth.present()) return;
-  if (pred.frames == truth.frames && pred.points == truth.points) return;
+  if (pred.frames() == truth.frames() && pred.points() == truth.points()) return;
   throw WorkError("evaluate: sequence " + std::to_string(sequence) +
-                  ": prediction and truth have " + std::to_string(pred.frames) + " x " +
-                  std::to_string(pred.points) + " and " + std::to_string(truth.frames) + " x " +
-                  std::to_string(truth.points) + " " + what);
+                  ": prediction and truth have " + std::to_string(pred.frames()) + " x " +
+                  std::to_string(pred.points()) + " and " + std::to_string(truth.frames()) + " x " +
+                  std::to_string(truth.points()) + " " + what);
+}
+
+Values values_of(const SequenceView& s, std::span<const Metric> metrics) {
+  const Surfaces &pred = s.pred_vertices, &truth = s.true_vertices;
+  const bool surfaces =
+      pred.present() && truth.present() && truth.frames() > 0 && truth.points() > 0;
+  std::vector<Meter> meters(metrics.size());
+  for (size_t m = 0; m < metrics.size(); ++m)
+    if (surfaces && metrics[m].of_surfaces) meters[m] = metrics[m].of_surfaces(s);
+  measure(pred, truth, meters);
+  Values out(metrics.size());
+  for (size_t m = 0; m < metrics.size(); ++m) {
+    if (meters[m]) out[m] = meters[m]->value();
+    if (metrics[m].of_joints) out[m] = metrics[m].of_joints(s);
+  }
+  return out;
 }
 
 }  // namespace
+
+Value Metric::compute(const SequenceView& sequence) const {
+  return values_of(sequence, {this, 1})[0];
+}
 
 std::span<const Metric> table() { return std::span(kAll).first(kPapers); }
 std::span<const Metric> recorded() { return std::span(kAll).first(kRecorded); }
@@ -460,8 +389,7 @@ Evaluation evaluate(std::span<const SequenceView> sequences, std::span<const Met
   for (const SequenceView& s : sequences) {
     check_pair(s.pred_joints, s.true_joints, "joints", out.sequences.size());
     check_pair(s.pred_vertices, s.true_vertices, "vertices", out.sequences.size());
-    Values& values = out.sequences.emplace_back();
-    for (const Metric& metric : metrics) values.push_back(metric.compute(s));
+    out.sequences.push_back(values_of(s, metrics));
   }
   average(&out);
   if (sequences.empty()) out.mean.assign(metrics.size(), std::nullopt);

@@ -1,11 +1,15 @@
 // Metrics of retargeting (spec of the method, section 8) on plain float64 values, metres, no tape.
 // A metric that cannot be computed (no vertices, too few frames or points, a collapsed prediction
 // that Procrustes cannot scale, values that are not finite) is std::nullopt, never 0.
-// To add one: write a function of a SequenceView and give it a line in table() (metrics.cpp).
+// To add one of joints: write a function of a SequenceView and give it a line in table()
+// (metrics.cpp). One of surfaces is a SurfaceMeter (surfaces.h): surfaces may be too large to be
+// held, so they come some frames at a time.
 #pragma once
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -27,9 +31,37 @@ struct Track {
   Track slice(int64_t begin, int64_t end) const;
 };
 
+/// A track in memory, or one that is read some frames at a time.
+class Surfaces {
+ public:
+  /// Fills `out` with the values of frames [first, first + count), row-major.
+  using Read = std::function<void(int64_t first, int64_t count, std::vector<double>& out)>;
+
+  Surfaces() = default;  ///< absent
+  Surfaces(const Track& held)
+      : frames_(held.frames), points_(held.points), held_(held), present_(held.present()) {}
+  Surfaces(int64_t frames, int64_t points, Read read)
+      : frames_(frames), points_(points), read_(std::move(read)), present_(true) {}
+
+  bool present() const { return present_; }
+  int64_t frames() const { return frames_; }
+  int64_t points() const { return points_; }
+  /// Frames [begin, end) of this track; absent stays absent.
+  Surfaces slice(int64_t begin, int64_t end) const;
+  /// Frames [first, first + count). What is read lies in `memory`, which has to live on.
+  Track block(int64_t first, int64_t count, std::vector<double>& memory) const;
+
+ private:
+  int64_t first_ = 0, frames_ = 0, points_ = 0;
+  Track held_;
+  Read read_;
+  bool present_ = false;
+};
+
 /// One sequence: prediction beside ground truth. Either kind of points may be absent.
 struct SequenceView {
-  Track pred_joints, true_joints, pred_vertices, true_vertices;
+  Track pred_joints, true_joints;
+  Surfaces pred_vertices, true_vertices;
   int64_t frames = 0;
 };
 
@@ -74,21 +106,12 @@ Value share_within(const Track& pred, const Track& truth, std::span<const double
 /// Mean difference of second differences, metres per frame squared; needs 3 frames.
 Value acceleration_error(const Track& pred, const Track& truth, const Alignment& how = {});
 
-/// Where edge_length_difference looks for neighbours: anew in every true frame, or in the first.
+/// Where MEDL (surfaces.h) looks for neighbours: anew in every true frame, or in the first.
 enum class NeighbourFrame { every, first };
 inline constexpr int kEdgeNeighbours = 6;
-/// MEDL: mean |edge length - true edge length| over the edges to the 6 nearest other points of the
-/// ground truth, millimetres; needs 7 points.
-Value edge_length_difference_mm(const Track& pred, const Track& truth,
-                                NeighbourFrame where = NeighbourFrame::every);
 /// The 6 nearest other points of every point, [count, 6], nearest first, ties to the lower index.
 /// `count` must be at least 7.
 std::vector<int32_t> nearest_neighbours(const double* points, int64_t count);
-
-/// LART equation 5: mean squared distance over frames and points, square metres.
-Value pmd(const Track& pred, const Track& truth);
-/// NPT's script: mean squared coordinate difference with bounding boxes centred, square metres.
-Value pmd_npt(const Track& pred, const Track& truth);
 
 /// How far feet that truly stand (standing_feet()) move from one frame to the next, median,
 /// millimetres; needs the 22 joints.
@@ -120,12 +143,18 @@ std::vector<RiskAtCoverage> risk_coverage(std::span<const double> confidence,
 
 // ---- the table ---------------------------------------------------------------------------------
 
+class SurfaceMeter;
+
+/// Either of joints or of surfaces; one that is neither has no value.
 struct Metric {
   const char* name;   ///< key in JSON
   const char* title;  ///< heading in tables
   const char* unit;
   const char* help;
-  Value (*compute)(const SequenceView&);
+  Value (*of_joints)(const SequenceView&) = nullptr;
+  /// For one sequence, of whose view it may take the joints.
+  std::unique_ptr<SurfaceMeter> (*of_surfaces)(const SequenceView&) = nullptr;
+  Value compute(const SequenceView& sequence) const;
 };
 
 /// The papers' metrics: those of `restage eval`, in the order of its tables.
@@ -146,8 +175,10 @@ struct Evaluation {
 /// Fills `mean` from `sequences`.
 void average(Evaluation* evaluation);
 
-/// Computes all metrics of a table for every sequence. Same bits for any number of threads.
-/// Throws WorkError if prediction and truth of a sequence differ in shape.
+/// Computes all metrics of a table for every sequence. Surfaces go by once for all metrics, as
+/// often as the one that looks most often wants it, in memory that does not grow with their frames.
+/// Same bits for any number of threads, and whether surfaces are in memory or read. Throws
+/// WorkError if prediction and truth of a sequence differ in shape.
 Evaluation evaluate(std::span<const SequenceView> sequences,
                     std::span<const Metric> metrics = table());
 

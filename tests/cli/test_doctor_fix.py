@@ -1,5 +1,6 @@
 """What `restage doctor --fix` and `--picture` write."""
 import json
+import math
 import os
 import struct
 import zlib
@@ -186,6 +187,57 @@ class DoctorFix(CliTest):
         self.assertEqual((said["counts"]["frames"], said["fps"]), (12, 15))
         self.fix("again.h5", "slow", 0)
         self.assertEqual(len(os.listdir(self.path("slow"))), 24)
+
+    def test_the_rate_is_told(self):
+        self.frames("sixty", self.walk())
+        found = self.fix("sixty", "sixty.h5", 0, "--fps", 60)
+        self.assertEqual(found["facts"]["fps"], 60)
+        self.assertEqual(self.json("data", "inspect", "sixty.h5")["fps"], 60)
+        self.fix("sixty.h5", "again.h5", 0)  # a file that states its rate keeps it
+        self.assertEqual(self.json("data", "inspect", "again.h5")["fps"], 60)
+        self.fix("sixty.h5", "slow.h5", 0, "--fps", 24)
+        self.assertEqual(self.json("data", "inspect", "slow.h5")["fps"], 24)
+        found = self.fix("sixty", "thirty", 0, "--fps", 60)
+        self.assertEqual(len(os.listdir(self.path("thirty"))), 6)
+        self.assertIn("thinned", " ".join(found["fixed"]["remarks"]))
+        for rate in (0, -1, "nan", 1e9):
+            self.bad_input(["doctor", "sixty", "--fps", rate], "--fps")
+        self.bad_input(["doctor", "walk/target.ply", "--fps", 60], "target.ply", "no sequence", "--fps")
+
+    def test_people_are_turned_by_the_angle_found(self):
+        turn = math.radians(35)
+        person = [(x * math.cos(turn) + z * math.sin(turn), y, z * math.cos(turn) - x * math.sin(turn)) for x, y, z in self.person()]
+        self.ply("turned.ply", person)
+        self.assertEqual(self.restage("doctor", "turned.ply", "--target").code, 1)
+        found = self.fix("turned.ply", "straight.ply", 0, "--target")
+        self.assertAlmostEqual(found["frame"]["turned"], 35, delta=8)
+        self.assertIn("turned by", " ".join(found["fixed"]["remarks"]))
+        kept = json.loads(self.bytes("straight.ply.transform.json"))
+        self.assertIn("degrees about the vertical", kept["turned"])
+        for i in range(0, len(person), 100):  # as it says: scale R (p - t)
+            want = [kept["scale"] * sum(kept["rotation"][r][c] * (person[i][c] - kept["offset"][c]) for c in range(3)) for r in range(3)]
+            for a, b in zip(want, self.mesh("straight.ply")[0][i]):
+                self.assertAlmostEqual(a, b, 5)
+
+    def test_results_keep_how_sure_they_are(self):
+        self.person()
+        vertices, faces = self.mesh("walk/target.ply")
+        flat = lambda rows: [x for row in rows for x in row]
+        self.h5("r.h5", {"source": "scans"}, joints=([3, 22, 3], numbers(3 * 66, 3)),
+                vertices=([3, len(vertices), 3], flat((100 * x, 100 * y, 100 * z) for x, y, z in vertices) * 3, "float32"),
+                confidence=([3], [.5, .25, 1], "float32"), radius=([3, 22], [2.0], "float32"), mine=([3, 2], numbers(6, 1)), table=([5], [1.0]))
+        remarks = " ".join(self.fix("r.h5", "m.h5", 0)["fixed"]["remarks"])
+        self.assertIn("/table", remarks)
+        self.assertIn("as they stand, neither turned nor scaled: /mine", remarks)
+        self.assertEqual(self.json("data", "verify", "m.h5")["problems"], [])
+        # The radius is 2 cm of centimetres: of joints 1 cm away all are within it, of joints 3 cm away none.
+        for off, share in ((1, 1), (3, 0)):
+            was = numbers(3 * 66, 3)
+            self.h5("t.h5", joints=([3, 22, 3], [x + off * (i % 3 == 1) for i, x in enumerate(was)]),
+                    vertices=([3, len(vertices), 3], flat((100 * x, 100 * y, 100 * z) for x, y, z in vertices) * 3, "float32"))
+            self.fix("t.h5", "tm.h5", 0)
+            self.assertEqual(self.json("eval", "--pred", "m.h5", "--truth", "tm.h5")["joints_within_radius"], share)
+        self.assertIn("confidence", " ".join(self.fix("r.h5", "folder", 0)["fixed"]["remarks"]))
 
     def test_a_rate_that_would_fill_the_disk_is_refused(self):
         cloud = self.person()

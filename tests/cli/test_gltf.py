@@ -132,6 +132,27 @@ class Gltf(CliTest):
         self.bad_input(call + ["--source", "scans", "--clip", "jump", "--target", "plain.ply", "--out", "x.h5"], "--clip")
         self.bad_input(call + ["--source", "first.glb", "--fps", "60", "--target", "plain.ply", "--out", "x.h5"], "leave --fps out")
 
+    def test_a_rig_decides_for_doctor_and_retarget(self):
+        # 22 specks that look like nobody: the rig says who stands there, and that in T-pose.
+        result = self.restage("doctor", "hero.glb", "--target", "--json")
+        found = json.loads(result.out)
+        said = {f["topic"]: (f["weight"], f["evidence"]) for f in found["findings"]}
+        self.assertEqual(said["up"], ("fact", "the rig's joints"))
+        self.assertEqual(said["facing"], ("fact", "the rig's joints"))
+        self.assertEqual(said["pose"][0], "fact")
+        self.assertEqual(found["transform"]["rotation"], [[1, 0, 0], [0, 1, 0], [0, 0, 1]])
+        # The same of names that nobody knows: never turned over.
+        names = ["bone %d" % j for j in range(22)]
+        character(self.path("own.glb"), names)
+        found = json.loads(self.restage("doctor", "own.glb", "--target", "--json").out)
+        self.assertEqual([f["weight"] != "wrong" and f["what"].startswith("+y is up") for f in found["findings"] if f["topic"] == "up"], [True])
+        # retarget asks the same: no weights here, so that nothing but the target is judged.
+        w = weights("tposes", *TPOSES)
+        self.person()
+        call = ["retarget", "--weights", w, "--source", "walk/source.h5", "--out", "x.h5", "--target"]
+        doctor = self.restage("doctor", "hero.glb", "--target").code
+        self.assertEqual(self.restage(*call, "hero.glb").code, 0 if doctor == 0 else 2)
+
     def test_mirrored_rigs_are_named(self):
         other = {"left": "right", "right": "left"}
         character(self.path("mirror.glb"), ["_".join(other.get(word, word) for word in name.split("_")) for name in NAMES])

@@ -105,6 +105,35 @@ TEST(DoctorSequence, SkeletonsAreOfAPersonsSize) {
   EXPECT_EQ(examine_skeletons({joints}).weight, Weight::wrong);
 }
 
+TEST(DoctorSequence, TheRateIsTheUsersOrTheFiles) {
+  Frames said(performance(12), {}, 60);
+  EXPECT_EQ(examine_frames(said).fps, 60);
+  said.rewind();
+  ExamineOptions known;
+  known.fps = 120;
+  const Diagnosis d = examine_frames(said, known);
+  EXPECT_EQ(d.fps, 120);
+  ASSERT_NE(d.find("frame rate"), nullptr);
+  EXPECT_EQ(d.find("frame rate")->what, "120 frames a second");
+}
+
+/// Seen from anywhere, people are turned by the angle that they are turned by.
+TEST(DoctorSequence, IsTurnedByTheAngleFound) {
+  for (const double degrees : {-15.0, 60.0, 240.0}) {  // 22 degrees to the right when it begins
+    std::vector<Points> frames;
+    const double turn = degrees * 3.14159265358979 / 180;
+    for (const Points& frame : performance(12)) frames.push_back(moved(frame, turn_about_y(turn)));
+    Frames turned(frames), straight(performance(12));
+    const Diagnosis d = examine_frames(turned), before = examine_frames(straight);
+    ASSERT_TRUE(d.transform);
+    EXPECT_NE(d.turned, 0) << degrees;
+    // The performer stands as if the sequence had not been turned at all.
+    const Mat3 left =
+        d.transform->rotation * turn_about_y(turn) * before.orientation.exact_turn().transpose();
+    EXPECT_NEAR(std::atan2(left(0, 2), left(2, 2)) * 180 / 3.14159265358979, 0, 10) << degrees;
+  }
+}
+
 TEST(DoctorSequence, NobodyRunsThatFast) {
   std::vector<Points> frames = performance(20);
   for (size_t f = 0; f < frames.size(); ++f)

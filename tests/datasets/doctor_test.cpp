@@ -260,6 +260,50 @@ TEST(Doctor, TargetsAreJudgedAsRetargetingDoes) {
   }
 }
 
+/// A figure whose flesh looks upside down: what its rig says holds, for the doctor and retargeting.
+TEST(Doctor, ARigKnowsBetterThanTheShapeOfItsFlesh) {
+  const Body& body = somebody();
+  Mesh figure = body.rest;  // turned over, which keeps left and right
+  for (Point& p : figure.vertices) p = Point(p.x(), 1.7f - p.y(), -p.z());
+  EXPECT_TRUE(notes(examine_target(figure), "up", "-y is up"));
+  EXPECT_THROW(check_target(figure, "hero"), InputError);
+
+  ExamineOptions known;
+  known.target = true;
+  known.joints = body.joints;
+  const Diagnosis d = examine_surface(figure, known);
+  EXPECT_TRUE(d.usable());
+  EXPECT_EQ(d.find("up")->evidence, "the rig's joints");
+  EXPECT_EQ(d.find("pose")->what, "T-pose");
+  ASSERT_TRUE(d.transform);
+  EXPECT_TRUE(d.transform->rotation.isIdentity(0));
+  EXPECT_EQ(d.transform->scale, 1);
+  EXPECT_NO_THROW(check_target(figure, "hero", known));
+  // Whoever knows better still may say so.
+  known.up = 3;
+  EXPECT_FALSE(examine_surface(figure, known).transform->rotation.isIdentity(0.1));
+  known.up.reset();
+
+  // The rig's own pose is judged by the same rule.
+  for (const int side : {0, 1})
+    for (const int j : {18, 20}) {
+      Vec3& p = (*known.joints)[static_cast<size_t>(j + side)];
+      const Vec3 shoulder = body.joints[static_cast<size_t>(16 + side)];
+      p = shoulder + Eigen::AngleAxisd((side == 0 ? -1 : 1) * 0.9, Vec3::UnitZ()) * (p - shoulder);
+    }
+  EXPECT_TRUE(notes(examine_surface(figure, known), "pose", "not a T-pose"));
+  EXPECT_THROW(check_target(figure, "hero", known), InputError);
+
+  // Of a rig that is not known the format's axis stays up.
+  ExamineOptions format;
+  format.target = format.y_up = true;
+  const Diagnosis unknown = examine_surface(figure, format);
+  EXPECT_TRUE(notes(unknown, "up", "though its shape looks as if -y were"));
+  EXPECT_EQ(unknown.orientation.up, 2);
+  ASSERT_TRUE(unknown.transform);
+  EXPECT_EQ((unknown.transform->rotation * Vec3::UnitY()).y(), 1);
+}
+
 /// What the doctor calls unusable is refused as a target, also with few points.
 TEST(Doctor, FlatSquaresAreNoTarget) {
   Mesh squares;  // twelve of them, with corners of their own: 48 vertices
@@ -347,6 +391,47 @@ TEST(DoctorOrientation, PeopleInMotionAreSeldomTakenForOthers) {
   }
   EXPECT_EQ(up, all);
   EXPECT_GE(facing, all - 1);
+}
+
+/// The angle of somebody who is turned, and the repair that takes it away.
+TEST(DoctorOrientation, PeopleAreTurnedByTheAngleFound) {
+  std::vector<double> off;
+  for (int person = 0; person < 4; ++person) {
+    const Body body = builtin_body(0, "test", static_cast<size_t>(person));
+    for (const double degrees : {-150.0, -60.0, -35.0, 25.0, 35.0, 45.0, 130.0}) {
+      const double turn = degrees * 3.14159265358979 / 180;
+      const Diagnosis d = examine_surface(cloud(moved(scan(body), turn_about_y(turn))));
+      ASSERT_TRUE(d.transform);
+      EXPECT_NE(d.turned, 0) << degrees << " " << person;
+      const Mat3 left = d.transform->rotation * turn_about_y(turn);
+      off.push_back(std::abs(std::atan2(left(0, 2), left(2, 2))) * 180 / 3.14159265358979);
+      EXPECT_LT(off.back(), 3) << degrees << " " << person;
+      EXPECT_NE(d.find("facing")->fix.find("by that angle"), std::string::npos);
+    }
+  }
+  EXPECT_LT(median(off), 1);
+  // Nearly straight is left as it is, to the last bit.
+  const Diagnosis d = examine_surface(cloud(moved(scan(somebody()), turn_about_y(0.1))));
+  EXPECT_EQ(d.turned, 0);
+  EXPECT_TRUE(d.transform->rotation.isIdentity(0));
+}
+
+TEST(DoctorOrientation, WhereUpIsInQuestionOnlyQuartersAreTurned) {
+  Orientation o;
+  o.facing_sure = o.turned_sure = 1;
+  o.turned = 35;
+  const Mat3 exact = o.exact_turn();  // +z is 35 degrees to the right of them
+  EXPECT_TRUE((exact * (turn_about_y(35 * 3.14159265358979 / 180) * Vec3::UnitZ()))
+                  .isApprox(Vec3::UnitZ(), 1e-9));
+  EXPECT_TRUE(o.turn().isIdentity(0));
+  Points points;  // nobody in particular: a bent sheet that might stand or lie
+  Rng rng(RngKey{21, 0});
+  for (int i = 0; i < 900; ++i) {
+    const auto a = static_cast<float>(rng.uniform(-1, 1)),
+               b = static_cast<float>(rng.uniform(-1, 1));
+    points.push_back({0.8f * a, 0.8f * b, 0.3f * a * a});
+  }
+  EXPECT_EQ(examine_surface(cloud(points)).turned, 0);
 }
 
 TEST(DoctorOrientation, WhatIsNoPersonIsUnsure) {

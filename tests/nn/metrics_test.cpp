@@ -134,7 +134,8 @@ TEST(Metrics, WhatCannotBeComputedHasNoValue) {
   EXPECT_FALSE(mean_distance(x, absent));
   EXPECT_FALSE(mean_distance(absent, y));
   EXPECT_FALSE(acceleration_error(x, y)) << "two frames";
-  EXPECT_FALSE(edge_length_difference_mm(x, y)) << "six points";
+  const SequenceView six{{}, {}, x, y, x.frames};
+  EXPECT_FALSE(table()[6].compute(six)) << "edges of six points";
   EXPECT_FALSE(mean_distance(x.slice(0, 0), y.slice(0, 0))) << "no frames";
   const std::vector<double> collapsed(2 * 6 * 3, 0.5);
   EXPECT_FALSE(mean_distance({collapsed.data(), 2, 6}, y, {Alignment::Mode::frame}));
@@ -218,6 +219,63 @@ TEST(Metrics, SameBitsForAnyNumberOfThreads) {
     return evaluate(views).mean;
   };
   for (const int n : {2, 3}) EXPECT_EQ(mean(n), mean(1)) << n << " threads";
+}
+
+/// A long sequence is read some frames at a time: of all frames a few are ever held, and every
+/// metric has the bits that it has of tracks in memory.
+TEST(Metrics, SurfacesThatAreReadHaveTheSameBits) {
+  constexpr int64_t kFrames = 7, kPoints = 120000;
+  std::vector<double> a = noise(3 * kPoints, 14), b = noise(3 * kPoints, 15);
+  for (std::vector<double>* one : {&a, &b})  // cheaper than seven times as much noise
+    for (int64_t i = 0; i < 3 * kPoints * (kFrames - 1); ++i)
+      one->push_back((*one)[static_cast<size_t>(i)] * 1.01 + 0.001 * static_cast<double>(i % 7));
+  const auto ja = noise(kFrames * 66, 16), jb = noise(kFrames * 66, 17);
+  const Track x{ja.data(), kFrames, kJoints}, y{jb.data(), kFrames, kJoints};
+  int64_t most = 0;
+  const auto read = [&](const std::vector<double>& from) {
+    return [&](int64_t first, int64_t count, std::vector<double>& out) {
+      most = std::max(most, count);
+      out.assign(from.begin() + 3 * kPoints * first, from.begin() + 3 * kPoints * (first + count));
+    };
+  };
+  const Track p{a.data(), kFrames, kPoints}, t{b.data(), kFrames, kPoints};
+  const Surfaces p_read(kFrames, kPoints, read(a)), t_read(kFrames, kPoints, read(b));
+  std::vector<Metric> metrics;
+  for (const auto from : {table(), variants()})
+    for (const Metric& metric : from)
+      if (std::string(metric.name).find("medl") == std::string::npos) metrics.push_back(metric);
+  const std::vector<SequenceView> held{{x, y, p, t, kFrames}, {x, y, p.slice(2, 5), t.slice(2, 5)}},
+      streamed{{x, y, p_read, t_read, kFrames}, {x, y, p_read.slice(2, 5), t_read.slice(2, 5)}};
+  const Evaluation want = evaluate(held, metrics), got = evaluate(streamed, metrics);
+  EXPECT_LE(most * kPoints * 24, int64_t{16} << 20);
+  for (size_t s = 0; s < 2; ++s)
+    for (size_t m = 0; m < metrics.size(); ++m)
+      EXPECT_EQ(got.sequences[s][m], want.sequences[s][m]) << s << " " << metrics[m].name;
+  EXPECT_EQ(*want.sequences[0][4], *mean_distance(p, t)) << "and those of the plain definition";
+  EXPECT_EQ(*want.sequences[0][5], *mean_distance(p, t, {Alignment::Mode::frame}));
+  const Alignment sequence{Alignment::Mode::sequence};
+  for (size_t m = 0; m < metrics.size(); ++m)
+    if (std::string(metrics[m].name) == "pa_mpvd_sequence") {
+      EXPECT_EQ(*got.sequences[0][m], *mean_distance(p, t, sequence));
+    }
+}
+
+TEST(Metrics, EdgesOfSurfacesThatAreReadHaveTheSameBits) {
+  constexpr int64_t kFrames = 13, kPoints = 60000;
+  std::vector<double> a = noise(3 * kPoints, 18), b = noise(3 * kPoints, 19);
+  const auto read = [&](const std::vector<double>& from) {  // all frames alike
+    return [&](int64_t, int64_t count, std::vector<double>& out) {
+      out.clear();
+      for (int64_t f = 0; f < count; ++f) out.insert(out.end(), from.begin(), from.end());
+    };
+  };
+  const SequenceView streamed{{}, {}, {kFrames, kPoints, read(a)}, {kFrames, kPoints, read(b)}};
+  const SequenceView one{{}, {}, Track{a.data(), 1, kPoints}, Track{b.data(), 1, kPoints}};
+  for (const auto from : {table(), variants()})
+    for (const Metric& metric : from)
+      if (std::string(metric.name).starts_with("medl")) {
+        EXPECT_NEAR(*metric.compute(streamed), *metric.compute(one), 1e-9) << metric.name;
+      }
 }
 
 TEST(Metrics, ErrorsByPointAverageToTheMeanDistance) {
