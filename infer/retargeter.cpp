@@ -149,12 +149,12 @@ bool Retargeter::frame_by_frame() const { return options_.fps == kFps && motion_
 void Retargeter::restart() {
   state_ = {};
   feet_ = {};
+  waiting_ = {};
   heading_ = Heading(steady_heading_);
   previous_.reset();
   back_before_.reset();
   received_.reset();
-  believed_.reset();
-  frame_ = grid_ = answered_ = 0;
+  frame_ = grid_ = missed_ = answered_ = 0;
   legs_a_ = 0;
 }
 
@@ -167,7 +167,8 @@ std::span<const RetargetedFrame> Retargeter::push(const Points& cloud, const std
     if (!extractor_)
       throw InputError(source, "cannot be read without a model for skeleton",
                        "give weights that have one");
-    const bool remembers = received_ && options_.fps > kRemembering;
+    const bool remembers =
+        received_ && options_.fps / static_cast<double>(missed_ + 1) > kRemembering;
     seen = (*extractor_)(cloud, source, key, remembers ? &*received_ : nullptr);
   }
   const auto out = push_joints(seen);
@@ -175,51 +176,72 @@ std::span<const RetargetedFrame> Retargeter::push(const Points& cloud, const std
   return out;
 }
 
+void Retargeter::miss() {
+  ++frame_;
+  ++missed_;
+}
+
 std::span<const RetargetedFrame> Retargeter::push_joints(const SeenJoints& seen) {
   last_source_ = seen.joints;
   times_ = {};
+  ++frame_;
+  const size_t count = advance(seen, false);
+  received_ = seen;
+  missed_ = 0;
+  return {frames_.data(), count};
+}
+
+/// Answers the grid frames up to source frame frame_ - 1, in which A is as in `seen`; how many
+/// there are. Between two frames that were received, positions are interpolated. `ended`: no frame
+/// follows those that were missed, in which A stays as in `seen`, the last one received.
+size_t Retargeter::advance(const SeenJoints& seen, bool ended) {
+  const double now = static_cast<double>(frame_ - 1) / options_.fps;
+  const auto apart = static_cast<double>(missed_ + 1);  // source frames from received_ to `seen`
   size_t count = 0;
-  const double now = static_cast<double>(frame_) / options_.fps;
-  // Grid frames up to this moment; positions between two source frames are interpolated.
   while (static_cast<double>(grid_) / kFps <= now + 1e-9) {
     const double back =
         (now - static_cast<double>(grid_) / kFps) * options_.fps;  // in source frames
+    const bool between = back > 1e-9 && !ended;
     if (frames_.size() == count) frames_.emplace_back();
-    count += step(received_ && back > 1e-9 ? blend(seen, *received_, std::min(back, 1.0)) : seen,
-                  &frames_[count]);
+    count +=
+        step(received_ && between ? blend(seen, *received_, std::min(back / apart, 1.0)) : seen,
+             missed_ > 0 && (between || ended), &frames_[count]);
   }
-  received_ = seen;
-  ++frame_;
-  return {frames_.data(), count};
+  return count;
 }
 
 std::span<const RetargetedFrame> Retargeter::finish() {
+  size_t count = 0;
+  if (missed_ > 0 && received_) {
+    count = advance(*received_, true);
+    missed_ = 0;
+  }
   if (grid_ == 0) return {};
   const SeenJoints last = asked_[static_cast<size_t>((grid_ - 1) % std::ssize(asked_))].seen;
-  size_t count = 0;
   for (const int64_t all = grid_; answered_ < all;) {
     if (frames_.size() == count) frames_.emplace_back();
-    count += step(last, &frames_[count]);
+    count += step(last, false, &frames_[count]);
   }
   return {frames_.data(), count};
 }
 
-bool Retargeter::step(const SeenJoints& now, RetargetedFrame* out) {
+bool Retargeter::step(const SeenJoints& now, bool filled, RetargetedFrame* out) {
   SeenJoints seen = now;
   {
     const Stopwatch watch(&times_.motion);
     const double heading = remove_heading_ ? heading_(now.joints) : 0;
     const MotionOutput said = answer(now, turn_about_y(heading));
     const int64_t room = std::ssize(asked_);
-    asked_[static_cast<size_t>(grid_ % room)] = {now, turn_about_y(heading)};
+    asked_[static_cast<size_t>(grid_ % room)] = {now, turn_about_y(heading), filled};
     if (++grid_ < room) return false;
     const Asked& then = asked_[static_cast<size_t>(grid_ % room)];  // the oldest
     seen = then.seen;
+    out->filled = then.filled;
     perform(said, seen.joints, then.turn, &out->pose);
   }
   out->confidence.reset();
-  if (seen.uncertainty) out->confidence = confidence(*seen.uncertainty);
-  hold_doubtful(out);
+  if (seen.uncertainty) out->confidence = out->filled ? 0 : confidence(*seen.uncertainty);
+  hold_doubtful(seen.joints, out);
   const Stopwatch watch(&times_.deformation);
   const PosedSkeleton posed = forward_kinematics(rest_, out->pose);
   out->joints = posed.joints;
@@ -232,21 +254,21 @@ bool Retargeter::step(const SeenJoints& now, RetargetedFrame* out) {
   return true;
 }
 
-void Retargeter::hold_doubtful(RetargetedFrame* out) {
+/// `a`: the joints of A in the frame that `out` answers.
+void Retargeter::hold_doubtful(const Joints& a, RetargetedFrame* out) {
   if (!out->confidence && options_.min_confidence > 0)
     throw InputError("", "these weights do not say how sure they are of a frame",
                      "leave --min-confidence out, or give weights whose extractor has sizes."
                      "uncertainty");
-  if (!out->confidence || *out->confidence >= options_.min_confidence) {
-    believed_ = out->pose;
+  if (options_.min_confidence == 0) return;
+  if (*out->confidence >= options_.min_confidence) {
+    out->pose = waiting_.go_on(out->pose);
     return;
   }
-  if (!believed_) {
-    out->pose.local.fill(Mat3::Identity());
-    out->pose.local[0] = turn_about_y(heading_angle(last_source_));
-    believed_ = out->pose;
-  }
-  out->pose = *believed_;
+  Pose rest = out->pose;
+  rest.local.fill(Mat3::Identity());
+  rest.local[0] = turn_about_y(heading_angle(a));
+  out->pose = waiting_.wait(rest);
 }
 
 /// The motion model's answer to what is seen of A, whose heading `turn` is.

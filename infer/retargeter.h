@@ -8,6 +8,7 @@
 #include "infer/foot_lock.h"
 #include "infer/surface.h"
 #include "infer/system.h"
+#include "infer/waiting.h"
 #include "nn/models/extraction.h"
 #include "nn/models/motion.h"
 #include "nn/weights/bundle.h"
@@ -22,8 +23,9 @@ struct RetargetOptions {
   /// Seconds in which B's path, a sum of velocities, goes back to A's in proportion to the legs, so
   /// that errors do not add up. 0: never, as in the papers (docs/method.md, "Drift").
   double anchor = 0.25;
-  /// Frames of less confidence than this are not guessed: the target keeps the pose of the last one
-  /// before, or its rest pose. 0: every frame is answered.
+  /// Frames of less confidence than this are not guessed: the target keeps the pose that was shown
+  /// before, or its rest pose, and comes back in kReturnFrames frames (infer/waiting.h). 0: every
+  /// frame is answered.
   double min_confidence = 0;
   /// Feet that stand are held where they landed, by weights that say which do.
   bool foot_lock = true;
@@ -49,9 +51,11 @@ class Retargeter final : public System {
   /// that looks ahead (MotionModel::latency) those so many frames before. A steady frame takes no
   /// memory.
   std::span<const RetargetedFrame> push(const Points& cloud, const std::string& source) override;
+  void miss() override;
   /// The same from joints of A in the world, and what else is seen of them.
   std::span<const RetargetedFrame> push_joints(const SeenJoints& seen);
-  /// The frames that the network has not answered yet: the source stands still in the end.
+  /// The frames of a gap at the end, and those that the network has not answered yet: the source
+  /// stands still in the end.
   std::span<const RetargetedFrame> finish() override;
   void restart() override;
 
@@ -69,11 +73,12 @@ class Retargeter final : public System {
 
  private:
   void prepare(const std::string& weights_name);
+  size_t advance(const SeenJoints& seen, bool ended);
   /// False: there is no answer yet.
-  bool step(const SeenJoints& seen, RetargetedFrame* out);
+  bool step(const SeenJoints& seen, bool filled, RetargetedFrame* out);
   MotionOutput answer(const SeenJoints& seen, const Mat3& turn);
   void perform(const MotionOutput& answer, const Joints& a, const Mat3& turn, Pose* pose);
-  void hold_doubtful(RetargetedFrame* out);
+  void hold_doubtful(const Joints& a, RetargetedFrame* out);
   void sum_path(const Joints& a, const Vec3& velocity);
 
   Bundle models_;
@@ -92,9 +97,9 @@ class Retargeter final : public System {
   Heading heading_{false};
   MotionState state_;
   FootLock feet_;
+  Waiting waiting_;
   std::optional<Joints> previous_;      ///< A on the 30 fps grid, one step ago
   std::optional<Mat3> back_before_;     ///< what took A's heading away then
-  std::optional<Pose> believed_;        ///< the last pose that was
   std::optional<SeenJoints> received_;  ///< A as last pushed
   Joints last_source_;
   Vec3 start_a_ = Vec3::Zero(), start_b_ = Vec3::Zero();  ///< pelvis in the first frame
@@ -105,9 +110,11 @@ class Retargeter final : public System {
   struct Asked {
     SeenJoints seen;
     Mat3 turn;
+    bool filled;
   };
   std::vector<Asked> asked_;
-  int64_t frame_ = 0, grid_ = 0;         ///< source frames received, grid frames seen
+  int64_t frame_ = 0, grid_ = 0;         ///< source frames received or missed, grid frames seen
+  int64_t missed_ = 0;                   ///< source frames since the last one that was received
   int64_t answered_ = 0;                 ///< grid frames produced
   std::vector<RetargetedFrame> frames_;  ///< of the last push, and room for more
   FrameTimes times_;

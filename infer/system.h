@@ -18,7 +18,11 @@ struct RetargetedFrame {
   Points vertices;  ///< posed, world, in the target's order
   /// Chance that a joint of the source is where it is believed to be, within kNearby
   /// (nn/models/views.h): mean of the 22, by the extractor's own estimate. Empty: nobody says.
+  /// 0 in a filled frame, whose source nobody has seen.
   std::optional<double> confidence;
+  /// No cloud of the source is behind this frame (System::miss()): it lies between those around the
+  /// gap, or repeats the nearest one where the source begins or ends with a gap.
+  bool filled = false;
 };
 
 /// Seconds that the parts of one push() took.
@@ -41,10 +45,15 @@ class System {
 
   /// One cloud of the source (metres, y up). An online system answers with the frames of the grid
   /// that this cloud ends, one that works in windows when a window is full. The frames live until
-  /// the next call. InputError naming `source` for a cloud that cannot be used.
+  /// the next call. UnusableCloud naming `source` for a cloud that cannot be used; the system is
+  /// then as before the call.
   virtual std::span<const RetargetedFrame> push(const Points& cloud, const std::string& source) = 0;
-  /// What is still held back when the source has ended.
-  virtual std::span<const RetargetedFrame> finish() { return {}; }
+  /// In the place of push() for a frame of the source that is missing or cannot be used. Time goes
+  /// on; the next push() answers with the frames of the gap too, or finish() where none follows.
+  virtual void miss() = 0;
+  /// What is still held back when the source has ended: frames after a gap at the end, which repeat
+  /// the last one, and those of a system that answers late. Nothing if every frame was missed.
+  virtual std::span<const RetargetedFrame> finish() = 0;
   /// Forgets the motion so far.
   virtual void restart() = 0;
 

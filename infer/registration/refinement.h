@@ -18,8 +18,10 @@ class Refinement final : public System {
   Refinement(std::unique_ptr<Retargeter> chain, const std::string& where);
 
   std::span<const RetargetedFrame> push(const Points& cloud, const std::string& source) override;
+  void miss() override { chain_->miss(); }
+  std::span<const RetargetedFrame> finish() override { return chain_->finish(); }
   void restart() override { chain_->restart(); }
-  /// The registered target's joints in the last frame, in the source's build.
+  /// The registered target's joints in the last cloud, in the source's build.
   const Joints* source_joints() const override { return &source_joints_; }
   const Mesh& target() const override { return chain_->target(); }
   const SystemRig* rig() const override { return chain_->rig(); }
@@ -30,7 +32,7 @@ class Refinement final : public System {
   std::unique_ptr<Retargeter> chain_;
   Rig rig_;
   Joints source_joints_;
-  RetargetedFrame frame_;
+  std::vector<RetargetedFrame> frames_;  // of the last push
 };
 
 }  // namespace restage

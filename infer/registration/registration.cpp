@@ -47,8 +47,8 @@ std::vector<Vec3> thinned(const Points& cloud, double width, const std::string& 
   std::map<std::array<int64_t, 3>, Sum> cubes;
   for (const Point& p : cloud) {
     if (!p.allFinite() || p.cwiseAbs().maxCoeff() > 1e6f)
-      throw InputError(source, "holds a coordinate that is not finite or beyond 1000 km",
-                       "remove such points, and give metres");
+      throw UnusableCloud(source, "holds a coordinate that is not finite or beyond 1000 km",
+                          "remove such points, and give metres");
     std::array<int64_t, 3> at;
     for (int c = 0; c < 3; ++c)
       at[c] = static_cast<int64_t>(std::floor(static_cast<double>(p[c]) / width));
@@ -57,7 +57,7 @@ std::vector<Vec3> thinned(const Points& cloud, double width, const std::string& 
     cube.count += 1;
   }
   if (cubes.size() < kLeastDistinctPoints)
-    throw InputError(
+    throw UnusableCloud(
         source, "holds points in " + std::to_string(cubes.size()) + " places, too few for a body",
         "give at least " + std::to_string(kLeastDistinctPoints) + " some centimetres apart");
   std::vector<Vec3> out;
@@ -129,12 +129,36 @@ std::span<const RetargetedFrame> Registration::push(const Points& cloud,
     pose = refit_pose(rig_, posed, fit_free_form(rig_, posed, points, options_.free_form_options));
   source_joints_ = forward_kinematics(built(body_.joints, *previous_), pose).joints;
 
-  RetargetedFrame& out = frame_;
+  pose.root = trajectory_scale(source_joints_, body_.joints) * source_joints_[0];
+  frames_.clear();
+  const Pose before = shown_.value_or(pose);
+  for (int64_t k = 1; k <= missed_; ++k)
+    add_frame(between(before, pose, static_cast<double>(k) / static_cast<double>(missed_ + 1)),
+              true);
+  add_frame(pose, false);
+  shown_ = pose;
+  missed_ = 0;
+  return frames_;
+}
+
+std::span<const RetargetedFrame> Registration::finish() {
+  frames_.clear();
+  for (; shown_ && missed_ > 0; --missed_) add_frame(*shown_, true);
+  return frames_;
+}
+
+void Registration::restart() {
+  previous_.reset();
+  shown_.reset();
+  missed_ = 0;
+}
+
+void Registration::add_frame(const Pose& pose, bool filled) {
+  RetargetedFrame& out = frames_.emplace_back();
   out.pose = pose;
-  out.pose.root = trajectory_scale(source_joints_, body_.joints) * source_joints_[0];
-  out.joints = forward_kinematics(body_.joints, out.pose).joints;
-  out.vertices = Registration::posed(out.pose);
-  return {&frame_, 1};
+  out.joints = forward_kinematics(body_.joints, pose).joints;
+  out.vertices = Registration::posed(pose);
+  out.filled = filled;
 }
 
 }  // namespace restage

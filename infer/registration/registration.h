@@ -19,11 +19,12 @@
 
 #include "infer/registration/free_form.h"
 #include "infer/system.h"
+#include "infer/waiting.h"
 
 namespace restage {
 
 /// One point, the mean, for each occupied cube of a grid of that width (metres), in the order of
-/// the cubes. InputError naming `source`: fewer than 64 of them, values that are not finite.
+/// the cubes. UnusableCloud naming `source`: fewer than 64 of them, values that are not finite.
 std::vector<Vec3> thinned(const Points& cloud, double width, const std::string& source);
 
 inline constexpr double kCloudGrid = 0.03;
@@ -44,11 +45,12 @@ class Registration final : public System {
                const RegistrationOptions& options = {});
 
   /// The target performing one frame of the source (metres, y up). The same bits for any number of
-  /// threads. InputError naming `source`: fewer than 64 distinct points, values that are not
-  /// finite.
+  /// threads. UnusableCloud: see thinned(). In a gap before this frame poses are interpolated.
   std::span<const RetargetedFrame> push(const Points& cloud, const std::string& source) override;
+  void miss() override { ++missed_; }
+  std::span<const RetargetedFrame> finish() override;
   /// Forgets the frame before.
-  void restart() override { previous_.reset(); }
+  void restart() override;
   /// The registered template's joints in the last frame, in the source's build.
   const Joints* source_joints() const override { return &source_joints_; }
   const Mesh& target() const override { return body_.rest; }
@@ -58,14 +60,17 @@ class Registration final : public System {
 
  private:
   std::vector<RigState> starts(const std::vector<Vec3>& cloud) const;
+  void add_frame(const Pose& pose, bool filled);
 
   Body body_;  // of the target, with weights by distance
   RegistrationOptions options_;
   Rig rig_;
-  std::optional<RigState> previous_;
+  std::optional<RigState> previous_;  // fitted to the last cloud
+  std::optional<Pose> shown_;         // of the target, for the last cloud
+  int64_t missed_ = 0;                // frames of the source since the last cloud
   Joints source_joints_;
   SystemRig system_rig_{body_.joints, body_.weights};
-  RetargetedFrame frame_;
+  std::vector<RetargetedFrame> frames_;  // of the last push
 };
 
 }  // namespace restage

@@ -1,6 +1,7 @@
 #include "infer/render/clip.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "autograd/base/error.h"
 
@@ -14,7 +15,31 @@ float ranked(std::vector<float>& values, size_t place) {
   return *at;
 }
 
+/// Those of the chosen frames; of a list that is empty none.
+template <class T>
+void choose(const std::vector<size_t>& chosen, std::vector<T>* list) {
+  if (list->empty()) return;
+  std::vector<T> out;
+  for (const size_t frame : chosen) out.push_back(list->at(frame));
+  *list = std::move(out);
+}
+
 }  // namespace
+
+Clip at_rate(Clip clip, double fps, size_t frames) {
+  std::vector<size_t> chosen;
+  for (size_t k = 0; k < frames; ++k) {
+    const auto nearest = static_cast<size_t>(std::llround(static_cast<double>(k) * clip.fps / fps));
+    if (nearest >= clip.frames.size()) break;
+    chosen.push_back(nearest);
+  }
+  choose(chosen, &clip.frames);
+  choose(chosen, &clip.confidence);
+  choose(chosen, &clip.focus);
+  choose(chosen, &clip.errors);
+  clip.fps = fps;
+  return clip;
+}
 
 Points stick_figure(const Joints& joints) {
   constexpr int kPointsPerBone = 12;

@@ -10,7 +10,8 @@ namespace restage {
 
 /// Frames of one surface (same vertex count in every frame, `faces` given) or of clouds (`faces`
 /// empty; counts may change). World metres, y up. Between one and three clips are shown together,
-/// by convention source, result, truth; the first frames of all belong together.
+/// by convention source, result, truth; frames of the same number are shown together, so their
+/// rates must be the same (at_rate()).
 struct Clip {
   std::string label;
   std::vector<Points> frames;
@@ -20,7 +21,12 @@ struct Clip {
   /// Of each vertex (innermost) of each frame, how far it is off, metres: a page shows them as
   /// colours. Surfaces only; may be empty.
   std::vector<std::vector<float>> errors = {};
+  double fps = kFps;  ///< frames per second
 };
+
+/// The clip at another rate: of each moment k / fps, up to `frames` of them, its nearest frame. It
+/// ends where the clip does.
+Clip at_rate(Clip clip, double fps, size_t frames);
 
 /// Enough points along each bone to see it.
 Points stick_figure(const Joints& joints);

@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
@@ -16,14 +17,25 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_frame(const std::string& name) {
-  if (name.size() < 16 || name.compare(0, 6, "frame_") != 0) return false;
+/// Whether we wrote it: other programs call their frames frame_000001.ply too.
+bool is_our_frame(const fs::path& path) {
+  const std::string name = path.filename().string();
+  if (name.size() < 16 || !name.starts_with("frame_")) return false;
   const size_t dot = name.size() - 4;
-  if (name.compare(dot, 4, ".ply") != 0 && name.compare(dot, 4, ".obj") != 0) return false;
-  return name.find_first_not_of("0123456789", 6) == dot;
+  const bool ply = name.ends_with(".ply");
+  if (!ply && !name.ends_with(".obj")) return false;
+  std::error_code error;
+  if (name.find_first_not_of("0123456789", 6) != dot ||
+      fs::symlink_status(path, error).type() != fs::file_type::regular)
+    return false;
+  std::string head(80, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(head.data(), std::ssize(head));
+  head.resize(static_cast<size_t>(file.gcount()));
+  return is_ours(ply ? MeshFormat::ply : MeshFormat::obj, head);
 }
 
-// Only what looks like our own earlier result may be replaced.
+/// Only our own earlier result may be replaced.
 void check_replaceable(const std::string& folder) {
   std::error_code code;
   const fs::file_type kind = fs::symlink_status(folder, code).type();
@@ -32,8 +44,10 @@ void check_replaceable(const std::string& folder) {
   if (!fs::is_directory(folder, code) || fs::is_symlink(folder, code))
     throw InputError(folder, "exists and is not a folder", "give another name");
   for (fs::directory_iterator it(folder, code), end; !code && it != end; it.increment(code))
-    if (!is_frame(it->path().filename().string()))
-      throw InputError(folder, "holds other files (" + it->path().filename().string() + ")",
+    if (!is_our_frame(it->path()))
+      throw InputError(folder,
+                       "holds a file that restage did not write (" +
+                           it->path().filename().string() + ") and would delete",
                        "give a new or an empty folder");
   if (code) throw_unwritable(folder, code.value());
 }

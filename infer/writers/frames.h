@@ -11,8 +11,10 @@ namespace restage {
 
 /// Writes one file per frame into a folder that appears whole, at commit(), or not at all: frames
 /// go to a hidden folder beside it that is renamed in the end and removed when commit() is not
-/// reached. A folder of that name is replaced if it is empty or holds nothing but such frames;
-/// anything else in it is an InputError before any work. Memory: one frame. Disk full: WorkError.
+/// reached. A folder of that name is replaced if it is empty or holds nothing but frames that we
+/// wrote: the name is a frame's and the file begins with our comment (mesh_file.h). Anything else
+/// in it, a user's own frame_000001.ply too, is an InputError before any work. Memory: one frame.
+/// Disk full: WorkError.
 class FrameFolderWriter {
  public:
   /// `faces` are those of every frame; empty for clouds, whose point count may change.

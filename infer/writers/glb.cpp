@@ -314,7 +314,8 @@ std::string GlbWriter::bytes() const {
                                       {"roughnessFactor", 0.75}}}}});
   root["skins"] = Json::array({skin(buffer, rest_)});
   if (frames() > 0) root["animations"] = Json::array({animation(buffer, turns_, roots_, fps_)});
-  if (!confidence_.empty()) root["animations"][0]["extras"] = {{"confidence", confidence_}};
+  if (!confidence_.empty()) root["animations"][0]["extras"]["confidence"] = confidence_;
+  if (!filled_.empty()) root["animations"][0]["extras"]["filled"] = filled_;
   buffer.describe(root);
   const std::string text = root.dump();
   const uint64_t size = 12 + 8 + (text.size() + 3) / 4 * 4 + 8 + buffer.bytes().size();

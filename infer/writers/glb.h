@@ -41,6 +41,9 @@ class GlbWriter {
   /// WorkError if the pose is not finite. `confidence` for all frames or for none: it goes into the
   /// animation's extras.
   void push(const Pose& pose, std::optional<double> confidence = std::nullopt);
+  /// Frames that have no cloud of the source behind them (RetargetedFrame::filled): they go into the
+  /// animation's extras.
+  void set_filled(std::vector<int64_t> frames) { filled_ = std::move(frames); }
   /// Writes the file; also in its `asset.extras`: fps, units and the influence error in mm.
   InfluenceError commit();
   InfluenceError influence_error() const;
@@ -59,6 +62,7 @@ class GlbWriter {
   std::vector<std::array<float, 4>> turns_;  ///< frame-major, 22 per frame, (x, y, z, w)
   std::vector<float> roots_;                 ///< 3 per frame
   std::vector<double> confidence_;
+  std::vector<int64_t> filled_;
   std::vector<uint64_t> histogram_;  ///< of errors, kBin metres each, for the percentile
   double error_sum_ = 0, error_max_ = 0;
 };

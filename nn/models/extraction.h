@@ -2,6 +2,7 @@
 // extractor.
 #pragma once
 
+#include "autograd/base/error.h"
 #include "autograd/base/rng.h"
 #include "nn/geometry/body.h"
 #include "nn/models/even_points.h"
@@ -11,6 +12,13 @@
 namespace restage {
 
 inline constexpr size_t kLeastDistinctPoints = 64;
+
+/// A cloud in which nobody can be found, whatever the clouds around it hold: too few points, or
+/// values that are not finite.
+class UnusableCloud : public InputError {
+ public:
+  using InputError::InputError;
+};
 
 /// Headings over which an extractor's views of a cloud are spread, radians.
 inline constexpr double kAllAround = 6.283185307179586;
@@ -28,7 +36,7 @@ class JointExtractor {
   /// choices of points begin.
   /// `before`: the answer to the frame before, in the same frame; null where there was none. It is
   /// forgotten where the cloud is more than a metre from it.
-  /// InputError naming `source`: fewer than 64 distinct points, values that are not finite.
+  /// UnusableCloud naming `source`: fewer than 64 distinct points, values that are not finite.
   SeenJoints operator()(const Points& cloud, const std::string& source, const RngKey& key,
                         const SeenJoints* before = nullptr);
 
