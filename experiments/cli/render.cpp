@@ -11,7 +11,6 @@
 #include "autograd/base/log.h"
 #include "autograd/base/nearest.h"
 #include "autograd/base/output_check.h"
-#include "datasets/doctor/orientation_model.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
 #include "experiments/clips.h"
@@ -118,11 +117,22 @@ void check_needs_source(const RenderOptions& options) {
                        "give --source too, or leave it out");
 }
 
+/// Median distance of the first frame's points from its middle, metres.
+double size_of(const Clip& clip) {
+  const Point centre = clip_centre(clip.frames[0]);
+  std::vector<float> away;
+  for (const Point& p : clip.frames[0])
+    if (p.allFinite()) away.push_back((p - centre).norm());
+  if (away.empty()) return 0;
+  const auto half = away.begin() + std::ssize(away) / 2;
+  std::nth_element(away.begin(), half, away.end());
+  return static_cast<double>(*half);
+}
+
 /// Somebody a thousand times as large as the result is an empty row.
 void compare_sizes(const Clip& source, const Clip& result, const std::string& path) {
   constexpr double kMostTimes = 4;
-  const double times =
-      normalised(source.frames[0]).size / std::max(normalised(result.frames[0]).size, 1e-9);
+  const double times = size_of(source) / std::max(size_of(result), 1e-9);
   if (times > kMostTimes || times < 1 / kMostTimes)
     log_warning(path + ": somebody " + format("%.3g", times) +
                 " times the size of the result; --scale says how many metres a unit has");
