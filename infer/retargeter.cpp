@@ -12,10 +12,11 @@
 namespace restage {
 namespace {
 
-constexpr int kTargetSamples = 16;  // a target is looked at once: average many choices of points
+constexpr int kTargetSamples = 16;  // views of the target, more than of a frame: it is seen once
 constexpr size_t kTargetPoints = 8192;
 constexpr double kTposeLimit = 30.0;  // degrees
-constexpr double kRemembering = 8;    // frames per second from which on one is like the one before
+constexpr double kRemembering = 8;  // frames per second; at lower rates a frame tells too little of
+                                    // the next one, and the extractor is not told
 
 Tensor tensor_of(const Joints& joints, const Vec3& origin) {
   Tensor t = Tensor::empty({1, kJoints, 3});
@@ -26,14 +27,17 @@ Tensor tensor_of(const Joints& joints, const Vec3& origin) {
   return t;
 }
 
-/// Between two moments; what is no position is that of the nearer one.
+/// A at a moment between two, `t` of the way from `a` to `b`: positions are interpolated; rotations
+/// and uncertainty are copied from the nearer of both.
 SeenJoints blend(const SeenJoints& a, const SeenJoints& b, double t) {
   SeenJoints out = t < 0.5 ? a : b;
   for (size_t j = 0; j < kJoints; ++j) out.joints[j] = (1 - t) * a.joints[j] + t * b.joints[j];
   return out;
 }
 
-/// What the network sees of A: about its pelvis, turned; in the network's terms.
+/// The motion network's input: A relative to A's pelvis, turned by `turn`. `moved`: the pelvis's
+/// velocity or place, as the network was trained. `reframed`: the turn from the frame before's
+/// directions to this frame's. `rest`: B's rest joints.
 MotionInput input_of(const SeenJoints& seen, const Mat3& turn, const Vec3& moved,
                      const Mat3& reframed, const Tensor& rest) {
   SeenJoints local = turned(turn, seen);
@@ -59,7 +63,7 @@ MotionInput input_of(const SeenJoints& seen, const Mat3& turn, const Vec3& moved
   return out;
 }
 
-/// Adds the time from its beginning to its end to a sum.
+/// Adds the time between its construction and its destruction to a sum, seconds.
 class Stopwatch {
  public:
   explicit Stopwatch(double* seconds) : seconds_(seconds) {}
@@ -74,8 +78,10 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-/// What paths are scaled about: the origin. Of somebody far from it a place on the floor nearby, so
-/// that a scale which still settles moves nobody by much.
+/// The centre about which A's path is scaled to B's: the origin if A starts near the origin. If A
+/// starts far away, the centre is a place on the floor kNear metres from A. The scale still changes
+/// in the first frames, as the estimate of A's legs does; far from the centre, small changes would
+/// move B by much.
 Vec3 scaling_centre(const Vec3& start) {
   constexpr double kNear = 3;  // metres
   const double far = std::hypot(start[0], start[2]);
@@ -191,9 +197,10 @@ std::span<const RetargetedFrame> Retargeter::push_joints(const SeenJoints& seen)
   return {frames_.data(), count};
 }
 
-/// Answers the grid frames up to source frame frame_ - 1, in which A is as in `seen`; how many
-/// there are. Between two frames that were received, positions are interpolated. `ended`: no frame
-/// follows those that were missed, in which A stays as in `seen`, the last one received.
+/// Answers all grid frames up to the moment of source frame frame_ - 1 and returns how many were
+/// answered. `seen`: A in that source frame. Between two source frames that were received, A's
+/// positions are interpolated. `ended`: the source ended with missed frames; `seen` is then A in
+/// the last frame that was received, and A stays so.
 size_t Retargeter::advance(const SeenJoints& seen, bool ended) {
   const double now = static_cast<double>(frame_ - 1) / options_.fps;
   const auto apart = static_cast<double>(missed_ + 1);  // source frames from received_ to `seen`
@@ -254,7 +261,8 @@ bool Retargeter::step(const SeenJoints& now, bool filled, RetargetedFrame* out) 
   return true;
 }
 
-/// `a`: the joints of A in the frame that `out` answers.
+/// Lets B wait in a frame without confidence (RetargetOptions::min_confidence). `a`: A's joints in
+/// the frame `out`.
 void Retargeter::hold_doubtful(const Joints& a, RetargetedFrame* out) {
   if (!out->confidence && options_.min_confidence > 0)
     throw InputError("", "these weights do not say how sure they are of a frame",
@@ -271,7 +279,7 @@ void Retargeter::hold_doubtful(const Joints& a, RetargetedFrame* out) {
   out->pose = waiting_.wait(rest);
 }
 
-/// The motion model's answer to what is seen of A, whose heading `turn` is.
+/// The motion network's answer to A as `seen`. `turn`: A's heading.
 MotionOutput Retargeter::answer(const SeenJoints& seen, const Mat3& turn) {
   const Joints& a = seen.joints;
   const Mat3 back = turn.transpose();
@@ -294,7 +302,8 @@ MotionOutput Retargeter::answer(const SeenJoints& seen, const Mat3& turn) {
   return on_host(motion_->forward(ctx, restage::moved(in, motion_device_), &state_));
 }
 
-/// What B does while A is as in `a`.
+/// Makes B's pose of the motion network's answer. `a` and `turn`: A's joints and heading in the
+/// frame that is answered.
 void Retargeter::perform(const MotionOutput& answer, const Joints& a, const Mat3& turn,
                          Pose* pose) {
   ++answered_;
@@ -316,7 +325,8 @@ void Retargeter::perform(const MotionOutput& answer, const Joints& a, const Mat3
   feet_(rest_, standing, pose);
 }
 
-/// Velocities that are a little too large or askew would carry B away from A for ever.
+/// Moves B's pelvis on by `velocity`, metres a second, and draws it to A's scaled path
+/// (RetargetOptions::anchor): errors of the velocity would carry B ever further away.
 void Retargeter::sum_path(const Joints& a, const Vec3& velocity) {
   legs_a_ += (leg_length(a) - legs_a_) / static_cast<double>(answered_);
   if (answered_ == 1) return;

@@ -14,10 +14,10 @@ namespace restage {
 namespace {
 
 constexpr int kHeadings = 8;
-constexpr std::array<double, 3> kArms = {0.0, 0.8, 1.3};  // lowered from the T-pose, radians
-constexpr double kStartWidth = 0.2, kLastWidth = 0.06;    // of the kernel that compares, metres
+constexpr std::array<double, 3> kArms = {0.0, 0.8, 1.3};  // angles below the T-pose, radians
+constexpr double kStartWidth = 0.2, kLastWidth = 0.06;    // of misfit(), before and after the fit
 
-/// The median by coordinate: stray points do not move it.
+/// The medians of the coordinates, which stray points do not change.
 Vec3 middle(const std::vector<Vec3>& points) {
   Vec3 out;
   for (int c = 0; c < 3; ++c) {
@@ -31,7 +31,7 @@ Vec3 middle(const std::vector<Vec3>& points) {
   return out;
 }
 
-/// A pose of the rig whose middle is that of the cloud.
+/// `state`, moved so that the middle of the rig's nodes is the middle of the cloud.
 RigState placed(const Rig& rig, RigState state, const std::vector<Vec3>& cloud) {
   state.pose.root += middle(cloud) - middle(pose_rig(rig, state).nodes);
   return state;
@@ -76,7 +76,8 @@ Registration::Registration(Mesh target, const Joints& rest, const std::string& w
   body_.weights = bone_distance_weights(body_.rest.vertices, rest);
 }
 
-/// Headings and arm poses, the most promising first, and the frame before.
+/// The candidates that are to be fitted: the pose of the frame before, if there is one, then
+/// headings and arm poses, the best fitting first.
 std::vector<RigState> Registration::starts(const std::vector<Vec3>& cloud) const {
   struct Candidate {
     double cost;
