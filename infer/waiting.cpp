@@ -2,26 +2,28 @@
 
 namespace restage {
 
-Pose between(const Pose& a, const Pose& b, double t) {
-  Pose out;
-  for (size_t j = 0; j < kJoints; ++j)
-    out.local[j] = Quat(a.local[j]).slerp(t, Quat(b.local[j])).toRotationMatrix();
-  out.root = (1 - t) * a.root + t * b.root;
-  return out;
-}
-
 const Pose& Waiting::wait(const Pose& rest) {
   if (!shown_) shown_ = rest;
-  waited_ = *shown_;
-  away_ = kReturnFrames;
+  waits_ = true;
   return *shown_;
 }
 
 const Pose& Waiting::go_on(const Pose& said) {
-  if (away_ == 0) return shown_.emplace(said);
-  const double t = 1 - away_ / (kReturnFrames + 1.0);
+  if (waits_) {
+    for (size_t j = 0; j < kJoints; ++j)
+      turns_[j] = Quat(Mat3(shown_->local[j] * said.local[j].transpose()));
+    shift_ = shown_->root - said.root;
+    away_ = kReturnFrames;
+    waits_ = false;
+  }
+  shown_ = said;
+  if (away_ == 0) return *shown_;
+  const double t = away_ / (kReturnFrames + 1.0), share = t * t * (3 - 2 * t);
   --away_;
-  return shown_.emplace(between(waited_, said, t * t * (3 - 2 * t)));
+  for (size_t j = 0; j < kJoints; ++j)
+    shown_->local[j] = Quat::Identity().slerp(share, turns_[j]).toRotationMatrix() * said.local[j];
+  shown_->root += share * shift_;
+  return *shown_;
 }
 
 }  // namespace restage

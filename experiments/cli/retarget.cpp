@@ -312,7 +312,7 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   if (c.rest.empty() && !system_type(c.system).weights) input.rest = target.joints;
   input.target = std::move(target.mesh);
   const auto system = system_type(c.system).make(std::move(input));
-  Gaps gaps(source.fps(), c.options.force);
+  Gaps gaps(source.frames(), source.fps() / static_cast<double>(c.every), c.options.force);
   Profile profile({"read", "extract", "motion", "deformation", "write", "frame"});
   Run run(c, source, *system, gaps, profile);
   const Outcome done = run();

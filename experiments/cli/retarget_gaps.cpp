@@ -26,13 +26,16 @@ std::string listed(const Items& items, const Text& text) {
 
 }  // namespace
 
-Gaps::Gaps(double fps, bool force)
-    : force_(force), longest_(std::max<size_t>(1, static_cast<size_t>(fps * kLongestGap + 1e-9))) {}
+Gaps::Gaps(int64_t frames, double fps, bool force)
+    : frames_(frames),
+      force_(force),
+      longest_(std::max<size_t>(1, static_cast<size_t>(fps * kLongestGap + 1e-9))) {}
 
 void Gaps::add(int64_t frame, const InputError& fault) {
   all_.push_back({frame, fault});
   ++open_;
   if (force_) return;
+  if (frames_ == 1) throw fault;
   if (!any_used_)
     throw InputError("", cause_of(fault) + ", and it is the first frame",
                      "begin with a good one, or --force to fill what is missing before it");

@@ -16,15 +16,15 @@ namespace restage::cli {
 /// a gap at the beginning shows the first frame that can be used.
 class Gaps {
  public:
-  /// `fps` of the source.
-  Gaps(double fps, bool force);
+  /// `frames` of the source, at `fps`.
+  Gaps(int64_t frames, double fps, bool force);
 
   /// Frame `frame` (from 0) of the source cannot be used, as `fault` says. InputError if it makes
   /// the gap too long.
   void add(int64_t frame, const InputError& fault);
   /// A frame that can be used.
   void end();
-  /// After the last frame of the source. InputError if none could be used.
+  /// After the last frame of the source. The first one's fault if no frame could be used.
   void check_any() const;
 
   /// `filled`: frames of the result. Lines for the log; none if nothing was wrong.
@@ -38,6 +38,7 @@ class Gaps {
     InputError fault;
   };
 
+  int64_t frames_;
   bool force_, any_used_ = false;
   size_t longest_;            // gap, in frames
   std::vector<Missing> all_;  // in order

@@ -37,6 +37,16 @@ RigState placed(const Rig& rig, RigState state, const std::vector<Vec3>& cloud) 
   return state;
 }
 
+/// The pose a share `t` of the way from `a` to `b`: every local rotation turns the shortest way,
+/// the pelvis goes straight.
+Pose between(const Pose& a, const Pose& b, double t) {
+  Pose out;
+  for (size_t j = 0; j < kJoints; ++j)
+    out.local[j] = Quat(a.local[j]).slerp(t, Quat(b.local[j])).toRotationMatrix();
+  out.root = (1 - t) * a.root + t * b.root;
+  return out;
+}
+
 }  // namespace
 
 std::vector<Vec3> thinned(const Points& cloud, double width, const std::string& source) {
@@ -132,10 +142,10 @@ std::span<const RetargetedFrame> Registration::push(const Points& cloud,
 
   pose.root = trajectory_scale(source_joints_, body_.joints) * source_joints_[0];
   frames_.clear();
-  const Pose before = shown_.value_or(pose);
-  for (int64_t k = 1; k <= missed_; ++k)
-    add_frame(between(before, pose, static_cast<double>(k) / static_cast<double>(missed_ + 1)),
-              true);
+  for (int64_t k = 1; k <= missed_; ++k) {
+    const double t = static_cast<double>(k) / static_cast<double>(missed_ + 1);
+    add_frame(shown_ ? between(*shown_, pose, t) : pose, true);
+  }
   add_frame(pose, false);
   shown_ = pose;
   missed_ = 0;

@@ -20,7 +20,6 @@
 
 #include "infer/registration/free_form.h"
 #include "infer/system.h"
-#include "infer/waiting.h"
 
 namespace restage {
 

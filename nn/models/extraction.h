@@ -2,7 +2,6 @@
 // extractor.
 #pragma once
 
-#include "autograd/base/error.h"
 #include "autograd/base/rng.h"
 #include "nn/geometry/body.h"
 #include "nn/models/even_points.h"
@@ -12,13 +11,6 @@
 namespace restage {
 
 inline constexpr size_t kLeastDistinctPoints = 64;
-
-/// A cloud in which nobody can be found, whatever the clouds around it hold: too few points, or
-/// values that are not finite.
-class UnusableCloud : public InputError {
- public:
-  using InputError::InputError;
-};
 
 /// Headings over which an extractor's views of a cloud are spread, radians.
 inline constexpr double kAllAround = 6.283185307179586;

@@ -9,6 +9,7 @@
 #include "autograd/base/rng.h"
 #include "datasets/builtin/bodies.h"
 #include "datasets/sampling/surface.h"
+#include "nn/models/views.h"
 #include "tests/support/use_set.h"
 
 namespace restage {

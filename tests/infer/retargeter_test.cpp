@@ -57,8 +57,8 @@ TEST(InferRetargeter, WaitsWhereItDoubts) {
   EXPECT_LT(*answered[kDoubt].confidence, 0.1);
   for (const Mat3& r : held[1].pose.local) EXPECT_NEAR(r.col(1).y(), 1, 1e-9) << "stands at rest";
   EXPECT_GT(apart(answered[kDoubt].joints, answered[kDoubt - 1].joints), 1e-4);
-  const auto step = [](const std::vector<RetargetedFrame>& frames, size_t f) {
-    return apart(frames[f].joints, frames[f - 1].joints);
+  const auto step = [](const std::vector<RetargetedFrame>& of, size_t f) {
+    return apart(of[f].joints, of[f - 1].joints);
   };
   double jump = 0;  // from rest into the motion
   for (size_t f = 2; f < kFrames; ++f) {

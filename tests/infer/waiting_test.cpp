@@ -37,17 +37,17 @@ TEST(Waiting, HoldsAndComesBackWithoutAJump) {
   const auto poses = shown(kFrames, kFrom, kTo);
   for (int f = kFrom; f < kTo; ++f) EXPECT_EQ(apart(poses[f], poses[kFrom - 1]), 0) << f;
   const double jump = apart(walk(kTo), walk(kFrom - 1));  // what it would be
-  double step = 0;
-  for (int f = kTo; f < kFrames; ++f) step = std::max(step, apart(poses[f], poses[f - 1]));
-  double usual = 0;
+  double usual = 0;                                       // step of the walk
   for (int f = 1; f < kFrames; ++f) usual = std::max(usual, apart(walk(f), walk(f - 1)));
-  EXPECT_GT(jump, 5 * usual);
-  EXPECT_LT(step, usual + 0.25 * jump);
-  EXPECT_LT(apart(poses[kTo], poses[kTo - 1]), 0.1 * jump) << "it starts gently";
+  ASSERT_GT(jump, 3 * usual);
+  // Also while the walk turns round and round.
+  for (int f = kTo; f < kFrames; ++f)
+    EXPECT_LT(apart(poses[f], poses[f - 1]), usual + 0.15 * jump) << f;
+  EXPECT_LT(apart(poses[kTo], poses[kTo - 1]), 0.05 * jump) << "it starts gently";
   EXPECT_GT(apart(poses[kTo + kReturnFrames - 1], walk(kTo + kReturnFrames - 1)), 0);
   for (int f = kTo + kReturnFrames; f < kFrames; ++f) EXPECT_EQ(apart(poses[f], walk(f)), 0) << f;
   for (const Pose& pose : poses)
-    for (const Mat3& r : pose.local) EXPECT_LT((r * r.transpose() - Mat3::Identity()).norm(), 1e-9);
+    for (const Mat3& r : pose.local) EXPECT_LT((r * r.transpose() - Mat3::Identity()).norm(), 1e-6);
 }
 
 TEST(Waiting, DoubtOnTheWayBackHoldsWhatWasShown) {
@@ -64,17 +64,6 @@ TEST(Waiting, BeginsAtRest) {
   Waiting waiting;
   EXPECT_EQ(apart(waiting.wait(walk(7)), walk(7)), 0);
   EXPECT_EQ(apart(waiting.wait(walk(9)), walk(7)), 0) << "and stays there";
-}
-
-TEST(Waiting, BetweenTwoPoses) {
-  Pose a = walk(0), b = walk(0);
-  a.root = Vec3(1, 0, 2);
-  b.root = Vec3(3, 0, 0);
-  b.local[4] = Eigen::AngleAxisd(0.8, Vec3::UnitX()).toRotationMatrix() * a.local[4];
-  const Pose middle = between(a, b, 0.25);
-  EXPECT_LT((middle.root - Vec3(1.5, 0, 1.5)).norm(), 1e-12);
-  EXPECT_NEAR(Eigen::AngleAxisd(middle.local[4] * a.local[4].transpose()).angle(), 0.2, 1e-9);
-  EXPECT_LT((middle.local[7] - a.local[7]).norm(), 1e-12);
 }
 
 }  // namespace
