@@ -1,7 +1,6 @@
 #include "experiments/clips.h"
 
 #include "autograd/base/error.h"
-#include "autograd/base/log.h"
 #include "datasets/schema.h"
 #include "nn/geometry/skeleton.h"
 #include "nn/metrics/metrics.h"
@@ -56,10 +55,14 @@ std::vector<double> coordinates(const Clip& clip) {
 }  // namespace
 
 Clip read_clip(const std::string& path, const std::string& label, int64_t sequence) {
-  return read_clip(SourceRecord{.path = path, .sequence = sequence}, label);
+  Remarks remarks;
+  Clip out = read_clip({.path = path, .sequence = sequence}, label, kMaxMemory, remarks);
+  if (!remarks.empty()) throw InputError("", remarks[0], "restage doctor --fix mends it");
+  return out;
 }
 
-Clip read_clip(const SourceRecord& how, const std::string& label, uint64_t max_memory) {
+Clip read_clip(const SourceRecord& how, const std::string& label, uint64_t max_memory,
+               Remarks& remarks) {
   const int64_t sequence = how.sequence.value_or(0);
   if (has_joints_only(how.path)) return skeletons(how.path, label, sequence);
   SourceRecord one = how;
@@ -89,12 +92,12 @@ Clip read_clip(const SourceRecord& how, const std::string& label, uint64_t max_m
   }
   if (clip.frames.empty()) throw faults.at(0);
   if (!faults.empty())
-    log_warning(std::to_string(faults.size()) + " frames of " + how.path +
-                " cannot be drawn and are replaced by the nearest one, the first because " +
-                faults[0].what());
+    remarks.push_back(
+        std::to_string(faults.size()) + " of the frames of " + how.path +
+        " cannot be drawn; the nearest ones are drawn in their place: " + faults[0].what());
   if (left_out > 0)
-    log_warning(std::to_string(left_out) + " points of " + how.path +
-                " are NaN or infinite and were left out");
+    remarks.push_back(std::to_string(left_out) + " points of " + how.path +
+                      " are NaN or infinite and are left out");
   if (!surface) clip.faces.clear();
   if (ends_with_hdf5(how.path)) clip.confidence = read_confidence(how.path, sequence);
   return clip;

@@ -76,20 +76,20 @@ bool is_same_file(const std::string& a, const std::string& b) {
 }
 
 /// What the result says of its source, if that is still there.
-std::optional<SourceRecord> remembered_source(const std::string& result) {
+std::optional<SourceRecord> remembered_source(const std::string& result, Remarks& remarks) {
   std::optional<SourceRecord> out;
   if (result.ends_with(".h5") || result.ends_with(".hdf5")) out = read_source_record(result);
   std::error_code error;
   if (!out || std::filesystem::exists(out->path, error)) return out;
-  log_warning("the source of " + result + ", " + out->path +
-              ", is not there any more: it is left out (--source says where it is)");
+  remarks.push_back("the source of " + result + ", " + out->path +
+                    ", is not there any more: it is left out (--source says where it is)");
   return std::nullopt;
 }
 
 /// Which source is drawn, and how it is read; nothing if none is.
-std::optional<SourceRecord> source_of(const RenderOptions& options) {
+std::optional<SourceRecord> source_of(const RenderOptions& options, Remarks& remarks) {
   if (options.no_source) return std::nullopt;
-  std::optional<SourceRecord> out = remembered_source(options.result);
+  std::optional<SourceRecord> out = remembered_source(options.result, remarks);
   if (!options.source.empty()) {
     // Of another source than its own a result knows nothing.
     if (!out || !is_same_file(out->path, options.source))
@@ -130,12 +130,13 @@ double size_of(const Clip& clip) {
 }
 
 /// Somebody a thousand times as large as the result is an empty row.
-void compare_sizes(const Clip& source, const Clip& result, const std::string& path) {
+void compare_sizes(const Clip& source, const Clip& result, const std::string& path,
+                   Remarks& remarks) {
   constexpr double kMostTimes = 4;
   const double times = size_of(source) / std::max(size_of(result), 1e-9);
   if (times > kMostTimes || times < 1 / kMostTimes)
-    log_warning(path + ": somebody " + format("%.3g", times) +
-                " times the size of the result; --scale says how many metres a unit has");
+    remarks.push_back(path + ": somebody " + format("%.3g", times) +
+                      " times the size of the result; --scale says how many metres a unit has");
 }
 
 /// The rows of the picture: the source, the result, the truth, at the result's moments.
@@ -144,7 +145,7 @@ class Rows {
   Rows(const RenderOptions& options, const Common& common) : options_(options), common_(common) {}
 
   std::vector<Clip> read() {
-    const auto source = source_of(options_);
+    const auto source = source_of(options_, remarks_);
     if (!source) check_needs_source(options_);
     Clip result = read({.path = options_.result, .sequence = options_.sequence}, "result");
     if (!source && options_.fps) result.fps = *options_.fps;
@@ -154,7 +155,7 @@ class Rows {
     std::vector<Clip> out;
     if (source && can_be_drawn(*source)) {
       out.push_back(timed(read(*source, "source")));
-      compare_sizes(out[0], result, source->path);
+      compare_sizes(out[0], result, source->path, remarks_);
       source_ = source->path;
     }
     std::optional<Clip> truth;
@@ -166,25 +167,27 @@ class Rows {
     return out;
   }
   const std::string& source() const { return source_; }  ///< the one that is drawn; empty: none
+  const Remarks& remarks() const { return remarks_; }
 
  private:
-  Clip read(const SourceRecord& how, const std::string& label) const {
-    Clip out = read_clip(how, label, common_.max_memory);
+  Clip read(const SourceRecord& how, const std::string& label) {
+    Clip out = read_clip(how, label, common_.max_memory, remarks_);
     if (!options_.focus.empty())
       out.focus = read_focus(how.path, joint_of(options_.focus), how.sequence.value_or(0));
     return out;
   }
 
   /// A close-up needs joints. A source that nobody asked for is then left out.
-  bool can_be_drawn(const SourceRecord& source) const {
+  bool can_be_drawn(const SourceRecord& source) {
     if (options_.focus.empty() || !options_.source.empty() || has_joints(source.path)) return true;
-    log_warning(source.path + " does not say where its joints are: it is not in the close-up");
+    remarks_.push_back(source.path + " does not say where its joints are: it is left out");
     return false;
   }
 
   const RenderOptions& options_;
   const Common& common_;
   std::string source_;
+  Remarks remarks_;
 };
 
 int run_render(const RenderOptions& options, const Common& common) {
@@ -206,6 +209,8 @@ int run_render(const RenderOptions& options, const Common& common) {
     if (!options.title.empty()) page.title = options.title;
     write_page(options.out, clips, page);
   }
+  // Bad input is answered with one line: remarks come when all is done.
+  for (const std::string& remark : rows.remarks()) log_warning(remark);
   Json document = {{"out", options.out}, {"frames", result.frames.size()}, {"fps", result.fps}};
   document["source"] = rows.source().empty() ? Json() : Json(rows.source());
   print(common.json, document, "wrote " + options.out + "\n");

@@ -13,7 +13,7 @@ class MaxMemory(CliTest):
             result = self.restage(*command, "--max-memory", "2MB")
             self.assertNotEqual(result.code, 0, command)
             self.assertIn("--max-memory", result.err + result.out, command)
-        self.done("eval", "--pred", "big.h5", "--truth", "big.h5", "--max-memory", "20MB")
+        self.done("data", "verify", "big.h5", "--max-memory", "20MB")
 
     def test_many_small_frames(self):
         cloud = [x for p in points(1000, 1) for x in p]

@@ -83,10 +83,15 @@ TEST_F(SourceTest, FramesComeInMetresAndUpright) {
 TEST_F(SourceTest, AClipShowsTheNearestFrameInThePlaceOfABadOne) {
   write_frames("scans", 5);
   for (const std::string bad : {"f0", "f1", "f3"}) dir.write("scans/" + bad + ".ply", "ply\n");
-  const Clip clip = read_clip(dir / "scans", "source");
+  Remarks remarks;
+  const Clip clip = read_clip({.path = dir / "scans"}, "source", kMaxMemory, remarks);
   std::vector<float> shown;
   for (const Points& points : clip.frames) shown.push_back(points[0].x());
   EXPECT_EQ(shown, (Xs{2, 2, 2, 2, 4}));
+  ASSERT_EQ(remarks.size(), 1u);
+  EXPECT_HAS(remarks[0], "3 of the frames");
+  EXPECT_HAS(remarks[0], "f0.ply");
+  EXPECT_HAS(refusal_of([&] { read_clip(dir / "scans", "source"); }), "f0.ply");
   for (const std::string bad : {"f2", "f4"}) dir.write("scans/" + bad + ".ply", "ply\n");
   EXPECT_HAS(refusal_of([&] { read_clip(dir / "scans", "source"); }), "f0.ply");
 }
