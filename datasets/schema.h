@@ -141,6 +141,23 @@ class PredictionReader {
 std::vector<double> read_confidence(const std::string& path, int64_t sequence);
 void write_prediction(const std::string& path, const Prediction& prediction, const FileInfo& info);
 
+/// Which file a result's motion was taken from, and how that file was read: the options of `restage
+/// retarget`.
+struct SourceRecord {
+  std::string path = {};                           ///< as from the working directory
+  std::string clip = {};                           ///< of a glTF file; empty: the first
+  std::optional<int64_t> sequence = std::nullopt;  ///< of an HDF5 file, from 0
+  std::optional<double> fps = std::nullopt;        ///< frames per second; nothing: the file's
+  double scale = 1;                                ///< metres per unit
+  std::string up = "y";                            ///< the axis that points up: x, -x, y, -y, z, -z
+};
+
+/// Nothing where the prediction does not say. A relative path is stored relative to the
+/// prediction's folder, so that both may be moved together.
+std::optional<SourceRecord> read_source_record(const std::string& path);
+/// The frames (from 0, rising) that have no cloud of the source behind them; mostly none.
+std::vector<int64_t> read_filled(const std::string& path);
+
 /// Writes a prediction frame by frame in constant memory (float32).
 class PredictionWriter {
  public:
@@ -155,6 +172,10 @@ class PredictionWriter {
   /// How the source's scans relate to the world: world = A p + b, rows of [A | b]. Written as
   /// /source_to_world [3,4].
   void set_source_to_world(const Eigen::Matrix<double, 3, 4>& transform);
+  /// Frames that have no cloud of the source behind them, from 0, rising. Written as /filled.
+  void set_filled(const std::vector<int64_t>& frames);
+  /// Written as attributes of the group /source.
+  void set_source(const SourceRecord& source);
   void end_sequence();  ///< the next frame starts another sequence; the last one ends by itself
   void commit();        ///< before this nothing is under `path`
 

@@ -80,6 +80,7 @@ void count_frames(const h5::File& file, std::map<std::string, int64_t>& counts) 
     counts["vertices"] = set.shape()[1];
   }
   if (file.has("/faces")) counts["faces"] = file.dataset("/faces", {-1, 3}).rows();
+  if (file.has("/filled")) counts["filled"] = file.dataset("/filled", {-1}).rows();
   counts["sequences"] =
       file.has("/sequence_offset") ? file.dataset("/sequence_offset", {-1}).rows() - 1 : 1;
 }
@@ -158,9 +159,11 @@ std::vector<std::string> verify(const std::string& path) {
   collect(problems, [&] { read_fps(file); });
   if (kind == "scans") {
     collect(problems, [&] { verify_scans(file); });
-  } else if (kind == "prediction")
+  } else if (kind == "prediction") {
     collect(problems, [&] { PredictionReader(path).check(); });
-  else
+    collect(problems, [&] { read_filled(path); });
+    collect(problems, [&] { read_source_record(path); });
+  } else
     collect(problems, [&] { verify_members(file, problems); });
   return problems;
 }

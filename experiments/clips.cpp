@@ -3,7 +3,6 @@
 #include <utility>
 
 #include "autograd/base/error.h"
-#include "datasets/readers/frame_folder.h"
 #include "datasets/schema.h"
 #include "nn/geometry/skeleton.h"
 #include "nn/metrics/metrics.h"
@@ -36,6 +35,7 @@ std::vector<Joints> read_joints(const std::string& path, int64_t sequence) {
 Clip skeletons(const std::string& path, const std::string& label, int64_t sequence) {
   Clip clip;
   clip.label = label;
+  clip.fps = inspect(path).fps;
   clip.confidence = read_confidence(path, sequence);
   for (const Joints& joints : read_joints(path, sequence))
     clip.frames.push_back(stick_figure(joints));
@@ -57,20 +57,56 @@ std::vector<double> coordinates(const Points& frame) {
 }  // namespace
 
 Clip read_clip(const std::string& path, const std::string& label, int64_t sequence) {
-  if (has_joints_only(path)) return skeletons(path, label, sequence);
-  const auto source = open_frames(path, {.clip = "", .sequence = sequence});
+  Remarks remarks;
+  Clip out = read_clip({.path = path, .sequence = sequence}, label, kMaxMemory, remarks);
+  if (!remarks.empty()) throw InputError("", remarks[0], "restage doctor --fix mends it");
+  return out;
+}
+
+Clip read_clip(const SourceRecord& how, const std::string& label, uint64_t max_memory,
+               Remarks& remarks) {
+  const int64_t sequence = how.sequence.value_or(0);
+  if (has_joints_only(how.path)) return skeletons(how.path, label, sequence);
+  SourceRecord one = how;
+  one.sequence = sequence;
+  Source source(one, max_memory);
   Clip clip;
   clip.label = label;
+  clip.fps = source.fps();
   bool surface = true;
-  while (auto frame = source->next()) {
-    if (clip.frames.empty()) clip.faces = frame->faces;
-    surface = surface && frame->faces == clip.faces &&
-              (clip.frames.empty() || frame->points.size() == clip.frames[0].size());
-    clip.frames.push_back(std::move(frame->points));
+  std::vector<InputError> faults;
+  size_t left_out = 0;
+  while (auto cloud = source.next()) {
+    if (cloud->fault) {
+      faults.push_back(*cloud->fault);
+      if (!clip.frames.empty()) clip.frames.push_back(clip.frames.back());
+      continue;
+    }
+    Frame& frame = cloud->frame;
+    left_out += frame.left_out;
+    if (clip.frames.empty()) {
+      clip.faces = frame.faces;
+      clip.frames.assign(faults.size(), frame.points);  // of those before it
+    }
+    surface = surface && frame.faces == clip.faces &&
+              (clip.frames.empty() || frame.points.size() == clip.frames[0].size());
+    clip.frames.push_back(std::move(frame.points));
   }
+  if (clip.frames.empty()) throw faults.at(0);
+  if (!faults.empty())
+    remarks.push_back(
+        std::to_string(faults.size()) + " of the frames of " + how.path +
+        " cannot be drawn; the nearest ones are drawn in their place: " + faults[0].what());
+  if (left_out > 0)
+    remarks.push_back(std::to_string(left_out) + " points of " + how.path +
+                      " are NaN or infinite and are left out");
   if (!surface) clip.faces.clear();
-  if (ends_with_hdf5(path)) clip.confidence = read_confidence(path, sequence);
+  if (ends_with_hdf5(how.path)) clip.confidence = read_confidence(how.path, sequence);
   return clip;
+}
+
+bool has_joints(const std::string& path) {
+  return ends_with_hdf5(path) && inspect(path).counts.contains("joints");
 }
 
 std::vector<Point> read_focus(const std::string& path, size_t joint, int64_t sequence) {

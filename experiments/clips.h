@@ -3,14 +3,26 @@
 
 #include <string>
 
+#include "experiments/source.h"
 #include "infer/render/clip.h"
 
 namespace restage {
 
-/// One sequence of a prediction or scan file (HDF5), a folder of PLY/OBJ frames, or a single mesh.
-/// A surface stays one only if all frames have the same faces; a prediction of joints alone becomes
-/// a cloud of points along the bones. InputError if there is no such sequence.
+/// What is said of a file that was read although something is wrong with it.
+using Remarks = std::vector<std::string>;
+
+/// One sequence of a prediction or scan file (HDF5), a folder of PLY/OBJ frames, a single mesh, or
+/// what else Source reads. A surface stays one only if all frames have the same faces; a prediction
+/// of joints alone becomes a cloud of points along the bones. `how.sequence`: of HDF5, the first
+/// where nothing is said. A frame that cannot be read is replaced by the nearest one before (or
+/// after) that can, points that are not finite are left out, and a remark is added. InputError if
+/// there is no such sequence, or none of its frames can be read.
+Clip read_clip(const SourceRecord& how, const std::string& label, uint64_t max_memory,
+               Remarks& remarks);
+/// The same of a file that is in our frame. InputError also for what would be a remark.
 Clip read_clip(const std::string& path, const std::string& label, int64_t sequence = 0);
+/// Whether a file can be given to read_focus().
+bool has_joints(const std::string& path);
 /// Where a joint is in each of the sequence's frames, metres. InputError: not HDF5, no /joints.
 std::vector<Point> read_focus(const std::string& path, size_t joint, int64_t sequence = 0);
 /// How far each vertex of `result` is from its true place once the frame is aligned (PA-MPVD), as

@@ -20,7 +20,8 @@ void require(const Tensor& t, const Shape& shape, const char* what) {
                    name_of(t.dtype()) + " " + t.shape().str());
 }
 
-/// Rows [v, c] -> [t, c, P] in the tiles' order.
+/// `rows` [v, c], one row a point, rearranged as [t, c, P]: tile, column, place of the point in its
+/// tile. `order` [t, P] says which point has which place.
 Tensor in_tiles(const Tensor& rows, const Tensor& order) {
   const int64_t t = order.size(0), c = rows.size(1);
   Tensor out = Tensor::empty({t, c, P});
@@ -31,8 +32,8 @@ Tensor in_tiles(const Tensor& rows, const Tensor& order) {
   return out;
 }
 
-/// a [m, n] without its first columns, or only its last: columns [from, to), transposed on request
-/// and the rows filled with zeros up to `width`.
+/// Columns [from, to) of `a` [m, n], as [m, width], or transposed as [to - from, width]. Rows that
+/// are shorter than `width` are filled up with zeros.
 Tensor columns(const Tensor& a, int64_t from, int64_t to, bool transpose, int64_t width) {
   const int64_t m = a.size(0), n = a.size(1), k = to - from;
   Tensor out = Tensor::zeros({transpose ? k : m, width});
@@ -43,7 +44,8 @@ Tensor columns(const Tensor& a, int64_t from, int64_t to, bool transpose, int64_
   return out;
 }
 
-/// Least (sign 1) or largest (sign -1) w1 x of each unit in each tile.
+/// The least (`sign` 1) or the largest (`sign` -1) value of w1 x over the points x of each tile,
+/// for each unit: [t, u].
 Tensor bound(const Tensor& points, const Tensor& w1, float sign) {
   const int64_t t = points.size(0), u = w1.size(0);
   Tensor out = Tensor::empty({t, u});
@@ -71,7 +73,8 @@ Deformer::Deformer(const Tensor& points, const Tensor& weights, const Mlp3* offs
   int32_t* order = order_.data<int32_t>();
   std::iota(order, order + count_, 0);
   sort_into_tiles(points.data<float>(), order, order + count_, P, kDeformGroup);
-  // The last tile is filled up with its last point, which is then computed again to the same bits.
+  // The last tile is filled up with copies of the last point. The copies are computed too and give
+  // the same bits as that point.
   std::fill(order + count_, order + t * P, count_ > 0 ? order[count_ - 1] : 0);
   points_ = in_tiles(points, order_);
   weights_ = in_tiles(weights, order_);

@@ -3,9 +3,11 @@
 namespace restage {
 namespace {
 
-constexpr double kLands = 0.5, kLifts = 0.3;  // chances
-constexpr double kLeak = 0.02, kRelease = 0.25;
-constexpr double kFar = 0.06;  // metres
+constexpr double kLands = 0.5;     // a foot begins to stand above this chance
+constexpr double kLifts = 0.3;     // and is lifted below this one
+constexpr double kLeak = 0.02;     // share of the offset that goes in a frame while a foot is held
+constexpr double kRelease = 0.25;  // the same while a foot is not held
+constexpr double kFar = 0.06;      // metres: a foot is not held this far from the network's
 
 }  // namespace
 

@@ -1,4 +1,4 @@
-// Feet that stand stay where they landed.
+// Keeps a foot that stands in the place where the foot landed.
 #pragma once
 
 #include <optional>
@@ -7,19 +7,22 @@
 
 namespace restage {
 
-/// Causal, at kFps. A foot that begins to stand is held where it is shown then, by hip, knee and
-/// ankle alone (the pelvis keeps its path), and lets go of it by and by: a fiftieth of what the
-/// network would have is made up for in every frame, all of it within a few frames once it is
-/// lifted or more than 6 cm away.
+/// Works frame by frame at kFps and looks at no later frame. A foot that begins to stand is held in
+/// the place where the foot is shown at that moment. Only hip, knee and ankle are turned for that;
+/// the pelvis keeps its path. While the foot stands, the place moves towards where the network puts
+/// the foot, by a fiftieth of the distance in every frame. Once the foot is lifted, or the network
+/// puts the foot more than 6 cm away from the place, the distance shrinks by a quarter in every
+/// frame.
 class FootLock {
  public:
-  /// `standing`: chance that the left and the right foot stand.
+  /// Changes `pose`, the network's, for the next frame. `rest`: rest joints of the body.
+  /// `standing`: the chances, 0 to 1, that the left and the right foot stand.
   void operator()(const Joints& rest, const std::array<double, 2>& standing, Pose* pose);
 
  private:
   struct Foot {
-    std::optional<Vec3> anchor;  ///< of the foot joint, while it stands
-    Vec3 offset = Vec3::Zero();  ///< of what is shown from what the network says
+    std::optional<Vec3> anchor;  ///< the place in which the foot joint is held; empty: not held
+    Vec3 offset = Vec3::Zero();  ///< from the network's foot joint to the foot joint that is shown
   };
   std::array<Foot, 2> feet_;
 };

@@ -12,10 +12,11 @@
 namespace restage {
 namespace {
 
-constexpr int kTargetSamples = 16;  // a target is looked at once: average many choices of points
+constexpr int kTargetSamples = 16;  // views of the target, more than of a frame: it is seen once
 constexpr size_t kTargetPoints = 8192;
 constexpr double kTposeLimit = 30.0;  // degrees
-constexpr double kRemembering = 8;    // frames per second from which on one is like the one before
+constexpr double kRemembering = 8;  // frames per second; at lower rates a frame tells too little of
+                                    // the next one, and the extractor is not told
 
 Tensor tensor_of(const Joints& joints, const Vec3& origin) {
   Tensor t = Tensor::empty({1, kJoints, 3});
@@ -26,14 +27,17 @@ Tensor tensor_of(const Joints& joints, const Vec3& origin) {
   return t;
 }
 
-/// Between two moments; what is no position is that of the nearer one.
+/// A at a moment between two, `t` of the way from `a` to `b`: positions are interpolated; rotations
+/// and uncertainty are copied from the nearer of both.
 SeenJoints blend(const SeenJoints& a, const SeenJoints& b, double t) {
   SeenJoints out = t < 0.5 ? a : b;
   for (size_t j = 0; j < kJoints; ++j) out.joints[j] = (1 - t) * a.joints[j] + t * b.joints[j];
   return out;
 }
 
-/// What the network sees of A: about its pelvis, turned; in the network's terms.
+/// The motion network's input: A relative to A's pelvis, turned by `turn`. `moved`: the pelvis's
+/// velocity or place, as the network was trained. `reframed`: the turn from the frame before's
+/// directions to this frame's. `rest`: B's rest joints.
 MotionInput input_of(const SeenJoints& seen, const Mat3& turn, const Vec3& moved,
                      const Mat3& reframed, const Tensor& rest) {
   SeenJoints local = turned(turn, seen);
@@ -59,7 +63,7 @@ MotionInput input_of(const SeenJoints& seen, const Mat3& turn, const Vec3& moved
   return out;
 }
 
-/// Adds the time from its beginning to its end to a sum.
+/// Adds the time between its construction and its destruction to a sum, seconds.
 class Stopwatch {
  public:
   explicit Stopwatch(double* seconds) : seconds_(seconds) {}
@@ -74,8 +78,10 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-/// What paths are scaled about: the origin. Of somebody far from it a place on the floor nearby, so
-/// that a scale which still settles moves nobody by much.
+/// The centre about which A's path is scaled to B's: the origin if A starts near the origin. If A
+/// starts far away, the centre is a place on the floor kNear metres from A. The scale still changes
+/// in the first frames, as the estimate of A's legs does; far from the centre, small changes would
+/// move B by much.
 Vec3 scaling_centre(const Vec3& start) {
   constexpr double kNear = 3;  // metres
   const double far = std::hypot(start[0], start[2]);
@@ -154,12 +160,12 @@ bool Retargeter::frame_by_frame() const { return options_.fps == kFps && motion_
 void Retargeter::restart() {
   state_ = {};
   feet_ = {};
+  waiting_ = {};
   heading_ = Heading(steady_heading_);
   previous_.reset();
   back_before_.reset();
   received_.reset();
-  believed_.reset();
-  frame_ = grid_ = answered_ = 0;
+  frame_ = grid_ = missed_ = answered_ = 0;
   legs_a_ = 0;
 }
 
@@ -172,7 +178,8 @@ std::span<const RetargetedFrame> Retargeter::push(const Points& cloud, const std
     if (!extractor_)
       throw InputError(source, "cannot be read without a model for skeleton",
                        "give weights that have one");
-    const bool remembers = received_ && options_.fps > kRemembering;
+    const bool remembers =
+        received_ && options_.fps / static_cast<double>(missed_ + 1) > kRemembering;
     seen = (*extractor_)(cloud, source, key, remembers ? &*received_ : nullptr);
   }
   const auto out = push_joints(seen);
@@ -180,51 +187,73 @@ std::span<const RetargetedFrame> Retargeter::push(const Points& cloud, const std
   return out;
 }
 
+void Retargeter::miss() {
+  ++frame_;
+  ++missed_;
+}
+
 std::span<const RetargetedFrame> Retargeter::push_joints(const SeenJoints& seen) {
   last_source_ = seen.joints;
   times_ = {};
+  ++frame_;
+  const size_t count = advance(seen, false);
+  received_ = seen;
+  missed_ = 0;
+  return {frames_.data(), count};
+}
+
+/// Answers all grid frames up to the moment of source frame frame_ - 1 and returns how many were
+/// answered. `seen`: A in that source frame. Between two source frames that were received, A's
+/// positions are interpolated. `ended`: the source ended with missed frames; `seen` is then A in
+/// the last frame that was received, and A stays so.
+size_t Retargeter::advance(const SeenJoints& seen, bool ended) {
+  const double now = static_cast<double>(frame_ - 1) / options_.fps;
+  const auto apart = static_cast<double>(missed_ + 1);  // source frames from received_ to `seen`
   size_t count = 0;
-  const double now = static_cast<double>(frame_) / options_.fps;
-  // Grid frames up to this moment; positions between two source frames are interpolated.
   while (static_cast<double>(grid_) / kFps <= now + 1e-9) {
     const double back =
         (now - static_cast<double>(grid_) / kFps) * options_.fps;  // in source frames
+    const bool between = back > 1e-9 && !ended;
     if (frames_.size() == count) frames_.emplace_back();
-    count += step(received_ && back > 1e-9 ? blend(seen, *received_, std::min(back, 1.0)) : seen,
-                  &frames_[count]);
+    count +=
+        step(received_ && between ? blend(seen, *received_, std::min(back / apart, 1.0)) : seen,
+             missed_ > 0 && (between || ended), &frames_[count]);
   }
-  received_ = seen;
-  ++frame_;
-  return {frames_.data(), count};
+  return count;
 }
 
 std::span<const RetargetedFrame> Retargeter::finish() {
+  size_t count = 0;
+  if (missed_ > 0 && received_) {
+    count = advance(*received_, true);
+    missed_ = 0;
+  }
   if (grid_ == 0) return {};
   const SeenJoints last = asked_[static_cast<size_t>((grid_ - 1) % std::ssize(asked_))].seen;
-  size_t count = 0;
   for (const int64_t all = grid_; answered_ < all;) {
     if (frames_.size() == count) frames_.emplace_back();
-    count += step(last, &frames_[count]);
+    count += step(last, false, &frames_[count]);
   }
   return {frames_.data(), count};
 }
 
-bool Retargeter::step(const SeenJoints& now, RetargetedFrame* out) {
+bool Retargeter::step(const SeenJoints& now, bool filled, RetargetedFrame* out) {
   SeenJoints seen = now;
   {
     const Stopwatch watch(&times_.motion);
     const double heading = remove_heading_ ? heading_(now.joints) : 0;
     const MotionOutput said = answer(now, turn_about_y(heading));
     const int64_t room = std::ssize(asked_);
-    asked_[static_cast<size_t>(grid_ % room)] = {now, turn_about_y(heading)};
+    asked_[static_cast<size_t>(grid_ % room)] = {now, turn_about_y(heading), filled};
     if (++grid_ < room) return false;
     const Asked& then = asked_[static_cast<size_t>(grid_ % room)];  // the oldest
     seen = then.seen;
+    out->filled = then.filled;
     perform(said, seen.joints, then.turn, &out->pose);
   }
   out->confidence.reset();
-  if (seen.uncertainty) out->confidence = confidence(*seen.uncertainty);
-  hold_doubtful(out);
+  if (seen.uncertainty) out->confidence = out->filled ? 0 : confidence(*seen.uncertainty);
+  hold_doubtful(seen.joints, out);
   const Stopwatch watch(&times_.deformation);
   const PosedSkeleton posed = forward_kinematics(rest_, out->pose);
   out->joints = posed.joints;
@@ -237,24 +266,25 @@ bool Retargeter::step(const SeenJoints& now, RetargetedFrame* out) {
   return true;
 }
 
-void Retargeter::hold_doubtful(RetargetedFrame* out) {
+/// Lets B wait in a frame without confidence (RetargetOptions::min_confidence). `a`: A's joints in
+/// the frame `out`.
+void Retargeter::hold_doubtful(const Joints& a, RetargetedFrame* out) {
   if (!out->confidence && options_.min_confidence > 0)
     throw InputError("", "these weights do not say how sure they are of a frame",
                      "leave --min-confidence out, or give weights whose extractor has sizes."
                      "uncertainty");
-  if (!out->confidence || *out->confidence >= options_.min_confidence) {
-    believed_ = out->pose;
+  if (options_.min_confidence == 0) return;
+  if (*out->confidence >= options_.min_confidence) {
+    out->pose = waiting_.go_on(out->pose);
     return;
   }
-  if (!believed_) {
-    out->pose.local.fill(Mat3::Identity());
-    out->pose.local[0] = turn_about_y(heading_angle(last_source_));
-    believed_ = out->pose;
-  }
-  out->pose = *believed_;
+  Pose rest = out->pose;
+  rest.local.fill(Mat3::Identity());
+  rest.local[0] = turn_about_y(heading_angle(a));
+  out->pose = waiting_.wait(rest);
 }
 
-/// The motion model's answer to what is seen of A, whose heading `turn` is.
+/// The motion network's answer to A as `seen`. `turn`: A's heading.
 MotionOutput Retargeter::answer(const SeenJoints& seen, const Mat3& turn) {
   const Joints& a = seen.joints;
   const Mat3 back = turn.transpose();
@@ -277,7 +307,8 @@ MotionOutput Retargeter::answer(const SeenJoints& seen, const Mat3& turn) {
   return on_host(motion_->forward(ctx, restage::moved(in, motion_device_), &state_));
 }
 
-/// What B does while A is as in `a`.
+/// Makes B's pose of the motion network's answer. `a` and `turn`: A's joints and heading in the
+/// frame that is answered.
 void Retargeter::perform(const MotionOutput& answer, const Joints& a, const Mat3& turn,
                          Pose* pose) {
   ++answered_;
@@ -299,7 +330,8 @@ void Retargeter::perform(const MotionOutput& answer, const Joints& a, const Mat3
   feet_(rest_, standing, pose);
 }
 
-/// Velocities that are a little too large or askew would carry B away from A for ever.
+/// Moves B's pelvis on by `velocity`, metres a second, and draws it to A's scaled path
+/// (RetargetOptions::anchor): errors of the velocity would carry B ever further away.
 void Retargeter::sum_path(const Joints& a, const Vec3& velocity) {
   legs_a_ += (leg_length(a) - legs_a_) / static_cast<double>(answered_);
   if (answered_ == 1) return;

@@ -1,5 +1,6 @@
-// Online retargeting (spec 3.6): clouds of A go in one by one, poses of B come out, in constant
-// memory. What depends on the target alone is computed once.
+// Online retargeting by networks (spec 3.6): clouds of the source, who is called A here, go in one
+// by one; poses of the target, who is called B, come out. Memory does not grow with the number of
+// frames. Work that depends on the target alone is done once, in the constructor.
 #pragma once
 
 #include <optional>
@@ -8,6 +9,7 @@
 #include "infer/foot_lock.h"
 #include "infer/surface.h"
 #include "infer/system.h"
+#include "infer/waiting.h"
 #include "nn/models/extraction.h"
 #include "nn/models/motion.h"
 #include "nn/weights/bundle.h"
@@ -15,45 +17,52 @@
 namespace restage {
 
 struct RetargetOptions {
-  double fps = kFps;   ///< of the source; other rates are resampled to 30
+  double fps = kFps;   ///< frames per second of the source; the result always has kFps
   bool force = false;  ///< accept a target that does not look like a T-pose
-  uint64_t seed = 0;   ///< of the choice of points
-  int samples = 4;     ///< views of a frame that are averaged (nn/models/extraction.h)
-  /// Seconds in which B's path, a sum of velocities, goes back to A's in proportion to the legs, so
-  /// that errors do not add up. 0: never, as in the papers (docs/method.md, "Drift").
+  uint64_t seed = 0;   ///< of the random choice of points
+  int samples = 4;     ///< how many views of a cloud are averaged (nn/models/extraction.h)
+  /// B's path is a sum of velocities, whose errors add up. So B's pelvis is drawn to the place that
+  /// A's path, scaled by the length of the legs, would give; `anchor` is the time constant in
+  /// seconds. 0: B's pelvis is not drawn, as in the papers (docs/method.md, "Drift").
   double anchor = 0.25;
-  /// Frames of less confidence than this are not guessed: the target keeps the pose of the last one
-  /// before, or its rest pose. 0: every frame is answered.
+  /// In a frame with less confidence than this, B waits: B keeps the pose that was shown before, or
+  /// stands at rest where nothing was shown before. When confidence is back, B comes back to the
+  /// network's poses within kReturnFrames frames (infer/waiting.h). 0: B never waits.
   double min_confidence = 0;
-  /// Feet that stand are held where they landed, by weights that say which do.
+  /// Hold feet that stand where they landed (infer/foot_lock.h), if the motion network says which
+  /// feet stand.
   bool foot_lock = true;
 };
 
-/// Our chain of three networks. Extractor and motion network work where they are (move_networks());
-/// the surface is the CPU's.
+/// Our chain of three networks: the extractor finds A's joints in a cloud, the motion network finds
+/// B's pose for them, the deformation network gives B's surface. Every network computes on the
+/// device on which its parameters lie (move_networks()); the deformation network on the motion
+/// network's.
 class Retargeter final : public System {
  public:
-  /// `weights` come from the file `weights_name` (for errors) and need at least a model for
-  /// skeleton and one for motion. Without `deformation.weights` frames have no vertices, without
-  /// offsets skinning is all. `where` names the target. InputError: a model that is missing, a
-  /// setting that is unknown, a target whose shoulder-wrist lines are more than 30 degrees from
-  /// +-x. Of a target with a `rig`, which shows its T-pose, the extractor does not decide: where it
-  /// finds none, the rig's joints take the place of those that it finds.
+  /// `weights` must hold a model for `skeleton` and one for `motion`. Without `deformation.weights`
+  /// frames have no vertices; without `deformation.offsets` vertices are skinned only.
+  /// `weights_name` and `where` are the files of `weights` and `target`, for errors. InputError: a
+  /// model is missing, a setting is unknown, or the line from a shoulder to a wrist of the target
+  /// is more than 30 degrees from +-x. `rig` holds the joints of a rigged target, which show its
+  /// T-pose: where the extractor finds no T-pose, they take the place of the joints that it finds.
   Retargeter(const Bundle& weights, const std::string& weights_name, Mesh target,
              const std::string& where, const RetargetOptions& options,
              const std::optional<Joints>& rig = std::nullopt);
-  /// The same from known rest joints of the target instead of extracted ones; the source is then
-  /// given by push_joints() unless there is a model for skeleton.
+  /// The same with known rest joints of the target: the extractor need not find them. If `weights`
+  /// hold no model for `skeleton`, the source is given by push_joints() instead of push().
   Retargeter(const Bundle& weights, const std::string& weights_name, Mesh target,
              const Joints& rest, const RetargetOptions& options);
 
-  /// At 30 fps each cloud gives one frame, else those of the 30 fps grid that it ends; of a network
-  /// that looks ahead (MotionModel::latency) those so many frames before. A steady frame takes no
+  /// At 30 fps each cloud gives one frame. At another rate a cloud gives the frames of the grid
+  /// between the moment of the cloud before and its own moment. A motion network that looks ahead
+  /// gives every frame MotionModel::latency() frames later. After a few frames, a call takes no new
   /// memory.
   std::span<const RetargetedFrame> push(const Points& cloud, const std::string& source) override;
-  /// The same from joints of A in the world, and what else is seen of them.
+  void miss() override;
+  /// As push(), for an A whose joints are known. `seen`: in the world, metres.
   std::span<const RetargetedFrame> push_joints(const SeenJoints& seen);
-  /// The frames that the network has not answered yet: the source stands still in the end.
+  /// To answer the last frames, a network that looks ahead is shown A standing still.
   std::span<const RetargetedFrame> finish() override;
   void restart() override;
 
@@ -62,7 +71,7 @@ class Retargeter final : public System {
   Points posed(const Pose& pose) const override { return surface_ ? (*surface_)(pose) : Points(); }
   const Joints* target_joints() const override { return &rest_; }
   const Joints& rest() const { return rest_; }
-  /// Whether every cloud is answered at once, by one frame of its own moment.
+  /// Whether every push() returns one frame, the frame of the pushed cloud's own moment.
   bool frame_by_frame() const;
   /// Null without a model for `deformation.weights`.
   const Surface* surface() const { return surface_ ? &*surface_ : nullptr; }
@@ -71,11 +80,12 @@ class Retargeter final : public System {
 
  private:
   void prepare(const std::string& weights_name);
-  /// False: there is no answer yet.
-  bool step(const SeenJoints& seen, RetargetedFrame* out);
+  size_t advance(const SeenJoints& seen, bool ended);
+  /// Answers one moment of the grid. False: the network has not answered yet, `out` is not set.
+  bool step(const SeenJoints& seen, bool filled, RetargetedFrame* out);
   MotionOutput answer(const SeenJoints& seen, const Mat3& turn);
   void perform(const MotionOutput& answer, const Joints& a, const Mat3& turn, Pose* pose);
-  void hold_doubtful(RetargetedFrame* out);
+  void hold_doubtful(const Joints& a, RetargetedFrame* out);
   void sum_path(const Joints& a, const Vec3& velocity);
 
   Bundle models_;
@@ -87,31 +97,36 @@ class Retargeter final : public System {
   Joints rest_;
   std::optional<Surface> surface_;
   std::optional<SystemRig> rig_;
-  Tensor rest_tensor_;  // relative to the rest pelvis
-  // How the models were trained:
+  Tensor rest_tensor_;  // rest_, relative to its pelvis
+  // Settings with which the motion network was trained:
   enum class Path { velocity, relative, absolute } path_ = Path::velocity;
   bool remove_heading_ = false, steady_heading_ = false;
   Heading heading_{false};
   MotionState state_;
   FootLock feet_;
-  std::optional<Joints> previous_;      ///< A on the 30 fps grid, one step ago
-  std::optional<Mat3> back_before_;     ///< what took A's heading away then
-  std::optional<Pose> believed_;        ///< the last pose that was
-  std::optional<SeenJoints> received_;  ///< A as last pushed
+  Waiting waiting_;
+  std::optional<Joints> previous_;      ///< A one frame of the grid ago
+  std::optional<Mat3> back_before_;     ///< the turn that took A's heading away one frame ago
+  std::optional<SeenJoints> received_;  ///< A in the frame that was pushed last
   Joints last_source_;
-  Vec3 start_a_ = Vec3::Zero(), start_b_ = Vec3::Zero();  ///< pelvis in the first frame
-  Vec3 root_b_ = Vec3::Zero();
-  Vec3 centre_a_ = Vec3::Zero(), centre_b_ = Vec3::Zero();  ///< what paths are scaled about
-  double legs_a_ = 0;                                       ///< mean leg length of A so far
-  /// What was seen on the grid and how it was turned, as many frames as answers come late.
+  Vec3 start_a_ = Vec3::Zero(), start_b_ = Vec3::Zero();  ///< pelvises in the first frame
+  Vec3 root_b_ = Vec3::Zero();                            ///< B's pelvis, before feet are held
+  Vec3 centre_a_ = Vec3::Zero(),
+       centre_b_ = Vec3::Zero();  ///< centres about which paths are scaled
+  double legs_a_ = 0;             ///< length of A's legs, mean of all frames so far, metres
+  /// A in the last frames of the grid, a ring of latency + 1 of them: a late answer belongs to the
+  /// oldest one. `turn`: A's heading.
   struct Asked {
     SeenJoints seen;
     Mat3 turn;
+    bool filled;
   };
   std::vector<Asked> asked_;
-  int64_t frame_ = 0, grid_ = 0;         ///< source frames received, grid frames seen
-  int64_t answered_ = 0;                 ///< grid frames produced
-  std::vector<RetargetedFrame> frames_;  ///< of the last push, and room for more
+  int64_t frame_ = 0;     ///< number of source frames received or missed
+  int64_t missed_ = 0;    ///< number of source frames missed since the last one that was received
+  int64_t grid_ = 0;      ///< number of grid frames shown to the network
+  int64_t answered_ = 0;  ///< number of grid frames answered
+  std::vector<RetargetedFrame> frames_;  ///< those of the last call first; is never made smaller
   FrameTimes times_;
 };
 

@@ -1,4 +1,4 @@
-// The systems by name. A system is a class derived from System and one line in systems.cpp.
+// The systems by name. To add a system: derive a class from System and add a line to systems.cpp.
 #pragma once
 
 #include <memory>
@@ -10,25 +10,26 @@
 
 namespace restage {
 
-/// What a system may be made from.
+/// Everything that a system may be made from.
 struct SystemInput {
   Bundle weights;
-  std::string weights_name;    ///< for errors
+  std::string weights_name;    ///< the file of `weights`, for errors
   Mesh target;                 ///< T-pose, metres, y up, facing +z
-  std::string target_name;     ///< for errors
-  std::optional<Joints> rest;  ///< of the target, if they are known
-  std::optional<Joints> rig;   ///< those that the target's rig shows (Retargeter)
+  std::string target_name;     ///< the file of `target`, for errors
+  std::optional<Joints> rest;  ///< the target's rest joints, if they are known
+  std::optional<Joints> rig;   ///< the joints that the target's rig shows (Retargeter)
   RetargetOptions options;
 };
 
 struct SystemType {
   std::string name, help;
-  bool weights;  ///< it needs some
+  bool weights;  ///< whether the system needs SystemInput::weights
   std::unique_ptr<System> (*make)(SystemInput input);
 };
 
 const std::vector<SystemType>& systems();
-/// InputError with the nearest known name if there is no such system; `where` the name stands.
+/// The system of that name. InputError, which suggests the nearest known name, if there is none;
+/// `where`: the file in which the name stands.
 const SystemType& system_type(const std::string& name, const std::string& where = "");
 
 }  // namespace restage

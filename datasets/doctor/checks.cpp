@@ -3,6 +3,7 @@
 #include "datasets/doctor/examine_detail.h"
 #include "datasets/doctor/orientation_model.h"
 #include "datasets/doctor/words.h"
+#include "datasets/importers/axis.h"
 
 namespace restage {
 
@@ -41,11 +42,11 @@ std::string scale_advice(double size, double given) {
                                             : "give --scale " + number(raw.unit.metres);
 }
 
-/// `up`: in the frame that the source was brought into.
-std::string up_advice(int up, bool z_up) {
-  if (z_up && up == 5) return "leave --source-up out";
-  if (!z_up && up == 4) return "give --source-up z";
-  return "restage doctor --fix OUT turns it";
+/// `up`: in the frame that the source was brought into, by its own axis `given`.
+std::string up_advice(int up, const std::string& given) {
+  const Mat3 back = upright(parse_axis(given, "--source-up")).transpose();
+  const Axis own = axis_near(back * direction(up));
+  return own == Axis::y ? "leave --source-up out" : "give --source-up " + to_string(own);
 }
 
 }  // namespace
@@ -63,7 +64,7 @@ void check_source(const std::vector<Mesh>& first_frames, const std::string& wher
     if (f.topic == "up" && f.sure < kNobody) refuse(where, f, "give scans of one whole person");
     // A few frames, alike: less certain than the many that the doctor looks at.
     if (f.topic == "up" && f.sure < kVerySure) continue;
-    if (f.topic == "up") refuse(where, f, up_advice(d.orientation.up, given.z_up));
+    if (f.topic == "up") refuse(where, f, up_advice(d.orientation.up, given.up));
     refuse(where, f, "restage doctor --fix OUT mends it");
   }
 }

@@ -80,10 +80,11 @@ inline constexpr const char* kMirroredFix =
     "mirror it (x to -x) where it was made, or exchange the names";
 std::optional<bool> is_mirrored(const Joints& joints, const Vec3& up = Vec3::UnitY());
 
-/// How a source was read: metres per unit, and whether its z axis points up.
+/// How a source was read: metres per unit, and which of its axes points up (parse_axis(),
+/// importers/axis.h; not "auto").
 struct SourceFrame {
   double scale = 1;
-  bool z_up = false;
+  std::string up = "y";
 };
 
 /// Cheap checks before retargeting: what the doctor finds wrong is refused in the doctor's words, a

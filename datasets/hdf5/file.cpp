@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <limits>
@@ -11,6 +12,7 @@
 
 #include "datasets/hdf5/detail.h"
 #include "datasets/hdf5/probe.h"
+#include "datasets/readers/byte_stream.h"
 #include "datasets/readers/errors.h"
 
 namespace restage::h5 {
@@ -19,7 +21,7 @@ namespace {
 constexpr uint64_t kAlwaysAllowed = uint64_t{64} << 20;  // bytes that any data set may claim
 constexpr uint64_t kMostCompression = 2000;  // gzip reaches 1032; beyond this, a claim is a lie
 constexpr uint64_t kLargestChunk = uint64_t{256} << 20;
-constexpr uint64_t kLargestRead = uint64_t{16} << 30;
+std::atomic<uint64_t> max_memory = kMaxMemory;
 
 template <class T>
 hid_t memory_type() {
@@ -46,7 +48,18 @@ void check_filters(hid_t properties, const std::string& where) {
   }
 }
 
-void check_layout(hid_t properties, const std::string& where) {
+void require_memory(uint64_t values, uint64_t value_size, const std::string& where,
+                    const char* what) {
+  const uint64_t most = max_memory;
+  if (values <= most / value_size) return;
+  throw InputError(where,
+                   cat(what, " ", values, " values of ", value_size, " bytes, more than the ", most,
+                       " bytes allowed"),
+                   "allow more with --max-memory");
+}
+
+/// `width`: bytes of a stored value.
+void check_layout(hid_t properties, uint64_t width, const std::string& where) {
   const H5D_layout_t layout = H5Pget_layout(properties);
   if (H5Pget_external_count(properties) > 0 || layout == H5D_VIRTUAL || layout < 0)
     throw InputError(where, "keeps its values in another file",
@@ -55,11 +68,12 @@ void check_layout(hid_t properties, const std::string& where) {
   check_filters(properties, where);
   hsize_t chunk[H5S_MAX_RANK];
   const int rank = H5Pget_chunk(properties, H5S_MAX_RANK, chunk);
-  double bytes = 8;
-  for (int i = 0; i < rank; ++i) bytes *= static_cast<double>(chunk[i]);
-  if (rank <= 0 || bytes <= 0 || bytes > static_cast<double>(kLargestChunk))
+  double values = 1;
+  for (int i = 0; i < rank; ++i) values *= static_cast<double>(chunk[i]);
+  if (rank <= 0 || values <= 0 || 8 * values > static_cast<double>(kLargestChunk))
     throw InputError(where, "has chunks of impossible size",
                      "make the file again with smaller chunks");
+  require_memory(static_cast<uint64_t>(values), width, where, "is stored in chunks of");
 }
 
 Shape extent_of(hid_t space, const std::string& where) {
@@ -119,6 +133,8 @@ Handle select_rows(hid_t space, const Shape& shape, int64_t first, int64_t count
 
 }  // namespace
 
+void set_max_memory(uint64_t bytes) { max_memory = bytes; }
+
 std::string to_string(const Shape& shape) {
   std::string text = "[";
   for (size_t i = 0; i < shape.size(); ++i)
@@ -138,8 +154,7 @@ size_t Dataset::value_size() const {
 }
 
 void Dataset::check_memory(int64_t values, size_t value_size) const {
-  if (static_cast<uint64_t>(values) > kLargestRead / value_size)
-    throw InputError(where_, "is too large to read at once", "split it into several files");
+  require_memory(static_cast<uint64_t>(values), value_size, where_, "has to be read at once,");
 }
 
 void Dataset::read_raw(int64_t first, int64_t count, int64_t type, void* out) const {
@@ -323,7 +338,7 @@ Dataset File::dataset(const std::string& name) const {
   set.type_ = classify(type, set.where_);
   set.wide_ = set.type_ == Type::integer && is_wide_integer(type);
   set.shape_ = extent_of(space, set.where_);
-  check_layout(creation, set.where_);
+  check_layout(creation, std::max<uint64_t>(H5Tget_size(type), 1), set.where_);
   const auto stored = std::min<uint64_t>(H5Dget_storage_size(set.id_), file_size(state_->path));
   const uint64_t claimed = static_cast<uint64_t>(product(set.shape_)) * H5Tget_size(type);
   if (claimed > kAlwaysAllowed && claimed / kMostCompression > stored)

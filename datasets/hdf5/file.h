@@ -1,8 +1,9 @@
 // HDF5 files as C++ values: the only place (with file.cpp) that knows the HDF5 library.
 // Every failure to read is an InputError that names file and data set ("x.h5:/joints: is missing;
 // ..."), every failure to write a WorkError; the library prints nothing. Sizes written in a file
-// are never trusted: they are compared with what the file stores before memory is taken. One lock
-// guards all calls, so files may be used from several threads (each File from one at a time).
+// are never trusted: they are compared with what the file stores, and with set_max_memory(), before
+// memory is taken. One lock guards all calls, so files may be used from several threads (each File
+// from one at a time).
 #pragma once
 
 #include <cstdint>
@@ -16,6 +17,10 @@
 namespace restage::h5 {
 
 using Shape = std::vector<int64_t>;  ///< lengths of the axes, slowest first; empty: one value
+
+/// Most that the values of one read, or one chunk of a file, may take in memory, in bytes; at first
+/// kMaxMemory (readers/byte_stream.h). Holds for all files of this process: `--max-memory`.
+void set_max_memory(uint64_t bytes);
 
 /// "[10, 22, 3]"; -1 (any length) is written as *.
 std::string to_string(const Shape& shape);

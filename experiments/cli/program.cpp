@@ -19,6 +19,7 @@
 #include "autograd/base/log.h"
 #include "autograd/base/nearest.h"
 #include "autograd/base/parallel.h"
+#include "datasets/hdf5/file.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
 
@@ -150,7 +151,7 @@ void Program::add_common_options(CommandOptions app) {
   app.add_text(
          "--max-memory",
          [this](const std::string& text) { common_.max_memory = parse_memory(text); },
-         "most that unpacking a compressed file may take (4GB)")
+         "most that an array of a file may take, unpacked (4GB)")
       .group(group);
 }
 
@@ -201,6 +202,7 @@ int Program::run(int argc, char** argv) {
   check_out(innermost(*app_));
   common_.seed_given = innermost(*app_).count("--seed") > 0;
   set_threads(common_.threads);
+  h5::set_max_memory(common_.max_memory);
   set_log_level(common_.quiet     ? LogLevel::quiet
                 : common_.verbose ? LogLevel::debug
                                   : LogLevel::info);

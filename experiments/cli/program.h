@@ -21,7 +21,8 @@ struct Common {
   bool seed_given = false;              ///< behind the command's name
   bool quiet = false, verbose = false;  ///< already handed to base/log.h
   bool json = false;
-  uint64_t max_memory = kMaxMemory;  ///< what unpacking one compressed file may take, bytes
+  /// What an array of a file may take in memory, bytes; already handed to datasets/hdf5/file.h.
+  uint64_t max_memory = kMaxMemory;
   /// All words that the program was called with, its own name first.
   std::vector<std::string> command_line;
 };

@@ -11,12 +11,12 @@
 #include "autograd/kernels/kernel.h"
 #include "datasets/doctor/examine.h"
 #include "datasets/importers/gltf_character.h"
-#include "datasets/readers/frame_folder.h"
-#include "datasets/readers/gltf.h"
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
 #include "experiments/cli/profile.h"
+#include "experiments/cli/retarget_gaps.h"
+#include "experiments/source.h"
 #include "infer/systems.h"
 #include "infer/writers/bvh.h"
 #include "infer/writers/frames.h"
@@ -26,20 +26,21 @@ namespace restage::cli {
 namespace {
 
 struct RetargetCommand {
-  std::string source, target, weights, out, clip, up = "y", format = "ply", device = "cpu";
+  SourceRecord source;
+  std::string target, weights, out, format = "ply", device = "cpu";
   std::string system = "chain", rest;
-  std::optional<double> fps;        ///< of the source
-  std::optional<int64_t> sequence;  ///< of the source, from 0
   RetargetOptions options;
-  double scale = 1;
   bool profile = false;
   int64_t every = 1;
 };
 
-/// Where results go: what a writer takes of each frame, and how it ends.
+using Frames = std::vector<int64_t>;  ///< their numbers
+
+/// Where results go: what a writer takes of each frame, and how it ends. `filled`:
+/// RetargetedFrame::filled.
 struct Sink {
   std::function<void(const RetargetedFrame&)> push;
-  std::function<void()> commit;
+  std::function<void(const Frames& filled)> commit;
 };
 
 /// What the skeleton's files are made of.
@@ -50,11 +51,15 @@ const SystemRig& rig_of(const System& system, const std::string& out) {
   return *system.rig();
 }
 
-Sink make_sink(const RetargetCommand& c, const System& s) {
+/// Of the result.
+double rate_of(const RetargetCommand& c) { return kFps / static_cast<double>(c.every); }
+
+Sink make_sink(const RetargetCommand& c, const System& s, const SourceRecord& source) {
   if (c.out.ends_with(".glb")) {
     const SystemRig& rig = rig_of(s, c.out);
     const auto writer = std::make_shared<GlbWriter>(c.out, s.target(), rig.rest, rig.weights);
-    const auto commit = [writer] {
+    const auto commit = [writer](const Frames& filled) {
+      writer->set_filled(filled);
       const InfluenceError e = writer->commit();
       log_info(format("four weights per vertex instead of 22: %.2f mm on average, at most %.2f mm",
                       1e3 * e.mean, 1e3 * e.max));
@@ -64,35 +69,29 @@ Sink make_sink(const RetargetCommand& c, const System& s) {
   if (c.out.ends_with(".bvh")) {
     const auto writer = std::make_shared<BvhWriter>(c.out, rig_of(s, c.out).rest);
     return {[writer](const RetargetedFrame& f) { writer->push(f.pose); },
-            [writer] { writer->commit(); }};
+            [writer](const Frames&) { writer->commit(); }};
   }
   const Mesh& target = s.target();
   if (c.out.ends_with(".h5")) {
-    const auto writer =
-        std::make_shared<PredictionWriter>(c.out, std::ssize(target.vertices), target.faces,
-                                           FileInfo{}, kFps / static_cast<double>(c.every));
+    const auto writer = std::make_shared<PredictionWriter>(c.out, std::ssize(target.vertices),
+                                                           target.faces, FileInfo{}, rate_of(c));
+    writer->set_source(source);
     return {
         [writer](const RetargetedFrame& f) { writer->append(f.joints, f.vertices, f.confidence); },
-        [writer] { writer->commit(); }};
+        [writer](const Frames& filled) {
+          writer->set_filled(filled);
+          writer->commit();
+        }};
   }
   const auto writer = std::make_shared<FrameFolderWriter>(
       c.out, target.faces, c.format == "obj" ? MeshFormat::obj : MeshFormat::ply);
   return {[writer](const RetargetedFrame& f) { writer->push(f.vertices); },
-          [writer] { writer->commit(); }};
+          [writer](const Frames&) { writer->commit(); }};
 }
 
 void check(const RetargetCommand& c) {
-  if (c.up != "y" && c.up != "z")
-    throw InputError("", "--source-up '" + c.up + "' is unknown", "use y or z");
   if (c.format != "ply" && c.format != "obj")
     throw InputError("", "--format '" + c.format + "' is unknown", "use ply or obj");
-  if (!(c.scale >= kLeastScale && c.scale <= kMostScale))
-    throw InputError("", "--scale is out of range", "give metres per unit, 1e-9 to 1e6");
-  if (c.fps && !(*c.fps >= 1 && *c.fps <= 1000))
-    throw InputError("", "--fps is out of range", "give the source's frames per second, 1 to 1000");
-  if (c.fps && is_gltf_name(c.source))
-    throw InputError(c.source, "states its key times, which --fps cannot change",
-                     "leave --fps out");
   if (system_type(c.system).weights && c.weights.empty())
     throw InputError("", "--weights is missing", "give a weights file or a run");
   if (c.every < 1 || c.every > 1000000)
@@ -110,32 +109,37 @@ void check(const RetargetCommand& c) {
   if (extension && !c.out.ends_with(".glb") && !c.out.ends_with(".bvh") && !c.out.ends_with(".h5"))
     throw InputError(c.out, "is of no kind that can be written",
                      "end it in .glb, .bvh, .h5, or / for a folder");
-  std::vector<std::string> inputs = {c.source, c.target};
+  std::vector<std::string> inputs = {c.source.path, c.target};
   if (!c.weights.empty()) inputs.push_back(weights_path(c.weights));
   if (!c.rest.empty()) inputs.push_back(c.rest);
   check_output(c.out, inputs);
 }
 
-void to_metres(const RetargetCommand& c, Points& points) {
-  for (Point& p : points) {
-    if (c.up == "z") p = Point(p[0], p[2], -p[1]);
-    p *= static_cast<float>(c.scale);
-  }
-}
-
 /// The doctor's words on what would make the result nonsense.
-void check_inputs(const RetargetCommand& c, FrameSource& frames, const TargetMesh& target) {
+void check_inputs(const RetargetCommand& c, Source& source, const TargetMesh& target) {
   if (c.options.force) return;
   check_target(target.mesh, c.target, target.known());
   std::vector<Mesh> first;
-  while (first.size() < kSourceFrames) {
-    auto frame = frames.next();
-    if (!frame) break;
-    to_metres(c, frame->points);
-    first.push_back({std::move(frame->points), std::move(frame->faces)});
+  for (int i = 0; i < kSourceFrames; ++i) {
+    auto cloud = source.next();
+    if (!cloud) break;
+    // What is of no use is told apart later, frame by frame.
+    if (cloud->fault || cloud->frame.points.size() < kLeastDistinctPoints) continue;
+    first.push_back({std::move(cloud->frame.points), std::move(cloud->frame.faces)});
   }
-  frames.rewind();
-  check_source(first, c.source, {c.scale, c.up == "z"});
+  source.rewind();
+  check_source(first, c.source.path, {c.source.scale, c.source.up});
+}
+
+/// Why a frame cannot be used; nothing if it can, for all that is known before a system sees it.
+std::optional<InputError> fault_of(const SourceCloud& cloud, bool force) {
+  if (cloud.fault || force) return cloud.fault;
+  try {
+    check_frame(cloud.frame.points, cloud.frame.source);
+  } catch (const InputError& fault) {
+    return fault;
+  }
+  return std::nullopt;
 }
 
 using Clock = std::chrono::steady_clock;
@@ -168,85 +172,159 @@ Joints rest_joints(const std::string& path) {
   return out;
 }
 
+/// What a system is made from, but for its options.
+SystemInput load_input(const RetargetCommand& c, const Common& common) {
+  SystemInput input;
+  input.options = c.options;
+  input.options.seed = common.seed;
+  input.target_name = c.target;
+  if (c.weights.empty()) return input;
+  input.weights_name = weights_path(c.weights);
+  input.weights = load_bundle(c.weights);
+  for (const char* role : {"skeleton", "motion", "deformation.weights"})
+    if (system_type(c.system).weights) input.weights.need(role, input.weights_name);
+  move_networks(input.weights, {"skeleton", "motion"}, device_of(c.device));
+  return input;
+}
+
+/// What has become of the source.
+struct Outcome {
+  Frames filled;  ///< RetargetedFrame::filled
+  int64_t frames = 0, held = 0;
+  size_t points_left_out = 0;
+  Json confidence = Json::array();
+};
+
+/// All frames of the source through the system and into the sink, which is not committed.
+class Run {
+ public:
+  Run(const RetargetCommand& c, Source& source, System& system, Gaps& gaps, Profile& profile)
+      : c_(c), source_(source), system_(system), gaps_(gaps), profile_(profile) {}
+
+  Outcome operator()() {
+    // The first frame is looked at before anything is written or logged.
+    for (auto cloud = next(); cloud; cloud = next()) {
+      out_.points_left_out += cloud->frame.left_out;
+      push(*cloud);
+      source_.skip(c_.every - 1);
+      in_ += c_.every;
+    }
+    gaps_.check_any();
+    write(system_.finish());
+    return out_;
+  }
+  const Sink& sink() const { return *sink_; }
+
+ private:
+  std::optional<SourceCloud> next() {
+    const Clock::time_point start = Clock::now();
+    auto cloud = source_.next();
+    read_ = seconds_since(start);
+    return cloud;
+  }
+
+  void push(const SourceCloud& cloud) {
+    const Clock::time_point start = Clock::now();
+    std::optional<InputError> fault = fault_of(cloud, c_.options.force);
+    std::span<const RetargetedFrame> made;
+    if (!fault) try {
+        made = system_.push(cloud.frame.points, cloud.frame.source);
+      } catch (const UnusableCloud& unusable) {
+        fault = unusable;
+      }
+    if (fault) {
+      gaps_.add(in_, *fault);
+      system_.miss();
+      return;
+    }
+    gaps_.end();
+    const Clock::time_point pushed = Clock::now();
+    write(made);
+    const double write = seconds_since(pushed), work = seconds_since(start);
+    const FrameTimes times = system_.times();
+    profile_.add({read_, times.extract, times.motion, times.deformation, write, read_ + work});
+  }
+
+  void write(std::span<const RetargetedFrame> made) {
+    if (!sink_) sink_ = make_sink(c_, system_, source_.record());
+    for (const RetargetedFrame& f : made) {
+      sink_->push(f);
+      if (f.filled) out_.filled.push_back(out_.frames);
+      ++out_.frames;
+      if (!f.confidence) continue;
+      out_.confidence.push_back(std::round(*f.confidence * 1e3) / 1e3);
+      out_.held += *f.confidence < c_.options.min_confidence;
+    }
+  }
+
+  const RetargetCommand& c_;
+  Source& source_;
+  System& system_;
+  Gaps& gaps_;
+  Profile& profile_;
+  std::optional<Sink> sink_;
+  Outcome out_;
+  int64_t in_ = 0;  // frame of the source
+  double read_ = 0;
+};
+
+/// What is said when all is done; bad input, which may come late in a source, is answered with one
+/// line.
+void log_outcome(const Outcome& done, const Gaps& gaps) {
+  for (const std::string& line : gaps.lines(done.filled)) log_warning(line);
+  if (done.points_left_out > 0)
+    log_warning(std::to_string(done.points_left_out) +
+                " points of the source are NaN or infinite and were left out");
+}
+
+void print_outcome(const RetargetCommand& c, const Common& common, const Source& source,
+                   const Outcome& done, const Gaps& gaps, const Profile& profile) {
+  Json document = {{"out", c.out},          {"source_frames", source.frames()},
+                   {"frames", done.frames}, {"fps", rate_of(c)},
+                   {"seed", common.seed},   {"missing", gaps.json()},
+                   {"filled", done.filled}, {"points_left_out", done.points_left_out}};
+  if (!done.confidence.empty()) {
+    document["held"] = done.held;
+    document["confidence"] = done.confidence;
+  }
+  if (c.profile) document["profile"] = profile.json();
+  std::string text = "wrote " + c.out + ": " + std::to_string(done.frames) + " frames (seed " +
+                     std::to_string(common.seed) + ")";
+  if (!done.filled.empty()) text += "; " + std::to_string(done.filled.size()) + " of them filled";
+  if (done.held > 0) text += "; in " + std::to_string(done.held) + " of them the target waits";
+  print(common.json, document, text + "\n");
+}
+
 int run_retarget(const RetargetCommand& c, const Common& common) {
   check(c);
-  SystemInput input;
-  if (!c.weights.empty()) {
-    input.weights_name = weights_path(c.weights);
-    input.weights = load_bundle(c.weights);
-    for (const char* role : {"skeleton", "motion", "deformation.weights"})
-      if (system_type(c.system).weights) input.weights.need(role, input.weights_name);
-    move_networks(input.weights, {"skeleton", "motion"}, device_of(c.device));
-  }
-  const auto frames = open_frames(c.source, {c.clip, common.max_memory, c.sequence});
-  if (!c.sequence && frames->sequences() > 1)
-    throw InputError(c.source, "holds " + std::to_string(frames->sequences()) + " sequences",
+  SystemInput input = load_input(c, common);
+  Source source(c.source, common.max_memory);
+  if (source.frames() == 0)
+    throw InputError(c.source.path, "holds no frames", "give at least one cloud");
+  if (!c.source.sequence && source.sequences() > 1)
+    throw InputError(c.source.path, "holds " + std::to_string(source.sequences()) + " sequences",
                      "choose one with --sequence N, from 0");
-  input.options = c.options;
-  input.options.fps = c.fps.value_or(frames->fps());
-  input.options.seed = common.seed;
+  input.options.fps = source.fps();
   TargetMesh target = read_target(c.target);
-  check_inputs(c, *frames, target);
+  check_inputs(c, source, target);
   if (!c.rest.empty()) input.rest = rest_joints(c.rest);
   // The joints that a rig names are where its maker put them, not where a network finds them.
   if (c.rest.empty() && !system_type(c.system).weights) input.rest = target.joints;
   input.rig = target.joints;
   input.target = std::move(target.mesh);
-  input.target_name = c.target;
   const auto system = system_type(c.system).make(std::move(input));
-  // The first frame is looked at before anything is written or logged.
-  double read = 0;
-  const auto next = [&] {
-    const Clock::time_point start = Clock::now();
-    auto frame = frames->next();
-    if (frame) to_metres(c, frame->points);
-    read = seconds_since(start);
-    return frame;
-  };
-  auto frame = next();
-  if (!frame) throw InputError(c.source, "holds no frames", "give at least one cloud");
-  const Sink sink = make_sink(c, *system);
+  Gaps gaps(source.frames(), source.fps() / static_cast<double>(c.every), c.options.force);
   Profile profile({"read", "extract", "motion", "deformation", "write", "frame"});
-  int64_t in = 0, out = 0, held = 0;
-  Json confidence = Json::array();
-  const auto write_all = [&](std::span<const RetargetedFrame> made) {
-    for (const RetargetedFrame& f : made) {
-      sink.push(f);
-      if (!f.confidence) continue;
-      confidence.push_back(std::round(*f.confidence * 1e3) / 1e3);
-      held += *f.confidence < c.options.min_confidence;
-    }
-    out += std::ssize(made);
-  };
-  for (; frame; frame = next(), ++in) {
-    if (in % c.every != 0) continue;
-    const Clock::time_point start = Clock::now();
-    if (!c.options.force) check_frame(frame->points, frame->source);
-    const auto made = system->push(frame->points, frame->source);
-    const Clock::time_point pushed = Clock::now();
-    write_all(made);
-    const double write = seconds_since(pushed), work = seconds_since(start);
-    const FrameTimes times = system->times();
-    profile.add({read, times.extract, times.motion, times.deformation, write, read + work});
-  }
-  write_all(system->finish());
-  sink.commit();
+  Run run(c, source, *system, gaps, profile);
+  const Outcome done = run();
+  run.sink().commit(done.filled);
   if (target.joints && c.rest.empty() && system_type(c.system).weights &&
       *system->target_joints() == *target.joints)
     target.report.remark("the network does not see its T-pose: the joints of its rig are taken");
   log_target(target.report);
+  log_outcome(done, gaps);
   if (c.profile) log_profile(profile);
-  Json document = {
-      {"out", c.out}, {"source_frames", in}, {"frames", out}, {"fps", kFps}, {"seed", common.seed}};
-  if (!confidence.empty()) {
-    document["held"] = held;
-    document["confidence"] = confidence;
-  }
-  if (c.profile) document["profile"] = profile.json();
-  print(common.json, document,
-        "wrote " + c.out + ": " + std::to_string(out) + " frames (seed " +
-            std::to_string(common.seed) + ")" +
-            (held > 0 ? "; in " + std::to_string(held) + " of them the target waits" : "") + "\n");
+  print_outcome(c, common, source, done, gaps, profile);
   return 0;
 }
 
@@ -280,7 +358,7 @@ void add_retarget(Program& program) {
       "restage retarget --source scans.h5 --target hero.ply --system register --rest rest.h5 "
       "--out r.h5",
       run_retarget);
-  app.add_option("--source", c.source,
+  app.add_option("--source", c.source.path,
                  "folder of clouds, file of them (HDF5, NPZ, NPY), or glTF animation")
       .required();
   app.add_option("--target", c.target,
@@ -292,11 +370,14 @@ void add_retarget(Program& program) {
   app.add_option("--every", c.every, "only every so many frames of the source; for X.h5");
   app.add_option("--out", c.out, "X.glb, X.bvh, X.h5, or a folder for PLY or OBJ frames")
       .required();
-  app.add_option("--clip", c.clip, "animation of a glTF source (default: the first)");
-  app.add_option("--sequence", c.sequence, "which sequence of an HDF5 source, from 0");
-  app.add_option("--fps", c.fps, "frames per second of the source (default: the file's, else 30)");
-  app.add_option("--source-up", c.up, "the source's up axis, y or z");
-  app.add_option("--scale", c.scale, "the source's units in metres");
+  app.add_option("--clip", c.source.clip, "animation of a glTF source (default: the first)");
+  app.add_option("--sequence", c.source.sequence, "which sequence of an HDF5 source, from 0");
+  app.add_option("--fps", c.source.fps,
+                 "frames per second of the source (default: the file's, else 30)");
+  app.add_option("--source-up", c.source.up,
+                 "the source's axis that points up: x, -x, y, -y, z or -z")
+      .show_default();
+  app.add_option("--scale", c.source.scale, "the source's units in metres");
   app.add_option("--format", c.format, "of a folder's frames: ply or obj");
   app.add_option("--device", c.device,
                  "where extractor and motion network run: cpu, or cuda in a program built for it");
@@ -305,12 +386,15 @@ void add_retarget(Program& program) {
   app.add_option("--anchor", c.options.anchor,
                  "seconds in which the path goes back to the source's, scaled to the target's legs "
                  "(0: never)");
-  app.add_option("--min-confidence", c.options.min_confidence,
-                 "the target waits where the extractor is less sure than this, 0 to 1 (0: never)");
+  app.add_option(
+      "--min-confidence", c.options.min_confidence,
+      "the target waits where the extractor is less sure than this, 0 to 1 (0: never), and "
+      "comes back within half a second");
   app.add_flag("!--no-foot-lock", c.options.foot_lock,
                "feet that stand are not held where they landed");
   app.add_flag("--force", c.options.force,
-               "accept a target that is no T-pose, and what else the doctor calls wrong");
+               "accept a target that is no T-pose, what else the doctor calls wrong, and gaps of "
+               "over a third of a second");
   app.add_flag("--profile", c.profile,
                "say how long a frame and its parts take: p50, p95, p99, max");
 }

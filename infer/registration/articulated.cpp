@@ -9,8 +9,9 @@
 namespace restage {
 namespace {
 
-// The unknowns of one step: place, logarithm of the size, rotation vectors of the joints (in their
-// parents' frames), stretch of the bones (a pair shares the lower one's).
+// The unknowns of one step: the place, the logarithm of the size, a rotation vector for each joint
+// (in its parent's frame), the stretch of each bone (left and right share one unknown, that of the
+// joint with the lower number).
 constexpr int kPlace = 0, kSize = 3, kTurn = 4, kStretch = kTurn + 3 * kJoints,
               kUnknowns = kStretch + kJoints;
 using Normal = Eigen::Matrix<double, kUnknowns, kUnknowns>;
@@ -36,8 +37,9 @@ Mat3 rotation_by(const Vec3& v) {
 
 // ---- what is known of people before a cloud is seen --------------------------------------------
 
-/// Cost of a squared radian of each joint's rotation vector, beside mean squared distances in
-/// metres: trunk, collars and ends stiff, limbs nearly free, knees and elbows hinges.
+/// Cost of a squared radian about each axis of a joint's rotation vector, added to the mean squared
+/// distance (square metres). Trunk, collars, hands, feet and head are stiff; limbs are nearly free;
+/// knees and elbows are hinges.
 Vec3 stiffness(int joint) {
   switch (joint) {
     case 0:
@@ -49,10 +51,10 @@ Vec3 stiffness(int joint) {
       return Vec3::Constant(2e-5);
     case 4:
     case 5:
-      return {2e-5, 3e-3, 3e-3};  // bends about x
+      return {2e-5, 3e-3, 3e-3};  // a knee bends about x
     case 18:
     case 19:
-      return {3e-3, 2e-5, 1e-3};  // about y; x is the twist
+      return {3e-3, 2e-5, 1e-3};  // an elbow bends about y; a turn about x is the forearm's twist
     case 3:
     case 6:
     case 9:
@@ -64,7 +66,8 @@ Vec3 stiffness(int joint) {
       return Vec3::Constant(3e-3);  // feet, toes, hands, head
   }
 }
-/// Knees and elbows bend one way: axis, sign, and the cost of the other way.
+/// Knees and elbows bend one way only: about which axis, with which sign, and the cost of bending
+/// the other way.
 struct Hinge {
   int joint, axis;
   double sign;
@@ -75,8 +78,9 @@ constexpr double kDamping = 1e-5;
 
 // ---- matches -----------------------------------------------------------------------------------
 
-/// Sums over all matches of a node y with points p: weight M, and weight M (y - p), where M counts
-/// the distance along the normal in full and across it in part.
+/// Sums over all matches of one node, which lies at y, with points p: the sum of weight M, and the
+/// sum of weight M (y - p). The matrix M counts the part of the distance along the node's normal in
+/// full and the part across the normal less.
 struct Pull {
   Mat3 weight = Mat3::Zero();
   Vec3 residual = Vec3::Zero();
@@ -110,7 +114,7 @@ struct Equations {
   }
 };
 
-/// The derivative of one node by the unknowns that move it.
+/// The derivative of one node's place by the unknowns that move the node.
 class NodeDerivative {
  public:
   NodeDerivative(const Rig& rig, const RigState& state, const PosedRig& posed)
@@ -145,7 +149,8 @@ class NodeDerivative {
   static size_t parent(int k) { return static_cast<size_t>(kParents[k]); }
   Vec3 bone(int k) const { return rig_.joints[k] - rig_.joints[parent(k)]; }
 
-  /// By joint: how much of the node it carries, itself or through its children, and where to.
+  /// For each joint: the share of the node that this joint and the joints below it carry, and the
+  /// place to which they carry the node.
   void gather(size_t i) {
     share_.fill(0);
     moment_.fill(Vec3::Zero());
@@ -256,8 +261,9 @@ RigState fit_articulated(const Rig& rig, const std::vector<Vec3>& cloud, RigStat
     for (size_t i = 0; i < rig.nodes.size(); ++i) derivative.add(i, pulls[i], e);
     add_priors(state, options, e);
     const Step step = -e.h.ldlt().solve(e.g);
-    if (!step.allFinite()) break;  // keep what there is
-    // A turn of more than half a radian is beyond what the derivative knows.
+    if (!step.allFinite()) break;  // the state so far is the answer
+    // The derivative holds for small turns only: no joint turns by more than half a radian in a
+    // step.
     const double most = step.segment<3 * kJoints>(kTurn).cwiseAbs().maxCoeff();
     take(step * std::min(1.0, 0.5 / std::max(most, 1e-12)), state);
   }

@@ -12,10 +12,11 @@ namespace {
 using Matrix = Eigen::SparseMatrix<double>;
 using Triplets = std::vector<Eigen::Triplet<double>>;
 
-// Each node has a displacement d and a matrix A: a point x near it is displaced by d + A (x -
-// node). As four rows of unknowns (A's columns, then d), times three coordinates.
+// Each node has a displacement d and a matrix A: a point x near the node is displaced by
+// d + A (x - node). These are four rows of unknowns (A's columns, then d), times three coordinates.
 
-/// What two neighbours say of the point halfway differs at a cost, and so do their matrices.
+/// Two costs for every pair of neighbours: of the difference between the displacements that both
+/// give to the point halfway between them, and of the difference between their matrices.
 void add_stiffness(const Rig& rig, const std::vector<Vec3>& nodes, double alpha, Triplets& out) {
   constexpr double kReach = 0.05;  // metres over which a difference of matrices counts
   const double weight = alpha / static_cast<double>(8 * nodes.size());
@@ -39,7 +40,8 @@ void add_stiffness(const Rig& rig, const std::vector<Vec3>& nodes, double alpha,
     }
 }
 
-/// Matches of all nodes: summed weights, and weighted sums of the points.
+/// For every node: the sum of the weights of its matches, and the weighted sum of the matched
+/// points.
 struct Targets {
   std::vector<double> weight;
   std::vector<Vec3> sum;
@@ -108,7 +110,7 @@ Pose refit_pose(const Rig& rig, const PosedRig& posed, const std::vector<Vec3>& 
       before += w * posed.nodes[i];
       after += w * moved[i];
     });
-    if (!(total > 3)) continue;  // too few nodes to tell: turned as the parent is
+    if (!(total > 3)) continue;  // too few nodes to tell: the joint turns as its parent does
     before /= total;
     after /= total;
     Mat3 sum = Mat3::Zero();

@@ -1,7 +1,7 @@
-// The last freedom of a registration: every node has an affine map of its own that differs little
-// from its neighbours', less and less stiffly. The optimal-step algorithm of Amberg, Romdhani and
-// Vetter, "Optimal step nonrigid ICP algorithms for surface registration" (CVPR 2007), without
-// landmarks and with robust weights.
+// The last step of a registration, for differences of shape that the rig cannot follow: every node
+// gets an affine map of its own. The maps of neighbours must differ little at first and may differ
+// more later. The optimal-step algorithm of Amberg, Romdhani and Vetter, "Optimal step nonrigid ICP
+// algorithms for surface registration" (CVPR 2007), without landmarks and with robust weights.
 #pragma once
 
 #include "infer/registration/articulated.h"
@@ -9,19 +9,19 @@
 namespace restage {
 
 struct FreeFormOptions {
-  std::vector<double> stiffness = {1.0, 0.3, 0.1, 0.03};  ///< from stiff to soft
-  int steps = 3;                                          ///< correspondences a stiffness
-  double width = 0.06;                                    ///< of the kernel, metres
+  std::vector<double> stiffness = {1.0, 0.3, 0.1, 0.03};  ///< one after the other
+  int steps = 3;        ///< how often nodes and points are matched anew at each stiffness
+  double width = 0.06;  ///< width of the kernel that weights matches, metres
 };
 
-/// Where the nodes end.
+/// The places of the nodes after the fit.
 std::vector<Vec3> fit_free_form(const Rig& rig, const PosedRig& posed,
                                 const std::vector<Vec3>& cloud,
                                 const FreeFormOptions& options = {});
 
-/// The pose whose joints turn their nodes as the free form did: for each joint the rotation that
-/// takes `posed` nodes, weighted by how much it carries them, onto `moved` ones (Kabsch 1976); the
-/// pelvis moves with the middle of its nodes.
+/// The pose whose joints turn the nodes as fit_free_form() did. For each joint it is the rotation
+/// that takes the `posed` nodes onto the `moved` ones best, a node counting as much as the joint
+/// carries it (Kabsch 1976). The pelvis moves with the middle of the nodes that it carries.
 Pose refit_pose(const Rig& rig, const PosedRig& posed, const std::vector<Vec3>& moved);
 
 }  // namespace restage

@@ -1,4 +1,4 @@
-// The nearest of a set of points, by a k-d tree, and how two sets are matched by it.
+// Finds the nearest of a set of points by a k-d tree, and matches two sets of points.
 #pragma once
 
 #include <limits>
@@ -18,7 +18,7 @@ class NearestPoint {
 
   struct Found {
     size_t index;
-    double squared;  ///< distance
+    double squared;  ///< the squared distance
   };
   Found operator()(const Vec3& p) const {
     uint32_t index = 0;
@@ -43,9 +43,10 @@ class NearestPoint {
       tree_{3, cloud_, nanoflann::KDTreeSingleIndexAdaptorParams(10)};
 };
 
-/// visit(node's index, point, weight) for the nearest point of every node and for the nearest node
-/// of every point. Weights are Geman and McClure's of the squared distance; those of either way sum
-/// to one where all distances are zero.
+/// Calls visit(index of a node, point, weight) for every node with its nearest point, and for every
+/// point with its nearest node. Weights are Geman and McClure's of the squared distance. If all
+/// distances are zero, the weights from nodes to points sum to one, and so do those from points to
+/// nodes.
 template <class F>
 void for_matches(const std::vector<Vec3>& nodes, const std::vector<Vec3>& cloud,
                  const NearestPoint& in_cloud, double width, F&& visit) {

@@ -6,7 +6,7 @@
 namespace restage {
 namespace {
 
-/// The answer is near: the kernel begins at a hand's length.
+/// The start is near the answer, so the kernel begins with the width of a hand's length.
 ArticulatedOptions near() {
   ArticulatedOptions out;
   out.iterations = 15;
@@ -25,23 +25,28 @@ Refinement::Refinement(std::unique_ptr<Retargeter> chain, const std::string& whe
 }
 
 std::span<const RetargetedFrame> Refinement::push(const Points& cloud, const std::string& source) {
+  const std::vector<Vec3> points = thinned(cloud, kCloudGrid, source);
   const std::span<const RetargetedFrame> answers = chain_->push(cloud, source);
   if (answers.empty()) return answers;
-  frame_ = answers.front();
+  // Frames of a gap before this cloud cannot be fitted, as they have no cloud: they stay as the
+  // chain gave them.
+  frames_.assign(answers.begin(), answers.end());
+  RetargetedFrame& frame = frames_.back();
   const Joints& seen = *chain_->source_joints();
   RigState start;
-  start.pose = frame_.pose;
+  start.pose = frame.pose;
   start.pose.root = seen[0];
   start.scale = 1 / trajectory_scale(seen, chain_->rest());
-  const RigState fitted = fit_articulated(rig_, thinned(cloud, kCloudGrid, source), start, near());
+  const RigState fitted = fit_articulated(rig_, points, start, near());
   source_joints_ = forward_kinematics(built(chain_->rest(), fitted), fitted.pose).joints;
-  // The path stays the chain's, which is held to the source's over time; turns are the fit's.
-  const Vec3 root = frame_.pose.root;
-  frame_.pose = fitted.pose;
-  frame_.pose.root = root;
-  frame_.joints = forward_kinematics(chain_->rest(), frame_.pose).joints;
-  frame_.vertices = chain_->posed(frame_.pose);
-  return {&frame_, 1};
+  // Rotations are those of the fit. The pelvis stays where the chain put it: the chain's path
+  // follows the source's path over time (RetargetOptions::anchor).
+  const Vec3 root = frame.pose.root;
+  frame.pose = fitted.pose;
+  frame.pose.root = root;
+  frame.joints = forward_kinematics(chain_->rest(), frame.pose).joints;
+  frame.vertices = chain_->posed(frame.pose);
+  return frames_;
 }
 
 }  // namespace restage

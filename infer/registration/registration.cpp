@@ -14,10 +14,10 @@ namespace restage {
 namespace {
 
 constexpr int kHeadings = 8;
-constexpr std::array<double, 3> kArms = {0.0, 0.8, 1.3};  // lowered from the T-pose, radians
-constexpr double kStartWidth = 0.2, kLastWidth = 0.06;    // of the kernel that compares, metres
+constexpr std::array<double, 3> kArms = {0.0, 0.8, 1.3};  // angles below the T-pose, radians
+constexpr double kStartWidth = 0.2, kLastWidth = 0.06;    // of misfit(), before and after the fit
 
-/// The median by coordinate: stray points do not move it.
+/// The medians of the coordinates, which stray points do not change.
 Vec3 middle(const std::vector<Vec3>& points) {
   Vec3 out;
   for (int c = 0; c < 3; ++c) {
@@ -31,10 +31,20 @@ Vec3 middle(const std::vector<Vec3>& points) {
   return out;
 }
 
-/// A pose of the rig whose middle is that of the cloud.
+/// `state`, moved so that the middle of the rig's nodes is the middle of the cloud.
 RigState placed(const Rig& rig, RigState state, const std::vector<Vec3>& cloud) {
   state.pose.root += middle(cloud) - middle(pose_rig(rig, state).nodes);
   return state;
+}
+
+/// The pose a share `t` of the way from `a` to `b`: every local rotation turns the shortest way,
+/// the pelvis goes straight.
+Pose between(const Pose& a, const Pose& b, double t) {
+  Pose out;
+  for (size_t j = 0; j < kJoints; ++j)
+    out.local[j] = Quat(a.local[j]).slerp(t, Quat(b.local[j])).toRotationMatrix();
+  out.root = (1 - t) * a.root + t * b.root;
+  return out;
 }
 
 }  // namespace
@@ -47,8 +57,8 @@ std::vector<Vec3> thinned(const Points& cloud, double width, const std::string& 
   std::map<std::array<int64_t, 3>, Sum> cubes;
   for (const Point& p : cloud) {
     if (!p.allFinite() || p.cwiseAbs().maxCoeff() > 1e6f)
-      throw InputError(source, "holds a coordinate that is not finite or beyond 1000 km",
-                       "remove such points, and give metres");
+      throw UnusableCloud(source, "holds a coordinate that is not finite or beyond 1000 km",
+                          "remove such points, and give metres");
     std::array<int64_t, 3> at;
     for (int c = 0; c < 3; ++c)
       at[c] = static_cast<int64_t>(std::floor(static_cast<double>(p[c]) / width));
@@ -57,7 +67,7 @@ std::vector<Vec3> thinned(const Points& cloud, double width, const std::string& 
     cube.count += 1;
   }
   if (cubes.size() < kLeastDistinctPoints)
-    throw InputError(
+    throw UnusableCloud(
         source, "holds points in " + std::to_string(cubes.size()) + " places, too few for a body",
         "give at least " + std::to_string(kLeastDistinctPoints) + " some centimetres apart");
   std::vector<Vec3> out;
@@ -76,7 +86,8 @@ Registration::Registration(Mesh target, const Joints& rest, const std::string& w
   body_.weights = bone_distance_weights(body_.rest.vertices, rest);
 }
 
-/// Headings and arm poses, the most promising first, and the frame before.
+/// The candidates that are to be fitted: the pose of the frame before, if there is one, then
+/// headings and arm poses, the best fitting first.
 std::vector<RigState> Registration::starts(const std::vector<Vec3>& cloud) const {
   struct Candidate {
     double cost;
@@ -129,12 +140,36 @@ std::span<const RetargetedFrame> Registration::push(const Points& cloud,
     pose = refit_pose(rig_, posed, fit_free_form(rig_, posed, points, options_.free_form_options));
   source_joints_ = forward_kinematics(built(body_.joints, *previous_), pose).joints;
 
-  RetargetedFrame& out = frame_;
+  pose.root = trajectory_scale(source_joints_, body_.joints) * source_joints_[0];
+  frames_.clear();
+  for (int64_t k = 1; k <= missed_; ++k) {
+    const double t = static_cast<double>(k) / static_cast<double>(missed_ + 1);
+    add_frame(shown_ ? between(*shown_, pose, t) : pose, true);
+  }
+  add_frame(pose, false);
+  shown_ = pose;
+  missed_ = 0;
+  return frames_;
+}
+
+std::span<const RetargetedFrame> Registration::finish() {
+  frames_.clear();
+  for (; shown_ && missed_ > 0; --missed_) add_frame(*shown_, true);
+  return frames_;
+}
+
+void Registration::restart() {
+  previous_.reset();
+  shown_.reset();
+  missed_ = 0;
+}
+
+void Registration::add_frame(const Pose& pose, bool filled) {
+  RetargetedFrame& out = frames_.emplace_back();
   out.pose = pose;
-  out.pose.root = trajectory_scale(source_joints_, body_.joints) * source_joints_[0];
-  out.joints = forward_kinematics(body_.joints, out.pose).joints;
-  out.vertices = Registration::posed(out.pose);
-  return {&frame_, 1};
+  out.joints = forward_kinematics(body_.joints, pose).joints;
+  out.vertices = Registration::posed(pose);
+  out.filled = filled;
 }
 
 }  // namespace restage

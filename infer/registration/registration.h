@@ -1,17 +1,18 @@
-// "Register then repose", the classical way to retarget without correspondences, as a reference
-// beside the learned system (docs/benchmark.md): the target's own T-pose is registered to every
-// cloud of the source, and the target then performs the motion that this took.
+// "Register then repose", the classical way to retarget without correspondences; a reference for
+// the learned system (docs/benchmark.md). The target's T-pose is registered to every cloud of the
+// source, and the target then performs the rotations that the registration found.
 //
-//   start    several headings and arm poses, and the frame before; the best few go on
-//   rigid and articulated ICP (articulated.h): pose, size and bone lengths
-//   free-form ICP (free_form.h): what is left of the shape
-//   repose   the rotations of the registered parts, the target's own bones; the path of the pelvis
-//            scaled by the length of the legs, as in nn/geometry/closed_form.h
+//   start    candidates: several headings and arm poses, and the pose of the frame before; the best
+//            few are fitted
+//   articulated ICP (articulated.h): finds pose, size and bone lengths
+//   free-form ICP (free_form.h): follows differences of shape
+//   repose   the target's own bones, with the rotations of the registered parts; the path of the
+//            pelvis is scaled by the length of the legs, as in nn/geometry/closed_form.h
 //
-// No network and no learned weights. It is told the target's 22 rest joints, as the rig of a
-// character is. Its limits are those of the kind: every frame is a search that may end in another
-// optimum (front and back, arms in the trunk, crossed legs), points of one frame know nothing of
-// those of the next, and it takes seconds a frame.
+// There is no network and there are no learned weights. The user gives the target's 22 rest joints,
+// as the rig of a character has them. The limits are those of every such method: the search of a
+// frame may end in a wrong optimum (front and back exchanged, arms in the trunk, legs crossed),
+// points of one frame are not matched with points of the next, and a frame takes seconds.
 #pragma once
 
 #include <optional>
@@ -22,16 +23,17 @@
 
 namespace restage {
 
-/// One point, the mean, for each occupied cube of a grid of that width (metres), in the order of
-/// the cubes. InputError naming `source`: fewer than 64 of them, values that are not finite.
+/// A cloud with fewer points: of all points in a cube of a grid of that width (metres) the mean, in
+/// the order of the cubes. UnusableCloud naming `source`: fewer than 64 cubes hold points, or
+/// values are not finite.
 std::vector<Vec3> thinned(const Points& cloud, double width, const std::string& source);
 
 inline constexpr double kCloudGrid = 0.03;
 
 struct RegistrationOptions {
   size_t nodes = kRigNodes;
-  int searched = 12;  ///< starts that are fitted, besides the frame before
-  double grid = kCloudGrid;
+  int searched = 12;         ///< candidates that are fitted, besides the pose of the frame before
+  double grid = kCloudGrid;  ///< width for thinned()
   bool free_form = true;
   ArticulatedOptions articulated;
   FreeFormOptions free_form_options;
@@ -43,13 +45,15 @@ class Registration final : public System {
   Registration(Mesh target, const Joints& rest, const std::string& where,
                const RegistrationOptions& options = {});
 
-  /// The target performing one frame of the source (metres, y up). The same bits for any number of
-  /// threads. InputError naming `source`: fewer than 64 distinct points, values that are not
-  /// finite.
+  /// The target performing one frame of the source (metres, y up). Missed frames before it are
+  /// returned too, with poses between the last cloud's and this one's. The same bits for any number
+  /// of threads. UnusableCloud: see thinned().
   std::span<const RetargetedFrame> push(const Points& cloud, const std::string& source) override;
-  /// Forgets the frame before.
-  void restart() override { previous_.reset(); }
-  /// The registered template's joints in the last frame, in the source's build.
+  void miss() override { ++missed_; }
+  std::span<const RetargetedFrame> finish() override;
+  void restart() override;
+  /// The joints of the target as registered to the last cloud: in the pose and of the build of the
+  /// source.
   const Joints* source_joints() const override { return &source_joints_; }
   const Mesh& target() const override { return body_.rest; }
   const SystemRig* rig() const override { return &system_rig_; }
@@ -58,14 +62,17 @@ class Registration final : public System {
 
  private:
   std::vector<RigState> starts(const std::vector<Vec3>& cloud) const;
+  void add_frame(const Pose& pose, bool filled);
 
-  Body body_;  // of the target, with weights by distance
+  Body body_;  // the target, with bone_distance_weights()
   RegistrationOptions options_;
   Rig rig_;
-  std::optional<RigState> previous_;
+  std::optional<RigState> previous_;  // fitted to the last cloud
+  std::optional<Pose> shown_;         // of the target, for the last cloud
+  int64_t missed_ = 0;                // frames of the source since the last cloud
   Joints source_joints_;
   SystemRig system_rig_{body_.joints, body_.weights};
-  RetargetedFrame frame_;
+  std::vector<RetargetedFrame> frames_;  // of the last push
 };
 
 }  // namespace restage

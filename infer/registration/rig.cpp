@@ -34,7 +34,8 @@ double distance(const Vec3& p, const Segment& s) {
   return (s.from + t * along - p).norm();
 }
 
-/// Indices of `count` points far from each other; the first is farthest from the middle.
+/// Indices of `count` points that are far from each other, by farthest point sampling; the first is
+/// the point farthest from the middle of all.
 std::vector<size_t> spread(const Points& points, size_t count) {
   Vec3 middle = Vec3::Zero();
   for (const Point& p : points) middle += p.cast<double>() / static_cast<double>(points.size());
@@ -44,7 +45,7 @@ std::vector<size_t> spread(const Points& points, size_t count) {
   std::vector<size_t> out;
   while (out.size() < count && !points.empty()) {
     const auto far = std::max_element(nearest.begin(), nearest.end());
-    if (!(*far > 0)) break;  // all others are copies
+    if (!(*far > 0)) break;  // the points that are left are copies of chosen ones
     const auto chosen = static_cast<size_t>(far - nearest.begin());
     const bool first = out.empty();
     out.push_back(chosen);
@@ -73,7 +74,7 @@ void connect(std::vector<RigNode>& nodes) {
   for (size_t i = 0; i < nodes.size(); ++i) {
     std::iota(order.begin(), order.end(), 0);
     const auto squared = [&](int k) { return (nodes[k].rest - nodes[i].rest).squaredNorm(); };
-    const size_t wanted = nodes[i].neighbours.size() + 1;  // the nearest is itself
+    const size_t wanted = nodes[i].neighbours.size() + 1;  // the nearest node is node i itself
     std::partial_sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(wanted),
                       order.end(), [&](int a, int b) {
                         const double x = squared(a), y = squared(b);
@@ -95,7 +96,7 @@ void check(const Mesh& target, const Joints& rest, const std::string& where) {
 }  // namespace
 
 SkinWeights bone_distance_weights(const Points& points, const Joints& rest) {
-  constexpr double kTouching = 0.005;  // closer than this counts as this: a joint's own point
+  constexpr double kTouching = 0.005;  // metres; smaller distances are taken for this one
   const std::vector<Segment> bones = bones_of(rest);
   SkinWeights out = SkinWeights::Zero(static_cast<Eigen::Index>(points.size()), kJoints);
   for (size_t v = 0; v < points.size(); ++v) {

@@ -1,20 +1,46 @@
 #include "infer/render/clip.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "autograd/base/error.h"
 
 namespace restage {
 namespace {
 
-/// The value that has `place` smaller ones.
+/// The value that would stand at `place` if the values were sorted.
 float ranked(std::vector<float>& values, size_t place) {
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(place);
   std::nth_element(values.begin(), at, values.end());
   return *at;
 }
 
+/// Replaces `list`, which has an element for each frame or none at all, by the elements of the
+/// chosen frames.
+template <class List>
+void choose(const std::vector<size_t>& chosen, List* list) {
+  if (list->empty()) return;
+  List out;
+  for (const size_t frame : chosen) out.push_back(list->at(frame));
+  *list = std::move(out);
+}
+
 }  // namespace
+
+Clip at_rate(Clip clip, double fps, size_t frames) {
+  std::vector<size_t> chosen;
+  for (size_t k = 0; k < frames; ++k) {
+    const auto nearest = static_cast<size_t>(std::llround(static_cast<double>(k) * clip.fps / fps));
+    if (nearest >= clip.frames.size()) break;
+    chosen.push_back(nearest);
+  }
+  choose(chosen, &clip.frames);
+  choose(chosen, &clip.confidence);
+  choose(chosen, &clip.focus);
+  choose(chosen, &clip.errors);
+  clip.fps = fps;
+  return clip;
+}
 
 Points stick_figure(const Joints& joints) {
   constexpr int kPointsPerBone = 12;
@@ -71,7 +97,8 @@ void check_clips(const std::string& where, const std::vector<Clip>& clips) {
 }
 
 Point clip_centre(const Points& points) {
-  // between the 2nd and the 98th per cent: stray points of a scan do not move the view
+  // Two per cent of the points are left out on each side: stray points of a scan must not move the
+  // view.
   Point centre = Point::Zero();
   std::vector<float> values;
   for (int axis = 0; axis < 3; ++axis) {
@@ -97,7 +124,8 @@ float clip_floor(const Clip& clip) {
   }
   if (lowest.empty()) return 0;
   const float low = ranked(lowest, lowest.size() / 50);
-  // Feet stand a little over or in the floor; data whose floor is y = 0 keeps it.
+  // Where the floor is y = 0, feet seem to stand a little over the floor or in it. So heights near
+  // 0 count as 0.
   return low > -0.1f && low < 0.1f ? 0 : low;
 }
 

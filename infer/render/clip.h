@@ -1,4 +1,4 @@
-// What is drawn: one row of a contact sheet, one view of a page.
+// A clip is a sequence that is drawn: a row of a contact sheet, or a view of a page.
 #pragma once
 
 #include <string>
@@ -9,31 +9,39 @@
 
 namespace restage {
 
-/// Frames of one surface (same vertex count in every frame, `faces` given) or of clouds (`faces`
-/// empty; counts may change). World metres, y up. Between one and three clips are shown together,
-/// by convention source, result, truth; the first frames of all belong together.
+/// Frames of one surface (`faces` are given, every frame has the same number of vertices) or of
+/// clouds
+/// (`faces` are empty, the number of points may change). World metres, y up. One to three clips are
+/// shown together, by convention source, result and truth. Frames with the same number are shown
+/// together, so clips that are shown together must have the same rate (at_rate()).
 struct Clip {
   std::string label;
   FrameStore<Point> frames;
   std::vector<Triangle> faces;
-  std::vector<double> confidence = {};  ///< of each frame, 0 to 1; empty if nobody says
-  std::vector<Point> focus = {};        ///< of each frame, what a close-up looks at; may be empty
-  /// Of each vertex (innermost) of each frame, how far it is off, metres: a page shows them as
-  /// colours. Surfaces only; may be empty.
+  std::vector<double> confidence = {};  ///< RetargetedFrame::confidence of each frame; may be empty
+  std::vector<Point> focus = {};  ///< the point of each frame that a close-up shows; may be empty
+  /// errors[frame][vertex]: distance of the vertex from its true place, metres. A page shows the
+  /// distances as colours. Surfaces only; may be empty.
   FrameStore<float> errors = {};
+  double fps = kFps;  ///< frames per second
 };
 
-/// Enough points along each bone to see it.
+/// The clip at another rate: frame k of the result is the frame of `clip` that is nearest in time
+/// to k / fps seconds. The result has at most `frames` frames and ends where `clip` ends.
+Clip at_rate(Clip clip, double fps, size_t frames);
+
+/// A cloud that shows a skeleton: some points along each bone.
 Points stick_figure(const Joints& joints);
 
-/// InputError when there is nothing to draw (no clips, more than three, a clip without frames) or a
-/// clip breaks the rules above. Points that are not finite are allowed in clouds only and not
-/// drawn.
+/// InputError naming `where`: there is no clip, there are more than three clips, a clip has no
+/// frames, or a clip breaks the rules above. In clouds, points that are not finite are allowed and
+/// are not drawn; surfaces must not have such points.
 void check_clips(const std::string& where, const std::vector<Clip>& clips);
 
-/// Middle of the points' bounding box, level, that the view follows; y is the middle's height.
+/// The point that the camera follows: the middle of the points' bounding box, without the outermost
+/// two per cent of the points on each side.
 Point clip_centre(const Points& points);
-/// Height of the floor under a clip: lowest point over all frames, but for stray points.
+/// The height of the floor under a clip: that of the clip's lowest point, without stray points.
 float clip_floor(const Clip& clip);
 
 }  // namespace restage

@@ -15,14 +15,15 @@ namespace {
 
 constexpr Rgb kPaper = {0xf7, 0xf8, 0xfa}, kInk = {0x2b, 0x30, 0x38}, kPale = {0x7a, 0x83, 0x90};
 constexpr int kMargin = 22, kTitle = 34, kCaption = 24, kLine = 20, kWidest = 1800;
-constexpr float kView = 0.36f;                  // a long lens: little perspective
-constexpr float kAround = 1.08f, kRim = 0.12f;  // around what is framed: a share, and metres
-constexpr float kWidestCell = 1.5f;             // times its height
-constexpr float kFarAway = 4.0f;                // times as far as nine in ten points: out of view
+constexpr float kView = 0.36f;                  // opening angle, radians: little perspective
+constexpr float kAround = 1.08f, kRim = 0.12f;  // room around the points: a factor, and metres
+constexpr float kWidestCell = 1.5f;             // width of the widest cell, in heights of the cell
+constexpr float kFarAway = 4.0f;  // a point this many times farther away than nine in ten points
+                                  // may be out of view
 
 float radians(double degrees) { return static_cast<float>(degrees * std::numbers::pi / 180); }
 
-/// The points that have to be in view.
+/// The points of a figure that have to be in view.
 Points framed_points(const Figure& figure) {
   Points out;
   for (size_t k = 0; k < figure.layers.size() && (figure.whole || k < figure.framed); ++k)
@@ -39,13 +40,15 @@ Points framed_points(const Figure& figure) {
   return out;
 }
 
-/// Where a figure's camera looks, and half of what it has to see there, metres.
+/// The camera of a figure, and half the width and half the height that the camera has to show,
+/// metres.
 struct View {
   Camera camera;
   float aside = 0, tall = 0;
 };
 
-/// `points` are framed_points(); heights from `low` to `high` over the floor are in view too.
+/// The view of a figure, in which `points`, its framed_points(), can be seen, and all heights from
+/// `low` to `high` over the floor.
 View view_of(const Figure& figure, const Points& points, float low, float high) {
   View out;
   Camera& camera = out.camera;
@@ -56,7 +59,7 @@ View view_of(const Figure& figure, const Points& points, float low, float high) 
   camera.target.y() = figure.floor + 0.5f * (low + high);
   const float ca = std::cos(camera.azimuth), sa = std::sin(camera.azimuth),
               ce = std::cos(camera.elevation), se = std::sin(camera.elevation),
-              nearer = std::tan(0.5f * kView);  // what is nearer to the eye needs more room
+              nearer = std::tan(0.5f * kView);  // a point nearer to the camera needs more room
   const Point right(ca, 0, -sa), eye(sa * ce, se, ca * ce), up = eye.cross(right);
   out.tall = 0.5f * (high - low) * ce;
   for (const Point& p : points) {
@@ -69,13 +72,14 @@ View view_of(const Figure& figure, const Points& points, float low, float high) 
   return out;
 }
 
-/// Metres that a cell is high, of one at most `wide` times as wide.
+/// The height in metres of a cell that shows `view`, if the cell is `wide` times as wide as it is
+/// high.
 float cell_metres(const View& view, float wide) {
   return 2 * kAround * std::max(view.tall, view.aside / wide) + kRim;
 }
 
-/// The views of all figures: of those that share a scale the floors are level and as high in the
-/// cells.
+/// The views of all figures. Figures that share a scale have their floors at the same height of
+/// their cells.
 std::vector<View> views_of(const std::vector<Figure>& figures) {
   std::vector<Points> points;
   float low = std::numeric_limits<float>::max(), high = -low;
@@ -96,7 +100,7 @@ std::vector<View> views_of(const std::vector<Figure>& figures) {
       from = std::numeric_limits<float>::max(), to = -from;
       levels(figures[i], points[i], from, to);
     }
-    if (from > to) from = to = 0;  // not a point that is finite
+    if (from > to) from = to = 0;  // the figure has no finite point
     out.push_back(view_of(figures[i], points[i], from, to));
   }
   return out;
@@ -116,7 +120,7 @@ Image draw(const Figure& figure, Camera camera, float metres, int width, int hei
   return canvas.image();
 }
 
-/// As much of the text as fits.
+/// The beginning of the text, as long as it is at most `width` pixels wide.
 std::string fitting(double size, std::string text, int width) {
   while (!text.empty() && text_width(size, text) > width) text.pop_back();
   return text;
@@ -130,7 +134,7 @@ Image figure_sheet(const std::vector<Figure>& figures, const FigureSheetOptions&
     if (figure.layers.empty() || figure.layers[0].points.empty())
       throw InputError("", "\"" + figure.caption + "\" is empty", "leave such figures out");
   const std::vector<View> views = views_of(figures);
-  View shared;  // room for each of those that share a scale
+  View shared;  // large enough for every figure that shares the scale
   for (size_t i = 0; i < figures.size(); ++i)
     if (!figures[i].whole || figures.size() == 1) {
       shared.aside = std::max(shared.aside, views[i].aside);

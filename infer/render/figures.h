@@ -1,4 +1,4 @@
-// A sheet of single figures: bodies, poses, scans, each in a cell of its own with a caption.
+// A sheet of single figures (bodies, poses, scans), each in its own cell, with a caption.
 #pragma once
 
 #include <string>
@@ -9,21 +9,23 @@
 
 namespace restage {
 
-/// Points or a surface of one colour (sRGB).
+/// A cloud or a surface in one colour (sRGB).
 struct FigureLayer {
   Points points;
   std::vector<Triangle> faces;  ///< empty: a cloud
   uint32_t colour = 0x4a8bc9;
 };
 
-/// Metres, y up. The view contains the first `framed` layers, but for a few points far away.
+/// Metres, y up. The view is chosen so that the first `framed` layers can be seen, except a few
+/// points that are far away.
 struct Figure {
   std::vector<FigureLayer> layers;
   std::string caption;
   double azimuth = 32, elevation = 9;  ///< degrees, as SheetOptions
   float floor = 0;
   size_t framed = 1;
-  bool whole = false;  ///< a scale of its own, at which every point of all layers is in view
+  bool whole =
+      false;  ///< the cell has its own scale, at which every point of all layers is in view
 };
 
 struct FigureSheetOptions {
@@ -32,8 +34,8 @@ struct FigureSheetOptions {
   std::vector<std::string> lines;  ///< under the figures
 };
 
-/// The scale is the same in all cells but those that are `whole`. InputError if there are no
-/// figures, or one is empty.
+/// All figures are drawn at the same scale, except those that are `whole`. InputError if there are
+/// no figures, or if a figure has no points.
 Image figure_sheet(const std::vector<Figure>& figures, const FigureSheetOptions& options = {});
 
 }  // namespace restage

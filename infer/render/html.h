@@ -1,4 +1,4 @@
-// What our pages share: text, data and templates made safe to stand inside HTML.
+// Helpers of all our pages: text, data and templates in a form that may stand inside HTML.
 #pragma once
 
 #include <cstddef>
@@ -9,13 +9,14 @@
 namespace restage {
 
 std::string base64(const void* data, size_t size);
-/// For the text of an element, or an attribute in double quotes, of HTML and of SVG.
+/// The text in a form that may stand in an element, or in an attribute in double quotes, of HTML
+/// and of SVG.
 std::string escape_html(const std::string& text);
-/// JSON that may stand inside a script element: nothing in it ends the element. Bytes that are no
-/// UTF-8 are replaced.
+/// The JSON document in a form that may stand inside a script element: no text in the document can
+/// end the element. Bytes that are not UTF-8 are replaced.
 std::string script_json(const nlohmann::ordered_json& json);
-/// `page` with every @NAME@ that `values` has replaced; in one pass, so that nothing in a value is
-/// taken for a name.
+/// `page` with every @NAME@ replaced by the value of NAME in `values`; a NAME without a value
+/// stays. A text such as @NAME@ inside a value is not replaced.
 std::string fill_page(const std::string& page, const std::map<std::string, std::string>& values);
 
 }  // namespace restage

@@ -21,7 +21,7 @@ namespace {
 constexpr std::string_view kFont =
 #include "infer/render/hershey.inc"
     ;
-constexpr double kCapital = 21.0, kTop = -12.0;  // in the font's units
+constexpr double kCapital = 21.0, kTop = -12.0;  // height and top of capitals, in the font's units
 
 struct Stroke {
   double x0, y0, x1, y1;
@@ -34,12 +34,14 @@ std::string_view glyph(char c) {
   return kFont.substr(start, kFont.find('\n', start) - start);
 }
 
-// Lines of the text in pixels from its upper left corner; returns the width.
+/// Adds the lines of which the text is drawn to `strokes` (null: none), in pixels from the text's
+/// upper left corner. Returns the width of the text in pixels.
 double strokes_of(std::string_view text, double size, std::vector<Stroke>* strokes) {
   const double scale = size / kCapital;
   double pen = 0;
   for (const char c : text) {
-    if ((static_cast<unsigned char>(c) & 0xc0) == 0x80) continue;  // the rest of a UTF-8 character
+    if ((static_cast<unsigned char>(c) & 0xc0) == 0x80)
+      continue;  // a later byte of a UTF-8 character
     const std::string_view g = glyph(c);
     const double left = g[0] - 'R', right = g[1] - 'R';
     bool down = false;

@@ -19,17 +19,18 @@ struct Image {
   Rgb at(int x, int y) const;
 };
 
-/// Copies `part` so that its upper left corner is at (x, y); what does not fit is cut off.
+/// Copies `part` into `image` with the upper left corner of `part` at (x, y). Pixels of `part` that
+/// lie outside `image` are left out.
 void paste(Image& image, const Image& part, int x, int y);
 void fill_rectangle(Image& image, int x, int y, int width, int height, Rgb colour);
-/// Antialiased text, upper left corner at (x, y), capitals about `size` pixels high; ASCII, other
-/// characters as '?'.
+/// Draws smooth text whose upper left corner is at (x, y) and whose capitals are about `size`
+/// pixels high. The font has ASCII only; any other character is drawn as '?'.
 void draw_text(Image& image, int x, int y, double size, Rgb colour, std::string_view text);
-/// Pixels that the text is wide.
+/// The width of the text in pixels.
 int text_width(double size, std::string_view text);
 
 std::string png_bytes(const Image& image);
-/// Appears whole or not at all.
+/// The file appears whole or not at all.
 void write_png(const std::string& path, const Image& image);
 
 }  // namespace restage

@@ -29,23 +29,24 @@ constexpr const char* kScript =
     ;
 constexpr const char* kErrorsBox =
     "<label><input id=\"errors\" type=\"checkbox\" checked> errors</label>\n";
-constexpr size_t kMostStride = 4;         // of frames, before surfaces are thinned
-constexpr size_t kFewestVertices = 1200;  // a person is still one
-constexpr float kReach = 4.0f;            // metres from the middle of a cloud
-// Metres at the end of the scale of errors: the first that 98 % of them are within.
+constexpr size_t kMostStride = 4;         // every so many frames, before surfaces are thinned
+constexpr size_t kFewestVertices = 1200;  // enough to recognise a person
+constexpr float kReach = 4.0f;  // metres; points farther from a cloud's middle are left out
+// Ends of the scale of errors, metres. A clip gets the first scale that holds 98 % of its errors.
 constexpr double kErrorScales[] = {0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1};
 
 std::string hex(uint32_t colour) { return format("#%06x", colour & 0xffffffu); }
 
 // ---- thinning -----------------------------------------------------------------------------------
 
-// Which vertices of a surface are kept (empty: all), and the faces between them.
+/// A thinned surface: the vertices that stay (empty: all of them) and the faces between them.
 struct Surface {
   std::vector<int32_t> kept;
   std::vector<Triangle> faces;
 };
 
-// One vertex per cell of a grid laid over the first frame.
+/// Thins a surface: in the clip's first frame, one vertex stays of all vertices in a cell of a
+/// grid.
 Surface cluster(const Clip& clip, float cell) {
   Surface surface;
   std::map<std::array<int64_t, 3>, int32_t> cells;
@@ -142,7 +143,8 @@ Points picked(const Clip& clip, const Surface& surface, size_t frame, size_t max
   return out;
 }
 
-// Middles of the frames, smoothed over a quarter of a second to both sides: a calm camera.
+/// The middle of each frame, averaged with the middles of a quarter of a second before and after:
+/// the camera follows them calmly.
 std::vector<Point> calm_centres(const std::vector<Points>& frames, double fps) {
   std::vector<Point> centres, calm;
   for (const Points& points : frames) centres.push_back(clip_centre(points));
@@ -177,7 +179,8 @@ double error_scale(const FrameStore<float>& errors) {
   return kErrorScales[std::size(kErrorScales) - 1];
 }
 
-// A byte for each vertex that is kept, of each frame that is kept.
+/// Errors as bytes, 255 being `scale`: of each frame that stays, and in a frame of each vertex that
+/// stays.
 std::vector<uint8_t> packed_errors(const Clip& clip, const Surface& surface, const Plan& plan,
                                    double scale) {
   std::vector<uint8_t> out;
@@ -194,8 +197,8 @@ std::vector<uint8_t> packed_errors(const Clip& clip, const Surface& surface, con
 
 struct Packed {
   Json meta;
-  std::string elements;               // script elements with the data
-  float width = 0.5f, height = 0.5f;  // of the figure, metres
+  std::string elements;               ///< script elements that hold the data
+  float width = 0.5f, height = 0.5f;  ///< of the figure, metres
 };
 
 Packed pack(const Clip& clip, const Surface& surface, const Plan& plan, size_t number,

@@ -1,4 +1,5 @@
-// One self-contained HTML page that plays clips side by side: no network, opens from disk.
+// An HTML page that plays clips side by side. The page is one file, needs no network and opens from
+// disk.
 #pragma once
 
 #include "infer/render/clip.h"
@@ -6,21 +7,23 @@
 namespace restage {
 
 struct PageOptions {
-  double fps = kFps;
+  double fps = kFps;  ///< of the clips
   std::string title = "restage";
-  /// The page stays below about this size: first frames are left out (up to every fourth is kept;
-  /// the page interpolates surfaces), then surfaces are thinned, then more frames go. What was done
-  /// stands at the foot of the page.
+  /// Size below which the page stays, about. If the clips are too large, frames are left out first
+  /// (at least every fourth frame stays; the page interpolates surfaces between frames), then
+  /// surfaces get fewer vertices, then more frames are left out. The foot of the page says what was
+  /// left out.
   size_t max_bytes = 30'000'000;
-  size_t max_points = 2048;  ///< of a cloud, per frame
+  size_t max_points = 2048;  ///< of a cloud, in a frame
 };
 
-/// The page as text. Positions are stored as 16-bit steps of the clip's bounding box (a walk over
-/// 6 m: 0.1 mm). Draws with WebGL, or a 2D canvas where there is none. The part of an address after
-/// '#' may hold 2d, dark, light and frame=N, joined by '&'. Clips as check_clips() wants them, else
-/// InputError. Points of a cloud more than 4 m from its middle are left out.
+/// The page as text. Positions are stored as 16-bit fractions of the clip's bounding box; for a
+/// walk over 6 m a step is 0.1 mm. Points of a cloud that are more than 4 m from the cloud's middle
+/// are left out. The page draws with WebGL; where there is no WebGL, with a 2D canvas. After '#',
+/// the page's address may hold the words 2d, dark, light and frame=N, joined by '&'. InputError:
+/// see check_clips().
 std::string page_html(const std::vector<Clip>& clips, const PageOptions& options = {});
-/// Appears whole or not at all.
+/// The file appears whole or not at all.
 void write_page(const std::string& path, const std::vector<Clip>& clips,
                 const PageOptions& options = {});
 

@@ -25,7 +25,7 @@ float smooth_step(float low, float high, float x) {
   return t * t * (3 - 2 * t);
 }
 
-// 1 on a line of the half-metre grid.
+/// 1 on a line of the half-metre grid, 0 beside it.
 float grid_line(float x, float half_width) {
   constexpr float step = 0.5f;
   const float off = std::abs(x - step * std::round(x / step));
@@ -86,7 +86,8 @@ void Canvas::begin(const Camera& camera, float floor, const Points& casts,
           Point((static_cast<float>(x) + 0.5f - 0.5f * static_cast<float>(width_)) / focus_,
                 -(static_cast<float>(y) + 0.5f - 0.5f * static_cast<float>(height_)) / focus_, -1);
       const float reach = ray.y() < -1e-4f ? (floor - eye_.y()) / ray.y() : -1;
-      // towards the picture's edges the ground fades too, so that pictures side by side join
+      // The ground also fades towards the edges of the picture, so that no edge is seen between
+      // pictures that stand side by side.
       const float across = std::min(static_cast<float>(x), static_cast<float>(width_ - 1 - x)) /
                            static_cast<float>(width_);
       const float below = static_cast<float>(height_ - 1 - y) / static_cast<float>(height_);
@@ -108,7 +109,8 @@ Colour Canvas::ground_at(const Point& at, float floor, const std::vector<float>&
   return colour.cwiseProduct(Colour::Ones() - dark * Colour(0.80f, 0.74f, 0.66f));
 }
 
-// Sky and floor light, a warm key light from the upper left of the camera, a cool rim from behind.
+/// The colour of a surface with unit normal `n` under four lights: from the sky, from the floor, a
+/// warm main light from the camera's upper left, a cool light from behind.
 Colour Canvas::shade(const Point& n, const Colour& colour) const {
   const float up = 0.5f + 0.5f * n.y();
   const Colour ambient = (1 - up) * Colour(0.27f, 0.25f, 0.24f) + up * Colour(0.42f, 0.46f, 0.52f);
@@ -129,7 +131,7 @@ void Canvas::fill_triangle(const Projected* c, const Point* normals, const Colou
               high_x = std::max({c[0].x, c[1].x, c[2].x});
   const float low_y = std::min({c[0].y, c[1].y, c[2].y}),
               high_y = std::max({c[0].y, c[1].y, c[2].y});
-  // clamped as floats: the numbers may be far outside the range of int
+  // Clamped before the conversion: the numbers may be far outside the range of int.
   const int x0 = static_cast<int>(std::clamp(low_x, 0.0f, static_cast<float>(width_)));
   const int x1 = static_cast<int>(std::clamp(high_x + 1, 0.0f, static_cast<float>(width_)));
   const int y0 = static_cast<int>(std::clamp(low_y, 0.0f, static_cast<float>(height_)));
@@ -160,7 +162,8 @@ void Canvas::draw_mesh(const Points& vertices, const std::vector<Triangle>& face
     const Projected corners[3] = {projected[f[0]], projected[f[1]], projected[f[2]]};
     if (corners[0].z <= 0 || corners[1].z <= 0 || corners[2].z <= 0) continue;
     const Point out = (vertices[f[1]] - vertices[f[0]]).cross(vertices[f[2]] - vertices[f[0]]);
-    // a face seen from behind (open or turned surfaces) is lit as if it were turned
+    // In open surfaces, or where corners are listed the other way round, a triangle is seen from
+    // behind. Such a triangle is lit as if it faced the camera.
     const float side = out.dot(eye_ - vertices[f[0]]) < 0 ? -1.0f : 1.0f;
     const Point turned[3] = {side * normals[f[0]], side * normals[f[1]], side * normals[f[2]]};
     fill_triangle(corners, turned, colour);
@@ -168,14 +171,16 @@ void Canvas::draw_mesh(const Points& vertices, const std::vector<Triangle>& face
 }
 
 void Canvas::draw_cloud(const Points& points, const Colour& colour) {
-  // About 1.8 square metres of skin: spheres nearly touch, whatever their number.
+  // A person has about 1.8 square metres of skin. The spheres' radius follows from that and from
+  // their number: neighbours nearly touch.
   const float size =
       std::clamp(0.42f * std::sqrt(1.8f / static_cast<float>(points.size() + 1)), 0.004f, 0.016f);
   for (const Point& p : points) {
     const Projected c = project(p);
     if (c.z <= 0) continue;
     const float radius = std::max(0.7f * static_cast<float>(samples_), focus_ * size / c.z);
-    // the far side shines through the gaps: paler, so that the near side reads as a surface
+    // The far side of a person can be seen between the spheres of the near side. The far side is
+    // drawn paler, so that the near side looks like a surface.
     const float far = 0.45f * smooth_step(-0.12f, 0.30f, c.z - camera_.distance);
     fill_sphere(c, radius, size, colour + far * (style_.background - colour));
   }
@@ -200,7 +205,8 @@ void Canvas::fill_sphere(const Projected& c, float radius, float size, const Col
     }
 }
 
-// Darkens what lies behind its neighbours in the picture: a fine outline and a wide soft shade.
+/// Ambient occlusion: darkens a sample whose neighbours in the picture are nearer to the camera, by
+/// a fine outline and by a wide soft shade.
 void Canvas::occlude() {
   struct Ring {
     float metres, reach, strength;
@@ -223,7 +229,7 @@ void Canvas::occlude() {
           const int nx = x + static_cast<int>(std::lround(pixels * std::cos(angle)));
           const int ny = y + static_cast<int>(std::lround(pixels * std::sin(angle)));
           if (nx < 0 || ny < 0 || nx >= width_ || ny >= height_) continue;
-          const float step = (z - depth(nx, ny)) / ring.reach;  // background: -infinity
+          const float step = (z - depth(nx, ny)) / ring.reach;  // -infinity before the background
           if (step > 0.05f) sum += std::min(1.0f, step) * std::exp(-0.35f * step);
         }
         dark += ring.strength * sum / kDirections;

@@ -1,5 +1,6 @@
-// A small software renderer: perspective camera, depth buffer, smooth-shaded surfaces, clouds as
-// little spheres, a ground with grid and soft shadows, ambient occlusion from the depth buffer.
+// A small software renderer with a perspective camera and a depth buffer. It draws smooth-shaded
+// surfaces, clouds as little spheres, and a ground with a grid and soft shadows; the depth buffer
+// gives ambient occlusion.
 #pragma once
 
 #include <vector>
@@ -9,31 +10,33 @@
 
 namespace restage {
 
-/// Looks at `target` from `distance` metres; azimuth 0 looks along -z (a T-pose from the front) and
-/// grows towards +x; angles in radians, `view` is the vertical opening angle.
+/// A camera that looks at the point `target` from `distance` metres. At azimuth 0 the camera looks
+/// along -z and sees a T-pose from the front; a growing azimuth moves the camera towards +x. `view`
+/// is the vertical opening angle. Angles are in radians.
 struct Camera {
   Point target = Point::Zero();
   float azimuth = 0, elevation = 0, distance = 4, view = 0.5f;
 };
 
-/// Linear light, 0..1.
+/// Red, green and blue as linear light, 0 to 1.
 using Colour = Eigen::Vector3f;
-/// From 8-bit sRGB, e.g. 0xd98c5f.
+/// The colour of an 8-bit sRGB number such as 0xd98c5f.
 Colour colour_of(uint32_t srgb);
 
 struct SceneStyle {
   Colour background = colour_of(0xf7f8fa), ground = colour_of(0xe9ebef), grid = colour_of(0xcfd4dc);
 };
 
-/// Draws in this order: begin(), any number of draw_*(), image(). Points that are not finite and
-/// triangles that touch one, or reach behind the camera, are left out.
+/// A picture is drawn by begin(), then any number of draw_mesh() and draw_cloud(), then image().
+/// Points that are not finite are left out; so are triangles with such a corner, and triangles that
+/// reach behind the camera.
 class Canvas {
  public:
-  /// Every pixel is the mean of `samples` x `samples`.
+  /// `width` and `height` in pixels. Every pixel is the mean of `samples` x `samples` samples.
   Canvas(int width, int height, int samples = 3, SceneStyle style = {});
 
-  /// Clears and draws the ground, level at height `floor`, fading away from `camera.target`;
-  /// `casts` is what throws shadows on it (surface or cloud).
+  /// Clears the picture and draws a level ground at height `floor`, which fades away from
+  /// `camera.target`. The surface or cloud `casts`, `faces` throws its shadow on the ground.
   void begin(const Camera& camera, float floor, const Points& casts,
              const std::vector<Triangle>& faces);
   void draw_mesh(const Points& vertices, const std::vector<Triangle>& faces, const Colour& colour);
@@ -42,7 +45,9 @@ class Canvas {
 
  private:
   struct Projected {
-    float x, y, z;  ///< samples from the upper left; z metres before the camera, <= 0: not visible
+    /// x and y: samples from the picture's upper left corner. z: metres before the camera; 0 or
+    /// less for a point that cannot be seen.
+    float x, y, z;
   };
   Projected project(const Point& p) const;
   void fill_triangle(const Projected* corners, const Point* normals, const Colour& colour);
@@ -53,12 +58,13 @@ class Canvas {
   float& depth(int x, int y) { return depth_[y * width_ + x]; }
   Colour& pixel(int x, int y) { return light_[y * width_ + x]; }
 
-  int width_, height_, samples_;  ///< in samples
+  int width_, height_;  ///< of the picture, in samples
+  int samples_;         ///< in a pixel, along each axis
   SceneStyle style_;
   Camera camera_;
   Eigen::Matrix3f axes_;  ///< rows: right, up, towards the eye
   Point eye_;
-  float focus_ = 1;  ///< samples per (metre / metre)
+  float focus_ = 1;  ///< samples that something takes which is as wide as it is far away
   std::vector<Colour> light_;
   std::vector<float> depth_;
 };

@@ -8,7 +8,7 @@ namespace {
 
 constexpr int kSize = 320;         // texels a side
 constexpr float kExtent = 4.0f;    // metres a side
-constexpr float kContact = 0.22f;  // lower than this: close enough for a dark contact shadow
+constexpr float kContact = 0.22f;  // metres: below this height things throw the dark, sharp shadow
 constexpr float kScale = kSize / kExtent;
 
 struct Texel {
@@ -32,7 +32,8 @@ void fill(Map& map, const Texel& a, const Texel& b, const Texel& c) {
     }
 }
 
-// A disc of about 3.5 cm: the points of a cloud are that far apart, the blur closes the rest.
+/// Draws one point of a cloud as a disc of about 3.5 cm, which is how far apart the points of a
+/// cloud are; the blur closes what gaps are left.
 void stamp(Map& map, const Texel& at) {
   constexpr int r = 2;
   if (!(at.x > -r && at.y > -r && at.x < kSize + r && at.y < kSize + r)) return;
@@ -41,7 +42,7 @@ void stamp(Map& map, const Texel& at) {
       if (x >= 0 && y >= 0 && x < kSize && y < kSize) map[y * kSize + x] = 1;
 }
 
-// Mean over 2 r + 1 texels along one direction.
+/// Replaces every texel by the mean of 2 r + 1 texels along one direction.
 void blur_lines(Map& map, int r, int step, int line) {
   std::vector<float> sums(kSize + 1);
   for (int l = 0; l < kSize; ++l) {
@@ -53,7 +54,7 @@ void blur_lines(Map& map, int r, int step, int line) {
 }
 
 void blur(Map& map, int r) {
-  for (int pass = 0; pass < 3; ++pass) {  // three boxes are nearly a bell
+  for (int pass = 0; pass < 3; ++pass) {  // three means in a row are nearly a Gaussian
     blur_lines(map, r, 1, kSize);
     blur_lines(map, r, kSize, 1);
   }

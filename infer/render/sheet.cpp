@@ -12,19 +12,20 @@ namespace {
 
 constexpr Rgb kPaper = {0xf7, 0xf8, 0xfa}, kInk = {0x2b, 0x30, 0x38}, kPale = {0x7a, 0x83, 0x90};
 constexpr int kMargin = 22, kLabel = 14, kTimes = 34, kTitle = 34;
-constexpr float kView = 0.36f;  // a long lens: little perspective
+constexpr float kView = 0.36f;  // opening angle, radians: little perspective
 
 struct Frame {
   const Points* points;
-  Point centre;  // at half the common height over the floor; of a close-up its focus
+  Point centre;  // clip_centre(), or the focus of a close-up
 };
 
 struct Layout {
   std::vector<std::vector<Frame>> cells;  // [clip][column]
   std::vector<size_t> moments;
   std::vector<float> floors;
-  float half_width = 0.3f, low = 0,
-        high = 0.5f;  // extent of all figures about their centres, metres
+  // Extent that the scale has to leave room for, metres: half the width of the widest figure about
+  // its centre, and the height of the tallest one over its floor.
+  float half_width = 0.3f, high = 0.5f;
 };
 
 std::vector<size_t> moments_of(const std::vector<Clip>& clips, int columns) {
@@ -54,7 +55,7 @@ Layout lay_out(const std::vector<Clip>& clips, const SheetOptions& options) {
       for (const Point& p : points) {
         if (!p.allFinite()) continue;
         const float aside = std::abs(right.dot(p - centre)), height = p.y() - floor;
-        // stray points may lie anywhere; a person is not larger than this
+        // Stray points may lie anywhere, but no person is larger than this.
         layout.half_width = std::max(layout.half_width, std::min(aside, 1.6f));
         layout.high = std::max(layout.high, std::min(height, 3.2f));
       }

@@ -12,7 +12,7 @@
 namespace restage {
 namespace {
 
-constexpr int kCountWidth = 10;  // room for the number of frames, known only at the end
+constexpr int kCountWidth = 10;  // digits left free for the number of frames, known at the end
 
 std::string vector_text(const Vec3& v) { return format("%.6f %.6f %.6f", v.x(), v.y(), v.z()); }
 
@@ -20,7 +20,8 @@ bool is_leaf(int joint) {
   return std::find(kParents.begin(), kParents.end(), joint) == kParents.end();
 }
 
-// One joint with all below it; appends to `order` what it lists.
+/// The file's text for a joint and all joints below it. Appends these joints to `order`, in the
+/// order in which the text lists them.
 void list_joint(const Joints& rest, int joint, int depth, double scale, std::string& text,
                 std::array<int, kJoints>& order, int& listed) {
   const std::string in(static_cast<size_t>(depth), '\t');
@@ -34,7 +35,9 @@ void list_joint(const Joints& rest, int joint, int depth, double scale, std::str
           "Zrotation Yrotation Xrotation\n";
   for (int child = joint + 1; child < kJoints; ++child)
     if (kParents[child] == joint) list_joint(rest, child, depth + 1, scale, text, order, listed);
-  if (is_leaf(joint))  // half the bone further on: the format wants an end, the method knows none
+  // The format wants an end point behind the last joint of a chain; the skeleton has none. The end
+  // point is put half a bone's length behind that joint.
+  if (is_leaf(joint))
     text += in + "\tEnd Site\n" + in + "\t{\n" + in + "\t\tOFFSET " +
             vector_text(0.5 * scale * offset) + "\n" + in + "\t}\n";
   text += in + "}\n";
@@ -50,7 +53,8 @@ double nearest_turn(double angle, double near) {
 Vec3 euler_zyx(const Mat3& r, const Vec3& near) {
   const double sine = std::clamp(-r(2, 0), -1.0, 1.0);
   const double cosine = std::hypot(r(2, 1), r(2, 2));
-  if (cosine < 1e-9) {  // y at +-90 degrees: only z -+ x matters; x stays as it was
+  // With y at +-90 degrees, only z - x or z + x matters; x stays that of the frame before.
+  if (cosine < 1e-9) {
     const double y = std::copysign(std::numbers::pi / 2, sine), x = near[2];
     const double sum = std::atan2(-r(0, 1), r(1, 1));  // z - x at +90, z + x at -90
     return {nearest_turn(sine > 0 ? sum + x : sum - x, near[0]), nearest_turn(y, near[1]), x};

@@ -1,4 +1,4 @@
-// BVH writer: the skeleton's motion for programs that read no skins.
+// BVH writer: the motion of the skeleton alone, for programs that cannot read a skinned surface.
 #pragma once
 
 #include <array>
@@ -16,11 +16,12 @@ struct BvhWriterOptions {
   double units_per_metre = 100.0;  ///< BVH knows no unit; centimetres are what most programs expect
 };
 
-/// Writes frame by frame; memory does not grow. Zero pose = the T-pose of `rest`, no rest
-/// rotations. Only the root has positions (6 channels); rotations are in degrees, channels Z Y X,
-/// i.e. local R = Rz Ry Rx. Of the equivalent angles those nearest to the frame before are written,
-/// so that curves have no jumps of 360 degrees. Nothing appears at `path` before commit().
-/// WorkError if a pose is not finite or the disk is full.
+/// Writes frame by frame; memory does not grow. With all angles zero the skeleton stands in the
+/// T-pose of `rest`. Only the root has positions (6 channels). Rotations are in degrees, channels Z
+/// Y X, so the local rotation is R = Rz Ry Rx. Several triples of angles give the same rotation;
+/// the triple nearest to that of the frame before is written, so that curves have no jumps of 360
+/// degrees. Nothing appears at `path` before commit(). WorkError if a pose is not finite or the
+/// disk is full.
 class BvhWriter {
  public:
   BvhWriter(std::string path, const Joints& rest, BvhWriterOptions options = {});
@@ -38,13 +39,14 @@ class BvhWriter {
   BvhWriterOptions options_;
   AtomicFile file_;
   std::unique_ptr<std::FILE, Close> out_;
-  std::array<int, kJoints> order_{};  ///< joints as listed in the file (depth first)
-  std::array<Vec3, kJoints> last_{};  ///< z, y, x of the frame before, radians
-  long count_at_ = 0;                 ///< where the number of frames stands
+  std::array<int, kJoints> order_{};  ///< the joints in the file's order (depth first)
+  std::array<Vec3, kJoints> last_{};  ///< angles z, y, x in the frame before, radians
+  long count_at_ = 0;                 ///< position in the file of the number of frames
   size_t frames_ = 0;
 };
 
-/// Angles (z, y, x) in radians with R = Rz Ry Rx, the solution nearest to `near`.
+/// The angles (z, y, x), radians, with Rz Ry Rx = `rotation`; of all solutions the one nearest to
+/// `near`.
 Vec3 euler_zyx(const Mat3& rotation, const Vec3& near);
 
 }  // namespace restage

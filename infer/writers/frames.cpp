@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
@@ -16,14 +17,26 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_frame(const std::string& name) {
-  if (name.size() < 16 || name.compare(0, 6, "frame_") != 0) return false;
+/// Whether a FrameFolderWriter wrote the file. The name alone does not tell: other programs call
+/// their frames frame_000001.ply, too.
+bool is_our_frame(const fs::path& path) {
+  const std::string name = path.filename().string();
+  if (name.size() < 16 || !name.starts_with("frame_")) return false;
   const size_t dot = name.size() - 4;
-  if (name.compare(dot, 4, ".ply") != 0 && name.compare(dot, 4, ".obj") != 0) return false;
-  return name.find_first_not_of("0123456789", 6) == dot;
+  const bool ply = name.ends_with(".ply");
+  if (!ply && !name.ends_with(".obj")) return false;
+  std::error_code error;
+  if (name.find_first_not_of("0123456789", 6) != dot ||
+      fs::symlink_status(path, error).type() != fs::file_type::regular)
+    return false;
+  std::string head(80, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(head.data(), std::ssize(head));
+  head.resize(static_cast<size_t>(file.gcount()));
+  return is_ours(ply ? MeshFormat::ply : MeshFormat::obj, head);
 }
 
-// Only what looks like our own earlier result may be replaced.
+/// InputError unless `folder` may be replaced; see FrameFolderWriter.
 void check_replaceable(const std::string& folder) {
   std::error_code code;
   const fs::file_type kind = fs::symlink_status(folder, code).type();
@@ -32,13 +45,15 @@ void check_replaceable(const std::string& folder) {
   if (!fs::is_directory(folder, code) || fs::is_symlink(folder, code))
     throw InputError(folder, "exists and is not a folder", "give another name");
   for (fs::directory_iterator it(folder, code), end; !code && it != end; it.increment(code))
-    if (!is_frame(it->path().filename().string()))
-      throw InputError(folder, "holds other files (" + it->path().filename().string() + ")",
+    if (!is_our_frame(it->path()))
+      throw InputError(folder,
+                       "holds a file that restage did not write (" +
+                           it->path().filename().string() + ") and would delete",
                        "give a new or an empty folder");
   if (code) throw_unwritable(folder, code.value());
 }
 
-/// The name without slashes at its end.
+/// The folder's name without slashes at the end, if that folder may be replaced.
 std::string checked(std::string folder) {
   while (folder.size() > 1 && folder.back() == '/') folder.pop_back();
   if (folder.empty() || folder == "/" || folder == "." || folder == "..")
@@ -56,7 +71,8 @@ void write_plain(const std::string& path, const std::string& bytes, const std::s
   if (written != bytes.size()) throw_unwritable(target, code);
 }
 
-// All frames at once: one flush of the file system is far cheaper than one per file.
+/// Makes sure that all frames are on the disk. One flush of the whole file system takes far less
+/// time than one flush for every file.
 void flush_folder(const std::string& folder, const std::string& target) {
   const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (fd < 0) throw_unwritable(target, errno);
@@ -66,7 +82,7 @@ void flush_folder(const std::string& folder, const std::string& target) {
   if (result != 0) throw_unwritable(target, code);
 }
 
-// In one step where the file system can, else in three.
+/// Exchanges the names of two folders: in one step if the file system can do that, else in three.
 void swap_folders(const std::string& temporary, const std::string& folder) {
   if (::renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, folder.c_str(), RENAME_EXCHANGE) == 0)
     return;
@@ -101,7 +117,8 @@ void FrameFolderWriter::push(const Points& vertices, const std::vector<Triangle>
 void FrameFolderWriter::commit() {
   flush_folder(temporary_.path(), folder_);
   check_replaceable(folder_);
-  // rename() replaces an empty folder; frames of an earlier run swap places and are then removed
+  // rename() replaces a folder that is empty. A folder that holds frames of an earlier run changes
+  // places with the new one and is then removed.
   if (::rename(temporary_.path().c_str(), folder_.c_str()) != 0) {
     if (errno != ENOTEMPTY && errno != EEXIST) throw_unwritable(folder_, errno);
     swap_folders(temporary_.path(), folder_);

@@ -9,18 +9,21 @@
 
 namespace restage {
 
-/// Writes one file per frame into a folder that appears whole, at commit(), or not at all: frames
-/// go to a hidden folder beside it that is renamed in the end and removed when commit() is not
-/// reached. A folder of that name is replaced if it is empty or holds nothing but such frames;
-/// anything else in it is an InputError before any work. Memory: one frame. Disk full: WorkError.
+/// Writes one file per frame. The folder appears whole at commit(), or not at all: until then files
+/// are written into a hidden folder beside it, which commit() renames, or which is removed if
+/// commit() is not reached. A folder that is already there is replaced if it is empty or holds only
+/// frames that a FrameFolderWriter wrote: files that have a frame's name and begin with our comment
+/// (mesh_file.h). Any other file in the folder is an InputError in the constructor, also a user's
+/// own frame_000001.ply. Memory: one frame. WorkError if the disk is full.
 class FrameFolderWriter {
  public:
-  /// `faces` are those of every frame; empty for clouds, whose point count may change.
+  /// `faces`: the triangles of every frame; empty for clouds, whose number of points may change
+  /// from frame to frame.
   FrameFolderWriter(std::string folder, std::vector<Triangle> faces,
                     MeshFormat format = MeshFormat::ply);
 
   void push(const Points& vertices) { push(vertices, faces_); }
-  /// A frame with faces of its own.
+  /// A frame that has other triangles than the rest.
   void push(const Points& vertices, const std::vector<Triangle>& faces);
   void commit();
   size_t frames() const { return frames_; }

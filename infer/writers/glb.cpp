@@ -14,16 +14,16 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kBin = 1e-5;         // metres: the percentile is exact to 0.01 mm
-constexpr size_t kBins = 20000;       // up to 0.2 m
-constexpr float kNegligible = 1e-6f;  // weaker influences are left out
+constexpr double kBin = 1e-5;         // metres, so the percentile is exact to 0.01 mm
+constexpr size_t kBins = 20000;       // distances up to 0.2 m
+constexpr float kNegligible = 1e-6f;  // a joint with a smaller weight is left out
 enum Component { u8 = 5121, u32 = 5125, f32 = 5126 };
 enum Target { none = 0, vertices = 34962, indices = 34963 };
 
-// The binary chunk with its buffer views and accessors.
+/// The binary chunk of the file, with the buffer views and accessors that describe its content.
 class Buffer {
  public:
-  // Adds `count` elements and returns the accessor's number.
+  /// Adds `count` elements to the chunk and returns the number of their accessor.
   int add(const void* data, size_t bytes, size_t count, Component component, const char* type,
           Target target) {
     Json view = {{"buffer", 0}, {"byteOffset", bytes_.size()}, {"byteLength", bytes}};
@@ -37,7 +37,8 @@ class Buffer {
                           {"type", type}});
     return static_cast<int>(accessors_.size()) - 1;
   }
-  // The format wants these for positions and times.
+  /// Writes the least and the largest value into an accessor: the format wants that for positions
+  /// and times.
   void set_bounds(int accessor, const std::vector<float>& low, const std::vector<float>& high) {
     accessors_[accessor]["min"] = low;
     accessors_[accessor]["max"] = high;
@@ -56,7 +57,8 @@ class Buffer {
 
 std::vector<float> three(const Point& p) { return {p.x(), p.y(), p.z()}; }
 
-// Area-weighted vertex normals of unit length; straight up where no face is.
+/// Unit normals of the vertices: means over the faces around a vertex, weighted by area. A vertex
+/// without faces gets a normal that points straight up.
 Points vertex_normals(const Mesh& mesh) {
   std::vector<Vec3> sums(mesh.vertices.size(), Vec3::Zero());
   for (const Triangle& f : mesh.faces) {
@@ -99,7 +101,7 @@ Json mesh_primitive(Buffer& buffer, const Mesh& mesh, const Influences& influenc
   return primitive;
 }
 
-// Nodes 0..21 are the joints, node 22 the skinned mesh.
+/// The file's nodes: nodes 0 to 21 are the joints, node 22 is the skinned mesh.
 Json nodes(const Joints& rest) {
   Json list = Json::array();
   for (int j = 0; j < kJoints; ++j) {
@@ -115,14 +117,15 @@ Json nodes(const Joints& rest) {
 }
 
 Json skin(Buffer& buffer, const Joints& rest) {
-  // Inverse of what the nodes give: sums of rounded offsets, so that rest is exactly the mesh.
+  // A program adds up the nodes' offsets, which are rounded to float32. The inverse bind matrices
+  // undo exactly these rounded sums, so that at rest the skinned mesh is the mesh itself.
   std::vector<std::array<float, 16>> inverse(kJoints);
   Joints placed;
   for (int j = 0; j < kJoints; ++j) {
     const Vec3 offset = j == 0 ? rest[0] : Vec3(rest[j] - rest[kParents[j]]);
     placed[j] =
         offset.cast<float>().cast<double>() + (j == 0 ? Vec3(Vec3::Zero()) : placed[kParents[j]]);
-    Eigen::Map<Eigen::Matrix4f> m(inverse[j].data());  // column-major, as in the format
+    Eigen::Map<Eigen::Matrix4f> m(inverse[j].data());  // column by column, as the format wants
     m.setIdentity();
     m.topRightCorner<3, 1>() = (-placed[j]).cast<float>();
   }
@@ -171,7 +174,7 @@ std::array<float, 4> renormalise(const std::array<double, 4>& strongest) {
     const auto weight = static_cast<float>(strongest[k] / sum);
     weights[k] = weight < kNegligible ? 0.0f : weight;
   }
-  // The strongest takes the rounding of the others, so that the float sum is 1.
+  // Rounding of the weaker weights goes into the strongest weight, so that the sum is 1 in float32.
   weights[0] = static_cast<float>(1.0 - (double{weights[1]} + weights[2] + weights[3]));
   return weights;
 }
@@ -229,7 +232,8 @@ void GlbWriter::push(const Pose& pose, std::optional<double> confidence) {
   for (size_t j = 0; j < kJoints; ++j) {
     const Quat q = Quat(pose.local[j]).normalized();
     Eigen::Vector4d c = q.coeffs();  // x, y, z, w
-    // q and -q are the same rotation; LINEAR interpolates on the nearer side only if they agree
+    // q and -q are the same rotation. LINEAR interpolates the short way only if two quaternions
+    // that follow each other have signs that agree.
     const double side = before != nullptr ? c[0] * before[j][0] + c[1] * before[j][1] +
                                                 c[2] * before[j][2] + c[3] * before[j][3]
                                           : c[3];
@@ -242,12 +246,14 @@ void GlbWriter::push(const Pose& pose, std::optional<double> confidence) {
   measure_cut(pose);
 }
 
-// Lost weights times joint transforms (V x 22 times 22 x 12), block by block.
+/// Adds to the influence error what this pose loses: lost_ [V, 22] times the joints' transforms
+/// [22, 12], some rows at a time.
 void GlbWriter::measure_cut(const Pose& pose) {
   const PosedSkeleton posed = forward_kinematics(rest_, pose);
   Eigen::Matrix<float, kJoints, 12, Eigen::RowMajor> transforms;
   for (int j = 0; j < kJoints; ++j) {
-    // relative to the pelvis: lost weights sum to 0 only up to rounding
+    // Relative to the pelvis: a row of lost_ sums to 0 only up to rounding, and a walk far from the
+    // origin would multiply that rounding.
     const Vec3 shift = posed.joints[j] - posed.joints[0] - posed.global[j] * rest_[j];
     for (int r = 0; r < 3; ++r) {
       for (int c = 0; c < 3; ++c)
@@ -314,7 +320,8 @@ std::string GlbWriter::bytes() const {
                                       {"roughnessFactor", 0.75}}}}});
   root["skins"] = Json::array({skin(buffer, rest_)});
   if (frames() > 0) root["animations"] = Json::array({animation(buffer, turns_, roots_, fps_)});
-  if (!confidence_.empty()) root["animations"][0]["extras"] = {{"confidence", confidence_}};
+  if (!confidence_.empty()) root["animations"][0]["extras"]["confidence"] = confidence_;
+  if (!filled_.empty()) root["animations"][0]["extras"]["filled"] = filled_;
   buffer.describe(root);
   const std::string text = root.dump();
   const uint64_t size = 12 + 8 + (text.size() + 3) / 4 * 4 + 8 + buffer.bytes().size();

@@ -1,4 +1,4 @@
-// Binary glTF 2.0 (GLB): the target with skeleton, skin and animation in one file.
+// Binary glTF 2.0 (GLB): one file with the target, its skeleton, its skin and an animation.
 #pragma once
 
 #include <array>
@@ -11,37 +11,44 @@
 
 namespace restage {
 
-/// The four strongest joints of each vertex, weights falling, summing to 1 in float32 (within an
-/// ulp or two). Unused places hold joint 0 and weight 0.
+/// The four joints that move a vertex most, for every vertex: the strongest first, the four weights
+/// summing to 1 in float32 (within one or two units in the last place). If fewer than four joints
+/// move a vertex, the remaining places hold joint 0 and weight 0.
 struct Influences {
   std::vector<std::array<uint8_t, 4>> joints;
   std::vector<std::array<float, 4>> weights;
 };
-/// InputError if a row is negative, not finite or all zero. Ties go to the lower joint.
+/// Of two joints with the same weight, the one with the lower number comes first. InputError if a
+/// row holds a negative number or one that is not finite, or is zero throughout.
 Influences strongest_four(const SkinWeights& weights);
 
-/// What the file loses: distance, over all vertices and frames written, between linear blend
-/// skinning with all 22 weights and with the four that are in the file. Metres.
+/// How exact the file is: distances between vertices skinned with all 22 weights and the same
+/// vertices skinned with the four weights that are in the file (linear blend skinning both), over
+/// all vertices and all frames written. Metres.
 struct InfluenceError {
   double mean = 0, p95 = 0, max = 0;
 };
 
-/// Collects poses and writes the file at commit(). 22 nodes named as kJointNames with the rest
-/// offsets as translations and no rest rotation; inverse bind matrix j = translate(-J_j); rotations
-/// as unit quaternions, hemisphere-continuous, LINEAR, at `fps`; translation of the root only; y
-/// up, metres. A target without faces becomes a POINTS primitive. The file poses by linear blend
-/// skinning: the pose-dependent offsets of the deformation model are not in it (PLY, OBJ and HDF5
-/// hold the exact surface). Memory: the mesh, and 364 bytes a frame. The bytes depend on the input
-/// only.
+/// Collects poses and writes the file at commit(). The file holds 22 nodes named as in kJointNames,
+/// whose translations are the offsets of the rest joints and which have no rest rotation; the
+/// inverse bind matrix of joint j is translate(-J_j). Rotations are unit quaternions, with signs
+/// that make curves continuous, LINEAR, at `fps`; only the root is translated; y is up, units are
+/// metres. A target without faces becomes a POINTS primitive. Programs pose the file by linear
+/// blend skinning, so the offsets of the deformation model, which depend on the pose, are not in
+/// the file (PLY, OBJ and HDF5 hold the exact surface). Memory: the mesh, and 364 bytes a frame.
+/// The file's bytes depend on the input only.
 class GlbWriter {
  public:
-  /// InputError for an unusable mesh, ShapeError if the rows of `weights` are not the vertices.
+  /// InputError: see check_mesh(). ShapeError if `weights` has not one row a vertex.
   GlbWriter(std::string path, Mesh mesh, const Joints& rest, const SkinWeights& weights,
             double fps = kFps);
-  /// WorkError if the pose is not finite. `confidence` for all frames or for none: it goes into the
-  /// animation's extras.
+  /// Adds a frame. `confidence` must be given for all frames or for none; the file holds the
+  /// numbers in the animation's extras. WorkError if the pose is not finite.
   void push(const Pose& pose, std::optional<double> confidence = std::nullopt);
-  /// Writes the file; also in its `asset.extras`: fps, units and the influence error in mm.
+  /// The numbers of the frames that have no cloud of the source behind them
+  /// (RetargetedFrame::filled). The file holds the numbers in the animation's extras.
+  void set_filled(std::vector<int64_t> frames) { filled_ = std::move(frames); }
+  /// Writes the file. Its `asset.extras` say fps, units and the influence error in millimetres.
   InfluenceError commit();
   InfluenceError influence_error() const;
   size_t frames() const { return roots_.size() / 3; }
@@ -55,11 +62,12 @@ class GlbWriter {
   Joints rest_;
   double fps_;
   Influences influences_;
-  SkinWeights lost_;                         ///< weights in the file minus all weights
-  std::vector<std::array<float, 4>> turns_;  ///< frame-major, 22 per frame, (x, y, z, w)
-  std::vector<float> roots_;                 ///< 3 per frame
+  SkinWeights lost_;                         ///< the file's weights minus the given ones
+  std::vector<std::array<float, 4>> turns_;  ///< 22 quaternions (x, y, z, w) a frame
+  std::vector<float> roots_;                 ///< the root's place, 3 numbers a frame
   std::vector<double> confidence_;
-  std::vector<uint64_t> histogram_;  ///< of errors, kBin metres each, for the percentile
+  std::vector<int64_t> filled_;
+  std::vector<uint64_t> histogram_;  ///< of distances, in bins of kBin metres; for the percentile
   double error_sum_ = 0, error_max_ = 0;
 };
 

@@ -11,6 +11,11 @@ namespace {
 // Files are little-endian; so is every machine this builds for.
 static_assert(std::endian::native == std::endian::little);
 
+// What we write begins with this where it has the comment.
+constexpr const char* kPlyStart = "ply\nformat binary_little_endian 1.0\n";
+constexpr const char* kPlyComment = "comment restage, metres, y up\n";
+constexpr const char* kObjComment = "# restage, metres, y up\n";
+
 template <class T>
 void append(std::string& bytes, const T* values, size_t count) {
   bytes.append(reinterpret_cast<const char*>(values), count * sizeof(T));
@@ -21,8 +26,8 @@ void append(std::string& bytes, const T* values, size_t count) {
 const char* extension(MeshFormat format) { return format == MeshFormat::ply ? "ply" : "obj"; }
 
 std::string ply_bytes(const Points& vertices, const std::vector<Triangle>& faces, bool comment) {
-  std::string bytes = "ply\nformat binary_little_endian 1.0\n";
-  if (comment) bytes += "comment restage, metres, y up\n";
+  std::string bytes = kPlyStart;
+  if (comment) bytes += kPlyComment;
   bytes += "element vertex " + std::to_string(vertices.size()) + "\n";
   bytes += "property float x\nproperty float y\nproperty float z\n";
   if (!faces.empty())
@@ -39,7 +44,7 @@ std::string ply_bytes(const Points& vertices, const std::vector<Triangle>& faces
 }
 
 std::string obj_bytes(const Points& vertices, const std::vector<Triangle>& faces, bool comment) {
-  std::string text = comment ? "# restage, metres, y up\n" : "";
+  std::string text = comment ? kObjComment : "";
   text.reserve(vertices.size() * 40 + faces.size() * 24);
   char line[96];
   for (const Point& p : vertices) {
@@ -57,6 +62,11 @@ std::string obj_bytes(const Points& vertices, const std::vector<Triangle>& faces
 std::string mesh_bytes(MeshFormat format, const Points& vertices,
                        const std::vector<Triangle>& faces) {
   return format == MeshFormat::ply ? ply_bytes(vertices, faces) : obj_bytes(vertices, faces);
+}
+
+bool is_ours(MeshFormat format, const std::string& head) {
+  return head.starts_with(format == MeshFormat::ply ? std::string(kPlyStart) + kPlyComment
+                                                    : std::string(kObjComment));
 }
 
 void check_mesh(const std::string& where, const Points& vertices,

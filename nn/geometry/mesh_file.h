@@ -22,6 +22,9 @@ std::string obj_bytes(const Points& vertices, const std::vector<Triangle>& faces
                       bool comment = true);
 std::string mesh_bytes(MeshFormat format, const Points& vertices,
                        const std::vector<Triangle>& faces);
+/// Whether a file of that format which begins with `head`, 80 bytes or more of it, has the comment
+/// of the functions above.
+bool is_ours(MeshFormat format, const std::string& head);
 /// InputError, naming `where`, when the mesh is empty, a coordinate is not finite, or a face names
 /// a vertex that is not there. Every writer calls it first.
 void check_mesh(const std::string& where, const Points& vertices,

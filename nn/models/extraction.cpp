@@ -27,10 +27,10 @@ double JointExtractor::heading(size_t view) const {
 void JointExtractor::arrange(const Points& cloud, const std::string& source) {
   for (const Point& p : cloud)
     if (!p.allFinite())
-      throw InputError(source, "holds a coordinate that is not finite", "remove such points");
+      throw UnusableCloud(source, "holds a coordinate that is not finite", "remove such points");
   points_.arrange(cloud);
   if (points_.size() < kLeastDistinctPoints)
-    throw InputError(
+    throw UnusableCloud(
         source, "holds " + std::to_string(points_.size()) + " distinct points, too few for a body",
         "give at least " + std::to_string(kLeastDistinctPoints) + ", better a thousand");
 }

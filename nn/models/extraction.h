@@ -28,7 +28,7 @@ class JointExtractor {
   /// choices of points begin.
   /// `before`: the answer to the frame before, in the same frame; null where there was none. It is
   /// forgotten where the cloud is more than a metre from it.
-  /// InputError naming `source`: fewer than 64 distinct points, values that are not finite.
+  /// UnusableCloud naming `source`: fewer than 64 distinct points, values that are not finite.
   SeenJoints operator()(const Points& cloud, const std::string& source, const RngKey& key,
                         const SeenJoints* before = nullptr);
 

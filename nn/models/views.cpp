@@ -97,7 +97,7 @@ SeenJoints combined(const std::vector<View>& views, bool turns, bool uncertainty
     for (int c = 0; c < 3; ++c) {
       for (size_t s = 0; s < n; ++s) values[s] = views[s].joints[j][c];
       if (!std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); }))
-        throw InputError(source, "gives joints that are not finite", "check its units: metres");
+        throw UnusableCloud(source, "gives joints that are not finite", "check its units: metres");
       out.joints[j][c] = middle_of(values, left_out);
     }
     View::Columns columns = View::Columns::Zero();

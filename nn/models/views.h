@@ -7,9 +7,17 @@
 #include <string>
 #include <vector>
 
+#include "autograd/base/error.h"
 #include "nn/geometry/skeleton.h"
 
 namespace restage {
+
+/// A cloud in which nobody can be found, whatever the clouds around it hold: too few points, values
+/// that are not finite, or points so far away that no joints can be computed.
+class UnusableCloud : public InputError {
+ public:
+  using InputError::InputError;
+};
 
 /// What is seen of somebody in a cloud.
 struct SeenJoints {
@@ -41,7 +49,7 @@ struct View {
 };
 
 /// Joints: the mean, from eight views on without a quarter of the values of each coordinate at
-/// either end. `turns`, `uncertainty`: whether the model gives them. InputError naming `source`:
+/// either end. `turns`, `uncertainty`: whether the model gives them. UnusableCloud naming `source`:
 /// joints that are not finite. `values`: room for a coordinate of each view.
 SeenJoints combined(const std::vector<View>& views, bool turns, bool uncertainty,
                     const std::string& source, std::vector<double>& values);

@@ -172,8 +172,9 @@ class Render(CliTest):
         self.bad_input(["render", "result.h5", "--out", "nowhere/sheet.png"], "nowhere")
         self.bad_input(["render", "result.h5", "--out", "sheet.png", "--sequence", 1], "sequence")
         self.bad_input(["render", "result.h5", "--source", self.ply("e.ply", []), "--out", "sheet.png"], "e.ply")
-        self.ply("scans/s1.ply", TETRAHEDRON + [(float("nan"), 0, 0)])
-        self.bad_input(["render", "result.h5", "--source", "scans", "--out", "sheet.png"], "s1.ply")
+        for i in range(3):
+            self.ply("scans/s%d.ply" % i, [])
+        self.bad_input(["render", "result.h5", "--source", "scans", "--out", "sheet.png"], "s0.ply")
 
     def test_full_disk(self):
         result = self.restage("render", "result.h5", "--source", "scans", "--out", "sheet.png", before=small_disk)

@@ -150,13 +150,15 @@ TEST(DoctorChecks, RefuseNonsenseWithTheOptionThatMendsIt) {
     return test::refusal_of([&] { check_source(frames, "scans", given); });
   };
   // What was given already counts: metres read as centimetres, y up read as z up.
-  EXPECT_HAS(source(Mat3::Identity(), 0.01, {0.01, false}), "leave --scale out");
-  EXPECT_HAS(source(Mat3::Identity(), 10, {0.1, false}), "--scale 0.01");
-  EXPECT_HAS(source(into_foreign(5, 2), 1, {1, true}), "leave --source-up out");
+  EXPECT_HAS(source(Mat3::Identity(), 0.01, {0.01, "y"}), "leave --scale out");
+  EXPECT_HAS(source(Mat3::Identity(), 10, {0.1, "y"}), "--scale 0.01");
+  EXPECT_HAS(source(into_foreign(5, 2), 1, {1, "z"}), "leave --source-up out");
+  EXPECT_HAS(source(into_foreign(3, 4), 1, {1, "z"}), "--source-up -z");
   EXPECT_HAS(source(Mat3::Identity(), 3e4), "--scale");
   EXPECT_EQ(source(Mat3::Identity(), 1), "");
   EXPECT_HAS(source(into_foreign(4, 1), 1), "--source-up z");
-  EXPECT_HAS(source(into_foreign(0, 4), 1), "--fix");
+  EXPECT_HAS(source(into_foreign(0, 4), 1), "--source-up x");
+  EXPECT_HAS(source(into_foreign(3, 4), 1), "--source-up -y");
   EXPECT_HAS(source(Mat3::Identity(), 100), "--scale 0.01");
   const auto target = [&](const Mat3& turn, double scale) {
     return test::refusal_of(

@@ -8,6 +8,7 @@
 
 #include "autograd/base/error.h"
 #include "datasets/hdf5/file.h"
+#include "datasets/readers/byte_stream.h"
 #include "datasets/schema.h"
 #include "tests/fuzz/old_layout.h"
 #include "tests/support/files.h"
@@ -270,6 +271,27 @@ TEST_F(SchemaHdf5, AFileThatFillsTheMemoryIsStoppedInItsChild) {
     const std::string refusal = error_of([&] { h5::File::open(path); });
     EXPECT_HAS(refusal, kEndsWithoutMemory ? "damaged" : "takes more than 1024 MiB to read");
   }
+}
+
+TEST_F(SchemaHdf5, WhatOneReadTakesIsLimited) {
+  const std::string path = dir / "large.h5";
+  write_one(path, "/points", {1'000'000, 3}, std::vector<float>(3'000'000));
+  const struct Limit {
+    explicit Limit(uint64_t bytes) { h5::set_max_memory(bytes); }
+    ~Limit() { h5::set_max_memory(kMaxMemory); }
+  } limit(10'000'000);
+  const h5::File file = h5::File::open(path);
+  const h5::Dataset set = file.dataset("/points", {-1, 3});
+  const std::string said = error_of([&] { set.read<float>(); });
+  EXPECT_HAS(said, "large.h5:/points: ");
+  EXPECT_HAS(said, "10000000 bytes allowed");
+  EXPECT_HAS(said, "--max-memory");
+  std::vector<float> rows;
+  set.read_rows(0, 800'000, rows);  // some of it may be in memory
+  std::vector<double> twice;
+  EXPECT_THROW(set.read_rows(0, 800'000, twice), InputError) << "doubles take twice as much";
+  h5::set_max_memory(100'000);
+  EXPECT_HAS(error_of([&] { file.dataset("/points"); }), "chunks");
 }
 
 TEST_F(SchemaHdf5, ReadsForeignByteOrdersAndText) {

@@ -222,6 +222,55 @@ TEST_F(Schema, ConfidenceIsOfAllFramesOrOfNone) {
   EXPECT_THROW(writer.commit(), ShapeError);
 }
 
+TEST_F(Schema, AResultRemembersItsSourceAndWhatWasFilled) {
+  namespace fs = std::filesystem;
+  const auto write = [](const std::string& path, const SourceRecord& source) {
+    PredictionWriter writer(path, 0, {}, kInfo, 10);
+    for (int f = 0; f < 3; ++f) writer.append(tiny_joints(), {});
+    writer.set_source(source);
+    writer.set_filled({1, 2});
+    writer.commit();
+  };
+  fs::create_directories(dir / "here/results");
+  fs::create_directories(dir / "here/scans");
+  const fs::path before = fs::current_path();
+  fs::current_path(dir / "here");
+  write("results/r.h5", {.path = "scans", .fps = 60, .scale = 0.001, .up = "-z"});
+  const SourceRecord read = read_source_record("results/r.h5").value();
+  EXPECT_EQ(read.path, "scans");
+  EXPECT_EQ(read.fps, 60);
+  EXPECT_EQ(read.scale, 0.001);
+  EXPECT_EQ(read.up, "-z");
+  EXPECT_EQ(read.clip, "");
+  EXPECT_FALSE(read.sequence);
+  // Both moved together, and seen from elsewhere.
+  fs::current_path(before);
+  fs::rename(dir / "here", dir / "there");
+  const SourceRecord moved = read_source_record(dir / "there/results/r.h5").value();
+  EXPECT_TRUE(fs::equivalent(moved.path, dir / "there/scans")) << moved.path;
+  write(dir / "a.h5", {.path = dir / "there/scans", .clip = "Walk", .sequence = 2});
+  const SourceRecord absolute = read_source_record(dir / "a.h5").value();
+  EXPECT_EQ(absolute.path, dir / "there/scans");
+  EXPECT_EQ(absolute.clip, "Walk");
+  EXPECT_EQ(absolute.sequence, 2);
+  EXPECT_FALSE(absolute.fps);
+  EXPECT_EQ(absolute.up, "y");
+
+  EXPECT_EQ(read_filled(dir / "a.h5"), (std::vector<int64_t>{1, 2}));
+  EXPECT_EQ(inspect(dir / "a.h5").counts.at("filled"), 2);
+  EXPECT_EQ(inspect(dir / "a.h5").fps, 10);
+  EXPECT_TRUE(verify(dir / "a.h5").empty());
+  {
+    PredictionWriter writer(dir / "b.h5", 0, {}, kInfo);
+    writer.append(tiny_joints(), {});
+    writer.set_filled({1});
+    writer.commit();
+  }
+  EXPECT_FALSE(read_source_record(dir / "b.h5"));
+  ASSERT_EQ(verify(dir / "b.h5").size(), 1u);
+  EXPECT_HAS(verify(dir / "b.h5")[0], "/filled");
+}
+
 TEST_F(Schema, RadiusIsOfAllFramesOrOfNone) {
   const std::string path = dir / "p.h5";
   std::array<double, kJoints> radius;

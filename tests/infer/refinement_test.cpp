@@ -99,6 +99,21 @@ TEST(Refinement, BringsLimbsToWhereTheCloudIs) {
   EXPECT_NEAR((frame.pose.root - answer[0]).norm(), 0, 1e-9) << "the path is the chain's";
 }
 
+TEST(Refinement, FramesOfAGapAreTheChains) {
+  const Scene s = scene();
+  Refinement refined(chain(s), "target");
+  refined.push(s.cloud, "first");
+  refined.miss();
+  EXPECT_THROW(refined.push(Points(1000, Point(1, 2, 3)), "one place"), UnusableCloud);
+  refined.miss();
+  const auto frames = refined.push(s.cloud, "fourth");
+  ASSERT_EQ(frames.size(), 3u);
+  EXPECT_TRUE(frames[0].filled && frames[1].filled && !frames[2].filled);
+  EXPECT_LT(apart(frames[2].joints, s.truth), 0.5 * apart(frames[1].joints, s.truth));
+  refined.miss();
+  EXPECT_EQ(refined.finish().size(), 1u);
+}
+
 TEST(Refinement, IsForCloudsThatAreAnsweredAtOnce) {
   const Scene s = scene();
   test::expect_error<InputError>([&] { Refinement(chain(s, 60), "target"); },

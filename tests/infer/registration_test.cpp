@@ -9,6 +9,7 @@
 #include "autograd/base/rng.h"
 #include "datasets/builtin/bodies.h"
 #include "datasets/sampling/surface.h"
+#include "nn/models/views.h"
 #include "tests/support/use_set.h"
 
 namespace restage {
@@ -148,6 +149,36 @@ TEST(Registration, WeightsSumToOneAndBelongToTheNearestBone) {
     agree += mine == theirs;
   }
   EXPECT_GT(agree / static_cast<double>(w.rows()), 0.6);  // of the body's own weights
+}
+
+TEST(Registration, MissedFramesLieBetweenThoseAround) {
+  const auto at = [](double way) {
+    Pose pose = step_pose(body());
+    pose.root.x() += way;
+    return pose;
+  };
+  Registration registration(body().rest, body().joints, "target");
+  registration.miss();
+  const auto first = registration.push(scan(body(), at(0)), "first");
+  ASSERT_EQ(first.size(), 2u) << "the missed one before is as the first";
+  EXPECT_TRUE(first[0].filled && !first[1].filled);
+  EXPECT_EQ(first[0].joints, first[1].joints);
+  const Joints before = first[1].joints;
+  registration.miss();
+  const auto pushed = registration.push(scan(body(), at(0.2)), "second");
+  ASSERT_EQ(pushed.size(), 2u);
+  EXPECT_TRUE(pushed[0].filled && !pushed[1].filled);
+  EXPECT_EQ(pushed[0].vertices.size(), body().rest.vertices.size());
+  const Joints after = pushed[1].joints;
+  EXPECT_LT((pushed[0].joints[0] - (before[0] + after[0]) / 2).norm(), 1e-9);
+  EXPECT_THROW(registration.push({}, "none"), UnusableCloud);
+  registration.miss();
+  const auto last = registration.finish();
+  ASSERT_EQ(last.size(), 1u);
+  EXPECT_EQ(last[0].joints, after);
+  registration.restart();
+  registration.miss();
+  EXPECT_TRUE(registration.finish().empty());
 }
 
 TEST(Registration, OddInputsAreRefused) {

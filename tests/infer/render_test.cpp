@@ -72,6 +72,31 @@ TEST(Figures, TheViewContainsWhatItIsToldTo) {
   EXPECT_GT(drawn(stray, kOrange), 0);
 }
 
+TEST(Clips, AreShownAtOneRate) {
+  Clip clip = toy_clips(12)[0];
+  clip.fps = 60;
+  for (size_t f = 0; f < 12; ++f) {
+    clip.confidence.push_back(0.01 * static_cast<double>(f));
+    clip.focus.push_back(Point(static_cast<float>(f), 0, 0));
+  }
+  const auto numbers = [](const Clip& c) {
+    std::vector<int> out;
+    for (const Point& p : c.focus) out.push_back(static_cast<int>(p.x()));
+    return out;
+  };
+  const Clip slow = at_rate(clip, 30, 100);
+  EXPECT_EQ(numbers(slow), (std::vector<int>{0, 2, 4, 6, 8, 10}));
+  EXPECT_EQ(slow.fps, 30);
+  ASSERT_EQ(slow.frames.size(), 6u);
+  EXPECT_EQ(slow.frames[3], clip.frames[6]);
+  EXPECT_EQ(slow.confidence[3], 0.06);
+  EXPECT_TRUE(slow.errors.empty());
+  EXPECT_EQ(numbers(at_rate(clip, 30, 4)), (std::vector<int>{0, 2, 4, 6}));
+  EXPECT_EQ(numbers(at_rate(clip, 25, 100)), (std::vector<int>{0, 2, 5, 7, 10}));
+  EXPECT_EQ(numbers(at_rate(clip, 120, 6)), (std::vector<int>{0, 1, 1, 2, 2, 3}));
+  EXPECT_EQ(numbers(at_rate(clip, 60, 100)), numbers(clip));
+}
+
 TEST(Sheet, MeshInFrontHidesWhatIsBehind) {
   const Points square = {{-1, 0.1f, 0}, {1, 0.1f, 0}, {1, 2, 0}, {-1, 2, 0}};
   const std::vector<Triangle> faces = {{0, 1, 2}, {0, 2, 3}};

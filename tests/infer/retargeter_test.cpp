@@ -6,17 +6,15 @@
 #include <cmath>
 
 #include "autograd/ops/elementwise.h"
+#include "tests/infer/retargeter_support.h"
 #include "tests/support/errors.h"
 #include "tests/support/fake_device.h"
-#include "tests/support/small_models.h"
-#include "tests/support/tiny_body.h"
 
 namespace restage {
 namespace {
 
-using testing::tiny_body;
+using namespace retargeter_test;
 using testing::tiny_joints;
-using testing::tiny_motion;
 
 /// Answers with the joints that it was given, at the centroid of the cloud.
 struct FixedExtractor final : SkeletonModel {
@@ -40,57 +38,14 @@ struct FixedExtractor final : SkeletonModel {
   const char* kind() const override { return "Fixed"; }
 };
 
-Bundle untrained(const std::string& smrm = "smrm/rot6d") { return testing::untrained_bundle(smrm); }
-
-std::vector<Joints> performance(size_t frames) {
-  const Motion motion = tiny_motion("m", "s", "test", frames);
-  const Body body = tiny_body("a", "test");
-  std::vector<Joints> out;
-  for (size_t f = 0; f < frames; ++f)
-    out.push_back(forward_kinematics(body.joints, pose_on(motion, body, f)).joints);
-  return out;
-}
-
-const Body& target() {
-  static const Body body = tiny_body("b", "test", 1.1, 1.2);
-  return body;
-}
-
-std::vector<RetargetedFrame> run(Retargeter& r, const std::vector<Joints>& source) {
-  std::vector<RetargetedFrame> out;
-  for (const Joints& j : source)
-    for (const RetargetedFrame& f : r.push_joints(j)) out.push_back(f);
-  return out;
-}
-
-/// What becomes of a source on the target.
-std::vector<RetargetedFrame> retargeted(const Bundle& models, const std::vector<Joints>& source,
-                                        const RetargetOptions& options = {}) {
-  Retargeter r(models, "w", target().rest, target().joints, options);
-  return run(r, source);
-}
-
-double apart(const Joints& a, const Joints& b) {
-  double most = 0;
-  for (size_t j = 0; j < kJoints; ++j) most = std::max(most, (a[j] - b[j]).norm());
-  return most;
-}
-
-double apart(const Points& a, const Points& b) {
-  if (a.size() != b.size()) return 1e9;
-  double most = 0;
-  for (size_t i = 0; i < a.size(); ++i)
-    most = std::max(most, static_cast<double>((a[i] - b[i]).norm()));
-  return most;
-}
-
 TEST(InferRetargeter, WaitsWhereItDoubts) {
-  const auto source = performance(12);
+  constexpr size_t kReturn = kReturnFrames, kDoubt = 2 + kReturn + 3,
+                   kFrames = kDoubt + kReturn + 4;
+  const auto source = performance(kFrames);
   std::vector<SeenJoints> seen(source.begin(), source.end());
-  for (size_t f = 0; f < seen.size(); ++f) {
-    seen[f].uncertainty.emplace().fill(0.002);
-    if (f < 2 || f == 6 || f == 7) seen[f].uncertainty->fill(0.2);
-  }
+  const auto doubted = [&](size_t f) { return f < 2 || f == kDoubt || f == kDoubt + 1; };
+  for (size_t f = 0; f < seen.size(); ++f)
+    seen[f].uncertainty.emplace().fill(doubted(f) ? 0.2 : 0.002);
   const auto frames = [&](double least) {
     Retargeter r(untrained(), "w", target().rest, target().joints, {.min_confidence = least});
     std::vector<RetargetedFrame> out;
@@ -99,11 +54,24 @@ TEST(InferRetargeter, WaitsWhereItDoubts) {
   };
   const auto answered = frames(0), held = frames(0.5);
   EXPECT_GT(*answered[3].confidence, 0.99);
-  EXPECT_LT(*answered[6].confidence, 0.1);
-  for (size_t f = 2; f < 12; ++f)
-    EXPECT_EQ(apart(held[f].joints, answered[f == 6 || f == 7 ? 5 : f].joints), 0) << f;
+  EXPECT_LT(*answered[kDoubt].confidence, 0.1);
   for (const Mat3& r : held[1].pose.local) EXPECT_NEAR(r.col(1).y(), 1, 1e-9) << "stands at rest";
-  EXPECT_GT(apart(answered[6].joints, answered[5].joints), 1e-4);
+  EXPECT_GT(apart(answered[kDoubt].joints, answered[kDoubt - 1].joints), 1e-4);
+  const auto step = [](const std::vector<RetargetedFrame>& of, size_t f) {
+    return apart(of[f].joints, of[f - 1].joints);
+  };
+  double jump = 0;  // from rest into the motion
+  for (size_t f = 2; f < kFrames; ++f) {
+    if (doubted(f)) {
+      EXPECT_EQ(apart(held[f].joints, answered[kDoubt - 1].joints), 0) << f;
+    } else if ((f >= 2 + kReturn && f < kDoubt) || f >= kDoubt + 2 + kReturn) {
+      EXPECT_EQ(apart(held[f].joints, answered[f].joints), 0) << f << ": has come back";
+    }
+    jump = std::max(jump, step(held, f));
+  }
+  EXPECT_GT(apart(held[1].joints, answered[2].joints), 0.2);
+  EXPECT_LT(jump, 0.5 * apart(held[1].joints, answered[2].joints)) << "no jump";
+  EXPECT_LT(step(held, 2), 0.05 * apart(held[1].joints, answered[2].joints));
   Retargeter silent(untrained(), "w", target().rest, target().joints, {.min_confidence = 0.5});
   EXPECT_THROW(silent.push_joints(source[0]), InputError);
 }
@@ -486,7 +454,10 @@ TEST(InferRetargeter, CloudsGoThroughTheExtractor) {
     EXPECT_EQ(x[0].vertices.size(), target().rest.vertices.size());
     EXPECT_EQ(*a.source_joints(), *b.source_joints());
   }
-  EXPECT_THROW(a.push(Points(3, Point(0, 0, 0)), "f1.ply"), InputError);
+  // A cloud that cannot be used leaves everything as it was.
+  EXPECT_THROW(a.push(Points(3, Point(0, 0, 0)), "f1.ply"), UnusableCloud);
+  const Points next = surface_points(target().rest, 300, RngKey{9, 0});
+  EXPECT_EQ(a.push(next, "f2.ply")[0].joints, b.push(next, "f2.ply")[0].joints);
 }
 
 TEST(Retargeter, NetworksOnAnotherDeviceAnswerAlike) {

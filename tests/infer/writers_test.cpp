@@ -298,6 +298,36 @@ TEST_F(WritersTest, FoldersWithOtherFilesAreKept) {
   EXPECT_EQ(names_in(dir.path()).size(), 2u);
 }
 
+/// Scanners and other programs name their frames as we do.
+TEST_F(WritersTest, FramesOfOthersAreKept) {
+  const std::string theirs = ply_bytes({{1, 2, 3}}, {}, false);
+  for (const std::string name : {"frame_000001.ply", "frame_000001.obj", "frame_0000001.ply"}) {
+    fs::remove_all(dir / "out");
+    FrameFolderWriter early(dir / "out", {});
+    early.push({{1, 2, 3}});
+    early.push({{1, 2, 3}});
+    early.commit();
+    dir.write("out/" + name, theirs);
+    const std::string said = refusal_of([&] { FrameFolderWriter(dir / "out", {}); });
+    EXPECT_HAS(said, name);
+    EXPECT_HAS(said, "did not write");
+    EXPECT_EQ(bytes_of(dir / ("out/" + name)), theirs);
+  }
+  // Nor what comes into the folder while the frames are written.
+  fs::remove_all(dir / "out");
+  FrameFolderWriter late(dir / "out", {});
+  late.push({{1, 2, 3}});
+  dir.write("out/frame_000000.ply", theirs);
+  EXPECT_THROW(late.commit(), InputError);
+  EXPECT_EQ(bytes_of(dir / "out/frame_000000.ply"), theirs);
+  // A link is somebody's decision, whatever it leads to.
+  fs::remove_all(dir / "out");
+  fs::create_directory(dir / "out");
+  dir.write("elsewhere.obj", obj_bytes({{1, 2, 3}}, {}));
+  fs::create_symlink("../elsewhere.obj", dir / "out/frame_000000.obj");
+  EXPECT_THROW(FrameFolderWriter(dir / "out", {}), InputError);
+}
+
 TEST_F(WritersTest, CloudsMayChangeTheirCountAndBadFramesAreRefused) {
   FrameFolderWriter writer(dir / "clouds", {}, MeshFormat::obj);
   writer.push({{0, 0, 0}, {1, 2, 3}});

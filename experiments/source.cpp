@@ -1,0 +1,84 @@
+#include "experiments/source.h"
+
+#include <algorithm>
+
+#include "datasets/doctor/examine.h"
+#include "datasets/importers/axis.h"
+#include "datasets/readers/gltf.h"
+
+namespace restage {
+namespace {
+
+Eigen::Matrix3f turn_of(const std::string& up) {
+  const Axis axis = parse_axis(up, "--source-up");
+  if (axis == Axis::automatic)
+    throw InputError("", "--source-up 'auto' is not known here", "give x, -x, y, -y, z or -z");
+  return upright(axis).cast<float>();
+}
+
+void check(const SourceRecord& how) {
+  if (!(how.scale >= kLeastScale && how.scale <= kMostScale))
+    throw InputError("", "--scale is out of range", "give metres per unit, 1e-9 to 1e6");
+  if (how.fps && !(*how.fps >= 1 && *how.fps <= 1000))
+    throw InputError("", "--fps is out of range", "give the source's frames per second, 1 to 1000");
+  if (how.fps && is_gltf_name(how.path))
+    throw InputError(how.path, "states its key times, which --fps cannot change",
+                     "leave --fps out");
+}
+
+}  // namespace
+
+Source::Source(const SourceRecord& how, uint64_t max_memory) : how_(how), turn_(turn_of(how.up)) {
+  check(how);
+  frames_ = open_frames(how.path, {.clip = how.clip,
+                                   .max_memory = max_memory,
+                                   .sequence = how.sequence,
+                                   .leave_out_non_finite = true});
+  if (!how_.fps) how_.fps = frames_->fps();
+}
+
+std::optional<SourceCloud> Source::next() {
+  if (at_ == frames_->frames()) return std::nullopt;
+  ++at_;
+  SourceCloud out;
+  out.fault = broken_;
+  if (broken_) return out;
+  try {
+    out.frame = frames_->next().value();
+  } catch (const InputError& error) {
+    out.fault = error;
+    return_to_place();
+    return out;
+  }
+  if (out.frame.points.empty())
+    out.fault = InputError(out.frame.source, "holds no points", "leave the frame out");
+  const auto scale = static_cast<float>(how_.scale);
+  for (Point& p : out.frame.points) {
+    if (!upright()) p = turn_ * p;
+    p *= scale;
+  }
+  return out;
+}
+
+void Source::skip(int64_t frames) {
+  for (; frames > 0 && at_ < frames_->frames(); --frames, ++at_)
+    if (!broken_) frames_->skip();
+}
+
+void Source::rewind() {
+  at_ = 0;
+  broken_.reset();
+  frames_->rewind();
+}
+
+/// Behind a frame that could not be read, whatever the reader did about it.
+void Source::return_to_place() {
+  try {
+    frames_->rewind();
+    for (int64_t i = 0; i < at_; ++i) frames_->skip();
+  } catch (const InputError& error) {
+    broken_ = error;
+  }
+}
+
+}  // namespace restage

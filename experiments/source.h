@@ -1,0 +1,48 @@
+// The source of a motion, as `retarget` and `render` read it: every frame in metres, y up.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "autograd/base/error.h"
+#include "datasets/readers/frame_folder.h"
+#include "datasets/schema.h"
+
+namespace restage {
+
+/// A frame that could be read, or why it could not.
+struct SourceCloud {
+  Frame frame;                      ///< without points if it has a fault
+  std::optional<InputError> fault;  ///< names the frame's file
+};
+
+class Source {
+ public:
+  /// InputError: there is nothing to read; a setting that is out of range, by the name of its
+  /// option (--scale, --source-up, --fps).
+  explicit Source(const SourceRecord& how, uint64_t max_memory = kMaxMemory);
+
+  /// The next frame; nothing at the end. A frame that is damaged, or empty, does not end the
+  /// sequence: it comes with its fault. Points that are not finite are left out (Frame::left_out).
+  std::optional<SourceCloud> next();
+  void skip(int64_t frames);
+  void rewind();
+
+  int64_t frames() const { return frames_->frames(); }
+  int64_t sequences() const { return frames_->sequences(); }
+  double fps() const { return *how_.fps; }
+  bool upright() const { return turn_.isIdentity(); }  ///< y was up already
+  /// How it is read; the rate is there, also where it is the file's.
+  const SourceRecord& record() const { return how_; }
+
+ private:
+  void return_to_place();
+
+  SourceRecord how_;
+  Eigen::Matrix3f turn_;
+  std::unique_ptr<FrameSource> frames_;
+  int64_t at_ = 0;                    // frames given or skipped
+  std::optional<InputError> broken_;  // nothing behind this place can be read
+};
+
+}  // namespace restage

@@ -1,0 +1,116 @@
+"""restage render: which source is drawn beside a result, how it is read, and which frames stand together."""
+import os
+import shutil
+
+from support import CliTest, points
+from tiny_run import weights
+
+FRAMES = 12
+SCALE = 1 / 1024  # exact, so that equal pictures are equal bytes
+
+
+class RenderSource(CliTest):
+    """A source of 60 frames a second, z up, in strange units; plain/ has what it shows at 30, y up, in metres."""
+
+    def setUp(self):
+        super().setUp()
+        self.ply("hero.ply", points(90, 7))
+        for i in range(FRAMES):
+            cloud = [(x + 0.05 * i, y, z) for x, y, z in points(120, i)]
+            self.ply("odd/f%d.ply" % i, [(x / SCALE, -z / SCALE, y / SCALE) for x, y, z in cloud])
+            if i % 2 == 0:
+                self.ply("plain/f%d.ply" % i, cloud)
+        os.mkdir(self.path("results"))
+        self.done(*self.retarget("results/r.h5", "--source", "odd", *self.how()))
+
+    def how(self):
+        return ["--fps", 60, "--source-up", "z", "--scale", SCALE]
+
+    def retarget(self, out, *more):
+        return ["retarget", "--target", "hero.ply", "--weights", weights("tiny"), "--force", "--out", out, *more]
+
+    def sheet(self, *arguments):
+        """The picture, and what is said of it."""
+        found = self.json("render", *arguments, "--out", "sheet.png")
+        return self.bytes("sheet.png"), found
+
+    def test_a_result_knows_its_source(self):
+        wanted, _ = self.sheet("results/r.h5", "--source", "plain", "--scale", 1)
+        remembered, found = self.sheet("results/r.h5")
+        self.assertEqual((found["source"], found["fps"], found["frames"]), ("odd", 30, FRAMES // 2))
+        self.assertEqual(remembered, wanted)
+        self.assertEqual(self.sheet("results/r.h5", "--source", "odd")[0], wanted, "named, read as remembered")
+        self.assertNotEqual(self.sheet("results/r.h5", "--no-source")[0], wanted)
+        self.done("render", "results/r.h5", "--out", "page.html")
+        self.assertIn(">source<", self.bytes("page.html").decode())
+        # Seen from elsewhere, and moved as a whole.
+        os.mkdir(self.path("moved"))
+        for name in ("odd", "results"):
+            os.rename(self.path(name), self.path("moved/" + name))
+        self.assertEqual(self.sheet("moved/results/r.h5")[0], wanted)
+
+    def test_options_say_how_a_source_is_read(self):
+        wanted, _ = self.sheet("results/r.h5")
+        shutil.copytree(self.path("odd"), self.path("copy"))
+        self.assertEqual(self.sheet("results/r.h5", "--source", "copy", *self.how())[0], wanted)
+        for k in (0, 2, 4):  # each of them is needed
+            left = self.how()[:k] + self.how()[k + 2:]
+            self.assertNotEqual(self.sheet("results/r.h5", "--source", "copy", *left)[0], wanted, left)
+        for option, value in (("--fps", 30), ("--source-up", "-z"), ("--scale", SCALE / 2)):
+            self.assertNotEqual(self.sheet("results/r.h5", option, value)[0], wanted, option)
+        # Somebody as large as a house would be an empty row: it is said.
+        result = self.restage("render", "results/r.h5", "--source", "copy", "--out", "sheet.png")
+        self.assertEqual(result.code, 0, result.err)
+        self.assertIn("--scale", result.err)
+        self.assertIn("copy", result.err)
+        self.assertNotIn("--scale", self.restage("render", "results/r.h5", "--out", "sheet.png").err)
+
+    def test_a_source_that_is_gone(self):
+        shutil.rmtree(self.path("odd"))
+        result = self.restage("render", "results/r.h5", "--out", "sheet.png")
+        self.assertEqual(result.code, 0, result.err)
+        self.assertIn("odd, is not there any more", result.err)
+        self.bad_input(["render", "results/r.h5", "--source", "odd", "--out", "a.png"], "odd")
+
+    def test_rows_are_paired_by_time(self):
+        self.done(*self.retarget("third.h5", "--source", "plain", "--every", 3))
+        picture, found = self.sheet("third.h5", "--truth", "results/r.h5")
+        self.assertEqual((found["fps"], found["frames"]), (10, 2))
+        for i in (0, 3):
+            self.ply("picked/f%d.ply" % i, self.vertices("plain/f%d.ply" % (2 * i)))
+        self.assertEqual(self.sheet("third.h5", "--truth", "results/r.h5", "--source", "picked", "--fps", 10)[0], picture)
+        self.assertNotEqual(self.sheet("third.h5", "--truth", "results/r.h5", "--source", "picked")[0], picture)
+
+    def test_bad_frames_of_the_source(self):
+        wanted, _ = self.sheet("results/r.h5")
+        self.write("odd/f4.ply", self.bytes("odd/f4.ply")[:-10])
+        result = self.restage("render", "results/r.h5", "--out", "sheet.png")
+        self.assertEqual(result.code, 0, result.err)
+        self.assertIn("f4.ply", result.err)
+        self.assertNotEqual(self.bytes("sheet.png"), wanted)
+
+    def test_one_of_several_sequences(self):
+        clouds = [points(100, 20 + i) for i in range(6)]
+        self.h5("two.h5", vertices=([6, 100, 3], [x for cloud in clouds for p in cloud for x in p], "float32"),
+                sequence_offset=([3], [0, 3, 6], "int64"))
+        self.done(*self.retarget("second.h5", "--source", "two.h5", "--sequence", 1))
+        wanted, found = self.sheet("second.h5")
+        self.assertEqual((found["source"], found["frames"]), ("two.h5", 3))
+        self.assertEqual(self.sheet("second.h5", "--source-sequence", 1)[0], wanted)
+        self.assertNotEqual(self.sheet("second.h5", "--source-sequence", 0)[0], wanted)
+        self.bad_input(["render", "second.h5", "--source-sequence", 2, "--out", "a.png"], "two.h5", "sequence")
+
+    def test_a_close_up_leaves_a_source_without_joints_out(self):
+        result = self.restage("render", "results/r.h5", "--focus", "head", "--out", "sheet.png")
+        self.assertEqual(result.code, 0, result.err)
+        self.assertIn("odd", result.err)
+        self.bad_input(["render", "results/r.h5", "--source", "odd", "--focus", "head", "--out", "a.png"], "odd", "joints")
+
+    def test_bad_options(self):
+        self.ply("one.ply", points(50, 1))
+        for option in (("--scale", 2), ("--source-up", "z"), ("--clip", "Walk"), ("--source-sequence", 0)):
+            self.bad_input(["render", "one.ply", *option, "--out", "a.png"], option[0], "--source")
+            self.bad_input(["render", "results/r.h5", "--no-source", *option, "--out", "a.png"], option[0])
+        self.bad_input(["render", "results/r.h5", "--no-source", "--source", "odd", "--out", "a.png"], "--no-source")
+        for option in (("--scale", 0), ("--source-up", "w"), ("--fps", 0), ("--fps", "nan"), ("--clip", "Walk")):
+            self.bad_input(["render", "results/r.h5", *option, "--out", "a.png"], option[0])
