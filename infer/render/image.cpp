@@ -22,6 +22,7 @@ constexpr std::string_view kFont =
 #include "infer/render/hershey.inc"
     ;
 constexpr double kCapital = 21.0, kTop = -12.0;  // in the font's units
+constexpr int kJpegQuality = 85;                 // of 100
 
 struct Stroke {
   double x0, y0, x1, y1;
@@ -71,6 +72,12 @@ void blend(Image& image, int x, int y, Rgb colour, double share) {
                                    static_cast<size_t>(x))];
   for (size_t k = 0; k < 3; ++k)
     pixel[k] = static_cast<uint8_t>(std::lround(pixel[k] + share * (colour[k] - pixel[k])));
+}
+
+/// What the encoder calls with each piece of a file.
+void append(void* context, void* data, int size) {
+  static_cast<std::string*>(context)->append(static_cast<const char*>(data),
+                                             static_cast<size_t>(size));
 }
 
 }  // namespace
@@ -124,10 +131,6 @@ int text_width(double size, std::string_view text) {
 
 std::string png_bytes(const Image& image) {
   std::string bytes;
-  const auto append = [](void* context, void* data, int size) {
-    static_cast<std::string*>(context)->append(static_cast<const char*>(data),
-                                               static_cast<size_t>(size));
-  };
   if (stbi_write_png_to_func(append, &bytes, image.width, image.height, 3, image.rgb.data(),
                              3 * image.width) == 0)
     throw WorkError("png: the picture could not be encoded; make it smaller");
@@ -136,6 +139,14 @@ std::string png_bytes(const Image& image) {
 
 void write_png(const std::string& path, const Image& image) {
   write_file_atomically(path, png_bytes(image));
+}
+
+void write_jpeg(const std::string& path, const Image& image) {
+  std::string bytes;
+  if (stbi_write_jpg_to_func(append, &bytes, image.width, image.height, 3, image.rgb.data(),
+                             kJpegQuality) == 0)
+    throw WorkError("jpeg: the picture could not be encoded; make it smaller");
+  write_file_atomically(path, bytes);
 }
 
 }  // namespace restage
