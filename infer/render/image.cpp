@@ -22,7 +22,6 @@ constexpr std::string_view kFont =
 #include "infer/render/hershey.inc"
     ;
 constexpr double kCapital = 21.0, kTop = -12.0;  // in the font's units
-constexpr int kJpegQuality = 85;                 // of 100
 
 struct Stroke {
   double x0, y0, x1, y1;
@@ -142,9 +141,10 @@ void write_png(const std::string& path, const Image& image) {
 }
 
 void write_jpeg(const std::string& path, const Image& image) {
+  constexpr int kQuality = 85;  // of 100
   std::string bytes;
   if (stbi_write_jpg_to_func(append, &bytes, image.width, image.height, 3, image.rgb.data(),
-                             kJpegQuality) == 0)
+                             kQuality) == 0)
     throw WorkError("jpeg: the picture could not be encoded; make it smaller");
   write_file_atomically(path, bytes);
 }
