@@ -7,12 +7,15 @@
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/log.h"
 #include "autograd/base/nearest.h"
+#include "datasets/readers/sha256.h"
+#include "experiments/sweep/json_reader.h"
 #include "experiments/sweep/sweep_dir.h"
 
 namespace restage::reproduce {
 namespace {
 
 namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;  // entries stay in the order of the sweep that wrote them
 
 bool is_file(const std::string& path) {
   std::error_code ignored;
@@ -34,12 +37,55 @@ void copy(const std::string& from, const std::string& to) {
   write_file_atomically(to, read_file(from, kMostBytes));
 }
 
-/// Whose machine it was is nobody's business.
-void copy_result(const std::string& from, const std::string& to) {
-  auto document = nlohmann::ordered_json::parse(read_file(from, kMostBytes));
+/// The scores of every reference of every set.
+std::vector<Json*> references_of(Json& result) {
+  std::vector<Json*> out;
+  if (const auto metrics = result.find("metrics"); metrics != result.end())
+    for (Json& set : *metrics)
+      if (const auto references = set.find("references"); references != set.end())
+        for (Json& scores : *references) out.push_back(&scores);
+  return out;
+}
+
+std::string reference_name(const std::string& text) { return sha256(text).substr(0, 12); }
+
+/// A line for each entry, so that a difference shows what differs.
+std::string text_of(const Json& document) { return document.dump(0) + "\n"; }
+
+/// Writes the committed form of a result. The machine that made it is nobody's business.
+void keep_result(const Evidence& evidence, const std::string& id, const std::string& from) {
+  Json document = Json::parse(read_file(from, kMostBytes));
   document.erase("host");
   document.erase("command");
-  write_file_atomically(to, document.dump(1) + "\n");
+  for (Json* scores : references_of(document)) {
+    const std::string text = text_of(*scores);
+    const std::string name = reference_name(text);
+    const std::string path = kept(evidence, "references/" + name);
+    make_folder(evidence.folder + "/results/references");
+    if (!is_file(path)) write_file_atomically(path, text);
+    *scores = name;
+  }
+  write_file_atomically(kept(evidence, id), text_of(document));
+}
+
+/// A committed result as its trial wrote it. InputError: it is damaged, or one of its references
+/// is.
+Json kept_result(const Evidence& evidence, const std::string& id) {
+  const std::string result = kept(evidence, id);
+  const std::string fix = "restore it; without it the result of trial " + id + " is not used";
+  const sweep::JsonReader<Json> reader(result, fix);
+  Json document = reader.parse();
+  for (Json* scores : references_of(document)) {
+    if (!scores->is_string()) continue;  // a result.json that was copied by hand has the scores
+    const auto name = scores->get<std::string>();
+    if (!sweep::is_trial_id(name)) reader.fail("has a reference that is not 12 hex digits");
+    const std::string path = kept(evidence, "references/" + name);
+    if (!is_file(path)) throw InputError(path, "is not there, and " + result + " needs it", fix);
+    const std::string text = read_file(path, kMostBytes);
+    if (reference_name(text) != name) throw InputError(path, "is damaged", fix);
+    *scores = Json::parse(text, nullptr, false);
+  }
+  return document;
 }
 
 /// All folders with a paper.yaml, sorted.
@@ -99,16 +145,17 @@ int take_results(const Evidence& evidence) {
     const auto own = sweep::read_result(dir, trial.id);
     if (own && own->state == tables::TrialState::done) continue;
     try {
-      if (tables::read_result(path, trial.id).state != tables::TrialState::done) continue;
+      const Json document = kept_result(evidence, trial.id);
+      if (tables::parse_result(document, path, trial.id).state != tables::TrialState::done)
+        continue;
+      make_folder(dir.folder(trial.id));
+      write_file_atomically(dir.result(trial.id), document.dump(1) + "\n");
+      ++taken;
     } catch (const ReadError&) {
       throw;
     } catch (const InputError& error) {
       log_warning(error.what());
-      continue;
     }
-    make_folder(dir.folder(trial.id));
-    copy(path, dir.result(trial.id));
-    ++taken;
   }
   return taken;
 }
@@ -127,7 +174,7 @@ void keep_results(const Evidence& evidence, const std::string& budget) {
   for (const sweep::TrialEntry& trial : dir.trials) {
     const auto result = sweep::read_result(dir, trial.id);
     if (result && result->state == tables::TrialState::done && !is_file(kept(evidence, trial.id)))
-      copy_result(dir.result(trial.id), kept(evidence, trial.id));
+      keep_result(evidence, trial.id, dir.result(trial.id));
   }
   sweep::PlanFile plan = dir;
   plan.directory = ".";

@@ -5,8 +5,13 @@
 //   NAME/README.md            what is the same here and what is not
 //   NAME/results/ID.json      result.json of trials that were run once, without weights
 //   NAME/results/BUDGET.json  plan.json of the trials that a budget stands for
+//   NAME/results/references/SUM.json
+//                             the scores of a reference, such as "rest_pose". Many trials measured
+//                             the same, so ID.json has SUM in their place: the first 12 hex digits
+//                             of the SHA-256 of the file with the scores
 //
-// Committed results are as good as new ones: the id says that the question is the same.
+// Committed results are as good as new ones: the id says that the question is the same, and no
+// digit is left out.
 #pragma once
 
 #include <string>
@@ -33,7 +38,8 @@ std::vector<Evidence> find_evidence(const std::string& from, const std::string& 
                                     const std::string& table, const std::string& out);
 
 /// Puts committed results of trials that its plan asks for, and that are not done, where the sweep
-/// looks for them. Returns how many.
+/// looks for them, with the scores of their references. What is damaged is told and left out.
+/// Returns how many.
 int take_results(const Evidence& evidence);
 /// Without planning: the sweep's folder from the committed plan of a budget, if it has none yet.
 /// False: there is no such plan.

@@ -132,7 +132,7 @@ void draw(const std::optional<sweep::SweepDir>& dir, const tables::Results& resu
   try {
     const auto image = drawn(*dir, results, picture, sequence);
     if (!image) return left("weights of its rows are not here");
-    write_png(path, *image);
+    write_jpeg(path, *image);
   } catch (const InputError& error) {
     left(error.what());
   }
@@ -156,7 +156,7 @@ std::vector<Drawn> draw_pictures(const Evidence& evidence, const tables::Results
         sequences = worst_of(*trial, picture.set, static_cast<size_t>(picture.worst));
     }
     for (const std::string& sequence : sequences) {
-      const std::string file = evidence.name + "-" + std::to_string(++number) + ".png";
+      const std::string file = evidence.name + "-" + std::to_string(++number) + ".jpg";
       const std::string path = folder + "/" + file;
       draw(dir, results, picture, sequence, path);
       if (is_there(path))

@@ -14,7 +14,7 @@ struct Drawn {
   std::string says;
 };
 
-/// Draws them as FOLDER/NAME-N.png, by the trials of each row's lowest seed. Where weights are
+/// Draws them as FOLDER/NAME-N.jpg, by the trials of each row's lowest seed. Where weights are
 /// missing (results that were committed have none), or the sweep knows no benchmark, a line of the
 /// log says so and an earlier picture stays. Returns those that are there.
 std::vector<Drawn> draw_pictures(const Evidence& evidence, const tables::Results& results,

@@ -15,6 +15,8 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
+constexpr const char* kFix = "it is not used; remove it and run the trial again";
+
 /// Reads the scores of a result.
 class Reader : public sweep::JsonReader<Json> {
  public:
@@ -147,8 +149,11 @@ std::string plain_text(const Json& value) {
 }
 
 TrialResult read_result(const std::string& path, const std::string& id) {
-  const Reader reader(path, "it is not used; remove it and run the trial again");
-  const Json document = reader.parse();
+  return parse_result(Reader(path, kFix).parse(), path, id);
+}
+
+TrialResult parse_result(const Json& document, const std::string& path, const std::string& id) {
+  const Reader reader(path, kFix);
   TrialResult out{read_entry<Json>(reader, document)};
   if (out.id != id) reader.fail("is the result of another trial (" + out.id + ")");
   const std::string state = reader.text(document, "state");

@@ -52,6 +52,9 @@ struct Results {
 
 /// One result file. InputError: damaged, or the result of another trial.
 TrialResult read_result(const std::string& path, const std::string& id);
+/// The same of a document that was read from `path` already.
+TrialResult parse_result(const nlohmann::json& document, const std::string& path,
+                         const std::string& id);
 /// All trials of a sweep. InputError: `dir` holds no sweep. ReadError: a file of it cannot be read,
 /// which says nothing about its trial.
 Results read_results(const std::string& dir);

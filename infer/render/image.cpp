@@ -75,6 +75,12 @@ void blend(Image& image, int x, int y, Rgb colour, double share) {
     pixel[k] = static_cast<uint8_t>(std::lround(pixel[k] + share * (colour[k] - pixel[k])));
 }
 
+/// What the encoder calls with each piece of a file.
+void append(void* context, void* data, int size) {
+  static_cast<std::string*>(context)->append(static_cast<const char*>(data),
+                                             static_cast<size_t>(size));
+}
+
 }  // namespace
 
 Image::Image(int w, int h, Rgb fill) : width(w), height(h) {
@@ -126,10 +132,6 @@ int text_width(double size, std::string_view text) {
 
 std::string png_bytes(const Image& image) {
   std::string bytes;
-  const auto append = [](void* context, void* data, int size) {
-    static_cast<std::string*>(context)->append(static_cast<const char*>(data),
-                                               static_cast<size_t>(size));
-  };
   if (stbi_write_png_to_func(append, &bytes, image.width, image.height, 3, image.rgb.data(),
                              3 * image.width) == 0)
     throw WorkError("png: the picture could not be encoded; make it smaller");
@@ -138,6 +140,15 @@ std::string png_bytes(const Image& image) {
 
 void write_png(const std::string& path, const Image& image) {
   write_file_atomically(path, png_bytes(image));
+}
+
+void write_jpeg(const std::string& path, const Image& image) {
+  constexpr int kQuality = 85;  // of 100
+  std::string bytes;
+  if (stbi_write_jpg_to_func(append, &bytes, image.width, image.height, 3, image.rgb.data(),
+                             kQuality) == 0)
+    throw WorkError("jpeg: the picture could not be encoded; make it smaller");
+  write_file_atomically(path, bytes);
 }
 
 }  // namespace restage

@@ -1,4 +1,4 @@
-// Pictures of 8 bits per channel, small text on them, PNG.
+// Pictures of 8 bits per channel, small text on them, PNG and JPEG.
 #pragma once
 
 #include <array>
@@ -32,5 +32,7 @@ int text_width(double size, std::string_view text);
 std::string png_bytes(const Image& image);
 /// The file appears whole or not at all.
 void write_png(const std::string& path, const Image& image);
+/// Likewise; a quarter of the bytes, and small text stays readable.
+void write_jpeg(const std::string& path, const Image& image);
 
 }  // namespace restage

@@ -1,4 +1,6 @@
 """restage reproduce: a paper's experiments from their folder to a page with verdicts."""
+import glob
+import json
 import os
 import shutil
 import struct
@@ -34,6 +36,15 @@ lite: {set: true_skeletons, note: Tiny.}
 """
 
 
+def jpeg_size(data):
+    """Height and width, from the frame header of a baseline JPEG."""
+    assert data[:2] == b"\xff\xd8", "no JPEG"
+    at = 2
+    while data[at:at + 2] != b"\xff\xc0":
+        at += 2 + struct.unpack(">H", data[at + 2:at + 4])[0]
+    return struct.unpack(">HH", data[at + 5:at + 9])
+
+
 class Reproduce(CliTest):
     def setUp(self):
         super().setUp()
@@ -47,6 +58,9 @@ class Reproduce(CliTest):
 
     def text(self, name):
         return self.bytes(name).decode()
+
+    def result(self, name):
+        return json.loads(self.bytes(name))
 
     def test_runs_judges_keeps_and_makes_the_page_again(self):
         found = self.reproduce("--budget", "lite", "--out", "r", "--keep", "--jobs", 2)
@@ -62,9 +76,15 @@ class Reproduce(CliTest):
                      "(experiments/one/README.md)", "restage sweep run experiments/one/sweep.yaml"):
             self.assertIn(part.replace("(experiments", "(../experiments"), page)
         self.assertEqual(sorted(os.listdir(self.path("r/somebody2024"))), ["one.csv", "one.svg", "one.tex"])
-        kept = sorted(os.listdir(self.path("experiments/one/results")))
+        kept = sorted(n for n in os.listdir(self.path("experiments/one/results")) if n != "references")
         self.assertEqual((len(kept), kept[-1]), (7, "lite.json"))
         self.assertNotIn("host", self.text("experiments/one/results/" + kept[0]))
+        # Six trials measured the same references: true joints, whatever was trained.
+        shared = os.listdir(self.path("experiments/one/results/references"))
+        named = {n for name in kept[:-1] for s in self.result("experiments/one/results/" + name)["metrics"].values()
+                 for n in s["references"].values()}
+        self.assertEqual({n[:-5] for n in shared}, named)
+        self.assertLess(len(named), 6)
 
         before = {name: self.bytes("r/one/trials/%s/result.json" % name[:-5]) for name in kept[:-1]}
         self.assertEqual(self.reproduce("--budget", "lite", "--out", "r"), found)
@@ -73,6 +93,9 @@ class Reproduce(CliTest):
         # What is committed is as good as what was run: planned, but not made again; and without any planning.
         self.assertEqual(self.reproduce("--budget", "lite", "--out", "again"), found)
         self.assertFalse(os.path.exists(self.path("again/store")))
+        for name in kept[:-1]:
+            ran, taken = (self.result("%s/one/trials/%s/result.json" % (folder, name[:-5])) for folder in ("r", "again"))
+            self.assertEqual({k: v for k, v in ran.items() if k not in ("host", "command")}, taken, "every digit is there")
         os.remove(self.path("tiny.yaml"))
         self.assertEqual(self.reproduce("--budget", "lite", "--out", "page/work", "--page", "page", "--no-run"), found)
         head = lambda text: text[text.index("Claims:"):]
@@ -91,24 +114,24 @@ class Reproduce(CliTest):
         self.reproduce("--budget", "lite", "--out", "r", "--keep")
         shapes = []
         for number in (1, 2):
-            name = "r/somebody2024/one-%d.png" % number
+            name = "r/somebody2024/one-%d.jpg" % number
             self.assertIn("(%s)" % name[2:], self.text("r/somebody2024.md"))
-            shapes.append(struct.unpack(">II", self.bytes(name)[16:24]))
+            shapes.append(jpeg_size(self.bytes(name)))
         # Lines of cells: source, rows, truth; columns: moments.
-        self.assertAlmostEqual(shapes[0][1] / shapes[1][1], 4 / 3, 1)
-        self.assertAlmostEqual(shapes[0][0] / shapes[1][0], 2 / 6, 1)
+        self.assertAlmostEqual(shapes[0][0] / shapes[1][0], 4 / 3, 1)
+        self.assertAlmostEqual(shapes[0][1] / shapes[1][1], 2 / 6, 1)
         self.assertIn("The worst: " + os.listdir(self.path("small/naked"))[0], self.text("r/somebody2024.md"))
         # The lowest seed's; the same bytes again; from results without weights the picture stays as it is.
-        first = [self.bytes("r/somebody2024/one-%d.png" % n) for n in (1, 2)]
+        first = [self.bytes("r/somebody2024/one-%d.jpg" % n) for n in (1, 2)]
         self.reproduce("--budget", "lite", "--out", "r")
-        self.assertEqual([self.bytes("r/somebody2024/one-%d.png" % n) for n in (1, 2)], first)
+        self.assertEqual([self.bytes("r/somebody2024/one-%d.jpg" % n) for n in (1, 2)], first)
         shutil.rmtree(self.path("r/store"))
-        self.write("r/somebody2024/one-1.png", "kept")
-        os.remove(self.path("r/somebody2024/one-2.png"))
+        self.write("r/somebody2024/one-1.jpg", "kept")
+        os.remove(self.path("r/somebody2024/one-2.jpg"))
         self.reproduce("--budget", "lite", "--out", "r", "--no-run")
-        self.assertEqual(self.bytes("r/somebody2024/one-1.png"), b"kept")
-        self.assertIn("one-1.png", self.text("r/somebody2024.md"))
-        self.assertNotIn("one-2.png", self.text("r/somebody2024.md"))
+        self.assertEqual(self.bytes("r/somebody2024/one-1.jpg"), b"kept")
+        self.assertIn("one-1.jpg", self.text("r/somebody2024.md"))
+        self.assertNotIn("one-2.jpg", self.text("r/somebody2024.md"))
         # Bad recipes.
         for change, *contains in ((("rows: [trained]", "rows: [traind]"), "traind", "trained"), (("worst: 1, ", ""), "'worst'"),
                                   (("set: scans", "set: scan"), "scan"), (("rows: [trained]", "rows: []"), "'rows' is empty")):
@@ -156,3 +179,16 @@ class OurFolders(CliTest):
             found = self.json("reproduce", paper, "--budget", "lite", "--out", "r", "--no-run", "--quiet")
             self.assertGreater(len(found["claims"]), 0)
             self.assertIn("# " + paper, self.bytes("r/%s.md" % paper).decode())
+
+    def test_what_is_committed_is_light_and_whole(self):
+        """At most 8 MB of results and pages; every reference of a result is there, and none that no result names."""
+        files = [f for part in ("experiments/**/results/**", "docs/reproduction/**")
+                 for f in glob.glob(os.path.join(ROOT, part), recursive=True) if os.path.isfile(f)]
+        self.assertGreater(len(files), 100)
+        self.assertLess(sum(map(os.path.getsize, files)), 8e6, "committed results and pictures; see experiments/reproduce/evidence.h")
+        for folder in glob.glob(os.path.join(ROOT, "experiments", "*", "results")):
+            named = set()
+            for name in glob.glob(os.path.join(folder, "*.json")):
+                with open(name, encoding="utf-8") as file:
+                    named |= {n for s in json.load(file).get("metrics", {}).values() for n in s.get("references", {}).values()}
+            self.assertEqual(named, {os.path.basename(n)[:-5] for n in glob.glob(os.path.join(folder, "references", "*"))}, folder)

@@ -286,5 +286,95 @@ TEST_F(Reproduce, CommittedResultsAreTakenAndKept) {
   EXPECT_HAS(refused("somebody2024", "5"), "there are 4");
 }
 
+/// A sweep of two rows of two trials, whose results stand in out/x; only `new` has other
+/// references.
+class Kept : public Reproduce {
+ protected:
+  static Json scores(double mpjpe) {
+    return {
+        {"mean", {{"mpjpe", mpjpe}, {"mpvd", nullptr}}},
+        {"sequences", {{{"name", "walk"}, {"frames", 9}, {"mpjpe", mpjpe}, {"mpvd", nullptr}}}}};
+  }
+  void SetUp() override {
+    Reproduce::SetUp();
+    references_ = {{"rest_pose", scores(1.0 / 3)}, {"closed_form", scores(0.1)}};
+    put("old", 2, 0.10, 0.02, 0.001);
+    references_["closed_form"] = scores(0.2);
+    put("new", 2, 0.09, 0.02, 0.001);
+    dir.write("x/sweep.yaml", "base: nothing.yaml\n");
+    Json trials = Json::array();
+    for (int i = 1; i <= 4; ++i)
+      trials.push_back({{"id", id(i)},
+                        {"case", i <= 2 ? "old" : "new"},
+                        {"seed", (i - 1) % 2 + 1},
+                        {"overrides", Json::object()},
+                        {"artifacts", Json::object()}});
+    fs::create_directories(dir / "out/x");
+    fs::rename(dir / "x/trials", dir / "out/x/trials");
+    dir.write("out/x/plan.json", Json{{"trials", trials}}.dump());
+    for (int i = 1; i <= 4; ++i) {
+      Json result = Json::parse(bytes_of(result_of(i)));
+      before_.push_back(result);
+      result["host"] = "somebody's";
+      result["command"] = "restage trial";
+      write_bytes(result_of(i), result.dump());
+    }
+    one_ = find_evidence(dir.path(), "somebody2024", "4", dir / "out")[0];
+    keep_results(one_, "lite");
+    fs::remove_all(dir / "out/x");
+  }
+  static std::string id(int i) { return "00000000000" + std::to_string(i); }
+  std::string result_of(int i) const { return dir / ("out/x/trials/" + id(i) + "/result.json"); }
+  std::string kept(int i) const { return dir / ("x/results/" + id(i) + ".json"); }
+  std::string reference(int i, const char* name) const {
+    const Json result = Json::parse(bytes_of(kept(i)));
+    return result["metrics"]["naked"]["references"][name].get<std::string>();
+  }
+  std::string file_of(const std::string& name) const {
+    return dir / ("x/results/references/" + name + ".json");
+  }
+  int taken() {
+    fs::remove_all(dir / "out/x");
+    EXPECT_TRUE(take_plan(one_, "lite"));
+    return take_results(one_);
+  }
+
+  Evidence one_;
+  std::vector<Json> before_;  ///< as the trials wrote them, but for host and command
+};
+
+TEST_F(Kept, ResultsShareTheirReferencesAndLoseNothing) {
+  EXPECT_EQ(std::distance(fs::directory_iterator(dir / "x/results/references"), {}), 3);
+  EXPECT_EQ(reference(1, "rest_pose"), reference(4, "rest_pose"));
+  EXPECT_EQ(reference(1, "closed_form"), reference(2, "closed_form"));
+  EXPECT_NE(reference(2, "closed_form"), reference(3, "closed_form"));
+  ASSERT_EQ(taken(), 4);
+  for (int i = 1; i <= 4; ++i)
+    EXPECT_EQ(Json::parse(bytes_of(result_of(i))), before_[static_cast<size_t>(i) - 1]);
+  EXPECT_EQ(bytes_of(kept(1)).find("  "), std::string::npos) << "lines, not indented";
+  const std::string bytes = bytes_of(kept(1));
+  fs::remove(kept(1));
+  keep_results(one_, "lite");
+  EXPECT_EQ(bytes_of(kept(1)), bytes) << "kept again, the same bytes";
+}
+
+TEST_F(Kept, AResultWhoseReferenceIsDamagedOrNotThereIsNotTaken) {
+  const std::string shared = file_of(reference(1, "rest_pose"));
+  const std::string other = file_of(reference(1, "closed_form"));
+  const std::string good = bytes_of(other);
+  write_bytes(other, replaced(good, "0.1", "0.7"));
+  EXPECT_EQ(taken(), 2) << "those that do not name it";
+  write_bytes(other, good);
+  EXPECT_EQ(taken(), 4);
+  const std::string text = bytes_of(kept(2));
+  for (const char* name : {"../x", "", "0000000000000", "00000000000g", "000000000000"}) {
+    write_bytes(kept(2), replaced(text, reference(1, "rest_pose"), name));
+    EXPECT_EQ(taken(), 3) << name;
+  }
+  write_bytes(kept(2), text);
+  fs::remove(shared);
+  EXPECT_EQ(taken(), 0);
+}
+
 }  // namespace
 }  // namespace restage::reproduce
