@@ -174,23 +174,36 @@ Character read_character(const std::string& path, const MotionOptions& options,
   return out;
 }
 
-TargetMesh read_target(const std::string& path) {
+TargetMesh read_target(const std::string& path, const std::string& bones) {
   TargetMesh out;
+  Gltf file;
+  if (is_gltf_name(path)) {
+    file = read_gltf(path);
+    describe(file, out.report);
+  }
+  if (file.skin_nodes.empty() && !bones.empty())
+    throw InputError(path, "has no rig whose bones could be named", "leave --bones out");
   if (!is_gltf_name(path)) {
     out.mesh = read_mesh(path);
     return out;
   }
-  const Gltf file = read_gltf(path);
-  describe(file, out.report);
-  if (file.skin_nodes.empty() || !has_known_joints(file)) {
-    out.report.remark(
-        file.skin_nodes.empty()
-            ? "has no rig: its mesh is taken as it stands"
-            : "the joints' names are of no known family: its mesh is taken as it stands");
+  MotionOptions options;
+  options.profile = bones;
+  GltfRig rig;
+  try {
+    if (!file.skin_nodes.empty()) rig = find_rig(file, options, out.report);
+  } catch (const UnknownSkeleton& error) {
+    out.unknown_rig = error.reason;
+  }
+  if (file.skin_nodes.empty() || !out.unknown_rig.empty()) {
+    out.report.remark(file.skin_nodes.empty()
+                          ? "has no rig: its mesh is taken as it stands"
+                          : "its rig was not recognised, so its mesh is taken as it stands (name "
+                            "its bones with --bones): " +
+                                out.unknown_rig);
     out.mesh = gltf_mesh(file, gltf_rest(file));
     return out;
   }
-  const GltfRig rig = find_rig(file, {}, out.report);
   check_handedness(t_pose_joints(rig), true, out.report);
   out.mesh = t_pose_mesh(file, rig);
   out.joints = t_pose_joints(rig);

@@ -26,7 +26,7 @@ namespace restage::cli {
 namespace {
 
 struct RetargetCommand {
-  std::string source, target, weights, out, clip, up = "y", format = "ply", device = "cpu";
+  std::string source, target, bones, weights, out, clip, up = "y", format = "ply", device = "cpu";
   std::string system = "chain", rest;
   std::optional<double> fps;        ///< of the source
   std::optional<int64_t> sequence;  ///< of the source, from 0
@@ -112,7 +112,8 @@ void check(const RetargetCommand& c) {
                      "end it in .glb, .bvh, .h5, or / for a folder");
   std::vector<std::string> inputs = {c.source, c.target};
   if (!c.weights.empty()) inputs.push_back(weights_path(c.weights));
-  if (!c.rest.empty()) inputs.push_back(c.rest);
+  for (const std::string& more : {c.rest, c.bones})
+    if (!more.empty()) inputs.push_back(more);
   check_output(c.out, inputs);
 }
 
@@ -123,10 +124,26 @@ void to_metres(const RetargetCommand& c, Points& points) {
   }
 }
 
+/// A target that is refused as it stands may only lack the names of its bones: then that is what
+/// there is to mend.
+template <class Work>
+auto with_target(const RetargetCommand& c, const TargetMesh& target, const Work& work) {
+  try {
+    return work();
+  } catch (const InputError& error) {
+    if (target.unknown_rig.empty() || !std::string(error.what()).starts_with(c.target)) throw;
+    throw InputError(
+        c.target, "it would be posed by its rig, which was not recognised: " + target.unknown_rig,
+        "say which bone is which joint with --bones names.yaml (docs/data.md)");
+  }
+}
+
 /// The doctor's words on what would make the result nonsense.
 void check_inputs(const RetargetCommand& c, FrameSource& frames, const TargetMesh& target) {
   if (c.options.force) return;
-  check_target(target.mesh, c.target, target.joints ? &*target.joints : nullptr);
+  with_target(c, target, [&] {
+    check_target(target.mesh, c.target, target.joints ? &*target.joints : nullptr);
+  });
   std::vector<Mesh> first;
   while (first.size() < kSourceFrames) {
     auto frame = frames.next();
@@ -185,14 +202,15 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   input.options = c.options;
   input.options.fps = c.fps.value_or(frames->fps());
   input.options.seed = common.seed;
-  TargetMesh target = read_target(c.target);
+  TargetMesh target = read_target(c.target, c.bones);
   check_inputs(c, *frames, target);
   if (!c.rest.empty()) input.rest = rest_joints(c.rest);
   // The joints that a rig names are where its maker put them, not where a network finds them.
   if (c.rest.empty() && !system_type(c.system).weights) input.rest = target.joints;
   input.target = std::move(target.mesh);
   input.target_name = c.target;
-  const auto system = system_type(c.system).make(std::move(input));
+  const auto system =
+      with_target(c, target, [&] { return system_type(c.system).make(std::move(input)); });
   // The first frame is looked at before anything is written or logged.
   double read = 0;
   const auto next = [&] {
@@ -282,6 +300,8 @@ void add_retarget(Program& program) {
   app.add_option("--target", c.target,
                  "mesh or cloud in T-pose, y up, facing +z; or a glTF character")
       ->required();
+  app.add_option("--bones", c.bones,
+                 "which bone of a glTF target is which joint, a .yaml file or a known family");
   app.add_option("--weights", c.weights, "weights file, run or artifact");
   app.add_option("--system", c.system, help_of_systems())->capture_default_str();
   app.add_option("--rest", c.rest, "the target's 22 rest joints (HDF5, /joints [1, 22, 3])");
