@@ -8,7 +8,9 @@
 namespace restage {
 namespace {
 
-constexpr size_t kLongestWord = 48;  // bytes; longer ones are no words of a body
+constexpr size_t kLongestWord = 48;    // bytes; longer ones are no words of a body
+constexpr size_t kLongestName = 1000;  // bytes; nobody reads more
+constexpr int kMostPieces = 16;        // of decoration
 
 enum class Kind : uint8_t { plain, part, left, right, upper, lower, helper };
 struct Word {
@@ -187,8 +189,8 @@ bool has_meaning(std::string_view piece) {
          });
 }
 
-/// The shortest text that three quarters of the names share with `part_of` and that leaves
-/// something of them; "" if there is none.
+/// What part_of() gives of three quarters of the names, if it leaves something of them; "" if they
+/// share nothing.
 template <class PartOf>
 std::string shared(const std::vector<std::string>& names, const PartOf& part_of) {
   std::map<std::string, size_t> count;
@@ -252,22 +254,23 @@ std::string shared_letters(const std::vector<std::string>& names) {
   std::string out;
   size_t all = 0;
   for (const std::string& name : names) all += !name.empty();
-  for (;;) {
+  while (out.size() < kLongestWord) {
     std::map<char, size_t> next;
     for (const std::string& name : names)
       if (name.size() > out.size() + 1 && name.starts_with(out)) ++next[name[out.size()]];
     const auto most = std::max_element(
         next.begin(), next.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
-    if (most == next.end() || most->second < 4 || 4 * most->second < 3 * all) return out;
+    if (most == next.end() || most->second < 4 || 4 * most->second < 3 * all) break;
     out += most->first;
   }
+  return out;
 }
 
 }  // namespace
 
 BoneWords bone_words(std::string_view name) {
   BoneWords out;
-  const std::vector<Token> tokens = tokens_of(name);
+  const std::vector<Token> tokens = tokens_of(name.substr(0, kLongestName));
   int parts = 0, strangers = 0;
   bool both = false;
   for (size_t i = 0; i < tokens.size(); ++i) {
@@ -325,8 +328,9 @@ std::vector<std::string> undecorated(const std::vector<std::string>& names) {
         name.resize(name.size() - ending.size());
     return !ending.empty();
   };
-  while (drop_first(shared(out, first_part))) continue;
-  while (drop_numbers(out) || drop_last(shared(out, last_part))) continue;
+  for (int i = 0; i < kMostPieces && drop_first(shared(out, first_part)); ++i) continue;
+  for (int i = 0; i < kMostPieces && (drop_numbers(out) || drop_last(shared(out, last_part))); ++i)
+    continue;
   drop_first(shared_letters(out));
   return out;
 }

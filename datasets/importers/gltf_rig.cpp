@@ -161,6 +161,8 @@ const Profile& vrm_profile() {
 NamedJoints rig_names(const Gltf& file, const std::vector<int>& nodes, const GltfTransforms& bind,
                       const Profile* profile) {
   const bool listed = by_list(file, profile);
+  // A skin is one person's, whoever says which bone is which.
+  if (!file.skin_nodes.empty()) check_one_person(skeleton_of(file, nodes, bind, false), file.path);
   return name_joints(skeleton_of(file, nodes, bind, listed), file.path,
                      listed ? &vrm_profile() : profile);
 }

@@ -167,10 +167,12 @@ void check_encoding(const SourceSkeleton& skeleton, const std::string& where) {
   }
 }
 
-[[noreturn]] void throw_two(const SourceSkeleton& skeleton, const std::vector<int>& people,
-                            const std::string& where) {
+/// The bone that carries the only person; -1: nothing tells. InputError for two.
+int only_person(const BoneTree& tree, const std::string& where) {
+  const std::vector<int> people = find_people(tree);
+  if (people.size() < 2) return people.empty() ? -1 : people[0];
   std::vector<std::string> tops;
-  for (const int top : people) tops.push_back(text::quote(skeleton.names[top]));
+  for (const int top : people) tops.push_back(text::quote(tree.skeleton.names[top]));
   throw InputError(where,
                    cat("holds ", people.size(), " characters (their bones hang on ", list_of(tops),
                        "), and each needs a file of its own"),
@@ -232,16 +234,18 @@ std::vector<std::string> words_for(const BoneTree& tree, const FoundJoints& foun
 
 [[noreturn]] void throw_not_found(const BoneTree& tree, const FoundJoints& found,
                                   const std::vector<std::string>& plain, const std::string& where) {
-  const auto known =
-      std::count_if(found.bones.begin(), found.bones.end(), [](int bone) { return bone >= 0; });
+  const bool any = std::any_of(tree.words.begin(), tree.words.end(), [](const BoneWords& words) {
+    return words.part != Part::none && !words.helper;
+  });
   std::string what;
-  if (known == 0) {
+  if (!any) {
     std::vector<std::string> some;
+    size_t named = 0;
     for (const std::string& name : tree.skeleton.names)
-      if (!name.empty() && some.size() < 3) some.push_back(text::quote(name));
+      if (!name.empty() && ++named <= 3) some.push_back(text::quote(name));
     what = some.empty() ? "its bones have no names"
-                        : cat("none of its ", tree.skeleton.size(),
-                              " bones is named like a person's (", list_of(some), " ...)");
+                        : cat("none of its ", named, " bones is named like a person's (",
+                              list_of(some), named > 3 ? " ...)" : ")");
   } else {
     what = cat("of the joints of a person these were not found among its bones: ",
                list_of(words_for(tree, found, plain)), found.why.empty() ? "" : "; ", found.why);
@@ -266,6 +270,12 @@ Bones asked_bones(const Profile& profile, const SourceSkeleton& skeleton, const 
   return bones;
 }
 
+BoneTree tree_of(const SourceSkeleton& skeleton, const std::vector<std::string>& plain) {
+  BoneTree out{skeleton, {}};
+  for (const std::string& name : plain) out.words.push_back(bone_words(name));
+  return out;
+}
+
 /// The profile of bones that were found without one.
 const Profile& no_profile() {
   static const Profile out = [] {
@@ -278,19 +288,20 @@ const Profile& no_profile() {
 
 }  // namespace
 
+void check_one_person(const SourceSkeleton& skeleton, const std::string& where) {
+  only_person(tree_of(skeleton, undecorated(skeleton.names)), where);
+}
+
 NamedJoints name_joints(const SourceSkeleton& skeleton, const std::string& where,
                         const Profile* profile) {
   const std::vector<std::string> plain = undecorated(skeleton.names);
-  BoneTree tree{skeleton, {}};
-  for (const std::string& name : plain) tree.words.push_back(bone_words(name));
+  const BoneTree tree = tree_of(skeleton, plain);
   const BoneNames names(skeleton, plain, profile != nullptr);
   const auto by_name = [&](const std::string& name) { return names.find(name); };
   if (profile)
     return place_joints(tree, by_name, *profile, asked_bones(*profile, skeleton, names, where),
                         where);
-  const std::vector<int> people = find_people(tree);
-  if (people.size() > 1) throw_two(skeleton, people, where);
-  const FoundJoints found = find_joints(tree, people.empty() ? -1 : people[0]);
+  const FoundJoints found = find_joints(tree, only_person(tree, where));
   const Family family = find_family(tree, names);
   if (family.profile && !knows_less(family, found))
     return place_joints(tree, by_name, *family.profile, family.bones, where);

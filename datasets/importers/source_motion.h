@@ -53,6 +53,8 @@ struct UnknownSkeleton : InputError {
 /// lacks, and for names in another encoding than UTF-8.
 NamedJoints name_joints(const SourceSkeleton& skeleton, const std::string& where,
                         const Profile* profile = nullptr);
+/// InputError if there are two characters in it: name_joints() without a profile says so, too.
+void check_one_person(const SourceSkeleton& skeleton, const std::string& where);
 /// Positions of all its joints at zero rotations, relative to the root.
 std::vector<Vec3> zero_positions(const SourceSkeleton& skeleton);
 /// Positions of the 22 joints at zero rotations, relative to the pelvis.
