@@ -46,10 +46,10 @@ const Dictionary& dictionary() {
     part(Part::arm, "arm");
     part(Part::forearm, "forearm farm elbow radius ulna ひじ 肘");
     part(Part::hand, "hand wrist 手首");
-    part(Part::palm, "palm fist");
+    part(Part::palm, "palm fist 手");
     part(Part::thigh, "thigh upleg femur 足");
     part(Part::leg, "leg");
-    part(Part::shin, "shin calf knee tibia crus ひざ 膝");
+    part(Part::shin, "shin calf knee shank tibia crus ひざ 膝");
     part(Part::ankle, "ankle 足首");
     part(Part::foot, "foot");
     part(Part::toe, "toe toes toebase ball つま先");
@@ -64,7 +64,7 @@ const Dictionary& dictionary() {
          "twist roll ik fk pole ctrl ctl control controller con target goal end nub tip top eff "
          "effector site aux corrective helper muscle volume jiggle dyn phys sec adj mch org vis "
          "tweak gizmo locator socket attach prop weapon sword gun shield slot camera pivot reverse "
-         "heel hook parent space switch dummy grp group "
+         "heel hook parent space switch dummy grp group offset zero null auto sdk part "
          "thumb index middle ring pinky pinkie little finger fingers metacarpal metacarpals carpal "
          "metatarsal metatarsals phalanx knuckle bigtoe indextoe middletoe ringtoe littletoe "
          "eye eyes eyelid brow eyebrow jaw tongue teeth tooth lip lips cheek nose ear hair beard "
@@ -121,6 +121,13 @@ bool decompose(std::string_view text, bool first, std::vector<Word>& out) {
   return false;
 }
 
+/// "RL" is no word: sides only, and more than one.
+bool is_both_sides(const std::vector<Word>& words) {
+  return words.size() > 1 && std::all_of(words.begin(), words.end(), [](const Word& w) {
+           return w.kind == Kind::left || w.kind == Kind::right;
+         });
+}
+
 /// A name's words, with its numbers in their places.
 struct Token {
   Word word;
@@ -151,7 +158,7 @@ std::vector<Token> tokens_of(std::string_view name) {
       joined.clear();
       for (size_t j = i; j < ends.back(); ++j)
         if (is_letter(pieces[j][0])) joined += lower_case(pieces[j]);
-      if (!decompose(joined, true, words)) words.clear();
+      if (!decompose(joined, true, words) || is_both_sides(words)) words.clear();
       if (!words.empty()) break;
     }
     for (const Word& word : words) out.push_back({word, true, -1});

@@ -4,6 +4,9 @@
 #include <optional>
 #include <tuple>
 
+#include "datasets/readers/errors.h"
+#include "datasets/readers/text.h"
+
 namespace restage {
 namespace {
 
@@ -20,7 +23,8 @@ struct Limb {
   int root = -1;  ///< collar; -1: none
   int upper = -1, lower = -1, end = -1;
   int cost = 0;
-  int lacks = 0;  ///< 0: nothing; 1: upper, 2: lower, 3: end (then nothing else is known)
+  int lacks = 0;      ///< 0: nothing; 1: upper, 2: lower, 3: end (then nothing else is known)
+  int stranger = -1;  ///< a bone within it that is neither known nor a helper
 };
 
 class Finder {
@@ -77,6 +81,13 @@ class Finder {
     return out;
   }
 
+  Limb weighed(Limb limb) const {
+    limb.cost = words_[limb.upper].cost + words_[limb.lower].cost + words_[limb.end].cost;
+    for (int b = parent(limb.end); b != limb.upper; b = parent(b))
+      if (words_[b].part == Part::none && !words_[b].helper) limb.stranger = b;
+    return limb;
+  }
+
   Limb arm_to(int end, int side) const {
     const std::vector<int> path = path_to(end, side);
     Limb out;
@@ -97,8 +108,7 @@ class Finder {
     if (out.upper < 0) return out.lacks = 1, out;
     out.root = plainest(above(path, out.upper), {Part::collar});
     if (out.root < 0) out.root = plainest(above(path, out.upper), {Part::shoulder});
-    out.cost = words_[out.upper].cost + words_[out.lower].cost + words_[out.end].cost;
-    return out;
+    return weighed(out);
   }
 
   Limb leg_to(int end, int side) const {
@@ -116,8 +126,7 @@ class Finder {
     for (const Part part : {Part::thigh, Part::leg, Part::hip})
       if (out.upper < 0) out.upper = plainest(rest, {part});
     if (out.upper < 0) return out.lacks = 1, out;
-    out.cost = words_[out.upper].cost + words_[out.lower].cost + words_[out.end].cost;
-    return out;
+    return weighed(out);
   }
 
   /// The plainest limb of those that end in one of these parts. Of a limb that is nowhere whole the
@@ -176,6 +185,10 @@ class Finder {
 
   void take(const Limb& limb, bool ambiguous, const std::string& what,
             const std::array<Segment, 3>& segments) {
+    if (limb.lacks == 0 && !ambiguous && limb.stranger >= 0)
+      return lacks(segments[0].joint,
+                   cat("in the ", what, " the bone ", text::quote(skeleton_.names[limb.stranger]),
+                       " is of no known name"));
     if (limb.lacks == 0 && !ambiguous) {
       out_.bones[segments[0].joint] = limb.upper;
       out_.bones[segments[1].joint] = limb.lower;
@@ -243,9 +256,8 @@ class Finder {
     if (named(all)) return all;
     if (legs != all && named(legs)) return legs;
     // 3ds Max hangs the legs on the first spine bone, which hangs on the pelvis.
-    if (all >= 0 && words_[all].part == Part::spine)
-      for (int b = parent(all); b >= 0; b = parent(b))
-        if (named(b)) return b;
+    for (int b = parent(all); b >= 0; b = parent(b))
+      if (named(b)) return b;
     return all;
   }
 
@@ -268,6 +280,9 @@ class Finder {
     if (n > 1) out_.bones[kSpine3] = spine.back();
     if (n > 2) out_.bones[kSpine2] = spine[n == 3 ? 1 : (2 * n + 1) / 3 - 1];
     find_neck(chest);
+    for (const int side : {0, 1})
+      if (out_.bones[13 + side] < 0) out_.bones[13 + side] = nameless_collar(side, chest);
+    check_sides(all);
     check_lengths();
   }
 
@@ -279,6 +294,39 @@ class Finder {
       if (!words_[b].helper) any = b;
     }
     out_.bones[kNeck] = named >= 0 ? named : any;
+  }
+
+  /// The only bone between chest and upper arm, whatever it is called; -1: none or several.
+  int nameless_collar(int side, int chest) const {
+    int out = -1, count = 0;
+    for (int b = parent(out_.bones[16 + side]); b >= 0 && b != chest; b = parent(b))
+      if (!words_[b].helper && words_[b].part != Part::neck) out = b, ++count;
+    return count == 1 ? out : -1;
+  }
+
+  /// Bones from `top` down to `bone`, without helpers.
+  int steps(int bone, int top) const {
+    int out = 0;
+    for (int b = bone; b >= 0 && b != top; b = parent(b)) out += !words_[b].helper;
+    return out;
+  }
+
+  /// A person's sides are built alike. Where they are not, one of two bones was not understood.
+  void check_sides(int top) {
+    const auto plain_cost = [&](int b) { return words_[b].cost - (words_[b].number > 0); };
+    for (const int j : {1, 4, 7, 10, 13, 16, 18, 20}) {
+      const int left = out_.bones[j], right = out_.bones[j + 1];
+      if (j == 10 && (left < 0 || right < 0)) continue;  // a toe may be the ankle's end
+      bool alike = (left < 0) == (right < 0) && steps(left, top) == steps(right, top);
+      if (alike && j == 10)
+        alike = plain_cost(left) == plain_cost(right) &&
+                (words_[left].number < 0 || words_[right].number < 0 ||
+                 words_[left].number == words_[right].number);
+      if (alike) continue;
+      const auto name = [&](int b) { return b < 0 ? "none" : text::quote(skeleton_.names[b]); };
+      return lacks(j, cat("its sides are not built alike: ", kJointNames[j], " may be ", name(left),
+                          ", ", kJointNames[j + 1], " ", name(right)));
+    }
   }
 
   double length(int from, int to) const {

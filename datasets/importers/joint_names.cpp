@@ -101,6 +101,7 @@ bool hang_together(const BoneTree& tree, const Bones& bones) {
   for (const int side : {0, 1})
     for (const int j : {4, 7, 10, 16, 18, 20})
       if (!on(j + side, kParents[j + side])) return false;
+  if (!on(kSpine2, kSpine1) || !on(kSpine3, kSpine2) || !on(kSpine3, kSpine1)) return false;
   const int chest = chest_of(tree, bones);
   if (chest == bones[0] || !hangs_on(tree.skeleton, chest, bones[0]))
     return hangs_on(tree.skeleton, bones[0], chest);  // limbs that hang on nothing, or on the root
@@ -111,8 +112,38 @@ bool hang_together(const BoneTree& tree, const Bones& bones) {
   return carries && last_spine(bones) == chest && on(15, 0);
 }
 
-/// The built-in profile whose names are all there and hang together, with its bones: the one of
-/// which most are there.
+/// How many bones lie between two of a path, without helpers and without these parts.
+int between(const BoneTree& tree, int above, int below, std::initializer_list<Part> without = {}) {
+  int out = 0;
+  if (!hangs_on(tree.skeleton, below, above)) return 0;
+  for (int b = tree.skeleton.parents[below]; b >= 0 && b != above; b = tree.skeleton.parents[b])
+    out += !tree.words[b].helper &&
+           std::find(without.begin(), without.end(), tree.words[b].part) == without.end();
+  return out;
+}
+
+/// Whether the family would place a joint where a bone lies: an odd one beside its good ones.
+bool leaves_out(const BoneTree& tree, const Profile& profile, const Bones& bones) {
+  const int chest = chest_of(tree, bones);
+  if (!hangs_on(tree.skeleton, chest, bones[0])) return false;  // limbs that hang on nothing
+  const auto named = [&](int j) { return bones[j] >= 0; };
+  const int spine = named(kSpine1) + named(kSpine2) + named(kSpine3);
+  if (!profile.places[kSpine3] && spine < std::min(3, 1 + between(tree, bones[0], chest)))
+    return true;
+  if (!named(12) && between(tree, chest, bones[15]) > 0) return true;
+  for (const int side : {0, 1}) {
+    if (!named(13 + side) && between(tree, chest, bones[16 + side], {Part::neck}) > 0) return true;
+    if (!named(10 + side))
+      for (size_t b = 0; b < tree.words.size(); ++b)
+        if (tree.words[b].part == Part::toe && !tree.words[b].helper &&
+            hangs_on(tree.skeleton, static_cast<int>(b), bones[7 + side]))
+          return true;
+  }
+  return false;
+}
+
+/// The built-in profile whose names are there and hang together, with its bones: the one of which
+/// most are there.
 struct Family {
   const Profile* profile = nullptr;
   Bones bones{};
@@ -124,7 +155,8 @@ Family find_family(const BoneTree& tree, const BoneNames& names) {
     const Bones bones = bones_of(profile, names);
     const auto count = static_cast<int>(
         std::count_if(bones.begin(), bones.end(), [](int bone) { return bone >= 0; }));
-    if (count > most && is_whole(bones) && hang_together(tree, bones)) {
+    if (count > most && is_whole(bones) && hang_together(tree, bones) &&
+        !leaves_out(tree, profile, bones)) {
       out = {&profile, bones};
       most = count;
     }
@@ -133,14 +165,6 @@ Family find_family(const BoneTree& tree, const BoneNames& names) {
   if (out.profile && out.bones[kSpine3] < 0 && !out.profile->places[kSpine3])
     std::swap(out.bones[kSpine3], out.bones[kSpine2]);
   return out;
-}
-
-/// Whether a joint that the family would place has a bone: an odd one beside its good ones.
-bool knows_less(const Family& family, const FoundJoints& found) {
-  if (!found.missing.empty()) return false;
-  for (const int j : {3, 6, 9, 10, 11, 12, 13, 14})
-    if (family.bones[j] < 0 && found.bones[j] >= 0 && !family.profile->places[kSpine3]) return true;
-  return false;
 }
 
 // ---- refusals ----------------------------------------------------------------------------------
@@ -209,7 +233,7 @@ std::vector<std::string> words_for(const BoneTree& tree, const FoundJoints& foun
     bool told = false;
     for (const int k : limb_of(j)) {
       const int twin = found.bones[kMirror[k]];
-      if (j == 0 || j == 15 || twin < 0) continue;
+      if (j == 0 || j == 15 || twin < 0 || found.bones[k] >= 0) continue;
       const std::string name = other_side(plain[twin]);
       if (name.empty() || std::find(lower.begin(), lower.end(), name) != lower.end()) continue;
       expected[k] = name;
@@ -303,8 +327,7 @@ NamedJoints name_joints(const SourceSkeleton& skeleton, const std::string& where
                         where);
   const FoundJoints found = find_joints(tree, only_person(tree, where));
   const Family family = find_family(tree, names);
-  if (family.profile && !knows_less(family, found))
-    return place_joints(tree, by_name, *family.profile, family.bones, where);
+  if (family.profile) return place_joints(tree, by_name, *family.profile, family.bones, where);
   if (!found.missing.empty()) {
     check_encoding(skeleton, where);
     throw_not_found(tree, found, plain, where);

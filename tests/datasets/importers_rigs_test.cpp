@@ -145,6 +145,39 @@ TEST(ImportersRigs, OneOddBoneBesideGoodOnesIsFoundToo) {
     }
 }
 
+/// One bone of an unknown name, whichever it is: refused, or everything else is still right.
+TEST(ImportersRigs, AnUnknownBoneMakesNoOtherOneWrong) {
+  size_t refused = 0, found = 0;
+  for (const RigList& list : rig_lists()) {
+    const BuiltRig plain = RigBuilder(list).built();
+    for (size_t damaged = 1; damaged < kJoints; ++damaged) {
+      if (plain.bone[damaged] < 0 || damaged == 12) continue;  // of two necks either will do
+      BuiltRig rig = plain;
+      rig.skeleton.names[static_cast<size_t>(plain.bone[damaged])] = "Thing";
+      NamedJoints joints;
+      try {
+        joints = name_joints(rig.skeleton, "x.bvh");
+      } catch (const InputError&) {
+        ++refused;
+        continue;
+      }
+      ++found;
+      const std::vector<Vec3> places = zero_positions(rig.skeleton);
+      for (size_t j = 0; j < kJoints; ++j) {
+        const bool toe = damaged == j && (j == 10 || j == 11);  // optional: placed without it
+        if (rig.bone[j] < 0 || toe) continue;
+        const auto at = static_cast<size_t>(joints.map[j].joint);
+        const Vec3 place = places[at] + joints.map[j].offset;
+        EXPECT_LT((place - places[static_cast<size_t>(rig.bone[j])]).norm(), 1e-9)
+            << list.name << " without " << kJointNames[damaged] << ": " << kJointNames[j] << " is "
+            << rig.skeleton.names[at];
+      }
+    }
+  }
+  EXPECT_GT(refused, 300u);
+  EXPECT_GT(found, 150u);
+}
+
 /// What is not certain is refused, with what is missing in the first place.
 TEST(ImportersRigs, NobodyIsGuessed) {
   const BuiltRig mixamo = rig("mixamo");

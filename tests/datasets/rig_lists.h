@@ -68,7 +68,7 @@ class RigBuilder {
       return;
     }
     std::string name = it.bone;
-    if (const size_t at = name.find('@'); at != std::string::npos)
+    for (size_t at = 0; (at = name.find('@')) != std::string::npos;)
       name.replace(at, 1, side == "left" ? list_.left : list_.right);
     const int bone = static_cast<int>(out_.skeleton.size());
     Vec3 place = parent < 0 ? Vec3(Vec3::Zero()) : Vec3(places_[static_cast<size_t>(parent)]);
@@ -937,6 +937,125 @@ pelvis = pelvis
           |group|rig|arm_upper_@_jnt = shoulder
             |group|rig|arm_lower_@_jnt = elbow
               |group|rig|hand_@_jnt = wrist
+)"},
+      {"tripo and others after character creator", "L", "R", R"(
+Root
+  Hip = pelvis
+    Pelvis
+      @_Thigh = hip
+        @_Calf = knee
+          @_Foot = ankle
+            @_ToeBase = foot
+    Waist = spine1
+      Spine01 = spine2
+        Spine02 = spine3
+          NeckTwist01 = neck
+            NeckTwist02
+              Head = head
+          @_Clavicle = collar
+            @_Upperarm = shoulder
+              @_Forearm = elbow
+                @_Hand = wrist
+)"},
+      {"meshy, its spine counted downwards", "Left", "Right", R"(
+Hips = pelvis
+  @UpLeg = hip
+    @Leg = knee
+      @Foot = ankle
+        @ToeBase = foot
+  Spine02 = spine1
+    Spine01 = spine2
+      Spine = spine3
+        neck = neck
+          Head = head
+            head_end
+            headfront
+        @Shoulder = collar
+          @Arm = shoulder
+            @ForeArm = elbow
+              @Hand = wrist
+)"},
+      {"skyrim", "L", "R", R"(
+NPC Root [Root]
+  NPC COM [COM ]
+    NPC Pelvis [Pelv] = pelvis
+      NPC @ Thigh [@Thg] = hip
+        NPC @ Calf [@Clf] = knee
+          NPC @ Foot [@ft ] = ankle
+            NPC @ Toe0 [@Toe] = foot
+      NPC Spine [Spn0] = spine1
+        NPC Spine1 [Spn1] = spine2
+          NPC Spine2 [Spn2] = spine3
+            NPC Neck [Neck] = neck
+              NPC Head [Head] = head
+            NPC @ Clavicle [@Clv] = collar
+              NPC @ UpperArm [@Uar] = shoulder
+                NPC @ UpperarmTwist1 [@Ut1]
+                NPC @ Forearm [@Lar] = elbow
+                  NPC @ ForearmTwist1 [@Lt1]
+                  NPC @ Hand [@Hnd] = wrist
+                    NPC @ Finger00 [@F00]
+)"},
+      {"roblox", "Left", "Right", R"(
+HumanoidRootNode
+  LowerTorso = pelvis
+    UpperTorso = spine1
+      Head = head
+      @UpperArm = shoulder
+        @LowerArm = elbow
+          @Hand = wrist
+    @UpperLeg = hip
+      @LowerLeg = knee
+        @Foot = ankle
+)"},
+      {"dota", "_L", "_R", R"(
+root_motion
+  pelvis = pelvis
+    spine_0 = spine1
+      spine_1
+        spine_2 = spine2
+          spine_3 = spine3
+            neck_0 = neck
+              head = head
+            clavicle@ = collar
+              arm_upper@ = shoulder
+                arm_upper@_TWIST
+                arm_lower@ = elbow
+                  hand@ = wrist
+                    finger_index_0@
+    leg_upper@ = hip
+      leg_upper@_TWIST
+      leg_lower@ = knee
+        ankle@ = ankle
+          ball@ = foot
+)"},
+      {"human3.6m", "L", "R", R"(
+Hip = pelvis
+  @Hip = hip
+    @Knee = knee
+      @Foot = ankle
+  Spine = spine1
+    Thorax = spine3
+      Neck = neck
+        Head = head
+      @Shoulder = shoulder
+        @Elbow = elbow
+          @Wrist = wrist
+)"},
+      {"kaykit without its dots", "l", "r", R"(
+root
+  hips = pelvis
+    spine = spine1
+      chest = spine3
+        head = head
+        upperarm@ = shoulder
+          lowerarm@ = elbow
+            wrist@ = wrist
+              hand@
+    upperleg@ = hip
+      lowerleg@ = knee
+        foot@ = ankle
+          toes@ = foot
 )"},
       {"all in lower case", "left", "right", R"(
 hips = pelvis
