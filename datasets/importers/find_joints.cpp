@@ -239,8 +239,12 @@ class Finder {
         if (words_[b].cost < words_[best].cost) best = b;
         continue;
       }
-      two = best >= 0 && words_[b].cost == words_[best].cost;
-      if (best < 0 || words_[b].cost < words_[best].cost) best = b;
+      if (best < 0 || words_[b].cost < words_[best].cost) {
+        best = b;
+        two = false;
+      } else if (words_[b].cost == words_[best].cost) {
+        two = true;
+      }
     }
     out_.bones[kHead] = best;
     if (best < 0 || two) lacks(kHead, two ? "two of its bones may be the head" : "");
@@ -274,11 +278,10 @@ class Finder {
         spine.insert(spine.begin(), b);
     if (spine.empty()) return lacks(kSpine1, "no bone lies between its pelvis and its arms");
     out_.bones[kPelvis] = pelvis;
-    const size_t n = spine.size();
-    // Of many: two fifths up, two thirds up, and the last, which carries the arms.
-    out_.bones[kSpine1] = spine[n < 5 ? 0 : 2 * n / 5 - 1];
-    if (n > 1) out_.bones[kSpine3] = spine.back();
-    if (n > 2) out_.bones[kSpine2] = spine[n == 3 ? 1 : (2 * n + 1) / 3 - 1];
+    // Of many the first, the middle one, and the last, which carries the arms.
+    out_.bones[kSpine1] = spine[0];
+    if (spine.size() > 1) out_.bones[kSpine3] = spine.back();
+    if (spine.size() > 2) out_.bones[kSpine2] = spine[spine.size() / 2];
     find_neck(chest);
     for (const int side : {0, 1})
       if (out_.bones[13 + side] < 0) out_.bones[13 + side] = nameless_collar(side, chest);

@@ -88,7 +88,8 @@ Motion motion_of(const Gltf& file, const GltfRig& rig, const GltfClip& clip, int
   std::vector<double> lowest;
   for (int64_t f = 0; f < frames; ++f) {
     const double seconds = clip.begin + static_cast<double>(f) / kFps;
-    const PosedSkeleton pose = rig_pose(rig, gltf_pose(file, clip, seconds));
+    PosedSkeleton pose = rig_pose(rig, gltf_pose(file, clip, seconds));
+    follow_trunk(pose, motion.rest);
     auto& global = motion.global.emplace_back();
     for (size_t j = 0; j < kJoints; ++j) {
       if (!pose.joints[j].allFinite() || !pose.global[j].allFinite())

@@ -121,6 +121,7 @@ Poses poses_at_30_fps(SourceMotion motion, const JointMap& map, const RestPose& 
       poses[f].global[j] = rest.align * poses[f].global[j] * rest.frame[j];
       poses[f].joints[j] = rest.align * poses[f].joints[j];
     }
+    follow_trunk(poses[f], rest.joints);
   }
   return poses;
 }

@@ -75,6 +75,12 @@ PosedSkeleton source_pose(const SourceMotion& motion, const JointMap& map, size_
 /// Frame by frame; in pieces, as the frames of hours are many.
 using Poses = std::deque<PosedSkeleton>;
 
+/// A source may have more bones in the trunk than the 22 joints: those between, which turn too, are
+/// left out. So the lower of two joints that follow each other there (spine, neck, collars) is
+/// turned further, by the shortest arc, until `rest` puts the upper one where it is in the source.
+/// Changes nothing where no bone is left out.
+void follow_trunk(PosedSkeleton& pose, const Joints& rest);
+
 /// 5th percentile over frames of the lowest ankle or foot: the height of the clip's floor.
 double floor_height(const Poses& poses);
 /// The same from lowest_foot() of each frame.

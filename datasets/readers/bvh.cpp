@@ -180,7 +180,7 @@ void parse_frames(WordLines& lines, BvhFile& file, bool rate_is_told) {
   file.frame_time = lines.number(frame_time);
   file.frame_time_digit = last_digit(frame_time);
   if (!rate_is_told && !(file.frame_time >= kLeastTime && file.frame_time <= kMostTime))
-    lines.fail(cat("frame time ", file.frame_time, " s is not usable"),
+    lines.fail("frame time " + WordLines::quoted(frame_time) + " s is not usable",
                "give the true rate with --fps, or write seconds per frame, between 0.0001 and 1");
   while (lines.next()) {
     if (static_cast<double>(file.frames.size()) >= announced) {
