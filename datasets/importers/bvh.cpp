@@ -31,6 +31,7 @@ Rate frame_rate(const BvhFile& file) {
 }
 
 std::string rate_text(const BvhFile& file) {
+  if (!(file.frame_time > 0)) return format("the file's frame time is %.6g s", file.frame_time);
   const Rate rate = frame_rate(file);
   return rate.rounded ? format("the file's frame time of %.6g s is %.6g fps, rounded",
                                file.frame_time, rate.fps)
@@ -138,7 +139,7 @@ SourceMotion bvh_motion(BvhFile file, int hips) {
 
 MotionClip convert_bvh(std::string_view text, const std::string& path,
                        const MotionOptions& options) {
-  BvhFile file = parse_bvh(text, path);
+  BvhFile file = parse_bvh(text, path, options.fps > 0);
   const std::optional<Profile> profile = asked_profile(options);
   Recording recording;
   recording.names = name_joints(file.skeleton, path, profile ? &*profile : nullptr);
@@ -146,7 +147,8 @@ MotionClip convert_bvh(std::string_view text, const std::string& path,
   recording.rate_of_file = rate_text(file);
   recording.rate_known = !frame_rate(file).rounded;
   recording.bytes = text.size();
-  check_length(file.frames.size(), file.skeleton.size(), frame_rate(file).fps, text.size(), path);
+  const double fps = options.fps > 0 ? options.fps : frame_rate(file).fps;
+  check_length(file.frames.size(), file.skeleton.size(), fps, text.size(), path);
   recording.positions = use_positions(file, recording.names.map);
   if (recording.positions.joints > 0)  // joints that the file lacks are placed between those it has
     recording.names = name_joints(file.skeleton, path, profile ? &*profile : nullptr);

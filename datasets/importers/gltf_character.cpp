@@ -88,7 +88,8 @@ Motion motion_of(const Gltf& file, const GltfRig& rig, const GltfClip& clip, int
   std::vector<double> lowest;
   for (int64_t f = 0; f < frames; ++f) {
     const double seconds = clip.begin + static_cast<double>(f) / kFps;
-    const PosedSkeleton pose = rig_pose(rig, gltf_pose(file, clip, seconds));
+    PosedSkeleton pose = rig_pose(rig, gltf_pose(file, clip, seconds));
+    follow_trunk(pose, motion.rest);
     auto& global = motion.global.emplace_back();
     for (size_t j = 0; j < kJoints; ++j) {
       if (!pose.joints[j].allFinite() || !pose.global[j].allFinite())
@@ -181,24 +182,37 @@ ExamineOptions TargetMesh::known() const {
   return out;
 }
 
-TargetMesh read_target(const std::string& path) {
+TargetMesh read_target(const std::string& path, const std::string& bones) {
   TargetMesh out;
+  Gltf file;
+  if (is_gltf_name(path)) {
+    file = read_gltf(path);
+    describe(file, out.report);
+  }
+  if (file.skin_nodes.empty() && !bones.empty())
+    throw InputError(path, "has no rig whose bones could be named", "leave --bones out");
   if (!is_gltf_name(path)) {
     out.mesh = read_mesh(path);
     return out;
   }
-  const Gltf file = read_gltf(path);
-  describe(file, out.report);
   out.rigged = !file.skin_nodes.empty();
-  if (file.skin_nodes.empty() || !has_known_joints(file)) {
-    out.report.remark(
-        file.skin_nodes.empty()
-            ? "has no rig: its mesh is taken as it stands"
-            : "the joints' names are of no known family: its mesh is taken as it stands");
+  MotionOptions options;
+  options.profile = bones;
+  GltfRig rig;
+  try {
+    if (out.rigged) rig = find_rig(file, options, out.report);
+  } catch (const UnknownSkeleton& error) {
+    out.unknown_rig = error.reason;
+  }
+  if (!out.rigged || !out.unknown_rig.empty()) {
+    out.report.remark(!out.rigged
+                          ? "has no rig: its mesh is taken as it stands"
+                          : "its rig was not recognised, so its mesh is taken as it stands (name "
+                            "its bones with --bones): " +
+                                out.unknown_rig);
     out.mesh = gltf_mesh(file, gltf_rest(file));
     return out;
   }
-  const GltfRig rig = find_rig(file, {}, out.report);
   check_handedness(t_pose_joints(rig), true, out.report);
   out.mesh = t_pose_mesh(file, rig);
   out.joints = t_pose_joints(rig);

@@ -33,13 +33,16 @@ struct TargetMesh {
   ImportReport report;           ///< empty for PLY and OBJ
   std::optional<Joints> joints;  ///< of a known rig, by their names, beside the surface
   bool rigged = false;           ///< it has a rig, known or not
+  std::string unknown_rig;       ///< why the joints of a rig were not found; empty: they were
   /// What the doctor need not guess of it.
   ExamineOptions known() const;
 };
 
 /// What `restage retarget --target` takes: of a glTF character the surface in T-pose, in metres, y
 /// up, facing +z, with all vertices and faces in the file's order; a glTF file without a known rig
-/// as it stands, with a remark; any other mesh as read_mesh() gives it.
-TargetMesh read_target(const std::string& path);
+/// as it stands, with a remark; any other mesh as read_mesh() gives it. `bones`: of the rig, as
+/// MotionOptions::profile. InputError also for two characters, and for `bones` where there is no
+/// rig.
+TargetMesh read_target(const std::string& path, const std::string& bones = "");
 
 }  // namespace restage

@@ -122,32 +122,6 @@ std::vector<int> bone_nodes(const Gltf& file) {
   return out;
 }
 
-/// "Armature_Hips_01" -> "Hips", if all names share such a beginning or such an end.
-void strip_common(std::vector<std::string>& names) {
-  std::vector<std::string*> given;
-  for (std::string& name : names)
-    if (!name.empty()) given.push_back(&name);
-  if (given.size() < 2) return;
-  size_t shared = given[0]->size();
-  for (const std::string* name : given) {
-    const auto [a, b] =
-        std::mismatch(name->begin(), name->end(), given[0]->begin(), given[0]->end());
-    shared = std::min(shared, static_cast<size_t>(a - name->begin()));
-  }
-  const auto end_of = [](const std::string& name) {
-    const size_t last = name.find_last_not_of("0123456789");
-    return last != std::string::npos && last + 1 < name.size() && name[last] == '_' ? last
-                                                                                    : name.size();
-  };
-  const bool numbered = std::all_of(given.begin(), given.end(), [&](const std::string* name) {
-    return end_of(*name) < name->size();
-  });
-  for (std::string* name : given) {
-    if (numbered) name->resize(end_of(*name));
-    name->erase(0, shared);
-  }
-}
-
 /// Whether bones go by VRM's list of them; a profile that is asked for goes by the nodes' names.
 bool by_list(const Gltf& file, const Profile* profile) {
   return !file.humanoid.empty() && (profile == nullptr || profile->name == "vrm");
@@ -170,26 +144,27 @@ SourceSkeleton skeleton_of(const Gltf& file, const std::vector<int>& nodes,
   if (!by_vrm_list) return out;
   // A VRM file says which bone is which; what its nodes are called is its author's business.
   for (std::string& name : out.names) name.clear();
-  for (const auto& [name, n] : file.humanoid)
-    if (const int at = place[n]; at > 0) out.names[at] = name;
+  const bool upper = std::any_of(file.humanoid.begin(), file.humanoid.end(),
+                                 [](const auto& bone) { return bone.first == "upperChest"; });
+  for (const auto& [name, n] : file.humanoid)  // without an upper chest the chest carries the arms
+    if (const int at = place[n]; at > 0)
+      out.names[at] = name == "chest" && !upper ? "upperChest" : name;
   return out;
 }
 
-NamedJoints map_names(SourceSkeleton& skeleton, const Profile* profile, const std::string& path) {
-  try {
-    return name_joints(skeleton, path, profile);
-  } catch (const InputError&) {
-    SourceSkeleton stripped = skeleton;
-    strip_common(stripped.names);
-    if (stripped.names == skeleton.names) throw;
-    try {
-      NamedJoints out = name_joints(stripped, path, profile);
-      skeleton = std::move(stripped);
-      return out;
-    } catch (const InputError&) {
-    }
-    throw;  // what is wrong with the names as they stand in the file
-  }
+/// The profile that VRM's list of bones is read with.
+const Profile& vrm_profile() {
+  static const Profile out = find_profile("vrm");
+  return out;
+}
+
+NamedJoints rig_names(const Gltf& file, const std::vector<int>& nodes, const GltfTransforms& bind,
+                      const Profile* profile) {
+  const bool listed = by_list(file, profile);
+  // A skin is one person's, whoever says which bone is which.
+  if (!file.skin_nodes.empty()) check_one_person(skeleton_of(file, nodes, bind, false), file.path);
+  return name_joints(skeleton_of(file, nodes, bind, listed), file.path,
+                     listed ? &vrm_profile() : profile);
 }
 
 // ---- units and axes ----------------------------------------------------------------------------
@@ -233,13 +208,17 @@ Mat3 find_front(const Joints& upright, ImportReport& report) {
   return out;
 }
 
-void check_standing(const Joints& joints, const std::string& path) {
+void check_standing(const Joints& joints, const Gltf& file) {
+  const bool skin = !file.skin_nodes.empty();
   const auto check = [&](const Limb& limb, double most) {
     const Vec3 bone = joints[limb.to] - joints[limb.from];
     if (!(bone.norm() > 1e-4) || angle_between(bone, limb.wanted) > most * kDegree)
-      throw InputError(path,
-                       cat("the skin was not made standing: ", kJointNames[limb.from], " to ",
-                           kJointNames[limb.to], " does not point as in a T-pose or an A-pose"),
+      throw InputError(file.path,
+                       cat(skin ? "the skin was not made standing: "
+                                : "its nodes do not rest "
+                                  "standing: ",
+                           kJointNames[limb.from], " to ", kJointNames[limb.to],
+                           " does not point as in a T-pose or an A-pose"),
                        "export it with the rest pose of its rig");
   };
   for (const Limb& limb : t_pose_limbs()) check(limb, limb.from < 16 ? 60 : 120);
@@ -345,13 +324,14 @@ GltfRig find_rig(const Gltf& file, const MotionOptions& options, ImportReport& r
   GltfRig rig;
   rig.bind = bind_pose(file, report);
   const std::vector<int> nodes = bone_nodes(file);
-  SourceSkeleton skeleton = skeleton_of(file, nodes, rig.bind, by_list(file, profile));
-  const NamedJoints names = map_names(skeleton, profile, file.path);
+  const NamedJoints names = rig_names(file, nodes, rig.bind, profile);
   const JointMap& map = names.map;
   if (by_list(file, profile))
     report.fact("names", "VRM's list of bones, not the nodes' names");
-  else if (profile)
-    report.fact("names", names.profile->title + " (profile " + names.profile->name + ")");
+  else
+    report.fact("names",
+                names.profile->title +
+                    (names.profile->name.empty() ? "" : " (profile " + names.profile->name + ")"));
   find_nodes(file, rig, map, nodes, report);
   Joints joints;
   for (size_t j = 0; j < kJoints; ++j)
@@ -363,7 +343,7 @@ GltfRig find_rig(const Gltf& file, const MotionOptions& options, ImportReport& r
   const Mat3 front = find_front(upright, report);
   for (Vec3& x : upright) x = front * x;
   rig.turn = front * rig.turn;
-  check_standing(upright, file.path);
+  check_standing(upright, file);
   const auto turns = arm_turns(file, rig, joints, report);
   rig.t_pose = turned(file, rig, turns);
   for (size_t j = 0; j < kJoints; ++j) {
@@ -374,17 +354,6 @@ GltfRig find_rig(const Gltf& file, const MotionOptions& options, ImportReport& r
     rig.offset[j] = rig.t_pose[n].linear() * rig.bind[n].linear().inverse() * rig.offset[j];
   }
   return rig;
-}
-
-bool has_known_joints(const Gltf& file) {
-  SourceSkeleton skeleton =
-      skeleton_of(file, bone_nodes(file), gltf_rest(file), by_list(file, nullptr));
-  try {
-    map_names(skeleton, nullptr, file.path);
-    return true;
-  } catch (const InputError&) {
-    return false;
-  }
 }
 
 Joints t_pose_joints(const GltfRig& rig) {

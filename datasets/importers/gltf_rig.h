@@ -23,20 +23,17 @@ struct GltfRig {
   Vec3 to_ours(const Vec3& x) const { return scale * (turn * x); }
 };
 
-/// Finds the joints by VRM's list of bones or by name (name_joints(); a prefix that all names share
-/// and a number at all their ends are left out where needed). Adds to the report what was found.
+/// Finds the joints by VRM's list of bones or as name_joints() does. Adds to the report what was
+/// found.
 /// Of the options these count, if they are given:
 /// - scale; else by the leg (hip-knee-ankle): [0.1, 4) units are metres, as the format has it,
 ///   longer ones as of recordings (axis.h), giants in centimetres up to 400 and in
 ///   millimetres up to 4000;
 /// - rest.up; else the axis along which the head is furthest from the ankles;
-/// - profile; else VRM's list of bones if there is one, else the built-in profile that fits.
-/// InputError: names of no known family, a bind pose that does not stand with its arms out, to the
-/// front or down, unknown units.
+/// - profile; else VRM's list of bones if there is one, else the names and how the bones hang.
+/// InputError: no person or two in its bones, a bind pose that does not stand with its arms out, to
+/// the front or down, unknown units.
 GltfRig find_rig(const Gltf& file, const MotionOptions& options, ImportReport& report);
-
-/// Whether find_rig() would find all joints that it needs.
-bool has_known_joints(const Gltf& file);
 
 /// Positions of the 22 joints in the T-pose, our axes and metres.
 Joints t_pose_joints(const GltfRig& rig);

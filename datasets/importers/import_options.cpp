@@ -44,7 +44,7 @@ std::vector<Given> all_of(const ImportOptions& options) {
       {"--facing", rest.facing != Axis::automatic, recordings, of_recordings},
       {"--rest-frame", rest.frame >= 0, recordings, of_recordings},
       {"--drop-leading", motion.drop_leading >= 0, recordings, of_recordings},
-      {"--profile", !motion.profile.empty(), moving, of_moving},
+      {"--bones", !motion.profile.empty(), moving, of_moving},
       {"--asf", !options.asf.empty(), {amc}, "AMC recordings"},
       {"--clip", !options.clip.empty(), {character}, "glTF characters"},
       {"--body-model", !options.body_model.empty(), {amass}, "AMASS motions"},

@@ -1,19 +1,26 @@
-// name_joints(): bones of a file as the 22 joints, and where missing joints are put.
+// name_joints(): which bones of a file are which of the 22 joints (docs/design/rigs.md).
 #include <algorithm>
 #include <map>
 
 #include "autograd/base/error.h"
 #include "autograd/base/nearest.h"
+#include "datasets/importers/find_joints.h"
+#include "datasets/importers/place_joints.h"
 #include "datasets/importers/source_motion.h"
+#include "datasets/readers/errors.h"
+#include "datasets/readers/text.h"
 #include "datasets/readers/word_lines.h"
 
 namespace restage {
 namespace {
 
-enum : int { kSpine1 = 3, kSpine2 = 6, kSpine3 = 9, kNeck = 12, kHead = 15 };
+enum : int { kSpine1 = 3, kSpine2 = 6, kSpine3 = 9 };
 
 /// Those that cannot be placed.
 constexpr int kRequired[] = {0, 1, 2, 4, 5, 7, 8, 15, 16, 17, 18, 19, 20, 21};
+
+constexpr const char* kFix =
+    "say which bone is which joint in a file, and give it with --bones names.yaml (docs/data.md)";
 
 /// In lower case, "Bip01 L Thigh" as "bip01_l_thigh" (BVH files cannot hold blanks in names).
 std::string plain_name(std::string_view bone) {
@@ -22,213 +29,310 @@ std::string plain_name(std::string_view bone) {
   return out;
 }
 
-/// Bones by plain name, without a namespace ("mixamorig:Hips") and, as a second name, without a
-/// prefix that three quarters of them share ("Model_Hips").
+/// Bones by name. Those of a file of one's own stand as they are in the skeleton's, without their
+/// namespace, or without decoration, in this order; a family's are compared without decoration.
 class BoneNames {
  public:
-  explicit BoneNames(const SourceSkeleton& skeleton) {
-    std::map<std::string, size_t> prefixes;
-    std::vector<std::string> plain;
-    for (const std::string& name : skeleton.names) {
-      plain.push_back(plain_name(name.substr(name.rfind(':') + 1)));  // npos + 1 is 0
-      const size_t end = plain.back().find('_');
-      if (end != std::string::npos) ++prefixes[plain.back().substr(0, end + 1)];
+  BoneNames(const SourceSkeleton& skeleton, const std::vector<std::string>& plain,
+            bool as_written) {
+    for (size_t b = 0; b < plain.size(); ++b) {
+      const auto at = static_cast<int>(b);
+      const std::string& name = skeleton.names[b];
+      if (name.empty()) continue;
+      if (as_written) {
+        index_[0].emplace(plain_name(name), at);
+        index_[1].emplace(plain_name(name.substr(name.rfind(':') + 1)), at);  // npos + 1 is 0
+      }
+      index_[2].emplace(plain_name(plain[b]), at);
     }
-    for (size_t j = 0; j < plain.size(); ++j) index_.emplace(plain[j], static_cast<int>(j));
-    for (const auto& [prefix, count] : prefixes)
-      if (4 * count >= 3 * plain.size())
-        for (size_t j = 0; j < plain.size(); ++j)
-          if (plain[j].starts_with(prefix))
-            index_.emplace(plain[j].substr(prefix.size()), static_cast<int>(j));
   }
 
-  int find(const std::string& bone) const {
-    const auto at = index_.find(plain_name(bone));
-    return at == index_.end() ? -1 : at->second;
+  /// The first bone of this name, -1 if there is none.
+  int find(const std::string& name) const {
+    for (const auto& index : index_)
+      if (const auto at = index.find(plain_name(name)); at != index.end()) return at->second;
+    return -1;
   }
   int find(const std::vector<std::string>& any) const {
-    for (const std::string& bone : any)
-      if (const int at = find(bone); at >= 0) return at;
+    for (const std::string& name : any)
+      if (const int at = find(name); at >= 0) return at;
     return -1;
+  }
+  bool is_twice(const std::string& name) const {
+    for (const auto& index : index_)
+      if (const size_t n = index.count(plain_name(name)); n > 0) return n > 1;
+    return false;
   }
   std::vector<std::string> all() const {
     std::vector<std::string> out;
-    for (const auto& entry : index_) out.push_back(entry.first);
+    for (const auto& entry : index_[2]) out.push_back(entry.first);
     return out;
   }
 
  private:
-  std::map<std::string, int> index_;
+  std::array<std::multimap<std::string, int>, 3> index_;
 };
 
-struct Found {
-  const Profile* profile = nullptr;
-  std::array<int, kJoints> joints{};
-  std::vector<std::string> missing;  ///< of the required ones
-  int count = 0;                     ///< how many of the 22 are there
-  int fitting = 0;                   ///< collars that hang from spine3
-};
-
-Found match(const Profile& profile, const BoneNames& names, const SourceSkeleton& skeleton) {
-  Found out;
-  out.profile = &profile;
-  for (size_t j = 0; j < kJoints; ++j) {
-    out.joints[j] = names.find(profile.bones[j]);
-    out.count += out.joints[j] >= 0;
-  }
-  for (const int j : kRequired)
-    if (out.joints[j] < 0) out.missing.push_back(profile.bones[j][0]);
-  for (const size_t collar : {13, 14})
-    out.fitting += out.joints[collar] >= 0 && out.joints[kSpine3] >= 0 &&
-                   skeleton.parents[out.joints[collar]] == out.joints[kSpine3];
+Bones bones_of(const Profile& profile, const BoneNames& names) {
+  Bones out;
+  for (size_t j = 0; j < kJoints; ++j) out[j] = names.find(profile.bones[j]);
   return out;
 }
 
-bool better(const Found& a, const Found& b) {
-  if (a.missing.size() != b.missing.size()) return a.missing.size() < b.missing.size();
-  return a.count != b.count ? a.count > b.count : a.fitting > b.fitting;
+bool is_whole(const Bones& bones) {
+  return std::all_of(std::begin(kRequired), std::end(kRequired),
+                     [&](int j) { return bones[j] >= 0; });
 }
 
-[[noreturn]] void throw_missing(const Found& best, const BoneNames& names, bool chosen,
-                                const std::string& where) {
-  std::string lacks;
-  for (const std::string& bone : best.missing) {
-    if (lacks.size() > 80) {
-      lacks += ", ...";
-      break;
-    }
-    lacks += (lacks.empty() ? "" : ", ") + bone;
-  }
-  const std::string close = nearest(lower_case(best.missing[0]), names.all());
-  if (!close.empty()) lacks += " (" + best.missing[0] + ": is it '" + close.substr(0, 40) + "'?)";
-  throw InputError(where,
-                   chosen ? "lacks bones of the profile " + best.profile->name + ": " + lacks
-                          : "its bones fit no known skeleton; of the nearest (" +
-                                best.profile->title + ") it lacks " + lacks,
-                   "write a profile for it and give it with --profile, or rename the bones");
+int last_spine(const Bones& bones) {
+  for (const int j : {kSpine3, kSpine2, kSpine1})
+    if (bones[j] >= 0) return bones[j];
+  return -1;
 }
 
-Found best_match(const SourceSkeleton& skeleton, const BoneNames& names, const Profile* chosen,
-                 const std::string& where) {
-  Found best;
-  if (chosen) best = match(*chosen, names, skeleton);
-  if (!chosen)
-    for (const Profile& profile : builtin_profiles()) {
-      Found found = match(profile, names, skeleton);
-      if (best.profile == nullptr || better(found, best)) best = std::move(found);
-    }
-  if (!best.missing.empty()) throw_missing(best, names, chosen != nullptr, where);
-  return best;
+// ---- known families ----------------------------------------------------------------------------
+
+/// Whether the bones that a family's names pick hang together as they must: limbs in a row, the
+/// pelvis is what carries legs and spine, and the last of the spine is what carries the arms.
+bool hang_together(const BoneTree& tree, const Bones& bones) {
+  const auto on = [&](int j, int above) {
+    return bones[j] < 0 || bones[above] < 0 || hangs_on(tree.skeleton, bones[j], bones[above]);
+  };
+  for (const int side : {0, 1})
+    for (const int j : {4, 7, 10, 16, 18, 20})
+      if (!on(j + side, kParents[j + side])) return false;
+  if (!on(kSpine2, kSpine1) || !on(kSpine3, kSpine2) || !on(kSpine3, kSpine1)) return false;
+  const int chest = chest_of(tree, bones);
+  if (chest == bones[0] || !hangs_on(tree.skeleton, chest, bones[0]))
+    return hangs_on(tree.skeleton, bones[0], chest);  // limbs that hang on nothing, or on the root
+  const int legs = carrier_of(tree.skeleton, bones[1], bones[2]);
+  const int all = carrier_of(tree.skeleton, legs, chest);
+  const bool carries =  // 3ds Max hangs the legs on the first spine bone
+      bones[0] == all || (all == bones[kSpine1] && hangs_on(tree.skeleton, all, bones[0]));
+  return carries && last_spine(bones) == chest && on(15, 0);
 }
 
-/// Places joints that the source lacks, in the frame of one that it has.
-class Placer {
- public:
-  Placer(const SourceSkeleton& skeleton, const BoneNames& names, const Found& found,
-         const std::string& where)
-      : skeleton_(skeleton),
-        names_(names),
-        found_(found),
-        where_(where),
-        zero_(zero_positions(skeleton)) {
-    for (size_t j = 0; j < kJoints; ++j) out_.map[j].joint = found.joints[j];
-  }
+/// How many bones lie between two of a path, without helpers and without these parts.
+int between(const BoneTree& tree, int above, int below, std::initializer_list<Part> without = {}) {
+  int out = 0;
+  if (!hangs_on(tree.skeleton, below, above)) return 0;
+  for (int b = tree.skeleton.parents[below]; b >= 0 && b != above; b = tree.skeleton.parents[b])
+    out += !tree.words[b].helper &&
+           std::find(without.begin(), without.end(), tree.words[b].part) == without.end();
+  return out;
+}
 
-  NamedJoints place() {
-    out_.profile = found_.profile;
-    if (lacks(kNeck) && !by_profile(kNeck)) put_between(kNeck, last_spine(), at(kHead), 0.75);
-    spine();
-    for (const int side : {0, 1}) {
-      const int collar = 13 + side, shoulder = 16 + side, foot = 10 + side, ankle = 7 + side;
-      if (lacks(collar) && !by_profile(collar))
-        put(collar, kSpine3, at(kNeck) + 0.2 * (at(shoulder) - at(kNeck)));
-      if (lacks(foot) && !by_profile(foot)) put(foot, ankle, toe_of(ankle));
-    }
-    std::sort(out_.placed.begin(), out_.placed.end());
-    return out_;
-  }
-
- private:
-  bool lacks(int j) const { return joint(j).joint < 0; }
-  const SourceJoint& joint(int j) const { return out_.map[j]; }
-  Vec3 at(int j) const { return zero_[joint(j).joint] + joint(j).offset; }
-  int last_spine() const {
-    for (const int j : {kSpine3, kSpine2, kSpine1})
-      if (!lacks(j)) return j;
-    return 0;
-  }
-
-  /// Joint j turns with the bone of `like` and rests at `where`.
-  void put(int j, int like, const Vec3& where) {
-    SourceJoint& to = out_.map[j];
-    to.joint = joint(like).joint;
-    to.offset = where - zero_[to.joint];
-    out_.placed.push_back(j);
-  }
-  void put_between(int j, int from, const Vec3& to, double share) {
-    put(j, from, at(from) + share * (to - at(from)));
-  }
-
-  /// One of the 22 joints (if it has its place already) or a bone of the file, by name.
-  std::optional<SourceJoint> named(const std::string& name) const {
-    const auto j = std::find(kJointNames.begin(), kJointNames.end(), name) - kJointNames.begin();
-    if (j < kJoints && !lacks(static_cast<int>(j))) return joint(static_cast<int>(j));
-    const int bone = names_.find(name);
-    return bone < 0 ? std::nullopt : std::optional(SourceJoint{bone, Vec3::Zero()});
-  }
-  bool by_profile(int j) {
-    const auto& place = found_.profile->places[j];
-    if (!place) return false;
-    const auto with = named(place->with), from = named(place->from), to = named(place->to);
-    if (!with || !from || !to) return false;
-    const auto rest = [&](const SourceJoint& s) -> Vec3 { return zero_[s.joint] + s.offset; };
-    SourceJoint& target = out_.map[j];
-    target.joint = with->joint;
-    target.offset = rest(*from) + place->share * (rest(*to) - rest(*from)) - zero_[with->joint];
-    out_.placed.push_back(j);
+/// Whether the family would place a joint where a bone lies: an odd one beside its good ones.
+bool leaves_out(const BoneTree& tree, const Profile& profile, const Bones& bones) {
+  const int chest = chest_of(tree, bones);
+  if (!hangs_on(tree.skeleton, chest, bones[0])) return false;  // limbs that hang on nothing
+  const auto named = [&](int j) { return bones[j] >= 0; };
+  const int spine = named(kSpine1) + named(kSpine2) + named(kSpine3);
+  if (!profile.places[kSpine3] && spine < std::min(3, 1 + between(tree, bones[0], chest)))
     return true;
+  if (!named(12) && between(tree, chest, bones[15]) > 0) return true;
+  for (const int side : {0, 1}) {
+    if (!named(13 + side) && between(tree, chest, bones[16 + side], {Part::neck}) > 0) return true;
+    if (!named(10 + side))
+      for (size_t b = 0; b < tree.words.size(); ++b)
+        if (tree.words[b].part == Part::toe && !tree.words[b].helper &&
+            hangs_on(tree.skeleton, static_cast<int>(b), bones[7 + side]))
+          return true;
   }
+  return false;
+}
 
-  void spine() {
-    const Vec3 neck = at(kNeck);
-    if (lacks(kSpine1) && !by_profile(kSpine1)) put_between(kSpine1, 0, neck, 0.25);
-    if (lacks(kSpine2) && !by_profile(kSpine2)) {
-      // Two joints (or one, if spine3 is there) on the way from spine1 up.
-      if (lacks(kSpine3)) {
-        put_between(kSpine3, kSpine1, neck, 2.0 / 3);
-        put_between(kSpine2, kSpine1, neck, 1.0 / 3);
-      } else {
-        put_between(kSpine2, kSpine1, at(kSpine3), 0.5);
-      }
-    }
-    if (lacks(kSpine3) && !by_profile(kSpine3)) put_between(kSpine3, kSpine2, neck, 0.35);
-  }
-
-  Vec3 toe_of(int ankle) const {
-    const size_t source = static_cast<size_t>(joint(ankle).joint);
-    if (skeleton_.has_end[source]) return at(ankle) + skeleton_.ends[source];
-    for (size_t j = 0; j < skeleton_.size(); ++j)
-      if (skeleton_.parents[j] == static_cast<int>(source)) return zero_[j];
-    throw InputError(where_,
-                     "joint " + skeleton_.names[source] + " has neither a toe nor an end site",
-                     "add one, so that the foot's direction is known");
-  }
-
-  const SourceSkeleton& skeleton_;
-  const BoneNames& names_;
-  const Found& found_;
-  const std::string& where_;
-  const std::vector<Vec3> zero_;
-  NamedJoints out_;
+/// The built-in profile whose names are there and hang together, with its bones: the one of which
+/// most are there.
+struct Family {
+  const Profile* profile = nullptr;
+  Bones bones{};
 };
+Family find_family(const BoneTree& tree, const BoneNames& names) {
+  Family out;
+  int most = 0;
+  for (const Profile& profile : builtin_profiles()) {
+    const Bones bones = bones_of(profile, names);
+    const auto count = static_cast<int>(
+        std::count_if(bones.begin(), bones.end(), [](int bone) { return bone >= 0; }));
+    if (count > most && is_whole(bones) && hang_together(tree, bones) &&
+        !leaves_out(tree, profile, bones)) {
+      out = {&profile, bones};
+      most = count;
+    }
+  }
+  // What carries collars and neck is spine3, unless the family says where spine3 is.
+  if (out.profile && out.bones[kSpine3] < 0 && !out.profile->places[kSpine3])
+    std::swap(out.bones[kSpine3], out.bones[kSpine2]);
+  return out;
+}
+
+// ---- refusals ----------------------------------------------------------------------------------
+
+std::string list_of(const std::vector<std::string>& words) {
+  std::string out;
+  for (const std::string& word : words) {
+    if (out.size() > 100) return out + ", ...";
+    out += (out.empty() ? "" : ", ") + word;
+  }
+  return out;
+}
+
+/// Names in another encoding can be neither found nor given: said before anything else.
+void check_encoding(const SourceSkeleton& skeleton, const std::string& where) {
+  for (const std::string& name : skeleton.names) {
+    if (text::is_utf8(name)) continue;
+    const bool japanese = text::may_be_shift_jis(name);
+    throw InputError(where,
+                     cat("the names of its bones are not UTF-8 text",
+                         japanese ? "; by their bytes they are Shift-JIS (Japanese)" : ""),
+                     cat("save it as UTF-8: iconv -f ", japanese ? "SHIFT_JIS" : "LATIN1",
+                         " -t UTF-8 OLD > NEW"));
+  }
+}
+
+/// The bone that carries the only person; -1: nothing tells. InputError for two.
+int only_person(const BoneTree& tree, const std::string& where) {
+  const std::vector<int> people = find_people(tree);
+  if (people.size() < 2) return people.empty() ? -1 : people[0];
+  std::vector<std::string> tops;
+  for (const int top : people) tops.push_back(text::quote(tree.skeleton.names[top]));
+  throw InputError(where,
+                   cat("holds ", people.size(), " characters (their bones hang on ", list_of(tops),
+                       "), and each needs a file of its own"),
+                   "export them one by one");
+}
+
+[[noreturn]] void throw_unlike_profile(const Profile& profile, const Bones& bones,
+                                       const BoneNames& names, const std::string& where) {
+  std::vector<std::string> lacks;
+  for (const int j : kRequired)
+    if (bones[j] < 0) lacks.push_back(profile.bones[j][0]);
+  std::string text = list_of(lacks);
+  if (const std::string close = nearest(lower_case(lacks[0]), names.all()); !close.empty())
+    text += cat(" (", lacks[0], ": is it ", text::quote(close), "?)");
+  throw InputError(where, cat("lacks bones of the profile ", profile.name, ": ", text),
+                   "correct the names there, or leave --bones out");
+}
+
+/// The bones that carry the joint's limb, for each side; of others the joint itself.
+std::vector<int> limb_of(int joint) {
+  for (const std::vector<int>& limb : {std::vector{1, 4, 7}, {2, 5, 8}, {16, 18, 20}, {17, 19, 21}})
+    if (std::find(limb.begin(), limb.end(), joint) != limb.end()) return limb;
+  return {joint};
+}
+
+/// What is missing, in the words of the side that is there: "left_hip (is it 'LeftUpLegg'?)".
+std::vector<std::string> words_for(const BoneTree& tree, const FoundJoints& found,
+                                   const std::vector<std::string>& plain) {
+  std::vector<std::string> lower, out;
+  for (const std::string& name : plain) lower.push_back(lower_case(name));
+  std::vector<int> missing;
+  std::map<int, std::string> expected;
+  for (const int j : found.missing) {
+    bool told = false;
+    for (const int k : limb_of(j)) {
+      const int twin = found.bones[kMirror[k]];
+      if (j == 0 || j == 15 || twin < 0 || found.bones[k] >= 0) continue;
+      const std::string name = other_side(plain[twin]);
+      if (name.empty() || std::find(lower.begin(), lower.end(), name) != lower.end()) continue;
+      expected[k] = name;
+      missing.push_back(k);
+      told = true;
+    }
+    if (!told) missing.push_back(j);
+  }
+  std::sort(missing.begin(), missing.end());
+  missing.erase(std::unique(missing.begin(), missing.end()), missing.end());
+  for (const int j : missing) {
+    std::string word(kJointNames[j]);
+    if (const auto at = expected.find(j); at != expected.end())
+      if (const auto close = nearest(at->second, lower); !close.empty()) {
+        const auto bone = std::find(lower.begin(), lower.end(), close) - lower.begin();
+        word += cat(" (is it ", text::quote(tree.skeleton.names[static_cast<size_t>(bone)]), "?)");
+      }
+    out.push_back(word);
+  }
+  return out;
+}
+
+[[noreturn]] void throw_not_found(const BoneTree& tree, const FoundJoints& found,
+                                  const std::vector<std::string>& plain, const std::string& where) {
+  const bool any = std::any_of(tree.words.begin(), tree.words.end(), [](const BoneWords& words) {
+    return words.part != Part::none && !words.helper;
+  });
+  std::string what;
+  if (!any) {
+    std::vector<std::string> some;
+    size_t named = 0;
+    for (const std::string& name : tree.skeleton.names)
+      if (!name.empty() && ++named <= 3) some.push_back(text::quote(name));
+    what = some.empty() ? "its bones have no names"
+                        : cat("none of its ", named, " bones is named like a person's (",
+                              list_of(some), named > 3 ? " ...)" : ")");
+  } else {
+    what = cat("of the joints of a person these were not found among its bones: ",
+               list_of(words_for(tree, found, plain)), found.why.empty() ? "" : "; ", found.why);
+  }
+  throw UnknownSkeleton(where, what, kFix);
+}
+
+/// The bones that a profile names which was asked for. InputError for those that the file lacks, or
+/// has twice.
+Bones asked_bones(const Profile& profile, const SourceSkeleton& skeleton, const BoneNames& names,
+                  const std::string& where) {
+  const Bones bones = bones_of(profile, names);
+  if (!is_whole(bones)) {
+    check_encoding(skeleton, where);
+    throw_unlike_profile(profile, bones, names, where);
+  }
+  for (size_t j = 0; j < kJoints; ++j)
+    for (const std::string& name : profile.bones[j])
+      if (bones[j] >= 0 && names.find(name) == bones[j] && names.is_twice(name))
+        throw InputError(where, cat("two of its bones are called ", text::quote(name)),
+                         "rename one, or export one character only");
+  return bones;
+}
+
+BoneTree tree_of(const SourceSkeleton& skeleton, const std::vector<std::string>& plain) {
+  BoneTree out{skeleton, {}};
+  for (const std::string& name : plain) out.words.push_back(bone_words(name));
+  return out;
+}
+
+/// The profile of bones that were found without one.
+const Profile& no_profile() {
+  static const Profile out = [] {
+    Profile p;
+    p.title = "found by parts of names and by how the bones hang together";
+    return p;
+  }();
+  return out;
+}
 
 }  // namespace
 
+void check_one_person(const SourceSkeleton& skeleton, const std::string& where) {
+  only_person(tree_of(skeleton, undecorated(skeleton.names)), where);
+}
+
 NamedJoints name_joints(const SourceSkeleton& skeleton, const std::string& where,
                         const Profile* profile) {
-  const BoneNames names(skeleton);
-  const Found found = best_match(skeleton, names, profile, where);
-  return Placer(skeleton, names, found, where).place();
+  const std::vector<std::string> plain = undecorated(skeleton.names);
+  const BoneTree tree = tree_of(skeleton, plain);
+  const BoneNames names(skeleton, plain, profile != nullptr);
+  const auto by_name = [&](const std::string& name) { return names.find(name); };
+  if (profile)
+    return place_joints(tree, by_name, *profile, asked_bones(*profile, skeleton, names, where),
+                        where);
+  const FoundJoints found = find_joints(tree, only_person(tree, where));
+  const Family family = find_family(tree, names);
+  if (family.profile) return place_joints(tree, by_name, *family.profile, family.bones, where);
+  if (!found.missing.empty()) {
+    check_encoding(skeleton, where);
+    throw_not_found(tree, found, plain, where);
+  }
+  return place_joints(tree, by_name, no_profile(), found.bones, where);
 }
 
 }  // namespace restage

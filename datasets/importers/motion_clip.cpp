@@ -5,6 +5,7 @@
 
 #include "autograd/base/format.h"
 #include "datasets/readers/errors.h"
+#include "datasets/readers/text.h"
 #include "datasets/readers/word_lines.h"
 
 namespace restage {
@@ -120,6 +121,7 @@ Poses poses_at_30_fps(SourceMotion motion, const JointMap& map, const RestPose& 
       poses[f].global[j] = rest.align * poses[f].global[j] * rest.frame[j];
       poses[f].joints[j] = rest.align * poses[f].joints[j];
     }
+    follow_trunk(poses[f], rest.joints);
   }
   return poses;
 }
@@ -139,7 +141,17 @@ void report_names(const Recording& recording, ImportReport& report) {
   std::string placed;
   for (const int j : recording.names.placed)
     placed += cat(placed.empty() ? "; placed: " : ", ", kJointNames[j]);
-  report.fact("names", profile.title + " (profile " + profile.name + ")" + placed);
+  if (!profile.name.empty()) {
+    report.fact("names", profile.title + " (profile " + profile.name + ")" + placed);
+    return;
+  }
+  report.fact("names", profile.title + placed);
+  std::string bones;
+  for (size_t j = 0; j < kJoints; ++j)
+    if (const SourceJoint& joint = recording.names.map[j]; joint.offset.isZero())
+      bones += cat(bones.empty() ? "" : ", ", kJointNames[j], " = ",
+                   text::quote(recording.motion.skeleton.names[joint.joint]));
+  report.fact("joints", bones);
 }
 
 /// Bones that the file moves apart are of one length here, which is said where it is seen.
@@ -149,8 +161,9 @@ void report_positions(const BonePositions& found, double scale, ImportReport& re
     report.fact("offsets", cat("by the position channels of ", found.joints, " joints, up to ",
                                format("%.3f", found.off_offset * scale), " m from OFFSET"));
   if (found.stray * scale > kSeen)
-    report.remark("the position channels stretch bones: " + found.stray_joint + " strays up to " +
-                  format("%.3f", found.stray * scale) + " m from its mean place, which is taken");
+    report.remark("the position channels stretch bones: " + text::quote(found.stray_joint) +
+                  " strays up to " + format("%.3f", found.stray * scale) +
+                  " m from its mean place, which is taken");
 }
 
 /// Where the file differs from what its family usually is.

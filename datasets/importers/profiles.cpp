@@ -8,6 +8,7 @@
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/nearest.h"
 #include "datasets/readers/errors.h"
+#include "datasets/readers/text.h"
 
 namespace restage {
 namespace {
@@ -166,8 +167,7 @@ Profile parse_profile(std::string_view yaml, const std::string& path) {
 }
 
 Profile find_profile(const std::string& name) {
-  const bool file =
-      name.ends_with(".yaml") || name.ends_with(".yml") || name.find('/') != std::string::npos;
+  const bool file = text::ends_in(name, {".yaml", ".yml"}) || name.find('/') != std::string::npos;
   if (file) return parse_profile(read_file(name, kLongest), name);
   std::vector<std::string> known;
   for (const Profile& profile : builtin_profiles()) {

@@ -47,8 +47,8 @@ const std::vector<Profile>& builtin_profiles();
 /// is no YAML, an unknown key or joint (with the nearest known), or a missing title or joint.
 Profile parse_profile(std::string_view yaml, const std::string& path);
 
-/// A built-in profile by name, or the one of a file (any name with ".yaml", ".yml" or "/").
-/// InputError with the nearest known name.
+/// A built-in profile by name, or the one of a file (any name that ends in .yaml or .yml, in any
+/// case, or with a "/"). InputError with the nearest known name.
 Profile find_profile(const std::string& name_or_file);
 
 }  // namespace restage

@@ -91,6 +91,17 @@ PosedSkeleton source_pose(const SourceMotion& motion, const JointMap& map, size_
   return out;
 }
 
+void follow_trunk(PosedSkeleton& pose, const Joints& rest) {
+  constexpr double kSeen = 1e-5;  // of the bone's length
+  for (const auto& [lower, upper] : {std::pair{3, 6}, {6, 9}, {12, 15}, {13, 16}, {14, 17}}) {
+    const Vec3 is = pose.global[lower] * (rest[upper] - rest[lower]);
+    const Vec3 wanted = pose.joints[upper] - pose.joints[lower];
+    const double size = std::min(is.norm(), wanted.norm());
+    if (size > 1e-9 && (is - wanted).norm() > kSeen * size)
+      pose.global[lower] = shortest_arc(is, wanted) * pose.global[lower];
+  }
+}
+
 double lowest_foot(const PosedSkeleton& p) {
   return std::min({p.joints[7].y(), p.joints[8].y(), p.joints[10].y(), p.joints[11].y()});
 }

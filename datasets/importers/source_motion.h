@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "autograd/base/error.h"
 #include "datasets/importers/profiles.h"
 #include "datasets/readers/skeleton_file.h"
 #include "nn/geometry/body.h"
@@ -33,16 +34,27 @@ using JointMap = std::array<SourceJoint, kJoints>;
 
 struct NamedJoints {
   JointMap map;
-  const Profile* profile = nullptr;  ///< built in, or the one asked for
-  std::vector<int> placed;           ///< joints that the source lacks, put where the profile says
+  /// Built in, the one asked for, or one without a name: found by structure. Never null.
+  const Profile* profile = nullptr;
+  std::vector<int> placed;  ///< joints that the source lacks, put where the profile says
 };
 
-/// Finds the 22 joints by name: with `profile`, or with the built-in one that fits best (the fewest
-/// joints missing, the most found, collars that hang from spine3; then the first by name). Case and
-/// a prefix that most bones share ("mixamorig:") do not matter. InputError naming `where`, what is
-/// missing and the nearest name that is there, if no names fit.
+/// A skeleton that name_joints() does not know: which joints it did not find.
+struct UnknownSkeleton : InputError {
+  UnknownSkeleton(const std::string& where, const std::string& wrong, const std::string& fix)
+      : InputError(where, wrong, fix), reason(wrong) {}
+  std::string reason;  ///< the error's text without file and remedy
+};
+
+/// Finds the 22 joints: with `profile` by its names, else with the built-in profile whose names are
+/// there and hang together, else by parts of names and structure (docs/design/rigs.md). Case and
+/// what all names are decorated with ("mixamorig:", "_01") do not matter. UnknownSkeleton for one
+/// that is not found; InputError for two characters, for bones that the profile names and the file
+/// lacks, and for names in another encoding than UTF-8.
 NamedJoints name_joints(const SourceSkeleton& skeleton, const std::string& where,
                         const Profile* profile = nullptr);
+/// InputError if there are two characters in it: name_joints() without a profile says so, too.
+void check_one_person(const SourceSkeleton& skeleton, const std::string& where);
 /// Positions of all its joints at zero rotations, relative to the root.
 std::vector<Vec3> zero_positions(const SourceSkeleton& skeleton);
 /// Positions of the 22 joints at zero rotations, relative to the pelvis.
@@ -62,6 +74,12 @@ PosedSkeleton source_pose(const SourceMotion& motion, const JointMap& map, size_
 
 /// Frame by frame; in pieces, as the frames of hours are many.
 using Poses = std::deque<PosedSkeleton>;
+
+/// A source may have more bones in the trunk than the 22 joints: those between, which turn too, are
+/// left out. So the lower of two joints that follow each other there (spine, neck, collars) is
+/// turned further, by the shortest arc, until `rest` puts the upper one where it is in the source.
+/// Changes nothing where no bone is left out.
+void follow_trunk(PosedSkeleton& pose, const Joints& rest);
 
 /// 5th percentile over frames of the lowest ankle or foot: the height of the clip's floor.
 double floor_height(const Poses& poses);

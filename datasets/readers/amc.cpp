@@ -68,8 +68,8 @@ class AmcParser {
 
   void bone_values() {
     const auto& words = lines_.words();
-    const std::string name = WordLines::quoted(words[0]);
-    const auto at = index_.find(name);
+    const std::string name = WordLines::quoted(words[0]);  // for messages
+    const auto at = index_.find(std::string(words[0]));
     if (at == index_.end()) {
       std::vector<std::string> known;
       for (const auto& entry : index_) known.push_back(entry.first);

@@ -130,7 +130,7 @@ class AsfParser {
   void bone_entry(AsfBone& bone, const std::string& key) {
     if (key == "name") {
       if (words().size() < 2) lines_.fail("a bone without a name", "give it one");
-      bone.name = WordLines::quoted(words()[1]);
+      bone.name = words()[1];
     } else if (key == "direction") {
       bone.direction = vector(1, "direction");
     } else if (key == "length") {
@@ -175,12 +175,13 @@ class AsfParser {
     if (bone.name.empty()) lines_.fail("a bone without a name", "give it one");
     const double norm = bone.direction.norm();
     if (!(norm > 1e-9) || !(bone.length >= 0))
-      lines_.fail("bone " + bone.name + " has no direction or no length", "give it both");
+      lines_.fail("bone " + WordLines::quoted(bone.name) + " has no direction or no length",
+                  "give it both");
     // Written with six digits, a direction is never quite of unit length; others take it as it is.
     if (std::abs(norm - 1) > 1e-4) bone.direction /= norm;
     if (!index_.emplace(bone.name, static_cast<int>(asf_.bones.size()) - 1).second ||
         bone.name == "root")
-      lines_.fail("two bones are called " + bone.name, "give each its own name");
+      lines_.fail("two bones are called " + WordLines::quoted(bone.name), "give each its own name");
   }
 
   void hierarchy_line() {
@@ -190,14 +191,14 @@ class AsfParser {
       const int child = bone_index(words()[i]);
       AsfBone& bone = asf_.bones[child];
       if (child == 0 || bone.parent >= 0)
-        lines_.fail("bone " + bone.name + " has two parents", "keep one");
+        lines_.fail("bone " + WordLines::quoted(bone.name) + " has two parents", "keep one");
       bone.parent = parent;
     }
   }
 
   int bone_index(std::string_view word) const {
     if (word == "root") return 0;
-    const auto at = index_.find(WordLines::quoted(word));
+    const auto at = index_.find(std::string(word));
     if (at == index_.end())
       lines_.fail("'" + WordLines::quoted(word) + "' is no bone of :bonedata", "correct the name");
     return at->second;
@@ -214,8 +215,10 @@ class AsfParser {
     std::vector<std::vector<int>> children(asf_.bones.size());
     for (size_t b = 1; b < asf_.bones.size(); ++b) {
       if (asf_.bones[b].parent < 0)
-        throw InputError(path_, "bone " + asf_.bones[b].name + " has no place in the hierarchy",
-                         "add it, or give the whole file");
+        throw InputError(
+            path_,
+            "bone " + WordLines::quoted(asf_.bones[b].name) + " has no place in the hierarchy",
+            "add it, or give the whole file");
       children[asf_.bones[b].parent].push_back(static_cast<int>(b));
     }
     std::vector<int> order = {0};

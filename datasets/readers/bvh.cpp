@@ -9,7 +9,8 @@
 namespace restage {
 namespace {
 
-constexpr size_t kMaxJoints = 4096;
+constexpr size_t kMaxJoints = 4096, kMaxName = 1000;
+constexpr double kLeastTime = 1e-4, kMostTime = 1;  // seconds of a frame
 
 Channel channel_of(const WordLines& lines, std::string_view word) {
   constexpr std::pair<std::string_view, Channel> kNames[] = {
@@ -74,8 +75,9 @@ class HierarchyParser {
     const bool brace = words.back() == "{" && words.size() > 1;
     std::string name;
     for (size_t i = 1; i < words.size() - (brace ? 1 : 0); ++i)
-      name += (i > 1 ? "_" : "") + WordLines::quoted(words[i]);
+      name += cat(i > 1 ? "_" : "", words[i]);
     if (name.empty()) lines_.fail("a joint without a name", "give it one");
+    if (name.size() > kMaxName) lines_.fail("a joint's name of more than 1000 bytes", "shorten it");
     s.add(name, open_.empty() ? -1 : open_.back(), Vec3::Zero());
     file_.channels.emplace_back();
     has_channels_.push_back(0);
@@ -170,16 +172,16 @@ double last_digit(const std::string& number) {
   return std::pow(10.0, power);
 }
 
-void parse_frames(WordLines& lines, BvhFile& file) {
+void parse_frames(WordLines& lines, BvhFile& file, bool rate_is_told) {
   const double announced = lines.number(header_value(lines, "frames"));
   if (!(announced >= 1) || announced != std::floor(announced))
     lines.fail("no frames announced", "give a file with at least one frame");
   const std::string frame_time = header_value(lines, "frame time");
   file.frame_time = lines.number(frame_time);
   file.frame_time_digit = last_digit(frame_time);
-  if (!(file.frame_time >= 1e-4 && file.frame_time <= 1.0))
-    lines.fail(cat("frame time ", file.frame_time, " s is not usable"),
-               "write seconds per frame, between 0.0001 and 1");
+  if (!rate_is_told && !(file.frame_time >= kLeastTime && file.frame_time <= kMostTime))
+    lines.fail("frame time " + WordLines::quoted(frame_time) + " s is not usable",
+               "give the true rate with --fps, or write seconds per frame, between 0.0001 and 1");
   while (lines.next()) {
     if (static_cast<double>(file.frames.size()) >= announced) {
       ++file.lines_left_out;
@@ -204,11 +206,11 @@ void parse_frames(WordLines& lines, BvhFile& file) {
 
 }  // namespace
 
-BvhFile parse_bvh(std::string_view text, const std::string& path) {
+BvhFile parse_bvh(std::string_view text, const std::string& path, bool rate_is_told) {
   BvhFile file;
   WordLines lines(text, path);
   HierarchyParser(lines, file).parse();
-  parse_frames(lines, file);
+  parse_frames(lines, file, rate_is_told);
   return file;
 }
 

@@ -213,6 +213,10 @@ std::unique_ptr<FrameSource> open_frames(const std::string& path, const FrameOpt
   if (options.sequence) check_sequence(path, *options.sequence, 1);
   if (!folder && is_gltf_name(path)) {
     Gltf file = read_gltf(path);
+    if (file.vertices.empty() && !file.clips.empty())
+      throw InputError(path, "holds a motion without a surface",
+                       "import it (restage data import) and let a body perform it (restage data "
+                       "perform)");
     if (!options.clip.empty() || !file.clips.empty())
       return std::make_unique<ClipFrames>(std::move(file), options.clip);
   }

@@ -423,7 +423,7 @@ class Builder {
 }  // namespace
 
 bool is_gltf_name(const std::string& path) {
-  return text::ends_in(path, {".glb", ".gltf", ".vrm"});
+  return text::ends_in(path, {".glb", ".gltf", ".vrm", ".vrma"});
 }
 
 Gltf parse_gltf(std::string_view content, const std::string& path) {

@@ -1,4 +1,5 @@
-// Rigged characters and scenes in glTF 2.0: .glb, .vrm and .gltf with the buffers in its folder.
+// Rigged characters and scenes in glTF 2.0: .glb, .vrm, .vrma (VRM animations: nodes that move and
+// a list of which bone they are) and .gltf with the buffers in its folder.
 // What a file holds as plain values, in the file's own units and axes (metres and y up, if it keeps
 // to the format). Pictures, materials, cameras and morph targets are left out.
 // Reading never trusts a number in a file. InputError "file: what; fix" for anything wrong: cut
@@ -75,7 +76,7 @@ struct Gltf {
   std::vector<std::string> remarks;                   ///< what was left out
 };
 
-/// Whether the name ends in .glb, .gltf or .vrm, in any case.
+/// Whether the name ends in .glb, .gltf, .vrm or .vrma, in any case.
 bool is_gltf_name(const std::string& path);
 
 Gltf read_gltf(const std::string& path);

@@ -124,10 +124,10 @@ int node_number(const Json& bone) {
              : -1;
 }
 
-/// VRM 0: extensions.VRM.humanoid.humanBones is a list; VRM 1: VRMC_vrm's is an object.
+/// VRM 0: extensions.VRM.humanoid.humanBones is a list; VRM 1 and VRM animations: an object.
 std::vector<std::pair<std::string, int>> read_humanoid(const Json& root) {
   std::vector<std::pair<std::string, int>> out;
-  for (const char* name : {"VRM", "VRMC_vrm"}) {
+  for (const char* name : {"VRM", "VRMC_vrm", "VRMC_vrm_animation"}) {
     const auto pointer = Json::json_pointer(cat("/extensions/", name, "/humanoid/humanBones"));
     if (!root.contains(pointer)) continue;
     const Json& bones = root.at(pointer);

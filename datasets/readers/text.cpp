@@ -57,8 +57,50 @@ bool ends_in(std::string_view name, std::initializer_list<std::string_view> endi
                      [&](std::string_view ending) { return lower.ends_with(ending); });
 }
 
+size_t utf8_size(std::string_view text) {
+  if (text.empty()) return 0;
+  const auto byte = [&](size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char first = byte(0);
+  if (first < 0x80) return 1;
+  const size_t size = first >= 0xC2 && first < 0xE0   ? 2
+                      : first >= 0xE0 && first < 0xF0 ? 3
+                      : first >= 0xF0 && first < 0xF5 ? 4
+                                                      : 0;
+  if (size == 0 || text.size() < size) return 0;
+  for (size_t i = 1; i < size; ++i)
+    if ((byte(i) & 0xC0) != 0x80) return 0;
+  const bool overlong = (first == 0xE0 && byte(1) < 0xA0) || (first == 0xF0 && byte(1) < 0x90);
+  const bool surrogate = first == 0xED && byte(1) >= 0xA0;
+  const bool beyond = first == 0xF4 && byte(1) >= 0x90;
+  return overlong || surrogate || beyond ? 0 : size;
+}
+
+bool is_utf8(std::string_view text) {
+  while (!text.empty()) {
+    const size_t size = utf8_size(text);
+    if (size == 0) return false;
+    text.remove_prefix(size);
+  }
+  return true;
+}
+
+bool may_be_shift_jis(std::string_view text) {
+  bool any = false;
+  for (size_t i = 0; i < text.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    if (byte < 0x80 || (byte >= 0xA1 && byte <= 0xDF)) continue;  // ASCII, half-width kana
+    const auto next = static_cast<unsigned char>(i + 1 < text.size() ? text[i + 1] : 0);
+    const bool lead = (byte >= 0x81 && byte <= 0x9F) || (byte >= 0xE0 && byte <= 0xFC);
+    if (!lead || next < 0x40 || next == 0x7F || next > 0xFC) return false;
+    any = true;
+    ++i;
+  }
+  return any;
+}
+
 std::string quote(std::string_view word) {
-  return cat("'", WordLines::quoted(word), word.size() > 40 ? "...'" : "'");
+  const std::string shown = WordLines::quoted(word);
+  return cat("'", shown, shown.size() < word.size() && word.size() > 40 ? "...'" : "'");
 }
 
 void throw_no_coordinate(double value, const std::string& where) {

@@ -1,5 +1,6 @@
 #include "datasets/readers/word_lines.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
@@ -63,9 +64,19 @@ double WordLines::number(std::string_view word) const {
 }
 
 std::string WordLines::quoted(std::string_view word) {
-  std::string out(word.substr(0, 40));
-  for (char& c : out)
-    if (c < ' ' || c > '~') c = '?';
+  constexpr size_t kMost = 40;  // bytes
+  std::string out;
+  while (!word.empty()) {
+    const size_t size = text::utf8_size(word);  // 0: no character of UTF-8
+    const auto first = static_cast<unsigned char>(word[0]);
+    const bool control = size == 1 && (first < 0x20 || first == 0x7f);
+    const bool control1 = size == 2 && first == 0xC2 && static_cast<unsigned char>(word[1]) < 0xA0;
+    const bool shown = size > 0 && !control && !control1;
+    const size_t taken = std::max<size_t>(size, 1);
+    if (out.size() + (shown ? taken : 1) > kMost) break;
+    out += shown ? word.substr(0, taken) : "?";
+    word.remove_prefix(taken);
+  }
   return out;
 }
 

@@ -22,7 +22,7 @@ class WordLines {
   [[noreturn]] void fail(const std::string& wrong, const std::string& fix) const;
   /// The word as a finite number of at most 1e9; else fail().
   double number(std::string_view word) const;
-  /// Short and printable, for messages.
+  /// Short and printable, for messages: at most 40 bytes of UTF-8, a '?' for what is no character.
   static std::string quoted(std::string_view word);
 
  private:

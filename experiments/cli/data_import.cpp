@@ -92,17 +92,18 @@ void add_data_import(Program& program, CommandOptions group) {
       "restage data import AMASS/ --body-model smplh/ --out amass.h5\n"
       "restage data import SMPLX_NEUTRAL.npz --betas zeros people.npz --out bodies.h5\n"
       "restage data import scans/ --fps 60 --scale 0.001 --out scans.h5\n"
-      "restage data import a.bvh --profile mixamo --up z --facing x --split test --out a.h5\n"
+      "restage data import a.bvh --bones mixamo --up z --facing x --split test --out a.h5\n"
       "restage data import a.bvh --rest-frame 0 --drop-leading 1 --force --out a.h5\n"
       "restage data import hero.glb --clip Walk --out walk.h5\n"
       "restage data import DATA_FOLDER --garment male_casualsuit04 --out dressed.h5",
       run_import);
   ImportOptions& options = given.options;
   MotionOptions& motion = options.motion;
-  app.add_option("SOURCE", given.source,
-                 "data folder; recording (.bvh, .amc; also .xz); character (.glb, .gltf, .vrm); "
-                 "AMASS motion or body model (.npz); scans (.ply, .obj, .npy, .npz); or a folder "
-                 "of one kind")
+  app.add_option(
+         "SOURCE", given.source,
+         "data folder; recording (.bvh, .amc; also .xz); character (.glb, .gltf, .vrm, .vrma); "
+         "AMASS motion or body model (.npz); scans (.ply, .obj, .npy, .npz); or a folder "
+         "of one kind")
       .required();
   app.add_option("--out", given.out, "file to write").required();
   app.add_option("--license", options.license, "licence of the files");
@@ -123,8 +124,9 @@ void add_data_import(Program& program, CommandOptions group) {
          "recordings: frames to leave out at the beginning (default: the T-pose in front of "
          "the Daz release of CMU)")
       .check(not_negative);
-  app.add_option("--profile", motion.profile,
-                 "recordings, characters: bone names, a known family or a .yaml file");
+  app.add_option("--bones,--profile", motion.profile,
+                 "recordings, characters: which bone is which joint, a .yaml file or a known "
+                 "family (--profile is the older name)");
   app.add_flag("--force", motion.force,
                "recordings, characters: take also one whose left and right are exchanged");
   app.add_option("--asf", options.asf, "skeleton of .amc files (default: the one beside)");

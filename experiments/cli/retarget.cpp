@@ -27,7 +27,7 @@ namespace {
 
 struct RetargetCommand {
   SourceRecord source;
-  std::string target, weights, out, format = "ply", device = "cpu";
+  std::string target, bones, weights, out, format = "ply", device = "cpu";
   std::string system = "chain", rest;
   RetargetOptions options;
   bool profile = false;
@@ -111,14 +111,29 @@ void check(const RetargetCommand& c) {
                      "end it in .glb, .bvh, .h5, or / for a folder");
   std::vector<std::string> inputs = {c.source.path, c.target};
   if (!c.weights.empty()) inputs.push_back(weights_path(c.weights));
-  if (!c.rest.empty()) inputs.push_back(c.rest);
+  for (const std::string& more : {c.rest, c.bones})
+    if (!more.empty()) inputs.push_back(more);
   check_output(c.out, inputs);
+}
+
+/// A target that is refused as it stands may only lack the names of its bones: then that is what
+/// there is to mend.
+template <class Work>
+auto with_target(const RetargetCommand& c, const TargetMesh& target, const Work& work) {
+  try {
+    return work();
+  } catch (const InputError& error) {
+    if (target.unknown_rig.empty() || !std::string(error.what()).starts_with(c.target)) throw;
+    throw InputError(
+        c.target, "it would be posed by its rig, which was not recognised: " + target.unknown_rig,
+        "say which bone is which joint with --bones names.yaml (docs/data.md)");
+  }
 }
 
 /// The doctor's words on what would make the result nonsense.
 void check_inputs(const RetargetCommand& c, Source& source, const TargetMesh& target) {
   if (c.options.force) return;
-  check_target(target.mesh, c.target, target.known());
+  with_target(c, target, [&] { check_target(target.mesh, c.target, target.known()); });
   std::vector<Mesh> first;
   for (int i = 0; i < kSourceFrames; ++i) {
     auto cloud = source.next();
@@ -305,15 +320,28 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
     throw InputError(c.source.path, "holds " + std::to_string(source.sequences()) + " sequences",
                      "choose one with --sequence N, from 0");
   input.options.fps = source.fps();
-  TargetMesh target = read_target(c.target);
+  TargetMesh target = read_target(c.target, c.bones);
   check_inputs(c, source, target);
   if (!c.rest.empty()) input.rest = rest_joints(c.rest);
   // The joints that a rig names are where its maker put them, not where a network finds them.
   if (c.rest.empty() && !system_type(c.system).weights) input.rest = target.joints;
   input.rig = target.joints;
   input.target = std::move(target.mesh);
-  const auto system = system_type(c.system).make(std::move(input));
-  Gaps gaps(source.frames(), source.fps() / static_cast<double>(c.every), c.options.force);
+  input.target_name = c.target;
+  const auto system =
+      with_target(c, target, [&] { return system_type(c.system).make(std::move(input)); });
+  // The first frame is looked at before anything is written or logged.
+  double read = 0;
+  const auto next = [&] {
+    const Clock::time_point start = Clock::now();
+    auto frame = frames->next();
+    if (frame) to_metres(c, frame->points);
+    read = seconds_since(start);
+    return frame;
+  };
+  auto frame = next();
+  if (!frame) throw InputError(c.source, "holds no frames", "give at least one cloud");
+  const Sink sink = make_sink(c, *system);
   Profile profile({"read", "extract", "motion", "deformation", "write", "frame"});
   Run run(c, source, *system, gaps, profile);
   const Outcome done = run();
@@ -364,6 +392,8 @@ void add_retarget(Program& program) {
   app.add_option("--target", c.target,
                  "mesh or cloud in T-pose, y up, facing +z; or a glTF character")
       .required();
+  app.add_option("--bones", c.bones,
+                 "which bone of a glTF target is which joint, a .yaml file or a known family");
   app.add_option("--weights", c.weights, "weights file, run or artifact");
   app.add_option("--system", c.system, help_of_systems()).show_default();
   app.add_option("--rest", c.rest, "the target's 22 rest joints (HDF5, /joints [1, 22, 3])");

@@ -113,20 +113,20 @@ class Data(CliTest):
         self.bad_input(["data", "import", "", "--out", "x.h5"], "SOURCE is empty")
 
     def test_import_with_a_profile(self):
-        self.write("suit.bvh", toy_bvh().replace("mixamorig:Left", "L ").replace("mixamorig:", ""))
-        self.bad_input(["data", "import", "suit.bvh", "--out", "x.h5"], "suit.bvh", "--profile")
-        self.bad_input(["data", "import", "suit.bvh", "--profile", "miximo", "--out", "x.h5"], "did you mean 'mixamo'?")
-        self.bad_input(["data", "import", "suit.bvh", "--profile", "none.yaml", "--out", "x.h5"], "none.yaml")
+        suit = toy_bvh()
+        for joint, name in zip(JOINTS, NAMES):
+            suit = suit.replace("mixamorig:%s\n" % name, "b %d\n" % JOINTS.index(joint))
+        self.write("suit.bvh", suit)
+        self.bad_input(["data", "import", "suit.bvh", "--out", "x.h5"], "suit.bvh", "--bones")
+        self.bad_input(["data", "import", "suit.bvh", "--bones", "miximo", "--out", "x.h5"], "did you mean 'mixamo'?")
+        self.bad_input(["data", "import", "suit.bvh", "--bones", "none.yaml", "--out", "x.h5"], "none.yaml")
         self.bad_input(["data", "import", "suit.bvh", "--up", "north", "--out", "x.h5"], "--up", "north")
         self.bad_input(["data", "import", "suit.bvh", "--fps", "nan", "--out", "x.h5"], "--fps")
-        names = dict(zip(JOINTS, NAMES))
-        profile = "title: Suit\njoints:\n"
-        for joint, name in names.items():
-            profile += "  %s: %s\n" % (joint, name.replace("Left", "L_"))
+        profile = "title: Suit\njoints:\n" + "".join("  %s: b_%d\n" % (joint, j) for j, joint in enumerate(JOINTS))
         self.write("suit.yaml", profile)
-        self.assertIn("Suit (profile suit)", self.done("data", "import", "suit.bvh", "--profile", "suit.yaml", "--out", "s.h5"))
+        self.assertIn("Suit (profile suit)", self.done("data", "import", "suit.bvh", "--bones", "suit.yaml", "--out", "s.h5"))
         self.write("bad.yaml", profile.replace("  head:", "  heed:"))
-        self.bad_input(["data", "import", "suit.bvh", "--profile", "bad.yaml", "--out", "x.h5"], "bad.yaml:", "'head'")
+        self.bad_input(["data", "import", "suit.bvh", "--bones", "bad.yaml", "--out", "x.h5"], "bad.yaml:", "'head'")
 
     def test_merge(self):
         self.done("data", "build", "--bodies", 1, 0, 0, "--motions", 0, 0, 0, "--out", "bodies.h5")

@@ -86,11 +86,11 @@ class Gltf(CliTest):
     def test_a_profile_names_bones(self):
         names = ["bone %d" % j for j in range(22)]
         character(self.path("own.glb"), names)
-        self.bad_input(["data", "import", "own.glb", "--out", "x.h5"], "own.glb", "--profile")
+        self.bad_input(["data", "import", "own.glb", "--out", "x.h5"], "own.glb", "--bones")
         self.write("own.yaml", "title: Own\njoints:\n" + "".join("  %s: %s\n" % pair for pair in zip(NAMES, names)))
-        facts = self.json("data", "import", "own.glb", "--profile", "own.yaml", "--out", "x.h5")["reports"][0]["facts"]
+        facts = self.json("data", "import", "own.glb", "--bones", "own.yaml", "--out", "x.h5")["reports"][0]["facts"]
         self.assertEqual(facts["names"], "Own (profile own)")
-        self.bad_input(["data", "import", "hero.glb", "--profile", "mixamo", "--out", "x.h5"], "hero.glb", "profile mixamo")
+        self.bad_input(["data", "import", "hero.glb", "--bones", "mixamo", "--out", "x.h5"], "hero.glb", "profile mixamo")
         self.bad_input(["data", "import", "hero.glb", "--facing", "z", "--out", "x.h5"], "--facing")
 
     def scaled(self, name, *scale):

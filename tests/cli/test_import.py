@@ -113,7 +113,7 @@ class Import(CliTest):
                               ("--betas", "zeros")):
             self.bad_input(["data", "import", "walk.bvh", "--out", "x.h5", option, value], "walk.bvh", option, "leave " + option)
         self.ply("scan.ply", [(0, i / 50, 0) for i in range(99)])
-        for option, value in (("--facing", "z"), ("--profile", "mixamo"), ("--rest-frame", 0), ("--subject", "ann")):
+        for option, value in (("--facing", "z"), ("--bones", "mixamo"), ("--rest-frame", 0), ("--subject", "ann")):
             self.bad_input(["data", "import", "scan.ply", "--out", "x.h5", option, value], "scan.ply", option)
         for option, value in (("--scale", 0), ("--scale", -1), ("--fps", 0), ("--fps", -30), ("--rest-frame", -5),
                               ("--drop-leading", -1)):

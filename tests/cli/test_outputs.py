@@ -150,7 +150,7 @@ class Places(CliTest):
             if name.split(".")[1] not in ("h5", "yaml", "safetensors"):
                 self.bad_input(["data", "import", name, "--out", "x.h5"], name)
         self.bad_input(["eval", "--pred", "a.h5", "--truth", "a.h5"], "a.h5")
-        self.bad_input(["data", "import", "walk.bvh", "--profile", "a.yaml", "--out", "x.h5"], "a.yaml")
+        self.bad_input(["data", "import", "walk.bvh", "--bones", "a.yaml", "--out", "x.h5"], "a.yaml")
         self.bad_input(["skeleton", "--weights", "a.safetensors", "--input", "a.ply"], "a.safetensors")
 
 

@@ -198,6 +198,43 @@ TEST_F(ImportersBvh, BadFilesAreNamedWithTheirLine) {
   }
 }
 
+// ---- names and rates as they are in the file
+
+TEST_F(ReadersRecordings, NamesStayThemselves) {
+  bvh_test::Style style{.frames = 3};
+  style.names = {"センター", "左足",   "右足",   "上半身",  "左ひざ",   "右ひざ",
+                 "上半身2",  "左足首", "右足首", "上半身3", "左つま先", "右つま先",
+                 "首",       "左肩",   "右肩",   "頭",      "左腕",     "右腕",
+                 "左ひじ",   "右ひじ", "左手首", "右手首"};
+  const std::string text = bvh_test::text(style);
+  EXPECT_EQ(parse_bvh(text, "x.bvh").skeleton.names[0], "センター");
+  EXPECT_TRUE(convert_bvh(text, "x.bvh").motion.frames() > 0);
+  for (std::string& name : style.names)  // far longer than what a message shows
+    name = "Session_2024_03_12_Take_004_Performer_0001:" + name;
+  EXPECT_EQ(parse_bvh(bvh_test::text(style), "x.bvh").skeleton.names[0],
+            "Session_2024_03_12_Take_004_Performer_0001:センター");
+  EXPECT_TRUE(convert_bvh(bvh_test::text(style), "x.bvh").motion.frames() > 0);
+  style.names.assign(22, "\x8D\xB6\x91\xAB");  // Shift-JIS
+  EXPECT_HAS(refusal_of([&] { convert_bvh(bvh_test::text(style), "x.bvh"); }), "Shift-JIS");
+  style.names.assign(22, std::string(2000, 'a'));
+  EXPECT_HAS(refusal_of([&] { convert_bvh(bvh_test::text(style), "x.bvh"); }), "1000 bytes");
+}
+
+TEST_F(ReadersRecordings, AFrameTimeThatIsNoneNeedsTheRate) {
+  std::string text = bvh_test::text({.fps = 30, .frames = 4});
+  const size_t at = text.find("Frame Time:"), end = text.find('\n', at);
+  for (const char* time : {"0", "0.000000", "-1", "1e9"}) {
+    text.replace(at, text.find('\n', at) - at, std::string("Frame Time: ") + time);
+    EXPECT_HAS(refusal_of([&] { convert_bvh(text, "x.bvh"); }), "give the true rate with --fps");
+    MotionOptions told;
+    told.fps = 30;
+    const MotionClip clip = convert_bvh(text, "x.bvh", told);
+    EXPECT_EQ(clip.motion.frames(), 4u);
+    EXPECT_EQ(clip.report.remarks.size(), 0u);
+  }
+  EXPECT_LT(at, end);
+}
+
 // ---- files that ask for too much
 
 std::string complaint(const std::string& text) {

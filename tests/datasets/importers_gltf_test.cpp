@@ -16,6 +16,7 @@ namespace {
 
 using namespace test;
 using testing::CharacterMaker;
+using testing::GltfJson;
 using testing::kTurnedRound;
 using testing::mixamo_style;
 using testing::plain_style;
@@ -124,6 +125,93 @@ TEST_F(ImportersGltf, VrmByItsListOfBonesTurnedToTheFront) {
   }
   // Without the list the names say nothing.
   EXPECT_THROW(hero(vrm_style()), InputError);
+}
+
+/// Nodes and animation only, as VRM animations (.vrma) and exports without a mesh are.
+void leave_out_skin(testing::GlbParts& parts) {
+  parts.root.erase("skins");
+  parts.root.erase("meshes");
+  for (auto& node : parts.root["nodes"]) {
+    node.erase("skin");
+    node.erase("mesh");
+  }
+}
+
+TEST_F(ImportersGltf, MotionWithoutASkinIsRead) {
+  const Motion truth = hero(mixamo_style()).motions[0];
+  const auto expect_truth = [&](const testing::GlbParts& parts, const std::string& name) {
+    const Character found = read_character(write(name, parts));
+    EXPECT_FALSE(found.body) << name;
+    ASSERT_EQ(found.motions.size(), 1u) << name;
+    ASSERT_EQ(found.motions[0].frames(), truth.frames()) << name;
+    for (size_t f = 0; f < truth.frames(); ++f)
+      for (int j = 0; j < kJoints; ++j)
+        EXPECT_LT(found.motions[0].global[f][j].angularDistance(truth.global[f][j]), 1e-3)
+            << name << " " << f << " " << j;
+    EXPECT_LT((found.motions[0].hips[10] - truth.hips[10]).norm(), 1e-3) << name;
+  };
+  testing::GlbParts mixamo = CharacterMaker(known_, mixamo_style()).parts;
+  leave_out_skin(mixamo);
+  expect_truth(mixamo, "walk.glb");
+  testing::GlbParts vrm = vrm_parts(known_, false);
+  leave_out_skin(vrm);
+  vrm.root["extensions"]["VRMC_vrm_animation"] = vrm.root["extensions"]["VRMC_vrm"];
+  vrm.root["extensions"].erase("VRMC_vrm");
+  expect_truth(vrm, "walk.vrma");
+  expect_truth(vrm, "renamed.glb");
+  EXPECT_HAS(error_of([&] { open_frames(dir / "walk.vrma"); }), "restage data perform");
+}
+
+/// A VRM's list may lack toes, neck, collars and the upper chest; the chest then is spine3.
+TEST_F(ImportersGltf, VrmMayLackWhatIsOptionalThere) {
+  testing::GlbParts parts = vrm_parts(known_, false);
+  auto& bones = parts.root["extensions"]["VRMC_vrm"]["humanoid"]["humanBones"];
+  for (const char* name :
+       {"upperChest", "neck", "leftShoulder", "rightShoulder", "leftToes", "rightToes"})
+    bones.erase(name);
+  const Character found = read_character(write("hero.vrm", parts));
+  EXPECT_HAS(fact(found.report, "joints"), "spine3 = 'J_106'");
+  EXPECT_HAS(fact(found.report, "joints"), "neck = 'J_106' (beside it)");
+  ASSERT_TRUE(found.body);
+  EXPECT_GT((found.body->joints[10] - found.body->joints[7]).z(), 0.02);
+}
+
+TEST_F(ImportersGltf, TwoCharactersInOneFileAreRefused) {
+  testing::GlbParts two = CharacterMaker(known_, mixamo_style()).parts;
+  const size_t count = two.root["nodes"].size();
+  GltfJson more = two.root["nodes"];
+  for (auto& node : more) {
+    if (node.contains("children"))
+      for (auto& child : node["children"]) child = child.get<size_t>() + count;
+    if (node.contains("skin")) node["skin"] = 1;
+    two.root["nodes"].push_back(node);
+  }
+  GltfJson skin = two.root["skins"][0];
+  for (auto& joint : skin["joints"]) joint = joint.get<size_t>() + count;
+  two.root["skins"].push_back(skin);
+  two.root["scenes"][0]["nodes"].push_back(22 + count);
+  const std::string file = write("two.glb", two);
+  EXPECT_HAS(error_of([&] { read_character(file); }), "holds 2 characters");
+  EXPECT_HAS(error_of([&] { read_target(file); }), "holds 2 characters");
+  MotionOptions named;
+  named.profile = "mixamo";
+  EXPECT_HAS(error_of([&] { read_character(file, named); }), "holds 2 characters");
+  leave_out_skin(two);  // which of the two is meant by a name is not guessed
+  EXPECT_HAS(error_of([&] { read_character(write("two.glb", two), named); }),
+             "two of its bones are called");
+}
+
+TEST_F(ImportersGltf, BonesOfATargetMayBeNamed) {
+  const std::string file = write("alien.glb", vrm_style());
+  std::string yaml = "title: Alien\njoints:\n";
+  for (int j = 0; j < kJoints; ++j)
+    yaml += "  " + std::string(kJointNames[j]) + ": J_" + std::to_string(100 + j) + "\n";
+  const TargetMesh found = read_target(file, dir.write("alien.YML", yaml));
+  EXPECT_EQ(found.unknown_rig, "");
+  ASSERT_TRUE(found.joints);
+  EXPECT_HAS(read_target(file).unknown_rig, "none of its");
+  write_ply(dir / "hero.ply", known_.body.rest);
+  EXPECT_HAS(error_of([&] { read_target(dir / "hero.ply", "mixamo"); }), "leave --bones out");
 }
 
 TEST_F(ImportersGltf, NodesThatRestInAnAnimationDoNotMatter) {
@@ -289,7 +377,7 @@ TEST_F(ImportersGltf, RigsThatCannotBeUsedAreRefusedWithAWord) {
   EXPECT_HAS(refused(nameless.parts), "left_knee");
   testing::GlbParts empty;
   empty.root["nodes"] = {{{"name", "hips"}}};
-  EXPECT_HAS(refused(empty), "lacks");
+  EXPECT_HAS(refused(empty), "left_hip");
 }
 
 }  // namespace

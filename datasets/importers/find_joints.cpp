@@ -1,0 +1,409 @@
+#include "datasets/importers/find_joints.h"
+
+#include <algorithm>
+#include <optional>
+#include <tuple>
+
+#include "datasets/readers/errors.h"
+#include "datasets/readers/text.h"
+
+namespace restage {
+namespace {
+
+enum : int { kPelvis = 0, kSpine1 = 3, kSpine2 = 6, kSpine3 = 9, kNeck = 12, kHead = 15 };
+
+using Parts = std::initializer_list<Part>;
+
+bool is(const BoneWords& words, Parts parts) {
+  return std::find(parts.begin(), parts.end(), words.part) != parts.end();
+}
+
+/// The bones of a limb, from the trunk outwards.
+struct Limb {
+  int root = -1;  ///< collar; -1: none
+  int upper = -1, lower = -1, end = -1;
+  int cost = 0;
+  int lacks = 0;      ///< 0: nothing; 1: upper, 2: lower, 3: end (then nothing else is known)
+  int stranger = -1;  ///< a bone within it that is neither known nor a helper
+};
+
+class Finder {
+ public:
+  Finder(const BoneTree& tree, int top)
+      : tree_(tree), skeleton_(tree.skeleton), words_(tree.words), top_(top) {}
+
+  FoundJoints find() {
+    out_.bones.fill(-1);
+    for (const int side : {0, 1}) {
+      take_leg(side);
+      take_arm(side);
+    }
+    find_head();
+    if (out_.missing.empty()) find_trunk();
+    std::sort(out_.missing.begin(), out_.missing.end());
+    return out_;
+  }
+
+ private:
+  struct Segment {
+    int joint;
+    bool named;  ///< some bone is called so
+  };
+
+  bool inside(int b) const { return top_ < 0 || hangs_on(skeleton_, b, top_); }
+  int parent(int b) const { return skeleton_.parents[b]; }
+  int size() const { return static_cast<int>(words_.size()); }
+  bool may_be(int b, int side) const { return words_[b].side == side && !words_[b].helper; }
+  void lacks(int joint, const std::string& why = "") {
+    out_.missing.push_back(joint);
+    if (out_.why.empty()) out_.why = why;
+  }
+
+  /// The plainest of these bones of a path, the highest of equals; -1 of none.
+  int plainest(const std::vector<int>& path, Parts parts) const {
+    int best = -1;
+    for (const int b : path)
+      if (is(words_[b], parts) && (best < 0 || words_[b].cost < words_[best].cost)) best = b;
+    return best;
+  }
+  static std::vector<int> below(const std::vector<int>& path, int bone) {
+    return {std::find(path.begin(), path.end(), bone) + 1, path.end()};
+  }
+  static std::vector<int> above(const std::vector<int>& path, int bone) {
+    return {path.begin(), std::find(path.begin(), path.end(), bone)};
+  }
+  /// From the trunk to `end`, both included: bones of this side that are no helpers.
+  std::vector<int> path_to(int end, int side) const {
+    std::vector<int> out;
+    for (int b = end; b >= 0; b = parent(b))
+      if (may_be(b, side)) out.push_back(b);
+    std::reverse(out.begin(), out.end());
+    return out;
+  }
+
+  Limb weighed(Limb limb) const {
+    limb.cost = words_[limb.upper].cost + words_[limb.lower].cost + words_[limb.end].cost;
+    for (int b = parent(limb.end); b != limb.upper; b = parent(b))
+      if (words_[b].part == Part::none && !words_[b].helper) limb.stranger = b;
+    return limb;
+  }
+
+  Limb arm_to(int end, int side) const {
+    const std::vector<int> path = path_to(end, side);
+    Limb out;
+    out.lower = plainest(path, {Part::forearm});
+    if (out.lower < 0)
+      if (const int strong = plainest(path, {Part::upper_arm}); strong >= 0)
+        out.lower = plainest(below(path, strong), {Part::arm});
+    if (out.lower < 0) return out.lacks = 2, out;
+    out.end = plainest(below(path, out.lower), {Part::hand});
+    if (out.end < 0) out.end = plainest(below(path, out.lower), {Part::palm});
+    if (out.end < 0) return out.lacks = 3, out;
+    const std::vector<int> rest = above(path, out.lower);
+    out.upper = plainest(rest, {Part::upper_arm});
+    if (out.upper < 0) out.upper = plainest(rest, {Part::arm});
+    if (out.upper < 0)  // a shoulder, the lowest, is the upper arm where nothing else is
+      for (const int b : rest)
+        if (is(words_[b], {Part::shoulder})) out.upper = b;
+    if (out.upper < 0) return out.lacks = 1, out;
+    out.root = plainest(above(path, out.upper), {Part::collar});
+    if (out.root < 0) out.root = plainest(above(path, out.upper), {Part::shoulder});
+    return weighed(out);
+  }
+
+  Limb leg_to(int end, int side) const {
+    const std::vector<int> path = path_to(end, side);
+    Limb out;
+    out.lower = plainest(path, {Part::shin});
+    if (out.lower < 0)
+      if (const int strong = plainest(path, {Part::thigh}); strong >= 0)
+        out.lower = plainest(below(path, strong), {Part::leg});
+    if (out.lower < 0) return out.lacks = 2, out;
+    out.end = plainest(below(path, out.lower), {Part::ankle});
+    if (out.end < 0) out.end = plainest(below(path, out.lower), {Part::foot});
+    if (out.end < 0) return out.lacks = 3, out;
+    const std::vector<int> rest = above(path, out.lower);
+    for (const Part part : {Part::thigh, Part::leg, Part::hip})
+      if (out.upper < 0) out.upper = plainest(rest, {part});
+    if (out.upper < 0) return out.lacks = 1, out;
+    return weighed(out);
+  }
+
+  /// The plainest limb of those that end in one of these parts. Of a limb that is nowhere whole the
+  /// part that is missing where most of it is; 3 if nothing is there.
+  template <class To>
+  Limb best_limb(int side, Parts ends, const To& to, bool& ambiguous) const {
+    std::optional<Limb> best;
+    Limb broken;
+    broken.lacks = 3;
+    for (int b = 0; b < size(); ++b) {
+      if (!may_be(b, side) || !is(words_[b], ends) || !inside(b)) continue;
+      const Limb limb = to(b, side);
+      if (limb.lacks != 0) {
+        broken.lacks = std::min(broken.lacks, limb.lacks);
+        continue;
+      }
+      if (!best || limb.cost < best->cost) {
+        best = limb;
+        ambiguous = false;
+      } else if (limb.cost == best->cost) {
+        ambiguous |= limb.upper != best->upper || limb.lower != best->lower;
+      }
+    }
+    return best.value_or(broken);
+  }
+
+  void take_arm(int side) {
+    bool ambiguous = false;
+    const Limb arm = best_limb(
+        side, {Part::hand, Part::palm}, [&](int b, int s) { return arm_to(b, s); }, ambiguous);
+    const bool called = has(side, {Part::upper_arm});
+    take(arm, ambiguous, side == 0 ? "left arm" : "right arm",
+         {Segment{16 + side, called || has(side, {Part::arm, Part::shoulder})},
+          Segment{18 + side, has(side, {Part::forearm}) || (called && has(side, {Part::arm}))},
+          Segment{20 + side, has(side, {Part::hand, Part::palm})}});
+    if (arm.lacks == 0) out_.bones[13 + side] = arm.root;
+  }
+
+  void take_leg(int side) {
+    bool ambiguous = false;
+    const Limb leg = best_limb(
+        side, {Part::ankle, Part::foot}, [&](int b, int s) { return leg_to(b, s); }, ambiguous);
+    const bool called = has(side, {Part::thigh});
+    take(leg, ambiguous, side == 0 ? "left leg" : "right leg",
+         {Segment{1 + side, called || has(side, {Part::leg, Part::hip})},
+          Segment{4 + side, has(side, {Part::shin}) || (called && has(side, {Part::leg}))},
+          Segment{7 + side, has(side, {Part::ankle, Part::foot})}});
+    if (leg.lacks == 0) out_.bones[10 + side] = toe_of(leg.end, side);
+  }
+
+  bool has(int side, Parts parts) const {
+    for (int b = 0; b < size(); ++b)
+      if (may_be(b, side) && is(words_[b], parts) && inside(b)) return true;
+    return false;
+  }
+
+  void take(const Limb& limb, bool ambiguous, const std::string& what,
+            const std::array<Segment, 3>& segments) {
+    if (limb.lacks == 0 && !ambiguous && limb.stranger >= 0)
+      return lacks(segments[0].joint,
+                   cat("in the ", what, " the bone ", text::quote(skeleton_.names[limb.stranger]),
+                       " is of no known name"));
+    if (limb.lacks == 0 && !ambiguous) {
+      out_.bones[segments[0].joint] = limb.upper;
+      out_.bones[segments[1].joint] = limb.lower;
+      out_.bones[segments[2].joint] = limb.end;
+      return;
+    }
+    bool all = true;
+    for (const auto& [joint, named] : segments) {
+      if (!named) lacks(joint);
+      all = all && named;
+    }
+    if (all)
+      lacks(segments[static_cast<size_t>(std::max(limb.lacks, 1)) - 1].joint,
+            ambiguous ? "two of its limbs may be the " + what
+                      : "the bones of the " + what + " do not hang on each other");
+  }
+
+  int depth(int b) const {
+    int out = 0;
+    for (; b >= 0; b = parent(b)) ++out;
+    return out;
+  }
+
+  /// Below the ankle: a toe, or, below what is called ankle, a foot. -1: none.
+  int toe_of(int ankle, int side) const {
+    int best = -1;
+    const auto better = [&](int a, int b) {
+      const auto rank = [&](int x) {
+        return std::make_tuple(words_[x].part != Part::toe, words_[x].cost, depth(x),
+                               words_[x].number);
+      };
+      return rank(a) < rank(b);
+    };
+    for (int b = 0; b < size(); ++b) {
+      if (b == ankle || !may_be(b, side) || !hangs_on(skeleton_, b, ankle)) continue;
+      const bool foot = words_[ankle].part == Part::ankle && words_[b].part == Part::foot;
+      if ((words_[b].part == Part::toe || foot) && (best < 0 || better(b, best))) best = b;
+    }
+    return best;
+  }
+
+  void find_head() {
+    int best = -1;
+    bool two = false;
+    for (int b = 0; b < size(); ++b) {
+      if (words_[b].part != Part::head || !may_be(b, BoneWords::middle) || !inside(b)) continue;
+      if (best >= 0 && hangs_on(skeleton_, b, best)) {
+        if (words_[b].cost < words_[best].cost) best = b;
+        continue;
+      }
+      if (best < 0 || words_[b].cost < words_[best].cost) {
+        best = b;
+        two = false;
+      } else if (words_[b].cost == words_[best].cost) {
+        two = true;
+      }
+    }
+    out_.bones[kHead] = best;
+    if (best < 0 || two) lacks(kHead, two ? "two of its bones may be the head" : "");
+  }
+
+  /// The bone that carries legs and spine.
+  int find_pelvis(int all) const {
+    const int legs = carrier_of(skeleton_, out_.bones[1], out_.bones[2]);
+    const auto named = [&](int b) {
+      return b >= 0 && words_[b].side == BoneWords::middle && !words_[b].helper &&
+             is(words_[b], {Part::pelvis, Part::hip});
+    };
+    if (named(all)) return all;
+    if (legs != all && named(legs)) return legs;
+    // 3ds Max hangs the legs on the first spine bone, which hangs on the pelvis.
+    for (int b = parent(all); b >= 0; b = parent(b))
+      if (named(b)) return b;
+    return all;
+  }
+
+  void find_trunk() {
+    const int chest = chest_of(tree_, out_.bones);
+    const int all =
+        carrier_of(skeleton_, carrier_of(skeleton_, out_.bones[1], out_.bones[2]), chest);
+    if (all < 0 || !inside(all) || !hangs_on(skeleton_, out_.bones[kHead], all))
+      return lacks(kPelvis, "no bone carries its legs, arms and head");
+    const int pelvis = find_pelvis(all), below = hangs_on(skeleton_, all, pelvis) ? pelvis : all;
+    std::vector<int> spine;
+    for (int b = chest; b != below; b = parent(b))
+      if (b == chest || !words_[b].helper || words_[b].part == Part::spine)
+        spine.insert(spine.begin(), b);
+    if (spine.empty()) return lacks(kSpine1, "no bone lies between its pelvis and its arms");
+    out_.bones[kPelvis] = pelvis;
+    // Of many the first, the middle one, and the last, which carries the arms.
+    out_.bones[kSpine1] = spine[0];
+    if (spine.size() > 1) out_.bones[kSpine3] = spine.back();
+    if (spine.size() > 2) out_.bones[kSpine2] = spine[spine.size() / 2];
+    find_neck(chest);
+    for (const int side : {0, 1})
+      if (out_.bones[13 + side] < 0) out_.bones[13 + side] = nameless_collar(side, chest);
+    check_sides(all);
+    check_lengths();
+  }
+
+  /// Between chest and head: what is called neck, else what lies there, but helpers.
+  void find_neck(int chest) {
+    int named = -1, any = -1;
+    for (int b = parent(out_.bones[kHead]); b >= 0 && b != chest; b = parent(b)) {
+      if (words_[b].part == Part::neck) named = b;
+      if (!words_[b].helper) any = b;
+    }
+    out_.bones[kNeck] = named >= 0 ? named : any;
+  }
+
+  /// The only bone between chest and upper arm, whatever it is called; -1: none or several.
+  int nameless_collar(int side, int chest) const {
+    int out = -1, count = 0;
+    for (int b = parent(out_.bones[16 + side]); b >= 0 && b != chest; b = parent(b))
+      if (!words_[b].helper && words_[b].part != Part::neck) out = b, ++count;
+    return count == 1 ? out : -1;
+  }
+
+  /// Bones from `top` down to `bone`, without helpers.
+  int steps(int bone, int top) const {
+    int out = 0;
+    for (int b = bone; b >= 0 && b != top; b = parent(b)) out += !words_[b].helper;
+    return out;
+  }
+
+  /// A person's sides are built alike. Where they are not, one of two bones was not understood.
+  void check_sides(int top) {
+    const auto plain_cost = [&](int b) { return words_[b].cost - (words_[b].number > 0); };
+    for (const int j : {1, 4, 7, 10, 13, 16, 18, 20}) {
+      const int left = out_.bones[j], right = out_.bones[j + 1];
+      if (j == 10 && (left < 0 || right < 0)) continue;  // a toe may be the ankle's end
+      bool alike = (left < 0) == (right < 0) && steps(left, top) == steps(right, top);
+      if (alike && j == 10)
+        alike = plain_cost(left) == plain_cost(right) &&
+                (words_[left].number < 0 || words_[right].number < 0 ||
+                 words_[left].number == words_[right].number);
+      if (alike) continue;
+      const auto name = [&](int b) { return b < 0 ? "none" : text::quote(skeleton_.names[b]); };
+      return lacks(j, cat("its sides are not built alike: ", kJointNames[j], " may be ", name(left),
+                          ", ", kJointNames[j + 1], " ", name(right)));
+    }
+  }
+
+  double length(int from, int to) const {
+    Vec3 out = Vec3::Zero();
+    for (int b = out_.bones[to]; b != out_.bones[from]; b = parent(b)) out += skeleton_.offsets[b];
+    return out.norm();
+  }
+
+  /// A limb with a part many times as long as its other part, or as the other side's, was not
+  /// understood. A length of 0 is one that position channels say.
+  void check_lengths() {
+    constexpr double kMost = 5;
+    const auto unlike = [&](double a, double b) {
+      return std::min(a, b) > 0 && std::max(a, b) > kMost * std::min(a, b);
+    };
+    for (const auto& [a, b, c] : {std::array{1, 4, 7}, std::array{16, 18, 20}}) {
+      const double left = length(a, b), right = length(a + 1, b + 1);
+      if (unlike(left, length(b, c)) || unlike(right, length(b + 1, c + 1)) || unlike(left, right))
+        lacks(b, "the lengths of its limbs are no person's");
+    }
+  }
+
+  const BoneTree& tree_;
+  const SourceSkeleton& skeleton_;
+  const std::vector<BoneWords>& words_;
+  const int top_;
+  FoundJoints out_;
+};
+
+}  // namespace
+
+bool hangs_on(const SourceSkeleton& skeleton, int bone, int above) {
+  while (bone > above) bone = skeleton.parents[bone];  // a parent comes before its children
+  return bone == above;
+}
+
+int carrier_of(const SourceSkeleton& skeleton, int a, int b) {
+  if (b < 0) return -1;
+  while (a >= 0 && !hangs_on(skeleton, b, a)) a = skeleton.parents[a];
+  return a;
+}
+
+std::vector<int> find_people(const BoneTree& tree) {
+  const auto& words = tree.words;
+  const auto& parents = tree.skeleton.parents;
+  std::vector<uint8_t> below(words.size()), inner(words.size());
+  constexpr uint8_t kAll = 31;
+  std::vector<int> out;
+  for (size_t b = words.size(); b-- > 0;) {
+    const BoneWords& w = words[b];
+    const int side = w.side;
+    if (!w.helper && w.part == Part::head && w.side == BoneWords::middle) below[b] |= 1;
+    if (!w.helper && side >= 0 && w.part == Part::hand) below[b] |= 2 << side;
+    if (!w.helper && side >= 0 && is(w, {Part::foot, Part::ankle})) below[b] |= 8 << side;
+    const bool person = below[b] == kAll && !inner[b];
+    if (person) out.push_back(static_cast<int>(b));
+    if (parents[b] < 0) continue;
+    below[parents[b]] |= below[b];
+    inner[parents[b]] |= person || inner[b];
+  }
+  std::reverse(out.begin(), out.end());
+  return out;
+}
+
+FoundJoints find_joints(const BoneTree& tree, int top) { return Finder(tree, top).find(); }
+
+int chest_of(const BoneTree& tree, const Bones& bones) {
+  const auto arm = [&](int side) {
+    return bones[13 + side] >= 0 ? bones[13 + side] : bones[16 + side];
+  };
+  int out = arm(0) < 0 ? -1 : carrier_of(tree.skeleton, arm(0), arm(1));
+  // 3ds Max hangs the collars on the neck.
+  while (out >= 0 && tree.words[out].part == Part::neck) out = tree.skeleton.parents[out];
+  return out;
+}
+
+}  // namespace restage

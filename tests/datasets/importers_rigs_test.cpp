@@ -1,0 +1,439 @@
+// Finding a person in bones of any make: skeletons as programs name them (rig_lists.h), each plain
+// and decorated in the ways that files come in; what must be refused; words of names.
+#include <gtest/gtest.h>
+
+#include <cctype>
+
+#include "datasets/importers/bone_words.h"
+#include "datasets/importers/find_joints.h"
+#include "datasets/importers/source_motion.h"
+#include "tests/datasets/rig_lists_games.h"
+#include "tests/datasets/rig_lists_studios.h"
+#include "tests/support/errors.h"
+
+namespace restage {
+namespace {
+
+using test::BuiltRig;
+using test::RigBuilder;
+using test::RigList;
+
+std::vector<RigList> rig_lists() {
+  std::vector<RigList> out = test::rigs_of_games();
+  out.insert(out.end(), test::rigs_of_studios().begin(), test::rigs_of_studios().end());
+  return out;
+}
+BuiltRig rig(const std::string& name) {
+  for (const RigList& list : rig_lists())
+    if (name == list.name) return RigBuilder(list).built();
+  throw std::runtime_error("no list " + name);
+}
+BuiltRig rig_of(const char* left, const char* right, const char* bones) {
+  return RigBuilder({"", left, right, bones}).built();
+}
+
+/// Every joint of the list is found at its bone, every other one is placed.
+void expect_right(const BuiltRig& rig, const std::string& what) {
+  NamedJoints found;
+  try {
+    found = name_joints(rig.skeleton, "x.bvh");
+  } catch (const InputError& error) {
+    ADD_FAILURE() << what << ": " << error.what();
+    return;
+  }
+  for (size_t j = 0; j < kJoints; ++j) {
+    const bool placed = std::find(found.placed.begin(), found.placed.end(), static_cast<int>(j)) !=
+                        found.placed.end();
+    EXPECT_EQ(placed, rig.bone[j] < 0) << what << ": " << kJointNames[j];
+    if (rig.bone[j] < 0 || placed) continue;
+    const auto& names = rig.skeleton.names;
+    EXPECT_EQ(names[static_cast<size_t>(found.map[j].joint)],
+              names[static_cast<size_t>(rig.bone[j])])
+        << what << ": " << kJointNames[j];
+    EXPECT_EQ(found.map[j].joint, rig.bone[j]) << what << ": " << kJointNames[j];
+  }
+}
+
+std::string refusal(const BuiltRig& rig) {
+  return restage::test::error_of([&] { name_joints(rig.skeleton, "x.bvh"); });
+}
+
+using Change = std::function<void(SourceSkeleton&)>;
+
+Change renamed(const std::function<std::string(const std::string&, size_t)>& as) {
+  return [as](SourceSkeleton& s) {
+    for (size_t b = 0; b < s.size(); ++b) s.names[b] = as(s.names[b], b);
+  };
+}
+Change before(const std::string& text) {
+  return renamed([text](const std::string& name, size_t) { return text + name; });
+}
+Change after(const std::string& text) {
+  return renamed([text](const std::string& name, size_t) { return name + text; });
+}
+
+/// A root above all.
+void add_root(SourceSkeleton& s, const std::string& name) {
+  SourceSkeleton out;
+  out.add(name, -1, Vec3::Zero());
+  for (size_t b = 0; b < s.size(); ++b) out.add(s.names[b], s.parents[b] + 1, s.offsets[b]);
+  s = out;
+}
+
+struct Decoration {
+  const char* name;
+  Change change;
+  int moved = 0;  ///< by how much the bones' numbers grow
+};
+
+const std::vector<Decoration>& decorations() {
+  static const std::vector<Decoration> all = {
+      {"plain", [](SourceSkeleton&) {}},
+      {"mixamorig:", before("mixamorig:")},
+      {"mixamorig", before("mixamorig")},
+      {"mixamorig1:", before("mixamorig1:")},
+      {"mixamorig_", before("mixamorig_")},
+      {"a prefix of two parts", before("Skeleton_001_")},
+      {"a prefix of three parts", before("Actor_02_Body_")},
+      {"a prefix that names a part", before("HeadRig_")},
+      {"a long namespace", before("Session_2024_03_12_Take_004_Performer_0001_LeftHand:")},
+      {"two namespaces", before("scene:ann:")},
+      {"an armature's path", before("Armature|")},
+      {".001", after(".001")},
+      {"_jnt", after("_jnt")},
+      {"numbers as Sketchfab's, without one at the root",
+       [](SourceSkeleton& s) {
+         for (size_t b = 0; b < s.size(); ++b) s.names[b] += "_0" + std::to_string(b + 1);
+         add_root(s, "_rootJoint");
+       },
+       1},
+      {"a prefix and numbers",
+       [](SourceSkeleton& s) {
+         for (size_t b = 0; b < s.size(); ++b)
+           s.names[b] = "Character1_" + s.names[b] + "_" + std::to_string(b);
+       }},
+      {"lower case", renamed([](std::string name, size_t) {
+         for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+         return name;
+       })},
+      {"an armature above", [](SourceSkeleton& s) { add_root(s, "Armature"); }, 1},
+      {"bones of another kind beside", [](SourceSkeleton& s) {
+         const int last = static_cast<int>(s.size()) - 1;
+         s.add("sword_joint", last, Vec3(0, 0.1, 0));
+         s.add("Cube.003", 0, Vec3(0, 0.1, 0));
+         s.add("ik_hand_l", 0, Vec3(0, 0.1, 0));
+       }}};
+  return all;
+}
+
+TEST(ImportersRigs, EveryFamilyIsFoundInEveryDecoration) {
+  ASSERT_GE(rig_lists().size(), 25u);
+  for (const RigList& list : rig_lists()) {
+    const BuiltRig plain = RigBuilder(list).built();
+    for (const Decoration& decoration : decorations()) {
+      BuiltRig rig = plain;
+      decoration.change(rig.skeleton);
+      for (int& bone : rig.bone) bone += bone >= 0 ? decoration.moved : 0;
+      expect_right(rig, std::string(list.name) + ", " + decoration.name);
+    }
+  }
+}
+
+/// One bone's own decoration changes nothing, whichever bone it is.
+TEST(ImportersRigs, OneOddBoneBesideGoodOnesIsFoundToo) {
+  const BuiltRig plain = rig("mixamo");
+  for (const int bone : plain.bone)
+    for (const char* end : {".001", "_01", "_jnt"}) {
+      BuiltRig odd = plain;
+      odd.skeleton.names[static_cast<size_t>(bone)] += end;
+      expect_right(odd, odd.skeleton.names[static_cast<size_t>(bone)]);
+    }
+}
+
+/// One bone of an unknown name, whichever it is: refused, or everything else is still right.
+TEST(ImportersRigs, AnUnknownBoneMakesNoOtherOneWrong) {
+  size_t refused = 0, found = 0;
+  for (const RigList& list : rig_lists()) {
+    const BuiltRig plain = RigBuilder(list).built();
+    for (size_t damaged = 1; damaged < kJoints; ++damaged) {
+      if (plain.bone[damaged] < 0 || damaged == 12) continue;  // of two necks either will do
+      BuiltRig rig = plain;
+      rig.skeleton.names[static_cast<size_t>(plain.bone[damaged])] = "Thing";
+      NamedJoints joints;
+      try {
+        joints = name_joints(rig.skeleton, "x.bvh");
+      } catch (const InputError&) {
+        ++refused;
+        continue;
+      }
+      ++found;
+      const std::vector<Vec3> places = zero_positions(rig.skeleton);
+      for (size_t j = 0; j < kJoints; ++j) {
+        const bool toe = damaged == j && (j == 10 || j == 11);  // optional: placed without it
+        if (rig.bone[j] < 0 || toe) continue;
+        const auto at = static_cast<size_t>(joints.map[j].joint);
+        const Vec3 place = places[at] + joints.map[j].offset;
+        EXPECT_LT((place - places[static_cast<size_t>(rig.bone[j])]).norm(), 1e-9)
+            << list.name << " without " << kJointNames[damaged] << ": " << kJointNames[j] << " is "
+            << rig.skeleton.names[at];
+      }
+    }
+  }
+  EXPECT_GT(refused, 300u);
+  EXPECT_GT(found, 150u);
+}
+
+/// What is not certain is refused, with what is missing in the first place.
+TEST(ImportersRigs, NobodyIsGuessed) {
+  const BuiltRig mixamo = rig("mixamo");
+  const auto without = [&](const std::string& name, const std::string& now) {
+    BuiltRig out = mixamo;
+    for (std::string& bone : out.skeleton.names)
+      if (bone == name) bone = now;
+    return refusal(out);
+  };
+  EXPECT_HAS(without("LeftUpLeg", "LeftUpLegg"), "left_hip (is it 'LeftUpLegg'?)");
+  EXPECT_HAS(without("LeftForeArm", "bone"), "left_elbow");
+  EXPECT_HAS(without("Head", "bone"), "head");
+  EXPECT_HAS(without("RightHand", "bone"), "right_wrist");
+  for (const char* name : {"LeftForeArm", "Head", "RightHand"}) {
+    const std::string says = without(name, "bone");
+    EXPECT_HAS(says, "--bones");
+    EXPECT_EQ(says.find("profile"), std::string::npos) << says;  // no nearest family
+    EXPECT_LT(says.size(), 380u);
+  }
+  BuiltRig nameless = mixamo;
+  for (size_t b = 0; b < nameless.skeleton.size(); ++b)
+    nameless.skeleton.names[b] = "joint_" + std::to_string(b);
+  EXPECT_HAS(refusal(nameless), "none of its");
+  EXPECT_HAS(refusal(nameless), "'joint_0'");
+  for (std::string& name : nameless.skeleton.names) name.clear();
+  EXPECT_HAS(refusal(nameless), "no names");
+}
+
+TEST(ImportersRigs, WhatOnlyLooksLikeAPersonIsRefused) {
+  const BuiltRig horse = rig_of("L", "R", R"(
+Root
+  Hips
+    Spine
+      Chest
+        Neck
+          Head
+        Front_UpperLeg_@
+          Front_LowerLeg_@
+            Front_Foot_@
+    Back_UpperLeg_@
+      Back_LowerLeg_@
+        Back_Foot_@
+    Tail1
+)");
+  EXPECT_HAS(refusal(horse), "left_shoulder");
+  const BuiltRig arm_of_two = rig_of("Left", "Right", R"(
+Hips
+  Spine
+    Chest
+      Neck
+        Head
+      @Shoulder
+        @Arm
+          @Hand
+  @UpLeg
+    @Leg
+      @Foot
+)");
+  EXPECT_HAS(refusal(arm_of_two), "left_elbow");  // no shoulder is made an upper arm
+  const BuiltRig legs_by_number = rig_of("L", "R", R"(
+Hips
+  Spine
+    Head
+    UpperArm_@
+      Forearm_@
+        Hand_@
+  Leg_@_01
+    Leg_@_02
+      Leg_@_03
+)");
+  EXPECT_HAS(refusal(legs_by_number), "left_knee");
+  const BuiltRig four_arms = rig_of("L", "R", R"(
+Hips
+  Spine
+    Chest
+      Head
+      A_UpperArm_@
+        A_Forearm_@
+          A_Hand_@
+      B_UpperArm_@
+        B_Forearm_@
+          B_Hand_@
+  Thigh_@
+    Shin_@
+      Foot_@
+)");
+  EXPECT_HAS(refusal(four_arms), "two of its limbs may be the left arm");
+  const BuiltRig apart = rig_of("L", "R", R"(
+Root
+  Hips
+  Spine
+    Chest
+  Head
+  UpperArm_@
+  Forearm_@
+  Hand_@
+  Thigh_@
+  Shin_@
+  Foot_@
+)");
+  EXPECT_HAS(refusal(apart), "do not hang on each other");
+  BuiltRig giant_shin = rig("bandai namco");
+  for (size_t b = 0; b < giant_shin.skeleton.size(); ++b)
+    if (giant_shin.skeleton.names[b].starts_with("Foot")) giant_shin.skeleton.offsets[b] *= 20;
+  EXPECT_HAS(refusal(giant_shin), "lengths");
+}
+
+TEST(ImportersRigs, TwoPeopleInOneFileAreRefused) {
+  for (const char* name : {"mixamo", "vroid", "character creator 4"}) {
+    const BuiltRig one = rig(name);
+    SourceSkeleton two;
+    two.add("World", -1, Vec3::Zero());
+    for (int person = 0; person < 2; ++person) {
+      const int first = static_cast<int>(two.size());
+      for (size_t b = 0; b < one.skeleton.size(); ++b) {
+        const int parent = one.skeleton.parents[b];
+        two.add(person == 0 ? one.skeleton.names[b] : one.skeleton.names[b] + ".001",
+                parent < 0 ? 0 : parent + first, one.skeleton.offsets[b]);
+      }
+    }
+    EXPECT_HAS(refusal({two, {}}), "holds 2 characters");
+  }
+}
+
+/// Which of many spine bones is spine3: the one that carries collars and neck, always.
+TEST(ImportersRigs, TheLastOfAnyNumberOfSpineBonesCarriesTheArms) {
+  for (int count = 1; count <= 9; ++count) {
+    SourceSkeleton s;
+    s.add("Hips", -1, Vec3::Zero());
+    for (int i = 0; i < count; ++i)
+      s.add(i == 0 ? "Spine" : "Spine" + std::to_string(i), i, Vec3(0, 0.4 / count, 0));
+    const int chest = count;
+    const auto chain = [&](std::vector<std::string> names, int on, const Vec3& step) {
+      for (const std::string& name : names) {
+        s.add(name, on, step);
+        on = static_cast<int>(s.size()) - 1;
+      }
+    };
+    chain({"Neck", "Head"}, chest, Vec3(0, 0.1, 0));
+    for (const std::string side : {"Left", "Right"}) {
+      const double x = side == "Left" ? 1 : -1;
+      chain({side + "Shoulder", side + "Arm", side + "ForeArm", side + "Hand"}, chest,
+            Vec3(0.2 * x, 0, 0));
+      chain({side + "UpLeg", side + "Leg", side + "Foot", side + "ToeBase"}, 0,
+            Vec3(0.05 * x, -0.4, 0.01));
+    }
+    const NamedJoints found = name_joints(s, "x.bvh");
+    EXPECT_EQ(found.map[3].joint, 1) << count;
+    if (count > 1) {
+      EXPECT_EQ(found.map[9].joint, chest) << count;
+      EXPECT_EQ(found.map[9].offset, Vec3(Vec3::Zero())) << count;
+      EXPECT_LT(found.map[3].joint, found.map[9].joint) << count;
+    }
+    if (count > 2) {
+      EXPECT_LT(found.map[3].joint, found.map[6].joint) << count;
+      EXPECT_LT(found.map[6].joint, found.map[9].joint) << count;
+    }
+  }
+}
+
+/// Bones of the trunk that are left out turn too; joints are where they are in the file all the
+/// same.
+TEST(ImportersRigs, BonesLeftOutOfTheTrunkMoveNoJoint) {
+  for (const char* name :
+       {"unreal 5", "makehuman, default rig", "xsens mvn, BVH", "daz genesis 8", "valve biped"}) {
+    const BuiltRig built = rig(name);
+    const NamedJoints found = name_joints(built.skeleton, "x.bvh");
+    const Joints rest = rest_joints(built.skeleton, found.map);
+    SourceMotion motion;
+    motion.skeleton = built.skeleton;
+    std::vector<Quat> local(built.skeleton.size(), Quat::Identity());
+    for (size_t b = 0; b < local.size(); ++b)  // every bone, up to 17 degrees
+      local[b] =
+          Quat(Eigen::AngleAxisd(0.3 * std::sin(1.7 * static_cast<double>(b)),
+                                 Vec3(1, 0.3, std::cos(static_cast<double>(b))).normalized()));
+    motion.local = {local};
+    motion.position = {{}};
+    PosedSkeleton pose = source_pose(motion, found.map, 0);
+    const auto worst = [&] {
+      double out = 0;
+      for (const auto& [lower, upper] : {std::pair{3, 6}, {6, 9}, {12, 15}, {13, 16}, {14, 17}})
+        out = std::max(out, (pose.joints[lower] + pose.global[lower] * (rest[upper] - rest[lower]) -
+                             pose.joints[upper])
+                                .norm());
+      return out;
+    };
+    EXPECT_GT(worst(), 0.004) << name;  // the test's motion shows it
+    follow_trunk(pose, rest);
+    EXPECT_LT(worst(), 0.002) << name;
+  }
+}
+
+/// A missing toe is put where a person's is: before the ankle and below it.
+TEST(ImportersRigs, MissingToesArePlacedAhead) {
+  const BuiltRig kaykit = rig("vrm without upper chest, neck, collars and toes");
+  const Joints rest = rest_joints(kaykit.skeleton, name_joints(kaykit.skeleton, "x").map);
+  for (const int ankle : {7, 8}) {
+    const Vec3 toe = rest[ankle + 3] - rest[ankle];
+    EXPECT_GT(toe.z(), 0.08);
+    EXPECT_LT(toe.z(), 0.2);
+    EXPECT_LT(toe.y(), -0.03);
+  }
+}
+
+TEST(ImportersRigs, NamesInOtherEncodingsAreTold) {
+  BuiltRig japanese = rig("mixamo");
+  japanese.skeleton.names[0] = "\x83\x5A\x83\x93\x83\x5E\x81\x5B";  // "Center" in Shift-JIS
+  expect_right(japanese, "the pelvis needs no name");
+  for (std::string& name : japanese.skeleton.names)
+    if (name == "Head") name = "\x93\xAA";
+  EXPECT_HAS(refusal(japanese), "Shift-JIS");
+  EXPECT_HAS(refusal(japanese), "iconv -f SHIFT_JIS");
+  for (std::string& name : japanese.skeleton.names)
+    if (name == "\x93\xAA") name = "T\xEAte";  // Latin-1
+  EXPECT_HAS(refusal(japanese), "not UTF-8");
+}
+
+TEST(ImportersRigs, WordsOfNames) {
+  const auto is = [](const char* name, Part part, BoneWords::Side side, bool helper = false) {
+    const BoneWords words = bone_words(name);
+    EXPECT_EQ(static_cast<int>(words.part), static_cast<int>(part)) << name;
+    EXPECT_EQ(words.side, side) << name;
+    EXPECT_EQ(words.helper, helper) << name;
+  };
+  using enum Part;
+  const auto left = BoneWords::left, right = BoneWords::right, middle = BoneWords::middle;
+  is("LeftUpLeg", thigh, left);
+  is("mixamorig:LeftLeg", leg, left);
+  is("thigh.R", thigh, right);
+  is("b_l_foot_toe", toe, left);
+  is("LUArm", upper_arm, left);
+  is("arm_lower_R", forearm, right);
+  is("RThigh_012", thigh, right);
+  is("lfemur", thigh, left);
+  is("Bip01 L Toe0", toe, left);
+  is("左足首", ankle, left);
+  is("上半身2", spine, middle);
+  is("CC_Base_L_ThighTwist01", thigh, left, true);
+  is("LeftHandThumb1", hand, left, true);
+  is("ik_foot_l", foot, left, true);
+  is("HeadTop_End", head, middle, true);
+  is("J_Sec_Hair1_01", none, middle, true);
+  is("Chip", none, middle);  // no hip
+  is("Alarm", none, middle);
+  is("LeftRightHand", hand, right, true);  // both sides: neither
+  EXPECT_LT(bone_words("hand_l").cost, bone_words("hand_weapon_l").cost + 1);
+  EXPECT_LT(bone_words("hand_l").cost, bone_words("hand_xyz_l").cost);
+  EXPECT_EQ(other_side("LeftUpLeg"), "rightupleg");
+  EXPECT_EQ(other_side("thigh.R.001"), "thigh.l.001");
+  EXPECT_EQ(other_side("Hips"), "");
+}
+
+}  // namespace
+}  // namespace restage
