@@ -307,7 +307,7 @@ bool is_amass_motion(const Npz& file) {
 
 bool is_amass_shape(const Npz& file) {
   const BodyParameters names = body_parameters(file);
-  return !names.betas.empty() && names.poses.empty() && names.orient.empty();
+  return !names.betas.empty() && names.poses.empty() && names.orient.empty() && !named_cloud(file);
 }
 
 Motion import_amass(const Npz& file, BodyModels& models, const MotionOptions& options,

@@ -1,5 +1,6 @@
 #include "datasets/readers/array_frames.h"
 
+#include <algorithm>
 #include <array>
 
 #include "datasets/readers/body_parameters.h"
@@ -49,18 +50,8 @@ struct OpenArray {
   CloudAxes axes;
 };
 
-OpenArray open_array(const std::string& path, uint64_t max_memory) {
-  OpenArray out;
-  if (is_npz_name(path)) {
-    const Npz file(path, max_memory);
-    const std::optional<CloudArray> cloud = find_cloud(file);
-    if (!cloud)
-      throw InputError(path, "holds no points (its arrays: " + list_of(file.names()) + ")",
-                       "save an array [N, 3] or [F, N, 3] named 'points'");
-    out.in = file.open(cloud->name);
-  } else {
-    out.in = std::make_unique<FileStream>(path);
-  }
+OpenArray open_array(std::unique_ptr<ByteStream> in) {
+  OpenArray out{std::move(in), {}, {}};
   out.header = read_npy_header(*out.in);
   const std::optional<CloudAxes> axes = axes_of(out.header);
   if (!axes)
@@ -68,17 +59,53 @@ OpenArray open_array(const std::string& path, uint64_t max_memory) {
                      "is an array " + shape_text(out.header.shape) + ", which is no cloud",
                      "give points as [N, 3] or [F, N, 3]");
   out.axes = *axes;
+  if (out.header.count == 0 && out.axes.sequence)
+    throw InputError(out.in->where(), "holds no points", "give a cloud that has some");
+  return out;
+}
+
+CloudArray need_cloud(const Npz& file) {
+  std::optional<CloudArray> cloud = find_cloud(file);
+  if (!cloud)
+    throw InputError(file.path(), "holds no points (its arrays: " + list_of(file.names()) + ")",
+                     "save an array [N, 3] or [F, N, 3] named 'points'");
+  return *cloud;
+}
+
+/// The arrays that are the frames of a sequence, one each, as numpy.savez(*clouds) keeps clouds of
+/// unequal size (arr_0, arr_1 ...); none if these are no series.
+std::vector<std::string> series_of(const std::vector<std::string>& clouds) {
+  std::vector<std::string> out = order_folders(clouds, "").files;
+  if (out.size() != clouds.size()) out.clear();
+  return out;
+}
+
+/// What an archive has that could be its cloud, where none is named so.
+std::vector<CloudArray> unnamed_clouds(const Npz& file) {
+  std::vector<CloudArray> out;
+  for (const bool whole_numbers : {false, true}) {  // of scanners, where nothing else is there
+    for (const std::string& name : file.names()) {
+      const std::optional<NpyHeader> header = header_if_readable(file, name);
+      if (!header || is_one_of(name, kOthers)) continue;
+      const std::optional<CloudAxes> axes = axes_of(*header);
+      if (axes && (header->kind != 'f') == whole_numbers && header->kind != 'b')
+        out.push_back({name, *axes});
+    }
+    if (!out.empty()) break;
+  }
+  return out;
+}
+
+std::vector<std::string> names_of(const std::vector<CloudArray>& clouds) {
+  std::vector<std::string> out;
+  for (const CloudArray& cloud : clouds) out.push_back(cloud.name);
   return out;
 }
 
 class ArrayFrames : public FrameSource {
  public:
-  ArrayFrames(const std::string& path, const FrameOptions& options)
-      : path_(path), array_(open_array(path, options.max_memory)) {
-    const uint64_t max_memory = options.max_memory;
-    fps_ = stated_fps(path, max_memory).value_or(kFps);
-    if (array_.header.count == 0 && array_.axes.sequence)
-      throw InputError(array_.in->where(), "holds no points", "give a cloud that has some");
+  ArrayFrames(const std::string& path, OpenArray array, double fps, uint64_t max_memory)
+      : path_(path), array_(std::move(array)), fps_(fps) {
     if (array_.header.fortran || !array_.axes.in_order()) {
       array_.in->rewind();
       whole_.emplace(*array_.in, max_memory);
@@ -137,9 +164,40 @@ class ArrayFrames : public FrameSource {
 
   std::string path_;
   OpenArray array_;
+  double fps_;
   std::optional<NpyArray> whole_;
   int64_t at_ = 0;
-  double fps_ = kFps;
+};
+
+/// Arrays of an archive, a frame each.
+class SeriesFrames : public FrameSource {
+ public:
+  SeriesFrames(Npz file, std::vector<std::string> names, double fps, uint64_t max_memory)
+      : file_(std::move(file)), names_(std::move(names)), fps_(fps), max_memory_(max_memory) {}
+
+  std::optional<Frame> next() override {
+    if (at_ == std::ssize(names_)) return std::nullopt;
+    const std::string& name = names_[static_cast<size_t>(at_++)];
+    std::optional<Frame> frame =
+        ArrayFrames(file_.path(), open_array(file_.open(name)), fps_, max_memory_).next();
+    frame->source = cat(file_.path(), ":", name);
+    return frame;
+  }
+  void skip() override { at_ = std::min(at_ + 1, frames()); }
+  void rewind() override { at_ = 0; }
+  int64_t frames() const override { return std::ssize(names_); }
+  double fps() const override { return fps_; }
+  std::vector<std::string> remarks() const override {
+    return {cat("its ", names_.size(), " arrays, ", text::quote(names_[0]), " to ",
+                text::quote(names_.back()), ", are the frames of a sequence")};
+  }
+
+ private:
+  Npz file_;
+  std::vector<std::string> names_;
+  double fps_;
+  uint64_t max_memory_;
+  int64_t at_ = 0;
 };
 
 }  // namespace
@@ -164,23 +222,20 @@ std::optional<CloudArray> find_cloud(const Npz& file) {
     throw InputError(file.path(), "is a motion of a body model (as AMASS has them), not a scan",
                      "restage data import FILE --body-model MODEL --out M.h5, then restage data "
                      "perform --motions M.h5 makes clouds of it");
-  std::optional<CloudArray> found;
-  std::vector<std::string> several;
-  for (const bool whole_numbers : {false, true}) {  // of scanners, where nothing else is there
-    if (found) break;
-    for (const std::string& name : file.names()) {
-      const std::optional<NpyHeader> header = header_if_readable(file, name);
-      if (!header || is_one_of(name, kOthers)) continue;
-      const std::optional<CloudAxes> axes = axes_of(*header);
-      if (!axes || (header->kind != 'f') != whole_numbers || header->kind == 'b') continue;
-      found = CloudArray{name, *axes};
-      several.push_back(name);
-    }
-  }
-  if (several.size() > 1)
-    throw InputError(file.path(), "holds several arrays of points: " + list_of(several),
+  const std::vector<CloudArray> found = unnamed_clouds(file);
+  if (found.empty()) return std::nullopt;
+  if (found.size() == 1) return found[0];
+  const bool single = std::none_of(found.begin(), found.end(),
+                                   [](const CloudArray& cloud) { return cloud.axes.sequence; });
+  const std::vector<std::string> series = single ? series_of(names_of(found)) : std::vector<std::string>();
+  if (series.empty())
+    throw InputError(file.path(), "holds several arrays of points: " + list_of(names_of(found)),
                      "name the right one 'points'");
-  return found;
+  CloudArray out = found[0];
+  out.name.clear();
+  out.axes.sequence = true;
+  out.axes.frames = std::ssize(series);
+  return out;
 }
 
 std::optional<CloudArray> find_cloud(const std::string& path, uint64_t max_memory) {
@@ -206,16 +261,27 @@ std::optional<double> stated_fps(const std::string& path, uint64_t max_memory) {
 
 std::unique_ptr<FrameSource> open_array_frames(const std::string& path,
                                                const FrameOptions& options) {
-  return std::make_unique<ArrayFrames>(path, options);
+  const uint64_t max_memory = options.max_memory;
+  const double fps = stated_fps(path, max_memory).value_or(kFps);
+  if (!is_npz_name(path))
+    return std::make_unique<ArrayFrames>(path, open_array(std::make_unique<FileStream>(path)), fps,
+                                         max_memory);
+  Npz file(path, max_memory);
+  const CloudArray cloud = need_cloud(file);
+  std::vector<std::string> series;
+  if (cloud.name.empty()) series = series_of(names_of(unnamed_clouds(file)));
+  if (!series.empty())
+    return std::make_unique<SeriesFrames>(std::move(file), std::move(series), fps, max_memory);
+  return std::make_unique<ArrayFrames>(path, open_array(file.open(cloud.name)), fps, max_memory);
 }
 
 Frame read_array_frame(const std::string& path, const FrameOptions& options) {
-  ArrayFrames frames(path, options);
-  if (frames.frames() != 1)
+  const std::unique_ptr<FrameSource> frames = open_array_frames(path, options);
+  if (frames->frames() != 1)
     throw InputError(path,
-                     cat("is a sequence of ", frames.frames(), " frames where one frame belongs"),
+                     cat("is a sequence of ", frames->frames(), " frames where one frame belongs"),
                      "give this file by itself");
-  return *frames.next();
+  return *frames->next();
 }
 
 }  // namespace restage

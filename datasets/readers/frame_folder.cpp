@@ -27,16 +27,18 @@ class FileFrames : public FrameSource {
     if (at_ == list_.files.size()) return std::nullopt;
     const std::string& file = list_.files[at_];
     Frame frame;
+    if (!list_.numbers.empty()) frame.number = list_.numbers[at_];
+    ++at_;
     if (is_array_name(file)) {
+      const int64_t number = frame.number;
       frame = read_array_frame(file, options_);
+      frame.number = number;
     } else {
       Mesh mesh = read_frame_mesh(file, frame.left_out);
       frame.points = std::move(mesh.vertices);
       frame.faces = std::move(mesh.faces);
       frame.source = file;
     }
-    if (!list_.numbers.empty()) frame.number = list_.numbers[at_];
-    ++at_;
     return frame;
   }
   void skip() override { at_ = std::min(at_ + 1, list_.files.size()); }
@@ -158,15 +160,15 @@ FrameList frames_among(const std::string& folder, const std::vector<std::string>
   return out;
 }
 
-/// The one frame that lies in a folder or below it; empty if there is none, or are several.
+/// The one frame that lies in a folder or below it (texts count where there is nothing else); empty
+/// if there is none, or are several.
 std::string only_frame_below(const std::string& folder) {
-  std::vector<std::string> files, ignored;
+  std::vector<std::string> files, texts, ignored;
   for (const std::string& inner : folders_below(folder))
-    for (const std::string& file : one_of_each(candidates_in(inner), ignored)) {
-      files.push_back(file);
-      if (files.size() > 1) return "";
-    }
-  return files.empty() ? "" : files[0];
+    for (const std::string& file : one_of_each(candidates_in(inner), ignored))
+      (is_text_name(file) ? texts : files).push_back(file);
+  const std::vector<std::string>& found = files.empty() ? texts : files;
+  return found.size() == 1 ? found[0] : "";
 }
 
 std::vector<std::string> folders_in(const std::string& folder) {

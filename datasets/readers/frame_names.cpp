@@ -139,6 +139,7 @@ Value unevenness(const std::vector<std::vector<Value>>& runs) {
 struct Decimals {
   std::vector<std::vector<Value>> as_decimals{{}}, as_counters;
   bool unequal = false, leading_zero = false, trailing_zero = false, twice = false, several = false;
+  bool negative = false;
 };
 
 Decimals decimals_in(const std::vector<std::string>& names) {
@@ -152,6 +153,7 @@ Decimals decimals_in(const std::vector<std::string>& names) {
       if (piece.fraction.empty()) continue;
       out.twice = out.twice || !seen.insert(piece.value()).second;
       out.as_decimals[0].push_back(piece.value());
+      out.negative = out.negative || piece.negative;
       counters[piece.whole].push_back(std::stold(piece.fraction.substr(0, 4000)));
       wholes.insert(piece.whole);
       out.unequal = out.unequal || (length != 0 && length != piece.fraction.size());
@@ -178,6 +180,7 @@ bool means_decimals(const std::vector<std::string>& names) {
   }
   for (const std::string& pattern : plain)
     if (pointed.count(pattern) > 0) return true;
+  if (found.negative) return true;  // nobody counts so
   if (found.unequal && found.leading_zero != found.trailing_zero) return found.leading_zero;
   const Value decimals = unevenness(found.as_decimals), counters = unevenness(found.as_counters);
   if (found.unequal) return decimals <= counters;

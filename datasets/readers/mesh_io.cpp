@@ -84,7 +84,10 @@ Mesh read_mesh(const std::string& path) {
 }
 
 Mesh read_frame_mesh(const std::string& path, size_t& left_out) {
-  Mesh mesh = without_non_finite(read_file(path), path, Vec3::Zero(), left_out);
+  left_out = 0;
+  const std::string content = read_file(path);
+  if (content.empty()) return {};  // a recorder that saw nothing
+  Mesh mesh = without_non_finite(content, path, Vec3::Zero(), left_out);
   check_precision(mesh.vertices, path, kDoctorMoves);
   return mesh;
 }

@@ -69,10 +69,11 @@ int axis_of(std::string_view cell) {
   return -1;
 }
 
+/// "frame", "Frame_ID"; or a time, which frames share, too.
 bool counts_frames(std::string_view cell) {
   const std::string name = lower_case(cell);
-  constexpr std::array<std::string_view, 7> kNames = {"frame",     "frame_id", "frameid", "time",
-                                                      "timestamp", "t",        "frame_number"};
+  constexpr std::array<std::string_view, 8> kNames = {"frame",     "frame_id", "frameid", "frame_number",
+                                                      "frame_idx", "time",     "t",       "timestamp"};
   return std::find(kNames.begin(), kNames.end(), name) != kNames.end();
 }
 
@@ -174,7 +175,10 @@ class TableParser {
 
   void check_frame(std::string_view cell) {
     if (out_.vertices.empty()) frame_ = cell;
-    if (cell != frame_)
+    if (cell == frame_) return;
+    if (out_.vertices.size() == 1)
+      frame_column_ = -1;  // it counts points, or is a scanner's time of each
+    else
       throw InputError(where(), "another frame begins here, and a table is one frame",
                        "write each frame into a file of its own");
   }

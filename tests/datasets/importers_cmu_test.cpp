@@ -152,7 +152,7 @@ TEST_F(ImportersAmc, FramesThatLackByTheirNumbers) {
     bool keep = true;
     std::istringstream lines(amc_text(41));
     for (std::string line; std::getline(lines, line);) {
-      if (line.find_first_not_of("0123456789") == std::string::npos) {
+      if (!line.empty() && line.find_first_not_of("0123456789") == std::string::npos) {
         const int now = number(std::stoi(line));
         keep = now > 0;
         line = std::to_string(now);

@@ -467,6 +467,26 @@ TEST_F(ReadersArrays, AxesInAnyOrderAndMoreColumns) {
   EXPECT_EQ(cloud_axes({70, 3, 300}, 70)->frames, 300);
 }
 
+/// As numpy.savez(*clouds) keeps clouds of unequal size.
+TEST_F(ReadersArrays, NumberedArraysAreTheFramesOfASequence) {
+  Arrays arrays;
+  for (const int i : {0, 1, 10, 2}) {
+    std::vector<float> values(static_cast<size_t>(3 * (i + 1)), static_cast<float>(i));
+    arrays.emplace_back("arr_" + std::to_string(i), npy<float>({i + 1, 3}, values));
+  }
+  dir.write("a.npz", npz(arrays));
+  EXPECT_TRUE(find_cloud(dir / "a.npz")->axes.sequence);
+  const auto frames = open_frames(dir / "a.npz");
+  EXPECT_EQ(frames->frames(), 4);
+  EXPECT_HAS(frames->remarks().at(0), "'arr_0' to 'arr_10'");
+  for (const int i : {0, 1, 2, 10}) {
+    const auto frame = frames->next();
+    EXPECT_EQ(frame->points, Points(static_cast<size_t>(i + 1), Point::Constant(static_cast<float>(i))));
+  }
+  EXPECT_FALSE(frames->next());
+  EXPECT_HAS(error_of([&] { read_array_frame(dir / "a.npz"); }), "sequence of 4");
+}
+
 TEST_F(ReadersArrays, NonFinitePointsAreLeftOutAndFramesMayBeEmpty) {
   dir.write("in/1.npy", npy<float>({2, 3}, {1, NAN, 3, 4, 5, 6}));
   dir.write("in/2.npy", npy<float>({0, 3}, {}));

@@ -46,7 +46,7 @@ TEST(FrameNames, NumbersAreComparedAsTheyAreMeant) {
       {"-0.5.ply", "-0.25.ply", "0.0.ply", "0.25.ply"},
       {"frame_-2.ply", "frame_-1.ply", "frame_0.ply", "frame_1.ply"},
       {"frame-2.ply", "frame-1.ply", "frame0.ply", "frame1.ply"},
-      {"t=-0.1.ply", "t=0.0.ply", "t=0.1.ply"},
+      {"t=-0.2.ply", "t=-0.1.ply", "t=0.0.ply", "t=0.1.ply"},
       // Where it is a mark.
       {"frame-1.ply", "frame-2.ply", "frame-10.ply"},
       {"2024-01-02_10-20-30.ply", "2024-01-02_10-20-31.ply", "2024-01-02_10-21-02.ply"},
