@@ -144,6 +144,8 @@ class Sequence {
     d_.fewest_points = INT64_MAX;
     Mesh before;
     for (int64_t i = 0; auto frame = source_.next(); ++i) {
+      if (frame->points.empty())
+        throw InputError(frame->source, "holds no points", "leave the frame out");
       const int64_t n = frame->points.size();
       d_.fewest_points = std::min(d_.fewest_points, n);
       d_.most_points = std::max(d_.most_points, n);
@@ -154,10 +156,7 @@ class Sequence {
       fewest_distinct_ = std::min(fewest_distinct_, once.size());
       repeats_ += frame->points.size() - once.size();
       repeat_frames_ += once.size() < frame->points.size();
-      // A file of HDF5 numbers its frames itself, without gaps.
-      frames_.push_back(summary_of(*frame, once,
-                                   frame->source.find(".h5:") == std::string::npos &&
-                                       frame->source.find(".hdf5:") == std::string::npos));
+      frames_.push_back(summary_of(*frame, once));
       if (i % every == 0 || i < kFacingFrames) look_closely(*frame, i);
       Mesh mesh{std::move(frame->points), std::move(frame->faces)};
       if (i > 0 && jumps(frames_[frames_.size() - 2].size, frames_.back().size))
@@ -256,34 +255,49 @@ class Sequence {
     d_.say(f);
   }
 
+  /// Gaps in the numbers of the frames' names; a frame that shows nothing is a gap, too, be it
+  /// numbered or not.
   void judge_numbers() {
     int64_t usual = INT64_MAX;
     for (size_t i = 1; i < frames_.size(); ++i) {
-      if (frames_[i].number < 0 || frames_[i - 1].number < 0) return;
       const int64_t ahead = frames_[i].number - frames_[i - 1].number;
-      if (ahead < 1) return;  // not one numbering
-      usual = std::min(usual, ahead);
+      // Not all have a number, or it is not one numbering.
+      if (frames_[i].number < 0 || frames_[i - 1].number < 0 || ahead < 1) usual = 0;
+      usual = std::min(usual, ahead / (1 + std::max<int64_t>(frames_[i].missing, 0)));
     }
-    std::vector<int64_t> at;
-    int64_t missing = 0;
-    bool filled = true;
-    for (size_t i = 1; i < frames_.size(); ++i) {
-      const int64_t ahead = (frames_[i].number - frames_[i - 1].number) / usual;
-      if (ahead <= 1) continue;
-      d_.gap[i] = ahead - 1;
-      missing += ahead - 1;
-      filled = filled && d_.is_filled(ahead - 1);
-      at.push_back(frames_[i].number);
+    std::vector<int64_t> empty, absent;
+    for (size_t i = 0; i < frames_.size(); ++i) {
+      const bool numbered = i > 0 && usual > 0;
+      const int64_t missing =
+          numbered ? (frames_[i].number - frames_[i - 1].number) / usual - 1 : frames_[i].missing;
+      if (missing < 1) continue;
+      d_.gap[static_cast<int64_t>(i)] = missing;
+      if (frames_[i].missing > 0) empty.push_back(i);
+      if (missing > frames_[i].missing) absent.push_back(numbered ? frames_[i].number : i);
     }
-    if (missing > 0)
-      d_.say(
-          {"missing frames", Weight::note,
-           counted(missing, "number") + " missing in the files' names, before " + frame_list(at), 1,
-           "the numbering has gaps",
-           filled
-               ? "--fix puts the nearest frame in their place, so that the timing is right"
+    const auto count = [&](bool shown_nothing) {
+      int64_t out = 0;
+      for (const auto& [before, missing] : d_.gap) {
+        const int64_t none = frames_[static_cast<size_t>(before)].missing;
+        out += shown_nothing ? none : missing - none;
+      }
+      return out;
+    };
+    const bool filled = std::all_of(d_.gap.begin(), d_.gap.end(),
+                                    [&](const auto& gap) { return d_.is_filled(gap.second); });
+    const std::string fix =
+        filled ? "--fix puts the nearest frame in their place, so that the timing is right"
                : "--fix fills gaps of up to a second with the nearest frame; cut the sequence at "
-                 "longer ones"});
+                 "longer ones";
+    if (!empty.empty())
+      d_.say({"missing frames", Weight::note,
+              counted(count(true), "frame") + " without any point, before " + frame_list(empty), 1,
+              "they show nothing", fix});
+    if (!absent.empty())
+      d_.say({"missing frames", Weight::note,
+              counted(count(false), "number") + " missing in the files' names, before " +
+                  frame_list(absent),
+              1, "the numbering has gaps", fix});
   }
 
   void judge_jumps() {

@@ -1,10 +1,8 @@
 #include "datasets/doctor/summary.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstring>
-#include <filesystem>
 
 #include "datasets/doctor/examine_detail.h"
 #include "datasets/doctor/orientation_model.h"
@@ -35,25 +33,15 @@ Vec3 extent_direction(int i) {
   return Vec3(code / 9 - 1, code / 3 % 3 - 1, code % 3 - 1).normalized();
 }
 
-/// The last run of digits of a file's name; -1: none, or no file of its own.
-int64_t number_in(const std::string& source) {
-  const std::string name = std::filesystem::path(source).filename().string();
-  const size_t end = name.find_last_of("0123456789", name.rfind('.'));
-  if (end == std::string::npos) return -1;
-  size_t begin = end;
-  while (begin > 0 && std::isdigit(static_cast<unsigned char>(name[begin - 1]))) --begin;
-  const std::string digits = name.substr(begin, end - begin + 1);
-  return digits.size() > 15 ? -1 : std::stoll(digits);
-}
-
 }  // namespace
 
-Summary summary_of(const Frame& frame, const Points& points, bool numbered) {
+Summary summary_of(const Frame& frame, const Points& points) {
   Summary out;
   out.content = content_of(frame.points);
   out.size = normalised(points).size;
   out.sequence = frame.sequence;
-  if (numbered) out.number = number_in(frame.source);
+  out.number = frame.number;
+  out.missing = frame.missing;
   Points some;
   const size_t n = std::min<size_t>(points.size(), 2000);
   for (size_t i = 0; i < n; ++i) some.push_back(points[i * points.size() / n]);

@@ -16,12 +16,11 @@ struct Summary {
   float size = 0;        ///< median distance from the middle, of all points or of the person's
   std::array<float, 2 * kExtents> extent{};
   Point middle = Point::Zero();
-  int64_t sequence = 0, number = -1;  ///< number in the file's name
+  int64_t sequence = 0, number = -1, missing = 0;  ///< Frame::sequence and so on
 };
 
-/// `points`: the frame's, each once. `numbered`: the frame has a file of its own, whose name may
-/// hold its number.
-Summary summary_of(const Frame& frame, const Points& points, bool numbered);
+/// `points`: the frame's, each once.
+Summary summary_of(const Frame& frame, const Points& points);
 /// How far the outline moved, in the data's units.
 double step(const Summary& a, const Summary& b);
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "autograd/base/format.h"
+#include "datasets/importers/body_rotations.h"
 #include "datasets/importers/import_detail.h"
 #include "datasets/readers/array_frames.h"
 #include "datasets/readers/errors.h"
@@ -16,9 +17,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int64_t kMaxFrames = int64_t{1} << 22;  // 9.7 hours at 120 fps
 constexpr double kMaxSeconds = 35000;
-constexpr const char* kRates[] = {"mocap_framerate", "mocap_frame_rate"};
+constexpr const char* kRates[] = {"mocap_framerate", "mocap_frame_rate", "mocap_fps",
+                                  "fps",             "frame_rate",       "framerate"};
 
 /// By the name of the file or its folder: SMPLX_MALE.npz, female/model.npz.
 std::string gender_of(const fs::path& file) {
@@ -43,15 +44,21 @@ std::string text_of(const Npz& file, const char* name, ImportReport& report) {
 
 // ---- one file ----------------------------------------------------------------------------------
 
-SmplFamily family_of(const Npz& file, const NpyHeader& poses, ImportReport& report) {
-  const int64_t width = poses.shape.size() == 2 ? poses.shape[1] : 0;
+/// Which model was moved; nothing if the 22 joints are those of any.
+std::optional<SmplFamily> family_of(const Npz& file, const BodyRotations& rotations,
+                                    ImportReport& report) {
   const std::string type = text_of(file, "surface_model_type", report);
-  if (width == 156 && (type.empty() || type == "smplh")) return SmplFamily::smplh;
-  if (width == 165 && (type.empty() || type == "smplx")) return SmplFamily::smplx;
-  throw InputError(
-      file.path() + ":poses",
-      "has the shape " + shape_text(poses.shape) + (type.empty() ? "" : " for the model " + type),
-      "AMASS has [F, 156] (SMPL-H) and [F, 165] (SMPL-X)");
+  std::optional<SmplFamily> by_joints, by_type;
+  if (rotations.joints == 24) by_joints = SmplFamily::smpl;
+  if (rotations.joints == 52) by_joints = SmplFamily::smplh;
+  if (rotations.joints == 55) by_joints = SmplFamily::smplx;
+  if (type == "smpl") by_type = SmplFamily::smpl;
+  if (type == "smplh") by_type = SmplFamily::smplh;
+  if (type == "smplx") by_type = SmplFamily::smplx;
+  if ((!type.empty() && !by_type) || (by_joints && by_type && *by_joints != *by_type))
+    throw InputError(file.path(), cat("has ", rotations.layout, " for the model ", type),
+                     "AMASS has [F, 156] (SMPL-H) and [F, 165] (SMPL-X)");
+  return by_type ? by_type : by_joints;
 }
 
 /// 0 where there is no single number; some files keep it as a Python object.
@@ -65,7 +72,7 @@ double number_of(const Npz& file, const char* name) {
 }
 
 /// The file's rate; a hair beside a whole number means that number.
-double rate_of(const Npz& file, double wanted, std::string& from) {
+double rate_of(const Npz& file, double wanted, std::string& from, ImportReport& report) {
   from = "--fps";
   if (wanted > 0) return wanted;
   for (const char* name : kRates) {
@@ -77,23 +84,36 @@ double rate_of(const Npz& file, double wanted, std::string& from) {
                        "give the true one with --fps");
     return std::abs(fps / std::round(fps) - 1) < 5e-4 ? std::round(fps) : fps;
   }
-  throw InputError(file.path(), "says no frame rate (mocap_framerate, mocap_frame_rate)",
-                   "give it with --fps");
+  if (is_amass_layout(file))
+    throw InputError(file.path(), "says no frame rate (mocap_framerate, mocap_frame_rate)",
+                     "give it with --fps");
+  from = "taken for granted: --fps";
+  report.remark("the file says no frame rate: 30 frames a second are taken for granted (--fps)");
+  return kFps;
 }
 
-Betas betas_of(const Npz& file) {
-  const NpyArray array = file.array("betas");
+/// One person's shape: [B], [1, B], or one a frame, of which the mean is taken.
+Betas betas_of(const Npz& file, const std::string& name, size_t frames, ImportReport& report) {
+  if (name.empty()) {
+    report.remark("the file says no shape (betas): the mean person is taken");
+    return {};
+  }
+  const NpyArray array = file.array(name);
   const auto& shape = array.shape();
-  if (array.is_text() || shape.empty() || (shape.size() > 1 && shape.back() != array.size()))
+  const auto width = static_cast<size_t>(shape.empty() ? 0 : shape.back());
+  const size_t rows = width == 0 ? 0 : static_cast<size_t>(array.size()) / width;
+  if (array.is_text() || (rows != 1 && rows != frames))
     throw InputError(array.where(), "has the shape " + shape_text(shape),
-                     "AMASS has one person a file: [B]");
-  return array.finite();
-}
-
-Quat rotation(const Vec3& axis_angle) {
-  const double angle = axis_angle.norm();
-  if (angle < 1e-12) return Quat::Identity();
-  return Quat(Eigen::AngleAxisd(angle, axis_angle / angle));
+                     "give one person's shape a file: [B], or [F, B]");
+  const std::vector<double> values = array.finite();
+  Betas out(width, 0.0);
+  bool differ = false;
+  for (size_t i = 0; i < values.size(); ++i) {
+    out[i % width] += values[i] / static_cast<double>(rows);
+    differ = differ || std::abs(values[i] - values[i % width]) > 1e-6;
+  }
+  if (differ) report.remark(cat("the shape changes from frame to frame: the mean of ", rows, " is taken"));
+  return out;
 }
 
 /// The 22 joints as a skeleton of their own, and each standing for itself.
@@ -111,33 +131,67 @@ JointMap identity_map() {
   return out;
 }
 
-/// The rest pose is the model's, y up; only the world that its root turns in may be z up.
-SourceMotion read_motion(const Npz& file, const Joints& rest, const Mat3& up) {
-  const NpyArray poses = file.array("poses"), trans = file.array("trans");
-  const int64_t frames = poses.shape()[0], width = poses.shape()[1];
-  if (frames == 0 || frames > kMaxFrames)
-    throw InputError(poses.where(), cat("has ", frames, " frames"), cat("give 1 to ", kMaxFrames));
-  if (!trans.is_shaped({frames, 3}))
+/// The rest pose is the model's, y up; only the world that its root turns in may be another.
+SourceMotion read_motion(const Npz& file, const BodyParameters& names, BodyRotations rotations,
+                         const Joints& rest) {
+  if (names.trans.empty())
+    throw InputError(file.path(), cat("says where the joints are (", rotations.layout, "), but not the body"),
+                     "add trans [F, 3], the root's place in metres (zeros: it stays in place)");
+  const NpyArray trans = file.array(names.trans);
+  const auto frames = std::ssize(rotations.local);
+  if (trans.is_text() || trans.size() != 3 * frames)
     throw InputError(trans.where(), "has the shape " + shape_text(trans.shape()),
                      cat("it needs one position a frame: [", frames, ", 3]"));
-  const auto vector = [](const NpyArray& array, int64_t at) {
-    const Vec3 out(array[at], array[at + 1], array[at + 2]);
-    if (!(out.cwiseAbs().maxCoeff() < 1e5))
-      throw InputError(array.where(), "holds a number that is not finite or too large",
-                       "give the file as it was published");
-    return out;
-  };
   SourceMotion out;
   out.skeleton = skeleton_of(rest);
   out.moving = {0};
+  out.local = std::move(rotations.local);
   for (int64_t f = 0; f < frames; ++f) {
-    std::vector<Quat>& local = out.local.emplace_back(kJoints);
-    for (size_t j = 0; j < kJoints; ++j)
-      local[j] = rotation(vector(poses, f * width + 3 * static_cast<int64_t>(j)));
-    local[0] = Quat(up) * local[0];
-    out.position.push_back({up * (vector(trans, 3 * f) + rest[0])});
+    const Vec3 at(trans[3 * f], trans[3 * f + 1], trans[3 * f + 2]);
+    if (!(at.cwiseAbs().maxCoeff() < 1e5))
+      throw InputError(trans.where(), "holds a number that is not finite or too large",
+                       "give the file as it was published");
+    out.position.push_back({at + rest[0]});
   }
   return out;
+}
+
+/// Where the head is, seen from the pelvis, on average; nothing if the body lies.
+std::optional<Axis> up_by_spine(const SourceMotion& motion) {
+  const JointMap map = identity_map();
+  Vec3 sum = Vec3::Zero();
+  double length = 0;
+  for (size_t f = 0; f < motion.local.size(); ++f) {
+    const PosedSkeleton pose = source_pose(motion, map, f);
+    const Vec3 spine = pose.joints[15] - pose.joints[0];
+    sum += spine;
+    length += spine.norm();
+  }
+  if (!(sum.norm() > 0.5 * length)) return std::nullopt;
+  return axis_near(sum);
+}
+
+/// Turns the world so that y is up, and says how it is known.
+void turn_upright(SourceMotion& motion, const Npz& file, Axis given, ImportReport& report) {
+  Axis up = given;
+  std::string how = to_string(given) + " (--up)";
+  if (given == Axis::automatic && is_amass_layout(file)) {
+    up = Axis::z;
+    how = "z (AMASS), turned to y";
+  } else if (given == Axis::automatic) {
+    const std::optional<Axis> found = up_by_spine(motion);
+    if (!found)
+      throw InputError(file.path(), "does not show which way is up: the body lies or turns over",
+                       "say it with --up (-y is usual where a camera looks on)");
+    up = *found;
+    how = to_string(up) + ", where the head is on average, turned to y";
+  }
+  report.fact("up", how);
+  const Mat3 turn = upright(up);
+  for (size_t f = 0; f < motion.local.size(); ++f) {
+    motion.local[f][0] = Quat(turn) * motion.local[f][0];
+    motion.position[f][0] = turn * motion.position[f][0];
+  }
 }
 
 /// Brings the motion to 30 fps and says how.
@@ -196,19 +250,33 @@ BodyModels::BodyModels(const std::string& path, uint64_t max_memory)
   throw InputError(path, none, "give a model or a folder of them as --body-model");
 }
 
-const SmplModel& BodyModels::find(SmplFamily family, const std::string& gender,
-                                  const std::string& clip, std::vector<std::string>& remarks) {
-  std::vector<const Entry*> usable = of_family(family);
-  if (usable.empty() && family == SmplFamily::smplh) {
-    usable = of_family(SmplFamily::smpl);
-    if (!usable.empty())
-      remarks.push_back("a SMPL model stands in for SMPL-H: their shapes are taken for the same");
+std::vector<const BodyModels::Entry*> BodyModels::usable(std::optional<SmplFamily> family,
+                                                         std::vector<std::string>& remarks) const {
+  using enum SmplFamily;
+  std::vector<const Entry*> out;
+  if (!family) {  // 22 joints: those of any
+    for (const SmplFamily any : {smplh, smplx, smpl})
+      if (out.empty()) out = of_family(any);
+    return out;
   }
+  out = of_family(*family);
+  if (!out.empty() || *family == smplx) return out;
+  const SmplFamily other = *family == smplh ? smpl : smplh;
+  out = of_family(other);
+  if (!out.empty())
+    remarks.push_back(cat("a ", to_string(other), " model stands in for ", to_string(*family),
+                          ": their shapes are taken for the same"));
+  return out;
+}
+
+const SmplModel& BodyModels::find(std::optional<SmplFamily> family, const std::string& gender,
+                                  const std::string& clip, std::vector<std::string>& remarks) {
+  const std::vector<const Entry*> usable = this->usable(family, remarks);
   if (usable.empty())
     throw InputError(clip,
-                     cat("moves a ", to_string(family), " body, ", path_, " is ",
+                     cat("moves a ", to_string(*family), " body, ", path_, " is ",
                          to_string(entries_[0].family), ", whose shapes are others"),
-                     cat("give a ", to_string(family), " model as --body-model"));
+                     cat("give a ", to_string(*family), " model as --body-model"));
   const std::string wanted = gender.empty() ? "neutral" : gender;
   const Entry* chosen = usable.size() == 1 ? usable[0] : nullptr;
   for (const Entry* entry : usable)
@@ -233,30 +301,39 @@ std::vector<const BodyModels::Entry*> BodyModels::of_family(SmplFamily family) c
 
 // ---- clips -------------------------------------------------------------------------------------
 
-bool is_amass_motion(const Npz& file) { return file.has("poses") && file.has("trans"); }
+bool is_amass_motion(const Npz& file) {
+  return is_amass_layout(file) || (body_parameters(file).moves() && !named_cloud(file));
+}
 
-bool is_amass_shape(const Npz& file) { return file.has("betas") && !file.has("poses"); }
+bool is_amass_shape(const Npz& file) {
+  const BodyParameters names = body_parameters(file);
+  return !names.betas.empty() && names.poses.empty() && names.orient.empty() && !named_cloud(file);
+}
 
 Motion import_amass(const Npz& file, BodyModels& models, const MotionOptions& options,
                     ImportReport& report) {
   report.file = file.path();
-  const NpyHeader poses = file.header("poses");
-  const SmplFamily family = family_of(file, poses, report);
-  report.fact("layout", cat(to_string(family), ", poses ", shape_text(poses.shape)));
+  const BodyParameters names = body_parameters(file);
+  BodyRotations rotations = read_body_rotations(file, names);
+  const std::optional<SmplFamily> family = family_of(file, rotations, report);
+  report.fact("layout", cat(family ? to_string(*family) : "22 joints", ", ", rotations.layout));
   const std::string gender = text_of(file, "gender", report);
   report.fact("gender", gender.empty() ? "not stated" : gender);
   const SmplModel& model = models.find(family, gender, file.path(), report.remarks);
-  const Betas betas = betas_of(file);
+  const Betas betas = betas_of(file, names.betas, rotations.local.size(), report);
   report.fact("body model", cat(model.path(), ", ", std::min(betas.size(), model.shapes()), " of ",
                                 betas.size(), " betas"));
-
   const Joints rest = model.joints(betas);
-  const Axis up = options.rest.up;
-  SourceMotion motion = read_motion(file, rest, upright(up == Axis::automatic ? Axis::z : up));
-  report.fact("up", up == Axis::automatic ? "z (AMASS), turned to y" : to_string(up) + " (--up)");
+  SourceMotion motion = read_motion(file, names, std::move(rotations), rest);
+  turn_upright(motion, file, options.rest.up, report);
+  if (lower_case(names.trans) == "cam_trans")
+    report.remark("the path is what a camera saw (cam_trans): its depth is an estimate");
   std::string from;
-  motion.fps = rate_of(file, options.fps, from);
-  report.fact("rate", resampled(motion, poses.bytes(), from, file.path()));
+  motion.fps = rate_of(file, options.fps, from, report);
+  uint64_t bytes = 0;
+  for (const std::string& name : {names.poses, names.orient, names.body})
+    if (!name.empty()) bytes += file.header(name).bytes();
+  report.fact("rate", resampled(motion, bytes, from, file.path()));
 
   Poses posed(motion.local.size());
   const JointMap map = identity_map();

@@ -1,10 +1,13 @@
-// AMASS motions (.npz): poses of a SMPL-H or SMPL-X body as axis-angle numbers, z up, at the rate
-// of the recording. Skeletons come from the user's own body model (smpl.h), which AMASS does not
-// hold. Source: Mahmood et al. 2019; the SMPL-X files are of the 2023 release ("stageii").
+// Motions of a SMPL, SMPL-H or SMPL-X body (.npz): AMASS's (poses and trans, z up, at the rate of the
+// recording), and those of estimators, which give the same numbers other names and shapes
+// (body_parameters.h, body_rotations.h) and look at the world as a camera does. Skeletons come from
+// the user's own body model (smpl.h), which no such file holds. Source: Mahmood et al. 2019; the
+// SMPL-X files are of the 2023 release ("stageii").
 #pragma once
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,11 +24,12 @@ class BodyModels {
   /// What is no such model in a folder is left out. InputError: nothing there, no model in it.
   explicit BodyModels(const std::string& path, uint64_t max_memory = kMaxMemory);
 
-  /// The model for a clip, loaded once; a single file stands for every gender. SMPL stands in for
-  /// SMPL-H, never for SMPL-X, whose shapes are others. What does not quite fit is remarked.
-  /// InputError (about `clip`) if none fits.
-  const SmplModel& find(SmplFamily family, const std::string& gender, const std::string& clip,
-                        std::vector<std::string>& remarks);
+  /// The model for a clip, loaded once; a single file stands for every gender. `family` nothing: the
+  /// clip fits any, and the only one at hand is taken, else SMPL-H, SMPL-X, SMPL in this order. SMPL
+  /// and SMPL-H stand in for each other, never for SMPL-X, whose shapes are others. What does not
+  /// quite fit is remarked. InputError (about `clip`) if none fits.
+  const SmplModel& find(std::optional<SmplFamily> family, const std::string& gender,
+                        const std::string& clip, std::vector<std::string>& remarks);
 
  private:
   struct Entry {
@@ -33,6 +37,8 @@ class BodyModels {
     SmplFamily family;
   };
   std::vector<const Entry*> of_family(SmplFamily family) const;
+  std::vector<const Entry*> usable(std::optional<SmplFamily> family,
+                                   std::vector<std::string>& remarks) const;
 
   std::string path_;
   uint64_t max_memory_;
@@ -40,13 +46,15 @@ class BodyModels {
   std::map<std::string, std::unique_ptr<SmplModel>> loaded_;
 };
 
-/// `poses` make a motion; `betas` without poses a shape only (shape.npz, neutral_stagei.npz).
+/// Rotations of joints make a motion, unless the surface is there too (CAPE's v_posed), which is a
+/// scan; `betas` without rotations are a shape only (shape.npz, neutral_stagei.npz).
 bool is_amass_motion(const Npz& file);
 bool is_amass_shape(const Npz& file);
 
 /// One clip at 30 fps, and what was done to it. Of the options the rate, the names and the up axis
-/// count (automatic: z, as in all of AMASS). InputError: another layout, no rate, not finite, no
-/// model that fits.
+/// count (automatic: z in AMASS's files, else where the head is on average). A file of an estimator
+/// that says no rate is taken for 30 fps, with a remark. InputError: another layout, no translation,
+/// no rate, not finite, no model that fits.
 Motion import_amass(const Npz& file, BodyModels& models, const MotionOptions& options,
                     ImportReport& report);
 

@@ -1,7 +1,9 @@
 #include "datasets/importers/axis.h"
 
+#include <cctype>
 #include <cmath>
 #include <iterator>
+#include <utility>
 
 #include "autograd/base/error.h"
 #include "autograd/base/format.h"
@@ -21,8 +23,12 @@ constexpr LegUnit kUnits[] = {{"metres", 0.4, 1.4, 1.0},
 }  // namespace
 
 Axis parse_axis(const std::string& text, const std::string& option) {
+  std::string name = text;
+  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (name.size() == 2 && (name[1] == '-' || name[1] == '+')) std::swap(name[0], name[1]);
+  if (name.starts_with('+')) name.erase(0, 1);
   for (size_t i = 0; i < std::size(kAxisNames); ++i)
-    if (text == kAxisNames[i]) return static_cast<Axis>(i);
+    if (name == kAxisNames[i]) return static_cast<Axis>(i);
   throw InputError("", option + " '" + text.substr(0, 40) + "' is no axis",
                    "give auto, x, -x, y, -y, z or -z");
 }

@@ -11,7 +11,7 @@ namespace restage {
 /// A direction along one of the file's axes.
 enum class Axis { automatic, x, minus_x, y, minus_y, z, minus_z };
 
-/// "auto", "x", "-x" ...; InputError naming `option` for anything else.
+/// "auto", "x", "+x", "-x", "x-" ..., in any case; InputError naming `option` for anything else.
 Axis parse_axis(const std::string& text, const std::string& option);
 std::string to_string(Axis axis);
 

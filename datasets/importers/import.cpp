@@ -13,6 +13,8 @@
 #include "datasets/readers/array_frames.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/folders.h"
+#include "datasets/readers/foreign_kinds.h"
+#include "datasets/readers/hdf5_frames.h"
 #include "datasets/readers/mesh_io.h"
 
 namespace restage {
@@ -67,13 +69,15 @@ ImportSummary import_folder(const std::string& source, const std::string& out,
 ImportSummary import_file(const std::string& source, const std::string& out,
                           const ImportOptions& options) {
   if (is_recording_name(source)) return import_recordings({source}, source, out, options);
-  if (is_array_name(source) || is_mesh_name(source)) return import_array_file(source, out, options);
+  if (holds_scans(source)) return import_array_file(source, out, options);
   if (is_pickle_name(source)) refuse_pickle(source);
   if (source.ends_with(".asf") || source.ends_with(".asf.xz"))
     throw InputError(source, "is a skeleton without a motion",
                      "give an .amc file and this one with --asf");
+  refuse_foreign_kind(source);
   throw InputError(source, "is of no kind that can be imported, by its name",
-                   "give .bvh, .amc, .glb, .npz, .npy, .ply or .obj files, or a folder of them");
+                   "give .bvh, .amc, .glb, .npz, .npy, .h5, .ply, .obj, .pcd or .xyz files, or a "
+                   "folder of them");
 }
 
 /// What no file can make right is said before any is opened.
@@ -200,6 +204,11 @@ void count_ignored(const std::string& folder, bool (*considered)(const std::stri
     if (!considered(path)) ++summary.ignored[fs::path(path).extension().string()];
 }
 
+bool holds_scans(const std::string& path) {
+  return is_array_name(path) || is_mesh_name(path) || is_cloud_name(path) || is_text_name(path) ||
+         is_hdf5_name(path);
+}
+
 bool is_pickle_name(const std::string& path) { return path.ends_with(".pkl"); }
 
 void refuse_pickle(const std::string& path) {
@@ -210,7 +219,7 @@ void refuse_pickle(const std::string& path) {
 bool is_importable(const std::string& source) {
   std::error_code ignored;
   return fs::is_directory(source, ignored) || is_recording_name(source) || is_array_name(source) ||
-         is_mesh_name(source);
+         is_mesh_name(source) || is_cloud_name(source) || is_text_name(source);
 }
 
 ImportSummary import_data(const std::string& source, const std::string& out,

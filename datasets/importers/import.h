@@ -52,7 +52,7 @@ bool is_importable(const std::string& source);
 /// - a tree of folders of recordings and characters, in the order of their names;
 /// - an AMASS motion (.npz) or a tree of folders of them, subjects named by folder (amass.h);
 /// - a body model (.npz), giving bodies (smpl.h);
-/// - scans: an array or mesh file, or a tree of folders of them (scans.h).
+/// - scans: an array, HDF5, mesh or cloud file, or a tree of folders of them (scans.h).
 /// An option that a kind of input does not take is an InputError, never ignored.
 /// Unusable files of a folder are skipped and listed, and so is a scan sequence of a tree with a
 /// frame that is unusable; if nothing is left, the first one's reason is the error.

@@ -10,6 +10,7 @@
 #include "datasets/readers/array_frames.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/folders.h"
+#include "datasets/readers/foreign_kinds.h"
 #include "datasets/readers/mesh_io.h"
 
 namespace restage {
@@ -45,8 +46,10 @@ ImportSummary import_amass_files(const std::vector<std::string>& files, const st
                                  const ImportOptions& options) {
   check_options({InputKind::amass}, source, options);
   if (options.body_model.empty())
-    throw InputError(source, "holds AMASS motions, whose skeletons are in a body model beside them",
-                     "give your SMPL-H or SMPL-X model with --body-model MODEL.npz");
+    throw InputError(source,
+                     "holds motions of a body model (as AMASS does), whose skeletons are in the "
+                     "model's own file",
+                     "give your SMPL, SMPL-H or SMPL-X model with --body-model MODEL.npz");
   check_fps(options);
   check_output(out, files);
   BodyModels models(options.body_model, options.max_memory);
@@ -128,6 +131,8 @@ ImportSummary import_scan_files(const std::string& source, const std::string& ou
   ImportSummary summary;
   const std::vector<ScanSequence> sequences =
       find_scans(source, options.max_memory, summary.skipped);
+  if (sequences.empty() && summary.skipped.empty())
+    for (const std::string& file : files_below(source)) refuse_foreign_kind(file);
   if (sequences.empty())
     throw InputError(
         source,
@@ -135,7 +140,10 @@ ImportSummary import_scan_files(const std::string& source, const std::string& ou
             (summary.skipped.empty() ? "" : " (" + summary.skipped[0].substr(0, 200) + ")"),
         "give a data folder, BVH files, AMASS motions, a body model or scans");
   check_fps(options);
-  for (const ScanSequence& sequence : sequences) check_output(out, sequence.files);
+  for (const ScanSequence& sequence : sequences) {
+    check_output(out, sequence.frames.files);
+    check_output(out, {sequence.file});
+  }
   ScanWriter writer(out, file_info(source, options));
   for (const ScanSequence& sequence : sequences) {
     try {
@@ -147,8 +155,8 @@ ImportSummary import_scan_files(const std::string& source, const std::string& ou
     } catch (const InputError& error) {
       if (sequences.size() == 1) throw;
       writer.drop_sequence();
-      summary.skipped.push_back(sequence.files.size() == 1 ? error.what()
-                                                           : sequence.name + ": " + error.what());
+      summary.skipped.push_back(sequence.file.empty() ? sequence.name + ": " + error.what()
+                                                      : error.what());
     }
   }
   check_any(summary, source);
@@ -191,7 +199,7 @@ ImportSummary import_array_folder(const std::string& source, const std::string& 
   ImportSummary summary = amass ? import_amass_files(npz, source, source, out, options)
                                 : import_scan_files(source, out, options);
   const auto of_scans = [](const std::string& path) {
-    return is_array_name(path) || is_mesh_name(path) || path.ends_with(".pkl");
+    return (holds_scans(path) && !is_text_name(path)) || path.ends_with(".pkl");
   };
   count_ignored(source, amass ? is_npz_name : of_scans, summary);
   return summary;

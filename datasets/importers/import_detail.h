@@ -42,6 +42,8 @@ class ImportWriter {
   std::map<std::string, std::string> bodies_, motions_;  ///< id to the file it came from
 };
 
+/// Whether a file may hold scans, by its name.
+bool holds_scans(const std::string& path);
 bool is_pickle_name(const std::string& path);
 [[noreturn]] void refuse_pickle(const std::string& path);
 
@@ -66,7 +68,7 @@ bool is_recording_name(const std::string& path);
 ImportSummary import_recordings(const std::vector<std::string>& files, const std::string& source,
                                 const std::string& out, const ImportOptions& options);
 
-/// An NPY, NPZ, PLY or OBJ file; a folder with such files somewhere below (import_arrays.cpp).
+/// An NPY, NPZ, HDF5, mesh or cloud file; a folder with such files somewhere below (import_arrays.cpp).
 ImportSummary import_array_file(const std::string& source, const std::string& out,
                                 const ImportOptions& options);
 ImportSummary import_array_folder(const std::string& source, const std::string& out,

@@ -188,6 +188,7 @@ MotionClip make_clip(Recording recording, const std::string& path, const MotionO
   ImportReport& report = clip.report;
   report.file = path;
   report_names(recording, report);
+  report.remarks = recording.remarks;
   clip.scale = find_scale(recording, options.scale, report);
   scale_lengths(recording, clip.scale);
   report_positions(recording.positions, clip.scale, report);

@@ -63,6 +63,7 @@ struct Recording {
   double metres_per_unit = 0;  ///< if the file says it
   uint64_t bytes = 0;          ///< of the file, unpacked
   BonePositions positions;
+  std::vector<std::string> remarks;  ///< of the reader
 };
 
 /// Units, axes, rest pose, rate: found or as given, each with a fact in the report. Quarter turns

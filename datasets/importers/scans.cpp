@@ -14,6 +14,7 @@
 #include "datasets/readers/errors.h"
 #include "datasets/readers/folders.h"
 #include "datasets/readers/frame_folder.h"
+#include "datasets/readers/hdf5_frames.h"
 #include "nn/geometry/box.h"
 
 namespace restage {
@@ -23,34 +24,86 @@ namespace fs = std::filesystem;
 
 // ---- finding -----------------------------------------------------------------------------------
 
-size_t count_pickles(const std::string& folder) {
-  size_t out = 0;
+/// Without those in folders below it.
+std::vector<std::string> files_in(const std::string& folder) {
+  std::vector<std::string> out;
   std::error_code ignored;
   for (fs::directory_iterator item(folder, ignored), end; !ignored && item != end;
        item.increment(ignored))
-    out += item->path().extension() == ".pkl";
+    if (std::error_code failed; item->is_regular_file(failed)) out.push_back(item->path().string());
+  std::sort(out.begin(), out.end(), natural_less);
   return out;
+}
+
+size_t count_pickles(const std::string& folder) {
+  const std::vector<std::string> files = files_in(folder);
+  return static_cast<size_t>(std::count_if(
+      files.begin(), files.end(), [](const std::string& file) { return file.ends_with(".pkl"); }));
 }
 
 /// The arrays of a folder: sequences by themselves, single frames together.
 void add_arrays(const std::string& folder, const std::vector<std::string>& files,
                 uint64_t max_memory, std::vector<ScanSequence>& out,
                 std::vector<std::string>& skipped) {
-  ScanSequence frames{folder, {}};
+  std::vector<std::string> frames;
   for (const std::string& file : files) {
     try {
       const std::optional<CloudArray> cloud = find_cloud(file, max_memory);
       if (!cloud)
         skipped.push_back(file + ": holds no points");
-      else if (cloud->sequence)
-        out.push_back({file, {file}});
+      else if (cloud->axes.sequence)
+        out.push_back({file, file, {}, {}});
       else
-        frames.files.push_back(file);
+        frames.push_back(file);
     } catch (const InputError& error) {
       skipped.emplace_back(error.what());
     }
   }
-  if (!frames.files.empty()) out.push_back(std::move(frames));
+  if (!frames.empty()) out.push_back({folder, "", {}, order_frames(frames, folder)});
+}
+
+/// The sequences of a file.
+void add_file(const std::string& file, const FrameOptions& options, std::vector<ScanSequence>& out) {
+  if (!is_hdf5_name(file)) return out.push_back({file, file, {}, {}});
+  const int64_t sequences = open_frames(file, options)->sequences();
+  for (int64_t s = 0; s < sequences; ++s)
+    out.push_back({sequences == 1 ? file : cat(file, ":", s), file, s, {}});
+}
+
+/// What lies in a folder itself.
+void add_folder(const std::string& folder, uint64_t max_memory, std::vector<ScanSequence>& out,
+                std::vector<std::string>& skipped) {
+  for (const std::string& file : files_in(folder)) {
+    if (!is_hdf5_name(file)) continue;
+    try {
+      add_file(file, {"", max_memory}, out);
+    } catch (const InputError& error) {  // our own data files, mostly
+      skipped.emplace_back(error.what());
+    }
+  }
+  const std::vector<std::string> files = frame_files(folder);
+  if (!files.empty() && std::all_of(files.begin(), files.end(), is_array_name))
+    return add_arrays(folder, files, max_memory, out, skipped);
+  if (!files.empty()) out.push_back({folder, "", {}, frame_list(folder)});
+}
+
+/// The folders below `path` that are looked into one by one; those whose folders are frames are
+/// sequences.
+std::vector<std::string> add_folders_of_frames(const std::string& path,
+                                               std::vector<ScanSequence>& out) {
+  std::vector<std::string> rest;
+  std::string taken;  // what lies below the last sequence is in it
+  for (const std::string& folder : folders_below(path)) {
+    if (!taken.empty() && folder.starts_with(taken)) continue;
+    FrameList frames = folder_a_frame(folder);
+    if (frames.files.empty()) {
+      rest.push_back(folder);
+      continue;
+    }
+    taken = folder + "/";
+    out.push_back({folder, "", {}, std::move(frames)});
+  }
+  return rest;
 }
 
 // ---- importing ---------------------------------------------------------------------------------
@@ -93,15 +146,66 @@ std::string rate_fact(double fps, const std::string& from, int64_t frames, const
              " left out, ", count - used, " repeated)");
 }
 
-/// InputError unless there are 64 different points, as many as retargeting needs.
-void check_count(const Frame& frame) {
-  constexpr size_t kFewest = 64;
+constexpr size_t kFewest = 64;  // different points that retargeting needs
+
+size_t different_points(const Points& points) {
   std::set<std::array<float, 3>> different;
-  for (const Point& p : frame.points)
-    if (different.insert({p.x(), p.y(), p.z()}).second && different.size() == kFewest) return;
-  throw InputError(frame.source, cat("has only ", different.size(), " different points"),
-                   "give scans of 64 points or more");
+  for (const Point& p : points)
+    if (different.insert({p.x(), p.y(), p.z()}).second && different.size() == kFewest) break;
+  return different.size();
 }
+
+/// Writes frames at our rate. Where one shows nobody (too few points), the nearest that do stand in
+/// its place, up to a second long.
+class HoldingWriter {
+ public:
+  HoldingWriter(ScanWriter& out, const std::string& name) : out_(out), name_(name) {}
+
+  void push(const Points& points, const std::string& source) {
+    const size_t different = different_points(points);
+    if (different < kFewest) {
+      if (missing_ == 0) first_ = cat(source, ": has only ", different, " different points");
+      ++missing_;
+      return;
+    }
+    for (int64_t k = 0; k < missing_; ++k)
+      out_.append(before_ && 2 * k < missing_ ? *before_ : points);
+    settle();
+    out_.append(points);
+    fewest_ = before_ ? std::min(fewest_, points.size()) : points.size();
+    most_ = std::max(most_, points.size());
+    before_ = points;
+  }
+
+  void finish(ImportReport& report) {
+    if (!before_)
+      throw InputError(name_, "shows nobody: " + first_, "give scans of 64 points or more");
+    for (int64_t k = 0; k < missing_; ++k) out_.append(*before_);
+    settle();
+    out_.end_sequence();
+    report.fact("points", fewest_ == most_ ? std::to_string(most_) : cat(fewest_, " to ", most_));
+    if (held_ > 0)
+      report.remark(cat(held_, held_ == 1 ? " frame shows" : " frames show",
+                        " too little (fewer than 64 points): the nearest in time ",
+                        held_ == 1 ? "stands" : "stand", " there"));
+  }
+
+ private:
+  void settle() {
+    if (static_cast<double>(missing_) > kFps)
+      throw InputError(name_,
+                       cat("shows nobody for ", missing_, " frames (30 a second), from ", first_),
+                       "cut the sequence there");
+    held_ += missing_;
+    missing_ = 0;
+  }
+
+  ScanWriter& out_;
+  std::string name_, first_;
+  std::optional<Points> before_;
+  int64_t missing_ = 0, held_ = 0;
+  size_t fewest_ = 0, most_ = 0;
+};
 
 /// InputError unless its size, the median distance to its median point, can be that of a person
 /// (0.26 to 0.63 m in any pose) or of some people in a room: in metres where the scale is given,
@@ -136,29 +240,38 @@ std::string size_fact(const Points& points) {
 std::vector<ScanSequence> find_scans(const std::string& path, uint64_t max_memory,
                                      std::vector<std::string>& skipped) {
   std::error_code ignored;
-  if (!fs::is_directory(path, ignored)) return {{path, {path}}};
   std::vector<ScanSequence> out;
-  for (const std::string& folder : folders_below(path)) {
-    const std::vector<std::string> files = frame_files(folder);
-    if (!files.empty() && is_array_name(files[0]))
-      add_arrays(folder, files, max_memory, out, skipped);
-    else if (!files.empty())
-      out.push_back({folder, files});
+  if (!fs::is_directory(path, ignored)) {
+    add_file(path, {"", max_memory}, out);
+    return out;
+  }
+  for (const std::string& folder : add_folders_of_frames(path, out)) {
+    try {
+      add_folder(folder, max_memory, out, skipped);
+    } catch (const InputError& error) {
+      skipped.emplace_back(error.what());
+    }
     if (const size_t n = count_pickles(folder))
       skipped.push_back(cat(folder, ": ", n,
                             " pickles (.pkl), which can run code and are never read; docs/data.md "
                             "shows how to convert them"));
   }
+  const auto by_name = [](const ScanSequence& a, const ScanSequence& b) {
+    return natural_less(a.name, b.name);
+  };
+  std::stable_sort(out.begin(), out.end(), by_name);
   return out;
 }
 
 int64_t import_scans(const ScanSequence& sequence, const MotionOptions& options,
                      uint64_t max_memory, ScanWriter& out, ImportReport& report) {
-  const bool one = sequence.files.size() == 1;
-  const auto source = one ? open_frames(sequence.files[0], {"", max_memory})
-                          : open_frame_files(sequence.files, {"", max_memory});
+  const bool one = !sequence.file.empty();
+  const FrameOptions how{"", max_memory, sequence.part};
+  const auto source =
+      one ? open_frames(sequence.file, how) : open_frame_list(sequence.frames, how);
   const bool stated =
-      one && is_array_name(sequence.files[0]) && stated_fps(sequence.files[0], max_memory);
+      one && ((is_array_name(sequence.file) && stated_fps(sequence.file, max_memory)) ||
+              (is_hdf5_name(sequence.file) && states_fps(sequence.file)));
   const double fps = options.fps > 0 ? options.fps : source->fps();
   const double scale = options.scale > 0 ? options.scale : 1;
   const Clock clock(source->frames(), fps);
@@ -174,28 +287,33 @@ int64_t import_scans(const ScanSequence& sequence, const MotionOptions& options,
   const Axis up = given_up ? options.rest.up : Axis::y;
   report.fact("up", to_string(up) + (given_up ? " (--up)" : " (taken for granted: --up)"));
   const Eigen::Matrix3f to_ours = (scale * upright(up)).cast<float>();
+  for (const std::string& remark : source->remarks()) report.remark(remark);
 
+  HoldingWriter writer(out, sequence.name);
+  Frame frame;
+  bool first = true;
+  size_t left_out = 0;
   int64_t at = 0;  // of the source, the frame that next() gives
-  size_t fewest = 0, most = 0;
-  Points points;
   const int64_t count = clock.count();
   for (int64_t k = 0; k < count; ++k) {
     for (; at < clock.source(k); ++at) source->skip();
     if (at == clock.source(k)) {  // else the frame before, once more
-      Frame frame = *source->next();
+      frame = *source->next();
       ++at;
-      check_count(frame);
-      if (k == 0) check_size(frame, options.scale, report);
+      left_out += frame.left_out;
+      if (first && frame.points.size() >= kFewest) check_size(frame, options.scale, report);
       convert(frame, to_ours);
-      points = std::move(frame.points);
-      if (k == 0) report.fact("size", size_fact(points));
-      fewest = k == 0 ? points.size() : std::min(fewest, points.size());
-      most = std::max(most, points.size());
+      if (first && frame.points.size() >= kFewest) {
+        report.fact("size", size_fact(frame.points));
+        first = false;
+      }
     }
-    out.append(points);
+    writer.push(frame.points, frame.source);
   }
-  out.end_sequence();
-  report.fact("points", fewest == most ? std::to_string(most) : cat(fewest, " to ", most));
+  if (left_out > 0)
+    report.remark(cat("left out ", left_out, left_out == 1 ? " point" : " points",
+                      " whose coordinates are NaN or infinite"));
+  writer.finish(report);
   return count;
 }
 

@@ -1,4 +1,6 @@
 // The frames of an AMC file; its skeleton is in asf.cpp.
+#include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "autograd/base/nearest.h"
@@ -48,12 +50,11 @@ class AmcParser {
  private:
   void begin_frame() {
     if (!amc_.frames.empty()) end_frame();
-    const double number = lines_.number(lines_.words()[0]);
-    if (!amc_.frames.empty() && number != number_ + 1)
-      lines_.fail(cat("frame ", lines_.words()[0].substr(0, 20), " follows frame ",
-                      static_cast<long long>(number_)),
-                  "give the whole recording, frame by frame");
-    number_ = number;
+    const auto number = static_cast<int64_t>(lines_.number(lines_.words()[0]));
+    if (!amc_.frames.empty() && number <= amc_.numbers.back())
+      lines_.fail(cat("frame ", number, " follows frame ", amc_.numbers.back()),
+                  "give one recording, its frames in order");
+    amc_.numbers.push_back(number);
     amc_.frames.emplace_back(width_, 0.0);
     given_.assign(given_.size(), 0);
   }
@@ -62,7 +63,7 @@ class AmcParser {
     for (size_t b = 0; b < given_.size(); ++b)
       if (!given_[b] && !skeleton_.bones[b].freedoms.empty())
         lines_.fail(
-            cat("frame ", static_cast<long long>(number_), " lacks bone ", skeleton_.bones[b].name),
+            cat("frame ", amc_.numbers.back(), " lacks bone ", skeleton_.bones[b].name),
             "give the whole file, with its own skeleton");
   }
 
@@ -85,8 +86,13 @@ class AmcParser {
                       " freedoms"),
                   "give the ASF file that belongs to it");
     given_[bone] = 1;
-    for (size_t i = 0; i < count; ++i)
-      amc_.frames.back()[first_[bone] + i] = lines_.number(words[i + 1]);
+    for (size_t i = 0; i < count; ++i) {
+      const double value = lines_.number(words[i + 1]);
+      const AsfFreedom& freedom = skeleton_.bones[bone].freedoms[i];
+      if (bone > 0 && (!freedom || !is_rotation(*freedom)))
+        amc_.largest_unused = std::max(amc_.largest_unused, std::abs(value));
+      amc_.frames.back()[first_[bone] + i] = value;
+    }
   }
 
   WordLines lines_;
@@ -96,7 +102,6 @@ class AmcParser {
   std::vector<size_t> first_;  // value of each bone
   std::vector<uint8_t> given_;
   size_t width_ = 0;
-  double number_ = 0;
 };
 
 }  // namespace

@@ -1,17 +1,37 @@
 #include "datasets/readers/array_frames.h"
 
+#include <algorithm>
+#include <array>
+
+#include "datasets/readers/body_parameters.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/precision.h"
 #include "datasets/readers/text.h"
+#include "datasets/readers/word_lines.h"
 
 namespace restage {
 namespace {
 
-constexpr const char* kNames[] = {"points", "vertices", "verts", "v_posed"};
+/// What clouds are called, the surest first.
+constexpr std::array<std::string_view, 20> kClouds = {
+    "points",     "vertices",    "verts", "v_posed", "xyz",    "pointcloud",   "point_cloud",
+    "cloud",      "pc",          "pcl",   "pcd",     "pts",    "coords",       "positions",
+    "scan_verts", "scan_points", "scan",  "v",       "vertex", "scan_vertices"};
+/// What has the shape of a cloud and is none.
+constexpr std::array<std::string_view, 30> kOthers = {
+    "normals",  "normal",     "n",      "vn",          "colors",      "colours",  "color",    "rgb",
+    "faces",    "f",          "face",   "triangles",   "trans",       "transl",   "cam_trans", "translation",
+    "joints",   "joints3d",   "j3d",    "keypoints",   "keypoints3d", "kp3d",     "j_posed",  "velocity",
+    "v_cano",   "v_template", "uv",     "root_orient", "global_orient", "markers"};
 
-bool is_cloud(const NpyHeader& header) {
-  const size_t axes = header.shape.size();
-  return !header.is_text() && (axes == 2 || axes == 3) && header.shape.back() == 3;
+template <class Names>
+bool is_one_of(const std::string& name, const Names& names) {
+  const std::string lower = lower_case(name);
+  return std::find(names.begin(), names.end(), lower) != names.end();
+}
+
+std::optional<CloudAxes> axes_of(const NpyHeader& header) {
+  return header.is_text() ? std::nullopt : cloud_axes(header.shape);
 }
 
 /// The header of an array that may be of a kind that is not read: such a one is no cloud.
@@ -27,43 +47,66 @@ std::optional<NpyHeader> header_if_readable(const Npz& file, const std::string& 
 struct OpenArray {
   std::unique_ptr<ByteStream> in;
   NpyHeader header;
+  CloudAxes axes;
 };
 
-OpenArray open_array(const std::string& path, uint64_t max_memory) {
-  OpenArray out;
-  if (is_npz_name(path)) {
-    const Npz file(path, max_memory);
-    const std::optional<CloudArray> cloud = find_cloud(file);
-    if (!cloud)
-      throw InputError(path, "holds no points (its arrays: " + list_of(file.names()) + ")",
-                       "save an array [N, 3] or [F, N, 3] named 'points'");
-    out.in = file.open(cloud->name);
-  } else {
-    out.in = std::make_unique<FileStream>(path);
-  }
+OpenArray open_array(std::unique_ptr<ByteStream> in) {
+  OpenArray out{std::move(in), {}, {}};
   out.header = read_npy_header(*out.in);
-  if (!is_cloud(out.header))
+  const std::optional<CloudAxes> axes = axes_of(out.header);
+  if (!axes)
     throw InputError(out.in->where(),
                      "is an array " + shape_text(out.header.shape) + ", which is no cloud",
                      "give points as [N, 3] or [F, N, 3]");
+  out.axes = *axes;
+  if (out.header.count == 0 && out.axes.sequence)
+    throw InputError(out.in->where(), "holds no points", "give a cloud that has some");
+  return out;
+}
+
+CloudArray need_cloud(const Npz& file) {
+  std::optional<CloudArray> cloud = find_cloud(file);
+  if (!cloud)
+    throw InputError(file.path(), "holds no points (its arrays: " + list_of(file.names()) + ")",
+                     "save an array [N, 3] or [F, N, 3] named 'points'");
+  return *cloud;
+}
+
+/// The arrays that are the frames of a sequence, one each, as numpy.savez(*clouds) keeps clouds of
+/// unequal size (arr_0, arr_1 ...); none if these are no series.
+std::vector<std::string> series_of(const std::vector<std::string>& clouds) {
+  std::vector<std::string> out = order_folders(clouds, "").files;
+  if (out.size() != clouds.size()) out.clear();
+  return out;
+}
+
+/// What an archive has that could be its cloud, where none is named so.
+std::vector<CloudArray> unnamed_clouds(const Npz& file) {
+  std::vector<CloudArray> out;
+  for (const bool whole_numbers : {false, true}) {  // of scanners, where nothing else is there
+    for (const std::string& name : file.names()) {
+      const std::optional<NpyHeader> header = header_if_readable(file, name);
+      if (!header || is_one_of(name, kOthers)) continue;
+      const std::optional<CloudAxes> axes = axes_of(*header);
+      if (axes && (header->kind != 'f') == whole_numbers && header->kind != 'b')
+        out.push_back({name, *axes});
+    }
+    if (!out.empty()) break;
+  }
+  return out;
+}
+
+std::vector<std::string> names_of(const std::vector<CloudArray>& clouds) {
+  std::vector<std::string> out;
+  for (const CloudArray& cloud : clouds) out.push_back(cloud.name);
   return out;
 }
 
 class ArrayFrames : public FrameSource {
  public:
-  ArrayFrames(const std::string& path, const FrameOptions& options)
-      : path_(path),
-        array_(open_array(path, options.max_memory)),
-        how_(options.leave_out_non_finite ? NonFinite::mark : NonFinite::refuse) {
-    const uint64_t max_memory = options.max_memory;
-    const NpyHeader& header = array_.header;
-    const size_t axes = header.shape.size();
-    frames_ = axes == 3 ? header.shape[0] : 1;
-    points_ = header.shape[axes - 2];
-    fps_ = stated_fps(path, max_memory).value_or(kFps);
-    if (header.count == 0)
-      throw InputError(array_.in->where(), "holds no points", "give a cloud that has some");
-    if (header.fortran && axes == 3) {
+  ArrayFrames(const std::string& path, OpenArray array, double fps, uint64_t max_memory)
+      : path_(path), array_(std::move(array)), fps_(fps) {
+    if (array_.header.fortran || !array_.axes.in_order()) {
       array_.in->rewind();
       whole_.emplace(*array_.in, max_memory);
     } else if (bytes_per_frame() > max_memory) {
@@ -73,22 +116,17 @@ class ArrayFrames : public FrameSource {
   }
 
   std::optional<Frame> next() override {
-    if (at_ == frames_) return std::nullopt;
+    if (at_ == frames()) return std::nullopt;
     Frame frame;
-    frame.source = array_.header.shape.size() == 3 ? cat(path_, ":", at_) : path_;
+    frame.source = array_.axes.sequence ? cat(path_, ":", at_) : path_;
     read(frame);
     ++at_;
-    if (how_ == NonFinite::mark) {
-      frame.left_out = leave_out_non_finite(frame.points, frame.faces);
-      if (frame.points.empty())
-        throw InputError(frame.source, "holds no points but NaN and infinite ones",
-                         "leave the frame out");
-    }
+    frame.left_out = leave_out_non_finite(frame.points, frame.faces);
     check_precision(frame.points, frame.source, kSubtract);
     return frame;
   }
   void skip() override {
-    if (at_ == frames_) return;
+    if (at_ == frames()) return;
     if (!whole_) array_.in->skip(bytes_per_frame());
     ++at_;
   }
@@ -98,36 +136,68 @@ class ArrayFrames : public FrameSource {
     array_.in->rewind();
     array_.header = read_npy_header(*array_.in);
   }
-  int64_t frames() const override { return frames_; }
+  int64_t frames() const override { return array_.axes.frames; }
   double fps() const override { return fps_; }
-
- private:
-  uint64_t bytes_per_frame() const {
-    return static_cast<uint64_t>(points_) * 3 * array_.header.width;
+  std::vector<std::string> remarks() const override {
+    if (array_.axes.remark.empty()) return {};
+    return {cat("an array ", shape_text(array_.header.shape), ": ", array_.axes.remark)};
   }
 
-  /// The next frame: of the stream, where a cloud [N, 3] in Fortran order lies axis by axis.
+ private:
+  uint64_t bytes_per_frame() const { return array_.header.bytes() / static_cast<uint64_t>(frames()); }
+
   void read(Frame& frame) {
     const std::vector<char> bytes =
         whole_ ? std::vector<char>() : array_.in->take(bytes_per_frame());
     const NpyHeader& header = array_.header;
-    frame.points.resize(points_);
-    for (int64_t i = 0; i < points_; ++i)
+    const CloudAxes& axes = array_.axes;
+    frame.points.resize(axes.points);
+    for (int64_t i = 0; i < axes.points; ++i)
       for (int axis = 0; axis < 3; ++axis) {
-        const int64_t element = header.fortran ? axis * points_ + i : 3 * i + axis;
-        const double value = whole_ ? (*whole_)[3 * (at_ * points_ + i) + axis]
-                                    : header.number(bytes.data() + element * header.width);
-        frame.points[i][axis] = text::coordinate(
-            value, [&] { return cat(frame.source, ": point ", i); }, how_);
+        const double value =
+            whole_ ? (*whole_)[axes.at(at_, i, axis)]
+                   : header.number(bytes.data() + axes.at(0, i, axis) * static_cast<int64_t>(header.width));
+        frame.points[i][axis] =
+            text::coordinate(value, [&] { return frame.source; }, NonFinite::mark);
       }
   }
 
   std::string path_;
   OpenArray array_;
-  NonFinite how_;
+  double fps_;
   std::optional<NpyArray> whole_;
-  int64_t frames_ = 0, points_ = 0, at_ = 0;
-  double fps_ = kFps;
+  int64_t at_ = 0;
+};
+
+/// Arrays of an archive, a frame each.
+class SeriesFrames : public FrameSource {
+ public:
+  SeriesFrames(Npz file, std::vector<std::string> names, double fps, uint64_t max_memory)
+      : file_(std::move(file)), names_(std::move(names)), fps_(fps), max_memory_(max_memory) {}
+
+  std::optional<Frame> next() override {
+    if (at_ == std::ssize(names_)) return std::nullopt;
+    const std::string& name = names_[static_cast<size_t>(at_++)];
+    std::optional<Frame> frame =
+        ArrayFrames(file_.path(), open_array(file_.open(name)), fps_, max_memory_).next();
+    frame->source = cat(file_.path(), ":", name);
+    return frame;
+  }
+  void skip() override { at_ = std::min(at_ + 1, frames()); }
+  void rewind() override { at_ = 0; }
+  int64_t frames() const override { return std::ssize(names_); }
+  double fps() const override { return fps_; }
+  std::vector<std::string> remarks() const override {
+    return {cat("its ", names_.size(), " arrays, ", text::quote(names_[0]), " to ",
+                text::quote(names_.back()), ", are the frames of a sequence")};
+  }
+
+ private:
+  Npz file_;
+  std::vector<std::string> names_;
+  double fps_;
+  uint64_t max_memory_;
+  int64_t at_ = 0;
 };
 
 }  // namespace
@@ -136,62 +206,82 @@ bool is_npz_name(const std::string& path) { return text::ends_in(path, {".npz"})
 
 bool is_array_name(const std::string& path) { return text::ends_in(path, {".npy", ".npz"}); }
 
-std::optional<CloudArray> find_cloud(const Npz& file) {
-  const auto cloud = [](const std::string& name, const NpyHeader& header) {
-    return CloudArray{name, header.shape.size() == 3};
-  };
-  for (const char* name : kNames)
-    if (file.has(name)) {
+std::optional<CloudArray> named_cloud(const Npz& file) {
+  for (const std::string_view wanted : kClouds)
+    for (const std::string& name : file.names()) {
+      if (lower_case(name) != wanted) continue;
       const NpyHeader header = file.header(name);
-      if (is_cloud(header)) return cloud(name, header);
+      if (const auto axes = axes_of(header)) return CloudArray{name, *axes};
     }
-  if (file.has("poses") && file.has("trans"))
-    throw InputError(file.path(), "is a motion in AMASS's format, not a scan",
-                     "import it with restage data import");
-  std::optional<CloudArray> found;
-  std::vector<std::string> several;
-  for (const std::string& name : file.names()) {
-    const std::optional<NpyHeader> header = header_if_readable(file, name);
-    if (!header || header->kind != 'f' || !is_cloud(*header)) continue;
-    found = cloud(name, *header);
-    several.push_back(name);
-  }
-  if (several.size() > 1)
-    throw InputError(file.path(), "holds several arrays of points: " + list_of(several),
+  return std::nullopt;
+}
+
+std::optional<CloudArray> find_cloud(const Npz& file) {
+  if (auto cloud = named_cloud(file)) return cloud;
+  if (body_parameters(file).moves())
+    throw InputError(file.path(), "is a motion of a body model (as AMASS has them), not a scan",
+                     "restage data import FILE --body-model MODEL --out M.h5, then restage data "
+                     "perform --motions M.h5 makes clouds of it");
+  const std::vector<CloudArray> found = unnamed_clouds(file);
+  if (found.empty()) return std::nullopt;
+  if (found.size() == 1) return found[0];
+  const bool single = std::none_of(found.begin(), found.end(),
+                                   [](const CloudArray& cloud) { return cloud.axes.sequence; });
+  const std::vector<std::string> series = single ? series_of(names_of(found)) : std::vector<std::string>();
+  if (series.empty())
+    throw InputError(file.path(), "holds several arrays of points: " + list_of(names_of(found)),
                      "name the right one 'points'");
-  return found;
+  CloudArray out = found[0];
+  out.name.clear();
+  out.axes.sequence = true;
+  out.axes.frames = std::ssize(series);
+  return out;
 }
 
 std::optional<CloudArray> find_cloud(const std::string& path, uint64_t max_memory) {
   if (is_npz_name(path)) return find_cloud(Npz(path, max_memory));
   FileStream in(path);
-  const NpyHeader header = read_npy_header(in);
-  if (!is_cloud(header)) return std::nullopt;
-  return CloudArray{"", header.shape.size() == 3};
+  const std::optional<CloudAxes> axes = axes_of(read_npy_header(in));
+  if (!axes) return std::nullopt;
+  return CloudArray{"", *axes};
 }
 
 std::optional<double> stated_fps(const std::string& path, uint64_t max_memory) {
   if (!is_npz_name(path)) return std::nullopt;
   const Npz file(path, max_memory);
-  if (!file.has("fps")) return std::nullopt;
-  const NpyArray fps = file.array("fps");
-  if (fps.is_text() || fps.size() != 1 || !(fps[0] >= 1 && fps[0] <= 1000))
-    throw InputError(path + ":fps", "is no frame rate", "store one number from 1 to 1000");
-  return fps[0];
+  for (const char* name : {"fps", "frame_rate", "framerate"}) {
+    if (!file.has(name)) continue;
+    const NpyArray fps = file.array(name);
+    if (fps.is_text() || fps.size() != 1 || !(fps[0] >= 1 && fps[0] <= 1000))
+      throw InputError(path + ":" + name, "is no frame rate", "store one number from 1 to 1000");
+    return fps[0];
+  }
+  return std::nullopt;
 }
 
 std::unique_ptr<FrameSource> open_array_frames(const std::string& path,
                                                const FrameOptions& options) {
-  return std::make_unique<ArrayFrames>(path, options);
+  const uint64_t max_memory = options.max_memory;
+  const double fps = stated_fps(path, max_memory).value_or(kFps);
+  if (!is_npz_name(path))
+    return std::make_unique<ArrayFrames>(path, open_array(std::make_unique<FileStream>(path)), fps,
+                                         max_memory);
+  Npz file(path, max_memory);
+  const CloudArray cloud = need_cloud(file);
+  std::vector<std::string> series;
+  if (cloud.name.empty()) series = series_of(names_of(unnamed_clouds(file)));
+  if (!series.empty())
+    return std::make_unique<SeriesFrames>(std::move(file), std::move(series), fps, max_memory);
+  return std::make_unique<ArrayFrames>(path, open_array(file.open(cloud.name)), fps, max_memory);
 }
 
 Frame read_array_frame(const std::string& path, const FrameOptions& options) {
-  ArrayFrames frames(path, options);
-  if (frames.frames() != 1)
+  const std::unique_ptr<FrameSource> frames = open_array_frames(path, options);
+  if (frames->frames() != 1)
     throw InputError(path,
-                     cat("is a sequence of ", frames.frames(), " frames where one frame belongs"),
+                     cat("is a sequence of ", frames->frames(), " frames where one frame belongs"),
                      "give this file by itself");
-  return *frames.next();
+  return *frames->next();
 }
 
 }  // namespace restage

@@ -1,15 +1,17 @@
-// Clouds in NPY and NPZ arrays.
+// Clouds in NPY and NPZ arrays, as cloud_axes.h says which shapes are.
 //
-// An NPZ may hold other things too. Its cloud is the array named points, vertices, verts or v_posed
-// (CAPE's name for a posed frame; it includes the translation), in this order; without one of these
-// names, the only array of floating-point numbers shaped [N, 3] or [F, N, 3]. A number `fps` beside
-// it is the sequence's frame rate.
+// An NPZ may hold other things too. Its cloud is the array that is named so (points, vertices,
+// verts, v_posed, which is CAPE's name of a posed frame, xyz, cloud and the like; case does not
+// matter); without such a name, the only array that has the shape of a cloud, which no array is that
+// is known to be something else (normals, colours, joints, the parameters of a body model). A number
+// `fps` beside it is the sequence's frame rate.
 #pragma once
 
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "datasets/readers/cloud_axes.h"
 #include "datasets/readers/frame_folder.h"
 #include "datasets/readers/npz.h"
 
@@ -20,12 +22,14 @@ bool is_array_name(const std::string& path);
 bool is_npz_name(const std::string& path);
 
 struct CloudArray {
-  std::string name;       ///< empty for an NPY file
-  bool sequence = false;  ///< [F, N, 3] rather than [N, 3]
+  std::string name;  ///< empty for an NPY file
+  CloudAxes axes;
 };
 
+/// The cloud that is named so; nothing if there is none.
+std::optional<CloudArray> named_cloud(const Npz& file);
 /// The cloud of an NPZ; nothing if it has none. InputError if there are several to choose from, or
-/// it is a motion of AMASS.
+/// it is a motion of a body model.
 std::optional<CloudArray> find_cloud(const Npz& file);
 /// The same of an NPY or NPZ file.
 std::optional<CloudArray> find_cloud(const std::string& path, uint64_t max_memory = kMaxMemory);
@@ -33,9 +37,9 @@ std::optional<CloudArray> find_cloud(const std::string& path, uint64_t max_memor
 /// The frame rate that an array file states, if it does.
 std::optional<double> stated_fps(const std::string& path, uint64_t max_memory = kMaxMemory);
 
-/// One frame [N, 3] or a sequence [F, N, 3], frame by frame in constant memory (in Fortran order:
-/// all at once, as one frame is then spread over the whole file). InputError: no cloud, no points,
-/// NaN, see npz.h.
+/// One frame or a sequence, frame by frame in constant memory (all at once where a frame is spread
+/// over the whole file: Fortran order, frames last). Points that are NaN or infinite are left out.
+/// InputError: no cloud, no points at all, see npz.h.
 std::unique_ptr<FrameSource> open_array_frames(const std::string& path,
                                                const FrameOptions& options = {});
 

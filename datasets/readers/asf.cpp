@@ -32,14 +32,15 @@ Quat in_order(const std::array<Channel, 3>& axes, const Vec3& degrees) {
   return out;
 }
 
-Channel freedom(const WordLines& lines, std::string_view word, bool may_move) {
+AsfFreedom freedom(const WordLines& lines, std::string_view word) {
   constexpr std::pair<std::string_view, Channel> kNames[] = {
       {"rx", Channel::x_rotation}, {"ry", Channel::y_rotation}, {"rz", Channel::z_rotation},
       {"tx", Channel::x_position}, {"ty", Channel::y_position}, {"tz", Channel::z_position}};
   for (const auto& [name, channel] : kNames)
-    if (same_word(word, name) && (may_move || is_rotation(channel))) return channel;
+    if (same_word(word, name)) return channel;
+  if (same_word(word, "l")) return std::nullopt;
   lines.fail("'" + WordLines::quoted(word) + "' is no freedom of a bone",
-             may_move ? "use TX, TY, TZ, RX, RY, RZ" : "use rx, ry, rz: bones of a person turn");
+             "use TX, TY, TZ, RX, RY, RZ or L");
 }
 
 /// ASF sections are lines ":name"; inside, bones and the hierarchy stand between begin and end.
@@ -93,7 +94,7 @@ class AsfParser {
     AsfBone& bone = asf_.bones[0];
     if (same_word(words()[0], "order")) {
       bone.freedoms.clear();
-      for (size_t i = 1; i < words().size(); ++i) add_freedom(bone, words()[i], true);
+      for (size_t i = 1; i < words().size(); ++i) add_freedom(bone, words()[i]);
     } else if (same_word(words()[0], "axis") && words().size() > 1) {
       asf_.root_axes = axis_order(lines_, words()[1]);
     } else if (same_word(words()[0], "position")) {
@@ -103,11 +104,11 @@ class AsfParser {
     }
   }
 
-  void add_freedom(AsfBone& bone, std::string_view word, bool may_move) {
-    const Channel channel = freedom(lines_, word, may_move);
-    if (std::find(bone.freedoms.begin(), bone.freedoms.end(), channel) != bone.freedoms.end())
+  void add_freedom(AsfBone& bone, std::string_view word) {
+    const AsfFreedom one = freedom(lines_, word);
+    if (std::find(bone.freedoms.begin(), bone.freedoms.end(), one) != bone.freedoms.end())
       lines_.fail("a freedom given twice for one bone", "keep one");
-    bone.freedoms.push_back(channel);
+    bone.freedoms.push_back(one);
   }
 
   void bone_line() {
@@ -142,7 +143,7 @@ class AsfParser {
           axis_order(lines_, words().size() > 4 ? words()[4] : std::string_view("XYZ"));
       bone.axis = in_order(order, asf_.radians ? Vec3(angles * kDegrees) : angles);
     } else if (key == "dof") {
-      for (size_t i = 1; i < words().size(); ++i) add_freedom(bone, words()[i], false);
+      for (size_t i = 1; i < words().size(); ++i) add_freedom(bone, words()[i]);
     } else if (key == "limits" || in_limits_) {
       in_limits_ = true;
       limits(bone, key == "limits" ? 1 : 0);
@@ -273,15 +274,16 @@ std::vector<Quat> asf_pose(const AsfFile& asf, const std::vector<double>& values
   for (const AsfBone& bone : asf.bones) {
     Quat turn = Quat::Identity();
     Vec3 root_angles = Vec3::Zero();
-    for (const Channel channel : bone.freedoms) {
+    for (const AsfFreedom& freedom : bone.freedoms) {
       const double value = values[next++];
-      if (!is_rotation(channel)) {
-        position[axis_of(channel)] += value;
+      if (!freedom || (!is_rotation(*freedom) && bone.parent >= 0)) continue;
+      if (!is_rotation(*freedom)) {
+        position[axis_of(*freedom)] += value;
         continue;
       }
       const double degrees = radians ? value * kDegrees : value;
-      root_angles[axis_of(channel)] = degrees;
-      turn = channel_rotation(channel, degrees) * turn;
+      root_angles[axis_of(*freedom)] = degrees;
+      turn = channel_rotation(*freedom, degrees) * turn;
     }
     if (bone.parent < 0) turn = in_order(asf.root_axes, root_angles);
     out.push_back(bone.axis * turn * bone.axis.conjugate());

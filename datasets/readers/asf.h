@@ -4,6 +4,8 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,6 +14,9 @@
 
 namespace restage {
 
+/// What a value of an AMC file does to its bone: a channel, or (nothing) its length.
+using AsfFreedom = std::optional<Channel>;
+
 struct AsfBone {
   std::string name;
   int parent = -1;                ///< a bone that comes before; bone 0 is the root
@@ -19,8 +24,9 @@ struct AsfBone {
   double length = 0;              ///< file units
   Quat axis = Quat::Identity();   ///< its own frame against the world's
   /// Freedoms in the order of their values; rotations are about the axes of its own frame, the
-  /// first applied first. Only the root moves.
-  std::vector<Channel> freedoms;
+  /// first applied first. Only the root's positions are used: of other bones positions and length
+  /// (`dof tx`, `dof l`) are read and left unused, as bones of a person keep their length.
+  std::vector<AsfFreedom> freedoms;
   std::vector<std::array<double, 2>> limits;  ///< least and most of each freedom, if the file says
 };
 
@@ -37,6 +43,8 @@ struct AsfFile {
 struct AmcFile {
   /// The values of all freedoms of all bones, bones in the skeleton's order; as in the file.
   std::vector<std::vector<double>> frames;
+  std::vector<int64_t> numbers;  ///< of the frames, rising; where some are lacking, by more than one
+  double largest_unused = 0;     ///< of the values that move or stretch other bones than the root
   bool radians = false;
 };
 
@@ -45,7 +53,7 @@ struct AmcFile {
 AsfFile parse_asf(std::string_view text, const std::string& path);
 
 /// InputError with file:line: not AMC, not finite, a bone that the skeleton lacks or a frame that
-/// lacks a bone, wrong counts, frame numbers that do not rise by one.
+/// lacks a bone, wrong counts, frame numbers that do not rise.
 AmcFile parse_amc(std::string_view text, const std::string& path, const AsfFile& skeleton);
 
 /// The skeleton: every bone a joint at its start, its end site at its end.

@@ -7,28 +7,34 @@
 #include <vector>
 
 #include "datasets/readers/byte_stream.h"
+#include "datasets/readers/frame_names.h"
 #include "nn/geometry/body.h"
 
 namespace restage {
 
 struct Frame {
   std::string source;           ///< file, or "file:frame number" (from 0) where it holds several
-  Points points;                ///< metres; the number may change from frame to frame
+  Points points;                ///< metres; the number may change from frame to frame, and be 0
   std::vector<Triangle> faces;  ///< empty for a cloud
   int64_t sequence = 0;         ///< which sequence of an HDF5 file it belongs to
   size_t left_out = 0;          ///< points that were NaN or infinite
+  int64_t number = -1;          ///< by its file's name (FrameList::numbers); -1: none
+  int64_t missing = 0;  ///< frames without a point just before it (without_empty_frames())
 };
 
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
-  /// The next frame, nothing at the end. InputError for a bad frame (also: no points, NaN).
+  /// The next frame, nothing at the end. Points that are NaN or infinite are left out and counted;
+  /// a frame that shows nothing has no points. InputError for a bad frame.
   virtual std::optional<Frame> next() = 0;
   virtual void skip() { next(); }      ///< leaves one frame out, reading as little as it can
   virtual void rewind() = 0;           ///< next() gives the first frame again
   virtual int64_t frames() const = 0;  ///< how many there are in all
   virtual int64_t sequences() const { return 1; }
   virtual double fps() const = 0;  ///< the file's rate; kFps where nothing says one
+  /// What the user should know of the whole: files that were left out, how axes were taken.
+  virtual std::vector<std::string> remarks() const { return {}; }
 };
 
 struct FrameOptions {
@@ -36,25 +42,27 @@ struct FrameOptions {
   uint64_t max_memory = kMaxMemory;  ///< what unpacking an array may take
   std::optional<int64_t> sequence =
       std::nullopt;  ///< only this one, from 0; else all, one after the other
-  /// Of meshes and arrays: points that are NaN or infinite are left out instead of refused.
-  bool leave_out_non_finite = false;
 };
 
-/// A folder of numbered PLY, OBJ or glTF files (natural numeric order: f2 before f10; other files
-/// are left out), one PLY/OBJ file, an HDF5 file of scans or predictions (their vertices), a glTF
-/// file (its surface performing an animation at 30 fps, or at rest if it has none), or arrays of
-/// points, NPY or NPZ (array_frames.h): one of shape [N, 3] or [F, N, 3], or, without meshes beside
-/// them, a folder of [N, 3]. InputError if there is nothing to read, or a clip or sequence is named
-/// that is not there.
+/// A folder of numbered files of one frame each (PLY, OBJ, PCD, tables of points, glTF, arrays; in
+/// the order and with the choice of order_frames()), or of numbered folders with one such file in
+/// each; one such file; an HDF5 file (hdf5_frames.h); a glTF file (its surface performing an
+/// animation at 30 fps, or at rest if it has none); arrays of points, NPY or NPZ (array_frames.h).
+/// Of a frame that is there as several kinds of files one is taken. InputError if there is nothing
+/// to read, or a clip or sequence is named that is not there.
 std::unique_ptr<FrameSource> open_frames(const std::string& path, const FrameOptions& options = {});
 
-/// The files of a folder that are its frames, in order; empty if it has none.
+/// All files of a folder that could be frames, in natural order.
 std::vector<std::string> frame_files(const std::string& folder);
-/// These files (PLY, OBJ, glTF, arrays [N, 3]) as the frames of one sequence.
-std::unique_ptr<FrameSource> open_frame_files(std::vector<std::string> files,
-                                              const FrameOptions& options = {});
+/// The files of a folder that are its frames; none if it has none. InputError as order_frames().
+FrameList frame_list(const std::string& folder);
+/// The frames of a folder of numbered folders that hold one frame each; none for other folders.
+FrameList folder_a_frame(const std::string& folder);
+/// These files as the frames of one sequence.
+std::unique_ptr<FrameSource> open_frame_list(FrameList list, const FrameOptions& options = {});
 
-/// f2 < f10: runs of digits compare as numbers, everything else by character.
-bool natural_less(const std::string& a, const std::string& b);
+/// The same frames but for those that show nothing, which are counted in the next one's `missing`.
+/// frames() still counts all.
+std::unique_ptr<FrameSource> without_empty_frames(std::unique_ptr<FrameSource> all);
 
 }  // namespace restage

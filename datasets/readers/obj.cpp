@@ -15,8 +15,7 @@ Point parse_vertex(std::string_view line, const Vec3& origin, NonFinite how, con
     double value = 0;
     if (word.empty())
       throw InputError(where(), "a vertex has fewer than 3 coordinates", "export the file again");
-    if (!text::parse(word, value))
-      throw InputError(where(), text::quote(word) + " is no number", "export the file again");
+    if (!text::parse(word, value)) text::throw_no_number(word, where());
     point[axis] = text::coordinate(value - origin[axis], where, how);
   }
   return point;
@@ -77,7 +76,7 @@ Mesh parse_obj(std::string_view content, const std::string& path, const Vec3& or
   std::vector<int32_t> corners;
   while (lines.next(line)) {
     const std::string_view keyword = text::take_word(line);
-    if (keyword != "v" && keyword != "f") continue;  // normals, groups, materials, comments
+    if (keyword != "v" && keyword != "f") continue;  // normals, groups, lines, comments
     const auto where = [&] { return cat(path, ":", lines.number()); };
     if (keyword == "v") {
       mesh.vertices.push_back(parse_vertex(line, origin, how, where));
@@ -87,8 +86,6 @@ Mesh parse_obj(std::string_view content, const std::string& path, const Vec3& or
     for (std::string_view word = text::take_word(line); !word.empty() && word[0] != '#';
          word = text::take_word(line))
       corners.push_back(parse_corner(word, mesh.vertices.size(), where));
-    if (corners.size() < 3)
-      throw InputError(where(), "a face has fewer than 3 corners", "export the file again");
     text::add_fan(corners, corners.size(), mesh.faces);
   }
   return mesh;

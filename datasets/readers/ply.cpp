@@ -5,6 +5,7 @@
 #include "datasets/readers/mesh_parsers.h"
 #include "datasets/readers/numbers.h"
 #include "datasets/readers/text.h"
+#include "datasets/readers/word_lines.h"
 
 namespace restage {
 namespace {
@@ -39,7 +40,8 @@ const Number* number_named(std::string_view name) {
       {"char", "int8", &kNumber<int8_t>},    {"uchar", "uint8", &kNumber<uint8_t>},
       {"short", "int16", &kNumber<int16_t>}, {"ushort", "uint16", &kNumber<uint16_t>},
       {"int", "int32", &kNumber<int32_t>},   {"uint", "uint32", &kNumber<uint32_t>},
-      {"float", "float32", &kNumber<float>}, {"double", "float64", &kNumber<double>}};
+      {"float", "float32", &kNumber<float>}, {"double", "float64", &kNumber<double>},
+      {"int64", "int64", &kNumber<int64_t>}, {"uint64", "uint64", &kNumber<uint64_t>}};
   for (const Named& known : kNames)
     if (name == known.old_name || name == known.name) return known.type;
   return nullptr;
@@ -175,8 +177,7 @@ class Rows {
     double value = 0;
     if (word.empty())
       throw InputError(where(), "has fewer values than the header says", kExportAgain);
-    if (!text::parse(word, value))
-      throw InputError(where(), text::quote(word) + " is no number", kExportAgain);
+    if (!text::parse(word, value)) text::throw_no_number(word, where());
     return value;
   }
 
@@ -212,11 +213,8 @@ void read_vertices(Rows& rows, const Element& element, const std::string& path, 
   std::array<int, 3> axis_seen = {0, 0, 0};
   std::vector<int> axis_of;  // for each property: 0, 1, 2 or -1
   for (const Property& p : element.properties) {
-    axis_of.push_back(p.count         ? -1
-                      : p.name == "x" ? 0
-                      : p.name == "y" ? 1
-                      : p.name == "z" ? 2
-                                      : -1);
+    const size_t axis = p.count ? std::string::npos : std::string("xyz").find(lower_case(p.name));
+    axis_of.push_back(p.name.size() == 1 && axis < 3 ? static_cast<int>(axis) : -1);
     if (axis_of.back() >= 0) ++axis_seen[axis_of.back()];
   }
   if (axis_seen != std::array<int, 3>{1, 1, 1})
@@ -250,7 +248,6 @@ void read_faces(Rows& rows, const Element& element, std::vector<Triangle>& faces
         continue;
       }
       const size_t n = rows.next_length(p);
-      if (n < 3) throw InputError(rows.where(), "a face has fewer than 3 corners", kExportAgain);
       corners.clear();
       for (size_t k = 0; k < n; ++k) {
         const double index = rows.next(*p.type);

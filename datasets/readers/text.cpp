@@ -11,14 +11,6 @@ namespace {
 
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f' || c == '\r'; }
 
-template <class T>
-bool parse_whole(std::string_view word, T& value) {
-  if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
-  const std::from_chars_result result =
-      std::from_chars(word.data(), word.data() + word.size(), value);
-  return result.ec == std::errc() && result.ptr == word.data() + word.size();
-}
-
 }  // namespace
 
 bool Lines::next(std::string_view& line) {
@@ -48,8 +40,29 @@ std::string_view take_word(std::string_view& line) {
   return word;
 }
 
-bool parse(std::string_view word, double& value) { return parse_whole(word, value); }
-bool parse(std::string_view word, int64_t& value) { return parse_whole(word, value); }
+bool parse(std::string_view word, double& value) {
+  if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
+  const char* end = word.data() + word.size();
+  const std::from_chars_result result = std::from_chars(word.data(), end, value);
+  if (result.ec == std::errc() && result.ptr == end) return true;
+  const std::string lower = lower_case(word);
+  // Older Windows programs write 1.#QNAN, -1.#IND00 and 1.#INF; rounded to few digits 1.#R and 1.#J.
+  const bool windows = lower.starts_with("1.#") || lower.starts_with("-1.#");
+  // A number that no double holds is nearly zero, or beyond all bounds.
+  const bool unheld = result.ec == std::errc::result_out_of_range && result.ptr == end;
+  if (!windows && !unheld) return false;
+  value = unheld && lower.find("e-") != std::string::npos ? 0.0
+          : unheld || lower.find("inf") != std::string::npos
+              ? std::numeric_limits<double>::infinity()
+              : std::numeric_limits<double>::quiet_NaN();
+  return true;
+}
+bool parse(std::string_view word, int64_t& value) {
+  if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
+  const char* end = word.data() + word.size();
+  const std::from_chars_result result = std::from_chars(word.data(), end, value);
+  return result.ec == std::errc() && result.ptr == end;
+}
 
 bool ends_in(std::string_view name, std::initializer_list<std::string_view> endings) {
   const std::string lower = lower_case(name);
@@ -103,9 +116,24 @@ std::string quote(std::string_view word) {
   return cat("'", shown, shown.size() < word.size() && word.size() > 40 ? "...'" : "'");
 }
 
+bool has_decimal_comma(std::string_view word) {
+  const size_t comma = word.find(',');
+  double value = 0;
+  if (comma == std::string_view::npos) return false;
+  std::string with_point(word);
+  with_point[comma] = '.';
+  return comma + 1 < word.size() && parse(with_point, value);
+}
+
+void throw_no_number(std::string_view word, const std::string& where) {
+  throw InputError(where, quote(word) + " is no number",
+                   has_decimal_comma(word) ? "write decimals with points, not with commas"
+                                           : "export the file again");
+}
+
 void throw_no_coordinate(double value, const std::string& where) {
   throw InputError(where, std::isnan(value) ? "a coordinate is NaN" : "a coordinate is infinite",
-                   "export the file again with finite coordinates");
+                   "restage doctor FILE --fix OUT leaves such points out");
 }
 
 }  // namespace restage::text

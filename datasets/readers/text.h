@@ -30,7 +30,8 @@ std::string_view without_mark(std::string_view content, const std::string& path)
 
 /// Cuts the next word off `line`; empty at its end.
 std::string_view take_word(std::string_view& line);
-/// The whole word as a number (nan and inf count as numbers), independent of the locale.
+/// The whole word as a number, independent of the locale. NaN and infinity count as numbers, in all
+/// spellings (nan, -nan(ind), inf, 1.#QNAN, -1.#IND).
 bool parse(std::string_view word, double& value);
 bool parse(std::string_view word, int64_t& value);
 /// Whether the name ends in one of these (lower case), whatever its own case is.
@@ -43,6 +44,10 @@ bool may_be_shift_jis(std::string_view text);
 /// A short, printable copy for messages.
 std::string quote(std::string_view word);
 
+/// Whether it is a number whose decimals begin with a comma: "0,5".
+bool has_decimal_comma(std::string_view word);
+/// InputError for a word where a number belongs.
+[[noreturn]] void throw_no_number(std::string_view word, const std::string& where);
 [[noreturn]] void throw_no_coordinate(double value, const std::string& where);
 /// One coordinate as float; if it is NaN, infinite or beyond float, NaN or InputError at `where()`.
 template <class Where>

@@ -102,8 +102,8 @@ void add_data_import(Program& program, CommandOptions group) {
   app.add_option(
          "SOURCE", given.source,
          "data folder; recording (.bvh, .amc; also .xz); character (.glb, .gltf, .vrm, .vrma); "
-         "AMASS motion or body model (.npz); scans (.ply, .obj, .npy, .npz); or a folder "
-         "of one kind")
+         "AMASS motion or body model (.npz); scans (.ply, .obj, .pcd, .xyz, .csv, .npy, .npz, "
+         ".h5); or a folder of one kind")
       .required();
   app.add_option("--out", given.out, "file to write").required();
   app.add_option("--license", options.license, "licence of the files");

@@ -15,7 +15,9 @@
 #include "datasets/importers/amc.h"
 #include "datasets/importers/bvh.h"
 #include "datasets/importers/gltf_character.h"
+#include "datasets/readers/foreign_kinds.h"
 #include "datasets/readers/frame_folder.h"
+#include "datasets/readers/hdf5_frames.h"
 #include "datasets/readers/mesh_io.h"
 #include "datasets/readers/precision.h"
 #include "datasets/schema.h"
@@ -139,8 +141,9 @@ Report examine_mesh(const Options& options) {
 
 Report examine_sequence(const Options& options) {
   Report out("frames");
-  auto source = open_frames(
-      options.path, {.clip = "", .max_memory = options.max_memory, .leave_out_non_finite = true});
+  auto source = without_empty_frames(
+      open_frames(options.path, {.clip = "", .max_memory = options.max_memory}));
+  const std::vector<std::string> remarks = source->remarks();
   Diagnosis d = examine_frames(*source, examine_options(options));
   out.facts["frames"] = d.frames;
   out.facts["fps"] = d.fps;
@@ -148,6 +151,8 @@ Report examine_sequence(const Options& options) {
   out.facts["most_points"] = d.most_points;
   if (d.faces > 0) out.facts["faces"] = d.faces;
   out.findings = d.findings;
+  for (const std::string& remark : remarks)
+    out.findings.push_back({"remark", Weight::note, remark, 1, "", ""});
   out.diagnosis = std::move(d);
   out.subject = {options.path, std::nullopt, std::move(source), std::nullopt, ""};
   return out;
@@ -215,6 +220,7 @@ std::vector<Joints> some_joints(const PredictionReader& data) {
 
 Report examine_hdf5(const Options& options) {
   const std::string& path = options.path;
+  if (is_foreign_hdf5(path)) return examine_sequence(options);
   const Inspection found = inspect(path);
   // A foreign unit is the first problem that verify() names; here it is a finding.
   const bool foreign =
@@ -301,8 +307,10 @@ struct Kind {
 const Kind kKinds[] = {
     {"\x89HDF\r\n", {}, examine_hdf5},
     {"ply", {}, examine_mesh},
-    {"", {".ply", ".obj"}, examine_mesh},
-    {"", {".h5", ".hdf5"}, examine_hdf5},
+    {"",
+     {".ply", ".obj", ".pcd", ".xyz", ".xyzn", ".xyzrgb", ".pts", ".asc", ".txt", ".csv"},
+     examine_mesh},
+    {"", {".h5", ".hdf5", ".hdf", ".he5"}, examine_hdf5},
     {"", {".bvh", ".bvh.xz", ".amc", ".amc.xz"}, examine_recording},
     {"", {".glb", ".gltf", ".vrm"}, examine_character},
     {"", {".npz", ".npy"}, examine_sequence},
@@ -322,6 +330,7 @@ Report examine(const Options& options) {
         (kind.endings.empty() || std::any_of(kind.endings.begin(), kind.endings.end(), named)))
       return kind.examine(options);
   }
+  refuse_foreign_kind(path);
   throw InputError(
       path, "is of no kind that is known here",
       "give HDF5, PLY, OBJ, glTF, BVH, AMC, NPY, NPZ, safetensors, YAML or a folder of frames");

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "autograd/base/format.h"
+#include "autograd/base/log.h"
 #include "autograd/base/output_check.h"
 #include "autograd/kernels/kernel.h"
 #include "datasets/readers/frame_folder.h"
@@ -53,7 +54,8 @@ void write(const Joints& joints, const Radius& radius, PredictionWriter* to) {
 std::vector<std::string> inputs_of(const SkeletonOptions& options) {
   std::vector<std::string> out = {options.input};
   std::error_code ignored;
-  if (std::filesystem::is_directory(options.input, ignored)) out = frame_files(options.input);
+  if (std::filesystem::is_directory(options.input, ignored))
+    for (const std::string& file : frame_files(options.input)) out.push_back(file);
   out.push_back(weights_path(options.weights));
   return out;
 }
@@ -75,7 +77,9 @@ int run_skeleton(const SkeletonOptions& options, const Common& common) {
   // The same points give the same joints wherever they stand, so every frame has the same key.
   const RngKey key = RngKey{common.seed, 0}.fold("skeleton");
   JointExtractor extract(model, options.samples);
+  size_t left_out = 0;
   while (const auto frame = frames->next()) {
+    left_out += frame->left_out;
     const SeenJoints seen = extract(frame->points, frame->source, key);
     const auto radius = radius_of(seen);
     if (writer) write(seen.joints, radius, writer.get());
@@ -87,6 +91,10 @@ int run_skeleton(const SkeletonOptions& options, const Common& common) {
     }
   }
   if (writer) writer->commit();
+  for (const std::string& remark : frames->remarks()) log_info(options.input + ": " + remark);
+  if (left_out > 0)
+    log_info(options.input + ": left out " + std::to_string(left_out) +
+             " points whose coordinates are NaN or infinite");
   if (common.json) {
     print_json({{"frames", list}, {"seed", common.seed}});
   } else {

@@ -70,6 +70,24 @@ TEST(DoctorSequence, MissingFramesByNumberAndByMotion) {
   EXPECT_TRUE(notes(examine_frames(jumping), "missing frames", "jumps before frame 15"));
 }
 
+/// A frame without a point is a missing frame, whether or not names count.
+TEST(DoctorSequence, EmptyFramesAreMissingFrames) {
+  for (const bool named : {false, true}) {
+    std::vector<Points> frames = performance(30);
+    std::vector<std::string> names;
+    for (int i = 0; i < 30; ++i) names.push_back("f" + std::to_string(i) + ".ply");
+    frames[12].clear();
+    frames[13].clear();
+    const auto source = without_empty_frames(
+        std::make_unique<Frames>(frames, named ? names : std::vector<std::string>{}));
+    const Diagnosis d = examine_frames(*source);
+    EXPECT_EQ(d.frames, 28);
+    EXPECT_EQ(d.gap, (std::map<int64_t, int64_t>{{12, 2}})) << named;
+    EXPECT_TRUE(notes(d, "missing frames", "2 frames without any point"));
+    EXPECT_FALSE(notes(d, "missing frames", "numbers missing"));
+  }
+}
+
 TEST(DoctorSequence, OneUnitThroughout) {
   std::vector<Points> frames = performance(40);
   for (size_t f = 20; f < frames.size(); ++f)

@@ -324,15 +324,16 @@ TEST_F(ImportersAmass, WhatIsWrongIsSaid) {
   const WrongArray wrong[] = {{"mocap_framerate", "", "--fps"},
                               {"mocap_framerate", npy<double>({}, {0}), "no frame rate"},
                               {"mocap_framerate", npy_text("fast"), "no frame rate"},
-                              {"poses", doubles({1, 72}, 0), "[1, 72]"},
+                              {"poses", doubles({121, 69}, 0), "[121, 69]"},
+                              {"poses", doubles({121, 52, 4}, 0), "quaternions"},
+                              {"poses", doubles({121, 52, 3, 3}, 0), "no rotation"},
                               {"poses", doubles({156}, 0), "[156]"},
                               {"poses", doubles({0, 156}, 0), "0 frames"},
                               {"poses", doubles({121, 156}, NAN), "finite"},
                               {"trans", doubles({120, 3}, 0), "[121, 3]"},
                               {"trans", doubles({121, 3}, INFINITY), "finite"},
                               {"betas", doubles({2, 4}, 0), "one person"},
-                              {"betas", doubles({4}, NAN), "NaN"},
-                              {"betas", "", "'betas'"}};
+                              {"betas", doubles({4}, NAN), "NaN"}};
   for (const auto& [name, bytes, says] : wrong)
     EXPECT_HAS(refused(with(TinyClip().arrays(), name, bytes)), says) << name;
   // Found by the fuzzer: text of the file in a message that is one short line.
@@ -340,6 +341,97 @@ TEST_F(ImportersAmass, WhatIsWrongIsSaid) {
   odd.emplace_back("surface_model_type", npy_text("smpl\nh" + std::string(500, 'x')));
   EXPECT_HAS(refused(odd), "for the model smpl?hxxx");
   EXPECT_HAS(refused(TinyClip{SmplFamily::smplx}.arrays()), "whose shapes are others");
+}
+
+/// The clip's rotations and places in the frame of a camera that looks on: y down, z away.
+Arrays seen_by_a_camera(const TinyClip& clip, int64_t body_joints, bool matrices) {
+  const Mat3 camera = (Mat3() << 1, 0, 0, 0, 0, -1, 0, 1, 0).finished();  // z up to y down
+  std::vector<double> orient, body, trans;
+  const auto add = [&](const Mat3& turn, std::vector<double>& out) {
+    const Eigen::AngleAxisd a(turn);
+    const Vec3 vector = a.angle() * a.axis();
+    for (int i = 0; i < (matrices ? 9 : 3); ++i) out.push_back(matrices ? turn(i / 3, i % 3) : vector[i]);
+  };
+  const Vec3 rest = TinySmpl{SmplFamily::smpl}.shaped(clip.betas)[0];
+  for (int64_t f = 0; f < clip.frames; ++f) {
+    const double t = static_cast<double>(f) / clip.fps;
+    add(camera * clip.root(t), orient);
+    for (int64_t j = 1; j <= body_joints; ++j) {
+      const Vec3 a = j < kJoints ? clip.turn(static_cast<int>(j), t) : Vec3::Zero();
+      add(a.norm() > 0 ? Mat3(Eigen::AngleAxisd(a.norm(), a.normalized())) : Mat3(Mat3::Identity()), body);
+    }
+    const Vec3 at = camera * (clip.trans(t) + rest) - rest;
+    trans.insert(trans.end(), {at.x(), at.y(), at.z()});
+  }
+  const int64_t n = clip.frames;
+  const std::vector<int64_t> one = matrices ? std::vector<int64_t>{n, 1, 3, 3} : std::vector<int64_t>{n, 3},
+                             all = matrices ? std::vector<int64_t>{n, body_joints, 3, 3}
+                                            : std::vector<int64_t>{n, 3 * body_joints};
+  return {{"smpl_global_orient", npy<double>(one, orient)},
+          {"smpl_body_pose", npy<double>(all, body)},
+          {"cam_trans", npy<double>({n, 3}, trans)},
+          {"smpl_betas", npy<double>({1, std::ssize(clip.betas)}, clip.betas)}};
+}
+
+TEST_F(ImportersAmass, EstimatorsNamesAndShapesGiveTheSameMotion) {
+  const TinyClip clip{.frames = 31, .fps = 30};
+  BodyModels models(dir.write("model.npz", TinySmpl{SmplFamily::smpl}.file()));
+  ImportReport ignored;
+  // AMASS's own layout, 72 and 66 columns wide.
+  const auto narrow = [&](int64_t columns) {
+    const Npz wide(dir.write("wide.npz", npz(clip.arrays())));
+    const NpyArray poses = wide.array("poses");
+    std::vector<double> kept;
+    for (int64_t f = 0; f < clip.frames; ++f)
+      for (int64_t c = 0; c < columns; ++c) kept.push_back(poses[f * poses.shape()[1] + c]);
+    return with(clip.arrays(), "poses", npy<double>({clip.frames, columns}, kept));
+  };
+  const Motion wanted = import_amass(Npz(dir.write("a.npz", npz(clip.arrays()))), models, {}, ignored);
+  const auto expect_same = [&](const Arrays& arrays, const std::string& name) {
+    ImportReport report;
+    const Npz file(dir.write("b.npz", npz(arrays)));
+    EXPECT_TRUE(is_amass_motion(file)) << name;
+    const Motion motion = import_amass(file, models, {}, report);
+    ASSERT_EQ(motion.frames(), wanted.frames()) << name;
+    const Joints first = testing::motion_joints(motion, 0), first_wanted = testing::motion_joints(wanted, 0);
+    for (size_t f = 0; f < wanted.frames(); ++f) {
+      const Joints got = testing::motion_joints(motion, f), want = testing::motion_joints(wanted, f);
+      for (size_t j = 0; j < kJoints; ++j)  // wherever the world's origin is
+        EXPECT_LT(((got[j] - first[0]) - (want[j] - first_wanted[0])).norm(), 1e-5) << name << " " << f << " " << j;
+    }
+    return;
+  };
+  expect_same(narrow(72), "72 columns");
+  expect_same(narrow(66), "66 columns");
+  expect_same(seen_by_a_camera(clip, 23, false), "ROMP, HMR");
+  expect_same(seen_by_a_camera(clip, 21, false), "21 joints");
+  expect_same(seen_by_a_camera(clip, 23, true), "matrices");
+  // Nothing is taken for granted without a word, and what is lacking is named.
+  ImportReport report;
+  import_amass(Npz(dir.write("c.npz", npz(seen_by_a_camera(clip, 23, false)))), models, {}, report);
+  EXPECT_HAS(fact(report, "up"), "-y, where the head is");
+  EXPECT_HAS(remarks(report), "30 frames a second are taken for granted");
+  EXPECT_HAS(error_of([&] {
+    const Npz file(dir.write("d.npz", npz(with(seen_by_a_camera(clip, 23, false), "cam_trans", ""))));
+    import_amass(file, models, {}, report);
+  }), "add trans [F, 3]");
+}
+
+TEST_F(ImportersAmass, AShapeForEachFrameOrNone) {
+  const TinyClip clip{.frames = 31, .fps = 30};
+  BodyModels models(dir.write("model.npz", TinySmpl().file()));
+  std::vector<double> betas;
+  for (int64_t f = 0; f < clip.frames; ++f) betas.insert(betas.end(), clip.betas.begin(), clip.betas.end());
+  const auto rest_of = [&](const std::string& bytes, ImportReport& report) {
+    const Npz file(dir.write("a.npz", npz(with(clip.arrays(), "betas", bytes))));
+    return import_amass(file, models, {}, report).rest;
+  };
+  ImportReport one, many, none;
+  const Joints wanted = rest_of(npy<double>({std::ssize(clip.betas)}, clip.betas), one);
+  const Joints got = rest_of(npy<double>({clip.frames, std::ssize(clip.betas)}, betas), many);
+  for (size_t j = 0; j < kJoints; ++j) EXPECT_LT((got[j] - wanted[j]).norm(), 1e-9);
+  rest_of("", none);
+  EXPECT_HAS(remarks(none), "the mean person");
 }
 
 // ---- the command's function --------------------------------------------------------------------

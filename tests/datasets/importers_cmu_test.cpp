@@ -13,6 +13,7 @@
 #include "datasets/importers/bvh.h"
 #include "datasets/importers/cmu.h"
 #include "datasets/readers/asf.h"
+#include "tests/datasets/importers_support.h"
 #include "tests/support/data_folder.h"
 #include "tests/support/files.h"
 #include "tests/support/toy_asf.h"
@@ -92,7 +93,7 @@ TEST_F(ImportersAmc, BadFilesAreNamedWithTheirLine) {
   const Case cases[] = {{true, "order TX", "order WX", "no freedom"},
                         {true, "axis XYZ", "axis XXZ", "no order of axes"},
                         {true, "dof rx", "dof rx rx", "given twice"},
-                        {true, "dof rx", "dof l", "no freedom"},
+                        {true, "dof rx", "dof q", "no freedom"},
                         {true, "length 0.45", "length 0", "must be positive"},
                         {true, "name thorax", "name lowerback", "two bones are called lowerback"},
                         {true, "direction ", "direction nan ", "no usable number"},
@@ -102,7 +103,8 @@ TEST_F(ImportersAmc, BadFilesAreNamedWithTheirLine) {
                         {true, "root lowerback", "root lowrback", "is no bone"},
                         {false, "lowerback ", "lowrback ", "did you mean 'lowerback'"},
                         {false, "lowerback ", "lowerback 1 ", "has 4 values"},
-                        {false, "\n2\n", "\n3\n", "frame 3 follows frame 1"},
+                        {false, "\n2\n", "\n3\n", "frame 3 follows frame 3"},
+                        {false, "\n5\n", "\n1005\n", "more than a second"},
                         {false, "root ", "root inf ", "some.amc"},
                         {false, "lowerback", "#", "lacks bone lowerback"},
                         {false, "\n1\n", "\n", "frame's number expected"}};
@@ -120,6 +122,61 @@ TEST_F(ImportersAmc, BadFilesAreNamedWithTheirLine) {
   refuse("", amc, "holds no bones");
   refuse("HIERARCHY\n", amc, "does not begin with a section");
   refuse(asf, "", "holds no frames");
+}
+
+/// Freedoms that a person's bones do not have are read and left unused.
+TEST_F(ImportersAmc, LengthsAndPlacesOfBonesAreLeftUnused) {
+  const std::string asf = asf_text(), amc = amc_text(5);
+  const MotionClip plain = convert_amc(amc, "a.amc", asf, "a.asf");
+  for (const char* freedom : {"l", "L", "TX", "tx ty tz"}) {
+    // The first bone that has freedoms: "lowerback a b c" in every frame.
+    std::string more = amc;
+    const std::string values = std::string(freedom).size() > 2 ? " 0.5 0 0" : " 0.5";
+    for (size_t at = more.find("lowerback "); at != std::string::npos;
+         at = more.find("lowerback ", at + 1))
+      more.insert(more.find('\n', at), values);
+    const std::string dof = asf.substr(asf.find("dof "), asf.find('\n', asf.find("dof ")) - asf.find("dof "));
+    const MotionClip clip = convert_amc(more, "a.amc", replaced(asf, dof, dof + " " + freedom), "a.asf");
+    ASSERT_EQ(clip.joints.size(), plain.joints.size());
+    for (size_t f = 0; f < clip.joints.size(); ++f)
+      for (size_t j = 0; j < kJoints; ++j)
+        EXPECT_EQ(clip.joints[f][j], plain.joints[f][j]) << freedom;
+    EXPECT_HAS(remarks(clip.report), "moved or stretched, by up to 0.5 units");
+  }
+}
+
+/// Every fourth frame is a recording at a fourth of the rate; single frames that lack are filled.
+TEST_F(ImportersAmc, FramesThatLackByTheirNumbers) {
+  const auto renumbered = [](const auto& number) {  // frames of 0: left out
+    std::string out;
+    bool keep = true;
+    std::istringstream lines(amc_text(41));
+    for (std::string line; std::getline(lines, line);) {
+      if (!line.empty() && line.find_first_not_of("0123456789") == std::string::npos) {
+        const int now = number(std::stoi(line));
+        keep = now > 0;
+        line = std::to_string(now);
+      }
+      if (keep) out += line + "\n";
+    }
+    return out;
+  };
+  const std::string asf = asf_text();
+  const MotionClip whole = convert_amc(amc_text(41), "a.amc", asf, "a.asf");
+  const auto fourth = renumbered([](int n) { return n % 4 == 1 ? n : 0; });
+  const MotionClip sparse = convert_amc(fourth, "a.amc", asf, "a.asf");
+  EXPECT_HAS(remarks(sparse.report), "one in 4 is there");
+  ASSERT_EQ(sparse.joints.size(), whole.joints.size());
+  for (size_t f = 0; f < whole.joints.size(); ++f)
+    for (size_t j = 0; j < kJoints; ++j)
+      EXPECT_LT((sparse.joints[f][j] - whole.joints[f][j]).norm(), 1e-9) << f;
+  const auto gap = renumbered([](int n) { return n == 20 || n == 21 ? 0 : n; });
+  const MotionClip filled = convert_amc(gap, "a.amc", asf, "a.asf");
+  EXPECT_HAS(remarks(filled.report), "2 frames are lacking");
+  ASSERT_EQ(filled.joints.size(), whole.joints.size());
+  for (size_t f = 0; f < whole.joints.size(); ++f)
+    for (size_t j = 0; j < kJoints; ++j)
+      EXPECT_LT((filled.joints[f][j] - whole.joints[f][j]).norm(), 0.01) << f;
 }
 
 TEST_F(ImportersAmc, TheSkeletonBesideIsFoundByName) {

@@ -249,5 +249,80 @@ TEST_F(ImportersScans, ABrokenFrameIsAnErrorAndLeavesNothing) {
   EXPECT_HAS(error_of([&] { import_data(dir / "in/none.npz", dir / "p.h5"); }), "is not there");
 }
 
+TEST_F(ImportersScans, FramesThatShowNobodyAreReplacedUpToASecond) {
+  const auto at = [&](int f) { return dir / ("in/f" + std::to_string(f) + ".ply"); };
+  fs::create_directories(dir / "in");
+  for (int f = 0; f < 6; ++f)
+    write_ply(at(f), Mesh{person({static_cast<float>(f), 0, 0}), {}});
+  write_bytes(at(2), "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\n"
+                     "property float z\nend_header\n");
+  write_ply(at(3), Mesh{{{0, 0, 0}, {1, 1, 1}}, {}});
+  const ImportSummary done = import_data(dir / "in", dir / "o.h5");
+  EXPECT_EQ(done.frames, 6u);
+  EXPECT_HAS(done.reports[0].remarks.at(0), "2 frames show too little");
+  const Scans scans = read_scans(dir / "o.h5");
+  std::vector<float> x;
+  for (size_t f = 0; f < 6; ++f) x.push_back(scans.points[static_cast<size_t>(scans.frame_offset[f])].x());
+  const float first = x[0];
+  for (float& value : x) value -= first;
+  EXPECT_EQ(x, (std::vector<float>{0, 1, 1, 4, 4, 5}));
+  // At the beginning and at the end the nearest is the only one there is; nobody at all is an error.
+  for (const int f : {0, 5}) write_ply(at(f), Mesh{{{0, 0, 0}}, {}});
+  EXPECT_EQ(import_data(dir / "in", dir / "o.h5").frames, 6u);
+  for (const int f : {1, 4}) write_ply(at(f), Mesh{{{0, 0, 0}}, {}});
+  EXPECT_HAS(error_of([&] { import_data(dir / "in", dir / "p.h5"); }), "shows nobody");
+  for (int f = 0; f < 40; ++f) {
+    const bool seen = f == 0 || f == 39;
+    write_ply(at(f), Mesh{seen ? person({0, 0, 0}) : Points{{0, 0, 0}}, {}});
+  }
+  EXPECT_HAS(error_of([&] { import_data(dir / "in", dir / "p.h5"); }), "nobody for 38 frames");
+}
+
+TEST_F(ImportersScans, NonFinitePointsStraysAndTwinsAreSaid) {
+  fs::create_directories(dir / "in");
+  for (int f = 0; f < 3; ++f) {
+    const std::string stem = dir / ("in/frame_" + std::to_string(f));
+    Mesh mesh{person({0, 0, 0}), {}};
+    write_obj(stem + ".obj", mesh);
+    mesh.vertices.push_back(Point::Constant(std::numeric_limits<float>::quiet_NaN()));
+    write_ply(stem + ".ply", mesh);
+  }
+  write_ply(dir / "in/floor.ply", Mesh{person({0, 0, 0}), {}});
+  const ImportSummary done = import_data(dir / "in", dir / "o.h5");
+  EXPECT_EQ(done.frames, 3u);
+  std::string said;
+  for (const std::string& remark : done.reports.at(0).remarks) said += remark + "\n";
+  for (const char* words : {"left out 3 .obj files", "left out 'floor.ply'", "left out 3 points whose"})
+    EXPECT_HAS(said, words);
+  EXPECT_EQ(verify(dir / "o.h5"), Names{});
+}
+
+TEST_F(ImportersScans, FoldersOfFramesAndHdf5FilesOfOthers) {
+  for (int f = 0; f < 3; ++f) {
+    const std::string folder = dir / ("tree/walk/" + std::to_string(f));
+    fs::create_directories(folder);
+    write_ply(folder + "/mesh.ply", Mesh{person({0, 0, 0}), {}});
+    fs::create_directories(dir / "tree/run");
+    write_ply(dir / ("tree/run/" + std::to_string(f) + ".ply"), Mesh{person({0, 0, 0}), {}});
+  }
+  {
+    const Points points = person({0, 0, 0});
+    std::vector<float> values;  // [V, 3, 2]
+    for (const Point& p : points)
+      for (int c = 0; c < 3; ++c) values.insert(values.end(), 2, p[c]);
+    h5::File file = h5::File::create(dir / "tree/dfaust.hdf5");
+    file.write<float>("/50002_hips", {std::ssize(points), 3, 2}, values);
+    file.write<float>("/50002_knees", {std::ssize(points), 3, 2}, values);
+    file.commit();
+  }
+  const ImportSummary done = import_data(dir / "tree", dir / "o.h5");
+  EXPECT_EQ(done.sequences, 4u);
+  EXPECT_EQ(done.frames, 10u);
+  EXPECT_EQ(import_data(dir / "tree/dfaust.hdf5", dir / "p.h5").sequences, 2u);
+  EXPECT_EQ(import_data(dir / "tree/walk", dir / "p.h5").frames, 3u);
+  EXPECT_HAS(error_of([&] { import_data(dir.write("a.fbx", "Kaydara"), dir / "p.h5"); }),
+             "is FBX, which is not read; open it in Blender and export GLB");
+}
+
 }  // namespace
 }  // namespace restage

@@ -197,7 +197,11 @@ TEST(ImportersStyles, OptionsOverrideWhatIsFound) {
   options.profile = "daz";  // not its names
   EXPECT_HAS(error_of([&] { convert_bvh(text, "a.bvh", options); }),
              "lacks bones of the profile daz");
-  EXPECT_EQ(parse_axis("-y", "--up"), Axis::minus_y);
+  for (const char* name : {"-y", "y-", "-Y"}) EXPECT_EQ(parse_axis(name, "--up"), Axis::minus_y);
+  for (const char* name : {"z", "+z", "z+", "Z"}) EXPECT_EQ(parse_axis(name, "--up"), Axis::z);
+  EXPECT_EQ(parse_axis("auto", "--up"), Axis::automatic);
+  for (const char* name : {"", "-", "--y", "w", "yz", "+"})
+    EXPECT_THROW(parse_axis(name, "--up"), InputError) << name;
   EXPECT_THROW(parse_axis("north", "--up"), InputError);
 }
 

@@ -372,9 +372,16 @@ TEST_F(ReadersArrays, WhichArrayIsTheCloud) {
   for (const Arrays& arrays : with_a_cloud) EXPECT_EQ(first(arrays), Point(1, 2, 3));
   const std::pair<Arrays, const char*> without[] = {
       {{{"a", cloud}, {"b", other}}, "several arrays of points: 'a', 'b'"},
-      {{{"poses", npy<float>({2}, {1, 2})}}, "holds no points (its arrays: 'poses')"},
-      {{{"points", npy<float>({0, 3}, {})}}, "holds no points"},
-      {{{"points", npy<float>({1, 3}, {1, NAN, 3})}}, "NaN"},
+      {{{"labels", npy<float>({2}, {1, 2})}}, "holds no points (its arrays: 'labels')"},
+      {{{"points", npy<float>({0, 5, 3}, {})}}, "holds no points"},
+      // Parameters of a body model: `trans` has the shape of a cloud and is none.
+      {{{"smpl_thetas", npy<float>({2, 72}, std::vector<float>(144, 0))}, {"trans", cloud}},
+       "is a motion of a body model"},
+      {{{"global_orient", cloud}, {"body_pose", npy<float>({1, 69}, std::vector<float>(69, 0))},
+        {"transl", cloud}},
+       "is a motion of a body model"},
+      {{{"trans", cloud}, {"betas", npy<float>({10}, std::vector<float>(10, 0))}},
+       "holds no points"},
       {{{"points", cloud}, {"fps", npy<float>({}, {0})}}, "fps: is no frame rate"},
       {{{"points", cloud}, {"fps", npy_text("30")}}, "fps: is no frame rate"}};
   for (const auto& [arrays, says] : without)
@@ -396,9 +403,100 @@ TEST_F(ReadersArrays, FoldersOfArrays) {
   EXPECT_EQ(last->source, dir / "f10.npz");
   frames->skip();
   EXPECT_FALSE(frames->next());
-  // Meshes come first: arrays beside them are something else.
+  // One mesh beside a series of arrays is a template or the like.
   write_bytes(dir / "scan.obj", "v 7 7 7\n");
-  EXPECT_EQ(open_frames(dir.path())->frames(), 1);
+  EXPECT_EQ(open_frames(dir.path())->frames(), 3);
+  EXPECT_HAS(open_frames(dir.path())->remarks().at(0), "left out 1 .obj file");
+  // Beside a series of meshes arrays are something else.
+  for (const char* name : {"m1.obj", "m2.obj"}) write_bytes(dir / name, "v 7 7 7\n");
+  EXPECT_EQ(open_frames(dir.path())->frames(), 2);
+}
+
+// ---- axes --------------------------------------------------------------------------------------
+
+/// An array of this shape whose element says what it is: point + 1000 * frame + 0.25 * axis, each of
+/// these the index of the axis of that number (-1: none).
+std::string marked(const std::vector<int64_t>& shape, int frame, int point, int xyz) {
+  int64_t count = 1;
+  for (const int64_t n : shape) count *= n;
+  std::vector<float> values;
+  for (int64_t i = 0; i < count; ++i) {
+    std::vector<int64_t> at(shape.size());
+    int64_t rest = i;
+    for (size_t a = shape.size(); a-- > 0; rest /= shape[a]) at[a] = rest % shape[a];
+    const auto index = [&](int axis) { return axis < 0 ? 0 : at[static_cast<size_t>(axis)]; };
+    values.push_back(static_cast<float>(index(point) + 1000 * index(frame)) +
+                     0.25f * static_cast<float>(index(xyz)));
+  }
+  return npy<float>(shape, values);
+}
+
+TEST_F(ReadersArrays, AxesInAnyOrderAndMoreColumns) {
+  struct Case {
+    std::vector<int64_t> shape;
+    int frame, point, xyz;
+    int64_t frames, points;
+  };
+  const Case cases[] = {{{80, 3}, -1, 0, 1, 1, 80},       {{80, 6}, -1, 0, 1, 1, 80},
+                        {{80, 4}, -1, 0, 1, 1, 80},       {{3, 80}, -1, 1, 0, 1, 80},
+                        {{4, 80, 3}, 0, 1, 2, 4, 80},     {{4, 80, 6}, 0, 1, 2, 4, 80},
+                        {{80, 3, 4}, 2, 0, 1, 4, 80},     {{4, 3, 80}, 0, 2, 1, 4, 80},
+                        {{3, 80, 4}, 2, 1, 0, 4, 80},     {{80, 3, 3}, 2, 0, 1, 3, 80},
+                        {{2, 1, 80, 3}, 0, 2, 3, 2, 80}};
+  for (const Case& c : cases) {
+    const auto frames = open_frames(dir.write("a.npy", marked(c.shape, c.frame, c.point, c.xyz)));
+    ASSERT_EQ(frames->frames(), c.frames) << shape_text(c.shape);
+    frames->skip();
+    frames->rewind();
+    for (int64_t f = 0; f < c.frames; ++f) {
+      const auto frame = frames->next();
+      ASSERT_EQ(std::ssize(frame->points), c.points) << shape_text(c.shape);
+      const float x = static_cast<float>(1000 * f + 17);
+      EXPECT_EQ(frame->points[17], Point(x, x + 0.25f, x + 0.5f)) << shape_text(c.shape);
+    }
+    const bool plain = c.shape.back() == 3 && c.shape != std::vector<int64_t>{80, 3, 3};
+    EXPECT_EQ(frames->remarks().empty(), plain) << shape_text(c.shape);
+  }
+  for (const std::vector<int64_t>& shape : {std::vector<int64_t>{80}, {80, 2}, {80, 66}, {5, 80, 72}})
+    EXPECT_FALSE(cloud_axes(shape)) << shape_text(shape);
+  // Pictures of a depth camera are one frame, not 288 of 320 points.
+  EXPECT_EQ(cloud_axes({288, 320, 3})->points, 288 * 320);
+  EXPECT_FALSE(cloud_axes({288, 320, 3})->sequence);
+  EXPECT_EQ(cloud_axes({5, 288, 320, 3})->frames, 5);
+  // Who knows the number of vertices knows which axis is which.
+  EXPECT_EQ(cloud_axes({70, 3, 300}, 70)->frames, 300);
+}
+
+/// As numpy.savez(*clouds) keeps clouds of unequal size.
+TEST_F(ReadersArrays, NumberedArraysAreTheFramesOfASequence) {
+  Arrays arrays;
+  for (const int i : {0, 1, 10, 2}) {
+    std::vector<float> values(static_cast<size_t>(3 * (i + 1)), static_cast<float>(i));
+    arrays.emplace_back("arr_" + std::to_string(i), npy<float>({i + 1, 3}, values));
+  }
+  dir.write("a.npz", npz(arrays));
+  EXPECT_TRUE(find_cloud(dir / "a.npz")->axes.sequence);
+  const auto frames = open_frames(dir / "a.npz");
+  EXPECT_EQ(frames->frames(), 4);
+  EXPECT_HAS(frames->remarks().at(0), "'arr_0' to 'arr_10'");
+  for (const int i : {0, 1, 2, 10}) {
+    const auto frame = frames->next();
+    EXPECT_EQ(frame->points, Points(static_cast<size_t>(i + 1), Point::Constant(static_cast<float>(i))));
+  }
+  EXPECT_FALSE(frames->next());
+  EXPECT_HAS(error_of([&] { read_array_frame(dir / "a.npz"); }), "sequence of 4");
+}
+
+TEST_F(ReadersArrays, NonFinitePointsAreLeftOutAndFramesMayBeEmpty) {
+  dir.write("in/1.npy", npy<float>({2, 3}, {1, NAN, 3, 4, 5, 6}));
+  dir.write("in/2.npy", npy<float>({0, 3}, {}));
+  dir.write("in/3.npy", npy<float>({1, 3}, {INFINITY, 0, 0}));
+  const auto frames = open_frames(dir / "in");
+  const auto first = frames->next();
+  EXPECT_EQ(first->points, (Points{{4, 5, 6}}));
+  EXPECT_EQ(first->left_out, 1u);
+  EXPECT_TRUE(frames->next()->points.empty());
+  EXPECT_EQ(frames->next()->left_out, 1u);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include "datasets/readers/frame_folder.h"
 #include "datasets/readers/mesh_io.h"
+#include "datasets/readers/text.h"
 #include "datasets/schema.h"
 #include "tests/datasets/npz_support.h"
 #include "tests/support/files.h"
@@ -115,7 +116,9 @@ std::vector<BadFile> bad_files() {
   return {
       {"", "empty.ply: is empty and holds no points"},
       {"hello", "text.ply: is not a PLY file"},
-      {"hello", "text.xyz: is neither PLY, OBJ nor glTF"},
+      {"hello", "text.bin: is neither PLY, OBJ, glTF nor a cloud (PCD, XYZ)"},
+      {"hello", "text.fbx: is FBX, which is not read; open it in Blender and export GLB"},
+      {"hello", "walk.bvh: is a recording of a skeleton, not clouds; restage data import"},
       {"ply\nformat ascii 1.0\nelement vertex 3\n",
        "header.ply: is cut short inside the PLY header"},
       {"ply\nend_header\n", "noformat.ply:2: the PLY header names no format"},
@@ -144,20 +147,18 @@ std::vector<BadFile> bad_files() {
       {ply(kVertex3 + kFace1, three + "3 0 1 3\n"),
        "range.ply: triangle 0 has vertex index 3 (from 0), out of range for 3 vertices"},
       {ply(kVertex3 + kFace1, three + "3 0 1 -1\n"), "minus.ply:13: a face index is out of range"},
-      {ply(kVertex3 + kFace1, three + "2 0 1\n"), "edge.ply:13: a face has fewer than 3 corners"},
       {ply(kVertex3 + kFace1, three + "250 0 1 2\n"), "list.ply: is cut short"},
       {ply(kVertex3 + kFace1, three + "-3 0 1 2\n"),
        "list2.ply:13: a list has an impossible length"},
       {"# nothing\n", "none.obj: holds no points"},
       {"v 0 0 0\nv 1 0", "cut.obj:2: a vertex has fewer than 3 coordinates"},
-      {"v 0 0 0\nv 1 0 1,5\n", "word.obj:2: '1,5' is no number"},
+      {"v 0 0 0\nv 1 0 1,5\n", "word.obj:2: '1,5' is no number; write decimals with points"},
       {"v 0 0 NaN\n", "nan.obj:1: a coordinate is NaN"},
       {"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "range.obj: triangle 0 has vertex index 3 (from 0)"},
       {"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n", "zero.obj:4: face index 0 is out of range"},
       {"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 -4\n", "minus.obj:4: face index -4 is out of range"},
       {"v 0 0 0\nf 1 1 99999999999999999999\n",
        "corner.obj:2: '99999999999999999999' is no face corner"},
-      {"v 0 0 0\nv 1 0 0\nf 1 2\n", "edge.obj:3: a face has fewer than 3 corners"},
   };
 }
 
@@ -261,9 +262,55 @@ TEST_F(Readers, BadSequencesAreOneClearLine) {
   }
   EXPECT_HAS(error_of([&] { open_frames(dir / "j.h5"); }),
              "/points: is missing, and so is /vertices");
+  // A frame that shows nothing is a frame; points that are NaN are left out and counted.
   const std::unique_ptr<FrameSource> gap = open_frames(dir / "gap.h5");
-  gap->next();
-  EXPECT_HAS(error_of([&] { gap->next(); }), "gap.h5:1: holds no points");
+  EXPECT_EQ(gap->next()->left_out, 0u);
+  EXPECT_TRUE(gap->next()->points.empty());
+  const std::optional<Frame> nan = gap->next();
+  EXPECT_TRUE(nan->points.empty());
+  EXPECT_EQ(nan->left_out, 1u);
+  const auto seen = without_empty_frames(open_frames(dir / "gap.h5"));
+  EXPECT_EQ(seen->next()->missing, 0);
+  EXPECT_FALSE(seen->next());
+}
+
+TEST_F(Readers, PointsAndLinesMakeNoTriangles) {
+  write_bytes(dir / "a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\np 1\nl 1 2\nf 1\nf 1 2\nf 1 2 3\n");
+  expect_equal(read_mesh(dir / "a.obj"),
+               {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}});
+  const std::string text =
+      "ply \r\nformat ascii 1.0\r\nelement vertex 3\r\nproperty list uchar int of\r\nproperty double "
+      "X\r\nproperty double Y\r\nproperty double Z\r\nproperty ushort red\r\nproperty uint64 t\r\nelement "
+      "face 3\r\nproperty list uchar int vertex_indices\r\nend_header\r\n2 7 7 0 0 0 65535 1\r\n0 1 0 0 0 2\r\n1 "
+      "5 0 1 0 0 3\r\n1 0\r\n2 0 1\r\n3 0 1 2\r\n";
+  write_bytes(dir / "a.ply", text);
+  expect_equal(read_mesh(dir / "a.ply"),
+               {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}});
+}
+
+/// As C, Python, Java, and programs of older Windows write them; and numbers that no double holds.
+TEST_F(Readers, NotANumberInAllSpellings) {
+  for (const char* word : {"nan", "NaN", "-nan", "NAN", "nan(ind)", "-nan(ind)", "nan(snan)", "inf",
+                           "-inf", "Infinity", "-INF", "+inf", "1.#QNAN", "1.#QNAN0", "-1.#IND",
+                           "-1.#IND00", "1.#INF", "-1.#INF", "1.#J", "1.#R", "1e999"}) {
+    size_t left_out = 0;
+    const std::string rest = std::string(" 0 0\n1 2 3\n");
+    write_bytes(dir / "a.ply", "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty "
+                              "float y\nproperty float z\nend_header\n" + std::string(word) + rest);
+    write_bytes(dir / "a.obj", "v " + std::string(word) + " 0 0\nv 1 2 3\n");
+    write_bytes(dir / "a.xyz", word + rest);
+    for (const char* name : {"a.ply", "a.obj", "a.xyz"}) {
+      const Mesh mesh = read_frame_mesh(dir / name, left_out);
+      EXPECT_EQ(mesh.vertices, (Points{{1, 2, 3}})) << name << " " << word;
+      EXPECT_EQ(left_out, 1u) << name << " " << word;
+      EXPECT_HAS(error_of([&] { read_mesh(dir / name); }), "restage doctor FILE --fix");
+    }
+  }
+  double value = 1;
+  EXPECT_TRUE(text::parse("-1e-400", value));
+  EXPECT_EQ(value, 0);
+  for (const char* word : {"", "-", "1.5.5", "nanx", "1#", "0x10", "1e", "n"})
+    EXPECT_FALSE(text::parse(word, value)) << word;
 }
 
 }  // namespace

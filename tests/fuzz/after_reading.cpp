@@ -60,11 +60,11 @@ void doctor_surface(const std::string& bytes) {
 }
 
 void doctor_sequence(const std::string& bytes) {
-  const auto frames =
-      open_frames(file_of(bytes, "x.npy"), {.clip = "", .leave_out_non_finite = true});
+  const auto frames = without_empty_frames(open_frames(file_of(bytes, "x.npy")));
   const Diagnosis found = examine_frames(*frames);
   frames->rewind();
   const auto frame = frames->next();
+  if (!frame) throw std::logic_error("frames that were examined are gone");
   mended({frame->points, frame->faces}, found);
 }
 

@@ -66,11 +66,16 @@ inline Diagnosis examine_target(const Mesh& mesh) {
 class Frames : public FrameSource {
  public:
   explicit Frames(std::vector<Points> frames, std::vector<std::string> names = {}, double fps = 30)
-      : frames_(std::move(frames)), names_(std::move(names)), fps_(fps) {}
+      : frames_(std::move(frames)), names_(std::move(names)), fps_(fps) {
+    if (!names_.empty()) numbers_ = order_frames(names_, "").numbers;
+  }
   std::optional<Frame> next() override {
     if (at_ == frames_.size()) return std::nullopt;
     const std::string name = names_.empty() ? "x.h5:" + std::to_string(at_) : names_[at_];
-    return Frame{name, frames_[at_++], {}, 0};
+    Frame frame{name, frames_[at_], {}, 0};
+    if (!numbers_.empty()) frame.number = numbers_[at_];
+    ++at_;
+    return frame;
   }
   void rewind() override { at_ = 0; }
   int64_t frames() const override { return static_cast<int64_t>(frames_.size()); }
@@ -78,6 +83,7 @@ class Frames : public FrameSource {
 
  private:
   std::vector<Points> frames_;
+  std::vector<int64_t> numbers_;
   std::vector<std::string> names_;
   double fps_;
   size_t at_ = 0;

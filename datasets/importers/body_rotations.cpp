@@ -1,0 +1,119 @@
+#include "datasets/importers/body_rotations.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "datasets/readers/errors.h"
+
+namespace restage {
+namespace {
+
+constexpr int64_t kMaxFrames = int64_t{1} << 22;  // 9.7 hours at 120 fps
+constexpr const char* kAsPublished = "give the file as it was published";
+
+/// Which numbers a rotation has.
+enum class Form { axis_angle, matrix };
+
+/// One array and how it is to be read.
+struct RotationArray {
+  NpyArray array;
+  Form form = Form::axis_angle;
+  int64_t frames = 0, joints = 0;
+  int64_t width() const { return form == Form::matrix ? 9 : 3; }
+};
+
+[[noreturn]] void misshapen(const NpyArray& array, const std::string& fix) {
+  throw InputError(array.where(), "has the shape " + shape_text(array.shape()), fix);
+}
+
+RotationArray open_rotations(const Npz& file, const std::string& name) {
+  RotationArray out{file.array(name)};
+  const std::vector<int64_t>& shape = out.array.shape();
+  if (out.array.is_text() || shape.size() < 2)
+    misshapen(out.array, "rotations are axis-angle numbers, [F, 3 J] or [F, J, 3]");
+  out.frames = shape[0];
+  if (out.frames == 0 || out.frames > kMaxFrames)
+    throw InputError(out.array.where(), cat("has ", out.frames, " frames"),
+                     cat("give 1 to ", kMaxFrames));
+  const int64_t last = shape.back(), row = out.array.size() / out.frames;
+  if (shape.size() > 2 && (last == 4 || last == 6))
+    misshapen(out.array, cat("turn its ", last == 4 ? "quaternions" : "6D rotations",
+                             " into axis-angle numbers [F, 3 J] first"));
+  const bool squares = shape.size() > 2 && last == 3 && shape[shape.size() - 2] == 3;
+  out.form = squares || (shape.size() > 2 && last == 9) ? Form::matrix : Form::axis_angle;
+  if (row == 0 || row % out.width() != 0)
+    misshapen(out.array, "rotations are axis-angle numbers, [F, 3 J] or [F, J, 3]");
+  out.joints = row / out.width();
+  return out;
+}
+
+Quat rotation(const Vec3& axis_angle) {
+  const double angle = axis_angle.norm();
+  if (angle < 1e-12) return Quat::Identity();
+  return Quat(Eigen::AngleAxisd(angle, axis_angle / angle));
+}
+
+Quat rotation_at(const RotationArray& from, int64_t frame, int64_t joint) {
+  const int64_t at = (frame * from.joints + joint) * from.width();
+  double numbers[9];
+  for (int64_t i = 0; i < from.width(); ++i) {
+    numbers[i] = from.array[at + i];
+    if (!(std::abs(numbers[i]) < 1e5))
+      throw InputError(from.array.where(), "holds a number that is not finite or too large", kAsPublished);
+  }
+  if (from.form == Form::axis_angle) return rotation(Vec3(numbers[0], numbers[1], numbers[2]));
+  const Mat3 matrix = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(numbers);
+  if (!((matrix * matrix.transpose() - Mat3::Identity()).cwiseAbs().maxCoeff() < 0.05) ||
+      !(matrix.determinant() > 0))
+    throw InputError(from.array.where(), cat("holds a matrix that is no rotation, in frame ", frame),
+                     kAsPublished);
+  return Quat(matrix).normalized();
+}
+
+void add_joints(const RotationArray& from, int64_t first, BodyRotations& out) {
+  const int64_t count = std::min<int64_t>(from.joints, kJoints - first);
+  for (int64_t f = 0; f < from.frames; ++f)
+    for (int64_t j = 0; j < count; ++j)
+      out.local[static_cast<size_t>(f)][static_cast<size_t>(first + j)] = rotation_at(from, f, j);
+}
+
+std::string named(const std::string& name, const NpyArray& array) {
+  return name + " " + shape_text(array.shape());
+}
+
+BodyRotations empty(int64_t frames, int64_t joints, const NpyArray& where, const std::string& layout) {
+  for (const int64_t known : {22, 24, 52, 55})
+    if (joints == known) {
+      BodyRotations out;
+      out.local.assign(static_cast<size_t>(frames), std::vector<Quat>(kJoints, Quat::Identity()));
+      out.joints = joints;
+      out.layout = layout;
+      return out;
+    }
+  throw InputError(where.where(), cat("has the shape ", shape_text(where.shape()), ", ", joints, " joints in all"),
+                   "AMASS has [F, 156] (SMPL-H) and [F, 165] (SMPL-X); [F, 72] (SMPL) and [F, 66] are read, too");
+}
+
+}  // namespace
+
+BodyRotations read_body_rotations(const Npz& file, const BodyParameters& names) {
+  // AMASS keeps its parts beside the whole; of others the parts have the plainer names.
+  const bool parts = !names.orient.empty() && !names.body.empty();
+  if (names.poses == "poses" || !parts) {
+    const RotationArray poses = open_rotations(file, names.poses);
+    BodyRotations out = empty(poses.frames, poses.joints, poses.array, named(names.poses, poses.array));
+    add_joints(poses, 0, out);
+    return out;
+  }
+  const RotationArray root = open_rotations(file, names.orient), body = open_rotations(file, names.body);
+  if (root.joints != 1) misshapen(root.array, "the root has one rotation a frame");
+  if (root.frames != body.frames)
+    misshapen(root.array, cat("it needs as many frames as ", names.body, ": ", body.frames));
+  BodyRotations out = empty(body.frames, body.joints + 1, body.array,
+                            cat(named(names.orient, root.array), ", ", named(names.body, body.array)));
+  add_joints(root, 0, out);
+  add_joints(body, 1, out);
+  return out;
+}
+
+}  // namespace restage

@@ -1,0 +1,27 @@
+// Parameters of a body model (SMPL and its kin) in an NPZ: the many names that data sets and
+// estimators give them.
+#pragma once
+
+#include <string>
+
+#include "datasets/readers/npz.h"
+
+namespace restage {
+
+/// Names of arrays; empty: there is none.
+struct BodyParameters {
+  std::string poses;   ///< of all joints: poses, pose, smpl_thetas, fullpose ...
+  std::string orient;  ///< of the root alone: root_orient, global_orient ...
+  std::string body;    ///< of the other joints: pose_body, body_pose ...
+  std::string trans;   ///< trans, transl, cam_trans ...
+  std::string betas;   ///< betas, smpl_betas, shape ...
+  /// Whether they are a motion, be it without a translation.
+  bool moves() const { return !poses.empty() || (!orient.empty() && !body.empty()); }
+};
+
+BodyParameters body_parameters(const Npz& file);
+
+/// Whether it is laid out as AMASS is: `poses` and `trans`.
+bool is_amass_layout(const Npz& file);
+
+}  // namespace restage

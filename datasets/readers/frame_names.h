@@ -1,0 +1,33 @@
+// Which files of a folder are the frames of a sequence, and in which order: by the numbers in their
+// names.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace restage {
+
+/// Files that are frames, in order, and what the user should know of the folder.
+struct FrameList {
+  std::vector<std::string> files;
+  /// The number of each frame by its name, in even steps (decimals: counted in steps from the first
+  /// name); empty if the names do not count so.
+  std::vector<int64_t> numbers;
+  std::vector<std::string> remarks;  ///< such as files that were left out
+};
+
+/// Orders frames by the numbers in their names: f2 before f10, 100.05 before 100.1, -2 before -1.
+/// A point between digits is a decimal point or parts two numbers, a minus is a sign or a mark, as
+/// it makes sense for all names together. The largest series of names that differ only in numbers
+/// is the sequence; other files are left out, with a remark. If nothing is a series, all files are
+/// frames, in the order of their names. InputError naming `folder` if it holds two series (cam0_1,
+/// cam1_1), which are two sequences.
+FrameList order_frames(const std::vector<std::string>& files, const std::string& folder);
+/// The same of folders, each of which holds a frame. No files if their names are no series.
+FrameList order_folders(const std::vector<std::string>& folders, const std::string& folder);
+
+/// f2 < f10: runs of digits compare as numbers, everything else by character.
+bool natural_less(const std::string& a, const std::string& b);
+
+}  // namespace restage

@@ -1,0 +1,350 @@
+#include "datasets/readers/hdf5_frames.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "datasets/readers/cloud_axes.h"
+#include "datasets/readers/errors.h"
+#include "datasets/readers/frame_names.h"
+#include "datasets/readers/non_finite.h"
+#include "datasets/readers/npz.h"
+#include "datasets/readers/precision.h"
+#include "datasets/readers/text.h"
+#include "datasets/readers/word_lines.h"
+#include "datasets/schema.h"
+#include "datasets/schema_detail.h"
+
+namespace restage {
+namespace {
+
+bool is_our_scans(const h5::File& file) { return file.has("/points") && file.has("/frame_offset"); }
+
+bool is_our_prediction(const h5::File& file) {
+  if (file.has("/joints")) return true;
+  if (!file.has("/vertices")) return false;
+  const h5::Shape shape = file.dataset("/vertices").shape();
+  return shape.size() == 3 && shape[2] == 3;
+}
+
+/// Scans or the vertices of a prediction: a data set of which a frame is some rows.
+class Hdf5Frames : public FrameSource {
+ public:
+  /// Frame f has the rows [offset[f], offset[f + 1]); without offsets it is row f.
+  Hdf5Frames(h5::File file, h5::Dataset set, std::vector<int64_t> offset)
+      : file_(std::move(file)),
+        set_(std::move(set)),
+        offset_(std::move(offset)),
+        end_(offset_.empty() ? set_.rows() : static_cast<int64_t>(offset_.size()) - 1),
+        fps_(read_fps(file_)),
+        sequence_{0, end_} {
+    if (file_.has("/sequence_offset"))
+      sequence_ = read_offsets(file_, "/sequence_offset", end_, true);
+    require_frames();
+    if (set_.shape().size() == 3 && file_.has("/faces"))
+      faces_ = read_faces(file_, "/faces", set_.shape()[1]);
+  }
+  /// From now on the file is this sequence.
+  void choose(int64_t sequence) {
+    check_sequence(file_.path(), sequence, sequences());
+    begin_ = at_ = sequence_[sequence];
+    end_ = sequence_[sequence + 1];
+    require_frames();
+  }
+  std::optional<Frame> next() override {
+    if (at_ == end_) return std::nullopt;
+    Frame frame;
+    frame.source = cat(file_.path(), ":", at_);
+    std::vector<float> values;
+    set_.read_rows(row(at_), row(at_ + 1) - row(at_), values);
+    // A surface that lacks a vertex would be another.
+    if (offset_.empty())
+      check_finite(set_.where(), values, std::max<int64_t>(set_.row_size(), 1), row(at_));
+    frame.points.resize(values.size() / 3);
+    if (!values.empty()) std::copy(values.begin(), values.end(), frame.points[0].data());
+    frame.left_out = leave_out_non_finite(frame.points, frame.faces);
+    check_precision(frame.points, frame.source, kSubtract);
+    frame.faces = faces_;
+    frame.sequence =
+        std::upper_bound(sequence_.begin(), sequence_.end(), at_) - sequence_.begin() - 1;
+    ++at_;
+    return frame;
+  }
+  void skip() override { at_ = std::min(at_ + 1, end_); }
+  void rewind() override { at_ = begin_; }
+  int64_t frames() const override { return end_ - begin_; }
+  int64_t sequences() const override { return static_cast<int64_t>(sequence_.size()) - 1; }
+  double fps() const override { return fps_; }
+
+ private:
+  int64_t row(int64_t frame) const { return offset_.empty() ? frame : offset_[frame]; }
+  void require_frames() const {
+    if (begin_ == end_)
+      throw InputError(set_.where(), "holds no frames", "give a file with at least one frame");
+  }
+  h5::File file_;
+  h5::Dataset set_;
+  std::vector<int64_t> offset_;
+  int64_t begin_ = 0, end_, at_ = 0;
+  double fps_;
+  std::vector<int64_t> sequence_;
+  std::vector<Triangle> faces_;
+};
+
+std::unique_ptr<FrameSource> open_ours(h5::File file, const FrameOptions& options) {
+  const bool scans = is_our_scans(file);
+  if (!scans && !file.has("/vertices"))
+    throw InputError(
+        file.path() + ":/points", "is missing, and so is /vertices",
+        "give a file of scans (/points, /frame_offset) or surfaces (/vertices [F, V, 3])");
+  h5::Dataset set =
+      scans ? file.dataset("/points", {-1, 3}) : file.dataset("/vertices", {-1, -1, 3});
+  std::vector<int64_t> offset;
+  if (scans) offset = read_offsets(file, "/frame_offset", set.rows(), false);
+  auto out = std::make_unique<Hdf5Frames>(std::move(file), std::move(set), std::move(offset));
+  if (options.sequence) out->choose(*options.sequence);
+  return out;
+}
+
+// ---- files of others ---------------------------------------------------------------------------
+
+constexpr int kDepth = 3;             // of groups that are looked into
+constexpr size_t kMostSets = 200000;  // a frame each
+
+/// A sequence is one data set, or one a frame.
+struct Sequence {
+  std::vector<std::string> sets;
+  std::vector<std::string> remarks;
+};
+
+/// All that has the shape of a cloud or a sequence.
+class Finder {
+ public:
+  explicit Finder(const h5::File& file) : file_(file) {}
+
+  std::vector<Sequence> find() {
+    if (file_.has("/bodies") || file_.has("/motions"))
+      throw InputError(file_.path(), "holds bodies or motions, not scans",
+                       "restage data perform makes scans of them");
+    walk("", 0);
+    std::vector<Sequence> out;
+    for (const std::string& name : sequences_) out.push_back({{name}, {}});
+    if (out.empty() && !clouds_.empty()) out.push_back(series());
+    if (out.empty())
+      throw InputError(file_.path() + ":/points", "is missing, and so is /vertices",
+                       "give a file of scans (/points, /frame_offset) or surfaces (/vertices [F, V, 3])");
+    return out;
+  }
+
+ private:
+  void walk(const std::string& group, int depth) {
+    for (const std::string& child : file_.children(group.empty() ? "/" : group)) {
+      const std::string name = group + "/" + child;
+      if (sequences_.size() + clouds_.size() >= kMostSets)
+        throw InputError(file_.path(), "holds too many data sets", "split it");
+      try {
+        consider(name, child);
+      } catch (const InputError&) {  // a group, or nothing that can be read
+        if (depth + 1 < kDepth) walk_group(name, depth + 1);
+      }
+    }
+  }
+
+  void walk_group(const std::string& name, int depth) {
+    try {
+      walk(name, depth);
+    } catch (const InputError&) {
+      // No group either: nothing that could be a cloud.
+    }
+  }
+
+  void consider(const std::string& name, const std::string& child) {
+    const h5::Dataset set = file_.dataset(name);
+    if (set.type() == h5::Type::text || is_no_cloud(child)) return;
+    const auto axes = cloud_axes(set.shape());
+    if (!axes) return;
+    (axes->sequence ? sequences_ : clouds_).push_back(name);
+  }
+
+  static bool is_no_cloud(const std::string& name) {
+    static const std::set<std::string> kNames = {
+        "faces", "f", "face", "triangles", "normals", "normal", "colors", "colours", "color", "rgb",
+        "joints", "label", "labels", "uv", "trans", "transl", "pose", "poses", "betas", "velocity"};
+    return kNames.count(lower_case(name)) > 0;
+  }
+
+  /// Single clouds are the frames of a sequence if their names are a series.
+  Sequence series() const {
+    if (clouds_.size() == 1) return {clouds_, {}};
+    std::vector<std::string> names;
+    for (std::string name : clouds_) {
+      std::replace(name.begin(), name.end(), '/', ' ');
+      names.push_back(name);
+    }
+    FrameList list = order_folders(names, file_.path());
+    if (list.files.empty())
+      throw InputError(file_.path(), "holds several arrays of points: " + list_of(clouds_),
+                       "keep one, or name frames by numbers");
+    Sequence out{{}, list.remarks};
+    for (std::string& name : list.files) {
+      const auto at = std::find(names.begin(), names.end(), name);
+      out.sets.push_back(clouds_[static_cast<size_t>(at - names.begin())]);
+    }
+    return out;
+  }
+
+  const h5::File& file_;
+  std::vector<std::string> sequences_, clouds_;
+};
+
+/// How many vertices the triangles of a file speak of; 0: it has none.
+int64_t vertices_by_faces(const h5::File& file) {
+  for (const char* name : {"/faces", "/f", "/triangles"}) {
+    if (!file.has(name)) continue;
+    const h5::Dataset set = file.dataset(name);
+    if (set.type() != h5::Type::integer || set.shape().size() != 2) continue;
+    const std::vector<int64_t> corners = set.read<int64_t>();
+    if (!corners.empty()) return *std::max_element(corners.begin(), corners.end()) + 1;
+  }
+  return 0;
+}
+
+class ForeignFrames : public FrameSource {
+ public:
+  ForeignFrames(h5::File file, const FrameOptions& options)
+      : file_(std::move(file)),
+        max_memory_(options.max_memory),
+        found_(Finder(file_).find()),
+        vertices_(vertices_by_faces(file_)),
+        fps_(read_fps(file_)) {
+    if (options.sequence) {
+      check_sequence(file_.path(), *options.sequence, sequences());
+      found_ = {found_[static_cast<size_t>(*options.sequence)]};
+    }
+    for (const Sequence& sequence : found_)
+      for (const std::string& set : sequence.sets) frames_ += axes_of(file_.dataset(set)).frames;
+    if (frames_ == 0)
+      throw InputError(file_.path(), "holds no frames", "give a file with at least one frame");
+  }
+
+  std::optional<Frame> next() override {
+    if (!find_place()) return std::nullopt;
+    const std::string& name = found_[sequence_].sets[set_];
+    if (!open_) open(name);
+    Frame frame;
+    frame.source = axes_.sequence ? cat(file_.path(), ":", name, ":", at_) : cat(file_.path(), ":", name);
+    frame.sequence = static_cast<int64_t>(sequence_);
+    std::vector<float> row;
+    if (whole_.empty() && axes_.sequence) open_->read_rows(at_, 1, row);
+    const std::vector<float>& values = row.empty() ? whole_ : row;
+    const int64_t f = row.empty() ? at_ : 0;
+    frame.points.resize(axes_.points);
+    for (int64_t i = 0; i < axes_.points; ++i)
+      for (int axis = 0; axis < 3; ++axis) frame.points[i][axis] = values[axes_.at(f, i, axis)];
+    ++at_;
+    frame.left_out = leave_out_non_finite(frame.points, frame.faces);
+    check_precision(frame.points, frame.source, kSubtract);
+    return frame;
+  }
+  void skip() override {
+    if (!find_place()) return;
+    if (!open_) open(found_[sequence_].sets[set_]);
+    ++at_;
+  }
+  void rewind() override {
+    sequence_ = set_ = 0;
+    close();
+  }
+  int64_t frames() const override { return frames_; }
+  int64_t sequences() const override { return std::ssize(found_); }
+  double fps() const override { return fps_; }
+  std::vector<std::string> remarks() const override {
+    std::vector<std::string> out;
+    for (const Sequence& sequence : found_) {
+      const h5::Dataset set = file_.dataset(sequence.sets[0]);
+      const CloudAxes axes = axes_of(set);
+      if (!axes.remark.empty())
+        out.push_back(cat(text::quote(sequence.sets[0]), " ", shape_text(set.shape()), ": ", axes.remark));
+      out.insert(out.end(), sequence.remarks.begin(), sequence.remarks.end());
+    }
+    return out;
+  }
+
+ private:
+  CloudAxes axes_of(const h5::Dataset& set) const { return *cloud_axes(set.shape(), vertices_); }
+
+  /// Goes on to a set that has frames left; false at the end.
+  bool find_place() {
+    while (sequence_ < found_.size()) {
+      if (open_ && at_ < axes_.frames) return true;
+      if (!open_) {
+        if (axes_of(file_.dataset(found_[sequence_].sets[set_])).frames > 0) return true;
+      }
+      close();
+      if (++set_ < found_[sequence_].sets.size()) continue;
+      set_ = 0;
+      ++sequence_;
+    }
+    return false;
+  }
+
+  void open(const std::string& name) {
+    open_.emplace(file_.dataset(name));
+    axes_ = axes_of(*open_);
+    at_ = 0;
+    whole_.clear();
+    if (axes_.sequence && axes_.in_order()) return;
+    const auto values = static_cast<uint64_t>(open_->rows()) * static_cast<uint64_t>(open_->row_size());
+    if (values > max_memory_ / sizeof(float))
+      throw InputError(open_->where(), cat("takes ", values * sizeof(float), " bytes"),
+                       "allow more with --max-memory");
+    whole_ = open_->read<float>();
+  }
+
+  void close() {
+    open_.reset();
+    whole_.clear();
+    at_ = 0;
+  }
+
+  h5::File file_;
+  uint64_t max_memory_;
+  std::vector<Sequence> found_;
+  int64_t vertices_;
+  double fps_;
+  int64_t frames_ = 0, at_ = 0;
+  size_t sequence_ = 0, set_ = 0;
+  std::optional<h5::Dataset> open_;
+  CloudAxes axes_;
+  std::vector<float> whole_;  // where a frame is spread over the data set
+};
+
+}  // namespace
+
+void check_sequence(const std::string& path, int64_t sequence, int64_t sequences) {
+  if (sequence >= 0 && sequence < sequences) return;
+  throw InputError(
+      path, cat("has no sequence number ", sequence),
+      sequences == 1 ? "it holds one, number 0" : cat("give a number from 0 to ", sequences - 1));
+}
+
+bool is_hdf5_name(const std::string& path) {
+  return text::ends_in(path, {".h5", ".hdf5", ".hdf", ".he5"});
+}
+
+bool is_foreign_hdf5(const std::string& path) {
+  const h5::File file = open_schema_file(path);
+  return !is_our_scans(file) && !is_our_prediction(file) && !file.has("/bodies") && !file.has("/motions");
+}
+
+bool states_fps(const std::string& path) {
+  return open_schema_file(path).number("/", "fps").has_value();
+}
+
+std::unique_ptr<FrameSource> open_hdf5_frames(const std::string& path, const FrameOptions& options) {
+  h5::File file = open_schema_file(path);
+  if (is_our_scans(file) || is_our_prediction(file)) return open_ours(std::move(file), options);
+  return std::make_unique<ForeignFrames>(std::move(file), options);
+}
+
+}  // namespace restage

@@ -1,0 +1,235 @@
+// Tables of points as text: .xyz, .pts, .csv and their like.
+#include <algorithm>
+#include <array>
+#include <optional>
+
+#include "datasets/readers/errors.h"
+#include "datasets/readers/mesh_parsers.h"
+#include "datasets/readers/text.h"
+#include "datasets/readers/word_lines.h"
+
+namespace restage {
+namespace {
+
+const char* const kSaveAgain = "save the points again, x y z in each line";
+constexpr size_t kMaxColumns = 4096;
+
+using Cells = std::vector<std::string_view>;
+
+/// Without blanks and quotation marks around it.
+std::string_view bare(std::string_view cell) {
+  constexpr const char* kAround = " \t\r\"'";
+  const size_t begin = cell.find_first_not_of(kAround);
+  if (begin == std::string_view::npos) return {};
+  return cell.substr(begin, cell.find_last_not_of(kAround) - begin + 1);
+}
+
+/// Cells between separators; of semicolons and commas a cell may be empty.
+void split(std::string_view line, char separator, Cells& cells) {
+  cells.clear();
+  if (separator == ' ') {
+    for (auto word = text::take_word(line); !word.empty() && cells.size() < kMaxColumns;
+         word = text::take_word(line))
+      cells.push_back(bare(word));
+    return;
+  }
+  for (size_t end = 0; end != std::string_view::npos && cells.size() < kMaxColumns;) {
+    end = line.find(separator);
+    cells.push_back(bare(line.substr(0, end)));
+    if (end != std::string_view::npos) line.remove_prefix(end + 1);
+  }
+  if (cells.size() > 1 && cells.back().empty()) cells.pop_back();  // "1,2,3,"
+}
+
+/// Commas in numbers ("0,5 1,5 2,5") are no separators.
+char separator_of(std::string_view line) {
+  if (line.find(';') != std::string_view::npos) return ';';
+  Cells words;
+  split(line, ' ', words);
+  const bool decimals = words.size() >= 3 && std::all_of(words.begin(), words.end(), [](auto word) {
+                          double value = 0;
+                          return text::has_decimal_comma(word) || text::parse(word, value);
+                        });
+  return line.find(',') != std::string_view::npos && !decimals ? ',' : ' ';
+}
+
+/// "X", "x [m]", "Points:0", "pos_y", "//Z" and their like; -1: another column.
+int axis_of(std::string_view cell) {
+  std::string name = lower_case(cell);
+  name = name.substr(0, name.find_first_of("[("));
+  while (!name.empty() && (name.back() == ' ' || name.back() == '_')) name.pop_back();
+  name.erase(0, name.find_first_not_of("/# "));
+  constexpr std::array<std::string_view, 7> kBefore = {"", "p", "pos_", "position_", "pos", "coord_", "point_"};
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const std::string_view before : kBefore)
+      if (name == std::string(before) + "xyz"[axis]) return axis;
+    for (const std::string_view before : {"points:", "points_"})
+      if (name == std::string(before) + "012"[axis]) return axis;
+  }
+  return -1;
+}
+
+/// "frame", "Frame_ID"; or a time, which frames share, too.
+bool counts_frames(std::string_view cell) {
+  const std::string name = lower_case(cell);
+  constexpr std::array<std::string_view, 8> kNames = {"frame",     "frame_id", "frameid", "frame_number",
+                                                      "frame_idx", "time",     "t",       "timestamp"};
+  return std::find(kNames.begin(), kNames.end(), name) != kNames.end();
+}
+
+class TableParser {
+ public:
+  TableParser(std::string_view content, const std::string& path, const Vec3& origin, NonFinite how)
+      : lines_(text::without_mark(content, path)), path_(path), origin_(origin), how_(how) {}
+
+  /// `whole`: not only the first lines of a file.
+  Mesh parse(bool whole) {
+    std::string_view line;
+    while (lines_.next(line)) {
+      const size_t begin = line.find_first_not_of(" \t\r");
+      if (begin == std::string_view::npos) continue;
+      line.remove_prefix(begin);
+      const bool comment = line[0] == '#' || line.starts_with("//");
+      if (comment && (columns_ > 0 || !names_axes(line))) continue;
+      if (columns_ == 0)
+        first_line(line);
+      else
+        point(line);
+    }
+    if (whole) check_end();
+    return std::move(out_);
+  }
+
+ private:
+  std::string where() const { return cat(path_, ":", lines_.number()); }
+
+  bool names_axes(std::string_view line) const {
+    while (!line.empty() && (line[0] == '#' || line[0] == '/')) line.remove_prefix(1);
+    Cells cells;
+    split(line, separator_of(line), cells);
+    std::array<int, 3> seen{};
+    for (const std::string_view cell : cells)
+      if (const int axis = axis_of(cell); axis >= 0) ++seen[static_cast<size_t>(axis)];
+    return seen == std::array<int, 3>{1, 1, 1};
+  }
+
+  void first_line(std::string_view line) {
+    if (names_axes(line)) return header(line);
+    separator_ = separator_of(line);
+    split(line, separator_, cells_);
+    if (int64_t count = 0; cells_.size() == 1 && !announced_ && text::parse(cells_[0], count) && count >= 0) {
+      announced_ = count;
+      return;
+    }
+    if (axis_column_[0] < 0) axis_column_ = {0, 1, 2};
+    columns_ = std::max(cells_.size(), named_columns_);
+    point(line);
+  }
+
+  void header(std::string_view line) {
+    while (!line.empty() && (line[0] == '#' || line[0] == '/')) line.remove_prefix(1);
+    split(line, separator_of(line), cells_);
+    for (size_t i = 0; i < cells_.size(); ++i) {
+      if (const int axis = axis_of(cells_[i]); axis >= 0)
+        axis_column_[static_cast<size_t>(axis)] = static_cast<int>(i);
+      if (counts_frames(cells_[i])) frame_column_ = static_cast<int>(i);
+    }
+    named_columns_ = cells_.size();
+  }
+
+  void point(std::string_view line) {
+    split(line, separator_, cells_);
+    if (cells_.size() < 3)
+      throw InputError(where(), "has fewer than 3 numbers", kSaveAgain);
+    if (cells_.size() != columns_)
+      throw InputError(where(), cat("has ", cells_.size(), " columns, the lines before ", columns_),
+                       kSaveAgain);
+    Point point;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const double value = number(cells_[static_cast<size_t>(axis_column_[axis])]);
+      point[static_cast<int>(axis)] = text::coordinate(
+          value - origin_[static_cast<int>(axis)], [&] { return where(); }, how_);
+    }
+    if (named_columns_ == 0) counted_ = counted_ && columns_ > 3 && follows(number(cells_[0]));
+    if (frame_column_ >= 0) check_frame(cells_[static_cast<size_t>(frame_column_)]);
+    out_.vertices.push_back(point);
+  }
+
+  /// An empty cell is a missing number.
+  double number(std::string_view cell) const {
+    double value = std::numeric_limits<double>::quiet_NaN();
+    if (cell.empty() || text::parse(cell, value)) return value;
+    if (separator_ != ';' || !text::has_decimal_comma(cell)) text::throw_no_number(cell, where());
+    std::string with_point(cell);
+    with_point[with_point.find(',')] = '.';
+    text::parse(with_point, value);
+    return value;
+  }
+
+  /// Whether the first column counts on from the line before.
+  bool follows(double value) {
+    const bool out = out_.vertices.empty() ? value == 0 || value == 1 : value == last_ + 1;
+    last_ = value;
+    return out;
+  }
+
+  void check_frame(std::string_view cell) {
+    if (out_.vertices.empty()) frame_ = cell;
+    if (cell == frame_) return;
+    if (out_.vertices.size() == 1)
+      frame_column_ = -1;  // it counts points, or is a scanner's time of each
+    else
+      throw InputError(where(), "another frame begins here, and a table is one frame",
+                       "write each frame into a file of its own");
+  }
+
+  void check_end() const {
+    if (announced_ && *announced_ != std::ssize(out_.vertices))
+      throw InputError(path_, cat("holds ", out_.vertices.size(), " points, its first line says ", *announced_),
+                       "give the whole file");
+    if (counted_ && out_.vertices.size() > 3)
+      throw InputError(path_, "its first column only counts the points",
+                       "leave that column out, or name the columns in a first line (n x y z)");
+  }
+
+  text::Lines lines_;
+  const std::string& path_;
+  Vec3 origin_;
+  NonFinite how_;
+  Mesh out_;
+  Cells cells_;
+  char separator_ = ' ';
+  size_t columns_ = 0, named_columns_ = 0;
+  std::array<int, 3> axis_column_ = {-1, -1, -1};
+  int frame_column_ = -1;
+  std::string frame_;
+  std::optional<int64_t> announced_;
+  bool counted_ = true;
+  double last_ = 0;
+};
+
+}  // namespace
+
+bool starts_as_table(std::string_view content) {
+  std::string head(content.substr(0, 4096));
+  if (content.size() > head.size()) head.resize(head.rfind('\n') + 1);  // npos + 1 is 0
+  try {
+    const std::string nowhere;
+    return !TableParser(head, nowhere, Vec3::Zero(), NonFinite::mark).parse(false).vertices.empty();
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+Mesh parse_table(std::string_view content, const std::string& path, const Vec3& origin,
+                 NonFinite how) {
+  std::string with_ends;  // lines of old Macintosh programs end with CR alone
+  if (content.find('\n') == std::string_view::npos && content.find('\r') != std::string_view::npos) {
+    with_ends = content;
+    std::replace(with_ends.begin(), with_ends.end(), '\r', '\n');
+    content = with_ends;
+  }
+  return TableParser(content, path, origin, how).parse(true);
+}
+
+}  // namespace restage
