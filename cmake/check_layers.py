@@ -45,7 +45,9 @@ MAY_USE = {
 }
 
 # Single files that may reach further: memory and conversions come from the backend.
-ALSO = {"autograd/tensor/tensor.cpp": ["autograd/kernels/scratch.h", "autograd/kernels/elementwise.h"], "experiments/main.cpp": ["experiments/cli/program.h"]}
+ALSO = {"autograd/tensor/tensor.cpp": ["autograd/kernels/scratch.h", "autograd/kernels/elementwise.h"],
+        "nn/weights/state.cpp": ["autograd/kernels/elementwise.h"],
+        "experiments/main.cpp": ["experiments/cli/program.h"]}
 
 # Third-party (and a few system) headers and the only places that may know them.
 ONLY_IN = {
@@ -54,7 +56,7 @@ ONLY_IN = {
     "sanitizer/": ["autograd/cpu/pool.cpp"],
     "hdf5.h": ["datasets/hdf5/"],
     "yaml-cpp/": ["nn/config/config_yaml.cpp", "nn/weights/", "datasets/importers/profiles.cpp"],
-    "CLI/": ["experiments/"],
+    "CLI/": ["experiments/cli/command_options.cpp", "experiments/cli/program.cpp"],
     "nanoflann.hpp": ["nn/metrics/", "datasets/doctor/", "infer/registration/"],
     "nlohmann/": ["nn/weights/", "datasets/readers/", "datasets/benchmark/manifest.cpp",
                   "datasets/importers/makehuman_pack.cpp", "datasets/fetch/fetch_cmu.cpp", "train/", "infer/",

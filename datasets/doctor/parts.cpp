@@ -16,12 +16,12 @@ namespace restage {
 namespace {
 
 constexpr size_t kMostJudged = 20000;
-constexpr float kEven = 0.08f;     // times the size (3 cm of a person): one point a cube is judged
-constexpr size_t kNeighbours = 4;  // a point's loneliness is the distance to this one
-constexpr float kLonely = 3.5f;    // times the typical distance: a stray point
-constexpr float kLinked = 2.5f;    // times the typical distance: of one piece
-constexpr float kApart = 0.4f;     // times the size (0.4 m of a person): not the same person
-constexpr double kSmallPiece = 0.012;  // part of all points; fewer are stray
+constexpr float kEven = 0.08f;  // times the size (3 cm of a person): one point a cube is judged
+constexpr size_t kLonelyNeighbours = 4;  // a point's loneliness is the distance to this one
+constexpr float kLonely = 3.5f;          // times the typical distance: a stray point
+constexpr float kLinked = 2.5f;          // times the typical distance: of one piece
+constexpr float kApart = 0.4f;           // times the size (0.4 m of a person): not the same person
+constexpr double kSmallPiece = 0.012;    // part of all points; fewer are stray
 
 struct Cloud {
   const Points& points;
@@ -35,11 +35,11 @@ struct Cloud {
 using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Cloud>, Cloud,
                                                  3, uint32_t>;
 
-/// Distance of each point to its kNeighbours-th neighbour.
+/// Distance of each point to its kLonelyNeighbours-th neighbour.
 std::vector<float> loneliness(const Tree& tree, const Points& points) {
   std::vector<float> out(points.size());
-  std::array<uint32_t, kNeighbours + 1> index;
-  std::array<float, kNeighbours + 1> squared;
+  std::array<uint32_t, kLonelyNeighbours + 1> index;
+  std::array<float, kLonelyNeighbours + 1> squared;
   for (size_t i = 0; i < points.size(); ++i) {
     const size_t n = tree.knnSearch(points[i].data(), index.size(), index.data(), squared.data());
     out[i] = n > 0 ? std::sqrt(squared[n - 1]) : 0;

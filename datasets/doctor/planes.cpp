@@ -15,12 +15,12 @@ namespace {
 
 constexpr int kPlanes = 3, kTries = 600;
 constexpr size_t kLooked = 2000;
-constexpr size_t kLeast = 100;    // points; fewer show no plane
-constexpr double kThick = 0.01;   // times the diagonal: on the plane, at first
-constexpr double kThin = 0.001;   // no plane is thinner
-constexpr double kShare = 0.08;   // of the points that a plane has at least
-constexpr double kBehind = 0.05;  // of the points that may lie on its other side
-constexpr double kRest = 0.02;    // of the points that are not on it: somebody
+constexpr size_t kLeast = 100;       // points; fewer show no plane
+constexpr double kThick = 0.01;      // times the diagonal: on the plane, at first
+constexpr double kThinnest = 0.001;  // no plane is thinner
+constexpr double kShare = 0.08;      // of the points that a plane has at least
+constexpr double kBehind = 0.05;     // of the points that may lie on its other side
+constexpr double kRest = 0.02;       // of the points that are not on it: somebody
 // Far beyond: cells inside what the plane fills beside the rest's shadow. A trunk fills some ten,
 // arms and legs none, two square metres of floor about a person fill sixty.
 constexpr double kCell = 0.04;  // times the diagonal
@@ -147,7 +147,7 @@ Planes find_planes(const Points& points) {
     if (!(size > 0) || !std::isfinite(size * size)) break;
     std::optional<Plane> plane = best_plane(some, kThick * size);
     if (!plane || !reaches_far(left, *plane, kCell * size)) break;
-    plane->thick = std::clamp(noise_of(some, *plane), kThin * size, kThick * size);
+    plane->thick = std::clamp(noise_of(some, *plane), kThinnest * size, kThick * size);
     plane = fitted(some, *plane);
     std::vector<bool> on = out.on;
     left.clear();

@@ -19,7 +19,7 @@ enum : int { kSpine1 = 3, kSpine2 = 6, kSpine3 = 9 };
 /// Those that cannot be placed.
 constexpr int kRequired[] = {0, 1, 2, 4, 5, 7, 8, 15, 16, 17, 18, 19, 20, 21};
 
-constexpr const char* kFix =
+constexpr const char* kNameThem =
     "say which bone is which joint in a file, and give it with --bones names.yaml (docs/data.md)";
 
 /// In lower case, "Bip01 L Thigh" as "bip01_l_thigh" (BVH files cannot hold blanks in names).
@@ -274,7 +274,7 @@ std::vector<std::string> words_for(const BoneTree& tree, const FoundJoints& foun
     what = cat("of the joints of a person these were not found among its bones: ",
                list_of(words_for(tree, found, plain)), found.why.empty() ? "" : "; ", found.why);
   }
-  throw UnknownSkeleton(where, what, kFix);
+  throw UnknownSkeleton(where, what, kNameThem);
 }
 
 /// The bones that a profile names which was asked for. InputError for those that the file lacks, or

@@ -15,7 +15,7 @@ namespace {
 
 constexpr size_t kLongest = 64 * 1024;  // bytes of a profile
 constexpr size_t kMostNames = 32;       // that may stand for one joint
-constexpr const char* kFix = "see datasets/importers/profiles/README.md for the form";
+constexpr const char* kSeeForm = "see datasets/importers/profiles/README.md for the form";
 
 /// Reads one profile; every complaint names file and line.
 class Reader {
@@ -24,12 +24,12 @@ class Reader {
 
   Profile read(std::string_view yaml) {
     if (yaml.size() > kLongest)
-      throw InputError(path_, "is longer than 64 kB, which is no profile", kFix);
+      throw InputError(path_, "is longer than 64 kB, which is no profile", kSeeForm);
     YAML::Node root;
     try {
       root = YAML::Load(std::string(yaml));
     } catch (const YAML::Exception& e) {
-      throw InputError(cat(path_, ":", std::max(e.mark.line, 0) + 1), "is not YAML", kFix);
+      throw InputError(cat(path_, ":", std::max(e.mark.line, 0) + 1), "is not YAML", kSeeForm);
     }
     Profile out;
     out.name = std::filesystem::path(path_).stem().string();
@@ -41,7 +41,7 @@ class Reader {
            if (key == "expect") expectations(v, out);
            if (key == "lead") out.lead = static_cast<size_t>(number(v, 1, 1000));
          });
-    if (out.title.empty()) throw InputError(path_, "has no title", kFix);
+    if (out.title.empty()) throw InputError(path_, "has no title", kSeeForm);
     for (const int j : {0, 1, 2, 4, 5, 7, 8, 15, 16, 17, 18, 19, 20, 21})
       if (out.bones[j].empty())
         throw InputError(path_, cat("names no bone for ", kJointNames[j]), "add it under 'joints'");
@@ -50,7 +50,7 @@ class Reader {
 
  private:
   [[noreturn]] void fail(const YAML::Node& node, const std::string& wrong,
-                         const std::string& fix = kFix) const {
+                         const std::string& fix = kSeeForm) const {
     std::string line = wrong;  // a quoted key may hold anything
     for (char& c : line)
       if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '?';

@@ -8,12 +8,12 @@
 namespace restage {
 namespace {
 
-constexpr const char* kFix = "give a SMPL, SMPL-H or SMPL-X model as published (.npz)";
+constexpr const char* kGiveModel = "give a SMPL, SMPL-H or SMPL-X model as published (.npz)";
 constexpr double kMostMetres = 100;  // nobody is larger: other units, or no model at all
 
 [[noreturn]] void misfit(const NpyArray& array, const std::string& wanted) {
   throw InputError(array.where(), "has the shape " + shape_text(array.shape()) + ", not " + wanted,
-                   kFix);
+                   kGiveModel);
 }
 
 void check_shape(const NpyArray& array, const std::vector<int64_t>& wanted) {
@@ -57,11 +57,11 @@ SmplModel::SmplModel(const Npz& file)
   read_faces(file);
   const Joints rest = joints({});
   if (!(rest[15].y() > rest[0].y()) || !(rest[1].x() > rest[2].x()))
-    throw InputError(path_, "does not stand with y up and its left towards +x", kFix);
+    throw InputError(path_, "does not stand with y up and its left towards +x", kGiveModel);
   const double height = (rest[15] - 0.5 * (rest[7] + rest[8])).norm();
   if (!(height > 0.3 && height < 3))
     throw InputError(path_, cat("is no person's size in metres: from ankles to head ", height),
-                     kFix);
+                     kGiveModel);
 }
 
 void SmplModel::read_template(const Npz& file) {
@@ -72,13 +72,14 @@ void SmplModel::read_template(const Npz& file) {
   for (size_t v = 0; v < template_.size(); ++v) {
     template_[v] = Vec3(&values[3 * v]);
     if (!(template_[v].cwiseAbs().maxCoeff() < kMostMetres))
-      throw InputError(array.where(), "is larger than any person in metres", kFix);
+      throw InputError(array.where(), "is larger than any person in metres", kGiveModel);
   }
   if (!directions_.is_shaped({array.shape()[0], 3, -1}))
     misfit(directions_, cat("[", template_.size(), ", 3, B]"));
   for (int64_t i = 0; i < directions_.size(); ++i)
     if (!(std::abs(directions_[i]) < kMostMetres))
-      throw InputError(directions_.where(), "holds a number that is no length in metres", kFix);
+      throw InputError(directions_.where(), "holds a number that is no length in metres",
+                       kGiveModel);
 }
 
 void SmplModel::read_skeleton(const Npz& file) {
@@ -91,7 +92,8 @@ void SmplModel::read_skeleton(const Npz& file) {
     const bool known = j < kJoints ? j == 0 || parent == kParents[j]
                                    : parent >= 0 && parent < static_cast<double>(j);
     if (!known)
-      throw InputError(table.where(), cat("gives joint ", j, " another parent than SMPL"), kFix);
+      throw InputError(table.where(), cat("gives joint ", j, " another parent than SMPL"),
+                       kGiveModel);
     parents_.push_back(j == 0 ? -1 : static_cast<int>(parent));
   }
 }
@@ -103,7 +105,7 @@ void SmplModel::read_regressor() {
   for (int64_t i = 0; i < kJoints * n; ++i) {
     const double share = regressor_[i];
     if (!(std::abs(share) < 1e3))
-      throw InputError(regressor_.where(), "holds a number that is no share", kFix);
+      throw InputError(regressor_.where(), "holds a number that is no share", kGiveModel);
     if (share != 0) joint_vertices_[i / n].push_back(static_cast<uint32_t>(i % n));
   }
 }
@@ -119,13 +121,14 @@ void SmplModel::read_weights(const Npz& file) {
     for (int64_t j = 0; j < joints; ++j) {
       const double weight = array[v * joints + j];
       if (!(weight >= -1e-6 && weight < 1e3))
-        throw InputError(array.where(), "holds a weight that is negative or no number", kFix);
+        throw InputError(array.where(), "holds a weight that is negative or no number", kGiveModel);
       int ours = static_cast<int>(j);  // hands, jaw and eyes: the joint of ours they hang from
       while (ours >= kJoints) ours = parents_[ours];
       row[ours] += std::max(weight, 0.0);
       sum += std::max(weight, 0.0);
     }
-    if (!(sum > 0)) throw InputError(array.where(), cat("gives vertex ", v, " no weight"), kFix);
+    if (!(sum > 0))
+      throw InputError(array.where(), cat("gives vertex ", v, " no weight"), kGiveModel);
     for (int j = 0; j < kJoints; ++j) weights_(v, j) = static_cast<float>(row[j] / sum);
   }
 }
@@ -138,7 +141,7 @@ void SmplModel::read_faces(const Npz& file) {
     const double index = array[i];
     if (!(index >= 0 && index < static_cast<double>(template_.size())) ||
         index != std::floor(index))
-      throw InputError(array.where(), "names a vertex that does not exist", kFix);
+      throw InputError(array.where(), "names a vertex that does not exist", kGiveModel);
     faces_[i / 3][i % 3] = static_cast<int32_t>(index);
   }
 }
@@ -155,7 +158,7 @@ void SmplModel::read_blend_shapes(const Npz& file) {
     for (int64_t k = 0; k < PoseBlendShapes::kFeatures; ++k) {
       const double value = array[row * width + k];
       if (!(std::abs(value) < kMostMetres))
-        throw InputError(array.where(), "holds a number that is no length in metres", kFix);
+        throw InputError(array.where(), "holds a number that is no length in metres", kGiveModel);
       shapes->directions(row, k) = static_cast<float>(value);
     }
   blend_shapes_ = shapes;

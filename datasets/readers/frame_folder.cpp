@@ -88,9 +88,9 @@ std::string ending_of(const std::string& path) {
 
 /// Of one frame in several kinds of files the first of these is taken, unless there are more files
 /// of another.
-constexpr std::string_view kEndings[] = {".ply",    ".obj",  ".pcd", ".glb", ".gltf", ".vrm",
-                                         ".xyz",    ".xyzrgb", ".xyzn", ".pts", ".asc", ".npz",
-                                         ".npy",    ".csv",  ".txt"};
+constexpr std::string_view kEndings[] = {".ply", ".obj", ".pcd",    ".glb",  ".gltf",
+                                         ".vrm", ".xyz", ".xyzrgb", ".xyzn", ".pts",
+                                         ".asc", ".npz", ".npy",    ".csv",  ".txt"};
 
 size_t rank_of(const std::string& ending) {
   return static_cast<size_t>(std::find(std::begin(kEndings), std::end(kEndings), ending) -

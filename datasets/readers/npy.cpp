@@ -15,10 +15,10 @@ using Json = nlohmann::json;
 
 constexpr size_t kMaxHeader = 1 << 16;
 constexpr size_t kMaxAxes = 32;
-constexpr const char* kAgain = "save it again with numpy.save or savez";
+constexpr const char* kSaveWithNumpy = "save it again with numpy.save or savez";
 
 [[noreturn]] void unreadable(const std::string& where) {
-  throw InputError(where, "has no readable NPY header", kAgain);
+  throw InputError(where, "has no readable NPY header", kSaveWithNumpy);
 }
 
 /// The header's Python literal, {'descr': '<f8', 'fortran_order': False, 'shape': (3, 4), }, as
@@ -107,7 +107,8 @@ void count_elements(NpyHeader& header, const std::string& where) {
   for (const int64_t length : header.shape) {
     const auto n = static_cast<uint64_t>(length);
     if (n != 0 && count > kMost / n)
-      throw InputError(where, "claims the impossible shape " + shape_text(header.shape), kAgain);
+      throw InputError(where, "claims the impossible shape " + shape_text(header.shape),
+                       kSaveWithNumpy);
     count *= n;
   }
   header.count = static_cast<int64_t>(count);
@@ -139,10 +140,10 @@ NpyHeader read_npy_header(ByteStream& in) {
   char magic[8];
   if (in.left() >= sizeof magic) in.read(magic, sizeof magic);
   if (in.size() < sizeof magic || std::memcmp(magic, "\x93NUMPY", 6) != 0)
-    throw InputError(in.where(), "is no NPY array", kAgain);
+    throw InputError(in.where(), "is no NPY array", kSaveWithNumpy);
   const int version = magic[6];
   if (version < 1 || version > 3 || magic[7] != 0)
-    throw InputError(in.where(), "is of an unknown version of NPY", kAgain);
+    throw InputError(in.where(), "is of an unknown version of NPY", kSaveWithNumpy);
   unsigned char length[4] = {0, 0, 0, 0};
   in.read(reinterpret_cast<char*>(length), version == 1 ? 2 : 4);
   const size_t n = length[0] | length[1] << 8 | length[2] << 16 | size_t{length[3]} << 24;

@@ -10,7 +10,7 @@
 namespace restage {
 namespace {
 
-const char* const kSaveAgain = "save the cloud again";
+const char* const kSaveCloud = "save the cloud again";
 constexpr size_t kMaxFields = 256;
 constexpr uint64_t kMaxPoints = uint64_t{1} << 32;
 constexpr uint64_t kMaxCount = 1 << 16;
@@ -22,11 +22,11 @@ struct Field {
   uint64_t bytes() const { return size * count; }
 };
 
-struct Header {
+struct PcdHeader {
   std::vector<Field> fields;
   uint64_t width = 0, height = 1, points = 0;
   bool has_points = false;
-  std::string data;  ///< ascii, binary or binary_compressed
+  std::string data;              ///< ascii, binary or binary_compressed
   std::array<size_t, 3> axis{};  ///< which field is x, y, z
   uint64_t row() const {
     uint64_t out = 0;
@@ -41,11 +41,11 @@ const Number* number_of(const Field& field) {
     char type;
     const Number* number;
   };
-  static constexpr Named kNames[] = {
-      {'F', &kNumber<float>},    {'F', &kNumber<double>},   {'I', &kNumber<int8_t>},
-      {'I', &kNumber<int16_t>},  {'I', &kNumber<int32_t>},  {'I', &kNumber<int64_t>},
-      {'U', &kNumber<uint8_t>},  {'U', &kNumber<uint16_t>}, {'U', &kNumber<uint32_t>},
-      {'U', &kNumber<uint64_t>}};
+  static constexpr Named kNames[] = {{'F', &kNumber<float>},    {'F', &kNumber<double>},
+                                     {'I', &kNumber<int8_t>},   {'I', &kNumber<int16_t>},
+                                     {'I', &kNumber<int32_t>},  {'I', &kNumber<int64_t>},
+                                     {'U', &kNumber<uint8_t>},  {'U', &kNumber<uint16_t>},
+                                     {'U', &kNumber<uint32_t>}, {'U', &kNumber<uint64_t>}};
   for (const Named& known : kNames)
     if (known.type == field.type && known.number->bytes == field.size) return known.number;
   return nullptr;
@@ -57,10 +57,11 @@ class HeaderParser {
  public:
   HeaderParser(text::Lines& lines, const std::string& path) : lines_(lines), path_(path) {}
 
-  Header parse() {
+  PcdHeader parse() {
     std::string_view line;
     while (out_.data.empty()) {
-      if (!lines_.next(line)) throw InputError(path_, "is cut short inside the PCD header", kSaveAgain);
+      if (!lines_.next(line))
+        throw InputError(path_, "is cut short inside the PCD header", kSaveCloud);
       entry(line);
     }
     return checked();
@@ -74,7 +75,8 @@ class HeaderParser {
     if (key == "fields" || key == "columns") {
       for (auto word = text::take_word(line); !word.empty(); word = text::take_word(line)) {
         out_.fields.emplace_back().name = lower_case(word);
-        if (out_.fields.size() > kMaxFields) throw InputError(where(), "has too many fields", kSaveAgain);
+        if (out_.fields.size() > kMaxFields)
+          throw InputError(where(), "has too many fields", kSaveCloud);
       }
     } else if (key == "size") {
       for (Field& field : out_.fields) field.size = number(line, 8);
@@ -94,7 +96,7 @@ class HeaderParser {
       out_.has_points = true;
     } else if (key == "data") {
       out_.data = lower_case(text::take_word(line));
-      if (out_.data.empty()) throw InputError(where(), "DATA names no format", kSaveAgain);
+      if (out_.data.empty()) throw InputError(where(), "DATA names no format", kSaveCloud);
     }  // VERSION, VIEWPOINT, comments
   }
 
@@ -102,14 +104,15 @@ class HeaderParser {
     const std::string_view word = text::take_word(line);
     int64_t value = 0;
     if (!text::parse(word, value) || value < 0 || static_cast<uint64_t>(value) > most)
-      throw InputError(where(), text::quote(word) + " is no usable count", kSaveAgain);
+      throw InputError(where(), text::quote(word) + " is no usable count", kSaveCloud);
     return static_cast<uint64_t>(value);
   }
 
-  Header checked() {
+  PcdHeader checked() {
     if (!out_.has_points)
-      out_.points = out_.height > 0 && out_.width > kMaxPoints / out_.height ? kMaxPoints
-                                                                             : out_.width * out_.height;
+      out_.points = out_.height > 0 && out_.width > kMaxPoints / out_.height
+                        ? kMaxPoints
+                        : out_.width * out_.height;
     for (size_t axis = 0; axis < 3; ++axis) {
       const std::string name(1, "xyz"[axis]);
       size_t found = 0;
@@ -117,7 +120,7 @@ class HeaderParser {
       if (found == out_.fields.size())
         throw InputError(path_, "has no field " + name, "save the cloud with x, y and z");
       if (number_of(out_.fields[found]) == nullptr || out_.fields[found].count != 1)
-        throw InputError(path_, "its field " + name + " is no single number", kSaveAgain);
+        throw InputError(path_, "its field " + name + " is no single number", kSaveCloud);
       out_.axis[axis] = found;
     }
     if (out_.data != "ascii" && out_.data != "binary" && out_.data != "binary_compressed")
@@ -128,25 +131,28 @@ class HeaderParser {
 
   text::Lines& lines_;
   const std::string& path_;
-  Header out_;
+  PcdHeader out_;
 };
 
 // ---- points ------------------------------------------------------------------------------------
 
-[[noreturn]] void throw_short(const std::string& path, const Header& header) {
-  throw InputError(path, cat("is cut short: it should have ", header.points, " points"), kSaveAgain);
+[[noreturn]] void throw_short(const std::string& path, const PcdHeader& header) {
+  throw InputError(path, cat("is cut short: it should have ", header.points, " points"),
+                   kSaveCloud);
 }
 
-/// LZF, which PCL packs with: literals of up to 32 bytes, and copies of up to 264 bytes from at most
-/// 8 KiB back. InputError unless exactly `size` bytes come out.
+/// LZF, which PCL packs with: literals of up to 32 bytes, and copies of up to 264 bytes from at
+/// most 8 KiB back. InputError unless exactly `size` bytes come out.
 std::string unpack_lzf(std::string_view in, uint64_t size, const std::string& path) {
   const auto damaged = [&]() -> InputError {
-    return InputError(path, "is damaged: its packed points make no sense", kSaveAgain);
+    return InputError(path, "is damaged: its packed points make no sense", kSaveCloud);
   };
   if (size / 100 > in.size()) throw damaged();  // three bytes make at most 264
   std::string out;
   out.reserve(size);
-  const auto byte = [&](size_t at) { return static_cast<size_t>(static_cast<unsigned char>(in[at])); };
+  const auto byte = [&](size_t at) {
+    return static_cast<size_t>(static_cast<unsigned char>(in[at]));
+  };
   for (size_t at = 0; at < in.size();) {
     const size_t control = byte(at++);
     if (control < 32) {
@@ -185,8 +191,9 @@ struct Reading {
 };
 
 /// Numbers of `bytes`: field f of point i stands at start[f] + i * step[f].
-void read_binary(std::string_view bytes, const Header& header, const std::vector<uint64_t>& start,
-                 const std::vector<uint64_t>& step, const Reading& reading, Points& points) {
+void read_binary(std::string_view bytes, const PcdHeader& header,
+                 const std::vector<uint64_t>& start, const std::vector<uint64_t>& step,
+                 const Reading& reading, Points& points) {
   for (uint64_t i = 0; i < header.points; ++i) {
     Vec3 value;
     for (int axis = 0; axis < 3; ++axis) {
@@ -197,8 +204,8 @@ void read_binary(std::string_view bytes, const Header& header, const std::vector
   }
 }
 
-void read_packed(std::string_view bytes, const Header& header, bool packed, const Reading& reading,
-                 Points& points) {
+void read_packed(std::string_view bytes, const PcdHeader& header, bool packed,
+                 const Reading& reading, Points& points) {
   const uint64_t row = header.row();
   std::string unpacked;
   if (packed) {
@@ -207,7 +214,7 @@ void read_packed(std::string_view bytes, const Header& header, bool packed, cons
     const auto size = static_cast<uint64_t>(number_at<uint32_t>(bytes.data() + 4));
     if (length > bytes.size() - 8) throw_short(reading.path, header);
     if (size != row * header.points)
-      throw InputError(reading.path, "is damaged: its size is not that of its points", kSaveAgain);
+      throw InputError(reading.path, "is damaged: its size is not that of its points", kSaveCloud);
     unpacked = unpack_lzf(bytes.substr(8, length), size, reading.path);
     bytes = unpacked;
   }
@@ -222,7 +229,8 @@ void read_packed(std::string_view bytes, const Header& header, bool packed, cons
   read_binary(bytes, header, start, step, reading, points);
 }
 
-void read_ascii(text::Lines& lines, const Header& header, const Reading& reading, Points& points) {
+void read_ascii(text::Lines& lines, const PcdHeader& header, const Reading& reading,
+                Points& points) {
   uint64_t words = 0;
   std::vector<uint64_t> first;
   for (const Field& field : header.fields) {
@@ -242,7 +250,7 @@ void read_ascii(text::Lines& lines, const Header& header, const Reading& reading
           text::throw_no_number(word, where);
     if (k == 0) continue;  // an empty line
     if (k != words)
-      throw InputError(where, cat("has ", k, " values, the header says ", words), kSaveAgain);
+      throw InputError(where, cat("has ", k, " values, the header says ", words), kSaveCloud);
     reading.add(value, i++, points);
   }
 }
@@ -265,7 +273,7 @@ bool starts_as_pcd(std::string_view content) {
 Mesh parse_pcd(std::string_view content, const std::string& path, const Vec3& origin,
                NonFinite how) {
   text::Lines lines(content);
-  const Header header = HeaderParser(lines, path).parse();
+  const PcdHeader header = HeaderParser(lines, path).parse();
   const Reading reading{path, origin, how};
   Mesh out;
   if (header.data == "ascii")

@@ -25,7 +25,7 @@ struct Element {
   std::vector<Property> properties;
 };
 
-struct Header {
+struct PlyHeader {
   Format format = Format::ascii;
   std::vector<Element> elements;
 };
@@ -89,8 +89,8 @@ Format parse_format(std::string_view line, const std::string& where) {
                    "use ascii or a binary format");
 }
 
-Header parse_header(text::Lines& lines, const std::string& path) {
-  Header header;
+PlyHeader parse_header(text::Lines& lines, const std::string& path) {
+  PlyHeader header;
   bool has_format = false;
   std::string_view line;
   lines.next(line);  // the magic word, checked by the caller
@@ -121,7 +121,7 @@ Header parse_header(text::Lines& lines, const std::string& path) {
 /// Gives the values of one element's rows, whatever the encoding.
 class Rows {
  public:
-  Rows(text::Lines& lines, const Header& header, const std::string& path)
+  Rows(text::Lines& lines, const PlyHeader& header, const std::string& path)
       : lines_(lines), bytes_(lines.rest()), format_(header.format), path_(path) {}
 
   /// InputError if what is left of the file cannot hold the rows of the element.
@@ -266,7 +266,7 @@ void read_faces(Rows& rows, const Element& element, std::vector<Triangle>& faces
 Mesh parse_ply(std::string_view content, const std::string& path, const Vec3& origin,
                NonFinite how) {
   text::Lines lines(content);
-  const Header header = parse_header(lines, path);
+  const PlyHeader header = parse_header(lines, path);
   Rows rows(lines, header, path);
   Mesh mesh;
   for (const Element& element : header.elements) {

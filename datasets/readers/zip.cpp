@@ -10,12 +10,12 @@
 namespace restage {
 namespace {
 
-constexpr const char* kAgain = "it is damaged: copy or export it again";
+constexpr const char* kCopyAgain = "it is damaged: copy or export it again";
 constexpr uint64_t kMostFold = 1032;   // deflate's best: 1032 bytes from one
 constexpr uint64_t kLocalHeader = 30;  // bytes before the name of every member
 
 [[noreturn]] void damaged(const std::string& where, const std::string& what) {
-  throw InputError(where, what, kAgain);
+  throw InputError(where, what, kCopyAgain);
 }
 
 [[noreturn]] void refuse(const std::string& path, int code) {

@@ -12,7 +12,7 @@
 namespace restage::cli {
 namespace {
 
-struct Arguments {
+struct CompareArguments {
   std::vector<std::string> folders;
   std::string out;
 };
@@ -26,7 +26,7 @@ std::string place_of(const std::string& out) {
                    "give a name that ends in .svg, or a folder (with '/' at the end)");
 }
 
-int run_compare(const Arguments& a, const Common& common) {
+int run_compare(const CompareArguments& a, const Common& common) {
   const std::string place = a.out.empty() ? "" : place_of(a.out);
   std::vector<tables::Compared> all;
   for (const std::string& folder : a.folders) {

@@ -56,7 +56,7 @@ int build_builtin(const BuildOptions& options, const Common& common) {
 
 // ---- a recipe ----------------------------------------------------------------------------------
 
-struct Request {
+struct BuildRequest {
   std::string recipe, out, data;
   std::vector<std::string> overrides;
 };
@@ -69,8 +69,8 @@ std::string usual_data_folder() {
   return "";
 }
 
-Request read_request(const BuildOptions& options, const Common& common) {
-  Request out;
+BuildRequest read_request(const BuildOptions& options, const Common& common) {
+  BuildRequest out;
   out.out = options.out;
   if (!options.bodies.empty() || !options.motions.empty())
     throw InputError("", "--bodies and --motions are of built-in data, a recipe names its own",
@@ -109,7 +109,7 @@ Request read_request(const BuildOptions& options, const Common& common) {
 }
 
 int build_recipe(const BuildOptions& options, const Common& common) {
-  const Request request = read_request(options, common);
+  const BuildRequest request = read_request(options, common);
   BenchmarkRecipe recipe;
   load_config(request.recipe, request.overrides, recipe);
   const BenchmarkSummary done =

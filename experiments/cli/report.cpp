@@ -12,14 +12,14 @@
 namespace restage::cli {
 namespace {
 
-struct Arguments {
+struct ReportArguments {
   std::vector<std::string> folders;
   std::string out;
   report::GatherOptions how;
   bool no_play = false;
 };
 
-void check(const Arguments& a) {
+void check(const ReportArguments& a) {
   if (!a.out.ends_with(".html"))
     throw InputError(a.out, "is no page that can be written", "give a name that ends in .html");
   namespace fs = std::filesystem;
@@ -38,7 +38,7 @@ void check(const Arguments& a) {
   const AtomicFile before_the_work(a.out);
 }
 
-int run_report(Arguments a, const Common& common) {
+int run_report(ReportArguments a, const Common& common) {
   check(a);
   a.how.seed = common.seed;
   a.how.play = !a.no_play;

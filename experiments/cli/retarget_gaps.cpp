@@ -6,7 +6,7 @@ namespace restage::cli {
 namespace {
 
 constexpr double kLongestGap = 1.0 / 3;  // seconds
-constexpr size_t kListed = 5;            // in a line of the log
+constexpr size_t kListedGaps = 5;        // in a line of the log
 
 /// What is wrong, without how to mend it.
 std::string cause_of(const InputError& fault) {
@@ -18,9 +18,10 @@ std::string cause_of(const InputError& fault) {
 template <class Items, class Text>
 std::string listed(const Items& items, const Text& text) {
   std::string out;
-  for (size_t i = 0; i < items.size() && i < kListed; ++i)
+  for (size_t i = 0; i < items.size() && i < kListedGaps; ++i)
     out += (i > 0 ? ", " : "") + text(items[i]);
-  if (items.size() > kListed) out += " and " + std::to_string(items.size() - kListed) + " more";
+  if (items.size() > kListedGaps)
+    out += " and " + std::to_string(items.size() - kListedGaps) + " more";
   return out;
 }
 

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct ExportArguments {
   std::string dir, engine, out, program;
 };
 
@@ -25,7 +25,7 @@ std::string this_program() {
   return path.string();
 }
 
-int run_export(const Arguments& a, const Common& common) {
+int run_export(const ExportArguments& a, const Common& common) {
   const tables::Engine engine = tables::engine_named(a.engine);
   const auto plan = sweep::read_plan_file(a.dir);
   if (!plan)

@@ -12,13 +12,13 @@
 namespace restage::cli {
 namespace {
 
-struct Arguments {
+struct TableArguments {
   std::string dir, out;
   tables::TableOptions options;
 };
 
 /// A table must not replace what it is made of.
-void check_place(const Arguments& a) {
+void check_place(const TableArguments& a) {
   if (a.out.empty()) return;
   tables::to_format({}, {}, a.out);  // before any work: is the ending known?
   std::vector<std::string> inputs = {a.dir + "/plan.json", a.dir + "/sweep.yaml"};
@@ -29,7 +29,7 @@ void check_place(const Arguments& a) {
   check_output(a.out, inputs);
 }
 
-int run_table(Arguments a, const Common& common) {
+int run_table(TableArguments a, const Common& common) {
   check_place(a);
   a.options.seed = common.seed;
   const tables::Results results = tables::read_results(a.dir);

@@ -13,32 +13,32 @@ namespace restage::tables {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::json;
+using SortedJson = nlohmann::json;
 
 constexpr const char* kFix = "it is not used; remove it and run the trial again";
 
 /// Reads the scores of a result.
-class Reader : public sweep::JsonReader<Json> {
+class Reader : public sweep::JsonReader<SortedJson> {
  public:
   using JsonReader::JsonReader;
 
-  MetricValues values(const Json& entries) const {
+  MetricValues values(const SortedJson& entries) const {
     if (!entries.is_object()) fail("holds metrics that are no section");
     MetricValues out;
     for (const metrics::Metric& metric : metrics::recorded()) {
-      const Json& value = at(entries, metric.name);
+      const SortedJson& value = at(entries, metric.name);
       if (value.is_null()) continue;
       need(value.is_number(), metric.name, "a number");
       out[metric.name] = value.template get<double>();
     }
     return out;
   }
-  Scores scores(const Json& entries) const {
+  Scores scores(const SortedJson& entries) const {
     if (!entries.is_object()) fail("holds a set that is no section");
     Scores out;
     out.mean = values(section(entries, "mean"));
     std::set<std::string> names;
-    for (const Json& sequence : list(entries, "sequences")) {
+    for (const SortedJson& sequence : list(entries, "sequences")) {
       MetricValues found = values(sequence);
       std::string name = text(sequence, "name");
       if (!names.insert(name).second) fail("has the sequence '" + name + "' twice");
@@ -46,17 +46,17 @@ class Reader : public sweep::JsonReader<Json> {
     }
     return out;
   }
-  SetResult set(const Json& entries) const {
+  SetResult set(const SortedJson& entries) const {
     SetResult out{scores(entries)};
-    for (const Json& sequence : list(entries, "sequences"))
-      if (const Json& frames = at(sequence, "frames"); frames.is_number_integer())
+    for (const SortedJson& sequence : list(entries, "sequences"))
+      if (const SortedJson& frames = at(sequence, "frames"); frames.is_number_integer())
         out.frames[text(sequence, "name")] = frames.template get<int64_t>();
-    if (const Json& joints = at(entries, "joints"); joints.is_object())
+    if (const SortedJson& joints = at(entries, "joints"); joints.is_object())
       for (const auto& [name, value] : joints.items()) {
         need(value.is_number(), name, "a number");
         out.joints[name] = value.template get<double>();
       }
-    const Json& references = at(entries, "references");
+    const SortedJson& references = at(entries, "references");
     if (references.is_null()) return out;
     need(references.is_object(), "references", "a section");
     for (const auto& [name, one] : references.items())
@@ -66,7 +66,7 @@ class Reader : public sweep::JsonReader<Json> {
 };
 
 /// Numbers by size and before text.
-bool value_before(const Json& a, const Json& b) {
+bool value_before(const SortedJson& a, const SortedJson& b) {
   if (a.is_number() && b.is_number()) return a.get<double>() < b.get<double>();
   if (a.is_number() != b.is_number()) return a.is_number();
   return a.dump() < b.dump();
@@ -144,7 +144,7 @@ int Results::count(TrialState state) const {
                                         [&](const TrialResult& t) { return t.state == state; }));
 }
 
-std::string plain_text(const Json& value) {
+std::string plain_text(const SortedJson& value) {
   return value.is_string() ? value.get<std::string>() : value.dump();
 }
 
@@ -152,9 +152,10 @@ TrialResult read_result(const std::string& path, const std::string& id) {
   return parse_result(Reader(path, kFix).parse(), path, id);
 }
 
-TrialResult parse_result(const Json& document, const std::string& path, const std::string& id) {
+TrialResult parse_result(const SortedJson& document, const std::string& path,
+                         const std::string& id) {
   const Reader reader(path, kFix);
-  TrialResult out{read_entry<Json>(reader, document)};
+  TrialResult out{read_entry<SortedJson>(reader, document)};
   if (out.id != id) reader.fail("is the result of another trial (" + out.id + ")");
   const std::string state = reader.text(document, "state");
   const auto* over = std::begin(kTrialStates) + 3;  // of which the first three are

@@ -10,11 +10,11 @@
 namespace restage::tables {
 namespace {
 
-using Json = nlohmann::json;
+using SortedJson = nlohmann::json;
 
 /// The trials of one row, in order.
 struct Group {
-  std::map<std::string, Json> key;  ///< what they were grouped by; the case as "case"
+  std::map<std::string, SortedJson> key;  ///< what they were grouped by; the case as "case"
   std::vector<const TrialResult*> trials;
   std::string reference;  ///< its values of this reference; empty: the trials' own
 };
@@ -28,8 +28,8 @@ std::string joined(const std::vector<std::string>& words) {
 // ---- groups ------------------------------------------------------------------------------------
 
 /// Overrides beside the case; a seed among them is no key of a row.
-std::map<std::string, Json> keys_of(const TrialResult& trial) {
-  std::map<std::string, Json> keys = trial.overrides;
+std::map<std::string, SortedJson> keys_of(const TrialResult& trial) {
+  std::map<std::string, SortedJson> keys = trial.overrides;
   keys.erase("seed");
   if (!trial.case_name.empty()) keys["case"] = trial.case_name;
   return keys;
@@ -55,7 +55,7 @@ std::vector<Group> group(const Results& results, const std::vector<std::string>&
   std::vector<Group> groups;
   for (const TrialResult& trial : results.trials) {
     if (!trial.described) continue;
-    std::map<std::string, Json> key = keys_of(trial);
+    std::map<std::string, SortedJson> key = keys_of(trial);
     if (!rows.empty())
       std::erase_if(key, [&](const auto& item) {
         return std::find(rows.begin(), rows.end(), item.first) == rows.end();
@@ -101,11 +101,11 @@ bool is_common(const std::vector<Group>& groups, const std::string& key) {
 
 /// Whether the name of the case says what a key is.
 bool follows_from_case(const std::vector<Group>& groups, const std::string& key) {
-  std::map<std::string, Json> of_case;
+  std::map<std::string, SortedJson> of_case;
   for (const Group& g : groups) {
     const auto name = g.key.find("case"), value = g.key.find(key);
     if (name == g.key.end()) return false;
-    const Json here = value == g.key.end() ? Json() : value->second;
+    const SortedJson here = value == g.key.end() ? SortedJson() : value->second;
     if (of_case.emplace(name->second.get<std::string>(), here).first->second != here) return false;
   }
   return true;

@@ -21,7 +21,7 @@ using tables::TrialState;
 namespace {
 
 namespace fs = std::filesystem;
-constexpr double kBeat = 1, kPatience = 20;  // seconds
+constexpr double kBeat = 1, kLeasePatience = 20;  // seconds
 
 /// The pool makes log.txt the standard error of its trials; others get a copy of the log there.
 bool is_standard_error(const std::string& path) {
@@ -102,7 +102,7 @@ TrialEnd perform_trial(const std::string& path, const std::string& id, bool quie
 
   const StopScope stop;
   const std::string token = stop_token(dir.path);
-  LeaseOptions options{kBeat, kPatience, [&] {
+  LeaseOptions options{kBeat, kLeasePatience, [&] {
                          if (stop_token(dir.path) != token) ask_to_stop();
                        }};
   std::optional<Lease> lease = Lease::take(dir.lease(id), "trial " + id, options);

@@ -8,14 +8,13 @@
 #include "autograd/base/error.h"
 #include "infer/render/clip.h"
 #include "infer/render/rasteriser.h"
+#include "infer/render/style.h"
 #include "nn/geometry/box.h"
 
 namespace restage {
 namespace {
 
-constexpr Rgb kPaper = {0xf7, 0xf8, 0xfa}, kInk = {0x2b, 0x30, 0x38}, kPale = {0x7a, 0x83, 0x90};
-constexpr int kMargin = 22, kTitle = 34, kCaption = 24, kLine = 20, kWidest = 1800;
-constexpr float kView = 0.36f;                  // opening angle, radians: little perspective
+constexpr int kCaption = 24, kLine = 20, kWidest = 1800;
 constexpr float kAround = 1.08f, kRim = 0.12f;  // room around the points: a factor, and metres
 constexpr float kWidestCell = 1.5f;             // width of the widest cell, in heights of the cell
 constexpr float kFarAway = 4.0f;  // a point this many times farther away than nine in ten points

@@ -6,13 +6,12 @@
 
 #include "autograd/base/format.h"
 #include "infer/render/rasteriser.h"
+#include "infer/render/style.h"
 
 namespace restage {
 namespace {
 
-constexpr Rgb kPaper = {0xf7, 0xf8, 0xfa}, kInk = {0x2b, 0x30, 0x38}, kPale = {0x7a, 0x83, 0x90};
-constexpr int kMargin = 22, kLabel = 14, kTimes = 34, kTitle = 34;
-constexpr float kView = 0.36f;  // opening angle, radians: little perspective
+constexpr int kLabel = 14, kTimes = 34;
 
 struct Frame {
   const Points* points;

@@ -14,7 +14,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kKey = "restage";
-constexpr const char* kFix = "give a weights file that restage wrote";
+constexpr const char* kGiveWeights = "give a weights file that restage wrote";
 
 /// The name of a role in a file's metadata.
 std::string place_of(const std::string& role) {
@@ -73,7 +73,8 @@ Settings settings_of(const Json& json, const std::string& where) {
   Settings out;
   for (const auto& [key, value] : json.items()) {
     if (!value.is_string())
-      throw InputError(where, "has a setting " + name_in_quotes(key) + " that is no text", kFix);
+      throw InputError(where, "has a setting " + name_in_quotes(key) + " that is no text",
+                       kGiveWeights);
     out[key] = value.get<std::string>();
   }
   return out;
@@ -90,11 +91,12 @@ Json parse_metadata(const TensorFile& file, const std::string& where) {
   if (text == file.metadata.end())
     throw InputError(where, "does not say which models it holds",
                      "bring it in with 'restage weights import'");
-  if (text->second.size() > (1 << 16)) throw InputError(where, "has too long metadata", kFix);
+  if (text->second.size() > (1 << 16))
+    throw InputError(where, "has too long metadata", kGiveWeights);
   const Json json = Json::parse(text->second, nullptr, false);
   const bool proper = json.is_object() && json.contains("format") && json["format"] == 1 &&
                       json.contains("models") && json["models"].is_object();
-  if (!proper) throw InputError(where, "has metadata of an unknown format", kFix);
+  if (!proper) throw InputError(where, "has metadata of an unknown format", kGiveWeights);
   return json;
 }
 
@@ -108,7 +110,8 @@ void add_older_settings(const Json& metadata, const std::string& where, Bundle* 
   for (const auto& [name, value] : settings_of(object_at(metadata, "extra"), where)) {
     const auto role = roles.find(name);
     if (role == roles.end())
-      throw InputError(where, "has a setting " + name_in_quotes(name) + " of no model", kFix);
+      throw InputError(where, "has a setting " + name_in_quotes(name) + " of no model",
+                       kGiveWeights);
     const TrainedModel* found = bundle->find(role->second);
     if (found == nullptr) continue;
     TrainedModel model = *found;
@@ -136,8 +139,9 @@ std::shared_ptr<Module> filled(const std::string& name, const AnyConfig& config,
   try {
     net = make_model(name, config, init);
   } catch (const InputError&) {
-    throw InputError(
-        where, "has sizes of " + name_in_quotes(name) + " that its tensors cannot fill", kFix);
+    throw InputError(where,
+                     "has sizes of " + name_in_quotes(name) + " that its tensors cannot fill",
+                     kGiveWeights);
   }
   load_state(*net, file, prefix, where);
   return net;
@@ -151,12 +155,13 @@ bool known_model(const std::string& name) {
 TrainedModel model_of(const std::string& place, const Json& entry, const TensorFile& file,
                       const std::string& where) {
   if (!entry.is_object() || !entry.contains("model") || !entry["model"].is_string())
-    throw InputError(where, "does not name its model for " + name_in_quotes(place), kFix);
+    throw InputError(where, "does not name its model for " + name_in_quotes(place), kGiveWeights);
   TrainedModel out;
   out.model = entry["model"].get<std::string>();
   if (!known_model(out.model) || model_type(out.model).role != role_of(place))
-    throw InputError(
-        where, "names " + name_in_quotes(out.model) + ", which is no model for " + place, kFix);
+    throw InputError(where,
+                     "names " + name_in_quotes(out.model) + ", which is no model for " + place,
+                     kGiveWeights);
   out.config = sizes_of(model_type(out.model), object_at(entry, "sizes"), where);
   out.settings = settings_of(object_at(entry, "settings"), where);
   out.net = filled(out.model, out.config, file, place + ".", where);
@@ -254,7 +259,7 @@ Bundle bundle_of(const TensorFile& file, const std::string& where) {
     throw InputError(where,
                      "holds " + std::to_string(file.tensors.size() - tensors) +
                          " tensors that belong to no model",
-                     kFix);
+                     kGiveWeights);
   add_older_settings(json, where, &out);
   return out;
 }

@@ -20,7 +20,7 @@ constexpr uint64_t kHeaderLimit = 100'000'000;  // as in the format's reference 
 constexpr int kMostNumbers = 64;                // of a list in the header
 constexpr uint64_t kMostElements = uint64_t{1} << 48;
 constexpr uint64_t kLargest = std::numeric_limits<int64_t>::max();
-constexpr const char* kFix = "give an undamaged safetensors file";
+constexpr const char* kGiveUndamaged = "give an undamaged safetensors file";
 
 static_assert(std::endian::native == std::endian::little, "the format is little-endian");
 
@@ -140,7 +140,9 @@ class Header : public Json::json_sax_t {
   bool parse_error(size_t, const std::string&, const Json::exception&) override { return false; }
 
  private:
-  [[noreturn]] void fail(const std::string& wrong) const { throw InputError(where_, wrong, kFix); }
+  [[noreturn]] void fail(const std::string& wrong) const {
+    throw InputError(where_, wrong, kGiveUndamaged);
+  }
 
   void count_number() {
     if (++numbers_ > kMostNumbers)
@@ -190,7 +192,9 @@ class Reader {
   }
 
  private:
-  [[noreturn]] void fail(const std::string& wrong) const { throw InputError(where_, wrong, kFix); }
+  [[noreturn]] void fail(const std::string& wrong) const {
+    throw InputError(where_, wrong, kGiveUndamaged);
+  }
 
   void parse(Header& header) {
     if (bytes_.size() < 8) fail("is too short to be a safetensors file");

@@ -11,7 +11,7 @@
 namespace restage {
 namespace {
 
-const Body& body() {
+const Body& person() {
   static const Body made = builtin_body(1, "test", 0);
   return made;
 }
@@ -28,7 +28,7 @@ Pose standing(double more) {
   pose.local[17] = turn(0.9 - more, Vec3::UnitZ());
   pose.local[1] = turn(-0.4 + more, Vec3::UnitX());
   pose.local[4] = turn(0.5, Vec3::UnitX());
-  pose.root = body().joints[0];
+  pose.root = person().joints[0];
   return pose;
 }
 
@@ -60,12 +60,12 @@ struct Scene {
 Scene scene() {
   Scene out;
   const Pose pose = standing(0);
-  out.cloud = SurfaceSampler(body()).draw(RngKey{5, 0}, 1500).on_pose(body(), pose);
-  out.truth = forward_kinematics(body().joints, pose).joints;
+  out.cloud = SurfaceSampler(person()).draw(RngKey{5, 0}, 1500).on_pose(person(), pose);
+  out.truth = forward_kinematics(person().joints, pose).joints;
   Point middle = Point::Zero();
   for (const Point& p : out.cloud) middle += p / static_cast<float>(out.cloud.size());
   auto extractor = std::make_shared<WrongBy>();
-  extractor->joints = forward_kinematics(body().joints, standing(0.3)).joints;
+  extractor->joints = forward_kinematics(person().joints, standing(0.3)).joints;
   for (Vec3& j : extractor->joints) j -= middle.cast<double>();
   out.models = testing::untrained_bundle("motion/closed_form", {});
   TrainedModel model = out.models.need("skeleton", "test");
@@ -84,7 +84,7 @@ std::unique_ptr<Retargeter> chain(const Scene& s, double fps = kFps) {
   RetargetOptions options;
   options.fps = fps;
   options.samples = 1;
-  return std::make_unique<Retargeter>(s.models, "w", body().rest, body().joints, options);
+  return std::make_unique<Retargeter>(s.models, "w", person().rest, person().joints, options);
 }
 
 TEST(Refinement, BringsLimbsToWhereTheCloudIs) {
@@ -95,7 +95,7 @@ TEST(Refinement, BringsLimbsToWhereTheCloudIs) {
   EXPECT_GT(apart(answer, s.truth), 0.03);
   EXPECT_LT(apart(frame.joints, s.truth), 0.5 * apart(answer, s.truth));
   EXPECT_LT(apart(*refined.source_joints(), s.truth), 0.5 * apart(answer, s.truth));
-  EXPECT_EQ(frame.vertices.size(), body().rest.vertices.size());
+  EXPECT_EQ(frame.vertices.size(), person().rest.vertices.size());
   EXPECT_NEAR((frame.pose.root - answer[0]).norm(), 0, 1e-9) << "the path is the chain's";
 }
 

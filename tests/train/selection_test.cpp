@@ -25,15 +25,16 @@ using testing::Forwarding;
 using testing::tiny_stage;
 using testing::tiny_training;
 
-constexpr int64_t kSteps = 12;
+constexpr int64_t kSelectionSteps = 12;
 const double kNaN = std::numeric_limits<double>::quiet_NaN();
-const TrainOptions kQuiet{.precision = MatmulPrecision::float32, .quiet = true, .observers = {}};
+const TrainOptions kQuietOptions{
+    .precision = MatmulPrecision::float32, .quiet = true, .observers = {}};
 
 /// A stage whose validations, one every two steps, say what the test wants; a signal may come.
 class Scripted final : public Forwarding {
  public:
   Scripted(std::vector<double> scores, int64_t stop_at)
-      : Forwarding(tiny_stage("deformation", tiny_training(kSteps))),
+      : Forwarding(tiny_stage("deformation", tiny_training(kSelectionSteps))),
         scores_(std::move(scores)),
         stop_at_(stop_at) {}
   NamedValues step(int64_t step) override {
@@ -73,7 +74,7 @@ class TrainSelection : public test::FileTest {
       if (fine_tuning_) stage->start_from({}, {}, "given weights");
       return stage;
     };
-    return safetensors_bytes(to_file(train(run, {"deformation"}, loop_, make, kQuiet)));
+    return safetensors_bytes(to_file(train(run, {"deformation"}, loop_, make, kQuietOptions)));
   }
   RunDir create(const std::string& name) {
     return RunDir::create_at(dir / name, "x: 1\n", "{}\n", {"deformation"});
@@ -163,7 +164,7 @@ TEST_F(TrainSelection, AnAverageIsHandedOnAndTheWeightsGoOn) {
   for (const int64_t step : {1, 7, 12})
     EXPECT_TRUE(weights_at("plain", step) == weights_at("averaged", step)) << step;
   std::vector<double> expected;
-  for (int64_t t = 1; t <= kSteps; ++t) {
+  for (int64_t t = 1; t <= kSelectionSteps; ++t) {
     const Tensor w = tensor("plain", t, key);
     if (expected.empty()) {  // as it was before the first step
       const Scripted untrained({}, -1);
