@@ -55,6 +55,8 @@ ConfigNode node_of(const Json& json, const std::string& where) {
       node.children.push_back(node_of(value, where));
       node.children.back().key = key;
     }
+  } else if (json.is_array()) {
+    for (const Json& item : json) node.children.push_back(node_of(item, where));
   } else {
     node.quoted = json.is_string();
     node.text = json.is_string() ? json.get<std::string>() : json.dump();
