@@ -1,7 +1,9 @@
 """restage retarget where some frames of the source cannot be used: short gaps are filled and reported, long ones refused."""
 import json
 import os
+import shutil
 import struct
+import tempfile
 
 from support import CliTest, points
 from tiny_run import TPOSES, weights
@@ -13,11 +15,18 @@ NAN = float("nan")
 class Gaps(CliTest):
     """A person's scans, 30 a second: a gap may have ten frames."""
 
+    made = None  # what every test begins with
+
     def setUp(self):
         super().setUp()
         self.w = weights("tposes", *TPOSES)
-        self.person(FRAMES)
-        self.done("doctor", "walk/source.h5", "--fix", "good/")
+        if Gaps.made is None:
+            self.person(FRAMES)
+            self.done("doctor", "walk/source.h5", "--fix", "good/")
+            Gaps.made = tempfile.mkdtemp(prefix="restage-cli-")
+            self.addClassCleanup(shutil.rmtree, Gaps.made, ignore_errors=True)
+            shutil.copytree(self.folder, Gaps.made, dirs_exist_ok=True)
+        shutil.copytree(Gaps.made, self.folder, dirs_exist_ok=True)
         self.names = sorted(os.listdir(self.path("good")))
         self.frames = [self.vertices("good/" + name) for name in self.names]
         self.assertEqual(len(self.frames), FRAMES)
