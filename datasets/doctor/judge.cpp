@@ -90,7 +90,7 @@ void judge_up(Diagnosis& d, const Seen& seen, const ExamineOptions& options, siz
     if (shape.up != 2 && shape.up_sure >= kUnsure) {
       f.weight = Weight::note;
       f.what += cat(", though its shape looks as if ", kDirections[shape.up], " were");
-      f.fix = "say it with --up if the shape is right; name the rig's bones as a known family does";
+      f.fix = "say it with --up if the shape is right";
     }
   } else if (o.up_sure < kNobody) {
     f.weight = Weight::wrong;

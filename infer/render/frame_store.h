@@ -58,7 +58,7 @@ class FrameStore {
     push_back(Frame(std::forward<Arguments>(arguments)...));
     return back();
   }
-  void assign(size_t count, const Frame& frame) {
+  void assign(size_t count, Frame frame) {
     *this = {};
     for (size_t i = 0; i < count; ++i) push_back(frame);
   }

@@ -148,7 +148,8 @@ class Gltf(CliTest):
         self.assertEqual([f["weight"] != "wrong" and f["what"].startswith("+y is up") for f in found["findings"] if f["topic"] == "up"], [True])
         # retarget asks the same: no weights here, so that nothing but the target is judged.
         w = weights("tposes", *TPOSES)
-        self.person()
+        self.done("data", "build", "--bodies", 1, 0, 1, "--motions", 1, 0, 0, "--quiet", "--out", "data.h5")
+        self.done("data", "perform", "--bodies", "data.h5", "--frames", 12, "--quiet", "--out", "walk")
         call = ["retarget", "--weights", w, "--source", "walk/source.h5", "--out", "x.h5", "--target"]
         doctor = self.restage("doctor", "hero.glb", "--target").code
         self.assertEqual(self.restage(*call, "hero.glb").code, 0 if doctor == 0 else 2)
