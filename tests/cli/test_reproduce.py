@@ -155,3 +155,5 @@ class OurFolders(CliTest):
             found = self.json("reproduce", paper, "--budget", "lite", "--out", "r", "--no-run", "--quiet")
             self.assertGreater(len(found["claims"]), 0)
             self.assertIn("# " + paper, self.bytes("r/%s.md" % paper).decode())
+            bones = [claim["verdict"] for claim in found["claims"] if "bone length preservation" in claim["says"]]
+            self.assertEqual(bones, ["holds"] if paper == "marsot2023" else [], "no improvement was claimed, and it got worse")
