@@ -10,7 +10,7 @@
 namespace restage {
 namespace {
 
-constexpr std::array<std::pair<const char*, SplitRecipe BenchmarkRecipe::*>, 3> kSplits = {
+constexpr std::array<std::pair<const char*, SplitRecipe BenchmarkRecipe::*>, 3> kRecipeSplits = {
     {{"train", &BenchmarkRecipe::train},
      {"validation", &BenchmarkRecipe::validation},
      {"test", &BenchmarkRecipe::test}}};
@@ -77,7 +77,7 @@ class Checker {
 
   void disjoint(const std::string& kind, std::vector<std::string> SplitRecipe::*list) const {
     std::map<std::string, std::string> split_of;
-    for (const auto& [split, lists] : kSplits)
+    for (const auto& [split, lists] : kRecipeSplits)
       for (const std::string& name : (r_.*lists).*list)
         if (const auto [at, added] = split_of.emplace(name, split); !added) {
           const std::string what = "the " + kind + " '" + name.substr(0, 40) + "' is ";
@@ -101,7 +101,7 @@ class Checker {
         for (const std::string& m : motions) add(set + m + "-" + p.source + "-" + p.target);
       }
     for (const ScanRecipe& s : r_.scans) add("scans/" + name_of(s));
-    const bool splits = std::any_of(kSplits.begin(), kSplits.end(), [&](const auto& split) {
+    const bool splits = std::any_of(kRecipeSplits.begin(), kRecipeSplits.end(), [&](const auto& split) {
       return !(r_.*split.second).bodies.empty() || !(r_.*split.second).clips.empty();
     });
     if (!splits && folders.empty())

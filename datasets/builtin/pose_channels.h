@@ -8,7 +8,7 @@
 namespace restage {
 
 /// Angles in degrees; 0 everywhere is the T-pose facing +z. Signs: see channel_rotations().
-enum Channel : int {
+enum PoseChannel : int {
   kYaw,
   kPitch,
   kRoll,  // whole body: left, forward, to the right

@@ -13,7 +13,7 @@ namespace {
 
 constexpr const char* kAxisNames[] = {"auto", "x", "-x", "y", "-y", "z", "-z"};
 
-constexpr LegUnit kUnits[] = {{"metres", 0.4, 1.4, 1.0},
+constexpr LegUnit kAxisUnits[] = {{"metres", 0.4, 1.4, 1.0},
                               {"decimetres", 4, 10, 0.1},
                               {"inches / 0.45", 10, 20, 0.0254 / 0.45},
                               {"inches", 20, 50, 0.0254},
@@ -69,13 +69,13 @@ double angle_between(const Vec3& a, const Vec3& b) {
 }
 
 const LegUnit* unit_of_leg(double leg) {
-  for (const LegUnit& unit : kUnits)
+  for (const LegUnit& unit : kAxisUnits)
     if (leg >= unit.from && leg < unit.to) return &unit;
   return nullptr;
 }
 
 std::string unit_name(double metres) {
-  for (const LegUnit& unit : kUnits)
+  for (const LegUnit& unit : kAxisUnits)
     if (std::abs(unit.metres / metres - 1) < 1e-6) return unit.name;
   return format("%.4g m", metres);
 }

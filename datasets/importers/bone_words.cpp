@@ -15,7 +15,7 @@ constexpr int kMostPieces = 16;        // of decoration
 enum class Kind : uint8_t { plain, part, left, right, upper, lower, helper };
 struct Word {
   Kind kind = Kind::plain;  ///< plain: says nothing
-  Part part = Part::none;
+  BonePart part = BonePart::none;
 };
 
 using Dictionary = std::map<std::string, Word, std::less<>>;
@@ -31,28 +31,28 @@ void add(Dictionary& out, Word word, std::string_view words) {
 const Dictionary& dictionary() {
   static const Dictionary words = [] {
     Dictionary out;
-    const auto part = [&](Part is, std::string_view text) { add(out, {Kind::part, is}, text); };
-    const auto kind = [&](Kind is, std::string_view text) { add(out, {is, Part::none}, text); };
-    part(Part::pelvis, "pelvis pelvic lowerbody 下半身");
-    part(Part::hip, "hip hips");
-    part(Part::spine,
+    const auto part = [&](BonePart is, std::string_view text) { add(out, {Kind::part, is}, text); };
+    const auto kind = [&](Kind is, std::string_view text) { add(out, {is, BonePart::none}, text); };
+    part(BonePart::pelvis, "pelvis pelvic lowerbody 下半身");
+    part(BonePart::hip, "hip hips");
+    part(BonePart::spine,
          "spine chest torso trunk abdomen abs ab waist back thorax rib ribs ribcage lumbar belly "
          "stomach sternum vertebra upperback lowerback upperbody 上半身");
-    part(Part::neck, "neck 首");
-    part(Part::head, "head 頭");
-    part(Part::collar, "clavicle collar collarbone clav scapula 肩");
-    part(Part::shoulder, "shoulder shldr");
-    part(Part::upper_arm, "upperarm uparm uarm humerus bicep biceps 腕");
-    part(Part::arm, "arm");
-    part(Part::forearm, "forearm farm elbow radius ulna ひじ 肘");
-    part(Part::hand, "hand wrist 手首");
-    part(Part::palm, "palm fist 手");
-    part(Part::thigh, "thigh upleg femur 足");
-    part(Part::leg, "leg");
-    part(Part::shin, "shin calf knee shank tibia crus ひざ 膝");
-    part(Part::ankle, "ankle 足首");
-    part(Part::foot, "foot");
-    part(Part::toe, "toe toes toebase ball つま先");
+    part(BonePart::neck, "neck 首");
+    part(BonePart::head, "head 頭");
+    part(BonePart::collar, "clavicle collar collarbone clav scapula 肩");
+    part(BonePart::shoulder, "shoulder shldr");
+    part(BonePart::upper_arm, "upperarm uparm uarm humerus bicep biceps 腕");
+    part(BonePart::arm, "arm");
+    part(BonePart::forearm, "forearm farm elbow radius ulna ひじ 肘");
+    part(BonePart::hand, "hand wrist 手首");
+    part(BonePart::palm, "palm fist 手");
+    part(BonePart::thigh, "thigh upleg femur 足");
+    part(BonePart::leg, "leg");
+    part(BonePart::shin, "shin calf knee shank tibia crus ひざ 膝");
+    part(BonePart::ankle, "ankle 足首");
+    part(BonePart::foot, "foot");
+    part(BonePart::toe, "toe toes toebase ball つま先");
     kind(Kind::left, "left l lft lt 左");
     kind(Kind::right, "right r rgt rt 右");
     kind(Kind::upper, "upper up");
@@ -169,9 +169,9 @@ std::vector<Token> tokens_of(std::string_view name) {
 }
 
 /// "arm" and "leg" with the word of height nearest before them, else after them.
-Part with_height(const std::vector<Token>& tokens, size_t at) {
-  const Part part = tokens[at].word.part;
-  if (part != Part::arm && part != Part::leg) return part;
+BonePart with_height(const std::vector<Token>& tokens, size_t at) {
+  const BonePart part = tokens[at].word.part;
+  if (part != BonePart::arm && part != BonePart::leg) return part;
   Kind height = Kind::plain;
   const auto is_height = [&](size_t i) {
     return tokens[i].word.kind == Kind::upper || tokens[i].word.kind == Kind::lower;
@@ -180,8 +180,8 @@ Part with_height(const std::vector<Token>& tokens, size_t at) {
     if (is_height(i - 1)) height = tokens[i - 1].word.kind;
   for (size_t i = 0; i < at; ++i)
     if (is_height(i)) height = tokens[i].word.kind;
-  if (height == Kind::upper) return part == Part::arm ? Part::upper_arm : Part::thigh;
-  if (height == Kind::lower) return part == Part::arm ? Part::forearm : Part::shin;
+  if (height == Kind::upper) return part == BonePart::arm ? BonePart::upper_arm : BonePart::thigh;
+  if (height == Kind::lower) return part == BonePart::arm ? BonePart::forearm : BonePart::shin;
   return part;
 }
 
@@ -282,7 +282,7 @@ BoneWords bone_words(std::string_view name) {
   bool both = false;
   for (size_t i = 0; i < tokens.size(); ++i) {
     const Token& token = tokens[i];
-    if (token.number >= 0 && out.part != Part::none && out.number < 0)
+    if (token.number >= 0 && out.part != BonePart::none && out.number < 0)
       out.number = static_cast<int>(token.number);
     strangers += !token.known;
     const Kind kind = token.word.kind;

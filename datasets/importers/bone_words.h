@@ -10,7 +10,7 @@
 
 namespace restage {
 
-enum class Part : uint8_t {
+enum class BonePart : uint8_t {
   none,
   pelvis,
   hip,  ///< "hips" without a side is the pelvis, with one a joint of the thigh
@@ -35,7 +35,7 @@ enum class Part : uint8_t {
 struct BoneWords {
   enum Side : int8_t { middle = -1, left = 0, right = 1 };
   Side side = middle;
-  Part part = Part::none;  ///< the last word that names a part: "foot_toe" is a toe
+  BonePart part = BonePart::none;  ///< the last word that names a part: "foot_toe" is a toe
   bool helper = false;     ///< twist, IK, control, end, finger, face, cloth, weapon ...
   int number = -1;         ///< the digits after the part; -1: none
   /// How far the name is from a plain one: unknown words, further parts, a number.

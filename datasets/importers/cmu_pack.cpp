@@ -36,12 +36,12 @@ struct PackedClip {
   std::vector<float> root;           // metres
 };
 
-struct Recording {
+struct PackedRecording {
   SourceMotion motion;
   double metres = 0;  // a unit of the file
 };
 
-Recording read_recording(const std::string& file, const std::string& skeleton) {
+PackedRecording read_recording(const std::string& file, const std::string& skeleton) {
   const std::string text = read_packed_text(file);
   if (skeleton.empty()) return {bvh_motion(parse_bvh(text, file), 0), kDazMetres};
   const AsfFile asf = parse_asf(read_packed_text(skeleton), skeleton);
@@ -63,7 +63,7 @@ Quat chosen(const Quat& q, const Quat* before) {
   return sign < 0 ? Quat(-q.coeffs()) : q;
 }
 
-PackedClip pack_clip(const Recording& recording, const CmuOriginal& entry,
+PackedClip pack_clip(const PackedRecording& recording, const CmuOriginal& entry,
                      const std::string& where) {
   const SourceMotion& motion = recording.motion;
   const size_t joints = motion.skeleton.size();

@@ -12,14 +12,14 @@ namespace {
 
 enum : int { kPelvis = 0, kSpine1 = 3, kSpine2 = 6, kSpine3 = 9, kNeck = 12, kHead = 15 };
 
-using Parts = std::initializer_list<Part>;
+using BoneParts = std::initializer_list<BonePart>;
 
-bool is(const BoneWords& words, Parts parts) {
+bool is(const BoneWords& words, BoneParts parts) {
   return std::find(parts.begin(), parts.end(), words.part) != parts.end();
 }
 
 /// The bones of a limb, from the trunk outwards.
-struct Limb {
+struct FoundLimb {
   int root = -1;  ///< collar; -1: none
   int upper = -1, lower = -1, end = -1;
   int cost = 0;
@@ -60,7 +60,7 @@ class Finder {
   }
 
   /// The plainest of these bones of a path, the highest of equals; -1 of none.
-  int plainest(const std::vector<int>& path, Parts parts) const {
+  int plainest(const std::vector<int>& path, BoneParts parts) const {
     int best = -1;
     for (const int b : path)
       if (is(words_[b], parts) && (best < 0 || words_[b].cost < words_[best].cost)) best = b;
@@ -81,49 +81,49 @@ class Finder {
     return out;
   }
 
-  Limb weighed(Limb limb) const {
+  FoundLimb weighed(FoundLimb limb) const {
     limb.cost = words_[limb.upper].cost + words_[limb.lower].cost + words_[limb.end].cost;
     for (int b = parent(limb.end); b != limb.upper; b = parent(b))
-      if (words_[b].part == Part::none && !words_[b].helper) limb.stranger = b;
+      if (words_[b].part == BonePart::none && !words_[b].helper) limb.stranger = b;
     return limb;
   }
 
-  Limb arm_to(int end, int side) const {
+  FoundLimb arm_to(int end, int side) const {
     const std::vector<int> path = path_to(end, side);
-    Limb out;
-    out.lower = plainest(path, {Part::forearm});
+    FoundLimb out;
+    out.lower = plainest(path, {BonePart::forearm});
     if (out.lower < 0)
-      if (const int strong = plainest(path, {Part::upper_arm}); strong >= 0)
-        out.lower = plainest(below(path, strong), {Part::arm});
+      if (const int strong = plainest(path, {BonePart::upper_arm}); strong >= 0)
+        out.lower = plainest(below(path, strong), {BonePart::arm});
     if (out.lower < 0) return out.lacks = 2, out;
-    out.end = plainest(below(path, out.lower), {Part::hand});
-    if (out.end < 0) out.end = plainest(below(path, out.lower), {Part::palm});
+    out.end = plainest(below(path, out.lower), {BonePart::hand});
+    if (out.end < 0) out.end = plainest(below(path, out.lower), {BonePart::palm});
     if (out.end < 0) return out.lacks = 3, out;
     const std::vector<int> rest = above(path, out.lower);
-    out.upper = plainest(rest, {Part::upper_arm});
-    if (out.upper < 0) out.upper = plainest(rest, {Part::arm});
+    out.upper = plainest(rest, {BonePart::upper_arm});
+    if (out.upper < 0) out.upper = plainest(rest, {BonePart::arm});
     if (out.upper < 0)  // a shoulder, the lowest, is the upper arm where nothing else is
       for (const int b : rest)
-        if (is(words_[b], {Part::shoulder})) out.upper = b;
+        if (is(words_[b], {BonePart::shoulder})) out.upper = b;
     if (out.upper < 0) return out.lacks = 1, out;
-    out.root = plainest(above(path, out.upper), {Part::collar});
-    if (out.root < 0) out.root = plainest(above(path, out.upper), {Part::shoulder});
+    out.root = plainest(above(path, out.upper), {BonePart::collar});
+    if (out.root < 0) out.root = plainest(above(path, out.upper), {BonePart::shoulder});
     return weighed(out);
   }
 
-  Limb leg_to(int end, int side) const {
+  FoundLimb leg_to(int end, int side) const {
     const std::vector<int> path = path_to(end, side);
-    Limb out;
-    out.lower = plainest(path, {Part::shin});
+    FoundLimb out;
+    out.lower = plainest(path, {BonePart::shin});
     if (out.lower < 0)
-      if (const int strong = plainest(path, {Part::thigh}); strong >= 0)
-        out.lower = plainest(below(path, strong), {Part::leg});
+      if (const int strong = plainest(path, {BonePart::thigh}); strong >= 0)
+        out.lower = plainest(below(path, strong), {BonePart::leg});
     if (out.lower < 0) return out.lacks = 2, out;
-    out.end = plainest(below(path, out.lower), {Part::ankle});
-    if (out.end < 0) out.end = plainest(below(path, out.lower), {Part::foot});
+    out.end = plainest(below(path, out.lower), {BonePart::ankle});
+    if (out.end < 0) out.end = plainest(below(path, out.lower), {BonePart::foot});
     if (out.end < 0) return out.lacks = 3, out;
     const std::vector<int> rest = above(path, out.lower);
-    for (const Part part : {Part::thigh, Part::leg, Part::hip})
+    for (const BonePart part : {BonePart::thigh, BonePart::leg, BonePart::hip})
       if (out.upper < 0) out.upper = plainest(rest, {part});
     if (out.upper < 0) return out.lacks = 1, out;
     return weighed(out);
@@ -132,13 +132,13 @@ class Finder {
   /// The plainest limb of those that end in one of these parts. Of a limb that is nowhere whole the
   /// part that is missing where most of it is; 3 if nothing is there.
   template <class To>
-  Limb best_limb(int side, Parts ends, const To& to, bool& ambiguous) const {
-    std::optional<Limb> best;
-    Limb broken;
+  FoundLimb best_limb(int side, BoneParts ends, const To& to, bool& ambiguous) const {
+    std::optional<FoundLimb> best;
+    FoundLimb broken;
     broken.lacks = 3;
     for (int b = 0; b < size(); ++b) {
       if (!may_be(b, side) || !is(words_[b], ends) || !inside(b)) continue;
-      const Limb limb = to(b, side);
+      const FoundLimb limb = to(b, side);
       if (limb.lacks != 0) {
         broken.lacks = std::min(broken.lacks, limb.lacks);
         continue;
@@ -155,35 +155,38 @@ class Finder {
 
   void take_arm(int side) {
     bool ambiguous = false;
-    const Limb arm = best_limb(
-        side, {Part::hand, Part::palm}, [&](int b, int s) { return arm_to(b, s); }, ambiguous);
-    const bool called = has(side, {Part::upper_arm});
+    const FoundLimb arm = best_limb(
+        side, {BonePart::hand, BonePart::palm}, [&](int b, int s) { return arm_to(b, s); },
+        ambiguous);
+    const bool called = has(side, {BonePart::upper_arm});
     take(arm, ambiguous, side == 0 ? "left arm" : "right arm",
-         {Segment{16 + side, called || has(side, {Part::arm, Part::shoulder})},
-          Segment{18 + side, has(side, {Part::forearm}) || (called && has(side, {Part::arm}))},
-          Segment{20 + side, has(side, {Part::hand, Part::palm})}});
+         {Segment{16 + side, called || has(side, {BonePart::arm, BonePart::shoulder})},
+          Segment{18 + side,
+                  has(side, {BonePart::forearm}) || (called && has(side, {BonePart::arm}))},
+          Segment{20 + side, has(side, {BonePart::hand, BonePart::palm})}});
     if (arm.lacks == 0) out_.bones[13 + side] = arm.root;
   }
 
   void take_leg(int side) {
     bool ambiguous = false;
-    const Limb leg = best_limb(
-        side, {Part::ankle, Part::foot}, [&](int b, int s) { return leg_to(b, s); }, ambiguous);
-    const bool called = has(side, {Part::thigh});
+    const FoundLimb leg = best_limb(
+        side, {BonePart::ankle, BonePart::foot}, [&](int b, int s) { return leg_to(b, s); },
+        ambiguous);
+    const bool called = has(side, {BonePart::thigh});
     take(leg, ambiguous, side == 0 ? "left leg" : "right leg",
-         {Segment{1 + side, called || has(side, {Part::leg, Part::hip})},
-          Segment{4 + side, has(side, {Part::shin}) || (called && has(side, {Part::leg}))},
-          Segment{7 + side, has(side, {Part::ankle, Part::foot})}});
+         {Segment{1 + side, called || has(side, {BonePart::leg, BonePart::hip})},
+          Segment{4 + side, has(side, {BonePart::shin}) || (called && has(side, {BonePart::leg}))},
+          Segment{7 + side, has(side, {BonePart::ankle, BonePart::foot})}});
     if (leg.lacks == 0) out_.bones[10 + side] = toe_of(leg.end, side);
   }
 
-  bool has(int side, Parts parts) const {
+  bool has(int side, BoneParts parts) const {
     for (int b = 0; b < size(); ++b)
       if (may_be(b, side) && is(words_[b], parts) && inside(b)) return true;
     return false;
   }
 
-  void take(const Limb& limb, bool ambiguous, const std::string& what,
+  void take(const FoundLimb& limb, bool ambiguous, const std::string& what,
             const std::array<Segment, 3>& segments) {
     if (limb.lacks == 0 && !ambiguous && limb.stranger >= 0)
       return lacks(segments[0].joint,
@@ -217,15 +220,15 @@ class Finder {
     int best = -1;
     const auto better = [&](int a, int b) {
       const auto rank = [&](int x) {
-        return std::make_tuple(words_[x].part != Part::toe, words_[x].cost, depth(x),
+        return std::make_tuple(words_[x].part != BonePart::toe, words_[x].cost, depth(x),
                                words_[x].number);
       };
       return rank(a) < rank(b);
     };
     for (int b = 0; b < size(); ++b) {
       if (b == ankle || !may_be(b, side) || !hangs_on(skeleton_, b, ankle)) continue;
-      const bool foot = words_[ankle].part == Part::ankle && words_[b].part == Part::foot;
-      if ((words_[b].part == Part::toe || foot) && (best < 0 || better(b, best))) best = b;
+      const bool foot = words_[ankle].part == BonePart::ankle && words_[b].part == BonePart::foot;
+      if ((words_[b].part == BonePart::toe || foot) && (best < 0 || better(b, best))) best = b;
     }
     return best;
   }
@@ -234,7 +237,7 @@ class Finder {
     int best = -1;
     bool two = false;
     for (int b = 0; b < size(); ++b) {
-      if (words_[b].part != Part::head || !may_be(b, BoneWords::middle) || !inside(b)) continue;
+      if (words_[b].part != BonePart::head || !may_be(b, BoneWords::middle) || !inside(b)) continue;
       if (best >= 0 && hangs_on(skeleton_, b, best)) {
         if (words_[b].cost < words_[best].cost) best = b;
         continue;
@@ -255,7 +258,7 @@ class Finder {
     const int legs = carrier_of(skeleton_, out_.bones[1], out_.bones[2]);
     const auto named = [&](int b) {
       return b >= 0 && words_[b].side == BoneWords::middle && !words_[b].helper &&
-             is(words_[b], {Part::pelvis, Part::hip});
+             is(words_[b], {BonePart::pelvis, BonePart::hip});
     };
     if (named(all)) return all;
     if (legs != all && named(legs)) return legs;
@@ -274,7 +277,7 @@ class Finder {
     const int pelvis = find_pelvis(all), below = hangs_on(skeleton_, all, pelvis) ? pelvis : all;
     std::vector<int> spine;
     for (int b = chest; b != below; b = parent(b))
-      if (b == chest || !words_[b].helper || words_[b].part == Part::spine)
+      if (b == chest || !words_[b].helper || words_[b].part == BonePart::spine)
         spine.insert(spine.begin(), b);
     if (spine.empty()) return lacks(kSpine1, "no bone lies between its pelvis and its arms");
     out_.bones[kPelvis] = pelvis;
@@ -293,7 +296,7 @@ class Finder {
   void find_neck(int chest) {
     int named = -1, any = -1;
     for (int b = parent(out_.bones[kHead]); b >= 0 && b != chest; b = parent(b)) {
-      if (words_[b].part == Part::neck) named = b;
+      if (words_[b].part == BonePart::neck) named = b;
       if (!words_[b].helper) any = b;
     }
     out_.bones[kNeck] = named >= 0 ? named : any;
@@ -303,7 +306,7 @@ class Finder {
   int nameless_collar(int side, int chest) const {
     int out = -1, count = 0;
     for (int b = parent(out_.bones[16 + side]); b >= 0 && b != chest; b = parent(b))
-      if (!words_[b].helper && words_[b].part != Part::neck) out = b, ++count;
+      if (!words_[b].helper && words_[b].part != BonePart::neck) out = b, ++count;
     return count == 1 ? out : -1;
   }
 
@@ -381,9 +384,9 @@ std::vector<int> find_people(const BoneTree& tree) {
   for (size_t b = words.size(); b-- > 0;) {
     const BoneWords& w = words[b];
     const int side = w.side;
-    if (!w.helper && w.part == Part::head && w.side == BoneWords::middle) below[b] |= 1;
-    if (!w.helper && side >= 0 && w.part == Part::hand) below[b] |= 2 << side;
-    if (!w.helper && side >= 0 && is(w, {Part::foot, Part::ankle})) below[b] |= 8 << side;
+    if (!w.helper && w.part == BonePart::head && w.side == BoneWords::middle) below[b] |= 1;
+    if (!w.helper && side >= 0 && w.part == BonePart::hand) below[b] |= 2 << side;
+    if (!w.helper && side >= 0 && is(w, {BonePart::foot, BonePart::ankle})) below[b] |= 8 << side;
     const bool person = below[b] == kAll && !inner[b];
     if (person) out.push_back(static_cast<int>(b));
     if (parents[b] < 0) continue;
@@ -402,7 +405,7 @@ int chest_of(const BoneTree& tree, const Bones& bones) {
   };
   int out = arm(0) < 0 ? -1 : carrier_of(tree.skeleton, arm(0), arm(1));
   // 3ds Max hangs the collars on the neck.
-  while (out >= 0 && tree.words[out].part == Part::neck) out = tree.skeleton.parents[out];
+  while (out >= 0 && tree.words[out].part == BonePart::neck) out = tree.skeleton.parents[out];
   return out;
 }
 

@@ -113,7 +113,8 @@ bool hang_together(const BoneTree& tree, const Bones& bones) {
 }
 
 /// How many bones lie between two of a path, without helpers and without these parts.
-int between(const BoneTree& tree, int above, int below, std::initializer_list<Part> without = {}) {
+int between(const BoneTree& tree, int above, int below,
+            std::initializer_list<BonePart> without = {}) {
   int out = 0;
   if (!hangs_on(tree.skeleton, below, above)) return 0;
   for (int b = tree.skeleton.parents[below]; b >= 0 && b != above; b = tree.skeleton.parents[b])
@@ -132,10 +133,11 @@ bool leaves_out(const BoneTree& tree, const Profile& profile, const Bones& bones
     return true;
   if (!named(12) && between(tree, chest, bones[15]) > 0) return true;
   for (const int side : {0, 1}) {
-    if (!named(13 + side) && between(tree, chest, bones[16 + side], {Part::neck}) > 0) return true;
+    if (!named(13 + side) && between(tree, chest, bones[16 + side], {BonePart::neck}) > 0)
+      return true;
     if (!named(10 + side))
       for (size_t b = 0; b < tree.words.size(); ++b)
-        if (tree.words[b].part == Part::toe && !tree.words[b].helper &&
+        if (tree.words[b].part == BonePart::toe && !tree.words[b].helper &&
             hangs_on(tree.skeleton, static_cast<int>(b), bones[7 + side]))
           return true;
   }
@@ -259,7 +261,7 @@ std::vector<std::string> words_for(const BoneTree& tree, const FoundJoints& foun
 [[noreturn]] void throw_not_found(const BoneTree& tree, const FoundJoints& found,
                                   const std::vector<std::string>& plain, const std::string& where) {
   const bool any = std::any_of(tree.words.begin(), tree.words.end(), [](const BoneWords& words) {
-    return words.part != Part::none && !words.helper;
+    return words.part != BonePart::none && !words.helper;
   });
   std::string what;
   if (!any) {

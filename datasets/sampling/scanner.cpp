@@ -26,9 +26,9 @@ struct DepthMap {
   }
 };
 
-class View {
+class ScanView {
  public:
-  explicit View(const DepthCamera& c) : camera_(c) {
+  explicit ScanView(const DepthCamera& c) : camera_(c) {
     const Vec3 ahead = c.target - c.eye;
     const Vec3 up = std::abs(ahead.normalized().y()) > 0.999 ? Vec3(0, 0, 1) : Vec3(0, 1, 0);
     const bool good = c.width > 0 && c.height > 0 && c.width <= kMostPixels &&
@@ -92,7 +92,7 @@ void fill_triangle(const Vec3& a, const Vec3& b, const Vec3& c, int32_t face, De
     }
 }
 
-DepthMap depth_map(const Mesh& surface, const View& view) {
+DepthMap depth_map(const Mesh& surface, const ScanView& view) {
   const int width = view.camera().width, height = view.camera().height;
   DepthMap map{width, height, {}, {}};
   map.depth.assign(static_cast<size_t>(width) * static_cast<size_t>(height), 0.0);
@@ -128,7 +128,7 @@ double across_outline(const DepthMap& map, int x, int y, const ScannerNoise& noi
   return 0.0;
 }
 
-void measure(const Mesh& surface, const View& view, const ScannerNoise& noise, const RngKey& key,
+void measure(const Mesh& surface, const ScanView& view, const ScannerNoise& noise, const RngKey& key,
              Points& out) {
   const DepthMap map = depth_map(surface, view);
   for (int y = 0; y < map.height; ++y)
@@ -170,7 +170,7 @@ Points scan_surface(const Mesh& surface, const std::vector<DepthCamera>& cameras
                     const ScannerNoise& noise, const RngKey& key) {
   Points out;
   for (size_t c = 0; c < cameras.size(); ++c)
-    measure(surface, View(cameras[c]), noise, key.fold("camera").fold(c), out);
+    measure(surface, ScanView(cameras[c]), noise, key.fold("camera").fold(c), out);
   add_outliers(noise.outliers, key.fold("outliers"), out);
   return out;
 }

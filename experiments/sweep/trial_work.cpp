@@ -13,7 +13,7 @@
 #include "datasets/readers/sha256.h"
 #include "experiments/benchmark_sets.h"
 #include "experiments/evaluation.h"
-#include "experiments/waiting.h"
+#include "experiments/slow_work.h"
 #include "nn/config/config.h"
 #include "train/training/training.h"
 
@@ -127,7 +127,7 @@ struct TrialPlanner::Memory {
   std::set<std::string> good;               // stages, at seed 0, that were found to be so
   std::string loaded;                       // identity of `data`
   std::unique_ptr<TrainingData> data;
-  Waiting waiting;
+  SlowWork waiting;
 
   /// Models of unknown names, sizes that do not fit together, windows longer than every motion, and
   /// too little held out to measure anything on. None of it depends on the seed, so trials that

@@ -41,15 +41,15 @@ Points framed_points(const Figure& figure) {
 
 /// The camera of a figure, and half the width and half the height that the camera has to show,
 /// metres.
-struct View {
+struct FigureView {
   Camera camera;
   float aside = 0, tall = 0;
 };
 
 /// The view of a figure, in which `points`, its framed_points(), can be seen, and all heights from
 /// `low` to `high` over the floor.
-View view_of(const Figure& figure, const Points& points, float low, float high) {
-  View out;
+FigureView view_of(const Figure& figure, const Points& points, float low, float high) {
+  FigureView out;
   Camera& camera = out.camera;
   camera.azimuth = radians(figure.azimuth);
   camera.elevation = radians(figure.elevation);
@@ -73,13 +73,13 @@ View view_of(const Figure& figure, const Points& points, float low, float high) 
 
 /// The height in metres of a cell that shows `view`, if the cell is `wide` times as wide as it is
 /// high.
-float cell_metres(const View& view, float wide) {
+float cell_metres(const FigureView& view, float wide) {
   return 2 * kAround * std::max(view.tall, view.aside / wide) + kRim;
 }
 
 /// The views of all figures. Figures that share a scale have their floors at the same height of
 /// their cells.
-std::vector<View> views_of(const std::vector<Figure>& figures) {
+std::vector<FigureView> views_of(const std::vector<Figure>& figures) {
   std::vector<Points> points;
   float low = std::numeric_limits<float>::max(), high = -low;
   const auto levels = [](const Figure& figure, const Points& of, float& from, float& to) {
@@ -92,7 +92,7 @@ std::vector<View> views_of(const std::vector<Figure>& figures) {
     points.push_back(framed_points(figure));
     if (!figure.whole) levels(figure, points.back(), low, high);
   }
-  std::vector<View> out;
+  std::vector<FigureView> out;
   for (size_t i = 0; i < figures.size(); ++i) {
     float from = low, to = high;
     if (figures[i].whole) {
@@ -132,8 +132,8 @@ Image figure_sheet(const std::vector<Figure>& figures, const FigureSheetOptions&
   for (const Figure& figure : figures)
     if (figure.layers.empty() || figure.layers[0].points.empty())
       throw InputError("", "\"" + figure.caption + "\" is empty", "leave such figures out");
-  const std::vector<View> views = views_of(figures);
-  View shared;  // large enough for every figure that shares the scale
+  const std::vector<FigureView> views = views_of(figures);
+  FigureView shared;  // large enough for every figure that shares the scale
   for (size_t i = 0; i < figures.size(); ++i)
     if (!figures[i].whole || figures.size() == 1) {
       shared.aside = std::max(shared.aside, views[i].aside);
@@ -161,7 +161,7 @@ Image figure_sheet(const std::vector<Figure>& figures, const FigureSheetOptions&
   for (int i = 0; i < count; ++i) {
     const int x = kMargin + i % columns * cell_width, y = top + i / columns * row_height;
     const Figure& figure = figures[i];
-    const View& view = views[i];
+    const FigureView& view = views[i];
     const float here = figure.whole ? cell_metres(view, wide) : metres;
     paste(sheet, draw(figure, view.camera, here, cell_width, options.cell_height), x, y);
     const std::string caption = fitting(10, figure.caption, cell_width - 4);

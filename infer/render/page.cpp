@@ -40,15 +40,15 @@ std::string hex(uint32_t colour) { return format("#%06x", colour & 0xffffffu); }
 // ---- thinning -----------------------------------------------------------------------------------
 
 /// A thinned surface: the vertices that stay (empty: all of them) and the faces between them.
-struct Surface {
+struct PageSurface {
   std::vector<int32_t> kept;
   std::vector<Triangle> faces;
 };
 
 /// Thins a surface: in the clip's first frame, one vertex stays of all vertices in a cell of a
 /// grid.
-Surface cluster(const Clip& clip, float cell) {
-  Surface surface;
+PageSurface cluster(const Clip& clip, float cell) {
+  PageSurface surface;
   std::map<std::array<int64_t, 3>, int32_t> cells;
   const Points& first = clip.frames[0];
   std::vector<int32_t> place(first.size());
@@ -70,11 +70,11 @@ Surface cluster(const Clip& clip, float cell) {
   return surface;
 }
 
-Surface thin(const Clip& clip, size_t vertices) {
+PageSurface thin(const Clip& clip, size_t vertices) {
   if (clip.faces.empty() || clip.frames[0].size() <= vertices) return {{}, clip.faces};
   const float size = box_of(clip.frames[0]).sizes().norm();
   float cell = std::max(1e-6f, size / 400);
-  Surface surface = cluster(clip, cell);
+  PageSurface surface = cluster(clip, cell);
   while (surface.kept.size() > vertices && cell < size) {
     cell *= 1.2f;
     surface = cluster(clip, cell);
@@ -84,11 +84,11 @@ Surface thin(const Clip& clip, size_t vertices) {
 
 struct Plan {
   size_t stride = 1, frames = 0;
-  std::vector<Surface> surfaces;
+  std::vector<PageSurface> surfaces;
   bool thinned = false;
 };
 
-size_t text_bytes(const std::vector<Clip>& clips, const std::vector<Surface>& surfaces,
+size_t text_bytes(const std::vector<Clip>& clips, const std::vector<PageSurface>& surfaces,
                   size_t frames, size_t max_points) {
   double bytes = 40000;
   for (size_t c = 0; c < clips.size(); ++c) {
@@ -125,7 +125,7 @@ Plan make_plan(const std::vector<Clip>& clips, const PageOptions& options) {
 
 // ---- data ---------------------------------------------------------------------------------------
 
-Points picked(const Clip& clip, const Surface& surface, size_t frame, size_t max_points) {
+Points picked(const Clip& clip, const PageSurface& surface, size_t frame, size_t max_points) {
   const Points& all = clip.frames[frame];
   Points out;
   if (!clip.faces.empty()) {
@@ -181,7 +181,7 @@ double error_scale(const FrameStore<float>& errors) {
 
 /// Errors as bytes, 255 being `scale`: of each frame that stays, and in a frame of each vertex that
 /// stays.
-std::vector<uint8_t> packed_errors(const Clip& clip, const Surface& surface, const Plan& plan,
+std::vector<uint8_t> packed_errors(const Clip& clip, const PageSurface& surface, const Plan& plan,
                                    double scale) {
   std::vector<uint8_t> out;
   for (size_t f = 0; f < plan.frames; ++f) {
@@ -201,7 +201,7 @@ struct Packed {
   float width = 0.5f, height = 0.5f;  ///< of the figure, metres
 };
 
-Packed pack(const Clip& clip, const Surface& surface, const Plan& plan, size_t number,
+Packed pack(const Clip& clip, const PageSurface& surface, const Plan& plan, size_t number,
             const PageOptions& options) {
   std::vector<Points> frames;
   for (size_t f = 0; f < plan.frames; ++f)

@@ -13,13 +13,13 @@ namespace {
 
 constexpr int kLabel = 14, kTimes = 34;
 
-struct Frame {
+struct SheetFrame {
   const Points* points;
   Point centre;  // clip_centre(), or the focus of a close-up
 };
 
 struct Layout {
-  std::vector<std::vector<Frame>> cells;  // [clip][column]
+  std::vector<std::vector<SheetFrame>> cells;  // [clip][column]
   std::vector<size_t> moments;
   std::vector<float> floors;
   // Extent that the scale has to leave room for, metres: half the width of the widest figure about
@@ -63,7 +63,7 @@ Layout lay_out(const std::vector<Clip>& clips, const SheetOptions& options) {
   return layout;
 }
 
-Image draw_cell(const Clip& clip, const Frame& frame, float floor, uint32_t colour, int width,
+Image draw_cell(const Clip& clip, const SheetFrame& frame, float floor, uint32_t colour, int width,
                 const Layout& layout, const SheetOptions& options) {
   Canvas canvas(width, options.cell_height);
   Camera camera;

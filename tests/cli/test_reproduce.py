@@ -179,6 +179,8 @@ class OurFolders(CliTest):
             found = self.json("reproduce", paper, "--budget", "lite", "--out", "r", "--no-run", "--quiet")
             self.assertGreater(len(found["claims"]), 0)
             self.assertIn("# " + paper, self.bytes("r/%s.md" % paper).decode())
+            bones = [claim["verdict"] for claim in found["claims"] if "bone length preservation" in claim["says"]]
+            self.assertEqual(bones, ["holds"] if paper == "marsot2023" else [], "no improvement was claimed, and it got worse")
 
     def test_what_is_committed_is_light_and_whole(self):
         """At most 8 MB of results and pages; every reference of a result is there, and none that no result names."""

@@ -401,13 +401,13 @@ TEST(ImportersRigs, NamesInOtherEncodingsAreTold) {
 }
 
 TEST(ImportersRigs, WordsOfNames) {
-  const auto is = [](const char* name, Part part, BoneWords::Side side, bool helper = false) {
+  const auto is = [](const char* name, BonePart part, BoneWords::Side side, bool helper = false) {
     const BoneWords words = bone_words(name);
     EXPECT_EQ(static_cast<int>(words.part), static_cast<int>(part)) << name;
     EXPECT_EQ(words.side, side) << name;
     EXPECT_EQ(words.helper, helper) << name;
   };
-  using enum Part;
+  using enum BonePart;
   const auto left = BoneWords::left, right = BoneWords::right, middle = BoneWords::middle;
   is("LeftUpLeg", thigh, left);
   is("mixamorig:LeftLeg", leg, left);

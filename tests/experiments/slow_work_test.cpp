@@ -1,5 +1,5 @@
 // What takes long is said, and what does not is not.
-#include "experiments/waiting.h"
+#include "experiments/slow_work.h"
 
 #include <gtest/gtest.h>
 
@@ -9,12 +9,12 @@
 namespace restage {
 namespace {
 
-TEST(Waiting, OnlyWhatTakesLongIsSaid) {
+TEST(SlowWork, OnlyWhatTakesLongIsSaid) {
   const test::TempDir dir;
   set_log_file(dir / "log.txt");
-  { Waiting().on("something short"); }
+  { SlowWork().on("something short"); }
   {
-    Waiting waiting;
+    SlowWork waiting;
     waiting.on("something that is over by then");
     waiting.on("something long");
     std::this_thread::sleep_for(std::chrono::milliseconds(2300));

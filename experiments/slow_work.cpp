@@ -1,4 +1,4 @@
-#include "experiments/waiting.h"
+#include "experiments/slow_work.h"
 
 #include <chrono>
 
@@ -11,9 +11,9 @@ constexpr std::chrono::seconds kFirst{2}, kNext{5};
 
 }  // namespace
 
-Waiting::Waiting() : thread_([this] { watch(); }) {}
+SlowWork::SlowWork() : thread_([this] { watch(); }) {}
 
-Waiting::~Waiting() {
+SlowWork::~SlowWork() {
   {
     const std::lock_guard lock(mutex_);
     ending_ = true;
@@ -22,12 +22,12 @@ Waiting::~Waiting() {
   thread_.join();
 }
 
-void Waiting::on(std::string what) {
+void SlowWork::on(std::string what) {
   const std::lock_guard lock(mutex_);
   what_ = std::move(what);
 }
 
-void Waiting::watch() {
+void SlowWork::watch() {
   std::unique_lock lock(mutex_);
   for (auto pause = kFirst; !wake_.wait_for(lock, pause, [this] { return ending_; });
        pause = kNext) {

@@ -10,12 +10,12 @@ namespace restage {
 
 /// Work that takes under two seconds goes without a word. From then on a line says what is being
 /// done, and every five seconds what is being done by then.
-class Waiting {
+class SlowWork {
  public:
-  Waiting();
-  ~Waiting();
-  Waiting(const Waiting&) = delete;
-  Waiting& operator=(const Waiting&) = delete;
+  SlowWork();
+  ~SlowWork();
+  SlowWork(const SlowWork&) = delete;
+  SlowWork& operator=(const SlowWork&) = delete;
   /// What begins now, such as "reading real.h5"; "": nothing that is worth a word.
   void on(std::string what);
 
