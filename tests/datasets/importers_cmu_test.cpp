@@ -51,7 +51,7 @@ std::map<std::string, Vec3> starts(int f) {
   return out;
 }
 
-TEST(ImportersAmc, NamesInUtf8StayThemselves) {
+TEST_F(ImportersAmc, NamesInUtf8StayThemselves) {
   const auto renamed = [](std::string text) {
     for (size_t at = 0; (at = text.find("lwrist", at)) != std::string::npos;)
       text.replace(at, 6, "左手首");
