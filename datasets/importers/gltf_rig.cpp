@@ -316,6 +316,33 @@ void find_nodes(const Gltf& file, GltfRig& rig, const JointMap& map, const std::
                                               : rig.joint[file.nodes[n].parent];
 }
 
+/// A skin on other bones than the person's is somebody else's (a horse's): one body of both would
+/// be wrong without a word.
+void check_skins(const Gltf& file, const GltfRig& rig) {
+  std::vector<bool> joint(file.nodes.size()), own(file.nodes.size());
+  for (const GltfBone& bone : file.bones)
+    if (bone.skin >= 0) joint[bone.node] = true;
+  int top = rig.node[0];
+  for (int n = top; n >= 0; n = file.nodes[n].parent)
+    if (joint[n]) top = n;
+  for (int n = top; n >= 0; n = file.nodes[n].parent) own[n] = true;
+  for (size_t n = static_cast<size_t>(top) + 1; n < own.size(); ++n)  // parents come first
+    if (const int p = file.nodes[n].parent; p >= top && own[p]) own[n] = true;
+  std::vector<const GltfBone*> first(file.skin_nodes.size());  // of each skin
+  std::vector<bool> persons(file.skin_nodes.size());
+  for (const GltfBone& bone : file.bones) {
+    if (bone.skin < 0) continue;
+    if (first[bone.skin] == nullptr) first[bone.skin] = &bone;
+    if (own[bone.node]) persons[bone.skin] = true;
+  }
+  for (size_t s = 0; s < persons.size(); ++s)
+    if (!persons[s] && file.skin_nodes[s] >= 0 && first[s] != nullptr)
+      throw InputError(file.path,
+                       "holds a skin on bones that are not the person's (" +
+                           text::quote(file.nodes[first[s]->node].name) + " ...)",
+                       "export the person alone");
+}
+
 }  // namespace
 
 GltfRig find_rig(const Gltf& file, const MotionOptions& options, ImportReport& report) {
@@ -333,6 +360,7 @@ GltfRig find_rig(const Gltf& file, const MotionOptions& options, ImportReport& r
                 names.profile->title +
                     (names.profile->name.empty() ? "" : " (profile " + names.profile->name + ")"));
   find_nodes(file, rig, map, nodes, report);
+  check_skins(file, rig);
   Joints joints;
   for (size_t j = 0; j < kJoints; ++j)
     joints[j] = rig.bind[rig.node[j]].translation() + rig.offset[j];

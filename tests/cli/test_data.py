@@ -125,6 +125,9 @@ class Data(CliTest):
         profile = "title: Suit\njoints:\n" + "".join("  %s: b_%d\n" % (joint, j) for j, joint in enumerate(JOINTS))
         self.write("suit.yaml", profile)
         self.assertIn("Suit (profile suit)", self.done("data", "import", "suit.bvh", "--bones", "suit.yaml", "--out", "s.h5"))
+        self.write("suit.YML", profile)
+        old = self.done("data", "import", "suit.bvh", "--profile", "suit.YML", "--out", "s.h5")  # the option's older name
+        self.assertIn("Suit (profile suit)", old)
         self.write("bad.yaml", profile.replace("  head:", "  heed:"))
         self.bad_input(["data", "import", "suit.bvh", "--bones", "bad.yaml", "--out", "x.h5"], "bad.yaml:", "'head'")
 

@@ -93,6 +93,20 @@ class Gltf(CliTest):
         self.bad_input(["data", "import", "hero.glb", "--bones", "mixamo", "--out", "x.h5"], "hero.glb", "profile mixamo")
         self.bad_input(["data", "import", "hero.glb", "--facing", "z", "--out", "x.h5"], "--facing")
 
+    def test_bones_of_a_target_are_named(self):
+        names = ["bone %d" % j for j in range(22)]
+        character(self.path("own.glb"), names)
+        self.ply("scans/f0.ply", points(120, 1))
+        call = ["retarget", "--weights", weights("tposes", *TPOSES), "--source", "scans", "--target", "own.glb", "--out", "out.h5"]
+        self.bad_input(call, "own.glb", "not recognised", "none of its 22 bones", "--bones")
+        self.write("own.YML", "title: Own\njoints:\n" + "".join("  %s: %s\n" % pair for pair in zip(NAMES, names)))
+        found = self.restage(*call, "--bones", "own.YML", "--force")
+        self.assertEqual(found.code, 0, found.err)
+        self.assertIn("left upper arm 45.0 degrees", found.err)  # brought into the T-pose by its rig
+        self.bad_input(call + ["--bones", "none.yaml"], "none.yaml")
+        self.ply("plain.ply", points(90, 7))
+        self.bad_input([word.replace("own.glb", "plain.ply") for word in call] + ["--bones", "own.YML"], "plain.ply", "leave --bones out")
+
     def scaled(self, name, *scale):
         """A copy of hero.glb below a node of this scale."""
         def change(root):

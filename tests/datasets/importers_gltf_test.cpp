@@ -193,6 +193,11 @@ TEST_F(ImportersGltf, TwoCharactersInOneFileAreRefused) {
   const std::string file = write("two.glb", two);
   EXPECT_HAS(error_of([&] { read_character(file); }), "holds 2 characters");
   EXPECT_HAS(error_of([&] { read_target(file); }), "holds 2 characters");
+  testing::GlbParts horse = two;  // no person, but a skin all the same
+  for (size_t n = count; n < 2 * count; ++n)
+    horse.root["nodes"][n]["name"] = "horse " + std::to_string(n);
+  const std::string rider = write("rider.glb", horse);
+  EXPECT_HAS(error_of([&] { read_character(rider); }), "not the person's ('horse");
   MotionOptions named;
   named.profile = "mixamo";
   EXPECT_HAS(error_of([&] { read_character(file, named); }), "holds 2 characters");
