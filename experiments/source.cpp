@@ -32,8 +32,7 @@ Source::Source(const SourceRecord& how, uint64_t max_memory) : how_(how), turn_(
   check(how);
   frames_ = open_frames(how.path, {.clip = how.clip,
                                    .max_memory = max_memory,
-                                   .sequence = how.sequence,
-                                   .leave_out_non_finite = true});
+                                   .sequence = how.sequence});
   if (!how_.fps) how_.fps = frames_->fps();
 }
 

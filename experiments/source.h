@@ -31,6 +31,8 @@ class Source {
   int64_t frames() const { return frames_->frames(); }
   int64_t sequences() const { return frames_->sequences(); }
   double fps() const { return *how_.fps; }
+  /// What the user should know of the whole, such as files that were left out.
+  std::vector<std::string> remarks() const { return frames_->remarks(); }
   bool upright() const { return turn_.isIdentity(); }  ///< y was up already
   /// How it is read; the rate is there, also where it is the file's.
   const SourceRecord& record() const { return how_; }

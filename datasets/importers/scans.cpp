@@ -162,8 +162,8 @@ class HoldingWriter {
  public:
   HoldingWriter(ScanWriter& out, const std::string& name) : out_(out), name_(name) {}
 
-  void push(const Points& points, const std::string& source) {
-    const size_t different = different_points(points);
+  /// `different`: how many of the points are (different_points()).
+  void push(const Points& points, size_t different, const std::string& source) {
     if (different < kFewest) {
       if (missing_ == 0) first_ = cat(source, ": has only ", different, " different points");
       ++missing_;
@@ -292,7 +292,7 @@ int64_t import_scans(const ScanSequence& sequence, const MotionOptions& options,
   HoldingWriter writer(out, sequence.name);
   Frame frame;
   bool first = true;
-  size_t left_out = 0;
+  size_t left_out = 0, different = 0;
   int64_t at = 0;  // of the source, the frame that next() gives
   const int64_t count = clock.count();
   for (int64_t k = 0; k < count; ++k) {
@@ -301,14 +301,14 @@ int64_t import_scans(const ScanSequence& sequence, const MotionOptions& options,
       frame = *source->next();
       ++at;
       left_out += frame.left_out;
-      if (first && frame.points.size() >= kFewest) check_size(frame, options.scale, report);
+      different = different_points(frame.points);
+      const bool look = first && different >= kFewest;
+      if (look) check_size(frame, options.scale, report);
       convert(frame, to_ours);
-      if (first && frame.points.size() >= kFewest) {
-        report.fact("size", size_fact(frame.points));
-        first = false;
-      }
+      if (look) report.fact("size", size_fact(frame.points));
+      first = first && !look;
     }
-    writer.push(frame.points, frame.source);
+    writer.push(frame.points, different, frame.source);
   }
   if (left_out > 0)
     report.remark(cat("left out ", left_out, left_out == 1 ? " point" : " points",

@@ -38,7 +38,6 @@ void split(std::string_view line, char separator, Cells& cells) {
     cells.push_back(bare(line.substr(0, end)));
     if (end != std::string_view::npos) line.remove_prefix(end + 1);
   }
-  if (cells.size() > 1 && cells.back().empty()) cells.pop_back();  // "1,2,3,"
 }
 
 /// Commas in numbers ("0,5 1,5 2,5") are no separators.
@@ -124,13 +123,20 @@ class TableParser {
       return;
     }
     if (axis_column_[0] < 0) axis_column_ = {0, 1, 2};
+    drop_empty_end();
     columns_ = std::max(cells_.size(), named_columns_);
     point(line);
+  }
+
+  /// Of a line that ends with a separator: "1,2,3,".
+  void drop_empty_end() {
+    if (cells_.size() > std::max<size_t>(columns_, 3) && cells_.back().empty()) cells_.pop_back();
   }
 
   void header(std::string_view line) {
     while (!line.empty() && (line[0] == '#' || line[0] == '/')) line.remove_prefix(1);
     split(line, separator_of(line), cells_);
+    drop_empty_end();
     for (size_t i = 0; i < cells_.size(); ++i) {
       if (const int axis = axis_of(cells_[i]); axis >= 0)
         axis_column_[static_cast<size_t>(axis)] = static_cast<int>(i);
@@ -141,6 +147,7 @@ class TableParser {
 
   void point(std::string_view line) {
     split(line, separator_, cells_);
+    drop_empty_end();
     if (cells_.size() < 3) throw InputError(where(), "has fewer than 3 numbers", kSaveAgain);
     if (cells_.size() != columns_)
       throw InputError(where(), cat("has ", cells_.size(), " columns, the lines before ", columns_),

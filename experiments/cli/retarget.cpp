@@ -285,7 +285,8 @@ class Run {
 
 /// What is said when all is done; bad input, which may come late in a source, is answered with one
 /// line.
-void log_outcome(const Outcome& done, const Gaps& gaps) {
+void log_outcome(const Outcome& done, const Source& source, const Gaps& gaps) {
+  for (const std::string& line : source.remarks()) log_warning(line);
   for (const std::string& line : gaps.lines(done.filled)) log_warning(line);
   if (done.points_left_out > 0)
     log_warning(std::to_string(done.points_left_out) +
@@ -350,7 +351,7 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
       *system->target_joints() == *target.joints)
     target.report.remark("the network does not see its T-pose: the joints of its rig are taken");
   log_target(target.report);
-  log_outcome(done, gaps);
+  log_outcome(done, source, gaps);
   if (c.profile) log_profile(profile);
   print_outcome(c, common, source, done, gaps, profile);
   return 0;
