@@ -135,21 +135,27 @@ TEST(DoctorSequence, TheRateIsTheUsersOrTheFiles) {
   EXPECT_EQ(d.find("frame rate")->what, "120 frames a second");
 }
 
-/// Seen from anywhere, people are turned by the angle that they are turned by.
+/// From wherever they are seen, people are turned by the angle that they are turned by, where it is
+/// sure and large enough.
 TEST(DoctorSequence, IsTurnedByTheAngleFound) {
-  for (const double degrees : {-15.0, 60.0, 240.0}) {  // 22 degrees to the right when it begins
+  Frames straight(performance(4));
+  const Mat3 forwards = examine_frames(straight).orientation.exact_turn();
+  int exactly = 0;
+  for (int k = 0; k < 12; ++k) {
+    const Mat3 turn = turn_about_y((15 + 30 * k) * 3.14159265358979 / 180);
     std::vector<Points> frames;
-    const double turn = degrees * 3.14159265358979 / 180;
-    for (const Points& frame : performance(12)) frames.push_back(moved(frame, turn_about_y(turn)));
-    Frames turned(frames), straight(performance(12));
-    const Diagnosis d = examine_frames(turned), before = examine_frames(straight);
+    for (const Points& frame : performance(4)) frames.push_back(moved(frame, turn));
+    Frames turned(frames);
+    const Diagnosis d = examine_frames(turned);
     ASSERT_TRUE(d.transform);
-    EXPECT_NE(d.turned, 0) << degrees;
-    // The performer stands as if the sequence had not been turned at all.
-    const Mat3 left =
-        d.transform->rotation * turn_about_y(turn) * before.orientation.exact_turn().transpose();
-    EXPECT_NEAR(std::atan2(left(0, 2), left(2, 2)) * 180 / 3.14159265358979, 0, 10) << degrees;
+    // The performer stands as if the sequence had not been turned at all; by quarters alone that
+    // would be up to 45 degrees off.
+    const Mat3 left = d.transform->rotation * turn * forwards.transpose();
+    const double off = std::abs(std::atan2(left(0, 2), left(2, 2))) * 180 / 3.14159265358979;
+    EXPECT_LT(off, d.turned != 0 ? 15 : 50) << k;
+    exactly += d.turned != 0;
   }
+  EXPECT_GE(exactly, 4);
 }
 
 TEST(DoctorSequence, NobodyRunsThatFast) {
