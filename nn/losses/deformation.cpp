@@ -12,7 +12,7 @@ namespace restage {
 
 namespace {
 
-/// `seen_*` is what the networks read, the others what is skinned.
+/// The networks read `seen_*`; the other points and joints are skinned.
 DeformationOutput deform(Context& ctx, const DeformationModel& weights, const OffsetNet* offsets,
                          const Var& seen_points, const Var& seen_joints, const Var& rest_points,
                          const Var& rest_joints, const Var& local, const Var& axis_angle) {

@@ -13,7 +13,8 @@ namespace {
 
 using Json = nlohmann::json;  // keys in order of their names
 
-/// A tree with its numbers as text, so that how they are printed elsewhere does not matter.
+/// A tree as JSON with its numbers as text, so that how numbers are printed elsewhere does not
+/// matter.
 Json to_json(const ConfigNode& node) {
   switch (node.kind) {
     case ConfigNode::Kind::null:
@@ -75,7 +76,7 @@ std::string Identities::networks(const std::string& stage, const std::string& pa
 
 std::vector<StageId> Identities::stages(const TrainConfig& config) {
   std::vector<StageId> out;
-  std::map<std::string, std::string> left;  // what a later stage would read
+  std::map<std::string, std::string> left;  // what each stage leaves to later stages: an id
   for (const std::string& name : config.stages) {
     const StageSection& section = config.section(name);
     if (section.from) {
@@ -90,7 +91,8 @@ std::vector<StageId> Identities::stages(const TrainConfig& config) {
                  {"precision", static_cast<int>(config.precision)},
                  {"reads", Json::object()}};
     const SelectionConfig& selection = config.loop.selection;
-    if (config.device != "cpu") json["device"] = config.device;  // rounds in other ways
+    // Another device rounds in other ways.
+    if (config.device != "cpu") json["device"] = config.device;
     if (config.loop.overfit_batches > 0) json["overfit_batches"] = config.loop.overfit_batches;
     if (config.loop.micro_batches > 1) json["micro_batches"] = config.loop.micro_batches;
     if (selection.ema > 0) json["ema"] = number(selection.ema);

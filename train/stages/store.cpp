@@ -18,7 +18,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kFiles[] = {"weights.safetensors", "config.yaml", "metrics.jsonl"};
 
-/// What is wrong with the artifact in `folder`; nothing if it is whole.
+/// What is wrong with the artifact in `folder`; "" if it is whole.
 std::string damage(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_regular_file(folder / "artifact.json", error)) return "artifact.json is missing";
@@ -36,11 +36,11 @@ std::string damage(const fs::path& folder) {
   return "";
 }
 
-/// The validation of what a stage hands on: the last line of its metrics, or that of the step which
-/// it names as the best.
+/// The validation of the weights that a stage hands on: the last line of its metrics, or the line
+/// of the step which that line names as the best.
 Json validation_of(const std::string& metrics) {
   std::istringstream lines(metrics);
-  std::map<int64_t, Json> last;  // of each step
+  std::map<int64_t, Json> last;  // the last line of each step
   Json out;
   for (std::string text; std::getline(lines, text);) {
     out = Json::parse(text, nullptr, false);

@@ -25,16 +25,18 @@ class Store {
  public:
   explicit Store(std::string dir) : dir_(std::move(dir)) {}
 
-  /// Its folder is there; whether its content is undamaged is seen when it is read.
+  /// Whether the folder of the artifact is there; whether its content is undamaged is seen when it
+  /// is read.
   bool has(const StageId& id) const;
   std::string path(const StageId& id) const;
   /// The artifact, or nothing. A damaged one gives a warning, is moved aside and counts as absent.
   std::optional<Bundle> find(const StageId& id) const;
 
-  /// Its curves so far (metrics.jsonl), also while it is made; empty if nobody has begun.
+  /// The curves of the artifact so far (metrics.jsonl), also while it is made; empty if nobody has
+  /// begun to make it.
   std::string metrics(const StageId& id) const;
 
-  /// The folder of what extractors were asked (train/stages/answers.h).
+  /// The folder of the answers of extractors (train/stages/answers.h).
   std::string answers() const;
 
   /// Trains in the given run directory, which may hold the checkpoints of an earlier attempt.
