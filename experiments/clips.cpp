@@ -73,7 +73,6 @@ Clip read_clip(const SourceRecord& how, const std::string& label, uint64_t max_m
   Clip clip;
   clip.label = label;
   clip.fps = source.fps();
-  for (const std::string& line : source.remarks()) remarks.push_back(line);
   bool surface = true;
   std::vector<InputError> faults;
   size_t left_out = 0;

@@ -1,6 +1,6 @@
 // Parameters and modules. A module is a plain struct whose members are parameters, buffers and
-// modules; visit() names them once, and counting, initialising, saving, loading and optimising all
-// follow from it. Names are PyTorch's state-dict names.
+// modules; visit() names them once, and counting, initialising, saving, loading and optimising
+// follow from visit(). Names are PyTorch's state-dict names.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace restage {
 
-/// A trainable tensor. Its identity ties gradients to it (Gradients::find).
+/// A trainable tensor. Gradients are found by its identity (Gradients::find).
 struct Parameter {
   Tensor value;
   uint64_t id = next_id();
@@ -35,26 +35,27 @@ class Fields {
   virtual void operator()(const std::string& name, Module& child) = 0;
 };
 
-/// What a forward pass needs besides its inputs; passed down, never global.
+/// What a forward pass needs besides its inputs. It is passed down and never global.
 struct Context {
   Tape* tape = nullptr;   ///< null: nothing is recorded
   bool training = false;  ///< dropout on, batch statistics in batch norm
-  RngKey rng;             ///< of this step
+  RngKey rng;             ///< the key of everything random in this step
   uint64_t masks = 0;     ///< dropout masks drawn so far
   bool frozen = false;    ///< parameters are constants (Frozen)
 
-  /// The parameter as a value: a leaf of the tape, or a constant where it has no gradient.
+  /// The parameter as a value: a leaf of the tape, or a constant without a tape or where parameters
+  /// are frozen.
   Var bind(const Parameter& p) const {
     return tape && !frozen ? tape->leaf(p.value, p.id) : Var(p.value);
   }
-  /// Stream of the next dropout mask: a function of `rng` and of how many came before, so no two of
-  /// a step are equal. Calls follow each other in an order that the source fixes: two layers that
-  /// drop must not be called within one expression.
+  /// The key of the next dropout mask: a function of `rng` and of how many masks came before, so no
+  /// two masks of a step are equal. The order of the calls must be fixed by the source, so two
+  /// layers with dropout must not be called within one expression.
   RngKey next_mask() { return rng.fold("dropout").fold(masks++); }
 };
 
-/// While it lives, parameters that `ctx` binds are constants: gradients go through a module to its
-/// inputs and cost nothing for what it holds. Batch norm behaves as ever.
+/// While an object lives, parameters that `ctx` binds are constants: gradients go through a module
+/// to its inputs, and none are computed for its parameters. Batch norm behaves as ever.
 class Frozen {
  public:
   explicit Frozen(Context& ctx) : ctx_(ctx), before_(ctx.frozen) { ctx.frozen = true; }
@@ -73,9 +74,10 @@ struct Module {
   Module(const Module&) = delete;
   Module& operator=(const Module&) = delete;
   virtual void visit(Fields& fields) = 0;
-  /// Short kind for layer tables, e.g. "Linear".
+  /// A short name of the kind of module for tables of layers, such as "Linear".
   virtual const char* kind() const = 0;
-  /// Whether a training pass changes buffers of the module's own, as batch norm does its averages.
+  /// Whether a training pass changes buffers of this module, as batch norm changes its running
+  /// averages.
   virtual bool changes_buffers() const { return false; }
   std::string scope;  ///< name within the parent, set by name_scopes(); for error messages
 };
@@ -86,8 +88,8 @@ struct StateEntry {
   Tensor* value;
   Parameter* parameter;  ///< null: a buffer
   std::string module;    ///< path of the owning module, "backbone.fc1.0"
-  const char* kind;      ///< its kind
-  bool changes;          ///< whether a training pass changes it: Module::changes_buffers()
+  const char* kind;      ///< kind of the owning module
+  bool changes;  ///< a buffer: whether a training pass changes it (Module::changes_buffers())
 };
 /// All parameters and buffers, depth first in declaration order, names joined with dots.
 std::vector<StateEntry> state_of(Module& module, const std::string& prefix = "");
@@ -99,15 +101,15 @@ void name_scopes(Module& root, const std::string& name);
 void cast_module(Module& module, DType type);
 /// Takes every parameter and buffer to a device.
 void move_module(Module& module, Device device);
-/// Where they are; the CPU's of a module that has none.
+/// The device of the parameters and buffers of a module; the CPU if the module has none.
 Device device_of(Module& module);
 
 /// PyTorch's default start: uniform in +-1/sqrt(fan_in) (spec 7), from a named stream.
 struct Init {
   RngKey key;
   DType type = DType::f32;
-  /// How many numbers a network may still take, where a file says how large it is to be (null: as
-  /// many as it likes). So a damaged size cannot ask for all memory.
+  /// How many more numbers the parameters of a network may hold, where a file says how large the
+  /// network is (null: any number). So a damaged size in a file cannot ask for all memory.
   int64_t* budget = nullptr;
   /// InputError if the budget is spent.
   Tensor uniform(const Shape& shape, double bound, const std::string& name) const;

@@ -10,17 +10,17 @@ namespace restage {
 
 struct Failure {
   std::string stage, said;  ///< what differentiate() found: op and module
-  int64_t step = 0;         ///< the one that failed, from 0
+  int64_t step = 0;         ///< number of the step that failed, from 0
   int64_t from = 0;         ///< steps that `state` has behind it
-  std::string config_yaml;  ///< of the run, resolved
+  std::string config_yaml;  ///< the configuration of the run, resolved
   TensorFile state = {};    ///< Stage::save() of the last checkpoint; empty: as the stage is made
-  NamedTensors examples;    ///< of the step
+  NamedTensors examples;    ///< the examples of the step that failed
   Bundle given;             ///< what earlier stages have left
 };
 
-/// As one safetensors file, which appears whole or not at all.
+/// Writes a failure as one safetensors file, which appears whole or not at all.
 void write_failure(const std::string& path, const Failure& failure);
-/// InputError: no such file, or one of something else.
+/// InputError: there is no such file, or the file holds something else.
 Failure read_failure(const std::string& path);
 
 }  // namespace restage

@@ -68,7 +68,7 @@ std::string start_of(int64_t pid) {
   return line.substr(at, line.find(' ', at) - at);
 }
 
-/// Of this host: is this process there, and the same that it was?
+/// Whether process `pid` of this host lives and is the one that started at `start`.
 bool runs(int64_t pid, const std::string& start) {
   const std::string now = start_of(pid);
   if (now.empty() || start.empty())  // /proc shows nothing, perhaps of another user
@@ -81,8 +81,8 @@ struct Record {
   std::string world, start, token;
   bool released = false;
 
-  /// Of `kRecord` bytes, and what changes has its place in them: a reader in the middle of a
-  /// heartbeat sees no broken text.
+  /// The record as `kRecord` bytes, in which everything that changes has a fixed place: who reads
+  /// in the middle of a heartbeat sees no broken text.
   std::string text() const {
     const nlohmann::ordered_json json = {{"host", holder.host}, {"pid", holder.pid},
                                          {"who", holder.who},   {"start", start},
@@ -116,7 +116,8 @@ std::optional<std::string> read_bytes(const std::string& file) {
   return bytes;
 }
 
-/// Nothing: no such file. One that stays unreadable for a while is damaged, and nobody's.
+/// The record of a file; nothing if there is no such file. A file that stays unreadable for a while
+/// is damaged, and its record belongs to nobody.
 std::optional<Record> read_record(const std::string& file) {
   constexpr int kLooks = 10;
   nlohmann::json json;
@@ -164,7 +165,7 @@ std::vector<std::string> ends_of_names(const std::string& path, const char* mark
   return out;
 }
 
-/// The highest number there is; 0: none.
+/// The highest number of the files of a lease; 0 if it has no files.
 int64_t last_number(const std::string& path) {
   int64_t last = 0;
   for (const std::string& name : ends_of_names(path, ".")) {
@@ -176,13 +177,14 @@ int64_t last_number(const std::string& path) {
   return last;
 }
 
-/// Known at once: free, or of a process of ours that is dead.
+/// Whether a lease is free, as far as that is known at once: it says so, or its holder was a
+/// process of this host and is dead.
 bool surely_free(const Record& record) {
   if (record.released) return true;
   return record.holder.here && !runs(record.holder.pid, record.start);
 }
 
-/// The file of a lease to be, complete, under a name that nobody else uses.
+/// Writes the file of a lease that this process wants to take, under a name that nobody else uses.
 std::string draft(const std::string& path, const Record& record) {
   const std::string name = name_beside(path);
   const int fd = ::open(name.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0644);
@@ -197,7 +199,7 @@ std::string draft(const std::string& path, const Record& record) {
   throw_unwritable(path, code == 0 ? ENOSPC : code);
 }
 
-/// Drafts of processes that were killed before they could remove them.
+/// Removes the drafts of processes that were killed before they could do so themselves.
 void remove_dead_drafts(const std::string& path) {
   try {
     for (const std::string& token : ends_of_names(path, kDraft)) {
@@ -209,8 +211,8 @@ void remove_dead_drafts(const std::string& path) {
   }
 }
 
-/// One name for a file, for one process only. A network file system may do it and answer that it
-/// failed: the count of names tells.
+/// Gives a file one more name, which only one process can do. A network file system may give the
+/// name and answer that it failed: the number of the file's names tells.
 bool link_once(const std::string& from, const std::string& to) {
   if (::link(from.c_str(), to.c_str()) == 0) return true;
   const int code = errno;
@@ -252,12 +254,13 @@ struct Lease::State {
   bool held = false, ending = false, forgotten = false;
   std::thread thread;
 
-  /// Somebody linked the next number, or removed ours after finishing the work.
+  /// Whether somebody linked the next number, or removed our file after finishing the work.
   bool superseded() const {
     return ::access(numbered(path, number + 1).c_str(), F_OK) == 0 ||
            ::access(file.c_str(), F_OK) != 0;
   }
-  /// In place: no new block of a full disk is needed. False: the file could not be written.
+  /// Writes the record over the old one, so that a full disk needs no new block. False if the file
+  /// could not be written.
   bool write() {
     const int fd = ::open(file.c_str(), O_WRONLY | O_CLOEXEC);
     if (fd < 0) return false;
@@ -277,10 +280,10 @@ struct Lease::State {
         if (superseded()) lost = true;
         good = !lost && write();
         if (options.on_beat) options.on_beat();
-      } catch (...) {  // no memory, which the work will find out by itself
+      } catch (...) {  // there is no memory, which the work will find out by itself
       }
       if (good) written = Clock::now();
-      // Others may take us for dead from then on.
+      // From then on others may take this process for dead.
       if (Seconds(Clock::now() - written).count() > options.patience / 2) lost = true;
       lock.lock();
     }
@@ -328,7 +331,7 @@ std::optional<Lease> Lease::take(const std::string& path, const std::string& who
     state->number = number + 1;
     state->file = numbered(path, state->number);
     if (link_once(name, state->file)) {
-      if (last_number(path) > state->number) {  // others have come and gone: ours is of the past
+      if (last_number(path) > state->number) {  // other holders have come and gone in the meantime
         ::unlink(state->file.c_str());
         number = last_number(path);
         continue;

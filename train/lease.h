@@ -39,7 +39,8 @@ struct LeaseOptions {
 struct LeaseHolder {
   std::string host, who;
   int64_t pid = 0, beat = 0;
-  bool here = false;         ///< on this host, so that its number and start time decide
+  /// The holder is on this host, so its process number and start time decide whether it lives.
+  bool here = false;
   std::string text() const;  ///< "process 12 on host a (trial 4f2a)"
 };
 
@@ -50,18 +51,19 @@ class Lease {
   /// `path` is not there or may not be written; WorkError: no space.
   static std::optional<Lease> take(const std::string& path, const std::string& who,
                                    LeaseOptions options = {});
-  /// Who holds it, at once: nothing if it is free or its holder was on this host and is dead. One
-  /// on another host counts as alive.
+  /// Who holds the lease, answered at once: nothing if the lease is free or if its holder was on
+  /// this host and is dead. A holder on another host counts as alive.
   static std::optional<LeaseHolder> holder(const std::string& path);
 
   Lease(Lease&&) noexcept;
   Lease& operator=(Lease&&) = delete;
   ~Lease();  ///< releases
 
-  /// Somebody else holds it now, or might: this process was, or will be, taken for dead.
+  /// Whether somebody else holds the lease now, or might: this process was, or will be, taken for
+  /// dead.
   bool lost() const;
-  /// The work is done and will be seen to be done: removes the lease's files, and those of
-  /// processes that died at it.
+  /// The work is done and will be seen to be done: removes the lease's files, and the files of
+  /// processes that died while they held it.
   void forget();
 
  private:

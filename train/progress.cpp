@@ -104,14 +104,15 @@ void Progress::draw_bar() {
   const auto width =
       static_cast<size_t>(std::max(out_.width() - 1, 1));  // the last column would wrap
   std::string tail = " " + numbers(finished_);
-  for (const auto& entry : values_) {  // as many as fit
+  for (const auto& entry : values_) {  // as many values as fit into the line
     const std::string item = "  " + entry.first + " " + format("%.4g", entry.second);
     if (title_.size() + 2 + kNarrowestBar + 2 + tail.size() + item.size() > width) break;
     tail += item;
   }
   std::string line = title_;
   size_t bar_start = 0, filled = 0;
-  if (width != bar_width_) bar_cells_ = kWidestBar;  // else it only shrinks: it must not breathe
+  // While the terminal keeps its width the bar may shrink and never grows.
+  if (width != bar_width_) bar_cells_ = kWidestBar;
   bar_width_ = width;
   const auto room =
       static_cast<int64_t>(width) - static_cast<int64_t>(title_.size() + tail.size() + 3);

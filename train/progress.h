@@ -12,12 +12,12 @@
 
 namespace restage {
 
-/// Where progress goes and what that place can do. All of it can be replaced in tests.
+/// Where progress is shown and what can be done there. Tests replace its members.
 struct ProgressOutput {
   std::function<void(std::string_view)> write;
   std::function<double()> clock;  ///< seconds, monotonic
   std::function<int()> width;     ///< columns of the terminal now
-  bool terminal = false;          ///< may move the cursor
+  bool terminal = false;          ///< the cursor can be moved
   bool colour = false;
   bool quiet = false;
 };
@@ -45,7 +45,7 @@ class Progress {
  private:
   void draw_bar();
   void write_line(bool last);
-  double rate() const;  ///< steps per second over the last half minute; 0: unknown yet
+  double rate() const;  ///< steps per second over the last half minute; 0 if that is not known yet
   std::string numbers(bool last) const;
 
   std::string title_;

@@ -56,7 +56,7 @@ struct Draft : Temporary {
     if (!fs::create_directories(path(), error) || error)
       throw_unwritable(place, error ? error.value() : EEXIST);
   }
-  /// False if there is something at `target` already.
+  /// Moves the folder to `target`; false if there is something already.
   bool move_to(const std::string& target) {
     if (::rename(path().c_str(), target.c_str()) == 0) {
       keep();
@@ -68,7 +68,7 @@ struct Draft : Temporary {
   bool moved = false;
 };
 
-/// Fills a draft beside the later place; returns its lock.
+/// Fills a draft that lies beside the later place of the run; returns its lock.
 int fill(const Draft& draft, const std::string& yaml, const std::string& provenance) {
   if (::mkdir(inside(draft.path(), "checkpoints").c_str(), 0755) != 0)
     throw_unwritable(draft.path(), errno);
@@ -88,11 +88,12 @@ std::string timestamp() {
   return text;
 }
 
-/// What goes on from `last` needs the stages before it. Bad input is told before anything changes.
+/// Checks what a run needs to go on from `last`: the stages before it. Bad input is refused before
+/// anything changes.
 void check_resumable(const std::string& dir, const std::vector<std::string>& stages,
                      const std::optional<Checkpoint>& last) {
   for (const char* name : {"metrics.jsonl", "log.txt", "weights.safetensors"})
-    AtomicFile(inside(dir, name));  // nothing in its way?
+    AtomicFile(inside(dir, name));  // throws if the file cannot be written
   std::vector<std::string> ignored;
   for (const std::string& stage : stages) {
     if (!last || stage == last->stage) return;
@@ -201,7 +202,8 @@ RunDir RunDir::resume(const std::string& dir, std::vector<std::string> stages) {
   check_resumable(dir, run.stages_, run.resumed_);
   for (const std::string& why : passed_over) log_warning(why);
   run_files::cut_metrics(dir, run.stages_, run.resumed_);
-  // What is newer than the newest good one is damaged: away with it, it would count when pruning.
+  // A checkpoint that is newer than the newest good one is damaged. It goes, since it would count
+  // when checkpoints are pruned.
   for (const auto& entry : run_files::list_checkpoints(dir, run.stages_)) {
     const bool good = run.resumed_ && entry.path == run.resumed_->path;
     const auto order = std::find(run.stages_.begin(), run.stages_.end(), entry.stage);

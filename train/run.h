@@ -20,7 +20,7 @@
 
 namespace restage {
 
-/// What was saved, with the bytes that were given to save_checkpoint.
+/// A checkpoint, with the bytes that were given to save_checkpoint.
 struct Checkpoint {
   std::string path, stage;
   int64_t step = 0;
@@ -29,17 +29,18 @@ struct Checkpoint {
 
 /// Which checkpoints of a stage stay.
 struct KeepRule {
-  int64_t last = 2;   ///< the newest
-  int64_t every = 0;  ///< those whose step is a multiple of this; 0: none
-  int64_t best = -1;  ///< that of this step
+  int64_t last = 2;   ///< so many of the newest checkpoints
+  int64_t every = 0;  ///< also the checkpoints whose step is a multiple of this; 0: no others
+  int64_t best = -1;  ///< also the checkpoint of this step; -1: none
 };
 
 /// The newest undamaged checkpoint of a run, in the order of the stages and of the steps in each;
-/// reads only, needs no lock. Each damaged one that is passed over gives a warning in the log.
-/// InputError if `dir` is no run directory. A single stage gives its newest one.
+/// reads only, needs no lock. Each damaged checkpoint that is passed over gives a warning in the
+/// log. If `stages` has a single stage, only its checkpoints count. InputError if `dir` is no run
+/// directory.
 std::optional<Checkpoint> latest_checkpoint(const std::string& dir,
                                             const std::vector<std::string>& stages);
-/// That of a step. InputError: it is not there, or damaged.
+/// The checkpoint of a step. InputError: it is not there, or it is damaged.
 Checkpoint checkpoint_of(const std::string& dir, const std::string& stage, int64_t step);
 /// `dir`/config.yaml; InputError if `dir` is no run directory.
 std::string run_config_path(const std::string& dir);
@@ -51,12 +52,12 @@ class RunDir {
   static RunDir create(const std::string& root, const std::string& name,
                        const std::string& resolved_yaml, const std::string& provenance_json,
                        std::vector<std::string> stages);
-  /// The same at a place of the user's choice, which must not exist or be an empty folder.
+  /// Makes and locks a run directory at `dir`, which must not exist or be an empty folder.
   static RunDir create_at(const std::string& dir, const std::string& resolved_yaml,
                           const std::string& provenance_json, std::vector<std::string> stages);
   /// Locks an existing run and takes it back to its newest undamaged checkpoint (resumed_from()):
-  /// later lines of metrics.jsonl and what an interrupted write left are removed. InputError: not
-  /// a run directory, in use by another process.
+  /// later lines of metrics.jsonl and the leftovers of an interrupted write are removed.
+  /// InputError: not a run directory, in use by another process.
   static RunDir resume(const std::string& dir, std::vector<std::string> stages);
 
   RunDir(RunDir&& other) noexcept;
@@ -66,17 +67,18 @@ class RunDir {
   ~RunDir();  ///< releases the lock and the log file
 
   const std::string& dir() const { return dir_; }
-  /// The state to go on from; none: from the beginning. Moves the bytes out.
+  /// The checkpoint to go on from; nothing if the run starts at the beginning. Moves the bytes out.
   std::optional<Checkpoint> take_resumed() { return std::exchange(resumed_, std::nullopt); }
 
-  /// Appends one line. Non-finite values become null. WorkError on a full disk, and no torn line.
+  /// Appends one line to metrics.jsonl. Values that are not finite become null. WorkError if the
+  /// disk is full; then no torn line is left.
   void metrics(const std::string& stage, int64_t step,
                const std::vector<std::pair<std::string, double>>& values);
-  /// Makes the metrics and then `bytes` durable, and prunes what the stage has beyond `keep`.
-  /// Returns the path.
+  /// Makes the metrics and then the checkpoint `bytes` durable, and removes the checkpoints of the
+  /// stage that `keep` does not keep. Returns the path.
   std::string save_checkpoint(const std::string& stage, int64_t step, std::string_view bytes,
                               const KeepRule& keep = {});
-  /// Prunes the checkpoints of a stage.
+  /// Removes the checkpoints of a stage that the rule does not keep.
   void prune(const std::string& stage, const KeepRule& keep) const;
 
  private:

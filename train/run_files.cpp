@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 constexpr std::string_view kSuffix = ".safetensors";
 constexpr size_t kChecksum = 16;
 
-/// The opposite of checkpoint_name.
+/// Reads what checkpoint_name() wrote; nothing if the name is of another form.
 std::optional<Entry> parse_name(const fs::path& path) {
   std::string name = path.filename().string();
   if (name.size() < kSuffix.size() || !name.ends_with(kSuffix)) return {};
@@ -40,7 +40,7 @@ size_t order_of(const std::vector<std::string>& stages, const std::string& stage
   return static_cast<size_t>(std::find(stages.begin(), stages.end(), stage) - stages.begin());
 }
 
-/// Is this line whole, ours, and not after `last`?
+/// Whether a line of metrics.jsonl is whole, of one of the stages, and not after `last`.
 bool keeps(const std::string& line, const std::vector<std::string>& stages,
            const Checkpoint& last) {
   const auto json = nlohmann::json::parse(line, nullptr, false);
@@ -55,7 +55,7 @@ bool keeps(const std::string& line, const std::vector<std::string>& stages,
 }
 
 void remove_file(const std::string& path) {
-  std::error_code ignored;  // what cannot be removed does no harm
+  std::error_code ignored;  // a file that cannot be removed does no harm
   fs::remove(path, ignored);
 }
 

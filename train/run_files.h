@@ -22,10 +22,10 @@ std::string checkpoint_name(const std::string& stage, int64_t step, std::string_
 /// order of `stages`, then of the steps. Other files and stages are ignored.
 std::vector<Entry> list_checkpoints(const std::string& dir, const std::vector<std::string>& stages);
 /// The newest of `entries` (oldest first) that can be read and fits its checksum; what is wrong
-/// with those after it is added to `passed_over`, each in a line.
+/// with the checkpoints after it is added to `passed_over`, each in a line.
 std::optional<Checkpoint> newest_good(const std::vector<Entry>& entries,
                                       std::vector<std::string>& passed_over);
-/// Removes those of a stage that are not to stay; `entries` oldest first.
+/// Removes those of `entries` (of one stage, oldest first) that the rule does not keep.
 void prune(const std::vector<Entry>& entries, const KeepRule& keep);
 /// Removes temporary files that a killed process left.
 void remove_leftovers(const std::string& dir);

@@ -10,7 +10,7 @@
 #include "autograd/kernels/instruction_sets.h"
 #include "nn/config/config_tree.h"
 
-// The build gives these for this file; without them the answer is "unknown".
+// The build defines these for this file; without them the answers are "unknown".
 #ifndef RESTAGE_VERSION
 #define RESTAGE_VERSION "unknown"
 #endif

@@ -14,9 +14,9 @@ struct ScheduleConfig {
   double rate = 1e-4;  ///< before any decay
   Kind kind = Kind::constant;
   std::vector<int64_t> milestones;  ///< steps, increasing; kind milestones
-  double factor = 0.1;              ///< the rate is multiplied by it at every milestone
+  double factor = 0.1;              ///< what the rate is multiplied by at every milestone
   int64_t warmup = 0;               ///< steps of linear growth from rate / warmup to rate
-  double final_fraction = 0.0;      ///< kind cosine: the last rate is this times `rate`
+  double final_fraction = 0.0;      ///< kind cosine: the last rate as a share of `rate`
 };
 
 inline EnumNames<ScheduleConfig::Kind> config_names(ScheduleConfig::Kind) {

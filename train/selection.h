@@ -1,6 +1,6 @@
-// Which weights a stage hands on: those of its last step or of its best validation, as they are or
-// averaged over the steps; and whether it ends before its last step. All of it is in a checkpoint,
-// so that a resumed training decides as an undisturbed one.
+// Which weights a stage hands on: the weights of its last step or of its best validation, as they
+// are or averaged over the steps; and whether the stage ends before its last step. What decides is
+// part of a checkpoint, so a resumed training decides as an undisturbed one does.
 #pragma once
 
 #include <optional>
@@ -28,7 +28,7 @@ inline EnumNames<SelectionConfig::Export> config_names(SelectionConfig::Export) 
   return {{"last", SelectionConfig::Export::last}, {"best", SelectionConfig::Export::best}};
 }
 
-/// Of the section `loop`.
+/// The keys stand in the section `loop`.
 template <class V>
 void visit(V& v, SelectionConfig& c) {
   v("ema", c.ema,
@@ -49,7 +49,7 @@ class WeightAverage {
   WeightAverage(Stage& stage, double decay);
   /// After step number `done`.
   void add(int64_t done);
-  /// The average takes the place of the weights, and the other way round.
+  /// Exchanges the average and the weights: the average becomes what the stage holds, and back.
   void exchange();
   void save(TensorFile* file) const;
   void load(const TensorFile& file, const std::string& where);
@@ -60,16 +60,18 @@ class WeightAverage {
   double decay_;
 };
 
-/// The best validation so far. Lower is better; what is not a number is worse than anything.
+/// The best validation so far. Lower is better; a figure that is not a number is worse than any
+/// number.
 class BestSoFar {
  public:
-  /// Of these figures the one called `monitor`; if that is empty, the first.
+  /// Judges by the figure called `monitor`; by the first figure of a validation if `monitor` is
+  /// empty.
   BestSoFar(std::string monitor, double min_delta)
       : monitor_(std::move(monitor)), min_delta_(min_delta) {}
-  /// True if this one is better than all before.
+  /// Notes a validation; true if it is better than all before it.
   bool add(int64_t done, const NamedValues& figures);
-  int64_t step() const { return step_; }    ///< -1: none yet
-  int64_t worse() const { return worse_; }  ///< validations since
+  int64_t step() const { return step_; }    ///< of the best validation; -1: there is none yet
+  int64_t worse() const { return worse_; }  ///< validations since the best one
   std::string text() const;                 ///< "best 17.9 at 52000"
   void save(TensorFile* file) const;
   void load(const TensorFile& file, const std::string& where);
@@ -80,7 +82,8 @@ class BestSoFar {
   int64_t step_ = -1, worse_ = 0;
 };
 
-/// STAGE.FIGURE as `config` names it for a stage; "" if it does not.
+/// The figure of a stage that `config` monitors (it is named STAGE.FIGURE there); "" if it names
+/// none.
 std::string monitored(const SelectionConfig& config, const std::string& stage);
 
 }  // namespace restage

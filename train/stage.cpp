@@ -14,8 +14,8 @@
 namespace restage {
 namespace {
 
-/// Copies those of `from`'s tensors whose names, after `prefix`, match one of `names`; notes which
-/// patterns matched.
+/// Copies from `from` the tensors whose names, after `prefix`, match one of `names`; notes in
+/// `used` which of `names` matched.
 void copy_matching(Module& to, Module* from, const std::string& prefix,
                    const std::vector<std::string>& names, std::vector<bool>* used,
                    const std::string& where) {
@@ -38,7 +38,7 @@ void copy_matching(Module& to, Module* from, const std::string& prefix,
   }
 }
 
-/// A model of the same weights in the host's memory.
+/// A copy of a model in the host's memory, with the same weights.
 TrainedModel copied(const TrainedModel& of) {
   TrainedModel out = of;
   out.net = make_model(of.model, of.config, Init{RngKey{}, DType::f32});
@@ -263,14 +263,15 @@ Differentiated Stage::parts(const Optimiser& optimiser,
   const int64_t own = micro_batches_ / team_->size();
   if (device_ == Device{} && row.can_share()) {
     const int64_t at_once = std::min<int64_t>(own, threads());
-    for (int64_t from = 0; from < own; from += at_once) {  // gradients travel in the meantime
+    // Gradients of the last few travel in the meantime.
+    for (int64_t from = 0; from < own; from += at_once) {
       std::vector<Differentiated> done(static_cast<size_t>(std::min(at_once, own - from)));
       in_groups(std::ssize(done), threads(),
                 [&](int64_t k) { done[static_cast<size_t>(k)] = compute(number(from + k)); });
       row.require_unchanged();
       for (const Differentiated& d : done) give(d);
     }
-  } else {  // a GPU computes one after the other, too
+  } else {  // a GPU also computes micro-batches one after the other
     for (int64_t k = 0; k < own; ++k) {
       row.begin();
       give(compute(number(k)));

@@ -39,17 +39,18 @@ Joints joints_of(const Tensor& joints, int64_t row);
 struct Differentiated {
   Gradients gradients;
   double loss = 0, norm = 0;
-  std::vector<double> values = {};  ///< what else a stage wants to know of it, as means
+  /// Further numbers that a stage wants, each a mean over the examples.
+  std::vector<double> values = {};
 };
 Differentiated differentiate(const RngKey& key, const std::function<Var(Context&)>& loss);
 
-/// A micro-batch: number `index` of those `of` that a step's examples are cut into.
+/// A micro-batch: number `index` of the `of` parts that the examples of a step are cut into.
 struct MicroBatch {
   int64_t index = 0, of = 1;
   int64_t count(int64_t batch) const { return batch / of; }
-  /// The first of its examples, of those of a step that begin at number `first`.
+  /// The number of its first example, where the examples of the step begin at number `first`.
   int64_t from(int64_t first, int64_t batch) const { return first + index * count(batch); }
-  /// What is random in it.
+  /// The key of everything random in the micro-batch.
   RngKey key(const RngKey& step) const {
     return of == 1 ? step : step.fold("part").fold(static_cast<uint64_t>(index));
   }
@@ -57,7 +58,8 @@ struct MicroBatch {
 
 class Stage {
  public:
-  /// Its networks and optimisers live on `device`; examples are made in the host's memory.
+  /// The networks and optimisers of the stage live on `device`; examples are made in the host's
+  /// memory.
   Stage(std::string name, OptimiserConfig optimiser, Device device = {})
       : optimisation_(std::move(optimiser)), name_(std::move(name)), device_(device) {}
   virtual ~Stage() = default;
@@ -67,20 +69,21 @@ class Stage {
   const std::string& name() const { return name_; }
   int64_t steps() const { return optimisation_.steps; }
   Device device() const { return device_; }  ///< where its networks are
-  /// Clouds, windows or pairs of bodies in a step.
+  /// How many examples a step has: clouds, windows or pairs of bodies.
   int64_t examples_per_step() const { return optimisation_.batch; }
-  /// Every `batches` steps the same examples come again: can it learn them by heart? 0: never.
+  /// Lets the same examples come again every `batches` steps, to see whether the stage can learn
+  /// them by heart. 0: never.
   void repeat_batches(int64_t batches) { repeated_ = batches; }
   /// Cuts every step into micro-batches, of which each process of a team computes some
-  /// (docs/design/devices.md). InputError: the batch cannot be divided by their number, or their
-  /// number by that of the processes.
+  /// (docs/design/devices.md). InputError: the number of micro-batches does not divide the batch,
+  /// or the number of processes does not divide the number of micro-batches.
   void cut_steps(int64_t micro_batches, Team& team);
   /// Optimiser step number `step` (from 0). Everything random is a function of (seed, step), so a
   /// resumed run repeats the same bits. Returns what to log.
   virtual NamedValues step(int64_t step) = 0;
-  /// The examples of that step, as its losses read them.
+  /// The examples of step number `step`, as the losses read them.
   virtual NamedTensors examples(int64_t step) const = 0;
-  /// Held-out figures by the evaluation's own metrics.
+  /// Figures of held-out examples, by the metrics of the evaluation.
   virtual NamedValues validate() = 0;
 
   /// Held-out examples with what the stage makes of them, at most three rows; may be empty.
@@ -89,21 +92,21 @@ class Stage {
   /// All that a checkpoint needs: networks, optimisers, anything carried from step to step.
   virtual void save(TensorFile& file) const;
   virtual void load(const TensorFile& file, const std::string& where);
-  /// Takes tensors of trained weights in the place of random ones: those whose names in a weights
-  /// file ("smrm.enc.weight_ih_l0") match one of `names`, where * stands for any text. Settings
-  /// stay the stage's own; a difference gives a warning. InputError naming `where`: a pattern that
-  /// matches nothing, a tensor that is missing or does not fit.
+  /// Takes tensors of trained weights in the place of random ones: the tensors whose names in a
+  /// weights file ("smrm.enc.weight_ih_l0") match one of `names`, where * stands for any text. The
+  /// settings stay those of the stage; if the weights have others, the log warns. InputError naming
+  /// `where`: a pattern that matches nothing, a tensor that is missing or does not fit.
   void start_from(const Bundle& weights, const std::vector<std::string>& names,
                   const std::string& where);
   bool started_from_weights() const { return started_from_weights_; }
-  /// The networks to be used later, by role. They are shared with the stage where it works in the
-  /// host's memory, and copies in it otherwise.
+  /// The networks to be used later, by role. If the stage works in the host's memory they are
+  /// shared with it, else they are copies in the host's memory.
   virtual Bundle result() const;
-  /// Their parameters and buffers, under the names of a checkpoint.
+  /// The parameters and buffers of the networks to be used later, under the names of a checkpoint.
   virtual std::vector<StateEntry> weights() const;
 
  protected:
-  /// Builds a network that the stage trains. `handed_on`: it is needed after the training.
+  /// Builds a network that the stage trains. `handed_on`: the network is needed after the training.
   template <class M>
   M* add_network(const std::string& role, const std::string& model, const AnyConfig& sizes,
                  const RngKey& key, Settings settings = {}, bool handed_on = true) {
@@ -116,10 +119,10 @@ class Stage {
   M* add_network(const ModelChoice& choice, const RngKey& key, Settings settings = {}) {
     return add_network<M>(choice.role, choice.name, choice.sizes, key, std::move(settings));
   }
-  /// An optimiser of the networks of some roles.
+  /// Makes an optimiser of the networks that have these roles.
   Optimiser* add_optimiser(const std::string& name, const std::vector<std::string>& roles,
                            const OptimiserConfig& config);
-  /// Whatever else is carried from step to step.
+  /// Saves and loads whatever else is carried from step to step.
   virtual void save_more(TensorFile&) const {}
   virtual void load_more(const TensorFile&, const std::string& /*where*/) {}
 
@@ -133,7 +136,7 @@ class Stage {
   Differentiated parts(const Optimiser& optimiser,
                        const std::function<Differentiated(const MicroBatch&)>& compute);
 
-  /// The step whose examples are drawn in this one.
+  /// The number of the step whose examples are drawn in step number `step`.
   int64_t drawn(int64_t step) const { return repeated_ > 0 ? step % repeated_ : step; }
 
   const OptimiserConfig optimisation_;
@@ -148,7 +151,7 @@ class Stage {
     std::string name;
     std::unique_ptr<Optimiser> optimiser;
   };
-  /// All networks, under the names of a checkpoint.
+  /// Parameters and buffers of all networks, under the names of a checkpoint.
   std::vector<StateEntry> state() const;
 
   std::string name_;

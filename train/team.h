@@ -1,5 +1,6 @@
-// Processes that train together. Each computes some of a step's micro-batches; all add up the same
-// numbers in the same order, so how many they are changes no bit (docs/design/devices.md).
+// Processes that train together. Each process computes some of a step's micro-batches. All
+// processes add up the same numbers in the same order, so the number of processes changes no bit
+// (docs/design/devices.md).
 #pragma once
 
 #include <cstddef>
@@ -21,19 +22,19 @@ class Team {
   class Sum {
    public:
     virtual ~Sum() = default;
-    /// The next row of this process: number rank, rank + size, rank + 2 size, ... It travels while
-    /// the caller goes on. All processes give equally many.
+    /// The next row of this process: number rank, rank + size, rank + 2 size, ... The row travels
+    /// while the caller goes on. All processes give the same number of rows.
     virtual void give(std::vector<float> row) = 0;
-    /// Of all rows, added in the order of their numbers; waits for the others.
+    /// The sum of all rows, added in the order of their numbers; waits for the other processes.
     virtual std::vector<float> total() = 0;
   };
-  /// Of rows of so many numbers.
+  /// Begins a sum of rows of `width` numbers.
   virtual std::unique_ptr<Sum> sum(size_t width) = 0;
-  /// The rows of all processes in the order of their numbers. For few numbers.
+  /// The rows of all processes in the order of their numbers; for rows of few numbers.
   virtual std::vector<std::vector<double>> all(const std::vector<std::vector<double>>& mine) = 0;
-  /// Whether it is so for any of them.
+  /// Whether any process says true.
   virtual bool any(bool mine) = 0;
-  /// The first one's bytes.
+  /// The bytes that the first process gives.
   virtual std::string of_first(std::string mine) = 0;
 
   /// Seconds that this process has stood still for the others' rows.
@@ -44,11 +45,12 @@ class Team {
   [[noreturn]] virtual void abort(int code) = 0;
 };
 
-/// This process by itself.
+/// A team of this process alone.
 Team& alone();
 
-/// The processes that mpirun or srun has started with this one; alone() if none. InputError: there
-/// are others and the program was built without MPI, or Slurm says another number of them.
+/// The processes that mpirun or srun has started with this one; alone() if there are no others.
+/// InputError: there are others and the program was built without MPI, or Slurm says another number
+/// of processes than MPI.
 Team& team_of_processes();
 
 }  // namespace restage

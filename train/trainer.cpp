@@ -41,7 +41,7 @@ std::string peak_of_tensors(Device device) {
   return mebibytes(device) + " on " + name_of(device) + " and " + mebibytes({}) + " on the host";
 }
 
-/// One stage's way through its steps.
+/// The training of one stage.
 class StageRun {
  public:
   /// `given`: what earlier stages have left.
@@ -56,7 +56,7 @@ class StageRun {
     if (loop.selection.ema > 0) average_.emplace(stage, loop.selection.ema);
   }
 
-  /// What a stage keeps once a later one has begun.
+  /// Removes the checkpoints that a stage need not keep once a later stage has begun.
   void tidy() const { run_.prune(stage_.name(), {1, loop_.keep_every, best_.step()}); }
 
   void go_on_from(const Checkpoint& checkpoint) {
@@ -68,7 +68,7 @@ class StageRun {
     resumed_ = true;
   }
 
-  /// To the end; the stage then holds what it hands on.
+  /// Trains the stage to its end; then the stage holds the weights that it hands on.
   void run() {
     const StopScope stop;
     tell([&](TrainObserver& o) { o.on_begin(stage_, done_); });
@@ -130,7 +130,7 @@ void StageRun::all_steps() {
                   static_cast<long long>(stage_.examples_per_step())));
   Progress progress(stage_.name(), stage_.steps(), standard_progress(options_.quiet), first);
   if (stage_.started_from_weights() && !resumed_) {
-    // What training must beat, and what is handed on if it does not.
+    // What the training must beat, and what is handed on if no later validation is better.
     progress.note(validate());
     if (loop_.selection.judges()) checkpoint();
   }
@@ -154,7 +154,7 @@ void StageRun::all_steps() {
     if (stopped) {
       progress.finish();
       throw_if_stopped();
-      throw Interrupted(SIGTERM);  // it was another process of the team
+      throw Interrupted(SIGTERM);  // the signal came to another process of the team
     }
   }
   progress.finish();
@@ -162,7 +162,7 @@ void StageRun::all_steps() {
 }
 
 NamedValues StageRun::step() {
-  take_kernel_stats();  // not what validation did
+  take_kernel_stats();  // forgets what a validation did
   const auto start = std::chrono::steady_clock::now();
   NamedValues values;
   try {
@@ -184,12 +184,12 @@ NamedValues StageRun::step() {
   return values;
 }
 
-/// Returns the file.
+/// Writes what is needed to repeat the step; returns the file.
 std::string StageRun::keep_failure(const NonFiniteError& error) const {
   Failure failure;
   failure.stage = stage_.name(), failure.said = error.what(), failure.step = done_;
   failure.config_yaml = read_file(run_config_path(run_.dir()));
-  // What the step has changed by now is not what it began with, so it is repeated from there.
+  // The step has changed the stage, so the step is repeated from the last checkpoint.
   if (const auto last = latest_checkpoint(run_.dir(), {stage_.name()})) {
     failure.from = last->step;
     failure.state = parse_safetensors(last->bytes, last->path);
@@ -197,7 +197,7 @@ std::string StageRun::keep_failure(const NonFiniteError& error) const {
   failure.examples = stage_.examples(done_);
   failure.given = given_;
   const std::string folder = run_.dir() + "/nonfinite";
-  std::error_code ignored;  // writing says what is wrong
+  std::error_code ignored;  // write_failure() says what is wrong
   std::filesystem::create_directories(folder, ignored);
   const std::string path =
       folder + "/" + stage_.name() + "-" + std::to_string(done_) + ".safetensors";
@@ -242,7 +242,7 @@ void StageRun::hand_on() {
   if (average_) average_->exchange();
 }
 
-/// Of the steps that are left, by those so far.
+/// What the steps that are left will take, by the time that the steps so far took.
 std::string StageRun::forecast() const {
   const double left =
       throughput_.seconds() / kForecastAfter * static_cast<double>(stage_.steps() - done_);

@@ -31,33 +31,36 @@ void visit(V& v, LoopConfig& c) {
   visit(v, c.selection);
 }
 
-/// Watches a training; one hangs on the loop for each thing that wants to know. Called on the
-/// thread that trains, after the loop's own lines are written.
+/// Watches a training. The loop calls its observers on the thread that trains, after it has written
+/// its own lines.
 class TrainObserver {
  public:
   virtual ~TrainObserver() = default;
-  /// A stage begins, `done` of its steps lie behind it.
+  /// A stage begins; `done` of its steps have been done before (in a run that was resumed).
   virtual void on_begin(const Stage&, int64_t /*done*/) {}
   virtual void on_step(const Stage&, int64_t /*done*/, const NamedValues&) {}
-  /// What a line of metrics.jsonl says of training steps.
+  /// A line of metrics.jsonl about training steps was written.
   virtual void on_log(const Stage&, int64_t /*done*/, const NamedValues&) {}
-  /// The stage holds the weights that were validated (averaged ones, with loop.ema).
+  /// A validation was made. The stage still holds the weights that were validated (averaged weights
+  /// with loop.ema).
   virtual void on_validation(Stage&, int64_t /*done*/, const NamedValues&) {}
   /// A checkpoint is on the disk.
   virtual void on_checkpoint(const Stage&, int64_t /*done*/, const std::string& /*path*/) {}
 };
 
 struct TrainOptions {
-  /// Of the steps' products; validation has float32's, like everything that uses the models later.
+  /// Precision of the matrix products of steps. Validation multiplies in float32, like everything
+  /// that uses the models later.
   MatmulPrecision precision = MatmulPrecision::float32;
   bool quiet = false;
   std::vector<TrainObserver*> observers = {};
-  Team* team = &alone();  ///< whose stages' steps these are; all end after the same one
-  Bundle given = {};  ///< what stages trained elsewhere have left, for the file of a failed step
+  Team* team = &alone();  ///< the processes that share the steps; all end after the same step
+  /// Networks of stages that were trained elsewhere, for the file of a failed step.
+  Bundle given = {};
 };
 
-/// Builds a stage when its turn comes, from what those before it left. Null: there is nothing to
-/// train, and its networks have been put into the bundle.
+/// Builds a stage when its turn comes, from what the stages before it left (`so_far`). Null: there
+/// is nothing to train, and the networks of the stage have been put into `so_far`.
 using MakeStage = std::function<std::unique_ptr<Stage>(const std::string& name, Bundle* so_far)>;
 
 /// Runs the stages to their ends, going on from the run's checkpoint if it was resumed. Throws

@@ -26,7 +26,8 @@ void sync_path(const std::string& path, const std::string& target, int flags) {
   if (result != 0 && code != EINVAL) throw_unwritable(target, code);
 }
 
-/// Where a target leads: links stay, and what is no plain file is left alone.
+/// The place that is written for a target: behind all links, which stay. What is no plain file is
+/// refused.
 std::string place_of(const std::string& target) {
   fs::path place = target;
   std::error_code failed;
@@ -161,7 +162,7 @@ std::string read_file(const std::string& path, uint64_t limit) {
 std::string checksum(std::string_view bytes) {
   uint64_t h = 0xcbf29ce484222325ull;
   size_t i = 0;
-  for (; i + 8 <= bytes.size(); i += 8) {  // eight bytes at a time, then one by one
+  for (; i + 8 <= bytes.size(); i += 8) {  // eight bytes at a time, then the last ones one by one
     uint64_t word = 0;
     std::memcpy(&word, bytes.data() + i, 8);
     h = (h ^ word) * 0x100000001b3ull;

@@ -11,29 +11,30 @@
 
 namespace restage {
 
-/// A temporary path beside `target` that becomes `target` on commit() and is removed otherwise.
-/// Of a link, what it leads to is written and the link stays. Libraries that open files by name
-/// (HDF5) write to path(). Errors (no such folder, a device or pipe: InputError; disk full:
-/// WorkError) name the target.
+/// A temporary path beside `target` that becomes `target` on commit() and is removed otherwise. If
+/// `target` is a link, the file that it leads to is written and the link stays. Libraries that open
+/// files by name (HDF5) write to path(). Errors (no such folder, a device or pipe: InputError; disk
+/// full: WorkError) name the target.
 class AtomicFile {
  public:
   explicit AtomicFile(std::string target);
   const std::string& path() const { return temporary_.path(); }
-  void write(std::string_view content);  ///< all of it, closed again
+  void write(std::string_view content);  ///< writes all of `content` to path()
   void commit();                         ///< fsync file, rename, fsync folder
 
  private:
-  std::string target_, place_;  ///< as it was given, and behind all links
+  std::string target_, place_;  ///< the target as it was given, and the same behind all links
   Temporary temporary_;
 };
 
 /// InputError or WorkError, by the system's error number, for a `place` that cannot be "written",
-/// "used" or what else was to be `done`.
+/// "used", or whatever `done` says.
 [[noreturn]] void throw_refused(const std::string& place, const std::string& done, int code);
 [[noreturn]] void throw_unwritable(const std::string& target, int code);
-/// All of `content` to an open file, however many calls it takes; 0, or the system's error number.
+/// Writes all of `content` to an open file, with as many calls as it takes. Returns 0 or the
+/// system's error number.
 int write_all(int fd, std::string_view content);
-/// The whole content at once.
+/// Writes a whole file at once.
 void write_file_atomically(const std::string& target, std::string_view content);
 /// The bytes of a file could not be had: there is no such file, no permission, too many files are
 /// open, the disk fails. That says nothing about what is in the file: who replaces damaged files

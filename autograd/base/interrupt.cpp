@@ -34,7 +34,7 @@ void handle_signals() {
   signal(SIGPIPE, SIG_IGN);
 }
 
-// A signal that an earlier scope answered is no reason to stop this one.
+// A signal that an earlier scope answered does not stop this one.
 StopScope::StopScope() {
   if (scopes.load() == 0) caught = 0, asked = false;
   ++scopes;

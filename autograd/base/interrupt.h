@@ -1,5 +1,5 @@
-// SIGINT and SIGTERM. By default they end the program at once with exit code 130 or 143, and what
-// it was writing is removed (temporary.h); inside a StopScope they only set a flag, so that a
+// SIGINT and SIGTERM. By default they end the program at once with exit code 130 or 143, and files
+// that it was writing are removed (temporary.h); inside a StopScope they only set a flag, so that a
 // training run can write a checkpoint first.
 #pragma once
 
@@ -18,7 +18,7 @@ class Interrupted : public Error {
 /// Called once by the program; a library user may leave it out.
 void handle_signals();
 
-/// While one exists, the first signal sets the flag and the second one ends the program.
+/// While a StopScope exists, the first signal sets the flag and the second signal ends the program.
 class StopScope {
  public:
   StopScope();
@@ -27,8 +27,8 @@ class StopScope {
   StopScope& operator=(const StopScope&) = delete;
 };
 
-/// Does what a first signal in a StopScope does, for who was asked to stop in another way. A signal
-/// that comes as well, from whoever was asked too, is still the first.
+/// Does what a first signal in a StopScope does, for a program that was asked to stop in another
+/// way. If a signal comes as well, it still counts as the first.
 void ask_to_stop();
 
 /// True after a signal in a StopScope, or ask_to_stop().

@@ -8,7 +8,7 @@ namespace restage {
 enum class LogLevel { debug, info, warning, quiet };
 
 void set_log_level(LogLevel level);
-/// Also writes every line, with time, to this file (empty: no file). Appends.
+/// From now on appends every line, with its time, to this file, too (empty: to no file).
 void set_log_file(const std::string& path);
 
 void log_debug(const std::string& text);

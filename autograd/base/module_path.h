@@ -31,7 +31,7 @@ class OpScope {
 
 /// Path of the innermost scope, "(no module)" outside of all.
 std::string module_path();
-/// The same with the op that runs, if one does: "'gather' in smrm.enc".
+/// The op that runs, if there is one, and module_path(): "'gather' in smrm.enc".
 std::string running_op();
 
 }  // namespace restage

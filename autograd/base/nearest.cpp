@@ -6,7 +6,8 @@
 namespace restage {
 namespace {
 
-/// Edit distance with neighbours swapped as one edit; case and '-' against '_' are no difference.
+/// Edit distance in which swapping neighbours is one edit. Upper and lower case, and '-' and '_',
+/// count as equal.
 size_t edit_distance(const std::string& a, const std::string& b) {
   const auto same = [](char x, char y) {
     const auto plain = [](char c) {

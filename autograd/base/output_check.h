@@ -1,4 +1,4 @@
-// What a command writes must not lie over what it reads.
+// Checks that a command does not write over what it reads.
 #pragma once
 
 #include <string>
@@ -6,9 +6,9 @@
 
 namespace restage {
 
-/// InputError if `out` is one of `inputs` under whatever name (device and inode count, so links and
-/// other spellings are seen), or a folder that holds one. Inputs that are empty or not there are
-/// passed by: who reads them complains.
+/// InputError if `out` is one of `inputs` or a folder that holds one. Files are compared by device
+/// and inode, so links and other spellings are seen. Inputs that are empty names or do not exist
+/// are passed over: whoever reads them complains.
 void check_output(const std::string& out, const std::vector<std::string>& inputs);
 
 }  // namespace restage

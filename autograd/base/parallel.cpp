@@ -21,7 +21,7 @@ std::unique_ptr<tbb::task_arena> arena;
 std::mutex limit_mutex;
 int requested = 0;
 
-/// The threads of a group, where one works.
+/// The threads of a group; of whichever group this thread works in.
 struct GroupOfThreads {
   tbb::task_arena* arena;
   int size;
@@ -46,7 +46,7 @@ void see(char) {}
 }  // namespace
 
 namespace {
-/// On the threads that there are to be.
+/// Runs work on the threads that set_threads() or in_groups() gives.
 template <class F>
 void run_all(const F& work) {
   if (group != nullptr)
@@ -84,8 +84,8 @@ void parallel_for(int64_t n, int64_t grain, PieceRef body) {
     for (int64_t i = 0; i < pieces; ++i) piece(i);
     return;
   }
-  // One task a thread, each taking the next piece until none is left: handing a piece out costs an
-  // addition, not a task of the library.
+  // Each thread has one task, which takes the next piece until none is left. So handing out a piece
+  // costs an addition, not a task of the library.
   std::atomic<int64_t> next{0};
   const auto take = [&](int64_t) {
     see(forked);
@@ -111,7 +111,8 @@ void in_groups(int64_t n, int groups, const std::function<void(int64_t)>& body) 
   const auto of_group = [&](int g) {
     see(forked);
     const int size = all / groups + (g < all % groups ? 1 : 0);
-    tbb::task_arena own(size);  // whoever waits in it takes no other group's work
+    // A thread that waits in its own arena takes no work of another group.
+    tbb::task_arena own(size);
     const GroupOfThreads threads_of_it{&own, size};
     const GroupOfThreads* outer = std::exchange(group, &threads_of_it);
     try {

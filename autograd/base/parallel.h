@@ -1,5 +1,5 @@
 // Threads. Work is cut by sizes only, never by the number of threads, so every result has the same
-// bits for any number of threads. The only place (with parallel.cpp) that knows oneTBB.
+// bits for any number of threads. No other file (but parallel.cpp) knows oneTBB.
 #pragma once
 
 #include <cstdint>

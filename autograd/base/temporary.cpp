@@ -15,7 +15,7 @@
 namespace restage {
 namespace {
 
-/// What a signal handler must find: no string, whose memory may be on the move.
+/// A path that a signal handler can read. It is no string, whose memory might just be moved.
 struct Slot {
   std::atomic<bool> taken{false}, live{false};
   char path[PATH_MAX];

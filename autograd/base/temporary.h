@@ -10,9 +10,8 @@ namespace restage {
 /// all. All drafts of files and folders are named so: ".part" tells what a killed process has left.
 std::string name_beside(const std::string& target, const std::string& prefix = "");
 
-/// The file or folder `path`, which the owner makes, is removed in the end unless it was kept, also
-/// when a signal ends the program (interrupt.h). Of more than 64 at a time a signal leaves the
-/// rest.
+/// The file or folder `path`, which the owner makes, is removed in the end unless keep() was
+/// called, also when a signal ends the program (interrupt.h). A signal removes at most 64 of them.
 class Temporary {
  public:
   explicit Temporary(std::string path);
@@ -20,14 +19,14 @@ class Temporary {
   Temporary(const Temporary&) = delete;
   Temporary& operator=(const Temporary&) = delete;
   const std::string& path() const { return path_; }
-  void keep();  ///< it has another name by now
+  void keep();  ///< the file is to stay: it has got another name
 
  private:
   std::string path_;
   int slot_ = -1;
 };
 
-/// Removes all that there are. Only calls that a signal handler may make.
+/// Removes all temporaries that exist. Makes only calls that a signal handler may make.
 void remove_temporaries() noexcept;
 
 }  // namespace restage

@@ -1,5 +1,6 @@
 // Neighbour attention, forward: tile by tile through all products, softmax and weighted sum, so
-// that nothing of the size [pairs, d] leaves the cache but the softmax, which backward wants.
+// that only the softmax, which the backward pass needs, leaves the cache as a tensor of the size
+// [pairs, d].
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "autograd/cpu/attention.cpp"
 #include <hwy/foreach_target.h>  // once per instruction set
@@ -10,7 +11,8 @@ HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
 namespace {
 
-/// The scores of a tile, up to what is the same for all neighbours of a point: [pairs, d].
+/// The scores of a tile, [pairs, d], without the summands that are the same for all neighbours of a
+/// point.
 template <class T>
 T* scores(const Attention<T>& a, int64_t t, const T* hidden, const T* u, const T* gamma,
           TileMemory<T>& memory) {

@@ -11,8 +11,9 @@
 HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
 
-// Groups of tiles that threads share: at least so many where there are tiles enough, and at most,
-// since each has sums of its own (3 MB at the paper's sizes, and keys and values of its clouds).
+// The least (if there are enough tiles) and the largest number of groups of tiles that threads
+// share. Each group has sums of its own: 3 MB at the paper's sizes, and the keys and values of its
+// clouds.
 inline constexpr int64_t kLeastGroups = 8, kMostGroups = 64;
 inline constexpr int64_t kGroupTiles = 40;  // that repay the sums of a group
 
@@ -72,7 +73,8 @@ void make_sums(const Backward<T>& b, GroupSums<T>& s) {
   if (b.args.g_xyz != nullptr) s.xyz = zeros({rows, 3});
 }
 
-/// e: gradient of the scores; st: [s, t] becomes [.., gradient of t]; also that of value.
+/// e: the gradient of the scores; st: [s, t] becomes [.., gradient of t]. Also adds the gradient of
+/// value.
 template <class T>
 void pool_grad(const Backward<T>& b, int64_t t, T* st, T* e, GroupSums<T>& sums) {
   const Attention<T>& a = b.a;
@@ -99,7 +101,8 @@ void pool_grad(const Backward<T>& b, int64_t t, T* st, T* e, GroupSums<T>& sums)
   }
 }
 
-/// Masks the gradient gz [pairs, units] of the active units' ReLU and adds what W and b get.
+/// Masks the gradient gz [pairs, units] by the ReLU of the active units, and adds the gradients of
+/// W and b.
 template <class T>
 void unit_grad(const Attention<T>& a, int64_t t, const T* r, const T* hidden, T* gz,
                GroupSums<T>& sums, TileMemory<T>& memory) {
@@ -132,8 +135,8 @@ T dot(int64_t n, const T* x, const T* y) {
       n, [](auto a, auto b) HWY_ATTR { return hn::Mul(a, b); }, x, y);
 }
 
-/// Gradient of the points from that of the offsets of a tile's pairs: through the active units
-/// (gz), and what on(pair, axis) says comes through those that are on.
+/// The gradient of the points from the gradient of the offsets of a tile's pairs: through the
+/// active units (gz), and through the units that are on, for which on(pair, axis) gives it.
 template <class T, class F>
 void offset_grad(const Backward<T>& b, int64_t t, const T* gz, GroupSums<T>& sums, F&& on) {
   const Attention<T>& a = b.a;

@@ -40,7 +40,8 @@ void score_grad(const Backward<T>& b, int64_t t, const T* u, const T* gu, T* st,
   }
 }
 
-/// From the gradient of [s, t] to those of M and of the moments; the hidden columns are its factor.
+/// Takes the gradient of [s, t] to the gradients of M and of the moments, with the hidden columns
+/// as its factor.
 template <class T>
 void both_grad(Backward<T>& b, int64_t t, const T* hidden, const T* g_st, GroupSums<T>& sums,
                TileMemory<T>& memory) {
@@ -61,7 +62,8 @@ void both_grad(Backward<T>& b, int64_t t, const T* hidden, const T* g_st, GroupS
     std::copy_n(g + m * width, 4 * width, b.moments.template data<T>() + 4 * t * width);
 }
 
-/// From the gradient of [s, t] to that of the active units' z, and to W, b and the points.
+/// Takes the gradient of [s, t] to the gradient of z of the active units, and to W, b and the
+/// points.
 template <class T>
 void hidden_grad(const Backward<T>& b, int64_t t, const T* r, const T* hidden, const T* g_st,
                  GroupSums<T>& sums, TileMemory<T>& memory) {
@@ -81,8 +83,8 @@ void hidden_grad(const Backward<T>& b, int64_t t, const T* r, const T* hidden, c
   unit_grad(a, t, r, hidden, gz, sums, memory);
 }
 
-/// Gradient of the points: through the active units (gz, as hidden_grad left it) and those that are
-/// on (affine).
+/// Gradient of the points: through the active units (gz, as hidden_grad left it) and through the
+/// units that are on (affine).
 template <class T>
 void xyz_grad(const Backward<T>& b, int64_t t, const T* gz, const T* g_st, GroupSums<T>& sums) {
   const Attention<T>& a = b.a;
@@ -127,8 +129,8 @@ void tile_grad(Backward<T>& b, int64_t t, GroupSums<T>& sums) {
   }
 }
 
-/// What the units that are on add, all tiles at once: M gets on^T moments; W and b get, for every
-/// unit, the moments times M of the tiles in which it is on.
+/// Adds the gradients through the units that are on, for all tiles at once: M gets on^T moments; W
+/// and b get, for every unit, the moments times M of the tiles in which the unit is on.
 template <class T>
 void affine_grad(const Backward<T>& b, Tensor& g_both_t, Tensor& g_hidden) {
   const Attention<T>& a = b.a;
@@ -191,7 +193,7 @@ template <class T>
 void backward(const NeighbourAttentionGradArgs& args) {
   Backward<T> b(args);
   parallel_for(std::ssize(b.groups), 1, [&](int64_t from, int64_t to) HWY_ATTR {
-    const FlushSubnormals flush;  // a softmax that has made up its mind is full of them
+    const FlushSubnormals flush;  // a softmax that is nearly 0 or 1 is full of subnormal numbers
     for (int64_t g = from; g < to; ++g) {
       GroupSums<T>& sums = b.groups[g];
       make_sums(b, sums);

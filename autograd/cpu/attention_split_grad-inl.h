@@ -41,8 +41,8 @@ void add_chosen(const T* from, const std::vector<int32_t>& columns, T* to) {
   for (const int32_t c : columns) to[c] += *from++;
 }
 
-/// The gradient of G from that of the scores, e. Returns what the units that are on saw of e: for
-/// each hidden column and (negated) each neighbour the sum of its products, [rows, d].
+/// The gradient of G from that of the scores, e. Returns the sums of products of e with what the
+/// units that are on see: a row for each hidden column and (negated) for each neighbour, [rows, d].
 template <class T>
 const T* gamma_grad(const Split& s, const T* columns, const T* rows, const T* e, GroupSums<T>& sums,
                     TileMemory<T>& memory) {
@@ -78,9 +78,9 @@ void through_gamma(const Attention<T>& a, const T* left, int64_t count,
           pack_right<T>({chosen, 1, a.d}, a.d, n, memory.right), out, n);
 }
 
-/// gu: gradient of the active units' u, masked here; on: that of the on_rows(). What query and key
-/// get. A unit that is on gives the query nothing: over the neighbours its gradients add up to
-/// zero.
+/// Adds the gradients of query and key. gu: the gradient of u of the active units, masked here; on:
+/// the gradient of on_rows(). A unit that is on gives the query nothing, since its gradients over
+/// the neighbours add up to zero.
 template <class T>
 void query_key_grad(const Backward<T>& b, int64_t t, const Split& s, const T* columns, T* gu,
                     const T* on, GroupSums<T>& sums, TileMemory<T>& memory) {
@@ -132,8 +132,8 @@ void split_both_grad(Backward<T>& b, int64_t t, const Split& s, const T* hidden,
   }
 }
 
-/// The gradient of the active units' z: through t, through the scores' units that are on (whose
-/// rows of scores are known), and through the active ones.
+/// The gradient of z of the active units: through t, through the units of the scores that are on
+/// (whose rows of scores are known), and through the active units of the scores.
 template <class T>
 T* split_hidden_grad(const Backward<T>& b, int64_t t, const Split& s, const T* on_scores,
                      const T* e, const T* gu, const T* g_st, TileMemory<T>& memory) {
@@ -157,8 +157,8 @@ T* split_hidden_grad(const Backward<T>& b, int64_t t, const Split& s, const T* o
   return gz;
 }
 
-/// Gradient of the points; what comes through hidden units that are on: by t, by the scores' units
-/// that are on, and by the active ones.
+/// The gradient of the points. Through hidden units that are on it comes by t, by the units of the
+/// scores that are on, and by the active units of the scores.
 template <class T>
 void split_xyz_grad(const Backward<T>& b, int64_t t, const Split& s, const T* on_scores, const T* e,
                     const T* gu, const T* gz, const T* g_st, GroupSums<T>& sums,

@@ -1,7 +1,7 @@
-// What forward and backward of the neighbour attention share. Points are handled in tiles of
-// neighbours. Within a tile the offsets r hardly vary, so most hidden units of h = relu(W r + b)
-// keep one sign: those that are off are zero, those that are on are affine in r, and only the rest,
-// the active ones, need a product. With on/off/active known for a tile,
+// What the forward and the backward pass of the neighbour attention share. Points are handled in
+// tiles of neighbours. Within a tile the offsets r hardly vary, so most hidden units of h = relu(W
+// r + b) keep one sign: units that are off are zero, units that are on are affine in r, and only
+// the other units, the active ones, need a product. With on/off/active known for a tile,
 //   M h = [M_active, M_on W_on, M_on b_on] [relu(z_active); r; 1],
 // which is exact and has a few dozen columns instead of d.
 //
@@ -42,18 +42,20 @@ struct Attention {
   const T *xyz, *query, *key, *value;
   const int32_t* index;
   PointTiles tiles;
-  Tensor hidden;                             // [4, d]: W transposed, then b
-  Tensor both_t;                             // M transposed, [d, 2d]
-  Tensor gamma_t;                            // G transposed, [d, d]
-  std::vector<uint8_t> sign;                 // [tiles, d]
-  std::vector<std::vector<int32_t>> active;  // of each tile; all units if it is done in full
-  std::vector<char> full;                    // whether a tile is done in full
+  Tensor hidden;              // [4, d]: W transposed, then b
+  Tensor both_t;              // M transposed, [d, 2d]
+  Tensor gamma_t;             // G transposed, [d, d]
+  std::vector<uint8_t> sign;  // [tiles, d]
+  // The active units of each tile; all units of a tile that is done in full.
+  std::vector<std::vector<int32_t>> active;
+  std::vector<char> full;  // whether a tile is done in full
   bool any_full = false;
-  /// Whether scores may be split: what cancels or is left out must be finite, or NaN would vanish.
+  /// Whether scores may be split: numbers that cancel or are left out must be finite, or a NaN
+  /// would vanish.
   bool finite = false;
   Tensor on;             // [tiles, 4, d]: W and b of the units that are on
   Tensor affine;         // [tiles, 4, 2d]: on times M
-  Buffer<T> full_right;  // both_t, packed, if a tile needs it
+  Buffer<T> full_right;  // both_t, packed, if a tile is done in full
 
   int64_t tile_rows(int64_t t) const {
     return tiles.start[static_cast<size_t>(t) + 1] - tiles.start[t];
@@ -73,7 +75,7 @@ struct Attention {
   void classify(int64_t t, Buffer<T>& offsets);
 };
 
-/// Memory of one thread.
+/// The working memory of one thread, kept between calls.
 template <class T>
 struct TileMemory {
   Buffer<T> offsets, weights, left, right, hidden, st, u, e, y, more;
@@ -81,8 +83,8 @@ struct TileMemory {
   std::vector<const T*> rows;
   std::vector<int32_t> active, on;  // units of the second ReLU
   std::vector<int64_t> others;      // rows of the batch: the neighbours in a tile, each once
-  std::vector<int32_t> slot;        // of each pair's neighbour in `others`
-  std::vector<int32_t> place;       // of each row of the batch in `others`, or -1
+  std::vector<int32_t> slot;        // for each pair the place of its neighbour in `others`
+  std::vector<int32_t> place;       // for each row of the batch its place in `others`, or -1
   static TileMemory& mine() {
     thread_local TileMemory memory;
     return memory;
@@ -183,7 +185,7 @@ void Attention<T>::classify(int64_t t, Buffer<T>& offsets) {
   unit_signs(hidden.data<T>(), d, r, tile_rows(t) * k, s);
   for (int64_t u = 0; u < d; ++u)
     if (s[u] == kActive) active[i].push_back(static_cast<int32_t>(u));
-  // Beyond this share leaving units out costs more than it saves.
+  // If more than this share of the units is active, leaving units out costs more than it saves.
   full[i] = in.dense || 10 * std::ssize(active[i]) > 7 * d;
   const T* h = hidden.data<T>();
   T* row = on.data<T>() + t * 4 * d;

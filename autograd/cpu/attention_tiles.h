@@ -13,7 +13,7 @@ struct PointTiles {
 };
 
 /// Cuts each of n clouds of v points at medians of its longest side until a piece has at most
-/// `size` points. Depends on the coordinates alone; ties go to the lower index.
+/// `size` points. The result depends on the coordinates alone; ties go to the lower index.
 template <class T>
 PointTiles tile_points(const T* xyz, int64_t n, int64_t v, int64_t size);
 

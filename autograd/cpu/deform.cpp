@@ -68,8 +68,9 @@ struct Field {
   const float *w1, *b1, *w2, *b2, *w3, *b3, *low, *high;
 };
 
-/// Puts unit i where its sign between `low` and `high` belongs: always positive, changing (or not
-/// a number), or nowhere, because it gives nothing.
+/// Puts unit i where its sign between `low` and `high` belongs: `on` if the sign is always
+/// positive, `changing` if it changes or is not a number, nowhere if it is never positive, since
+/// the unit is zero then.
 void sort_unit(int32_t i, float low, float high, Scratch<int32_t>& on, Scratch<int32_t>& changing) {
   if (low > 0) {
     on.push_back(i);
@@ -99,8 +100,8 @@ void add_units(const Field& f, const Scratch<int32_t>& on, float* affine) {
   }
 }
 
-/// What the tiles [from, to) share: the affine part of the units that are on in all of them, and
-/// the units that may be anything.
+/// Computes what the tiles [from, to) share: the affine part of the units that are on in all of
+/// these tiles, and the list of the units whose sign may differ between tiles.
 void prepare_group(const Field& f, int64_t from, int64_t to, bool dense, TileMemory& s) {
   s.on.clear();
   s.candidates.clear();

@@ -9,9 +9,10 @@
 
 namespace restage::cpu {
 
-/// While it lives, its thread takes them for zero, in what it reads and in what it writes (x86;
-/// elsewhere nothing changes). For the inside of a piece of parallel work: what other threads do
-/// depends on them alone, so around parallel_for() bits would depend on who did what.
+/// While an object lives, its thread takes subnormal numbers for zero when it reads and when it
+/// writes them (on x86; elsewhere nothing changes). To be used inside a piece of parallel work:
+/// other threads have modes of their own, so around parallel_for() bits would depend on which
+/// thread did what.
 class FlushSubnormals {
  public:
 #if HWY_ARCH_X86

@@ -32,7 +32,8 @@ inline constexpr int kRows = 6;
 inline constexpr int kVectors = 2;
 inline constexpr int64_t kDepth = 256;  // k per packed block
 inline constexpr int kThin = 4;         // up to so many rows, weights are not packed
-inline constexpr int64_t kStrip = 16;   // k per pass while packing: the rows it reads stay in L1
+// Steps of k per pass while packing: the rows that are read stay in L1.
+inline constexpr int64_t kStrip = 16;
 
 template <class T>
 struct Simd {
@@ -209,14 +210,14 @@ inline void multiply(int64_t k, const T* a, const T* b, T* out) {
   }
 }
 
-/// The same for 1 to kRows rows of a panel that is kRows wide.
+/// The same product for 1 to kRows rows of a panel that is kRows wide.
 template <class T, bool Add, int Rows = kRows>
 inline void multiply_rows(int64_t rows, int64_t k, const T* a, const T* b, T* out) {
   if (rows == Rows) return multiply<T, Rows, kRows, Add>(k, a, b, out);
   if constexpr (Rows > 1) multiply_rows<T, Add, Rows - 1>(rows, k, a, b, out);
 }
 
-/// Weights [any, k] as they lie in memory, from some row on.
+/// Weights as they lie in memory, rows of k numbers, from some row on.
 template <class T>
 struct Weights {
   const T* data;
@@ -299,7 +300,7 @@ inline void multiply_thin(const T* a, const Weights<T>& b, [[maybe_unused]] cons
 #endif
 }
 
-/// The same for 1 to Rows rows.
+/// The same product for 1 to Rows rows.
 template <class T, int Rows = kThin>
 inline void multiply_thin_rows(int64_t rows, const T* a, const Weights<T>& b,
                                const Weights<T>& next, T* out) {

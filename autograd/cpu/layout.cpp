@@ -8,7 +8,7 @@
 namespace restage::cpu {
 namespace {
 
-/// Calls f with the tensor's numbers, whatever they are.
+/// Calls f with the numbers of the tensor, whatever its dtype.
 template <class F>
 void with_numbers(DType type, F&& f) {
   switch (type) {

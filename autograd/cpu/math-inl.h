@@ -104,7 +104,7 @@ HWY_INLINE V sigmoid(V x) {
   return hn::Div(one, hn::Add(one, exp(hn::Neg(x))));
 }
 
-/// log(0) is -infinity, that of a negative number NaN.
+/// log(0) is -infinity, log of a negative number NaN.
 template <class V>
 HWY_INLINE V log(V x) {
   const hn::DFromV<V> d;
@@ -144,7 +144,7 @@ HWY_INLINE void map(int64_t n, T* out, F f, const In*... in) {
 }
 
 /// Like map() for several results: f(v...) gets a vector of each array, by reference, and what it
-/// leaves in those of the arrays that are not const is stored.
+/// leaves in the vectors of arrays that are not const is stored.
 template <class F, class... Array>
 HWY_INLINE void update(int64_t n, F f, Array*... arrays) {
   using T = std::common_type_t<std::remove_const_t<Array>...>;

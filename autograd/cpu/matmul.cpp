@@ -1,6 +1,7 @@
 // Packed, register-tiled matrix product. Output tiles go to threads; the sum over k stays in one
 // thread and in one order. An operand that several tiles need is packed once for all of them, in
-// parallel; one that a single tile needs is packed by that tile, in the cache where it is used.
+// parallel; an operand that a single tile needs is packed by that tile, in the cache where it is
+// used.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "autograd/cpu/matmul.cpp"
 #include <hwy/cache_control.h>
@@ -25,9 +26,9 @@ namespace {
 
 constexpr int64_t kTileRows = 288;  // times kDepth: half of a small L2
 constexpr int64_t kTileCols = 512;
-constexpr int64_t kShared = 1 << 19;    // numbers of both operands packed at a time
-constexpr int64_t kSharedRows = 1024;   // more rows than this are packed by their tiles
-constexpr int64_t kPieces = 16;         // tiles wanted at least, to have some to share
+constexpr int64_t kShared = 1 << 19;   // numbers of both operands packed at a time
+constexpr int64_t kSharedRows = 1024;  // if a has more rows than this, each tile packs its own rows
+constexpr int64_t kPieces = 16;        // tiles wanted at least, to have some to share
 constexpr int64_t kSmallest = 1 << 15;  // cycles, roughly, that a piece should take
 
 int64_t round_up(int64_t n, int64_t step) { return (n + step - 1) / step * step; }
@@ -40,7 +41,8 @@ struct Product {
   const T* bias;
   Activation activation;
   bool accumulate;
-  /// A few rows times weights [n, k] as they lie in memory, each number of which is needed once.
+  /// Whether this is a product of a few rows with weights [n, k] as they lie in memory, of which
+  /// each number is needed once.
   bool thin() const { return m <= kThin && a.col == 1 && b.row == 1 && !accumulate; }
 };
 
@@ -50,9 +52,9 @@ struct Place {
   bool first, last;
 };
 
-/// What becomes of sums x over a block of k for the element that holds c: the first block
-/// overwrites (unless accumulating), later ones add; after the last come bias and activation. NaN
-/// stays.
+/// The new value of an element that holds c, from the sum x over a block of k: the first block
+/// overwrites c (unless accumulating), later blocks add to c; after the last block come bias and
+/// activation. NaN stays NaN.
 template <class T, class V>
 HWY_INLINE V finish(const Product<T>& p, const Place& at, V x, V c, V bias) {
   if (!at.first || p.accumulate) x += c;
@@ -213,7 +215,7 @@ void pack_shared(int64_t begin, int64_t end, int64_t count, int64_t panel, const
   });
 }
 
-/// One product, or one of a batch of equal shape that threads share among them.
+/// Computes tiles [from, to) of one product, or of one of a batch of equal shape.
 template <class T>
 void multiply_tiles(const Product<T>& p, const Cut& cut, const Packed<T>& packed, int64_t from,
                     int64_t to) {

@@ -38,7 +38,7 @@ const T* pack_right(const Strided<T>& b, int64_t k, int64_t n, Buffer<T>& buffer
   return out;
 }
 
-/// The same for a matrix whose rows lie anywhere: row l is rows[l][0..n).
+/// Columns [k, n] for the right side, of a matrix whose rows lie anywhere: row l is rows[l][0..n).
 template <class T>
 const T* pack_rows_right(const std::vector<const T*>& rows, int64_t n, Buffer<T>& buffer) {
   constexpr int cols = Simd<T>::cols;
@@ -58,7 +58,7 @@ const T* pack_rows_right(const std::vector<const T*>& rows, int64_t n, Buffer<T>
   return out;
 }
 
-/// One register tile of product(): from registers to out if it is whole.
+/// One register tile of product(). A whole tile goes from registers straight to out.
 template <class T>
 HWY_INLINE void product_tile(int64_t rows, int64_t columns, int64_t k, const T* left,
                              const T* right, T* out, int64_t ld, bool add) {

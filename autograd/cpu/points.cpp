@@ -35,7 +35,7 @@ struct Cloud {
   int64_t size;
 };
 
-/// Squared distances of points i, i + 1, ... from one place.
+/// The squared distances of points i, i + 1, ... from one place, as a vector.
 template <class D, class T>
 HWY_INLINE hn::Vec<D> squared_distance(D d, const Cloud<T>& c, int64_t i, const T* from) {
   const auto dx = hn::Sub(hn::LoadU(d, c.x.data() + i), hn::Set(d, from[0]));
@@ -44,8 +44,8 @@ HWY_INLINE hn::Vec<D> squared_distance(D d, const Cloud<T>& c, int64_t i, const 
   return hn::MulAdd(dz, dz, hn::MulAdd(dy, dy, hn::Mul(dx, dx)));
 }
 
-/// A bound that at least k of the distances do not exceed: the points are dealt into k groups or
-/// somewhat more, and each has a nearest one.
+/// A bound that at least k of the distances do not exceed: the points are dealt into at least k
+/// groups, and each group has a nearest point.
 template <class T>
 hn::Vec<hn::ScalableTag<T>> bound_of(const T* distance, int64_t v, int64_t k) {
   const hn::ScalableTag<T> d;
@@ -60,7 +60,8 @@ hn::Vec<hn::ScalableTag<T>> bound_of(const T* distance, int64_t v, int64_t k) {
   return hn::MaxOfLanes(d, bound);
 }
 
-/// The k nearest points in order, of equal ones the earlier. A point with NaN is infinitely far.
+/// Finds the k nearest points, nearest first; of equally near points the one of the lower index
+/// comes first. A point with NaN is infinitely far.
 template <class T>
 void nearest(const T* query, const Cloud<T>& cloud, int64_t k, T* distance, T* best, int32_t* out) {
   const hn::ScalableTag<T> d;
@@ -75,7 +76,7 @@ void nearest(const T* query, const Cloud<T>& cloud, int64_t k, T* distance, T* b
   std::fill_n(distance + v, kPadding, std::numeric_limits<T>::infinity());
   const V bound = bound_of(distance, v, k);
   int64_t count = 0;
-  const auto add = [&](int64_t i) {  // indices rise, so an equal one goes behind
+  const auto add = [&](int64_t i) {  // indices rise, so an equally near point goes behind
     const T far = distance[i];
     if (count == k && !(far < best[k - 1])) return;
     count = std::min(count + 1, k);

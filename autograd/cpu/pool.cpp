@@ -18,7 +18,7 @@
 // Under AddressSanitizer free blocks, and the slack behind a tensor, may not be touched.
 #ifdef __has_feature
 #if __has_feature(address_sanitizer)
-#define __SANITIZE_ADDRESS__  // as GCC calls it
+#define __SANITIZE_ADDRESS__  // the name that GCC defines
 #endif
 #endif
 #ifdef __SANITIZE_ADDRESS__
@@ -60,7 +60,7 @@ struct Pool {
   std::mutex mutex;
   std::array<FreeList, kClasses> free;
   MemoryStats stats;
-  int nan_memory = 0;  // objects of this name alive
+  int nan_memory = 0;  // how many NanMemory objects live
 };
 
 Pool& pool() {
@@ -85,7 +85,7 @@ void trim(Pool& p) {
 void* from_system(Pool& p, size_t bytes) {
   const size_t align = bytes >= kHuge ? kHuge : kAlign, whole = (bytes + align - 1) / align * align;
   void* data = std::aligned_alloc(align, whole);
-  if (data == nullptr) {  // blocks of other sizes may be all that is missing
+  if (data == nullptr) {  // perhaps free blocks of other sizes hold the memory
     trim(p);
     data = std::aligned_alloc(align, whole);
   }

@@ -46,7 +46,8 @@ void centre(const Tensor& x, int64_t rows, int64_t k, Tensor& mean, Tensor& out)
 }
 
 /// Maxima over the points of one cloud, of one panel of channels. `sign`: of the scale, by which
-/// the largest or smallest z is looked for; with 0 all are equal, and the first is taken.
+/// the largest or smallest z is looked for; if it is 0 all values are equal, and the first point is
+/// taken.
 template <class T>
 struct Peaks {
   static constexpr int cols = Simd<T>::cols;
@@ -177,8 +178,8 @@ void finish(const PooledNormArgs& args, const double* squares, const T* mean) {
   }
 }
 
-// Products here are in float32 whatever other ops' precision is: they belong to sums that fused
-// loops make in float32, and what must cancel between them would not.
+// Products here are in float32 whatever the precision of other ops is: they belong to sums that
+// fused loops make in float32, and summands that must cancel would not.
 
 template <class T>
 void forward(const PooledNormArgs& args) {

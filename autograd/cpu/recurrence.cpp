@@ -28,7 +28,8 @@ void recurrence_grad(const RecurrenceGradArgs& args) {
   dispatch(args.out.dtype(), [&](auto zero) {
     using T = decltype(zero);
     parallel_each(args.out.size(0), 1, [&](int64_t s) {
-      T* later = args.g_first.data<T>() + s * m;  // a_(t+1) g_b_(t+1), in the end that of `first`
+      // A_(t+1) g_b_(t+1); in the end the gradient of `first`.
+      T* later = args.g_first.data<T>() + s * m;
       std::fill_n(later, m, T(0));
       for (int64_t t = steps - 1; t >= 0; --t) {
         const int64_t at = (s * steps + t) * m;

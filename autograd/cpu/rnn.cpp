@@ -1,6 +1,6 @@
 // GRU layers. Threads share the hidden units: each takes some through a step for all rows of the
-// batch, so a weight is fetched once a step whatever the batch, and waits for the others before the
-// next. States go from step to step in the layout that products read.
+// batch, so a weight is fetched once a step whatever the batch, and waits for the other threads
+// before the next step. States go from step to step in the layout that products read.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "autograd/cpu/rnn.cpp"
 #include <hwy/foreach_target.h>  // once per instruction set
@@ -123,7 +123,7 @@ void cell(const T* const* in, T* const* out, int64_t count) {
 }
 
 /// Gradients at one row's hidden units. gates and g_gi, g_gh are h apart per gate; g: gradient of
-/// the new state; `direct` gets the part that goes straight to the old one.
+/// the new state; `direct` gets the part that goes straight to the old state.
 template <class T>
 void cell_grad(const T* gates, const T* previous, const T* g_out, int64_t h, int64_t count, T* gi,
                T* gh, T* direct) {
@@ -182,8 +182,8 @@ struct Layer {
   }
 };
 
-/// A step alone, of a few rows: both products and the cells of some units in one go, weights read
-/// as they lie. More steps or rows are worth packing the weights once.
+/// A single step of a few rows: both products and the cells of some units in one go, with weights
+/// read as they lie in memory. For more steps or rows packing the weights pays.
 template <class T>
 struct Frame {
   static constexpr int cols = Simd<T>::cols;
@@ -213,7 +213,8 @@ struct Frame {
   }
 };
 
-/// Steps one after the other; the input products of all of them are one.
+/// A sequence: its steps one after the other. The products with the inputs of all steps are one
+/// product.
 template <class T>
 struct Sequence {
   static constexpr int cols = Simd<T>::cols;

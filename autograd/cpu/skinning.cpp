@@ -149,8 +149,8 @@ void skin_grad_piece(const LbsGradArgs& args, const T* transforms, int64_t first
   }
 }
 
-/// From the gradients of [G | b] of one sample, `pieces` of them to be added up in order, to those
-/// of [G | P] and of the rest joints.
+/// Takes the gradients of [G | b] of one sample (`pieces` of them, which are added up in order) to
+/// the gradients of [G | P] and of the rest joints.
 template <class T>
 void transform_grads(const LbsGradArgs& args, int64_t s, int64_t pieces, const T* partial) {
   const int64_t joints = args.transforms.size(1), many = padded<T>(joints);

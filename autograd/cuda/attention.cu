@@ -1,6 +1,6 @@
-// Neighbour attention (kernels/attention.h), a few clouds at a time so that what is as large as
-// their pairs of points stays small: products by cuBLAS, and one pass each over what is between
-// them. Only the softmax is kept for the backward pass, which computes the rest again.
+// Neighbour attention (kernels/attention.h), a few clouds at a time, so that tensors over pairs of
+// points stay small. cuBLAS makes the products, and one pass each does what is between them. Only
+// the softmax is kept for the backward pass, which computes everything else again.
 #include "autograd/cuda/indices.h"
 #include "autograd/cuda/kernels.h"
 
@@ -218,7 +218,7 @@ void cloud_gradients(const NeighbourAttentionGradArgs& args, const Pairs<T>& p, 
       score_gradients(p, at<T>(st), at<T>(args.weights) + at_point * p.k * d,
                       at<T>(args.y) + at_point * d, at<T>(args.gy) + at_point * d, g_st);
   add_product(g_e, u, args.out);
-  matmul({.a = g_e, .b = in.gamma, .out = g_h, .precision = precision});  // for now that of u
+  matmul({.a = g_e, .b = in.gamma, .out = g_h, .precision = precision});  // for now it holds u
   keep_on(p, u, g_h, g_st);
   add_product(g_st, h, args.g_both);
   matmul({.a = g_st, .b = in.both, .out = g_h, .precision = precision});

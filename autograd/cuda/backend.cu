@@ -21,7 +21,7 @@ struct Runtime {
     if (count > 1) log_info(format("device 'cuda' is GPU %d of %d", gpu, count));
     check(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking), "cudaStreamCreate");
     check(cudaDeviceGetDefaultMemPool(&pool, gpu), "cudaDeviceGetDefaultMemPool");
-    uint64_t keep_all = UINT64_MAX;  // a step needs again what the last one gave back
+    uint64_t keep_all = UINT64_MAX;  // a step needs again what the last step gave back
     check(cudaMemPoolSetAttribute(pool, cudaMemPoolAttrReleaseThreshold, &keep_all),
           "cudaMemPoolSetAttribute");
     check(cublasCreate(&cublas), "cublasCreate");

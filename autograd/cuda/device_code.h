@@ -1,5 +1,5 @@
-// What kernels of this folder are written in: loops over numbers and over groups of threads. nvcc
-// makes them CUDA's; any other compiler makes them loops of the host, in another order than a GPU
+// The form of the kernels of this folder: loops over numbers and over groups of threads. nvcc makes
+// CUDA kernels of these; any other compiler makes loops of the host, in another order than a GPU
 // would take on purpose, which is how tests run them where there is no GPU (tests/support).
 //
 // A kernel is a function of a contract (autograd/kernels) that takes addresses out of tensors and
@@ -40,7 +40,7 @@ inline constexpr int kThreads = 256;  ///< of a group
       throw Error(std::string("kernel of the GPU has no variant for ") + name_of(type)); \
   }
 
-/// The numbers of a tensor as kernels see them. Error if they are the host's.
+/// The numbers of a tensor as kernels see them. Error if the tensor is in the host's memory.
 template <class T>
 T* at(const Tensor& t) {
 #ifdef __CUDACC__
@@ -77,7 +77,7 @@ struct Group {
     for (int64_t i = n; i-- > 0;) f(i);
   }
 #endif
-  /// Sum of f(i) over i below n, in an order that n alone decides. Everybody gets it.
+  /// Sum of f(i) over i below n, in an order that n alone decides. All threads get the sum.
   template <class F>
   RESTAGE_DEVICE double sum(int64_t n, F f) const {
     double* parts = room;
@@ -89,7 +89,7 @@ struct Group {
     for (int64_t half = kThreads / 2; half > 0; half /= 2)
       each(half, [&](int64_t t) { parts[t] += parts[t + half]; });
     const double total = parts[0];
-    each(0, [](int64_t) {});  // nobody writes before all have read
+    each(0, [](int64_t) {});  // no thread writes before all threads have read
     return total;
   }
   /// The i below n of the largest f(i), the first of equal ones; 0 if all are NaN.

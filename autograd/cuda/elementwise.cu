@@ -178,7 +178,7 @@ void relu_dropout_grad_of(const ReluDropoutGradArgs& args) {
        [=] RESTAGE_DEVICE(int64_t i) { out[i] = y[i] <= T(0) ? T(0) : g[i] * kept; });
 }
 
-/// Every thread that finds one writes the same.
+/// Every thread that finds such a number writes the same.
 template <class T>
 void non_finite_of(const NonFiniteArgs& args) {
   const T* x = at<T>(args.x);

@@ -11,7 +11,8 @@ struct Gemm {
   bool transpose_a, transpose_b;
   int64_t m, n, k;
   const void* a;
-  int64_t a_columns_apart, a_apart;  ///< leading dimension; from one of the batch to the next
+  /// Distance of columns (leading dimension); distance of one matrix of the batch from the next.
+  int64_t a_columns_apart, a_apart;
   const void* b;
   int64_t b_columns_apart, b_apart;
   double beta;
@@ -21,7 +22,7 @@ struct Gemm {
   DType type;                 ///< f32 or f64
   MatmulPrecision precision;  ///< to which f32 operands may be rounded
 };
-/// By cuBLAS; tests have one of their own.
+/// Multiplies by cuBLAS; tests define another one.
 void multiply(const Gemm& g);
 
 }  // namespace restage::cuda

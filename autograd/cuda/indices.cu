@@ -20,7 +20,7 @@ std::string& faulty_op() {
 
 }  // namespace
 
-/// The op is named as the last one that took an index if more than one ran since somebody waited.
+/// If several ops took an index since the host last waited, the error names the last of them.
 void look_at(const Tensor& index, int64_t limit) {
   const int32_t* of = at<int32_t>(index);
   int32_t* flag = at<int32_t>(index_flag(index));
@@ -35,7 +35,7 @@ std::string take_index_fault() {
   if (op.empty()) return "";  // also while the copy below waits
   Tensor& flag = index_flag(Tensor());
   if (flag.cpu().item() == 0) return "";
-  flag = Tensor();  // the next one is clear
+  flag = Tensor();  // the next flag is clear
   return op + " on the GPU: an index is outside";
 }
 

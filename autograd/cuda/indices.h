@@ -5,12 +5,12 @@
 
 namespace restage::cuda {
 
-/// Notes an index outside of [0, limit); whoever waits is told (take_index_fault()). Kernels that
-/// use it read nothing outside meanwhile.
+/// Notes an index outside of [0, limit); whoever waits is told (take_index_fault()). Until then
+/// kernels that use the index read nothing outside of their tensors.
 void look_at(const Tensor& index, int64_t limit);
 
-/// Who asks for whom: of every target the places of an index [n, m] that name it, in order. With it
-/// sums over them need no atomics, and no search.
+/// For every target the places of an index [n, m] that name it, in order. With these lists, sums
+/// over the places need no atomics and no search.
 struct Askers {
   int64_t m, v;
   Tensor start;  ///< [n, v + 1]: where a target's places begin, from the first of its cloud
@@ -18,11 +18,11 @@ struct Askers {
 };
 Askers askers_of(const Tensor& index, int64_t targets);
 
-/// The same as kernels see it.
+/// The same lists as kernels see them.
 struct AskersAt {
   explicit AskersAt(const Askers& of)
       : m(of.m), v(of.v), start(at<int32_t>(of.start)), place(at<int32_t>(of.place)) {}
-  /// Sum of f(row of the index) over those that ask for a target (a row of the batch).
+  /// The sum of f(place) over the places of the index that name a target (a row of the batch).
   template <class F>
   RESTAGE_DEVICE double sum(int64_t target, F f) const {
     const int64_t s = target / v;

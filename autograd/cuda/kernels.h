@@ -1,5 +1,5 @@
-// Every kernel of the GPU with its contract, once. What is missing here is composed of others by
-// the op (has_fused()) or, where there is no composition, refused by name.
+// Every kernel of the GPU with its contract, once. An op whose kernel is missing here is composed
+// of other ops (has_fused()) or, if it cannot be, refused by name.
 #pragma once
 
 #include <string>

@@ -1,6 +1,6 @@
-// Linear map, batch norm and maximum over points (kernels/pooled_norm.h), with the CPU's algebra
-// (cpu/pooled_norm.cpp): the product of some clouds at a time by cuBLAS, one pass over it, and no
-// product as large as that in the backward pass.
+// Linear map, batch norm and maximum over points (kernels/pooled_norm.h), with the algebra of
+// cpu/pooled_norm.cpp: cuBLAS makes the product of some clouds at a time, one pass goes over it,
+// and the backward pass has no product as large as that.
 #include "autograd/cuda/indices.h"
 #include "autograd/cuda/kernels.h"
 #include "autograd/cuda/sums.h"
@@ -18,7 +18,7 @@ struct Sizes {
   int64_t n, v, k, o;
 };
 
-/// x less its mean over all points; the mean [1, k].
+/// Computes x less its mean over all points, and the mean [1, k].
 template <class T>
 void centre(const PooledNormArgs& args, const Sizes& s, const Tensor& mean) {
   const int64_t rows = s.n * s.v, k = s.k;

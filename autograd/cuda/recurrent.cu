@@ -41,7 +41,8 @@ void gru_of(const GruArgs& args) {
 template <class T>
 void gru_grad_of(const GruGradArgs& args) {
   const int64_t steps = args.gy.size(0), n = args.gy.size(1), h = args.gy.size(2);
-  T* g_state = at<T>(args.out);  // of the state after the step, then of that before it
+  // Gradient of the state after the step, then of the state before it.
+  T* g_state = at<T>(args.out);
   each(n * h, [=] RESTAGE_DEVICE(int64_t k) { g_state[k] = T(0); });
   for (int64_t t = steps - 1; t >= 0; --t) {
     const T *gates = at<T>(args.gates) + t * n * 4 * h, *gy = at<T>(args.gy) + t * n * h,

@@ -9,9 +9,10 @@ namespace restage::cuda {
 /// Error naming what was done and what CUDA says.
 void check(cudaError_t code, const char* what);
 void check(cublasStatus_t code, const char* what);
-/// After a launch: whether it could be made. What the kernel does wrong comes with synchronise().
+/// To be called after a launch; Error if it could not be made. What the kernel itself does wrong is
+/// told by synchronise().
 void launched();
-/// In the order of which everything happens.
+/// The stream in which everything is launched, so that everything happens in order.
 cudaStream_t stream();
 cublasHandle_t cublas();
 

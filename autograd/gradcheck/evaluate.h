@@ -8,12 +8,12 @@ namespace restage::gradcheck {
 
 struct Evaluation {
   Tensor value;
-  std::vector<Tensor> gradients;  ///< one per input; undefined: it received none
+  std::vector<Tensor> gradients;  ///< one per input; undefined if the input received none
 };
 
-/// What is built of these inputs on the sample's device, without a tape.
+/// The result of the sample with these inputs, on the sample's device and without a tape.
 Var built(const Sample& s, const std::vector<Tensor>& inputs);
-/// Its result, in the host's memory.
+/// The same result in the host's memory.
 Tensor value_of(const Sample& s, const std::vector<Tensor>& inputs);
 
 /// Value, and gradients of sum(u * value), with the inputs that `on_tape` picks (null: all) as

@@ -110,7 +110,8 @@ void check_direction(const Sample& s, const Tensor& u, const Evaluation& e, Find
                 ", finite differences say " + number(numeric));
 }
 
-/// What is left unwritten is NaN in the result, and old numbers in the evaluations after it.
+/// Evaluates on memory full of NaN: what a kernel leaves unwritten is NaN in this result, and old
+/// numbers in other evaluations.
 Evaluation evaluate_over_nan(const Sample& s, const Tensor& u) {
   const NanMemory unwritten_shows;
   return evaluate(s, u);
@@ -242,7 +243,8 @@ void check_kink(const Sample& s, Findings& f) {
   }
 }
 
-/// What only a kernel can see (an index) is told by its device to whoever waits.
+/// Whether a mistake that only a kernel can see (in an index) is refused when the host waits for
+/// the device.
 bool refused_late(Device device, Findings& f) {
   try {
     backend(device).synchronise();

@@ -31,13 +31,15 @@ struct Sample {
   std::vector<Tensor> inputs;  ///< float64 (errors: anything)
   Build build;                 ///< must be a pure function of its arguments
   Kind kind = Kind::smooth;
-  std::vector<Tensor> expected = {};  ///< of kinks: one per input, undefined: not looked at
-  bool zero_gradient = false;         ///< the true gradient of every input is zero here
-  double f32_tolerance = 1e-4;        ///< float32 gradients, relative to the largest float64 one
-  Device device = {};                 ///< where it is computed; inputs and results are the host's
+  /// Of kinks: a gradient for each input; an undefined one is not compared.
+  std::vector<Tensor> expected = {};
+  bool zero_gradient = false;   ///< the true gradient of every input is zero here
+  double f32_tolerance = 1e-4;  ///< float32 gradients, relative to the largest float64 one
+  /// Where the sample is computed; inputs and results are in the host's memory.
+  Device device = {};
 };
 
-/// All that is known about one op.
+/// All samples of one op.
 struct OpSamples {
   std::string op;       ///< the op's name
   std::string letters;  ///< its dimension letters, which every ShapeError must repeat
@@ -45,7 +47,7 @@ struct OpSamples {
   /// A random valid case: shapes and values are functions of the generator. Null: none.
   std::function<Sample(Rng&)> random = nullptr;
 
-  /// Add one sample each; what else it is to say can be set in what comes back.
+  /// Each adds one sample and returns it, so that its other members can be set.
   Sample& add(const std::string& title, std::vector<Tensor> inputs, Build build,
               Sample::Kind kind = Sample::Kind::smooth) {
     return samples.emplace_back(Sample{title, std::move(inputs), std::move(build), kind});
@@ -68,7 +70,7 @@ OpSamples samples_for() {
   return {Op::name, Op::letters};
 }
 
-/// What was found.
+/// The result of the checks.
 struct Report {
   std::vector<std::string> failures;  ///< empty: passed
   int64_t compared = 0;               ///< derivatives compared with finite differences

@@ -9,7 +9,7 @@
 
 namespace restage {
 
-/// What forward and backward read.
+/// The inputs, which both the forward and the backward pass read.
 struct NeighbourAttentionInputs {
   const Tensor& xyz;    ///< [n, v, 3]
   const Tensor& index;  ///< i32 [n, v, k], neighbours of each point, within its cloud
@@ -24,11 +24,13 @@ struct NeighbourAttentionInputs {
   /// Do every product in full, instead of leaving out hidden units whose ReLU has the same sign for
   /// all pairs of a tile of neighbouring points. The result is the same up to rounding.
   bool dense = false;
-  /// Of the products over pairs, on a GPU. The CPU's are made inside of loops in float32.
+  /// Precision of the products over pairs on a GPU. The CPU makes these products in float32, inside
+  /// of loops.
   MatmulPrecision precision = MatmulPrecision::float32;
 };
 
-/// out [n, v, d]; weights [n, v, k, d] keeps the softmax for the backward pass (null: nobody asks).
+/// out [n, v, d]; weights [n, v, k, d] keeps the softmax for the backward pass (null if there will
+/// be none).
 struct NeighbourAttentionArgs {
   NeighbourAttentionInputs in;
   Tensor& out;

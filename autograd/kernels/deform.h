@@ -10,12 +10,13 @@ inline constexpr int64_t kDeformTile = 48;   ///< points of a tile: whole vector
 inline constexpr int64_t kDeformGroup = 8;   ///< neighbouring tiles that share work
 inline constexpr int64_t kDeformAlign = 32;  ///< the width p below is a multiple of it
 
-/// offset(x) = w3 relu(w2 relu(w1 x + b1) + b2) + b3 with u hidden units; p is u rounded up, the
-/// numbers in between are zero.
+/// offset(x) = w3 relu(w2 relu(w1 x + b1) + b2) + b3 with u hidden units; p is u rounded up to a
+/// multiple of kDeformAlign; the numbers beyond u are zero.
 struct OffsetField {
-  Tensor w1;         ///< [u, 3]
-  Tensor b1;         ///< [u], what this frame's other inputs give included
-  Tensor w2;         ///< [u, p], row i holds what unit i of the first layer gives to all others
+  Tensor w1;  ///< [u, 3]
+  Tensor b1;  ///< [u], includes what the other inputs of this frame give
+  /// [u, p], row i holds what unit i of the first layer gives to all units of the second.
+  Tensor w2;
   Tensor b2;         ///< [p]
   Tensor w3;         ///< [3, p]
   Tensor b3;         ///< [3]

@@ -90,7 +90,8 @@ struct ExpandArgs {
   const Tensor& x;
   Tensor& out;
 };
-/// out = x in out's dtype, which differs: any of the four, by way of float64.
+/// out = x converted, by way of float64, to the dtype of out, which differs from that of x. All
+/// four dtypes.
 struct CastArgs {
   const Tensor& x;
   Tensor& out;

@@ -10,10 +10,10 @@ namespace restage {
 /// "avx512", "avx2", ..., and last the one that every processor has, e.g. "baseline".
 std::vector<std::string> instruction_sets();
 
-/// The one in use.
+/// The name of the set in use.
 std::string instruction_set();
 
-/// Uses another from now on; InputError unless it is one of instruction_sets(). For tests and
+/// Uses another set from now on; InputError unless it is one of instruction_sets(). For tests and
 /// measurements: not while kernels run. All sets but the baseline give the same bits.
 void use_instruction_set(const std::string& name);
 

@@ -18,7 +18,7 @@ bool add_cuda_device();  // autograd/cuda/backend.cu, with RESTAGE_CUDA: whether
 
 namespace {
 
-/// By kind. Devices are entered before the work begins.
+/// All backends; the kind of a device is its index. Devices are entered before the work begins.
 std::vector<Backend*>& backends() {
   static std::vector<Backend*> all{&cpu_backend()};
   return all;

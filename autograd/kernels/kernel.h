@@ -19,21 +19,21 @@ class Backend {
   virtual ~Backend() = default;
   virtual std::string_view name() const = 0;
   virtual void* allocate(size_t bytes) = 0;
-  /// Kernels that were launched before may still use it.
+  /// Kernels that were launched before may still use the memory.
   virtual void release(void* data, size_t bytes) = 0;
   virtual void fill_zero(void* data, size_t bytes) = 0;
   virtual void copy_in(void* to, const void* from_host, size_t bytes) = 0;
   virtual void copy(void* to, const void* from, size_t bytes) = 0;  ///< within its memory
-  /// Returns when the numbers are there; throws what synchronise() does.
+  /// Returns when the numbers have arrived; throws what synchronise() throws.
   virtual void copy_out(void* to_host, const void* from, size_t bytes) = 0;
-  /// Returns when all that was launched is done. Error naming the kernel if one failed.
+  /// Returns when everything that was launched is done. Error naming the kernel if one failed.
   virtual void synchronise() = 0;
   virtual MemoryStats memory() const = 0;
   virtual void reset_peak() = 0;
   virtual void trim() = 0;  ///< gives free memory back to the system
 
   virtual bool supports(std::type_index args) const { return table_.contains(args); }
-  /// Error naming both if it has no such kernel.
+  /// Runs a kernel; Error naming the kernel and the device if the device has no such kernel.
   virtual void run(std::type_index args_type, const void* args);
 
  protected:
@@ -47,22 +47,25 @@ class Backend {
   std::unordered_map<std::type_index, Function> table_;
 };
 
-/// The backend of a device; that of Device{} is the CPU's.
+/// The backend of a device; Device{} is the CPU.
 Backend& backend(Device device);
-/// Enters a backend, which must outlive all its tensors. Error if one of its name is there.
+/// Enters a backend, which must outlive all its tensors. Error if there is a backend of that name
+/// already.
 Device add_device(Backend& backend);
-/// The device of this name ("cpu"); InputError listing those that are built in.
+/// The device of this name ("cpu"); InputError listing the devices that are built in.
 Device device_of(std::string_view name);
 
-/// Which GPU is "cuda" for the process number `local_rank` (from 0) of those that train together on
-/// one host with `count` GPUs: one each, in turn where there are more processes than GPUs.
+/// Which GPU is "cuda" for the process number `local_rank` (from 0) of the processes that train
+/// together on a host with `count` GPUs. Each process has a GPU of its own, unless there are more
+/// processes than GPUs; then they share the GPUs evenly.
 int gpu_of(int local_rank, int count);
-/// Says which of them this process is. Before the first device_of("cuda"); 0 if nobody says it.
+/// Says which of them this process is (0 if nobody says it). To be called before the first
+/// device_of("cuda").
 void set_local_rank(int local_rank);
 int local_rank();
 
-/// Whether the device has kernels for all of these contracts. If not, an op takes those it is
-/// composed of, and that is logged once for each device and op: such a device is slower there.
+/// Whether the device has kernels for all of these contracts. If not, an op is composed of other
+/// kernels, which is slower; the log says so once for each device and op.
 bool has_fused(Device device, const char* op, std::initializer_list<std::type_index> contracts);
 
 /// Room for a result: a tensor of the dtype and on the device of another, not initialised.

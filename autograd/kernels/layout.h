@@ -20,9 +20,9 @@ struct PermuteArgs {
   Tensor& out;
   std::array<int, Shape::kMaxRank> order;
 };
-/// Whether an i32 index, which the host can read, is within [0, limit). Ops look before they
-/// launch; where the host cannot, kernels that take an index look themselves, and the error comes
-/// with Backend::synchronise().
+/// Whether an i32 index, which the host can read, is within [0, limit). Ops check an index before
+/// they launch a kernel. If the host cannot read the index, the kernel checks it, and the error
+/// comes with Backend::synchronise().
 bool index_within(const Tensor& index, int64_t limit);
 
 /// x [n, v, c], index i32 [n, m] -> out [n, m, c].

@@ -14,7 +14,7 @@ namespace restage {
 /// The numbers are part of ids (train/stages/identity.h), so they stay.
 enum class MatmulPrecision { float32 = 0, tf32 = 2 };
 
-/// The one in use: what ops that are made now compute with.
+/// The precision in use: ops that are made now compute with it.
 MatmulPrecision matmul_precision();
 void set_matmul_precision(MatmulPrecision precision);
 

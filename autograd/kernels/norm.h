@@ -10,7 +10,7 @@ enum class Affine {
   none,
   inner,
   middle
-};  ///< along which axis scale and shift run; middle needs inner = 1
+};  ///< the axis along which scale and shift run; middle needs inner = 1
 
 /// out = (x - mean) * rstd * scale + shift, biased variance; mean, rstd [outer, inner] are outputs,
 /// always f64: over few rows the gradient all but cancels and needs them exactly.

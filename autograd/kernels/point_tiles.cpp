@@ -32,7 +32,7 @@ void sort_into_tiles(const T* xyz, int32_t* first, int32_t* last, int64_t size, 
   int32_t* middle = first + half * size;
   const int axis = longest_side(xyz, first, last);
   const auto key = [&](int32_t i) { return xyz[3 * i + axis]; };
-  // NaN after all numbers: the order must be one.
+  // NaN comes after all numbers, since std::nth_element needs a strict order.
   const auto before = [&](int32_t a, int32_t b) {
     const T x = key(a), y = key(b);
     if (x != x || y != y) return x == x ? true : (y == y ? false : a < b);

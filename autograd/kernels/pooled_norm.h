@@ -1,6 +1,6 @@
 // A linear map per point, batch norm and the maximum over the points of a cloud, in one. The
-// product [n, v, o], by far the largest tensor of such a layer, is never written: only its maxima
-// leave.
+// product [n, v, o], by far the largest tensor of such a layer, is never written, only its maxima
+// are.
 #pragma once
 
 #include "autograd/kernels/kernel.h"
@@ -29,7 +29,8 @@ struct PooledNormArgs {
   Activation activation;
   double eps;
 };
-/// Gradients of x (out), weight, scale and shift; that of the bias is zero. y: the forward result.
+/// Gradients of x (out), weight, scale and shift; the gradient of the bias is zero. y: the forward
+/// result.
 struct PooledNormGradArgs {
   const Tensor& centred;
   const Tensor& weight;

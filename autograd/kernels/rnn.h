@@ -1,6 +1,6 @@
-// Recurrences. A GRU layer (PyTorch's equations, spec 3.2), gates stacked r, z, n. Sums are those
-// of matmul.h: a step alone has the bits of the same step of a sequence, a row those of the row in
-// a batch.
+// Recurrences. A GRU layer (PyTorch's equations, spec 3.2), gates stacked r, z, n. Sums are ordered
+// as in matmul.h: a step alone has the same bits as that step in a sequence, and a row alone the
+// same bits as that row in a batch.
 #pragma once
 
 #include "autograd/kernels/kernel.h"
@@ -20,7 +20,8 @@ struct GruArgs {
   const Tensor& b_hh;
   Tensor& out;
   Tensor* gates;
-  MatmulPrecision precision = MatmulPrecision::float32;  ///< of the input products
+  /// Of the products with the inputs of all steps.
+  MatmulPrecision precision = MatmulPrecision::float32;
 };
 /// gy [t, n, h] and y = out of GruArgs -> g_gi [t, n, 3h], g_gh [t, n, 3h] (gradients of W_i x +
 /// b_i and of W_h h + b_h), out [n, h] = gradient of h0.

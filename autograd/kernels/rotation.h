@@ -77,8 +77,8 @@ struct SwingTwistArgs {
   std::span<const SwingJoint> joints;
   Tensor& out;
 };
-/// out is the gradient of posed. That of an arc of more than 172 degrees, whose axis means little,
-/// is zero.
+/// out is the gradient of posed. The gradient through an arc of more than 172 degrees, whose axis
+/// means little, is zero.
 struct SwingTwistGradArgs {
   const Tensor& rest;
   const Tensor& posed;

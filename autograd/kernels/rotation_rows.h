@@ -15,7 +15,7 @@ using V3 = Eigen::Matrix<T, 3, 1>;
 template <class T>
 using M3 = Eigen::Matrix<T, 3, 3, Eigen::RowMajor>;
 
-/// v / max(|v|, eps) and its gradient (below eps that of v / eps).
+/// v / max(|v|, eps) and its gradient (if |v| is below eps, the gradient of v / eps).
 template <class V>
 EIGEN_DEVICE_FUNC V unit(const V& v) {
   using T = typename V::Scalar;

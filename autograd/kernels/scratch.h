@@ -1,5 +1,5 @@
-// Working memory of kernels, and the handles of tensors: from the host's pool, so that a loop which
-// repeats itself takes nothing from the heap.
+// Lists in memory of the host's pool: working memory of kernels, and the handles of tensors. So a
+// loop that repeats itself takes nothing from the heap.
 #pragma once
 
 #include <vector>

@@ -13,7 +13,7 @@ namespace restage::swing_rows {
 using Vec = Eigen::Vector3d;
 using Mat = Eigen::Matrix3d;
 
-constexpr double kTiny = 1e-9;      // metres: no direction
+constexpr double kTiny = 1e-9;      // metres: a shorter vector has no direction
 constexpr double kReversed = 1e-2;  // 1 + cosine below which an arc has no gradient (172 degrees)
 
 /// NaN stays NaN.
@@ -35,16 +35,17 @@ EIGEN_DEVICE_FUNC inline Mat cross_matrix(const Vec& v) {
   m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
   return m;
 }
-/// Gradient of v from that of cross_matrix(v).
+/// The gradient of v from the gradient of cross_matrix(v).
 EIGEN_DEVICE_FUNC inline Vec from_cross(const Mat& g) {
   return {g(2, 1) - g(1, 2), g(0, 2) - g(2, 0), g(1, 0) - g(0, 1)};
 }
-/// Gradient of x from that of its direction u = x / length.
+/// The gradient of x from the gradient of its direction u = x / length.
 EIGEN_DEVICE_FUNC inline Vec from_direction(const Vec& g, const Vec& u, double length) {
   return (g - u * u.dot(g)) / length;
 }
 
-/// x along `across`, y along the rest of `up`, z at right angles.
+/// Axes: x along `across`, y along the part of `up` at right angles to x, z at right angles to
+/// both.
 struct Frame {
   EIGEN_DEVICE_FUNC Frame(const Vec& across, const Vec& upwards)
       : length(across.norm()), up(upwards) {
@@ -95,7 +96,7 @@ EIGEN_DEVICE_FUNC inline void turn_grad(const Vec& u, double angle, const Mat& g
   *gu = s * from_cross(g) + (1 - c) * (g + g.transpose()) * u;
 }
 
-/// Doubles for each joint that a walk works in, there and back.
+/// How many doubles for each joint a walk needs as working memory: forwards, and forwards and back.
 inline constexpr int64_t kWalkRoom = 9, kWalkBackRoom = 24;
 
 /// One skeleton: world rotations on the way down, gradients on the way up. Arc{}(a, b) is the
@@ -190,8 +191,8 @@ struct WalkBack : Walk<T, Arc> {
     add_bone(to, s.right, s.left, across);
     add_bone(to, j, s.child, up);
   }
-  /// From the gradient of a joint's world rotation to those of what it was made of; returns that of
-  /// the twist.
+  /// Takes the gradient of a joint's world rotation to the gradients of what the rotation was made
+  /// of; returns the gradient of the twist.
   EIGEN_DEVICE_FUNC double back(const SwingJoint& s, int j, const Mat& gw, const Mat& parent,
                                 Mat* g_parent) {
     if (s.child >= 0 && s.left >= 0) {

@@ -28,8 +28,8 @@ struct NeighbourAttention {
 /// inputs: xyz, query, key, value, W, b, M, G, g.
 Var neighbour_attention(std::initializer_list<Var> inputs, const Tensor& index, double scale,
                         bool dense = false);
-/// The same from products, gathers and attention_pool(): what tests compare it with, and what
-/// devices do that have no kernel for it.
+/// The same function made of products, gathers and attention_pool(). Tests compare
+/// neighbour_attention() with it, and devices without a kernel for that op compute it.
 Var neighbour_attention_reference(std::initializer_list<Var> inputs, const Tensor& index,
                                   double scale);
 

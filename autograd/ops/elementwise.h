@@ -65,8 +65,8 @@ struct Dropout {
   static constexpr const char* letters = "x[...]";
   double p = 0;
   RngKey key;
-  /// Of relu(x), in one pass each way: the result says what both let through, so no mask is drawn
-  /// again for the gradient.
+  /// Dropout of relu(x), in one pass each way. The result shows which elements both let through, so
+  /// the mask is not drawn again for the gradient.
   bool relu = false;
   void check(Inputs x) const;
   Tensor forward(Inputs x, Saved& saved) const;

@@ -18,7 +18,7 @@ Tensor product(const Tensor& a, const Tensor& b, bool ta, bool tb, MatmulPrecisi
   return y;
 }
 
-/// A gradient of a matrix that was shared by a batch.
+/// The gradient of a matrix: of one that a batch shares, the sum over the batch.
 Tensor unshare(const Tensor& g, const Shape& of) {
   return g.rank() == of.rank() ? g : sum_to(g, of);
 }

@@ -12,7 +12,7 @@ struct LinearOp {
   static constexpr const char* name = "linear";
   static constexpr const char* letters = "x[..., i], W[o, i], b[o]";
   Activation activation = Activation::none;
-  /// What is in force where the op is made holds for its backward pass, too.
+  /// The precision in use when the op is made; the backward pass has it, too.
   MatmulPrecision precision = matmul_precision();
   void check(Inputs x) const;
   Tensor forward(Inputs x, Saved& saved) const;
@@ -24,7 +24,7 @@ struct Matmul {
   static constexpr const char* name = "matmul";
   static constexpr const char* letters = "a[b?, m, k], c[b?, k, n]";
   bool transpose_a = false, transpose_b = false;
-  MatmulPrecision precision = matmul_precision();  ///< as in LinearOp
+  MatmulPrecision precision = matmul_precision();  ///< see LinearOp
   void check(Inputs x) const;
   Tensor forward(Inputs x, Saved& saved) const;
   Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;

@@ -23,8 +23,8 @@ struct AttentionPool {
 };
 
 Var attention_pool(const Var& score, const Var& value, double scale);
-/// The same from softmax, product and sum: what tests compare attention_pool() with, and what
-/// devices do that have no kernel for it.
+/// The same function made of softmax, product and sum. Tests compare attention_pool() with it, and
+/// devices without a kernel for that op compute it.
 Var attention_pool_reference(const Var& score, const Var& value, double scale);
 
 }  // namespace restage

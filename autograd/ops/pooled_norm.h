@@ -26,8 +26,8 @@ struct PooledNorm {
 Var pooled_norm(const Var& x, const Var& weight, const Var& bias, const Var& scale,
                 const Var& shift, Activation activation = Activation::none, double eps = 1e-5,
                 BatchStatistics* statistics = nullptr);
-/// The same from linear, batch norm, ReLU and max: what tests compare pooled_norm() with, and what
-/// devices do that have no kernel for it.
+/// The same function made of linear, batch norm, ReLU and max. Tests compare pooled_norm() with it,
+/// and devices without a kernel for that op compute it.
 Var pooled_norm_reference(const Var& x, const Var& weight, const Var& bias, const Var& scale,
                           const Var& shift, Activation activation = Activation::none,
                           double eps = 1e-5, BatchStatistics* statistics = nullptr);

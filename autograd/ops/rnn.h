@@ -12,7 +12,7 @@ struct Gru {
   static constexpr const char* name = "gru";
   static constexpr const char* letters =
       "x[t, n, i], h0[n, h], w_ih[3h, i], w_hh[3h, h], b_ih[3h], b_hh[3h]";
-  /// Of products over all steps at once, forward and backward, as in LinearOp.
+  /// Precision of the products over all steps at once, forward and backward; see LinearOp.
   MatmulPrecision precision = matmul_precision();
   void check(Inputs x) const;
   Tensor forward(Inputs x, Saved& saved) const;
@@ -35,8 +35,8 @@ inline Var recurrence(const Var& a, const Var& b, const Var& first) {
 /// y [t, n, h]: hidden states of all steps.
 Var gru(const Var& x, const Var& h0, const Var& w_ih, const Var& w_hh, const Var& b_ih,
         const Var& b_hh);
-/// The same from elementary ops: what tests compare gru() with, and what devices do that have no
-/// kernel for it.
+/// The same function made of elementary ops. Tests compare gru() with it, and devices without a
+/// kernel for that op compute it.
 Var gru_reference(const Var& x, const Var& h0, const Var& w_ih, const Var& w_hh, const Var& b_ih,
                   const Var& b_hh);
 

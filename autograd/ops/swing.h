@@ -1,4 +1,5 @@
-// Rotations that put a skeleton's bones where given joints are, and turn them about themselves.
+// Rotations that put the bones of a skeleton where given joints are, and twist the bones about
+// themselves.
 #pragma once
 
 #include "autograd/kernels/rotation.h"
@@ -7,9 +8,9 @@
 
 namespace restage {
 
-/// Rest joints, posed joints and a twist about each posed bone (radians) -> local rotations
-/// [n, j, 3, 3]. With twists of zero this is the closed form of retargeting. Which joint turns how
-/// is said by `joints` (kernels/rotation.h).
+/// Rest joints, posed joints and a twist about each posed bone (radians) -> local rotations [n, j,
+/// 3, 3]. With twists of zero this is the closed form of retargeting. `joints` says how each joint
+/// turns (SwingJoint in kernels/rotation.h).
 struct SwingTwist {
   static constexpr const char* name = "swing_twist";
   static constexpr const char* letters = "rest[n, j, 3], posed[n, j, 3], twist[n, j]";

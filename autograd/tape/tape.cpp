@@ -83,7 +83,8 @@ const Tensor* Gradients::find(uint64_t id) const {
   return it == by_id_.end() ? nullptr : &it->second.gradient;
 }
 
-/// Sums of squares that are not known yet: all are computed before the first is waited for.
+/// Computes the sums of squares that are not known yet: all are launched before the first is waited
+/// for.
 void Gradients::measure(std::span<const uint64_t> ids) const {
   std::vector<const Leaf*> open;
   for (const uint64_t id : ids) {
@@ -161,7 +162,7 @@ Var Tape::record(std::unique_ptr<Function> function, std::span<const Var> inputs
   return v;
 }
 
-/// The op's gradients of its inputs, held to what Grads promises.
+/// The gradients of the op's inputs; checks what Grads promises.
 Grads Tape::Node::backward(const Tensor& gy) const {
   const Saved& saved = function->saved();
   const auto fail = [this](const std::string& what) {
@@ -194,7 +195,8 @@ Gradients Tape::backward(const Var& loss) {
   require_own(loss);
   const int64_t first = first_;
   const auto at = [first](int64_t node) { return static_cast<size_t>(node - first); };
-  // Off the tape before anything can fail: what is half consumed must not be walked again.
+  // The nodes leave the tape before anything can fail, since a tape that is half consumed must not
+  // be walked again.
   std::vector<Node> nodes = std::move(nodes_);
   first_ += static_cast<int64_t>(nodes.size());
   nodes_.clear();

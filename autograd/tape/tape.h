@@ -1,6 +1,6 @@
 // The reverse-mode tape. Values are computed eagerly; an op is recorded only if one of its inputs
 // lives on a tape, so inference, which has no tape, records nothing. The tape is a vector in order
-// of execution: backward walks it in reverse and frees what it passes.
+// of execution: backward walks it in reverse and frees the nodes that it passes.
 #pragma once
 
 #include <initializer_list>
@@ -40,23 +40,24 @@ struct Var {
   bool on_tape() const { return link != nullptr; }
   /// The tape of a value that is on one; null for a constant. Error if the tape is gone.
   Tape* tape() const;
-  /// The same value without history.
+  /// The same value as a constant.
   Var detach() const { return Var(value); }
 };
 
-inline constexpr size_t kMaxInputs = 16;  ///< of an op
+inline constexpr size_t kMaxInputs = 16;  ///< most inputs of an op
 using Inputs = std::span<const Tensor>;
 /// One gradient per input, of the input's shape and dtype; undefined only where it is not needed.
-/// (What has no gradient is no input of an op but a member, as the index of gather is.)
+/// (Something that has no gradient, such as the index of gather, is a member of the op and not an
+/// input.)
 using Grads = std::vector<Tensor>;
 /// needs[i]: whether the gradient of input i is wanted.
 using Needs = std::span<const bool>;
 
 /// What is kept of a call for its backward pass: shapes and dtypes of the inputs in any case, and
-/// the tensors that the op keeps. Nothing when nobody will ask.
+/// the tensors that the op keeps. Nothing is kept if there will be no backward pass.
 class Saved {
  public:
-  Saved() = default;  ///< nobody will ask
+  Saved() = default;  ///< there will be no backward pass
   Saved(Inputs inputs, Needs needs);
   bool on() const { return !inputs_.empty(); }
   /// Whether the gradient of this input will be asked for.
@@ -64,12 +65,12 @@ class Saved {
   const Shape& shape(size_t input) const { return inputs_[input].shape; }
   DType dtype(size_t input) const { return inputs_[input].dtype; }
 
-  /// Keeps tensors that are complete: changing one before the backward pass is an Error there. An
-  /// op that computes from shapes alone keeps none.
+  /// Keeps tensors that are complete: if one is changed before the backward pass, that pass is an
+  /// Error. An op whose gradient needs shapes only keeps none.
   void keep(std::initializer_list<Tensor> tensors);
   const Tensor& operator[](size_t i) const { return tensors_[i]; }
   const std::vector<Tensor>& tensors() const { return tensors_; }
-  /// Whether none of them was written to since.
+  /// Whether none of the kept tensors was written to since.
   bool intact() const;
 
  private:
@@ -91,17 +92,17 @@ class Gradients {
   /// Gradient of a leaf with this identity (Parameter::id), or null if it did not take part.
   const Tensor* find(uint64_t id) const;
   void set(uint64_t id, Tensor gradient) { by_id_[id] = {std::move(gradient), {}}; }
-  /// Euclidean norm over these leaves, in double, summed in the order given; one without a gradient
-  /// adds nothing. Each leaf's part is computed once.
+  /// Euclidean norm over these leaves, in double, summed in the order given; a leaf without a
+  /// gradient adds nothing. The part of each leaf is computed once.
   double norm(std::span<const uint64_t> ids) const;
-  /// Over all leaves, in order of identity.
+  /// Euclidean norm over all leaves, in the order of their identities.
   double norm() const;
   bool finite() const;
 
  private:
   struct Leaf {
     Tensor gradient;
-    mutable std::optional<double> squares;  // their sum
+    mutable std::optional<double> squares;  // the sum of its squares
   };
   void measure(std::span<const uint64_t> ids) const;
   std::unordered_map<uint64_t, Leaf> by_id_;
@@ -118,8 +119,8 @@ class Tape {
   Var leaf(const Tensor& value, uint64_t id);
   /// Gradients of all leaves of a scalar. Consumes the recorded ops, also when it ends with an
   /// error: values recorded before are stale afterwards, and using one with this tape again is an
-  /// Error. So is an op whose gradients have not the number, shapes and dtypes of its inputs, and
-  /// one of whose kept tensors was changed since.
+  /// Error. It is also an Error if the gradients of an op have not the number, shapes and dtypes of
+  /// its inputs, or if a tensor that an op keeps was changed since.
   Gradients backward(const Var& loss);
   size_t size() const { return nodes_.size(); }
   /// What node i is: an op by its name, or "leaf".
@@ -155,8 +156,9 @@ class Tape {
   std::unordered_map<uint64_t, int64_t> leaves_;
 };
 
-/// Checks every result of every op for NaN and infinity while alive (slow: the trainer repeats a
-/// failed step under it to name the op and module where the value appeared).
+/// While an object lives, every result of every op is checked for NaN and infinity. This is slow:
+/// the trainer repeats a failed step in this way to name the op and module where the value
+/// appeared.
 class FiniteCheck {
  public:
   FiniteCheck();
@@ -175,7 +177,8 @@ void require_finite(const Tensor& t, const char* op, const std::string& path, co
 [[noreturn]] void too_many_inputs(const char* op, const char* letters, std::span<const Var> inputs);
 /// ShapeError unless all inputs have the same floating dtype.
 void require_floats(const char* op, const char* letters, Inputs inputs);
-/// Error naming the op that runs and both devices, unless all that are defined live on one.
+/// Error naming the op that runs and both devices, unless all tensors that are defined live on one
+/// device.
 void require_one_device(Inputs tensors);
 
 namespace detail {
@@ -226,8 +229,8 @@ Var call(const Op& op, std::initializer_list<Var> inputs) {
   return call(op, std::span<const Var>(inputs.begin(), inputs.size()));
 }
 
-/// Refuses what call() would refuse, for an op that is composed of others where a device lacks its
-/// kernel.
+/// Refuses what call() would refuse: for an op that is composed of other ops because a device lacks
+/// its kernel.
 template <class Op>
 void check_call(const Op& op, std::initializer_list<Var> inputs) {
   std::vector<Tensor> values;

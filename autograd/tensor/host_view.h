@@ -1,4 +1,5 @@
-// For devices whose kernels are host code: tests have one whose memory nobody else can read.
+// For devices whose kernels are host code. Tests have such a device, whose memory nobody but its
+// kernels can read.
 #pragma once
 
 #include <cstddef>
@@ -7,8 +8,9 @@
 
 namespace restage {
 
-/// While one lives, Tensor::data() gives the memory of `device`, `distance` bytes from where its
-/// tensors say they are, and refuses that of any other: a kernel runs, on all threads.
+/// While a HostView lives, on all threads, Tensor::data() gives the memory of `device`, `distance`
+/// bytes from the addresses of its tensors, and refuses the memory of any other device. It lives
+/// while a kernel runs.
 class HostView {
  public:
   HostView(Device device, std::ptrdiff_t distance);

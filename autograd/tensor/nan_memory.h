@@ -1,4 +1,4 @@
-// Makes results that a kernel leaves unwritten show; for tests.
+// Shows, in tests, results that a kernel leaves unwritten.
 #pragma once
 
 namespace restage {

@@ -12,7 +12,7 @@ enum class DType : uint8_t { f32, f64, i32, i64 };
 size_t size_of(DType type);
 const char* name_of(DType type);
 
-/// Where a tensor lives; `kind` 0 is the CPU, others come with their backend folder.
+/// Where a tensor lives. `kind` 0 is the CPU; the kinds of other devices are given by add_device().
 struct Device {
   uint8_t kind = 0;
   uint8_t index = 0;
@@ -46,7 +46,7 @@ class Shape {
   int rank_ = 0;
 };
 
-/// Shape of numpy-style broadcasting of a and b; rank 0 result flag via `ok`.
+/// The shape to which a and b are broadcast, as numpy does it; `ok` is false if they do not fit.
 Shape broadcast_shape(const Shape& a, const Shape& b, bool* ok);
 
 }  // namespace restage

@@ -13,7 +13,8 @@
 namespace restage {
 namespace {
 
-/// Whose memory data() may give now, and how far from where tensors say it is (HostView).
+/// The kind of device whose memory data() may give now, and the distance of that memory from the
+/// addresses of its tensors (HostView).
 std::atomic<uint8_t> viewed{0};
 std::atomic<std::ptrdiff_t> view_distance{0};
 
@@ -100,7 +101,8 @@ struct Storage {
 };
 
 Tensor Tensor::empty(const Shape& shape, DType type, Device device) {
-  constexpr int64_t kMost = int64_t{1} << 48;  // numbers: more is a mistake, and must not overflow
+  // Numbers: a larger size is a mistake, and must not overflow.
+  constexpr int64_t kMost = int64_t{1} << 48;
   int64_t n = 1;
   for (int i = 0; i < shape.rank(); ++i) {
     if (shape[i] < 0) throw ShapeError("tensor: negative size in " + shape.str());

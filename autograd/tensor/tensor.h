@@ -49,29 +49,30 @@ class Tensor {
   DType dtype() const { return dtype_; }
   Device device() const;
 
-  /// Host pointer; T must match the dtype. Error naming the op that runs where the host may not
-  /// read the device's memory: what it needs there it takes with cpu().
+  /// Host pointer; T must match the dtype. Error naming the op that runs if the host may not read
+  /// the memory of the device; cpu() brings the numbers to the host.
   template <class T>
   T* data();
   template <class T>
   const T* data() const;
-  /// The same whatever the dtype.
+  /// The host pointer, whatever the dtype.
   void* bytes();
   const void* bytes() const { return const_cast<Tensor*>(this)->bytes(); }
-  /// Where the memory begins on its device, for kernels of that device and to tell tensors apart.
+  /// The address on the tensor's device: for kernels of that device, and to tell tensors apart.
   const void* address() const { return base_; }
 
   /// How often the memory was written to, counted for all tensors that share it: what a tape keeps
-  /// for the backward pass must not change until then. launch() counts a kernel's output; who
-  /// writes through data() or raw() into memory that others may hold calls written() himself.
+  /// for the backward pass must not change until then. launch() counts writing the output of a
+  /// kernel. Whoever writes through data() into memory that other tensors may share must call
+  /// written().
   uint64_t version() const;
   void written();
 
-  Tensor reshape(const Shape& shape) const;     ///< same memory; one dimension may be -1
-  Tensor rows(int64_t from, int64_t to) const;  ///< leading-axis range, same memory
+  Tensor reshape(const Shape& shape) const;     ///< shares the memory; one dimension may be -1
+  Tensor rows(int64_t from, int64_t to) const;  ///< a range of the leading axis, shares the memory
   Tensor clone() const;
-  /// The same numbers on a device: the only way from one to another. The same handle if they are
-  /// there already; to the CPU it waits for them.
+  /// The same numbers on a device: the only way from one device to another. The same handle if the
+  /// numbers are there already. A copy to the CPU waits for the numbers.
   Tensor to(Device device) const;
   Tensor cpu() const { return to(Device{}); }
   Tensor cast(DType type) const;         ///< the same handle if the type is equal
@@ -90,7 +91,8 @@ class Tensor {
 };
 
 using NamedTensors = std::vector<std::pair<std::string, Tensor>>;
-/// Of a batch that names its tensors (each(f) calls f(name, tensor)): those that are not undefined.
+/// The tensors of a batch that are not undefined, with their names. (`each(f)` of a batch calls
+/// f(name, tensor) for all of its tensors.)
 template <class Batch>
 NamedTensors named_tensors(Batch batch) {
   NamedTensors out;

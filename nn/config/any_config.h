@@ -1,5 +1,5 @@
-// A config struct whose type is known at run time only: that of a model or a stage which YAML
-// names. It behaves as the struct does: visitors go through to the struct's own visit().
+// A config struct whose type is known at run time only: the config of a model or a stage that YAML
+// names. Visitors go through to the visit() of the struct that it holds.
 #pragma once
 
 #include <memory>

@@ -27,8 +27,8 @@ namespace restage {
 ConfigNode load_config_tree(const std::string& path,
                             const std::vector<std::string>& overrides = {});
 
-/// The same into a struct. What the file does not say keeps the value that `config` has. Returns
-/// the tree, for config_error().
+/// Reads a file as load_config_tree() does, into a struct. Keys that the file does not give keep
+/// the values of `config`. Returns the tree, for config_error().
 template <class C>
 ConfigNode load_config(const std::string& path, const std::vector<std::string>& overrides,
                        C& config) {

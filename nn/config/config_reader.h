@@ -6,10 +6,10 @@
 //     v.check("warmup", c.warmup <= c.steps, "is longer than the training", "lower it");
 //   }
 //
-// Reading, the resolved YAML and the key reference all follow from it. Values may be bool, int,
-// int64_t, uint64_t, float, double, std::string, enums with a config_names(), structs with a
-// visit(), and std::optional (YAML: null or none), std::vector and std::array of these. A visit may
-// look at values that it has read already, to decide which keys follow.
+// Reading, the resolved YAML and the key reference all follow from this function. Values may be
+// bool, int, int64_t, uint64_t, float, double, std::string, enums with a config_names(), structs
+// with a visit(), and std::optional (YAML: null or none), std::vector and std::array of these. A
+// visit may look at values that it has read already, to decide which keys follow.
 #pragma once
 
 #include <array>
@@ -45,7 +45,7 @@ inline constexpr bool is_list = ListOf<T>::value || FixedListOf<T>::value;
 template <class T>
 inline constexpr bool is_leaf = std::is_arithmetic_v<T> || std::is_same_v<T, std::string>;
 
-// Leaves (config_reader.cpp). `path` names the key in errors.
+// Reading and writing of single values (config_reader.cpp). `path` names the key in errors.
 void read_leaf(const ConfigNode& node, const std::string& path, const Rule& rule, bool& value);
 void read_leaf(const ConfigNode& node, const std::string& path, const Rule& rule, int& value);
 void read_leaf(const ConfigNode& node, const std::string& path, const Rule& rule, int64_t& value);
@@ -94,10 +94,10 @@ class ConfigReader {
     const ConfigNode* node = take(key, rule);
     if (node != nullptr) read(*node, full(key), rule, value);
   }
-  /// A condition on values read so far; the error stands at `key`.
+  /// Refuses values read so far unless `good`; the error stands at `key`.
   void check(const std::string& key, bool good, const std::string& wrong,
              const std::string& fix) const;
-  /// Fails on keys that nobody asked for, then on required ones that are missing.
+  /// Refuses keys that visit() did not ask for, then required keys that are missing.
   void finish() const;
 
  private:

@@ -143,7 +143,8 @@ size_t ConfigNode::size() const {
 
 void merge_config(ConfigNode& base, ConfigNode over) {
   using Kind = ConfigNode::Kind;
-  if (base.kind == Kind::map && over.kind == Kind::null) return;  // `section:` with nothing below
+  // `section:` with nothing below it changes nothing.
+  if (base.kind == Kind::map && over.kind == Kind::null) return;
   if (base.kind != Kind::map || over.kind != Kind::map) {
     std::string key = std::move(base.key);
     base = std::move(over);
@@ -187,7 +188,8 @@ void apply_override(ConfigNode& root, const std::string& override_text) {
     if (node->kind == ConfigNode::Kind::list)
       throw InputError(place.source, "the list has no item " + in_quotes(part),
                        "give a number from 0 to " + std::to_string(node->children.size() - 1));
-    if (node->kind != ConfigNode::Kind::map) {  // a scalar: the reader will say what belongs there
+    // A scalar has no children; the reader will say what belongs there.
+    if (node->kind != ConfigNode::Kind::map) {
       node->kind = ConfigNode::Kind::map;
       node->place = place;
     }

@@ -1,5 +1,5 @@
 // The tree of values behind a configuration: what the YAML files and the command line say, each
-// value with the file, line and column that it comes from. What keys there are and what they mean
+// value with the file, line and column that it comes from. Which keys there are and what they mean
 // is said by the config structs (nn/config/config_reader.h).
 #pragma once
 
@@ -38,7 +38,7 @@ struct ConfigNode {
 /// Limits of one configuration, all files and aliases together.
 inline constexpr size_t kConfigMaxBytes = 1 << 20, kConfigMaxNodes = 100'000;
 inline constexpr int kConfigMaxDepth = 32, kConfigMaxFiles = 64;
-/// Keys of one section: they are looked for one by one.
+/// Limit of the keys of one section, since keys are looked for one by one.
 inline constexpr size_t kConfigMaxKeys = 1000;
 
 /// Parses one YAML document whose root must be a map (`any_root`: anything). Errors (InputError):
@@ -55,8 +55,8 @@ void apply_override(ConfigNode& root, const std::string& override_text);
 /// Value at a dotted path (`stages.0.steps`), or nullptr.
 const ConfigNode* find_config(const ConfigNode& root, std::string_view path);
 
-/// An error about the value at `path`, at the place where it was written; for checks that come
-/// after reading (a file that a key names does not exist).
+/// An error about the value at `path`, with the place where the value was written; for checks after
+/// reading (such as whether a file that a key names exists).
 InputError config_error(const ConfigNode& root, std::string_view path, const std::string& wrong,
                         const std::string& fix);
 

@@ -1,4 +1,4 @@
-// YAML text to a ConfigNode tree. yaml-cpp's events are used instead of its nodes because these
+// YAML text to a ConfigNode tree. yaml-cpp's events are used instead of its nodes because the nodes
 // forget duplicate keys and expand aliases without a bound.
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/exceptions.h>
@@ -22,7 +22,7 @@ std::string printable(std::string text) {
   return text;
 }
 
-/// yaml-cpp lets any bytes pass; what is written from them (JSON) does not.
+/// yaml-cpp lets any bytes pass, but JSON, which is written from them, must be UTF-8.
 bool is_utf8(std::string_view text) {
   while (!text.empty()) {
     const auto lead = static_cast<unsigned char>(text[0]);
@@ -62,7 +62,7 @@ class TreeBuilder : public YAML::EventHandler {
     if (!is_utf8(value)) fail(mark, "holds bytes that are no text in UTF-8", "save it as UTF-8");
     ConfigNode node = make(mark, ConfigNode::Kind::scalar);
     node.text = value;
-    node.quoted = tag == "!";  // yaml-cpp's way of saying that it stood in quotes
+    node.quoted = tag == "!";  // yaml-cpp's way of saying that the scalar stood in quotes
     add(mark, anchor, std::move(node));
   }
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
@@ -165,7 +165,7 @@ class TreeBuilder : public YAML::EventHandler {
     map.key = std::move(node.text);
     map.key_place = place(mark);
   }
-  /// A value is complete: it goes to its parent, and a copy to its anchor.
+  /// Puts a value that is complete into its parent, and a copy of it under its anchor.
   void finish(YAML::anchor_t anchor, ConfigNode node) {
     if (anchor != 0) {
       nodes_ += node.size();

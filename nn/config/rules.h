@@ -10,7 +10,7 @@
 
 namespace restage {
 
-/// What a value must fulfil; for lists, each of their items.
+/// What a value must fulfil; of a list, what each of its items must fulfil.
 struct Rule {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
@@ -46,7 +46,7 @@ inline Rule added(std::string fixed_before, Rule rule = {}) {
 template <class E>
 using EnumNames = std::vector<std::pair<std::string, E>>;
 
-/// More than any network here needs; a larger number in a file is a mistake.
+/// Limits of sizes in files: no network here needs more, so a larger number is a mistake.
 inline constexpr int64_t kMostPoints = 1 << 16, kMostWidth = 1 << 14;
 
 }  // namespace restage

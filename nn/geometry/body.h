@@ -25,7 +25,7 @@ struct Mesh {
   std::vector<Triangle> faces;
 };
 
-/// How a surface gives way to a pose before it is skinned: SMPL's pose blend shapes (Loper et al.,
+/// How a surface changes with a pose before it is skinned: SMPL's pose blend shapes (Loper et al.,
 /// SMPL, 2015, eq. 9), the same for everybody of a model.
 struct PoseBlendShapes {
   static constexpr int kFeatures = 9 * (kJoints - 1);

@@ -7,12 +7,13 @@
 namespace restage {
 
 /// y = act(W x + b) over the last axis; weight [out, in]. `tail` trailing 1-axes are kept in the
-/// weight's shape, so that PyTorch's 1x1 convolutions ([out, in, 1] or [out, in, 1, 1]) are this
-/// layer.
+/// weight's shape, so that this layer takes the weights of PyTorch's 1x1 convolutions ([out, in, 1]
+/// or [out, in, 1, 1]).
 struct Linear : Module {
   Linear(int64_t in, int64_t out, const Init& init, bool with_bias = true, int tail = 0);
   Var operator()(Context& ctx, const Var& x, Activation activation = Activation::none) const;
-  /// Weights to a hundredth, biases to zero: an answer near none before training.
+  /// Makes weights a hundredth of what they were and biases zero, so that the layer's answer is
+  /// near zero before training.
   void start_small();
   void visit(Fields& f) override;
   const char* kind() const override {

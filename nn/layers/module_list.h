@@ -17,7 +17,8 @@ struct ModuleList : Module {
   M& operator[](size_t i) { return *items_[i]; }
   const M& operator[](size_t i) const { return *items_[i]; }
   size_t size() const { return items_.size(); }
-  /// Distance of neighbouring names: 2 for a Sequential whose every second item is an activation.
+  /// The step from one name to the next: 2 where every second item of PyTorch's Sequential is an
+  /// activation.
   int step = 1;
   void visit(Fields& f) override {
     for (size_t i = 0; i < items_.size(); ++i)

@@ -6,13 +6,13 @@
 
 namespace restage {
 
-/// Per channel (last axis): batch statistics and running averages in training, running averages in
-/// evaluation. PyTorch's names; num_batches_tracked is not kept.
+/// Batch norm per channel (last axis): normalises by the statistics of the batch in training, by
+/// running averages in evaluation. PyTorch's names; num_batches_tracked is not kept.
 struct BatchNormLayer : Module {
   BatchNormLayer(int64_t channels, const Init& init);
   Var operator()(Context& ctx, const Var& x);
-  /// max over v of act(this(map(x))), x [n, v, i] -> [n, o], in training as one op; `map` has a
-  /// bias.
+  /// max over v of act(this(map(x))), x [n, v, i] -> [n, o], in training as one op. `map` must have
+  /// a bias.
   Var pooled(Context& ctx, const Linear& map, const Var& x, Activation activation);
   void visit(Fields& f) override;
   const char* kind() const override { return "BatchNorm"; }
@@ -25,7 +25,7 @@ struct BatchNormLayer : Module {
   void update(const BatchStatistics& batch);
 };
 
-/// Per row over the last axis.
+/// Layer norm of each row over the last axis.
 struct LayerNormLayer : Module {
   LayerNormLayer(int64_t channels, const Init& init);
   Var operator()(Context& ctx, const Var& x) const;

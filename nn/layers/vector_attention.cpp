@@ -12,7 +12,7 @@
 namespace restage {
 namespace {
 
-/// Pairs of points in a cloud from which folding the weights costs less than it saves.
+/// From so many pairs of points in a cloud on, folding the weights costs less than it saves.
 constexpr int64_t kFoldedPairs = 4096;
 
 }  // namespace

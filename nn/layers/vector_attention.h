@@ -9,19 +9,21 @@ namespace restage {
 /// Vector attention over the k nearest neighbours; c channels in and out, d inside.
 struct VectorAttention : Module {
   VectorAttention(int64_t c, int64_t d, int64_t k, const Init& init);
-  /// xyz [n, v, 3], f [n, v, c] -> [n, v, c]. Neighbourhoods are constants, offsets are not.
+  /// xyz [n, v, 3], f [n, v, c] -> [n, v, c]. Who is a neighbour of whom has no gradient; the
+  /// offsets between neighbours have one.
   Var operator()(Context& ctx, const Var& xyz, const Var& f) const;
   void visit(Fields& f) override;
   const char* kind() const override { return "VectorAttention"; }
   Linear fc1, fc2;
   ReluChain fc_delta, fc_gamma;
   Linear w_qs, w_ks, w_vs;
-  /// Products over pairs in full where many pairs allow to leave some out (the result is the same
-  /// up to rounding): for measurements.
+  /// For measurements: computes products over pairs in full, also where many pairs would allow to
+  /// leave some out. The result is the same up to rounding.
   bool dense = false;
 
  private:
-  /// The neighbours' weighted sum, as the paper writes it, and for many pairs with folded weights.
+  /// The weighted sum over neighbours: as the paper writes it, and for many pairs with folded
+  /// weights.
   Var plain(Context& ctx, const Var& xyz, const Var& f, const Tensor& index) const;
   Var folded(Context& ctx, const Var& xyz, const Var& f, const Tensor& index) const;
 

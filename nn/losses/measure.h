@@ -1,4 +1,4 @@
-// How far two things are apart.
+// How errors are measured: as squares or as distances.
 #pragma once
 
 #include "autograd/tape/tape.h"
@@ -9,8 +9,8 @@ namespace restage {
 /// much as one of 5 mm and not a hundred times (docs/method.md, "Past SMRM").
 enum class Measure { mse, distance };
 
-/// Of differences x [n, ...], whose last axis holds `width` numbers that belong together, or
-/// several such groups: their squares [n, ...], or the length of each group [n, groups].
+/// Errors of differences x [n, ...], whose last axis holds one or several groups of `width` numbers
+/// that belong together. mse: the squares [n, ...]; distance: the length of each group [n, groups].
 Var errors(const Var& x, Measure measure, int64_t width = 3);
 
 /// Mean distance per point, metres (a number to report, not to differentiate).

@@ -31,16 +31,17 @@ Var nothing(const MotionBatch& b) {
   return Var(Tensor::zeros({}, b.joints.dtype(), b.joints.value.device()));
 }
 
-/// Cross-entropy of which feet stand; 0 where the network does not say or nobody knows.
+/// Cross-entropy of which feet stand; 0 if the network does not say it or the batch does not know
+/// it.
 Var contact_loss(const MotionOutput& out, const MotionBatch& b) {
   if (!out.standing.value.defined() || !b.standing.defined()) return nothing(b);
   return mean_all(softplus(out.standing) - out.standing * Var(b.standing));
 }
 
-/// v1's smoothness: a path's change of velocity.
+/// The first version's smoothness: how much the velocity of a path changes.
 Var path_loss(const Var& trans) { return mean_all(square(differences(trans))); }
 
-/// What is true of the first frames.
+/// The first frames of a batch.
 MotionBatch first_frames(MotionBatch b, int64_t frames) {
   for (Var* x : {&b.joints, &b.true_trans, &b.sixd}) *x = slice(*x, 1, 0, frames);
   if (b.standing.defined()) b.standing = slice(Var(b.standing), 1, 0, frames).value;

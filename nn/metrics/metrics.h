@@ -101,7 +101,7 @@ std::vector<double> distances(const Track& pred, const Track& truth, const Align
 std::vector<double> mean_distance_by_point(const Track& pred, const Track& truth,
                                            const Alignment& how = {});
 /// Share of the true points that lie within `radius` (frames x points, metres) of the predicted
-/// ones: what a claim to hold nine in ten is held against.
+/// ones: to check regions that are said to hold nine points in ten.
 Value share_within(const Track& pred, const Track& truth, std::span<const double> radius);
 /// Mean difference of second differences, metres per frame squared; needs 3 frames.
 Value acceleration_error(const Track& pred, const Track& truth, const Alignment& how = {});

@@ -9,9 +9,10 @@ namespace restage {
 namespace {
 
 constexpr double kNearest = 8;     // how much the nearest bone is preferred at the start
-constexpr double kSmooth = 1e-12;  // of lengths, square metres
+constexpr double kSmooth = 1e-12;  // epsilon of smooth_length(), square metres
 
-/// Of the bone that leads to a leaf, how much follows behind it: skull, hand, toes.
+/// How far the body goes on behind a leaf (skull, hand, toes), as a part of the bone that leads to
+/// the leaf.
 double behind_leaf(int joint) {
   constexpr int kHead = 15, kLeftWrist = 20, kRightWrist = 21;
   if (joint == kHead) return 1.5;
@@ -50,7 +51,8 @@ Var bone_distances(const Var& points, const Var& joints, const Var& bones) {
   const Var along = reshape(bones, {n, 1, kJoints, 3});
   const Var length2 = add_scalar(reshape(sum(square(bones), -1), {n, 1, kJoints}), kSmooth);
   const Var share = sum(way * along, -1) / length2;
-  const Var inside = relu(share) - relu(add_scalar(share, -1));  // 0 to 1: on the bone
+  // Where the nearest point of the bone is: 0 at its beginning, 1 at its end.
+  const Var inside = relu(share) - relu(add_scalar(share, -1));
   return smooth_length(way - reshape(inside, {n, v, kJoints, 1}) * along, kSmooth);
 }
 

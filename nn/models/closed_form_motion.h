@@ -1,6 +1,6 @@
 // `motion/closed_form`: no network. The rotations are the closed form of the joints as they come
-// (nn/geometry/closed_form.h), the path that of A times the length of the legs: what every learned
-// motion network has to beat, as a model like any other. It has nothing to learn
+// (nn/geometry/closed_form.h), the path is the path of A times the ratio of the legs' lengths.
+// Every learned motion network has to beat this model. It has nothing to learn
 // (motion.optimiser.steps=0).
 #pragma once
 

@@ -38,7 +38,7 @@ Var Mlp3::operator()(Context& ctx, const Var& x) const {
 }
 
 // W [vector; p] + b = [W_p, (W_c vectors + b)] [p; one], with `one` the unit vector of the sample:
-// a product of n + 3 columns, whose gradient gives that of the vectors' part as well.
+// a product of n + 3 columns, whose gradient gives the gradient of the vectors' part as well.
 Var Mlp3::at_points(Context& ctx, const Var& vector, const Var& points) const {
   const int64_t n = points.size(0), v = points.size(1), c = vector.size(1);
   if (n > c) return (*this)(ctx, join_points(vector, points));

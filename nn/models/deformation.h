@@ -24,10 +24,10 @@ void visit(V& v, MlpConfig& c) {
 struct Mlp3 : Module {
   Mlp3(int64_t in, int64_t out, const MlpConfig& config, bool softmax, const Init& init);
   Var operator()(Context& ctx, const Var& x) const;
-  /// The same for join_points(vector, points): what a sample's vector [n, c] gives the first layer
-  /// is computed once and not for each of its points [n, v, 3].
+  /// The network of join_points(vector, points). What the vector [n, c] of a sample gives to the
+  /// first layer is computed once and not for each of the points [n, v, 3].
   Var at_points(Context& ctx, const Var& vector, const Var& points) const;
-  /// The same with given 0/1 dropout masks.
+  /// The network of x with given dropout masks of 0 and 1.
   Var with_masks(Context& ctx, const Var& x, const Tensor& mask1, const Tensor& mask2) const;
   void visit(Fields& f) override;
   const char* kind() const override { return "MLP"; }
@@ -43,7 +43,7 @@ struct Mlp3 : Module {
   Var from_first(Context& ctx, const Var& h1) const;
 };
 
-/// How a target's surface follows its joints; the role `deformation.weights`.
+/// How the surface of a target follows its joints; the role `deformation.weights`.
 struct DeformationModel : Module {
   /// rest joints [n, 22, 3] and points [n, v, 3], both relative to the rest pelvis, metres ->
   /// skinning weights [n, v, 22], each point's sum 1.

@@ -7,7 +7,8 @@
 namespace restage {
 namespace {
 
-constexpr int64_t kNknSteps = 59;  // between 60 frames; the last layer then gives one number
+// Steps between 60 frames, of which the last layer makes one number.
+constexpr int64_t kNknSteps = 59;
 
 }  // namespace
 

@@ -13,7 +13,7 @@ namespace restage {
 struct DiscriminatorConfig {
   int64_t in = 69, condition = 63;
   std::array<int64_t, 4> widths = {32, 64, 128, 256};
-  bool nkn_head = false;  ///< NKN's last layer for windows of exactly 60 frames
+  bool nkn_head = false;  ///< the last layer of NKN, for windows of exactly 60 frames
 };
 
 template <class V>

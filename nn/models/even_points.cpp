@@ -5,8 +5,8 @@
 namespace restage {
 namespace {
 
-/// Where a cell of 1 cm lies on the Z curve (Morton 1966): the bits of its three numbers in turn.
-/// `p`: metres from the cloud's lowest corner.
+/// Where the cell of 1 cm that holds `p` lies on the Z curve (Morton 1966): the bits of the cell's
+/// three numbers in turn. `p`: metres from the cloud's lowest corner.
 uint64_t along_curve(const Point& p) {
   constexpr float kCells = 100;  // a metre
   constexpr int kBits = 21;

@@ -6,7 +6,7 @@
 namespace restage {
 namespace {
 
-constexpr double kLost = 1;  // metres that nobody moves from one frame to the next
+constexpr double kLost = 1;  // metres: nobody moves so far from one frame to the next
 
 bool mirrored(size_t view) { return view % 2 == 1; }
 
@@ -70,7 +70,8 @@ SeenJoints JointExtractor::operator()(const Points& cloud, const std::string& so
   return out;
 }
 
-/// As each view has it: turned, mirrored, about its centre.
+/// The joints of the frame before in the frame of each view: turned, mirrored, relative to the
+/// view's centre.
 Tensor JointExtractor::past(const SeenJoints& before) const {
   Vec3 middle = Vec3::Zero();
   for (const Vec3& joint : before.joints) middle += joint / kJoints;
@@ -89,7 +90,7 @@ Tensor JointExtractor::past(const SeenJoints& before) const {
   return out;
 }
 
-/// Every view's answer, turned and mirrored back.
+/// Reads the answer to every view, turned and mirrored back.
 void JointExtractor::read(const SkeletonAnswer& answer) {
   const Tensor &joints = answer.joints.value, &turns = answer.turns.value,
                &uncertainty = answer.uncertainty.value;

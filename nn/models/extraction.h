@@ -14,14 +14,14 @@ inline constexpr size_t kLeastDistinctPoints = 64;
 
 /// Headings over which an extractor's views of a cloud are spread, radians.
 inline constexpr double kAllAround = 6.283185307179586;
-inline constexpr double kRestPoses = 0.7;  ///< of a target, which faces +z
+inline constexpr double kRestPoses = 0.7;  ///< the same for a target, which faces +z
 
 /// The 22 joints of clouds. Keeps its working memory between clouds.
 class JointExtractor {
  public:
-  /// `samples` > 1 takes several views of a cloud, each of other points of it, turned about y by
-  /// another part of `around`, every second one mirrored. An extractor errs differently on each;
-  /// their answers are combined() (docs/method.md, "Views").
+  /// `samples` > 1 takes several views of a cloud. Each view has other points of the cloud and is
+  /// turned about y by another part of `around`; every second view is mirrored. An extractor errs
+  /// differently on each view; the answers are combined() (docs/method.md, "Views").
   explicit JointExtractor(SkeletonModel& model, int samples = 1, double around = kAllAround);
   /// Metres, in the cloud's frame. Points are sorted first and exact repeats left out, so neither
   /// their order in a file nor pixels without depth matter to the last bit. `key` says where the
@@ -45,7 +45,7 @@ class JointExtractor {
   Points chosen_;
   std::vector<Vec3> centres_;
   std::vector<View> views_;
-  std::vector<double> values_;  // one coordinate of each
+  std::vector<double> values_;  // room for one coordinate of each view
 };
 
 /// The joints of one cloud.

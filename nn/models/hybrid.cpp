@@ -14,19 +14,22 @@
 namespace restage {
 namespace {
 
-constexpr double kUsualUncertainty = 0.005;  // metres; also where nobody says
-constexpr double kPath = 0.3;    // what an answer of 1 stands for in deviations of the path
-constexpr double kBlind = 2;     // times as far for rotations where none are read from the surface
+// Metres; also the uncertainty of joints for which no extractor states one.
+constexpr double kUsualUncertainty = 0.005;
+constexpr double kPath = 0.3;  // an answer of 1 changes the path by so many deviations
+// Rotations reach so many times as far where none are read from the surface.
+constexpr double kBlind = 2;
 constexpr double kTrusting = 4;  // log odds of an untrained gate: what is seen counts for 98 %
 constexpr int64_t kEnds = std::ssize(kLeaves), kGates = 2 * kJoints + kEnds + 1;
-constexpr int64_t kPathAt = 4 * kJoints + 6 * kEnds;  // in what is filtered
+// Where the path begins in the numbers that are filtered.
+constexpr int64_t kPathAt = 4 * kJoints + 6 * kEnds;
 constexpr int64_t kFooting = 16, kFootingHidden = 32;
 constexpr double kTrend = -2;  // log odds of an untrained trend's gain: 12 %
 
 /// Holt's filter with gains that change, over x, g, h [n, t, m]:
 ///   v_t = h_t (x_t - x_(t-1)) + (1 - h_t) v_(t-1),  y_t = g_t x_t + (1 - g_t) (y_(t-1) + v_t);
-/// before the first frame y is x and v none. What moves steadily is followed without delay.
-/// `state`, three of [n, m], is read and replaced: x, v and y of the last frame.
+/// before the first frame y is x and v none. A steady movement is followed without delay. `state`,
+/// three tensors [n, m], is read and replaced: x, v and y of the last frame.
 Var filtered(const Var& x, const Var& g, const Var& h, Var* state) {
   const int64_t n = x.size(0), t = x.size(1), m = x.size(2);
   const auto frame = [&](const Var& of, int64_t i) {
@@ -45,8 +48,8 @@ Var filtered(const Var& x, const Var& g, const Var& h, Var* state) {
   return y;
 }
 
-/// x [n, t, m] so many frames later; before the first frame it stood still. `state`, those frames,
-/// is read and replaced.
+/// x [n, t, m] delayed by `frames` frames; before the first frame x stood still. `state`, the last
+/// `frames` frames, is read and replaced.
 Var delayed(const Var& x, int64_t frames, Var* state) {
   if (frames == 0) return x;
   const int64_t n = x.size(0), t = x.size(1), m = x.size(2);
@@ -56,8 +59,8 @@ Var delayed(const Var& x, int64_t frames, Var* state) {
   return slice(all, 1, 0, t);
 }
 
-/// Gates of 22 joints, 22 twists, the leaves and the path [n, t, 22 + 22 + 5 + 1] for each of their
-/// numbers.
+/// Repeats the gates of 22 joints, 22 twists, the leaves and the path [n, t, 22 + 22 + 5 + 1] for
+/// each number of what they belong to.
 Var for_each_number(const Var& gates) {
   const int64_t n = gates.size(0), t = gates.size(1);
   const auto repeated = [&](int64_t from, int64_t count, int64_t times) {
@@ -75,7 +78,7 @@ Var each_thrice(const Var& x) {
   return reshape(expand(reshape(x, {n, t, kJoints, 1}), {n, t, kJoints, 3}), {n, t, 3 * kJoints});
 }
 
-/// [n, t, 22] -> [n, t, 30]: that of each leaf, six times.
+/// [n, t, 22] -> [n, t, 30]: the number of each leaf, six times.
 Var of_leaves(const Var& x) {
   const int64_t n = x.size(0), t = x.size(1);
   const auto one = [&](int64_t j) { return slice(x, 2, j, j + 1); };

@@ -44,9 +44,9 @@ void visit(V& v, HybridConfig& c) {
   v("layers", c.layers, "of the encoder and of the decoder", added("2", between(1, 16)));
 }
 
-/// The state is {encoder, decoder}, both [layers, n, hidden], the filter's three, [n, 121], and the
-/// last `latency` frames of what is filtered; with `contact` also the footing's, and
-/// the joints of the last frame.
+/// The state is {encoder, decoder}, both [layers, n, hidden], the three states of the filter, [n,
+/// 121], and the last `latency` frames of what is filtered; with `contact` also the state of
+/// `footing` and the joints of the last frame.
 struct Hybrid final : MotionModel {
   using Config = HybridConfig;
   Hybrid(const HybridConfig& c, const Init& init);
@@ -58,8 +58,9 @@ struct Hybrid final : MotionModel {
 
   HybridConfig config;
   GruLayer enc, dec;
-  Linear gate, trend, correction, twist, leaves, path;  ///< all near none at the start
-  std::optional<GruLayer> footing;                      ///< reads how the feet move in the world
+  /// Before training the answers of all of these are near zero.
+  Linear gate, trend, correction, twist, leaves, path;
+  std::optional<GruLayer> footing;  ///< reads how the feet move in the world; with config.contact
   std::optional<Linear> contact;
   MotionStatistics units;  ///< all but `sixd`
 

@@ -14,7 +14,7 @@ std::span<const SwingJoint> joint_swings() {
     std::vector<SwingJoint> out(kJoints);
     for (int j = kJoints - 1; j >= 0; --j) {
       out[j].parent = kParents[j];
-      if (kParents[j] >= 0) out[kParents[j]].child = j;  // in the end the first one
+      if (kParents[j] >= 0) out[kParents[j]].child = j;  // the first child stays in the end
     }
     out[0] = {-1, 3, 1, 2};    // spine1, left hip, right hip
     out[9] = {6, 12, 13, 14};  // spine3: neck, left collar, right collar

@@ -1,4 +1,4 @@
-// What every motion network is: joints and translation of A in, the motion of B out (spec 3.1).
+// The interface of motion networks: joints and translation of A in, the motion of B out (spec 3.1).
 #pragma once
 
 #include <vector>
@@ -9,12 +9,12 @@
 
 namespace restage {
 
-/// What a network carries from frame to frame, in a form of its own; empty at the start.
+/// What a network carries from frame to frame; the form is the network's own. Empty at the start.
 using MotionState = std::vector<Var>;
 
-/// What is seen of A, and who is to perform it. No network needs the last three, which may be
-/// undefined: what an extractor may say beside the joints, and how the directions in which all is
-/// given turn with A's heading.
+/// What is seen of A, and who is to perform it. The last three may be undefined, and no network
+/// needs them: they are what an extractor may say beside the joints, and how the axes of the input
+/// turn with A's heading.
 struct MotionInput {
   Var joints;            ///< [n, t, 22, 3] of A relative to its root
   Var trans;             ///< [n, t, 3], in the configured meaning
@@ -45,19 +45,19 @@ struct MotionStatistics {
 struct MotionModel : Module {
   /// `state` is read and replaced.
   virtual MotionOutput forward(Context& ctx, const MotionInput& in, MotionState* state) const = 0;
-  /// How many frames an answer is later than what it answers: answer t is of frame t - latency().
+  /// By how many frames an answer is late: answer t is the motion of frame t - latency().
   virtual int64_t latency() const { return 0; }
   /// Called once before a training; a network that takes numbers as they are ignores it.
   virtual void standardise(const MotionStatistics& statistics) = 0;
 };
 
-/// What is seen, on a device.
+/// The input on a device.
 MotionInput moved(MotionInput in, Device device);
 /// The answer as constants in the host's memory.
 MotionOutput on_host(const MotionOutput& out);
 /// Frames [from, to) of an answer.
 MotionOutput frames_of(const MotionOutput& out, int64_t from, int64_t to);
-/// x in units of the training set's deviation from its mean.
+/// x relative to the mean of the training set, in units of its deviation.
 Var in_units(const Var& x, const MotionStatistics::Columns& of);
 /// rest [n, 22, 3] -> [n * frames, 22, 3].
 Var rest_of_each_frame(const Var& rest, int64_t frames);
@@ -69,7 +69,7 @@ void put_pose(const Var& local, const Var& rest_rows, int64_t n, MotionOutput* o
 /// Parents of the 22 joints as the kinematics op takes them.
 inline std::span<const int> joint_parents() { return kParents; }
 
-/// How each of them is turned by the op swing_twist: as in the closed form
+/// How the op swing_twist turns each of the 22 joints: as in the closed form
 /// (nn/geometry/closed_form.h).
 std::span<const SwingJoint> joint_swings();
 

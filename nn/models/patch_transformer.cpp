@@ -11,8 +11,8 @@ namespace {
 
 constexpr double kUsualError = -4;  // log of 2 cm: where an untrained uncertainty begins
 
-/// Per centre [n, t, 3]: where each remembered joint lies from it, by the trust in it, and that
-/// trust. [n, t, 88], constant; all zero where nothing is remembered.
+/// For each centre [n, t, 3]: where each remembered joint lies relative to the centre, times the
+/// trust in that joint, and the trust. [n, t, 88], constant; all zero if nothing is remembered.
 Tensor seen_from(const Tensor& centres_there, const Tensor& past_there, double scale) {
   const int64_t n = centres_there.size(0), t = centres_there.size(1), w = 4 * kJoints;
   const Device device = centres_there.device();

@@ -54,16 +54,17 @@ struct PatchTransformer : SkeletonModel {
   void visit(Fields& f) override;
   const char* kind() const override { return "PatchTransformer"; }
   PatchTransformerConfig config;
-  ReluChain point, position;  ///< of each neighbour; of each centre
-  Linear mix;                 ///< after the maximum over the neighbours
+  ReluChain point, position;  ///< layers of each neighbour; layers of each centre
+  Linear mix;                 ///< applied to the maximum over the neighbours
   ModuleList<EncoderLayer> layers;
   LayerNormLayer norm;
   Linear vote;     ///< 22 logits and 22 offsets per token
   Linear segment;  ///< which joint moves the centre (used by the training loss only)
   std::optional<Linear> orientation;  ///< 22 logits and 22 x 6 numbers per token
-  std::optional<Linear> uncertainty;  ///< 22 per token, weighted as the votes are
-  std::optional<ReluChain> memory;    ///< of where a centre lies from each remembered joint
-  ModuleList<SecondLook> again;       ///< looks - 1
+  std::optional<Linear> uncertainty;  ///< 22 numbers per token, weighted as the votes are
+  /// Layers of where a centre lies relative to each remembered joint.
+  std::optional<ReluChain> memory;
+  ModuleList<SecondLook> again;  ///< looks - 1
 };
 
 }  // namespace restage

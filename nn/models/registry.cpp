@@ -27,8 +27,8 @@ ModelType model(const char* name, const char* role, const char* help,
           }};
 }
 
-/// The paper's network takes numbers as they are; so far none of ours has trained well that way
-/// (docs/method.md).
+/// The paper's network takes numbers as they are, which is the default of its sizes. So far no
+/// training of ours went well that way (docs/method.md), so trainings start with other sizes.
 ModelType smrm(const char* name, const char* help, RotationForm rotation) {
   SmrmConfig config;
   config.rotation = rotation;

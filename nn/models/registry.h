@@ -13,24 +13,25 @@ namespace restage {
 
 struct ModelType {
   std::string name, help;
-  std::string role;    ///< what it is used as (nn/weights/bundle.h)
+  std::string role;    ///< the role that it fills in a system (nn/weights/bundle.h)
   AnyConfig config;    ///< its sizes, at their defaults
-  AnyConfig training;  ///< the same, as a training starts that does not say otherwise
+  AnyConfig training;  ///< sizes with which a training starts that does not name any
   std::unique_ptr<Module> (*make)(const AnyConfig& config, const Init& init);
 };
 
 const std::vector<ModelType>& models();
-/// InputError with the nearest known name if there is no such model.
+/// The model of this name. InputError with the nearest known name if there is none.
 const ModelType& model_type(const std::string& name);
-/// `config` as model_type(name).config, perhaps changed.
+/// Builds a network. `config` is of the type of model_type(name).config.
 std::unique_ptr<Module> make_model(const std::string& name, const AnyConfig& config,
                                    const Init& init);
-/// The sizes of a model with some changed, each "name=value". InputError if it has no such size.
+/// The default sizes of a model, changed by `sizes`, each "name=value". InputError if the model has
+/// no such size.
 AnyConfig model_config(const std::string& name, const std::vector<std::string>& sizes = {});
 /// The names of the models of a role.
 std::vector<std::string> models_of_role(const std::string& role);
 
-/// A model as what its role promises (SkeletonModel, MotionModel ...).
+/// Builds a network as the interface of its role (SkeletonModel, MotionModel ...).
 template <class M>
 std::shared_ptr<M> make_model_as(const std::string& name, const AnyConfig& config,
                                  const Init& init) {

@@ -14,9 +14,9 @@ namespace {
 constexpr int64_t kNeighbours = 32, kLayers = 2;
 // Bring lengths in metres to order one, and outputs of order one to metres.
 constexpr double kNear = 10, kFar = 2, kCorrection = 0.05;
-constexpr int64_t kPose = 3 + 1 + 1;  // numbers for each joint, seen from one
+constexpr int64_t kPose = 3 + 1 + 1;  // numbers that one joint has for each of the 22
 
-/// Axes of every joint as matrices [n * 22, 3, 3] whose columns they are; the cloud's own where
+/// The axes of every joint as the columns of matrices [n * 22, 3, 3]; the axes of the cloud if
 /// rotations are not known.
 Tensor axes(const SkeletonAnswer& first) {
   const int64_t n = first.joints.size(0);
@@ -78,14 +78,16 @@ SkeletonAnswer SecondLook::operator()(Context& ctx, const Var& cloud,
   Var x = mix(ctx, relu(max(point(ctx, near), 2))) + pose(ctx, pose_around(first, own));
   for (size_t i = 0; i < layers.size(); ++i) x = layers[i](ctx, x);
   x = norm(ctx, x);
-  // One row for the place and one for each column, in the joint's axes; transposed, they turn back.
+  // One row for the place and one for each column of the rotation, in the joint's axes; the
+  // transposed axes turn them back.
   const Var correction = reshape(
       matmul(reshape(correct(ctx, x), {rows, 3, 3}), Var(own), false, true), {n, kJoints, 9});
   SkeletonAnswer out;
   out.joints = Var(joints) + scale(slice(correction, 2, 0, 3), kCorrection);
   if (first.turns.value.defined())
     out.turns = matrix_to_sixd(Var(own.reshape({n, kJoints, 3, 3}))) + slice(correction, 2, 3, 9);
-  if (first.uncertainty.value.defined())  // learns alone, as the first look's does
+  // The uncertainty learns apart from the rest, as in the first look.
+  if (first.uncertainty.value.defined())
     out.uncertainty =
         Var(first.uncertainty.value) + reshape(unsure(ctx, Var(x.value)), {n, kJoints});
   return out;

@@ -1,4 +1,4 @@
-// What every skeleton extractor is: a cloud in, 22 joints out (spec 2.1).
+// The interface of skeleton extractors: a cloud in, 22 joints out (spec 2.1).
 #pragma once
 
 #include <vector>
@@ -20,7 +20,7 @@ struct SkeletonAnswer {
 SkeletonAnswer on_host(const SkeletonAnswer& answer);
 
 struct SkeletonOutput : SkeletonAnswer {
-  /// What a model that looks again believed before, look by look; each has its own training loss.
+  /// The earlier answers of a model that looks again, look by look; each has its own training loss.
   std::vector<SkeletonAnswer> before;
   // What a voting head offers to its training loss; undefined for the other heads.
   Var votes;         ///< [n, c, 22, 3]: where each centre believes each joint to be
@@ -38,7 +38,7 @@ struct SkeletonInput {
                 ///< the trust in each (trust_of()); undefined where no frame came before
 };
 
-/// |error| / s that nine in ten stay below, of SkeletonOutput's uncertainty s.
+/// Nine errors in ten are less than this times s, the uncertainty in SkeletonAnswer.
 inline constexpr double kNinety = 5.3223;
 
 /// Trust in a remembered joint: 1 where its uncertainty (SkeletonOutput, metres) is none, 1/2 at
@@ -47,7 +47,7 @@ inline double trust_of(double uncertainty) { return 0.03 / (0.03 + uncertainty);
 
 struct SkeletonModel : Module {
   /// A cloud on a tape gets a gradient; who is a neighbour of whom counts as constant. A model that
-  /// has no use for the past leaves it.
+  /// has no use for the past ignores it.
   virtual SkeletonOutput forward(Context& ctx, const SkeletonInput& in) = 0;
   virtual int64_t points() const = 0;
 };

@@ -10,11 +10,12 @@
 namespace restage {
 
 struct SmrmConfig {
-  RotationForm rotation = RotationForm::sixd;  ///< or quaternion (the first version)
+  RotationForm rotation = RotationForm::sixd;  ///< or RotationForm::quaternion (the first version)
   int64_t hidden = 512;
   int layers = 2;
   double dropout = 0.2;
-  bool standardise = false;  ///< inputs and translation in units of the training set's deviation
+  /// Inputs and translation are in units of the training set's deviation.
+  bool standardise = false;
   bool rest_pose_start = false;  ///< first output near the rest pose (spec 3.4)
   int64_t joints = kJoints;
 };

@@ -12,9 +12,11 @@ namespace {
 constexpr double kSure = 0.8;       // confidence from which on sides are believed
 constexpr int kRemembered = 15;     // frames
 constexpr double kOpposite = -0.3;  // cosine
-constexpr double kFollowed = 0.1;   // of the way to an unsure answer's left, per frame
+// Part of the way towards the left of an unsure answer, per frame.
+constexpr double kFollowed = 0.1;
 
-/// With x along `first`, y along the rest of `second`; none if they span no plane.
+/// The rotation whose x is along `first` and whose y is along the part of `second` at right angles
+/// to it; none if the two span no plane.
 Mat3 rotation_of(const Vec3& first, const Vec3& second) {
   const Vec3 x = first.normalized(), y = (second - x.dot(second) * x).normalized();
   if (!(first.norm() > 1e-9) || !(y.squaredNorm() > 0.5)) return Mat3::Identity();
@@ -23,7 +25,7 @@ Mat3 rotation_of(const Vec3& first, const Vec3& second) {
   return out;
 }
 
-/// Mean without `left_out` values at either end.
+/// The mean of values without the `left_out` smallest and the `left_out` largest.
 double middle_of(std::vector<double>& values, size_t left_out) {
   std::sort(values.begin(), values.end());
   double sum = 0;
@@ -31,13 +33,13 @@ double middle_of(std::vector<double>& values, size_t left_out) {
   return sum / static_cast<double>(values.size() - 2 * left_out);
 }
 
-/// Direction of the body's left: of hips and shoulders. Zero if they coincide.
+/// The direction of the body's left, by hips and shoulders. Zero if they coincide.
 Vec3 left_of(const Joints& joints) {
   const Vec3 across = joints[1] - joints[2] + joints[16] - joints[17];
   return across.norm() > 1e-9 ? Vec3(across.normalized()) : Vec3(Vec3::Zero());
 }
 
-/// What is left is right, and so the other way: front and back change places.
+/// The view with left and right exchanged, so that front and back change places.
 View exchanged(const View& view) {
   View out;
   for (size_t j = 0; j < kJoints; ++j) {

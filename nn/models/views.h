@@ -1,5 +1,5 @@
-// What an extractor answers to several views of a cloud, made one answer (docs/method.md, "Views",
-// "Memory").
+// Combines the answers of an extractor to several views of a cloud into one (docs/method.md,
+// "Views", "Memory").
 #pragma once
 
 #include <array>
@@ -24,7 +24,7 @@ struct SeenJoints {
   SeenJoints() = default;
   SeenJoints(const Joints& known) : joints(known) {}
   Joints joints{};  ///< metres
-  // Where the model gives them (SkeletonOutput); of several views the mean.
+  // If the model gives them (SkeletonOutput): the mean over the views.
   std::optional<Rotations> turns;                          ///< from the T-pose
   std::optional<std::array<double, kJoints>> uncertainty;  ///< metres
   /// Which way the body's left was when the extractor was last sure of it, and how many frames ago.
@@ -34,18 +34,20 @@ struct SeenJoints {
 SeenJoints turned(const Mat3& turn, const SeenJoints& seen);
 
 inline constexpr double kNearby = 0.05;  ///< metres
-/// Mean chance of a joint to be within kNearby of where it is seen, of 22 uncertainties (metres).
+/// How sure an answer is: the chance of a joint to be within kNearby of where it is seen, by its
+/// uncertainty (metres); the mean over the 22 joints.
 double confidence(const std::array<double, kJoints>& uncertainty);
 
-/// How far about a joint the true one should be nine times in ten, for each uncertainty (metres).
+/// The radius around each joint within which the true joint should be nine times in ten, by the
+/// uncertainties (metres).
 std::array<double, kJoints> radius_of_90(const std::array<double, kJoints>& uncertainty);
 
 /// The answer to one view, in the cloud's frame.
 struct View {
   using Columns = Eigen::Matrix<double, 3, 2>;
   Joints joints;
-  std::array<Columns, kJoints> turns;           ///< as the model gives them, not orthonormal
-  std::array<double, kJoints> log_uncertainty;  ///< of metres
+  std::array<Columns, kJoints> turns;  ///< columns as the model gives them, not orthonormal
+  std::array<double, kJoints> log_uncertainty;  ///< logarithms of metres
 };
 
 /// Joints: the mean, from eight views on without a quarter of the values of each coordinate at
@@ -54,12 +56,12 @@ struct View {
 SeenJoints combined(const std::vector<View>& views, bool turns, bool uncertainty,
                     const std::string& source, std::vector<double>& values);
 
-/// An extractor that takes somebody's front for the back gives every limb the other side's name,
-/// and is unsure of it. While it is, for half a second at most, views whose left points where
-/// `before` was sure to have the right are exchanged: each side under the other's name.
+/// An extractor that takes the front of a person for the back gives every limb the name of the
+/// other side, and is unsure. While it is unsure, for half a second at most, the sides of a view
+/// are exchanged if its left points where `before` was sure to have the right.
 void keep_sides(const SeenJoints& before, std::vector<View>* views);
-/// What is remembered of that in an answer: its own sides where it is sure, else those of before
-/// (null: none), which turn with it a little.
+/// Notes in an answer where its left is: as the answer itself says if it is sure, else as `before`
+/// says (null: nothing), turned a little towards the answer.
 void remember_sides(const SeenJoints* before, SeenJoints* answer);
 
 }  // namespace restage

@@ -64,7 +64,7 @@ ConfigNode node_of(const Json& json, const std::string& where) {
   return node;
 }
 
-/// The sizes in `json` over the model's own.
+/// The default sizes of the model, changed by the sizes in `json`.
 AnyConfig sizes_of(const ModelType& type, const Json& json, const std::string& where) {
   AnyConfig out = type.config;
   read_config(node_of(json, where), out);
@@ -122,8 +122,8 @@ void add_older_settings(const Json& metadata, const std::string& where, Bundle* 
   }
 }
 
-/// A network may only be about as large as the numbers in the file that are to fill it; a little
-/// larger, so that the tensors that do not fit can be named.
+/// How many numbers the file has to fill a network: a network may only be about as large
+/// (filled()).
 int64_t numbers_below(const TensorFile& file, const std::string& prefix) {
   int64_t out = 0;
   for (const auto& [name, tensor] : file.tensors)

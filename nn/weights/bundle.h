@@ -1,6 +1,6 @@
-// A bundle of weights: trained networks by the role that each fills in a system, with all that must
-// be known to use them. It is what stages hand on, what weights files hold and what `retarget`
-// reads.
+// A bundle of weights: trained networks by the role that each fills in a system, with everything
+// that must be known to use them. Stages hand on a bundle, weights files hold one, and `retarget`
+// reads one.
 //
 //   role                 what fills it (interface)                       prefix in a file
 //   skeleton             clouds -> joints (nn/models/skeleton.h)         skeleton.
@@ -29,21 +29,22 @@ struct TrainedModel {
   std::shared_ptr<Module> net;
   Settings settings;
 
-  /// The value of a setting, which must be one of `known`; without it the first of them.
-  /// InputError otherwise: nothing is guessed.
+  /// The value of a setting; the first of `known` if the model has no such setting. InputError if
+  /// the value is not one of `known`.
   std::string setting(const std::string& name, const std::vector<std::string>& known) const;
 };
 
 class Bundle {
  public:
-  /// InputError if the model is of another role than the registry says, or unknown.
+  /// InputError if the registry gives the model another role, or does not know it.
   void put(const std::string& role, TrainedModel model);
   void erase(const std::string& role) { by_role_.erase(role); }
   /// Null if there is none.
   const TrainedModel* find(const std::string& role) const;
   /// InputError naming `where` the bundle comes from.
   const TrainedModel& need(const std::string& role, const std::string& where) const;
-  /// The network of a role as what it is used for; null without one.
+  /// The network of a role as the type `M` that its users need; null if there is none or it is no
+  /// `M`.
   template <class M>
   M* find_as(const std::string& role) const {
     const TrainedModel* found = find(role);
@@ -57,9 +58,9 @@ class Bundle {
                        "give weights of another training");
     return *net;
   }
-  /// Puts all of another bundle into this one; what was there for those roles goes.
+  /// Puts all models of another bundle into this one, in the place of models of the same roles.
   void add(const Bundle& other);
-  /// Those of `roles` that are there.
+  /// A bundle of the models of `roles` that are here.
   Bundle only(const std::vector<std::string>& roles) const;
 
   bool empty() const { return by_role_.empty(); }
@@ -70,7 +71,7 @@ class Bundle {
   std::map<std::string, TrainedModel> by_role_;
 };
 
-/// Takes the networks of some roles to a device, for all who share them.
+/// Takes the networks of some roles to a device, for everybody who shares the networks.
 void move_networks(const Bundle& bundle, const std::vector<std::string>& roles, Device device);
 
 /// The prefix of a role's tensors in a weights file.
@@ -83,21 +84,21 @@ std::string identity_bytes(const Bundle& bundle);
 void save_bundle(const std::string& path, const Bundle& bundle);
 
 /// All models of a file, in float32. InputError naming `where` if a model is unknown, its sizes are
-/// impossible or unknown, tensors belong to none, or (StateError) do not fit; nothing is loaded
-/// then.
+/// impossible or unknown, tensors belong to no model, or (StateError) tensors do not fit.
 Bundle bundle_of(const TensorFile& file, const std::string& where);
-/// Of a weights file, or of a folder that holds weights.safetensors (a run, an artifact).
+/// The models of a weights file, or of a folder that holds weights.safetensors (a run, an
+/// artifact).
 Bundle load_bundle(const std::string& path);
 /// The weights file that load_bundle() reads. InputError if the folder holds none.
 std::string weights_path(const std::string& file_or_folder);
 
-/// Builds a model and fills it with a plain state dict (StateError if that does not fit). Sizes:
-/// those that export_model() wrote down, then `sizes`, each "name=value".
+/// Builds a model and fills it with a plain state dict (StateError if that does not fit). The sizes
+/// are what export_model() wrote down, changed by `sizes`, each "name=value".
 TrainedModel import_model(const std::string& name, const std::vector<std::string>& sizes,
                           const TensorFile& state, const std::string& where);
-/// One model as a plain state dict; its name, sizes and settings in the metadata. `which` is its
-/// model, its role or its prefix without the dot ("smrm"); InputError if the bundle, read from
-/// `where`, has none.
+/// One model as a plain state dict; its name, sizes and settings in the metadata. `which` names the
+/// model by its name in the registry, its role or its prefix without the dot ("smrm"). InputError
+/// if the bundle, which was read from `where`, has no such model.
 TensorFile export_model(const Bundle& bundle, const std::string& which, const std::string& where);
 
 }  // namespace restage

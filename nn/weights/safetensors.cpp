@@ -16,8 +16,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr uint64_t kHeaderLimit = 100'000'000;  // as in the format's reference implementation
-constexpr int kMostNumbers = 64;                // of a list in the header
+// The limit of the format's reference implementation.
+constexpr uint64_t kHeaderLimit = 100'000'000;
+constexpr int kMostNumbers = 64;  // of a list in the header
 constexpr uint64_t kMostElements = uint64_t{1} << 48;
 constexpr uint64_t kLargest = std::numeric_limits<int64_t>::max();
 constexpr const char* kGiveUndamaged = "give an undamaged safetensors file";
@@ -62,7 +63,7 @@ float from_half(uint16_t h) {
 
 float from_bfloat(uint16_t h) { return std::bit_cast<float>(static_cast<uint32_t>(h) << 16); }
 
-/// What the header says of a tensor; nothing of it is believed yet.
+/// What the header says of a tensor, before it has been checked.
 struct Claim {
   std::string name, dtype;
   bool has_dtype = false, has_shape = false, has_offsets = false;
@@ -83,7 +84,8 @@ class Header : public Json::json_sax_t {
 
   bool null() override { return other(); }
   bool boolean(bool) override { return other(); }
-  bool number_integer(number_integer_t) override { return other(); }  // only negative ones
+  // The JSON library calls this for negative numbers only.
+  bool number_integer(number_integer_t) override { return other(); }
   bool number_float(number_float_t, const string_t&) override { return other(); }
   bool binary(binary_t&) override { return other(); }
 
@@ -149,7 +151,7 @@ class Header : public Json::json_sax_t {
       fail("has a list of more than " + std::to_string(kMostNumbers) + " numbers in its header");
   }
 
-  /// A value that is not of the kind that belongs here.
+  /// Notes a value of a kind that does not belong here.
   bool other() {
     if (depth_ == 1 && in_metadata_) fail("has metadata that is no JSON object");
     if (depth_ == 2 && in_metadata_)
@@ -168,7 +170,8 @@ class Header : public Json::json_sax_t {
   }
 
   const std::string& where_;
-  std::set<std::string> names_, keys_;  // of the header, of the tensor at hand
+  // Seen so far: names in the header, keys of the tensor at hand.
+  std::set<std::string> names_, keys_;
   std::string name_, key_;
   std::vector<uint64_t>* list_ = nullptr;
   int depth_ = 0, numbers_ = 0;
@@ -204,7 +207,8 @@ class Reader {
       fail("is no safetensors file or is cut off (header of " + std::to_string(length) + " bytes)");
     data_ = bytes_.substr(8 + length);
     const std::string_view text = bytes_.substr(8, length);
-    // Nothing may hide before or behind the header's text; to the JSON library a zero is its end.
+    // Nothing may stand before or behind the header's text. (The JSON library takes a zero byte for
+    // its end.)
     if (text.empty() || text[0] != '{' || text.find('\0') != std::string_view::npos)
       fail("has a header that is no JSON object");
     if (!Json::sax_parse(text, &header)) fail("has a header that is not JSON");
@@ -223,7 +227,8 @@ class Reader {
                        "store it as F32, F64, I32, I64, F16 or BF16");
     if (!claim.shape_is_list || claim.shape.size() > static_cast<size_t>(Shape::kMaxRank))
       fail(called + " has a shape of more than " + std::to_string(Shape::kMaxRank) + " axes");
-    uint64_t count = 1;  // without axes of length 0, which must not hide the others
+    // Product of the lengths; axes of length 0 are left out, lest they hide an overflow.
+    uint64_t count = 1;
     bool empty = false;
     if (!claim.whole) fail_number(called);
     for (const uint64_t n : claim.shape) {

@@ -21,16 +21,16 @@ struct TensorFile {
 };
 
 /// F32, F64, I32 and I64 are kept, F16 and BF16 become f32. InputError (one line, naming `where`)
-/// for whatever is damaged: nothing that the bytes say about lengths is believed.
+/// for whatever is damaged: lengths that the bytes state are checked before they are used.
 TensorFile parse_safetensors(std::string_view bytes, const std::string& where);
 TensorFile read_safetensors(const std::string& path);
 
 /// The same bytes for the same content; data begins at a multiple of 8.
 std::string safetensors_bytes(const TensorFile& file);
-/// Whole or not at all.
+/// Writes a file that appears whole or not at all.
 void write_safetensors(const std::string& path, const TensorFile& file);
 
-/// A name out of a file, fit for a message: in quotes, short, printable.
+/// A name from a file in a form fit for a message: in quotes, short, printable.
 std::string name_in_quotes(std::string_view name);
 
 }  // namespace restage

@@ -12,7 +12,7 @@ namespace restage {
 namespace {
 
 constexpr uint64_t kLongestMap = 1 << 18;
-constexpr size_t kMostStars = 3;  // a match may try every length for every star
+constexpr size_t kMostStars = 3;  // since a match may try every length for every star
 
 bool ignored(const std::string& name) {
   static const std::string ending = "num_batches_tracked";
@@ -20,7 +20,7 @@ bool ignored(const std::string& name) {
          name.compare(name.size() - ending.size(), ending.size(), ending) == 0;
 }
 
-/// What keeps `found` from becoming `wanted`; empty if nothing does.
+/// Why `found` cannot take the place of `wanted`; "" if it can.
 std::string misfit(const Tensor& found, const Tensor& wanted) {
   if (!(found.shape() == wanted.shape()))
     return found.shape().str() + " instead of " + wanted.shape().str();
@@ -39,7 +39,7 @@ void describe(std::string* text, const std::vector<std::string>& names, const ch
   *text += names.size() > most ? ", ...)" : ")";
 }
 
-/// Text of the stars of `pattern` where it matches all of `text`.
+/// Whether `pattern` matches all of `text`; the texts for its stars then.
 bool match(std::string_view pattern, std::string_view text, std::vector<std::string>* stars) {
   const size_t star = pattern.find('*');
   if (star == std::string_view::npos) return pattern == text;
@@ -58,7 +58,7 @@ size_t count_stars(const std::string& s) {
 }
 
 /// The YAML parser calls itself for every level of nesting. A map of names has one level; deeper
-/// ones come from brackets, from "- - -" on one line, or (quadratic in length) from indentation.
+/// levels come from brackets, from "- - -" on one line, or (quadratic in length) from indentation.
 bool may_nest_deeply(const std::string& yaml) {
   const auto count = [&](char c) { return std::count(yaml.begin(), yaml.end(), c); };
   size_t dashes = 0;

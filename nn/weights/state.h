@@ -16,20 +16,21 @@ namespace restage {
 TensorFile to_file(Module& module, const std::string& prefix = "");
 void append(TensorFile* file, Module& module, const std::string& prefix);
 
-/// A file that does not fit a module: the message shows the first names, the lists hold all.
+/// A file does not fit a module: the message shows some of the names, the lists hold all names.
 class StateError : public InputError {
  public:
   StateError(const std::string& where, const std::string& wrong, const std::string& fix)
       : InputError(where, wrong, fix) {}
   /// `unfit`: the name and what is wrong with it (shape, dtype, not finite).
   std::vector<std::string> missing, unexpected, unfit;
-  /// All of them, one a line.
+  /// All names, each in a line.
   std::string details() const;
 };
 
 /// Copies the tensors of `file` whose names begin with `prefix` into the module, cast to its dtype,
 /// on its device. Strict: if a name is missing, unexpected, of another shape or holds NaN,
-/// StateError tells all and nothing is loaded. Names ending in num_batches_tracked are ignored.
+/// StateError tells all such names and nothing is loaded. Names ending in num_batches_tracked are
+/// ignored.
 void load_state(Module& module, const TensorFile& file, const std::string& prefix,
                 const std::string& where);
 
@@ -42,7 +43,7 @@ class NameMap {
   static NameMap parse(const std::string& yaml, const std::string& where);
   /// InputError if two tensors get the same name.
   TensorFile apply(const TensorFile& file, const std::string& where) const;
-  /// False: the name is to be left out.
+  /// Writes the new name; false if the tensor is to be left out.
   bool rename(const std::string& name, std::string* ours) const;
 
  private:

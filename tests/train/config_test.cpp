@@ -471,7 +471,7 @@ TEST(ConfigReferencePage, NamesEveryKeyWithItsDefault) {
   for (const auto& [key, value] : page) EXPECT_TRUE(keys.contains(key)) << key << " is no key";
 }
 
-TEST(TrainConfig, ARunOfAnEarlierVersionIsRead) {
+TEST(ConfigOfARun, OfAnEarlierVersionIsRead) {
   const std::string left =
       "stages: [motion]\nseed: 9\nroot: {points: 7, model: deformation/root}\n";
   const auto read = [](const ConfigNode& tree) {

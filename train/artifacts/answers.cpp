@@ -22,8 +22,8 @@ namespace fs = std::filesystem;
 
 constexpr const char* kWhere = "the skeleton stage";
 
-// As numbers, all in double precision, so that what is read is what was asked for. Of each frame 22
-// rows (joint, rotation, uncertainty), then one for the sides that are remembered.
+// Answers as numbers, all in double precision, so that what is read equals what was answered. Each
+// frame has 22 rows (joint, rotation, uncertainty), then a row for the sides that are remembered.
 
 constexpr int64_t kJointNumbers = 3 + 9 + 1, kFrame = kJoints * kJointNumbers + 4;
 
@@ -63,8 +63,8 @@ std::vector<SeenJoints> get(const double* in, size_t frames, bool turns, bool un
 
 // ---- asking ------------------------------------------------------------------------------------
 
-/// Fills the tracks that other processes have asked for. A message holds a track of each process,
-/// after whether it has rotations and uncertainties.
+/// Fills the tracks that other processes have asked for. A message holds one track of each process:
+/// first whether it has rotations and uncertainties, then its numbers.
 void exchange(std::vector<JointTrack>* tracks, size_t frames, Team& team) {
   const auto rank = static_cast<size_t>(team.rank()), size = static_cast<size_t>(team.size());
   for (size_t from = 0; from < tracks->size(); from += size) {
@@ -97,7 +97,8 @@ std::vector<JointTrack> asked(const Corpus& corpus, const AnswersConfig& config,
     throw;
   }
   if (team.size() == 1) return out;
-  if (team.any(false)) throw Interrupted(SIGTERM);  // it was another process of the team
+  // The signal came to another process of the team.
+  if (team.any(false)) throw Interrupted(SIGTERM);
   exchange(&out, static_cast<size_t>(config.tracks.frames), team);
   return out;
 }
@@ -176,7 +177,7 @@ std::optional<std::vector<JointTrack>> find(const std::string& path, const std::
   }
 }
 
-/// All that answers depend on.
+/// Everything that answers depend on, as JSON text.
 std::string facts_of(const std::string& data, const std::string& split, const AnswersConfig& config,
                      const Bundle& given, uint64_t seed) {
   const std::string extractor = identity_bytes(given.only({"skeleton"}));

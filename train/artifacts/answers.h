@@ -1,5 +1,6 @@
-// What a skeleton stage's network answers to clouds of a corpus (datasets/sampling/tracks.h), asked
-// once: motion networks that learn on the same answers, such as the trials of a sweep, share them.
+// The answers of a skeleton stage's network to clouds of a corpus (datasets/sampling/tracks.h). The
+// network is asked once: motion networks that learn on the same answers, such as those of the
+// trials of a sweep, share them.
 #pragma once
 
 #include <optional>
@@ -35,17 +36,17 @@ void visit(V& v, AnswersConfig& c) {
     between(0, 1));
 }
 
-/// A folder for answers, and what they are about.
+/// A folder that keeps answers, and the identity of the data that they are about.
 struct AnswerFolder {
   std::string path;
   std::string data;  ///< identity of the corpora (Identities::data)
 };
 
 /// The answers of `given`'s extractor about performances of a corpus; `split`: its name in the
-/// data. With a folder those that are kept there, for the same question, are taken; others are
-/// asked for and kept, by one process while the others wait. A damaged file gives a warning and is
-/// made again. Without a folder each process of a team asks about some and tells the others. The
-/// bits are the same either way.
+/// data. With a folder, answers to the same question that are kept there are taken; otherwise one
+/// process asks and keeps the answers while the others wait. A damaged file gives a warning and is
+/// made again. Without a folder each process of a team asks about some sequences and tells the
+/// others. The bits are the same either way.
 std::vector<JointTrack> ask(const Corpus& corpus, const std::string& split,
                             const AnswersConfig& config, const Bundle& given, uint64_t seed,
                             const std::optional<AnswerFolder>& folder, Team& team = alone());

@@ -41,7 +41,7 @@ bool made_once_detail::has_leftovers(const std::string& dir, const std::string& 
   return !leftovers(dir, name).empty();
 }
 
-/// All of it but the lease, which the caller holds.
+/// Removes all leftovers but the lease, which the caller holds.
 void made_once_detail::remove_leftovers(const std::string& dir, const std::string& name) {
   std::error_code ignored;
   for (const fs::path& path : leftovers(dir, name))

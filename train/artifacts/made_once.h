@@ -18,15 +18,16 @@ std::string path_aside(const std::string& dir, const std::string& name, const ch
 
 namespace made_once_detail {
 void make_folder(const std::string& dir);
-/// What processes that were killed have left of it.
+/// Whether there are leftovers of processes that were killed while they made `name`.
 bool has_leftovers(const std::string& dir, const std::string& name);
 void remove_leftovers(const std::string& dir, const std::string& name);
-/// Half a second; says whom it waits for unless that was told. Interrupted on a signal.
+/// Waits half a second; logs whom it waits for unless `told`. Interrupted on a signal.
 void wait(const std::string& dir, const std::string& name, bool told);
 }  // namespace made_once_detail
 
-/// `find` gives it if it is there and whole; `make` makes it so that it is found, and asks
-/// lost() before it is published. Interrupted on a signal; WorkError if it cannot be read back.
+/// Returns what `find` gives if it is there and whole. Otherwise one process calls `make`, after
+/// which `find` must give it; `make` asks lost() of its lease before it publishes. Interrupted on a
+/// signal; WorkError if what was made cannot be read back.
 template <class T>
 T made_once(const std::string& dir, const std::string& name,
             const std::function<std::optional<T>()>& find,
@@ -42,7 +43,7 @@ T made_once(const std::string& dir, const std::string& name,
       if (!there) there = find();  // somebody may just have finished
       if (!there) {
         make(*lease);
-        there = find();  // what others read is what we use
+        there = find();  // this process, too, uses what others will read
       }
       if (!there)
         throw WorkError(dir + "/" + name +
@@ -50,7 +51,7 @@ T made_once(const std::string& dir, const std::string& name,
       remove_leftovers(dir, name);
       lease->forget();
     }
-    if (there) return std::move(*there);  // without the lease: somebody else tidies up
+    if (there) return std::move(*there);  // this process has no lease: another one tidies up
     wait(dir, name, told);
   }
 }

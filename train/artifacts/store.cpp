@@ -34,11 +34,11 @@ std::string damage(const std::string& folder) {
   return "";
 }
 
-/// The validation of what a stage hands on: the last line of its metrics, or that of the step which
-/// it names as the best.
+/// The validation of the weights that a stage hands on: the last line of its metrics, or the line
+/// of the step which that line names as the best.
 Json validation_of(const std::string& metrics) {
   std::istringstream lines(metrics);
-  std::map<int64_t, Json> last;  // of each step
+  std::map<int64_t, Json> last;  // the last line of each step
   Json out;
   for (std::string text; std::getline(lines, text);) {
     out = Json::parse(text, nullptr, false);

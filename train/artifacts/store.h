@@ -33,7 +33,8 @@ class Store {
   /// warning, is moved aside and counts as absent. InputError: whole, but no weights of ours.
   std::optional<Bundle> find(const StageId& id) const;
 
-  /// Its curves so far (metrics.jsonl), also while it is made; empty if nobody has begun.
+  /// The curves of the artifact so far (metrics.jsonl), also while it is made; empty if nobody has
+  /// begun to make it.
   std::string metrics(const StageId& id) const;
 
   /// The folder of what extractors were asked (train/artifacts/answers.h).

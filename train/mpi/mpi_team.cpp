@@ -73,7 +73,8 @@ class MpiSum final : public Team::Sum {
   }
 
  private:
-  /// MPI moves nothing while nobody calls it, and the caller computes: so it is asked now and then.
+  /// MPI moves nothing while nobody calls it, and the caller computes. So a thread of its own calls
+  /// MPI now and then.
   void move(const std::stop_token& stop) {
     for (int done = 0; !done && !stop.stop_requested();) {
       MPI_Test(&request_, &done, MPI_STATUS_IGNORE);
@@ -81,7 +82,8 @@ class MpiSum final : public Team::Sum {
     }
   }
 
-  /// Adds what the last round brought, in the order of the ranks: that of the rows' numbers.
+  /// Adds the rows of the last round in the order of the ranks, which is the order of the rows'
+  /// numbers.
   void finish_round() {
     if (!mover_.joinable()) return;
     const double start = MPI_Wtime();
@@ -107,7 +109,7 @@ class MpiSum final : public Team::Sum {
   std::vector<int> received_count_, received_first_;
   std::vector<float> sent_, received_, slice_;
   MPI_Request request_ = MPI_REQUEST_NULL;
-  std::jthread mover_;  // the only one that calls MPI while it is there
+  std::jthread mover_;  // while this thread runs, no other thread calls MPI
 };
 
 class MpiTeam final : public Team {

@@ -10,13 +10,13 @@ namespace restage {
 namespace {
 
 constexpr int kIterations = 5;
-// s -> a s + b s^3 + c s^5 for every singular value s: Jordan's, which grows small ones fastest and
-// keeps them about one, not at it.
+// s -> a s + b s^3 + c s^5 for every singular value s: Jordan's coefficients, which let small
+// singular values grow fastest and keep all of them near one, not at one.
 constexpr double kA = 3.4445, kB = -4.7750, kC = 2.0315;
 
 enum class Transposed { none, first, second };
 
-/// Of each pair of matrices [b, rows, columns].
+/// The product of each pair of matrices [b, rows, columns].
 Tensor product(const Tensor& a, const Tensor& b, Transposed which = Transposed::none) {
   const bool first = which == Transposed::first, second = which == Transposed::second;
   Tensor out = empty_like(a, {a.size(0), a.size(first ? 2 : 1), b.size(second ? 1 : 2)});
@@ -24,7 +24,7 @@ Tensor product(const Tensor& a, const Tensor& b, Transposed which = Transposed::
   return out;
 }
 
-/// Of each of x [n, rows, columns].
+/// The norm of each matrix of x [n, rows, columns].
 std::vector<double> norms_of(const Tensor& x) {
   const Tensor squares = Tensor::empty({x.size(0)}, DType::f64, x.device());
   for (int64_t i = 0; i < x.size(0); ++i) {

@@ -1,7 +1,7 @@
 // Muon (Jordan 2024): a matrix moves along its orthogonalised momentum, so that it learns in all
-// directions alike and not only in the few that its gradient is large in. Steps have the size that
-// Adam's have (Liu et al. 2025, "Muon is scalable for LLM training", eq. 4), so one rate serves
-// both.
+// directions alike and not only in the few directions in which its gradient is large. Steps are as
+// large as steps of Adam (Liu et al. 2025, "Muon is scalable for LLM training", eq. 4), so one
+// learning rate serves both.
 #pragma once
 
 #include "nn/config/config_reader.h"
@@ -38,14 +38,15 @@ class Muon {
     NamedParameter of;
     Tensor m;
   };
-  /// Of equal shape each, so that threads share them and not the rows of one.
+  /// Matrices of one shape form a group. Threads share the matrices of a group, not the rows of one
+  /// matrix.
   std::vector<std::vector<Slot>> groups_;
   MuonConfig config_;
 };
 
-/// Matrices x [n, rows, columns] with their singular values brought to between 0.7 and 1.2 (those
-/// over 1e-3 of the norm), singular vectors kept: five steps of a Newton-Schulz iteration. Zero
-/// stays zero.
+/// Matrices x [n, rows, columns] with their singular values brought to between 0.7 and 1.2 (the
+/// singular values over 1e-3 of the norm), singular vectors kept: five steps of a Newton-Schulz
+/// iteration. Zero stays zero.
 Tensor orthogonalised(const Tensor& x);
 
 }  // namespace restage

@@ -14,7 +14,7 @@ std::vector<uint64_t> sorted_ids(const Modules& modules) {
   return out;
 }
 
-/// Those that Muon is to take, or all others.
+/// The parameters that Muon is to take (`of_muon`), or all others.
 std::vector<NamedParameter> share(const Modules& modules, const OptimiserConfig& config,
                                   bool of_muon) {
   std::vector<NamedParameter> out = named_parameters(modules);

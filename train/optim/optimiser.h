@@ -1,4 +1,4 @@
-// What every stage says about its optimisation, and the optimiser that follows: Adam for
+// What every stage says about its optimisation, and the optimiser that this describes: Adam for
 // everything, or Muon for matrices and Adam for the rest (biases, norms, narrow layers).
 #pragma once
 
@@ -35,14 +35,14 @@ void visit(V& v, OptimiserConfig& c) {
 
 class Optimiser {
  public:
-  /// Optimises the parameters of `modules`, each under its prefix (names of the saved state).
+  /// Optimises the parameters of `modules`; the state of each is saved under its prefix.
   Optimiser(const std::vector<std::pair<std::string, Module*>>& modules,
             const OptimiserConfig& config);
-  /// One update; a parameter without gradient stays. The norm that is clipped is that of the
-  /// parameters that this optimises, whatever else `gradients` holds; the gradient is scaled down
-  /// as torch's clip_grad_norm_ does.
+  /// One update; a parameter without gradient stays. The norm that is clipped is taken over the
+  /// parameters of this optimiser, whatever else `gradients` holds; gradients are scaled down as
+  /// torch's clip_grad_norm_ does.
   void step(const Gradients& gradients, double rate);
-  /// Identities of the parameters that it optimises, ascending.
+  /// Identities of the parameters of this optimiser, ascending.
   const std::vector<uint64_t>& parameters() const { return ids_; }
   void save(const std::string& prefix, TensorFile& file) const;
   /// InputError if the state does not fit.

@@ -1,4 +1,4 @@
-// What optimisers hold: parameters by the names that their state is saved under.
+// The parameters of an optimiser, with the names under which their state is saved.
 #pragma once
 
 #include <string>

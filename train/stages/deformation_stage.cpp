@@ -22,8 +22,8 @@ PairConfig held_out(PairConfig c) {
   return c;
 }
 
-/// Adds to `skin` how much of the points each joint moves in the data, and to `kept` how much of
-/// that it moves by the predicted weights as well.
+/// Adds to `skin`, for each joint, how much of the points it moves in the data, and to `kept` how
+/// much of that it moves by the predicted weights as well.
 void add_shared_skin(const Tensor& predicted, const Tensor& truth,
                      std::array<double, kJoints>* skin, std::array<double, kJoints>* kept) {
   const float *p = predicted.data<float>(), *t = truth.data<float>();
@@ -69,7 +69,7 @@ PairBatch DeformationStage::batch(int64_t step, const MicroBatch& part) const {
   return sampler_.batch(part.from(drawn(step) * n, n), part.count(n));
 }
 
-/// Sums over the points of a pair, means over pairs.
+/// The loss: a sum over the points of a pair, a mean over pairs.
 Var DeformationStage::loss(Context& ctx, const PairBatch& pairs, int64_t step,
                            Tensor* posed) const {
   const DeformationBatch b = batch_of(pairs);
@@ -116,11 +116,11 @@ NamedValues DeformationStage::validate() {
     without += error(plain);
     add_shared_skin(plain.weights.value.cpu(), pairs.weights, &skin, &kept);
   }
-  double lost = 0;  // by the joint that loses most
+  double lost = 0;  // of the joint that loses most
   for (int j = 0; j < kJoints; ++j)
     if (skin[j] > 0) lost = std::max(lost, 1 - kept[j] / skin[j]);
   NamedValues values{{"skinning_mm", 1e3 * without}, {"skin_lost", lost}};
-  // First, since it is what the surface comes to.
+  // The figure with offsets comes first, since it is the error of the surface in the end.
   if (offsets_ != nullptr) values.insert(values.begin(), {"with_offsets_mm", 1e3 * with});
   return values;
 }

@@ -22,7 +22,7 @@ void visit(V& v, PairConfig& c) {
 }
 
 struct DeformationStageConfig {
-  ModelChoice model{"deformation/weights"};  ///< the sizes are those of the offsets too
+  ModelChoice model{"deformation/weights"};  ///< its sizes are the sizes of the offset network, too
   OptimiserConfig optimiser;
   PairConfig pairs;
   Measure loss = Measure::mse;

@@ -13,7 +13,7 @@
 namespace restage {
 namespace {
 
-/// What must be known of the training to use the network.
+/// What must be known of the training by whoever uses the network.
 Settings settings_of(const MotionStageConfig& c) {
   Settings out{{"remove_heading", c.windows.remove_heading ? "true" : "false"}};
   if (c.windows.steady_heading) out["steady_heading"] = "true";
@@ -31,7 +31,8 @@ WindowConfig held_out(WindowConfig c, int64_t frames) {
   return c;
 }
 
-/// With self samples apart, the cycle's windows have none and the others are nothing else.
+/// If self samples have a pass of their own, none of the cycle's windows is one, and all of the
+/// other windows are.
 WindowConfig windows_of_cycle(const MotionStageConfig& c) {
   WindowConfig w = c.windows;
   if (c.self_first_pass) w.self_share = 0;
@@ -49,7 +50,7 @@ MotionBatch motion_batch(const WindowBatch& w) {
           w.sixd_a,   w.self_mask, w.turns,   w.uncertainty,   w.standing, w.reframed};
 }
 
-/// One pass whose answer is known: of A itself, or of B.
+/// The batch of one pass whose answer is known: the motion of A itself, or the true motion of B.
 MotionBatch supervised_batch(const WindowBatch& w) {
   if (!w.truth_b.defined()) return motion_batch(w);
   return {w.truth_b,      w.input_a,   w.truth_trans_b, w.input_trans_a, w.rest_b,   w.rest_b,
@@ -104,7 +105,7 @@ Tensor first_frames(const Tensor& x, int64_t frames) { return slice(Var(x), 1, 0
 /// local rotations as the mean length of the difference of their two columns.
 struct Judged {
   double pa = 0, local = 0, acceleration = 0, rotation = 0;
-  /// `late`: frames that the answer is behind.
+  /// `late`: by how many frames the answer comes after its input.
   void add(const MotionOutput& answer, const WindowBatch& b, int64_t late) {
     using Mode = metrics::Alignment::Mode;
     const int64_t t = b.truth_b.size(1);
@@ -183,7 +184,8 @@ MotionStage::MotionStage(const Config& config, const StageInput& in)
                      cat("of ", late, " leaves nothing of windows of ", config.windows.frames,
                          " frames (validation: ", config.validation_frames, ")"),
                      "give longer windows.frames and validation_frames");
-  if (config.answers.tracks.sequences == 0) windows();  // what is wrong with them is said at once
+  // So that a mistake in them is reported at once.
+  if (config.answers.tracks.sequences == 0) windows();
   model_->standardise(statistics());
   move_module(*model_, device());
 }
@@ -240,7 +242,8 @@ int64_t MotionStage::cycle_windows() const {
 }
 
 MotionStage::Batch MotionStage::batch(int64_t step, const MicroBatch& part) const {
-  // Self samples are dealt as evenly as can be; the cycle's are the others.
+  // Self samples are shared among the micro-batches as evenly as can be; the other windows are for
+  // the cycle.
   const int64_t self = self_windows(), n = part.count(config_.optimiser.batch);
   const int64_t from = self * part.index / part.of, to = self * (part.index + 1) / part.of;
   Batch out;
@@ -278,7 +281,8 @@ Differentiated MotionStage::learn(const RngKey& key, const Batch& b, bool judged
     }
     return total;
   });
-  // Means over micro-batches of what is a mean over their windows of one kind.
+  // Scales a mean over the windows of one kind in this micro-batch so that the mean over
+  // micro-batches is the mean over all windows of that kind.
   const auto value = [&](const Var& v, int64_t here, int64_t all) {
     const double part = static_cast<double>(here * config_.optimiser.batch) /
                         static_cast<double>(std::max<int64_t>(1, all * (b.self + b.cycle)));
@@ -294,7 +298,7 @@ Differentiated MotionStage::learn(const RngKey& key, const Batch& b, bool judged
 NamedValues MotionStage::step(int64_t step) {
   const OptimiserConfig& o = config_.optimiser;
   const double rate = learning_rate(o.schedule, step, o.steps);
-  std::map<int64_t, Batch> drawn;  // two rounds may ask for the same
+  std::map<int64_t, Batch> drawn;  // the two rounds of a step may ask for the same micro-batch
   std::mutex several_ask;
   const Drawn batch_of = [&](const MicroBatch& part) -> const Batch& {
     const std::lock_guard lock(several_ask);

@@ -104,22 +104,25 @@ class MotionStage final : public Stage {
   std::vector<Shown> show() override;
 
  private:
-  /// Windows of a step: for the cycle, and self samples apart; either may be undefined.
+  /// The windows of a step or a micro-batch: for the cycle, and self samples in a pass of their
+  /// own. Either batch may be undefined.
   struct Batch {
-    int64_t cycle = 0, self = 0;  ///< how many
+    int64_t cycle = 0, self = 0;  ///< how many windows each has
     WindowBatch windows, own;
   };
-  /// Of a step's windows, how many are for the cycle and how many are self samples in a pass of
-  /// their own.
+  /// How many windows of a step are for the cycle, and how many are self samples in a pass of their
+  /// own.
   int64_t cycle_windows() const;
   int64_t self_windows() const { return config_.optimiser.batch - cycle_windows(); }
   Batch batch(int64_t step, const MicroBatch& part = {}) const;
   using Drawn = std::function<const Batch&(const MicroBatch&)>;
   MotionStatistics statistics() const;
-  /// Made when they are first asked for: an extractor has to answer first.
+  /// The samplers of windows. They are made when they are first asked for, since an extractor may
+  /// have to answer before.
   struct Windows;
   const Windows& windows() const;
-  /// Discriminator's own step, unless it is winning clearly (spec 4.4).
+  /// The step of the discriminator, which is left out while the discriminator is winning clearly
+  /// (spec 4.4).
   void update_discriminator(const RngKey& step, double rate, const Drawn& batch,
                             NamedValues* values);
   /// The network's gradient on a micro-batch; its values are the losses cycle, rotation,
@@ -135,7 +138,7 @@ class MotionStage final : public Stage {
   Optimiser *optimiser_, *discriminator_optimiser_;
   const Corpus &train_, &validation_;
   uint64_t seed_;
-  Bundle given_;  ///< the extractor, if it is asked
+  Bundle given_;  ///< the extractor, if the motion network learns on its answers
   std::optional<AnswerFolder> answers_;
   RngKey key_;
   mutable std::once_flag asked_;

@@ -13,21 +13,24 @@ namespace restage {
 
 struct StageType {
   std::string name, help;
-  AnyConfig config;                  ///< at its defaults
-  std::vector<std::string> roles;    ///< what it may leave in a bundle; the first always
-  std::vector<std::string> figures;  ///< of validate(); lower is better
-  /// Stages whose networks it needs, as it is configured; they are trained before.
+  AnyConfig config;  ///< the configuration with its defaults
+  /// The roles that it may leave in a bundle; the first role always.
+  std::vector<std::string> roles;
+  std::vector<std::string> figures;  ///< figures of validate(); lower is better
+  /// The stages whose networks this stage needs with such a configuration; they are trained before
+  /// it.
   std::vector<std::string> (*reads)(const AnyConfig& config);
   std::unique_ptr<Stage> (*make)(const AnyConfig& config, const StageInput& input);
 };
 
 const std::vector<StageType>& stage_types();
 std::vector<std::string> stage_names();
-/// The first of these that is no STAGE.FIGURE; "" if all are.
+/// The first of `names` that is not STAGE.FIGURE of some stage; "" if there is none.
 std::string unknown_figure(const std::vector<std::string>& names);
 /// InputError if there is no such stage.
 const StageType& stage_type(const std::string& name);
-/// What a stage would leave, from a weights file, run or artifact. InputError if it has no such.
+/// The networks that a stage would leave, taken from a weights file, run or artifact. InputError if
+/// `path` has no such networks.
 Bundle networks_of(const StageType& stage, const std::string& path);
 
 }  // namespace restage

@@ -14,8 +14,8 @@
 namespace restage {
 namespace {
 
-/// The uncertainty's head learns alone, so this only says how much of the clip of all gradients is
-/// its own; Adam makes up for the rest.
+/// The head of the uncertainty learns apart from the other layers, so this weight only decides how
+/// much its gradient counts when gradients are clipped; Adam makes up for its size.
 constexpr double kUncertaintyWeight = 0.01;
 constexpr size_t kFollowed = 12;  // frames of a validation sequence
 
@@ -34,7 +34,7 @@ CloudConfig training_clouds(const SkeletonStageConfig& c, const SkeletonModel& m
   return out;
 }
 
-/// Of the leading axis.
+/// Some rows of a tensor, along its leading axis.
 Tensor rows_of(const Tensor& t, const std::vector<int64_t>& rows) {
   Shape shape = t.shape();
   shape.set(0, std::ssize(rows));
@@ -157,8 +157,8 @@ CloudBatch SkeletonStage::batch(int64_t step, const MicroBatch& part) const {
   return sampler_.batch(part.from(drawn(step) * n, n), part.count(n));
 }
 
-/// Memories that are asked for are what this model says of the frame before: errors of today and
-/// of yesterday are alike, which none that is drawn would teach.
+/// Where a cloud asks for a memory, it gets what this model says of the frame before. So errors of
+/// this frame and of the frame before are alike, which memories drawn at random would not teach.
 void SkeletonStage::recall(int64_t step, const MicroBatch& part, CloudBatch* clouds) const {
   if (clouds->asked.empty()) return;
   const int64_t n = config_.optimiser.batch;
@@ -166,7 +166,7 @@ void SkeletonStage::recall(int64_t step, const MicroBatch& part, CloudBatch* clo
   Context ctx;
   const SkeletonAnswer answer =
       on_host(model_->forward(ctx, {before.points.to(device()), before.past.to(device())}));
-  // The step itself will find what makes it so, and name it.
+  // The step itself will find the op that makes a value infinite, and name it.
   const std::span joints(answer.joints.value.data<float>(),
                          static_cast<size_t>(answer.joints.value.numel()));
   if (!std::all_of(joints.begin(), joints.end(), [](float x) { return std::isfinite(x); })) return;
@@ -256,7 +256,7 @@ double followed_error(SkeletonModel& model, const CloudBatch& clouds, int64_t fr
 
 NamedValues SkeletonStage::validate() {
   NamedValues out;
-  std::optional<double> turns, miscalibration;  // of the worst kind of cloud
+  std::optional<double> turns, miscalibration;  // over the kinds of clouds, the worst
   const auto worst = [](std::optional<double>& of, double x) { of = std::max(of.value_or(x), x); };
   const auto put = [&](const char* name, const CloudBatch& clouds) {
     if (!clouds.points.defined()) return;

@@ -77,25 +77,27 @@ class SkeletonStage final : public Stage {
   Optimiser* optimiser_;
   CloudSampler sampler_, validation_sampler_;
   std::vector<CloudSubject> posed_, tposes_;
-  // Held-out scans by ray casting; undefined if not trained for.
+  // Held-out scans by ray casting, one batch for each kind of cloud; undefined if the stage does
+  // not train on that kind.
   CloudBatch one_camera_, ring_, intruded_;
-  CloudBatch followed_;  ///< the same of people followed by one camera
+  CloudBatch followed_;  ///< held-out sequences of people whom one camera follows
   RngKey key_;
 };
 
-/// How a model does on given clouds (evaluation mode); means over joints.
+/// Errors of a model on given clouds (evaluation mode); means over joints.
 struct SkeletonErrors {
-  double joints = 0;              ///< distance, metres
-  std::optional<double> turns;    ///< angle, radians; empty if not given or not known
+  double joints = 0;  ///< distance, metres
+  /// Angle, radians; empty if the model gives no rotations or the truth is not known.
+  std::optional<double> turns;
   std::optional<double> outside;  ///< part of the joints outside their 90 % regions
 };
 SkeletonErrors skeleton_errors(SkeletonModel& model, const CloudBatch& clouds);
 
-/// An answer as what is remembered of it (SkeletonInput::past) by clouds whose centroids, as those
-/// of `clouds`, are given in the world [n, 3].
+/// An answer in the form in which the next clouds remember it (SkeletonInput::past). The centroids
+/// of both are given in the world, [n, 3].
 Tensor remembered(const SkeletonAnswer& answer, const Tensor& centres, const Tensor& now);
-/// Mean distance over joints of clouds that are `frames` frames of one sequence after the other,
-/// each seen with the answer to the one before in memory; metres.
+/// Mean distance over joints, metres. `clouds` holds sequences of `frames` frames, one after the
+/// other; each frame is seen with the answer to the frame before it in memory.
 double followed_error(SkeletonModel& model, const CloudBatch& clouds, int64_t frames,
                       Device device = {});
 

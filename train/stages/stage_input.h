@@ -14,8 +14,9 @@ inline EnumNames<Measure> config_names(Measure) {
   return {{"mse", Measure::mse}, {"distance", Measure::distance}};
 }
 
-/// The seed of one of a stage's samplers: another one for another name, and for another seed of the
-/// training, so that trainings differ in what they see and not only in where they begin.
+/// The seed of one of a stage's samplers: it differs between samplers and between seeds of the
+/// training, so that trainings of two seeds differ in what they see and not only in where they
+/// begin.
 inline uint64_t sampler_seed(uint64_t seed, std::string_view sampler) {
   const auto words = philox(RngKey{seed, 0}.fold(sampler), 0);
   return (uint64_t{words[0]} << 32) | words[1];
@@ -25,9 +26,10 @@ struct StageInput {
   const Corpus& train;       ///< kept by reference
   const Corpus& validation;  ///< kept by reference
   uint64_t seed = 0;
-  const Bundle& given;                       ///< what the stages that it reads have left
-  std::optional<AnswerFolder> answers = {};  ///< where those about the corpora are kept
-  Device device = {};                        ///< where the stage's networks live and are trained
+  const Bundle& given;  ///< networks of the stages that this stage reads
+  /// Where the answers of an extractor about the corpora are kept.
+  std::optional<AnswerFolder> answers = {};
+  Device device = {};  ///< where the stage's networks live and are trained
 };
 
 }  // namespace restage

@@ -53,7 +53,7 @@ std::string Identities::networks(const std::string& stage, const std::string& pa
 
 std::vector<StageId> Identities::stages(const TrainConfig& config) {
   std::vector<StageId> out;
-  std::map<std::string, std::string> left;  // what a later stage would read
+  std::map<std::string, std::string> left;  // what each stage leaves to later stages: an id
   for (const std::string& name : config.stages) {
     const StageSection& section = config.section(name);
     if (section.from) {
@@ -68,7 +68,8 @@ std::vector<StageId> Identities::stages(const TrainConfig& config) {
                  {"precision", static_cast<int>(config.precision)},
                  {"reads", Json::object()}};
     const SelectionConfig& selection = config.loop.selection;
-    if (config.device != "cpu") json["device"] = config.device;  // rounds in other ways
+    // Another device rounds in other ways.
+    if (config.device != "cpu") json["device"] = config.device;
     if (config.loop.overfit_batches > 0) json["overfit_batches"] = config.loop.overfit_batches;
     if (config.loop.micro_batches > 1) json["micro_batches"] = config.loop.micro_batches;
     if (selection.ema > 0) json["ema"] = number(selection.ema);

@@ -1,8 +1,8 @@
 // What makes two results the same result. The id of an artifact or a trial is the first 12 hex
-// digits of the SHA-256 of all that determines it: the resolved keys that its training reads, the
-// content of its data and of weights that it starts from, the seed, the ids of the artifacts that
-// it reads, and the number of this program's behaviour. Names, folders, logging and thread counts
-// are not part of it, so the same question has the same id on any machine.
+// digits of the SHA-256 of everything that determines the result: the resolved keys that its
+// training reads, the content of its data and of weights that it starts from, the seed, the ids of
+// the artifacts that it reads, and the number of this program's behaviour. Names, folders, logging
+// and thread counts are not part of it, so the same question has the same id on any machine.
 #pragma once
 
 #include <map>
@@ -18,17 +18,19 @@ namespace restage {
 /// its own life (datasets/readers/file_sums.h).
 class Identities {
  public:
-  /// Of bodies and motions: the bytes of a data set file, a benchmark's manifest, or the keys of
-  /// the built-in source. InputError if the file cannot be read.
+  /// The identity of bodies and motions: the bytes of a data set file, a benchmark's manifest, or
+  /// the keys of the built-in source. InputError if the file cannot be read.
   std::string data(const CorpusSource& source);
-  /// Of a weights file, run or artifact: its bytes.
+  /// The identity of a weights file, run or artifact: the checksum of its bytes.
   std::string weights(const std::string& path);
-  /// Of a stage's networks in such a file: what else the file holds does not matter.
+  /// The identity of the networks of a stage in such a file: what else the file holds does not
+  /// matter.
   std::string networks(const std::string& stage, const std::string& path);
-  /// The stages that `config` trains, in order; those taken `from` elsewhere have none.
+  /// The identities of the stages that `config` trains, in order; a stage that is taken `from`
+  /// elsewhere has none.
   std::vector<StageId> stages(const TrainConfig& config);
-  /// Of all that determines what `config` trains; `more` is what else determines a result, such as
-  /// what it is measured on.
+  /// The id of a trial: of everything that determines what `config` trains, and of `more`, which
+  /// says what else determines the result, such as what it is measured on.
   std::string trial(const TrainConfig& config, const std::map<std::string, std::string>& more);
 
  private:

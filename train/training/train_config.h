@@ -61,10 +61,11 @@ inline EnumNames<MatmulPrecision> config_names(MatmulPrecision) {
 
 /// One stage of a configuration: trained as its own keys say, or taken as it is.
 struct StageSection {
-  std::optional<std::string> from;  ///< weights file, run or artifact: not trained
-  std::optional<std::string> init;  ///< the same: trained on from these weights
+  std::optional<std::string> from;  ///< weights file, run or artifact: the stage is not trained
+  /// Weights file, run or artifact: the stage is trained on from its weights.
+  std::optional<std::string> init;
   std::vector<std::string> init_names = {"*"};
-  AnyConfig config;  ///< as the stage's type says
+  AnyConfig config;  ///< the keys of the stage itself
 };
 
 template <class V>
@@ -94,7 +95,7 @@ struct TrainConfig {
     return const_cast<TrainConfig*>(this)->section(stage);
   }
 
-  /// Those of `stages` that are not taken as they are.
+  /// The names in `stages` of those that are trained, not taken as they are.
   std::vector<std::string> trained() const {
     std::vector<std::string> out = stages;
     std::erase_if(out,
@@ -109,7 +110,7 @@ struct TrainConfig {
   std::string device = "cpu";
   std::vector<std::string> stages = {"skeleton", "motion", "deformation"};
   CorpusSource data;
-  std::vector<std::pair<std::string, StageSection>> sections;  ///< of every stage there is
+  std::vector<std::pair<std::string, StageSection>> sections;  ///< by name, of every stage there is
   LoopConfig loop;
   EvaluationConfig evaluation;
 };

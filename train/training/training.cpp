@@ -59,7 +59,8 @@ Bundle train_run(RunDir& run, const TrainConfig& config, const TrainingData& dat
 }
 
 std::vector<StageForecast> forecast(TrainConfig config, const TrainingData& data) {
-  // Asking an extractor for all that a stage learns on and is judged on would take minutes.
+  // Asking an extractor about everything that a stage learns on and is judged on would take
+  // minutes.
   auto& motion = config.section("motion").config.as<MotionStageConfig>();
   int64_t &learned = motion.answers.tracks.sequences, &judged = motion.validation_windows;
   const int64_t all = learned + judged;

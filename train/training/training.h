@@ -15,13 +15,14 @@ struct TrainingData {
   explicit TrainingData(const CorpusSource& source)
       : train(load_corpus(source, "train")), validation(load_corpus(source, "validation")) {}
   Corpus train, validation;
-  Team* team = nullptr;  ///< processes that train on them together; null: this one alone
-  std::optional<AnswerFolder> answers;  ///< where an extractor's answers to them are kept
+  Team* team = nullptr;  ///< the processes that train together; null: this process alone
+  /// Where the answers of extractors about these data are kept.
+  std::optional<AnswerFolder> answers;
 };
 
-/// A stage with its weights to start from; null if it is taken as it is, and then its networks are
-/// put into `so_far`. InputError: weights that do not fit or hold nothing for the stage, a stage
-/// that it reads and that does not come before.
+/// A stage, with the weights that it starts from. Null if the stage is taken as it is; then its
+/// networks are put into `so_far`. InputError: the weights do not fit or hold nothing for the
+/// stage, or the stage reads another one that does not come before it.
 std::unique_ptr<Stage> make_stage(const TrainConfig& config, const std::string& name,
                                   const TrainingData& data, Bundle* so_far);
 
@@ -30,21 +31,21 @@ std::unique_ptr<Stage> make_stage(const TrainConfig& config, const std::string& 
 /// there.
 void check_stages(const TrainConfig& config, const TrainingData& data);
 
-/// All stages one after the other in a run directory, in the precision of the configuration.
+/// Trains all stages one after the other in a run directory, in the precision of the configuration.
 Bundle train_run(RunDir& run, const TrainConfig& config, const TrainingData& data,
                  TrainOptions options);
 
-/// What each stage that is trained would cost, by some of its steps. A stage that reads another's
-/// networks gets them untrained: that changes no time.
+/// What each stage that is trained would cost, measured on some of its steps. A stage that reads
+/// the networks of another gets them untrained, which changes no time.
 std::vector<StageForecast> forecast(TrainConfig config, const TrainingData& data);
 
 struct StoreTraining {
   Bundle bundle;
   std::vector<StageId> artifacts;  ///< in the order of training
 };
-/// The same through a store: what is there is taken, what is not is made, or waited for if another
-/// process makes it. `last_stage`: no further than that. Data are read only if something is
-/// trained.
+/// Trains through a store: artifacts that are there are taken; the others are made, or waited for
+/// while another process makes them. `last_stage`: the last stage to make ("": all). Data are read
+/// only if something is trained.
 StoreTraining train_in_store(const Store& store, const TrainConfig& config, Identities* identities,
                              const TrainOptions& options, const std::string& last_stage = "");
 
