@@ -50,7 +50,7 @@ class Import(CliTest):
         report, count = self.imported("arm.bvh", frames(slow))
         self.assertEqual(count, 60)
         self.assertNotIn("beginning", report["facts"])
-        names = dict(zip(NAMES, "hip lThigh rThigh abdomen lShin rShin chest lFoot rFoot - lToe rToe neck lCollar rCollar head "
+        names = dict(zip(NAMES, "hip lThigh rThigh abdomen lShin rShin - lFoot rFoot chest lToe rToe neck lCollar rCollar head "
                                 "lShldr rShldr lForeArm rForeArm lHand rHand".split()))
         def daz(text):
             for name in sorted(names, key=len, reverse=True):
