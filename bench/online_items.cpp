@@ -186,7 +186,7 @@ class FrameOnline : public Item {
   std::vector<double> check() override {
     for (int64_t i = 0; i < 3; ++i) push(i);
     Points p = answer_[0].vertices;
-    for (Point& x : p) x -= answer_[0].joints[0].cast<float>();
+    for (Point& x : p) x -= answer_[0].joints->front().cast<float>();
     return summary(tensor_of(p));
   }
 

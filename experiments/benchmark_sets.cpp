@@ -47,7 +47,7 @@ Prediction retargeted(const Bundle& weights, const std::string& folder, const st
   };
   const auto keep_all = [&](std::span<const RetargetedFrame> made) {
     for (const RetargetedFrame& f : made) {
-      if (system->rig() != nullptr) keep(f.joints, &out.joints);
+      if (f.joints) keep(*f.joints, &out.joints);
       keep(f.vertices, &out.vertices);
       if (f.confidence) out.confidence.push_back(*f.confidence);
       ++out.frames;

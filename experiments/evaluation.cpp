@@ -36,9 +36,10 @@ struct Sequence {
 /// What is not every frame has no acceleration.
 void add(const Predicted& p, const Sequence& s, const EvaluationOptions& how,
          metrics::Evaluation* into) {
-  const metrics::SequenceView view{p.joints.track(), s.joints.track(), p.vertices.track(),
-                                   p.vertices.frames > 0 ? s.vertices.track() : metrics::Track{},
-                                   s.joints.frames};
+  const metrics::SequenceView view{
+      p.joints.track(), p.joints.frames > 0 ? s.joints.track() : metrics::Track{},
+      p.vertices.track(), p.vertices.frames > 0 ? s.vertices.track() : metrics::Track{},
+      s.joints.frames};
   const auto metrics = metrics_of_every(how.every, how.metrics);
   into->sequences.push_back(metrics::evaluate({&view, 1}, metrics).sequences[0]);
 }
@@ -83,7 +84,7 @@ void judge_retargeting(const Performance& performance, System& system, const Pus
   Predicted model;
   const auto keep = [&](std::span<const RetargetedFrame> frames) {
     for (const RetargetedFrame& f : frames) {
-      model.joints.push(f.joints);
+      if (f.joints) model.joints.push(*f.joints);
       if (!f.vertices.empty()) model.vertices.push(f.vertices);
     }
   };
@@ -93,7 +94,8 @@ void judge_retargeting(const Performance& performance, System& system, const Pus
   }
   keep(system.finish());
   add(model, s, how, &scores->model);
-  scores->joint_errors.push_back(joint_errors(model.joints.track(), s.joints.track()));
+  if (model.joints.frames > 0)
+    scores->joint_errors.push_back(joint_errors(model.joints.track(), s.joints.track()));
   scores->frames.push_back(s.joints.frames);
   if (how.every == 1 && system.target_joints() != nullptr && !s.source.empty())
     add_references(s, system, how, scores);

@@ -30,9 +30,8 @@ void check(const SourceRecord& how) {
 
 Source::Source(const SourceRecord& how, uint64_t max_memory) : how_(how), turn_(turn_of(how.up)) {
   check(how);
-  frames_ = open_frames(how.path, {.clip = how.clip,
-                                   .max_memory = max_memory,
-                                   .sequence = how.sequence});
+  frames_ =
+      open_frames(how.path, {.clip = how.clip, .max_memory = max_memory, .sequence = how.sequence});
   if (!how_.fps) how_.fps = frames_->fps();
 }
 

@@ -259,7 +259,7 @@ bool Retargeter::step(const SeenJoints& now, bool filled, RetargetedFrame* out) 
   out->joints = posed.joints;
   if (surface_) (*surface_)(out->pose, posed, &out->vertices);
   const auto finite = [](const auto& x) { return x.allFinite(); };
-  if (!std::all_of(out->joints.begin(), out->joints.end(), finite) ||
+  if (!std::all_of(posed.joints.begin(), posed.joints.end(), finite) ||
       !std::all_of(out->vertices.begin(), out->vertices.end(), finite))
     throw InputError("", "frame " + std::to_string(answered_ - 1) + " of the result is not finite",
                      "check that source and target are in metres");

@@ -13,12 +13,13 @@
 namespace restage {
 
 /// The target in one frame of the result. Frames of the result are kFps a second, whatever the
-/// source's rate is; their moments are called the grid. `pose` and `joints` are only set by a
-/// system that has a rig().
+/// source's rate is; their moments are called the grid.
 struct RetargetedFrame {
-  Pose pose;        ///< local rotations; the pelvis in the world, metres
-  Joints joints;    ///< of `pose`, in the world, metres
-  Points vertices;  ///< of `pose`, in the world, metres, in the target's order
+  /// Local rotations; the pelvis in the world, metres. Means nothing where there are no `joints`.
+  Pose pose;
+  /// The joints of `pose` in the world, metres. A system without a rig() has none.
+  std::optional<Joints> joints;
+  Points vertices;  ///< in the world, metres, in the target's order
   /// How sure the extractor is of the source's joints, 0 to 1: its estimate of the chance that a
   /// joint lies within kNearby (nn/models/views.h) of the place where the extractor puts the joint,
   /// averaged over the 22 joints. Empty: the system makes no estimate. 0 in a filled frame.

@@ -45,9 +45,9 @@ std::vector<Camera> draw_cameras(Sensor sensor, Rng& rng) {
 }
 
 /// The nearest depths of a camera's picture, cell by cell.
-class DepthMap {
+class SensorDepth {
  public:
-  explicit DepthMap(const Points& view) : low_(box_of(view).min()) {
+  explicit SensorDepth(const Points& view) : low_(box_of(view).min()) {
     const Point size = box_of(view).sizes();
     width_ = std::max(kCell, std::max(size.x(), size.y()) / 1000);  // of giants' cells
     columns_ = static_cast<int>(size.x() / width_) + 3;             // with an empty margin
@@ -82,7 +82,7 @@ void look(const Camera& camera, const Points& points, const Points& normals,
   Points view;
   for (const Point& p : points)
     view.emplace_back(camera.across.dot(p), camera.up.dot(p), camera.towards.dot(p));
-  const DepthMap map(view);
+  const SensorDepth map(view);
   for (size_t i = 0; i < points.size(); ++i) {
     const float cosine = camera.towards.dot(normals[i]);
     if (cosine > kGrazing && !map.hides(view[i])) (*seen)[i] += cosine;

@@ -73,15 +73,17 @@ Sink make_sink(const RetargetCommand& c, const System& s, const SourceRecord& so
   }
   const Mesh& target = s.target();
   if (c.out.ends_with(".h5")) {
+    rig_of(s, c.out);  // /joints must be there
     const auto writer = std::make_shared<PredictionWriter>(c.out, std::ssize(target.vertices),
                                                            target.faces, FileInfo{}, rate_of(c));
     writer->set_source(source);
-    return {
-        [writer](const RetargetedFrame& f) { writer->append(f.joints, f.vertices, f.confidence); },
-        [writer](const Frames& filled) {
-          writer->set_filled(filled);
-          writer->commit();
-        }};
+    return {[writer](const RetargetedFrame& f) {
+              writer->append(f.joints.value(), f.vertices, f.confidence);
+            },
+            [writer](const Frames& filled) {
+              writer->set_filled(filled);
+              writer->commit();
+            }};
   }
   const auto writer = std::make_shared<FrameFolderWriter>(
       c.out, target.faces, c.format == "obj" ? MeshFormat::obj : MeshFormat::ply);

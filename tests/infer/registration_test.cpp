@@ -58,7 +58,7 @@ TEST(Registration, RecoversThePoseOfTheSameBody) {
   const Pose truth = step_pose(body());
   const PosedSkeleton posed = forward_kinematics(body().joints, truth);
   const RetargetedFrame found = registered(body(), scan(body(), truth));
-  EXPECT_LT(mean_distance(found.joints, posed.joints), 0.03);
+  EXPECT_LT(mean_distance(*found.joints, posed.joints), 0.03);
   // It has somewhere to come from: the T-pose in the right place is far away.
   Joints rest = body().joints;
   for (Vec3& p : rest) p += truth.root - body().joints[0];
@@ -77,12 +77,12 @@ TEST(Registration, AnotherBodyPerformsItWithItsOwnBones) {
   ASSERT_EQ(found.vertices.size(), other.rest.vertices.size());
   for (size_t j = 1; j < kJoints; ++j) {
     const auto p = static_cast<size_t>(kParents[j]);
-    EXPECT_NEAR((found.joints[j] - found.joints[p]).norm(),
+    EXPECT_NEAR(((*found.joints)[j] - (*found.joints)[p]).norm(),
                 (other.joints[j] - other.joints[p]).norm(), 1e-9);
   }
   Pose same = pose;  // the same turns, the path by the length of the legs
   same.root *= leg_length(other.joints) / leg_length(body().joints);
-  EXPECT_LT(mean_distance(found.joints, forward_kinematics(other.joints, same).joints), 0.08);
+  EXPECT_LT(mean_distance(*found.joints, forward_kinematics(other.joints, same).joints), 0.08);
 }
 
 TEST(Registration, TheSameBitsForAnyNumberOfThreads) {
@@ -162,20 +162,20 @@ TEST(Registration, MissedFramesLieBetweenThoseAround) {
   const auto first = registration.push(scan(body(), at(0)), "first");
   ASSERT_EQ(first.size(), 2u) << "the missed one before is as the first";
   EXPECT_TRUE(first[0].filled && !first[1].filled);
-  EXPECT_EQ(first[0].joints, first[1].joints);
-  const Joints before = first[1].joints;
+  EXPECT_EQ(*first[0].joints, *first[1].joints);
+  const Joints before = *first[1].joints;
   registration.miss();
   const auto pushed = registration.push(scan(body(), at(0.2)), "second");
   ASSERT_EQ(pushed.size(), 2u);
   EXPECT_TRUE(pushed[0].filled && !pushed[1].filled);
   EXPECT_EQ(pushed[0].vertices.size(), body().rest.vertices.size());
-  const Joints after = pushed[1].joints;
-  EXPECT_LT((pushed[0].joints[0] - (before[0] + after[0]) / 2).norm(), 1e-9);
+  const Joints after = *pushed[1].joints;
+  EXPECT_LT(((*pushed[0].joints)[0] - (before[0] + after[0]) / 2).norm(), 1e-9);
   EXPECT_THROW(registration.push({}, "none"), UnusableCloud);
   registration.miss();
   const auto last = registration.finish();
   ASSERT_EQ(last.size(), 1u);
-  EXPECT_EQ(last[0].joints, after);
+  EXPECT_EQ(*last[0].joints, after);
   registration.restart();
   registration.miss();
   EXPECT_TRUE(registration.finish().empty());

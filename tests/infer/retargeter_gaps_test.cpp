@@ -45,7 +45,7 @@ TEST(InferRetargeter, MissedFramesLieBetweenThoseAround) {
   const auto expected = retargeted(models, bridged), found = with_gaps(r, source, {7, 8});
   ASSERT_EQ(found.size(), source.size());
   for (size_t f = 0; f < found.size(); ++f)
-    EXPECT_LT(apart(found[f].joints, expected[f].joints), 1e-6) << f;
+    EXPECT_LT(apart(*found[f].joints, *expected[f].joints), 1e-6) << f;
   EXPECT_EQ(filled(found), (Numbers{7, 8}));
   r.restart();
   EXPECT_EQ(filled(with_gaps(r, source, {})), Numbers{}) << "a restart forgets the gaps";
@@ -61,7 +61,7 @@ TEST(InferRetargeter, GapsAtTheEndsRepeatTheNearestFrame) {
   Retargeter r(models, "w", target().rest, target().joints, {});
   const auto found = with_gaps(r, source, {0, 1, 6, 7});
   ASSERT_EQ(found.size(), 8u);
-  for (size_t f = 0; f < 8; ++f) EXPECT_EQ(apart(found[f].joints, expected[f].joints), 0) << f;
+  for (size_t f = 0; f < 8; ++f) EXPECT_EQ(apart(*found[f].joints, *expected[f].joints), 0) << f;
   EXPECT_EQ(filled(found), (Numbers{0, 1, 6, 7}));
   r.restart();
   EXPECT_TRUE(with_gaps(r, source, {0, 1, 2, 3, 4, 5, 6, 7}).empty());
@@ -106,7 +106,7 @@ TEST(InferRetargeter, NobodyIsSureOfAFilledFrame) {
   ASSERT_EQ(frames.size(), source.size());
   for (const size_t f : {5u, 6u}) {
     EXPECT_EQ(frames[f].confidence, 0) << f;
-    EXPECT_EQ(apart(frames[f].joints, frames[4].joints), 0) << f << ": the target waits";
+    EXPECT_EQ(apart(*frames[f].joints, *frames[4].joints), 0) << f << ": the target waits";
   }
   EXPECT_GT(*frames[7].confidence, 0.9);
 }

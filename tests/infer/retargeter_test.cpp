@@ -56,22 +56,22 @@ TEST(InferRetargeter, WaitsWhereItDoubts) {
   EXPECT_GT(*answered[3].confidence, 0.99);
   EXPECT_LT(*answered[kDoubt].confidence, 0.1);
   for (const Mat3& r : held[1].pose.local) EXPECT_NEAR(r.col(1).y(), 1, 1e-9) << "stands at rest";
-  EXPECT_GT(apart(answered[kDoubt].joints, answered[kDoubt - 1].joints), 1e-4);
+  EXPECT_GT(apart(*answered[kDoubt].joints, *answered[kDoubt - 1].joints), 1e-4);
   const auto step = [](const std::vector<RetargetedFrame>& of, size_t f) {
-    return apart(of[f].joints, of[f - 1].joints);
+    return apart(*of[f].joints, *of[f - 1].joints);
   };
   double jump = 0;  // from rest into the motion
   for (size_t f = 2; f < kFrames; ++f) {
     if (doubted(f)) {
-      EXPECT_EQ(apart(held[f].joints, answered[kDoubt - 1].joints), 0) << f;
+      EXPECT_EQ(apart(*held[f].joints, *answered[kDoubt - 1].joints), 0) << f;
     } else if ((f >= 2 + kReturn && f < kDoubt) || f >= kDoubt + 2 + kReturn) {
-      EXPECT_EQ(apart(held[f].joints, answered[f].joints), 0) << f << ": has come back";
+      EXPECT_EQ(apart(*held[f].joints, *answered[f].joints), 0) << f << ": has come back";
     }
     jump = std::max(jump, step(held, f));
   }
-  EXPECT_GT(apart(held[1].joints, answered[2].joints), 0.2);
-  EXPECT_LT(jump, 0.5 * apart(held[1].joints, answered[2].joints)) << "no jump";
-  EXPECT_LT(step(held, 2), 0.05 * apart(held[1].joints, answered[2].joints));
+  EXPECT_GT(apart(*held[1].joints, *answered[2].joints), 0.2);
+  EXPECT_LT(jump, 0.5 * apart(*held[1].joints, *answered[2].joints)) << "no jump";
+  EXPECT_LT(step(held, 2), 0.05 * apart(*held[1].joints, *answered[2].joints));
   Retargeter silent(untrained(), "w", target().rest, target().joints, {.min_confidence = 0.5});
   EXPECT_THROW(silent.push_joints(source[0]), InputError);
 }
@@ -124,12 +124,12 @@ TEST(InferRetargeter, FrameByFrameEqualsTheWholeSequence) {
         EXPECT_LT((online[f].pose.local[j] - whole[f].local[j]).cwiseAbs().maxCoeff(), 1e-5)
             << name << " frame " << f;
       EXPECT_LT((online[f].pose.root - whole[f].root).norm(), 1e-5) << name << " frame " << f;
-      EXPECT_LT(apart(online[f].joints, forward_kinematics(target().joints, whole[f]).joints),
+      EXPECT_LT(apart(*online[f].joints, forward_kinematics(target().joints, whole[f]).joints),
                 1e-5);
     }
     // The state is carried: a frame depends on those before it.
     r.restart();
-    EXPECT_GT(apart(r.push_joints(source[20])[0].joints, online[20].joints), 1e-4);
+    EXPECT_GT(apart(*r.push_joints(source[20])[0].joints, *online[20].joints), 1e-4);
   }
 }
 
@@ -176,7 +176,7 @@ TEST(InferRetargeter, RestartForgetsEverything) {
   const std::vector<RetargetedFrame> again = run(r, source);
   ASSERT_EQ(first.size(), again.size());
   for (size_t f = 0; f < first.size(); ++f) {
-    EXPECT_EQ(first[f].joints, again[f].joints);
+    EXPECT_EQ(*first[f].joints, *again[f].joints);
     EXPECT_EQ(first[f].vertices, again[f].vertices);
   }
 }
@@ -213,7 +213,7 @@ TEST(InferRetargeter, WhoLooksAheadAnswersEveryFrameLater) {
       for (const RetargetedFrame& f : late.finish()) frames.push_back(f);
       ASSERT_EQ(frames.size(), length) << round;
       for (size_t f = 0; f < length; ++f)
-        EXPECT_LT(apart(frames[f].joints, at_once[f].joints), 0.03) << length << " " << f;
+        EXPECT_LT(apart(*frames[f].joints, *at_once[f].joints), 0.03) << length << " " << f;
       late.restart();
     }
   }
@@ -245,9 +245,9 @@ TEST(InferRetargeter, FramesOfOtherRatesFallOnTheThirtyPerSecondGrid) {
   const auto from60 = frames(60, 40), direct = retargeted(models, half);
   const auto from15 = frames(15, 20), midpoints = retargeted(models, doubled);
   for (size_t f = 0; f < direct.size(); ++f)
-    EXPECT_LT(apart(from60[f].joints, direct[f].joints), 1e-6) << f;
+    EXPECT_LT(apart(*from60[f].joints, *direct[f].joints), 1e-6) << f;
   for (size_t f = 0; f < midpoints.size(); ++f)
-    EXPECT_LT(apart(from15[f].joints, midpoints[f].joints), 1e-5) << f;
+    EXPECT_LT(apart(*from15[f].joints, *midpoints[f].joints), 1e-5) << f;
 }
 
 TEST(InferRetargeter, VerticesKeepTheTargetsOrder) {
@@ -285,7 +285,7 @@ TEST(InferRetargeter, TargetsAwayFromTheOriginAreTheSame) {
   Retargeter a(models, "w", target().rest, target().joints, {}), b(models, "w", moved, rest, {});
   for (const Joints& j : source) {
     const RetargetedFrame x = a.push_joints(j)[0], y = b.push_joints(j)[0];
-    EXPECT_LT(apart(x.joints, y.joints), 1e-4);
+    EXPECT_LT(apart(*x.joints, *y.joints), 1e-4);
     EXPECT_LT(apart(x.vertices, y.vertices), 1e-4);
   }
 }

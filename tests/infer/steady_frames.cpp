@@ -91,7 +91,7 @@ TEST_P(SteadyFrames, TakeNothingFromTheHeapAndDoNotGrow) {
   double moved = 0;
   const auto frames = [&](size_t n) {
     for (size_t i = 0; i < n; ++i)
-      moved += r.push(source[i % source.size()], name)[0].joints[0].norm();
+      moved += r.push(source[i % source.size()], name)[0].joints->front().norm();
   };
   frames(200);
   reset_peak_memory();
