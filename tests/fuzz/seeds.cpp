@@ -99,7 +99,7 @@ Seeds table_seeds() {
 Seeds frame_seeds() {
   return {{"counted", "f1.ply\nf2.ply\nf10.ply\nfloor.ply\n", Cut::any},
           {"times", "100.0.ply\n100.05.ply\n100.1.ply\n100.2.ply\n", Cut::any},
-          {"signs", "a-1.ply\na0.ply\n-3.ply\n-2.5.ply\n", Cut::any}};
+          {"signs", "a-1.ply\na0.ply\na0.5.ply\na1.ply\n-3.ply\n", Cut::any}};
 }
 
 // ---- characters --------------------------------------------------------------------------------

@@ -71,10 +71,10 @@ void play(const std::string& path) {
 
 void read_ply(const std::string& bytes) { parse_mesh(bytes, "x.ply"); }
 void read_obj(const std::string& bytes) { parse_mesh(bytes, "x.obj"); }
-void read_pcd(const std::string& bytes) { parse_mesh(bytes, "x.pcd"); }
+void read_pcd(const std::string& bytes) { parse_mesh(bytes, "x.pcd", Vec3::Zero(), NonFinite::mark); }
 void read_table(const std::string& bytes) {
   starts_as_table(bytes);
-  parse_mesh(bytes, "x.csv");
+  parse_mesh(bytes, "x.csv", Vec3::Zero(), NonFinite::mark);
 }
 
 /// Names of files, one a line.
