@@ -101,11 +101,5 @@ struct NonFiniteArgs {
   const Tensor& x;
   Tensor& out;
 };
-/// Whether no element of x (f32 or f64) is NaN or infinite; waits for the device.
-inline bool all_finite(const Tensor& x) {
-  Tensor found = Tensor::empty({1}, DType::i32, x.device());
-  launch(NonFiniteArgs{x, found});
-  return found.cpu().item() == 0;
-}
 
 }  // namespace restage

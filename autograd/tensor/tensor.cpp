@@ -256,6 +256,12 @@ Tensor Tensor::cast(DType type) const {
   return out;
 }
 
+bool all_finite(const Tensor& x) {
+  Tensor found = Tensor::empty({1}, DType::i32, x.device());
+  launch(NonFiniteArgs{x, found});
+  return found.cpu().item() == 0;
+}
+
 #define RESTAGE_INSTANTIATE(T)                                          \
   template Tensor Tensor::from<T>(const Shape&, const std::vector<T>&); \
   template T* Tensor::data<T>();                                        \

@@ -108,6 +108,9 @@ Batch moved(Batch batch, Device device) {
   return batch;
 }
 
+/// Whether no element of x (f32 or f64) is NaN or infinite; waits for the device.
+bool all_finite(const Tensor& x);
+
 /// Memory of a device's tensors, bytes. A device keeps the blocks that tensors give back and hands
 /// them out again.
 struct MemoryStats {

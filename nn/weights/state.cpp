@@ -6,7 +6,6 @@
 #include <map>
 
 #include "autograd/base/atomic_file.h"
-#include "autograd/kernels/elementwise.h"
 
 namespace restage {
 namespace {
