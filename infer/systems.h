@@ -17,8 +17,8 @@ struct SystemInput {
   Mesh target;                 ///< T-pose, metres, y up, facing +z
   std::string target_name;     ///< for errors
   std::optional<Joints> rest;  ///< of the target, if they are known
-  std::optional<Joints> rig;   ///< those that the target's rig shows (Retargeter)
   RetargetOptions options;
+  std::optional<Joints> rig = std::nullopt;  ///< those that the target's rig shows (Retargeter)
 };
 
 struct SystemType {
