@@ -19,6 +19,7 @@ struct SystemInput {
   std::optional<Joints> rest;  ///< the target's rest joints, if they are known
   std::optional<Joints> rig;   ///< the joints that the target's rig shows (Retargeter)
   RetargetOptions options;
+  std::optional<Joints> rig = std::nullopt;  ///< those that the target's rig shows (Retargeter)
 };
 
 struct SystemType {
