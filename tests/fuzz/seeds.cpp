@@ -96,12 +96,6 @@ Seeds table_seeds() {
           {"commas", "x;y;z\n0,5;1;2\n", Cut::any}};
 }
 
-Seeds frame_seeds() {
-  return {{"counted", "f1.ply\nf2.ply\nf10.ply\nfloor.ply\n", Cut::any},
-          {"times", "100.0.ply\n100.05.ply\n100.1.ply\n100.2.ply\n", Cut::any},
-          {"signs", "a-1.ply\na0.ply\na0.5.ply\na1.ply\n-3.ply\n", Cut::any}};
-}
-
 // ---- characters --------------------------------------------------------------------------------
 
 using testing::GlbParts;
@@ -387,7 +381,6 @@ std::vector<Seed> seeds(std::string_view target) {
       {"obj", obj_seeds},
       {"pcd", pcd_seeds},
       {"table", table_seeds},
-      {"frames", frame_seeds},
       {"gltf", gltf_seeds},
       {"character", character_seeds},
       {"bvh", bvh_seeds},
