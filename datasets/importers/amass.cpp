@@ -18,8 +18,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kMaxSeconds = 35000;
-constexpr const char* kRates[] = {"mocap_framerate", "mocap_frame_rate", "mocap_fps",
-                                  "fps",             "frame_rate",       "framerate"};
+constexpr const char* kRates[] = {"mocap_framerate", "mocap_frame_rate", "mocap_fps", "fps",
+                                  "frame_rate",      "framerate"};
 
 /// By the name of the file or its folder: SMPLX_MALE.npz, female/model.npz.
 std::string gender_of(const fs::path& file) {
@@ -112,7 +112,8 @@ Betas betas_of(const Npz& file, const std::string& name, size_t frames, ImportRe
     out[i % width] += values[i] / static_cast<double>(rows);
     differ = differ || std::abs(values[i] - values[i % width]) > 1e-6;
   }
-  if (differ) report.remark(cat("the shape changes from frame to frame: the mean of ", rows, " is taken"));
+  if (differ)
+    report.remark(cat("the shape changes from frame to frame: the mean of ", rows, " is taken"));
   return out;
 }
 
@@ -135,7 +136,8 @@ JointMap identity_map() {
 SourceMotion read_motion(const Npz& file, const BodyParameters& names, BodyRotations rotations,
                          const Joints& rest) {
   if (names.trans.empty())
-    throw InputError(file.path(), cat("says where the joints are (", rotations.layout, "), but not the body"),
+    throw InputError(file.path(),
+                     cat("says where the joints are (", rotations.layout, "), but not the body"),
                      "add trans [F, 3], the root's place in metres (zeros: it stays in place)");
   const NpyArray trans = file.array(names.trans);
   const auto frames = std::ssize(rotations.local);

@@ -66,7 +66,8 @@ void fill_gaps(Recording& recording, const std::vector<int64_t>& numbers, double
     motion.fps = kAmcFps / static_cast<double>(step);
     recording.rate_of_file += cat(", of which one in ", step, " is there");
     recording.remarks.push_back(cat("its frames are numbered ", numbers[0], ", ", numbers[1],
-                                    " ...: one in ", step, " is there, and they are taken as they are"));
+                                    " ...: one in ", step,
+                                    " is there, and they are taken as they are"));
   }
   const double rate = fps > 0 ? fps : motion.fps;
   SourceMotion whole;
@@ -74,8 +75,10 @@ void fill_gaps(Recording& recording, const std::vector<int64_t>& numbers, double
   for (size_t i = 0; i < numbers.size(); ++i) {
     const int64_t missing = i == 0 ? 0 : (numbers[i] - numbers[i - 1]) / step - 1;
     if (static_cast<double>(missing) > rate)
-      throw InputError(path, cat("lacks the frames from ", numbers[i - 1], " to ", numbers[i], ", more than a second"),
-                       "cut the recording there");
+      throw InputError(
+          path,
+          cat("lacks the frames from ", numbers[i - 1], " to ", numbers[i], ", more than a second"),
+          "cut the recording there");
     for (int64_t k = 1; k <= missing; ++k) {
       const double t = static_cast<double>(k) / static_cast<double>(missing + 1);
       std::vector<Quat>& local = whole.local.emplace_back();
@@ -90,8 +93,9 @@ void fill_gaps(Recording& recording, const std::vector<int64_t>& numbers, double
   if (filled == 0) return;
   motion.local = std::move(whole.local);
   motion.position = std::move(whole.position);
-  recording.remarks.push_back(cat(filled, filled == 1 ? " frame is" : " frames are",
-                                  " lacking by the numbers of the others: filled from those around"));
+  recording.remarks.push_back(
+      cat(filled, filled == 1 ? " frame is" : " frames are",
+          " lacking by the numbers of the others: filled from those around"));
 }
 
 }  // namespace
@@ -110,9 +114,10 @@ MotionClip convert_amc(std::string_view text, const std::string& path, std::stri
   if (asf.length_unit > 0) recording.metres_per_unit = 0.0254 / asf.length_unit;
   const std::vector<int64_t> numbers = std::move(amc.numbers);
   if (amc.largest_unused > 0)
-    recording.remarks.push_back(format("bones are moved or stretched, by up to %.4g units: left out, "
-                                       "as a person's bones keep their length",
-                                       amc.largest_unused));
+    recording.remarks.push_back(
+        format("bones are moved or stretched, by up to %.4g units: left out, "
+               "as a person's bones keep their length",
+               amc.largest_unused));
   recording.motion = amc_motion(asf, std::move(amc));
   fill_gaps(recording, numbers, options.fps, path);
   recording.names = name_joints(recording.motion.skeleton, asf_path, profile ? &*profile : nullptr);

@@ -59,14 +59,15 @@ Quat rotation_at(const RotationArray& from, int64_t frame, int64_t joint) {
   for (int64_t i = 0; i < from.width(); ++i) {
     numbers[i] = from.array[at + i];
     if (!(std::abs(numbers[i]) < 1e5))
-      throw InputError(from.array.where(), "holds a number that is not finite or too large", kAsPublished);
+      throw InputError(from.array.where(), "holds a number that is not finite or too large",
+                       kAsPublished);
   }
   if (from.form == Form::axis_angle) return rotation(Vec3(numbers[0], numbers[1], numbers[2]));
   const Mat3 matrix = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(numbers);
   if (!((matrix * matrix.transpose() - Mat3::Identity()).cwiseAbs().maxCoeff() < 0.05) ||
       !(matrix.determinant() > 0))
-    throw InputError(from.array.where(), cat("holds a matrix that is no rotation, in frame ", frame),
-                     kAsPublished);
+    throw InputError(from.array.where(),
+                     cat("holds a matrix that is no rotation, in frame ", frame), kAsPublished);
   return Quat(matrix).normalized();
 }
 
@@ -81,7 +82,8 @@ std::string named(const std::string& name, const NpyArray& array) {
   return name + " " + shape_text(array.shape());
 }
 
-BodyRotations empty(int64_t frames, int64_t joints, const NpyArray& where, const std::string& layout) {
+BodyRotations empty(int64_t frames, int64_t joints, const NpyArray& where,
+                    const std::string& layout) {
   for (const int64_t known : {22, 24, 52, 55})
     if (joints == known) {
       BodyRotations out;
@@ -90,8 +92,10 @@ BodyRotations empty(int64_t frames, int64_t joints, const NpyArray& where, const
       out.layout = layout;
       return out;
     }
-  throw InputError(where.where(), cat("has the shape ", shape_text(where.shape()), ", ", joints, " joints in all"),
-                   "AMASS has [F, 156] (SMPL-H) and [F, 165] (SMPL-X); [F, 72] (SMPL) and [F, 66] are read, too");
+  throw InputError(where.where(),
+                   cat("has the shape ", shape_text(where.shape()), ", ", joints, " joints in all"),
+                   "AMASS has [F, 156] (SMPL-H) and [F, 165] (SMPL-X); [F, 72] (SMPL) and [F, 66] "
+                   "are read, too");
 }
 
 }  // namespace
@@ -101,16 +105,19 @@ BodyRotations read_body_rotations(const Npz& file, const BodyParameters& names) 
   const bool parts = !names.orient.empty() && !names.body.empty();
   if (names.poses == "poses" || !parts) {
     const RotationArray poses = open_rotations(file, names.poses);
-    BodyRotations out = empty(poses.frames, poses.joints, poses.array, named(names.poses, poses.array));
+    BodyRotations out =
+        empty(poses.frames, poses.joints, poses.array, named(names.poses, poses.array));
     add_joints(poses, 0, out);
     return out;
   }
-  const RotationArray root = open_rotations(file, names.orient), body = open_rotations(file, names.body);
+  const RotationArray root = open_rotations(file, names.orient),
+                      body = open_rotations(file, names.body);
   if (root.joints != 1) misshapen(root.array, "the root has one rotation a frame");
   if (root.frames != body.frames)
     misshapen(root.array, cat("it needs as many frames as ", names.body, ": ", body.frames));
-  BodyRotations out = empty(body.frames, body.joints + 1, body.array,
-                            cat(named(names.orient, root.array), ", ", named(names.body, body.array)));
+  BodyRotations out =
+      empty(body.frames, body.joints + 1, body.array,
+            cat(named(names.orient, root.array), ", ", named(names.body, body.array)));
   add_joints(root, 0, out);
   add_joints(body, 1, out);
   return out;

@@ -63,7 +63,8 @@ void add_arrays(const std::string& folder, const std::vector<std::string>& files
 }
 
 /// The sequences of a file.
-void add_file(const std::string& file, const FrameOptions& options, std::vector<ScanSequence>& out) {
+void add_file(const std::string& file, const FrameOptions& options,
+              std::vector<ScanSequence>& out) {
   if (!is_hdf5_name(file)) return out.push_back({file, file, {}, {}});
   const int64_t sequences = open_frames(file, options)->sequences();
   for (int64_t s = 0; s < sequences; ++s)
@@ -267,8 +268,7 @@ int64_t import_scans(const ScanSequence& sequence, const MotionOptions& options,
                      uint64_t max_memory, ScanWriter& out, ImportReport& report) {
   const bool one = !sequence.file.empty();
   const FrameOptions how{"", max_memory, sequence.part};
-  const auto source =
-      one ? open_frames(sequence.file, how) : open_frame_list(sequence.frames, how);
+  const auto source = one ? open_frames(sequence.file, how) : open_frame_list(sequence.frames, how);
   const bool stated =
       one && ((is_array_name(sequence.file) && stated_fps(sequence.file, max_memory)) ||
               (is_hdf5_name(sequence.file) && states_fps(sequence.file)));

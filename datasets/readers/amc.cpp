@@ -62,9 +62,8 @@ class AmcParser {
   void end_frame() const {
     for (size_t b = 0; b < given_.size(); ++b)
       if (!given_[b] && !skeleton_.bones[b].freedoms.empty())
-        lines_.fail(
-            cat("frame ", amc_.numbers.back(), " lacks bone ", skeleton_.bones[b].name),
-            "give the whole file, with its own skeleton");
+        lines_.fail(cat("frame ", amc_.numbers.back(), " lacks bone ", skeleton_.bones[b].name),
+                    "give the whole file, with its own skeleton");
   }
 
   void bone_values() {

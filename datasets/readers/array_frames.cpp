@@ -19,10 +19,11 @@ constexpr std::array<std::string_view, 20> kClouds = {
     "scan_verts", "scan_points", "scan",  "v",       "vertex", "scan_vertices"};
 /// What has the shape of a cloud and is none.
 constexpr std::array<std::string_view, 30> kOthers = {
-    "normals",  "normal",     "n",      "vn",          "colors",      "colours",  "color",    "rgb",
-    "faces",    "f",          "face",   "triangles",   "trans",       "transl",   "cam_trans", "translation",
-    "joints",   "joints3d",   "j3d",    "keypoints",   "keypoints3d", "kp3d",     "j_posed",  "velocity",
-    "v_cano",   "v_template", "uv",     "root_orient", "global_orient", "markers"};
+    "normals", "normal",     "n",           "vn",          "colors",        "colours",
+    "color",   "rgb",        "faces",       "f",           "face",          "triangles",
+    "trans",   "transl",     "cam_trans",   "translation", "joints",        "joints3d",
+    "j3d",     "keypoints",  "keypoints3d", "kp3d",        "j_posed",       "velocity",
+    "v_cano",  "v_template", "uv",          "root_orient", "global_orient", "markers"};
 
 template <class Names>
 bool is_one_of(const std::string& name, const Names& names) {
@@ -144,7 +145,9 @@ class ArrayFrames : public FrameSource {
   }
 
  private:
-  uint64_t bytes_per_frame() const { return array_.header.bytes() / static_cast<uint64_t>(frames()); }
+  uint64_t bytes_per_frame() const {
+    return array_.header.bytes() / static_cast<uint64_t>(frames());
+  }
 
   void read(Frame& frame) {
     const std::vector<char> bytes =
@@ -156,9 +159,10 @@ class ArrayFrames : public FrameSource {
       for (int axis = 0; axis < 3; ++axis) {
         const double value =
             whole_ ? (*whole_)[axes.at(at_, i, axis)]
-                   : header.number(bytes.data() + axes.at(0, i, axis) * static_cast<int64_t>(header.width));
-        frame.points[i][axis] =
-            text::coordinate(value, [&] { return frame.source; }, NonFinite::mark);
+                   : header.number(bytes.data() +
+                                   axes.at(0, i, axis) * static_cast<int64_t>(header.width));
+        frame.points[i][axis] = text::coordinate(
+            value, [&] { return frame.source; }, NonFinite::mark);
       }
   }
 
@@ -227,7 +231,8 @@ std::optional<CloudArray> find_cloud(const Npz& file) {
   if (found.size() == 1) return found[0];
   const bool single = std::none_of(found.begin(), found.end(),
                                    [](const CloudArray& cloud) { return cloud.axes.sequence; });
-  const std::vector<std::string> series = single ? series_of(names_of(found)) : std::vector<std::string>();
+  const std::vector<std::string> series =
+      single ? series_of(names_of(found)) : std::vector<std::string>();
   if (series.empty())
     throw InputError(file.path(), "holds several arrays of points: " + list_of(names_of(found)),
                      "name the right one 'points'");

@@ -27,13 +27,14 @@ std::string find(const Npz& file, std::initializer_list<std::string_view> names)
 
 BodyParameters body_parameters(const Npz& file) {
   BodyParameters out;
-  out.poses = find(file, {"poses_world", "pose_world", "poses", "pose", "thetas", "theta", "fullpose",
-                          "full_pose"});
+  out.poses = find(file, {"poses_world", "pose_world", "poses", "pose", "thetas", "theta",
+                          "fullpose", "full_pose"});
   out.orient = find(file, {"root_orient", "global_orient", "root_orientation", "global_orientation",
                            "root_pose", "global_rot", "root_rot", "orient"});
   out.body = find(file, {"pose_body", "body_pose"});
-  out.trans = find(file, {"trans_world", "trans", "transl", "translation", "root_trans", "root_transl",
-                          "root_translation", "global_trans", "global_transl", "th_trans", "cam_trans"});
+  out.trans =
+      find(file, {"trans_world", "trans", "transl", "translation", "root_trans", "root_transl",
+                  "root_translation", "global_trans", "global_transl", "th_trans", "cam_trans"});
   out.betas = find(file, {"betas", "beta", "shape", "shapes"});
   return out;
 }

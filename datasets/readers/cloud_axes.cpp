@@ -10,13 +10,24 @@
 namespace restage {
 namespace {
 
-constexpr int64_t kMostColumns = 12;  // x y z, normal, colour and some more
+constexpr int64_t kMostColumns = 12;   // x y z, normal, colour and some more
 constexpr int64_t kFewestPoints = 64;  // of a cloud that is of use
 
 /// Height and width of depth cameras' pictures.
-constexpr std::array<std::pair<int64_t, int64_t>, 14> kPictures = {
-    {{576, 640}, {288, 320}, {512, 512}, {1024, 1024}, {480, 640}, {240, 320}, {424, 512},
-     {720, 1280}, {1080, 1920}, {480, 848}, {360, 640}, {192, 256}, {180, 240}, {1536, 2048}}};
+constexpr std::array<std::pair<int64_t, int64_t>, 14> kPictures = {{{576, 640},
+                                                                    {288, 320},
+                                                                    {512, 512},
+                                                                    {1024, 1024},
+                                                                    {480, 640},
+                                                                    {240, 320},
+                                                                    {424, 512},
+                                                                    {720, 1280},
+                                                                    {1080, 1920},
+                                                                    {480, 848},
+                                                                    {360, 640},
+                                                                    {192, 256},
+                                                                    {180, 240},
+                                                                    {1536, 2048}}};
 
 bool is_picture(int64_t height, int64_t width) {
   return std::any_of(kPictures.begin(), kPictures.end(), [&](const auto& known) {
@@ -27,7 +38,9 @@ bool is_picture(int64_t height, int64_t width) {
 bool are_columns(int64_t n) { return n > 3 && n <= kMostColumns; }
 
 std::string first_three(int64_t columns) {
-  return columns == 3 ? "" : cat("of its ", columns, " columns the first three are taken for x, y and z");
+  return columns == 3
+             ? ""
+             : cat("of its ", columns, " columns the first three are taken for x, y and z");
 }
 
 CloudAxes cloud(int64_t points, int64_t point_step, int64_t axis_step, std::string remark) {
@@ -48,7 +61,8 @@ CloudAxes sequence(int64_t frames, int64_t frame_step, CloudAxes each) {
 
 std::optional<CloudAxes> of_two(int64_t a, int64_t b) {
   if (b == 3 || (are_columns(b) && a > b)) return cloud(a, b, 1, first_three(b));
-  if (a == 3 && b > kMostColumns) return cloud(b, 1, b, cat("its axes are taken for [xyz, ", b, " points]"));
+  if (a == 3 && b > kMostColumns)
+    return cloud(b, 1, b, cat("its axes are taken for [xyz, ", b, " points]"));
   return std::nullopt;
 }
 
@@ -60,7 +74,8 @@ std::optional<CloudAxes> of_three(int64_t a, int64_t b, int64_t c, int64_t verti
     all.push_back(x_first ? y : x);
   };
   if (c == 3 && is_picture(a, b))
-    all.push_back(cloud(a * b, 3, 1, cat("taken for one picture of a depth camera, ", a, " x ", b, " points")));
+    all.push_back(cloud(a * b, 3, 1,
+                        cat("taken for one picture of a depth camera, ", a, " x ", b, " points")));
   if (c == 3) all.push_back(sequence(a, b * c, cloud(b, c, 1, "")));
   const auto said = [&](const char* order) { return cat("its axes are taken for ", order); };
   if (b == 3)
@@ -85,9 +100,10 @@ std::optional<CloudAxes> cloud_axes(const std::vector<int64_t>& shape, int64_t v
   if (axes.size() == 3) return of_three(axes[0], axes[1], axes[2], vertices);
   if (axes.size() != 4 || axes[3] != 3) return std::nullopt;
   const int64_t points = axes[1] * axes[2];
-  return sequence(axes[0], 3 * points,
-                  cloud(points, 3, 1, cat("taken for pictures of a depth camera, ", axes[1], " x ",
-                                          axes[2], " points")));
+  return sequence(
+      axes[0], 3 * points,
+      cloud(points, 3, 1,
+            cat("taken for pictures of a depth camera, ", axes[1], " x ", axes[2], " points")));
 }
 
 }  // namespace restage

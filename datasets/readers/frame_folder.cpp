@@ -40,8 +40,10 @@ class FileFrames : public FrameSource {
       frame.source = file;
     }
     if (frame.points.empty() && frames() == 1)
-      throw InputError(file, frame.left_out > 0 ? "holds no points but NaN and infinite ones" : "holds no points",
-                       "give a cloud that has some");
+      throw InputError(
+          file,
+          frame.left_out > 0 ? "holds no points but NaN and infinite ones" : "holds no points",
+          "give a cloud that has some");
     return frame;
   }
   void skip() override { at_ = std::min(at_ + 1, list_.files.size()); }
@@ -91,9 +93,9 @@ std::string ending_of(const std::string& path) {
 
 /// Of one frame in several kinds of files the first of these is taken, unless there are more files
 /// of another.
-constexpr std::string_view kEndings[] = {".ply",    ".obj",  ".pcd", ".glb", ".gltf", ".vrm",
-                                         ".xyz",    ".xyzrgb", ".xyzn", ".pts", ".asc", ".npz",
-                                         ".npy",    ".csv",  ".txt"};
+constexpr std::string_view kEndings[] = {".ply", ".obj", ".pcd",    ".glb",  ".gltf",
+                                         ".vrm", ".xyz", ".xyzrgb", ".xyzn", ".pts",
+                                         ".asc", ".npz", ".npy",    ".csv",  ".txt"};
 
 size_t rank_of(const std::string& ending) {
   return static_cast<size_t>(std::find(std::begin(kEndings), std::end(kEndings), ending) -

@@ -21,7 +21,7 @@ bool is_letter(char c) { return (c | 32) >= 'a' && (c | 32) <= 'z'; }
 
 /// A part of a name: text, or a number.
 struct Piece {
-  std::string text;             ///< as it stands in the name
+  std::string text;  ///< as it stands in the name
   bool number = false, negative = false;
   std::string whole, fraction;  ///< digits before the point (without leading zeros) and behind it
   Value value() const {
@@ -75,7 +75,8 @@ Pieces pieces_of(const std::string& name, const Meaning& meaning) {
     }
     Piece piece{digits_at(name, at), true, false, "", ""};
     at += piece.text.size();
-    piece.whole = piece.text.substr(std::min(piece.text.find_first_not_of('0'), piece.text.size() - 1));
+    piece.whole =
+        piece.text.substr(std::min(piece.text.find_first_not_of('0'), piece.text.size() - 1));
     if (meaning.decimals && at < name.size() && is_lone_point(name, at)) {
       piece.fraction = digits_at(name, at + 1);
       at += 1 + piece.fraction.size();
@@ -114,8 +115,8 @@ int compare_numbers(const Piece& a, const Piece& b) {
 
 int compare(const Pieces& a, const Pieces& b) {
   for (size_t i = 0; i < std::min(a.size(), b.size()); ++i) {
-    const int order = a[i].number && b[i].number ? compare_numbers(a[i], b[i])
-                                                 : a[i].text.compare(b[i].text);
+    const int order =
+        a[i].number && b[i].number ? compare_numbers(a[i], b[i]) : a[i].text.compare(b[i].text);
     if (order != 0) return order;
   }
   return a.size() == b.size() ? 0 : a.size() < b.size() ? -1 : 1;
@@ -175,7 +176,8 @@ bool means_decimals(const std::vector<std::string>& names) {
   std::set<std::string> plain, pointed;
   for (const std::string& name : names) {
     const Pieces pieces = pieces_of(name, {.decimals = true});
-    const bool has = std::any_of(pieces.begin(), pieces.end(), [](const Piece& p) { return !p.fraction.empty(); });
+    const bool has = std::any_of(pieces.begin(), pieces.end(),
+                                 [](const Piece& p) { return !p.fraction.empty(); });
     (has ? pointed : plain).insert(pattern_of(pieces));
   }
   for (const std::string& pattern : plain)
@@ -238,8 +240,8 @@ void refuse_parallel_series(const Names& series, const std::string& folder) {
   }
   if (fewest < 2 || 10 * fewest < 8 * most) return;
   throw InputError(folder,
-                   cat("holds several series of frames, such as ", text::quote(series[0].shown), " and ",
-                       text::quote(series.back().shown)),
+                   cat("holds several series of frames, such as ", text::quote(series[0].shown),
+                       " and ", text::quote(series.back().shown)),
                    "put each series into a folder of its own");
 }
 
@@ -272,9 +274,10 @@ void add_numbers(const Names& series, bool decimals, FrameList& out) {
   if (!decimals || out.numbers.empty() || out.numbers.back() == 0) return;
   const auto step = static_cast<double>((columns[0].back() - columns[0][0]) / out.numbers.back());
   if (step > 0.001 && step < 1)
-    out.remarks.push_back(format("the names of the frames count in steps of %.4g: if these are "
-                                 "seconds, the rate is %.4g frames a second (--fps)",
-                                 step, 1 / step));
+    out.remarks.push_back(
+        format("the names of the frames count in steps of %.4g: if these are "
+               "seconds, the rate is %.4g frames a second (--fps)",
+               step, 1 / step));
 }
 
 std::string shown_of(const std::string& path) {
@@ -313,15 +316,16 @@ FrameList order(const std::vector<std::string>& files, const std::string& folder
     out.files = files;
     std::sort(out.files.begin(), out.files.end(), natural_less);
     if (files.size() > 1)
-      out.remarks.push_back(cat("the names of the ", files.size(),
-                                " files are no series of numbers: all are frames, in the order of their names"));
+      out.remarks.push_back(
+          cat("the names of the ", files.size(),
+              " files are no series of numbers: all are frames, in the order of their names"));
     return out;
   }
   for (const auto& [pattern, names] : groups)
     if (&names != series && names.size() > 1 && 2 * names.size() > series->size())
       throw InputError(folder,
-                       cat("holds several series of frames, such as ", text::quote((*series)[0].shown), " and ",
-                           text::quote(names[0].shown)),
+                       cat("holds several series of frames, such as ",
+                           text::quote((*series)[0].shown), " and ", text::quote(names[0].shown)),
                        "put each series into a folder of its own");
   std::sort(series->begin(), series->end(), [](const Name& a, const Name& b) {
     const int order = compare(a.pieces, b.pieces);

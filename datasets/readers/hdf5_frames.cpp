@@ -131,8 +131,9 @@ class Finder {
     for (const std::string& name : sequences_) out.push_back({{name}, {}});
     if (out.empty() && !clouds_.empty()) out.push_back(series());
     if (out.empty())
-      throw InputError(file_.path() + ":/points", "is missing, and so is /vertices",
-                       "give a file of scans (/points, /frame_offset) or surfaces (/vertices [F, V, 3])");
+      throw InputError(
+          file_.path() + ":/points", "is missing, and so is /vertices",
+          "give a file of scans (/points, /frame_offset) or surfaces (/vertices [F, V, 3])");
     return out;
   }
 
@@ -168,8 +169,9 @@ class Finder {
 
   static bool is_no_cloud(const std::string& name) {
     static const std::set<std::string> kNames = {
-        "faces", "f", "face", "triangles", "normals", "normal", "colors", "colours", "color", "rgb",
-        "joints", "label", "labels", "uv", "trans", "transl", "pose", "poses", "betas", "velocity"};
+        "faces",   "f",      "face", "triangles", "normals", "normal",  "colors",
+        "colours", "color",  "rgb",  "joints",    "label",   "labels",  "uv",
+        "trans",   "transl", "pose", "poses",     "betas",   "velocity"};
     return kNames.count(lower_case(name)) > 0;
   }
 
@@ -232,7 +234,8 @@ class ForeignFrames : public FrameSource {
     const std::string& name = found_[sequence_].sets[set_];
     if (!open_) open(name);
     Frame frame;
-    frame.source = axes_.sequence ? cat(file_.path(), ":", name, ":", at_) : cat(file_.path(), ":", name);
+    frame.source =
+        axes_.sequence ? cat(file_.path(), ":", name, ":", at_) : cat(file_.path(), ":", name);
     frame.sequence = static_cast<int64_t>(sequence_);
     std::vector<float> row;
     if (whole_.empty() && axes_.sequence) open_->read_rows(at_, 1, row);
@@ -264,7 +267,8 @@ class ForeignFrames : public FrameSource {
       const h5::Dataset set = file_.dataset(sequence.sets[0]);
       const CloudAxes axes = axes_of(set);
       if (!axes.remark.empty())
-        out.push_back(cat(text::quote(sequence.sets[0]), " ", shape_text(set.shape()), ": ", axes.remark));
+        out.push_back(
+            cat(text::quote(sequence.sets[0]), " ", shape_text(set.shape()), ": ", axes.remark));
       out.insert(out.end(), sequence.remarks.begin(), sequence.remarks.end());
     }
     return out;
@@ -294,7 +298,8 @@ class ForeignFrames : public FrameSource {
     at_ = 0;
     whole_.clear();
     if (axes_.sequence && axes_.in_order()) return;
-    const auto values = static_cast<uint64_t>(open_->rows()) * static_cast<uint64_t>(open_->row_size());
+    const auto values =
+        static_cast<uint64_t>(open_->rows()) * static_cast<uint64_t>(open_->row_size());
     if (values > max_memory_ / sizeof(float))
       throw InputError(open_->where(), cat("takes ", values * sizeof(float), " bytes"),
                        "allow more with --max-memory");
@@ -334,14 +339,16 @@ bool is_hdf5_name(const std::string& path) {
 
 bool is_foreign_hdf5(const std::string& path) {
   const h5::File file = open_schema_file(path);
-  return !is_our_scans(file) && !is_our_prediction(file) && !file.has("/bodies") && !file.has("/motions");
+  return !is_our_scans(file) && !is_our_prediction(file) && !file.has("/bodies") &&
+         !file.has("/motions");
 }
 
 bool states_fps(const std::string& path) {
   return open_schema_file(path).number("/", "fps").has_value();
 }
 
-std::unique_ptr<FrameSource> open_hdf5_frames(const std::string& path, const FrameOptions& options) {
+std::unique_ptr<FrameSource> open_hdf5_frames(const std::string& path,
+                                              const FrameOptions& options) {
   h5::File file = open_schema_file(path);
   if (is_our_scans(file) || is_our_prediction(file)) return open_ours(std::move(file), options);
   return std::make_unique<ForeignFrames>(std::move(file), options);

@@ -26,7 +26,7 @@ struct Header {
   std::vector<Field> fields;
   uint64_t width = 0, height = 1, points = 0;
   bool has_points = false;
-  std::string data;  ///< ascii, binary or binary_compressed
+  std::string data;              ///< ascii, binary or binary_compressed
   std::array<size_t, 3> axis{};  ///< which field is x, y, z
   uint64_t row() const {
     uint64_t out = 0;
@@ -41,11 +41,11 @@ const Number* number_of(const Field& field) {
     char type;
     const Number* number;
   };
-  static constexpr Named kNames[] = {
-      {'F', &kNumber<float>},    {'F', &kNumber<double>},   {'I', &kNumber<int8_t>},
-      {'I', &kNumber<int16_t>},  {'I', &kNumber<int32_t>},  {'I', &kNumber<int64_t>},
-      {'U', &kNumber<uint8_t>},  {'U', &kNumber<uint16_t>}, {'U', &kNumber<uint32_t>},
-      {'U', &kNumber<uint64_t>}};
+  static constexpr Named kNames[] = {{'F', &kNumber<float>},    {'F', &kNumber<double>},
+                                     {'I', &kNumber<int8_t>},   {'I', &kNumber<int16_t>},
+                                     {'I', &kNumber<int32_t>},  {'I', &kNumber<int64_t>},
+                                     {'U', &kNumber<uint8_t>},  {'U', &kNumber<uint16_t>},
+                                     {'U', &kNumber<uint32_t>}, {'U', &kNumber<uint64_t>}};
   for (const Named& known : kNames)
     if (known.type == field.type && known.number->bytes == field.size) return known.number;
   return nullptr;
@@ -60,7 +60,8 @@ class HeaderParser {
   Header parse() {
     std::string_view line;
     while (out_.data.empty()) {
-      if (!lines_.next(line)) throw InputError(path_, "is cut short inside the PCD header", kSaveAgain);
+      if (!lines_.next(line))
+        throw InputError(path_, "is cut short inside the PCD header", kSaveAgain);
       entry(line);
     }
     return checked();
@@ -74,7 +75,8 @@ class HeaderParser {
     if (key == "fields" || key == "columns") {
       for (auto word = text::take_word(line); !word.empty(); word = text::take_word(line)) {
         out_.fields.emplace_back().name = lower_case(word);
-        if (out_.fields.size() > kMaxFields) throw InputError(where(), "has too many fields", kSaveAgain);
+        if (out_.fields.size() > kMaxFields)
+          throw InputError(where(), "has too many fields", kSaveAgain);
       }
     } else if (key == "size") {
       for (Field& field : out_.fields) field.size = number(line, 8);
@@ -108,8 +110,9 @@ class HeaderParser {
 
   Header checked() {
     if (!out_.has_points)
-      out_.points = out_.height > 0 && out_.width > kMaxPoints / out_.height ? kMaxPoints
-                                                                             : out_.width * out_.height;
+      out_.points = out_.height > 0 && out_.width > kMaxPoints / out_.height
+                        ? kMaxPoints
+                        : out_.width * out_.height;
     for (size_t axis = 0; axis < 3; ++axis) {
       const std::string name(1, "xyz"[axis]);
       size_t found = 0;
@@ -134,11 +137,12 @@ class HeaderParser {
 // ---- points ------------------------------------------------------------------------------------
 
 [[noreturn]] void throw_short(const std::string& path, const Header& header) {
-  throw InputError(path, cat("is cut short: it should have ", header.points, " points"), kSaveAgain);
+  throw InputError(path, cat("is cut short: it should have ", header.points, " points"),
+                   kSaveAgain);
 }
 
-/// LZF, which PCL packs with: literals of up to 32 bytes, and copies of up to 264 bytes from at most
-/// 8 KiB back. InputError unless exactly `size` bytes come out.
+/// LZF, which PCL packs with: literals of up to 32 bytes, and copies of up to 264 bytes from at
+/// most 8 KiB back. InputError unless exactly `size` bytes come out.
 std::string unpack_lzf(std::string_view in, uint64_t size, const std::string& path) {
   const auto damaged = [&]() -> InputError {
     return InputError(path, "is damaged: its packed points make no sense", kSaveAgain);
@@ -146,7 +150,9 @@ std::string unpack_lzf(std::string_view in, uint64_t size, const std::string& pa
   if (size / 100 > in.size()) throw damaged();  // three bytes make at most 264
   std::string out;
   out.reserve(size);
-  const auto byte = [&](size_t at) { return static_cast<size_t>(static_cast<unsigned char>(in[at])); };
+  const auto byte = [&](size_t at) {
+    return static_cast<size_t>(static_cast<unsigned char>(in[at]));
+  };
   for (size_t at = 0; at < in.size();) {
     const size_t control = byte(at++);
     if (control < 32) {

@@ -58,7 +58,8 @@ int axis_of(std::string_view cell) {
   name = name.substr(0, name.find_first_of("[("));
   while (!name.empty() && (name.back() == ' ' || name.back() == '_')) name.pop_back();
   name.erase(0, name.find_first_not_of("/# "));
-  constexpr std::array<std::string_view, 7> kBefore = {"", "p", "pos_", "position_", "pos", "coord_", "point_"};
+  constexpr std::array<std::string_view, 7> kBefore = {"",    "p",      "pos_",  "position_",
+                                                       "pos", "coord_", "point_"};
   for (int axis = 0; axis < 3; ++axis) {
     for (const std::string_view before : kBefore)
       if (name == std::string(before) + "xyz"[axis]) return axis;
@@ -71,8 +72,8 @@ int axis_of(std::string_view cell) {
 /// "frame", "Frame_ID"; or a time, which frames share, too.
 bool counts_frames(std::string_view cell) {
   const std::string name = lower_case(cell);
-  constexpr std::array<std::string_view, 8> kNames = {"frame",     "frame_id", "frameid", "frame_number",
-                                                      "frame_idx", "time",     "t",       "timestamp"};
+  constexpr std::array<std::string_view, 8> kNames = {
+      "frame", "frame_id", "frameid", "frame_number", "frame_idx", "time", "t", "timestamp"};
   return std::find(kNames.begin(), kNames.end(), name) != kNames.end();
 }
 
@@ -116,7 +117,8 @@ class TableParser {
     if (names_axes(line)) return header(line);
     separator_ = separator_of(line);
     split(line, separator_, cells_);
-    if (int64_t count = 0; cells_.size() == 1 && !announced_ && text::parse(cells_[0], count) && count >= 0) {
+    if (int64_t count = 0;
+        cells_.size() == 1 && !announced_ && text::parse(cells_[0], count) && count >= 0) {
       announced_ = count;
       return;
     }
@@ -146,8 +148,7 @@ class TableParser {
   void point(std::string_view line) {
     split(line, separator_, cells_);
     drop_empty_end();
-    if (cells_.size() < 3)
-      throw InputError(where(), "has fewer than 3 numbers", kSaveAgain);
+    if (cells_.size() < 3) throw InputError(where(), "has fewer than 3 numbers", kSaveAgain);
     if (cells_.size() != columns_)
       throw InputError(where(), cat("has ", cells_.size(), " columns, the lines before ", columns_),
                        kSaveAgain);
@@ -192,8 +193,9 @@ class TableParser {
 
   void check_end() const {
     if (announced_ && *announced_ != std::ssize(out_.vertices))
-      throw InputError(path_, cat("holds ", out_.vertices.size(), " points, its first line says ", *announced_),
-                       "give the whole file");
+      throw InputError(
+          path_, cat("holds ", out_.vertices.size(), " points, its first line says ", *announced_),
+          "give the whole file");
     if (counted_ && out_.vertices.size() > 3)
       throw InputError(path_, "its first column only counts the points",
                        "leave that column out, or name the columns in a first line (n x y z)");
@@ -231,7 +233,8 @@ bool starts_as_table(std::string_view content) {
 Mesh parse_table(std::string_view content, const std::string& path, const Vec3& origin,
                  NonFinite how) {
   std::string with_ends;  // lines of old Macintosh programs end with CR alone
-  if (content.find('\n') == std::string_view::npos && content.find('\r') != std::string_view::npos) {
+  if (content.find('\n') == std::string_view::npos &&
+      content.find('\r') != std::string_view::npos) {
     with_ends = content;
     std::replace(with_ends.begin(), with_ends.end(), '\r', '\n');
     content = with_ends;

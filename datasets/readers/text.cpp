@@ -46,7 +46,8 @@ bool parse(std::string_view word, double& value) {
   const std::from_chars_result result = std::from_chars(word.data(), end, value);
   if (result.ec == std::errc() && result.ptr == end) return true;
   const std::string lower = lower_case(word);
-  // Older Windows programs write 1.#QNAN, -1.#IND00 and 1.#INF; rounded to few digits 1.#R and 1.#J.
+  // Older Windows programs write 1.#QNAN, -1.#IND00 and 1.#INF; rounded to few digits 1.#R
+  // and 1.#J.
   const bool windows = lower.starts_with("1.#") || lower.starts_with("-1.#");
   // A number that no double holds is nearly zero, or beyond all bounds.
   const bool unheld = result.ec == std::errc::result_out_of_range && result.ptr == end;

@@ -299,7 +299,8 @@ struct Kind {
 const Kind kKinds[] = {
     {"\x89HDF\r\n", {}, examine_hdf5},
     {"ply", {}, examine_mesh},
-    {"", {".ply", ".obj", ".pcd", ".xyz", ".xyzn", ".xyzrgb", ".pts", ".asc", ".txt", ".csv"},
+    {"",
+     {".ply", ".obj", ".pcd", ".xyz", ".xyzn", ".xyzrgb", ".pts", ".asc", ".txt", ".csv"},
      examine_mesh},
     {"", {".h5", ".hdf5", ".hdf", ".he5"}, examine_hdf5},
     {"", {".bvh", ".bvh.xz", ".amc", ".amc.xz"}, examine_recording},

@@ -73,14 +73,17 @@ Seeds obj_seeds() {
 
 Seeds pcd_seeds() {
   const auto header = [](const char* data) {
-    return std::string("# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 8 "
-                       "4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 "
-                       "0\nPOINTS 2\nDATA ") +
+    return std::string(
+               "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z rgb\nSIZE 4 "
+               "4 8 "
+               "4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 "
+               "0\nPOINTS 2\nDATA ") +
            data + "\n";
   };
   std::string rows, columns(40, '\0');
   for (int i = 0; i < 2; ++i)
-    rows += test::raw(0.5f * static_cast<float>(i)) + test::raw(1.0f) + test::raw(-2.0) + test::raw(uint32_t{7});
+    rows += test::raw(0.5f * static_cast<float>(i)) + test::raw(1.0f) + test::raw(-2.0) +
+            test::raw(uint32_t{7});
   // Eight zeros, then copies of them: LZF.
   const std::string packed = std::string("\x07") + std::string(8, '\0') + "\xe0\x17\x07";
   return {{"ascii", header("ascii") + "0 0 0 1\nnan 1.5e0 -2 3\n", Cut::any},

@@ -71,7 +71,9 @@ void play(const std::string& path) {
 
 void read_ply(const std::string& bytes) { parse_mesh(bytes, "x.ply"); }
 void read_obj(const std::string& bytes) { parse_mesh(bytes, "x.obj"); }
-void read_pcd(const std::string& bytes) { parse_mesh(bytes, "x.pcd", Vec3::Zero(), NonFinite::mark); }
+void read_pcd(const std::string& bytes) {
+  parse_mesh(bytes, "x.pcd", Vec3::Zero(), NonFinite::mark);
+}
 /// Names of files, one a line.
 void read_names_of_frames(const std::string& bytes) {
   std::vector<std::string> names;
