@@ -17,9 +17,9 @@ struct SystemInput {
   Mesh target;                 ///< T-pose, metres, y up, facing +z
   std::string target_name;     ///< the file of `target`, for errors
   std::optional<Joints> rest;  ///< the target's rest joints, if they are known
-  std::optional<Joints> rig;   ///< the joints that the target's rig shows (Retargeter)
   RetargetOptions options;
-  std::optional<Joints> rig = std::nullopt;  ///< those that the target's rig shows (Retargeter)
+  std::optional<Joints> rig =
+      std::nullopt;  ///< the joints that the target's rig shows (Retargeter)
 };
 
 struct SystemType {

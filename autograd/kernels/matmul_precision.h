@@ -11,7 +11,7 @@
 
 namespace restage {
 
-/// The numbers are part of ids (train/stages/identity.h), so they stay.
+/// The numbers are part of ids (train/training/identity.h), so they stay.
 enum class MatmulPrecision { float32 = 0, tf32 = 2 };
 
 /// The precision in use: ops that are made now compute with it.

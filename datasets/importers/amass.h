@@ -1,5 +1,5 @@
-// Motions of a SMPL, SMPL-H or SMPL-X body (.npz): AMASS's (poses and trans, z up, at the rate of the
-// recording), and those of estimators, which give the same numbers other names and shapes
+// Motions of a SMPL, SMPL-H or SMPL-X body (.npz): AMASS's (poses and trans, z up, at the rate of
+// the recording), and those of estimators, which give the same numbers other names and shapes
 // (body_parameters.h, body_rotations.h) and look at the world as a camera does. Skeletons come from
 // the user's own body model (smpl.h), which no such file holds. Source: Mahmood et al. 2019; the
 // SMPL-X files are of the 2023 release ("stageii").
@@ -24,10 +24,10 @@ class BodyModels {
   /// What is no such model in a folder is left out. InputError: nothing there, no model in it.
   explicit BodyModels(const std::string& path, uint64_t max_memory = kMaxMemory);
 
-  /// The model for a clip, loaded once; a single file stands for every gender. `family` nothing: the
-  /// clip fits any, and the only one at hand is taken, else SMPL-H, SMPL-X, SMPL in this order. SMPL
-  /// and SMPL-H stand in for each other, never for SMPL-X, whose shapes are others. What does not
-  /// quite fit is remarked. InputError (about `clip`) if none fits.
+  /// The model for a clip, loaded once; a single file stands for every gender. `family` nothing:
+  /// the clip fits any, and the only one at hand is taken, else SMPL-H, SMPL-X, SMPL in this order.
+  /// SMPL and SMPL-H stand in for each other, never for SMPL-X, whose shapes are others. What does
+  /// not quite fit is remarked. InputError (about `clip`) if none fits.
   const SmplModel& find(std::optional<SmplFamily> family, const std::string& gender,
                         const std::string& clip, std::vector<std::string>& remarks);
 
@@ -53,8 +53,8 @@ bool is_amass_shape(const Npz& file);
 
 /// One clip at 30 fps, and what was done to it. Of the options the rate, the names and the up axis
 /// count (automatic: z in AMASS's files, else where the head is on average). A file of an estimator
-/// that says no rate is taken for 30 fps, with a remark. InputError: another layout, no translation,
-/// no rate, not finite, no model that fits.
+/// that says no rate is taken for 30 fps, with a remark. InputError: another layout, no
+/// translation, no rate, not finite, no model that fits.
 Motion import_amass(const Npz& file, BodyModels& models, const MotionOptions& options,
                     ImportReport& report);
 

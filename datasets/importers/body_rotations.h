@@ -9,17 +9,17 @@
 
 namespace restage {
 
-/// Local rotations of the 22 joints, and how many joints the file has (22, 24 of SMPL, 52 of SMPL-H,
-/// 55 of SMPL-X; of files that keep hands by themselves 22).
+/// Local rotations of the 22 joints, and how many joints the file has (22, 24 of SMPL, 52 of
+/// SMPL-H, 55 of SMPL-X; of files that keep hands by themselves 22).
 struct BodyRotations {
   std::vector<std::vector<Quat>> local;  ///< per frame
   int64_t joints = 0;
   std::string layout;  ///< for the report: "poses [61, 156]"
 };
 
-/// From one array of all joints or from those of the root and the rest: axis-angle numbers ([F, 3 J],
-/// [F, J, 3]) or rotation matrices ([F, J, 3, 3]), with or without axes of length 1. InputError:
-/// other shapes and numbers of joints, no rotations, not finite.
+/// From one array of all joints or from those of the root and the rest: axis-angle numbers ([F, 3
+/// J], [F, J, 3]) or rotation matrices ([F, J, 3, 3]), with or without axes of length 1.
+/// InputError: other shapes and numbers of joints, no rotations, not finite.
 BodyRotations read_body_rotations(const Npz& file, const BodyParameters& names);
 
 }  // namespace restage

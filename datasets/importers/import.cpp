@@ -219,7 +219,8 @@ void refuse_pickle(const std::string& path) {
 bool is_importable(const std::string& source) {
   std::error_code ignored;
   return fs::is_directory(source, ignored) || is_recording_name(source) || is_array_name(source) ||
-         is_mesh_name(source) || is_cloud_name(source) || is_text_name(source);
+         is_mesh_name(source) || is_cloud_name(source) ||
+         (is_text_name(source) && fs::exists(source, ignored) && is_table_of_points(source));
 }
 
 ImportSummary import_data(const std::string& source, const std::string& out,

@@ -68,7 +68,8 @@ bool is_recording_name(const std::string& path);
 ImportSummary import_recordings(const std::vector<std::string>& files, const std::string& source,
                                 const std::string& out, const ImportOptions& options);
 
-/// An NPY, NPZ, HDF5, mesh or cloud file; a folder with such files somewhere below (import_arrays.cpp).
+/// An NPY, NPZ, HDF5, mesh or cloud file; a folder with such files somewhere below
+/// (import_arrays.cpp).
 ImportSummary import_array_file(const std::string& source, const std::string& out,
                                 const ImportOptions& options);
 ImportSummary import_array_folder(const std::string& source, const std::string& out,

@@ -2,9 +2,9 @@
 //
 // An NPZ may hold other things too. Its cloud is the array that is named so (points, vertices,
 // verts, v_posed, which is CAPE's name of a posed frame, xyz, cloud and the like; case does not
-// matter); without such a name, the only array that has the shape of a cloud, which no array is that
-// is known to be something else (normals, colours, joints, the parameters of a body model). A number
-// `fps` beside it is the sequence's frame rate.
+// matter); without such a name, the only array that has the shape of a cloud, which no array is
+// that is known to be something else (normals, colours, joints, the parameters of a body model). A
+// number `fps` beside it is the sequence's frame rate.
 #pragma once
 
 #include <memory>

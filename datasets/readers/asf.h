@@ -43,8 +43,9 @@ struct AsfFile {
 struct AmcFile {
   /// The values of all freedoms of all bones, bones in the skeleton's order; as in the file.
   std::vector<std::vector<double>> frames;
-  std::vector<int64_t> numbers;  ///< of the frames, rising; where some are lacking, by more than one
-  double largest_unused = 0;     ///< of the values that move or stretch other bones than the root
+  std::vector<int64_t>
+      numbers;                ///< of the frames, rising; where some are lacking, by more than one
+  double largest_unused = 0;  ///< of the values that move or stretch other bones than the root
   bool radians = false;
 };
 

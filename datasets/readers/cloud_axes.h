@@ -24,8 +24,8 @@ struct CloudAxes {
 
 /// Taken are [N, 3] and [F, N, 3]; more columns than three (colours, normals, up to 12 in all), of
 /// which the first three count; axes in another order ([3, N], [V, 3, F], [F, 3, V], [3, V, F]): of
-/// two lengths the larger is that of the points, unless `vertices` says how many there are; pictures
-/// of a depth camera, [H, W, 3] of a known size or [F, H, W, 3]. Nothing for other shapes.
+/// two lengths the larger is that of the points, unless `vertices` says how many there are;
+/// pictures of a depth camera, [H, W, 3] of a known size or [F, H, W, 3]. Nothing for other shapes.
 std::optional<CloudAxes> cloud_axes(const std::vector<int64_t>& shape, int64_t vertices = 0);
 
 }  // namespace restage

@@ -39,6 +39,11 @@ class FileFrames : public FrameSource {
       frame.faces = std::move(mesh.faces);
       frame.source = file;
     }
+    if (frame.points.empty() && frames() == 1)
+      throw InputError(
+          file,
+          frame.left_out > 0 ? "holds no points but NaN and infinite ones" : "holds no points",
+          "give a cloud that has some");
     return frame;
   }
   void skip() override { at_ = std::min(at_ + 1, list_.files.size()); }

@@ -19,7 +19,7 @@ struct Frame {
   int64_t sequence = 0;         ///< which sequence of an HDF5 file it belongs to
   size_t left_out = 0;          ///< points that were NaN or infinite
   int64_t number = -1;          ///< by its file's name (FrameList::numbers); -1: none
-  int64_t missing = 0;  ///< frames without a point just before it (without_empty_frames())
+  int64_t missing = 0;          ///< frames without a point just before it (without_empty_frames())
 };
 
 class FrameSource {

@@ -19,9 +19,10 @@ bool states_fps(const std::string& path);
 
 /// Our files: /points with /frame_offset, else /vertices [F, V, 3]. Of others every data set that
 /// has the shape of a sequence (cloud_axes.h; a data set `faces` says how many vertices there are)
-/// is a sequence, as Dynamic FAUST has them, [V, 3, F]; of single clouds those whose names or groups
-/// are a series of numbers are the frames of one. Points that are NaN or infinite are left out, but
-/// not of surfaces. InputError: no clouds, several that are no series, a sequence that is not there.
+/// is a sequence, as Dynamic FAUST has them, [V, 3, F]; of single clouds those whose names or
+/// groups are a series of numbers are the frames of one. Points that are NaN or infinite are left
+/// out, but not of surfaces. InputError: no clouds, several that are no series, a sequence that is
+/// not there.
 std::unique_ptr<FrameSource> open_hdf5_frames(const std::string& path, const FrameOptions& options);
 
 /// InputError unless there is such a sequence, counted from 0.

@@ -10,11 +10,11 @@
 
 namespace restage {
 
-/// PLY (ASCII, binary of both byte orders), OBJ, PCD, tables of points (mesh_parsers.h) or glTF (.glb,
-/// .gltf, .vrm: all meshes of the scene as they rest, datasets/readers/gltf.h), told apart by
-/// content, then by extension. Polygons become fans of triangles; normals, colours, texture
-/// coordinates and groups are ignored; a file without faces is a cloud. Coordinates are kept as they
-/// are (metres by convention).
+/// PLY (ASCII, binary of both byte orders), OBJ, PCD, tables of points (mesh_parsers.h) or glTF
+/// (.glb, .gltf, .vrm: all meshes of the scene as they rest, datasets/readers/gltf.h), told apart
+/// by content, then by extension. Polygons become fans of triangles; normals, colours, texture
+/// coordinates and groups are ignored; a file without faces is a cloud. Coordinates are kept as
+/// they are (metres by convention).
 Mesh read_mesh(const std::string& path);
 /// The same of a frame: points that are NaN or infinite are left out, and `left_out` says how many;
 /// it may be that none is left.

@@ -1,5 +1,5 @@
-// Meshes and clouds from memory; used by read_mesh(). `content` is the whole file, `path` only names
-// it in errors. `origin` is taken off every vertex before it becomes a float.
+// Meshes and clouds from memory; used by read_mesh(). `content` is the whole file, `path` only
+// names it in errors. `origin` is taken off every vertex before it becomes a float.
 #pragma once
 
 #include <string>

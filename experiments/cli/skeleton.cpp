@@ -94,7 +94,7 @@ int run_skeleton(const SkeletonOptions& options, const Common& common) {
   for (const std::string& remark : frames->remarks()) log_info(options.input + ": " + remark);
   if (left_out > 0)
     log_info(options.input + ": left out " + std::to_string(left_out) +
-             " points whose coordinates are NaN or infinite");
+             (left_out == 1 ? " point" : " points") + " whose coordinates are NaN or infinite");
   if (common.json) {
     print_json({{"frames", list}, {"seed", common.seed}});
   } else {

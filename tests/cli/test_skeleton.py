@@ -103,8 +103,10 @@ class BadClouds(Skeleton):
         for part in (0.9, 0.2, 0.01):
             bad(self.write("cut.ply", good[:int(len(good) * part)]))
         bad(self.ply("empty.ply", []))
-        bad(self.ply("nan.ply", self.cloud + [(0, float("nan"), 0)]))
-        bad(self.ply("inf.ply", self.cloud + [(0, 0, float("-inf"))]))
+        for name, point in (("nan.ply", (0, float("nan"), 0)), ("inf.ply", (0, 0, float("-inf")))):
+            done = self.restage("skeleton", "--weights", self.w, "--input", self.ply(name, self.cloud + [point]))
+            self.assertEqual(done.code, 0, done.err)
+            self.assertIn(name + ": left out 1 point whose", done.err)
         bad(self.ply("three.ply", points(3, 1)), "3 distinct points")
         bad(self.ply("same.ply", points(63, 1) * 20), "63 distinct points")
         bad(self.ply("huge.ply", [(3e38 * (-1) ** i, 3e38, z) for i, (_, _, z) in enumerate(self.cloud)]))

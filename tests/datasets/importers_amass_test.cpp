@@ -350,7 +350,8 @@ Arrays seen_by_a_camera(const TinyClip& clip, int64_t body_joints, bool matrices
   const auto add = [&](const Mat3& turn, std::vector<double>& out) {
     const Eigen::AngleAxisd a(turn);
     const Vec3 vector = a.angle() * a.axis();
-    for (int i = 0; i < (matrices ? 9 : 3); ++i) out.push_back(matrices ? turn(i / 3, i % 3) : vector[i]);
+    for (int i = 0; i < (matrices ? 9 : 3); ++i)
+      out.push_back(matrices ? turn(i / 3, i % 3) : vector[i]);
   };
   const Vec3 rest = TinySmpl{SmplFamily::smpl}.shaped(clip.betas)[0];
   for (int64_t f = 0; f < clip.frames; ++f) {
@@ -358,13 +359,15 @@ Arrays seen_by_a_camera(const TinyClip& clip, int64_t body_joints, bool matrices
     add(camera * clip.root(t), orient);
     for (int64_t j = 1; j <= body_joints; ++j) {
       const Vec3 a = j < kJoints ? clip.turn(static_cast<int>(j), t) : Vec3::Zero();
-      add(a.norm() > 0 ? Mat3(Eigen::AngleAxisd(a.norm(), a.normalized())) : Mat3(Mat3::Identity()), body);
+      add(a.norm() > 0 ? Mat3(Eigen::AngleAxisd(a.norm(), a.normalized())) : Mat3(Mat3::Identity()),
+          body);
     }
     const Vec3 at = camera * (clip.trans(t) + rest) - rest;
     trans.insert(trans.end(), {at.x(), at.y(), at.z()});
   }
   const int64_t n = clip.frames;
-  const std::vector<int64_t> one = matrices ? std::vector<int64_t>{n, 1, 3, 3} : std::vector<int64_t>{n, 3},
+  const std::vector<int64_t> one = matrices ? std::vector<int64_t>{n, 1, 3, 3}
+                                            : std::vector<int64_t>{n, 3},
                              all = matrices ? std::vector<int64_t>{n, body_joints, 3, 3}
                                             : std::vector<int64_t>{n, 3 * body_joints};
   return {{"smpl_global_orient", npy<double>(one, orient)},
@@ -386,18 +389,22 @@ TEST_F(ImportersAmass, EstimatorsNamesAndShapesGiveTheSameMotion) {
       for (int64_t c = 0; c < columns; ++c) kept.push_back(poses[f * poses.shape()[1] + c]);
     return with(clip.arrays(), "poses", npy<double>({clip.frames, columns}, kept));
   };
-  const Motion wanted = import_amass(Npz(dir.write("a.npz", npz(clip.arrays()))), models, {}, ignored);
+  const Motion wanted =
+      import_amass(Npz(dir.write("a.npz", npz(clip.arrays()))), models, {}, ignored);
   const auto expect_same = [&](const Arrays& arrays, const std::string& name) {
     ImportReport report;
     const Npz file(dir.write("b.npz", npz(arrays)));
     EXPECT_TRUE(is_amass_motion(file)) << name;
     const Motion motion = import_amass(file, models, {}, report);
     ASSERT_EQ(motion.frames(), wanted.frames()) << name;
-    const Joints first = testing::motion_joints(motion, 0), first_wanted = testing::motion_joints(wanted, 0);
+    const Joints first = testing::motion_joints(motion, 0),
+                 first_wanted = testing::motion_joints(wanted, 0);
     for (size_t f = 0; f < wanted.frames(); ++f) {
-      const Joints got = testing::motion_joints(motion, f), want = testing::motion_joints(wanted, f);
+      const Joints got = testing::motion_joints(motion, f),
+                   want = testing::motion_joints(wanted, f);
       for (size_t j = 0; j < kJoints; ++j)  // wherever the world's origin is
-        EXPECT_LT(((got[j] - first[0]) - (want[j] - first_wanted[0])).norm(), 1e-5) << name << " " << f << " " << j;
+        EXPECT_LT(((got[j] - first[0]) - (want[j] - first_wanted[0])).norm(), 1e-5)
+            << name << " " << f << " " << j;
     }
     return;
   };
@@ -412,16 +419,19 @@ TEST_F(ImportersAmass, EstimatorsNamesAndShapesGiveTheSameMotion) {
   EXPECT_HAS(fact(report, "up"), "-y, where the head is");
   EXPECT_HAS(remarks(report), "30 frames a second are taken for granted");
   EXPECT_HAS(error_of([&] {
-    const Npz file(dir.write("d.npz", npz(with(seen_by_a_camera(clip, 23, false), "cam_trans", ""))));
-    import_amass(file, models, {}, report);
-  }), "add trans [F, 3]");
+               const Npz file(dir.write(
+                   "d.npz", npz(with(seen_by_a_camera(clip, 23, false), "cam_trans", ""))));
+               import_amass(file, models, {}, report);
+             }),
+             "add trans [F, 3]");
 }
 
 TEST_F(ImportersAmass, AShapeForEachFrameOrNone) {
   const TinyClip clip{.frames = 31, .fps = 30};
   BodyModels models(dir.write("model.npz", TinySmpl().file()));
   std::vector<double> betas;
-  for (int64_t f = 0; f < clip.frames; ++f) betas.insert(betas.end(), clip.betas.begin(), clip.betas.end());
+  for (int64_t f = 0; f < clip.frames; ++f)
+    betas.insert(betas.end(), clip.betas.begin(), clip.betas.end());
   const auto rest_of = [&](const std::string& bytes, ImportReport& report) {
     const Npz file(dir.write("a.npz", npz(with(clip.arrays(), "betas", bytes))));
     return import_amass(file, models, {}, report).rest;

@@ -151,8 +151,10 @@ TEST_F(ImportersAmc, LengthsAndPlacesOfBonesAreLeftUnused) {
     for (size_t at = more.find("lowerback "); at != std::string::npos;
          at = more.find("lowerback ", at + 1))
       more.insert(more.find('\n', at), values);
-    const std::string dof = asf.substr(asf.find("dof "), asf.find('\n', asf.find("dof ")) - asf.find("dof "));
-    const MotionClip clip = convert_amc(more, "a.amc", replaced(asf, dof, dof + " " + freedom), "a.asf");
+    const std::string dof =
+        asf.substr(asf.find("dof "), asf.find('\n', asf.find("dof ")) - asf.find("dof "));
+    const MotionClip clip =
+        convert_amc(more, "a.amc", replaced(asf, dof, dof + " " + freedom), "a.asf");
     ASSERT_EQ(clip.joints.size(), plain.joints.size());
     for (size_t f = 0; f < clip.joints.size(); ++f)
       for (size_t j = 0; j < kJoints; ++j)

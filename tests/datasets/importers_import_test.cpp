@@ -252,21 +252,23 @@ TEST_F(ImportersScans, ABrokenFrameIsAnErrorAndLeavesNothing) {
 TEST_F(ImportersScans, FramesThatShowNobodyAreReplacedUpToASecond) {
   const auto at = [&](int f) { return dir / ("in/f" + std::to_string(f) + ".ply"); };
   fs::create_directories(dir / "in");
-  for (int f = 0; f < 6; ++f)
-    write_ply(at(f), Mesh{person({static_cast<float>(f), 0, 0}), {}});
-  write_bytes(at(2), "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\n"
-                     "property float z\nend_header\n");
+  for (int f = 0; f < 6; ++f) write_ply(at(f), Mesh{person({static_cast<float>(f), 0, 0}), {}});
+  write_bytes(at(2),
+              "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\n"
+              "property float z\nend_header\n");
   write_ply(at(3), Mesh{{{0, 0, 0}, {1, 1, 1}}, {}});
   const ImportSummary done = import_data(dir / "in", dir / "o.h5");
   EXPECT_EQ(done.frames, 6u);
   EXPECT_HAS(done.reports[0].remarks.at(0), "2 frames show too little");
   const Scans scans = read_scans(dir / "o.h5");
   std::vector<float> x;
-  for (size_t f = 0; f < 6; ++f) x.push_back(scans.points[static_cast<size_t>(scans.frame_offset[f])].x());
+  for (size_t f = 0; f < 6; ++f)
+    x.push_back(scans.points[static_cast<size_t>(scans.frame_offset[f])].x());
   const float first = x[0];
   for (float& value : x) value -= first;
   EXPECT_EQ(x, (std::vector<float>{0, 1, 1, 4, 4, 5}));
-  // At the beginning and at the end the nearest is the only one there is; nobody at all is an error.
+  // At the beginning and at the end the nearest is the only one there is; nobody at all is an
+  // error.
   for (const int f : {0, 5}) write_ply(at(f), Mesh{{{0, 0, 0}}, {}});
   EXPECT_EQ(import_data(dir / "in", dir / "o.h5").frames, 6u);
   for (const int f : {1, 4}) write_ply(at(f), Mesh{{{0, 0, 0}}, {}});
@@ -292,7 +294,8 @@ TEST_F(ImportersScans, NonFinitePointsStraysAndTwinsAreSaid) {
   EXPECT_EQ(done.frames, 3u);
   std::string said;
   for (const std::string& remark : done.reports.at(0).remarks) said += remark + "\n";
-  for (const char* words : {"left out 3 .obj files", "left out 'floor.ply'", "left out 3 points whose"})
+  for (const char* words :
+       {"left out 3 .obj files", "left out 'floor.ply'", "left out 3 points whose"})
     EXPECT_HAS(said, words);
   EXPECT_EQ(verify(dir / "o.h5"), Names{});
 }

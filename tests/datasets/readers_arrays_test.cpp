@@ -377,7 +377,8 @@ TEST_F(ReadersArrays, WhichArrayIsTheCloud) {
       // Parameters of a body model: `trans` has the shape of a cloud and is none.
       {{{"smpl_thetas", npy<float>({2, 72}, std::vector<float>(144, 0))}, {"trans", cloud}},
        "is a motion of a body model"},
-      {{{"global_orient", cloud}, {"body_pose", npy<float>({1, 69}, std::vector<float>(69, 0))},
+      {{{"global_orient", cloud},
+        {"body_pose", npy<float>({1, 69}, std::vector<float>(69, 0))},
         {"transl", cloud}},
        "is a motion of a body model"},
       {{{"trans", cloud}, {"betas", npy<float>({10}, std::vector<float>(10, 0))}},
@@ -414,8 +415,8 @@ TEST_F(ReadersArrays, FoldersOfArrays) {
 
 // ---- axes --------------------------------------------------------------------------------------
 
-/// An array of this shape whose element says what it is: point + 1000 * frame + 0.25 * axis, each of
-/// these the index of the axis of that number (-1: none).
+/// An array of this shape whose element says what it is: point + 1000 * frame + 0.25 * axis, each
+/// of these the index of the axis of that number (-1: none).
 std::string marked(const std::vector<int64_t>& shape, int frame, int point, int xyz) {
   int64_t count = 1;
   for (const int64_t n : shape) count *= n;
@@ -437,12 +438,11 @@ TEST_F(ReadersArrays, AxesInAnyOrderAndMoreColumns) {
     int frame, point, xyz;
     int64_t frames, points;
   };
-  const Case cases[] = {{{80, 3}, -1, 0, 1, 1, 80},       {{80, 6}, -1, 0, 1, 1, 80},
-                        {{80, 4}, -1, 0, 1, 1, 80},       {{3, 80}, -1, 1, 0, 1, 80},
-                        {{4, 80, 3}, 0, 1, 2, 4, 80},     {{4, 80, 6}, 0, 1, 2, 4, 80},
-                        {{80, 3, 4}, 2, 0, 1, 4, 80},     {{4, 3, 80}, 0, 2, 1, 4, 80},
-                        {{3, 80, 4}, 2, 1, 0, 4, 80},     {{80, 3, 3}, 2, 0, 1, 3, 80},
-                        {{2, 1, 80, 3}, 0, 2, 3, 2, 80}};
+  const Case cases[] = {
+      {{80, 3}, -1, 0, 1, 1, 80},   {{80, 6}, -1, 0, 1, 1, 80},     {{80, 4}, -1, 0, 1, 1, 80},
+      {{3, 80}, -1, 1, 0, 1, 80},   {{4, 80, 3}, 0, 1, 2, 4, 80},   {{4, 80, 6}, 0, 1, 2, 4, 80},
+      {{80, 3, 4}, 2, 0, 1, 4, 80}, {{4, 3, 80}, 0, 2, 1, 4, 80},   {{3, 80, 4}, 2, 1, 0, 4, 80},
+      {{80, 3, 3}, 2, 0, 1, 3, 80}, {{2, 1, 80, 3}, 0, 2, 3, 2, 80}};
   for (const Case& c : cases) {
     const auto frames = open_frames(dir.write("a.npy", marked(c.shape, c.frame, c.point, c.xyz)));
     ASSERT_EQ(frames->frames(), c.frames) << shape_text(c.shape);
@@ -457,7 +457,8 @@ TEST_F(ReadersArrays, AxesInAnyOrderAndMoreColumns) {
     const bool plain = c.shape.back() == 3 && c.shape != std::vector<int64_t>{80, 3, 3};
     EXPECT_EQ(frames->remarks().empty(), plain) << shape_text(c.shape);
   }
-  for (const std::vector<int64_t>& shape : {std::vector<int64_t>{80}, {80, 2}, {80, 66}, {5, 80, 72}})
+  for (const std::vector<int64_t>& shape :
+       {std::vector<int64_t>{80}, {80, 2}, {80, 66}, {5, 80, 72}})
     EXPECT_FALSE(cloud_axes(shape)) << shape_text(shape);
   // Pictures of a depth camera are one frame, not 288 of 320 points.
   EXPECT_EQ(cloud_axes({288, 320, 3})->points, 288 * 320);
@@ -481,7 +482,8 @@ TEST_F(ReadersArrays, NumberedArraysAreTheFramesOfASequence) {
   EXPECT_HAS(frames->remarks().at(0), "'arr_0' to 'arr_10'");
   for (const int i : {0, 1, 2, 10}) {
     const auto frame = frames->next();
-    EXPECT_EQ(frame->points, Points(static_cast<size_t>(i + 1), Point::Constant(static_cast<float>(i))));
+    EXPECT_EQ(frame->points,
+              Points(static_cast<size_t>(i + 1), Point::Constant(static_cast<float>(i))));
   }
   EXPECT_FALSE(frames->next());
   EXPECT_HAS(error_of([&] { read_array_frame(dir / "a.npz"); }), "sequence of 4");

@@ -20,9 +20,10 @@ using ReadersClouds = FileTest;
 
 std::string pcd_header(const std::string& data, int points = 3) {
   const std::string n = std::to_string(points);
-  return "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS intensity x y z _ rgb\nSIZE 2 4 4 8 1 "
-         "4\nTYPE U F F F U U\nCOUNT 1 1 1 1 3 1\nWIDTH " + n + "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " +
-         n + "\nDATA " + data + "\n";
+  return "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS intensity x y z _ "
+         "rgb\nSIZE 2 4 4 8 1 "
+         "4\nTYPE U F F F U U\nCOUNT 1 1 1 1 3 1\nWIDTH " +
+         n + "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + n + "\nDATA " + data + "\n";
 }
 
 const Points kPcdPoints = {{0.5f, -1, 2}, {3, 4, -5.25f}};
@@ -31,8 +32,8 @@ const Points kPcdPoints = {{0.5f, -1, 2}, {3, 4, -5.25f}};
 std::string pcd_rows() {
   std::string out;
   for (const Vec3& p : {Vec3(0.5, -1, 2), Vec3(3, 4, -5.25), Vec3(NAN, NAN, NAN)})
-    out += raw(uint16_t{7}) + raw(static_cast<float>(p.x())) + raw(static_cast<float>(p.y())) + raw(p.z()) +
-           "abc" + raw(uint32_t{0xff00ff});
+    out += raw(uint16_t{7}) + raw(static_cast<float>(p.x())) + raw(static_cast<float>(p.y())) +
+           raw(p.z()) + "abc" + raw(uint32_t{0xff00ff});
   return out;
 }
 
@@ -58,7 +59,9 @@ std::string lzf(const std::string& bytes) {
   };
   for (size_t at = 0; at < bytes.size();) {
     size_t length = 0;
-    while (at >= 4 && at + length < bytes.size() && length < 264 && bytes[at + length] == bytes[at + length - 4]) ++length;
+    while (at >= 4 && at + length < bytes.size() && length < 264 &&
+           bytes[at + length] == bytes[at + length - 4])
+      ++length;
     if (length < 3) {
       literals += bytes[at++];
       continue;
@@ -93,7 +96,8 @@ TEST_F(ReadersClouds, PcdInAllEncodings) {
     }
   }
   size_t left_out = 0;
-  EXPECT_TRUE(read_frame_mesh(dir.write("a.pcd", pcd_header("binary", 0)), left_out).vertices.empty());
+  EXPECT_TRUE(
+      read_frame_mesh(dir.write("a.pcd", pcd_header("binary", 0)), left_out).vertices.empty());
 }
 
 TEST_F(ReadersClouds, BadPcdIsOneClearLine) {
@@ -101,19 +105,22 @@ TEST_F(ReadersClouds, BadPcdIsOneClearLine) {
     file.replace(file.find(from), from.size(), to);
     return error_of([&] { read_mesh(dir.write("a.pcd", file)); });
   };
-  const std::string file = pcd_header("ascii") + "7 0.5 -1 2 0 0 0 99\n7 3 4 5 0 0 0 99\n7 1 1 1 0 0 0 99\n";
+  const std::string file =
+      pcd_header("ascii") + "7 0.5 -1 2 0 0 0 99\n7 3 4 5 0 0 0 99\n7 1 1 1 0 0 0 99\n";
   EXPECT_HAS(refusal(file, " x y", " a y"), "has no field x");
   EXPECT_HAS(refusal(file, "TYPE U F F F", "TYPE U F F Q"), "field z is no single number");
   EXPECT_HAS(refusal(file, "POINTS 3", "POINTS -3"), "'-3' is no usable count");
   EXPECT_HAS(refusal(file, "POINTS 3", "POINTS 999999999999"), "no usable count");
   EXPECT_HAS(refusal(file, "POINTS 3", "POINTS 9999999"), "cut short");
-  EXPECT_HAS(refusal(file, "0.5", "0,5"), "a.pcd:12: '0,5' is no number; write decimals with points");
+  EXPECT_HAS(refusal(file, "0.5", "0,5"),
+             "a.pcd:12: '0,5' is no number; write decimals with points");
   EXPECT_HAS(refusal(file, "ascii", "zip"), "has DATA 'zip'");
   // Sizes that the packed bytes cannot have.
   const std::string columns = pcd_columns(), packed = lzf(columns);
   const auto compressed = [&](uint32_t length, uint32_t size, const std::string& bytes) {
     return error_of([&] {
-      read_mesh(dir.write("b.pcd", pcd_header("binary_compressed") + raw(length) + raw(size) + bytes));
+      read_mesh(
+          dir.write("b.pcd", pcd_header("binary_compressed") + raw(length) + raw(size) + bytes));
     });
   };
   const auto n = static_cast<uint32_t>(packed.size()), m = static_cast<uint32_t>(columns.size());
@@ -144,7 +151,9 @@ TEST_F(ReadersClouds, TablesOfPoints) {
   for (const auto& [name, text] : files)
     EXPECT_EQ(read_mesh(dir.write(name, text)).vertices, (Points{{1, 2, 3}, {4, 5, 6}})) << text;
   size_t left_out = 0;
-  EXPECT_EQ(read_frame_mesh(dir.write("b.csv", "x,y,z\n1,2,3\n,,\nNaN,0,0\n"), left_out).vertices.size(), 1u);
+  EXPECT_EQ(
+      read_frame_mesh(dir.write("b.csv", "x,y,z\n1,2,3\n,,\nNaN,0,0\n"), left_out).vertices.size(),
+      1u);
   EXPECT_EQ(left_out, 2u);
   EXPECT_TRUE(read_frame_mesh(dir.write("empty.xyz", ""), left_out).vertices.empty());
 }
@@ -172,7 +181,8 @@ std::vector<float> marked(int64_t frames, int64_t points, bool frames_last) {
   for (int64_t f = 0; f < frames; ++f)
     for (int64_t i = 0; i < points; ++i)
       for (int64_t c = 0; c < 3; ++c)
-        out[static_cast<size_t>(frames_last ? (i * 3 + c) * frames + f : (f * points + i) * 3 + c)] =
+        out[static_cast<size_t>(frames_last ? (i * 3 + c) * frames + f
+                                            : (f * points + i) * 3 + c)] =
             static_cast<float>(1000 * f + i) + 0.25f * static_cast<float>(c);
   return out;
 }
@@ -233,7 +243,8 @@ TEST_F(ReadersClouds, Hdf5FilesOfOthers) {
   EXPECT_EQ(groups->next()->points[0].x(), 9);
   EXPECT_EQ(groups->next()->points[0].x(), 10);
   expect_marked(*open_frames(dir / "plain.h5"), 4, 80);
-  EXPECT_HAS(error_of([&] { open_frames(dir / "two.h5"); }), "several arrays of points: '/a', '/b'");
+  EXPECT_HAS(error_of([&] { open_frames(dir / "two.h5"); }),
+             "several arrays of points: '/a', '/b'");
   EXPECT_HAS(error_of([&] { open_frames(dir / "none.h5"); }), "/points: is missing");
   second.sequence = 2;
   EXPECT_HAS(error_of([&] { open_frames(dir / "dfaust.hdf5", second); }), "no sequence number 2");

@@ -97,7 +97,8 @@ TEST(FrameNames, SeveralSeriesAreRefused) {
 std::string one_point(int x) { return "v " + std::to_string(x) + " 0 0\n"; }
 
 std::string ply_point(int x) {
-  return "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float "
+  return "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty "
+         "float "
          "z\nend_header\n" +
          std::to_string(x) + " 0 0\n";
 }
@@ -142,7 +143,8 @@ TEST_F(ReadersFrames, AFolderAFrame) {
     EXPECT_EQ(played(*frames), (std::vector<float>{0, 1, 2, 10})) << name;
     EXPECT_HAS(all_of(frames->remarks()), "a folder a frame: 4 folders");
   }
-  EXPECT_HAS(error_of([&] { open_frames(dir / "sequences"); }), "4 of its folders do; give one sequence");
+  EXPECT_HAS(error_of([&] { open_frames(dir / "sequences"); }),
+             "4 of its folders do; give one sequence");
 }
 
 TEST_F(ReadersFrames, TextsAreFramesOnlyIfTheyArePoints) {
@@ -151,7 +153,8 @@ TEST_F(ReadersFrames, TextsAreFramesOnlyIfTheyArePoints) {
   dir.write("in/readme.txt", "two frames of a walk\n");
   EXPECT_EQ(played(*open_frames(dir / "in")), (std::vector<float>{1, 2}));
   dir.write("in/1.ply", ply_point(7));
-  EXPECT_EQ(played(*open_frames(dir / "in")), (std::vector<float>{7})) << "poses or times beside frames";
+  EXPECT_EQ(played(*open_frames(dir / "in")), (std::vector<float>{7}))
+      << "poses or times beside frames";
   dir.write("none/readme.txt", "nothing\n");
   EXPECT_HAS(error_of([&] { open_frames(dir / "none"); }), "holds no PLY, OBJ or glTF files");
 }

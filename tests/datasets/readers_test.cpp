@@ -276,27 +276,31 @@ TEST_F(Readers, BadSequencesAreOneClearLine) {
 
 TEST_F(Readers, PointsAndLinesMakeNoTriangles) {
   write_bytes(dir / "a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\np 1\nl 1 2\nf 1\nf 1 2\nf 1 2 3\n");
-  expect_equal(read_mesh(dir / "a.obj"),
-               {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}});
+  expect_equal(read_mesh(dir / "a.obj"), {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}});
   const std::string text =
-      "ply \r\nformat ascii 1.0\r\nelement vertex 3\r\nproperty list uchar int of\r\nproperty double "
-      "X\r\nproperty double Y\r\nproperty double Z\r\nproperty ushort red\r\nproperty uint64 t\r\nelement "
-      "face 3\r\nproperty list uchar int vertex_indices\r\nend_header\r\n2 7 7 0 0 0 65535 1\r\n0 1 0 0 0 2\r\n1 "
+      "ply \r\nformat ascii 1.0\r\nelement vertex 3\r\nproperty list uchar int of\r\nproperty "
+      "double "
+      "X\r\nproperty double Y\r\nproperty double Z\r\nproperty ushort red\r\nproperty uint64 "
+      "t\r\nelement "
+      "face 3\r\nproperty list uchar int vertex_indices\r\nend_header\r\n2 7 7 0 0 0 65535 1\r\n0 "
+      "1 0 0 0 2\r\n1 "
       "5 0 1 0 0 3\r\n1 0\r\n2 0 1\r\n3 0 1 2\r\n";
   write_bytes(dir / "a.ply", text);
-  expect_equal(read_mesh(dir / "a.ply"),
-               {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}});
+  expect_equal(read_mesh(dir / "a.ply"), {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}});
 }
 
 /// As C, Python, Java, and programs of older Windows write them; and numbers that no double holds.
 TEST_F(Readers, NotANumberInAllSpellings) {
-  for (const char* word : {"nan", "NaN", "-nan", "NAN", "nan(ind)", "-nan(ind)", "nan(snan)", "inf",
-                           "-inf", "Infinity", "-INF", "+inf", "1.#QNAN", "1.#QNAN0", "-1.#IND",
-                           "-1.#IND00", "1.#INF", "-1.#INF", "1.#J", "1.#R", "1e999"}) {
+  for (const char* word :
+       {"nan",     "NaN",       "-nan",     "NAN",     "nan(ind)", "-nan(ind)", "nan(snan)",
+        "inf",     "-inf",      "Infinity", "-INF",    "+inf",     "1.#QNAN",   "1.#QNAN0",
+        "-1.#IND", "-1.#IND00", "1.#INF",   "-1.#INF", "1.#J",     "1.#R",      "1e999"}) {
     size_t left_out = 0;
     const std::string rest = std::string(" 0 0\n1 2 3\n");
-    write_bytes(dir / "a.ply", "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty "
-                              "float y\nproperty float z\nend_header\n" + std::string(word) + rest);
+    write_bytes(dir / "a.ply",
+                "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty "
+                "float y\nproperty float z\nend_header\n" +
+                    std::string(word) + rest);
     write_bytes(dir / "a.obj", "v " + std::string(word) + " 0 0\nv 1 2 3\n");
     write_bytes(dir / "a.xyz", word + rest);
     for (const char* name : {"a.ply", "a.obj", "a.xyz"}) {

@@ -73,14 +73,17 @@ Seeds obj_seeds() {
 
 Seeds pcd_seeds() {
   const auto header = [](const char* data) {
-    return std::string("# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 8 "
-                       "4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 "
-                       "0\nPOINTS 2\nDATA ") +
+    return std::string(
+               "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z rgb\nSIZE 4 "
+               "4 8 "
+               "4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH 2\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 "
+               "0\nPOINTS 2\nDATA ") +
            data + "\n";
   };
   std::string rows, columns(40, '\0');
   for (int i = 0; i < 2; ++i)
-    rows += test::raw(0.5f * static_cast<float>(i)) + test::raw(1.0f) + test::raw(-2.0) + test::raw(uint32_t{7});
+    rows += test::raw(0.5f * static_cast<float>(i)) + test::raw(1.0f) + test::raw(-2.0) +
+            test::raw(uint32_t{7});
   // Eight zeros, then copies of them: LZF.
   const std::string packed = std::string("\x07") + std::string(8, '\0') + "\xe0\x17\x07";
   return {{"ascii", header("ascii") + "0 0 0 1\nnan 1.5e0 -2 3\n", Cut::any},
@@ -94,12 +97,6 @@ Seeds table_seeds() {
           {"count", "2\n1 2 3 9\n4 5 6 9\n", Cut::any},
           {"named", "n,z,\"X [m]\",y\n1,2,3,4\n2,,5,6\n", Cut::any},
           {"commas", "x;y;z\n0,5;1;2\n", Cut::any}};
-}
-
-Seeds frame_seeds() {
-  return {{"counted", "f1.ply\nf2.ply\nf10.ply\nfloor.ply\n", Cut::any},
-          {"times", "100.0.ply\n100.05.ply\n100.1.ply\n100.2.ply\n", Cut::any},
-          {"signs", "a-1.ply\na0.ply\na0.5.ply\na1.ply\n-3.ply\n", Cut::any}};
 }
 
 // ---- characters --------------------------------------------------------------------------------
@@ -387,7 +384,6 @@ std::vector<Seed> seeds(std::string_view target) {
       {"obj", obj_seeds},
       {"pcd", pcd_seeds},
       {"table", table_seeds},
-      {"frames", frame_seeds},
       {"gltf", gltf_seeds},
       {"character", character_seeds},
       {"bvh", bvh_seeds},

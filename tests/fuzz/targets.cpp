@@ -71,12 +71,9 @@ void play(const std::string& path) {
 
 void read_ply(const std::string& bytes) { parse_mesh(bytes, "x.ply"); }
 void read_obj(const std::string& bytes) { parse_mesh(bytes, "x.obj"); }
-void read_pcd(const std::string& bytes) { parse_mesh(bytes, "x.pcd", Vec3::Zero(), NonFinite::mark); }
-void read_table(const std::string& bytes) {
-  starts_as_table(bytes);
-  parse_mesh(bytes, "x.csv", Vec3::Zero(), NonFinite::mark);
+void read_pcd(const std::string& bytes) {
+  parse_mesh(bytes, "x.pcd", Vec3::Zero(), NonFinite::mark);
 }
-
 /// Names of files, one a line.
 void read_names_of_frames(const std::string& bytes) {
   std::vector<std::string> names;
@@ -88,6 +85,13 @@ void read_names_of_frames(const std::string& bytes) {
   const FrameList list = order_frames(names, "folder");
   if (list.files.empty() || (!list.numbers.empty() && list.numbers.size() != list.files.size()))
     throw std::logic_error("frames are lost");
+}
+
+/// A table of points; and its lines as names of files.
+void read_table(const std::string& bytes) {
+  starts_as_table(bytes);
+  do_all({[&] { parse_mesh(bytes, "x.csv", Vec3::Zero(), NonFinite::mark); },
+          [&] { read_names_of_frames(bytes); }});
 }
 
 void read_scene(const std::string& bytes) {
@@ -264,7 +268,6 @@ const std::vector<Target>& targets() {
       {"obj", "obj", kShort, 65, 500, read_obj},
       {"pcd", "cloud", kShort, 65, 500, read_pcd},
       {"table", "cloud", kShort, 65, 500, read_table},
-      {"frames", "cloud", kShort, 65, 300, read_names_of_frames},
       {"gltf", "gltf", kLong, 65, 3000, read_scene},
       {"character", "gltf", kLong, 65, 3000, read_rigged},
       {"bvh", "bvh", kLong, 65, 900, read_bvh_text},
