@@ -35,6 +35,7 @@ class Unreadable {
   }
   ~Unreadable() {
     std::error_code ignored;
+    std::filesystem::remove(path_, ignored);  // no folder can take the place of a link
     std::filesystem::rename(path_ + ".good", path_, ignored);
   }
   Unreadable(const Unreadable&) = delete;
