@@ -136,7 +136,7 @@ class HeaderParser {
 
 // ---- points ------------------------------------------------------------------------------------
 
-[[noreturn]] void throw_short(const std::string& path, const Header& header) {
+[[noreturn]] void throw_short(const std::string& path, const PcdHeader& header) {
   throw InputError(path, cat("is cut short: it should have ", header.points, " points"),
                    kSaveCloud);
 }

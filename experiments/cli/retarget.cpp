@@ -333,18 +333,7 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   input.target_name = c.target;
   const auto system =
       with_target(c, target, [&] { return system_type(c.system).make(std::move(input)); });
-  // The first frame is looked at before anything is written or logged.
-  double read = 0;
-  const auto next = [&] {
-    const Clock::time_point start = Clock::now();
-    auto frame = frames->next();
-    if (frame) to_metres(c, frame->points);
-    read = seconds_since(start);
-    return frame;
-  };
-  auto frame = next();
-  if (!frame) throw InputError(c.source, "holds no frames", "give at least one cloud");
-  const Sink sink = make_sink(c, *system);
+  Gaps gaps(source.frames(), source.fps() / static_cast<double>(c.every), c.options.force);
   Profile profile({"read", "extract", "motion", "deformation", "write", "frame"});
   Run run(c, source, *system, gaps, profile);
   const Outcome done = run();

@@ -66,7 +66,7 @@ int report(const Transfer& t, const TensorFile& written, const Common& common) {
 }
 
 /// A file may be extended in place: --with and --out may be the same.
-int run_import(const Transfer& t, const Common& common) {
+int run_weights_import(const Transfer& t, const Common& common) {
   check_output(t.out, {t.from, t.map});
   TensorFile state = read_safetensors(t.from);
   for (const std::string& size : t.sizes)
@@ -86,7 +86,7 @@ int run_import(const Transfer& t, const Common& common) {
   return report(t, out, common);
 }
 
-int run_export(const Transfer& t, const Common& common) {
+int run_weights_export(const Transfer& t, const Common& common) {
   check_output(t.out, {t.from});
   const TensorFile out = export_model(load_bundle(t.from), t.model, t.from);
   write_safetensors(t.out, out);
@@ -102,7 +102,7 @@ void add_import(Program& program, CommandOptions group) {
       "w.safetensors\n"
       "restage weights import --from smrm.safetensors --map names.yaml --model smrm/rot6d "
       "--with w.safetensors --out all.safetensors",
-      run_import);
+      run_weights_import);
   app.add_option("--from", t.from, "state dict (safetensors; docs/convert_pytorch.py makes one)")
       .required();
   app.add_option("--model", t.model, "which model it is, as in 'restage info'").required();
@@ -117,7 +117,7 @@ void add_export(Program& program, CommandOptions group) {
   auto [app, t] =
       program.add(group, "export", "take one model out of a weights file, as a plain state dict",
                   "restage weights export --from w.safetensors --model smrm --out smrm.safetensors",
-                  run_export);
+                  run_weights_export);
   app.add_option("--from", t.from, "weights file").required();
   app.add_option("--model", t.model, "its name (smrm/rot6d), role (motion) or prefix (smrm)")
       .required();

@@ -16,7 +16,7 @@ std::optional<size_t> index_of(const List& list, const Name& name) {
   return std::nullopt;
 }
 
-std::optional<size_t> row_of(const tables::Table& table, const std::string& label) {
+std::optional<size_t> place_of(const tables::Table& table, const std::string& label) {
   return index_of(table.rows, [&](const tables::Row& row) { return row.label == label; });
 }
 
@@ -63,7 +63,7 @@ Judgement judge(const PaperFile& file, const Budget& budget, const Claim& claim,
   const std::vector<std::string>& metrics = claim.metrics.empty() ? file.metrics : claim.metrics;
   tables::TableOptions options{{}, metrics, "", seed};
   tables::Table table = tables::make_table(results, options);
-  const auto better = row_of(table, claim.better), than = row_of(table, claim.than);
+  const auto better = place_of(table, claim.better), than = place_of(table, claim.than);
   if (better && than) {
     options.against = claim.than;
     table = tables::make_table(results, options);

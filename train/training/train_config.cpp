@@ -1,4 +1,4 @@
-#include "train/stages/train_config.h"
+#include "train/training/train_config.h"
 
 #include <algorithm>
 
