@@ -97,7 +97,7 @@ TEST(Device, AnUnknownOneIsRefused) {
   expect_error<InputError>([] { device_of("abacus"); }, {"'abacus'", "cpu"});
 }
 
-class DeviceOps : public testing::TestWithParam<size_t> {};
+class DeviceOps : public ::testing::TestWithParam<size_t> {};
 
 TEST_P(DeviceOps, PassTheHarnessThere) {
   const int64_t before = fake_counts().kernels;
@@ -121,7 +121,7 @@ TEST(DeviceGpu, EveryOpPassesTheHarness) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, DeviceOps, testing::Range(size_t{0}, all_samples().size()),
+INSTANTIATE_TEST_SUITE_P(All, DeviceOps, ::testing::Range(size_t{0}, all_samples().size()),
                          [](const auto& param) { return all_samples()[param.param].op; });
 
 TEST(Device, TheGpuRoundsWhatItMultipliesAsItIsTold) {

@@ -20,7 +20,7 @@
 namespace restage::gradcheck {
 namespace {
 
-class GradcheckOps : public testing::TestWithParam<size_t> {};
+class GradcheckOps : public ::testing::TestWithParam<size_t> {};
 
 TEST_P(GradcheckOps, Passes) {
   const Report r = check(all_samples()[GetParam()]);
@@ -28,7 +28,7 @@ TEST_P(GradcheckOps, Passes) {
   EXPECT_GT(r.compared, 0);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, GradcheckOps, testing::Range(size_t{0}, all_samples().size()),
+INSTANTIATE_TEST_SUITE_P(All, GradcheckOps, ::testing::Range(size_t{0}, all_samples().size()),
                          [](const auto& param) { return all_samples()[param.param].op; });
 
 std::string content(const std::filesystem::path& path) {

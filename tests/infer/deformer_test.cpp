@@ -20,13 +20,13 @@ Tensor random(const Shape& shape, const std::string& name, double size) {
   return Init{RngKey{11, 0}, DType::f32}.uniform(shape, size, name);
 }
 
-struct Surface {
+struct DeformerInput {
   Tensor points, weights, pose, bones;
 };
 
 /// Points on a bent sheet of about a body's size; weights that sum to one; any pose.
-Surface surface(int64_t v, int64_t joints = kJoints) {
-  Surface s;
+DeformerInput surface(int64_t v, int64_t joints = kJoints) {
+  DeformerInput s;
   s.points = random({v, 3}, "points", 1);
   for (int64_t i = 0; i < v; ++i) {
     float* x = s.points.data<float>() + 3 * i;
@@ -45,7 +45,7 @@ Surface surface(int64_t v, int64_t joints = kJoints) {
 }
 
 /// The same from ops: every unit for every point.
-Tensor reference(const Surface& s, const Mlp3* offsets) {
+Tensor reference(const DeformerInput& s, const Mlp3* offsets) {
   const int64_t v = s.points.size(0), j = s.weights.size(1);
   Context ctx;
   Var x = s.points.reshape({1, v, 3});
@@ -79,12 +79,12 @@ void fill(Parameter& p, double value) { p.value = Tensor::full(p.value.shape(), 
 
 /// Planes through the origin, in which the first units change sign, and points of which every tile
 /// has some on both sides of each plane.
-Surface with_all_units_active(Mlp3* offsets) {
+DeformerInput with_all_units_active(Mlp3* offsets) {
   fill(offsets->fc1.bias, 0);
   Tensor& w = offsets->fc1.weight.value;
   for (int64_t i = 0; i < w.size(0); ++i)
     for (int64_t c = 0; c < 69; ++c) w.data<float>()[69 * i + c] *= c < 66 ? 0.0f : 10.0f;
-  Surface s = surface(40);
+  DeformerInput s = surface(40);
   for (int64_t i = 0; i < 40; ++i)
     for (int64_t c = 0; c < 3; ++c)
       s.points.data<float>()[3 * i + c] =
@@ -96,16 +96,16 @@ Surface with_all_units_active(Mlp3* offsets) {
 TEST(InferDeformer, EqualsThePlainNetworkForAnyNumberOfPoints) {
   const auto offsets = net();
   for (const int64_t v : {1, 2, 47, 48, 49, 63, 65, 384, 385, 500, 3000}) {
-    const Surface s = surface(v);
+    const DeformerInput s = surface(v);
     const Deformer deformer(s.points, s.weights, offsets.get());
     EXPECT_LT(apart(deformer(s.pose, s.bones), reference(s, offsets.get())), 2e-6) << v;
   }
-  const Surface none = surface(0);
+  const DeformerInput none = surface(0);
   EXPECT_EQ(Deformer(none.points, none.weights, offsets.get())(none.pose, none.bones).numel(), 0);
 }
 
 TEST(InferDeformer, EqualsThePlainNetworkForAnyWidth) {
-  const Surface s = surface(400);
+  const DeformerInput s = surface(400);
   for (const int64_t width : {1, 5, 31, 33, 300}) {
     const auto offsets = net(width);
     const Deformer deformer(s.points, s.weights, offsets.get());
@@ -116,7 +116,7 @@ TEST(InferDeformer, EqualsThePlainNetworkForAnyWidth) {
 TEST(InferDeformer, EqualsTheTrainedNetwork) {
   const Bundle models =
       load_bundle(std::string(RESTAGE_SOURCE_DIR) + "/experiments/weights/lite.safetensors");
-  const Surface s = surface(5000);
+  const DeformerInput s = surface(5000);
   const Deformer deformer(s.points, s.weights, models.find_as<OffsetNet>("deformation.offsets"));
   const Tensor expected = reference(s, models.find_as<OffsetNet>("deformation.offsets"));
   EXPECT_LT(apart(deformer(s.pose, s.bones), expected), 2e-6);
@@ -126,7 +126,7 @@ TEST(InferDeformer, EqualsTheTrainedNetwork) {
 }
 
 TEST(InferDeformer, EqualsThePlainNetworkWhenAllOrNoUnitsChangeSign) {
-  const Surface s = surface(1000);
+  const DeformerInput s = surface(1000);
   const auto offsets = net();
   const auto share = [&] {
     const Deformer deformer(s.points, s.weights, offsets.get());
@@ -137,14 +137,14 @@ TEST(InferDeformer, EqualsThePlainNetworkWhenAllOrNoUnitsChangeSign) {
   EXPECT_EQ(share(), 0);
   fill(offsets->fc1.bias, -50);  // all off
   EXPECT_EQ(share(), 0);
-  const Surface around = with_all_units_active(offsets.get());
+  const DeformerInput around = with_all_units_active(offsets.get());
   const Deformer deformer(around.points, around.weights, offsets.get());
   EXPECT_LT(apart(deformer(s.pose, s.bones), reference(around, offsets.get())), 5e-6);
   EXPECT_EQ(deformer.active_share(s.pose), 1);
 }
 
 TEST(InferDeformer, PointsInOnePlace) {
-  Surface s = surface(700);
+  DeformerInput s = surface(700);
   for (int64_t i = 0; i < s.points.numel(); ++i) s.points.data<float>()[i] = 0.25f;
   const auto offsets = net();
   const Deformer deformer(s.points, s.weights, offsets.get());
@@ -154,7 +154,7 @@ TEST(InferDeformer, PointsInOnePlace) {
 
 TEST(InferDeformer, SkinsAloneWithoutOffsets) {
   for (const int64_t joints : {1, 22, 30}) {
-    const Surface s = surface(333, joints);
+    const DeformerInput s = surface(333, joints);
     const Deformer deformer(s.points, s.weights, nullptr);
     EXPECT_LT(apart(deformer(s.pose, s.bones), reference(s, nullptr)), 1e-6);
     EXPECT_EQ(deformer.active_share(s.pose), 0);
@@ -162,7 +162,7 @@ TEST(InferDeformer, SkinsAloneWithoutOffsets) {
 }
 
 TEST(InferDeformer, AGpuGivesTheSame) {
-  const Surface s = surface(500);
+  const DeformerInput s = surface(500);
   for (const int64_t width : {0, 5, 300}) {
     const auto offsets = width > 0 ? net(width) : nullptr;
     const Deformer here(s.points, s.weights, offsets.get()),
@@ -175,7 +175,7 @@ TEST(InferDeformer, AGpuGivesTheSame) {
 }
 
 TEST(InferDeformer, BitsDoNotDependOnThreads) {
-  const Surface s = surface(4000);
+  const DeformerInput s = surface(4000);
   const auto offsets = net();
   const Deformer deformer(s.points, s.weights, offsets.get());
   const auto with = [&](int n) {
@@ -191,8 +191,8 @@ TEST(InferDeformer, BitsAreTheSameOnAllVectorSets) {
   const Bundle models =
       load_bundle(std::string(RESTAGE_SOURCE_DIR) + "/experiments/weights/lite.safetensors");
   const auto some = net(), odd = net(33), all = net();
-  const Surface any = surface(1000), everywhere = with_all_units_active(all.get());
-  const auto expect_same = [&](const Surface& s, const Mlp3* offsets, double least_share) {
+  const DeformerInput any = surface(1000), everywhere = with_all_units_active(all.get());
+  const auto expect_same = [&](const DeformerInput& s, const Mlp3* offsets, double least_share) {
     for (const bool dense : {false, true}) {
       const auto with = [&](const std::string& set) {
         const testing::UseSet use(set);
@@ -212,7 +212,7 @@ TEST(InferDeformer, BitsAreTheSameOnAllVectorSets) {
 }
 
 TEST(InferDeformer, NaNDoesNotVanish) {
-  Surface s = surface(200);
+  DeformerInput s = surface(200);
   s.pose.data<float>()[5] = std::nanf("");
   const auto offsets = net();
   const Tensor out = Deformer(s.points, s.weights, offsets.get())(s.pose, s.bones);
@@ -220,7 +220,7 @@ TEST(InferDeformer, NaNDoesNotVanish) {
 }
 
 TEST(InferDeformer, RefusesWhatDoesNotFit) {
-  const Surface s = surface(10);
+  const DeformerInput s = surface(10);
   const auto offsets = net();
   const WeightNet skinning(MlpConfig(), Init{RngKey{7, 0}, DType::f32});
   EXPECT_THROW(Deformer(s.points, s.weights, &skinning.net), ShapeError);

@@ -359,9 +359,9 @@ TEST(InferRetargeter, WithoutHeadingTheResultTurnsWithTheSource) {
     for (Vec3& j : joints) j = turn * j;
   const auto x = retargeted(models, source), y = retargeted(models, turned);
   for (size_t f = 0; f < x.size(); ++f) {
-    Joints expected = x[f].joints;
+    Joints expected = *x[f].joints;
     for (Vec3& j : expected) j = turn * j;
-    EXPECT_LT(apart(y[f].joints, expected), 1e-4) << f;
+    EXPECT_LT(apart(*y[f].joints, expected), 1e-4) << f;
   }
 }
 

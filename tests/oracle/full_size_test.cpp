@@ -117,7 +117,7 @@ void expect_checksums(const std::string& name, const Tensor& got) {
   EXPECT_NEAR(std::sqrt(squares / n), deviation, 1e-9 * deviation) << name;
 }
 
-class FullSize : public testing::TestWithParam<DType> {
+class FullSize : public ::testing::TestWithParam<DType> {
  protected:
   DType type() const { return GetParam(); }
   Tensor in(const Tensor& t) const { return t.cast(type()); }
@@ -178,7 +178,7 @@ TEST_P(FullSize, DeformationAndDiscriminator) {
                                                                in(hash_fill({2, 63}, 907))));
 }
 
-INSTANTIATE_TEST_SUITE_P(Types, FullSize, testing::Values(DType::f64, DType::f32),
+INSTANTIATE_TEST_SUITE_P(Types, FullSize, ::testing::Values(DType::f64, DType::f32),
                          [](const auto& p) { return std::string(name_of(p.param)); });
 
 TEST(FullSizeFormulas, HashAndFarthestPoints) {

@@ -42,7 +42,7 @@ std::string report(const std::vector<Difference>& differences) {
   return out;
 }
 
-class OracleGolden : public testing::TestWithParam<std::string> {};
+class OracleGolden : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(OracleGolden, AgreesInValuesAndGradients) {
   const std::string path = folder() + GetParam() + ".safetensors";
@@ -69,7 +69,7 @@ TEST_P(OracleGolden, AgreesWithTheKernelsOfTheGpu) {
   EXPECT_TRUE(found.empty()) << report(found);
 }
 
-INSTANTIATE_TEST_SUITE_P(Cases, OracleGolden, testing::ValuesIn(cases()),
+INSTANTIATE_TEST_SUITE_P(Cases, OracleGolden, ::testing::ValuesIn(cases()),
                          [](const auto& param) { return param.param; });
 
 TEST(DeviceGpu, AgreesWithTheOracle) {

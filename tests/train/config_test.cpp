@@ -85,7 +85,7 @@ void visit(V& v, Needy& c) {
 /// Content of a file, or overrides, and what is said of it after "x.yaml:" or "override ".
 using Cases = std::vector<std::pair<std::string, std::string>>;
 
-class TrainConfig : public test::FileTest {
+class ConfigFiles : public test::FileTest {
  protected:
   std::string put(const std::string& name, const std::string& text) {
     return dir.write(name, text);
@@ -115,7 +115,7 @@ class TrainConfig : public test::FileTest {
   }
 };
 
-TEST_F(TrainConfig, ReadsEveryType) {
+TEST_F(ConfigFiles, ReadsEveryType) {
   Everything c;
   const ConfigNode tree = load_config(
       put("x.yaml",
@@ -139,7 +139,7 @@ TEST_F(TrainConfig, ReadsEveryType) {
             dir / "x.yaml:16: 'net.clip' is odd; mend it");
 }
 
-TEST_F(TrainConfig, EmptyFileAndEmptySectionKeepDefaults) {
+TEST_F(ConfigFiles, EmptyFileAndEmptySectionKeepDefaults) {
   EXPECT_EQ(error(""), "");
   EXPECT_EQ(error("# only a comment\n"), "");
   EXPECT_EQ(error("net:\n"), "");
@@ -151,7 +151,7 @@ TEST_F(TrainConfig, EmptyFileAndEmptySectionKeepDefaults) {
   EXPECT_FALSE(c.net.clip.has_value());
 }
 
-TEST_F(TrainConfig, TypeErrorsNameFileLineKeyAndValue) {
+TEST_F(ConfigFiles, TypeErrorsNameFileLineKeyAndValue) {
   const std::string steps = "1: 'steps' must be a whole number >= 0, got ";
   expect_errors(
       {{"net:\n  batch: abc\n", "2: 'net.batch' must be a whole number > 0, got 'abc'"},
@@ -183,7 +183,7 @@ TEST_F(TrainConfig, TypeErrorsNameFileLineKeyAndValue) {
       {{"milestones: [1, 2, 3, 4]", "1: 'milestones' has more than 3 items; remove some"}});
 }
 
-TEST_F(TrainConfig, ChoicesAndUnknownKeysSuggestTheNearest) {
+TEST_F(ConfigFiles, ChoicesAndUnknownKeysSuggestTheNearest) {
   expect_errors(
       {{"net:\n  space: quaternions",
         "2: 'net.space' must be one of rot6d, quaternion, got 'quaternions'; did you mean "
@@ -201,7 +201,7 @@ TEST_F(TrainConfig, ChoicesAndUnknownKeysSuggestTheNearest) {
   EXPECT_EQ(nearest("x", {"y"}), "");
 }
 
-TEST_F(TrainConfig, BrokenYaml) {
+TEST_F(ConfigFiles, BrokenYaml) {
   const std::string no_lines = "1: holds no 'key: value' lines; give a configuration file";
   const std::string open =
       "1: a bracket is open, or a list or section stands as a key; write 'key: value'";
@@ -224,7 +224,7 @@ TEST_F(TrainConfig, BrokenYaml) {
   EXPECT_NE(error("net: *missing\n"), "");
 }
 
-TEST_F(TrainConfig, AliasesAreAllowedButBounded) {
+TEST_F(ConfigFiles, AliasesAreAllowedButBounded) {
   Everything c;
   load_config(put("x.yaml", "layers: [&l {width: 7}, *l, *l]\n"), {}, c);
   EXPECT_EQ(c.layers, (std::vector<Layer>{{7, "linear"}, {7, "linear"}, {7, "linear"}}));
@@ -247,7 +247,7 @@ TEST_F(TrainConfig, AliasesAreAllowedButBounded) {
   EXPECT_NE(error(std::string(900'000, '[')), "");
 }
 
-TEST_F(TrainConfig, IncludesMergeAndTheFileItselfWins) {
+TEST_F(ConfigFiles, IncludesMergeAndTheFileItselfWins) {
   put("sub/base.yaml", "include: deep.yaml\nname: base\nsteps: 1\nnet:\n  batch: 2\n");
   put("sub/deep.yaml",
       "name: deep\nseed: 9\nnet: {space: quaternion, batch: 1}\nmilestones: [1, 2, 3]\n");
@@ -279,7 +279,7 @@ TEST_F(TrainConfig, IncludesMergeAndTheFileItselfWins) {
   EXPECT_EQ(error_of(dir / "x.yaml"), "sub/deep.yaml:2: unknown key 'nmae'; did you mean 'name'?");
 }
 
-TEST_F(TrainConfig, IncludeErrors) {
+TEST_F(ConfigFiles, IncludeErrors) {
   EXPECT_EQ(error("name: a\ninclude: none.yaml\n"),
             "x.yaml:2: the included file 'none.yaml' does not exist; give a path relative to the "
             "file that "
@@ -306,7 +306,7 @@ TEST_F(TrainConfig, IncludeErrors) {
   EXPECT_NE(error_of(dir / "absent.yaml"), "");
 }
 
-TEST_F(TrainConfig, OverridesWinAndErrorsNameThem) {
+TEST_F(ConfigFiles, OverridesWinAndErrorsNameThem) {
   Everything c;
   load_config(put("x.yaml", "steps: 1\nlayers: [{width: 1}]\n"),
               {"steps=2", "net.batch=3", "milestones=[4, 5]", "net={clip: 1}", "layers.0.kind=conv",
@@ -332,7 +332,7 @@ TEST_F(TrainConfig, OverridesWinAndErrorsNameThem) {
   EXPECT_HAS(error("", {"include=x.yaml"}), "unknown key 'include'");
 }
 
-TEST_F(TrainConfig, ResolvedYamlReadsBackToTheSame) {
+TEST_F(ConfigFiles, ResolvedYamlReadsBackToTheSame) {
   Everything c;
   c.name = "it's \"odd\"\n\ttab: # \\ null";
   c.rate = 0.1 + 0.2;
@@ -357,13 +357,13 @@ TEST_F(TrainConfig, ResolvedYamlReadsBackToTheSame) {
             "a:\n  b: [1, [2]]\n  c:\n    - d: 1\n      e: []\n    - {}\nf: {}\n");
 }
 
-TEST_F(TrainConfig, Tf32IsForGpus) {
+TEST_F(ConfigFiles, Tf32IsForGpus) {
   using Training = restage::TrainConfig;
   EXPECT_HAS(error<Training>("precision: tf32\n"), "tf32, which only GPUs have; give float32");
   EXPECT_EQ(error<Training>("precision: tf32\ndevice: cuda\n"), "");
 }
 
-TEST_F(TrainConfig, ReferenceListsEveryKey) {
+TEST_F(ConfigFiles, ReferenceListsEveryKey) {
   const std::string table = config_reference_table(config_reference<Everything>());
   for (const char* line :
        {"| `steps` | whole number >= 0 | `1000` | optimiser steps |",

@@ -15,7 +15,7 @@
 namespace restage {
 namespace {
 
-using testing::bytes_of;
+using testing::result_bytes;
 using testing::choose;
 using testing::deformation;
 using testing::motion;
@@ -40,7 +40,7 @@ Outcome trained(Device device, const std::string& name, const TrainConfig& confi
   Outcome out;
   for (int64_t i = 0; i < 5; ++i)
     for (const auto& value : stage->step(i)) out.logged.push_back(value);
-  out.bytes = bytes_of(*stage);
+  out.bytes = result_bytes(*stage);
   out.judged = stage->validate();
   for (const Shown& row : stage->show()) EXPECT_FALSE(row.label.empty());
   TensorFile weights;
@@ -185,7 +185,7 @@ TEST(DeviceStages, ACheckpointMovesBetweenDevices) {
     begun->save(checkpoint);
     gone_on->load(checkpoint, "checkpoint");
     for (int64_t i = 2; i < 4; ++i) gone_on->step(i);
-    EXPECT_TRUE(bytes_of(*gone_on) == bytes_of(*whole)) << name;
+    EXPECT_TRUE(result_bytes(*gone_on) == result_bytes(*whole)) << name;
   }
 }
 

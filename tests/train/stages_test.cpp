@@ -20,7 +20,7 @@
 namespace restage {
 namespace {
 
-using testing::bytes_of;
+using testing::result_bytes;
 using testing::choose;
 using testing::deformation;
 using testing::motion;
@@ -60,8 +60,8 @@ TEST(TrainStages, FiveStepsGiveTheSameBitsOnAllVectorSets) {
       const testing::UseSet use(set);
       const auto stage = tiny_stage(name, wide(5));
       for (int64_t i = 0; i < 5; ++i) stage->step(i);
-      if (first.empty()) first = bytes_of(*stage);
-      EXPECT_TRUE(bytes_of(*stage) == first) << name << ": " << sets[0] << " and " << set;
+      if (first.empty()) first = result_bytes(*stage);
+      EXPECT_TRUE(result_bytes(*stage) == first) << name << ": " << sets[0] << " and " << set;
     }
   }
 }
@@ -74,8 +74,8 @@ TEST(TrainStages, TwentyStepsWithOneTwoAndThreeThreadsGiveTheSameBits) {
       const auto stage = tiny_stage(name, wide(20));
       for (int64_t i = 0; i < 20; ++i) stage->step(i);
       stage->validate();  // must leave no trace
-      if (n == 1) first = bytes_of(*stage);
-      EXPECT_TRUE(bytes_of(*stage) == first) << name << " with " << n << " threads";
+      if (n == 1) first = result_bytes(*stage);
+      EXPECT_TRUE(result_bytes(*stage) == first) << name << " with " << n << " threads";
     }
   }
 }
@@ -86,8 +86,8 @@ TEST(TrainStages, AnotherSeedGivesOtherBits) {
   for (const std::string name : kStageNames) {
     const auto x = tiny_stage(name, a), y = tiny_stage(name, a), z = tiny_stage(name, b);
     for (int64_t i = 0; i < 2; ++i) x->step(i), y->step(i), z->step(i);
-    EXPECT_TRUE(bytes_of(*x) == bytes_of(*y)) << name;
-    EXPECT_FALSE(bytes_of(*x) == bytes_of(*z)) << name;
+    EXPECT_TRUE(result_bytes(*x) == result_bytes(*y)) << name;
+    EXPECT_FALSE(result_bytes(*x) == result_bytes(*z)) << name;
     // Not only where it begins: a training that starts from given weights would not vary else.
     const auto examples = [](const Stage& stage) {
       TensorFile file;
@@ -103,14 +103,14 @@ TEST(TrainStages, StateGoesThroughAFile) {
   for (const std::string name : kStageNames) {
     const auto straight = tiny_stage(name, tiny_training(8));
     for (int64_t i = 0; i < 4; ++i) straight->step(i);
-    const std::string half = bytes_of(*straight);
+    const std::string half = result_bytes(*straight);
     for (int64_t i = 4; i < 8; ++i) straight->step(i);
 
     const auto resumed = tiny_stage(name, tiny_training(8));
     resumed->load(parse_safetensors(half, "half"), "half");
-    EXPECT_TRUE(bytes_of(*resumed) == half) << name;
+    EXPECT_TRUE(result_bytes(*resumed) == half) << name;
     for (int64_t i = 4; i < 8; ++i) resumed->step(i);
-    EXPECT_TRUE(bytes_of(*resumed) == bytes_of(*straight)) << name;
+    EXPECT_TRUE(result_bytes(*resumed) == result_bytes(*straight)) << name;
   }
 }
 
@@ -126,7 +126,7 @@ TEST(TrainStages, ReadingHasNoState) {
     one->step(1);
     other->step(0);
     other->step(1);
-    EXPECT_TRUE(bytes_of(*one) == bytes_of(*other)) << name;
+    EXPECT_TRUE(result_bytes(*one) == result_bytes(*other)) << name;
     // A checkpoint holds models, optimisers and the discriminator's balance, and nothing of where
     // the loader is: that is a function of the number of the step.
     TensorFile file;
@@ -149,7 +149,7 @@ std::string asked(const TrainConfig& config, const std::optional<AnswerFolder>& 
   data.answers = answers;
   const auto stage = make_stage(config, "motion", data, &so_far);
   for (int64_t i = 0; i < 3; ++i) stage->step(i);
-  return bytes_of(*stage) + std::to_string(value_of(stage->validate(), "pa_mpjpe"));
+  return result_bytes(*stage) + std::to_string(value_of(stage->validate(), "pa_mpjpe"));
 }
 
 TrainConfig asking() {
@@ -338,13 +338,13 @@ TEST(TrainStages, TheFirstVersionsLossesAreDistancesAndBoneLengths) {
 TEST(TrainStages, StateOfAnotherStageIsRefused) {
   for (const std::string name : kStageNames) {
     const auto stage = tiny_stage(name, tiny_training(2));
-    const std::string before = bytes_of(*stage);
+    const std::string before = result_bytes(*stage);
     for (const std::string other : kStageNames) {
       if (other == name) continue;
-      const std::string bytes = bytes_of(*tiny_stage(other, tiny_training(2)));
+      const std::string bytes = result_bytes(*tiny_stage(other, tiny_training(2)));
       EXPECT_THROW(stage->load(parse_safetensors(bytes, "c"), "c"), InputError) << name;
     }
-    EXPECT_TRUE(bytes_of(*stage) == before) << name;
+    EXPECT_TRUE(result_bytes(*stage) == before) << name;
   }
   EXPECT_THROW(tiny_stage("motions", tiny_training(2)), InputError);
 }
@@ -423,12 +423,12 @@ TEST(TrainStages, ExtractorsWithBatchNormLearn) {
 
   choose(skeleton(c).model, "skeleton/pointnet", {"points=64", "dropout=0"});
   const auto pointnet = tiny_stage("skeleton", c);
-  const std::string start = bytes_of(*pointnet);
+  const std::string start = result_bytes(*pointnet);
   const auto [one, twelve] = learn(*pointnet, 12);
   EXPECT_LT(twelve, 0.9 * one);
   // The running statistics are part of the state, and move.
   const TensorFile before = parse_safetensors(start, "b"),
-                   after = parse_safetensors(bytes_of(*pointnet), "a");
+                   after = parse_safetensors(result_bytes(*pointnet), "a");
   int moved = 0;
   for (const auto& [name, tensor] : before.tensors)
     if (name.ends_with("running_mean"))
@@ -468,7 +468,7 @@ TEST(TrainStages, DiscriminatorRestsWhileItWins) {
 
 /// A checkpoint of the stage in which `name` holds the largest numbers.
 TensorFile poisoned(const Stage& stage, const std::string& name) {
-  TensorFile file = parse_safetensors(bytes_of(stage), "c");
+  TensorFile file = parse_safetensors(result_bytes(stage), "c");
   Tensor t = file.at(name, "c").clone();
   std::fill_n(t.data<float>(), t.numel(), 3e38f);
   file.tensors[name] = t;
@@ -486,7 +486,7 @@ TEST(TrainStages, NonFiniteValuesAreNamedWithOpAndModule) {
   for (const auto& c : cases) {
     const auto stage = tiny_stage(c.stage, tiny_training(4));
     stage->load(poisoned(*stage, c.parameter), "c");
-    const std::string before = bytes_of(*stage);
+    const std::string before = result_bytes(*stage);
     const std::string what = test::message_of<NonFiniteError>([&] { stage->step(0); });
     EXPECT_HAS(what, c.op);
     EXPECT_HAS(what, c.path);
@@ -494,7 +494,7 @@ TEST(TrainStages, NonFiniteValuesAreNamedWithOpAndModule) {
     EXPECT_FALSE(FiniteCheck::active());
     // The parameters stand as they were before the step.
     const TensorFile then = parse_safetensors(before, "b"),
-                     now = parse_safetensors(bytes_of(*stage), "a");
+                     now = parse_safetensors(result_bytes(*stage), "a");
     for (const auto& [name, tensor] : then.tensors) {
       if (name.starts_with("optimiser.") || name.starts_with("discriminator")) continue;
       EXPECT_TRUE(tensor.to_vector<float>() == now.at(name, "a").to_vector<float>()) << name;

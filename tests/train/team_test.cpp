@@ -20,7 +20,7 @@
 namespace restage {
 namespace {
 
-using testing::bytes_of;
+using testing::result_bytes;
 using testing::choose;
 using testing::deformation;
 using testing::motion;
@@ -124,7 +124,7 @@ std::vector<std::string> trained(const std::string& name, TrainConfig config, in
       for (const auto& value : values)
         if (team.rank() == 0 && losses != nullptr) losses->push_back(value.second);
     }
-    out[static_cast<size_t>(team.rank())] = bytes_of(*stage);
+    out[static_cast<size_t>(team.rank())] = result_bytes(*stage);
   });
   return out;
 }

@@ -87,7 +87,7 @@ inline std::unique_ptr<Stage> tiny_stage(const std::string& name, const TrainCon
 }
 
 /// All that a stage carries from step to step.
-inline std::string bytes_of(const Stage& stage) {
+inline std::string result_bytes(const Stage& stage) {
   TensorFile file;
   stage.save(file);
   return safetensors_bytes(file);
