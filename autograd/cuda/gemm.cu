@@ -7,9 +7,10 @@ void multiply(const Gemm& g) {
   const float beta32 = static_cast<float>(g.beta), one32 = 1;
   const bool wide = g.type == DType::f64;
   const cudaDataType_t type = wide ? CUDA_R_64F : CUDA_R_32F;
-  const cublasComputeType_t compute = wide                                    ? CUBLAS_COMPUTE_64F
-                                      : g.precision == MatmulPrecision::tf32 ? CUBLAS_COMPUTE_32F_FAST_TF32
-                                                                             : CUBLAS_COMPUTE_32F;
+  const cublasComputeType_t compute = wide ? CUBLAS_COMPUTE_64F
+                                      : g.precision == MatmulPrecision::tf32
+                                          ? CUBLAS_COMPUTE_32F_FAST_TF32
+                                          : CUBLAS_COMPUTE_32F;
   const auto op = [](bool transpose) { return transpose ? CUBLAS_OP_T : CUBLAS_OP_N; };
   check(cublasGemmStridedBatchedEx(cublas(), op(g.transpose_a), op(g.transpose_b),
                                    static_cast<int>(g.m), static_cast<int>(g.n),

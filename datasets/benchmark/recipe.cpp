@@ -101,9 +101,10 @@ class Checker {
         for (const std::string& m : motions) add(set + m + "-" + p.source + "-" + p.target);
       }
     for (const ScanRecipe& s : r_.scans) add("scans/" + name_of(s));
-    const bool splits = std::any_of(kRecipeSplits.begin(), kRecipeSplits.end(), [&](const auto& split) {
-      return !(r_.*split.second).bodies.empty() || !(r_.*split.second).clips.empty();
-    });
+    const bool splits =
+        std::any_of(kRecipeSplits.begin(), kRecipeSplits.end(), [&](const auto& split) {
+          return !(r_.*split.second).bodies.empty() || !(r_.*split.second).clips.empty();
+        });
     if (!splits && folders.empty())
       fail("makes nothing", "list bodies and clips, or pairs of characters and motions");
   }

@@ -36,8 +36,8 @@ struct BoneWords {
   enum Side : int8_t { middle = -1, left = 0, right = 1 };
   Side side = middle;
   BonePart part = BonePart::none;  ///< the last word that names a part: "foot_toe" is a toe
-  bool helper = false;     ///< twist, IK, control, end, finger, face, cloth, weapon ...
-  int number = -1;         ///< the digits after the part; -1: none
+  bool helper = false;             ///< twist, IK, control, end, finger, face, cloth, weapon ...
+  int number = -1;                 ///< the digits after the part; -1: none
   /// How far the name is from a plain one: unknown words, further parts, a number.
   int cost = 0;
 };

@@ -128,8 +128,8 @@ double across_outline(const DepthMap& map, int x, int y, const ScannerNoise& noi
   return 0.0;
 }
 
-void measure(const Mesh& surface, const ScanView& view, const ScannerNoise& noise, const RngKey& key,
-             Points& out) {
+void measure(const Mesh& surface, const ScanView& view, const ScannerNoise& noise,
+             const RngKey& key, Points& out) {
   const DepthMap map = depth_map(surface, view);
   for (int y = 0; y < map.height; ++y)
     for (int x = 0; x < map.width; ++x) {

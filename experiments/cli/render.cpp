@@ -224,6 +224,9 @@ void add_render(Program& program) {
       "render", "draw a result as a contact sheet or a page that plays it",
       "restage render result.h5 --out sheet.png\n"
       "restage render result.h5 --source mm/ --fps 60 --source-up z --scale 0.001 --out page.html\n"
+      "restage render result.h5 --no-source --out sheet.png\n"
+      "restage render result.h5 --source hero.glb --clip Walk --out sheet.png\n"
+      "restage render result.h5 --source takes.h5 --source-sequence 3 --out sheet.png\n"
       "restage render result.h5 --source scans.h5 --truth truth.h5 --out page.html\n"
       "restage render result.h5 --focus left_wrist --azimuth 60 --out hand.png\n"
       "restage render result.h5 --focus left_foot --within 0.1 --columns 4 --out foot.png\n"

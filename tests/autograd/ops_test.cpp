@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <ctime>
@@ -255,8 +256,8 @@ TEST(Threads, AFewLongRowsAreSharedByColumn) {
     }
 }
 
-/// Whether other threads than this one do a share of what f does: so much of the processor's time,
-/// after as many calls as that takes.
+/// Whether other threads than this one do a share of what f does, by the processor's time that they
+/// take. On a busy machine they may have to wait for their turn: f is called for up to 30 seconds.
 template <class F>
 bool is_shared(F&& f) {
   const auto seconds = [](clockid_t clock) {
@@ -266,7 +267,8 @@ bool is_shared(F&& f) {
   };
   const testing::UseThreads use(2);
   const double all = seconds(CLOCK_PROCESS_CPUTIME_ID), own = seconds(CLOCK_THREAD_CPUTIME_ID);
-  for (int i = 0; i < 200; ++i) {
+  const auto start = std::chrono::steady_clock::now();
+  for (int i = 0; std::chrono::steady_clock::now() - start < std::chrono::seconds(30); ++i) {
     f();
     const double mine = seconds(CLOCK_THREAD_CPUTIME_ID) - own,
                  total = seconds(CLOCK_PROCESS_CPUTIME_ID) - all;

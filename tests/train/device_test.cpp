@@ -15,10 +15,10 @@
 namespace restage {
 namespace {
 
-using testing::result_bytes;
 using testing::choose;
 using testing::deformation;
 using testing::motion;
+using testing::result_bytes;
 using testing::skeleton;
 using testing::tiny_stage;
 using testing::tiny_training;

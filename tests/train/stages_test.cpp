@@ -20,12 +20,12 @@
 namespace restage {
 namespace {
 
-using testing::result_bytes;
 using testing::choose;
 using testing::deformation;
 using testing::motion;
 using testing::optimisers;
 using testing::resize;
+using testing::result_bytes;
 using testing::skeleton;
 using testing::tiny_stage;
 using testing::tiny_training;
