@@ -87,8 +87,8 @@ class ScanSink final : public Sink {
   void end_sequence() override { writer_.end_sequence(); }
   void commit() override {
     if (subject_.stored)
-      carry_frames(open_schema_file(subject_.path), d_.frames, rows_, *d_.transform, writer_.file(),
-                   remarks_);
+      carry_frames(open_schema_file(subject_.path), subject_.frames->frames(), rows_, *d_.transform,
+                   writer_.file(), remarks_);
     writer_.commit();
   }
 
@@ -130,8 +130,9 @@ void mend_frames(const Subject& subject, const Diagnosis& d, Mender& mend, Sink&
   if (subject.mesh) return sink.push(mend(*subject.mesh), 0);
   subject.frames->rewind();
   std::optional<Mesh> previous;
-  int64_t sequence = 0;
+  int64_t sequence = 0, row = -1, row_before = -1;  // of the source, where empty frames count too
   for (int64_t i = 0; const auto frame = subject.frames->next(); ++i) {
+    row += 1 + frame->missing;
     if (frame->sequence != sequence) {
       sink.end_sequence();
       sequence = frame->sequence;
@@ -143,9 +144,10 @@ void mend_frames(const Subject& subject, const Diagnosis& d, Mender& mend, Sink&
     const auto gap = d.gap.find(i);
     if (gap != d.gap.end() && previous && d.is_filled(gap->second))
       for (int64_t k = 0; k < gap->second; ++k)
-        2 * k < gap->second ? sink.push(*previous, i - 1) : sink.push(mesh, i);
-    sink.push(mesh, i);
+        2 * k < gap->second ? sink.push(*previous, row_before) : sink.push(mesh, row);
+    sink.push(mesh, row);
     previous = std::move(mesh);
+    row_before = row;
   }
 }
 

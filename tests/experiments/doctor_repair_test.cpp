@@ -174,5 +174,25 @@ TEST(DoctorRepair, ScansKeepAllThatTheyHoldOfEveryFrame) {
     EXPECT_TRUE(remarked(folder, name)) << name;
 }
 
+TEST(DoctorRepair, RowsBehindAnEmptyFrameStayWithTheirFrames) {
+  const TempDir dir;
+  const std::string path = dir / "s.h5", out = dir / "out.h5";
+  {
+    const Points points = scan(somebody());
+    ScanWriter writer(path, {}, 30);
+    for (int f = 0; f < kFrames; ++f) writer.append(f == 1 ? Points{} : points);
+    writer.file().write<float>("/confidence", {kFrames}, {0.25f, 0.5f, 0.75f, 1.0f});
+    writer.commit();
+  }
+  Subject subject = subject_of(path);
+  subject.frames = without_empty_frames(std::move(subject.frames));
+  Diagnosis d = diagnosis_of(subject);
+  d.frames = kFrames - 1;  // that show something
+  d.gap[1] = 1;
+  write_repaired(subject, out, d);
+  EXPECT_EQ(h5::File::open(out).read<double>("/confidence", {kFrames}),
+            (std::vector<double>{0.25, 0.75, 0.75, 1.0}));
+}
+
 }  // namespace
 }  // namespace restage
