@@ -142,9 +142,9 @@ void mend_frames(const Subject& subject, const Diagnosis& d, Mender& mend, Sink&
     Mesh mesh = mend({frame->points, frame->faces});
     // A gap of up to a second: the nearest frame in time stands in.
     const auto gap = d.gap.find(i);
-    if (gap != d.gap.end() && previous && d.is_filled(gap->second))
+    if (gap != d.gap.end() && d.is_filled(gap->second))
       for (int64_t k = 0; k < gap->second; ++k)
-        2 * k < gap->second ? sink.push(*previous, row_before) : sink.push(mesh, row);
+        previous && 2 * k < gap->second ? sink.push(*previous, row_before) : sink.push(mesh, row);
     sink.push(mesh, row);
     previous = std::move(mesh);
     row_before = row;

@@ -21,7 +21,7 @@ void check(const SourceRecord& how) {
     throw InputError("", "--scale is out of range", "give metres per unit, 1e-9 to 1e6");
   if (how.fps && !(*how.fps >= 1 && *how.fps <= 1000))
     throw InputError("", "--fps is out of range", "give the source's frames per second, 1 to 1000");
-  if (how.fps && is_gltf_name(how.path))
+  if (how.fps && *how.fps != kFps && is_gltf_name(how.path))  // it is played at that rate
     throw InputError(how.path, "states its key times, which --fps cannot change",
                      "leave --fps out");
 }

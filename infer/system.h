@@ -26,7 +26,8 @@ struct RetargetedFrame {
   std::optional<double> confidence;
   /// No cloud of the source is behind this frame (System::miss()). The frame lies between the
   /// frames before and after the gap; in a gap at the beginning or at the end of the source, the
-  /// frame repeats the nearest one that has a cloud.
+  /// frame repeats the nearest one that has a cloud. With RetargetOptions::min_confidence the
+  /// target waits in such a frame.
   bool filled = false;
 };
 

@@ -21,7 +21,7 @@ namespace {
 constexpr uint64_t kAlwaysAllowed = uint64_t{64} << 20;  // bytes that any data set may claim
 constexpr uint64_t kMostCompression = 2000;  // gzip reaches 1032; beyond this, a claim is a lie
 constexpr uint64_t kLargestChunk = uint64_t{256} << 20;
-std::atomic<uint64_t> max_memory = kMaxMemory;
+std::atomic<uint64_t> max_memory = uint64_t{16} << 30;
 
 template <class T>
 hid_t memory_type() {

@@ -19,7 +19,7 @@ namespace restage::h5 {
 using Shape = std::vector<int64_t>;  ///< lengths of the axes, slowest first; empty: one value
 
 /// Most that the values of one read, or one chunk of a file, may take in memory, in bytes; at first
-/// kMaxMemory (readers/byte_stream.h). Holds for all files of this process: `--max-memory`.
+/// 16 GiB. Holds for all files of this process: `--max-memory`.
 void set_max_memory(uint64_t bytes);
 
 /// "[10, 22, 3]"; -1 (any length) is written as *.

@@ -283,6 +283,7 @@ class SeenFrames : public FrameSource {
       frame->left_out = left_out;
       return frame;
     }
+    at_end_ = missing;
     return std::nullopt;
   }
   void skip() override { next(); }
@@ -290,10 +291,17 @@ class SeenFrames : public FrameSource {
   int64_t frames() const override { return all_->frames(); }
   int64_t sequences() const override { return all_->sequences(); }
   double fps() const override { return all_->fps(); }
-  std::vector<std::string> remarks() const override { return all_->remarks(); }
+  std::vector<std::string> remarks() const override {
+    std::vector<std::string> out = all_->remarks();
+    if (at_end_ > 0)
+      out.push_back("its last " + std::to_string(at_end_) +
+                    " frames have no points and are left out");
+    return out;
+  }
 
  private:
   std::unique_ptr<FrameSource> all_;
+  int64_t at_end_ = 0;  // frames without a point behind the last one; known when that was read
 };
 
 }  // namespace

@@ -85,7 +85,9 @@ class HeaderParser {
     } else if (key == "type") {
       for (Field& field : out_.fields) {
         const std::string_view word = text::take_word(line);
-        field.type = word.size() == 1 ? static_cast<char>(std::toupper(word[0])) : '?';
+        field.type = word.size() == 1
+                         ? static_cast<char>(std::toupper(static_cast<unsigned char>(word[0])))
+                         : '?';
       }
     } else if (key == "width") {
       out_.width = number(line, kMaxPoints);

@@ -143,7 +143,6 @@ Report examine_sequence(const Options& options) {
   Report out("frames");
   auto source = without_empty_frames(
       open_frames(options.path, {.clip = "", .max_memory = options.max_memory}));
-  const std::vector<std::string> remarks = source->remarks();
   Diagnosis d = examine_frames(*source, examine_options(options));
   out.facts["frames"] = d.frames;
   out.facts["fps"] = d.fps;
@@ -151,7 +150,7 @@ Report examine_sequence(const Options& options) {
   out.facts["most_points"] = d.most_points;
   if (d.faces > 0) out.facts["faces"] = d.faces;
   out.findings = d.findings;
-  for (const std::string& remark : remarks)
+  for (const std::string& remark : source->remarks())
     out.findings.push_back({"remark", Weight::note, remark, 1, "", ""});
   out.diagnosis = std::move(d);
   out.subject = {options.path, std::nullopt, std::move(source), std::nullopt, ""};
@@ -434,8 +433,10 @@ void add_doctor(Program& program) {
       "restage doctor frames60/ --fps 60 --fix mended.h5\n"
       "exit code: 0 usable, 1 read but not usable as it is, 2 not readable",
       run_doctor);
-  app.add_option("FILE", options.path,
-                 "HDF5, PLY, OBJ, BVH, safetensors, YAML, or a folder of frames")
+  app.add_option(
+         "FILE", options.path,
+         "clouds and meshes (PLY, OBJ, PCD, XYZ, NPY, NPZ, glTF), a folder of them, HDF5, BVH, "
+         "AMC, safetensors, YAML")
       .required();
   app.add_option("--picture", options.picture, "draw it from front, side and top (PNG)");
   app.add_option("--fix", options.fix,

@@ -150,8 +150,11 @@ void Program::add_common_options(CommandOptions app) {
   app.add_flag("--json", common_.json, "print one JSON document instead of text").group(group);
   app.add_text(
          "--max-memory",
-         [this](const std::string& text) { common_.max_memory = parse_memory(text); },
-         "most that an array of a file may take, unpacked (4GB)")
+         [this](const std::string& text) {
+           common_.max_memory = parse_memory(text);
+           h5::set_max_memory(common_.max_memory);
+         },
+         "most that an array of a file may take, unpacked (4GB; of HDF5 16GiB)")
       .group(group);
 }
 
@@ -202,7 +205,6 @@ int Program::run(int argc, char** argv) {
   check_out(innermost(*app_));
   common_.seed_given = innermost(*app_).count("--seed") > 0;
   set_threads(common_.threads);
-  h5::set_max_memory(common_.max_memory);
   set_log_level(common_.quiet     ? LogLevel::quiet
                 : common_.verbose ? LogLevel::debug
                                   : LogLevel::info);

@@ -34,6 +34,12 @@ class RenderSource(CliTest):
         found = self.json("render", *arguments, "--out", "sheet.png")
         return self.bytes("sheet.png"), found
 
+    def test_a_source_that_states_its_times(self):
+        self.done(*self.retarget("moving.glb", "--source", "plain"))
+        self.done(*self.retarget("again.h5", "--source", "moving.glb"))
+        self.assertEqual(self.sheet("again.h5")[1]["source"], "moving.glb")
+        self.bad_input(["render", "again.h5", "--fps", 60, "--out", "x.png"], "key times")
+
     def test_a_result_knows_its_source(self):
         wanted, _ = self.sheet("results/r.h5", "--source", "plain", "--scale", 1)
         remembered, found = self.sheet("results/r.h5")

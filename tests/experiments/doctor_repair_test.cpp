@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "tests/support/doctor_people.h"
+#include "tests/support/errors.h"
 #include "tests/support/files.h"
 
 namespace restage {
@@ -174,13 +175,15 @@ TEST(DoctorRepair, ScansKeepAllThatTheyHoldOfEveryFrame) {
     EXPECT_TRUE(remarked(folder, name)) << name;
 }
 
-TEST(DoctorRepair, RowsBehindAnEmptyFrameStayWithTheirFrames) {
+/// The confidence of each frame of a repaired file whose frame `empty` has no points, and what is
+/// said.
+std::vector<double> repaired_without(int empty, std::vector<std::string>* said) {
   const TempDir dir;
   const std::string path = dir / "s.h5", out = dir / "out.h5";
   {
     const Points points = scan(somebody());
     ScanWriter writer(path, {}, 30);
-    for (int f = 0; f < kFrames; ++f) writer.append(f == 1 ? Points{} : points);
+    for (int f = 0; f < kFrames; ++f) writer.append(f == empty ? Points{} : points);
     writer.file().write<float>("/confidence", {kFrames}, {0.25f, 0.5f, 0.75f, 1.0f});
     writer.commit();
   }
@@ -188,10 +191,20 @@ TEST(DoctorRepair, RowsBehindAnEmptyFrameStayWithTheirFrames) {
   subject.frames = without_empty_frames(std::move(subject.frames));
   Diagnosis d = diagnosis_of(subject);
   d.frames = kFrames - 1;  // that show something
-  d.gap[1] = 1;
+  if (empty < kFrames - 1) d.gap[empty] = 1;
   write_repaired(subject, out, d);
-  EXPECT_EQ(h5::File::open(out).read<double>("/confidence", {kFrames}),
-            (std::vector<double>{0.25, 0.75, 0.75, 1.0}));
+  *said = subject.frames->remarks();
+  return h5::File::open(out).read<double>("/confidence", {-1});
+}
+
+TEST(DoctorRepair, RowsBesideAnEmptyFrameStayWithTheirFrames) {
+  std::vector<std::string> said;
+  EXPECT_EQ(repaired_without(1, &said), (std::vector<double>{0.25, 0.75, 0.75, 1.0}));
+  EXPECT_EQ(repaired_without(0, &said), (std::vector<double>{0.5, 0.5, 0.75, 1.0}));
+  EXPECT_TRUE(said.empty());
+  EXPECT_EQ(repaired_without(3, &said), (std::vector<double>{0.25, 0.5, 0.75}));
+  ASSERT_EQ(said.size(), 1u) << "nothing behind it could tell when it was";
+  EXPECT_HAS(said[0], "its last 1 frames");
 }
 
 }  // namespace
