@@ -163,11 +163,11 @@ RunDir RunDir::create(const std::string& root, const std::string& name,
                       const std::string& resolved_yaml, const std::string& provenance_json,
                       std::vector<std::string> stages) {
   check_stages(stages);
-  constexpr int kTries = 10000;
+  constexpr int kMostNames = 10000;
   Draft draft(inside(root, name.c_str()));
   RunDir run("", std::move(stages), fill(draft, resolved_yaml, provenance_json));
   const std::string stem = inside(root, name.c_str()) + "-" + timestamp() + "-";
-  for (int n = 1; n <= kTries && !draft.moved; ++n) {
+  for (int n = 1; n <= kMostNames && !draft.moved; ++n) {
     run.dir_ = stem + std::to_string(n);
     // rename replaces an empty folder; a run is never empty, but a user's folder might be
     if (!fs::exists(run.dir_)) draft.move_to(run.dir_);

@@ -256,6 +256,16 @@ bool drop_numbers(std::vector<std::string>& names) {
   return true;
 }
 
+/// Without the beginning of a UTF-8 character at its end: 左 and 右 share their first byte.
+void drop_cut_character(std::string& text) {
+  size_t lead = text.size();
+  while (lead > 0 && (static_cast<unsigned char>(text[lead - 1]) & 0xC0) == 0x80) --lead;
+  if (lead == 0 || !is_foreign(text[lead - 1])) return;
+  const auto first = static_cast<unsigned char>(text[--lead]);
+  const size_t length = first >= 0xF0 ? 4 : first >= 0xE0 ? 3 : 2;
+  if (text.size() - lead < length) text.resize(lead);
+}
+
 /// What three quarters of names begin with within a word: "mixamorig" of "mixamorighips".
 std::string shared_letters(const std::vector<std::string>& names) {
   std::string out;
@@ -270,6 +280,7 @@ std::string shared_letters(const std::vector<std::string>& names) {
     if (most == next.end() || most->second < 4 || 4 * most->second < 3 * all) break;
     out += most->first;
   }
+  drop_cut_character(out);
   return out;
 }
 

@@ -129,8 +129,7 @@ bool leaves_out(const BoneTree& tree, const Profile& profile, const Bones& bones
   if (!hangs_on(tree.skeleton, chest, bones[0])) return false;  // limbs that hang on nothing
   const auto named = [&](int j) { return bones[j] >= 0; };
   const int spine = named(kSpine1) + named(kSpine2) + named(kSpine3);
-  if (!profile.places[kSpine3] && spine < std::min(3, 1 + between(tree, bones[0], chest)))
-    return true;
+  if (spine < std::min(3, 1 + between(tree, bones[0], chest))) return true;
   if (!named(12) && between(tree, chest, bones[15]) > 0) return true;
   for (const int side : {0, 1}) {
     if (!named(13 + side) && between(tree, chest, bones[16 + side], {BonePart::neck}) > 0)
@@ -279,6 +278,27 @@ std::vector<std::string> words_for(const BoneTree& tree, const FoundJoints& foun
   throw UnknownSkeleton(where, what, kNameThem);
 }
 
+/// What no skeleton can be: one bone for two joints, a limb's lower joint above its upper one.
+void check_asked(const SourceSkeleton& skeleton, const Bones& bones, const std::string& where) {
+  constexpr const char* kFixNames = "correct the names in the file of --bones";
+  for (size_t j = 0; j < kJoints; ++j)
+    for (size_t k = 0; k < j; ++k)
+      if (bones[j] >= 0 && bones[j] == bones[k])
+        throw InputError(where,
+                         cat("its bone ", text::quote(skeleton.names[bones[j]]),
+                             " is named for two joints, ", kJointNames[k], " and ", kJointNames[j]),
+                         kFixNames);
+  for (const int j : {4, 5, 7, 8, 10, 11, 18, 19, 20, 21}) {
+    const int above = bones[kParents[j]];
+    if (bones[j] >= 0 && above >= 0 && hangs_on(skeleton, above, bones[j]))
+      throw InputError(where,
+                       cat("the bone for ", kJointNames[kParents[j]], ", ",
+                           text::quote(skeleton.names[above]), ", hangs on the bone for ",
+                           kJointNames[j], ", ", text::quote(skeleton.names[bones[j]])),
+                       kFixNames);
+  }
+}
+
 /// The bones that a profile names which was asked for. InputError for those that the file lacks, or
 /// has twice.
 Bones asked_bones(const Profile& profile, const SourceSkeleton& skeleton, const BoneNames& names,
@@ -293,6 +313,7 @@ Bones asked_bones(const Profile& profile, const SourceSkeleton& skeleton, const 
       if (bones[j] >= 0 && names.find(name) == bones[j] && names.is_twice(name))
         throw InputError(where, cat("two of its bones are called ", text::quote(name)),
                          "rename one, or export one character only");
+  check_asked(skeleton, bones, where);
   return bones;
 }
 

@@ -158,7 +158,7 @@ class TableParser {
       point[static_cast<int>(axis)] = text::coordinate(
           value - origin_[static_cast<int>(axis)], [&] { return where(); }, how_);
     }
-    if (named_columns_ == 0) counted_ = counted_ && columns_ > 3 && follows(number(cells_[0]));
+    counted_ = counted_ && named_columns_ == 0 && columns_ > 3 && follows(number(cells_[0]));
     if (frame_column_ >= 0) check_frame(cells_[static_cast<size_t>(frame_column_)]);
     out_.vertices.push_back(point);
   }

@@ -142,10 +142,9 @@ size_t ConfigNode::size() const {
 }
 
 void merge_config(ConfigNode& base, ConfigNode over) {
-  using Kind = ConfigNode::Kind;
   // `section:` with nothing below it changes nothing.
-  if (base.kind == Kind::map && over.kind == Kind::null) return;
-  if (base.kind != Kind::map || over.kind != Kind::map) {
+  if (base.kind == ConfigNode::Kind::map && over.kind == ConfigNode::Kind::null) return;
+  if (base.kind != ConfigNode::Kind::map || over.kind != ConfigNode::Kind::map) {
     std::string key = std::move(base.key);
     base = std::move(over);
     base.key = std::move(key);
