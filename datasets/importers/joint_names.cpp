@@ -124,7 +124,7 @@ int between(const BoneTree& tree, int above, int below,
 }
 
 /// Whether the family would place a joint where a bone lies: an odd one beside its good ones.
-bool leaves_out(const BoneTree& tree, const Profile& profile, const Bones& bones) {
+bool leaves_out(const BoneTree& tree, const Bones& bones) {
   const int chest = chest_of(tree, bones);
   if (!hangs_on(tree.skeleton, chest, bones[0])) return false;  // limbs that hang on nothing
   const auto named = [&](int j) { return bones[j] >= 0; };
@@ -156,8 +156,7 @@ Family find_family(const BoneTree& tree, const BoneNames& names) {
     const Bones bones = bones_of(profile, names);
     const auto count = static_cast<int>(
         std::count_if(bones.begin(), bones.end(), [](int bone) { return bone >= 0; }));
-    if (count > most && is_whole(bones) && hang_together(tree, bones) &&
-        !leaves_out(tree, profile, bones)) {
+    if (count > most && is_whole(bones) && hang_together(tree, bones) && !leaves_out(tree, bones)) {
       out = {&profile, bones};
       most = count;
     }

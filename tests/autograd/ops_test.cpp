@@ -239,8 +239,9 @@ TEST(Threads, SumsOfManyNumbersHaveTheSameBits) {
 
 TEST(Threads, AFewLongRowsAreSharedByColumn) {
   // [16, 3.5 million] over axis 0 was the work of one thread: all of it was one piece.
-  for (const auto& [n, inner] : {std::pair<int64_t, int64_t>{16, 100003}, {1500, 3001}, {1, 70001}})
+  for (const auto& shape : {std::pair<int64_t, int64_t>{16, 100003}, {1500, 3001}, {1, 70001}})
     for (const DType type : {DType::f32, DType::f64}) {
+      const int64_t n = shape.first, inner = shape.second;
       const Var x(random({n, inner}, 1).cast(type)), g(random({n, inner}, 2).cast(type));
       expect_same_for_all_threads([&] { return sum(x, 0).value; });
       expect_same_for_all_threads([&] { return max(x, 0).value; });
