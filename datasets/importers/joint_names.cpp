@@ -124,12 +124,13 @@ int between(const BoneTree& tree, int above, int below,
 }
 
 /// Whether the family would place a joint where a bone lies: an odd one beside its good ones.
-bool leaves_out(const BoneTree& tree, const Bones& bones) {
+bool leaves_out(const BoneTree& tree, const Profile& profile, const Bones& bones) {
   const int chest = chest_of(tree, bones);
   if (!hangs_on(tree.skeleton, chest, bones[0])) return false;  // limbs that hang on nothing
   const auto named = [&](int j) { return bones[j] >= 0; };
   const int spine = named(kSpine1) + named(kSpine2) + named(kSpine3);
-  if (spine < std::min(3, 1 + between(tree, bones[0], chest))) return true;
+  if (!profile.places[kSpine3] && spine < std::min(3, 1 + between(tree, bones[0], chest)))
+    return true;
   if (!named(12) && between(tree, chest, bones[15]) > 0) return true;
   for (const int side : {0, 1}) {
     if (!named(13 + side) && between(tree, chest, bones[16 + side], {BonePart::neck}) > 0)
@@ -156,7 +157,8 @@ Family find_family(const BoneTree& tree, const BoneNames& names) {
     const Bones bones = bones_of(profile, names);
     const auto count = static_cast<int>(
         std::count_if(bones.begin(), bones.end(), [](int bone) { return bone >= 0; }));
-    if (count > most && is_whole(bones) && hang_together(tree, bones) && !leaves_out(tree, bones)) {
+    if (count > most && is_whole(bones) && hang_together(tree, bones) &&
+        !leaves_out(tree, profile, bones)) {
       out = {&profile, bones};
       most = count;
     }

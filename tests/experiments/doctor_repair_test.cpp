@@ -199,7 +199,7 @@ std::vector<double> repaired_without(int empty, std::vector<std::string>* said) 
 
 TEST(DoctorRepair, RowsBesideAnEmptyFrameStayWithTheirFrames) {
   std::vector<std::string> said;
-  EXPECT_EQ(repaired_without(1, &said), (std::vector<double>{0.25, 0.75, 0.75, 1.0}));
+  EXPECT_EQ(repaired_without(1, &said), (std::vector<double>{0.25, 0.25, 0.75, 1.0}));
   EXPECT_EQ(repaired_without(0, &said), (std::vector<double>{0.5, 0.5, 0.75, 1.0}));
   EXPECT_TRUE(said.empty());
   EXPECT_EQ(repaired_without(3, &said), (std::vector<double>{0.25, 0.5, 0.75}));
