@@ -20,6 +20,7 @@ std::unique_ptr<tbb::global_control> limit;
 std::unique_ptr<tbb::task_arena> arena;
 std::mutex limit_mutex;
 int requested = 0;
+std::atomic<int64_t> cut{0};
 
 /// The threads of a group; of whichever group this thread works in.
 struct GroupOfThreads {
@@ -79,6 +80,7 @@ void parallel_for(int64_t n, int64_t grain, PieceRef body) {
   if (n <= 0) return;
   grain = std::max<int64_t>(1, grain);
   const int64_t pieces = (n + grain - 1) / grain;
+  cut.fetch_add(pieces, std::memory_order_relaxed);
   const auto piece = [&](int64_t i) { body(i * grain, std::min(n, (i + 1) * grain)); };
   if (pieces == 1 || (group != nullptr ? group->size : requested) == 1) {
     for (int64_t i = 0; i < pieces; ++i) piece(i);
@@ -98,6 +100,8 @@ void parallel_for(int64_t n, int64_t grain, PieceRef body) {
   run_all(work);
   see(joined);
 }
+
+int64_t pieces_cut() { return cut.load(std::memory_order_relaxed); }
 
 void in_groups(int64_t n, int groups, const std::function<void(int64_t)>& body) {
   if (n <= 0) return;

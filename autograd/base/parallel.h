@@ -32,4 +32,8 @@ class PieceRef {
 /// shorter), on any thread, in any order. The pieces depend on n and grain only.
 void parallel_for(int64_t n, int64_t grain, PieceRef body);
 
+/// Pieces that all calls of parallel_for() were cut into so far. How work is cut decides how many
+/// threads can share it, and unlike the time that they take it is the same on every machine.
+int64_t pieces_cut();
+
 }  // namespace restage

@@ -3,12 +3,11 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstring>
-#include <ctime>
 #include <limits>
 
+#include "autograd/base/parallel.h"
 #include "autograd/gradcheck/evaluate.h"
 #include "autograd/kernels/reduce.h"
 #include "autograd/ops/elementwise.h"
@@ -257,39 +256,32 @@ TEST(Threads, AFewLongRowsAreSharedByColumn) {
     }
 }
 
-/// Whether other threads than this one do a share of what f does, by the processor's time that they
-/// take. On a busy machine they may have to wait for their turn: f is called for up to 30 seconds.
+/// How many pieces the work of f is cut into.
 template <class F>
-bool is_shared(F&& f) {
-  const auto seconds = [](clockid_t clock) {
-    timespec t;
-    ::clock_gettime(clock, &t);
-    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-  };
-  const testing::UseThreads use(2);
-  const double all = seconds(CLOCK_PROCESS_CPUTIME_ID), own = seconds(CLOCK_THREAD_CPUTIME_ID);
-  const auto start = std::chrono::steady_clock::now();
-  for (int i = 0; std::chrono::steady_clock::now() - start < std::chrono::seconds(30); ++i) {
-    f();
-    const double mine = seconds(CLOCK_THREAD_CPUTIME_ID) - own,
-                 total = seconds(CLOCK_PROCESS_CPUTIME_ID) - all;
-    if (i > 3 && total - mine > 0.2 * total) return true;
-  }
-  return false;
+int64_t pieces_of(F&& f) {
+  const int64_t before = pieces_cut();
+  f();
+  return pieces_cut() - before;
 }
 
 TEST(Threads, ShareAFewLongRows) {
-  const int64_t n = 16, inner = 300000;
+  const int64_t n = 16, inner = 300000, many = 16;
   const Tensor x = Tensor::full({n, inner}, 1.5);
   Tensor row = Tensor::empty({inner}), all = Tensor::empty({n, inner}),
          index = Tensor::zeros({inner}, DType::i32);
-  EXPECT_TRUE(is_shared([&] { launch(SumArgs{x, row, 1, n, inner}); })) << "sum";
-  EXPECT_TRUE(is_shared([&] { launch(MaxArgs{x, row, index, 1, n, inner}); })) << "max";
-  EXPECT_TRUE(is_shared([&] { launch(MaxGradArgs{row, index, all, 1, n, inner}); })) << "max, back";
-  EXPECT_TRUE(is_shared([&] { launch(SoftmaxArgs{x, all, 1, n, inner}); })) << "softmax";
-  EXPECT_TRUE(is_shared([&] {
-    launch(SoftmaxGradArgs{x, x, all, 1, n, inner});
-  })) << "its gradient";
+  EXPECT_GE(pieces_of([&] { launch(SumArgs{x, row, 1, n, inner}); }), many) << "sum";
+  EXPECT_GE(pieces_of([&] { launch(MaxArgs{x, row, index, 1, n, inner}); }), many) << "max";
+  EXPECT_GE(pieces_of([&] {
+              launch(MaxGradArgs{row, index, all, 1, n, inner});
+            }),
+            many)
+      << "max, back";
+  EXPECT_GE(pieces_of([&] { launch(SoftmaxArgs{x, all, 1, n, inner}); }), many) << "softmax";
+  EXPECT_GE(pieces_of([&] {
+              launch(SoftmaxGradArgs{x, x, all, 1, n, inner});
+            }),
+            many)
+      << "its gradient";
 }
 
 TEST(Threads, SumsAreAccurate) {
