@@ -76,7 +76,10 @@ bool runs(int64_t pid, const std::string& start) {
   return now == start;
 }
 
-struct Record {
+}  // namespace
+
+/// What a lease's file says. Named, not anonymous: Lease::State has one.
+struct LeaseRecord {
   LeaseHolder holder;
   std::string world, start, token;
   bool released = false;
@@ -96,6 +99,7 @@ struct Record {
   }
 };
 
+namespace {
 std::string numbered(const std::string& path, int64_t number) {
   return path + "." + std::to_string(number);
 }
@@ -118,7 +122,7 @@ std::optional<std::string> read_bytes(const std::string& file) {
 
 /// The record of a file; nothing if there is no such file. A file that stays unreadable for a while
 /// is damaged, and its record belongs to nobody.
-std::optional<Record> read_record(const std::string& file) {
+std::optional<LeaseRecord> read_record(const std::string& file) {
   constexpr int kLooks = 10;
   nlohmann::json json;
   for (int look = 0; look < kLooks && !json.is_object(); ++look) {
@@ -127,7 +131,7 @@ std::optional<Record> read_record(const std::string& file) {
     if (!bytes) return std::nullopt;
     json = nlohmann::json::parse(*bytes, nullptr, false);
   }
-  Record out;
+  LeaseRecord out;
   const auto text = [&](const char* key) {
     const auto found = json.find(key);
     return found != json.end() && found->is_string() ? found->get<std::string>() : std::string();
@@ -179,13 +183,13 @@ int64_t last_number(const std::string& path) {
 
 /// Whether a lease is free, as far as that is known at once: it says so, or its holder was a
 /// process of this host and is dead.
-bool surely_free(const Record& record) {
+bool surely_free(const LeaseRecord& record) {
   if (record.released) return true;
   return record.holder.here && !runs(record.holder.pid, record.start);
 }
 
 /// Writes the file of a lease that this process wants to take, under a name that nobody else uses.
-std::string draft(const std::string& path, const Record& record) {
+std::string draft(const std::string& path, const LeaseRecord& record) {
   const std::string name = name_beside(path);
   const int fd = ::open(name.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0644);
   if (fd < 0) throw_unwritable(path, errno);
@@ -204,7 +208,7 @@ void remove_dead_drafts(const std::string& path) {
   try {
     for (const std::string& token : ends_of_names(path, kDraft)) {
       const std::string name = path + kDraft + token;
-      const std::optional<Record> record = read_record(name);
+      const std::optional<LeaseRecord> record = read_record(name);
       if (record && surely_free(*record)) ::unlink(name.c_str());
     }
   } catch (const ReadError&) {  // left to whoever tidies up next
@@ -224,12 +228,12 @@ bool link_once(const std::string& from, const std::string& to) {
 
 /// Waits until the heartbeat of the holder in `file` moves (true), or does not for `patience`. Time
 /// in which we ourselves stood still (a stalled file system, a suspended process) does not count.
-bool beats(const std::string& file, const Record& record, double patience) {
+bool beats(const std::string& file, const LeaseRecord& record, double patience) {
   const double nap = std::clamp(patience / 20, 0.01, 1.0);
   for (double waited = 0; waited < patience;) {
     const auto before = Clock::now();
     std::this_thread::sleep_for(Seconds(nap));
-    const std::optional<Record> now = read_record(file);
+    const std::optional<LeaseRecord> now = read_record(file);
     if (!now || now->released) return false;
     if (now->token != record.token || now->holder.beat != record.holder.beat) return true;
     waited += std::min(Seconds(Clock::now() - before).count(), 2 * nap);
@@ -246,7 +250,7 @@ std::string LeaseHolder::text() const {
 struct Lease::State {
   std::string path, file;
   int64_t number = 0;
-  Record record;
+  LeaseRecord record;
   LeaseOptions options;
   std::atomic<bool> lost = false;
   std::mutex mutex;
