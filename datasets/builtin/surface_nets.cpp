@@ -40,14 +40,28 @@ Samples sample(const std::function<double(const Vec3&)>& field, const GridLines&
   return s;
 }
 
+// Bit k: corner k of the cell lies inside.
+int corners_inside(const Samples& s, int x, int y, int z) {
+  int inside = 0;
+  for (int k = 0; k < 8; ++k)
+    inside |= (s.value[s.at(x + (k & 1), y + (k >> 1 & 1), z + (k >> 2))] < 0) << k;
+  return inside;
+}
+
+// Calls f(x, y, z) for all cells that the surface passes.
+template <class F>
+void for_surface_cells(const Samples& s, F&& f) {
+  for (int z = 0; z + 1 < s.n[2]; ++z)
+    for (int y = 0; y + 1 < s.n[1]; ++y)
+      for (int x = 0; x + 1 < s.n[0]; ++x)
+        if (const int inside = corners_inside(s, x, y, z); inside != 0 && inside != 255) f(x, y, z);
+}
+
 // Fills one outside node if the nodes of this cell have diagonal contact; true when it did.
 bool repair_cell(Samples& s, int x, int y, int z) {
   std::array<size_t, 8> c;
-  int inside = 0;
-  for (int k = 0; k < 8; ++k) {
-    c[k] = s.at(x + (k & 1), y + (k >> 1 & 1), z + (k >> 2));
-    inside |= (s.value[c[k]] < 0) << k;
-  }
+  for (int k = 0; k < 8; ++k) c[k] = s.at(x + (k & 1), y + (k >> 1 & 1), z + (k >> 2));
+  const int inside = corners_inside(s, x, y, z);
   const auto in = [&](int k) { return (inside >> k & 1) != 0; };
   const auto fill = [&](int k, int l) {  // the one nearer to the surface
     double &a = s.value[c[k]], &b = s.value[c[l]];
@@ -71,15 +85,14 @@ bool repair_cell(Samples& s, int x, int y, int z) {
 void make_well_composed(Samples& s) {
   for (bool changed = true; changed;) {  // ends: every change turns an outside node inside
     changed = false;
-    for (int z = 0; z + 1 < s.n[2]; ++z)
-      for (int y = 0; y + 1 < s.n[1]; ++y)
-        for (int x = 0; x + 1 < s.n[0]; ++x)
-          while (repair_cell(s, x, y, z)) changed = true;
+    for_surface_cells(s, [&](int x, int y, int z) {
+      while (repair_cell(s, x, y, z)) changed = true;
+    });
   }
 }
 
-// Mean of the crossings of a cell's edges; false when the surface does not pass the cell.
-bool cell_vertex(const Samples& s, const GridLines& g, int x, int y, int z, Vec3& out) {
+// Mean of the crossings of the edges of a cell that the surface passes.
+Vec3 cell_vertex(const Samples& s, const GridLines& g, int x, int y, int z) {
   Vec3 sum = Vec3::Zero();
   int crossings = 0;
   for (int k = 0; k < 8; ++k)
@@ -94,9 +107,7 @@ bool cell_vertex(const Samples& s, const GridLines& g, int x, int y, int z, Vec3
       sum += (1 - t) * node(g, a[0], a[1], a[2]) + t * node(g, b[0], b[1], b[2]);
       ++crossings;
     }
-  if (crossings == 0) return false;
-  out = sum / crossings;
-  return true;
+  return sum / crossings;
 }
 
 void add_quad(SurfaceMesh& mesh, std::array<int32_t, 4> q, bool flip) {
@@ -120,14 +131,10 @@ SurfaceMesh surface_nets(const std::function<double(const Vec3&)>& field, const 
   make_well_composed(s);
   SurfaceMesh mesh;
   std::vector<int32_t> cell(s.value.size(), -1);
-  for (int z = 0; z + 1 < s.n[2]; ++z)
-    for (int y = 0; y + 1 < s.n[1]; ++y)
-      for (int x = 0; x + 1 < s.n[0]; ++x) {
-        Vec3 v;
-        if (!cell_vertex(s, grid, x, y, z, v)) continue;
-        cell[s.at(x, y, z)] = static_cast<int32_t>(mesh.vertices.size());
-        mesh.vertices.push_back(v);
-      }
+  for_surface_cells(s, [&](int x, int y, int z) {
+    cell[s.at(x, y, z)] = static_cast<int32_t>(mesh.vertices.size());
+    mesh.vertices.push_back(cell_vertex(s, grid, x, y, z));
+  });
   for (int z = 1; z + 1 < s.n[2]; ++z)  // an edge with a change of sign is the middle of a quad
     for (int y = 1; y + 1 < s.n[1]; ++y)
       for (int x = 1; x + 1 < s.n[0]; ++x)
