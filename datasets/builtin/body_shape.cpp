@@ -192,10 +192,11 @@ BodyShape draw_body_shape(const RngKey& key) {
 }
 
 double map_height(const BodyShape& s, double y) {
-  constexpr double kHip = .52, kNeck = .85;
-  const double trunk = (1 - kHip * s.legs - (1 - kNeck) * s.head) / (kNeck - kHip);
-  if (y <= kHip) return y * s.legs;
-  if (y <= kNeck) return kHip * s.legs + (y - kHip) * trunk;
+  constexpr double kHipHeight = .52, kNeckHeight = .85;
+  const double trunk =
+      (1 - kHipHeight * s.legs - (1 - kNeckHeight) * s.head) / (kNeckHeight - kHipHeight);
+  if (y <= kHipHeight) return y * s.legs;
+  if (y <= kNeckHeight) return kHipHeight * s.legs + (y - kHipHeight) * trunk;
   return 1 - (1 - y) * s.head;
 }
 

@@ -23,7 +23,7 @@ constexpr double kBehind = 0.05;     // of the points that may lie on its other 
 constexpr double kRest = 0.02;       // of the points that are not on it: somebody
 // Far beyond: cells inside what the plane fills beside the rest's shadow. A trunk fills some ten,
 // arms and legs none, two square metres of floor about a person fill sixty.
-constexpr double kCell = 0.04;  // times the diagonal
+constexpr double kReachCell = 0.04;  // times the diagonal
 constexpr int kFilled = 40;
 constexpr int kNeighbours = 6;  // of eight that a cell inside has
 
@@ -146,7 +146,7 @@ Planes find_planes(const Points& points) {
     const double size = diagonal(some);
     if (!(size > 0) || !std::isfinite(size * size)) break;
     std::optional<Plane> plane = best_plane(some, kThick * size);
-    if (!plane || !reaches_far(left, *plane, kCell * size)) break;
+    if (!plane || !reaches_far(left, *plane, kReachCell * size)) break;
     plane->thick = std::clamp(noise_of(some, *plane), kThinnest * size, kThick * size);
     plane = fitted(some, *plane);
     std::vector<bool> on = out.on;

@@ -12,7 +12,7 @@ constexpr double kDegrees = 180 / 3.14159265358979323846;
 // Shares of the height: shoulders and hips of a T-pose (data of 160 bodies).
 constexpr double kShoulderHeight = 0.81, kShoulderWidth = 0.10, kShortestReach = 0.22;
 constexpr double kHipHeight = 0.53, kHipWidth = 0.055, kFoot = 0.06;
-constexpr double kChest = 0.6, kNeck = 0.8, kTrunkWidth = 0.12;
+constexpr double kChestHeight = 0.6, kNeckHeight = 0.8, kTrunkWidth = 0.12;
 
 /// The middle of the points that `chosen` takes; nothing if there are none.
 template <class Chosen>
@@ -36,7 +36,8 @@ std::vector<Vec3> normed(const Points& points) {
   for (const Point& p : points) {
     out.push_back((p.cast<double>() - Vec3(middle, floor, 0)) / height);
     const Vec3& x = out.back();
-    if (x.y() > kChest && x.y() < kNeck && std::abs(x.x()) < kTrunkWidth) depth.push_back(x.z());
+    if (x.y() > kChestHeight && x.y() < kNeckHeight && std::abs(x.x()) < kTrunkWidth)
+      depth.push_back(x.z());
   }
   const double trunk = median(std::move(depth));
   for (Vec3& p : out) p.z() -= trunk;

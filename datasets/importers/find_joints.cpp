@@ -10,8 +10,6 @@
 namespace restage {
 namespace {
 
-enum : int { kPelvis = 0, kSpine1 = 3, kSpine2 = 6, kSpine3 = 9, kNeck = 12, kHead = 15 };
-
 using BoneParts = std::initializer_list<BonePart>;
 
 bool is(const BoneWords& words, BoneParts parts) {

@@ -21,7 +21,7 @@ using Json = nlohmann::ordered_json;  // bones in the file's order
 
 constexpr uint64_t kMostBytes = uint64_t{64} << 20;
 
-[[noreturn]] void broken(const std::string& where, const std::string& what) {
+[[noreturn]] void damaged(const std::string& where, const std::string& what) {
   throw InputError(where, what, kFetchAgain);
 }
 
@@ -56,7 +56,7 @@ BaseMesh read_base(const std::string& path) {
         out.quads.push_back(vertex_named(lines, words[k], 1, out.count()));
     }
   });
-  if (out.quads.empty()) broken(path, "has no faces of a group 'body'");
+  if (out.quads.empty()) damaged(path, "has no faces of a group 'body'");
   return out;
 }
 
@@ -90,7 +90,7 @@ Targets read_targets(const std::string& folder, size_t vertices) {
     if (name.extension() == ".target")
       files[(name.parent_path() / name.stem()).generic_string()] = path;
   }
-  if (files.empty()) broken(folder, "holds no targets");
+  if (files.empty()) damaged(folder, "holds no targets");
   Targets out;
   for (const auto& [name, path] : files) {
     out.names.push_back(name);
@@ -109,14 +109,14 @@ struct Rig {
   /// InputError at `path` if there is no such bone.
   int32_t bone(const std::string& name, const std::string& path) const {
     const auto at = std::find(bones.begin(), bones.end(), name);
-    if (at == bones.end()) broken(path, "names a bone that the rig has not");
+    if (at == bones.end()) damaged(path, "names a bone that the rig has not");
     return static_cast<int32_t>(at - bones.begin());
   }
 };
 
 int32_t vertex_of(const Json& value, size_t vertices, const std::string& path) {
   if (!value.is_number_unsigned() || value.get<uint64_t>() >= vertices)
-    broken(path, "names a vertex that does not exist");
+    damaged(path, "names a vertex that does not exist");
   return value.get<int32_t>();
 }
 
@@ -147,7 +147,7 @@ void read_weights(const std::string& path, size_t vertices, Rig& rig) {
     const int32_t bone = rig.bone(name, path);
     for (const Json& row : rows) {
       const double weight = row.at(1).get<double>();
-      if (!(weight >= 0 && weight <= 1)) broken(path, "holds a weight outside of 0 to 1");
+      if (!(weight >= 0 && weight <= 1)) damaged(path, "holds a weight outside of 0 to 1");
       rig.weight_bone.push_back(bone);
       rig.weight_vertex.push_back(vertex_of(row.at(0), vertices, path));
       rig.weight.push_back(weight);
@@ -163,7 +163,7 @@ Rig read_rig(const std::string& folder, size_t vertices) {
     path = folder + "/weights.game_engine.json";
     read_weights(path, vertices, out);
   } catch (const Json::exception&) {
-    broken(path, "is not laid out as MakeHuman's rigs are");
+    damaged(path, "is not laid out as MakeHuman's rigs are");
   }
   return out;
 }

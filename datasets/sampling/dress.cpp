@@ -10,8 +10,6 @@
 namespace restage {
 namespace {
 
-constexpr Eigen::Index kHead = 15;
-
 /// 0 on the face and below, 1 on top and behind, seen from the middle of the skull.
 double hairiness(const Point& direction) {
   const double up = direction.y(), ahead = direction.z();

@@ -49,7 +49,7 @@ std::string listed(const std::map<std::string, int64_t>& counts) {
   return std::to_string(order.size()) + ": " + out;
 }
 
-std::string to_text(const Inspection& found) {
+std::string inspection_text(const Inspection& found) {
   std::string text = row("kind", found.kind);
   for (const auto& [name, count] : found.counts) text += row(name, std::to_string(count));
   if (found.seconds > 0)
@@ -74,7 +74,7 @@ std::string to_text(const Inspection& found) {
   return text;
 }
 
-Json to_json(const Inspection& found) {
+Json inspection_json(const Inspection& found) {
   Json out = {{"kind", found.kind},       {"counts", found.counts},         {"units", found.units},
               {"license", found.license}, {"provenance", found.provenance}, {"fps", found.fps},
               {"seconds", found.seconds}};
@@ -219,14 +219,14 @@ int run_inspect(const InspectOptions& options, const Common& common) {
   std::vector<std::string> remarks;
   if (!options.plot.empty()) remarks = plot(options, data, found);
   if (common.json) {
-    Json out = to_json(found);
+    Json out = inspection_json(found);
     if (imported) out["reports"] = reports_json(imported->reports());
     if (!options.plot.empty()) out["plot"] = {{"file", options.plot}, {"remarks", remarks}};
     print_json(out);
     return 0;
   }
   if (imported) print(reports_text(imported->reports(), common.verbose));
-  std::string text = to_text(found);
+  std::string text = inspection_text(found);
   if (!options.plot.empty()) text += "wrote " + options.plot + "\n";
   for (const std::string& line : remarks) text += "  " + line + "\n";
   print(text);

@@ -19,24 +19,26 @@ std::string listed(const std::vector<std::string>& names) {
   return out.empty() ? "none" : out;
 }
 
-Json to_json(const BentVolume& v) { return {{"surface", v.ours}, {"linear_blend", v.linear}}; }
+Json realism_json(const BentVolume& v) { return {{"surface", v.ours}, {"linear_blend", v.linear}}; }
 
-Json to_json(const RealismReport& r) {
-  return {{"bodies", r.bodies},
-          {"motions", r.motions},
-          {"frames", r.frames},
-          {"knee_volume", {{"mean", to_json(r.knee_mean)}, {"least", to_json(r.knee_least)}}},
-          {"elbow_volume", {{"mean", to_json(r.elbow_mean)}, {"least", to_json(r.elbow_least)}}},
-          {"joints_inside", {{"rest", r.joints_inside_rest}, {"posed", r.joints_inside_posed}}},
-          {"joints_outside", r.outside},
-          {"buried_at_rest", r.buried},
-          {"buried_at", r.buried_at},
-          {"lowest_point", r.lowest},
-          {"on_floor", r.on_floor},
-          {"slipping", r.slipping}};
+Json realism_json(const RealismReport& r) {
+  return {
+      {"bodies", r.bodies},
+      {"motions", r.motions},
+      {"frames", r.frames},
+      {"knee_volume", {{"mean", realism_json(r.knee_mean)}, {"least", realism_json(r.knee_least)}}},
+      {"elbow_volume",
+       {{"mean", realism_json(r.elbow_mean)}, {"least", realism_json(r.elbow_least)}}},
+      {"joints_inside", {{"rest", r.joints_inside_rest}, {"posed", r.joints_inside_posed}}},
+      {"joints_outside", r.outside},
+      {"buried_at_rest", r.buried},
+      {"buried_at", r.buried_at},
+      {"lowest_point", r.lowest},
+      {"on_floor", r.on_floor},
+      {"slipping", r.slipping}};
 }
 
-std::string to_text(const RealismReport& r) {
+std::string realism_text(const RealismReport& r) {
   const auto volume = [](const BentVolume& mean, const BentVolume& least) {
     return percent(mean.ours) + ", least " + percent(least.ours) +
            " (linear blending: " + percent(mean.linear) + ", least " + percent(least.linear) + ")";
@@ -68,7 +70,7 @@ int run_realism(const std::string& file, const Common& common) {
                      "give a data file with bodies, and best with motions");
   const RealismReport report = measure_realism(
       read_bodies(file), kind == "dataset" ? read_motions(file) : std::vector<Motion>{});
-  print(common.json, to_json(report), to_text(report));
+  print(common.json, realism_json(report), realism_text(report));
   return 0;
 }
 

@@ -102,8 +102,8 @@ std::string heading(const std::string& condition) {
   return "Surface alone (true skeletons and rotations of the target)";
 }
 
-std::string to_text(const SystemEvaluation& scores, const EvaluationOptions& options,
-                    const std::string& motion) {
+std::string scores_text(const SystemEvaluation& scores, const EvaluationOptions& options,
+                        const std::string& motion) {
   std::string out = std::to_string(options.sequences.size()) + " held-out sequences, seed " +
                     std::to_string(options.seed);
   char line[160];
@@ -128,7 +128,7 @@ std::string to_text(const SystemEvaluation& scores, const EvaluationOptions& opt
 
 /// The best that the weights can be judged on stands at the top: from clouds, else from true
 /// skeletons, else the surface. Its name is "condition".
-Json to_json(const SystemEvaluation& scores, const EvaluationOptions& options) {
+Json scores_json(const SystemEvaluation& scores, const EvaluationOptions& options) {
   const bool any = !scores.conditions.empty();
   EvalReport nothing;
   nothing.model.mean.assign(metrics::table().size(), std::nullopt);
@@ -160,7 +160,7 @@ int run_eval_run(const EvalOptions& options, const Common& common) {
   if (options.anchor) how.anchor = *options.anchor;
   const SystemEvaluation scores = evaluate_system(weights, weights_name, test, how);
   const TrainedModel* motion = weights.find("motion");
-  const std::string text = to_text(scores, how, motion ? motion->model : "");
+  const std::string text = scores_text(scores, how, motion ? motion->model : "");
   if (!options.out.empty()) {
     std::error_code failed;
     std::filesystem::create_directories(options.out, failed);
@@ -170,7 +170,7 @@ int run_eval_run(const EvalOptions& options, const Common& common) {
     write_sequence(Performance(test, how.sequences[0], how.scans, common.seed),
                    {test.license, test.description}, options.out);
   }
-  print(common.json, to_json(scores, how), text);
+  print(common.json, scores_json(scores, how), text);
   return 0;
 }
 

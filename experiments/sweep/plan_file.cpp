@@ -8,7 +8,7 @@ namespace restage::sweep {
 namespace {
 
 using Json = nlohmann::ordered_json;  // the order of a trial's artifacts is that of their making
-using Reader = JsonReader<Json>;
+using PlanReader = JsonReader<Json>;
 
 constexpr int kMaxDepth = 8;  ///< of an override's value
 
@@ -29,7 +29,7 @@ int depth(const Json& value) {
   return levels;
 }
 
-Evaluate read_evaluate(const Reader& reader, const Json& document) {
+Evaluate read_evaluate(const PlanReader& reader, const Json& document) {
   Evaluate out;
   if (reader.at(document, "evaluate").is_null()) return out;
   const Json& evaluate = reader.section(document, "evaluate");
@@ -41,7 +41,7 @@ Evaluate read_evaluate(const Reader& reader, const Json& document) {
   return out;
 }
 
-std::optional<EarlyStop> read_early_stop(const Reader& reader, const Json& document) {
+std::optional<EarlyStop> read_early_stop(const PlanReader& reader, const Json& document) {
   if (reader.at(document, "early_stop").is_null()) return std::nullopt;
   const Json& rule = reader.section(document, "early_stop");
   return EarlyStop{
@@ -90,8 +90,8 @@ Json early_stop_json(const std::optional<EarlyStop>& rule) {
 std::optional<PlanFile> read_plan_file(const std::string& dir) {
   const std::string path = dir + "/plan.json";
   if (!is_there(path)) return std::nullopt;
-  const Reader reader(path,
-                      "write it again with 'restage sweep plan SWEEP.yaml --out " + dir + "'");
+  const PlanReader reader(path,
+                          "write it again with 'restage sweep plan SWEEP.yaml --out " + dir + "'");
   const Json document = reader.parse();
   PlanFile out;
   out.directory = reader.optional_text(document, "directory");

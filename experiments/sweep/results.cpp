@@ -18,7 +18,7 @@ using SortedJson = nlohmann::json;
 constexpr const char* kFix = "it is not used; remove it and run the trial again";
 
 /// Reads the scores of a result.
-class Reader : public sweep::JsonReader<SortedJson> {
+class ResultReader : public sweep::JsonReader<SortedJson> {
  public:
   using JsonReader::JsonReader;
 
@@ -149,12 +149,12 @@ std::string plain_text(const SortedJson& value) {
 }
 
 TrialResult read_result(const std::string& path, const std::string& id) {
-  return parse_result(Reader(path, kFix).parse(), path, id);
+  return parse_result(ResultReader(path, kFix).parse(), path, id);
 }
 
 TrialResult parse_result(const SortedJson& document, const std::string& path,
                          const std::string& id) {
-  const Reader reader(path, kFix);
+  const ResultReader reader(path, kFix);
   TrialResult out{read_entry<SortedJson>(reader, document)};
   if (out.id != id) reader.fail("is the result of another trial (" + out.id + ")");
   const std::string state = reader.text(document, "state");

@@ -175,9 +175,9 @@ EarlyStop early_stop_of(const ConfigNode& node) {
 }
 
 /// The file alone, without what the command line adds.
-class Reader {
+class SweepReader {
  public:
-  explicit Reader(const std::string& path)
+  explicit SweepReader(const std::string& path)
       : tree_(parse_yaml(read_file(path, kConfigMaxBytes), path)) {
     out_.path = path;
     check_keys(tree_, kKeys);
@@ -387,7 +387,7 @@ bool as_number(const ConfigNode& node, double& value) {
 }  // namespace
 
 SweepFile read_sweep_file(const std::string& path, const std::vector<std::string>& arguments) {
-  SweepFile file = Reader(path).read();
+  SweepFile file = SweepReader(path).read();
   std::set<std::string> seen;
   std::vector<SweepWord> evaluate;
   for (const std::string& argument : arguments) {

@@ -5,8 +5,6 @@
 namespace restage {
 namespace {
 
-constexpr int kPelvis = 0, kLeftHip = 1, kRightHip = 2, kSpine1 = 3, kSpine3 = 9, kNeck = 12,
-              kLeftCollar = 13, kRightCollar = 14;
 constexpr double kTiny = 1e-12;
 
 /// Columns: across, the part of `up` at right angles to it, and their cross product. Empty if the

@@ -14,6 +14,13 @@ namespace restage {
 inline constexpr int kJoints = 22;
 inline constexpr double kFps = 30.0;  ///< the project's frame rate
 
+/// The indices of the joints.
+inline constexpr int kPelvis = 0, kLeftHip = 1, kRightHip = 2, kSpine1 = 3, kLeftKnee = 4,
+                     kRightKnee = 5, kSpine2 = 6, kLeftAnkle = 7, kRightAnkle = 8, kSpine3 = 9,
+                     kLeftFoot = 10, kRightFoot = 11, kNeck = 12, kLeftCollar = 13,
+                     kRightCollar = 14, kHead = 15, kLeftShoulder = 16, kRightShoulder = 17,
+                     kLeftElbow = 18, kRightElbow = 19, kLeftWrist = 20, kRightWrist = 21;
+
 inline constexpr std::array<int, kJoints> kParents = {-1, 0, 0, 0, 1,  2,  3,  4,  5,  6,  7,
                                                       8,  9, 9, 9, 12, 13, 14, 16, 17, 18, 19};
 inline constexpr std::array<std::string_view, kJoints> kJointNames = {

@@ -14,7 +14,6 @@ constexpr double kSmooth = 1e-12;  // epsilon of smooth_length(), square metres
 /// How far the body goes on behind a leaf (skull, hand, toes), as a part of the bone that leads to
 /// the leaf.
 double behind_leaf(int joint) {
-  constexpr int kHead = 15, kLeftWrist = 20, kRightWrist = 21;
   if (joint == kHead) return 1.5;
   return joint == kLeftWrist || joint == kRightWrist ? 0.6 : 0.5;
 }

@@ -288,13 +288,13 @@ TEST_F(ImportersProfiles, OnesOwnFileIsAsGood) {
   EXPECT_LT((rest[9] - 0.5 * (rest[6] + rest[12])).norm(), 1e-12);
 }
 
-std::string complaint(const std::string& yaml) {
+std::string style_complaint(const std::string& yaml) {
   return refusal_of([&] { parse_profile(yaml, "suit.yaml"); });
 }
 
 TEST_F(ImportersProfiles, MistakesAreNamedWithLineAndNearestName) {
   const std::string good = own_profile();
-  EXPECT_EQ(complaint(good), "");
+  EXPECT_EQ(style_complaint(good), "");
   const std::pair<std::string, const char*> cases[] = {
       {good + "jonts: {}\n", "suit.yaml:24: 'jonts' is not known here; did you mean 'joints'?"},
       {good + "\"a\\nb\": x\n", "'a?b' is not known here"},
@@ -306,12 +306,13 @@ TEST_F(ImportersProfiles, MistakesAreNamedWithLineAndNearestName) {
       {good + "places: {spine3: {from: spine2}}\n", "'from' and 'to'"},
       {good + "places: {head: {from: neck, to: neck}}\n", "not known here"},
       {good + std::string(70000, '#'), "longer than"}};
-  for (const auto& [yaml, says] : cases) EXPECT_HAS(complaint(yaml), says);
+  for (const auto& [yaml, says] : cases) EXPECT_HAS(style_complaint(yaml), says);
   for (const std::string& bad :
        Names{"", "- a\n", "title: [\n", "\t", "a: &b [*b]\n", "title: {a: b}\n", "%YAML 9.9\n---\n",
              "title: x\njoints: 3\n", "title: " + std::string(20000, '[')})
-    EXPECT_EQ(complaint(bad).find("suit.yaml"), 0u) << bad << ": " << complaint(bad);
-  for (size_t cut = 0; cut < good.size(); cut += 7) complaint(good.substr(0, cut));  // no crash
+    EXPECT_EQ(style_complaint(bad).find("suit.yaml"), 0u) << bad << ": " << style_complaint(bad);
+  for (size_t cut = 0; cut < good.size(); cut += 7)
+    style_complaint(good.substr(0, cut));  // no crash
 }
 
 TEST_F(ImportersProfiles, UnknownNamesAreAnsweredWithTheNearest) {

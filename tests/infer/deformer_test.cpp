@@ -57,7 +57,7 @@ Tensor reference(const DeformerInput& s, const Mlp3* offsets) {
 }
 
 /// Largest difference, in units of the largest value.
-double apart(const Tensor& a, const Tensor& b) {
+double relative_gap(const Tensor& a, const Tensor& b) {
   EXPECT_EQ(a.shape(), b.shape());
   double most = 0, scale = 1e-30;
   for (int64_t i = 0; i < a.numel(); ++i) {
@@ -98,7 +98,7 @@ TEST(InferDeformer, EqualsThePlainNetworkForAnyNumberOfPoints) {
   for (const int64_t v : {1, 2, 47, 48, 49, 63, 65, 384, 385, 500, 3000}) {
     const DeformerInput s = surface(v);
     const Deformer deformer(s.points, s.weights, offsets.get());
-    EXPECT_LT(apart(deformer(s.pose, s.bones), reference(s, offsets.get())), 2e-6) << v;
+    EXPECT_LT(relative_gap(deformer(s.pose, s.bones), reference(s, offsets.get())), 2e-6) << v;
   }
   const DeformerInput none = surface(0);
   EXPECT_EQ(Deformer(none.points, none.weights, offsets.get())(none.pose, none.bones).numel(), 0);
@@ -109,7 +109,7 @@ TEST(InferDeformer, EqualsThePlainNetworkForAnyWidth) {
   for (const int64_t width : {1, 5, 31, 33, 300}) {
     const auto offsets = net(width);
     const Deformer deformer(s.points, s.weights, offsets.get());
-    EXPECT_LT(apart(deformer(s.pose, s.bones), reference(s, offsets.get())), 2e-6) << width;
+    EXPECT_LT(relative_gap(deformer(s.pose, s.bones), reference(s, offsets.get())), 2e-6) << width;
   }
 }
 
@@ -119,8 +119,8 @@ TEST(InferDeformer, EqualsTheTrainedNetwork) {
   const DeformerInput s = surface(5000);
   const Deformer deformer(s.points, s.weights, models.find_as<OffsetNet>("deformation.offsets"));
   const Tensor expected = reference(s, models.find_as<OffsetNet>("deformation.offsets"));
-  EXPECT_LT(apart(deformer(s.pose, s.bones), expected), 2e-6);
-  EXPECT_LT(apart(deformer(s.pose, s.bones, true), expected), 2e-6);
+  EXPECT_LT(relative_gap(deformer(s.pose, s.bones), expected), 2e-6);
+  EXPECT_LT(relative_gap(deformer(s.pose, s.bones, true), expected), 2e-6);
   EXPECT_GT(deformer.active_share(s.pose), 0.005);
   EXPECT_LT(deformer.active_share(s.pose), 0.3);
 }
@@ -130,7 +130,7 @@ TEST(InferDeformer, EqualsThePlainNetworkWhenAllOrNoUnitsChangeSign) {
   const auto offsets = net();
   const auto share = [&] {
     const Deformer deformer(s.points, s.weights, offsets.get());
-    EXPECT_LT(apart(deformer(s.pose, s.bones), reference(s, offsets.get())), 5e-6);
+    EXPECT_LT(relative_gap(deformer(s.pose, s.bones), reference(s, offsets.get())), 5e-6);
     return deformer.active_share(s.pose);
   };
   fill(offsets->fc1.bias, 50);  // all on
@@ -139,7 +139,7 @@ TEST(InferDeformer, EqualsThePlainNetworkWhenAllOrNoUnitsChangeSign) {
   EXPECT_EQ(share(), 0);
   const DeformerInput around = with_all_units_active(offsets.get());
   const Deformer deformer(around.points, around.weights, offsets.get());
-  EXPECT_LT(apart(deformer(s.pose, s.bones), reference(around, offsets.get())), 5e-6);
+  EXPECT_LT(relative_gap(deformer(s.pose, s.bones), reference(around, offsets.get())), 5e-6);
   EXPECT_EQ(deformer.active_share(s.pose), 1);
 }
 
@@ -148,7 +148,7 @@ TEST(InferDeformer, PointsInOnePlace) {
   for (int64_t i = 0; i < s.points.numel(); ++i) s.points.data<float>()[i] = 0.25f;
   const auto offsets = net();
   const Deformer deformer(s.points, s.weights, offsets.get());
-  EXPECT_LT(apart(deformer(s.pose, s.bones), reference(s, offsets.get())), 2e-6);
+  EXPECT_LT(relative_gap(deformer(s.pose, s.bones), reference(s, offsets.get())), 2e-6);
   EXPECT_EQ(deformer.active_share(s.pose), 0);
 }
 
@@ -156,7 +156,7 @@ TEST(InferDeformer, SkinsAloneWithoutOffsets) {
   for (const int64_t joints : {1, 22, 30}) {
     const DeformerInput s = surface(333, joints);
     const Deformer deformer(s.points, s.weights, nullptr);
-    EXPECT_LT(apart(deformer(s.pose, s.bones), reference(s, nullptr)), 1e-6);
+    EXPECT_LT(relative_gap(deformer(s.pose, s.bones), reference(s, nullptr)), 1e-6);
     EXPECT_EQ(deformer.active_share(s.pose), 0);
   }
 }
@@ -167,7 +167,7 @@ TEST(InferDeformer, AGpuGivesTheSame) {
     const auto offsets = width > 0 ? net(width) : nullptr;
     const Deformer here(s.points, s.weights, offsets.get()),
         there(s.points, s.weights, offsets.get(), emulated_gpu());
-    EXPECT_LT(apart(there(s.pose, s.bones), here(s.pose, s.bones)), 2e-6) << width;
+    EXPECT_LT(relative_gap(there(s.pose, s.bones), here(s.pose, s.bones)), 2e-6) << width;
     EXPECT_EQ(there.active_share(s.pose), here.active_share(s.pose)) << width;
   }
   const Deformer none(surface(0).points, surface(0).weights, net().get(), emulated_gpu());

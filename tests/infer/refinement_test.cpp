@@ -74,7 +74,7 @@ Scene scene() {
   return out;
 }
 
-double apart(const Joints& a, const Joints& b) {
+double mean_gap(const Joints& a, const Joints& b) {
   double sum = 0;
   for (size_t j = 0; j < kJoints; ++j) sum += (a[j] - b[j]).norm() / kJoints;
   return sum;
@@ -92,9 +92,9 @@ TEST(Refinement, BringsLimbsToWhereTheCloudIs) {
   const Joints answer = *chain(s)->push(s.cloud, "cloud")[0].joints;
   Refinement refined(chain(s), "target");
   const RetargetedFrame frame = refined.push(s.cloud, "cloud")[0];
-  EXPECT_GT(apart(answer, s.truth), 0.03);
-  EXPECT_LT(apart(*frame.joints, s.truth), 0.5 * apart(answer, s.truth));
-  EXPECT_LT(apart(*refined.source_joints(), s.truth), 0.5 * apart(answer, s.truth));
+  EXPECT_GT(mean_gap(answer, s.truth), 0.03);
+  EXPECT_LT(mean_gap(*frame.joints, s.truth), 0.5 * mean_gap(answer, s.truth));
+  EXPECT_LT(mean_gap(*refined.source_joints(), s.truth), 0.5 * mean_gap(answer, s.truth));
   EXPECT_EQ(frame.vertices.size(), person().rest.vertices.size());
   EXPECT_NEAR((frame.pose.root - answer[0]).norm(), 0, 1e-9) << "the path is the chain's";
 }
@@ -109,7 +109,7 @@ TEST(Refinement, FramesOfAGapAreTheChains) {
   const auto frames = refined.push(s.cloud, "fourth");
   ASSERT_EQ(frames.size(), 3u);
   EXPECT_TRUE(frames[0].filled && frames[1].filled && !frames[2].filled);
-  EXPECT_LT(apart(*frames[2].joints, s.truth), 0.5 * apart(*frames[1].joints, s.truth));
+  EXPECT_LT(mean_gap(*frames[2].joints, s.truth), 0.5 * mean_gap(*frames[1].joints, s.truth));
   refined.miss();
   EXPECT_EQ(refined.finish().size(), 1u);
 }

@@ -11,9 +11,9 @@
 namespace restage {
 namespace {
 
-std::string with_header(const std::string& json, const std::string& data) {
-  const uint64_t n = json.size();
-  return std::string(reinterpret_cast<const char*>(&n), 8) + json + data;
+std::string with_header(const std::string& head, const std::string& data) {
+  const uint64_t n = head.size();
+  return std::string(reinterpret_cast<const char*>(&n), 8) + head + data;
 }
 
 TensorFile sample() {
