@@ -287,8 +287,8 @@ class Sequence {
                                     [&](const auto& gap) { return d_.is_filled(gap.second); });
     const std::string fix =
         filled ? "--fix puts the nearest frame in their place, so that the timing is right"
-               : "--fix fills gaps of up to a second with the nearest frame; cut the sequence at "
-                 "longer ones";
+               : "--fix fills gaps of up to a second with the nearest frame and keeps frames "
+                 "without points in longer ones; cut the sequence there";
     if (!empty.empty())
       d_.say({"missing frames", Weight::note,
               counted(count(true), "frame") + " without any point, before " + frame_list(empty), 1,
