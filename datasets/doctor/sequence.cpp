@@ -144,6 +144,7 @@ class Sequence {
     d_.fewest_points = INT64_MAX;
     Mesh before;
     for (int64_t i = 0; auto frame = source_.next(); ++i) {
+      if (frame->fault) throw *frame->fault;
       if (frame->points.empty())
         throw InputError(frame->source, "holds no points", "leave the frame out");
       const int64_t n = frame->points.size();

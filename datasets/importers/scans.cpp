@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <set>
 
@@ -42,31 +43,35 @@ size_t count_pickles(const std::string& folder) {
       files.begin(), files.end(), [](const std::string& file) { return file.ends_with(".pkl"); }));
 }
 
-/// The arrays of a folder: sequences by themselves, single frames together.
+/// The arrays of a folder: sequences by themselves, single frames together. Among frames, one that
+/// cannot be read is a frame that shows nothing.
 void add_arrays(const std::string& folder, const std::vector<std::string>& files,
                 uint64_t max_memory, std::vector<ScanSequence>& out,
                 std::vector<std::string>& skipped) {
-  std::vector<std::string> frames, damaged, faults;
+  std::vector<std::string> frames, damaged;
+  std::map<std::string, std::string> why;  // of files that are of no use
   for (const std::string& file : files) {
     try {
       refuse_foreign_content(file);
       const std::optional<CloudArray> cloud = find_cloud(file, max_memory);
       if (!cloud)
-        skipped.push_back(file + ": holds no points");
+        why[file] = file + ": holds no points";
       else if (cloud->axes.sequence)
         out.push_back({file, file, {}, {}});
       else
         frames.push_back(file);
     } catch (const InputError& error) {
       damaged.push_back(file);
-      faults.emplace_back(error.what());
+      why[file] = error.what();
     }
   }
-  // Among frames, one that cannot be read is a frame that shows nothing.
-  const bool among_frames = damaged.size() < frames.size();
-  if (among_frames) frames.insert(frames.end(), damaged.begin(), damaged.end());
-  if (!among_frames) skipped.insert(skipped.end(), faults.begin(), faults.end());
-  if (!frames.empty()) out.push_back({folder, "", {}, order_frames(frames, folder)});
+  if (!frames.empty()) {
+    if (damaged.size() < frames.size()) frames.insert(frames.end(), damaged.begin(), damaged.end());
+    out.push_back({folder, "", {}, order_frames(frames, folder)});
+    for (const std::string& file : out.back().frames.files) why.erase(file);
+  }
+  for (const std::string& file : files)
+    if (why.count(file) > 0) skipped.push_back(why[file]);
 }
 
 /// The sequences of a file.

@@ -154,14 +154,14 @@ bool is_decimal_comma(std::string_view before, std::string_view after) {
          digit(before.back()) && digit(after[0]);
 }
 
-/// "Frames: 12" or "Frame Time : 0.01": what is written after the colon. A comma between digits is
-/// a decimal point.
-std::string header_value(WordLines& lines, const std::string& title) {
+/// "Frames: 12" or "Frame Time : 0.01": what is written after the colon. In a `decimal` a comma
+/// between digits is a decimal point.
+std::string header_value(WordLines& lines, const std::string& title, bool decimal = false) {
   std::string joined;
   if (lines.next())
     for (size_t i = 0; i < lines.words().size() && joined.size() <= 100; ++i) {
       const std::string_view word = lines.words()[i];
-      const bool comma = i > 0 && is_decimal_comma(lines.words()[i - 1], word);
+      const bool comma = i > 0 && decimal && is_decimal_comma(lines.words()[i - 1], word);
       joined += cat(i == 0 ? "" : comma ? "." : " ", word.substr(0, 100));
     }
   const size_t colon = joined.find(':');
@@ -185,7 +185,7 @@ void parse_frames(WordLines& lines, BvhFile& file, bool rate_is_told) {
   const double announced = lines.number(header_value(lines, "frames"));
   if (!(announced >= 1) || announced != std::floor(announced))
     lines.fail("no frames announced", "give a file with at least one frame");
-  const std::string frame_time = header_value(lines, "frame time");
+  const std::string frame_time = header_value(lines, "frame time", true);
   file.frame_time = lines.number(frame_time);
   file.frame_time_digit = last_digit(frame_time);
   if (!rate_is_told && !(file.frame_time >= kLeastTime && file.frame_time <= kMostTime))

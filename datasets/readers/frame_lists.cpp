@@ -301,6 +301,11 @@ FrameList folder_a_frame(const std::string& folder) {
     out.files[i] = file.empty() ? out.files[i] + "/" : file;
   }
   tell_choice(stems, *stem, lacking, out);
+  std::vector<std::string> beside;
+  for (const std::string& file : frame_files(folder))
+    beside.push_back(fs::path(file).filename().string());
+  if (!beside.empty())
+    out.remarks.push_back(cat("left out ", list_of(beside), ": beside the folders of the frames"));
   refuse_pointers(out, folder);
   return out;
 }
@@ -309,12 +314,7 @@ FrameList frames_in(const std::string& folder) {
   FrameList files = frame_list(folder);
   if (files.is_series) return files;
   FrameList out = folder_a_frame(folder);
-  if (out.files.empty()) return files;
-  std::vector<std::string> names;
-  for (const std::string& file : files.files) names.push_back(fs::path(file).filename().string());
-  if (!names.empty())
-    out.remarks.push_back(cat("left out ", list_of(names), ": beside the folders of the frames"));
-  return out;
+  return out.files.empty() ? files : out;
 }
 
 std::vector<std::string> frame_files(const std::string& folder) {

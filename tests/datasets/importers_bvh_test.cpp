@@ -244,6 +244,9 @@ TEST_F(ReadersRecordings, AFrameTimeMayHaveADecimalComma) {
   }
   text.replace(at, text.find('\n', at) - at, "Frame Time: 0, 0333333");
   EXPECT_HAS(refusal_of([&] { convert_bvh(text, "x.bvh"); }), "is no usable number");
+  text = bvh_test::text({.fps = 30, .frames = 4});
+  text.replace(text.find("Frames: 4"), 9, "Frames: 1,000");  // a thousand is not one
+  EXPECT_HAS(refusal_of([&] { convert_bvh(text, "x.bvh"); }), "is no usable number");
 }
 
 // ---- files that ask for too much
