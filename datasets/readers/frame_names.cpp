@@ -133,7 +133,7 @@ std::optional<Numbering> numbering_of(const std::string& stem) {
   size_t at = end;
   while (at > 0 && is_digit(stem[at - 1])) --at;
   out.digits = stem.substr(at, end - at);
-  for (const std::string open : {" (", "(", " "})
+  for (const std::string_view open : {" (", "(", " "})
     if ((open == " ") == out.close.empty() && stem.substr(0, at).ends_with(open)) {
       out.open = open;
       out.base = stem.substr(0, at - open.size());
