@@ -114,7 +114,8 @@ void look_at_parts(const std::vector<Piece>& column, Fractions& out) {
   std::map<Value, std::vector<Value>> parts;
   for (const Piece& piece : column)
     if (!piece.fraction.empty())
-      parts[std::stold(piece.whole)].push_back(std::stold(piece.fraction.substr(0, 4000)));
+      parts[std::stold(piece.whole.substr(0, 4000))].push_back(
+          std::stold(piece.fraction.substr(0, 4000)));
   out.several = parts.size() > 1;
   for (auto& [whole, values] : parts) {
     std::sort(values.begin(), values.end());
@@ -144,7 +145,7 @@ Fractions look_at(const std::vector<Piece>& column) {
     out.longer_zero = out.longer_zero || (zero && f.size() > shortest);
     out.trailing_zero = out.trailing_zero || (f.size() > 1 && f.back() == '0');
     decimals.push_back(piece.value());
-    nanoseconds.push_back(std::stold(piece.whole) +
+    nanoseconds.push_back(std::stold(piece.whole.substr(0, 4000)) +
                           (f.empty() ? 0 : std::stold(f.substr(0, 4000)) / 1e9L));
   }
   out.twice = std::set<Value>(decimals.begin(), decimals.end()).size() < decimals.size();
