@@ -8,6 +8,7 @@
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
 #include "autograd/base/format.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/mesh_io.h"
 #include "experiments/doctor_carry.h"
 #include "experiments/text.h"
@@ -126,9 +127,11 @@ class Mender {
   size_t points_ = 0, faces_ = 0;
 };
 
-void mend_frames(const Subject& subject, const Diagnosis& d, Mender& mend, Sink& sink) {
+void mend_frames(const Subject& subject, const Diagnosis& d, Mender& mend, Sink& sink,
+                 std::vector<std::string>& remarks) {
   if (subject.mesh) return sink.push(mend(*subject.mesh), 0);
   subject.frames->rewind();
+  int64_t empty = 0, leading = 0;  // frames without points: written, left out in front
   std::optional<Mesh> previous;
   int64_t sequence = 0, row = -1, row_before = -1;  // of the source, where empty frames count too
   for (int64_t i = 0; const auto frame = subject.frames->next(); ++i) {
@@ -140,15 +143,24 @@ void mend_frames(const Subject& subject, const Diagnosis& d, Mender& mend, Sink&
     }
     if (i % d.keep_every != 0) continue;
     Mesh mesh = mend({frame->points, frame->faces});
-    // A gap of up to a second: the nearest frame in time stands in.
+    // A gap of up to a second: the nearest frame in time stands in. In a longer one frames that
+    // show nothing stay, so that those behind it keep their time; in front they are left out.
     const auto gap = d.gap.find(i);
-    if (gap != d.gap.end() && d.is_filled(gap->second))
-      for (int64_t k = 0; k < gap->second; ++k)
-        previous && 2 * k < gap->second ? sink.push(*previous, row_before) : sink.push(mesh, row);
+    const int64_t missing = gap == d.gap.end() ? 0 : gap->second;
+    const int64_t filled = d.is_filled(missing) ? missing / d.keep_every : 0;
+    for (int64_t k = 0; k < filled; ++k)
+      previous && 2 * k < filled ? sink.push(*previous, row_before) : sink.push(mesh, row);
+    const int64_t kept = d.is_filled(missing) ? 0 : frame->missing / d.keep_every;
+    for (int64_t k = 0; previous && k < kept; ++k) sink.push({}, row - frame->missing + k);
+    (previous ? empty : leading) += kept;
     sink.push(mesh, row);
     previous = std::move(mesh);
     row_before = row;
   }
+  if (empty > 0)
+    remarks.push_back(cat("in gaps of over a second ", empty, " frames without points stay"));
+  if (leading > 0)
+    remarks.push_back(cat("left out: ", leading, " frames without points before the first"));
 }
 
 /// Every frame that is kept, with all its vertices: their numbers are what the truth of `restage
@@ -335,7 +347,7 @@ Repaired write_repaired(const Subject& subject, const std::string& out, const Di
   }
   const auto sink = make_sink(subject, out, kind, info, d, done.remarks);
   Mender mend(out, d);
-  mend_frames(subject, d, mend, *sink);
+  mend_frames(subject, d, mend, *sink, done.remarks);
   sink->commit();
   if (side) side->commit();
   mend.tell(done.remarks);

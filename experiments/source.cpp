@@ -48,7 +48,8 @@ std::optional<SourceCloud> Source::next() {
     return_to_place();
     return out;
   }
-  if (out.frame.points.empty())
+  out.fault = out.frame.fault;
+  if (!out.fault && out.frame.points.empty())
     out.fault = InputError(out.frame.source, "holds no points", "leave the frame out");
   const auto scale = static_cast<float>(how_.scale);
   for (Point& p : out.frame.points) {

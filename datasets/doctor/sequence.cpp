@@ -144,6 +144,7 @@ class Sequence {
     d_.fewest_points = INT64_MAX;
     Mesh before;
     for (int64_t i = 0; auto frame = source_.next(); ++i) {
+      if (frame->fault) throw *frame->fault;
       if (frame->points.empty())
         throw InputError(frame->source, "holds no points", "leave the frame out");
       const int64_t n = frame->points.size();
@@ -287,8 +288,8 @@ class Sequence {
                                     [&](const auto& gap) { return d_.is_filled(gap.second); });
     const std::string fix =
         filled ? "--fix puts the nearest frame in their place, so that the timing is right"
-               : "--fix fills gaps of up to a second with the nearest frame; cut the sequence at "
-                 "longer ones";
+               : "--fix fills gaps of up to a second with the nearest frame and keeps frames "
+                 "without points in longer ones; cut the sequence there";
     if (!empty.empty())
       d_.say({"missing frames", Weight::note,
               counted(count(true), "frame") + " without any point, before " + frame_list(empty), 1,

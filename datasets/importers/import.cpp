@@ -68,6 +68,7 @@ ImportSummary import_folder(const std::string& source, const std::string& out,
 
 ImportSummary import_file(const std::string& source, const std::string& out,
                           const ImportOptions& options) {
+  refuse_foreign_content(source);
   if (is_recording_name(source)) return import_recordings({source}, source, out, options);
   if (holds_scans(source)) return import_array_file(source, out, options);
   if (is_pickle_name(source)) refuse_pickle(source);

@@ -133,12 +133,13 @@ ImportSummary import_scan_files(const std::string& source, const std::string& ou
       find_scans(source, options.max_memory, summary.skipped);
   if (sequences.empty() && summary.skipped.empty())
     for (const std::string& file : files_below(source)) refuse_foreign_kind(file);
+  if (sequences.empty() && summary.skipped.size() == 1) throw Error(summary.skipped[0], 2);
+  if (sequences.empty() && !summary.skipped.empty())
+    refuse_all(source, cat("holds nothing to import, ", summary.skipped.size(), " were skipped"),
+               summary.skipped[0]);
   if (sequences.empty())
-    throw InputError(
-        source,
-        "holds nothing to import" +
-            (summary.skipped.empty() ? "" : " (" + summary.skipped[0].substr(0, 200) + ")"),
-        "give a data folder, BVH files, AMASS motions, a body model or scans");
+    throw InputError(source, "holds nothing to import",
+                     "give a data folder, BVH files, AMASS motions, a body model or scans");
   check_fps(options);
   for (const ScanSequence& sequence : sequences) {
     check_output(out, sequence.frames.files);
@@ -155,8 +156,9 @@ ImportSummary import_scan_files(const std::string& source, const std::string& ou
     } catch (const InputError& error) {
       if (sequences.size() == 1) throw;
       writer.drop_sequence();
-      summary.skipped.push_back(sequence.file.empty() ? sequence.name + ": " + error.what()
-                                                      : error.what());
+      const std::string why = error.what();
+      const bool named = !sequence.file.empty() || why.starts_with(sequence.name + ": ");
+      summary.skipped.push_back(named ? why : sequence.name + ": " + why);
     }
   }
   check_any(summary, source);

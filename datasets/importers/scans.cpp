@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <set>
 
@@ -13,6 +14,7 @@
 #include "datasets/readers/array_frames.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/folders.h"
+#include "datasets/readers/foreign_kinds.h"
 #include "datasets/readers/frame_folder.h"
 #include "datasets/readers/hdf5_frames.h"
 #include "nn/geometry/box.h"
@@ -41,25 +43,35 @@ size_t count_pickles(const std::string& folder) {
       files.begin(), files.end(), [](const std::string& file) { return file.ends_with(".pkl"); }));
 }
 
-/// The arrays of a folder: sequences by themselves, single frames together.
+/// The arrays of a folder: sequences by themselves, single frames together. Among frames, one that
+/// cannot be read is a frame that shows nothing.
 void add_arrays(const std::string& folder, const std::vector<std::string>& files,
                 uint64_t max_memory, std::vector<ScanSequence>& out,
                 std::vector<std::string>& skipped) {
-  std::vector<std::string> frames;
+  std::vector<std::string> frames, damaged;
+  std::map<std::string, std::string> why;  // of files that are of no use
   for (const std::string& file : files) {
     try {
+      refuse_foreign_content(file);
       const std::optional<CloudArray> cloud = find_cloud(file, max_memory);
       if (!cloud)
-        skipped.push_back(file + ": holds no points");
+        why[file] = file + ": holds no points";
       else if (cloud->axes.sequence)
         out.push_back({file, file, {}, {}});
       else
         frames.push_back(file);
     } catch (const InputError& error) {
-      skipped.emplace_back(error.what());
+      damaged.push_back(file);
+      why[file] = error.what();
     }
   }
-  if (!frames.empty()) out.push_back({folder, "", {}, order_frames(frames, folder)});
+  if (!frames.empty()) {
+    if (damaged.size() < frames.size()) frames.insert(frames.end(), damaged.begin(), damaged.end());
+    out.push_back({folder, "", {}, order_frames(frames, folder)});
+    for (const std::string& file : out.back().frames.files) why.erase(file);
+  }
+  for (const std::string& file : files)
+    if (why.count(file) > 0) skipped.push_back(why[file]);
 }
 
 /// The sequences of a file.
@@ -88,21 +100,36 @@ void add_folder(const std::string& folder, uint64_t max_memory, std::vector<Scan
   if (!files.empty()) out.push_back({folder, "", {}, frame_list(folder)});
 }
 
+/// Where its files are one, its folders are no frames; nor where it cannot be told.
+bool is_series_of_files(const std::string& folder) {
+  try {
+    return frame_list(folder).is_series;
+  } catch (const InputError&) {
+    return true;  // add_folder() says why
+  }
+}
+
 /// The folders below `path` that are looked into one by one; those whose folders are frames are
 /// sequences.
 std::vector<std::string> add_folders_of_frames(const std::string& path,
-                                               std::vector<ScanSequence>& out) {
+                                               std::vector<ScanSequence>& out,
+                                               std::vector<std::string>& skipped) {
   std::vector<std::string> rest;
   std::string taken;  // what lies below the last sequence is in it
   for (const std::string& folder : folders_below(path)) {
     if (!taken.empty() && folder.starts_with(taken)) continue;
-    FrameList frames = folder_a_frame(folder);
-    if (frames.files.empty()) {
-      rest.push_back(folder);
-      continue;
-    }
+    FrameList frames;
+    bool refused = false;
+    if (!is_series_of_files(folder)) try {
+        frames = folder_a_frame(folder);
+      } catch (const InputError& error) {
+        skipped.emplace_back(error.what());
+        refused = true;
+      }
+    if (frames.files.empty()) rest.push_back(folder);
+    if (frames.files.empty() && !refused) continue;
     taken = folder + "/";
-    out.push_back({folder, "", {}, std::move(frames)});
+    if (!refused) out.push_back({folder, "", {}, std::move(frames)});
   }
   return rest;
 }
@@ -156,6 +183,12 @@ size_t different_points(const Points& points) {
   return different.size();
 }
 
+/// What is wrong, without how to mend it.
+std::string cause_of(const InputError& fault) {
+  const std::string text = fault.what();
+  return text.substr(0, text.rfind("; "));
+}
+
 /// Writes frames at our rate. Where one shows nobody (too few points), the nearest that do stand in
 /// its place, up to a second long.
 class HoldingWriter {
@@ -163,9 +196,14 @@ class HoldingWriter {
   HoldingWriter(ScanWriter& out, const std::string& name) : out_(out), name_(name) {}
 
   /// `different`: how many of the points are (different_points()).
-  void push(const Points& points, size_t different, const std::string& source) {
+  void push(const Frame& frame, size_t different) {
+    const Points& points = frame.points;
     if (different < kFewest) {
-      if (missing_ == 0) first_ = cat(source, ": has only ", different, " different points");
+      if (missing_ == 0) {
+        fault_ = frame.fault;
+        first_ = fault_ ? cause_of(*fault_)
+                        : cat(frame.source, ": has only ", different, " different points");
+      }
       ++missing_;
       return;
     }
@@ -179,6 +217,7 @@ class HoldingWriter {
   }
 
   void finish(ImportReport& report) {
+    if (!before_ && fault_) throw *fault_;
     if (!before_)
       throw InputError(name_, "shows nobody: " + first_, "give scans of 64 points or more");
     for (int64_t k = 0; k < missing_; ++k) out_.append(*before_);
@@ -203,6 +242,7 @@ class HoldingWriter {
 
   ScanWriter& out_;
   std::string name_, first_;
+  std::optional<InputError> fault_;  // of the first missing frame, if it could not be read
   std::optional<Points> before_;
   int64_t missing_ = 0, held_ = 0;
   size_t fewest_ = 0, most_ = 0;
@@ -246,7 +286,7 @@ std::vector<ScanSequence> find_scans(const std::string& path, uint64_t max_memor
     add_file(path, {"", max_memory}, out);
     return out;
   }
-  for (const std::string& folder : add_folders_of_frames(path, out)) {
+  for (const std::string& folder : add_folders_of_frames(path, out, skipped)) {
     try {
       add_folder(folder, max_memory, out, skipped);
     } catch (const InputError& error) {
@@ -287,12 +327,12 @@ int64_t import_scans(const ScanSequence& sequence, const MotionOptions& options,
   const Axis up = given_up ? options.rest.up : Axis::y;
   report.fact("up", to_string(up) + (given_up ? " (--up)" : " (taken for granted: --up)"));
   const Eigen::Matrix3f to_ours = (scale * upright(up)).cast<float>();
-  for (const std::string& remark : source->remarks()) report.remark(remark);
 
   HoldingWriter writer(out, sequence.name);
   Frame frame;
   bool first = true;
   size_t left_out = 0, different = 0;
+  std::vector<InputError> faults;
   int64_t at = 0;  // of the source, the frame that next() gives
   const int64_t count = clock.count();
   for (int64_t k = 0; k < count; ++k) {
@@ -301,6 +341,7 @@ int64_t import_scans(const ScanSequence& sequence, const MotionOptions& options,
       frame = *source->next();
       ++at;
       left_out += frame.left_out;
+      if (frame.fault) faults.push_back(*frame.fault);
       different = different_points(frame.points);
       const bool look = first && different >= kFewest;
       if (look) check_size(frame, options.scale, report);
@@ -308,11 +349,13 @@ int64_t import_scans(const ScanSequence& sequence, const MotionOptions& options,
       if (look) report.fact("size", size_fact(frame.points));
       first = first && !look;
     }
-    writer.push(frame.points, different, frame.source);
+    writer.push(frame, different);
   }
   if (left_out > 0)
     report.remark(cat("left out ", left_out, left_out == 1 ? " point" : " points",
                       " whose coordinates are NaN or infinite"));
+  for (const std::string& remark : source->remarks()) report.remark(remark);
+  if (!faults.empty()) report.remark(remark_on_faults(faults));
   writer.finish(report);
   return count;
 }

@@ -22,18 +22,19 @@ struct ScanSequence {
 };
 
 /// All sequences in a file or below a folder: each folder of frames (frame_folder.h), each folder
-/// of numbered folders with a frame in each, each array that is a sequence, the single clouds among
-/// arrays of a folder together, each sequence of an HDF5 file; folders in natural numeric order.
-/// What cannot be used is named in `skipped`, pickles (.pkl) as a count.
+/// of numbered folders with a frame in each (folder_a_frame()), each array that is a sequence, the
+/// single clouds among arrays of a folder together, each sequence of an HDF5 file; folders in
+/// natural numeric order. What cannot be used is named in `skipped`, pickles (.pkl) as a count.
 std::vector<ScanSequence> find_scans(const std::string& path, uint64_t max_memory,
                                      std::vector<std::string>& skipped);
 
 /// Appends a sequence to `out` in metres, y up and at 30 fps, in constant memory. Clouds cannot be
 /// interpolated: each frame is the nearest one in time, and the report says how many were left out
-/// or repeated. Frames of fewer than 64 different points are replaced by the nearest ones, up to a
-/// second of them. Faces are dropped. Of the options fps (0: the file's, else 30), scale (0: 1) and
-/// up axis (automatic: y) count. Returns the number of frames. InputError: see open_frames(); the
-/// frames before it are in `out`, until its drop_sequence().
+/// or repeated. Frames of fewer than 64 different points, and those that cannot be read, are
+/// replaced by the nearest ones, up to a second of them. Faces are dropped. Of the options fps (0:
+/// the file's, else 30), scale (0: 1) and up axis (automatic: y) count. Returns the number of
+/// frames. InputError: see open_frames(); the frames before it are in `out`, until its
+/// drop_sequence().
 int64_t import_scans(const ScanSequence& sequence, const MotionOptions& options,
                      uint64_t max_memory, ScanWriter& out, ImportReport& report);
 

@@ -147,13 +147,22 @@ class HierarchyParser {
   bool opening_ = false;  // a name was read, its brace not yet
 };
 
-/// "Frames: 12" or "Frame Time : 0.01": what is written after the colon.
-std::string header_value(WordLines& lines, const std::string& title) {
+/// Whether a comma alone stands between digits of these words of one line: "0,0333".
+bool is_decimal_comma(std::string_view before, std::string_view after) {
+  const auto digit = [](char c) { return c >= '0' && c <= '9'; };
+  return before.data() + before.size() + 1 == after.data() && before.data()[before.size()] == ',' &&
+         digit(before.back()) && digit(after[0]);
+}
+
+/// "Frames: 12" or "Frame Time : 0.01": what is written after the colon. In a `decimal` a comma
+/// between digits is a decimal point.
+std::string header_value(WordLines& lines, const std::string& title, bool decimal = false) {
   std::string joined;
   if (lines.next())
-    for (const std::string_view word : lines.words()) {
-      if (joined.size() > 100) break;
-      joined += cat(joined.empty() ? "" : " ", word.substr(0, 100));
+    for (size_t i = 0; i < lines.words().size() && joined.size() <= 100; ++i) {
+      const std::string_view word = lines.words()[i];
+      const bool comma = i > 0 && decimal && is_decimal_comma(lines.words()[i - 1], word);
+      joined += cat(i == 0 ? "" : comma ? "." : " ", word.substr(0, 100));
     }
   const size_t colon = joined.find(':');
   const size_t end = joined.find_last_not_of(' ', colon - (colon > 0 ? 1 : 0)) + 1;
@@ -176,7 +185,7 @@ void parse_frames(WordLines& lines, BvhFile& file, bool rate_is_told) {
   const double announced = lines.number(header_value(lines, "frames"));
   if (!(announced >= 1) || announced != std::floor(announced))
     lines.fail("no frames announced", "give a file with at least one frame");
-  const std::string frame_time = header_value(lines, "frame time");
+  const std::string frame_time = header_value(lines, "frame time", true);
   file.frame_time = lines.number(frame_time);
   file.frame_time_digit = last_digit(frame_time);
   if (!rate_is_told && !(file.frame_time >= kLeastTime && file.frame_time <= kMostTime))

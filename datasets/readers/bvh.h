@@ -22,8 +22,8 @@ struct BvhFile {
 
 /// Parses the text of a BVH file; `path` is for messages. Any joint order, any channel order.
 /// InputError with file:line for anything that is not BVH, not finite, or of fewer frames than it
-/// announces; lines after these are left out. A frame time that is none (0, say) is refused unless
-/// the rate is told otherwise.
+/// announces; lines after these are left out. A frame time may have a decimal comma; one
+/// that is none (0, say) is refused unless the rate is told otherwise.
 BvhFile parse_bvh(std::string_view text, const std::string& path, bool rate_is_told = false);
 
 }  // namespace restage

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "autograd/base/error.h"
 #include "datasets/readers/byte_stream.h"
 #include "datasets/readers/frame_names.h"
 #include "nn/geometry/body.h"
@@ -20,13 +21,16 @@ struct Frame {
   size_t left_out = 0;          ///< points that were NaN or infinite
   int64_t number = -1;          ///< by its file's name (FrameList::numbers); -1: none
   int64_t missing = 0;          ///< frames without a point just before it (without_empty_frames())
+  /// Why its file could not be read; it has no points then.
+  std::optional<InputError> fault = std::nullopt;
 };
 
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
   /// The next frame, nothing at the end. Points that are NaN or infinite are left out and counted;
-  /// a frame that shows nothing has no points. InputError for a bad frame.
+  /// a frame that shows nothing has no points, and so has a file of several that cannot be read
+  /// (Frame::fault). InputError where nothing behind a bad frame can be read.
   virtual std::optional<Frame> next() = 0;
   virtual void skip() { next(); }      ///< leaves one frame out, reading as little as it can
   virtual void rewind() = 0;           ///< next() gives the first frame again
@@ -54,15 +58,27 @@ std::unique_ptr<FrameSource> open_frames(const std::string& path, const FrameOpt
 
 /// All files of a folder that could be frames, in natural order.
 std::vector<std::string> frame_files(const std::string& folder);
-/// The files of a folder that are its frames; none if it has none. InputError as order_frames().
+/// The files of a folder that are its frames; none if it has none. InputError as order_frames(),
+/// and where many of them are pointers of Git LFS.
 FrameList frame_list(const std::string& folder);
-/// The frames of a folder of numbered folders that hold one frame each; none for other folders.
+/// The frames of a folder of numbered folders that hold one frame each: of several files that which
+/// all of them hold, with a remark. A folder without a frame is a frame without points: its path,
+/// with a slash at the end, stands for the file. None for other folders. InputError as
+/// frame_list(), and if all of them hold several files that may be the frame.
 FrameList folder_a_frame(const std::string& folder);
+/// frame_list(), if these are a series; else folder_a_frame(), if there is one; else frame_list().
+FrameList frames_in(const std::string& folder);
+/// Says why a folder has no frames.
+[[noreturn]] void throw_no_frames(const std::string& folder);
 /// These files as the frames of one sequence.
 std::unique_ptr<FrameSource> open_frame_list(FrameList list, const FrameOptions& options = {});
 
-/// The same frames but for those that show nothing, which are counted in the next one's `missing`.
-/// frames() still counts all.
+/// "2 frames could not be read ...", with their names and reasons.
+std::string remark_on_faults(const std::vector<InputError>& faults);
+
+/// The same frames but for those that show nothing, which are counted in the next one's `missing`;
+/// those that could not be read are named in a remark. frames() still counts all. InputError, the
+/// first one's, if no frame could be read.
 std::unique_ptr<FrameSource> without_empty_frames(std::unique_ptr<FrameSource> all);
 
 }  // namespace restage

@@ -4,209 +4,25 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "autograd/base/format.h"
 #include "datasets/readers/errors.h"
+#include "datasets/readers/name_numbers.h"
 #include "datasets/readers/npz.h"
 #include "datasets/readers/text.h"
 
 namespace restage {
 namespace {
 
-using Value = long double;  // of times in nanoseconds, exactly
-
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-bool is_letter(char c) { return (c | 32) >= 'a' && (c | 32) <= 'z'; }
-
-/// A part of a name: text, or a number.
-struct Piece {
-  std::string text;  ///< as it stands in the name
-  bool number = false, negative = false;
-  std::string whole, fraction;  ///< digits before the point (without leading zeros) and behind it
-  Value value() const {
-    const Value out = std::stold(cat(whole.substr(0, 4000), ".", fraction.substr(0, 4000), "0"));
-    return negative ? -out : out;
-  }
-};
-using Pieces = std::vector<Piece>;
-
-/// How marks in names are meant.
-struct Meaning {
-  bool decimals = false;      ///< a point between two runs of digits is a decimal point
-  bool letter_signs = false;  ///< so is a minus between a letter and a digit: a sign
-};
-
-std::string digits_at(const std::string& name, size_t at) {
-  size_t end = at;
-  while (end < name.size() && is_digit(name[end])) ++end;
-  return name.substr(at, end - at);
-}
-
-/// Whether the point at `at` has digits on both sides and no further point and digits beyond them
-/// (as versions and dates have).
-bool is_lone_point(const std::string& name, size_t at) {
-  const auto digit = [&](size_t i) { return i < name.size() && is_digit(name[i]); };
-  if (at == 0 || name[at] != '.' || !digit(at - 1) || !digit(at + 1)) return false;
-  size_t before = at, after = at + 1;
-  while (before > 0 && digit(before - 1)) --before;
-  while (digit(after)) ++after;
-  const bool chain_before = before >= 2 && name[before - 1] == '.' && digit(before - 2);
-  return !chain_before && !(after < name.size() && name[after] == '.' && digit(after + 1));
-}
-
-/// Whether the minus that ends `text` is the sign of a number that follows.
-bool ends_in_sign(const std::string& text, bool after_number, const Meaning& meaning) {
-  if (!text.ends_with('-')) return false;
-  if (text.size() == 1) return !after_number;
-  const char before = text[text.size() - 2];
-  return is_letter(before) ? meaning.letter_signs : before != ')';
-}
-
-Pieces pieces_of(const std::string& name, const Meaning& meaning) {
-  Pieces out;
-  for (size_t at = 0; at < name.size();) {
-    if (!is_digit(name[at])) {
-      size_t end = at;
-      while (end < name.size() && !is_digit(name[end])) ++end;
-      out.push_back({name.substr(at, end - at), false, false, "", ""});
-      at = end;
-      continue;
-    }
-    Piece piece{digits_at(name, at), true, false, "", ""};
-    at += piece.text.size();
-    piece.whole =
-        piece.text.substr(std::min(piece.text.find_first_not_of('0'), piece.text.size() - 1));
-    if (meaning.decimals && at < name.size() && is_lone_point(name, at)) {
-      piece.fraction = digits_at(name, at + 1);
-      at += 1 + piece.fraction.size();
-    }
-    if (!out.empty() && ends_in_sign(out.back().text, out.size() > 1, meaning)) {
-      piece.negative = true;
-      out.back().text.pop_back();
-      if (out.back().text.empty()) out.pop_back();
-    }
-    out.push_back(std::move(piece));
-  }
-  return out;
-}
-
-/// The name with # for each number.
-std::string pattern_of(const Pieces& pieces) {
-  std::string out;
-  for (const Piece& piece : pieces) out += piece.number ? "#" : piece.text;
-  return out;
-}
-
-int compare_numbers(const Piece& a, const Piece& b) {
-  const auto order = [](const std::string& x, const std::string& y) { return x.compare(y); };
-  if (a.negative != b.negative) return a.negative ? -1 : 1;
-  int out = a.whole.size() != b.whole.size() ? (a.whole.size() < b.whole.size() ? -1 : 1)
-                                             : order(a.whole, b.whole);
-  if (out == 0) {  // "5" is "50" and more than "05"
-    const size_t length = std::max(a.fraction.size(), b.fraction.size());
-    std::string x = a.fraction, y = b.fraction;
-    x.resize(length, '0');
-    y.resize(length, '0');
-    out = order(x, y);
-  }
-  return a.negative ? -out : out;
-}
-
-int compare(const Pieces& a, const Pieces& b) {
-  for (size_t i = 0; i < std::min(a.size(), b.size()); ++i) {
-    const int order =
-        a[i].number && b[i].number ? compare_numbers(a[i], b[i]) : a[i].text.compare(b[i].text);
-    if (order != 0) return order;
-  }
-  return a.size() == b.size() ? 0 : a.size() < b.size() ? -1 : 1;
-}
-
-// ---- what marks mean ---------------------------------------------------------------------------
-
-/// How much longer the longest step between sorted values is than the usual one.
-Value unevenness(const std::vector<std::vector<Value>>& runs) {
-  std::vector<Value> steps;
-  for (std::vector<Value> run : runs) {
-    std::sort(run.begin(), run.end());
-    for (size_t i = 1; i < run.size(); ++i) steps.push_back(run[i] - run[i - 1]);
-  }
-  if (steps.empty()) return 1;
-  std::sort(steps.begin(), steps.end());
-  return steps.back() / std::max<Value>(steps[steps.size() / 2], 1e-30L);
-}
-
-/// The names that have a decimal point, if points are such.
-struct Decimals {
-  std::vector<std::vector<Value>> as_decimals{{}}, as_counters;
-  bool unequal = false, leading_zero = false, trailing_zero = false, twice = false, several = false;
-  bool negative = false;
-};
-
-Decimals decimals_in(const std::vector<std::string>& names) {
-  Decimals out;
-  std::map<std::string, std::vector<Value>> counters;  // by all that is before the fraction
-  std::set<Value> seen;
-  std::set<std::string> wholes;
-  size_t length = 0;
-  for (const std::string& name : names)
-    for (const Piece& piece : pieces_of(name, {.decimals = true})) {
-      if (piece.fraction.empty()) continue;
-      out.twice = out.twice || !seen.insert(piece.value()).second;
-      out.as_decimals[0].push_back(piece.value());
-      out.negative = out.negative || piece.negative;
-      counters[piece.whole].push_back(std::stold(piece.fraction.substr(0, 4000)));
-      wholes.insert(piece.whole);
-      out.unequal = out.unequal || (length != 0 && length != piece.fraction.size());
-      length = piece.fraction.size();
-      out.leading_zero = out.leading_zero || (length > 1 && piece.fraction[0] == '0');
-      out.trailing_zero = out.trailing_zero || (length > 1 && piece.fraction.back() == '0');
-    }
-  for (auto& [whole, values] : counters) out.as_counters.push_back(std::move(values));
-  out.several = wholes.size() > 1;
-  return out;
-}
-
-/// Whether points between digits are decimal points. Programs write 0.05, 0.1, 0.15 for times, and
-/// take1.9, take1.10 for counters.
-bool means_decimals(const std::vector<std::string>& names) {
-  const Decimals found = decimals_in(names);
-  if (found.as_decimals[0].empty() || found.twice) return false;
-  // The same names without a fraction: 100, 100.05.
-  std::set<std::string> plain, pointed;
-  for (const std::string& name : names) {
-    const Pieces pieces = pieces_of(name, {.decimals = true});
-    const bool has = std::any_of(pieces.begin(), pieces.end(),
-                                 [](const Piece& p) { return !p.fraction.empty(); });
-    (has ? pointed : plain).insert(pattern_of(pieces));
-  }
-  for (const std::string& pattern : plain)
-    if (pointed.count(pattern) > 0) return true;
-  if (found.negative) return true;  // nobody counts so
-  if (found.unequal && found.leading_zero != found.trailing_zero) return found.leading_zero;
-  const Value decimals = unevenness(found.as_decimals), counters = unevenness(found.as_counters);
-  if (found.unequal) return decimals <= counters;
-  return found.several && decimals <= 2 * counters;  // of one length, both give one order
-}
-
-Meaning meaning_of(const std::vector<std::string>& names) {
-  Meaning out;
-  out.decimals = means_decimals(names);
-  std::set<std::string> patterns;
-  for (const std::string& name : names) patterns.insert(pattern_of(pieces_of(name, out)));
-  for (const std::string& pattern : patterns)
-    for (size_t at = pattern.find("-#"); at != std::string::npos; at = pattern.find("-#", at + 1)) {
-      std::string without = pattern;
-      without.erase(at, 1);
-      out.letter_signs = out.letter_signs || (at > 0 && patterns.count(without) > 0);
-    }
-  return out;
-}
-
-// ---- series ------------------------------------------------------------------------------------
+using numbered::is_digit;
+using numbered::Meaning;
+using numbered::Pieces;
+using numbered::Value;
 
 struct Name {
-  std::string path, shown;
+  std::string path, shown, stem;
   Pieces pieces;
 };
 using Names = std::vector<Name>;
@@ -297,30 +113,127 @@ void tell_others(const std::map<std::string, Names>& groups, const Names* series
                             " frames such as ", text::quote((*series)[0].shown)));
 }
 
+/// The names of one frame's copies, as downloads number them: "scan", "scan (1)", "scan (2)"; and
+/// "scan 2" where the first one counts as the first copy. `first` has no number.
+struct Copies {
+  std::string first;
+  std::string as_number;  ///< the name that `first` would have
+};
+
+/// The number that ends a name behind a blank or in brackets: "scan (2)" is "scan", " (#)", 2.
+struct Numbering {
+  std::string base, open, close;
+  std::string digits;
+};
+
+std::optional<Numbering> numbering_of(const std::string& stem) {
+  Numbering out;
+  size_t end = stem.size();
+  if (stem.ends_with(')')) out.close = ")", --end;
+  size_t at = end;
+  while (at > 0 && is_digit(stem[at - 1])) --at;
+  out.digits = stem.substr(at, end - at);
+  for (const std::string_view open : {" (", "(", " "})
+    if ((open == " ") == out.close.empty() && stem.substr(0, at).ends_with(open)) {
+      out.open = open;
+      out.base = stem.substr(0, at - open.size());
+      return out.digits.empty() || out.digits.size() > 9 ? std::nullopt : std::optional(out);
+    }
+  return std::nullopt;
+}
+
+/// The copies among these names whose first one has no number; of several the last by name.
+std::optional<Copies> copies_among(const std::vector<std::string>& stems) {
+  const std::set<std::string> all(stems.begin(), stems.end());
+  std::map<std::string, size_t> like;  // how many names are like this one but for numbers
+  for (const std::string& stem : all) ++like[pattern_of(pieces_of(stem, Meaning{}))];
+  std::map<std::string, std::pair<int, std::string>> least;  // number and name, by the base
+  std::optional<Copies> out;
+  for (const std::string& stem : all) {
+    const std::optional<Numbering> n = numbering_of(stem);
+    if (!n || all.count(n->base) == 0 || like[pattern_of(pieces_of(n->base, Meaning{}))] > 1)
+      continue;
+    const int number = std::stoi(n->digits);
+    const auto [at, is_new] = least.try_emplace(n->base + n->open, number, stem);
+    if (!is_new && at->second.first < number) continue;
+    at->second = {number, stem};
+    const int first = n->close.empty() ? 2 : 1;  // what the second copy is called
+    if (number >= first && (number == first || first == 1))
+      out = Copies{n->base, cat(n->base, n->open, first - 1, n->close)};
+  }
+  return out;
+}
+
+/// How the names of a folder are read.
+struct NameReading {
+  Meaning meaning;
+  std::optional<numbered::Hexadecimal> hexadecimal;
+  std::optional<Copies> copies;
+  Pieces operator()(const std::string& stem) const {
+    if (hexadecimal)
+      if (auto out = hexadecimal->pieces_of(stem)) return *out;
+    return pieces_of(copies && stem == copies->first ? copies->as_number : stem, meaning);
+  }
+};
+
+NameReading reading_of(const std::vector<std::string>& stems, const std::string& folder) {
+  NameReading out;
+  out.hexadecimal = numbered::hexadecimal_names(stems);
+  std::vector<std::string> others;
+  for (const std::string& stem : stems)
+    if (!out.hexadecimal || !out.hexadecimal->pieces_of(stem)) others.push_back(stem);
+  out.meaning = numbered::meaning_of(others, folder);
+  out.copies = copies_among(others);
+  return out;
+}
+
+/// What is not plain in the order of the series.
+void tell_reading(const NameReading& reading, const Names& series, FrameList& out) {
+  if (!reading.meaning.remark.empty()) out.remarks.push_back(reading.meaning.remark);
+  if (reading.hexadecimal && reading.hexadecimal->pieces_of(series[0].stem))
+    out.remarks.push_back(cat("the names of the frames count in hexadecimal, from ",
+                              text::quote(series[0].shown), " to ",
+                              text::quote(series.back().shown)));
+  if (reading.copies && series[0].stem == reading.copies->first)
+    out.remarks.push_back(cat(text::quote(series[0].shown), " is taken for the frame before ",
+                              text::quote(series[1].shown)));
+}
+
+/// f0 and f00, or 0000.ply and 0.obj: nobody can tell which is the frame.
+void refuse_twice(const Names& series, const std::string& folder) {
+  for (size_t i = 1; i < series.size(); ++i)
+    if (compare(series[i - 1].pieces, series[i].pieces) == 0)
+      throw InputError(folder,
+                       cat("holds one frame twice: ", text::quote(series[i - 1].shown), " and ",
+                           text::quote(series[i].shown), " have the same number"),
+                       "keep one of the two, or put each set of files into a folder of its own");
+}
+
+FrameList in_order_of_names(const std::vector<std::string>& files) {
+  FrameList out;
+  out.files = files;
+  std::sort(out.files.begin(), out.files.end(), natural_less);
+  if (files.size() > 1)
+    out.remarks.push_back(
+        cat("the names of the ", files.size(),
+            " files are no series of numbers: all are frames, in the order of their names"));
+  return out;
+}
+
 FrameList order(const std::vector<std::string>& files, const std::string& folder, bool folders) {
   std::vector<std::string> stems;
   for (const std::string& file : files)
     stems.push_back(folders ? shown_of(file) : std::filesystem::path(file).stem().string());
-  const Meaning meaning = meaning_of(stems);
+  const NameReading reading = reading_of(stems, folder);
   std::map<std::string, Names> groups;
   for (size_t i = 0; i < files.size(); ++i) {
-    Name name{files[i], shown_of(files[i]), pieces_of(stems[i], meaning)};
+    Name name{files[i], shown_of(files[i]), stems[i], reading(stems[i])};
     groups[pattern_of(name.pieces)].push_back(std::move(name));
   }
   Names* series = nullptr;
   for (auto& [pattern, names] : groups)
     if (names.size() > 1 && (series == nullptr || names.size() > series->size())) series = &names;
-  FrameList out;
-  if (series == nullptr) {
-    if (folders) return out;
-    out.files = files;
-    std::sort(out.files.begin(), out.files.end(), natural_less);
-    if (files.size() > 1)
-      out.remarks.push_back(
-          cat("the names of the ", files.size(),
-              " files are no series of numbers: all are frames, in the order of their names"));
-    return out;
-  }
+  if (series == nullptr) return folders ? FrameList{} : in_order_of_names(files);
   for (const auto& [pattern, names] : groups)
     if (&names != series && names.size() > 1 && 2 * names.size() > series->size())
       throw InputError(folder,
@@ -331,10 +244,14 @@ FrameList order(const std::vector<std::string>& files, const std::string& folder
     const int order = compare(a.pieces, b.pieces);
     return order != 0 ? order < 0 : a.path < b.path;
   });
+  refuse_twice(*series, folder);
   refuse_parallel_series(*series, folder);
+  FrameList out;
+  out.is_series = true;
   for (const Name& name : *series) out.files.push_back(name.path);
   tell_others(groups, series, out);
-  add_numbers(*series, meaning.decimals, out);
+  tell_reading(reading, *series, out);
+  add_numbers(*series, reading.meaning.mark != numbered::Mark::parts, out);
   return out;
 }
 

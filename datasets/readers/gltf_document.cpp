@@ -8,6 +8,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "datasets/readers/errors.h"
+#include "datasets/readers/foreign_kinds.h"
 #include "datasets/readers/gltf_detail.h"
 #include "datasets/readers/text.h"
 
@@ -243,6 +244,7 @@ size_t checked(int64_t index, size_t size, const std::string& path, const std::s
 }
 
 Document parse_document(std::string_view content, const std::string& path) {
+  refuse_foreign_content(content, path);
   Document out;
   out.path = path;
   out.payload = content.size();

@@ -104,6 +104,7 @@ Mesh read_mesh(const std::string& path, size_t& left_out, Vec3& origin) {
 
 Mesh parse_mesh(const std::string& content, const std::string& path, const Vec3& origin,
                 NonFinite how) {
+  refuse_foreign_content(content, path);
   Mesh mesh;
   if (content.empty() && !is_cloud_name(path) && !is_text_name(path)) {
     throw InputError(path, "is empty and holds no points", "give a mesh or cloud that has some");

@@ -23,7 +23,10 @@ Mesh parse_pcd(std::string_view content, const std::string& path, const Vec3& or
 /// Tables of numbers, a point a line (.xyz, .xyzrgb, .xyzn, .pts, .asc, .txt, .csv): x, y and z are
 /// the first three columns, or those that a first line names so. Blanks, commas or semicolons stand
 /// between numbers (beside semicolons decimals may have commas); lines with # or // say nothing; a
-/// first line of one number is the count, as .pts files have it.
+/// first line of one number is the count, as .pts files have it. Behind the count .xyz files may
+/// have a line of any words; then, and where words stand in it, a fourth column in front of x, y
+/// and z holds labels (elements). A .pts file may begin with "version: 1", "n_points: 68" and a
+/// brace. Empty cells, NULL, NA, N/A, -- and their like are missing numbers, which count as NaN.
 /// InputError: lines of unequal length, a table of many frames, a first column that counts.
 Mesh parse_table(std::string_view content, const std::string& path,
                  const Vec3& origin = Vec3::Zero(), NonFinite how = NonFinite::refuse);

@@ -7,6 +7,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "datasets/readers/errors.h"
+#include "datasets/readers/foreign_kinds.h"
 
 namespace restage {
 namespace {
@@ -60,7 +61,9 @@ std::optional<std::string> read_gz(const std::string& path, uint64_t limit) {
 std::string read_packed_text(const std::string& path, uint64_t limit) {
   std::string text = read_file(path, limit);
   constexpr std::string_view kXz = "\xFD\x37zXZ";
-  return text.starts_with(kXz) ? unpack_xz(text, path, limit) : text;
+  if (text.starts_with(kXz)) text = unpack_xz(text, path, limit);
+  refuse_foreign_content(text, path);
+  return text;
 }
 
 }  // namespace restage

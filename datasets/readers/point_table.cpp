@@ -24,7 +24,7 @@ std::string_view bare(std::string_view cell) {
   return cell.substr(begin, cell.find_last_not_of(kAround) - begin + 1);
 }
 
-/// Cells between separators; of semicolons and commas a cell may be empty.
+/// Cells between separators; but for blanks a cell may be empty.
 void split(std::string_view line, char separator, Cells& cells) {
   cells.clear();
   if (separator == ' ') {
@@ -40,9 +40,17 @@ void split(std::string_view line, char separator, Cells& cells) {
   }
 }
 
-/// Commas in numbers ("0,5 1,5 2,5") are no separators.
+/// Commas in numbers ("0,5 1,5 2,5") are no separators. Tabs are separators like semicolons (a cell
+/// may be empty) if there is one for each column.
 char separator_of(std::string_view line) {
   if (line.find(';') != std::string_view::npos) return ';';
+  if (line.find('\t') != std::string_view::npos && line.find(',') == std::string_view::npos) {
+    Cells cells, words;
+    split(line, '\t', cells);
+    split(line, ' ', words);
+    const bool empty = std::any_of(cells.begin(), cells.end(), [](auto c) { return c.empty(); });
+    if (cells.size() >= 3 && (empty ? words.size() < 3 : cells.size() == words.size())) return '\t';
+  }
   Cells words;
   split(line, ' ', words);
   const bool decimals = words.size() >= 3 && std::all_of(words.begin(), words.end(), [](auto word) {
@@ -69,6 +77,20 @@ int axis_of(std::string_view cell) {
   return -1;
 }
 
+/// What programs write for a number that is missing. "Na" is sodium.
+bool is_missing(std::string_view cell) {
+  constexpr std::array<std::string_view, 20> kMissing = {
+      "",     "-",    "--",   "---",  "?",   "NA",   "na",   "N/A",  "n/a",     "#N/A",
+      "<NA>", "NULL", "Null", "null", "nil", "None", "none", "NONE", "missing", "."};
+  return std::find(kMissing.begin(), kMissing.end(), cell) != kMissing.end();
+}
+
+/// A number, or a word for a missing one.
+bool is_value(std::string_view cell) {
+  double value = 0;
+  return is_missing(cell) || text::parse(cell, value) || text::has_decimal_comma(cell);
+}
+
 /// "frame", "Frame_ID"; or a time, which frames share, too.
 bool counts_frames(std::string_view cell) {
   const std::string name = lower_case(cell);
@@ -86,10 +108,11 @@ class TableParser {
   Mesh parse(bool whole) {
     std::string_view line;
     while (lines_.next(line)) {
-      const size_t begin = line.find_first_not_of(" \t\r");
+      if (is_remark(line)) continue;
+      const size_t begin = line.find_first_not_of(separator_ == '\t' ? " \r" : " \t\r");
       if (begin == std::string_view::npos) continue;
       line.remove_prefix(begin);
-      const bool comment = line[0] == '#' || line.starts_with("//");
+      const bool comment = (line[0] == '#' && !line.starts_with("#N/A")) || line.starts_with("//");
       if (comment && (columns_ > 0 || !names_axes(line))) continue;
       if (columns_ == 0)
         first_line(line);
@@ -102,6 +125,45 @@ class TableParser {
 
  private:
   std::string where() const { return cat(path_, ":", lines_.number()); }
+
+  /// The second line of an .xyz file of chemists, behind the count of points: any words, or none.
+  /// The heading of a .pts file: "version: 1", "n_points: 68", braces.
+  bool is_remark(std::string_view line) {
+    Cells words;
+    split(line, ' ', words);
+    if (columns_ == 0 && is_behind_count(lines_.number())) {
+      has_remark_ = !is_row(words);
+      return has_remark_ && !names_axes(line);
+    }
+    if (words.empty()) return false;
+    if (words[0] == "{" || words[0] == "}") return words.size() == 1;
+    const size_t colon = line.find(':');
+    if (columns_ > 0 || colon == std::string_view::npos) return false;
+    const std::string name = lower_case(bare(line.substr(0, colon)));
+    if (name == "n_points") announce(bare(line.substr(colon + 1)));
+    return name == "version" || name == "n_points";
+  }
+
+  /// Whether that line may be the second one of chemists' files.
+  bool is_behind_count(int64_t line) const {
+    return announced_ && line == count_line_ + 1 && text::ends_in(path_, {".xyz"});
+  }
+
+  /// Three numbers or more, with or without an element in front.
+  static bool is_row(const Cells& words) {
+    const bool element = !words.empty() && words[0].size() <= 3 && !is_value(words[0]);
+    return words.size() >= (element ? 4 : 3) &&
+           std::all_of(words.begin() + element, words.end(), is_value);
+  }
+
+  /// Whether it is the number of points, which is kept.
+  bool announce(std::string_view cell) {
+    int64_t count = 0;
+    if (announced_ || !text::parse(cell, count) || count < 0) return false;
+    announced_ = count;
+    count_line_ = lines_.number();
+    return true;
+  }
 
   bool names_axes(std::string_view line) const {
     while (!line.empty() && (line[0] == '#' || line[0] == '/')) line.remove_prefix(1);
@@ -117,15 +179,23 @@ class TableParser {
     if (names_axes(line)) return header(line);
     separator_ = separator_of(line);
     split(line, separator_, cells_);
-    if (int64_t count = 0;
-        cells_.size() == 1 && !announced_ && text::parse(cells_[0], count) && count >= 0) {
-      announced_ = count;
-      return;
-    }
-    if (axis_column_[0] < 0) axis_column_ = {0, 1, 2};
+    if (cells_.size() == 1 && announce(cells_[0])) return;
     drop_empty_end();
+    if (axis_column_[0] < 0) axis_column_ = first_axes();
     columns_ = std::max(cells_.size(), named_columns_);
     point(line);
+  }
+
+  /// x, y and z come first, or behind a column of labels: words, or the elements of chemists'
+  /// files.
+  std::array<int, 3> first_axes() const {
+    constexpr int64_t kElements = 118;
+    int64_t number = 0;
+    const bool element = has_remark_ && !cells_.empty() && text::parse(cells_[0], number) &&
+                         number >= 1 && number <= kElements;
+    const bool labels = cells_.size() > 3 && (element || !is_value(cells_[0])) &&
+                        std::all_of(cells_.begin() + 1, cells_.begin() + 4, is_value);
+    return labels ? std::array<int, 3>{1, 2, 3} : std::array<int, 3>{0, 1, 2};
   }
 
   /// Of a line that ends with a separator: "1,2,3,".
@@ -148,7 +218,15 @@ class TableParser {
   void point(std::string_view line) {
     split(line, separator_, cells_);
     drop_empty_end();
-    if (cells_.size() < 3) throw InputError(where(), "has fewer than 3 numbers", kSaveAgain);
+    check_count_of_cells();
+    if (out_.vertices.empty()) first_row_ = lines_.number();
+    if (cells_.size() != columns_ && out_.vertices.size() == 1 && is_behind_count(first_row_)) {
+      out_.vertices.clear();  // three numbers, and yet the remark
+      has_remark_ = true;
+      axis_column_[0] = -1;
+      columns_ = 0;
+      return first_line(line);
+    }
     if (cells_.size() != columns_)
       throw InputError(where(), cat("has ", cells_.size(), " columns, the lines before ", columns_),
                        kSaveAgain);
@@ -158,15 +236,29 @@ class TableParser {
       point[static_cast<int>(axis)] = text::coordinate(
           value - origin_[static_cast<int>(axis)], [&] { return where(); }, how_);
     }
-    counted_ = counted_ && named_columns_ == 0 && columns_ > 3 && follows(number(cells_[0]));
+    counted_ = counted_ && named_columns_ == 0 && columns_ > 3 && axis_column_[0] == 0 &&
+               follows(number(cells_[0]));
     if (frame_column_ >= 0) check_frame(cells_[static_cast<size_t>(frame_column_)]);
     out_.vertices.push_back(point);
   }
 
-  /// An empty cell is a missing number.
+  void check_count_of_cells() const {
+    if (cells_.size() >= 3) return;
+    int64_t count = 0;
+    if (cells_.size() == 1 && announced_ && std::ssize(out_.vertices) >= *announced_ &&
+        text::parse(cells_[0], count))
+      throw InputError(where(), "another frame begins here, and a table is one frame",
+                       "write each frame into a file of its own");
+    if (cells_.size() == 2 && out_.vertices.empty() && is_value(cells_[0]) && is_value(cells_[1]))
+      throw InputError(where(), "holds points of a picture: two numbers each",
+                       "give points of space, x y z in each line");
+    throw InputError(where(), "has fewer than 3 numbers", kSaveAgain);
+  }
+
+  /// A word for a missing number is NaN.
   double number(std::string_view cell) const {
     double value = std::numeric_limits<double>::quiet_NaN();
-    if (cell.empty() || text::parse(cell, value)) return value;
+    if (is_missing(cell) || text::parse(cell, value)) return value;
     if (separator_ != ';' || !text::has_decimal_comma(cell)) text::throw_no_number(cell, where());
     std::string with_point(cell);
     with_point[with_point.find(',')] = '.';
@@ -191,7 +283,10 @@ class TableParser {
                        "write each frame into a file of its own");
   }
 
-  void check_end() const {
+  void check_end() {
+    // One more than announced: the first was the remark of an .xyz file.
+    if (is_behind_count(first_row_) && std::ssize(out_.vertices) == *announced_ + 1)
+      out_.vertices.erase(out_.vertices.begin());
     if (announced_ && *announced_ != std::ssize(out_.vertices))
       throw InputError(
           path_, cat("holds ", out_.vertices.size(), " points, its first line says ", *announced_),
@@ -212,7 +307,9 @@ class TableParser {
   std::array<int, 3> axis_column_ = {-1, -1, -1};
   int frame_column_ = -1;
   std::string frame_;
-  std::optional<int64_t> announced_;
+  std::optional<int64_t> announced_;        // points
+  int64_t count_line_ = 0, first_row_ = 0;  // lines: where that stands, and the first point
+  bool has_remark_ = false;                 // is_remark()
   bool counted_ = true;
   double last_ = 0;
 };

@@ -7,6 +7,7 @@
 #include "experiments/cli/commands.h"
 #include "experiments/cli/import_text.h"
 #include "experiments/cli/output.h"
+#include "experiments/cli/scale_option.h"
 
 namespace restage::cli {
 namespace {
@@ -15,6 +16,9 @@ namespace {
 std::string positive(const std::string& text) {
   const double value = std::strtod(text.c_str(), nullptr);
   return value > 0 ? "" : "is '" + text.substr(0, 40) + "', but must be above 0";
+}
+std::string positive_scale(const std::string& text) {
+  return metres_per_unit(text) > 0 ? "" : positive(text);
 }
 std::string not_negative(const std::string& text) {
   return text.starts_with("-") ? "is '" + text.substr(0, 40) + "', but frames count from 0" : "";
@@ -112,7 +116,7 @@ void add_data_import(Program& program, CommandOptions group) {
                  "folders: regular expression on a file's path below SOURCE whose first group "
                  "names who moves");
   app.add_option("--split", motion.split, "train, validation or test");
-  app.add_option("--scale", motion.scale, "metres per unit of the file").check(positive);
+  add_scale(app, motion.scale, "metres per unit of the file").check(positive_scale);
   app.add_option("--fps", motion.fps, "true frame rate").check(positive);
   app.add_option("--up", given.up, "up axis of the file: auto, x, y, z, -x, -y or -z");
   app.add_option("--facing", given.facing,

@@ -23,6 +23,7 @@
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/doctor_report.h"
+#include "experiments/cli/scale_option.h"
 #include "experiments/doctor_repair.h"
 #include "nn/config/config.h"
 #include "nn/weights/safetensors.h"
@@ -321,6 +322,7 @@ Report examine(const Options& options) {
   const std::string& path = options.path;
   std::error_code ignored;
   if (fs::is_directory(path, ignored)) return examine_folder(options);
+  refuse_foreign_content(path);
   const std::string start = first_bytes(path);
   const std::string name = small_letters(path);
   for (const Kind& kind : kKinds) {
@@ -443,7 +445,7 @@ void add_doctor(Program& program) {
                  "write it mended: X.ply or X.obj (one cloud or surface), X.h5 (a sequence), or a "
                  "folder of frames");
   app.add_flag("--target", options.target, "it is meant as a target: in T-pose, facing +z");
-  app.add_option("--scale", options.scale, "metres per unit, where you know better");
+  add_scale(app, options.scale, "metres per unit, where you know better");
   app.add_option("--up", options.up, "the direction that is up: x, y, z, --up=-x ...");
   app.add_option("--fps", options.fps,
                  "frames per second of a sequence, where you know better than the file (30 where "

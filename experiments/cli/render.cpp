@@ -13,6 +13,7 @@
 #include "autograd/base/output_check.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
+#include "experiments/cli/scale_option.h"
 #include "experiments/clips.h"
 #include "infer/render/page.h"
 #include "infer/render/sheet.h"
@@ -248,7 +249,7 @@ void add_render(Program& program) {
       "30)");
   app.add_option("--source-up", options.up,
                  "the source's axis that points up: x, -x, y, -y, z or -z");
-  app.add_option("--scale", options.scale, "the source's units in metres");
+  add_scale(app, options.scale, "the source's units in metres");
   app.add_option("--clip", options.clip, "animation of a glTF source");
   app.add_option("--source-sequence", options.source_sequence,
                  "which sequence of an HDF5 source, from 0 (default: as --sequence)");

@@ -16,6 +16,7 @@
 #include "experiments/cli/output.h"
 #include "experiments/cli/profile.h"
 #include "experiments/cli/retarget_gaps.h"
+#include "experiments/cli/scale_option.h"
 #include "experiments/source.h"
 #include "infer/systems.h"
 #include "infer/writers/bvh.h"
@@ -402,7 +403,7 @@ void add_retarget(Program& program) {
   app.add_option("--source-up", c.source.up,
                  "the source's axis that points up: x, -x, y, -y, z or -z")
       .show_default();
-  app.add_option("--scale", c.source.scale, "the source's units in metres");
+  add_scale(app, c.source.scale, "the source's units in metres");
   app.add_option("--format", c.format, "of a folder's frames: ply or obj");
   app.add_option("--device", c.device,
                  "where extractor and motion network run: cpu, or cuda in a program built for it");

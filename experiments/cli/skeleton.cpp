@@ -79,6 +79,7 @@ int run_skeleton(const SkeletonOptions& options, const Common& common) {
   JointExtractor extract(model, options.samples);
   size_t left_out = 0;
   while (const auto frame = frames->next()) {
+    if (frame->fault) throw *frame->fault;
     left_out += frame->left_out;
     const SeenJoints seen = extract(frame->points, frame->source, key);
     const auto radius = radius_of(seen);

@@ -23,7 +23,7 @@ class FrameFolderWriter {
                     MeshFormat format = MeshFormat::ply);
 
   void push(const Points& vertices) { push(vertices, faces_); }
-  /// A frame that has other triangles than the rest.
+  /// A frame that has other triangles than the rest. One without vertices shows nothing.
   void push(const Points& vertices, const std::vector<Triangle>& faces);
   void commit();
   size_t frames() const { return frames_; }

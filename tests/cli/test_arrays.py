@@ -105,20 +105,24 @@ class Arrays(CliTest):
                                       betas=npy((1,), [0.0]), mocap_framerate=objects))
         bad("model.npz", "a_poses.npz:mocap_framerate", "--fps")
 
-    def test_a_damaged_frame_costs_its_sequence(self):
+    def test_a_damaged_frame_is_held(self):
         for take in "abc":
             for f in (1, 2, 3):
                 self.ply("tree/%s/%d.ply" % (take, f), points(80 + f, f))
         self.write("tree/b/2.ply", self.bytes("tree/b/2.ply")[:-9])
         found = self.json("data", "import", "tree", "--out", "t.h5")
-        self.assertEqual((found["sequences"], found["frames"], len(found["reports"]), len(found["skipped"])), (2, 6, 2, 1))
-        self.assertTrue(found["skipped"][0].startswith("tree/b: tree/b/2.ply: "), found["skipped"])
+        self.assertEqual((found["sequences"], found["frames"], len(found["reports"]), found["skipped"]), (3, 9, 3, []))
+        remarks = " ".join(found["reports"][1]["remarks"])
+        self.assertIn("1 frame could not be read and counts as a frame without points: tree/b/2.ply: is cut short", remarks)
+        self.assertIn("1 frame shows too little", remarks)
         self.assertEqual(self.json("data", "verify", "t.h5")["problems"], [])
-        self.assertEqual(self.json("data", "inspect", "t.h5")["counts"]["points"], 2 * (81 + 82 + 83))
-        self.bad_input(["data", "import", "tree/b", "--out", "x.h5"], "tree/b/2.ply")
-        for take in "ac":
-            self.write("tree/%s/3.ply" % take, "x")
-        self.bad_input(["data", "import", "tree", "--out", "x.h5"], "all 3 files were skipped, the first: tree/a: tree/a/3.ply")
+        self.assertEqual(self.json("data", "inspect", "t.h5")["counts"]["points"], 2 * (81 + 82 + 83) + 81 + 81 + 83)
+        for f in (1, 2, 3):
+            self.write("tree/b/%d.ply" % f, "x")
+        found = self.json("data", "import", "tree", "--out", "t.h5")
+        self.assertEqual((found["sequences"], len(found["skipped"])), (2, 1))
+        self.assertIn("tree/b/1.ply: is not a PLY file", found["skipped"][0])
+        self.bad_input(["data", "import", "tree/b", "--out", "x.h5"], "tree/b/1.ply: is not a PLY file")
 
     def test_scans(self):
         self.write("walk.npz", npz(points=cloud(7)))

@@ -235,6 +235,20 @@ TEST_F(ReadersRecordings, AFrameTimeThatIsNoneNeedsTheRate) {
   EXPECT_LT(at, end);
 }
 
+TEST_F(ReadersRecordings, AFrameTimeMayHaveADecimalComma) {
+  std::string text = bvh_test::text({.fps = 30, .frames = 4});
+  const size_t at = text.find("Frame Time:");
+  for (const char* time : {"0,0333333", " 0,0333333  ", "0,0333", "3,33333e-2"}) {
+    text.replace(at, text.find('\n', at) - at, std::string("Frame Time: ") + time);
+    EXPECT_EQ(convert_bvh(text, "x.bvh").motion.frames(), 4u) << time;
+  }
+  text.replace(at, text.find('\n', at) - at, "Frame Time: 0, 0333333");
+  EXPECT_HAS(refusal_of([&] { convert_bvh(text, "x.bvh"); }), "is no usable number");
+  text = bvh_test::text({.fps = 30, .frames = 4});
+  text.replace(text.find("Frames: 4"), 9, "Frames: 1,000");  // a thousand is not one
+  EXPECT_HAS(refusal_of([&] { convert_bvh(text, "x.bvh"); }), "is no usable number");
+}
+
 // ---- files that ask for too much
 
 std::string complaint(const std::string& text) {

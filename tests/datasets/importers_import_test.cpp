@@ -237,12 +237,16 @@ TEST_F(ImportersScans, TreesOfFolders) {
   EXPECT_HAS(summary.skipped[2], "notes.npz: holds no points");
 }
 
-TEST_F(ImportersScans, ABrokenFrameIsAnErrorAndLeavesNothing) {
+TEST_F(ImportersScans, ABrokenFrameIsHeldAndOnlyBrokenOnesLeaveNothing) {
   fs::create_directories(dir / "in");
-  write_ply(dir / "in/1.ply", Mesh{person({0, 0, 0}), {}});
-  write_bytes(dir / "in/2.ply", "ply\n");
-  EXPECT_HAS(error_of([&] { import_data(dir / "in", dir / "o.h5"); }), "2.ply");
+  for (const int f : {1, 2}) write_bytes(dir / "in/" + std::to_string(f) + ".ply", "ply\n");
+  EXPECT_HAS(error_of([&] { import_data(dir / "in", dir / "o.h5"); }), "1.ply: is cut short");
   EXPECT_EQ(names_in(dir.path()), Names{"in"});
+  write_ply(dir / "in/1.ply", Mesh{person({0, 0, 0}), {}});
+  const ImportSummary held = import_data(dir / "in", dir / "o.h5");
+  EXPECT_EQ(held.frames, 2u);
+  EXPECT_HAS(held.reports[0].remarks.at(0), "1 frame could not be read");
+  EXPECT_HAS(held.reports[0].remarks.at(0), "2.ply: is cut short");
   // A single mesh or cloud is a sequence of one frame.
   const ImportSummary one = import_data(dir / "in/1.ply", dir / "o.h5");
   EXPECT_EQ(one.frames, 1u);

@@ -163,7 +163,6 @@ TEST_F(ReadersClouds, OtherTablesAreRefused) {
       {"1 2 3\n4 5\n", "a.xyz:2: has fewer than 3 numbers"},
       {"1 2 3 4\n4 5 6\n", "a.xyz:2: has 3 columns, the lines before 4"},
       {"0,1 0,2 0,3\n", "'0,1' is no number; write decimals with points"},
-      {"2\nwater\nO 0 0 0\nH 0 0 1\n", "has fewer than 3 numbers"},
       {"frame,x,y,z\n1,0,0,0\n1,1,0,0\n2,0,0,0\n", "another frame begins here"},
       {"Frame,Hips,Spine\n1,0,0\n", "'Frame' is no number"},
       {"3\n1 2 3\n4 5 6\n", "holds 2 points, its first line says 3"},

@@ -1,12 +1,10 @@
-// Which files of a folder are the frames of a sequence, and in which order.
+// Folders of frames: which files are taken, and what becomes of those that cannot be read.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <filesystem>
 
 #include "autograd/base/error.h"
 #include "datasets/readers/frame_folder.h"
-#include "datasets/readers/frame_names.h"
 #include "tests/support/files.h"
 
 namespace restage {
@@ -15,84 +13,11 @@ namespace {
 using namespace test;
 using ReadersFrames = FileTest;
 
-/// The order of these names, whatever order they come in.
-Names ordered(Names names, FrameList* list = nullptr) {
-  std::sort(names.begin(), names.end());
-  const FrameList out = order_frames(names, "in");
-  if (list != nullptr) *list = out;
-  return out.files;
-}
-
 std::string all_of(const std::vector<std::string>& remarks) {
   std::string out;
   for (const std::string& remark : remarks) out += remark + "\n";
   return out;
 }
-
-TEST(FrameNames, NumbersAreComparedAsTheyAreMeant) {
-  const Names series[] = {
-      {"f1.ply", "f2.ply", "f10.ply"},
-      // Times: decimals of unequal length, with and without a fraction.
-      {"100.0.ply", "100.05.ply", "100.1.ply", "100.15.ply", "100.2.ply"},
-      {"9.5.ply", "10.ply", "10.25.ply", "10.5.ply"},
-      {"t_0.2.ply", "t_0.25.ply", "t_0.3.ply", "t_0.35.ply"},
-      {"1700000000.9.ply", "1700000001.05.ply", "1700000001.2.ply"},
-      // Counters behind a point.
-      {"take1.8.ply", "take1.9.ply", "take1.10.ply", "take1.11.ply"},
-      {"walk.v2.0009.ply", "walk.v2.0010.ply", "walk.v2.0011.ply"},
-      {"2024.1.9.ply", "2024.1.10.ply", "2024.1.11.ply"},
-      // Negative numbers, where a minus is a sign.
-      {"-10.ply", "-2.ply", "0.ply", "3.ply"},
-      {"-0.5.ply", "-0.25.ply", "0.0.ply", "0.25.ply"},
-      {"frame_-2.ply", "frame_-1.ply", "frame_0.ply", "frame_1.ply"},
-      {"frame-2.ply", "frame-1.ply", "frame0.ply", "frame1.ply"},
-      {"t=-0.2.ply", "t=-0.1.ply", "t=0.0.ply", "t=0.1.ply"},
-      // Where it is a mark.
-      {"frame-1.ply", "frame-2.ply", "frame-10.ply"},
-      {"2024-01-02_10-20-30.ply", "2024-01-02_10-20-31.ply", "2024-01-02_10-21-02.ply"},
-      {"1700000000123456789.ply", "1700000000123456790.ply", "1700000000223456788.ply"}};
-  for (const Names& names : series) EXPECT_EQ(ordered(names), names) << names[0];
-}
-
-TEST(FrameNames, EvenNumbersAreKept) {
-  FrameList list;
-  ordered({"f2.ply", "f4.ply", "f10.ply"}, &list);
-  EXPECT_EQ(list.numbers, (std::vector<int64_t>{2, 4, 10}));
-  ordered({"0.0.ply", "0.05.ply", "0.1.ply", "0.15.ply", "0.25.ply"}, &list);
-  EXPECT_EQ(list.numbers, (std::vector<int64_t>{0, 1, 2, 3, 5}));
-  EXPECT_NE(all_of(list.remarks).find("20 frames a second"), std::string::npos);
-  ordered({"0.0.ply", "0.05.ply", "0.16.ply", "0.9.ply"}, &list);
-  EXPECT_TRUE(list.numbers.empty()) << "not even";
-}
-
-TEST(FrameNames, WhatIsNoPartOfTheSeriesIsLeftOutAndSaid) {
-  FrameList list;
-  const Names frames = {"frame_0001.ply", "frame_0002.ply", "frame_0003.ply"};
-  for (const Names& strays : {Names{"floor.ply"}, Names{"template.obj", "calibration_1.ply"},
-                              Names{"frame.ply"}, Names{"frame_0001_clean.ply"}}) {
-    Names all = frames;
-    all.insert(all.end(), strays.begin(), strays.end());
-    EXPECT_EQ(ordered(all, &list), frames) << strays[0];
-    ASSERT_EQ(list.remarks.size(), 1u);
-    for (const std::string& stray : strays) EXPECT_HAS(list.remarks[0], stray);
-  }
-  // Names without numbers are in the order of names, which is said.
-  EXPECT_EQ(ordered({"a.ply", "b.ply", "c.ply"}, &list), (Names{"a.ply", "b.ply", "c.ply"}));
-  EXPECT_HAS(all_of(list.remarks), "no series of numbers");
-  EXPECT_EQ(ordered({"floor.ply"}, &list), Names{"floor.ply"});
-  EXPECT_TRUE(list.remarks.empty());
-}
-
-TEST(FrameNames, SeveralSeriesAreRefused) {
-  for (const Names& names :
-       {Names{"left_1.ply", "left_2.ply", "right_1.ply", "right_2.ply"},
-        Names{"cam0_0001.ply", "cam0_0002.ply", "cam1_0001.ply", "cam1_0002.ply"},
-        Names{"0001_cam0.ply", "0001_cam1.ply", "0002_cam0.ply", "0002_cam1.ply"},
-        Names{"c0_1.ply", "c0_2.ply", "c0_3.ply", "c1_1.ply", "c1_2.ply", "c1_3.ply"}})
-    EXPECT_HAS(error_of([&] { ordered(names); }), "holds several series of frames") << names[0];
-}
-
-// ---- folders -----------------------------------------------------------------------------------
 
 std::string one_point(int x) { return "v " + std::to_string(x) + " 0 0\n"; }
 
@@ -145,6 +70,74 @@ TEST_F(ReadersFrames, AFolderAFrame) {
   }
   EXPECT_HAS(error_of([&] { open_frames(dir / "sequences"); }),
              "4 of its folders do; give one sequence");
+}
+
+TEST_F(ReadersFrames, AFolderAFrameWithStrays) {
+  for (const int f : {0, 1, 2, 3}) {
+    const std::string folder = "000" + std::to_string(f) + "/";
+    dir.write("empty/" + folder + "note.md", "");
+    if (f != 2) dir.write("empty/" + folder + "mesh.ply", ply_point(f));
+    dir.write("some/" + folder + "mesh.ply", ply_point(f));
+    if (f != 1) dir.write("some/" + folder + "floor.ply", ply_point(70 + f));
+    dir.write("all/" + folder + "mesh.ply", ply_point(f));
+    dir.write("all/" + folder + "floor.ply", ply_point(70 + f));
+    dir.write("beside/" + folder + "f" + std::to_string(f) + ".ply", ply_point(f));
+  }
+  dir.write("beside/floor.ply", ply_point(77));
+  {
+    const auto frames = open_frames(dir / "empty");
+    EXPECT_EQ(frames->frames(), 4);
+    frames->skip(), frames->skip();
+    EXPECT_TRUE(frames->next()->points.empty());
+    EXPECT_EQ(frames->next()->points[0].x(), 3);
+    EXPECT_HAS(all_of(frames->remarks()), "1 folder holds no 'mesh.ply': a frame without points");
+  }
+  const auto some = open_frames(dir / "some");
+  EXPECT_EQ(played(*some), (std::vector<float>{0, 1, 2, 3}));
+  EXPECT_HAS(all_of(some->remarks()), "'mesh.ply' is taken of each, and left out are 'floor.ply'");
+  const std::string said = error_of([&] { open_frames(dir / "all"); });
+  EXPECT_HAS(said, "in each several files that may be the frame");
+  EXPECT_HAS(said, "'floor.ply' and 'mesh.ply'");
+  EXPECT_HAS(said, "leave one of them in each folder");
+  const auto beside = open_frames(dir / "beside");
+  EXPECT_EQ(played(*beside), (std::vector<float>{0, 1, 2, 3}));
+  EXPECT_HAS(all_of(beside->remarks()), "left out 'floor.ply': beside the folders");
+}
+
+TEST_F(ReadersFrames, AFrameThatCannotBeReadShowsNothing) {
+  for (const int f : {0, 1, 2, 3, 4, 5}) dir.write(std::to_string(f) + ".ply", ply_point(f));
+  dir.write("1.ply", ply_point(1).substr(0, ply_point(1).size() - 6));
+  dir.write("3.ply", "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 7\n");
+  const auto all = open_frames(dir.path());
+  for (int f = 0; f < 6; ++f) {
+    const auto frame = all->next();
+    EXPECT_EQ(frame->points.empty(), f == 1 || f == 3) << f;
+    EXPECT_EQ(frame->fault.has_value(), f == 1 || f == 3) << f;
+    EXPECT_EQ(frame->number, f);
+    if (frame->fault) {
+      EXPECT_HAS(frame->fault->what(), std::to_string(f) + ".ply: ");
+    }
+  }
+  const auto seen = without_empty_frames(open_frames(dir.path()));
+  EXPECT_EQ(played(*seen), (std::vector<float>{0, 2, 4, 5}));
+  EXPECT_HAS(all_of(seen->remarks()),
+             "2 frames could not be read and count as frames without points");
+  EXPECT_HAS(all_of(seen->remarks()), "1.ply: is cut short");
+  EXPECT_HAS(all_of(seen->remarks()), "3.ply: is a Git LFS pointer");
+  // Where none can be read, the first one's reason is the answer.
+  for (const int f : {0, 1, 2, 3, 4, 5}) dir.write(std::to_string(f) + ".ply", "ply of a kind");
+  const auto none = without_empty_frames(open_frames(dir.path()));
+  EXPECT_HAS(error_of([&] { none->next(); }), "0.ply: ");
+}
+
+TEST_F(ReadersFrames, PointersOfGitLfsAreNamed) {
+  for (const int f : {0, 1, 2, 3})
+    dir.write("in/" + std::to_string(f) + ".ply",
+              f == 3 ? ply_point(3) : "version https://git-lfs.github.com/spec/v1\noid sha256:0\n");
+  const std::string said = error_of([&] { open_frames(dir / "in"); });
+  EXPECT_HAS(said, "3 of 4 frames are Git LFS pointers");
+  EXPECT_HAS(said, "; run git lfs pull");
+  EXPECT_HAS(error_of([&] { open_frames(dir / "in/0.ply"); }), "Git LFS pointer");
 }
 
 TEST_F(ReadersFrames, TextsAreFramesOnlyIfTheyArePoints) {

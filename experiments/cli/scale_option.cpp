@@ -1,0 +1,40 @@
+#include "experiments/cli/scale_option.h"
+
+#include <charconv>
+#include <map>
+
+#include "autograd/base/error.h"
+#include "datasets/readers/word_lines.h"
+
+namespace restage::cli {
+
+double metres_per_unit(const std::string& text) {
+  static const std::map<std::string, double> units = {{"mm", 0.001},
+                                                      {"millimetres", 0.001},
+                                                      {"millimeters", 0.001},
+                                                      {"cm", 0.01},
+                                                      {"centimetres", 0.01},
+                                                      {"centimeters", 0.01},
+                                                      {"dm", 0.1},
+                                                      {"m", 1},
+                                                      {"metres", 1},
+                                                      {"meters", 1},
+                                                      {"km", 1000},
+                                                      {"in", 0.0254},
+                                                      {"inch", 0.0254},
+                                                      {"inches", 0.0254},
+                                                      {"ft", 0.3048},
+                                                      {"feet", 0.3048}};
+  if (const auto unit = units.find(lower_case(text)); unit != units.end()) return unit->second;
+  const size_t plus = text.size() > 1 && text[0] == '+' ? 1 : 0;
+  double value = 0;
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data() + plus, end, value);
+  if (error != std::errc() || stop != end)
+    throw InputError("",
+                     "--scale '" + text.substr(0, 40) + "' is neither a number nor a known unit",
+                     "give metres per unit, such as 0.001, or mm, cm, m, in or ft");
+  return value;
+}
+
+}  // namespace restage::cli
