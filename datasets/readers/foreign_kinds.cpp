@@ -97,7 +97,7 @@ const ForeignKind kArchives[] = {
     {{".xz"}, {"\xFD\x37zXZ"sv}, "is packed with xz", "unxz"},
 };
 
-constexpr uint64_t kHead = 512;  // bytes that tell every kind
+constexpr uint64_t kFirstBytes = 512;  // bytes that tell every kind
 
 bool is_packed_text_name(const std::string& path) {
   return text::ends_in(path, {".bvh.xz", ".amc.xz", ".asf.xz"});
@@ -122,7 +122,7 @@ bool starts_with_any(std::string_view content, const ForeignKind& kind) {
 
 /// An XML document is COLLADA if it says so near its start.
 bool is_collada(std::string_view content) {
-  return content.starts_with("<?xml") && content.substr(0, kHead).find("<COLLADA") != content.npos;
+  return content.starts_with("<?xml") && content.substr(0, kFirstBytes).find("<COLLADA") != content.npos;
 }
 
 }  // namespace
@@ -150,7 +150,7 @@ void refuse_foreign_content(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) return;
   FileStream file(path);
-  const std::vector<char> head = file.take(std::min<uint64_t>(kHead, file.size()));
+  const std::vector<char> head = file.take(std::min<uint64_t>(kFirstBytes, file.size()));
   refuse_foreign_content({head.data(), head.size()}, path);
 }
 
