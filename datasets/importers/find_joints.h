@@ -37,6 +37,12 @@ std::vector<int> find_people(const BoneTree& tree);
 /// bones fit equally well or limbs do not hang together, joints are missing.
 FoundJoints find_joints(const BoneTree& tree, int top);
 
+/// `listed` with what it leaves out: joints of spine, neck and collars that are `open` (not listed,
+/// and with no place of their own) where a bone lies that is theirs by how the listed ones hang
+/// together. What carries the arms is spine3, as it is in find_joints().
+Bones complete_joints(const BoneTree& tree, const Bones& listed,
+                      const std::array<bool, kJoints>& open);
+
 /// The lowest bone that carries both; -1: there is none.
 int carrier_of(const SourceSkeleton& skeleton, int a, int b);
 

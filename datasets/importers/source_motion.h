@@ -9,6 +9,7 @@
 
 #include "autograd/base/error.h"
 #include "datasets/importers/profiles.h"
+#include "datasets/importers/report.h"
 #include "datasets/readers/skeleton_file.h"
 #include "nn/geometry/body.h"
 
@@ -80,6 +81,16 @@ using Poses = std::deque<PosedSkeleton>;
 /// turned further, by the shortest arc, until `rest` puts the upper one where it is in the source.
 /// Changes nothing where no bone is left out.
 void follow_trunk(PosedSkeleton& pose, const Joints& rest);
+
+/// How far hips and spine1 are from where `rest` puts them on the pelvis: no bone of the file need
+/// hold them there. The largest over the frames so far, and of which joint.
+struct Apart {
+  double distance = 0;  ///< metres
+  int joint = 0;
+  void add(const PosedSkeleton& pose, const Joints& rest);
+};
+/// A remark for what is seen; InputError for a body that falls apart.
+void check_apart(const Apart& apart, ImportReport& report);
 
 /// 5th percentile over frames of the lowest ankle or foot: the height of the clip's floor.
 double floor_height(const Poses& poses);
