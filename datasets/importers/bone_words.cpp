@@ -195,6 +195,10 @@ std::string last_part(const std::string& name) {
   return out;
 }
 
+size_t different(const std::vector<std::string>& names) {
+  return std::set<std::string>(names.begin(), names.end()).size();
+}
+
 /// Takes off what many of the names begin (`front`) or end with; whether there was such a part.
 bool drop_shared(std::vector<std::string>& names, bool front) {
   std::map<std::string, size_t> count;
@@ -213,9 +217,6 @@ bool drop_shared(std::vector<std::string>& names, bool front) {
       if (!front && name.ends_with(part)) name.resize(name.size() - part.size());
     }
     if (has_meaning(part)) {  // "hand" and "hand_ctrl" are two bones
-      const auto different = [](const std::vector<std::string>& of) {
-        return std::set<std::string>(of.begin(), of.end()).size();
-      };
       if (10 * n < 9 * all || different(out) < different(names)) continue;
     }
     names = std::move(out);
@@ -231,14 +232,18 @@ size_t number_at(const std::string& name) {
   return name[last] == '_' || name[last] == '.' || name[last] == '-' ? last : name.size();
 }
 
+/// Takes off the numbers that most names end with, unless they tell bones apart ("arm_0", "arm_1").
 bool drop_numbers(std::vector<std::string>& names) {
   size_t numbered = 0, all = 0;
-  for (const std::string& name : names) {
+  std::vector<std::string> out = names;
+  for (std::string& name : out) {
     all += !name.empty();
     numbered += number_at(name) < name.size();
+    name.resize(number_at(name));
   }
-  if (numbered < 3 || 4 * numbered < 3 * all) return false;
-  for (std::string& name : names) name.resize(number_at(name));
+  if (numbered < 3 || 4 * numbered < 3 * all || 10 * different(out) < 9 * different(names))
+    return false;
+  names = std::move(out);
   return true;
 }
 

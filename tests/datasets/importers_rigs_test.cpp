@@ -8,6 +8,7 @@
 #include "datasets/importers/find_joints.h"
 #include "datasets/importers/source_motion.h"
 #include "tests/datasets/rig_lists_games.h"
+#include "tests/datasets/rig_lists_more.h"
 #include "tests/datasets/rig_lists_studios.h"
 #include "tests/support/errors.h"
 
@@ -20,7 +21,8 @@ using test::RigList;
 
 std::vector<RigList> rig_lists() {
   std::vector<RigList> out = test::rigs_of_games();
-  out.insert(out.end(), test::rigs_of_studios().begin(), test::rigs_of_studios().end());
+  for (const auto* more : {&test::rigs_of_studios(), &test::rigs_of_others()})
+    out.insert(out.end(), more->begin(), more->end());
   return out;
 }
 BuiltRig rig(const std::string& name) {
@@ -101,6 +103,11 @@ const std::vector<Decoration>& decorations() {
       {"an armature's path", before("Armature|")},
       {".001", after(".001")},
       {"_jnt", after("_jnt")},
+      {"_ctrl", after("_ctrl")},
+      {"_end", after("_end")},
+      {"_R, whichever side", after("_R")},
+      {"CTRL_", before("CTRL_")},
+      {"_bind.001", after("_bind.001")},
       {"numbers as Sketchfab's, without one at the root",
        [](SourceSkeleton& s) {
          for (size_t b = 0; b < s.size(); ++b) s.names[b] += "_0" + std::to_string(b + 1);
@@ -213,75 +220,41 @@ TEST(ImportersRigs, NobodyIsGuessed) {
 
 TEST(ImportersRigs, WhatOnlyLooksLikeAPersonIsRefused) {
   const BuiltRig horse = rig_of("L", "R", R"(
-Root
-  Hips
-    Spine
-      Chest
-        Neck
-          Head
-        Front_UpperLeg_@
-          Front_LowerLeg_@
-            Front_Foot_@
-    Back_UpperLeg_@
-      Back_LowerLeg_@
-        Back_Foot_@
-    Tail1
+Root Hips Spine Chest Neck Head
+Hips Back_UpperLeg_@ Back_LowerLeg_@ Back_Foot_@
+Hips Tail1
+Chest Front_UpperLeg_@ Front_LowerLeg_@ Front_Foot_@
 )");
   EXPECT_HAS(refusal(horse), "left_shoulder");
   const BuiltRig arm_of_two = rig_of("Left", "Right", R"(
-Hips
-  Spine
-    Chest
-      Neck
-        Head
-      @Shoulder
-        @Arm
-          @Hand
-  @UpLeg
-    @Leg
-      @Foot
+Hips Spine Chest Neck Head
+Hips @UpLeg @Leg @Foot
+Chest @Shoulder @Arm @Hand
 )");
   EXPECT_HAS(refusal(arm_of_two), "left_elbow");  // no shoulder is made an upper arm
   const BuiltRig legs_by_number = rig_of("L", "R", R"(
-Hips
-  Spine
-    Head
-    UpperArm_@
-      Forearm_@
-        Hand_@
-  Leg_@_01
-    Leg_@_02
-      Leg_@_03
+Hips Spine Head
+Hips Leg_@_01 Leg_@_02 Leg_@_03
+Spine UpperArm_@ Forearm_@ Hand_@
 )");
   EXPECT_HAS(refusal(legs_by_number), "left_knee");
   const BuiltRig four_arms = rig_of("L", "R", R"(
-Hips
-  Spine
-    Chest
-      Head
-      A_UpperArm_@
-        A_Forearm_@
-          A_Hand_@
-      B_UpperArm_@
-        B_Forearm_@
-          B_Hand_@
-  Thigh_@
-    Shin_@
-      Foot_@
+Hips Spine Chest Head
+Hips Thigh_@ Shin_@ Foot_@
+Chest A_UpperArm_@ A_Forearm_@ A_Hand_@
+Chest B_UpperArm_@ B_Forearm_@ B_Hand_@
 )");
   EXPECT_HAS(refusal(four_arms), "two of its limbs may be the left arm");
   const BuiltRig apart = rig_of("L", "R", R"(
-Root
-  Hips
-  Spine
-    Chest
-  Head
-  UpperArm_@
-  Forearm_@
-  Hand_@
-  Thigh_@
-  Shin_@
-  Foot_@
+Root Hips
+Root Spine Chest
+Root Head
+Root UpperArm_@
+Root Forearm_@
+Root Hand_@
+Root Thigh_@
+Root Shin_@
+Root Foot_@
 )");
   EXPECT_HAS(refusal(apart), "do not hang on each other");
   BuiltRig giant_shin = rig("bandai namco");
