@@ -195,7 +195,7 @@ std::string last_part(const std::string& name) {
   return out;
 }
 
-size_t different(const std::vector<std::string>& names) {
+size_t count_different(const std::vector<std::string>& names) {
   return std::set<std::string>(names.begin(), names.end()).size();
 }
 
@@ -217,7 +217,7 @@ bool drop_shared(std::vector<std::string>& names, bool front) {
       if (!front && name.ends_with(part)) name.resize(name.size() - part.size());
     }
     if (has_meaning(part)) {  // "hand" and "hand_ctrl" are two bones
-      if (10 * n < 9 * all || different(out) < different(names)) continue;
+      if (10 * n < 9 * all || count_different(out) < count_different(names)) continue;
     }
     names = std::move(out);
     return true;
@@ -241,7 +241,8 @@ bool drop_numbers(std::vector<std::string>& names) {
     numbered += number_at(name) < name.size();
     name.resize(number_at(name));
   }
-  if (numbered < 3 || 4 * numbered < 3 * all || 10 * different(out) < 9 * different(names))
+  if (numbered < 3 || 4 * numbered < 3 * all ||
+      10 * count_different(out) < 9 * count_different(names))
     return false;
   names = std::move(out);
   return true;

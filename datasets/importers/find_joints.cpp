@@ -126,22 +126,30 @@ class Finder {
   }
 
   /// Of a limb whose bones are only counted ("arm1", "arm2") the second; of more than two the one
-  /// where it bends in the zero pose. -1: nothing says which.
+  /// where it bends in the zero pose. -1: nothing says which, or one part is far longer than the
+  /// other (then the first is a collar).
   int counted(const std::vector<int>& path, int end, BonePart either) const {
     std::vector<int> all;
     for (const int b : path)
       if (words_[b].part == either) all.push_back(b);
     for (size_t i = 1; i < all.size(); ++i)
       if (words_[all[i]].last_number <= words_[all[i - 1]].last_number) return -1;
-    if (all.size() == 2) return all[1];
+    const int out = all.size() == 2 ? all[1] : bend_of(all, end);
+    if (out < 0) return -1;
+    const double upper = between(all[0], out).norm(), lower = between(out, end).norm();
+    return std::max(upper, lower) < 2 * std::min(upper, lower) ? out : -1;
+  }
+
+  /// The only bone of a row at which it bends; -1: none, several, or not clearly.
+  int bend_of(const std::vector<int>& row, int end) const {
     constexpr double kBent = 0.05, kStraight = 0.01;  // sines
     int out = -1;
-    for (size_t i = 1; i < all.size(); ++i) {
-      const Vec3 to = between(all[i], i + 1 < all.size() ? all[i + 1] : end);
-      const Vec3 from = between(all[i - 1], all[i]);
+    for (size_t i = 1; i < row.size(); ++i) {
+      const Vec3 from = between(row[i - 1], row[i]);
+      const Vec3 to = between(row[i], i + 1 < row.size() ? row[i + 1] : end);
       const double bend = from.cross(to).norm() / std::max(from.norm() * to.norm(), 1e-12);
       if (bend > kStraight && (bend < kBent || out >= 0)) return -1;
-      if (bend > kBent) out = all[i];
+      if (bend > kBent) out = row[i];
     }
     return out;
   }
@@ -299,7 +307,7 @@ class Finder {
       const BoneWords& words = words_[b];
       if (words.side != BoneWords::middle || words.helper || !hangs_on(skeleton_, b, chest))
         continue;
-      if (words.part == BonePart::none && words.cost > 0) return -1;  // it may be the head
+      if (words.part == BonePart::none) return -1;  // it may be the head
       if (words.part != BonePart::spine) continue;
       if (!hangs_on(skeleton_, b, last)) return -1;
       last = b;

@@ -399,15 +399,15 @@ NamedJoints name_joints(const SourceSkeleton& skeleton, const std::string& where
   const std::vector<std::string> plain = undecorated(skeleton.names);
   const BoneNames names(skeleton, plain, profile != nullptr);
   const auto by_name = [&](const std::string& name) { return names.find(name); };
+  const BoneTree tree = tree_of(skeleton, plain);
   if (profile) {
-    const BoneTree tree = tree_of(skeleton, plain);
     const Bones bones = asked_bones(*profile, skeleton, names, where);
     return place_joints(tree, by_name, *profile, completed(tree, *profile, bones), where);
   }
+  only_person(tree, where);  // refuses two
+  if (const Family family = find_family(tree, names); family.profile)
+    return place_joints(tree, by_name, *family.profile, family.bones, where);
   const Reading reading = best_reading(skeleton, plain, where);
-  const Family family = find_family(reading.tree, names);
-  if (family.profile)
-    return place_joints(reading.tree, by_name, *family.profile, family.bones, where);
   if (!reading.found.missing.empty()) {
     check_encoding(skeleton, where);
     throw_not_found(reading.tree, reading.found, plain, where);

@@ -86,8 +86,8 @@ class Reader {
       const std::string key = text(entry.first);
       if (std::find(known.begin(), known.end(), key) == known.end()) {
         if (known.front() == "title" && joint_index(key) < kJoints)
-          fail(entry.first, "'" + key + "' stands beside 'joints'",
-               "put the joints under a line 'joints:', indented by two blanks");
+          fail(entry.first, "'" + key + "' is a joint and belongs under 'joints:'",
+               "write 'joints:' above the joints and indent them by two blanks");
         const std::string close = nearest(key, known);
         fail(entry.first, "'" + key.substr(0, 60) + "' is not known here",
              close.empty() ? "use one of " + joined(known) : "did you mean '" + close + "'?");

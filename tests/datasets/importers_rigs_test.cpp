@@ -238,6 +238,18 @@ Hips Leg_@_01 Leg_@_02 Leg_@_03
 Spine UpperArm_@ Forearm_@ Hand_@
 )");
   EXPECT_HAS(refusal(legs_by_number), "left_knee");
+  const BuiltRig arm_of_three = rig_of("L", "R", R"(
+Hips Spine Chest Head
+Hips t:Thigh_@ k:Shin_@ a:Foot_@
+Chest c:Arm1_@ s:Arm2_@ e:Arm3_@ w:Hand_@
+)");
+  EXPECT_HAS(refusal(arm_of_three), "left_elbow");  // a collar is no upper arm
+  const BuiltRig no_head = rig_of("L", "R", R"(
+Hips Spine Spine1 Spine2 Spine3 Thing
+Hips Thigh_@ Shin_@ Foot_@
+Spine1 UpperArm_@ Forearm_@ Hand_@
+)");
+  EXPECT_HAS(refusal(no_head), "head");
   const BuiltRig four_arms = rig_of("L", "R", R"(
 Hips Spine Chest Head
 Hips Thigh_@ Shin_@ Foot_@
@@ -390,6 +402,11 @@ TEST(ImportersRigs, WordsOfNames) {
   is("arm_lower_R", forearm, right);
   is("RThigh_012", thigh, right);
   is("lfemur", thigh, left);
+  is("lLeg", leg, left);
+  is("l_lleg", shin, left);
+  is("RLArm", forearm, right);
+  is("r_uleg", thigh, right);
+  is("arm_L0_end", arm, left, true);
   is("Bip01 L Toe0", toe, left);
   is("左足首", ankle, left);
   is("上半身2", spine, middle);
@@ -402,6 +419,11 @@ TEST(ImportersRigs, WordsOfNames) {
   is("Alarm", none, middle);
   is("LeftRightHand", hand, right, true);  // both sides: neither
   EXPECT_LT(bone_words("hand_l").cost, bone_words("hand_weapon_l").cost + 1);
+  EXPECT_EQ(bone_words("arm_L0_1").last_number, 1);
+  EXPECT_EQ(bone_words("main_G", 0).part, none);
+  EXPECT_EQ(bone_words("main_G", 2).part, hand);  // French
+  EXPECT_EQ(bone_words("Schlüsselbein_L", 1).part, collar);
+  EXPECT_EQ(bone_words("ПЛЕЧО", 9).part, shoulder);
   EXPECT_LT(bone_words("hand_l").cost, bone_words("hand_xyz_l").cost);
   EXPECT_EQ(other_side("LeftUpLeg"), "rightupleg");
   EXPECT_EQ(other_side("thigh.R.001"), "thigh.l.001");
