@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include "autograd/base/format.h"
-#include "datasets/importers/find_joints.h"
+#include "datasets/importers/bone_tree.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/text.h"
 #include "datasets/readers/word_lines.h"
