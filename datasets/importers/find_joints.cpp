@@ -10,8 +10,6 @@
 namespace restage {
 namespace {
 
-enum : int { kPelvis = 0, kSpine1 = 3, kSpine2 = 6, kSpine3 = 9, kNeck = 12, kHead = 15 };
-
 using BoneParts = std::initializer_list<BonePart>;
 
 bool is(const BoneWords& words, BoneParts parts) {
@@ -154,6 +152,13 @@ class Finder {
     return out;
   }
 
+  /// Where a counted limb ends: "arm_end" above the hand, else `end` itself.
+  int tip_above(int end, BonePart either) const {
+    for (int b = end; b >= 0; b = parent(b))
+      if (words_[b].end && words_[b].part == either) return b;
+    return end;
+  }
+
   /// The limb that ends in `end`: a bone of this side that is called hand or foot, or what lies at
   /// the end of a limb whose bones are only counted ("arm_end").
   FoundLimb limb_to(int end, int side, const LimbWords& limb) const {
@@ -164,12 +169,11 @@ class Finder {
       if (const int strong = plainest(path, limb.upper); strong >= 0)
         out.lower = plainest(below(path, strong), limb.either);
     const bool by_number = out.lower < 0;
-    if (by_number) out.lower = counted(path, end, limb.either);
+    const int tip = tip_above(end, limb.either);
+    if (by_number) out.lower = counted(path, tip, limb.either);
     if (out.lower < 0) return out.lacks = 2, out;
     out.end = plainest(below(path, out.lower), limb.ends[0], limb.ends[1]);
-    if (by_number)
-      for (int b = end; b != out.lower; b = parent(b))
-        if (words_[b].end && words_[b].part == limb.either) out.end = b;
+    if (by_number && words_[tip].end) out.end = tip;
     if (out.end < 0) return out.lacks = 3, out;
     const std::vector<int> rest = above(path, out.lower);
     out.upper = plainest(rest, limb.upper, limb.either);

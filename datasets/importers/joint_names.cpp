@@ -16,8 +16,6 @@
 namespace restage {
 namespace {
 
-enum : int { kSpine1 = 3, kSpine2 = 6, kSpine3 = 9 };
-
 /// Those that cannot be placed.
 constexpr int kRequired[] = {0, 1, 2, 4, 5, 7, 8, 15, 16, 17, 18, 19, 20, 21};
 

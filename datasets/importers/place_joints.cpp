@@ -10,8 +10,6 @@
 namespace restage {
 namespace {
 
-enum : int { kSpine1 = 3, kSpine2 = 6, kSpine3 = 9, kNeck = 12, kHead = 15 };
-
 /// Places joints that the source lacks, in the frame of one that it has.
 class Placer {
  public:

@@ -275,6 +275,28 @@ Root Foot_@
   EXPECT_HAS(refusal(giant_shin), "lengths");
 }
 
+TEST(ImportersRigs, OfManyCountedBonesTheOneThatBendsIsTheElbow) {
+  for (const bool bent : {true, false}) {
+    BuiltRig rig = rig_of("L", "R", R"(
+p:spine_C0_0 1:spine_C0_1 3:spine_C0_2 n:neck_C0_0 h:neck_C0_head
+spine_C0_0 t:leg_@0_0 leg_@0_1 k:leg_@0_2 leg_@0_3 a:leg_@0_end f:foot_@0_0
+spine_C0_2 c:shoulder_@0_0 s:arm_@0_0 arm_@0_1 e:arm_@0_2 arm_@0_3 w:arm_@0_end
+)");
+    SourceSkeleton& s = rig.skeleton;
+    for (size_t b = 0; b + 1 < s.size(); ++b) {
+      if (!s.names[b].ends_with("0_1") && !s.names[b].ends_with("0_3")) continue;
+      if (s.names[b].starts_with("spine")) continue;
+      Vec3 whole = s.offsets[b] + s.offsets[b + 1];  // what it halves
+      if (bent && s.names[b].starts_with("arm") && s.names[b].ends_with("3")) whole.z() += 0.05;
+      s.offsets[b] = s.offsets[b + 1] = 0.5 * whole;
+    }
+    if (bent)
+      expect_right(rig, "mgear with divided limbs");
+    else
+      EXPECT_HAS(refusal(rig), "left_elbow");
+  }
+}
+
 TEST(ImportersRigs, TwoPeopleInOneFileAreRefused) {
   for (const char* name : {"mixamo", "vroid", "character creator 4"}) {
     const BuiltRig one = rig(name);
