@@ -84,6 +84,11 @@ Motion motion_of(const Gltf& file, const GltfRig& rig, const GltfClip& clip, int
                  ImportReport& report) {
   Motion motion;
   Apart apart;
+  for (const int j : {1, 2, 3}) {
+    int above = rig.node[j];
+    while (above >= 0 && above != rig.node[0]) above = file.nodes[above].parent;
+    if (above < 0) apart.loose.push_back(j);
+  }
   motion.rest = t_pose_joints(rig);
   const Vec3 pelvis = motion.rest[0];
   for (Vec3& x : motion.rest) x -= pelvis;

@@ -120,6 +120,8 @@ Poses poses_at_30_fps(SourceMotion motion, const JointMap& map, const RestPose& 
   motion = resample(motion);
   Poses poses(motion.local.size());
   Apart apart;
+  for (const int j : {1, 2, 3})
+    if (!hangs_on(motion.skeleton, map[j].joint, map[0].joint)) apart.loose.push_back(j);
   for (size_t f = 0; f < poses.size(); ++f) {
     poses[f] = source_pose(motion, map, f);
     for (size_t j = 0; j < kJoints; ++j) {

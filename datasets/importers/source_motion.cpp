@@ -104,7 +104,7 @@ void follow_trunk(PosedSkeleton& pose, const Joints& rest) {
 }
 
 void Apart::add(const PosedSkeleton& pose, const Joints& rest) {
-  for (const int j : {1, 2, 3}) {
+  for (const int j : loose) {
     const Vec3 held = pose.joints[0] + pose.global[0] * (rest[j] - rest[0]);
     if (const double off = (pose.joints[j] - held).norm(); off > distance) {
       distance = off;

@@ -82,10 +82,11 @@ using Poses = std::deque<PosedSkeleton>;
 /// Changes nothing where no bone is left out.
 void follow_trunk(PosedSkeleton& pose, const Joints& rest);
 
-/// How far hips and spine1 are from where `rest` puts them on the pelvis: no bone of the file need
-/// hold them there. The largest over the frames so far, and of which joint.
+/// How far hips and spine1 that do not hang on the pelvis are from where `rest` puts them on it:
+/// the largest over the frames so far, and of which joint.
 struct Apart {
-  double distance = 0;  ///< metres
+  std::vector<int> loose;  ///< those of the joints 1, 2 and 3 that hang elsewhere
+  double distance = 0;     ///< metres
   int joint = 0;
   void add(const PosedSkeleton& pose, const Joints& rest);
 };
