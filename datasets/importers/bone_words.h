@@ -37,19 +37,24 @@ struct BoneWords {
   Side side = middle;
   BonePart part = BonePart::none;  ///< the last word that names a part: "foot_toe" is a toe
   bool helper = false;             ///< twist, IK, control, end, finger, face, cloth, weapon ...
+  bool end = false;                ///< a helper at the end of a bone: "LeftArm_end"
   int number = -1;                 ///< the digits after the part; -1: none
+  int last_number = -1;            ///< the last digits of the name; -1: none
   /// How far the name is from a plain one: unknown words, further parts, a number.
   int cost = 0;
 };
 
-BoneWords bone_words(std::string_view name);
+/// By the words of one of bone_dictionaries(). Accents count for nothing.
+BoneWords bone_words(std::string_view name, size_t language = 0);
 
 /// The name of the same bone on the other side, in lower case; "" of a name without a side.
 std::string other_side(std::string_view name);
 
 /// Names without what they are decorated with: what stands before a ':' or '|', beginnings and
 /// endings that three quarters of them share ("Skeleton_001_", "_jnt"), and numbers that three
-/// quarters of them end with (".001", "_017"). What is nothing but decoration stays.
+/// quarters of them end with (".001", "_017"). A word that may tell bones apart (a side, "ctrl",
+/// "end") is decoration only if nine tenths share it and no two bones would then have one name.
+/// What is nothing but decoration stays.
 std::vector<std::string> undecorated(const std::vector<std::string>& names);
 
 }  // namespace restage

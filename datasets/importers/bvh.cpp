@@ -66,23 +66,38 @@ void mark_upwards(const SourceSkeleton& skeleton, int joint, std::vector<uint8_t
   for (; joint >= 0; joint = skeleton.parents[joint]) marks[joint] = 1;
 }
 
-/// Joints of use that are told where they are in every frame, but for those down to the hips, which
-/// move.
-std::vector<size_t> told_joints(const BvhFile& file, const JointMap& map) {
+bool has_positions(const BvhFile& file, size_t joint) {
+  return !std::all_of(file.channels[joint].begin(), file.channels[joint].end(), is_rotation);
+}
+
+/// Joints of use that are told where they are in every frame, but for those down to the hips.
+struct ToldJoints {
+  std::vector<int> beside;    ///< that move with the body, but do not hang on the hips: a spine
+  std::vector<size_t> fixed;  ///< others: where they are told to be is the length of a bone
+};
+
+ToldJoints told_joints(const BvhFile& file, const JointMap& map) {
+  const std::vector<int>& parents = file.skeleton.parents;
+  const int hips = map[0].joint;
   std::vector<uint8_t> moves(file.skeleton.size(), 0), used = moves;
-  mark_upwards(file.skeleton, map[0].joint, moves);
+  mark_upwards(file.skeleton, hips, moves);
   for (const SourceJoint& joint : map) mark_upwards(file.skeleton, joint.joint, used);
-  std::vector<size_t> out;
-  for (size_t j = 0; j < moves.size(); ++j)
-    if (used[j] && !moves[j] &&
-        !std::all_of(file.channels[j].begin(), file.channels[j].end(), is_rotation))
-      out.push_back(j);
+  ToldJoints out;
+  for (size_t j = 0; j < moves.size(); ++j) {
+    if (!used[j] || moves[j] || !has_positions(file, j)) continue;
+    int above = parents[j];
+    while (!moves[above] && !has_positions(file, static_cast<size_t>(above)))
+      above = parents[above];
+    if (moves[above] && above != hips)
+      out.beside.push_back(static_cast<int>(j));
+    else
+      out.fixed.push_back(j);
+  }
   return out;
 }
 
 /// Bones have one length here, so joints rest where the channels put them on average.
-BonePositions use_positions(BvhFile& file, const JointMap& map) {
-  const std::vector<size_t> told = told_joints(file, map);
+BonePositions use_positions(BvhFile& file, const std::vector<size_t>& told) {
   double said = 0, drawn = 0;
   for (const size_t j : told) {
     said += place_of(file, j, Vec3::Zero()).mean.norm();
@@ -105,13 +120,30 @@ BonePositions use_positions(BvhFile& file, const JointMap& map) {
   return found;
 }
 
+/// Joints beside the hips rest where they are on average, seen from the hips.
+void rest_beside(SourceMotion& motion, int hips, const std::vector<int>& beside) {
+  for (const int joint : beside) {
+    JointMap map;
+    map.fill({hips, Vec3::Zero()});
+    map[1].joint = joint;
+    Vec3 mean = Vec3::Zero();
+    for (size_t f = 0; f < motion.local.size(); ++f) {
+      const PosedSkeleton pose = source_pose(motion, map, f);
+      mean += pose.global[0].transpose() * (pose.joints[1] - pose.joints[0]);
+    }
+    mean /= static_cast<double>(std::max<size_t>(motion.local.size(), 1));
+    const std::vector<Vec3> zero = zero_positions(motion.skeleton);
+    motion.skeleton.offsets[joint] = zero[hips] + mean - zero[motion.skeleton.parents[joint]];
+  }
+}
+
 }  // namespace
 
-SourceMotion bvh_motion(BvhFile file, int hips) {
+SourceMotion bvh_motion(BvhFile file, const std::vector<int>& moving) {
   SourceMotion out;
   out.fps = frame_rate(file).fps;
   std::vector<uint8_t> moves(file.skeleton.size(), 0);
-  mark_upwards(file.skeleton, hips, moves);
+  for (const int joint : moving) mark_upwards(file.skeleton, joint, moves);
   for (size_t j = 0; j < moves.size(); ++j)
     if (moves[j]) out.moving.push_back(static_cast<int>(j));
   out.local.reserve(file.frames.size());
@@ -149,12 +181,16 @@ MotionClip convert_bvh(std::string_view text, const std::string& path,
   recording.bytes = text.size();
   const double fps = options.fps > 0 ? options.fps : frame_rate(file).fps;
   check_length(file.frames.size(), file.skeleton.size(), fps, text.size(), path);
-  recording.positions = use_positions(file, recording.names.map);
-  if (recording.positions.joints > 0)  // joints that the file lacks are placed between those it has
-    recording.names = name_joints(file.skeleton, path, profile ? &*profile : nullptr);
+  const ToldJoints told = told_joints(file, recording.names.map);
+  recording.positions = use_positions(file, told.fixed);
   const int hips = recording.names.map[0].joint;
+  std::vector<int> moving = told.beside;
+  moving.push_back(hips);
   const size_t frames = file.frames.size(), left_out = file.lines_left_out;
-  recording.motion = bvh_motion(std::move(file), hips);
+  recording.motion = bvh_motion(std::move(file), moving);
+  rest_beside(recording.motion, hips, told.beside);
+  if (!told.fixed.empty() || !told.beside.empty())  // joints that the file lacks go between others
+    recording.names = name_joints(recording.motion.skeleton, path, profile ? &*profile : nullptr);
   MotionClip clip = make_clip(std::move(recording), path, options);
   if (left_out > 0)
     clip.report.remarks.push_back(

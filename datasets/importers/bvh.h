@@ -3,6 +3,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "datasets/importers/motion_clip.h"
 #include "datasets/readers/bvh.h"
@@ -16,8 +17,9 @@ MotionClip read_bvh(const std::string& path, const MotionOptions& options = {});
 MotionClip convert_bvh(std::string_view text, const std::string& path,
                        const MotionOptions& options = {});
 
-/// Rotations of all joints, translations of those from the root down to `hips`, in the file's
-/// units. Takes the file's frames as it goes, so that they are in memory only once.
-SourceMotion bvh_motion(BvhFile file, int hips);
+/// Rotations of all joints, translations of those from the root down to each of `moving` (the hips,
+/// and what moves beside them), in the file's units. Takes the file's frames as it goes, so that
+/// they are in memory only once.
+SourceMotion bvh_motion(BvhFile file, const std::vector<int>& moving);
 
 }  // namespace restage

@@ -43,7 +43,7 @@ struct PackedRecording {
 
 PackedRecording read_recording(const std::string& file, const std::string& skeleton) {
   const std::string text = read_packed_text(file);
-  if (skeleton.empty()) return {bvh_motion(parse_bvh(text, file), 0), kDazMetres};
+  if (skeleton.empty()) return {bvh_motion(parse_bvh(text, file), {0}), kDazMetres};
   const AsfFile asf = parse_asf(read_packed_text(skeleton), skeleton);
   if (!(asf.length_unit > 0))
     throw InputError(skeleton, "does not say its unit of length", "fetch it again");

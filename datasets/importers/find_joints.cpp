@@ -16,6 +16,25 @@ bool is(const BoneWords& words, BoneParts parts) {
   return std::find(parts.begin(), parts.end(), words.part) != parts.end();
 }
 
+/// What the bones of a limb are called, and which joints they are: from the trunk outwards.
+struct LimbWords {
+  const char* name;
+  std::array<int, 3> joints;  ///< of the left side
+  BonePart upper, lower, either;
+  std::array<BonePart, 2> ends;  ///< the surer first
+  BonePart root;                 ///< the upper bone where nothing else is
+};
+constexpr LimbWords kArm = {"arm",
+                            {16, 18, 20},
+                            BonePart::upper_arm,
+                            BonePart::forearm,
+                            BonePart::arm,
+                            {BonePart::hand, BonePart::palm},
+                            BonePart::shoulder};
+constexpr LimbWords kLeg = {"leg",          {1, 4, 7},     BonePart::thigh,
+                            BonePart::shin, BonePart::leg, {BonePart::ankle, BonePart::foot},
+                            BonePart::hip};
+
 /// The bones of a limb, from the trunk outwards.
 struct FoundLimb {
   int root = -1;  ///< collar; -1: none
@@ -33,13 +52,27 @@ class Finder {
   FoundJoints find() {
     out_.bones.fill(-1);
     for (const int side : {0, 1}) {
-      take_leg(side);
-      take_arm(side);
+      if (const FoundLimb leg = take_limb(side, kLeg); leg.lacks == 0)
+        out_.bones[10 + side] = toe_of(leg.end, side);
+      if (const FoundLimb arm = take_limb(side, kArm); arm.lacks == 0)
+        out_.bones[13 + side] = arm.root;
     }
     find_head();
     if (out_.missing.empty()) find_trunk();
     std::sort(out_.missing.begin(), out_.missing.end());
     return out_;
+  }
+
+  Bones complete(const Bones& listed, const std::array<bool, kJoints>& open) {
+    out_.bones = listed;
+    const int chest = chest_of(tree_, listed), pelvis = listed[kPelvis];
+    if (chest == pelvis || !hangs_on(skeleton_, chest, pelvis)) return listed;
+    complete_spine(chest, open);
+    if (open[kNeck] && hangs_on(skeleton_, listed[kHead], chest)) find_neck(chest);
+    const int left = nameless_collar(0, chest), right = nameless_collar(1, chest);
+    if (open[13] && open[14] && left >= 0 && right >= 0)
+      out_.bones[13] = left, out_.bones[14] = right;
+    return out_.bones;
   }
 
  private:
@@ -57,12 +90,16 @@ class Finder {
     if (out_.why.empty()) out_.why = why;
   }
 
-  /// The plainest of these bones of a path, the highest of equals; -1 of none.
-  int plainest(const std::vector<int>& path, BoneParts parts) const {
+  /// The plainest bone of a path that is called so, the highest of equals; -1: there is none.
+  int plainest(const std::vector<int>& path, BonePart part) const {
     int best = -1;
     for (const int b : path)
-      if (is(words_[b], parts) && (best < 0 || words_[b].cost < words_[best].cost)) best = b;
+      if (words_[b].part == part && (best < 0 || words_[b].cost < words_[best].cost)) best = b;
     return best;
+  }
+  int plainest(const std::vector<int>& path, BonePart sure, BonePart otherwise) const {
+    const int out = plainest(path, sure);
+    return out >= 0 ? out : plainest(path, otherwise);
   }
   static std::vector<int> below(const std::vector<int>& path, int bone) {
     return {std::find(path.begin(), path.end(), bone) + 1, path.end()};
@@ -86,57 +123,84 @@ class Finder {
     return limb;
   }
 
-  FoundLimb arm_to(int end, int side) const {
+  /// Of a limb whose bones are only counted ("arm1", "arm2") the second; of more than two the one
+  /// where it bends in the zero pose. -1: nothing says which, or one part is far longer than the
+  /// other (then the first is a collar).
+  int counted(const std::vector<int>& path, int end, BonePart either) const {
+    std::vector<int> all;
+    for (const int b : path)
+      if (words_[b].part == either) all.push_back(b);
+    for (size_t i = 1; i < all.size(); ++i)
+      if (words_[all[i]].last_number <= words_[all[i - 1]].last_number) return -1;
+    const int out = all.size() == 2 ? all[1] : bend_of(all, end);
+    if (out < 0) return -1;
+    const double upper = between(all[0], out).norm(), lower = between(out, end).norm();
+    return std::max(upper, lower) < 2 * std::min(upper, lower) ? out : -1;
+  }
+
+  /// The only bone of a row at which it bends; -1: none, several, or not clearly.
+  int bend_of(const std::vector<int>& row, int end) const {
+    constexpr double kBent = 0.05, kStraight = 0.01;  // sines
+    int out = -1;
+    for (size_t i = 1; i < row.size(); ++i) {
+      const Vec3 from = between(row[i - 1], row[i]);
+      const Vec3 to = between(row[i], i + 1 < row.size() ? row[i + 1] : end);
+      const double bend = from.cross(to).norm() / std::max(from.norm() * to.norm(), 1e-12);
+      if (bend > kStraight && (bend < kBent || out >= 0)) return -1;
+      if (bend > kBent) out = row[i];
+    }
+    return out;
+  }
+
+  /// Where a counted limb ends: "arm_end" above the hand, else `end` itself.
+  int tip_above(int end, BonePart either) const {
+    for (int b = end; b >= 0; b = parent(b))
+      if (words_[b].end && words_[b].part == either) return b;
+    return end;
+  }
+
+  /// The limb that ends in `end`: a bone of this side that is called hand or foot, or what lies at
+  /// the end of a limb whose bones are only counted ("arm_end").
+  FoundLimb limb_to(int end, int side, const LimbWords& limb) const {
     const std::vector<int> path = path_to(end, side);
     FoundLimb out;
-    out.lower = plainest(path, {BonePart::forearm});
+    out.lower = plainest(path, limb.lower);
     if (out.lower < 0)
-      if (const int strong = plainest(path, {BonePart::upper_arm}); strong >= 0)
-        out.lower = plainest(below(path, strong), {BonePart::arm});
+      if (const int strong = plainest(path, limb.upper); strong >= 0)
+        out.lower = plainest(below(path, strong), limb.either);
+    const bool by_number = out.lower < 0;
+    const int tip = tip_above(end, limb.either);
+    if (by_number) out.lower = counted(path, tip, limb.either);
     if (out.lower < 0) return out.lacks = 2, out;
-    out.end = plainest(below(path, out.lower), {BonePart::hand});
-    if (out.end < 0) out.end = plainest(below(path, out.lower), {BonePart::palm});
+    out.end = plainest(below(path, out.lower), limb.ends[0], limb.ends[1]);
+    if (by_number && words_[tip].end) out.end = tip;
     if (out.end < 0) return out.lacks = 3, out;
     const std::vector<int> rest = above(path, out.lower);
-    out.upper = plainest(rest, {BonePart::upper_arm});
-    if (out.upper < 0) out.upper = plainest(rest, {BonePart::arm});
-    if (out.upper < 0)  // a shoulder, the lowest, is the upper arm where nothing else is
+    out.upper = plainest(rest, limb.upper, limb.either);
+    if (out.upper < 0) out.upper = plainest(rest, BonePart::hip);
+    if (out.upper < 0)  // of shoulders the lowest
       for (const int b : rest)
-        if (is(words_[b], {BonePart::shoulder})) out.upper = b;
+        if (words_[b].part == BonePart::shoulder) out.upper = b;
     if (out.upper < 0) return out.lacks = 1, out;
-    out.root = plainest(above(path, out.upper), {BonePart::collar});
-    if (out.root < 0) out.root = plainest(above(path, out.upper), {BonePart::shoulder});
+    out.root = plainest(above(path, out.upper), BonePart::collar, BonePart::shoulder);
     return weighed(out);
   }
 
-  FoundLimb leg_to(int end, int side) const {
-    const std::vector<int> path = path_to(end, side);
-    FoundLimb out;
-    out.lower = plainest(path, {BonePart::shin});
-    if (out.lower < 0)
-      if (const int strong = plainest(path, {BonePart::thigh}); strong >= 0)
-        out.lower = plainest(below(path, strong), {BonePart::leg});
-    if (out.lower < 0) return out.lacks = 2, out;
-    out.end = plainest(below(path, out.lower), {BonePart::ankle});
-    if (out.end < 0) out.end = plainest(below(path, out.lower), {BonePart::foot});
-    if (out.end < 0) return out.lacks = 3, out;
-    const std::vector<int> rest = above(path, out.lower);
-    for (const BonePart part : {BonePart::thigh, BonePart::leg, BonePart::hip})
-      if (out.upper < 0) out.upper = plainest(rest, {part});
-    if (out.upper < 0) return out.lacks = 1, out;
-    return weighed(out);
+  bool may_end(int b, int side, const LimbWords& limb) const {
+    if (words_[b].side != side || !inside(b)) return false;
+    return words_[b].helper ? words_[b].end && words_[b].part == limb.either
+                            : is(words_[b], {limb.ends[0], limb.ends[1]});
   }
 
-  /// The plainest limb of those that end in one of these parts. Of a limb that is nowhere whole the
-  /// part that is missing where most of it is; 3 if nothing is there.
-  template <class To>
-  FoundLimb best_limb(int side, BoneParts ends, const To& to, bool& ambiguous) const {
+  /// The plainest limb. Of one that is nowhere whole the part that is missing where most of it is;
+  /// 3 if nothing is there.
+  FoundLimb best_limb(int side, const LimbWords& words, bool& ambiguous) const {
     std::optional<FoundLimb> best;
     FoundLimb broken;
     broken.lacks = 3;
     for (int b = 0; b < size(); ++b) {
-      if (!may_be(b, side) || !is(words_[b], ends) || !inside(b)) continue;
-      const FoundLimb limb = to(b, side);
+      if (!may_end(b, side, words)) continue;
+      const FoundLimb limb = limb_to(b, side, words);
       if (limb.lacks != 0) {
         broken.lacks = std::min(broken.lacks, limb.lacks);
         continue;
@@ -151,31 +215,16 @@ class Finder {
     return best.value_or(broken);
   }
 
-  void take_arm(int side) {
+  FoundLimb take_limb(int side, const LimbWords& words) {
     bool ambiguous = false;
-    const FoundLimb arm = best_limb(
-        side, {BonePart::hand, BonePart::palm}, [&](int b, int s) { return arm_to(b, s); },
-        ambiguous);
-    const bool called = has(side, {BonePart::upper_arm});
-    take(arm, ambiguous, side == 0 ? "left arm" : "right arm",
-         {Segment{16 + side, called || has(side, {BonePart::arm, BonePart::shoulder})},
-          Segment{18 + side,
-                  has(side, {BonePart::forearm}) || (called && has(side, {BonePart::arm}))},
-          Segment{20 + side, has(side, {BonePart::hand, BonePart::palm})}});
-    if (arm.lacks == 0) out_.bones[13 + side] = arm.root;
-  }
-
-  void take_leg(int side) {
-    bool ambiguous = false;
-    const FoundLimb leg = best_limb(
-        side, {BonePart::ankle, BonePart::foot}, [&](int b, int s) { return leg_to(b, s); },
-        ambiguous);
-    const bool called = has(side, {BonePart::thigh});
-    take(leg, ambiguous, side == 0 ? "left leg" : "right leg",
-         {Segment{1 + side, called || has(side, {BonePart::leg, BonePart::hip})},
-          Segment{4 + side, has(side, {BonePart::shin}) || (called && has(side, {BonePart::leg}))},
-          Segment{7 + side, has(side, {BonePart::ankle, BonePart::foot})}});
-    if (leg.lacks == 0) out_.bones[10 + side] = toe_of(leg.end, side);
+    const FoundLimb limb = best_limb(side, words, ambiguous);
+    const bool called = has(side, {words.upper});
+    take(limb, ambiguous, cat(side == 0 ? "left " : "right ", words.name),
+         {Segment{words.joints[0] + side, called || has(side, {words.either, words.root})},
+          Segment{words.joints[1] + side,
+                  has(side, {words.lower}) || (called && has(side, {words.either}))},
+          Segment{words.joints[2] + side, has(side, {words.ends[0], words.ends[1]})}});
+    return limb;
   }
 
   bool has(int side, BoneParts parts) const {
@@ -225,7 +274,8 @@ class Finder {
     };
     for (int b = 0; b < size(); ++b) {
       if (b == ankle || !may_be(b, side) || !hangs_on(skeleton_, b, ankle)) continue;
-      const bool foot = words_[ankle].part == BonePart::ankle && words_[b].part == BonePart::foot;
+      const bool is_ankle = words_[ankle].part == BonePart::ankle || words_[ankle].end;
+      const bool foot = is_ankle && words_[b].part == BonePart::foot;
       if ((words_[b].part == BonePart::toe || foot) && (best < 0 || better(b, best))) best = b;
     }
     return best;
@@ -247,11 +297,30 @@ class Finder {
         two = true;
       }
     }
+    if (best < 0) best = last_of_spine();
     out_.bones[kHead] = best;
     if (best < 0 || two) lacks(kHead, two ? "two of its bones may be the head" : "");
   }
 
-  /// The bone that carries legs and spine.
+  /// The head of a skeleton that only counts the bones of its trunk, as Rigify's does ("spine" to
+  /// "spine.006"): the last of two or more in a row above the chest. -1: there is none.
+  int last_of_spine() const {
+    const int chest = chest_of(tree_, out_.bones);
+    int last = chest, count = 0;
+    for (int b = chest + 1; chest >= 0 && b < size(); ++b) {
+      const BoneWords& words = words_[b];
+      if (words.side != BoneWords::middle || words.helper || !hangs_on(skeleton_, b, chest))
+        continue;
+      if (words.part == BonePart::none) return -1;  // it may be the head
+      if (words.part != BonePart::spine) continue;
+      if (!hangs_on(skeleton_, b, last)) return -1;
+      last = b;
+      ++count;
+    }
+    return count > 1 ? last : -1;
+  }
+
+  /// The bone of the pelvis. `all` carries legs and chest.
   int find_pelvis(int all) const {
     const int legs = carrier_of(skeleton_, out_.bones[1], out_.bones[2]);
     const auto named = [&](int b) {
@@ -263,7 +332,40 @@ class Finder {
     // 3ds Max hangs the legs on the first spine bone, which hangs on the pelvis.
     for (int b = parent(all); b >= 0; b = parent(b))
       if (named(b)) return b;
-    return all;
+    // A pelvis that stands beside the legs, or beside the spine, on a bone that is only a root.
+    int beside = -1, count = 0;
+    for (int b = all + 1; b < size(); ++b)
+      if (parent(b) == all && named(b)) beside = b, ++count;
+    if (count == 1 && words_[all].part == BonePart::none) return beside;
+    const bool carries = legs != all && words_[all].part == BonePart::none &&
+                         words_[legs].side == BoneWords::middle && !words_[legs].helper;
+    return carries ? legs : all;
+  }
+
+  /// From below `under` up to the chest.
+  std::vector<int> spine_to(int chest, int under) const {
+    std::vector<int> out;
+    for (int b = chest; b != under; b = parent(b))
+      if (b == chest || !words_[b].helper || words_[b].part == BonePart::spine)
+        out.insert(out.begin(), b);
+    return out;
+  }
+
+  /// Puts the bones of the spine that lie where the list leaves out joints.
+  void complete_spine(int chest, const std::array<bool, kJoints>& open) {
+    Bones& bones = out_.bones;
+    const std::vector<int> spine = spine_to(chest, bones[kPelvis]);
+    if (open[kSpine1] && spine[0] != bones[kSpine2] && spine[0] != bones[kSpine3])
+      bones[kSpine1] = spine[0];
+    if (open[kSpine3] && chest == bones[kSpine2]) {
+      std::swap(bones[kSpine2], bones[kSpine3]);
+    } else if (open[kSpine3] && chest != bones[kSpine1]) {
+      bones[kSpine3] = chest;
+    }
+    if (bones[kSpine2] >= 0 || bones[kSpine1] < 0 || bones[kSpine3] != chest) return;
+    const std::vector<int> inner(std::find(spine.begin(), spine.end(), bones[kSpine1]),
+                                 spine.end());
+    if (open[kSpine2] && inner.size() > 2) bones[kSpine2] = inner[inner.size() / 2];
   }
 
   void find_trunk() {
@@ -272,11 +374,9 @@ class Finder {
         carrier_of(skeleton_, carrier_of(skeleton_, out_.bones[1], out_.bones[2]), chest);
     if (all < 0 || !inside(all) || !hangs_on(skeleton_, out_.bones[kHead], all))
       return lacks(kPelvis, "no bone carries its legs, arms and head");
-    const int pelvis = find_pelvis(all), below = hangs_on(skeleton_, all, pelvis) ? pelvis : all;
-    std::vector<int> spine;
-    for (int b = chest; b != below; b = parent(b))
-      if (b == chest || !words_[b].helper || words_[b].part == BonePart::spine)
-        spine.insert(spine.begin(), b);
+    const int pelvis = find_pelvis(all);
+    const int below = hangs_on(skeleton_, chest, pelvis) ? pelvis : all;
+    const std::vector<int> spine = spine_to(chest, below);
     if (spine.empty()) return lacks(kSpine1, "no bone lies between its pelvis and its arms");
     out_.bones[kPelvis] = pelvis;
     // Of many the first, the middle one, and the last, which carries the arms.
@@ -333,11 +433,13 @@ class Finder {
     }
   }
 
-  double length(int from, int to) const {
+  /// From a bone to one that hangs on it, in the zero pose.
+  Vec3 between(int from, int to) const {
     Vec3 out = Vec3::Zero();
-    for (int b = out_.bones[to]; b != out_.bones[from]; b = parent(b)) out += skeleton_.offsets[b];
-    return out.norm();
+    for (int b = to; b != from; b = parent(b)) out += skeleton_.offsets[b];
+    return out;
   }
+  double length(int from, int to) const { return between(out_.bones[from], out_.bones[to]).norm(); }
 
   /// A limb with a part many times as long as its other part, or as the other side's, was not
   /// understood. A length of 0 is one that position channels say.
@@ -362,49 +464,11 @@ class Finder {
 
 }  // namespace
 
-bool hangs_on(const SourceSkeleton& skeleton, int bone, int above) {
-  while (bone > above) bone = skeleton.parents[bone];  // a parent comes before its children
-  return bone == above;
-}
-
-int carrier_of(const SourceSkeleton& skeleton, int a, int b) {
-  if (b < 0) return -1;
-  while (a >= 0 && !hangs_on(skeleton, b, a)) a = skeleton.parents[a];
-  return a;
-}
-
-std::vector<int> find_people(const BoneTree& tree) {
-  const auto& words = tree.words;
-  const auto& parents = tree.skeleton.parents;
-  std::vector<uint8_t> below(words.size()), inner(words.size());
-  constexpr uint8_t kAll = 31;
-  std::vector<int> out;
-  for (size_t b = words.size(); b-- > 0;) {
-    const BoneWords& w = words[b];
-    const int side = w.side;
-    if (!w.helper && w.part == BonePart::head && w.side == BoneWords::middle) below[b] |= 1;
-    if (!w.helper && side >= 0 && w.part == BonePart::hand) below[b] |= 2 << side;
-    if (!w.helper && side >= 0 && is(w, {BonePart::foot, BonePart::ankle})) below[b] |= 8 << side;
-    const bool person = below[b] == kAll && !inner[b];
-    if (person) out.push_back(static_cast<int>(b));
-    if (parents[b] < 0) continue;
-    below[parents[b]] |= below[b];
-    inner[parents[b]] |= person || inner[b];
-  }
-  std::reverse(out.begin(), out.end());
-  return out;
-}
-
 FoundJoints find_joints(const BoneTree& tree, int top) { return Finder(tree, top).find(); }
 
-int chest_of(const BoneTree& tree, const Bones& bones) {
-  const auto arm = [&](int side) {
-    return bones[13 + side] >= 0 ? bones[13 + side] : bones[16 + side];
-  };
-  int out = arm(0) < 0 ? -1 : carrier_of(tree.skeleton, arm(0), arm(1));
-  // 3ds Max hangs the collars on the neck.
-  while (out >= 0 && tree.words[out].part == BonePart::neck) out = tree.skeleton.parents[out];
-  return out;
+Bones complete_joints(const BoneTree& tree, const Bones& listed,
+                      const std::array<bool, kJoints>& open) {
+  return Finder(tree, -1).complete(listed, open);
 }
 
 }  // namespace restage

@@ -80,8 +80,15 @@ std::string rate_of(const Gltf& file, const GltfClip& clip, int64_t frames) {
                 static_cast<long long>(frames));
 }
 
-Motion motion_of(const Gltf& file, const GltfRig& rig, const GltfClip& clip, int64_t frames) {
+Motion motion_of(const Gltf& file, const GltfRig& rig, const GltfClip& clip, int64_t frames,
+                 ImportReport& report) {
   Motion motion;
+  Apart apart;
+  for (const int j : {1, 2, 3}) {
+    int above = rig.node[j];
+    while (above >= 0 && above != rig.node[0]) above = file.nodes[above].parent;
+    if (above < 0) apart.loose.push_back(j);
+  }
   motion.rest = t_pose_joints(rig);
   const Vec3 pelvis = motion.rest[0];
   for (Vec3& x : motion.rest) x -= pelvis;
@@ -90,6 +97,7 @@ Motion motion_of(const Gltf& file, const GltfRig& rig, const GltfClip& clip, int
     const double seconds = clip.begin + static_cast<double>(f) / kFps;
     PosedSkeleton pose = rig_pose(rig, gltf_pose(file, clip, seconds));
     follow_trunk(pose, motion.rest);
+    apart.add(pose, motion.rest);
     auto& global = motion.global.emplace_back();
     for (size_t j = 0; j < kJoints; ++j) {
       if (!pose.joints[j].allFinite() || !pose.global[j].allFinite())
@@ -101,6 +109,7 @@ Motion motion_of(const Gltf& file, const GltfRig& rig, const GltfClip& clip, int
     motion.hips.push_back((0.5 * (pose.joints[1] + pose.joints[2])).cast<float>());
     lowest.push_back(lowest_foot(pose));
   }
+  check_apart(apart, report);
   const auto floor = static_cast<float>(floor_height(std::move(lowest)));
   for (Point& p : motion.hips) p.y() -= floor;
   return motion;
@@ -126,7 +135,7 @@ std::vector<Motion> motions_of(const Gltf& file, const GltfRig& rig, const Motio
     if (left < 0)
       throw InputError(file.path, "its animations are far longer than the keys in it",
                        "import them one by one (--clip), or cut them");
-    Motion motion = motion_of(file, rig, *clip, frames);
+    Motion motion = motion_of(file, rig, *clip, frames, report);
     std::string id = id_of(file.path, options);
     if (clips.size() > 1 || !only.empty()) id += "_" + clip->name;
     std::replace(id.begin(), id.end(), '/', '_');

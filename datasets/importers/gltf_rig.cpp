@@ -144,11 +144,8 @@ SourceSkeleton skeleton_of(const Gltf& file, const std::vector<int>& nodes,
   if (!by_vrm_list) return out;
   // A VRM file says which bone is which; what its nodes are called is its author's business.
   for (std::string& name : out.names) name.clear();
-  const bool upper = std::any_of(file.humanoid.begin(), file.humanoid.end(),
-                                 [](const auto& bone) { return bone.first == "upperChest"; });
-  for (const auto& [name, n] : file.humanoid)  // without an upper chest the chest carries the arms
-    if (const int at = place[n]; at > 0)
-      out.names[at] = name == "chest" && !upper ? "upperChest" : name;
+  for (const auto& [name, n] : file.humanoid)
+    if (const int at = place[n]; at > 0) out.names[at] = name;
   return out;
 }
 

@@ -1,9 +1,11 @@
 // name_joints(): which bones of a file are which of the 22 joints (docs/design/rigs.md).
 #include <algorithm>
 #include <map>
+#include <optional>
 
 #include "autograd/base/error.h"
 #include "autograd/base/nearest.h"
+#include "datasets/importers/bone_dictionary.h"
 #include "datasets/importers/find_joints.h"
 #include "datasets/importers/place_joints.h"
 #include "datasets/importers/source_motion.h"
@@ -27,8 +29,16 @@ std::string plain_name(std::string_view bone) {
   return out;
 }
 
+/// Without what separates words, which exporters exchange or leave out ("DEF-spine_006").
+std::string squeezed(std::string_view bone) {
+  std::string out = plain_name(bone);
+  std::erase_if(out, [](char c) { return c == '_' || c == '.' || c == '-'; });
+  return out;
+}
+
 /// Bones by name. Those of a file of one's own stand as they are in the skeleton's, without their
-/// namespace, or without decoration, in this order; a family's are compared without decoration.
+/// namespace, without decoration, or without separators, in this order; a family's are compared
+/// without decoration.
 class BoneNames {
  public:
   BoneNames(const SourceSkeleton& skeleton, const std::vector<std::string>& plain,
@@ -42,14 +52,14 @@ class BoneNames {
         index_[1].emplace(plain_name(name.substr(name.rfind(':') + 1)), at);  // npos + 1 is 0
       }
       index_[2].emplace(plain_name(plain[b]), at);
+      index_[3].emplace(squeezed(plain[b]), at);
     }
   }
 
   /// The first bone of this name, -1 if there is none.
   int find(const std::string& name) const {
-    for (const auto& index : index_)
-      if (const auto at = index.find(plain_name(name)); at != index.end()) return at->second;
-    return -1;
+    const auto [first, last] = all_of(name);
+    return first == last ? -1 : first->second;
   }
   int find(const std::vector<std::string>& any) const {
     for (const std::string& name : any)
@@ -57,9 +67,8 @@ class BoneNames {
     return -1;
   }
   bool is_twice(const std::string& name) const {
-    for (const auto& index : index_)
-      if (const size_t n = index.count(plain_name(name)); n > 0) return n > 1;
-    return false;
+    const auto [first, last] = all_of(name);
+    return std::distance(first, last) > 1;
   }
   std::vector<std::string> all() const {
     std::vector<std::string> out;
@@ -68,7 +77,15 @@ class BoneNames {
   }
 
  private:
-  std::array<std::multimap<std::string, int>, 3> index_;
+  using Index = std::multimap<std::string, int>;
+  std::pair<Index::const_iterator, Index::const_iterator> all_of(const std::string& name) const {
+    for (size_t i = 0; i < 3; ++i)
+      if (const auto found = index_[i].equal_range(plain_name(name)); found.first != found.second)
+        return found;
+    return index_[3].equal_range(squeezed(name));
+  }
+
+  std::array<Index, 4> index_;
 };
 
 Bones bones_of(const Profile& profile, const BoneNames& names) {
@@ -110,29 +127,35 @@ bool hang_together(const BoneTree& tree, const Bones& bones) {
   return carries && last_spine(bones) == chest && on(15, 0);
 }
 
-/// How many bones lie between two of a path, without helpers and without these parts.
-int between(const BoneTree& tree, int above, int below,
-            std::initializer_list<BonePart> without = {}) {
+/// How many bones lie between two of a path, but helpers and those that `counts` says no to.
+template <class Counts>
+int between(const BoneTree& tree, int above, int below, const Counts& counts) {
   int out = 0;
   if (!hangs_on(tree.skeleton, below, above)) return 0;
   for (int b = tree.skeleton.parents[below]; b >= 0 && b != above; b = tree.skeleton.parents[b])
-    out += !tree.words[b].helper &&
-           std::find(without.begin(), without.end(), tree.words[b].part) == without.end();
+    out += !tree.words[b].helper && counts(b);
   return out;
 }
 
-/// Whether the family would place a joint where a bone lies: an odd one beside its good ones.
-bool leaves_out(const BoneTree& tree, const Profile& profile, const Bones& bones) {
+/// Whether the family would place a joint where a bone lies that it does not know: an odd one
+/// beside its good ones, or another make's spine.
+bool leaves_out(const BoneTree& tree, const Profile& profile, const BoneNames& names,
+                const Bones& bones) {
   const int chest = chest_of(tree, bones);
   if (!hangs_on(tree.skeleton, chest, bones[0])) return false;  // limbs that hang on nothing
   const auto named = [&](int j) { return bones[j] >= 0; };
-  const int spine = named(kSpine1) + named(kSpine2) + named(kSpine3);
-  if (!profile.places[kSpine3] && spine < std::min(3, 1 + between(tree, bones[0], chest)))
-    return true;
-  if (!named(12) && between(tree, chest, bones[15]) > 0) return true;
+  const auto is_unknown = [&](int b) {
+    return std::find(bones.begin(), bones.end(), b) == bones.end() &&
+           std::none_of(profile.unused.begin(), profile.unused.end(),
+                        [&](const std::string& name) { return names.find(name) == b; });
+  };
+  const auto any = [](int) { return true; };
+  const auto no_neck = [&](int b) { return tree.words[b].part != BonePart::neck; };
+  const bool whole = named(kSpine1) && named(kSpine2) && named(kSpine3);
+  if (!whole && between(tree, bones[0], chest, is_unknown) > 0) return true;
+  if (!named(12) && between(tree, chest, bones[15], any) > 0) return true;
   for (const int side : {0, 1}) {
-    if (!named(13 + side) && between(tree, chest, bones[16 + side], {BonePart::neck}) > 0)
-      return true;
+    if (!named(13 + side) && between(tree, chest, bones[16 + side], no_neck) > 0) return true;
     if (!named(10 + side))
       for (size_t b = 0; b < tree.words.size(); ++b)
         if (tree.words[b].part == BonePart::toe && !tree.words[b].helper &&
@@ -156,7 +179,7 @@ Family find_family(const BoneTree& tree, const BoneNames& names) {
     const auto count = static_cast<int>(
         std::count_if(bones.begin(), bones.end(), [](int bone) { return bone >= 0; }));
     if (count > most && is_whole(bones) && hang_together(tree, bones) &&
-        !leaves_out(tree, profile, bones)) {
+        !leaves_out(tree, profile, names, bones)) {
       out = {&profile, bones};
       most = count;
     }
@@ -316,10 +339,39 @@ Bones asked_bones(const Profile& profile, const SourceSkeleton& skeleton, const 
   return bones;
 }
 
-BoneTree tree_of(const SourceSkeleton& skeleton, const std::vector<std::string>& plain) {
+/// With what the profile neither names nor places.
+Bones completed(const BoneTree& tree, const Profile& profile, const Bones& bones) {
+  std::array<bool, kJoints> open{};
+  for (size_t j = 0; j < kJoints; ++j) open[j] = bones[j] < 0 && !profile.places[j];
+  return complete_joints(tree, bones, open);
+}
+
+BoneTree tree_of(const SourceSkeleton& skeleton, const std::vector<std::string>& plain,
+                 size_t language = 0) {
   BoneTree out{skeleton, {}};
-  for (const std::string& name : plain) out.words.push_back(bone_words(name));
+  for (const std::string& name : plain) out.words.push_back(bone_words(name, language));
   return out;
+}
+
+/// A skeleton read with the words of one language.
+struct Reading {
+  BoneTree tree;
+  FoundJoints found;
+};
+
+/// With those of the first language in which it is a whole person; else of the one in which least
+/// is missing.
+Reading best_reading(const SourceSkeleton& skeleton, const std::vector<std::string>& plain,
+                     const std::string& where) {
+  std::optional<Reading> best;
+  for (size_t language = 0; language < bone_dictionaries().size(); ++language) {
+    BoneTree tree = tree_of(skeleton, plain, language);
+    FoundJoints found = find_joints(tree, only_person(tree, where));
+    if (!best || found.missing.size() < best->found.missing.size())
+      best.emplace(Reading{std::move(tree), std::move(found)});
+    if (best->found.missing.empty()) break;
+  }
+  return std::move(*best);
 }
 
 /// The profile of bones that were found without one.
@@ -335,26 +387,30 @@ const Profile& no_profile() {
 }  // namespace
 
 void check_one_person(const SourceSkeleton& skeleton, const std::string& where) {
-  only_person(tree_of(skeleton, undecorated(skeleton.names)), where);
+  const std::vector<std::string> plain = undecorated(skeleton.names);
+  for (size_t language = 0; language < bone_dictionaries().size(); ++language)
+    only_person(tree_of(skeleton, plain, language), where);
 }
 
 NamedJoints name_joints(const SourceSkeleton& skeleton, const std::string& where,
                         const Profile* profile) {
   const std::vector<std::string> plain = undecorated(skeleton.names);
-  const BoneTree tree = tree_of(skeleton, plain);
   const BoneNames names(skeleton, plain, profile != nullptr);
   const auto by_name = [&](const std::string& name) { return names.find(name); };
-  if (profile)
-    return place_joints(tree, by_name, *profile, asked_bones(*profile, skeleton, names, where),
-                        where);
-  const FoundJoints found = find_joints(tree, only_person(tree, where));
-  const Family family = find_family(tree, names);
-  if (family.profile) return place_joints(tree, by_name, *family.profile, family.bones, where);
-  if (!found.missing.empty()) {
-    check_encoding(skeleton, where);
-    throw_not_found(tree, found, plain, where);
+  const BoneTree tree = tree_of(skeleton, plain);
+  if (profile) {
+    const Bones bones = asked_bones(*profile, skeleton, names, where);
+    return place_joints(tree, by_name, *profile, completed(tree, *profile, bones), where);
   }
-  return place_joints(tree, by_name, no_profile(), found.bones, where);
+  only_person(tree, where);  // refuses two
+  if (const Family family = find_family(tree, names); family.profile)
+    return place_joints(tree, by_name, *family.profile, family.bones, where);
+  const Reading reading = best_reading(skeleton, plain, where);
+  if (!reading.found.missing.empty()) {
+    check_encoding(skeleton, where);
+    throw_not_found(reading.tree, reading.found, plain, where);
+  }
+  return place_joints(reading.tree, by_name, no_profile(), reading.found.bones, where);
 }
 
 }  // namespace restage

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "autograd/base/format.h"
+#include "datasets/importers/bone_tree.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/text.h"
 #include "datasets/readers/word_lines.h"
@@ -43,12 +44,14 @@ void scale_lengths(Recording& recording, double scale) {
   for (SourceJoint& joint : recording.names.map) joint.offset *= scale;
 }
 
-void check_root(const SourceMotion& motion, double limit, const std::string& path) {
+/// `hips`: the pelvis' bone.
+void check_root(const SourceMotion& motion, int hips, double limit, const std::string& path) {
   if (!(limit > 0)) return;
   for (size_t f = 1; f < motion.position.size(); ++f) {
     Vec3 step = Vec3::Zero();
-    for (size_t m = 0; m < motion.moving.size(); ++m)
-      step += motion.position[f][m] - motion.position[f - 1][m];
+    for (size_t m = 0; m < motion.moving.size() && motion.moving[m] <= hips; ++m)
+      if (hangs_on(motion.skeleton, hips, motion.moving[m]))
+        step += motion.position[f][m] - motion.position[f - 1][m];
     const double speed = step.norm() * motion.fps;
     if (speed > limit)
       throw InputError(path,
@@ -107,7 +110,8 @@ void cut_frames(SourceMotion& motion, const Profile& profile, const MotionOption
 
 /// The frames at 30 fps in terms of the rest pose.
 Poses poses_at_30_fps(SourceMotion motion, const JointMap& map, const RestPose& rest,
-                      uint64_t bytes, const std::string& path) {
+                      uint64_t bytes, ImportReport& report) {
+  const std::string& path = report.file;
   const double seconds = static_cast<double>(motion.local.size()) / motion.fps;
   if (!(seconds * kFps < static_cast<double>(kMaxFrames)))
     throw InputError(path, "lasts " + format("%.4g", seconds) + " s",
@@ -115,6 +119,9 @@ Poses poses_at_30_fps(SourceMotion motion, const JointMap& map, const RestPose& 
   check_length(motion.local.size(), motion.skeleton.size(), motion.fps, bytes, path);
   motion = resample(motion);
   Poses poses(motion.local.size());
+  Apart apart;
+  for (const int j : {1, 2, 3})
+    if (!hangs_on(motion.skeleton, map[j].joint, map[0].joint)) apart.loose.push_back(j);
   for (size_t f = 0; f < poses.size(); ++f) {
     poses[f] = source_pose(motion, map, f);
     for (size_t j = 0; j < kJoints; ++j) {
@@ -122,7 +129,9 @@ Poses poses_at_30_fps(SourceMotion motion, const JointMap& map, const RestPose& 
       poses[f].joints[j] = rest.align * poses[f].joints[j];
     }
     follow_trunk(poses[f], rest.joints);
+    apart.add(poses[f], rest.joints);
   }
+  check_apart(apart, report);
   return poses;
 }
 
@@ -194,14 +203,14 @@ MotionClip make_clip(Recording recording, const std::string& path, const MotionO
   report_positions(recording.positions, clip.scale, report);
   SourceMotion& motion = recording.motion;
   if (options.fps > 0) motion.fps = options.fps;
-  check_root(motion, options.max_root_speed, path);
+  check_root(motion, recording.names.map[0].joint, options.max_root_speed, path);
   const JointMap& map = recording.names.map;
   const RestPose rest = find_rest_pose(motion, map, options.rest, report);
   check_handedness(rest.joints, options.force, report);
   cut_frames(motion, *recording.names.profile, options, report);
   const double fps = motion.fps;
   const size_t frames = motion.local.size();
-  const Poses poses = poses_at_30_fps(std::move(motion), map, rest, recording.bytes, path);
+  const Poses poses = poses_at_30_fps(std::move(motion), map, rest, recording.bytes, report);
   clip.joints.reserve(poses.size());
   report.fact("rate", (fps == kFps ? "30 fps, taken as they are"
                                    : cat(format("%.6g", fps), " fps -> 30 fps, slerp: ", frames,

@@ -33,15 +33,18 @@ class Reader {
     }
     Profile out;
     out.name = std::filesystem::path(path_).stem().string();
-    each(root, {"title", "joints", "places", "expect", "lead"},
+    each(root, {"title", "joints", "places", "unused", "expect", "lead"},
          [&](const std::string& key, const auto& v) {
            if (key == "title") out.title = text(v);
            if (key == "joints") joints(v, out);
            if (key == "places") places(v, out);
+           if (key == "unused") out.unused = names(v);
            if (key == "expect") expectations(v, out);
            if (key == "lead") out.lead = static_cast<size_t>(number(v, 1, 1000));
          });
-    if (out.title.empty()) throw InputError(path_, "has no title", kSeeForm);
+    if (out.title.empty())
+      throw InputError(path_, "has no title",
+                       "write a first line that says whose bones these are: 'title: My suit'");
     for (const int j : {0, 1, 2, 4, 5, 7, 8, 15, 16, 17, 18, 19, 20, 21})
       if (out.bones[j].empty())
         throw InputError(path_, cat("names no bone for ", kJointNames[j]), "add it under 'joints'");
@@ -82,6 +85,9 @@ class Reader {
     for (const auto& entry : map) {
       const std::string key = text(entry.first);
       if (std::find(known.begin(), known.end(), key) == known.end()) {
+        if (known.front() == "title" && joint_index(key) < kJoints)
+          fail(entry.first, "'" + key + "' is a joint and belongs under 'joints:'",
+               "write 'joints:' above the joints and indent them by two blanks");
         const std::string close = nearest(key, known);
         fail(entry.first, "'" + key.substr(0, 60) + "' is not known here",
              close.empty() ? "use one of " + joined(known) : "did you mean '" + close + "'?");
@@ -110,15 +116,18 @@ class Reader {
 
   void joints(const YAML::Node& node, Profile& out) const {
     each(node, joint_names(), [&](const std::string& key, const YAML::Node& value) {
-      std::vector<std::string>& bones = out.bones[joint_index(key)];
-      if (!value.IsSequence()) {
-        bones = {text(value)};
-        return;
-      }
-      if (value.size() == 0 || value.size() > kMostNames)
-        fail(value, "one to 32 names of bones are expected");
-      for (const auto& bone : value) bones.push_back(text(bone));
+      out.bones[joint_index(key)] = names(value);
     });
+  }
+
+  /// One name, or a list of them.
+  std::vector<std::string> names(const YAML::Node& value) const {
+    if (!value.IsSequence()) return {text(value)};
+    if (value.size() == 0 || value.size() > kMostNames)
+      fail(value, "one to 32 names of bones are expected");
+    std::vector<std::string> out;
+    for (const auto& bone : value) out.push_back(text(bone));
+    return out;
   }
 
   void places(const YAML::Node& node, Profile& out) const {

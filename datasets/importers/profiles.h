@@ -26,6 +26,9 @@ struct Profile {
   /// Bones that may stand for each joint, the preferred first; empty: always placed.
   std::array<std::vector<std::string>, kJoints> bones;
   std::array<std::optional<Place>, kJoints> places;  ///< none: placed by the general rules
+  /// Bones of the family's spine that are no joint. With any other unnamed bone there, a skeleton
+  /// is of another family, as it then has a joint where this one places it.
+  std::vector<std::string> unused;
   /// What files of the family usually are; a file that differs gets a remark. Empty or 0: no say.
   std::string units, up;
   double fps = 0;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "autograd/base/format.h"
 #include "datasets/readers/errors.h"
 
 namespace restage {
@@ -100,6 +101,27 @@ void follow_trunk(PosedSkeleton& pose, const Joints& rest) {
     if (size > 1e-9 && (is - wanted).norm() > kSeen * size)
       pose.global[lower] = shortest_arc(is, wanted) * pose.global[lower];
   }
+}
+
+void Apart::add(const PosedSkeleton& pose, const Joints& rest) {
+  for (const int j : loose) {
+    const Vec3 held = pose.joints[0] + pose.global[0] * (rest[j] - rest[0]);
+    if (const double off = (pose.joints[j] - held).norm(); off > distance) {
+      distance = off;
+      joint = j;
+    }
+  }
+}
+
+void check_apart(const Apart& apart, ImportReport& report) {
+  constexpr double kSeen = 0.02, kMost = 0.25;  // metres
+  const std::string what = cat("the ", kJointNames[apart.joint], " moves up to ",
+                               format("%.2f", apart.distance), " m against the pelvis");
+  if (!(apart.distance <= kMost))
+    throw InputError(report.file, what + ", on which it does not hang",
+                     "export a skeleton whose hips carry legs and spine, or say with --bones which "
+                     "bone is the pelvis");
+  if (apart.distance > kSeen) report.remark(what + ", where it is kept");
 }
 
 double lowest_foot(const PosedSkeleton& p) {

@@ -9,6 +9,7 @@
 
 #include "autograd/base/error.h"
 #include "datasets/importers/profiles.h"
+#include "datasets/importers/report.h"
 #include "datasets/readers/skeleton_file.h"
 #include "nn/geometry/body.h"
 
@@ -80,6 +81,17 @@ using Poses = std::deque<PosedSkeleton>;
 /// turned further, by the shortest arc, until `rest` puts the upper one where it is in the source.
 /// Changes nothing where no bone is left out.
 void follow_trunk(PosedSkeleton& pose, const Joints& rest);
+
+/// How far hips and spine1 that do not hang on the pelvis are from where `rest` puts them on it:
+/// the largest over the frames so far, and of which joint.
+struct Apart {
+  std::vector<int> loose;  ///< those of the joints 1, 2 and 3 that hang elsewhere
+  double distance = 0;     ///< metres
+  int joint = 0;
+  void add(const PosedSkeleton& pose, const Joints& rest);
+};
+/// A remark for what is seen; InputError for a body that falls apart.
+void check_apart(const Apart& apart, ImportReport& report);
 
 /// 5th percentile over frames of the lowest ankle or foot: the height of the clip's floor.
 double floor_height(const Poses& poses);

@@ -20,6 +20,7 @@
 #include "autograd/base/nearest.h"
 #include "autograd/base/parallel.h"
 #include "datasets/hdf5/file.h"
+#include "datasets/readers/text.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
 
@@ -82,6 +83,19 @@ std::vector<std::string> command_names(const CLI::App& command) {
   return names;
 }
 
+/// A file of bone names that was given to --profile, which means timings beside --bones; "": none.
+std::string bones_for_profile(const CLI::App& command, const std::vector<std::string>& extras) {
+  const CLI::Option* profile = command.get_option_no_throw("--profile");
+  const CLI::Option* bones = command.get_option_no_throw("--bones");
+  if (profile == nullptr || bones == nullptr || profile == bones || profile->count() == 0)
+    return "";
+  std::vector<std::string> words = profile->results();
+  words.insert(words.end(), extras.begin(), extras.end());
+  for (const std::string& word : words)
+    if (text::ends_in(word, {".yaml", ".yml"})) return word;
+  return "";
+}
+
 /// What was wrong with the arguments that `app` just refused, with the nearest known name.
 InputError usage_error(const CLI::App& app, const CLI::ParseError& error) {
   const CLI::App& command = innermost(app);
@@ -89,6 +103,9 @@ InputError usage_error(const CLI::App& app, const CLI::ParseError& error) {
   const std::string help = "see '" + words + " --help'";
   const std::vector<std::string> known = command_names(command);
   const std::vector<std::string> extras = app.remaining(true);
+  if (const std::string bones = bones_for_profile(command, extras); !bones.empty())
+    return InputError("", "--profile of '" + words + "' prints timings and takes no file",
+                      "name the bones with --bones " + bones);
   if (!extras.empty()) {
     const std::string word = extras.front().substr(0, extras.front().find('='));
     const bool is_option = word.size() > 1 && word[0] == '-';

@@ -157,6 +157,8 @@ class Sources(Retarget):
         self.assertEqual(self.counts("out.h5")["frames"], 1)
 
     def test_profile(self):
+        for given in (["--profile", "names.yaml"], ["--profile=names.yaml"]):  # which `data import` takes for --bones
+            self.bad_input(self.call("out.h5", *given), "prints timings", "--bones names.yaml")
         result = self.restage(*self.call("out.h5", "--profile"))
         self.assertEqual(result.code, 0, result.err)
         self.assertIn("ms a frame", result.err)

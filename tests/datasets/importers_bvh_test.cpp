@@ -147,6 +147,61 @@ TEST_F(ImportersBvh, JumpingRootIsRefused) {
   EXPECT_NO_THROW(convert_bvh(text, "test.bvh", options));
 }
 
+/// Trunk and legs that hang beside each other on a still root, each told where it is: `torn` metres
+/// a second apart. The pelvis turns and walks away.
+std::string beside(double torn) {
+  std::string out = "HIERARCHY\nROOT Root\n{\nOFFSET 0 0 0\nCHANNELS 0\n";
+  const Joints& rest = bvh_test::rest();
+  std::vector<int> order;
+  const std::function<void(int)> write = [&](int j) {
+    order.push_back(j);
+    const bool free = j == 0 || j == 3;
+    const Vec3 offset = j == 3   ? rest[3]
+                        : j == 0 ? Vec3(Vec3::Zero())
+                                 : rest[j] - rest[kParents[j]];
+    out += "JOINT " + std::string(kJointNames[j]) + "\n{\nOFFSET" + bvh_test::vector_text(offset) +
+           (free ? "\nCHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation\n"
+                 : "\nCHANNELS 3 Zrotation Xrotation Yrotation\n");
+    for (int k = 1; k < kJoints; ++k)
+      if (kParents[k] == j && k != 3) write(k);
+    out += "}\n";
+  };
+  write(0);
+  write(3);
+  out += "}\nMOTION\nFrames: 30\nFrame Time: 0.0333333333\n";
+  for (int f = 0; f < 30; ++f) {
+    const double t = f / 30.0;
+    const Mat3 yaw = Eigen::AngleAxisd(t, Vec3::UnitY()).toRotationMatrix();
+    const Vec3 hips = bvh_test::hips(t);
+    for (const int j : order) {
+      const Vec3 at = j == 0 ? hips : Vec3(hips + yaw * (rest[3] - rest[0]) + Vec3(0, torn * t, 0));
+      if (j == 0 || j == 3) out += bvh_test::vector_text(at);
+      out += " 0 0" + bvh_test::number(j == 0 || j == 3 ? t * 180 / M_PI : 0);
+    }
+    out += "\n";
+  }
+  return out;
+}
+
+TEST_F(ImportersBvh, ASpineBesideItsPelvisMovesWithIt) {
+  const MotionClip clip = convert_bvh(beside(0), "x.bvh", {});
+  for (size_t f = 0; f < clip.motion.frames(); f += 5) {
+    const Mat3 yaw =
+        Eigen::AngleAxisd(static_cast<double>(f) / 30, Vec3::UnitY()).toRotationMatrix();
+    for (int j = 0; j < kJoints; ++j) {
+      const Vec3 at = bvh_test::hips(static_cast<double>(f) / 30) +
+                      yaw * (bvh_test::rest()[j] - bvh_test::rest()[0]);
+      EXPECT_LT((clip.joints[f][j] - at).norm(), 1e-5) << f << " " << kJointNames[j];
+      EXPECT_LT((clip.motion.rest[j] - (bvh_test::rest()[j] - bvh_test::rest()[0])).norm(), 1e-5);
+    }
+  }
+  EXPECT_TRUE(clip.report.remarks.empty());
+  const MotionClip loose = convert_bvh(beside(0.2), "x.bvh", {});
+  ASSERT_EQ(loose.report.remarks.size(), 1u);
+  EXPECT_HAS(loose.report.remarks[0], "spine1 moves up to 0.1");
+  EXPECT_HAS(refusal_of([&] { convert_bvh(beside(1.5), "x.bvh", {}); }), "against the pelvis");
+}
+
 TEST_F(ImportersBvh, ReadsPlainAndXzFiles) {
   const std::string text = bvh_test::text({}), xz = xz_of(text, 8);
   const std::string plain = dir.write("07_01.bvh", text), file = dir.write("07_01.bvh.xz", xz);

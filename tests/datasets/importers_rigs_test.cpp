@@ -8,6 +8,7 @@
 #include "datasets/importers/find_joints.h"
 #include "datasets/importers/source_motion.h"
 #include "tests/datasets/rig_lists_games.h"
+#include "tests/datasets/rig_lists_more.h"
 #include "tests/datasets/rig_lists_studios.h"
 #include "tests/support/errors.h"
 
@@ -20,7 +21,8 @@ using test::RigList;
 
 std::vector<RigList> rig_lists() {
   std::vector<RigList> out = test::rigs_of_games();
-  out.insert(out.end(), test::rigs_of_studios().begin(), test::rigs_of_studios().end());
+  for (const auto* more : {&test::rigs_of_studios(), &test::rigs_of_others()})
+    out.insert(out.end(), more->begin(), more->end());
   return out;
 }
 BuiltRig rig(const std::string& name) {
@@ -101,6 +103,11 @@ const std::vector<Decoration>& decorations() {
       {"an armature's path", before("Armature|")},
       {".001", after(".001")},
       {"_jnt", after("_jnt")},
+      {"_ctrl", after("_ctrl")},
+      {"_end", after("_end")},
+      {"_R, whichever side", after("_R")},
+      {"CTRL_", before("CTRL_")},
+      {"_bind.001", after("_bind.001")},
       {"numbers as Sketchfab's, without one at the root",
        [](SourceSkeleton& s) {
          for (size_t b = 0; b < s.size(); ++b) s.names[b] += "_0" + std::to_string(b + 1);
@@ -213,81 +220,81 @@ TEST(ImportersRigs, NobodyIsGuessed) {
 
 TEST(ImportersRigs, WhatOnlyLooksLikeAPersonIsRefused) {
   const BuiltRig horse = rig_of("L", "R", R"(
-Root
-  Hips
-    Spine
-      Chest
-        Neck
-          Head
-        Front_UpperLeg_@
-          Front_LowerLeg_@
-            Front_Foot_@
-    Back_UpperLeg_@
-      Back_LowerLeg_@
-        Back_Foot_@
-    Tail1
+Root Hips Spine Chest Neck Head
+Hips Back_UpperLeg_@ Back_LowerLeg_@ Back_Foot_@
+Hips Tail1
+Chest Front_UpperLeg_@ Front_LowerLeg_@ Front_Foot_@
 )");
   EXPECT_HAS(refusal(horse), "left_shoulder");
   const BuiltRig arm_of_two = rig_of("Left", "Right", R"(
-Hips
-  Spine
-    Chest
-      Neck
-        Head
-      @Shoulder
-        @Arm
-          @Hand
-  @UpLeg
-    @Leg
-      @Foot
+Hips Spine Chest Neck Head
+Hips @UpLeg @Leg @Foot
+Chest @Shoulder @Arm @Hand
 )");
   EXPECT_HAS(refusal(arm_of_two), "left_elbow");  // no shoulder is made an upper arm
   const BuiltRig legs_by_number = rig_of("L", "R", R"(
-Hips
-  Spine
-    Head
-    UpperArm_@
-      Forearm_@
-        Hand_@
-  Leg_@_01
-    Leg_@_02
-      Leg_@_03
+Hips Spine Head
+Hips Leg_@_01 Leg_@_02 Leg_@_03
+Spine UpperArm_@ Forearm_@ Hand_@
 )");
   EXPECT_HAS(refusal(legs_by_number), "left_knee");
+  const BuiltRig arm_of_three = rig_of("L", "R", R"(
+Hips Spine Chest Head
+Hips t:Thigh_@ k:Shin_@ a:Foot_@
+Chest c:Arm1_@ s:Arm2_@ e:Arm3_@ w:Hand_@
+)");
+  EXPECT_HAS(refusal(arm_of_three), "left_elbow");  // a collar is no upper arm
+  const BuiltRig no_head = rig_of("L", "R", R"(
+Hips Spine Spine1 Spine2 Spine3 Thing
+Hips Thigh_@ Shin_@ Foot_@
+Spine1 UpperArm_@ Forearm_@ Hand_@
+)");
+  EXPECT_HAS(refusal(no_head), "head");
   const BuiltRig four_arms = rig_of("L", "R", R"(
-Hips
-  Spine
-    Chest
-      Head
-      A_UpperArm_@
-        A_Forearm_@
-          A_Hand_@
-      B_UpperArm_@
-        B_Forearm_@
-          B_Hand_@
-  Thigh_@
-    Shin_@
-      Foot_@
+Hips Spine Chest Head
+Hips Thigh_@ Shin_@ Foot_@
+Chest A_UpperArm_@ A_Forearm_@ A_Hand_@
+Chest B_UpperArm_@ B_Forearm_@ B_Hand_@
 )");
   EXPECT_HAS(refusal(four_arms), "two of its limbs may be the left arm");
   const BuiltRig apart = rig_of("L", "R", R"(
-Root
-  Hips
-  Spine
-    Chest
-  Head
-  UpperArm_@
-  Forearm_@
-  Hand_@
-  Thigh_@
-  Shin_@
-  Foot_@
+Root Hips
+Root Spine Chest
+Root Head
+Root UpperArm_@
+Root Forearm_@
+Root Hand_@
+Root Thigh_@
+Root Shin_@
+Root Foot_@
 )");
   EXPECT_HAS(refusal(apart), "do not hang on each other");
   BuiltRig giant_shin = rig("bandai namco");
   for (size_t b = 0; b < giant_shin.skeleton.size(); ++b)
     if (giant_shin.skeleton.names[b].starts_with("Foot")) giant_shin.skeleton.offsets[b] *= 20;
   EXPECT_HAS(refusal(giant_shin), "lengths");
+}
+
+TEST(ImportersRigs, OfManyCountedBonesTheOneThatBendsIsTheElbow) {
+  for (const bool bent : {true, false}) {
+    BuiltRig rig = rig_of("L", "R", R"(
+p:spine_C0_0 1:spine_C0_1 3:spine_C0_2 n:neck_C0_0 h:neck_C0_head
+spine_C0_0 t:leg_@0_0 leg_@0_1 k:leg_@0_2 leg_@0_3 a:leg_@0_end f:foot_@0_0
+spine_C0_2 c:shoulder_@0_0 s:arm_@0_0 arm_@0_1 e:arm_@0_2 arm_@0_3 w:arm_@0_end
+)");
+    SourceSkeleton& s = rig.skeleton;
+    for (size_t b = 0; b + 1 < s.size(); ++b) {
+      if (!s.names[b].ends_with("0_1") && !s.names[b].ends_with("0_3")) continue;
+      if (s.names[b].starts_with("spine")) continue;
+      Vec3 whole = s.offsets[b] + s.offsets[b + 1];  // what it halves
+      if (bent && s.names[b].starts_with("arm") && s.names[b].ends_with("3")) whole.z() += 0.05;
+      s.offsets[b] = s.offsets[b + 1] = 0.5 * whole;
+    }
+    if (bent)
+      expect_right(rig, "mgear with divided limbs");
+    else
+      EXPECT_HAS(refusal(rig), "left_elbow");
+  }
 }
 
 TEST(ImportersRigs, TwoPeopleInOneFileAreRefused) {
@@ -417,6 +424,11 @@ TEST(ImportersRigs, WordsOfNames) {
   is("arm_lower_R", forearm, right);
   is("RThigh_012", thigh, right);
   is("lfemur", thigh, left);
+  is("lLeg", leg, left);
+  is("l_lleg", shin, left);
+  is("RLArm", forearm, right);
+  is("r_uleg", thigh, right);
+  is("arm_L0_end", arm, left, true);
   is("Bip01 L Toe0", toe, left);
   is("左足首", ankle, left);
   is("上半身2", spine, middle);
@@ -429,6 +441,11 @@ TEST(ImportersRigs, WordsOfNames) {
   is("Alarm", none, middle);
   is("LeftRightHand", hand, right, true);  // both sides: neither
   EXPECT_LT(bone_words("hand_l").cost, bone_words("hand_weapon_l").cost + 1);
+  EXPECT_EQ(bone_words("arm_L0_1").last_number, 1);
+  EXPECT_EQ(bone_words("main_G", 0).part, none);
+  EXPECT_EQ(bone_words("main_G", 2).part, hand);  // French
+  EXPECT_EQ(bone_words("Schlüsselbein_L", 1).part, collar);
+  EXPECT_EQ(bone_words("ПЛЕЧО", 9).part, shoulder);
   EXPECT_LT(bone_words("hand_l").cost, bone_words("hand_xyz_l").cost);
   EXPECT_EQ(other_side("LeftUpLeg"), "rightupleg");
   EXPECT_EQ(other_side("thigh.R.001"), "thigh.l.001");

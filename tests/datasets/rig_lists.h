@@ -1,9 +1,12 @@
-// Skeletons as programs of all kinds name them: how they are written down here. A bone a line,
-// indented below its parent, "= joint" where it is one of the 22. A '@' is the side: such a bone
-// and all below it are there twice.
+// Skeletons as programs of all kinds name them: how they are written down here. A line is a chain
+// of bones, each hanging on the one before it; its first word is a bone of a line above (of the
+// first line: the root). "t:" before a bone says which of the 22 joints it is. A '@' is the side: a
+// line with one is there twice. A '~' is a blank.
 #pragma once
 
 #include <array>
+#include <map>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -29,67 +32,60 @@ class RigBuilder {
  public:
   explicit RigBuilder(const RigList& list) : list_(list) {
     out_.bone.fill(-1);
-    parse(list.bones);
-    for (size_t i = 0; i < lines_.size(); ++i)
-      if (parent_line(i) < 0) add(static_cast<int>(i), -1, "");
+    std::istringstream lines(list.bones);
+    for (std::string line; std::getline(lines, line);) {
+      if (line.find('@') == std::string::npos) {
+        add(line, 0);
+      } else {
+        add(line, 1);
+        add(line, 2);
+      }
+    }
   }
   BuiltRig built() const { return out_; }
 
  private:
-  struct Line {
-    int indent;
-    std::string bone, joint;
-  };
-
-  void parse(const std::string& text) {
-    for (size_t at = 0; at < text.size();) {
-      const size_t end = std::min(text.find('\n', at), text.size());
-      const std::string line = text.substr(at, end - at);
-      at = end + 1;
-      const size_t begin = line.find_first_not_of(' ');
-      if (begin == std::string::npos) continue;
-      const size_t equals = line.find(" = ");
-      lines_.push_back({static_cast<int>(begin), line.substr(begin, equals - begin),
-                        equals == std::string::npos ? "" : line.substr(equals + 3)});
+  /// `side`: 1 left, 2 right, 0 outside of a limb.
+  void add(const std::string& line, int side) {
+    std::istringstream words(line);
+    int parent = -1;
+    for (std::string word; words >> word;) {
+      const bool joint = word.size() > 2 && word[1] == ':';
+      std::string name = joint ? word.substr(2) : word;
+      std::replace(name.begin(), name.end(), '~', ' ');
+      for (size_t at = 0; (at = name.find('@')) != std::string::npos;)
+        name.replace(at, 1, side == 1 ? list_.left : list_.right);
+      const auto known = bones_.find(name);
+      if (parent < 0 && known != bones_.end()) {
+        parent = known->second;
+        continue;
+      }
+      if (parent < 0 && out_.skeleton.size() > 0) throw std::runtime_error(name + " hangs nowhere");
+      parent = add_bone(name, joint ? joint_of(word[0], side) : -1, parent);
     }
   }
-  int parent_line(size_t i) const {
-    for (size_t p = i; p-- > 0;)
-      if (lines_[p].indent < lines_[i].indent) return static_cast<int>(p);
-    return -1;
-  }
 
-  /// `side`: "left", "right", or "" outside of a limb.
-  void add(int line, int parent, const std::string& side) {
-    const Line& it = lines_[static_cast<size_t>(line)];
-    if (side.empty() && it.bone.find('@') != std::string::npos) {
-      add(line, parent, "left");
-      add(line, parent, "right");
-      return;
-    }
-    std::string name = it.bone;
-    for (size_t at = 0; (at = name.find('@')) != std::string::npos;)
-      name.replace(at, 1, side == "left" ? list_.left : list_.right);
+  int add_bone(const std::string& name, int joint, int parent) {
     const int bone = static_cast<int>(out_.skeleton.size());
-    Vec3 place = parent < 0 ? Vec3(Vec3::Zero()) : Vec3(places_[static_cast<size_t>(parent)]);
-    place.y() += 0.01;
-    if (!it.joint.empty()) {
-      const std::string full = (side.empty() ? "" : side + "_") + it.joint;
-      const auto at = std::find(kJointNames.begin(), kJointNames.end(), full);
-      if (at == kJointNames.end()) throw std::runtime_error(full + " is no joint");
-      const auto j = static_cast<size_t>(at - kJointNames.begin());
-      out_.bone[j] = bone;
-      place = bvh_test::rest()[j];
-    }
-    const Vec3 from = parent < 0 ? Vec3(Vec3::Zero()) : Vec3(places_[static_cast<size_t>(parent)]);
+    const Vec3 from = parent < 0 ? Vec3(Vec3::Zero()) : places_[static_cast<size_t>(parent)];
+    const Vec3 place = joint < 0 ? Vec3(from + Vec3(0, 0.01, 0)) : bvh_test::rest()[joint];
+    if (joint >= 0) out_.bone[static_cast<size_t>(joint)] = bone;
     out_.skeleton.add(name, parent, place - from);
     places_.push_back(place);
-    for (size_t i = 0; i < lines_.size(); ++i)
-      if (parent_line(i) == line) add(static_cast<int>(i), bone, side);
+    bones_[name] = bone;
+    return bone;
+  }
+
+  static int joint_of(char letter, int side) {
+    static const std::map<char, int> joints = {
+        {'p', 0},  {'1', 3},  {'2', 6},  {'3', 9},  {'n', 12}, {'h', 15},  // trunk
+        {'t', 1},  {'k', 4},  {'a', 7},  {'f', 10},                        // thigh, knee ...
+        {'c', 13}, {'s', 16}, {'e', 18}, {'w', 20}};                       // collar, shoulder ...
+    return joints.at(letter) + (side == 2 ? 1 : 0);
   }
 
   const RigList& list_;
-  std::vector<Line> lines_;
+  std::map<std::string, int> bones_;
   std::vector<Vec3> places_;
   BuiltRig out_;
 };

@@ -8,421 +8,160 @@ namespace restage::test {
 inline const std::vector<RigList>& rigs_of_games() {
   static const std::vector<RigList> lists = {
       {"unreal 4", "_l", "_r", R"(
-root
-  pelvis = pelvis
-    spine_01 = spine1
-      spine_02 = spine2
-        spine_03 = spine3
-          neck_01 = neck
-            head = head
-          clavicle@ = collar
-            upperarm@ = shoulder
-              upperarm_twist_01@
-              lowerarm@ = elbow
-                lowerarm_twist_01@
-                hand@ = wrist
-                  index_01@
-                  weapon@
-    thigh@ = hip
-      thigh_twist_01@
-      calf@ = knee
-        calf_twist_01@
-        foot@ = ankle
-          ball@ = foot
-  ik_foot_root
-    ik_foot@
-  ik_hand_root
-    ik_hand_gun
-      ik_hand@
-  center_of_mass
+root p:pelvis 1:spine_01 2:spine_02 3:spine_03 n:neck_01 h:head
+root ik_foot_root
+ik_foot_root ik_foot@
+root ik_hand_root ik_hand_gun
+ik_hand_gun ik_hand@
+root center_of_mass
+pelvis t:thigh@ k:calf@ a:foot@ f:ball@
+thigh@ thigh_twist_01@
+calf@ calf_twist_01@
+spine_03 c:clavicle@ s:upperarm@ e:lowerarm@ w:hand@ index_01@
+upperarm@ upperarm_twist_01@
+lowerarm@ lowerarm_twist_01@
+hand@ weapon@
 )"},
       {"unreal 5", "_l", "_r", R"(
-root
-  pelvis = pelvis
-    spine_01 = spine1
-      spine_02
-        spine_03 = spine2
-          spine_04
-            spine_05 = spine3
-              neck_01 = neck
-                neck_02
-                  head = head
-              clavicle@ = collar
-                clavicle_out@
-                upperarm@ = shoulder
-                  upperarm_correctiveRoot@
-                  upperarm_twist_01@
-                  lowerarm@ = elbow
-                    lowerarm_out@
-                    wrist_inner@
-                    hand@ = wrist
-                      index_metacarpal@
-    thigh@ = hip
-      thigh_out@
-      calf@ = knee
-        calf_kneeBack@
-        calf_knee@
-        ankle_bck@
-        foot@ = ankle
-          ball@ = foot
-            bigtoe_01@
+root p:pelvis 1:spine_01 spine_02 2:spine_03 spine_04 3:spine_05 n:neck_01 neck_02 h:head
+pelvis t:thigh@ k:calf@ a:foot@ f:ball@ bigtoe_01@
+thigh@ thigh_out@
+calf@ calf_kneeBack@
+calf@ calf_knee@
+calf@ ankle_bck@
+spine_05 c:clavicle@ s:upperarm@ e:lowerarm@ w:hand@ index_metacarpal@
+clavicle@ clavicle_out@
+upperarm@ upperarm_correctiveRoot@
+upperarm@ upperarm_twist_01@
+lowerarm@ lowerarm_out@
+lowerarm@ wrist_inner@
 )"},
       {"unity humanoid", "Left", "Right", R"(
-Root
-  Hips = pelvis
-    @UpperLeg = hip
-      @LowerLeg = knee
-        @Foot = ankle
-          @Toes = foot
-    Spine = spine1
-      Chest = spine2
-        UpperChest = spine3
-          Neck = neck
-            Head = head
-              Jaw
-          @Shoulder = collar
-            @UpperArm = shoulder
-              @LowerArm = elbow
-                @Hand = wrist
-                  @IndexProximal
+Root p:Hips 1:Spine 2:Chest 3:UpperChest n:Neck h:Head Jaw
+Hips t:@UpperLeg k:@LowerLeg a:@Foot f:@Toes
+UpperChest c:@Shoulder s:@UpperArm e:@LowerArm w:@Hand @IndexProximal
 )"},
       {"vrm without upper chest, neck, collars and toes", "left", "right", R"(
-hips = pelvis
-  @UpperLeg = hip
-    @LowerLeg = knee
-      @Foot = ankle
-  spine = spine1
-    chest = spine3
-      head = head
-      @UpperArm = shoulder
-        @LowerArm = elbow
-          @Hand = wrist
+p:hips 1:spine 3:chest h:head
+hips t:@UpperLeg k:@LowerLeg a:@Foot
+chest s:@UpperArm e:@LowerArm w:@Hand
 )"},
       {"vroid", "L", "R", R"(
-Root
-  J_Bip_C_Hips = pelvis
-    J_Bip_C_Spine = spine1
-      J_Bip_C_Chest = spine2
-        J_Bip_C_UpperChest = spine3
-          J_Sec_@_Bust1
-          J_Bip_C_Neck = neck
-            J_Bip_C_Head = head
-              J_Adj_@_FaceEye
-              J_Sec_Hair1_01
-              J_Sec_Hair1_02
-                J_Sec_Hair2_02
-          J_Bip_@_Shoulder = collar
-            J_Bip_@_UpperArm = shoulder
-              J_Sec_@_TopsUpperArmInside_01
-              J_Bip_@_LowerArm = elbow
-                J_Bip_@_Hand = wrist
-                  J_Bip_@_Index1
-    J_Bip_@_UpperLeg = hip
-      J_Sec_@_CoatSkirtBack_01
-      J_Bip_@_LowerLeg = knee
-        J_Bip_@_Foot = ankle
-          J_Bip_@_ToeBase = foot
+Root p:J_Bip_C_Hips 1:J_Bip_C_Spine 2:J_Bip_C_Chest 3:J_Bip_C_UpperChest n:J_Bip_C_Neck
+J_Bip_C_Neck h:J_Bip_C_Head
+J_Bip_C_Hips t:J_Bip_@_UpperLeg k:J_Bip_@_LowerLeg a:J_Bip_@_Foot f:J_Bip_@_ToeBase
+J_Bip_@_UpperLeg J_Sec_@_CoatSkirtBack_01
+J_Bip_C_UpperChest J_Sec_@_Bust1
+J_Bip_C_UpperChest c:J_Bip_@_Shoulder s:J_Bip_@_UpperArm e:J_Bip_@_LowerArm w:J_Bip_@_Hand
+J_Bip_@_Hand J_Bip_@_Index1
+J_Bip_@_UpperArm J_Sec_@_TopsUpperArmInside_01
+J_Bip_C_Head J_Adj_@_FaceEye
+J_Bip_C_Head J_Sec_Hair1_01
+J_Bip_C_Head J_Sec_Hair1_02 J_Sec_Hair2_02
 )"},
       {"synty", "_L", "_R", R"(
-Root
-  Hips = pelvis
-    UpperLeg@ = hip
-      LowerLeg@ = knee
-        Ankle@ = ankle
-          Ball@ = foot
-            Toes@
-    Spine_01 = spine1
-      Spine_02 = spine2
-        Spine_03 = spine3
-          Neck = neck
-            Head = head
-              Eyes
-          Clavicle@ = collar
-            Shoulder@ = shoulder
-              Elbow@ = elbow
-                Hand@ = wrist
-                  Thumb_01 2@
+Root p:Hips 1:Spine_01 2:Spine_02 3:Spine_03 n:Neck h:Head Eyes
+Hips t:UpperLeg@ k:LowerLeg@ a:Ankle@ f:Ball@ Toes@
+Spine_03 c:Clavicle@ s:Shoulder@ e:Elbow@ w:Hand@ Thumb_01~2@
 )"},
       {"kaykit", ".l", ".r", R"(
-root
-  hips = pelvis
-    spine = spine1
-      chest = spine3
-        head = head
-        upperarm@ = shoulder
-          lowerarm@ = elbow
-            wrist@ = wrist
-              hand@
-                handslot@
-    upperleg@ = hip
-      lowerleg@ = knee
-        foot@ = ankle
-          toes@ = foot
-  control-foot-roll@
-  kneeIK@
+root p:hips 1:spine 3:chest h:head
+root control-foot-roll@
+root kneeIK@
+hips t:upperleg@ k:lowerleg@ a:foot@ f:toes@
+chest s:upperarm@ e:lowerarm@ w:wrist@ hand@ handslot@
 )"},
       {"quaternius, universal animations", ".L", ".R", R"(
-root
-  DEF-hips = pelvis
-    DEF-spine.001 = spine1
-      DEF-spine.002 = spine2
-        DEF-spine.003 = spine3
-          DEF-neck = neck
-            DEF-head = head
-          DEF-shoulder@ = collar
-            DEF-upper_arm@ = shoulder
-              DEF-forearm@ = elbow
-                DEF-hand@ = wrist
-    DEF-thigh@ = hip
-      DEF-shin@ = knee
-        DEF-foot@ = ankle
-          DEF-toe@ = foot
+root p:DEF-hips 1:DEF-spine.001 2:DEF-spine.002 3:DEF-spine.003 n:DEF-neck h:DEF-head
+DEF-hips t:DEF-thigh@ k:DEF-shin@ a:DEF-foot@ f:DEF-toe@
+DEF-spine.003 c:DEF-shoulder@ s:DEF-upper_arm@ e:DEF-forearm@ w:DEF-hand@
 )"},
       {"quaternius, older", ".L", ".R", R"(
-Bone
-  Body
-    Hips = pelvis
-      Abdomen = spine1
-        Torso = spine3
-          Neck = neck
-            Head = head
-          Shoulder@ = collar
-            UpperArm@ = shoulder
-              LowerArm@ = elbow
-                Palm@ = wrist
-                  Thumb1@
-      UpperLeg@ = hip
-        LowerLeg@ = knee
-          Foot@ = ankle
-  PoleTarget@
+Bone Body p:Hips 1:Abdomen 3:Torso n:Neck h:Head
+Bone PoleTarget@
+Hips t:UpperLeg@ k:LowerLeg@ a:Foot@
+Torso c:Shoulder@ s:UpperArm@ e:LowerArm@ w:Palm@ Thumb1@
 )"},
       {"mmd, Japanese", "左", "右", R"(
-全ての親
-  センター
-    グルーブ
-      腰
-        下半身 = pelvis
-          腰キャンセル@
-            @足 = hip
-              @ひざ = knee
-                @足首 = ankle
-                  @つま先 = foot
-        上半身 = spine1
-          上半身2 = spine3
-            首 = neck
-              頭 = head
-                両目
-            @肩P
-              @肩 = collar
-                @肩C
-                  @腕 = shoulder
-                    @腕捩
-                      @ひじ = elbow
-                        @手捩
-                          @手首 = wrist
-                            @親指１
-  @足ＩＫ
-    @つま先ＩＫ
+全ての親 センター グルーブ 腰 1:上半身 3:上半身2 n:首 h:頭 両目
+全ての親 @足ＩＫ @つま先ＩＫ
+腰 p:下半身
+下半身 腰キャンセル@ t:@足 k:@ひざ a:@足首 f:@つま先
+上半身2 @肩P c:@肩 @肩C s:@腕 @腕捩 e:@ひじ @手捩 w:@手首 @親指１
 )"},
       {"mmd, English", "_L", "_R", R"(
-ParentNode
-  Center
-    Groove
-      Waist
-        LowerBody = pelvis
-          Leg@ = hip
-            Knee@ = knee
-              Ankle@ = ankle
-                Toe@ = foot
-        UpperBody = spine1
-          UpperBody2 = spine3
-            Neck = neck
-              Head = head
-            Shoulder@ = collar
-              Arm@ = shoulder
-                ArmTwist@
-                  Elbow@ = elbow
-                    Wrist@ = wrist
-                      Thumb1@
-  LegIK@
+ParentNode Center Groove Waist 1:UpperBody 3:UpperBody2 n:Neck h:Head
+ParentNode LegIK@
+Waist p:LowerBody
+LowerBody t:Leg@ k:Knee@ a:Ankle@ f:Toe@
+UpperBody2 c:Shoulder@ s:Arm@ ArmTwist@ e:Elbow@ w:Wrist@ Thumb1@
 )"},
       {"3ds max biped", "L", "R", R"(
-Bip001
-  Bip001 Pelvis = pelvis
-    Bip001 Spine = spine1
-      Bip001 Spine1 = spine2
-        Bip001 Spine2 = spine3
-          Bip001 Neck = neck
-            Bip001 Head = head
-              Bip001 HeadNub
-              Bip001 Ponytail1
-            Bip001 @ Clavicle = collar
-              Bip001 @ UpperArm = shoulder
-                Bip001 @ Forearm = elbow
-                  Bip001 @ Hand = wrist
-                    Bip001 @ Finger0
-      Bip001 @ Thigh = hip
-        Bip001 @ Calf = knee
-          Bip001 @ Foot = ankle
-            Bip001 @ Toe0 = foot
-              Bip001 @ Toe0Nub
-  Bip001 Footsteps
+Bip001 p:Bip001~Pelvis 1:Bip001~Spine 2:Bip001~Spine1 3:Bip001~Spine2 n:Bip001~Neck h:Bip001~Head
+Bip001~Head Bip001~HeadNub
+Bip001 Bip001~Footsteps
+Bip001~Spine t:Bip001~@~Thigh k:Bip001~@~Calf a:Bip001~@~Foot f:Bip001~@~Toe0 Bip001~@~Toe0Nub
+Bip001~Neck c:Bip001~@~Clavicle s:Bip001~@~UpperArm e:Bip001~@~Forearm w:Bip001~@~Hand
+Bip001~@~Hand Bip001~@~Finger0
+Bip001~Head Bip001~Ponytail1
 )"},
       {"valve biped", "L", "R", R"(
-ValveBiped.Bip01_Pelvis = pelvis
-  ValveBiped.Bip01_Spine = spine1
-    ValveBiped.Bip01_Spine1
-      ValveBiped.Bip01_Spine2 = spine2
-        ValveBiped.Bip01_Spine4 = spine3
-          ValveBiped.Bip01_Neck1 = neck
-            ValveBiped.Bip01_Head1 = head
-          ValveBiped.Bip01_@_Clavicle = collar
-            ValveBiped.Bip01_@_UpperArm = shoulder
-              ValveBiped.Bip01_@_Forearm = elbow
-                ValveBiped.Bip01_@_Hand = wrist
-                  ValveBiped.Anim_Attachment_@H
-  ValveBiped.Bip01_@_Thigh = hip
-    ValveBiped.Bip01_@_Calf = knee
-      ValveBiped.Bip01_@_Foot = ankle
-        ValveBiped.Bip01_@_Toe0 = foot
+p:ValveBiped.Bip01_Pelvis 1:ValveBiped.Bip01_Spine ValveBiped.Bip01_Spine1
+ValveBiped.Bip01_Spine1 2:ValveBiped.Bip01_Spine2 3:ValveBiped.Bip01_Spine4
+ValveBiped.Bip01_Spine4 n:ValveBiped.Bip01_Neck1 h:ValveBiped.Bip01_Head1
+ValveBiped.Bip01_Pelvis t:ValveBiped.Bip01_@_Thigh k:ValveBiped.Bip01_@_Calf
+ValveBiped.Bip01_@_Calf a:ValveBiped.Bip01_@_Foot f:ValveBiped.Bip01_@_Toe0
+ValveBiped.Bip01_Spine4 c:ValveBiped.Bip01_@_Clavicle s:ValveBiped.Bip01_@_UpperArm
+ValveBiped.Bip01_@_UpperArm e:ValveBiped.Bip01_@_Forearm w:ValveBiped.Bip01_@_Hand
+ValveBiped.Bip01_@_Hand ValveBiped.Anim_Attachment_@H
 )"},
       {"second life", "Left", "Right", R"(
-mPelvis = pelvis
-  mTorso = spine1
-    mChest = spine3
-      mNeck = neck
-        mHead = head
-          mSkull
-      mCollar@ = collar
-        mShoulder@ = shoulder
-          mElbow@ = elbow
-            mWrist@ = wrist
-  mHip@ = hip
-    mKnee@ = knee
-      mAnkle@ = ankle
-        mFoot@
-          mToe@ = foot
+p:mPelvis 1:mTorso 3:mChest n:mNeck h:mHead mSkull
+mPelvis t:mHip@ k:mKnee@ a:mAnkle@ mFoot@ f:mToe@
+mChest c:mCollar@ s:mShoulder@ e:mElbow@ w:mWrist@
 )"},
       {"tripo and others after character creator", "L", "R", R"(
-Root
-  Hip = pelvis
-    Pelvis
-      @_Thigh = hip
-        @_Calf = knee
-          @_Foot = ankle
-            @_ToeBase = foot
-    Waist = spine1
-      Spine01 = spine2
-        Spine02 = spine3
-          NeckTwist01 = neck
-            NeckTwist02
-              Head = head
-          @_Clavicle = collar
-            @_Upperarm = shoulder
-              @_Forearm = elbow
-                @_Hand = wrist
+Root p:Hip 1:Waist 2:Spine01 3:Spine02 n:NeckTwist01 NeckTwist02 h:Head
+Hip Pelvis
+Pelvis t:@_Thigh k:@_Calf a:@_Foot f:@_ToeBase
+Spine02 c:@_Clavicle s:@_Upperarm e:@_Forearm w:@_Hand
 )"},
       {"meshy, its spine counted downwards", "Left", "Right", R"(
-Hips = pelvis
-  @UpLeg = hip
-    @Leg = knee
-      @Foot = ankle
-        @ToeBase = foot
-  Spine02 = spine1
-    Spine01 = spine2
-      Spine = spine3
-        neck = neck
-          Head = head
-            head_end
-            headfront
-        @Shoulder = collar
-          @Arm = shoulder
-            @ForeArm = elbow
-              @Hand = wrist
+p:Hips 1:Spine02 2:Spine01 3:Spine n:neck h:Head head_end
+Hips t:@UpLeg k:@Leg a:@Foot f:@ToeBase
+Spine c:@Shoulder s:@Arm e:@ForeArm w:@Hand
+Head headfront
 )"},
       {"skyrim", "L", "R", R"(
-NPC Root [Root]
-  NPC COM [COM ]
-    NPC Pelvis [Pelv] = pelvis
-      NPC @ Thigh [@Thg] = hip
-        NPC @ Calf [@Clf] = knee
-          NPC @ Foot [@ft ] = ankle
-            NPC @ Toe0 [@Toe] = foot
-      NPC Spine [Spn0] = spine1
-        NPC Spine1 [Spn1] = spine2
-          NPC Spine2 [Spn2] = spine3
-            NPC Neck [Neck] = neck
-              NPC Head [Head] = head
-            NPC @ Clavicle [@Clv] = collar
-              NPC @ UpperArm [@Uar] = shoulder
-                NPC @ UpperarmTwist1 [@Ut1]
-                NPC @ Forearm [@Lar] = elbow
-                  NPC @ ForearmTwist1 [@Lt1]
-                  NPC @ Hand [@Hnd] = wrist
-                    NPC @ Finger00 [@F00]
+NPC~Root~[Root] NPC~COM~[COM~] p:NPC~Pelvis~[Pelv] 1:NPC~Spine~[Spn0] 2:NPC~Spine1~[Spn1]
+NPC~Spine1~[Spn1] 3:NPC~Spine2~[Spn2] n:NPC~Neck~[Neck] h:NPC~Head~[Head]
+NPC~Pelvis~[Pelv] t:NPC~@~Thigh~[@Thg] k:NPC~@~Calf~[@Clf] a:NPC~@~Foot~[@ft~] f:NPC~@~Toe0~[@Toe]
+NPC~Spine2~[Spn2] c:NPC~@~Clavicle~[@Clv] s:NPC~@~UpperArm~[@Uar] e:NPC~@~Forearm~[@Lar]
+NPC~@~Forearm~[@Lar] w:NPC~@~Hand~[@Hnd] NPC~@~Finger00~[@F00]
+NPC~@~UpperArm~[@Uar] NPC~@~UpperarmTwist1~[@Ut1]
+NPC~@~Forearm~[@Lar] NPC~@~ForearmTwist1~[@Lt1]
 )"},
       {"roblox", "Left", "Right", R"(
-HumanoidRootNode
-  LowerTorso = pelvis
-    UpperTorso = spine1
-      Head = head
-      @UpperArm = shoulder
-        @LowerArm = elbow
-          @Hand = wrist
-    @UpperLeg = hip
-      @LowerLeg = knee
-        @Foot = ankle
+HumanoidRootNode p:LowerTorso 1:UpperTorso h:Head
+LowerTorso t:@UpperLeg k:@LowerLeg a:@Foot
+UpperTorso s:@UpperArm e:@LowerArm w:@Hand
 )"},
       {"dota", "_L", "_R", R"(
-root_motion
-  pelvis = pelvis
-    spine_0 = spine1
-      spine_1
-        spine_2 = spine2
-          spine_3 = spine3
-            neck_0 = neck
-              head = head
-            clavicle@ = collar
-              arm_upper@ = shoulder
-                arm_upper@_TWIST
-                arm_lower@ = elbow
-                  hand@ = wrist
-                    finger_index_0@
-    leg_upper@ = hip
-      leg_upper@_TWIST
-      leg_lower@ = knee
-        ankle@ = ankle
-          ball@ = foot
+root_motion p:pelvis 1:spine_0 spine_1 2:spine_2 3:spine_3 n:neck_0 h:head
+pelvis t:leg_upper@ k:leg_lower@ a:ankle@ f:ball@
+leg_upper@ leg_upper@_TWIST
+spine_3 c:clavicle@ s:arm_upper@ e:arm_lower@ w:hand@ finger_index_0@
+arm_upper@ arm_upper@_TWIST
 )"},
       {"kaykit without its dots", "l", "r", R"(
-root
-  hips = pelvis
-    spine = spine1
-      chest = spine3
-        head = head
-        upperarm@ = shoulder
-          lowerarm@ = elbow
-            wrist@ = wrist
-              hand@
-    upperleg@ = hip
-      lowerleg@ = knee
-        foot@ = ankle
-          toes@ = foot
+root p:hips 1:spine 3:chest h:head
+hips t:upperleg@ k:lowerleg@ a:foot@ f:toes@
+chest s:upperarm@ e:lowerarm@ w:wrist@ hand@
 )"},
       {"all in lower case", "left", "right", R"(
-hips = pelvis
-  spine = spine1
-    chest = spine3
-      neck = neck
-        head = head
-      @shoulder = collar
-        @upperarm = shoulder
-          @forearm = elbow
-            @hand = wrist
-  @upperleg = hip
-    @lowerleg = knee
-      @foot = ankle
-        @toe = foot
+p:hips 1:spine 3:chest n:neck h:head
+hips t:@upperleg k:@lowerleg a:@foot f:@toe
+chest c:@shoulder s:@upperarm e:@forearm w:@hand
 )"}};
   return lists;
 }
