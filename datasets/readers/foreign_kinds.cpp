@@ -29,7 +29,8 @@ const ForeignKind kForeignKinds[] = {
      "convert it to plain arrays (docs/data.md shows how)"},
     {{".mat"},
      "is a file of MATLAB",
-     "save the points with numpy.save (scipy.io.loadmat reads it)"},
+     "save it in MATLAB with -v7.3, which is HDF5, or the points with numpy.save "
+     "(scipy.io.loadmat reads it)"},
     {{".bag", ".db3", ".mcap", ".mkv", ".mp4", ".mov", ".avi"},
      "is a recording of a sensor or a film, not clouds",
      "export its clouds frame by frame, as PLY or PCD"},
