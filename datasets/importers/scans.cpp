@@ -16,6 +16,7 @@
 #include "datasets/readers/folders.h"
 #include "datasets/readers/frame_folder.h"
 #include "datasets/readers/hdf5_frames.h"
+#include "datasets/readers/mesh_io.h"
 #include "datasets/readers/point_path.h"
 #include "nn/geometry/box.h"
 
@@ -214,7 +215,8 @@ class HoldingWriter {
 /// 0.26 to 0.63 m of a person in any pose) that is no person's and not that of some people in a
 /// room either. A remark if a size that passes looks more like one in another unit.
 void check_person(const Frame& frame, double given_scale, ImportReport& report) {
-  if (frame.faces.empty() && is_path(frame.points))
+  // Arrays and tables hold anything; meshes and their kin hold surfaces.
+  if (!is_mesh_name(frame.source) && is_path(frame.points))
     throw InputError(frame.source, kPath, cat(kPathFix, ", or --force to take it as it is"));
   constexpr double kLeast = 0.1, kMost = 5;
   const Box box = box_of(frame.points);

@@ -144,7 +144,7 @@ Points as_points(const std::vector<double>& values) {
 }
 
 /// Whether the steps of the slowest axis of an array [A, B, 3] are points: each moves along a path,
-/// or stays where it is while they lie far apart.
+/// or stays where it is while they lie far apart (and are not frames of somebody who runs far).
 bool are_points(int64_t steps, const ReadSteps& read) {
   constexpr int64_t kLookedAt = 8;
   constexpr size_t kShort = 8;                         // frames in which nobody gets far
@@ -153,6 +153,7 @@ bool are_points(int64_t steps, const ReadSteps& read) {
   float moved = 0;
   int64_t paths = 0;
   bool is_short = false;
+  Points firsts;
   for (int64_t k = 0; k < kLookedAt; ++k) {
     const Points at = as_points(read(k * steps / kLookedAt, 1));
     Point least = at[0], most = at[0];
@@ -162,12 +163,13 @@ bool are_points(int64_t steps, const ReadSteps& read) {
     }
     low = low.cwiseMin(at[0]);
     high = high.cwiseMax(at[0]);
+    firsts.push_back(at[0]);
     moved = std::max(moved, (most - least).norm());
     paths += is_path(at);
     is_short = at.size() < kShort;
   }
-  return 4 * paths >= 3 * kLookedAt ||
-         moved < (is_short ? kStaysShort : kStays) * (high - low).norm();
+  if (4 * paths >= 3 * kLookedAt) return true;
+  return !is_path(firsts) && moved < (is_short ? kStaysShort : kStays) * (high - low).norm();
 }
 
 }  // namespace
