@@ -79,7 +79,8 @@ bool is_no_cloud(const std::string& name, bool one_frame) {
     return std::any_of(words.begin(), words.end(),
                        [&](const std::string& word) { return holds(list, word); });
   };
-  return any(kBesidePoints) || (one_frame && any(kPathsAndSignals) && !any(kOfPoints));
+  const bool numbered = !name.empty() && std::isdigit(static_cast<unsigned char>(name.back()));
+  return any(kBesidePoints) || (one_frame && !numbered && any(kPathsAndSignals) && !any(kOfPoints));
 }
 
 }  // namespace restage

@@ -14,7 +14,7 @@ std::optional<size_t> cloud_rank(const std::string& name);
 /// Whether an array of this name is no cloud, whatever its shape: normals, colours, joints, numbers
 /// of a body model; of one that would be a single cloud (`one_frame`) also paths (root_pos, trans,
 /// com) and what instruments measured (gyro), unless the name also speaks of points
-/// (camera_points).
+/// (camera_points) or is numbered as a frame is (pose_0001).
 bool is_no_cloud(const std::string& name, bool one_frame);
 
 }  // namespace restage

@@ -576,7 +576,7 @@ TEST_F(ReadersArrays, PathsAndSignalsAreNoCloudsByTheirNames) {
     dir.write("b.npz", npz({{name, path}, {"frames", npy<float>({1, 3}, {1, 2, 3})}}));
     EXPECT_EQ(open_frames(dir / "b.npz")->next()->points.size(), 1u) << name;
   }
-  for (const char* name : {"camera_points", "pose_vertices", "scan_of_root"})
+  for (const char* name : {"camera_points", "pose_vertices", "scan_of_root", "pose_0001"})
     EXPECT_EQ(open_frames(dir.write("a.npz", npz({{name, path}})))->next()->points.size(), 80u);
 }
 
