@@ -82,6 +82,9 @@ ONLY_IN = {
     "future": [],
 }
 
+# Third parties whose headers a user of the installed library need not have: in no header of it.
+NOT_IN_HEADERS = ("nlohmann/", "CLI/")
+
 INCLUDE = re.compile(r'^\s*#\s*include\s*(?:"([^"]+)"|<([^>]+)>)', re.M)
 
 
@@ -118,6 +121,9 @@ def check_own(file, target):
 
 
 def check_foreign(file, header):
+    installed = file.endswith(".h") and not file.startswith("experiments/")
+    if installed and header.startswith(NOT_IN_HEADERS):
+        return "not in a header of the library, whose users need not have it"
     for prefix, places in ONLY_IN.items():
         if header == prefix or (prefix.endswith("/") and header.startswith(prefix)):
             if any(file.startswith(place) for place in places):

@@ -3,16 +3,13 @@
 #include <utility>
 
 #include "autograd/base/error.h"
+#include "datasets/readers/hdf5_frames.h"
 #include "datasets/schema.h"
 #include "nn/geometry/skeleton.h"
 #include "nn/metrics/metrics.h"
 
 namespace restage {
 namespace {
-
-bool ends_with_hdf5(const std::string& path) {
-  return path.ends_with(".h5") || path.ends_with(".hdf5");
-}
 
 /// Of one sequence.
 std::vector<Joints> read_joints(const std::string& path, int64_t sequence) {
@@ -43,7 +40,7 @@ Clip skeletons(const std::string& path, const std::string& label, int64_t sequen
 }
 
 bool has_joints_only(const std::string& path) {
-  if (!ends_with_hdf5(path)) return false;
+  if (!is_hdf5(path)) return false;
   const Inspection found = inspect(path);
   return found.kind == "prediction" && found.counts.count("vertices") == 0;
 }
@@ -101,16 +98,16 @@ Clip read_clip(const SourceRecord& how, const std::string& label, uint64_t max_m
     remarks.push_back(std::to_string(left_out) + " points of " + how.path +
                       " are NaN or infinite and are left out");
   if (!surface) clip.faces.clear();
-  if (ends_with_hdf5(how.path)) clip.confidence = read_confidence(how.path, sequence);
+  if (is_hdf5(how.path)) clip.confidence = read_confidence(how.path, sequence);
   return clip;
 }
 
 bool has_joints(const std::string& path) {
-  return ends_with_hdf5(path) && inspect(path).counts.contains("joints");
+  return is_hdf5(path) && inspect(path).counts.contains("joints");
 }
 
 std::vector<Point> read_focus(const std::string& path, size_t joint, int64_t sequence) {
-  if (!ends_with_hdf5(path))
+  if (!is_hdf5(path))
     throw InputError(path, "does not say where its joints are", "give HDF5 with /joints");
   std::vector<Point> out;
   for (const Joints& joints : read_joints(path, sequence))

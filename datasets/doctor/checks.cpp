@@ -60,6 +60,7 @@ void check_source(const std::vector<Mesh>& first_frames, const std::string& wher
   const Diagnosis d = examine_frames(frames);
   for (const Finding& f : d.findings) {
     if (f.weight != Weight::wrong || f.topic == "points") continue;
+    if (f.topic == "path") refuse(where, f, f.fix);
     if (f.topic == "units") refuse(where, f, scale_advice(d.size, given.scale));
     if (f.topic == "up" && f.sure < kNobody) refuse(where, f, "give scans of one whole person");
     // A few frames, alike: less certain than the many that the doctor looks at.
@@ -82,7 +83,7 @@ void check_target(const Mesh& target, const std::string& where, ExamineOptions o
     if (f.topic == "pose") said.what += ": " + f.evidence;
     refuse(where, said,
            nobody ? "give one whole person in T-pose"
-           : f.topic == "pose" || f.topic == "points"
+           : f.topic == "pose" || f.topic == "points" || f.topic == "path"
                ? f.fix
                : "restage doctor --target --fix OUT mends it");
   }

@@ -63,6 +63,7 @@ Diagnosis doctor_detail::judge_surface(const Mesh& mesh, const PersonShape& shap
   d.faces = mesh.faces.size();
   d.fewest_points = d.most_points = mesh.vertices.size();
   judge_points(d, mesh.vertices.size() - equal);
+  if (mesh.faces.empty()) judge_path(d, mesh.vertices);
   Seen seen;
   seen.vote.add(shape.points);
   seen.size = shape.size;

@@ -64,9 +64,14 @@ Diagnosis examine_frames(FrameSource& source, const ExamineOptions& options = {}
 /// and in our frame. Of a surface only whole pieces are left out; the order of the rest stays.
 Mesh mended(const Mesh& mesh, const Diagnosis& diagnosis);
 
-/// That the reader left points out because a coordinate is NaN or infinite: retargeting refuses
-/// them. `where` is added to the sentence.
-Finding non_finite(size_t points, const std::string& where);
+/// That the reader left points out because a coordinate is NaN or infinite, as retargeting does
+/// with those of a source; it refuses those of a target. `where` is added to the sentence.
+Finding non_finite(size_t points, const std::string& where, bool target = false);
+
+/// What is said of points that are the path of one point (readers/point_path.h), and what to do.
+inline constexpr const char* kPath =
+    "the points are places of one moving point, such as somebody's root, and no surface";
+inline constexpr const char* kPathFix = "give clouds of a whole person";
 
 /// The unit of skeletons, by the lengths of their bones, which no pose changes.
 Finding examine_skeletons(const std::vector<Joints>& frames);

@@ -32,6 +32,8 @@ void judge_facing(Diagnosis& d, const ExamineOptions& options);
 /// Transform, height and floor; heights along the up axis found, in the data's units.
 void judge_frame(Diagnosis& d, double lowest, double highest);
 void judge_points(Diagnosis& d, size_t distinct);
+/// Of one cloud: whether it is the path of one point.
+void judge_path(Diagnosis& d, const Points& points);
 /// Scale and axes are of no consequence but for the up axis; a target must be in T-pose.
 void judge_pose(Diagnosis& d, const PersonShape& shape, const ExamineOptions& options);
 /// `where` is added to each sentence (" in frame 7"), and may be empty.

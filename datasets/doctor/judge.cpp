@@ -5,6 +5,7 @@
 #include "datasets/doctor/examine_detail.h"
 #include "datasets/doctor/pose.h"
 #include "datasets/doctor/words.h"
+#include "datasets/readers/point_path.h"
 
 namespace restage {
 
@@ -183,6 +184,12 @@ void judge_points(Diagnosis& d, size_t distinct) {
          "scan it more finely"});
 }
 
+void judge_path(Diagnosis& d, const Points& points) {
+  if (!is_path(points)) return;
+  d.say(
+      {"path", Weight::wrong, kPath, 0.99, "each is near the one before, in even steps", kPathFix});
+}
+
 void judge_plane(Diagnosis& d, const Parts& parts, const std::string& where) {
   if (parts.flat == 0) return;
   const double share = static_cast<double>(parts.flat) / static_cast<double>(parts.part.size());
@@ -282,10 +289,11 @@ void judge_duplicates(Diagnosis& d, size_t equal, bool cloud, const std::string&
 
 }  // namespace doctor_detail
 
-Finding non_finite(size_t points, const std::string& where) {
+Finding non_finite(size_t points, const std::string& where, bool target) {
   return {"non-finite",
-          Weight::wrong,
-          doctor_detail::counted(points, "point") + " with a NaN or infinite coordinate" + where,
+          target ? Weight::wrong : Weight::note,
+          doctor_detail::counted(points, "point") + " with a NaN or infinite coordinate" + where +
+              (target ? "" : ", which retarget leaves out"),
           1,
           "counted",
           "--fix leaves them out"};

@@ -151,6 +151,7 @@ class Sequence {
       d_.fewest_points = std::min(d_.fewest_points, n);
       d_.most_points = std::max(d_.most_points, n);
       d_.faces = frame->faces.size();
+      if (i == 0 && frame->faces.empty()) judge_path(d_, frame->points);
       non_finite_ += frame->left_out;
       non_finite_frames_ += frame->left_out > 0;
       const Points once = without_repeats(frame->points);

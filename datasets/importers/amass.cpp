@@ -6,6 +6,7 @@
 
 #include "autograd/base/format.h"
 #include "datasets/importers/body_rotations.h"
+#include "datasets/importers/body_units.h"
 #include "datasets/importers/import_detail.h"
 #include "datasets/readers/array_frames.h"
 #include "datasets/readers/errors.h"
@@ -134,7 +135,7 @@ JointMap identity_map() {
 
 /// The rest pose is the model's, y up; only the world that its root turns in may be another.
 SourceMotion read_motion(const Npz& file, const BodyParameters& names, BodyRotations rotations,
-                         const Joints& rest) {
+                         const Joints& rest, const MotionOptions& options, ImportReport& report) {
   if (names.trans.empty())
     throw InputError(file.path(),
                      cat("says where the joints are (", rotations.layout, "), but not the body"),
@@ -144,6 +145,8 @@ SourceMotion read_motion(const Npz& file, const BodyParameters& names, BodyRotat
   if (trans.is_text() || trans.size() != 3 * frames)
     throw InputError(trans.where(), "has the shape " + shape_text(trans.shape()),
                      cat("it needs one position a frame: [", frames, ", 3]"));
+  const std::vector<double> metres =
+      metres_of_trans(file, names, rotations.local.size(), options, report);
   SourceMotion out;
   out.skeleton = skeleton_of(rest);
   out.moving = {0};
@@ -153,7 +156,7 @@ SourceMotion read_motion(const Npz& file, const BodyParameters& names, BodyRotat
     if (!(at.cwiseAbs().maxCoeff() < 1e5))
       throw InputError(trans.where(), "holds a number that is not finite or too large",
                        "give the file as it was published");
-    out.position.push_back({at + rest[0]});
+    out.position.push_back({metres[static_cast<size_t>(f)] * at + rest[0]});
   }
   return out;
 }
@@ -309,7 +312,8 @@ bool is_amass_motion(const Npz& file) {
 
 bool is_amass_shape(const Npz& file) {
   const BodyParameters names = body_parameters(file);
-  return !names.betas.empty() && names.poses.empty() && names.orient.empty() && !named_cloud(file);
+  return !names.betas.empty() && names.poses.empty() && names.orient.empty() &&
+         names.body.empty() && !named_cloud(file);
 }
 
 Motion import_amass(const Npz& file, BodyModels& models, const MotionOptions& options,
@@ -317,6 +321,7 @@ Motion import_amass(const Npz& file, BodyModels& models, const MotionOptions& op
   report.file = file.path();
   const BodyParameters names = body_parameters(file);
   BodyRotations rotations = read_body_rotations(file, names);
+  check_radians(file, rotations, options.force, report);
   const std::optional<SmplFamily> family = family_of(file, rotations, report);
   report.fact("layout", cat(family ? to_string(*family) : "22 joints", ", ", rotations.layout));
   const std::string gender = text_of(file, "gender", report);
@@ -326,12 +331,13 @@ Motion import_amass(const Npz& file, BodyModels& models, const MotionOptions& op
   report.fact("body model", cat(model.path(), ", ", std::min(betas.size(), model.shapes()), " of ",
                                 betas.size(), " betas"));
   const Joints rest = model.joints(betas);
-  SourceMotion motion = read_motion(file, names, std::move(rotations), rest);
+  SourceMotion motion = read_motion(file, names, std::move(rotations), rest, options, report);
   turn_upright(motion, file, options.rest.up, report);
-  if (lower_case(names.trans) == "cam_trans")
-    report.remark("the path is what a camera saw (cam_trans): its depth is an estimate");
+  if (lower_case(names.trans).find("cam_t") != std::string::npos)
+    report.remark("the path is what a camera saw (" + names.trans + "): its depth is an estimate");
   std::string from;
   motion.fps = rate_of(file, options.fps, from, report);
+  check_metres(file.path() + ":" + names.trans, motion, options, report);
   uint64_t bytes = 0;
   for (const std::string& name : {names.poses, names.orient, names.body})
     if (!name.empty()) bytes += file.header(name).bytes();

@@ -26,20 +26,28 @@ struct RotationArray {
   throw InputError(array.where(), "has the shape " + shape_text(array.shape()), fix);
 }
 
-RotationArray open_rotations(const Npz& file, const std::string& name) {
+/// Numbers of joints of a body model.
+bool is_known(int64_t joints) {
+  return joints == 22 || joints == 24 || joints == 52 || joints == 55;
+}
+
+/// `whole`: of all joints of a body.
+RotationArray open_rotations(const Npz& file, const std::string& name, bool whole) {
   RotationArray out{file.array(name)};
   const std::vector<int64_t>& shape = out.array.shape();
   if (out.array.is_text() || shape.size() < 2)
     misshapen(out.array, "rotations are axis-angle numbers, [F, 3 J] or [F, J, 3]");
-  out.frames = shape[0];
+  const bool squares = shape.size() > 2 && shape.back() == 3 && shape[shape.size() - 2] == 3;
+  const bool one_frame = squares && shape.size() == 3 && whole && is_known(shape[0]);
+  out.frames = one_frame ? 1 : shape[0];
   if (out.frames == 0 || out.frames > kMaxFrames)
     throw InputError(out.array.where(), cat("has ", out.frames, " frames"),
                      cat("give 1 to ", kMaxFrames));
-  const int64_t last = shape.back(), row = out.array.size() / out.frames;
+  const int64_t last = shape.back();
   if (shape.size() > 2 && (last == 4 || last == 6))
     misshapen(out.array, cat("turn its ", last == 4 ? "quaternions" : "6D rotations",
                              " into axis-angle numbers [F, 3 J] first"));
-  const bool squares = shape.size() > 2 && last == 3 && shape[shape.size() - 2] == 3;
+  const int64_t row = out.array.size() / out.frames;
   out.form = squares || (shape.size() > 2 && last == 9) ? Form::matrix : Form::axis_angle;
   if (row == 0 || row % out.width() != 0)
     misshapen(out.array, "rotations are axis-angle numbers, [F, 3 J] or [F, J, 3]");
@@ -53,7 +61,8 @@ Quat rotation(const Vec3& axis_angle) {
   return Quat(Eigen::AngleAxisd(angle, axis_angle / angle));
 }
 
-Quat rotation_at(const RotationArray& from, int64_t frame, int64_t joint) {
+/// `largest` grows to the angle of axis-angle numbers.
+Quat rotation_at(const RotationArray& from, int64_t frame, int64_t joint, double& largest) {
   const int64_t at = (frame * from.joints + joint) * from.width();
   double numbers[9];
   for (int64_t i = 0; i < from.width(); ++i) {
@@ -62,7 +71,11 @@ Quat rotation_at(const RotationArray& from, int64_t frame, int64_t joint) {
       throw InputError(from.array.where(), "holds a number that is not finite or too large",
                        kAsPublished);
   }
-  if (from.form == Form::axis_angle) return rotation(Vec3(numbers[0], numbers[1], numbers[2]));
+  if (from.form == Form::axis_angle) {
+    const Vec3 turn(numbers[0], numbers[1], numbers[2]);
+    largest = std::max(largest, turn.norm());
+    return rotation(turn);
+  }
   const Mat3 matrix = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(numbers);
   if (!((matrix * matrix.transpose() - Mat3::Identity()).cwiseAbs().maxCoeff() < 0.05) ||
       !(matrix.determinant() > 0))
@@ -75,7 +88,8 @@ void add_joints(const RotationArray& from, int64_t first, BodyRotations& out) {
   const int64_t count = std::min<int64_t>(from.joints, kJoints - first);
   for (int64_t f = 0; f < from.frames; ++f)
     for (int64_t j = 0; j < count; ++j)
-      out.local[static_cast<size_t>(f)][static_cast<size_t>(first + j)] = rotation_at(from, f, j);
+      out.local[static_cast<size_t>(f)][static_cast<size_t>(first + j)] =
+          rotation_at(from, f, j, out.largest);
 }
 
 std::string named(const std::string& name, const NpyArray& array) {
@@ -84,14 +98,13 @@ std::string named(const std::string& name, const NpyArray& array) {
 
 BodyRotations empty(int64_t frames, int64_t joints, const NpyArray& where,
                     const std::string& layout) {
-  for (const int64_t known : {22, 24, 52, 55})
-    if (joints == known) {
-      BodyRotations out;
-      out.local.assign(static_cast<size_t>(frames), std::vector<Quat>(kJoints, Quat::Identity()));
-      out.joints = joints;
-      out.layout = layout;
-      return out;
-    }
+  if (is_known(joints)) {
+    BodyRotations out;
+    out.local.assign(static_cast<size_t>(frames), std::vector<Quat>(kJoints, Quat::Identity()));
+    out.joints = joints;
+    out.layout = layout;
+    return out;
+  }
   throw InputError(where.where(),
                    cat("has the shape ", shape_text(where.shape()), ", ", joints, " joints in all"),
                    "AMASS has [F, 156] (SMPL-H) and [F, 165] (SMPL-X); [F, 72] (SMPL) and [F, 66] "
@@ -104,14 +117,14 @@ BodyRotations read_body_rotations(const Npz& file, const BodyParameters& names) 
   // AMASS keeps its parts beside the whole; of others the parts have the plainer names.
   const bool parts = !names.orient.empty() && !names.body.empty();
   if (names.poses == "poses" || !parts) {
-    const RotationArray poses = open_rotations(file, names.poses);
+    const RotationArray poses = open_rotations(file, names.poses, true);
     BodyRotations out =
         empty(poses.frames, poses.joints, poses.array, named(names.poses, poses.array));
     add_joints(poses, 0, out);
     return out;
   }
-  const RotationArray root = open_rotations(file, names.orient),
-                      body = open_rotations(file, names.body);
+  const RotationArray root = open_rotations(file, names.orient, false),
+                      body = open_rotations(file, names.body, false);
   if (root.joints != 1) misshapen(root.array, "the root has one rotation a frame");
   if (root.frames != body.frames)
     misshapen(root.array, cat("it needs as many frames as ", names.body, ": ", body.frames));

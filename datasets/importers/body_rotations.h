@@ -15,10 +15,12 @@ struct BodyRotations {
   std::vector<std::vector<Quat>> local;  ///< per frame
   int64_t joints = 0;
   std::string layout;  ///< for the report: "poses [61, 156]"
+  double largest = 0;  ///< axis-angle numbers: the largest angle, radians; of matrices 0
 };
 
 /// From one array of all joints or from those of the root and the rest: axis-angle numbers ([F, 3
-/// J], [F, J, 3]) or rotation matrices ([F, J, 3, 3]), with or without axes of length 1.
+/// J], [F, J, 3]) or rotation matrices ([F, J, 3, 3], of one frame [J, 3, 3]), with or without axes
+/// of length 1.
 /// InputError: other shapes and numbers of joints, no rotations, not finite.
 BodyRotations read_body_rotations(const Npz& file, const BodyParameters& names);
 

@@ -9,9 +9,6 @@
 
 namespace restage {
 
-/// The trunk among the 22 joints.
-enum : int { kPelvis = 0, kSpine1 = 3, kSpine2 = 6, kSpine3 = 9, kNeck = 12, kHead = 15 };
-
 /// The bone of each of the 22 joints; -1: none.
 using Bones = std::array<int, kJoints>;
 

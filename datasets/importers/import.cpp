@@ -207,7 +207,7 @@ void count_ignored(const std::string& folder, bool (*considered)(const std::stri
 
 bool holds_scans(const std::string& path) {
   return is_array_name(path) || is_mesh_name(path) || is_cloud_name(path) || is_text_name(path) ||
-         is_hdf5_name(path);
+         is_hdf5(path);
 }
 
 bool is_pickle_name(const std::string& path) { return path.ends_with(".pkl"); }

@@ -8,6 +8,7 @@
 #include "datasets/importers/scans.h"
 #include "datasets/importers/smpl.h"
 #include "datasets/readers/array_frames.h"
+#include "datasets/readers/body_parameters.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/folders.h"
 #include "datasets/readers/foreign_kinds.h"
@@ -65,6 +66,7 @@ ImportSummary import_amass_files(const std::vector<std::string>& files, const st
       ++summary.shapes;
       return;
     }
+    if (!named_cloud(file)) refuse_incomplete(file, body_parameters(file));
     if (!is_amass_motion(file))
       throw InputError(path, "holds no motion (it has " + list_of(file.names()) + ")",
                        "AMASS motions have poses and trans");
@@ -177,6 +179,7 @@ ImportSummary import_npz(const std::string& source, const std::string& out,
   if (is_amass_shape(file))
     throw InputError(source, "holds a body's shape and no motion",
                      "import the body model and give this file as --betas");
+  find_cloud(file);  // refuses half a motion by what is missing
   return import_scan_files(source, out, options);
 }
 

@@ -24,11 +24,11 @@ std::vector<Given> all_of(const ImportOptions& options) {
               motions = {bvh, amc, character, amass},
               bodies = {bvh, amc, character, amass, body_model},
               files = {bvh, amc, character, amass, body_model, scans},
-              scaled = {bvh, amc, character, scans}, timed = {bvh, amc, amass, scans},
+              scaled = {bvh, amc, character, amass, scans}, timed = {bvh, amc, amass, scans},
               turned = {bvh, amc, character, amass, scans};
   const char *of_recordings = "BVH and AMC recordings",
              *of_moving = "recordings and glTF characters",
-             *of_scaled = "recordings, glTF characters and scans",
+             *of_scaled = "recordings, glTF characters, AMASS motions and scans",
              *of_timed = "recordings, AMASS motions and scans (glTF files state their key times)",
              *of_turned = "recordings, characters, AMASS motions and scans";
   const ImportOptions none;

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "autograd/base/format.h"
+#include "datasets/doctor/examine.h"
 #include "datasets/doctor/orientation_model.h"
 #include "datasets/doctor/shape.h"
 #include "datasets/readers/array_frames.h"
@@ -17,6 +18,8 @@
 #include "datasets/readers/foreign_kinds.h"
 #include "datasets/readers/frame_folder.h"
 #include "datasets/readers/hdf5_frames.h"
+#include "datasets/readers/mesh_io.h"
+#include "datasets/readers/point_path.h"
 #include "nn/geometry/box.h"
 
 namespace restage {
@@ -77,7 +80,7 @@ void add_arrays(const std::string& folder, const std::vector<std::string>& files
 /// The sequences of a file.
 void add_file(const std::string& file, const FrameOptions& options,
               std::vector<ScanSequence>& out) {
-  if (!is_hdf5_name(file)) return out.push_back({file, file, {}, {}});
+  if (!is_hdf5(file)) return out.push_back({file, file, {}, {}});
   const int64_t sequences = open_frames(file, options)->sequences();
   for (int64_t s = 0; s < sequences; ++s)
     out.push_back({sequences == 1 ? file : cat(file, ":", s), file, s, {}});
@@ -87,7 +90,7 @@ void add_file(const std::string& file, const FrameOptions& options,
 void add_folder(const std::string& folder, uint64_t max_memory, std::vector<ScanSequence>& out,
                 std::vector<std::string>& skipped) {
   for (const std::string& file : files_in(folder)) {
-    if (!is_hdf5_name(file)) continue;
+    if (!is_hdf5(file)) continue;
     try {
       add_file(file, {"", max_memory}, out);
     } catch (const InputError& error) {  // our own data files, mostly
@@ -248,27 +251,42 @@ class HoldingWriter {
   size_t fewest_ = 0, most_ = 0;
 };
 
-/// InputError unless its size, the median distance to its median point, can be that of a person
-/// (0.26 to 0.63 m in any pose) or of some people in a room: in metres where the scale is given,
-/// else in some unit, with a remark if that is surely another than metres.
-void check_size(const Frame& frame, double given_scale, ImportReport& report) {
-  constexpr double kLeast = 0.1, kMost = 5, kMillimetre = 0.001;
+/// InputError for the path of one point, and for a size (the median distance to the median point,
+/// 0.26 to 0.63 m of a person in any pose) that is no person's and not that of some people in a
+/// room either. A remark if a size that passes looks more like one in another unit.
+void check_person(const Frame& frame, double given_scale, ImportReport& report) {
+  // Arrays and tables hold anything; meshes and their kin hold surfaces.
+  if (!is_mesh_name(frame.source) && is_path(frame.points))
+    throw InputError(frame.source, kPath, cat(kPathFix, ", or --force to take it as it is"));
+  constexpr double kLeast = 0.1, kMost = 5;
   const Box box = box_of(frame.points);
   const double width = (box.max().cast<double>() - box.min().cast<double>()).norm();
   const double size = width < 1e7 ? doctor_detail::normalised(frame.points).size : width;
-  if (given_scale > 0 && !(size * given_scale > kLeast && size * given_scale < kMost))
-    throw InputError(frame.source,
-                     format("is %.3g m large with --scale %.6g, which no person is",
-                            width * given_scale, given_scale),
-                     "give the true metres a unit, or leave --scale out to hear what it seems");
-  if (!(given_scale > 0) && !(size > kLeast && size < kMost / kMillimetre))
-    throw InputError(frame.source,
-                     format("is %.3g units large, which no person is in any unit", width),
-                     "give scans of one person, or metres a unit as --scale");
+  const double metres = given_scale > 0 ? given_scale * size : size;
   const UnitGuess guess = guess_unit(size);
-  if (!(given_scale > 0) && guess.unit.metres != 1 && guess.sure > 0.9)
-    report.remark(format("a unit seems to be %.6g m: if so, give --scale %.6g", guess.unit.metres,
-                         guess.unit.metres));
+  const bool other = guess.unit.metres != 1 && guess.sure > 0.5;
+  if (metres > kLeast && metres < kMost) {
+    if (!(given_scale > 0) && other && guess.sure > 0.9)
+      report.remark(format("a unit seems to be %.6g m: if so, give --scale %.6g", guess.unit.metres,
+                           guess.unit.metres));
+    return;
+  }
+  if (given_scale > 0)
+    throw InputError(
+        frame.source,
+        format("is %.3g m large with --scale %.6g, which no person is", width * given_scale,
+               given_scale),
+        "give the true metres a unit, leave --scale out to hear what it seems, or --force");
+  if (other)
+    throw InputError(
+        frame.source,
+        format("is %.3g units large, which no person is in metres; a unit seems to "
+               "be %.6g m",
+               width, guess.unit.metres),
+        format("give --scale %.6g, or --force to take it as it is", guess.unit.metres));
+  throw InputError(frame.source,
+                   format("is %.3g units large, which no person is in any unit", width),
+                   "give scans of one person, metres a unit as --scale, or --force");
 }
 
 std::string size_fact(const Points& points) {
@@ -311,7 +329,7 @@ int64_t import_scans(const ScanSequence& sequence, const MotionOptions& options,
   const auto source = one ? open_frames(sequence.file, how) : open_frame_list(sequence.frames, how);
   const bool stated =
       one && ((is_array_name(sequence.file) && stated_fps(sequence.file, max_memory)) ||
-              (is_hdf5_name(sequence.file) && states_fps(sequence.file)));
+              (is_hdf5(sequence.file) && states_fps(sequence.file)));
   const double fps = options.fps > 0 ? options.fps : source->fps();
   const double scale = options.scale > 0 ? options.scale : 1;
   const Clock clock(source->frames(), fps);
@@ -344,7 +362,7 @@ int64_t import_scans(const ScanSequence& sequence, const MotionOptions& options,
       if (frame.fault) faults.push_back(*frame.fault);
       different = different_points(frame.points);
       const bool look = first && different >= kFewest;
-      if (look) check_size(frame, options.scale, report);
+      if (look && !options.force) check_person(frame, options.scale, report);
       convert(frame, to_ours);
       if (look) report.fact("size", size_fact(frame.points));
       first = first && !look;

@@ -1,35 +1,16 @@
 #include "datasets/readers/array_frames.h"
 
 #include <algorithm>
-#include <array>
+#include <limits>
 
 #include "datasets/readers/body_parameters.h"
+#include "datasets/readers/cloud_names.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/precision.h"
 #include "datasets/readers/text.h"
-#include "datasets/readers/word_lines.h"
 
 namespace restage {
 namespace {
-
-/// What clouds are called, the surest first.
-constexpr std::array<std::string_view, 20> kClouds = {
-    "points",     "vertices",    "verts", "v_posed", "xyz",    "pointcloud",   "point_cloud",
-    "cloud",      "pc",          "pcl",   "pcd",     "pts",    "coords",       "positions",
-    "scan_verts", "scan_points", "scan",  "v",       "vertex", "scan_vertices"};
-/// What has the shape of a cloud and is none.
-constexpr std::array<std::string_view, 30> kOthers = {
-    "normals", "normal",     "n",           "vn",          "colors",        "colours",
-    "color",   "rgb",        "faces",       "f",           "face",          "triangles",
-    "trans",   "transl",     "cam_trans",   "translation", "joints",        "joints3d",
-    "j3d",     "keypoints",  "keypoints3d", "kp3d",        "j_posed",       "velocity",
-    "v_cano",  "v_template", "uv",          "root_orient", "global_orient", "markers"};
-
-template <class Names>
-bool is_one_of(const std::string& name, const Names& names) {
-  const std::string lower = lower_case(name);
-  return std::find(names.begin(), names.end(), lower) != names.end();
-}
 
 std::optional<CloudAxes> axes_of(const NpyHeader& header) {
   return header.is_text() ? std::nullopt : cloud_axes(header.shape);
@@ -69,7 +50,7 @@ CloudArray need_cloud(const Npz& file) {
   std::optional<CloudArray> cloud = find_cloud(file);
   if (!cloud)
     throw InputError(file.path(), "holds no points (its arrays: " + list_of(file.names()) + ")",
-                     "save an array [N, 3] or [F, N, 3] named 'points'");
+                     "save the points as an array [N, 3] or [F, N, 3] named 'points'");
   return *cloud;
 }
 
@@ -87,9 +68,10 @@ std::vector<CloudArray> unnamed_clouds(const Npz& file) {
   for (const bool whole_numbers : {false, true}) {  // of scanners, where nothing else is there
     for (const std::string& name : file.names()) {
       const std::optional<NpyHeader> header = header_if_readable(file, name);
-      if (!header || is_one_of(name, kOthers)) continue;
+      if (!header) continue;
       const std::optional<CloudAxes> axes = axes_of(*header);
-      if (axes && (header->kind != 'f') == whole_numbers && header->kind != 'b')
+      if (axes && !is_no_cloud(name, !axes->sequence) && (header->kind != 'f') == whole_numbers &&
+          header->kind != 'b')
         out.push_back({name, *axes});
     }
     if (!out.empty()) break;
@@ -106,14 +88,12 @@ std::vector<std::string> names_of(const std::vector<CloudArray>& clouds) {
 class ArrayFrames : public FrameSource {
  public:
   ArrayFrames(const std::string& path, OpenArray array, double fps, uint64_t max_memory)
-      : path_(path), array_(std::move(array)), fps_(fps) {
-    if (array_.header.fortran || !array_.axes.in_order()) {
-      array_.in->rewind();
-      whole_.emplace(*array_.in, max_memory);
-    } else if (bytes_per_frame() > max_memory) {
-      throw InputError(path, cat("has frames of ", bytes_per_frame(), " bytes"),
-                       "allow more with --max-memory");
-    }
+      : path_(path), array_(std::move(array)), fps_(fps), max_memory_(max_memory) {
+    settle_memory();
+    const ReadSteps steps = [&](int64_t first, int64_t count) { return read_steps(first, count); };
+    array_.axes = axes_by_numbers(array_.axes, array_.header.shape, steps);
+    settle_memory();
+    rewind();
   }
 
   std::optional<Frame> next() override {
@@ -149,6 +129,36 @@ class ArrayFrames : public FrameSource {
     return array_.header.bytes() / static_cast<uint64_t>(frames());
   }
 
+  /// The whole array is kept where a frame is spread over it.
+  void settle_memory() {
+    if (whole_) return;
+    if (array_.header.fortran || !array_.axes.in_order()) {
+      array_.in->rewind();
+      whole_.emplace(*array_.in, max_memory_);
+    } else if (bytes_per_frame() > max_memory_) {
+      throw InputError(path_, cat("has frames of ", bytes_per_frame(), " bytes"),
+                       "allow more with --max-memory");
+    }
+  }
+
+  /// See ReadSteps; the file then stands somewhere else.
+  std::vector<double> read_steps(int64_t first, int64_t count) {
+    const NpyHeader& header = array_.header;
+    const int64_t step = header.count / header.shape[0];
+    std::vector<double> out;
+    if (whole_) {
+      for (int64_t i = first * step; i < (first + count) * step; ++i) out.push_back((*whole_)[i]);
+      return out;
+    }
+    const auto bytes = static_cast<int64_t>(header.width) * step;
+    rewind();
+    array_.in->skip(static_cast<uint64_t>(first * bytes));
+    const std::vector<char> all = array_.in->take(static_cast<uint64_t>(count * bytes));
+    for (int64_t i = 0; i < count * step; ++i)
+      out.push_back(header.number(all.data() + i * static_cast<int64_t>(header.width)));
+    return out;
+  }
+
   void read(Frame& frame) {
     const std::vector<char> bytes =
         whole_ ? std::vector<char>() : array_.in->take(bytes_per_frame());
@@ -169,6 +179,7 @@ class ArrayFrames : public FrameSource {
   std::string path_;
   OpenArray array_;
   double fps_;
+  uint64_t max_memory_;
   std::optional<NpyArray> whole_;
   int64_t at_ = 0;
 };
@@ -192,8 +203,11 @@ class SeriesFrames : public FrameSource {
   int64_t frames() const override { return std::ssize(names_); }
   double fps() const override { return fps_; }
   std::vector<std::string> remarks() const override {
-    return {cat("its ", names_.size(), " arrays, ", text::quote(names_[0]), " to ",
-                text::quote(names_.back()), ", are the frames of a sequence")};
+    std::vector<std::string> out =
+        ArrayFrames(file_.path(), open_array(file_.open(names_[0])), fps_, max_memory_).remarks();
+    out.push_back(cat("its ", names_.size(), " arrays, ", text::quote(names_[0]), " to ",
+                      text::quote(names_.back()), ", are the frames of a sequence"));
+    return out;
   }
 
  private:
@@ -211,22 +225,28 @@ bool is_npz_name(const std::string& path) { return text::ends_in(path, {".npz"})
 bool is_array_name(const std::string& path) { return text::ends_in(path, {".npy", ".npz"}); }
 
 std::optional<CloudArray> named_cloud(const Npz& file) {
-  for (const std::string_view wanted : kClouds)
-    for (const std::string& name : file.names()) {
-      if (lower_case(name) != wanted) continue;
-      const NpyHeader header = file.header(name);
-      if (const auto axes = axes_of(header)) return CloudArray{name, *axes};
+  std::optional<CloudArray> out;
+  size_t best = std::numeric_limits<size_t>::max();
+  for (const std::string& name : file.names()) {
+    const std::optional<size_t> rank = cloud_rank(name);
+    if (!rank || *rank >= best) continue;
+    if (const auto axes = axes_of(file.header(name))) {
+      best = *rank;
+      out = CloudArray{name, *axes};
     }
-  return std::nullopt;
+  }
+  return out;
 }
 
 std::optional<CloudArray> find_cloud(const Npz& file) {
   if (auto cloud = named_cloud(file)) return cloud;
-  if (body_parameters(file).moves())
+  const BodyParameters parameters = body_parameters(file);
+  if (parameters.moves())
     throw InputError(file.path(), "is a motion of a body model (as AMASS has them), not a scan",
                      "restage data import FILE --body-model MODEL --out M.h5, then restage data "
                      "perform --motions M.h5 makes clouds of it");
   const std::vector<CloudArray> found = unnamed_clouds(file);
+  if (found.empty()) refuse_incomplete(file, parameters);
   if (found.empty()) return std::nullopt;
   if (found.size() == 1) return found[0];
   const bool single = std::none_of(found.begin(), found.end(),

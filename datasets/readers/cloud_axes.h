@@ -2,30 +2,45 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 namespace restage {
 
-/// Coordinate c of point i of frame f is element f * frame_step + i * point_step + c * axis_step of
-/// the array in C order.
+/// Coordinate c of point i of frame f is element f * frame_step + i * point_step + (skipped + c) *
+/// axis_step of the array in C order.
 struct CloudAxes {
   int64_t frames = 1, points = 0;
   int64_t frame_step = 0, point_step = 0, axis_step = 0;
+  int64_t columns = 3;    ///< numbers of a point, of which three count
+  int64_t skipped = 0;    ///< columns before x
   bool sequence = false;  ///< has an axis of frames
   std::string remark;     ///< what was chosen, where it is not plain; else empty
   int64_t at(int64_t frame, int64_t point, int64_t axis) const {
-    return frame * frame_step + point * point_step + axis * axis_step;
+    return frame * frame_step + point * point_step + (skipped + axis) * axis_step;
   }
   /// Whether each frame lies in one piece, one after the other.
   bool in_order() const { return !sequence || frame_step >= points * 3; }
 };
 
 /// Taken are [N, 3] and [F, N, 3]; more columns than three (colours, normals, up to 12 in all), of
-/// which the first three count; axes in another order ([3, N], [V, 3, F], [F, 3, V], [3, V, F]): of
-/// two lengths the larger is that of the points, unless `vertices` says how many there are;
-/// pictures of a depth camera, [H, W, 3] of a known size or [F, H, W, 3]. Nothing for other shapes.
+/// which the first three count; axes in another order ([3, N], [6, N], [V, 3, F], [F, 3, V], [3, V,
+/// F], [F, 6, V]): of two lengths the larger is that of the points, unless `vertices` says how many
+/// there are; pictures of a depth camera, [H, W, 3] or [3, H, W] of a known size, [F, H, W, 3] or
+/// [F, 3, H, W]. Nothing for other shapes.
 std::optional<CloudAxes> cloud_axes(const std::vector<int64_t>& shape, int64_t vertices = 0);
+
+/// The numbers of steps [first, first + count) of an array's slowest axis, in C order.
+using ReadSteps = std::function<std::vector<double>(int64_t first, int64_t count)>;
+
+/// What only the numbers of an array tell, with a remark in the result's:
+/// - of more than three columns the first counts the points (0, 1, 2 ...) or gives times at equal
+///   steps: x, y and z are the three behind it;
+/// - an array [V, F, 3] has its points first: what would be a frame is the path of one point.
+/// `axes` are those of cloud_axes(), `vertices` as there.
+CloudAxes axes_by_numbers(CloudAxes axes, const std::vector<int64_t>& shape, const ReadSteps& read,
+                          int64_t vertices = 0);
 
 }  // namespace restage

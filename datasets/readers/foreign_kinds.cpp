@@ -70,7 +70,8 @@ const ForeignKind kForeignKinds[] = {
     {{".mat"},
      {"MATLAB 5.0 MAT-file"},
      "is a file of MATLAB",
-     "save the points with numpy.save (scipy.io.loadmat reads it)"},
+     "save it in MATLAB with -v7.3, which is HDF5, or the points with numpy.save "
+     "(scipy.io.loadmat reads it)"},
     {{".bag", ".db3", ".mcap", ".mkv", ".mp4", ".mov", ".avi"},
      {"#ROSBAG", "SQLite format 3", "\x89MCAP"sv, "\x1A\x45\xDF\xA3"sv},
      "is a recording of a sensor or a film, not clouds",

@@ -99,7 +99,7 @@ std::unique_ptr<FrameSource> open_frames(const std::string& path, const FrameOpt
   std::error_code error;
   const bool folder = fs::is_directory(path, error);
   if (!folder) refuse_foreign_content(path);
-  if (!folder && is_hdf5_name(path) && options.clip.empty()) return open_hdf5_frames(path, options);
+  if (!folder && is_hdf5(path) && options.clip.empty()) return open_hdf5_frames(path, options);
   if (options.sequence) check_sequence(path, *options.sequence, 1);
   if (!folder && is_gltf_name(path)) {
     Gltf file = read_gltf(path);

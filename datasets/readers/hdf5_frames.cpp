@@ -1,17 +1,18 @@
 #include "datasets/readers/hdf5_frames.h"
 
 #include <algorithm>
-#include <cmath>
-#include <set>
+#include <array>
+#include <filesystem>
+#include <fstream>
 
 #include "datasets/readers/cloud_axes.h"
+#include "datasets/readers/cloud_names.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/frame_names.h"
 #include "datasets/readers/non_finite.h"
 #include "datasets/readers/npz.h"
 #include "datasets/readers/precision.h"
 #include "datasets/readers/text.h"
-#include "datasets/readers/word_lines.h"
 #include "datasets/schema.h"
 #include "datasets/schema_detail.h"
 
@@ -19,13 +20,6 @@ namespace restage {
 namespace {
 
 bool is_our_scans(const h5::File& file) { return file.has("/points") && file.has("/frame_offset"); }
-
-bool is_our_prediction(const h5::File& file) {
-  if (file.has("/joints")) return true;
-  if (!file.has("/vertices")) return false;
-  const h5::Shape shape = file.dataset("/vertices").shape();
-  return shape.size() == 3 && shape[2] == 3;
-}
 
 /// Scans or the vertices of a prediction: a data set of which a frame is some rows.
 class Hdf5Frames : public FrameSource {
@@ -120,84 +114,109 @@ struct Sequence {
 /// All that has the shape of a cloud or a sequence.
 class Finder {
  public:
-  explicit Finder(const h5::File& file) : file_(file) {}
+  explicit Finder(const h5::File& file) : file_(file) { walk("", 0); }
 
-  std::vector<Sequence> find() {
+  bool any() const { return !found_.empty(); }
+
+  std::vector<Sequence> find() const {
     if (file_.has("/bodies") || file_.has("/motions"))
       throw InputError(file_.path(), "holds bodies or motions, not scans",
                        "restage data perform makes scans of them");
-    walk("", 0);
+    std::vector<std::string> sequences, clouds, left_out = others_;
+    for (const Candidate& one : found_) {
+      if (one.rank > best_)
+        left_out.push_back(one.name);
+      else
+        (one.sequence ? sequences : clouds).push_back(one.name);
+    }
     std::vector<Sequence> out;
-    for (const std::string& name : sequences_) out.push_back({{name}, {}});
-    if (out.empty() && !clouds_.empty()) out.push_back(series());
+    for (const std::string& name : sequences) out.push_back({{name}, {}});
+    if (out.empty() && !clouds.empty()) out.push_back(series(clouds));
     if (out.empty())
       throw InputError(
           file_.path() + ":/points", "is missing, and so is /vertices",
           "give a file of scans (/points, /frame_offset) or surfaces (/vertices [F, V, 3])");
+    if (!sequences.empty()) left_out.insert(left_out.end(), clouds.begin(), clouds.end());
+    if (!left_out.empty())
+      out[0].remarks.push_back(cat("clouds are taken from ", text::quote(out[0].sets[0]),
+                                   out.size() > 1 ? " and others" : "",
+                                   "; left out: " + list_of(left_out)));
     return out;
   }
 
  private:
+  struct Candidate {
+    std::string name;
+    bool sequence;
+    size_t rank;  ///< cloud_rank(); of other names kUnnamed
+  };
+  static constexpr size_t kUnnamed = 1000;
+
   void walk(const std::string& group, int depth) {
     for (const std::string& child : file_.children(group.empty() ? "/" : group)) {
       const std::string name = group + "/" + child;
-      if (sequences_.size() + clouds_.size() >= kMostSets)
-        throw InputError(file_.path(), "holds too many data sets", "split it");
-      try {
+      if (found_.size() >= kMostSets)
+        throw InputError(file_.path(), cat("holds more than ", kMostSets, " data sets of points"),
+                         "split it");
+      if (!file_.is_group(name))
         consider(name, child);
-      } catch (const InputError&) {  // a group, or nothing that can be read
-        if (depth + 1 < kGroupDepth) walk_group(name, depth + 1);
-      }
-    }
-  }
-
-  void walk_group(const std::string& name, int depth) {
-    try {
-      walk(name, depth);
-    } catch (const InputError&) {
-      // No group either: nothing that could be a cloud.
+      else if (depth + 1 < kGroupDepth && !child.starts_with("#"))  // MATLAB's own
+        walk(name, depth + 1);
     }
   }
 
   void consider(const std::string& name, const std::string& child) {
-    const h5::Dataset set = file_.dataset(name);
-    if (set.type() == h5::Type::text || is_no_cloud(child)) return;
-    const auto axes = cloud_axes(set.shape());
-    if (!axes) return;
-    (axes->sequence ? sequences_ : clouds_).push_back(name);
-  }
-
-  static bool is_no_cloud(const std::string& name) {
-    static const std::set<std::string> kNames = {
-        "faces",   "f",      "face", "triangles", "normals", "normal",  "colors",
-        "colours", "color",  "rgb",  "joints",    "label",   "labels",  "uv",
-        "trans",   "transl", "pose", "poses",     "betas",   "velocity"};
-    return kNames.count(lower_case(name)) > 0;
+    try {
+      const h5::Dataset set = file_.dataset(name);
+      if (set.type() == h5::Type::text) return;
+      const auto axes = cloud_axes(set.shape());
+      if (!axes) return;
+      if (is_no_cloud(child, !axes->sequence)) {
+        if (set.type() == h5::Type::floating) others_.push_back(name);
+        return;
+      }
+      const size_t rank = cloud_rank(child).value_or(kUnnamed);
+      found_.push_back({name, axes->sequence, rank});
+      best_ = std::min(best_, rank);
+    } catch (const InputError&) {
+      // Nothing that can be read, so no cloud.
+    }
   }
 
   /// Single clouds are the frames of a sequence if their names are a series.
-  Sequence series() const {
-    if (clouds_.size() == 1) return {clouds_, {}};
+  Sequence series(const std::vector<std::string>& clouds) const {
+    if (clouds.size() == 1) return {clouds, {}};
     std::vector<std::string> names;
-    for (std::string name : clouds_) {
+    for (std::string name : clouds) {
       std::replace(name.begin(), name.end(), '/', ' ');
       names.push_back(name);
     }
     FrameList list = order_folders(names, file_.path());
     if (list.files.empty())
-      throw InputError(file_.path(), "holds several arrays of points: " + list_of(clouds_),
+      throw InputError(file_.path(), "holds several arrays of points: " + list_of(clouds),
                        "keep one, or name frames by numbers");
     Sequence out{{}, list.remarks};
     for (std::string& name : list.files) {
       const auto at = std::find(names.begin(), names.end(), name);
-      out.sets.push_back(clouds_[static_cast<size_t>(at - names.begin())]);
+      out.sets.push_back(clouds[static_cast<size_t>(at - names.begin())]);
     }
     return out;
   }
 
   const h5::File& file_;
-  std::vector<std::string> sequences_, clouds_;
+  std::vector<Candidate> found_;
+  std::vector<std::string> others_;  ///< of the shape of clouds, by their names none
+  size_t best_ = kUnnamed;
 };
+
+/// Surfaces, or joints and no clouds beside them.
+bool is_our_prediction(const h5::File& file) {
+  if (file.has("/vertices") && !file.is_group("/vertices")) {
+    const h5::Shape shape = file.dataset("/vertices").shape();
+    if (shape.size() == 3 && shape[2] == 3) return true;
+  }
+  return file.has("/joints") && !Finder(file).any();
+}
 
 /// How many vertices the triangles of a file speak of; 0: it has none.
 int64_t vertices_by_faces(const h5::File& file) {
@@ -224,7 +243,7 @@ class ForeignFrames : public FrameSource {
       found_ = {found_[static_cast<size_t>(*options.sequence)]};
     }
     for (const Sequence& sequence : found_)
-      for (const std::string& set : sequence.sets) frames_ += axes_of(file_.dataset(set)).frames;
+      for (const std::string& set : sequence.sets) frames_ += frames_of(file_.dataset(set));
     if (frames_ == 0)
       throw InputError(file_.path(), "holds no frames", "give a file with at least one frame");
   }
@@ -275,14 +294,24 @@ class ForeignFrames : public FrameSource {
   }
 
  private:
-  CloudAxes axes_of(const h5::Dataset& set) const { return *cloud_axes(set.shape(), vertices_); }
+  CloudAxes axes_of(const h5::Dataset& set) const {
+    const auto read = [&](int64_t first, int64_t count) {
+      std::vector<double> out;
+      set.read_rows(first, count, out);
+      return out;
+    };
+    return axes_by_numbers(*cloud_axes(set.shape(), vertices_), set.shape(), read, vertices_);
+  }
+  int64_t frames_of(const h5::Dataset& set) const {
+    return cloud_axes(set.shape(), vertices_)->sequence ? axes_of(set).frames : 1;
+  }
 
   /// Goes on to a set that has frames left; false at the end.
   bool find_place() {
     while (sequence_ < found_.size()) {
       if (open_ && at_ < axes_.frames) return true;
       if (!open_) {
-        if (axes_of(file_.dataset(found_[sequence_].sets[set_])).frames > 0) return true;
+        if (frames_of(file_.dataset(found_[sequence_].sets[set_])) > 0) return true;
       }
       close();
       if (++set_ < found_[sequence_].sets.size()) continue;
@@ -333,8 +362,18 @@ void check_sequence(const std::string& path, int64_t sequence, int64_t sequences
       sequences == 1 ? "it holds one, number 0" : cat("give a number from 0 to ", sequences - 1));
 }
 
-bool is_hdf5_name(const std::string& path) {
-  return text::ends_in(path, {".h5", ".hdf5", ".hdf", ".he5"});
+bool is_hdf5(const std::string& path) {
+  if (text::ends_in(path, {".h5", ".hdf5", ".hdf", ".he5"})) return true;
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) return false;
+  std::ifstream file(path, std::ios::binary);
+  constexpr std::string_view kSignature("\x89HDF\r\n\x1a\n", 8);
+  for (const int64_t at : {0, 512, 1024, 2048}) {  // behind what MATLAB and others put before it
+    std::array<char, kSignature.size()> bytes{};
+    if (!file.seekg(at).read(bytes.data(), bytes.size())) return false;
+    if (std::string_view(bytes.data(), bytes.size()) == kSignature) return true;
+  }
+  return false;
 }
 
 bool is_foreign_hdf5(const std::string& path) {
@@ -350,8 +389,9 @@ bool states_fps(const std::string& path) {
 std::unique_ptr<FrameSource> open_hdf5_frames(const std::string& path,
                                               const FrameOptions& options) {
   h5::File file = open_schema_file(path);
-  if (is_our_scans(file) || is_our_prediction(file)) return open_ours(std::move(file), options);
-  return std::make_unique<ForeignFrames>(std::move(file), options);
+  if (!is_our_scans(file) && !is_our_prediction(file))
+    return std::make_unique<ForeignFrames>(std::move(file), options);
+  return open_ours(std::move(file), options);
 }
 
 }  // namespace restage

@@ -131,8 +131,11 @@ void add_data_import(Program& program, CommandOptions group) {
   app.add_option("--bones,--profile", motion.profile,
                  "recordings, characters: which bone is which joint, a .yaml file or a known "
                  "family (--profile is the older name)");
-  app.add_flag("--force", motion.force,
-               "recordings, characters: take also one whose left and right are exchanged");
+  app.add_flag(
+      "--force", motion.force,
+      "take also recordings and characters whose left and right are exchanged, scans of no "
+      "person's size or shape, and motions of a body model whose numbers look as if they "
+      "were not metres and radians");
   app.add_option("--asf", options.asf, "skeleton of .amc files (default: the one beside)");
   app.add_option("--clip", options.clip, "characters: this animation only");
   app.add_option("--body-model", options.body_model,

@@ -34,7 +34,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Options {
-  std::string path, picture, up, facing;
+  std::string path, picture, up, facing, bones;
   std::optional<std::string> fix;
   std::optional<double> scale, fps;
   bool target = false;
@@ -136,7 +136,7 @@ Report examine_mesh(const Options& options) {
   const char* kind = mesh.faces.empty() ? "cloud" : "mesh";
   Report out = examine_one(kind, std::move(mesh), origin, options);
   judge_origin(out);
-  if (left_out > 0) out.findings.push_back(non_finite(left_out, ""));
+  if (left_out > 0) out.findings.push_back(non_finite(left_out, "", options.target));
   return out;
 }
 
@@ -194,7 +194,7 @@ void add_remarks(Report& out, const ImportReport& report) {
 
 /// A rigged character, as retarget would take it: in T-pose, in our frame.
 Report examine_character(const Options& options) {
-  TargetMesh target = read_target(options.path);
+  TargetMesh target = read_target(options.path, options.bones);
   Report out =
       examine_one("character", std::move(target.mesh), Vec3::Zero(), options, target.known());
   out.subject.taken_as = "the surface that retarget takes as its target";
@@ -260,6 +260,7 @@ Report examine_recording(const Options& options) {
   const bool amc = file.ends_with(".amc") || file.ends_with(".amc.xz");
   MotionOptions how;
   how.force = true;  // mirrored or not is a finding here
+  how.profile = options.bones;
   how.fps = examine_options(options).fps.value_or(how.fps);
   const MotionClip clip = amc ? read_amc(options.path, "", how) : read_bvh(options.path, how);
   Report out(amc ? "amc" : "bvh");
@@ -305,12 +306,10 @@ struct Kind {
 };
 
 const Kind kKinds[] = {
-    {"\x89HDF\r\n", {}, examine_hdf5},
     {"ply", {}, examine_mesh},
     {"",
      {".ply", ".obj", ".pcd", ".xyz", ".xyzn", ".xyzrgb", ".pts", ".asc", ".txt", ".csv"},
      examine_mesh},
-    {"", {".h5", ".hdf5", ".hdf", ".he5"}, examine_hdf5},
     {"", {".bvh", ".bvh.xz", ".amc", ".amc.xz"}, examine_recording},
     {"", {".glb", ".gltf", ".vrm"}, examine_character},
     {"", {".npz", ".npy"}, examine_sequence},
@@ -322,6 +321,7 @@ Report examine(const Options& options) {
   const std::string& path = options.path;
   std::error_code ignored;
   if (fs::is_directory(path, ignored)) return examine_folder(options);
+  if (is_hdf5(path)) return examine_hdf5(options);
   refuse_foreign_content(path);
   const std::string start = first_bytes(path);
   const std::string name = small_letters(path);
@@ -389,15 +389,19 @@ std::vector<Finding> still_wrong(const Options& options) {
   return out;
 }
 
+bool is_recording(const std::string& kind) { return kind == "bvh" || kind == "amc"; }
+
 int run_doctor(Options options, const Common& common) {
   options.max_memory = common.max_memory;
   if (options.fix) repair_kind(*options.fix);
-  check_output(options.fix.value_or(""), {options.path});
-  check_output(options.picture, {options.path});
+  check_output(options.fix.value_or(""), {options.path, options.bones});
+  check_output(options.picture, {options.path, options.bones});
   const Report found = examine(options);
-  if (options.fps && !found.subject.frames && found.kind != "bvh" && found.kind != "amc")
+  if (options.fps && !found.subject.frames && !is_recording(found.kind))
     throw InputError(options.path, "is no sequence of frames, so it has no rate",
                      "leave --fps out");
+  if (!options.bones.empty() && found.kind != "character" && !is_recording(found.kind))
+    throw InputError(options.path, "has no bones, which --bones names", "leave --bones out");
   if (!found.diagnosis && (!options.picture.empty() || options.fix))
     throw InputError(
         options.path,
@@ -433,6 +437,7 @@ void add_doctor(Program& program) {
       "restage doctor scan.ply --scale 0.001 --up z --facing=-y --fix mended.ply\n"
       "restage doctor hero.obj --target --picture sheet.png\nrestage doctor frames/ --fix mended/\n"
       "restage doctor frames60/ --fps 60 --fix mended.h5\n"
+      "restage doctor hero.glb --target --bones names.yaml\n"
       "exit code: 0 usable, 1 read but not usable as it is, 2 not readable",
       run_doctor);
   app.add_option(
@@ -451,6 +456,9 @@ void add_doctor(Program& program) {
                  "frames per second of a sequence, where you know better than the file (30 where "
                  "it says none)");
   app.add_option("--facing", options.facing, "the direction that the person faces, as --up");
+  app.add_option("--bones", options.bones,
+                 "which bone of a character or recording is which joint, a .yaml file or a known "
+                 "family");
 }
 
 }  // namespace restage::cli

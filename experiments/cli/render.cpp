@@ -11,6 +11,7 @@
 #include "autograd/base/log.h"
 #include "autograd/base/nearest.h"
 #include "autograd/base/output_check.h"
+#include "datasets/readers/hdf5_frames.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
 #include "experiments/cli/scale_option.h"
@@ -79,7 +80,7 @@ bool is_same_file(const std::string& a, const std::string& b) {
 /// What the result says of its source, if that is still there.
 std::optional<SourceRecord> remembered_source(const std::string& result, Remarks& remarks) {
   std::optional<SourceRecord> out;
-  if (result.ends_with(".h5") || result.ends_with(".hdf5")) out = read_source_record(result);
+  if (is_hdf5(result)) out = read_source_record(result);
   std::error_code error;
   if (!out || std::filesystem::exists(out->path, error)) return out;
   remarks.push_back("the source of " + result + ", " + out->path +

@@ -146,13 +146,18 @@ std::string curves_html(const Report& report, bool thinned) {
 
 // ---- sequences ----------------------------------------------------------------------------------
 
+/// Bytes that are not UTF-8 are replaced.
+std::string ascii(const Json& json) {
+  return json.dump(-1, ' ', true, Json::error_handler_t::replace);
+}
+
 std::string plays_html(const std::vector<Play>& plays) {
   std::string buttons, pages;
   for (size_t k = 0; k < plays.size(); ++k) {
     buttons += "<button type=\"button\" data-play=\"" + std::to_string(k) + "\">" +
                escape_html(plays[k].title) + "</button>\n";
     pages += "<script id=\"play" + std::to_string(k) + "\" type=\"application/json\">" +
-             script_json(plays[k].page) + "</script>\n";
+             script_json(ascii(plays[k].page)) + "</script>\n";
   }
   return "<div class=\"tools\">" + buttons +
          "</div>\n<iframe id=\"player\" title=\"source, result and truth\"></iframe>\n" + pages;
@@ -185,7 +190,7 @@ std::string page(const Report& report) {
   return fill_page(kPage, {{"TITLE", escape_html(report.title)},
                            {"STYLE", kStyle},
                            {"BODY", body},
-                           {"DATA", script_json(data)},
+                           {"DATA", script_json(ascii(data))},
                            {"SCRIPT", kScript}});
 }
 

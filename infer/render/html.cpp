@@ -1,7 +1,6 @@
 #include "infer/render/html.h"
 
 #include <cstdint>
-#include <nlohmann/json.hpp>
 
 namespace restage {
 
@@ -41,9 +40,9 @@ std::string escape_html(const std::string& text) {
   return out;
 }
 
-std::string script_json(const nlohmann::ordered_json& json) {
+std::string script_json(const std::string& json) {
   std::string out;
-  for (const char c : json.dump(-1, ' ', true, nlohmann::ordered_json::error_handler_t::replace))
+  for (const char c : json)
     if (c == '<')
       out += "\\u003c";
     else

@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <map>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 namespace restage {
@@ -12,9 +11,9 @@ std::string base64(const void* data, size_t size);
 /// The text in a form that may stand in an element, or in an attribute in double quotes, of HTML
 /// and of SVG.
 std::string escape_html(const std::string& text);
-/// The JSON document in a form that may stand inside a script element: no text in the document can
-/// end the element. Bytes that are not UTF-8 are replaced.
-std::string script_json(const nlohmann::ordered_json& json);
+/// JSON (ASCII) in a form that may stand inside a script element: no text in the document can end
+/// the element.
+std::string script_json(const std::string& json);
 /// `page` with every @NAME@ replaced by the value of NAME in `values`; a NAME without a value
 /// stays. A text such as @NAME@ inside a value is not replaced.
 std::string fill_page(const std::string& page, const std::map<std::string, std::string>& values);

@@ -300,15 +300,16 @@ std::string page_html(const std::vector<Clip>& clips, const PageOptions& options
   meta["width"] = width;
   meta["height"] = height;
   meta["clips"] = std::move(list);
-  return fill_page(kPage, {{"TITLE", escape_html(options.title)},
-                           {"STYLE", kStyle},
-                           {"DESCRIPTION", description},
-                           {"PANELS", panels},
-                           {"NOTE", note_of(plan, any_errors)},
-                           {"ERRORS", any_errors ? kErrorsBox : ""},
-                           {"META", script_json(meta)},
-                           {"DATA", data},
-                           {"SCRIPT", kScript}});
+  return fill_page(kPage,
+                   {{"TITLE", escape_html(options.title)},
+                    {"STYLE", kStyle},
+                    {"DESCRIPTION", description},
+                    {"PANELS", panels},
+                    {"NOTE", note_of(plan, any_errors)},
+                    {"ERRORS", any_errors ? kErrorsBox : ""},
+                    {"META", script_json(meta.dump(-1, ' ', true, Json::error_handler_t::replace))},
+                    {"DATA", data},
+                    {"SCRIPT", kScript}});
 }
 
 void write_page(const std::string& path, const std::vector<Clip>& clips,

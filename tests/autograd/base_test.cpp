@@ -314,6 +314,8 @@ TEST(Layers, ABrokenArrowIsSeen) {
   EXPECT_EQ(with("infer/x.cpp", "#include \"train/run.h\""), 1);
   EXPECT_EQ(with("nn/models/x.cpp", "#include \"train/run.h\""), 1);
   EXPECT_EQ(with("nn/models/x.cpp", "#include <tbb/parallel_for.h>"), 1);
+  EXPECT_EQ(with("train/x.h", "#include <nlohmann/json_fwd.hpp>"), 1);
+  EXPECT_EQ(with("train/x.cpp", "#include <nlohmann/json.hpp>"), 0);
   EXPECT_EQ(with("autograd/unknown/x.cpp", "#include \"autograd/base/rng.h\""), 1);
 }
 

@@ -136,6 +136,30 @@ class Arrays(CliTest):
         self.bad_input(["data", "import", "walk.npz", "--fps", 0.1, "--out", "x.h5"], "--fps")
         self.bad_input(["data", "import", self.write("o.npy", npy((2,), [1.0, 2.0])), "--out", "x.h5"], "o.npy", "[2]")
 
+    def test_paths_are_no_scans(self):
+        walk = npy((200, 3), [v for f in range(200) for v in (math.sin(.05 * f), .9 + .03 * math.sin(.3 * f), .025 * f)])
+        self.write("walk.npy", walk)
+        self.bad_input(["data", "import", "walk.npy", "--out", "x.h5"], "walk.npy", "one moving point", "--force")
+        self.write("walk.npz", npz(root_pos=walk, gyro=walk))
+        self.bad_input(["data", "import", "walk.npz", "--out", "x.h5"], "walk.npz", "holds no points", "root_pos")
+        self.assertEqual(self.restage("doctor", "walk.npy").code, 1)
+        self.assertIn("one moving point", self.restage("doctor", "walk.npy").out)
+        self.done("data", "import", "walk.npy", "--force", "--out", "x.h5")
+
+    def test_a_body_model_in_other_units(self):
+        self.write("model.npz", smplh())
+        poses, call = npy((61, 156), ([math.pi / 2] + [0.0] * 155) * 61), ["--body-model", "model.npz", "--out", "x.h5"]
+        trans = lambda unit: npy((61, 3), [unit * v for f in range(61) for v in (.02 * f, 0, 0)])
+        motion = lambda name, unit, **more: self.write(name, npz(
+            poses=poses, trans=trans(unit), betas=npy((2,), [0.0, 0.0]), mocap_framerate=npy((), [60.0]), **more))
+        motion("cm.npz", 100)
+        self.bad_input(["data", "import", "cm.npz", *call], "cm.npz:trans", "--scale 0.01", "centimetres")
+        self.done("data", "import", "cm.npz", "--scale", .01, *call)
+        motion("aist.npz", 93, smpl_scaling=npy((1,), [93.0]))
+        self.assertIn("divided by 93", self.done("data", "import", "aist.npz", *call, "--verbose"))
+        self.write("half.npz", npz(root_orient=trans(1), trans=trans(1), betas=npy((2,), [0.0, 0.0])))
+        self.bad_input(["data", "import", "half.npz", *call], "half.npz", "not of the other joints", "add pose_body")
+
     def test_retarget_reads_arrays(self):
         self.write("walk.npz", npz(points=cloud(2)))
         self.write("walk.npy", cloud(2))

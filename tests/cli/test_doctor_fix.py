@@ -55,11 +55,14 @@ class DoctorFix(CliTest):
                                 ("bad.obj", "c.ply", "3 points"), ("bad.npy", "d.h5", "6 points"), ("bad_frames", "e.h5", "3 points")):
             found = json.loads(self.restage("doctor", name, "--json").out)
             wrong = [f for f in found["findings"] if f["topic"] == "non-finite"]
-            self.assertEqual([f["weight"] for f in wrong], ["wrong"], name)
+            self.assertEqual([f["weight"] for f in wrong], ["note"], name)
+            self.assertIn("which retarget leaves out", wrong[0]["what"])
             self.assertTrue(wrong[0]["what"].startswith(said), wrong)
-            self.assertFalse(found["usable"])
-            self.assertEqual(self.restage("doctor", name).code, 1)
+            self.assertTrue(found["usable"], found)
+            self.assertEqual(self.restage("doctor", name).code, 0)
             self.assertTrue(self.fix(name, out, 0)["fixed"]["usable"], name)
+        # A target that lacks a point would be another: retarget refuses it, and so does the doctor.
+        self.assertEqual(self.restage("doctor", "bad.ply", "--target").code, 1)
         self.assertEqual(self.mesh("b.ply"), (person, faces))
         self.assertEqual(json.loads(self.done("doctor", "e.h5", "--json"))["facts"]["frames"], 2)
 

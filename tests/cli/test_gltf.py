@@ -104,6 +104,13 @@ class Gltf(CliTest):
         self.assertEqual(found.code, 0, found.err)
         self.assertIn("left upper arm 45.0 degrees", found.err)  # brought into the T-pose by its rig
         self.bad_input(call + ["--bones", "none.yaml"], "none.yaml")
+        doctor = ["doctor", "own.glb", "--target", "--json"]
+        self.assertIn("not recognised", self.restage(*doctor).out)
+        named = json.loads(self.restage(*doctor, "--bones", "own.YML").out)
+        self.assertNotIn("not recognised", str(named))
+        self.assertEqual([f["evidence"] for f in named["findings"] if f["topic"] == "up"], ["the rig's joints"])
+        self.bad_input(["doctor", "own.glb", "--bones", "none.yaml"], "none.yaml")
+        self.bad_input(["doctor", self.ply("plain.ply", points(80, 1)), "--bones", "own.YML"], "plain.ply", "no bones", "leave --bones out")
         self.ply("plain.ply", points(90, 7))
         self.bad_input([word.replace("own.glb", "plain.ply") for word in call] + ["--bones", "own.YML"], "plain.ply", "leave --bones out")
 

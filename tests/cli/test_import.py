@@ -192,8 +192,10 @@ class Import(CliTest):
         self.bad_input(["data", "import", ply("ant.ply", 0.01), "--out", "x.h5"], "ant.ply", "no person")
         self.bad_input(["data", "import", ply("wrong.ply", 1.7), "--scale", 0.001, "--out", "x.h5"], "wrong.ply", "--scale")
         self.done("data", "import", ply("cm.ply", 170), "--scale", 0.01, "--out", "x.h5")
-        found = self.json("data", "import", ply("cm.ply", 170), "--out", "x.h5")
-        self.assertIn("--scale 0.01", found["reports"][0]["remarks"][0])
+        self.bad_input(["data", "import", ply("cm.ply", 170), "--out", "x.h5"], "cm.ply", "--scale 0.01", "--force")
+        self.done("data", "import", "cm.ply", "--force", "--out", "x.h5")
+        found = self.json("data", "import", ply("dm.ply", 17), "--out", "x.h5")  # or people in a room
+        self.assertIn("--scale 0.1", found["reports"][0]["remarks"][0])
 
 
 class Transcripts(CliTest):

@@ -23,8 +23,12 @@ constexpr SmplFamily kFamilies[] = {SmplFamily::smpl, SmplFamily::smplh, SmplFam
 
 /// The arrays with another one of this name, or without it where `bytes` are empty.
 Arrays with(Arrays arrays, const std::string& name, const std::string& bytes) {
-  for (auto& [key, value] : arrays)
-    if (key == name) value = bytes;
+  const auto at = std::find_if(arrays.begin(), arrays.end(),
+                               [&](const auto& array) { return array.first == name; });
+  if (at == arrays.end())
+    arrays.emplace_back(name, bytes);
+  else
+    at->second = bytes;
   if (bytes.empty()) std::erase_if(arrays, [&](const auto& array) { return array.first == name; });
   return arrays;
 }
@@ -424,6 +428,102 @@ TEST_F(ImportersAmass, EstimatorsNamesAndShapesGiveTheSameMotion) {
                import_amass(file, models, {}, report);
              }),
              "add trans [F, 3]");
+}
+
+/// The clip with its path in other units, as such files have it.
+Arrays with_path(const TinyClip& clip, double unit, const Vec3& from = Vec3::Zero()) {
+  std::vector<double> trans;
+  for (int64_t f = 0; f < clip.frames; ++f) {
+    const Vec3 at = clip.trans(static_cast<double>(f) / clip.fps) + from;
+    for (int axis = 0; axis < 3; ++axis) trans.push_back(unit * at[axis]);
+  }
+  return with(clip.arrays(), "trans", npy<double>({clip.frames, 3}, trans));
+}
+
+TEST_F(ImportersAmass, APathThatIsNotInMetresIsSaid) {
+  const TinyClip clip{.frames = 61, .fps = 60};
+  BodyModels models(dir.write("female.npz", TinySmpl().file()));
+  ImportReport report;
+  const Vec3 standing(0, 0, 1);
+  const auto import = [&](const Arrays& arrays, const MotionOptions& options = {}) {
+    report = {};
+    return import_amass(Npz(dir.write("a.npz", npz(arrays))), models, options, report);
+  };
+  const Motion wanted = import(with_path(clip, 1, standing));
+  const std::pair<double, const char*> units[] = {
+      {100, "give --scale 0.01 if they are centimetres"},
+      {1000, "give --scale 0.001 if they are milli"}};
+  for (const auto& [unit, says] : units) {
+    const Arrays arrays = with_path(clip, unit, standing);
+    EXPECT_HAS(error_of([&] { import(arrays); }), says);
+    MotionOptions options;
+    options.scale = 1 / unit;
+    const Motion motion = import(arrays, options);
+    EXPECT_HAS(fact(report, "scale of trans"), "--scale");
+    for (size_t f = 0; f < wanted.frames(); ++f)
+      EXPECT_LT(
+          (testing::motion_joints(motion, f)[0] - testing::motion_joints(wanted, f)[0]).norm(),
+          1e-5);
+    options.scale = 0;
+    options.force = true;
+    import(arrays, options);
+    // AIST++ says itself by what to divide.
+    const Motion said = import(with(arrays, "smpl_scaling", npy<double>({1}, {unit})));
+    EXPECT_HAS(fact(report, "scale of trans"), "AIST++");
+    EXPECT_LT((testing::motion_joints(said, 9)[0] - testing::motion_joints(wanted, 9)[0]).norm(),
+              1e-5);
+  }
+  import(with(clip.arrays(), "scale", npy<double>({}, {2.5})));
+  EXPECT_HAS(remarks(report), "an array 'scale', which is not applied");
+  EXPECT_HAS(error_of([&] {
+               import(with(clip.arrays(), "smpl_scaling", npy<double>({2}, {1, 0})));
+             }),
+             "no number to divide");
+}
+
+TEST_F(ImportersAmass, RotationsInDegreesAreSaid) {
+  const TinyClip clip{.frames = 31, .fps = 30};
+  BodyModels models(dir.write("female.npz", TinySmpl().file()));
+  const Npz file(dir.write("a.npz", clip.file()));
+  const NpyArray poses = file.array("poses");
+  const auto times = [&](double factor) {
+    std::vector<double> values;
+    for (int64_t i = 0; i < poses.size(); ++i) values.push_back(factor * poses[i]);
+    return Npz(
+        dir.write("b.npz", npz(with(clip.arrays(), "poses", npy<double>(poses.shape(), values)))));
+  };
+  ImportReport report;
+  const double degrees = 180 / std::acos(-1.0);
+  EXPECT_HAS(error_of([&] { import_amass(times(degrees), models, {}, report); }),
+             "these seem to be degrees; turn them into radians (numpy.deg2rad)");
+  MotionOptions forced;
+  forced.force = true;
+  import_amass(times(degrees), models, forced, report);
+  EXPECT_HAS(remarks(report), "more than a whole turn");
+}
+
+TEST_F(ImportersAmass, RotationMatricesOfAllJointsAndMissingParts) {
+  const TinyClip clip{.frames = 31, .fps = 30};
+  BodyModels models(dir.write("model.npz", TinySmpl{SmplFamily::smpl}.file()));
+  std::vector<double> turns;
+  for (int64_t f = 0; f < clip.frames; ++f)
+    for (int joint = 0; joint < 24; ++joint) {
+      const Mat3 turn = joint == 0 ? clip.root(0) : Mat3::Identity();
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c) turns.push_back(turn(r, c));
+    }
+  const std::string place = npy<double>({clip.frames, 3}, std::vector<double>(93, 0));
+  ImportReport report;
+  for (const char* name : {"pred_rotmat", "rotmat", "pose_rotmat", "smpl_poses_rotmat"}) {
+    const Npz file(dir.write(
+        "a.npz", npz({{name, npy<double>({clip.frames, 24, 3, 3}, turns)}, {"trans", place}})));
+    ASSERT_TRUE(is_amass_motion(file)) << name;
+    EXPECT_EQ(import_amass(file, models, {}, report).frames(), 31u) << name;
+  }
+  dir.write("b.npz", npz({{"root_orient", place}, {"trans", place}}));
+  ImportOptions options;
+  options.body_model = dir / "model.npz";
+  EXPECT_HAS(error_of([&] { import_data(dir / "b.npz", dir / "o.h5", options); }), "add pose_body");
 }
 
 TEST_F(ImportersAmass, AShapeForEachFrameOrNone) {

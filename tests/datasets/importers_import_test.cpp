@@ -304,6 +304,54 @@ TEST_F(ImportersScans, NonFinitePointsStraysAndTwinsAreSaid) {
   EXPECT_EQ(verify(dir / "o.h5"), Names{});
 }
 
+/// A point that walks about for so many frames, as roots, centres of mass and joints do.
+std::vector<float> walk(int64_t frames, double unit = 1) {
+  std::vector<float> out;
+  for (int64_t f = 0; f < frames; ++f) {
+    const double t = 0.05 * static_cast<double>(f);
+    for (const double x : {std::sin(t), 0.9 + 0.03 * std::sin(6 * t), 0.5 * t})
+      out.push_back(static_cast<float>(unit * x));
+  }
+  return out;
+}
+
+TEST_F(ImportersScans, PathsOfOnePointAreNoScans) {
+  for (const char* name : {"", "positions", "points", "where", "root_pos", "com"}) {
+    const std::string array = npy<float>({200, 3}, walk(200));
+    const std::string file =
+        *name == 0 ? dir.write("a.npy", array) : dir.write("a.npz", npz({{name, array}}));
+    const std::string said = error_of([&] { import_data(file, dir / "o.h5"); });
+    EXPECT_TRUE(said.find("places of one moving point") != std::string::npos ||
+                said.find("holds no points") != std::string::npos)
+        << said;
+  }
+  {
+    h5::File file = h5::File::create(dir / "a.h5");
+    file.write<float>("/track", {200, 3}, walk(200));
+    file.commit();
+  }
+  EXPECT_HAS(error_of([&] { import_data(dir / "a.h5", dir / "o.h5"); }), "one moving point");
+  EXPECT_FALSE(fs::exists(dir / "o.h5"));
+  ImportOptions forced;
+  forced.motion.force = true;
+  EXPECT_EQ(import_data(dir / "a.h5", dir / "o.h5", forced).frames, 1u);
+}
+
+TEST_F(ImportersScans, AnotherUnitThanMetresIsNotTakenForMetres) {
+  const std::pair<float, const char*> units[] = {{100, "give --scale 0.01,"},
+                                                 {1000, "give --scale 0.001,"}};
+  for (const auto& [unit, says] : units) {
+    const Points points = person({0, 0, 0}, unit);
+    const std::string file = dir.write("a.npy", npy<float>({80, 3}, flat(points)));
+    EXPECT_HAS(error_of([&] { import_data(file, dir / "o.h5"); }), says);
+    ImportOptions options;
+    options.motion.scale = 1 / unit;
+    EXPECT_EQ(import_data(file, dir / "o.h5", options).frames, 1u);
+  }
+  const std::string tiny = dir.write("b.npy", npy<float>({80, 3}, flat(person({0, 0, 0}, 1e-4f))));
+  EXPECT_HAS(error_of([&] { import_data(tiny, dir / "p.h5"); }), "no person is in any unit");
+}
+
 TEST_F(ImportersScans, FoldersOfFramesAndHdf5FilesOfOthers) {
   for (int f = 0; f < 3; ++f) {
     const std::string folder = dir / ("tree/walk/" + std::to_string(f));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "datasets/readers/array_frames.h"
@@ -466,6 +467,129 @@ TEST_F(ReadersArrays, AxesInAnyOrderAndMoreColumns) {
   EXPECT_EQ(cloud_axes({5, 288, 320, 3})->frames, 5);
   // Who knows the number of vertices knows which axis is which.
   EXPECT_EQ(cloud_axes({70, 3, 300}, 70)->frames, 300);
+}
+
+/// Numbers that stand behind each other in an order of their own: frames, points, x y z.
+using Element = std::function<double(int64_t frame, int64_t point, int axis)>;
+
+std::string array_in_order(const std::vector<int64_t>& shape, const std::vector<int>& axis_of,
+                           const Element& element) {
+  std::vector<float> values;
+  int64_t count = 1;
+  for (const int64_t n : shape) count *= n;
+  for (int64_t i = 0; i < count; ++i) {
+    int64_t at[3] = {0, 0, 0}, rest = i;
+    for (size_t a = shape.size(); a-- > 0; rest /= shape[a]) at[axis_of[a]] = rest % shape[a];
+    values.push_back(static_cast<float>(element(at[0], at[1], static_cast<int>(at[2]))));
+  }
+  return npy<float>(shape, values);
+}
+
+/// Somebody of scattered points, who walks along z.
+double walker(int64_t frame, int64_t point, int axis) {
+  const double spread[] = {0.3, 0.9, 0.2};
+  return spread[axis] * std::sin(7.3 * static_cast<double>(point) + 2.1 * axis) +
+         (axis == 2 ? 0.03 : 0.004) * static_cast<double>(frame);
+}
+
+TEST_F(ReadersArrays, ChannelsAndPointsMayComeFirst) {
+  const auto expect = [&](const std::string& array, int64_t frames, int64_t points,
+                          const char* says) {
+    const auto found = open_frames(dir.write("a.npy", array));
+    ASSERT_EQ(found->frames(), frames) << says;
+    for (int64_t f = 0; f < frames; ++f) {
+      const auto frame = found->next();
+      ASSERT_EQ(std::ssize(frame->points), points) << says;
+      for (const int64_t i : {int64_t{0}, points / 2, points - 1})
+        for (int axis = 0; axis < 3; ++axis)
+          EXPECT_EQ(frame->points[static_cast<size_t>(i)][axis],
+                    static_cast<float>(walker(f, i, axis)))
+              << says;
+    }
+    ASSERT_EQ(found->remarks().size(), 1u) << says;
+    EXPECT_HAS(found->remarks()[0], says);
+  };
+  const auto with_colours = [](int64_t f, int64_t i, int axis) {
+    return axis < 3 ? walker(f, i, axis) : 255.0;
+  };
+  expect(array_in_order({6, 90}, {2, 1}, with_colours), 1, 90, "[6 numbers, 90 points]");
+  expect(array_in_order({4, 6, 90}, {0, 2, 1}, with_colours), 4, 90, "[frames, 6 numbers, 90");
+  expect(array_in_order({90, 70, 3}, {1, 0, 2}, walker), 70, 90, "[90 points, 70 frames, xyz]");
+  expect(array_in_order({900, 20, 3}, {1, 0, 2}, walker), 20, 900, "[900 points, 20 frames");
+  expect(array_in_order({90, 5, 3}, {1, 0, 2}, walker), 5, 90, "[90 points, 5 frames");
+  const auto still = [](int64_t, int64_t i, int axis) { return walker(0, i, axis); };
+  const auto seen = open_frames(dir.write("a.npy", array_in_order({90, 70, 3}, {1, 0, 2}, still)));
+  EXPECT_EQ(seen->frames(), 70);
+  // A camera's picture.
+  EXPECT_EQ(cloud_axes({3, 288, 320})->points, 288 * 320);
+  EXPECT_EQ(cloud_axes({3, 288, 320})->frames, 1);
+  EXPECT_EQ(cloud_axes({5, 3, 288, 320})->frames, 5);
+}
+
+TEST_F(ReadersArrays, FramesThatComeFirstStayFramesHoweverFarSomebodyRuns) {
+  for (const double speed : {0.0, 0.03, 0.3}) {
+    const auto runner = [&](int64_t f, int64_t i, int axis) {
+      return walker(0, i, axis) + (axis == 2 ? speed * static_cast<double>(f) : 0.0);
+    };
+    const auto found =
+        open_frames(dir.write("a.npy", array_in_order({300, 70, 3}, {0, 1, 2}, runner)));
+    EXPECT_EQ(found->frames(), 300) << speed;
+    EXPECT_TRUE(found->remarks().empty()) << speed;
+  }
+}
+
+TEST_F(ReadersArrays, AColumnThatCountsThePointsIsNoCoordinate) {
+  for (const double first : {0.0, 1000.0})
+    for (const double step : {1.0, 0.033})
+      for (const int64_t columns : {4, 7}) {
+        const auto numbered = [&](int64_t f, int64_t i, int axis) {
+          if (axis == 0) return first + step * static_cast<double>(i);
+          return axis < 4 ? walker(f, i, axis - 1) : 0.5;
+        };
+        const std::string arrays[] = {array_in_order({90, columns}, {1, 2}, numbered),
+                                      array_in_order({columns, 90}, {2, 1}, numbered),
+                                      array_in_order({5, 90, columns}, {0, 1, 2}, numbered)};
+        for (const std::string& array : arrays) {
+          const auto found = open_frames(dir.write("a.npy", array));
+          const auto frame = found->next();
+          EXPECT_EQ(frame->points[17], Point(static_cast<float>(walker(0, 17, 0)),
+                                             static_cast<float>(walker(0, 17, 1)),
+                                             static_cast<float>(walker(0, 17, 2))));
+          EXPECT_HAS(found->remarks().at(0), "numbers the points");
+        }
+      }
+  // A cloud in the order of x has unequal steps.
+  const auto sorted = [](int64_t f, int64_t i, int axis) {
+    return axis == 0 ? static_cast<double>(i) + 0.4 * std::sin(5.0 * static_cast<double>(i))
+                     : walker(f, i, axis - 1);
+  };
+  const auto found = open_frames(dir.write("a.npy", array_in_order({90, 4}, {1, 2}, sorted)));
+  EXPECT_FLOAT_EQ(found->next()->points[1].x(), 1 + 0.4f * std::sin(5.0f));
+}
+
+TEST_F(ReadersArrays, PathsAndSignalsAreNoCloudsByTheirNames) {
+  const std::string path = npy<float>({80, 3}, std::vector<float>(240, 1));
+  for (const char* name : {"root_pos", "rootPos", "com", "gyro", "imu_accel", "trans", "pelvis",
+                           "angular_velocity", "keypoints3d", "markers", "cam_trans"}) {
+    dir.write("a.npz", npz({{name, path}}));
+    EXPECT_HAS(error_of([&] { open_frames(dir / "a.npz"); }), "holds no points") << name;
+    dir.write("b.npz", npz({{name, path}, {"frames", npy<float>({1, 3}, {1, 2, 3})}}));
+    EXPECT_EQ(open_frames(dir / "b.npz")->next()->points.size(), 1u) << name;
+  }
+  for (const char* name : {"camera_points", "pose_vertices", "scan_of_root", "pose_0001"})
+    EXPECT_EQ(open_frames(dir.write("a.npz", npz({{name, path}})))->next()->points.size(), 80u);
+}
+
+TEST_F(ReadersArrays, OnePartOfABodysRotationsNamesTheOther) {
+  const std::string root = npy<float>({2, 3}, std::vector<float>(6, 0)),
+                    body = npy<float>({2, 63}, std::vector<float>(126, 0));
+  dir.write("a.npz", npz({{"root_orient", root}, {"trans", root}, {"betas", root}}));
+  EXPECT_HAS(error_of([&] { open_frames(dir / "a.npz"); }), "and not of the other joints");
+  EXPECT_HAS(error_of([&] { open_frames(dir / "a.npz"); }), "add pose_body");
+  dir.write("b.npz", npz({{"pose_body", body}, {"trans", root}, {"betas", root}}));
+  EXPECT_HAS(error_of([&] { open_frames(dir / "b.npz"); }), "add root_orient");
+  dir.write("c.npz", npz({{"pred_rotmat", npy<float>({2, 24, 3, 3}, std::vector<float>(432, 0))}}));
+  EXPECT_HAS(error_of([&] { open_frames(dir / "c.npz"); }), "is a motion of a body model");
 }
 
 /// As numpy.savez(*clouds) keeps clouds of unequal size.

@@ -197,6 +197,55 @@ void expect_marked(FrameSource& source, int64_t frames, int64_t points, int64_t 
   }
 }
 
+TEST_F(ReadersClouds, CloudsBesideJointsAreTaken) {
+  const std::vector<float> joints(size_t{4} * 22 * 3, 1);
+  const auto with = [&](const char* name, const h5::Shape& shape, bool points_last) {
+    h5::File file = h5::File::create(dir / "a.h5");
+    file.write<float>("/joints", {4, 22, 3}, joints);
+    file.write<float>("/normals_of_all", {4, 80, 3}, std::vector<float>(960, 7));
+    file.write<float>(name, shape, marked(4, 80, points_last));
+    file.commit();
+  };
+  for (const char* name : {"/pcl", "/points", "/depth/cloud", "/clouds"}) {
+    with(name, {4, 80, 3}, false);
+    EXPECT_TRUE(is_foreign_hdf5(dir / "a.h5")) << name;
+    const auto frames = open_frames(dir / "a.h5");
+    EXPECT_EQ(frames->frames(), 4) << name;
+    expect_marked(*frames, 4, 80);
+    EXPECT_HAS(frames->remarks().at(0), std::string("taken from '") + name);
+    EXPECT_HAS(frames->remarks().at(0), "left out: '/joints'");
+  }
+  {  // joints alone are a prediction, joints and vertices too
+    h5::File file = h5::File::create(dir / "b.h5");
+    file.write<float>("/joints", {4, 22, 3}, joints);
+    file.commit();
+  }
+  EXPECT_FALSE(is_foreign_hdf5(dir / "b.h5"));
+  EXPECT_HAS(error_of([&] { open_frames(dir / "b.h5"); }), "/points: is missing");
+}
+
+TEST_F(ReadersClouds, Hdf5IsKnownByItsFirstBytesWhateverItsName) {
+  {
+    h5::File file = h5::File::create(dir / "a.h5");
+    file.write<float>("/pcl", {4, 80, 3}, marked(4, 80, false));
+    file.commit();
+  }
+  const std::string bytes = bytes_of(dir / "a.h5");
+  // MATLAB puts 512 bytes of its own before it.
+  std::string head = "MATLAB 7.3 MAT-file";
+  head.resize(512, ' ');
+  for (const char* name : {"b.mat", "c.data"}) {
+    EXPECT_TRUE(is_hdf5(dir.write(name, bytes))) << name;
+    EXPECT_EQ(open_frames(dir / name)->frames(), 4) << name;
+  }
+  EXPECT_TRUE(is_hdf5(dir.write("d.mat", head + bytes)));
+  EXPECT_EQ(open_frames(dir / "d.mat")->frames(), 4);
+  EXPECT_FALSE(is_hdf5(dir.write("e.mat", head)));
+  EXPECT_FALSE(is_hdf5(dir.path()));
+  EXPECT_FALSE(is_hdf5(dir / "none.mat"));
+  EXPECT_HAS(error_of([&] { open_frames(dir / "e.mat"); }), "-v7.3");
+}
+
 TEST_F(ReadersClouds, Hdf5FilesOfOthers) {
   {  // as Dynamic FAUST: a set a sequence, frames last, and faces
     h5::File file = h5::File::create(dir / "dfaust.hdf5");

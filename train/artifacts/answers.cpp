@@ -184,7 +184,7 @@ std::string facts_of(const std::string& data, const std::string& split, const An
   return nlohmann::json{{"behaviour", kBehaviour},
                         {"data", data},
                         {"split", split},
-                        {"answers", keys_json(write_identity(config)).dump()},
+                        {"answers", keys_text(write_identity(config))},
                         {"extractor", sha256(extractor)},
                         {"precision", static_cast<int>(matmul_precision())},
                         {"seed", seed}}

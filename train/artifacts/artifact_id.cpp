@@ -5,6 +5,7 @@
 #include "datasets/readers/sha256.h"
 
 namespace restage {
+namespace {
 
 nlohmann::json keys_json(const ConfigNode& keys) {
   using Json = nlohmann::json;
@@ -25,6 +26,10 @@ nlohmann::json keys_json(const ConfigNode& keys) {
   for (const ConfigNode& child : keys.children) out[child.key] = keys_json(child);
   return out;
 }
+
+}  // namespace
+
+std::string keys_text(const ConfigNode& keys) { return keys_json(keys).dump(); }
 
 std::string short_id(const std::string& text) { return sha256(text).substr(0, 12); }
 

@@ -2,7 +2,6 @@
 // train/training/identity.h finds the ids of what a configuration trains.
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "nn/config/config.h"
@@ -23,9 +22,9 @@ struct StageId {
   std::string name() const { return stage + "-" + id; }  ///< of its folder in a store
 };
 
-/// Keys and values in the order of the keys' names. Numbers are text, so that how they are printed
-/// elsewhere does not matter.
-nlohmann::json keys_json(const ConfigNode& keys);
+/// Keys and values as JSON, in the order of the keys' names. Numbers are text, so that how they are
+/// printed elsewhere does not matter.
+std::string keys_text(const ConfigNode& keys);
 /// The first 12 hex digits of the SHA-256 of `text`.
 std::string short_id(const std::string& text);
 

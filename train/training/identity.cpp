@@ -19,7 +19,7 @@ std::string number(double value) { return config_detail::write_leaf(value).text;
 
 template <class C>
 Json keys_of(const C& config) {
-  return keys_json(write_identity(config));
+  return Json::parse(keys_text(write_identity(config)));
 }
 
 }  // namespace
