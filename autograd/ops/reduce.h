@@ -44,9 +44,8 @@ Var mean(const Var& x, int axis);
 Var sum_all(const Var& x);
 Var mean_all(const Var& x);
 /// Lengths of vectors along the last axis (removed): sqrt(|x|^2 + epsilon), which has a derivative
-/// where a vector is zero. `epsilon` in square units of x: the default changes no bit of a length
-/// over 0.01.
-Var smooth_length(const Var& x, double epsilon = 1e-12);
+/// where a vector is zero.
+Var smooth_length(const Var& x, double epsilon);
 /// Mean squared error over all elements of two equal shapes (spec 7).
 Var mse(const Var& a, const Var& b);
 /// Mean binary cross-entropy of logits against a constant label in [0, 1].

@@ -11,9 +11,7 @@ namespace restage {
 Var errors(const Var& x, Measure measure, int64_t width) {
   if (measure == Measure::mse) return square(x);
   const Var rows = reshape(x, {x.size(0), x.value.numel() / (x.size(0) * width), width});
-  // Trainings rest on it: errors below a millimetre, and their gradients, would change.
-  constexpr double kEpsilon = 1e-10;
-  return smooth_length(rows, kEpsilon);
+  return smooth_length(rows, 1e-10);
 }
 
 double mean_distance(const Tensor& a, const Tensor& b) {

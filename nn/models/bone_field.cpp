@@ -9,7 +9,7 @@ namespace restage {
 namespace {
 
 constexpr double kNearest = 8;     // how much the nearest bone is preferred at the start
-constexpr double kSmooth = 1e-12;  // square metres, as of smooth_length()
+constexpr double kSmooth = 1e-12;  // epsilon of smooth_length(), square metres
 
 /// How far the body goes on behind a leaf (skull, hand, toes), as a part of the bone that leads to
 /// the leaf.
@@ -52,7 +52,7 @@ Var bone_distances(const Var& points, const Var& joints, const Var& bones) {
   const Var share = sum(way * along, -1) / length2;
   // Where the nearest point of the bone is: 0 at its beginning, 1 at its end.
   const Var inside = relu(share) - relu(add_scalar(share, -1));
-  return smooth_length(way - reshape(inside, {n, v, kJoints, 1}) * along);
+  return smooth_length(way - reshape(inside, {n, v, kJoints, 1}) * along, kSmooth);
 }
 
 BoneField::BoneField(const MlpConfig& c, const Init& init)
@@ -62,7 +62,7 @@ Var BoneField::weights(Context& ctx, const Var& rest, const Var& points) const {
   const ModuleScope path(scope);
   const int64_t n = points.size(0);
   const Var bones = bones_of(rest);
-  const Var size = reshape(mean(smooth_length(bones), 1), {n, 1, 1});
+  const Var size = reshape(mean(smooth_length(bones, kSmooth), 1), {n, 1, 1});
   const Var distances = bone_distances(points, rest, bones) / size;
   const Var x = concat({joint_differences(points, rest) / size, distances}, 2);
   return softmax(net(ctx, x) - scale(distances, kNearest));

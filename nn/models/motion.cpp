@@ -53,7 +53,7 @@ Var rest_of_each_frame(const Var& rest, int64_t frames) {
 Var leg_lengths(const Var& joints) {
   const Var hips = slice(joints, 1, 1, 3), knees = slice(joints, 1, 4, 6),
             ankles = slice(joints, 1, 7, 9);
-  return mean(smooth_length(hips - knees) + smooth_length(knees - ankles), 1);
+  return mean(smooth_length(hips - knees, 1e-20) + smooth_length(knees - ankles, 1e-20), 1);
 }
 
 void put_pose(const Var& local, const Var& rest_rows, int64_t n, MotionOutput* out) {

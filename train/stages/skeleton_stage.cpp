@@ -19,8 +19,7 @@ namespace {
 constexpr double kUncertaintyWeight = 0.01;
 constexpr size_t kFollowed = 12;  // frames of a validation sequence
 
-/// Lengths of vectors along the last axis, metres. The epsilon is another than the usual one since
-/// trainings rest on it: errors of some millimetres, and their gradients, would change.
+/// Lengths of vectors along the last axis, metres.
 Var lengths(const Var& d) { return smooth_length(d, 1e-8); }
 
 CloudConfig with_points(CloudConfig c, const SkeletonModel& model) {
