@@ -147,6 +147,7 @@ Points as_points(const std::vector<double>& values) {
 /// or stays where it is while they lie far apart (and are not frames of somebody who runs far).
 bool are_points(int64_t steps, const ReadSteps& read) {
   constexpr int64_t kLookedAt = 8;
+  constexpr double kAnyStep = std::numeric_limits<double>::infinity();  // some have few frames
   constexpr size_t kShort = 8;                         // frames in which nobody gets far
   constexpr float kStays = 0.05f, kStaysShort = 0.3f;  // times the distance between points
   Point low = Point::Constant(std::numeric_limits<float>::infinity()), high = -low;
@@ -165,11 +166,12 @@ bool are_points(int64_t steps, const ReadSteps& read) {
     high = high.cwiseMax(at[0]);
     firsts.push_back(at[0]);
     moved = std::max(moved, (most - least).norm());
-    paths += is_path(at);
+    paths += is_path(at, kAnyStep);
     is_short = at.size() < kShort;
   }
   if (4 * paths >= 3 * kLookedAt) return true;
-  return !is_path(firsts) && moved < (is_short ? kStaysShort : kStays) * (high - low).norm();
+  return !is_path(firsts, kAnyStep) &&
+         moved < (is_short ? kStaysShort : kStays) * (high - low).norm();
 }
 
 }  // namespace

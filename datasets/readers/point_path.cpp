@@ -1,5 +1,6 @@
 #include "datasets/readers/point_path.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <limits>
 
@@ -21,14 +22,17 @@ Points moving(const Points& points) {
   return out;
 }
 
-/// How much a step differs from the one before, times the length of the steps.
-double change_of_steps(const Points& at) {
+/// Whether the steps are short and differ little from those before.
+bool moves_smoothly(const Points& at, double longest_step) {
   double lengths = 0, changes = 0;
+  Eigen::AlignedBox3f box(at[0]);
   for (size_t i = 1; i < at.size(); ++i) {
+    box.extend(at[i]);
     lengths += (at[i] - at[i - 1]).cast<double>().norm();
     if (i + 1 < at.size()) changes += (at[i + 1] - 2 * at[i] + at[i - 1]).cast<double>().norm();
   }
-  return changes / lengths;
+  const double step = lengths / static_cast<double>(at.size() - 1);
+  return changes < kMostChange * lengths && step < longest_step * box.diagonal().norm();
 }
 
 /// How many places are nearest to one that is at most two steps away.
@@ -52,9 +56,9 @@ double share_near_in_order(const Points& at) {
 
 }  // namespace
 
-bool is_path(const Points& points) {
+bool is_path(const Points& points, double longest_step) {
   const Points at = moving(points);
-  return at.size() >= kFewestPlaces && change_of_steps(at) < kMostChange &&
+  return at.size() >= kFewestPlaces && moves_smoothly(at, longest_step) &&
          share_near_in_order(at) > kLeastShare;
 }
 

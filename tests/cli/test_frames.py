@@ -13,7 +13,7 @@ def moved(step, scale=1.0):
 
 
 class Frames(CliTest):
-    def folder(self, name, *files, scale=1.0):
+    def frames_in(self, name, *files, scale=1.0):
         for i, file in enumerate(files):
             self.ply("%s/%s" % (name, file), moved(i, scale))
         return name
@@ -24,14 +24,14 @@ class Frames(CliTest):
             self.bad_input(command, *words)
 
     def test_a_frame_that_is_there_twice(self):
-        self.everywhere(self.folder("pads", "f0.ply", "f00.ply", "f1.ply"), "pads", "f0.ply", "f00.ply", "keep one of the two")
-        self.folder("kinds", "frame_0000.ply", "frame_0001.ply")
+        self.everywhere(self.frames_in("pads", "f0.ply", "f00.ply", "f1.ply"), "pads", "f0.ply", "f00.ply", "keep one of the two")
+        self.frames_in("kinds", "frame_0000.ply", "frame_0001.ply")
         self.write("kinds/frame_0.obj", "".join("v %g %g %g\n" % p for p in moved(0)))
         self.everywhere("kinds", "frame_0000.ply", "frame_0.obj", "holds one frame twice")
-        self.everywhere(self.folder("either", "take1.9.ply", "take1.11.ply"), "cannot be told", "rename the frames")
+        self.everywhere(self.frames_in("either", "take1.9.ply", "take1.11.ply"), "cannot be told", "rename the frames")
 
     def test_the_order_is_said(self):
-        self.folder("stamps", "1700000000.99999999.ply", "1700000000.100000000.ply", "1700000001.5.ply")
+        self.frames_in("stamps", "1700000000.99999999.ply", "1700000000.100000000.ply", "1700000001.5.ply")
         self.assertIn("seconds and nanoseconds", self.done("data", "import", "stamps", "--out", "x.h5"))
         self.assertIn("seconds and nanoseconds", self.restage("doctor", "stamps").out)
 
@@ -55,7 +55,7 @@ class Frames(CliTest):
         self.assertIn("'mesh.ply' is taken of each, and left out are 'floor.ply'", " ".join(found["reports"][0]["remarks"]))
 
     def test_what_cannot_be_read_is_a_frame_without_points(self):
-        self.folder("in", *("%d.ply" % f for f in range(8)))
+        self.frames_in("in", *("%d.ply" % f for f in range(8)))
         self.write("in/3.ply", self.bytes("in/3.ply")[:-40])
         self.write("in/5.ply", POINTER)
         found = self.json("data", "import", "in", "--out", "x.h5")
@@ -73,7 +73,7 @@ class Frames(CliTest):
         self.everywhere("in", "6 of 8 frames are Git LFS pointers", "git lfs pull")
 
     def test_long_gaps_keep_their_time(self):
-        self.folder("in", *("%03d.ply" % f for f in range(50)))
+        self.frames_in("in", *("%03d.ply" % f for f in range(50)))
         for f in list(range(2)) + list(range(6, 41)):
             self.ply("in/%03d.ply" % f, [])
         known = ("--up", "y", "--scale", 1, "--facing", "z")
@@ -90,7 +90,7 @@ class Frames(CliTest):
         self.assertNotEqual(self.vertices("mended/frame_%06d.ply" % 45), [])
 
     def test_units_by_name(self):
-        self.folder("mm", "1.ply", "2.ply", scale=1000)
+        self.frames_in("mm", "1.ply", "2.ply", scale=1000)
         self.done("data", "import", "mm", "--scale", "0.001", "--out", "a.h5")
         for unit in ("mm", "MM", "millimetres"):
             self.done("data", "import", "mm", "--scale", unit, "--out", "b.h5")
