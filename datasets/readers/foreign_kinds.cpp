@@ -123,7 +123,8 @@ bool starts_with_any(std::string_view content, const ForeignKind& kind) {
 
 /// An XML document is COLLADA if it says so near its start.
 bool is_collada(std::string_view content) {
-  return content.starts_with("<?xml") && content.substr(0, kFirstBytes).find("<COLLADA") != content.npos;
+  return content.starts_with("<?xml") &&
+         content.substr(0, kFirstBytes).find("<COLLADA") != content.npos;
 }
 
 }  // namespace
