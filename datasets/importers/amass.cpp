@@ -142,7 +142,7 @@ SourceMotion read_motion(const Npz& file, const BodyParameters& names, BodyRotat
                      "add trans [F, 3], the root's place in metres (zeros: it stays in place)");
   const NpyArray trans = file.array(names.trans);
   const auto frames = std::ssize(rotations.local);
-  if (trans.is_text() || trans.size() != 3 * frames)
+  if (trans.is_text() || trans.size() != 3 * frames || trans.shape().back() != 3)
     throw InputError(trans.where(), "has the shape " + shape_text(trans.shape()),
                      cat("it needs one position a frame: [", frames, ", 3]"));
   const std::vector<double> metres =

@@ -81,6 +81,7 @@ std::vector<CloudArray> unnamed_clouds(const Npz& file) {
 
 std::vector<std::string> names_of(const std::vector<CloudArray>& clouds) {
   std::vector<std::string> out;
+  out.reserve(clouds.size());
   for (const CloudArray& cloud : clouds) out.push_back(cloud.name);
   return out;
 }

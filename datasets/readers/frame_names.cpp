@@ -222,6 +222,7 @@ FrameList in_order_of_names(const std::vector<std::string>& files) {
 
 FrameList order(const std::vector<std::string>& files, const std::string& folder, bool folders) {
   std::vector<std::string> stems;
+  stems.reserve(files.size());
   for (const std::string& file : files)
     stems.push_back(folders ? shown_of(file) : std::filesystem::path(file).stem().string());
   const NameReading reading = reading_of(stems, folder);

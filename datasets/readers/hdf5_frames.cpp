@@ -130,6 +130,7 @@ class Finder {
         (one.sequence ? sequences : clouds).push_back(one.name);
     }
     std::vector<Sequence> out;
+    out.reserve(sequences.size());
     for (const std::string& name : sequences) out.push_back({{name}, {}});
     if (out.empty() && !clouds.empty()) out.push_back(series(clouds));
     if (out.empty())

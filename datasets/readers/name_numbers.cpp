@@ -65,6 +65,7 @@ std::vector<std::string> main_series(const std::vector<std::string>& names) {
 /// The number of each name that has a fraction in some of them, and changes; none if there is none.
 std::vector<Piece> changing_fractions(const std::vector<std::string>& series) {
   std::vector<Pieces> names;
+  names.reserve(series.size());
   for (const std::string& name : series) names.push_back(pieces_of(name, kAsDecimals));
   for (size_t k = 0; !names.empty() && k < names[0].size(); ++k) {
     std::vector<Piece> column;
@@ -167,6 +168,7 @@ std::optional<Dispute> dispute(const std::vector<std::string>& series) {
     Pieces parts, decimals;
   };
   std::vector<Readings> names;
+  names.reserve(series.size());
   for (const std::string& name : series)
     names.push_back({name, pieces_of(name, kAsParts), pieces_of(name, kAsDecimals)});
   std::sort(names.begin(), names.end(), [](const Readings& a, const Readings& b) {

@@ -335,6 +335,8 @@ TEST_F(ImportersAmass, WhatIsWrongIsSaid) {
                               {"poses", doubles({0, 156}, 0), "0 frames"},
                               {"poses", doubles({121, 156}, NAN), "finite"},
                               {"trans", doubles({120, 3}, 0), "[121, 3]"},
+                              {"trans", doubles({3, 121}, 0), "[121, 3]"},
+                              {"trans", doubles({363}, 0), "[121, 3]"},
                               {"trans", doubles({121, 3}, INFINITY), "finite"},
                               {"betas", doubles({2, 4}, 0), "one person"},
                               {"betas", doubles({4}, NAN), "NaN"}};
