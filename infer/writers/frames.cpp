@@ -109,7 +109,7 @@ FrameFolderWriter::FrameFolderWriter(std::string folder, std::vector<Triangle> f
 
 void FrameFolderWriter::push(const Points& vertices, const std::vector<Triangle>& faces) {
   const std::string name = format("/frame_%06zu.%s", frames_, extension(format_));
-  if (!vertices.empty()) check_mesh(folder_ + name, vertices, faces);
+  if (!vertices.empty() || !faces.empty()) check_mesh(folder_ + name, vertices, faces);
   write_plain(temporary_.path() + name, mesh_bytes(format_, vertices, faces), folder_);
   ++frames_;
 }

@@ -332,11 +332,13 @@ TEST_F(WritersTest, CloudsMayChangeTheirCountAndBadFramesAreRefused) {
   FrameFolderWriter writer(dir / "clouds", {}, MeshFormat::obj);
   writer.push({{0, 0, 0}, {1, 2, 3}});
   writer.push({{0.1f, 0, 0}});
-  EXPECT_THROW(writer.push({}), InputError);
+  writer.push({});  // shows nothing
+  EXPECT_THROW(writer.push({}, {{0, 1, 2}}), InputError);
   EXPECT_THROW(writer.push({{NAN, 0, 0}}), InputError);
   writer.commit();
   EXPECT_EQ(bytes_of(dir / "clouds/frame_000000.obj"),
             "# restage, metres, y up\nv 0 0 0\nv 1 2 3\n");
+  EXPECT_EQ(bytes_of(dir / "clouds/frame_000002.obj"), "# restage, metres, y up\n");
   EXPECT_EQ(bytes_of(dir / "clouds/frame_000001.obj"),
             "# restage, metres, y up\nv 0.100000001 0 0\n");
 }
