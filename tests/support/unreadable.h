@@ -4,21 +4,26 @@
 
 #include <sys/resource.h>
 
-#include <cerrno>
 #include <filesystem>
 #include <string>
 
-#include "autograd/base/atomic_file.h"
-
 namespace restage::test {
+
+/// False under the sanitizers: UBSan opens a pipe to look at an object of a class that it has not
+/// met, and takes a failure for a fault of ours.
+#if defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define RESTAGE_FILES_MAY_RUN_OUT false
+#endif
+#endif
+#ifndef RESTAGE_FILES_MAY_RUN_OUT
+#define RESTAGE_FILES_MAY_RUN_OUT true
+#endif
 
 /// While it lives, no further file can be opened ("Too many open files").
 class NoMoreFiles {
  public:
   NoMoreFiles() {
-    // UBSan opens a pipe when it meets a class for the first time, and takes a failure for a fault
-    // of ours.
-    const ReadError known("", ENOENT);
     getrlimit(RLIMIT_NOFILE, &old_);
     const rlimit none{0, old_.rlim_max};
     setrlimit(RLIMIT_NOFILE, &none);
