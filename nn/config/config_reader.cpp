@@ -238,7 +238,7 @@ std::string config_reference_table(const std::vector<ConfigReference::Row>& rows
   std::string out = "| key | type | default | meaning |\n|---|---|---|---|\n";
   const auto cell = [](std::string text) {
     for (size_t at = 0; (at = text.find('|', at)) != std::string::npos; at += 2)
-      text.insert(at, "\\");
+      text.insert(at, 1, '\\');
     return text;
   };
   for (const auto& row : rows)

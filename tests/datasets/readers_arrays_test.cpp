@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "datasets/readers/array_frames.h"
 #include "datasets/readers/npz.h"
 #include "tests/datasets/npz_support.h"
 #include "tests/support/files.h"
