@@ -5,6 +5,7 @@
 #include <set>
 
 #include "autograd/base/format.h"
+#include "datasets/importers/joint_fit.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/mesh_io.h"
 #include "datasets/readers/text.h"
@@ -83,21 +84,15 @@ std::string rate_of(const Gltf& file, const GltfClip& clip, int64_t frames) {
 Motion motion_of(const Gltf& file, const GltfRig& rig, const GltfClip& clip, int64_t frames,
                  ImportReport& report) {
   Motion motion;
-  Apart apart;
-  for (const int j : {1, 2, 3}) {
-    int above = rig.node[j];
-    while (above >= 0 && above != rig.node[0]) above = file.nodes[above].parent;
-    if (above < 0) apart.loose.push_back(j);
-  }
   motion.rest = t_pose_joints(rig);
   const Vec3 pelvis = motion.rest[0];
   for (Vec3& x : motion.rest) x -= pelvis;
+  JointFit fit(motion.rest);
   std::vector<double> lowest;
   for (int64_t f = 0; f < frames; ++f) {
     const double seconds = clip.begin + static_cast<double>(f) / kFps;
     PosedSkeleton pose = rig_pose(rig, gltf_pose(file, clip, seconds));
-    follow_trunk(pose, motion.rest);
-    apart.add(pose, motion.rest);
+    fit.turn(pose);
     auto& global = motion.global.emplace_back();
     for (size_t j = 0; j < kJoints; ++j) {
       if (!pose.joints[j].allFinite() || !pose.global[j].allFinite())
@@ -109,7 +104,7 @@ Motion motion_of(const Gltf& file, const GltfRig& rig, const GltfClip& clip, int
     motion.hips.push_back((0.5 * (pose.joints[1] + pose.joints[2])).cast<float>());
     lowest.push_back(lowest_foot(pose));
   }
-  check_apart(apart, report);
+  fit.report(report);
   const auto floor = static_cast<float>(floor_height(std::move(lowest)));
   for (Point& p : motion.hips) p.y() -= floor;
   return motion;

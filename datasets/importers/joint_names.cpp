@@ -384,6 +384,18 @@ const Profile& no_profile() {
   return out;
 }
 
+/// The pelvis turns with the lowest bone that carries both legs, if that hangs on it: the first of
+/// the spine in 3ds Max, Daz's `pelvis` below `hip`.
+NamedJoints turned_with_legs(const SourceSkeleton& skeleton, NamedJoints names) {
+  SourceJoint& pelvis = names.map[kPelvis];
+  const int legs = carrier_of(skeleton, names.map[kLeftHip].joint, names.map[kRightHip].joint);
+  if (legs <= pelvis.joint || !hangs_on(skeleton, legs, pelvis.joint)) return names;
+  const std::vector<Vec3> zero = zero_positions(skeleton);
+  pelvis.offset += zero[pelvis.joint] - zero[legs];
+  pelvis.joint = legs;
+  return names;
+}
+
 }  // namespace
 
 void check_one_person(const SourceSkeleton& skeleton, const std::string& where) {
@@ -396,21 +408,24 @@ NamedJoints name_joints(const SourceSkeleton& skeleton, const std::string& where
                         const Profile* profile) {
   const std::vector<std::string> plain = undecorated(skeleton.names);
   const BoneNames names(skeleton, plain, profile != nullptr);
-  const auto by_name = [&](const std::string& name) { return names.find(name); };
+  const auto placed = [&](const BoneTree& tree, const Profile& by, const Bones& bones) {
+    const auto by_name = [&](const std::string& name) { return names.find(name); };
+    return turned_with_legs(skeleton, place_joints(tree, by_name, by, bones, where));
+  };
   const BoneTree tree = tree_of(skeleton, plain);
   if (profile) {
     const Bones bones = asked_bones(*profile, skeleton, names, where);
-    return place_joints(tree, by_name, *profile, completed(tree, *profile, bones), where);
+    return placed(tree, *profile, completed(tree, *profile, bones));
   }
   only_person(tree, where);  // refuses two
   if (const Family family = find_family(tree, names); family.profile)
-    return place_joints(tree, by_name, *family.profile, family.bones, where);
+    return placed(tree, *family.profile, family.bones);
   const Reading reading = best_reading(skeleton, plain, where);
   if (!reading.found.missing.empty()) {
     check_encoding(skeleton, where);
     throw_not_found(reading.tree, reading.found, plain, where);
   }
-  return place_joints(reading.tree, by_name, no_profile(), reading.found.bones, where);
+  return placed(reading.tree, no_profile(), reading.found.bones);
 }
 
 }  // namespace restage

@@ -5,6 +5,7 @@
 
 #include "autograd/base/format.h"
 #include "datasets/importers/bone_tree.h"
+#include "datasets/importers/joint_fit.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/text.h"
 #include "datasets/readers/word_lines.h"
@@ -119,19 +120,16 @@ Poses poses_at_30_fps(SourceMotion motion, const JointMap& map, const RestPose& 
   check_length(motion.local.size(), motion.skeleton.size(), motion.fps, bytes, path);
   motion = resample(motion);
   Poses poses(motion.local.size());
-  Apart apart;
-  for (const int j : {1, 2, 3})
-    if (!hangs_on(motion.skeleton, map[j].joint, map[0].joint)) apart.loose.push_back(j);
+  JointFit fit(rest.joints);
   for (size_t f = 0; f < poses.size(); ++f) {
     poses[f] = source_pose(motion, map, f);
     for (size_t j = 0; j < kJoints; ++j) {
       poses[f].global[j] = rest.align * poses[f].global[j] * rest.frame[j];
       poses[f].joints[j] = rest.align * poses[f].joints[j];
     }
-    follow_trunk(poses[f], rest.joints);
-    apart.add(poses[f], rest.joints);
+    fit.turn(poses[f]);
   }
-  check_apart(apart, report);
+  fit.report(report);
   return poses;
 }
 

@@ -92,38 +92,6 @@ PosedSkeleton source_pose(const SourceMotion& motion, const JointMap& map, size_
   return out;
 }
 
-void follow_trunk(PosedSkeleton& pose, const Joints& rest) {
-  constexpr double kSeen = 1e-5;  // of the bone's length
-  for (const auto& [lower, upper] : {std::pair{3, 6}, {6, 9}, {12, 15}, {13, 16}, {14, 17}}) {
-    const Vec3 is = pose.global[lower] * (rest[upper] - rest[lower]);
-    const Vec3 wanted = pose.joints[upper] - pose.joints[lower];
-    const double size = std::min(is.norm(), wanted.norm());
-    if (size > 1e-9 && (is - wanted).norm() > kSeen * size)
-      pose.global[lower] = shortest_arc(is, wanted) * pose.global[lower];
-  }
-}
-
-void Apart::add(const PosedSkeleton& pose, const Joints& rest) {
-  for (const int j : loose) {
-    const Vec3 held = pose.joints[0] + pose.global[0] * (rest[j] - rest[0]);
-    if (const double off = (pose.joints[j] - held).norm(); off > distance) {
-      distance = off;
-      joint = j;
-    }
-  }
-}
-
-void check_apart(const Apart& apart, ImportReport& report) {
-  constexpr double kSeen = 0.02, kMost = 0.25;  // metres
-  const std::string what = cat("the ", kJointNames[apart.joint], " moves up to ",
-                               format("%.2f", apart.distance), " m against the pelvis");
-  if (!(apart.distance <= kMost))
-    throw InputError(report.file, what + ", on which it does not hang",
-                     "export a skeleton whose hips carry legs and spine, or say with --bones which "
-                     "bone is the pelvis");
-  if (apart.distance > kSeen) report.remark(what + ", where it is kept");
-}
-
 double lowest_foot(const PosedSkeleton& p) {
   return std::min({p.joints[7].y(), p.joints[8].y(), p.joints[10].y(), p.joints[11].y()});
 }

@@ -76,23 +76,6 @@ PosedSkeleton source_pose(const SourceMotion& motion, const JointMap& map, size_
 /// Frame by frame; in pieces, as the frames of hours are many.
 using Poses = std::deque<PosedSkeleton>;
 
-/// A source may have more bones in the trunk than the 22 joints: those between, which turn too, are
-/// left out. So the lower of two joints that follow each other there (spine, neck, collars) is
-/// turned further, by the shortest arc, until `rest` puts the upper one where it is in the source.
-/// Changes nothing where no bone is left out.
-void follow_trunk(PosedSkeleton& pose, const Joints& rest);
-
-/// How far hips and spine1 that do not hang on the pelvis are from where `rest` puts them on it:
-/// the largest over the frames so far, and of which joint.
-struct Apart {
-  std::vector<int> loose;  ///< those of the joints 1, 2 and 3 that hang elsewhere
-  double distance = 0;     ///< metres
-  int joint = 0;
-  void add(const PosedSkeleton& pose, const Joints& rest);
-};
-/// A remark for what is seen; InputError for a body that falls apart.
-void check_apart(const Apart& apart, ImportReport& report);
-
 /// 5th percentile over frames of the lowest ankle or foot: the height of the clip's floor.
 double floor_height(const Poses& poses);
 /// The same from lowest_foot() of each frame.

@@ -198,7 +198,7 @@ TEST_F(ImportersBvh, ASpineBesideItsPelvisMovesWithIt) {
   EXPECT_TRUE(clip.report.remarks.empty());
   const MotionClip loose = convert_bvh(beside(0.2), "x.bvh", {});
   ASSERT_EQ(loose.report.remarks.size(), 1u);
-  EXPECT_HAS(loose.report.remarks[0], "spine1 moves up to 0.1");
+  EXPECT_HAS(loose.report.remarks[0], "spine1 is up to 0.097 m");
   EXPECT_HAS(refusal_of([&] { convert_bvh(beside(1.5), "x.bvh", {}); }), "against the pelvis");
 }
 

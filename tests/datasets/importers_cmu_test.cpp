@@ -360,9 +360,10 @@ TEST_F(ImportersCmu, OriginalSkeletonIsTheAsfOne) {
     const Vec3 b = clip->motion.rest[limb[1]] - clip->motion.rest[limb[0]];
     EXPECT_LT((a.normalized() - b.normalized()).norm(), 0.01) << limb[0];
   }
+  // The trunk follows bones that are none of the 22 joints (joint_fit.h).
   double worst = 0;
   for (size_t f = 0; f < bvh.joints.size(); ++f)
-    for (int j = 0; j < kJoints; ++j)
+    for (const int j : {0, 1, 2, 4, 5, 7, 8, 10, 11, 15, 16, 17, 18, 19, 20, 21})
       worst = std::max<double>(worst,
                                bvh.motion.global[f][j].angularDistance(clip->motion.global[f][j]));
   EXPECT_LT(worst, 2e-3);

@@ -6,6 +6,7 @@
 
 #include "datasets/importers/bone_words.h"
 #include "datasets/importers/find_joints.h"
+#include "datasets/importers/joint_fit.h"
 #include "datasets/importers/source_motion.h"
 #include "tests/datasets/rig_lists_games.h"
 #include "tests/datasets/rig_lists_more.h"
@@ -43,7 +44,12 @@ void expect_right(const BuiltRig& rig, const std::string& what) {
     ADD_FAILURE() << what << ": " << error.what();
     return;
   }
-  for (size_t j = 0; j < kJoints; ++j) {
+  // Where the legs hang on a bone below the pelvis, that one turns it.
+  const SourceJoint& pelvis = found.map[0];
+  const std::vector<Vec3> zero = zero_positions(rig.skeleton);
+  EXPECT_TRUE(hangs_on(rig.skeleton, pelvis.joint, rig.bone[0])) << what;
+  EXPECT_LT((zero[pelvis.joint] + pelvis.offset - zero[rig.bone[0]]).norm(), 1e-12) << what;
+  for (size_t j = 1; j < kJoints; ++j) {
     const bool placed = std::find(found.placed.begin(), found.placed.end(), static_cast<int>(j)) !=
                         found.placed.end();
     EXPECT_EQ(placed, rig.bone[j] < 0) << what << ": " << kJointNames[j];
@@ -350,36 +356,120 @@ TEST(ImportersRigs, TheLastOfAnyNumberOfSpineBonesCarriesTheArms) {
   }
 }
 
+/// How far these joints of a pose's turns, put on the middle of its hips, are from its points,
+/// metres.
+double off_its_points(const PosedSkeleton& pose, const Joints& rest,
+                      const std::vector<int>& joints) {
+  const Pose turns{to_local(pose.global), Vec3::Zero()};
+  const Joints made = forward_kinematics(rest, turns).joints;
+  const Vec3 moved = 0.5 * (pose.joints[1] + pose.joints[2] - made[1] - made[2]);
+  double out = 0;
+  for (const int j : joints) out = std::max(out, (made[j] + moved - pose.joints[j]).norm());
+  return out;
+}
+const std::vector<int> kLimbs = {1,  2,  4,  5,  7,  8,  10, 11,
+                                 15, 16, 17, 18, 19, 20, 21};  // and the head
+const std::vector<int> kOfTrunk = {3, 6, 9, 12, 13, 14};
+
+struct Seen {
+  double before = 0, limbs = 0, trunk = 0;  ///< off_its_points(): of all before JointFit, after it
+  std::vector<std::string> remarks;         ///< of JointFit
+};
+/// A skeleton's pose in which bone b is turned by `turn(b)`.
+template <class Turn>
+Seen seen_in(const SourceSkeleton& skeleton, const Turn& turn) {
+  const NamedJoints found = name_joints(skeleton, "x.bvh");
+  const Joints rest = rest_joints(skeleton, found.map);
+  SourceMotion motion;
+  motion.skeleton = skeleton;
+  motion.position = {{}};
+  motion.local.resize(1);
+  for (size_t b = 0; b < skeleton.size(); ++b) motion.local[0].push_back(turn(b));
+  PosedSkeleton pose = source_pose(motion, found.map, 0);
+  Seen out;
+  out.before = std::max(off_its_points(pose, rest, kLimbs), off_its_points(pose, rest, kOfTrunk));
+  JointFit fit(rest);
+  fit.turn(pose);
+  ImportReport report;
+  fit.report(report);
+  out.limbs = off_its_points(pose, rest, kLimbs);
+  out.trunk = off_its_points(pose, rest, kOfTrunk);
+  out.remarks = report.remarks;
+  return out;
+}
+
 /// Bones of the trunk that are left out turn too; joints are where they are in the file all the
-/// same.
+/// same, or the report says that they are not.
 TEST(ImportersRigs, BonesLeftOutOfTheTrunkMoveNoJoint) {
-  for (const char* name :
-       {"unreal 5", "makehuman, default rig", "xsens mvn, BVH", "daz genesis 8", "valve biped"}) {
-    const BuiltRig built = rig(name);
-    const NamedJoints found = name_joints(built.skeleton, "x.bvh");
-    const Joints rest = rest_joints(built.skeleton, found.map);
-    SourceMotion motion;
-    motion.skeleton = built.skeleton;
-    std::vector<Quat> local(built.skeleton.size(), Quat::Identity());
-    for (size_t b = 0; b < local.size(); ++b)  // every bone, up to 17 degrees
-      local[b] =
-          Quat(Eigen::AngleAxisd(0.3 * std::sin(1.7 * static_cast<double>(b)),
-                                 Vec3(1, 0.3, std::cos(static_cast<double>(b))).normalized()));
-    motion.local = {local};
-    motion.position = {{}};
-    PosedSkeleton pose = source_pose(motion, found.map, 0);
-    const auto worst = [&] {
-      double out = 0;
-      for (const auto& [lower, upper] : {std::pair{3, 6}, {6, 9}, {12, 15}, {13, 16}, {14, 17}})
-        out = std::max(out, (pose.joints[lower] + pose.global[lower] * (rest[upper] - rest[lower]) -
-                             pose.joints[upper])
-                                .norm());
-      return out;
-    };
-    EXPECT_GT(worst(), 0.004) << name;  // the test's motion shows it
-    follow_trunk(pose, rest);
-    EXPECT_LT(worst(), 0.002) << name;
+  int shown = 0;
+  for (const RigList& list : rig_lists()) {
+    const BuiltRig built = RigBuilder(list).built();
+    const Seen seen = seen_in(built.skeleton, [](size_t b) {  // every bone, up to 17 degrees
+      return Quat(Eigen::AngleAxisd(0.3 * std::sin(1.7 * static_cast<double>(b)),
+                                    Vec3(1, 0.3, std::cos(static_cast<double>(b))).normalized()));
+    });
+    shown += seen.before > 0.02;
+    EXPECT_LT(seen.limbs, 0.015) << list.name;
+    EXPECT_LT(seen.trunk, 0.04) << list.name;
+    EXPECT_EQ(!seen.remarks.empty(), std::max(seen.limbs, seen.trunk) > 0.02) << list.name;
   }
+  EXPECT_GT(shown, 10);
+}
+
+/// The skeleton with one bone more on the way to `below`, halfway.
+SourceSkeleton with_bone_above(const SourceSkeleton& s, const std::string& below) {
+  SourceSkeleton out;
+  std::vector<int> at;
+  for (size_t b = 0; b < s.size(); ++b) {
+    int parent = s.parents[b] < 0 ? -1 : at[static_cast<size_t>(s.parents[b])];
+    Vec3 offset = s.offsets[b];
+    if (s.names[b] == below) {
+      out.add("Extra", parent, 0.5 * offset);
+      parent = static_cast<int>(out.size()) - 1;
+      offset *= 0.5;
+    }
+    at.push_back(static_cast<int>(out.size()));
+    out.add(s.names[b], parent, offset);
+  }
+  return out;
+}
+
+/// What is off, at most, when one bone alone is turned by 30 degrees about each axis.
+Seen turned_alone(const SourceSkeleton& skeleton, const std::string& bone) {
+  Seen worst;
+  for (const Vec3& axis : {Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)}) {
+    const Seen seen = seen_in(skeleton, [&](size_t b) {
+      return Quat(Eigen::AngleAxisd(skeleton.names[b] == bone ? M_PI / 6 : 0, axis));
+    });
+    worst.before = std::max(worst.before, seen.before);
+    worst.limbs = std::max(worst.limbs, seen.limbs);
+    worst.trunk = std::max(worst.trunk, seen.trunk);
+    worst.remarks.insert(worst.remarks.end(), seen.remarks.begin(), seen.remarks.end());
+  }
+  return worst;
+}
+
+/// Legs on the spine, arms on the neck, legs on a bone beside the spine; one bone more anywhere in
+/// trunk, arms and legs.
+TEST(ImportersRigs, BonesThatHangElsewhereTurnTheBody) {
+  const Seen spine = turned_alone(rig("3ds max biped").skeleton, "Bip001 Spine");
+  EXPECT_LT(std::max(spine.limbs, spine.trunk), 1e-6);
+  for (const char* below : {"Spine1", "Spine2", "Neck", "Head", "LeftShoulder", "LeftForeArm",
+                            "LeftHand", "RightUpLeg", "RightLeg", "RightFoot"}) {
+    const Seen more = turned_alone(with_bone_above(rig("mixamo").skeleton, below), "Extra");
+    EXPECT_GT(more.before, 0.01) << below;
+    EXPECT_LT(std::max(more.limbs, more.trunk), 0.022) << below;
+  }
+  // Daz's pelvis turns beside the spine, and a neck takes the collars with it, which no turn of the
+  // 22 joints can: said, and arms and legs are as near as bones of one length come.
+  const Seen pelvis = turned_alone(rig("daz genesis 8").skeleton, "pelvis");
+  EXPECT_LT(pelvis.limbs, 0.02);
+  ASSERT_FALSE(pelvis.remarks.empty());
+  EXPECT_HAS(pelvis.remarks[0], "the spine1 is up to 0.0");
+  const Seen neck = turned_alone(rig("3ds max biped").skeleton, "Bip001 Neck");
+  EXPECT_LT(neck.limbs, 0.032);
+  ASSERT_FALSE(neck.remarks.empty());
+  EXPECT_HAS(neck.remarks[0], "_collar is up to 0.0");
 }
 
 /// A missing toe is put where a person's is: before the ankle and below it.
