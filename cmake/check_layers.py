@@ -58,7 +58,7 @@ ONLY_IN = {
     "yaml-cpp/": ["nn/config/config_yaml.cpp", "nn/weights/", "datasets/importers/profiles.cpp"],
     "CLI/": ["experiments/cli/command_options.cpp", "experiments/cli/program.cpp"],
     "nanoflann.hpp": ["nn/metrics/", "datasets/doctor/", "infer/registration/"],
-    "nlohmann/": ["nn/weights/", "datasets/readers/", "datasets/benchmark/manifest.cpp",
+    "nlohmann/": ["nn/weights/", "datasets/readers/", "datasets/benchmark/manifest.cpp", "datasets/characters/",
                   "datasets/importers/makehuman_pack.cpp", "datasets/fetch/fetch_cmu.cpp", "train/", "infer/",
                   "experiments/"],
     "mpi.h": ["train/mpi/"],

@@ -105,18 +105,14 @@ std::string off_tpose(const Joints& j) {
 }  // namespace
 
 Retargeter::Retargeter(const Bundle& weights, const std::string& weights_name, Mesh target,
-                       const std::string& where, const RetargetOptions& options,
-                       const std::optional<Joints>& rig)
+                       const std::string& where, const RetargetOptions& options)
     : models_(weights), target_(std::move(target)), options_(options) {
   auto& skeleton = models_.need_as<SkeletonModel>("skeleton", weights_name);
   const RngKey key = RngKey{options.seed, 0}.fold("target");
   rest_ = extract_joints(skeleton, surface_points(target_, kTargetPoints, key.fold("surface")),
                          where, key, kTargetSamples, kRestPoses);
-  if (const std::string off = off_tpose(rest_); !off.empty()) {
-    if (!rig && !options.force)
-      throw InputError(where, off, "give the target in T-pose facing +z, y up, or add --force");
-    if (rig) rest_ = *rig;
-  }
+  if (const std::string off = off_tpose(rest_); !off.empty() && !options.force)
+    throw InputError(where, off, "give the target in T-pose facing +z, y up, or add --force");
   prepare(weights_name);
 }
 

@@ -44,11 +44,9 @@ class Retargeter final : public System {
   /// frames have no vertices; without `deformation.offsets` vertices are skinned only.
   /// `weights_name` and `where` are the files of `weights` and `target`, for errors. InputError: a
   /// model is missing, a setting is unknown, or the line from a shoulder to a wrist of the target
-  /// is more than 30 degrees from +-x. `rig` holds the joints of a rigged target, which show its
-  /// T-pose: where the extractor finds no T-pose, they take the place of the joints that it finds.
+  /// is more than 30 degrees from +-x.
   Retargeter(const Bundle& weights, const std::string& weights_name, Mesh target,
-             const std::string& where, const RetargetOptions& options,
-             const std::optional<Joints>& rig = std::nullopt);
+             const std::string& where, const RetargetOptions& options);
   /// The same with known rest joints of the target: the extractor need not find them. If `weights`
   /// hold no model for `skeleton`, the source is given by push_joints() instead of push().
   Retargeter(const Bundle& weights, const std::string& weights_name, Mesh target,

@@ -1,6 +1,7 @@
 #include "infer/systems.h"
 
 #include "autograd/base/nearest.h"
+#include "infer/own_skin.h"
 #include "infer/registration/refinement.h"
 #include "infer/registration/registration.h"
 
@@ -12,7 +13,7 @@ std::unique_ptr<Retargeter> make_retargeter(SystemInput in) {
     return std::make_unique<Retargeter>(in.weights, in.weights_name, std::move(in.target), *in.rest,
                                         in.options);
   return std::make_unique<Retargeter>(in.weights, in.weights_name, std::move(in.target),
-                                      in.target_name, in.options, in.rig);
+                                      in.target_name, in.options);
 }
 
 std::unique_ptr<System> make_chain(SystemInput in) { return make_retargeter(std::move(in)); }
@@ -39,6 +40,17 @@ const std::vector<SystemType>& systems() {
        make_registration},
   };
   return table;
+}
+
+std::unique_ptr<System> make_system(const SystemType& type, SystemInput input) {
+  const auto own = std::move(input.own);
+  if (!own) return type.make(std::move(input));
+  input.target = own->mesh();
+  input.rest = own->rest();
+  if (type.name == "chain")  // its surface would not be shown
+    for (const char* role : {"deformation.weights", "deformation.offsets"})
+      input.weights.erase(role);
+  return std::make_unique<OwnSkin>(type.make(std::move(input)), own);
 }
 
 const SystemType& system_type(const std::string& name, const std::string& where) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "infer/retargeter.h"
+#include "nn/geometry/own_rig.h"
 
 namespace restage {
 
@@ -18,8 +19,8 @@ struct SystemInput {
   std::string target_name;     ///< the file of `target`, for errors
   std::optional<Joints> rest;  ///< the target's rest joints, if they are known
   RetargetOptions options;
-  std::optional<Joints> rig =
-      std::nullopt;  ///< the joints that the target's rig shows (Retargeter)
+  /// A target with bones and a skin of its own: `target` and `rest` are those then.
+  std::shared_ptr<const OwnRig> own = nullptr;
 };
 
 struct SystemType {
@@ -29,6 +30,8 @@ struct SystemType {
 };
 
 const std::vector<SystemType>& systems();
+/// A system of that type; where the target has a skin of its own, that poses its vertices.
+std::unique_ptr<System> make_system(const SystemType& type, SystemInput input);
 /// The system of that name. InputError, which suggests the nearest known name, if there is none;
 /// `where`: the file in which the name stands.
 const SystemType& system_type(const std::string& name, const std::string& where = "");

@@ -35,29 +35,13 @@ Mesh t_pose_mesh(const Gltf& file, const GltfRig& rig) {
   return out;
 }
 
-/// Moves the lowest point to y = 0 and the pelvis over the origin; gives what was taken off.
-Vec3 put_on_floor(Mesh& mesh, const Vec3& pelvis) {
-  float floor = mesh.vertices[0].y();
-  for (const Point& p : mesh.vertices) floor = std::min(floor, p.y());
-  const Vec3 origin(pelvis.x(), double{floor}, pelvis.z());
-  for (Point& p : mesh.vertices) p = (p.cast<double>() - origin).cast<float>();
-  return origin;
-}
-
 Body body_of(const Gltf& file, const GltfRig& rig) {
   Body body;
   body.rest = t_pose_mesh(file, rig);
   body.joints = t_pose_joints(rig);
   const Vec3 origin = put_on_floor(body.rest, body.joints[0]);
   for (Vec3& x : body.joints) x -= origin;
-  body.weights.setZero(file.vertices.size(), kJoints);
-  for (size_t v = 0; v < file.vertices.size(); ++v) {
-    auto row = body.weights.row(v);
-    for (uint32_t i = file.first_influence[v]; i < file.first_influence[v + 1]; ++i) {
-      const GltfBone& bone = file.bones[file.influences[i].bone];
-      row[rig.joint[bone.node]] += file.influences[i].weight;
-    }
-  }
+  body.weights = joint_weights(file, rig);
   return body;
 }
 
@@ -218,10 +202,9 @@ TargetMesh read_target(const std::string& path, const std::string& bones) {
     return out;
   }
   check_handedness(t_pose_joints(rig), true, out.report);
-  out.mesh = t_pose_mesh(file, rig);
-  out.joints = t_pose_joints(rig);
-  const Vec3 moved = put_on_floor(out.mesh, (*out.joints)[0]);
-  for (Vec3& x : *out.joints) x -= moved;
+  out.own = std::make_shared<GltfOwnRig>(std::move(file), std::move(rig));
+  out.mesh = out.own->mesh();
+  out.joints = out.own->rest();
   return out;
 }
 

@@ -2,12 +2,13 @@
 // motions and targets of retargeting.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "datasets/doctor/examine.h"
-#include "datasets/importers/gltf_rig.h"
+#include "datasets/importers/gltf_own_rig.h"
 
 namespace restage {
 
@@ -30,10 +31,11 @@ Character read_character(const std::string& path, const MotionOptions& options =
 
 struct TargetMesh {
   Mesh mesh;
-  ImportReport report;           ///< empty for PLY and OBJ
-  std::optional<Joints> joints;  ///< of a known rig, by their names, beside the surface
-  bool rigged = false;           ///< it has a rig, known or not
-  std::string unknown_rig;       ///< why the joints of a rig were not found; empty: they were
+  ImportReport report;                    ///< empty for PLY and OBJ
+  std::optional<Joints> joints;           ///< of a known rig, by their names, beside the surface
+  std::shared_ptr<const GltfOwnRig> own;  ///< of a known rig: it poses the mesh itself
+  bool rigged = false;                    ///< it has a rig, known or not
+  std::string unknown_rig;  ///< why the joints of a rig were not found; empty: they were
   /// What the doctor need not guess of it.
   ExamineOptions known() const;
 };

@@ -15,15 +15,6 @@ namespace {
 constexpr double kDegree = M_PI / 180;
 constexpr double kStraight = 5 * kDegree;  // arms nearer than this to the T-pose stay
 
-/// The rotation in a matrix that may also scale.
-Mat3 rotation_of(const Mat3& m) {
-  const Mat3 unscaled = m / std::cbrt(std::max(std::abs(m.determinant()), 1e-300));
-  if ((unscaled.transpose() * unscaled - Mat3::Identity()).cwiseAbs().maxCoeff() < 1e-9 &&
-      unscaled.determinant() > 0)
-    return unscaled;
-  return Eigen::Affine3d(Eigen::Translation3d(0, 0, 0) * m).rotation();
-}
-
 double angle_of(const Mat3& rotation) { return Eigen::AngleAxisd(rotation).angle(); }
 
 // ---- bind pose ---------------------------------------------------------------------------------
@@ -357,6 +348,7 @@ GltfRig find_rig(const Gltf& file, const MotionOptions& options, ImportReport& r
                 names.profile->title +
                     (names.profile->name.empty() ? "" : " (profile " + names.profile->name + ")"));
   find_nodes(file, rig, map, nodes, report);
+  rig.hips = nodes[static_cast<size_t>(names.hips) - 1];
   check_skins(file, rig);
   Joints joints;
   for (size_t j = 0; j < kJoints; ++j)
@@ -379,6 +371,35 @@ GltfRig find_rig(const Gltf& file, const MotionOptions& options, ImportReport& r
     rig.offset[j] = rig.t_pose[n].linear() * rig.bind[n].linear().inverse() * rig.offset[j];
   }
   return rig;
+}
+
+Mat3 rotation_of(const Mat3& m) {
+  const Mat3 unscaled = m / std::cbrt(std::max(std::abs(m.determinant()), 1e-300));
+  if ((unscaled.transpose() * unscaled - Mat3::Identity()).cwiseAbs().maxCoeff() < 1e-9 &&
+      unscaled.determinant() > 0)
+    return unscaled;
+  return Eigen::Affine3d(Eigen::Translation3d(0, 0, 0) * m).rotation();
+}
+
+SkinWeights joint_weights(const Gltf& file, const GltfRig& rig) {
+  SkinWeights out;
+  out.setZero(static_cast<Eigen::Index>(file.vertices.size()), kJoints);
+  for (size_t v = 0; v < file.vertices.size(); ++v) {
+    auto row = out.row(static_cast<Eigen::Index>(v));
+    for (uint32_t i = file.first_influence[v]; i < file.first_influence[v + 1]; ++i) {
+      const GltfBone& bone = file.bones[file.influences[i].bone];
+      row[rig.joint[bone.node]] += file.influences[i].weight;
+    }
+  }
+  return out;
+}
+
+Vec3 put_on_floor(Mesh& mesh, const Vec3& pelvis) {
+  float floor = mesh.vertices[0].y();
+  for (const Point& p : mesh.vertices) floor = std::min(floor, p.y());
+  const Vec3 origin(pelvis.x(), double{floor}, pelvis.z());
+  for (Point& p : mesh.vertices) p = (p.cast<double>() - origin).cast<float>();
+  return origin;
 }
 
 Joints t_pose_joints(const GltfRig& rig) {

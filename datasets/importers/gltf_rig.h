@@ -14,6 +14,7 @@ struct GltfRig {
   /// The bind pose with upper arms, forearms and hands along the shoulders' line, by the shortest
   /// arcs, where they are more than 5 degrees off; twist and everything else stays.
   GltfTransforms t_pose;
+  int hips = 0;                        ///< the node that is moved: the pelvis
   std::array<int, kJoints> node{};     ///< which turns with each of the 22 joints
   std::array<Vec3, kJoints> offset{};  ///< of the joint from its node, T-pose
   std::vector<int> joint;              ///< per node: the nearest of the 22 at it or above it
@@ -34,6 +35,15 @@ struct GltfRig {
 /// InputError: no person or two in its bones, a bind pose that does not stand with its arms out, to
 /// the front or down, unknown units.
 GltfRig find_rig(const Gltf& file, const MotionOptions& options, ImportReport& report);
+
+/// [vertices, 22]: the weights of the file's bones, each counted for rig.joint of its node.
+SkinWeights joint_weights(const Gltf& file, const GltfRig& rig);
+
+/// Moves the lowest point to y = 0 and `pelvis` over the origin; returns what was taken off.
+Vec3 put_on_floor(Mesh& mesh, const Vec3& pelvis);
+
+/// The rotation in a matrix that may also scale.
+Mat3 rotation_of(const Mat3& m);
 
 /// Positions of the 22 joints in the T-pose, our axes and metres.
 Joints t_pose_joints(const GltfRig& rig);

@@ -388,6 +388,7 @@ const Profile& no_profile() {
 /// the spine in 3ds Max, Daz's `pelvis` below `hip`.
 NamedJoints turned_with_legs(const SourceSkeleton& skeleton, NamedJoints names) {
   SourceJoint& pelvis = names.map[kPelvis];
+  names.hips = pelvis.joint;
   const int legs = carrier_of(skeleton, names.map[kLeftHip].joint, names.map[kRightHip].joint);
   if (legs <= pelvis.joint || !hangs_on(skeleton, legs, pelvis.joint)) return names;
   const std::vector<Vec3> zero = zero_positions(skeleton);

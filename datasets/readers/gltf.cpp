@@ -114,6 +114,7 @@ class Builder {
     const std::string where = name_of("node", order_[at]);
     GltfNode node;
     node.name = in.name;
+    node.number = static_cast<int>(order_[at]);
     if (const int p = parent_[order_[at]]; p >= 0) node.parent = place_[p];
     if (has_numbers(in.matrix, 16, path_, "the matrix of " + where)) decompose(in.matrix, node);
     if (has_numbers(in.translation, 3, path_, "the translation of " + where))
@@ -177,6 +178,9 @@ class Builder {
     const bool skins =
         std::any_of(wearers_.begin(), wearers_.end(), [](const Wearer& w) { return w.skin >= 0; });
     const std::vector<bool> rigid = below_joints();
+    std::sort(wearers_.begin(), wearers_.end(), [&](const Wearer& a, const Wearer& b) {
+      return order_[a.node] < order_[b.node];  // as in the file
+    });
     for (const Wearer& wearer : wearers_) {
       if (wearer.skin >= 0) {
         const size_t skin = checked(wearer.skin, model_.skins.size(), path_, "skin");

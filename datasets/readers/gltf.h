@@ -20,6 +20,7 @@ namespace restage {
 
 struct GltfNode {
   std::string name;
+  int number = 0;   ///< in the file
   int parent = -1;  ///< comes before its children; -1: none
   Vec3 translation = Vec3::Zero();
   Quat rotation = Quat::Identity();

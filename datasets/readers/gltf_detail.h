@@ -35,6 +35,17 @@ struct Document {
   uint64_t payload = 0;  ///< bytes of the file and of all that it names
 };
 
+struct Chunks {
+  std::string_view json, binary;
+};
+/// The parts of a GLB file.
+Chunks split_glb(std::string_view content, const std::string& path);
+/// The content of a file that a document names: it must lie in the same folder or below.
+std::string read_neighbour(const std::string& uri, const std::string& path);
+/// Text with "%20" and alike as the bytes that it stands for.
+std::string decode_percent(const std::string& text);
+std::string decode_data_uri(const std::string& uri, size_t length, const std::string& path);
+
 /// `content` must outlive the document.
 Document parse_document(std::string_view content, const std::string& path);
 

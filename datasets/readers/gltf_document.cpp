@@ -51,35 +51,10 @@ void check_extensions(const tinygltf::Model& model, const std::string& path) {
 
 // ---- container ---------------------------------------------------------------------------------
 
-struct Chunks {
-  std::string_view json, binary;
-};
-
 uint32_t word(std::string_view content, size_t at) {
   uint32_t value;
   std::memcpy(&value, content.data() + at, 4);
   return value;
-}
-
-Chunks split_glb(std::string_view content, const std::string& path) {
-  static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "GLB is read as it lies in the file");
-  if (content.size() < 20) broken(path, "is cut short in the header of a GLB file");
-  if (word(content, 4) != 2)
-    throw InputError(path, cat("is of glTF version ", word(content, 4)), "export it as glTF 2.0");
-  const size_t length = word(content, 8);
-  if (length > content.size())
-    broken(path, cat("is cut short: ", content.size(), " of ", length, " bytes"));
-  Chunks out;
-  for (size_t at = 12; at + 8 <= length;) {
-    const size_t size = word(content, at);
-    const uint32_t kind = word(content, at + 4);
-    if (size > length - at - 8) broken(path, "has a chunk that is longer than the file");
-    if (kind == 0x4E4F534A && out.json.empty()) out.json = content.substr(at + 8, size);
-    if (kind == 0x004E4942 && out.binary.empty()) out.binary = content.substr(at + 8, size);
-    at += 8 + size;
-  }
-  if (out.json.empty()) broken(path, "holds no JSON chunk");
-  return out;
 }
 
 // ---- structure ---------------------------------------------------------------------------------
@@ -148,49 +123,6 @@ std::vector<std::pair<std::string, int>> read_humanoid(const Json& root) {
 
 // ---- buffers -----------------------------------------------------------------------------------
 
-/// "%20" and alike.
-std::string decode_percent(const std::string& text) {
-  std::string out;
-  for (size_t i = 0; i < text.size(); ++i) {
-    const auto hex = [](char c) { return std::isxdigit(static_cast<unsigned char>(c)) != 0; };
-    if (text[i] == '%' && i + 2 < text.size() && hex(text[i + 1]) && hex(text[i + 2])) {
-      out += static_cast<char>(std::stoi(text.substr(i + 1, 2), nullptr, 16));
-      i += 2;
-    } else {
-      out += text[i];
-    }
-  }
-  return out;
-}
-
-/// A file that a glTF file names: it must lie in the same folder or below.
-std::string read_neighbour(const std::string& uri, const std::string& path) {
-  const std::string name = decode_percent(uri);
-  const auto refuse = [&](const std::string& what) {
-    throw InputError(path, "names the buffer " + text::quote(name) + ", " + what,
-                     "put all files of a character into one folder, or export a .glb");
-  };
-  if (name.find('\0') != std::string::npos || name.find("://") != std::string::npos)
-    refuse("which is no file beside it");
-  std::error_code error;
-  const fs::path folder = fs::weakly_canonical(fs::absolute(path, error).parent_path(), error);
-  const fs::path file = fs::weakly_canonical(folder / name, error);
-  const fs::path inside = file.lexically_relative(folder);
-  if (error || inside.empty() || *inside.begin() == ".." || inside == ".")
-    refuse("which lies outside of its folder");
-  if (!fs::is_regular_file(file, error)) refuse("which is not there");
-  return read_file(file.string());
-}
-
-std::string decode_data_uri(const std::string& uri, size_t length, const std::string& path) {
-  std::vector<unsigned char> bytes;
-  std::string type;
-  if (!tinygltf::IsDataURI(uri) || !tinygltf::DecodeDataURI(&bytes, type, uri, 0, false))
-    broken(path, "has a buffer in its text that cannot be decoded");
-  if (bytes.size() < length) broken(path, "has a buffer in its text that is cut short");
-  return {bytes.begin(), bytes.end()};
-}
-
 void read_buffers(const Json& root, std::string_view binary, Document& document) {
   const auto list = root.find("buffers");
   if (list == root.end()) return;
@@ -225,6 +157,68 @@ std::string first_words(const std::string& message) {
 }
 
 }  // namespace
+
+Chunks split_glb(std::string_view content, const std::string& path) {
+  static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "GLB is read as it lies in the file");
+  if (content.size() < 20) broken(path, "is cut short in the header of a GLB file");
+  if (word(content, 4) != 2)
+    throw InputError(path, cat("is of glTF version ", word(content, 4)), "export it as glTF 2.0");
+  const size_t length = word(content, 8);
+  if (length > content.size())
+    broken(path, cat("is cut short: ", content.size(), " of ", length, " bytes"));
+  Chunks out;
+  for (size_t at = 12; at + 8 <= length;) {
+    const size_t size = word(content, at);
+    const uint32_t kind = word(content, at + 4);
+    if (size > length - at - 8) broken(path, "has a chunk that is longer than the file");
+    if (kind == 0x4E4F534A && out.json.empty()) out.json = content.substr(at + 8, size);
+    if (kind == 0x004E4942 && out.binary.empty()) out.binary = content.substr(at + 8, size);
+    at += 8 + size;
+  }
+  if (out.json.empty()) broken(path, "holds no JSON chunk");
+  return out;
+}
+
+std::string decode_percent(const std::string& text) {
+  std::string out;
+  for (size_t i = 0; i < text.size(); ++i) {
+    const auto hex = [](char c) { return std::isxdigit(static_cast<unsigned char>(c)) != 0; };
+    if (text[i] == '%' && i + 2 < text.size() && hex(text[i + 1]) && hex(text[i + 2])) {
+      out += static_cast<char>(std::stoi(text.substr(i + 1, 2), nullptr, 16));
+      i += 2;
+    } else {
+      out += text[i];
+    }
+  }
+  return out;
+}
+
+std::string read_neighbour(const std::string& uri, const std::string& path) {
+  const std::string name = decode_percent(uri);
+  const auto refuse = [&](const std::string& what) {
+    throw InputError(path, "names the buffer " + text::quote(name) + ", " + what,
+                     "put all files of a character into one folder, or export a .glb");
+  };
+  if (name.find('\0') != std::string::npos || name.find("://") != std::string::npos)
+    refuse("which is no file beside it");
+  std::error_code error;
+  const fs::path folder = fs::weakly_canonical(fs::absolute(path, error).parent_path(), error);
+  const fs::path file = fs::weakly_canonical(folder / name, error);
+  const fs::path inside = file.lexically_relative(folder);
+  if (error || inside.empty() || *inside.begin() == ".." || inside == ".")
+    refuse("which lies outside of its folder");
+  if (!fs::is_regular_file(file, error)) refuse("which is not there");
+  return read_file(file.string());
+}
+
+std::string decode_data_uri(const std::string& uri, size_t length, const std::string& path) {
+  std::vector<unsigned char> bytes;
+  std::string type;
+  if (!tinygltf::IsDataURI(uri) || !tinygltf::DecodeDataURI(&bytes, type, uri, 0, false))
+    broken(path, "has a buffer in its text that cannot be decoded");
+  if (bytes.size() < length) broken(path, "has a buffer in its text that is cut short");
+  return {bytes.begin(), bytes.end()};
+}
 
 void Allowance::spend(uint64_t count, uint64_t size) {
   if (count > left_ / size)

@@ -1,7 +1,6 @@
 // restage retarget: clouds of one body in, the same motion by another body out, frame by frame.
 #include <chrono>
 #include <cmath>
-#include <functional>
 #include <memory>
 #include <optional>
 
@@ -16,107 +15,38 @@
 #include "experiments/cli/output.h"
 #include "experiments/cli/profile.h"
 #include "experiments/cli/retarget_gaps.h"
+#include "experiments/cli/retarget_sink.h"
 #include "experiments/cli/scale_option.h"
 #include "experiments/source.h"
 #include "infer/systems.h"
-#include "infer/writers/bvh.h"
-#include "infer/writers/frames.h"
-#include "infer/writers/glb.h"
 
 namespace restage::cli {
 namespace {
 
 struct RetargetCommand {
   SourceRecord source;
-  std::string target, bones, weights, out, format = "ply", device = "cpu";
+  std::string target, bones, weights, device = "cpu";
+  SinkOptions to;
   std::string system = "chain", rest;
   RetargetOptions options;
   bool profile = false;
-  int64_t every = 1;
 };
 
 using Frames = std::vector<int64_t>;  ///< their numbers
 
-/// Where results go: what a writer takes of each frame, and how it ends. `filled`:
-/// RetargetedFrame::filled.
-struct Sink {
-  std::function<void(const RetargetedFrame&)> push;
-  std::function<void(const Frames& filled)> commit;
-};
-
-/// What the skeleton's files are made of.
-const SystemRig& rig_of(const System& system, const std::string& out) {
-  if (system.rig() == nullptr)
-    throw InputError(out, "needs a skeleton, which this system does not have",
-                     "end it in .h5, or / for a folder of frames");
-  return *system.rig();
-}
-
-/// Of the result.
-double rate_of(const RetargetCommand& c) { return kFps / static_cast<double>(c.every); }
-
-Sink make_sink(const RetargetCommand& c, const System& s, const SourceRecord& source) {
-  if (c.out.ends_with(".glb")) {
-    const SystemRig& rig = rig_of(s, c.out);
-    const auto writer = std::make_shared<GlbWriter>(c.out, s.target(), rig.rest, rig.weights);
-    const auto commit = [writer](const Frames& filled) {
-      writer->set_filled(filled);
-      const InfluenceError e = writer->commit();
-      log_info(format("four weights per vertex instead of 22: %.2f mm on average, at most %.2f mm",
-                      1e3 * e.mean, 1e3 * e.max));
-    };
-    return {[writer](const RetargetedFrame& f) { writer->push(f.pose, f.confidence); }, commit};
-  }
-  if (c.out.ends_with(".bvh")) {
-    const auto writer = std::make_shared<BvhWriter>(c.out, rig_of(s, c.out).rest);
-    return {[writer](const RetargetedFrame& f) { writer->push(f.pose); },
-            [writer](const Frames&) { writer->commit(); }};
-  }
-  const Mesh& target = s.target();
-  if (c.out.ends_with(".h5")) {
-    rig_of(s, c.out);  // /joints must be there
-    const auto writer = std::make_shared<PredictionWriter>(c.out, std::ssize(target.vertices),
-                                                           target.faces, FileInfo{}, rate_of(c));
-    writer->set_source(source);
-    return {[writer](const RetargetedFrame& f) {
-              writer->append(f.joints.value(), f.vertices, f.confidence);
-            },
-            [writer](const Frames& filled) {
-              writer->set_filled(filled);
-              writer->commit();
-            }};
-  }
-  const auto writer = std::make_shared<FrameFolderWriter>(
-      c.out, target.faces, c.format == "obj" ? MeshFormat::obj : MeshFormat::ply);
-  return {[writer](const RetargetedFrame& f) { writer->push(f.vertices); },
-          [writer](const Frames&) { writer->commit(); }};
-}
-
 void check(const RetargetCommand& c) {
-  if (c.format != "ply" && c.format != "obj")
-    throw InputError("", "--format '" + c.format + "' is unknown", "use ply or obj");
+  check_sink(c.to);
   if (system_type(c.system).weights && c.weights.empty())
     throw InputError("", "--weights is missing", "give a weights file or a run");
-  if (c.every < 1 || c.every > 1000000)
-    throw InputError("", "--every is out of range", "give 1 or more frames");
-  if (c.every > 1 && !c.out.ends_with(".h5"))
-    throw InputError(c.out, "is played at 30 frames a second", "end --out in .h5 with --every");
   if (!(c.options.min_confidence >= 0 && c.options.min_confidence <= 1))
     throw InputError("", "--min-confidence is out of range", "give 0 to 1");
   if (c.options.samples < 1 || c.options.samples > 256)
     throw InputError("", "--samples is out of range", "give 1 to 256");
-  const auto dot = c.out.find_last_of('.');
-  const auto slash = c.out.find_last_of('/');
-  const bool extension = dot != std::string::npos && (slash == std::string::npos || dot > slash) &&
-                         dot + 1 < c.out.size();
-  if (extension && !c.out.ends_with(".glb") && !c.out.ends_with(".bvh") && !c.out.ends_with(".h5"))
-    throw InputError(c.out, "is of no kind that can be written",
-                     "end it in .glb, .bvh, .h5, or / for a folder");
   std::vector<std::string> inputs = {c.source.path, c.target};
   if (!c.weights.empty()) inputs.push_back(weights_path(c.weights));
   for (const std::string& more : {c.rest, c.bones})
     if (!more.empty()) inputs.push_back(more);
-  check_output(c.out, inputs);
+  check_output(c.to.out, inputs);
 }
 
 /// A target that is refused as it stands may only lack the names of its bones: then that is what
@@ -216,16 +146,22 @@ struct Outcome {
 /// All frames of the source through the system and into the sink, which is not committed.
 class Run {
  public:
-  Run(const RetargetCommand& c, Source& source, System& system, Gaps& gaps, Profile& profile)
-      : c_(c), source_(source), system_(system), gaps_(gaps), profile_(profile) {}
+  Run(const RetargetCommand& c, Source& source, System& system,
+      std::shared_ptr<const GltfOwnRig> own, Gaps& gaps, Profile& profile)
+      : c_(c),
+        source_(source),
+        system_(system),
+        own_(std::move(own)),
+        gaps_(gaps),
+        profile_(profile) {}
 
   Outcome operator()() {
     // The first frame is looked at before anything is written or logged.
     for (auto cloud = next(); cloud; cloud = next()) {
       out_.points_left_out += cloud->frame.left_out;
       push(*cloud);
-      source_.skip(c_.every - 1);
-      in_ += c_.every;
+      source_.skip(c_.to.every - 1);
+      in_ += c_.to.every;
     }
     gaps_.check_any();
     write(system_.finish());
@@ -264,7 +200,7 @@ class Run {
   }
 
   void write(std::span<const RetargetedFrame> made) {
-    if (!sink_) sink_ = make_sink(c_, system_, source_.record());
+    if (!sink_) sink_ = make_sink(c_.to, system_, source_.record(), c_.target, own_);
     for (const RetargetedFrame& f : made) {
       sink_->push(f);
       if (f.filled) out_.filled.push_back(out_.frames);
@@ -278,6 +214,7 @@ class Run {
   const RetargetCommand& c_;
   Source& source_;
   System& system_;
+  const std::shared_ptr<const GltfOwnRig> own_;
   Gaps& gaps_;
   Profile& profile_;
   std::optional<Sink> sink_;
@@ -298,8 +235,8 @@ void log_outcome(const Outcome& done, const Source& source, const Gaps& gaps) {
 
 void print_outcome(const RetargetCommand& c, const Common& common, const Source& source,
                    const Outcome& done, const Gaps& gaps, const Profile& profile) {
-  Json document = {{"out", c.out},          {"source_frames", source.frames()},
-                   {"frames", done.frames}, {"fps", rate_of(c)},
+  Json document = {{"out", c.to.out},       {"source_frames", source.frames()},
+                   {"frames", done.frames}, {"fps", c.to.rate()},
                    {"seed", common.seed},   {"missing", gaps.json()},
                    {"filled", done.filled}, {"points_left_out", done.points_left_out}};
   if (!done.confidence.empty()) {
@@ -307,7 +244,7 @@ void print_outcome(const RetargetCommand& c, const Common& common, const Source&
     document["confidence"] = done.confidence;
   }
   if (c.profile) document["profile"] = profile.json();
-  std::string text = "wrote " + c.out + ": " + std::to_string(done.frames) + " frames (seed " +
+  std::string text = "wrote " + c.to.out + ": " + std::to_string(done.frames) + " frames (seed " +
                      std::to_string(common.seed) + ")";
   if (!done.filled.empty()) text += "; " + std::to_string(done.filled.size()) + " of them filled";
   if (done.held > 0) text += "; in " + std::to_string(done.held) + " of them the target waits";
@@ -327,21 +264,18 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   TargetMesh target = read_target(c.target, c.bones);
   check_inputs(c, source, target);
   if (!c.rest.empty()) input.rest = rest_joints(c.rest);
-  // The joints that a rig names are where its maker put them, not where a network finds them.
-  if (c.rest.empty() && !system_type(c.system).weights) input.rest = target.joints;
-  input.rig = target.joints;
+  if (target.own && !c.rest.empty())
+    throw InputError(c.target, "has a rig that says where its joints are", "leave --rest out");
+  input.own = target.own;
   input.target = std::move(target.mesh);
   input.target_name = c.target;
   const auto system =
-      with_target(c, target, [&] { return system_type(c.system).make(std::move(input)); });
-  Gaps gaps(source.frames(), source.fps() / static_cast<double>(c.every), c.options.force);
+      with_target(c, target, [&] { return make_system(system_type(c.system), std::move(input)); });
+  Gaps gaps(source.frames(), source.fps() / static_cast<double>(c.to.every), c.options.force);
   Profile profile({"read", "extract", "motion", "deformation", "write", "frame"});
-  Run run(c, source, *system, gaps, profile);
+  Run run(c, source, *system, target.own, gaps, profile);
   const Outcome done = run();
   run.sink().commit(done.filled);
-  if (target.joints && c.rest.empty() && system_type(c.system).weights &&
-      *system->target_joints() == *target.joints)
-    target.report.remark("the network does not see its T-pose: the joints of its rig are taken");
   log_target(target.report);
   log_outcome(done, source, gaps);
   if (c.profile) log_profile(profile);
@@ -393,9 +327,14 @@ void add_retarget(Program& program) {
   app.add_option("--weights", c.weights, "weights file, run or artifact");
   app.add_option("--system", c.system, help_of_systems()).show_default();
   app.add_option("--rest", c.rest, "the target's 22 rest joints (HDF5, /joints [1, 22, 3])");
-  app.add_option("--every", c.every, "only every so many frames of the source; for X.h5");
-  app.add_option("--out", c.out, "X.glb, X.bvh, X.h5, or a folder for PLY or OBJ frames")
+  app.add_option("--every", c.to.every, "only every so many frames of the source; for X.h5");
+  app.add_option("--out", c.to.out,
+                 "X.glb, X.gltf, X.vrm, X.bvh, X.h5, or a folder for PLY or OBJ frames")
       .required();
+  app.add_option("--clip-name", c.to.clip_name,
+                 "of the animation that a rigged target's file gets (default: the source's name)");
+  app.add_flag("--animation-only", c.to.animation_only,
+               "of a rigged target only nodes and the animation, without meshes");
   app.add_option("--clip", c.source.clip, "animation of a glTF source (default: the first)");
   app.add_option("--sequence", c.source.sequence, "which sequence of an HDF5 source, from 0");
   app.add_option("--fps", c.source.fps,
@@ -404,7 +343,7 @@ void add_retarget(Program& program) {
                  "the source's axis that points up: x, -x, y, -y, z or -z")
       .show_default();
   add_scale(app, c.source.scale, "the source's units in metres");
-  app.add_option("--format", c.format, "of a folder's frames: ply or obj");
+  app.add_option("--format", c.to.format, "of a folder's frames: ply or obj");
   app.add_option("--device", c.device,
                  "where extractor and motion network run: cpu, or cuda in a program built for it");
   app.add_option("--samples", c.options.samples,

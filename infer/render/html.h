@@ -1,13 +1,11 @@
 // Helpers of all our pages: text, data and templates in a form that may stand inside HTML.
 #pragma once
 
-#include <cstddef>
 #include <map>
 #include <string>
 
 namespace restage {
 
-std::string base64(const void* data, size_t size);
 /// The text in a form that may stand in an element, or in an attribute in double quotes, of HTML
 /// and of SVG.
 std::string escape_html(const std::string& text);

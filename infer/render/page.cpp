@@ -8,6 +8,7 @@
 #include <set>
 
 #include "autograd/base/atomic_file.h"
+#include "autograd/base/base64.h"
 #include "autograd/base/format.h"
 #include "infer/render/html.h"
 #include "infer/render/sheet.h"

@@ -149,7 +149,7 @@ class Gltf(CliTest):
         found = self.json("data", "import", "first.glb", "--out", "first.h5")
         self.assertEqual((found["bodies"], found["motions"], found["frames"]), (1, 1, 5))
         self.bad_input(call + ["--source", "first.glb", "--clip", "jump", "--target", "plain.ply", "--out", "x.h5"],
-                       "jump", "'motion'")
+                       "jump", "'scans'")
         self.bad_input(call + ["--source", "scans", "--clip", "jump", "--target", "plain.ply", "--out", "x.h5"], "--clip")
         self.bad_input(call + ["--source", "first.glb", "--fps", "60", "--target", "plain.ply", "--out", "x.h5"], "leave --fps out")
 

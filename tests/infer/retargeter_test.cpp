@@ -390,17 +390,6 @@ Joints arms_down(double degrees, bool both) {
   return joints;
 }
 
-/// A rig shows its T-pose itself: what the extractor makes of its surface refuses nobody.
-TEST(InferRetargeter, ARigIsInTPoseWhateverTheExtractorFinds) {
-  const Joints rig = target().joints;
-  const Retargeter misread(with_extractor(arms_down(60, true)), "w", target().rest, "hero.glb", {},
-                           rig);
-  EXPECT_EQ(misread.rest(), rig);
-  const Retargeter read(with_extractor(arms_down(10, true)), "w", target().rest, "hero.glb", {},
-                        rig);
-  EXPECT_NE(read.rest(), rig) << "joints that the networks know are better for them";
-}
-
 TEST(InferRetargeter, TargetsThatAreNoTPose) {
   const auto refused = [&](const Joints& joints) {
     const Bundle models = with_extractor(joints);

@@ -1,0 +1,64 @@
+#include "datasets/characters/gltf_clip.h"
+
+#include <cmath>
+#include <filesystem>
+
+#include "autograd/base/atomic_file.h"
+#include "datasets/characters/gltf_document.h"
+#include "datasets/readers/errors.h"
+
+namespace restage {
+
+GltfClipWriter::GltfClipWriter(std::string out, const std::string& in,
+                               std::shared_ptr<const GltfOwnRig> rig, Options options)
+    : out_(std::move(out)),
+      in_(in),
+      content_(read_file(in)),
+      rig_(std::move(rig)),
+      options_(std::move(options)) {
+  if (options_.name.empty())
+    throw InputError(out_, "its animation has no name", "give --clip-name");
+  GltfDocument(content_, in_).check_place(out_);
+}
+
+void GltfClipWriter::push(const Pose& pose, std::optional<double> confidence) {
+  const NodeTurns turns = rig_->turns(pose);
+  bool finite = turns.hips.allFinite();
+  const size_t count = turns.local.size();
+  for (size_t i = 0; i < count; ++i) {
+    Eigen::Vector4d c = turns.local[i].coeffs();  // x, y, z, w
+    finite = finite && c.allFinite();
+    // q and -q are the same rotation; LINEAR interpolates the short way if signs agree.
+    double side = c[3];
+    if (turns_.size() >= count) {
+      const std::array<float, 4>& before = turns_[turns_.size() - count];
+      side = c[0] * before[0] + c[1] * before[1] + c[2] * before[2] + c[3] * before[3];
+    }
+    if (side < 0) c = -c;
+    turns_.push_back({static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]),
+                      static_cast<float>(c[3])});
+  }
+  if (!finite)
+    throw WorkError(out_ + ": the pose of frame " + std::to_string(frames()) +
+                    " is not finite; check the source and the weights");
+  for (int k = 0; k < 3; ++k) hips_.push_back(static_cast<float>(turns.hips[k]));
+  if (confidence) confidence_.push_back(std::round(*confidence * 1e3) / 1e3);
+}
+
+void GltfClipWriter::commit() {
+  GltfDocument document(content_, in_);
+  if (options_.animation_only) document.keep_nodes_only();
+  if (frames() > 0) {
+    const size_t count = rig_->driven().size();
+    GltfDocument::Clip clip{options_.name,     options_.fps, frames(),    {},
+                            rig_->hips_node(), hips_,        confidence_, filled_};
+    for (size_t i = 0; i < count; ++i) {
+      auto& track = clip.turns.emplace_back(rig_->driven()[i], std::vector<std::array<float, 4>>());
+      for (size_t f = 0; f < frames(); ++f) track.second.push_back(turns_[f * count + i]);
+    }
+    document.append(clip);
+  }
+  document.write(out_);
+}
+
+}  // namespace restage

@@ -1,0 +1,45 @@
+// A glTF document as it is written again: its structure, untouched where nobody asks for a change,
+// and its bytes.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace restage {
+
+class GltfDocument {
+ public:
+  /// `content`: of the file `path`, which read_gltf() has accepted; it must outlive the document.
+  GltfDocument(std::string_view content, const std::string& path);
+  ~GltfDocument();
+
+  struct Clip {
+    std::string name;
+    double fps;
+    size_t frames;
+    /// Numbers of nodes and their local rotations (x, y, z, w), one a frame.
+    std::vector<std::pair<int, std::vector<std::array<float, 4>>>> turns;
+    int hips;                   ///< number of the node that is moved
+    std::vector<float> places;  ///< its translation, 3 numbers a frame
+    std::vector<double> confidence;
+    std::vector<int64_t> filled;
+  };
+  void append(const Clip& clip);
+  /// Drops everything but nodes and scenes; nodes show nothing any more.
+  void keep_nodes_only();
+
+  /// InputError where write() would have to replace files of others beside `out`.
+  void check_place(const std::string& out) const;
+  /// By the ending of `out`: .gltf as text, else binary.
+  void write(const std::string& out) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace restage

@@ -1,0 +1,129 @@
+#include "experiments/cli/retarget_sink.h"
+
+#include <filesystem>
+
+#include "autograd/base/format.h"
+#include "autograd/base/log.h"
+#include "datasets/characters/gltf_clip.h"
+#include "datasets/readers/text.h"
+#include "infer/writers/bvh.h"
+#include "infer/writers/frames.h"
+#include "infer/writers/glb.h"
+
+namespace restage::cli {
+namespace {
+
+using Frames = std::vector<int64_t>;
+
+bool is_character(const std::string& out) { return text::ends_in(out, {".glb", ".gltf", ".vrm"}); }
+
+/// What the skeleton's files are made of.
+const SystemRig& rig_of(const System& system, const std::string& out) {
+  if (system.rig() == nullptr)
+    throw InputError(out, "needs a skeleton, which this system does not have",
+                     "end it in .h5, or / for a folder of frames");
+  return *system.rig();
+}
+
+/// What the animation is called: as it is asked for, else by the source.
+std::string clip_name(const SinkOptions& options, const SourceRecord& source) {
+  if (!options.clip_name.empty()) return options.clip_name;
+  if (!source.clip.empty()) return source.clip;
+  std::filesystem::path path(source.path);
+  if (!path.has_filename()) path = path.parent_path();  // "scans/"
+  const std::string stem = path.stem().string();
+  return text::is_utf8(stem) && !stem.empty() && stem != "." && stem != ".." ? stem : "retargeted";
+}
+
+Sink own_sink(const SinkOptions& options, const SourceRecord& source, const std::string& target,
+              const std::shared_ptr<const GltfOwnRig>& own) {
+  if (text::ends_in(options.out, {".vrm"}) && own->file().humanoid.empty())
+    throw InputError(options.out, "would be no VRM character, since the target is none",
+                     "end --out in .glb");
+  const auto writer = std::make_shared<GltfClipWriter>(
+      options.out, target, own,
+      GltfClipWriter::Options{clip_name(options, source), options.rate(), options.animation_only});
+  return {[writer](const RetargetedFrame& f) { writer->push(f.pose, f.confidence); },
+          [writer](const Frames& filled) {
+            writer->set_filled(filled);
+            writer->commit();
+          }};
+}
+
+/// The target has no bones that we know: a skeleton and a skin of our own.
+Sink glb_sink(const SinkOptions& options, const System& system) {
+  if (!text::ends_in(options.out, {".glb"}))
+    throw InputError(options.out, "keeps the target's own file, which has no rig that we know",
+                     "end --out in .glb, or name its bones with --bones");
+  if (options.animation_only || !options.clip_name.empty())
+    throw InputError(options.out, "has no rig of its own whose animation could be named or alone",
+                     "leave --clip-name and --animation-only out");
+  const SystemRig& rig = rig_of(system, options.out);
+  const auto writer =
+      std::make_shared<GlbWriter>(options.out, system.target(), rig.rest, rig.weights);
+  const auto commit = [writer](const Frames& filled) {
+    writer->set_filled(filled);
+    const InfluenceError e = writer->commit();
+    log_info(format("four weights per vertex instead of 22: %.2f mm on average, at most %.2f mm",
+                    1e3 * e.mean, 1e3 * e.max));
+  };
+  return {[writer](const RetargetedFrame& f) { writer->push(f.pose, f.confidence); }, commit};
+}
+
+Sink bvh_sink(const SinkOptions& options, const System& system) {
+  const auto writer = std::make_shared<BvhWriter>(options.out, rig_of(system, options.out).rest);
+  return {[writer](const RetargetedFrame& f) { writer->push(f.pose); },
+          [writer](const Frames&) { writer->commit(); }};
+}
+
+Sink hdf5_sink(const SinkOptions& options, const System& system, const SourceRecord& source) {
+  rig_of(system, options.out);  // /joints must be there
+  const Mesh& target = system.target();
+  const auto writer = std::make_shared<PredictionWriter>(options.out, std::ssize(target.vertices),
+                                                         target.faces, FileInfo{}, options.rate());
+  writer->set_source(source);
+  return {[writer](const RetargetedFrame& f) {
+            writer->append(f.joints.value(), f.vertices, f.confidence);
+          },
+          [writer](const Frames& filled) {
+            writer->set_filled(filled);
+            writer->commit();
+          }};
+}
+
+}  // namespace
+
+void check_sink(const SinkOptions& options) {
+  const std::string& out = options.out;
+  if (options.format != "ply" && options.format != "obj")
+    throw InputError("", "--format '" + options.format + "' is unknown", "use ply or obj");
+  if (options.every < 1 || options.every > 1000000)
+    throw InputError("", "--every is out of range", "give 1 or more frames");
+  if (options.every > 1 && !out.ends_with(".h5"))
+    throw InputError(out, "is played at 30 frames a second", "end --out in .h5 with --every");
+  const auto dot = out.find_last_of('.');
+  const auto slash = out.find_last_of('/');
+  const bool extension = dot != std::string::npos && (slash == std::string::npos || dot > slash) &&
+                         dot + 1 < out.size();
+  if (extension && !is_character(out) && !out.ends_with(".bvh") && !out.ends_with(".h5"))
+    throw InputError(out, "is of no kind that can be written",
+                     "end it in .glb, .gltf, .vrm, .bvh, .h5, or / for a folder");
+  if ((options.animation_only || !options.clip_name.empty()) && !is_character(out))
+    throw InputError(out, "holds no animation that could be named or alone",
+                     "leave --clip-name and --animation-only out, or end --out in .glb");
+}
+
+Sink make_sink(const SinkOptions& options, const System& system, const SourceRecord& source,
+               const std::string& target, const std::shared_ptr<const GltfOwnRig>& own) {
+  if (is_character(options.out))
+    return own ? own_sink(options, source, target, own) : glb_sink(options, system);
+  if (options.out.ends_with(".bvh")) return bvh_sink(options, system);
+  if (options.out.ends_with(".h5")) return hdf5_sink(options, system, source);
+  const auto writer = std::make_shared<FrameFolderWriter>(
+      options.out, system.target().faces,
+      options.format == "obj" ? MeshFormat::obj : MeshFormat::ply);
+  return {[writer](const RetargetedFrame& f) { writer->push(f.vertices); },
+          [writer](const Frames&) { writer->commit(); }};
+}
+
+}  // namespace restage::cli

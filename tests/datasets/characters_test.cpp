@@ -1,0 +1,230 @@
+// A character's own document with one animation more: what is in it is what was asked for, and all
+// else is what it was.
+#include <gtest/gtest.h>
+
+#include "datasets/characters/gltf_clip.h"
+#include "datasets/importers/gltf_character.h"
+#include "tests/datasets/gltf_maker.h"
+#include "tests/datasets/importers_support.h"
+
+namespace restage {
+namespace {
+
+using namespace test;
+using testing::CharacterMaker;
+using testing::GlbParts;
+using testing::GltfJson;
+using testing::RigStyle;
+
+constexpr size_t kFrames = 20;
+
+/// The two chunks of a GLB.
+std::pair<GltfJson, std::string> parts_of(const std::string& glb) {
+  const auto word = [&](size_t at) {
+    uint32_t value;
+    std::memcpy(&value, glb.data() + at, 4);
+    return size_t{value};
+  };
+  EXPECT_EQ(word(8), glb.size());
+  const size_t json = word(12);
+  const std::string binary = 20 + json < glb.size() ? glb.substr(28 + json) : "";
+  return {GltfJson::parse(glb.substr(20, json)), binary};
+}
+
+class Characters : public FileTest {
+ protected:
+  std::string write(const std::string& name, const GlbParts& parts) const {
+    return dir.write(name, parts.glb());
+  }
+  Pose pose(size_t f) const { return known_.pose(static_cast<double>(f) / kFps); }
+
+  /// The motion of known_ in the file of a character.
+  std::string performed(const std::string& in, const std::string& out,
+                        GltfClipWriter::Options options = {}) const {
+    const TargetMesh target = read_target(in);
+    EXPECT_TRUE(target.own) << target.unknown_rig;
+    GltfClipWriter writer(out, in, target.own, std::move(options));
+    for (size_t f = 0; f < kFrames; ++f) writer.push(pose(f), 0.5);
+    writer.set_filled({3});
+    writer.commit();
+    return out;
+  }
+
+  /// What a program that plays the new animation shows is what place() says, and its joints turn as
+  /// the poses do.
+  void expect_played(const std::string& in, const std::string& out) const {
+    const TargetMesh target = read_target(in);
+    const Gltf file = read_gltf(out);
+    const GltfClip& clip = find_clip(file, "retargeted");
+    ASSERT_EQ(clip_frames(file, clip), int64_t{kFrames});
+    double surface = 0, turn = 0, joint = 0;
+    for (size_t f = 0; f < kFrames; ++f) {
+      const auto nodes = gltf_pose(file, clip, clip.begin + static_cast<double>(f) / kFps);
+      const Mesh shown = gltf_mesh(file, nodes);
+      Joints joints;
+      Points vertices;
+      target.own->place(pose(f), &joints, &vertices);
+      ASSERT_EQ(shown.vertices.size(), vertices.size());
+      const GltfRig& rig = target.own->rig();
+      for (size_t v = 0; v < vertices.size(); ++v)
+        surface = std::max(
+            surface,
+            double{(rig.to_ours(shown.vertices[v].cast<double>()).cast<float>() - vertices[v])
+                       .norm()});
+      const PosedSkeleton got = rig_pose(rig, nodes);
+      const PosedSkeleton wanted = forward_kinematics(target.own->rest(), pose(f));
+      for (int j = 0; j < kJoints; ++j) {
+        turn = std::max(turn, Quat(got.global[j]).angularDistance(Quat(wanted.global[j])));
+        joint = std::max(joint, (got.joints[j] - wanted.joints[j]).norm());
+        EXPECT_LT((joints[j] - got.joints[j]).norm(), 1e-5);
+      }
+    }
+    EXPECT_LT(surface, 1e-4);
+    EXPECT_LT(joint, 1e-4);
+    EXPECT_LT(turn * 180 / M_PI, 0.05);
+  }
+
+  const testing::KnownCharacter known_ = testing::known_character();
+};
+
+/// Every rig as users export it.
+TEST_F(Characters, PlayTheMotionOnTheirOwnBones) {
+  RigStyle posed = testing::mixamo_style();
+  posed.nodes_rest_posed = true;  // the nodes rest in the first frame of another motion
+  const std::pair<const char*, RigStyle> styles[] = {{"plain", testing::plain_style()},
+                                                     {"mixamo", testing::mixamo_style()},
+                                                     {"unreal", testing::unreal_style()},
+                                                     {"posed", posed}};
+  for (const auto& [name, style] : styles) {
+    SCOPED_TRACE(name);
+    const std::string in = write("in.glb", CharacterMaker(known_, style).parts);
+    expect_played(in, performed(in, dir / "out.glb"));
+  }
+  for (const bool list : {true, false}) {  // VRM 0 faces -z
+    const std::string in = write("in.vrm", testing::vrm_parts(known_, list));
+    expect_played(in, performed(in, dir / "out.vrm"));
+  }
+}
+
+TEST_F(Characters, AllElseIsWhatItWas) {
+  GlbParts parts = CharacterMaker(known_, testing::mixamo_style()).parts;
+  parts.root["materials"] = {
+      {{"name", "Skin"}, {"pbrMetallicRoughness", {{"baseColorFactor", {0.1, 0.2, 0.3, 1}}}}}};
+  parts.root["images"] = {
+      {{"mimeType", "image/png"}, {"bufferView", parts.root["bufferViews"].size()}}};
+  parts.root["bufferViews"].push_back(
+      {{"buffer", 0}, {"byteOffset", parts.binary.size()}, {"byteLength", 5}});
+  parts.binary += "pixel";  // not a whole number of words
+  parts.root["extensionsUsed"] = {"MAKER_odd"};
+  parts.root["extensions"]["MAKER_odd"] = {{"tailored", {1, 2.5, "x"}}};
+  parts.root["nodes"][3]["extras"] = {{"note", "ä"}};
+  const std::string in = write("in.glb", parts), before = bytes_of(in);
+  const std::string out = performed(in, dir / "out.glb");
+  const auto [was, was_binary] = parts_of(before);
+  auto [is, is_binary] = parts_of(bytes_of(out));
+  EXPECT_EQ(is_binary.substr(0, was["buffers"][0]["byteLength"]),
+            was_binary.substr(0, was["buffers"][0]["byteLength"]));
+  EXPECT_EQ(is["buffers"][0]["byteLength"], is_binary.size());
+  ASSERT_EQ(is["animations"].size(), 2u);
+  const GltfJson added = is["animations"][1];
+  EXPECT_EQ(added["name"], "retargeted");
+  EXPECT_EQ(added["extras"]["confidence"].size(), kFrames);
+  EXPECT_EQ(added["extras"]["filled"], (std::vector<int>{3}));
+  size_t moved = 0;
+  for (const auto& channel : added["channels"]) {
+    if (channel["target"]["path"] != "translation") continue;
+    ++moved;
+    EXPECT_EQ(channel["target"]["node"], 0);
+  }
+  EXPECT_EQ(moved, 1u);
+  EXPECT_EQ(added["channels"].size(), 23u);
+  is["animations"].erase(1);
+  for (const char* list : {"bufferViews", "accessors"}) {
+    ASSERT_GT(is[list].size(), was[list].size());
+    while (is[list].size() > was[list].size()) is[list].erase(is[list].size() - 1);
+  }
+  is["buffers"] = was["buffers"];
+  EXPECT_EQ(is, was);
+  EXPECT_EQ(bytes_of(in), before) << "the input was written to";
+  EXPECT_EQ(bytes_of(performed(in, dir / "again.glb")), bytes_of(out));
+}
+
+TEST_F(Characters, TextsAndTheFilesThatTheyName) {
+  GlbParts parts = CharacterMaker(known_, testing::plain_style()).parts;
+  GltfJson root = parts.root;
+  root["buffers"] = {{{"byteLength", parts.binary.size()}, {"uri", "its%20data.bin"}}};
+  root["images"] = {{{"uri", "tex/skin.jpg"}}};
+  dir.write("a/its data.bin", parts.binary);
+  dir.write("a/tex/skin.jpg", "JPEG");
+  const std::string in = dir.write("a/in.gltf", root.dump());
+  // Beside them; elsewhere, where they are copied; all in one file.
+  expect_played(in, performed(in, dir / "a/out.gltf"));
+  std::filesystem::create_directories(dir / "b");
+  const std::string there = performed(in, dir / "b/out.gltf");
+  expect_played(in, there);
+  EXPECT_EQ(bytes_of(dir / "b/tex/skin.jpg"), "JPEG");
+  const GltfJson text = GltfJson::parse(bytes_of(there));
+  EXPECT_EQ(text["images"], root["images"]);
+  EXPECT_EQ(text["buffers"][0], root["buffers"][0]);
+  std::filesystem::create_directories(dir / "c");
+  const std::string whole = performed(in, dir / "c/out.glb");
+  expect_played(in, whole);
+  const auto [json, binary] = parts_of(bytes_of(whole));
+  EXPECT_EQ(json["buffers"].size(), 1u);
+  const GltfJson view = json["bufferViews"][json["images"][0]["bufferView"].get<size_t>()];
+  EXPECT_EQ(binary.substr(view["byteOffset"], view["byteLength"]), "JPEG");
+  EXPECT_EQ(json["images"][0]["mimeType"], "image/jpeg");
+  // A GLB as a text.
+  const std::string glb = write("in.glb", parts);
+  expect_played(glb, performed(glb, dir / "b/from_glb.gltf"));
+  // What others put there stays.
+  dir.write("d/tex/skin.jpg", "somebody's");
+  EXPECT_HAS(refusal_of([&] { performed(in, dir / "d/out.gltf"); }), "is another file");
+  EXPECT_EQ(bytes_of(dir / "d/tex/skin.jpg"), "somebody's");
+  EXPECT_FALSE(std::filesystem::exists(dir / "d/out.gltf"));
+}
+
+TEST_F(Characters, TheAnimationAlone) {
+  const std::string in = write("in.glb", CharacterMaker(known_, testing::unreal_style()).parts);
+  GltfClipWriter::Options alone;
+  alone.animation_only = true;
+  alone.fps = 15;
+  const std::string out = performed(in, dir / "out.glb", alone);
+  const auto [json, binary] = parts_of(bytes_of(out));
+  for (const char* gone : {"meshes", "skins", "materials"})
+    EXPECT_FALSE(json.contains(gone)) << gone;
+  EXPECT_EQ(json["nodes"].size(), parts_of(bytes_of(in)).first["nodes"].size());
+  EXPECT_EQ(json["animations"].size(), 1u);
+  const Gltf file = read_gltf(out);
+  EXPECT_TRUE(file.vertices.empty());
+  EXPECT_NEAR(file.clips[0].end, (kFrames - 1) / 15.0, 1e-6);
+}
+
+/// 3ds Max hangs the legs on the first spine bone: it turns with the pelvis, and legs stay.
+TEST_F(Characters, LegsOnTheSpineStayWhereTheyAre) {
+  RigStyle style = testing::plain_style();
+  GlbParts parts = CharacterMaker(known_, style).parts;
+  auto& nodes = parts.root["nodes"];
+  const Vec3 spine(nodes[3]["translation"][0], nodes[3]["translation"][1],
+                   nodes[3]["translation"][2]);
+  for (const int hip : {1, 2}) {  // from the pelvis to the spine, at the same place
+    auto& children = nodes[0]["children"];
+    children.erase(std::find(children.begin(), children.end(), GltfJson(hip)));
+    nodes[3]["children"].push_back(hip);
+    for (int c = 0; c < 3; ++c)
+      nodes[hip]["translation"][static_cast<size_t>(c)] =
+          nodes[hip]["translation"][static_cast<size_t>(c)].get<double>() - spine[c];
+  }
+  const TargetMesh target = read_target(write("in.glb", parts));
+  ASSERT_TRUE(target.own) << target.unknown_rig;
+  for (size_t f = 0; f < kFrames; ++f) {
+    Joints joints;
+    target.own->place(pose(f), &joints, nullptr);
+    const PosedSkeleton wanted = forward_kinematics(target.own->rest(), pose(f));
+    for (const int j : {0, 1, 2, 4, 5, 7, 8, 10, 11})
+      EXPECT_LT((joints[j] - wanted.joints[j]).norm(), 1e-5) << kJointNames[j];
+  }
+}
+
+}  // namespace
+}  // namespace restage
