@@ -47,15 +47,6 @@ Body body_of(const Gltf& file, const GltfRig& rig) {
 
 // ---- motions -----------------------------------------------------------------------------------
 
-/// Whether a track moves one of the 22 joints or what it hangs on.
-bool moves_joints(const Gltf& file, const GltfRig& rig, const GltfClip& clip) {
-  std::vector<bool> counts(file.nodes.size());
-  for (int n : rig.node)
-    for (; n >= 0 && !counts[n]; n = file.nodes[n].parent) counts[n] = true;
-  return std::any_of(clip.tracks.begin(), clip.tracks.end(),
-                     [&](const GltfTrack& track) { return counts[track.node]; });
-}
-
 std::string rate_of(const Gltf& file, const GltfClip& clip, int64_t frames) {
   size_t most = 0;
   for (const GltfTrack& track : clip.tracks) most = std::max(most, file.times[track.times].size());
@@ -71,24 +62,14 @@ Motion motion_of(const Gltf& file, const GltfRig& rig, const GltfClip& clip, int
   motion.rest = t_pose_joints(rig);
   const Vec3 pelvis = motion.rest[0];
   for (Vec3& x : motion.rest) x -= pelvis;
-  JointFit fit(motion.rest);
   std::vector<double> lowest;
-  for (int64_t f = 0; f < frames; ++f) {
-    const double seconds = clip.begin + static_cast<double>(f) / kFps;
-    PosedSkeleton pose = rig_pose(rig, gltf_pose(file, clip, seconds));
-    fit.turn(pose);
+  for (const PosedSkeleton& pose : clip_poses(file, rig, clip, frames, report)) {
     auto& global = motion.global.emplace_back();
-    for (size_t j = 0; j < kJoints; ++j) {
-      if (!pose.joints[j].allFinite() || !pose.global[j].allFinite())
-        throw InputError(file.path,
-                         cat("frame ", f, " of ", text::quote(clip.name), " puts a joint nowhere"),
-                         "export it again with finite scales");
+    for (size_t j = 0; j < kJoints; ++j)
       global[j] = Quat(pose.global[j]).normalized().cast<float>();
-    }
     motion.hips.push_back((0.5 * (pose.joints[1] + pose.joints[2])).cast<float>());
     lowest.push_back(lowest_foot(pose));
   }
-  fit.report(report);
   const auto floor = static_cast<float>(floor_height(std::move(lowest)));
   for (Point& p : motion.hips) p.y() -= floor;
   return motion;
@@ -136,6 +117,40 @@ std::vector<Motion> motions_of(const Gltf& file, const GltfRig& rig, const Motio
 }
 
 }  // namespace
+
+bool moves_joints(const Gltf& file, const GltfRig& rig, const GltfClip& clip) {
+  std::vector<bool> counts(file.nodes.size());
+  for (int n : rig.node)
+    for (; n >= 0 && !counts[n]; n = file.nodes[n].parent) counts[n] = true;
+  return std::any_of(clip.tracks.begin(), clip.tracks.end(),
+                     [&](const GltfTrack& track) { return counts[track.node]; });
+}
+
+const GltfClip& first_clip(const Gltf& file, const GltfRig& rig) {
+  for (const GltfClip& clip : file.clips)
+    if (moves_joints(file, rig, clip)) return clip;
+  throw InputError(file.path, "holds no animation that moves its bones",
+                   "export it with its animation");
+}
+
+std::vector<PosedSkeleton> clip_poses(const Gltf& file, const GltfRig& rig, const GltfClip& clip,
+                                      int64_t frames, ImportReport& report) {
+  std::vector<PosedSkeleton> out;
+  JointFit fit(t_pose_joints(rig));
+  for (int64_t f = 0; f < frames; ++f) {
+    const double seconds = clip.begin + static_cast<double>(f) / kFps;
+    PosedSkeleton pose = rig_pose(rig, gltf_pose(file, clip, seconds));
+    for (size_t j = 0; j < kJoints; ++j)
+      if (!pose.joints[j].allFinite() || !pose.global[j].allFinite())
+        throw InputError(file.path,
+                         cat("frame ", f, " of ", text::quote(clip.name), " puts a joint nowhere"),
+                         "export it again with finite scales");
+    fit.turn(pose);
+    out.push_back(pose);
+  }
+  fit.report(report);
+  return out;
+}
 
 Character read_character(const std::string& path, const MotionOptions& options,
                          const std::string& clip) {

@@ -29,6 +29,16 @@ struct Character {
 Character read_character(const std::string& path, const MotionOptions& options = {},
                          const std::string& clip = "");
 
+/// Whether a track moves one of the 22 joints or what it hangs on.
+bool moves_joints(const Gltf& file, const GltfRig& rig, const GltfClip& clip);
+/// The first animation that moves one of the 22 joints or what it hangs on. InputError: there is
+/// none.
+const GltfClip& first_clip(const Gltf& file, const GltfRig& rig);
+/// Frames of an animation at 30 fps, our axes and metres: turns from the T-pose, and joints.
+/// InputError for a joint that lies nowhere.
+std::vector<PosedSkeleton> clip_poses(const Gltf& file, const GltfRig& rig, const GltfClip& clip,
+                                      int64_t frames, ImportReport& report);
+
 struct TargetMesh {
   Mesh mesh;
   ImportReport report;                    ///< empty for PLY and OBJ

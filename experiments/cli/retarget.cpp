@@ -9,42 +9,30 @@
 #include "autograd/base/output_check.h"
 #include "autograd/kernels/kernel.h"
 #include "datasets/doctor/examine.h"
-#include "datasets/importers/gltf_character.h"
+#include "datasets/importers/performance.h"
 #include "datasets/schema.h"
-#include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
 #include "experiments/cli/profile.h"
+#include "experiments/cli/retarget.h"
 #include "experiments/cli/retarget_gaps.h"
-#include "experiments/cli/retarget_sink.h"
 #include "experiments/cli/scale_option.h"
+#include "experiments/cli/standard_weights.h"
 #include "experiments/source.h"
-#include "infer/systems.h"
 
 namespace restage::cli {
 namespace {
-
-struct RetargetCommand {
-  SourceRecord source;
-  std::string target, bones, weights, device = "cpu";
-  SinkOptions to;
-  std::string system = "chain", rest;
-  RetargetOptions options;
-  bool profile = false;
-};
 
 using Frames = std::vector<int64_t>;  ///< their numbers
 
 void check(const RetargetCommand& c) {
   check_sink(c.to);
-  if (system_type(c.system).weights && c.weights.empty())
-    throw InputError("", "--weights is missing", "give a weights file or a run");
   if (!(c.options.min_confidence >= 0 && c.options.min_confidence <= 1))
     throw InputError("", "--min-confidence is out of range", "give 0 to 1");
   if (c.options.samples < 1 || c.options.samples > 256)
     throw InputError("", "--samples is out of range", "give 1 to 256");
   std::vector<std::string> inputs = {c.source.path, c.target};
   if (!c.weights.empty()) inputs.push_back(weights_path(c.weights));
-  for (const std::string& more : {c.rest, c.bones})
+  for (const std::string& more : {c.rest, c.bones, c.source_bones})
     if (!more.empty()) inputs.push_back(more);
   check_output(c.to.out, inputs);
 }
@@ -102,14 +90,6 @@ void log_profile(const Profile& profile) {
       format("peak of tensors %.1f MiB", static_cast<double>(memory_stats().peak) / 1048576.0));
 }
 
-/// How a character was brought into T-pose; nothing for a plain mesh. Said when all is done: bad
-/// input, which may come late in a source, is answered with one line.
-void log_target(const ImportReport& report) {
-  for (const auto& [name, value] : report.facts)
-    if (name != "joints") log_info(report.file + ": " + name + ": " + value);
-  for (const std::string& remark : report.remarks) log_info(report.file + ": " + remark);
-}
-
 Joints rest_joints(const std::string& path) {
   const Prediction rest = read_prediction(path);
   if (rest.joints.empty() || rest.frames != 1)
@@ -118,21 +98,6 @@ Joints rest_joints(const std::string& path) {
   Joints out;
   for (size_t j = 0; j < out.size(); ++j) out[j] = Eigen::Map<const Vec3>(&rest.joints[3 * j]);
   return out;
-}
-
-/// What a system is made from, but for its options.
-SystemInput load_input(const RetargetCommand& c, const Common& common) {
-  SystemInput input;
-  input.options = c.options;
-  input.options.seed = common.seed;
-  input.target_name = c.target;
-  if (c.weights.empty()) return input;
-  input.weights_name = weights_path(c.weights);
-  input.weights = load_bundle(c.weights);
-  for (const char* role : {"skeleton", "motion", "deformation.weights"})
-    if (system_type(c.system).weights) input.weights.need(role, input.weights_name);
-  move_networks(input.weights, {"skeleton", "motion"}, device_of(c.device));
-  return input;
 }
 
 /// What has become of the source.
@@ -200,7 +165,9 @@ class Run {
   }
 
   void write(std::span<const RetargetedFrame> made) {
-    if (!sink_) sink_ = make_sink(c_.to, system_, source_.record(), c_.target, own_);
+    if (!sink_)
+      sink_ = make_sink(c_.to, {system_.target(), system_.rig()}, source_.record(),
+                        clip_name(source_.record()), c_.target, own_);
     for (const RetargetedFrame& f : made) {
       sink_->push(f);
       if (f.filled) out_.filled.push_back(out_.frames);
@@ -253,6 +220,12 @@ void print_outcome(const RetargetCommand& c, const Common& common, const Source&
 
 int run_retarget(const RetargetCommand& c, const Common& common) {
   check(c);
+  std::string no_skeleton;
+  if (!c.from_surface && holds_performance(c.source.path, c.source_bones, &no_skeleton))
+    return run_performance(c, common);
+  if (!c.source_bones.empty())
+    throw InputError(c.source.path, "is looked at as a surface, which has no bones to name",
+                     "leave --source-bones out");
   SystemInput input = load_input(c, common);
   Source source(c.source, common.max_memory);
   if (source.frames() == 0)
@@ -263,20 +236,16 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   input.options.fps = source.fps();
   TargetMesh target = read_target(c.target, c.bones);
   check_inputs(c, source, target);
-  if (!c.rest.empty()) input.rest = rest_joints(c.rest);
-  if (target.own && !c.rest.empty())
-    throw InputError(c.target, "has a rig that says where its joints are", "leave --rest out");
-  input.own = target.own;
-  input.target = std::move(target.mesh);
-  input.target_name = c.target;
-  const auto system =
-      with_target(c, target, [&] { return make_system(system_type(c.system), std::move(input)); });
+  const auto system = system_for(c, std::move(input), target);
   Gaps gaps(source.frames(), source.fps() / static_cast<double>(c.to.every), c.options.force);
   Profile profile({"read", "extract", "motion", "deformation", "write", "frame"});
   Run run(c, source, *system, target.own, gaps, profile);
   const Outcome done = run();
   run.sink().commit(done.filled);
   log_target(target.report);
+  if (!no_skeleton.empty())
+    log_warning(c.source.path +
+                ": its surface is looked at; its skeleton cannot be taken: " + no_skeleton);
   log_outcome(done, source, gaps);
   if (c.profile) log_profile(profile);
   print_outcome(c, common, source, done, gaps, profile);
@@ -292,9 +261,47 @@ std::string help_of_systems() {
 
 }  // namespace
 
+void log_target(const ImportReport& report) {
+  for (const auto& [name, value] : report.facts)
+    if (name != "joints") log_info(report.file + ": " + name + ": " + value);
+  for (const std::string& remark : report.remarks) log_info(report.file + ": " + remark);
+}
+
+SystemInput load_input(const RetargetCommand& c, const Common& common) {
+  SystemInput input;
+  input.options = c.options;
+  input.options.seed = common.seed;
+  input.target_name = c.target;
+  const bool needed = system_type(c.system).weights;
+  if (c.weights.empty() && !needed) return input;
+  const std::string weights = c.weights.empty() ? standard_weights() : c.weights;
+  input.weights_name = weights_path(weights);
+  input.weights = load_bundle(weights);
+  for (const char* role : {"skeleton", "motion", "deformation.weights"})
+    if (needed) input.weights.need(role, input.weights_name);
+  move_networks(input.weights, {"skeleton", "motion"}, device_of(c.device));
+  return input;
+}
+
+std::unique_ptr<System> system_for(const RetargetCommand& c, SystemInput input,
+                                   TargetMesh& target) {
+  if (!c.rest.empty()) input.rest = rest_joints(c.rest);
+  if (target.own && !c.rest.empty())
+    throw InputError(c.target, "has a rig that says where its joints are", "leave --rest out");
+  input.own = target.own;
+  input.target = std::move(target.mesh);
+  return with_target(c, target,
+                     [&] { return make_system(system_type(c.system), std::move(input)); });
+}
+
 void add_retarget(Program& program) {
   auto [app, c] = program.add(
       "retarget", "a target performs the motion of a sequence of clouds",
+      "restage retarget --source scans/ --target hero.vrm --out hero_dancing.vrm\n"
+      "restage retarget --source walk.bvh --source-bones mine.yaml --target hero.glb --out "
+      "hero_walking.glb\n"
+      "restage retarget --source dance.glb --from-surface --target hero.glb --clip-name Dance "
+      "--animation-only --out dance.glb\n"
       "restage retarget --source scans/ --target hero.obj --weights w.safetensors --out hero.glb\n"
       "restage retarget --source scans.h5 --target hero.ply --weights runs/demo-1 --out result.h5\n"
       "restage retarget --source mm/ --fps 60 --source-up z --scale 0.001 --target a.obj --weights "
@@ -316,15 +323,19 @@ void add_retarget(Program& program) {
       "restage retarget --source scans.h5 --target hero.ply --system register --rest rest.h5 "
       "--out r.h5",
       run_retarget);
-  app.add_option("--source", c.source.path,
-                 "folder of clouds, file of them (HDF5, NPZ, NPY), or glTF animation")
+  app.add_option(
+         "--source", c.source.path,
+         "folder of clouds, file of them (HDF5, NPZ, NPY); or a skeleton's motion, which is taken "
+         "over exactly: BVH, AMC, glTF, VRM, VRMA")
       .required();
   app.add_option("--target", c.target,
                  "mesh or cloud in T-pose, y up, facing +z; or a glTF character")
       .required();
   app.add_option("--bones", c.bones,
                  "which bone of a glTF target is which joint, a .yaml file or a known family");
-  app.add_option("--weights", c.weights, "weights file, run or artifact");
+  app.add_option("--source-bones", c.source_bones, "the same of a source's skeleton");
+  app.add_option("--weights", c.weights,
+                 "weights file, run or artifact (default: the standard ones)");
   app.add_option("--system", c.system, help_of_systems()).show_default();
   app.add_option("--rest", c.rest, "the target's 22 rest joints (HDF5, /joints [1, 22, 3])");
   app.add_option("--every", c.to.every, "only every so many frames of the source; for X.h5");
@@ -360,6 +371,8 @@ void add_retarget(Program& program) {
   app.add_flag("--force", c.options.force,
                "accept a target that is no T-pose, what else the doctor calls wrong, and gaps of "
                "over a third of a second");
+  app.add_flag("--from-surface", c.from_surface,
+               "look at the surface of a source that has a skeleton, as if it had been scanned");
   app.add_flag("--profile", c.profile,
                "say how long a frame and its parts take: p50, p95, p99, max");
 }

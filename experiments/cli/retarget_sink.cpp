@@ -18,31 +18,22 @@ using Frames = std::vector<int64_t>;
 bool is_character(const std::string& out) { return text::ends_in(out, {".glb", ".gltf", ".vrm"}); }
 
 /// What the skeleton's files are made of.
-const SystemRig& rig_of(const System& system, const std::string& out) {
-  if (system.rig() == nullptr)
+const SystemRig& rig_of(const Shown& shown, const std::string& out) {
+  if (shown.rig == nullptr)
     throw InputError(out, "needs a skeleton, which this system does not have",
                      "end it in .h5, or / for a folder of frames");
-  return *system.rig();
+  return *shown.rig;
 }
 
-/// What the animation is called: as it is asked for, else by the source.
-std::string clip_name(const SinkOptions& options, const SourceRecord& source) {
-  if (!options.clip_name.empty()) return options.clip_name;
-  if (!source.clip.empty()) return source.clip;
-  std::filesystem::path path(source.path);
-  if (!path.has_filename()) path = path.parent_path();  // "scans/"
-  const std::string stem = path.stem().string();
-  return text::is_utf8(stem) && !stem.empty() && stem != "." && stem != ".." ? stem : "retargeted";
-}
-
-Sink own_sink(const SinkOptions& options, const SourceRecord& source, const std::string& target,
+Sink own_sink(const SinkOptions& options, const std::string& clip, const std::string& target,
               const std::shared_ptr<const GltfOwnRig>& own) {
   if (text::ends_in(options.out, {".vrm"}) && own->file().humanoid.empty())
     throw InputError(options.out, "would be no VRM character, since the target is none",
                      "end --out in .glb");
   const auto writer = std::make_shared<GltfClipWriter>(
       options.out, target, own,
-      GltfClipWriter::Options{clip_name(options, source), options.rate(), options.animation_only});
+      GltfClipWriter::Options{options.clip_name.empty() ? clip : options.clip_name, options.rate(),
+                              options.animation_only});
   return {[writer](const RetargetedFrame& f) { writer->push(f.pose, f.confidence); },
           [writer](const Frames& filled) {
             writer->set_filled(filled);
@@ -51,16 +42,15 @@ Sink own_sink(const SinkOptions& options, const SourceRecord& source, const std:
 }
 
 /// The target has no bones that we know: a skeleton and a skin of our own.
-Sink glb_sink(const SinkOptions& options, const System& system) {
+Sink glb_sink(const SinkOptions& options, const Shown& shown) {
   if (!text::ends_in(options.out, {".glb"}))
     throw InputError(options.out, "keeps the target's own file, which has no rig that we know",
                      "end --out in .glb, or name its bones with --bones");
   if (options.animation_only || !options.clip_name.empty())
     throw InputError(options.out, "has no rig of its own whose animation could be named or alone",
                      "leave --clip-name and --animation-only out");
-  const SystemRig& rig = rig_of(system, options.out);
-  const auto writer =
-      std::make_shared<GlbWriter>(options.out, system.target(), rig.rest, rig.weights);
+  const SystemRig& rig = rig_of(shown, options.out);
+  const auto writer = std::make_shared<GlbWriter>(options.out, shown.target, rig.rest, rig.weights);
   const auto commit = [writer](const Frames& filled) {
     writer->set_filled(filled);
     const InfluenceError e = writer->commit();
@@ -70,18 +60,19 @@ Sink glb_sink(const SinkOptions& options, const System& system) {
   return {[writer](const RetargetedFrame& f) { writer->push(f.pose, f.confidence); }, commit};
 }
 
-Sink bvh_sink(const SinkOptions& options, const System& system) {
-  const auto writer = std::make_shared<BvhWriter>(options.out, rig_of(system, options.out).rest);
+Sink bvh_sink(const SinkOptions& options, const Shown& shown) {
+  const auto writer = std::make_shared<BvhWriter>(options.out, rig_of(shown, options.out).rest);
   return {[writer](const RetargetedFrame& f) { writer->push(f.pose); },
           [writer](const Frames&) { writer->commit(); }};
 }
 
-Sink hdf5_sink(const SinkOptions& options, const System& system, const SourceRecord& source) {
-  rig_of(system, options.out);  // /joints must be there
-  const Mesh& target = system.target();
+Sink hdf5_sink(const SinkOptions& options, const Shown& shown,
+               const std::optional<SourceRecord>& source) {
+  rig_of(shown, options.out);  // /joints must be there
+  const Mesh& target = shown.target;
   const auto writer = std::make_shared<PredictionWriter>(options.out, std::ssize(target.vertices),
                                                          target.faces, FileInfo{}, options.rate());
-  writer->set_source(source);
+  if (source) writer->set_source(*source);
   return {[writer](const RetargetedFrame& f) {
             writer->append(f.joints.value(), f.vertices, f.confidence);
           },
@@ -113,15 +104,23 @@ void check_sink(const SinkOptions& options) {
                      "leave --clip-name and --animation-only out, or end --out in .glb");
 }
 
-Sink make_sink(const SinkOptions& options, const System& system, const SourceRecord& source,
+std::string clip_name(const SourceRecord& source) {
+  if (!source.clip.empty()) return source.clip;
+  std::filesystem::path path(source.path);
+  if (!path.has_filename()) path = path.parent_path();  // "scans/"
+  const std::string stem = path.stem().string();
+  return text::is_utf8(stem) && !stem.empty() && stem != "." && stem != ".." ? stem : "retargeted";
+}
+
+Sink make_sink(const SinkOptions& options, const Shown& shown,
+               const std::optional<SourceRecord>& source, const std::string& clip,
                const std::string& target, const std::shared_ptr<const GltfOwnRig>& own) {
   if (is_character(options.out))
-    return own ? own_sink(options, source, target, own) : glb_sink(options, system);
-  if (options.out.ends_with(".bvh")) return bvh_sink(options, system);
-  if (options.out.ends_with(".h5")) return hdf5_sink(options, system, source);
+    return own ? own_sink(options, clip, target, own) : glb_sink(options, shown);
+  if (options.out.ends_with(".bvh")) return bvh_sink(options, shown);
+  if (options.out.ends_with(".h5")) return hdf5_sink(options, shown, source);
   const auto writer = std::make_shared<FrameFolderWriter>(
-      options.out, system.target().faces,
-      options.format == "obj" ? MeshFormat::obj : MeshFormat::ply);
+      options.out, shown.target.faces, options.format == "obj" ? MeshFormat::obj : MeshFormat::ply);
   return {[writer](const RetargetedFrame& f) { writer->push(f.vertices); },
           [writer](const Frames&) { writer->commit(); }};
 }

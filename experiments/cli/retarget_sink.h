@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,12 +27,23 @@ struct Sink {
   std::function<void(const std::vector<int64_t>& filled)> commit;
 };
 
+/// What is moved: the target, and its skeleton (null: none).
+struct Shown {
+  const Mesh& target;
+  const SystemRig* rig;
+};
+
 /// InputError for an ending that cannot be written, and for options that do not go with it.
 void check_sink(const SinkOptions& options);
 
-/// `own`: the target's own rig, of the file `target`; null: it has none. InputError if the system
-/// or the target lacks what the ending needs.
-Sink make_sink(const SinkOptions& options, const System& system, const SourceRecord& source,
+/// `source`: for files that remember it; nothing: a source without a surface. `clip`: what its
+/// motion is called. `own`: the target's own rig, of the file `target`; null: it has none.
+/// InputError if the target lacks what the ending needs.
+Sink make_sink(const SinkOptions& options, const Shown& shown,
+               const std::optional<SourceRecord>& source, const std::string& clip,
                const std::string& target, const std::shared_ptr<const GltfOwnRig>& own);
+
+/// What the motion of a source of clouds is called: its clip's name, else its file's.
+std::string clip_name(const SourceRecord& source);
 
 }  // namespace restage::cli

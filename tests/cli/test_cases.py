@@ -1,5 +1,7 @@
 """The shared cases of skeletons, bone names and characters: files as users bring them, with the true joints."""
-from cases import CaseTest, WEIGHTS
+import os
+
+from cases import CASES, CaseTest, WEIGHTS
 
 
 class SkeletonCases(CaseTest):
@@ -27,8 +29,11 @@ class SkeletonCases(CaseTest):
         for name in ("walk.vrma", "walk.glb"):
             with self.subTest(name=name):
                 self.expect_true(["data", "import", name, "--out", "out.h5"])
-        self.bad_input(["retarget", "--source", "walk.vrma", "--target", "walk.glb", "--weights", WEIGHTS, "--out", "x.h5"],
-                       "walk.vrma", "restage data import", "restage data perform")
+        self.bad_input(["retarget", "--source", "walk.vrma", "--target", "walk.glb", "--out", "x.h5"], "walk.glb", "no mesh")
+        self.enter("t01_rig_targets")
+        walk = os.path.join(CASES, "g07_vrma", "walk.vrma")
+        self.done("retarget", "--source", walk, "--target", "apose_sketchfab.glb", "--out", "out.glb")
+        self.assertEqual(self.json("data", "import", "out.glb", "--out", "out.h5")["motions"], 1)
 
     def test_two_characters(self):
         self.enter("x02_two_characters")

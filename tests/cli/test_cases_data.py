@@ -66,8 +66,8 @@ class DataCases(CaseTest):
 
     def test_p10_bvh_source(self):
         self.enter("p10_bvh_source")
-        self.bad_input(["retarget", "--source", "walk.bvh", "--target", "target.ply", "--weights", WEIGHTS, "--out", "out.h5"],
-                       "walk.bvh", "restage data import", "perform")
+        self.done("retarget", "--source", "walk.bvh", "--target", "target.ply", "--weights", WEIGHTS, "--out", "out.h5")
+        self.assertEqual(self.json("data", "inspect", "out.h5")["counts"]["frames"], 3)
 
     def test_y01_obj(self):
         self.enter("y01_obj")

@@ -36,7 +36,7 @@ class RenderSource(CliTest):
 
     def test_a_source_that_states_its_times(self):
         self.done(*self.retarget("moving.glb", "--source", "plain"))
-        self.done(*self.retarget("again.h5", "--source", "moving.glb"))
+        self.done(*self.retarget("again.h5", "--source", "moving.glb", "--from-surface"))
         self.assertEqual(self.sheet("again.h5")[1]["source"], "moving.glb")
         self.bad_input(["render", "again.h5", "--fps", 60, "--out", "x.png"], "key times")
 

@@ -1,0 +1,38 @@
+// What a skeleton does in its file, to be done by another skeleton exactly: no network, no surface.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "datasets/importers/motion_clip.h"
+#include "datasets/readers/gltf.h"
+
+namespace restage {
+
+struct Performance {
+  std::string name;  ///< of the clip, else of the file
+  Joints rest;       ///< the T-pose that turns are counted from, metres, y up, facing +z
+  /// At 30 fps: world turns from the T-pose, and joints, in the world in which `rest` stands.
+  std::vector<PosedSkeleton> frames;
+  ImportReport report;
+};
+
+/// Whether the file holds a skeleton that moves: BVH and AMC recordings by their names; a glTF file
+/// by what is in it: an animation, and a rig that find_rig() accepts. `why`: of an animated surface
+/// whose rig is not accepted, the reason. InputError where there is no surface either.
+/// `bones`: as MotionOptions::profile; a rig that is named by the user is taken or refused.
+bool holds_performance(const std::string& path, const std::string& bones = "",
+                       std::string* why = nullptr);
+
+/// The options count as in read_bvh(), read_amc() and read_character(); `clip`: of a glTF file,
+/// empty: the first that moves the 22 joints.
+Performance read_performance(const std::string& path, const MotionOptions& options,
+                             const std::string& clip = "");
+
+/// One frame of it by a skeleton of these rest joints, which stands in T-pose on y = 0: the same
+/// world turns; thighs, shins, upper arms and forearms point where the source's do (whose rest
+/// directions may be others); the middle of the hips goes its way, scaled by the length of the legs
+/// about the origin of the floor. For the same skeleton all of it is exact.
+Pose perform(const Performance& performance, size_t frame, const Joints& rest);
+
+}  // namespace restage

@@ -1,0 +1,35 @@
+// What the files of `restage retarget` share.
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "datasets/importers/gltf_character.h"
+#include "experiments/cli/commands.h"
+#include "experiments/cli/retarget_sink.h"
+#include "infer/systems.h"
+
+namespace restage::cli {
+
+struct RetargetCommand {
+  SourceRecord source;
+  std::string target, bones, source_bones, weights, device = "cpu";
+  std::string system = "chain", rest;
+  SinkOptions to;
+  RetargetOptions options;
+  bool profile = false, from_surface = false;
+};
+
+/// What the command's system is made from, but for its target: weights and options.
+SystemInput load_input(const RetargetCommand& c, const Common& common);
+/// The same with the target; what is refused because its rig is not known says so.
+std::unique_ptr<System> system_for(const RetargetCommand& c, SystemInput input, TargetMesh& target);
+/// How a character was brought into T-pose; nothing for a plain mesh. Said when all is done: bad
+/// input, which may come late in a source, is answered with one line.
+void log_target(const ImportReport& report);
+
+/// A source whose skeleton is known: its turns go over as they are, and no network is asked but for
+/// a target without a rig.
+int run_performance(const RetargetCommand& c, const Common& common);
+
+}  // namespace restage::cli

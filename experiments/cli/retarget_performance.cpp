@@ -1,0 +1,87 @@
+// restage retarget of a source that has a skeleton: BVH, AMC, glTF, VRM animations.
+#include "autograd/base/log.h"
+#include "datasets/doctor/examine.h"
+#include "datasets/importers/performance.h"
+#include "experiments/cli/output.h"
+#include "experiments/cli/retarget.h"
+
+namespace restage::cli {
+namespace {
+
+/// What says how clouds are looked at says nothing of a skeleton.
+void check_options(const RetargetCommand& c) {
+  const RetargetOptions usual;
+  const auto refuse = [&](const std::string& option) {
+    throw InputError(c.source.path,
+                     "has a skeleton, which is taken over as it is; " + option + " is for clouds",
+                     "leave " + option + " out, or add --from-surface");
+  };
+  if (c.source.sequence) refuse("--sequence");
+  if (c.system != "chain") refuse("--system");
+  if (c.options.samples != usual.samples) refuse("--samples");
+  if (c.options.anchor != usual.anchor) refuse("--anchor");
+  if (c.options.min_confidence != usual.min_confidence) refuse("--min-confidence");
+  if (!c.options.foot_lock) refuse("--no-foot-lock");
+  if (c.profile) refuse("--profile");
+  if (is_gltf_name(c.source.path) && c.source.fps && *c.source.fps != kFps)
+    throw InputError(c.source.path, "states its key times, which --fps cannot change",
+                     "leave --fps out");
+}
+
+MotionOptions options_of(const RetargetCommand& c) {
+  MotionOptions out;
+  if (c.source.scale != 1) out.scale = c.source.scale;
+  if (c.source.up != "y") out.rest.up = parse_axis(c.source.up, "--source-up");
+  if (c.source.fps) out.fps = *c.source.fps;
+  out.force = c.options.force;
+  out.profile = c.source_bones;
+  return out;
+}
+
+}  // namespace
+
+int run_performance(const RetargetCommand& c, const Common& common) {
+  check_options(c);
+  const Performance performance = read_performance(c.source.path, options_of(c), c.source.clip);
+  TargetMesh target = read_target(c.target, c.bones);
+  std::unique_ptr<System> system;  // poses a target that has no rig of its own
+  if (!target.own) {
+    if (!c.options.force) check_target(target.mesh, c.target, target.known());
+    system = system_for(c, load_input(c, common), target);
+  }
+  SkinWeights weights;
+  if (target.own) weights = target.own->weights();
+  const Joints& rest = target.own ? target.own->rest() : *system->target_joints();
+  std::optional<SystemRig> rig;
+  if (target.own) rig.emplace(SystemRig{rest, weights});
+  const Shown shown{target.own ? target.own->mesh() : system->target(),
+                    target.own ? &*rig : system->rig()};
+  std::optional<SourceRecord> source;
+  if (is_gltf_name(c.source.path)) source = c.source;
+  const Sink sink = make_sink(c.to, shown, source, performance.name, c.target, target.own);
+  int64_t frames = 0;
+  for (size_t f = 0; f < performance.frames.size(); f += static_cast<size_t>(c.to.every)) {
+    RetargetedFrame frame;
+    frame.pose = perform(performance, f, rest);
+    frame.joints.emplace();
+    if (target.own) {
+      target.own->place(frame.pose, &*frame.joints, &frame.vertices);
+    } else {
+      *frame.joints = forward_kinematics(rest, frame.pose).joints;
+      frame.vertices = system->posed(frame.pose);
+    }
+    sink.push(frame);
+    ++frames;
+  }
+  sink.commit({});
+  log_target(performance.report);
+  log_target(target.report);
+  const Json document = {{"out", c.to.out},          {"source_frames", performance.frames.size()},
+                         {"frames", frames},         {"fps", c.to.rate()},
+                         {"clip", performance.name}, {"from", "skeleton"}};
+  print(common.json, document,
+        "wrote " + c.to.out + ": " + std::to_string(frames) + " frames of the source's skeleton\n");
+  return 0;
+}
+
+}  // namespace restage::cli
