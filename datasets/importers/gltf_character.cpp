@@ -21,9 +21,15 @@ void describe(const Gltf& file, ImportReport& report) {
   report.file = file.path;
   size_t joints = 0;
   for (const GltfBone& bone : file.bones) joints += bone.skin >= 0;
-  report.fact("holds", cat(file.vertices.size(), " vertices, ", file.faces.size(), " triangles, ",
-                           file.skin_nodes.size(), " skins with ", joints, " joints, ",
-                           file.clips.size(), " animations"));
+  const auto count = [](size_t n, const char* one, const char* many) {
+    return cat(n, " ", n == 1 ? one : many);
+  };
+  report.fact("holds", cat(file.standard, file.standard.empty() ? "" : ", ",
+                           count(file.meshes, "mesh", "meshes"), " of ", file.vertices.size(),
+                           " vertices and ", file.faces.size(), " triangles, ",
+                           count(file.morph_targets, "morph target", "morph targets"), ", ",
+                           count(file.skin_nodes.size(), "skin", "skins"), " with ", joints,
+                           " joints, ", count(file.clips.size(), "animation", "animations")));
   report.remarks.insert(report.remarks.end(), file.remarks.begin(), file.remarks.end());
 }
 
@@ -165,6 +171,8 @@ Character read_character(const std::string& path, const MotionOptions& options,
   const GltfRig rig = find_rig(file, options, out.report);
   check_handedness(t_pose_joints(rig), options.force, out.report);
   if (loose) out.report.remark("left out its mesh, which belongs to no skin");
+  if (file.morph_targets > 0)
+    out.report.remark("morph targets are left out: the face rests as it is modelled");
   if (skinned) {
     out.body = body_of(file, rig);
     out.body->id = id_of(path, options);

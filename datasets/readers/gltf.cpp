@@ -64,6 +64,7 @@ class Builder {
     for (size_t a = 0; a < model_.animations.size(); ++a) read_animation(a);
     for (const auto& [name, node] : document_.humanoid)
       out_.humanoid.emplace_back(name, place_[checked(node, place_.size(), path_, "node")]);
+    out_.standard = document_.standard;
     report();
     return std::move(out_);
   }
@@ -192,8 +193,11 @@ class Builder {
         continue;
       }
       vertices_of_.clear();
+      morphs_of_mesh_ = 0;
       for (const tinygltf::Primitive& primitive : model_.meshes[wearer.mesh].primitives)
         read_primitive(wearer, primitive);
+      ++out_.meshes;
+      out_.morph_targets += morphs_of_mesh_;
     }
     if (out_.vertices.size() > static_cast<size_t>(INT32_MAX))
       broken(path_, "has more vertices than can be counted");
@@ -208,7 +212,7 @@ class Builder {
     }
     const auto position = primitive.attributes.find("POSITION");
     if (position == primitive.attributes.end()) return;  // draws nothing
-    if (!primitive.targets.empty()) morphs_ = true;
+    morphs_of_mesh_ = std::max(morphs_of_mesh_, primitive.targets.size());
     const auto joints = primitive.attributes.find("JOINTS_0");
     const bool skinned = wearer.skin >= 0 && joints != primitive.attributes.end();
     // Primitives of a mesh often share one list of vertices and differ in their material.
@@ -340,8 +344,7 @@ class Builder {
       const std::string& path = channel.target_path;
       if (channel.target_node < 0) continue;  // aims at nothing
       if (path == "weights") {
-        morphs_ = true;
-        continue;
+        continue;  // a face's, which rests as it is modelled
       }
       if (path != "translation" && path != "rotation" && path != "scale") {
         ++unknown_tracks_;
@@ -394,8 +397,6 @@ class Builder {
       out_.remarks.push_back(cat("left out ", loose_, " meshes that belong to no skin: ",
                                  loose_names_, loose_ > 3 ? ", ..." : ""));
     if (lines_ > 0) out_.remarks.push_back("left out lines: only points and triangles are read");
-    if (morphs_)
-      out_.remarks.push_back("morph targets are left out: the face rests as it is modelled");
     if (weightless_ > 0)
       out_.remarks.push_back(
           cat(weightless_, " vertices without weights hang on the first joint of their skin"));
@@ -421,7 +422,7 @@ class Builder {
   std::map<int, int> times_;
   size_t lines_ = 0, loose_ = 0, weightless_ = 0, unknown_tracks_ = 0;
   std::string loose_names_;
-  bool morphs_ = false;
+  size_t morphs_of_mesh_ = 0;
 };
 
 }  // namespace

@@ -1,7 +1,8 @@
 // Rigged characters and scenes in glTF 2.0: .glb, .vrm, .vrma (VRM animations: nodes that move and
 // a list of which bone they are) and .gltf with the buffers in its folder.
 // What a file holds as plain values, in the file's own units and axes (metres and y up, if it keeps
-// to the format). Pictures, materials, cameras and morph targets are left out.
+// to the format). Pictures, materials, cameras and morph targets are left out
+// (datasets/characters/gltf_document.h keeps them).
 // Reading never trusts a number in a file. InputError "file: what; fix" for anything wrong: cut
 // short, indices and ranges outside of what is there, circles of nodes, NaN, required extensions
 // that change how data is stored (Draco, meshopt), data repeated until it would fill the memory.
@@ -74,6 +75,8 @@ struct Gltf {
   std::vector<std::vector<float>> times;  ///< seconds, not falling
   std::vector<GltfClip> clips;
   std::vector<std::pair<std::string, int>> humanoid;  ///< VRM's name of a bone, and its node
+  std::string standard;                               ///< "VRM 0", "VRM 1", "VRM animation" or ""
+  size_t meshes = 0, morph_targets = 0;               ///< that the scene shows
   std::vector<std::string> remarks;                   ///< what was left out
 };
 

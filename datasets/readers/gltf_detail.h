@@ -32,6 +32,7 @@ struct Document {
   std::vector<std::string> storage;       ///< what buffers point into, if not into the file
   std::vector<std::string_view> buffers;  ///< as long as they are declared
   std::vector<std::pair<std::string, int>> humanoid;  ///< VRM: name of a bone, number of its node
+  std::string standard;                               ///< Gltf::standard
   uint64_t payload = 0;  ///< bytes of the file and of all that it names
 };
 

@@ -101,9 +101,11 @@ int node_number(const Json& bone) {
 }
 
 /// VRM 0: extensions.VRM.humanoid.humanBones is a list; VRM 1 and VRM animations: an object.
-std::vector<std::pair<std::string, int>> read_humanoid(const Json& root) {
+std::vector<std::pair<std::string, int>> read_humanoid(const Json& root, std::string* standard) {
   std::vector<std::pair<std::string, int>> out;
-  for (const char* name : {"VRM", "VRMC_vrm", "VRMC_vrm_animation"}) {
+  for (const auto& [name, title_of_it] : {std::pair{"VRM", "VRM 0"},
+                                          {"VRMC_vrm", "VRM 1"},
+                                          {"VRMC_vrm_animation", "VRM animation"}}) {
     const auto pointer = Json::json_pointer(cat("/extensions/", name, "/humanoid/humanBones"));
     if (!root.contains(pointer)) continue;
     const Json& bones = root.at(pointer);
@@ -116,7 +118,9 @@ std::vector<std::pair<std::string, int>> read_humanoid(const Json& root) {
       }
       if (const int node = node_number(bone); node >= 0) out.emplace_back(title, node);
     }
-    if (!out.empty()) break;
+    if (out.empty()) continue;
+    *standard = title_of_it;
+    break;
   }
   return out;
 }
@@ -245,7 +249,7 @@ Document parse_document(std::string_view content, const std::string& path) {
   Chunks chunks{content, {}};
   if (content.starts_with("glTF")) chunks = split_glb(content, path);
   Json root = parse_json(chunks.json, content.size(), path);
-  out.humanoid = read_humanoid(root);
+  out.humanoid = read_humanoid(root, &out.standard);
   read_buffers(root, chunks.binary, out);
   root.erase("buffers");
   drop_extensions(root);
