@@ -111,6 +111,7 @@ struct Prediction {
 
 /// /joints [F,22,3] and /vertices [F,V,3] (float32 or float64, either may be absent),
 /// /sequence_offset [S+1], /faces [T,3], /confidence [F] and /radius [F,22] (all optional).
+/// /rotations [F,22,4] (PredictionWriter::append_rotations()) is checked and not read.
 Prediction read_prediction(const std::string& path);
 
 /// The same some frames at a time, as surfaces are large. Opening it checks shapes and offsets.
@@ -167,6 +168,9 @@ class PredictionWriter {
   /// `confidence` for all frames or for none.
   void append(const Joints& joints, const Points& vertices,
               std::optional<double> confidence = std::nullopt);
+  /// World turns from the T-pose of the frame that append() was called for last; for all frames or
+  /// for none. Written as /rotations [F,22,4], unit quaternions w x y z.
+  void append_rotations(const Rotations& global);
   /// Joints alone, each with the radius about it that should hold the true one nine times in ten.
   void append_joints(const Joints& joints, const std::array<double, kJoints>& radius);
   /// How the source's scans relate to the world: world = A p + b, rows of [A | b]. Written as
@@ -183,7 +187,7 @@ class PredictionWriter {
   h5::File file_;
   int64_t vertex_count_ = 0;
   h5::Dataset joints_;
-  std::optional<h5::Dataset> vertices_;
+  std::optional<h5::Dataset> vertices_, rotations_;
   std::vector<float> confidence_, radius_;
   std::vector<int64_t> sequence_offset_{0};
 };

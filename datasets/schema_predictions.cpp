@@ -25,6 +25,17 @@ std::vector<double> radius_in(const h5::File& file, int64_t frames) {
   return out;
 }
 
+void check_rotations(const h5::File& file, int64_t frames) {
+  if (!file.has("/rotations")) return;
+  const h5::Dataset set = file.dataset("/rotations", {frames, kJoints, 4});
+  const std::vector<double> all = read_finite<double>(file, "/rotations", {frames, kJoints, 4});
+  for (size_t i = 0; i < all.size(); i += 4)
+    if (std::abs(Eigen::Map<const Eigen::Vector4d>(&all[i]).norm() - 1) > 1e-3)
+      throw InputError(set.where(),
+                       "frame " + std::to_string(i / (4 * kJoints)) + " holds no unit quaternion",
+                       "normalise the rotations");
+}
+
 }  // namespace
 
 std::vector<double> read_confidence(const std::string& path, int64_t sequence) {
@@ -92,6 +103,7 @@ Prediction PredictionReader::read_small() const {
 
 void PredictionReader::check() const {
   read_small();
+  check_rotations(file_, frames_);
   if (vertices_) check_all_finite<double>(*vertices_);
 }
 
@@ -136,6 +148,17 @@ void PredictionWriter::append(const Joints& joints, const Points& vertices,
   if (confidence) confidence_.push_back(static_cast<float>(*confidence));
 }
 
+void PredictionWriter::append_rotations(const Rotations& global) {
+  if (!rotations_) rotations_ = file_.create_appendable<float>("/rotations", {kJoints, 4});
+  std::vector<float> row;
+  for (const Mat3& turn : global) {
+    Quat q = Quat(turn).normalized();
+    if (q.w() < 0) q.coeffs() = -q.coeffs();
+    for (const double x : {q.w(), q.x(), q.y(), q.z()}) row.push_back(static_cast<float>(x));
+  }
+  rotations_->append<float>(row);
+}
+
 void PredictionWriter::append_joints(const Joints& joints,
                                      const std::array<double, kJoints>& radius) {
   append(joints, {});
@@ -164,6 +187,8 @@ void PredictionWriter::commit() {
       throw ShapeError("prediction writer: radius for some frames only");
     file_.write<float>("/radius", {joints_.rows(), kJoints}, radius_);
   }
+  if (rotations_ && rotations_->rows() != joints_.rows())
+    throw ShapeError("prediction writer: rotations for some frames only");
   write_sequence_offset(file_, sequence_offset_, joints_.rows());
   file_.commit();
 }

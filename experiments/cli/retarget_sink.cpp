@@ -75,6 +75,7 @@ Sink hdf5_sink(const SinkOptions& options, const Shown& shown,
   if (source) writer->set_source(*source);
   return {[writer](const RetargetedFrame& f) {
             writer->append(f.joints.value(), f.vertices, f.confidence);
+            writer->append_rotations(to_global(f.pose.local));
           },
           [writer](const Frames& filled) {
             writer->set_filled(filled);

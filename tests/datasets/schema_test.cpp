@@ -203,6 +203,30 @@ TEST_F(Schema, PredictionWriterStreamsAndIsAtomic) {
   EXPECT_EQ(names_in(dir.path()), Names{"p.h5"});
 }
 
+TEST_F(Schema, RotationsAreUnitQuaternionsOfAllFramesOrOfNone) {
+  const std::string path = dir / "p.h5";
+  Rotations turned;
+  turned.fill(Eigen::AngleAxisd(2.0, Vec3::UnitY()).toRotationMatrix());
+  {
+    PredictionWriter writer(path, 0, {}, kInfo);
+    for (int f = 0; f < 2; ++f) {
+      writer.append(tiny_joints(), {});
+      writer.append_rotations(turned);
+    }
+    writer.commit();
+  }
+  const h5::File file = h5::File::open(path);
+  const std::vector<float> all = file.read<float>("/rotations", {2, kJoints, 4});
+  EXPECT_NEAR(all[0], std::cos(1.0), 1e-6);
+  EXPECT_NEAR(all[2], std::sin(1.0), 1e-6);
+  EXPECT_TRUE(verify(path).empty());
+  PredictionWriter some(dir / "q.h5", 0, {}, kInfo);
+  some.append(tiny_joints(), {});
+  some.append_rotations(turned);
+  some.append(tiny_joints(), {});
+  EXPECT_THROW(some.commit(), ShapeError);
+}
+
 TEST_F(Schema, ConfidenceIsOfAllFramesOrOfNone) {
   const std::string path = dir / "p.h5";
   {
