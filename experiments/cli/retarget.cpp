@@ -354,7 +354,8 @@ void add_retarget(Program& program) {
                  "the source's axis that points up: x, -x, y, -y, z or -z")
       .show_default();
   add_scale(app, c.source.scale, "the source's units in metres");
-  app.add_option("--format", c.to.format, "of a folder's frames: ply or obj");
+  app.add_option("--format", c.to.format,
+                 "of a folder's frames: ply or obj (default: the target's own, else ply)");
   app.add_option("--device", c.device,
                  "where extractor and motion network run: cpu, or cuda in a program built for it");
   app.add_option("--samples", c.options.samples,

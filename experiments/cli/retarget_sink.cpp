@@ -5,6 +5,7 @@
 #include "autograd/base/format.h"
 #include "autograd/base/log.h"
 #include "datasets/characters/gltf_clip.h"
+#include "datasets/characters/mesh_template.h"
 #include "datasets/readers/text.h"
 #include "infer/writers/bvh.h"
 #include "infer/writers/frames.h"
@@ -83,11 +84,33 @@ Sink hdf5_sink(const SinkOptions& options, const Shown& shown,
           }};
 }
 
+/// Frames in the target's own file, where the format is the target's.
+Sink folder_sink(const SinkOptions& options, const Shown& shown, const std::string& target) {
+  const std::string own = text::ends_in(target, {".obj"}) ? "obj" : "ply";
+  const std::string& format = options.format.empty() ? own : options.format;
+  const MeshFormat kind = format == "obj" ? MeshFormat::obj : MeshFormat::ply;
+  std::shared_ptr<const MeshTemplate> mesh = MeshTemplate::of(target, shown.target.vertices.size());
+  std::shared_ptr<FrameFolderWriter> writer;
+  if (mesh && mesh->format() == kind)
+    writer = std::make_shared<FrameFolderWriter>(
+        options.out, kind, [mesh, folder = options.out](const Points& vertices) {
+          return mesh->with(vertices, folder);
+        });
+  else
+    writer = std::make_shared<FrameFolderWriter>(options.out, shown.target.faces, kind);
+  return {[writer](const RetargetedFrame& f) { writer->push(f.vertices); },
+          [writer, mesh, kind](const Frames&) {
+            writer->commit();
+            if (mesh && mesh->format() == kind && mesh->had_normals())
+              log_info("frames have no normals: the target's are those of its rest pose");
+          }};
+}
+
 }  // namespace
 
 void check_sink(const SinkOptions& options) {
   const std::string& out = options.out;
-  if (options.format != "ply" && options.format != "obj")
+  if (!options.format.empty() && options.format != "ply" && options.format != "obj")
     throw InputError("", "--format '" + options.format + "' is unknown", "use ply or obj");
   if (options.every < 1 || options.every > 1000000)
     throw InputError("", "--every is out of range", "give 1 or more frames");
@@ -120,10 +143,7 @@ Sink make_sink(const SinkOptions& options, const Shown& shown,
     return own ? own_sink(options, clip, target, own) : glb_sink(options, shown);
   if (options.out.ends_with(".bvh")) return bvh_sink(options, shown);
   if (options.out.ends_with(".h5")) return hdf5_sink(options, shown, source);
-  const auto writer = std::make_shared<FrameFolderWriter>(
-      options.out, shown.target.faces, options.format == "obj" ? MeshFormat::obj : MeshFormat::ply);
-  return {[writer](const RetargetedFrame& f) { writer->push(f.vertices); },
-          [writer](const Frames&) { writer->commit(); }};
+  return folder_sink(options, shown, target);
 }
 
 }  // namespace restage::cli

@@ -14,7 +14,7 @@
 namespace restage::cli {
 
 struct SinkOptions {
-  std::string out, format = "ply", clip_name;
+  std::string out, format, clip_name;  ///< empty format: the target's own, else PLY
   bool animation_only = false;
   int64_t every = 1;  ///< of the source's frames, one is taken
   double rate() const { return kFps / static_cast<double>(every); }  ///< of the result

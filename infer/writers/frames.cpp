@@ -107,10 +107,16 @@ FrameFolderWriter::FrameFolderWriter(std::string folder, std::vector<Triangle> f
     throw_unwritable(folder_, code ? code.value() : EEXIST);
 }
 
+FrameFolderWriter::FrameFolderWriter(std::string folder, MeshFormat format, Make made)
+    : FrameFolderWriter(std::move(folder), {}, format) {
+  made_ = std::move(made);
+}
+
 void FrameFolderWriter::push(const Points& vertices, const std::vector<Triangle>& faces) {
   const std::string name = format("/frame_%06zu.%s", frames_, extension(format_));
   if (!vertices.empty() || !faces.empty()) check_mesh(folder_ + name, vertices, faces);
-  write_plain(temporary_.path() + name, mesh_bytes(format_, vertices, faces), folder_);
+  write_plain(temporary_.path() + name,
+              made_ ? made_(vertices) : mesh_bytes(format_, vertices, faces), folder_);
   ++frames_;
 }
 

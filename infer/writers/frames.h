@@ -1,6 +1,7 @@
 // Numbered folders of meshes or clouds: frame_000000.ply, frame_000001.ply, ...
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,10 @@ class FrameFolderWriter {
   /// from frame to frame.
   FrameFolderWriter(std::string folder, std::vector<Triangle> faces,
                     MeshFormat format = MeshFormat::ply);
+  /// Frames whose bytes `made` makes of their vertices; they must begin with the comment of
+  /// `format` as mesh_bytes() has it.
+  using Make = std::function<std::string(const Points& vertices)>;
+  FrameFolderWriter(std::string folder, MeshFormat format, Make made);
 
   void push(const Points& vertices) { push(vertices, faces_); }
   /// A frame that has other triangles than the rest. One without vertices shows nothing.
@@ -33,6 +38,7 @@ class FrameFolderWriter {
   Temporary temporary_;
   std::vector<Triangle> faces_;
   MeshFormat format_;
+  Make made_;
   size_t frames_ = 0;
 };
 

@@ -64,9 +64,15 @@ std::string mesh_bytes(MeshFormat format, const Points& vertices,
   return format == MeshFormat::ply ? ply_bytes(vertices, faces) : obj_bytes(vertices, faces);
 }
 
+std::string comment_of(MeshFormat format) {
+  return format == MeshFormat::ply ? kPlyComment : kObjComment;
+}
+
 bool is_ours(MeshFormat format, const std::string& head) {
-  return head.starts_with(format == MeshFormat::ply ? std::string(kPlyStart) + kPlyComment
-                                                    : std::string(kObjComment));
+  if (format == MeshFormat::obj) return head.starts_with(kObjComment);
+  // "ply", the format's line, the comment
+  const size_t line = head.starts_with("ply\nformat ") ? head.find('\n', 4) : head.npos;
+  return line != head.npos && std::string_view(head).substr(line + 1).starts_with(kPlyComment);
 }
 
 void check_mesh(const std::string& where, const Points& vertices,

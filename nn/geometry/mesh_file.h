@@ -22,6 +22,8 @@ std::string obj_bytes(const Points& vertices, const std::vector<Triangle>& faces
                       bool comment = true);
 std::string mesh_bytes(MeshFormat format, const Points& vertices,
                        const std::vector<Triangle>& faces);
+/// The line that says so.
+std::string comment_of(MeshFormat format);
 /// Whether a file of that format which begins with `head`, 80 bytes or more of it, has the comment
 /// of the functions above.
 bool is_ours(MeshFormat format, const std::string& head);
