@@ -104,7 +104,7 @@ std::unique_ptr<FrameSource> open_ours(h5::File file, const FrameOptions& option
 
 // ---- files of others ---------------------------------------------------------------------------
 
-constexpr int kGroupDepth = 3;        // of groups that are looked into
+constexpr int kGroupDepth = 6;        // of groups that are looked into
 constexpr size_t kMostSets = 200000;  // a frame each
 
 /// A sequence is one data set, or one a frame.
@@ -112,6 +112,13 @@ struct Sequence {
   std::vector<std::string> sets;
   std::vector<std::string> remarks;
 };
+
+/// InputError for a data set whose rows may be x y z of one point after the other.
+void refuse_flat(const h5::Dataset& set) {
+  if (const auto mend = flat_mend(set.shape()))
+    throw InputError(set.where(),
+                     cat("is a flat data set ", shape_text(set.shape()), ", and no cloud"), *mend);
+}
 
 /// All that has the shape of a cloud or a sequence.
 class Finder {
@@ -167,12 +174,7 @@ class Finder {
           "save these data sets as an NPZ (numpy.savez) with the same names; restage "
           "data import FILE.npz --body-model MODEL --out M.h5 reads it");
     for (const std::string& name : all_)
-      if (const auto mend = flat_mend(file_.dataset(name).shape());
-          mend && !is_no_cloud(name, true))
-        throw InputError(
-            cat(file_.path(), ":", name),
-            cat("is a flat data set ", shape_text(file_.dataset(name).shape()), ", and no cloud"),
-            *mend);
+      if (!is_no_cloud(name, true)) refuse_flat(file_.dataset(name));
     throw InputError(
         file_.path() + ":/points", "is missing, and so is /vertices",
         "give a file of scans (/points, /frame_offset) or surfaces (/vertices [F, V, 3])");
@@ -352,7 +354,9 @@ class ForeignFrames : public FrameSource {
       set.read_rows(first, count, out);
       return out;
     };
-    return axes_by_numbers(*cloud_axes(set.shape(), vertices_), set.shape(), read, vertices_);
+    const CloudAxes axes = *cloud_axes(set.shape(), vertices_);
+    if (rows_are_frames(axes, set.shape(), read)) refuse_flat(set);
+    return axes_by_numbers(axes, set.shape(), read, vertices_);
   }
   int64_t frames_of(const h5::Dataset& set) const {
     return cloud_axes(set.shape(), vertices_)->sequence ? axes_of(set).frames : 1;

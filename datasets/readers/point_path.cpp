@@ -88,8 +88,8 @@ size_t crossings(const Points& at, int axis, float low, float high) {
 bool are_rings(const Points& at) {
   constexpr float kLeastLength = 0.4f;  // along the axis, times the width of the rings
   constexpr float kMostReturns = 1.5f;  // travel along the axis, times the length
-  constexpr double kLeastTravel = 2.2;  // in all, times the length
-  constexpr size_t kLeastCrossings = 4;
+  constexpr double kLeastTravel = 2.0;  // in all, times the length
+  constexpr size_t kLeastCrossings = 3;
   Eigen::AlignedBox3f box;
   double travel = 0;
   for (size_t i = 0; i < at.size(); ++i) {

@@ -254,7 +254,8 @@ class TableParser {
     if (cells_.size() != columns_)
       throw InputError(where(), cat("has ", cells_.size(), " columns, the lines before ", columns_),
                        separator_ == ',' ? kPartOtherwise : kSaveAgain);
-    if (separator_ == ',' && named_columns_ == 0 && are_halves(cells_))
+    const bool twice = named_columns_ > 0 && cells_.size() == 2 * named_columns_;
+    if (separator_ == ',' && (twice || are_halves(cells_)))
       throw InputError(where(), "has commas both between its columns and before decimals",
                        "part the columns by semicolons or tabs, or write decimals with a point");
     Point point;

@@ -18,7 +18,7 @@ double metres_per_unit(const std::string& text) {
       {"in", 0.0254}, {"inch", 0.0254},      {"inches", 0.0254},
       {"ft", 0.3048}, {"foot", 0.3048},      {"feet", 0.3048}};
   std::string name = lower_case(text);
-  if (units.count(name) == 0 && name.ends_with('s')) name.pop_back();  // millimetres
+  if (units.count(name) == 0 && name.size() > 3 && name.ends_with('s')) name.pop_back();
   if (const auto unit = units.find(name); unit != units.end()) return unit->second;
   const size_t plus = text.size() > 1 && text[0] == '+' ? 1 : 0;
   double value = 0;
