@@ -296,6 +296,7 @@ class ForeignFrames : public FrameSource {
       check_sequence(file_.path(), *options.sequence, sequences());
       found_ = {found_[static_cast<size_t>(*options.sequence)]};
     }
+    for (const Sequence& sequence : found_) axes_of(file_.dataset(sequence.sets[0]));  // or refuses
     for (const Sequence& sequence : found_)
       for (const std::string& set : sequence.sets) frames_ += frames_of(file_.dataset(set));
     if (frames_ == 0)

@@ -116,8 +116,8 @@ bool are_rings(const Points& at) {
 
 bool is_path(const Points& points, double longest_step) {
   const Points at = moving(points);
-  return at.size() >= kFewestPlaces && moves_smoothly(at, longest_step) &&
-         share_near_in_order(at) > kLeastShare && !are_rings(at);
+  return at.size() >= kFewestPlaces && moves_smoothly(at, longest_step) && !are_rings(at) &&
+         share_near_in_order(at) > kLeastShare;
 }
 
 }  // namespace restage

@@ -9,6 +9,7 @@
 #include "datasets/readers/errors.h"
 #include "datasets/readers/npy.h"
 #include "datasets/readers/text.h"
+#include "datasets/readers/word_lines.h"
 
 namespace restage {
 namespace {
@@ -36,26 +37,28 @@ bool is_in(const std::string_view (&list)[N], const std::string& word) {
 /// What an array is, by its name.
 enum class Role { other, lengths, offsets, of_points };
 
+/// `word`: of a name without marks, in small letters; `frames`: frames were named before it.
+Role role_of_word(const std::string& word, bool frames) {
+  if (is_in(kLengths, word)) return Role::lengths;
+  if (is_in(kOffsets, word)) return Role::offsets;
+  if (frames && is_in(kOfPoints, word)) return Role::of_points;
+  for (const std::string_view before :
+       {"frames", "frame", "batch", "points", "point", "pts", "clouds", "cloud", "scans", "scan",
+        "rows", "row", "vertices", "vertex", "verts"}) {
+    if (!word.starts_with(before)) continue;
+    const bool here = before.starts_with("frame") || before == "batch";
+    const Role role = role_of_word(word.substr(before.size()), frames || here);
+    if (role != Role::other) return role;
+  }
+  return Role::other;
+}
+
 Role role_of(const std::string& name) {
   std::string word;
   for (const char c : name)
     if (std::isalnum(static_cast<unsigned char>(c)) != 0)
       word += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  bool frames = false;
-  for (bool again = true; again;) {
-    again = false;
-    if (is_in(kLengths, word)) return Role::lengths;
-    for (const std::string_view before :
-         {"frames", "frame", "batch", "points", "point", "pts", "clouds", "cloud", "scans", "scan",
-          "rows", "row", "vertices", "vertex", "verts"})
-      if (!again && word.starts_with(before)) {
-        frames = frames || before.starts_with("frame") || before == "batch";
-        word.erase(0, before.size());
-        again = true;
-      }
-  }
-  if (is_in(kOffsets, word)) return Role::offsets;
-  return frames && is_in(kOfPoints, word) ? Role::of_points : Role::other;
+  return role_of_word(word, false);
 }
 
 /// Whole numbers; empty if one is none.
@@ -150,7 +153,7 @@ std::optional<RaggedFrames> ragged_frames(const std::string& file, int64_t point
       Numbers offset = fitted(role, numbers, points);
       if (offset.size() > 2) return RaggedFrames{array.name, std::move(offset)};
       if (!offset.empty()) continue;
-      const bool place = role == Role::offsets && length == 3;  // in the world
+      const bool place = lower_case(array.name) == "offset" && length == 3;  // in the world
       if (named && array.whole_type && !place) unfit = &array;
     }
   if (unfit == nullptr) return std::nullopt;

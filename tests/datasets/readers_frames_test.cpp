@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/frame_folder.h"
 #include "tests/support/files.h"
 

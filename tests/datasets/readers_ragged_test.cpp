@@ -5,6 +5,7 @@
 
 #include "datasets/hdf5/file.h"
 #include "datasets/readers/array_frames.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/frame_folder.h"
 #include "datasets/readers/point_path.h"
 #include "tests/datasets/npz_support.h"
@@ -170,19 +171,20 @@ TEST_F(ReadersRagged, FlatRowsAreToldOrUnderstood) {
 
 TEST_F(ReadersRagged, RecordsOfPointsAreRead) {
   const std::string fields = "{'descr': [('x', '<f4'), ('y', '<f4'), ('z', '<f4')";
-  const std::string behind = "], 'fortran_order': False, 'shape': (2,), }";
+  const std::string behind = "], 'fortran_order': False, 'shape': (5,), }";
   std::string plain, coloured, mixed;
-  for (const float at : {1.0f, 4.0f}) {
+  Points all;
+  for (const float at : {1.0f, 4.0f, 7.0f, 10.0f, 13.0f}) {
+    all.emplace_back(at, at + 1, at + 2);
     const std::string xyz = raw(at) + raw(at + 1) + raw(at + 2);
     plain += xyz;
     coloured += xyz + raw(uint32_t{0xff00ff});
     mixed += xyz + "c";
   }
-  const Points two = {{1, 2, 3}, {4, 5, 6}};
   dir.write("a.npy", npy_of(fields + behind, plain));
-  EXPECT_EQ(open_frames(dir / "a.npy")->next()->points, two);
+  EXPECT_EQ(open_frames(dir / "a.npy")->next()->points, all);
   dir.write("a.npy", npy_of(fields + ", ('rgb', '<u4')" + behind, coloured));
-  EXPECT_EQ(open_frames(dir / "a.npy")->next()->points, two);
+  EXPECT_EQ(open_frames(dir / "a.npy")->next()->points, all);
   dir.write("a.npy", npy_of(fields + ", ('c', '|u1')" + behind, mixed));
   const std::string said = error_of([&] { open_frames(dir / "a.npy"); });
   EXPECT_HAS(said, "records of the fields x, y, z, c");
