@@ -338,10 +338,10 @@ class TableParser {
       throw InputError(
           path_, cat("holds ", out_.vertices.size(), " points, its first line says ", *announced_),
           "give the whole file");
-    check_no_frames();
     if (counted_ && out_.vertices.size() > 3)
       throw InputError(path_, "its first column only counts the points",
                        "leave that column out, or name the columns in a first line (n x y z)");
+    check_no_frames();
   }
 
   text::Lines lines_;
