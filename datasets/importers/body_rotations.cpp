@@ -19,7 +19,12 @@ struct RotationArray {
   NpyArray array;
   Form form = Form::axis_angle;
   int64_t frames = 0, joints = 0;
+  bool numbers_first = false;  ///< [F, 3, J]
   int64_t width() const { return form == Form::matrix ? 9 : 3; }
+  /// Number i of a joint.
+  int64_t at(int64_t frame, int64_t joint, int64_t i) const {
+    return frame * joints * width() + (numbers_first ? i * joints + joint : joint * width() + i);
+  }
 };
 
 [[noreturn]] void misshapen(const NpyArray& array, const std::string& fix) {
@@ -29,6 +34,35 @@ struct RotationArray {
 /// Numbers of joints of a body model.
 bool is_known(int64_t joints) {
   return joints == 22 || joints == 24 || joints == 52 || joints == 55;
+}
+
+/// [F, 3, J] has the three numbers before the joints: certain where J is a body's number of joints.
+bool are_numbers_first(const NpyArray& array, bool whole) {
+  const std::vector<int64_t>& shape = array.shape();
+  if (shape.size() != 3 || shape[1] != 3 || shape[2] == 3) return false;
+  if (!is_known(shape[2] + (whole ? 0 : 1)) && shape[2] != 1)
+    misshapen(array, "rotations are axis-angle numbers, [F, 3 J] or [F, J, 3]");
+  return true;
+}
+
+/// [F, 9 J] of a number of joints that [F, 3 J] is not.
+bool are_flat_matrices(const std::vector<int64_t>& shape, bool whole) {
+  const int64_t root = whole ? 0 : 1;
+  return shape.size() == 2 && shape[1] % 9 == 0 && !is_known(shape[1] / 3 + root) &&
+         (is_known(shape[1] / 9 + root) || (!whole && shape[1] == 9));
+}
+
+/// InputError for [F, 4 J] and [F, 6 J].
+void refuse_other_forms(const NpyArray& array, int64_t last, bool whole) {
+  const int64_t root = whole ? 0 : 1;
+  const std::vector<int64_t>& shape = array.shape();
+  for (const int64_t width : {4, 6}) {
+    const bool flat = shape.size() == 2 && last % width == 0 && is_known(last / width + root) &&
+                      !(last % 3 == 0 && is_known(last / 3 + root));
+    if (flat || (shape.size() > 2 && last == width))
+      misshapen(array, cat("turn its ", width == 4 ? "quaternions" : "6D rotations",
+                           " into axis-angle numbers [F, 3 J] first"));
+  }
 }
 
 /// `whole`: of all joints of a body.
@@ -44,11 +78,12 @@ RotationArray open_rotations(const Npz& file, const std::string& name, bool whol
     throw InputError(out.array.where(), cat("has ", out.frames, " frames"),
                      cat("give 1 to ", kMaxFrames));
   const int64_t last = shape.back();
-  if (shape.size() > 2 && (last == 4 || last == 6))
-    misshapen(out.array, cat("turn its ", last == 4 ? "quaternions" : "6D rotations",
-                             " into axis-angle numbers [F, 3 J] first"));
+  refuse_other_forms(out.array, last, whole);
+  out.numbers_first = !one_frame && are_numbers_first(out.array, whole);
   const int64_t row = out.array.size() / out.frames;
-  out.form = squares || (shape.size() > 2 && last == 9) ? Form::matrix : Form::axis_angle;
+  const bool matrices =
+      squares || (shape.size() > 2 && last == 9) || are_flat_matrices(shape, whole);
+  out.form = matrices ? Form::matrix : Form::axis_angle;
   if (row == 0 || row % out.width() != 0)
     misshapen(out.array, "rotations are axis-angle numbers, [F, 3 J] or [F, J, 3]");
   out.joints = row / out.width();
@@ -63,10 +98,9 @@ Quat rotation(const Vec3& axis_angle) {
 
 /// `largest` grows to the angle of axis-angle numbers.
 Quat rotation_at(const RotationArray& from, int64_t frame, int64_t joint, double& largest) {
-  const int64_t at = (frame * from.joints + joint) * from.width();
   double numbers[9];
   for (int64_t i = 0; i < from.width(); ++i) {
-    numbers[i] = from.array[at + i];
+    numbers[i] = from.array[from.at(frame, joint, i)];
     if (!(std::abs(numbers[i]) < 1e5))
       throw InputError(from.array.where(), "holds a number that is not finite or too large",
                        kAsPublished);
@@ -92,8 +126,9 @@ void add_joints(const RotationArray& from, int64_t first, BodyRotations& out) {
           rotation_at(from, f, j, out.largest);
 }
 
-std::string named(const std::string& name, const NpyArray& array) {
-  return name + " " + shape_text(array.shape());
+std::string named(const std::string& name, const RotationArray& from) {
+  return name + " " + shape_text(from.array.shape()) +
+         (from.numbers_first ? ", taken for [frames, axis-angle numbers, joints]" : "");
 }
 
 BodyRotations empty(int64_t frames, int64_t joints, const NpyArray& where,
@@ -118,8 +153,7 @@ BodyRotations read_body_rotations(const Npz& file, const BodyParameters& names) 
   const bool parts = !names.orient.empty() && !names.body.empty();
   if (names.poses == "poses" || !parts) {
     const RotationArray poses = open_rotations(file, names.poses, true);
-    BodyRotations out =
-        empty(poses.frames, poses.joints, poses.array, named(names.poses, poses.array));
+    BodyRotations out = empty(poses.frames, poses.joints, poses.array, named(names.poses, poses));
     add_joints(poses, 0, out);
     return out;
   }
@@ -128,9 +162,8 @@ BodyRotations read_body_rotations(const Npz& file, const BodyParameters& names) 
   if (root.joints != 1) misshapen(root.array, "the root has one rotation a frame");
   if (root.frames != body.frames)
     misshapen(root.array, cat("it needs as many frames as ", names.body, ": ", body.frames));
-  BodyRotations out =
-      empty(body.frames, body.joints + 1, body.array,
-            cat(named(names.orient, root.array), ", ", named(names.body, body.array)));
+  BodyRotations out = empty(body.frames, body.joints + 1, body.array,
+                            cat(named(names.orient, root), ", ", named(names.body, body)));
   add_joints(root, 0, out);
   add_joints(body, 1, out);
   return out;

@@ -4,7 +4,9 @@
 // verts, v_posed, which is CAPE's name of a posed frame, xyz, cloud and the like; case does not
 // matter); without such a name, the only array that has the shape of a cloud, which no array is
 // that is known to be something else (normals, colours, joints, the parameters of a body model). A
-// number `fps` beside it is the sequence's frame rate.
+// number `fps` beside it is the sequence's frame rate. Whole numbers beside it may part one array
+// of points into frames of unequal size (ragged_frames.h). Flat rows [F, 3 V] are frames where
+// faces or a template beside them say how many vertices there are.
 #pragma once
 
 #include <memory>
@@ -24,6 +26,9 @@ bool is_npz_name(const std::string& path);
 struct CloudArray {
   std::string name;  ///< empty for an NPY file
   CloudAxes axes;
+  /// Where the frames of a sequence begin that lie one behind the other in one cloud, and their end
+  /// (ragged_frames.h); empty for others.
+  std::vector<int64_t> offset;
 };
 
 /// The cloud that is named so; nothing if there is none.

@@ -21,32 +21,35 @@ std::string plain(const std::string& name) {
   return out;
 }
 
-std::string find(const Npz& file, std::initializer_list<std::string_view> names) {
+std::string find(const std::vector<std::string>& all,
+                 std::initializer_list<std::string_view> names) {
   for (const std::string_view wanted : names)
-    for (const std::string& name : file.names())
+    for (const std::string& name : all)
       if (plain(name) == wanted) return name;
   return "";
 }
 
 }  // namespace
 
-BodyParameters body_parameters(const Npz& file) {
+BodyParameters body_parameters(const std::vector<std::string>& names) {
   BodyParameters out;
-  out.poses = find(file, {"poses_world", "pose_world", "poses", "pose", "thetas", "theta",
-                          "fullpose", "full_pose", "rotmat", "rotmats", "rotation_matrices"});
-  out.orient = find(file, {"root_orient", "global_orient", "root_orientation", "global_orientation",
-                           "root_pose", "global_rot", "root_rot", "orient"});
-  out.body = find(file, {"pose_body", "body_pose"});
-  out.trans = find(file, {"trans_world", "trans", "transl", "translation", "root_trans",
-                          "root_transl", "root_translation", "global_trans", "global_transl",
-                          "th_trans", "cam_trans", "cam_t"});
-  out.betas = find(file, {"betas", "beta", "shape", "shapes"});
-  for (const std::string& name : file.names()) {
+  out.poses = find(names, {"poses_world", "pose_world", "poses", "pose", "thetas", "theta",
+                           "fullpose", "full_pose", "rotmat", "rotmats", "rotation_matrices"});
+  out.orient = find(names, {"root_orient", "global_orient", "root_orientation",
+                            "global_orientation", "root_pose", "global_rot", "root_rot", "orient"});
+  out.body = find(names, {"pose_body", "body_pose"});
+  out.trans = find(names, {"trans_world", "trans", "transl", "translation", "root_trans",
+                           "root_transl", "root_translation", "global_trans", "global_transl",
+                           "th_trans", "cam_trans", "cam_t"});
+  out.betas = find(names, {"betas", "beta", "shape", "shapes"});
+  for (const std::string& name : names) {
     if (lower_case(name) == "smpl_scaling") out.scaling = name;
     if (lower_case(name) == "scale" || lower_case(name) == "smpl_scale") out.scale = name;
   }
   return out;
 }
+
+BodyParameters body_parameters(const Npz& file) { return body_parameters(file.names()); }
 
 void refuse_incomplete(const Npz& file, const BodyParameters& names) {
   if (names.moves() || (names.orient.empty() && names.body.empty())) return;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "datasets/readers/npz.h"
 
@@ -22,6 +23,8 @@ struct BodyParameters {
 };
 
 BodyParameters body_parameters(const Npz& file);
+/// The same of a list of names, such as those of the data sets of an HDF5 file.
+BodyParameters body_parameters(const std::vector<std::string>& names);
 
 /// InputError for a file that has rotations of the root and not of the other joints, or the other
 /// way round, naming what is missing.

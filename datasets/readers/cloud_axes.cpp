@@ -71,7 +71,15 @@ CloudAxes sequence(int64_t frames, int64_t frame_step, CloudAxes each) {
   return each;
 }
 
-std::optional<CloudAxes> of_two(int64_t a, int64_t b) {
+std::optional<CloudAxes> of_two(int64_t a, int64_t b, int64_t vertices) {
+  if (vertices > 1 && b > 3 && (b == 3 * vertices || a == 3 * vertices)) {
+    const bool rows = b == 3 * vertices;
+    const std::string remark =
+        cat("its ", rows ? "rows" : "columns", " are taken for frames, x y z of ", vertices,
+            " points one after the other");
+    return rows ? sequence(a, b, cloud(vertices, 3, 1, remark))
+                : sequence(b, 1, cloud(vertices, 3 * b, b, remark));
+  }
   if (b == 3 || (are_columns(b) && a > b)) return cloud(a, b, 1, first_three(b), b);
   if ((a == 3 || are_columns(a)) && b > kMostColumns)
     return cloud(b, 1, b, channels_first(a, cat(b, " points")), a);
@@ -196,11 +204,39 @@ CloudAxes axes_by_numbers(CloudAxes axes, const std::vector<int64_t>& shape, con
   return axes;
 }
 
+std::optional<std::string> flat_mend(const std::vector<int64_t>& shape) {
+  if (shape.empty() || shape.size() > 2 || shape.back() % 3 != 0 || shape.back() <= kMostColumns)
+    return std::nullopt;
+  const int64_t points = shape.back() / 3;
+  const std::string form =
+      shape.size() == 1 ? cat("(", points, ", 3)") : cat("(", shape[0], ", ", points, ", 3)");
+  return cat("if ", shape.size() == 1 ? "it" : "each row", " holds x y z of ", points,
+             " points one after the other, save array.reshape", form);
+}
+
+bool rows_are_frames(const CloudAxes& axes, const std::vector<int64_t>& shape,
+                     const ReadSteps& read) {
+  constexpr double kNear = 0.4;  // times the distance from the mean number
+  const bool channels = shape.size() == 2 && !axes.sequence && axes.axis_step > 1;
+  if (!channels || axes.columns == 3 || shape[1] % 3 != 0) return false;
+  const auto n = static_cast<size_t>(shape[1]);
+  const std::vector<double> rows = read(0, 3);
+  double mean = 0, spread = 0;
+  for (size_t i = 0; i < n; ++i) mean += rows[i] / static_cast<double>(n);
+  for (size_t i = 0; i < n; ++i) spread += std::abs(rows[i] - mean);
+  for (const size_t row : {0, 1}) {
+    double change = 0;
+    for (size_t i = 0; i < n; ++i) change += std::abs(rows[(row + 1) * n + i] - rows[row * n + i]);
+    if (!(change < kNear * spread)) return false;
+  }
+  return true;
+}
+
 std::optional<CloudAxes> cloud_axes(const std::vector<int64_t>& shape, int64_t vertices) {
   std::vector<int64_t> axes = shape;
   for (auto at = axes.begin(); axes.size() > 3 && at != axes.end();)
     at = *at == 1 ? axes.erase(at) : at + 1;
-  if (axes.size() == 2) return of_two(axes[0], axes[1]);
+  if (axes.size() == 2) return of_two(axes[0], axes[1], vertices);
   if (axes.size() == 3) return of_three(axes[0], axes[1], axes[2], vertices);
   if (axes.size() == 4 && axes[1] == 3 && is_picture(axes[2], axes[3])) {
     const int64_t pixels = axes[2] * axes[3];

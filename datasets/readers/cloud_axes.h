@@ -29,8 +29,13 @@ struct CloudAxes {
 /// which the first three count; axes in another order ([3, N], [6, N], [V, 3, F], [F, 3, V], [3, V,
 /// F], [F, 6, V]): of two lengths the larger is that of the points, unless `vertices` says how many
 /// there are; pictures of a depth camera, [H, W, 3] or [3, H, W] of a known size, [F, H, W, 3] or
-/// [F, 3, H, W]. Nothing for other shapes.
+/// [F, 3, H, W]; and, where `vertices` says it, flat rows [F, 3 V] and [3 V, F]. Nothing for other
+/// shapes.
 std::optional<CloudAxes> cloud_axes(const std::vector<int64_t>& shape, int64_t vertices = 0);
+
+/// What to do with an array whose rows may be x y z of one point after the other ([F, 3 V], [3 N]):
+/// how to reshape it. Nothing for other shapes.
+std::optional<std::string> flat_mend(const std::vector<int64_t>& shape);
 
 /// The numbers of steps [first, first + count) of an array's slowest axis, in C order.
 using ReadSteps = std::function<std::vector<double>(int64_t first, int64_t count)>;
@@ -42,5 +47,10 @@ using ReadSteps = std::function<std::vector<double>(int64_t first, int64_t count
 /// `axes` are those of cloud_axes(), `vertices` as there.
 CloudAxes axes_by_numbers(CloudAxes axes, const std::vector<int64_t>& shape, const ReadSteps& read,
                           int64_t vertices = 0);
+
+/// Whether an array [4 to 12, 3 V] that cloud_axes() takes for rows of x, y, z and more holds a
+/// frame in each row: the first rows are nearly the same.
+bool rows_are_frames(const CloudAxes& axes, const std::vector<int64_t>& shape,
+                     const ReadSteps& read);
 
 }  // namespace restage

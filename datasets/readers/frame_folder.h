@@ -64,7 +64,8 @@ FrameList frame_list(const std::string& folder);
 /// The frames of a folder of numbered folders that hold one frame each: of several files that which
 /// all of them hold, with a remark. A folder without a frame is a frame without points: its path,
 /// with a slash at the end, stands for the file. None for other folders. InputError as
-/// frame_list(), and if all of them hold several files that may be the frame.
+/// frame_list(); if all of them hold several files that may be the frame, or clouds of several
+/// cameras; if one holds another file in its place.
 FrameList folder_a_frame(const std::string& folder);
 /// frame_list(), if these are a series; else folder_a_frame(), if there is one; else frame_list().
 FrameList frames_in(const std::string& folder);

@@ -7,6 +7,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "datasets/readers/array_frames.h"
+#include "datasets/readers/camera_names.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/folders.h"
 #include "datasets/readers/foreign_kinds.h"
@@ -55,6 +56,21 @@ std::vector<std::string> candidates_in(const std::string& folder) {
   return out;
 }
 
+/// f1.ply and f1.PLY.
+void refuse_capitals(const std::string& folder, const std::vector<std::string>& files) {
+  std::map<std::string, std::string> seen;
+  for (const std::string& file : files) {
+    const std::string name = fs::path(file).filename().string();
+    const auto [at, is_new] = seen.try_emplace(lower_case(name), name);
+    if (!is_new)
+      throw InputError(
+          folder,
+          cat("holds one frame twice: ", text::quote(std::min(name, at->second)), " and ",
+              text::quote(std::max(name, at->second)), " differ in capital letters alone"),
+          "keep one of the two, or give the frames other numbers");
+  }
+}
+
 /// Of files of one name with several endings only one, with a remark.
 std::vector<std::string> one_of_each(const std::vector<std::string>& files,
                                      std::vector<std::string>& remarks) {
@@ -85,6 +101,7 @@ std::vector<std::string> one_of_each(const std::vector<std::string>& files,
 /// The frames among these files: meshes and clouds before arrays, which beside them are mostly
 /// something else, unless only the arrays are a series.
 FrameList frames_among(const std::string& folder, const std::vector<std::string>& files) {
+  refuse_capitals(folder, files);
   std::vector<std::string> remarks, meshes, arrays;
   for (const std::string& file : one_of_each(files, remarks))
     (is_array_name(file) ? arrays : meshes).push_back(file);
@@ -218,7 +235,8 @@ const Stem* frame_stem(const std::map<std::string, Stem>& stems, size_t filled,
                            "frame, such as ",
                            text::quote(a), " and ", text::quote(b)),
                        cat("leave one of them in each folder, or copy the right ones into one "
-                           "folder as 0000.ply, 0001.ply ..."));
+                           "folder as 0000.ply, 0001.ply ...; if they are of several cameras, ",
+                           kFuseCameras));
     }
   return nullptr;
 }
@@ -245,6 +263,60 @@ bool is_sequence(const std::string& file) {
   } catch (const InputError&) {
     return false;  // said when its turn comes
   }
+}
+
+/// Whether a file below a frame's folder is of one of several cameras: cam0.ply, cam0/cloud.ply,
+/// but not cam0/0001.ply, which is a frame.
+bool is_of_camera(const std::string& folder, const std::string& file) {
+  const fs::path below = fs::path(file).lexically_relative(folder).replace_extension();
+  const std::string name = below.filename().string();
+  if (is_camera_name(name)) return true;
+  return name.find_first_of("0123456789") == std::string::npos &&
+         std::any_of(below.begin(), below.end(),
+                     [](const fs::path& part) { return is_camera_name(part.string()); });
+}
+
+/// InputError if each of these folders, as far as it holds anything, holds clouds of several
+/// cameras.
+void refuse_cameras_a_frame(const std::vector<std::string>& folders,
+                            const std::vector<FilesByName>& files, const std::string& folder) {
+  constexpr size_t kMostCameras = 16;
+  std::vector<std::string> example;
+  for (size_t i = 0; i < folders.size(); ++i) {
+    std::vector<std::string> here;
+    for (const auto& [name, same] : files[i]) here.insert(here.end(), same.begin(), same.end());
+    if (here.empty()) continue;
+    std::sort(here.begin(), here.end(), natural_less);
+    const bool cameras = here.size() > 1 && here.size() <= kMostCameras &&
+                         std::all_of(here.begin(), here.end(), [&](const std::string& file) {
+                           return is_of_camera(folders[i], file);
+                         });
+    if (!cameras) return;
+    if (example.empty()) example = here;
+  }
+  if (example.empty()) return;
+  const auto shown = [&](const std::string& file) {
+    return text::quote(fs::path(file).lexically_relative(folder).string());
+  };
+  throw InputError(
+      folder,
+      cat("holds a folder a frame, and in each the clouds of several cameras, such as ",
+          shown(example[0]), " and ", shown(example[1])),
+      kFuseCameras);
+}
+
+/// InputError for a folder that has something else in the place of its frame, which none of the
+/// folders with a frame has beside it.
+void refuse_other_name(const std::string& folder, const FilesByName& files,
+                       const std::set<std::string>& companions, const Stem& chosen) {
+  for (const auto& [name, same] : files)
+    if (companions.count(without_ending(name)) == 0)
+      throw InputError(
+          folder,
+          cat("holds ", text::quote(fs::path(same[0]).lexically_relative(folder).string()),
+              " where the other folders have ",
+              text::quote(best_name(chosen, [](const std::string&) { return true; }))),
+          "give it the name that the others have, or take it out if this frame is missing");
 }
 
 /// The frame's file; empty if the folder has none.
@@ -284,7 +356,10 @@ FrameList frame_list(const std::string& folder) {
 
 FrameList folder_a_frame(const std::string& folder) {
   const std::vector<std::string> folders = folders_in(folder);
-  if (folders.size() < 2 || are_sequences(files_of(folders))) return {};
+  if (folders.size() < 2) return {};
+  const std::vector<FilesByName> all = files_of(folders);
+  refuse_cameras_a_frame(folders, all, folder);
+  if (are_sequences(all)) return {};
   FrameList out = order_folders(folders, folder);
   const std::vector<FilesByName> files = files_of(out.files);
   const auto filled = static_cast<size_t>(std::count_if(
@@ -294,8 +369,13 @@ FrameList folder_a_frame(const std::string& folder) {
   const Stem* stem = frame_stem(stems, filled, folder);
   if (stem == nullptr || 2 * stem->folders <= out.files.size()) return {};
   size_t lacking = 0;
+  std::set<std::string> companions;  // of the frame's file
+  for (const FilesByName& names : files)
+    if (!frame_in(names, *stem).empty())
+      for (const auto& [name, same] : names) companions.insert(without_ending(name));
   for (size_t i = 0; i < out.files.size(); ++i) {
     const std::string file = frame_in(files[i], *stem);
+    if (file.empty()) refuse_other_name(out.files[i], files[i], companions, *stem);
     lacking += file.empty();
     if (lacking == i && is_sequence(file)) return {};  // the first that is there
     out.files[i] = file.empty() ? out.files[i] + "/" : file;
@@ -328,9 +408,10 @@ void throw_no_frames(const std::string& path) {
   for (const std::string& folder : folders_in(path))
     if (!candidates_in(folder).empty()) with_frames.push_back(folder);
   if (!with_frames.empty())
-    throw InputError(path,
-                     cat("holds no frames itself, but ", with_frames.size(), " of its folders do"),
-                     cat("give one sequence, such as ", with_frames[0]));
+    throw InputError(
+        path, cat("holds no frames itself, but ", with_frames.size(), " of its folders do"),
+        cat("give one sequence, such as ", with_frames[0],
+            " (if each folder is one moment, seen by several cameras: ", kFuseCameras, ")"));
   for (const std::string& file : files_below(path)) refuse_foreign_kind(file);
   throw InputError(path,
                    "holds no PLY, OBJ or glTF files, no clouds (PCD, XYZ) and no arrays (NPY, NPZ)",

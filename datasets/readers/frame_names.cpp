@@ -8,7 +8,10 @@
 #include <set>
 
 #include "autograd/base/format.h"
+#include "datasets/readers/camera_names.h"
 #include "datasets/readers/errors.h"
+#include "datasets/readers/name_copies.h"
+#include "datasets/readers/name_digits.h"
 #include "datasets/readers/name_numbers.h"
 #include "datasets/readers/npz.h"
 #include "datasets/readers/text.h"
@@ -27,6 +30,13 @@ struct Name {
 };
 using Names = std::vector<Name>;
 
+/// What is in order: files of a folder, its folders, or arrays and groups in a file.
+enum class Kind { files, folders, members };
+
+const char* own_place(Kind kind) {
+  return kind == Kind::members ? "a file of its own" : "a folder of its own";
+}
+
 /// The numbers of each name, in columns: those that change.
 std::vector<std::vector<Value>> changing_numbers(const Names& series) {
   std::vector<std::vector<Value>> out;
@@ -42,7 +52,7 @@ std::vector<std::vector<Value>> changing_numbers(const Names& series) {
 /// Names such as cam0_0001 and cam1_0001 are frames of several recordings at once: each value of
 /// the first number comes with about the same values of the second. (Minutes and seconds do so
 /// too.)
-void refuse_parallel_series(const Names& series, const std::string& folder) {
+void refuse_parallel_series(const Names& series, const std::string& folder, Kind kind) {
   const auto columns = changing_numbers(series);
   if (columns.size() != 2) return;
   std::map<Value, std::set<Value>> second;
@@ -58,7 +68,23 @@ void refuse_parallel_series(const Names& series, const std::string& folder) {
   throw InputError(folder,
                    cat("holds several series of frames, such as ", text::quote(series[0].shown),
                        " and ", text::quote(series.back().shown)),
-                   "put each series into a folder of its own");
+                   cat("put each series into ", own_place(kind)));
+}
+
+/// cam0 to cam3 show one moment.
+void refuse_cameras(const Names& series, const std::string& folder) {
+  constexpr size_t kMostCameras = 16, kMostDigits = 2;
+  if (series.size() > kMostCameras || changing_numbers(series).size() != 1) return;
+  const Pieces &first = series[0].pieces, &last = series.back().pieces;
+  for (size_t k = 1; k < first.size(); ++k) {
+    if (!first[k].number || first[k].value() == last[k].value()) continue;
+    if (first[k].text.size() > kMostDigits || !ends_in_camera(first[k - 1].text)) return;
+    throw InputError(
+        folder,
+        cat("holds clouds of several cameras, by the names ", text::quote(series[0].shown), " to ",
+            text::quote(series.back().shown), ", and not frames"),
+        cat(kFuseCameras, " (if they are frames, name them frame_0, frame_1 ...)"));
+  }
 }
 
 /// Numbers in even steps from the column that changes; empty where there are none.
@@ -113,66 +139,16 @@ void tell_others(const std::map<std::string, Names>& groups, const Names* series
                             " frames such as ", text::quote((*series)[0].shown)));
 }
 
-/// The names of one frame's copies, as downloads number them: "scan", "scan (1)", "scan (2)"; and
-/// "scan 2" where the first one counts as the first copy. `first` has no number.
-struct Copies {
-  std::string first;
-  std::string as_number;  ///< the name that `first` would have
-};
-
-/// The number that ends a name behind a blank or in brackets: "scan (2)" is "scan", " (#)", 2.
-struct Numbering {
-  std::string base, open, close;
-  std::string digits;
-};
-
-std::optional<Numbering> numbering_of(const std::string& stem) {
-  Numbering out;
-  size_t end = stem.size();
-  if (stem.ends_with(')')) out.close = ")", --end;
-  size_t at = end;
-  while (at > 0 && is_digit(stem[at - 1])) --at;
-  out.digits = stem.substr(at, end - at);
-  for (const std::string_view open : {" (", "(", " "})
-    if ((open == " ") == out.close.empty() && stem.substr(0, at).ends_with(open)) {
-      out.open = open;
-      out.base = stem.substr(0, at - open.size());
-      return out.digits.empty() || out.digits.size() > 9 ? std::nullopt : std::optional(out);
-    }
-  return std::nullopt;
-}
-
-/// The copies among these names whose first one has no number; of several the last by name.
-std::optional<Copies> copies_among(const std::vector<std::string>& stems) {
-  const std::set<std::string> all(stems.begin(), stems.end());
-  std::map<std::string, size_t> like;  // how many names are like this one but for numbers
-  for (const std::string& stem : all) ++like[pattern_of(pieces_of(stem, Meaning{}))];
-  std::map<std::string, std::pair<int, std::string>> least;  // number and name, by the base
-  std::optional<Copies> out;
-  for (const std::string& stem : all) {
-    const std::optional<Numbering> n = numbering_of(stem);
-    if (!n || all.count(n->base) == 0 || like[pattern_of(pieces_of(n->base, Meaning{}))] > 1)
-      continue;
-    const int number = std::stoi(n->digits);
-    const auto [at, is_new] = least.try_emplace(n->base + n->open, number, stem);
-    if (!is_new && at->second.first < number) continue;
-    at->second = {number, stem};
-    const int first = n->close.empty() ? 2 : 1;  // what the second copy is called
-    if (number >= first && (number == first || first == 1))
-      out = Copies{n->base, cat(n->base, n->open, first - 1, n->close)};
-  }
-  return out;
-}
-
 /// How the names of a folder are read.
 struct NameReading {
   Meaning meaning;
   std::optional<numbered::Hexadecimal> hexadecimal;
-  std::optional<Copies> copies;
+  std::optional<numbered::Unnumbered> unnumbered;
   Pieces operator()(const std::string& stem) const {
     if (hexadecimal)
       if (auto out = hexadecimal->pieces_of(stem)) return *out;
-    return pieces_of(copies && stem == copies->first ? copies->as_number : stem, meaning);
+    return pieces_of(unnumbered && stem == unnumbered->first ? unnumbered->as_number : stem,
+                     meaning);
   }
 };
 
@@ -183,7 +159,7 @@ NameReading reading_of(const std::vector<std::string>& stems, const std::string&
   for (const std::string& stem : stems)
     if (!out.hexadecimal || !out.hexadecimal->pieces_of(stem)) others.push_back(stem);
   out.meaning = numbered::meaning_of(others, folder);
-  out.copies = copies_among(others);
+  out.unnumbered = numbered::unnumbered_first(others);
   return out;
 }
 
@@ -194,22 +170,30 @@ void tell_reading(const NameReading& reading, const Names& series, FrameList& ou
     out.remarks.push_back(cat("the names of the frames count in hexadecimal, from ",
                               text::quote(series[0].shown), " to ",
                               text::quote(series.back().shown)));
-  if (reading.copies && series[0].stem == reading.copies->first)
+  if (reading.unnumbered && series[0].stem == reading.unnumbered->first)
     out.remarks.push_back(cat(text::quote(series[0].shown), " is taken for the frame before ",
                               text::quote(series[1].shown)));
 }
 
 /// f0 and f00, or 0000.ply and 0.obj: nobody can tell which is the frame.
-void refuse_twice(const Names& series, const std::string& folder) {
+void refuse_twice(const Names& series, const std::string& folder, Kind kind) {
   for (size_t i = 1; i < series.size(); ++i)
     if (compare(series[i - 1].pieces, series[i].pieces) == 0)
       throw InputError(folder,
                        cat("holds one frame twice: ", text::quote(series[i - 1].shown), " and ",
                            text::quote(series[i].shown), " have the same number"),
-                       "keep one of the two, or put each set of files into a folder of its own");
+                       cat("keep one of the two, or put each set of files into ", own_place(kind)));
 }
 
-FrameList in_order_of_names(const std::vector<std::string>& files) {
+FrameList in_order_of_names(const std::vector<std::string>& files, const std::string& folder) {
+  if (files.size() > 1 && std::all_of(files.begin(), files.end(), [](const std::string& file) {
+        return is_camera_name(std::filesystem::path(file).stem().string());
+      }))
+    throw InputError(
+        folder,
+        cat("holds clouds of several cameras, by the names ", text::quote(shown_of(files[0])),
+            " and ", text::quote(shown_of(files[1])), ", and not frames"),
+        kFuseCameras);
   FrameList out;
   out.files = files;
   std::sort(out.files.begin(), out.files.end(), natural_less);
@@ -220,11 +204,55 @@ FrameList in_order_of_names(const std::vector<std::string>& files) {
   return out;
 }
 
-FrameList order(const std::vector<std::string>& files, const std::string& folder, bool folders) {
+std::string stem_of(const std::string& file, Kind kind) {
+  return numbered::plain_numbers(kind == Kind::files ? std::filesystem::path(file).stem().string()
+                                                     : shown_of(file));
+}
+
+/// Without files that are copies of others by their names, with a remark. InputError if hardly
+/// anything else is there: then they may be meant as frames.
+std::vector<std::string> without_copies(const std::vector<std::string>& files,
+                                        const std::string& folder, Kind kind,
+                                        std::vector<std::string>& remarks) {
+  std::map<std::string, std::string> by_stem;
+  for (const std::string& file : files) by_stem[stem_of(file, kind)] = file;
+  std::vector<std::string> out, copies;
+  std::string original;
+  for (const std::string& file : files) {
+    const std::optional<std::string> copied = numbered::copied_name(stem_of(file, kind));
+    const auto at = copied ? by_stem.find(*copied) : by_stem.end();
+    (at == by_stem.end() ? out : copies).push_back(file);
+    if (at != by_stem.end()) original = shown_of(at->second);
+  }
+  if (copies.empty()) return out;
+  for (std::string& copy : copies) copy = shown_of(copy);
+  std::sort(copies.begin(), copies.end(), natural_less);
+  if (out.size() < 2)
+    throw InputError(
+        folder,
+        cat("holds ", text::quote(copies[0]), ", by its name a copy of ", text::quote(original)),
+        "remove the copies, or number the files that are frames (0001, 0002 ...)");
+  remarks.push_back(cat("left out ", list_of(copies), ": by their names copies of other frames"));
+  return out;
+}
+
+/// InputError if the names are those of two series.
+void refuse_second_series(const std::map<std::string, Names>& groups, const Names& series,
+                          const std::string& folder, Kind kind) {
+  for (const auto& [pattern, names] : groups)
+    if (&names != &series && names.size() > 1 && 2 * names.size() > series.size())
+      throw InputError(folder,
+                       cat("holds several series of frames, such as ", text::quote(series[0].shown),
+                           " and ", text::quote(names[0].shown)),
+                       cat("put each series into ", own_place(kind)));
+}
+
+FrameList order(const std::vector<std::string>& all, const std::string& folder, Kind kind) {
+  FrameList out;
+  const std::vector<std::string> files = without_copies(all, folder, kind, out.remarks);
   std::vector<std::string> stems;
   stems.reserve(files.size());
-  for (const std::string& file : files)
-    stems.push_back(folders ? shown_of(file) : std::filesystem::path(file).stem().string());
+  for (const std::string& file : files) stems.push_back(stem_of(file, kind));
   const NameReading reading = reading_of(stems, folder);
   std::map<std::string, Names> groups;
   for (size_t i = 0; i < files.size(); ++i) {
@@ -234,20 +262,16 @@ FrameList order(const std::vector<std::string>& files, const std::string& folder
   Names* series = nullptr;
   for (auto& [pattern, names] : groups)
     if (names.size() > 1 && (series == nullptr || names.size() > series->size())) series = &names;
-  if (series == nullptr) return folders ? FrameList{} : in_order_of_names(files);
-  for (const auto& [pattern, names] : groups)
-    if (&names != series && names.size() > 1 && 2 * names.size() > series->size())
-      throw InputError(folder,
-                       cat("holds several series of frames, such as ",
-                           text::quote((*series)[0].shown), " and ", text::quote(names[0].shown)),
-                       "put each series into a folder of its own");
+  if (series == nullptr)
+    return kind == Kind::files ? in_order_of_names(files, folder) : FrameList{};
+  refuse_second_series(groups, *series, folder, kind);
   std::sort(series->begin(), series->end(), [](const Name& a, const Name& b) {
     const int order = compare(a.pieces, b.pieces);
     return order != 0 ? order < 0 : a.path < b.path;
   });
-  refuse_twice(*series, folder);
-  refuse_parallel_series(*series, folder);
-  FrameList out;
+  refuse_twice(*series, folder, kind);
+  refuse_parallel_series(*series, folder, kind);
+  refuse_cameras(*series, folder);
   out.is_series = true;
   for (const Name& name : *series) out.files.push_back(name.path);
   tell_others(groups, series, out);
@@ -267,11 +291,15 @@ std::string take_digits(const std::string& text, size_t& at) {
 }  // namespace
 
 FrameList order_frames(const std::vector<std::string>& files, const std::string& folder) {
-  return order(files, folder, false);
+  return order(files, folder, Kind::files);
 }
 
 FrameList order_folders(const std::vector<std::string>& folders, const std::string& folder) {
-  return order(folders, folder, true);
+  return order(folders, folder, Kind::folders);
+}
+
+FrameList order_members(const std::vector<std::string>& names, const std::string& file) {
+  return order(names, file, Kind::members);
 }
 
 bool natural_less(const std::string& a, const std::string& b) {

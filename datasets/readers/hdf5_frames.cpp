@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "datasets/readers/body_parameters.h"
 #include "datasets/readers/cloud_axes.h"
 #include "datasets/readers/cloud_names.h"
 #include "datasets/readers/errors.h"
@@ -12,6 +13,7 @@
 #include "datasets/readers/non_finite.h"
 #include "datasets/readers/npz.h"
 #include "datasets/readers/precision.h"
+#include "datasets/readers/ragged_frames.h"
 #include "datasets/readers/text.h"
 #include "datasets/schema.h"
 #include "datasets/schema_detail.h"
@@ -102,7 +104,7 @@ std::unique_ptr<FrameSource> open_ours(h5::File file, const FrameOptions& option
 
 // ---- files of others ---------------------------------------------------------------------------
 
-constexpr int kGroupDepth = 3;        // of groups that are looked into
+constexpr int kGroupDepth = 6;        // of groups that are looked into
 constexpr size_t kMostSets = 200000;  // a frame each
 
 /// A sequence is one data set, or one a frame.
@@ -111,10 +113,20 @@ struct Sequence {
   std::vector<std::string> remarks;
 };
 
+/// InputError for a data set whose rows may be x y z of one point after the other.
+void refuse_flat(const h5::Dataset& set) {
+  if (const auto mend = flat_mend(set.shape()))
+    throw InputError(set.where(),
+                     cat("is a flat data set ", shape_text(set.shape()), ", and no cloud"), *mend);
+}
+
 /// All that has the shape of a cloud or a sequence.
 class Finder {
  public:
-  explicit Finder(const h5::File& file) : file_(file) { walk("", 0); }
+  /// `vertices`: how many there are, if the file says it; else 0.
+  explicit Finder(const h5::File& file, int64_t vertices = 0) : file_(file), vertices_(vertices) {
+    walk("", 0);
+  }
 
   bool any() const { return !found_.empty(); }
 
@@ -133,10 +145,7 @@ class Finder {
     out.reserve(sequences.size());
     for (const std::string& name : sequences) out.push_back({{name}, {}});
     if (out.empty() && !clouds.empty()) out.push_back(series(clouds));
-    if (out.empty())
-      throw InputError(
-          file_.path() + ":/points", "is missing, and so is /vertices",
-          "give a file of scans (/points, /frame_offset) or surfaces (/vertices [F, V, 3])");
+    if (out.empty()) throw_no_clouds();
     if (!sequences.empty()) left_out.insert(left_out.end(), clouds.begin(), clouds.end());
     if (!left_out.empty())
       out[0].remarks.push_back(cat("clouds are taken from ", text::quote(out[0].sets[0]),
@@ -152,6 +161,24 @@ class Finder {
     size_t rank;  ///< cloud_rank(); of other names kUnnamed
   };
   static constexpr size_t kUnnamed = 1000;
+
+  /// Says what the file holds instead.
+  [[noreturn]] void throw_no_clouds() const {
+    std::vector<std::string> last;
+    for (const std::string& name : all_) last.push_back(name.substr(name.rfind('/') + 1));
+    const BodyParameters parameters = body_parameters(last);
+    if (parameters.moves() || !parameters.body.empty() || !parameters.orient.empty())
+      throw InputError(
+          file_.path(),
+          cat("holds a motion of a body model (its data sets: ", list_of(all_), "), not clouds"),
+          "save these data sets as an NPZ (numpy.savez) with the same names; restage "
+          "data import FILE.npz --body-model MODEL --out M.h5 reads it");
+    for (const std::string& name : all_)
+      if (!is_no_cloud(name, true)) refuse_flat(file_.dataset(name));
+    throw InputError(
+        file_.path() + ":/points", "is missing, and so is /vertices",
+        "give a file of scans (/points, /frame_offset) or surfaces (/vertices [F, V, 3])");
+  }
 
   void walk(const std::string& group, int depth) {
     for (const std::string& child : file_.children(group.empty() ? "/" : group)) {
@@ -170,7 +197,8 @@ class Finder {
     try {
       const h5::Dataset set = file_.dataset(name);
       if (set.type() == h5::Type::text) return;
-      const auto axes = cloud_axes(set.shape());
+      if (all_.size() < kMostListed) all_.push_back(name);
+      const auto axes = cloud_axes(set.shape(), vertices_);
       if (!axes) return;
       if (is_no_cloud(child, !axes->sequence)) {
         if (set.type() == h5::Type::floating) others_.push_back(name);
@@ -192,10 +220,10 @@ class Finder {
       std::replace(name.begin(), name.end(), '/', ' ');
       names.push_back(name);
     }
-    FrameList list = order_folders(names, file_.path());
+    FrameList list = order_members(names, file_.path());
     if (list.files.empty())
       throw InputError(file_.path(), "holds several arrays of points: " + list_of(clouds),
-                       "keep one, or name frames by numbers");
+                       "keep one, or name the frames' groups or data sets by numbers");
     Sequence out{{}, list.remarks};
     for (std::string& name : list.files) {
       const auto at = std::find(names.begin(), names.end(), name);
@@ -204,20 +232,15 @@ class Finder {
     return out;
   }
 
+  static constexpr size_t kMostListed = 64;
+
   const h5::File& file_;
+  int64_t vertices_;
+  std::vector<std::string> all_;  ///< data sets of numbers, the first of them
   std::vector<Candidate> found_;
   std::vector<std::string> others_;  ///< of the shape of clouds, by their names none
   size_t best_ = kUnnamed;
 };
-
-/// Surfaces, or joints and no clouds beside them.
-bool is_our_prediction(const h5::File& file) {
-  if (file.has("/vertices") && !file.is_group("/vertices")) {
-    const h5::Shape shape = file.dataset("/vertices").shape();
-    if (shape.size() == 3 && shape[2] == 3) return true;
-  }
-  return file.has("/joints") && !Finder(file).any();
-}
 
 /// How many vertices the triangles of a file speak of; 0: it has none.
 int64_t vertices_by_faces(const h5::File& file) {
@@ -231,18 +254,49 @@ int64_t vertices_by_faces(const h5::File& file) {
   return 0;
 }
 
+/// Offsets of the frames of the only cloud of a file, if a data set in its group parts it into
+/// frames; `name` becomes that cloud's.
+std::optional<RaggedFrames> parted_cloud(const h5::File& file, std::string& name) {
+  const std::vector<Sequence> found = Finder(file, vertices_by_faces(file)).find();
+  if (found.size() != 1 || found[0].sets.size() != 1) return std::nullopt;
+  name = found[0].sets[0];
+  const h5::Shape shape = file.dataset(name).shape();
+  if (shape.size() != 2 || shape[1] != 3) return std::nullopt;
+  const std::string group = name.substr(0, name.rfind('/'));
+  std::vector<BesideArray> beside;
+  for (const std::string& child : file.children(group.empty() ? "/" : group)) {
+    const std::string path = group + "/" + child;
+    if (path == name || file.is_group(path)) continue;
+    const h5::Dataset set = file.dataset(path);
+    if (set.type() != h5::Type::integer && set.type() != h5::Type::floating) continue;
+    const auto read = [&file, path] { return file.dataset(path).read<double>(); };
+    beside.push_back({child, set.shape(), set.type() == h5::Type::integer, read});
+  }
+  return ragged_frames(file.path(), shape[0], beside);
+}
+
+/// Surfaces, or joints and no clouds beside them.
+bool is_our_prediction(const h5::File& file) {
+  if (file.has("/vertices") && !file.is_group("/vertices")) {
+    const h5::Shape shape = file.dataset("/vertices").shape();
+    if (shape.size() == 3 && shape[2] == 3) return true;
+  }
+  return file.has("/joints") && !Finder(file).any();
+}
+
 class ForeignFrames : public FrameSource {
  public:
   ForeignFrames(h5::File file, const FrameOptions& options)
       : file_(std::move(file)),
         max_memory_(options.max_memory),
-        found_(Finder(file_).find()),
         vertices_(vertices_by_faces(file_)),
+        found_(Finder(file_, vertices_).find()),
         fps_(read_fps(file_)) {
     if (options.sequence) {
       check_sequence(file_.path(), *options.sequence, sequences());
       found_ = {found_[static_cast<size_t>(*options.sequence)]};
     }
+    for (const Sequence& sequence : found_) axes_of(file_.dataset(sequence.sets[0]));  // or refuses
     for (const Sequence& sequence : found_)
       for (const std::string& set : sequence.sets) frames_ += frames_of(file_.dataset(set));
     if (frames_ == 0)
@@ -301,7 +355,9 @@ class ForeignFrames : public FrameSource {
       set.read_rows(first, count, out);
       return out;
     };
-    return axes_by_numbers(*cloud_axes(set.shape(), vertices_), set.shape(), read, vertices_);
+    const CloudAxes axes = *cloud_axes(set.shape(), vertices_);
+    if (rows_are_frames(axes, set.shape(), read)) refuse_flat(set);
+    return axes_by_numbers(axes, set.shape(), read, vertices_);
   }
   int64_t frames_of(const h5::Dataset& set) const {
     return cloud_axes(set.shape(), vertices_)->sequence ? axes_of(set).frames : 1;
@@ -344,8 +400,8 @@ class ForeignFrames : public FrameSource {
 
   h5::File file_;
   uint64_t max_memory_;
-  std::vector<Sequence> found_;
   int64_t vertices_;
+  std::vector<Sequence> found_;
   double fps_;
   int64_t frames_ = 0, at_ = 0;
   size_t sequence_ = 0, set_ = 0;
@@ -390,8 +446,14 @@ bool states_fps(const std::string& path) {
 std::unique_ptr<FrameSource> open_hdf5_frames(const std::string& path,
                                               const FrameOptions& options) {
   h5::File file = open_schema_file(path);
-  if (!is_our_scans(file) && !is_our_prediction(file))
-    return std::make_unique<ForeignFrames>(std::move(file), options);
+  if (!is_our_scans(file) && !is_our_prediction(file)) {
+    std::string name;
+    std::optional<RaggedFrames> parts = parted_cloud(file, name);
+    if (!parts) return std::make_unique<ForeignFrames>(std::move(file), options);
+    if (options.sequence) check_sequence(path, *options.sequence, 1);
+    h5::Dataset set = file.dataset(name, {-1, 3});
+    return std::make_unique<Hdf5Frames>(std::move(file), std::move(set), std::move(parts->offset));
+  }
   return open_ours(std::move(file), options);
 }
 

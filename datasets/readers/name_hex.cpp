@@ -64,6 +64,35 @@ bool count_on(const std::vector<std::string>& tokens) {
                                      : places <= 2 * values.size();
 }
 
+/// Where "0x" begins a hexadecimal number that ends a word: 0x1f, frame_0X0a, but no 640x480. npos:
+/// nowhere.
+size_t marked_number(const std::string& name, size_t& end) {
+  for (size_t at = 0; at + 2 < name.size(); ++at) {
+    if (name[at] != '0' || (name[at + 1] | 32) != 'x' || (at > 0 && is_digit(name[at - 1])))
+      continue;
+    end = at + 2;
+    while (end < name.size() && (is_hex_digit(name[end], 'a') || is_hex_digit(name[end], 'A')))
+      ++end;
+    const bool word_ends = end == name.size() || !is_word(name[end]);
+    if (end > at + 2 && end - at - 2 <= kMostHexDigits && word_ends) return at + 2;
+  }
+  return std::string::npos;
+}
+
+/// Names whose numbers say by "0x" that they are hexadecimal, if two or more do.
+std::optional<Hexadecimal> marked_names(const std::vector<std::string>& names) {
+  std::map<Template, size_t> count;
+  for (const std::string& name : names) {
+    size_t end = 0;
+    const size_t at = marked_number(name, end);
+    if (at != std::string::npos) ++count[{name.substr(0, at), name.substr(end)}];
+  }
+  const auto most = std::max_element(
+      count.begin(), count.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  if (most == count.end() || most->second < 2) return std::nullopt;
+  return Hexadecimal{most->first.first, most->first.second};
+}
+
 }  // namespace
 
 std::optional<Pieces> Hexadecimal::pieces_of(const std::string& name) const {
@@ -85,6 +114,7 @@ std::optional<Pieces> Hexadecimal::pieces_of(const std::string& name) const {
 }
 
 std::optional<Hexadecimal> hexadecimal_names(const std::vector<std::string>& names) {
+  if (auto marked = marked_names(names)) return marked;
   std::optional<Hexadecimal> out;
   size_t most = 0;
   for (const char first : {'a', 'A'}) {

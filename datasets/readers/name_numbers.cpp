@@ -307,7 +307,7 @@ Pieces pieces_of(const std::string& name, const Meaning& meaning) {
         piece.fraction.insert(0, kNanoseconds - piece.fraction.size(), '0');
     }
     if (!out.empty() && ends_in_sign(out.back().text, out.size() > 1, meaning)) {
-      piece.negative = true;
+      piece.negative = (piece.whole + piece.fraction).find_first_not_of('0') != std::string::npos;
       out.back().text.pop_back();
       if (out.back().text.empty()) out.pop_back();
     }

@@ -51,7 +51,8 @@ struct Hexadecimal {
   std::optional<Pieces> pieces_of(const std::string& name) const;
 };
 
-/// Nothing unless the names count from 9 to a, or from f to 10, in nearly even steps.
+/// Nothing unless two names have numbers behind 0x, or the names count from 9 to a, or from f to
+/// 10, in nearly even steps.
 std::optional<Hexadecimal> hexadecimal_names(const std::vector<std::string>& names);
 
 }  // namespace restage::numbered

@@ -81,13 +81,44 @@ void read_type(const std::string& type, const std::string& where, NpyHeader& out
                      "save it as float32, float64 or whole numbers");
 }
 
+/// Records of points, [('x', '<f4'), ('y', '<f4'), ('z', '<f4'), ...], are columns where x, y and z
+/// come first, in one type, and all fields are as wide. Gives their number; others are refused.
+int64_t read_record(const Json& fields, const std::string& where, NpyHeader& out) {
+  std::string names;
+  bool simple = true;
+  for (const Json& field : fields) {
+    const std::string name = field.at(0).is_array() ? field.at(0).at(1) : field.at(0);
+    names += (names.empty() ? "" : ", ") + name;
+    simple = simple && field.size() == 2 && field.at(1).is_string();
+  }
+  const auto is_axis = [&](size_t i, const char* name, const char* capital) {
+    return fields.at(i).at(0) == name || fields.at(i).at(0) == capital;
+  };
+  const bool points = simple && fields.size() >= 3 && is_axis(0, "x", "X") &&
+                      is_axis(1, "y", "Y") && is_axis(2, "z", "Z") &&
+                      fields[0][1] == fields[1][1] && fields[0][1] == fields[2][1];
+  bool columns = points;
+  if (points) read_type(fields[0][1], where, out);
+  for (size_t i = 3; columns && i < fields.size(); ++i) {
+    const std::string type = fields[i][1];
+    int64_t width = 0;
+    columns = type.size() > 2 && text::parse(std::string_view(type).substr(2), width) &&
+              width == static_cast<int64_t>(out.width);
+  }
+  if (!columns)
+    throw InputError(where, cat("holds records of the fields ", names.substr(0, 200)),
+                     "save the points alone, numpy.stack([a['x'], a['y'], a['z']], -1), with your "
+                     "fields' names");
+  return std::ssize(fields);
+}
+
 NpyHeader parse_header(std::string_view text, const std::string& where) {
   NpyHeader out;
   try {
     const Json json = Json::parse(json_of(text));
-    if (json.at("descr").is_structured())
-      throw InputError(where, "holds records (a structured array)", "save each field by itself");
-    read_type(json.at("descr").get<std::string>(), where, out);
+    const Json& type = json.at("descr");
+    const int64_t fields = type.is_array() ? read_record(type, where, out) : 0;
+    if (fields == 0) read_type(type.get<std::string>(), where, out);
     out.fortran = json.at("fortran_order").get<bool>();
     const Json& shape = json.at("shape");
     if (!shape.is_array() || shape.size() > kMaxAxes || json.size() != 3) unreadable(where);
@@ -95,6 +126,7 @@ NpyHeader parse_header(std::string_view text, const std::string& where) {
       if (!length.is_number_unsigned() || length.get<uint64_t>() > INT64_MAX) unreadable(where);
       out.shape.push_back(length.get<int64_t>());
     }
+    if (fields > 0) out.shape.push_back(fields);
   } catch (const Json::exception&) {
     unreadable(where);
   }

@@ -1,6 +1,7 @@
 // NPY arrays, versions 1.0 to 3.0: whole numbers, floating point (16, 32, 64 bits), truth values
 // and fixed-size text, in both byte orders and both layouts (C, Fortran).
-// InputError for anything else: pickled objects (never read: unpickling runs code), records,
+// Records of points (fields x, y, z and others of the same width) are arrays with one axis more.
+// InputError for anything else: pickled objects (never read: unpickling runs code), other records,
 // complex and extended numbers, a header that contradicts the number of bytes behind it.
 #pragma once
 

@@ -2,7 +2,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <vector>
 
 namespace restage {
 namespace {
@@ -54,11 +56,67 @@ double share_near_in_order(const Points& at) {
   return static_cast<double>(near) / static_cast<double>(looked);
 }
 
+/// The means of at most 24 runs of places, of each axis.
+std::vector<Point> run_means(const Points& at) {
+  constexpr size_t kRuns = 24;
+  const size_t runs = std::min(at.size(), kRuns);
+  std::vector<Point> out(runs, Point::Zero());
+  for (size_t r = 0; r < runs; ++r) {
+    const size_t begin = r * at.size() / runs, end = (r + 1) * at.size() / runs;
+    for (size_t i = begin; i < end; ++i) out[r] += at[i] / static_cast<float>(end - begin);
+  }
+  return out;
+}
+
+/// How often the places go from one side of an axis to the other, through half of their extent.
+size_t crossings(const Points& at, int axis, float low, float high) {
+  const float quarter = 0.25f * (high - low);
+  int side = 0;
+  size_t out = 0;
+  for (const Point& p : at) {
+    const int now = p[axis] < low + quarter ? -1 : p[axis] > high - quarter ? 1 : 0;
+    if (now == 0) continue;
+    out += side != 0 && now != side;
+    side = now;
+  }
+  return out;
+}
+
+/// Whether the points are rings or arcs around a body, one above the other, as a lidar of few beams
+/// sees it: along one axis they go on and on, while they cross the body again and again, and travel
+/// much farther than the body is long. Nobody moves so.
+bool are_rings(const Points& at) {
+  constexpr float kLeastLength = 0.4f;  // along the axis, times the width of the rings
+  constexpr float kMostReturns = 1.5f;  // travel along the axis, times the length
+  constexpr double kLeastTravel = 2.0;  // in all, times the length
+  constexpr size_t kLeastCrossings = 3;
+  Eigen::AlignedBox3f box;
+  double travel = 0;
+  for (size_t i = 0; i < at.size(); ++i) {
+    box.extend(at[i]);
+    if (i > 0) travel += (at[i] - at[i - 1]).cast<double>().norm();
+  }
+  const std::vector<Point> means = run_means(at);
+  for (int axis = 0; axis < 3; ++axis) {
+    int across = (axis + 1) % 3;
+    if (box.sizes()[(axis + 2) % 3] > box.sizes()[across]) across = (axis + 2) % 3;
+    const float length = box.sizes()[axis];
+    float along = 0;
+    for (size_t r = 1; r < means.size(); ++r)
+      along += std::abs(means[r][axis] - means[r - 1][axis]);
+    if (length >= kLeastLength * box.sizes()[across] && along <= kMostReturns * length &&
+        travel >= kLeastTravel * length &&
+        crossings(at, across, box.min()[across], box.max()[across]) >= kLeastCrossings)
+      return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 bool is_path(const Points& points, double longest_step) {
   const Points at = moving(points);
-  return at.size() >= kFewestPlaces && moves_smoothly(at, longest_step) &&
+  return at.size() >= kFewestPlaces && moves_smoothly(at, longest_step) && !are_rings(at) &&
          share_near_in_order(at) > kLeastShare;
 }
 

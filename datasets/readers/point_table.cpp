@@ -1,9 +1,12 @@
 // Tables of points as text: .xyz, .pts, .csv and their like.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 
+#include "autograd/base/format.h"
 #include "datasets/readers/errors.h"
+#include "datasets/readers/frame_columns.h"
 #include "datasets/readers/mesh_parsers.h"
 #include "datasets/readers/text.h"
 #include "datasets/readers/word_lines.h"
@@ -12,6 +15,11 @@ namespace restage {
 namespace {
 
 const char* const kSaveAgain = "save the points again, x y z in each line";
+const char* const kPartOtherwise =
+    "save the points again, x y z in each line (where a comma begins the decimals, part the "
+    "columns "
+    "by semicolons)";
+const char* const kFileEach = "write each frame into a file of its own";
 constexpr size_t kMaxColumns = 4096;
 
 using Cells = std::vector<std::string_view>;
@@ -91,12 +99,28 @@ bool is_value(std::string_view cell) {
   return is_missing(cell) || text::parse(cell, value) || text::has_decimal_comma(cell);
 }
 
-/// "frame", "Frame_ID"; or a time, which frames share, too.
+/// "frame", "Frame #", "frame_id"; or a time, which frames share, too.
 bool counts_frames(std::string_view cell) {
   const std::string name = lower_case(cell);
-  constexpr std::array<std::string_view, 8> kNames = {
-      "frame", "frame_id", "frameid", "frame_number", "frame_idx", "time", "t", "timestamp"};
-  return std::find(kNames.begin(), kNames.end(), name) != kNames.end();
+  return name.starts_with("frame") || name.ends_with("frame") || name.starts_with("time") ||
+         name == "t" || name == "t [s]" || name == "f";
+}
+
+/// Whether each number stands in two cells, as "0,512,1,204,0,031" does where commas both part the
+/// columns and begin the decimals: nobody writes whole numbers as "031" or "-0".
+bool are_halves(const Cells& cells) {
+  if (cells.size() < 6 || cells.size() % 2 != 0) return false;
+  bool certain = false;
+  for (size_t i = 0; i < cells.size(); ++i) {
+    std::string_view digits = cells[i];
+    if (i % 2 == 0 && digits.starts_with('-')) digits.remove_prefix(1);
+    const bool whole = !digits.empty() && std::all_of(digits.begin(), digits.end(),
+                                                      [](char c) { return c >= '0' && c <= '9'; });
+    if (!whole) return false;
+    certain = certain || (i % 2 == 1 && digits.size() > 1 && digits[0] == '0') ||
+              (i % 2 == 0 && cells[i] == "-0");
+  }
+  return certain;
 }
 
 class TableParser {
@@ -229,7 +253,11 @@ class TableParser {
     }
     if (cells_.size() != columns_)
       throw InputError(where(), cat("has ", cells_.size(), " columns, the lines before ", columns_),
-                       kSaveAgain);
+                       separator_ == ',' ? kPartOtherwise : kSaveAgain);
+    const bool twice = named_columns_ > 0 && cells_.size() == 2 * named_columns_;
+    if (separator_ == ',' && (twice || are_halves(cells_)))
+      throw InputError(where(), "has commas both between its columns and before decimals",
+                       "part the columns by semicolons or tabs, or write decimals with a point");
     Point point;
     for (size_t axis = 0; axis < 3; ++axis) {
       const double value = number(cells_[static_cast<size_t>(axis_column_[axis])]);
@@ -239,6 +267,8 @@ class TableParser {
     counted_ = counted_ && named_columns_ == 0 && columns_ > 3 && axis_column_[0] == 0 &&
                follows(number(cells_[0]));
     if (frame_column_ >= 0) check_frame(cells_[static_cast<size_t>(frame_column_)]);
+    if (named_columns_ == 0 && columns_ > 3) frames_.add(cells_);
+    if (repeats_frames_) frames_.add({cells_[*repeats_frames_]});
     out_.vertices.push_back(point);
   }
 
@@ -247,8 +277,7 @@ class TableParser {
     int64_t count = 0;
     if (cells_.size() == 1 && announced_ && std::ssize(out_.vertices) >= *announced_ &&
         text::parse(cells_[0], count))
-      throw InputError(where(), "another frame begins here, and a table is one frame",
-                       "write each frame into a file of its own");
+      throw InputError(where(), "another frame begins here, and a table is one frame", kFileEach);
     if (cells_.size() == 2 && out_.vertices.empty() && is_value(cells_[0]) && is_value(cells_[1]))
       throw InputError(where(), "holds points of a picture: two numbers each",
                        "give points of space, x y z in each line");
@@ -268,7 +297,7 @@ class TableParser {
 
   /// Whether the first column counts on from the line before.
   bool follows(double value) {
-    const bool out = out_.vertices.empty() ? value == 0 || value == 1 : value == last_ + 1;
+    const bool out = out_.vertices.empty() ? value == std::floor(value) : value == last_ + 1;
     last_ = value;
     return out;
   }
@@ -276,11 +305,29 @@ class TableParser {
   void check_frame(std::string_view cell) {
     if (out_.vertices.empty()) frame_ = cell;
     if (cell == frame_) return;
-    if (out_.vertices.size() == 1)
-      frame_column_ = -1;  // it counts points, or is a scanner's time of each
-    else
-      throw InputError(where(), "another frame begins here, and a table is one frame",
-                       "write each frame into a file of its own");
+    if (out_.vertices.size() > 1)
+      throw InputError(where(), "another frame begins here, and a table is one frame", kFileEach);
+    // It counts points, is a scanner's time of each, or goes through all frames of a point.
+    repeats_frames_ = static_cast<size_t>(frame_column_);
+    frame_column_ = -1;
+    frames_.add({frame_});
+  }
+
+  /// InputError if a column tells the frames of the points, where no first line says what it is.
+  void check_no_frames() const {
+    constexpr const char* kOrName =
+        "; if the column is something else, name the columns in a first line (x y z label)";
+    if (const auto found = frames_.find(named_columns_ == 0))
+      throw InputError(path_,
+                       cat("its column ", repeats_frames_.value_or(found->column) + 1, " (",
+                           format("%.10g to %.10g", found->first, found->last),
+                           ") numbers frames, and a table is one frame"),
+                       named_columns_ > 0 ? kFileEach : cat(kFileEach, kOrName));
+    if (named_columns_ == 0 && axis_column_[0] == 0 && frames_.first_is_constant())
+      throw InputError(path_,
+                       "its first column is the same in all rows, as the number of a frame is, and "
+                       "x is not",
+                       "leave that column out, or name the columns in a first line (frame x y z)");
   }
 
   void check_end() {
@@ -294,6 +341,7 @@ class TableParser {
     if (counted_ && out_.vertices.size() > 3)
       throw InputError(path_, "its first column only counts the points",
                        "leave that column out, or name the columns in a first line (n x y z)");
+    check_no_frames();
   }
 
   text::Lines lines_;
@@ -307,6 +355,8 @@ class TableParser {
   std::array<int, 3> axis_column_ = {-1, -1, -1};
   int frame_column_ = -1;
   std::string frame_;
+  FrameColumns frames_;
+  std::optional<size_t> repeats_frames_;    // a column named so whose value changes at once
   std::optional<int64_t> announced_;        // points
   int64_t count_line_ = 0, first_row_ = 0;  // lines: where that stands, and the first point
   bool has_remark_ = false;                 // is_remark()

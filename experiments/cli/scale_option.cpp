@@ -9,23 +9,17 @@
 namespace restage::cli {
 
 double metres_per_unit(const std::string& text) {
-  static const std::map<std::string, double> units = {{"mm", 0.001},
-                                                      {"millimetres", 0.001},
-                                                      {"millimeters", 0.001},
-                                                      {"cm", 0.01},
-                                                      {"centimetres", 0.01},
-                                                      {"centimeters", 0.01},
-                                                      {"dm", 0.1},
-                                                      {"m", 1},
-                                                      {"metres", 1},
-                                                      {"meters", 1},
-                                                      {"km", 1000},
-                                                      {"in", 0.0254},
-                                                      {"inch", 0.0254},
-                                                      {"inches", 0.0254},
-                                                      {"ft", 0.3048},
-                                                      {"feet", 0.3048}};
-  if (const auto unit = units.find(lower_case(text)); unit != units.end()) return unit->second;
+  static const std::map<std::string, double> units = {
+      {"mm", 0.001},  {"millimetre", 0.001}, {"millimeter", 0.001},
+      {"cm", 0.01},   {"centimetre", 0.01},  {"centimeter", 0.01},
+      {"dm", 0.1},    {"decimetre", 0.1},    {"decimeter", 0.1},
+      {"m", 1},       {"metre", 1},          {"meter", 1},
+      {"km", 1000},   {"kilometre", 1000},   {"kilometer", 1000},
+      {"in", 0.0254}, {"inch", 0.0254},      {"inches", 0.0254},
+      {"ft", 0.3048}, {"foot", 0.3048},      {"feet", 0.3048}};
+  std::string name = lower_case(text);
+  if (units.count(name) == 0 && name.size() > 3 && name.ends_with('s')) name.pop_back();
+  if (const auto unit = units.find(name); unit != units.end()) return unit->second;
   const size_t plus = text.size() > 1 && text[0] == '+' ? 1 : 0;
   double value = 0;
   const char* end = text.data() + text.size();

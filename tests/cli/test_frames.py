@@ -95,7 +95,12 @@ class Frames(CliTest):
         for unit in ("mm", "MM", "millimetres"):
             self.done("data", "import", "mm", "--scale", unit, "--out", "b.h5")
             self.assertEqual(self.bytes("a.h5"), self.bytes("b.h5"))
-        self.assertEqual(self.restage("doctor", "mm", "--scale", "mm", "--json").out, self.restage("doctor", "mm", "--scale", "0.001", "--json").out)
+        in_metres = self.restage("doctor", "mm", "--scale", "0.001", "--json").out
+        for unit in ("mm", "millimetre", "Millimeters", "millimetres"):
+            self.assertEqual(self.restage("doctor", "mm", "--scale", unit, "--json").out, in_metres)
+        for unit, metres in (("centimetre", "0.01"), ("meter", "1"), ("inches", "0.0254"), ("foot", "0.3048"), ("feet", "0.3048")):
+            self.assertEqual(self.restage("doctor", "mm", "--scale", unit, "--json").out,
+                             self.restage("doctor", "mm", "--scale", metres, "--json").out)
         for command in (["data", "import", "mm", "--out", "x.h5"], ["doctor", "mm"]):
             self.bad_input(command + ["--scale", "furlong"], "--scale 'furlong'", "mm, cm, m")
             self.bad_input(command + ["--scale", "1,5"], "--scale '1,5'", "metres per unit")

@@ -236,6 +236,18 @@ TEST_F(ImportersAmass, EstimatorsNamesAndShapesGiveTheSameMotion) {
   };
   expect_same(narrow(72), "72 columns");
   expect_same(narrow(66), "66 columns");
+  // The three numbers of a rotation before the joints.
+  const auto numbers_first = [&](int64_t joints) {
+    const Npz flat(dir.write("flat.npz", npz(narrow(3 * joints))));
+    const NpyArray poses = flat.array("poses");
+    std::vector<double> turned;
+    for (int64_t f = 0; f < clip.frames; ++f)
+      for (int64_t i = 0; i < 3; ++i)
+        for (int64_t j = 0; j < joints; ++j) turned.push_back(poses[(f * joints + j) * 3 + i]);
+    return with(clip.arrays(), "poses", npy<double>({clip.frames, 3, joints}, turned));
+  };
+  expect_same(numbers_first(24), "[F, 3, 24]");
+  expect_same(numbers_first(22), "[F, 3, 22]");
   expect_same(seen_by_a_camera(clip, 23, false), "ROMP, HMR");
   expect_same(seen_by_a_camera(clip, 21, false), "21 joints");
   expect_same(seen_by_a_camera(clip, 23, true), "matrices");
@@ -341,6 +353,25 @@ TEST_F(ImportersAmass, RotationMatricesOfAllJointsAndMissingParts) {
         "a.npz", npz({{name, npy<double>({clip.frames, 24, 3, 3}, turns)}, {"trans", place}})));
     ASSERT_TRUE(is_amass_motion(file)) << name;
     EXPECT_EQ(import_amass(file, models, {}, report).frames(), 31u) << name;
+  }
+  {  // all numbers of a frame in one row
+    const Npz file(dir.write("a.npz", npz({{"poses", npy<double>({clip.frames, 216}, turns)},
+                                           {"mocap_framerate", npy<double>({}, {30})},
+                                           {"trans", place}})));
+    EXPECT_EQ(import_amass(file, models, {}, report).frames(), 31u);
+  }
+  for (const auto& [shape, says] : std::vector<std::pair<std::vector<int64_t>, const char*>>{
+           {{31, 144}, "turn its 6D rotations"},
+           {{31, 96}, "turn its quaternions"},
+           {{31, 3, 17}, "rotations are axis-angle numbers"}}) {
+    int64_t size = 1;
+    for (const int64_t n : shape) size *= n;
+    const Npz file(dir.write(
+        "a.npz",
+        npz({{"poses", npy<double>(shape, std::vector<double>(static_cast<size_t>(size), 0))},
+             {"mocap_framerate", npy<double>({}, {30})},
+             {"trans", place}})));
+    EXPECT_HAS(error_of([&] { import_amass(file, models, {}, report); }), says) << says;
   }
   dir.write("b.npz", npz({{"root_orient", place}, {"trans", place}}));
   ImportOptions options;

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "autograd/base/error.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/frame_folder.h"
 #include "tests/support/files.h"
 
@@ -102,6 +103,41 @@ TEST_F(ReadersFrames, AFolderAFrameWithStrays) {
   const auto beside = open_frames(dir / "beside");
   EXPECT_EQ(played(*beside), (std::vector<float>{0, 1, 2, 3}));
   EXPECT_HAS(all_of(beside->remarks()), "left out 'floor.ply': beside the folders");
+}
+
+TEST_F(ReadersFrames, SeveralCamerasOfOneMomentAreNoFrames) {
+  for (const char* folder : {"8/", "9/", "10/"}) {
+    for (const char* camera : {"cam0", "cam1"}) {
+      dir.write(cat("files/", folder, camera, ".ply"), ply_point(1));
+      dir.write(cat("folders/", folder, camera, "/cloud.ply"), ply_point(1));
+    }
+    for (const char* camera : {"left", "right"})
+      dir.write(cat("sides/", folder, camera, ".ply"), ply_point(1));
+    for (const char* name : {"0", "1"})
+      dir.write(cat("numbers/", folder, name, ".ply"), ply_point(1));
+  }
+  for (const char* name : {"files", "folders", "sides"}) {
+    const std::string said = error_of([&] { open_frames(dir / name); });
+    EXPECT_HAS(said, "in each the clouds of several cameras") << name;
+    EXPECT_HAS(said, "fuse the clouds of all cameras");
+  }
+  for (const char* name : {"files/8", "folders/8", "sides/8"})
+    EXPECT_HAS(error_of([&] { open_frames(dir / name); }), "several cameras") << name;
+  EXPECT_HAS(error_of([&] { open_frames(dir / "numbers"); }), "seen by several cameras");
+}
+
+TEST_F(ReadersFrames, AnotherNameInTheFramesPlaceIsSaid) {
+  for (const int f : {0, 1, 2, 3}) {
+    const std::string folder = "000" + std::to_string(f) + "/";
+    dir.write("other/" + folder + (f == 2 ? "body.ply" : "mesh.ply"), ply_point(f));
+  }
+  const std::string said = error_of([&] { open_frames(dir / "other"); });
+  EXPECT_HAS(said, "0002: holds 'body.ply' where the other folders have 'mesh.ply'");
+}
+
+TEST_F(ReadersFrames, NamesThatDifferInCapitalsAloneAreRefused) {
+  for (const char* name : {"f1.ply", "f1.PLY", "f2.ply"}) dir.write(name, ply_point(1));
+  EXPECT_HAS(error_of([&] { open_frames(dir.path()); }), "'f1.PLY' and 'f1.ply' differ in capital");
 }
 
 TEST_F(ReadersFrames, AFrameThatCannotBeReadShowsNothing) {

@@ -194,10 +194,88 @@ TEST(FrameNames, CopiesWhoseFirstHasNoNumber) {
     EXPECT_HAS(joined(list.remarks),
                "'" + names[0] + "' is taken for the frame before '" + names[1]);
   }
+  for (const Names& names : {Names{"scan.ply", "scan_1.ply", "scan_2.ply"},
+                             Names{"scan.ply", "scan-1.ply", "scan-2.ply"},
+                             Names{"mesh.obj", "mesh.001.obj", "mesh.002.obj"},
+                             Names{"scan.ply", "scan_2.ply", "scan_3.ply"},
+                             Names{"scan.ply", "scan 1.ply", "scan 2.ply"},
+                             Names{"scan.ply", "scan1.ply", "scan2.ply", "scan10.ply"}}) {
+    EXPECT_EQ(ordered(names, &list), names) << names[1];
+    EXPECT_HAS(joined(list.remarks),
+               "'" + names[0] + "' is taken for the frame before '" + names[1]);
+  }
+  // Frame 0 is there, or the numbers are a program's.
+  for (const char* second : {"scan_0.ply", "scan_5.ply", "scan_001.ply"})
+    EXPECT_EQ(ordered({"scan.ply", second, "scan_17.ply"}, &list), (Names{second, "scan_17.ply"}));
   // Of a numbered frame it is another download of that frame.
   EXPECT_EQ(ordered({"f_1.ply", "f_2.ply", "f_2 (1).ply", "f_3.ply"}, &list),
             (Names{"f_1.ply", "f_2.ply", "f_3.ply"}));
   EXPECT_HAS(joined(list.remarks), "f_2 (1).ply");
+}
+
+TEST(FrameNames, CopiesOfAFileAreNoFrames) {
+  for (const Names& names : {Names{"scan.ply", "scan - Copy.ply"},
+                             Names{"scan.ply", "scan - Copy.ply", "scan - Copy (2).ply"},
+                             Names{"scan.ply", "scan - Kopie.ply"},
+                             Names{"scan.ply", "scan copy.ply", "scan copy 2.ply"},
+                             Names{"scan.ply", "Copy of scan.ply"}}) {
+    const std::string said = error_of([&] { ordered(names); });
+    EXPECT_HAS(said, "by its name a copy of 'scan.ply'") << names[1];
+    EXPECT_HAS(said, "remove the copies");
+  }
+  FrameList list;
+  EXPECT_EQ(ordered({"f_1.ply", "f_2.ply", "f_1 - Copy.ply", "f_2 - Copy.ply", "f_3.ply"}, &list),
+            (Names{"f_1.ply", "f_2.ply", "f_3.ply"}));
+  EXPECT_HAS(joined(list.remarks), "left out 'f_1 - Copy.ply', 'f_2 - Copy.ply'");
+}
+
+TEST(FrameNames, CamerasAreNoFrames) {
+  for (const Names& names :
+       {Names{"cam0.ply", "cam1.ply"}, Names{"Kinect_1.ply", "Kinect_2.ply", "Kinect_3.ply"},
+        Names{"scan_camera01.pcd", "scan_camera02.pcd"}, Names{"view 1.ply", "view 2.ply"},
+        Names{"left.ply", "right.ply"}, Names{"cam_back.ply", "cam_front.ply"}})
+    EXPECT_HAS(error_of([&] { ordered(names); }), "holds clouds of several cameras") << names[0];
+  for (const Names& names :
+       {Names{"cam0_0001.ply", "cam0_0002.ply"}, Names{"camera_0001.ply", "camera_0002.ply"},
+        Names{"scam1.ply", "scam2.ply"}, Names{"left_1.ply", "left_2.ply"}})
+    EXPECT_EQ(ordered(names), names) << names[0];
+}
+
+TEST(FrameNames, DigitsOfOtherScriptsAndPowersOfTen) {
+  FrameList list;
+  const Names series[] = {
+      {"\xEF\xBC\x99.ply", "\xEF\xBC\x91\xEF\xBC\x90.ply", "11.ply"},  // full-width 9, 10
+      {"\xD9\xA9.ply", "\xD9\xA1\xD9\xA0.ply"},                        // Arabic
+      {"1e-1.ply", "2e-1.ply", "9e-1.ply", "1e+0.ply", "1.1e+0.ply", "1e+1.ply"},
+      {"0.0.ply", "5e-05.ply", "0.0001.ply", "0.00015.ply"},
+      {"t_1.0e-02.ply", "t_2.0e-02.ply", "t_1.1e-01.ply"}};
+  for (const Names& names : series) EXPECT_EQ(ordered(names, &list), names) << names[0];
+  for (const Names& names :
+       {Names{"-0.ply", "0.ply", "1.ply"}, Names{"-0.0.ply", "0.0.ply", "0.5.ply"},
+        Names{"\xEF\xBC\x91.ply", "1.ply", "2.ply"}})
+    EXPECT_HAS(error_of([&] { ordered(names); }), "holds one frame twice") << names[0];
+  const Names words = {"scene1e-2.ply", "scene2e-2.ply"};
+  EXPECT_EQ(ordered(words), words);
+}
+
+TEST(FrameNames, MarkedHexadecimalNumbers) {
+  FrameList list;
+  for (const Names& names : {Names{"0x08.ply", "0x09.ply", "0x10.ply", "0x11.ply"},
+                             Names{"f_0X9.ply", "f_0XA.ply", "f_0X10.ply"},
+                             Names{"scan0xff_a.ply", "scan0x100_a.ply"}}) {
+    EXPECT_EQ(ordered(names, &list), names) << names[0];
+    EXPECT_HAS(joined(list.remarks), "hexadecimal") << names[0];
+  }
+  ordered({"0x08.ply", "0x09.ply", "0x10.ply", "0x11.ply"}, &list);
+  EXPECT_EQ(list.numbers, (std::vector<int64_t>{8, 9, 16, 17}));
+  const Names pictures = {"640x480_9.ply", "640x480_10.ply"};
+  EXPECT_EQ(ordered(pictures, &list), pictures);
+  EXPECT_TRUE(joined(list.remarks).find("hexadecimal") == std::string::npos);
+}
+
+TEST(FrameNames, MembersOfAFileAreNotCalledFolders) {
+  const std::string said = error_of([] { order_members({"a 1", "a 2", "b 1", "b 2"}, "x.h5"); });
+  EXPECT_HAS(said, "put each series into a file of its own");
 }
 
 }  // namespace
