@@ -158,6 +158,20 @@ BonePart with_height(const std::vector<Token>& tokens, size_t at) {
   return part == BonePart::arm ? BonePart::upper_arm : BonePart::thigh;
 }
 
+bool is_of_leg(BonePart part) { return part >= BonePart::thigh && part <= BonePart::toe; }
+
+/// Of a name with a word for fingers and toes: "dedos_pie" is a toe, "dedos_mano" a finger, and
+/// "dedos" may be either.
+void say_digit(BoneWords& words) {
+  if (words.helper) return;  // a toe's control, too, is a helper
+  if (is_of_leg(words.part)) {
+    words.part = BonePart::toe;
+    return;
+  }
+  words.helper = true;
+  words.digit = words.part == BonePart::none;
+}
+
 // ---- decoration --------------------------------------------------------------------------------
 
 bool is_piece(std::string_view piece) { return is_letter(piece[0]) || is_digit(piece[0]); }
@@ -171,7 +185,8 @@ bool has_meaning(std::string_view part) {
   return decompose(letters, bone_dictionaries()[0], true, words) &&
          std::any_of(words.begin(), words.end(), [](const BoneWord& w) {
            using enum BoneWordKind;
-           return w.kind == helper || w.kind == end || w.kind == left || w.kind == right;
+           return w.kind == helper || w.kind == end || w.kind == digit || w.kind == left ||
+                  w.kind == right;
          });
 }
 
@@ -286,7 +301,7 @@ BoneWords bone_words(std::string_view name, size_t language) {
     return token.word.kind == BoneWordKind::left || token.word.kind == BoneWordKind::right;
   });
   int parts = 0, strangers = 0;
-  bool both = false;
+  bool both = false, digit = false;
   for (size_t i = 0; i < tokens.size(); ++i) {
     const Token& token = tokens[i];
     const BoneWordKind kind = token.word.kind;
@@ -297,6 +312,7 @@ BoneWords bone_words(std::string_view name, size_t language) {
     strangers += !token.known;
     out.end |= kind == BoneWordKind::end;
     out.helper |= kind == BoneWordKind::helper || kind == BoneWordKind::end;
+    digit |= kind == BoneWordKind::digit;
     const bool l = kind == BoneWordKind::l_and_part && !sided;
     if (l || kind == BoneWordKind::left || kind == BoneWordKind::right) {
       const auto side = kind == BoneWordKind::right ? BoneWords::right : BoneWords::left;
@@ -309,6 +325,7 @@ BoneWords bone_words(std::string_view name, size_t language) {
     out.number = -1;
   }
   out.helper |= both;
+  if (digit) say_digit(out);
   out.cost = 4 * strangers + 2 * std::max(0, parts - 1) + (out.number > 0);
   return out;
 }
@@ -319,8 +336,9 @@ std::string other_side(std::string_view name) {
   for (const std::string_view piece : pieces_of(name)) {
     const std::string word = lower_case(piece);
     static const std::map<std::string, std::string, std::less<>> kOther = {
-        {"left", "right"}, {"right", "left"}, {"l", "r"},   {"r", "l"},   {"lft", "rgt"},
-        {"rgt", "lft"},    {"lt", "rt"},      {"rt", "lt"}, {"左", "右"}, {"右", "左"}};
+        {"left", "right"}, {"right", "left"}, {"l", "r"},   {"r", "l"},
+        {"lft", "rgt"},    {"rgt", "lft"},    {"lt", "rt"}, {"rt", "lt"},
+        {"lf", "rt"},      {"左", "右"},      {"右", "左"}};
     const auto at = kOther.find(word);
     turned |= at != kOther.end();
     out += at == kOther.end() ? word : at->second;

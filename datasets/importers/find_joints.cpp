@@ -348,6 +348,31 @@ class Finder {
     for (int b = chest; b != under; b = parent(b))
       if (b == chest || !words_[b].helper || words_[b].part == BonePart::spine)
         out.insert(out.begin(), b);
+    return apart(out, under);
+  }
+
+  /// Of bones of the spine in one place in the zero pose the plainest, of equals the highest: such
+  /// bones fold up (Second Life) or only gather others (GTA's spine root, which lies on the
+  /// pelvis). The last, which is the chest, stays.
+  std::vector<int> apart(const std::vector<int>& spine, int under) const {
+    constexpr double kNear = 0.01;             // of the spine's length
+    const auto together = [&](int a, int b) {  // a carries b
+      return between(a, b).norm() < kNear * between(under, spine.back()).norm();
+    };
+    const auto takes_place_of = [&](int b, int other) {
+      if (other == spine.back()) return true;
+      if (b == spine.back()) return false;
+      return words_[other].cost < words_[b].cost ||
+             (words_[other].cost == words_[b].cost && other > b);
+    };
+    std::vector<int> out;
+    for (const int b : spine) {
+      bool stays = b == spine.back() || !together(under, b);
+      for (const int other : spine)
+        if (other != b && together(std::min(b, other), std::max(b, other)))
+          stays = stays && !takes_place_of(b, other);
+      if (stays) out.push_back(b);
+    }
     return out;
   }
 

@@ -11,6 +11,7 @@
 #include "tests/datasets/rig_lists_games.h"
 #include "tests/datasets/rig_lists_more.h"
 #include "tests/datasets/rig_lists_studios.h"
+#include "tests/datasets/rig_lists_words.h"
 #include "tests/support/errors.h"
 
 namespace restage {
@@ -22,7 +23,8 @@ using test::RigList;
 
 std::vector<RigList> rig_lists() {
   std::vector<RigList> out = test::rigs_of_games();
-  for (const auto* more : {&test::rigs_of_studios(), &test::rigs_of_others()})
+  for (const auto* more :
+       {&test::rigs_of_studios(), &test::rigs_of_others(), &test::rigs_of_words()})
     out.insert(out.end(), more->begin(), more->end());
   return out;
 }
@@ -485,16 +487,23 @@ TEST(ImportersRigs, MissingToesArePlacedAhead) {
 }
 
 TEST(ImportersRigs, NamesInOtherEncodingsAreTold) {
-  BuiltRig japanese = rig("mixamo");
+  const auto with_head = [](const std::string& head) {
+    BuiltRig out = rig("mixamo");
+    for (std::string& name : out.skeleton.names)
+      if (name == "Head") name = head;
+    return out;
+  };
+  BuiltRig japanese = with_head("Head");
   japanese.skeleton.names[0] = "\x83\x5A\x83\x93\x83\x5E\x81\x5B";  // "Center" in Shift-JIS
   expect_right(japanese, "the pelvis needs no name");
-  for (std::string& name : japanese.skeleton.names)
-    if (name == "Head") name = "\x93\xAA";
-  EXPECT_HAS(refusal(japanese), "Shift-JIS");
-  EXPECT_HAS(refusal(japanese), "iconv -f SHIFT_JIS");
-  for (std::string& name : japanese.skeleton.names)
-    if (name == "\x93\xAA") name = "T\xEAte";  // Latin-1
-  EXPECT_HAS(refusal(japanese), "not UTF-8");
+  EXPECT_HAS(refusal(with_head("\x93\xAA")), "Shift-JIS");
+  EXPECT_HAS(refusal(with_head("\x93\xAA")), "iconv -f SHIFT_JIS");
+  const std::string french = refusal(with_head("T\xEAte"));  // Latin-1
+  EXPECT_HAS(french, "Latin-1");
+  EXPECT_HAS(french, "iconv -f LATIN1");
+  EXPECT_EQ(french.find("Shift-JIS"), std::string::npos) << french;
+  const std::string chinese = refusal(with_head("\xCD\xB7"));  // GBK: both are named
+  EXPECT_HAS(chinese, "may be Latin-1 (Western European), Shift-JIS (Japanese) or another");
 }
 
 TEST(ImportersRigs, WordsOfNames) {
@@ -530,12 +539,22 @@ TEST(ImportersRigs, WordsOfNames) {
   is("Chip", none, middle);  // no hip
   is("Alarm", none, middle);
   is("LeftRightHand", hand, right, true);  // both sides: neither
+  is("lf_hip", hip, left);
+  is("RtKnee", shin, right);
+  is("lft_upArm", upper_arm, left);
+  is("rgt_wrist", hand, right);
   EXPECT_LT(bone_words("hand_l").cost, bone_words("hand_weapon_l").cost + 1);
   EXPECT_EQ(bone_words("arm_L0_1").last_number, 1);
   EXPECT_EQ(bone_words("main_G", 0).part, none);
   EXPECT_EQ(bone_words("main_G", 2).part, hand);  // French
   EXPECT_EQ(bone_words("Schlüsselbein_L", 1).part, collar);
   EXPECT_EQ(bone_words("ПЛЕЧО", 9).part, shoulder);
+  // Fingers or toes: the name says it, or where the bone hangs.
+  EXPECT_EQ(bone_words("dedos_pie", 3).part, toe);
+  EXPECT_FALSE(bone_words("dedos_pie", 3).helper);
+  EXPECT_TRUE(bone_words("dedos_mano", 3).helper);
+  EXPECT_TRUE(bone_words("dedos", 3).digit);
+  EXPECT_TRUE(bone_words("dedos", 3).helper);
   EXPECT_LT(bone_words("hand_l").cost, bone_words("hand_xyz_l").cost);
   EXPECT_EQ(other_side("LeftUpLeg"), "rightupleg");
   EXPECT_EQ(other_side("thigh.R.001"), "thigh.l.001");
