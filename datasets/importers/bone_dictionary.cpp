@@ -27,8 +27,8 @@ BoneDictionary english_words() {
   part(BonePart::hip, "hip hips");
   part(BonePart::spine,
        "spine chest torso trunk abdomen abs ab waist back thorax rib ribs ribcage lumbar belly "
-       "stomach sternum vertebra upperback lowerback upperbody 上半身");
-  part(BonePart::neck, "neck 首");
+       "stomach sternum vertebra thoracic upperback lowerback upperbody 上半身");
+  part(BonePart::neck, "neck cervical 首");
   part(BonePart::head, "head skull cranium 頭");
   part(BonePart::collar, "clavicle collar collarbone clav scapula 肩");
   part(BonePart::shoulder, "shoulder shldr");
@@ -53,7 +53,7 @@ BoneDictionary english_words() {
   kind(BoneWordKind::digit, "digit digits phalanx phalange phalanges 指");
   kind(BoneWordKind::plain,
        "bone bones joint joints jnt jt bn bind bnd skin def deform drv rig armature skeleton base "
-       "bend stretch main c m x center centre mid");
+       "bend stretch main c m x y z xy yz xz center centre mid");
   kind(BoneWordKind::helper,
        "twist roll ik fk pole ctrl ctl control controller con target goal nub tip top eff "
        "effector site aux corrective helper muscle volume jiggle dyn phys sec adj mch org vis "
@@ -266,7 +266,7 @@ constexpr LanguageWords kLanguageWords[] = {
          "親指 人差指 人差し指 中指 薬指 小指 かかと 踵 目 顎 舌 髪 髪の毛 スカート 捩 "
          "フィンガー サム インデックス ミドル リング ピンキー アイ ジョー ヘア ヒール ツイスト "
          "ロール コントロール コントローラー ターゲット ポール 先端 エンド",
-     .plains = "骨 部 の 関節 ボーン ジョイント ルート センター ベース メイン",
+     .plains = "骨 部 の ・ 関節 ボーン ジョイント ルート センター ベース メイン",
      .digits = "指 ゆび"},
     {.lefts = "왼쪽 왼 왼편 좌 좌측",  // Korean
      .rights = "오른쪽 오른 오른편 오 우 우측",

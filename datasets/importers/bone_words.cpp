@@ -5,6 +5,7 @@
 #include <set>
 
 #include "datasets/importers/bone_dictionary.h"
+#include "datasets/importers/plain_letters.h"
 #include "datasets/readers/word_lines.h"
 
 namespace restage {
@@ -19,36 +20,6 @@ bool is_upper(char c) { return c >= 'A' && c <= 'Z'; }
 bool is_lower(char c) { return c >= 'a' && c <= 'z'; }
 bool is_foreign(char c) { return static_cast<unsigned char>(c) >= 0x80; }
 bool is_letter(char c) { return is_upper(c) || is_lower(c) || is_foreign(c); }
-
-/// "Schlüsselbein" as "Schlusselbein", "tête" as "tete", Russian capitals as small letters: all
-/// that people who leave accents out and people who do not have in common.
-std::string without_accents(std::string_view name) {
-  constexpr std::string_view kLatin =  // of U+00C0 to U+00FF; '~': is none
-      "AAAAAAACEEEEIIIIDNOOOOO~OUUUUYT~aaaaaaaceeeeiiiidnooooo~ouuuuyty";
-  std::string out;
-  for (size_t i = 0; i < name.size(); ++i) {
-    const auto a = static_cast<unsigned char>(name[i]);
-    const auto b = static_cast<unsigned char>(i + 1 < name.size() ? name[i + 1] : 0);
-    std::string letter(1, name[i]);
-    if (const size_t at = b - size_t{0x80}; b >= 0x80 && b < 0xC0) {
-      if (a == 0xC3 && b == 0x9F)
-        letter = "ss";
-      else if (a == 0xC3 && kLatin[at] != '~')
-        letter = kLatin[at];
-      else if (a == 0xD0 && b >= 0x90 && b < 0xA0)  // U+0410 to U+041F
-        letter = {'\xD0', static_cast<char>(b + 0x20)};
-      else if (a == 0xD0 && b >= 0xA0 && b < 0xB0)  // U+0420 to U+042F
-        letter = {'\xD1', static_cast<char>(b - 0x20)};
-      else if (a == 0xCC || (a == 0xCD && b < 0xB0))  // a mark above the letter before
-        letter.clear();
-      else
-        letter += name[i + 1];
-      ++i;
-    }
-    out += letter;
-  }
-  return out;
-}
 
 /// "mixamorig:LeftUpLeg_02" -> mixamorig : Left Up Leg _ 02. Every byte is in one piece.
 std::vector<std::string_view> pieces_of(std::string_view name) {
@@ -296,7 +267,7 @@ std::string shared_letters(const std::vector<std::string>& names) {
 BoneWords bone_words(std::string_view name, size_t language) {
   BoneWords out;
   const std::vector<Token> tokens =
-      tokens_of(without_accents(name.substr(0, kLongestName)), bone_dictionaries()[language]);
+      tokens_of(plain_letters(name.substr(0, kLongestName)), bone_dictionaries()[language]);
   const bool sided = std::any_of(tokens.begin(), tokens.end(), [](const Token& token) {
     return token.word.kind == BoneWordKind::left || token.word.kind == BoneWordKind::right;
   });

@@ -549,6 +549,10 @@ TEST(ImportersRigs, WordsOfNames) {
   EXPECT_EQ(bone_words("main_G", 2).part, hand);  // French
   EXPECT_EQ(bone_words("Schlüsselbein_L", 1).part, collar);
   EXPECT_EQ(bone_words("ПЛЕЧО", 9).part, shoulder);
+  EXPECT_EQ(bone_words("左ﾋｯﾌﾟ", 7).part, hip);  // kana of half width
+  EXPECT_EQ(bone_words("ﾍｯﾄﾞ", 7).part, head);
+  EXPECT_EQ(bone_words("左足ＩＫ").helper, true);
+  EXPECT_EQ(bone_words("Ｌｅｆｔ＿Ａｒｍ").side, left);
   // Fingers or toes: the name says it, or where the bone hangs.
   EXPECT_EQ(bone_words("dedos_pie", 3).part, toe);
   EXPECT_FALSE(bone_words("dedos_pie", 3).helper);
