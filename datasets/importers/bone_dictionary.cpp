@@ -29,7 +29,7 @@ BoneDictionary english_words() {
        "spine chest torso trunk abdomen abs ab waist back thorax rib ribs ribcage lumbar belly "
        "stomach sternum vertebra thoracic upperback lowerback upperbody 上半身");
   part(BonePart::neck, "neck cervical 首");
-  part(BonePart::head, "head skull cranium 頭");
+  part(BonePart::head, "head cranium 頭");
   part(BonePart::collar, "clavicle collar collarbone clav scapula 肩");
   part(BonePart::shoulder, "shoulder shldr");
   part(BonePart::upper_arm, "upperarm uparm uarm humerus bicep biceps 腕");

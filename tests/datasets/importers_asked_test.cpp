@@ -38,14 +38,14 @@ std::array<int, kJoints> crossed(std::array<int, kJoints> bones, size_t left) {
   return bones;
 }
 
-/// The same bones in the same places beside each other, on a root or on nothing. With `places` all
-/// positions stand in the offsets, else only in position channels.
-SourceSkeleton flat(const SourceSkeleton& s, bool root, bool places) {
+/// The same bones in the same places beside each other, on a root. With `places` all positions
+/// stand in the offsets, else only in position channels.
+SourceSkeleton flat(const SourceSkeleton& s, bool places) {
   const std::vector<Vec3> zero = zero_positions(s);
   SourceSkeleton out;
-  if (root) out.add("World", -1, Vec3::Zero());
+  out.add("World", -1, Vec3::Zero());
   for (size_t b = 0; b < s.size(); ++b)
-    out.add(s.names[b], root ? 0 : -1, places ? zero[b] : Vec3(Vec3::Zero()));
+    out.add(s.names[b], 0, places ? zero[b] : Vec3(Vec3::Zero()));
   return out;
 }
 
@@ -95,16 +95,14 @@ TEST(ImportersAsked, JointsOfOtherPartsAreRefused) {
 /// either, what is named is taken.
 TEST(ImportersAsked, BonesBesideEachOtherGoByTheirPlaces) {
   const BuiltRig rig = RigBuilder(test::rigs_of_studios()[0]).built();
-  for (const bool root : {true, false}) {
-    std::array<int, kJoints> bones = rig.bone;
-    for (int& b : bones) b += root;
-    const SourceSkeleton skeleton = flat(rig.skeleton, root, true);
-    expect_taken(skeleton, bones);
-    for (const size_t j : {size_t{4}, size_t{7}, size_t{18}, size_t{20}})
-      EXPECT_HAS(refusal(skeleton, crossed(bones, j)), "left and right are exchanged");
-    EXPECT_HAS(refusal(skeleton, crossed(bones, 4)), "left_knee, 'RightLeg'");
-    expect_taken(flat(rig.skeleton, root, false), crossed(bones, 4));
-  }
+  std::array<int, kJoints> bones = rig.bone;
+  for (int& b : bones) ++b;  // the root
+  const SourceSkeleton skeleton = flat(rig.skeleton, true);
+  expect_taken(skeleton, bones);
+  for (const size_t j : {size_t{4}, size_t{7}, size_t{18}, size_t{20}})
+    EXPECT_HAS(refusal(skeleton, crossed(bones, j)), "left and right are exchanged");
+  EXPECT_HAS(refusal(skeleton, crossed(bones, 4)), "left_knee, 'RightLeg'");
+  expect_taken(flat(rig.skeleton, false), crossed(bones, 4));
 }
 
 }  // namespace

@@ -358,6 +358,31 @@ TEST(ImportersRigs, TheLastOfAnyNumberOfSpineBonesCarriesTheArms) {
   }
 }
 
+/// Spine bones in one place are one joint: Second Life's go up and come back, GTA's spine begins on
+/// the pelvis.
+TEST(ImportersRigs, SpineBonesInOnePlaceAreOneJoint) {
+  const BuiltRig second_life = rig_of("Left", "Right", R"(
+p:mPelvis mSpine1 mSpine2 1:mTorso mSpine3 mSpine4 3:mChest n:mNeck h:mHead
+mPelvis t:mHip@ k:mKnee@ a:mAnkle@ mFoot@ f:mToe@
+mChest c:mCollar@ s:mShoulder@ e:mElbow@ w:mWrist@
+)");
+  BuiltRig folded = second_life;
+  SourceSkeleton& s = folded.skeleton;
+  const Vec3 torso(0, 0.1, 0), chest(0, 0.25, 0);
+  const Vec3 steps[] = {torso, -torso, torso, chest, -chest, chest};
+  for (size_t b = 1; b <= 6; ++b) s.offsets[b] = steps[b - 1];
+  expect_right(folded, "Second Life's folded spine");
+  BuiltRig gta = rig_of("L", "R", R"(
+SKEL_ROOT p:SKEL_Pelvis
+SKEL_ROOT SKEL_Spine_Root 1:SKEL_Spine0 SKEL_Spine1 2:SKEL_Spine2 3:SKEL_Spine3 h:SKEL_Head
+SKEL_Pelvis t:SKEL_@_Thigh k:SKEL_@_Calf a:SKEL_@_Foot f:SKEL_@_Toe0
+SKEL_Spine3 c:SKEL_@_Clavicle s:SKEL_@_UpperArm e:SKEL_@_Forearm w:SKEL_@_Hand
+)");
+  for (size_t b = 0; b < gta.skeleton.size(); ++b)
+    if (gta.skeleton.names[b] == "SKEL_Spine_Root") gta.skeleton.offsets[b].setZero();
+  expect_right(gta, "a spine's root on the pelvis");
+}
+
 /// How far these joints of a pose's turns, put on the middle of its hips, are from its points,
 /// metres.
 double off_its_points(const PosedSkeleton& pose, const Joints& rest,
@@ -502,7 +527,7 @@ TEST(ImportersRigs, NamesInOtherEncodingsAreTold) {
   EXPECT_HAS(french, "Latin-1");
   EXPECT_HAS(french, "iconv -f LATIN1");
   EXPECT_EQ(french.find("Shift-JIS"), std::string::npos) << french;
-  const std::string chinese = refusal(with_head("\xCD\xB7"));  // GBK: both are named
+  const std::string chinese = refusal(with_head("\xD7\xF3\xCA\xD6"));  // GBK: both are named
   EXPECT_HAS(chinese, "may be Latin-1 (Western European), Shift-JIS (Japanese) or another");
 }
 
