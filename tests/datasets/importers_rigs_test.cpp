@@ -379,7 +379,8 @@ SKEL_Pelvis t:SKEL_@_Thigh k:SKEL_@_Calf a:SKEL_@_Foot f:SKEL_@_Toe0
 SKEL_Spine3 c:SKEL_@_Clavicle s:SKEL_@_UpperArm e:SKEL_@_Forearm w:SKEL_@_Hand
 )");
   for (size_t b = 0; b < gta.skeleton.size(); ++b)
-    if (gta.skeleton.names[b] == "SKEL_Spine_Root") gta.skeleton.offsets[b].setZero();
+    if (gta.skeleton.names[b] == "SKEL_Spine_Root")
+      gta.skeleton.offsets[b] = gta.skeleton.offsets[static_cast<size_t>(gta.bone[0])];
   expect_right(gta, "a spine's root on the pelvis");
 }
 
