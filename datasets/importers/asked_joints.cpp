@@ -53,10 +53,13 @@ class Asked {
   }
   [[noreturn]] void refuse(const std::string& what) const { throw InputError(where_, what, mend_); }
 
-  /// No bone hangs on another limb than its own, or on what is below it in its own.
+  /// No bone hangs on another limb than its own, or on what is below it in its own; no limb hangs
+  /// on the head.
   void check_pair(int j, int k) const {
-    if (j == k || !named(j) || !named(k) || limb_index(k) < 0 || !hangs(j, k)) return;
-    const bool in_order = limb_index(j) == limb_index(k) && j > k;  // numbers grow outwards
+    if (j == k || !named(j) || !named(k) || !hangs(j, k)) return;
+    const int limb = limb_index(j), other = limb_index(k);
+    const bool in_order =
+        other < 0 ? k != kHead || limb < 0 : limb == other && j > k;  // numbers grow outwards
     if (!in_order) refuse(cat(bone_for(j), ", hangs on ", bone_for(k)));
   }
 

@@ -50,7 +50,7 @@ BoneDictionary english_words() {
   kind(BoneWordKind::upper, "upper up");
   kind(BoneWordKind::lower, "lower low lo fore");
   kind(BoneWordKind::end, "end");
-  kind(BoneWordKind::digit, "digit digits phalanx phalange phalanges 指");
+  kind(BoneWordKind::digit, "digit digits phalanx phalange phalanges 親指 人指 中指 薬指 小指 指");
   kind(BoneWordKind::plain,
        "bone bones joint joints jnt jt bn bind bnd skin def deform drv rig armature skeleton base "
        "bend stretch main c m x y z xy yz xz center centre mid");
@@ -65,7 +65,7 @@ BoneDictionary english_words() {
        "mouth chin face facial pony ponytail hat helmet bangs "
        "breast bust boob butt buttock glute pec skirt cape cloth tail wing cloak coat scarf "
        "strap pad armor armour pauldron belt bag quiver holster "
-       "捩 捩れ 補助 キャンセル 親指 人指 中指 薬指 小指 ｉｋ 先");
+       "捩 捩れ 補助 キャンセル 先");
   return out;
 }
 
@@ -234,10 +234,10 @@ constexpr LanguageWords kLanguageWords[] = {
      .ankle = "脚踝 腳踝 踝 踝部 足踝 脚腕 腳腕",
      .foot = "脚 腳 足 脚掌 腳掌 脚部 足部",
      .toe = "脚趾 腳趾 脚尖 腳尖 足趾 足尖 趾 趾头 趾頭",
-     .helpers = "拇指 大拇指 食指 中指 无名指 無名指 小指 小拇指 手指 脚跟 腳跟 眼 下巴 舌 牙 "
+     .helpers = "手指 脚跟 腳跟 眼 下巴 舌 牙 "
                 "发 髮 头发 頭髮 裙 尾 扭转 扭轉 末端 控制 控制器 目标 目標",
      .plains = "骨 骨骼 关节 關節 部 根 节 節",
-     .digits = "指 指头 指頭",
+     .digits = "拇指 大拇指 食指 中指 无名指 無名指 小指 小拇指 指 指头 指頭",
      .without = "首 手首 足首 ひじ ひざ つま先"},
     {.lefts = "ひだり レフト",  // Japanese, where 足 is the foot
      .rights = "みぎ ライト",
@@ -263,11 +263,11 @@ constexpr LanguageWords kLanguageWords[] = {
      .foot = "足 あし フット",
      .toe = "つま先 爪先 足先 足指 足の指 足趾 トゥ トゥー トー トウ トゥベース",
      .helpers =
-         "親指 人差指 人差し指 中指 薬指 小指 かかと 踵 目 顎 舌 髪 髪の毛 スカート 捩 "
+         "かかと 踵 目 顎 舌 髪 髪の毛 スカート 捩 "
          "フィンガー サム インデックス ミドル リング ピンキー アイ ジョー ヘア ヒール ツイスト "
          "ロール コントロール コントローラー ターゲット ポール 先端 エンド",
      .plains = "骨 部 の ・ 関節 ボーン ジョイント ルート センター ベース メイン",
-     .digits = "指 ゆび"},
+     .digits = "親指 人差指 人差し指 中指 薬指 小指 指 ゆび"},
     {.lefts = "왼쪽 왼 왼편 좌 좌측",  // Korean
      .rights = "오른쪽 오른 오른편 오 우 우측",
      .uppers = "위 위쪽 윗 윗쪽 상",
@@ -290,9 +290,9 @@ constexpr LanguageWords kLanguageWords[] = {
      .ankle = "발목",
      .foot = "발",
      .toe = "발가락 발끝",
-     .helpers = "엄지 검지 중지 약지 소지 손가락 눈 턱 혀 머리카락 치마 발뒤꿈치",
+     .helpers = "손가락 눈 턱 혀 머리카락 치마 발뒤꿈치",
      .plains = "뼈 관절",
-     .digits = "가락 지골"},
+     .digits = "엄지 검지 중지 약지 소지 지골"},
     {.lefts = "левый левая левое лев л",  // Russian
      .rights = "правый правая правое прав п",
      .uppers = "верх верхний верхняя верхнее",

@@ -82,6 +82,9 @@ TEST(ImportersAsked, JointsOfOtherPartsAreRefused) {
   bones[15] = bone("LeftHandThumb1");
   EXPECT_HAS(refusal(rig.skeleton, bones),
              "the bone for head, 'LeftHandThumb1', hangs on the bone");
+  bones[15] = bone("Spine2");
+  bones[9] = -1;
+  EXPECT_HAS(refusal(rig.skeleton, bones), "hangs on the bone for head, 'Spine2'");
   bones = rig.bone;
   bones[12] = -1;
   bones[4] = bone("Neck");

@@ -584,6 +584,9 @@ TEST(ImportersRigs, WordsOfNames) {
   EXPECT_FALSE(bone_words("dedos_pie", 3).helper);
   EXPECT_TRUE(bone_words("dedos_mano", 3).helper);
   EXPECT_TRUE(bone_words("dedos", 3).digit);
+  EXPECT_EQ(bone_words("엄지발가락_왼", 8).part, toe);
+  EXPECT_TRUE(bone_words("엄지손가락_왼", 8).helper);
+  EXPECT_EQ(bone_words("左足親指", 7).part, toe);
   EXPECT_TRUE(bone_words("dedos", 3).helper);
   EXPECT_LT(bone_words("hand_l").cost, bone_words("hand_xyz_l").cost);
   EXPECT_EQ(other_side("LeftUpLeg"), "rightupleg");
