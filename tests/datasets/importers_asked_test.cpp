@@ -23,7 +23,7 @@ Profile naming(const SourceSkeleton& skeleton, const std::array<int, kJoints>& b
               skeleton.names[static_cast<size_t>(bones[j])] + "'\n";
   return parse_profile(yaml, "mine.yaml");
 }
-std::string refusal(const SourceSkeleton& skeleton, const std::array<int, kJoints>& bones) {
+std::string asked_says(const SourceSkeleton& skeleton, const std::array<int, kJoints>& bones) {
   const Profile profile = naming(skeleton, bones);
   return test::error_of([&] { name_joints(skeleton, "x.bvh", &profile); });
 }
@@ -33,14 +33,14 @@ void expect_taken(const SourceSkeleton& skeleton, const std::array<int, kJoints>
   for (const int j : {1, 2, 4, 5, 7, 8, 15, 16, 17, 18, 19, 20, 21})
     EXPECT_EQ(found.map[j].joint, bones[static_cast<size_t>(j)]) << kJointNames[j];
 }
-std::array<int, kJoints> crossed(std::array<int, kJoints> bones, size_t left) {
+std::array<int, kJoints> crossed_at(std::array<int, kJoints> bones, size_t left) {
   std::swap(bones[left], bones[left + 1]);
   return bones;
 }
 
 /// The same bones in the same places beside each other, on a root. With `places` all positions
 /// stand in the offsets, else only in position channels.
-SourceSkeleton flat(const SourceSkeleton& s, bool places) {
+SourceSkeleton beside_each_other(const SourceSkeleton& s, bool places) {
   const std::vector<Vec3> zero = zero_positions(s);
   SourceSkeleton out;
   out.add("World", -1, Vec3::Zero());
@@ -59,7 +59,7 @@ TEST(ImportersAsked, SidesCrossedWithinALimbAreRefused) {
       expect_taken(rig.skeleton, rig.bone);
       for (const size_t j : kOfLimbs) {
         if (rig.bone[j] < 0) continue;
-        const std::string says = refusal(rig.skeleton, crossed(rig.bone, j));
+        const std::string says = asked_says(rig.skeleton, crossed_at(rig.bone, j));
         EXPECT_HAS(says, ", hangs on the bone for ") << list.name << " " << kJointNames[j];
         EXPECT_HAS(says, "correct the names in the file of --bones");
         ++tried;
@@ -67,7 +67,7 @@ TEST(ImportersAsked, SidesCrossedWithinALimbAreRefused) {
     }
   EXPECT_GT(tried, 200u);
   const BuiltRig mixamo = RigBuilder(test::rigs_of_studios()[0]).built();
-  EXPECT_HAS(refusal(mixamo.skeleton, crossed(mixamo.bone, 4)),
+  EXPECT_HAS(asked_says(mixamo.skeleton, crossed_at(mixamo.bone, 4)),
              "the bone for left_knee, 'RightLeg', hangs on the bone for right_hip, 'RightUpLeg'");
 }
 
@@ -80,18 +80,18 @@ TEST(ImportersAsked, JointsOfOtherPartsAreRefused) {
   };
   std::array<int, kJoints> bones = rig.bone;
   bones[15] = bone("LeftHandThumb1");
-  EXPECT_HAS(refusal(rig.skeleton, bones),
+  EXPECT_HAS(asked_says(rig.skeleton, bones),
              "the bone for head, 'LeftHandThumb1', hangs on the bone");
   bones[15] = bone("Spine2");
   bones[9] = -1;
-  EXPECT_HAS(refusal(rig.skeleton, bones), "hangs on the bone for head, 'Spine2'");
+  EXPECT_HAS(asked_says(rig.skeleton, bones), "hangs on the bone for head, 'Spine2'");
   bones = rig.bone;
   bones[12] = -1;
   bones[4] = bone("Neck");
-  EXPECT_HAS(refusal(rig.skeleton, bones), "left_knee, 'Neck'");
+  EXPECT_HAS(asked_says(rig.skeleton, bones), "left_knee, 'Neck'");
   bones = rig.bone;
   std::swap(bones[4], bones[7]);
-  EXPECT_HAS(refusal(rig.skeleton, bones), "hangs on the bone for left_ankle, 'LeftLeg'");
+  EXPECT_HAS(asked_says(rig.skeleton, bones), "hangs on the bone for left_ankle, 'LeftLeg'");
 }
 
 /// Where nothing hangs on anything, rest positions tell the sides apart; where these are not known
@@ -100,12 +100,12 @@ TEST(ImportersAsked, BonesBesideEachOtherGoByTheirPlaces) {
   const BuiltRig rig = RigBuilder(test::rigs_of_studios()[0]).built();
   std::array<int, kJoints> bones = rig.bone;
   for (int& b : bones) ++b;  // the root
-  const SourceSkeleton skeleton = flat(rig.skeleton, true);
+  const SourceSkeleton skeleton = beside_each_other(rig.skeleton, true);
   expect_taken(skeleton, bones);
   for (const size_t j : {size_t{4}, size_t{7}, size_t{18}, size_t{20}})
-    EXPECT_HAS(refusal(skeleton, crossed(bones, j)), "left and right are exchanged");
-  EXPECT_HAS(refusal(skeleton, crossed(bones, 4)), "left_knee, 'RightLeg'");
-  expect_taken(flat(rig.skeleton, false), crossed(bones, 4));
+    EXPECT_HAS(asked_says(skeleton, crossed_at(bones, j)), "left and right are exchanged");
+  EXPECT_HAS(asked_says(skeleton, crossed_at(bones, 4)), "left_knee, 'RightLeg'");
+  expect_taken(beside_each_other(rig.skeleton, false), crossed_at(bones, 4));
 }
 
 }  // namespace
