@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
+#include <numbers>
+#include <tuple>
 
 #include "autograd/base/format.h"
 #include "datasets/importers/body_rotations.h"
@@ -176,13 +179,57 @@ std::optional<Axis> up_by_spine(const SourceMotion& motion) {
   return axis_near(sum);
 }
 
+/// Heights of the lowest joint along a direction, in order of height; a body that lies or stands
+/// on a floor at 0 all the time has it near 0.
+std::vector<double> lowest_joints(const SourceMotion& motion, const Vec3& up) {
+  const JointMap map = identity_map();
+  std::vector<double> out;
+  for (size_t f = 0; f < motion.local.size(); ++f) {
+    double lowest = std::numeric_limits<double>::infinity();
+    for (const Vec3& joint : source_pose(motion, map, f).joints)
+      lowest = std::min(lowest, up.dot(joint));
+    out.push_back(lowest);
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+/// Whether a body whose own up points along `axis` lies on AMASS's floor, z = 0, rather than stands
+/// with that axis up.
+bool lies_on_floor(const SourceMotion& motion, Axis axis) {
+  constexpr double kBelow = 0, kAbove = 0.3, kSpread = 0.3, kStands = 0.25;  // metres
+  const std::vector<double> z = lowest_joints(motion, Vec3::UnitZ());
+  const std::vector<double> stands = lowest_joints(motion, vector_of(axis));
+  const double middle = z[z.size() / 2];
+  return middle > kBelow && middle < kAbove && z.back() - z.front() < kSpread &&
+         std::abs(stands[stands.size() / 2]) > kStands;
+}
+
+/// The axis that is up in a file laid out as AMASS's, and how it is known. AMASS's is z. Where the
+/// root turns the body's own up (+y in the rest pose) to y or -y in the mean of all frames, the
+/// file is of another maker, unless it shows somebody who lies on the floor (check_upright()
+/// remarks on that).
+std::pair<Axis, std::string> up_by_root(const SourceMotion& motion) {
+  constexpr double kMost = 45;  // degrees
+  Vec3 sum = Vec3::Zero();
+  for (const std::vector<Quat>& local : motion.local) sum += local[0] * Vec3::UnitY();
+  const Vec3 mean = sum / static_cast<double>(motion.local.size());
+  for (const Axis axis : {Axis::y, Axis::minus_y}) {
+    const double off = angle_between(mean, vector_of(axis)) * 180 / std::numbers::pi;
+    // A body that turns over has a short mean, which points nowhere.
+    if (mean.norm() > std::numbers::sqrt2 / 2 && off < kMost && !lies_on_floor(motion, axis))
+      return {axis, format("%s, where the root turns the body's up (%.0f degrees off), turned to y",
+                           to_string(axis).c_str(), off)};
+  }
+  return {Axis::z, "z (AMASS), turned to y"};
+}
+
 /// Turns the world so that y is up, and says how it is known.
 void turn_upright(SourceMotion& motion, const Npz& file, Axis given, ImportReport& report) {
   Axis up = given;
   std::string how = to_string(given) + " (--up)";
   if (given == Axis::automatic && is_amass_layout(file)) {
-    up = Axis::z;
-    how = "z (AMASS), turned to y";
+    std::tie(up, how) = up_by_root(motion);
   } else if (given == Axis::automatic) {
     const std::optional<Axis> found = up_by_spine(motion);
     if (!found)

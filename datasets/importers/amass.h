@@ -52,7 +52,8 @@ bool is_amass_motion(const Npz& file);
 bool is_amass_shape(const Npz& file);
 
 /// One clip at 30 fps, and what was done to it. Of the options the rate, the names and the up axis
-/// count (automatic: z in AMASS's files, else where the head is on average). A file of an estimator
+/// count (automatic: in AMASS's layout z, or y or -y where the root turns a standing body's up
+/// there; in others where the head is on average). A file of an estimator
 /// that says no rate is taken for 30 fps, with a remark. InputError: another layout, no
 /// translation, no rate, not finite, no model that fits.
 Motion import_amass(const Npz& file, BodyModels& models, const MotionOptions& options,

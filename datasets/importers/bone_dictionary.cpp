@@ -23,13 +23,13 @@ BoneDictionary english_words() {
   const auto kind = [&](BoneWordKind is, std::string_view text) {
     add_words(out, {is, BonePart::none}, text);
   };
-  part(BonePart::pelvis, "pelvis pelvic lowerbody 下半身");
+  part(BonePart::pelvis, "pelvis pelvic sacrum lowerbody 下半身");
   part(BonePart::hip, "hip hips");
   part(BonePart::spine,
        "spine chest torso trunk abdomen abs ab waist back thorax rib ribs ribcage lumbar belly "
-       "stomach sternum vertebra upperback lowerback upperbody 上半身");
-  part(BonePart::neck, "neck 首");
-  part(BonePart::head, "head 頭");
+       "stomach sternum vertebra thoracic upperback lowerback upperbody 上半身");
+  part(BonePart::neck, "neck cervical 首");
+  part(BonePart::head, "head cranium 頭");
   part(BonePart::collar, "clavicle collar collarbone clav scapula 肩");
   part(BonePart::shoulder, "shoulder shldr");
   part(BonePart::upper_arm, "upperarm uparm uarm humerus bicep biceps 腕");
@@ -40,31 +40,32 @@ BoneDictionary english_words() {
   part(BonePart::thigh, "thigh upleg uleg femur 足");
   part(BonePart::leg, "leg");
   part(BonePart::shin, "shin calf knee shank tibia crus ひざ 膝");
-  part(BonePart::ankle, "ankle 足首");
-  part(BonePart::foot, "foot");
+  part(BonePart::ankle, "ankle talus 足首");
+  part(BonePart::foot, "foot calcaneus calcn");
   part(BonePart::toe, "toe toes toebase ball つま先");
   out["larm"] = {BoneWordKind::l_and_part, BonePart::arm};
   out["lleg"] = {BoneWordKind::l_and_part, BonePart::leg};
-  kind(BoneWordKind::left, "left l lft lt 左");
-  kind(BoneWordKind::right, "right r rgt rt 右");
+  kind(BoneWordKind::left, "left l lft lf lt lhs 左");
+  kind(BoneWordKind::right, "right r rgt rt rght rhs 右");
   kind(BoneWordKind::upper, "upper up");
   kind(BoneWordKind::lower, "lower low lo fore");
   kind(BoneWordKind::end, "end");
+  kind(BoneWordKind::digit, "digit digits phalanx phalange phalanges 親指 人指 中指 薬指 小指 指");
   kind(BoneWordKind::plain,
        "bone bones joint joints jnt jt bn bind bnd skin def deform drv rig armature skeleton base "
-       "bend stretch main c m x center centre mid");
+       "bend stretch main c m x y z xy yz xz center centre mid");
   kind(BoneWordKind::helper,
        "twist roll ik fk pole ctrl ctl control controller con target goal nub tip top eff "
        "effector site aux corrective helper muscle volume jiggle dyn phys sec adj mch org vis "
        "tweak gizmo locator socket attach prop weapon sword gun shield slot camera pivot reverse "
        "heel hook parent space switch dummy grp group offset zero null auto sdk part "
        "thumb index middle ring pinky pinkie little finger fingers metacarpal metacarpals carpal "
-       "metatarsal metatarsals phalanx knuckle bigtoe indextoe middletoe ringtoe littletoe "
+       "metatarsal metatarsals knuckle bigtoe indextoe middletoe ringtoe littletoe "
        "eye eyes eyelid brow eyebrow jaw tongue teeth tooth lip lips cheek nose ear hair beard "
        "mouth chin face facial pony ponytail hat helmet bangs "
        "breast bust boob butt buttock glute pec skirt cape cloth tail wing cloak coat scarf "
        "strap pad armor armour pauldron belt bag quiver holster "
-       "捩 捩れ 補助 キャンセル 親指 人指 中指 薬指 小指 ｉｋ 先 指");
+       "捩 捩れ 補助 キャンセル 先");
   return out;
 }
 
@@ -75,6 +76,7 @@ struct LanguageWords {
   std::string_view upper_arm, arm, forearm, hand, palm;
   std::string_view thigh, leg, shin, ankle, foot, toe;
   std::string_view helpers, plains;
+  std::string_view digits = {};   ///< fingers and toes
   std::string_view without = {};  ///< words of other languages that mean nothing in this one
 };
 
@@ -127,9 +129,10 @@ constexpr LanguageWords kLanguageWords[] = {
      .ankle = "cheville",
      .foot = "pied",
      .toe = "orteil orteils pointe",
-     .helpers = "pouce doigt doigts index majeur annulaire auriculaire talon oeil yeux machoire "
+     .helpers = "pouce index majeur annulaire auriculaire talon oeil yeux machoire "
                 "cheveux torsion fin cible langue oreille",
-     .plains = "os articulation racine de du la le"},
+     .plains = "os articulation racine de du la le",
+     .digits = "doigt doigts phalange phalanges"},
     {.lefts = "izquierda izquierdo izq izda izdo i",  // Spanish
      .rights = "derecha derecho der dcha dcho d",
      .uppers = "superior alto",
@@ -151,10 +154,11 @@ constexpr LanguageWords kLanguageWords[] = {
      .shin = "pantorrilla espinilla tibia rodilla canilla",
      .ankle = "tobillo",
      .foot = "pie",
-     .toe = "punta dedosdelpie dedospie puntera",
-     .helpers = "pulgar dedo dedos indice medio anular menique talon ojo ojos mandibula pelo fin "
+     .toe = "punta puntera",
+     .helpers = "pulgar indice medio anular menique talon ojo ojos mandibula pelo fin "
                 "torsion objetivo lengua oreja",
-     .plains = "hueso articulacion raiz de del la el"},
+     .plains = "hueso articulacion raiz de del la el",
+     .digits = "dedo dedos falange falanges"},
     {.lefts = "sinistra sinistro sin sx",  // Italian
      .rights = "destra destro dx",
      .uppers = "superiore",
@@ -177,9 +181,10 @@ constexpr LanguageWords kLanguageWords[] = {
      .ankle = "caviglia",
      .foot = "piede",
      .toe = "punta alluce",
-     .helpers = "pollice dito dita indice medio anulare mignolo tallone occhio occhi mascella "
+     .helpers = "pollice indice medio anulare mignolo tallone occhio occhi mascella "
                 "capelli torsione fine lingua orecchio",
-     .plains = "osso giunto radice"},
+     .plains = "osso giunto radice",
+     .digits = "dito dita falange falangi"},
     {.lefts = "esquerda esquerdo esq e",  // Portuguese
      .rights = "direita direito dir d",
      .uppers = "superior",
@@ -201,10 +206,11 @@ constexpr LanguageWords kLanguageWords[] = {
      .shin = "canela panturrilha tibia joelho",
      .ankle = "tornozelo",
      .foot = "pe",
-     .toe = "ponta biqueira dedosdope",
-     .helpers = "polegar dedo dedos indicador medio anelar minimo calcanhar olho olhos mandibula "
+     .toe = "ponta biqueira artelho artelhos",
+     .helpers = "polegar indicador medio anelar minimo calcanhar olho olhos mandibula "
                 "cabelo fim torcao lingua orelha",
-     .plains = "osso articulacao raiz de do da"},
+     .plains = "osso articulacao raiz de do da",
+     .digits = "dedo dedos falange falanges"},
     {.lefts = "左侧 左側",  // Chinese; 手首 and 足首 are Japanese
      .rights = "右侧 右側",
      .uppers = "上",
@@ -227,39 +233,45 @@ constexpr LanguageWords kLanguageWords[] = {
      .shin = "小腿 膝 膝盖 膝蓋 胫骨 脛骨 小腿骨",
      .ankle = "脚踝 腳踝 踝 踝部 足踝 脚腕 腳腕",
      .foot = "脚 腳 足 脚掌 腳掌 脚部 足部",
-     .toe = "脚趾 腳趾 脚尖 腳尖 足趾 足尖 趾",
-     .helpers = "拇指 大拇指 食指 中指 无名指 無名指 小指 小拇指 手指 指 脚跟 腳跟 眼 下巴 舌 牙 "
+     .toe = "脚趾 腳趾 脚尖 腳尖 足趾 足尖 趾 趾头 趾頭",
+     .helpers = "手指 脚跟 腳跟 眼 下巴 舌 牙 "
                 "发 髮 头发 頭髮 裙 尾 扭转 扭轉 末端 控制 控制器 目标 目標",
      .plains = "骨 骨骼 关节 關節 部 根 节 節",
+     .digits = "拇指 大拇指 食指 中指 无名指 無名指 小指 小拇指 指 指头 指頭",
      .without = "首 手首 足首 ひじ ひざ つま先"},
-    {.lefts = "ひだり",  // Japanese, where 足 is the foot
-     .rights = "みぎ",
-     .uppers = "上",
-     .lowers = "下 前",
-     .pelvis = "骨盤 こし 腰",
-     .hip = "尻 臀部 股関節",
-     .spine = "背骨 脊椎 脊柱 背中 背 胸 胸部 腹 腹部 お腹 胴 胴体 むね",
-     .neck = "首 くび 頸",
-     .head = "頭 頭部 あたま",
-     .collar = "鎖骨 肩甲骨",
-     .shoulder = "肩 かた",
+    {.lefts = "ひだり レフト",  // Japanese, where 足 is the foot
+     .rights = "みぎ ライト",
+     .uppers = "上 アッパー アップ",
+     .lowers = "下 前 ロア ロアー ロウアー ロワー ロー フォア",
+     .pelvis = "骨盤 こし 腰 ペルビス ペルヴィス",
+     .hip = "尻 臀部 股関節 ヒップ ヒップス",
+     .spine = "背骨 脊椎 脊柱 背中 背 胸 胸部 腹 腹部 お腹 胴 胴体 むね スパイン チェスト "
+              "トルソ トルソー ウエスト ウェスト バック",
+     .neck = "首 くび 頸 ネック",
+     .head = "頭 頭部 あたま ヘッド",
+     .collar = "鎖骨 肩甲骨 クラビクル クラヴィクル カラー",
+     .shoulder = "肩 かた ショルダー ショルダ",
      .upper_arm = "上腕 二の腕",
-     .arm = "腕 うで",
-     .forearm = "前腕 下腕 ひじ 肘 肘関節",
-     .hand = "手首 てくび",
-     .palm = "手 て 掌 手のひら",
-     .thigh = "太もも 太腿 もも 腿 大腿 大腿部 ふともも 上腿 股",
-     .leg = "脚",
-     .shin = "すね 脛 ふくらはぎ 下腿 ひざ 膝 膝関節",
-     .ankle = "足首 あしくび 足関節 くるぶし",
-     .foot = "足 あし",
-     .toe = "つま先 爪先 足先 足指 足の指",
-     .helpers = "親指 人差指 人差し指 中指 薬指 小指 指 かかと 踵 目 顎 舌 髪 髪の毛 スカート 捩",
-     .plains = "骨 部 の 関節 ボーン"},
-    {.lefts = "왼쪽 왼 좌 좌측",  // Korean
-     .rights = "오른쪽 오른 우 우측",
-     .uppers = "위 윗 상",
-     .lowers = "아래 하 앞",
+     .arm = "腕 うで アーム",
+     .forearm = "前腕 下腕 ひじ 肘 肘関節 エルボー エルボ",
+     .hand = "手首 てくび ハンド リスト",
+     .palm = "手 て 掌 手のひら パーム",
+     .thigh = "太もも 太腿 もも 腿 大腿 大腿部 ふともも 上腿 股 サイ",
+     .leg = "脚 レッグ レグ",
+     .shin = "すね 脛 ふくらはぎ 下腿 ひざ 膝 膝関節 シン ニー カーフ",
+     .ankle = "足首 あしくび 足関節 くるぶし アンクル",
+     .foot = "足 あし フット",
+     .toe = "つま先 爪先 足先 足指 足の指 足趾 トゥ トゥー トー トウ トゥベース",
+     .helpers =
+         "かかと 踵 目 顎 舌 髪 髪の毛 スカート 捩 "
+         "フィンガー サム インデックス ミドル リング ピンキー アイ ジョー ヘア ヒール ツイスト "
+         "ロール コントロール コントローラー ターゲット ポール 先端 エンド",
+     .plains = "骨 部 の ・ 関節 ボーン ジョイント ルート センター ベース メイン",
+     .digits = "親指 人差指 人差し指 中指 薬指 小指 指 ゆび"},
+    {.lefts = "왼쪽 왼 왼편 좌 좌측",  // Korean
+     .rights = "오른쪽 오른 오른편 오 우 우측",
+     .uppers = "위 위쪽 윗 윗쪽 상",
+     .lowers = "아래 아래쪽 아랫 하 앞",
      .pelvis = "골반",
      .hip = "엉덩이 고관절",
      .spine = "척추 가슴 허리 등 배 몸통 흉부",
@@ -278,8 +290,9 @@ constexpr LanguageWords kLanguageWords[] = {
      .ankle = "발목",
      .foot = "발",
      .toe = "발가락 발끝",
-     .helpers = "엄지 검지 중지 약지 소지 손가락 눈 턱 혀 머리카락 치마 발뒤꿈치",
-     .plains = "뼈 관절"},
+     .helpers = "손가락 눈 턱 혀 머리카락 치마 발뒤꿈치",
+     .plains = "뼈 관절",
+     .digits = "엄지 검지 중지 약지 소지 지골"},
     {.lefts = "левый левая левое лев л",  // Russian
      .rights = "правый правая правое прав п",
      .uppers = "верх верхний верхняя верхнее",
@@ -292,18 +305,19 @@ constexpr LanguageWords kLanguageWords[] = {
      .collar = "ключица лопатка",
      .shoulder = "плечо",
      .upper_arm = "плечевая",
-     .arm = "рука",
+     .arm = "рука руки",
      .forearm = "предплечье локоть",
      .hand = "кисть запястье",
      .palm = "ладонь",
      .thigh = "бедро",
-     .leg = "нога",
+     .leg = "нога ноги ног",
      .shin = "голень колено икра",
      .ankle = "лодыжка щиколотка",
-     .foot = "стопа ступня",
-     .toe = "носок пальцыног",
-     .helpers = "палец пальцы пятка глаз глаза челюсть волосы язык",
-     .plains = "кость сустав корень"}};
+     .foot = "стопа стопы ступня ступни",
+     .toe = "носок носки",
+     .helpers = "пятка глаз глаза челюсть волосы язык",
+     .plains = "кость сустав корень",
+     .digits = "палец пальцы пальцев фаланга фаланги"}};
 
 BoneDictionary with_language(const BoneDictionary& base, const LanguageWords& words) {
   BoneDictionary out = base;
@@ -335,6 +349,7 @@ BoneDictionary with_language(const BoneDictionary& base, const LanguageWords& wo
   add_words(out, {BoneWordKind::right, P::none}, words.rights);
   add_words(out, {BoneWordKind::upper, P::none}, words.uppers);
   add_words(out, {BoneWordKind::lower, P::none}, words.lowers);
+  add_words(out, {BoneWordKind::digit, P::none}, words.digits);
   add_words(out, {BoneWordKind::helper, P::none}, words.helpers);
   add_words(out, {BoneWordKind::plain, P::none}, words.plains);
   return out;

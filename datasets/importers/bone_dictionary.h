@@ -18,6 +18,7 @@ enum class BoneWordKind : uint8_t {
   lower,
   helper,
   end,        ///< a helper, too: what lies at the end of a bone
+  digit,      ///< a finger or a toe
   l_and_part  ///< "larm": left, or, where another word says the side, lower
 };
 

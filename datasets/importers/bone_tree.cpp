@@ -3,6 +3,31 @@
 #include <algorithm>
 
 namespace restage {
+namespace {
+
+bool is_foot(BonePart part) {
+  return part == BonePart::ankle || part == BonePart::foot || part == BonePart::toe;
+}
+
+}  // namespace
+
+BoneTree bone_tree(const SourceSkeleton& skeleton, const std::vector<std::string>& plain,
+                   size_t language) {
+  BoneTree out{skeleton, {}};
+  for (const std::string& name : plain) out.words.push_back(bone_words(name, language));
+  for (size_t b = 0; b < plain.size(); ++b) {  // a parent comes before its children
+    if (!out.words[b].digit) continue;
+    int above = skeleton.parents[b];
+    while (above >= 0 && out.words[above].part == BonePart::none) above = skeleton.parents[above];
+    if (above < 0 || !is_foot(out.words[above].part)) continue;
+    BoneWords& toe = out.words[b];
+    toe.part = BonePart::toe;
+    toe.helper = false;
+    if (toe.number < 0) toe.number = toe.last_number;
+    if (toe.side == BoneWords::middle) toe.side = out.words[above].side;
+  }
+  return out;
+}
 
 bool hangs_on(const SourceSkeleton& skeleton, int bone, int above) {
   while (bone > above) bone = skeleton.parents[bone];  // a parent comes before its children

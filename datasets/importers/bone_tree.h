@@ -18,6 +18,11 @@ struct BoneTree {
   std::vector<BoneWords> words;
 };
 
+/// By the words of one of bone_dictionaries(); `plain` are the bones' undecorated() names. What may
+/// be a finger or a toe is a toe where it hangs on a foot.
+BoneTree bone_tree(const SourceSkeleton& skeleton, const std::vector<std::string>& plain,
+                   size_t language);
+
 /// Whether `bone` is `above` or hangs on it.
 bool hangs_on(const SourceSkeleton& skeleton, int bone, int above);
 

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "datasets/importers/bone_dictionary.h"
+#include "datasets/importers/plain_letters.h"
 #include "datasets/readers/word_lines.h"
 
 namespace restage {
@@ -19,36 +20,6 @@ bool is_upper(char c) { return c >= 'A' && c <= 'Z'; }
 bool is_lower(char c) { return c >= 'a' && c <= 'z'; }
 bool is_foreign(char c) { return static_cast<unsigned char>(c) >= 0x80; }
 bool is_letter(char c) { return is_upper(c) || is_lower(c) || is_foreign(c); }
-
-/// "Schlüsselbein" as "Schlusselbein", "tête" as "tete", Russian capitals as small letters: all
-/// that people who leave accents out and people who do not have in common.
-std::string without_accents(std::string_view name) {
-  constexpr std::string_view kLatin =  // of U+00C0 to U+00FF; '~': is none
-      "AAAAAAACEEEEIIIIDNOOOOO~OUUUUYT~aaaaaaaceeeeiiiidnooooo~ouuuuyty";
-  std::string out;
-  for (size_t i = 0; i < name.size(); ++i) {
-    const auto a = static_cast<unsigned char>(name[i]);
-    const auto b = static_cast<unsigned char>(i + 1 < name.size() ? name[i + 1] : 0);
-    std::string letter(1, name[i]);
-    if (const size_t at = b - size_t{0x80}; b >= 0x80 && b < 0xC0) {
-      if (a == 0xC3 && b == 0x9F)
-        letter = "ss";
-      else if (a == 0xC3 && kLatin[at] != '~')
-        letter = kLatin[at];
-      else if (a == 0xD0 && b >= 0x90 && b < 0xA0)  // U+0410 to U+041F
-        letter = {'\xD0', static_cast<char>(b + 0x20)};
-      else if (a == 0xD0 && b >= 0xA0 && b < 0xB0)  // U+0420 to U+042F
-        letter = {'\xD1', static_cast<char>(b - 0x20)};
-      else if (a == 0xCC || (a == 0xCD && b < 0xB0))  // a mark above the letter before
-        letter.clear();
-      else
-        letter += name[i + 1];
-      ++i;
-    }
-    out += letter;
-  }
-  return out;
-}
 
 /// "mixamorig:LeftUpLeg_02" -> mixamorig : Left Up Leg _ 02. Every byte is in one piece.
 std::vector<std::string_view> pieces_of(std::string_view name) {
@@ -158,6 +129,20 @@ BonePart with_height(const std::vector<Token>& tokens, size_t at) {
   return part == BonePart::arm ? BonePart::upper_arm : BonePart::thigh;
 }
 
+bool is_of_leg(BonePart part) { return part >= BonePart::thigh && part <= BonePart::toe; }
+
+/// Of a name with a word for fingers and toes: "dedos_pie" is a toe, "dedos_mano" a finger, and
+/// "dedos" may be either.
+void say_digit(BoneWords& words) {
+  if (words.helper) return;  // a toe's control, too, is a helper
+  if (is_of_leg(words.part)) {
+    words.part = BonePart::toe;
+    return;
+  }
+  words.helper = true;
+  words.digit = words.part == BonePart::none;
+}
+
 // ---- decoration --------------------------------------------------------------------------------
 
 bool is_piece(std::string_view piece) { return is_letter(piece[0]) || is_digit(piece[0]); }
@@ -171,7 +156,8 @@ bool has_meaning(std::string_view part) {
   return decompose(letters, bone_dictionaries()[0], true, words) &&
          std::any_of(words.begin(), words.end(), [](const BoneWord& w) {
            using enum BoneWordKind;
-           return w.kind == helper || w.kind == end || w.kind == left || w.kind == right;
+           return w.kind == helper || w.kind == end || w.kind == digit || w.kind == left ||
+                  w.kind == right;
          });
 }
 
@@ -281,12 +267,12 @@ std::string shared_letters(const std::vector<std::string>& names) {
 BoneWords bone_words(std::string_view name, size_t language) {
   BoneWords out;
   const std::vector<Token> tokens =
-      tokens_of(without_accents(name.substr(0, kLongestName)), bone_dictionaries()[language]);
+      tokens_of(plain_letters(name.substr(0, kLongestName)), bone_dictionaries()[language]);
   const bool sided = std::any_of(tokens.begin(), tokens.end(), [](const Token& token) {
     return token.word.kind == BoneWordKind::left || token.word.kind == BoneWordKind::right;
   });
   int parts = 0, strangers = 0;
-  bool both = false;
+  bool both = false, digit = false;
   for (size_t i = 0; i < tokens.size(); ++i) {
     const Token& token = tokens[i];
     const BoneWordKind kind = token.word.kind;
@@ -297,6 +283,7 @@ BoneWords bone_words(std::string_view name, size_t language) {
     strangers += !token.known;
     out.end |= kind == BoneWordKind::end;
     out.helper |= kind == BoneWordKind::helper || kind == BoneWordKind::end;
+    digit |= kind == BoneWordKind::digit;
     const bool l = kind == BoneWordKind::l_and_part && !sided;
     if (l || kind == BoneWordKind::left || kind == BoneWordKind::right) {
       const auto side = kind == BoneWordKind::right ? BoneWords::right : BoneWords::left;
@@ -309,6 +296,7 @@ BoneWords bone_words(std::string_view name, size_t language) {
     out.number = -1;
   }
   out.helper |= both;
+  if (digit) say_digit(out);
   out.cost = 4 * strangers + 2 * std::max(0, parts - 1) + (out.number > 0);
   return out;
 }
@@ -319,8 +307,9 @@ std::string other_side(std::string_view name) {
   for (const std::string_view piece : pieces_of(name)) {
     const std::string word = lower_case(piece);
     static const std::map<std::string, std::string, std::less<>> kOther = {
-        {"left", "right"}, {"right", "left"}, {"l", "r"},   {"r", "l"},   {"lft", "rgt"},
-        {"rgt", "lft"},    {"lt", "rt"},      {"rt", "lt"}, {"左", "右"}, {"右", "左"}};
+        {"left", "right"}, {"right", "left"}, {"l", "r"},   {"r", "l"},
+        {"lft", "rgt"},    {"rgt", "lft"},    {"lt", "rt"}, {"rt", "lt"},
+        {"lf", "rt"},      {"左", "右"},      {"右", "左"}};
     const auto at = kOther.find(word);
     turned |= at != kOther.end();
     out += at == kOther.end() ? word : at->second;

@@ -38,8 +38,11 @@ struct BoneWords {
   BonePart part = BonePart::none;  ///< the last word that names a part: "foot_toe" is a toe
   bool helper = false;             ///< twist, IK, control, end, finger, face, cloth, weapon ...
   bool end = false;                ///< a helper at the end of a bone: "LeftArm_end"
-  int number = -1;                 ///< the digits after the part; -1: none
-  int last_number = -1;            ///< the last digits of the name; -1: none
+  /// Finger or toe, of which the name does not tell (Spanish "dedo"); a helper until bone_tree()
+  /// sees where the bone hangs.
+  bool digit = false;
+  int number = -1;       ///< the digits after the part; -1: none
+  int last_number = -1;  ///< the last digits of the name; -1: none
   /// How far the name is from a plain one: unknown words, further parts, a number.
   int cost = 0;
 };

@@ -348,6 +348,27 @@ class Finder {
     for (int b = chest; b != under; b = parent(b))
       if (b == chest || !words_[b].helper || words_[b].part == BonePart::spine)
         out.insert(out.begin(), b);
+    return apart(out);
+  }
+
+  /// Of bones of the spine in one place in the zero pose the plainest, of equals the highest, and
+  /// none on the pelvis: such bones fold up (Second Life) or only gather others (GTA's spine root).
+  /// The last, which is the chest, stays.
+  std::vector<int> apart(const std::vector<int>& spine) const {
+    constexpr double kNear = 0.01;  // of the spine's length
+    const int pelvis = out_.bones[kPelvis];
+    const auto distance = [&](int a, int b) { return (place(a) - place(b)).norm(); };
+    std::vector<int> out;
+    for (const int b : spine) {
+      const double near = kNear * distance(pelvis, spine.back());
+      const auto takes_its_place = [&](int other) {
+        if (other == b || !(distance(other, b) < near) || b == spine.back()) return false;
+        return other == spine.back() || words_[other].cost < words_[b].cost ||
+               (words_[other].cost == words_[b].cost && other > b);
+      };
+      const bool on_pelvis = b != spine.back() && distance(pelvis, b) < near;
+      if (!on_pelvis && std::none_of(spine.begin(), spine.end(), takes_its_place)) out.push_back(b);
+    }
     return out;
   }
 
@@ -376,9 +397,9 @@ class Finder {
       return lacks(kPelvis, "no bone carries its legs, arms and head");
     const int pelvis = find_pelvis(all);
     const int below = hangs_on(skeleton_, chest, pelvis) ? pelvis : all;
+    out_.bones[kPelvis] = pelvis;
     const std::vector<int> spine = spine_to(chest, below);
     if (spine.empty()) return lacks(kSpine1, "no bone lies between its pelvis and its arms");
-    out_.bones[kPelvis] = pelvis;
     // Of many the first, the middle one, and the last, which carries the arms.
     out_.bones[kSpine1] = spine[0];
     if (spine.size() > 1) out_.bones[kSpine3] = spine.back();
@@ -433,6 +454,11 @@ class Finder {
     }
   }
 
+  Vec3 place(int bone) const {  // in the zero pose
+    Vec3 out = Vec3::Zero();
+    for (int b = bone; b >= 0; b = parent(b)) out += skeleton_.offsets[b];
+    return out;
+  }
   /// From a bone to one that hangs on it, in the zero pose.
   Vec3 between(int from, int to) const {
     Vec3 out = Vec3::Zero();

@@ -142,7 +142,14 @@ SourceSkeleton skeleton_of(const Gltf& file, const std::vector<int>& nodes,
 
 /// The profile that VRM's list of bones is read with.
 const Profile& vrm_profile() {
-  static const Profile out = find_profile("vrm");
+  static const Profile out = [] {
+    Profile vrm = find_profile("vrm");
+    vrm.list = "VRM's list of bones (humanBones)";
+    vrm.mend =
+        "assign them to the humanoid in the program that exports VRM, or say which node is which "
+        "joint with --bones names.yaml (docs/data.md)";
+    return vrm;
+  }();
   return out;
 }
 

@@ -5,10 +5,12 @@
 
 #include "autograd/base/error.h"
 #include "autograd/base/nearest.h"
+#include "datasets/importers/asked_joints.h"
 #include "datasets/importers/bone_dictionary.h"
 #include "datasets/importers/find_joints.h"
 #include "datasets/importers/place_joints.h"
 #include "datasets/importers/source_motion.h"
+#include "datasets/readers/encoding.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/text.h"
 #include "datasets/readers/word_lines.h"
@@ -203,15 +205,24 @@ std::string list_of(const std::vector<std::string>& words) {
 
 /// Names in another encoding can be neither found nor given: said before anything else.
 void check_encoding(const SourceSkeleton& skeleton, const std::string& where) {
-  for (const std::string& name : skeleton.names) {
-    if (text::is_utf8(name)) continue;
-    const bool japanese = text::may_be_shift_jis(name);
-    throw InputError(where,
-                     cat("the names of its bones are not UTF-8 text",
-                         japanese ? "; by their bytes they are Shift-JIS (Japanese)" : ""),
-                     cat("save it as UTF-8: iconv -f ", japanese ? "SHIFT_JIS" : "LATIN1",
-                         " -t UTF-8 OLD > NEW"));
+  if (std::all_of(skeleton.names.begin(), skeleton.names.end(), text::is_utf8)) return;
+  std::string known, from = "LATIN1", otherwise;
+  switch (text::encoding_of(skeleton.names)) {
+    case text::Encoding::shift_jis:
+      known = "; by their bytes they are Shift-JIS (Japanese)";
+      from = "SHIFT_JIS";
+      break;
+    case text::Encoding::latin1:
+      known = "; by their bytes they are Latin-1 (Western European)";
+      break;
+    case text::Encoding::unsure:
+      known =
+          "; by their bytes they may be Latin-1 (Western European), Shift-JIS (Japanese) or "
+          "another";
+      otherwise = " (or -f SHIFT_JIS, GBK, EUC-KR, CP1251: whichever makes them readable)";
   }
+  throw InputError(where, cat("the names of its bones are not UTF-8 text", known),
+                   cat("save it as UTF-8: iconv -f ", from, " -t UTF-8 OLD > NEW", otherwise));
 }
 
 /// The bone that carries the only person; -1: nothing tells. InputError for two.
@@ -228,9 +239,14 @@ int only_person(const BoneTree& tree, const std::string& where) {
 
 [[noreturn]] void throw_unlike_profile(const Profile& profile, const Bones& bones,
                                        const BoneNames& names, const std::string& where) {
-  std::vector<std::string> lacks;
-  for (const int j : kRequired)
-    if (bones[j] < 0) lacks.push_back(profile.bones[j][0]);
+  std::vector<std::string> lacks, with_joints;
+  for (const int j : kRequired) {
+    if (bones[j] >= 0) continue;
+    lacks.push_back(profile.bones[j][0]);
+    with_joints.push_back(cat(lacks.back(), " (the ", kJointNames[j], ")"));
+  }
+  if (!profile.list.empty())
+    throw InputError(where, cat(profile.list, " lacks ", list_of(with_joints)), profile.mend);
   std::string text = list_of(lacks);
   if (const std::string close = nearest(lower_case(lacks[0]), names.all()); !close.empty())
     text += cat(" (", lacks[0], ": is it ", text::quote(close), "?)");
@@ -300,27 +316,6 @@ std::vector<std::string> words_for(const BoneTree& tree, const FoundJoints& foun
   throw UnknownSkeleton(where, what, kNameThem);
 }
 
-/// What no skeleton can be: one bone for two joints, a limb's lower joint above its upper one.
-void check_asked(const SourceSkeleton& skeleton, const Bones& bones, const std::string& where) {
-  constexpr const char* kFixNames = "correct the names in the file of --bones";
-  for (size_t j = 0; j < kJoints; ++j)
-    for (size_t k = 0; k < j; ++k)
-      if (bones[j] >= 0 && bones[j] == bones[k])
-        throw InputError(where,
-                         cat("its bone ", text::quote(skeleton.names[bones[j]]),
-                             " is named for two joints, ", kJointNames[k], " and ", kJointNames[j]),
-                         kFixNames);
-  for (const int j : {4, 5, 7, 8, 10, 11, 18, 19, 20, 21}) {
-    const int above = bones[kParents[j]];
-    if (bones[j] >= 0 && above >= 0 && hangs_on(skeleton, above, bones[j]))
-      throw InputError(where,
-                       cat("the bone for ", kJointNames[kParents[j]], ", ",
-                           text::quote(skeleton.names[above]), ", hangs on the bone for ",
-                           kJointNames[j], ", ", text::quote(skeleton.names[bones[j]])),
-                       kFixNames);
-  }
-}
-
 /// The bones that a profile names which was asked for. InputError for those that the file lacks, or
 /// has twice.
 Bones asked_bones(const Profile& profile, const SourceSkeleton& skeleton, const BoneNames& names,
@@ -335,7 +330,8 @@ Bones asked_bones(const Profile& profile, const SourceSkeleton& skeleton, const 
       if (bones[j] >= 0 && names.find(name) == bones[j] && names.is_twice(name))
         throw InputError(where, cat("two of its bones are called ", text::quote(name)),
                          "rename one, or export one character only");
-  check_asked(skeleton, bones, where);
+  check_asked(skeleton, bones, where,
+              profile.mend.empty() ? "correct the names in the file of --bones" : profile.mend);
   return bones;
 }
 
@@ -344,13 +340,6 @@ Bones completed(const BoneTree& tree, const Profile& profile, const Bones& bones
   std::array<bool, kJoints> open{};
   for (size_t j = 0; j < kJoints; ++j) open[j] = bones[j] < 0 && !profile.places[j];
   return complete_joints(tree, bones, open);
-}
-
-BoneTree tree_of(const SourceSkeleton& skeleton, const std::vector<std::string>& plain,
-                 size_t language = 0) {
-  BoneTree out{skeleton, {}};
-  for (const std::string& name : plain) out.words.push_back(bone_words(name, language));
-  return out;
 }
 
 /// A skeleton read with the words of one language.
@@ -365,7 +354,7 @@ Reading best_reading(const SourceSkeleton& skeleton, const std::vector<std::stri
                      const std::string& where) {
   std::optional<Reading> best;
   for (size_t language = 0; language < bone_dictionaries().size(); ++language) {
-    BoneTree tree = tree_of(skeleton, plain, language);
+    BoneTree tree = bone_tree(skeleton, plain, language);
     FoundJoints found = find_joints(tree, only_person(tree, where));
     if (!best || found.missing.size() < best->found.missing.size())
       best.emplace(Reading{std::move(tree), std::move(found)});
@@ -402,7 +391,7 @@ NamedJoints turned_with_legs(const SourceSkeleton& skeleton, NamedJoints names) 
 void check_one_person(const SourceSkeleton& skeleton, const std::string& where) {
   const std::vector<std::string> plain = undecorated(skeleton.names);
   for (size_t language = 0; language < bone_dictionaries().size(); ++language)
-    only_person(tree_of(skeleton, plain, language), where);
+    only_person(bone_tree(skeleton, plain, language), where);
 }
 
 NamedJoints name_joints(const SourceSkeleton& skeleton, const std::string& where,
@@ -413,7 +402,7 @@ NamedJoints name_joints(const SourceSkeleton& skeleton, const std::string& where
     const auto by_name = [&](const std::string& name) { return names.find(name); };
     return turned_with_legs(skeleton, place_joints(tree, by_name, by, bones, where));
   };
-  const BoneTree tree = tree_of(skeleton, plain);
+  const BoneTree tree = bone_tree(skeleton, plain, 0);
   if (profile) {
     const Bones bones = asked_bones(*profile, skeleton, names, where);
     return placed(tree, *profile, completed(tree, *profile, bones));

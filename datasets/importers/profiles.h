@@ -23,6 +23,9 @@ struct Profile {
 
   std::string name;   ///< the file's, without ".yaml"
   std::string title;  ///< for people
+  /// Of names that stand in the file of the skeleton itself: what holds them there ("VRM's list of
+  /// bones"), and how to mend it. Empty: a profile.
+  std::string list, mend;
   /// Bones that may stand for each joint, the preferred first; empty: always placed.
   std::array<std::vector<std::string>, kJoints> bones;
   std::array<std::optional<Place>, kJoints> places;  ///< none: placed by the general rules

@@ -98,20 +98,6 @@ bool is_utf8(std::string_view text) {
   return true;
 }
 
-bool may_be_shift_jis(std::string_view text) {
-  bool any = false;
-  for (size_t i = 0; i < text.size(); ++i) {
-    const auto byte = static_cast<unsigned char>(text[i]);
-    if (byte < 0x80 || (byte >= 0xA1 && byte <= 0xDF)) continue;  // ASCII, half-width kana
-    const auto next = static_cast<unsigned char>(i + 1 < text.size() ? text[i + 1] : 0);
-    const bool lead = (byte >= 0x81 && byte <= 0x9F) || (byte >= 0xE0 && byte <= 0xFC);
-    if (!lead || next < 0x40 || next == 0x7F || next > 0xFC) return false;
-    any = true;
-    ++i;
-  }
-  return any;
-}
-
 std::string quote(std::string_view word) {
   const std::string shown = WordLines::quoted(word);
   return cat("'", shown, shown.size() < word.size() && word.size() > 40 ? "...'" : "'");

@@ -39,8 +39,6 @@ bool ends_in(std::string_view name, std::initializer_list<std::string_view> endi
 /// Bytes of the character that the text begins with; 0 if that is none of UTF-8.
 size_t utf8_size(std::string_view text);
 bool is_utf8(std::string_view text);
-/// Whether all bytes may be Shift-JIS, and some are characters beyond ASCII there.
-bool may_be_shift_jis(std::string_view text);
 /// A short, printable copy for messages.
 std::string quote(std::string_view word);
 

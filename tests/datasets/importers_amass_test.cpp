@@ -264,6 +264,85 @@ TEST_F(ImportersAmass, EstimatorsNamesAndShapesGiveTheSameMotion) {
              "add trans [F, 3]");
 }
 
+/// The clip in AMASS's layout, 72 columns wide, in a world that is turned by `world`; everything
+/// moved by `from`.
+Arrays in_world(const TinyClip& clip, const Mat3& world, const Vec3& from = Vec3::Zero()) {
+  const Vec3 rest = TinySmpl{SmplFamily::smpl}.shaped(clip.betas)[0];
+  std::vector<double> poses, trans;
+  for (int64_t f = 0; f < clip.frames; ++f) {
+    const double t = static_cast<double>(f) / clip.fps;
+    const Eigen::AngleAxisd root(Mat3(world * clip.root(t)));
+    for (int j = 0; j < 24; ++j) {
+      const Vec3 a = j == 0        ? Vec3(root.angle() * root.axis())
+                     : j < kJoints ? clip.turn(j, t)
+                                   : Vec3::Zero();
+      poses.insert(poses.end(), a.data(), a.data() + 3);
+    }
+    const Vec3 at = world * (clip.trans(t) + rest) - rest + from;
+    trans.insert(trans.end(), at.data(), at.data() + 3);
+  }
+  return with(with(clip.arrays(), "poses", npy<double>({clip.frames, 72}, poses)), "trans",
+              npy<double>({clip.frames, 3}, trans));
+}
+
+/// AMASS's layout says nothing of the axis that is up: the root of somebody who stands does.
+TEST_F(ImportersAmass, TheRootTellsWhichAxisIsUp) {
+  const TinyClip clip{.frames = 31, .fps = 30};
+  BodyModels models(dir.write("model.npz", TinySmpl{SmplFamily::smpl}.file()));
+  const auto imported = [&](const Arrays& arrays, ImportReport& report) {
+    return import_amass(Npz(dir.write("a.npz", npz(arrays))), models, {}, report);
+  };
+  ImportReport amass;
+  const Motion wanted = imported(in_world(clip, Mat3::Identity()), amass);
+  EXPECT_EQ(fact(amass, "up"), "z (AMASS), turned to y");
+  for (const Axis up : {Axis::y, Axis::minus_y}) {
+    const Mat3 world = upright(up).transpose() * upright(Axis::z);
+    ImportReport report;
+    const Motion motion = imported(in_world(clip, world), report);
+    EXPECT_HAS(fact(report, "up"), to_string(up) + ", where the root turns the body's up");
+    EXPECT_EQ(remarks(report).find("upright"), std::string::npos) << remarks(report);
+    ASSERT_EQ(motion.frames(), wanted.frames());
+    const Vec3 first = testing::motion_joints(motion, 0)[0],
+               first_wanted = testing::motion_joints(wanted, 0)[0];
+    for (size_t f = 0; f < wanted.frames(); ++f)
+      for (size_t j = 0; j < kJoints; ++j) {
+        const Vec3 got = testing::motion_joints(motion, f)[j] - first,
+                   want = testing::motion_joints(wanted, f)[j] - first_wanted;
+        EXPECT_LT((got - want).norm(), 1e-5) << to_string(up) << " " << f << " " << j;
+      }
+    MotionOptions given;
+    given.rest.up = Axis::z;
+    ImportReport overruled;
+    import_amass(Npz(dir / "a.npz"), models, given, overruled);
+    EXPECT_HAS(fact(overruled, "up"), "z (--up)");
+  }
+}
+
+/// Somebody who lies on AMASS's floor has a root like somebody who stands with y up, and somebody
+/// who lies along x, or turns over, shows no other axis.
+TEST_F(ImportersAmass, WhoLiesOnTheFloorKeepsZUp) {
+  const TinyClip clip{.frames = 4, .fps = 30};
+  BodyModels models(dir.write("model.npz", TinySmpl{SmplFamily::smpl}.file()));
+  const Mat3 supine = upright(Axis::z);                                        // the head to +y
+  const Mat3 along_x = upright(Axis::minus_x).transpose() * upright(Axis::z);  // to -x
+  for (const Mat3& world : {supine, along_x}) {
+    double lowest = 1e9;  // puts it 5 cm above the floor, 2 m from the origin
+    Arrays lies = in_world(clip, world);
+    ImportReport report;
+    MotionOptions given;
+    given.rest.up = Axis::z;
+    const Motion raw = import_amass(Npz(dir.write("a.npz", npz(lies))), models, given, report);
+    for (size_t f = 0; f < raw.frames(); ++f)
+      for (const Vec3& joint : testing::motion_joints(raw, f)) lowest = std::min(lowest, joint.y());
+    const double floor = std::stod(fact(report, "floor"));
+    lies = in_world(clip, world, Vec3(0, 2, 0.05 - floor - lowest));
+    ImportReport found;
+    import_amass(Npz(dir.write("b.npz", npz(lies))), models, {}, found);
+    EXPECT_EQ(fact(found, "up"), "z (AMASS), turned to y");
+    EXPECT_HAS(remarks(found), "--up y");
+  }
+}
+
 /// The clip with its path in other units, as such files have it.
 Arrays with_path(const TinyClip& clip, double unit, const Vec3& from = Vec3::Zero()) {
   std::vector<double> trans;

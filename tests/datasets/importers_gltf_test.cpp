@@ -184,6 +184,35 @@ TEST_F(ImportersGltf, VrmMayLackWhatIsOptionalThere) {
   }
 }
 
+/// What VRM requires and its list lacks is said in VRM's words: nobody gave a profile.
+TEST_F(ImportersGltf, AnIncompleteVrmListIsNamed) {
+  const auto refused = [&](std::initializer_list<const char*> lacks) {
+    testing::GlbParts parts = vrm_parts(known_, false);
+    auto& bones = parts.root["extensions"]["VRMC_vrm"]["humanoid"]["humanBones"];
+    for (const char* name : lacks) bones.erase(name);
+    const std::string file = write("hero.vrm", parts);
+    return error_of([&] { read_character(file); });
+  };
+  const std::string one = refused({"leftHand"});
+  EXPECT_HAS(one, "VRM's list of bones (humanBones) lacks leftHand (the left_wrist)");
+  EXPECT_HAS(one, "in the program that exports VRM");
+  EXPECT_HAS(one, "--bones names.yaml");
+  EXPECT_EQ(one.find("leave --bones out"), std::string::npos) << one;
+  EXPECT_HAS(refused({"head", "rightUpperLeg"}),
+             "lacks rightUpperLeg (the right_hip), head (the head)");
+}
+
+/// A VRM list in which sides are crossed within a limb.
+TEST_F(ImportersGltf, AVrmListMustHangTogether) {
+  testing::GlbParts parts = vrm_parts(known_, false);
+  auto& bones = parts.root["extensions"]["VRMC_vrm"]["humanoid"]["humanBones"];
+  std::swap(bones["leftLowerLeg"], bones["rightLowerLeg"]);
+  const std::string file = write("hero.vrm", parts);
+  const std::string says = error_of([&] { read_character(file); });
+  EXPECT_HAS(says, "the bone for left_knee, 'leftLowerLeg', hangs on the bone for right_hip");
+  EXPECT_HAS(says, "in the program that exports VRM");
+}
+
 TEST_F(ImportersGltf, TwoCharactersInOneFileAreRefused) {
   testing::GlbParts two = CharacterMaker(known_, mixamo_style()).parts;
   const size_t count = two.root["nodes"].size();

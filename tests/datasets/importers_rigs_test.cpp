@@ -1,16 +1,16 @@
 // Finding a person in bones of any make: skeletons as programs name them (rig_lists.h), each plain
-// and decorated in the ways that files come in; what must be refused; words of names.
+// and decorated in the ways that files come in; what must be refused.
 #include <gtest/gtest.h>
 
 #include <cctype>
 
-#include "datasets/importers/bone_words.h"
 #include "datasets/importers/find_joints.h"
 #include "datasets/importers/joint_fit.h"
 #include "datasets/importers/source_motion.h"
 #include "tests/datasets/rig_lists_games.h"
 #include "tests/datasets/rig_lists_more.h"
 #include "tests/datasets/rig_lists_studios.h"
+#include "tests/datasets/rig_lists_words.h"
 #include "tests/support/errors.h"
 
 namespace restage {
@@ -22,7 +22,8 @@ using test::RigList;
 
 std::vector<RigList> rig_lists() {
   std::vector<RigList> out = test::rigs_of_games();
-  for (const auto* more : {&test::rigs_of_studios(), &test::rigs_of_others()})
+  for (const auto* more :
+       {&test::rigs_of_studios(), &test::rigs_of_others(), &test::rigs_of_words()})
     out.insert(out.end(), more->begin(), more->end());
   return out;
 }
@@ -356,6 +357,32 @@ TEST(ImportersRigs, TheLastOfAnyNumberOfSpineBonesCarriesTheArms) {
   }
 }
 
+/// Spine bones in one place are one joint: Second Life's go up and come back, GTA's spine begins on
+/// the pelvis.
+TEST(ImportersRigs, SpineBonesInOnePlaceAreOneJoint) {
+  const BuiltRig second_life = rig_of("Left", "Right", R"(
+p:mPelvis mSpine1 mSpine2 1:mTorso mSpine3 mSpine4 3:mChest n:mNeck h:mHead
+mPelvis t:mHip@ k:mKnee@ a:mAnkle@ mFoot@ f:mToe@
+mChest c:mCollar@ s:mShoulder@ e:mElbow@ w:mWrist@
+)");
+  BuiltRig folded = second_life;
+  SourceSkeleton& s = folded.skeleton;
+  const Vec3 torso(0, 0.1, 0), chest(0, 0.25, 0);
+  const Vec3 steps[] = {torso, -torso, torso, chest, -chest, chest};
+  for (size_t b = 1; b <= 6; ++b) s.offsets[b] = steps[b - 1];
+  expect_right(folded, "Second Life's folded spine");
+  BuiltRig gta = rig_of("L", "R", R"(
+SKEL_ROOT p:SKEL_Pelvis
+SKEL_ROOT SKEL_Spine_Root 1:SKEL_Spine0 SKEL_Spine1 2:SKEL_Spine2 3:SKEL_Spine3 h:SKEL_Head
+SKEL_Pelvis t:SKEL_@_Thigh k:SKEL_@_Calf a:SKEL_@_Foot f:SKEL_@_Toe0
+SKEL_Spine3 c:SKEL_@_Clavicle s:SKEL_@_UpperArm e:SKEL_@_Forearm w:SKEL_@_Hand
+)");
+  for (size_t b = 0; b < gta.skeleton.size(); ++b)
+    if (gta.skeleton.names[b] == "SKEL_Spine_Root")
+      gta.skeleton.offsets[b] = gta.skeleton.offsets[static_cast<size_t>(gta.bone[0])];
+  expect_right(gta, "a spine's root on the pelvis");
+}
+
 /// How far these joints of a pose's turns, put on the middle of its hips, are from its points,
 /// metres.
 double off_its_points(const PosedSkeleton& pose, const Joints& rest,
@@ -485,61 +512,23 @@ TEST(ImportersRigs, MissingToesArePlacedAhead) {
 }
 
 TEST(ImportersRigs, NamesInOtherEncodingsAreTold) {
-  BuiltRig japanese = rig("mixamo");
+  const auto with_head = [](const std::string& head) {
+    BuiltRig out = rig("mixamo");
+    for (std::string& name : out.skeleton.names)
+      if (name == "Head") name = head;
+    return out;
+  };
+  BuiltRig japanese = with_head("Head");
   japanese.skeleton.names[0] = "\x83\x5A\x83\x93\x83\x5E\x81\x5B";  // "Center" in Shift-JIS
   expect_right(japanese, "the pelvis needs no name");
-  for (std::string& name : japanese.skeleton.names)
-    if (name == "Head") name = "\x93\xAA";
-  EXPECT_HAS(refusal(japanese), "Shift-JIS");
-  EXPECT_HAS(refusal(japanese), "iconv -f SHIFT_JIS");
-  for (std::string& name : japanese.skeleton.names)
-    if (name == "\x93\xAA") name = "T\xEAte";  // Latin-1
-  EXPECT_HAS(refusal(japanese), "not UTF-8");
-}
-
-TEST(ImportersRigs, WordsOfNames) {
-  const auto is = [](const char* name, BonePart part, BoneWords::Side side, bool helper = false) {
-    const BoneWords words = bone_words(name);
-    EXPECT_EQ(static_cast<int>(words.part), static_cast<int>(part)) << name;
-    EXPECT_EQ(words.side, side) << name;
-    EXPECT_EQ(words.helper, helper) << name;
-  };
-  using enum BonePart;
-  const auto left = BoneWords::left, right = BoneWords::right, middle = BoneWords::middle;
-  is("LeftUpLeg", thigh, left);
-  is("mixamorig:LeftLeg", leg, left);
-  is("thigh.R", thigh, right);
-  is("b_l_foot_toe", toe, left);
-  is("LUArm", upper_arm, left);
-  is("arm_lower_R", forearm, right);
-  is("RThigh_012", thigh, right);
-  is("lfemur", thigh, left);
-  is("lLeg", leg, left);
-  is("l_lleg", shin, left);
-  is("RLArm", forearm, right);
-  is("r_uleg", thigh, right);
-  is("arm_L0_end", arm, left, true);
-  is("Bip01 L Toe0", toe, left);
-  is("左足首", ankle, left);
-  is("上半身2", spine, middle);
-  is("CC_Base_L_ThighTwist01", thigh, left, true);
-  is("LeftHandThumb1", hand, left, true);
-  is("ik_foot_l", foot, left, true);
-  is("HeadTop_End", head, middle, true);
-  is("J_Sec_Hair1_01", none, middle, true);
-  is("Chip", none, middle);  // no hip
-  is("Alarm", none, middle);
-  is("LeftRightHand", hand, right, true);  // both sides: neither
-  EXPECT_LT(bone_words("hand_l").cost, bone_words("hand_weapon_l").cost + 1);
-  EXPECT_EQ(bone_words("arm_L0_1").last_number, 1);
-  EXPECT_EQ(bone_words("main_G", 0).part, none);
-  EXPECT_EQ(bone_words("main_G", 2).part, hand);  // French
-  EXPECT_EQ(bone_words("Schlüsselbein_L", 1).part, collar);
-  EXPECT_EQ(bone_words("ПЛЕЧО", 9).part, shoulder);
-  EXPECT_LT(bone_words("hand_l").cost, bone_words("hand_xyz_l").cost);
-  EXPECT_EQ(other_side("LeftUpLeg"), "rightupleg");
-  EXPECT_EQ(other_side("thigh.R.001"), "thigh.l.001");
-  EXPECT_EQ(other_side("Hips"), "");
+  EXPECT_HAS(refusal(with_head("\x93\xAA")), "Shift-JIS");
+  EXPECT_HAS(refusal(with_head("\x93\xAA")), "iconv -f SHIFT_JIS");
+  const std::string french = refusal(with_head("T\xEAte"));  // Latin-1
+  EXPECT_HAS(french, "Latin-1");
+  EXPECT_HAS(french, "iconv -f LATIN1");
+  EXPECT_EQ(french.find("Shift-JIS"), std::string::npos) << french;
+  const std::string chinese = refusal(with_head("\xD7\xF3\xCA\xD6"));  // GBK: both are named
+  EXPECT_HAS(chinese, "may be Latin-1 (Western European), Shift-JIS (Japanese) or another");
 }
 
 }  // namespace
