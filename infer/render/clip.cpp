@@ -21,6 +21,7 @@ template <class List>
 void choose(const std::vector<size_t>& chosen, List* list) {
   if (list->empty()) return;
   List out;
+  out.reserve(chosen.size());
   for (const size_t frame : chosen) out.push_back(list->at(frame));
   *list = std::move(out);
 }
