@@ -37,7 +37,8 @@ struct NamedJoints {
   JointMap map;
   /// Built in, the one asked for, or one without a name: found by structure. Never null.
   const Profile* profile = nullptr;
-  /// The bone called pelvis. map[0] turns with the bone that carries both legs, which may hang on it.
+  /// The bone called pelvis. map[0] turns with the bone that carries both legs, which may hang on
+  /// it.
   int hips = -1;
   std::vector<int> placed;  ///< joints that the source lacks, put where the profile says
 };
