@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "autograd/base/error.h"
 
@@ -21,8 +22,8 @@ template <class List>
 void choose(const std::vector<size_t>& chosen, List* list) {
   if (list->empty()) return;
   List out;
-  out.reserve(chosen.size());
-  for (const size_t frame : chosen) out.push_back(list->at(frame));
+  std::transform(chosen.begin(), chosen.end(), std::back_inserter(out),
+                 [&](size_t frame) { return list->at(frame); });
   *list = std::move(out);
 }
 

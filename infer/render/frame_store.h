@@ -49,7 +49,6 @@ class FrameStore {
 
   size_t size() const { return slots_.size(); }
   bool empty() const { return slots_.empty(); }
-  void reserve(size_t frames) { slots_.reserve(frames); }
   void push_back(Frame frame) {
     slots_.push_back({std::move(frame)});
     hold(slots_.size() - 1);
