@@ -10,7 +10,7 @@
 namespace restage {
 namespace {
 
-constexpr double kSeen = 1e-5;  // of a bone's length: less is rounding
+constexpr double kRounding = 1e-5;  // of a bone's length: less is rounding
 
 /// The rotation that takes the points `from` next to `to`, or not quite: a turn costs as much as
 /// moving a point 2 cm from the joint, so that a bone of no length decides nothing.
@@ -35,7 +35,7 @@ void turn_joint(PosedSkeleton& pose, const Joints& rest, int j, const Vec3& rest
     from.push_back(pose.global[j] * (rest[on_it] - rest_at));
     to.push_back(pose.joints[on_it] - at);
     const double size = std::min(from.back().norm(), to.back().norm());
-    right = right && (from.back() - to.back()).norm() <= kSeen * std::max(size, 1e-4);
+    right = right && (from.back() - to.back()).norm() <= kRounding * std::max(size, 1e-4);
   }
   if (!right) pose.global[j] = best_rotation(from, to) * pose.global[j];
 }
@@ -60,7 +60,7 @@ void JointFit::turn(PosedSkeleton& pose) {
     const Vec3 bone = pose.global[p] * (rest_[j] - rest_[p]);
     at[j] = at[p] + bone;
     const double off = (at[j] - pose.joints[j]).norm();
-    if (off <= kSeen * bone.norm()) at[j] = pose.joints[j];  // rounding does not add up
+    if (off <= kRounding * bone.norm()) at[j] = pose.joints[j];  // rounding does not add up
     // Trunk and collars make up for what is off below them. A limb keeps its direction.
     turn_joint(pose, rest_, j, rest_[j], in_trunk(j) ? at[j] : pose.joints[j], j + 1, kJoints - 1);
     if (!(off <= any_.distance)) any_ = {off, j, frames_};
