@@ -9,7 +9,7 @@
 #include "autograd/base/output_check.h"
 #include "autograd/kernels/kernel.h"
 #include "datasets/doctor/examine.h"
-#include "datasets/importers/performance.h"
+#include "datasets/importers/skeleton_take.h"
 #include "datasets/schema.h"
 #include "experiments/cli/output.h"
 #include "experiments/cli/profile.h"
@@ -221,8 +221,8 @@ void print_outcome(const RetargetCommand& c, const Common& common, const Source&
 int run_retarget(const RetargetCommand& c, const Common& common) {
   check(c);
   std::string no_skeleton;
-  if (!c.from_surface && holds_performance(c.source.path, c.source_bones, &no_skeleton))
-    return run_performance(c, common);
+  if (!c.from_surface && holds_take(c.source.path, c.source_bones, &no_skeleton))
+    return run_take(c, common);
   if (!c.source_bones.empty())
     throw InputError(c.source.path, "is looked at as a surface, which has no bones to name",
                      "leave --source-bones out");

@@ -30,6 +30,6 @@ void log_target(const ImportReport& report);
 
 /// A source whose skeleton is known: its turns go over as they are, and no network is asked but for
 /// a target without a rig.
-int run_performance(const RetargetCommand& c, const Common& common);
+int run_take(const RetargetCommand& c, const Common& common);
 
 }  // namespace restage::cli

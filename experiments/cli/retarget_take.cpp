@@ -1,7 +1,7 @@
 // restage retarget of a source that has a skeleton: BVH, AMC, glTF, VRM animations.
 #include "autograd/base/log.h"
 #include "datasets/doctor/examine.h"
-#include "datasets/importers/performance.h"
+#include "datasets/importers/skeleton_take.h"
 #include "experiments/cli/output.h"
 #include "experiments/cli/retarget.h"
 
@@ -40,9 +40,9 @@ MotionOptions options_of(const RetargetCommand& c) {
 
 }  // namespace
 
-int run_performance(const RetargetCommand& c, const Common& common) {
+int run_take(const RetargetCommand& c, const Common& common) {
   check_options(c);
-  const Performance performance = read_performance(c.source.path, options_of(c), c.source.clip);
+  const SkeletonTake take = read_take(c.source.path, options_of(c), c.source.clip);
   TargetMesh target = read_target(c.target, c.bones);
   std::unique_ptr<System> system;  // poses a target that has no rig of its own
   if (!target.own) {
@@ -58,11 +58,11 @@ int run_performance(const RetargetCommand& c, const Common& common) {
                     target.own ? &*rig : system->rig()};
   std::optional<SourceRecord> source;
   if (is_gltf_name(c.source.path)) source = c.source;
-  const Sink sink = make_sink(c.to, shown, source, performance.name, c.target, target.own);
+  const Sink sink = make_sink(c.to, shown, source, take.name, c.target, target.own);
   int64_t frames = 0;
-  for (size_t f = 0; f < performance.frames.size(); f += static_cast<size_t>(c.to.every)) {
+  for (size_t f = 0; f < take.frames.size(); f += static_cast<size_t>(c.to.every)) {
     RetargetedFrame frame;
-    frame.pose = perform(performance, f, rest);
+    frame.pose = perform_take(take, f, rest);
     frame.joints.emplace();
     if (target.own) {
       target.own->place(frame.pose, &*frame.joints, &frame.vertices);
@@ -74,11 +74,11 @@ int run_performance(const RetargetCommand& c, const Common& common) {
     ++frames;
   }
   sink.commit({});
-  log_target(performance.report);
+  log_target(take.report);
   log_target(target.report);
-  const Json document = {{"out", c.to.out},          {"source_frames", performance.frames.size()},
-                         {"frames", frames},         {"fps", c.to.rate()},
-                         {"clip", performance.name}, {"from", "skeleton"}};
+  const Json document = {{"out", c.to.out},   {"source_frames", take.frames.size()},
+                         {"frames", frames},  {"fps", c.to.rate()},
+                         {"clip", take.name}, {"from", "skeleton"}};
   print(common.json, document,
         "wrote " + c.to.out + ": " + std::to_string(frames) + " frames of the source's skeleton\n");
   return 0;

@@ -1,5 +1,5 @@
 // A skeleton's motion taken over by another: the same turns, to rounding; a place that fits.
-#include "datasets/importers/performance.h"
+#include "datasets/importers/skeleton_take.h"
 
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@ using namespace test;
 using testing::CharacterMaker;
 using testing::RigStyle;
 
-class PerformanceTest : public FileTest {
+class SkeletonTakeTest : public FileTest {
  protected:
   std::string write(const RigStyle& style) const {
     return dir.write("in.glb", CharacterMaker(known_, style).parts.glb());
@@ -30,17 +30,17 @@ class PerformanceTest : public FileTest {
   const testing::KnownCharacter known_ = testing::known_character();
 };
 
-TEST_F(PerformanceTest, TheSameSkeletonDoesTheSame) {
+TEST_F(SkeletonTakeTest, TheSameSkeletonDoesTheSame) {
   RigStyle fine = testing::unreal_style();
   fine.fps = 60, fine.keys = 61;
   for (const RigStyle& style : {testing::plain_style(), testing::mixamo_style(), fine}) {
-    const Performance p = read_performance(write(style), {});
+    const SkeletonTake p = read_take(write(style), {});
     ASSERT_EQ(p.frames.size(), 31u);
     const Joints rest = standing(1);
     double floor = rest[0].y() - p.rest[0].y();  // of the file's world
     for (size_t f = 0; f < p.frames.size(); ++f) {
       const Pose truth = known_.pose(static_cast<double>(f) / kFps);
-      const Pose got = perform(p, f, rest);
+      const Pose got = perform_take(p, f, rest);
       const PosedSkeleton wanted = forward_kinematics(rest, truth),
                           is = forward_kinematics(rest, got);
       for (int j = 0; j < kJoints; ++j) {
@@ -53,19 +53,19 @@ TEST_F(PerformanceTest, TheSameSkeletonDoesTheSame) {
   }
 }
 
-TEST_F(PerformanceTest, AnotherSizeGoesAnotherWay) {
-  const Performance p = read_performance(write(testing::plain_style()), {});
+TEST_F(SkeletonTakeTest, AnotherSizeGoesAnotherWay) {
+  const SkeletonTake p = read_take(write(testing::plain_style()), {});
   const Joints rest = standing(1.5);
   for (size_t f = 0; f < p.frames.size(); f += 5) {
-    const Pose same = perform(p, f, standing(1)), large = perform(p, f, rest);
+    const Pose same = perform_take(p, f, standing(1)), large = perform_take(p, f, rest);
     EXPECT_LT((large.root - 1.5 * same.root).norm(), 1e-6);
     for (int j = 0; j < kJoints; ++j) EXPECT_LT((large.local[j] - same.local[j]).norm(), 1e-9);
   }
 }
 
 /// Where the rest pose of a target has its thighs apart, they point where the source's do.
-TEST_F(PerformanceTest, LimbsPointAsTheSourcesDo) {
-  const Performance p = read_performance(write(testing::plain_style()), {});
+TEST_F(SkeletonTakeTest, LimbsPointAsTheSourcesDo) {
+  const SkeletonTake p = read_take(write(testing::plain_style()), {});
   Joints apart = standing(1);
   for (const int side : {0, 1}) {
     const Mat3 turn = Eigen::AngleAxisd(side == 0 ? 0.2 : -0.2, Vec3::UnitZ()).toRotationMatrix();
@@ -76,39 +76,39 @@ TEST_F(PerformanceTest, LimbsPointAsTheSourcesDo) {
     }
   }
   for (size_t f = 0; f < p.frames.size(); f += 5) {
-    const PosedSkeleton a = forward_kinematics(standing(1), perform(p, f, standing(1)));
-    const PosedSkeleton b = forward_kinematics(apart, perform(p, f, apart));
+    const PosedSkeleton a = forward_kinematics(standing(1), perform_take(p, f, standing(1)));
+    const PosedSkeleton b = forward_kinematics(apart, perform_take(p, f, apart));
     for (const auto& [from, to] : {std::pair{1, 4}, {4, 7}, {2, 5}, {5, 8}, {16, 18}})
       EXPECT_LT(((a.joints[to] - a.joints[from]) - (b.joints[to] - b.joints[from])).norm(), 1e-9);
   }
 }
 
-TEST_F(PerformanceTest, RecordingsStandOnTheFloor) {
+TEST_F(SkeletonTakeTest, RecordingsStandOnTheFloor) {
   const std::string path = dir.write("07_01.bvh", bvh_test::text({}));
-  ASSERT_TRUE(holds_performance(path));
+  ASSERT_TRUE(holds_take(path));
   MotionOptions all;
   all.drop_leading = 0;
-  const Performance p = read_performance(path, all);
+  const SkeletonTake p = read_take(path, all);
   EXPECT_EQ(p.name, "07_01");
   EXPECT_EQ(p.frames.size(), 31u);
   std::vector<double> lowest;
   for (size_t f = 0; f < p.frames.size(); ++f)
-    lowest.push_back(lowest_foot(forward_kinematics(standing(1), perform(p, f, standing(1)))));
+    lowest.push_back(lowest_foot(forward_kinematics(standing(1), perform_take(p, f, standing(1)))));
   const Joints rest = standing(1);
   const double sole = std::min({rest[7].y(), rest[8].y(), rest[10].y(), rest[11].y()});
   EXPECT_NEAR(floor_height(lowest), sole, 0.03);
-  EXPECT_HAS(refusal_of([&] { read_performance(path, {}, "walk"); }), "leave --clip out");
+  EXPECT_HAS(refusal_of([&] { read_take(path, {}, "walk"); }), "leave --clip out");
 }
 
-TEST_F(PerformanceTest, WhatHoldsOne) {
-  EXPECT_TRUE(holds_performance(write(testing::mixamo_style())));
+TEST_F(SkeletonTakeTest, WhatHoldsOne) {
+  EXPECT_TRUE(holds_take(write(testing::mixamo_style())));
   testing::GlbParts still = CharacterMaker(known_, testing::mixamo_style()).parts;
   still.root.erase("animations");
-  EXPECT_FALSE(holds_performance(dir.write("still.glb", still.glb())));
-  EXPECT_FALSE(holds_performance(write(testing::vrm_style()))) << "names that say nothing";
-  EXPECT_FALSE(holds_performance(dir / "none.ply"));
-  EXPECT_FALSE(holds_performance(dir.path()));
-  EXPECT_THROW(holds_performance(dir.write("bad.glb", "glTF")), InputError);
+  EXPECT_FALSE(holds_take(dir.write("still.glb", still.glb())));
+  EXPECT_FALSE(holds_take(write(testing::vrm_style()))) << "names that say nothing";
+  EXPECT_FALSE(holds_take(dir / "none.ply"));
+  EXPECT_FALSE(holds_take(dir.path()));
+  EXPECT_THROW(holds_take(dir.write("bad.glb", "glTF")), InputError);
 }
 
 }  // namespace

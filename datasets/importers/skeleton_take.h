@@ -9,7 +9,7 @@
 
 namespace restage {
 
-struct Performance {
+struct SkeletonTake {
   std::string name;  ///< of the clip, else of the file
   Joints rest;       ///< the T-pose that turns are counted from, metres, y up, facing +z
   /// At 30 fps: world turns from the T-pose, and joints, in the world in which `rest` stands.
@@ -21,18 +21,17 @@ struct Performance {
 /// by what is in it: an animation, and a rig that find_rig() accepts. `why`: of an animated surface
 /// whose rig is not accepted, the reason. InputError where there is no surface either.
 /// `bones`: as MotionOptions::profile; a rig that is named by the user is taken or refused.
-bool holds_performance(const std::string& path, const std::string& bones = "",
-                       std::string* why = nullptr);
+bool holds_take(const std::string& path, const std::string& bones = "", std::string* why = nullptr);
 
 /// The options count as in read_bvh(), read_amc() and read_character(); `clip`: of a glTF file,
 /// empty: the first that moves the 22 joints.
-Performance read_performance(const std::string& path, const MotionOptions& options,
-                             const std::string& clip = "");
+SkeletonTake read_take(const std::string& path, const MotionOptions& options,
+                       const std::string& clip = "");
 
 /// One frame of it by a skeleton of these rest joints, which stands in T-pose on y = 0: the same
 /// world turns; thighs, shins, upper arms and forearms point where the source's do (whose rest
 /// directions may be others); the middle of the hips goes its way, scaled by the length of the legs
 /// about the origin of the floor. For the same skeleton all of it is exact.
-Pose perform(const Performance& performance, size_t frame, const Joints& rest);
+Pose perform_take(const SkeletonTake& take, size_t frame, const Joints& rest);
 
 }  // namespace restage

@@ -1,4 +1,4 @@
-#include "datasets/importers/performance.h"
+#include "datasets/importers/skeleton_take.h"
 
 #include <algorithm>
 #include <cmath>
@@ -23,17 +23,17 @@ double lowest_foot_of(const Joints& joints) {
 }
 
 /// Puts the rest pose upright over the place where frames have their floor: its feet stand on it.
-void stand_on_floor(Performance& p) {
+void stand_on_floor(SkeletonTake& p) {
   std::vector<double> lowest;
   for (const PosedSkeleton& frame : p.frames) lowest.push_back(lowest_foot(frame));
   const double lift = floor_height(std::move(lowest)) - lowest_foot_of(p.rest);
   for (Vec3& x : p.rest) x.y() += lift;
 }
 
-Performance of_recording(const std::string& path, const MotionOptions& options) {
+SkeletonTake of_recording(const std::string& path, const MotionOptions& options) {
   const bool amc = text::ends_in(path, {".amc", ".amc.xz"});
   MotionClip clip = amc ? read_amc(path, "", options) : read_bvh(path, options);
-  Performance out;
+  SkeletonTake out;
   out.name = stem_of(path);
   out.rest = clip.motion.rest;
   out.report = std::move(clip.report);
@@ -47,10 +47,10 @@ Performance of_recording(const std::string& path, const MotionOptions& options) 
   return out;
 }
 
-Performance of_gltf(const std::string& path, const MotionOptions& options,
-                    const std::string& name) {
+SkeletonTake of_gltf(const std::string& path, const MotionOptions& options,
+                     const std::string& name) {
   const Gltf file = read_gltf(path);
-  Performance out;
+  SkeletonTake out;
   out.report.file = path;
   const GltfRig rig = find_rig(file, options, out.report);
   // A body stands on its soles, wherever its file lets it rest; bare bones, where they rest.
@@ -61,7 +61,7 @@ Performance of_gltf(const std::string& path, const MotionOptions& options,
   out.frames = clip_poses(file, rig, clip, clip_frames(file, clip), out.report);
   // Where a file rests with its hips at the origin, its rest pose does not say where the floor is.
   constexpr double kNear = 0.1;  // metres
-  Performance standing = out;
+  SkeletonTake standing = out;
   stand_on_floor(standing);
   if (std::abs(standing.rest[0].y() - out.rest[0].y()) > kNear) {
     out.rest = standing.rest;
@@ -72,7 +72,7 @@ Performance of_gltf(const std::string& path, const MotionOptions& options,
 
 }  // namespace
 
-bool holds_performance(const std::string& path, const std::string& bones, std::string* why) {
+bool holds_take(const std::string& path, const std::string& bones, std::string* why) {
   if (is_recording(path)) return true;
   std::error_code error;
   if (!is_gltf_name(path) || std::filesystem::is_directory(path, error)) return false;
@@ -96,17 +96,17 @@ bool holds_performance(const std::string& path, const std::string& bones, std::s
   return false;
 }
 
-Performance read_performance(const std::string& path, const MotionOptions& options,
-                             const std::string& clip) {
+SkeletonTake read_take(const std::string& path, const MotionOptions& options,
+                       const std::string& clip) {
   if (!is_recording(path)) return of_gltf(path, options, clip);
   if (!clip.empty())
     throw InputError(path, "is one recording, of which no clip can be chosen", "leave --clip out");
   return of_recording(path, options);
 }
 
-Pose perform(const Performance& performance, size_t frame, const Joints& rest) {
-  const PosedSkeleton& source = performance.frames.at(frame);
-  const Joints& theirs = performance.rest;
+Pose perform_take(const SkeletonTake& take, size_t frame, const Joints& rest) {
+  const PosedSkeleton& source = take.frames.at(frame);
+  const Joints& theirs = take.rest;
   Rotations global = source.global;
   for (const Limb& limb : t_pose_limbs())
     global[limb.from] *=
