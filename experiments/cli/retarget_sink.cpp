@@ -1,6 +1,8 @@
 #include "experiments/cli/retarget_sink.h"
 
+#include <algorithm>
 #include <filesystem>
+#include <set>
 
 #include "autograd/base/format.h"
 #include "autograd/base/log.h"
@@ -61,8 +63,29 @@ Sink glb_sink(const SinkOptions& options, const Shown& shown) {
   return {[writer](const RetargetedFrame& f) { writer->push(f.pose, f.confidence); }, commit};
 }
 
-Sink bvh_sink(const SinkOptions& options, const Shown& shown) {
-  const auto writer = std::make_shared<BvhWriter>(options.out, rig_of(shown, options.out).rest);
+/// What a character's own bones are called; of joints without a bone: nothing. BVH ends names at
+/// blanks, so those become '_'.
+std::array<std::string, kJoints> bone_names(const GltfOwnRig& own) {
+  std::array<std::string, kJoints> out;
+  std::set<std::string> taken;
+  for (size_t j = 0; j < kJoints; ++j) {
+    const int node = j == kPelvis ? own.rig().hips : own.rig().node[j];
+    if (j != kPelvis && !own.rig().offset[j].isZero()) continue;
+    std::string name = own.file().nodes[static_cast<size_t>(node)].name;
+    std::replace_if(
+        name.begin(), name.end(),
+        [](char c) { return c == ' ' || (c >= 0 && c < ' ') || c == '{' || c == '}'; }, '_');
+    if (taken.insert(name).second) out[j] = name;
+  }
+  return out;
+}
+
+Sink bvh_sink(const SinkOptions& options, const Shown& shown,
+              const std::shared_ptr<const GltfOwnRig>& own) {
+  BvhWriterOptions how;
+  if (own) how.names = bone_names(*own);
+  const auto writer =
+      std::make_shared<BvhWriter>(options.out, rig_of(shown, options.out).rest, how);
   return {[writer](const RetargetedFrame& f) { writer->push(f.pose); },
           [writer](const Frames&) { writer->commit(); }};
 }
@@ -141,7 +164,7 @@ Sink make_sink(const SinkOptions& options, const Shown& shown,
                const std::string& target, const std::shared_ptr<const GltfOwnRig>& own) {
   if (is_character(options.out))
     return own ? own_sink(options, clip, target, own) : glb_sink(options, shown);
-  if (options.out.ends_with(".bvh")) return bvh_sink(options, shown);
+  if (options.out.ends_with(".bvh")) return bvh_sink(options, shown, own);
   if (options.out.ends_with(".h5")) return hdf5_sink(options, shown, source);
   return folder_sink(options, shown, target);
 }

@@ -22,19 +22,21 @@ bool is_leaf(int joint) {
 
 /// The file's text for a joint and all joints below it. Appends these joints to `order`, in the
 /// order in which the text lists them.
-void list_joint(const Joints& rest, int joint, int depth, double scale, std::string& text,
-                std::array<int, kJoints>& order, int& listed) {
+void list_joint(const Joints& rest, const BvhWriterOptions& options, int joint, int depth,
+                std::string& text, std::array<int, kJoints>& order, int& listed) {
+  const double scale = options.units_per_metre;
+  const std::string& own = options.names[static_cast<size_t>(joint)];
+  const std::string name = own.empty() ? std::string(kJointNames[joint]) : own;
   const std::string in(static_cast<size_t>(depth), '\t');
   const int parent = kParents[joint];
   const Vec3 offset = parent < 0 ? rest[joint] : Vec3(rest[joint] - rest[parent]);
   order[listed++] = joint;
-  text +=
-      in + (parent < 0 ? "ROOT " : "JOINT ") + std::string(kJointNames[joint]) + "\n" + in + "{\n";
+  text += in + (parent < 0 ? "ROOT " : "JOINT ") + name + "\n" + in + "{\n";
   text += in + "\tOFFSET " + vector_text(scale * offset) + "\n";
   text += in + (parent < 0 ? "\tCHANNELS 6 Xposition Yposition Zposition " : "\tCHANNELS 3 ") +
           "Zrotation Yrotation Xrotation\n";
   for (int child = joint + 1; child < kJoints; ++child)
-    if (kParents[child] == joint) list_joint(rest, child, depth + 1, scale, text, order, listed);
+    if (kParents[child] == joint) list_joint(rest, options, child, depth + 1, text, order, listed);
   // The format wants an end point behind the last joint of a chain; the skeleton has none. The end
   // point is put half a bone's length behind that joint.
   if (is_leaf(joint))
@@ -81,7 +83,7 @@ BvhWriter::BvhWriter(std::string path, const Joints& rest, BvhWriterOptions opti
   last_.fill(Vec3::Zero());
   std::string text = "HIERARCHY\n";
   int listed = 0;
-  list_joint(rest, 0, 0, options_.units_per_metre, text, order_, listed);
+  list_joint(rest, options_, 0, 0, text, order_, listed);
   text += "MOTION\nFrames: ";
   count_at_ = static_cast<long>(text.size());
   write(text + format("%*d\nFrame Time: %.16g\n", kCountWidth, 0, 1.0 / options_.fps));

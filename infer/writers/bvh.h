@@ -13,6 +13,8 @@ namespace restage {
 
 struct BvhWriterOptions {
   double fps = kFps;
+  /// What joints are called; an empty name: as in kJointNames.
+  std::array<std::string, kJoints> names = {};
   double units_per_metre = 100.0;  ///< BVH knows no unit; centimetres are what most programs expect
 };
 

@@ -51,6 +51,17 @@ class RealCharacters(CliTest):
             self.check(name + ".glb", name + ".glb", "--truth", truth, "--frames", "60", "--pa", ".02", "--mpjpe", ".03")
         self.check("mixa_t.glb", "mixa_t.glb", "--same", self.path("mixa_a.glb"))
 
+    def test_bvh_has_the_characters_own_names(self):
+        call = ["retarget", "--source", os.path.join(CHARACTERS, "source_dance.glb"), "--target", os.path.join(CHARACTERS, "mixa_a.glb")]
+        self.done(*call, "--out", "dance.bvh")
+        text = self.bytes("dance.bvh").decode()
+        self.assertIn("ROOT mixamorig:Hips\n", text)
+        self.assertEqual(text.count("mixamorig:"), 22)
+        # It comes back in by those names, and does the same.
+        self.done(*call[:1], "--source", "dance.bvh", *call[3:], "--out", "again.glb")
+        truth = os.path.join(CHARACTERS, "truth_a.npz")
+        self.check("mixa_a.glb", "again.glb", "--truth", truth, "--frames", "60", "--pa", ".002", "--mpjpe", ".02")
+
     def test_vertices_are_those_that_the_document_shows(self):
         call = ["retarget", "--source", os.path.join(CHARACTERS, "source_dance.glb"), "--target", os.path.join(CHARACTERS, "mixa_a.glb"),
                 "--weights", STANDARD]
