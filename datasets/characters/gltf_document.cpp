@@ -20,6 +20,18 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kData = "data:application/octet-stream;base64,";
 
+/// Runs what reads parts of the structure that read_gltf() does not look at. InputError if they are
+/// of another kind than the format says.
+template <class Work>
+auto checked_kinds(const std::string& path, const Work& work) {
+  try {
+    return work();
+  } catch (const Json::exception&) {
+  } catch (const std::out_of_range&) {
+  }
+  gltf::broken(path, "has parts that are no glTF");
+}
+
 bool is_external(const Json& item) {
   return item.contains("uri") && !item["uri"].get_ref<const std::string&>().starts_with("data:");
 }
@@ -51,14 +63,19 @@ struct GltfDocument::State {
   bool has_binary = false;
   std::string added;  ///< of a text: the bytes of the new animation
 
+  /// A list of the document, which becomes an empty one where there is none.
   Json& list(const char* name) {
     Json& out = json[name];
-    if (!out.is_array()) out = Json::array();
+    if (out.is_null()) out = Json::array();
+    if (!out.is_array()) gltf::broken(path, cat("has ", name, " that are no list"));
     return out;
   }
 
   /// The files that the document names.
   std::vector<std::string> externals() const {
+    return checked_kinds(path, [&] { return list_externals(); });
+  }
+  std::vector<std::string> list_externals() const {
     std::vector<std::string> out;
     for (const char* name : {"buffers", "images"})
       if (json.contains(name))
@@ -168,8 +185,9 @@ void GltfDocument::check_place(const std::string& out) const {
   std::error_code error;
   if (fs::equivalent(from, to, error)) return;
   for (const std::string& uri : state_->externals()) {
+    const std::string content = gltf::read_neighbour(uri, state_->path);  // refuses other folders
     const std::string file = (to / gltf::decode_percent(uri)).string();
-    if (is_there(file) && read_file(file) != gltf::read_neighbour(uri, state_->path))
+    if (is_there(file) && read_file(file) != content)
       throw InputError(file, "is another file than the one of this name beside the target",
                        "write into another folder, or end --out in .glb");
   }
@@ -244,11 +262,11 @@ void GltfDocument::write(const std::string& out) const {
         if (!is_there(file.string()))
           write_file_atomically(file.string(), gltf::read_neighbour(uri, s.path));
       }
-    write_file_atomically(out, s.as_text().dump(1) + "\n");
+    write_file_atomically(out, checked_kinds(s.path, [&] { return s.as_text().dump(1) + "\n"; }));
     return;
   }
   std::string bytes;
-  const std::string text = s.as_binary(&bytes).dump();
+  const std::string text = checked_kinds(s.path, [&] { return s.as_binary(&bytes).dump(); });
   const uint64_t size =
       12 + 8 + (text.size() + 3) / 4 * 4 + (bytes.empty() ? 0 : 8 + (bytes.size() + 3) / 4 * 4);
   if (size > UINT32_MAX)

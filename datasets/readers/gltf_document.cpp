@@ -200,7 +200,7 @@ std::string decode_percent(const std::string& text) {
 std::string read_neighbour(const std::string& uri, const std::string& path) {
   const std::string name = decode_percent(uri);
   const auto refuse = [&](const std::string& what) {
-    throw InputError(path, "names the buffer " + text::quote(name) + ", " + what,
+    throw InputError(path, "names the file " + text::quote(name) + ", " + what,
                      "put all files of a character into one folder, or export a .glb");
   };
   if (name.find('\0') != std::string::npos || name.find("://") != std::string::npos)

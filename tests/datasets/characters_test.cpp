@@ -184,6 +184,24 @@ TEST_F(Characters, TextsAndTheFilesThatTheyName) {
   EXPECT_FALSE(std::filesystem::exists(dir / "d/out.gltf"));
 }
 
+TEST_F(Characters, PartsThatNobodyReadsMayBeWrong) {
+  const GlbParts good = CharacterMaker(known_, testing::plain_style()).parts;
+  std::filesystem::create_directories(dir / "b");
+  const auto refused = [&](const char* name, const GltfJson& value, const std::string& out) {
+    GlbParts parts = good;
+    parts.root[name] = value;
+    const std::string in = write("in.glb", parts);
+    EXPECT_HAS(refusal_of([&] { performed(in, dir / out); }), "in.glb: ");
+    EXPECT_FALSE(std::filesystem::exists(dir / out)) << value;
+  };
+  for (const char* out : {"out.glb", "b/out.gltf"})
+    for (const GltfJson& uri : {GltfJson(5), GltfJson("no_such.png"), GltfJson("../outside.png")})
+      refused("images", GltfJson::array({{{"uri", uri}}}), out);
+  GltfJson views = good.root["bufferViews"];
+  views.push_back({{"buffer", 9}, {"byteLength", 4}});
+  refused("bufferViews", views, "out.glb");
+}
+
 TEST_F(Characters, TheAnimationAlone) {
   const std::string in = write("in.glb", CharacterMaker(known_, testing::unreal_style()).parts);
   GltfClipWriter::Options alone;
