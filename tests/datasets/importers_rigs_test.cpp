@@ -149,10 +149,12 @@ TEST(ImportersRigs, EveryFamilyIsFoundInEveryDecoration) {
       decoration.change(rig.skeleton);
       for (int& bone : rig.bone) bone += bone >= 0 ? decoration.moved : 0;
       // "lfemurX" is two words by its capital alone.
-      if (list.name == std::string("jedi academy") && decoration.name == std::string("lower case"))
+      if (list.name == std::string("jedi academy") &&
+          decoration.name == std::string("lower case")) {
         EXPECT_HAS(refusal(rig), "left_hip");
-      else
+      } else {
         expect_right(rig, std::string(list.name) + ", " + decoration.name);
+      }
     }
   }
 }

@@ -85,7 +85,9 @@ TEST_F(MeshTemplateTest, PlyKeepsItsFormatColoursAndElements) {
     EXPECT_TRUE(made.ends_with(tail));
     for (const char colour : {'\xC8', '\xCB'})
       EXPECT_EQ(format == "ascii" || made.find(colour) != made.npos, true);
-    if (format == "ascii") EXPECT_HAS(made, "3 200 1 2\n");
+    if (format == "ascii") {
+      EXPECT_HAS(made, "3 200 1 2\n");
+    }
   }
 }
 
