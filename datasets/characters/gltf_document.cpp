@@ -11,6 +11,7 @@
 #include "datasets/readers/errors.h"
 #include "datasets/readers/gltf_detail.h"
 #include "datasets/readers/text.h"
+#include "nn/geometry/glb_file.h"
 
 namespace restage {
 namespace {
@@ -44,15 +45,7 @@ std::string mime_of(const std::string& uri) {
   return "image/png";
 }
 
-void pad(std::string& bytes, char with = '\0') { bytes.resize((bytes.size() + 3) / 4 * 4, with); }
-
-void append_chunk(std::string& file, const char* kind, std::string content, char padding) {
-  pad(content, padding);
-  const auto length = static_cast<uint32_t>(content.size());
-  file.append(reinterpret_cast<const char*>(&length), 4);
-  file.append(kind, 4);
-  file += content;
-}
+void pad(std::string& bytes) { bytes.resize((bytes.size() + 3) / 4 * 4, '\0'); }
 
 }  // namespace
 
@@ -267,16 +260,7 @@ void GltfDocument::write(const std::string& out) const {
   }
   std::string bytes;
   const std::string text = checked_kinds(s.path, [&] { return s.as_binary(&bytes).dump(); });
-  const uint64_t size =
-      12 + 8 + (text.size() + 3) / 4 * 4 + (bytes.empty() ? 0 : 8 + (bytes.size() + 3) / 4 * 4);
-  if (size > UINT32_MAX)
-    throw WorkError(out + ": a GLB cannot hold more than 4 GiB; write shorter pieces");
-  std::string file = "glTF";
-  const std::array<uint32_t, 2> header = {2, static_cast<uint32_t>(size)};
-  file.append(reinterpret_cast<const char*>(header.data()), 8);
-  append_chunk(file, "JSON", text, ' ');
-  if (!bytes.empty()) append_chunk(file, "BIN\0", bytes, '\0');
-  write_file_atomically(out, file);
+  write_file_atomically(out, glb_bytes(text, std::move(bytes), out));
 }
 
 }  // namespace restage

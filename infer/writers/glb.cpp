@@ -7,6 +7,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "nn/geometry/glb_file.h"
 #include "nn/geometry/mesh_file.h"
 
 namespace restage {
@@ -157,14 +158,6 @@ Json animation(Buffer& buffer, const std::vector<std::array<float, 4>>& turns,
     channel(j, "rotation", buffer.add(track.data(), frames * 16, frames, f32, "VEC4", none));
   }
   return {{"name", "motion"}, {"channels", channels}, {"samplers", samplers}};
-}
-
-void append_chunk(std::string& file, const char* kind, std::string content, char padding) {
-  content.resize((content.size() + 3) / 4 * 4, padding);
-  const auto length = static_cast<uint32_t>(content.size());
-  file.append(reinterpret_cast<const char*>(&length), 4);
-  file.append(kind, 4);
-  file += content;
 }
 
 std::array<float, 4> renormalise(const std::array<double, 4>& strongest) {
@@ -323,16 +316,7 @@ std::string GlbWriter::bytes() const {
   if (!confidence_.empty()) root["animations"][0]["extras"]["confidence"] = confidence_;
   if (!filled_.empty()) root["animations"][0]["extras"]["filled"] = filled_;
   buffer.describe(root);
-  const std::string text = root.dump();
-  const uint64_t size = 12 + 8 + (text.size() + 3) / 4 * 4 + 8 + buffer.bytes().size();
-  if (size > UINT32_MAX)
-    throw WorkError(path_ + ": a GLB cannot hold more than 4 GiB; write shorter pieces");
-  std::string file = "glTF";
-  const std::array<uint32_t, 2> header = {2, static_cast<uint32_t>(size)};
-  file.append(reinterpret_cast<const char*>(header.data()), 8);
-  append_chunk(file, "JSON", text, ' ');
-  append_chunk(file, "BIN\0", buffer.bytes(), '\0');
-  return file;
+  return glb_bytes(root.dump(), buffer.bytes(), path_);
 }
 
 InfluenceError GlbWriter::commit() {
