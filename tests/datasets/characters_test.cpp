@@ -202,6 +202,27 @@ TEST_F(Characters, PartsThatNobodyReadsMayBeWrong) {
   refused("bufferViews", views, "out.glb");
 }
 
+/// Players interpolate the four numbers: q and -q next to each other would turn the long way round.
+TEST_F(Characters, AFullTurnHasNoFlips) {
+  const std::string in = write("in.glb", CharacterMaker(known_, testing::mixamo_style()).parts);
+  const TargetMesh target = read_target(in);
+  GltfClipWriter writer(dir / "out.glb", in, target.own, {});
+  for (int f = 0; f < 30; ++f) {
+    Pose spin = pose(0);
+    spin.local[0] = Eigen::AngleAxisd(0.3 * f, Vec3::UnitY()).toRotationMatrix();
+    writer.push(spin);
+  }
+  writer.commit();
+  const Gltf file = read_gltf(dir / "out.glb");
+  for (const GltfTrack& track : find_clip(file, "retargeted").tracks) {
+    if (track.path != GltfTrack::Path::rotation) continue;
+    for (size_t k = 4; k < track.values.size(); k += 4)
+      EXPECT_GT(Eigen::Map<const Eigen::Vector4f>(&track.values[k])
+                    .dot(Eigen::Map<const Eigen::Vector4f>(&track.values[k - 4])),
+                0);
+  }
+}
+
 TEST_F(Characters, TheAnimationAlone) {
   const std::string in = write("in.glb", CharacterMaker(known_, testing::unreal_style()).parts);
   GltfClipWriter::Options alone;
