@@ -43,13 +43,20 @@ class RealCharacters(CliTest):
     def test_from_clouds(self):
         source = os.path.join(CHARACTERS, "source_dance.glb")
         for name in ("mixa_t", "mixa_a"):
-            call = ["retarget", "--source", source, "--target", os.path.join(CHARACTERS, name + ".glb"), "--weights", STANDARD]
+            call = ["retarget", "--source", source, "--from-surface", "--target", os.path.join(CHARACTERS, name + ".glb"), "--weights", STANDARD]
             self.done(*call, "--out", name + ".glb")
             self.done(*call, "--out", "again.glb")
             self.assertEqual(self.bytes("again.glb"), self.bytes(name + ".glb"))
             truth = os.path.join(CHARACTERS, "truth_%s.npz" % name[-1])
             self.check(name + ".glb", name + ".glb", "--truth", truth, "--frames", "60", "--pa", ".02", "--mpjpe", ".03")
         self.check("mixa_t.glb", "mixa_t.glb", "--same", self.path("mixa_a.glb"))
+
+    def test_from_the_skeleton_of_the_same_person(self):
+        for source, target in (("mixa_t", "mixa_a"), ("mixa_a", "mixa_t")):
+            self.done("retarget", "--source", os.path.join(CHARACTERS, "ideal", source + ".glb"), "--target",
+                      os.path.join(CHARACTERS, target + ".glb"), "--out", "out.glb")
+            truth = os.path.join(CHARACTERS, "truth_%s.npz" % target[-1])
+            self.check(target + ".glb", "out.glb", "--truth", truth, "--frames", "60", "--pa", ".001", "--mpjpe", ".001")
 
     def test_bvh_has_the_characters_own_names(self):
         call = ["retarget", "--source", os.path.join(CHARACTERS, "source_dance.glb"), "--target", os.path.join(CHARACTERS, "mixa_a.glb")]
