@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <tuple>
@@ -363,21 +364,18 @@ bool is_amass_shape(const Npz& file) {
          names.body.empty() && !named_cloud(file);
 }
 
-Motion import_amass(const Npz& file, BodyModels& models, const MotionOptions& options,
-                    ImportReport& report) {
+namespace {
+
+/// The body that the file's turns are done by.
+using SkeletonOf = std::function<Joints(const BodyParameters& names, const BodyRotations&)>;
+
+Motion import_parameters(const Npz& file, const MotionOptions& options, const SkeletonOf& skeleton,
+                         ImportReport& report) {
   report.file = file.path();
   const BodyParameters names = body_parameters(file);
   BodyRotations rotations = read_body_rotations(file, names);
   check_radians(file, rotations, options.force, report);
-  const std::optional<SmplFamily> family = family_of(file, rotations, report);
-  report.fact("layout", cat(family ? to_string(*family) : "22 joints", ", ", rotations.layout));
-  const std::string gender = text_of(file, "gender", report);
-  report.fact("gender", gender.empty() ? "not stated" : gender);
-  const SmplModel& model = models.find(family, gender, file.path(), report.remarks);
-  const Betas betas = betas_of(file, names.betas, rotations.local.size(), report);
-  report.fact("body model", cat(model.path(), ", ", std::min(betas.size(), model.shapes()), " of ",
-                                betas.size(), " betas"));
-  const Joints rest = model.joints(betas);
+  const Joints rest = skeleton(names, rotations);
   SourceMotion motion = read_motion(file, names, std::move(rotations), rest, options, report);
   turn_upright(motion, file, options.rest.up, report);
   if (lower_case(names.trans).find("cam_t") != std::string::npos)
@@ -404,6 +402,38 @@ Motion import_amass(const Npz& file, BodyModels& models, const MotionOptions& op
   out.split = options.split;
   out.action = options.action;
   return out;
+}
+
+void report_layout(const std::optional<SmplFamily>& family, const BodyRotations& rotations,
+                   ImportReport& report) {
+  report.fact("layout", cat(family ? to_string(*family) : "22 joints", ", ", rotations.layout));
+}
+
+}  // namespace
+
+Motion import_amass(const Npz& file, BodyModels& models, const MotionOptions& options,
+                    ImportReport& report) {
+  const auto skeleton = [&](const BodyParameters& names, const BodyRotations& rotations) {
+    const std::optional<SmplFamily> family = family_of(file, rotations, report);
+    report_layout(family, rotations, report);
+    const std::string gender = text_of(file, "gender", report);
+    report.fact("gender", gender.empty() ? "not stated" : gender);
+    const SmplModel& model = models.find(family, gender, file.path(), report.remarks);
+    const Betas betas = betas_of(file, names.betas, rotations.local.size(), report);
+    report.fact("body model", cat(model.path(), ", ", std::min(betas.size(), model.shapes()),
+                                  " of ", betas.size(), " betas"));
+    return model.joints(betas);
+  };
+  return import_parameters(file, options, skeleton, report);
+}
+
+Motion import_amass(const Npz& file, const Joints& stand_in, const MotionOptions& options,
+                    ImportReport& report) {
+  const auto skeleton = [&](const BodyParameters&, const BodyRotations& rotations) {
+    report_layout(family_of(file, rotations, report), rotations, report);
+    return stand_in;
+  };
+  return import_parameters(file, options, skeleton, report);
 }
 
 }  // namespace restage

@@ -58,5 +58,9 @@ bool is_amass_shape(const Npz& file);
 /// translation, no rate, not finite, no model that fits.
 Motion import_amass(const Npz& file, BodyModels& models, const MotionOptions& options,
                     ImportReport& report);
+/// The same turns and path by another skeleton, where no body model is at hand: rest joints,
+/// metres, T-pose.
+Motion import_amass(const Npz& file, const Joints& stand_in, const MotionOptions& options,
+                    ImportReport& report);
 
 }  // namespace restage

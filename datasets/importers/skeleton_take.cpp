@@ -5,11 +5,13 @@
 #include <filesystem>
 
 #include "autograd/base/format.h"
+#include "datasets/importers/amass.h"
 #include "datasets/importers/amc.h"
 #include "datasets/importers/bvh.h"
 #include "datasets/importers/gltf_character.h"
 #include "datasets/readers/errors.h"
 #include "datasets/readers/text.h"
+#include "datasets/schema.h"
 
 namespace restage {
 namespace {
@@ -17,6 +19,8 @@ namespace {
 bool is_recording(const std::string& path) {
   return text::ends_in(path, {".bvh", ".bvh.xz", ".amc", ".amc.xz"});
 }
+
+bool is_motions_name(const std::string& path) { return text::ends_in(path, {".h5", ".hdf5"}); }
 
 double lowest_foot_of(const Joints& joints) {
   return std::min({joints[7].y(), joints[8].y(), joints[10].y(), joints[11].y()});
@@ -28,6 +32,89 @@ void stand_on_floor(SkeletonTake& p) {
   for (const PosedSkeleton& frame : p.frames) lowest.push_back(lowest_foot(frame));
   const double lift = floor_height(std::move(lowest)) - lowest_foot_of(p.rest);
   for (Vec3& x : p.rest) x.y() += lift;
+}
+
+SkeletonTake of_motion(const Motion& motion, ImportReport report) {
+  SkeletonTake out;
+  out.name = motion.id;
+  out.rest = motion.rest;
+  out.report = std::move(report);
+  const Vec3 to_pelvis = out.rest[kPelvis] - 0.5 * (out.rest[kLeftHip] + out.rest[kRightHip]);
+  for (size_t f = 0; f < motion.frames(); ++f) {
+    Rotations global;
+    for (size_t j = 0; j < kJoints; ++j)
+      global[j] = motion.global[f][j].cast<double>().normalized().toRotationMatrix();
+    const Vec3 root = motion.hips[f].cast<double>() + global[kPelvis] * to_pelvis;
+    out.frames.push_back(forward_kinematics(out.rest, {to_local(global), root}));
+  }
+  stand_on_floor(out);
+  return out;
+}
+
+/// What a file of motions is asked for; there must be one answer.
+SkeletonTake of_motions(const std::string& path, const TakeOptions& options) {
+  const std::vector<Motion> all = read_motions(path);
+  size_t chosen = 0;
+  if (options.sequence) {
+    chosen = static_cast<size_t>(*options.sequence);
+    if (*options.sequence < 0 || chosen >= all.size())
+      throw InputError(path, cat("holds ", all.size(), " motions, no number ", *options.sequence),
+                       "count them from 0");
+  } else if (!options.clip.empty()) {
+    const auto named =
+        std::find_if(all.begin(), all.end(), [&](const Motion& m) { return m.id == options.clip; });
+    if (named == all.end())
+      throw InputError(path, "holds no motion " + text::quote(options.clip),
+                       "list them with restage data inspect");
+    chosen = static_cast<size_t>(named - all.begin());
+  } else if (all.size() > 1) {
+    throw InputError(
+        path, cat("holds ", all.size(), " motions, of which the first is ", text::quote(all[0].id)),
+        "choose one with --clip ID or --sequence N, from 0");
+  }
+  ImportReport report;
+  report.file = path;
+  report.fact("motion", text::quote(all[chosen].id));
+  return of_motion(all[chosen], std::move(report));
+}
+
+SkeletonTake of_parameters(const std::string& path, const TakeOptions& options) {
+  constexpr double kLegs = 0.8;  // metres, hip to ankle, of the mean body of such models
+  const Npz file(path);
+  MotionOptions motion = options.motion;
+  motion.id = stem_of(path);
+  ImportReport report;
+  if (!options.body_model.empty()) {
+    BodyModels models(options.body_model);
+    const Motion read = import_amass(file, models, motion, report);
+    return of_motion(read, std::move(report));
+  }
+  Joints stand_in = options.like;
+  // `trans` is where the pelvis is, but for some 25 cm that each model has its own way.
+  for (Vec3& x : stand_in)
+    x = kLegs / std::max(leg_length(options.like), 1e-9) * (x - options.like[kPelvis]);
+  const Motion read = import_amass(file, stand_in, motion, report);
+  report.remark(
+      format("no body model: turns go over as they are, and the path as that of a person with legs "
+             "of %.1f m (--body-model FILE gives this person's)",
+             kLegs));
+  return of_motion(read, std::move(report));
+}
+
+bool holds_motions(const std::string& path) {
+  try {
+    return inspect(path).counts.contains("motions");
+  } catch (const InputError&) {
+    return false;  // what reads clouds says what is wrong
+  }
+}
+
+bool holds_parameters(const std::string& path) {
+  try {
+    return is_amass_motion(Npz(path));
+  } catch (const InputError&) {
+    return false;
+  }
 }
 
 SkeletonTake of_recording(const std::string& path, const MotionOptions& options) {
@@ -75,7 +162,10 @@ SkeletonTake of_gltf(const std::string& path, const MotionOptions& options,
 bool holds_take(const std::string& path, const std::string& bones, std::string* why) {
   if (is_recording(path)) return true;
   std::error_code error;
-  if (!is_gltf_name(path) || std::filesystem::is_directory(path, error)) return false;
+  if (std::filesystem::is_directory(path, error)) return false;
+  if (is_motions_name(path)) return holds_motions(path);
+  if (text::ends_in(path, {".npz"})) return holds_parameters(path);
+  if (!is_gltf_name(path)) return false;
   const Gltf file = read_gltf(path);
   if (file.clips.empty()) return false;
   try {
@@ -96,12 +186,12 @@ bool holds_take(const std::string& path, const std::string& bones, std::string* 
   return false;
 }
 
-SkeletonTake read_take(const std::string& path, const MotionOptions& options,
-                       const std::string& clip) {
-  if (!is_recording(path)) return of_gltf(path, options, clip);
-  if (!clip.empty())
+SkeletonTake read_take(const std::string& path, const TakeOptions& options) {
+  if (is_gltf_name(path)) return of_gltf(path, options.motion, options.clip);
+  if (is_motions_name(path)) return of_motions(path, options);
+  if (!options.clip.empty())
     throw InputError(path, "is one recording, of which no clip can be chosen", "leave --clip out");
-  return of_recording(path, options);
+  return is_recording(path) ? of_recording(path, options.motion) : of_parameters(path, options);
 }
 
 Pose perform_take(const SkeletonTake& take, size_t frame, const Joints& rest) {

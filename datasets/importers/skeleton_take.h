@@ -1,6 +1,7 @@
 // What a skeleton does in its file, to be done by another skeleton exactly: no network, no surface.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,15 +19,26 @@ struct SkeletonTake {
 };
 
 /// Whether the file holds a skeleton that moves: BVH and AMC recordings by their names; a glTF file
-/// by what is in it: an animation, and a rig that find_rig() accepts. `why`: of an animated surface
-/// whose rig is not accepted, the reason. InputError where there is no surface either.
+/// by what is in it: an animation, and a rig that find_rig() accepts; an NPZ with a body model's
+/// parameters (AMASS and its kin); an HDF5 file of motions. `why`: of an animated surface whose rig
+/// is not accepted, the reason. InputError where there is no surface either.
 /// `bones`: as MotionOptions::profile; a rig that is named by the user is taken or refused.
 bool holds_take(const std::string& path, const std::string& bones = "", std::string* why = nullptr);
 
-/// The options count as in read_bvh(), read_amc() and read_character(); `clip`: of a glTF file,
-/// empty: the first that moves the 22 joints.
-SkeletonTake read_take(const std::string& path, const MotionOptions& options,
-                       const std::string& clip = "");
+struct TakeOptions {
+  MotionOptions motion;  ///< count as in read_bvh(), read_amc(), read_character(), import_amass()
+  /// Of a glTF file its animation, empty: the first that moves the 22 joints. Of a file of motions
+  /// the motion's id.
+  std::string clip;
+  std::optional<int64_t> sequence;  ///< of a file of motions, from 0
+  /// Of a body model's parameters: the model or a folder of models (BodyModels). Empty: `like`.
+  std::string body_model;
+  /// Rest joints of who performs. Where parameters come without a body model, a skeleton of this
+  /// shape with an adult's legs stands in: turns go over as they are.
+  Joints like{};
+};
+
+SkeletonTake read_take(const std::string& path, const TakeOptions& options);
 
 /// One frame of it by a skeleton of these rest joints, which stands in T-pose on y = 0: the same
 /// world turns; thighs, shins, upper arms and forearms point where the source's do (whose rest

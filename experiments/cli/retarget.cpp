@@ -32,7 +32,7 @@ void check(const RetargetCommand& c) {
     throw InputError("", "--samples is out of range", "give 1 to 256");
   std::vector<std::string> inputs = {c.source.path, c.target};
   if (!c.weights.empty()) inputs.push_back(weights_path(c.weights));
-  for (const std::string& more : {c.rest, c.bones, c.source_bones})
+  for (const std::string& more : {c.rest, c.bones, c.source_bones, c.body_model})
     if (!more.empty()) inputs.push_back(more);
   check_output(c.to.out, inputs);
 }
@@ -223,9 +223,9 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   std::string no_skeleton;
   if (!c.from_surface && holds_take(c.source.path, c.source_bones, &no_skeleton))
     return run_take(c, common);
-  if (!c.source_bones.empty())
-    throw InputError(c.source.path, "is looked at as a surface, which has no bones to name",
-                     "leave --source-bones out");
+  if (!c.source_bones.empty() || !c.body_model.empty())
+    throw InputError(c.source.path, "is looked at as a surface, which has no skeleton",
+                     "leave --source-bones and --body-model out");
   SystemInput input = load_input(c, common);
   Source source(c.source, common.max_memory);
   if (source.frames() == 0)
@@ -326,7 +326,7 @@ void add_retarget(Program& program) {
   app.add_option(
          "--source", c.source.path,
          "folder of clouds, file of them (HDF5, NPZ, NPY); or a skeleton's motion, which is taken "
-         "over exactly: BVH, AMC, glTF, VRM, VRMA")
+         "over exactly: BVH, AMC, glTF, VRM, VRMA, AMASS (.npz), our motions (.h5)")
       .required();
   app.add_option("--target", c.target,
                  "mesh or cloud in T-pose, y up, facing +z; or a glTF character")
@@ -334,6 +334,8 @@ void add_retarget(Program& program) {
   app.add_option("--bones", c.bones,
                  "which bone of a glTF target is which joint, a .yaml file or a known family");
   app.add_option("--source-bones", c.source_bones, "the same of a source's skeleton");
+  app.add_option("--body-model", c.body_model,
+                 "of an AMASS source its SMPL model (.npz), or a folder of them");
   app.add_option("--weights", c.weights,
                  "weights file, run or artifact (default: the standard ones)");
   app.add_option("--system", c.system, help_of_systems()).show_default();
@@ -346,7 +348,8 @@ void add_retarget(Program& program) {
                  "of the animation that a rigged target's file gets (default: the source's name)");
   app.add_flag("--animation-only", c.to.animation_only,
                "of a rigged target only nodes and the animation, without meshes");
-  app.add_option("--clip", c.source.clip, "animation of a glTF source (default: the first)");
+  app.add_option("--clip", c.source.clip,
+                 "animation of a glTF source (default: the first), or motion of a file of motions");
   app.add_option("--sequence", c.source.sequence, "which sequence of an HDF5 source, from 0");
   app.add_option("--fps", c.source.fps,
                  "frames per second of the source (default: the file's, else 30)");

@@ -13,7 +13,7 @@ namespace restage::cli {
 
 struct RetargetCommand {
   SourceRecord source;
-  std::string target, bones, source_bones, weights, device = "cpu";
+  std::string target, bones, source_bones, body_model, weights, device = "cpu";
   std::string system = "chain", rest;
   SinkOptions to;
   RetargetOptions options;

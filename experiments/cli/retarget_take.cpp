@@ -1,4 +1,4 @@
-// restage retarget of a source that has a skeleton: BVH, AMC, glTF, VRM animations.
+// restage retarget of a source that has a skeleton: BVH, AMC, glTF, VRM animations, AMASS, motions.
 #include "autograd/base/log.h"
 #include "datasets/doctor/examine.h"
 #include "datasets/importers/skeleton_take.h"
@@ -16,7 +16,6 @@ void check_options(const RetargetCommand& c) {
                      "has a skeleton, which is taken over as it is; " + option + " is for clouds",
                      "leave " + option + " out, or add --from-surface");
   };
-  if (c.source.sequence) refuse("--sequence");
   if (c.system != "chain") refuse("--system");
   if (c.options.samples != usual.samples) refuse("--samples");
   if (c.options.anchor != usual.anchor) refuse("--anchor");
@@ -28,13 +27,17 @@ void check_options(const RetargetCommand& c) {
                      "leave --fps out");
 }
 
-MotionOptions options_of(const RetargetCommand& c) {
-  MotionOptions out;
-  if (c.source.scale != 1) out.scale = c.source.scale;
-  if (c.source.up != "y") out.rest.up = parse_axis(c.source.up, "--source-up");
-  if (c.source.fps) out.fps = *c.source.fps;
-  out.force = c.options.force;
-  out.profile = c.source_bones;
+TakeOptions options_of(const RetargetCommand& c, const Joints& performer) {
+  TakeOptions out;
+  if (c.source.scale != 1) out.motion.scale = c.source.scale;
+  if (c.source.up != "y") out.motion.rest.up = parse_axis(c.source.up, "--source-up");
+  if (c.source.fps) out.motion.fps = *c.source.fps;
+  out.motion.force = c.options.force;
+  out.motion.profile = c.source_bones;
+  out.clip = c.source.clip;
+  out.sequence = c.source.sequence;
+  out.body_model = c.body_model;
+  out.like = performer;
   return out;
 }
 
@@ -42,7 +45,6 @@ MotionOptions options_of(const RetargetCommand& c) {
 
 int run_take(const RetargetCommand& c, const Common& common) {
   check_options(c);
-  const SkeletonTake take = read_take(c.source.path, options_of(c), c.source.clip);
   TargetMesh target = read_target(c.target, c.bones);
   std::unique_ptr<System> system;  // poses a target that has no rig of its own
   if (!target.own) {
@@ -52,6 +54,7 @@ int run_take(const RetargetCommand& c, const Common& common) {
   SkinWeights weights;
   if (target.own) weights = target.own->weights();
   const Joints& rest = target.own ? target.own->rest() : *system->target_joints();
+  const SkeletonTake take = read_take(c.source.path, options_of(c, rest));
   std::optional<SystemRig> rig;
   if (target.own) rig.emplace(SystemRig{rest, weights});
   const Shown shown{target.own ? target.own->mesh() : system->target(),

@@ -88,7 +88,7 @@ TEST_F(SkeletonTakeTest, RecordingsStandOnTheFloor) {
   ASSERT_TRUE(holds_take(path));
   MotionOptions all;
   all.drop_leading = 0;
-  const SkeletonTake p = read_take(path, all);
+  const SkeletonTake p = read_take(path, {.motion = all});
   EXPECT_EQ(p.name, "07_01");
   EXPECT_EQ(p.frames.size(), 31u);
   std::vector<double> lowest;
@@ -97,7 +97,7 @@ TEST_F(SkeletonTakeTest, RecordingsStandOnTheFloor) {
   const Joints rest = standing(1);
   const double sole = std::min({rest[7].y(), rest[8].y(), rest[10].y(), rest[11].y()});
   EXPECT_NEAR(floor_height(lowest), sole, 0.03);
-  EXPECT_HAS(refusal_of([&] { read_take(path, {}, "walk"); }), "leave --clip out");
+  EXPECT_HAS(refusal_of([&] { read_take(path, {.clip = "walk"}); }), "leave --clip out");
 }
 
 TEST_F(SkeletonTakeTest, WhatHoldsOne) {
