@@ -19,7 +19,7 @@ std::span<const RetargetedFrame> OwnSkin::placed(std::span<const RetargetedFrame
     out.confidence = frames[f].confidence;
     out.filled = frames[f].filled;
     out.joints.emplace();
-    rig_->place(out.pose, &*out.joints, &out.vertices);
+    rig_->place(out.pose, nullptr, &*out.joints, &out.vertices);
   }
   seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return {frames_.data(), frames.size()};
@@ -28,7 +28,7 @@ std::span<const RetargetedFrame> OwnSkin::placed(std::span<const RetargetedFrame
 Points OwnSkin::posed(const Pose& pose) const {
   Joints joints;
   Points out;
-  rig_->place(pose, &joints, &out);
+  rig_->place(pose, nullptr, &joints, &out);
   return out;
 }
 

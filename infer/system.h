@@ -9,6 +9,7 @@
 #include <string>
 
 #include "nn/geometry/body.h"
+#include "nn/geometry/hands.h"
 
 namespace restage {
 
@@ -17,6 +18,8 @@ namespace restage {
 struct RetargetedFrame {
   /// Local rotations; the pelvis in the world, metres. Means nothing where there are no `joints`.
   Pose pose;
+  /// Of a source that has fingers, those of its skeleton; networks find none.
+  std::optional<FingerTurns> fingers;
   /// The joints of `pose` in the world, metres. A system without a rig() has none.
   std::optional<Joints> joints;
   Points vertices;  ///< in the world, metres, in the target's order

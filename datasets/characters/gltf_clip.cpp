@@ -21,12 +21,14 @@ GltfClipWriter::GltfClipWriter(std::string out, const std::string& in,
   GltfDocument(content_, in_).check_place(out_);
 }
 
-void GltfClipWriter::push(const Pose& pose, std::optional<double> confidence) {
-  const NodeTurns turns = rig_->turns(pose);
+void GltfClipWriter::push(const Pose& pose, std::optional<double> confidence,
+                          const FingerTurns* fingers) {
+  const NodeTurns turns = rig_->turns(pose, fingers);
   bool finite = turns.hips.allFinite();
   const size_t count = turns.local.size();
   for (size_t i = 0; i < count; ++i) {
-    Eigen::Vector4d c = turns.local[i].coeffs();  // x, y, z, w
+    if (frames() == 0) nodes_.push_back(turns.local[i].first);
+    Eigen::Vector4d c = turns.local[i].second.coeffs();  // x, y, z, w
     finite = finite && c.allFinite();
     // q and -q are the same rotation; LINEAR interpolates the short way if signs agree.
     double side = c[3];
@@ -49,11 +51,11 @@ void GltfClipWriter::commit() {
   GltfDocument document(content_, in_);
   if (options_.animation_only) document.keep_nodes_only();
   if (frames() > 0) {
-    const size_t count = rig_->driven().size();
+    const size_t count = nodes_.size();
     GltfDocument::Clip clip{options_.name,     options_.fps, frames(),    {},
                             rig_->hips_node(), hips_,        confidence_, filled_};
     for (size_t i = 0; i < count; ++i) {
-      auto& track = clip.turns.emplace_back(rig_->driven()[i], std::vector<std::array<float, 4>>());
+      auto& track = clip.turns.emplace_back(nodes_[i], std::vector<std::array<float, 4>>());
       for (size_t f = 0; f < frames(); ++f) track.second.push_back(turns_[f * count + i]);
     }
     document.append(clip);

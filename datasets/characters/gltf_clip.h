@@ -12,8 +12,8 @@ namespace restage {
 
 /// Collects poses and writes the document at commit(). Nodes, meshes, skins, materials, pictures,
 /// morph targets, extensions and earlier animations are the input's; of a GLB, the input's binary
-/// chunk begins the output's. The new animation turns the nodes of the 22 joints (LINEAR, unit
-/// quaternions whose signs make curves continuous) and moves the hips, nothing else.
+/// chunk begins the output's. The new animation turns the nodes of the 22 joints and of fingers
+/// (LINEAR, unit quaternions whose signs make curves continuous) and moves the hips, nothing else.
 ///
 /// `out` ends in .glb, .vrm or .gltf. A .glb or .vrm holds everything itself, also what a .gltf
 /// names as files beside it. A .gltf keeps the names of such files; where it is written into
@@ -31,7 +31,9 @@ class GltfClipWriter {
   GltfClipWriter(std::string out, const std::string& in, std::shared_ptr<const GltfOwnRig> rig,
                  Options options);
   /// As GlbWriter::push().
-  void push(const Pose& pose, std::optional<double> confidence = std::nullopt);
+  /// `fingers`: of all frames the same ones, or null in all.
+  void push(const Pose& pose, std::optional<double> confidence = std::nullopt,
+            const FingerTurns* fingers = nullptr);
   /// As GlbWriter::set_filled().
   void set_filled(std::vector<int64_t> frames) { filled_ = std::move(frames); }
   void commit();
@@ -41,7 +43,8 @@ class GltfClipWriter {
   std::string out_, in_, content_;
   std::shared_ptr<const GltfOwnRig> rig_;
   Options options_;
-  std::vector<std::array<float, 4>> turns_;  ///< one (x, y, z, w) a driven node, frame by frame
+  std::vector<int> nodes_;                   ///< that are turned
+  std::vector<std::array<float, 4>> turns_;  ///< one (x, y, z, w) a node, frame by frame
   std::vector<float> hips_;                  ///< 3 numbers a frame
   std::vector<double> confidence_;
   std::vector<int64_t> filled_;

@@ -122,12 +122,31 @@ Betas betas_of(const Npz& file, const std::string& name, size_t frames, ImportRe
   return out;
 }
 
-/// The 22 joints as a skeleton of their own, and each standing for itself.
-SourceSkeleton skeleton_of(const Joints& rest) {
+/// The order of the fingers in SMPL-H.
+constexpr int kSmplFingers[] = {1, 2, 4, 3, 0};
+
+/// The joints of both hands among those of skeleton_of().
+FingerBones smpl_fingers() {
+  FingerBones out;
+  for (int side = 0; side < 2; ++side)
+    for (int f = 0; f < 5; ++f)
+      for (int bone = 0; bone < 3; ++bone)
+        out[static_cast<size_t>(finger_bone(side, kSmplFingers[f], bone))] =
+            kJoints + 15 * side + 3 * f + bone;
+  return out;
+}
+
+/// The 22 joints as a skeleton of their own, and each standing for itself. With hands, fingers
+/// follow, whose places count for nothing.
+SourceSkeleton skeleton_of(const Joints& rest, bool hands) {
   SourceSkeleton out;
   for (size_t j = 0; j < kJoints; ++j)
     out.add(std::string(kJointNames[j]), kParents[j],
             j == 0 ? rest[0] : Vec3(rest[j] - rest[kParents[j]]));
+  for (int j = kJoints; hands && j < kJoints + kFingerBones; ++j) {
+    const int wrist = j < kJoints + kFingerBones / 2 ? kLeftWrist : kRightWrist;
+    out.add("finger", (j - kJoints) % 3 == 0 ? wrist : j - 1, Vec3::Zero());
+  }
   return out;
 }
 
@@ -152,9 +171,11 @@ SourceMotion read_motion(const Npz& file, const BodyParameters& names, BodyRotat
   const std::vector<double> metres =
       metres_of_trans(file, names, rotations.local.size(), options, report);
   SourceMotion out;
-  out.skeleton = skeleton_of(rest);
+  out.skeleton = skeleton_of(rest, !rotations.hands.empty());
   out.moving = {0};
   out.local = std::move(rotations.local);
+  for (size_t f = 0; f < rotations.hands.size(); ++f)
+    out.local[f].insert(out.local[f].end(), rotations.hands[f].begin(), rotations.hands[f].end());
   for (int64_t f = 0; f < frames; ++f) {
     const Vec3 at(trans[3 * f], trans[3 * f + 1], trans[3 * f + 2]);
     if (!(at.cwiseAbs().maxCoeff() < 1e5))
@@ -370,14 +391,16 @@ namespace {
 using SkeletonOf = std::function<Joints(const BodyParameters& names, const BodyRotations&)>;
 
 Motion import_parameters(const Npz& file, const MotionOptions& options, const SkeletonOf& skeleton,
-                         ImportReport& report) {
+                         ImportReport& report, std::vector<FingerTurns>* fingers) {
   report.file = file.path();
   const BodyParameters names = body_parameters(file);
   BodyRotations rotations = read_body_rotations(file, names);
+  if (fingers == nullptr) rotations.hands.clear();
   check_radians(file, rotations, options.force, report);
   const Joints rest = skeleton(names, rotations);
   SourceMotion motion = read_motion(file, names, std::move(rotations), rest, options, report);
   turn_upright(motion, file, options.rest.up, report);
+  const bool hands = motion.skeleton.size() > kJoints;
   if (lower_case(names.trans).find("cam_t") != std::string::npos)
     report.remark("the path is what a camera saw (" + names.trans + "): its depth is an estimate");
   std::string from;
@@ -391,6 +414,8 @@ Motion import_parameters(const Npz& file, const MotionOptions& options, const Sk
   Poses posed(motion.local.size());
   const JointMap map = identity_map();
   for (size_t f = 0; f < posed.size(); ++f) posed[f] = source_pose(motion, map, f);
+  for (size_t f = 0; hands && f < posed.size(); ++f)
+    fingers->push_back(source_fingers(motion, smpl_fingers(), f));
   check_upright(posed, report);
   const double floor = floor_height(posed);
   report.fact("floor", format("%.6g", std::round(1e3 * floor) / 1e3) + " m, taken to 0");
@@ -412,7 +437,7 @@ void report_layout(const std::optional<SmplFamily>& family, const BodyRotations&
 }  // namespace
 
 Motion import_amass(const Npz& file, BodyModels& models, const MotionOptions& options,
-                    ImportReport& report) {
+                    ImportReport& report, std::vector<FingerTurns>* fingers) {
   const auto skeleton = [&](const BodyParameters& names, const BodyRotations& rotations) {
     const std::optional<SmplFamily> family = family_of(file, rotations, report);
     report_layout(family, rotations, report);
@@ -424,16 +449,16 @@ Motion import_amass(const Npz& file, BodyModels& models, const MotionOptions& op
                                   " of ", betas.size(), " betas"));
     return model.joints(betas);
   };
-  return import_parameters(file, options, skeleton, report);
+  return import_parameters(file, options, skeleton, report, fingers);
 }
 
 Motion import_amass(const Npz& file, const Joints& stand_in, const MotionOptions& options,
-                    ImportReport& report) {
+                    ImportReport& report, std::vector<FingerTurns>* fingers) {
   const auto skeleton = [&](const BodyParameters&, const BodyRotations& rotations) {
     report_layout(family_of(file, rotations, report), rotations, report);
     return stand_in;
   };
-  return import_parameters(file, options, skeleton, report);
+  return import_parameters(file, options, skeleton, report, fingers);
 }
 
 }  // namespace restage

@@ -55,12 +55,13 @@ bool is_amass_shape(const Npz& file);
 /// count (automatic: in AMASS's layout z, or y or -y where the root turns a standing body's up
 /// there; in others where the head is on average). A file of an estimator
 /// that says no rate is taken for 30 fps, with a remark. InputError: another layout, no
-/// translation, no rate, not finite, no model that fits.
+/// translation, no rate, not finite, no model that fits. `fingers`: gets those of SMPL-H and
+/// SMPL-X, one a frame; stays empty where the file has none.
 Motion import_amass(const Npz& file, BodyModels& models, const MotionOptions& options,
-                    ImportReport& report);
+                    ImportReport& report, std::vector<FingerTurns>* fingers = nullptr);
 /// The same turns and path by another skeleton, where no body model is at hand: rest joints,
 /// metres, T-pose.
 Motion import_amass(const Npz& file, const Joints& stand_in, const MotionOptions& options,
-                    ImportReport& report);
+                    ImportReport& report, std::vector<FingerTurns>* fingers = nullptr);
 
 }  // namespace restage

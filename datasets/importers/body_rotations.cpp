@@ -126,6 +126,17 @@ void add_joints(const RotationArray& from, int64_t first, BodyRotations& out) {
           rotation_at(from, f, j, out.largest);
 }
 
+/// The last 30 joints of SMPL-H and SMPL-X.
+void add_hands(const RotationArray& from, BodyRotations& out) {
+  if (from.joints != 52 && from.joints != 55) return;
+  double largest = 0;  // of fingers: says nothing of the body's units
+  for (int64_t f = 0; f < from.frames; ++f) {
+    std::vector<Quat>& hands = out.hands.emplace_back();
+    for (int64_t j = from.joints - 30; j < from.joints; ++j)
+      hands.push_back(rotation_at(from, f, j, largest));
+  }
+}
+
 std::string named(const std::string& name, const RotationArray& from) {
   return name + " " + shape_text(from.array.shape()) +
          (from.numbers_first ? ", taken for [frames, axis-angle numbers, joints]" : "");
@@ -155,6 +166,7 @@ BodyRotations read_body_rotations(const Npz& file, const BodyParameters& names) 
     const RotationArray poses = open_rotations(file, names.poses, true);
     BodyRotations out = empty(poses.frames, poses.joints, poses.array, named(names.poses, poses));
     add_joints(poses, 0, out);
+    add_hands(poses, out);
     return out;
   }
   const RotationArray root = open_rotations(file, names.orient, false),

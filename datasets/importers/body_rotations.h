@@ -13,6 +13,9 @@ namespace restage {
 /// SMPL-H, 55 of SMPL-X; of files that keep hands by themselves 22).
 struct BodyRotations {
   std::vector<std::vector<Quat>> local;  ///< per frame
+  /// Of the 30 joints of both hands, as SMPL-H counts them: index, middle, little, ring, thumb of
+  /// the left, then of the right. Empty: the file's array of all joints has none.
+  std::vector<std::vector<Quat>> hands;
   int64_t joints = 0;
   std::string layout;  ///< for the report: "poses [61, 156]"
   double largest = 0;  ///< axis-angle numbers: the largest angle, radians; of matrices 0

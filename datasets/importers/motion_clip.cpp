@@ -1,5 +1,6 @@
 #include "datasets/importers/motion_clip.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -109,16 +110,36 @@ void cut_frames(SourceMotion& motion, const Profile& profile, const MotionOption
   cut(motion.position);
 }
 
-/// The frames at 30 fps in terms of the rest pose.
-Poses poses_at_30_fps(SourceMotion motion, const JointMap& map, const RestPose& rest,
-                      uint64_t bytes, ImportReport& report) {
-  const std::string& path = report.file;
+SourceMotion at_30_fps(const SourceMotion& motion, uint64_t bytes, const std::string& path) {
   const double seconds = static_cast<double>(motion.local.size()) / motion.fps;
   if (!(seconds * kFps < static_cast<double>(kMaxFrames)))
     throw InputError(path, "lasts " + format("%.4g", seconds) + " s",
                      "cut it into files of at most 9 hours");
   check_length(motion.local.size(), motion.skeleton.size(), motion.fps, bytes, path);
-  motion = resample(motion);
+  return resample(motion);
+}
+
+/// Fingers in terms of the rest pose, in which they turn with the hands.
+std::vector<FingerTurns> fingers_of(const SourceMotion& motion, const JointMap& map,
+                                    const RestPose& rest) {
+  const FingerBones bones = find_fingers(motion.skeleton.names, motion.skeleton.parents,
+                                         {map[kLeftWrist].joint, map[kRightWrist].joint});
+  std::vector<FingerTurns> out;
+  if (std::all_of(bones.begin(), bones.end(), [](int b) { return b < 0; })) return out;
+  for (size_t f = 0; f < motion.local.size(); ++f) {
+    FingerTurns turns = source_fingers(motion, bones, f);
+    for (size_t k = 0; k < turns.size(); ++k)
+      if (turns[k])
+        *turns[k] = rest.align * *turns[k] *
+                    rest.frame[k < turns.size() / 2 ? size_t{kLeftWrist} : size_t{kRightWrist}];
+    out.push_back(turns);
+  }
+  return out;
+}
+
+/// The frames at 30 fps in terms of the rest pose.
+Poses poses_at_30_fps(const SourceMotion& motion, const JointMap& map, const RestPose& rest,
+                      ImportReport& report) {
   Poses poses(motion.local.size());
   JointFit fit(rest.joints);
   for (size_t f = 0; f < poses.size(); ++f) {
@@ -208,7 +229,9 @@ MotionClip make_clip(Recording recording, const std::string& path, const MotionO
   cut_frames(motion, *recording.names.profile, options, report);
   const double fps = motion.fps;
   const size_t frames = motion.local.size();
-  const Poses poses = poses_at_30_fps(std::move(motion), map, rest, recording.bytes, report);
+  motion = at_30_fps(motion, recording.bytes, path);
+  const Poses poses = poses_at_30_fps(motion, map, rest, report);
+  if (options.fingers) clip.fingers = fingers_of(motion, map, rest);
   clip.joints.reserve(poses.size());
   report.fact("rate", (fps == kFps ? "30 fps, taken as they are"
                                    : cat(format("%.6g", fps), " fps -> 30 fps, slerp: ", frames,

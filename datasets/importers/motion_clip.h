@@ -31,6 +31,7 @@ struct MotionOptions {
   double max_root_speed = 25.0;
   /// Take a recording whose left and right are exchanged, with a remark; else InputError.
   bool force = false;
+  bool fingers = false;  ///< read them, too
   /// Bone names: a built-in profile's name or a YAML file (profiles.h); empty: the one that fits.
   std::string profile;
   /// Empty id: the file's name. Empty subject: from the file's name (07_01 -> 07), else the id.
@@ -39,9 +40,10 @@ struct MotionOptions {
 
 struct MotionClip {
   Motion motion;
-  std::vector<Joints> joints;  ///< the source's own 22 joints per frame, world, metres, y up
-  double floor_y = 0;          ///< height of the clip's floor in that world
-  double scale = 0;            ///< metres per unit of the file
+  std::vector<FingerTurns> fingers;  ///< per frame; empty: not asked for, or the source has none
+  std::vector<Joints> joints;        ///< the source's own 22 joints per frame, world, metres, y up
+  double floor_y = 0;                ///< height of the clip's floor in that world
+  double scale = 0;                  ///< metres per unit of the file
   ImportReport report;
 };
 

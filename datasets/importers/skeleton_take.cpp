@@ -34,10 +34,12 @@ void stand_on_floor(SkeletonTake& p) {
   for (Vec3& x : p.rest) x.y() += lift;
 }
 
-SkeletonTake of_motion(const Motion& motion, ImportReport report) {
+SkeletonTake of_motion(const Motion& motion, ImportReport report,
+                       std::vector<FingerTurns> fingers = {}) {
   SkeletonTake out;
   out.name = motion.id;
   out.rest = motion.rest;
+  out.fingers = std::move(fingers);
   out.report = std::move(report);
   const Vec3 to_pelvis = out.rest[kPelvis] - 0.5 * (out.rest[kLeftHip] + out.rest[kRightHip]);
   for (size_t f = 0; f < motion.frames(); ++f) {
@@ -84,21 +86,22 @@ SkeletonTake of_parameters(const std::string& path, const TakeOptions& options) 
   MotionOptions motion = options.motion;
   motion.id = stem_of(path);
   ImportReport report;
+  std::vector<FingerTurns> fingers;
   if (!options.body_model.empty()) {
     BodyModels models(options.body_model);
-    const Motion read = import_amass(file, models, motion, report);
-    return of_motion(read, std::move(report));
+    const Motion read = import_amass(file, models, motion, report, &fingers);
+    return of_motion(read, std::move(report), std::move(fingers));
   }
   Joints stand_in = options.like;
   // `trans` is where the pelvis is, but for some 25 cm that each model has its own way.
   for (Vec3& x : stand_in)
     x = kLegs / std::max(leg_length(options.like), 1e-9) * (x - options.like[kPelvis]);
-  const Motion read = import_amass(file, stand_in, motion, report);
+  const Motion read = import_amass(file, stand_in, motion, report, &fingers);
   report.remark(
       format("no body model: turns go over as they are, and the path as that of a person with legs "
              "of %.1f m (--body-model FILE gives this person's)",
              kLegs));
-  return of_motion(read, std::move(report));
+  return of_motion(read, std::move(report), std::move(fingers));
 }
 
 bool holds_motions(const std::string& path) {
@@ -124,6 +127,7 @@ SkeletonTake of_recording(const std::string& path, const MotionOptions& options)
   out.name = stem_of(path);
   out.rest = clip.motion.rest;
   out.report = std::move(clip.report);
+  out.fingers = std::move(clip.fingers);
   out.frames.resize(clip.joints.size());
   for (size_t f = 0; f < out.frames.size(); ++f) {
     out.frames[f].joints = clip.joints[f];
@@ -131,6 +135,18 @@ SkeletonTake of_recording(const std::string& path, const MotionOptions& options)
       out.frames[f].global[j] = clip.motion.global[f][j].cast<double>().toRotationMatrix();
   }
   stand_on_floor(out);
+  return out;
+}
+
+/// Empty where the file has no fingers.
+std::vector<FingerTurns> clip_fingers(const Gltf& file, const GltfRig& rig, const GltfClip& clip,
+                                      int64_t frames) {
+  std::vector<FingerTurns> out;
+  const FingerBones bones = rig_fingers(file, rig);
+  if (std::all_of(bones.begin(), bones.end(), [](int b) { return b < 0; })) return out;
+  for (int64_t f = 0; f < frames; ++f)
+    out.push_back(rig_fingers_at(
+        rig, bones, gltf_pose(file, clip, clip.begin + static_cast<double>(f) / kFps)));
   return out;
 }
 
@@ -146,6 +162,7 @@ SkeletonTake of_gltf(const std::string& path, const MotionOptions& options,
   const GltfClip& clip = name.empty() ? first_clip(file, rig) : find_clip(file, name);
   out.name = clip.name;
   out.frames = clip_poses(file, rig, clip, clip_frames(file, clip), out.report);
+  out.fingers = clip_fingers(file, rig, clip, std::ssize(out.frames));
   // Where a file rests with its hips at the origin, its rest pose does not say where the floor is.
   constexpr double kNear = 0.1;  // metres
   SkeletonTake standing = out;

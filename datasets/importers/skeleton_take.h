@@ -15,6 +15,7 @@ struct SkeletonTake {
   Joints rest;       ///< the T-pose that turns are counted from, metres, y up, facing +z
   /// At 30 fps: world turns from the T-pose, and joints, in the world in which `rest` stands.
   std::vector<PosedSkeleton> frames;
+  std::vector<FingerTurns> fingers;  ///< the same of fingers; empty: the source has none
   ImportReport report;
 };
 

@@ -64,10 +64,17 @@ SourceMotion resample(const SourceMotion& motion) {
   return out;
 }
 
-PosedSkeleton source_pose(const SourceMotion& motion, const JointMap& map, size_t frame) {
+namespace {
+
+struct World {
+  std::vector<Mat3> global;
+  std::vector<Vec3> position;
+};
+
+World world_of(const SourceMotion& motion, size_t frame) {
   const SourceSkeleton& s = motion.skeleton;
-  std::vector<Mat3> global(s.size());
-  std::vector<Vec3> position(s.size());
+  World out{std::vector<Mat3>(s.size()), std::vector<Vec3>(s.size())};
+  auto& [global, position] = out;
   size_t moving = 0;
   for (size_t j = 0; j < s.size(); ++j) {
     Vec3 offset = s.offsets[j];
@@ -83,12 +90,27 @@ PosedSkeleton source_pose(const SourceMotion& motion, const JointMap& map, size_
       position[j] = position[p] + global[p] * offset;
     }
   }
+  return out;
+}
+
+}  // namespace
+
+PosedSkeleton source_pose(const SourceMotion& motion, const JointMap& map, size_t frame) {
+  const auto [global, position] = world_of(motion, frame);
   PosedSkeleton out;
   for (int j = 0; j < kJoints; ++j) {
     const int source = map[j].joint;
     out.global[j] = global[source];
     out.joints[j] = position[source] + global[source] * map[j].offset;
   }
+  return out;
+}
+
+FingerTurns source_fingers(const SourceMotion& motion, const FingerBones& bones, size_t frame) {
+  const World world = world_of(motion, frame);
+  FingerTurns out;
+  for (size_t k = 0; k < out.size(); ++k)
+    if (bones[k] >= 0) out[k] = world.global[static_cast<size_t>(bones[k])];
   return out;
 }
 

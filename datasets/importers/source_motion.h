@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "autograd/base/error.h"
+#include "datasets/importers/finger_bones.h"
 #include "datasets/importers/profiles.h"
 #include "datasets/importers/report.h"
 #include "datasets/readers/skeleton_file.h"
@@ -75,6 +76,8 @@ SourceMotion resample(const SourceMotion& motion);
 
 /// Global rotations and positions of the 22 joints in one frame.
 PosedSkeleton source_pose(const SourceMotion& motion, const JointMap& map, size_t frame);
+/// World rotations of fingers in one frame, from the zero pose.
+FingerTurns source_fingers(const SourceMotion& motion, const FingerBones& bones, size_t frame);
 
 /// Frame by frame; in pieces, as the frames of hours are many.
 using Poses = std::deque<PosedSkeleton>;

@@ -37,7 +37,9 @@ Sink own_sink(const SinkOptions& options, const std::string& clip, const std::st
       options.out, target, own,
       GltfClipWriter::Options{options.clip_name.empty() ? clip : options.clip_name, options.rate(),
                               options.animation_only});
-  return {[writer](const RetargetedFrame& f) { writer->push(f.pose, f.confidence); },
+  return {[writer](const RetargetedFrame& f) {
+            writer->push(f.pose, f.confidence, f.fingers ? &*f.fingers : nullptr);
+          },
           [writer](const Frames& filled) {
             writer->set_filled(filled);
             writer->commit();

@@ -34,6 +34,7 @@ TakeOptions options_of(const RetargetCommand& c, const Joints& performer) {
   if (c.source.fps) out.motion.fps = *c.source.fps;
   out.motion.force = c.options.force;
   out.motion.profile = c.source_bones;
+  out.motion.fingers = true;
   out.clip = c.source.clip;
   out.sequence = c.source.sequence;
   out.body_model = c.body_model;
@@ -67,8 +68,10 @@ int run_take(const RetargetCommand& c, const Common& common) {
     RetargetedFrame frame;
     frame.pose = perform_take(take, f, rest);
     frame.joints.emplace();
+    if (!take.fingers.empty()) frame.fingers = take.fingers[f];
     if (target.own) {
-      target.own->place(frame.pose, &*frame.joints, &frame.vertices);
+      target.own->place(frame.pose, frame.fingers ? &*frame.fingers : nullptr, &*frame.joints,
+                        &frame.vertices);
     } else {
       *frame.joints = forward_kinematics(rest, frame.pose).joints;
       frame.vertices = system->posed(frame.pose);

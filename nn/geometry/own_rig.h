@@ -3,6 +3,7 @@
 #pragma once
 
 #include "nn/geometry/body.h"
+#include "nn/geometry/hands.h"
 
 namespace restage {
 
@@ -19,9 +20,11 @@ class OwnRig {
   /// [vertices, 22]: each bone's weight counts for the nearest of the 22 joints at it or above it.
   virtual SkinWeights weights() const = 0;
   /// Where the file's bones put joints and vertices, in the world, metres. Bones that are none of
-  /// the 22 joints keep their rest; turns of joints that the rig lacks are left out. So joints may
-  /// lie elsewhere than forward_kinematics() says. `vertices` may be null.
-  virtual void place(const Pose& pose, Joints* joints, Points* vertices) const = 0;
+  /// the 22 joints keep their rest, but for those of `fingers` (may be null) that the rig has;
+  /// turns of joints that the rig lacks are left out. So joints may lie elsewhere than
+  /// forward_kinematics() says. `vertices` may be null.
+  virtual void place(const Pose& pose, const FingerTurns* fingers, Joints* joints,
+                     Points* vertices) const = 0;
 };
 
 }  // namespace restage

@@ -63,7 +63,7 @@ class Characters : public FileTest {
       const Mesh shown = gltf_mesh(file, nodes);
       Joints joints;
       Points vertices;
-      target.own->place(pose(f), &joints, &vertices);
+      target.own->place(pose(f), nullptr, &joints, &vertices);
       ASSERT_EQ(shown.vertices.size(), vertices.size());
       const GltfRig& rig = target.own->rig();
       for (size_t v = 0; v < vertices.size(); ++v)
@@ -258,7 +258,7 @@ TEST_F(Characters, LegsOnTheSpineStayWhereTheyAre) {
   ASSERT_TRUE(target.own) << target.unknown_rig;
   for (size_t f = 0; f < kFrames; ++f) {
     Joints joints;
-    target.own->place(pose(f), &joints, nullptr);
+    target.own->place(pose(f), nullptr, &joints, nullptr);
     const PosedSkeleton wanted = forward_kinematics(target.own->rest(), pose(f));
     for (const int j : {0, 1, 2, 4, 5, 7, 8, 10, 11})
       EXPECT_LT((joints[j] - wanted.joints[j]).norm(), 1e-5) << kJointNames[j];

@@ -1,0 +1,76 @@
+#include "datasets/importers/finger_bones.h"
+
+#include <algorithm>
+
+#include "datasets/readers/word_lines.h"
+
+namespace restage {
+namespace {
+
+constexpr int kFingers = 5, kBones = 3;
+
+/// What fingers are called, thumb to little finger.
+const std::vector<std::string> kFingerNames[kFingers] = {
+    {"thumb", "親指"},
+    {"index", "pointer", "人指", "人差"},
+    {"middle", "中指"},
+    {"ring", "薬指"},
+    {"pinky", "pinkie", "little", "small", "小指"}};
+
+bool holds(const std::string& name, const std::string& word) {
+  return name.find(word) != std::string::npos;
+}
+
+/// The number behind "finger": its first digit; -1: none.
+int number_of_finger(const std::string& name) {
+  const std::string word = "finger";
+  size_t at = name.find(word);
+  if (at == std::string::npos) return -1;
+  at += word.size();
+  if (at < name.size() && (name[at] == '_' || name[at] == '.' || name[at] == ' ')) ++at;
+  return at < name.size() && name[at] >= '0' && name[at] <= '9' ? name[at] - '0' : -1;
+}
+
+/// Which finger a bone is of; -1: of none. `first`: the thumb's number.
+int finger_of(const std::string& name, int first) {
+  if (holds(name, "string") || holds(name, "spring")) return -1;
+  for (int f = 0; f < kFingers; ++f)
+    for (const std::string& word : kFingerNames[f])
+      if (holds(name, word)) return f == 0 || !holds(name, "metacarp") ? f : -1;
+  const int number = number_of_finger(name);
+  return number >= first && number < first + kFingers ? number - first : -1;
+}
+
+}  // namespace
+
+FingerBones find_fingers(const std::vector<std::string>& names, const std::vector<int>& parents,
+                         const std::array<int, 2>& hands) {
+  FingerBones out;
+  out.fill(-1);
+  std::vector<std::string> lower;
+  for (const std::string& name : names) lower.push_back(lower_case(name));
+  for (int side = 0; side < 2; ++side) {
+    std::vector<bool> below(names.size());
+    below[static_cast<size_t>(hands[static_cast<size_t>(side)])] = true;
+    int first = 1;
+    std::vector<size_t> bones;
+    for (size_t b = 0; b < names.size(); ++b) {
+      if (parents[b] < 0 || !below[static_cast<size_t>(parents[b])]) continue;
+      below[b] = true;
+      bones.push_back(b);
+      if (number_of_finger(lower[b]) == 0) first = 0;
+    }
+    for (const size_t b : bones) {
+      const int finger = finger_of(lower[b], first);
+      if (finger < 0) continue;
+      // The first of a finger, or the one that hangs on what was found last.
+      int* const chain = &out[static_cast<size_t>(finger_bone(side, finger, 0))];
+      const int length = static_cast<int>(std::find(chain, chain + kBones, -1) - chain);
+      if (length < kBones && (length == 0 || chain[length - 1] == parents[b]))
+        chain[length] = static_cast<int>(b);
+    }
+  }
+  return out;
+}
+
+}  // namespace restage
