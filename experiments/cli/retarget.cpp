@@ -342,10 +342,15 @@ void add_retarget(Program& program) {
   app.add_option("--rest", c.rest, "the target's 22 rest joints (HDF5, /joints [1, 22, 3])");
   app.add_option("--every", c.to.every, "only every so many frames of the source; for X.h5");
   app.add_option("--out", c.to.out,
-                 "X.glb, X.gltf, X.vrm, X.bvh, X.h5, or a folder for PLY or OBJ frames")
+                 "X.glb, X.gltf, X.vrm, X.vrma, X.bvh, X.h5, or a folder for PLY or OBJ frames")
       .required();
   app.add_option("--clip-name", c.to.clip_name,
                  "of the animation that a rigged target's file gets (default: the source's name)");
+  app.add_option("--out-fps", c.to.fps, "frames per second of an animation, such as 24 or 60")
+      .show_default();
+  app.add_option("--skeleton", c.to.skeleton,
+                 "names and axes of the bones that a target without a rig gets: restage, smpl, "
+                 "mixamo, vrm, unreal");
   app.add_flag("--animation-only", c.to.animation_only,
                "of a rigged target only nodes and the animation, without meshes");
   app.add_option("--clip", c.source.clip,

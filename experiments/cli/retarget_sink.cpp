@@ -9,9 +9,11 @@
 #include "datasets/characters/gltf_clip.h"
 #include "datasets/characters/mesh_template.h"
 #include "datasets/readers/text.h"
+#include "infer/frame_rate.h"
 #include "infer/writers/bvh.h"
 #include "infer/writers/frames.h"
 #include "infer/writers/glb.h"
+#include "infer/writers/vrma.h"
 
 namespace restage::cli {
 namespace {
@@ -19,6 +21,12 @@ namespace {
 using Frames = std::vector<int64_t>;
 
 bool is_character(const std::string& out) { return text::ends_in(out, {".glb", ".gltf", ".vrm"}); }
+
+bool is_vrma(const std::string& out) { return text::ends_in(out, {".vrma"}); }
+
+bool is_animation(const std::string& out) {
+  return is_character(out) || is_vrma(out) || out.ends_with(".bvh");
+}
 
 /// What the skeleton's files are made of.
 const SystemRig& rig_of(const Shown& shown, const std::string& out) {
@@ -46,6 +54,22 @@ Sink own_sink(const SinkOptions& options, const std::string& clip, const std::st
           }};
 }
 
+/// The motion alone, which every VRM character plays.
+Sink vrma_sink(const SinkOptions& options, const Shown& shown, const std::string& clip) {
+  const auto writer = std::make_shared<VrmaWriter>(
+      options.out, rig_of(shown, options.out).rest,
+      options.clip_name.empty() ? clip : options.clip_name, options.rate());
+  const auto fingers = std::make_shared<bool>(false);
+  return {[writer, fingers](const RetargetedFrame& f) {
+            *fingers = *fingers || f.fingers;
+            writer->push(f.pose);
+          },
+          [writer, fingers](const Frames&) {
+            writer->commit();
+            if (*fingers) log_warning("the source's fingers are not in the file: it has 22 bones");
+          }};
+}
+
 /// The target has no bones that we know: a skeleton and a skin of our own.
 Sink glb_sink(const SinkOptions& options, const Shown& shown) {
   if (!text::ends_in(options.out, {".glb"}))
@@ -55,14 +79,28 @@ Sink glb_sink(const SinkOptions& options, const Shown& shown) {
     throw InputError(options.out, "has no rig of its own whose animation could be named or alone",
                      "leave --clip-name and --animation-only out");
   const SystemRig& rig = rig_of(shown, options.out);
-  const auto writer = std::make_shared<GlbWriter>(options.out, shown.target, rig.rest, rig.weights);
+  GlbOptions how;
+  how.fps = options.rate();
+  if (!options.skeleton.empty()) how.skeleton = options.skeleton;
+  const auto writer =
+      std::make_shared<GlbWriter>(options.out, shown.target, rig.rest, rig.weights, how);
   const auto commit = [writer](const Frames& filled) {
     writer->set_filled(filled);
     const InfluenceError e = writer->commit();
     log_info(format("four weights per vertex instead of 22: %.2f mm on average, at most %.2f mm",
                     1e3 * e.mean, 1e3 * e.max));
+    const DistanceSummary surface = writer->surface_error();
+    if (surface.max > 0)
+      log_info(
+          format("pose offsets, which a skin cannot hold, are left out: the file's surface is "
+                 "%.2f mm from the exact one on average, at most %.2f mm (.h5 and folders are "
+                 "exact)",
+                 1e3 * surface.mean, 1e3 * surface.max));
   };
-  return {[writer](const RetargetedFrame& f) { writer->push(f.pose, f.confidence); }, commit};
+  return {[writer](const RetargetedFrame& f) {
+            writer->push(f.pose, f.confidence, f.vertices.empty() ? nullptr : &f.vertices);
+          },
+          commit};
 }
 
 /// What a character's own bones are called; of joints without a bone: nothing. BVH ends names at
@@ -85,9 +123,11 @@ std::array<std::string, kJoints> bone_names(const GltfOwnRig& own) {
 Sink bvh_sink(const SinkOptions& options, const Shown& shown,
               const std::shared_ptr<const GltfOwnRig>& own) {
   BvhWriterOptions how;
+  how.fps = options.rate();
+  const Joints& rest = rig_of(shown, options.out).rest;
   if (own) how.names = bone_names(*own);
-  const auto writer =
-      std::make_shared<BvhWriter>(options.out, rig_of(shown, options.out).rest, how);
+  if (!options.skeleton.empty()) how.names = rig_convention(options.skeleton, rest, 0).names;
+  const auto writer = std::make_shared<BvhWriter>(options.out, rest, how);
   return {[writer](const RetargetedFrame& f) { writer->push(f.pose); },
           [writer](const Frames&) { writer->commit(); }};
 }
@@ -131,26 +171,61 @@ Sink folder_sink(const SinkOptions& options, const Shown& shown, const std::stri
           }};
 }
 
+/// The same at another rate. Which frames are filled is known frame by frame.
+Sink at_rate(Sink sink, double fps) {
+  struct State {
+    FrameRate rate;
+    Frames filled;
+    int64_t frames = 0;
+  };
+  const auto state = std::make_shared<State>(State{FrameRate(fps), {}});
+  return {[sink, state](const RetargetedFrame& in) {
+            for (const RetargetedFrame& f : state->rate.push(in)) {
+              if (f.filled) state->filled.push_back(state->frames);
+              ++state->frames;
+              sink.push(f);
+            }
+          },
+          [sink, state](const Frames&) { sink.commit(state->filled); }};
+}
+
+void check_rate(const SinkOptions& options) {
+  const std::string& out = options.out;
+  if (options.every < 1 || options.every > 1000000)
+    throw InputError("", "--every is out of range", "give 1 or more frames");
+  if (options.every > 1 && !out.ends_with(".h5"))
+    throw InputError(out, "holds every frame", "end --out in .h5 with --every");
+  if (!(options.fps >= 1 && options.fps <= 1000))
+    throw InputError("", "--out-fps is out of range", "give 1 to 1000");
+  if (options.fps != kFps && !is_animation(out))
+    throw InputError(out, "has the 30 frames a second in which results are computed",
+                     "end --out in .glb, .gltf, .vrm, .vrma or .bvh with --out-fps");
+}
+
 }  // namespace
 
 void check_sink(const SinkOptions& options) {
   const std::string& out = options.out;
   if (!options.format.empty() && options.format != "ply" && options.format != "obj")
     throw InputError("", "--format '" + options.format + "' is unknown", "use ply or obj");
-  if (options.every < 1 || options.every > 1000000)
-    throw InputError("", "--every is out of range", "give 1 or more frames");
-  if (options.every > 1 && !out.ends_with(".h5"))
-    throw InputError(out, "is played at 30 frames a second", "end --out in .h5 with --every");
+  check_rate(options);
+  if (!options.skeleton.empty()) check_convention(options.skeleton);
   const auto dot = out.find_last_of('.');
   const auto slash = out.find_last_of('/');
   const bool extension = dot != std::string::npos && (slash == std::string::npos || dot > slash) &&
                          dot + 1 < out.size();
-  if (extension && !is_character(out) && !out.ends_with(".bvh") && !out.ends_with(".h5"))
+  if (extension && !is_animation(out) && !out.ends_with(".h5"))
     throw InputError(out, "is of no kind that can be written",
-                     "end it in .glb, .gltf, .vrm, .bvh, .h5, or / for a folder");
-  if ((options.animation_only || !options.clip_name.empty()) && !is_character(out))
-    throw InputError(out, "holds no animation that could be named or alone",
-                     "leave --clip-name and --animation-only out, or end --out in .glb");
+                     "end it in .glb, .gltf, .vrm, .vrma, .bvh, .h5, or / for a folder");
+  if (options.animation_only && !is_character(out))
+    throw InputError(out, "has no meshes that could be left out",
+                     "leave --animation-only out, or end --out in .glb");
+  if (!options.clip_name.empty() && (!is_animation(out) || out.ends_with(".bvh")))
+    throw InputError(out, "holds no animation that could be named",
+                     "leave --clip-name out, or end --out in .glb");
+  if (!options.skeleton.empty() && !out.ends_with(".glb") && !out.ends_with(".bvh"))
+    throw InputError(out, "has no bones that --skeleton could name",
+                     "end --out in .glb or .bvh (a .vrma always has VRM's)");
 }
 
 std::string clip_name(const SourceRecord& source) {
@@ -164,9 +239,15 @@ std::string clip_name(const SourceRecord& source) {
 Sink make_sink(const SinkOptions& options, const Shown& shown,
                const std::optional<SourceRecord>& source, const std::string& clip,
                const std::string& target, const std::shared_ptr<const GltfOwnRig>& own) {
+  if (own && !options.skeleton.empty())
+    throw InputError(target, "has a rig of its own, which is kept", "leave --skeleton out");
+  const auto timed = [&](Sink sink) {
+    return options.fps == kFps ? sink : at_rate(std::move(sink), options.fps);
+  };
   if (is_character(options.out))
-    return own ? own_sink(options, clip, target, own) : glb_sink(options, shown);
-  if (options.out.ends_with(".bvh")) return bvh_sink(options, shown, own);
+    return timed(own ? own_sink(options, clip, target, own) : glb_sink(options, shown));
+  if (is_vrma(options.out)) return timed(vrma_sink(options, shown, clip));
+  if (options.out.ends_with(".bvh")) return timed(bvh_sink(options, shown, own));
   if (options.out.ends_with(".h5")) return hdf5_sink(options, shown, source);
   return folder_sink(options, shown, target);
 }

@@ -16,8 +16,10 @@ namespace restage::cli {
 struct SinkOptions {
   std::string out, format, clip_name;  ///< empty format: the target's own, else PLY
   bool animation_only = false;
-  int64_t every = 1;  ///< of the source's frames, one is taken
-  double rate() const { return kFps / static_cast<double>(every); }  ///< of the result
+  std::string skeleton;  ///< of a target without a rig, one of rig_conventions(); empty: restage
+  int64_t every = 1;     ///< of the source's frames, one is taken
+  double fps = kFps;     ///< of an animation
+  double rate() const { return fps / static_cast<double>(every); }  ///< of the result
 };
 
 /// What a writer takes of each frame, and how it ends. `filled`: the numbers of the frames that are

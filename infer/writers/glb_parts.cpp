@@ -1,0 +1,128 @@
+#include "infer/writers/glb_parts.h"
+
+namespace restage::glb {
+namespace {
+
+/// The turn of a node with its convention's axes that turns joint `j` by `local`.
+Mat3 in_axes(const RigConvention& rig, size_t j, const Mat3& local) {
+  const Mat3 above = j == 0 ? Mat3(Mat3::Identity()) : rig.axes[static_cast<size_t>(kParents[j])];
+  return above.transpose() * local * rig.axes[j];
+}
+
+Json node(const std::string& name, const Vec3& translation, const Mat3& rotation) {
+  Json out = {{"name", name}, {"translation", three(translation.cast<float>())}};
+  if (rotation.isIdentity(1e-12)) return out;
+  const Eigen::Vector4f q = Quat(rotation).normalized().coeffs().cast<float>();
+  out["rotation"] = {q[0], q[1], q[2], q[3]};
+  return out;
+}
+
+}  // namespace
+
+std::vector<float> three(const Eigen::Vector3f& p) { return {p.x(), p.y(), p.z()}; }
+
+int Buffer::add(const void* data, size_t bytes, size_t count, Component component, const char* type,
+                Target target) {
+  Json view = {{"buffer", 0}, {"byteOffset", bytes_.size()}, {"byteLength", bytes}};
+  if (target != none) view["target"] = static_cast<int>(target);
+  views_.push_back(view);
+  bytes_.append(static_cast<const char*>(data), bytes);
+  bytes_.resize((bytes_.size() + 3) / 4 * 4, '\0');
+  accessors_.push_back({{"bufferView", views_.size() - 1},
+                        {"componentType", static_cast<int>(component)},
+                        {"count", count},
+                        {"type", type}});
+  return static_cast<int>(accessors_.size()) - 1;
+}
+
+void Buffer::set_bounds(int accessor, const std::vector<float>& low,
+                        const std::vector<float>& high) {
+  accessors_[accessor]["min"] = low;
+  accessors_[accessor]["max"] = high;
+}
+
+void Buffer::describe(Json& root) const {
+  root["buffers"] = Json::array({{{"byteLength", bytes_.size()}}});
+  root["bufferViews"] = views_;
+  root["accessors"] = accessors_;
+}
+
+Json nodes(const Joints& rest, const RigConvention& rig) {
+  Json list = Json::array();
+  for (size_t j = 0; j < kJoints; ++j) {
+    const auto p = static_cast<size_t>(std::max(kParents[j], 0));
+    const Vec3 offset = j == 0 ? rest[0] : Vec3(rig.axes[p].transpose() * Vec3(rest[j] - rest[p]));
+    Json item = node(rig.names[j], offset, in_axes(rig, j, Mat3::Identity()));
+    for (size_t child = j + 1; child < kJoints; ++child)
+      if (kParents[child] == static_cast<int>(j)) item["children"].push_back(child);
+    list.push_back(item);
+  }
+  for (const ExtraNode& extra : rig.extra) {
+    const auto p = static_cast<size_t>(extra.parent);
+    list[p]["children"].push_back(list.size());
+    list.push_back(
+        node(extra.name, rig.axes[p].transpose() * (extra.place - rest[p]), Mat3::Identity()));
+  }
+  if (!rig.root.empty()) list.push_back({{"name", rig.root}, {"children", {0}}});
+  return list;
+}
+
+int top_node(const RigConvention& rig) {
+  return rig.root.empty() ? 0 : kJoints + static_cast<int>(rig.extra.size());
+}
+
+Joints placed_joints(const Json& nodes, const RigConvention& rig) {
+  Joints out;
+  for (size_t j = 0; j < kJoints; ++j) {
+    const Json& at = nodes[j]["translation"];
+    const Vec3 offset(double{at[0].get<float>()}, double{at[1].get<float>()},
+                      double{at[2].get<float>()});
+    const auto p = static_cast<size_t>(std::max(kParents[j], 0));
+    out[j] = j == 0 ? offset : Vec3(out[p] + rig.axes[p] * offset);
+  }
+  return out;
+}
+
+bool Tracks::push(const Pose& pose) {
+  bool finite = pose.root.allFinite();
+  for (const Mat3& r : pose.local) finite = finite && r.allFinite();
+  if (!finite) return false;
+  const size_t before = turns_.size();
+  for (size_t j = 0; j < kJoints; ++j) {
+    Eigen::Vector4d c = Quat(in_axes(rig_, j, pose.local[j])).normalized().coeffs();  // x, y, z, w
+    // q and -q are the same rotation. LINEAR interpolates the short way only if two quaternions
+    // that follow each other have signs that agree.
+    double side = c[3];
+    if (before > 0) {
+      const std::array<float, 4>& last = turns_[before - kJoints + j];
+      side = c[0] * last[0] + c[1] * last[1] + c[2] * last[2] + c[3] * last[3];
+    }
+    if (side < 0) c = -c;
+    turns_.push_back({static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]),
+                      static_cast<float>(c[3])});
+  }
+  for (int k = 0; k < 3; ++k) roots_.push_back(static_cast<float>(pose.root[k]));
+  return true;
+}
+
+Json Tracks::animation(Buffer& buffer, const std::string& name, double fps) const {
+  std::vector<float> times(frames());
+  for (size_t f = 0; f < times.size(); ++f)
+    times[f] = static_cast<float>(static_cast<double>(f) / fps);
+  const int input = buffer.add(times.data(), times.size() * 4, times.size(), f32, "SCALAR", none);
+  buffer.set_bounds(input, {times.front()}, {times.back()});
+  Json samplers = Json::array(), channels = Json::array();
+  const auto channel = [&](size_t at, const char* path, int output) {
+    channels.push_back({{"sampler", samplers.size()}, {"target", {{"node", at}, {"path", path}}}});
+    samplers.push_back({{"input", input}, {"interpolation", "LINEAR"}, {"output", output}});
+  };
+  channel(0, "translation", buffer.add(roots_.data(), frames() * 12, frames(), f32, "VEC3", none));
+  std::vector<std::array<float, 4>> track(frames());
+  for (size_t j = 0; j < kJoints; ++j) {
+    for (size_t f = 0; f < frames(); ++f) track[f] = turns_[f * kJoints + j];
+    channel(j, "rotation", buffer.add(track.data(), frames() * 16, frames(), f32, "VEC4", none));
+  }
+  return {{"name", name}, {"channels", channels}, {"samplers", samplers}};
+}
+
+}  // namespace restage::glb

@@ -1,0 +1,64 @@
+// What files of our own skeletons are made of: nodes, tracks, the binary chunk. Shared by GlbWriter
+// and VrmaWriter.
+#pragma once
+
+#include <array>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "infer/writers/rig_convention.h"
+
+namespace restage::glb {
+
+using Json = nlohmann::ordered_json;
+
+enum Component { u8 = 5121, u32 = 5125, f32 = 5126 };
+enum Target { none = 0, vertices = 34962, indices = 34963 };
+
+/// The binary chunk of the file, with the buffer views and accessors that describe its content.
+class Buffer {
+ public:
+  /// Adds `count` elements to the chunk and returns the number of their accessor.
+  int add(const void* data, size_t bytes, size_t count, Component component, const char* type,
+          Target target);
+  /// Writes the least and the largest value into an accessor: the format wants that for positions
+  /// and times.
+  void set_bounds(int accessor, const std::vector<float>& low, const std::vector<float>& high);
+  void describe(Json& root) const;
+  const std::string& bytes() const { return bytes_; }
+
+ private:
+  std::string bytes_;
+  Json views_ = Json::array(), accessors_ = Json::array();
+};
+
+/// The file's nodes: 0 to 21 are the joints, then the convention's extra nodes and its root.
+/// Translations are the offsets of the rest joints, in float32.
+Json nodes(const Joints& rest, const RigConvention& rig);
+/// The number of the node that nothing carries.
+int top_node(const RigConvention& rig);
+/// Where a program that adds up the nodes of nodes() puts the joints: the sums of what is in the
+/// file, which is rounded.
+Joints placed_joints(const Json& nodes, const RigConvention& rig);
+
+/// Poses as the numbers of an animation: unit quaternions (x, y, z, w) whose signs make curves
+/// continuous, and the root's place.
+class Tracks {
+ public:
+  explicit Tracks(const RigConvention& rig) : rig_(rig) {}
+  /// False: the pose is not finite, and was not taken.
+  [[nodiscard]] bool push(const Pose& pose);
+  size_t frames() const { return roots_.size() / 3; }
+  /// LINEAR, at `fps`; only the root is translated.
+  Json animation(Buffer& buffer, const std::string& name, double fps) const;
+
+ private:
+  RigConvention rig_;
+  std::vector<std::array<float, 4>> turns_;  ///< 22 a frame
+  std::vector<float> roots_;                 ///< 3 numbers a frame
+};
+
+std::vector<float> three(const Eigen::Vector3f& p);
+
+}  // namespace restage::glb
