@@ -6,6 +6,8 @@
 namespace restage {
 namespace {
 
+constexpr double kOn = 1e-6;  // of a frame: what rounding makes of a whole number
+
 Mat3 between(const Mat3& a, const Mat3& b, double share) {
   return Quat(a).slerp(share, Quat(b)).normalized().toRotationMatrix();
 }
@@ -28,8 +30,12 @@ RetargetedFrame between(const RetargetedFrame& a, const RetargetedFrame& b, doub
 
 }  // namespace
 
+int64_t FrameRate::count(int64_t frames, double fps) {
+  if (frames <= 0) return 0;
+  return static_cast<int64_t>(std::floor((static_cast<double>(frames - 1) + kOn) * fps / kFps)) + 1;
+}
+
 std::vector<RetargetedFrame> FrameRate::push(const RetargetedFrame& frame) {
-  constexpr double kOn = 1e-6;  // of a frame: what rounding makes of a whole number
   std::vector<RetargetedFrame> out;
   const auto here = static_cast<double>(in_++);
   for (;; ++out_) {

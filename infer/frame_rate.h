@@ -16,6 +16,8 @@ class FrameRate {
   explicit FrameRate(double fps) : fps_(fps) {}
   /// The frames that lie between the frame before and this one, or on this one.
   std::vector<RetargetedFrame> push(const RetargetedFrame& frame);
+  /// How many frames come of so many at kFps.
+  static int64_t count(int64_t frames, double fps);
 
  private:
   double fps_;

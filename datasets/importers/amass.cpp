@@ -394,8 +394,7 @@ Motion import_parameters(const Npz& file, const MotionOptions& options, const Sk
                          ImportReport& report, std::vector<FingerTurns>* fingers) {
   report.file = file.path();
   const BodyParameters names = body_parameters(file);
-  BodyRotations rotations = read_body_rotations(file, names);
-  if (fingers == nullptr) rotations.hands.clear();
+  BodyRotations rotations = read_body_rotations(file, names, fingers != nullptr);
   check_radians(file, rotations, options.force, report);
   const Joints rest = skeleton(names, rotations);
   SourceMotion motion = read_motion(file, names, std::move(rotations), rest, options, report);

@@ -159,14 +159,14 @@ BodyRotations empty(int64_t frames, int64_t joints, const NpyArray& where,
 
 }  // namespace
 
-BodyRotations read_body_rotations(const Npz& file, const BodyParameters& names) {
+BodyRotations read_body_rotations(const Npz& file, const BodyParameters& names, bool with_hands) {
   // AMASS keeps its parts beside the whole; of others the parts have the plainer names.
   const bool parts = !names.orient.empty() && !names.body.empty();
   if (names.poses == "poses" || !parts) {
     const RotationArray poses = open_rotations(file, names.poses, true);
     BodyRotations out = empty(poses.frames, poses.joints, poses.array, named(names.poses, poses));
     add_joints(poses, 0, out);
-    add_hands(poses, out);
+    if (with_hands) add_hands(poses, out);
     return out;
   }
   const RotationArray root = open_rotations(file, names.orient, false),

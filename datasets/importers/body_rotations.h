@@ -14,7 +14,7 @@ namespace restage {
 struct BodyRotations {
   std::vector<std::vector<Quat>> local;  ///< per frame
   /// Of the 30 joints of both hands, as SMPL-H counts them: index, middle, little, ring, thumb of
-  /// the left, then of the right. Empty: the file's array of all joints has none.
+  /// the left, then of the right. Empty: not asked for, or the file's array of all joints has none.
   std::vector<std::vector<Quat>> hands;
   int64_t joints = 0;
   std::string layout;  ///< for the report: "poses [61, 156]"
@@ -25,6 +25,7 @@ struct BodyRotations {
 /// J], [F, J, 3]) or rotation matrices ([F, J, 3, 3], of one frame [J, 3, 3]), with or without axes
 /// of length 1.
 /// InputError: other shapes and numbers of joints, no rotations, not finite.
-BodyRotations read_body_rotations(const Npz& file, const BodyParameters& names);
+BodyRotations read_body_rotations(const Npz& file, const BodyParameters& names,
+                                  bool with_hands = false);
 
 }  // namespace restage

@@ -84,7 +84,7 @@ SkeletonTake of_parameters(const std::string& path, const TakeOptions& options) 
   constexpr double kLegs = 0.8;  // metres, hip to ankle, of the mean body of such models
   const Npz file(path);
   MotionOptions motion = options.motion;
-  motion.id = stem_of(path);
+  motion.id = std::filesystem::path(path).stem().string();
   ImportReport report;
   std::vector<FingerTurns> fingers;
   if (!options.body_model.empty()) {
@@ -203,12 +203,35 @@ bool holds_take(const std::string& path, const std::string& bones, std::string* 
   return false;
 }
 
-SkeletonTake read_take(const std::string& path, const TakeOptions& options) {
+namespace {
+
+/// Fingers that a recording only carries along say nothing.
+bool fingers_move(const SkeletonTake& take) {
+  constexpr double kStill = 0.01;  // radians
+  for (size_t f = 0; f < take.fingers.size(); ++f)
+    for (size_t k = 0; k < kFingerBones; ++k) {
+      const auto hand = static_cast<size_t>(k < kFingerBones / 2 ? kLeftWrist : kRightWrist);
+      const std::optional<Mat3>& turn = take.fingers[f][k];
+      if (turn && Quat(*turn).angularDistance(Quat(take.frames[f].global[hand])) > kStill)
+        return true;
+    }
+  return false;
+}
+
+SkeletonTake read_any(const std::string& path, const TakeOptions& options) {
   if (is_gltf_name(path)) return of_gltf(path, options.motion, options.clip);
   if (is_motions_name(path)) return of_motions(path, options);
   if (!options.clip.empty())
     throw InputError(path, "is one recording, of which no clip can be chosen", "leave --clip out");
   return is_recording(path) ? of_recording(path, options.motion) : of_parameters(path, options);
+}
+
+}  // namespace
+
+SkeletonTake read_take(const std::string& path, const TakeOptions& options) {
+  SkeletonTake out = read_any(path, options);
+  if (!fingers_move(out)) out.fingers.clear();
+  return out;
 }
 
 Pose perform_take(const SkeletonTake& take, size_t frame, const Joints& rest) {

@@ -27,16 +27,17 @@ struct SkeletonTake {
 bool holds_take(const std::string& path, const std::string& bones = "", std::string* why = nullptr);
 
 struct TakeOptions {
-  MotionOptions motion;  ///< count as in read_bvh(), read_amc(), read_character(), import_amass()
+  MotionOptions motion =
+      {};  ///< count as in read_bvh(), read_amc(), read_character(), import_amass()
   /// Of a glTF file its animation, empty: the first that moves the 22 joints. Of a file of motions
   /// the motion's id.
-  std::string clip;
-  std::optional<int64_t> sequence;  ///< of a file of motions, from 0
+  std::string clip = {};
+  std::optional<int64_t> sequence = std::nullopt;  ///< of a file of motions, from 0
   /// Of a body model's parameters: the model or a folder of models (BodyModels). Empty: `like`.
-  std::string body_model;
+  std::string body_model = {};
   /// Rest joints of who performs. Where parameters come without a body model, a skeleton of this
   /// shape with an adult's legs stands in: turns go over as they are.
-  Joints like{};
+  Joints like = {};
 };
 
 SkeletonTake read_take(const std::string& path, const TakeOptions& options);

@@ -1,4 +1,6 @@
 // restage retarget: clouds of one body in, the same motion by another body out, frame by frame.
+#include <unistd.h>
+
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -15,9 +17,11 @@
 #include "experiments/cli/profile.h"
 #include "experiments/cli/retarget.h"
 #include "experiments/cli/retarget_gaps.h"
+#include "experiments/cli/retarget_words.h"
 #include "experiments/cli/scale_option.h"
 #include "experiments/cli/standard_weights.h"
 #include "experiments/source.h"
+#include "infer/frame_rate.h"
 
 namespace restage::cli {
 namespace {
@@ -202,8 +206,9 @@ void log_outcome(const Outcome& done, const Source& source, const Gaps& gaps) {
 
 void print_outcome(const RetargetCommand& c, const Common& common, const Source& source,
                    const Outcome& done, const Gaps& gaps, const Profile& profile) {
+  const int64_t frames = c.to.every == 1 ? FrameRate::count(done.frames, c.to.rate()) : done.frames;
   Json document = {{"out", c.to.out},       {"source_frames", source.frames()},
-                   {"frames", done.frames}, {"fps", c.to.rate()},
+                   {"frames", frames},      {"fps", c.to.rate()},
                    {"seed", common.seed},   {"missing", gaps.json()},
                    {"filled", done.filled}, {"points_left_out", done.points_left_out}};
   if (!done.confidence.empty()) {
@@ -211,7 +216,7 @@ void print_outcome(const RetargetCommand& c, const Common& common, const Source&
     document["confidence"] = done.confidence;
   }
   if (c.profile) document["profile"] = profile.json();
-  std::string text = "wrote " + c.to.out + ": " + std::to_string(done.frames) + " frames (seed " +
+  std::string text = "wrote " + c.to.out + ": " + std::to_string(frames) + " frames (seed " +
                      std::to_string(common.seed) + ")";
   if (!done.filled.empty()) text += "; " + std::to_string(done.filled.size()) + " of them filled";
   if (done.held > 0) text += "; in " + std::to_string(done.held) + " of them the target waits";
@@ -240,9 +245,12 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   Gaps gaps(source.frames(), source.fps() / static_cast<double>(c.to.every), c.options.force);
   Profile profile({"read", "extract", "motion", "deformation", "write", "frame"});
   Run run(c, source, *system, target.own, gaps, profile);
+  // Scripts get one line if the source turns out to be bad later on; people need not wait.
+  const bool on_terminal = isatty(STDERR_FILENO) != 0;
+  if (on_terminal) say_target(target);
   const Outcome done = run();
   run.sink().commit(done.filled);
-  log_target(target.report);
+  if (!on_terminal) say_target(target);
   if (!no_skeleton.empty())
     log_warning(c.source.path +
                 ": its surface is looked at; its skeleton cannot be taken: " + no_skeleton);
@@ -260,12 +268,6 @@ std::string help_of_systems() {
 }
 
 }  // namespace
-
-void log_target(const ImportReport& report) {
-  for (const auto& [name, value] : report.facts)
-    if (name != "joints") log_info(report.file + ": " + name + ": " + value);
-  for (const std::string& remark : report.remarks) log_info(report.file + ": " + remark);
-}
 
 SystemInput load_input(const RetargetCommand& c, const Common& common) {
   SystemInput input;

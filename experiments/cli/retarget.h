@@ -24,10 +24,6 @@ struct RetargetCommand {
 SystemInput load_input(const RetargetCommand& c, const Common& common);
 /// The same with the target; what is refused because its rig is not known says so.
 std::unique_ptr<System> system_for(const RetargetCommand& c, SystemInput input, TargetMesh& target);
-/// How a character was brought into T-pose; nothing for a plain mesh. Said when all is done: bad
-/// input, which may come late in a source, is answered with one line.
-void log_target(const ImportReport& report);
-
 /// A source whose skeleton is known: its turns go over as they are, and no network is asked but for
 /// a target without a rig.
 int run_take(const RetargetCommand& c, const Common& common);

@@ -4,6 +4,8 @@
 #include "datasets/importers/skeleton_take.h"
 #include "experiments/cli/output.h"
 #include "experiments/cli/retarget.h"
+#include "experiments/cli/retarget_words.h"
+#include "infer/frame_rate.h"
 
 namespace restage::cli {
 namespace {
@@ -63,6 +65,8 @@ int run_take(const RetargetCommand& c, const Common& common) {
   std::optional<SourceRecord> source;
   if (is_gltf_name(c.source.path)) source = c.source;
   const Sink sink = make_sink(c.to, shown, source, take.name, c.target, target.own);
+  say_take(take);
+  say_target(target);
   int64_t frames = 0;
   for (size_t f = 0; f < take.frames.size(); f += static_cast<size_t>(c.to.every)) {
     RetargetedFrame frame;
@@ -80,13 +84,12 @@ int run_take(const RetargetCommand& c, const Common& common) {
     ++frames;
   }
   sink.commit({});
-  log_target(take.report);
-  log_target(target.report);
+  if (c.to.every == 1) frames = FrameRate::count(frames, c.to.rate());
   const Json document = {{"out", c.to.out},   {"source_frames", take.frames.size()},
                          {"frames", frames},  {"fps", c.to.rate()},
                          {"clip", take.name}, {"from", "skeleton"}};
   print(common.json, document,
-        "wrote " + c.to.out + ": " + std::to_string(frames) + " frames of the source's skeleton\n");
+        "wrote " + c.to.out + ": " + std::to_string(frames) + " frames, the motion of the source's skeleton\n");
   return 0;
 }
 

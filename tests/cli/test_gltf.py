@@ -139,7 +139,8 @@ class Gltf(CliTest):
         call = ["retarget", "--weights", w, "--force"]
         result = self.restage(*call, "--source", "scans", "--target", "hero.glb", "--out", "first.glb")
         self.assertEqual(result.code, 0, result.err)
-        self.assertIn("rest pose", result.err)
+        self.assertIn("hero.glb: ", result.err)
+        self.assertIn("A-pose turned into T-pose", result.err)
         # What we wrote comes back in: as a source, frame by frame, and as a target.
         self.ply("plain.ply", points(90, 7))
         self.done(*call, "--source", "first.glb", "--target", "plain.ply", "--out", "second.h5")

@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include "datasets/importers/gltf_character.h"
+#include "datasets/schema.h"
 #include "tests/datasets/gltf_maker.h"
 #include "tests/datasets/importers_support.h"
+#include "tests/datasets/smpl_support.h"
 
 namespace restage {
 namespace {
@@ -109,6 +111,115 @@ TEST_F(SkeletonTakeTest, WhatHoldsOne) {
   EXPECT_FALSE(holds_take(dir / "none.ply"));
   EXPECT_FALSE(holds_take(dir.path()));
   EXPECT_THROW(holds_take(dir.write("bad.glb", "glTF")), InputError);
+}
+
+/// Axis-angle numbers turn about fixed axes, so turns at 30 fps are known.
+class ParametersTest : public FileTest {
+ protected:
+  std::string clip_file(const test::TinyClip& clip) const {
+    auto arrays = clip.arrays();
+    for (auto& [name, content] : arrays)
+      if (name == "poses") content = poses_with_fingers(clip);
+    return dir.write("walk_poses.npz", npz(arrays));
+  }
+  /// The left middle finger (index, middle, little, ring, thumb in the file) bends.
+  static std::string poses_with_fingers(const test::TinyClip& clip) {
+    std::vector<double> poses;
+    for (int64_t f = 0; f < clip.frames; ++f) {
+      const double t = static_cast<double>(f) / clip.fps;
+      const Eigen::AngleAxisd first(clip.root(t));
+      for (int64_t i = 0; i < clip.width() / 3; ++i) {
+        const int64_t hand = i - (clip.width() / 3 - 30);
+        Vec3 a = i == 0        ? Vec3(first.angle() * first.axis())
+                 : i < kJoints ? clip.turn(static_cast<int>(i), t)
+                               : Vec3(Vec3::Zero());
+        if (hand >= 3 && hand < 6) a = Vec3(0, 0, 0.4 * t);
+        poses.insert(poses.end(), a.data(), a.data() + 3);
+      }
+    }
+    return npy<double>({clip.frames, clip.width()}, poses);
+  }
+  static Mat3 z_to_y() { return Eigen::AngleAxisd(-M_PI / 2, Vec3::UnitX()).toRotationMatrix(); }
+  static Rotations turns(const test::TinyClip& clip, double t) {
+    Rotations local;
+    local[0] = z_to_y() * clip.root(t);
+    for (size_t j = 1; j < kJoints; ++j) {
+      const Vec3 a = clip.turn(static_cast<int>(j), t);
+      local[j] =
+          Eigen::AngleAxisd(a.norm(), a.norm() > 0 ? Vec3(a.normalized()) : Vec3(Vec3::UnitX()))
+              .toRotationMatrix();
+    }
+    return to_global(local);
+  }
+};
+
+TEST_F(ParametersTest, TurnsGoOverWithAndWithoutABodyModel) {
+  for (const SmplFamily family : {SmplFamily::smplh, SmplFamily::smplx}) {
+    test::TinyClip clip;
+    clip.family = family;
+    const std::string path = clip_file(clip);
+    ASSERT_TRUE(holds_take(path));
+    TakeOptions options;
+    options.like = testing::tiny_joints();
+    for (Vec3& x : options.like) x *= 1.3;
+    const SkeletonTake bare = read_take(path, options);
+    EXPECT_HAS(remarks(bare.report), "no body model");
+    options.body_model = dir.write("model.npz", test::TinySmpl{family}.file());
+    const SkeletonTake full = read_take(path, options);
+    EXPECT_EQ(full.name, "walk_poses");
+    for (const SkeletonTake* take : {&bare, &full}) {
+      ASSERT_EQ(take->frames.size(), 31u);
+      ASSERT_EQ(take->fingers.size(), 31u);
+      for (size_t f = 0; f < 31; f += 6) {
+        const double t = static_cast<double>(f) / kFps;
+        const Rotations wanted = turns(clip, t);
+        for (size_t j = 0; j < kJoints; ++j)
+          EXPECT_LT((take->frames[f].global[j] - wanted[j]).norm(), 1e-4) << f << " " << j;
+        const auto& middle = take->fingers[f];
+        for (int bone = 0; bone < 3; ++bone) {
+          const Mat3 bent =
+              Eigen::AngleAxisd(0.4 * t * (bone + 1), Vec3::UnitZ()).toRotationMatrix();
+          EXPECT_LT(
+              (*middle[static_cast<size_t>(finger_bone(0, 2, bone))] - wanted[kLeftWrist] * bent)
+                  .norm(),
+              1e-4);
+          EXPECT_LT(
+              (*middle[static_cast<size_t>(finger_bone(1, 2, bone))] - wanted[kRightWrist]).norm(),
+              1e-4);
+        }
+      }
+    }
+    // Without a model, the turns of who performs are the file's.
+    const Pose pose = perform_take(bare, 12, options.like);
+    const Rotations global = to_global(pose.local), wanted = turns(clip, 12 / kFps);
+    for (size_t j = 0; j < kJoints; ++j) EXPECT_LT((global[j] - wanted[j]).norm(), 1e-4);
+  }
+}
+
+TEST_F(SkeletonTakeTest, OurOwnMotions) {
+  std::vector<Motion> motions = {testing::tiny_motion("a", "ann", "train", 12),
+                                 testing::tiny_motion("b", "bob", "test", 7)};
+  write_motions(dir / "one.h5", {motions[1]}, {});
+  write_motions(dir / "two.h5", motions, {});
+  const std::string one = dir / "one.h5", two = dir / "two.h5";
+  ASSERT_TRUE(holds_take(one));
+  const SkeletonTake take = read_take(one, {});
+  EXPECT_EQ(take.name, "b");
+  const Body body = testing::tiny_body("own", "test");
+  ASSERT_EQ(take.frames.size(), 7u);
+  for (size_t f = 0; f < 7; ++f) {
+    const Pose is = perform_take(take, f, body.joints), wanted = pose_on(motions[1], body, f);
+    for (size_t j = 0; j < kJoints; ++j) EXPECT_LT((is.local[j] - wanted.local[j]).norm(), 1e-5);
+    EXPECT_LT((is.root - wanted.root).head<1>().norm(), 0.02);
+  }
+  EXPECT_EQ(read_take(two, {.clip = "a"}).frames.size(), 12u);
+  EXPECT_EQ(read_take(two, {.sequence = 1}).frames.size(), 7u);
+  EXPECT_HAS(refusal_of([&] { read_take(two, {}); }), "holds 2 motions");
+  EXPECT_HAS(refusal_of([&] { read_take(two, {.clip = "c"}); }), "no motion 'c'");
+  EXPECT_HAS(refusal_of([&] { read_take(two, {.sequence = 2}); }), "no number 2");
+  Scans scans{{Point(0, 0, 0)}, {0, 1}, {0, 1}};
+  write_scans(dir / "scans.h5", scans, {});
+  EXPECT_FALSE(holds_take(dir / "scans.h5"));
 }
 
 }  // namespace

@@ -1,0 +1,66 @@
+#include "experiments/cli/retarget_words.h"
+
+#include <algorithm>
+
+#include "autograd/base/format.h"
+#include "autograd/base/log.h"
+#include "datasets/readers/errors.h"
+
+namespace restage::cli {
+namespace {
+
+std::string fact(const ImportReport& report, const std::string& wanted) {
+  for (const auto& [name, value] : report.facts)
+    if (name == wanted) return value;
+  return "";
+}
+
+/// "Mixamo (profile mixamo); placed: neck" -> "Mixamo".
+std::string family(const ImportReport& report) {
+  const std::string names = fact(report, "names");
+  return names.substr(0, std::min(names.find(" (profile"), names.find(';')));
+}
+
+std::string rest_pose(const ImportReport& report) {
+  const std::string said = fact(report, "rest pose");
+  return said.starts_with("turned onto") ? "A-pose turned into T-pose" : said;
+}
+
+std::string count(size_t n, const char* one, const char* many) {
+  return cat(n, " ", n == 1 ? one : many);
+}
+
+void say(const std::string& line, const ImportReport& report) {
+  log_info(report.file + ": " + line);
+  for (const auto& [name, value] : report.facts)
+    log_debug(report.file + ": " + name + ": " + value);
+  for (const std::string& remark : report.remarks) log_info(report.file + ": " + remark);
+}
+
+}  // namespace
+
+void say_target(const TargetMesh& target) {
+  const ImportReport& report = target.report;
+  if (!target.own) {
+    for (const std::string& remark : report.remarks) log_warning(report.file + ": " + remark);
+    return;
+  }
+  const Gltf& file = target.own->file();
+  const auto skinned = std::count_if(file.bones.begin(), file.bones.end(),
+                                     [](const GltfBone& bone) { return bone.skin >= 0; });
+  std::string line = file.standard.empty() ? "" : file.standard + ", ";
+  line += cat(family(report), " bones (", skinned, "), ", rest_pose(report), ", ",
+              count(file.meshes, "mesh", "meshes"));
+  if (file.morph_targets > 0)
+    line += ", " + count(file.morph_targets, "morph target", "morph targets");
+  say(line, report);
+}
+
+void say_take(const SkeletonTake& take) {
+  std::string line = family(take.report);
+  line += cat(line.empty() ? "" : " bones, ", take.name, ": ", take.frames.size(),
+              " frames at 30 a second", take.fingers.empty() ? "" : ", with fingers");
+  say(line, take.report);
+}
+
+}  // namespace restage::cli
