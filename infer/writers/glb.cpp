@@ -64,18 +64,24 @@ Json mesh_primitive(Buffer& buffer, const Mesh& mesh, const Influences& influenc
 /// The inverse bind matrices undo exactly where the rounded nodes put the joints, so that at rest
 /// the skinned mesh is the mesh itself.
 Json skin(Buffer& buffer, const Json& nodes, const RigConvention& rig) {
-  std::vector<std::array<float, 16>> inverse(kJoints);
-  const Joints placed = glb::placed_joints(nodes, rig);
+  std::vector<std::array<float, 16>> inverse;
   Json joints = Json::array();
-  for (size_t j = 0; j < kJoints; ++j) {
-    Eigen::Map<Eigen::Matrix4f> m(inverse[j].data());  // column by column, as the format wants
+  const auto add = [&](const Mat3& axes, const Vec3& place) {
+    // Column by column, as the format wants.
+    Eigen::Map<Eigen::Matrix4f> m(inverse.emplace_back().data());
     m.setIdentity();
-    m.topLeftCorner<3, 3>() = rig.axes[j].transpose().cast<float>();
-    m.topRightCorner<3, 1>() = (rig.axes[j].transpose() * -placed[j]).cast<float>();
-    joints.push_back(j);
-  }
-  return {{"inverseBindMatrices",
-           buffer.add(inverse.data(), inverse.size() * 64, kJoints, glb::f32, "MAT4", glb::none)},
+    m.topLeftCorner<3, 3>() = axes.transpose().cast<float>();
+    m.topRightCorner<3, 1>() = (axes.transpose() * -place).cast<float>();
+    joints.push_back(joints.size());
+  };
+  const Joints placed = glb::placed_joints(nodes, rig);
+  for (size_t j = 0; j < kJoints; ++j) add(rig.axes[j], placed[j]);
+  // They carry no weight, but programs make bones of what a skin lists.
+  for (const ExtraNode& extra : rig.extra)
+    add(rig.axes[static_cast<size_t>(extra.parent)], extra.place);
+  if (!rig.root.empty()) add(Mat3::Identity(), Vec3::Zero());
+  return {{"inverseBindMatrices", buffer.add(inverse.data(), inverse.size() * 64, inverse.size(),
+                                             glb::f32, "MAT4", glb::none)},
           {"skeleton", glb::top_node(rig)},
           {"joints", joints}};
 }

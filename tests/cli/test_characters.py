@@ -173,7 +173,7 @@ class Characters(CliTest):
         self.write("odd.yaml", "title: Odd\njoints:\n" + "".join("  %s: %s\n" % pair for pair in names.items()))
         self.done(*call, "--source-bones", "odd.yaml")
         self.ply("scans/f0.ply", points(120, 0))
-        self.bad_input(["retarget", "--source", "scans", "--source-bones", "odd.yaml", "--target", "hero.glb", "--out", "x.glb"], "leave --source-bones out")
+        self.bad_input(["retarget", "--source", "scans", "--source-bones", "odd.yaml", "--target", "hero.glb", "--out", "x.glb"], "leave --source-bones and --body-model out")
 
     def last_turns(self, name):
         """All numbers of the last animation of a GLB."""

@@ -68,6 +68,8 @@ TEST_F(RigConventions, AllSayTheSameMotion) {
     EXPECT_NEAR(writer.surface_error().max, cut.max, 1e-5);
     check(name + ".glb");
     const RigConvention rig = rig_convention(name, body_.joints, 1.8);
+    EXPECT_EQ(std::ssize(read_gltf(dir / (name + ".glb")).bones),
+              std::ssize(rig.names) + std::ssize(rig.extra) + (rig.root.empty() ? 0 : 1));
     keep(name + ".glb", {rig.names.begin(), rig.names.end()});
   }
 }
