@@ -2,6 +2,7 @@
 #include "autograd/base/log.h"
 #include "datasets/doctor/examine.h"
 #include "datasets/importers/skeleton_take.h"
+#include "datasets/readers/text.h"
 #include "experiments/cli/output.h"
 #include "experiments/cli/retarget.h"
 #include "experiments/cli/retarget_words.h"
@@ -18,12 +19,19 @@ void check_options(const RetargetCommand& c) {
                      "has a skeleton, which is taken over as it is; " + option + " is for clouds",
                      "leave " + option + " out, or add --from-surface");
   };
+  const bool many = text::ends_in(c.source.path, {".h5", ".hdf5"});
+  if (c.source.sequence && !many) refuse("--sequence");
   if (c.system != "chain") refuse("--system");
   if (c.options.samples != usual.samples) refuse("--samples");
   if (c.options.anchor != usual.anchor) refuse("--anchor");
   if (c.options.min_confidence != usual.min_confidence) refuse("--min-confidence");
   if (!c.options.foot_lock) refuse("--no-foot-lock");
   if (c.profile) refuse("--profile");
+  if (!c.body_model.empty() && !text::ends_in(c.source.path, {".npz"}))
+    throw InputError(c.source.path, "has a skeleton of its own", "leave --body-model out");
+  if (many && c.source.fps && *c.source.fps != kFps)
+    throw InputError(c.source.path, "has 30 frames a second, which --fps cannot change",
+                     "leave --fps out");
   if (is_gltf_name(c.source.path) && c.source.fps && *c.source.fps != kFps)
     throw InputError(c.source.path, "states its key times, which --fps cannot change",
                      "leave --fps out");
@@ -89,7 +97,8 @@ int run_take(const RetargetCommand& c, const Common& common) {
                          {"frames", frames},  {"fps", c.to.rate()},
                          {"clip", take.name}, {"from", "skeleton"}};
   print(common.json, document,
-        "wrote " + c.to.out + ": " + std::to_string(frames) + " frames, the motion of the source's skeleton\n");
+        "wrote " + c.to.out + ": " + std::to_string(frames) +
+            " frames, the motion of the source's skeleton\n");
   return 0;
 }
 

@@ -159,6 +159,7 @@ class Characters(CliTest):
         for option in (["--samples", "8"], ["--min-confidence", "0.5"], ["--system", "refine"], ["--sequence", "0"], ["--profile"]):
             self.bad_input([*call, "--out", "x.glb", *option], "walk.bvh", option[0], "--from-surface")
         self.bad_input([*call, "--out", "x.glb", "--clip", "walk"], "leave --clip out")
+        self.bad_input([*call, "--out", "x.glb", "--body-model", "hero.glb"], "walk.bvh", "leave --body-model out")
         self.bad_input([*call, "--out", "x.glb", "--from-surface"], "walk.bvh")
         self.bad_input(["retarget", "--source", "none.bvh", "--target", "hero.glb", "--out", "x.glb"], "none.bvh")
 
@@ -174,6 +175,43 @@ class Characters(CliTest):
         self.done(*call, "--source-bones", "odd.yaml")
         self.ply("scans/f0.ply", points(120, 0))
         self.bad_input(["retarget", "--source", "scans", "--source-bones", "odd.yaml", "--target", "hero.glb", "--out", "x.glb"], "leave --source-bones and --body-model out")
+
+    def test_rates_and_vrm_animations(self):
+        self.bvh("walk.bvh")
+        call = ["retarget", "--source", "walk.bvh", "--target", "hero.glb", "--out"]
+        for name, fps, frames in (("a.glb", 60, 3), ("b.vrma", 120, 5), ("c.bvh", 24, 1), ("d.glb", 30, 2)):
+            said = self.json(*call, name, "--out-fps", str(fps))
+            self.assertEqual((said["frames"], said["fps"]), (frames, fps))
+        animation = self.glb("a.glb")["animations"][-1]
+        self.assertEqual(self.glb("a.glb")["accessors"][animation["samplers"][0]["input"]]["count"], 3)
+        vrma = self.glb("b.vrma")
+        self.assertEqual(vrma["extensionsUsed"], ["VRMC_vrm_animation"])
+        bones = vrma["extensions"]["VRMC_vrm_animation"]["humanoid"]["humanBones"]
+        self.assertEqual((len(bones), bones["hips"]["node"]), (22, 0))
+        # The file is a source again, and says the same.
+        self.done("retarget", "--source", "b.vrma", "--target", "hero.glb", "--out", "again.glb")
+        self.done(*call, "once.glb")
+        self.assertLess(max(abs(a - b) for a, b in zip(self.last_turns("again.glb"), self.last_turns("once.glb"))), 1e-5)
+        self.bad_input(call + ["x.h5", "--out-fps", "24"], "x.h5", "30 frames a second")
+        self.bad_input(call + ["x.glb", "--out-fps", "0"], "--out-fps")
+
+    def test_a_skeleton_for_a_target_without_one(self):
+        for i in range(4):
+            self.ply("scans/f%d.ply" % i, points(120, i))
+        self.ply("plain.ply", points(90, 7))
+        call = ["retarget", "--weights", weights("tposes", *TPOSES), "--force", "--source", "scans", "--target", "plain.ply", "--out"]
+        names = {"mixamo": "mixamorig:LeftForeArm", "vrm": "leftLowerArm", "unreal": "lowerarm_l", "smpl": "left_hand", "restage": "left_elbow"}
+        for skeleton, bone in names.items():
+            self.done(*call, "a.glb", "--skeleton", skeleton)
+            self.assertIn(bone, [node["name"] for node in self.glb("a.glb")["nodes"]])
+        said = self.restage(*call, "a.glb")
+        self.assertIn("from the exact one on average", said.err)
+        self.assertGreater(self.glb("a.glb")["asset"]["extras"]["surface_error_mm"]["max"], 0)
+        self.done(*call, "a.bvh", "--skeleton", "unreal")
+        self.assertIn("JOINT lowerarm_l\n", self.bytes("a.bvh").decode())
+        self.bad_input(call + ["x.glb", "--skeleton", "biped"], "--skeleton", "mixamo")
+        self.bad_input(call + ["x.h5", "--skeleton", "vrm"], "x.h5", "--skeleton")
+        self.bad_input(["retarget", *call[1:6], "--target", "hero.glb", "--out", "x.glb", "--skeleton", "vrm"], "hero.glb", "leave --skeleton out")
 
     def last_turns(self, name):
         """All numbers of the last animation of a GLB."""
