@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+
+#include "autograd/base/format.h"
 #include "datasets/importers/gltf_character.h"
 #include "datasets/schema.h"
 #include "tests/datasets/gltf_maker.h"
@@ -194,6 +197,50 @@ TEST_F(ParametersTest, TurnsGoOverWithAndWithoutABodyModel) {
     const Rotations global = to_global(pose.local), wanted = turns(clip, 12 / kFps);
     for (size_t j = 0; j < kJoints; ++j) EXPECT_LT((global[j] - wanted[j]).norm(), 1e-4);
   }
+}
+
+/// Two frames of 22 joints and a finger; in the second the elbow and the finger bend about z by
+/// these degrees.
+std::string recording_with_a_finger(double elbow, double finger) {
+  const Joints& at = bvh_test::rest();
+  std::string motion[2] = {"0 95 0", "0 95 0"};
+  const std::string channels = "3 Zrotation Xrotation Yrotation\n";
+  const std::function<std::string(int, const Vec3&)> joint = [&](int j, const Vec3& from) {
+    const Vec3 offset = 100 * (at[static_cast<size_t>(j)] - from);
+    std::string out =
+        (j == 0 ? "ROOT " : "JOINT ") + std::string(bvh_test::kMixamo[j]) + "\n{\n" +
+        format("OFFSET %.6f %.6f %.6f\nCHANNELS ", offset.x(), offset.y(), offset.z()) +
+        (j == 0 ? "6 Xposition Yposition Zposition Zrotation Xrotation Yrotation\n" : channels);
+    motion[0] += " 0 0 0";
+    motion[1] += j == kLeftElbow ? format(" %g 0 0", elbow) : " 0 0 0";
+    for (int child = j + 1; child < kJoints; ++child)
+      if (kParents[child] == j) out += joint(child, at[static_cast<size_t>(j)]);
+    if (j == kLeftWrist) {
+      out += "JOINT mixamorig:LeftHandIndex1\n{\nOFFSET 8 0 2\nCHANNELS " + channels +
+             "End Site\n{\nOFFSET 3 0 0\n}\n}\n";
+      motion[0] += " 0 0 0";
+      motion[1] += format(" %g 0 0", finger);
+    }
+    if (j == kHead) out += "End Site\n{\nOFFSET 0 10 0\n}\n";
+    return out + "}\n";
+  };
+  const std::string tree = "HIERARCHY\n" + joint(0, Vec3::Zero());
+  return tree + "MOTION\nFrames: 2\nFrame Time: 0.033333333\n" + motion[0] + "\n" + motion[1] +
+         "\n";
+}
+
+TEST_F(SkeletonTakeTest, FingersOfARecording) {
+  TakeOptions options;
+  options.motion.fingers = true;
+  const SkeletonTake bent = read_take(dir.write("a.bvh", recording_with_a_finger(20, 30)), options);
+  ASSERT_EQ(bent.fingers.size(), 2u);
+  const auto index = static_cast<size_t>(finger_bone(0, 1, 0));
+  for (size_t k = 0; k < kFingerBones; ++k) EXPECT_EQ(bent.fingers[1][k].has_value(), k == index);
+  const Mat3 wanted = Eigen::AngleAxisd(50 * M_PI / 180, Vec3::UnitZ()).toRotationMatrix();
+  EXPECT_LT((*bent.fingers[1][index] - wanted).norm(), 1e-6);
+  // Fingers that a recording only carries along are left alone.
+  EXPECT_TRUE(
+      read_take(dir.write("b.bvh", recording_with_a_finger(20, 0)), options).fingers.empty());
 }
 
 TEST_F(SkeletonTakeTest, OurOwnMotions) {
