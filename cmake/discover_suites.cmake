@@ -1,4 +1,4 @@
-cmake_minimum_required(VERSION 3.20)
+cmake_minimum_required(VERSION 3.25)
 # One ctest entry for each gtest suite: run after PROGRAM was linked, writes OUT for ctest.
 # (One for each test, as gtest_discover_tests makes them, would start hundreds of processes and build
 # the fixtures that a suite shares again and again.)
