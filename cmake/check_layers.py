@@ -62,6 +62,7 @@ ONLY_IN = {
                   "datasets/importers/makehuman_pack.cpp", "datasets/fetch/fetch_cmu.cpp", "train/", "infer/",
                   "experiments/"],
     "mpi.h": ["train/mpi/"],
+    "assimp/": ["datasets/readers/assimp/"],
     "openssl/": ["datasets/readers/sha256.cpp"],
     "stb/": ["infer/render/"],
     "lzma.h": ["datasets/readers/"],

@@ -80,12 +80,15 @@ struct Gltf {
   std::vector<std::string> remarks;                   ///< what was left out
 };
 
-/// Whether the name ends in .glb, .gltf, .vrm or .vrma, in any case.
+/// Whether the name ends in .glb, .gltf, .vrm or .vrma, in any case; or in .fbx, which is read as the
+/// GLB document that is made of it (datasets/readers/fbx.h).
 bool is_gltf_name(const std::string& path);
 
 Gltf read_gltf(const std::string& path);
 /// The same from memory; external buffers are looked for in the folder of `path`.
 Gltf parse_gltf(std::string_view content, const std::string& path);
+/// The bytes of the document: the file's own; of FBX those that it is made into.
+std::string read_gltf_bytes(const std::string& path);
 
 using GltfTransforms = std::vector<Eigen::Affine3d>;
 

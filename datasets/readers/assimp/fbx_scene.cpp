@@ -1,0 +1,190 @@
+// Assimp's import, the document's nodes and its bytes.
+#include "datasets/readers/assimp/fbx_scene.h"
+
+#include <assimp/config.h>
+#include <assimp/postprocess.h>
+
+#include <assimp/Importer.hpp>
+#include <cmath>
+
+#include "datasets/readers/assimp/fbx_detail.h"
+#include "datasets/readers/errors.h"
+#include "datasets/readers/text.h"
+#include "nn/geometry/glb_file.h"
+
+namespace restage {
+namespace fbx {
+namespace {
+
+constexpr std::string_view kPart = "_$AssimpFbx$_";  // in names of nodes that are a part of one
+
+std::string name_of(const aiString& text) {
+  std::string name(text.C_Str(), text.length);
+  if (text::is_utf8(name)) return name;
+  for (char& c : name)  // JSON holds nothing else
+    if (static_cast<unsigned char>(c) >= 128) c = '_';
+  return name;
+}
+
+double number_of(const aiMetadata& data, const char* key, double otherwise) {
+  int32_t whole = 0;
+  float single = 0;
+  double twice = 0;
+  if (data.Get(key, whole)) return whole;
+  if (data.Get(key, single)) return single;
+  return data.Get(key, twice) ? twice : otherwise;
+}
+
+}  // namespace
+
+Eigen::Matrix4d matrix_of(const aiMatrix4x4& m) {
+  Eigen::Matrix4d out;
+  out << m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4, m.c1, m.c2, m.c3, m.c4, m.d1, m.d2, m.d3,
+      m.d4;
+  return out;
+}
+
+Trs trs_of(const Eigen::Matrix4d& matrix) {
+  const Eigen::Matrix3d linear = matrix.topLeftCorner<3, 3>();
+  Trs out{matrix.topRightCorner<3, 1>(), Eigen::Quaterniond::Identity(),
+          linear.colwise().norm().transpose()};
+  if (linear.determinant() < 0) out.scale.x() = -out.scale.x();
+  if (out.scale.cwiseAbs().minCoeff() < 1e-12) return out;
+  out.rotation = Eigen::Quaterniond(
+      Eigen::Matrix3d(linear * out.scale.cwiseInverse().asDiagonal()));
+  out.rotation.normalize();
+  return out;
+}
+
+void Maker::refuse(const std::string& what) const {
+  throw InputError(path_, what, "export it again, or export GLB (glTF) from Blender");
+}
+
+/// To metres, y up, facing +z: FBX says its axes and its unit in centimetres.
+Eigen::Matrix4d Maker::root_transform() const {
+  Eigen::Matrix4d out = Eigen::Matrix4d::Identity();
+  if (scene_.mMetaData == nullptr) return out;
+  const aiMetadata& data = *scene_.mMetaData;
+  const double unit = 0.01 * number_of(data, "UnitScaleFactor", 1);
+  if (!(unit > 1e-9 && unit < 1e9)) refuse("has a unit that is none");
+  const char* names[] = {"CoordAxis", "UpAxis", "FrontAxis"};
+  const double otherwise[] = {0, 1, 2};
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Zero();
+  for (int row = 0; row < 3; ++row) {
+    const double axis = number_of(data, names[row], otherwise[row]);
+    if (axis != 0 && axis != 1 && axis != 2) refuse("has axes that are none");
+    const double sign = number_of(data, (std::string(names[row]) + "Sign").c_str(), 1);
+    axes(row, static_cast<int>(axis)) = sign < 0 ? -1 : 1;
+  }
+  if (std::abs(axes.determinant()) < 0.5) refuse("names one axis twice");
+  out.topLeftCorner<3, 3>() = unit * axes;
+  return out;
+}
+
+/// `chain`, `geometry`: what the parts above `from` have gathered for the node that they belong to.
+void Maker::add_nodes(const aiNode& from, int parent, std::vector<const aiNode*> chain,
+                      Eigen::Matrix4d geometry) {
+  const std::string name = name_of(from.mName);
+  const size_t part = name.find(kPart);
+  if (part != name.npos) {
+    const std::string kind = name.substr(part + kPart.size());
+    if (!kind.starts_with("Geometric"))
+      chain.push_back(&from);
+    else if (!kind.ends_with("Inverse"))  // those undo for the children what they do not inherit here
+      geometry = geometry * matrix_of(from.mTransformation);
+    if (from.mNumChildren > 0 || from.mNumMeshes == 0) {
+      for (unsigned c = 0; c < from.mNumChildren; ++c)
+        add_nodes(*from.mChildren[c], parent, chain, geometry);
+      return;
+    }
+  }
+  Node node;
+  node.name = name;
+  node.parent = parent;
+  node.chain = std::move(chain);
+  if (part == name.npos) node.chain.push_back(&from);
+  for (const aiNode* step : node.chain) node.local = node.local * matrix_of(step->mTransformation);
+  if (parent < 0) node.local = root_transform();
+  node.geometry = geometry;
+  node.meshes.assign(from.mMeshes, from.mMeshes + from.mNumMeshes);
+  const int number = static_cast<int>(nodes_.size());
+  nodes_.push_back(std::move(node));
+  for (unsigned c = 0; c < from.mNumChildren; ++c)
+    add_nodes(*from.mChildren[c], number, {}, Eigen::Matrix4d::Identity());
+}
+
+void Maker::write_nodes() {
+  Json& list = json_["nodes"] = Json::array();
+  for (const Node& node : nodes_) {
+    if (!node.local.allFinite()) refuse("has a node that is nowhere: " + text::quote(node.name));
+    const Trs trs = trs_of(node.local);
+    Json item = {{"name", node.name}};
+    if (!trs.translation.isZero(0))
+      item["translation"] = {trs.translation.x(), trs.translation.y(), trs.translation.z()};
+    if (!trs.rotation.isApprox(Eigen::Quaterniond::Identity(), 0))
+      item["rotation"] = {trs.rotation.x(), trs.rotation.y(), trs.rotation.z(), trs.rotation.w()};
+    if (!trs.scale.isOnes(0)) item["scale"] = {trs.scale.x(), trs.scale.y(), trs.scale.z()};
+    list.push_back(std::move(item));
+  }
+  for (size_t n = 0; n < nodes_.size(); ++n)
+    if (nodes_[n].parent >= 0)
+      list[static_cast<size_t>(nodes_[n].parent)]["children"].push_back(n);
+}
+
+int Maker::add_view(const void* data, size_t bytes) {
+  const size_t at = binary_.size();
+  binary_.append(static_cast<const char*>(data), bytes);
+  binary_.resize((binary_.size() + 3) / 4 * 4, '\0');
+  json_["bufferViews"].push_back({{"buffer", 0}, {"byteOffset", at}, {"byteLength", bytes}});
+  return static_cast<int>(json_["bufferViews"].size()) - 1;
+}
+
+void Maker::check_finite(const std::vector<float>& values) const {
+  for (const float x : values)
+    if (!std::isfinite(x)) refuse("holds NaN or infinite numbers");
+}
+
+void Maker::set_bounds(int accessor, const std::vector<float>& values, size_t width) {
+  std::vector<float> least(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(width));
+  std::vector<float> most = least;
+  for (size_t i = 0; i < values.size(); ++i) {
+    least[i % width] = std::min(least[i % width], values[i]);
+    most[i % width] = std::max(most[i % width], values[i]);
+  }
+  json_["accessors"][static_cast<size_t>(accessor)]["min"] = least;
+  json_["accessors"][static_cast<size_t>(accessor)]["max"] = most;
+}
+
+std::string Maker::make() {
+  json_["asset"] = {{"version", "2.0"}, {"generator", "restage, from FBX"}};
+  json_["scene"] = 0;
+  json_["scenes"] = Json::array({{{"nodes", {0}}}});
+  add_nodes(*scene_.mRootNode, -1, {}, Eigen::Matrix4d::Identity());
+  write_nodes();
+  add_materials();
+  add_meshes();
+  add_animations();
+  if (!binary_.empty()) json_["buffers"] = Json::array({{{"byteLength", binary_.size()}}});
+  return glb_bytes(json_.dump(), std::move(binary_), path_);
+}
+
+}  // namespace fbx
+
+std::string fbx_to_glb(std::string_view content, const std::string& path,
+                       std::vector<std::string>* remarks) {
+  Assimp::Importer importer;
+  importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_PRESERVE_PIVOTS, true);
+  importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_READ_CAMERAS, false);
+  importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_READ_LIGHTS, false);
+  const aiScene* scene = importer.ReadFileFromMemory(content.data(), content.size(),
+                                                     aiProcess_Triangulate, "fbx");
+  if (scene == nullptr) throw std::runtime_error(importer.GetErrorString());
+  if (scene->mRootNode == nullptr || scene->mRootNode->mNumChildren == 0)
+    throw InputError(path, "holds no scene", "export it again with its character");
+  fbx::Maker maker(*scene, path);
+  std::string out = maker.make();
+  *remarks = std::move(maker.remarks);
+  return out;
+}
+
+}  // namespace restage
