@@ -5,7 +5,8 @@
 // (datasets/characters/gltf_document.h keeps them).
 // Reading never trusts a number in a file. InputError "file: what; fix" for anything wrong: cut
 // short, indices and ranges outside of what is there, circles of nodes, NaN, required extensions
-// that change how data is stored (Draco, meshopt), data repeated until it would fill the memory.
+// that change how data is stored (Draco, meshopt: with the command that unpacks them; a file that
+// holds its data in plain, too, is read by those), data repeated until it would fill the memory.
 #pragma once
 
 #include <Eigen/Geometry>

@@ -139,6 +139,12 @@ void check_sink(const SinkOptions& options) {
     throw InputError("", "--every is out of range", "give 1 or more frames");
   if (options.every > 1 && !out.ends_with(".h5"))
     throw InputError(out, "is played at 30 frames a second", "end --out in .h5 with --every");
+  if (text::ends_in(out, {".fbx"})) {
+    const std::string glb = std::filesystem::path(out).stem().string() + ".glb";
+    throw InputError(out, "is FBX, which Blender writes",
+                     "end --out in .glb; then: blender -b --python docs/glb_to_fbx.py -- " + glb +
+                         " " + std::filesystem::path(out).filename().string());
+  }
   const auto dot = out.find_last_of('.');
   const auto slash = out.find_last_of('/');
   const bool extension = dot != std::string::npos && (slash == std::string::npos || dot > slash) &&

@@ -67,8 +67,10 @@ int Maker::image_of(const std::string& name) {
                                      : ", which is neither PNG nor JPEG"));
     return out;
   }
-  std::string title = name.substr(name.find_last_of("/\\") + 1);
-  if (!text::is_utf8(title)) title = cat("picture ", textures_.size());
+  const aiTexture* inside = scene_.GetEmbeddedTexture(name.c_str());
+  std::string title = inside != nullptr ? inside->mFilename.C_Str() : name;
+  title = title.substr(title.find_last_of("/\\") + 1);
+  if (title.empty() || !text::is_utf8(title)) title = cat("picture ", textures_.size());
   json_["images"].push_back({{"name", title},
                              {"mimeType", kind},
                              {"bufferView", add_view(bytes.data(), bytes.size())}});

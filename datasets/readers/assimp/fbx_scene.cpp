@@ -4,7 +4,9 @@
 #include <assimp/config.h>
 #include <assimp/postprocess.h>
 
+#include <assimp/DefaultLogger.hpp>
 #include <assimp/Importer.hpp>
+#include <assimp/LogStream.hpp>
 #include <cmath>
 
 #include "datasets/readers/assimp/fbx_detail.h"
@@ -49,6 +51,8 @@ Trs trs_of(const Eigen::Matrix4d& matrix) {
   Trs out{matrix.topRightCorner<3, 1>(), Eigen::Quaterniond::Identity(),
           linear.colwise().norm().transpose()};
   if (linear.determinant() < 0) out.scale.x() = -out.scale.x();
+  for (double& s : out.scale)  // single precision went in
+    if (std::abs(s - 1) < 1e-5) s = 1;
   if (out.scale.cwiseAbs().minCoeff() < 1e-12) return out;
   out.rotation = Eigen::Quaterniond(
       Eigen::Matrix3d(linear * out.scale.cwiseInverse().asDiagonal()));
@@ -170,12 +174,38 @@ std::string Maker::make() {
 
 }  // namespace fbx
 
+namespace {
+
+/// What Assimp leaves out of a scene because it does not understand it.
+class LeftOut : public Assimp::LogStream {
+ public:
+  explicit LeftOut(std::vector<std::string>* remarks) : remarks_(remarks) {}
+  void write(const char* message) override {
+    const std::string_view line(message);
+    const size_t at = line.find("FBX-");  // "FBX-DOM", "FBX-Parser"; "FBX:" does no harm
+    if (at == line.npos || remarks_->size() >= kMost) return;
+    const std::string_view words = line.substr(at);
+    remarks_->push_back("left out a part of the file (" +
+                        text::quote(words.substr(0, words.find('\n'))) + ")");
+  }
+
+ private:
+  static constexpr size_t kMost = 5;
+  std::vector<std::string>* remarks_;
+};
+
+}  // namespace
+
 std::string fbx_to_glb(std::string_view content, const std::string& path,
                        std::vector<std::string>* remarks) {
+  Assimp::DefaultLogger::create("", Assimp::Logger::NORMAL, 0);
+  Assimp::DefaultLogger::get()->attachStream(new LeftOut(remarks), Assimp::Logger::Err);  // owns it
   Assimp::Importer importer;
   importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_PRESERVE_PIVOTS, true);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_READ_CAMERAS, false);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_READ_LIGHTS, false);
+  // Pictures in the file are called "*0", "*1": several may have one file name.
+  importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_EMBEDDED_TEXTURES_LEGACY_NAMING, true);
   const aiScene* scene = importer.ReadFileFromMemory(content.data(), content.size(),
                                                      aiProcess_Triangulate, "fbx");
   if (scene == nullptr) throw std::runtime_error(importer.GetErrorString());
@@ -183,7 +213,7 @@ std::string fbx_to_glb(std::string_view content, const std::string& path,
     throw InputError(path, "holds no scene", "export it again with its character");
   fbx::Maker maker(*scene, path);
   std::string out = maker.make();
-  *remarks = std::move(maker.remarks);
+  remarks->insert(remarks->end(), maker.remarks.begin(), maker.remarks.end());
   return out;
 }
 
