@@ -1,6 +1,5 @@
 #include "datasets/readers/fbx.h"
 
-
 #include "datasets/readers/errors.h"
 #include "datasets/readers/text.h"
 #ifdef RESTAGE_ASSIMP

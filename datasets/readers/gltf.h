@@ -81,8 +81,8 @@ struct Gltf {
   std::vector<std::string> remarks;                   ///< what was left out
 };
 
-/// Whether the name ends in .glb, .gltf, .vrm or .vrma, in any case; or in .fbx, which is read as the
-/// GLB document that is made of it (datasets/readers/fbx.h).
+/// Whether the name ends in .glb, .gltf, .vrm or .vrma, in any case; or in .fbx, which is read as
+/// the GLB document that is made of it (datasets/readers/fbx.h).
 bool is_gltf_name(const std::string& path);
 
 Gltf read_gltf(const std::string& path);

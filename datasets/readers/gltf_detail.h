@@ -33,8 +33,9 @@ struct Document {
   std::vector<std::string_view> buffers;  ///< as long as they are declared
   std::vector<std::pair<std::string, int>> humanoid;  ///< VRM: name of a bone, number of its node
   std::string standard;                               ///< Gltf::standard
-  std::string compression;  ///< an extension that is used but not required: data may be there in plain, too
-  uint64_t payload = 0;     ///< bytes of the file and of all that it names
+  std::string
+      compression;  ///< an extension that is used but not required: data may be there in plain, too
+  uint64_t payload = 0;  ///< bytes of the file and of all that it names
 };
 
 struct Chunks {

@@ -22,9 +22,9 @@ constexpr int kDepth = 64;
 // Bytes that tinygltf and the JSON library take for an object (a node has 456, vectors grow by
 // doubling) and for any other value.
 constexpr uint64_t kObjectCost = 1600, kValueCost = 128;
-constexpr const char* kUsed[] = {"asset",      "scene",     "scenes",     "nodes",
-                                 "meshes",     "accessors", "skins",      "bufferViews",
-                                 "animations", "buffers",   "extensions", "extensionsRequired",
+constexpr const char* kUsed[] = {"asset",         "scene",     "scenes",     "nodes",
+                                 "meshes",        "accessors", "skins",      "bufferViews",
+                                 "animations",    "buffers",   "extensions", "extensionsRequired",
                                  "extensionsUsed"};
 
 /// Extensions that leave positions, skins and animations as they are.

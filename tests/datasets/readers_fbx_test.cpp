@@ -3,9 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include "autograd/base/error.h"
 #include "datasets/readers/gltf.h"
 #include "datasets/readers/mesh_io.h"
-#include "autograd/base/error.h"
 #include "tests/support/files.h"
 
 namespace restage {

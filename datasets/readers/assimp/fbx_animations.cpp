@@ -1,5 +1,6 @@
 // Animations. Assimp animates either a whole node or the parts that a node is a product of
-// (fbx_detail.h, Node::chain); glTF gets the product, at the times at which one of the parts has a key.
+// (fbx_detail.h, Node::chain); glTF gets the product, at the times at which one of the parts has a
+// key.
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -54,7 +55,8 @@ Matrix4d matrix_at(const aiNodeAnim& c, double time, const Quaterniond& after) {
   return out.matrix();
 }
 
-/// Parts that do not move have one key at a time of their own, which counts only if there are no others.
+/// Parts that do not move have one key at a time of their own, which counts only if there are no
+/// others.
 template <class Key>
 void collect(const Key* keys, unsigned count, std::set<double>& moving, std::set<double>& single) {
   for (unsigned k = 0; k < count; ++k) (count > 1 ? moving : single).insert(keys[k].mTime);
@@ -102,8 +104,8 @@ Motion motion_of(const Node& node, const Channels& channels) {
   for (const aiNode* part : node.chain) {
     const std::string name = part->mName.C_Str();
     if (out.whole == nullptr) out.parts.push_back(find(name));
-    // Assimp 5.2 puts the rotation that FBX takes back (PostRotation) behind such a channel instead:
-    // twice its inverse, which the part has, mends that.
+    // Assimp 5.2 puts the rotation that FBX takes back (PostRotation) behind such a channel
+    // instead: twice its inverse, which the part has, mends that.
     if (out.whole != nullptr && name.ends_with("_PostRotation")) {
       const Quaterniond inverse = trs_of(matrix_of(part->mTransformation)).rotation;
       out.after = inverse * inverse;
@@ -185,8 +187,8 @@ void Maker::add_turns(const aiAnimation& animation, Json& out) {
   }
 }
 
-/// Morph targets: a channel is called after a node and the place of its mesh there ("Body*0"), and a
-/// key holds only the weights that have a key at its time.
+/// Morph targets: a channel is called after a node and the place of its mesh there ("Body*0"), and
+/// a key holds only the weights that have a key at its time.
 void Maker::add_weights(const aiAnimation& animation, Json& out) {
   for (unsigned c = 0; c < animation.mNumMorphMeshChannels; ++c) {
     const aiMeshMorphAnim& channel = *animation.mMorphMeshChannels[c];

@@ -16,8 +16,8 @@ using Json = nlohmann::ordered_json;
 
 constexpr int kFloat = 5126, kInteger = 5125, kShort = 5123;  // glTF's component types
 
-/// A glTF node. FBX says where a node is by up to a dozen parts (pivots, offsets, rotations before and
-/// after); Assimp makes each a node of its own, here they are one again.
+/// A glTF node. FBX says where a node is by up to a dozen parts (pivots, offsets, rotations before
+/// and after); Assimp makes each a node of its own, here they are one again.
 struct Node {
   std::string name;
   int parent = -1;

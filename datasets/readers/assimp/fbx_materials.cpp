@@ -30,8 +30,8 @@ std::array<double, 3> clamped(const aiColor3D& c) {
 
 }  // namespace
 
-/// What a texture's name stands for: a picture in the file, else a file in the FBX's folder, where it
-/// is named or by its bare name (FBX often holds paths of another computer). Empty: neither.
+/// What a texture's name stands for: a picture in the file, else a file in the FBX's folder, where
+/// it is named or by its bare name (FBX often holds paths of another computer). Empty: neither.
 std::string Maker::picture_bytes(const std::string& name) const {
   if (const aiTexture* inside = scene_.GetEmbeddedTexture(name.c_str())) {
     if (inside->mHeight != 0 || inside->pcData == nullptr) return "";  // bare pixels: never in FBX
@@ -71,9 +71,8 @@ int Maker::image_of(const std::string& name) {
   std::string title = inside != nullptr ? inside->mFilename.C_Str() : name;
   title = title.substr(title.find_last_of("/\\") + 1);
   if (title.empty() || !text::is_utf8(title)) title = cat("picture ", textures_.size());
-  json_["images"].push_back({{"name", title},
-                             {"mimeType", kind},
-                             {"bufferView", add_view(bytes.data(), bytes.size())}});
+  json_["images"].push_back(
+      {{"name", title}, {"mimeType", kind}, {"bufferView", add_view(bytes.data(), bytes.size())}});
   json_["textures"].push_back({{"source", json_["images"].size() - 1}});
   return out = static_cast<int>(json_["textures"].size()) - 1;
 }
@@ -108,7 +107,8 @@ void Maker::add_materials() {
     aiColor3D diffuse(1, 1, 1);
     if (picture >= 0)
       use(shading, "baseColorTexture", picture);
-    else if (material.Get(AI_MATKEY_COLOR_DIFFUSE, diffuse) == aiReturn_SUCCESS && is_color(diffuse))
+    else if (material.Get(AI_MATKEY_COLOR_DIFFUSE, diffuse) == aiReturn_SUCCESS &&
+             is_color(diffuse))
       color = clamped(diffuse);
     float opacity = 1;
     material.Get(AI_MATKEY_OPACITY, opacity);
@@ -116,7 +116,8 @@ void Maker::add_materials() {
     const bool clear = opacity > 0 && opacity < 1;
     shading["baseColorFactor"] = {color[0], color[1], color[2], clear ? double{opacity} : 1.0};
     item["pbrMetallicRoughness"] = std::move(shading);
-    if (const int normals = texture_of(material, {aiTextureType_NORMALS, aiTextureType_NORMAL_CAMERA}, &set);
+    if (const int normals =
+            texture_of(material, {aiTextureType_NORMALS, aiTextureType_NORMAL_CAMERA}, &set);
         normals >= 0)
       use(item, "normalTexture", normals);
     aiColor3D glow(0, 0, 0);
@@ -129,7 +130,8 @@ void Maker::add_materials() {
     } else if (is_color(glow) && !glow.IsBlack()) {
       item["emissiveFactor"] = clamped(glow);
     }
-    const bool holes = picture >= 0 && texture_of(material, {aiTextureType_OPACITY}, &set) == picture;
+    const bool holes =
+        picture >= 0 && texture_of(material, {aiTextureType_OPACITY}, &set) == picture;
     if (clear || holes) item["alphaMode"] = "BLEND";
     item["doubleSided"] = true;  // FBX knows no single-sided materials
     json_["materials"].push_back(std::move(item));

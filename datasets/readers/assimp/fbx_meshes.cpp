@@ -1,5 +1,5 @@
-// Meshes, skins and morph targets. Assimp gives a vertex for each corner of a face; those that agree
-// in everything are one again.
+// Meshes, skins and morph targets. Assimp gives a vertex for each corner of a face; those that
+// agree in everything are one again.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -23,7 +23,9 @@ struct Attribute {
   int target = -1;  ///< of a morph target: which
 };
 
-void append(std::vector<float>& out, const aiVector3D& v) { out.insert(out.end(), {v.x, v.y, v.z}); }
+void append(std::vector<float>& out, const aiVector3D& v) {
+  out.insert(out.end(), {v.x, v.y, v.z});
+}
 
 Attribute vectors(const std::string& name, const aiVector3D* from, const aiVector3D* minus,
                   unsigned count, int target = -1) {
@@ -72,7 +74,8 @@ std::vector<Attribute> attributes_of(const aiMesh& mesh) {
     if (shape.mNumVertices != count || shape.mVertices == nullptr) continue;
     out.push_back(vectors("POSITION", shape.mVertices, mesh.mVertices, count, static_cast<int>(t)));
     if (shape.mNormals == nullptr || mesh.mNormals == nullptr) continue;
-    Attribute normals = vectors("NORMAL", shape.mNormals, mesh.mNormals, count, static_cast<int>(t));
+    Attribute normals =
+        vectors("NORMAL", shape.mNormals, mesh.mNormals, count, static_cast<int>(t));
     if (!is_zero(normals.values)) out.push_back(std::move(normals));
   }
   return out;
@@ -169,8 +172,9 @@ Json Maker::primitive_of(const aiMesh& mesh, const Node& node, size_t targets, S
   for (unsigned b = 0; skin != nullptr && b < mesh.mNumBones; ++b) {
     const aiBone& bone = *mesh.mBones[b];
     if (bone.mNumWeights == 0) continue;
-    const uint16_t joint = skin->joint(find_bone(std::string(bone.mName.C_Str(), bone.mName.length)),
-                                       matrix_of(bone.mOffsetMatrix) * node.geometry);
+    const uint16_t joint =
+        skin->joint(find_bone(std::string(bone.mName.C_Str(), bone.mName.length)),
+                    matrix_of(bone.mOffsetMatrix) * node.geometry);
     for (unsigned w = 0; w < bone.mNumWeights; ++w) {
       const aiVertexWeight& one = bone.mWeights[w];
       if (one.mVertexId >= count || !std::isfinite(one.mWeight)) refuse("has a broken skin");
@@ -284,8 +288,8 @@ void Maker::add_meshes() {
     nodes_[n].targets = targets;
     if (!skinned) continue;
     json_["nodes"][wearer]["skin"] = json_["skins"].size();
-    json_["skins"].push_back({{"joints", skin.joints},
-                              {"inverseBindMatrices", add(skin.inverse, kFloat, "MAT4", 16)}});
+    json_["skins"].push_back(
+        {{"joints", skin.joints}, {"inverseBindMatrices", add(skin.inverse, kFloat, "MAT4", 16)}});
   }
 }
 

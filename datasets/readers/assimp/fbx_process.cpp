@@ -28,7 +28,8 @@ namespace {
 
 constexpr const char* kMend = "export it again, or export GLB (glTF) from Blender";
 
-// What the child answers: this letter, then parts that end in a zero byte, then (kDocument) the document.
+// What the child answers: this letter, then parts that end in a zero byte, then (kDocument) the
+// document.
 constexpr char kDocument = 'D', kRefused = 'R', kUnreadable = 'U';
 
 void limit(int resource, rlim_t most) {
@@ -80,7 +81,8 @@ std::string answer_of(std::string_view content, const std::string& path) {
 [[noreturn]] void work(int to, std::string_view content, const std::string& path) {
   for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL, SIGXCPU, SIGTERM, SIGINT})
     std::signal(signal, SIG_DFL);
-  const int nowhere = open("/dev/null", O_WRONLY);  // what abort() and alike say is said by the parent
+  const int nowhere =
+      open("/dev/null", O_WRONLY);  // what abort() and alike say is said by the parent
   if (nowhere >= 0) {
     dup2(nowhere, STDOUT_FILENO);
     dup2(nowhere, STDERR_FILENO);
@@ -131,9 +133,12 @@ std::string fbx_in_a_process(std::string_view content, const std::string& path,
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
   if (all.empty() || !WIFEXITED(status) || WEXITSTATUS(status) != 0) {
-    const bool slow = WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL);
-    throw InputError(path, slow ? "takes far longer to read than a file of its size should"
-                                : "is so broken that its reader crashed", kMend);
+    const bool slow =
+        WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL);
+    throw InputError(path,
+                     slow ? "takes far longer to read than a file of its size should"
+                          : "is so broken that its reader crashed",
+                     kMend);
   }
   std::string_view answer(all);
   answer.remove_prefix(1);

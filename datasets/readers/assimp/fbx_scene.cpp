@@ -54,8 +54,8 @@ Trs trs_of(const Eigen::Matrix4d& matrix) {
   for (double& s : out.scale)  // single precision went in
     if (std::abs(s - 1) < 1e-5) s = 1;
   if (out.scale.cwiseAbs().minCoeff() < 1e-12) return out;
-  out.rotation = Eigen::Quaterniond(
-      Eigen::Matrix3d(linear * out.scale.cwiseInverse().asDiagonal()));
+  out.rotation =
+      Eigen::Quaterniond(Eigen::Matrix3d(linear * out.scale.cwiseInverse().asDiagonal()));
   out.rotation.normalize();
   return out;
 }
@@ -94,7 +94,8 @@ void Maker::add_nodes(const aiNode& from, int parent, std::vector<const aiNode*>
     const std::string kind = name.substr(part + kPart.size());
     if (!kind.starts_with("Geometric"))
       chain.push_back(&from);
-    else if (!kind.ends_with("Inverse"))  // those undo for the children what they do not inherit here
+    else if (!kind.ends_with(
+                 "Inverse"))  // those undo for the children what they do not inherit here
       geometry = geometry * matrix_of(from.mTransformation);
     if (from.mNumChildren > 0 || from.mNumMeshes == 0) {
       for (unsigned c = 0; c < from.mNumChildren; ++c)
@@ -131,8 +132,7 @@ void Maker::write_nodes() {
     list.push_back(std::move(item));
   }
   for (size_t n = 0; n < nodes_.size(); ++n)
-    if (nodes_[n].parent >= 0)
-      list[static_cast<size_t>(nodes_[n].parent)]["children"].push_back(n);
+    if (nodes_[n].parent >= 0) list[static_cast<size_t>(nodes_[n].parent)]["children"].push_back(n);
 }
 
 int Maker::add_view(const void* data, size_t bytes) {
@@ -206,8 +206,8 @@ std::string fbx_to_glb(std::string_view content, const std::string& path,
   importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_READ_LIGHTS, false);
   // Pictures in the file are called "*0", "*1": several may have one file name.
   importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_EMBEDDED_TEXTURES_LEGACY_NAMING, true);
-  const aiScene* scene = importer.ReadFileFromMemory(content.data(), content.size(),
-                                                     aiProcess_Triangulate, "fbx");
+  const aiScene* scene =
+      importer.ReadFileFromMemory(content.data(), content.size(), aiProcess_Triangulate, "fbx");
   if (scene == nullptr) throw std::runtime_error(importer.GetErrorString());
   if (scene->mRootNode == nullptr || scene->mRootNode->mNumChildren == 0)
     throw InputError(path, "holds no scene", "export it again with its character");
