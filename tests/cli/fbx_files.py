@@ -114,7 +114,10 @@ class Scene:
         self.bone(bone)
         corners = [i for polygon in polygons for i in list(polygon[:-1]) + [-polygon[-1] - 1]]
         geometry = self.add("Geometry", "Geometry::" + bone.name, "Mesh",
-                            [self.array("Vertices", [float(x) for v in vertices for x in v]), self.array("PolygonVertexIndex", corners), "GeometryVersion: 124"])
+                            [self.array("Vertices", [float(x) for v in vertices for x in v]), self.array("PolygonVertexIndex", corners), "GeometryVersion: 124",
+                             'LayerElementMaterial: 0 {\n\t\t\tMappingInformationType: "AllSame"\n\t\t\tReferenceInformationType: "IndexToDirect"\n'
+                             "\t\t\tMaterials: *1 {\n\t\t\ta: 0\n\t\t}\n\t\t}",
+                             'Layer: 0 {\n\t\t\tLayerElement:  {\n\t\t\t\tType: "LayerElementMaterial"\n\t\t\t\tTypedIndex: 0\n\t\t\t}\n\t\t}'])
         self.link(geometry, self.ids[bone.name])
         if weights:
             skin = self.add("Deformer", "Deformer::", "Skin", ["Version: 101"])
@@ -137,6 +140,16 @@ class Scene:
             self.link(channel, blend)
             self.link(shape, channel)
         return geometry
+
+    def picture(self, bone, name, text=None):
+        """A material of the mesh `bone` whose colour is a picture: a file of this name, or `text` in quotes."""
+        material = self.add("Material", "Material::Cloth", "", ["Version: 102", 'ShadingModel: "phong"'])
+        texture = self.add("Texture", "Texture::" + name, "", ['FileName: "C:\\else\\%s"' % name, 'RelativeFilename: "..\\%s"' % name])
+        video = self.add("Video", "Video::" + name, "Clip", ['Type: "Clip"', 'FileName: "%s"' % name, 'RelativeFilename: "%s"' % name] + (
+            ['Content: "%s"' % text] if text else []))
+        self.link(material, self.ids[bone])
+        self.link(texture, material, "DiffuseColor")
+        self.link(video, texture)
 
     @staticmethod
     def columns(m):

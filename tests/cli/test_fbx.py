@@ -1,5 +1,6 @@
 """FBX as target and as source (datasets/readers/fbx.h): files made here as text by FBX's own formula, real ones where they are at hand,
 and the way to FBX through Blender."""
+import base64
 import json
 import math
 import os
@@ -93,7 +94,7 @@ class Fbx(CliTest):
     def near(self, a, b, most=1e-4):
         self.assertLess(math.dist(a, b), most, "%s, not %s" % (a, b))
 
-    def person(self, name, clip=None, **more):
+    def person(self, name, clip=None, picture=None):
         """22 bones of a person in an A-pose (z up, centimetres) with axes of their own, as Maya and 3ds Max write them."""
         scene, rng = Scene(up=2, front=(1, -1)), random.Random(5)
         armature = Bone("Armature", None, "Null", rotation=(0, 0, 20))
@@ -125,7 +126,9 @@ class Fbx(CliTest):
         scene.mesh(body, vertices, polygons, weights, [("smile", {1: (0, 0, 1)}), ("frown", {2: (1, 0, 0)})])
         self.body, self.points = body, vertices
         if clip:
-            scene.clip(clip[0], clip[1], clip[2])
+            scene.clip(*clip)
+        if picture:
+            scene.picture("Body", *picture)
         return self.write(name, scene.text().encode())
 
     def test_the_document_is_the_scene(self):
@@ -197,6 +200,25 @@ class Fbx(CliTest):
                 self.one_line(result, 2, "bad.fbx")
         os.rename(self.path("hero.fbx"), self.path("hero.glb"))
         self.bad_input(["doctor", "hero.glb"], "hero.glb", "FBX", ".fbx")
+
+    def test_pictures(self):
+        png = b"\x89PNG\r\n\x1a\n" + bytes(range(57))
+        self.person("walk.fbx", self.walk())
+        text = base64.b64encode(png).decode().rstrip("=")
+        # In the file, also where the padding is wrong, as programs write it; beside the file, where a path of another computer is named.
+        os.makedirs(self.path("textures"))
+        self.write("textures/beside.png", png)
+        for name, picture in (("in", ("in.png", text + "=" * (-len(text) % 4))), ("odd", ("odd.png", text + "=====")), ("beside", ("beside.png",))):
+            self.person(name + ".fbx", picture=picture)
+            self.done("retarget", "--source", "walk.fbx", "--target", name + ".fbx", "--out", name + ".glb")
+            glb = Glb(self.bytes(name + ".glb"))
+            view = glb.json["bufferViews"][glb.json["images"][0]["bufferView"]]
+            self.assertEqual(glb.binary[view["byteOffset"]:view["byteOffset"] + view["byteLength"]], png, name)
+            self.assertEqual(glb.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"], {"index": 0})
+        for picture, word in ((("nowhere.png",), "nowhere.png"), (("bad.png", "!" + text), "base64"), (("bad.tga", base64.b64encode(bytes(99)).decode()), "PNG")):
+            self.person("hero.fbx", picture=picture)
+            remarks = self.json("data", "import", "hero.fbx", "--out", "x.h5")["reports"][0]["remarks"]
+            self.assertTrue(any("left out" in r and word in r for r in remarks), remarks)
 
     def test_a_part_that_is_left_out_is_named(self):
         self.person("hero.fbx")
