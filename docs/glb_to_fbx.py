@@ -8,13 +8,12 @@ import sys
 import tempfile
 
 import bpy
-import numpy
-
-if not hasattr(numpy, "bool"):  # Blender 3.4 beside numpy 1.24 or later, as in Debian 12
-    numpy.bool = bool
 
 
 def convert(glb, fbx):
+    import numpy  # Blender's glTF needs it, too
+    if "bool" not in vars(numpy):  # Blender 3.4 beside numpy 1.24 or later, as in Debian 12
+        numpy.bool = bool
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.scene.render.fps = 30  # before the import: keys fall on whole frames
     bpy.ops.import_scene.gltf(filepath=glb)

@@ -13,7 +13,6 @@
 
 #include "datasets/readers/assimp/fbx_scene.h"
 #include "datasets/readers/errors.h"
-#include "datasets/readers/text.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define RESTAGE_SANITIZED  // sanitizers reserve terabytes of addresses
@@ -73,7 +72,7 @@ std::string answer_of(std::string_view content, const std::string& path) {
     part("takes far more memory than a file of its size should");
   } catch (const std::exception& error) {
     out = kUnreadable;
-    part(cat("cannot be read (", text::quote(error.what()), ")"));
+    part(cat("cannot be read (", assimp_words(error.what()), ")"));
   }
   return out;
 }

@@ -176,6 +176,17 @@ std::string Maker::make() {
 
 }  // namespace fbx
 
+std::string assimp_words(std::string_view words) {
+  constexpr size_t kMost = 120;
+  words = words.substr(0, words.find_last_not_of(" \n") + 1);
+  const size_t token = words.find("(TOK_"), end = words.find(") ", std::min(token, words.size()));
+  std::string out(words);
+  if (token != words.npos && end != words.npos) out.erase(token, end + 2 - token);
+  for (char& c : out)
+    if (c < ' ' || c > '~' || c == ';') c = '?';
+  return out.size() > kMost ? out.substr(0, kMost) + "..." : out;
+}
+
 namespace {
 
 bool is_base64(char c) {
@@ -220,9 +231,7 @@ class LeftOut : public Assimp::LogStream {
     const std::string_view line(message);
     const size_t at = line.find("FBX-");  // "FBX-DOM", "FBX-Parser"; "FBX:" does no harm
     if (at == line.npos || remarks_->size() >= kMost) return;
-    const std::string_view words = line.substr(at);
-    remarks_->push_back("left out a part of the file (" +
-                        text::quote(words.substr(0, words.find('\n'))) + ")");
+    remarks_->push_back("left out a part of the file (" + assimp_words(line.substr(at)) + ")");
   }
 
  private:
