@@ -8,7 +8,8 @@
 
 namespace restage {
 
-/// Assimp's words as a part of a line: printable, not too long, without the place in its own tokens.
+/// Assimp's words as a part of a line: printable, not too long, without the place in its own
+/// tokens.
 std::string assimp_words(std::string_view words);
 
 /// InputError where the scene cannot be kept: skins on bones that are not there or not unique, NaN,
