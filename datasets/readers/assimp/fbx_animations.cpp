@@ -118,6 +118,7 @@ Motion motion_of(const Node& node, const Channels& channels) {
 
 int Maker::add_times(const std::vector<double>& seconds) {
   std::vector<float> times;
+  times.reserve(seconds.size());
   for (const double t : seconds) times.push_back(static_cast<float>(t));
   const int out = add(times, kFloat, "SCALAR", 1);
   set_bounds(out, times, 1);
