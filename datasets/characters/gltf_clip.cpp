@@ -13,7 +13,7 @@ GltfClipWriter::GltfClipWriter(std::string out, const std::string& in,
                                std::shared_ptr<const GltfOwnRig> rig, Options options)
     : out_(std::move(out)),
       in_(in),
-      content_(read_file(in)),
+      content_(read_gltf_bytes(in)),
       rig_(std::move(rig)),
       options_(std::move(options)) {
   if (options_.name.empty())

@@ -205,11 +205,17 @@ Json GltfDocument::State::as_binary(std::string* bytes) const {
     *bytes += own.substr(0, length);
   }
   pad(*bytes);
+  const auto move = [&](Json& view) {
+    const size_t b = view["buffer"].get<size_t>();
+    if (begin.at(b) > 0) view["byteOffset"] = view.value("byteOffset", size_t{0}) + begin[b];
+    view["buffer"] = 0;
+  };
   if (out.contains("bufferViews"))
     for (Json& view : out["bufferViews"]) {
-      const size_t b = view["buffer"].get<size_t>();
-      if (begin.at(b) > 0) view["byteOffset"] = view.value("byteOffset", size_t{0}) + begin[b];
-      view["buffer"] = 0;
+      move(view);
+      if (view.contains("extensions"))  // the same data compressed, beside the plain one
+        for (Json& extension : view["extensions"])
+          if (extension.contains("buffer")) move(extension);
     }
   if (out.contains("images"))
     for (Json& image : out["images"]) {

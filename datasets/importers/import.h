@@ -48,7 +48,7 @@ bool is_importable(const std::string& source);
 /// - a folder laid out like the project's data folder: all bodies of body/makehuman.h5 by
 ///   body/bodies.csv and all clips of cmu/clips30.h5 (one of the two may be absent);
 /// - a recording (.bvh, or .amc with its .asf; any may end in .xz): one motion;
-/// - a rigged character (.glb, .gltf, .vrm): its body and its animations (gltf_character.h);
+/// - a rigged character (.glb, .gltf, .vrm, .fbx): its body and its animations (gltf_character.h);
 /// - a tree of folders of recordings and characters, in the order of their names;
 /// - an AMASS motion (.npz) or a tree of folders of them, subjects named by folder (amass.h);
 /// - a body model (.npz), giving bodies (smpl.h);

@@ -21,11 +21,11 @@ struct ForeignKind {
 using namespace std::string_view_literals;
 
 const ForeignKind kForeignKinds[] = {
-    // Text of FBX begins with a comment.
-    {{".fbx"},
+    // Text of FBX begins with a comment. FBX that is called so is read (datasets/readers/fbx.h).
+    {{},
      {"Kaydara FBX Binary", "; FBX"},
-     "is FBX, which is not read",
-     "open it in Blender and export GLB (glTF)"},
+     "is FBX under another name",
+     "rename it to .fbx, or open it in Blender and export GLB (glTF)"},
     {{".blend", ".blend1"},
      {"BLENDER"},
      "is a file of Blender, which is not read",
@@ -110,6 +110,10 @@ bool is_promised(const ForeignKind& archive, const std::string& path) {
          is_packed_text_name(path);
 }
 
+bool is_fbx_in_place(const ForeignKind& kind, const std::string& path) {
+  return kind.what == kForeignKinds[0].what && text::ends_in(path, {".fbx"});
+}
+
 [[noreturn]] void refuse_archive(const ForeignKind& kind, const std::string& path) {
   throw InputError(path, cat(kind.what, ", which is not opened"),
                    cat("unpack it (", kind.mend, " FILE) and give what was inside"));
@@ -138,7 +142,8 @@ void refuse_foreign_content(std::string_view content, const std::string& path) {
     throw InputError(path, "is a Git LFS pointer, not the file itself", "run git lfs pull");
   const std::string_view bare = content.starts_with("\xEF\xBB\xBF") ? content.substr(3) : content;
   for (const ForeignKind& kind : kForeignKinds)
-    if (starts_with_any(bare, kind)) throw InputError(path, kind.what, kind.mend);
+    if (starts_with_any(bare, kind) && !is_fbx_in_place(kind, path))
+      throw InputError(path, kind.what, kind.mend);
   if (is_collada(bare))
     throw InputError(path, "is COLLADA, which is not read",
                      "open it in Blender and export GLB (glTF)");

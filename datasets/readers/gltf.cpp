@@ -7,6 +7,8 @@
 
 #include "autograd/base/atomic_file.h"
 #include "datasets/readers/errors.h"
+#include "datasets/readers/fbx.h"
+#include "datasets/readers/foreign_kinds.h"
 #include "datasets/readers/gltf_detail.h"
 #include "datasets/readers/text.h"
 
@@ -428,12 +430,23 @@ class Builder {
 }  // namespace
 
 bool is_gltf_name(const std::string& path) {
-  return text::ends_in(path, {".glb", ".gltf", ".vrm", ".vrma"});
+  return text::ends_in(path, {".glb", ".gltf", ".vrm", ".vrma"}) || is_fbx_name(path);
 }
 
 Gltf parse_gltf(std::string_view content, const std::string& path) {
+  if (is_fbx_name(path)) refuse_foreign_content(content, path);
+  std::vector<std::string> remarks;
+  std::string made;
+  if (is_fbx_name(path)) content = made = fbx_as_glb(content, path, &remarks);
   const Document document = gltf::parse_document(content, path);
-  return Builder(document).build();
+  Gltf out = Builder(document).build();
+  out.remarks.insert(out.remarks.begin(), remarks.begin(), remarks.end());
+  return out;
+}
+
+std::string read_gltf_bytes(const std::string& path) {
+  std::string content = read_file(path);
+  return is_fbx_name(path) ? fbx_as_glb(content, path, nullptr) : content;
 }
 
 Gltf read_gltf(const std::string& path) { return parse_gltf(read_file(path), path); }

@@ -5,7 +5,8 @@
 // (datasets/characters/gltf_document.h keeps them).
 // Reading never trusts a number in a file. InputError "file: what; fix" for anything wrong: cut
 // short, indices and ranges outside of what is there, circles of nodes, NaN, required extensions
-// that change how data is stored (Draco, meshopt), data repeated until it would fill the memory.
+// that change how data is stored (Draco, meshopt: with the command that unpacks them; a file that
+// holds its data in plain, too, is read by those), data repeated until it would fill the memory.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -80,12 +81,15 @@ struct Gltf {
   std::vector<std::string> remarks;                   ///< what was left out
 };
 
-/// Whether the name ends in .glb, .gltf, .vrm or .vrma, in any case.
+/// Whether the name ends in .glb, .gltf, .vrm or .vrma, in any case; or in .fbx, which is read as
+/// the GLB document that is made of it (datasets/readers/fbx.h).
 bool is_gltf_name(const std::string& path);
 
 Gltf read_gltf(const std::string& path);
 /// The same from memory; external buffers are looked for in the folder of `path`.
 Gltf parse_gltf(std::string_view content, const std::string& path);
+/// The bytes of the document: the file's own; of FBX those that it is made into.
+std::string read_gltf_bytes(const std::string& path);
 
 using GltfTransforms = std::vector<Eigen::Affine3d>;
 

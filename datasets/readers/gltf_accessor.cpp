@@ -100,6 +100,8 @@ std::vector<T> read_values(const Document& document, const tinygltf::Accessor& a
             static_cast<T>(kind.at(span.first + i * span.stride + c * kind.bytes, false) * factor);
   } else if (accessor.sparse.isSparse) {
     out.resize(accessor.count * width);
+  } else if (!document.compression.empty()) {
+    refuse_compression(document.compression, document.path);
   } else {
     broken(document.path, what + " have no data");
   }

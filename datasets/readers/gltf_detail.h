@@ -33,6 +33,8 @@ struct Document {
   std::vector<std::string_view> buffers;  ///< as long as they are declared
   std::vector<std::pair<std::string, int>> humanoid;  ///< VRM: name of a bone, number of its node
   std::string standard;                               ///< Gltf::standard
+  std::string
+      compression;  ///< an extension that is used but not required: data may be there in plain, too
   uint64_t payload = 0;  ///< bytes of the file and of all that it names
 };
 
@@ -50,6 +52,8 @@ std::string decode_data_uri(const std::string& uri, size_t length, const std::st
 /// `content` must outlive the document.
 Document parse_document(std::string_view content, const std::string& path);
 
+/// InputError with the command that unpacks such a file.
+[[noreturn]] void refuse_compression(const std::string& extension, const std::string& path);
 [[noreturn]] void broken(const std::string& path, const std::string& what);
 /// `index` as a place in a list of `size`.
 size_t checked(int64_t index, size_t size, const std::string& path, const std::string& what);

@@ -22,9 +22,10 @@ constexpr int kDepth = 64;
 // Bytes that tinygltf and the JSON library take for an object (a node has 456, vectors grow by
 // doubling) and for any other value.
 constexpr uint64_t kObjectCost = 1600, kValueCost = 128;
-constexpr const char* kUsed[] = {"asset",      "scene",     "scenes",     "nodes",
-                                 "meshes",     "accessors", "skins",      "bufferViews",
-                                 "animations", "buffers",   "extensions", "extensionsRequired"};
+constexpr const char* kUsed[] = {"asset",         "scene",     "scenes",     "nodes",
+                                 "meshes",        "accessors", "skins",      "bufferViews",
+                                 "animations",    "buffers",   "extensions", "extensionsRequired",
+                                 "extensionsUsed"};
 
 /// Extensions that leave positions, skins and animations as they are.
 bool harmless(const std::string& extension) {
@@ -36,15 +37,26 @@ bool harmless(const std::string& extension) {
   return false;
 }
 
-void check_extensions(const tinygltf::Model& model, const std::string& path) {
-  for (const std::string& name : model.extensionsRequired) {
+/// How it stores data that only this extension can unpack; empty: in no such way.
+std::string compression_of(const std::string& extension) {
+  if (extension == "KHR_draco_mesh_compression") return "Draco";
+  return extension.find("meshopt") != std::string::npos ? "meshopt" : "";
+}
+
+std::vector<std::string> extensions_in(const Json& root, const char* list) {
+  std::vector<std::string> out;
+  if (root.contains(list) && root[list].is_array())
+    for (const Json& name : root[list])
+      if (name.is_string()) out.push_back(name.get<std::string>());
+  return out;
+}
+
+void check_extensions(const Json& root, const std::string& path) {
+  for (const std::string& name : extensions_in(root, "extensionsRequired")) {
     if (harmless(name)) continue;
-    const std::string text = text::quote(name);
-    if (name == "KHR_draco_mesh_compression")
-      throw InputError(path, "is compressed with Draco", "export it without mesh compression");
-    if (name.find("meshopt") != std::string::npos)
-      throw InputError(path, "is compressed with meshopt", "export it without that compression");
-    throw InputError(path, "needs the glTF extension " + text + ", which is not known here",
+    if (!compression_of(name).empty()) refuse_compression(name, path);
+    throw InputError(path,
+                     "needs the glTF extension " + text::quote(name) + ", which is not known here",
                      "export it without that extension");
   }
 }
@@ -149,6 +161,8 @@ void read_buffers(const Json& root, std::string_view binary, Document& document)
       bytes = document.storage.back();
       if (!uri.starts_with("data:")) document.payload += bytes.size();
     }
+    if (length > bytes.size() && bytes.empty() && !document.compression.empty())
+      refuse_compression(document.compression, path);  // its bytes come out of another buffer
     if (length > bytes.size())
       broken(path, cat(title, " has ", bytes.size(), " of its ", length, " bytes"));
     document.buffers.push_back(bytes.substr(0, length));
@@ -231,6 +245,14 @@ void Allowance::spend(uint64_t count, uint64_t size) {
   left_ -= count * size;
 }
 
+void refuse_compression(const std::string& extension, const std::string& path) {
+  const std::string name = fs::path(path).filename().string();
+  const std::string shown = name.size() < 100 && text::is_utf8(name) ? name : "IN.glb";
+  throw InputError(path,
+                   cat("is compressed with ", compression_of(extension), " (", extension, ")"),
+                   "unpack it: npx @gltf-transform/cli copy \"" + shown + "\" unpacked.glb");
+}
+
 void broken(const std::string& path, const std::string& what) {
   throw InputError(path, what, "export it again as GLB");
 }
@@ -250,6 +272,9 @@ Document parse_document(std::string_view content, const std::string& path) {
   if (content.starts_with("glTF")) chunks = split_glb(content, path);
   Json root = parse_json(chunks.json, content.size(), path);
   out.humanoid = read_humanoid(root, &out.standard);
+  check_extensions(root, path);
+  for (const std::string& name : extensions_in(root, "extensionsUsed"))
+    if (!compression_of(name).empty()) out.compression = name;
   read_buffers(root, chunks.binary, out);
   root.erase("buffers");
   drop_extensions(root);
@@ -268,7 +293,6 @@ Document parse_document(std::string_view content, const std::string& path) {
   if (!out.model.asset.version.starts_with("2"))
     throw InputError(path, "is of glTF version " + text::quote(out.model.asset.version),
                      "export it as glTF 2.0");
-  check_extensions(out.model, path);
   return out;
 }
 

@@ -105,7 +105,8 @@ void add_data_import(Program& program, CommandOptions group) {
   MotionOptions& motion = options.motion;
   app.add_option(
          "SOURCE", given.source,
-         "data folder; recording (.bvh, .amc; also .xz); character (.glb, .gltf, .vrm, .vrma); "
+         "data folder; recording (.bvh, .amc; also .xz); character (.glb, .gltf, .vrm, .vrma, "
+         ".fbx); "
          "AMASS motion or body model (.npz); scans (.ply, .obj, .pcd, .xyz, .csv, .npy, .npz, "
          ".h5); or a folder of one kind")
       .required();

@@ -311,7 +311,7 @@ const Kind kKinds[] = {
      {".ply", ".obj", ".pcd", ".xyz", ".xyzn", ".xyzrgb", ".pts", ".asc", ".txt", ".csv"},
      examine_mesh},
     {"", {".bvh", ".bvh.xz", ".amc", ".amc.xz"}, examine_recording},
-    {"", {".glb", ".gltf", ".vrm"}, examine_character},
+    {"", {".glb", ".gltf", ".vrm", ".fbx"}, examine_character},
     {"", {".npz", ".npy"}, examine_sequence},
     {"", {".yaml", ".yml"}, examine_config},
     {"", {".safetensors"}, examine_weights},

@@ -328,10 +328,10 @@ void add_retarget(Program& program) {
   app.add_option(
          "--source", c.source.path,
          "folder of clouds, file of them (HDF5, NPZ, NPY); or a skeleton's motion, which is taken "
-         "over exactly: BVH, AMC, glTF, VRM, VRMA, AMASS (.npz), our motions (.h5)")
+         "over exactly: BVH, AMC, glTF, VRM, VRMA, FBX, AMASS (.npz), our motions (.h5)")
       .required();
   app.add_option("--target", c.target,
-                 "mesh or cloud in T-pose, y up, facing +z; or a glTF character")
+                 "mesh or cloud in T-pose, y up, facing +z; or a glTF or FBX character")
       .required();
   app.add_option("--bones", c.bones,
                  "which bone of a glTF target is which joint, a .yaml file or a known family");

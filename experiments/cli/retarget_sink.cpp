@@ -210,6 +210,12 @@ void check_sink(const SinkOptions& options) {
     throw InputError("", "--format '" + options.format + "' is unknown", "use ply or obj");
   check_rate(options);
   if (!options.skeleton.empty()) check_convention(options.skeleton);
+  if (text::ends_in(out, {".fbx"})) {
+    const std::string glb = std::filesystem::path(out).stem().string() + ".glb";
+    throw InputError(out, "is FBX, which Blender writes",
+                     "end --out in .glb; then: blender -b --python docs/glb_to_fbx.py -- " + glb +
+                         " " + std::filesystem::path(out).filename().string());
+  }
   const auto dot = out.find_last_of('.');
   const auto slash = out.find_last_of('/');
   const bool extension = dot != std::string::npos && (slash == std::string::npos || dot > slash) &&

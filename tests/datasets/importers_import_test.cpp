@@ -376,7 +376,7 @@ TEST_F(ImportersScans, FoldersOfFramesAndHdf5FilesOfOthers) {
   EXPECT_EQ(import_data(dir / "tree/dfaust.hdf5", dir / "p.h5").sequences, 2u);
   EXPECT_EQ(import_data(dir / "tree/walk", dir / "p.h5").frames, 3u);
   EXPECT_HAS(error_of([&] { import_data(dir.write("a.fbx", "Kaydara"), dir / "p.h5"); }),
-             "is FBX, which is not read; open it in Blender and export GLB");
+             "is no FBX file; export it again, or export GLB (glTF) from Blender");
 }
 
 }  // namespace

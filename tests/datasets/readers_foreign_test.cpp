@@ -18,8 +18,6 @@ const struct {
   const char* ending;  ///< that such files have
   const char *what, *mend;
 } kStrangers[] = {
-    {"Kaydara FBX Binary  \0\x1a\0"s, ".fbx", "is FBX", "export GLB (glTF)"},
-    {"; FBX 7.3.0 project file\n", ".fbx", "is FBX", "export GLB (glTF)"},
     {"PK\x03\x04\x14\0"s, ".zip", "is a zip archive", "unzip"},
     {"\x1f\x8b\x08\0"s, ".gz", "is packed with gzip", "gunzip"},
     {"7z\xBC\xAF\x27\x1C\0\x04"s, ".7z", "is a 7z archive", "7z x"},
@@ -51,6 +49,18 @@ TEST_F(ReadersForeign, KnownByTheirNamesAndByTheirFirstBytes) {
     if (file.ending == ".usdz"s) continue;  // by its name alone
     for (const char* ending : {".bvh", ".glb", ".ply", ".obj", ".vrm", ".pcd", ".amc"})
       expect_told(dir.write("walk"s + ending, content), dir / "o.h5", file.what, file.mend);
+  }
+}
+
+TEST_F(ReadersForeign, FbxIsReadOnlyByItsOwnName) {
+  for (const char* start : {"Kaydara FBX Binary  \x1a", "; FBX 7.3.0 project file\n"}) {
+    for (const char* ending : {".bvh", ".glb", ".ply", ".obj", ".vrm", ".pcd", ".amc"})
+      expect_told(dir.write("walk"s + ending, start), dir / "o.h5", "is FBX under another name",
+                  "rename it to .fbx");
+    // The reader answers, with or without Assimp.
+    const std::string own = dir.write("walk.fbx", start);
+    EXPECT_HAS(error_of([&] { import_data(own, dir / "o.h5", {}); }), "GLB (glTF)");
+    refuse_foreign_content(own);
   }
 }
 

@@ -201,14 +201,35 @@ TEST_F(ReadersGltf, BuffersInTheTextAndBesideTheFile) {
     EXPECT_THROW(with(bad), InputError) << bad;
 }
 
+TEST_F(ReadersGltf, CompressedDataThatIsThereInPlainIsRead) {
+  GlbParts both = triangle();
+  both.root["extensionsUsed"] = {"KHR_draco_mesh_compression", "EXT_meshopt_compression"};
+  primitive_of(both)["extensions"]["KHR_draco_mesh_compression"] = {{"bufferView", 0}};
+  EXPECT_EQ(mesh_of(both).vertices.size(), 3u);
+  // Data that only the compressed copy has: of an accessor, and of a buffer.
+  GlbParts accessor = triangle();
+  accessor.root["extensionsUsed"] = {"KHR_draco_mesh_compression"};
+  accessor.root["accessors"][0].erase("bufferView");
+  EXPECT_HAS(refusal(accessor), "compressed with Draco");
+  for (const char* list : {"extensionsUsed", "extensionsRequired"})
+    EXPECT_HAS(refusal_of_text(std::string(R"({"asset":{"version":"2.0"},")") + list +
+                               R"(":["EXT_meshopt_compression"],"buffers":[{"byteLength":36,)"
+                               R"("extensions":{"EXT_meshopt_compression":{"fallback":true}}}]})"),
+               "compressed with meshopt");
+}
+
 TEST_F(ReadersGltf, WhatIsWrongIsSaid) {
   /// What is said where the triangle's structure has another value at a place.
   struct Case {
     const char *says, *place, *value;
   };
   for (const auto& [says, place, value] :
-       {Case{"Draco", "/extensionsRequired", R"(["KHR_draco_mesh_compression"])"},
-        {"meshopt", "/extensionsRequired", R"(["EXT_meshopt_compression"])"},
+       {Case{"is compressed with Draco (KHR_draco_mesh_compression); unpack it: npx "
+             "@gltf-transform/cli copy \"t.glb\" unpacked.glb",
+             "/extensionsRequired", R"(["KHR_draco_mesh_compression"])"},
+        {"is compressed with meshopt (EXT_meshopt_compression); unpack it: npx "
+         "@gltf-transform/cli copy \"t.glb\" unpacked.glb",
+         "/extensionsRequired", R"(["EXT_meshopt_compression"])"},
         {"'XX_new'", "/extensionsRequired", R"(["XX_new"])"},
         {"version '1.0'", "/asset/version", R"("1.0")"},
         {"circles", "/nodes", R"([{"children": [1]}, {"children": [0]}])"},

@@ -117,7 +117,7 @@ std::vector<BadFile> bad_files() {
       {"", "empty.ply: is empty and holds no points"},
       {"hello", "text.ply: is not a PLY file"},
       {"hello", "text.bin: is neither PLY, OBJ, glTF nor a cloud (PCD, XYZ)"},
-      {"hello", "text.fbx: is FBX, which is not read; open it in Blender and export GLB"},
+      {"hello", "text.fbx: is no FBX file; export it again, or export GLB (glTF) from Blender"},
       {"hello", "walk.bvh: is a recording of a skeleton, not clouds; restage data import"},
       {"ply\nformat ascii 1.0\nelement vertex 3\n",
        "header.ply: is cut short inside the PLY header"},

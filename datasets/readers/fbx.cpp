@@ -1,0 +1,37 @@
+#include "datasets/readers/fbx.h"
+
+#include "datasets/readers/errors.h"
+#include "datasets/readers/text.h"
+#ifdef RESTAGE_ASSIMP
+#include "datasets/readers/assimp/fbx_process.h"
+#endif
+
+namespace restage {
+
+bool is_fbx_name(const std::string& path) { return text::ends_in(path, {".fbx"}); }
+
+bool starts_as_fbx(std::string_view content) {
+  if (content.starts_with("Kaydara FBX Binary")) return true;
+  if (content.starts_with("\xEF\xBB\xBF")) content.remove_prefix(3);
+  const size_t first = content.find_first_not_of(" \t\r\n");
+  if (first == content.npos) return false;
+  content = content.substr(first, 200);
+  return (content.front() == ';' && content.find("FBX") != content.npos) ||
+         content.starts_with("FBXHeaderExtension");
+}
+
+std::string fbx_as_glb(std::string_view content, const std::string& path,
+                       std::vector<std::string>* remarks) {
+  if (!starts_as_fbx(content))
+    throw InputError(path, "is no FBX file", "export it again, or export GLB (glTF) from Blender");
+#ifdef RESTAGE_ASSIMP
+  return fbx_in_a_process(content, path, remarks);
+#else
+  static_cast<void>(remarks);
+  throw InputError(path, "is FBX, and this program was built without Assimp, which reads it",
+                   "install libassimp-dev and build again, or open it in Blender and export GLB "
+                   "(glTF)");
+#endif
+}
+
+}  // namespace restage
