@@ -1,0 +1,27 @@
+#include "infer/live/timeline.h"
+
+#include <cmath>
+
+#include "nn/geometry/skeleton.h"
+
+namespace restage::live {
+
+Step Timeline::place(double seconds, int64_t sender) {
+  constexpr double kFollow = 0.1;
+  const double at = (seconds - zero_) * kFps, ahead = at - static_cast<double>(last_);
+  constexpr double kReach = kMostMissed + 1.5;
+  if (!began_ || sender != sender_ || !(std::abs(ahead) < kReach)) {
+    began_ = true;
+    sender_ = sender;
+    last_ = 0;
+    zero_ = seconds;
+    return {Step::Kind::anew};
+  }
+  const auto moments = static_cast<int64_t>(std::lround(ahead));
+  if (moments < 1) return {Step::Kind::late};
+  last_ += moments;
+  zero_ += kFollow * (at - static_cast<double>(last_)) / kFps;
+  return {Step::Kind::next, moments - 1};
+}
+
+}  // namespace restage::live

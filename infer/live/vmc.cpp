@@ -1,0 +1,84 @@
+#include "infer/live/vmc.h"
+
+#include <lo/lo.h>
+
+#include "autograd/base/error.h"
+
+namespace restage::live {
+
+const std::array<std::string_view, kJoints> kUnityBones = {
+    "Hips",         "LeftUpperLeg",  "RightUpperLeg", "Spine",      "LeftLowerLeg", "RightLowerLeg",
+    "Chest",        "LeftFoot",      "RightFoot",     "UpperChest", "LeftToes",     "RightToes",
+    "Neck",         "LeftShoulder",  "RightShoulder", "Head",       "LeftUpperArm", "RightUpperArm",
+    "LeftLowerArm", "RightLowerArm", "LeftHand",      "RightHand"};
+
+namespace {
+
+// Unity's x points to the character's right: everything is mirrored in the plane x = 0.
+Eigen::Vector3f unity(const Vec3& v) { return Vec3(-v.x(), v.y(), v.z()).cast<float>(); }
+Eigen::Quaternionf unity(const Mat3& turn) {
+  const Quat q(turn);
+  const double sign = q.w() < 0 ? -1 : 1;
+  return Quat(sign * q.w(), sign * q.x(), -sign * q.y(), -sign * q.z()).cast<float>();
+}
+
+/// The message is freed by whoever frees its bundle.
+void add_place(lo_bundle bundle, const char* path, std::string_view name, const Eigen::Vector3f& p,
+               const Eigen::Quaternionf& q) {
+  const lo_message message = lo_message_new();
+  lo_message_add(message, "sfffffff", std::string(name).c_str(), double{p.x()}, double{p.y()},
+                 double{p.z()}, double{q.x()}, double{q.y()}, double{q.z()}, double{q.w()});
+  lo_bundle_add_message(bundle, path, message);
+}
+
+}  // namespace
+
+std::vector<VmcBone> vmc_bones(const Joints& rest, const Pose& pose, const BoneSet& sent) {
+  const Rotations global = to_global(pose.local);
+  std::vector<VmcBone> out;
+  for (size_t j = 0; j < kJoints; ++j) {
+    if (!sent[j]) continue;
+    int parent = kParents[j];
+    while (parent >= 0 && !sent[static_cast<size_t>(parent)])
+      parent = kParents[static_cast<size_t>(parent)];
+    const auto p = static_cast<size_t>(parent);
+    if (parent < 0)
+      out.push_back({kUnityBones[j], unity(pose.root), unity(global[j])});
+    else
+      out.push_back({kUnityBones[j], unity(Vec3(rest[j] - rest[p])),
+                     unity(Mat3(global[p].transpose() * global[j]))});
+  }
+  return out;
+}
+
+struct VmcSender::Address {
+  lo_address value = nullptr;
+  ~Address() { lo_address_free(value); }
+};
+
+VmcSender::VmcSender(const Place& to, const Joints& rest, const BoneSet& sent)
+    : to_(std::make_unique<Address>()), rest_(rest), sent_(sent) {
+  if (!sent_[kPelvis]) throw WorkError("a character without hips cannot be sent");
+  to_->value = lo_address_new_with_proto(LO_UDP, to.host.c_str(), std::to_string(to.port).c_str());
+  if (to_->value == nullptr) throw WorkError("cannot make an address of " + to.text());
+}
+
+VmcSender::~VmcSender() = default;
+
+std::string VmcSender::send(const Pose& pose, double seconds) {
+  const lo_bundle bundle = lo_bundle_new(LO_TT_IMMEDIATE);
+  const lo_message loaded = lo_message_new(), time = lo_message_new();
+  lo_message_add(loaded, "i", 1);
+  lo_bundle_add_message(bundle, "/VMC/Ext/OK", loaded);
+  lo_message_add(time, "f", seconds);
+  lo_bundle_add_message(bundle, "/VMC/Ext/T", time);
+  add_place(bundle, "/VMC/Ext/Root/Pos", "root", Eigen::Vector3f::Zero(),
+            Eigen::Quaternionf::Identity());
+  for (const VmcBone& bone : vmc_bones(rest_, pose, sent_))
+    add_place(bundle, "/VMC/Ext/Bone/Pos", bone.name, bone.position, bone.rotation);
+  const int sent = lo_send_bundle(to_->value, bundle);
+  lo_bundle_free_recursive(bundle);
+  return sent < 0 ? lo_address_errstr(to_->value) : "";
+}
+
+}  // namespace restage::live
