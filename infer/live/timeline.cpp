@@ -15,12 +15,17 @@ Step Timeline::place(double seconds, int64_t sender) {
     sender_ = sender;
     last_ = 0;
     zero_ = seconds;
+    crowded_ = false;
     return {Step::Kind::anew};
   }
   const auto moments = static_cast<int64_t>(std::lround(ahead));
-  if (moments < 1) return {Step::Kind::late};
+  if (moments < 1) {
+    crowded_ = true;
+    return {Step::Kind::late};
+  }
   last_ += moments;
-  zero_ += kFollow * (at - static_cast<double>(last_)) / kFps;
+  if (!crowded_) zero_ += kFollow * (at - static_cast<double>(last_)) / kFps;
+  crowded_ = false;
   return {Step::Kind::next, moments - 1};
 }
 

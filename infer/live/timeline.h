@@ -24,14 +24,16 @@ class Timeline {
  public:
   /// The next cloud, captured at `seconds` (finite) of the clock of `sender`. Each cloud belongs to
   /// the nearest moment of the grid, and the grid follows the sender slowly: by a tenth of what the
-  /// cloud is off. So neither trembling times nor a rate that is not quite 30 cost clouds.
+  /// cloud is off, unless clouds are more than the grid has moments. So neither trembling times
+  /// nor a rate that is not quite 30 cost clouds.
   Step place(double seconds, int64_t sender);
 
  private:
   bool began_ = false;
   int64_t sender_ = 0;
-  int64_t last_ = 0;  ///< the moment of the last cloud, from 0
-  double zero_ = 0;   ///< the sender's time of moment 0
+  int64_t last_ = 0;      ///< the moment of the last cloud, from 0
+  double zero_ = 0;       ///< the sender's time of moment 0
+  bool crowded_ = false;  ///< a cloud has come since that belongs to no later moment
 };
 
 }  // namespace restage::live
