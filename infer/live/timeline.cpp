@@ -14,6 +14,7 @@ Step Timeline::place(double seconds, int64_t sender) {
     began_ = true;
     sender_ = sender;
     last_ = 0;
+    newest_ = seconds;
     zero_ = seconds;
     crowded_ = false;
     return {Step::Kind::anew};
@@ -21,12 +22,17 @@ Step Timeline::place(double seconds, int64_t sender) {
   const auto moments = static_cast<int64_t>(std::lround(ahead));
   if (moments < 1) {
     crowded_ = true;
-    return {Step::Kind::late};
+    if (!(seconds > newest_)) return {Step::Kind::late};
+    newest_ = seconds;
+    return {Step::Kind::early, 0, (1 - ahead) / kFps};
   }
+  newest_ = seconds;
   last_ += moments;
   if (!crowded_) zero_ += kFollow * (at - static_cast<double>(last_)) / kFps;
   crowded_ = false;
   return {Step::Kind::next, moments - 1};
 }
+
+void Timeline::take_early() { ++last_; }
 
 }  // namespace restage::live

@@ -13,11 +13,14 @@ inline constexpr int64_t kMostMissed = 10;
 /// What a cloud is to the sequence so far.
 struct Step {
   enum class Kind {
-    next,  ///< it goes on, `missed` moments of the grid after the cloud before
-    late,  ///< it belongs to a moment that has been answered, or to one shortly before
-    anew   ///< a sequence begins with it
+    next,   ///< it goes on, `missed` moments of the grid after the cloud before
+    early,  ///< newer than the last cloud, but of the same moment: unless another cloud comes in
+            ///< the next `wait` seconds, it is the next moment's (take_early())
+    late,   ///< not newer than the last cloud, or by too little to count
+    anew    ///< a sequence begins with it
   } kind;
   int64_t missed = 0;
+  double wait = 0;
 };
 
 class Timeline {
@@ -28,10 +31,14 @@ class Timeline {
   /// nor a rate that is not quite 30 cost clouds.
   Step place(double seconds, int64_t sender);
 
+  /// The cloud that was early stands for the next moment.
+  void take_early();
+
  private:
   bool began_ = false;
   int64_t sender_ = 0;
   int64_t last_ = 0;      ///< the moment of the last cloud, from 0
+  double newest_ = 0;     ///< the sender's time of the last cloud that was placed
   double zero_ = 0;       ///< the sender's time of moment 0
   bool crowded_ = false;  ///< a cloud has come since that belongs to no later moment
 };

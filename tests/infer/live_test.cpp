@@ -146,7 +146,7 @@ TEST(LiveTimeline, ThirtyASecondIsOneMomentACloudAlsoWhenItTrembles) {
         const double tremble = 0.009 * std::sin(12.9 * k);
         const Step step = line.place(start + k / rate + tremble, 1);
         missed += step.missed;
-        late += step.kind == Kind::late;
+        late += step.kind == Kind::late || step.kind == Kind::early;
         EXPECT_EQ(step.kind == Kind::anew, k == 0);
       }
       EXPECT_EQ(missed, 0) << rate;
@@ -168,17 +168,26 @@ TEST(LiveTimeline, OtherRatesKeepTheirPace) {
 }
 
 TEST(LiveTimeline, GapsAndClocksThatJump) {
+  Timeline line;
   const auto gap = steps({0, 5 / 30., 6 / 30.});
   EXPECT_EQ(gap[1].missed, 4);
   EXPECT_EQ(gap[2].missed, 0);
   EXPECT_EQ(steps({0, 11 / 30.})[1].kind, Kind::next);
   EXPECT_EQ(steps({0, 13 / 30.})[1].kind, Kind::anew);
-  EXPECT_EQ(steps({0, 0.001})[1].kind, Kind::late);
+  EXPECT_EQ(steps({0, 0})[1].kind, Kind::late);
   EXPECT_EQ(steps({0, 1 / 30., 2 / 30., 0})[3].kind, Kind::late);
   EXPECT_EQ(steps({5, 0})[1].kind, Kind::anew);
+  // Of the same moment, but newer: it stands for the next one, if no other comes.
+  line = {};
+  line.place(0, 1);
+  const Step early = line.place(0.01, 1);
+  EXPECT_EQ(early.kind, Kind::early);
+  EXPECT_NEAR(early.wait, 1 / 30. - 0.01, 1e-9);
+  line.take_early();
+  EXPECT_EQ(line.place(2 / 30., 1).missed, 0);
   EXPECT_EQ(steps({0, 1e300})[1].kind, Kind::anew);
   EXPECT_EQ(steps({-1e300, 1e300, 1e300 + 1})[1].kind, Kind::anew);
-  Timeline line;  // another sender has another clock
+  line = {};  // another sender has another clock
   line.place(0, 1);
   EXPECT_EQ(line.place(1 / 30., 2).kind, Kind::anew);
 }
