@@ -16,7 +16,7 @@ struct Step {
     next,   ///< it goes on, `missed` moments of the grid after the cloud before
     early,  ///< newer than the last cloud, but of the same moment: unless another cloud comes in
             ///< the next `wait` seconds, it is the next moment's (take_early())
-    late,   ///< not newer than the last cloud, or by too little to count
+    late,   ///< not newer than the last cloud
     anew    ///< a sequence begins with it
   } kind;
   int64_t missed = 0;
