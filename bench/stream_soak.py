@@ -98,10 +98,11 @@ class Sender:
         self.connect()
 
 
-def drift(receiver, rounds, length):
-    """How far the hips are in the last rounds from where they were in the second, mean over a round, millimetres."""
-    hips = [p for _, p in receiver.got]
-    if rounds < 3 or len(hips) != rounds * length + len(hips) % length:
+def drift(hips, length):
+    """How far the hips are in the last round of the clouds from where they were in the second, mean over a round, millimetres.
+    None: there are no three rounds."""
+    rounds = len(hips) // length
+    if rounds < 3:
         return None
     first, last = hips[length:2 * length], hips[(rounds - 1) * length:rounds * length]
     return 1e3 * sum(sum((a - b) ** 2 for a, b in zip(p, q)) ** 0.5 for p, q in zip(first, last)) / length
@@ -154,7 +155,8 @@ def main():
     settled = memory[len(memory) // 10:]
     growth = 100 * (settled[-1] / settled[0] - 1)
     latency = report["latency_ms"]
-    moved = drift(receiver, len(receiver.got) // len(clouds), len(clouds))
+    whole = not troubles and report["frames_out"] == len(sender.sent)  # else rounds cannot be told apart
+    moved = drift([p for _, p in receiver.got], len(clouds)) if whole else None
     print("| %s | %s | %d | %g s at %g fps%s | %d | %d | %d | %.1f | %.1f | %.1f | %.1f to %.1f MiB | %s |" % (
         os.path.basename(a.target), os.path.basename(a.weights or "standard"), len(clouds[0]) // 12, a.seconds, a.fps,
         ", %d troubles" % troubles if troubles else "", report["frames_in"], report["frames_out"], report["dropped"], latency["p50"],

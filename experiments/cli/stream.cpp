@@ -322,8 +322,7 @@ int run_stream(const StreamCommand& c, const Common& common) {
     const live::Reading reading(std::move(input), box, words);
     stream.run();
   }
-  if (box.counts().arrived == 0)
-    log_warning("no frame came; docs/stream.md says what a frame is");
+  if (box.counts().arrived == 0) log_warning("no frame came; docs/stream.md says what a frame is");
   print(common.json, stream.json(), stream.text());
   try {
     throw_if_stopped();
@@ -340,7 +339,15 @@ void add_stream(Program& program) {
       "stream", "a character performs clouds while they are captured: VMC protocol, live page",
       "restage stream --target hero.vrm --in tcp://127.0.0.1:9000 --vmc 127.0.0.1:39539\n"
       "restage stream --target hero.vrm --in captured/ --vmc 127.0.0.1:39539 --ws 8080\n"
-      "camera | restage stream --target hero.glb --in - --vmc 127.0.0.1:39539 --seconds 60 --json",
+      "camera | restage stream --target hero.glb --in - --vmc 127.0.0.1:39539 --seconds 60 --json\n"
+      "restage stream --target odd.glb --bones names.yaml --weights runs/demo-1 --in captured/ "
+      "--source-up z --scale mm --vmc 39539\n"
+      "restage stream --target hero.ply --in tcp://0.0.0.0:9000 --vmc 192.168.0.7:39539 --ws "
+      "0.0.0.0:8080 --samples 1 --min-confidence 0.5\n"
+      "restage stream --target hero.glb --in captured/ --vmc 39539 --anchor 0 --no-foot-lock "
+      "--force --device cuda\n"
+      "restage stream --target hero.ply --system register --rest rest.h5 --in captured/ --vmc "
+      "39539",
       run_stream);
   add_target_options(app, c.how);
   app.add_option("--in", c.in,

@@ -5,6 +5,7 @@ import base64
 import json
 import os
 import random
+import re
 import select
 import shutil
 import signal
@@ -19,6 +20,8 @@ from support import CliTest, PROGRAM, ROOT
 from test_gltf import character
 
 LITE = os.path.join(ROOT, "experiments", "weights", "lite.safetensors")
+CHROMIUM = next((path for path in (os.environ.get("CHROMIUM"), "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome")
+                 if path and os.path.exists(path)), None)
 # Unity's names of the 22 joints, in our order, and whose child each is.
 BONES = """Hips LeftUpperLeg RightUpperLeg Spine LeftLowerLeg RightLowerLeg Chest LeftFoot RightFoot UpperChest LeftToes RightToes
 Neck LeftShoulder RightShoulder Head LeftUpperArm RightUpperArm LeftLowerArm RightLowerArm LeftHand RightHand""".split()
@@ -349,6 +352,28 @@ class Streams(StreamTest):
             self.assertIn(b"element vertex %d\n" % count, f.read(1000))
         heights = struct.unpack_from("<%df" % (3 * count), message, at + 16)[1::3]
         self.assertTrue(1 < max(heights) - min(heights) < 2.5)
+        self.interrupted(process)
+
+    @unittest.skipUnless(CHROMIUM, "no Chromium found (set CHROMIUM)")
+    def test_the_page_plays_in_a_browser(self):
+        port, page = free_port(), free_port()
+        process = self.stream("tcp://127.0.0.1:%d" % port, "--ws", str(page))
+        browser = subprocess.Popen([CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--use-angle=swiftshader",
+                                    "--enable-unsafe-swiftshader", "--virtual-time-budget=4000", "--user-data-dir=" + self.path("profile"), "--dump-dom",
+                                    "http://127.0.0.1:%d/" % page], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+        self.addCleanup(browser.stdout.close)
+        self.addCleanup(browser.wait)
+        self.addCleanup(browser.kill)
+        send, k = self.sender(port).sendall, 0
+        while browser.poll() is None and k < 1200:
+            send(frame(k / 30, self.clouds[k % 16]))
+            time.sleep(1 / 30)
+            k += 1
+        dom = browser.stdout.read().decode()
+        self.assertIn('data-renderer="', dom)
+        came, drawn = re.search(r'<html[^>]* data-live="(\d+)"', dom), re.search(r"s, frame (\d+)</output>", dom)
+        self.assertGreater(int(came[1]), 0)
+        self.assertTrue(drawn and int(drawn[1]) > 0)
         self.interrupted(process)
 
     def test_ends_after_so_many_seconds(self):
