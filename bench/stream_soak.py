@@ -53,7 +53,7 @@ def resident(pid):
 
 
 class Receiver(threading.Thread):
-    """When each bundle came, and where its hips were."""
+    """Where the hips were in each bundle."""
 
     def __init__(self, port):
         super().__init__(daemon=True)
@@ -66,12 +66,12 @@ class Receiver(threading.Thread):
         while True:
             data = self.socket.recv(65536)
             at = data.index(b"Hips\0\0\0\0") + 8
-            self.got.append((time.monotonic(), struct.unpack_from(">3f", data, at)))
+            self.got.append(struct.unpack_from(">3f", data, at))
 
 
 class Sender:
     def __init__(self, port, clouds):
-        self.port, self.clouds, self.socket, self.sent = port, clouds, None, []
+        self.port, self.clouds, self.socket, self.numbers = port, clouds, None, []
 
     def connect(self):
         if self.socket is not None:
@@ -85,7 +85,7 @@ class Sender:
 
     def send(self, k, seconds):
         self.socket.sendall(self.frame(k, seconds))
-        self.sent.append(time.monotonic())
+        self.numbers.append(k)
 
     def trouble(self, kind, k, seconds):
         if kind == 0:
@@ -98,14 +98,15 @@ class Sender:
         self.connect()
 
 
-def drift(hips, length):
-    """How far the hips are in the last round of the clouds from where they were in the second, mean over a round, millimetres.
-    None: there are no three rounds."""
-    rounds = len(hips) // length
-    if rounds < 3:
+def drift(hips, numbers, length):
+    """How far the hips are from where they were when the same cloud was answered early in the run (in the second of `length`
+    clouds), mean over the last round, millimetres. None: there are no three rounds."""
+    if numbers[-1] < 3 * length:
         return None
-    first, last = hips[length:2 * length], hips[(rounds - 1) * length:rounds * length]
-    return 1e3 * sum(sum((a - b) ** 2 for a, b in zip(p, q)) ** 0.5 for p, q in zip(first, last)) / length
+    early = {n % length: p for n, p in zip(numbers, hips) if length <= n < 2 * length}
+    late = {n % length: p for n, p in zip(numbers[-length:], hips[-length:])}
+    far = [sum((a - b) ** 2 for a, b in zip(p, early[n])) ** 0.5 for n, p in late.items() if n in early]
+    return 1e3 * sum(far) / len(far)
 
 
 def main():
@@ -155,17 +156,17 @@ def main():
     settled = memory[len(memory) // 10:]
     growth = 100 * (settled[-1] / settled[0] - 1)
     latency = report["latency_ms"]
-    whole = not troubles and report["frames_out"] == len(sender.sent)  # else rounds cannot be told apart
-    moved = drift([p for _, p in receiver.got], len(clouds)) if whole else None
+    whole = not troubles and report["frames_out"] == len(sender.numbers)  # else rounds cannot be told apart
+    moved = drift(receiver.got, sender.numbers, len(clouds)) if whole else None
     print("| %s | %s | %d | %g s at %g fps%s | %d | %d | %d | %.1f | %.1f | %.1f | %.1f to %.1f MiB | %s |" % (
         os.path.basename(a.target), os.path.basename(a.weights or "standard"), len(clouds[0]) // 12, a.seconds, a.fps,
         ", %d troubles" % troubles if troubles else "", report["frames_in"], report["frames_out"], report["dropped"], latency["p50"],
         latency["p99"], latency["max"], settled[0], settled[-1], "%.1f mm" % moved if moved is not None else "-"))
-    print(json.dumps({**report, "sent": len(sender.sent), "received": len(receiver.got), "memory_growth_percent": growth,
+    print(json.dumps({**report, "sent": len(sender.numbers), "received": len(receiver.got), "memory_growth_percent": growth,
                       "memory_most_mib": max(memory)}))
     if troubles:
         print("".join(said), file=sys.stderr)
-    lost = len(sender.sent) - report["frames_in"] if not troubles else 0
+    lost = len(sender.numbers) - report["frames_in"] if not troubles else 0
     if growth > 5 or lost or len(receiver.got) != report["frames_out"] or process.returncode != 130:
         sys.exit("memory grew by %.1f %%, %d frames lost, %d bundles of %d received, exit code %d" % (
             growth, lost, len(receiver.got), report["frames_out"], process.returncode))

@@ -25,7 +25,7 @@ Eigen::Quaternionf unity(const Mat3& turn) {
 /// The message is freed by whoever frees its bundle.
 void add_place(lo_bundle bundle, const char* path, std::string_view name, const Eigen::Vector3f& p,
                const Eigen::Quaternionf& q) {
-  const lo_message message = lo_message_new();
+  lo_message message = lo_message_new();
   lo_message_add(message, "sfffffff", std::string(name).c_str(), double{p.x()}, double{p.y()},
                  double{p.z()}, double{q.x()}, double{q.y()}, double{q.z()}, double{q.w()});
   lo_bundle_add_message(bundle, path, message);
@@ -66,8 +66,8 @@ VmcSender::VmcSender(const Place& to, const Joints& rest, const BoneSet& sent)
 VmcSender::~VmcSender() = default;
 
 std::string VmcSender::send(const Pose& pose, double seconds) {
-  const lo_bundle bundle = lo_bundle_new(LO_TT_IMMEDIATE);
-  const lo_message loaded = lo_message_new(), time = lo_message_new();
+  lo_bundle bundle = lo_bundle_new(LO_TT_IMMEDIATE);
+  lo_message loaded = lo_message_new(), time = lo_message_new();
   lo_message_add(loaded, "i", 1);
   lo_bundle_add_message(bundle, "/VMC/Ext/OK", loaded);
   lo_message_add(time, "f", seconds);
