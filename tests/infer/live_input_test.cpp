@@ -112,6 +112,8 @@ TEST_F(LiveInput, AStalledSenderIsReplacedByOneThatSendsAFrame) {
   const Client fresh(port_);
   fresh.send(one_frame(7).substr(0, 15));  // no whole frame: nobody is replaced
   EXPECT_EQ(next(50), -1);
+  stalled.send(one_frame(2).substr(9));
+  EXPECT_EQ(next(), 2);
   fresh.send(one_frame(7).substr(15));
   EXPECT_EQ(next(), 7);
   EXPECT_TRUE(stalled.closed());
