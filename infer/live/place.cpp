@@ -13,16 +13,11 @@
 namespace restage::live {
 namespace {
 
-struct Found {
-  sockaddr_storage address{};
-  socklen_t length = 0;
-};
-
 /// The numeric or named host's address; `length` 0: there is none.
-Found look_up(const Place& place) {
+SocketAddress look_up(const Place& place) {
   addrinfo how{}, *list = nullptr;
   how.ai_socktype = SOCK_STREAM;
-  Found out;
+  SocketAddress out;
   if (getaddrinfo(place.host.c_str(), std::to_string(place.port).c_str(), &how, &list) != 0)
     return out;
   for (const addrinfo* one = list; one != nullptr; one = one->ai_next) {
@@ -60,7 +55,7 @@ Place parse_place(const std::string& text, const std::string& option) {
 }
 
 Place resolved(const Place& place, const std::string& option) {
-  const Found found = look_up(place);
+  const SocketAddress found = look_up(place);
   char host[NI_MAXHOST];
   if (found.length == 0 ||
       getnameinfo(reinterpret_cast<const sockaddr*>(&found.address), found.length, host,
@@ -72,7 +67,7 @@ Place resolved(const Place& place, const std::string& option) {
 }
 
 Listener::Listener(const Place& place, const std::string& option) {
-  const Found found = look_up(place);
+  const SocketAddress found = look_up(place);
   fd_ = socket(found.address.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   const int on = 1;
   if (fd_ >= 0 && setsockopt(fd_, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) == 0 &&
@@ -87,5 +82,21 @@ Listener::Listener(const Place& place, const std::string& option) {
 }
 
 Listener::~Listener() { close(fd_); }
+
+Datagrams::Datagrams(const Place& to) : to_(look_up(to)) {
+  fd_ = socket(to_.address.ss_family, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  const int on = 1;
+  if (fd_ < 0 || setsockopt(fd_, SOL_SOCKET, SO_BROADCAST, &on, sizeof on) != 0)
+    throw WorkError("cannot make a socket to send to " + to.text() + ": " + std::strerror(errno));
+}
+
+Datagrams::~Datagrams() { close(fd_); }
+
+std::string Datagrams::send(std::span<const char> bytes) const {
+  return sendto(fd_, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&to_.address),
+                to_.length) < 0
+             ? std::strerror(errno)
+             : "";
+}
 
 }  // namespace restage::live

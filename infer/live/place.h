@@ -1,7 +1,10 @@
 // Addresses that a user writes: where to send, where to listen.
 #pragma once
 
+#include <sys/socket.h>
+
 #include <cstdint>
+#include <span>
 #include <string>
 
 namespace restage::live {
@@ -19,6 +22,11 @@ Place parse_place(const std::string& text, const std::string& option);
 /// The same with the host as a numeric address, IPv4 if there is one. InputError: no such host.
 Place resolved(const Place& place, const std::string& option);
 
+struct SocketAddress {
+  sockaddr_storage address{};
+  socklen_t length = 0;  ///< 0: there is none
+};
+
 /// A TCP socket that listens, closed with this value. InputError naming `option`: the port is in
 /// use, or the address is none of this machine.
 class Listener {
@@ -30,6 +38,23 @@ class Listener {
   int fd() const { return fd_; }
 
  private:
+  int fd_ = -1;
+};
+
+/// Sends datagrams (UDP) to one address.
+class Datagrams {
+ public:
+  /// `to`: resolved().
+  explicit Datagrams(const Place& to);
+  ~Datagrams();
+  Datagrams(const Datagrams&) = delete;
+  Datagrams& operator=(const Datagrams&) = delete;
+  /// Returns why it could not be sent; empty: it has been handed to the system. Whether anybody
+  /// listens is not known.
+  std::string send(std::span<const char> bytes) const;
+
+ private:
+  SocketAddress to_;
   int fd_ = -1;
 };
 

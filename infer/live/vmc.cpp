@@ -51,19 +51,10 @@ std::vector<VmcBone> vmc_bones(const Joints& rest, const Pose& pose, const BoneS
   return out;
 }
 
-struct VmcSender::Address {
-  lo_address value = nullptr;
-  ~Address() { lo_address_free(value); }
-};
-
 VmcSender::VmcSender(const Place& to, const Joints& rest, const BoneSet& sent)
-    : to_(std::make_unique<Address>()), rest_(rest), sent_(sent) {
+    : to_(to), rest_(rest), sent_(sent) {
   if (!sent_[kPelvis]) throw WorkError("a character without hips cannot be sent");
-  to_->value = lo_address_new_with_proto(LO_UDP, to.host.c_str(), std::to_string(to.port).c_str());
-  if (to_->value == nullptr) throw WorkError("cannot make an address of " + to.text());
 }
-
-VmcSender::~VmcSender() = default;
 
 std::string VmcSender::send(const Pose& pose, double seconds) {
   lo_bundle bundle = lo_bundle_new(LO_TT_IMMEDIATE);
@@ -76,9 +67,10 @@ std::string VmcSender::send(const Pose& pose, double seconds) {
             Eigen::Quaternionf::Identity());
   for (const VmcBone& bone : vmc_bones(rest_, pose, sent_))
     add_place(bundle, "/VMC/Ext/Bone/Pos", bone.name, bone.position, bone.rotation);
-  const int sent = lo_send_bundle(to_->value, bundle);
+  bytes_.resize(lo_bundle_length(bundle));
+  lo_bundle_serialise(bundle, bytes_.data(), nullptr);
   lo_bundle_free_recursive(bundle);
-  return sent < 0 ? lo_address_errstr(to_->value) : "";
+  return to_.send(bytes_);
 }
 
 }  // namespace restage::live

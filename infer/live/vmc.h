@@ -4,7 +4,6 @@
 #pragma once
 
 #include <array>
-#include <memory>
 #include <string_view>
 #include <vector>
 
@@ -36,19 +35,16 @@ class VmcSender {
  public:
   /// `to`: resolved().
   VmcSender(const Place& to, const Joints& rest, const BoneSet& sent);
-  ~VmcSender();
-  VmcSender(const VmcSender&) = delete;
-  VmcSender& operator=(const VmcSender&) = delete;
   /// One bundle: /VMC/Ext/OK, /VMC/Ext/T, /VMC/Ext/Root/Pos (always the origin) and
   /// /VMC/Ext/Bone/Pos for every bone. `seconds`: since the stream began. Returns why it could not
   /// be sent; empty: it has been handed to the socket.
   std::string send(const Pose& pose, double seconds);
 
  private:
-  struct Address;
-  std::unique_ptr<Address> to_;
+  Datagrams to_;
   Joints rest_;
   BoneSet sent_;
+  std::vector<char> bytes_;
 };
 
 }  // namespace restage::live

@@ -2,6 +2,9 @@
 // time, the latency meter; and VMC bundles as a receiver of liblo's reads them.
 #include <gtest/gtest.h>
 #include <lo/lo.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <cstring>
 #include <limits>
@@ -351,6 +354,32 @@ TEST(LiveVmc, ABundleIsReadByAReceiver) {
     EXPECT_EQ(got.times[key], 1);
   }
   lo_server_free(server);
+}
+
+TEST(LiveVmc, SendsToBothKindsOfAddresses) {
+  for (const char* host : {"127.0.0.1", "::1"}) {
+    const bool v6 = host[0] == ':';
+    const int fd = socket(v6 ? AF_INET6 : AF_INET, SOCK_DGRAM, 0);
+    sockaddr_storage where{};
+    where.ss_family = v6 ? AF_INET6 : AF_INET;
+    if (v6) reinterpret_cast<sockaddr_in6&>(where).sin6_addr = in6addr_loopback;
+    socklen_t size = v6 ? sizeof(sockaddr_in6) : sizeof(sockaddr_in);
+    const timeval patience{2, 0};
+    setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+    if (fd < 0 || bind(fd, reinterpret_cast<sockaddr*>(&where), size) != 0) {
+      close(fd);
+      GTEST_SKIP() << "this machine has no address " << host;
+    }
+    getsockname(fd, reinterpret_cast<sockaddr*>(&where), &size);
+    const uint16_t port = ntohs(v6 ? reinterpret_cast<sockaddr_in6&>(where).sin6_port
+                                   : reinterpret_cast<sockaddr_in&>(where).sin_port);
+    VmcSender sender({host, port}, testing::tiny_joints(), bones_without({}));
+    EXPECT_EQ(sender.send(some_pose(), 0), "");
+    char bytes[8];
+    ASSERT_EQ(recv(fd, bytes, sizeof bytes, 0), 8) << host;
+    EXPECT_EQ(std::memcmp(bytes, "#bundle", 8), 0);
+    close(fd);
+  }
 }
 
 TEST(LivePage, AMessageIsWhatItsHeaderSays) {
