@@ -69,6 +69,8 @@ ONLY_IN = {
     "zip.h": ["datasets/readers/zip.cpp"],
     "zlib.h": ["datasets/readers/", "datasets/fetch/"],
     "curl/": ["datasets/fetch/download.cpp"],
+    "lo/": ["infer/live/vmc.cpp"],
+    "libwebsockets.h": ["infer/live/server.cpp"],
     "hwy/": ["autograd/cpu/"],
     "cublas_v2.h": ["autograd/cuda/"],
     "cuda_runtime.h": ["autograd/cuda/"],
@@ -79,6 +81,7 @@ ONLY_IN = {
     "iostream": ["experiments/"],  # nothing below prints
     "thread": ["autograd/base/", "experiments/", "train/lease.cpp", "train/artifacts/made_once.cpp",  # waiting
                "train/mpi/",  # rows on their way
+               "infer/live/",  # clouds that arrive, a page that is served
                "train/run_provenance.cpp"],  # counting cores
     "future": [],
 }

@@ -17,8 +17,6 @@ Eigen::Matrix3f turn_of(const std::string& up) {
 }
 
 void check(const SourceRecord& how) {
-  if (!(how.scale >= kLeastScale && how.scale <= kMostScale))
-    throw InputError("", "--scale is out of range", "give metres per unit, 1e-9 to 1e6");
   if (how.fps && !(*how.fps >= 1 && *how.fps <= 1000))
     throw InputError("", "--fps is out of range", "give the source's frames per second, 1 to 1000");
   if (how.fps && *how.fps != kFps && is_gltf_name(how.path))  // it is played at that rate
@@ -28,7 +26,22 @@ void check(const SourceRecord& how) {
 
 }  // namespace
 
-Source::Source(const SourceRecord& how, uint64_t max_memory) : how_(how), turn_(turn_of(how.up)) {
+ToOurs::ToOurs(double scale, const std::string& up)
+    : scale_(static_cast<float>(scale)), turn_(turn_of(up)) {
+  if (!(scale >= kLeastScale && scale <= kMostScale))
+    throw InputError("", "--scale is out of range", "give metres per unit, 1e-9 to 1e6");
+}
+
+void ToOurs::operator()(Points& points) const {
+  const bool upright = turn_.isIdentity();
+  for (Point& p : points) {
+    if (!upright) p = turn_ * p;
+    p *= scale_;
+  }
+}
+
+Source::Source(const SourceRecord& how, uint64_t max_memory)
+    : how_(how), to_ours_(how.scale, how.up) {
   check(how);
   frames_ =
       open_frames(how.path, {.clip = how.clip, .max_memory = max_memory, .sequence = how.sequence});
@@ -51,11 +64,7 @@ std::optional<SourceCloud> Source::next() {
   out.fault = out.frame.fault;
   if (!out.fault && out.frame.points.empty())
     out.fault = InputError(out.frame.source, "holds no points", "leave the frame out");
-  const auto scale = static_cast<float>(how_.scale);
-  for (Point& p : out.frame.points) {
-    if (!upright()) p = turn_ * p;
-    p *= scale;
-  }
+  to_ours_(out.frame.points);
   return out;
 }
 

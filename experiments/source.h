@@ -16,6 +16,18 @@ struct SourceCloud {
   std::optional<InputError> fault;  ///< names the frame's file
 };
 
+/// From a source's units and axes to metres, y up.
+class ToOurs {
+ public:
+  /// InputError naming --scale or --source-up: out of range, no axis.
+  ToOurs(double scale, const std::string& up);
+  void operator()(Points& points) const;
+
+ private:
+  float scale_;
+  Eigen::Matrix3f turn_;
+};
+
 class Source {
  public:
   /// InputError: there is nothing to read; a setting that is out of range, by the name of its
@@ -33,7 +45,6 @@ class Source {
   double fps() const { return *how_.fps; }
   /// What the user should know of the whole, such as files that were left out.
   std::vector<std::string> remarks() const { return frames_->remarks(); }
-  bool upright() const { return turn_.isIdentity(); }  ///< y was up already
   /// How it is read; the rate is there, also where it is the file's.
   const SourceRecord& record() const { return how_; }
 
@@ -41,7 +52,7 @@ class Source {
   void return_to_place();
 
   SourceRecord how_;
-  Eigen::Matrix3f turn_;
+  ToOurs to_ours_;
   std::unique_ptr<FrameSource> frames_;
   int64_t at_ = 0;                    // frames given or skipped
   std::optional<InputError> broken_;  // nothing behind this place can be read

@@ -11,6 +11,7 @@ void add_commands(Program& program) {
   add_reproduce(program);
   add_replay(program);
   add_retarget(program);
+  add_stream(program);
   add_skeleton(program);
   add_data(program);
   add_eval(program);

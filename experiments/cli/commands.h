@@ -26,6 +26,7 @@ void add_report(Program& program);
 void add_reproduce(Program& program);
 void add_retarget(Program& program);
 void add_skeleton(Program& program);
+void add_stream(Program& program);
 void add_sweep(Program& program);
 void add_sweep_export(Program& program, CommandOptions group);  // of `sweep`, as all add_sweep_*
 void add_sweep_table(Program& program, CommandOptions group);

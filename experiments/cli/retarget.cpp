@@ -30,10 +30,7 @@ using Frames = std::vector<int64_t>;  ///< their numbers
 
 void check(const RetargetCommand& c) {
   check_sink(c.to);
-  if (!(c.options.min_confidence >= 0 && c.options.min_confidence <= 1))
-    throw InputError("", "--min-confidence is out of range", "give 0 to 1");
-  if (c.options.samples < 1 || c.options.samples > 256)
-    throw InputError("", "--samples is out of range", "give 1 to 256");
+  check_options(c.options);
   std::vector<std::string> inputs = {c.source.path, c.target};
   if (!c.weights.empty()) inputs.push_back(weights_path(c.weights));
   for (const std::string& more : {c.rest, c.bones, c.source_bones, c.body_model})
@@ -57,8 +54,8 @@ auto with_target(const RetargetCommand& c, const TargetMesh& target, const Work&
 
 /// The doctor's words on what would make the result nonsense.
 void check_inputs(const RetargetCommand& c, Source& source, const TargetMesh& target) {
+  check_mesh(c, target);
   if (c.options.force) return;
-  with_target(c, target, [&] { check_target(target.mesh, c.target, target.known()); });
   std::vector<Mesh> first;
   for (int i = 0; i < kSourceFrames; ++i) {
     auto cloud = source.next();
@@ -269,6 +266,49 @@ std::string help_of_systems() {
 
 }  // namespace
 
+void add_target_options(CommandOptions app, RetargetCommand& c) {
+  app.add_option("--target", c.target,
+                 "mesh or cloud in T-pose, y up, facing +z; or a glTF or FBX character")
+      .required();
+  app.add_option("--bones", c.bones,
+                 "which bone of a glTF target is which joint, a .yaml file or a known family");
+}
+
+void add_system_options(CommandOptions app, RetargetCommand& c) {
+  app.add_option("--device", c.device,
+                 "where extractor and motion network run: cpu, or cuda in a program built for it");
+  app.add_option("--samples", c.options.samples,
+                 "views of a cloud to average: choices of its points, turned and mirrored");
+  app.add_option("--anchor", c.options.anchor,
+                 "seconds in which the path goes back to the source's, scaled to the target's legs "
+                 "(0: never)");
+  app.add_option(
+      "--min-confidence", c.options.min_confidence,
+      "the target waits where the extractor is less sure than this, 0 to 1 (0: never), and "
+      "comes back within half a second");
+  app.add_flag("!--no-foot-lock", c.options.foot_lock,
+               "feet that stand are not held where they landed");
+}
+
+void add_weights_options(CommandOptions app, RetargetCommand& c) {
+  app.add_option("--weights", c.weights,
+                 "weights file, run or artifact (default: the standard ones)");
+  app.add_option("--system", c.system, help_of_systems()).show_default();
+  app.add_option("--rest", c.rest, "the target's 22 rest joints (HDF5, /joints [1, 22, 3])");
+}
+
+void check_options(const RetargetOptions& options) {
+  if (!(options.min_confidence >= 0 && options.min_confidence <= 1))
+    throw InputError("", "--min-confidence is out of range", "give 0 to 1");
+  if (options.samples < 1 || options.samples > 256)
+    throw InputError("", "--samples is out of range", "give 1 to 256");
+}
+
+void check_mesh(const RetargetCommand& c, const TargetMesh& target) {
+  if (c.options.force) return;
+  with_target(c, target, [&] { check_target(target.mesh, c.target, target.known()); });
+}
+
 SystemInput load_input(const RetargetCommand& c, const Common& common) {
   SystemInput input;
   input.options = c.options;
@@ -330,18 +370,11 @@ void add_retarget(Program& program) {
          "folder of clouds, file of them (HDF5, NPZ, NPY); or a skeleton's motion, which is taken "
          "over exactly: BVH, AMC, glTF, VRM, VRMA, FBX, AMASS (.npz), our motions (.h5)")
       .required();
-  app.add_option("--target", c.target,
-                 "mesh or cloud in T-pose, y up, facing +z; or a glTF or FBX character")
-      .required();
-  app.add_option("--bones", c.bones,
-                 "which bone of a glTF target is which joint, a .yaml file or a known family");
+  add_target_options(app, c);
   app.add_option("--source-bones", c.source_bones, "the same of a source's skeleton");
   app.add_option("--body-model", c.body_model,
                  "of an AMASS source its SMPL model (.npz), or a folder of them");
-  app.add_option("--weights", c.weights,
-                 "weights file, run or artifact (default: the standard ones)");
-  app.add_option("--system", c.system, help_of_systems()).show_default();
-  app.add_option("--rest", c.rest, "the target's 22 rest joints (HDF5, /joints [1, 22, 3])");
+  add_weights_options(app, c);
   app.add_option("--every", c.to.every, "only every so many frames of the source; for X.h5");
   app.add_option("--out", c.to.out,
                  "X.glb, X.gltf, X.vrm, X.vrma, X.bvh, X.h5, or a folder for PLY or OBJ frames")
@@ -366,19 +399,7 @@ void add_retarget(Program& program) {
   add_scale(app, c.source.scale, "the source's units in metres");
   app.add_option("--format", c.to.format,
                  "of a folder's frames: ply or obj (default: the target's own, else ply)");
-  app.add_option("--device", c.device,
-                 "where extractor and motion network run: cpu, or cuda in a program built for it");
-  app.add_option("--samples", c.options.samples,
-                 "views of a cloud to average: choices of its points, turned and mirrored");
-  app.add_option("--anchor", c.options.anchor,
-                 "seconds in which the path goes back to the source's, scaled to the target's legs "
-                 "(0: never)");
-  app.add_option(
-      "--min-confidence", c.options.min_confidence,
-      "the target waits where the extractor is less sure than this, 0 to 1 (0: never), and "
-      "comes back within half a second");
-  app.add_flag("!--no-foot-lock", c.options.foot_lock,
-               "feet that stand are not held where they landed");
+  add_system_options(app, c);
   app.add_flag("--force", c.options.force,
                "accept a target that is no T-pose, what else the doctor calls wrong, and gaps of "
                "over a third of a second");

@@ -1,4 +1,4 @@
-// What the files of `restage retarget` share.
+// What the files of `restage retarget` share, and `restage stream` with them.
 #pragma once
 
 #include <functional>
@@ -19,6 +19,15 @@ struct RetargetCommand {
   RetargetOptions options;
   bool profile = false, from_surface = false;
 };
+
+/// The options of every command that makes a system: the target, the weights, how they are used.
+void add_target_options(CommandOptions app, RetargetCommand& c);
+void add_weights_options(CommandOptions app, RetargetCommand& c);
+void add_system_options(CommandOptions app, RetargetCommand& c);
+/// InputError naming an option that is out of range.
+void check_options(const RetargetOptions& options);
+/// The doctor's words on a target that would make the result nonsense, unless `force`.
+void check_mesh(const RetargetCommand& c, const TargetMesh& target);
 
 /// What the command's system is made from, but for its target: weights and options.
 SystemInput load_input(const RetargetCommand& c, const Common& common);

@@ -298,6 +298,7 @@ std::string page_html(const std::vector<Clip>& clips, const PageOptions& options
   }
   const bool any_errors = std::any_of(clips.begin(), clips.end(),
                                       [](const Clip& clip) { return !clip.errors.empty(); });
+  if (options.live) meta["live"] = true;
   meta["width"] = width;
   meta["height"] = height;
   meta["clips"] = std::move(list);

@@ -15,6 +15,9 @@ struct PageOptions {
   /// left out.
   size_t max_bytes = 30'000'000;
   size_t max_points = 2048;  ///< of a cloud, in a frame
+  /// The page shows the first frame, and then what its server sends (live/server.h): places of the
+  /// one clip's vertices, of which none may have been left out.
+  bool live = false;
 };
 
 /// The page as text. Positions are stored as 16-bit fractions of the clip's bounding box; for a

@@ -1,0 +1,212 @@
+#include "infer/live/input.h"
+
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <list>
+#include <vector>
+
+#include "autograd/base/error.h"
+
+namespace restage::live {
+namespace {
+
+constexpr size_t kChunk = 1 << 16;      // bytes that are read at once
+constexpr size_t kMostConnections = 8;  // that are open at once
+constexpr std::chrono::seconds kSilence{2};
+
+/// Says once that a sender is silent, when it has been for a while.
+class Silence {
+ public:
+  void heard() {
+    last_ = Clock::now();
+    said_ = false;
+  }
+  void check(bool in_frame, Words& words) {
+    if (said_ || Clock::now() - last_ < kSilence) return;
+    said_ = true;
+    words.warn("silence", std::string("the sender has been silent for two seconds") +
+                              (in_frame ? ", in the middle of a frame" : "") +
+                              "; the stream waits");
+  }
+
+ private:
+  Clock::time_point last_ = Clock::now();
+  bool said_ = false;
+};
+
+/// A sender's bytes as clouds.
+struct Sender {
+  int fd = -1;
+  int64_t number = 0;
+  FrameParser parser = {};
+  Silence silence = {};
+  bool whole = false;  ///< it has sent a frame
+
+  enum class State { open, ended, garbage };
+  /// Reads what is there.
+  State read(std::span<unsigned char> buffer, Mailbox& to, Words& words, const std::string& name);
+};
+
+Sender::State Sender::read(std::span<unsigned char> buffer, Mailbox& to, Words& words,
+                           const std::string& name) {
+  const ssize_t got = ::read(fd, buffer.data(), buffer.size());
+  if (got < 0 && (errno == EINTR || errno == EAGAIN)) return State::open;
+  if (got <= 0) {
+    const std::string how = got < 0             ? std::string("broke off: ") + std::strerror(errno)
+                            : parser.in_frame() ? "ended in the middle of a frame"
+                                                : "";
+    if (!how.empty()) words.warn("cut", name + " " + how);
+    return State::ended;
+  }
+  silence.heard();
+  const auto refuse = [&](const std::string& why) {
+    to.refuse();
+    words.warn("refused", "a frame of " + name + " was left out: " + why);
+  };
+  const auto deliver = [&](LiveCloud& cloud) {
+    whole = true;
+    cloud.sender = number;
+    cloud.name = name;
+    to.put(cloud);
+  };
+  const std::string garbage =
+      parser.take(buffer.first(static_cast<size_t>(got)), Clock::now(), deliver, refuse);
+  if (garbage.empty()) return State::open;
+  words.warn("garbage", name + " sends what is no frame: " + garbage);
+  return State::garbage;
+}
+
+/// Waits for any of them; false: it was told to stop.
+bool wait_for(std::vector<pollfd>& all) {
+  constexpr int kLongest = 250;  // milliseconds, so that silence is noticed
+  if (poll(all.data(), all.size(), kLongest) < 0)
+    for (pollfd& one : all) one.revents = 0;  // a signal
+  return all[0].revents == 0;
+}
+
+}  // namespace
+
+Reading::Reading(std::unique_ptr<CloudInput> input, Mailbox& to, Words& words)
+    : stop_(eventfd(0, EFD_CLOEXEC)), input_(std::move(input)) {
+  if (stop_ < 0) throw WorkError("cannot make an event descriptor");
+  thread_ = std::thread([this, &to, &words] {
+    try {
+      input_->run(stop_, to, words);
+    } catch (const std::exception& error) {
+      words.warn("reading", std::string("reading clouds has ended: ") + error.what());
+    }
+    to.close();
+  });
+}
+
+Reading::~Reading() {
+  const uint64_t one = 1;
+  if (write(stop_, &one, sizeof one) == sizeof one) thread_.join();
+  close(stop_);
+}
+
+void PipeInput::run(int stop, Mailbox& to, Words& words) {
+  std::vector<unsigned char> buffer(kChunk);
+  Sender sender{.fd = fd_, .number = 1};
+  std::vector<pollfd> all = {{stop, POLLIN, 0}, {fd_, POLLIN, 0}};
+  while (wait_for(all)) {
+    if (all[1].revents == 0)
+      sender.silence.check(sender.parser.in_frame(), words);
+    else if (sender.read(buffer, to, words, name_) != Sender::State::open)
+      return;
+  }
+}
+
+namespace {
+
+/// The connections of a socket; the last to have sent a whole frame is the one that counts.
+class Connections {
+ public:
+  Connections(int listener, Mailbox& to, Words& words)
+      : listener_(listener), to_(to), words_(words), buffer_(kChunk) {}
+  ~Connections() {
+    for (const Sender& s : open_) close(s.fd);
+  }
+  Connections(const Connections&) = delete;
+  Connections& operator=(const Connections&) = delete;
+
+  void run(int stop) {
+    std::vector<pollfd> all;
+    do {
+      all = {{stop, POLLIN, 0}, {listener_, POLLIN, 0}};
+      for (const Sender& s : open_) all.push_back({s.fd, POLLIN, 0});
+      if (!wait_for(all)) return;
+      auto one = open_.begin();
+      for (size_t k = 2; k < all.size(); ++k) one = serve(one, all[k].revents != 0);
+      if (counts_ != 0) close_others();
+      if (all[1].revents != 0) accept_one();
+    } while (true);
+  }
+
+ private:
+  std::list<Sender>::iterator serve(std::list<Sender>::iterator one, bool ready) {
+    if (!ready) {
+      one->silence.check(one->parser.in_frame(), words_);
+      return std::next(one);
+    }
+    const bool before = one->whole;
+    const auto state = one->read(buffer_, to_, words_, "sender " + std::to_string(one->number));
+    if (one->whole && !before) counts_ = one->number;
+    if (state == Sender::State::open) return std::next(one);
+    if (state == Sender::State::ended && !one->parser.in_frame())
+      words_.warn("ended", "sender " + std::to_string(one->number) +
+                               " has ended; the stream waits for the next");
+    close(one->fd);
+    return open_.erase(one);
+  }
+
+  /// A sender that has only now sent a whole frame takes the place of all others.
+  void close_others() {
+    for (auto one = open_.begin(); one != open_.end();) {
+      if (one->number == counts_ || !one->whole) {
+        ++one;
+        continue;
+      }
+      words_.warn("taken over", "sender " + std::to_string(counts_) +
+                                    " takes the place of sender " + std::to_string(one->number));
+      close(one->fd);
+      one = open_.erase(one);
+    }
+    counts_ = 0;
+  }
+
+  void accept_one() {
+    const int fd = accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    if (fd < 0) return;
+    if (open_.size() == kMostConnections) {  // those that never sent a frame go first
+      auto oldest =
+          std::find_if(open_.begin(), open_.end(), [](const Sender& s) { return !s.whole; });
+      if (oldest == open_.end()) oldest = open_.begin();
+      close(oldest->fd);
+      open_.erase(oldest);
+    }
+    open_.push_back({.fd = fd, .number = ++last_});
+  }
+
+  int listener_;
+  Mailbox& to_;
+  Words& words_;
+  std::vector<unsigned char> buffer_;
+  std::list<Sender> open_;
+  int64_t last_ = 0;    ///< number of the last sender
+  int64_t counts_ = 0;  ///< number of a sender whose first whole frame has just come; 0: none
+};
+
+}  // namespace
+
+void SocketInput::run(int stop, Mailbox& to, Words& words) {
+  Connections(listener_->fd(), to, words).run(stop);
+}
+
+}  // namespace restage::live

@@ -1,0 +1,63 @@
+// Where clouds come from. Reading runs on a thread of its own and puts every cloud into a mailbox.
+#pragma once
+
+#include <memory>
+#include <thread>
+
+#include "infer/live/frame_parser.h"
+#include "infer/live/place.h"
+#include "infer/live/words.h"
+
+namespace restage::live {
+
+class CloudInput {
+ public:
+  CloudInput() = default;
+  CloudInput(const CloudInput&) = delete;
+  CloudInput& operator=(const CloudInput&) = delete;
+  virtual ~CloudInput() = default;
+  /// Reads until the input ends, or until `stop`, a file descriptor, becomes readable. Trouble with
+  /// a sender ends neither.
+  virtual void run(int stop, Mailbox& to, Words& words) = 0;
+};
+
+/// Runs an input until it ends or this value does; then the mailbox is closed. The mailbox and the
+/// words must live longer.
+class Reading {
+ public:
+  Reading(std::unique_ptr<CloudInput> input, Mailbox& to, Words& words);
+  ~Reading();
+  Reading(const Reading&) = delete;
+  Reading& operator=(const Reading&) = delete;
+
+ private:
+  int stop_;
+  std::unique_ptr<CloudInput> input_;
+  std::thread thread_;
+};
+
+/// Frames (frame_parser.h) on a file descriptor, such as standard input, which is not closed. The
+/// input ends where the bytes do, or where they stop making sense.
+class PipeInput final : public CloudInput {
+ public:
+  PipeInput(int fd, std::string name) : fd_(fd), name_(std::move(name)) {}
+  void run(int stop, Mailbox& to, Words& words) override;
+
+ private:
+  int fd_;
+  std::string name_;
+};
+
+/// The same on a socket that listens. Anybody may connect at any time; the clouds that count are
+/// those of the connection that sent a whole frame last, all others are closed then. A sender that
+/// ends, vanishes or sends what makes no sense is told of, and the next one is waited for.
+class SocketInput final : public CloudInput {
+ public:
+  explicit SocketInput(std::unique_ptr<Listener> listener) : listener_(std::move(listener)) {}
+  void run(int stop, Mailbox& to, Words& words) override;
+
+ private:
+  std::unique_ptr<Listener> listener_;
+};
+
+}  // namespace restage::live

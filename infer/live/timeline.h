@@ -1,0 +1,46 @@
+// Where clouds lie on the grid of 30 moments a second that a system works on
+// (docs/design/stream.md).
+#pragma once
+
+#include <cstdint>
+
+namespace restage::live {
+
+/// Moments of the grid that a system may be told it has missed, a third of a second; after a longer
+/// gap it begins anew.
+inline constexpr int64_t kMostMissed = 10;
+
+/// What a cloud is to the sequence so far.
+struct Step {
+  enum class Kind {
+    next,   ///< it goes on, `missed` moments of the grid after the cloud before
+    early,  ///< newer than the last cloud, but of the same moment: unless another cloud comes in
+            ///< the next `wait` seconds, it is the next moment's (take_early())
+    late,   ///< not newer than the last cloud
+    anew    ///< a sequence begins with it
+  } kind;
+  int64_t missed = 0;
+  double wait = 0;
+};
+
+class Timeline {
+ public:
+  /// The next cloud, captured at `seconds` (finite) of the clock of `sender`. Each cloud belongs to
+  /// the nearest moment of the grid, and the grid follows the sender slowly: by a tenth of what the
+  /// cloud is off, unless clouds are more than the grid has moments. So neither trembling times
+  /// nor a rate that is not quite 30 cost clouds.
+  Step place(double seconds, int64_t sender);
+
+  /// The cloud that was early stands for the next moment.
+  void take_early();
+
+ private:
+  bool began_ = false;
+  int64_t sender_ = 0;
+  int64_t last_ = 0;      ///< the moment of the last cloud, from 0
+  double newest_ = 0;     ///< the sender's time of the last cloud that was placed
+  double zero_ = 0;       ///< the sender's time of moment 0
+  bool crowded_ = false;  ///< a cloud has come since that belongs to no later moment
+};
+
+}  // namespace restage::live

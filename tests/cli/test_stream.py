@@ -1,0 +1,423 @@
+"""restage stream: clouds on a socket, a pipe or in a folder in, VMC bundles and a page out. What arrives is read by this
+file's own few lines of OSC and WebSocket, joints are put together as a program that shows VRM characters does it, and
+compared with what `restage retarget` makes of the same clouds."""
+import base64
+import json
+import os
+import random
+import re
+import select
+import shutil
+import signal
+import socket
+import struct
+import subprocess
+import tempfile
+import time
+import unittest
+
+from support import CliTest, PROGRAM, ROOT
+from test_gltf import character
+
+LITE = os.path.join(ROOT, "experiments", "weights", "lite.safetensors")
+CHROMIUM = next((path for path in (os.environ.get("CHROMIUM"), "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome")
+                 if path and os.path.exists(path)), None)
+# Unity's names of the 22 joints, in our order, and whose child each is.
+BONES = """Hips LeftUpperLeg RightUpperLeg Spine LeftLowerLeg RightLowerLeg Chest LeftFoot RightFoot UpperChest LeftToes RightToes
+Neck LeftShoulder RightShoulder Head LeftUpperArm RightUpperArm LeftLowerArm RightLowerArm LeftHand RightHand""".split()
+PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19)
+
+
+def free_port(kind=socket.SOCK_STREAM):
+    with socket.socket(socket.AF_INET, kind) as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+def frame(seconds, points):
+    return struct.pack("<Id", len(points), seconds) + b"".join(struct.pack("<3f", *p) for p in points)
+
+
+# ---- OSC ----
+
+def osc_string(data, at):
+    end = data.index(b"\0", at)
+    return data[at:end].decode(), (end + 4) & ~3
+
+
+def osc_message(data):
+    path, at = osc_string(data, 0)
+    types, at = osc_string(data, at)
+    values = []
+    for kind in types[1:]:
+        if kind == "s":
+            value, at = osc_string(data, at)
+        else:
+            value, at = struct.unpack_from(">" + kind, data, at)[0], at + 4
+        values.append(value)
+    return path, types[1:], values
+
+
+def osc_bundle(data):
+    assert data[:8] == b"#bundle\0", data[:20]
+    out, at = [], 16
+    while at < len(data):
+        size = struct.unpack_from(">i", data, at)[0]
+        out.append(osc_message(data[at + 4:at + 4 + size]))
+        at += 4 + size
+    return out
+
+
+def times(q, v):
+    """The vector turned by a quaternion x, y, z, w."""
+    x, y, z, w = q
+    t = [2 * (y * v[2] - z * v[1]), 2 * (z * v[0] - x * v[2]), 2 * (x * v[1] - y * v[0])]
+    return [v[0] + w * t[0] + y * t[2] - z * t[1], v[1] + w * t[1] + z * t[0] - x * t[2], v[2] + w * t[2] + x * t[1] - y * t[0]]
+
+
+def product(a, b):
+    ax, ay, az, aw = a
+    bx, by, bz, bw = b
+    return (aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz)
+
+
+def joints_of(bundle):
+    """Where the 22 bones stand when each hangs in its parent, in our axes: Unity's x points the other way."""
+    bones = {v[0]: (v[1:4], v[4:]) for path, _, v in bundle if path == "/VMC/Ext/Bone/Pos"}
+    root = next(v for path, _, v in bundle if path == "/VMC/Ext/Root/Pos")
+    assert root[0] == "root", root
+    places, turns = [], []
+    for name, parent in zip(BONES, PARENTS):
+        p, q = bones[name]
+        at, turn = (root[1:4], root[4:]) if parent < 0 else (places[parent], turns[parent])
+        places.append([a + b for a, b in zip(at, times(turn, p))])
+        turns.append(product(turn, q))
+    return [(-x, y, z) for x, y, z in places]
+
+
+class Receiver:
+    """The program that shows the character."""
+
+    def __init__(self):
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", 0))
+        self.port = self.socket.getsockname()[1]
+
+    def next(self, seconds=10):
+        """The next bundle; None: none came."""
+        self.socket.settimeout(seconds)
+        try:
+            return osc_bundle(self.socket.recv(65536))
+        except socket.timeout:
+            return None
+
+    def all(self, seconds=0.5):
+        out = []
+        while (bundle := self.next(seconds)) is not None:
+            out.append(bundle)
+        return out
+
+
+class StreamTest(CliTest):
+    """Clouds of somebody who moves, and a target without a rig."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.made = tempfile.mkdtemp(prefix="restage-stream-")
+        cls.addClassCleanup(shutil.rmtree, cls.made, ignore_errors=True)
+        for call in (["data", "build", "--bodies", "1", "0", "1", "--motions", "1", "0", "0", "--out", "data.h5"],
+                     ["data", "perform", "--bodies", "data.h5", "--frames", "16", "--out", "walk"],
+                     ["retarget", "--source", "walk/source.h5", "--target", "walk/target.ply", "--weights", LITE, "--out", "posed/"]):
+            done = subprocess.run([PROGRAM, *call, "--quiet"], cwd=cls.made, capture_output=True, text=True)
+            assert done.returncode == 0, done.stderr
+        cls.target = os.path.join(cls.made, "walk", "target.ply")
+        r, cls.clouds = random.Random(1), []
+        for name in sorted(os.listdir(os.path.join(cls.made, "posed"))):
+            with open(os.path.join(cls.made, "posed", name), "rb") as f:
+                head, _, body = f.read().partition(b"end_header\n")
+            count = int(head.split(b"element vertex ")[1].split()[0])
+            cls.clouds.append(r.sample(list(struct.iter_unpack("<3f", body[:12 * count])), 1500))
+
+    def setUp(self):
+        super().setUp()
+        self.receiver = Receiver()
+        self.addCleanup(self.receiver.socket.close)
+
+    def stream(self, source, *more, target=None):
+        """The program, once it says that it is ready."""
+        command = [PROGRAM, "stream", "--target", target or self.target, "--in", source, "--vmc", "127.0.0.1:%d" % self.receiver.port,
+                   "--weights", LITE, "--json", *more]
+        process = subprocess.Popen(command, cwd=self.folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        for clean in (process.stderr.close, process.stdout.close, process.stdin.close, process.wait, process.kill):
+            self.addCleanup(clean)
+        line = b""
+        while not line.startswith(b"clouds come from"):
+            line = process.stderr.readline()
+            self.assertTrue(line, "the program has ended")
+        return process
+
+    def sender(self, port):
+        s = socket.create_connection(("127.0.0.1", port), timeout=10)
+        self.addCleanup(s.close)
+        return s
+
+    def answer(self, send, points, seconds):
+        """The bundle that follows a cloud."""
+        send(frame(seconds, points))
+        bundle = self.receiver.next()
+        self.assertIsNotNone(bundle, "no bundle came")
+        return bundle
+
+    def ended(self, process, code=0):
+        """The one document, and what was said."""
+        out, err = process.communicate(timeout=30)
+        self.assertEqual(process.returncode, code, err)
+        document = json.loads(out)
+        self.assertEqual(document["frames_in"], document["frames_out"] + document["dropped"])
+        return document, err.decode()
+
+    def interrupted(self, process):
+        process.send_signal(signal.SIGINT)
+        return self.ended(process, 130)
+
+    def check_same(self, bundles, target):
+        """The joints that were put together are those of `retarget`, to a tenth of a millimetre."""
+        for k, points in enumerate(self.clouds):
+            self.ply("scans/f%02d.ply" % k, points)
+        self.done("retarget", "--source", "scans", "--target", target, "--weights", LITE, "--out", "truth.h5")
+        values = [x for bundle in bundles for joint in joints_of(bundle) for x in joint]
+        self.h5("mine.h5", joints=([len(bundles), 22, 3], values))
+        self.assertLess(self.json("eval", "--pred", "mine.h5", "--truth", "truth.h5")["mean"]["mpjpe"], 1e-4)
+
+
+class Streams(StreamTest):
+    def test_socket_and_the_same_joints_as_retarget(self):
+        port = free_port()
+        process = self.stream("tcp://127.0.0.1:%d" % port)
+        sender = self.sender(port)
+        bundles = [self.answer(sender.sendall, points, 100 + k / 30) for k, points in enumerate(self.clouds)]
+        self.check_same(bundles, self.target)
+        messages = {}
+        for path, types, _ in bundles[-1]:
+            messages.setdefault(path, []).append(types)
+        self.assertEqual({path: (len(types), set(types)) for path, types in messages.items()},
+                         {"/VMC/Ext/OK": (1, {"i"}), "/VMC/Ext/T": (1, {"f"}), "/VMC/Ext/Root/Pos": (1, {"sfffffff"}),
+                          "/VMC/Ext/Bone/Pos": (22, {"sfffffff"})})
+        document, _ = self.interrupted(process)
+        self.assertEqual((document["frames_in"], document["frames_out"]), (16, 16))
+        latency = document["latency_ms"]
+        self.assertTrue(0 < latency["p50"] <= latency["p99"] <= latency["max"], latency)
+
+    def test_a_rigged_target_moves_by_its_own_bones(self):
+        character(self.path("hero.glb"))
+        process = self.stream("-", target="hero.glb")
+
+        def send(data):
+            process.stdin.write(data)
+            process.stdin.flush()
+        bundles = [self.answer(send, points, k / 30) for k, points in enumerate(self.clouds)]
+        self.check_same(bundles, "hero.glb")
+        send(frame(1, self.clouds[0])[:500])
+        process.stdin.close()
+        process.stdin = None
+        document, err = self.ended(process)
+        self.assertEqual((document["frames_in"], document["frames_out"]), (16, 16))
+        self.assertIn("standard input ended in the middle of a frame", err)
+
+    def test_a_pipe_of_nothing_or_garbage_ends_in_order(self):
+        for data, words in ((b"", "no frame came"), (b"ply\nformat ascii 1.0\n" * 9, "standard input sends what is no frame")):
+            process = self.stream("-")
+            out, err = process.communicate(data, timeout=30)
+            self.assertEqual(process.returncode, 0, err)
+            self.assertEqual(json.loads(out)["frames_in"], 0)
+            self.assertIn(words, err.decode())
+
+    def test_folder(self):
+        os.mkdir(self.path("in"))
+        self.ply("in/frame_9.ply", self.clouds[0])
+        self.ply("in/frame_10.ply", self.clouds[1])
+        process = self.stream("in", "--seconds", "6")
+        self.assertIsNotNone(self.receiver.next())
+        for k in range(2, 6):  # renamed into the folder
+            self.ply("part.ply", self.clouds[k])
+            os.rename(self.path("part.ply"), self.path("in/frame_%d.ply" % (9 + k)))
+            self.assertIsNotNone(self.receiver.next())
+        whole = self.bytes("in/frame_12.ply")
+        with open(self.path("in/frame_20.ply"), "wb") as f:  # written slowly
+            f.write(whole[:len(whole) // 2])
+            f.flush()
+            self.assertIsNone(self.receiver.next(0.3))
+            f.write(whole[len(whole) // 2:])
+        self.assertIsNotNone(self.receiver.next())
+        self.write("in/frame_21.ply", whole[:len(whole) // 2])  # never whole
+        self.write("in/notes.md", "no cloud")
+        document, err = self.ended(process)
+        self.assertEqual((document["frames_in"], document["frames_out"]), (8, 6))
+        self.assertEqual((document["dropped_because"]["overtaken"], document["dropped_because"]["unusable"]), (1, 1))
+        self.assertIn("frame_21.ply", err)
+
+    def test_newest_wins(self):
+        port = free_port()
+        process = self.stream("tcp://127.0.0.1:%d" % port)
+        sender = self.sender(port)
+        burst = b"".join(frame(k / 30, self.clouds[k % 16]) for k in range(600))
+        sender.sendall(burst)
+        self.receiver.all()
+        document, _ = self.interrupted(process)
+        self.assertEqual(document["frames_in"], 600)
+        self.assertGreater(document["dropped_because"]["overtaken"], 100)
+        self.assertGreater(document["frames_out"], 0)
+
+    def test_senders_that_stall_send_garbage_or_vanish(self):
+        port = free_port()
+        process = self.stream("tcp://127.0.0.1:%d" % port)
+        nan = float("nan")
+        first = self.sender(port)
+        self.answer(first.sendall, self.clouds[0], 0)
+        self.answer(first.sendall, self.clouds[1] + [(nan, 0, 0)], 1 / 30)  # a point that is none is left out
+        first.sendall(frame(nan, self.clouds[2]))  # a time that is none
+        for k, points in ((2, self.clouds[2][:10]), (3, [])):  # too few points
+            first.sendall(frame(k / 30, points))
+            self.assertIsNone(self.receiver.next(0.3))
+        self.answer(first.sendall, self.clouds[3], 4 / 30)
+        first.sendall(frame(5 / 30, self.clouds[4])[:700])  # stalls
+        second = self.sender(port)
+        second.sendall(b"\xff" * 100)  # garbage
+        self.assertEqual(second.recv(1), b"")
+        third = self.sender(port)  # the stalled one is replaced
+        self.answer(third.sendall, self.clouds[0], 50)
+        third.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        third.close()  # vanishes
+        last = self.sender(port)
+        self.answer(last.sendall, self.clouds[1], 3)
+        time.sleep(2.5)  # silence
+        document, err = self.interrupted(process)
+        for words in ("4294967295 points", "its time is not a finite number", "a cloud was left out", "silent for two seconds",
+                      "takes the place of sender"):
+            self.assertIn(words, err)
+        self.assertEqual((document["frames_in"], document["frames_out"], document["dropped_because"]["unusable"]), (8, 5, 3))
+        self.assertEqual((document["restarts"], document["points_left_out"]), (2, 1))
+
+    def test_clocks_that_jump_stand_or_go_back(self):
+        port = free_port()
+        process = self.stream("tcp://127.0.0.1:%d" % port)
+        send = self.sender(port).sendall
+        for seconds in (0, 1 / 30, 5 / 30, 1e6, 1e6 + 1 / 30, 10, 10 + 1 / 30):  # a gap, a leap, back by days
+            self.answer(send, self.clouds[0], seconds)
+        for _ in range(12):
+            send(frame(10, self.clouds[0]))
+            time.sleep(0.05)
+        self.assertIsNone(self.receiver.next(0.2))
+        document, err = self.interrupted(process)
+        self.assertEqual((document["frames_out"], document["restarts"]), (7, 2))
+        self.assertGreater(document["dropped_because"]["late"], 9)
+        self.assertIn("do not go on", err)
+
+    def test_the_page_and_its_frames(self):
+        port, page = free_port(), free_port()
+        process = self.stream("tcp://127.0.0.1:%d" % port, "--ws", str(page))
+
+        def ask(path, *more):
+            s = self.sender(page)
+            lines = ["GET %s HTTP/1.1" % path, "Host: 127.0.0.1:%d" % page, *more]
+            s.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
+            return s
+
+        def read(s, seconds=3):
+            data = b""
+            while select.select([s], [], [], seconds)[0]:
+                piece = s.recv(1 << 20)
+                data += piece
+                if not piece or data.endswith(b"</html>\n"):
+                    break
+            return data
+        text = read(ask("/"))
+        self.assertIn(b" 200 ", text.split(b"\r\n")[0])
+        self.assertIn(b'"live":true', text)
+        self.assertTrue(text.endswith(b"</html>\n"))
+        self.assertIn(b" 404 ", read(ask("/etc/passwd"), 1).split(b"\r\n")[0])
+        upgrade = ["Connection: Upgrade", "Upgrade: websocket", "Sec-WebSocket-Version: 13",
+                   "Sec-WebSocket-Key: " + base64.b64encode(b"0123456789abcdef").decode()]
+        self.assertNotIn(b" 101 ", read(ask("/", *upgrade, "Origin: http://elsewhere.example"), 1))
+        web = ask("/", *upgrade, "Origin: http://127.0.0.1:%d" % page)
+        self.answer(self.sender(port).sendall, self.clouds[0], 0)
+        head, _, message = read(web, 1).partition(b"\r\n\r\n")
+        self.assertIn(b" 101 ", head)
+        self.assertEqual(message[0], 0x82)  # whole and binary
+        at, size = (4, struct.unpack_from(">H", message, 2)[0]) if message[1] == 126 else (10, struct.unpack_from(">Q", message, 2)[0])
+        count = struct.unpack_from("<I", message, at + 12)[0]
+        self.assertEqual((size, len(message) - at), (16 + 12 * count, size))
+        with open(self.target, "rb") as f:
+            self.assertIn(b"element vertex %d\n" % count, f.read(1000))
+        heights = struct.unpack_from("<%df" % (3 * count), message, at + 16)[1::3]
+        self.assertTrue(1 < max(heights) - min(heights) < 2.5)
+        self.interrupted(process)
+
+    @unittest.skipUnless(CHROMIUM, "no Chromium found (set CHROMIUM)")
+    def test_the_page_plays_in_a_browser(self):
+        port, page = free_port(), free_port()
+        process = self.stream("tcp://127.0.0.1:%d" % port, "--ws", str(page))
+        browser = subprocess.Popen([CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--use-angle=swiftshader",
+                                    "--enable-unsafe-swiftshader", "--virtual-time-budget=20000", "--user-data-dir=" + self.path("profile"), "--dump-dom",
+                                    "http://127.0.0.1:%d/" % page], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+        self.addCleanup(browser.stdout.close)
+        self.addCleanup(browser.wait)
+        self.addCleanup(browser.kill)
+        send, k = self.sender(port).sendall, 0
+        while browser.poll() is None and k < 1200:
+            send(frame(k / 30, self.clouds[k % 16]))
+            time.sleep(1 / 30)
+            k += 1
+        dom = browser.stdout.read().decode()
+        self.assertIn('data-renderer="', dom)
+        came, drawn = re.search(r'<html[^>]* data-live="(\d+)"', dom), re.search(r"s, frame (\d+)</output>", dom)
+        self.assertGreater(int(came[1]), 0)
+        self.assertTrue(drawn and int(drawn[1]) > 0)
+        self.interrupted(process)
+
+    def test_ends_after_so_many_seconds(self):
+        start = time.monotonic()
+        document = json.loads(self.done("stream", "--target", self.target, "--in", "tcp://127.0.0.1:%d" % free_port(), "--vmc",
+                                        "127.0.0.1:%d" % self.receiver.port, "--weights", LITE, "--seconds", "0.5", "--json"))
+        self.assertLess(time.monotonic() - start, 20)
+        self.assertEqual(document["latency_ms"], {"p50": None, "p99": None, "max": None})
+        self.assertEqual(document["frames_in"], 0)
+
+    def test_bad_input_is_one_line(self):
+        os.mkdir(self.path("in"))
+        self.write("file", "x")
+        good = {"--target": self.target, "--in": "in", "--vmc": "127.0.0.1:%d" % self.receiver.port, "--weights": LITE}
+
+        def call(**other):
+            options = {**good, **{"--" + key: value for key, value in other.items()}}
+            return ["stream", *(word for pair in options.items() for word in pair)]
+        for port in ("0", "65536", "x", "", "127.0.0.1", "127.0.0.1:", "127.0.0.1:-1", "127.0.0.1:1x"):
+            self.bad_input(call(vmc=port), "--vmc", "port")
+            self.bad_input(call(ws=port or ":"), "--ws", "port")
+            self.bad_input(call(**{"in": "tcp://" + port}), "--in", "port")
+        self.bad_input(call(vmc="no.such.host.invalid:39539"), "--vmc", "no.such.host.invalid")
+        self.bad_input(call(**{"in": "tcp://192.0.2.1:9000"}), "--in", "192.0.2.1")  # no address of this machine
+        self.bad_input(call(**{"in": "nowhere"}), "nowhere", "no such folder")
+        self.bad_input(call(**{"in": "file"}), "file", "no folder")
+        self.bad_input(call(**{"in": "udp://127.0.0.1:1"}), "--in", "udp://")
+        self.bad_input(call(target="nobody.ply"), "nobody.ply")
+        self.bad_input(call(weights="nothing.safetensors"), "nothing.safetensors")
+        self.bad_input(call(seconds="0"), "--seconds")
+        self.bad_input(call(scale="0"), "--scale")
+        self.bad_input(call(samples="0"), "--samples")
+        self.bad_input(call(**{"source-up": "w"}), "--source-up")
+        self.bad_input(call(**{"min-confidence": "0.5"}), "do not say how sure")  # of these weights
+        self.ply("dot.ply", [(0, 0, 0)] * 3)
+        self.bad_input(call(target="dot.ply"), "dot.ply")
+        with socket.socket() as busy:
+            busy.bind(("127.0.0.1", 0))
+            busy.listen()
+            port = busy.getsockname()[1]
+            self.bad_input(call(**{"in": "tcp://127.0.0.1:%d" % port}), "--in", "in use")
+            self.bad_input(call(ws=str(port)), "--ws", "in use")
+            self.bad_input(call(**{"in": "tcp://127.0.0.1:%d" % port, "ws": str(port)}), "same port")
+
+
+if __name__ == "__main__":
+    unittest.main()
