@@ -144,22 +144,6 @@ Points picked(const Clip& clip, const PageSurface& surface, size_t frame, size_t
   return out;
 }
 
-/// The middle of each frame, averaged with the middles of a quarter of a second before and after:
-/// the camera follows them calmly.
-std::vector<Point> calm_centres(const std::vector<Points>& frames, double fps) {
-  std::vector<Point> centres, calm;
-  for (const Points& points : frames) centres.push_back(clip_centre(points));
-  const auto reach = static_cast<std::ptrdiff_t>(std::lround(std::min(fps, 240.0) / 4));
-  const auto count = static_cast<std::ptrdiff_t>(centres.size());
-  for (std::ptrdiff_t f = 0; f < count; ++f) {
-    const std::ptrdiff_t side = std::min({reach, f, count - 1 - f});
-    Point sum = Point::Zero();
-    for (std::ptrdiff_t k = f - side; k <= f + side; ++k) sum += centres[k];
-    calm.push_back(sum / static_cast<float>(2 * side + 1));
-  }
-  return calm;
-}
-
 Json numbers(const Point& p) {
   Json list = Json::array();
   for (int k = 0; k < 3; ++k) list.push_back(std::round(double{p[k]} * 1e4) / 1e4);
@@ -213,8 +197,9 @@ Packed pack(const Clip& clip, const PageSurface& surface, const Plan& plan, size
   const Eigen::Vector3d step = ((high - low).cast<double>() / 65535.0).cwiseMax(1e-9);
   Packed packed;
   const float floor = clip_floor(clip);
-  const std::vector<Point> centres =
-      calm_centres(frames, options.fps / static_cast<double>(plan.stride));
+  std::vector<Point> centres;
+  for (const Points& points : frames) centres.push_back(clip_centre(points));
+  centres = calm_centres(centres, options.fps / static_cast<double>(plan.stride));
   std::vector<uint16_t> data;
   Json counts = Json::array(), middles = Json::array();
   size_t most = 1;
