@@ -63,7 +63,15 @@ std::vector<Landmark> landmarks(const Joints& joints, const std::string& look) {
   return out;
 }
 
+/// Where hips and shoulders face, degrees from +z to +x.
+double facing(const Joints& joints) {
+  const Vec3 left =
+      joints[kLeftHip] - joints[kRightHip] + joints[kLeftShoulder] - joints[kRightShoulder];
+  return std::hypot(left.x(), left.z()) > 1e-6 ? std::atan2(-left.z(), left.x()) * 180 / M_PI : 0;
+}
+
 void look_at(View& view, const std::vector<Joints>& joints, const ViewRequest& request) {
+  if (request.single && joints.size() == 1) view.facing = facing(joints[0]);
   if (request.look.empty()) return;
   if (joints.size() != view.clip.frames.size())
     throw InputError(request.path, "does not say where its " + request.look + " is",
@@ -207,7 +215,7 @@ View view_frames(const ViewRequest& request, std::vector<Joints>& joints) {
                          .scale = request.scale,
                          .up = request.up},
                         "", request.max_memory, view.remarks);
-  if (request.look.empty() || !has_joints(request.path)) return view;
+  if (!has_joints(request.path)) return view;
   joints.resize(view.clip.frames.size());
   for (size_t j = 0; j < kJoints; ++j) {
     const std::vector<Point> places = read_focus(request.path, j, request.sequence);

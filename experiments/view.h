@@ -34,6 +34,7 @@ struct View {
   Clip clip;
   std::string animation;  ///< its name; empty: none
   double close_up = 0;    ///< FilmOptions::close_up
+  double facing = 0;      ///< of one frame: degrees that the person is turned from +z to +x
   Remarks remarks;
 };
 

@@ -3,11 +3,10 @@
 #include "datasets/readers/gltf_look.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <optional>
-#include <tuple>
 
 #include "autograd/base/atomic_file.h"
 #include "datasets/readers/errors.h"
@@ -253,18 +252,24 @@ class LookReader {
     read_morphs(run);
   }
 
-  /// Vertices at one place, with one normal, are one point of a smooth surface.
+  /// Vertices at one place, with about one normal, are one point of a smooth surface.
   void join(const gltf::Runs::Vertices& run, const std::vector<float>& normals) {
-    using Key = std::tuple<float, float, float, int, int, int>;
-    std::map<Key, int32_t> known;
-    for (size_t v = 0; v < run.count; ++v) {
-      const Point& p = out_.file.vertices[run.first + v];
-      std::array<int, 3> n{};
-      for (size_t k = 0; k < 3 && !normals.empty(); ++k)
-        n[k] = static_cast<int>(std::lround(50 * std::clamp(normals[3 * v + k], -1.0f, 1.0f)));
-      const auto number = static_cast<int32_t>(run.first + v);
-      out_.look.smooth.push_back(
-          known.try_emplace({p.x(), p.y(), p.z(), n[0], n[1], n[2]}, number).first->second);
+    constexpr float kSameSide = 0.8f;  // cosine: edges that are meant to be sharp are sharper
+    const auto normal = [&](int32_t v) -> Point {
+      return normals.empty() ? Point(0, 0, 0)
+                             : Point(Eigen::Map<const Point>(&normals[3 * (v - run.first)]));
+    };
+    std::map<std::array<float, 3>, std::vector<int32_t>> known;  // per place: its smooth points
+    for (size_t v = run.first; v < run.first + run.count; ++v) {
+      const Point& p = out_.file.vertices[v];
+      std::vector<int32_t>& here = known[{p.x(), p.y(), p.z()}];
+      const auto number = static_cast<int32_t>(v);
+      const auto same = std::find_if(here.begin(), here.end(), [&](int32_t other) {
+        return normals.empty() || normal(other).dot(normal(number)) > kSameSide;
+      });
+      out_.look.smooth.push_back(same == here.end() ? number : *same);
+      // A file may put all its vertices into one place.
+      if (same == here.end() && here.size() < 16) here.push_back(number);
     }
   }
 

@@ -119,7 +119,7 @@ FilmOptions film_options(const ViewOptions& o, const View& view, ViewKind kind) 
   out.height = kind == ViewKind::picture ? kPictureHeight : kAnimationHeight;
   if (!o.size.empty()) std::tie(out.width, out.height) = parse_size(o.size);
   if (!o.background.empty()) out.background = parse_colour(o.background);
-  out.azimuth = azimuth_of(o.from);
+  out.azimuth = view.facing + azimuth_of(o.from);
   out.zoom = o.zoom.value_or(1);
   out.close_up = view.close_up;
   return out;
