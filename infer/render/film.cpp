@@ -15,8 +15,6 @@ namespace {
 constexpr size_t kTogether = 8;             // frames that are drawn at a time, at most
 constexpr int64_t kMostSamples = 24 << 20;  // of them all, so that they take below a gigabyte
 
-float radians(double degrees) { return static_cast<float>(degrees * std::numbers::pi / 180); }
-
 /// A ground and a grid that can be told from the background, whether that is bright or dark.
 SceneStyle style_on(const Rgb& background) {
   SceneStyle out;
