@@ -17,7 +17,7 @@ namespace {
 constexpr int64_t kMostFrames = 36'000;  // twenty minutes at 30 frames per second
 
 /// Which frames of `total` are shown, of a file at `rate` frames per second.
-std::vector<int64_t> chosen(const ViewRequest& request, int64_t total, double rate) {
+std::vector<int64_t> chosen(const ShowRequest& request, int64_t total, double rate) {
   const std::string& path = request.path;
   if (request.single) {
     const double last = static_cast<double>(total - 1);
@@ -70,7 +70,7 @@ double facing(const Joints& joints) {
   return std::hypot(left.x(), left.z()) > 1e-6 ? std::atan2(-left.z(), left.x()) * 180 / M_PI : 0;
 }
 
-void look_at(View& view, const std::vector<Joints>& joints, const ViewRequest& request) {
+void look_at(Showing& view, const std::vector<Joints>& joints, const ShowRequest& request) {
   if (request.single && joints.size() == 1) view.facing = facing(joints[0]);
   if (request.look.empty()) return;
   if (joints.size() != view.clip.frames.size())
@@ -87,7 +87,7 @@ void look_at(View& view, const std::vector<Joints>& joints, const ViewRequest& r
 }
 
 /// What is no person's size is drawn at a person's: light, ground and camera are made for that.
-void fit(View& view, std::vector<Joints>& joints) {
+void fit(Showing& view, std::vector<Joints>& joints) {
   Box box;
   for (const Point& p : std::as_const(view.clip).frames[0])
     if (p.allFinite()) box.extend(p);
@@ -142,7 +142,7 @@ std::vector<int> bones_of(const Gltf& file) {
   return out;
 }
 
-View view_gltf(const ViewRequest& request) {
+Showing view_gltf(const ShowRequest& request) {
   GltfLook look = read_gltf_look(request.path);
   const Gltf& file = look.file;
   const GltfClip* clip = clip_of(look, request.clip);
@@ -152,7 +152,7 @@ View view_gltf(const ViewRequest& request) {
     throw InputError(request.path, "holds neither a mesh nor bones: there is nothing to draw",
                      "export the character with its mesh");
   const std::optional<GltfRig> rig = rig_of(file, request.bones);
-  View view;
+  Showing view;
   view.clip.fps = request.fps.value_or(kFps);
   int64_t total = 1;
   if (clip != nullptr) {
@@ -190,14 +190,14 @@ View view_gltf(const ViewRequest& request) {
 // ---- everything else
 // -----------------------------------------------------------------------------
 
-View view_take(const ViewRequest& request, std::vector<Joints>& joints) {
+Showing view_take(const ShowRequest& request, std::vector<Joints>& joints) {
   MotionOptions options;
   options.force = true;
   options.profile = request.bones;
   if (request.scale != 1) options.scale = request.scale;
   if (request.up != "y") options.rest.up = parse_axis(request.up, "--up");
   const SkeletonTake take = read_take(request.path, options, request.clip);
-  View view;
+  Showing view;
   view.animation = take.name;
   for (const PosedSkeleton& frame : take.frames) {
     view.clip.frames.push_back(stick_figure(frame.joints));
@@ -206,10 +206,10 @@ View view_take(const ViewRequest& request, std::vector<Joints>& joints) {
   return view;
 }
 
-View view_frames(const ViewRequest& request, std::vector<Joints>& joints) {
+Showing view_frames(const ShowRequest& request, std::vector<Joints>& joints) {
   if (!request.clip.empty())
     throw InputError(request.path, "has no clips by name", "leave --clip out");
-  View view;
+  Showing view;
   view.clip = read_clip({.path = request.path,
                          .sequence = request.sequence,
                          .scale = request.scale,
@@ -225,10 +225,10 @@ View view_frames(const ViewRequest& request, std::vector<Joints>& joints) {
   return view;
 }
 
-View view_others(const ViewRequest& request) {
+Showing view_others(const ShowRequest& request) {
   std::vector<Joints> joints, kept;
-  View view = holds_take(request.path, request.bones) ? view_take(request, joints)
-                                                      : view_frames(request, joints);
+  Showing view = holds_take(request.path, request.bones) ? view_take(request, joints)
+                                                         : view_frames(request, joints);
   Clip& all = view.clip;
   const double rate = request.fps.value_or(all.fps);
   const auto total = static_cast<int64_t>(std::floor(
@@ -252,7 +252,7 @@ View view_others(const ViewRequest& request) {
 
 }  // namespace
 
-View read_view(const ViewRequest& request) {
+Showing read_showing(const ShowRequest& request) {
   return is_gltf_name(request.path) ? view_gltf(request) : view_others(request);
 }
 

@@ -10,7 +10,7 @@
 namespace restage {
 
 /// What of a file is shown.
-struct ViewRequest {
+struct ShowRequest {
   std::string path;
   std::string clip;   ///< of a glTF file; empty: the last that Restage wrote, else the first
   std::string bones;  ///< as MotionOptions::profile
@@ -28,7 +28,7 @@ struct ViewRequest {
   uint64_t max_memory = 0;
 };
 
-struct View {
+struct Showing {
   /// In metres, y up; characters whose bones are known face +z at rest. What is far from a
   /// person's size is drawn at a person's. `focus` is set where a part is looked at.
   Clip clip;
@@ -40,6 +40,6 @@ struct View {
 
 /// InputError: the readers' own; a clip, frame or time that is not there; nothing to draw; a part
 /// to look at of a file whose joints are not known.
-View read_view(const ViewRequest& request);
+Showing read_showing(const ShowRequest& request);
 
 }  // namespace restage

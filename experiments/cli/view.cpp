@@ -31,7 +31,7 @@ constexpr int kPictureHeight = 720, kAnimationHeight = 480, kLeastSide = 16, kMo
 constexpr double kUsualGifFps = 15;
 
 struct ViewOptions {
-  ViewRequest request;
+  ShowRequest request;
   std::string out, size, from = "three-quarter", background;
   std::optional<double> fps, zoom;
   std::optional<int64_t> every;
@@ -87,7 +87,7 @@ void check(const ViewOptions& o, ViewKind kind) {
   const auto refuse_if = [](bool given, const char* name, const char* where) {
     if (given) throw InputError("", std::string(name) + " " + where, "leave it out");
   };
-  const ViewRequest& r = o.request;
+  const ShowRequest& r = o.request;
   const char* page = "is for pictures: a page is turned and zoomed by hand";
   if (kind == ViewKind::page) {
     refuse_if(!o.size.empty(), "--size", page);
@@ -114,7 +114,7 @@ void check(const ViewOptions& o, ViewKind kind) {
     throw InputError("", "--scale is out of range", "give metres per unit, 1e-9 to 1e6");
 }
 
-FilmOptions film_options(const ViewOptions& o, const View& view, ViewKind kind) {
+FilmOptions film_options(const ViewOptions& o, const Showing& view, ViewKind kind) {
   FilmOptions out;
   out.height = kind == ViewKind::picture ? kPictureHeight : kAnimationHeight;
   if (!o.size.empty()) std::tie(out.width, out.height) = parse_size(o.size);
@@ -205,7 +205,7 @@ int run_view(const ViewOptions& given, const Common& common) {
   o.request.max_memory = common.max_memory;
   o.request.fps = o.fps;
   if (!o.fps && kind == ViewKind::gif && !o.every) o.request.fps = kUsualGifFps;
-  View view = read_view(o.request);
+  Showing view = read_showing(o.request);
   if (kind == ViewKind::gif && view.clip.fps > kGifFps)
     throw InputError(o.request.path,
                      format("has %g frames per second, more than GIF can show", view.clip.fps),
@@ -253,7 +253,7 @@ void add_view(Program& program) {
       "restage view walk.bvh --every 2 --out walk.webp\n"
       "restage view result.h5 --out page.html",
       run_view);
-  ViewRequest& r = options.request;
+  ShowRequest& r = options.request;
   app.add_option(
          "FILE", r.path,
          "glTF (.glb, .gltf, .vrm, .vrma), BVH, AMC, a result or scans (HDF5), PLY, OBJ, or "
