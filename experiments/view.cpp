@@ -126,7 +126,7 @@ std::optional<GltfRig> rig_of(const Gltf& file, const std::string& bones) {
   }
 }
 
-/// Lines between nodes that move, and what hangs on them.
+/// Lines between nodes that move, and what hangs on them; without these, between all nodes.
 std::vector<int> bones_of(const Gltf& file) {
   std::vector<bool> moves(file.nodes.size());
   for (const GltfClip& clip : file.clips)
@@ -139,6 +139,8 @@ std::vector<int> bones_of(const Gltf& file) {
     moves[n] = moves[n] || hangs;
     out.push_back(hangs ? parent : -1);
   }
+  if (std::all_of(out.begin(), out.end(), [](int parent) { return parent < 0; }))
+    for (size_t n = 0; n < out.size(); ++n) out[n] = file.nodes[n].parent;
   return out;
 }
 
