@@ -387,11 +387,14 @@ class LookReader {
 
 }  // namespace
 
-GltfLook read_gltf_look(const std::string& path) {
-  const std::string content = read_file(path);
+GltfLook parse_gltf_look(std::string_view content, const std::string& path) {
   const Document document = gltf::parse_document(content, path, true);
   Allowance allowance(document.payload, path);
   return LookReader(document, allowance).read();
+}
+
+GltfLook read_gltf_look(const std::string& path) {
+  return parse_gltf_look(read_file(path), path);
 }
 
 }  // namespace restage

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "datasets/readers/gltf.h"
@@ -41,6 +42,8 @@ struct GltfLook {
 /// InputError: as read_gltf(). What concerns looks alone is never an error: a texture coordinate, a
 /// colour or a picture that cannot be read is left out, with a remark in `file.remarks`.
 GltfLook read_gltf_look(const std::string& path);
+/// The same from memory, as parse_gltf().
+GltfLook parse_gltf_look(std::string_view content, const std::string& path);
 
 /// The surface at a time of a clip, or at rest (null). `nodes`: gltf_pose() or gltf_rest().
 Mesh gltf_look_mesh(const GltfLook& look, const GltfTransforms& nodes, const GltfClip* clip,

@@ -26,7 +26,7 @@
 namespace restage {
 namespace {
 
-constexpr int kMostSide = 16384, kKeptSide = 2048;
+constexpr int kLongest = 16384;  // pixels along a side of a file
 constexpr int64_t kMostPixels = int64_t{64} << 20;
 
 struct Decoded {
@@ -38,7 +38,7 @@ struct Decoded {
 bool is_size(int width, int height, Decoded& out) {
   out.width = width;
   out.height = height;
-  if (width > 0 && height > 0 && width <= kMostSide && height <= kMostSide &&
+  if (width > 0 && height > 0 && width <= kLongest && height <= kLongest &&
       int64_t{width} * height <= kMostPixels)
     return true;
   out.fault = format("it has %d x %d pixels", width, height);
@@ -98,16 +98,17 @@ const std::array<float, 256>& light_of_bytes() {
 
 }  // namespace
 
-std::optional<TexturePicture> TexturePicture::decode(std::string_view bytes, std::string* why) {
+std::optional<TexturePicture> TexturePicture::decode(std::string_view bytes, std::string* why,
+                                                     int side) {
   Decoded picture = decoded(bytes);
   *why = picture.fault;
   if (!picture.fault.empty()) return std::nullopt;
-  return TexturePicture(picture.width, picture.height, std::move(picture.rgba));
+  return TexturePicture(picture.width, picture.height, std::move(picture.rgba), side);
 }
 
-TexturePicture::TexturePicture(int width, int height, std::vector<uint8_t> rgba) {
+TexturePicture::TexturePicture(int width, int height, std::vector<uint8_t> rgba, int side) {
   Level level{width, height, std::move(rgba)};
-  while (std::max(level.width, level.height) > kKeptSide) level = halved(level);
+  while (std::max(level.width, level.height) > side) level = halved(level);
   levels_.push_back(std::move(level));
   while (levels_.back().width > 1 || levels_.back().height > 1)
     levels_.push_back(halved(levels_.back()));
@@ -187,14 +188,22 @@ Rgba TexturePicture::at(const Texture& how, const Uv& at, float texels) const {
 
 std::vector<std::optional<TexturePicture>> decode_pictures(const Appearance& look,
                                                            std::vector<std::string>& remarks) {
+  constexpr size_t kMostPictures = 1024;
+  int side = TexturePicture::kMostSide;
+  for (size_t room = 16; room < look.pictures.size() && side > 256; room *= 4) side /= 2;
   std::vector<std::optional<TexturePicture>> out;
   for (const PictureFile& file : look.pictures) {
     std::string why;
-    out.push_back(TexturePicture::decode(file.bytes, &why));
+    out.push_back(TexturePicture::decode(file.bytes, &why, side));
     // What has no bytes was spoken of by whoever read the file.
     if (!out.back() && !file.bytes.empty())
       remarks.push_back("the picture '" + file.name + "' is not drawn: " + why);
+    if (out.size() == kMostPictures) break;
   }
+  if (out.size() < look.pictures.size())
+    remarks.push_back(
+        format("only %zu of %zu pictures are drawn", out.size(), look.pictures.size()));
+  out.resize(look.pictures.size());
   return out;
 }
 

@@ -15,11 +15,13 @@ namespace restage {
 /// without flicker.
 class TexturePicture {
  public:
-  /// PNG, JPEG or WebP of at most 16,384 x 16,384 and 64 million pixels; kept with at most 2,048 on
-  /// each side. Nothing if it cannot be decoded, and then `why` says why not.
-  static std::optional<TexturePicture> decode(std::string_view bytes, std::string* why);
+  static constexpr int kMostSide = 2048;
+  /// PNG, JPEG or WebP of at most 16,384 x 16,384 and 64 million pixels; kept with at most `side`
+  /// on each side. Nothing if it cannot be decoded, and then `why` says why not.
+  static std::optional<TexturePicture> decode(std::string_view bytes, std::string* why,
+                                              int side = kMostSide);
   /// `rgba`: sRGB and opacity, rows from the top.
-  TexturePicture(int width, int height, std::vector<uint8_t> rgba);
+  TexturePicture(int width, int height, std::vector<uint8_t> rgba, int side = kMostSide);
 
   int width() const { return levels_[0].width; }
   int height() const { return levels_[0].height; }
@@ -40,7 +42,8 @@ class TexturePicture {
 };
 
 /// All pictures of an appearance, in its order; nothing in the place of one that cannot be decoded.
-/// A remark for each of these.
+/// A remark for each of these. The more there are, the smaller they are kept: together they take
+/// less than 400 MB. Beyond 1,024 there are none.
 std::vector<std::optional<TexturePicture>> decode_pictures(const Appearance& look,
                                                            std::vector<std::string>& remarks);
 
