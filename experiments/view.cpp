@@ -181,7 +181,9 @@ Showing view_gltf(const ShowRequest& request) {
     view.clip.frames.push_back(std::move(mesh.vertices));
   }
   view.clip.fps /= static_cast<double>(request.every);
-  if (!view.clip.faces.empty())
+  // Without any material a surface is drawn as those of other files are.
+  const bool dressed = look.look.materials.size() > 1 || !look.look.colours.empty();
+  if (!view.clip.faces.empty() && dressed)
     view.clip.look = std::make_shared<const Appearance>(std::move(look.look));
   view.remarks = file.remarks;
   fit(view, joints);
@@ -198,7 +200,15 @@ Showing view_take(const ShowRequest& request, std::vector<Joints>& joints) {
   options.profile = request.bones;
   if (request.scale != 1) options.scale = request.scale;
   if (request.up != "y") options.rest.up = parse_axis(request.up, "--up");
-  const SkeletonTake take = read_take(request.path, options, request.clip);
+  const SkeletonTake take = [&] {
+    try {
+      return read_take(request.path, options, request.clip);
+    } catch (const InputError&) {  // --fps also says the rate of a file that states none
+      if (!request.fps) throw;
+      options.fps = *request.fps;
+      return read_take(request.path, options, request.clip);
+    }
+  }();
   Showing view;
   view.animation = take.name;
   for (const PosedSkeleton& frame : take.frames) {

@@ -32,7 +32,8 @@ struct GltfLook {
   /// With all meshes of the scene: also those that read_gltf() leaves out because they belong to
   /// no skin. Clips that only animate weights are there too.
   Gltf file;
-  Appearance look;  ///< of the vertices and faces of `file`
+  /// Of the vertices and faces of `file`. The last material is white, of what has none.
+  Appearance look;
   std::vector<GltfMorphs> morphs;
   std::vector<std::vector<float>> weights;                  ///< per node: at rest; may be empty
   std::vector<std::vector<GltfWeightTrack>> weight_tracks;  ///< per clip of `file`
