@@ -393,8 +393,6 @@ GltfLook parse_gltf_look(std::string_view content, const std::string& path) {
   return LookReader(document, allowance).read();
 }
 
-GltfLook read_gltf_look(const std::string& path) {
-  return parse_gltf_look(read_file(path), path);
-}
+GltfLook read_gltf_look(const std::string& path) { return parse_gltf_look(read_file(path), path); }
 
 }  // namespace restage
