@@ -65,6 +65,8 @@ ONLY_IN = {
     "assimp/": ["datasets/readers/assimp/"],
     "openssl/": ["datasets/readers/sha256.cpp"],
     "stb/": ["infer/render/"],
+    "webp/": ["infer/render/texture.cpp", "infer/render/webp.cpp"],
+    "gif_lib.h": ["infer/render/gif.cpp"],
     "lzma.h": ["datasets/readers/"],
     "zip.h": ["datasets/readers/zip.cpp"],
     "zlib.h": ["datasets/readers/", "datasets/fetch/"],

@@ -48,11 +48,12 @@ void decompose(const std::vector<double>& m, GltfNode& node) {
 
 class Builder {
  public:
-  explicit Builder(const Document& document)
+  Builder(const Document& document, Allowance& allowance, gltf::Runs* runs)
       : document_(document),
         model_(document.model),
         path_(document.path),
-        allowance_(document.payload, document.path) {
+        allowance_(allowance),
+        runs_(runs) {
     out_.path = path_;
     out_.bytes = document.payload;
   }
@@ -68,6 +69,7 @@ class Builder {
       out_.humanoid.emplace_back(name, place_[checked(node, place_.size(), path_, "node")]);
     out_.standard = document_.standard;
     report();
+    if (runs_ != nullptr) runs_->place = place_;
     return std::move(out_);
   }
 
@@ -188,7 +190,7 @@ class Builder {
       if (wearer.skin >= 0) {
         const size_t skin = checked(wearer.skin, model_.skins.size(), path_, "skin");
         if (out_.skin_nodes[skin] < 0) out_.skin_nodes[skin] = static_cast<int>(wearer.node);
-      } else if (skins && !rigid[wearer.node]) {
+      } else if (skins && !rigid[wearer.node] && runs_ == nullptr) {
         if (loose_++ < 3)
           loose_names_ +=
               (loose_names_.empty() ? "" : ", ") + text::quote(out_.nodes[wearer.node].name);
@@ -217,11 +219,19 @@ class Builder {
     morphs_of_mesh_ = std::max(morphs_of_mesh_, primitive.targets.size());
     const auto joints = primitive.attributes.find("JOINTS_0");
     const bool skinned = wearer.skin >= 0 && joints != primitive.attributes.end();
-    // Primitives of a mesh often share one list of vertices and differ in their material.
-    const auto key = std::make_pair(position->second, skinned ? joints->second : -1);
+    // Primitives of a mesh often share one list of vertices and differ in their material. Those
+    // that differ in texture coordinates share none if these are asked for.
+    std::map<std::string, int> key = {*position};
+    if (skinned) key.insert(*joints);
+    if (runs_ != nullptr) key.insert(primitive.attributes.begin(), primitive.attributes.end());
     const auto [at, is_new] = vertices_of_.try_emplace(key, std::make_pair(size_t{0}, size_t{0}));
+    const auto& [first, count] = at->second;
     if (is_new) at->second = read_vertices(wearer, primitive, position->second, skinned);
-    read_faces(primitive, mode, at->second.first, at->second.second);
+    if (is_new && runs_ != nullptr)
+      runs_->vertices.push_back({&primitive, static_cast<int>(wearer.node), first, count});
+    const size_t faces = out_.faces.size();
+    read_faces(primitive, mode, first, count);
+    if (runs_ != nullptr) runs_->faces.push_back({&primitive, out_.faces.size() - faces});
   }
 
   /// First vertex and number of vertices.
@@ -342,11 +352,13 @@ class Builder {
     const tinygltf::Animation& animation = model_.animations[number];
     GltfClip clip;
     clip.name = animation.name.empty() ? name_of("animation", number) : animation.name;
+    bool weights = false;
     for (const tinygltf::AnimationChannel& channel : animation.channels) {
       const std::string& path = channel.target_path;
       if (channel.target_node < 0) continue;  // aims at nothing
-      if (path == "weights") {
-        continue;  // a face's, which rests as it is modelled
+      if (path == "weights") {                // a face's, which rests as it is modelled
+        weights = true;
+        continue;
       }
       if (path != "translation" && path != "rotation" && path != "scale") {
         ++unknown_tracks_;
@@ -354,7 +366,8 @@ class Builder {
       }
       clip.tracks.push_back(read_track(animation, channel, clip.name));
     }
-    if (clip.tracks.empty()) return;
+    if (clip.tracks.empty() && !(weights && runs_ != nullptr)) return;
+    if (runs_ != nullptr) runs_->animations.push_back(number);
     clip.begin = INFINITY, clip.end = -INFINITY;
     for (const GltfTrack& track : clip.tracks) {
       const auto& times = out_.times[track.times];
@@ -411,7 +424,8 @@ class Builder {
   const Document& document_;
   const tinygltf::Model& model_;
   const std::string& path_;
-  Allowance allowance_;
+  Allowance& allowance_;
+  gltf::Runs* runs_;  // null: not asked for
   Gltf out_;
   std::vector<size_t> order_;  // file numbers of nodes, parents first
   std::vector<int> place_;     // of a file number in order_
@@ -419,7 +433,7 @@ class Builder {
   std::vector<bool> shown_;    // by place
   std::vector<Wearer> wearers_;
   std::vector<size_t> first_bone_;  // of each skin
-  std::map<std::pair<int, int>, std::pair<size_t, size_t>> vertices_of_;
+  std::map<std::map<std::string, int>, std::pair<size_t, size_t>> vertices_of_;
   std::map<size_t, int32_t> node_bone_;
   std::map<int, int> times_;
   size_t lines_ = 0, loose_ = 0, weightless_ = 0, unknown_tracks_ = 0;
@@ -428,6 +442,10 @@ class Builder {
 };
 
 }  // namespace
+
+Gltf gltf::build(const Document& document, Allowance& allowance, Runs* runs) {
+  return Builder(document, allowance, runs).build();
+}
 
 bool is_gltf_name(const std::string& path) {
   return text::ends_in(path, {".glb", ".gltf", ".vrm", ".vrma"}) || is_fbx_name(path);
@@ -439,7 +457,8 @@ Gltf parse_gltf(std::string_view content, const std::string& path) {
   std::string made;
   if (is_fbx_name(path)) content = made = fbx_as_glb(content, path, &remarks);
   const Document document = gltf::parse_document(content, path);
-  Gltf out = Builder(document).build();
+  Allowance allowance(document.payload, path);
+  Gltf out = gltf::build(document, allowance);
   out.remarks.insert(out.remarks.begin(), remarks.begin(), remarks.end());
   return out;
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "autograd/base/error.h"
+#include "datasets/readers/gltf.h"
 
 namespace restage::gltf {
 
@@ -36,6 +37,9 @@ struct Document {
   std::string
       compression;  ///< an extension that is used but not required: data may be there in plain, too
   uint64_t payload = 0;  ///< bytes of the file and of all that it names
+  /// JSON, if asked for: the file's "materials", "textures", "images" and "samplers", and per
+  /// animation in "ours" whether Restage has written it.
+  std::string looks;
 };
 
 struct Chunks {
@@ -50,7 +54,7 @@ std::string decode_percent(const std::string& text);
 std::string decode_data_uri(const std::string& uri, size_t length, const std::string& path);
 
 /// `content` must outlive the document.
-Document parse_document(std::string_view content, const std::string& path);
+Document parse_document(std::string_view content, const std::string& path, bool looks = false);
 
 /// InputError with the command that unpacks such a file.
 [[noreturn]] void refuse_compression(const std::string& extension, const std::string& path);
@@ -65,5 +69,26 @@ std::vector<float> read_floats(const Document& document, int index, int type,
 /// Unsigned integers of any width.
 std::vector<uint32_t> read_integers(const Document& document, int index, int type,
                                     const std::string& what, Allowance& allowance);
+
+/// Where the values of primitives came to lie in a Gltf.
+struct Runs {
+  struct Vertices {
+    const tinygltf::Primitive* primitive;
+    int node;  ///< a place in Gltf::nodes: the one that shows the mesh
+    size_t first, count;
+  };
+  struct Faces {
+    const tinygltf::Primitive* primitive;
+    size_t count;
+  };
+  std::vector<Vertices> vertices;  ///< each after the last
+  std::vector<Faces> faces;        ///< each after the last
+  std::vector<int> place;          ///< per node of the file: its place in Gltf::nodes
+  std::vector<size_t> animations;  ///< per clip: its number in the file
+};
+
+/// What read_gltf() gives. With `runs`: as GltfLook::file is, weights of morph targets not read;
+/// clips of weights alone are there, and begin at infinity.
+Gltf build(const Document& document, Allowance& allowance, Runs* runs = nullptr);
 
 }  // namespace restage::gltf

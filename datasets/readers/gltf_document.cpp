@@ -5,6 +5,7 @@
 #include <cstring>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <span>
 
 #include "autograd/base/atomic_file.h"
 #include "datasets/readers/errors.h"
@@ -26,6 +27,7 @@ constexpr const char* kUsed[] = {"asset",         "scene",     "scenes",     "no
                                  "meshes",        "accessors", "skins",      "bufferViews",
                                  "animations",    "buffers",   "extensions", "extensionsRequired",
                                  "extensionsUsed"};
+constexpr const char* kLooks[] = {"materials", "textures", "images", "samplers"};
 
 /// Extensions that leave positions, skins and animations as they are.
 bool harmless(const std::string& extension) {
@@ -71,15 +73,19 @@ uint32_t word(std::string_view content, size_t at) {
 
 // ---- structure ---------------------------------------------------------------------------------
 
-/// Parses only what is used, in bounded memory.
-Json parse_json(std::string_view text, uint64_t payload, const std::string& path) {
+bool is_one_of(const std::string& key, std::span<const char* const> names) {
+  return std::find(names.begin(), names.end(), key) != names.end();
+}
+
+/// Parses only what is used, in bounded memory. `looks`: also what only looks are made of.
+Json parse_json(std::string_view text, uint64_t payload, const std::string& path, bool looks) {
   uint64_t left = (uint64_t{64} << 20) + 8 * payload;
   const auto keep = [&](int depth, Json::parse_event_t event, Json& parsed) {
     if (depth > kDepth) broken(path, "is nested deeper than any glTF file");
     if (event == Json::parse_event_t::key) {
       const std::string& key = parsed.get_ref<const std::string&>();
-      if (depth == 1) return std::find(std::begin(kUsed), std::end(kUsed), key) != std::end(kUsed);
-      return key != "extras";
+      if (depth == 1) return is_one_of(key, kUsed) || (looks && is_one_of(key, kLooks));
+      return looks || key != "extras";
     }
     const uint64_t cost = event == Json::parse_event_t::object_start ? kObjectCost : kValueCost;
     if (cost > left) broken(path, "has far more parts than data");
@@ -97,11 +103,33 @@ Json parse_json(std::string_view text, uint64_t payload, const std::string& path
   }
 }
 
-/// Drops "extensions" everywhere; their number is bounded by parse_json(), their depth too.
+/// Drops "extensions" and "extras" everywhere; their number is bounded by parse_json(), their depth
+/// too.
 void drop_extensions(Json& value) {
   if (value.is_object()) value.erase("extensions");
+  if (value.is_object()) value.erase("extras");
   if (value.is_structured())
     for (Json& part : value) drop_extensions(part);
+}
+
+/// Who made the animation, if it says so.
+bool is_ours(const Json& animation) {
+  const auto at = Json::json_pointer("/extras/generator");
+  return animation.is_object() && animation.contains(at) && animation.at(at) == "restage";
+}
+
+/// Takes what looks are made of out of the structure, as text.
+std::string take_looks(Json& root) {
+  Json out = Json::object();
+  for (const char* name : kLooks)
+    if (const auto at = root.find(name); at != root.end()) {
+      out[name] = std::move(*at);
+      root.erase(at);
+    }
+  out["ours"] = Json::array();
+  if (const auto list = root.find("animations"); list != root.end() && list->is_array())
+    for (const Json& animation : *list) out["ours"].push_back(is_ours(animation));
+  return out.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
 int node_number(const Json& bone) {
@@ -263,14 +291,15 @@ size_t checked(int64_t index, size_t size, const std::string& path, const std::s
   return static_cast<size_t>(index);
 }
 
-Document parse_document(std::string_view content, const std::string& path) {
+Document parse_document(std::string_view content, const std::string& path, bool looks) {
   refuse_foreign_content(content, path);
   Document out;
   out.path = path;
   out.payload = content.size();
   Chunks chunks{content, {}};
   if (content.starts_with("glTF")) chunks = split_glb(content, path);
-  Json root = parse_json(chunks.json, content.size(), path);
+  Json root = parse_json(chunks.json, content.size(), path, looks);
+  if (looks) out.looks = take_looks(root);
   out.humanoid = read_humanoid(root, &out.standard);
   check_extensions(root, path);
   for (const std::string& name : extensions_in(root, "extensionsUsed"))

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "datasets/readers/errors.h"
-#include "datasets/readers/gltf.h"
+#include "datasets/readers/gltf_look.h"
 #include "datasets/readers/text.h"
 
 namespace restage {
@@ -69,19 +69,19 @@ GltfTransforms to_world(const std::vector<GltfNode>& nodes) {
   return out;
 }
 
-/// Linear blend skinning.
-Points skinned(const Gltf& file, const GltfTransforms& nodes) {
+/// Linear blend skinning of `vertices`, which may be the file's or others in their place.
+Points skinned(const Gltf& file, const Points& vertices, const GltfTransforms& nodes) {
   using Rows = Eigen::Matrix<double, 3, 4>;
   std::vector<Rows> bones;
   bones.reserve(file.bones.size());
   for (const GltfBone& bone : file.bones)
     bones.push_back((nodes[bone.node] * bone.inverse_bind).affine());
-  Points out(file.vertices.size());
+  Points out(vertices.size());
   for (size_t v = 0; v < out.size(); ++v) {
     Rows sum = Rows::Zero();
     for (uint32_t i = file.first_influence[v]; i < file.first_influence[v + 1]; ++i)
       sum += double{file.influences[i].weight} * bones[file.influences[i].bone];
-    const Eigen::Vector4d at = file.vertices[v].cast<double>().homogeneous();
+    const Eigen::Vector4d at = vertices[v].cast<double>().homogeneous();
     out[v] = (sum * at).cast<float>();
     if (!out[v].allFinite())
       throw InputError(file.path, cat("its transforms put vertex ", v, " nowhere"),
@@ -100,6 +100,38 @@ void keep_outside_out(const Gltf& file, const GltfTransforms& nodes, std::vector
     const uint32_t first = file.first_influence[face[0]];
     if (mirrors[file.influences[first].bone]) std::swap(face[1], face[2]);
   }
+}
+
+Mesh posed_mesh(const Gltf& file, const Points& vertices, const GltfTransforms& nodes) {
+  Mesh out{skinned(file, vertices, nodes), file.faces};
+  keep_outside_out(file, nodes, out.faces);
+  return out;
+}
+
+/// Weights of a node's morph targets at a time of a clip, or at rest.
+std::vector<float> weights_at(const GltfLook& look, int node, const GltfClip* clip,
+                              double seconds) {
+  std::vector<float> out = look.weights[node];
+  if (clip == nullptr) return out;
+  for (const GltfWeightTrack& track : look.weight_tracks[clip - look.file.clips.data()]) {
+    if (track.node != node) continue;
+    const Between at = find_keys(look.file.times[track.times], seconds);
+    const bool cubic = track.interpolation == Interpolation::cubic;
+    const double t = track.interpolation == Interpolation::step ? 0 : at.t;
+    const double t2 = t * t, t3 = t2 * t;
+    out.resize(track.targets);
+    for (size_t k = 0; k < track.targets; ++k) {
+      const auto value = [&](size_t keyed, size_t part) {
+        return double{track.values[(cubic ? 3 * keyed + part : keyed) * track.targets + k]};
+      };
+      out[k] = static_cast<float>(cubic ? (2 * t3 - 3 * t2 + 1) * value(at.a, 1) +
+                                              at.seconds * (t3 - 2 * t2 + t) * value(at.a, 2) +
+                                              (3 * t2 - 2 * t3) * value(at.b, 1) +
+                                              at.seconds * (t3 - t2) * value(at.b, 0)
+                                        : (1 - t) * value(at.a, 1) + t * value(at.b, 1));
+    }
+  }
+  return out;
 }
 
 }  // namespace
@@ -122,9 +154,20 @@ GltfTransforms gltf_pose(const Gltf& file, const GltfClip& clip, double seconds)
 Mesh gltf_mesh(const Gltf& file, const GltfTransforms& nodes) {
   if (file.vertices.empty())
     throw InputError(file.path, "holds no mesh", "export the character with its mesh");
-  Mesh out{skinned(file, nodes), file.faces};
-  keep_outside_out(file, nodes, out.faces);
-  return out;
+  return posed_mesh(file, file.vertices, nodes);
+}
+
+Mesh gltf_look_mesh(const GltfLook& look, const GltfTransforms& nodes, const GltfClip* clip,
+                    double seconds) {
+  Points vertices = look.file.vertices;
+  for (const GltfMorphs& morphs : look.morphs) {
+    const std::vector<float> weights = weights_at(look, morphs.node, clip, seconds);
+    for (size_t t = 0; t < std::min(weights.size(), morphs.targets.size()); ++t)
+      if (weights[t] != 0)
+        for (size_t v = 0; v < morphs.targets[t].size(); ++v)
+          vertices[morphs.first + v] += weights[t] * morphs.targets[t][v];
+  }
+  return posed_mesh(look.file, vertices, nodes);
 }
 
 const GltfClip& find_clip(const Gltf& file, const std::string& name) {

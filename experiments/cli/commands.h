@@ -31,6 +31,7 @@ void add_sweep(Program& program);
 void add_sweep_export(Program& program, CommandOptions group);  // of `sweep`, as all add_sweep_*
 void add_sweep_table(Program& program, CommandOptions group);
 void add_train(Program& program);
+void add_view(Program& program);
 void add_weights(Program& program);
 
 /// Adds every command, in the order of `restage --help`.

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "autograd/base/error.h"
@@ -57,6 +58,15 @@ class FolderWatch {
     for (const auto& file : std::filesystem::directory_iterator(folder_, gone))
       names.push_back(file.path().filename().string());
     take(std::move(names));
+    listed_ = taken_;
+  }
+
+  /// What tells a file from the same one written again; nothing if it is not there.
+  std::optional<std::pair<std::string, std::filesystem::file_time_type>> mark_of(
+      const std::string& path) const {
+    std::error_code gone;
+    const auto time = std::filesystem::last_write_time(path, gone);
+    return gone ? std::nullopt : std::optional(std::pair(path, time));
   }
 
   /// Names of the files that have come since; none if the folder has gone.
@@ -87,8 +97,11 @@ class FolderWatch {
       if (std::find(names.begin(), names.end(), tried_->name) == names.end()) give_up();
       tried_.reset();
     }
-    to_.pass(static_cast<int64_t>(names.size()) - 1);
     cloud_.name = folder_ + (folder_.ends_with('/') ? "" : "/") + names.back();
+    taken_ = mark_of(cloud_.name);
+    // A file that was closed while begin() looked is in its list, and is told of, too.
+    if (listed_ && std::exchange(listed_, std::nullopt) == taken_) return;
+    to_.pass(static_cast<int64_t>(names.size()) - 1);
     cloud_.arrived = now;
     cloud_.seconds = std::chrono::duration<double>(now.time_since_epoch()).count();
     cloud_.sender = 1;
@@ -120,6 +133,8 @@ class FolderWatch {
     std::string name, why;
     Clock::time_point when;
   };
+  /// The file that was read last, and that of begin() until another one comes.
+  std::optional<std::pair<std::string, std::filesystem::file_time_type>> taken_, listed_;
   std::optional<Tried> tried_;  ///< a file that could not be read, perhaps only yet
 };
 

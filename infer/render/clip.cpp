@@ -27,6 +27,27 @@ void choose(const std::vector<size_t>& chosen, List* list) {
   *list = std::move(out);
 }
 
+void check_look(const std::string& where, const Clip& clip) {
+  if (!clip.look) return;
+  const Appearance& look = *clip.look;
+  const size_t count = clip.frames.front().size();
+  const auto known = [](const auto& list, size_t size) {
+    return std::all_of(list.begin(), list.end(), [&](int32_t number) {
+      return number >= 0 && static_cast<size_t>(number) < size;
+    });
+  };
+  const auto fits = [&](size_t size) { return size == 0 || size == count; };
+  bool pictures = true;
+  for (const Material& material : look.materials)
+    for (const int picture : {material.texture.picture, material.glow_texture.picture})
+      pictures = pictures && picture < static_cast<int>(look.pictures.size());
+  if (look.material.size() != clip.faces.size() || !known(look.material, look.materials.size()) ||
+      !known(look.smooth, count) || !fits(look.uv.size()) || !fits(look.colours.size()) ||
+      !fits(look.smooth.size()) || !pictures)
+    throw InputError(where, "\"" + clip.label + "\" has the looks of another surface",
+                     "give looks of its own vertices and faces, or none");
+}
+
 }  // namespace
 
 Clip at_rate(Clip clip, double fps, size_t frames) {
@@ -44,15 +65,21 @@ Clip at_rate(Clip clip, double fps, size_t frames) {
   return clip;
 }
 
-Points stick_figure(const Joints& joints) {
+Points stick_figure(const Points& joints, const std::vector<int>& parents) {
   constexpr int kPointsPerBone = 12;
   Points out;
-  for (int j = 1; j < kJoints; ++j)
-    for (int k = 0; k <= kPointsPerBone; ++k) {
-      const double t = static_cast<double>(k) / kPointsPerBone;
-      out.push_back(((1 - t) * joints[kParents[j]] + t * joints[j]).cast<float>());
+  for (size_t j = 0; j < joints.size(); ++j)
+    for (int k = 0; parents[j] >= 0 && k <= kPointsPerBone; ++k) {
+      const float t = static_cast<float>(k) / kPointsPerBone;
+      out.push_back((1 - t) * joints[static_cast<size_t>(parents[j])] + t * joints[j]);
     }
   return out;
+}
+
+Points stick_figure(const Joints& joints) {
+  Points points;
+  for (const Vec3& joint : joints) points.push_back(joint.cast<float>());
+  return stick_figure(points, {kParents.begin(), kParents.end()});
 }
 
 void check_clips(const std::string& where, const std::vector<Clip>& clips) {
@@ -75,6 +102,7 @@ void check_clips(const std::string& where, const std::vector<Clip>& clips) {
         (clip.faces.empty() || clip.errors.size() != clip.frames.size() || !fits))
       throw InputError(where, "\"" + clip.label + "\" has errors of other vertices than its own",
                        "write one number per vertex and frame of a surface, or none");
+    check_look(where, clip);
     for (size_t f = 0; f < clip.frames.size(); ++f) {
       const std::string frame = "frame " + std::to_string(f) + " of \"" + clip.label + "\"";
       const Points& points = clip.frames[f];
@@ -113,6 +141,19 @@ Point clip_centre(const Points& points) {
     centre[axis] = 0.5f * (low + high);
   }
   return centre;
+}
+
+std::vector<Point> calm_centres(const std::vector<Point>& centres, double fps) {
+  std::vector<Point> calm;
+  const auto reach = static_cast<std::ptrdiff_t>(std::lround(std::min(fps, 240.0) / 4));
+  const auto count = static_cast<std::ptrdiff_t>(centres.size());
+  for (std::ptrdiff_t f = 0; f < count; ++f) {
+    const std::ptrdiff_t side = std::min({reach, f, count - 1 - f});
+    Point sum = Point::Zero();
+    for (std::ptrdiff_t k = f - side; k <= f + side; ++k) sum += centres[k];
+    calm.push_back(sum / static_cast<float>(2 * side + 1));
+  }
+  return calm;
 }
 
 float clip_floor(const Clip& clip) {

@@ -20,8 +20,6 @@ constexpr float kWidestCell = 1.5f;             // width of the widest cell, in 
 constexpr float kFarAway = 4.0f;  // a point this many times farther away than nine in ten points
                                   // may be out of view
 
-float radians(double degrees) { return static_cast<float>(degrees * std::numbers::pi / 180); }
-
 /// The points of a figure that have to be in view.
 Points framed_points(const Figure& figure) {
   Points out;

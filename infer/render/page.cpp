@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <set>
 
 #include "autograd/base/atomic_file.h"
@@ -71,8 +72,23 @@ PageSurface cluster(const Clip& clip, float cell) {
   return surface;
 }
 
+/// Faces in the order in which they are drawn: those of one material together.
+std::vector<Triangle> drawn_faces(const Clip& clip) {
+  if (!clip.look) return clip.faces;
+  std::vector<size_t> order(clip.faces.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  const std::vector<int32_t>& material = clip.look->material;
+  std::stable_sort(order.begin(), order.end(),
+                   [&](size_t a, size_t b) { return material[a] < material[b]; });
+  std::vector<Triangle> out;
+  for (const size_t f : order) out.push_back(clip.faces[f]);
+  return out;
+}
+
 PageSurface thin(const Clip& clip, size_t vertices) {
-  if (clip.faces.empty() || clip.frames[0].size() <= vertices) return {{}, clip.faces};
+  // A picture lies on all the vertices of its surface.
+  if (clip.faces.empty() || clip.look || clip.frames[0].size() <= vertices)
+    return {{}, drawn_faces(clip)};
   const float size = box_of(clip.frames[0]).sizes().norm();
   float cell = std::max(1e-6f, size / 400);
   PageSurface surface = cluster(clip, cell);
@@ -89,6 +105,13 @@ struct Plan {
   bool thinned = false;
 };
 
+size_t look_bytes(const Clip& clip) {
+  if (!clip.look) return 0;
+  size_t bytes = 30 * clip.look->uv.size();
+  for (const PictureFile& picture : clip.look->pictures) bytes += picture.bytes.size() * 4 / 3;
+  return bytes;
+}
+
 size_t text_bytes(const std::vector<Clip>& clips, const std::vector<PageSurface>& surfaces,
                   size_t frames, size_t max_points) {
   double bytes = 40000;
@@ -100,7 +123,7 @@ size_t text_bytes(const std::vector<Clip>& clips, const std::vector<PageSurface>
     bytes += 8.0 * static_cast<double>(count) * static_cast<double>(frames) +
              16.0 * static_cast<double>(surfaces[c].faces.size()) +
              (clips[c].errors.empty() ? 0 : 1.4 * static_cast<double>(count * frames)) +
-             30.0 * static_cast<double>(frames);
+             30.0 * static_cast<double>(frames) + static_cast<double>(look_bytes(clips[c]));
   }
   return static_cast<size_t>(bytes);
 }
@@ -109,7 +132,7 @@ Plan make_plan(const std::vector<Clip>& clips, const PageOptions& options) {
   size_t length = clips[0].frames.size();
   for (const Clip& clip : clips) length = std::min(length, clip.frames.size());
   Plan plan;
-  for (const Clip& clip : clips) plan.surfaces.push_back({{}, clip.faces});
+  for (const Clip& clip : clips) plan.surfaces.push_back({{}, drawn_faces(clip)});
   const auto fits = [&] {
     plan.frames = (length + plan.stride - 1) / plan.stride;
     return text_bytes(clips, plan.surfaces, plan.frames, options.max_points) <= options.max_bytes;
@@ -117,7 +140,8 @@ Plan make_plan(const std::vector<Clip>& clips, const PageOptions& options) {
   while (!fits() && plan.stride < kMostStride) ++plan.stride;
   for (size_t vertices = 16384; !fits() && vertices >= kFewestVertices;
        vertices = vertices * 3 / 4) {
-    plan.thinned = true;
+    plan.thinned = std::any_of(clips.begin(), clips.end(),
+                               [](const Clip& c) { return !c.faces.empty() && !c.look; });
     for (size_t c = 0; c < clips.size(); ++c) plan.surfaces[c] = thin(clips[c], vertices);
   }
   while (!fits() && plan.frames > 2) plan.stride += (plan.stride + 3) / 4;
@@ -142,22 +166,6 @@ Points picked(const Clip& clip, const PageSurface& surface, size_t frame, size_t
   for (size_t k = 0; k < max_points; ++k) out[k] = out[k * out.size() / max_points];
   out.resize(max_points);
   return out;
-}
-
-/// The middle of each frame, averaged with the middles of a quarter of a second before and after:
-/// the camera follows them calmly.
-std::vector<Point> calm_centres(const std::vector<Points>& frames, double fps) {
-  std::vector<Point> centres, calm;
-  for (const Points& points : frames) centres.push_back(clip_centre(points));
-  const auto reach = static_cast<std::ptrdiff_t>(std::lround(std::min(fps, 240.0) / 4));
-  const auto count = static_cast<std::ptrdiff_t>(centres.size());
-  for (std::ptrdiff_t f = 0; f < count; ++f) {
-    const std::ptrdiff_t side = std::min({reach, f, count - 1 - f});
-    Point sum = Point::Zero();
-    for (std::ptrdiff_t k = f - side; k <= f + side; ++k) sum += centres[k];
-    calm.push_back(sum / static_cast<float>(2 * side + 1));
-  }
-  return calm;
 }
 
 Json numbers(const Point& p) {
@@ -196,6 +204,47 @@ std::vector<uint8_t> packed_errors(const Clip& clip, const PageSurface& surface,
   return out;
 }
 
+Json texture_meta(const Texture& texture) {
+  static constexpr const char* kWrap[] = {"REPEAT", "MIRRORED_REPEAT", "CLAMP_TO_EDGE"};
+  const auto& t = texture.transform;
+  return {{"picture", texture.picture},
+          {"across", kWrap[static_cast<size_t>(texture.across)]},
+          {"down", kWrap[static_cast<size_t>(texture.down)]},
+          {"nearest", texture.nearest},
+          {"transform", {t(0, 0), t(1, 0), 0, t(0, 1), t(1, 1), 0, t(0, 2), t(1, 2), 1}}};
+}
+
+/// Materials that have faces, in the order of drawn_faces().
+Json materials_meta(const Appearance& look) {
+  std::vector<size_t> faces(look.materials.size());
+  for (const int32_t m : look.material) ++faces[static_cast<size_t>(m)];
+  Json list = Json::array();
+  for (size_t m = 0; m < faces.size(); ++m) {
+    const Material& material = look.materials[m];
+    const Rgba& c = material.colour;
+    const auto& glow = material.glow;
+    static constexpr const char* kAlpha[] = {"opaque", "mask", "blend"};
+    if (faces[m] > 0)
+      list.push_back({{"faces", faces[m]},
+                      {"colour", {c[0], c[1], c[2], c[3]}},
+                      {"texture", texture_meta(material.texture)},
+                      {"glow", {glow[0], glow[1], glow[2]}},
+                      {"glow_texture", texture_meta(material.glow_texture)},
+                      {"alpha", kAlpha[static_cast<size_t>(material.alpha)]},
+                      {"cutoff", material.cutoff},
+                      {"two_sided", material.two_sided},
+                      {"unlit", material.unlit}});
+  }
+  return list;
+}
+
+std::string data_uri(const std::string& bytes) {
+  const char* kind = bytes.starts_with("RIFF")   ? "image/webp"
+                     : bytes.starts_with("\xff") ? "image/jpeg"
+                                                 : "image/png";
+  return std::string("data:") + kind + ";base64," + base64(bytes.data(), bytes.size());
+}
+
 struct Packed {
   Json meta;
   std::string elements;               ///< script elements that hold the data
@@ -213,8 +262,9 @@ Packed pack(const Clip& clip, const PageSurface& surface, const Plan& plan, size
   const Eigen::Vector3d step = ((high - low).cast<double>() / 65535.0).cwiseMax(1e-9);
   Packed packed;
   const float floor = clip_floor(clip);
-  const std::vector<Point> centres =
-      calm_centres(frames, options.fps / static_cast<double>(plan.stride));
+  std::vector<Point> centres;
+  for (const Points& points : frames) centres.push_back(clip_centre(points));
+  centres = calm_centres(centres, options.fps / static_cast<double>(plan.stride));
   std::vector<uint16_t> data;
   Json counts = Json::array(), middles = Json::array();
   size_t most = 1;
@@ -252,6 +302,22 @@ Packed pack(const Clip& clip, const PageSurface& surface, const Plan& plan, size
   };
   element("frames", data.data(), data.size() * 2);
   if (!surface.faces.empty()) element("faces", surface.faces.data(), surface.faces.size() * 12);
+  if (clip.look) {
+    const Appearance& look = *clip.look;
+    packed.meta["materials"] = materials_meta(look);
+    packed.meta["pictures"] = look.pictures.size();
+    for (size_t k = 0; k < look.pictures.size(); ++k)
+      packed.elements += "<script id=\"picture" + std::to_string(number) + "_" + std::to_string(k) +
+                         "\" type=\"text/plain\">" + data_uri(look.pictures[k].bytes) +
+                         "</script>\n";
+    if (!look.uv.empty()) element("uv", look.uv.data(), look.uv.size() * sizeof(Uv));
+    if (!look.smooth.empty()) element("smooth", look.smooth.data(), look.smooth.size() * 4);
+    std::vector<uint8_t> colours;
+    for (const Rgba& c : look.colours)
+      for (int k = 0; k < 4; ++k)
+        colours.push_back(static_cast<uint8_t>(std::lround(255 * std::clamp(c[k], 0.0f, 1.0f))));
+    if (!colours.empty()) element("colours", colours.data(), colours.size());
+  }
   if (!clip.errors.empty()) {
     const double scale = error_scale(clip.errors);
     packed.meta["error_scale"] = scale;

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "infer/render/shadow.h"
+#include "infer/render/srgb.h"
 
 namespace restage {
 namespace {
@@ -12,13 +13,6 @@ namespace {
 constexpr float kNear = 0.05f;
 constexpr float kFar = std::numeric_limits<float>::infinity();
 constexpr float kFade = 1.7f;  // metres from the target at which the ground has faded away
-
-float to_linear(float s) {
-  return s <= 0.04045f ? s / 12.92f : std::pow((s + 0.055f) / 1.055f, 2.4f);
-}
-float to_srgb(float l) {
-  return l <= 0.0031308f ? 12.92f * l : 1.055f * std::pow(l, 1 / 2.4f) - 0.055f;
-}
 
 float smooth_step(float low, float high, float x) {
   const float t = std::clamp((x - low) / (high - low), 0.0f, 1.0f);
@@ -32,13 +26,16 @@ float grid_line(float x, float half_width) {
   return 1 - smooth_step(half_width * 0.6f, half_width * 1.4f, off);
 }
 
-Points vertex_normals(const Points& vertices, const std::vector<Triangle>& faces) {
+/// `smooth`: Appearance::smooth, or empty.
+Points vertex_normals(const Points& vertices, const std::vector<Triangle>& faces,
+                      const std::vector<int32_t>& smooth = {}) {
   Points normals(vertices.size(), Point::Zero());
   for (const Triangle& f : faces) {
     const Point n = (vertices[f[1]] - vertices[f[0]]).cross(vertices[f[2]] - vertices[f[0]]);
-    for (const int32_t v : f) normals[v] += n;
+    for (const int32_t v : f) normals[smooth.empty() ? v : smooth[v]] += n;
   }
   for (Point& n : normals) n = n.norm() > 0 ? Point(n.normalized()) : Point(0, 1, 0);
+  for (size_t v = 0; v < smooth.size(); ++v) normals[v] = normals[smooth[v]];
   return normals;
 }
 
@@ -46,7 +43,7 @@ Points vertex_normals(const Points& vertices, const std::vector<Triangle>& faces
 
 Colour colour_of(uint32_t srgb) {
   const auto channel = [&](int shift) {
-    return to_linear(static_cast<float>((srgb >> shift) & 255u) / 255.0f);
+    return srgb_to_linear(static_cast<float>((srgb >> shift) & 255u) / 255.0f);
   };
   return {channel(16), channel(8), channel(0)};
 }
@@ -124,7 +121,8 @@ Colour Canvas::shade(const Point& n, const Colour& colour) const {
   return colour.cwiseProduct(ambient + key) + (0.12f * rim + gloss) * Colour(0.9f, 0.95f, 1.0f);
 }
 
-void Canvas::fill_triangle(const Projected* c, const Point* normals, const Colour& colour) {
+template <class Paint>
+void Canvas::fill_triangle(const Projected* c, const Paint& paint) {
   const float area = (c[1].x - c[0].x) * (c[2].y - c[0].y) - (c[2].x - c[0].x) * (c[1].y - c[0].y);
   if (!(std::abs(area) > 1e-6f)) return;
   const float low_x = std::min({c[0].x, c[1].x, c[2].x}),
@@ -147,9 +145,12 @@ void Canvas::fill_triangle(const Projected* c, const Point* normals, const Colou
       if (a < 0 || b < 0 || d < 0) continue;
       const float z = 1 / (a / c[0].z + b / c[1].z + d / c[2].z);
       if (!(z < depth(x, y))) continue;
-      depth(x, y) = z;
-      const Point n = a * normals[0] + b * normals[1] + d * normals[2];
-      pixel(x, y) = shade(n.normalized(), colour);
+      const Rgba seen = paint(Point(a, b, d), z);
+      if (!(seen[3] > 0)) continue;
+      // What is nearly opaque hides what is behind it, also if that is drawn later.
+      if (seen[3] > 0.95f) depth(x, y) = z;
+      const Colour behind = seen[3] < 1 ? pixel(x, y) : Colour(seen.head<3>());
+      pixel(x, y) = seen.head<3>() + (1 - seen[3]) * (behind - seen.head<3>());
     }
 }
 
@@ -165,9 +166,110 @@ void Canvas::draw_mesh(const Points& vertices, const std::vector<Triangle>& face
     // In open surfaces, or where corners are listed the other way round, a triangle is seen from
     // behind. Such a triangle is lit as if it faced the camera.
     const float side = out.dot(eye_ - vertices[f[0]]) < 0 ? -1.0f : 1.0f;
-    const Point turned[3] = {side * normals[f[0]], side * normals[f[1]], side * normals[f[2]]};
-    fill_triangle(corners, turned, colour);
+    fill_triangle(corners, [&](const Point& share, float) {
+      const Point n =
+          share[0] * normals[f[0]] + share[1] * normals[f[1]] + share[2] * normals[f[2]];
+      Rgba seen;
+      seen << shade(side * n.normalized(), colour), 1;
+      return seen;
+    });
   }
+}
+
+/// A triangle of a surface with materials.
+struct Canvas::Facet {
+  const Triangle* face;
+  const Material* material;
+  Projected corners[3];
+  float side, distance;  // distance: of its middle from the eye
+};
+
+/// Triangles that are in view, in the order in which they are drawn: what is solid, then what is
+/// seen through, the farthest first.
+std::vector<Canvas::Facet> Canvas::facets(const Points& vertices,
+                                          const std::vector<Triangle>& faces,
+                                          const Appearance& look) const {
+  std::vector<Projected> projected(vertices.size());
+  for (size_t v = 0; v < vertices.size(); ++v) projected[v] = project(vertices[v]);
+  std::vector<Facet> out;
+  for (size_t t = 0; t < faces.size(); ++t) {
+    const Triangle& f = faces[t];
+    const Facet facet{&f,
+                      &look.materials[static_cast<size_t>(look.material[t])],
+                      {projected[f[0]], projected[f[1]], projected[f[2]]},
+                      (vertices[f[1]] - vertices[f[0]])
+                                  .cross(vertices[f[2]] - vertices[f[0]])
+                                  .dot(eye_ - vertices[f[0]]) < 0
+                          ? -1.0f
+                          : 1.0f,
+                      projected[f[0]].z + projected[f[1]].z + projected[f[2]].z};
+    if (facet.side < 0 && !facet.material->two_sided) continue;
+    if (facet.corners[0].z > 0 && facet.corners[1].z > 0 && facet.corners[2].z > 0)
+      out.push_back(facet);
+  }
+  const auto solid = [](const Facet& facet) {
+    return facet.material->alpha != Material::Alpha::blend;
+  };
+  const auto middle = std::stable_partition(out.begin(), out.end(), solid);
+  std::stable_sort(middle, out.end(),
+                   [](const Facet& a, const Facet& b) { return a.distance > b.distance; });
+  return out;
+}
+
+void Canvas::draw_surface(const Points& vertices, const std::vector<Triangle>& faces,
+                          const Appearance& look, const Pictures& pictures) {
+  const Points normals = vertex_normals(vertices, faces, look.smooth);
+  for (const Facet& facet : facets(vertices, faces, look)) {
+    const Triangle& f = *facet.face;
+    const Material& material = *facet.material;
+    const auto picture_of = [&](const Texture& texture) -> const TexturePicture* {
+      const bool is_there = texture.picture >= 0 && !look.uv.empty() &&
+                            pictures[static_cast<size_t>(texture.picture)];
+      return is_there ? &*pictures[static_cast<size_t>(texture.picture)] : nullptr;
+    };
+    const TexturePicture* picture = picture_of(material.texture);
+    const TexturePicture* glow = picture_of(material.glow_texture);
+    const float texels = picture ? texels_of(facet, look, material.texture, *picture) : 1;
+    fill_triangle(facet.corners, [&](const Point& share, float z) -> Rgba {
+      // Shares of the corners on the surface, which perspective makes others than in the picture.
+      const Point s(share[0] * z / facet.corners[0].z, share[1] * z / facet.corners[1].z,
+                    share[2] * z / facet.corners[2].z);
+      const auto mixed = [&](const auto& list) {
+        return (s[0] * list[f[0]] + s[1] * list[f[1]] + s[2] * list[f[2]]).eval();
+      };
+      Rgba seen = material.colour;
+      const Uv place = look.uv.empty() ? Uv(0, 0) : mixed(look.uv);
+      if (picture) seen = seen.cwiseProduct(picture->at(material.texture, place, texels));
+      if (!look.colours.empty()) seen = seen.cwiseProduct(mixed(look.colours));
+      if (material.alpha == Material::Alpha::mask && seen[3] < material.cutoff)
+        seen[3] = 0;
+      else if (material.alpha != Material::Alpha::blend)
+        seen[3] = 1;
+      if (!(seen[3] > 0)) return Rgba::Zero();
+      if (!material.unlit) {
+        const Point n = mixed(normals);
+        seen.head<3>() = shade(facet.side * n.normalized(), seen.head<3>());
+      }
+      Colour light = material.glow;
+      if (glow) light = light.cwiseProduct(glow->at(material.glow_texture, place, 1).head<3>());
+      seen.head<3>() += light;
+      return seen;
+    });
+  }
+}
+
+/// How many texels lie, along one axis, in a sample of the triangle.
+float Canvas::texels_of(const Facet& facet, const Appearance& look, const Texture& texture,
+                        const TexturePicture& picture) {
+  const Triangle& f = *facet.face;
+  const auto& c = facet.corners;
+  const Eigen::Matrix2f turn = texture.transform.leftCols<2>();
+  const Uv a = turn * (look.uv[f[1]] - look.uv[f[0]]), b = turn * (look.uv[f[2]] - look.uv[f[0]]);
+  const float texels = std::abs(a.x() * b.y() - a.y() * b.x()) *
+                       static_cast<float>(picture.width()) * static_cast<float>(picture.height());
+  const float samples =
+      std::abs((c[1].x - c[0].x) * (c[2].y - c[0].y) - (c[2].x - c[0].x) * (c[1].y - c[0].y));
+  return samples > 0 ? std::sqrt(texels / samples) : 1;
 }
 
 void Canvas::draw_cloud(const Points& points, const Colour& colour) {
@@ -213,6 +315,14 @@ void Canvas::occlude() {
   };
   constexpr Ring rings[2] = {{0.012f, 0.05f, 0.35f}, {0.05f, 0.16f, 0.55f}};
   constexpr int kDirections = 12;
+  float cosines[2][kDirections], sines[2][kDirections];  // of neighbouring samples, by turns
+  for (int odd = 0; odd < 2; ++odd)
+    for (int d = 0; d < kDirections; ++d) {
+      const float angle =
+          6.2831853f * (static_cast<float>(d) + 0.5f * static_cast<float>(odd)) / kDirections;
+      cosines[odd][d] = std::cos(angle);
+      sines[odd][d] = std::sin(angle);
+    }
   std::vector<float> keep(depth_.size(), 1);
   for (int y = 0; y < height_; ++y)
     for (int x = 0; x < width_; ++x) {
@@ -223,11 +333,9 @@ void Canvas::occlude() {
         const float pixels = focus_ * ring.metres / z;
         float sum = 0;
         for (int d = 0; d < kDirections; ++d) {
-          const float angle = 6.2831853f *
-                              (static_cast<float>(d) + 0.5f * static_cast<float>((x + y) & 1)) /
-                              kDirections;
-          const int nx = x + static_cast<int>(std::lround(pixels * std::cos(angle)));
-          const int ny = y + static_cast<int>(std::lround(pixels * std::sin(angle)));
+          const int odd = (x + y) & 1;
+          const int nx = x + static_cast<int>(std::lround(pixels * cosines[odd][d]));
+          const int ny = y + static_cast<int>(std::lround(pixels * sines[odd][d]));
           if (nx < 0 || ny < 0 || nx >= width_ || ny >= height_) continue;
           const float step = (z - depth(nx, ny)) / ring.reach;  // -infinity before the background
           if (step > 0.05f) sum += std::min(1.0f, step) * std::exp(-0.35f * step);
@@ -252,7 +360,7 @@ Image Canvas::image() {
       for (int k = 0; k < 3; ++k)
         image.rgb[3 * static_cast<size_t>(y * image.width + x) + static_cast<size_t>(k)] =
             static_cast<uint8_t>(
-                std::lround(255 * std::clamp(to_srgb(share * sum[k]), 0.0f, 1.0f)));
+                std::lround(255 * std::clamp(linear_to_srgb(share * sum[k]), 0.0f, 1.0f)));
     }
   return image;
 }

@@ -1,11 +1,13 @@
 // A small software renderer with a perspective camera and a depth buffer. It draws smooth-shaded
-// surfaces, clouds as little spheres, and a ground with a grid and soft shadows; the depth buffer
-// gives ambient occlusion.
+// surfaces in one colour or with materials, clouds as little spheres, and a ground with a grid and
+// soft shadows; the depth buffer gives ambient occlusion.
 #pragma once
 
 #include <vector>
 
 #include "infer/render/image.h"
+#include "infer/render/texture.h"
+#include "nn/geometry/appearance.h"
 #include "nn/geometry/body.h"
 
 namespace restage {
@@ -27,7 +29,8 @@ struct SceneStyle {
   Colour background = colour_of(0xf7f8fa), ground = colour_of(0xe9ebef), grid = colour_of(0xcfd4dc);
 };
 
-/// A picture is drawn by begin(), then any number of draw_mesh() and draw_cloud(), then image().
+/// A picture is drawn by begin(), then any number of draw_mesh(), draw_surface() and draw_cloud(),
+/// then image().
 /// Points that are not finite are left out; so are triangles with such a corner, and triangles that
 /// reach behind the camera.
 class Canvas {
@@ -40,6 +43,11 @@ class Canvas {
   void begin(const Camera& camera, float floor, const Points& casts,
              const std::vector<Triangle>& faces);
   void draw_mesh(const Points& vertices, const std::vector<Triangle>& faces, const Colour& colour);
+  /// With its materials. What is seen through must be drawn last: it hides nothing behind it that
+  /// is drawn later. `pictures`: decode_pictures() of `look`.
+  using Pictures = std::vector<std::optional<TexturePicture>>;
+  void draw_surface(const Points& vertices, const std::vector<Triangle>& faces,
+                    const Appearance& look, const Pictures& pictures);
   void draw_cloud(const Points& points, const Colour& colour);
   Image image();
 
@@ -50,7 +58,14 @@ class Canvas {
     float x, y, z;
   };
   Projected project(const Point& p) const;
-  void fill_triangle(const Projected* corners, const Point* normals, const Colour& colour);
+  struct Facet;
+  /// paint(shares of the corners in the picture, distance): colour and opacity of a sample.
+  template <class Paint>
+  void fill_triangle(const Projected* corners, const Paint& paint);
+  std::vector<Facet> facets(const Points& vertices, const std::vector<Triangle>& faces,
+                            const Appearance& look) const;
+  static float texels_of(const Facet& facet, const Appearance& look, const Texture& texture,
+                         const TexturePicture& picture);
   void fill_sphere(const Projected& centre, float radius, float size, const Colour& colour);
   Colour shade(const Point& normal, const Colour& colour) const;
   Colour ground_at(const Point& at, float floor, const std::vector<float>& shadow) const;

@@ -6,6 +6,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "infer/writers/glb_detail.h"
 #include "nn/geometry/glb_file.h"
 #include "nn/geometry/mesh_file.h"
 
@@ -17,6 +18,7 @@ using glb::Json;
 using glb::three;
 
 constexpr float kNegligible = 1e-6f;  // a joint with a smaller weight is left out
+
 /// Unit normals of the vertices: means over the faces around a vertex, weighted by area. A vertex
 /// without faces gets a normal that points straight up.
 Points vertex_normals(const Mesh& mesh) {
@@ -240,7 +242,8 @@ std::string GlbWriter::bytes() const {
                                       {"roughnessFactor", 0.75}}}}});
   root["skins"] = Json::array({skin(buffer, bones, rig_)});
   if (frames() > 0)
-    root["animations"] = Json::array({tracks_.animation(buffer, options_.clip, options_.fps)});
+    root["animations"] =
+        Json::array({glb::animation(buffer, tracks_, options_.clip, options_.fps)});
   if (!confidence_.empty()) root["animations"][0]["extras"]["confidence"] = confidence_;
   if (!filled_.empty()) root["animations"][0]["extras"]["filled"] = filled_;
   buffer.describe(root);

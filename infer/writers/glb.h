@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "infer/writers/distances.h"
-#include "infer/writers/glb_parts.h"
+#include "infer/writers/tracks.h"
 #include "nn/geometry/body.h"
 
 namespace restage {

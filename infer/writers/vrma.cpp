@@ -2,6 +2,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "infer/writers/glb_detail.h"
 #include "nn/geometry/glb_file.h"
 
 namespace restage {
@@ -30,7 +31,7 @@ void VrmaWriter::commit() {
   root["scene"] = 0;
   root["scenes"] = glb::Json::array({{{"nodes", {0}}}});
   root["nodes"] = glb::nodes(rest_, rig_);
-  root["animations"] = glb::Json::array({tracks_.animation(buffer, clip_, fps_)});
+  root["animations"] = glb::Json::array({glb::animation(buffer, tracks_, clip_, fps_)});
   glb::Json bones;
   for (size_t j = 0; j < kJoints; ++j) bones[rig_.names[j]] = {{"node", j}};
   root["extensions"]["VRMC_vrm_animation"] = {{"specVersion", "1.0"},

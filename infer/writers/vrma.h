@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "infer/writers/glb_parts.h"
+#include "infer/writers/tracks.h"
 
 namespace restage {
 

@@ -15,11 +15,13 @@
 #include "datasets/readers/array_frames.h"
 #include "datasets/readers/asf.h"
 #include "datasets/readers/frame_folder.h"
+#include "datasets/readers/gltf_look.h"
 #include "datasets/readers/hdf5_frames.h"
 #include "datasets/readers/mesh_io.h"
 #include "datasets/readers/mesh_parsers.h"
 #include "datasets/schema.h"
 #include "experiments/cli/benchmark_config.h"
+#include "infer/render/texture.h"
 #include "nn/config/config.h"
 #include "nn/weights/bundle.h"
 #include "nn/weights/state.h"
@@ -100,6 +102,14 @@ void read_scene(const std::string& bytes) {
   for (const GltfClip& clip : file.clips) {
     clip_frames(file, clip);
     gltf_pose(file, clip, 0.5 * (clip.begin + clip.end));
+  }
+  const GltfLook look = parse_gltf_look(bytes, folder() / "x.glb");
+  std::vector<std::string> remarks;
+  decode_pictures(look.look, remarks);
+  gltf_look_mesh(look, gltf_rest(look.file), nullptr, 0);
+  for (const GltfClip& clip : look.file.clips) {
+    const double middle = 0.5 * (clip.begin + clip.end);
+    gltf_look_mesh(look, gltf_pose(look.file, clip, middle), &clip, middle);
   }
 }
 

@@ -1,5 +1,5 @@
-// What files of our own skeletons are made of: nodes, tracks, the binary chunk. Shared by GlbWriter
-// and VrmaWriter.
+// What files of our own skeletons are made of: nodes, an animation, the binary chunk. Shared by
+// GlbWriter and VrmaWriter.
 #pragma once
 
 #include <array>
@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "infer/writers/rig_convention.h"
+#include "infer/writers/tracks.h"
 
 namespace restage::glb {
 
@@ -42,22 +42,8 @@ int top_node(const RigConvention& rig);
 /// file, which is rounded.
 Joints placed_joints(const Json& nodes, const RigConvention& rig);
 
-/// Poses as the numbers of an animation: unit quaternions (x, y, z, w) whose signs make curves
-/// continuous, and the root's place.
-class Tracks {
- public:
-  explicit Tracks(const RigConvention& rig) : rig_(rig) {}
-  /// False: the pose is not finite, and was not taken.
-  [[nodiscard]] bool push(const Pose& pose);
-  size_t frames() const { return roots_.size() / 3; }
-  /// LINEAR, at `fps`; only the root is translated.
-  Json animation(Buffer& buffer, const std::string& name, double fps) const;
-
- private:
-  RigConvention rig_;
-  std::vector<std::array<float, 4>> turns_;  ///< 22 a frame
-  std::vector<float> roots_;                 ///< 3 numbers a frame
-};
+/// LINEAR, at `fps`; only the root is translated.
+Json animation(Buffer& buffer, const Tracks& tracks, const std::string& name, double fps);
 
 std::vector<float> three(const Eigen::Vector3f& p);
 

@@ -1,13 +1,9 @@
-#include "infer/writers/glb_parts.h"
+#include "infer/writers/glb_detail.h"
+
+#include <algorithm>
 
 namespace restage::glb {
 namespace {
-
-/// The turn of a node with its convention's axes that turns joint `j` by `local`.
-Mat3 in_axes(const RigConvention& rig, size_t j, const Mat3& local) {
-  const Mat3 above = j == 0 ? Mat3(Mat3::Identity()) : rig.axes[static_cast<size_t>(kParents[j])];
-  return above.transpose() * local * rig.axes[j];
-}
 
 Json node(const std::string& name, const Vec3& translation, const Mat3& rotation) {
   Json out = {{"name", name}, {"translation", three(translation.cast<float>())}};
@@ -83,30 +79,9 @@ Joints placed_joints(const Json& nodes, const RigConvention& rig) {
   return out;
 }
 
-bool Tracks::push(const Pose& pose) {
-  bool finite = pose.root.allFinite();
-  for (const Mat3& r : pose.local) finite = finite && r.allFinite();
-  if (!finite) return false;
-  const size_t before = turns_.size();
-  for (size_t j = 0; j < kJoints; ++j) {
-    Eigen::Vector4d c = Quat(in_axes(rig_, j, pose.local[j])).normalized().coeffs();  // x, y, z, w
-    // q and -q are the same rotation. LINEAR interpolates the short way only if two quaternions
-    // that follow each other have signs that agree.
-    double side = c[3];
-    if (before > 0) {
-      const std::array<float, 4>& last = turns_[before - kJoints + j];
-      side = c[0] * last[0] + c[1] * last[1] + c[2] * last[2] + c[3] * last[3];
-    }
-    if (side < 0) c = -c;
-    turns_.push_back({static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2]),
-                      static_cast<float>(c[3])});
-  }
-  for (int k = 0; k < 3; ++k) roots_.push_back(static_cast<float>(pose.root[k]));
-  return true;
-}
-
-Json Tracks::animation(Buffer& buffer, const std::string& name, double fps) const {
-  std::vector<float> times(frames());
+Json animation(Buffer& buffer, const Tracks& tracks, const std::string& name, double fps) {
+  const size_t frames = tracks.frames();
+  std::vector<float> times(frames);
   for (size_t f = 0; f < times.size(); ++f)
     times[f] = static_cast<float>(static_cast<double>(f) / fps);
   const int input = buffer.add(times.data(), times.size() * 4, times.size(), f32, "SCALAR", none);
@@ -116,11 +91,12 @@ Json Tracks::animation(Buffer& buffer, const std::string& name, double fps) cons
     channels.push_back({{"sampler", samplers.size()}, {"target", {{"node", at}, {"path", path}}}});
     samplers.push_back({{"input", input}, {"interpolation", "LINEAR"}, {"output", output}});
   };
-  channel(0, "translation", buffer.add(roots_.data(), frames() * 12, frames(), f32, "VEC3", none));
-  std::vector<std::array<float, 4>> track(frames());
+  channel(0, "translation",
+          buffer.add(tracks.roots().data(), frames * 12, frames, f32, "VEC3", none));
+  std::vector<std::array<float, 4>> track(frames);
   for (size_t j = 0; j < kJoints; ++j) {
-    for (size_t f = 0; f < frames(); ++f) track[f] = turns_[f * kJoints + j];
-    channel(j, "rotation", buffer.add(track.data(), frames() * 16, frames(), f32, "VEC4", none));
+    for (size_t f = 0; f < frames; ++f) track[f] = tracks.turns()[f * kJoints + j];
+    channel(j, "rotation", buffer.add(track.data(), frames * 16, frames, f32, "VEC4", none));
   }
   return {{"name", name}, {"channels", channels}, {"samplers", samplers}};
 }
