@@ -195,18 +195,20 @@ Showing view_gltf(const ShowRequest& request) {
 // -----------------------------------------------------------------------------
 
 Showing view_take(const ShowRequest& request, std::vector<Joints>& joints) {
-  MotionOptions options;
-  options.force = true;
-  options.profile = request.bones;
-  if (request.scale != 1) options.scale = request.scale;
-  if (request.up != "y") options.rest.up = parse_axis(request.up, "--up");
+  TakeOptions options;
+  options.motion.force = true;
+  options.motion.profile = request.bones;
+  if (request.scale != 1) options.motion.scale = request.scale;
+  if (request.up != "y") options.motion.rest.up = parse_axis(request.up, "--up");
+  options.clip = request.clip;
+  options.sequence = request.sequence;
   const SkeletonTake take = [&] {
     try {
-      return read_take(request.path, options, request.clip);
+      return read_take(request.path, options);
     } catch (const InputError&) {  // --fps also says the rate of a file that states none
       if (!request.fps) throw;
-      options.fps = *request.fps;
-      return read_take(request.path, options, request.clip);
+      options.motion.fps = *request.fps;
+      return read_take(request.path, options);
     }
   }();
   Showing view;
@@ -223,14 +225,14 @@ Showing view_frames(const ShowRequest& request, std::vector<Joints>& joints) {
     throw InputError(request.path, "has no clips by name", "leave --clip out");
   Showing view;
   view.clip = read_clip({.path = request.path,
-                         .sequence = request.sequence,
+                         .sequence = request.sequence.value_or(0),
                          .scale = request.scale,
                          .up = request.up},
                         "", request.max_memory, view.remarks);
   if (!has_joints(request.path)) return view;
   joints.resize(view.clip.frames.size());
   for (size_t j = 0; j < kJoints; ++j) {
-    const std::vector<Point> places = read_focus(request.path, j, request.sequence);
+    const std::vector<Point> places = read_focus(request.path, j, request.sequence.value_or(0));
     for (size_t f = 0; f < std::min(joints.size(), places.size()); ++f)
       joints[f][j] = places[f].cast<double>();
   }

@@ -22,9 +22,9 @@ struct ShowRequest {
   bool single = false;
   std::optional<int64_t> frame;
   std::optional<double> seconds;
-  int64_t sequence = 0;  ///< of an HDF5 file
-  std::string up = "y";  ///< of scans and recordings: the axis that points up
-  double scale = 1;      ///< metres per unit, of all but glTF
+  std::optional<int64_t> sequence;  ///< of an HDF5 file; nothing: the only one, of scans the first
+  std::string up = "y";             ///< of scans and recordings: the axis that points up
+  double scale = 1;                 ///< metres per unit, of all but glTF
   uint64_t max_memory = 0;
 };
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "autograd/base/format.h"
+#include "datasets/builtin/body_shape.h"
 #include "datasets/importers/amass.h"
 #include "datasets/importers/amc.h"
 #include "datasets/importers/bvh.h"
@@ -92,10 +93,10 @@ SkeletonTake of_parameters(const std::string& path, const TakeOptions& options) 
     const Motion read = import_amass(file, models, motion, report, &fingers);
     return of_motion(read, std::move(report), std::move(fingers));
   }
-  Joints stand_in = options.like;
+  const Joints like = options.like.value_or(shape_joints({}));
+  Joints stand_in = like;
   // `trans` is where the pelvis is, but for some 25 cm that each model has its own way.
-  for (Vec3& x : stand_in)
-    x = kLegs / std::max(leg_length(options.like), 1e-9) * (x - options.like[kPelvis]);
+  for (Vec3& x : stand_in) x = kLegs / std::max(leg_length(like), 1e-9) * (x - like[kPelvis]);
   const Motion read = import_amass(file, stand_in, motion, report, &fingers);
   report.remark(
       format("no body model: turns go over as they are, and the path as that of a person with legs "

@@ -35,9 +35,10 @@ struct TakeOptions {
   std::optional<int64_t> sequence = std::nullopt;  ///< of a file of motions, from 0
   /// Of a body model's parameters: the model or a folder of models (BodyModels). Empty: `like`.
   std::string body_model = {};
-  /// Rest joints of who performs. Where parameters come without a body model, a skeleton of this
-  /// shape with an adult's legs stands in: turns go over as they are.
-  Joints like = {};
+  /// Rest joints of who performs; nothing: an average built-in body. Where parameters come without
+  /// a body model, a skeleton of this shape with an adult's legs stands in: turns go over as they
+  /// are.
+  std::optional<Joints> like = std::nullopt;
 };
 
 SkeletonTake read_take(const std::string& path, const TakeOptions& options);

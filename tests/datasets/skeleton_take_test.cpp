@@ -164,7 +164,7 @@ TEST_F(ParametersTest, TurnsGoOverWithAndWithoutABodyModel) {
     ASSERT_TRUE(holds_take(path));
     TakeOptions options;
     options.like = testing::tiny_joints();
-    for (Vec3& x : options.like) x *= 1.3;
+    for (Vec3& x : *options.like) x *= 1.3;
     const SkeletonTake bare = read_take(path, options);
     EXPECT_HAS(remarks(bare.report), "no body model");
     options.body_model = dir.write("model.npz", test::TinySmpl{family}.file());
@@ -193,7 +193,7 @@ TEST_F(ParametersTest, TurnsGoOverWithAndWithoutABodyModel) {
       }
     }
     // Without a model, the turns of who performs are the file's.
-    const Pose pose = perform_take(bare, 12, options.like);
+    const Pose pose = perform_take(bare, 12, *options.like);
     const Rotations global = to_global(pose.local), wanted = turns(clip, 12 / kFps);
     for (size_t j = 0; j < kJoints; ++j) EXPECT_LT((global[j] - wanted[j]).norm(), 1e-4);
   }
