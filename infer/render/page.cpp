@@ -29,6 +29,10 @@ constexpr const char* kStyle =
 constexpr const char* kScript =
 #include "infer/render/viewer/viewer.js.inc"
     ;
+/// Of the page of a stream only: other pages ask for nothing.
+constexpr const char* kLiveScript =
+#include "infer/render/viewer/live.js.inc"
+    ;
 constexpr const char* kErrorsBox =
     "<label><input id=\"errors\" type=\"checkbox\" checked> errors</label>\n";
 constexpr size_t kMostStride = 4;         // every so many frames, before surfaces are thinned
@@ -340,6 +344,12 @@ std::string note_of(const Plan& plan, bool errors) {
   return note;
 }
 
+std::string script(bool live) {
+  std::string out = kScript;
+  const std::string_view mark = "// @LIVE@\n";
+  return out.replace(out.find(mark), mark.size(), live ? kLiveScript : "");
+}
+
 }  // namespace
 
 std::string page_html(const std::vector<Clip>& clips, const PageOptions& options) {
@@ -377,7 +387,7 @@ std::string page_html(const std::vector<Clip>& clips, const PageOptions& options
                     {"ERRORS", any_errors ? kErrorsBox : ""},
                     {"META", script_json(meta.dump(-1, ' ', true, Json::error_handler_t::replace))},
                     {"DATA", data},
-                    {"SCRIPT", kScript}});
+                    {"SCRIPT", script(options.live)}});
 }
 
 void write_page(const std::string& path, const std::vector<Clip>& clips,

@@ -139,7 +139,8 @@ TEST(GltfLook, MorphTargetsRestAndMove) {
   EXPECT_TRUE(at(0, 1)[0].isApprox(Point(0, 1, 1)));
   EXPECT_EQ(at(1, 0.5)[0], Point(0, 0, 0)) << "STEP";
   EXPECT_TRUE(at(1, 1)[0].isApprox(Point(0, 1, 1)));
-  EXPECT_EQ(read_gltf((dir.path() + "/strip.glb")).clips.size(), 1u) << "and the plain reader has none";
+  EXPECT_EQ(read_gltf((dir.path() + "/strip.glb")).clips.size(), 1u)
+      << "and the plain reader has none";
 }
 
 TEST(GltfLook, NonsenseOfLooksIsLeftOutAndSaid) {
