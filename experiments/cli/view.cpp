@@ -256,8 +256,8 @@ void add_view(Program& program) {
   ShowRequest& r = options.request;
   app.add_option(
          "FILE", r.path,
-         "glTF (.glb, .gltf, .vrm, .vrma), BVH, AMC, a result or scans (HDF5), PLY, OBJ, or "
-         "a folder of frames")
+         "glTF (.glb, .gltf, .vrm, .vrma), FBX, BVH, AMC, AMASS (.npz), a result, scans or motions "
+         "(HDF5), PLY, OBJ, or a folder of frames")
       .required();
   app.add_option("--out", options.out,
                  "picture.png, animation.webp, animation.gif or page.html (default: a page in the "
