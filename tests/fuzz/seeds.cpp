@@ -415,6 +415,14 @@ std::vector<Seed> seeds(std::string_view target) {
          return Seeds{{"map", "a.*: skeleton.*\nb.0.bias: ~\n'x': y\n", Cut::any}};
        }},
       {"hdf5", hdf5_seeds},
+      {"stream",
+       [] {
+         std::string frames;
+         for (const uint32_t points : {2u, 0u, 40u})
+           frames += test::raw(points) + test::raw(0.1 * points) +
+                     std::string(12 * size_t{points}, '\x3f');
+         return Seeds{{"frames", frames, Cut::any}};
+       }},
       {"doctor", doctor_seeds},
       {"sequence", sequence_seeds},
       {"import", import_seeds},

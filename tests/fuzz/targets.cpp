@@ -4,6 +4,7 @@
 #include <cstring>
 #include <exception>
 #include <functional>
+#include <span>
 #include <sstream>
 
 #include "autograd/base/atomic_file.h"
@@ -21,6 +22,7 @@
 #include "datasets/readers/mesh_parsers.h"
 #include "datasets/schema.h"
 #include "experiments/cli/benchmark_config.h"
+#include "infer/live/frame_parser.h"
 #include "infer/render/texture.h"
 #include "nn/config/config.h"
 #include "nn/weights/bundle.h"
@@ -244,6 +246,23 @@ void read_names(const std::string& bytes) {
   NameMap::parse(bytes, "x.yaml").apply(file, "x");
 }
 
+/// Frames of a stream, cut anywhere on their way.
+void read_stream(const std::string& bytes) {
+  live::FrameParser parser;
+  const size_t step = 1 + checksum(bytes).back() % 61;
+  const std::span all(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
+  for (size_t at = 0; at < all.size(); at += step) {
+    const std::string why = parser.take(
+        all.subspan(at, std::min(step, all.size() - at)), {},
+        [](live::LiveCloud& cloud) {
+          for (const Point& p : cloud.points)
+            if (!p.allFinite()) throw std::logic_error("a point is not finite");
+        },
+        [](const std::string&) {});
+    if (!why.empty()) throw InputError("stream", why, "send frames");
+  }
+}
+
 // ---- HDF5 --------------------------------------------------------------------------------------
 
 void read_hdf5(const std::string& bytes) {
@@ -294,6 +313,7 @@ const std::vector<Target>& targets() {
       {"profile", "yaml", kShort, 65, 300, read_profile},
       {"names", "yaml", kShort, 65, 300, read_names},
       {"hdf5", "", kLong, 1040, 1100, read_hdf5},
+      {"stream", "", kShort, 65, 500, read_stream},
       {"doctor", "obj", kShort, 65, 10, doctor_surface},
       {"sequence", "npy", kShort, 65, 20, doctor_sequence},
       {"import", "bvh", kShort, 65, 20, import_file},
