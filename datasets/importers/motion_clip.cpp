@@ -226,6 +226,9 @@ MotionClip make_clip(Recording recording, const std::string& path, const MotionO
   const JointMap& map = recording.names.map;
   const RestPose rest = find_rest_pose(motion, map, options.rest, report);
   check_handedness(rest.joints, options.force, report);
+  const auto hips = static_cast<size_t>(map[kPelvis].joint);
+  clip.rest_y =
+      (rest.align * (motion.skeleton.offsets[0] + zero_positions(motion.skeleton)[hips])).y();
   cut_frames(motion, *recording.names.profile, options, report);
   const double fps = motion.fps;
   const size_t frames = motion.local.size();

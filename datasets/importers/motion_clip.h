@@ -42,6 +42,7 @@ struct MotionClip {
   Motion motion;
   std::vector<FingerTurns> fingers;  ///< per frame; empty: not asked for, or the source has none
   std::vector<Joints> joints;        ///< the source's own 22 joints per frame, world, metres, y up
+  double rest_y = 0;                 ///< height of the pelvis where the file's zero pose has it
   double floor_y = 0;                ///< height of the clip's floor in that world
   double scale = 0;                  ///< metres per unit of the file
   ImportReport report;

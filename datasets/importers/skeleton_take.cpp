@@ -28,10 +28,13 @@ double lowest_foot_of(const Joints& joints) {
 }
 
 /// Puts the rest pose upright over the place where frames have their floor: its feet stand on it.
+/// A rest pose that stands within 5 cm of it is believed.
 void stand_on_floor(SkeletonTake& p) {
+  constexpr double kNear = 0.05;  // metres
   std::vector<double> lowest;
   for (const PosedSkeleton& frame : p.frames) lowest.push_back(lowest_foot(frame));
   const double lift = floor_height(std::move(lowest)) - lowest_foot_of(p.rest);
+  if (std::abs(lift) < kNear) return;
   for (Vec3& x : p.rest) x.y() += lift;
 }
 
@@ -127,6 +130,7 @@ SkeletonTake of_recording(const std::string& path, const MotionOptions& options)
   SkeletonTake out;
   out.name = stem_of(path);
   out.rest = clip.motion.rest;
+  for (Vec3& x : out.rest) x.y() += clip.rest_y - clip.motion.rest[kPelvis].y();
   out.report = std::move(clip.report);
   out.fingers = std::move(clip.fingers);
   out.frames.resize(clip.joints.size());

@@ -268,7 +268,7 @@ TEST(Film, AFrameIsTheSameAloneAndAmongOthers) {
 // -----------------------------------------------------------------------------
 
 /// A red square that walks over a wide ramp of greys.
-std::vector<Image> walk(int frames) {
+std::vector<Image> film_of_a_walk(int frames) {
   std::vector<Image> out;
   for (int f = 0; f < frames; ++f) {
     Image image(96, 48, {0, 0, 0});
@@ -291,7 +291,7 @@ double difference(const Image& a, const uint8_t* pixels, size_t width) {
 }
 
 TEST(Webp, DecodesToWhatWentIn) {
-  const std::vector<Image> frames = walk(8);
+  const std::vector<Image> frames = film_of_a_walk(8);
   const auto writer = webp_writer(25);
   for (const Image& image : frames) writer->push(image);
   const std::string bytes = writer->finish();
@@ -329,7 +329,7 @@ struct GifInput {
 };
 
 TEST(Gif, DecodesToWhatWentIn) {
-  const std::vector<Image> frames = walk(8);
+  const std::vector<Image> frames = film_of_a_walk(8);
   const auto writer = gif_writer(15, {frames[0], frames[4]});
   for (const Image& image : frames) writer->push(image);
   GifInput input{writer->finish()};
