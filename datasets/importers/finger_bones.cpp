@@ -7,7 +7,7 @@
 namespace restage {
 namespace {
 
-constexpr int kFingers = 5, kBones = 3;
+constexpr int kFingers = 5, kLength = 3;
 
 /// What fingers are called, thumb to little finger.
 const std::vector<std::string> kFingerNames[kFingers] = {
@@ -65,8 +65,8 @@ FingerBones find_fingers(const std::vector<std::string>& names, const std::vecto
       if (finger < 0) continue;
       // The first of a finger, or the one that hangs on what was found last.
       int* const chain = &out[static_cast<size_t>(finger_bone(side, finger, 0))];
-      const int length = static_cast<int>(std::find(chain, chain + kBones, -1) - chain);
-      if (length < kBones && (length == 0 || chain[length - 1] == parents[b]))
+      const int length = static_cast<int>(std::find(chain, chain + kLength, -1) - chain);
+      if (length < kLength && (length == 0 || chain[length - 1] == parents[b]))
         chain[length] = static_cast<int>(b);
     }
   }
