@@ -58,8 +58,8 @@ std::vector<Landmark> landmarks(const Joints& joints, const std::string& look) {
   if (look == "feet")
     return {beyond(kLeftFoot, kLeftAnkle, 0, 0.2f), beyond(kRightFoot, kRightAnkle, 0, 0.2f)};
   std::vector<Landmark> out;
-  if (look != "right-hand") out.push_back(beyond(kLeftWrist, kLeftElbow, 0.35, 0.15f));
-  if (look != "left-hand") out.push_back(beyond(kRightWrist, kRightElbow, 0.35, 0.15f));
+  if (look != "right-hand") out.push_back(beyond(kLeftWrist, kLeftElbow, 0.35, 0.18f));
+  if (look != "left-hand") out.push_back(beyond(kRightWrist, kRightElbow, 0.35, 0.18f));
   return out;
 }
 
@@ -74,7 +74,7 @@ void look_at(Showing& view, const std::vector<Joints>& joints, const ShowRequest
   if (request.single && joints.size() == 1) view.facing = facing(joints[0]);
   if (request.look.empty()) return;
   if (joints.size() != view.clip.frames.size())
-    throw InputError(request.path, "does not say where its " + request.look + " is",
+    throw InputError(request.path, "does not say where to look for " + request.look,
                      "leave --look out, or name its bones with --bones");
   for (const Joints& frame : joints) {
     const std::vector<Landmark> marks = landmarks(frame, request.look);

@@ -1,5 +1,6 @@
 #include "datasets/characters/gltf_clip.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -52,8 +53,22 @@ void GltfClipWriter::commit() {
   if (options_.animation_only) document.keep_nodes_only();
   if (frames() > 0) {
     const size_t count = nodes_.size();
-    GltfDocument::Clip clip{options_.name,     options_.fps, frames(),    {},
-                            rig_->hips_node(), hips_,        confidence_, filled_};
+    GltfDocument::Clip clip;
+    clip.name = options_.name;
+    clip.fps = options_.fps;
+    clip.frames = frames();
+    clip.hips = rig_->hips_node();
+    clip.places = hips_;
+    clip.confidence = confidence_;
+    clip.filled = filled_;
+    for (const GltfNode& node : rig_->file().nodes) {
+      if (node.number != clip.hips &&
+          std::find(nodes_.begin(), nodes_.end(), node.number) == nodes_.end())
+        continue;
+      const Vec3 &t = node.translation, &s = node.scale;
+      const Eigen::Vector4d r = node.rotation.normalized().coeffs();
+      clip.rest[node.number] = {t[0], t[1], t[2], r[0], r[1], r[2], r[3], s[0], s[1], s[2]};
+    }
     for (size_t i = 0; i < count; ++i) {
       auto& track = clip.turns.emplace_back(nodes_[i], std::vector<std::array<float, 4>>());
       for (size_t f = 0; f < frames(); ++f) track.second.push_back(turns_[f * count + i]);

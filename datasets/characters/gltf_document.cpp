@@ -127,6 +127,13 @@ void GltfDocument::append(const Clip& clip) {
   std::vector<float> times(clip.frames);
   for (size_t f = 0; f < times.size(); ++f)
     times[f] = static_cast<float>(static_cast<double>(f) / clip.fps);
+  for (const auto& [number, r] : clip.rest) {
+    Json& node = s.json["nodes"][static_cast<size_t>(number)];
+    if (node.erase("matrix") == 0) continue;
+    node["translation"] = {r[0], r[1], r[2]};
+    node["rotation"] = {r[3], r[4], r[5], r[6]};
+    node["scale"] = {r[7], r[8], r[9]};
+  }
   const size_t input = accessor(times.data(), times.size(), "SCALAR", times.size());
   s.json["accessors"][input]["min"] = {times.front()};
   s.json["accessors"][input]["max"] = {times.back()};

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -23,6 +24,9 @@ class GltfDocument {
     size_t frames;
     /// Numbers of nodes and their local rotations (x, y, z, w), one a frame.
     std::vector<std::pair<int, std::vector<std::array<float, 4>>>> turns;
+    /// Of all nodes that are turned or moved: translation, rotation (x, y, z, w) and scale, in the
+    /// place of a `matrix`, which the format does not let an animation turn.
+    std::map<int, std::array<double, 10>> rest;
     int hips;                   ///< number of the node that is moved
     std::vector<float> places;  ///< its translation, 3 numbers a frame
     std::vector<double> confidence;

@@ -57,13 +57,26 @@ Eigen::Affine3d bind_space(const Gltf& file, const std::vector<GltfBone>& bones,
       format("the nodes rest in another pose than the skin was made in (up to %.0f degrees): the "
              "skin's is taken",
              off.degrees));
-  // Where the root itself rests turned, the node that wears the mesh says how the mesh stands.
-  const int wearer = file.skin_nodes[top.skin];
-  if (wearer < 0) return by_root;
-  const Eigen::Affine3d& by_mesh = rest[wearer];
-  const double ratio =
-      by_mesh.linear().determinant() / std::max(std::abs(by_root.linear().determinant()), 1e-300);
-  return std::abs(std::cbrt(ratio) - 1) < 0.01 ? by_mesh : by_root;
+  // Where the root itself rests turned, it does not say how the mesh stands. Makers store vertices
+  // in the space of the node that wears the mesh, of the bones' parent, or in the world (Blender):
+  // the one of the root's scale that the root tilts least from.
+  std::vector<Eigen::Affine3d> spaces;
+  if (const int wearer = file.skin_nodes[top.skin]; wearer >= 0) spaces.push_back(rest[wearer]);
+  if (const int above = file.nodes[top.node].parent; above >= 0) spaces.push_back(rest[above]);
+  spaces.push_back(Eigen::Affine3d::Identity());
+  const Eigen::Affine3d* best = &by_root;
+  double least = 180;
+  for (const Eigen::Affine3d& space : spaces) {
+    const double ratio =
+        space.linear().determinant() / std::max(std::abs(by_root.linear().determinant()), 1e-300);
+    if (!(std::abs(std::cbrt(ratio) - 1) < 0.01)) continue;
+    const Mat3 turn = rotation_of(by_root.linear()) * rotation_of(space.linear()).transpose();
+    const double tilt = angle_between(turn * Vec3::UnitY(), Vec3::UnitY()) / kDegree;
+    if (tilt > least - 1) continue;  // nearly alike: the first
+    least = tilt;
+    best = &space;
+  }
+  return *best;
 }
 
 GltfTransforms bind_pose(const Gltf& file, ImportReport& report) {
@@ -176,9 +189,9 @@ double find_scale(const Joints& joints, double given, ImportReport& report) {
             : leg >= 1400 && leg < 4000 ? 0.001
                                         : 0.0;
     if (scale == 0)
-      throw InputError(report.file,
-                       "a leg of " + format("%.3g", leg) + " units is no person's in metres",
-                       "give --scale (metres per unit)");
+      throw InputError(
+          report.file, "a leg of " + format("%.3g", leg) + " units is no person's in metres",
+          "export it in metres (where a command has --scale, that says the unit, too)");
     how = scale == 1.0 ? "the format's" : unit_name(scale) + " by the leg";
   }
   report.fact("units", format("%g m (%s; the leg has %.3g)", scale, how.c_str(), leg));
@@ -380,7 +393,9 @@ GltfRig find_rig(const Gltf& file, const MotionOptions& options, ImportReport& r
   return rig;
 }
 
-Mat3 rotation_of(const Mat3& m) {
+Mat3 rotation_of(const Mat3& given) {
+  // Of a mirror the rotation behind a point reflection, the same way for all nodes below it.
+  const Mat3 m = given.determinant() < 0 ? Mat3(-given) : given;
   const Mat3 unscaled = m / std::cbrt(std::max(std::abs(m.determinant()), 1e-300));
   if ((unscaled.transpose() * unscaled - Mat3::Identity()).cwiseAbs().maxCoeff() < 1e-9 &&
       unscaled.determinant() > 0)

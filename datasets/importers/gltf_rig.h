@@ -42,7 +42,7 @@ SkinWeights joint_weights(const Gltf& file, const GltfRig& rig);
 /// Moves the lowest point to y = 0 and `pelvis` over the origin; returns what was taken off.
 Vec3 put_on_floor(Mesh& mesh, const Vec3& pelvis);
 
-/// The rotation in a matrix that may also scale.
+/// The rotation in a matrix that may also scale and mirror.
 Mat3 rotation_of(const Mat3& m);
 
 /// Positions of the 22 joints in the T-pose, our axes and metres.

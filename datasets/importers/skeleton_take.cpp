@@ -124,9 +124,10 @@ bool holds_parameters(const std::string& path) {
   }
 }
 
-SkeletonTake of_recording(const std::string& path, const MotionOptions& options) {
+SkeletonTake of_recording(const std::string& path, const TakeOptions& take) {
+  const MotionOptions& options = take.motion;
   const bool amc = text::ends_in(path, {".amc", ".amc.xz"});
-  MotionClip clip = amc ? read_amc(path, "", options) : read_bvh(path, options);
+  MotionClip clip = amc ? read_amc(path, take.asf, options) : read_bvh(path, options);
   SkeletonTake out;
   out.name = stem_of(path);
   out.rest = clip.motion.rest;
@@ -167,6 +168,7 @@ SkeletonTake of_gltf(const std::string& path, const MotionOptions& options,
   const GltfClip& clip = name.empty() ? first_clip(file, rig) : find_clip(file, name);
   out.name = clip.name;
   out.frames = clip_poses(file, rig, clip, clip_frames(file, clip), out.report);
+  out.own_floor = true;
   out.fingers = clip_fingers(file, rig, clip, std::ssize(out.frames));
   // Where a file rests with its hips at the origin, its rest pose does not say where the floor is.
   constexpr double kNear = 0.1;  // metres
@@ -189,7 +191,11 @@ bool holds_take(const std::string& path, const std::string& bones, std::string* 
   if (text::ends_in(path, {".npz"})) return holds_parameters(path);
   if (!is_gltf_name(path)) return false;
   const Gltf file = read_gltf(path);
-  if (file.clips.empty()) return false;
+  if (file.clips.empty()) {
+    if (file.skin_nodes.empty()) return false;
+    throw InputError(path, "is a character without an animation",
+                     "give one that moves, or look at its surface with --from-surface");
+  }
   try {
     MotionOptions options;
     options.force = true;
@@ -228,7 +234,7 @@ SkeletonTake read_any(const std::string& path, const TakeOptions& options) {
   if (is_motions_name(path)) return of_motions(path, options);
   if (!options.clip.empty())
     throw InputError(path, "is one recording, of which no clip can be chosen", "leave --clip out");
-  return is_recording(path) ? of_recording(path, options.motion) : of_parameters(path, options);
+  return is_recording(path) ? of_recording(path, options) : of_parameters(path, options);
 }
 
 }  // namespace
@@ -237,6 +243,18 @@ SkeletonTake read_take(const std::string& path, const TakeOptions& options) {
   SkeletonTake out = read_any(path, options);
   if (!fingers_move(out)) out.fingers.clear();
   return out;
+}
+
+void put_on_floor(SkeletonTake& take, const Joints& rest) {
+  constexpr double kSeen = 0.03;  // metres
+  if (take.own_floor || take.frames.empty()) return;
+  std::vector<double> lowest;
+  for (size_t f = 0; f < take.frames.size(); ++f)
+    lowest.push_back(lowest_foot(forward_kinematics(rest, perform_take(take, f, rest))));
+  const double off = floor_height(std::move(lowest)) - lowest_foot_of(rest);
+  if (std::abs(off) < kSeen) return;
+  const double scale = leg_length(rest) / std::max(leg_length(take.rest), 1e-9);
+  for (Vec3& x : take.rest) x.y() += off / std::max(scale, 1e-9);
 }
 
 Pose perform_take(const SkeletonTake& take, size_t frame, const Joints& rest) {

@@ -15,6 +15,7 @@ struct SkeletonTake {
   Joints rest;       ///< the T-pose that turns are counted from, metres, y up, facing +z
   /// At 30 fps: world turns from the T-pose, and joints, in the world in which `rest` stands.
   std::vector<PosedSkeleton> frames;
+  bool own_floor = false;            ///< the source says where its floor is
   std::vector<FingerTurns> fingers;  ///< the same of fingers; empty: the source has none
   ImportReport report;
 };
@@ -34,6 +35,7 @@ struct TakeOptions {
   std::string clip = {};
   std::optional<int64_t> sequence = std::nullopt;  ///< of a file of motions, from 0
   /// Of a body model's parameters: the model or a folder of models (BodyModels). Empty: `like`.
+  std::string asf = {};  ///< of an AMC file; empty: the one beside it
   std::string body_model = {};
   /// Rest joints of who performs; nothing: an average built-in body. Where parameters come without
   /// a body model, a skeleton of this shape with an adult's legs stands in: turns go over as they
@@ -42,6 +44,11 @@ struct TakeOptions {
 };
 
 SkeletonTake read_take(const std::string& path, const TakeOptions& options);
+
+/// Lifts or lowers a recording as a whole where whoever performs it would float or sink: a
+/// recording does not say where its floor is, and rest poses have their feet in many ways. Within 3
+/// cm, and of a source that says it, the floor stays.
+void put_on_floor(SkeletonTake& take, const Joints& rest);
 
 /// One frame of it by a skeleton of these rest joints, which stands in T-pose on y = 0: the same
 /// world turns; thighs, shins, upper arms and forearms point where the source's do (whose rest

@@ -463,9 +463,11 @@ Gltf parse_gltf(std::string_view content, const std::string& path) {
   return out;
 }
 
-std::string read_gltf_bytes(const std::string& path) {
+std::string read_gltf_bytes(const std::string& path, std::vector<std::string>* remarks) {
   std::string content = read_file(path);
-  return is_fbx_name(path) ? fbx_as_glb(content, path, nullptr) : content;
+  if (!is_fbx_name(path)) return content;
+  refuse_foreign_content(content, path);
+  return fbx_as_glb(content, path, remarks);
 }
 
 Gltf read_gltf(const std::string& path) { return parse_gltf(read_file(path), path); }

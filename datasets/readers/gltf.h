@@ -89,7 +89,7 @@ Gltf read_gltf(const std::string& path);
 /// The same from memory; external buffers are looked for in the folder of `path`.
 Gltf parse_gltf(std::string_view content, const std::string& path);
 /// The bytes of the document: the file's own; of FBX those that it is made into.
-std::string read_gltf_bytes(const std::string& path);
+std::string read_gltf_bytes(const std::string& path, std::vector<std::string>* remarks = nullptr);
 
 using GltfTransforms = std::vector<Eigen::Affine3d>;
 

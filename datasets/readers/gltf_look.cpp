@@ -394,7 +394,10 @@ GltfLook parse_gltf_look(std::string_view content, const std::string& path) {
 }
 
 GltfLook read_gltf_look(const std::string& path) {
-  return parse_gltf_look(read_gltf_bytes(path), path);
+  std::vector<std::string> remarks;
+  GltfLook out = parse_gltf_look(read_gltf_bytes(path, &remarks), path);
+  out.file.remarks.insert(out.file.remarks.begin(), remarks.begin(), remarks.end());
+  return out;
 }
 
 }  // namespace restage

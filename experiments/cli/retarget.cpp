@@ -12,6 +12,7 @@
 #include "autograd/kernels/kernel.h"
 #include "datasets/doctor/examine.h"
 #include "datasets/importers/skeleton_take.h"
+#include "datasets/readers/text.h"
 #include "datasets/schema.h"
 #include "experiments/cli/output.h"
 #include "experiments/cli/profile.h"
@@ -33,7 +34,7 @@ void check(const RetargetCommand& c) {
   check_options(c.options);
   std::vector<std::string> inputs = {c.source.path, c.target};
   if (!c.weights.empty()) inputs.push_back(weights_path(c.weights));
-  for (const std::string& more : {c.rest, c.bones, c.source_bones, c.body_model})
+  for (const std::string& more : {c.rest, c.bones, c.source_bones, c.body_model, c.asf})
     if (!more.empty()) inputs.push_back(more);
   check_output(c.to.out, inputs);
 }
@@ -223,8 +224,7 @@ void print_outcome(const RetargetCommand& c, const Common& common, const Source&
 int run_retarget(const RetargetCommand& c, const Common& common) {
   check(c);
   std::string no_skeleton;
-  if (!c.from_surface && holds_take(c.source.path, c.source_bones, &no_skeleton))
-    return run_take(c, common);
+  if (!c.from_surface && has_take(c, &no_skeleton)) return run_take(c, common);
   if (!c.source_bones.empty() || !c.body_model.empty())
     throw InputError(c.source.path, "is looked at as a surface, which has no skeleton",
                      "leave --source-bones and --body-model out");
@@ -237,6 +237,7 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
                      "choose one with --sequence N, from 0");
   input.options.fps = source.fps();
   TargetMesh target = read_target(c.target, c.bones);
+  check_kept(c, target);
   check_inputs(c, source, target);
   const auto system = system_for(c, std::move(input), target);
   Gaps gaps(source.frames(), source.fps() / static_cast<double>(c.to.every), c.options.force);
@@ -304,6 +305,14 @@ void check_options(const RetargetOptions& options) {
     throw InputError("", "--samples is out of range", "give 1 to 256");
 }
 
+void check_kept(const RetargetCommand& c, const TargetMesh& target) {
+  if (target.unknown_rig.empty() || !c.to.skeleton.empty()) return;
+  if (!text::ends_in(c.to.out, {".glb", ".gltf", ".vrm"})) return;
+  throw InputError(c.target, "its rig was not recognised: " + target.unknown_rig,
+                   "name its bones with --bones names.yaml, or ask for a skeleton of ours with "
+                   "--skeleton restage");
+}
+
 void check_mesh(const RetargetCommand& c, const TargetMesh& target) {
   if (c.options.force) return;
   with_target(c, target, [&] { check_target(target.mesh, c.target, target.known()); });
@@ -344,7 +353,10 @@ void add_retarget(Program& program) {
       "hero_walking.glb\n"
       "restage retarget --source dance.glb --from-surface --target hero.glb --clip-name Dance "
       "--animation-only --out dance.glb\n"
-      "restage retarget --source scans/ --target hero.obj --weights w.safetensors --out hero.glb\n"
+      "restage retarget --source walk_poses.npz --body-model smplh/ --target hero.glb --out-fps 24 "
+      "--out hero_walking.glb\n"
+      "restage retarget --source 02_03.amc --asf 02.asf --target hero.vrm --out hero_running.vrma\n"
+      "restage retarget --source scans/ --target hero.obj --skeleton mixamo --out hero.glb\n"
       "restage retarget --source scans.h5 --target hero.ply --weights runs/demo-1 --out result.h5\n"
       "restage retarget --source mm/ --fps 60 --source-up z --scale 0.001 --target a.obj --weights "
       "w "
@@ -372,6 +384,7 @@ void add_retarget(Program& program) {
       .required();
   add_target_options(app, c);
   app.add_option("--source-bones", c.source_bones, "the same of a source's skeleton");
+  app.add_option("--asf", c.asf, "of an AMC source its skeleton, if it lies elsewhere");
   app.add_option("--body-model", c.body_model,
                  "of an AMASS source its SMPL model (.npz), or a folder of them");
   add_weights_options(app, c);

@@ -13,7 +13,7 @@ namespace restage::cli {
 
 struct RetargetCommand {
   SourceRecord source;
-  std::string target, bones, source_bones, body_model, weights, device = "cpu";
+  std::string target, bones, source_bones, body_model, asf, weights, device = "cpu";
   std::string system = "chain", rest;
   SinkOptions to;
   RetargetOptions options;
@@ -33,8 +33,14 @@ void check_mesh(const RetargetCommand& c, const TargetMesh& target);
 SystemInput load_input(const RetargetCommand& c, const Common& common);
 /// The same with the target; what is refused because its rig is not known says so.
 std::unique_ptr<System> system_for(const RetargetCommand& c, SystemInput input, TargetMesh& target);
+/// InputError for a character whose rig is not recognised where its own file is to come out, unless
+/// a skeleton of ours is asked for.
+void check_kept(const RetargetCommand& c, const TargetMesh& target);
+
 /// A source whose skeleton is known: its turns go over as they are, and no network is asked but for
 /// a target without a rig.
+/// Whether the source has a skeleton to be taken over; holds_take().
+bool has_take(const RetargetCommand& c, std::string* why);
 int run_take(const RetargetCommand& c, const Common& common);
 
 }  // namespace restage::cli

@@ -41,10 +41,26 @@ Sink own_sink(const SinkOptions& options, const std::string& clip, const std::st
   if (text::ends_in(options.out, {".vrm"}) && own->file().humanoid.empty())
     throw InputError(options.out, "would be no VRM character, since the target is none",
                      "end --out in .glb");
+  if (text::ends_in(options.out, {".vrm"}) && options.animation_only)
+    throw InputError(options.out, "would be no VRM character without its meshes",
+                     "end --out in .vrma or .glb");
+  std::string name = options.clip_name.empty() ? clip : options.clip_name;
+  const auto is_taken = [&](const std::string& other) {
+    const auto& all = own->file().clips;
+    return !options.animation_only &&
+           std::any_of(all.begin(), all.end(), [&](const GltfClip& c) { return c.name == other; });
+  };
+  if (is_taken(name) && !options.clip_name.empty())
+    throw InputError(target, "has an animation " + text::quote(name) + " already",
+                     "give another --clip-name");
+  if (is_taken(name)) {
+    int number = 2;
+    while (is_taken(name + " " + std::to_string(number))) ++number;
+    name += " " + std::to_string(number);
+  }
   const auto writer = std::make_shared<GltfClipWriter>(
       options.out, target, own,
-      GltfClipWriter::Options{options.clip_name.empty() ? clip : options.clip_name, options.rate(),
-                              options.animation_only});
+      GltfClipWriter::Options{name, options.rate(), options.animation_only});
   return {[writer](const RetargetedFrame& f) {
             writer->push(f.pose, f.confidence, f.fingers ? &*f.fingers : nullptr);
           },
@@ -223,6 +239,10 @@ void check_sink(const SinkOptions& options) {
   if (extension && !is_animation(out) && !out.ends_with(".h5"))
     throw InputError(out, "is of no kind that can be written",
                      "end it in .glb, .gltf, .vrm, .vrma, .bvh, .h5, or / for a folder");
+  const std::filesystem::path folder = std::filesystem::path(out).parent_path();
+  std::error_code error;
+  if (extension && !folder.empty() && !std::filesystem::is_directory(folder, error))
+    throw InputError(out, "would lie in a folder that is not there", "make the folder first");
   if (options.animation_only && !is_character(out))
     throw InputError(out, "has no meshes that could be left out",
                      "leave --animation-only out, or end --out in .glb");

@@ -37,6 +37,25 @@ void check_options(const RetargetCommand& c) {
                      "leave --fps out");
 }
 
+/// Readers name the options of `data import`; those of a source are called otherwise here.
+template <class Work>
+auto as_source(const Work& work) {
+  try {
+    return work();
+  } catch (const InputError& error) {
+    std::string text = error.what();
+    for (const std::string option : {"--bones", "--up"}) {
+      const std::string ours = "--source" + option.substr(1);
+      for (size_t at = text.find(option); at != std::string::npos;
+           at = text.find(option, at + ours.size()))
+        text.replace(at, option.size(), ours);
+    }
+    const size_t mend = text.rfind("; ");
+    throw InputError("", text.substr(0, mend),
+                     mend == std::string::npos ? "" : text.substr(mend + 2));
+  }
+}
+
 TakeOptions options_of(const RetargetCommand& c, const Joints& performer) {
   TakeOptions out;
   if (c.source.scale != 1) out.motion.scale = c.source.scale;
@@ -48,15 +67,21 @@ TakeOptions options_of(const RetargetCommand& c, const Joints& performer) {
   out.clip = c.source.clip;
   out.sequence = c.source.sequence;
   out.body_model = c.body_model;
+  out.asf = c.asf;
   out.like = performer;
   return out;
 }
 
 }  // namespace
 
+bool has_take(const RetargetCommand& c, std::string* why) {
+  return as_source([&] { return holds_take(c.source.path, c.source_bones, why); });
+}
+
 int run_take(const RetargetCommand& c, const Common& common) {
   check_options(c);
   TargetMesh target = read_target(c.target, c.bones);
+  check_kept(c, target);
   std::unique_ptr<System> system;  // poses a target that has no rig of its own
   if (!target.own) {
     if (!c.options.force) check_target(target.mesh, c.target, target.known());
@@ -65,7 +90,8 @@ int run_take(const RetargetCommand& c, const Common& common) {
   SkinWeights weights;
   if (target.own) weights = target.own->weights();
   const Joints& rest = target.own ? target.own->rest() : *system->target_joints();
-  const SkeletonTake take = read_take(c.source.path, options_of(c, rest));
+  SkeletonTake take = as_source([&] { return read_take(c.source.path, options_of(c, rest)); });
+  put_on_floor(take, rest);
   std::optional<SystemRig> rig;
   if (target.own) rig.emplace(SystemRig{rest, weights});
   const Shown shown{target.own ? target.own->mesh() : system->target(),

@@ -138,9 +138,7 @@ class Stream {
   void run() {
     constexpr std::chrono::milliseconds kLook{20}, kClose{2};
     while (!stop_requested() && !(c_.seconds && lasted() >= *c_.seconds)) {
-      if (box_.take(cloud_, waits_ ? kClose : kLook)) {
-        late_ += waits_.has_value();
-        waits_.reset();
+      if (box_.take(come_, waits_ ? kClose : kLook)) {
         place();
       } else if (waits_ && (live::Clock::now() >= *waits_ || box_.ended())) {
         waits_.reset();
@@ -162,16 +160,22 @@ class Stream {
     return std::chrono::duration<double>(live::Clock::now() - start).count();
   }
 
-  /// The cloud that has come, in time.
+  /// The cloud that has come, in time. One that comes too late leaves the one that waits alone.
   void place() {
-    left_out_ += cloud_.left_out;
-    const live::Step step = timeline_.place(cloud_.seconds, cloud_.sender);
-    late_in_a_row_ = step.kind == live::Step::Kind::late ? late_in_a_row_ + 1 : 0;
+    left_out_ += come_.left_out;
+    const live::Step step = timeline_.place(come_.seconds, come_.sender);
+    if (step.kind == live::Step::Kind::late) {
+      ++late_;
+      if (++late_in_a_row_ == live::kMostMissed)
+        words_.warn("late", "the times of the clouds do not go on; check the sender's clock");
+      return;
+    }
+    late_in_a_row_ = 0;
+    late_ += waits_.has_value();
+    waits_.reset();
+    std::swap(cloud_, come_);
     switch (step.kind) {
       case live::Step::Kind::late:
-        ++late_;
-        if (late_in_a_row_ == live::kMostMissed)
-          words_.warn("late", "the times of the clouds do not go on; check the sender's clock");
         return;
       case live::Step::Kind::early:
         waits_ = cloud_.arrived + std::chrono::duration_cast<live::Clock::duration>(
@@ -242,7 +246,7 @@ class Stream {
   const live::Clock::time_point begun_ = live::Clock::now();
   live::Timeline timeline_;
   live::LatencyMeter latency_;
-  live::LiveCloud cloud_;
+  live::LiveCloud come_, cloud_;  ///< what has just come; what is answered, or waits
   std::optional<live::Clock::time_point> waits_;  ///< the cloud is early: how long it waits
   bool going_ = false;             ///< the system has answered a cloud of this sequence
   int64_t missed_ = 0, told_ = 0;  ///< moments since the last answer; those the system knows of
@@ -252,6 +256,9 @@ class Stream {
 
 Json Stream::json() const {
   const live::Mailbox::Counts counts = box_.counts();
+  // What waited in the end, and what a network that looks ahead had not answered yet.
+  const int64_t unanswered =
+      counts.arrived - out_ - counts.overtaken - late_ - unusable_ - counts.refused - unsent_;
   Json latency = {{"p50", nullptr}, {"p99", nullptr}, {"max", nullptr}};
   if (latency_.count() > 0)
     latency = {{"p50", latency_.quantile(0.5)},
@@ -264,7 +271,8 @@ Json Stream::json() const {
            {{"overtaken", counts.overtaken},
             {"late", late_},
             {"unusable", unusable_ + counts.refused},
-            {"unsent", unsent_}}},
+            {"unsent", unsent_},
+            {"unanswered", unanswered}}},
           {"points_left_out", left_out_},
           {"restarts", restarts_},
           {"seconds", lasted()},

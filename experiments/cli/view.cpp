@@ -170,8 +170,7 @@ void open_page(const std::string& page) {
     throw WorkError(page + ": no program opened the page; open it in a browser");
 }
 
-/// A new folder for the page of this file, which a browser may look at when we are gone.
-std::string page_for(const std::string& file) {
+void check_display() {
   const auto is_set = [](const char* name) {
     const char* value = std::getenv(name);
     return value != nullptr && *value != '\0';
@@ -179,6 +178,10 @@ std::string page_for(const std::string& file) {
   if (!is_set("DISPLAY") && !is_set("WAYLAND_DISPLAY"))
     throw InputError("", "there is no display to show the page on",
                      "write a file: --out picture.png, animation.webp or page.html");
+}
+
+/// A new folder for the page of this file, which a browser may look at when we are gone.
+std::string page_for(const std::string& file) {
   std::error_code error;
   std::string folder =
       (std::filesystem::temp_directory_path(error) / "restage-view-XXXXXX").string();
@@ -196,7 +199,7 @@ int run_view(const ViewOptions& given, const Common& common) {
   if (!o.background.empty()) parse_colour(o.background);
   const bool opens = o.out.empty();
   if (opens)
-    page_for("");
+    check_display();
   else
     check_output(o.out, {o.request.path});
   o.request.single = kind == ViewKind::picture;
@@ -210,6 +213,10 @@ int run_view(const ViewOptions& given, const Common& common) {
     throw InputError(o.request.path,
                      format("has %g frames per second, more than GIF can show", view.clip.fps),
                      format("give --fps up to %g, or write .webp", kGifFps));
+  const double longest = kind == ViewKind::gif ? 600 : 16000;  // seconds that files can state
+  if ((kind == ViewKind::gif || kind == ViewKind::webp) && view.clip.fps * longest < 1)
+    throw InputError(o.request.path, format("would show each frame for %.0f s", 1 / view.clip.fps),
+                     "give a smaller --every, or a larger --fps");
   const std::string name = std::filesystem::path(o.request.path).filename().string();
   view.clip.label = view.animation.empty() ? name : name + ": " + view.animation;
   Json document = {{"out", o.out}};

@@ -55,8 +55,9 @@ class FolderWatch {
     }
     std::vector<std::string> names;
     std::error_code gone;
-    for (const auto& file : std::filesystem::directory_iterator(folder_, gone))
-      names.push_back(file.path().filename().string());
+    for (std::filesystem::directory_iterator file(folder_, gone), end; !gone && file != end;
+         file.increment(gone))
+      names.push_back(file->path().filename().string());
     take(std::move(names));
     listed_ = taken_;
   }
@@ -108,7 +109,7 @@ class FolderWatch {
     cloud_.left_out = 0;
     try {
       cloud_.points = files_.read(cloud_.name, cloud_.left_out);
-    } catch (const InputError& fault) {
+    } catch (const std::exception& fault) {
       if (!tried_) tried_ = Tried{names.back(), fault.what(), now};
       tried_->why = fault.what();
       return;

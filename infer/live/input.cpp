@@ -125,7 +125,7 @@ void PipeInput::run(int stop, Mailbox& to, Words& words) {
 
 namespace {
 
-/// The connections of a socket; the last to have sent a whole frame is the one that counts.
+/// The connections of a socket; the one whose first whole frame came last is the one that counts.
 class Connections {
  public:
   Connections(int listener, Mailbox& to, Words& words)
@@ -139,7 +139,8 @@ class Connections {
   void run(int stop) {
     std::vector<pollfd> all;
     do {
-      all = {{stop, POLLIN, 0}, {listener_, POLLIN, 0}};
+      const bool full = Clock::now() < full_until_;
+      all = {{stop, POLLIN, 0}, {listener_, static_cast<short>(full ? 0 : POLLIN), 0}};
       for (const Sender& s : open_) all.push_back({s.fd, POLLIN, 0});
       if (!wait_for(all)) return;
       auto one = open_.begin();
@@ -183,7 +184,12 @@ class Connections {
 
   void accept_one() {
     const int fd = accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
-    if (fd < 0) return;
+    if (fd < 0) {
+      if (errno != EMFILE && errno != ENFILE) return;
+      words_.warn("full", "no more connections can be opened: the system's limit is reached");
+      full_until_ = Clock::now() + std::chrono::milliseconds(250);
+      return;
+    }
     if (open_.size() == kMostConnections) {  // those that never sent a frame go first
       auto oldest =
           std::find_if(open_.begin(), open_.end(), [](const Sender& s) { return !s.whole; });
@@ -199,7 +205,8 @@ class Connections {
   Words& words_;
   std::vector<unsigned char> buffer_;
   std::list<Sender> open_;
-  int64_t last_ = 0;    ///< number of the last sender
+  Clock::time_point full_until_{};  ///< nobody is let in until then
+  int64_t last_ = 0;                ///< number of the last sender
   int64_t counts_ = 0;  ///< number of a sender whose first whole frame has just come; 0: none
 };
 

@@ -49,8 +49,9 @@ class PipeInput final : public CloudInput {
 };
 
 /// The same on a socket that listens. Anybody may connect at any time; the clouds that count are
-/// those of the connection that sent a whole frame last, all others are closed then. A sender that
-/// ends, vanishes or sends what makes no sense is told of, and the next one is waited for.
+/// those of the connection whose first whole frame came last; others that sent one are closed then.
+/// A sender that ends, vanishes or sends what makes no sense is told of, and the next one is waited
+/// for.
 class SocketInput final : public CloudInput {
  public:
   explicit SocketInput(std::unique_ptr<Listener> listener) : listener_(std::move(listener)) {}

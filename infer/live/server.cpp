@@ -1,5 +1,7 @@
 #include "infer/live/server.h"
 
+#include <unistd.h>
+
 #include <libwebsockets.h>
 
 #include <algorithm>
@@ -45,11 +47,22 @@ struct PageServer::State {
   /// they call this machine.
   bool welcome(lws* wsi) const {
     const std::string from = header(wsi, WSI_TOKEN_ORIGIN), asked = header(wsi, WSI_TOKEN_HOST);
-    if (from.empty()) return true;
-    const std::string name = asked.substr(0, asked.rfind(':'));
-    const bool ours = name == "localhost" || name == host || name == "[" + host + "]" ||
-                      name.find_first_not_of("0123456789.") == std::string::npos;
-    return ours && from == "http://" + asked;
+    return from.empty() || (is_ours(asked) && from == "http://" + asked);
+  }
+  /// Whether a browser that calls us so has been told of us, not of somebody who borrows our
+  /// address: an address, or this machine's own name.
+  bool is_ours(const std::string& asked) const {
+    if (asked.starts_with('[')) return asked.find(']') != std::string::npos;
+    const std::string name = asked.substr(0, asked.find(':'));
+    char machine[256] = "";
+    gethostname(machine, sizeof machine - 1);
+    return name == "localhost" || name == host || (name == machine && !name.empty()) ||
+           (!name.empty() && name.find_first_not_of("0123456789.") == std::string::npos);
+  }
+  /// Answers with a status alone.
+  static int refuse(lws* wsi, unsigned status) {
+    if (lws_return_http_status(wsi, status, nullptr) != 0) return -1;
+    return lws_http_transaction_completed(wsi) != 0 ? -1 : 0;
   }
   int begin_page(lws* wsi, const char* path);
   int send_page(lws* wsi, Client& client);
@@ -58,10 +71,11 @@ struct PageServer::State {
 };
 
 int PageServer::State::begin_page(lws* wsi, const char* path) {
-  if (std::strcmp(path, "/") != 0) {
-    if (lws_return_http_status(wsi, HTTP_STATUS_NOT_FOUND, nullptr) != 0) return -1;
-    return lws_http_transaction_completed(wsi) != 0 ? -1 : 0;
-  }
+  if (lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) == 0)
+    return refuse(wsi, HTTP_STATUS_METHOD_NOT_ALLOWED);
+  if (const std::string asked = header(wsi, WSI_TOKEN_HOST); !asked.empty() && !is_ours(asked))
+    return refuse(wsi, HTTP_STATUS_FORBIDDEN);
+  if (std::strcmp(path, "/") != 0) return refuse(wsi, HTTP_STATUS_NOT_FOUND);
   unsigned char room[LWS_PRE + 2048], *at = room + LWS_PRE, *const end = room + sizeof room;
   unsigned char* const start = at;
   if (lws_add_http_common_headers(wsi, HTTP_STATUS_OK, "text/html; charset=utf-8", page.size(), &at,

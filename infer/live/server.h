@@ -18,8 +18,9 @@ namespace restage::live {
 std::string frame_message(double seconds, double confidence, const Points& vertices);
 
 /// Serves `page` at / and sends every frame to all WebSockets. A client that is slow gets the
-/// newest frame and misses others, so memory does not grow. Only pages of the server itself may
-/// connect, and whoever is no browser: a page of another origin is refused.
+/// newest frame and misses others, so memory does not grow. The server answers
+/// to addresses and to the machine's own name only, and only its own page may connect, besides
+/// whoever is no browser: pages of other origins read nothing.
 class PageServer {
  public:
   /// `where`: resolved(). InputError naming `option` as Listener.

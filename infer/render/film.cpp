@@ -86,7 +86,9 @@ Image Film::draw(const Points& points, const Point& centre) const {
   const float whole =
       std::max(1.16f * high_ + 0.12f, (2 * aside_ + 0.16f) * static_cast<float>(options_.height) /
                                           static_cast<float>(width_));
-  const float tall = (reach > 0 ? 2 * reach : whole) / static_cast<float>(options_.zoom);
+  const float upright =
+      std::max(1.0f, static_cast<float>(options_.height) / static_cast<float>(width_));
+  const float tall = (reach > 0 ? 2 * reach * upright : whole) / static_cast<float>(options_.zoom);
   camera.distance = 0.5f * tall / std::tan(0.5f * kView);
   camera.target = centre;
   if (reach <= 0) camera.target.y() = floor_ + 0.5f * high_ - 0.01f * tall;

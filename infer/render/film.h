@@ -16,7 +16,7 @@ struct FilmOptions {
   int width = 0;                  ///< pixels; 0: as wide as the figure needs, and even
   double azimuth = 32;            ///< degrees from the front towards the body's left
   double elevation = 9;           ///< degrees
-  double close_up = 0;            ///< metres shown above and below Clip::focus; 0: whole figures
+  double close_up = 0;            ///< metres shown on all sides of Clip::focus; 0: whole figures
   double zoom = 1;                ///< everything is seen so many times as large
   std::optional<Rgb> background;  ///< empty: of our paper
 };

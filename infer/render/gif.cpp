@@ -31,9 +31,9 @@ class GifWriter final : public AnimationWriter {
  public:
   GifWriter(double fps, const std::vector<Image>& samples)
       : fps_(fps),
-        palette_(samples, kSeen),
         width_(samples.at(0).width),
-        height_(samples.at(0).height) {
+        height_(samples.at(0).height),
+        palette_(samples, kSeen) {
     int error = 0;
     gif_ = EGifOpen(&bytes_, append_bytes, &error);
     if (gif_ == nullptr) fail(error);
@@ -114,8 +114,8 @@ class GifWriter final : public AnimationWriter {
   }
 
   double fps_;
-  Palette palette_;
   int width_, height_;
+  Palette palette_;
   std::string bytes_;
   GifFileType* gif_ = nullptr;
   std::vector<uint8_t> before_;

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <memory>
 
 #include "autograd/base/format.h"
 #include "infer/render/srgb.h"
@@ -35,12 +36,15 @@ struct Decoded {
   std::string fault;  ///< empty: none
 };
 
-bool is_size(int width, int height, Decoded& out) {
+bool is_size(int width, int height, int64_t* room, Decoded& out) {
   out.width = width;
   out.height = height;
-  if (width > 0 && height > 0 && width <= kLongest && height <= kLongest &&
-      int64_t{width} * height <= kMostPixels)
-    return true;
+  const int64_t pixels = int64_t{width} * height;
+  if (width > 0 && height > 0 && width <= kLongest && height <= kLongest && pixels <= kMostPixels) {
+    if (room == nullptr || (*room -= pixels) >= 0) return true;
+    out.fault = "the file's pictures have too many pixels";
+    return false;
+  }
   out.fault = format("it has %d x %d pixels", width, height);
   return false;
 }
@@ -50,12 +54,12 @@ void take(Decoded& out, uint8_t* pixels, void (*release)(void*)) {
     out.fault = "its bytes are damaged";
     return;
   }
+  const std::unique_ptr<uint8_t, void (*)(void*)> held(pixels, release);
   out.rgba.assign(pixels, pixels + size_t{4} * static_cast<size_t>(out.width) *
                                        static_cast<size_t>(out.height));
-  release(pixels);
 }
 
-Decoded decoded(std::string_view bytes) {
+Decoded decoded(std::string_view bytes, int64_t* room) {
   Decoded out;
   const auto* data = reinterpret_cast<const uint8_t*>(bytes.data());
   int width = 0, height = 0;
@@ -64,14 +68,14 @@ Decoded decoded(std::string_view bytes) {
   } else if (bytes.starts_with("RIFF")) {
     if (WebPGetInfo(data, bytes.size(), &width, &height) == 0)
       out.fault = "it is no PNG, JPEG or WebP picture";
-    else if (is_size(width, height, out))
+    else if (is_size(width, height, room, out))
       take(out, WebPDecodeRGBA(data, bytes.size(), &width, &height), WebPFree);
   } else {
     const int size = static_cast<int>(bytes.size());
     int channels = 0;
     if (stbi_info_from_memory(data, size, &width, &height, &channels) == 0)
       out.fault = bytes.empty() ? "it has no bytes" : "it is no PNG, JPEG or WebP picture";
-    else if (is_size(width, height, out))
+    else if (is_size(width, height, room, out))
       take(out, stbi_load_from_memory(data, size, &width, &height, &channels, 4), stbi_image_free);
   }
   return out;
@@ -99,8 +103,8 @@ const std::array<float, 256>& light_of_bytes() {
 }  // namespace
 
 std::optional<TexturePicture> TexturePicture::decode(std::string_view bytes, std::string* why,
-                                                     int side) {
-  Decoded picture = decoded(bytes);
+                                                     int side, int64_t* room) {
+  Decoded picture = decoded(bytes, room);
   *why = picture.fault;
   if (!picture.fault.empty()) return std::nullopt;
   return TexturePicture(picture.width, picture.height, std::move(picture.rgba), side);
@@ -189,12 +193,13 @@ Rgba TexturePicture::at(const Texture& how, const Uv& at, float texels) const {
 std::vector<std::optional<TexturePicture>> decode_pictures(const Appearance& look,
                                                            std::vector<std::string>& remarks) {
   constexpr size_t kMostPictures = 1024;
+  int64_t room = int64_t{1} << 28;  // pixels of all: some ten seconds of decoding
   int side = TexturePicture::kMostSide;
   for (size_t room = 16; room < look.pictures.size() && side > 256; room *= 4) side /= 2;
   std::vector<std::optional<TexturePicture>> out;
   for (const PictureFile& file : look.pictures) {
     std::string why;
-    out.push_back(TexturePicture::decode(file.bytes, &why, side));
+    out.push_back(TexturePicture::decode(file.bytes, &why, side, &room));
     // What has no bytes was spoken of by whoever read the file.
     if (!out.back() && !file.bytes.empty())
       remarks.push_back("the picture '" + file.name + "' is not drawn: " + why);

@@ -17,9 +17,10 @@ class TexturePicture {
  public:
   static constexpr int kMostSide = 2048;
   /// PNG, JPEG or WebP of at most 16,384 x 16,384 and 64 million pixels; kept with at most `side`
-  /// on each side. Nothing if it cannot be decoded, and then `why` says why not.
+  /// on each side. Nothing if it cannot be decoded, and then `why` says why not. `room`: pixels
+  /// that may still be decoded; the picture's are taken off.
   static std::optional<TexturePicture> decode(std::string_view bytes, std::string* why,
-                                              int side = kMostSide);
+                                              int side = kMostSide, int64_t* room = nullptr);
   /// `rgba`: sRGB and opacity, rows from the top.
   TexturePicture(int width, int height, std::vector<uint8_t> rgba, int side = kMostSide);
 
@@ -43,7 +44,7 @@ class TexturePicture {
 
 /// All pictures of an appearance, in its order; nothing in the place of one that cannot be decoded.
 /// A remark for each of these. The more there are, the smaller they are kept: together they take
-/// less than 400 MB. Beyond 1,024 there are none.
+/// less than 400 MB. Beyond 1,024 pictures, or 268 million pixels of all, there are none.
 std::vector<std::optional<TexturePicture>> decode_pictures(const Appearance& look,
                                                            std::vector<std::string>& remarks);
 

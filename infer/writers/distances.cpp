@@ -15,7 +15,8 @@ void Distances::add(double metres) {
   sum_ += metres;
   max_ = std::max(max_, metres);
   ++count_;
-  ++histogram_[std::min(kBins, static_cast<size_t>(metres / kBin))];
+  const bool near = metres < kBin * static_cast<double>(kBins);  // not so of NaN
+  ++histogram_[near ? static_cast<size_t>(metres / kBin) : kBins];
 }
 
 DistanceSummary Distances::summary() const {

@@ -36,7 +36,7 @@ const std::vector<std::string>& rig_conventions();
 /// another name.
 RigConvention rig_convention(const std::string& name, const Joints& rest, double top);
 
-/// Which names `name` has none of: InputError.
+/// InputError for another name than those of rig_conventions().
 void check_convention(const std::string& name);
 
 }  // namespace restage

@@ -84,6 +84,9 @@ TEST(FingerBones, HandsWithoutFingersHaveNone) {
   none.fill(-1);
   EXPECT_EQ(find_fingers({"hips", "l", "r", "bowstring1", "sword"}, {-1, 0, 0, 1, 2}, {1, 2}),
             none);
+  EXPECT_EQ(find_fingers({"hips", "l", "r", "Earring", "SmallSword", "Shoestring", "middleware"},
+                         {-1, 0, 0, 1, 1, 2, 2}, {1, 2}),
+            none);
   // A ring that hangs elsewhere is no finger.
   EXPECT_EQ(find_fingers({"hips", "l", "r", "ring1"}, {-1, 0, 0, 0}, {1, 2}), none);
 }

@@ -100,7 +100,7 @@ Motion motion_of(const Node& node, const Channels& channels) {
     return at == channels.end() ? nullptr : at->second;
   };
   // A channel of the node itself is of all its parts.
-  out.whole = find(node.name);
+  out.whole = find(node.raw);
   for (const aiNode* part : node.chain) {
     const std::string name = part->mName.C_Str();
     if (out.whole == nullptr) out.parts.push_back(find(name));
@@ -196,7 +196,7 @@ void Maker::add_weights(const aiAnimation& animation, Json& out) {
     const std::string name = channel.mName.C_Str();
     const std::string owner = name.substr(0, name.rfind('*'));
     const auto node = std::find_if(nodes_.begin(), nodes_.end(), [&](const Node& one) {
-      return one.name == owner && one.targets > 0;
+      return one.raw == owner && one.targets > 0;
     });
     if (node == nodes_.end()) continue;
     std::vector<std::vector<aiVectorKey>> of_target(node->targets);

@@ -20,6 +20,7 @@ constexpr int kFloat = 5126, kInteger = 5125, kShort = 5123;  // glTF's componen
 /// and after); Assimp makes each a node of its own, here they are one again.
 struct Node {
   std::string name;
+  std::string raw;  ///< as FBX has it, in whatever encoding; bones and channels are called so
   int parent = -1;
   /// What the local transform is a product of; the last one is the node itself.
   std::vector<const aiNode*> chain;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <unordered_map>
 
 #include "datasets/readers/assimp/fbx_detail.h"
@@ -89,10 +91,13 @@ struct Maker::Skin {
   std::vector<float> inverse;  ///< 16 numbers a joint, column by column
   std::map<std::pair<int, std::vector<float>>, uint16_t> known;
 
-  uint16_t joint(int node, const Eigen::Matrix4d& offset) {
+  /// Nothing: there are more than glTF can count.
+  std::optional<uint16_t> joint(int node, const Eigen::Matrix4d& offset) {
     const Eigen::Matrix4f single = offset.cast<float>();
     const std::vector<float> numbers(single.data(), single.data() + 16);
-    const auto [at, is_new] = known.try_emplace({node, numbers}, joints.size());
+    const auto next = static_cast<uint16_t>(joints.size());
+    const auto [at, is_new] = known.try_emplace({node, numbers}, next);
+    if (is_new && joints.size() > std::numeric_limits<uint16_t>::max()) return std::nullopt;
     if (is_new) {
       joints.push_back(node);
       inverse.insert(inverse.end(), numbers.begin(), numbers.end());
@@ -106,7 +111,7 @@ struct Maker::Skin {
 int Maker::find_bone(const std::string& name) const {
   int found = -1, worst = -1;
   for (size_t n = 1; n < nodes_.size(); ++n) {
-    if (nodes_[n].name != name) continue;
+    if (nodes_[n].raw != name) continue;
     if (!nodes_[n].meshes.empty()) {
       worst = static_cast<int>(n);
       continue;
@@ -172,9 +177,11 @@ Json Maker::primitive_of(const aiMesh& mesh, const Node& node, size_t targets, S
   for (unsigned b = 0; skin != nullptr && b < mesh.mNumBones; ++b) {
     const aiBone& bone = *mesh.mBones[b];
     if (bone.mNumWeights == 0) continue;
-    const uint16_t joint =
+    const std::optional<uint16_t> found =
         skin->joint(find_bone(std::string(bone.mName.C_Str(), bone.mName.length)),
                     matrix_of(bone.mOffsetMatrix) * node.geometry);
+    if (!found) refuse("has a skin of more than 65,535 bones");
+    const uint16_t joint = *found;
     for (unsigned w = 0; w < bone.mNumWeights; ++w) {
       const aiVertexWeight& one = bone.mWeights[w];
       if (one.mVertexId >= count || !std::isfinite(one.mWeight)) refuse("has a broken skin");
@@ -189,9 +196,12 @@ Json Maker::primitive_of(const aiMesh& mesh, const Node& node, size_t targets, S
     }
   }
   // What no bone moves is moved by the mesh's own node.
-  for (Influences& all : influences)
-    if (all.empty())
-      all.emplace_back(1.0f, skin->joint(static_cast<int>(&node - nodes_.data()), node.geometry));
+  for (Influences& all : influences) {
+    if (!all.empty()) continue;
+    const auto own = skin->joint(static_cast<int>(&node - nodes_.data()), node.geometry);
+    if (!own) refuse("has a skin of more than 65,535 bones");
+    all.emplace_back(1.0f, *own);
+  }
   tidy(influences);
   const Welded welded = weld(attributes, influences, count);
 

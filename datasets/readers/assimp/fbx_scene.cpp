@@ -107,6 +107,7 @@ void Maker::add_nodes(const aiNode& from, int parent, std::vector<const aiNode*>
   }
   Node node;
   node.name = name;
+  node.raw = std::string(from.mName.C_Str(), from.mName.length);
   node.parent = parent;
   node.chain = std::move(chain);
   if (part == name.npos) node.chain.push_back(&from);
