@@ -193,13 +193,13 @@ Rgba TexturePicture::at(const Texture& how, const Uv& at, float texels) const {
 std::vector<std::optional<TexturePicture>> decode_pictures(const Appearance& look,
                                                            std::vector<std::string>& remarks) {
   constexpr size_t kMostPictures = 1024;
-  int64_t room = int64_t{1} << 28;  // pixels of all: some ten seconds of decoding
+  int64_t pixels = int64_t{1} << 28;  // pixels of all: some ten seconds of decoding
   int side = TexturePicture::kMostSide;
   for (size_t room = 16; room < look.pictures.size() && side > 256; room *= 4) side /= 2;
   std::vector<std::optional<TexturePicture>> out;
   for (const PictureFile& file : look.pictures) {
     std::string why;
-    out.push_back(TexturePicture::decode(file.bytes, &why, side, &room));
+    out.push_back(TexturePicture::decode(file.bytes, &why, side, &pixels));
     // What has no bytes was spoken of by whoever read the file.
     if (!out.back() && !file.bytes.empty())
       remarks.push_back("the picture '" + file.name + "' is not drawn: " + why);

@@ -51,6 +51,33 @@ class RealCharacters(CliTest):
             self.check(name + ".glb", name + ".glb", "--truth", truth, "--frames", "60", "--pa", ".02", "--mpjpe", ".03")
         self.check("mixa_t.glb", "mixa_t.glb", "--same", self.path("mixa_a.glb"))
 
+    def test_a_file_that_was_saved_in_a_pose_or_mirrored(self):
+        """As Blender exports it: nodes hold a pose, vertices lie in the world; and an armature of scale -0.01 above the same skin."""
+        source = ["--source", os.path.join(CHARACTERS, "source_dance.glb")]
+        with open(os.path.join(CHARACTERS, "mixa_t.glb"), "rb") as f:
+            content = f.read()
+        length, = struct.unpack("<I", content[12:16])
+        for name in ("posed", "mirrored"):
+            root = json.loads(content[20:20 + length])
+            for node in root["nodes"]:
+                if name == "posed" and node["name"] in ("mixamorig:Hips", "mixamorig:LeftUpLeg", "mixamorig:Spine"):
+                    node["rotation"] = [0.0, 0.6, 0.0, 0.8] if "Hips" in node["name"] else [0.36, 0.48, 0.0, 0.8]
+                if name == "mirrored" and node["name"] == "Armature":
+                    node["scale"] = [-0.01, -0.01, -0.01]
+                if name == "mirrored" and node["name"] == "mixamorig:Hips":  # where it was, through the mirror
+                    node["translation"] = [-x for x in node["translation"]]
+                    x, y, z, w = node["rotation"]
+                    node["rotation"] = [x, y, z, w]
+                    node["scale"] = [-1, -1, -1]
+            text = json.dumps(root).encode()
+            text += b" " * (-len(text) % 4)
+            rest = content[20 + length:]
+            self.write(name + ".glb", struct.pack("<4sIIII", b"glTF", 2, 20 + len(text) + len(rest), len(text), 0x4E4F534A) + text + rest)
+            self.done("retarget", *source, "--target", name + ".glb", "--out", "out.h5")
+            self.done("retarget", *source, "--target", os.path.join(CHARACTERS, "mixa_t.glb"), "--out", "plain.h5")
+            off = self.json("eval", "--pred", "out.h5", "--truth", "plain.h5")["mean"]
+            self.assertLess((off["mpjpe"], off["mpvd"]), (1e-3, 1e-3), name)
+
     def test_from_the_skeleton_of_the_same_person(self):
         for source, target in (("mixa_t", "mixa_a"), ("mixa_a", "mixa_t")):
             self.done("retarget", "--source", os.path.join(CHARACTERS, "ideal", source + ".glb"), "--target",
@@ -93,6 +120,18 @@ class Characters(CliTest):
         content = self.bytes(name)
         return json.loads(content[20:20 + struct.unpack("<I", content[12:16])[0]])
 
+    def rename(self, name, out, names):
+        """The same file with other names of nodes."""
+        content = self.bytes(name)
+        length, = struct.unpack("<I", content[12:16])
+        root = json.loads(content[20:20 + length])
+        for node in root["nodes"]:
+            node["name"] = names.get(node["name"], node["name"])
+        text = json.dumps(root).encode()
+        text += b" " * (-len(text) % 4)
+        rest = content[20 + length:]
+        self.write(out, struct.pack("<4sIIII", b"glTF", 2, 20 + len(text) + len(rest), len(text), 0x4E4F534A) + text + rest)
+
     def test_names_endings_and_refusals(self):
         for i in range(4):
             self.ply("scans/f%d.ply" % i, points(120, i))
@@ -114,6 +153,16 @@ class Characters(CliTest):
         self.bad_input(call + ["hero.glb"], "hero.glb")
         self.h5("rest.h5", joints=([1, 22, 3], 0.5))
         self.bad_input(call + ["x.glb", "--rest", "rest.h5"], "hero.glb", "leave --rest out")
+        self.bad_input([*call, "x.vrm", "--animation-only"], "x.vrm")
+        self.bad_input([*call, "nowhere/x.glb"], "nowhere/x.glb", "make the folder")
+        self.done(*call, "twice.glb", "--clip-name", "Dance 1")
+        again = [word.replace("hero.glb", "twice.glb") for word in call]
+        self.bad_input(again + ["x.glb", "--clip-name", "Dance 1"], "twice.glb", "has an animation 'Dance 1' already")
+        names = [node["name"] for node in before["nodes"]]
+        self.rename("hero.glb", "odd.glb", {name: "b%d" % i for i, name in enumerate(names)})
+        odd = [word.replace("hero.glb", "odd.glb") for word in call]
+        self.bad_input(odd + ["x.glb"], "odd.glb", "was not recognised", "--bones", "--skeleton restage")
+        self.done(*odd, "ours.glb", "--skeleton", "restage")
         self.ply("plain.ply", points(90, 7))
         plain = [word.replace("hero.glb", "plain.ply") for word in call]
         self.bad_input(plain + ["x.vrm"], "x.vrm", "no rig")

@@ -178,6 +178,15 @@ class Fbx(CliTest):
                     if not pivots:
                         self.near(place(again[bone.name]), true, 2e-3)
 
+    def test_names_in_another_encoding(self):
+        for name in ("hero.fbx", "walk.fbx"):
+            self.person(name, self.walk())
+            with open(self.path(name), "rb") as f:
+                text = f.read()
+            self.write(name, text.replace(b"left_foot", "\u5de6\u8db3\u5148".encode("cp932")))
+        self.done("retarget", "--source", "walk.fbx", "--target", "hero.fbx", "--out", "out.glb")
+        self.assertIn("______", [node.get("name") for node in Glb(self.bytes("out.glb")).json["nodes"]])
+
     def test_all_commands_read_it(self):
         self.person("hero.fbx", self.walk())
         self.assertEqual(self.json("data", "import", "hero.fbx", "--out", "hero.h5")["bodies"], 1)
@@ -186,8 +195,9 @@ class Fbx(CliTest):
         self.done("retarget", "--source", "hero.fbx", "--target", "hero.fbx", "--out", "hero.bvh")
 
     def test_what_cannot_be_read(self):
+        self.person("walk.fbx", self.walk())
         text = self.bytes(self.person("hero.fbx"))
-        call = ["retarget", "--source", "hero.fbx", "--out", "x.glb", "--target"]
+        call = ["retarget", "--source", "walk.fbx", "--out", "x.glb", "--target"]
         for name, content in (("text.fbx", b"hello"), ("nothing.fbx", b""), ("short.fbx", text[:2000]), ("deep.fbx", b"; FBX\n" + b"A: {\n" * 1000000),
                               ("binary.fbx", b"Kaydara FBX Binary  \0\x1a\0" + b"\xff" * 99), ("axes.fbx", text.replace(b'"Integer", "",2', b'"Integer", "",7')),
                               ("number.fbx", text.replace(b"Transform: *16 {\n\t\t\ta: ", b"Transform: *16 {\n\t\t\ta: 1e99"))):

@@ -175,6 +175,8 @@ class StreamTest(CliTest):
         self.assertEqual(process.returncode, code, err)
         document = json.loads(out)
         self.assertEqual(document["frames_in"], document["frames_out"] + document["dropped"])
+        self.assertEqual(document["dropped"], sum(document["dropped_because"].values()))
+        self.assertGreaterEqual(min(document["dropped_because"].values()), 0)
         return document, err.decode()
 
     def interrupted(self, process):
@@ -314,13 +316,23 @@ class Streams(StreamTest):
         self.assertGreater(document["dropped_because"]["late"], 9)
         self.assertIn("do not go on", err)
 
+    def test_a_late_cloud_leaves_the_one_that_waits_alone(self):
+        port = free_port()
+        process = self.stream("tcp://127.0.0.1:%d" % port)
+        send = self.sender(port).sendall
+        self.answer(send, self.clouds[0], 0)
+        send(frame(0.012, self.clouds[1]) + frame(0.005, self.clouds[0]))  # early, and older than that
+        self.assertIsNotNone(self.receiver.next())
+        document, _ = self.interrupted(process)
+        self.assertEqual(document["frames_out"] + document["dropped_because"]["overtaken"] + document["dropped_because"]["late"], 3)
+
     def test_the_page_and_its_frames(self):
         port, page = free_port(), free_port()
         process = self.stream("tcp://127.0.0.1:%d" % port, "--ws", str(page))
 
-        def ask(path, *more):
+        def ask(path, *more, host="127.0.0.1:%d" % page, method="GET"):
             s = self.sender(page)
-            lines = ["GET %s HTTP/1.1" % path, "Host: 127.0.0.1:%d" % page, *more]
+            lines = ["%s %s HTTP/1.1" % (method, path), "Host: " + host, *more]
             s.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
             return s
 
@@ -337,6 +349,10 @@ class Streams(StreamTest):
         self.assertIn(b'"live":true', text)
         self.assertTrue(text.endswith(b"</html>\n"))
         self.assertIn(b" 404 ", read(ask("/etc/passwd"), 1).split(b"\r\n")[0])
+        self.assertIn(b" 403 ", read(ask("/", host="elsewhere.example"), 1).split(b"\r\n")[0])  # a name that borrows our address
+        self.assertIn(b" 405 ", read(ask("/", "Content-Length: 0", method="POST"), 1).split(b"\r\n")[0])
+        for own in ("localhost:%d" % page, "[::1]:%d" % page):
+            self.assertIn(b" 200 ", read(ask("/", host=own)).split(b"\r\n")[0])
         upgrade = ["Connection: Upgrade", "Upgrade: websocket", "Sec-WebSocket-Version: 13",
                    "Sec-WebSocket-Key: " + base64.b64encode(b"0123456789abcdef").decode()]
         self.assertNotIn(b" 101 ", read(ask("/", *upgrade, "Origin: http://elsewhere.example"), 1))
