@@ -361,7 +361,7 @@ void add_retarget(Program& program) {
       "restage retarget --source mm/ --fps 60 --source-up z --scale 0.001 --target a.obj --weights "
       "w "
       "--out a.glb\n"
-      "restage retarget --source walk.glb --clip Walk --target hero.vrm --weights w --out "
+      "restage retarget --source walk.glb --clip Walk --target hero.vrm --out "
       "hero.bvh\n"
       "restage retarget --source scans/ --target odd_names.glb --bones names.yaml --weights w "
       "--out "
