@@ -38,14 +38,12 @@ void limit(int resource, rlim_t most) {
   setrlimit(static_cast<__rlimit_resource>(resource), &now);
 }
 
-/// A text of 1 MB becomes some 30 MB while it is read.
-uint64_t memory_for(size_t content) { return (uint64_t{1} << 30) + 64 * uint64_t{content}; }
-
 void set_bounds(size_t content) {
 #ifndef RESTAGE_SANITIZED
+  const uint64_t memory = (uint64_t{1} << 30) + 64 * uint64_t{content};  // texts need some 30 times
   uint64_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;
-  limit(RLIMIT_AS, pages * static_cast<uint64_t>(sysconf(_SC_PAGESIZE)) + memory_for(content));
+  limit(RLIMIT_AS, pages * static_cast<uint64_t>(sysconf(_SC_PAGESIZE)) + memory);
 #endif
   limit(RLIMIT_CPU, 60 + content / 1000000);  // seconds
   limit(RLIMIT_CORE, 0);
