@@ -257,7 +257,10 @@ void add_view(Program& program) {
       "restage view hero.glb --clip Walk --fps 12 --size 320x320 --out walk.gif\n"
       "restage view hero.glb --look hands --from front --out hands.png\n"
       "restage view hero.glb --frame 40 --background black --out still.png\n"
+      "restage view hero.glb --time 1.5 --zoom 1.2 --bones names.yaml --out still.png\n"
       "restage view walk.bvh --every 2 --out walk.webp\n"
+      "restage view scans/ --up z --scale mm --out scans.webp\n"
+      "restage view motions.h5 --sequence 3 --out motion.gif\n"
       "restage view result.h5 --out page.html",
       run_view);
   ShowRequest& r = options.request;

@@ -260,7 +260,7 @@ class View(CliTest):
         self.bad_input(view + ["x.png", "--background", "mauve"], "mauve")
         self.bad_input(view + ["x.png", "--zoom", 0], "--zoom")
         self.bad_input(view + ["x.png", "--look", "tail"], "tail")
-        self.bad_input(view + ["x.png", "--look", "head"], "does not say where its head is")
+        self.bad_input(view + ["x.png", "--look", "head"], "does not say where to look for head")
         self.bad_input(view + ["x.html", "--look", "head"], "--look")
         self.bad_input(["view", "gone.glb", "--out", "x.png"], "gone.glb")
         self.write("empty.glb", b"")
