@@ -109,7 +109,8 @@ TEST_F(SkeletonTakeTest, WhatHoldsOne) {
   EXPECT_TRUE(holds_take(write(testing::mixamo_style())));
   testing::GlbParts still = CharacterMaker(known_, testing::mixamo_style()).parts;
   still.root.erase("animations");
-  EXPECT_FALSE(holds_take(dir.write("still.glb", still.glb())));
+  EXPECT_HAS(refusal_of([&] { holds_take(dir.write("still.glb", still.glb())); }),
+             "is a character without an animation; give one that moves");
   EXPECT_FALSE(holds_take(write(testing::vrm_style()))) << "names that say nothing";
   EXPECT_FALSE(holds_take(dir / "none.ply"));
   EXPECT_FALSE(holds_take(dir.path()));

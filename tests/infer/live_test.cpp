@@ -313,9 +313,14 @@ int hear(const char* path, const char* types, lo_arg** argv, int argc, lo_messag
   std::string key = path;
   std::vector<float> numbers;
   for (int k = 0; k < argc; ++k) {
-    if (types[k] == 's') key += std::string(" ") + &argv[k]->s;
-    if (types[k] == 'f') numbers.push_back(argv[k]->f);
-    if (types[k] == 'i') numbers.push_back(static_cast<float>(argv[k]->i));
+    // liblo hands out the message's own bytes, which lie on no boundary of a lo_arg.
+    const char* bytes = reinterpret_cast<const char*>(argv[k]);
+    float single = 0;
+    int32_t whole = 0;
+    if (types[k] == 's') key += std::string(" ") + bytes;
+    if (types[k] == 'f') numbers.push_back((std::memcpy(&single, bytes, 4), single));
+    if (types[k] == 'i')
+      numbers.push_back(static_cast<float>((std::memcpy(&whole, bytes, 4), whole)));
   }
   got.numbers[key] = numbers;
   ++got.times[key];
