@@ -85,6 +85,7 @@ std::vector<Triangle> drawn_faces(const Clip& clip) {
   std::stable_sort(order.begin(), order.end(),
                    [&](size_t a, size_t b) { return material[a] < material[b]; });
   std::vector<Triangle> out;
+  out.reserve(order.size());
   for (const size_t f : order) out.push_back(clip.faces[f]);
   return out;
 }
@@ -267,6 +268,7 @@ Packed pack(const Clip& clip, const PageSurface& surface, const Plan& plan, size
   Packed packed;
   const float floor = clip_floor(clip);
   std::vector<Point> centres;
+  centres.reserve(frames.size());
   for (const Points& points : frames) centres.push_back(clip_centre(points));
   centres = calm_centres(centres, options.fps / static_cast<double>(plan.stride));
   std::vector<uint16_t> data;
