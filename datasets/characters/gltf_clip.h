@@ -12,8 +12,10 @@ namespace restage {
 
 /// Collects poses and writes the document at commit(). Nodes, meshes, skins, materials, pictures,
 /// morph targets, extensions and earlier animations are the input's; of a GLB, the input's binary
-/// chunk begins the output's. The new animation turns the nodes of the 22 joints and of fingers
-/// (LINEAR, unit quaternions whose signs make curves continuous) and moves the hips, nothing else.
+/// chunk begins the output's; but a node that is turned and whose place is a `matrix` gets
+/// translation, rotation and scale instead. The new animation turns the nodes of the 22 joints and
+/// of fingers (LINEAR, unit quaternions whose signs make curves continuous) and moves the hips,
+/// nothing else.
 ///
 /// `out` ends in .glb, .vrm or .gltf. A .glb or .vrm holds everything itself, also what a .gltf
 /// names as files beside it. A .gltf keeps the names of such files; where it is written into

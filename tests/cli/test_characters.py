@@ -66,8 +66,6 @@ class RealCharacters(CliTest):
                     node["scale"] = [-0.01, -0.01, -0.01]
                 if name == "mirrored" and node["name"] == "mixamorig:Hips":  # where it was, through the mirror
                     node["translation"] = [-x for x in node["translation"]]
-                    x, y, z, w = node["rotation"]
-                    node["rotation"] = [x, y, z, w]
                     node["scale"] = [-1, -1, -1]
             text = json.dumps(root).encode()
             text += b" " * (-len(text) % 4)
@@ -76,7 +74,7 @@ class RealCharacters(CliTest):
             self.done("retarget", *source, "--target", name + ".glb", "--out", "out.h5")
             self.done("retarget", *source, "--target", os.path.join(CHARACTERS, "mixa_t.glb"), "--out", "plain.h5")
             off = self.json("eval", "--pred", "out.h5", "--truth", "plain.h5")["mean"]
-            self.assertLess((off["mpjpe"], off["mpvd"]), (1e-3, 1e-3), name)
+            self.assertLess(max(off["mpjpe"], off["mpvd"]), 1e-3, name)
 
     def test_from_the_skeleton_of_the_same_person(self):
         for source, target in (("mixa_t", "mixa_a"), ("mixa_a", "mixa_t")):
