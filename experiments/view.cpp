@@ -8,7 +8,9 @@
 #include "autograd/base/format.h"
 #include "datasets/importers/gltf_rig.h"
 #include "datasets/importers/skeleton_take.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/gltf_look.h"
+#include "datasets/readers/text.h"
 #include "nn/geometry/box.h"
 
 namespace restage {
@@ -198,8 +200,8 @@ Showing view_take(const ShowRequest& request, std::vector<Joints>& joints) {
   TakeOptions options;
   options.motion.force = true;
   options.motion.profile = request.bones;
-  if (request.scale != 1) options.motion.scale = request.scale;
-  if (request.up != "y") options.motion.rest.up = parse_axis(request.up, "--up");
+  if (request.scale) options.motion.scale = *request.scale;
+  if (!request.up.empty()) options.motion.rest.up = parse_axis(request.up, "--up");
   options.clip = request.clip;
   options.sequence = request.sequence;
   const SkeletonTake take = [&] {
@@ -226,8 +228,8 @@ Showing view_frames(const ShowRequest& request, std::vector<Joints>& joints) {
   Showing view;
   view.clip = read_clip({.path = request.path,
                          .sequence = request.sequence.value_or(0),
-                         .scale = request.scale,
-                         .up = request.up},
+                         .scale = request.scale.value_or(1),
+                         .up = request.up.empty() ? "y" : request.up},
                         "", request.max_memory, view.remarks);
   if (!has_joints(request.path)) return view;
   joints.resize(view.clip.frames.size());
@@ -267,6 +269,16 @@ Showing view_others(const ShowRequest& request) {
 }  // namespace
 
 Showing read_showing(const ShowRequest& request) {
+  const auto refuse_if = [&](bool given, const char* option, const char* what) {
+    if (given)
+      throw InputError(request.path, cat(what, ", which ", option, " cannot change"),
+                       cat("leave ", option, " out"));
+  };
+  const bool glTF = is_gltf_name(request.path);
+  refuse_if(glTF && !request.up.empty(), "--up", "says where up is");
+  refuse_if(glTF && request.scale.has_value(), "--scale", "says how large it is");
+  refuse_if(request.sequence && !text::ends_in(request.path, {".h5", ".hdf5"}), "--sequence",
+            "holds one sequence");
   return is_gltf_name(request.path) ? view_gltf(request) : view_others(request);
 }
 

@@ -23,8 +23,8 @@ struct ShowRequest {
   std::optional<int64_t> frame;
   std::optional<double> seconds;
   std::optional<int64_t> sequence;  ///< of an HDF5 file; nothing: the only one, of scans the first
-  std::string up = "y";             ///< of scans and recordings: the axis that points up
-  double scale = 1;                 ///< metres per unit, of all but glTF
+  std::string up;                   ///< of scans and recordings: the axis that points up; empty: y
+  std::optional<double> scale;      ///< of scans and recordings: metres per unit; nothing: 1
   uint64_t max_memory = 0;
 };
 

@@ -351,6 +351,23 @@ void check_skins(const Gltf& file, const GltfRig& rig) {
                        "export the person alone");
 }
 
+/// A node that is scaled more along one axis than along another stretches what turns below it.
+void say_uneven_scale(const Gltf& file, const GltfRig& rig, ImportReport& report) {
+  constexpr double kUneven = 1.02;
+  const GltfTransforms rest = gltf_rest(file);
+  for (size_t j = 0; j < kJoints; ++j) {
+    const auto n = static_cast<size_t>(rig.node[j]);
+    const Vec3 sizes = rest[n].linear().jacobiSvd().singularValues();
+    if (sizes.x() < kUneven * sizes.z()) continue;
+    report.remarks.push_back(cat(
+        "bone ", text::quote(file.nodes[n].name), " is scaled unevenly (",
+        format("%.0f %% more along one axis", 100 * (sizes.x() / sizes.z() - 1)),
+        "): what hangs on it changes its length as it turns; apply the scale in the program that "
+        "exported it (Blender: Object > Apply > Scale)"));
+    return;
+  }
+}
+
 }  // namespace
 
 GltfRig find_rig(const Gltf& file, const MotionOptions& options, ImportReport& report) {
@@ -383,6 +400,7 @@ GltfRig find_rig(const Gltf& file, const MotionOptions& options, ImportReport& r
   check_standing(upright, file);
   const auto turns = arm_turns(file, rig, joints, report);
   rig.t_pose = turned(file, rig, turns);
+  say_uneven_scale(file, rig, report);
   for (size_t j = 0; j < kJoints; ++j) {
     const auto n = static_cast<size_t>(rig.node[j]);
     if (!(std::abs(rig.bind[n].linear().determinant()) > 1e-30))

@@ -1,5 +1,8 @@
 #include "datasets/readers/fbx.h"
 
+#include <memory>
+#include <mutex>
+
 #include "datasets/readers/errors.h"
 #include "datasets/readers/text.h"
 #ifdef RESTAGE_ASSIMP
@@ -25,7 +28,23 @@ std::string fbx_as_glb(std::string_view content, const std::string& path,
   if (!starts_as_fbx(content))
     throw InputError(path, "is no FBX file", "export it again, or export GLB (glTF) from Blender");
 #ifdef RESTAGE_ASSIMP
-  return fbx_in_a_process(content, path, remarks);
+  // A command reads its target more than once (what it is, the rig, what is written), and reading
+  // takes seconds: the last document is kept.
+  struct Made {
+    std::string content, path, glb;
+    std::vector<std::string> remarks;
+  };
+  static std::mutex mutex;
+  static std::unique_ptr<const Made> last;
+  const std::lock_guard lock(mutex);
+  if (!last || last->path != path || last->content != content) {
+    Made made{std::string(content), path, "", {}};
+    made.glb = fbx_in_a_process(content, path, &made.remarks);
+    last = std::make_unique<const Made>(std::move(made));
+  }
+  if (remarks != nullptr)
+    remarks->insert(remarks->end(), last->remarks.begin(), last->remarks.end());
+  return last->glb;
 #else
   static_cast<void>(remarks);
   throw InputError(path, "is FBX, and this program was built without Assimp, which reads it",

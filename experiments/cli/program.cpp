@@ -1,10 +1,14 @@
 #include "experiments/cli/program.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
 #include <cctype>
+#include <cerrno>
 #include <charconv>
 #include <filesystem>
 #include <map>
@@ -243,9 +247,17 @@ int run_program(int argc, char** argv) {
   }
 }
 
+/// A program may be begun without standard streams. The next file to be opened would be taken for
+/// one of them; so each becomes one that holds nothing.
+void open_standard_streams() {
+  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (fcntl(fd, F_GETFD) < 0 && errno == EBADF && open("/dev/null", O_RDWR) < 0) return;
+}
+
 }  // namespace
 
 int run(int argc, char** argv) {
+  open_standard_streams();
   handle_signals();
   try {
     return run_program(argc, argv);

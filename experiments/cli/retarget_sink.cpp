@@ -243,6 +243,9 @@ void check_sink(const SinkOptions& options) {
   std::error_code error;
   if (extension && !folder.empty() && !std::filesystem::is_directory(folder, error))
     throw InputError(out, "would lie in a folder that is not there", "make the folder first");
+  if (!options.format.empty() && extension)
+    throw InputError(out, "is one file, and --format is for a folder's frames",
+                     "leave --format out, or end --out in /");
   if (options.animation_only && !is_character(out))
     throw InputError(out, "has no meshes that could be left out",
                      "leave --animation-only out, or end --out in .glb");

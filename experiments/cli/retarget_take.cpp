@@ -2,6 +2,7 @@
 #include "autograd/base/log.h"
 #include "datasets/doctor/examine.h"
 #include "datasets/importers/skeleton_take.h"
+#include "datasets/readers/errors.h"
 #include "datasets/readers/text.h"
 #include "experiments/cli/output.h"
 #include "experiments/cli/retarget.h"
@@ -101,6 +102,12 @@ int run_take(const RetargetCommand& c, const Common& common) {
   const Sink sink = make_sink(c.to, shown, source, take.name, c.target, target.own);
   say_take(take);
   say_target(target);
+  for (const auto& [given, option] : {std::pair(!c.weights.empty(), "--weights"),
+                                      {!c.rest.empty(), "--rest"},
+                                      {c.device != "cpu", "--device"}})
+    if (target.own && given)
+      log_warning(
+          cat(option, " is not used: source and target have skeletons, so no network is asked"));
   int64_t frames = 0;
   for (size_t f = 0; f < take.frames.size(); f += static_cast<size_t>(c.to.every)) {
     RetargetedFrame frame;

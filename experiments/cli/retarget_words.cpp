@@ -15,10 +15,13 @@ std::string fact(const ImportReport& report, const std::string& wanted) {
   return "";
 }
 
-/// "Mixamo (profile mixamo); placed: neck" -> "Mixamo".
+/// "Mixamo (profile mixamo); placed: neck" -> "Mixamo bones". VRM's list is named by the file's
+/// kind.
 std::string family(const ImportReport& report) {
   const std::string names = fact(report, "names");
-  return names.substr(0, std::min(names.find(" (profile"), names.find(';')));
+  if (names.empty() || names.starts_with("VRM's list")) return names.empty() ? "" : "bones";
+  if (names.starts_with("found by parts")) return "bones of no known family";
+  return names.substr(0, std::min(names.find(" (profile"), names.find(';'))) + " bones";
 }
 
 std::string rest_pose(const ImportReport& report) {
@@ -49,7 +52,7 @@ void say_target(const TargetMesh& target) {
   const auto skinned = std::count_if(file.bones.begin(), file.bones.end(),
                                      [](const GltfBone& bone) { return bone.skin >= 0; });
   std::string line = file.standard.empty() ? "" : file.standard + ", ";
-  line += cat(family(report), " bones (", skinned, "), ", rest_pose(report), ", ",
+  line += cat(family(report), " (", skinned, "), ", rest_pose(report), ", ",
               count(file.meshes, "mesh", "meshes"));
   if (file.morph_targets > 0)
     line += ", " + count(file.morph_targets, "morph target", "morph targets");
@@ -58,7 +61,7 @@ void say_target(const TargetMesh& target) {
 
 void say_take(const SkeletonTake& take) {
   std::string line = family(take.report);
-  line += cat(line.empty() ? "" : " bones, ", take.name, ": ", take.frames.size(),
+  line += cat(line.empty() ? "" : ", ", take.name, ": ", take.frames.size(),
               " frames at 30 a second", take.fingers.empty() ? "" : ", with fingers");
   say(line, take.report);
 }

@@ -193,6 +193,7 @@ class Stream {
   void answer() {
     if (missed_ > live::kMostMissed) begin_anew();
     for (; told_ < missed_ && going_; ++told_) system_.miss();
+    thin();
     to_ours_(cloud_.points);
     try {
       if (!c_.how.options.force) check_frame(cloud_.points, cloud_.name);
@@ -205,6 +206,17 @@ class Stream {
     } catch (const InputError& fault) {
       leave_out(fault);
     }
+  }
+
+  /// More points than a network looks at cost time and say nothing new.
+  void thin() {
+    constexpr size_t kEnough = 100'000;
+    Points& points = cloud_.points;
+    const size_t step = (points.size() + kEnough - 1) / kEnough;
+    if (step < 2) return;
+    words_.warn("many", format("a cloud has %zu points; one in %zu is used", points.size(), step));
+    for (size_t k = 0; k * step < points.size(); ++k) points[k] = points[k * step];
+    points.resize((points.size() + step - 1) / step);
   }
 
   void begin_anew() {
@@ -328,8 +340,9 @@ int run_stream(const StreamCommand& c, const Common& common) {
   const StopScope stop;
   Stream stream(c, *system, vmc, page.get(), box, words);
   {
-    const live::Reading reading(std::move(input), box, words);
+    live::Reading reading(std::move(input), box, words);
     stream.run();
+    reading.end();
   }
   if (box.counts().arrived == 0) log_warning("no frame came; docs/stream.md says what a frame is");
   print(common.json, stream.json(), stream.text());

@@ -35,7 +35,6 @@ struct ViewOptions {
   std::string out, size, from = "three-quarter", background;
   std::optional<double> fps, zoom;
   std::optional<int64_t> every;
-  std::optional<double> scale;
 };
 
 enum class ViewKind { picture, webp, gif, page };
@@ -110,7 +109,7 @@ void check(const ViewOptions& o, ViewKind kind) {
     throw InputError("", "--every is out of range", "give a whole number, 1 to 100000");
   if (o.zoom && !(*o.zoom >= 0.1 && *o.zoom <= 50))
     throw InputError("", "--zoom is out of range", "give 0.1 to 50");
-  if (o.scale && !(*o.scale >= 1e-9 && *o.scale <= 1e6))
+  if (r.scale && !(*r.scale >= 1e-9 && *r.scale <= 1e6))
     throw InputError("", "--scale is out of range", "give metres per unit, 1e-9 to 1e6");
 }
 
@@ -204,7 +203,6 @@ int run_view(const ViewOptions& given, const Common& common) {
     check_output(o.out, {o.request.path});
   o.request.single = kind == ViewKind::picture;
   o.request.every = o.every.value_or(1);
-  o.request.scale = o.scale.value_or(1);
   o.request.max_memory = common.max_memory;
   o.request.fps = o.fps;
   if (!o.fps && kind == ViewKind::gif && !o.every) o.request.fps = kUsualGifFps;
@@ -292,7 +290,7 @@ void add_view(Program& program) {
   app.add_option("--sequence", r.sequence, "which sequence of an HDF5 file, from 0");
   app.add_option("--up", r.up,
                  "axis of scans and recordings that points up: x, -x, y, -y, z or -z");
-  add_scale(app, options.scale, "units of scans and recordings in metres");
+  add_scale(app, r.scale, "units of scans and recordings in metres");
 }
 
 }  // namespace restage::cli

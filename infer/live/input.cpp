@@ -98,6 +98,8 @@ Reading::Reading(std::unique_ptr<CloudInput> input, Mailbox& to, Words& words)
   thread_ = std::thread([this, &to, &words] {
     try {
       input_->run(stop_, to, words);
+    } catch (const InputError& error) {
+      fault_ = error;
     } catch (const std::exception& error) {
       words.warn("reading", std::string("reading clouds has ended: ") + error.what());
     }
@@ -106,9 +108,18 @@ Reading::Reading(std::unique_ptr<CloudInput> input, Mailbox& to, Words& words)
 }
 
 Reading::~Reading() {
-  const uint64_t one = 1;
-  if (write(stop_, &one, sizeof one) == sizeof one) thread_.join();
+  stop();
   close(stop_);
+}
+
+void Reading::stop() {
+  const uint64_t one = 1;
+  if (thread_.joinable() && write(stop_, &one, sizeof one) == sizeof one) thread_.join();
+}
+
+void Reading::end() {
+  stop();
+  if (fault_) throw *fault_;
 }
 
 void PipeInput::run(int stop, Mailbox& to, Words& words) {
@@ -116,10 +127,14 @@ void PipeInput::run(int stop, Mailbox& to, Words& words) {
   Sender sender{.fd = fd_, .number = 1};
   std::vector<pollfd> all = {{stop, POLLIN, 0}, {fd_, POLLIN, 0}};
   while (wait_for(all)) {
-    if (all[1].revents == 0)
+    if (all[1].revents == 0) {
       sender.silence.check(sender.parser.in_frame(), words);
-    else if (sender.read(buffer, to, words, name_) != Sender::State::open)
-      return;
+      continue;
+    }
+    const Sender::State state = sender.read(buffer, to, words, name_);
+    if (state == Sender::State::garbage && !sender.whole)
+      throw InputError(name_, "holds no frame", "send frames as docs/stream.md says");
+    if (state != Sender::State::open) return;
   }
 }
 

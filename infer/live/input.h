@@ -2,8 +2,10 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <thread>
 
+#include "autograd/base/error.h"
 #include "infer/live/frame_parser.h"
 #include "infer/live/place.h"
 #include "infer/live/words.h"
@@ -17,7 +19,7 @@ class CloudInput {
   CloudInput& operator=(const CloudInput&) = delete;
   virtual ~CloudInput() = default;
   /// Reads until the input ends, or until `stop`, a file descriptor, becomes readable. Trouble with
-  /// a sender ends neither.
+  /// a sender ends neither. InputError: nothing that came was a frame, and nobody else can come.
   virtual void run(int stop, Mailbox& to, Words& words) = 0;
 };
 
@@ -30,8 +32,14 @@ class Reading {
   Reading(const Reading&) = delete;
   Reading& operator=(const Reading&) = delete;
 
+  /// Stops reading, and throws the input's InputError if there was one.
+  void end();
+
  private:
+  void stop();
+
   int stop_;
+  std::optional<InputError> fault_;  ///< written by the thread, read when it is over
   std::unique_ptr<CloudInput> input_;
   std::thread thread_;
 };

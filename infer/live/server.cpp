@@ -18,6 +18,10 @@ namespace {
 
 constexpr size_t kPiece = 1 << 15;  // bytes of the page that are written at once
 
+/// Who says nothing for ten seconds is asked whether anybody is there, and hung up ten seconds
+/// later.
+constexpr lws_retry_bo_t kIdle{nullptr, 0, 0, 10, 20, 0};
+
 /// What we remember of a connection; libwebsockets makes it, all zero.
 struct Client {
   size_t page_at;  ///< bytes of the page that were sent
@@ -174,7 +178,8 @@ PageServer::PageServer(const Place& where, const std::string& option, std::strin
   info.gid = info.uid = static_cast<decltype(info.gid)>(-1);
   info.options =
       LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND | (v6 ? 0 : LWS_SERVER_OPTION_DISABLE_IPV6);
-  info.fd_limit_per_thread = 64;
+  info.fd_limit_per_thread = 256;
+  info.retry_and_idle_policy = &kIdle;
   state_->context = lws_create_context(&info);
   if (state_->context == nullptr)
     throw InputError("", option + " cannot listen on " + where.text(), "give another port");

@@ -227,13 +227,36 @@ class Streams(StreamTest):
         self.assertEqual((document["frames_in"], document["frames_out"]), (16, 16))
         self.assertIn("standard input ended in the middle of a frame", err)
 
-    def test_a_pipe_of_nothing_or_garbage_ends_in_order(self):
-        for data, words in ((b"", "no frame came"), (b"ply\nformat ascii 1.0\n" * 9, "standard input sends what is no frame")):
-            process = self.stream("-")
-            out, err = process.communicate(data, timeout=30)
-            self.assertEqual(process.returncode, 0, err)
-            self.assertEqual(json.loads(out)["frames_in"], 0)
-            self.assertIn(words, err.decode())
+    def test_a_pipe_of_nothing_or_garbage(self):
+        process = self.stream("-")
+        out, err = process.communicate(b"", timeout=30)
+        self.assertEqual(process.returncode, 0, err)
+        self.assertEqual(json.loads(out)["frames_in"], 0)
+        self.assertIn("no frame came", err.decode())
+        process = self.stream("-")
+        out, err = process.communicate(b"ply\nformat ascii 1.0\n" * 9, timeout=30)
+        self.assertEqual((process.returncode, out), (2, b""), err)
+        self.assertIn("standard input: holds no frame; send frames as docs/stream.md says", err.decode())
+
+    def test_without_standard_input(self):
+        command = '"$@" <&-'
+        done = subprocess.run(["sh", "-c", command, "sh", PROGRAM, "stream", "--target", self.target, "--in", "-", "--vmc",
+                               "127.0.0.1:%d" % self.receiver.port, "--weights", LITE, "--json"], cwd=self.folder, capture_output=True, timeout=30)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn(b"no frame came", done.stderr)
+
+    def test_a_cloud_of_very_many_points(self):
+        process = self.stream("-")
+        points = self.clouds[0]
+        count = 400_000
+        process.stdin.write(struct.pack("<Id", count, 0.0) + b"".join(struct.pack("<3f", *points[k % len(points)]) for k in range(count)))
+        process.stdin.flush()
+        self.assertIsNotNone(self.receiver.next())
+        process.stdin.close()
+        process.stdin = None
+        document, err = self.ended(process)
+        self.assertEqual(document["frames_out"], 1)
+        self.assertIn("a cloud has 400000 points; one in 4 is used", err)
 
     def test_folder(self):
         os.mkdir(self.path("in"))

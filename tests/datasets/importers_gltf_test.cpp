@@ -265,6 +265,16 @@ TEST_F(ImportersGltf, NodesThatRestInAnAnimationDoNotMatter) {
   EXPECT_HAS(found.report.remarks[0], "another pose");
 }
 
+TEST_F(ImportersGltf, UnevenScalesAreToldOf) {
+  testing::GlbParts parts = CharacterMaker(known_, mixamo_style()).parts;
+  EXPECT_TRUE(read_character(write("even.glb", parts)).report.remarks.empty());
+  parts.root["nodes"][22]["scale"][1] = 1.2 * parts.root["nodes"][22]["scale"][0].get<double>();
+  const Character found = read_character(write("uneven.glb", parts));
+  ASSERT_EQ(found.report.remarks.size(), 2u);
+  EXPECT_HAS(found.report.remarks[0], "is scaled unevenly (20 % more along one axis)");
+  EXPECT_HAS(found.report.remarks[1], "turn or stretch");
+}
+
 TEST_F(ImportersGltf, AxesAndUnitsOfEveryKindComeOutRight) {
   const Mat3 z_up = Eigen::AngleAxisd(M_PI / 2, Vec3::UnitX()).toRotationMatrix();
   const Mat3 oblique = turn_about_y(0.6);

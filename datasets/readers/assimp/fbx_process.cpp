@@ -8,7 +8,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 
 #include "datasets/readers/assimp/fbx_scene.h"
@@ -75,6 +77,16 @@ std::string answer_of(std::string_view content, const std::string& path) {
   return out;
 }
 
+/// Sockets and files of the program are no business of the child's.
+void close_all_but(int kept) {
+  std::vector<int> open;
+  std::error_code error;
+  for (const auto& one : std::filesystem::directory_iterator("/proc/self/fd", error))
+    open.push_back(std::atoi(one.path().filename().c_str()));
+  for (const int fd : open)
+    if (fd > STDERR_FILENO && fd != kept) close(fd);
+}
+
 [[noreturn]] void work(int to, std::string_view content, const std::string& path) {
   for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL, SIGXCPU, SIGTERM, SIGINT})
     std::signal(signal, SIG_DFL);
@@ -84,6 +96,7 @@ std::string answer_of(std::string_view content, const std::string& path) {
     dup2(nowhere, STDOUT_FILENO);
     dup2(nowhere, STDERR_FILENO);
   }
+  close_all_but(to);
   set_bounds(content.size());
   const std::string answer = answer_of(content, path);
   for (size_t at = 0; at < answer.size();) {
@@ -130,11 +143,13 @@ std::string fbx_in_a_process(std::string_view content, const std::string& path,
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
   if (all.empty() || !WIFEXITED(status) || WEXITSTATUS(status) != 0) {
-    const bool slow =
-        WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL);
+    const int signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+    if (signal == SIGKILL || signal == SIGTERM || signal == SIGINT)
+      throw WorkError(path +
+                      ": its reader was stopped from outside, as a machine without memory does");
     throw InputError(path,
-                     slow ? "takes far longer to read than a file of its size should"
-                          : "is so broken that its reader crashed",
+                     signal == SIGXCPU ? "takes far longer to read than a file of its size should"
+                                       : "is so broken that its reader crashed",
                      kMend);
   }
   std::string_view answer(all);
