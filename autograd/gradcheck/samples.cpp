@@ -6,6 +6,7 @@ const std::vector<OpSamples>& all_samples() {
   static const Table table = [] {
     Table t;
     add_attention(t);
+    add_cross_attention(t);
     add_elementwise(t);
     add_layout(t);
     add_linear(t);

@@ -8,6 +8,7 @@ namespace restage::gradcheck {
 using Table = std::vector<OpSamples>;
 
 void add_attention(Table& table);
+void add_cross_attention(Table& table);
 void add_elementwise(Table& table);
 void add_layout(Table& table);
 void add_linear(Table& table);

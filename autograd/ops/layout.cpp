@@ -210,4 +210,12 @@ Var conv1d(const Var& x, const Var& weight, const Var& bias, int64_t stride, int
   return linear(windows, reshape(weight, {weight.size(0), weight.size(1) * k}), bias);
 }
 
+Var concat(std::span<const Var> xs, int axis) {
+  if (xs.size() <= kMaxInputs) return call(Concat{axis}, xs);
+  std::vector<Var> groups;
+  for (size_t i = 0; i < xs.size(); i += kMaxInputs)
+    groups.push_back(concat(xs.subspan(i, std::min(kMaxInputs, xs.size() - i)), axis));
+  return concat(std::span<const Var>(groups), axis);
+}
+
 }  // namespace restage

@@ -1,0 +1,184 @@
+#include "nn/models/corenet.h"
+
+#include <cmath>
+#include <string>
+
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+#include "autograd/ops/norm.h"
+#include "autograd/ops/reduce.h"
+#include "nn/layers/transport.h"
+#include "nn/models/npt.h"
+
+namespace restage {
+namespace {
+
+constexpr double kLeak = 0.2;
+
+std::string numbered(const char* name, size_t i) { return name + std::to_string(i); }
+
+/// x [n, v, c] over the length of its channels, to which float64's epsilon is added.
+Var unit_channels(const Var& x) {
+  const Var length = add_scalar(smooth_length(x, 1e-24), std::numeric_limits<double>::epsilon());
+  return x / reshape(length, {x.size(0), x.size(1), 1});
+}
+
+/// [n, c] as [n, 1, c].
+Var of_all_points(const Var& x) { return reshape(x, {x.size(0), 1, x.size(1)}); }
+
+}  // namespace
+
+PointResBlock::PointResBlock(int64_t channels, const Init& init)
+    : conv1(channels, channels, init.sub("conv1"), true, 1),
+      conv2(channels, channels, init.sub("conv2"), true, 1),
+      slope(Tensor::full({1}, 0.25, init.type)) {}
+
+Var PointResBlock::operator()(Context& ctx, const Var& x) const {
+  const ModuleScope path(scope);
+  const Var a = ctx.bind(slope);
+  const auto act = [&](const Var& y) {
+    const Var positive = relu(y);
+    return positive + a * (y - positive);
+  };
+  const Var h = act(instance_norm(conv1(ctx, x)));
+  return act(x + instance_norm(conv2(ctx, h)));
+}
+
+void PointResBlock::visit(Fields& f) {
+  f("conv1", conv1);
+  f("conv2", conv2);
+  f("act.weight", slope);
+}
+
+Correspondence::Correspondence(const CoreNetConfig& c, const Init& init)
+    : phi(c.widths[2], c.widths[2], init.sub("phi"), true, 1),
+      theta(c.widths[2], c.widths[2], init.sub("theta"), true, 1) {
+  int64_t in = 3;
+  for (size_t i = 0; i < c.widths.size(); ++i) {
+    convs.emplace(in, c.widths[i], init.sub(numbered("convs.", i)), true, 1);
+    in = c.widths[i];
+  }
+  for (int64_t i = 0; i < c.blocks; ++i)
+    res.emplace(in, init.sub(numbered("res.", static_cast<size_t>(i))));
+}
+
+Var Correspondence::features(Context& ctx, const Var& points) const {
+  Var x = points;
+  for (size_t i = 0; i < convs.size(); ++i)
+    x = instance_norm(convs[i](ctx, i == 0 ? x : leaky_relu(x, kLeak)));
+  x = unit_channels(x);
+  for (size_t i = 0; i < res.size(); ++i) x = res[i](ctx, x);
+  return x;
+}
+
+Correspondence::Found Correspondence::operator()(Context& ctx, const Var& pose,
+                                                 const Var& identity) const {
+  const ModuleScope path(scope);
+  Found out;
+  out.features = features(ctx, identity);
+  const Var q = unit_channels(theta(ctx, out.features));
+  const Var k = unit_channels(phi(ctx, features(ctx, pose)));
+  out.rows = transport_rows(transport_plan(matmul(q, k, false, true)));
+  out.warped = matmul(out.rows, pose);
+  return out;
+}
+
+void Correspondence::visit(Fields& f) {
+  f("convs", convs);
+  f("res", res);
+  f("phi", phi);
+  f("theta", theta);
+}
+
+Elain::Elain(int64_t channels, int64_t identity, const Init& init)
+    : same(identity, channels, init.sub("same"), true, 1),
+      gamma(channels, channels, init.sub("gamma"), true, 1),
+      beta(channels, channels, init.sub("beta"), true, 1),
+      mix(2 * channels, channels, init.sub("mix"), true, 1) {}
+
+Var Elain::operator()(Context& ctx, const Var& x, const Var& identity) const {
+  const ModuleScope path(scope);
+  constexpr double kEps = 1e-5;
+  const auto points = static_cast<double>(x.size(1));
+  if (x.size(1) < 2)
+    shape_error("elain", "x[n, v, c], v > 1", std::array{x.value}, "one point has no deviation");
+  const Var m = mean(x, 1), difference = x - of_all_points(m);
+  const Var s = sqrt(add_scalar(scale(sum(square(difference), 1), 1 / (points - 1)), kEps));
+  const Var asked = same(ctx, identity);
+  const Var share = mix(ctx, concat({mean(asked, 1), m}, 1)), rest = add_scalar(neg(share), 1);
+  const auto between = [&](const Linear& of, const Var& own) {
+    return of(ctx, asked) * of_all_points(share) + of_all_points(own * rest);
+  };
+  const Var unit = difference / of_all_points(s);
+  return unit + unit * between(gamma, s) + between(beta, m);
+}
+
+void Elain::visit(Fields& f) {
+  f("same", same);
+  f("gamma", gamma);
+  f("beta", beta);
+  f("mix", mix);
+}
+
+ElainBlock::ElainBlock(int64_t channels, int64_t identity, const Init& init)
+    : n0(channels, identity, init.sub("n0")),
+      n1(channels, identity, init.sub("n1")),
+      ns(channels, identity, init.sub("ns")),
+      c0(channels, channels, init.sub("c0")),
+      c1(channels, channels, init.sub("c1")),
+      cs(channels, channels, init.sub("cs"), false) {}
+
+Var ElainBlock::operator()(Context& ctx, const Var& x, const Var& identity) {
+  const ModuleScope path(scope);
+  const Var h = c0(ctx, leaky_relu(n0(ctx, x, identity), kLeak));
+  const Var past = cs(ctx, leaky_relu(ns(ctx, x, identity), kLeak));
+  return past + c1(ctx, leaky_relu(n1(ctx, h, identity), kLeak));
+}
+
+void ElainBlock::visit(Fields& f) {
+  f("n0", n0);
+  f("n1", n1);
+  f("ns", ns);
+  f("c0", c0);
+  f("c1", c1);
+  f("cs", cs);
+}
+
+CoreNet::CoreNet(const CoreNetConfig& c, const Init& init)
+    : config(c),
+      corr(c, init.sub("corr")),
+      fc(3, c.generator[0], 3, init.sub("fc")),
+      out(c.generator[2], 3, init.sub("out"), true, 1) {
+  int64_t in = c.generator[0];
+  for (size_t i = 0; i < c.generator.size(); ++i) {
+    convs.emplace(in, c.generator[i], init.sub(numbered("convs.", i)), true, 1);
+    blocks.emplace(c.generator[i], c.widths[2], init.sub(numbered("blocks.", i)));
+    in = c.generator[i];
+  }
+}
+
+Var CoreNet::posed(Context& ctx, const Var& pose, const Var& identity,
+                   Correspondence::Found* found) {
+  const ModuleScope path(scope);
+  const Correspondence::Found matched = corr(ctx, pose, identity);
+  Var x = fc.same(ctx, matched.warped, 1);
+  for (size_t i = 0; i < convs.size(); ++i) x = blocks[i](ctx, convs[i](ctx, x), matched.features);
+  if (found != nullptr) *found = matched;
+  return points_of(ctx, out, x);
+}
+
+Var CoreNet::forward(Context& ctx, const TransferInput& in) {
+  const int64_t n = in.pose.size(0), t = in.pose.size(1), v = in.identity.size(1);
+  const Var mesh = reshape(expand(reshape(in.identity, {n, 1, v, 3}), {n, t, v, 3}), {n * t, v, 3});
+  return reshape(posed(ctx, reshape(in.pose, {n * t, in.pose.size(2), 3}), mesh), {n, t, v, 3});
+}
+
+void CoreNet::visit(Fields& f) {
+  f("corr", corr);
+  f("fc", fc);
+  f("convs", convs);
+  f("blocks", blocks);
+  f("out", out);
+}
+
+}  // namespace restage

@@ -1,0 +1,94 @@
+// `transfer/corenet`: 3D-CoreNet (Song et al., NeurIPS 2021).
+#pragma once
+
+#include <array>
+
+#include "nn/config/rules.h"
+#include "nn/layers/linear.h"
+#include "nn/layers/module_list.h"
+#include "nn/layers/spectral.h"
+#include "nn/models/transfer.h"
+
+namespace restage {
+
+struct CoreNetConfig {
+  std::array<int64_t, 3> widths = {64, 128, 256};
+  std::array<int64_t, 3> generator = {1024, 512, 256};
+  int64_t blocks = 4;
+};
+
+template <class V>
+void visit(V& v, CoreNetConfig& c) {
+  v("widths", c.widths, "channels of the features that are matched", between(1, kMostWidth));
+  v("generator", c.generator, "channels of the generator", between(1, kMostWidth));
+  v("blocks", c.blocks, "residual blocks of the features", between(0, 64));
+}
+
+/// x + norm(c2 act(norm(c1 x))) through act, one PReLU whose slope is used twice.
+struct PointResBlock : Module {
+  PointResBlock(int64_t channels, const Init& init);
+  Var operator()(Context& ctx, const Var& x) const;
+  void visit(Fields& f) override;
+  const char* kind() const override { return "PointResBlock"; }
+  Linear conv1, conv2;
+  Parameter slope;
+};
+
+/// Finds the pose's point for each vertex of the target, by features and optimal transport.
+struct Correspondence : Module {
+  struct Found {
+    Var features;  ///< of the identity [n, v, c]
+    Var rows;      ///< shares of the pose's points [n, v, p], adding up to 1
+    Var warped;    ///< the mean of the pose's points [n, v, 3]
+  };
+  Correspondence(const CoreNetConfig& c, const Init& init);
+  Found operator()(Context& ctx, const Var& pose, const Var& identity) const;
+  void visit(Fields& f) override;
+  const char* kind() const override { return "Correspondence"; }
+  ModuleList<Linear> convs;
+  ModuleList<PointResBlock> res;
+  Linear phi, theta;
+
+ private:
+  Var features(Context& ctx, const Var& points) const;
+};
+
+/// Elastic instance normalisation: (x - m) / s (1 + gamma) + beta, with gamma and beta between what
+/// the identity's features f [n, v, i] ask for and x's own deviation s (unbiased) and mean m.
+struct Elain : Module {
+  Elain(int64_t channels, int64_t identity, const Init& init);
+  Var operator()(Context& ctx, const Var& x, const Var& identity) const;
+  void visit(Fields& f) override;
+  const char* kind() const override { return "ElaIN"; }
+  Linear same, gamma, beta, mix;
+};
+
+struct ElainBlock : Module {
+  ElainBlock(int64_t channels, int64_t identity, const Init& init);
+  Var operator()(Context& ctx, const Var& x, const Var& identity);
+  void visit(Fields& f) override;
+  const char* kind() const override { return "ElaINBlock"; }
+  Elain n0, n1, ns;
+  SpectralLinear c0, c1, cs;
+};
+
+/// The first layer of the generator sees three neighbours in the order of the vertices, so the
+/// answer depends on that order.
+struct CoreNet : TransferModel {
+  using Config = CoreNetConfig;
+  CoreNet(const CoreNetConfig& c, const Init& init);
+  Var forward(Context& ctx, const TransferInput& in) override;
+  /// The same of poses [n, p, 3]; `found`, where given, says what was matched.
+  Var posed(Context& ctx, const Var& pose, const Var& identity,
+            Correspondence::Found* found = nullptr);
+  void visit(Fields& f) override;
+  const char* kind() const override { return "CoreNet"; }
+  CoreNetConfig config;
+  Correspondence corr;
+  Conv1d fc;
+  ModuleList<Linear> convs;
+  ModuleList<ElainBlock> blocks;
+  Linear out;
+};
+
+}  // namespace restage

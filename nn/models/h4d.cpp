@@ -1,0 +1,167 @@
+#include "nn/models/h4d.h"
+
+#include <algorithm>
+#include <string>
+
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+#include "autograd/ops/linear.h"
+#include "autograd/ops/reduce.h"
+#include "autograd/ops/rotation.h"
+
+namespace restage {
+namespace {
+
+constexpr size_t kBlocks = 5, kPlainLayers = 3;
+
+/// x [n, v, c] with the maximum over its points joined to each, [n, v, 2 c].
+Var with_maximum(const Var& x) {
+  const int64_t n = x.size(0), c = x.size(2);
+  return concat({x, expand(reshape(max(x, 1), {n, 1, c}), x.shape())}, 2);
+}
+
+/// x [...] repeated for each of n items.
+Var for_each_of(int64_t n, const Tensor& x) {
+  Shape one{1}, all{n};
+  for (int i = 0; i < x.rank(); ++i) {
+    one.push_back(x.size(i));
+    all.push_back(x.size(i));
+  }
+  return expand(Var(x.reshape(one)), all);
+}
+
+}  // namespace
+
+ResBlockFc::ResBlockFc(int64_t in, int64_t out, const Init& init)
+    : fc_0(in, std::min(in, out), init.sub("fc_0")),
+      fc_1(std::min(in, out), out, init.sub("fc_1")),
+      shortcut(in, out, init.sub("shortcut"), false) {
+  fc_1.weight.value = Tensor::zeros(fc_1.weight.value.shape(), init.type);
+}
+
+Var ResBlockFc::operator()(Context& ctx, const Var& x) const {
+  const ModuleScope path(scope);
+  return shortcut(ctx, x) + fc_1(ctx, fc_0(ctx, relu(x), Activation::relu));
+}
+
+void ResBlockFc::visit(Fields& f) {
+  f("fc_0", fc_0);
+  f("fc_1", fc_1);
+  f("shortcut", shortcut);
+}
+
+ResPointNet::ResPointNet(int64_t out, int64_t hidden, const Init& init)
+    : fc_pos(3, 2 * hidden, init.sub("fc_pos")), fc_c(hidden, out, init.sub("fc_c")) {
+  for (size_t i = 0; i < kBlocks; ++i)
+    blocks.emplace(2 * hidden, hidden, init.sub("blocks." + std::to_string(i)));
+}
+
+Var ResPointNet::operator()(Context& ctx, const Var& points) const {
+  const ModuleScope path(scope);
+  Var x = fc_pos(ctx, points);
+  for (size_t i = 0; i < kBlocks; ++i) {
+    if (i > 0) x = with_maximum(x);
+    x = blocks[i](ctx, x);
+  }
+  return fc_c(ctx, relu(max(x, 1)));
+}
+
+void ResPointNet::visit(Fields& f) {
+  f("fc_pos", fc_pos);
+  f("fc_c", fc_c);
+  f("blocks", blocks);
+}
+
+PlainPointNet::PlainPointNet(int64_t out, int64_t hidden, const Init& init)
+    : fc_pos(3, 2 * hidden, init.sub("fc_pos")), fc_c(hidden, out, init.sub("fc_c")) {
+  for (size_t i = 0; i < kPlainLayers; ++i)
+    fc.emplace(2 * hidden, hidden, init.sub("fc." + std::to_string(i)));
+}
+
+Var PlainPointNet::operator()(Context& ctx, const Var& points) const {
+  const ModuleScope path(scope);
+  Var x = fc_pos(ctx, points);
+  for (size_t i = 0; i < kPlainLayers; ++i) {
+    if (i > 0) x = with_maximum(x);
+    x = fc[i](ctx, relu(x));
+  }
+  return fc_c(ctx, relu(max(x, 1)));
+}
+
+void PlainPointNet::visit(Fields& f) {
+  f("fc_pos", fc_pos);
+  f("fc_c", fc_c);
+  f("fc", fc);
+}
+
+TemporalEncoder::TemporalEncoder(int64_t in, int64_t hidden, int64_t out, const Init& init)
+    : gru(in, hidden, 2, 0, init.sub("gru")), linear(hidden, out, init.sub("linear")) {}
+
+Var TemporalEncoder::operator()(Context& ctx, const Var& x) const {
+  const ModuleScope path(scope);
+  Var state;
+  return linear(ctx, relu(gru(ctx, x, &state)));
+}
+
+void TemporalEncoder::visit(Fields& f) {
+  f("gru", gru);
+  f("linear", linear);
+}
+
+H4d::H4d(const H4dConfig& c, const Init& init)
+    : config(c),
+      id_encoder(c.shape, c.hidden, init.sub("id_encoder")),
+      pose_encoder(c.pose, c.hidden, init.sub("pose_encoder")),
+      point_encoder(c.features, c.hidden, init.sub("point_encoder")),
+      motion_encoder(c.features, c.recurrent, c.motion, init.sub("motion_encoder")) {}
+
+H4d::Codes H4d::codes(Context& ctx, const Var& window) const {
+  const ModuleScope path(scope);
+  const int64_t n = window.size(0), t = window.size(1), v = window.size(2);
+  const Var first = reshape(slice(window, 1, 0, 1), {n, v, 3});
+  const Var frames = point_encoder(ctx, reshape(window, {n * t, v, 3}));
+  const Var steps = motion_encoder(ctx, reshape(frames, {n, t, frames.size(1)}));
+  return {id_encoder(ctx, first), pose_encoder(ctx, first),
+          reshape(slice(steps, 1, t - 1, t), {n, steps.size(2)})};
+}
+
+void H4d::visit(Fields& f) {
+  f("id_encoder", id_encoder);
+  f("pose_encoder", pose_encoder);
+  f("point_encoder", point_encoder);
+  f("motion_encoder", motion_encoder);
+}
+
+Var h4d_poses(const Var& pose, const Var& motion, const MotionBasis& basis) {
+  const int64_t n = pose.size(0), width = pose.size(1), r = basis.root.size(0);
+  const auto change = [&](int64_t from, int64_t to, const Tensor& components, const Tensor& mean,
+                          int64_t numbers) {
+    return reshape(matmul(slice(motion, 1, from, to), components) + Var(mean), {n, -1, numbers});
+  };
+  const Var changes = concat({change(0, r, basis.root, basis.root_mean, 3),
+                              change(r, motion.size(1), basis.joints, basis.joint_mean, width - 3)},
+                             2);
+  const Var first = reshape(pose, {n, 1, width});
+  return concat({first, first + changes}, 1);
+}
+
+Var pose_body(const LinearBody& body, const Var& shape, const Var& poses) {
+  const int64_t n = poses.size(0), t = poses.size(1), j = poses.size(2) / 3;
+  const int64_t v = body.mean.size(0), b = shape.size(1);
+  const Var directions(body.directions.reshape({3 * v, b}));
+  const Var rest = reshape(linear(shape, directions), {n, v, 3}) + Var(body.mean);
+  const Var joints = matmul(Var(body.regressor), rest);
+  const auto each_frame = [&](const Var& x) {
+    return reshape(expand(reshape(x, {n, 1, x.size(1), 3}), {n, t, x.size(1), 3}),
+                   {n * t, x.size(1), 3});
+  };
+  const Var frame_joints = each_frame(joints);
+  const Var local = axis_angle_to_matrix(reshape(poses, {n * t, j, 3}));
+  const Var root = reshape(slice(frame_joints, 1, 0, 1), {n * t, 3});
+  const Var posed = forward_kinematics(local, frame_joints, root, body.parents);
+  return reshape(linear_blend_skinning(each_frame(rest), for_each_of(n * t, body.weights), posed,
+                                       frame_joints),
+                 {n, t, v, 3});
+}
+
+}  // namespace restage

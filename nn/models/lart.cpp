@@ -1,0 +1,67 @@
+#include "nn/models/lart.h"
+
+#include <string>
+
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+#include "autograd/ops/reduce.h"
+#include "nn/models/npt.h"
+
+namespace restage {
+
+Lart::Lart(const LartConfig& c, const Init& init)
+    : config(c),
+      time(Tensor::zeros({c.frames, c.widths[2]}, init.type)),
+      enc(c.widths, init.sub("enc")),
+      out(c.widths[2] / 4, 3, init.sub("out"), true, 1) {
+  const int64_t full = c.widths[2];
+  int64_t in = full;
+  size_t i = 0;
+  for (const int64_t width : {full, full / 2, full / 2, full / 4}) {
+    const std::string number = std::to_string(i);
+    convs.emplace(in, width, init.sub("convs." + number), true, 1);
+    att.emplace(width, init.sub("att." + number));
+    blocks.emplace(width, i > 0 || c.first_norm, init.sub("blocks." + number));
+    in = width;
+    ++i;
+  }
+}
+
+Var Lart::codes(Context& ctx, const Var& pose) const {
+  const int64_t n = pose.size(0), t = pose.size(1);
+  if (t > config.frames)
+    shape_error("lart", "pose[n, t, p, 3]", std::array{pose.value},
+                "the model has vectors for " + std::to_string(config.frames) + " frames");
+  const Var pooled = max(enc(ctx, reshape(pose, {n * t, pose.size(2), 3})), 1);
+  return reshape(pooled, {n, t, pooled.size(1)}) + slice(ctx.bind(time), 0, 0, t);
+}
+
+Var Lart::decode(Context& ctx, const Var& code, const Var& identity) const {
+  const int64_t n = identity.size(0), v = identity.size(1), c = code.size(1);
+  Var u = enc(ctx, identity), x = expand(reshape(code, {n, 1, c}), {n, v, c});
+  for (size_t i = 0; i < convs.size(); ++i) {
+    u = convs[i](ctx, u);
+    x = convs[i](ctx, x);
+    x = blocks[i](ctx, att[i](ctx, u, x, x), identity);
+  }
+  return points_of(ctx, out, x);
+}
+
+Var Lart::forward(Context& ctx, const TransferInput& in) {
+  const ModuleScope path(scope);
+  const int64_t n = in.pose.size(0), t = in.pose.size(1), v = in.identity.size(1);
+  const Var code = codes(ctx, in.pose);
+  const Var mesh = reshape(expand(reshape(in.identity, {n, 1, v, 3}), {n, t, v, 3}), {n * t, v, 3});
+  return reshape(decode(ctx, reshape(code, {n * t, code.size(2)}), mesh), {n, t, v, 3});
+}
+
+void Lart::visit(Fields& f) {
+  f("time", time);
+  f("enc", enc);
+  f("convs", convs);
+  f("att", att);
+  f("blocks", blocks);
+  f("out", out);
+}
+
+}  // namespace restage

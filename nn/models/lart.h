@@ -1,0 +1,53 @@
+// `transfer/lart`: LART (Chen et al. 2023), as far as paper and the programs before it say what it
+// is (docs/systems/lart.md).
+#pragma once
+
+#include <array>
+
+#include "nn/config/rules.h"
+#include "nn/layers/cross_attention.h"
+#include "nn/layers/spadain.h"
+#include "nn/models/transfer.h"
+
+namespace restage {
+
+struct LartConfig {
+  std::array<int64_t, 3> widths = {64, 128, 1024};
+  int64_t frames = 3;
+  bool first_norm = false;
+};
+
+template <class V>
+void visit(V& v, LartConfig& c) {
+  v("widths", c.widths,
+    "channels of the encoder; the decoder has the last, its half twice, a quarter",
+    between(4, kMostWidth));
+  v("frames", c.frames, "frames of a window", between(1, 64));
+  v("first_norm", c.first_norm,
+    "instance norm in the first block, too: the answer does then not depend on the pose");
+}
+
+/// Each frame is pooled to one code, to which its place in the window adds a learned vector. The
+/// code is repeated at the target's vertices and decoded by four steps: a convolution on the code
+/// and on the encoded target, attention of the target over the code, a SPAdaIN block.
+struct Lart : TransferModel {
+  using Config = LartConfig;
+  Lart(const LartConfig& c, const Init& init);
+  Var forward(Context& ctx, const TransferInput& in) override;
+  int64_t frames() const override { return config.frames; }
+  /// Codes of a window's frames [n, t, c].
+  Var codes(Context& ctx, const Var& pose) const;
+  /// The target [n, v, 3] in the pose of one code each [n, c] -> [n, v, 3].
+  Var decode(Context& ctx, const Var& code, const Var& identity) const;
+  void visit(Fields& f) override;
+  const char* kind() const override { return "LART"; }
+  LartConfig config;
+  Parameter time;
+  PoseEncoder enc;
+  ModuleList<Linear> convs;
+  ModuleList<GatedCrossAttention> att;
+  ModuleList<SpadainBlock> blocks;
+  Linear out;
+};
+
+}  // namespace restage

@@ -1,0 +1,52 @@
+#include "nn/models/npt.h"
+
+#include <string>
+
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+#include "autograd/ops/reduce.h"
+
+namespace restage {
+
+Var points_of(Context& ctx, const Linear& out, const Var& x) { return scale(tanh(out(ctx, x)), 2); }
+
+Npt::Npt(const NptConfig& c, const Init& init)
+    : config(c),
+      enc(c.widths, init.sub("enc")),
+      out((c.widths[2] + 3) / 4, 3, init.sub("out"), true, 1) {
+  const int64_t full = c.widths[2] + 3;
+  int64_t in = full;
+  size_t i = 0;
+  for (const int64_t width : {full, full / 2, full / 4}) {
+    const std::string number = std::to_string(i);
+    convs.emplace(in, width, init.sub("convs." + number), true, 1);
+    blocks.emplace(width, !(c.pool && i == 0), init.sub("blocks." + number));
+    in = width;
+    ++i;
+  }
+}
+
+Var Npt::forward(Context& ctx, const TransferInput& in) {
+  const ModuleScope path(scope);
+  const int64_t n = in.pose.size(0), t = in.pose.size(1), p = in.pose.size(2);
+  const int64_t v = in.identity.size(1);
+  if (!config.pool && p != v)
+    shape_error("npt", "pose[n, t, v, 3], identity[n, v, 3]",
+                std::array{in.pose.value, in.identity.value},
+                "without 'pool' the pose needs as many points as the target has vertices");
+  const Var mesh = reshape(expand(reshape(in.identity, {n, 1, v, 3}), {n, t, v, 3}), {n * t, v, 3});
+  Var z = enc(ctx, reshape(in.pose, {n * t, p, 3}));
+  if (config.pool) z = expand(reshape(max(z, 1), {n * t, 1, z.size(2)}), {n * t, v, z.size(2)});
+  Var x = concat({z, mesh}, 2);
+  for (size_t i = 0; i < convs.size(); ++i) x = blocks[i](ctx, convs[i](ctx, x), mesh);
+  return reshape(points_of(ctx, out, x), {n, t, v, 3});
+}
+
+void Npt::visit(Fields& f) {
+  f("enc", enc);
+  f("convs", convs);
+  f("blocks", blocks);
+  f("out", out);
+}
+
+}  // namespace restage

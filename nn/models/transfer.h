@@ -1,0 +1,24 @@
+// The role `transfer`: a network that poses a mesh by looking at another body, without a skeleton.
+#pragma once
+
+#include "nn/module.h"
+
+namespace restage {
+
+struct TransferInput {
+  Var pose;      ///< [n, t, p, 3]: windows of the performer, clouds or vertices, metres
+  Var identity;  ///< [n, v, 3]: the target's mesh, in a rest pose or in any
+};
+
+struct TransferModel : Module {
+  /// Vertices of the target in the poses of the window, in the identity's order, [n, t, v, 3].
+  /// ShapeError where the window has another length than frames(), or points are not as many as the
+  /// model needs.
+  virtual Var forward(Context& ctx, const TransferInput& in) = 0;
+  /// Frames of a window; 1: the network looks at each frame alone.
+  virtual int64_t frames() const { return 1; }
+  /// Whether point i of the pose must be point i of the identity.
+  virtual bool corresponding() const { return false; }
+};
+
+}  // namespace restage
