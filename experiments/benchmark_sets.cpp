@@ -37,7 +37,7 @@ Prediction retargeted(const Bundle& weights, const std::string& folder, const st
   input.options.seed = how.seed;
   input.options.anchor = how.anchor;
   input.options.force = how.force;
-  if (!type.weights)
+  if (type.needs_rest)
     input.rest = joints_of(PredictionFile(in(folder, "rest.h5")).joints().slice(0, 1))[0];
   const auto system = type.make(std::move(input));
   Prediction out;
@@ -187,8 +187,7 @@ SystemScores evaluate_benchmark_set(const Bundle& weights, const std::string& fo
                                     const std::string& set, const BenchmarkOptions& how,
                                     std::vector<std::string>* names) {
   check_benchmark_set(set);
-  if (system_type(how.system).weights)
-    for (const char* role : {"skeleton", "motion"}) weights.need(role, "the trial");
+  for (const std::string& role : system_type(how.system).roles) weights.need(role, "the trial");
   SystemScores out;
   if (set == "test") {
     judge_test_clips(weights, folder, how, &out, names);

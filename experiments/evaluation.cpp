@@ -147,13 +147,13 @@ struct Condition {
   std::vector<std::string> roles;
 };
 
-/// Known joints are for our own chain; other systems see clouds and nothing else. What is nothing
-/// but an extractor is judged as one.
-std::vector<Condition> conditions_of(bool chain, const Bundle& weights) {
-  if (!chain) return {{"clouds", {}}};
-  std::vector<Condition> out = {{"clouds", {"skeleton", "motion"}},
-                                {"true_skeletons", {"motion"}},
-                                {"true_poses", {"deformation.weights"}}};
+/// Known joints are for a system whose networks can be judged one by one; others see clouds and
+/// nothing else. What is nothing but an extractor is judged as one.
+std::vector<Condition> conditions_of(const SystemType& type, const Bundle& weights) {
+  std::vector<Condition> out = {{"clouds", type.roles}};
+  if (!type.parts) return out;
+  out.push_back({"true_skeletons", {"motion"}});
+  out.push_back({"true_poses", {"deformation.weights"}});
   if (weights.find("skeleton") != nullptr && weights.find("motion") == nullptr &&
       weights.find("deformation.weights") == nullptr)
     for (const char* name : {"source_joints", "rest_joints"}) out.push_back({name, {"skeleton"}});
@@ -209,6 +209,7 @@ std::vector<std::string> sequence_names(const std::vector<EvalSequence>& list, c
 EvaluationOptions evaluation_options(const TrainConfig& config, const Corpus& test, uint64_t seed) {
   EvaluationOptions out;
   out.seed = seed;
+  out.system = config.evaluation.system;
   out.anchor = config.evaluation.anchor;
   out.scans = config.evaluation.scans;
   out.clouds = config.section("skeleton").config.as<SkeletonStageConfig>().clouds;
@@ -220,16 +221,16 @@ EvaluationOptions evaluation_options(const TrainConfig& config, const Corpus& te
 SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weights_name,
                                  const Corpus& corpus, const EvaluationOptions& options) {
   const SystemType& type = system_type(options.system);
-  const bool chain = type.name == EvaluationOptions().system;
   SystemEvaluation out;
-  for (const Condition& condition : conditions_of(chain, weights)) {
+  for (const Condition& condition : conditions_of(type, weights)) {
     const std::string missing = lacking(condition, weights);
     if (!missing.empty())
       out.missing.push_back(missing);
     else
       out.conditions.emplace_back(condition.name, SystemScores{});
   }
-  if (chain && weights.find("motion") != nullptr && weights.find("deformation.weights") == nullptr)
+  if (type.parts && weights.find("motion") != nullptr &&
+      weights.find("deformation.weights") == nullptr)
     out.missing.push_back("surfaces: no model for deformation.weights");
   RetargetOptions how;
   how.seed = options.seed;
@@ -248,7 +249,7 @@ SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weigh
                          name == "rest_joints", options, &scores);
       } else if (name == "clouds") {
         SystemInput input{weights, weights_name, target.rest, target.id, {}, how};
-        if (!type.weights) input.rest = target.joints;
+        if (type.needs_rest) input.rest = target.joints;
         const auto system = type.make(std::move(input));
         const auto push = [&](size_t i) {
           return system->push(performance.cloud(i), "frame " + std::to_string(i));
@@ -267,7 +268,7 @@ SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weigh
     metrics::average(&scores.model);
     for (auto& reference : scores.references) metrics::average(&reference.second);
   }
-  if (chain) judge_extractor(weights, corpus, options.clouds, &out);
+  if (type.parts) judge_extractor(weights, corpus, options.clouds, &out);
   return out;
 }
 

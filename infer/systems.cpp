@@ -4,6 +4,7 @@
 #include "infer/own_skin.h"
 #include "infer/registration/refinement.h"
 #include "infer/registration/registration.h"
+#include "infer/transfer.h"
 
 namespace restage {
 namespace {
@@ -30,26 +31,56 @@ std::unique_ptr<System> make_registration(SystemInput in) {
   return std::make_unique<Registration>(std::move(in.target), *in.rest, in.target_name);
 }
 
+std::unique_ptr<System> make_transfer(SystemInput in) {
+  return std::make_unique<Transfer>(in.weights, in.weights_name, std::move(in.target),
+                                    in.target_name, in.options);
+}
+
+std::vector<SystemType>& table() {
+  static std::vector<SystemType> all = {
+      {.name = "chain",
+       .help = "extractor, motion network and deformation of the weights",
+       .roles = {"skeleton", "motion"},
+       .surface = {"deformation.weights", "deformation.offsets"},
+       .parts = true,
+       .make = make_chain},
+      {.name = "refine",
+       .help = "the chain's answer, then fitted to each cloud",
+       .roles = {"skeleton", "motion", "deformation.weights"},
+       .make = make_refinement},
+      {.name = "register",
+       .help = "no learning: the target is registered to each cloud, then reposed",
+       .needs_rest = true,
+       .make = make_registration},
+      {.name = "transfer",
+       .help = "one network that moves vertices, without a skeleton (NPT, LART, 3D-CoreNet)",
+       .roles = {"transfer"},
+       .own_skin = false,
+       .make = make_transfer},
+  };
+  return all;
+}
+
 }  // namespace
 
-const std::vector<SystemType>& systems() {
-  static const std::vector<SystemType> table = {
-      {"chain", "extractor, motion network and deformation of the weights", true, make_chain},
-      {"refine", "the chain's answer, then fitted to each cloud", true, make_refinement},
-      {"register", "no learning: the target is registered to each cloud, then reposed", false,
-       make_registration},
-  };
-  return table;
+const std::vector<SystemType>& systems() { return table(); }
+
+void register_system(SystemType type) {
+  for (const SystemType& known : table())
+    if (known.name == type.name) throw Error("there is a system '" + type.name + "' already");
+  table().push_back(std::move(type));
 }
 
 std::unique_ptr<System> make_system(const SystemType& type, SystemInput input) {
   const auto own = std::move(input.own);
   if (!own) return type.make(std::move(input));
+  if (!type.own_skin)
+    throw InputError(input.target_name,
+                     "has bones, and --system " + type.name + " moves vertices without bones",
+                     "use another system, or give the character as a mesh (.obj, .ply)");
   input.target = own->mesh();
   input.rest = own->rest();
-  if (type.name == "chain")  // its surface would not be shown
-    for (const char* role : {"deformation.weights", "deformation.offsets"})
-      input.weights.erase(role);
+  for (const std::string& role : type.surface) input.weights.erase(role);  // would not be shown
   return std::make_unique<OwnSkin>(type.make(std::move(input)), own);
 }
 

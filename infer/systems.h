@@ -1,4 +1,5 @@
-// The systems by name. To add a system: derive a class from System and add a line to systems.cpp.
+// The systems by name. To add a system: derive a class from System and add a line to systems.cpp,
+// or register_system() from a program of one's own.
 #pragma once
 
 #include <memory>
@@ -25,11 +26,19 @@ struct SystemInput {
 
 struct SystemType {
   std::string name, help;
-  bool weights;  ///< whether the system needs SystemInput::weights
+  std::vector<std::string> roles = {};  ///< roles of SystemInput::weights that it reads
+  /// Roles that only vertices need; without the first of them frames have none.
+  std::vector<std::string> surface = {};
+  bool parts = false;       ///< a Retargeter, whose networks can be judged one by one
+  bool needs_rest = false;  ///< whether it needs SystemInput::rest
+  bool own_skin = true;     ///< gives joints, so that a target's own skin can pose its vertices
   std::unique_ptr<System> (*make)(SystemInput input);
 };
 
 const std::vector<SystemType>& systems();
+/// Adds a system of a program that uses this library, before anything else is done. Error if there
+/// is one of that name.
+void register_system(SystemType type);
 /// A system of that type; where the target has a skin of its own, that poses its vertices.
 std::unique_ptr<System> make_system(const SystemType& type, SystemInput input);
 /// The system of that name. InputError, which suggests the nearest known name, if there is none;

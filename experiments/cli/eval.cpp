@@ -154,7 +154,7 @@ int run_eval_run(const EvalOptions& options, const Common& common) {
     check_output(file, {run_config_path(folder), weights_name, config.data.source});
   const Bundle weights = load_bundle(folder);
   if (!options.device.empty())
-    move_networks(weights, {"skeleton", "motion"}, device_of(options.device));
+    move_networks(weights, system_type(config.evaluation.system).roles, device_of(options.device));
   const Corpus test = load_corpus(config.data, "test");
   EvaluationOptions how = evaluation_options(config, test, common.seed);
   if (options.anchor) how.anchor = *options.anchor;

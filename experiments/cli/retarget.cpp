@@ -323,14 +323,15 @@ SystemInput load_input(const RetargetCommand& c, const Common& common) {
   input.options = c.options;
   input.options.seed = common.seed;
   input.target_name = c.target;
-  const bool needed = system_type(c.system).weights;
-  if (c.weights.empty() && !needed) return input;
+  const SystemType& type = system_type(c.system);
+  if (c.weights.empty() && type.roles.empty()) return input;
   const std::string weights = c.weights.empty() ? standard_weights() : c.weights;
   input.weights_name = weights_path(weights);
   input.weights = load_bundle(weights);
-  for (const char* role : {"skeleton", "motion", "deformation.weights"})
-    if (needed) input.weights.need(role, input.weights_name);
-  move_networks(input.weights, {"skeleton", "motion"}, device_of(c.device));
+  std::vector<std::string> needed = type.roles;
+  if (!type.surface.empty()) needed.push_back(type.surface.front());
+  for (const std::string& role : needed) input.weights.need(role, input.weights_name);
+  move_networks(input.weights, type.roles, device_of(c.device));
   return input;
 }
 

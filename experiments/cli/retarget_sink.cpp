@@ -32,7 +32,7 @@ bool is_animation(const std::string& out) {
 const SystemRig& rig_of(const Shown& shown, const std::string& out) {
   if (shown.rig == nullptr)
     throw InputError(out, "needs a skeleton, which this system does not have",
-                     "end it in .h5, or / for a folder of frames");
+                     "end it in / for a folder of frames");
   return *shown.rig;
 }
 
@@ -150,7 +150,9 @@ Sink bvh_sink(const SinkOptions& options, const Shown& shown,
 
 Sink hdf5_sink(const SinkOptions& options, const Shown& shown,
                const std::optional<SourceRecord>& source) {
-  rig_of(shown, options.out);  // /joints must be there
+  if (shown.rig == nullptr)  // /joints must be there
+    throw InputError(options.out, "holds joints, and this system finds none",
+                     "end --out in / for a folder of frames");
   const Mesh& target = shown.target;
   const auto writer = std::make_shared<PredictionWriter>(options.out, std::ssize(target.vertices),
                                                          target.faces, FileInfo{}, options.rate());

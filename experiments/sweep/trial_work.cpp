@@ -75,7 +75,6 @@ Json scores_json(const SystemScores& scores, const std::vector<std::string>& nam
 Json evaluate_held_out(const Bundle& models, const TrainConfig& config) {
   const Corpus test = load_corpus(config.data, "test");
   EvaluationOptions how = evaluation_options(config, test, 0);
-  how.system = config.evaluation.system;
   how.every = config.evaluation.every;
   how.metrics = metrics::recorded();
   const auto names = sequence_names(how.sequences, test);

@@ -6,9 +6,11 @@
 namespace restage {
 
 /// NPT's edge loss of each item, [n]: the mean over faces of the sum over their three edges of
-/// | length / reference length - 1 |. pred and reference [n, v, 3]; faces i32 [n, f, 3] or, shared
-/// by all items, [f, 3]. The reference has no gradient. An edge whose reference has no length
-/// counts as right; where a predicted edge has none the gradient is zero. ShapeError without faces.
+/// | length / reference length - 1 |. pred and reference [n, v, 3]; faces i32 [m, f, 3], each for
+/// n / m items in a row, or [f, 3] for all; a face with a
+/// corner twice is none. The reference has no gradient. An edge whose reference
+/// has no length counts as right; where a predicted edge has none the gradient is zero. ShapeError
+/// without faces.
 Var edge_loss(const Var& pred, const Tensor& reference, const Tensor& faces);
 
 /// Distances between all points of each item: x [n, v, 3] -> [n, v, v], gradient zero where two

@@ -29,6 +29,7 @@ struct Npt : TransferModel {
   using Config = NptConfig;
   Npt(const NptConfig& c, const Init& init);
   Var forward(Context& ctx, const TransferInput& in) override;
+  bool equal_counts() const override { return !config.pool; }
   void visit(Fields& f) override;
   const char* kind() const override { return "NPT"; }
   NptConfig config;

@@ -3,71 +3,87 @@
 #include "autograd/base/nearest.h"
 #include "nn/models/bone_field.h"
 #include "nn/models/closed_form_motion.h"
+#include "nn/models/corenet.h"
 #include "nn/models/deformation.h"
 #include "nn/models/discriminator.h"
+#include "nn/models/h4d.h"
 #include "nn/models/hybrid.h"
+#include "nn/models/lart.h"
+#include "nn/models/npt.h"
 #include "nn/models/patch_transformer.h"
 #include "nn/models/point_transformer.h"
 #include "nn/models/pointnet.h"
 #include "nn/models/smrm.h"
+#include "nn/models/tst.h"
 
 namespace restage {
 namespace {
-
-template <class M>
-ModelType model(const char* name, const char* role, const char* help,
-                typename M::Config config = {}) {
-  return {name,
-          help,
-          role,
-          AnyConfig(config),
-          AnyConfig(config),
-          [](const AnyConfig& c, const Init& init) -> std::unique_ptr<Module> {
-            return std::make_unique<M>(c.as<typename M::Config>(), init);
-          }};
-}
 
 /// The paper's network takes numbers as they are, which is the default of its sizes. So far no
 /// training of ours went well that way (docs/method.md), so trainings start with other sizes.
 ModelType smrm(const char* name, const char* help, RotationForm rotation) {
   SmrmConfig config;
   config.rotation = rotation;
-  ModelType out = model<Smrm>(name, "motion", help, config);
+  ModelType out = model_of<Smrm>(name, "motion", help, config);
   config.standardise = config.rest_pose_start = true;
   out.training = AnyConfig(config);
   return out;
 }
 
-}  // namespace
+ModelType npt_pool() {
+  NptConfig config;
+  config.pool = true;
+  return model_of<Npt>("transfer/npt_pool", "transfer", "NPT with a pooled pose code", config);
+}
 
-const std::vector<ModelType>& models() {
-  static const std::vector<ModelType> table = {
-      model<PointTransformer>("skeleton/point_transformer", "skeleton",
-                              "the paper's extractor: 4 blocks, width 512, 1024 points"),
-      model<PointNet>("skeleton/pointnet", "skeleton",
-                      "the first version's extractor: PointNet with a 3x3 T-net"),
-      model<PatchTransformer>("skeleton/patch_transformer", "skeleton",
-                              "our small extractor for CPUs: patch tokens that vote"),
+std::vector<ModelType>& table() {
+  static std::vector<ModelType> all = {
+      model_of<PointTransformer>("skeleton/point_transformer", "skeleton",
+                                 "the paper's extractor: 4 blocks, width 512, 1024 points"),
+      model_of<PointNet>("skeleton/pointnet", "skeleton",
+                         "the first version's extractor: PointNet with a 3x3 T-net"),
+      model_of<PatchTransformer>("skeleton/patch_transformer", "skeleton",
+                                 "our small extractor for CPUs: patch tokens that vote"),
       smrm("smrm/rot6d", "the motion retargeting network with 6D rotations", RotationForm::sixd),
       smrm("smrm/quaternion", "the first version's, with quaternions", RotationForm::quaternion),
-      model<Hybrid>("smrm/hybrid", "motion",
-                    "closed form of joints that a recurrent network corrects, twists and ends"),
-      model<ClosedFormMotion>("motion/closed_form", "motion",
-                              "no network: the closed form of the joints, to compare with"),
-      model<Discriminator>("smrm/discriminator", "discriminator",
-                           "the motion discriminator of the adversarial loss"),
-      model<WeightNet>("deformation/weights", "deformation.weights",
-                       "skinning weights of a rest point"),
-      model<OffsetNet>("deformation/offsets", "deformation.offsets",
-                       "pose-corrective offset of a rest point"),
-      model<RootNet>("deformation/root", "deformation.root",
-                     "the third MLP: rest joints to pelvis in the scan"),
-      model<BoneField>("deformation/bones", "deformation.weights",
-                       "skinning weights from distances to the bones"),
-      model<V1Field>("deformation/v1_field", "deformation.weights",
-                     "the first version's skinning field"),
+      model_of<Hybrid>("smrm/hybrid", "motion",
+                       "closed form of joints that a recurrent network corrects, twists and ends"),
+      model_of<ClosedFormMotion>("motion/closed_form", "motion",
+                                 "no network: the closed form of the joints, to compare with"),
+      model_of<Discriminator>("smrm/discriminator", "discriminator",
+                              "the motion discriminator of the adversarial loss"),
+      model_of<WeightNet>("deformation/weights", "deformation.weights",
+                          "skinning weights of a rest point"),
+      model_of<OffsetNet>("deformation/offsets", "deformation.offsets",
+                          "pose-corrective offset of a rest point"),
+      model_of<RootNet>("deformation/root", "deformation.root",
+                        "the third MLP: rest joints to pelvis in the scan"),
+      model_of<BoneField>("deformation/bones", "deformation.weights",
+                          "skinning weights from distances to the bones"),
+      model_of<V1Field>("deformation/v1_field", "deformation.weights",
+                        "the first version's skinning field"),
+      model_of<Npt>("transfer/npt", "transfer", "Neural Pose Transfer (Wang et al. 2020)"),
+      npt_pool(),
+      model_of<Lart>("transfer/lart", "transfer", "LART (Chen et al. 2023), a reconstruction"),
+      model_of<CoreNet>("transfer/corenet", "transfer", "3D-CoreNet (Song et al. 2021)"),
+      model_of<Tst>("transfer/tst", "transfer",
+                    "Temporal Shape Transfer (Regateiro and Boyer 2022)"),
+      model_of<TstDiscriminator>("transfer/tst_discriminator", "transfer.discriminator",
+                                 "TST's discriminator, which its program never trains"),
+      model_of<H4d>("codes/h4d", "codes",
+                    "H4D's first stage (Jiang et al. 2022): codes of a window"),
   };
-  return table;
+  return all;
+}
+
+}  // namespace
+
+const std::vector<ModelType>& models() { return table(); }
+
+void register_model(ModelType type) {
+  for (const ModelType& known : table())
+    if (known.name == type.name) throw Error("there is a model '" + type.name + "' already");
+  table().push_back(std::move(type));
 }
 
 const ModelType& model_type(const std::string& name) {

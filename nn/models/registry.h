@@ -19,7 +19,25 @@ struct ModelType {
   std::unique_ptr<Module> (*make)(const AnyConfig& config, const Init& init);
 };
 
+/// The line of a model whose class has a type `Config` with a visit(), and a constructor from one
+/// and an Init. `config`: its sizes where they are not named.
+template <class M>
+ModelType model_of(const char* name, const char* role, const char* help,
+                   typename M::Config config = {}) {
+  return {name,
+          help,
+          role,
+          AnyConfig(config),
+          AnyConfig(config),
+          [](const AnyConfig& c, const Init& init) -> std::unique_ptr<Module> {
+            return std::make_unique<M>(c.as<typename M::Config>(), init);
+          }};
+}
+
 const std::vector<ModelType>& models();
+/// Adds a model of a program that uses this library, before anything else is done; model_of() makes
+/// its line. Error if there is one of that name.
+void register_model(ModelType type);
 /// The model of this name. InputError with the nearest known name if there is none.
 const ModelType& model_type(const std::string& name);
 /// Builds a network. `config` is of the type of model_type(name).config.

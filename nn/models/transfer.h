@@ -19,6 +19,8 @@ struct TransferModel : Module {
   virtual int64_t frames() const { return 1; }
   /// Whether point i of the pose must be point i of the identity.
   virtual bool corresponding() const { return false; }
+  /// Whether the pose needs as many points as the target has vertices.
+  virtual bool equal_counts() const { return corresponding(); }
 };
 
 }  // namespace restage

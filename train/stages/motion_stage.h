@@ -95,6 +95,8 @@ class MotionStage final : public Stage {
  public:
   using Config = MotionStageConfig;
   static std::vector<std::string> reads(const Config& config);
+  /// An extractor is asked about few sequences, since all would take minutes.
+  static double shorten(Config& config);
   MotionStage(const Config& config, const StageInput& input);
   NamedValues step(int64_t step) override;
   NamedTensors examples(int64_t step) const override;

@@ -3,41 +3,38 @@
 #include "train/stages/deformation_stage.h"
 #include "train/stages/motion_stage.h"
 #include "train/stages/skeleton_stage.h"
+#include "train/stages/transfer_stage.h"
 
 namespace restage {
 namespace {
 
-template <class S>
-StageType stage(const char* name, const char* help, std::vector<std::string> roles,
-                std::vector<std::string> figures) {
-  return {name,
-          help,
-          AnyConfig(typename S::Config()),
-          std::move(roles),
-          std::move(figures),
-          [](const AnyConfig& c) { return S::reads(c.as<typename S::Config>()); },
-          [](const AnyConfig& c, const StageInput& input) -> std::unique_ptr<Stage> {
-            return std::make_unique<S>(c.as<typename S::Config>(), input);
-          }};
+std::vector<StageType>& table() {
+  static std::vector<StageType> all = {
+      stage_of<SkeletonStage>("skeleton", "the skeleton extractor", {"skeleton"},
+                              {"joint_error_mm", "tpose_joint_error_mm", "ring_joint_error_mm",
+                               "one_camera_joint_error_mm", "intruder_joint_error_mm",
+                               "followed_joint_error_mm", "turn_error_degrees", "miscalibration"}),
+      stage_of<MotionStage>(
+          "motion", "the motion retargeting network", {"motion"},
+          {"pa_mpjpe", "local_mpjpe", "cycle_mpjpe", "acceleration", "rotation",
+           "closed_form_pa_mpjpe", "closed_form_acceleration", "closed_form_rotation"}),
+      stage_of<DeformationStage>("deformation", "skinning weights and offsets",
+                                 {"deformation.weights", "deformation.offsets"},
+                                 {"with_offsets_mm", "skinning_mm", "skin_lost"}),
+      stage_of<TransferStage>("transfer", "a network that poses a mesh without a skeleton",
+                              {"transfer"}, {"distance_mm", "pmd_1e4"}),
+  };
+  return all;
 }
 
 }  // namespace
 
-const std::vector<StageType>& stage_types() {
-  static const std::vector<StageType> table = {
-      stage<SkeletonStage>("skeleton", "the skeleton extractor", {"skeleton"},
-                           {"joint_error_mm", "tpose_joint_error_mm", "ring_joint_error_mm",
-                            "one_camera_joint_error_mm", "intruder_joint_error_mm",
-                            "followed_joint_error_mm", "turn_error_degrees", "miscalibration"}),
-      stage<MotionStage>(
-          "motion", "the motion retargeting network", {"motion"},
-          {"pa_mpjpe", "local_mpjpe", "cycle_mpjpe", "acceleration", "rotation",
-           "closed_form_pa_mpjpe", "closed_form_acceleration", "closed_form_rotation"}),
-      stage<DeformationStage>("deformation", "skinning weights and offsets",
-                              {"deformation.weights", "deformation.offsets"},
-                              {"with_offsets_mm", "skinning_mm", "skin_lost"}),
-  };
-  return table;
+const std::vector<StageType>& stage_types() { return table(); }
+
+void register_stage(StageType type) {
+  for (const StageType& known : table())
+    if (known.name == type.name) throw Error("there is a stage '" + type.name + "' already");
+  table().push_back(std::move(type));
 }
 
 std::vector<std::string> stage_names() {

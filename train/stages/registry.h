@@ -21,9 +21,35 @@ struct StageType {
   /// it.
   std::vector<std::string> (*reads)(const AnyConfig& config);
   std::unique_ptr<Stage> (*make)(const AnyConfig& config, const StageInput& input);
+  /// For a forecast: makes what comes before the first step short, and returns how many times as
+  /// long it would take in full. Null: there is nothing to shorten.
+  double (*shorten)(AnyConfig& config) = nullptr;
 };
 
+/// The line of a stage: a class derived from Stage with a type `Config`, a static reads(Config), a
+/// constructor from a Config and a StageInput, and, where it is needed, a static shorten(Config&).
+template <class S>
+StageType stage_of(const char* name, const char* help, std::vector<std::string> roles,
+                   std::vector<std::string> figures) {
+  double (*shorten)(AnyConfig&) = nullptr;
+  if constexpr (requires(typename S::Config & c) { S::shorten(c); })
+    shorten = [](AnyConfig& c) { return S::shorten(c.as<typename S::Config>()); };
+  return {name,
+          help,
+          AnyConfig(typename S::Config()),
+          std::move(roles),
+          std::move(figures),
+          [](const AnyConfig& c) { return S::reads(c.as<typename S::Config>()); },
+          [](const AnyConfig& c, const StageInput& input) -> std::unique_ptr<Stage> {
+            return std::make_unique<S>(c.as<typename S::Config>(), input);
+          },
+          shorten};
+}
+
 const std::vector<StageType>& stage_types();
+/// Adds a stage of a program that uses this library, before anything else is done: its section is
+/// then a section of every configuration. Error if there is one of that name.
+void register_stage(StageType type);
 std::vector<std::string> stage_names();
 /// The first of `names` that is not STAGE.FIGURE of some stage; "" if there is none.
 std::string unknown_figure(const std::vector<std::string>& names);

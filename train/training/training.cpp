@@ -3,13 +3,11 @@
 #include <algorithm>
 #include <memory>
 
+#include "autograd/kernels/kernel.h"
 #include "nn/config/config.h"
-#include "train/stages/motion_stage.h"
 
 namespace restage {
 namespace {
-
-constexpr int64_t kAsked = 8;  // sequences, in a forecast
 
 void check_order(const TrainConfig& config, const StageType& type, const AnyConfig& own) {
   const auto& stages = config.stages;
@@ -59,21 +57,16 @@ Bundle train_run(RunDir& run, const TrainConfig& config, const TrainingData& dat
 }
 
 std::vector<StageForecast> forecast(TrainConfig config, const TrainingData& data) {
-  // Asking an extractor about everything that a stage learns on and is judged on would take
-  // minutes.
-  auto& motion = config.section("motion").config.as<MotionStageConfig>();
-  int64_t &learned = motion.answers.tracks.sequences, &judged = motion.validation_windows;
-  const int64_t all = learned + judged;
-  if (learned > 0) learned = std::min(learned, kAsked), judged = std::min(judged, kAsked);
   std::vector<StageForecast> out;
   Bundle so_far;
   for (const std::string& name : config.stages) {
+    const StageType& type = stage_type(name);
+    const double left_out = type.shorten ? type.shorten(config.section(name).config) : 1;
     const auto stage = make_stage(config, name, data, &so_far);
     if (stage == nullptr) continue;
     so_far.add(stage->result());
     out.push_back(forecast(*stage, config.precision, true));
-    if (name == "motion" && learned > 0)
-      out.back().before *= static_cast<double>(all) / static_cast<double>(learned + judged);
+    out.back().before *= left_out;
   }
   return out;
 }

@@ -1,0 +1,73 @@
+"""Networks that move a mesh without a skeleton: trained, measured, used, refused."""
+import os
+import unittest
+
+from support import CliTest
+from tiny_run import CONFIG
+
+TRANSFER = CONFIG.replace("test: 1}\n  motions", "test: 2}\n  motions") + """
+stages: [transfer]
+transfer:
+  model: transfer/npt_pool
+  sizes: {widths: [8, 8, 13]}
+  optimiser: {steps: 6, batch: 2}
+  pairs: {points: 64, vertices: 100}
+  validation_pairs: 2
+evaluation: {system: transfer, sequences: 1, frames: 5}
+"""
+SIZES = {"npt": "{widths: [8, 8, 13]}", "lart": "{widths: [8, 8, 16]}", "corenet": "{widths: [8, 8, 8], generator: [8, 8, 8], blocks: 1}"}
+
+
+class Transfer(CliTest):
+    def setUp(self):
+        super().setUp()
+        self.write("t.yaml", TRANSFER)
+
+    def trained(self, *overrides):
+        return self.done("train", "t.yaml", "--quiet", *overrides).strip()
+
+    def test_every_network_is_trained_and_measured(self):
+        for model, more in (("npt", ["transfer.pairs.points=0"]), ("lart", ["transfer.loss.metric=0.1", "transfer.loss.edge_reference=truth"]),
+                            ("corenet", ["transfer.loss.reconstruction=1000"])):
+            run = self.trained("name=" + model, "transfer.model=transfer/" + model, "transfer.sizes=" + SIZES[model], *more)
+            said = self.json("eval", "run=" + run)
+            self.assertGreater(said["mean"]["mpvd"], 0, model)
+            self.assertIsNone(said["mean"]["mpjpe"], model)
+
+    def test_the_same_bits_again_and_for_other_threads(self):
+        one = self.bytes(os.path.join(self.trained(), "weights.safetensors"))
+        self.assertEqual(self.bytes(os.path.join(self.trained("--threads", "1"), "weights.safetensors")), one)
+
+    def test_a_mesh_is_moved(self):
+        weights = self.trained()
+        cloud = [(0.2 * (k % 7) - 0.6, 0.05 * (k % 35), 0.1 * (k % 3)) for k in range(300)]
+        for f in range(3):
+            self.ply("scans/f%d.ply" % f, [(x + 0.1 * f, y, z) for x, y, z in cloud])
+        self.ply("hero.ply", cloud[:120])
+        call = ["retarget", "--system", "transfer", "--force", "--source", "scans", "--target", "hero.ply", "--weights", weights]
+        said = self.json(*call, "--out", "frames/")
+        self.assertEqual(said["frames"], 3)
+        first = self.bytes("frames/frame_000001.ply")
+        self.done(*call, "--out", "again/")
+        self.assertEqual(self.bytes("again/frame_000001.ply"), first)
+        self.bad_input(call + ["--out", "x.glb"], "x.glb", "needs a skeleton")
+        self.bad_input(call + ["--out", "x.h5"], "x.h5", "end --out in /")
+        self.bad_input(call + ["--out", "x/", "--fps", "60"], "60 frames a second")
+        self.bad_input(["retarget", "--force", "--source", "scans", "--target", "hero.ply", "--weights", weights, "--out", "x/"], "no model for skeleton")
+
+    def test_refusals(self):
+        call = ["train", "t.yaml", "--quiet"]
+        self.bad_input(call + ["transfer.pairs.points=200"], "points")
+        self.bad_input(call + ["transfer.pairs.vertices=0"], "pairs.vertices")
+        self.bad_input(call + ["transfer.loss.metric=1"], "transfer/lart")
+        self.bad_input(call + ["transfer.model=transfer/lart", "transfer.sizes={frames: 1, widths: [8, 8, 16]}", "transfer.loss.metric=1"], "two frames")
+        tst = ["transfer.model=transfer/tst", "transfer.sizes={widths: [8, 8, 8], vertices: 100, code: 8, hidden: 8}"]
+        self.bad_input(call + tst, "shuffle")
+        self.bad_input(call + tst + ["transfer.pairs.shuffle=false"], "faces")
+        self.bad_input(call + ["data.bodies={train: 1, validation: 1, test: 1}", "transfer.pairs.shuffle=false", "transfer.model=transfer/tst",
+                               "transfer.sizes={widths: [8, 8, 8], vertices: 90, code: 8, hidden: 8}"], "made for 90 vertices")
+        self.bad_input(call + ["transfer.model=transfer/nbt"], "transfer/npt")
+
+
+if __name__ == "__main__":
+    unittest.main()

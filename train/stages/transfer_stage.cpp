@@ -1,0 +1,160 @@
+#include "train/stages/transfer_stage.h"
+
+#include <algorithm>
+
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+#include "autograd/ops/reduce.h"
+#include "nn/losses/measure.h"
+#include "nn/losses/transfer.h"
+#include "nn/models/lart.h"
+
+namespace restage {
+namespace {
+
+/// A window is as long as the model wants it; points correspond where the model needs that.
+TransferConfig for_model(TransferConfig c, const TransferModel& model) {
+  c.frames = static_cast<int>(model.frames());
+  if (model.corresponding() && c.shuffle)
+    throw InputError("", "pairs.shuffle mixes points, and this model needs their order",
+                     "set pairs.shuffle: false");
+  if (model.equal_counts()) c.points = 0;
+  return c;
+}
+
+/// All frames of all items below one another: [n, t, v, 3] -> [n t, v, 3].
+Var frames_of(const Var& x) { return reshape(x, {x.size(0) * x.size(1), x.size(2), 3}); }
+
+/// x [n, v, 3] with every item t times.
+Tensor repeated(const Tensor& x, int64_t t) {
+  const int64_t n = x.size(0), v = x.size(1);
+  return frames_of(expand(Var(x.reshape({n, 1, v, 3})), {n, t, v, 3})).value;
+}
+
+/// Frame number `t` of windows [n, t, v, 3].
+Var frame_of(const Var& x, int64_t t) {
+  return reshape(slice(x, 1, t, t + 1), {x.size(0), x.size(2), 3});
+}
+
+}  // namespace
+
+TransferStage::TransferStage(const Config& config, const StageInput& in)
+    : Stage("transfer", config.optimiser, in.device),
+      config_(config),
+      model_(add_network<TransferModel>(config.model, RngKey{in.seed, 0}.fold("transfer"),
+                                        {{"points", std::to_string(config.pairs.points)}})),
+      optimiser_(add_optimiser("optimiser", {"transfer"}, config.optimiser)),
+      sampler_(in.train, for_model(config.pairs, *model_), sampler_seed(in.seed, "transfer.pairs")),
+      validation_sampler_(in.validation, for_model(config.pairs, *model_), 1),
+      key_(RngKey{in.seed, 0}.fold("transfer.step")) {
+  if (model_->corresponding() && !(sampler_.corresponding() && validation_sampler_.corresponding()))
+    throw InputError("", "bodies have different faces, and this model needs corresponding vertices",
+                     "train on bodies of one topology, such as those of the open benchmark");
+  if (config.loss.metric > 0 && dynamic_cast<Lart*>(model_) == nullptr)
+    throw InputError("", "loss.metric needs a model whose codes can be mixed",
+                     "choose model: transfer/lart, or set loss.metric: 0");
+  if (config.loss.metric > 0 && model_->frames() < 2)
+    throw InputError("", "loss.metric needs windows of two frames at least",
+                     "set sizes.frames: 3, or loss.metric: 0");
+  // What does not fit is found out before hours of training.
+  Context ctx;
+  const TransferBatch one = moved(validation_sampler_.batch(0, 1), device());
+  try {
+    model_->forward(ctx, {one.pose, one.identity});
+  } catch (const ShapeError& error) {
+    const std::string text = error.what();
+    throw InputError("", "pairs do not fit the model: " + text.substr(0, text.find("; got")),
+                     "change transfer.pairs or transfer.sizes");
+  }
+}
+
+TransferBatch TransferStage::batch(int64_t step, const MicroBatch& part) const {
+  const int64_t n = config_.optimiser.batch;
+  return sampler_.batch(part.from(drawn(step) * n, n), part.count(n));
+}
+
+/// LART's: a code between those of the first and the last frame gives a mesh whose distances lie
+/// between theirs.
+Var TransferStage::metric(Context& ctx, const TransferBatch& pairs) {
+  auto& lart = dynamic_cast<Lart&>(*model_);
+  const int64_t last = pairs.pose.size(1) - 1, n = pairs.pose.size(0);
+  const int64_t v = std::min(config_.loss.metric_points, pairs.identity.size(1));
+  const double alpha = Rng(ctx.rng.fold("metric")).uniform();
+  const Var codes = lart.codes(ctx, pairs.pose);
+  const auto code = [&](int64_t t) {
+    return reshape(slice(codes, 1, t, t + 1), {n, codes.size(2)});
+  };
+  const Var mixed = lart.decode(ctx, code(0) * (1 - alpha) + code(last) * alpha, pairs.identity);
+  // Vertices come in a random order, so the first ones are a random choice.
+  const auto some = [&](const Var& x) { return slice(x, 1, 0, v); };
+  return metric_loss(some(mixed), some(frame_of(pairs.truth, 0)).value,
+                     some(frame_of(pairs.truth, last)).value, alpha);
+}
+
+Var TransferStage::loss(Context& ctx, const TransferBatch& pairs, int64_t step, Tensor* posed) {
+  const TransferLossConfig& l = config_.loss;
+  const Var made = model_->forward(ctx, {pairs.pose, pairs.identity});
+  *posed = made.value;
+  Var total = scale(mse(made, pairs.truth), l.reconstruction);
+  const int64_t t = pairs.pose.size(1);
+  const Var frames = frames_of(made);
+  const Tensor truth = frames_of(pairs.truth).value;
+  if (l.edge > 0) {
+    const Tensor& right =
+        l.edge_reference == EdgeReference::truth ? truth : repeated(pairs.identity, t);
+    total = total + scale(mean_all(edge_loss(frames, right, pairs.faces)), l.edge);
+  }
+  if (l.distances > 0) {
+    const int64_t v = std::min(l.metric_points, frames.size(1));
+    const auto some = [&](const Var& x) { return pair_distances(slice(x, 1, 0, v)); };
+    total = total + scale(mse(some(frames), some(truth)), l.distances);
+  }
+  if (l.metric > 0 && step >= l.metric_from) total = total + scale(metric(ctx, pairs), l.metric);
+  return total;
+}
+
+NamedValues TransferStage::step(int64_t step) {
+  const OptimiserConfig& o = config_.optimiser;
+  const Differentiated d = parts(*optimiser_, [&](const MicroBatch& part) {
+    const TransferBatch pairs = batch(step, part), there = moved(pairs, device());
+    Tensor posed;
+    Differentiated out =
+        differentiate(part.key(key_.fold(static_cast<uint64_t>(step))),
+                      [&](Context& ctx) { return loss(ctx, there, step, &posed); });
+    out.values = {mean_distance(posed.cpu(), pairs.truth)};
+    return out;
+  });
+  const double rate = learning_rate(o.schedule, step, o.steps);
+  optimiser_->step(d.gradients, rate);
+  return {{"loss", d.loss}, {"distance_mm", 1e3 * d.values[0]}, {"rate", rate}};
+}
+
+NamedValues TransferStage::validate() {
+  Context ctx;
+  double distance = 0, squares = 0;
+  const int64_t n = config_.validation_pairs;
+  for (int64_t i = 0; i < n; ++i) {
+    const TransferBatch pairs = validation_sampler_.batch(i, 1), there = moved(pairs, device());
+    const Tensor made = model_->forward(ctx, {there.pose, there.identity}).value.cpu();
+    distance += mean_distance(made, pairs.truth) / static_cast<double>(n);
+    squares += mse(made, pairs.truth).value.item() / static_cast<double>(n);
+  }
+  return {{"distance_mm", 1e3 * distance}, {"pmd_1e4", 3e4 * squares}};
+}
+
+std::vector<Shown> TransferStage::show() {
+  const int64_t n = std::min<int64_t>(8, config_.validation_pairs);
+  const TransferBatch pairs = validation_sampler_.batch(0, n), there = moved(pairs, device());
+  Context ctx;
+  const Tensor made = model_->forward(ctx, {there.pose, there.identity}).value.cpu();
+  Shown source{"source", {}}, answered{"posed target", {}}, truth{"true target", {}};
+  const int64_t t = made.size(1);
+  for (int64_t i = 0; i < n; ++i) {
+    source.clouds.push_back(points_of(pairs.pose, i * t, pairs.pose.size(2)));
+    answered.clouds.push_back(points_of(made, i * t, made.size(2)));
+    truth.clouds.push_back(points_of(pairs.truth, i * t, made.size(2)));
+  }
+  return {source, answered, truth};
+}
+
+}  // namespace restage
