@@ -269,6 +269,7 @@ TEST(SavedTensors, AreThoseOfTheTable) {
       {"pooled_norm", "240 x1 x3 32 64 32 y"},  // x less its mean, deviations, peaks and where
       {"gru", "x0 x1 x2 x3 y 576"},             // the gates
       {"attention_pool", "x1 480 y"},           // the softmax
+      {"cross_attention", "x0 x1 x2"},
       {"neighbour_attention", "x0 x1 x2 x3 x4 x5 x6 x7 8 y 4"},  // the softmax, the index
       {"to_matrix", "x0"},
       {"atan2", "x0 x1"},

@@ -102,8 +102,7 @@ void npt(Case& c) {
 }
 
 void lart(Case& c) {
-  Lart net({.widths = three_widths(c, "enc.convs."), .frames = c.size("time", 0)},
-           c.init());
+  Lart net({.widths = three_widths(c, "enc.convs."), .frames = c.size("time", 0)}, c.init());
   c.load(net);
   const Var pose = permute(c.in("pose"), {0, 1, 3, 2}), mesh = swapped(c.in("mesh"));
   const Var truth = c.asked("gt");

@@ -497,7 +497,8 @@ TEST(ConfigReferencePage, NamesTheSizesOfEveryModel) {
   std::vector<std::string> lines;
   for (std::string line; std::getline(file, line);) lines.push_back(line);
   const std::set<std::string> by_default = {"skeleton/point_transformer", "smrm/rot6d",
-                                            "deformation/weights", "deformation/offsets"};
+                                            "deformation/weights", "deformation/offsets",
+                                            "transfer/npt"};
   for (const ModelType& type : models()) {
     std::vector<ConfigReference::Row> rows;
     ConfigReference reference(rows);
