@@ -8,6 +8,7 @@
 #include "autograd/gradcheck/gradcheck.h"
 #include "autograd/ops/reduce.h"
 #include "datasets/schema.h"
+#include "own_network.h"
 
 int main() {
   using namespace restage;
@@ -23,6 +24,7 @@ int main() {
       samples,
       {"two numbers", {gradcheck::random({2}, 1)}, [](gradcheck::Args x) { return square(x[0]); }});
   if (!report.ok() || report.compared == 0) return 1;
+  if (!mine::trains_and_answers()) return 1;
   try {
     inspect("no such file.h5");
   } catch (const InputError&) {

@@ -1,0 +1,142 @@
+// A network, a loss and a system of one's own, trained and used with the installed library
+// (docs/systems.md, "Your own"). Not a line of the library knows them.
+#include "own_network.h"
+
+#include <cmath>
+#include <cstdio>
+
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
+#include "autograd/ops/reduce.h"
+#include "datasets/sampling/transfers.h"
+#include "infer/systems.h"
+#include "infer/transfer.h"
+#include "nn/config/config.h"
+#include "nn/config/rules.h"
+#include "nn/layers/linear.h"
+#include "nn/models/registry.h"
+#include "nn/models/transfer.h"
+#include "train/training/training.h"
+
+namespace mine {
+
+using namespace restage;
+
+struct ShiftConfig {
+  int64_t width = 8;
+};
+
+template <class V>
+void visit(V& v, ShiftConfig& c) {
+  v("width", c.width, "units of the hidden layer", between(1, 1024));
+}
+
+/// Moves each vertex by what a small network makes of the vertex and of the pose's highest
+/// coordinates.
+struct Shift : TransferModel {
+  using Config = ShiftConfig;
+  Shift(const ShiftConfig& c, const Init& init)
+      : in(6, c.width, init.sub("in")), out(c.width, 3, init.sub("out")) {}
+  Var forward(Context& ctx, const TransferInput& x) override {
+    const int64_t n = x.pose.size(0), t = x.pose.size(1), v = x.identity.size(1);
+    const auto at_each = [&](const Var& y, const Shape& one) {
+      return expand(reshape(y, one), {n, t, v, 3});
+    };
+    const Var mesh = at_each(x.identity, {n, 1, v, 3});
+    const Var pose = at_each(max(x.pose, 2), {n, t, 1, 3});
+    return mesh + out(ctx, in(ctx, concat({mesh, pose}, 3), Activation::relu));
+  }
+  void visit(Fields& f) override {
+    f("in", in);
+    f("out", out);
+  }
+  const char* kind() const override { return "Shift"; }
+  Linear in, out;
+};
+
+/// A stage with a loss of its own: distances of points, not their squares.
+struct ShiftStageConfig {
+  ModelChoice model{"mine/shift"};
+  OptimiserConfig optimiser;
+};
+
+template <class V>
+void visit(V& v, ShiftStageConfig& c) {
+  visit_choice(v, c.model);
+  v("optimiser", c.optimiser, "steps, batch, rate");
+}
+
+class ShiftStage final : public Stage {
+ public:
+  using Config = ShiftStageConfig;
+  static std::vector<std::string> reads(const Config&) { return {}; }
+  ShiftStage(const Config& c, const StageInput& in)
+      : Stage("shift", c.optimiser, in.device),
+        model_(add_network<TransferModel>(c.model, RngKey{in.seed, 0})),
+        optimiser_(add_optimiser("optimiser", {"transfer"}, c.optimiser)),
+        sampler_(in.train, {.points = 20, .vertices = 40}, in.seed) {}
+  NamedValues step(int64_t step) override {
+    const int64_t n = examples_per_step();
+    const TransferBatch b = sampler_.batch(drawn(step) * n, n);
+    const Differentiated d =
+        differentiate(RngKey{1, static_cast<uint64_t>(step)}, [&](Context& ctx) {
+          const Var made = model_->forward(ctx, {b.pose, b.identity});
+          return mean_all(smooth_length(made - Var(b.truth), 1e-8));
+        });
+    optimiser_->step(d.gradients, learning_rate(optimisation_.schedule, step, steps()));
+    return {{"loss", d.loss}};
+  }
+  NamedTensors examples(int64_t step) const override {
+    return named_tensors(sampler_.batch(step, examples_per_step()));
+  }
+  NamedValues validate() override { return {{"loss", 0}}; }
+
+ private:
+  TransferModel* model_;
+  Optimiser* optimiser_;
+  TransferSampler sampler_;
+};
+
+bool trains_and_answers() {
+  register_model(model_of<Shift>("mine/shift", "transfer", "moves vertices a little"));
+  register_stage(stage_of<ShiftStage>("shift", "a stage of mine", {"transfer"}, {"loss"}));
+  register_system({.name = "mine",
+                   .help = "my system",
+                   .roles = {"transfer"},
+                   .own_skin = false,
+                   .make = [](SystemInput in) -> std::unique_ptr<System> {
+                     return std::make_unique<Transfer>(in.weights, in.weights_name,
+                                                       std::move(in.target), in.target_name,
+                                                       in.options);
+                   }});
+  TrainConfig config;
+  read_config(parse_yaml("stages: [shift]\n"
+                         "data: {bodies: {train: 2, validation: 1, test: 1},"
+                         " motions: {train: 2, validation: 1, test: 1}}\n"
+                         "shift: {sizes: {width: 16}, optimiser: {steps: 60, batch: 4,"
+                         " schedule: {rate: 0.01}}}\n",
+                         "mine.yaml"),
+              config);
+  const TrainingData data(config.data);
+  Bundle weights;
+  const auto stage = make_stage(config, "shift", data, &weights);
+  double first = 0, last = 0;
+  for (int64_t i = 0; i < stage->steps(); ++i) {
+    last = stage->step(i)[0].second;
+    if (i == 0) first = last;
+  }
+  std::printf("loss of my network: %.3f m, then %.3f m\n", first, last);
+  weights.add(stage->result());
+  const Body& body = data.train.bodies[0];
+  SystemInput input;
+  input.weights = weights;
+  input.weights_name = "my weights";
+  input.target = body.rest;
+  input.target_name = body.id;
+  const auto system = make_system(system_type("mine"), std::move(input));
+  const auto frames = system->push(body.rest.vertices, "a cloud");
+  return last < 0.8 * first && frames.size() == 1 &&
+         frames[0].vertices.size() == body.rest.vertices.size();
+}
+
+}  // namespace mine
