@@ -1,11 +1,12 @@
 #include "infer/transfer.h"
 
 #include <algorithm>
+#include <charconv>
 #include <chrono>
-#include <limits>
 
 #include "autograd/base/error.h"
 #include "autograd/base/format.h"
+#include "nn/config/rules.h"
 #include "nn/geometry/box.h"
 
 namespace restage {
@@ -38,11 +39,24 @@ Tensor as_tensor(const Points& points, const Shape& shape) {
   return out;
 }
 
+/// Points of a cloud in the training of these weights; 0: as many as the target has vertices.
+int64_t points_of(const TrainedModel& model, const std::string& where) {
+  const auto found = model.settings.find("points");
+  if (found == model.settings.end()) return kUsualPoints;
+  const std::string& text = found->second;
+  int64_t out = -1;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), out);
+  if (error != std::errc() || end != text.data() + text.size() || out < 0 || out > kMostPoints)
+    throw InputError(where, "says that its network sees '" + text.substr(0, 20) + "' points",
+                     "give weights as a training left them");
+  return out;
+}
+
 void check_cloud(const Points& cloud, const std::string& source) {
-  if (cloud.size() < 64)
+  if (cloud.size() < kLeastDistinctPoints)
     throw UnusableCloud(source,
                         "holds " + std::to_string(cloud.size()) + " points, too few for a body",
-                        "give at least 64");
+                        "give at least " + std::to_string(kLeastDistinctPoints));
   for (const Point& p : cloud)
     if (!p.allFinite())
       throw UnusableCloud(source, "holds a coordinate that is not finite", "remove such points");
@@ -60,7 +74,7 @@ Transfer::Transfer(const Bundle& weights, const std::string& weights_name, Mesh 
     throw InputError(
         weights_name,
         "holds " + found.model + ", which needs the source's points in the target's order",
-        "use it with restage eval on registered meshes, or other weights here");
+        "give weights of another model");
   if (options.fps != kFps)
     throw InputError("",
                      format("the source has %g frames a second, and this system answers each cloud",
@@ -68,8 +82,7 @@ Transfer::Transfer(const Bundle& weights, const std::string& weights_name, Mesh 
                      "give clouds at 30 frames a second");
   if (target_.vertices.empty())
     throw InputError(where, "has no vertices", "give a mesh or a cloud");
-  const auto points = found.settings.find("points");
-  points_ = points == found.settings.end() ? kUsualPoints : std::stoll(points->second);
+  points_ = points_of(found, weights_name);
   if (points_ == 0 || model_->equal_counts()) points_ = std::ssize(target_.vertices);
   Points centred = target_.vertices;
   const Box box = box_of(centred);

@@ -1,0 +1,68 @@
+// The system of networks that move vertices: where the answer stands, gaps, settings of files.
+#include "infer/transfer.h"
+
+#include <gtest/gtest.h>
+
+#include "nn/geometry/box.h"
+#include "nn/models/registry.h"
+#include "tests/support/errors.h"
+
+namespace restage {
+namespace {
+
+Bundle weights(const std::string& points) {
+  const AnyConfig sizes = model_config("transfer/npt_pool", {"widths=[4, 5, 9]"});
+  Bundle out;
+  out.put("transfer", {"transfer/npt_pool",
+                       sizes,
+                       make_model("transfer/npt_pool", sizes, Init{RngKey{1, 0}}),
+                       {{"points", points}}});
+  return out;
+}
+
+/// A person's box of points, moved by `by`.
+Points cloud(const Point& by) {
+  Points out;
+  for (int i = 0; i < 100; ++i)
+    out.push_back(by + Point(0.01f * static_cast<float>(i % 7), 0.018f * static_cast<float>(i),
+                             0.01f * static_cast<float>(i % 5)));
+  return out;
+}
+
+Transfer system(const std::string& points) {
+  return Transfer(weights(points), "weights", {cloud(Point::Zero()), {}}, "target", {});
+}
+
+TEST(TransferSystem, StandsWhereTheSourceStands) {
+  Transfer transfer = system("50");
+  const Points seen = cloud(Point(3, 0.2f, -1));
+  const auto frames = transfer.push(seen, "a cloud");
+  ASSERT_EQ(frames.size(), 1u);
+  const Box there = box_of(seen), box = box_of(frames[0].vertices);
+  EXPECT_NEAR(box.min().y(), there.min().y(), 1e-5);
+  EXPECT_NEAR(box.center().x(), there.center().x(), 1e-5);
+  EXPECT_NEAR(box.center().z(), there.center().z(), 1e-5);
+  EXPECT_FALSE(frames[0].joints);
+}
+
+TEST(TransferSystem, GapsAreFilledBetweenTheirEnds) {
+  Transfer transfer = system("0");
+  const Point from = transfer.push(cloud(Point::Zero()), "first")[0].vertices[0];
+  transfer.miss();
+  const auto frames = transfer.push(cloud(Point(2, 0, 0)), "third");
+  ASSERT_EQ(frames.size(), 2u);
+  EXPECT_TRUE(frames[0].filled);
+  EXPECT_FALSE(frames[1].filled);
+  const Point between = 0.5f * from + 0.5f * frames[1].vertices[0];
+  EXPECT_LT((frames[0].vertices[0] - between).norm(), 1e-5f);
+  transfer.miss();
+  EXPECT_EQ(transfer.finish().size(), 1u);
+}
+
+TEST(TransferSystem, DamagedSettingsAreBadInput) {
+  for (const char* points : {"many", "", "-3", "99999999999999999999", "70000"})
+    EXPECT_HAS(test::error_of([&] { system(points); }), "weights");
+}
+
+}  // namespace
+}  // namespace restage
