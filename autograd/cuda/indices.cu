@@ -39,50 +39,33 @@ std::string take_index_fault() {
   return op + " on the GPU: an index is outside";
 }
 
-/// A group for each target counts, then writes. Its threads look at parts of the index that follow
-/// each other, so that places come in order.
+/// Places are sorted by what they name, and targets then look for where theirs begin.
 Askers askers_of(const Tensor& index, int64_t targets) {
-  const int64_t n = index.size(0), count = index.shape().product(1, index.rank()), all = targets;
-  const auto room = [&](int64_t width) {
-    return Tensor::empty({n, width}, DType::i32, index.device());
-  };
-  Askers out{count, targets, room(targets + 1), room(count)};
+  const int64_t n = index.size(0), count = index.numel(), m = n > 0 ? count / n : 0,
+                all = n * targets;
+  const auto room = [&](int64_t size) { return Tensor::empty({size}, DType::i32, index.device()); };
+  Tensor keys = room(count);
+  Askers out{room(all + 1), room(count)};
   const int32_t* of = at<int32_t>(index);
-  int32_t *from = at<int32_t>(out.start), *to = at<int32_t>(out.place);
-  groups(n * all, [=] RESTAGE_DEVICE(const Group& g, int64_t row) {
-    const int64_t s = row / all, own = row % all;
-    const double found =
-        g.sum(count, [&](int64_t k) { return of[s * count + k] == own ? 1. : 0.; });
-    g.each(1, [&](int64_t) { from[s * (all + 1) + own + 1] = static_cast<int32_t>(found); });
+  int32_t *key = at<int32_t>(keys), *place = at<int32_t>(out.place);
+  each(count, [=] RESTAGE_DEVICE(int64_t k) {
+    const bool inside = of[k] >= 0 && of[k] < targets;
+    key[k] = static_cast<int32_t>(inside ? k / m * targets + of[k] : all);
+    place[k] = static_cast<int32_t>(k);
   });
-  each(n, [=] RESTAGE_DEVICE(int64_t s) {
-    from[s * (all + 1)] = 0;
-    for (int64_t i = 1; i <= all; ++i) from[s * (all + 1) + i] += from[s * (all + 1) + i - 1];
-  });
-  groups(n * all, [=] RESTAGE_DEVICE(const Group& g, int64_t row) {
-    const int64_t s = row / all, own = row % all, part = (count + kThreads - 1) / kThreads;
-    const auto in_part = [&](int64_t t, auto f) {
-      const int64_t end = count < (t + 1) * part ? count : (t + 1) * part;
-      for (int64_t k = t * part; k < end; ++k)
-        if (of[s * count + k] == own) f(k);
-    };
-    double* before = g.room;  // how many the threads before have found
-    g.each(kThreads, [&](int64_t t) {
-      before[t] = 0;
-      in_part(t, [&](int64_t) { before[t] += 1; });
-    });
-    g.each(1, [&](int64_t) {
-      double total = 0;
-      for (int t = 0; t < kThreads; ++t) {
-        const double own_count = before[t];
-        before[t] = total;
-        total += own_count;
-      }
-    });
-    g.each(kThreads, [&](int64_t t) {
-      int64_t next = s * count + from[s * (all + 1) + own] + static_cast<int64_t>(before[t]);
-      in_part(t, [&](int64_t k) { to[next++] = static_cast<int32_t>(k); });
-    });
+  sort_by_key(keys, out.place, all + 1);
+  key = at<int32_t>(keys);
+  int32_t* start = at<int32_t>(out.start);
+  each(all + 1, [=] RESTAGE_DEVICE(int64_t target) {
+    int64_t low = 0, high = count;  // the first key that is not below the target
+    while (low < high) {
+      const int64_t middle = (low + high) / 2;
+      if (key[middle] < target)
+        low = middle + 1;
+      else
+        high = middle;
+    }
+    start[target] = static_cast<int32_t>(low);
   });
   return out;
 }

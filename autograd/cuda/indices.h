@@ -10,28 +10,28 @@ namespace restage::cuda {
 void look_at(const Tensor& index, int64_t limit);
 
 /// For every target the places of an index [n, m] that name it, in order. With these lists, sums
-/// over the places need no atomics and no search.
+/// over the places need no atomics and no search. What is outside is on no list.
 struct Askers {
-  int64_t m, v;
-  Tensor start;  ///< [n, v + 1]: where a target's places begin, from the first of its cloud
-  Tensor place;  ///< [n, m]
+  Tensor start;  ///< [n * targets + 1]: where the places of a target (a row of the batch) begin
+  Tensor place;  ///< [n * m]: rows of the index
 };
 Askers askers_of(const Tensor& index, int64_t targets);
+
+/// Sorts i32 keys from 0 on that are below `limit`, and `values` with them; equal ones stay in
+/// order.
+void sort_by_key(Tensor& keys, Tensor& values, int64_t limit);
 
 /// The same lists as kernels see them.
 struct AskersAt {
   explicit AskersAt(const Askers& of)
-      : m(of.m), v(of.v), start(at<int32_t>(of.start)), place(at<int32_t>(of.place)) {}
-  /// The sum of f(place) over the places of the index that name a target (a row of the batch).
+      : start(at<int32_t>(of.start)), place(at<int32_t>(of.place)) {}
+  /// The sum of f(place) over the places of the index that name a target.
   template <class F>
   RESTAGE_DEVICE double sum(int64_t target, F f) const {
-    const int64_t s = target / v;
-    const int32_t* range = start + s * (v + 1) + target % v;
     double total = 0;
-    for (int64_t k = range[0]; k < range[1]; ++k) total += f(s * m + place[s * m + k]);
+    for (int64_t k = start[target]; k < start[target + 1]; ++k) total += f(int64_t{place[k]});
     return total;
   }
-  int64_t m, v;
   const int32_t *start, *place;
 };
 

@@ -51,9 +51,30 @@ void max_grad_of(const MaxGradArgs& args) {
   });
 }
 
-/// Columns of at most some dozens of numbers, a thread each.
+constexpr int64_t kShort = 32;  ///< numbers of a row that one thread goes through
+
+template <class T>
+void softmax_of_rows(const SoftmaxArgs& args) {
+  const T* x = at<T>(args.x);
+  T* out = at<T>(args.out);
+  const int64_t n = args.n;
+  groups(args.outer, [=] RESTAGE_DEVICE(const Group& g, int64_t o) {
+    const T* from = x + o * n;
+    T* to = out + o * n;
+    const T top = from[g.first_largest(n, [&](int64_t r) { return static_cast<double>(from[r]); })];
+    const T all = static_cast<T>(g.sum(n, [&](int64_t r) {
+      const T e = exp(from[r] - top);
+      to[r] = e;
+      return static_cast<double>(e);
+    }));
+    g.each(n, [&](int64_t r) { to[r] /= all; });
+  });
+}
+
+/// A group of threads for each long row; else a thread for each column.
 template <class T>
 void softmax_of(const SoftmaxArgs& args) {
+  if (args.inner == 1 && args.n > kShort) return softmax_of_rows<T>(args);
   const T* x = at<T>(args.x);
   T* out = at<T>(args.out);
   const int64_t n = args.n, inner = args.inner;
@@ -78,6 +99,17 @@ void softmax_grad_of(const SoftmaxGradArgs& args) {
   const T *y = at<T>(args.y), *gy = at<T>(args.gy);
   T* out = at<T>(args.out);
   const int64_t n = args.n, inner = args.inner;
+  if (inner == 1 && n > kShort) {
+    groups(args.outer, [=] RESTAGE_DEVICE(const Group& g, int64_t o) {
+      const double total = g.sum(n, [&](int64_t r) {
+        return static_cast<double>(y[o * n + r]) * static_cast<double>(gy[o * n + r]);
+      });
+      g.each(n, [&](int64_t r) {
+        out[o * n + r] = y[o * n + r] * (gy[o * n + r] - static_cast<T>(total));
+      });
+    });
+    return;
+  }
   each(args.outer * inner, [=] RESTAGE_DEVICE(int64_t k) {
     const int64_t from = k / inner * n * inner + k % inner;
     double total = 0;

@@ -1,7 +1,13 @@
 #include "tests/support/emulated_gpu.h"
 
+#include <algorithm>
 #include <bit>
+#include <tuple>
+#include <utility>
+#include <vector>
 
+// A program with a GPU holds the kernels a second time.
+#define cuda emulated_cuda
 #include "autograd/cuda/attention.cu"
 #include "autograd/cuda/deform.cu"
 #include "autograd/cuda/elementwise.cu"
@@ -60,6 +66,16 @@ void multiply(const Gemm& g) {
   g.type == DType::f64 ? multiply_columns<double>(g) : multiply_columns<float>(g);
 }
 
+/// A stable sort, as the GPU's is.
+void sort_by_key(Tensor& keys, Tensor& values, int64_t) {
+  std::vector<std::pair<int32_t, int32_t>> pairs;
+  int32_t *key = at<int32_t>(keys), *value = at<int32_t>(values);
+  for (int64_t i = 0; i < keys.numel(); ++i) pairs.emplace_back(key[i], value[i]);
+  std::stable_sort(pairs.begin(), pairs.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (size_t i = 0; i < pairs.size(); ++i) std::tie(key[i], value[i]) = pairs[i];
+}
+
 }  // namespace cuda
 
 namespace {
@@ -90,3 +106,4 @@ Device emulated_gpu() { return gpu().device(); }
 DeviceCounts emulated_counts() { return gpu().counts; }
 
 }  // namespace restage
+#undef cuda
