@@ -10,6 +10,7 @@
 #include "autograd/base/log.h"
 #include "autograd/base/parallel.h"
 #include "autograd/base/thread_groups.h"
+#include "autograd/kernels/kernel.h"
 
 namespace restage {
 namespace {
@@ -126,6 +127,8 @@ std::vector<StateEntry> Stage::weights() const {
         out.push_back(std::move(entry));
   return out;
 }
+
+bool Stage::may_draw_ahead() const { return backend(device_).works_later(); }
 
 void Stage::cut_steps(int64_t micro_batches, Team& team) {
   if (examples_per_step() % micro_batches != 0)

@@ -136,6 +136,8 @@ class Stage {
   Differentiated parts(const Optimiser& optimiser,
                        const std::function<Differentiated(const MicroBatch&)>& compute);
 
+  /// Whether a GPU computes a step, so that the host may draw the next (train/ahead.h).
+  bool may_draw_ahead() const;
   /// The number of the step whose examples are drawn in step number `step`.
   int64_t drawn(int64_t step) const { return repeated_ > 0 ? step % repeated_ : step; }
 

@@ -70,10 +70,9 @@ Tensor hidden(const NeighbourAttentionInputs& in, const Pairs<T>& p, const Tenso
   Tensor out = empty_like(in.xyz, {p.count, p.d});
   const T *r = at<T>(offsets), *w = at<T>(in.w), *b = at<T>(in.b);
   T* to = at<T>(out);
-  each(p.count * p.d, [=] RESTAGE_DEVICE(int64_t i) {
-    const int64_t c = i % p.d;
-    const T *of = r + i / p.d * 4, *row = w + 3 * c;
-    to[i] = relu_of(fma(row[2], of[2], fma(row[1], of[1], fma(row[0], of[0], b[c]))));
+  rows(p.count, p.d, [=] RESTAGE_DEVICE(int64_t pair, int64_t c) {
+    const T *of = r + pair * 4, *row = w + 3 * c;
+    to[pair * p.d + c] = relu_of(fma(row[2], of[2], fma(row[1], of[1], fma(row[0], of[0], b[c]))));
   });
   return out;
 }
@@ -84,10 +83,9 @@ Tensor score_inputs(const NeighbourAttentionInputs& in, const Pairs<T>& p, const
   Tensor out = empty_like(in.xyz, {p.count, p.d});
   const T* s = at<T>(st);
   T* to = at<T>(out);
-  each(p.count * p.d, [=] RESTAGE_DEVICE(int64_t i) {
-    const int64_t pair = i / p.d, c = i % p.d;
-    to[i] = relu_of(p.query[p.point(pair) * p.d + c] - p.key[p.neighbour(pair) * p.d + c] +
-                    s[pair * 2 * p.d + c]);
+  rows(p.count, p.d, [=] RESTAGE_DEVICE(int64_t pair, int64_t c) {
+    to[pair * p.d + c] = relu_of(p.query[p.point(pair) * p.d + c] -
+                                 p.key[p.neighbour(pair) * p.d + c] + s[pair * 2 * p.d + c]);
   });
   return out;
 }
@@ -95,8 +93,8 @@ Tensor score_inputs(const NeighbourAttentionInputs& in, const Pairs<T>& p, const
 /// Softmax over neighbours, a thread for each channel of a point; e becomes its weights.
 template <class T>
 void pool(const Pairs<T>& p, const T* st, T* e, T* out) {
-  each(p.points * p.d, [=] RESTAGE_DEVICE(int64_t i) {
-    const int64_t c = i % p.d, first = i / p.d * p.k;
+  rows(p.points, p.d, [=] RESTAGE_DEVICE(int64_t point, int64_t c) {
+    const int64_t first = point * p.k;
     T* score = e + first * p.d + c;
     T top = score[0];
     for (int64_t j = 1; j < p.k; ++j)
@@ -111,7 +109,7 @@ void pool(const Pairs<T>& p, const T* st, T* e, T* out) {
           fma(weight,
               p.value[p.neighbour(first + j) * p.d + c] + st[((first + j) * 2 + 1) * p.d + c], sum);
     }
-    out[i] = sum;
+    out[point * p.d + c] = sum;
   });
 }
 
@@ -146,9 +144,8 @@ Tensor score_gradients(const Pairs<T>& p, const T* st, const T* weights, const T
                        const Tensor& g_st) {
   Tensor out = empty_like(g_st, {p.count, p.d});
   T *g_e = at<T>(out), *g_t = at<T>(g_st);
-  each(p.count * p.d, [=] RESTAGE_DEVICE(int64_t i) {
-    const int64_t pair = i / p.d, c = i % p.d, of = p.point(pair) * p.d + c,
-                  t_at = (2 * pair + 1) * p.d + c;
+  rows(p.count, p.d, [=] RESTAGE_DEVICE(int64_t pair, int64_t c) {
+    const int64_t i = pair * p.d + c, of = p.point(pair) * p.d + c, t_at = (2 * pair + 1) * p.d + c;
     const T g = weights[i] * gy[of];
     g_t[t_at] = g;
     g_e[i] = p.scale * g * (p.value[p.neighbour(pair) * p.d + c] + st[t_at] - y[of]);
@@ -163,24 +160,25 @@ struct Columns {
 
 /// out [points, width] = sums over a point's own pairs.
 template <class T>
-void sum_own(const Pairs<T>& p, const T* rows, Columns in, T* out) {
-  each(p.points * in.width, [=] RESTAGE_DEVICE(int64_t i) {
-    const T* row = rows + i / in.width * p.k * in.apart + in.from + i % in.width;
+void sum_own(const Pairs<T>& p, const T* values, Columns in, T* out) {
+  rows(p.points, in.width, [=] RESTAGE_DEVICE(int64_t point, int64_t c) {
+    const T* row = values + point * p.k * in.apart + in.from + c;
     double total = 0;
     for (int64_t j = 0; j < p.k; ++j) total += static_cast<double>(row[j * in.apart]);
-    out[i] = static_cast<T>(total);
+    out[point * in.width + c] = static_cast<T>(total);
   });
 }
 
 /// out [points, width] = kept times out + sign times sums over the pairs whose neighbour a point
 /// is.
 template <class T>
-void sum_asked(const Pairs<T>& p, const AskersAt& askers, const T* rows, Columns in, double kept,
+void sum_asked(const Pairs<T>& p, const AskersAt& askers, const T* values, Columns in, double kept,
                double sign, T* out) {
-  each(p.points * in.width, [=] RESTAGE_DEVICE(int64_t i) {
-    const double total = askers.sum(i / in.width, [&](int64_t pair) {
-      return static_cast<double>(rows[pair * in.apart + in.from + i % in.width]);
+  rows(p.points, in.width, [=] RESTAGE_DEVICE(int64_t point, int64_t c) {
+    const double total = askers.sum(point, [&](int64_t pair) {
+      return static_cast<double>(values[pair * in.apart + in.from + c]);
     });
+    const int64_t i = point * in.width + c;
     out[i] = static_cast<T>((kept == 0 ? 0 : kept * static_cast<double>(out[i])) + sign * total);
   });
 }
@@ -190,8 +188,9 @@ template <class T>
 void keep_on(const Pairs<T>& p, const Tensor& u, const Tensor& g_u, const Tensor& g_st) {
   const T *after = at<T>(u), *g = at<T>(g_u);
   T* to = at<T>(g_st);
-  each(p.count * p.d, [=] RESTAGE_DEVICE(int64_t i) {
-    to[i / p.d * 2 * p.d + i % p.d] = after[i] <= T(0) ? T(0) : g[i];
+  rows(p.count, p.d, [=] RESTAGE_DEVICE(int64_t pair, int64_t c) {
+    const int64_t i = pair * p.d + c;
+    to[2 * pair * p.d + c] = after[i] <= T(0) ? T(0) : g[i];
   });
 }
 

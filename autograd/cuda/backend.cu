@@ -24,6 +24,13 @@ struct Runtime {
     uint64_t keep_all = UINT64_MAX;  // a step needs again what the last step gave back
     check(cudaMemPoolSetAttribute(pool, cudaMemPoolAttrReleaseThreshold, &keep_all),
           "cudaMemPoolSetAttribute");
+    int processors = 0, bytes = 0;
+    check(cudaDeviceGetAttribute(&processors, cudaDevAttrMultiProcessorCount, gpu),
+          "cudaDeviceGetAttribute");
+    check(cudaDeviceGetAttribute(&bytes, cudaDevAttrMaxSharedMemoryPerBlockOptin, gpu),
+          "cudaDeviceGetAttribute");
+    constexpr int64_t kRoomOfGroups = 2 * kThreads * sizeof(double);
+    limits = {processors, bytes - kRoomOfGroups};
     check(cublasCreate(&cublas), "cublasCreate");
     check(cublasSetStream(cublas, stream), "cublasSetStream");
     // Bits must not depend on what else runs: no atomics.
@@ -33,6 +40,7 @@ struct Runtime {
   cudaMemPool_t pool;
   cudaStream_t stream;
   cublasHandle_t cublas;
+  RoundsLimits limits;
 };
 
 Runtime& runtime() {
@@ -68,6 +76,7 @@ void check(cublasStatus_t code, const char* what) {
 void launched() { check(cudaGetLastError(), "a launch"); }
 cudaStream_t stream() { return runtime().stream; }
 cublasHandle_t cublas() { return runtime().cublas; }
+RoundsLimits rounds_limits() { return runtime().limits; }
 
 namespace {
 
@@ -111,6 +120,7 @@ class CudaBackend final : public Backend {
     check(cudaStreamSynchronize(stream()), "what was launched");
     if (const std::string fault = take_index_fault(); !fault.empty()) throw Error(fault);
   }
+  bool works_later() const override { return true; }
   MemoryStats memory() const override {
     MemoryStats out;
     out.in_use = number_of(cudaMemPoolAttrUsedMemCurrent);

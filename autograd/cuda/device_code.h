@@ -13,12 +13,15 @@
 #include <cstdint>
 #include <string>
 #include <type_traits>
+#include <vector>
 
 #include "autograd/base/error.h"
 #include "autograd/base/module_path.h"
 #include "autograd/kernels/kernel.h"
 
 #ifdef __CUDACC__
+#include <cooperative_groups.h>
+
 #include "autograd/cuda/runtime.h"
 #define RESTAGE_DEVICE __device__
 #else
@@ -134,6 +137,26 @@ __global__ void groups_kernel(int64_t n, F f) {
   for (int64_t i = blockIdx.x; i < n; i += gridDim.x) f(Group{room}, i);
 }
 
+/// Threads beside each other have columns beside each other.
+template <class F>
+__global__ void rows_kernel(int64_t n, int64_t width, F f) {
+  const int64_t step = static_cast<int64_t>(gridDim.x) * blockDim.y;
+  for (int64_t row = static_cast<int64_t>(blockIdx.x) * blockDim.y + threadIdx.y; row < n;
+       row += step)
+    for (int64_t column = threadIdx.x; column < width; column += blockDim.x) f(row, column);
+}
+
+extern __shared__ __align__(16) double kept_of_group[];
+
+template <class F>
+__global__ void rounds_kernel(int64_t rounds, F f) {
+  __shared__ double room[2 * kThreads];
+  for (int64_t round = 0; round < rounds; ++round) {
+    f(Group{room}, kept_of_group, static_cast<int64_t>(blockIdx.x), round);
+    cooperative_groups::this_grid().sync();
+  }
+}
+
 inline unsigned grid(int64_t blocks) {
   return static_cast<unsigned>(std::min<int64_t>(blocks, 1 << 20));
 }
@@ -146,6 +169,18 @@ void each(int64_t n, F f) {
   launched();
 }
 
+/// f(row, column) for all of n rows of so many columns, each in a thread of its own: as each(), for
+/// kernels that would divide by the width, which costs more than most of them do.
+template <class F>
+void rows(int64_t n, int64_t width, F f) {
+  if (n == 0 || width == 0) return;
+  unsigned across = 32;
+  while (across < width && across < kThreads) across *= 2;
+  const dim3 block(across, kThreads / across);
+  rows_kernel<<<grid((n + block.y - 1) / block.y), block, 0, stream()>>>(n, width, f);
+  launched();
+}
+
 /// f(group, i) for all i below n, each by a group of threads.
 template <class F>
 void groups(int64_t n, F f) {
@@ -154,7 +189,29 @@ void groups(int64_t n, F f) {
   launched();
 }
 
+/// f(group, kept, i, round) for all i below n and round after round: all groups meet between two
+/// rounds, and `kept`, so many bytes, stays with its group. n is at most rounds_limits().groups.
+template <class F>
+void rounds(int64_t n, int64_t count, int64_t bytes, F f) {
+  if (n == 0 || count == 0) return;
+  const auto kernel = &rounds_kernel<F>;
+  check(cudaFuncSetAttribute(kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
+                             static_cast<int>(bytes)),
+        "cudaFuncSetAttribute");
+  void* args[] = {&count, &f};
+  check(cudaLaunchCooperativeKernel(reinterpret_cast<const void*>(kernel),
+                                    dim3(static_cast<unsigned>(n)), dim3(kThreads), args,
+                                    static_cast<size_t>(bytes), stream()),
+        "a launch");
+}
+
 #else
+
+template <class F>
+void rows(int64_t n, int64_t width, F f) {
+  for (int64_t row = n; row-- > 0;)
+    for (int64_t column = width; column-- > 0;) f(row, column);
+}
 
 template <class F>
 void each(int64_t n, F f) {
@@ -167,6 +224,21 @@ void groups(int64_t n, F f) {
   for (int64_t i = n; i-- > 0;) f(Group{room}, i);
 }
 
+template <class F>
+void rounds(int64_t n, int64_t count, int64_t bytes, F f) {
+  double room[2 * kThreads];
+  const int64_t width = bytes / 16 * 2 + 2;  // each begins at a multiple of 16 bytes
+  std::vector<double> kept(static_cast<size_t>(n * width));
+  for (int64_t round = 0; round < count; ++round)
+    for (int64_t i = n; i-- > 0;) f(Group{room}, kept.data() + i * width, i, round);
+}
+
 #endif
+
+/// What rounds() can have: groups that run at once, and bytes that each may keep.
+struct RoundsLimits {
+  int64_t groups, bytes;
+};
+RoundsLimits rounds_limits();
 
 }  // namespace restage::cuda

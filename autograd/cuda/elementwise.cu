@@ -122,18 +122,27 @@ void unary_grad_of(const UnaryGradArgs& args) {
 }
 
 template <class T>
+RESTAGE_DEVICE T value_of(Binary op, T x, T y) {
+  return op == Binary::add ? x + y : op == Binary::sub ? x - y : op == Binary::mul ? x * y : x / y;
+}
+
+/// Most operands have the result's shape, or one number for each of its last axis.
+template <class T>
 void binary_of(const BinaryArgs& args) {
   const T *a = at<T>(args.a), *b = at<T>(args.b);
   T* out = at<T>(args.out);
-  const Steps of_a(args.a.shape(), args.out.shape()), of_b(args.b.shape(), args.out.shape());
   const Binary op = args.op;
-  each(args.out.numel(), [=] RESTAGE_DEVICE(int64_t i) {
-    const T x = a[of_a.at(i)], y = b[of_b.at(i)];
-    out[i] = op == Binary::add   ? x + y
-             : op == Binary::sub ? x - y
-             : op == Binary::mul ? x * y
-                                 : x / y;
-  });
+  const int64_t n = args.out.numel();
+  if (n == 0) return;
+  if (args.a.numel() == n && args.b.numel() == n)
+    return each(n, [=] RESTAGE_DEVICE(int64_t i) { out[i] = value_of(op, a[i], b[i]); });
+  const int64_t width = args.out.rank() > 0 ? args.out.size(-1) : 1;
+  if (args.a.numel() == n && args.b.numel() == width && args.b.size(-1) == width)
+    return rows(n / width, width, [=] RESTAGE_DEVICE(int64_t row, int64_t c) {
+      out[row * width + c] = value_of(op, a[row * width + c], b[c]);
+    });
+  const Steps of_a(args.a.shape(), args.out.shape()), of_b(args.b.shape(), args.out.shape());
+  each(n, [=] RESTAGE_DEVICE(int64_t i) { out[i] = value_of(op, a[of_a.at(i)], b[of_b.at(i)]); });
 }
 
 template <class T>

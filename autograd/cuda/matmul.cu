@@ -11,9 +11,10 @@ void finish(const MatmulArgs& args) {
   const T* bias = at<T>(args.bias);
   const int64_t n = args.out.size(-1);
   const bool relu = args.activation == Activation::relu;
-  each(args.out.numel(), [=] RESTAGE_DEVICE(int64_t i) {
-    const T v = bias == nullptr ? out[i] : out[i] + bias[i % n];
-    out[i] = relu && v <= T(0) ? T(0) : v;
+  rows(args.out.numel() / n, n, [=] RESTAGE_DEVICE(int64_t row, int64_t c) {
+    T* to = out + row * n + c;
+    const T v = bias == nullptr ? *to : *to + bias[c];
+    *to = relu && v <= T(0) ? T(0) : v;
   });
 }
 

@@ -22,21 +22,25 @@ void norm_of(const NormArgs& args) {
   const T* x = at<T>(args.x);
   T* out = at<T>(args.out);
   double *mean = at<double>(args.mean), *rstd = at<double>(args.rstd);
-  const int64_t n = args.n, inner = args.inner, columns = args.outer * inner;
+  const int64_t n = args.n, inner = args.inner;
   const double count = static_cast<double>(n), eps = args.eps;
   const Factor<T> scale{at<T>(args.scale), args.affine, 1},
       shift{at<T>(args.shift), args.affine, 0};
-  sums(args.out, args.outer, n, inner, mean, [=] RESTAGE_DEVICE(int64_t o, int64_t r, int64_t i) {
-    return static_cast<double>(x[(o * n + r) * inner + i]);
-  });
-  each(columns, [=] RESTAGE_DEVICE(int64_t k) { mean[k] /= count; });
-  sums(args.out, args.outer, n, inner, rstd, [=] RESTAGE_DEVICE(int64_t o, int64_t r, int64_t i) {
-    const double d = static_cast<double>(x[(o * n + r) * inner + i]) - mean[o * inner + i];
-    return d * d;
-  });
-  each(columns, [=] RESTAGE_DEVICE(int64_t k) { rstd[k] = 1.0 / sqrt(rstd[k] / count + eps); });
-  each(args.out.numel(), [=] RESTAGE_DEVICE(int64_t k) {
-    const int64_t o = k / (n * inner), r = k / inner % n, i = k % inner, c = o * inner + i;
+  sums(
+      args.out, args.outer, n, inner,
+      [=] RESTAGE_DEVICE(int64_t o, int64_t r, int64_t i) {
+        return static_cast<double>(x[(o * n + r) * inner + i]);
+      },
+      [=] RESTAGE_DEVICE(int64_t k, double total) { mean[k] = total / count; });
+  sums(
+      args.out, args.outer, n, inner,
+      [=] RESTAGE_DEVICE(int64_t o, int64_t r, int64_t i) {
+        const double d = static_cast<double>(x[(o * n + r) * inner + i]) - mean[o * inner + i];
+        return d * d;
+      },
+      [=] RESTAGE_DEVICE(int64_t k, double total) { rstd[k] = 1.0 / sqrt(total / count + eps); });
+  rows(args.outer * n, inner, [=] RESTAGE_DEVICE(int64_t row, int64_t i) {
+    const int64_t r = row % n, c = row / n * inner + i, k = row * inner + i;
     out[k] = static_cast<T>((static_cast<double>(x[k]) - mean[c]) * rstd[c] * scale.at(r, i) +
                             shift.at(r, i));
   });
@@ -60,8 +64,8 @@ void norm_grad_of(const NormGradArgs& args) {
            ((static_cast<double>(x[k]) - mean[c]) * rstd[c]);
   });
   const double inv = n > 0 ? 1.0 / static_cast<double>(n) : 0;
-  each(args.out.numel(), [=] RESTAGE_DEVICE(int64_t k) {
-    const int64_t r = k / inner % n, i = k % inner, c = k / (n * inner) * inner + i;
+  rows(outer * n, inner, [=] RESTAGE_DEVICE(int64_t row, int64_t i) {
+    const int64_t r = row % n, c = row / n * inner + i, k = row * inner + i;
     const double h = (static_cast<double>(x[k]) - mean[c]) * rstd[c];
     const double g = static_cast<double>(gy[k]) * scale.at(r, i);
     out[k] = static_cast<T>(rstd[c] * (g - inv * (g_sum[c] + h * gx_sum[c])));
@@ -69,22 +73,22 @@ void norm_grad_of(const NormGradArgs& args) {
   if (args.g_scale == nullptr) return;
   // Along the inner axis there is one block; along the middle one the columns are what is summed.
   const int64_t width = args.affine == Affine::inner ? inner : n,
-                rows = args.affine == Affine::inner ? n : outer;
+                blocks = args.affine == Affine::inner ? n : outer;
   const bool by_inner = args.affine == Affine::inner;
-  Tensor more = scratch(args.out, 2 * width);
-  double *a = at<double>(more), *b = a + width;
-  sums(args.out, 1, rows, width, a, [=] RESTAGE_DEVICE(int64_t, int64_t r, int64_t i) {
-    const int64_t k = r * width + i, c = by_inner ? i : r;
-    return static_cast<double>(gy[k]) * ((static_cast<double>(x[k]) - mean[c]) * rstd[c]);
-  });
-  sums(args.out, 1, rows, width, b, [=] RESTAGE_DEVICE(int64_t, int64_t r, int64_t i) {
-    return static_cast<double>(gy[r * width + i]);
-  });
   T *g_scale = at<T>(args.g_scale), *g_shift = at<T>(args.g_shift);
-  each(width, [=] RESTAGE_DEVICE(int64_t i) {
-    g_scale[i] = static_cast<T>(a[i]);
-    g_shift[i] = static_cast<T>(b[i]);
-  });
+  sums(
+      args.out, 1, blocks, width,
+      [=] RESTAGE_DEVICE(int64_t, int64_t r, int64_t i) {
+        const int64_t k = r * width + i, c = by_inner ? i : r;
+        return static_cast<double>(gy[k]) * ((static_cast<double>(x[k]) - mean[c]) * rstd[c]);
+      },
+      [=] RESTAGE_DEVICE(int64_t k, double total) { g_scale[k] = static_cast<T>(total); });
+  sums(
+      args.out, 1, blocks, width,
+      [=] RESTAGE_DEVICE(int64_t, int64_t r, int64_t i) {
+        return static_cast<double>(gy[r * width + i]);
+      },
+      [=] RESTAGE_DEVICE(int64_t k, double total) { g_shift[k] = static_cast<T>(total); });
 }
 
 }  // namespace

@@ -10,13 +10,13 @@ template <class T>
 void sum_of(const SumArgs& args) {
   const T* x = at<T>(args.x);
   T* out = at<T>(args.out);
-  const int64_t n = args.n, inner = args.inner, count = args.outer * inner;
-  Tensor totals = scratch(args.out, count);
-  double* total = at<double>(totals);
-  sums(args.out, args.outer, n, inner, total, [=] RESTAGE_DEVICE(int64_t o, int64_t r, int64_t i) {
-    return static_cast<double>(x[(o * n + r) * inner + i]);
-  });
-  each(count, [=] RESTAGE_DEVICE(int64_t k) { out[k] = static_cast<T>(total[k]); });
+  const int64_t n = args.n, inner = args.inner;
+  sums(
+      args.out, args.outer, n, inner,
+      [=] RESTAGE_DEVICE(int64_t o, int64_t r, int64_t i) {
+        return static_cast<double>(x[(o * n + r) * inner + i]);
+      },
+      [=] RESTAGE_DEVICE(int64_t k, double total) { out[k] = static_cast<T>(total); });
 }
 
 template <class T>

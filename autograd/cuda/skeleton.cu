@@ -61,43 +61,46 @@ void fk_of(const FkArgs& args) {
   });
 }
 
+/// Only the gradients of the joints' transforms follow each other, by rows that do not mix; what is
+/// made of them has a thread for each joint.
 template <class T>
 void fk_grad_of(const FkGradArgs& args) {
   const T *local = at<T>(args.local), *rest = at<T>(args.rest), *world = at<T>(args.transforms);
   T *g_local = at<T>(args.out), *g_rest = at<T>(args.g_rest), *g_root = at<T>(args.g_root);
   Tensor room = args.gy.clone();  // becomes the gradient of each joint's transform
   T* g = at<T>(room);
-  const int64_t joints = args.local.size(1);
+  const int64_t joints = args.local.size(1), n = args.local.size(0);
   const Parents parents(args.parents);
-  each(args.local.size(0), [=] RESTAGE_DEVICE(int64_t s) {
-    for (int c = 0; c < 3; ++c) g_root[3 * s + c] = 0;
-    for (int64_t k = 0; k < 3 * joints; ++k) g_rest[3 * joints * s + k] = 0;
+  each(3 * n, [=] RESTAGE_DEVICE(int64_t i) {
+    const int64_t s = i / 3, r = i % 3;
+    T root = 0;
     for (int64_t j = joints - 1; j >= 0; --j) {
-      const T *gj = g + (s * joints + j) * 12, *l = local + (s * joints + j) * 9;
-      T* gl = g_local + (s * joints + j) * 9;
+      const T *gj = g + (s * joints + j) * 12 + 4 * r, *l = local + (s * joints + j) * 9;
       const int p = parents.of[j];
       if (p < 0) {
-        for (int r = 0; r < 3; ++r) {
-          for (int c = 0; c < 3; ++c) gl[3 * r + c] = gj[4 * r + c];
-          g_root[3 * s + r] += gj[4 * r + 3];
-        }
+        root += gj[3];
         continue;
       }
-      const T* up = world + (s * joints + p) * 12;
-      T *gp = g + (s * joints + p) * 12, *to_a = g_rest + (s * joints + j) * 3,
-        *to_b = g_rest + (s * joints + p) * 3;
+      T* gp = g + (s * joints + p) * 12 + 4 * r;
       const T *a = rest + (s * joints + j) * 3, *b = rest + (s * joints + p) * 3;
-      const T bone[3] = {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-      for (int r = 0; r < 3; ++r) {
-        for (int c = 0; c < 3; ++c) {
-          gl[3 * r + c] = column_times(up, r, gj, c);
-          gp[4 * r + c] += row_times(gj, r, l + 3 * c) + gj[4 * r + 3] * bone[c];
-        }
-        gp[4 * r + 3] += gj[4 * r + 3];
-        const T g_bone = column_times(up, r, gj, 3);
-        to_a[r] += g_bone;
-        to_b[r] -= g_bone;
-      }
+      for (int c = 0; c < 3; ++c) gp[c] += row_times(gj, 0, l + 3 * c) + gj[3] * (a[c] - b[c]);
+      gp[3] += gj[3];
+    }
+    g_root[i] = root;
+  });
+  each(n * joints, [=] RESTAGE_DEVICE(int64_t i) {
+    const int64_t s = i / joints, j = i % joints;
+    const int p = parents.of[j];
+    const T *gj = g + i * 12, *up = world + (s * joints + (p < 0 ? 0 : p)) * 12;
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c)
+        g_local[i * 9 + 3 * r + c] = p < 0 ? gj[4 * r + c] : column_times(up, r, gj, c);
+    for (int r = 0; r < 3; ++r) {
+      T total = p < 0 ? T(0) : column_times(up, r, gj, 3);
+      for (int64_t child = j + 1; child < joints; ++child)
+        if (parents.of[child] == j)
+          total -= column_times(world + i * 12, r, g + (s * joints + child) * 12, 3);
+      g_rest[3 * i + r] = total;
     }
   });
 }

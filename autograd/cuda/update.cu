@@ -10,8 +10,9 @@ void squared_norm_of(const SquaredNormArgs& args) {
   const T* x = at<T>(args.x);
   double* out = at<double>(args.out);
   const int64_t n = args.x.numel(), parts = (n + kPart - 1) / kPart;
-  Tensor room = scratch(args.out, parts);
+  const Tensor room = parts > 1 ? scratch(args.out, parts) : args.out;
   double* part = at<double>(room);
+  if (n == 0) return each(1, [=] RESTAGE_DEVICE(int64_t) { out[0] = 0; });
   groups(parts, [=] RESTAGE_DEVICE(const Group& g, int64_t p) {
     const int64_t count = n < (p + 1) * kPart ? n - p * kPart : kPart;
     const double total = g.sum(count, [&](int64_t i) {
@@ -20,6 +21,7 @@ void squared_norm_of(const SquaredNormArgs& args) {
     });
     g.each(1, [&](int64_t) { part[p] = total; });
   });
+  if (parts == 1) return;
   groups(1, [=] RESTAGE_DEVICE(const Group& g, int64_t) {
     const double total = g.sum(parts, [&](int64_t p) { return part[p]; });
     g.each(1, [&](int64_t) { out[0] = total; });

@@ -28,6 +28,8 @@ class Backend {
   virtual void copy_out(void* to_host, const void* from, size_t bytes) = 0;
   /// Returns when everything that was launched is done. Error naming the kernel if one failed.
   virtual void synchronise() = 0;
+  /// Whether launch() returns before the work is done, so that the host has time for other things.
+  virtual bool works_later() const { return false; }
   virtual MemoryStats memory() const = 0;
   virtual void reset_peak() = 0;
   virtual void trim() = 0;  ///< gives free memory back to the system

@@ -15,7 +15,10 @@ struct CrossAttention {
   static constexpr const char* name = "cross_attention";
   static constexpr const char* letters = "q[n, t, d], k[n, m, d], v[n, m, c], m > 0";
   double factor = 1;
-  int64_t most_scores = 1 << 21;  ///< scores that are held at once, or those of one query
+  /// Scores that are held at once, or those of one query: on the host they stay in the caches, on a
+  /// GPU they keep it busy.
+  static constexpr int64_t kOnHost = 1 << 21, kOnGpu = 1 << 25;
+  int64_t most_scores = kOnHost;
   MatmulPrecision precision = matmul_precision();  ///< see LinearOp
   void check(Inputs x) const;
   Tensor forward(Inputs x, Saved& saved) const;
@@ -23,7 +26,9 @@ struct CrossAttention {
 };
 
 inline Var cross_attention(const Var& q, const Var& k, const Var& v, double factor = 1) {
-  return call(CrossAttention{factor}, {q, k, v});
+  const bool host = q.value.device() == Device{};
+  return call(CrossAttention{factor, host ? CrossAttention::kOnHost : CrossAttention::kOnGpu},
+              {q, k, v});
 }
 /// The same function made of matmul() and softmax(), which hold all scores. Tests and benchmarks
 /// compare cross_attention() with it.

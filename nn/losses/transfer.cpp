@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "autograd/kernels/layout.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
 #include "autograd/ops/reduce.h"
@@ -12,52 +13,53 @@ namespace {
 
 constexpr double kNothing = 1e-24;  // square metres: below any distance, above float32's least
 
-/// The vertices [n, 3 f, 3] where the edges of all faces begin and end.
-struct Ends {
-  Tensor from, to;             ///< i32 [n, 3 f]
-  std::vector<double> shares;  ///< [n]: 1 / faces of an item
-};
+/// The lengths of the three edges of every face of `places` [n, 3 f], vertices of x [n, v, 3]:
+/// [n, 3 f].
+Var edge_lengths(const Var& x, const Tensor& places) {
+  const int64_t n = places.size(0), corners = places.size(1);
+  const Var from = reshape(gather(x, places), {n, corners / 3, 9});
+  const Var to = concat({slice(from, 2, 3, 9), slice(from, 2, 0, 3)}, 2);
+  return smooth_length(reshape(from - to, {n, corners, 3}), kNothing);
+}
 
-Ends ends_of(const Tensor& faces, int64_t n) {
+/// faces [m, f, 3] or [f, 3] of n items, as places [n, 3 f].
+Tensor places_of(const Tensor& faces, int64_t n) {
+  const int64_t f = faces.size(-2), m = faces.rank() == 2 ? 1 : faces.size(0);
+  const Tensor each = faces.reshape({m, 3 * f});
+  if (m == n) return each;
+  Tensor out = Tensor::empty({n, 3 * f}, DType::i32, faces.device());
+  for (int64_t i = 0; i < n; ++i)
+    launch(CopyBlocksArgs{.x = each,
+                          .out = out,
+                          .outer = 1,
+                          .count = 3 * f,
+                          .x_stride = 0,
+                          .x_offset = i / (n / m) * 3 * f,
+                          .out_stride = 0,
+                          .out_offset = i * 3 * f});
+  return out;
+}
+
+/// 1 / how many faces of each item have three corners, [n].
+Tensor shares_of(const Tensor& faces, int64_t n) {
   const Tensor host = faces.cpu();
-  const int64_t in_a_row = faces.rank() == 2 ? n : n / std::max<int64_t>(faces.size(0), 1);
-  const int64_t f = faces.size(-2);
-  std::vector<int32_t> from, to;
+  const int64_t f = faces.size(-2), m = faces.rank() == 2 ? 1 : faces.size(0);
   std::vector<double> shares;
-  const int32_t* const all = host.data<int32_t>();
-  for (int64_t i = 0; i < n; ++i) {
+  for (int64_t i = 0; i < m; ++i) {
     int64_t count = 0;
-    for (int64_t k = 0; k < f; ++k) {
-      const int32_t* const face = all + 3 * (i / in_a_row * f + k);
-      for (const auto& [a, b] : {std::pair(0, 1), {1, 2}, {0, 2}}) {
-        from.push_back(face[a]);
-        to.push_back(face[b]);
-      }
+    const int32_t* face = host.data<int32_t>() + i * 3 * f;
+    for (int64_t k = 0; k < f; ++k, face += 3)
       count += face[0] != face[1] && face[1] != face[2] && face[0] != face[2];
-    }
-    shares.push_back(1 / static_cast<double>(std::max<int64_t>(count, 1)));
+    shares.insert(shares.end(), static_cast<size_t>(n / m),
+                  1 / static_cast<double>(std::max<int64_t>(count, 1)));
   }
-  return {Tensor::from<int32_t>({n, 3 * f}, from).to(faces.device()),
-          Tensor::from<int32_t>({n, 3 * f}, to).to(faces.device()), shares};
+  return Tensor::from<double>({n}, shares);
 }
 
-Var lengths(const Var& x, const Ends& ends) {
-  return smooth_length(gather(x, ends.from) - gather(x, ends.to), kNothing);
-}
-
-/// 1 / length, and 1; both 0 for an edge that has no length.
-std::pair<Tensor, Tensor> inverse_and_mask(const Tensor& lengths) {
-  const Tensor host = lengths.cpu();
-  std::vector<double> inverse, mask;
-  for (int64_t i = 0; i < host.numel(); ++i) {
-    const double length = host.item(i);
-    inverse.push_back(length > 1e-9 ? 1 / length : 0);
-    mask.push_back(length > 1e-9 ? 1 : 0);
-  }
-  const auto back = [&](const std::vector<double>& x) {
-    return Tensor::from<double>(lengths.shape(), x).cast(lengths.dtype()).to(lengths.device());
-  };
-  return {back(inverse), back(mask)};
+/// 1 where a length is above a nanometre, else 0, without a look at the host.
+Tensor mask_of(const Var& lengths) {
+  const Var above = scale(relu(add_scalar(lengths, -1e-9)), 1e15);
+  return add_scalar(neg(relu(add_scalar(neg(above), 1))), 1).value;
 }
 
 }  // namespace
@@ -70,11 +72,12 @@ Var edge_loss(const Var& pred, const Tensor& reference, const Tensor& faces) {
     shape_error("edge_loss",
                 "pred[n, v, 3], reference[n, v, 3], faces[m?, f, 3], m divides n, f > 0",
                 std::array{pred.value, reference, faces}, "a mesh with faces is needed");
-  const Ends ends = ends_of(faces, n);
-  const auto [inverse, mask] = inverse_and_mask(lengths(Var(reference), ends).value);
-  const Var ratios = lengths(pred, ends) * Var(inverse);
-  const Tensor shares =
-      Tensor::from<double>({n}, ends.shares).cast(pred.dtype()).to(faces.device());
+  // The host counts while the device still has work from before.
+  const Tensor shares = shares_of(faces, n).cast(pred.dtype()).to(pred.value.device());
+  const Tensor places = places_of(faces, n).to(pred.value.device());
+  const Var right = edge_lengths(Var(reference), places);
+  const Tensor mask = mask_of(right);
+  const Var ratios = edge_lengths(pred, places) * Var((Var(mask) / right).value);
   return sum(abs(ratios - Var(mask)), 1) * Var(shares);
 }
 

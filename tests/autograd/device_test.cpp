@@ -18,6 +18,7 @@
 #include "autograd/ops/points.h"
 #include "autograd/ops/pooled_norm.h"
 #include "autograd/ops/reduce.h"
+#include "autograd/ops/rnn.h"
 #include "tests/support/emulated_gpu.h"
 #include "tests/support/errors.h"
 #include "tests/support/fake_device.h"
@@ -222,6 +223,36 @@ TEST(Device, TheGpusPooledNormGoesThroughABatchInParts) {
     for (int64_t k = 0; k < here[t].numel(); ++k)
       ASSERT_NEAR(there[t].item(k), here[t].item(k), 1e-9 * (1 + std::abs(here[t].item(k))))
           << "tensor " << t << ", number " << k;
+}
+
+TEST(Device, TheGpusGruMakesItsProductsInParts) {
+  // The emulated GPU has room for 32 columns of the states forward (14 rows), for 64 of the gates
+  // backward (28 rows), and for none at all (130 rows).
+  const int64_t steps = 3, h = 48, inputs = 5;
+  for (const int64_t n : {1, 14, 28, 130}) {
+    Rng rng(RngKey{2, 0});
+    std::vector<Tensor> x;
+    for (const Shape& shape : {Shape{steps, n, inputs}, Shape{n, h}, Shape{3 * h, inputs},
+                               Shape{3 * h, h}, Shape{3 * h}, Shape{3 * h}}) {
+      x.push_back(Tensor::empty(shape, DType::f64));
+      for (int64_t i = 0; i < x.back().numel(); ++i) x.back().data<double>()[i] = rng.normal() / 4;
+    }
+    const auto run = [&](Device device) {
+      Tape tape;
+      std::vector<Var> v;
+      for (const Tensor& t : x) v.push_back(tape.leaf(t.to(device), v.size() + 1));
+      const Var y = gru(v[0], v[1], v[2], v[3], v[4], v[5]);
+      const Gradients gradients = tape.backward(sum_all(square(y)));
+      std::vector<Tensor> out{y.value.cpu()};
+      for (size_t i = 1; i <= v.size(); ++i) out.push_back(gradients.find(i)->cpu());
+      return out;
+    };
+    const auto here = run({}), there = run(emulated_gpu());
+    for (size_t t = 0; t < here.size(); ++t)
+      for (int64_t i = 0; i < here[t].numel(); ++i)
+        ASSERT_NEAR(there[t].item(i), here[t].item(i), 1e-9 * (1 + std::abs(here[t].item(i))))
+            << n << " rows, tensor " << t << ", number " << i;
+  }
 }
 
 /// Ops that have a kernel of their own and a composition, with the contracts of the former.

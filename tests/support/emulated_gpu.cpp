@@ -66,6 +66,9 @@ void multiply(const Gemm& g) {
   g.type == DType::f64 ? multiply_columns<double>(g) : multiply_columns<float>(g);
 }
 
+/// Of a GPU with few processors, so that a group has several units of a recurrent layer.
+RoundsLimits rounds_limits() { return {.groups = 3, .bytes = 1 << 16}; }
+
 /// A stable sort, as the GPU's is.
 void sort_by_key(Tensor& keys, Tensor& values, int64_t) {
   std::vector<std::pair<int32_t, int32_t>> pairs;

@@ -85,7 +85,9 @@ Var DeformationStage::loss(Context& ctx, const PairBatch& pairs, int64_t step,
 NamedValues DeformationStage::step(int64_t step) {
   const OptimiserConfig& o = config_.optimiser;
   const Differentiated d = parts(*optimiser_, [&](const MicroBatch& part) {
-    const PairBatch pairs = batch(step, part), there = moved(pairs, device());
+    const PairBatch pairs =
+        ahead_.take(may_draw_ahead(), step, part, [this](auto... of) { return batch(of...); });
+    const PairBatch there = moved(pairs, device());
     Tensor posed;
     Differentiated out =
         differentiate(part.key(key_.fold(static_cast<uint64_t>(step))),

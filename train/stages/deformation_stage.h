@@ -4,6 +4,7 @@
 #include "datasets/sampling/pairs.h"
 #include "nn/losses/deformation.h"
 #include "nn/models/deformation.h"
+#include "train/ahead.h"
 #include "train/stage.h"
 #include "train/stages/stage_input.h"
 
@@ -69,6 +70,7 @@ class DeformationStage final : public Stage {
   Optimiser* optimiser_;
   PairSampler sampler_, validation_sampler_;
   RngKey key_;
+  Ahead<PairBatch> ahead_;
 };
 
 }  // namespace restage

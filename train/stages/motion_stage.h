@@ -6,6 +6,7 @@
 
 #include "datasets/sampling/windows.h"
 #include "nn/losses/motion.h"
+#include "train/ahead.h"
 #include "train/artifacts/answers.h"
 #include "train/stage.h"
 #include "train/stages/stage_input.h"
@@ -145,6 +146,7 @@ class MotionStage final : public Stage {
   RngKey key_;
   mutable std::once_flag asked_;
   mutable std::shared_ptr<const Windows> windows_;
+  Ahead<Batch> ahead_;
   double balance_ = 0.5;
 };
 

@@ -3,6 +3,7 @@
 
 #include "datasets/sampling/evaluation.h"
 #include "nn/models/skeleton.h"
+#include "train/ahead.h"
 #include "train/stage.h"
 #include "train/stages/stage_input.h"
 
@@ -82,6 +83,7 @@ class SkeletonStage final : public Stage {
   CloudBatch one_camera_, ring_, intruded_;
   CloudBatch followed_;  ///< held-out sequences of people whom one camera follows
   RngKey key_;
+  Ahead<CloudBatch> ahead_;
 };
 
 /// Errors of a model on given clouds (evaluation mode); means over joints.

@@ -116,7 +116,10 @@ Var TransferStage::loss(Context& ctx, const TransferBatch& pairs, int64_t step, 
 NamedValues TransferStage::step(int64_t step) {
   const OptimiserConfig& o = config_.optimiser;
   const Differentiated d = parts(*optimiser_, [&](const MicroBatch& part) {
-    const TransferBatch pairs = batch(step, part), there = moved(pairs, device());
+    const TransferBatch pairs =
+        ahead_.take(may_draw_ahead(), step, part, [this](auto... of) { return batch(of...); });
+    TransferBatch there = moved(pairs, device());
+    there.faces = pairs.faces;  // the edge loss counts them on the host
     Tensor posed;
     Differentiated out =
         differentiate(part.key(key_.fold(static_cast<uint64_t>(step))),

@@ -3,6 +3,7 @@
 
 #include "datasets/sampling/transfers.h"
 #include "nn/models/transfer.h"
+#include "train/ahead.h"
 #include "train/stage.h"
 #include "train/stages/stage_input.h"
 
@@ -89,6 +90,7 @@ class TransferStage final : public Stage {
   Optimiser* optimiser_;
   TransferSampler sampler_, validation_sampler_;
   RngKey key_;
+  Ahead<TransferBatch> ahead_;
 };
 
 }  // namespace restage
