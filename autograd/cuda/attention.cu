@@ -96,15 +96,16 @@ void pool(const Pairs<T>& p, const T* st, T* e, T* out) {
   rows(p.points, p.d, [=] RESTAGE_DEVICE(int64_t point, int64_t c) {
     const int64_t first = point * p.k;
     T* score = e + first * p.d + c;
-    T top = score[0];
-    for (int64_t j = 1; j < p.k; ++j)
-      if (score[j * p.d] > top) top = score[j * p.d];
-    T total = 0, sum = 0;
-    for (int64_t j = 0; j < p.k; ++j)
-      total += score[j * p.d] = exp((score[j * p.d] - top) * p.scale);
+    T top = score[0], total = 1;  // of exp(score - top), over those that were seen
+    for (int64_t j = 1; j < p.k; ++j) {
+      const T next = score[j * p.d], larger = next > top ? next : top;
+      total = total * exp((top - larger) * p.scale) + exp((next - larger) * p.scale);
+      top = larger;
+    }
     const T inverse = T(1) / total;
+    T sum = 0;
     for (int64_t j = 0; j < p.k; ++j) {
-      const T weight = score[j * p.d] *= inverse;
+      const T weight = score[j * p.d] = exp((score[j * p.d] - top) * p.scale) * inverse;
       sum =
           fma(weight,
               p.value[p.neighbour(first + j) * p.d + c] + st[((first + j) * 2 + 1) * p.d + c], sum);
