@@ -1,9 +1,11 @@
 #include "autograd/base/interrupt.h"
 
 #include <signal.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <atomic>
+#include <cstdint>
 
 #include "autograd/base/temporary.h"
 
@@ -13,11 +15,28 @@ namespace {
 std::atomic<int> scopes{0};
 std::atomic<int> caught{0};
 std::atomic<bool> asked{false};
+std::atomic<int64_t> caught_at{0};  // milliseconds
 static_assert(std::atomic<int>::is_always_lock_free, "used in a signal handler");
 
+constexpr int64_t kSameRequest = 500;  // milliseconds
+
+int64_t now() {
+  timespec t{};
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return t.tv_sec * 1000 + t.tv_nsec / 1000000;
+}
+
+/// A terminal and a program such as timeout(1) may both send the one signal that somebody asked
+/// for.
 void on_signal(int signal) {
-  int none = 0;
-  if (scopes.load() > 0 && caught.compare_exchange_strong(none, signal)) return;
+  if (scopes.load() > 0) {
+    int none = 0;
+    if (caught.compare_exchange_strong(none, signal)) {
+      caught_at = now();
+      return;
+    }
+    if (now() - caught_at.load() < kSameRequest) return;
+  }
   remove_temporaries();
   _exit(128 + signal);
 }

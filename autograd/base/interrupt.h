@@ -19,6 +19,8 @@ class Interrupted : public Error {
 void handle_signals();
 
 /// While a StopScope exists, the first signal sets the flag and the second signal ends the program.
+/// What comes within half a second of the first belongs to it: a wrapper such as timeout(1) sends
+/// its signal to the program and to the program's group.
 class StopScope {
  public:
   StopScope();

@@ -216,6 +216,8 @@ class Resume(Train):
             while "1/1000000" not in process.stderr.readline():
                 pass
             process.send_signal(number)
+            time.sleep(0.01)  # timeout(1) sends its signal to the program, then to the program's group
+            process.send_signal(number)
             process.stderr.read()
             self.assertEqual(process.wait(60), code)
             self.assertEqual(len(self.checkpoints(run)), 1)
