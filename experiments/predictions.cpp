@@ -1,8 +1,10 @@
 #include "experiments/predictions.h"
 
 #include <algorithm>
+#include <filesystem>
 
 #include "autograd/base/error.h"
+#include "experiments/mesh_frames.h"
 #include "nn/geometry/closed_form.h"
 
 namespace restage {
@@ -70,9 +72,21 @@ class CarriedRest {
 }  // namespace
 
 PredictionFile::PredictionFile(const std::string& name) : path(name) {
-  const auto reader = std::make_shared<PredictionReader>(name);
+  if (std::filesystem::is_directory(name)) {
+    const auto meshes = std::make_shared<const MeshFrames>(name);
+    data.frames = meshes->frames();
+    data.vertex_count = meshes->vertex_count();
+    data.sequence_offset = meshes->sequence_offset();
+    data.faces = meshes->faces();
+    read_ = [meshes](int64_t first, int64_t count, auto& out) { meshes->read(first, count, out); };
+    return;
+  }
+  const auto reader = std::make_shared<const PredictionReader>(name);
   data = reader->read_small();
-  if (reader->has_vertices()) reader_ = reader;
+  if (reader->has_vertices())
+    read_ = [reader](int64_t first, int64_t count, auto& out) {
+      reader->read_vertices(first, count, out);
+    };
 }
 
 Track PredictionFile::joints() const {
@@ -80,19 +94,19 @@ Track PredictionFile::joints() const {
 }
 
 Surfaces PredictionFile::vertices() const {
-  if (reader_ == nullptr)
+  if (!read_)
     return data.vertices.empty() ? Track{}
                                  : Track{data.vertices.data(), data.frames, data.vertex_count};
   const auto rows = std::make_shared<const std::vector<int64_t>>(rows_);
-  const auto read = [reader = reader_, rows, move = move_](int64_t first, int64_t count,
-                                                           std::vector<double>& out) {
+  const auto read = [read_rows = read_, rows, move = move_](int64_t first, int64_t count,
+                                                            std::vector<double>& out) {
     if (rows->empty()) {
-      reader->read_vertices(first, count, out);
+      read_rows(first, count, out);
     } else {
       out.clear();
       std::vector<double> row;
       for (int64_t f = first; f < first + count; ++f) {
-        reader->read_vertices((*rows)[static_cast<size_t>(f)], 1, row);
+        read_rows((*rows)[static_cast<size_t>(f)], 1, row);
         out.insert(out.end(), row.begin(), row.end());
       }
     }

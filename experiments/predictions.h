@@ -24,6 +24,7 @@ struct PredictionFile {
   std::string path;
   Prediction data;  ///< of a file without its vertices
 
+  /// An HDF5 file, or a folder of meshes (mesh_frames.h).
   explicit PredictionFile(const std::string& name);
   PredictionFile(std::string name, Prediction made)
       : path(std::move(name)), data(std::move(made)) {}
@@ -37,9 +38,10 @@ struct PredictionFile {
   void carry(const WorldMap& map, bool rigid, double stretched = 1);
 
  private:
-  std::shared_ptr<const PredictionReader> reader_;  // of the vertices; null: they are in `data`
-  std::vector<int64_t> rows_;                       // of the file, frame by frame
-  std::function<void(std::span<double>)> move_;     // of vertices that are read
+  using Read = std::function<void(int64_t first, int64_t count, std::vector<double>& out)>;
+  Read read_;                                    // the vertices; empty: they are in `data`
+  std::vector<int64_t> rows_;                    // of the file, frame by frame
+  std::function<void(std::span<double>)> move_;  // of vertices that are read
 };
 
 /// InputError unless both have as many frames.

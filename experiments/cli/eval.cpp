@@ -287,6 +287,7 @@ void add_eval(Program& program) {
       "restage eval run=runs/demo-1 --out demo/\n"
       "restage eval --pred result.h5 --truth truth.h5\n"
       "restage eval --pred result.h5 --truth truth.h5 --source a.h5 --rest b.h5 --json\n"
+      "restage eval --pred frames/ --truth truth.h5\n"
       "restage eval run=runs/demo-1 --anchor 0\n"
       "restage eval run=runs/demo-1 --device cuda\n"
       "restage eval --pred result.h5 --truth truth.h5 --every 3 --variants --per-joint\n"
@@ -299,7 +300,10 @@ void add_eval(Program& program) {
                  "with run=: as in 'restage retarget'; 0: the papers' sum of velocities");
   app.add_option("--device", options.device,
                  "with run=: where extractor and motion network run, cpu or cuda (cpu)");
-  app.add_option("--pred", options.pred, "predicted /joints and /vertices (HDF5)");
+  app.add_option(
+      "--pred", options.pred,
+      "predicted /joints and /vertices (HDF5), or a folder of meshes, one a frame: of one "
+      "sequence, or a folder for each");
   app.add_option("--truth", options.truth, "true /joints and /vertices (HDF5)");
   app.add_option("--source", options.source, "joints of the source, for the references");
   app.add_option("--rest", options.rest,

@@ -1,5 +1,6 @@
 """restage eval."""
 import math
+import os
 
 from support import CliTest, numbers
 
@@ -137,4 +138,40 @@ class Eval(CliTest):
         for part in (0.95, 0.5, 0.1):
             bad(self.write("cut.h5", content[:int(len(content) * part)]), "cut.h5")
         self.bad_input(["eval", "--pred", "pred.h5", "--truth", "truth.h5", "--source", "truth.h5"], "--rest")
-        self.bad_input(["eval", "--pred", ".", "--truth", "truth.h5"], "not a file")
+        self.bad_input(["eval", "--pred", ".", "--truth", "truth.h5", "--source", "truth.h5"], "--rest")
+
+    def meshes(self, folder, frames=range(F), vertices=V):
+        for f in frames:
+            points = [self.vertices[3 * (f * V + v):][:3] for v in range(vertices)]
+            self.write("%s/%d.obj" % (folder, f), "".join("v %.9g %.9g %.9g\n" % (x, y + 0.1, z) for x, y, z in points))
+
+    def test_meshes_of_any_program(self):
+        self.meshes("frames")
+        self.meshes("two/take2", range(2))
+        self.meshes("two/take10", range(2, F))
+        self.h5("two.h5", vertices=([F, V, 3], self.vertices), sequence_offset=([3], [0, 2, F], "int64"))
+        for pred, truth, sequences in (("frames", "truth.h5", [F]), ("two", "two.h5", [2, F - 2]), ("frames", "two.h5", [2, F - 2])):
+            result = self.eval(pred, truth)
+            self.assertAlmostEqual(result["mean"]["mpvd"], 0.1, 5)
+            self.assertAlmostEqual(result["mean"]["pa_mpvd"], 0, 5)
+            self.assertIsNone(result["mean"]["mpjpe"])
+            self.assertEqual([s["frames"] for s in result["sequences"]], sequences)
+        self.assertAlmostEqual(self.eval("frames", "truth.h5", "--every", 1)["mean"]["mpvd"], 0.1, 5)
+
+    def test_folders_that_are_no_prediction(self):
+        bad = lambda pred, *words: self.bad_input(["eval", "--pred", pred, "--truth", "truth.h5"], *words)
+        os.makedirs(self.path("nothing"))
+        bad("nothing", "nothing", "holds no PLY")
+        self.meshes("both")
+        self.meshes("both/more")
+        bad("both", "meshes and folders")
+        self.meshes("few", range(F - 1))
+        bad("few", "few", "has 5 frames", "has 6")
+        self.meshes("other", vertices=V - 1)
+        bad("other", "11 vertices", "truth.h5 has 12")
+        self.meshes("mixed", range(3))
+        self.meshes("mixed", range(3, F), V - 1)
+        bad("mixed", "mixed/3.obj", "has 11 vertices")
+        self.meshes("nan", range(1, F))
+        self.write("nan/0.obj", "v nan 0 0\n" * V)
+        bad("nan", "nan/0.obj")
