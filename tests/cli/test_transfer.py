@@ -2,7 +2,7 @@
 import os
 import unittest
 
-from support import CliTest
+from support import ROOT, CliTest
 from tiny_run import CONFIG
 
 TRANSFER = CONFIG.replace("test: 1}\n  motions", "test: 2}\n  motions") + """
@@ -33,6 +33,14 @@ class Transfer(CliTest):
             said = self.json("eval", "run=" + run)
             self.assertGreater(said["mean"]["mpvd"], 0, model)
             self.assertIsNone(said["mean"]["mpjpe"], model)
+
+    def test_smoke_configurations(self):
+        for system in ("npt", "lart", "corenet", "tst"):
+            run = self.done("train", os.path.join(ROOT, "configs", system, "smoke.yaml"), "--quiet").strip()
+            if system == "tst":  # it needs the source's points in the target's order, which no cloud has
+                self.bad_input(["eval", "run=" + run], "transfer/tst", "target's order")
+            else:
+                self.assertGreater(self.json("eval", "run=" + run)["mean"]["mpvd"], 0, system)
 
     def test_the_same_bits_again_and_for_other_threads(self):
         one = self.bytes(os.path.join(self.trained(), "weights.safetensors"))
