@@ -1,5 +1,7 @@
 #include "nn/module.h"
 
+#include <cmath>
+
 #include <atomic>
 
 namespace restage {
@@ -82,17 +84,41 @@ Device device_of(Module& module) {
   return entries.empty() ? Device{} : entries.front().value->device();
 }
 
-Tensor Init::uniform(const Shape& shape, double bound, const std::string& name) const {
-  if (budget != nullptr) {
-    *budget -= shape.numel();
-    if (*budget < 0)
+namespace {
+
+/// number(i) for each of a tensor's numbers.
+template <class F>
+Tensor drawn(const Init& init, const Shape& shape, F number) {
+  if (init.budget != nullptr) {
+    *init.budget -= shape.numel();
+    if (*init.budget < 0)
       throw InputError("", "is too small for the network", "give the sizes it was trained with");
   }
-  const RngKey stream = key.fold(name);
   std::vector<double> values(static_cast<size_t>(shape.numel()));
-  for (size_t i = 0; i < values.size(); ++i)
-    values[i] = bound * (2 * restage::uniform(stream, i) - 1);
-  return Tensor::from<double>(shape, values).cast(type);
+  for (size_t i = 0; i < values.size(); ++i) values[i] = number(i);
+  return Tensor::from<double>(shape, values).cast(init.type);
+}
+
+}  // namespace
+
+Tensor Init::uniform(const Shape& shape, double bound, const std::string& name) const {
+  const RngKey stream = key.fold(name);
+  return drawn(*this, shape,
+               [&](size_t i) { return bound * (2 * restage::uniform(stream, i) - 1); });
+}
+
+Tensor Init::weight(const Shape& shape, int64_t in, int64_t out) const {
+  if (start == Start::pytorch)
+    return uniform(shape, 1.0 / std::sqrt(static_cast<double>(in)), "weight");
+  const double deviation =
+      start == Start::normal ? 0.02 : 0.02 * std::sqrt(2.0 / static_cast<double>(in + out));
+  const RngKey stream = key.fold("weight");
+  return drawn(*this, shape, [&](size_t i) { return deviation * restage::normal(stream, i); });
+}
+
+Tensor Init::bias(int64_t in, int64_t out) const {
+  const double bound = start == Start::xavier ? 0 : 1.0 / std::sqrt(static_cast<double>(in));
+  return uniform({out}, bound, "bias");
 }
 
 }  // namespace restage

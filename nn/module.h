@@ -104,16 +104,28 @@ void move_module(Module& module, Device device);
 /// The device of the parameters and buffers of a module; the CPU if the module has none.
 Device device_of(Module& module);
 
-/// PyTorch's default start: uniform in +-1/sqrt(fan_in) (spec 7), from a named stream.
+/// How the weights of linear maps begin. `pytorch`: uniform in +-1/sqrt(inputs), as do biases (spec
+/// 7). `normal`: a normal distribution of deviation 0.02, biases as PyTorch's (NPT, AniFormer).
+/// `xavier`: a normal distribution of deviation 0.02 sqrt(2 / (inputs + outputs)), biases 0
+/// (3D-CoreNet).
+enum class Start { pytorch, normal, xavier };
+
+/// Where the numbers of a new network come from: named streams of a key.
 struct Init {
   RngKey key;
   DType type = DType::f32;
   /// How many more numbers the parameters of a network may hold, where a file says how large the
   /// network is (null: any number). So a damaged size in a file cannot ask for all memory.
   int64_t* budget = nullptr;
+  Start start = Start::pytorch;
   /// InputError if the budget is spent.
   Tensor uniform(const Shape& shape, double bound, const std::string& name) const;
-  Init sub(const std::string& name) const { return {key.fold(name), type, budget}; }
+  /// Of a map from `in` to `out` channels, in the shape in which the map keeps them.
+  Tensor weight(const Shape& shape, int64_t in, int64_t out) const;
+  Tensor bias(int64_t in, int64_t out) const;
+  Init sub(const std::string& name) const { return {key.fold(name), type, budget, start}; }
+  /// With another start, if the network has one of its `own`.
+  Init begun(bool own, Start how) const { return {key, type, budget, own ? how : Start::pytorch}; }
 };
 
 }  // namespace restage

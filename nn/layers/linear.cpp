@@ -9,11 +9,10 @@ namespace restage {
 
 Linear::Linear(int64_t in, int64_t out, const Init& init, bool with_bias, int tail)
     : with_bias_(with_bias), tail_(tail) {
-  const double bound = 1.0 / std::sqrt(static_cast<double>(in));
   Shape shape{out, in};
   for (int i = 0; i < tail; ++i) shape.push_back(1);
-  weight.value = init.uniform(shape, bound, "weight");
-  if (with_bias) bias.value = init.uniform({out}, bound, "bias");
+  weight.value = init.weight(shape, in, out);
+  if (with_bias) bias.value = init.bias(in, out);
 }
 
 Var Linear::operator()(Context& ctx, const Var& x, Activation activation) const {
@@ -37,9 +36,8 @@ void Linear::visit(Fields& f) {
 }
 
 Conv1d::Conv1d(int64_t in, int64_t out, int64_t k, const Init& init) {
-  const double bound = 1.0 / std::sqrt(static_cast<double>(in * k));
-  weight.value = init.uniform({out, in, k}, bound, "weight");
-  bias.value = init.uniform({out}, bound, "bias");
+  weight.value = init.weight({out, in, k}, in * k, out * k);
+  bias.value = init.bias(in * k, out);
 }
 
 Var Conv1d::same(Context& ctx, const Var& x, int64_t stride) const {

@@ -25,9 +25,9 @@ Tensor direction(int64_t size, const Init& init, const char* name) {
 
 SpectralLinear::SpectralLinear(int64_t in, int64_t out, const Init& init, bool with_bias)
     : with_bias_(with_bias) {
-  const double bound = 1.0 / std::sqrt(static_cast<double>(in));
-  weight.value = init.uniform({out, in, 1}, bound, "weight");
-  if (with_bias) bias.value = init.uniform({out}, bound, "bias");
+  // The start of 3D-CoreNet's program does not reach these on a GPU, where it was trained.
+  weight.value = init.begun(true, Start::pytorch).weight({out, in, 1}, in, out);
+  if (with_bias) bias.value = init.bias(in, out);
   u = direction(out, init, "u");
   v = direction(in, init, "v");
 }

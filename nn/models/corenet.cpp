@@ -144,11 +144,12 @@ void ElainBlock::visit(Fields& f) {
   f("cs", cs);
 }
 
-CoreNet::CoreNet(const CoreNetConfig& c, const Init& init)
+CoreNet::CoreNet(const CoreNetConfig& c, const Init& given)
     : config(c),
-      corr(c, init.sub("corr")),
-      fc(3, c.generator[0], 3, init.sub("fc")),
-      out(c.generator[2], 3, init.sub("out"), true, 1) {
+      corr(c, given.begun(c.own_start, Start::xavier).sub("corr")),
+      fc(3, c.generator[0], 3, given.begun(c.own_start, Start::xavier).sub("fc")),
+      out(c.generator[2], 3, given.begun(c.own_start, Start::xavier).sub("out"), true, 1) {
+  const Init init = given.begun(c.own_start, Start::xavier);
   int64_t in = c.generator[0];
   for (size_t i = 0; i < c.generator.size(); ++i) {
     convs.emplace(in, c.generator[i], init.sub(numbered("convs.", i)), true, 1);

@@ -15,6 +15,7 @@ struct CoreNetConfig {
   std::array<int64_t, 3> widths = {64, 128, 256};
   std::array<int64_t, 3> generator = {1024, 512, 256};
   int64_t blocks = 4;
+  bool own_start = false;
 };
 
 template <class V>
@@ -22,6 +23,8 @@ void visit(V& v, CoreNetConfig& c) {
   v("widths", c.widths, "channels of the features that are matched", between(1, kMostWidth));
   v("generator", c.generator, "channels of the generator", between(1, kMostWidth));
   v("blocks", c.blocks, "residual blocks of the features", between(0, 64));
+  v("own_start", c.own_start,
+    "weights begin as its program's do, with a Xavier gain of 0.02; else as PyTorch's");
 }
 
 /// x + norm(c2 act(norm(c1 x))) through act, one PReLU whose slope is used twice.

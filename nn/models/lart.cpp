@@ -9,11 +9,12 @@
 
 namespace restage {
 
-Lart::Lart(const LartConfig& c, const Init& init)
+Lart::Lart(const LartConfig& c, const Init& given)
     : config(c),
-      time(Tensor::zeros({c.frames, c.widths[2]}, init.type)),
-      enc(c.widths, init.sub("enc")),
-      out(c.widths[2] / 4, 3, init.sub("out"), true, 1) {
+      time(Tensor::zeros({c.frames, c.widths[2]}, given.type)),
+      enc(c.widths, given.begun(c.own_start, Start::normal).sub("enc")),
+      out(c.widths[2] / 4, 3, given.begun(c.own_start, Start::normal).sub("out"), true, 1) {
+  const Init init = given.begun(c.own_start, Start::normal);
   const int64_t full = c.widths[2];
   int64_t in = full;
   size_t i = 0;

@@ -14,7 +14,7 @@ namespace restage {
 struct LartConfig {
   std::array<int64_t, 3> widths = {64, 128, 1024};
   int64_t frames = 3;
-  bool first_norm = false;
+  bool first_norm = false, own_start = false;
 };
 
 template <class V>
@@ -25,6 +25,8 @@ void visit(V& v, LartConfig& c) {
   v("frames", c.frames, "frames of a window", between(1, 64));
   v("first_norm", c.first_norm,
     "instance norm in the first block, too: the answer does then not depend on the pose");
+  v("own_start", c.own_start,
+    "weights begin as those of its predecessors, with a deviation of 0.02; else as PyTorch's");
 }
 
 /// Each frame is pooled to one code, to which its place in the window adds a learned vector. The

@@ -10,10 +10,11 @@ namespace restage {
 
 Var points_of(Context& ctx, const Linear& out, const Var& x) { return scale(tanh(out(ctx, x)), 2); }
 
-Npt::Npt(const NptConfig& c, const Init& init)
+Npt::Npt(const NptConfig& c, const Init& given)
     : config(c),
-      enc(c.widths, init.sub("enc")),
-      out((c.widths[2] + 3) / 4, 3, init.sub("out"), true, 1) {
+      enc(c.widths, given.begun(c.own_start, Start::normal).sub("enc")),
+      out((c.widths[2] + 3) / 4, 3, given.begun(c.own_start, Start::normal).sub("out"), true, 1) {
+  const Init init = given.begun(c.own_start, Start::normal);
   const int64_t full = c.widths[2] + 3;
   int64_t in = full;
   size_t i = 0;

@@ -11,7 +11,7 @@ namespace restage {
 
 struct NptConfig {
   std::array<int64_t, 3> widths = {64, 128, 1024};
-  bool pool = false;
+  bool pool = false, own_start = false;
 };
 
 template <class V>
@@ -21,6 +21,8 @@ void visit(V& v, NptConfig& c) {
   v("pool", c.pool,
     "the pose is the maximum over its points; else point i of the pose goes with vertex i of the "
     "target, whatever their order");
+  v("own_start", c.own_start,
+    "weights begin as its program's do, with a deviation of 0.02; else as PyTorch's");
 }
 
 /// The pose code, joined with the target's coordinates, through three convolutions, each with a

@@ -131,5 +131,40 @@ TEST(CrossAttentionMemory, GrowsWithThePointsAndNotWithTheirProduct) {
   EXPECT_GT(peak(false), int64_t{100} << 20);
 }
 
+/// Deviation of a tensor of a model, by its name.
+double deviation_of(Module& model, const std::string& name) {
+  for (const StateEntry& entry : state_of(model)) {
+    if (entry.name != name) continue;
+    double sum = 0, squares = 0;
+    const std::vector<double> x = entry.value->to_vector<double>();
+    for (const double v : x) sum += v, squares += v * v;
+    const auto n = static_cast<double>(x.size());
+    return std::sqrt(squares / n - sum * sum / n / n);
+  }
+  ADD_FAILURE() << name;
+  return 0;
+}
+
+TEST(TransferModels, WeightsBeginAsTheirProgramsDo) {
+  const Init init{RngKey{5, 0}};
+  const auto of = [&](const char* model, const char* name, bool own) {
+    const std::vector<std::string> settings = {own ? "own_start=true" : "own_start=false"};
+    const auto net = make_model_as<TransferModel>(model, model_config(model, settings), init);
+    return deviation_of(*net, name);
+  };
+  // 128 -> 1,024 channels; PyTorch's: uniform within 1 / sqrt(128).
+  const double pytorch = 1 / std::sqrt(128. * 3);
+  for (const char* model : {"transfer/npt", "transfer/npt_pool", "transfer/lart"}) {
+    EXPECT_NEAR(of(model, "enc.convs.2.weight", false), pytorch, 2e-4) << model;
+    EXPECT_NEAR(of(model, "enc.convs.2.weight", true), 0.02, 1e-4) << model;
+    EXPECT_NEAR(of(model, "enc.convs.2.bias", true), pytorch, 3e-3) << model;
+  }
+  const double xavier = 0.02 * std::sqrt(2. / (1024 + 512));
+  EXPECT_NEAR(of("transfer/corenet", "convs.1.weight", true), xavier, 0.01 * xavier);
+  EXPECT_EQ(of("transfer/corenet", "convs.1.bias", true), 0);
+  EXPECT_NEAR(of("transfer/corenet", "blocks.0.c0.weight_orig", true), 1 / std::sqrt(1024. * 3),
+              2e-4);
+}
+
 }  // namespace
 }  // namespace restage
