@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "autograd/base/error.h"
+#include "autograd/base/log.h"
 #include "datasets/readers/frame_folder.h"
 #include "datasets/readers/mesh_io.h"
 
@@ -32,7 +33,9 @@ MeshFrames::MeshFrames(const std::string& folder) {
   else if (own || sequences.empty())
     sequences = {folder};
   for (const std::string& sequence : sequences) {
-    const std::vector<std::string> files = frame_list(sequence).files;
+    const FrameList list = frame_list(sequence);
+    for (const std::string& remark : list.remarks) log_warning(remark);
+    const std::vector<std::string>& files = list.files;
     if (files.empty()) throw_no_frames(sequence);
     files_.insert(files_.end(), files.begin(), files.end());
     offset_.push_back(std::ssize(files_));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <chrono>
+#include <numeric>
 
 #include "autograd/base/error.h"
 #include "autograd/base/format.h"
@@ -88,7 +89,14 @@ Transfer::Transfer(const Bundle& weights, const std::string& weights_name, Mesh 
   const Box box = box_of(centred);
   height_ = box.sizes().y();
   move(centred, -box.center());
-  identity_ = as_tensor(centred, {1, std::ssize(centred), 3}).to(device_of(*model_));
+  order_.resize(centred.size());
+  std::iota(order_.begin(), order_.end(), size_t{0});
+  Rng rng(RngKey{seed_, 0}.fold("transfer.vertices"));
+  for (size_t i = 0; i < order_.size(); ++i)
+    std::swap(order_[i], order_[i + rng.below(order_.size() - i)]);
+  Points shuffled;
+  for (const size_t i : order_) shuffled.push_back(centred[i]);
+  identity_ = as_tensor(shuffled, {1, std::ssize(shuffled), 3}).to(device_of(*model_));
 }
 
 Points Transfer::answer() {
@@ -105,7 +113,7 @@ Points Transfer::answer() {
   const int64_t v = made.size(2);
   Points out(static_cast<size_t>(v));
   const float* from = made.data<float>() + 3 * v * (t - 1);
-  for (size_t i = 0; i < out.size(); ++i) out[i] = Eigen::Map<const Point>(from + 3 * i);
+  for (size_t i = 0; i < out.size(); ++i) out[order_[i]] = Eigen::Map<const Point>(from + 3 * i);
   return out;
 }
 

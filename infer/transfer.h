@@ -41,7 +41,10 @@ class Transfer final : public System {
 
   std::shared_ptr<TransferModel> model_;
   Mesh target_;
-  Tensor identity_;  // [1, v, 3]
+  // Trainings shuffle vertices, and 3D-CoreNet looks at neighbours in the list, so it has to see
+  // them shuffled here too. `order_`: the vertex of the target at each place.
+  std::vector<size_t> order_;
+  Tensor identity_;  // [1, v, 3] in that order
   uint64_t seed_;
   int64_t points_;               // of a cloud that the network is given
   float height_ = 0;             // of the target

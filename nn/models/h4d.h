@@ -1,4 +1,4 @@
-// `transfer/h4d_codes`: H4D (Jiang et al., CVPR 2022): codes of shape, first pose and motion from a
+// `codes/h4d`: H4D (Jiang et al., CVPR 2022): codes of shape, first pose and motion from a
 // window of clouds, and the body that is made of them.
 #pragma once
 

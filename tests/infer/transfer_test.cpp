@@ -59,6 +59,39 @@ TEST(TransferSystem, GapsAreFilledBetweenTheirEnds) {
   EXPECT_EQ(transfer.finish().size(), 1u);
 }
 
+/// Answers with the target's mesh, and keeps what it was shown.
+struct Same : TransferModel {
+  explicit Same(Tensor* shown) : shown_(shown) {}
+  Var forward(Context&, const TransferInput& in) override {
+    *shown_ = in.identity.value.clone();
+    return Var(in.identity.value.reshape({1, 1, in.identity.size(1), 3}));
+  }
+  void visit(Fields&) override {}
+  const char* kind() const override { return "Same"; }
+  Tensor* shown_;
+};
+
+TEST(TransferSystem, SeesVerticesShuffledAndAnswersInTheTargetsOrder) {
+  Tensor shown;
+  Bundle bundle;
+  bundle.put("transfer", {"transfer/npt_pool",
+                          model_config("transfer/npt_pool"),
+                          std::make_shared<Same>(&shown),
+                          {{"points", "50"}}});
+  const Points target = cloud(Point::Zero());
+  Transfer transfer(bundle, "weights", {target, {}}, "target", {});
+  const Points answer = transfer.push(target, "a cloud")[0].vertices;
+  ASSERT_EQ(answer.size(), target.size());
+  size_t moved = 0;
+  for (size_t i = 0; i < target.size(); ++i) {
+    EXPECT_LT(((answer[i] - answer[0]) - (target[i] - target[0])).norm(), 1e-5f) << i;
+    const Eigen::Map<const Point> there(shown.data<float>() + 3 * i);
+    const Eigen::Map<const Point> first(shown.data<float>());
+    moved += ((there - first) - (target[i] - target[0])).norm() > 1e-4f;
+  }
+  EXPECT_GT(moved, target.size() / 2);
+}
+
 TEST(TransferSystem, DamagedSettingsAreBadInput) {
   for (const char* points : {"many", "", "-3", "99999999999999999999", "70000"})
     EXPECT_HAS(test::error_of([&] { system(points); }), "weights");

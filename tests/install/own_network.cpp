@@ -1,5 +1,5 @@
 // A network, a loss and a system of one's own, trained and used with the installed library
-// (docs/systems.md, "Your own"). Not a line of the library knows them.
+// (docs/extending.md). Not a line of the library knows them.
 #include "own_network.h"
 
 #include <cmath>
@@ -72,7 +72,7 @@ class ShiftStage final : public Stage {
   static std::vector<std::string> reads(const Config&) { return {}; }
   ShiftStage(const Config& c, const StageInput& in)
       : Stage("shift", c.optimiser, in.device),
-        model_(add_network<TransferModel>(c.model, RngKey{in.seed, 0})),
+        model_(add_network<TransferModel>(c.model, RngKey{in.seed, 0}, {{"points", "20"}})),
         optimiser_(add_optimiser("optimiser", {"transfer"}, c.optimiser)),
         sampler_(in.train, {.points = 20, .vertices = 40}, in.seed) {}
   NamedValues step(int64_t step) override {

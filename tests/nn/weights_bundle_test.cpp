@@ -4,14 +4,18 @@
 #include <cmath>
 
 #include "autograd/gradcheck/evaluate.h"
+#include "nn/models/corenet.h"
 #include "nn/models/deformation.h"
 #include "nn/models/discriminator.h"
 #include "nn/models/hybrid.h"
+#include "nn/models/lart.h"
+#include "nn/models/npt.h"
 #include "nn/models/patch_transformer.h"
 #include "nn/models/point_transformer.h"
 #include "nn/models/pointnet.h"
 #include "nn/models/skeleton.h"
 #include "nn/models/smrm.h"
+#include "nn/models/tst.h"
 #include "nn/weights/bundle.h"
 #include "nn/weights/state.h"
 #include "tests/support/files.h"
@@ -215,6 +219,10 @@ TEST(WeightsBundle, EverySizeOfAModelIsAKey) {
   expect_all_are_keys<HybridConfig>("hybrid", 0);
   expect_all_are_keys<MlpConfig>("deformation networks", 0);
   expect_all_are_keys<DiscriminatorConfig>("discriminator", 2);  // widths of its inputs
+  expect_all_are_keys<NptConfig>("NPT", 0);
+  expect_all_are_keys<LartConfig>("LART", 0);
+  expect_all_are_keys<CoreNetConfig>("3D-CoreNet", 0);
+  expect_all_are_keys<TstConfig>("TST", 0);
 }
 
 TEST(WeightsBundle, EveryShapeOfAModelComesBack) {

@@ -1,6 +1,7 @@
 #include "train/stages/transfer_stage.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
@@ -34,6 +35,18 @@ Tensor repeated(const Tensor& x, int64_t t) {
 /// Frame number `t` of windows [n, t, v, 3].
 Var frame_of(const Var& x, int64_t t) {
   return reshape(slice(x, 1, t, t + 1), {x.size(0), x.size(2), 3});
+}
+
+/// i32 [n, up to `most`]: vertices below `all`, in each row the same random ones.
+Tensor some_of(int64_t all, int64_t most, int64_t n, const RngKey& key) {
+  std::vector<int32_t> order(static_cast<size_t>(all));
+  std::iota(order.begin(), order.end(), 0);
+  Rng rng(key.fold("vertices"));
+  const auto count = static_cast<size_t>(std::min(all, most));
+  for (size_t i = 0; i < count; ++i) std::swap(order[i], order[i + rng.below(order.size() - i)]);
+  std::vector<int32_t> rows;
+  for (int64_t k = 0; k < n; ++k) rows.insert(rows.end(), order.begin(), order.begin() + count);
+  return Tensor::from<int32_t>({n, static_cast<int64_t>(count)}, rows);
 }
 
 }  // namespace
@@ -105,8 +118,9 @@ Var TransferStage::loss(Context& ctx, const TransferBatch& pairs, int64_t step, 
     total = total + scale(mean_all(edge_loss(frames, right, pairs.faces)), l.edge);
   }
   if (l.distances > 0) {
-    const int64_t v = std::min(l.metric_points, frames.size(1));
-    const auto some = [&](const Var& x) { return pair_distances(slice(x, 1, 0, v)); };
+    const Tensor chosen =
+        some_of(frames.size(1), l.metric_points, frames.size(0), ctx.rng).to(device());
+    const auto some = [&](const Var& x) { return pair_distances(gather(x, chosen)); };
     total = total + scale(mse(some(frames), some(truth)), l.distances);
   }
   if (l.metric > 0 && step >= l.metric_from) total = total + scale(metric(ctx, pairs), l.metric);
