@@ -314,7 +314,8 @@ NamedValues MotionStage::step(int64_t step) {
     const std::lock_guard lock(several_ask);
     const auto [at, fresh] = drawn.try_emplace(part.index);
     if (fresh) {
-      at->second = ahead_.take(may_draw_ahead(), step, part, [this](auto... of) { return batch(of...); });
+      at->second =
+          ahead_.take(may_draw_ahead(), step, part, [this](auto... of) { return batch(of...); });
       for (WindowBatch* b : {&at->second.windows, &at->second.own}) *b = moved(*b, device());
     }
     return at->second;

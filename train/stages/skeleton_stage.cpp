@@ -180,7 +180,8 @@ void SkeletonStage::recall(int64_t step, const MicroBatch& part, CloudBatch* clo
 NamedValues SkeletonStage::step(int64_t step) {
   const OptimiserConfig& o = config_.optimiser;
   const Differentiated d = parts(*optimiser_, [&](const MicroBatch& part) {
-    CloudBatch clouds = ahead_.take(may_draw_ahead(), step, part, [this](auto... of) { return batch(of...); });
+    CloudBatch clouds =
+        ahead_.take(may_draw_ahead(), step, part, [this](auto... of) { return batch(of...); });
     recall(step, part, &clouds);
     clouds = moved(std::move(clouds), device());
     return differentiate(part.key(key_.fold(static_cast<uint64_t>(step))),
