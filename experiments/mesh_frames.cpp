@@ -4,7 +4,6 @@
 #include <filesystem>
 
 #include "autograd/base/error.h"
-#include "autograd/base/log.h"
 #include "datasets/readers/frame_folder.h"
 #include "datasets/readers/mesh_io.h"
 
@@ -23,24 +22,40 @@ std::vector<std::string> folders_in(const std::string& folder) {
   return out;
 }
 
+/// All vertices have to be there: which one is left out decides what the others are compared with.
+Mesh read_whole(const std::string& file) {
+  size_t left_out = 0;
+  Mesh mesh = read_frame_mesh(file, left_out);
+  if (left_out > 0)
+    throw InputError(file, "has " + std::to_string(left_out) + " vertices that are no numbers",
+                     "write finite coordinates for all vertices");
+  if (mesh.vertices.empty()) throw InputError(file, "has no vertices", "give a mesh");
+  return mesh;
+}
+
 }  // namespace
 
 MeshFrames::MeshFrames(const std::string& folder) {
   std::vector<std::string> sequences = folders_in(folder);
-  if (const bool own = !frame_files(folder).empty(); own && !sequences.empty())
-    throw InputError(folder, "holds meshes and folders",
+  const std::vector<std::string> own = frame_files(folder);
+  if (!own.empty() && !sequences.empty())
+    throw InputError(own.front(), "may be a frame, and is beside folders",
                      "give a folder of meshes, or one folder of meshes for each sequence");
-  else if (own || sequences.empty())
-    sequences = {folder};
+  if (sequences.empty()) sequences = {folder};
   for (const std::string& sequence : sequences) {
     const FrameList list = frame_list(sequence);
-    for (const std::string& remark : list.remarks) log_warning(remark);
+    remarks_.insert(remarks_.end(), list.remarks.begin(), list.remarks.end());
+    for (size_t i = 1; i < list.numbers.size(); ++i)
+      if (list.numbers[i] > list.numbers[i - 1] + 1) {
+        remarks_.push_back("frames are missing after " + list.files[i - 1]);
+        break;
+      }
     const std::vector<std::string>& files = list.files;
     if (files.empty()) throw_no_frames(sequence);
     files_.insert(files_.end(), files.begin(), files.end());
     offset_.push_back(std::ssize(files_));
   }
-  const Mesh first = read_mesh(files_.front());
+  const Mesh first = read_whole(files_.front());
   vertex_count_ = std::ssize(first.vertices);
   faces_ = first.faces;
 }
@@ -49,7 +64,7 @@ void MeshFrames::read(int64_t first, int64_t count, std::vector<double>& out) co
   out.clear();
   for (int64_t f = first; f < first + count; ++f) {
     const std::string& file = files_[static_cast<size_t>(f)];
-    const Mesh mesh = read_mesh(file);
+    const Mesh mesh = read_whole(file);
     if (std::ssize(mesh.vertices) != vertex_count_)
       throw InputError(file,
                        "has " + std::to_string(mesh.vertices.size()) + " vertices, and " +

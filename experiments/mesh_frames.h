@@ -20,6 +20,8 @@ class MeshFrames {
   int64_t vertex_count() const { return vertex_count_; }
   const std::vector<int64_t>& sequence_offset() const { return offset_; }
   const std::vector<Triangle>& faces() const { return faces_; }
+  /// Files that were left out, numbers that are missing.
+  const std::vector<std::string>& remarks() const { return remarks_; }
   /// Frames [first, first + count), count x V x 3. InputError naming the file: another number of
   /// vertices than the first, or one that is not finite.
   void read(int64_t first, int64_t count, std::vector<double>& out) const;
@@ -28,6 +30,7 @@ class MeshFrames {
   std::vector<std::string> files_;
   std::vector<int64_t> offset_{0};
   std::vector<Triangle> faces_;
+  std::vector<std::string> remarks_;
   int64_t vertex_count_ = 0;
 };
 

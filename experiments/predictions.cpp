@@ -78,6 +78,7 @@ PredictionFile::PredictionFile(const std::string& name) : path(name) {
     data.vertex_count = meshes->vertex_count();
     data.sequence_offset = meshes->sequence_offset();
     data.faces = meshes->faces();
+    remarks = meshes->remarks();
     read_ = [meshes](int64_t first, int64_t count, auto& out) { meshes->read(first, count, out); };
     return;
   }
@@ -153,7 +154,8 @@ void check_same_frames(const PredictionFile& file, const PredictionFile& truth) 
   if (file.data.frames == truth.data.frames) return;
   throw InputError(file.path,
                    "has " + counted(file.data.frames, "frames, but ") + truth.path + " has " +
-                       std::to_string(truth.data.frames),
+                       std::to_string(truth.data.frames) +
+                       (file.remarks.empty() ? "" : " (" + file.remarks.front() + ")"),
                    "give files of the same frames");
 }
 

@@ -22,7 +22,8 @@ using References = std::vector<std::pair<std::string, metrics::Evaluation>>;
 /// read some frames at a time.
 struct PredictionFile {
   std::string path;
-  Prediction data;  ///< of a file without its vertices
+  Prediction data;                   ///< of a file without its vertices
+  std::vector<std::string> remarks;  ///< of a folder: what was left out, what is missing
 
   /// An HDF5 file, or a folder of meshes (mesh_frames.h).
   explicit PredictionFile(const std::string& name);

@@ -66,11 +66,14 @@ void TransferSampler::find_meshes() {
     known.push_back(&body.rest);
     meshes_.push_back(thin_mesh(body.rest, static_cast<size_t>(std::max(0, config_.vertices))));
     faces_ = std::max(faces_, std::ssize(meshes_.back().faces));
-    if (std::ssize(meshes_.back().kept) != vertices())
+    if (std::ssize(meshes_.back().kept) != vertices()) {
+      const int64_t least = std::min(vertices(), std::ssize(meshes_.back().kept));
       throw InputError("",
-                       "body '" + body.id + "' has " + std::to_string(meshes_.back().kept.size()) +
-                           " vertices, and others " + std::to_string(vertices()),
-                       "thin them to one number with pairs.vertices, such as 1000");
+                       "bodies have different numbers of vertices, one of them " +
+                           std::to_string(least) + ", and all must be thinned to the same number",
+                       "set transfer.pairs.vertices to " + std::to_string(least) +
+                           " or less, such as 1000, or give data whose bodies have more");
+    }
   }
 }
 

@@ -4,6 +4,7 @@
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
 #include "autograd/base/format.h"
+#include "autograd/base/log.h"
 #include "autograd/base/output_check.h"
 #include "datasets/benchmark/sequence.h"
 #include "datasets/schema.h"
@@ -94,27 +95,29 @@ std::vector<std::string> result_files(const std::string& folder) {
 }
 
 /// In words, for the heading of a table.
-std::string heading(const std::string& condition) {
-  if (condition == "clouds") return "From clouds alone (extracted skeletons)";
+std::string heading(const std::string& condition, bool skeletons) {
+  if (condition == "clouds")
+    return skeletons ? "From clouds alone (extracted skeletons)" : "From clouds alone";
   if (condition == "true_skeletons") return "From true skeletons";
   if (condition == "source_joints") return "Extractor alone, clouds of the source";
   if (condition == "rest_joints") return "Extractor alone, the targets' T-poses";
   return "Surface alone (true skeletons and rotations of the target)";
 }
 
+/// `label`: the model of the row; `skeletons`: whether the system moves its target by joints.
 std::string scores_text(const SystemEvaluation& scores, const EvaluationOptions& options,
-                        const std::string& motion) {
+                        const std::string& label, bool skeletons) {
   std::string out = std::to_string(options.sequences.size()) + " held-out sequences, seed " +
                     std::to_string(options.seed);
   char line[160];
-  if (options.anchor > 0) {
+  if (skeletons && options.anchor > 0) {
     std::snprintf(line, sizeof line, ", paths held to the source's within %g s", options.anchor);
     out += line;
   }
   out += ".\n";
   for (const auto& [name, part] : scores.conditions)
-    out += "\n" + heading(name) + ":\n\n" +
-           to_markdown(report_of(part), name == "true_poses" ? "deformation" : motion);
+    out += "\n" + heading(name, skeletons) + ":\n\n" +
+           to_markdown(report_of(part), name == "true_poses" ? "deformation" : label);
   if (scores.joint_error) {
     std::snprintf(line, sizeof line,
                   "\nExtractor on held-out clouds: %.1f mm; on held-out T-poses: %.1f mm.\n",
@@ -159,8 +162,10 @@ int run_eval_run(const EvalOptions& options, const Common& common) {
   EvaluationOptions how = evaluation_options(config, test, common.seed);
   if (options.anchor) how.anchor = *options.anchor;
   const SystemEvaluation scores = evaluate_system(weights, weights_name, test, how);
-  const TrainedModel* motion = weights.find("motion");
-  const std::string text = scores_text(scores, how, motion ? motion->model : "");
+  const TrainedModel *motion = weights.find("motion"), *transfer = weights.find("transfer");
+  const bool skeletons = transfer == nullptr || motion != nullptr;
+  const TrainedModel* const named = skeletons ? motion : transfer;
+  const std::string text = scores_text(scores, how, named ? named->model : "", skeletons);
   if (!options.out.empty()) {
     std::error_code failed;
     std::filesystem::create_directories(options.out, failed);
@@ -229,7 +234,7 @@ int run_eval(const EvalOptions& options, const Common& common) {
   }
   if (options.pred.empty() || options.truth.empty())
     throw InputError("", options.pred.empty() ? "--pred is missing" : "--truth is missing",
-                     "give --pred P.h5 --truth T.h5, or run=RUN_DIR");
+                     "give --pred P.h5 (or a folder of meshes) --truth T.h5, or run=RUN_DIR");
   check_way(options);
   if (options.source.empty() != options.rest.empty())
     throw InputError("", "--source and --rest belong together",
@@ -259,6 +264,7 @@ int run_eval(const EvalOptions& options, const Common& common) {
   report.model =
       metrics::evaluate(cut(offset, pred.joints(), pred.vertices(), truth), report.metrics);
 
+  for (const std::string& remark : pred.remarks) log_warning(remark);
   const metrics::Value within = claim_held(pred, truth);
   const auto by_joint = options.per_joint ? errors_by_joint(pred, truth) : std::vector<double>();
   if (common.json) {
