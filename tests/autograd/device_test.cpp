@@ -138,42 +138,65 @@ TEST(Device, TheGpuRoundsWhatItMultipliesAsItIsTold) {
   }
 }
 
-/// Value and gradients of an attention, in the host's memory.
-std::vector<Tensor> attended(Device device, const std::vector<Tensor>& inputs,
-                             const Tensor& index) {
+using Op = std::function<Var(const std::vector<Var>&)>;
+
+/// The value of op(inputs) and the gradient of each input, in the host's memory.
+std::vector<Tensor> differentiated(Device device, const std::vector<Tensor>& inputs, const Op& op) {
   Tape tape;
   std::vector<Var> x;
   for (const Tensor& t : inputs) x.push_back(tape.leaf(t.to(device), x.size() + 1));
-  const Var y = neighbour_attention({x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]},
-                                    index.to(device), 0.7);
+  const Var y = op(x);
   const Gradients gradients = tape.backward(sum_all(square(y)));
   std::vector<Tensor> out{y.value.cpu()};
   for (size_t i = 1; i <= x.size(); ++i) out.push_back(gradients.find(i)->cpu());
   return out;
 }
 
-/// Points, features, weights and neighbours of an attention, in that order.
-std::pair<std::vector<Tensor>, Tensor> attention_inputs(int64_t n, int64_t v, int64_t k, int64_t d,
-                                                        DType type) {
+/// The emulated GPU gives the CPU's value and gradients.
+void expect_agreement(const std::vector<Tensor>& inputs, const Op& op) {
+  const auto here = differentiated({}, inputs, op),
+             there = differentiated(emulated_gpu(), inputs, op);
+  for (size_t t = 0; t < here.size(); ++t)
+    for (int64_t i = 0; i < here[t].numel(); ++i)
+      ASSERT_NEAR(there[t].item(i), here[t].item(i), 1e-9 * (1 + std::abs(here[t].item(i))))
+          << "tensor " << t << ", number " << i;
+}
+
+std::vector<Tensor> normal_inputs(const std::vector<Shape>& shapes, double deviation = 1) {
   Rng rng(RngKey{1, 0});
-  std::vector<Tensor> x;
-  for (const Shape& shape : {Shape{n, v, 3}, Shape{n, v, d}, Shape{n, v, d}, Shape{n, v, d},
-                             Shape{d, 3}, Shape{d}, Shape{2 * d, d}, Shape{d, d}, Shape{d}}) {
-    Tensor wide = Tensor::empty(shape, DType::f64);
-    for (int64_t i = 0; i < wide.numel(); ++i) wide.data<double>()[i] = rng.normal();
-    x.push_back(wide.cast(type));
+  std::vector<Tensor> out;
+  for (const Shape& shape : shapes) {
+    out.push_back(Tensor::empty(shape, DType::f64));
+    for (int64_t i = 0; i < out.back().numel(); ++i)
+      out.back().data<double>()[i] = deviation * rng.normal();
   }
+  return out;
+}
+
+/// Points, features and weights of an attention.
+std::vector<Tensor> attention_inputs(int64_t n, int64_t v, int64_t d) {
+  return normal_inputs({Shape{n, v, 3}, Shape{n, v, d}, Shape{n, v, d}, Shape{n, v, d}, Shape{d, 3},
+                        Shape{d}, Shape{2 * d, d}, Shape{d, d}, Shape{d}});
+}
+
+/// Attention to k random neighbours of each of v points.
+Op attention(int64_t n, int64_t v, int64_t k) {
+  Rng rng(RngKey{2, 0});
   Tensor index = Tensor::empty({n, v, k}, DType::i32);
   for (int64_t i = 0; i < index.numel(); ++i)
     index.data<int32_t>()[i] = static_cast<int32_t>(rng.below(static_cast<uint64_t>(v)));
-  return {x, index};
+  return [index](const std::vector<Var>& x) {
+    return neighbour_attention({x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8]},
+                               index.to(x[0].value.device()), 0.7);
+  };
 }
 
 TEST(Device, TheGpusAttentionRoundsItsProductsAsItIsTold) {
-  const auto [x, index] = attention_inputs(1, 20, 4, 32, DType::f32);
-  const auto exact = attended(emulated_gpu(), x, index);
+  std::vector<Tensor> x = attention_inputs(1, 20, 32);
+  for (Tensor& t : x) t = t.cast(DType::f32);
+  const auto exact = differentiated(emulated_gpu(), x, attention(1, 20, 4));
   const MatmulPrecisionScope scope(MatmulPrecision::tf32);
-  const auto rounded = attended(emulated_gpu(), x, index);
+  const auto rounded = differentiated(emulated_gpu(), x, attention(1, 20, 4));
   // The value, then each gradient but that of the last input, which is zero.
   for (size_t t = 0; t + 1 < exact.size(); ++t) {
     double difference = 0, size = 0;
@@ -189,40 +212,16 @@ TEST(Device, TheGpusAttentionRoundsItsProductsAsItIsTold) {
 
 TEST(Device, TheGpusAttentionGoesThroughABatchInParts) {
   // Two clouds of more pairs each than it handles at once.
-  const auto [x, index] = attention_inputs(2, 129, 512, 2, DType::f64);
-  const auto here = attended({}, x, index), there = attended(emulated_gpu(), x, index);
-  for (size_t t = 0; t < here.size(); ++t)
-    for (int64_t i = 0; i < here[t].numel(); ++i)
-      ASSERT_NEAR(there[t].item(i), here[t].item(i), 1e-9 * (1 + std::abs(here[t].item(i))))
-          << "tensor " << t << ", number " << i;
+  expect_agreement(attention_inputs(2, 129, 2), attention(2, 129, 512));
 }
 
 TEST(Device, TheGpusPooledNormGoesThroughABatchInParts) {
   // Two clouds, each with as many products as it has at once, of more points than a thread goes
   // through.
   const int64_t n = 2, v = 4200, i = 2, o = 2100;
-  Rng rng(RngKey{1, 0});
-  std::vector<Tensor> inputs;
-  for (const Shape& shape : {Shape{n, v, i}, Shape{o, i}, Shape{o}, Shape{o}, Shape{o}}) {
-    inputs.push_back(Tensor::empty(shape, DType::f64));
-    for (int64_t k = 0; k < inputs.back().numel(); ++k)
-      inputs.back().data<double>()[k] = rng.normal();
-  }
-  const auto pooled = [&](Device device) {
-    Tape tape;
-    std::vector<Var> x;
-    for (const Tensor& t : inputs) x.push_back(tape.leaf(t.to(device), x.size() + 1));
-    const Var y = pooled_norm(x[0], x[1], x[2], x[3], x[4], Activation::relu);
-    const Gradients gradients = tape.backward(sum_all(square(y)));
-    std::vector<Tensor> out{y.value.cpu()};
-    for (size_t k = 1; k <= x.size(); ++k) out.push_back(gradients.find(k)->cpu());
-    return out;
-  };
-  const auto here = pooled({}), there = pooled(emulated_gpu());
-  for (size_t t = 0; t < here.size(); ++t)
-    for (int64_t k = 0; k < here[t].numel(); ++k)
-      ASSERT_NEAR(there[t].item(k), here[t].item(k), 1e-9 * (1 + std::abs(here[t].item(k))))
-          << "tensor " << t << ", number " << k;
+  expect_agreement(
+      normal_inputs({Shape{n, v, i}, Shape{o, i}, Shape{o}, Shape{o}, Shape{o}}),
+      [](const auto& x) { return pooled_norm(x[0], x[1], x[2], x[3], x[4], Activation::relu); });
 }
 
 TEST(Device, TheGpusGruMakesItsProductsInParts) {
@@ -230,28 +229,11 @@ TEST(Device, TheGpusGruMakesItsProductsInParts) {
   // backward (28 rows), and for none at all (130 rows).
   const int64_t steps = 3, h = 48, inputs = 5;
   for (const int64_t n : {1, 14, 28, 130}) {
-    Rng rng(RngKey{2, 0});
-    std::vector<Tensor> x;
-    for (const Shape& shape : {Shape{steps, n, inputs}, Shape{n, h}, Shape{3 * h, inputs},
-                               Shape{3 * h, h}, Shape{3 * h}, Shape{3 * h}}) {
-      x.push_back(Tensor::empty(shape, DType::f64));
-      for (int64_t i = 0; i < x.back().numel(); ++i) x.back().data<double>()[i] = rng.normal() / 4;
-    }
-    const auto run = [&](Device device) {
-      Tape tape;
-      std::vector<Var> v;
-      for (const Tensor& t : x) v.push_back(tape.leaf(t.to(device), v.size() + 1));
-      const Var y = gru(v[0], v[1], v[2], v[3], v[4], v[5]);
-      const Gradients gradients = tape.backward(sum_all(square(y)));
-      std::vector<Tensor> out{y.value.cpu()};
-      for (size_t i = 1; i <= v.size(); ++i) out.push_back(gradients.find(i)->cpu());
-      return out;
-    };
-    const auto here = run({}), there = run(emulated_gpu());
-    for (size_t t = 0; t < here.size(); ++t)
-      for (int64_t i = 0; i < here[t].numel(); ++i)
-        ASSERT_NEAR(there[t].item(i), here[t].item(i), 1e-9 * (1 + std::abs(here[t].item(i))))
-            << n << " rows, tensor " << t << ", number " << i;
+    SCOPED_TRACE(n);
+    expect_agreement(normal_inputs({Shape{steps, n, inputs}, Shape{n, h}, Shape{3 * h, inputs},
+                                    Shape{3 * h, h}, Shape{3 * h}, Shape{3 * h}},
+                                   0.25),
+                     [](const auto& x) { return gru(x[0], x[1], x[2], x[3], x[4], x[5]); });
   }
 }
 

@@ -115,6 +115,14 @@ TEST(TransferLosses, EdgesWithoutLengthGiveNoNan) {
              "faces is needed");
 }
 
+TEST(TransferLosses, AnEdgeWithoutLengthInTheReferenceCountsAsRight) {
+  const Tensor faces = Tensor::from<int32_t>({1, 3}, {0, 1, 2});
+  const Tensor reference = Tensor::from<double>({1, 3, 3}, {0, 0, 0, 0, 0, 0, 1, 0, 0});
+  const Tensor pred = Tensor::from<double>({1, 3, 3}, {0, 0, 0, 0, 3, 0, 2, 0, 0});
+  // 0-1 has no length in the reference; 1-2 is sqrt(13) instead of 1, and 0-2 is 2 instead of 1.
+  EXPECT_NEAR(edge_loss(Var(pred), reference, faces).value.item(), std::sqrt(13.0) - 1 + 1, 1e-9);
+}
+
 TEST(CrossAttentionMemory, GrowsWithThePointsAndNotWithTheirProduct) {
   const auto peak = [](bool blocks) {
     const int64_t points = 4096, width = 8;
