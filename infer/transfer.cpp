@@ -109,10 +109,10 @@ Points Transfer::answer() {
   }
   Context ctx;
   const Tensor pose = as_tensor(all, {1, t, points_, 3}).to(identity_.device());
-  const Tensor made = model_->forward(ctx, {pose, identity_}).value.cpu();
+  const Tensor made = model_->forward(ctx, {pose, identity_, true}).value.cpu();
   const int64_t v = made.size(2);
   Points out(static_cast<size_t>(v));
-  const float* from = made.data<float>() + 3 * v * (t - 1);
+  const float* from = made.data<float>() + 3 * v * (made.size(1) - 1);
   for (size_t i = 0; i < out.size(); ++i) out[order_[i]] = Eigen::Map<const Point>(from + 3 * i);
   return out;
 }

@@ -7,6 +7,7 @@
 #include "autograd/kernels/elementwise.h"
 #include "autograd/kernels/layout.h"
 #include "autograd/kernels/matmul.h"
+#include "autograd/kernels/modulate.h"
 #include "autograd/kernels/norm.h"
 #include "autograd/kernels/points.h"
 #include "autograd/kernels/pooled_norm.h"
@@ -41,6 +42,8 @@
   K(norm_grad, NormGradArgs)                              \
   K(pooled_norm, PooledNormArgs)                          \
   K(pooled_norm_grad, PooledNormGradArgs)                 \
+  K(modulate, ModulateArgs)                               \
+  K(modulate_grad, ModulateGradArgs)                      \
   K(gru, GruArgs)                                         \
   K(gru_grad, GruGradArgs)                                \
   K(recurrence, RecurrenceArgs)                           \

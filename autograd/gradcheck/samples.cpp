@@ -10,6 +10,7 @@ const std::vector<OpSamples>& all_samples() {
     add_elementwise(t);
     add_layout(t);
     add_linear(t);
+    add_modulate(t);
     add_norm(t);
     add_points(t);
     add_pooled_norm(t);

@@ -12,6 +12,7 @@ void add_cross_attention(Table& table);
 void add_elementwise(Table& table);
 void add_layout(Table& table);
 void add_linear(Table& table);
+void add_modulate(Table& table);
 void add_norm(Table& table);
 void add_points(Table& table);
 void add_pooled_norm(Table& table);

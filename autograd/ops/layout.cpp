@@ -210,6 +210,12 @@ Var conv1d(const Var& x, const Var& weight, const Var& bias, int64_t stride, int
   return linear(windows, reshape(weight, {weight.size(0), weight.size(1) * k}), bias);
 }
 
+Var repeat_items(const Var& x, int64_t times) {
+  if (times == 1) return x;
+  const int64_t n = x.size(0), v = x.size(1), c = x.size(2);
+  return reshape(expand(reshape(x, {n, 1, v, c}), {n, times, v, c}), {n * times, v, c});
+}
+
 Var concat(std::span<const Var> xs, int axis) {
   if (xs.size() <= kMaxInputs) return call(Concat{axis}, xs);
   std::vector<Var> groups;

@@ -90,6 +90,8 @@ inline Var slice(const Var& x, int axis, int64_t from, int64_t to) {
 inline Var concat(std::initializer_list<Var> xs, int axis) { return call(Concat{axis}, xs); }
 /// The same of any number of tensors, but one.
 Var concat(std::span<const Var> xs, int axis);
+/// [n, v, c] -> [n times, v, c]: every item `times` times in a row.
+Var repeat_items(const Var& x, int64_t times);
 inline Var gather(const Var& x, const Tensor& index) { return call(Gather{index}, {x}); }
 inline Var scatter_add(const Var& x, const Tensor& index, int64_t rows) {
   return call(ScatterAdd{index, rows}, {x});

@@ -2,6 +2,7 @@
 
 #include "autograd/ops/cross_attention.h"
 #include "autograd/ops/elementwise.h"
+#include "autograd/ops/layout.h"
 
 namespace restage {
 
@@ -14,7 +15,10 @@ GatedCrossAttention::GatedCrossAttention(int64_t channels, const Init& init)
 Var GatedCrossAttention::operator()(Context& ctx, const Var& target, const Var& pose,
                                     const Var& residual) const {
   const ModuleScope path(scope);
-  const Var mixed = cross_attention(q(ctx, target), k(ctx, pose), v(ctx, pose));
+  // All queries get the same from one key, so one of them stands for all.
+  const Var asking = pose.size(1) == 1 ? slice(target, 1, 0, 1) : target;
+  const Var queries = repeat_items(q(ctx, asking), pose.size(0) / target.size(0));
+  const Var mixed = cross_attention(queries, k(ctx, pose), v(ctx, pose));
   return residual + mixed * ctx.bind(gamma);
 }
 

@@ -15,10 +15,14 @@ Linear::Linear(int64_t in, int64_t out, const Init& init, bool with_bias, int ta
   if (with_bias) bias.value = init.bias(in, out);
 }
 
+Var Linear::matrix(Context& ctx) const {
+  const Var w = ctx.bind(weight);
+  return tail_ > 0 ? reshape(w, {w.size(0), w.size(1)}) : w;
+}
+
 Var Linear::operator()(Context& ctx, const Var& x, Activation activation) const {
   const ModuleScope path(scope);
-  Var w = ctx.bind(weight);
-  if (tail_ > 0) w = reshape(w, {w.size(0), w.size(1)});
+  const Var w = matrix(ctx);
   if (with_bias_) return linear(x, w, ctx.bind(bias), activation);
   return linear(x, w);
 }

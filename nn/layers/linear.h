@@ -12,6 +12,8 @@ namespace restage {
 struct Linear : Module {
   Linear(int64_t in, int64_t out, const Init& init, bool with_bias = true, int tail = 0);
   Var operator()(Context& ctx, const Var& x, Activation activation = Activation::none) const;
+  /// The weight [out, in], without its tail.
+  Var matrix(Context& ctx) const;
   /// Makes weights a hundredth of what they were and biases zero, so that the layer's answer is
   /// near zero before training.
   void start_small();

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "autograd/ops/elementwise.h"
+#include "autograd/ops/modulate.h"
 #include "autograd/ops/norm.h"
 
 namespace restage {
@@ -22,14 +23,14 @@ Var PoseEncoder::operator()(Context& ctx, const Var& points) const {
   return x;
 }
 
-Spadain::Spadain(int64_t channels, bool norm, const Init& init)
+Spadain::Spadain(int64_t channels, const Init& init)
     : scale(3, channels, init.sub("scale"), true, 1),
-      shift(3, channels, init.sub("shift"), true, 1),
-      norm_(norm) {}
+      shift(3, channels, init.sub("shift"), true, 1) {}
 
-Var Spadain::operator()(Context& ctx, const Var& x, const Var& mesh) const {
+Var Spadain::operator()(Context& ctx, const Var& x, const Var& mesh, Activation activation) const {
   const ModuleScope path(scope);
-  return scale(ctx, mesh) * (norm_ ? instance_norm(x) : x) + shift(ctx, mesh);
+  return modulate(x, mesh, scale.matrix(ctx), ctx.bind(scale.bias), shift.matrix(ctx),
+                  ctx.bind(shift.bias), activation);
 }
 
 void Spadain::visit(Fields& f) {
@@ -38,18 +39,21 @@ void Spadain::visit(Fields& f) {
 }
 
 SpadainBlock::SpadainBlock(int64_t channels, bool norm, const Init& init)
-    : n1(channels, norm, init.sub("n1")),
-      n2(channels, norm, init.sub("n2")),
-      n3(channels, norm, init.sub("n3")),
+    : n1(channels, init.sub("n1")),
+      n2(channels, init.sub("n2")),
+      n3(channels, init.sub("n3")),
       c1(channels, channels, init.sub("c1"), true, 1),
       c2(channels, channels, init.sub("c2"), true, 1),
-      c3(channels, channels, init.sub("c3"), true, 1) {}
+      c3(channels, channels, init.sub("c3"), true, 1),
+      norm_(norm) {}
 
 Var SpadainBlock::operator()(Context& ctx, const Var& x, const Var& mesh) const {
   const ModuleScope path(scope);
-  const Var inner = c1(ctx, relu(n1(ctx, x, mesh)));
-  const Var outer = c2(ctx, relu(n2(ctx, inner, mesh)));
-  return outer + c3(ctx, relu(n3(ctx, x, mesh)));
+  const auto normed = [&](const Var& y) { return norm_ ? instance_norm(y) : y; };
+  const Var h = normed(x);
+  const Var inner = normed(c1(ctx, n1(ctx, h, mesh, Activation::relu)));
+  const Var outer = c2(ctx, n2(ctx, inner, mesh, Activation::relu));
+  return outer + c3(ctx, n3(ctx, h, mesh, Activation::relu));
 }
 
 void SpadainBlock::visit(Fields& f) {

@@ -18,21 +18,20 @@ struct PoseEncoder : Module {
   ModuleList<Linear> convs;
 };
 
-/// (A m + a) * instance_norm(x) + (B m + b): x [n, v, c] in the style of the mesh m [n, v, 3].
-/// Without the norm where x is one code repeated at every point: over equal values the norm is
-/// zero, and the pose would be lost.
+/// (A m + a) * x + (B m + b): x, normalised by its block, in the style of the mesh m [n, v, 3].
+/// x [n, v, c], or [n, 1, c] for one code at all points.
 struct Spadain : Module {
-  Spadain(int64_t channels, bool norm, const Init& init);
-  Var operator()(Context& ctx, const Var& x, const Var& mesh) const;
+  Spadain(int64_t channels, const Init& init);
+  Var operator()(Context& ctx, const Var& x, const Var& mesh,
+                 Activation activation = Activation::none) const;
   void visit(Fields& f) override;
   const char* kind() const override { return "SPAdaIN"; }
   Linear scale, shift;
-
- private:
-  bool norm_;
 };
 
-/// c2 relu(n2(c1 relu(n1(x)))) + c3 relu(n3(x)).
+/// c2 relu(n2(norm(c1 relu(n1(norm(x)))))) + c3 relu(n3(norm(x))), with instance norm. Without it
+/// where x is one code for all points: over equal values the norm is zero, and the pose would be
+/// lost.
 struct SpadainBlock : Module {
   SpadainBlock(int64_t channels, bool norm, const Init& init);
   Var operator()(Context& ctx, const Var& x, const Var& mesh) const;
@@ -40,6 +39,9 @@ struct SpadainBlock : Module {
   const char* kind() const override { return "SPAdaINBlock"; }
   Spadain n1, n2, n3;
   Linear c1, c2, c3;
+
+ private:
+  bool norm_;
 };
 
 }  // namespace restage

@@ -96,21 +96,26 @@ Elain::Elain(int64_t channels, int64_t identity, const Init& init)
       beta(channels, channels, init.sub("beta"), true, 1),
       mix(2 * channels, channels, init.sub("mix"), true, 1) {}
 
-Var Elain::operator()(Context& ctx, const Var& x, const Var& identity) const {
-  const ModuleScope path(scope);
+Normalised::Normalised(const Var& x) {
   constexpr double kEps = 1e-5;
   const auto points = static_cast<double>(x.size(1));
   if (x.size(1) < 2)
     shape_error("elain", "x[n, v, c], v > 1", std::array{x.value}, "one point has no deviation");
-  const Var m = mean(x, 1), difference = x - of_all_points(m);
-  const Var s = sqrt(add_scalar(scale(sum(square(difference), 1), 1 / (points - 1)), kEps));
+  mean = restage::mean(x, 1);
+  const Var difference = x - of_all_points(mean);
+  deviation = sqrt(add_scalar(scale(sum(square(difference), 1), 1 / (points - 1)), kEps));
+  unit = difference / of_all_points(deviation);
+}
+
+Var Elain::operator()(Context& ctx, const Normalised& x, const Var& identity) const {
+  const ModuleScope path(scope);
   const Var asked = same(ctx, identity);
-  const Var share = mix(ctx, concat({mean(asked, 1), m}, 1)), rest = add_scalar(neg(share), 1);
+  const Var share = mix(ctx, concat({mean(asked, 1), x.mean}, 1));
+  const Var rest = add_scalar(neg(share), 1);
   const auto between = [&](const Linear& of, const Var& own) {
-    return of(ctx, asked) * of_all_points(share) + of_all_points(own * rest);
+    return of(ctx, asked) * of_all_points(share) + of_all_points(own);
   };
-  const Var unit = difference / of_all_points(s);
-  return unit + unit * between(gamma, s) + between(beta, m);
+  return x.unit * between(gamma, add_scalar(x.deviation * rest, 1)) + between(beta, x.mean * rest);
 }
 
 void Elain::visit(Fields& f) {
@@ -130,8 +135,9 @@ ElainBlock::ElainBlock(int64_t channels, int64_t identity, const Init& init)
 
 Var ElainBlock::operator()(Context& ctx, const Var& x, const Var& identity) {
   const ModuleScope path(scope);
-  const Var h = c0(ctx, leaky_relu(n0(ctx, x, identity), kLeak));
-  const Var past = cs(ctx, leaky_relu(ns(ctx, x, identity), kLeak));
+  const Normalised own(x);
+  const Normalised h(c0(ctx, leaky_relu(n0(ctx, own, identity), kLeak)));
+  const Var past = cs(ctx, leaky_relu(ns(ctx, own, identity), kLeak));
   return past + c1(ctx, leaky_relu(n1(ctx, h, identity), kLeak));
 }
 
@@ -170,7 +176,7 @@ Var CoreNet::posed(Context& ctx, const Var& pose, const Var& identity,
 
 Var CoreNet::forward(Context& ctx, const TransferInput& in) {
   const int64_t n = in.pose.size(0), t = in.pose.size(1), v = in.identity.size(1);
-  const Var mesh = reshape(expand(reshape(in.identity, {n, 1, v, 3}), {n, t, v, 3}), {n * t, v, 3});
+  const Var mesh = repeat_items(in.identity, t);
   return reshape(posed(ctx, reshape(in.pose, {n * t, in.pose.size(2), 3}), mesh), {n, t, v, 3});
 }
 

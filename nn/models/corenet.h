@@ -56,11 +56,18 @@ struct Correspondence : Module {
   Var features(Context& ctx, const Var& points) const;
 };
 
+/// What ElaIN makes of features x [n, v, c], v > 1.
+struct Normalised {
+  explicit Normalised(const Var& x);
+  Var mean, deviation;  ///< [n, c]; unbiased
+  Var unit;             ///< (x - mean) / deviation
+};
+
 /// Elastic instance normalisation: (x - m) / s (1 + gamma) + beta, with gamma and beta between what
-/// the identity's features f [n, v, i] ask for and x's own deviation s (unbiased) and mean m.
+/// the identity's features f [n, v, i] ask for and x's own deviation s and mean m.
 struct Elain : Module {
   Elain(int64_t channels, int64_t identity, const Init& init);
-  Var operator()(Context& ctx, const Var& x, const Var& identity) const;
+  Var operator()(Context& ctx, const Normalised& x, const Var& identity) const;
   void visit(Fields& f) override;
   const char* kind() const override { return "ElaIN"; }
   Linear same, gamma, beta, mix;

@@ -28,32 +28,33 @@ Lart::Lart(const LartConfig& c, const Init& given)
   }
 }
 
-Var Lart::codes(Context& ctx, const Var& pose) const {
-  const int64_t n = pose.size(0), t = pose.size(1);
+Var Lart::codes(Context& ctx, const Var& pose, bool last) const {
+  const int64_t n = pose.size(0), t = pose.size(1), from = last ? t - 1 : 0, frames = t - from;
   if (t > config.frames)
     shape_error("lart", "pose[n, t, p, 3]", std::array{pose.value},
                 "the model has vectors for " + std::to_string(config.frames) + " frames");
-  const Var pooled = max(enc(ctx, reshape(pose, {n * t, pose.size(2), 3})), 1);
-  return reshape(pooled, {n, t, pooled.size(1)}) + slice(ctx.bind(time), 0, 0, t);
+  const Var wanted = reshape(slice(pose, 1, from, t), {n * frames, pose.size(2), 3});
+  const Var pooled = max(enc(ctx, wanted), 1);
+  return reshape(pooled, {n, frames, pooled.size(1)}) + slice(ctx.bind(time), 0, from, t);
 }
 
 Var Lart::decode(Context& ctx, const Var& code, const Var& identity) const {
-  const int64_t n = identity.size(0), v = identity.size(1), c = code.size(1);
-  Var u = enc(ctx, identity), x = expand(reshape(code, {n, 1, c}), {n, v, c});
+  const int64_t n = code.size(0), t = code.size(1), v = identity.size(1);
+  const Var mesh = repeat_items(identity, t);
+  // The target is encoded once for all frames. The code is one row for all its vertices until the
+  // first block, which gives each a row of its own.
+  Var u = enc(ctx, identity), x = reshape(code, {n * t, 1, code.size(2)});
   for (size_t i = 0; i < convs.size(); ++i) {
     u = convs[i](ctx, u);
     x = convs[i](ctx, x);
-    x = blocks[i](ctx, att[i](ctx, u, x, x), identity);
+    x = blocks[i](ctx, att[i](ctx, u, x, x), mesh);
   }
-  return points_of(ctx, out, x);
+  return reshape(points_of(ctx, out, x), {n, t, v, 3});
 }
 
 Var Lart::forward(Context& ctx, const TransferInput& in) {
   const ModuleScope path(scope);
-  const int64_t n = in.pose.size(0), t = in.pose.size(1), v = in.identity.size(1);
-  const Var code = codes(ctx, in.pose);
-  const Var mesh = reshape(expand(reshape(in.identity, {n, 1, v, 3}), {n, t, v, 3}), {n * t, v, 3});
-  return reshape(decode(ctx, reshape(code, {n * t, code.size(2)}), mesh), {n, t, v, 3});
+  return decode(ctx, codes(ctx, in.pose, in.last), in.identity);
 }
 
 void Lart::visit(Fields& f) {

@@ -37,9 +37,9 @@ struct Lart : TransferModel {
   Lart(const LartConfig& c, const Init& init);
   Var forward(Context& ctx, const TransferInput& in) override;
   int64_t frames() const override { return config.frames; }
-  /// Codes of a window's frames [n, t, c].
-  Var codes(Context& ctx, const Var& pose) const;
-  /// The target [n, v, 3] in the pose of one code each [n, c] -> [n, v, 3].
+  /// Codes of a window's frames [n, t, c]; `last`: of its last frame only, [n, 1, c].
+  Var codes(Context& ctx, const Var& pose, bool last = false) const;
+  /// The target [n, v, 3] in the poses of codes [n, t, c] -> [n, t, v, 3].
   Var decode(Context& ctx, const Var& code, const Var& identity) const;
   void visit(Fields& f) override;
   const char* kind() const override { return "LART"; }

@@ -4,6 +4,7 @@
 
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
+#include "autograd/ops/linear.h"
 #include "autograd/ops/reduce.h"
 
 namespace restage {
@@ -27,6 +28,13 @@ Npt::Npt(const NptConfig& c, const Init& given)
   }
 }
 
+Var Npt::join(Context& ctx, const Var& code, const Var& mesh) const {
+  const Var w = convs[0].matrix(ctx);
+  const int64_t c = code.size(2);
+  return linear(code, slice(w, 1, 0, c)) +
+         linear(mesh, slice(w, 1, c, c + 3), ctx.bind(convs[0].bias));
+}
+
 Var Npt::forward(Context& ctx, const TransferInput& in) {
   const ModuleScope path(scope);
   const int64_t n = in.pose.size(0), t = in.pose.size(1), p = in.pose.size(2);
@@ -35,11 +43,11 @@ Var Npt::forward(Context& ctx, const TransferInput& in) {
     shape_error("npt", "pose[n, t, v, 3], identity[n, v, 3]",
                 std::array{in.pose.value, in.identity.value},
                 "without 'pool' the pose needs as many points as the target has vertices");
-  const Var mesh = reshape(expand(reshape(in.identity, {n, 1, v, 3}), {n, t, v, 3}), {n * t, v, 3});
+  const Var mesh = repeat_items(in.identity, t);
   Var z = enc(ctx, reshape(in.pose, {n * t, p, 3}));
-  if (config.pool) z = expand(reshape(max(z, 1), {n * t, 1, z.size(2)}), {n * t, v, z.size(2)});
-  Var x = concat({z, mesh}, 2);
-  for (size_t i = 0; i < convs.size(); ++i) x = blocks[i](ctx, convs[i](ctx, x), mesh);
+  if (config.pool) z = reshape(max(z, 1), {n * t, 1, z.size(2)});
+  Var x = blocks[0](ctx, join(ctx, z, mesh), mesh);
+  for (size_t i = 1; i < convs.size(); ++i) x = blocks[i](ctx, convs[i](ctx, x), mesh);
   return reshape(points_of(ctx, out, x), {n, t, v, 3});
 }
 

@@ -26,12 +26,14 @@ void visit(V& v, NptConfig& c) {
 }
 
 /// The pose code, joined with the target's coordinates, through three convolutions, each with a
-/// SPAdaIN block. With `pool` the first block has no norm (Spadain).
+/// SPAdaIN block. With `pool` the first block has no norm (SpadainBlock).
 struct Npt : TransferModel {
   using Config = NptConfig;
   Npt(const NptConfig& c, const Init& init);
   Var forward(Context& ctx, const TransferInput& in) override;
   bool equal_counts() const override { return !config.pool; }
+  /// The first convolution of code [n, v or 1, c] and coordinates [n, v, 3] beside each other.
+  Var join(Context& ctx, const Var& code, const Var& mesh) const;
   void visit(Fields& f) override;
   const char* kind() const override { return "NPT"; }
   NptConfig config;

@@ -6,8 +6,9 @@
 namespace restage {
 
 struct TransferInput {
-  Var pose;      ///< [n, t, p, 3]: windows of the performer, clouds or vertices, metres
-  Var identity;  ///< [n, v, 3]: the target's mesh, in a rest pose or in any
+  Var pose;           ///< [n, t, p, 3]: windows of the performer, clouds or vertices, metres
+  Var identity;       ///< [n, v, 3]: the target's mesh, in a rest pose or in any
+  bool last = false;  ///< only the window's last frame is wanted, [n, 1, v, 3]
 };
 
 struct TransferModel : Module {

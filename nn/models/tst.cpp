@@ -66,7 +66,7 @@ Var Tst::forward(Context& ctx, const TransferInput& in) {
   if (v != config.vertices)
     shape_error("tst", "identity[n, v, 3]", std::array{in.identity.value},
                 "the network is made for " + std::to_string(config.vertices) + " vertices");
-  const Var mesh = reshape(expand(reshape(in.identity, {n, 1, v, 3}), {n, t, v, 3}), {n * t, v, 3});
+  const Var mesh = repeat_items(in.identity, t);
   const Var posed = decode(ctx, reshape(code, {n * t, v, code.size(3)}), mesh);
   return reshape(posed, {n, t, v, 3});
 }

@@ -8,6 +8,7 @@
 #include "autograd/gradcheck/evaluate.h"
 #include "autograd/gradcheck/gradcheck.h"
 #include "autograd/kernels/attention.h"
+#include "autograd/kernels/modulate.h"
 #include "autograd/kernels/points.h"
 #include "autograd/kernels/pooled_norm.h"
 #include "autograd/kernels/rnn.h"
@@ -243,6 +244,7 @@ TEST(Device, WithoutAFusedKernelAnOpIsComposed) {
       {"neighbour_attention", {typeid(NeighbourAttentionArgs), typeid(NeighbourAttentionGradArgs)}},
       {"attention_pool", {typeid(AttentionPoolArgs), typeid(AttentionPoolGradArgs)}},
       {"pooled_norm", {typeid(PooledNormArgs), typeid(PooledNormGradArgs)}},
+      {"modulate", {typeid(ModulateArgs), typeid(ModulateGradArgs)}},
       {"gru", {typeid(GruArgs), typeid(GruGradArgs)}}};
   size_t found = 0;
   for (const gradcheck::OpSamples& op : all_samples()) {

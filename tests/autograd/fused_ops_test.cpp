@@ -11,6 +11,7 @@
 #include "autograd/ops/attention.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/linear.h"
+#include "autograd/ops/modulate.h"
 #include "autograd/ops/norm.h"
 #include "autograd/ops/points.h"
 #include "autograd/ops/pooled_norm.h"
@@ -275,6 +276,17 @@ TEST(FusedOps, PooledNormIsItsReference) {
           trunk(n, v, i, o, 3),
           [=](Args x) { return pooled_norm(x[0], x[1], x[2], x[3], x[4], act, 1e-3); },
           [=](Args x) { return pooled_norm_reference(x[0], x[1], x[2], x[3], x[4], act, 1e-3); });
+}
+
+TEST(FusedOps, ModulateIsItsReference) {
+  for (const Activation act : {Activation::none, Activation::relu})
+    for (const auto& [n, rows, v, c] :
+         {std::array<int64_t, 4>{1, 3, 3, 2}, {3, 1, 40, 33}, {2, 300, 300, 70}, {2, 1, 290, 16}})
+      expect_fused(
+          {random({n, rows, c}, 1), random({n, v, 3}, 2), random({c, 3}, 3), random({c}, 4),
+           random({c, 3}, 5), random({c}, 6)},
+          [=](Args x) { return modulate(x[0], x[1], x[2], x[3], x[4], x[5], act); },
+          [=](Args x) { return modulate_reference(x[0], x[1], x[2], x[3], x[4], x[5], act); });
 }
 
 TEST(FusedOps, PooledNormReportsTheStatisticsOfItsReference) {

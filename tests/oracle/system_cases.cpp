@@ -36,14 +36,14 @@ void instance_norm_case(Case& c) {
 
 void spadain(Case& c) {
   const int64_t width = c.count("c");
-  Spadain on(width, true, c.init()), off(width, false, c.init());
+  Spadain on(width, c.init()), off(width, c.init());
   SpadainBlock block(width, true, c.init());
   c.load(on, "on.");
   c.load(off, "off.");
   c.load(block, "block.");
   const Var x = swapped(c.in("x")), mesh = swapped(c.in("mesh"));
-  const Var y_on = swapped(on(c.ctx(), x, mesh)), y_off = swapped(off(c.ctx(), x, mesh)),
-            y_block = swapped(block(c.ctx(), x, mesh));
+  const Var y_on = swapped(on(c.ctx(), instance_norm(x), mesh)),
+            y_off = swapped(off(c.ctx(), x, mesh)), y_block = swapped(block(c.ctx(), x, mesh));
   c.out({{"on", y_on}, {"off", y_off}, {"block", y_block}});
   c.finish(dot(y_on, c.probe("probe_on")) + dot(y_off, c.probe("probe_off")) +
            dot(y_block, c.probe("probe_block")));
@@ -112,14 +112,13 @@ void lart(Case& c) {
   const double alpha = c.number("alpha");
   const auto of = [](const Var& x, int64_t t) {
     const Var frame = slice(x, 1, t, t + 1);
-    return x.rank() == 3 ? reshape(frame, {x.size(0), x.size(2)})
-                         : reshape(frame, {x.size(0), x.size(2), 3});
+    return x.rank() == 3 ? frame : reshape(frame, {x.size(0), x.size(2), 3});
   };
   const Var between = of(code, 0) * (1 - alpha) + of(code, last) * alpha;
   // The case wants the gradient of the true meshes, too.
   const Var wanted =
       pair_distances(of(truth, 0)) * (1 - alpha) + pair_distances(of(truth, last)) * alpha;
-  const Var metric = mse(pair_distances(net.decode(c.ctx(), between, mesh)), wanted);
+  const Var metric = mse(pair_distances(of(net.decode(c.ctx(), between, mesh), 0)), wanted);
   const Var rec = mse(posed, truth);
   c.out({{"y", posed}, {"rec", rec}, {"metric", metric}});
   c.finish(rec + metric * c.number("metric_weight"));

@@ -26,12 +26,6 @@ TransferConfig for_model(TransferConfig c, const TransferModel& model) {
 /// All frames of all items below one another: [n, t, v, 3] -> [n t, v, 3].
 Var frames_of(const Var& x) { return reshape(x, {x.size(0) * x.size(1), x.size(2), 3}); }
 
-/// x [n, v, 3] with every item t times.
-Tensor repeated(const Tensor& x, int64_t t) {
-  const int64_t n = x.size(0), v = x.size(1);
-  return frames_of(expand(Var(x.reshape({n, 1, v, 3})), {n, t, v, 3})).value;
-}
-
 /// Frame number `t` of windows [n, t, v, 3].
 Var frame_of(const Var& x, int64_t t) {
   return reshape(slice(x, 1, t, t + 1), {x.size(0), x.size(2), 3});
@@ -94,10 +88,9 @@ Var TransferStage::metric(Context& ctx, const TransferBatch& pairs) {
   const int64_t v = std::min(config_.loss.metric_points, pairs.identity.size(1));
   const double alpha = Rng(ctx.rng.fold("metric")).uniform();
   const Var codes = lart.codes(ctx, pairs.pose);
-  const auto code = [&](int64_t t) {
-    return reshape(slice(codes, 1, t, t + 1), {n, codes.size(2)});
-  };
-  const Var mixed = lart.decode(ctx, code(0) * (1 - alpha) + code(last) * alpha, pairs.identity);
+  const auto code = [&](int64_t t) { return slice(codes, 1, t, t + 1); };
+  const Var mixed =
+      frame_of(lart.decode(ctx, code(0) * (1 - alpha) + code(last) * alpha, pairs.identity), 0);
   // Vertices come in a random order, so the first ones are a random choice.
   const auto some = [&](const Var& x) { return slice(x, 1, 0, v); };
   return metric_loss(some(mixed), some(frame_of(pairs.truth, 0)).value,
@@ -113,8 +106,9 @@ Var TransferStage::loss(Context& ctx, const TransferBatch& pairs, int64_t step, 
   const Var frames = frames_of(made);
   const Tensor truth = frames_of(pairs.truth).value;
   if (l.edge > 0) {
-    const Tensor& right =
-        l.edge_reference == EdgeReference::truth ? truth : repeated(pairs.identity, t);
+    const Tensor& right = l.edge_reference == EdgeReference::truth
+                              ? truth
+                              : repeat_items(Var(pairs.identity), t).value;
     total = total + scale(mean_all(edge_loss(frames, right, pairs.faces)), l.edge);
   }
   if (l.distances > 0) {

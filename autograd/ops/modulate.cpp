@@ -1,0 +1,53 @@
+#include "autograd/ops/modulate.h"
+
+#include "autograd/ops/elementwise.h"
+#include "autograd/ops/linear.h"
+
+namespace restage {
+
+void Modulate::check(Inputs x) const {
+  if (x[0].rank() != 3 || x[1].rank() != 3 || x[1].size(2) != 3)
+    shape_error(name, letters, x, "needs three axes, the last of m being 3");
+  if (x[0].size(0) != x[1].size(0)) shape_error(name, letters, x, "n must agree");
+  if (x[0].size(1) != x[1].size(1) && x[0].size(1) != 1)
+    shape_error(name, letters, x, "x needs one row for each point of m, or one in all");
+  const int64_t c = x[0].size(2);
+  for (size_t k = 2; k < 6; ++k)
+    if (x[k].shape() != (k % 2 == 0 ? Shape{c, 3} : Shape{c}))
+      shape_error(name, letters, x, "c must agree");
+  require_floats(name, letters, x);
+}
+
+Tensor Modulate::forward(Inputs x, Saved& saved) const {
+  Tensor y = empty_like(x[0], {x[0].size(0), x[1].size(1), x[0].size(2)});
+  launch(ModulateArgs{x[0], x[1], x[2], x[3], x[4], x[5], y, activation});
+  saved.keep({x[0], x[1], x[2], x[3], x[4], x[5]});
+  return y;
+}
+
+Grads Modulate::backward(const Saved& s, const Tensor& gy, Needs needs) const {
+  Grads g;
+  for (size_t k = 0; k < 6; ++k) g.push_back(k != 1 || needs[1] ? empty_like(s[k]) : Tensor());
+  launch(ModulateGradArgs{s[0], s[1], s[2], s[3], s[4], s[5], gy, g[0], needs[1] ? &g[1] : nullptr,
+                          g[2], g[3], g[4], g[5], activation});
+  return g;
+}
+
+Var modulate(const Var& x, const Var& mesh, const Var& scale, const Var& scale_bias,
+             const Var& shift, const Var& shift_bias, Activation activation) {
+  const Modulate op{activation};
+  if (!has_fused(x.value.device(), Modulate::name,
+                 {typeid(ModulateArgs), typeid(ModulateGradArgs)})) {
+    check_call(op, {x, mesh, scale, scale_bias, shift, shift_bias});
+    return modulate_reference(x, mesh, scale, scale_bias, shift, shift_bias, activation);
+  }
+  return call(op, {x, mesh, scale, scale_bias, shift, shift_bias});
+}
+
+Var modulate_reference(const Var& x, const Var& mesh, const Var& scale, const Var& scale_bias,
+                       const Var& shift, const Var& shift_bias, Activation activation) {
+  const Var y = linear(mesh, scale, scale_bias) * x + linear(mesh, shift, shift_bias);
+  return activation == Activation::relu ? relu(y) : y;
+}
+
+}  // namespace restage
