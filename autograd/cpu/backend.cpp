@@ -10,7 +10,7 @@ class CpuBackend final : public Backend {
  public:
   CpuBackend() {
 #define RESTAGE_ENTER(kernel, Args) add<Args, cpu::kernel>();
-    RESTAGE_CPU_KERNELS(RESTAGE_ENTER)
+    RESTAGE_KERNELS(RESTAGE_ENTER)
 #undef RESTAGE_ENTER
   }
   std::string_view name() const override { return "cpu"; }

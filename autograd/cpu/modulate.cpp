@@ -171,7 +171,7 @@ void add_up(const ModulateGradArgs& a, int64_t parts, const T* sums, const T* ro
       whole.data<T>()[bias ? i : 3 * i + k % 4] = static_cast<T>(sum);
     }
   }
-  if (rows == nullptr) return;
+  if (a.x.size(1) == a.mesh.size(1)) return;
   for (int64_t k = 0; k < n * c; ++k) {
     double sum = 0;
     for (int64_t p = 0; p < parts; ++p)
@@ -201,7 +201,7 @@ void modulate_grad_of(const ModulateGradArgs& a) {
                        a.g_mesh->data<T>() + (item * v + first) * 3);
     }
   });
-  add_up(a, parts, to_sums, one ? to_rows : nullptr);
+  add_up(a, parts, to_sums, to_rows);
 }
 
 }  // namespace

@@ -84,7 +84,7 @@ class CudaBackend final : public Backend {
  public:
   CudaBackend() {
 #define RESTAGE_ENTER(kernel, Args) add<Args, cuda::kernel>();
-    RESTAGE_CUDA_KERNELS(RESTAGE_ENTER)
+    RESTAGE_KERNELS(RESTAGE_ENTER)
 #undef RESTAGE_ENTER
   }
   std::string_view name() const override { return "cuda"; }

@@ -15,6 +15,7 @@
 #include "autograd/cuda/indices.cu"
 #include "autograd/cuda/layout.cu"
 #include "autograd/cuda/matmul.cu"
+#include "autograd/cuda/modulate.cu"
 #include "autograd/cuda/norm.cu"
 #include "autograd/cuda/points.cu"
 #include "autograd/cuda/pooled_norm.cu"
@@ -87,7 +88,7 @@ class EmulatedGpu final : public GuardedBackend {
  public:
   EmulatedGpu() : GuardedBackend("emulated gpu") {
 #define RESTAGE_ENTER(kernel, Args) add<Args, cuda::kernel>();
-    RESTAGE_CUDA_KERNELS(RESTAGE_ENTER)
+    RESTAGE_KERNELS(RESTAGE_ENTER)
 #undef RESTAGE_ENTER
   }
 
