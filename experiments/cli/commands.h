@@ -6,6 +6,7 @@
 
 namespace restage::cli {
 
+void add_assess(Program& program);
 void add_compare(Program& program);
 void add_data(Program& program);
 void add_data_build(Program& program, CommandOptions group);  // of `data`, as all add_data_*

@@ -1,0 +1,148 @@
+#include "experiments/assess.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "datasets/doctor/examine.h"
+#include "infer/own_body.h"
+#include "nn/metrics/label_free.h"
+#include "nn/metrics/surfaces.h"
+#include "nn/models/extraction.h"
+
+namespace restage {
+namespace {
+
+constexpr size_t kShown = 32;          // frames whose clouds are kept
+constexpr size_t kBodyFrames = 8;      // of them make the person's own body
+constexpr size_t kCloudPoints = 2000;  // of a cloud that is kept
+constexpr double kRemembering =
+    8;  // frames per second, as retargeting: else a frame tells too little
+
+/// Clouds evenly spread over a sequence whose length nobody knows: every so many frames one, and
+/// half of them go when there are too many.
+class SomeFrames {
+ public:
+  struct Kept {
+    Points cloud;
+    SeenJoints seen;
+  };
+  void add(int64_t frame, const Points& cloud, const SeenJoints& seen, Rng& rng) {
+    if (frame % step_ != 0) return;
+    Kept& kept = kept_.emplace_back();
+    kept.seen = seen;
+    for (size_t i = 0; i < std::min(cloud.size(), kCloudPoints); ++i)
+      kept.cloud.push_back(cloud[rng.below(cloud.size())]);
+    if (kept_.size() < 2 * kShown) return;
+    for (size_t i = 0; i < kShown; ++i) kept_[i] = std::move(kept_[2 * i]);
+    kept_.resize(kShown);
+    step_ *= 2;
+  }
+  const std::vector<Kept>& kept() const { return kept_; }
+
+ private:
+  std::vector<Kept> kept_;
+  int64_t step_ = 1;
+};
+
+/// Some of the frames make the body; the others are compared with it.
+std::optional<double> surface_distance(const SomeFrames& frames) {
+  const auto& kept = frames.kept();
+  if (kept.size() < 2) return std::nullopt;
+  const size_t step = std::max<size_t>(2, kept.size() / kBodyFrames);
+  OwnBody body;
+  for (size_t i = 0; i < kept.size(); i += step) body.add(kept[i].cloud, kept[i].seen);
+  std::vector<double> distances;
+  for (size_t i = 0; i < kept.size(); ++i)
+    if (i % step != 0) distances.push_back(body.distance(kept[i].cloud, kept[i].seen));
+  return std::accumulate(distances.begin(), distances.end(), 0.0) /
+         static_cast<double>(distances.size());
+}
+
+double lowest_of(const Points& cloud) {
+  std::vector<double> heights;
+  for (const auto& p : cloud) heights.push_back(static_cast<double>(p.y()));
+  return *metrics::percentile(std::move(heights), 0.01);
+}
+
+/// What a sequence showed, frame by frame.
+struct Seen {
+  std::vector<int64_t> number;
+  std::vector<Joints> joints;
+  std::vector<double> lowest, confidence;
+};
+
+void read_shaking(const Seen& seen, Assessment* out) {
+  const std::vector<double> shaking = metrics::jitter(seen.joints);
+  if (shaking.empty()) return;
+  const double inner = static_cast<double>(shaking.size() - 6);
+  out->jitter = std::accumulate(shaking.begin(), shaking.end(), 0.0) / inner;
+  std::vector<size_t> order(shaking.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  std::sort(order.begin(), order.end(), [&](size_t a, size_t b) {
+    return shaking[a] != shaking[b] ? shaking[a] > shaking[b] : a < b;
+  });
+  order.resize(std::min<size_t>(order.size(), 5));
+  for (const size_t i : order)
+    if (shaking[i] > 0) out->shakiest.push_back(seen.number[i]);
+}
+
+void judge(const Seen& seen, Assessment* out) {
+  out->frames = std::ssize(seen.joints);
+  if (const auto spread = metrics::bone_length_spread(seen.joints)) {
+    out->bone_sds = *spread;
+    out->bone_length_sd = std::accumulate(spread->begin(), spread->end(), 0.0) / (kJoints - 1);
+  }
+  const std::vector<bool> changed = metrics::side_changes(seen.joints);
+  for (size_t i = 0; i < changed.size(); ++i)
+    if (changed[i]) out->swapped.push_back(seen.number[i]);
+  out->swaps = static_cast<double>(out->swapped.size()) /
+               static_cast<double>(std::max<int64_t>(out->frames, 1));
+  read_shaking(seen, out);
+  out->floor = metrics::floor_spread(seen.lowest);
+  if (!seen.confidence.empty())
+    out->confidence = std::accumulate(seen.confidence.begin(), seen.confidence.end(), 0.0) /
+                      static_cast<double>(seen.confidence.size());
+}
+
+}  // namespace
+
+Assessment assess(Source& source, const Bundle& weights, const std::string& weights_name,
+                  const AssessOptions& options) {
+  auto& model = weights.need_as<SkeletonModel>("skeleton", weights_name);
+  JointExtractor extract(model, options.samples);
+  const RngKey key = RngKey{options.seed, 0}.fold("assess");
+  Rng rng(key.fold("points"));
+  Assessment out;
+  Seen all;
+  SomeFrames some;
+  std::optional<SeenJoints> before;
+  for (int64_t i = 0; auto cloud = source.next(); ++i) {
+    const Points& points = cloud->frame.points;
+    try {
+      if (cloud->fault) throw *cloud->fault;
+      check_frame(points, cloud->frame.source);
+      const bool remembers = before && source.fps() > kRemembering;
+      before = extract(points, cloud->frame.source, key.fold(static_cast<uint64_t>(i)),
+                       remembers ? &*before : nullptr);
+    } catch (const InputError& fault) {
+      if (out.left_out++ == 0) out.why = fault.what();
+      before.reset();
+      continue;
+    }
+    all.number.push_back(i);
+    all.joints.push_back(before->joints);
+    all.lowest.push_back(lowest_of(points));
+    if (before->uncertainty) all.confidence.push_back(confidence(*before->uncertainty));
+    some.add(i, points, *before, rng);
+  }
+  if (all.joints.empty())
+    throw InputError(source.record().path,
+                     "has no frame in which a person can be found" +
+                         (out.why.empty() ? "" : "; the first: " + out.why),
+                     "see what 'restage doctor' says of it");
+  judge(all, &out);
+  out.surface = surface_distance(some);
+  return out;
+}
+
+}  // namespace restage
