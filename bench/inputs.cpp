@@ -5,6 +5,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
+#include "bench/transfers.h"
 #include "datasets/sampling/clouds.h"
 #include "datasets/sampling/evaluation.h"
 #include "datasets/sampling/pairs.h"
@@ -115,6 +116,22 @@ void add_batches(TensorFile& file, const Corpus& corpus) {
   file.tensors["pairs.axis_angle"] = pairs.axis_angle;
 }
 
+void write_weights(const std::string& folder, const std::string& name, Module& net) {
+  std::filesystem::create_directories(folder);
+  write_safetensors(folder + "/" + name + ".safetensors", to_file(net));
+}
+
+/// Batches and first weights of the systems without a skeleton.
+void add_transfers(const std::string& folder, TensorFile& file, const Corpus& corpus) {
+  for (const TransferCase& c : transfer_cases()) {
+    const auto net = transfer_model(c);
+    write_weights(folder + "/initial", c.name, *net);
+    transfer_batch(corpus, c, net->frames()).each([&](const char* part, const Tensor& value) {
+      file.tensors[c.name + "." + part] = value;
+    });
+  }
+}
+
 /// What the kernels get: numbers without meaning.
 void add_kernel_inputs(TensorFile& file) {
   const auto noise = [&](const char* name, const Shape& shape) {
@@ -126,6 +143,7 @@ void add_kernel_inputs(TensorFile& file) {
   };
   noise("features", {1, 1024, 32});
   noise("sequence", {16, 30, 578});
+  for (const char* name : {"queries", "keys", "values"}) noise(name, {1, kMostAttended, 64});
 }
 
 bool same_shapes(Module& a, Module& b) {
@@ -133,11 +151,6 @@ bool same_shapes(Module& a, Module& b) {
   return std::equal(x.begin(), x.end(), y.begin(), y.end(), [](const auto& s, const auto& t) {
     return s.name == t.name && s.value->shape() == t.value->shape();
   });
-}
-
-void write_weights(const std::string& folder, const std::string& name, Module& net) {
-  std::filesystem::create_directories(folder);
-  write_safetensors(folder + "/" + name + ".safetensors", to_file(net));
 }
 
 /// Those models of a weights file that have the paper's sizes.
@@ -186,6 +199,7 @@ void make_inputs(const std::string& folder, const InputSettings& settings) {
   add_batches(file, corpus);
   add_performance(file, corpus);
   add_kernel_inputs(file);
+  add_transfers(folder, file, corpus);
   file.metadata["data"] = corpus.description;
   for (const Model& m : kModels)
     write_weights(

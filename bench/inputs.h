@@ -14,6 +14,7 @@
 namespace restage::bench {
 
 inline constexpr int64_t kSurfacePoints = 6890;  ///< of deformation, as many as SMPL has vertices
+inline constexpr int64_t kMostAttended = 13380;  ///< points of the largest cross attention
 inline constexpr int64_t kFrames = 48;           ///< of the performance that online items play
 
 /// At least one point, as rows.

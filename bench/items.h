@@ -71,6 +71,7 @@ struct ItemInfo {
 std::vector<ItemInfo> items();
 /// One table each; items() joins them.
 std::vector<ItemInfo> training_items();
+std::vector<ItemInfo> transfer_items();
 std::vector<ItemInfo> reading_items();
 std::vector<ItemInfo> online_items();
 std::vector<ItemInfo> kernel_items();

@@ -1,6 +1,7 @@
 // The kernels in which most of the time goes.
 #include <cmath>
 
+#include "autograd/ops/cross_attention.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/linear.h"
 #include "autograd/ops/reduce.h"
@@ -75,6 +76,31 @@ class Attention : public Layer {
   Tensor xyz_, features_;
 };
 
+/// Attention of so many points of 64 channels over as many others, with gradients of all three.
+template <int64_t points>
+class AttentionOver : public Layer {
+ public:
+  AttentionOver(const Inputs& inputs, const std::string&, bool)
+      : Layer(true),
+        queries_(first(inputs.at("kernel.queries"))),
+        keys_(first(inputs.at("kernel.keys"))),
+        values_(first(inputs.at("kernel.values"))) {}
+
+ private:
+  static Tensor first(const Tensor& x) {
+    return x.reshape({x.size(1), x.size(2)}).rows(0, points).reshape({1, points, x.size(2)});
+  }
+  Var forward(Context& ctx) override {
+    return cross_attention(ctx.bind(queries_), ctx.bind(keys_), ctx.bind(values_));
+  }
+  Parameter queries_, keys_, values_;
+};
+
+/// Two products forward, four backward; what is computed again is not counted.
+double attention_over_gflop(int64_t points) {
+  return 3 * gflop_of(2.0 * 64 * static_cast<double>(points * points));
+}
+
 /// SMRM's decoder on 16 windows of 30 frames.
 class Recurrent : public Layer {
  public:
@@ -109,7 +135,13 @@ std::vector<ItemInfo> kernel_items() {
           ItemInfo("attention_train", "first attention block, forward and backward", "cloud", 1,
                    3 * attention, make_item<Attention<true>>, {"skeleton"}, {"dense"}),
           ItemInfo("gru_train", "SMRM's decoder GRU, batch 16, forward and backward", "step", 1,
-                   3 * gru, make_item<Recurrent>)};
+                   3 * gru, make_item<Recurrent>),
+          ItemInfo("cross_attention_1k", "cross attention of 1,024 points, forward and backward",
+                   "step", 1, attention_over_gflop(1024), make_item<AttentionOver<1024>>),
+          ItemInfo("cross_attention_7k", "the same of 6,890 points", "step", 1,
+                   attention_over_gflop(6890), make_item<AttentionOver<6890>>),
+          ItemInfo("cross_attention_13k", "the same of 13,380 points", "step", 1,
+                   attention_over_gflop(kMostAttended), make_item<AttentionOver<kMostAttended>>)};
 }
 
 void make_dense(SkeletonModel& net, const std::string& variant) {
@@ -130,7 +162,7 @@ std::vector<double> summary(const Tensor& x) {
 
 std::vector<ItemInfo> items() {
   std::vector<ItemInfo> all = training_items();
-  for (auto&& more : {reading_items(), online_items(), kernel_items()})
+  for (auto&& more : {transfer_items(), reading_items(), online_items(), kernel_items()})
     all.insert(all.end(), more.begin(), more.end());
   return all;
 }

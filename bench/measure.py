@@ -20,7 +20,9 @@ import report
 TUNABLES = ("glibc.malloc.mmap_max=0:glibc.malloc.trim_threshold=100000000000:"
             "glibc.malloc.top_pad=268435456:glibc.malloc.hugetlb=1")
 RATIOS = ("skeleton_train", "skeleton_online", "smrm_train_b16", "smrm_train_b64", "smrm_online",
-          "deformation_train", "deformation_online", "pointnet_train", "frame_online")
+          "deformation_train", "deformation_online", "pointnet_train", "frame_online",
+          "npt_lite_train", "npt_paper_train", "lart_lite_train", "lart_paper_train", "corenet_lite_train",
+          "corenet_paper_train", "cross_attention_1k", "cross_attention_7k", "cross_attention_13k")
 LEAST_ROUNDS, WANTED_ROUNDS, MOST_ROUNDS = 3, 5, 9
 REQUEST_SECONDS = 0.6  # short repetitions are bundled: the system counts processor time in 10 ms
 FOREIGN_LIMIT = 0.05   # cores used by others during a request that counts as undisturbed
@@ -342,8 +344,9 @@ def main():
         print(report.agreement(out["agreement"]))
         return
     quiet = Quiet(patience=0 if a.quick else 20)
-    # A step of the large extractor takes longer than those of all others together.
-    weight = {i["name"]: 5 if i["name"] in ("skeleton_train", "reading_skeleton_paper") else 1 for i in items}
+    # A step of the large extractor or of LART takes longer than those of all others together.
+    long = ("skeleton_train", "reading_skeleton_paper", "lart_paper_train")
+    weight = {i["name"]: 5 if i["name"] in long else 1 for i in items}
     end = time.monotonic() + 60 * a.minutes
     for item in items:
         seconds = max(0.0, end - time.monotonic()) * weight[item["name"]] / sum(weight.values())

@@ -1,45 +1,16 @@
 // Full training steps as the trainer does them: forward, backward, Adam.
-#include <functional>
-
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/reduce.h"
-#include "bench/items.h"
+#include "bench/training.h"
 #include "bench/work.h"
 #include "nn/losses/deformation.h"
 #include "nn/losses/motion.h"
 #include "nn/models/deformation.h"
-#include "train/optim/optimiser.h"
-#include "train/stage.h"
 
 namespace restage::bench {
 namespace {
 
-constexpr double kRate = 1e-5;  // small, so that weights stay what the variant says
 constexpr int kClouds = 4;
-
-/// A model, a loss and an optimiser; the same batch in every step.
-class Training : public Item {
- public:
-  using Loss = std::function<Var(Context&)>;
-
-  void run() override { adam_->step(differentiate(key_.fold(step_++), loss_).gradients, kRate); }
-  std::vector<double> check() override {
-    const Differentiated d = differentiate(key_, loss_);
-    return {d.loss, d.norm};
-  }
-
- protected:
-  void train(const std::vector<std::pair<std::string, Module*>>& modules, Loss loss) {
-    adam_ = std::make_unique<Optimiser>(modules, OptimiserConfig{});
-    loss_ = std::move(loss);
-  }
-
- private:
-  std::unique_ptr<Optimiser> adam_;
-  Loss loss_;
-  RngKey key_ = RngKey{0, 0}.fold("bench");
-  uint64_t step_ = 0;
-};
 
 std::shared_ptr<SkeletonModel> extractor_of(const std::string& model, bool dropout) {
   const bool drops = model == "skeleton/pointnet";

@@ -15,12 +15,14 @@ std::map<std::string, Tensor> read_tensors(const std::string& path) {
   std::map<std::string, Tensor> out;
   const auto entries = nlohmann::json::parse(header);
   for (const auto& [name, about] : entries.items()) {
-    if (name == "__metadata__" || about["dtype"] != "F32") continue;
-    Tensor t = torch::empty(about["shape"].get<std::vector<int64_t>>(), torch::kFloat);
+    const bool whole = name != "__metadata__" && about["dtype"] == "I32";
+    if (name == "__metadata__" || (about["dtype"] != "F32" && !whole)) continue;
+    Tensor t = torch::empty(about["shape"].get<std::vector<int64_t>>(),
+                            whole ? torch::kInt : torch::kFloat);
     in.seekg(static_cast<std::streamoff>(8 + length + about["data_offsets"][0].get<uint64_t>()));
     in.read(static_cast<char*>(t.data_ptr()), static_cast<std::streamsize>(t.nbytes()));
     TORCH_CHECK(in, path, ": ", name, " is cut off");
-    out[name] = t;
+    out[name] = whole ? t.to(torch::kLong) : t;
   }
   return out;
 }

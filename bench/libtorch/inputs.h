@@ -10,7 +10,7 @@ namespace bench {
 
 using torch::Tensor;
 
-/// All tensors of a safetensors file; float32 and int only.
+/// All tensors of a safetensors file that are float32 or int32, which becomes int64.
 std::map<std::string, Tensor> read_tensors(const std::string& path);
 
 class Inputs {

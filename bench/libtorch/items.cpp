@@ -3,15 +3,13 @@
 #include <ATen/Parallel.h>
 #include <unistd.h>
 
-#include <functional>
-
 #include "extractors.h"
 #include "motion.h"
+#include "training.h"
+#include "transfers.h"
 
 namespace bench {
 namespace {
-
-constexpr double kRate = 1e-5;
 
 double rate_of(bool dropout, double p) { return dropout ? p : 0; }
 
@@ -24,33 +22,6 @@ std::vector<double> summary(const Tensor& x) {
 
 // ---- training
 // --------------------------------------------------------------------------------------
-
-/// The same batch in every step: forward, backward, Adam.
-class Training : public Item {
- public:
-  Training(std::vector<Tensor> parameters, std::function<Tensor()> loss)
-      : parameters_(std::move(parameters)),
-        loss_(std::move(loss)),
-        adam_(parameters_, torch::optim::AdamOptions(kRate)) {}
-  void run() override {
-    adam_.zero_grad();
-    loss_().backward();
-    adam_.step();
-  }
-  std::vector<double> check() override {
-    const Tensor loss = loss_();
-    loss.backward();
-    double square = 0;
-    for (const Tensor& p : parameters_)
-      if (p.grad().defined()) square += p.grad().to(torch::kDouble).square().sum().item<double>();
-    return {loss.item<double>(), std::sqrt(square)};
-  }
-
- private:
-  std::vector<Tensor> parameters_;
-  std::function<Tensor()> loss_;
-  torch::optim::Adam adam_;
-};
 
 std::unique_ptr<Item> skeleton_training(const Inputs& in, std::shared_ptr<Extractor> net,
                                         const std::string& file, int64_t parameters) {
@@ -239,6 +210,17 @@ std::unique_ptr<Item> attention(const Inputs& in, bool backward) {
                                     [=] { return block->forward(xyz, f).square().mean(); });
 }
 
+/// So many points of 64 channels over as many others.
+std::unique_ptr<Item> attention_over(const Inputs& in, int64_t points) {
+  std::vector<Tensor> all;
+  for (const char* part : {"queries", "keys", "values"}) {
+    const Tensor some = in.at(std::string("kernel.") + part).slice(1, 0, points);
+    all.push_back(some.transpose(1, 2).contiguous().requires_grad_());
+  }
+  return std::make_unique<Gradients>(
+      all, [=] { return attend(all[0], all[1], all[2]).square().mean(); });
+}
+
 std::unique_ptr<Item> recurrent(const Inputs& in) {
   torch::nn::GRU gru(torch::nn::GRUOptions(578, 512).num_layers(2).batch_first(true));
   in.load(*gru, "smrm", 0, "dec.");
@@ -269,7 +251,10 @@ std::unique_ptr<Item> make_item(const std::string& name, const Inputs& in, bool 
   if (name == "attention") return attention(in, false);
   if (name == "attention_train") return attention(in, true);
   if (name == "gru_train") return recurrent(in);
-  return nullptr;
+  if (name == "cross_attention_1k") return attention_over(in, 1024);
+  if (name == "cross_attention_7k") return attention_over(in, 6890);
+  if (name == "cross_attention_13k") return attention_over(in, 13380);
+  return make_transfer_item(name, in);
 }
 
 }  // namespace bench

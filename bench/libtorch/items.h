@@ -19,5 +19,7 @@ class Item {
 
 /// By the names of ../items.h; null if there is no such item here.
 std::unique_ptr<Item> make_item(const std::string& name, const Inputs& inputs, bool dropout);
+/// One of them, of the systems without a skeleton.
+std::unique_ptr<Item> make_transfer_item(const std::string& name, const Inputs& inputs);
 
 }  // namespace bench
