@@ -312,7 +312,7 @@ def arguments():
     p.add_argument("--libtorch", help="libtorch_bench (none: no comparison)")
     p.add_argument("--json", help="file for all figures")
     p.add_argument("--items", help="only these, separated by commas")
-    p.add_argument("--minutes", type=float, default=8, help="about how long to measure (default 8)")
+    p.add_argument("--minutes", type=float, default=12, help="about how long to measure (default 12)")
     p.add_argument("--quick", action="store_true", help="every item once: to try the program, not a result")
     p.add_argument("--answers", action="store_true", help="only whether both give the same answers: nothing is timed")
     a = p.parse_args()
