@@ -156,6 +156,7 @@ bool Retargeter::frame_by_frame() const { return options_.fps == kFps && motion_
 void Retargeter::restart() {
   state_ = {};
   feet_ = {};
+  bones_ = {};
   waiting_ = {};
   heading_ = Heading(steady_heading_);
   previous_.reset();
@@ -177,6 +178,7 @@ std::span<const RetargetedFrame> Retargeter::push(const Points& cloud, const std
     const bool remembers =
         received_ && options_.fps / static_cast<double>(missed_ + 1) > kRemembering;
     seen = (*extractor_)(cloud, source, key, remembers ? &*received_ : nullptr);
+    if (options_.steady_bones) seen.joints = bones_(seen.joints, seen.uncertainty);
   }
   const auto out = push_joints(seen);
   times_.extract = seconds;

@@ -10,6 +10,7 @@
 #include "infer/surface.h"
 #include "infer/system.h"
 #include "infer/waiting.h"
+#include "nn/geometry/steady_bones.h"
 #include "nn/models/extraction.h"
 #include "nn/models/motion.h"
 #include "nn/weights/bundle.h"
@@ -32,6 +33,8 @@ struct RetargetOptions {
   /// Hold feet that stand where they landed (infer/foot_lock.h), if the motion network says which
   /// feet stand.
   bool foot_lock = true;
+  /// Hold the source's bones at the mean of their lengths so far (nn/geometry/steady_bones.h).
+  bool steady_bones = true;
 };
 
 /// Our chain of three networks: the extractor finds A's joints in a cloud, the motion network finds
@@ -102,6 +105,7 @@ class Retargeter final : public System {
   Heading heading_{false};
   MotionState state_;
   FootLock feet_;
+  SteadyBones bones_;
   Waiting waiting_;
   std::optional<Joints> previous_;      ///< A one frame of the grid ago
   std::optional<Mat3> back_before_;     ///< the turn that took A's heading away one frame ago

@@ -289,6 +289,8 @@ void add_system_options(CommandOptions app, RetargetCommand& c) {
       "comes back within half a second");
   app.add_flag("!--no-foot-lock", c.options.foot_lock,
                "feet that stand are not held where they landed");
+  app.add_flag("!--no-steady-bones", c.options.steady_bones,
+               "the source's bones are as long as each frame shows them");
 }
 
 void add_weights_options(CommandOptions app, RetargetCommand& c) {

@@ -88,6 +88,7 @@ BenchmarkOptions benchmark_options(const TrainConfig& config) {
   BenchmarkOptions how{config.evaluation.system, config.evaluation.every, config.seed};
   how.metrics = metrics::recorded();
   how.anchor = config.evaluation.anchor;
+  how.steady_bones = config.evaluation.steady_bones;
   return how;
 }
 

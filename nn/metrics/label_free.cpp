@@ -72,6 +72,7 @@ std::vector<double> jitter(std::span<const Joints> frames) {
 
 std::optional<double> floor_spread(std::vector<double> lowest) {
   constexpr double kStanding = 0.1;  // metres
+  if (lowest.size() < 2) return std::nullopt;
   const auto floor = percentile(lowest, 0.05);
   if (!floor) return std::nullopt;
   std::vector<double> off;

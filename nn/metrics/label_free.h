@@ -28,7 +28,7 @@ std::vector<double> jitter(std::span<const Joints> frames);
 
 /// How far the lowest points of a person who stands are from one floor, metres: the floor is the
 /// fifth percentile of the frames' lowest points, and those within 0.1 m of it stand. The median.
-/// Empty without frames.
+/// Empty below two frames.
 std::optional<double> floor_spread(std::vector<double> lowest);
 
 }  // namespace restage::metrics

@@ -33,6 +33,7 @@ struct EvaluationConfig {
   int64_t sequences = 12, frames = 90, every = 1;
   std::string system = "chain";  ///< infer/systems.h
   double anchor = 0.25;          ///< of RetargetOptions
+  bool steady_bones = false;     ///< of RetargetOptions, where true is usual
   ScanConfig scans;
 };
 
@@ -51,6 +52,9 @@ void visit(V& v, EvaluationConfig& c) {
   v("frames", c.frames, "frames of each", between(3, 1e6));
   v("system", c.system, "which system a sweep's trial is: 'restage retarget --system'");
   v("anchor", c.anchor, "'restage retarget --anchor', seconds; 0: off", at_least(0));
+  v("steady_bones", c.steady_bones,
+    "the source's bones are held at their mean length so far, as 'restage retarget' does",
+    added("false"));
   v("scans", c.scans, "held-out sequences as they are seen");
   v("every", c.every, "a sweep's trial is measured on every so many frames", positive());
 }
