@@ -111,7 +111,7 @@ struct Prediction {
 
 /// /joints [F,22,3] and /vertices [F,V,3] (float32 or float64, either may be absent),
 /// /sequence_offset [S+1], /faces [T,3], /confidence [F] and /radius [F,22] (all optional).
-/// /rotations [F,22,4] (PredictionWriter::append_rotations()) is checked and not read.
+/// /rotations [F,22,4] (PredictionWriter::append_rotations()) is left where it is.
 Prediction read_prediction(const std::string& path);
 
 /// The same some frames at a time, as surfaces are large. Opening it checks shapes and offsets.
@@ -126,7 +126,9 @@ class PredictionReader {
   /// Frames [first, first + count), count x 22 x 3 and count x V x 3.
   void read_joints(int64_t first, int64_t count, std::vector<double>& out) const;
   void read_vertices(int64_t first, int64_t count, std::vector<double>& out) const;
-  /// All of the file but its vertices: some hundred bytes a frame.
+  /// F x 22 x 4 unit quaternions w x y z, global, from the T-pose; none if the file has none.
+  std::vector<double> read_rotations() const;
+  /// The rest of the file: some hundred bytes a frame.
   Prediction read_small() const;
   /// Looks at every value; InputError as read_prediction().
   void check() const;

@@ -25,15 +25,17 @@ std::vector<double> radius_in(const h5::File& file, int64_t frames) {
   return out;
 }
 
-void check_rotations(const h5::File& file, int64_t frames) {
-  if (!file.has("/rotations")) return;
+/// F x 22 x 4 unit quaternions; none if the file has none.
+std::vector<double> rotations_in(const h5::File& file, int64_t frames) {
+  if (!file.has("/rotations")) return {};
   const h5::Dataset set = file.dataset("/rotations", {frames, kJoints, 4});
-  const std::vector<double> all = read_finite<double>(file, "/rotations", {frames, kJoints, 4});
+  std::vector<double> all = read_finite<double>(file, "/rotations", {frames, kJoints, 4});
   for (size_t i = 0; i < all.size(); i += 4)
     if (std::abs(Eigen::Map<const Eigen::Vector4d>(&all[i]).norm() - 1) > 1e-3)
       throw InputError(set.where(),
                        "frame " + std::to_string(i / (4 * kJoints)) + " holds no unit quaternion",
                        "normalise the rotations");
+  return all;
 }
 
 }  // namespace
@@ -101,9 +103,13 @@ Prediction PredictionReader::read_small() const {
   return out;
 }
 
+std::vector<double> PredictionReader::read_rotations() const {
+  return rotations_in(file_, frames_);
+}
+
 void PredictionReader::check() const {
   read_small();
-  check_rotations(file_, frames_);
+  read_rotations();
   if (vertices_) check_all_finite<double>(*vertices_);
 }
 

@@ -9,25 +9,28 @@ std::vector<std::string> sequence_files(const std::string& folder) {
   return {folder + "/source.h5", folder + "/target.ply", folder + "/rest.h5", folder + "/truth.h5"};
 }
 
-void write_sequence(const Performance& performance, const FileInfo& info,
-                    const std::string& folder) {
+void write_sequence(const Performance& performance, const FileInfo& info, const std::string& folder,
+                    bool rotations) {
   ScanWriter scans(folder + "/source.h5", info);
   in_batches<Points>(
       performance.frames(), [&](size_t i) { return performance.cloud(i); },
       [&](size_t i, const Points& cloud) { scans.append(cloud, performance.joints_a(i)); });
   scans.commit();
-  write_truth(performance, info, folder);
+  write_truth(performance, info, folder, nullptr, rotations);
 }
 
 void write_truth(const Performance& performance, const FileInfo& info, const std::string& folder,
-                 const Eigen::Matrix<double, 3, 4>* source_to_world) {
+                 const Eigen::Matrix<double, 3, 4>* source_to_world, bool rotations) {
   const Body& target = performance.target();
   const int64_t vertices = target.rest.vertices.size();
   PredictionWriter truth(folder + "/truth.h5", vertices, target.rest.faces, info);
   if (source_to_world) truth.set_source_to_world(*source_to_world);
   in_batches<Points>(
       performance.frames(), [&](size_t i) { return performance.vertices_b(i); },
-      [&](size_t i, const Points& surface) { truth.append(performance.joints_b(i), surface); });
+      [&](size_t i, const Points& surface) {
+        truth.append(performance.joints_b(i), surface);
+        if (rotations) truth.append_rotations(performance.rotations_b(i));
+      });
   truth.commit();
   PredictionWriter rest(folder + "/rest.h5", vertices, target.rest.faces, info);
   rest.append(target.joints, target.rest.vertices);

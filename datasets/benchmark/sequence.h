@@ -15,14 +15,16 @@ namespace restage {
 ///   rest.h5     its joints and vertices, one frame (`restage eval --rest`)
 ///   truth.h5    joints and vertices of B performing the motion
 /// Frames are made on all threads, a few at a time: memory does not depend on their number.
-void write_sequence(const Performance& performance, const FileInfo& info,
-                    const std::string& folder);
+/// `rotations`: truth.h5 holds B's global rotations, too.
+void write_sequence(const Performance& performance, const FileInfo& info, const std::string& folder,
+                    bool rotations = false);
 
 /// The names that it writes to.
 std::vector<std::string> sequence_files(const std::string& folder);
 
 /// The last three of them. `source_to_world` (may be null): where the source's scans were put.
 void write_truth(const Performance& performance, const FileInfo& info, const std::string& folder,
-                 const Eigen::Matrix<double, 3, 4>* source_to_world = nullptr);
+                 const Eigen::Matrix<double, 3, 4>* source_to_world = nullptr,
+                 bool rotations = false);
 
 }  // namespace restage

@@ -209,6 +209,8 @@ Joints Performance::joints_b(size_t i) const {
   return forward_kinematics(b_.joints, pose_b(i)).joints;
 }
 
+Rotations Performance::rotations_b(size_t i) const { return to_global(pose_b(i).local); }
+
 Points Performance::vertices_b(size_t i) const { return pose_surface(b_, pose_b(i)); }
 
 Points Performance::cloud(size_t i) const {

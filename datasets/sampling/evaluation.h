@@ -73,7 +73,8 @@ class Performance {
   Pose pose_b(size_t i) const;  ///< the true answer, relative to B's rest joints
   Joints joints_a(size_t i) const;
   Joints joints_b(size_t i) const;
-  Points vertices_b(size_t i) const;  ///< in the order of target().rest.vertices
+  Rotations rotations_b(size_t i) const;  ///< global, from the T-pose
+  Points vertices_b(size_t i) const;      ///< in the order of target().rest.vertices
 
  private:
   size_t frame(size_t i) const;

@@ -68,14 +68,30 @@ metrics::Value claim_held(const File& pred, const File& truth) {
   return metrics::share_within(pred.joints(), truth.joints(), pred.data.radius);
 }
 
-void print_per_joint(const std::vector<double>& errors) {
+using Turns = std::optional<metrics::RotationError>;
+
+/// Of files that both hold rotations of the same frames, in one frame of axes.
+Turns rotation_error_of(const EvalOptions& o) {
+  if (o.every > 1 || !o.mended.empty() || std::filesystem::is_directory(o.pred)) return {};
+  const PredictionReader pred(o.pred), truth(o.truth);
+  return metrics::rotation_error(pred.read_rotations(), truth.read_rotations());
+}
+
+void print_per_joint(const std::vector<double>& errors, const Turns& turns) {
   std::vector<std::vector<std::string>> rows{{"joint", "PA-MPJPE [m]"}};
+  if (turns) rows[0].push_back("rotation [deg]");
   for (size_t j = 0; j < errors.size(); ++j) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.4f", errors[j]);
-    rows.push_back({std::string(kJointNames[j]), text});
+    rows.push_back({std::string(kJointNames[j]), format("%.4f", errors[j])});
+    if (turns) rows.back().push_back(format("%.1f", turns->by_joint[j]));
   }
   print("\n" + markdown_table(rows));
+}
+
+void add_to(Json* document, const metrics::RotationError& turns, bool per_joint) {
+  (*document)["rotation_deg"] = turns.mean;
+  (*document)["rotation_over_90"] = turns.over_90;
+  for (size_t j = 0; per_joint && j < kJoints; ++j)
+    (*document)["rotation_deg_by_joint"][std::string(kJointNames[j])] = turns.by_joint[j];
 }
 
 EvalReport report_of(const SystemScores& scores) {
@@ -267,8 +283,10 @@ int run_eval(const EvalOptions& options, const Common& common) {
   for (const std::string& remark : pred.remarks) log_warning(remark);
   const metrics::Value within = claim_held(pred, truth);
   const auto by_joint = options.per_joint ? errors_by_joint(pred, truth) : std::vector<double>();
+  const Turns turns = rotation_error_of(options);
   if (common.json) {
     Json document = to_json(report);
+    if (turns) add_to(&document, *turns, options.per_joint);
     for (size_t j = 0; j < by_joint.size(); ++j)
       document["pa_mpjpe_by_joint"][std::string(kJointNames[j])] = by_joint[j];
     if (within) document["joints_within_radius"] = *within;
@@ -278,7 +296,10 @@ int run_eval(const EvalOptions& options, const Common& common) {
     return 0;
   }
   print(to_markdown(report));
-  if (!by_joint.empty()) print_per_joint(by_joint);
+  if (!by_joint.empty()) print_per_joint(by_joint, turns);
+  if (turns)
+    print(format("\nRotations are %.1f degrees off on average; %.1f %% are more than 90 off.\n",
+                 turns->mean, 100 * turns->over_90));
   if (within)
     print(format("\n%.1f %% of the true joints lie within /radius of the predicted ones.\n",
                  100 * *within));
@@ -319,7 +340,8 @@ void add_eval(Program& program) {
   app.add_option("--mended", options.mended,
                  "what restage doctor --fix made of the scans that the prediction is from");
   app.add_flag("--variants", options.variants, "further alignments: rigid, sequence, root");
-  app.add_flag("--per-joint", options.per_joint, "also the aligned error of every joint");
+  app.add_flag("--per-joint", options.per_joint,
+               "also the aligned error of every joint, and of its rotation");
 }
 
 }  // namespace restage::cli

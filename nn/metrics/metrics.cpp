@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numbers>
 #include <numeric>
 
 #include "autograd/base/error.h"
@@ -229,6 +230,22 @@ Value side_swaps(const Track& pred, const Track& truth) {
     swapped += here ? 1 : 0;
   }
   return finite(swapped / static_cast<double>(truth.frames));
+}
+
+std::optional<RotationError> rotation_error(std::span<const double> pred,
+                                            std::span<const double> truth) {
+  if (pred.empty() || pred.size() != truth.size()) return std::nullopt;
+  RotationError out;
+  const double share = 4.0 * kJoints / static_cast<double>(pred.size());  // of a frame
+  for (size_t i = 0; i < pred.size(); i += 4) {
+    const Eigen::Map<const Eigen::Vector4d> a(&pred[i]), b(&truth[i]);
+    const double cosine = std::abs(a.dot(b)) / (a.norm() * b.norm());
+    const double angle = 2 * std::acos(std::min(cosine, 1.0)) * 180 / std::numbers::pi;
+    out.by_joint[i / 4 % kJoints] += share * angle;
+    out.mean += share / kJoints * angle;
+    out.over_90 += angle > 90 ? share / kJoints : 0;
+  }
+  return out;
 }
 
 std::vector<RiskAtCoverage> risk_coverage(std::span<const double> confidence,

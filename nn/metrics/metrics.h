@@ -7,6 +7,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -132,6 +133,16 @@ Value leaf_vertex_distance(const Track& pred, const Track& truth, const Track& j
 /// Part of the frames in which the legs or the arms of the prediction would be nearer to the truth
 /// with left and right exchanged, by 5 cm a joint at least; needs the 22 joints.
 Value side_swaps(const Track& pred, const Track& truth);
+
+/// Differences of rotations of the 22 joints: the angle of the turn between both, in degrees.
+struct RotationError {
+  std::array<double, 22> by_joint{};  ///< means over the frames
+  double mean = 0;                    ///< over all
+  double over_90 = 0;                 ///< share of frames and joints that are more than 90 off
+};
+/// Quaternions w x y z, frames x 22 x 4 values each. Empty if the numbers differ or there are none.
+std::optional<RotationError> rotation_error(std::span<const double> pred,
+                                            std::span<const double> truth);
 
 /// What is gained by answering only the surest frames: their share of all, and their mean error.
 struct RiskAtCoverage {

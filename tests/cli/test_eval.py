@@ -119,6 +119,19 @@ class Eval(CliTest):
         for words in ("| prediction", "| rest pose", "| source unchanged", "| closed form", "PA-MPJPE [m]", "| left_wrist"):
             self.assertIn(words, text)
 
+    def test_rotations(self):
+        one = [1, 0, 0, 0] * (22 * F)
+        turned = [0.5, 0, 3 ** 0.5 / 2, 0] + one[4:]  # 120 degrees, of the first joint in the first frame
+        self.h5("pred.h5", joints=([F, 22, 3], self.joints), rotations=([F, 22, 4], turned))
+        self.assertNotIn("rotation_deg", self.eval("pred.h5", "truth.h5"))
+        self.h5("truth.h5", joints=([F, 22, 3], self.joints), rotations=([F, 22, 4], one))
+        result = self.eval("pred.h5", "truth.h5", "--per-joint")
+        self.assertAlmostEqual(result["rotation_deg"], 120 / (22 * F))
+        self.assertAlmostEqual(result["rotation_over_90"], 1 / (22 * F))
+        self.assertAlmostEqual(result["rotation_deg_by_joint"]["pelvis"], 120 / F)
+        self.h5("truth.h5", joints=([F, 22, 3], self.joints), rotations=([F, 22, 4], [2, 0, 0, 0] * (22 * F)))
+        self.bad_input(["eval", "--pred", "pred.h5", "--truth", "truth.h5"], "rotations", "unit quaternion")
+
     def test_same_bits_for_any_number_of_threads(self):
         outputs = {self.done("eval", "--pred", "pred.h5", "--truth", "truth.h5", "--json", "--variants", "--threads", n) for n in (1, 2, 3)}
         self.assertEqual(len(outputs), 1)

@@ -288,5 +288,28 @@ TEST(Metrics, ErrorsByPointAverageToTheMeanDistance) {
   EXPECT_NEAR(mean, *mean_distance(x, y, {Alignment::Mode::frame}), 1e-12);
 }
 
+TEST(Metrics, RotationErrorsAreAngles) {
+  // Two frames: joint 3 is 60 degrees off in the first, 120 in the second, once with the sign
+  // turned, which is the same rotation.
+  std::vector<double> truth, pred;
+  for (int i = 0; i < 2 * 22; ++i) truth.insert(truth.end(), {1, 0, 0, 0});
+  pred = truth;
+  const auto set = [&](int frame, int joint, double degrees, double sign) {
+    double* q = &pred[static_cast<size_t>(4 * (22 * frame + joint))];
+    const double half = degrees / 2 * std::acos(-1.0) / 180;
+    q[0] = sign * std::cos(half), q[2] = sign * std::sin(half);
+  };
+  set(0, 3, 60, 1);
+  set(1, 3, 120, -1);
+  const auto error = rotation_error(pred, truth);
+  ASSERT_TRUE(error);
+  EXPECT_NEAR(error->by_joint[3], 90, 1e-9);
+  EXPECT_NEAR(error->by_joint[4], 0, 1e-9);
+  EXPECT_NEAR(error->mean, 90.0 / 22, 1e-9);
+  EXPECT_NEAR(error->over_90, 1.0 / 44, 1e-12);
+  EXPECT_FALSE(rotation_error({}, {}));
+  EXPECT_FALSE(rotation_error(pred, std::span(truth).first(88)));
+}
+
 }  // namespace
 }  // namespace restage::metrics

@@ -84,7 +84,7 @@ TransferBatch TransferStage::batch(int64_t step, const MicroBatch& part) const {
 /// between theirs.
 Var TransferStage::metric(Context& ctx, const TransferBatch& pairs) {
   auto& lart = dynamic_cast<Lart&>(*model_);
-  const int64_t last = pairs.pose.size(1) - 1, n = pairs.pose.size(0);
+  const int64_t last = pairs.pose.size(1) - 1;
   const int64_t v = std::min(config_.loss.metric_points, pairs.identity.size(1));
   const double alpha = Rng(ctx.rng.fold("metric")).uniform();
   const Var codes = lart.codes(ctx, pairs.pose);
