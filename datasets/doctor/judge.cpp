@@ -151,6 +151,26 @@ Mat3 best_turn(const Orientation& o) {
   return best;
 }
 
+/// Heights that people have, and what it may be that has another. In a pose people are less tall,
+/// and with raised arms more.
+Finding height_finding(const Diagnosis& d) {
+  constexpr double kLeast = 1.1, kMost = 2.2, kNearOne = 0.03;  // metres
+  Finding f{"height", Weight::fact, number(d.height) + " m from the floor to the top", 1,
+            "in the pose that it shows", ""};
+  if (d.height >= kLeast && d.height <= kMost) return f;
+  f.weight = Weight::note;
+  if (std::abs(d.height - 1) < kNearOne) {
+    f.what += ", as clouds have that were scaled to height 1";
+  } else if (d.height < kLeast) {
+    f.what += ", which is a small child, somebody who crouches, or units that are not quite metres";
+  } else {
+    f.what += ", which is nobody unless arms are raised: units that are not quite metres";
+  }
+  f.fix = "if a person of 1.7 m should stand there, --scale " +
+          number(d.unit.unit.metres * 1.7 / d.height) + " makes it so";
+  return f;
+}
+
 void judge_frame(Diagnosis& d, double lowest, double highest) {
   if (d.unit.sure < kUnsure || d.orientation.up_sure < kUnsure) {
     d.say({"transform", Weight::note, "how to bring it into our frame cannot be told", 1,
@@ -166,8 +186,7 @@ void judge_frame(Diagnosis& d, double lowest, double highest) {
   const double floor = t.scale * lowest;
   if (std::abs(floor) > kFloorMatters) t.offset = lowest * direction(d.orientation.up);
   d.transform = t;
-  d.say({"height", Weight::fact, number(d.height) + " m from the floor to the top", 1,
-         "in the pose that it shows", ""});
+  d.say(height_finding(d));
   Finding f{"floor", Weight::fact, "at 0", 1, "lowest points of the person", ""};
   if (!t.offset.isZero()) {
     f.weight = Weight::note;
