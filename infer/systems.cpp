@@ -1,6 +1,7 @@
 #include "infer/systems.h"
 
 #include "autograd/base/nearest.h"
+#include "infer/h4d.h"
 #include "infer/own_skin.h"
 #include "infer/registration/refinement.h"
 #include "infer/registration/registration.h"
@@ -36,6 +37,11 @@ std::unique_ptr<System> make_transfer(SystemInput in) {
                                     in.target_name, in.options);
 }
 
+std::unique_ptr<System> make_h4d(SystemInput in) {
+  return std::make_unique<H4dSystem>(in.weights, in.weights_name, std::move(in.target),
+                                     in.target_name, in.rest, in.options);
+}
+
 std::vector<SystemType>& table() {
   static std::vector<SystemType> all = {
       {.name = "chain",
@@ -57,6 +63,10 @@ std::vector<SystemType>& table() {
        .roles = {"transfer"},
        .own_skin = false,
        .make = make_transfer},
+      {.name = "h4d",
+       .help = "codes of shape, pose and motion of windows of clouds (H4D's first stage)",
+       .roles = {"codes"},
+       .make = make_h4d},
   };
   return all;
 }

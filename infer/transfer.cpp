@@ -1,66 +1,19 @@
 #include "infer/transfer.h"
 
 #include <algorithm>
-#include <charconv>
 #include <chrono>
 #include <numeric>
 
 #include "autograd/base/error.h"
 #include "autograd/base/format.h"
-#include "nn/config/rules.h"
+#include "infer/cloud_input.h"
 #include "nn/geometry/box.h"
 
 namespace restage {
 namespace {
 
-/// Points of a cloud that the network is given where its weights do not say how many.
-constexpr int64_t kUsualPoints = 1024;
-
 void move(Points& points, const Point& by) {
   for (Point& p : points) p += by;
-}
-
-/// `count` points of the cloud, each at most once while there are enough.
-Points drawn(const Points& cloud, size_t count, uint64_t seed) {
-  Rng rng(RngKey{seed, 0}.fold("transfer.points"));
-  Points rest = cloud, out;
-  while (out.size() < count) {
-    if (rest.empty()) rest = cloud;
-    std::swap(rest[rng.below(rest.size())], rest.back());
-    out.push_back(rest.back());
-    rest.pop_back();
-  }
-  return out;
-}
-
-Tensor as_tensor(const Points& points, const Shape& shape) {
-  Tensor out = Tensor::empty(shape);
-  float* to = out.data<float>();
-  for (const Point& p : points) to = std::copy(p.data(), p.data() + 3, to);
-  return out;
-}
-
-/// Points of a cloud in the training of these weights; 0: as many as the target has vertices.
-int64_t points_of(const TrainedModel& model, const std::string& where) {
-  const auto found = model.settings.find("points");
-  if (found == model.settings.end()) return kUsualPoints;
-  const std::string& text = found->second;
-  int64_t out = -1;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), out);
-  if (error != std::errc() || end != text.data() + text.size() || out < 0 || out > kMostPoints)
-    throw InputError(where, "says that its network sees '" + text.substr(0, 20) + "' points",
-                     "give weights as a training left them");
-  return out;
-}
-
-void check_cloud(const Points& cloud, const std::string& source) {
-  if (cloud.size() < kLeastDistinctPoints)
-    throw UnusableCloud(source,
-                        "holds " + std::to_string(cloud.size()) + " points, too few for a body",
-                        "give at least " + std::to_string(kLeastDistinctPoints));
-  for (const Point& p : cloud)
-    if (!p.allFinite())
-      throw UnusableCloud(source, "holds a coordinate that is not finite", "remove such points");
 }
 
 }  // namespace
@@ -83,7 +36,7 @@ Transfer::Transfer(const Bundle& weights, const std::string& weights_name, Mesh 
                      "give clouds at 30 frames a second");
   if (target_.vertices.empty())
     throw InputError(where, "has no vertices", "give a mesh or a cloud");
-  points_ = points_of(found, weights_name);
+  points_ = trained_points(found, weights_name);
   if (points_ == 0 || model_->equal_counts()) points_ = std::ssize(target_.vertices);
   Points centred = target_.vertices;
   const Box box = box_of(centred);
@@ -96,7 +49,7 @@ Transfer::Transfer(const Bundle& weights, const std::string& weights_name, Mesh 
     std::swap(order_[i], order_[i + rng.below(order_.size() - i)]);
   Points shuffled;
   for (const size_t i : order_) shuffled.push_back(centred[i]);
-  identity_ = as_tensor(shuffled, {1, std::ssize(shuffled), 3}).to(device_of(*model_));
+  identity_ = tensor_of_points(shuffled, {1, std::ssize(shuffled), 3}).to(device_of(*model_));
 }
 
 Points Transfer::answer() {
@@ -108,7 +61,7 @@ Points Transfer::answer() {
     all.insert(all.end(), frame.begin(), frame.end());
   }
   Context ctx;
-  const Tensor pose = as_tensor(all, {1, t, points_, 3}).to(identity_.device());
+  const Tensor pose = tensor_of_points(all, {1, t, points_, 3}).to(identity_.device());
   const Tensor made = model_->forward(ctx, {pose, identity_, true}).value.cpu();
   const int64_t v = made.size(2);
   Points out(static_cast<size_t>(v));
@@ -118,11 +71,12 @@ Points Transfer::answer() {
 }
 
 std::span<const RetargetedFrame> Transfer::push(const Points& cloud, const std::string& source) {
-  check_cloud(cloud, source);
+  require_body(cloud, source);
   const auto begun = std::chrono::steady_clock::now();
   const Box there = box_of(cloud);
   tallest_ = std::max(tallest_, there.sizes().y());
-  Points seen = drawn(cloud, static_cast<size_t>(points_), seed_);
+  Points seen =
+      some_of(cloud, static_cast<size_t>(points_), RngKey{seed_, 0}.fold("transfer.points"));
   move(seen, -there.center());
   window_.push_back(std::move(seen));
   while (std::ssize(window_) > model_->frames()) window_.pop_front();

@@ -7,7 +7,6 @@
 #include "autograd/ops/layout.h"
 #include "autograd/ops/linear.h"
 #include "autograd/ops/reduce.h"
-#include "autograd/ops/rotation.h"
 
 namespace restage {
 namespace {
@@ -18,16 +17,6 @@ constexpr size_t kBlocks = 5, kPlainLayers = 3;
 Var with_maximum(const Var& x) {
   const int64_t n = x.size(0), c = x.size(2);
   return concat({x, expand(reshape(max(x, 1), {n, 1, c}), x.shape())}, 2);
-}
-
-/// x [...] repeated for each of n items.
-Var for_each_of(int64_t n, const Tensor& x) {
-  Shape one{1}, all{n};
-  for (int i = 0; i < x.rank(); ++i) {
-    one.push_back(x.size(i));
-    all.push_back(x.size(i));
-  }
-  return expand(Var(x.reshape(one)), all);
 }
 
 }  // namespace
@@ -113,16 +102,22 @@ H4d::H4d(const H4dConfig& c, const Init& init)
       id_encoder(c.shape, c.hidden, init.sub("id_encoder")),
       pose_encoder(c.pose, c.hidden, init.sub("pose_encoder")),
       point_encoder(c.features, c.hidden, init.sub("point_encoder")),
-      motion_encoder(c.features, c.recurrent, c.motion, init.sub("motion_encoder")) {}
+      motion_encoder(c.features, c.recurrent, c.motion, init.sub("motion_encoder")),
+      space(c, init.sub("space")) {}
 
 H4d::Codes H4d::codes(Context& ctx, const Var& window) const {
   const ModuleScope path(scope);
   const int64_t n = window.size(0), t = window.size(1), v = window.size(2);
   const Var first = reshape(slice(window, 1, 0, 1), {n, v, 3});
   const Var frames = point_encoder(ctx, reshape(window, {n * t, v, 3}));
-  const Var steps = motion_encoder(ctx, reshape(frames, {n, t, frames.size(1)}));
-  return {id_encoder(ctx, first), pose_encoder(ctx, first),
-          reshape(slice(steps, 1, t - 1, t), {n, steps.size(2)})};
+  const Var moved = motion(ctx, reshape(frames, {n, t, frames.size(1)}));
+  return {id_encoder(ctx, first), pose_encoder(ctx, first), moved};
+}
+
+Var H4d::motion(Context& ctx, const Var& features) const {
+  const int64_t n = features.size(0), t = features.size(1);
+  const Var steps = motion_encoder(ctx, features);
+  return reshape(slice(steps, 1, t - 1, t), {n, steps.size(2)});
 }
 
 void H4d::visit(Fields& f) {
@@ -130,6 +125,7 @@ void H4d::visit(Fields& f) {
   f("pose_encoder", pose_encoder);
   f("point_encoder", point_encoder);
   f("motion_encoder", motion_encoder);
+  if (space.defined()) f("space", space);
 }
 
 Var h4d_poses(const Var& pose, const Var& motion, const MotionBasis& basis) {
@@ -143,25 +139,6 @@ Var h4d_poses(const Var& pose, const Var& motion, const MotionBasis& basis) {
                              2);
   const Var first = reshape(pose, {n, 1, width});
   return concat({first, first + changes}, 1);
-}
-
-Var pose_body(const LinearBody& body, const Var& shape, const Var& poses) {
-  const int64_t n = poses.size(0), t = poses.size(1), j = poses.size(2) / 3;
-  const int64_t v = body.mean.size(0), b = shape.size(1);
-  const Var directions(body.directions.reshape({3 * v, b}));
-  const Var rest = reshape(linear(shape, directions), {n, v, 3}) + Var(body.mean);
-  const Var joints = matmul(Var(body.regressor), rest);
-  const auto each_frame = [&](const Var& x) {
-    return reshape(expand(reshape(x, {n, 1, x.size(1), 3}), {n, t, x.size(1), 3}),
-                   {n * t, x.size(1), 3});
-  };
-  const Var frame_joints = each_frame(joints);
-  const Var local = axis_angle_to_matrix(reshape(poses, {n * t, j, 3}));
-  const Var root = reshape(slice(frame_joints, 1, 0, 1), {n * t, 3});
-  const Var posed = forward_kinematics(local, frame_joints, root, body.parents);
-  return reshape(linear_blend_skinning(each_frame(rest), for_each_of(n * t, body.weights), posed,
-                                       frame_joints),
-                 {n, t, v, 3});
 }
 
 }  // namespace restage

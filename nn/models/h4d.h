@@ -1,7 +1,8 @@
-// `codes/h4d`: H4D (Jiang et al., CVPR 2022): codes of shape, first pose and motion from a
-// window of clouds, and the body that is made of them.
+// `codes/h4d`, the only model of the role `codes`: H4D's first stage (Jiang et al., CVPR 2022).
+// Codes of shape, first pose and motion from a window of clouds, and what the codes mean.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -9,22 +10,30 @@
 #include "nn/layers/gru.h"
 #include "nn/layers/linear.h"
 #include "nn/layers/module_list.h"
+#include "nn/models/linear_body.h"
 
 namespace restage {
 
 struct H4dConfig {
-  int64_t shape = 10, pose = 72, motion = 90;
+  int64_t shape = 10, pose = 72, motion = 90, root = 4, frames = 30;
   int64_t hidden = 128, features = 128, recurrent = 512;
+  int64_t vertices = 0, faces = 0;
 };
 
 template <class V>
 void visit(V& v, H4dConfig& c) {
   v("shape", c.shape, "numbers of the shape", between(1, kMostWidth));
   v("pose", c.pose, "numbers of the first pose: three for each joint", between(1, kMostWidth));
-  v("motion", c.motion, "numbers of the motion", between(1, kMostWidth));
+  v("motion", c.motion, "numbers of the motion, those of the root among them",
+    between(1, kMostWidth));
+  v("root", c.root, "numbers of the root's motion", between(1, kMostWidth));
+  v("frames", c.frames, "of a window", between(2, 1024));
   v("hidden", c.hidden, "channels inside the point networks", between(1, kMostWidth));
   v("features", c.features, "numbers of a frame", between(1, kMostWidth));
   v("recurrent", c.recurrent, "units of the GRU", between(1, kMostWidth));
+  v("vertices", c.vertices, "of the body kept with the weights; a training sets it",
+    between(0, 1e6));
+  v("faces", c.faces, "of that body; a training sets it", between(0, 4e6));
 }
 
 /// shortcut(x) + fc_1(relu(fc_0(relu(x)))); fc_1 starts at zero.
@@ -67,6 +76,39 @@ struct TemporalEncoder : Module {
   Linear linear;
 };
 
+/// What motion codes say: components of the change of pose against frame 0, for t - 1 later frames,
+/// frame by frame.
+struct MotionBasis {
+  Tensor root, root_mean;     ///< [r, 3 (t - 1)], [3 (t - 1)]
+  Tensor joints, joint_mean;  ///< [m, (3 j - 3) (t - 1)], [(3 j - 3) (t - 1)]
+};
+/// Poses of all frames [n, t, 3 j]: frame 0, and frame 0 plus its change (axis-angle numbers are
+/// added).
+Var h4d_poses(const Var& pose, const Var& motion, const MotionBasis& basis);
+
+/// What the codes of a trained network mean, as buffers, so that a weights file needs nothing
+/// beside it. A training computes it from its data; before that all of it is 0. Without `vertices`
+/// in the sizes there is none.
+struct H4dSpace : Module {
+  H4dSpace(const H4dConfig& c, const Init& init);
+  bool defined() const { return mean.defined(); }
+  /// Takes tensors of the shapes that the sizes say, on any device; ShapeError for others.
+  void set(const LinearBody& body, const std::vector<std::array<int32_t, 3>>& faces,
+           const MotionBasis& basis);
+  /// InputError if the parents are no tree whose root comes first (a damaged file).
+  LinearBody body() const;
+  MotionBasis basis() const { return {root, root_mean, joints, joint_mean}; }
+  /// The body's faces; InputError if one names a vertex that there is not.
+  std::vector<std::array<int32_t, 3>> faces() const;
+  void visit(Fields& f) override;
+  const char* kind() const override { return "H4DSpace"; }
+
+ private:
+  Tensor mean, directions, body_joints, joint_directions, weights;
+  Tensor parents, corners;  // [j], [f, 3]; whole numbers
+  Tensor root, root_mean, joints, joint_mean;
+};
+
 /// The first stage's networks.
 struct H4d : Module {
   using Config = H4dConfig;
@@ -78,34 +120,15 @@ struct H4d : Module {
   H4d(const H4dConfig& c, const Init& init);
   /// Clouds of a window [n, t, v, 3].
   Codes codes(Context& ctx, const Var& window) const;
+  /// The motion of frames whose point_encoder gave `features` [n, t, c].
+  Var motion(Context& ctx, const Var& features) const;
   void visit(Fields& f) override;
   const char* kind() const override { return "H4D"; }
   H4dConfig config;
   ResPointNet id_encoder, pose_encoder;
   PlainPointNet point_encoder;
   TemporalEncoder motion_encoder;
+  H4dSpace space;
 };
-
-/// What motion codes say: components of the change of pose against frame 0, for t - 1 later frames,
-/// frame by frame.
-struct MotionBasis {
-  Tensor root, root_mean;     ///< [r, 3 (t - 1)], [3 (t - 1)]
-  Tensor joints, joint_mean;  ///< [m, (3 j - 3) (t - 1)], [(3 j - 3) (t - 1)]
-};
-/// Poses of all frames [n, t, 3 j]: frame 0, and frame 0 plus its change (axis-angle numbers are
-/// added).
-Var h4d_poses(const Var& pose, const Var& motion, const MotionBasis& basis);
-
-/// A body whose shape is a sum of directions, without pose offsets.
-struct LinearBody {
-  Tensor mean;               ///< [v, 3]
-  Tensor directions;         ///< [v, 3, b]
-  Tensor regressor;          ///< [j, v]: joints from vertices
-  Tensor weights;            ///< [v, j]: skin
-  std::vector<int> parents;  ///< of the joints; -1: the root
-};
-/// Bodies of shapes [n, b] in poses [n, t, 3 j] -> [n, t, v, 3]. The root joint stays where it
-/// rests.
-Var pose_body(const LinearBody& body, const Var& shape, const Var& poses);
 
 }  // namespace restage

@@ -36,6 +36,16 @@ ModelType npt_pool() {
   return model_of<Npt>("transfer/npt_pool", "transfer", "NPT with a pooled pose code", config);
 }
 
+/// H4D's own sizes are for SMPL's 24 joints. Trainings start with those of our skeleton.
+ModelType h4d() {
+  ModelType out = model_of<H4d>("codes/h4d", "codes",
+                                "H4D's first stage (Jiang et al. 2022): codes of a window");
+  H4dConfig config;
+  config.pose = 3 * kJoints;
+  out.training = AnyConfig(config);
+  return out;
+}
+
 std::vector<ModelType>& table() {
   static std::vector<ModelType> all = {
       model_of<PointTransformer>("skeleton/point_transformer", "skeleton",
@@ -70,8 +80,7 @@ std::vector<ModelType>& table() {
                     "Temporal Shape Transfer (Regateiro and Boyer 2022)"),
       model_of<TstDiscriminator>("transfer/tst_discriminator", "transfer.discriminator",
                                  "TST's discriminator, which its program never trains"),
-      model_of<H4d>("codes/h4d", "codes",
-                    "H4D's first stage (Jiang et al. 2022): codes of a window"),
+      h4d(),
   };
   return all;
 }

@@ -158,9 +158,14 @@ void h4d(Case& c) {
   const Var poses = h4d_poses(codes.pose, codes.motion,
                               {c.constant("rot_pc"), c.constant("rot_mean"), c.constant("joint_pc"),
                                c.constant("joint_mean")});
-  LinearBody body{c.constant("template"),
-                  c.constant("shape_basis"),
-                  c.constant("regressor"),
+  // Its joints are a regressor's of the vertices, ours move along directions of their own.
+  const Tensor mean = c.constant("template"), directions = c.constant("shape_basis");
+  const int64_t v = mean.size(0), b = directions.size(2);
+  const Var regressor(c.constant("regressor"));
+  LinearBody body{mean,
+                  directions,
+                  matmul(regressor, Var(mean)).value,
+                  matmul(regressor, Var(directions.reshape({v, 3 * b}))).value.reshape({-1, 3, b}),
                   c.constant("weights"),
                   {}};
   const Tensor parents = c.constant("parents").cpu();

@@ -1,5 +1,6 @@
 #include "train/stages/registry.h"
 
+#include "train/stages/codes_stage.h"
 #include "train/stages/deformation_stage.h"
 #include "train/stages/motion_stage.h"
 #include "train/stages/skeleton_stage.h"
@@ -23,6 +24,8 @@ std::vector<StageType>& table() {
                                  {"with_offsets_mm", "skinning_mm", "skin_lost"}),
       stage_of<TransferStage>("transfer", "a network that poses a mesh without a skeleton",
                               {"transfer"}, {"distance_mm", "pmd_1e4"}),
+      stage_of<CodesStage>("codes", "codes of shape, pose and motion of a window of clouds",
+                           {"codes"}, {"distance_mm", "shape_mm"}),
   };
   return all;
 }
