@@ -178,9 +178,10 @@ int run_eval_run(const EvalOptions& options, const Common& common) {
   EvaluationOptions how = evaluation_options(config, test, common.seed);
   if (options.anchor) how.anchor = *options.anchor;
   const SystemEvaluation scores = evaluate_system(weights, weights_name, test, how);
-  const TrainedModel *motion = weights.find("motion"), *transfer = weights.find("transfer");
-  const bool skeletons = transfer == nullptr || motion != nullptr;
-  const TrainedModel* const named = skeletons ? motion : transfer;
+  const TrainedModel *motion = weights.find("motion"), *named = motion;
+  for (const char* role : {"transfer", "codes"})
+    if (named == nullptr) named = weights.find(role);
+  const bool skeletons = named == motion;
   const std::string text = scores_text(scores, how, named ? named->model : "", skeletons);
   if (!options.out.empty()) {
     std::error_code failed;

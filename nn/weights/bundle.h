@@ -7,6 +7,8 @@
 //   motion               joints of A -> motion of B (nn/models/motion.h) smrm.
 //   deformation.weights  skinning (nn/models/deformation.h)              deformation.weights.
 //   deformation.offsets  OffsetNet, may be absent                        deformation.offsets.
+//   codes                windows of clouds -> codes, and their meaning   codes.
+//                        (nn/models/h4d.h)
 //   any other            what its model is                               ROLE.
 #pragma once
 

@@ -7,6 +7,7 @@
 #include "nn/models/corenet.h"
 #include "nn/models/deformation.h"
 #include "nn/models/discriminator.h"
+#include "nn/models/h4d.h"
 #include "nn/models/hybrid.h"
 #include "nn/models/lart.h"
 #include "nn/models/npt.h"
@@ -223,6 +224,7 @@ TEST(WeightsBundle, EverySizeOfAModelIsAKey) {
   expect_all_are_keys<LartConfig>("LART", 0);
   expect_all_are_keys<CoreNetConfig>("3D-CoreNet", 0);
   expect_all_are_keys<TstConfig>("TST", 0);
+  expect_all_are_keys<H4dConfig>("H4D", 0);
 }
 
 TEST(WeightsBundle, EveryShapeOfAModelComesBack) {

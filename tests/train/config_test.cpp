@@ -496,9 +496,9 @@ TEST(ConfigReferencePage, NamesTheSizesOfEveryModel) {
   std::ifstream file(RESTAGE_SOURCE_DIR "/docs/config_reference.md");
   std::vector<std::string> lines;
   for (std::string line; std::getline(file, line);) lines.push_back(line);
-  const std::set<std::string> by_default = {"skeleton/point_transformer", "smrm/rot6d",
-                                            "deformation/weights", "deformation/offsets",
-                                            "transfer/npt"};
+  const std::set<std::string> by_default = {
+      "skeleton/point_transformer", "smrm/rot6d",   "deformation/weights",
+      "deformation/offsets",        "transfer/npt", "codes/h4d"};
   for (const ModelType& type : models()) {
     std::vector<ConfigReference::Row> rows;
     ConfigReference reference(rows);
