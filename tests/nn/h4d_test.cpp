@@ -41,6 +41,8 @@ TEST(LinearBodyPoses, HaveTheGradientsOfFiniteDifferences) {
               [](gradcheck::Args x) { return pose_body(three_joints(), x[0], x[1]); });
   samples.add("[1, 2], [1, 1, 9]", {random({1, 2}, 14), random({1, 1, 9}, 15)},
               [](gradcheck::Args x) { return pose_body(three_joints(), x[0], x[1]); });
+  samples.add("none", {random({0, 2}, 16), random({0, 3, 9}, 17)},
+              [](gradcheck::Args x) { return pose_body(three_joints(), x[0], x[1]); });
   samples.add("codes", {random({2, 9}, 12), random({2, 5}, 13)},
               [](gradcheck::Args x) { return h4d_poses(x[0], x[1], small_basis()); });
   const gradcheck::Report report = gradcheck::check(samples);
