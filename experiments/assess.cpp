@@ -5,6 +5,7 @@
 
 #include "datasets/doctor/examine.h"
 #include "infer/own_body.h"
+#include "nn/geometry/steady_bones.h"
 #include "nn/metrics/label_free.h"
 #include "nn/metrics/surfaces.h"
 #include "nn/models/extraction.h"
@@ -67,7 +68,7 @@ double lowest_of(const Points& cloud) {
 /// What a sequence showed, frame by frame.
 struct Seen {
   std::vector<int64_t> number;
-  std::vector<Joints> joints;
+  std::vector<Joints> joints, held;
   std::vector<double> lowest, confidence;
 };
 
@@ -86,12 +87,20 @@ void read_shaking(const Seen& seen, Assessment* out) {
     if (shaking[i] > 0) out->shakiest.push_back(seen.number[i]);
 }
 
-void judge(const Seen& seen, Assessment* out) {
+double mean_bone(const std::array<double, kJoints>& of) {
+  return std::accumulate(of.begin(), of.end(), 0.0) / (kJoints - 1);
+}
+
+void judge(const Seen& seen, double fps, Assessment* out) {
   out->frames = std::ssize(seen.joints);
   if (const auto spread = metrics::bone_length_spread(seen.joints)) {
     out->bone_sds = *spread;
-    out->bone_length_sd = std::accumulate(spread->begin(), spread->end(), 0.0) / (kJoints - 1);
+    out->bone_length_sd = mean_bone(*spread);
   }
+  const auto settled = static_cast<size_t>(2 * fps);
+  if (seen.held.size() > settled)
+    if (const auto spread = metrics::bone_length_spread(std::span(seen.held).subspan(settled)))
+      out->held_bone_length_sd = mean_bone(*spread);
   const std::vector<bool> changed = metrics::side_changes(seen.joints);
   for (size_t i = 0; i < changed.size(); ++i)
     if (changed[i]) out->swapped.push_back(seen.number[i]);
@@ -116,6 +125,7 @@ Assessment assess(Source& source, const Bundle& weights, const std::string& weig
   Seen all;
   SomeFrames some;
   std::optional<SeenJoints> before;
+  SteadyBones bones;
   for (int64_t i = 0; auto cloud = source.next(); ++i) {
     const Points& points = cloud->frame.points;
     try {
@@ -131,6 +141,7 @@ Assessment assess(Source& source, const Bundle& weights, const std::string& weig
     }
     all.number.push_back(i);
     all.joints.push_back(before->joints);
+    all.held.push_back(bones(before->joints, before->uncertainty));
     all.lowest.push_back(lowest_of(points));
     if (before->uncertainty) all.confidence.push_back(confidence(*before->uncertainty));
     some.add(i, points, *before, rng);
@@ -140,7 +151,7 @@ Assessment assess(Source& source, const Bundle& weights, const std::string& weig
                      "has no frame in which a person can be found" +
                          (out.why.empty() ? "" : "; the first: " + out.why),
                      "see what 'restage doctor' says of it");
-  judge(all, &out);
+  judge(all, source.fps(), &out);
   out.surface = surface_distance(some);
   return out;
 }

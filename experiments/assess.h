@@ -20,6 +20,9 @@ struct Assessment {
   std::string why;
   std::optional<double> bone_length_sd;  ///< mean over the 21 bones
   std::array<double, kJoints> bone_sds{};
+  /// The same after the first two seconds, of bones that are held as retargeting does
+  /// (SteadyBones).
+  std::optional<double> held_bone_length_sd;
   double swaps = 0;               ///< share of the frames in which legs or arms changed sides
   std::optional<double> jitter;   ///< mean over the frames and joints
   std::optional<double> surface;  ///< of clouds from the person's own body, posed

@@ -212,6 +212,7 @@ EvaluationOptions evaluation_options(const TrainConfig& config, const Corpus& te
   out.system = config.evaluation.system;
   out.anchor = config.evaluation.anchor;
   out.steady_bones = config.evaluation.steady_bones;
+  out.keep_limbs = config.evaluation.keep_limbs;
   out.scans = config.evaluation.scans;
   out.clouds = config.section("skeleton").config.as<SkeletonStageConfig>().clouds;
   out.sequences = evaluation_sequences(test, static_cast<size_t>(config.evaluation.sequences),
@@ -238,6 +239,7 @@ SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weigh
   how.force = true;  // a badly extracted target counts with its error instead of ending the table
   how.anchor = options.anchor;
   how.steady_bones = options.steady_bones;
+  how.keep_limbs = options.keep_limbs;
   for (const EvalSequence& sequence : options.sequences) {
     const Performance performance(corpus, sequence, options.scans, options.seed);
     Sequence truth = truth_of(performance, options.every);

@@ -131,7 +131,7 @@ void Retargeter::prepare(const std::string& weights_name) {
   if (!(options_.min_confidence >= 0 && options_.min_confidence <= 1))
     throw InputError("", "the least confidence is out of range", "give --min-confidence 0 to 1");
   if (auto* skeleton = models_.find_as<SkeletonModel>("skeleton"))
-    extractor_.emplace(*skeleton, options_.samples);
+    extractor_.emplace(*skeleton, options_.samples, kAllAround, options_.keep_limbs);
   const TrainedModel& motion = models_.need("motion", weights_name);
   auto& network = models_.need_as<MotionModel>("motion", weights_name);
   motion_ = &network;

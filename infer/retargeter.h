@@ -33,6 +33,8 @@ struct RetargetOptions {
   /// Hold feet that stand where they landed (infer/foot_lock.h), if the motion network says which
   /// feet stand.
   bool foot_lock = true;
+  /// Legs and arms that cross keep their names (keep_limbs(), nn/models/views.h).
+  bool keep_limbs = true;
   /// Hold the source's bones at the mean of their lengths so far (nn/geometry/steady_bones.h).
   bool steady_bones = true;
 };

@@ -58,6 +58,7 @@ Json document_of(const Assessment& found, uint64_t seed) {
   for (size_t j = 1; j < kJoints; ++j) bones[std::string(kJointNames[j])] = 1e3 * found.bone_sds[j];
   return {{"frames", found.frames},
           {"bone_length_sd_mm", millimetres(found.bone_length_sd)},
+          {"held_bone_length_sd_mm", millimetres(found.held_bone_length_sd)},
           {"swaps", found.swaps},
           {"jitter_mm", millimetres(found.jitter)},
           {"surface_mm", millimetres(found.surface)},
@@ -74,6 +75,7 @@ std::string text_of(const Assessment& found, const std::string& path, uint64_t s
   std::string out = markdown_table(
       {{path, std::to_string(found.frames) + " frames"},
        {"bone lengths, standard deviation", shown(found.bone_length_sd, 1e3, " mm")},
+       {"the same, held, after two seconds", shown(found.held_bone_length_sd, 1e3, " mm")},
        {"legs or arms changed sides", format("%.3g %% of frames", 100 * found.swaps)},
        {"jitter", shown(found.jitter, 1e3, " mm")},
        {"surface from the person's own body", shown(found.surface, 1e3, " mm")},

@@ -289,6 +289,8 @@ void add_system_options(CommandOptions app, RetargetCommand& c) {
       "comes back within half a second");
   app.add_flag("!--no-foot-lock", c.options.foot_lock,
                "feet that stand are not held where they landed");
+  app.add_flag("!--no-keep-limbs", c.options.keep_limbs,
+               "legs and arms that cross are named as each frame shows them");
   app.add_flag("!--no-steady-bones", c.options.steady_bones,
                "the source's bones are as long as each frame shows them");
 }
@@ -377,6 +379,7 @@ void add_retarget(Program& program) {
       "restage retarget --source s.h5 --target a.ply --weights w --out r.h5 --device cuda\n"
       "restage retarget --source s.h5 --target a.ply --weights w --out r.h5 --anchor 0 "
       "--no-foot-lock\n"
+      "restage retarget --source s.h5 --target a.ply --out r.h5 --no-steady-bones --no-keep-limbs\n"
       "restage retarget --source scans.h5 --target hero.ply --system register --rest rest.h5 "
       "--out r.h5",
       run_retarget);

@@ -27,6 +27,8 @@ void check_options(const RetargetCommand& c) {
   if (c.options.anchor != usual.anchor) refuse("--anchor");
   if (c.options.min_confidence != usual.min_confidence) refuse("--min-confidence");
   if (!c.options.foot_lock) refuse("--no-foot-lock");
+  if (!c.options.steady_bones) refuse("--no-steady-bones");
+  if (!c.options.keep_limbs) refuse("--no-keep-limbs");
   if (c.profile) refuse("--profile");
   if (!c.body_model.empty() && !text::ends_in(c.source.path, {".npz"}))
     throw InputError(c.source.path, "has a skeleton of its own", "leave --body-model out");

@@ -367,7 +367,7 @@ void add_stream(Program& program) {
       "restage stream --target hero.ply --in tcp://0.0.0.0:9000 --vmc 192.168.0.7:39539 --ws "
       "0.0.0.0:8080 --samples 1 --min-confidence 0.5\n"
       "restage stream --target hero.glb --in captured/ --vmc 39539 --anchor 0 --no-foot-lock "
-      "--force --device cuda\n"
+      "--no-steady-bones --no-keep-limbs --force --device cuda\n"
       "restage stream --target hero.ply --system register --rest rest.h5 --in captured/ --vmc "
       "39539",
       run_stream);

@@ -12,10 +12,11 @@ bool mirrored(size_t view) { return view % 2 == 1; }
 
 }  // namespace
 
-JointExtractor::JointExtractor(SkeletonModel& model, int samples, double around)
+JointExtractor::JointExtractor(SkeletonModel& model, int samples, double around, bool keep_limbs)
     : model_(model),
       device_(device_of(model)),
       around_(around),
+      keep_limbs_(keep_limbs),
       centres_(static_cast<size_t>(samples)),
       views_(static_cast<size_t>(samples)) {}
 
@@ -63,10 +64,15 @@ SeenJoints JointExtractor::operator()(const Points& cloud, const std::string& so
   const SkeletonAnswer answer =
       on_host(model_.forward(ctx, {batch.to(device_), remembered.to(device_)}));
   read(answer);
-  if (before != nullptr) keep_sides(*before, &views_);
+  std::array<int, 2> limbs{};
+  if (before != nullptr) {
+    keep_sides(*before, &views_);
+    if (keep_limbs_) limbs = restage::keep_limbs(*before, &views_);
+  }
   SeenJoints out = combined(views_, answer.turns.value.defined(),
                             answer.uncertainty.value.defined(), source, values_);
   remember_sides(before, &out);
+  out.exchanged = limbs;
   return out;
 }
 

@@ -22,7 +22,9 @@ class JointExtractor {
   /// `samples` > 1 takes several views of a cloud. Each view has other points of the cloud and is
   /// turned about y by another part of `around`; every second view is mirrored. An extractor errs
   /// differently on each view; the answers are combined() (docs/method.md, "Views").
-  explicit JointExtractor(SkeletonModel& model, int samples = 1, double around = kAllAround);
+  /// `keep_limbs`: see keep_limbs().
+  explicit JointExtractor(SkeletonModel& model, int samples = 1, double around = kAllAround,
+                          bool keep_limbs = false);
   /// Metres, in the cloud's frame. Points are sorted first and exact repeats left out, so neither
   /// their order in a file nor pixels without depth matter to the last bit. `key` says where the
   /// choices of points begin.
@@ -41,6 +43,7 @@ class JointExtractor {
   SkeletonModel& model_;
   Device device_;  // the model's
   double around_;
+  bool keep_limbs_;
   EvenPoints points_;
   Points chosen_;
   std::vector<Vec3> centres_;

@@ -14,6 +14,8 @@ constexpr int kRemembered = 15;     // frames
 constexpr double kOpposite = -0.3;  // cosine
 // Part of the way towards the left of an unsure answer, per frame.
 constexpr double kFollowed = 0.1;
+constexpr double kClearly = 0.05;  // metres a joint
+constexpr int kBelieved = 60;      // frames
 
 /// The rotation whose x is along `first` and whose y is along the part of `second` at right angles
 /// to it; none if the two span no plane.
@@ -50,6 +52,37 @@ View exchanged(const View& view) {
     out.turns[j] << -view.turns[other].col(0), view.turns[other].col(1);
   }
   return out;
+}
+
+/// How much nearer the limb's two sides would be to where `before` has them with their names
+/// exchanged, metres a joint.
+template <size_t N>
+double gained(const std::array<int, N>& left, const Joints& seen, const Joints& before) {
+  double out = 0;
+  for (const int joint : left) {
+    const auto l = static_cast<size_t>(joint), r = static_cast<size_t>(kMirror[l]);
+    out += (seen[l] - before[l]).norm() + (seen[r] - before[r]).norm();
+    out -= (seen[l] - before[r]).norm() + (seen[r] - before[l]).norm();
+  }
+  return out / (2 * N);
+}
+
+template <size_t N>
+int keep_limb(const std::array<int, N>& left, const Joints& before, int already,
+              std::vector<View>* views) {
+  if (already >= kBelieved) return 0;
+  size_t count = 0;
+  for (View& view : *views) {
+    if (gained(left, view.joints, before) < kClearly) continue;
+    ++count;
+    for (const int joint : left) {
+      const auto l = static_cast<size_t>(joint), r = static_cast<size_t>(kMirror[l]);
+      std::swap(view.joints[l], view.joints[r]);
+      std::swap(view.turns[l], view.turns[r]);
+      std::swap(view.log_uncertainty[l], view.log_uncertainty[r]);
+    }
+  }
+  return 2 * count > views->size() ? already + 1 : 0;
 }
 
 double mean_confidence(const std::vector<View>& views) {
@@ -115,6 +148,13 @@ void keep_sides(const SeenJoints& before, std::vector<View>* views) {
   if (!before.left || before.since >= kRemembered || mean_confidence(*views) >= kSure) return;
   for (View& view : *views)
     if (left_of(view.joints).dot(*before.left) < kOpposite) view = exchanged(view);
+}
+
+std::array<int, 2> keep_limbs(const SeenJoints& before, std::vector<View>* views) {
+  constexpr std::array<int, 3> kLeg = {kLeftKnee, kLeftAnkle, kLeftFoot};
+  constexpr std::array<int, 2> kArm = {kLeftElbow, kLeftWrist};
+  return {keep_limb(kLeg, before.joints, before.exchanged[0], views),
+          keep_limb(kArm, before.joints, before.exchanged[1], views)};
 }
 
 void remember_sides(const SeenJoints* before, SeenJoints* answer) {

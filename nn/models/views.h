@@ -30,6 +30,9 @@ struct SeenJoints {
   /// Which way the body's left was when the extractor was last sure of it, and how many frames ago.
   std::optional<Vec3> left;
   int since = 0;
+  /// For how many frames in a row most views of the legs, of the arms, were exchanged by
+  /// keep_limbs().
+  std::array<int, 2> exchanged{};
 };
 SeenJoints turned(const Mat3& turn, const SeenJoints& seen);
 
@@ -60,6 +63,11 @@ SeenJoints combined(const std::vector<View>& views, bool turns, bool uncertainty
 /// other side, and is unsure. While it is unsure, for half a second at most, the sides of a view
 /// are exchanged if its left points where `before` was sure to have the right.
 void keep_sides(const SeenJoints& before, std::vector<View>* views);
+/// Legs and arms that cross: an extractor may call the left one the right one, in some views or in
+/// all. The joints below the hips, and those below the shoulders, of a view whose two sides lie
+/// clearly nearer to where the frame before had the other ones are exchanged. For two seconds at
+/// most: what most views say for longer is believed. Returns SeenJoints::exchanged of this frame.
+std::array<int, 2> keep_limbs(const SeenJoints& before, std::vector<View>* views);
 /// Notes in an answer where its left is: as the answer itself says if it is sure, else as `before`
 /// says (null: nothing), turned a little towards the answer.
 void remember_sides(const SeenJoints* before, SeenJoints* answer);

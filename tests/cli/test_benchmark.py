@@ -125,7 +125,8 @@ class Benchmark(CliTest):
     def test_a_sweep_measures_as_the_commands_do(self):
         self.done("data", "build", os.path.join(ROOT, "configs", "data", "small_benchmark.yaml"), "out=small", "data=" + DATA)
         lite = os.path.join(ROOT, "experiments", "weights", "lite.safetensors")
-        self.write("base.yaml", "".join("%s: {from: %s}\n" % (s, lite) for s in ("skeleton", "motion", "deformation")))
+        self.write("base.yaml", "".join("%s: {from: %s}\n" % (s, lite) for s in ("skeleton", "motion", "deformation"))
+                   + "evaluation: {steady_bones: true, keep_limbs: true}\n")
         self.write("sweep.yaml", "base: base.yaml\nevaluate: {benchmark: small, sets: [naked, scans]}\n")
         self.done("sweep", "run", "sweep.yaml", "--out", "d")
         trial = os.listdir(self.path("d/trials"))[0]

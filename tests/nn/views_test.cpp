@@ -85,6 +85,37 @@ TEST(Views, SureAnswersAndOldMemoriesChangeNothing) {
   EXPECT_GT(off(late[0]), 1);
 }
 
+/// `view` with the names of some left joints and the right ones exchanged.
+View renamed(View view, std::initializer_list<int> left) {
+  for (const int l : left) {
+    const auto a = static_cast<size_t>(l), b = static_cast<size_t>(kMirror[a]);
+    std::swap(view.joints[a], view.joints[b]);
+    std::swap(view.turns[a], view.turns[b]);
+  }
+  return view;
+}
+
+TEST(Views, LimbsOfSomeViewsGetTheirNamesBack) {
+  const SeenJoints before = remembered();
+  std::vector<View> views = {renamed(seen(0.4, kSure), {kLeftKnee, kLeftAnkle, kLeftFoot}),
+                             seen(0.4, kSure), renamed(seen(0.4, kSure), {kLeftElbow, kLeftWrist})};
+  EXPECT_EQ(keep_limbs(before, &views), (std::array<int, 2>{0, 0}));  // most views had them right
+  for (const View& view : views) EXPECT_LT(off(view), 1e-12);
+}
+
+TEST(Views, WhatMostViewsSayForTwoSecondsIsBelieved) {
+  SeenJoints before = remembered();
+  for (int frame = 1; frame <= 60; ++frame) {
+    std::vector<View> views(2, renamed(seen(0.4, kSure), {kLeftElbow, kLeftWrist}));
+    before.exchanged = keep_limbs(before, &views);
+    EXPECT_EQ(before.exchanged, (std::array<int, 2>{0, frame}));
+    for (const View& view : views) EXPECT_LT(off(view), 1e-12) << frame;
+  }
+  std::vector<View> views(2, renamed(seen(0.4, kSure), {kLeftElbow, kLeftWrist}));
+  EXPECT_EQ(keep_limbs(before, &views), (std::array<int, 2>{0, 0}));
+  EXPECT_GT(off(views[0]), 0.1);
+}
+
 TEST(Views, WhatWasSureIsRememberedAndTurnsALittle) {
   const SeenJoints before = remembered();
   SeenJoints unsure = answer({seen(0.9, kUnsure)}), sure = answer({seen(0.9, kSure)});

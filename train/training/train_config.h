@@ -31,9 +31,9 @@ void visit(V& v, CorpusSource& c) {
 
 struct EvaluationConfig {
   int64_t sequences = 12, frames = 90, every = 1;
-  std::string system = "chain";  ///< infer/systems.h
-  double anchor = 0.25;          ///< of RetargetOptions
-  bool steady_bones = false;     ///< of RetargetOptions, where true is usual
+  std::string system = "chain";                   ///< infer/systems.h
+  double anchor = 0.25;                           ///< of RetargetOptions
+  bool steady_bones = false, keep_limbs = false;  ///< of RetargetOptions, where true is usual
   ScanConfig scans;
 };
 
@@ -54,6 +54,8 @@ void visit(V& v, EvaluationConfig& c) {
   v("anchor", c.anchor, "'restage retarget --anchor', seconds; 0: off", at_least(0));
   v("steady_bones", c.steady_bones,
     "the source's bones are held at their mean length so far, as 'restage retarget' does",
+    added("false"));
+  v("keep_limbs", c.keep_limbs, "limbs that cross keep their names, as 'restage retarget' does",
     added("false"));
   v("scans", c.scans, "held-out sequences as they are seen");
   v("every", c.every, "a sweep's trial is measured on every so many frames", positive());
