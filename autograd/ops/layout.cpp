@@ -1,5 +1,6 @@
 #include "autograd/ops/layout.h"
 
+#include "autograd/ops/elementwise.h"
 #include "autograd/ops/linear.h"
 
 namespace restage {
