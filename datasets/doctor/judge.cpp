@@ -155,8 +155,12 @@ Mat3 best_turn(const Orientation& o) {
 /// and with raised arms more.
 Finding height_finding(const Diagnosis& d) {
   constexpr double kLeast = 1.1, kMost = 2.2, kNearOne = 0.03;  // metres
-  Finding f{"height", Weight::fact, number(d.height) + " m from the floor to the top", 1,
-            "in the pose that it shows", ""};
+  Finding f{"height",
+            Weight::fact,
+            number(d.height) + " m from the floor to the top",
+            1,
+            "in the pose that it shows",
+            ""};
   if (d.height >= kLeast && d.height <= kMost) return f;
   f.weight = Weight::note;
   if (std::abs(d.height - 1) < kNearOne) {
