@@ -48,6 +48,12 @@ Source::Source(const SourceRecord& how, uint64_t max_memory)
   if (!how_.fps) how_.fps = frames_->fps();
 }
 
+Source::Source(const SourceRecord& how, std::unique_ptr<FrameSource> frames)
+    : how_(how), to_ours_(how.scale, how.up), frames_(std::move(frames)) {
+  check(how);
+  if (!how_.fps) how_.fps = frames_->fps();
+}
+
 std::optional<SourceCloud> Source::next() {
   if (at_ == frames_->frames()) return std::nullopt;
   ++at_;

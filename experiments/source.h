@@ -33,6 +33,8 @@ class Source {
   /// InputError: there is nothing to read; a setting that is out of range, by the name of its
   /// option (--scale, --source-up, --fps).
   explicit Source(const SourceRecord& how, uint64_t max_memory = kMaxMemory);
+  /// Of frames that somebody has at hand; `how.path` is what they are called.
+  Source(const SourceRecord& how, std::unique_ptr<FrameSource> frames);
 
   /// The next frame; nothing at the end. A frame that is damaged, or empty, does not end the
   /// sequence: it comes with its fault. Points that are not finite are left out (Frame::left_out).

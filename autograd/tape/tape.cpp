@@ -65,9 +65,9 @@ Saved::Saved(Inputs inputs, Needs needs) {
     inputs_.push_back({inputs[i].shape(), inputs[i].dtype(), needs[i]});
 }
 
-void Saved::keep(std::initializer_list<Tensor> tensors) {
+void Saved::keep_all(std::vector<Tensor> tensors) {
   if (!on()) return;
-  tensors_ = tensors;
+  tensors_ = std::move(tensors);
   versions_.clear();
   for (const Tensor& t : tensors_) versions_.push_back(t.version());
 }

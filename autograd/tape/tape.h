@@ -67,7 +67,9 @@ class Saved {
 
   /// Keeps tensors that are complete: if one is changed before the backward pass, that pass is an
   /// Error. An op whose gradient needs shapes only keeps none.
-  void keep(std::initializer_list<Tensor> tensors);
+  void keep(std::initializer_list<Tensor> tensors) { keep_all(tensors); }
+  /// The same of any number of tensors.
+  void keep_all(std::vector<Tensor> tensors);
   const Tensor& operator[](size_t i) const { return tensors_[i]; }
   const std::vector<Tensor>& tensors() const { return tensors_; }
   /// Whether none of the kept tensors was written to since.

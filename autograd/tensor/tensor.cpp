@@ -91,13 +91,18 @@ Shape broadcast_shape(const Shape& a, const Shape& b, bool* ok) {
 
 struct Storage {
   Storage(size_t n, Device d) : bytes(n), device(d), data(backend(d).allocate(n)) {}
-  ~Storage() { backend(device).release(data, bytes); }
+  Storage(void* foreign, size_t n, std::shared_ptr<void> keeper)
+      : bytes(n), device{}, data(foreign), owner(std::move(keeper)) {}
+  ~Storage() {
+    if (!owner) backend(device).release(data, bytes);
+  }
   Storage(const Storage&) = delete;
   Storage& operator=(const Storage&) = delete;
   size_t bytes;
   Device device;
   void* data;
   uint64_t version = 0;
+  std::shared_ptr<void> owner;  ///< of memory that is not the backend's
 };
 
 Tensor Tensor::empty(const Shape& shape, DType type, Device device) {
@@ -138,6 +143,17 @@ Tensor Tensor::full(const Shape& shape, double value, DType type, Device device)
       t.data<int64_t>()[i] = static_cast<int64_t>(value);
   }
   return t.to(device);
+}
+
+Tensor Tensor::borrow(const Shape& shape, DType type, void* data, std::shared_ptr<void> owner) {
+  Tensor t;
+  t.shape_ = shape;
+  t.numel_ = shape.numel();
+  t.dtype_ = type;
+  t.storage_ = std::allocate_shared<Storage>(PoolAllocator<Storage>(), data, t.size_in_bytes(),
+                                             std::move(owner));
+  t.base_ = data;
+  return t;
 }
 
 template <class T>

@@ -40,6 +40,9 @@ class Tensor {
   static Tensor full(const Shape& shape, double value, DType type = DType::f32, Device device = {});
   template <class T>
   static Tensor from(const Shape& shape, const std::vector<T>& values);
+  /// Numbers in host memory of somebody else, which `owner` keeps there: no copy. `data` must be
+  /// aligned for the dtype; it need not be 64-byte aligned, as after rows().
+  static Tensor borrow(const Shape& shape, DType type, void* data, std::shared_ptr<void> owner);
 
   bool defined() const { return storage_ != nullptr; }
   const Shape& shape() const { return shape_; }

@@ -9,6 +9,8 @@
 namespace restage::cli {
 namespace {
 
+thread_local Captured* captured = nullptr;
+
 [[noreturn]] void fail() {
   throw WorkError(std::string("standard output could not be written (") + std::strerror(errno) +
                   "); free some space or keep the reader of the pipe open");
@@ -16,7 +18,14 @@ namespace {
 
 }  // namespace
 
+Captured::Captured() : before_(captured) { captured = this; }
+Captured::~Captured() { captured = before_; }
+
 void print(const std::string& text) {
+  if (captured != nullptr) {
+    captured->text += text;
+    return;
+  }
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size()) fail();
 }
 

@@ -10,6 +10,20 @@ namespace restage::cli {
 
 using Json = nlohmann::ordered_json;
 
+/// While it lives, what this thread prints is kept in `text` and goes nowhere else: for callers
+/// that are no command line (python/).
+class Captured {
+ public:
+  Captured();
+  ~Captured();
+  Captured(const Captured&) = delete;
+  Captured& operator=(const Captured&) = delete;
+  std::string text;
+
+ private:
+  Captured* before_;
+};
+
 /// Text to standard output. WorkError if it cannot be written.
 void print(const std::string& text);
 /// One JSON document to standard output.

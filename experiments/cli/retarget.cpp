@@ -29,10 +29,14 @@ namespace {
 
 using Frames = std::vector<int64_t>;  ///< their numbers
 
-void check(const RetargetCommand& c) {
-  check_sink(c.to);
+void check(const RetargetCommand& c, const RetargetCaller& caller) {
+  SinkOptions to = c.to;
+  if (caller.sink) to.out = "arrays.h5";  // what goes with such a file goes with arrays
+  check_sink(to);
   check_options(c.options);
-  std::vector<std::string> inputs = {c.source.path, c.target};
+  if (caller.sink) return;
+  std::vector<std::string> inputs = {c.target};
+  if (!caller.clouds) inputs.push_back(c.source.path);
   if (!c.weights.empty()) inputs.push_back(weights_path(c.weights));
   for (const std::string& more : {c.rest, c.bones, c.source_bones, c.body_model, c.asf})
     if (!more.empty()) inputs.push_back(more);
@@ -114,17 +118,21 @@ struct Outcome {
 class Run {
  public:
   Run(const RetargetCommand& c, Source& source, System& system,
-      std::shared_ptr<const GltfOwnRig> own, Gaps& gaps, Profile& profile)
+      std::shared_ptr<const GltfOwnRig> own, Gaps& gaps, Profile& profile,
+      const RetargetCaller& caller, bool from_memory)
       : c_(c),
+        caller_(caller),
         source_(source),
         system_(system),
         own_(std::move(own)),
         gaps_(gaps),
-        profile_(profile) {}
+        profile_(profile),
+        from_memory_(from_memory) {}
 
   Outcome operator()() {
     // The first frame is looked at before anything is written or logged.
     for (auto cloud = next(); cloud; cloud = next()) {
+      caller_.look();
       out_.points_left_out += cloud->frame.left_out;
       push(*cloud);
       source_.skip(c_.to.every - 1);
@@ -167,9 +175,7 @@ class Run {
   }
 
   void write(std::span<const RetargetedFrame> made) {
-    if (!sink_)
-      sink_ = make_sink(c_.to, {system_.target(), system_.rig()}, source_.record(),
-                        clip_name(source_.record()), c_.target, own_);
+    if (!sink_) sink_ = new_sink();
     for (const RetargetedFrame& f : made) {
       sink_->push(f);
       if (f.filled) out_.filled.push_back(out_.frames);
@@ -180,12 +186,22 @@ class Run {
     }
   }
 
+  Sink new_sink() const {
+    const Shown shown{system_.target(), system_.rig()};
+    if (caller_.sink) return caller_.sink(shown);
+    std::optional<SourceRecord> source;
+    if (!from_memory_) source = source_.record();  // there is no file to be found again
+    return make_sink(c_.to, shown, source, clip_name(source_.record()), c_.target, own_);
+  }
+
   const RetargetCommand& c_;
+  const RetargetCaller& caller_;
   Source& source_;
   System& system_;
   const std::shared_ptr<const GltfOwnRig> own_;
   Gaps& gaps_;
   Profile& profile_;
+  const bool from_memory_;
   std::optional<Sink> sink_;
   Outcome out_;
   int64_t in_ = 0;  // frame of the source
@@ -202,8 +218,8 @@ void log_outcome(const Outcome& done, const Source& source, const Gaps& gaps) {
                 " points of the source are NaN or infinite and were left out");
 }
 
-void print_outcome(const RetargetCommand& c, const Common& common, const Source& source,
-                   const Outcome& done, const Gaps& gaps, const Profile& profile) {
+Retargeted told(const RetargetCommand& c, const Common& common, const Source& source,
+                const Outcome& done, const Gaps& gaps, const Profile& profile) {
   const int64_t frames = c.to.every == 1 ? FrameRate::count(done.frames, c.to.rate()) : done.frames;
   Json document = {{"out", c.to.out},       {"source_frames", source.frames()},
                    {"frames", frames},      {"fps", c.to.rate()},
@@ -218,18 +234,40 @@ void print_outcome(const RetargetCommand& c, const Common& common, const Source&
                      std::to_string(common.seed) + ")";
   if (!done.filled.empty()) text += "; " + std::to_string(done.filled.size()) + " of them filled";
   if (done.held > 0) text += "; in " + std::to_string(done.held) + " of them the target waits";
-  print(common.json, document, text + "\n");
+  return {document, text + "\n"};
+}
+
+Source open_source(const RetargetCommand& c, const Common& common, RetargetCaller& caller) {
+  if (caller.clouds) return Source(c.source, std::move(caller.clouds));
+  return Source(c.source, common.max_memory);
 }
 
 int run_retarget(const RetargetCommand& c, const Common& common) {
-  check(c);
+  const Retargeted done = retarget(c, common);
+  print(common.json, done.document, done.text);
+  return 0;
+}
+
+std::string help_of_systems() {
+  std::string out;
+  for (const SystemType& type : systems())
+    out += (out.empty() ? "" : "; ") + type.name + ": " + type.help;
+  return out;
+}
+
+}  // namespace
+
+Retargeted retarget(const RetargetCommand& c, const Common& common, RetargetCaller caller) {
+  check(c, caller);
+  const bool from_memory = caller.clouds != nullptr;
   std::string no_skeleton;
-  if (!c.from_surface && has_take(c, &no_skeleton)) return run_take(c, common);
+  if (!from_memory && !c.from_surface && has_take(c, &no_skeleton))
+    return run_take(c, common, caller);
   if (!c.source_bones.empty() || !c.body_model.empty())
     throw InputError(c.source.path, "is looked at as a surface, which has no skeleton",
                      "leave --source-bones and --body-model out");
   SystemInput input = load_input(c, common);
-  Source source(c.source, common.max_memory);
+  Source source = open_source(c, common, caller);
   if (source.frames() == 0)
     throw InputError(c.source.path, "holds no frames", "give at least one cloud");
   if (!c.source.sequence && source.sequences() > 1)
@@ -242,7 +280,7 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
   const auto system = system_for(c, std::move(input), target);
   Gaps gaps(source.frames(), source.fps() / static_cast<double>(c.to.every), c.options.force);
   Profile profile({"read", "extract", "motion", "deformation", "write", "frame"});
-  Run run(c, source, *system, target.own, gaps, profile);
+  Run run(c, source, *system, target.own, gaps, profile, caller, from_memory);
   // Scripts get one line if the source turns out to be bad later on; people need not wait.
   const bool on_terminal = isatty(STDERR_FILENO) != 0;
   if (on_terminal) say_target(target);
@@ -254,18 +292,8 @@ int run_retarget(const RetargetCommand& c, const Common& common) {
                 ": its surface is looked at; its skeleton cannot be taken: " + no_skeleton);
   log_outcome(done, source, gaps);
   if (c.profile) log_profile(profile);
-  print_outcome(c, common, source, done, gaps, profile);
-  return 0;
+  return told(c, common, source, done, gaps, profile);
 }
-
-std::string help_of_systems() {
-  std::string out;
-  for (const SystemType& type : systems())
-    out += (out.empty() ? "" : "; ") + type.name + ": " + type.help;
-  return out;
-}
-
-}  // namespace
 
 void add_target_options(CommandOptions app, RetargetCommand& c) {
   app.add_option("--target", c.target,
@@ -383,11 +411,14 @@ void add_retarget(Program& program) {
       "restage retarget --source scans.h5 --target hero.ply --system register --rest rest.h5 "
       "--out r.h5",
       run_retarget);
-  app.add_option(
-         "--source", c.source.path,
-         "folder of clouds, file of them (HDF5, NPZ, NPY); or a skeleton's motion, which is taken "
-         "over exactly: BVH, AMC, glTF, VRM, VRMA, FBX, AMASS (.npz), our motions (.h5)")
-      .required();
+  add_retarget_options(app, c);
+}
+
+void add_retarget_options(CommandOptions app, RetargetCommand& c, bool files) {
+  Option source = app.add_option(
+      "--source", c.source.path,
+      "folder of clouds, file of them (HDF5, NPZ, NPY); or a skeleton's motion, which is taken "
+      "over exactly: BVH, AMC, glTF, VRM, VRMA, FBX, AMASS (.npz), our motions (.h5)");
   add_target_options(app, c);
   app.add_option("--source-bones", c.source_bones, "the same of a source's skeleton");
   app.add_option("--asf", c.asf, "of an AMC source its skeleton, if it lies elsewhere");
@@ -395,9 +426,10 @@ void add_retarget(Program& program) {
                  "of an AMASS source its SMPL model (.npz), or a folder of them");
   add_weights_options(app, c);
   app.add_option("--every", c.to.every, "only every so many frames of the source; for X.h5");
-  app.add_option("--out", c.to.out,
-                 "X.glb, X.gltf, X.vrm, X.vrma, X.bvh, X.h5, or a folder for PLY or OBJ frames")
-      .required();
+  Option out = app.add_option(
+      "--out", c.to.out,
+      "X.glb, X.gltf, X.vrm, X.vrma, X.bvh, X.h5, or a folder for PLY or OBJ frames");
+  if (files) source.required(), out.required();
   app.add_option("--clip-name", c.to.clip_name,
                  "of the animation that a rigged target's file gets (default: the source's name)");
   app.add_option("--out-fps", c.to.fps, "frames per second of an animation, such as 24 or 60")

@@ -2,10 +2,13 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <string>
 
 #include "datasets/importers/gltf_character.h"
+#include "datasets/readers/frame_folder.h"
 #include "experiments/cli/commands.h"
+#include "experiments/cli/output.h"
 #include "experiments/cli/retarget_sink.h"
 #include "infer/systems.h"
 
@@ -19,6 +22,28 @@ struct RetargetCommand {
   RetargetOptions options;
   bool profile = false, from_surface = false;
 };
+
+/// What a caller that is no command line (python/) gives, and what it wants.
+struct RetargetCaller {
+  std::unique_ptr<FrameSource> clouds = nullptr;  ///< the source; null: the file that is named
+  /// Where frames go; null: into the file that is named.
+  std::function<Sink(const Shown&)> sink = nullptr;
+  std::function<void()> every_frame = nullptr;  ///< is called before each frame, and may throw
+  void look() const {
+    if (every_frame) every_frame();
+  }
+};
+
+/// What was done: the command's document, and the same in words.
+struct Retargeted {
+  Json document;
+  std::string text;
+};
+/// The command itself; it prints nothing on standard output.
+Retargeted retarget(const RetargetCommand& c, const Common& common, RetargetCaller caller = {});
+/// All options of the command. `files`: its source and its result are files, which have to be
+/// named.
+void add_retarget_options(CommandOptions app, RetargetCommand& c, bool files = true);
 
 /// The options of every command that makes a system: the target, the weights, how they are used.
 void add_target_options(CommandOptions app, RetargetCommand& c);
@@ -41,6 +66,6 @@ void check_kept(const RetargetCommand& c, const TargetMesh& target);
 /// a target without a rig.
 /// Whether the source has a skeleton to be taken over; holds_take().
 bool has_take(const RetargetCommand& c, std::string* why);
-int run_take(const RetargetCommand& c, const Common& common);
+Retargeted run_take(const RetargetCommand& c, const Common& common, const RetargetCaller& caller);
 
 }  // namespace restage::cli

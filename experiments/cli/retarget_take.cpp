@@ -81,7 +81,7 @@ bool has_take(const RetargetCommand& c, std::string* why) {
   return as_source([&] { return holds_take(c.source.path, c.source_bones, why); });
 }
 
-int run_take(const RetargetCommand& c, const Common& common) {
+Retargeted run_take(const RetargetCommand& c, const Common& common, const RetargetCaller& caller) {
   check_options(c);
   TargetMesh target = read_target(c.target, c.bones);
   check_kept(c, target);
@@ -101,7 +101,8 @@ int run_take(const RetargetCommand& c, const Common& common) {
                     target.own ? &*rig : system->rig()};
   std::optional<SourceRecord> source;
   if (is_gltf_name(c.source.path)) source = c.source;
-  const Sink sink = make_sink(c.to, shown, source, take.name, c.target, target.own);
+  const Sink sink = caller.sink ? caller.sink(shown)
+                                : make_sink(c.to, shown, source, take.name, c.target, target.own);
   say_take(take);
   say_target(target);
   for (const auto& [given, option] : {std::pair(!c.weights.empty(), "--weights"),
@@ -112,6 +113,7 @@ int run_take(const RetargetCommand& c, const Common& common) {
           cat(option, " is not used: source and target have skeletons, so no network is asked"));
   int64_t frames = 0;
   for (size_t f = 0; f < take.frames.size(); f += static_cast<size_t>(c.to.every)) {
+    caller.look();
     RetargetedFrame frame;
     frame.pose = perform_take(take, f, rest);
     frame.joints.emplace();
@@ -131,10 +133,8 @@ int run_take(const RetargetCommand& c, const Common& common) {
   const Json document = {{"out", c.to.out},   {"source_frames", take.frames.size()},
                          {"frames", frames},  {"fps", c.to.rate()},
                          {"clip", take.name}, {"from", "skeleton"}};
-  print(common.json, document,
-        "wrote " + c.to.out + ": " + std::to_string(frames) +
-            " frames, the motion of the source's skeleton\n");
-  return 0;
+  return {document, "wrote " + c.to.out + ": " + std::to_string(frames) +
+                        " frames, the motion of the source's skeleton\n"};
 }
 
 }  // namespace restage::cli

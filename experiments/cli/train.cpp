@@ -13,6 +13,7 @@
 #include "autograd/kernels/matmul_precision.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
+#include "experiments/cli/train.h"
 #include "experiments/observers/loggers.h"
 #include "experiments/scratch.h"
 #include "nn/config/config.h"
@@ -24,13 +25,6 @@ namespace restage::cli {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct TrainArguments {
-  std::vector<std::string> words;
-  int64_t overfit_batches = 0;
-  bool fast_dev_run = false, dry_run = false, print_config = false;
-  bool tensorboard = false, csv = false;
-};
 
 /// CONFIG.yaml and key=value, in any order; resume=RUN stands alone.
 struct Request {
@@ -132,6 +126,7 @@ void train_in(RunDir& run, const TrainConfig& config, const TrainingData& data,
   options.quiet = common.quiet || data.team->rank() > 0;
   if (arguments.tensorboard) options.observers.push_back(&tensorboard);
   if (arguments.csv) options.observers.push_back(&csv);
+  for (TrainObserver* more : arguments.observers) options.observers.push_back(more);
   save_bundle(run.dir() + "/weights.safetensors", train_run(run, config, data, options));
 }
 
@@ -237,6 +232,8 @@ int train_with(Team& team, const TrainArguments& arguments, const Common& common
   return 0;
 }
 
+}  // namespace
+
 int run_train(const TrainArguments& arguments, const Common& common) {
   Team& team = team_of_processes();
   set_local_rank(team.local_rank());
@@ -259,8 +256,6 @@ int run_train(const TrainArguments& arguments, const Common& common) {
   return 1;
 }
 
-}  // namespace
-
 void add_train(Program& program) {
   auto [app, a] = program.add(
       "train", "train the stages of a configuration",
@@ -275,6 +270,10 @@ void add_train(Program& program) {
       "restage train configs/lite/all.yaml data.source=data.h5 --fast-dev-run\n"
       "restage train resume=runs/demo-20260101-120000-1",
       run_train);
+  add_train_options(app, a);
+}
+
+void add_train_options(CommandOptions app, TrainArguments& a) {
   app.add_option("ARGUMENTS", a.words, "CONFIG.yaml and key=value overrides, or resume=RUN_DIR")
       .required();
   app.add_flag("--print-config", a.print_config, "print the resolved configuration and end");

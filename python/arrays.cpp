@@ -1,0 +1,102 @@
+#include "python/arrays.h"
+
+#include <cmath>
+
+#include "autograd/base/error.h"
+
+namespace restage::python {
+
+std::string shape_text(const py::array& a) {
+  std::string out = "[";
+  for (py::ssize_t i = 0; i < a.ndim(); ++i) out += (i ? ", " : "") + std::to_string(a.shape(i));
+  return out + "]";
+}
+
+template <class T>
+py::array_t<T, py::array::c_style> numbers(const py::handle& value, const std::string& what) {
+  const auto refuse = [&](const std::string& wrong) {
+    throw InputError(what, wrong, "give an array of numbers");
+  };
+  if (!value || value.is_none() || py::isinstance<py::str>(value)) refuse("is no array");
+  const py::array any = py::array::ensure(value);
+  if (!any) PyErr_Clear(), refuse("is no array");
+  const char kind = any.dtype().kind();
+  if (kind != 'f' && kind != 'i' && kind != 'u')
+    refuse("holds " + std::string(py::str(any.dtype())) + ", no real numbers");
+  auto out = py::array_t<T, py::array::c_style | py::array::forcecast>::ensure(any);
+  if (!out) PyErr_Clear(), refuse("cannot be read");
+  return py::reinterpret_borrow<py::array_t<T, py::array::c_style>>(out);
+}
+template py::array_t<float, py::array::c_style> numbers<float>(const py::handle&,
+                                                               const std::string&);
+template py::array_t<double, py::array::c_style> numbers<double>(const py::handle&,
+                                                                 const std::string&);
+
+Points points_of(const py::handle& value, const std::string& what) {
+  const auto a = numbers<float>(value, what);
+  if (a.ndim() != 2 || a.shape(1) != 3)
+    throw InputError(what, "has the shape " + shape_text(a), "give points as [n, 3], metres, y up");
+  Points out;
+  out.reserve(static_cast<size_t>(a.shape(0)));
+  const float* p = a.data();
+  for (py::ssize_t i = 0; i < a.shape(0); ++i, p += 3)
+    if (std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]))
+      out.emplace_back(p[0], p[1], p[2]);
+  if (out.empty()) throw InputError(what, "holds no points", "give a cloud of a person");
+  return out;
+}
+
+std::vector<Joints> joint_frames_of(const py::handle& value, const std::string& what) {
+  const auto a = numbers<double>(value, what);
+  const bool one = a.ndim() == 2;
+  if ((!one && a.ndim() != 3) || a.shape(one ? 0 : 1) != kJoints || a.shape(one ? 1 : 2) != 3)
+    throw InputError(what, "has the shape " + shape_text(a),
+                     "give the 22 joints as [frames, 22, 3], metres");
+  std::vector<Joints> out(one ? 1 : static_cast<size_t>(a.shape(0)));
+  const double* p = a.data();
+  for (Joints& joints : out)
+    for (Vec3& joint : joints) {
+      joint = Eigen::Map<const Vec3>(p);
+      if (!joint.allFinite()) throw InputError(what, "holds NaN or infinity", "give finite joints");
+      p += 3;
+    }
+  return out;
+}
+
+Joints joints_of(const py::handle& value, const std::string& what) {
+  const std::vector<Joints> frames = joint_frames_of(value, what);
+  if (frames.size() != 1)
+    throw InputError(what, "is not one skeleton", "give the 22 joints as [22, 3], metres");
+  return frames[0];
+}
+
+py::array array_of(const Joints& joints) {
+  std::vector<double> flat;
+  for (const Vec3& joint : joints) flat.insert(flat.end(), joint.data(), joint.data() + 3);
+  return array_of<double>(std::move(flat), {kJoints, 3});
+}
+
+py::array array_of(Points points) {
+  const auto n = static_cast<py::ssize_t>(points.size());
+  return array_of<float>(std::move(points), {n, 3});
+}
+
+py::array array_of(std::vector<Triangle> faces) {
+  const auto n = static_cast<py::ssize_t>(faces.size());
+  return array_of<int32_t>(std::move(faces), {n, 3});
+}
+
+void append_rotations(const Rotations& global, std::vector<float>& out) {
+  for (const Mat3& turn : global) {
+    Quat q = Quat(turn).normalized();
+    if (q.w() < 0) q.coeffs() = -q.coeffs();
+    for (const double x : {q.w(), q.x(), q.y(), q.z()}) out.push_back(static_cast<float>(x));
+  }
+}
+
+void append_joints(const Joints& joints, std::vector<float>& out) {
+  for (const Vec3& joint : joints)
+    for (int i = 0; i < 3; ++i) out.push_back(static_cast<float>(joint[i]));
+}
+
+}  // namespace restage::python

@@ -1,0 +1,43 @@
+// Between NumPy and our values. Whatever comes in is looked at before it is used; what goes out
+// owns its memory or keeps alive who does.
+#pragma once
+
+#include <pybind11/numpy.h>
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "nn/geometry/body.h"
+#include "python/bind.h"
+
+namespace restage::python {
+
+/// An array of real numbers, C-contiguous, of type T. InputError naming `what` for anything else.
+template <class T>
+py::array_t<T, py::array::c_style> numbers(const py::handle& value, const std::string& what);
+/// "[2, 3]"
+std::string shape_text(const py::array& a);
+
+/// [n, 3]: points that are NaN or infinite are left out, as readers of files do.
+Points points_of(const py::handle& value, const std::string& what);
+/// [22, 3]
+Joints joints_of(const py::handle& value, const std::string& what);
+/// [frames, 22, 3], or one frame.
+std::vector<Joints> joint_frames_of(const py::handle& value, const std::string& what);
+
+/// An array over memory that lives in `values`, which it takes.
+template <class T, class V>
+py::array array_of(std::vector<V> values, std::vector<py::ssize_t> shape) {
+  auto* kept = new std::vector<V>(std::move(values));
+  const py::capsule owner(kept, [](void* p) { delete static_cast<std::vector<V>*>(p); });
+  return py::array_t<T>(std::move(shape), reinterpret_cast<const T*>(kept->data()), owner);
+}
+py::array array_of(const Joints& joints);  ///< float64 [22, 3]
+py::array array_of(Points points);         ///< float32 [n, 3]
+py::array array_of(std::vector<Triangle> faces);
+/// Unit quaternions w x y z, w >= 0, as PredictionWriter writes them.
+void append_rotations(const Rotations& global, std::vector<float>& out);
+void append_joints(const Joints& joints, std::vector<float>& out);
+
+}  // namespace restage::python

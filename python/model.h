@@ -1,0 +1,26 @@
+// A network in Python.
+#pragma once
+
+#include <map>
+#include <memory>
+
+#include "nn/weights/state.h"
+#include "python/engine.h"
+
+namespace restage::python {
+
+struct PyModel {
+  std::string name;
+  std::shared_ptr<Module> net;
+  /// In the order of the state dict; each keeps the network alive.
+  std::vector<std::pair<std::string, PyParameter>> parameters() const;
+};
+
+using TensorMap = std::map<std::string, Tensor>;
+TensorMap tensors_of(const py::dict& arrays);
+/// Runs the network (model_call.cpp). ShapeError for inputs that do not fit it.
+py::object call_model(const PyModel& model, const py::args& inputs,
+                      const std::shared_ptr<PyTape>& tape, bool training, uint64_t seed,
+                      uint64_t step);
+
+}  // namespace restage::python

@@ -1,0 +1,60 @@
+"""Files as arrays, and the reference that needs no network."""
+from typing import NamedTuple
+
+import numpy as np
+
+from . import _core
+
+
+class Mesh(NamedTuple):
+    """A surface, or a cloud where there are no faces."""
+    vertices: np.ndarray  #: float32 [V, 3], as the file has them (metres by convention)
+    faces: np.ndarray  #: int32 [T, 3]
+
+
+class Clip(NamedTuple):
+    """A skeleton's motion, 30 frames a second, metres, y up."""
+    name: str
+    rest: np.ndarray  #: float64 [22, 3], the T-pose that turns are counted from
+    joints: np.ndarray  #: float64 [F, 22, 3]
+    rotations: np.ndarray  #: float32 [F, 22, 4], w x y z: world turns from the T-pose
+
+
+class ClosedForm(NamedTuple):
+    """What closed_form() gives."""
+    joints: np.ndarray  #: float64 [F, 22, 3], world metres
+    rotations: np.ndarray  #: float32 [F, 22, 4], w x y z: world turns from the T-pose
+
+
+def load_mesh(path):
+    """A PLY, OBJ, PCD or glTF file, or a table of points, as a Mesh."""
+    return Mesh(*_core.load_mesh(path))
+
+
+def load_cloud(path):
+    """The points of such a file, float32 [n, 3]."""
+    return load_mesh(path).vertices
+
+
+def load_clouds(path, sequence=None, scale=1.0, up="y"):
+    """The clouds of a file (HDF5, NPZ, NPY) or folder, as retarget() reads them: a list of float32 [n, 3], metres.
+
+    A frame that cannot be read is None. scale: metres per unit; up: the axis that points up.
+    """
+    return _core.load_clouds(path, sequence, scale, up)
+
+
+def load_motion(path, clip="", bones=""):
+    """The motion of a skeleton (BVH, AMC, glTF, VRM, AMASS, our motions) as a Clip.
+
+    clip: which animation of a glTF file or motion of an HDF5 file; bones: a file that names its bones.
+    """
+    return Clip(**_core.load_motion(path, clip, bones))
+
+
+def closed_form(source, target_rest, source_rest=None):
+    """Retargeting without a network: the reference of every table.
+
+    source: joints of the performer, [F, 22, 3], world metres; target_rest, source_rest: rest joints, [22, 3].
+    """
+    return ClosedForm(*_core.closed_form(source, target_rest, source_rest))

@@ -1,0 +1,39 @@
+"""The metrics of `restage eval`, by the names of its JSON.
+
+Each takes a prediction and the truth, [frames, points, 3] in metres (one frame may come as [points, 3]), and
+returns a float, or None where it cannot be computed (too few frames or points), never 0. mpjpe, acc and their
+kin look at joints; mpvd, medl, pmd and their kin at vertices.
+"""
+from . import _core
+
+names = [name for name, *_ in _core.all_metrics()]
+units = {name: unit for name, _, unit, *_ in _core.all_metrics()}
+
+
+def _metric(name, title, unit, text, of_joints):
+    def measure(pred, truth, joints=None):
+        return _core.measure(name, pred, truth, joints)
+
+    what = "joints" if of_joints else "vertices"
+    measure.__name__ = measure.__qualname__ = name
+    measure.__doc__ = f"""{title}: {text}, {unit}.
+
+    pred, truth: {what}, [frames, points, 3], metres. joints: true joints [frames, 22, 3], for leaf_pa_mpvd."""
+    return measure
+
+
+for _row in _core.all_metrics():
+    globals()[_row[0]] = _metric(*_row)
+
+
+def all(pred_joints=None, true_joints=None, pred_vertices=None, true_vertices=None):  # noqa: A001
+    """Every metric that can be computed, by name; the others are None."""
+    out = {}
+    for name, _, _, _, of_joints in _core.all_metrics():
+        pred, truth = (pred_joints, true_joints) if of_joints else (pred_vertices, true_vertices)
+        there = pred is not None and truth is not None
+        out[name] = _core.measure(name, pred, truth, None if of_joints else true_joints) if there else None
+    return out
+
+
+__all__ = ["all", "names", "units", *names]

@@ -1,0 +1,65 @@
+// restage.Extractor: the 22 joints of clouds, as the command `skeleton` finds them.
+#include <mutex>
+
+#include "autograd/kernels/kernel.h"
+#include "experiments/cli/standard_weights.h"
+#include "nn/models/extraction.h"
+#include "nn/weights/bundle.h"
+#include "python/arrays.h"
+
+namespace restage::python {
+namespace {
+
+class PyExtractor {
+ public:
+  PyExtractor(const py::object& weights, int samples, uint64_t seed, const std::string& device)
+      : key_(RngKey{seed, 0}.fold("skeleton")) {
+    if (samples < 1 || samples > 256)
+      throw InputError("", "--samples is out of range", "give a number from 1 to 256");
+    const std::string path = weights.is_none() ? "" : path_of(weights);
+    const py::gil_scoped_release released;
+    const std::string file = path.empty() ? cli::standard_weights() : path;
+    models_ = load_bundle(file);
+    auto& model = models_.need_as<SkeletonModel>("skeleton", weights_path(file));
+    move_module(model, device_of(device));
+    extract_.emplace(model, samples);
+  }
+
+  py::tuple operator()(const py::object& points, const std::string& name) {
+    const Points cloud = points_of(points, name);
+    SeenJoints seen;
+    {
+      const py::gil_scoped_release released;
+      const std::lock_guard<std::mutex> lock(mutex_);
+      seen = (*extract_)(cloud, name, key_);
+    }
+    if (!seen.uncertainty) return py::make_tuple(array_of(seen.joints), py::none());
+    const auto radius = radius_of_90(*seen.uncertainty);
+    std::vector<double> flat(radius.begin(), radius.end());
+    return py::make_tuple(array_of(seen.joints), array_of<double>(std::move(flat), {kJoints}));
+  }
+
+ private:
+  std::mutex mutex_;
+  Bundle models_;
+  const RngKey key_;
+  std::optional<JointExtractor> extract_;
+};
+
+}  // namespace
+
+void add_skeleton(py::module_& m) {
+  py::class_<PyExtractor>(m, "Extractor", R"(The 22 joints of clouds, each by itself.
+
+weights: a file or a run, None: the standard weights; samples: views of a cloud that are averaged;
+device: "cpu", or "cuda" where it is built in.)")
+      .def(py::init<const py::object&, int, uint64_t, const std::string&>(),
+           py::arg("weights") = py::none(), py::arg("samples") = 1, py::arg("seed") = 0,
+           py::arg("device") = "cpu")
+      .def("__call__", &PyExtractor::operator(), py::arg("points"), py::arg("name") = "cloud",
+           "points [n, 3], metres, y up -> joints float64 [22, 3], in the cloud's own frame, and "
+           "the radius about each that should hold the true one nine times in ten, float64 [22] "
+           "in metres, or None.");
+}
+
+}  // namespace restage::python

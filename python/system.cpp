@@ -1,0 +1,184 @@
+// restage.System: clouds in, frames out, one at a time.
+#include "infer/system.h"
+
+#include <mutex>
+
+#include "datasets/doctor/examine.h"
+#include "experiments/cli/retarget.h"
+#include "experiments/cli/scale_option.h"
+#include "experiments/source.h"
+#include "python/arrays.h"
+
+namespace restage::python {
+namespace {
+
+/// A frame of the result, for itself: nothing of the system is needed any more.
+struct Frame {
+  Points vertices;
+  std::vector<float> joints, rotations;
+  std::optional<double> confidence;
+  bool filled = false;
+
+  explicit Frame(const RetargetedFrame& f)
+      : vertices(f.vertices), confidence(f.confidence), filled(f.filled) {
+    if (!f.joints) return;
+    append_joints(*f.joints, joints);
+    append_rotations(to_global(f.pose.local), rotations);
+  }
+};
+using Frames = std::vector<std::shared_ptr<Frame>>;
+
+/// An array over numbers of a frame, which it keeps alive.
+py::object view(const py::object& frame, const float* data, std::vector<py::ssize_t> shape) {
+  return py::array_t<float>(std::move(shape), data, frame);
+}
+
+class PySystem {
+ public:
+  PySystem(const py::object& target, const py::object& weights, const py::dict& options) {
+    std::vector<std::string> words = words_of(options);
+    words.push_back("--target=" + path_of(target));
+    if (!weights.is_none()) words.push_back("--weights=" + path_of(weights));
+    Watch watch;
+    watch.run([&] {
+      run_command("system", words, [&](cli::Program& program) {
+        const auto make_it = [&] { return make(program.common()), 0; };
+        add_options(program.add("system", "", "", make_it));
+      });
+    });
+  }
+
+  Frames push(const py::object& points, const std::string& name) {
+    Points cloud = points_of(points, name);
+    return locked([&] {
+      (*to_ours_)(cloud);
+      if (!c_.options.force) check_frame(cloud, name);
+      return copy(system_->push(cloud, name));
+    });
+  }
+  Frames finish() {
+    return locked([&] { return copy(system_->finish()); });
+  }
+  void miss() {
+    locked([&] { system_->miss(); });
+  }
+  void restart() {
+    locked([&] { system_->restart(); });
+  }
+
+  py::object target_vertices() const { return array_of(Points(system_->target().vertices)); }
+  py::object faces() const { return array_of(std::vector<Triangle>(system_->target().faces)); }
+  py::object rest_joints() const {
+    const Joints* joints = system_->target_joints();
+    return joints == nullptr ? py::none() : py::object(array_of(*joints));
+  }
+  py::object source_joints() {
+    std::optional<Joints> seen;
+    locked([&] {
+      if (const Joints* joints = system_->source_joints()) seen = *joints;
+    });
+    return seen ? py::object(array_of(*seen)) : py::none();
+  }
+
+ private:
+  void add_options(cli::CommandOptions app) {
+    cli::add_target_options(app, c_);
+    cli::add_weights_options(app, c_);
+    cli::add_system_options(app, c_);
+    app.add_option("--fps", c_.source.fps, "frames per second of the clouds");
+    app.add_option("--source-up", c_.source.up, "the clouds' axis that points up");
+    cli::add_scale(app, c_.source.scale, "the clouds' units in metres");
+    app.add_flag("--force", c_.options.force, "accept what the doctor calls wrong");
+  }
+
+  void make(const cli::Common& common) {
+    cli::check_options(c_.options);
+    to_ours_.emplace(c_.source.scale, c_.source.up);
+    if (c_.source.fps && !(*c_.source.fps >= 1 && *c_.source.fps <= 1000))
+      throw InputError("", "--fps is out of range",
+                       "give the clouds' frames per second, 1 to 1000");
+    SystemInput input = cli::load_input(c_, common);
+    if (c_.source.fps) input.options.fps = *c_.source.fps;
+    TargetMesh target = read_target(c_.target, c_.bones);
+    cli::check_mesh(c_, target);
+    system_ = cli::system_for(c_, std::move(input), target);
+  }
+
+  /// One caller at a time; Python's other threads go on.
+  template <class Work>
+  auto locked(const Work& work) -> decltype(work()) {
+    const py::gil_scoped_release released;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return work();
+  }
+
+  static Frames copy(std::span<const RetargetedFrame> frames) {
+    Frames out;
+    for (const RetargetedFrame& f : frames) out.push_back(std::make_shared<Frame>(f));
+    return out;
+  }
+
+  std::mutex mutex_;
+  cli::RetargetCommand c_;
+  std::optional<ToOurs> to_ours_;
+  std::unique_ptr<System> system_;
+};
+
+void add_frame(py::module_& m) {
+  const auto joints = [](const py::object& self, std::vector<float> Frame::*of, int width) {
+    const auto& values = self.cast<Frame&>().*of;
+    return values.empty() ? py::none() : view(self, values.data(), {kJoints, width});
+  };
+  py::class_<Frame, std::shared_ptr<Frame>>(m, "Frame",
+                                            "The target in one frame, 30 of them a second.")
+      .def_property_readonly(
+          "vertices",
+          [](const py::object& self) -> py::object {
+            const Points& v = self.cast<Frame&>().vertices;
+            if (v.empty()) return py::none();
+            return view(self, v[0].data(), {std::ssize(v), 3});
+          },
+          "float32 [V, 3], world metres, in the target's order; None: the system gives none")
+      .def_property_readonly(
+          "joints", [joints](const py::object& s) { return joints(s, &Frame::joints, 3); },
+          "float32 [22, 3], world metres; None: the system has no skeleton")
+      .def_property_readonly(
+          "rotations", [joints](const py::object& s) { return joints(s, &Frame::rotations, 4); },
+          "float32 [22, 4], unit quaternions w x y z: world turns from the T-pose")
+      .def_readonly("confidence", &Frame::confidence,
+                    "how sure the extractor is of the source's joints, 0 to 1, or None")
+      .def_readonly("filled", &Frame::filled, "whether no cloud is behind this frame");
+}
+
+}  // namespace
+
+void add_system(py::module_& m) {
+  add_frame(m);
+  py::class_<PySystem>(m, "System")
+      .def(py::init<const py::object&, const py::object&, const py::dict&>())
+      .def("push_all", &PySystem::push, py::arg("points"), py::arg("name") = "cloud",
+           "Takes the next cloud, [n, 3] in metres, y up (or as scale and source_up say), and "
+           "returns the frames that it finishes, as a list. InputError leaves the system as it "
+           "was: call miss() then, or push another cloud.")
+      .def(
+          "push",
+          [](PySystem& self, const py::object& points, const std::string& name) {
+            const Frames frames = self.push(points, name);
+            return frames.empty() ? nullptr : frames.back();
+          },
+          py::arg("points"), py::arg("name") = "cloud",
+          "As push_all(), but returns the newest frame, or None where none is finished.")
+      .def("finish", &PySystem::finish,
+           "Says that the source has ended; returns the frames that are left, as a list.")
+      .def("miss", &PySystem::miss, "Says that a frame of the source is missing.")
+      .def("restart", &PySystem::restart, "Forgets the motion so far.")
+      .def_property_readonly("target_vertices", &PySystem::target_vertices,
+                             "float32 [V, 3], the target in T-pose, metres")
+      .def_property_readonly("faces", &PySystem::faces, "int32 [T, 3], the target's triangles")
+      .def_property_readonly("rest_joints", &PySystem::rest_joints,
+                             "float64 [22, 3], the target's joints in T-pose, metres, or None")
+      .def_property_readonly("source_joints", &PySystem::source_joints,
+                             "float64 [22, 3], the source's joints in the last cloud, or None");
+}
+
+}  // namespace restage::python

@@ -1,0 +1,333 @@
+"""Tensors, the tape, ops, own ops, gradcheck, models, optimisers."""
+import gc
+import inspect
+import threading
+
+import numpy as np
+import pytest
+import restage
+from restage import ops
+
+rng = np.random.default_rng(2)
+
+
+def f32(*shape):
+    return rng.normal(size=shape).astype(np.float32)
+
+
+# ---- tensors ----
+
+def test_numpy_in_and_out():
+    for dtype in (np.float32, np.float64, np.int32, np.int64):
+        a = np.arange(6).reshape(2, 3).astype(dtype)
+        t = restage.Tensor(a)
+        assert t.shape == (2, 3) and t.dtype == dtype and np.array_equal(t.numpy(), a)
+        a[0, 0] = 7
+        assert t.numpy()[0, 0] == 0
+        assert not np.asarray(t).flags.writeable
+    assert restage.Tensor(np.float16([1, 2])).dtype == np.float32
+    assert np.array_equal(restage.Tensor(np.arange(12.0).reshape(3, 4).T).numpy(), np.arange(12.0).reshape(3, 4).T)
+    assert restage.Tensor(3.0).shape == (1,) and restage.Tensor(np.zeros((0, 3))).shape == (0, 3)
+    assert restage.Tensor(np.array([1, 2], ">f8")).numpy().tolist() == [1, 2]
+
+
+def test_memory_is_shared_and_kept_alive():
+    a = f32(1000, 3)
+    t = restage.Tensor(a, copy=False)
+    a[0, 0] = 42
+    assert t.numpy()[0, 0] == 42
+    expected = a.copy()
+    del a
+    gc.collect()
+    junk = [np.zeros((1000, 3), np.float32) for _ in range(50)]
+    assert np.array_equal(t.numpy(), expected) and junk
+    view = restage.Tensor(f32(500, 500)).numpy()
+    copy = view.copy()
+    gc.collect()
+    assert np.array_equal(view, copy)
+
+
+def test_assign():
+    t = restage.Tensor.zeros((2, 2))
+    version = t.version
+    t.assign([[1, 2], [3, 4]])
+    assert t.numpy().tolist() == [[1, 2], [3, 4]] and t.version > version
+    with pytest.raises(restage.ShapeError):
+        t.assign([1, 2])
+
+
+@pytest.mark.parametrize("bad", [None, "x", [[1], [1, 2]], np.zeros(2, complex), np.zeros((1,) * 7), object(), {}],
+                         ids=lambda b: type(b).__name__)
+def test_no_tensor(bad):
+    with pytest.raises(ValueError):
+        restage.Tensor(bad)
+
+
+# ---- the tape ----
+
+def test_gradients_and_operators():
+    tape = restage.Tape()
+    a, b = tape.leaf(f32(2, 3)), tape.leaf(f32(3))
+    assert np.allclose((1 / a).numpy(), 1 / a.numpy()) and np.allclose((3 - b).numpy(), 3 - b.numpy())
+    y = ops.sum_all(2 * a * b + a / 4 - b + 1 - (-a))
+    grads = tape.backward(y)
+    assert np.allclose(grads[a].numpy(), 2 * b.numpy() + 1.25)
+    assert np.allclose(grads[b].numpy(), 2 * a.numpy().sum(0) - 2)
+    assert grads.norm() > 0 and grads.finite() and len(grads) == 2
+
+
+def test_a_tape_lives_as_long_as_its_values():
+    x = restage.Tape().leaf(np.ones(3))
+    y = ops.sum_all(x * x)
+    gc.collect()
+    assert y.backward()[x].numpy().tolist() == [2, 2, 2]
+
+
+def test_wrong_use():
+    tape = restage.Tape()
+    x = tape.leaf(np.ones(3))
+    y = ops.sum_all(x)
+    for wrong in (lambda: x.backward(), lambda: restage.Tape().backward(y), lambda: ops.add(x, restage.Tape().leaf(np.ones(3))),
+                  lambda: tape.leaf(np.ones(3, int)), lambda: ops.sum_all(np.ones(3)).backward(), lambda: tape.leaf(None)):
+        with pytest.raises((restage.InputError, restage.WorkError)):
+            wrong()
+    y = ops.sum_all(x)
+    y.backward()
+    for stale in (lambda: y.backward(), lambda: x + 1):
+        with pytest.raises(restage.WorkError):
+            stale()
+    x = tape.leaf(np.ones(3))
+    y = ops.sum_all(ops.square(x))
+    x.value.assign([1, 2, 3])
+    with pytest.raises(restage.WorkError, match="changed"):
+        y.backward()
+
+
+def test_two_threads():
+    def work(seed, out):
+        for _ in range(20):
+            tape = restage.Tape()
+            x = tape.leaf(np.full((50, 50), seed, np.float32))
+            out.append(ops.sum_all(ops.matmul(x, x)).backward()[x].numpy()[0, 0])
+    outs = [[], [], []]
+    workers = [threading.Thread(target=work, args=(k + 1, out)) for k, out in enumerate(outs)]
+    for w in workers:
+        w.start()
+    for w in workers:
+        w.join()
+    assert [set(out) for out in outs] == [{100.0}, {200.0}, {300.0}]
+
+
+# ---- ops ----
+
+def arguments_of(function):
+    return [line for line in inspect.getdoc(function).splitlines()][0]
+
+
+def test_every_op_says_what_it_takes():
+    assert len(ops.__all__) >= 60
+    for name in ops.__all__:
+        assert len(inspect.getdoc(getattr(ops, name)).splitlines()) >= 3, name
+
+
+def test_ops_refuse_what_does_not_fit():
+    """No argument, however wrong, crashes an op."""
+    values = [None, 3, -1, 2.5, "x", [], np.zeros(0, np.float32), f32(1), f32(2, 3), f32(2, 3, 3), f32(2, 5, 3), f32(1, 2, 3, 4),
+              np.arange(6, dtype=np.int32).reshape(2, 3), np.full((2, 4), 10 ** 6, np.int32), f32(2, 0, 3), np.zeros((3, 3)),
+              (2, 3), (-5, 3), 10 ** 30, np.full((2, 5, 3), np.nan, np.float32), f32(2, 22, 3), [-7] * 22]
+    for name in ops.__all__:
+        op = getattr(ops, name)
+        for count in range(1, 13):
+            for _ in range(25):
+                given = [values[i] for i in rng.integers(0, len(values), count)]
+                try:
+                    op(*given)
+                except (restage.InputError, restage.WorkError, TypeError, MemoryError):
+                    pass
+                except Exception as error:
+                    raise AssertionError((name, given)) from error
+
+
+def test_ops_are_right():
+    x, w, b = f32(4, 5), f32(2, 5), f32(2)
+    assert np.allclose(ops.linear(x, w, b, "relu").numpy(), np.maximum(x @ w.T + b, 0), atol=1e-6)
+    assert np.allclose(ops.linear(x, w).numpy(), x @ w.T, atol=1e-6)
+    assert np.allclose(ops.softmax(x).numpy().sum(1), 1, atol=1e-6)
+    assert np.array_equal(ops.concat([x] * 20, 0).numpy(), np.concatenate([x] * 20))
+    assert np.array_equal(ops.permute(x, (1, 0)).numpy(), x.T) and ops.reshape(x, -1).shape == (20,)
+    assert np.array_equal(ops.slice(x, 1, 1, 3).numpy(), x[:, 1:3])
+    q, k, v = f32(1, 3, 4), f32(1, 6, 4), f32(1, 6, 2)
+    e = np.exp(q @ k.transpose(0, 2, 1))
+    assert np.allclose(ops.cross_attention(q, k, v).numpy(), e / e.sum(-1, keepdims=True) @ v, atol=1e-5)
+    points = f32(1, 9, 3)
+    near = ops.knn(points, points, 3).numpy()
+    assert near.dtype == np.int32 and (near[0, :, 0] == np.arange(9)).all()
+    assert ops.gather(points, near).shape == (1, 9, 3, 3)
+    assert ops.gru(f32(3, 2, 4), f32(2, 5), f32(15, 4), f32(15, 5), f32(15), f32(15)).shape == (3, 2, 5)
+    r = ops.axis_angle_to_matrix(0.1 * f32(1, 22, 3))
+    posed = ops.forward_kinematics(r, f32(1, 22, 3), f32(1, 3))
+    assert ops.joints_of(posed).shape == (1, 22, 3) and ops.rotations_of(posed).shape == (1, 22, 3, 3)
+    assert np.allclose(ops.quaternion_to_matrix(ops.matrix_to_quaternion(r)).numpy(), r.numpy(), atol=1e-5)
+    assert np.array_equal(ops.dropout(x, 0.5, seed=1).numpy(), ops.dropout(x, 0.5, seed=1).numpy())
+
+
+# ---- own ops ----
+
+def sigmoid(x):
+    return 1 / (1 + np.exp(-x))
+
+
+def test_an_own_op():
+    swish = restage.Op("swish", lambda x: x * sigmoid(x),
+                       lambda gy, y, x: gy * (sigmoid(x) + y * (1 - sigmoid(x))))
+    report = restage.gradcheck(swish, rng.normal(size=(3, 4)), name="swish")
+    assert report and report.compared == 12, report
+    dot = restage.Op("dot", lambda a, b: a * b, lambda gy, y, a, b: (gy * b, gy * a), "a[n], b[n]")
+    assert restage.gradcheck(lambda a, b: dot(a, b) + swish(a), rng.normal(size=5), rng.normal(size=5))
+    wrong = restage.Op("wrong", lambda x: x * x, lambda gy, y, x: gy * x)
+    report = restage.gradcheck(wrong, rng.normal(size=3) + 3)
+    assert not report and "finite differences say" in report.failures[0]
+    tape = restage.Tape()
+    x = tape.leaf(f32(3))
+    assert np.allclose(ops.sum_all(swish(x)).backward()[x].numpy(), sigmoid(x.numpy()) * (1 + x.numpy() * (1 - sigmoid(x.numpy()))), atol=1e-6)
+
+
+def test_own_ops_that_fail():
+    def angry(*_):
+        raise KeyError("mine")
+
+    tape = restage.Tape()
+    x = tape.leaf(f32(3))
+    with pytest.raises(KeyError, match="mine"):
+        restage.Op("a", angry, angry)(x)
+    y = ops.sum_all(restage.Op("b", lambda v: v, angry)(x))
+    with pytest.raises(KeyError, match="mine"):
+        y.backward()
+    for answer in (lambda *_: None, lambda *_: (1, 2), lambda *_: "x", lambda *_: np.zeros(7), lambda *_: np.zeros(3, complex)):
+        x = tape.leaf(f32(3))
+        y = ops.sum_all(restage.Op("c", lambda v: v, answer)(x))
+        try:
+            assert np.array_equal(y.backward()[x].numpy(), np.zeros(3))
+        except (restage.InputError, restage.WorkError):
+            pass
+    for forward in (lambda v: None, lambda v: "x", lambda v: np.zeros(3, int), lambda: 0):
+        with pytest.raises((restage.InputError, TypeError)):
+            restage.Op("d", forward, angry)(f32(3))
+    with pytest.raises(restage.InputError):
+        restage.Op("e", 1, 2)
+    with pytest.raises(KeyError):
+        restage.gradcheck(angry, f32(3))
+
+
+def test_gradcheck_of_ops():
+    assert restage.gradcheck(lambda x, w: ops.linear(x, w, activation="relu"), rng.normal(size=(3, 4)), rng.normal(size=(2, 4)))
+    before = restage.threads()
+    assert restage.gradcheck(lambda x: ops.tanh(2 * x + 1), rng.normal(size=4)) and restage.threads() == before
+    with pytest.raises(restage.InputError):
+        restage.gradcheck(lambda x: 3, f32(2))
+    kept = []
+    restage.gradcheck(lambda x: kept.append(x) or x * 2, f32(2))
+    for dead in kept:
+        with pytest.raises((restage.InputError, restage.WorkError)) if dead.on_tape else pytest.raises(ZeroDivisionError):
+            dead + 1
+            1 / 0
+
+
+# ---- models and training ----
+
+def train_mlp(steps=60, threads=0):
+    restage.set_threads(threads)
+    start = np.random.default_rng(5)
+    x = start.normal(size=(256, 8)).astype(np.float32)
+    target = np.sin(x.sum(1, keepdims=True)).astype(np.float32)
+    sizes = [(32, 8), (32, 32), (1, 32)]
+    layers = [(restage.Parameter(start.normal(size=s, scale=s[1] ** -0.5), dtype="float32"),
+               restage.Parameter(np.zeros(s[0]), dtype="float32")) for s in sizes]
+    adam = restage.Adam([p for layer in layers for p in layer], rate=1e-2)
+    losses = []
+    for _ in range(steps):
+        tape = restage.Tape()
+        h = x
+        for k, (w, b) in enumerate(layers):
+            h = ops.linear(h, tape.leaf(w), tape.leaf(b), "relu" if k < 2 else "none")
+        loss = ops.mse(h, target)
+        adam.step(loss.backward())
+        losses.append(loss.item())
+    restage.set_threads(0)
+    return losses, [p.numpy().copy() for layer in layers for p in layer]
+
+
+def test_a_small_model_learns():
+    losses, weights = train_mlp()
+    assert losses[-1] < 0.2 * losses[0]
+    for threads in (0, 1, 3):
+        again, same = train_mlp(threads=threads)
+        assert again == losses and all(np.array_equal(a, b) for a, b in zip(weights, same))
+
+
+def test_models_by_name(tmp_path):
+    net = restage.model("transfer/npt_pool", seed=1)
+    assert net.count() == sum(p.size for p in net.parameters()) > 0 and "transfer/npt_pool" in restage.models()
+    assert list(net.named_parameters()) == [n for n in net.state_dict() if n in net.named_parameters()]
+    other = restage.model("transfer/npt_pool", seed=2)
+    restage.save_safetensors(tmp_path / "w.safetensors", net.state_dict(), {"made": "here"})
+    state, metadata = restage.load_safetensors(tmp_path / "w.safetensors")
+    assert metadata == {"made": "here"}
+    other.load_state_dict(state)
+    pose, identity = f32(1, 1, 40, 3), f32(1, 30, 3)
+    assert np.array_equal(net(pose, identity).numpy(), other(pose, identity).numpy())
+    state.pop(next(iter(state)))
+    with pytest.raises(restage.InputError, match="missing"):
+        other.load_state_dict(state)
+    tape = restage.Tape()
+    y = net(pose, identity, tape=tape, training=True, seed=3)
+    assert y.shape == (1, 1, 30, 3)
+    grads = ops.mean_all(ops.square(y)).backward()
+    p = net.parameters()[0]
+    before = p.numpy().copy()
+    adam = restage.Adam(net)
+    adam.step(grads)
+    assert not np.array_equal(before, p.numpy())
+    saved = adam.state_dict()
+    restage.Adam(net).load_state_dict(saved)
+    del net
+    gc.collect()
+    assert np.isfinite(p.numpy()).all()
+
+
+def test_models_refuse():
+    for bad in ("no/model", "", 3, None):
+        with pytest.raises((restage.InputError, TypeError)):
+            restage.model(bad)
+    with pytest.raises(restage.InputError):
+        restage.model("skeleton/pointnet", sizes={"nonsense": 1})
+    for name in restage.models():
+        net = restage.model(name)
+        for given in ((), (f32(1),), (f32(2, 3), f32(2, 3)), (f32(1, 0, 3), f32(1, 5, 3)), (f32(1, 1, 4, 3), f32(2, 5, 3)), (None,),
+                      (f32(1, 2, 22, 3), f32(1, 2, 3), f32(2, 22, 3)), (np.zeros((1, 1, 4, 3)), np.zeros((1, 4, 3), int))):
+            try:
+                net(*given)
+            except (restage.InputError, restage.WorkError):
+                pass
+
+
+def test_train(tmp_path):
+    config = tmp_path / "c.yaml"
+    config.write_text("stages: [deformation]\nrun_root: %s\nname: t\ndata: {bodies: {train: 1, validation: 1, test: 1}, motions: {train: 1, "
+                      "validation: 1, test: 1}}\ndeformation: {optimiser: {steps: 4, batch: 2}}\n" % tmp_path)
+    seen = []
+    run = restage.train(config, on_step=lambda stage, done, figures: seen.append((stage, done)))
+    assert seen == [("deformation", k) for k in (1, 2, 3, 4)]
+    assert (tmp_path / run / "weights.safetensors").exists()
+
+    class Enough(Exception):
+        pass
+
+    def stop(stage, done, figures):
+        if done == 2:
+            raise Enough
+
+    with pytest.raises(Enough):
+        restage.train(config, on_step=stop)
+    with pytest.raises(restage.InputError):
+        restage.train(tmp_path / "no.yaml")

@@ -1,0 +1,112 @@
+"""Errors: the program's line, for files as for arrays; nothing crashes; Ctrl-C works."""
+import os
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+import restage
+
+from conftest import LITE
+
+
+def line_of(result):
+    return result.stderr.strip()
+
+
+def test_types():
+    assert issubclass(restage.InputError, ValueError) and issubclass(restage.WorkError, RuntimeError)
+
+
+def test_the_programs_line(program, walk):
+    for words, call in [
+        (["retarget", "--source", "no.h5", "--target", walk / "target.ply", "--out", "r.h5"],
+         lambda: restage.retarget("no.h5", walk / "target.ply", out="r.h5")),
+        (["retarget", "--source", walk / "target.ply", "--target", walk / "target.ply", "--out", "r.xyz"],
+         lambda: restage.retarget(walk / "target.ply", walk / "target.ply", out="r.xyz")),
+        (["doctor", "no.ply"], lambda: restage.doctor("no.ply")),
+        (["train", "no.yaml"], lambda: restage.command("train", "no.yaml")),
+        (["skeleton", "--weights", LITE, "--input", "no"], lambda: restage.command("skeleton", weights=LITE, input="no")),
+    ]:
+        told = program(*words)
+        assert told.returncode == 2
+        with pytest.raises(restage.InputError) as error:
+            call()
+        assert str(error.value) == line_of(told)
+
+
+def test_unknown_option(walk):
+    with pytest.raises(restage.InputError, match="did you mean '--samples'"):
+        restage.retarget("a", walk / "target.ply", sampels=3)
+    for name in ("json", "help", "threads", "a=b"):
+        with pytest.raises(restage.InputError, match="unknown option"):
+            restage.retarget("a", walk / "target.ply", **{name: True})
+
+
+BAD = [None, 3, "text", [], [[1, 2]], np.zeros((5, 2)), np.zeros((0, 3)), np.zeros(3), np.zeros((4, 3), complex),
+       np.array([["a", "b", "c"]]), np.full((70, 3), np.nan), [[1, 2, 3], [1]], np.zeros((2, 3), object), {1: 2}]
+
+
+@pytest.mark.parametrize("bad", BAD, ids=lambda b: type(b).__name__)
+def test_bad_clouds(walk, bad):
+    system = restage.System(walk / "target.ply", LITE, samples=1)
+    good = np.asarray(restage.load_cloud(walk / "target.ply"))
+    before = system.push(good).vertices.copy()
+    with pytest.raises(restage.InputError):
+        system.push(bad)
+    with pytest.raises(restage.InputError):
+        restage.skeleton([bad], LITE)
+    system.restart()
+    assert np.array_equal(system.push(good).vertices, before)
+
+
+def test_bad_sources(walk):
+    for bad in (3, [], [np.zeros((5, 2))], np.zeros((3, 3)), [None], object()):
+        with pytest.raises(restage.InputError):
+            restage.retarget(bad, walk / "target.ply", LITE)
+    for bad in (3, None, "a\0b", b"no", object()):
+        with pytest.raises(restage.InputError):
+            restage.retarget("a", bad, LITE)
+        with pytest.raises(restage.InputError):
+            restage.System(bad, LITE)
+        with pytest.raises((restage.InputError, TypeError)):
+            restage.load_mesh(bad)
+
+
+def test_out_of_range(walk):
+    for options in ({"samples": 0}, {"min_confidence": 2}, {"fps": 0}, {"every": 0}, {"scale": -1}, {"source_up": "q"},
+                    {"samples": "many"}, {"device": "abacus"}, {"system": "magic"}):
+        with pytest.raises(restage.InputError):
+            restage.retarget([np.zeros((80, 3))], walk / "target.ply", LITE, **options)
+    with pytest.raises(restage.InputError):
+        restage.set_threads(-1)
+
+
+def test_ctrl_c(walk):
+    cloud = restage.load_cloud(walk / "target.ply")
+    timer = threading.Timer(3.0, os.kill, (os.getpid(), signal.SIGINT))
+    start = time.monotonic()
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        restage.retarget([cloud] * 3000, walk / "target.ply", LITE)
+    assert time.monotonic() - start < 30
+
+
+def test_the_lock_of_python_is_free(walk):
+    """Another thread goes on while we compute."""
+    cloud = restage.load_cloud(walk / "target.ply")
+    counted = []
+    stop = threading.Event()
+
+    def count():
+        while not stop.is_set():
+            counted.append(1)
+            time.sleep(0.001)
+
+    worker = threading.Thread(target=count)
+    worker.start()
+    restage.retarget([cloud] * 20, walk / "target.ply", LITE)
+    stop.set()
+    worker.join()
+    assert len(counted) > 10

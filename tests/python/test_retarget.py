@@ -1,0 +1,121 @@
+"""restage.retarget, System, skeleton: the program's bits, from files and from arrays."""
+import threading
+
+import numpy as np
+import pytest
+import restage
+
+from conftest import LITE
+
+h5py = pytest.importorskip("h5py")
+
+
+@pytest.fixture(scope="module")
+def source(walk):
+    return walk / "source.h5"
+
+
+@pytest.fixture(scope="module")
+def truth(walk, source, program, tmp_path_factory):
+    """The program's own result."""
+    out = tmp_path_factory.mktemp("truth") / "truth.h5"
+    program.done("retarget", "--source", source, "--target", walk / "target.ply", "--weights", LITE, "--out", out)
+    with h5py.File(out) as f:
+        return {name: f[name][:] for name in ("vertices", "joints", "rotations", "confidence") if name in f}, out
+
+
+def same(frames, truth, first=0):
+    for name, values in truth.items():
+        assert getattr(frames, name).dtype == np.float32
+        assert np.array_equal(getattr(frames, name), values), name
+
+
+def test_arrays_are_the_programs(walk, source, truth):
+    result = restage.retarget(source, walk / "target.ply", LITE)
+    same(result, truth[0])
+    assert len(result) == len(truth[0]["joints"]) and result.filled == []
+    assert result.faces.shape[1] == 3 and result.report["frames"] == len(result)
+
+
+def test_files_are_the_programs(walk, source, truth, tmp_path):
+    report = restage.retarget(str(source), str(walk / "target.ply"), LITE, out=tmp_path / "r.h5")
+    assert report["frames"] == len(truth[0]["joints"])
+    assert (tmp_path / "r.h5").read_bytes() == truth[1].read_bytes()
+    with h5py.File(tmp_path / "r.h5") as f:
+        for name, values in truth[0].items():
+            assert np.array_equal(f[name][:], values), name
+
+
+def test_clouds_in_memory(walk, source, truth, tmp_path):
+    clouds = restage.load_clouds(source)
+    same(restage.retarget(clouds, walk / "target.ply", LITE), truth[0])
+    same(restage.retarget([c.astype(np.float64) for c in clouds], walk / "target.ply", LITE), truth[0])
+    restage.retarget(clouds, walk / "target.ply", LITE, out=tmp_path / "r.h5")
+    with h5py.File(tmp_path / "r.h5") as f:
+        assert np.array_equal(f["vertices"][:], truth[0]["vertices"])
+
+
+def test_push(walk, source, truth):
+    system = restage.System(walk / "target.ply", LITE)
+    frames = [f for cloud in restage.load_clouds(source) for f in system.push_all(cloud)] + system.finish()
+    assert len(frames) == len(truth[0]["joints"])
+    for k, frame in enumerate(frames):
+        same(frame, {name: values[k] for name, values in truth[0].items() if name != "confidence"})
+        if "confidence" in truth[0]:
+            assert np.float32(frame.confidence) == truth[0]["confidence"][k]
+    assert system.target_vertices.shape == truth[0]["vertices"].shape[1:]
+    assert system.rest_joints.shape == (22, 3) and system.source_joints.shape == (22, 3)
+
+
+def test_threads_change_nothing(walk, source, truth):
+    try:
+        for n in (1, 3):
+            restage.set_threads(n)
+            assert restage.threads() == n
+            same(restage.retarget(source, walk / "target.ply", LITE), truth[0])
+            assert restage.threads() == n
+    finally:
+        restage.set_threads(0)
+
+
+def test_frames_outlive_their_system(walk, source, truth):
+    system = restage.System(walk / "target.ply", LITE)
+    cloud = restage.load_clouds(source)[0]
+    arrays = [system.push(cloud).vertices for _ in range(20)]
+    copies = [a.copy() for a in arrays]
+    system.restart()
+    del system
+    assert all(np.array_equal(a, b) for a, b in zip(arrays, copies))
+    assert np.array_equal(arrays[0], truth[0]["vertices"][0])
+
+
+def test_two_threads_push_into_one_system(walk, source):
+    system = restage.System(walk / "target.ply", LITE, samples=1)
+    cloud = restage.load_clouds(source)[0]
+    got = []
+    workers = [threading.Thread(target=lambda: got.extend(system.push_all(cloud) for _ in range(5))) for _ in range(3)]
+    for w in workers:
+        w.start()
+    for w in workers:
+        w.join()
+    assert len(got) == 15
+
+
+def test_options_are_the_programs(walk, source):
+    few = restage.retarget(source, walk / "target.ply", LITE, every=2, foot_lock=False, samples=1, seed=3)
+    assert len(few) == 4 and few.report["seed"] == 3
+
+
+def test_skeleton(walk, source, program, tmp_path):
+    told = program.json("skeleton", "--weights", LITE, "--input", source)
+    joints = restage.skeleton(source, LITE)
+    assert joints.shape == (8, 22, 3)
+    assert np.array_equal(joints, [f["joints"] for f in told["frames"]])
+    cloud = restage.load_clouds(source)[2]
+    assert np.array_equal(restage.skeleton(cloud, LITE), joints[2])
+    assert np.array_equal(restage.skeleton([cloud], LITE)[0], joints[2])
+    assert np.array_equal(restage.skeleton(cloud.tolist(), LITE), joints[2])
+
+
+def test_standard_weights(walk, source):
+    assert restage.skeleton(restage.load_clouds(source)[0]).shape == (22, 3)

@@ -1,0 +1,112 @@
+"""Metrics, the closed form, readers, the doctor."""
+import json
+
+import numpy as np
+import pytest
+import restage
+from restage import metrics
+
+rng = np.random.default_rng(1)
+
+
+def test_metrics_are_the_programs(program, tmp_path):
+    h5py = pytest.importorskip("h5py")
+    truth = {"joints": rng.normal(size=(6, 22, 3)), "vertices": rng.normal(size=(6, 40, 3))}
+    pred = {k: v + 0.1 * rng.normal(size=v.shape) for k, v in truth.items()}
+    for name, values in (("p.h5", pred), ("t.h5", truth)):
+        with h5py.File(tmp_path / name, "w") as f:
+            for key, v in values.items():
+                f[key] = v
+    told = program.json("eval", "--pred", tmp_path / "p.h5", "--truth", tmp_path / "t.h5")["mean"]
+    ours = metrics.all(pred["joints"], truth["joints"], pred["vertices"], truth["vertices"])
+    for name, value in told.items():
+        assert ours[name] == value, name
+        of_joints = name in ("mpjpe", "pa_mpjpe", "acc", "pa_acc")
+        key = "joints" if of_joints else "vertices"
+        assert getattr(metrics, name)(pred[key], truth[key]) == value
+
+
+def test_metrics_that_cannot_be():
+    joints = rng.normal(size=(2, 22, 3))
+    assert metrics.mpjpe(joints, joints) == 0
+    assert metrics.mpjpe(joints[0], joints[0]) == 0
+    assert metrics.acc(joints, joints) is None
+    assert metrics.pa_mpjpe(np.zeros((2, 22, 3)), joints) is None
+    assert metrics.mpjpe(np.zeros((0, 22, 3)), np.zeros((0, 22, 3))) is None
+    for name in metrics.names:
+        for shape in ((3, 1, 3), (1, 5, 3), (3, 22, 3), (0, 0, 3), (4, 0, 3), (0, 7, 3), (3, 8, 3)):
+            value = getattr(metrics, name)(np.full(shape, np.nan), np.zeros(shape))
+            assert value is None or np.isfinite(value)
+            value = getattr(metrics, name)(rng.normal(size=shape), rng.normal(size=shape), joints=rng.normal(size=(shape[0], 22, 3)))
+            assert value is None or np.isfinite(value)
+    for bad in (np.zeros((2, 21, 3)), np.zeros(3), "x", None, np.zeros((2, 22, 2))):
+        with pytest.raises(restage.InputError):
+            metrics.mpjpe(bad, joints)
+
+
+def test_closed_form(walk):
+    rest = np.asarray(restage.System(walk / "target.ply", restage_lite()).rest_joints)
+    still = restage.closed_form(np.repeat(rest[None], 3, 0), rest)
+    assert still.joints.shape == (3, 22, 3) and still.rotations.shape == (3, 22, 4)
+    assert np.allclose(still.joints[0] - still.joints[0, 0], rest - rest[0], atol=1e-6)
+    assert np.allclose(still.rotations, [1, 0, 0, 0], atol=1e-6)
+    assert restage.closed_form(np.zeros((0, 22, 3)), rest).joints.shape == (0, 22, 3)
+    with pytest.raises(restage.InputError):
+        restage.closed_form(np.zeros((2, 22, 3)), rest[:5])
+    assert np.isfinite(restage.closed_form(np.zeros((2, 22, 3)), np.zeros((22, 3))).joints).all()
+
+
+def restage_lite():
+    from conftest import LITE
+    return LITE
+
+
+def test_readers(walk, program, tmp_path):
+    mesh = restage.load_mesh(walk / "target.ply")
+    assert mesh.vertices.dtype == np.float32 and mesh.faces.dtype == np.int32
+    assert mesh.faces.max() < len(mesh.vertices)
+    assert np.array_equal(restage.load_cloud(walk / "target.ply"), mesh.vertices)
+    np.save(tmp_path / "clouds.npy", np.stack([mesh.vertices] * 2))
+    clouds = restage.load_clouds(tmp_path / "clouds.npy", scale=2.0)
+    assert len(clouds) == 2 and np.array_equal(clouds[1], 2 * mesh.vertices)
+
+
+def test_motion(tmp_path):
+    names = ["Hips", "LeftUpLeg", "LeftLeg", "LeftFoot", "LeftToeBase", "RightUpLeg", "RightLeg", "RightFoot",
+             "RightToeBase", "Spine", "Spine1", "Spine2", "Neck", "Head", "LeftShoulder", "LeftArm", "LeftForeArm",
+             "LeftHand", "RightShoulder", "RightArm", "RightForeArm", "RightHand"]
+    from itertools import count
+    tree = ("Hips", (0, 100, 0), [
+        ("LeftUpLeg", (10, 0, 0), [("LeftLeg", (0, -45, 0), [("LeftFoot", (0, -45, 0), [("LeftToeBase", (0, -5, 12), [])])])]),
+        ("RightUpLeg", (-10, 0, 0), [("RightLeg", (0, -45, 0), [("RightFoot", (0, -45, 0), [("RightToeBase", (0, -5, 12), [])])])]),
+        ("Spine", (0, 10, 0), [("Spine1", (0, 12, 0), [("Spine2", (0, 12, 0), [
+            ("Neck", (0, 18, 0), [("Head", (0, 10, 0), [])]),
+            ("LeftShoulder", (5, 12, 0), [("LeftArm", (12, 0, 0), [("LeftForeArm", (28, 0, 0), [("LeftHand", (25, 0, 0), [])])])]),
+            ("RightShoulder", (-5, 12, 0), [("RightArm", (-12, 0, 0), [("RightForeArm", (-28, 0, 0), [("RightHand", (-25, 0, 0), [])])])]),
+        ])])])])
+    number = count()
+
+    def text(node, root=True):
+        name, offset, children = node
+        next(number)
+        kind = "ROOT" if root else "JOINT"
+        channels = "6 Xposition Yposition Zposition Zrotation Xrotation Yrotation" if root else "3 Zrotation Xrotation Yrotation"
+        end = "" if children else "End Site\n{\nOFFSET 0 1 0\n}\n"
+        inner = "".join(text(c, False) for c in children)
+        return f"{kind} {name}\n{{\nOFFSET {' '.join(map(str, offset))}\nCHANNELS {channels}\n{inner}{end}}}\n"
+
+    hierarchy = text(tree)
+    row = " ".join(["0 100 0"] + ["0"] * 3 * next(number))
+    (tmp_path / "still.bvh").write_text(f"HIERARCHY\n{hierarchy}MOTION\nFrames: 4\nFrame Time: 0.0333333\n" + f"{row}\n" * 4)
+    clip = restage.load_motion(tmp_path / "still.bvh")
+    assert len(names) == 22 and clip.joints.shape == (4, 22, 3) and clip.rotations.shape == (4, 22, 4)
+    assert np.allclose(clip.rotations, [1, 0, 0, 0], atol=1e-6)
+    with pytest.raises(restage.InputError):
+        restage.load_motion(tmp_path / "no.bvh")
+
+
+def test_doctor(walk, program):
+    told = program.json("doctor", walk / "target.ply")
+    ours = restage.doctor(walk / "target.ply")
+    assert ours == told and ours["usable"]
+    assert json.dumps(restage.command("info", "skeleton/pointnet")["parameters"]) == "1620811"
