@@ -56,6 +56,8 @@ void translate(std::exception_ptr thrown) {
     }
   } catch (const Error&) {
     translate_ours(thrown);
+  } catch (const py::cast_error&) {
+    set(shape_error_type, ShapeError("a number is too large, or is no number"));
   }
 }
 

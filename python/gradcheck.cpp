@@ -7,18 +7,31 @@
 namespace restage::python {
 namespace {
 
-/// A function of Python as the harness calls it.
-gradcheck::Build build_of(const py::object& f) {
+std::string first_line(const py::error_already_set& error) {
+  const std::string text = error.what();
+  return text.substr(0, text.find('\n'));
+}
+
+/// A function of Python as the harness calls it. The harness takes an exception for a finding;
+/// `raised` keeps one of Python's own.
+gradcheck::Build build_of(const py::object& f, std::exception_ptr& raised) {
   // It is let go where the harness's copies are, which may be without the GIL.
   const std::shared_ptr<py::object> held(new py::object(f), [](py::object* p) {
     const py::gil_scoped_acquire acquired;
     delete p;
   });
-  return [held](gradcheck::Args x) {
+  return [held, &raised](gradcheck::Args x) {
     const py::gil_scoped_acquire acquired;
     py::list arguments;
     for (const Var& v : x) arguments.append(py::cast(PyVar{v, nullptr, 0}));
-    const py::object y = (*held)(*py::tuple(arguments));
+    py::object y;
+    try {
+      y = (*held)(*py::tuple(arguments));
+    } catch (const py::error_already_set& error) {
+      if (!error.matches(PyExc_ValueError) && !error.matches(PyExc_RuntimeError))
+        raised = std::current_exception();
+      throw Error(first_line(error));
+    }
     if (!py::isinstance<PyVar>(y)) throw ShapeError("gradcheck: the function gave no Var");
     return y.cast<PyVar>().var;
   };
@@ -39,7 +52,8 @@ PyReport check(const py::object& f, const py::args& inputs, const std::string& n
     const Tensor t = tensor_of(one);
     sample.inputs.push_back(t.cast(DType::f64).clone());
   }
-  sample.build = build_of(f);
+  std::exception_ptr raised;
+  sample.build = build_of(f, raised);
   sample.zero_gradient = zero_gradient;
   sample.f32_tolerance = f32_tolerance;
   const int before = threads();
@@ -52,6 +66,7 @@ PyReport check(const py::object& f, const py::args& inputs, const std::string& n
     throw;
   }
   set_threads(before);
+  if (raised) std::rethrow_exception(raised);
   return out;
 }
 

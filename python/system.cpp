@@ -80,6 +80,14 @@ class PySystem {
     return seen ? py::object(array_of(*seen)) : py::none();
   }
 
+  py::dict times() {
+    FrameTimes t;
+    locked([&] { t = system_->times(); });
+    py::dict out;
+    out["extract"] = t.extract, out["motion"] = t.motion, out["deformation"] = t.deformation;
+    return out;
+  }
+
  private:
   void add_options(cli::CommandOptions app) {
     cli::add_target_options(app, c_);
@@ -177,6 +185,8 @@ void add_system(py::module_& m) {
       .def_property_readonly("faces", &PySystem::faces, "int32 [T, 3], the target's triangles")
       .def_property_readonly("rest_joints", &PySystem::rest_joints,
                              "float64 [22, 3], the target's joints in T-pose, metres, or None")
+      .def_property_readonly("times", &PySystem::times,
+                             "how long the parts of the last push() took, seconds")
       .def_property_readonly("source_joints", &PySystem::source_joints,
                              "float64 [22, 3], the source's joints in the last cloud, or None");
 }

@@ -223,8 +223,7 @@ def test_gradcheck_of_ops():
     assert restage.gradcheck(lambda x, w: ops.linear(x, w, activation="relu"), rng.normal(size=(3, 4)), rng.normal(size=(2, 4)))
     before = restage.threads()
     assert restage.gradcheck(lambda x: ops.tanh(2 * x + 1), rng.normal(size=4)) and restage.threads() == before
-    with pytest.raises(restage.InputError):
-        restage.gradcheck(lambda x: 3, f32(2))
+    assert "gave no Var" in restage.gradcheck(lambda x: 3, f32(2)).failures[0]
     kept = []
     restage.gradcheck(lambda x: kept.append(x) or x * 2, f32(2))
     for dead in kept:
@@ -268,7 +267,7 @@ def test_a_small_model_learns():
 def test_models_by_name(tmp_path):
     net = restage.model("transfer/npt_pool", seed=1)
     assert net.count() == sum(p.size for p in net.parameters()) > 0 and "transfer/npt_pool" in restage.models()
-    assert list(net.named_parameters()) == [n for n in net.state_dict() if n in net.named_parameters()]
+    assert set(net.named_parameters()) <= set(net.state_dict())
     other = restage.model("transfer/npt_pool", seed=2)
     restage.save_safetensors(tmp_path / "w.safetensors", net.state_dict(), {"made": "here"})
     state, metadata = restage.load_safetensors(tmp_path / "w.safetensors")

@@ -1,0 +1,18 @@
+"""Every example of docs/python.md runs, in the order of the page."""
+import re
+import shutil
+
+from conftest import LITE, ROOT
+
+
+def test_examples(walk, tmp_path, monkeypatch):
+    shutil.copy(walk / "source.h5", tmp_path / "walk.h5")
+    shutil.copy(walk / "target.ply", tmp_path / "hero.ply")
+    monkeypatch.chdir(tmp_path)
+    page = (ROOT / "docs/python.md").read_text()
+    names = {"weights": LITE}
+    examples = re.findall(r"^```python\n(.*?)^```$", page, re.M | re.S)
+    assert len(examples) >= 8
+    for example in examples:
+        exec(compile(example, "docs/python.md", "exec"), names)
+    assert (tmp_path / "hero_walking.glb").exists() and names["loss"].item() < 2
