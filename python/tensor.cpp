@@ -106,7 +106,9 @@ Tensor tensor_of(const py::handle& value, bool share) {
       py::array::ensure(py::module_::import("numpy").attr("require")(any, numpy_of(type), "CA"));
   if (!as_held) throw py::error_already_set();
   void* data = const_cast<void*>(as_held.data());
-  if (share || data != any.data()) return Tensor::borrow(shape, type, data, keeper_of(as_held));
+  // What may not be written to is no memory for a tensor, which assign() writes to.
+  if ((share && as_held.writeable()) || data != any.data())
+    return Tensor::borrow(shape, type, data, keeper_of(as_held));
   Tensor out = Tensor::empty(shape, type);
   if (out.numel() > 0) std::memcpy(out.bytes(), data, static_cast<size_t>(as_held.nbytes()));
   return out;

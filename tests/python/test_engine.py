@@ -1,4 +1,5 @@
 """Tensors, the tape, ops, own ops, gradcheck, models, optimisers."""
+import copy
 import gc
 import inspect
 import threading
@@ -45,6 +46,13 @@ def test_memory_is_shared_and_kept_alive():
     copy = view.copy()
     gc.collect()
     assert np.array_equal(view, copy)
+
+
+def test_read_only_memory_is_not_written_to():
+    a = np.frombuffer(bytes(24), np.float32)
+    t = restage.Tensor(a, copy=False)
+    t.assign(np.ones(6))
+    assert not a.any() and t.numpy().all()
 
 
 def test_assign():
@@ -308,6 +316,58 @@ def test_models_refuse():
                 net(*given)
             except (restage.InputError, restage.WorkError):
                 pass
+
+
+def test_sizes_and_files_that_cannot_be(tmp_path):
+    for sizes in ({"width": 10 ** 9}, {"dropout": 2}, {"width": "many"}, {"width": -1}):
+        with pytest.raises(restage.InputError):
+            restage.model("deformation/weights", sizes=sizes)
+    (tmp_path / "bad.safetensors").write_bytes(b"\xff" * 100)
+    for path in (tmp_path / "bad.safetensors", tmp_path / "none", tmp_path, 3):
+        with pytest.raises(restage.InputError):
+            restage.load_safetensors(path)
+        with pytest.raises(restage.InputError):
+            restage.load_model(path, "skeleton")
+    with pytest.raises((restage.InputError, restage.WorkError)):
+        restage.save_safetensors(tmp_path / "no/such/folder", {"a": [1.0]})
+    with pytest.raises(restage.InputError):
+        restage.save_safetensors(tmp_path / "x", {"a": "text"})
+
+
+def test_adam_refuses():
+    p = restage.Parameter(np.ones(3))
+    for wrong in ([1], 3, {"a": 2}, None):
+        with pytest.raises(restage.InputError):
+            restage.Adam(wrong)
+    for options in ({"rate": -1}, {"beta1": 1}, {"eps": 0}, {"rate": float("nan")}):
+        with pytest.raises(restage.InputError):
+            restage.Adam([p], **options)
+    adam = restage.Adam([p], rate=0.5)
+    tape = restage.Tape()
+    adam.step(ops.sum_all(tape.leaf(np.ones(2))).backward())
+    assert p.numpy().tolist() == [1, 1, 1]
+    adam.step(ops.sum_all(ops.square(tape.leaf(p))).backward())
+    assert np.allclose(p.numpy(), 0.5)
+    with pytest.raises(restage.InputError):
+        adam.load_state_dict({"nonsense": np.ones(3)})
+    for kind in (restage.Var, restage.Gradients, restage.Frame, restage.Model):
+        with pytest.raises(TypeError):
+            kind()
+    for whole in (tape, adam, p, restage.Tensor([1.0]), tape.leaf(p), restage.model("deformation/weights")):
+        with pytest.raises(TypeError):
+            copy.copy(whole)
+        with pytest.raises(TypeError):
+            copy.deepcopy(whole)
+
+
+def test_stubs_name_everything():
+    import ast
+    import pathlib
+    for module, stub in ((restage, "__init__"), (ops, "ops"), (restage.metrics, "metrics")):
+        tree = ast.parse((pathlib.Path(restage.__file__).parent / f"{stub}.pyi").read_text())
+        named = {n.name for n in tree.body if hasattr(n, "name")} | {a.asname for n in tree.body if isinstance(n, ast.ImportFrom) for a in n.names}
+        named |= {n.target.id for n in tree.body if isinstance(n, ast.AnnAssign)}
+        assert set(module.__all__) <= named, set(module.__all__) - named
 
 
 def test_train(tmp_path):

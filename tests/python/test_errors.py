@@ -93,6 +93,22 @@ def test_ctrl_c(walk):
     assert time.monotonic() - start < 30
 
 
+def test_ctrl_c_ends_a_training(tmp_path):
+    config = tmp_path / "c.yaml"
+    config.write_text("stages: [deformation]\nrun_root: %s\nname: t\ndata: {bodies: {train: 1, validation: 1, test: 1}, motions: {train: 1, "
+                      "validation: 1, test: 1}}\ndeformation: {optimiser: {steps: 100000, batch: 2}}\n" % tmp_path)
+    seen = []
+
+    def step(stage, done, figures):
+        seen.append(done)
+        if done == 5:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        restage.train(config, on_step=step)
+    assert 5 <= seen[-1] <= 6 and list(tmp_path.glob("t-*/checkpoints/deformation-*"))
+
+
 def test_the_lock_of_python_is_free(walk):
     """Another thread goes on while we compute."""
     cloud = restage.load_cloud(walk / "target.ply")

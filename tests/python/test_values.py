@@ -1,10 +1,13 @@
 """Metrics, the closed form, readers, the doctor."""
 import json
+from itertools import count
 
 import numpy as np
 import pytest
 import restage
 from restage import metrics
+
+from conftest import LITE
 
 rng = np.random.default_rng(1)
 
@@ -45,7 +48,7 @@ def test_metrics_that_cannot_be():
 
 
 def test_closed_form(walk):
-    rest = np.asarray(restage.System(walk / "target.ply", restage_lite()).rest_joints)
+    rest = np.asarray(restage.System(walk / "target.ply", LITE).rest_joints)
     still = restage.closed_form(np.repeat(rest[None], 3, 0), rest)
     assert still.joints.shape == (3, 22, 3) and still.rotations.shape == (3, 22, 4)
     assert np.allclose(still.joints[0] - still.joints[0, 0], rest - rest[0], atol=1e-6)
@@ -54,11 +57,6 @@ def test_closed_form(walk):
     with pytest.raises(restage.InputError):
         restage.closed_form(np.zeros((2, 22, 3)), rest[:5])
     assert np.isfinite(restage.closed_form(np.zeros((2, 22, 3)), np.zeros((22, 3))).joints).all()
-
-
-def restage_lite():
-    from conftest import LITE
-    return LITE
 
 
 def test_readers(walk, program, tmp_path):
@@ -71,11 +69,9 @@ def test_readers(walk, program, tmp_path):
     assert len(clouds) == 2 and np.array_equal(clouds[1], 2 * mesh.vertices)
 
 
-def test_motion(tmp_path):
-    names = ["Hips", "LeftUpLeg", "LeftLeg", "LeftFoot", "LeftToeBase", "RightUpLeg", "RightLeg", "RightFoot",
-             "RightToeBase", "Spine", "Spine1", "Spine2", "Neck", "Head", "LeftShoulder", "LeftArm", "LeftForeArm",
-             "LeftHand", "RightShoulder", "RightArm", "RightForeArm", "RightHand"]
-    from itertools import count
+@pytest.fixture
+def bvh(tmp_path):
+    """A recording of somebody who stands in T-pose and turns an arm."""
     tree = ("Hips", (0, 100, 0), [
         ("LeftUpLeg", (10, 0, 0), [("LeftLeg", (0, -45, 0), [("LeftFoot", (0, -45, 0), [("LeftToeBase", (0, -5, 12), [])])])]),
         ("RightUpLeg", (-10, 0, 0), [("RightLeg", (0, -45, 0), [("RightFoot", (0, -45, 0), [("RightToeBase", (0, -5, 12), [])])])]),
@@ -96,13 +92,28 @@ def test_motion(tmp_path):
         return f"{kind} {name}\n{{\nOFFSET {' '.join(map(str, offset))}\nCHANNELS {channels}\n{inner}{end}}}\n"
 
     hierarchy = text(tree)
-    row = " ".join(["0 100 0"] + ["0"] * 3 * next(number))
-    (tmp_path / "still.bvh").write_text(f"HIERARCHY\n{hierarchy}MOTION\nFrames: 4\nFrame Time: 0.0333333\n" + f"{row}\n" * 4)
-    clip = restage.load_motion(tmp_path / "still.bvh")
-    assert len(names) == 22 and clip.joints.shape == (4, 22, 3) and clip.rotations.shape == (4, 22, 4)
-    assert np.allclose(clip.rotations, [1, 0, 0, 0], atol=1e-6)
+    zeros = 3 * next(number)
+    rows = [" ".join(["0 100 0"] + ["0"] * (zeros - 3) + [str(5 * k), "0", "0"]) for k in range(4)]
+    (tmp_path / "still.bvh").write_text(f"HIERARCHY\n{hierarchy}MOTION\nFrames: 4\nFrame Time: 0.0333333\n" + "\n".join(rows) + "\n")
+    return tmp_path / "still.bvh"
+
+
+def test_motion(bvh, tmp_path):
+    clip = restage.load_motion(bvh)
+    assert clip.joints.shape == (4, 22, 3) and clip.rotations.shape == (4, 22, 4)
+    assert np.allclose(clip.rotations[0], [1, 0, 0, 0], atol=1e-6) and not np.allclose(clip.rotations[3], clip.rotations[0], atol=1e-2)
     with pytest.raises(restage.InputError):
         restage.load_motion(tmp_path / "no.bvh")
+
+
+def test_a_skeleton_as_source(bvh, walk, program, tmp_path):
+    h5py = pytest.importorskip("h5py")
+    program.done("retarget", "--source", bvh, "--target", walk / "target.ply", "--weights", LITE, "--out", tmp_path / "t.h5")
+    result = restage.retarget(bvh, walk / "target.ply", LITE)
+    assert result.confidence is None and result.report["from"] == "skeleton"
+    with h5py.File(tmp_path / "t.h5") as f:
+        for name in ("vertices", "joints", "rotations"):
+            assert np.array_equal(getattr(result, name), f[name][:]), name
 
 
 def test_doctor(walk, program):
