@@ -1,6 +1,7 @@
 // restage.System: clouds in, frames out, one at a time.
 #include "infer/system.h"
 
+#include <chrono>
 #include <mutex>
 
 #include "datasets/doctor/examine.h"
@@ -51,9 +52,13 @@ class PySystem {
   Frames push(const py::object& points, const std::string& name) {
     Points cloud = points_of(points, name);
     return locked([&] {
+      const auto start = std::chrono::steady_clock::now();
       (*to_ours_)(cloud);
       if (!c_.options.force) check_frame(cloud, name);
-      return copy(system_->push(cloud, name));
+      const std::span<const RetargetedFrame> made = system_->push(cloud, name);
+      frame_seconds_ =
+          std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      return copy(made);
     });
   }
   Frames finish() {
@@ -82,9 +87,11 @@ class PySystem {
 
   py::dict times() {
     FrameTimes t;
-    locked([&] { t = system_->times(); });
+    double frame = 0;
+    locked([&] { t = system_->times(), frame = frame_seconds_; });
     py::dict out;
     out["extract"] = t.extract, out["motion"] = t.motion, out["deformation"] = t.deformation;
+    out["frame"] = frame;
     return out;
   }
 
@@ -127,6 +134,7 @@ class PySystem {
   }
 
   std::mutex mutex_;
+  double frame_seconds_ = 0;  // of C++ in the last push
   cli::RetargetCommand c_;
   std::optional<ToOurs> to_ours_;
   std::unique_ptr<System> system_;
@@ -185,8 +193,9 @@ void add_system(py::module_& m) {
       .def_property_readonly("faces", &PySystem::faces, "int32 [T, 3], the target's triangles")
       .def_property_readonly("rest_joints", &PySystem::rest_joints,
                              "float64 [22, 3], the target's joints in T-pose, metres, or None")
-      .def_property_readonly("times", &PySystem::times,
-                             "how long the parts of the last push() took, seconds")
+      .def_property_readonly(
+          "times", &PySystem::times,
+          "how long the parts of the last push() took, seconds; frame: all that C++ did")
       .def_property_readonly("source_joints", &PySystem::source_joints,
                              "float64 [22, 3], the source's joints in the last cloud, or None");
 }
