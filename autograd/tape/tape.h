@@ -67,7 +67,9 @@ class Saved {
 
   /// Keeps tensors that are complete: if one is changed before the backward pass, that pass is an
   /// Error. An op whose gradient needs shapes only keeps none.
-  void keep(std::initializer_list<Tensor> tensors) { keep_all(tensors); }
+  void keep(std::initializer_list<Tensor> tensors) {
+    if (on()) keep_all(tensors);  // nothing is taken from the heap where nothing is kept
+  }
   /// The same of any number of tensors.
   void keep_all(std::vector<Tensor> tensors);
   const Tensor& operator[](size_t i) const { return tensors_[i]; }
