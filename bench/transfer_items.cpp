@@ -52,16 +52,15 @@ class TransferTraining : public Training {
     auto& lart = dynamic_cast<Lart&>(*net_);
     const int64_t n = pairs_.truth.size(0), last = pairs_.truth.size(1) - 1;
     const Var codes = lart.codes(ctx, pairs_.pose);
-    const auto code = [&](int64_t t) {
-      return reshape(slice(codes, 1, t, t + 1), {n, codes.size(2)});
-    };
+    const auto code = [&](int64_t t) { return slice(codes, 1, t, t + 1); };
     const auto truth = [&](int64_t t) {
       const Var frame = slice(pairs_.truth, 1, t, t + 1);
       return slice(reshape(frame, {n, frame.size(2), 3}), 1, 0, metric_points_).value;
     };
     const Var mixed =
         lart.decode(ctx, code(0) * (1 - kMixture) + code(last) * kMixture, pairs_.identity);
-    return metric_loss(slice(mixed, 1, 0, metric_points_), truth(0), truth(last), kMixture);
+    const Var mesh = reshape(mixed, {n, mixed.size(2), 3});
+    return metric_loss(slice(mesh, 1, 0, metric_points_), truth(0), truth(last), kMixture);
   }
 
   int64_t metric_points_;
