@@ -12,6 +12,7 @@
 #include "experiments/doctor_repair.h"
 #include "experiments/scratch.h"
 #include "experiments/world_map.h"
+#include "infer/transfer.h"
 #include "nn/geometry/closed_form.h"
 
 namespace restage {
@@ -23,10 +24,40 @@ std::string in(const std::string& folder, const char* file) {
   return (fs::path(folder) / file).string();
 }
 
+bool same(const Joints& a, const Joints& b) {
+  for (size_t j = 0; j < kJoints; ++j)
+    if ((a[j] - b[j]).norm() > 1e-4) return false;
+  return true;
+}
+
+/// The file with the source's own vertices, frame by frame. A benchmark stores clouds of the
+/// sources only; but in its set `naked` everybody who is the source of a motion is the target of
+/// the same motion in another sequence, and the truth of that sequence is what the source did.
+std::string source_mesh(const std::string& folder) {
+  const std::string own = in(folder, "source_mesh.h5");
+  if (fs::exists(own)) return own;
+  const PredictionFile source(in(folder, "source.h5"));
+  const std::vector<Joints> did = joints_of(source.joints());
+  std::error_code none;
+  for (const auto& entry :
+       fs::directory_iterator(fs::path(folder).parent_path().parent_path() / "naked", none)) {
+    const std::string path = in(entry.path().string(), "truth.h5");
+    if (!fs::exists(path)) continue;
+    const PredictionFile truth(path);
+    if (truth.data.frames != source.data.frames) continue;
+    const std::vector<Joints> there = joints_of(truth.joints());
+    if (std::equal(did.begin(), did.end(), there.begin(), there.end(), same)) return path;
+  }
+  throw InputError(in(folder, "source.h5"),
+                   "has clouds, and these weights need the source's vertices, which no sequence of "
+                   "the set naked has",
+                   "evaluate these weights on the sets test and naked");
+}
+
 /// What the target did, as a file of predictions would hold it.
 Prediction retargeted(const Bundle& weights, const std::string& folder, const std::string& clouds,
                       const BenchmarkOptions& how) {
-  const auto frames = open_frames(clouds);
+  const auto frames = open_frames(needs_correspondence(weights) ? source_mesh(folder) : clouds);
   const SystemType& type = system_type(how.system);
   SystemInput input;
   input.weights = weights;
@@ -162,8 +193,10 @@ void judge_test_clips(const Bundle& weights, const std::string& folder, const Be
     s.motion = i;
     s.frames = test.motions[i].frames();
     const Scratch scratch;
-    write_sequence(Performance(test, s, ScanConfig{}, 0), {test.license, test.description},
-                   scratch.folder());
+    const Performance performance(test, s, ScanConfig{}, 0);
+    const FileInfo info{test.license, test.description};
+    write_sequence(performance, info, scratch.folder());
+    if (needs_correspondence(weights)) write_source_mesh(performance, info, scratch.folder());
     names->push_back(test.motions[i].id + "-" + test.bodies[s.body_a].id + "-" +
                      test.bodies[s.body_b].id);
     judge(weights, scratch.folder(), false, how, scores);

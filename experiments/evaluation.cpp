@@ -1,5 +1,6 @@
 #include "experiments/evaluation.h"
 
+#include "infer/transfer.h"
 #include "nn/geometry/closed_form.h"
 #include "train/stages/skeleton_stage.h"
 
@@ -150,7 +151,8 @@ struct Condition {
 /// Known joints are for a system whose networks can be judged one by one; others see clouds and
 /// nothing else. What is nothing but an extractor is judged as one.
 std::vector<Condition> conditions_of(const SystemType& type, const Bundle& weights) {
-  std::vector<Condition> out = {{"clouds", type.roles}};
+  std::vector<Condition> out = {
+      {needs_correspondence(weights) ? "true_vertices" : "clouds", type.roles}};
   if (!type.parts) return out;
   out.push_back({"true_skeletons", {"motion"}});
   out.push_back({"true_poses", {"deformation.weights"}});
@@ -251,12 +253,13 @@ SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weigh
       } else if (name == "source_joints" || name == "rest_joints") {
         judge_extraction(performance, weights.need_as<SkeletonModel>("skeleton", weights_name),
                          name == "rest_joints", options, &scores);
-      } else if (name == "clouds") {
+      } else if (name == "clouds" || name == "true_vertices") {
         SystemInput input{weights, weights_name, target.rest, target.id, {}, how};
         if (type.needs_rest) input.rest = target.joints;
         const auto system = type.make(std::move(input));
         const auto push = [&](size_t i) {
-          return system->push(performance.cloud(i), "frame " + std::to_string(i));
+          return system->push(name == "clouds" ? performance.cloud(i) : performance.vertices_a(i),
+                              "frame " + std::to_string(i));
         };
         judge_retargeting(performance, *system, push, options, truth, &scores);
       } else {

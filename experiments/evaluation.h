@@ -29,6 +29,8 @@ struct SystemScores {
 struct SystemEvaluation {
   /// By condition, as far as there are models for it:
   ///   "clouds"          clouds in, the target's joints extracted: end to end (skeleton, motion)
+  ///   "true_vertices"   in the place of clouds, for a network that needs the source's vertices in
+  ///                     the target's order (transfer)
   ///   "true_skeletons"  true joints of source and target: no extractor (motion)
   ///   "source_joints", "rest_joints"  of weights that are an extractor alone: its joints of the
   ///                     source's clouds and of the target's T-pose (skeleton)

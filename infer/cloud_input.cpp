@@ -12,17 +12,48 @@ namespace {
 
 constexpr int64_t kUsualPoints = 1024;
 
-}  // namespace
+[[noreturn]] void refuse(const std::string& where, const std::string& what) {
+  throw InputError(where, what, "give weights as a training left them");
+}
 
-int64_t trained_points(const TrainedModel& model, const std::string& where) {
-  const auto found = model.settings.find("points");
-  if (found == model.settings.end()) return kUsualPoints;
+/// The number that a setting holds, 0 to `most`; `usual` if there is no such setting.
+int64_t count_of(const TrainedModel& model, const char* setting, int64_t usual, int64_t most,
+                 const std::string& where) {
+  const auto found = model.settings.find(setting);
+  if (found == model.settings.end()) return usual;
   const std::string& text = found->second;
   int64_t out = -1;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), out);
-  if (error != std::errc() || end != text.data() + text.size() || out < 0 || out > kMostPoints)
-    throw InputError(where, "says that its network sees '" + text.substr(0, 20) + "' points",
-                     "give weights as a training left them");
+  if (error != std::errc() || end != text.data() + text.size() || out < 0 || out > most)
+    refuse(where, "says that its network sees '" + text.substr(0, 20) + "' " + setting);
+  return out;
+}
+
+}  // namespace
+
+int64_t trained_points(const TrainedModel& model, const std::string& where) {
+  return count_of(model, "points", kUsualPoints, kMostPoints, where);
+}
+
+int64_t trained_vertices(const TrainedModel& model, const std::string& where) {
+  return count_of(model, "vertices", 0, 1'000'000, where);
+}
+
+std::vector<int32_t> kept_vertices(const TrainedModel& model, const std::string& where) {
+  const auto found = model.settings.find("kept");
+  std::vector<int32_t> out;
+  if (found == model.settings.end()) refuse(where, "does not say which vertices its network moves");
+  const char *at = found->second.data(), *const end = at + found->second.size();
+  while (at < end) {
+    int32_t vertex = -1;
+    const auto [next, error] = std::from_chars(at, end, vertex);
+    if (error != std::errc() || (next < end && *next != ',') || vertex < 0 ||
+        (!out.empty() && vertex <= out.back()))
+      refuse(where, "has a damaged list of the vertices that its network moves");
+    out.push_back(vertex);
+    at = next + (next < end);
+  }
+  if (out.empty()) refuse(where, "has an empty list of the vertices that its network moves");
   return out;
 }
 

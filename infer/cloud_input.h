@@ -12,6 +12,13 @@ namespace restage {
 /// has vertices. 1,024 where the weights do not say it. InputError naming `where`: no such number.
 int64_t trained_points(const TrainedModel& model, const std::string& where);
 
+/// Vertices that bodies were thinned to in the training of these weights (setting `vertices`); 0:
+/// they were not. InputError naming `where`: no such number.
+int64_t trained_vertices(const TrainedModel& model, const std::string& where);
+/// Where vertices had to correspond: which vertices were kept (setting `kept`: "0,17,20"),
+/// ascending. InputError naming `where`: there is no such list, or it is damaged.
+std::vector<int32_t> kept_vertices(const TrainedModel& model, const std::string& where);
+
 /// UnusableCloud naming `source`: too few points for a body, or one that is not finite.
 void require_body(const Points& cloud, const std::string& source);
 

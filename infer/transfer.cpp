@@ -16,7 +16,41 @@ void move(Points& points, const Point& by) {
   for (Point& p : points) p += by;
 }
 
+Points in_order(const Points& points, const std::vector<int32_t>& order) {
+  Points out;
+  for (const int32_t i : order) out.push_back(points[static_cast<size_t>(i)]);
+  return out;
+}
+
+/// All numbers below `count`.
+std::vector<int32_t> all_of(size_t count) {
+  std::vector<int32_t> out(count);
+  std::iota(out.begin(), out.end(), 0);
+  return out;
+}
+
+/// The vertices of the target that the network is shown, in this order. A training that thinned
+/// bodies has noted to how many vertices, and, where they had to correspond, to which.
+std::vector<int32_t> shown_vertices(const TrainedModel& model, bool corresponding,
+                                    const Points& target, const std::string& weights_name,
+                                    const RngKey& key) {
+  const auto trained = static_cast<size_t>(trained_vertices(model, weights_name));
+  if (corresponding && trained > 0) return kept_vertices(model, weights_name);
+  std::vector<int32_t> out = trained > 0 && trained < target.size() ? evenly_spread(target, trained)
+                                                                    : all_of(target.size());
+  if (corresponding) return out;
+  if (out.size() < EmbeddedMesh::kFewest) out = all_of(target.size());  // the others coincide
+  Rng rng(key);
+  for (size_t i = 0; i < out.size(); ++i) std::swap(out[i], out[i + rng.below(out.size() - i)]);
+  return out;
+}
+
 }  // namespace
+
+bool needs_correspondence(const Bundle& weights) {
+  const auto* model = weights.find_as<TransferModel>("transfer");
+  return model != nullptr && model->corresponding();
+}
 
 Transfer::Transfer(const Bundle& weights, const std::string& weights_name, Mesh target,
                    const std::string& where, const RetargetOptions& options)
@@ -24,11 +58,6 @@ Transfer::Transfer(const Bundle& weights, const std::string& weights_name, Mesh 
   const TrainedModel& found = weights.need("transfer", weights_name);
   model_ = std::dynamic_pointer_cast<TransferModel>(found.net);
   if (model_ == nullptr) weights.need_as<TransferModel>("transfer", weights_name);
-  if (model_->corresponding())
-    throw InputError(
-        weights_name,
-        "holds " + found.model + ", which needs the source's points in the target's order",
-        "give weights of another model");
   if (options.fps != kFps)
     throw InputError("",
                      format("the source has %g frames a second, and this system answers each cloud",
@@ -36,20 +65,51 @@ Transfer::Transfer(const Bundle& weights, const std::string& weights_name, Mesh 
                      "give clouds at 30 frames a second");
   if (target_.vertices.empty())
     throw InputError(where, "has no vertices", "give a mesh or a cloud");
-  points_ = trained_points(found, weights_name);
-  if (points_ == 0 || model_->equal_counts()) points_ = std::ssize(target_.vertices);
   Points centred = target_.vertices;
   const Box box = box_of(centred);
   height_ = box.sizes().y();
   move(centred, -box.center());
-  order_.resize(centred.size());
-  std::iota(order_.begin(), order_.end(), size_t{0});
-  Rng rng(RngKey{seed_, 0}.fold("transfer.vertices"));
-  for (size_t i = 0; i < order_.size(); ++i)
-    std::swap(order_[i], order_[i + rng.below(order_.size() - i)]);
-  Points shuffled;
-  for (const size_t i : order_) shuffled.push_back(centred[i]);
-  identity_ = tensor_of_points(shuffled, {1, std::ssize(shuffled), 3}).to(device_of(*model_));
+  const std::vector<int32_t> shown =
+      shown_vertices(found, model_->corresponding(), centred, weights_name,
+                     RngKey{seed_, 0}.fold("transfer.vertices"));
+  for (const int32_t i : shown)
+    if (i >= std::ssize(centred)) refuse_mesh(where, weights_name);
+  if (shown.size() < std::min(EmbeddedMesh::kFewest, centred.size()))
+    refuse_mesh(where, weights_name);
+  points_ = trained_points(found, weights_name);
+  if (points_ == 0 || model_->equal_counts()) points_ = std::ssize(shown);
+  identity_ =
+      tensor_of_points(in_order(centred, shown), {1, std::ssize(shown), 3}).to(device_of(*model_));
+  if (model_->corresponding()) try {
+      Context ctx;
+      const Shape window = {1, model_->frames(), points_, 3};
+      model_->forward(ctx, {Tensor::zeros(window, DType::f32, identity_.device()), identity_});
+    } catch (const ShapeError&) {
+      refuse_mesh(where, weights_name);
+    }
+  embedded_.emplace(target_.vertices, shown);
+}
+
+/// The network was trained on a mesh of one kind, and the target is another.
+void Transfer::refuse_mesh(const std::string& where, const std::string& weights_name) const {
+  throw InputError(where,
+                   "has " + std::to_string(target_.vertices.size()) + " vertices, and " +
+                       weights_name + " holds a network for another mesh",
+                   "give a target of the mesh that the network was trained on");
+}
+
+/// What the network is given of a cloud: some of it, or the vertices that it needs.
+Points Transfer::seen_of(const Points& cloud, const std::string& source) const {
+  if (!model_->corresponding())
+    return some_of(cloud, static_cast<size_t>(points_), RngKey{seed_, 0}.fold("transfer.points"));
+  if (cloud.size() != target_.vertices.size())
+    throw InputError(source,
+                     "has " + std::to_string(cloud.size()) +
+                         " points, and this network needs the target's " +
+                         std::to_string(target_.vertices.size()) + " vertices in their order",
+                     "give meshes of the source that correspond to the target, or weights of "
+                     "another model");
+  return in_order(cloud, embedded_->nodes());
 }
 
 Points Transfer::answer() {
@@ -64,10 +124,10 @@ Points Transfer::answer() {
   const Tensor pose = tensor_of_points(all, {1, t, points_, 3}).to(identity_.device());
   const Tensor made = model_->forward(ctx, {pose, identity_, true}).value.cpu();
   const int64_t v = made.size(2);
-  Points out(static_cast<size_t>(v));
   const float* from = made.data<float>() + 3 * v * (made.size(1) - 1);
-  for (size_t i = 0; i < out.size(); ++i) out[order_[i]] = Eigen::Map<const Point>(from + 3 * i);
-  return out;
+  Points out(static_cast<size_t>(v));
+  for (size_t i = 0; i < out.size(); ++i) out[i] = Eigen::Map<const Point>(from + 3 * i);
+  return (*embedded_)(out);
 }
 
 std::span<const RetargetedFrame> Transfer::push(const Points& cloud, const std::string& source) {
@@ -75,8 +135,7 @@ std::span<const RetargetedFrame> Transfer::push(const Points& cloud, const std::
   const auto begun = std::chrono::steady_clock::now();
   const Box there = box_of(cloud);
   tallest_ = std::max(tallest_, there.sizes().y());
-  Points seen =
-      some_of(cloud, static_cast<size_t>(points_), RngKey{seed_, 0}.fold("transfer.points"));
+  Points seen = seen_of(cloud, source);
   move(seen, -there.center());
   window_.push_back(std::move(seen));
   while (std::ssize(window_) > model_->frames()) window_.pop_front();

@@ -7,12 +7,6 @@ find_package(Python3 REQUIRED COMPONENTS Interpreter Development.Module)
 find_package(pybind11 2.10 CONFIG REQUIRED)
 message(STATUS "Python: ${Python3_VERSION} (${Python3_EXECUTABLE}), pybind11 ${pybind11_VERSION}")
 
-foreach(target restage restage_experiments restage_gradcheck restage_mpi restage_assimp restage_cuda)
-  if(TARGET ${target})
-    set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
-  endif()
-endforeach()
-
 file(GLOB python_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/python/*.cpp)
 Python3_add_library(restage_python MODULE WITH_SOABI ${python_sources})
 set(python_folder ${PROJECT_BINARY_DIR}/python/restage)

@@ -115,6 +115,11 @@ class Stage {
     networks_.push_back({role, {model, sizes, net, std::move(settings)}, handed_on});
     return net.get();
   }
+  /// Notes a setting of a network that is known later than the network.
+  void set(const std::string& role, const std::string& setting, std::string value) {
+    for (Network& n : networks_)
+      if (n.role == role) n.model.settings[setting] = std::move(value);
+  }
   template <class M>
   M* add_network(const ModelChoice& choice, const RngKey& key, Settings settings = {}) {
     return add_network<M>(choice.role, choice.name, choice.sizes, key, std::move(settings));

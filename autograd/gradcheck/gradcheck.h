@@ -96,8 +96,13 @@ Report check_sample(const OpSamples& op, const Sample& sample);
 /// a generator.
 Report check(const OpSamples& op, int random_cases = 12, Device device = {});
 
-/// Samples of every op of autograd/ops and of the functions composed of them (conv1d, mse, ...).
+/// Samples of every op of autograd/ops and of the functions composed of them (conv1d, mse, ...),
+/// and of those that were registered.
 const std::vector<OpSamples>& all_samples();
+/// Adds the samples of an op of a program that uses this library, before all_samples() is asked
+/// for. Using an op needs no registration (call(), autograd/tape/tape.h). Error if an op of that
+/// name has samples already.
+void register_op(OpSamples samples);
 
 /// Standard normal float64 numbers; `stream` picks others. Away from zero by at least `gap`.
 Tensor random(const Shape& shape, uint64_t stream, double gap = 0);

@@ -2,8 +2,10 @@
 
 namespace restage::gradcheck {
 
-const std::vector<OpSamples>& all_samples() {
-  static const Table table = [] {
+namespace {
+
+Table& known() {
+  static Table table = [] {
     Table t;
     add_attention(t);
     add_cross_attention(t);
@@ -21,6 +23,16 @@ const std::vector<OpSamples>& all_samples() {
     return t;
   }();
   return table;
+}
+
+}  // namespace
+
+const std::vector<OpSamples>& all_samples() { return known(); }
+
+void register_op(OpSamples samples) {
+  for (const OpSamples& op : known())
+    if (op.op == samples.op) throw Error("there are samples of an op '" + op.op + "' already");
+  known().push_back(std::move(samples));
 }
 
 int64_t random_size(Rng& rng, int64_t least, int64_t most) {

@@ -19,6 +19,16 @@ void write_sequence(const Performance& performance, const FileInfo& info, const 
   write_truth(performance, info, folder, nullptr, rotations);
 }
 
+void write_source_mesh(const Performance& performance, const FileInfo& info,
+                       const std::string& folder) {
+  const Mesh& rest = performance.source().rest;
+  PredictionWriter meshes(folder + "/source_mesh.h5", std::ssize(rest.vertices), rest.faces, info);
+  in_batches<Points>(
+      performance.frames(), [&](size_t i) { return performance.vertices_a(i); },
+      [&](size_t i, const Points& surface) { meshes.append(performance.joints_a(i), surface); });
+  meshes.commit();
+}
+
 void write_truth(const Performance& performance, const FileInfo& info, const std::string& folder,
                  const Eigen::Matrix<double, 3, 4>* source_to_world, bool rotations) {
   const Body& target = performance.target();

@@ -19,7 +19,12 @@ namespace restage {
 void write_sequence(const Performance& performance, const FileInfo& info, const std::string& folder,
                     bool rotations = false);
 
-/// The names that it writes to.
+/// The source's own vertices, frame by frame, as FOLDER/source_mesh.h5: for networks that need
+/// correspondence.
+void write_source_mesh(const Performance& performance, const FileInfo& info,
+                       const std::string& folder);
+
+/// The names that write_sequence() writes to.
 std::vector<std::string> sequence_files(const std::string& folder);
 
 /// The last three of them. `source_to_world` (may be null): where the source's scans were put.

@@ -211,6 +211,7 @@ Joints Performance::joints_b(size_t i) const {
 
 Rotations Performance::rotations_b(size_t i) const { return to_global(pose_b(i).local); }
 
+Points Performance::vertices_a(size_t i) const { return pose_surface(a_, pose_a(i)); }
 Points Performance::vertices_b(size_t i) const { return pose_surface(b_, pose_b(i)); }
 
 Points Performance::cloud(size_t i) const {

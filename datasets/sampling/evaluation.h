@@ -74,6 +74,7 @@ class Performance {
   Joints joints_a(size_t i) const;
   Joints joints_b(size_t i) const;
   Rotations rotations_b(size_t i) const;  ///< global, from the T-pose
+  Points vertices_a(size_t i) const;      ///< in the order of source().rest.vertices
   Points vertices_b(size_t i) const;      ///< in the order of target().rest.vertices
 
  private:

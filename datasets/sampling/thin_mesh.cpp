@@ -1,29 +1,14 @@
 #include "datasets/sampling/thin_mesh.h"
 
 #include <algorithm>
-#include <limits>
 #include <numeric>
 #include <queue>
 #include <set>
 
+#include "nn/geometry/embedded_mesh.h"
+
 namespace restage {
 namespace {
-
-std::vector<int32_t> spread(const Points& points, size_t count) {
-  std::vector<float> nearest(points.size(), std::numeric_limits<float>::max());
-  std::vector<int32_t> out;
-  size_t next = 0;
-  while (out.size() < count) {
-    out.push_back(static_cast<int32_t>(next));
-    const Point at = points[next];
-    for (size_t i = 0; i < points.size(); ++i)
-      nearest[i] = std::min(nearest[i], (points[i] - at).squaredNorm());
-    next = static_cast<size_t>(std::max_element(nearest.begin(), nearest.end()) - nearest.begin());
-    if (nearest[next] == 0) break;  // all others coincide with one that is kept
-  }
-  std::sort(out.begin(), out.end());
-  return out;
-}
 
 /// Of each vertex the kept one that is nearest along edges; -1: none can be reached.
 std::vector<int32_t> owners(const Mesh& mesh, const std::vector<int32_t>& kept) {
@@ -69,7 +54,7 @@ ThinMesh thin_mesh(const Mesh& mesh, size_t vertices) {
     out.faces = mesh.faces;
     return out;
   }
-  out.kept = spread(mesh.vertices, vertices);
+  out.kept = evenly_spread(mesh.vertices, vertices);
   const std::vector<int32_t> owner = owners(mesh, out.kept);
   std::set<Triangle> known;  // each set of corners once
   for (const Triangle& f : mesh.faces) {

@@ -12,9 +12,9 @@ struct ThinMesh {
   std::vector<Triangle> faces;  ///< of numbers in `kept`
 };
 
-/// About evenly spread vertices (farthest point sampling from vertex 0), joined where the regions
-/// of vertices that are nearer to one of them than to the others, along edges, meet in a face (the
-/// dual of the Voronoi cells). 0, or not fewer than there are: the whole mesh.
+/// About evenly spread vertices (evenly_spread(), nn/geometry/embedded_mesh.h), joined where the
+/// regions of vertices that are nearer to one of them than to the others, along edges, meet in a
+/// face (the dual of the Voronoi cells). 0, or not fewer than there are: the whole mesh.
 ThinMesh thin_mesh(const Mesh& mesh, size_t vertices);
 
 }  // namespace restage

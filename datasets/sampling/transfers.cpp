@@ -36,14 +36,15 @@ Point centre_box(Points& points) {
   return centre;
 }
 
-TransferSampler::TransferSampler(const Corpus& corpus, const TransferConfig& config, uint64_t seed)
+TransferSampler::TransferSampler(const Corpus& corpus, const TransferConfig& config, uint64_t seed,
+                                 const TransferSampler* like)
     : corpus_(corpus),
       config_(config),
       key_(RngKey{seed, 0}.fold("transfers")),
       frames_(corpus.motions, static_cast<size_t>(std::max(
                                   1, (config.frames - 1) * std::max(1, config.frame_step) + 1))) {
   if (corpus.bodies.empty()) throw InputError("", "no bodies to draw from", "add bodies");
-  find_meshes();
+  find_meshes(like);
   check_setting("transfer", config_.frames >= 1 && config_.frames <= 64, "frames", "1 to 64");
   check_setting("transfer", config_.frame_step >= 1, "frame_step", "1 or more");
   check_setting("transfer", config_.points >= 0 && config_.points <= vertices(), "points",
@@ -51,20 +52,27 @@ TransferSampler::TransferSampler(const Corpus& corpus, const TransferConfig& con
 }
 
 /// Thins each topology once, so that bodies of one topology keep the same vertices.
-void TransferSampler::find_meshes() {
-  std::vector<const Mesh*> known;
+void TransferSampler::find_meshes(const TransferSampler* like) {
+  const auto number_of = [](const std::vector<const Mesh*>& known, const Mesh& mesh) {
+    size_t k = 0;
+    while (k < known.size() &&
+           (known[k]->vertices.size() != mesh.vertices.size() || known[k]->faces != mesh.faces))
+      ++k;
+    return k;
+  };
   for (const Body& body : corpus_.bodies) {
     if (body.rest.faces.empty())
       throw InputError("", "body '" + body.id + "' has no faces, which the edge loss needs",
                        "give meshes");
-    size_t k = 0;
-    while (k < known.size() && (known[k]->vertices.size() != body.rest.vertices.size() ||
-                                known[k]->faces != body.rest.faces))
-      ++k;
+    const size_t k = number_of(wholes_, body.rest);
     mesh_of_.push_back(k);
-    if (k < known.size()) continue;
-    known.push_back(&body.rest);
-    meshes_.push_back(thin_mesh(body.rest, static_cast<size_t>(std::max(0, config_.vertices))));
+    if (k < wholes_.size()) continue;
+    wholes_.push_back(&body.rest);
+    const size_t there = like == nullptr ? 0 : number_of(like->wholes_, body.rest);
+    if (like != nullptr && there < like->meshes_.size())
+      meshes_.push_back(like->meshes_[there]);
+    else
+      meshes_.push_back(thin_mesh(body.rest, static_cast<size_t>(std::max(0, config_.vertices))));
     faces_ = std::max(faces_, std::ssize(meshes_.back().faces));
     if (std::ssize(meshes_.back().kept) != vertices()) {
       const int64_t least = std::min(vertices(), std::ssize(meshes_.back().kept));

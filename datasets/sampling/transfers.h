@@ -44,28 +44,32 @@ class TransferSampler {
  public:
   /// Keeps a reference to `corpus`. InputError: settings out of range, no motion of that length,
   /// bodies without faces or, where they are not thinned, with other numbers of vertices, more
-  /// points than vertices.
-  TransferSampler(const Corpus& corpus, const TransferConfig& config, uint64_t seed);
+  /// points than vertices. `like`: bodies of a mesh that it knows keep the same vertices as there.
+  TransferSampler(const Corpus& corpus, const TransferConfig& config, uint64_t seed,
+                  const TransferSampler* like = nullptr);
 
   /// Samples number first ... first + n - 1. Sample i is a function of (corpus, config, seed, i): a
   /// random body in a random window of all motions, and another body.
   TransferBatch batch(int64_t first, int64_t n) const;
   int64_t vertices() const { return std::ssize(meshes_.front().kept); }
+  /// Those that the first body keeps.
+  const std::vector<int32_t>& kept() const { return meshes_.front().kept; }
   /// Whether all bodies have the same faces, so that their vertices correspond.
   bool corresponding() const { return meshes_.size() == 1; }
   int64_t points() const { return config_.points > 0 ? config_.points : vertices(); }
 
  private:
-  void find_meshes();
+  void find_meshes(const TransferSampler* like);
   void fill(TransferBatch& batch, int64_t row, const RngKey& key) const;
 
   const Corpus& corpus_;
   TransferConfig config_;
   RngKey key_;
   FrameIndex frames_;
-  std::vector<ThinMesh> meshes_;  ///< one for each topology
-  std::vector<size_t> mesh_of_;   ///< of each body
-  int64_t faces_ = 0;             ///< of the mesh with the most
+  std::vector<const Mesh*> wholes_;  ///< of the first body of each topology
+  std::vector<ThinMesh> meshes_;     ///< one for each topology
+  std::vector<size_t> mesh_of_;      ///< of each body
+  int64_t faces_ = 0;                ///< of the mesh with the most
 };
 
 /// Moves points so that the middle of their bounding box is the origin; where it was.

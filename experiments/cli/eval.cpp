@@ -114,6 +114,7 @@ std::vector<std::string> result_files(const std::string& folder) {
 std::string heading(const std::string& condition, bool skeletons) {
   if (condition == "clouds")
     return skeletons ? "From clouds alone (extracted skeletons)" : "From clouds alone";
+  if (condition == "true_vertices") return "From the source's true vertices";
   if (condition == "true_skeletons") return "From true skeletons";
   if (condition == "source_joints") return "Extractor alone, clouds of the source";
   if (condition == "rest_joints") return "Extractor alone, the targets' T-poses";

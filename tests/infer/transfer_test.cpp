@@ -92,6 +92,70 @@ TEST(TransferSystem, SeesVerticesShuffledAndAnswersInTheTargetsOrder) {
   EXPECT_GT(moved, target.size() / 2);
 }
 
+/// A grid of 30 x 30 vertices, 3 cm apart.
+Points grid() {
+  Points out;
+  for (int i = 0; i < 30; ++i)
+    for (int j = 0; j < 30; ++j)
+      out.emplace_back(0.03f * static_cast<float>(i), 0.03f * static_cast<float>(j), 0.f);
+  return out;
+}
+
+Bundle same(Tensor* shown, const Settings& settings) {
+  Bundle out;
+  out.put("transfer", {"transfer/npt_pool", model_config("transfer/npt_pool"),
+                       std::make_shared<Same>(shown), settings});
+  return out;
+}
+
+/// A network moves as many vertices as it was trained with, and the others follow.
+TEST(TransferSystem, VerticesFollowThoseThatTheNetworkMoves) {
+  Tensor shown;
+  Transfer transfer(same(&shown, {{"points", "50"}, {"vertices", "100"}}), "weights", {grid(), {}},
+                    "target", {});
+  const Points answer = transfer.push(grid(), "a cloud")[0].vertices;
+  EXPECT_EQ(shown.size(1), 100);
+  ASSERT_EQ(answer.size(), grid().size());
+  for (size_t i = 0; i < answer.size(); ++i)
+    EXPECT_LT(((answer[i] - answer[0]) - (grid()[i] - grid()[0])).norm(), 1e-5f) << i;
+}
+
+/// Fewer vertices than in the training: all are shown.
+TEST(TransferSystem, SmallTargetsAreShownWhole) {
+  Tensor shown;
+  Transfer transfer(same(&shown, {{"points", "50"}, {"vertices", "1000"}}), "weights", {grid(), {}},
+                    "target", {});
+  transfer.push(grid(), "a cloud");
+  EXPECT_EQ(shown.size(1), 900);
+}
+
+/// A tiny TST of 8 vertices, whose training kept every hundredth of 900.
+Bundle tst(const Settings& settings) {
+  const AnyConfig sizes =
+      model_config("transfer/tst", {"widths=[4, 4, 6]", "vertices=8", "code=4", "hidden=4"});
+  Bundle out;
+  out.put("transfer",
+          {"transfer/tst", sizes, make_model("transfer/tst", sizes, Init{RngKey{1, 0}}), settings});
+  return out;
+}
+
+TEST(TransferSystem, ANetworkThatNeedsCorrespondence) {
+  const Settings settings = {{"vertices", "8"}, {"kept", "0,100,200,300,400,500,600,700"}};
+  Transfer transfer(tst(settings), "weights", {grid(), {}}, "target", {});
+  EXPECT_EQ(transfer.push(grid(), "a mesh")[0].vertices.size(), grid().size());
+  EXPECT_HAS(test::error_of([&] { transfer.push(cloud(Point::Zero()), "a cloud"); }),
+             "900 vertices in their order");
+  const auto refused = [&](const Settings& bad) {
+    return test::error_of([&] { Transfer(tst(bad), "weights", {grid(), {}}, "target", {}); });
+  };
+  EXPECT_HAS(refused({}), "another mesh");
+  EXPECT_HAS(refused({{"vertices", "8"}}), "does not say which vertices");
+  EXPECT_HAS(refused({{"vertices", "8"}, {"kept", "0,1,2,3,4,5,6,6"}}), "damaged list");
+  EXPECT_HAS(refused({{"vertices", "8"}, {"kept", "0,1,2,x"}}), "damaged list");
+  EXPECT_HAS(refused({{"vertices", "8"}, {"kept", "0,1,2,3,4,5,6,900"}}), "another mesh");
+  EXPECT_HAS(refused({{"vertices", "8"}, {"kept", "0,1,2"}}), "another mesh");
+}
+
 TEST(TransferSystem, DamagedSettingsAreBadInput) {
   for (const char* points : {"many", "", "-3", "99999999999999999999", "70000"})
     EXPECT_HAS(test::error_of([&] { system(points); }), "weights");

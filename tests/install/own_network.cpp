@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "autograd/gradcheck/gradcheck.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
 #include "autograd/ops/reduce.h"
@@ -54,7 +55,52 @@ struct Shift : TransferModel {
   Linear in, out;
 };
 
-/// A stage with a loss of its own: distances of points, not their squares.
+/// An op of one's own, number by number: x^2 / (1 + x^2), the loss of Geman and McClure, in which
+/// far-off points count little. On the CPU.
+struct GemanMcClure {
+  static constexpr const char* name = "geman_mcclure";
+  static constexpr const char* letters = "x[...]";
+  void check(Inputs x) const { require_floats(name, letters, x); }
+  Tensor forward(Inputs x, Saved& saved) const {
+    saved.keep({x[0]});
+    return each(x[0], x[0], [](double a, double) { return a * a / (1 + a * a); });
+  }
+  Grads backward(const Saved& saved, const Tensor& gy, Needs) const {
+    const auto slope = [](double a, double g) { return g * 2 * a / ((1 + a * a) * (1 + a * a)); };
+    return {each(saved[0], gy, slope)};
+  }
+
+ private:
+  template <class F>
+  static Tensor each(const Tensor& a, const Tensor& b, F f) {
+    Tensor out = Tensor::empty(a.shape(), a.dtype());
+    const auto fill = [&]<class T>(T* to) {
+      for (int64_t i = 0; i < a.numel(); ++i)
+        to[i] = static_cast<T>(f(a.data<T>()[i], b.data<T>()[i]));
+    };
+    a.dtype() == DType::f64 ? fill(out.data<double>()) : fill(out.data<float>());
+    return out;
+  }
+};
+
+Var geman_mcclure(const Var& x) { return call(GemanMcClure{}, {x}); }
+
+gradcheck::OpSamples op_samples() {
+  using namespace gradcheck;
+  OpSamples out = samples_for<GemanMcClure>();
+  const auto build = [](Args x) { return geman_mcclure(x[0]); };
+  out.add("[2, 1, 3]", {random({2, 1, 3}, 1)}, build);
+  out.add("nothing", {random({0, 3}, 1)}, build);
+  out.large("many", {random({300, 300}, 2)}, build);
+  out.error("integers", {Tensor::from<int32_t>({2}, {1, 2})}, build);
+  out.random = [build](Rng& rng) {
+    const auto n = static_cast<int64_t>(1 + rng.below(5));
+    return Sample{"random", {random({n, 2}, rng.below(1000))}, build};
+  };
+  return out;
+}
+
+/// A stage with a loss of its own: points count by their distances, far-off ones little.
 struct ShiftStageConfig {
   ModelChoice model{"mine/shift"};
   OptimiserConfig optimiser;
@@ -81,7 +127,7 @@ class ShiftStage final : public Stage {
     const Differentiated d =
         differentiate(RngKey{1, static_cast<uint64_t>(step)}, [&](Context& ctx) {
           const Var made = model_->forward(ctx, {b.pose, b.identity});
-          return mean_all(smooth_length(made - Var(b.truth), 1e-8));
+          return mean_all(geman_mcclure(smooth_length(made - Var(b.truth), 1e-8)));
         });
     optimiser_->step(d.gradients, learning_rate(optimisation_.schedule, step, steps()));
     return {{"loss", d.loss}};
@@ -96,6 +142,13 @@ class ShiftStage final : public Stage {
   Optimiser* optimiser_;
   TransferSampler sampler_;
 };
+
+bool checks_an_op() {
+  gradcheck::register_op(op_samples());
+  const gradcheck::Report report = gradcheck::check(gradcheck::all_samples().back());
+  std::printf("%s", report.text().c_str());
+  return report.ok() && report.compared > 0;
+}
 
 bool trains_and_answers() {
   register_model(model_of<Shift>("mine/shift", "transfer", "moves vertices a little"));
@@ -125,7 +178,7 @@ bool trains_and_answers() {
     last = stage->step(i)[0].second;
     if (i == 0) first = last;
   }
-  std::printf("loss of my network: %.3f m, then %.3f m\n", first, last);
+  std::printf("loss of my network: %.4f, then %.4f\n", first, last);
   weights.add(stage->result());
   const Body& body = data.train.bodies[0];
   SystemInput input;

@@ -31,6 +31,12 @@ Var frame_of(const Var& x, int64_t t) {
   return reshape(slice(x, 1, t, t + 1), {x.size(0), x.size(2), 3});
 }
 
+std::string joined(const std::vector<int32_t>& numbers) {
+  std::string out;
+  for (const int32_t i : numbers) out += (out.empty() ? "" : ",") + std::to_string(i);
+  return out;
+}
+
 /// i32 [n, up to `most`]: vertices below `all`, in each row the same random ones.
 Tensor some_of(int64_t all, int64_t most, int64_t n, const RngKey& key) {
   std::vector<int32_t> order(static_cast<size_t>(all));
@@ -52,7 +58,8 @@ TransferStage::TransferStage(const Config& config, const StageInput& in)
                                         {{"points", std::to_string(config.pairs.points)}})),
       optimiser_(add_optimiser("optimiser", {"transfer"}, config.optimiser)),
       sampler_(in.train, for_model(config.pairs, *model_), sampler_seed(in.seed, "transfer.pairs")),
-      validation_sampler_(in.validation, for_model(config.pairs, *model_), 1),
+      validation_sampler_(in.validation, for_model(config.pairs, *model_), 1,
+                          model_->corresponding() ? &sampler_ : nullptr),
       key_(RngKey{in.seed, 0}.fold("transfer.step")) {
   if (model_->corresponding() && !(sampler_.corresponding() && validation_sampler_.corresponding()))
     throw InputError("", "bodies have different faces, and this model needs corresponding vertices",
@@ -63,6 +70,10 @@ TransferStage::TransferStage(const Config& config, const StageInput& in)
   if (config.loss.metric > 0 && model_->frames() < 2)
     throw InputError("", "loss.metric needs windows of two frames at least",
                      "set sizes.frames: 3, or loss.metric: 0");
+  if (config.pairs.vertices > 0) {
+    set("transfer", "vertices", std::to_string(sampler_.vertices()));
+    if (model_->corresponding()) set("transfer", "kept", joined(sampler_.kept()));
+  }
   // What does not fit is found out before hours of training.
   Context ctx;
   const TransferBatch one = moved(validation_sampler_.batch(0, 1), device());
