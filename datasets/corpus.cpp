@@ -61,11 +61,11 @@ std::string text(const SplitCounts& c) {
 Corpus builtin_corpus(const CorpusSource& source, const std::string& split) {
   const SplitCounts b = only(source.bodies, split), m = only(source.motions, split);
   Corpus out;
-  out.bodies = builtin_bodies(source.seed, b.train, b.validation, b.test);
+  out.bodies = builtin_bodies(source.seed, b.train, b.validation, b.test, source.one_mesh);
   out.motions = builtin_motions(source.seed, m.train, m.validation, m.test);
   out.description = "built-in source, seed " + std::to_string(source.seed) +
                     ", train/validation/test bodies " + text(source.bodies) + ", motions " +
-                    text(source.motions);
+                    text(source.motions) + (source.one_mesh ? ", one mesh" : "");
   out.license = "Apache-2.0";
   return out;
 }

@@ -26,6 +26,7 @@ struct CorpusSource {
   uint64_t seed = 0;  ///< of the built-in source; seed and counts leave files alone
   SplitCounts bodies{24, 6, 6};
   SplitCounts motions{120, 20, 20};
+  bool one_mesh = false;  ///< built-in bodies have the same faces; their vertices correspond
 };
 
 /// All of it, or one split ("train", "validation", "test"; else InputError). A body belongs to one

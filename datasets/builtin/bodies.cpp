@@ -66,13 +66,39 @@ void relax(const ImplicitSurface& surface, double longest, SurfaceMesh& mesh) {
   }
 }
 
+SurfaceMesh mesh_of(const BodyShape& shape, const ImplicitSurface& surface) {
+  SurfaceMesh mesh = surface_nets([&](const Vec3& p) { return surface(p); }, grid_of(shape));
+  relax(surface, .01, mesh);
+  return mesh;
+}
+
+/// The average body's mesh on another body: every vertex goes with the joints that carry it, and
+/// then to the surface.
+SurfaceMesh average_mesh_on(const BodyShape& shape, const ImplicitSurface& surface) {
+  static const BodyShape average;
+  static const SurfaceMesh there = mesh_of(average, shape_surface(average));
+  static const Weights weights = shape_weights(average, there);
+  SurfaceMesh mesh = there;
+  const Joints from = shape_joints(average), to = shape_joints(shape);
+  for (size_t v = 0; v < mesh.vertices.size(); ++v) {
+    Vec3 move = Vec3::Zero();
+    for (size_t j = 0; j < kJoints; ++j)
+      move +=
+          static_cast<double>(weights(static_cast<Eigen::Index>(v), static_cast<Eigen::Index>(j))) *
+          (to[j] - from[j]);
+    mesh.vertices[v] += move;
+  }
+  relax(surface, .03, mesh);
+  return mesh;
+}
+
 RngKey body_key(uint64_t seed, const std::string& split, int index) {
   return RngKey{seed, 0}.fold("builtin.body").fold(split).fold(static_cast<uint64_t>(index));
 }
 
 }  // namespace
 
-Body builtin_body(uint64_t seed, const std::string& split, int index) {
+Body builtin_body(uint64_t seed, const std::string& split, int index, bool one_mesh) {
   if (split != "train" && split != "validation" && split != "test")
     throw InputError("builtin bodies", "unknown split \"" + split + "\"",
                      "use train, validation or test");
@@ -80,8 +106,7 @@ Body builtin_body(uint64_t seed, const std::string& split, int index) {
     throw InputError("builtin bodies", cat("negative body number ", index), "count from 0");
   const BodyShape shape = draw_body_shape(body_key(seed, split, index));
   const ImplicitSurface surface = shape_surface(shape);
-  SurfaceMesh mesh = surface_nets([&](const Vec3& p) { return surface(p); }, grid_of(shape));
-  relax(surface, .01, mesh);
+  SurfaceMesh mesh = one_mesh ? average_mesh_on(shape, surface) : mesh_of(shape, surface);
 
   Body body;
   body.id = cat("builtin_", split, "_", index);
@@ -101,18 +126,19 @@ Body builtin_body(uint64_t seed, const std::string& split, int index) {
   return body;
 }
 
-std::vector<Body> builtin_bodies(uint64_t seed, int train, int validation, int test) {
+std::vector<Body> builtin_bodies(uint64_t seed, int train, int validation, int test,
+                                 bool one_mesh) {
   if (train < 0 || validation < 0 || test < 0)
     throw InputError("builtin bodies", "a negative count", "ask for 0 or more bodies per split");
   std::vector<Body> out(static_cast<size_t>(train) + validation + test);
   parallel_for(out.size(), 1, [&](int64_t begin, int64_t end) {
     for (int64_t i = begin; i < end; ++i) {
       if (i < train)
-        out[i] = builtin_body(seed, "train", static_cast<int>(i));
+        out[i] = builtin_body(seed, "train", static_cast<int>(i), one_mesh);
       else if (i < train + validation)
-        out[i] = builtin_body(seed, "validation", static_cast<int>(i - train));
+        out[i] = builtin_body(seed, "validation", static_cast<int>(i - train), one_mesh);
       else
-        out[i] = builtin_body(seed, "test", static_cast<int>(i - train - validation));
+        out[i] = builtin_body(seed, "test", static_cast<int>(i - train - validation), one_mesh);
     }
   });
   return out;

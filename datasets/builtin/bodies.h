@@ -14,12 +14,14 @@ namespace restage {
 /// Body `index` of a split ("train", "validation", "test"; else InputError). T-pose facing +z, left
 /// = +x, arms along x, lowest vertex at y = 0, 1.45 to 2.0 m high, about 5,000 vertices. The
 /// surface is closed and oriented (counter-clockwise from outside); weights: at most 4 joints per
-/// vertex.
-Body builtin_body(uint64_t seed, const std::string& split, int index);
+/// vertex. `one_mesh`: with the faces of the average body, so that vertices of all bodies
+/// correspond.
+Body builtin_body(uint64_t seed, const std::string& split, int index, bool one_mesh = false);
 
 /// `train` + `validation` + `test` bodies, in this order. Built in parallel. Counts must not be
 /// negative (InputError).
-std::vector<Body> builtin_bodies(uint64_t seed, int train, int validation, int test);
+std::vector<Body> builtin_bodies(uint64_t seed, int train, int validation, int test,
+                                 bool one_mesh = false);
 
 /// Rest joints of the average built-in body in metres: the skeleton of the built-in motions.
 Joints builtin_rest_joints();

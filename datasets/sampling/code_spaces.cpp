@@ -65,7 +65,8 @@ void require_topology(const std::vector<Body>& bodies, const Body& like) {
       throw InputError("",
                        cat("body '", body.id, "' has other faces than '", like.id, "', or none",
                            ", and stage codes needs bodies of one topology"),
-                       "set data.source to data of one topology, such as the open benchmark "
+                       "set data.one_mesh for built-in bodies, or data.source to data of one "
+                       "topology, such as the open benchmark "
                        "(docs/benchmark.md)");
 }
 

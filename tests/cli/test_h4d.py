@@ -42,7 +42,7 @@ class H4d(CliTest):
 
     def test_refusals(self):
         call = ["train", SMOKE, "--quiet"]
-        self.bad_input(call + ["data.source=builtin", "data.bodies={train: 2, validation: 1, test: 1}",
+        self.bad_input(call + ["data.one_mesh=false", "data.bodies={train: 2, validation: 1, test: 1}",
                                "data.motions={train: 2, validation: 1, test: 1}"], "one topology", "benchmark")
         call.append("data.source=boxes.h5")
         self.bad_input(call + ["codes.sizes={pose: 72}"], "sizes.pose")

@@ -70,6 +70,32 @@ TEST(BuiltinBodies, SurfaceIsOneClosedOrientedSphere) {
   }
 }
 
+/// The same people with one mesh: faces and order are the same, and each surface is still the own
+/// one.
+TEST(BuiltinBodies, OneMeshForAll) {
+  const std::vector<Body> bodies = builtin_bodies(11, 8, 2, 2, true);
+  for (size_t i = 0; i < bodies.size(); ++i) {
+    const Body &body = bodies[i], &own = some_bodies()[i];
+    EXPECT_EQ(body.rest.faces, bodies[0].rest.faces);
+    EXPECT_EQ(body.rest.vertices.size(), bodies[0].rest.vertices.size());
+    EXPECT_NEAR(volume(body.rest) / volume(own.rest), 1, 0.01) << body.id;
+    for (size_t j = 0; j < kJoints; ++j)
+      EXPECT_LT((body.joints[j] - own.joints[j]).norm(), 0.01) << body.id;
+    const auto off = [](const Points& points, const Points& from) {
+      double sum = 0;
+      for (size_t k = 0; k < points.size(); k += 40) {
+        float least = 1e9f;
+        for (const Point& p : from) least = std::min(least, (p - points[k]).norm());
+        sum += least;
+      }
+      return sum / static_cast<double>((points.size() + 39) / 40);
+    };
+    EXPECT_LT(off(body.rest.vertices, own.rest.vertices), 0.012) << body.id;
+    EXPECT_LT(off(own.rest.vertices, body.rest.vertices), 0.012) << body.id;
+  }
+  EXPECT_FALSE(bodies[0].rest.vertices == bodies[1].rest.vertices);
+}
+
 TEST(BuiltinBodies, SizesAreHuman) {
   for (const Body& body : some_bodies()) {
     EXPECT_GE(body.rest.vertices.size(), 4000u);

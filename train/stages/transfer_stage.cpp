@@ -63,7 +63,8 @@ TransferStage::TransferStage(const Config& config, const StageInput& in)
       key_(RngKey{in.seed, 0}.fold("transfer.step")) {
   if (model_->corresponding() && !(sampler_.corresponding() && validation_sampler_.corresponding()))
     throw InputError("", "bodies have different faces, and this model needs corresponding vertices",
-                     "train on bodies of one topology, such as those of the open benchmark");
+                     "train on bodies of one topology, such as those of the open benchmark, or set "
+                     "data.one_mesh for the built-in ones");
   if (config.loss.metric > 0 && dynamic_cast<Lart*>(model_) == nullptr)
     throw InputError("", "loss.metric needs a model whose codes can be mixed",
                      "choose model: transfer/lart, or set loss.metric: 0");

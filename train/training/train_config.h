@@ -27,6 +27,9 @@ void visit(V& v, CorpusSource& c) {
   v("seed", c.seed, "of the built-in source");
   v("bodies", c.bodies, "built-in bodies per split");
   v("motions", c.motions, "built-in motions per split");
+  v("one_mesh", c.one_mesh,
+    "built-in bodies have one mesh, for networks that need vertices in correspondence",
+    added("false"));
 }
 
 struct EvaluationConfig {
