@@ -20,6 +20,16 @@ std::unique_ptr<Retargeter> make_retargeter(SystemInput in) {
 
 std::unique_ptr<System> make_chain(SystemInput in) { return make_retargeter(std::move(in)); }
 
+/// The chain with its motion network taken out: rotations are the closed form of the joints that
+/// the extractor finds, and are copied.
+std::unique_ptr<System> make_copy(SystemInput in) {
+  const std::string model = "motion/closed_form";
+  const AnyConfig sizes = model_config(model);
+  in.weights.put("motion",
+                 {model, sizes, make_model(model, sizes, Init{RngKey{}, DType::f32}), {}});
+  return make_retargeter(std::move(in));
+}
+
 std::unique_ptr<System> make_refinement(SystemInput in) {
   const std::string where = in.target_name;
   return std::make_unique<Refinement>(make_retargeter(std::move(in)), where);
@@ -50,6 +60,11 @@ std::vector<SystemType>& table() {
        .surface = {"deformation.weights", "deformation.offsets"},
        .parts = true,
        .make = make_chain},
+      {.name = "copy",
+       .help = "no motion network: the rotations of the source's joints, copied as rig tools do",
+       .roles = {"skeleton"},
+       .surface = {"deformation.weights", "deformation.offsets"},
+       .make = make_copy},
       {.name = "refine",
        .help = "the chain's answer, then fitted to each cloud",
        .roles = {"skeleton", "motion", "deformation.weights"},

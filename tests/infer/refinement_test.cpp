@@ -5,6 +5,7 @@
 
 #include "datasets/builtin/bodies.h"
 #include "datasets/sampling/surface.h"
+#include "infer/systems.h"
 #include "tests/support/errors.h"
 #include "tests/support/small_models.h"
 
@@ -97,6 +98,21 @@ TEST(Refinement, BringsLimbsToWhereTheCloudIs) {
   EXPECT_LT(mean_gap(*refined.source_joints(), s.truth), 0.5 * mean_gap(answer, s.truth));
   EXPECT_EQ(frame.vertices.size(), person().rest.vertices.size());
   EXPECT_NEAR((frame.pose.root - answer[0]).norm(), 0, 1e-9) << "the path is the chain's";
+}
+
+/// `copy` is the chain without a motion network, whatever motion network the weights hold.
+TEST(CopySystem, IsTheChainWithTheClosedForm) {
+  const Scene s = scene();
+  const auto answer = [&](const std::string& system, const std::string& motion) {
+    SystemInput in{s.models, "w", person().rest, "target", person().joints, {}};
+    if (motion != "motion/closed_form")
+      in.weights.put("motion", testing::untrained_bundle(motion).need("motion", "test"));
+    in.options.samples = 1;
+    return *make_system(system_type(system), std::move(in))->push(s.cloud, "cloud")[0].joints;
+  };
+  const Joints copied = answer("copy", "smrm/rot6d");
+  EXPECT_EQ(copied, answer("chain", "motion/closed_form"));
+  EXPECT_NE(copied, answer("chain", "smrm/rot6d"));
 }
 
 TEST(Refinement, FramesOfAGapAreTheChains) {
