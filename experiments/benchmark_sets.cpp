@@ -177,28 +177,56 @@ void judge(const Bundle& weights, const std::string& folder, bool scans,
   }
 }
 
+/// Sequences that are made when they are asked for.
+struct MadeSequences {
+  Corpus corpus;
+  std::vector<EvalSequence> sequences;
+};
+
 /// The AMASS-style set, by rule: clip i from body i, to the next body of the circle, then the one
 /// after, ... so that all bodies are sources and targets about equally often.
-void judge_test_clips(const Bundle& weights, const std::string& folder, const BenchmarkOptions& how,
-                      SystemScores* scores, std::vector<std::string>* names) {
-  const Corpus test = load_corpus({.source = folder}, "test");
-  const size_t n = test.bodies.size();
+MadeSequences test_clips(const std::string& folder) {
+  MadeSequences out{load_corpus({.source = folder}, "test"), {}};
+  const size_t n = out.corpus.bodies.size();
   if (n < 2)
     throw InputError(folder, "has one body in its test split, and 'test' retargets to another",
                      "leave the set 'test' out");
-  for (size_t i = 0; i < test.motions.size(); ++i) {
-    EvalSequence s;
-    s.body_a = i % n;
-    s.body_b = (i + 1 + i / n % (n - 1)) % n;
-    s.motion = i;
-    s.frames = test.motions[i].frames();
+  for (size_t i = 0; i < out.corpus.motions.size(); ++i)
+    out.sequences.push_back(
+        {i % n, (i + 1 + i / n % (n - 1)) % n, i, 0, out.corpus.motions[i].frames()});
+  return out;
+}
+
+/// Motions that trainings see, on bodies that they see, to bodies that they do not see: up to 16
+/// clips, evenly chosen, three seconds from the middle of each (chen2023, Table 1, "seen motions").
+MadeSequences seen_motions(const std::string& folder) {
+  constexpr size_t kClips = 16, kFrames = 90;
+  MadeSequences out{load_corpus({.source = folder}, "train"), {}};
+  Corpus& all = out.corpus;
+  const size_t trained = all.bodies.size();
+  for (Body& body : load_corpus({.source = folder}, "test").bodies)
+    all.bodies.push_back(std::move(body));
+  const size_t targets = all.bodies.size() - trained, clips = std::min(kClips, all.motions.size());
+  for (size_t i = 0; i < clips; ++i) {
+    const size_t motion = i * all.motions.size() / clips, length = all.motions[motion].frames();
+    const size_t frames = std::min(kFrames, length);
+    out.sequences.push_back(
+        {i * trained / clips, trained + i % targets, motion, (length - frames) / 2, frames});
+  }
+  return out;
+}
+
+void judge_made(const Bundle& weights, const MadeSequences& made, const BenchmarkOptions& how,
+                SystemScores* scores, std::vector<std::string>* names) {
+  const Corpus& corpus = made.corpus;
+  for (const EvalSequence& s : made.sequences) {
     const Scratch scratch;
-    const Performance performance(test, s, ScanConfig{}, 0);
-    const FileInfo info{test.license, test.description};
+    const Performance performance(corpus, s, ScanConfig{}, 0);
+    const FileInfo info{corpus.license, corpus.description};
     write_sequence(performance, info, scratch.folder());
     if (needs_correspondence(weights)) write_source_mesh(performance, info, scratch.folder());
-    names->push_back(test.motions[i].id + "-" + test.bodies[s.body_a].id + "-" +
-                     test.bodies[s.body_b].id);
+    names->push_back(corpus.motions[s.motion].id + "-" + corpus.bodies[s.body_a].id + "-" +
+                     corpus.bodies[s.body_b].id);
     judge(weights, scratch.folder(), false, how, scores);
   }
 }
@@ -206,9 +234,9 @@ void judge_test_clips(const Bundle& weights, const std::string& folder, const Be
 }  // namespace
 
 void check_benchmark_set(const std::string& set) {
-  if (set != "test" && set != "naked" && set != "clothed" && set != "scans")
+  if (set != "test" && set != "seen" && set != "naked" && set != "clothed" && set != "scans")
     throw InputError("", "there is no set '" + set + "' in the open benchmark",
-                     "use test, naked, clothed or scans");
+                     "use test, seen, naked, clothed or scans");
 }
 
 Prediction retarget_sequence(const Bundle& weights, const std::string& folder,
@@ -224,8 +252,9 @@ SystemScores evaluate_benchmark_set(const Bundle& weights, const std::string& fo
   check_benchmark_set(set);
   for (const std::string& role : system_type(how.system).roles) weights.need(role, "the trial");
   SystemScores out;
-  if (set == "test") {
-    judge_test_clips(weights, folder, how, &out, names);
+  if (set == "test" || set == "seen") {
+    judge_made(weights, set == "test" ? test_clips(folder) : seen_motions(folder), how, &out,
+               names);
   } else {
     std::vector<fs::path> places;
     std::error_code error;

@@ -8,7 +8,7 @@
 
 namespace restage {
 
-/// InputError with the known names if there is no such set: test, naked, clothed, scans.
+/// InputError with the known names if there is no such set: test, seen, naked, clothed, scans.
 void check_benchmark_set(const std::string& set);
 
 struct BenchmarkOptions {

@@ -156,6 +156,13 @@ class Benchmark(CliTest):
                   folder + "/rest.h5", "--every", "5", "--out", "r.h5")
         judged = self.json("eval", "--pred", "r.h5", "--truth", folder + "/truth.h5", "--every", "5", "--variants")["mean"]
         self.assertEqual(found["naked"]["mean"], self.recorded(judged, found["naked"]["mean"]))
+        # Motions of the training onto bodies of the test.
+        self.write("sweep.yaml", "base: base.yaml\nevaluate: {benchmark: small, sets: [seen]}\n")
+        self.done("sweep", "run", "sweep.yaml", "--out", "seen")
+        trial = os.listdir(self.path("seen/trials"))[0]
+        found = json.loads(self.bytes("seen/trials/%s/result.json" % trial))["metrics"]["seen"]
+        self.assertGreater(len(found["sequences"]), 0)
+        self.assertGreater(found["mean"]["mpjpe"], 0)
         # One test body has nobody to retarget to; it was a division by zero.
         self.write("sweep.yaml", "base: base.yaml\nevaluate: {benchmark: small, sets: [test]}\n")
         failed = self.restage("sweep", "run", "sweep.yaml", "--out", "alone")
