@@ -23,6 +23,7 @@ void add_commands(Program& program) {
   add_info(program);
   add_weights(program);
   add_doctor(program);
+  add_completion(program);
 }
 
 }  // namespace restage::cli

@@ -8,6 +8,7 @@ namespace restage::cli {
 
 void add_assess(Program& program);
 void add_compare(Program& program);
+void add_completion(Program& program);
 void add_data(Program& program);
 void add_data_build(Program& program, CommandOptions group);  // of `data`, as all add_data_*
 void add_data_fetch(Program& program, CommandOptions group);
@@ -19,6 +20,7 @@ void add_data_realism(Program& program, CommandOptions group);
 void add_data_sheet(Program& program, CommandOptions group);
 void add_data_split(Program& program, CommandOptions group);
 void add_doctor(Program& program);
+int run_doctor_self(const Common& common);  // doctor --self
 void add_eval(Program& program);
 void add_info(Program& program);
 void add_render(Program& program);

@@ -11,6 +11,7 @@
 #include "experiments/cli/benchmark_config.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
+#include "experiments/cli/shipped_config.h"
 #include "nn/config/config.h"
 
 namespace restage::cli {
@@ -111,7 +112,7 @@ BuildRequest read_request(const BuildOptions& options, const Common& common) {
 int build_recipe(const BuildOptions& options, const Common& common) {
   const BuildRequest request = read_request(options, common);
   BenchmarkRecipe recipe;
-  load_config(request.recipe, request.overrides, recipe);
+  load_config(config_file(request.recipe), request.overrides, recipe);
   const BenchmarkSummary done =
       build_benchmark(recipe, resolved_yaml(recipe), request.recipe, request.data, request.out);
   print(common.json,

@@ -37,7 +37,7 @@ struct Options {
   std::string path, picture, up, facing, bones;
   std::optional<std::string> fix;
   std::optional<double> scale, fps;
-  bool target = false;
+  bool target = false, self = false;
   uint64_t max_memory = kMaxMemory;
 };
 
@@ -393,6 +393,12 @@ bool is_recording(const std::string& kind) { return kind == "bvh" || kind == "am
 
 int run_doctor(Options options, const Common& common) {
   options.max_memory = common.max_memory;
+  if (options.self != options.path.empty())
+    throw InputError(
+        options.path,
+        options.self ? "cannot be examined together with the program" : "no file was given",
+        "give a FILE, or --self alone");
+  if (options.self) return run_doctor_self(common);
   if (options.fix) repair_kind(*options.fix);
   check_output(options.fix.value_or(""), {options.path, options.bones});
   check_output(options.picture, {options.path, options.bones});
@@ -438,13 +444,15 @@ void add_doctor(Program& program) {
       "restage doctor hero.obj --target --picture sheet.png\nrestage doctor frames/ --fix mended/\n"
       "restage doctor frames60/ --fps 60 --fix mended.h5\n"
       "restage doctor hero.glb --target --bones names.yaml\n"
+      "restage doctor --self\n"
       "exit code: 0 usable, 1 read but not usable as it is, 2 not readable",
       run_doctor);
   app.add_option(
-         "FILE", options.path,
-         "clouds and meshes (PLY, OBJ, PCD, XYZ, NPY, NPZ, glTF), a folder of them, HDF5, BVH, "
-         "AMC, safetensors, YAML")
-      .required();
+      "FILE", options.path,
+      "clouds and meshes (PLY, OBJ, PCD, XYZ, NPY, NPZ, glTF), a folder of them, HDF5, BVH, "
+      "AMC, safetensors, YAML");
+  app.add_flag("--self", options.self,
+               "examine the program: instruction set, threads, weights, GPU, time of a frame");
   app.add_option("--picture", options.picture, "draw it from front, side and top (PNG)");
   app.add_option("--fix", options.fix,
                  "write it mended: X.ply or X.obj (one cloud or surface), X.h5 (a sequence), or a "

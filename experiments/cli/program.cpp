@@ -14,6 +14,7 @@
 #include <map>
 #include <new>
 #include <span>
+#include <sstream>
 #include <string_view>
 #include <utility>
 
@@ -98,6 +99,28 @@ std::string bones_for_profile(const CLI::App& command, const std::vector<std::st
   for (const std::string& word : words)
     if (text::ends_in(word, {".yaml", ".yml"})) return word;
   return "";
+}
+
+/// "TEXT:{smoke,lite}" -> smoke, lite
+std::vector<std::string> choices_of(const std::string& type) {
+  std::vector<std::string> out;
+  const size_t open = type.find('{'), close = type.rfind('}');
+  if (open == std::string::npos || close == std::string::npos || close < open) return out;
+  std::istringstream words(type.substr(open + 1, close - open - 1));
+  for (std::string word; std::getline(words, word, ',');) out.push_back(word);
+  return out;
+}
+
+CommandTree described(const CLI::App& command) {
+  CommandTree out{command.get_name(), command.get_description(), {}, {}};
+  for (const CLI::Option* option : command.get_options())
+    for (const std::string& name : option->get_lnames())
+      out.options.push_back({"--" + name, option->get_description(),
+                             option->get_items_expected_max() > 0,
+                             choices_of(option->get_type_name())});
+  for (const CLI::App* sub : command.get_subcommands([](const CLI::App*) { return true; }))
+    if (!sub->get_group().empty()) out.commands.push_back(described(*sub));
+  return out;
 }
 
 /// What was wrong with the arguments that `app` just refused, with the nearest known name.
@@ -200,6 +223,8 @@ CommandOptions Program::add_group(const std::string& name, const std::string& he
   group.footer("More about each: restage " + name + " COMMAND --help");
   return CommandOptions(group);
 }
+
+CommandTree Program::tree() const { return described(*app_); }
 
 int Program::run(int argc, char** argv) {
   common_.command_line.assign(argv, argv + argc);

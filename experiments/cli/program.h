@@ -11,6 +11,7 @@
 
 #include "datasets/readers/byte_stream.h"
 #include "experiments/cli/command_options.h"
+#include "experiments/cli/completion.h"
 
 namespace restage::cli {
 
@@ -64,6 +65,8 @@ class Program {
     return add(all_, name, help, examples, work);
   }
   const Common& common() const { return common_; }
+  /// All commands and options, as the help pages show them.
+  CommandTree tree() const;
 
   /// Reads the arguments and runs the chosen command. Throws.
   int run(int argc, char** argv);

@@ -4,6 +4,7 @@
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 #include "autograd/base/parallel.h"
+#include "autograd/base/shipped.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
 #include "experiments/reproduce/page.h"
@@ -91,6 +92,7 @@ bool run_trials(const ReproduceOptions& o, const std::vector<Evidence>& all) {
 int run_reproduce(ReproduceOptions o, const Common& common) {
   check(o);
   if (o.page.empty()) o.page = o.out;
+  o.from = here_or_shipped(o.from);
   const std::vector<Evidence> all = reproduce::find_evidence(o.from, o.paper, o.table, o.out);
   const StopScope stop;
   if (const int code = plan(o, common, all); code != 0) return code;

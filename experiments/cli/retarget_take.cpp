@@ -13,7 +13,7 @@ namespace restage::cli {
 namespace {
 
 /// What says how clouds are looked at says nothing of a skeleton.
-void check_options(const RetargetCommand& c) {
+void check_words(const RetargetCommand& c) {
   const RetargetOptions usual;
   const auto refuse = [&](const std::string& option) {
     throw InputError(c.source.path,
@@ -82,7 +82,7 @@ bool has_take(const RetargetCommand& c, std::string* why) {
 }
 
 Retargeted run_take(const RetargetCommand& c, const Common& common, const RetargetCaller& caller) {
-  check_options(c);
+  check_words(c);
   TargetMesh target = read_target(c.target, c.bones);
   check_kept(c, target);
   std::unique_ptr<System> system;  // poses a target that has no rig of its own

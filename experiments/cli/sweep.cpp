@@ -9,6 +9,7 @@
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 #include "autograd/base/parallel.h"
+#include "autograd/base/shipped.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
 #include "experiments/sweep/plan.h"
@@ -55,6 +56,7 @@ std::pair<std::string, std::vector<std::string>> split(const std::vector<std::st
   if (out.first.empty())
     throw InputError("", "no sweep file was given",
                      "use 'restage sweep plan SWEEP.yaml [key=value ...]'");
+  out.first = here_or_shipped(out.first);
   return out;
 }
 

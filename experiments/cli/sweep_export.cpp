@@ -4,6 +4,7 @@
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
 #include "autograd/base/output_check.h"
+#include "autograd/base/shipped.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
 #include "experiments/sweep/export.h"
@@ -19,10 +20,10 @@ struct ExportArguments {
 
 /// The program that runs now, wherever it was found.
 std::string this_program() {
-  std::error_code code;
-  const fs::path path = fs::read_symlink("/proc/self/exe", code);
-  if (code) throw WorkError("where this program lies cannot be found out; give it with --program");
-  return path.string();
+  std::string path = own_program();
+  if (path.empty())
+    throw WorkError("where this program lies cannot be found out; give it with --program");
+  return path;
 }
 
 int run_export(const ExportArguments& a, const Common& common) {

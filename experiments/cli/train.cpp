@@ -13,6 +13,7 @@
 #include "autograd/kernels/matmul_precision.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
+#include "experiments/cli/shipped_config.h"
 #include "experiments/cli/train.h"
 #include "experiments/observers/loggers.h"
 #include "experiments/scratch.h"
@@ -53,7 +54,7 @@ Request read_request(const TrainArguments& arguments, const Common& common) {
     } else if (a.find('=') != std::string::npos) {
       out.overrides.push_back(a);
     } else if (out.config.empty()) {
-      out.config = a;
+      out.config = config_file(a);
     } else {
       throw InputError("", "there are two configurations, '" + out.config + "' and '" + a + "'",
                        "give one, and include: others in it");

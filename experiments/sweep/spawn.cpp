@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "autograd/base/parallel.h"
+#include "autograd/base/shipped.h"
 #include "experiments/sweep/pool.h"
 
 namespace restage::sweep {
@@ -36,7 +37,8 @@ int spawn_self(const std::vector<std::string>& arguments, const std::string& out
     words.push_back(const_cast<char*>(argument.c_str()));
   words.push_back(nullptr);
   pid_t pid = 0;
-  const int code = posix_spawn(&pid, "/proc/self/exe", &files, &attributes, words.data(), environ);
+  const int code =
+      posix_spawn(&pid, program_to_start().c_str(), &files, &attributes, words.data(), environ);
   posix_spawn_file_actions_destroy(&files);
   posix_spawnattr_destroy(&attributes);
   if (code != 0)

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "autograd/base/nearest.h"
+#include "autograd/base/shipped.h"
 #include "nn/weights/state.h"
 
 namespace restage {
@@ -266,9 +267,10 @@ Bundle bundle_of(const TensorFile& file, const std::string& where) {
   return out;
 }
 
-std::string weights_path(const std::string& file_or_folder) {
+std::string weights_path(const std::string& given) {
   namespace fs = std::filesystem;
   std::error_code ignored;
+  const std::string file_or_folder = here_or_shipped(given);
   if (!fs::is_directory(file_or_folder, ignored)) return file_or_folder;
   const std::string path = (fs::path(file_or_folder) / "weights.safetensors").string();
   if (!fs::exists(path, ignored))

@@ -35,6 +35,9 @@ def command(name, *words, **options):
     return _json.loads(text) if text.strip() else {}
 
 
+__version__ = command("--version")["version"]
+
+
 def train(config, *overrides, on_step=None, **options):
     """Trains the stages of a configuration, as `restage train CONFIG.yaml key=value ...`; returns the run's folder.
 

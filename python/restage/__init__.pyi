@@ -14,6 +14,7 @@ F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
 Clouds = Iterable[npt.ArrayLike]
 
+__version__: str
 JOINTS: tuple[str, ...]
 PARENTS: tuple[int, ...]
 

@@ -121,3 +121,7 @@ def test_doctor(walk, program):
     ours = restage.doctor(walk / "target.ply")
     assert ours == told and ours["usable"]
     assert json.dumps(restage.command("info", "skeleton/pointnet")["parameters"]) == "1620811"
+
+
+def test_version(program):
+    assert restage.__version__ == program.json("--version")["version"]

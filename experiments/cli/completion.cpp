@@ -1,0 +1,192 @@
+#include "experiments/cli/completion.h"
+
+#include <functional>
+#include <memory>
+
+#include "experiments/cli/commands.h"
+#include "experiments/cli/output.h"
+
+namespace restage::cli {
+namespace {
+
+/// In single quotes, as all three shells read it.
+std::string shell_word(const std::string& text) {
+  std::string out = "'";
+  for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return out + "'";
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string out;
+  for (const std::string& word : words) out += (out.empty() ? "" : " ") + word;
+  return out;
+}
+
+/// Calls visit(words, command) for the program (no words) and all commands ("data import").
+void each_command(const CommandTree& of, const std::string& words,
+                  const std::function<void(const std::string&, const CommandTree&)>& visit) {
+  visit(words, of);
+  for (const CommandTree& command : of.commands)
+    each_command(command, words.empty() ? command.name : words + " " + command.name, visit);
+}
+
+/// The lines that find out which command a half-written line is of: `path`, from `words`, an array
+/// that begins with the program.
+std::string find_path(const CommandTree& program) {
+  std::string patterns;
+  each_command(program, "", [&](const std::string& words, const CommandTree&) {
+    if (!words.empty()) patterns += (patterns.empty() ? "" : "|") + shell_word(words);
+  });
+  return "  local path='' word\n"
+         "  for word in \"${before[@]}\"; do\n"
+         "    case \"${path:+$path }$word\" in\n"
+         "      " +
+         patterns +
+         ") path=\"${path:+$path }$word\" ;;\n"
+         "    esac\n"
+         "  done\n";
+}
+
+std::string for_each_path(const CommandTree& program,
+                          const std::function<std::string(const CommandTree&)>& body) {
+  std::string out = "  case \"$path\" in\n";
+  each_command(program, "", [&](const std::string& words, const CommandTree& command) {
+    out += "    " + shell_word(words) + ")\n" + body(command) + "      ;;\n";
+  });
+  return out + "  esac\n";
+}
+
+/// "case "$previous" in --budget) ...": what may follow an option. Where anything may, a file.
+std::string for_each_value(const CommandTree& command,
+                           const std::function<std::string(const std::string&)>& choose,
+                           const std::string& files) {
+  std::string out = "      case \"$previous\" in\n", any;
+  for (const CommandTree::Option& option : command.options) {
+    if (option.value && option.choices.empty()) any += (any.empty() ? "" : "|") + option.name;
+    if (!option.choices.empty())
+      out += "        " + option.name + ") " + choose(joined(option.choices)) + "; return ;;\n";
+  }
+  if (!any.empty()) out += "        " + any + ") " + files + "; return ;;\n";
+  return out + "      esac\n";
+}
+
+void print_script(const std::string& shell, const CommandTree& program) {
+  if (shell == "bash")
+    print(bash_completion(program));
+  else if (shell == "zsh")
+    print(zsh_completion(program));
+  else
+    print(fish_completion(program));
+}
+
+}  // namespace
+
+std::string bash_completion(const CommandTree& program) {
+  const std::string files = "COMPREPLY=($(compgen -f -- \"$current\"))";
+  return "# restage completion bash > /usr/share/bash-completion/completions/restage\n"
+         "_restage() {\n"
+         "  local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]}\n"
+         "  local before=(\"${COMP_WORDS[@]:1:COMP_CWORD - 1}\")\n" +
+         find_path(program) +
+         for_each_path(program,
+                       [&](const CommandTree& command) {
+                         std::vector<std::string> commands, options;
+                         for (const auto& sub : command.commands) commands.push_back(sub.name);
+                         for (const auto& option : command.options) options.push_back(option.name);
+                         std::string out = for_each_value(
+                             command,
+                             [](const std::string& words) {
+                               return "COMPREPLY=($(compgen -W '" + words + "' -- \"$current\"))";
+                             },
+                             files);
+                         out += "      if [[ $current == -* ]]; then COMPREPLY=($(compgen -W '" +
+                                joined(options) + "' -- \"$current\"))\n";
+                         out += commands.empty()
+                                    ? "      else " + files + "; fi\n"
+                                    : "      else COMPREPLY=($(compgen -W '" + joined(commands) +
+                                          "' -- \"$current\")); fi\n";
+                         return out;
+                       }) +
+         "}\n"
+         "complete -o filenames -F _restage restage\n";
+}
+
+std::string zsh_completion(const CommandTree& program) {
+  const auto described = [](const std::string& name, const std::string& help) {
+    std::string text = name + ":" + help;
+    for (size_t at = name.size() + 1; (at = text.find(':', at + 1)) != std::string::npos; ++at)
+      text.insert(at++, "\\");
+    return " " + shell_word(text);
+  };
+  return "#compdef restage\n"
+         "_restage() {\n"
+         "  local previous=${words[CURRENT - 1]}\n"
+         "  local -a before commands options\n"
+         "  before=(\"${(@)words[2,CURRENT - 1]}\")\n" +
+         find_path(program) +
+         for_each_path(program,
+                       [&](const CommandTree& command) {
+                         std::string out = for_each_value(
+                             command, [](const std::string& words) { return "compadd " + words; },
+                             "_files");
+                         out += "      commands=(";
+                         for (const auto& sub : command.commands)
+                           out += described(sub.name, sub.help);
+                         out += " )\n      options=(";
+                         for (const auto& option : command.options)
+                           out += described(option.name, option.help);
+                         return out + " )\n";
+                       }) +
+         "  if [[ ${words[CURRENT]} == -* ]]; then _describe option options\n"
+         "  elif (( $#commands )); then _describe command commands\n"
+         "  else _files; fi\n"
+         "}\n"
+         "_restage \"$@\"\n";
+}
+
+std::string fish_completion(const CommandTree& program) {
+  std::string out =
+      "# restage completion fish > ~/.config/fish/completions/restage.fish\n"
+      "# Whether the words without options that were typed so far are exactly these.\n"
+      "function __restage_at\n"
+      "  set -l typed (commandline -opc)[2..-1]\n"
+      "  test (count $typed) -ge (count $argv); or return 1\n"
+      "  for i in (seq (count $argv))\n"
+      "    test $typed[$i] = $argv[$i]; or return 1\n"
+      "  end\n"
+      "end\n";
+  each_command(program, "", [&](const std::string& words, const CommandTree& command) {
+    const std::string at = words.empty() ? "__fish_use_subcommand" : "__restage_at " + words;
+    for (const auto& sub : command.commands)
+      out += "complete -c restage -f -n " +
+             shell_word(at + "; and not __restage_at " + (words.empty() ? "" : words + " ") +
+                        sub.name) +
+             " -a " + sub.name + " -d " + shell_word(sub.help) + "\n";
+    for (const auto& option : command.options) {
+      out += "complete -c restage -n " + shell_word(at) + " -l " + option.name.substr(2) + " -d " +
+             shell_word(option.help);
+      if (option.value) out += " -r";
+      if (!option.choices.empty()) out += " -f -a " + shell_word(joined(option.choices));
+      out += "\n";
+    }
+  });
+  return out;
+}
+
+void add_completion(Program& program) {
+  const auto shell = std::make_shared<std::string>();
+  auto command =
+      program.add("completion", "print a script that completes command lines in a shell",
+                  "restage completion bash > ~/.local/share/bash-completion/completions/restage\n"
+                  "restage completion zsh > ~/.zfunc/_restage\n"
+                  "restage completion fish > ~/.config/fish/completions/restage.fish",
+                  [&program, shell] {
+                    print_script(*shell, program.tree());
+                    return 0;
+                  });
+  command.add_option("SHELL", *shell, "bash, zsh or fish")
+      .required()
+      .one_of({"bash", "zsh", "fish"});
+}
+
+}  // namespace restage::cli

@@ -1,0 +1,42 @@
+#include "experiments/cli/shipped_config.h"
+
+#include <filesystem>
+#include <vector>
+
+#include "autograd/base/error.h"
+#include "autograd/base/nearest.h"
+#include "autograd/base/shipped.h"
+
+namespace restage::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// "demo", "standard/finetune", ...
+std::vector<std::string> shipped_configs() {
+  std::vector<std::string> out;
+  const std::string folder = shipped("configs");
+  std::error_code error;
+  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
+       it.increment(error))
+    if (it->path().extension() == ".yaml")
+      out.push_back(it->path().lexically_relative(folder).replace_extension().string());
+  return out;
+}
+
+}  // namespace
+
+std::string config_file(const std::string& name) {
+  std::error_code error;
+  if (name.empty() || fs::is_regular_file(name, error)) return name;
+  for (const std::string& place : {name, "configs/" + name + ".yaml", "configs/" + name}) {
+    const std::string found = shipped(place);
+    if (!found.empty() && fs::is_regular_file(found, error)) return found;
+  }
+  if (fs::exists(name, error)) return name;  // a folder and the like: whoever reads it says so
+  const std::string near = nearest(name, shipped_configs());
+  throw InputError(name, "does not exist, and no configuration of that name comes with the program",
+                   near.empty() ? "give a configuration file" : "did you mean '" + near + "'?");
+}
+
+}  // namespace restage::cli
