@@ -47,7 +47,7 @@ std::string run_config_path(const std::string& dir);
 
 class RunDir {
  public:
-  /// Makes and locks `root`/<name>-<UTC timestamp>-<n>. The directory appears complete or not at
+  /// Makes and locks `ROOT/NAME-TIMESTAMP-N` (UTC). The directory appears complete or not at
   /// all. `stages`: names (letters, digits, '_') in the order of training.
   static RunDir create(const std::string& root, const std::string& name,
                        const std::string& resolved_yaml, const std::string& provenance_json,

@@ -9,7 +9,7 @@
 namespace restage {
 
 /// One line of a list: `SHA256 BYTES PATH ADDRESS`. A line `@NAME ADDRESS` above lets addresses
-/// begin with @NAME.
+/// begin with `@NAME`.
 struct FetchEntry {
   std::string sha256;
   uint64_t bytes = 0;

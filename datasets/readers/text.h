@@ -31,7 +31,7 @@ std::string_view without_mark(std::string_view content, const std::string& path)
 /// Cuts the next word off `line`; empty at its end.
 std::string_view take_word(std::string_view& line);
 /// The whole word as a number, independent of the locale. NaN and infinity count as numbers, in all
-/// spellings (nan, -nan(ind), inf, 1.#QNAN, -1.#IND).
+/// spellings (`nan`, `-nan(ind)`, `inf`, `1.#QNAN`, `-1.#IND`).
 bool parse(std::string_view word, double& value);
 bool parse(std::string_view word, int64_t& value);
 /// Whether the name ends in one of these (lower case), whatever its own case is.

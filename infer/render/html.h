@@ -12,8 +12,8 @@ std::string escape_html(const std::string& text);
 /// JSON (ASCII) in a form that may stand inside a script element: no text in the document can end
 /// the element.
 std::string script_json(const std::string& json);
-/// `page` with every @NAME@ replaced by the value of NAME in `values`; a NAME without a value
-/// stays. A text such as @NAME@ inside a value is not replaced.
+/// `page` with every `@NAME@` replaced by the value of NAME in `values`; a NAME without a
+/// value stays. A text such as `@NAME@` inside a value is not replaced.
 std::string fill_page(const std::string& page, const std::map<std::string, std::string>& values);
 
 }  // namespace restage

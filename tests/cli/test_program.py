@@ -1,6 +1,7 @@
 """The program as a whole: usage, help, exit codes, standard output."""
 import os
 import re
+import shutil
 import signal
 import subprocess
 import time
@@ -34,6 +35,44 @@ class Usage(CliTest):
             for flag in re.findall(r"^  (?:-\w,)?(--[a-z-]+)", own, re.M):
                 if flag != "--help":
                     self.assertRegex(examples, re.escape(flag) + "(?![a-z-])", "restage " + " ".join(words))
+
+    def completed(self, *words):
+        """What bash offers for a half-written line."""
+        script = self.write("completion.bash", self.done("completion", "bash"))
+        line = " ".join("'%s'" % w for w in words)
+        lines = 'source "%s"; COMP_WORDS=(restage %s); COMP_CWORD=%d; _restage; echo "${COMPREPLY[@]}"' % (script, line, len(words))
+        return subprocess.run(["bash", "-c", lines], cwd=self.path("."), capture_output=True, text=True, check=True).stdout.split()
+
+    def test_command_lines_are_completed(self):
+        self.assertEqual(self.completed("retar"), ["retarget"])
+        self.assertEqual(self.completed("data", "im"), ["import"])
+        self.assertEqual(self.completed("reproduce", "rekik2024", "--budget", "l"), ["lite"])
+        self.assertIn("--target", self.completed("retarget", "--source", "scans/", "--ta"))
+        self.write("scan.ply", "")
+        self.assertEqual(self.completed("doctor", "sca"), ["scan.ply"])
+        zsh, fish = self.done("completion", "zsh"), self.done("completion", "fish")
+        for words, text in self.commands():
+            self.assertIn("'" + " ".join(words) + "')", zsh)
+            for flag in re.findall(r"^  (?:-\w,)?(--[a-z-]+)", text, re.M):
+                self.assertIn(flag, zsh)
+                self.assertIn("-l " + flag[2:] + " ", fish)
+        for shell, text in (("zsh", zsh), ("fish", fish)):
+            if shutil.which(shell):
+                subprocess.run([shell, "-n", self.write("completion." + shell, text)], check=True)
+        self.bad_input(["completion", "csh"], "csh")
+
+    def test_what_comes_with_the_program_is_found_from_any_folder(self):
+        said = self.json("doctor", "--self")
+        self.assertNotIn("problem", said)
+        self.assertGreater(said["frame_ms"], 0)
+        self.assertEqual(said["threads"], len(os.sched_getaffinity(0)))
+        self.assertTrue(os.path.isfile(said["weights"]))
+        self.assertIn("skeleton", self.done("train", "demo", "--print-config"))
+        self.assertIn("transfer", self.done("train", "npt/lite", "--print-config"))
+        self.bad_input(["train", "npt/lit", "--print-config"], "did you mean 'npt/lite'")
+        self.assertIn("trials", self.done("sweep", "plan", "experiments/ours_switches/sweep.yaml"))
+        self.bad_input(["doctor"], "--self")
+        self.bad_input(["doctor", "x.ply", "--self"], "--self")
 
     def test_wrong_usage(self):
         self.bad_input([], "needs a command")

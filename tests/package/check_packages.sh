@@ -1,9 +1,12 @@
 #!/usr/bin/env bash
-# check_packages.sh DEB TARBALL FOLDER: both packages (./run package) in bare systems, as root.
+# check_packages.sh DEB TARBALL FOLDER [SUITE...]: both packages (./run package) in bare systems, as root.
 # The .deb in a bare Debian 12: the program, the module for Python, another project that links the library. The tarball
-# in a bare Debian 11, 12 and 13. Bare systems are made once with debootstrap, in FOLDER/bare.
+# in a bare system of each SUITE (bullseye, bookworm, trixie: Debian 11 to 13). Bare systems are made once, in FOLDER/bare.
+# Exit code 77: bare systems cannot be made here.
 set -euo pipefail
 deb=$(readlink -f "$1") tarball=$(readlink -f "$2") folder=$3
+shift 3
+suites=("${@:-bullseye bookworm trixie}")
 here=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")
 mirror=$(awk '/^URIs:/ { print $2; exit } $1 == "deb" { for (i = 2; i <= NF; ++i) if ($i ~ /^http/) { print $i; exit } }' \
   /etc/apt/sources.list.d/*.sources /etc/apt/sources.list 2> /dev/null)
@@ -13,7 +16,11 @@ root=$(readlink -f "$folder")/root
 # bare SUITE: a fresh $root.
 bare() {
   local kept=$folder/bare/$1
-  [ -e "$kept/done" ] || { rm -rf "$kept"; debootstrap --variant=minbase "$1" "$kept" "$mirror" > "$folder/$1.log" 2>&1 && touch "$kept/done"; }
+  if [ ! -e "$kept/done" ]; then
+    rm -rf "$kept"
+    debootstrap --variant=minbase "$1" "$kept" "$mirror" > "$folder/$1.log" 2>&1 || { tail -n 3 "$folder/$1.log"; exit 77; }
+    touch "$kept/done"
+  fi
   rm -rf "$root"
   cp -a "$kept" "$root"
 }
@@ -41,7 +48,7 @@ timed() {
 bare bookworm
 cp "$deb" "$root/tmp/restage.deb"
 # Without proc there is no /proc/self/exe.
-mount --bind /proc "$root/proc"
+mount --bind /proc "$root/proc" || exit 77
 trap 'umount "$root/proc" 2> /dev/null || true' EXIT
 timed 'Debian 12: apt-get update' inside 'apt-get update'
 timed 'Debian 12: the .deb is installed' inside 'apt-get install -y /tmp/restage.deb'
@@ -60,10 +67,10 @@ timed 'Debian 12: what the library needs is installed' inside \
 timed 'Debian 12: another project is built' inside \
   'cmake -S /tmp/consumer -B /tmp/consumer/build -G Ninja -DCMAKE_BUILD_TYPE=Release && cmake --build /tmp/consumer/build && /tmp/consumer/build/consumer'
 umount "$root/proc"
-for suite in bullseye:11 bookworm:12 trixie:13; do
-  bare "${suite%:*}"
+for suite in ${suites[*]}; do
+  bare "$suite"
   mount --bind /proc "$root/proc"
-  timed "Debian ${suite#*:}: the tarball is unpacked" tar -xzf "$tarball" -C "$root/opt"
-  timed "Debian ${suite#*:}: first result" inside "restage=\$(echo /opt/restage-*/bin/restage); $first"
+  timed "$suite: the tarball is unpacked" tar -xzf "$tarball" -C "$root/opt"
+  timed "$suite: first result" inside "restage=\$(echo /opt/restage-*/bin/restage); $first"
   umount "$root/proc"
 done
