@@ -75,8 +75,8 @@ class Stage {
   /// them by heart. 0: never.
   void repeat_batches(int64_t batches) { repeated_ = batches; }
   /// Cuts every step into micro-batches, of which each process of a team computes some
-  /// (docs/design/devices.md). InputError: the number of micro-batches does not divide the batch,
-  /// or the number of processes does not divide the number of micro-batches.
+  /// (docs/notes/design/devices.md). InputError: the number of micro-batches does not divide the
+  /// batch, or the number of processes does not divide the number of micro-batches.
   void cut_steps(int64_t micro_batches, Team& team);
   /// Optimiser step number `step` (from 0). Everything random is a function of (seed, step), so a
   /// resumed run repeats the same bits. Returns what to log.

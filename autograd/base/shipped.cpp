@@ -5,6 +5,8 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "autograd/base/error.h"
+
 namespace restage {
 namespace {
 
@@ -21,18 +23,32 @@ std::string launcher() {
   return by != nullptr && self.filename().string().starts_with("ld-") ? by : "";
 }
 
-/// The folder of the file that holds this function: the program, or the module that Python loaded.
-fs::path module_folder() {
+/// The file that holds this function: the program, or the module that Python loaded.
+fs::path own_file() {
   Dl_info found{};
   const bool known = dladdr(reinterpret_cast<const void*>(&shipped), &found) != 0;
-  return known && found.dli_fname != nullptr ? fs::path(found.dli_fname).parent_path() : "";
+  return known && found.dli_fname != nullptr ? found.dli_fname : "";
+}
+
+/// The program beside the module that Python loaded: installed, or in a build folder. Empty: this
+/// is no module.
+std::string beside_module() {
+  const fs::path module = own_file();
+  if (module.extension() != ".so") return "";
+  for (const char* place : {"../../../../bin/restage", "../../restage"}) {
+    std::error_code error;
+    const fs::path program = fs::canonical(module.parent_path() / place, error);
+    if (!error) return program.string();
+  }
+  throw WorkError("the program 'restage', which does this work, is not beside " + module.string());
 }
 
 }  // namespace
 
 std::string program_to_start() {
-  const std::string by = launcher();
-  return by.empty() ? kSelf : by;
+  for (const std::string& other : {beside_module(), launcher()})
+    if (!other.empty()) return other;
+  return kSelf;
 }
 
 std::string own_program() {
@@ -44,7 +60,7 @@ std::string own_program() {
 
 std::string shipped(const std::string& name) {
   if (name.empty() || fs::path(name).is_absolute()) return "";
-  const fs::path program = fs::path(own_program()).parent_path(), module = module_folder();
+  const fs::path program = fs::path(own_program()).parent_path(), module = own_file().parent_path();
   // Installed; in a build folder of the clone; the same of the module for Python.
   for (const fs::path& root : {program / "../share/restage", program / "../..",
                                module / "../../../../share/restage", module / "../../../.."}) {

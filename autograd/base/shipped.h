@@ -6,7 +6,8 @@
 
 namespace restage {
 
-/// A path that starts the running program again, also after its file was replaced.
+/// A path that starts the running program again, also after its file was replaced; from Python the
+/// program beside the module. WorkError if there is none.
 std::string program_to_start();
 /// The program's own file, absolute; empty if the system does not tell.
 std::string own_program();

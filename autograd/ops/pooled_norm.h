@@ -10,8 +10,8 @@ namespace restage {
 /// mode); the gradient of a maximum goes to the first point that attains it. Exact, and cheaper
 /// than its parts: the gradient has one point per channel and cloud, and batch norm spreads it only
 /// along an affine function of x, so the backward pass needs products of i x i matrices instead of
-/// [n v, i] x [i, o] ones (docs/performance.md). The bias has no gradient: batch norm takes it
-/// away.
+/// [n v, i] x [i, o] ones (docs/notes/performance_log.md). The bias has no gradient: batch norm
+/// takes it away.
 struct PooledNorm {
   static constexpr const char* name = "pooled_norm";
   static constexpr const char* letters = "x[n, v, i], W[o, i], b[o], scale[o], shift[o], v > 0";

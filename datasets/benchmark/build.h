@@ -1,4 +1,4 @@
-// `restage data build RECIPE`: the open benchmark as a folder (docs/design/data.md).
+// `restage data build RECIPE`: the open benchmark as a folder (docs/notes/design/data.md).
 #pragma once
 
 #include <string>
@@ -12,10 +12,10 @@ struct BenchmarkSummary {
   uint64_t bytes = 0;
 };
 
-/// Builds `out` from a data folder (docs/data.md: body/ and cmu/). It appears whole or not at all;
-/// it may be there already if it is empty. `recipe_text` is kept in it as recipe.yaml. The bytes
-/// depend on recipe, text and data only. InputError: the recipe or the data is wrong, `out` is
-/// taken. WorkError: disk full. Interrupted: stopped by a signal, nothing is left.
+/// Builds `out` from a data folder (docs/formats.md: body/ and cmu/). It appears whole or not at
+/// all; it may be there already if it is empty. `recipe_text` is kept in it as recipe.yaml. The
+/// bytes depend on recipe, text and data only. InputError: the recipe or the data is wrong, `out`
+/// is taken. WorkError: disk full. Interrupted: stopped by a signal, nothing is left.
 BenchmarkSummary build_benchmark(const BenchmarkRecipe& recipe, const std::string& recipe_text,
                                  const std::string& where, const std::string& data,
                                  const std::string& out);

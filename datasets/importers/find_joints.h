@@ -1,5 +1,5 @@
 // Finds a person in a tree of bones, by what the bones are called and how they hang together
-// (docs/design/rigs.md). No family of skeletons is known here.
+// (docs/notes/design/rigs.md). No family of skeletons is known here.
 #pragma once
 
 #include <array>

@@ -160,7 +160,7 @@ const Profile& vrm_profile() {
     vrm.list = "VRM's list of bones (humanBones)";
     vrm.mend =
         "assign them to the humanoid in the program that exports VRM, or say which node is which "
-        "joint with --bones names.yaml (docs/data.md)";
+        "joint with --bones names.yaml (docs/formats.md)";
     return vrm;
   }();
   return out;

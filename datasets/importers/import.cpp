@@ -214,7 +214,7 @@ bool is_pickle_name(const std::string& path) { return path.ends_with(".pkl"); }
 
 void refuse_pickle(const std::string& path) {
   throw InputError(path, "is a pickle, which can run code and is never read",
-                   "convert it to plain arrays (docs/data.md shows how)");
+                   "convert it to plain arrays (docs/formats.md shows how)");
 }
 
 bool is_importable(const std::string& source) {

@@ -8,7 +8,7 @@
 namespace restage {
 
 /// Frame by frame: turns joints until those that hang on them lie where the file has them, and
-/// measures how far they still are (docs/design/rigs.md).
+/// measures how far they still are (docs/notes/design/rigs.md).
 ///
 /// A file's spine may have bones that are none of the 22 joints; an upper arm may be made of two
 /// bones, collars may hang on the neck. Such bones turn, too, and the turns of the 22 alone would

@@ -1,4 +1,4 @@
-// name_joints(): which bones of a file are which of the 22 joints (docs/design/rigs.md).
+// name_joints(): which bones of a file are which of the 22 joints (docs/notes/design/rigs.md).
 #include <algorithm>
 #include <map>
 #include <optional>
@@ -22,7 +22,8 @@ namespace {
 constexpr int kRequired[] = {0, 1, 2, 4, 5, 7, 8, 15, 16, 17, 18, 19, 20, 21};
 
 constexpr const char* kNameThem =
-    "say which bone is which joint in a file, and give it with --bones names.yaml (docs/data.md)";
+    "say which bone is which joint in a file, and give it with --bones names.yaml "
+    "(docs/formats.md)";
 
 /// In lower case, "Bip01 L Thigh" as "bip01_l_thigh" (BVH files cannot hold blanks in names).
 std::string plain_name(std::string_view bone) {

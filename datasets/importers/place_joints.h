@@ -1,4 +1,4 @@
-// Where joints go that a skeleton lacks: spine, neck, collars and toes (docs/data.md has the
+// Where joints go that a skeleton lacks: spine, neck, collars and toes (docs/formats.md has the
 // table).
 #pragma once
 

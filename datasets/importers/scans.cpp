@@ -311,9 +311,10 @@ std::vector<ScanSequence> find_scans(const std::string& path, uint64_t max_memor
       skipped.emplace_back(error.what());
     }
     if (const size_t n = count_pickles(folder))
-      skipped.push_back(cat(folder, ": ", n,
-                            " pickles (.pkl), which can run code and are never read; docs/data.md "
-                            "shows how to convert them"));
+      skipped.push_back(
+          cat(folder, ": ", n,
+              " pickles (.pkl), which can run code and are never read; docs/formats.md "
+              "shows how to convert them"));
   }
   const auto by_name = [](const ScanSequence& a, const ScanSequence& b) {
     return natural_less(a.name, b.name);

@@ -52,10 +52,10 @@ struct UnknownSkeleton : InputError {
 };
 
 /// Finds the 22 joints: with `profile` by its names, else with the built-in profile whose names are
-/// there and hang together, else by parts of names and structure (docs/design/rigs.md). Case and
-/// what all names are decorated with ("mixamorig:", "_01") do not matter. UnknownSkeleton for one
-/// that is not found; InputError for two characters, for bones that the profile names and the file
-/// lacks, and for names in another encoding than UTF-8.
+/// there and hang together, else by parts of names and structure (docs/notes/design/rigs.md). Case
+/// and what all names are decorated with ("mixamorig:", "_01") do not matter. UnknownSkeleton for
+/// one that is not found; InputError for two characters, for bones that the profile names and the
+/// file lacks, and for names in another encoding than UTF-8.
 NamedJoints name_joints(const SourceSkeleton& skeleton, const std::string& where,
                         const Profile* profile = nullptr);
 /// InputError if there are two characters in it: name_joints() without a profile says so, too.

@@ -66,7 +66,7 @@ const ForeignKind kForeignKinds[] = {
     {{".pkl", ".pickle", ".pt", ".pth"},
      {"\x80\x02"sv, "\x80\x03"sv, "\x80\x04"sv, "\x80\x05"sv},
      "is a pickle, which can run code and is never read",
-     "convert it to plain arrays (docs/data.md shows how)"},
+     "convert it to plain arrays (docs/formats.md shows how)"},
     {{".mat"},
      {"MATLAB 5.0 MAT-file"},
      "is a file of MATLAB",

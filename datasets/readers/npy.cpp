@@ -67,7 +67,7 @@ void read_type(const std::string& type, const std::string& where, NpyHeader& out
   if (type.size() > at && type[at] == 'O')
     throw InputError(where,
                      "holds Python objects (a pickle), which are never read: they can run code",
-                     "save plain numbers (docs/data.md shows how)");
+                     "save plain numbers (docs/formats.md shows how)");
   int64_t width = 0;
   if (type.size() <= at || !text::parse(digits, width) || width < 0 || width > (1 << 16))
     unreadable(where);

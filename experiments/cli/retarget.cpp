@@ -53,7 +53,7 @@ auto with_target(const RetargetCommand& c, const TargetMesh& target, const Work&
     if (target.unknown_rig.empty() || !std::string(error.what()).starts_with(c.target)) throw;
     throw InputError(
         c.target, "it would be posed by its rig, which was not recognised: " + target.unknown_rig,
-        "say which bone is which joint with --bones names.yaml (docs/data.md)");
+        "say which bone is which joint with --bones names.yaml (docs/formats.md)");
   }
 }
 

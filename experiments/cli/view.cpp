@@ -286,7 +286,7 @@ void add_view(Program& program) {
       .one_of({"head", "hands", "left-hand", "right-hand", "feet"});
   app.add_option("--zoom", options.zoom, "everything so many times as large (1)");
   app.add_option("--background", options.background, "white, black, grey or '#rrggbb'");
-  app.add_option("--bones", r.bones, "names of a rig that is not recognised (docs/data.md)");
+  app.add_option("--bones", r.bones, "names of a rig that is not recognised (docs/formats.md)");
   app.add_option("--sequence", r.sequence, "which sequence of an HDF5 file, from 0");
   app.add_option("--up", r.up,
                  "axis of scans and recordings that points up: x, -x, y, -y, z or -z");

@@ -1,5 +1,5 @@
 // paper.yaml: what a paper prints about one experiment, and what it claims from it, beside the
-// sweep.yaml that runs the experiment here (docs/design/reproduction.md).
+// sweep.yaml that runs the experiment here (docs/notes/design/reproduction.md).
 #pragma once
 
 #include <optional>

@@ -1,5 +1,5 @@
 // Where clouds lie on the grid of 30 moments a second that a system works on
-// (docs/design/stream.md).
+// (docs/notes/design/stream.md).
 #pragma once
 
 #include <cstdint>

@@ -27,7 +27,7 @@ struct RigConvention {
 /// "restage", "smpl", "mixamo", "vrm", "unreal".
 const std::vector<std::string>& rig_conventions();
 
-/// The hierarchy is ours in all of them (docs/characters.md). Axes in T-pose, facing +z:
+/// The hierarchy is ours in all of them (docs/animators.md). Axes in T-pose, facing +z:
 /// - restage, smpl, vrm: the world's. smpl has 24 joints, with hands.
 /// - mixamo: y along the bone; z to the front, of feet and toes x to the left.
 /// - unreal: x along spine, neck, head and left arm, x up in pelvis, left leg and left foot, y to

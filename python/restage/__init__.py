@@ -10,7 +10,8 @@ from . import _core, metrics, ops
 from ._core import (Adam, Frame, Gradients, InputError, Model, NonFiniteError, Op, Parameter, Report, ShapeError, Tape,
                     Tensor, Var, WorkError, gradcheck, load_model, load_safetensors, model, models, save_safetensors,
                     set_threads, threads)
-from ._files import Clip, ClosedForm, Mesh, closed_form, load_cloud, load_clouds, load_mesh, load_motion
+from ._files import (Clip, ClosedForm, Mesh, closed_form, load_cloud, load_clouds, load_mesh, load_motion,
+                     sweep_results)
 from ._retarget import Extractor, Result, System, retarget, skeleton
 
 JOINTS = ("pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle", "right_ankle",
@@ -53,4 +54,4 @@ __all__ = ["Adam", "Clip", "ClosedForm", "Extractor", "Frame", "Gradients", "Inp
            "NonFiniteError", "Op", "PARENTS", "Parameter", "Report", "Result", "ShapeError", "System", "Tape", "Tensor",
            "Var", "WorkError", "closed_form", "command", "doctor", "gradcheck", "load_cloud", "load_clouds", "load_mesh",
            "load_model", "load_motion", "load_safetensors", "metrics", "model", "models", "ops", "retarget",
-           "save_safetensors", "set_threads", "skeleton", "threads", "train"]
+           "save_safetensors", "set_threads", "skeleton", "sweep_results", "threads", "train"]

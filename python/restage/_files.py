@@ -1,4 +1,7 @@
 """Files as arrays, and the reference that needs no network."""
+import json
+import os
+import pathlib
 from typing import NamedTuple
 
 import numpy as np
@@ -58,3 +61,28 @@ def closed_form(source, target_rest, source_rest=None):
     source: joints of the performer, [F, 22, 3], world metres; target_rest, source_rest: rest joints, [22, 3].
     """
     return ClosedForm(*_core.closed_form(source, target_rest, source_rest))
+
+
+def sweep_results(folder):
+    """The finished trials of a sweep as columns: a dict of arrays, one value a trial, which pandas.DataFrame() takes.
+
+    "trial", "case", "seed", "seconds"; every key in which trials differ; "SET/METRIC", the mean over the set's
+    sequences in metres (NaN: not measured). folder: what `restage sweep run --out` was given. InputError without
+    a finished trial.
+    """
+    rows = []
+    for path in sorted(pathlib.Path(os.fsdecode(folder)).glob("trials/*/result.json")):
+        result = json.loads(path.read_text())
+        if result.get("state") != "done":
+            continue
+        row = {"trial": result["id"], "case": result.get("case") or "", "seed": result["seed"],
+               "seconds": result["seconds"], **result.get("overrides", {})}
+        for name, scores in result["metrics"].items():
+            for metric, value in scores["mean"].items():
+                row["%s/%s" % (name, metric)] = np.nan if value is None else value
+        rows.append(row)
+    if not rows:
+        raise _core.InputError("restage: %s: holds no finished trial of a sweep; give a folder that 'restage sweep run' "
+                               "filled" % os.fsdecode(folder))
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    return {name: np.array([row.get(name, np.nan if "/" in name else None) for row in rows]) for name in names}

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Writes docs/import_transcripts.md: every importer's command and what it prints.
+"""Writes docs/notes/import_transcripts.md: every importer's command and what it prints.
 
-    python3 tests/cli/import_transcripts.py BUILD_DIR DATA_FOLDER > docs/import_transcripts.md
+    python3 tests/cli/import_transcripts.py BUILD_DIR DATA_FOLDER > docs/notes/import_transcripts.md
 
-Commands run as they stand there, in a folder in which `data` is the data folder (docs/data.md) and
+Commands run as they stand there, in a folder in which `data` is the data folder (docs/formats.md) and
 `samples` what BUILD_DIR/tests/make_samples wrote. test_import.py runs those of the samples."""
 import os
 import shlex
@@ -56,11 +56,11 @@ CASES = [
 
 HEAD = """# What the importers say
 
-Every importer's command and what it prints, of real files where they may be passed on ([data.md](data.md) says where
+Every importer's command and what it prints, of real files where they may be passed on ([formats.md](../formats.md) says where
 they come from), else of small ones in the style of a data set that the tests write themselves (`make_samples`). Made by
 
 ```
-python3 tests/cli/import_transcripts.py BUILD_DIR DATA_FOLDER > docs/import_transcripts.md
+python3 tests/cli/import_transcripts.py BUILD_DIR DATA_FOLDER > docs/notes/import_transcripts.md
 ```
 """
 

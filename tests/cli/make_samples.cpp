@@ -1,7 +1,7 @@
 // Writes small files as users hold them, in the styles that the importers' tests have, into a
 // folder:
 //   make_samples FOLDER
-// docs/import_transcripts.md shows what `restage data import` says of them.
+// docs/notes/import_transcripts.md shows what `restage data import` says of them.
 #include <filesystem>
 #include <iostream>
 

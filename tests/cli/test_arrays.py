@@ -95,8 +95,8 @@ class Arrays(CliTest):
     def test_a_body_model_that_is_none(self):
         self.write("a_poses.npz", clip())
         bad = lambda model, *words: self.bad_input(["data", "import", "a_poses.npz", "--body-model", model, "--out", "x.h5"], *words)
-        bad(self.write("old/m.pkl", "x"), "old/m.pkl", "pickle", "docs/data.md")
-        bad("old", "old/m.pkl", "pickle", "docs/data.md")
+        bad(self.write("old/m.pkl", "x"), "old/m.pkl", "pickle", "docs/formats.md")
+        bad("old", "old/m.pkl", "pickle", "docs/formats.md")
         self.write("broken/m.npz", smplh()[:-30])
         bad("broken", "holds no SMPL", "among 1 files, the first: broken/m.npz")
         self.write("model.npz", smplh())

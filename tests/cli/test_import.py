@@ -8,7 +8,7 @@ from test_data import JOINTS, NAMES, toy_bvh
 
 RESTS = " 0" * 66
 SAMPLES = os.path.join(os.path.dirname(os.environ["RESTAGE_MAKE_H5"]), "make_samples")
-PAGE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "docs", "import_transcripts.md")
+PAGE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "docs", "notes", "import_transcripts.md")
 
 
 def frames(motion, seconds="0.0333333"):
@@ -202,7 +202,7 @@ class Import(CliTest):
 
 
 class Transcripts(CliTest):
-    """The commands of docs/import_transcripts.md, as far as their files are made here."""
+    """The commands of docs/notes/import_transcripts.md, as far as their files are made here."""
 
     def test_every_importer_reads_its_sample(self):
         import_transcripts.prepare(self.folder, SAMPLES)
@@ -210,7 +210,7 @@ class Transcripts(CliTest):
             page = f.read()
         for _, _, command in import_transcripts.CASES:
             with self.subTest(command=command):
-                self.assertIn("\n$ " + command + "\n", page, "renew docs/import_transcripts.md (import_transcripts.py)")
+                self.assertIn("\n$ " + command + "\n", page, "renew docs/notes/import_transcripts.md (import_transcripts.py)")
                 if "samples/" in command:
                     code, text = import_transcripts.run(PROGRAM, self.folder, command)
                     self.assertEqual(code, 0, text)

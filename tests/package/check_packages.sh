@@ -29,7 +29,7 @@ bare() {
 inside() { env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 chroot "$root" sh -ec "$1"; }
 
 # What is typed first: is all well; clouds (of the smallest training's test, so that nothing must be downloaded); a character.
-first='cd /tmp
+first='cd /var/tmp
 "$restage" doctor --self
 "$restage" train h4d/smoke --quiet
 "$restage" eval run=$(echo runs/*) --out walk > eval.md
@@ -46,26 +46,26 @@ timed() {
 }
 
 bare bookworm
-cp "$deb" "$root/tmp/restage.deb"
+cp "$deb" "$root/opt/restage.deb"
 # Without proc there is no /proc/self/exe.
 mount --bind /proc "$root/proc" || exit 77
 trap 'umount "$root/proc" 2> /dev/null || true' EXIT
 timed 'Debian 12: apt-get update' inside 'apt-get update'
-timed 'Debian 12: the .deb is installed' inside 'apt-get install -y /tmp/restage.deb'
+timed 'Debian 12: the .deb is installed' inside 'apt-get install -y /opt/restage.deb'
 timed 'Debian 12: first result' inside "restage=restage; $first"
 timed 'Debian 12: no compiler is there' inside '! command -v cc && ! command -v g++'
 timed 'Debian 12: manual page and completion' inside 'test -s /usr/share/man/man1/restage.1* && test -s /usr/share/bash-completion/completions/restage'
-timed 'Debian 12: the module for Python' inside 'cd /tmp && python3 -c "
+timed 'Debian 12: the module for Python' inside 'cd /var/tmp && python3 -c "
 import numpy, restage
 system = restage.System(\"walk/target.ply\")
 print(restage.__version__, system)
 frame = system.push(numpy.random.default_rng(0).normal(size=(900, 3)) * [0.2, 0.5, 0.1] + [0, 1, 0])
 print(frame.vertices.shape)"'
-cp -r "$here/../install" "$root/tmp/consumer"
+cp -r "$here/../install" "$root/opt/consumer"
 timed 'Debian 12: what the library needs is installed' inside \
-  'apt-get install -y --no-install-recommends $(apt-cache show /tmp/restage.deb | sed -n "s/^Suggests: //p" | tr -d ,)'
+  'apt-get install -y --no-install-recommends $(apt-cache show /opt/restage.deb | sed -n "s/^Suggests: //p" | tr -d ,)'
 timed 'Debian 12: another project is built' inside \
-  'cmake -S /tmp/consumer -B /tmp/consumer/build -G Ninja -DCMAKE_BUILD_TYPE=Release && cmake --build /tmp/consumer/build && /tmp/consumer/build/consumer'
+  'cmake -S /opt/consumer -B /opt/consumer/build -G Ninja -DCMAKE_BUILD_TYPE=Release && cmake --build /opt/consumer/build && /opt/consumer/build/consumer'
 umount "$root/proc"
 for suite in ${suites[*]}; do
   bare "$suite"

@@ -7,7 +7,7 @@ import pytest
 import restage
 from restage import metrics
 
-from conftest import LITE
+from conftest import LITE, ROOT
 
 rng = np.random.default_rng(1)
 
@@ -125,3 +125,25 @@ def test_doctor(walk, program):
 
 def test_version(program):
     assert restage.__version__ == program.json("--version")["version"]
+
+
+SWEEP = """base: npt/smoke.yaml
+cases:
+  plain: {transfer.optimiser.steps: 2}
+  longer: {transfer.optimiser.steps: 3}
+seeds: [1, 2]
+"""
+
+
+def test_sweep_results(program, tmp_path):
+    sweep = tmp_path / "sweep.yaml"
+    sweep.write_text(SWEEP.replace("npt/smoke.yaml", str(ROOT / "configs/npt/smoke.yaml")))
+    with pytest.raises(restage.InputError, match="no finished trial"):
+        restage.sweep_results(tmp_path)
+    restage.command("sweep", "run", sweep, out=tmp_path / "out", jobs=2)
+    found = restage.sweep_results(tmp_path / "out")
+    assert sorted(found["case"]) == ["longer", "longer", "plain", "plain"] and set(found["seed"]) == {1, 2}
+    assert set(found["transfer.optimiser.steps"]) == {2, 3}
+    assert found["clouds/mpvd"].dtype == np.float64 and (found["clouds/mpvd"] > 0).all()
+    assert np.isnan(found["clouds/mpjpe"]).all()
+    assert len({len(column) for column in found.values()}) == 1

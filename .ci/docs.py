@@ -1,0 +1,67 @@
+#!/usr/bin/env python3
+"""Pages for people: every relative link and its anchor lead somewhere, every page that code names is there, and the pages
+outside docs/notes are short enough to be read. Prints one line for each fault; exit code 1 if there is any."""
+import pathlib
+import re
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+MOST_WORDS = 46_000  # of README.md and docs, without docs/notes and the generated pages of docs/reproduction
+faults = []
+
+
+def pages():
+    listed = subprocess.run(["git", "-C", ROOT, "ls-files", "-co", "--exclude-standard", "*.md"], capture_output=True, text=True, check=True)
+    return [ROOT / name for name in listed.stdout.split("\n") if name and (ROOT / name).exists()]
+
+
+def anchors(path):
+    """The names that a reader of the page on a code host finds."""
+    found, text = {}, re.sub(r"^```.*?^```", "", path.read_text(), flags=re.M | re.S)
+    for title in re.findall(r"^#+ +(.*)$", text, re.M):
+        title = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", title)
+        name = re.sub(r"[^\w\- ]", "", title.strip().lower()).replace(" ", "-")
+        found[name] = found.get(name, -1) + 1
+        if found[name]:
+            found["%s-%d" % (name, found[name])] = 0
+    return set(found) | set(re.findall(r"<a (?:id|name)=\"([^\"]+)\"", text))
+
+
+def check_links(path):
+    text = re.sub(r"^```.*?^```", "", path.read_text(), flags=re.M | re.S)
+    text = re.sub(r"`[^`\n]*`", "", text)
+    for link in re.findall(r"\]\(([^)\s]+)\)", text):
+        if re.match(r"[a-z]+:", link):
+            continue
+        place, _, anchor = link.partition("#")
+        target = (path.parent / place).resolve() if place else path
+        if not target.exists():
+            faults.append("%s: links to %s, which is not there" % (path.relative_to(ROOT), link))
+        elif anchor and target.suffix == ".md" and anchor not in anchors(target):
+            faults.append("%s: links to %s, which has no such heading" % (path.relative_to(ROOT), link))
+
+
+def check_names_in_code():
+    lines = subprocess.run(["git", "-C", ROOT, "grep", "-noE", r"docs/[A-Za-z0-9_/]+\.md(#[a-z0-9-]+)?", "--", ":!docs", ":!*.md"],
+                           capture_output=True, text=True).stdout.splitlines()
+    for line in lines:
+        file, number, name = line.split(":", 2)
+        place, _, anchor = name.partition("#")
+        if not (ROOT / place).exists():
+            faults.append("%s:%s: names %s, which is not there" % (file, number, place))
+        elif anchor and anchor not in anchors(ROOT / place):
+            faults.append("%s:%s: names %s, which has no such heading" % (file, number, name))
+
+
+for page in pages():
+    check_links(page)
+check_names_in_code()
+read = [ROOT / "README.md"] + [p for p in pages() if p.is_relative_to(ROOT / "docs") and not p.is_relative_to(ROOT / "docs/notes")
+                               and not p.is_relative_to(ROOT / "docs/reproduction")]
+words = sum(len(p.read_text().split()) for p in read)
+print("%d pages to read, %d words" % (len(read), words))
+if words > MOST_WORDS:
+    faults.append("docs: %d words, and %d are enough; move what is history to docs/notes" % (words, MOST_WORDS))
+print("\n".join(faults))
+sys.exit(bool(faults))

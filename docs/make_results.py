@@ -1,0 +1,419 @@
+#!/usr/bin/env python3
+"""Writes docs/results.md from the committed results under experiments.
+
+    python3 docs/make_results.py            writes the page
+    python3 docs/make_results.py --check    1 if the page, or a figure of README.md's table, is not what this writes
+    python3 docs/make_results.py --readme   prints a table for README.md
+
+Every figure is computed here; the prose holds none. Files are in metres; the page is in millimetres.
+README.md's table is what stands between the lines <!-- results --> and <!-- /results -->.
+"""
+
+import json
+import math
+import random
+import re
+import sys
+import textwrap
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGE, README = ROOT / "docs/results.md", ROOT / "README.md"
+RESAMPLES = 10_000
+
+# ---- what is committed ---------------------------------------------------------------------------
+
+
+class Trial:
+    """One result.json, with the scores of its references."""
+
+    def __init__(self, path):
+        document = json.loads(path.read_text())
+        self.case, self.seed, self.sets = document["case"], document["seed"], document["metrics"]
+        for part in self.sets.values():
+            for name, scores in part.get("references", {}).items():
+                if isinstance(scores, str):  # stored once for many trials
+                    scores = json.loads((path.parent / "references" / (scores + ".json")).read_text())
+                    part["references"][name] = scores
+
+    def sequences(self, kind, metric, reference=None):
+        """Values by the sequence's name. `kind`: a set, or a set and a part of its sequences' names."""
+        name, _, part = kind.partition(":")
+        scores = self.sets[name]
+        if reference:
+            scores = scores["references"][reference]
+        return {s["name"]: s.get(metric) for s in scores["sequences"] if part in s["name"]}
+
+
+def trials(folder, pattern="trials/*/result.json"):
+    found = [Trial(path) for path in sorted((ROOT / "experiments" / folder).glob(pattern))]
+    by_case = {}
+    for trial in found:
+        by_case.setdefault(trial.case, []).append(trial)
+    for group in by_case.values():
+        group.sort(key=lambda t: t.seed)
+    return by_case
+
+
+def mean(values):
+    values = [v for v in values if v is not None]
+    return sum(values) / len(values) if values else None
+
+
+def deviation(values):
+    middle = mean(values)
+    return math.sqrt(sum((v - middle) ** 2 for v in values) / (len(values) - 1))
+
+
+class Row:
+    """A system on every set: the mean of its trials' means."""
+
+    def __init__(self, label, found, reference=None):
+        self.label, self.trials, self.reference = label, found, reference
+
+    def each(self, kind, metric):
+        return [mean(t.sequences(kind, metric, self.reference).values()) for t in self.trials]
+
+    def value(self, kind, metric):
+        return mean(self.each(kind, metric))
+
+
+# ---- how figures are written ---------------------------------------------------------------------
+
+IN_MILLIMETRES = {"mpjpe", "pa_mpjpe", "mpvd", "pa_mpvd", "leaf_pa_mpvd", "acc", "pa_acc"}
+DIGITS = {"medl": 2, "peak_speed": 2}
+
+
+def number(value, metric, sign=""):
+    if value is None:
+        return "-"
+    scale = 1e3 if metric in IN_MILLIMETRES else 1
+    return f"{value * scale:{sign}.{DIGITS.get(metric, 1)}f}"
+
+
+def cells(row, kinds, metrics):
+    return [" / ".join(number(row.value(kind, m), m) for m in metrics) for kind in kinds]
+
+
+def table(head, rows):
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows])
+
+
+# ---- differences ---------------------------------------------------------------------------------
+
+_draws = {}
+
+
+def draws(trial_count, sequence_count):
+    """How experiments/sweep/statistics.h draws: trials, and once for all of them sequences, with replacement."""
+    key = trial_count, sequence_count
+    if key not in _draws:
+        chance = random.Random(0).random
+        _draws[key] = [(tuple(sorted(int(chance() * trial_count) for _ in range(trial_count))),
+                        [int(chance() * sequence_count) for _ in range(sequence_count)]) for _ in range(RESAMPLES)]
+    return _draws[key]
+
+
+def difference(row, other, kind, metric):
+    """Mean of row - other over pairs of trial and sequence, its 95 % interval, in how many sequences row is less."""
+    columns = []
+    for a, b in zip(row.trials, other.trials):
+        assert a.seed == b.seed
+        mine, theirs = a.sequences(kind, metric, row.reference), b.sequences(kind, metric, other.reference)
+        columns.append([mine[name] - theirs[name] for name in sorted(mine)])
+    n, size, mixed, means = len(columns), len(columns[0]), {}, []
+    for chosen, sequences in draws(n, size):
+        if chosen not in mixed:
+            mixed[chosen] = [sum(columns[k][s] for k in chosen) / n for s in range(size)]
+        values = mixed[chosen]
+        means.append(sum(values[s] for s in sequences) / size)
+    means.sort()
+    quantile = lambda q: means[int(q * (RESAMPLES - 1))]
+    per_sequence = [sum(c[s] for c in columns) / n for s in range(size)]
+    return mean(per_sequence), quantile(0.025), quantile(0.975), sum(v < 0 for v in per_sequence), size
+
+
+def said(row, other, kind, metric, less, more):
+    middle, low, high, fewer, size = difference(row, other, kind, metric)
+    verdict = less if high < 0 else more if low > 0 else "cannot be told"
+    middle, low, high = (number(v, metric, "+") for v in (middle, low, high))
+    return [f"{middle} [{low}, {high}]", f"{fewer} of {size}", verdict]
+
+
+# ---- the rows ------------------------------------------------------------------------------------
+
+shipped, seeds = trials("shipped"), trials("standard_seeds")
+benchmark, kinds = trials("benchmark"), trials("kinds_of_cloud")
+switches = trials("ours_switches", "results/[0-9a-f]*.json")
+
+standard = Row("**standard**", shipped["standard"] + seeds["standard"])
+no_motion = Row("standard, no motion network", shipped["no motion network"] + seeds["no motion network"])
+fitted = Row("standard, fitted to each cloud (earlier weights)", shipped["refined"])
+lite = Row("lite (earlier program)", benchmark["Restage lite"])
+register = Row("register, then repose", benchmark["register then repose"])
+closed_form = Row("closed form", shipped["standard"], "closed_form")
+unchanged = Row("source unchanged (copying)", shipped["standard"], "source_unchanged")
+copied_by_each = Row("", standard.trials, "source_unchanged")
+rest_pose = Row("rest pose", shipped["standard"], "rest_pose")
+
+SETS = {"test": "more motions", "naked": "naked", "clothed": "clothed", "scans:-rig": "eight cameras",
+        "scans:-depth": "one camera"}
+TOLD = {standard: "clouds", no_motion: "clouds", fitted: "clouds", lite: "clouds",
+        register: "clouds, target's true joints", closed_form: "true joints of both",
+        unchanged: "true joints of the source", rest_pose: "true joints of both"}
+KINDS = {"naked": "whole", "clothed": "whole, clothed, hair", "scans:six_cameras": "six cameras",
+         "scans:one_camera": "one camera"}
+
+
+def count(row, kind):
+    return len(row.trials[0].sequences(kind, "pa_mpjpe"))
+
+
+GLANCE = {"naked": "naked, whole", "clothed": "clothed, whole", "test": "more motions, whole",
+          "scans:-rig": "eight depth cameras", "scans:-depth": "one depth camera"}
+
+
+def glance_rows():
+    """README.md shows some of these columns."""
+    def seeds_of(kind, metric):
+        each = standard.each(kind, metric)
+        return f"{number(mean(each), metric)} ± {number(deviation(each), metric)}"
+    def copied(kind, metric):
+        return number(unchanged.value(kind, metric), metric)
+    return [[f"{words} ({count(standard, k)})", seeds_of(k, "pa_mpjpe"), copied(k, "pa_mpjpe"), seeds_of(k, "pa_mpvd"),
+             seeds_of(k, "mpjpe"), copied(k, "mpjpe")] for k, words in GLANCE.items()]
+
+
+def glance():
+    head = ["clouds (sequences)", "joints", "copying", "surface", "joints, not aligned", "copying, not aligned"]
+    return table(head, glance_rows())
+
+
+def readme_table():
+    return table(["clouds (sequences)", "joints", "copying", "surface"], [row[:4] for row in glance_rows()])
+
+
+def by_set(metrics, rows, told=False):
+    head = ["", *(["is told"] if told else []), *(f"{SETS[k]} ({count(standard, k)})" for k in SETS)]
+    return table(head, [[row.label, *([TOLD[row]] if told else []), *cells(row, SETS, metrics)] for row in rows])
+
+
+def spread():
+    def one(kind, metric):
+        each = standard.each(kind, metric)
+        return ", ".join(number(v, metric) for v in each) + f" (± {number(deviation(each), metric)})"
+    metrics = {"pa_mpjpe": "PA-MPJPE", "mpjpe": "MPJPE", "acc": "Acc", "pa_mpvd": "PA-MPVD"}
+    rows = [[SETS[k], *(one(k, m) for m in metrics)] for k in SETS]
+    return table(["standard: seeds 1, 2, 3", *metrics.values()], rows)
+
+
+def real():
+    rows = []
+    for kind in SETS:
+        rows.append([SETS[kind], *said(standard, copied_by_each, kind, "pa_mpjpe", "nearer", "farther"),
+                     *said(standard, no_motion, kind, "pa_mpjpe", "nearer", "farther"),
+                     said(standard, no_motion, kind, "acc", "", "")[0]])
+    head = ["", "PA-MPJPE, standard - copying", "less in", "standard is", "PA-MPJPE, with - without motion network",
+            "less in", "with it", "Acc, the same"]
+    return table(head, rows)
+
+
+def kinds_table():
+    one, metrics = kinds["standard"], ("pa_mpjpe", "mpjpe", "pa_mpvd", "acc")
+    rows = [Row("**standard**", one), Row("the same, bones held (`retarget` does it)", kinds["standard, bones held"]),
+            Row("standard, no motion network", kinds["no motion network"]),
+            Row("lite (points drawn at random)", kinds["lite"]), Row("closed form", one, "closed_form"),
+            Row("source unchanged (copying)", one, "source_unchanged")]
+    head = ["", *(f"{KINDS[k]} ({count(rows[0], k)})" for k in KINDS)]
+    return table(head, [[r.label, *cells(r, KINDS, metrics)] for r in rows])
+
+
+def sure():
+    parts = {"test": "more motions", "naked": "naked", "clothed": "clothed", "scans": "scans, all eight"}
+    first = shipped["standard"][0].sets
+    curves = {words: first[name]["risk_coverage"] for name, words in parts.items()}
+    shares = [f"{100 * point['coverage']:.0f} %" for point in curves["naked"]]
+    rows = [[words, *(number(point["pa_mpjpe"], "pa_mpjpe") for point in curve)] for words, curve in curves.items()]
+    return table(["share of the frames, surest first", *shares], rows)
+
+
+def joints():
+    errors = shipped["standard"][0].sets["naked"]["joints"]
+    sides = {}
+    for name, value in errors.items():
+        sides.setdefault(re.sub("^(left|right)_|[123]$", "", name), []).append(value)
+    ordered = sorted(sides.items(), key=lambda item: mean(item[1]))
+    errors = ", ".join(f"{name} {number(mean(values), 'pa_mpjpe')}" for name, values in ordered)
+    return textwrap.fill("**By joint** (standard, naked, seed 1, PA-MPJPE, mean of both sides): " + errors, 119)
+
+
+def switch_rows():
+    labels = {
+        "standard": "the standard settings",
+        "closed form": "no network (closed form)",
+        "the papers' network": "the papers' network, same input",
+        "squares": "squares for distances",
+        "with the cycle": "with the papers' cycle",
+        "with the discriminator": "with cycle and discriminator",
+        "simulated noise": "true joints with noise as input",
+        "nobody else's body": "nobody else's body as a target",
+        "no acceleration": "no loss on accelerations",
+        "twice the acceleration": "twice the loss on accelerations",
+        "no smoothness": "no loss on frame differences",
+        "no rotations": "no loss on rotations",
+        "without the extractor's rotations": "not shown the extractor's rotations",
+        "without its uncertainty": "not shown its uncertainty",
+        "heading of every frame": "heading of every frame",
+        "two frames late": "answers two frames late",
+        "five frames late": "answers five frames late",
+        "Adam": "Adam for Muon",
+    }
+    assert set(labels) == set(switches), set(labels) ^ set(switches)
+    three = ["naked", "clothed", "scans"]
+    rows = [[label, *cells(Row("", switches[case]), three, ("pa_mpjpe", "acc"))] for case, label in labels.items()]
+    return table(["PA-MPJPE / Acc", *three], rows)
+
+
+# ---- the page ------------------------------------------------------------------------------------
+
+TEMPLATE = """# Results
+
+<!-- Written by docs/make_results.py from the JSON files under experiments. Edit the script, not this page. -->
+
+How far answers are from the truth, on people and motions that no training saw. [Metrics](metrics.md) explains every
+name. [Benchmark](benchmark.md) says what the sets and the rows are. Lengths are in mm, Acc in mm per frame², foot slide
+in mm per frame. Less is better everywhere. Older figures and single trials are in the [log](notes/results_log.md).
+
+## At a glance
+
+Standard weights, mean of {seed_count} seeds ± deviation: PA-MPJPE, PA-MPVD, MPJPE. "Copying" hands on the source's true
+skeleton.
+
+{glance}
+
+## The benchmark's sets
+
+Means of the seeds ({seed_count} of standard, {lite_count} of lite, one of the others). In brackets: sequences.
+
+**Joints: PA-MPJPE / MPJPE**
+
+{joint_table}
+
+**Surface: PA-MPVD / MPVD / MEDL**
+
+{surface_table}
+
+**Calm: Acc / PA-Acc / foot slide**
+
+{calm_table}
+
+* A rule makes the truth. The closed form follows nearly the same rule with true joints: it is near the best possible.
+* Copying looks good in PA-MPJPE, because alignment removes place, turn and size. MPJPE shows the difference.
+* "Lite" and "fitted" are of earlier programs, which drew points at random. "Register" has one frame a second.
+
+{joints}.
+
+## Is a difference real?
+
+Paired over seeds and sequences, with [95 % intervals](metrics.md#when-is-a-difference-real). "Less in": sequences.
+
+{real}
+
+## Seeds
+
+Seeds decide the extractor's second look, the motion network and the order of examples. All three share the extractor's
+first look and the skinning. So the true spread is larger. In brackets: sample deviation.
+
+{spread}
+
+## Four kinds of cloud: PA-MPJPE / MPJPE / PA-MPVD / Acc
+
+Four people, who are in no other data of ours, do five motions. Each is seen in four ways
+(`configs/data/kinds_of_cloud.yaml`). One seed.
+
+{kinds_table}
+
+## Sure frames are better
+
+PA-MPJPE of the frames that the extractor is surest of (standard, seed 1). Here all frames count alike.
+
+{sure}
+
+## Switches of our motion network
+
+One setting changes at a time: a quarter of the steps, three seeds, one extractor, weights and program of commit
+28ac42b. [reproduction/ours.md](reproduction/ours.md) has an interval and a verdict for each switch.
+
+{switches}
+
+## Not here
+
+* Without a committed result: lite and `refine` of today on the benchmark, the papers' network on more motions.
+* On other pages: NPT, H4D, TST, LART and 3D-CoreNet ([systems](systems.md)), speed ([performance](performance.md)), the
+  papers' tables ([reproduction](reproduction.md)), fine-tuning ([log](notes/results_log.md#11-a-training-day)).
+
+`restage sweep table experiments/shipped` shows these results with intervals. `sweep.yaml` there says how to run them.
+"""
+
+
+def page():
+    with_surface = [standard, no_motion, fitted, lite, register, rest_pose]
+    moving = [standard, no_motion, fitted, lite, closed_form, unchanged]
+    return TEMPLATE.format(
+        seed_count=len(standard.trials), lite_count=len(lite.trials), glance=glance(),
+        joint_table=by_set(("pa_mpjpe", "mpjpe"), list(TOLD), True),
+        surface_table=by_set(("pa_mpvd", "mpvd", "medl"), with_surface),
+        calm_table=by_set(("acc", "pa_acc", "foot_slide_mm"), moving), joints=joints(), real=real(), spread=spread(),
+        kinds_table=kinds_table(), sure=sure(), switches=switch_rows())
+
+
+def check_page(wanted):
+    have = PAGE.read_text().splitlines() if PAGE.exists() else []
+    want = wanted.splitlines()
+    for i in range(max(len(have), len(want))):
+        a, b = (lines[i] if i < len(lines) else "(no line)" for lines in (have, want))
+        if a != b:
+            return [f"docs/results.md:{i + 1}: is not what docs/make_results.py writes\n  is:     {a}\n  should: {b}"]
+    return []
+
+
+def check_readme(wanted):
+    """Figures in README's table, but for the first column. A row of a name that the page has shows its figures."""
+    text = README.read_text()
+    block = re.search(r"^<!-- results -->$(.*?)^<!-- /results -->$", text, re.S | re.M)
+    if not block:
+        print("README.md: no table between <!-- results --> and <!-- /results -->; not checked")
+        return []
+    figures = lambda words: re.findall(r"(?<![\w.])\d+(?:\.\d+)?(?![\w.]*\d)", words)
+    rows = {row[0]: set(figures(" ".join(row[1:]))) for row in glance_rows()}
+    everything, out = set(figures(wanted)), []
+    first = text[:block.start(1)].count("\n") + 1
+    for i, line in enumerate(block.group(1).splitlines()):
+        if not line.lstrip().startswith("|"):
+            continue
+        label, *cells_of_row = [cell.strip() for cell in line.strip().strip("|").split("|")]
+        for figure in figures(" ".join(cells_of_row)):
+            if figure not in rows.get(label, everything):
+                out.append(f"README.md:{first + i}: {figure} is not what docs/results.md says of '{label}'")
+    return out
+
+
+def main(arguments):
+    if arguments not in ([], ["--check"], ["--readme"]):
+        print(__doc__.strip(), file=sys.stderr)
+        return 2
+    if arguments == ["--readme"]:
+        print("<!-- results -->\n" + readme_table() + "\n<!-- /results -->")
+        return 0
+    wanted = page()
+    if not arguments:
+        PAGE.write_text(wanted)
+        return 0
+    faults = check_page(wanted) + check_readme(wanted)
+    print("\n".join(faults) if faults else "docs/results.md: is what docs/make_results.py writes")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
