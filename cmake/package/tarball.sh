@@ -16,6 +16,10 @@ strip lib/restage/restage
 install -m 755 "$place/restage.sh" bin/restage
 ldd lib/restage/restage | awk '$2 == "=>" { print $3 } $1 ~ /^\// { print $1 }' | while read -r library; do
   cp -L "$library" lib/restage/
+  # Whose library it is, and under which licence.
+  package=$(dpkg -S "$(readlink -f "$library")" 2> /dev/null || dpkg -S "*${library#/usr}") && package=${package%%:*}
+  mkdir -p share/doc/restage/licences
+  cp "/usr/share/doc/$package/copyright" "share/doc/restage/licences/$package.txt"
 done
 cd ..
 # The same input gives the same bytes.
