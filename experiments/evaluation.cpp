@@ -257,8 +257,9 @@ SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weigh
         SystemInput input{weights, weights_name, target.rest, target.id, {}, how};
         if (type.needs_rest) input.rest = target.joints;
         const auto system = type.make(std::move(input));
+        const bool clouds = name == "clouds";
         const auto push = [&](size_t i) {
-          return system->push(name == "clouds" ? performance.cloud(i) : performance.vertices_a(i),
+          return system->push(clouds ? performance.cloud(i) : performance.vertices_a(i),
                               "frame " + std::to_string(i));
         };
         judge_retargeting(performance, *system, push, options, truth, &scores);

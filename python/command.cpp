@@ -116,6 +116,7 @@ std::string run_command(const std::string& name, std::vector<std::string> words,
   // Program::run() sets them.
   if (name != "--help" && name != "--version")
     words.push_back("--threads=" + std::to_string(chosen_threads));
+  const StopScope stop;  // forgets what stopped an earlier command
   cli::Captured captured;
   cli::Program program;
   add(program);

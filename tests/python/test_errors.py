@@ -107,6 +107,8 @@ def test_ctrl_c_ends_a_training(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         restage.train(config, on_step=step)
     assert 5 <= seen[-1] <= 6 and list(tmp_path.glob("t-*/checkpoints/deformation-*"))
+    # What stopped the training does not stop what comes after it.
+    restage.command("data", "build", bodies=[1, 0, 0], motions=[1, 0, 0], out=tmp_path / "data.h5")
 
 
 def test_the_lock_of_python_is_free(walk):

@@ -91,7 +91,7 @@ TEST(CodesStage, RefusesWhatItCannotTrainOn) {
   };
   TrainingData other = tiny_data();
   other.validation.bodies[0].rest.faces.pop_back();
-  EXPECT_HAS(refused(other), "set data.source to data of one topology");
+  EXPECT_HAS(refused(other), "data.source to data of one topology");
   codes(c).model.sizes.as<H4dConfig>().pose = 72;
   EXPECT_HAS(refused(tiny_data()), "leave sizes.pose out");
   codes(c).model.sizes.as<H4dConfig>().pose = 66;
