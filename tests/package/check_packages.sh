@@ -6,7 +6,8 @@
 set -euo pipefail
 deb=$(readlink -f "$1") tarball=$(readlink -f "$2") folder=$3
 shift 3
-suites=("${@:-bullseye bookworm trixie}")
+suites=("$@")
+[ ${#suites[@]} -gt 0 ] || suites=(bullseye bookworm trixie)
 here=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")
 mirror=$(awk '/^URIs:/ { print $2; exit } $1 == "deb" { for (i = 2; i <= NF; ++i) if ($i ~ /^http/) { print $i; exit } }' \
   /etc/apt/sources.list.d/*.sources /etc/apt/sources.list 2> /dev/null)
@@ -67,7 +68,7 @@ timed 'Debian 12: what the library needs is installed' inside \
 timed 'Debian 12: another project is built' inside \
   'cmake -S /opt/consumer -B /opt/consumer/build -G Ninja -DCMAKE_BUILD_TYPE=Release && cmake --build /opt/consumer/build && /opt/consumer/build/consumer'
 umount "$root/proc"
-for suite in ${suites[*]}; do
+for suite in "${suites[@]}"; do
   bare "$suite"
   mount --bind /proc "$root/proc"
   timed "$suite: the tarball is unpacked" tar -xzf "$tarball" -C "$root/opt"
