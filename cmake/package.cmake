@@ -12,7 +12,7 @@ set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 # The module for Python; what a program that links the library needs, as in restageConfig.cmake.
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "python3, python3-numpy")
-set(CPACK_DEBIAN_PACKAGE_SUGGESTS "g++, cmake, ninja-build, pkg-config, libeigen3-dev, libtbb-dev, libhdf5-dev, libyaml-cpp-dev, libspdlog-dev, liblzma-dev, zlib1g-dev, libzip-dev, libssl-dev, libcurl4-openssl-dev, libhwy-dev, libtinygltf-dev, libassimp-dev, liblo-dev, libwebsockets-dev, libwebp-dev, libgif-dev")
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS "bash-completion, g++, cmake, ninja-build, pkg-config, libeigen3-dev, libtbb-dev, libhdf5-dev, libyaml-cpp-dev, libspdlog-dev, liblzma-dev, zlib1g-dev, libzip-dev, libssl-dev, libcurl4-openssl-dev, libhwy-dev, libtinygltf-dev, libassimp-dev, liblo-dev, libwebsockets-dev, libwebp-dev, libgif-dev")
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 include(CPack)
 

@@ -53,8 +53,13 @@ std::vector<int32_t> kept_vertices(const TrainedModel& model, const std::string&
     out.push_back(vertex);
     at = next + (next < end);
   }
-  if (out.empty()) refuse(where, "has an empty list of the vertices that its network moves");
+  if (found->second.ends_with(',') || std::ssize(out) != trained_vertices(model, where))
+    refuse(where, "has a damaged list of the vertices that its network moves");
   return out;
+}
+
+int64_t kept_of(const TrainedModel& model, const std::string& where) {
+  return count_of(model, "kept_of", 0, 1'000'000, where);
 }
 
 void require_body(const Points& cloud, const std::string& source) {

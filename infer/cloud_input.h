@@ -19,6 +19,9 @@ int64_t trained_vertices(const TrainedModel& model, const std::string& where);
 /// ascending. InputError naming `where`: there is no such list, or it is damaged.
 std::vector<int32_t> kept_vertices(const TrainedModel& model, const std::string& where);
 
+/// Of how many vertices these were (setting `kept_of`); 0: not known.
+int64_t kept_of(const TrainedModel& model, const std::string& where);
+
 /// UnusableCloud naming `source`: too few points for a body, or one that is not finite.
 void require_body(const Points& cloud, const std::string& source);
 

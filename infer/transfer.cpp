@@ -63,8 +63,10 @@ Transfer::Transfer(const Bundle& weights, const std::string& weights_name, Mesh 
                      format("the source has %g frames a second, and this system answers each cloud",
                             options.fps),
                      "give clouds at 30 frames a second");
-  if (target_.vertices.empty())
-    throw InputError(where, "has no vertices", "give a mesh or a cloud");
+  if (target_.vertices.size() < 2)
+    throw InputError(where,
+                     "has " + std::string(target_.vertices.empty() ? "no" : "one") + " vertex",
+                     "give a mesh or a cloud");
   Points centred = target_.vertices;
   const Box box = box_of(centred);
   height_ = box.sizes().y();
@@ -72,6 +74,8 @@ Transfer::Transfer(const Bundle& weights, const std::string& weights_name, Mesh 
   const std::vector<int32_t> shown =
       shown_vertices(found, model_->corresponding(), centred, weights_name,
                      RngKey{seed_, 0}.fold("transfer.vertices"));
+  const int64_t whole = kept_of(found, weights_name);
+  if (whole > 0 && whole != std::ssize(centred)) refuse_mesh(where, weights_name);
   for (const int32_t i : shown)
     if (i >= std::ssize(centred)) refuse_mesh(where, weights_name);
   if (shown.size() < std::min(EmbeddedMesh::kFewest, centred.size()))

@@ -13,6 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kSelf = "/proc/self/exe";
+constexpr const char* kMissing = "no program";  // what is beside a module that stands alone
 
 /// The script that started the program, where a package brings a loader of its own (cmake/package):
 /// the system then takes the loader for the program.
@@ -20,7 +21,9 @@ std::string launcher() {
   std::error_code error;
   const fs::path self = fs::read_symlink(kSelf, error);
   const char* by = std::getenv("RESTAGE_LAUNCHER");
-  return by != nullptr && self.filename().string().starts_with("ld-") ? by : "";
+  if (by == nullptr || !self.filename().string().starts_with("ld-")) return "";
+  const fs::path path = fs::canonical(by, error);
+  return error ? "" : path.string();
 }
 
 /// The file that holds this function: the program, or the module that Python loaded.
@@ -40,32 +43,36 @@ std::string beside_module() {
     const fs::path program = fs::canonical(module.parent_path() / place, error);
     if (!error) return program.string();
   }
-  throw WorkError("the program 'restage', which does this work, is not beside " + module.string());
+  return kMissing;
 }
 
 }  // namespace
 
 std::string program_to_start() {
-  for (const std::string& other : {beside_module(), launcher()})
-    if (!other.empty()) return other;
-  return kSelf;
+  const std::string module = beside_module(), by = launcher();
+  if (module == kMissing)
+    throw WorkError("the program 'restage', which does this work, is not beside the module " +
+                    own_file().string());
+  return !module.empty() ? module : !by.empty() ? by : kSelf;
 }
 
 std::string own_program() {
   std::error_code error;
-  const std::string by = launcher();
-  const fs::path path = by.empty() ? fs::read_symlink(kSelf, error) : fs::canonical(by, error);
+  for (const std::string& other : {beside_module(), launcher()})
+    if (!other.empty()) return other == kMissing ? "" : other;
+  const fs::path path = fs::read_symlink(kSelf, error);
   return error ? "" : path.string();
 }
 
 std::string shipped(const std::string& name) {
-  if (name.empty() || fs::path(name).is_absolute()) return "";
+  if (name.empty() || fs::path(name).is_absolute() || name.find("..") != std::string::npos)
+    return "";
   const fs::path program = fs::path(own_program()).parent_path(), module = own_file().parent_path();
   // Installed; in a build folder of the clone; the same of the module for Python.
   for (const fs::path& root : {program / "../share/restage", program / "../..",
                                module / "../../../../share/restage", module / "../../../.."}) {
     std::error_code error;
-    if (!fs::exists(root / "experiments/weights", error)) continue;  // some other folder
+    if (root.is_relative() || !fs::exists(root / "experiments/weights", error)) continue;
     const fs::path place = fs::weakly_canonical(root / name, error);
     if (!error && fs::exists(place, error)) return place.string();
   }

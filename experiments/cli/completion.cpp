@@ -70,19 +70,17 @@ std::string for_each_value(const CommandTree& command,
   return out + "      esac\n";
 }
 
-void print_script(const std::string& shell, const CommandTree& program) {
-  if (shell == "bash")
-    print(bash_completion(program));
-  else if (shell == "zsh")
-    print(zsh_completion(program));
-  else
-    print(fish_completion(program));
+std::string script_of(const std::string& shell, const CommandTree& program) {
+  return shell == "bash"  ? bash_completion(program)
+         : shell == "zsh" ? zsh_completion(program)
+                          : fish_completion(program);
 }
 
 }  // namespace
 
 std::string bash_completion(const CommandTree& program) {
-  const std::string files = "COMPREPLY=($(compgen -f -- \"$current\"))";
+  // Names may hold spaces.
+  const std::string files = "mapfile -t COMPREPLY < <(compgen -f -- \"$current\")";
   return "# restage completion bash > /usr/share/bash-completion/completions/restage\n"
          "_restage() {\n"
          "  local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]}\n"
@@ -181,7 +179,8 @@ void add_completion(Program& program) {
                   "restage completion zsh > ~/.zfunc/_restage\n"
                   "restage completion fish > ~/.config/fish/completions/restage.fish",
                   [&program, shell] {
-                    print_script(*shell, program.tree());
+                    const std::string script = script_of(*shell, program.tree());
+                    print(program.common().json, {{"shell", *shell}, {"script", script}}, script);
                     return 0;
                   });
   command.add_option("SHELL", *shell, "bash, zsh or fish")

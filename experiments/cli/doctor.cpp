@@ -398,7 +398,13 @@ int run_doctor(Options options, const Common& common) {
         options.path,
         options.self ? "cannot be examined together with the program" : "no file was given",
         "give a FILE, or --self alone");
-  if (options.self) return run_doctor_self(common);
+  if (options.self) {
+    if (options.fix || options.scale || options.fps || options.target || !options.picture.empty() ||
+        !options.up.empty() || !options.facing.empty() || !options.bones.empty())
+      throw InputError("", "--self examines the program, and other options are about a file",
+                       "give --self alone");
+    return run_doctor_self(common);
+  }
   if (options.fix) repair_kind(*options.fix);
   check_output(options.fix.value_or(""), {options.path, options.bones});
   check_output(options.picture, {options.path, options.bones});

@@ -12,7 +12,6 @@
 #include "datasets/sampling/surface.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
-#include "experiments/cli/standard_weights.h"
 #include "infer/retargeter.h"
 
 namespace restage::cli {
@@ -47,8 +46,12 @@ std::string gpu() {
 
 void add_weights(Json& out) {
   try {
-    const std::string path = standard_weights();
+    const std::string path = shipped("experiments/weights/standard.safetensors");
     out["weights"] = path;
+    if (path.empty()) {
+      out["problem"] = "the standard weights are not beside the program; install it again";
+      return;
+    }
     const std::string sum = sha256_of_file(path);
     out["weights_sha256"] = sum;
     if (sum != RESTAGE_STANDARD_SHA256) {

@@ -29,7 +29,11 @@ std::vector<std::string> shipped_configs() {
 std::string config_file(const std::string& name) {
   std::error_code error;
   if (name.empty() || fs::is_regular_file(name, error)) return name;
-  for (const std::string& place : {name, "configs/" + name + ".yaml", "configs/" + name}) {
+  if (fs::is_regular_file(name + ".yaml", error)) return name + ".yaml";
+  const bool named = name.front() != '/';
+  for (const std::string& place :
+       {name, name + ".yaml", "configs/" + name + ".yaml", "configs/" + name}) {
+    if (!named) break;
     const std::string found = shipped(place);
     if (!found.empty() && fs::is_regular_file(found, error)) return found;
   }

@@ -63,6 +63,18 @@ def closed_form(source, target_rest, source_rest=None):
     return ClosedForm(*_core.closed_form(source, target_rest, source_rest))
 
 
+def _row_of(result):
+    """A finished trial as a dict; None: it is not finished."""
+    if result["state"] != "done":
+        return None
+    row = {"trial": result["id"], "case": result["case"] or "", "seed": result["seed"], "seconds": result["seconds"],
+           **result["overrides"]}
+    for name, scores in result["metrics"].items():
+        for metric, value in scores["mean"].items():
+            row["%s/%s" % (name, metric)] = np.nan if value is None else value
+    return row
+
+
 def sweep_results(folder):
     """The finished trials of a sweep as columns: a dict of arrays, one value a trial, which pandas.DataFrame() takes.
 
@@ -72,15 +84,12 @@ def sweep_results(folder):
     """
     rows = []
     for path in sorted(pathlib.Path(os.fsdecode(folder)).glob("trials/*/result.json")):
-        result = json.loads(path.read_text())
-        if result.get("state") != "done":
-            continue
-        row = {"trial": result["id"], "case": result.get("case") or "", "seed": result["seed"],
-               "seconds": result["seconds"], **result.get("overrides", {})}
-        for name, scores in result["metrics"].items():
-            for metric, value in scores["mean"].items():
-                row["%s/%s" % (name, metric)] = np.nan if value is None else value
-        rows.append(row)
+        try:
+            row = _row_of(json.loads(path.read_text()))
+        except (ValueError, KeyError, AttributeError, TypeError):
+            raise _core.InputError("restage: %s: is no result of a trial; remove it, and run the sweep again" % path) from None
+        if row:
+            rows.append(row)
     if not rows:
         raise _core.InputError("restage: %s: holds no finished trial of a sweep; give a folder that 'restage sweep run' "
                                "filled" % os.fsdecode(folder))

@@ -50,6 +50,9 @@ class Usage(CliTest):
         self.assertIn("--target", self.completed("retarget", "--source", "scans/", "--ta"))
         self.write("scan.ply", "")
         self.assertEqual(self.completed("doctor", "sca"), ["scan.ply"])
+        self.write("a scan.ply", "")
+        self.assertEqual(self.completed("doctor", "a"), ["a", "scan.ply"])  # one name: printed with its space
+        self.assertEqual(self.json("completion", "fish")["script"], self.done("completion", "fish"))
         zsh, fish = self.done("completion", "zsh"), self.done("completion", "fish")
         for words, text in self.commands():
             self.assertIn("'" + " ".join(words) + "')", zsh)
@@ -58,7 +61,7 @@ class Usage(CliTest):
                 self.assertIn("-l " + flag[2:] + " ", fish)
         for shell, text in (("zsh", zsh), ("fish", fish)):
             if shutil.which(shell):
-                subprocess.run([shell, "-n", self.write("completion." + shell, text)], check=True)
+                subprocess.run([shell, "-n", self.path(self.write("completion." + shell, text))], check=True)
         self.bad_input(["completion", "csh"], "csh")
 
     def test_what_comes_with_the_program_is_found_from_any_folder(self):
@@ -73,6 +76,10 @@ class Usage(CliTest):
         self.assertIn("trials", self.done("sweep", "plan", "experiments/ours_switches/sweep.yaml"))
         self.bad_input(["doctor"], "--self")
         self.bad_input(["doctor", "x.ply", "--self"], "--self")
+        self.bad_input(["doctor", "--self", "--picture", "p.png"], "--self alone")
+        self.write("demo.yaml", "name: mine\nstages: []\n")  # one's own comes first
+        self.bad_input(["train", "demo", "--print-config"], "demo.yaml:2", "stages")
+        self.bad_input(["train", "/npt/lite", "--print-config"], "/npt/lite")
 
     def test_wrong_usage(self):
         self.bad_input([], "needs a command")

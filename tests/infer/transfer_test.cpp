@@ -153,7 +153,11 @@ TEST(TransferSystem, ANetworkThatNeedsCorrespondence) {
   EXPECT_HAS(refused({{"vertices", "8"}, {"kept", "0,1,2,3,4,5,6,6"}}), "damaged list");
   EXPECT_HAS(refused({{"vertices", "8"}, {"kept", "0,1,2,x"}}), "damaged list");
   EXPECT_HAS(refused({{"vertices", "8"}, {"kept", "0,1,2,3,4,5,6,900"}}), "another mesh");
-  EXPECT_HAS(refused({{"vertices", "8"}, {"kept", "0,1,2"}}), "another mesh");
+  EXPECT_HAS(refused({{"vertices", "8"}, {"kept", "0,1,2"}}), "damaged list");
+  EXPECT_HAS(refused({{"vertices", "3"}, {"kept", "0,1,2"}}), "another mesh");
+  EXPECT_HAS(refused({{"vertices", "8"}, {"kept", "0,1,2,3,4,5,6,7,"}}), "damaged list");
+  EXPECT_HAS(refused({{"vertices", "8"}, {"kept", "0,1,2,3,4,5,6,7"}, {"kept_of", "901"}}),
+             "another mesh");
 }
 
 TEST(TransferSystem, DamagedSettingsAreBadInput) {

@@ -147,3 +147,8 @@ def test_sweep_results(program, tmp_path):
     assert found["clouds/mpvd"].dtype == np.float64 and (found["clouds/mpvd"] > 0).all()
     assert np.isnan(found["clouds/mpjpe"]).all()
     assert len({len(column) for column in found.values()}) == 1
+    path = tmp_path / "out/trials" / found["trial"][0] / "result.json"
+    for damaged in (b"", b"\xff\xfe", b"[]", b"{}"):
+        path.write_bytes(damaged)
+        with pytest.raises(restage.InputError, match="no result of a trial"):
+            restage.sweep_results(tmp_path / "out")

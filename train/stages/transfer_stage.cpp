@@ -73,7 +73,10 @@ TransferStage::TransferStage(const Config& config, const StageInput& in)
                      "set sizes.frames: 3, or loss.metric: 0");
   if (config.pairs.vertices > 0) {
     set("transfer", "vertices", std::to_string(sampler_.vertices()));
-    if (model_->corresponding()) set("transfer", "kept", joined(sampler_.kept()));
+    if (model_->corresponding()) {
+      set("transfer", "kept", joined(sampler_.kept()));
+      set("transfer", "kept_of", std::to_string(in.train.bodies[0].rest.vertices.size()));
+    }
   }
   // What does not fit is found out before hours of training.
   Context ctx;
