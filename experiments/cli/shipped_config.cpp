@@ -30,13 +30,11 @@ std::string config_file(const std::string& name) {
   std::error_code error;
   if (name.empty() || fs::is_regular_file(name, error)) return name;
   if (fs::is_regular_file(name + ".yaml", error)) return name + ".yaml";
-  const bool named = name.front() != '/';
-  for (const std::string& place :
-       {name, name + ".yaml", "configs/" + name + ".yaml", "configs/" + name}) {
-    if (!named) break;
-    const std::string found = shipped(place);
-    if (!found.empty() && fs::is_regular_file(found, error)) return found;
-  }
+  for (const char* folder : {"", "configs"})
+    for (const char* ending : {"", ".yaml"}) {
+      const std::string found = shipped((fs::path(folder) / (name + ending)).string());
+      if (fs::is_regular_file(found, error)) return found;
+    }
   if (fs::exists(name, error)) return name;  // a folder and the like: whoever reads it says so
   const std::string near = nearest(name, shipped_configs());
   throw InputError(name, "does not exist, and no configuration of that name comes with the program",
