@@ -6,6 +6,7 @@
 
 #include "autograd/base/error.h"
 #include "autograd/base/format.h"
+#include "autograd/ops/layout.h"
 #include "infer/cloud_input.h"
 #include "nn/geometry/box.h"
 
@@ -14,6 +15,12 @@ namespace {
 
 void move(Points& points, const Point& by) {
   for (Point& p : points) p += by;
+}
+
+/// Puts the middle of the floor of the points' box to `below`.
+void stand(Points& points, const Point& below) {
+  const Box box = box_of(points);
+  move(points, below - Point(box.center().x(), box.min().y(), box.center().z()));
 }
 
 Points in_order(const Points& points, const std::vector<int32_t>& order) {
@@ -116,7 +123,8 @@ Points Transfer::seen_of(const Points& cloud, const std::string& source) const {
   return in_order(cloud, embedded_->nodes());
 }
 
-Points Transfer::answer() {
+/// The last clouds as the network takes them, [1, t, points, 3].
+Tensor Transfer::seen_window() const {
   const int64_t t = model_->frames();
   Points all;
   for (int64_t k = 0; k < t; ++k) {
@@ -124,14 +132,37 @@ Points Transfer::answer() {
     const Points& frame = back < window_.size() ? window_[window_.size() - 1 - back] : window_[0];
     all.insert(all.end(), frame.begin(), frame.end());
   }
-  Context ctx;
-  const Tensor pose = tensor_of_points(all, {1, t, points_, 3}).to(identity_.device());
-  const Tensor made = model_->forward(ctx, {pose, identity_, true}).value.cpu();
+  return tensor_of_points(all, {1, t, points_, 3}).to(identity_.device());
+}
+
+/// All vertices of the target, from those that the network moved, [..., v, 3].
+Points Transfer::of_all(const Tensor& moved) const {
+  const Tensor made = moved.cpu();
   const int64_t v = made.size(2);
   const float* from = made.data<float>() + 3 * v * (made.size(1) - 1);
   Points out(static_cast<size_t>(v));
   for (size_t i = 0; i < out.size(); ++i) out[i] = Eigen::Map<const Point>(from + 3 * i);
   return (*embedded_)(out);
+}
+
+/// Frames for the clouds that were missed between the one that is shown and `posed`.
+void Transfer::fill_gap(const Tensor& window, const Points& posed, const Point& below) {
+  for (int64_t k = 1; k <= missed_; ++k) {
+    const float share = static_cast<float>(k) / static_cast<float>(missed_ + 1);
+    RetargetedFrame& filled = frames_.emplace_back();
+    filled.filled = true;
+    filled.vertices = posed;
+    if (!shown_) continue;
+    Context ctx;
+    if (const auto made = model_->between(ctx, {concat({before_, window}, 0), identity_}, share)) {
+      filled.vertices = of_all(made->value);
+      stand(filled.vertices, (1 - share) * stood_ + share * below);
+    } else {
+      for (size_t i = 0; i < posed.size(); ++i)
+        filled.vertices[i] = (1 - share) * (*shown_)[i] + share * posed[i];
+    }
+  }
+  missed_ = 0;
 }
 
 std::span<const RetargetedFrame> Transfer::push(const Points& cloud, const std::string& source) {
@@ -143,24 +174,19 @@ std::span<const RetargetedFrame> Transfer::push(const Points& cloud, const std::
   move(seen, -there.center());
   window_.push_back(std::move(seen));
   while (std::ssize(window_) > model_->frames()) window_.pop_front();
-  Points posed = answer();
-  const Box box = box_of(posed);
+  Context ctx;
+  const Tensor window = seen_window();
+  Points posed = of_all(model_->forward(ctx, {window, identity_, true}).value);
   const float scale = tallest_ > 0 ? height_ / tallest_ : 1;
   const Point below(scale * there.center().x(), scale * there.min().y(),
                     scale * there.center().z());
-  move(posed, below - Point(box.center().x(), box.min().y(), box.center().z()));
+  stand(posed, below);
   frames_.clear();
-  for (int64_t k = 1; k <= missed_; ++k) {
-    const float share = static_cast<float>(k) / static_cast<float>(missed_ + 1);
-    RetargetedFrame& filled = frames_.emplace_back();
-    filled.vertices = posed;
-    for (size_t i = 0; shown_ && i < posed.size(); ++i)
-      filled.vertices[i] = (1 - share) * (*shown_)[i] + share * posed[i];
-    filled.filled = true;
-  }
-  missed_ = 0;
+  fill_gap(window, posed, below);
   frames_.emplace_back().vertices = posed;
   shown_ = std::move(posed);
+  stood_ = below;
+  before_ = window;
   times_.deformation =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   return frames_;

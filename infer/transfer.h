@@ -22,7 +22,9 @@ bool needs_correspondence(const Bundle& weights);
 /// clouds before it that its window holds (at the start the first cloud stands for them). The
 /// answer is put where the source is: its box stands over the source's, both paths scaled by the
 /// ratio of the boxes' heights, the tallest of the source so far counting. Turns of the source
-/// about y go through the network like all else. One frame of the result for each of the source.
+/// about y go through the network like all else. One frame of the result for each of the source: in
+/// a gap, LART decodes what lies between the codes of its ends; vertices of other networks go
+/// straight.
 ///
 /// A network moves about as many vertices as bodies had in its training. Where these were thinned,
 /// it is shown as many evenly spread vertices of the target, and the others follow them
@@ -49,7 +51,9 @@ class Transfer final : public System {
  private:
   [[noreturn]] void refuse_mesh(const std::string& where, const std::string& weights_name) const;
   Points seen_of(const Points& cloud, const std::string& source) const;
-  Points answer();
+  Tensor seen_window() const;
+  Points of_all(const Tensor& moved) const;
+  void fill_gap(const Tensor& window, const Points& posed, const Point& below);
 
   std::shared_ptr<TransferModel> model_;
   Mesh target_;
@@ -63,6 +67,8 @@ class Transfer final : public System {
   float tallest_ = 0;            // cloud so far
   std::deque<Points> window_;    // centred, the newest last
   std::optional<Points> shown_;  // for the last cloud
+  Point stood_ = {};             // the middle of its box's floor
+  Tensor before_;                // what the network saw for it
   int64_t missed_ = 0;           // frames of the source since the last cloud
   FrameTimes times_;
   std::vector<RetargetedFrame> frames_;  // of the last push

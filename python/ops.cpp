@@ -17,6 +17,12 @@ void unary(py::module_& m, const char* name, const char* doc, F f) {
       name, [f](const O& x) { return op_of(f, x); }, py::arg("x"), doc);
 }
 template <class F>
+void unary(py::module_& m, const char* name, const char* number, const char* doc, F f) {
+  m.def(
+      name, [f](const O& x, double c) { return op_of([&](const Var& v) { return f(v, c); }, x); },
+      py::arg("x"), py::arg(number), doc);
+}
+template <class F>
 void binary_op(py::module_& m, const char* name, const char* doc, F f) {
   m.def(
       name, [f](const O& a, const O& b) { return op_of(f, a, b); }, py::arg("a"), py::arg("b"),
@@ -30,25 +36,13 @@ void check_rate(double p) {
 }
 
 void add_elementwise(py::module_& m) {
-  unary(m, "neg", "-x", [](const Var& x) { return neg(x); });
-  unary(m, "exp", "e^x", [](const Var& x) { return exp(x); });
-  unary(m, "log", "natural logarithm", [](const Var& x) { return log(x); });
-  unary(m, "sqrt", "square root", [](const Var& x) { return sqrt(x); });
-  unary(m, "square", "x x", [](const Var& x) { return square(x); });
-  unary(m, "abs", "|x|; derivative 0 at 0", [](const Var& x) { return abs(x); });
-  unary(m, "sigmoid", "1 / (1 + e^-x)", [](const Var& x) { return sigmoid(x); });
-  unary(m, "tanh", "hyperbolic tangent", [](const Var& x) { return tanh(x); });
-  unary(m, "relu", "max(x, 0); derivative 0 at 0", [](const Var& x) { return relu(x); });
-  unary(m, "softplus", "log(1 + e^x)", [](const Var& x) { return softplus(x); });
-  const auto with_number = [&m](const char* name, const char* number, const char* doc, auto f) {
-    m.def(
-        name, [f](const O& x, double c) { return op_of([&](const Var& v) { return f(v, c); }, x); },
-        py::arg("x"), py::arg(number), doc);
-  };
-  with_number("leaky_relu", "slope", "x, or slope x below 0",
-              [](const Var& x, double c) { return leaky_relu(x, c); });
-  with_number("scale", "factor", "factor x", [](const Var& x, double c) { return scale(x, c); });
-  with_number("add_scalar", "c", "x + c", [](const Var& x, double c) { return add_scalar(x, c); });
+#define RESTAGE_BIND(name, help, ...) unary(m, #name, help, [](const Var& x) { return name(x); });
+  RESTAGE_UNARY(RESTAGE_BIND)
+#undef RESTAGE_BIND
+#define RESTAGE_BIND(name, number, tried, help, ...) \
+  unary(m, #name, #number, help, [](const Var& x, double c) { return name(x, c); });
+  RESTAGE_UNARY_WITH_NUMBER(RESTAGE_BIND)
+#undef RESTAGE_BIND
   binary_op(m, "add", "a + b, broadcast as in NumPy",
             [](const Var& a, const Var& b) { return add(a, b); });
   binary_op(m, "sub", "a - b", [](const Var& a, const Var& b) { return sub(a, b); });

@@ -16,84 +16,53 @@ HWY_BEFORE_NAMESPACE();
 namespace restage::cpu::HWY_NAMESPACE {
 namespace {
 
+// Of each row a case: the value of x, the gradient of g and of what is kept, which the row calls x
+// or y. The number of a row has the row's name for it.
+#define RESTAGE_CASE(name, help, kept, domain, value, gradient) \
+  RESTAGE_CASE_WITH_NUMBER(name, number, 0, help, kept, domain, value, gradient)
+
 template <class T>
-void apply_unary(Unary op, int64_t n, const T* x, T* y, T alpha) {
-  const hn::ScalableTag<T> d;
-  using V = hn::Vec<decltype(d)>;
-  const V zero = hn::Zero(d), factor = hn::Set(d, alpha);
-  const auto each = [&](auto f) HWY_ATTR { map(n, y, f, x); };
+void apply_unary(Unary op, int64_t n, const T* in, T* out, T of_op) {
+  using N = Numbers<T>;
+  using V = typename N::Vector;
+  [[maybe_unused]] const N zero(T(0)), one(T(1));
   switch (op) {
-    case Unary::neg:
-      return each([](V v) HWY_ATTR { return hn::Neg(v); });
-    case Unary::exp:
-      return each([](V v) HWY_ATTR { return exp(v); });
-    case Unary::log:
-      return each([](V v) HWY_ATTR { return log(v); });
-    case Unary::sqrt:
-      return each([](V v) HWY_ATTR { return hn::Sqrt(v); });
-    case Unary::square:
-      return each([](V v) HWY_ATTR { return hn::Mul(v, v); });
-    case Unary::abs:
-      return each([](V v) HWY_ATTR { return hn::Abs(v); });
-    case Unary::sigmoid:
-      return each([](V v) HWY_ATTR { return sigmoid(v); });
-    case Unary::tanh:
-      return each([](V v) HWY_ATTR { return tanh(v); });
-    case Unary::relu:  // NaN stays NaN
-      return each([&](V v) HWY_ATTR { return hn::IfThenZeroElse(hn::Le(v, zero), v); });
-    case Unary::leaky_relu:
-      return each([&](V v)
-                      HWY_ATTR { return hn::IfThenElse(hn::Gt(v, zero), v, hn::Mul(factor, v)); });
-    case Unary::softplus:
-      return each([](V v) HWY_ATTR { return softplus(v); });
-    case Unary::scale:
-      return each([&](V v) HWY_ATTR { return hn::Mul(factor, v); });
-    case Unary::add_scalar:
-      return each([&](V v) HWY_ATTR { return hn::Add(v, factor); });
+#define RESTAGE_CASE_WITH_NUMBER(name, number, tried, help, kept, domain, value, gradient) \
+  case Unary::name: {                                                                      \
+    [[maybe_unused]] const N number(of_op);                                                \
+    const auto f = [&](V v) HWY_ATTR {                                                     \
+      const N x(v);                                                                        \
+      return (value).v;                                                                    \
+    };                                                                                     \
+    return map(n, out, f, in);                                                             \
+  }
+    RESTAGE_UNARY(RESTAGE_CASE)
+    RESTAGE_UNARY_WITH_NUMBER(RESTAGE_CASE_WITH_NUMBER)
+#undef RESTAGE_CASE_WITH_NUMBER
   }
 }
 
 template <class T>
-void apply_unary_grad(Unary op, int64_t n, const T* kept, const T* g, T* out, T alpha) {
-  const hn::ScalableTag<T> d;
-  using V = hn::Vec<decltype(d)>;
-  const V zero = hn::Zero(d), one = hn::Set(d, T(1)), factor = hn::Set(d, alpha);
-  const auto by_kept = [&](auto f) HWY_ATTR { map(n, out, f, g, kept); };
-  const auto constant = [&](auto f) HWY_ATTR { map(n, out, f, g); };
+void apply_unary_grad(Unary op, int64_t n, const T* of, const T* gy, T* out, T of_op) {
+  using N = Numbers<T>;
+  using V = typename N::Vector;
+  [[maybe_unused]] const N zero(T(0)), one(T(1));
   switch (op) {
-    case Unary::neg:
-      return constant([](V a) HWY_ATTR { return hn::Neg(a); });
-    case Unary::exp:
-      return by_kept([](V a, V v) HWY_ATTR { return hn::Mul(a, v); });
-    case Unary::log:
-      return by_kept([](V a, V v) HWY_ATTR { return hn::Div(a, v); });
-    case Unary::sqrt:
-      return by_kept([&](V a, V v) HWY_ATTR { return hn::Div(a, hn::Add(v, v)); });
-    case Unary::square:
-      return by_kept([](V a, V v) HWY_ATTR { return hn::Mul(hn::Add(a, a), v); });
-    case Unary::abs:  // 0 at 0
-      return by_kept([&](V a, V v) HWY_ATTR {
-        const V other = hn::IfThenElse(hn::Lt(v, zero), hn::Neg(a), hn::Mul(a, v));
-        return hn::IfThenElse(hn::Gt(v, zero), a, other);
-      });
-    case Unary::sigmoid:
-      return by_kept([&](V a, V v) HWY_ATTR { return hn::Mul(hn::Mul(a, v), hn::Sub(one, v)); });
-    case Unary::tanh:
-      return by_kept([&](V a, V v) HWY_ATTR { return hn::Mul(a, hn::NegMulAdd(v, v, one)); });
-    case Unary::relu:
-      return by_kept([&](V a, V v) HWY_ATTR { return hn::IfThenZeroElse(hn::Le(v, zero), a); });
-    case Unary::leaky_relu:
-      return by_kept([&](V a, V v) HWY_ATTR {
-        return hn::IfThenElse(hn::Gt(v, zero), a, hn::Mul(factor, a));
-      });
-    case Unary::softplus:
-      return by_kept([](V a, V v) HWY_ATTR { return hn::Mul(a, sigmoid(v)); });
-    case Unary::scale:
-      return constant([&](V a) HWY_ATTR { return hn::Mul(factor, a); });
-    case Unary::add_scalar:
-      return constant([](V a) HWY_ATTR { return a; });
+#define RESTAGE_CASE_WITH_NUMBER(name, number, tried, help, kept, domain, value, gradient) \
+  case Unary::name: {                                                                      \
+    [[maybe_unused]] const N number(of_op);                                                \
+    const auto f = [&](V first, V v) HWY_ATTR {                                            \
+      [[maybe_unused]] const N g(first), x(v), y(v);                                       \
+      return (gradient).v;                                                                 \
+    };                                                                                     \
+    return map(n, out, f, gy, Derivative::kept == Derivative::of_nothing ? gy : of);       \
+  }
+    RESTAGE_UNARY(RESTAGE_CASE)
+    RESTAGE_UNARY_WITH_NUMBER(RESTAGE_CASE_WITH_NUMBER)
+#undef RESTAGE_CASE_WITH_NUMBER
   }
 }
+#undef RESTAGE_CASE
 
 template <class T>
 T combine(Binary op, T a, T b) {
@@ -157,7 +126,7 @@ void unary(const UnaryArgs& args) {
     using T = decltype(zero);
     parallel_for(args.out.numel(), kGrain, [&](int64_t from, int64_t to) HWY_ATTR {
       apply_unary<T>(args.op, to - from, args.x.data<T>() + from, args.out.data<T>() + from,
-                     static_cast<T>(args.alpha));
+                     static_cast<T>(args.number));
     });
   });
 }
@@ -169,7 +138,7 @@ void unary_grad(const UnaryGradArgs& args) {
     parallel_for(args.out.numel(), kGrain, [&](int64_t from, int64_t to) HWY_ATTR {
       apply_unary_grad<T>(args.op, to - from, kept ? kept + from : nullptr,
                           args.gy.data<T>() + from, args.out.data<T>() + from,
-                          static_cast<T>(args.alpha));
+                          static_cast<T>(args.number));
     });
   });
 }

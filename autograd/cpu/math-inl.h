@@ -124,6 +124,40 @@ HWY_INLINE V softplus(V x) {
   return keep_nan(x, hn::Add(hn::IfThenElseZero(hn::Gt(x, hn::Zero(d)), x), tail));
 }
 
+/// A vector that formulas can be written with (kernels/unary_rows.h). Each operator is one
+/// instruction; fma() is two where the processor has none.
+template <class T>
+struct Numbers {
+  using Tag = hn::ScalableTag<T>;
+  using Vector = hn::Vec<Tag>;
+  using Mask = hn::Mask<Tag>;
+  Vector v;
+  HWY_INLINE explicit Numbers(Vector vector) : v(vector) {}
+  HWY_INLINE explicit Numbers(T number) : v(hn::Set(Tag(), number)) {}
+  friend HWY_INLINE Numbers operator-(Numbers a) { return Numbers(hn::Neg(a.v)); }
+  friend HWY_INLINE Numbers operator+(Numbers a, Numbers b) { return Numbers(hn::Add(a.v, b.v)); }
+  friend HWY_INLINE Numbers operator-(Numbers a, Numbers b) { return Numbers(hn::Sub(a.v, b.v)); }
+  friend HWY_INLINE Numbers operator*(Numbers a, Numbers b) { return Numbers(hn::Mul(a.v, b.v)); }
+  friend HWY_INLINE Numbers operator/(Numbers a, Numbers b) { return Numbers(hn::Div(a.v, b.v)); }
+  friend HWY_INLINE Mask operator<(Numbers a, Numbers b) { return hn::Lt(a.v, b.v); }
+  friend HWY_INLINE Mask operator>(Numbers a, Numbers b) { return hn::Gt(a.v, b.v); }
+  friend HWY_INLINE Mask operator<=(Numbers a, Numbers b) { return hn::Le(a.v, b.v); }
+  friend HWY_INLINE Mask operator>=(Numbers a, Numbers b) { return hn::Ge(a.v, b.v); }
+  friend HWY_INLINE Numbers where(Mask m, Numbers a, Numbers b) {
+    return Numbers(hn::IfThenElse(m, a.v, b.v));
+  }
+  friend HWY_INLINE Numbers fma(Numbers a, Numbers b, Numbers c) {
+    return Numbers(hn::MulAdd(a.v, b.v, c.v));
+  }
+  friend HWY_INLINE Numbers abs(Numbers a) { return Numbers(hn::Abs(a.v)); }
+  friend HWY_INLINE Numbers sqrt(Numbers a) { return Numbers(hn::Sqrt(a.v)); }
+  friend HWY_INLINE Numbers exp(Numbers a) { return Numbers(HWY_NAMESPACE::exp(a.v)); }
+  friend HWY_INLINE Numbers log(Numbers a) { return Numbers(HWY_NAMESPACE::log(a.v)); }
+  friend HWY_INLINE Numbers tanh(Numbers a) { return Numbers(HWY_NAMESPACE::tanh(a.v)); }
+  friend HWY_INLINE Numbers sigmoid(Numbers a) { return Numbers(HWY_NAMESPACE::sigmoid(a.v)); }
+  friend HWY_INLINE Numbers softplus(Numbers a) { return Numbers(HWY_NAMESPACE::softplus(a.v)); }
+};
+
 /// out[i] = f(in[i]...) for i < n, whole vectors at a time; the rest in one padded vector, so every
 /// element is computed by the same instructions. out may be one of the inputs.
 template <class T, class F, class... In>

@@ -6,78 +6,61 @@
 namespace restage::cuda {
 namespace {
 
+// What the rows of unary_rows.h are written in, beside what the language has.
 template <class T>
-RESTAGE_DEVICE T sigmoid_of(T x) {
+RESTAGE_DEVICE T abs(T x) {
+  return fabs(x);
+}
+template <class T>
+RESTAGE_DEVICE T sigmoid(T x) {
   const T e = exp(-fabs(x));
   return x >= T(0) ? T(1) / (T(1) + e) : e / (T(1) + e);
 }
+template <class T>
+RESTAGE_DEVICE T softplus(T x) {
+  return (x > T(0) ? x : T(0)) + log1p(exp(-fabs(x)));
+}
+template <class T>
+RESTAGE_DEVICE T where(bool condition, T a, T b) {
+  return condition ? a : b;
+}
+
+#define RESTAGE_CASE(name, help, kept, domain, value, gradient) \
+  RESTAGE_CASE_WITH_NUMBER(name, number, 0, help, kept, domain, value, gradient)
 
 template <class T>
-RESTAGE_DEVICE T value_of(Unary op, T x, T alpha) {
+RESTAGE_DEVICE T value_of(Unary op, T x, T of_op) {
+  [[maybe_unused]] const T zero = 0, one = 1;
   switch (op) {
-    case Unary::neg:
-      return -x;
-    case Unary::exp:
-      return exp(x);
-    case Unary::log:
-      return log(x);
-    case Unary::sqrt:
-      return sqrt(x);
-    case Unary::square:
-      return x * x;
-    case Unary::abs:
-      return fabs(x);
-    case Unary::sigmoid:
-      return sigmoid_of(x);
-    case Unary::tanh:
-      return tanh(x);
-    case Unary::relu:
-      return x <= T(0) ? T(0) : x;  // NaN stays NaN
-    case Unary::leaky_relu:
-      return x > T(0) ? x : alpha * x;
-    case Unary::softplus:
-      return (x > T(0) ? x : T(0)) + log1p(exp(-fabs(x)));
-    case Unary::scale:
-      return alpha * x;
-    case Unary::add_scalar:
-      return x + alpha;
+#define RESTAGE_CASE_WITH_NUMBER(name, number, tried, help, kept, domain, value, gradient) \
+  case Unary::name: {                                                                      \
+    [[maybe_unused]] const T number = of_op;                                               \
+    return value;                                                                          \
+  }
+    RESTAGE_UNARY(RESTAGE_CASE)
+    RESTAGE_UNARY_WITH_NUMBER(RESTAGE_CASE_WITH_NUMBER)
+#undef RESTAGE_CASE_WITH_NUMBER
   }
   return x;
 }
 
-/// g f'(x) from what is kept: x or y = f(x).
+/// g f'(x) from what is kept, which the rows call x or y.
 template <class T>
-RESTAGE_DEVICE T slope_times(Unary op, T kept, T g, T alpha) {
+RESTAGE_DEVICE T slope_times(Unary op, T of, T g, T of_op) {
+  [[maybe_unused]] const T zero = 0, one = 1, x = of, y = of;
   switch (op) {
-    case Unary::neg:
-      return -g;
-    case Unary::exp:
-      return g * kept;
-    case Unary::log:
-      return g / kept;
-    case Unary::sqrt:
-      return g / (kept + kept);
-    case Unary::square:
-      return (g + g) * kept;
-    case Unary::abs:  // 0 at 0
-      return kept > T(0) ? g : kept < T(0) ? -g : g * kept;
-    case Unary::sigmoid:
-      return g * kept * (T(1) - kept);
-    case Unary::tanh:
-      return g * (T(1) - kept * kept);
-    case Unary::relu:
-      return kept <= T(0) ? T(0) : g;
-    case Unary::leaky_relu:
-      return kept > T(0) ? g : alpha * g;
-    case Unary::softplus:
-      return g * sigmoid_of(kept);
-    case Unary::scale:
-      return alpha * g;
-    case Unary::add_scalar:
-      return g;
+#define RESTAGE_CASE_WITH_NUMBER(name, number, tried, help, kept, domain, value, gradient) \
+  case Unary::name: {                                                                      \
+    [[maybe_unused]] const T number = of_op;                                               \
+    return gradient;                                                                       \
+  }
+    RESTAGE_UNARY(RESTAGE_CASE)
+    RESTAGE_UNARY_WITH_NUMBER(RESTAGE_CASE_WITH_NUMBER)
+#undef RESTAGE_CASE_WITH_NUMBER
   }
   return g;
 }
+#undef RESTAGE_CASE
 
 /// Where the numbers of a broadcast operand lie: steps of its axes, 0 where it is repeated.
 struct Steps {
@@ -105,19 +88,19 @@ struct Steps {
 
 template <class T>
 void unary_of(const UnaryArgs& args) {
-  const T *x = at<T>(args.x), alpha = static_cast<T>(args.alpha);
+  const T *x = at<T>(args.x), number = static_cast<T>(args.number);
   T* out = at<T>(args.out);
   const Unary op = args.op;
-  each(args.out.numel(), [=] RESTAGE_DEVICE(int64_t i) { out[i] = value_of(op, x[i], alpha); });
+  each(args.out.numel(), [=] RESTAGE_DEVICE(int64_t i) { out[i] = value_of(op, x[i], number); });
 }
 
 template <class T>
 void unary_grad_of(const UnaryGradArgs& args) {
-  const T *kept = at<T>(args.kept), *g = at<T>(args.gy), alpha = static_cast<T>(args.alpha);
+  const T *kept = at<T>(args.kept), *g = at<T>(args.gy), number = static_cast<T>(args.number);
   T* out = at<T>(args.out);
   const Unary op = args.op;
   each(args.out.numel(), [=] RESTAGE_DEVICE(int64_t i) {
-    out[i] = slope_times(op, kept == nullptr ? T(0) : kept[i], g[i], alpha);
+    out[i] = slope_times(op, kept == nullptr ? T(0) : kept[i], g[i], number);
   });
 }
 

@@ -26,9 +26,9 @@ bool all_negative(const Tensor& t) {
 }
 
 template <Unary U>
-OpSamples unary(Domain domain, double alpha = 0) {
+OpSamples unary(Domain domain, double number = 0) {
   OpSamples s = samples_for<UnaryOp<U>>();
-  const Build build = [alpha](Args x) { return call(UnaryOp<U>{alpha}, {x[0]}); };
+  const Build build = [number](Args x) { return call(UnaryOp<U>{number}, {x[0]}); };
   Rng rng(RngKey{21, 0});
   s.add("[3, 4]", {in_domain({3, 4}, rng, domain)}, build);
   s.add("[1]", {Tensor::full({1}, 0.7, DType::f64)}, build);
@@ -139,27 +139,27 @@ OpSamples dropout_samples() {
 }  // namespace
 
 void add_elementwise(Table& t) {
-  t.push_back(unary<Unary::neg>(Domain::all));
-  t.push_back(unary<Unary::exp>(Domain::all));
-  t.push_back(unary<Unary::log>(Domain::positive));
-  t.push_back(unary<Unary::sqrt>(Domain::positive));
-  t.push_back(unary<Unary::square>(Domain::all));
-  t.push_back(unary<Unary::abs>(Domain::no_zero));
-  t.back().kink("abs at 0 has derivative 0", {f64({3}, {0.0, -0.0, 2})},
-                [](Args x) { return abs(x[0]); }, {f64({3}, {0, 0, 1})});
-  t.push_back(unary<Unary::sigmoid>(Domain::all));
-  t.back().add("far out", {f64({4}, {-700, -30, 30, 700})}, [](Args x) { return sigmoid(x[0]); });
-  t.push_back(unary<Unary::tanh>(Domain::all));
-  t.push_back(unary<Unary::relu>(Domain::no_zero));
-  t.back().kink("relu at 0 has derivative 0", {f64({4}, {0.0, -0.0, 2, -2})},
-                [](Args x) { return relu(x[0]); }, {f64({4}, {0, 0, 1, 0})});
-  t.push_back(unary<Unary::leaky_relu>(Domain::no_zero, 0.2));
-  t.back().kink("leaky relu at 0 has the slope of its negative side", {f64({3}, {0.0, 2, -2})},
-                [](Args x) { return leaky_relu(x[0], 0.2); }, {f64({3}, {0.2, 1, 0.2})});
-  t.push_back(unary<Unary::softplus>(Domain::all));
-  t.back().add("far out", {f64({4}, {-700, -30, 30, 700})}, [](Args x) { return softplus(x[0]); });
-  t.push_back(unary<Unary::scale>(Domain::all, -1.7));
-  t.push_back(unary<Unary::add_scalar>(Domain::all, 3.1));
+#define RESTAGE_SAMPLES(name, help, kept, domain, ...) \
+  t.push_back(unary<Unary::name>(Domain::domain));
+  RESTAGE_UNARY(RESTAGE_SAMPLES)
+#undef RESTAGE_SAMPLES
+#define RESTAGE_SAMPLES(name, number, tried, help, kept, domain, ...) \
+  t.push_back(unary<Unary::name>(Domain::domain, tried));
+  RESTAGE_UNARY_WITH_NUMBER(RESTAGE_SAMPLES)
+#undef RESTAGE_SAMPLES
+  const auto of = [&](const std::string& op) -> OpSamples& {
+    return *std::find_if(t.begin(), t.end(), [&](const OpSamples& s) { return s.op == op; });
+  };
+  of("abs").kink("abs at 0 has derivative 0", {f64({3}, {0.0, -0.0, 2})},
+                 [](Args x) { return abs(x[0]); }, {f64({3}, {0, 0, 1})});
+  of("relu").kink("relu at 0 has derivative 0", {f64({4}, {0.0, -0.0, 2, -2})},
+                  [](Args x) { return relu(x[0]); }, {f64({4}, {0, 0, 1, 0})});
+  of("leaky_relu")
+      .kink("leaky relu at 0 has the slope of its negative side", {f64({3}, {0.0, 2, -2})},
+            [](Args x) { return leaky_relu(x[0], 0.2); }, {f64({3}, {0.2, 1, 0.2})});
+  const Tensor far = f64({4}, {-700, -30, 30, 700});
+  of("sigmoid").add("far out", {far}, [](Args x) { return sigmoid(x[0]); });
+  of("softplus").add("far out", {far}, [](Args x) { return softplus(x[0]); });
   t.push_back(binary<Binary::add>());
   t.push_back(binary<Binary::sub>());
   t.push_back(binary<Binary::mul>());

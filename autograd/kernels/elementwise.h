@@ -3,48 +3,37 @@
 
 #include "autograd/base/rng.h"
 #include "autograd/kernels/kernel.h"
+#include "autograd/kernels/unary_rows.h"
 
 namespace restage {
 
 enum class Unary {
-  neg,
-  exp,
-  log,
-  sqrt,
-  square,
-  abs,
-  sigmoid,
-  tanh,
-  relu,
-  leaky_relu,
-  softplus,
-  scale,
-  add_scalar
+#define RESTAGE_NAME(name, ...) name,
+  RESTAGE_UNARY(RESTAGE_NAME) RESTAGE_UNARY_WITH_NUMBER(RESTAGE_NAME)
+#undef RESTAGE_NAME
 };
-/// out = f(x); `alpha` is the slope of leaky_relu, the factor of scale, the addend of add_scalar.
+#define RESTAGE_ONE(...) +1
+inline constexpr int kUnaryOps = RESTAGE_UNARY(RESTAGE_ONE) RESTAGE_UNARY_WITH_NUMBER(RESTAGE_ONE);
+#undef RESTAGE_ONE
+/// out = f(x); `number` is that of functions which have one.
 struct UnaryArgs {
   Unary op;
   const Tensor& x;
   Tensor& out;
-  double alpha = 0;
+  double number = 0;
 };
-/// What f'(x) is computed from: neg, scale and add_scalar need nothing.
+/// What f'(x) is computed from.
 enum class Derivative { of_nothing, of_x, of_y };
 constexpr Derivative derivative(Unary op) {
-  switch (op) {
-    case Unary::neg:
-    case Unary::scale:
-    case Unary::add_scalar:
-      return Derivative::of_nothing;
-    case Unary::exp:
-    case Unary::sqrt:
-    case Unary::sigmoid:
-    case Unary::tanh:
-    case Unary::relu:
-      return Derivative::of_y;
-    default:
-      return Derivative::of_x;
-  }
+  using enum Derivative;
+  constexpr Derivative of[] = {
+#define RESTAGE_KEPT(name, help, kept, ...) kept,
+#define RESTAGE_KEPT_WITH_NUMBER(name, number, tried, help, kept, ...) kept,
+      RESTAGE_UNARY(RESTAGE_KEPT) RESTAGE_UNARY_WITH_NUMBER(RESTAGE_KEPT_WITH_NUMBER)
+#undef RESTAGE_KEPT
+#undef RESTAGE_KEPT_WITH_NUMBER
+  };
+  return of[static_cast<int>(op)];
 }
 /// out = gy * f'(x). At kinks (relu, abs at 0) the derivative is 0.
 struct UnaryGradArgs {
@@ -52,7 +41,7 @@ struct UnaryGradArgs {
   const Tensor* kept;  ///< x or y = f(x), as derivative(op) says; null where it needs neither
   const Tensor& gy;
   Tensor& out;
-  double alpha = 0;
+  double number = 0;
 };
 
 enum class Binary { add, sub, mul, div };

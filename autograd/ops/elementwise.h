@@ -7,9 +7,11 @@
 namespace restage {
 
 constexpr const char* name_of(Unary op) {
-  constexpr const char* names[] = {"neg",      "exp",     "log",       "sqrt", "square",
-                                   "abs",      "sigmoid", "tanh",      "relu", "leaky_relu",
-                                   "softplus", "scale",   "add_scalar"};
+  constexpr const char* names[] = {
+#define RESTAGE_NAME(name, ...) #name,
+      RESTAGE_UNARY(RESTAGE_NAME) RESTAGE_UNARY_WITH_NUMBER(RESTAGE_NAME)
+#undef RESTAGE_NAME
+  };
   return names[static_cast<int>(op)];
 }
 constexpr const char* name_of(Binary op) {
@@ -22,11 +24,11 @@ template <Unary U>
 struct UnaryOp {
   static constexpr const char* name = name_of(U);
   static constexpr const char* letters = "x[...]";
-  double alpha = 0;
+  double number = 0;
   void check(Inputs x) const { require_floats(name, letters, x); }
   Tensor forward(Inputs x, Saved& saved) const {
     Tensor y = empty_like(x[0]);
-    launch(UnaryArgs{U, x[0], y, alpha});
+    launch(UnaryArgs{U, x[0], y, number});
     if constexpr (derivative(U) == Derivative::of_x) saved.keep({x[0]});
     if constexpr (derivative(U) == Derivative::of_y) saved.keep({y});
     return y;
@@ -34,7 +36,7 @@ struct UnaryOp {
   Grads backward(const Saved& saved, const Tensor& gy, Needs) const {
     Tensor gx = empty_like(gy);
     const Tensor* kept = derivative(U) == Derivative::of_nothing ? nullptr : &saved[0];
-    launch(UnaryGradArgs{U, kept, gy, gx, alpha});
+    launch(UnaryGradArgs{U, kept, gy, gx, number});
     return {gx};
   }
 };
@@ -73,22 +75,15 @@ struct Dropout {
   Grads backward(const Saved& saved, const Tensor& gy, Needs needs) const;
 };
 
-inline Var neg(const Var& x) { return call(UnaryOp<Unary::neg>{}, {x}); }
-inline Var exp(const Var& x) { return call(UnaryOp<Unary::exp>{}, {x}); }
-inline Var log(const Var& x) { return call(UnaryOp<Unary::log>{}, {x}); }
-inline Var sqrt(const Var& x) { return call(UnaryOp<Unary::sqrt>{}, {x}); }
-inline Var square(const Var& x) { return call(UnaryOp<Unary::square>{}, {x}); }
-inline Var abs(const Var& x) { return call(UnaryOp<Unary::abs>{}, {x}); }
-inline Var sigmoid(const Var& x) { return call(UnaryOp<Unary::sigmoid>{}, {x}); }
-inline Var tanh(const Var& x) { return call(UnaryOp<Unary::tanh>{}, {x}); }
-inline Var relu(const Var& x) { return call(UnaryOp<Unary::relu>{}, {x}); }
-inline Var leaky_relu(const Var& x, double slope) {
-  return call(UnaryOp<Unary::leaky_relu>{slope}, {x});
-}
-/// log(1 + e^x), without overflow.
-inline Var softplus(const Var& x) { return call(UnaryOp<Unary::softplus>{}, {x}); }
-inline Var scale(const Var& x, double factor) { return call(UnaryOp<Unary::scale>{factor}, {x}); }
-inline Var add_scalar(const Var& x, double c) { return call(UnaryOp<Unary::add_scalar>{c}, {x}); }
+// The functions of unary_rows.h: exp(x), relu(x), scale(x, factor) and the others.
+#define RESTAGE_FUNCTION(name, ...) \
+  inline Var name(const Var& x) { return call(UnaryOp<Unary::name>{}, {x}); }
+RESTAGE_UNARY(RESTAGE_FUNCTION)
+#undef RESTAGE_FUNCTION
+#define RESTAGE_FUNCTION(name, number, ...) \
+  inline Var name(const Var& x, double number) { return call(UnaryOp<Unary::name>{number}, {x}); }
+RESTAGE_UNARY_WITH_NUMBER(RESTAGE_FUNCTION)
+#undef RESTAGE_FUNCTION
 inline Var add(const Var& a, const Var& b) { return call(BinaryOp<Binary::add>{}, {a, b}); }
 inline Var sub(const Var& a, const Var& b) { return call(BinaryOp<Binary::sub>{}, {a, b}); }
 inline Var mul(const Var& a, const Var& b) { return call(BinaryOp<Binary::mul>{}, {a, b}); }

@@ -2,9 +2,9 @@
 
 #include <cmath>
 
+#include "autograd/ops/cross_attention.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
-#include "autograd/ops/reduce.h"
 
 namespace restage {
 
@@ -24,9 +24,9 @@ Var EncoderLayer::attention(Context& ctx, const Var& x) const {
   const auto part = [&](int64_t i) {
     return reshape(slice(all, 0, i, i + 1), {n * heads_, t, per_head});
   };
-  const Var score =
-      scale(matmul(part(0), part(1), false, true), 1.0 / std::sqrt(static_cast<double>(per_head)));
-  const Var mixed = reshape(matmul(softmax(score), part(2)), {n, heads_, t, per_head});
+  const double factor = 1.0 / std::sqrt(static_cast<double>(per_head));
+  const Var mixed =
+      reshape(cross_attention(part(0), part(1), part(2), factor), {n, heads_, t, per_head});
   return out(ctx, reshape(permute(mixed, {0, 2, 1, 3}), {n, t, width}));
 }
 

@@ -57,6 +57,13 @@ Var Lart::forward(Context& ctx, const TransferInput& in) {
   return decode(ctx, codes(ctx, in.pose, in.last), in.identity);
 }
 
+std::optional<Var> Lart::between(Context& ctx, const TransferInput& in, double share) const {
+  const ModuleScope path(scope);
+  const Var code = codes(ctx, in.pose, true);
+  const Var mixed = scale(slice(code, 0, 0, 1), 1 - share) + scale(slice(code, 0, 1, 2), share);
+  return decode(ctx, mixed, in.identity);
+}
+
 void Lart::visit(Fields& f) {
   f("time", time);
   f("enc", enc);

@@ -36,6 +36,8 @@ struct Lart : TransferModel {
   using Config = LartConfig;
   Lart(const LartConfig& c, const Init& init);
   Var forward(Context& ctx, const TransferInput& in) override;
+  /// The code at `share` between those of the two frames, decoded (section 4, interpolation).
+  std::optional<Var> between(Context& ctx, const TransferInput& in, double share) const override;
   int64_t frames() const override { return config.frames; }
   /// Codes of a window's frames [n, t, c]; `last`: of its last frame only, [n, 1, c].
   Var codes(Context& ctx, const Var& pose, bool last = false) const;

@@ -1,6 +1,8 @@
 // The role `transfer`: a network that poses a mesh by looking at another body, without a skeleton.
 #pragma once
 
+#include <optional>
+
 #include "nn/module.h"
 
 namespace restage {
@@ -16,6 +18,11 @@ struct TransferModel : Module {
   /// ShapeError where the window has another length than frames(), or points are not as many as the
   /// model needs.
   virtual Var forward(Context& ctx, const TransferInput& in) = 0;
+  /// The target at `share` of the way from the last frame of a window to that of another, in.pose
+  /// [2, t, p, 3] -> [1, 1, v, 3]; nothing of a model without codes of frames that may be mixed.
+  virtual std::optional<Var> between(Context&, const TransferInput&, double) const {
+    return std::nullopt;
+  }
   /// Frames of a window; 1: the network looks at each frame alone.
   virtual int64_t frames() const { return 1; }
   /// Whether point i of the pose must be point i of the identity.

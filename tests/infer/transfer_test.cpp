@@ -59,6 +59,50 @@ TEST(TransferSystem, GapsAreFilledBetweenTheirEnds) {
   EXPECT_EQ(transfer.finish().size(), 1u);
 }
 
+/// A body whose height and width follow the performer's, and codes that are these two numbers.
+struct Boxes : TransferModel {
+  Var forward(Context&, const TransferInput& in) override { return made(box(in.pose, 0), in); }
+  std::optional<Var> between(Context&, const TransferInput& in, double share) const override {
+    const Point a = box(in.pose, 0), b = box(in.pose, 1);
+    return made(a + static_cast<float>(share * share) * (b - a), in);  // on no straight line
+  }
+  void visit(Fields&) override {}
+  const char* kind() const override { return "Boxes"; }
+
+ private:
+  static Point box(const Var& pose, int64_t item) {
+    Points points(static_cast<size_t>(pose.size(1) * pose.size(2)));
+    const float* from = pose.value.data<float>() + item * 3 * std::ssize(points);
+    for (size_t i = 0; i < points.size(); ++i) points[i] = Eigen::Map<const Point>(from + 3 * i);
+    return box_of(points).sizes();
+  }
+  static Var made(const Point& size, const TransferInput& in) {
+    Tensor out = in.identity.value.clone().reshape({1, 1, in.identity.size(1), 3});
+    for (int64_t i = 0; i < out.numel(); ++i) out.data<float>()[i] *= size[i % 3];
+    return Var(out);
+  }
+};
+
+TEST(TransferSystem, CodesAreMixedInGapsWhereAModelHasSome) {
+  Bundle weights;
+  weights.put("transfer",
+              {"boxes", model_config("transfer/npt_pool", {}), std::make_shared<Boxes>(), {}});
+  Transfer transfer(weights, "weights", {cloud(Point::Zero()), {}}, "target", {});
+  Points wide = cloud(Point(4, 0, 0));
+  for (Point& p : wide) p.z() *= 9;
+  const float narrow_is =
+      box_of(transfer.push(cloud(Point::Zero()), "first")[0].vertices).sizes().z();
+  transfer.miss();
+  const auto frames = transfer.push(wide, "third");
+  ASSERT_EQ(frames.size(), 2u);
+  EXPECT_TRUE(frames[0].filled);
+  const Box between = box_of(frames[0].vertices), end = box_of(frames[1].vertices);
+  EXPECT_NEAR(between.sizes().z(), narrow_is + 0.25f * (end.sizes().z() - narrow_is), 1e-5);
+  const float start = box_of(cloud(Point::Zero())).center().x();
+  EXPECT_NEAR(between.center().x(), 0.5f * (start + end.center().x()),
+              1e-5);  // the path goes straight
+}
+
 /// Answers with the target's mesh, and keeps what it was shown.
 struct Same : TransferModel {
   explicit Same(Tensor* shown) : shown_(shown) {}

@@ -57,6 +57,31 @@ TEST(TransferModels, LartSeesThePoseOnlyWithoutItsFirstNorm) {
   EXPECT_LT(change_by_pose(true), 1e-5);
 }
 
+TEST(TransferModels, LartMixesTheCodesOfTwoFrames) {
+  LartConfig config;
+  config.widths = {4, 6, 8};
+  Lart net(config, Init{RngKey{2, 0}});
+  Context ctx;
+  const Tensor pose = some_points({2, 3, 20, 3}, 3), target = some_points({1, 12, 3}, 4);
+  const auto at = [&](double share) {
+    return net.between(ctx, {pose, target}, share)->value.reshape({12, 3});
+  };
+  const auto answer = [&](int64_t window) {
+    const Var y = net.forward(ctx, {pose.rows(window, window + 1), target, true});
+    return y.value.reshape({12, 3});
+  };
+  const auto apart = [](const Tensor& a, const Tensor& b) {
+    double most = 0;
+    for (int64_t i = 0; i < a.numel(); ++i) most = std::max(most, std::abs(a.item(i) - b.item(i)));
+    return most;
+  };
+  ASSERT_GT(apart(answer(0), answer(1)), 1e-3);
+  EXPECT_LT(apart(at(0), answer(0)), 1e-6);
+  EXPECT_LT(apart(at(1), answer(1)), 1e-6);
+  EXPECT_GT(apart(at(0.5), answer(0)), 1e-4);
+  EXPECT_GT(apart(at(0.5), answer(1)), 1e-4);
+}
+
 TEST(TransferModels, LartsFirstAttentionLearnsNoCorrespondence) {
   LartConfig config;
   config.widths = {8, 12, 16};
