@@ -7,7 +7,7 @@
 namespace restage::python {
 namespace {
 
-/// Clouds that were given as arrays.
+/// Clouds that were given as arrays, without points where there was none.
 class ArrayFrames final : public FrameSource {
  public:
   explicit ArrayFrames(std::vector<Points> clouds) : clouds_(std::move(clouds)) {}
@@ -86,7 +86,8 @@ std::vector<Points> clouds_of(const py::handle& source) {
   std::vector<Points> out;
   for (const py::handle cloud : source) {
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-    out.push_back(points_of(cloud, "clouds:" + std::to_string(out.size())));
+    const std::string name = "clouds:" + std::to_string(out.size());
+    out.push_back(cloud.is_none() ? Points() : points_of(cloud, name));
   }
   return out;
 }

@@ -43,11 +43,10 @@ def main():
     os.makedirs(args.out, exist_ok=True)
     moved = {}
     for name, given in seen.items():
-        file = os.path.join(args.out, name + ".h5")
-        restage.retarget(given, os.path.join(folder, "target.ply"), weights=args.weights, out=file, system="transfer", force=True)
-        with h5py.File(file) as f:
-            moved[name] = f["vertices"][:]
-        restage.command("render", file, "--no-source", out=os.path.join(args.out, name + ".png"), columns=9)
+        frames = os.path.join(args.out, name)
+        restage.retarget(given, os.path.join(folder, "target.ply"), weights=args.weights, out=frames + "/", system="transfer", force=True)
+        moved[name] = np.array([restage.load_cloud(os.path.join(frames, f)) for f in sorted(os.listdir(frames)) if f.endswith(".ply")])
+        restage.command("render", frames, "--no-source", out=frames + ".png", columns=9)
     gap = np.arange(last) % STEP != 0
     share = (np.arange(last) % STEP / STEP)[:, None, None]
     first = np.arange(last) // STEP * STEP

@@ -12,7 +12,7 @@ Array = npt.NDArray[Any]
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
-Clouds = Iterable[npt.ArrayLike]
+Clouds = Iterable[Union[npt.ArrayLike, None]]
 
 __version__: str
 JOINTS: tuple[str, ...]

@@ -27,9 +27,9 @@ def retarget(source, target, weights=None, out=None, **options):
     """The target performs the source's motion.
 
     source: a file or folder, as the program takes it (clouds, or a skeleton's motion), or a sequence of clouds,
-    each [n, 3] in metres, y up. target: a mesh or a character in T-pose. weights: a file or a run; None: the
-    standard ones. out: a file or folder to write, as the program does; then the program's report comes back as a
-    dict, else a Result of arrays. options: the program's, with _ for -: fps=60, source_up="z", scale=0.001,
+    each [n, 3] in metres, y up, or None where a frame is missing, which is filled in. target: a mesh or a
+    character in T-pose. weights: a file or a run; None: the standard ones. out: a file or folder to write, as the
+    program does; then the program's report comes back as a dict, else a Result of arrays. options: the program's, with _ for -: fps=60, source_up="z", scale=0.001,
     samples=8, min_confidence=0.5, foot_lock=False, force=True, seed=1, verbose=True (its log) ...
     """
     done = _core.retarget(source, target, weights, out, options)

@@ -85,8 +85,9 @@ struct Boxes : TransferModel {
 
 TEST(TransferSystem, CodesAreMixedInGapsWhereAModelHasSome) {
   Bundle weights;
-  weights.put("transfer",
-              {"boxes", model_config("transfer/npt_pool", {}), std::make_shared<Boxes>(), {}});
+  weights.put(
+      "transfer",
+      {"transfer/npt_pool", model_config("transfer/npt_pool", {}), std::make_shared<Boxes>(), {}});
   Transfer transfer(weights, "weights", {cloud(Point::Zero()), {}}, "target", {});
   Points wide = cloud(Point(4, 0, 0));
   for (Point& p : wide) p.z() *= 9;

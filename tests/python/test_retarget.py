@@ -55,6 +55,16 @@ def test_clouds_in_memory(walk, source, truth, tmp_path):
         assert np.array_equal(f["vertices"][:], truth[0]["vertices"])
 
 
+def test_none_is_a_missing_frame(walk, source, truth):
+    clouds = restage.load_clouds(source)
+    clouds[2] = None
+    result = restage.retarget(clouds, walk / "target.ply", LITE)
+    assert result.filled == [2] and len(result) == len(clouds)
+    assert np.array_equal(result.vertices[:2], truth[0]["vertices"][:2])
+    with pytest.raises(restage.InputError, match="holds no points"):
+        restage.retarget([None, None], walk / "target.ply", LITE)
+
+
 def test_push(walk, source, truth):
     system = restage.System(walk / "target.ply", LITE)
     frames = [f for cloud in restage.load_clouds(source) for f in system.push_all(cloud)] + system.finish()
