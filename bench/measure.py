@@ -28,6 +28,9 @@ REQUEST_SECONDS = 0.6  # short repetitions are bundled: the system counts proces
 FOREIGN_LIMIT = 0.05   # cores used by others during a request that counts as undisturbed
 TICK = 1 / os.sysconf("SC_CLK_TCK")
 TOLERANCE = 1e-3       # relative, between the two implementations' answers
+# Of a gradient's norm: where two points differ by rounding alone, a maximum over points takes either, and the norm jumps.
+# Changing the clouds by 1e-7 of themselves changes PointNet's by up to 1.4e-3.
+NORM_TOLERANCE = 5e-3
 
 
 def say(text):
@@ -270,6 +273,11 @@ def least(item, kind):
     return min(found) if found else None
 
 
+def limits(item, count):
+    """How far each of an item's answers may be apart. Those of a training step are its loss and its gradient's norm."""
+    return [TOLERANCE, NORM_TOLERANCE] if item["name"].endswith("_train") and count == 2 else [TOLERANCE] * count
+
+
 def agreement(programs, items):
     """The largest relative difference between both programs' answers for the same weights and inputs, by item.
     Ends the program if it is too large."""
@@ -279,8 +287,9 @@ def agreement(programs, items):
         for variant in item["variants"]:
             request = f"check {item['name']} {variant}"
             a, b = ours.ask(request)["values"], theirs.ask(request)["values"]
-            worst = max(abs(x - y) / max(abs(x), abs(y), 1e-2) for x, y in zip(a, b))
-            if len(a) != len(b) or worst > TOLERANCE:
+            apart = [abs(x - y) / max(abs(x), abs(y), 1e-2) for x, y in zip(a, b)]
+            worst = max(apart)
+            if len(a) != len(b) or any(d > limit for d, limit in zip(apart, limits(item, len(a)))):
                 sys.exit(f"{request}: LibTorch answers {b}, we {a}: they do not do the same work")
             out[item["name"]] = max(worst, out.get(item["name"], 0))
     ours.close()
