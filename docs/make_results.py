@@ -317,6 +317,9 @@ Means of the seeds ({seed_count} of standard, {lite_count} of lite, one of the o
 ## Is a difference real?
 
 Paired over seeds and sequences, with [95 % intervals](metrics.md#when-is-a-difference-real). "Less in": sequences.
+"Nearer" and "farther" mean that the interval excludes zero, "cannot be told" that it contains zero. With few seeds and
+sequences an interval is less sure than 95 %. The weights are those of the whole schedule; after a quarter of it, the
+gain of the motion network [cannot be told](reproduction/ours.md).
 
 {real}
 
@@ -330,7 +333,8 @@ first look and the skinning. So the true spread is larger. In brackets: sample d
 ## Four kinds of cloud: PA-MPJPE / MPJPE / PA-MPVD / Acc
 
 Four people, who are in no other data of ours, do five motions. Each is seen in four ways
-(`configs/data/kinds_of_cloud.yaml`). One seed.
+(`configs/data/kinds_of_cloud.yaml`). One seed. Errors before the benchmark's cameras are larger: people and motions
+are others, and in one of each four sequences somebody else's arm is in view.
 
 {kinds_table}
 
