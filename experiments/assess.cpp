@@ -145,6 +145,7 @@ Assessment assess(Source& source, const Bundle& weights, const std::string& weig
     all.lowest.push_back(lowest_of(points));
     if (before->uncertainty) all.confidence.push_back(confidence(*before->uncertainty));
     some.add(i, points, *before, rng);
+    if (options.show) options.show(i, points, *before);
   }
   if (all.joints.empty())
     throw InputError(source.record().path,

@@ -2,12 +2,13 @@
 // prints. What each figure means, and how far it can be trusted: docs/real_scans.md.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "experiments/source.h"
-#include "nn/geometry/skeleton.h"
+#include "nn/models/extraction.h"
 #include "nn/weights/bundle.h"
 
 namespace restage {
@@ -35,6 +36,8 @@ struct Assessment {
 struct AssessOptions {
   uint64_t seed = 0;
   int samples = 4;  ///< views of a cloud, as in RetargetOptions
+  /// Called with each cloud in which joints were found, and its number in the source, from 0.
+  std::function<void(int64_t, const Points&, const SeenJoints&)> show = {};
 };
 
 /// Reads the source to its end. `weights` must hold a model for `skeleton`; `weights_name` is their

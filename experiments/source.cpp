@@ -5,6 +5,7 @@
 #include "datasets/doctor/examine.h"
 #include "datasets/importers/axis.h"
 #include "datasets/readers/gltf.h"
+#include "nn/models/extraction.h"
 
 namespace restage {
 namespace {
@@ -93,6 +94,20 @@ void Source::return_to_place() {
   } catch (const InputError& error) {
     broken_ = error;
   }
+}
+
+void check_first_frames(Source& source) {
+  std::vector<Mesh> first;
+  for (int i = 0; i < kSourceFrames; ++i) {
+    auto cloud = source.next();
+    if (!cloud) break;
+    // What is of no use is told apart later, frame by frame.
+    if (cloud->fault || cloud->frame.points.size() < kLeastDistinctPoints) continue;
+    first.push_back({std::move(cloud->frame.points), std::move(cloud->frame.faces)});
+  }
+  source.rewind();
+  const SourceRecord& how = source.record();
+  check_source(first, how.path, {how.scale, how.up});
 }
 
 }  // namespace restage

@@ -60,4 +60,8 @@ class Source {
   std::optional<InputError> broken_;  // nothing behind this place can be read
 };
 
+/// The doctor's words on what would make nonsense of all that is done with the source: looks at
+/// its first frames, and rewinds. InputError, as check_source() says.
+void check_first_frames(Source& source);
+
 }  // namespace restage

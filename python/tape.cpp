@@ -134,6 +134,15 @@ void add_var(py::module_& m) {
            })
       .def("backward", &backward_of,
            "Gradients of all leaves; the tape forgets what was recorded. Needs a single number.")
+      .def(
+          "keep_gradient",
+          [](const PyVar& v) {
+            if (!v.tape) throw ShapeError("keep_gradient: the value is on no tape");
+            v.tape->tape.keep_gradient(v.var);
+            return v;
+          },
+          "Has the next backward give this value's gradient, too (PyTorch's retain_grad); the "
+          "value itself.")
       .def("__len__", [](const PyVar& v) { return v.var.rank() == 0 ? int64_t{0} : v.var.size(0); })
       .def("__repr__", [](const PyVar& v) {
         return "Var(" + v.var.shape().str() + (v.var.on_tape() ? ", on a tape)" : ")");
@@ -144,9 +153,14 @@ void add_var(py::module_& m) {
 }  // namespace
 
 const Tensor* PyGradients::find(const py::handle& of) const {
-  if (py::isinstance<PyVar>(of)) return gradients.find(of.cast<const PyVar&>().leaf);
+  if (py::isinstance<PyVar>(of)) {
+    const auto& v = of.cast<const PyVar&>();
+    return v.leaf != 0 ? gradients.find(v.leaf) : gradients.find(v.var);
+  }
   if (py::isinstance<Parameter>(of)) return gradients.find(of.cast<PyParameter>()->id);
-  throw ShapeError("gradients are those of leaves: give a Var of Tape.leaf() or a Parameter");
+  throw ShapeError(
+      "gradients are those of leaves: give a Var of Tape.leaf(), a Parameter, or a Var "
+      "whose gradient was kept");
 }
 
 PyVar var_of(const py::handle& value, const DType* like) {
@@ -171,7 +185,9 @@ void add_tape(py::module_& m) {
             const Tensor* found = g.find(of);
             return found == nullptr ? py::none() : py::cast(*found);
           },
-          "The gradient of a leaf or parameter, a Tensor; None if the loss does not depend on it.")
+          "The gradient of a leaf, a parameter, or a Var after keep_gradient(), a Tensor; None if "
+          "the "
+          "loss does not depend on it.")
       .def("__len__", [](const PyGradients& g) { return g.gradients.size(); })
       .def(
           "norm", [](const PyGradients& g) { return g.gradients.norm(); }, "Euclidean, over all.")

@@ -43,6 +43,12 @@ Backend& backend(Device device) {
   return *backends()[device.kind];
 }
 
+void Backend::enter(std::type_index args, Function function) {
+  if (!table_.emplace(args, function).second)
+    throw Error(std::string("there is a kernel for ") + args.name() + " on " + std::string(name()) +
+                " already");
+}
+
 Device add_device(Backend& backend) {
   for (const Backend* known : backends())
     if (known->name() == backend.name())

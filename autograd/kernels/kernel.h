@@ -38,14 +38,15 @@ class Backend {
   /// Runs a kernel; Error naming the kernel and the device if the device has no such kernel.
   virtual void run(std::type_index args_type, const void* args);
 
- protected:
-  /// add<MatmulArgs, cpu::matmul>() enters a function under its contract.
+  /// add<MatmulArgs, cpu::matmul>() enters a function under its contract, before work begins. A
+  /// program may enter kernels of its own: launch() finds them. Error if there is one already.
   template <class Args, void (*F)(const Args&)>
   void add() {
-    table_[typeid(Args)] = [](const void* args) { F(*static_cast<const Args*>(args)); };
+    enter(typeid(Args), [](const void* args) { F(*static_cast<const Args*>(args)); });
   }
 
  private:
+  void enter(std::type_index args, Function function);
   std::unordered_map<std::type_index, Function> table_;
 };
 

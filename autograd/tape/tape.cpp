@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <unordered_set>
 
 #include "autograd/kernels/elementwise.h"
 #include "autograd/kernels/update.h"
@@ -81,6 +82,11 @@ bool Saved::intact() const {
 const Tensor* Gradients::find(uint64_t id) const {
   const auto it = by_id_.find(id);
   return it == by_id_.end() ? nullptr : &it->second.gradient;
+}
+
+const Tensor* Gradients::find(const Var& inner) const {
+  const auto it = inner_.find(inner.node);
+  return !inner.on_tape() || it == inner_.end() ? nullptr : &it->second;
 }
 
 /// Computes the sums of squares that are not known yet: all are launched before the first is waited
@@ -192,7 +198,20 @@ Gradients Tape::backward(const Var& loss) {
     throw Error("backward: the loss does not depend on anything of this tape");
   if (loss.value.numel() != 1)
     throw ShapeError("backward: the loss has shape " + loss.shape().str() + ", not one number");
+  return backward(loss, Tensor::full(loss.shape(), 1.0, loss.dtype(), loss.value.device()));
+}
+
+void Tape::keep_gradient(const Var& v) {
+  if (!v.on_tape()) throw Error("keep_gradient: the value is a constant");
+  require_own(v);
+  kept_.push_back(v.node);
+}
+
+Gradients Tape::backward(const Var& loss, const Tensor& gradient) {
   require_own(loss);
+  if (!(gradient.shape() == loss.shape()) || gradient.dtype() != loss.dtype())
+    throw ShapeError("backward: the value is " + text_of(loss.value) + ", its gradient " +
+                     text_of(gradient));
   const int64_t first = first_;
   const auto at = [first](int64_t node) { return static_cast<size_t>(node - first); };
   // The nodes leave the tape before anything can fail, since a tape that is half consumed must not
@@ -202,11 +221,15 @@ Gradients Tape::backward(const Var& loss) {
   nodes_.clear();
   leaves_.clear();
   std::vector<Tensor> grads(nodes.size());
-  grads[at(loss.node)] = Tensor::full(loss.shape(), 1.0, loss.dtype(), loss.value.device());
+  grads[at(loss.node)] = gradient;
+  const std::unordered_set<int64_t> kept(kept_.begin(), kept_.end());
+  kept_.clear();
   Gradients result;
   for (size_t i = at(loss.node) + 1; i-- > 0;) {
     Node& node = nodes[i];
     if (!grads[i].defined()) continue;  // the loss does not depend on it
+    const int64_t number = first + static_cast<int64_t>(i);
+    if (kept.contains(number)) result.set_inner(number, grads[i]);
     if (node.function == nullptr) {
       result.set(node.id, grads[i]);
       continue;

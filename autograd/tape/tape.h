@@ -95,6 +95,9 @@ class Gradients {
   size_t size() const { return by_id_.size(); }  ///< leaves that took part
   /// Gradient of a leaf with this identity (Parameter::id), or null if it did not take part.
   const Tensor* find(uint64_t id) const;
+  /// Gradient of a value that Tape::keep_gradient() named, or null.
+  const Tensor* find(const Var& inner) const;
+  void set_inner(int64_t node, Tensor gradient) { inner_[node] = std::move(gradient); }
   void set(uint64_t id, Tensor gradient) { by_id_[id] = {std::move(gradient), {}}; }
   /// Euclidean norm over these leaves, in double, summed in the order given; a leaf without a
   /// gradient adds nothing. The part of each leaf is computed once.
@@ -110,6 +113,7 @@ class Gradients {
   };
   void measure(std::span<const uint64_t> ids) const;
   std::unordered_map<uint64_t, Leaf> by_id_;
+  std::unordered_map<int64_t, Tensor> inner_;  // by node; in no norm
 };
 
 class Tape {
@@ -126,6 +130,11 @@ class Tape {
   /// Error. It is also an Error if the gradients of an op have not the number, shapes and dtypes of
   /// its inputs, or if a tensor that an op keeps was changed since.
   Gradients backward(const Var& loss);
+  /// The same of a value of any shape, whose own gradient is given (a vector-Jacobian product).
+  Gradients backward(const Var& y, const Tensor& gradient);
+  /// Has the next backward pass give the gradient of a value between the leaves and the loss, too
+  /// (PyTorch's retain_grad): Gradients::find(v).
+  void keep_gradient(const Var& v);
   size_t size() const { return nodes_.size(); }
   /// What node i is: an op by its name, or "leaf".
   const char* name(size_t i) const { return nodes_[i].name(); }
@@ -158,6 +167,7 @@ class Tape {
   std::vector<Node> nodes_;
   int64_t first_ = 0;  // number of nodes_[0]; grows with every backward, so stale values show
   std::unordered_map<uint64_t, int64_t> leaves_;
+  std::vector<int64_t> kept_;  // nodes whose gradients are wanted
 };
 
 /// While an object lives, every result of every op is checked for NaN and infinity. This is slow:

@@ -71,7 +71,7 @@ Diagnosis doctor_detail::judge_surface(const Mesh& mesh, const PersonShape& shap
                      static_cast<double>(std::max<size_t>(shape.parts.part.size(), 1));
   recognise(d, seen, options);
   refine_turn(d.orientation, shape.points);
-  judge_units(d);
+  judge_units(d, options.target);
   judge_up(d, seen, options, 1);
   judge_facing(d, options);
   const Vec3 up = direction(d.orientation.up);
@@ -104,7 +104,7 @@ Finding examine_skeletons(const std::vector<Joints>& frames) {
   Diagnosis d;
   d.size = kSizeOfHeight * height;
   d.unit = guess_unit(d.size);
-  judge_units(d);
+  judge_units(d, false);
   Finding f = d.findings[0];
   f.evidence = "standing, the skeleton is about " + number(height) + " units tall";
   if (!f.fix.empty()) f.fix = "store metres";

@@ -26,7 +26,7 @@ struct Seen {
 
 /// Unit and orientation as found, or as the options say. InputError for options that contradict.
 void recognise(Diagnosis& d, const Seen& seen, const ExamineOptions& options);
-void judge_units(Diagnosis& d);
+void judge_units(Diagnosis& d, bool target);
 void judge_up(Diagnosis& d, const Seen& seen, const ExamineOptions& options, size_t clouds);
 void judge_facing(Diagnosis& d, const ExamineOptions& options);
 /// Transform, height and floor; heights along the up axis found, in the data's units.

@@ -48,7 +48,7 @@ void recognise(Diagnosis& d, const Seen& seen, const ExamineOptions& options) {
   d.orientation.turned = d.orientation.turned_sure = 0;
 }
 
-void judge_units(Diagnosis& d) {
+void judge_units(Diagnosis& d, bool target) {
   const UnitGuess& guess = d.unit;
   Finding f{"units", Weight::fact, "", guess.sure, "", ""};
   f.evidence = "half of the points lie within " + number(d.size) +
@@ -73,7 +73,8 @@ void judge_units(Diagnosis& d) {
     f.what = "metres";
   } else {
     f.what = cat("1 unit is 1 ", guess.unit.name, ", not 1 m");
-    f.fix = "--fix; or give retarget --scale " + number(guess.unit.metres);
+    f.fix = target ? "--fix makes metres of it"
+                   : "--fix; or give retarget --scale " + number(guess.unit.metres);
   }
   d.say(f);
 }
@@ -105,7 +106,8 @@ void judge_up(Diagnosis& d, const Seen& seen, const ExamineOptions& options, siz
     // What is of no person's size may be no person: then only a note.
     f.weight = o.up_sure >= kSure && d.unit.sure >= kUnsure ? Weight::wrong : Weight::note;
     f.what += ", not +y";
-    f.fix = o.up == 4 ? "--fix turns it; or give retarget --source-up z" : "--fix turns it";
+    f.fix = o.up == 4 && !options.target ? "--fix turns it; or give retarget --source-up z"
+                                         : "--fix turns it";
   }
   d.say(f);
 }

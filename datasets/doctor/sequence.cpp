@@ -51,7 +51,7 @@ class Sequence {
     recognise(d_, seen_, options_);
     judge_points(d_, fewest_distinct_);
     if (!judge_sizes()) d_.unit.sure = 0;
-    judge_units(d_);
+    judge_units(d_, false);
     judge_up(d_, seen_, options_, looked_);
     judge_walk();
     judge_facing(d_, options_);

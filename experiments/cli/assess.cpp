@@ -4,6 +4,7 @@
 
 #include "autograd/base/format.h"
 #include "autograd/base/log.h"
+#include "autograd/base/output_check.h"
 #include "datasets/doctor/examine.h"
 #include "experiments/assess.h"
 #include "experiments/cli/commands.h"
@@ -11,6 +12,7 @@
 #include "experiments/cli/scale_option.h"
 #include "experiments/cli/standard_weights.h"
 #include "experiments/slow_work.h"
+#include "infer/render/page.h"
 #include "nn/models/extraction.h"
 
 namespace restage::cli {
@@ -18,7 +20,7 @@ namespace {
 
 struct AssessCommand {
   SourceRecord source;
-  std::string weights;
+  std::string weights, out;
   AssessOptions options;
   bool force = false;
 };
@@ -71,37 +73,82 @@ Json document_of(const Assessment& found, uint64_t seed) {
           {"seed", seed}};
 }
 
+using Rows = std::vector<std::vector<std::string>>;
+
+Rows rows_of(const Assessment& found) {
+  return {{"bone lengths, standard deviation", shown(found.bone_length_sd, 1e3, " mm")},
+          {"the same, held, after two seconds", shown(found.held_bone_length_sd, 1e3, " mm")},
+          {"legs or arms changed sides", format("%.3g %% of frames", 100 * found.swaps)},
+          {"jitter", shown(found.jitter, 1e3, " mm")},
+          {"surface from the person's own body", shown(found.surface, 1e3, " mm")},
+          {"confidence", shown(found.confidence, 1, "")},
+          {"floor", shown(found.floor, 1e3, " mm")}};
+}
+
+/// Where to look.
+std::vector<std::string> places_of(const Assessment& found) {
+  std::vector<std::string> out;
+  if (found.bone_length_sd) out.push_back("bones that vary most: " + worst_bones(found));
+  if (!found.swapped.empty()) out.push_back("frames with sides changed: " + listed(found.swapped));
+  if (!found.shakiest.empty()) out.push_back("frames that shake most: " + listed(found.shakiest));
+  return out;
+}
+
 std::string text_of(const Assessment& found, const std::string& path, uint64_t seed) {
-  std::string out = markdown_table(
-      {{path, std::to_string(found.frames) + " frames"},
-       {"bone lengths, standard deviation", shown(found.bone_length_sd, 1e3, " mm")},
-       {"the same, held, after two seconds", shown(found.held_bone_length_sd, 1e3, " mm")},
-       {"legs or arms changed sides", format("%.3g %% of frames", 100 * found.swaps)},
-       {"jitter", shown(found.jitter, 1e3, " mm")},
-       {"surface from the person's own body", shown(found.surface, 1e3, " mm")},
-       {"confidence", shown(found.confidence, 1, "")},
-       {"floor", shown(found.floor, 1e3, " mm")}});
-  if (found.bone_length_sd) out += "bones that vary most: " + worst_bones(found) + "\n";
-  if (!found.swapped.empty()) out += "frames with sides changed: " + listed(found.swapped) + "\n";
-  if (!found.shakiest.empty()) out += "frames that shake most: " + listed(found.shakiest) + "\n";
+  Rows rows = rows_of(found);
+  rows.insert(rows.begin(), {path, std::to_string(found.frames) + " frames"});
+  std::string out = markdown_table(rows);
+  for (const std::string& place : places_of(found)) out += place + "\n";
   return out + "seed " + std::to_string(seed) + "\n";
 }
 
-/// The doctor's words on what would make the figures nonsense.
-void check_first_frames(Source& source, const AssessCommand& c) {
-  if (c.force) return;
-  std::vector<Mesh> first;
-  for (int i = 0; i < kSourceFrames; ++i) {
-    auto cloud = source.next();
-    if (!cloud) break;
-    if (cloud->fault || cloud->frame.points.size() < kLeastDistinctPoints) continue;
-    first.push_back({std::move(cloud->frame.points), std::move(cloud->frame.faces)});
+/// The capture, the joints that were found in it, and the figures, on one page.
+class AssessPage {
+ public:
+  /// Frames without joints are shown as the one before (the first: as the one after).
+  void add(int64_t number, const Points& cloud, const SeenJoints& seen) {
+    const size_t step = std::max<size_t>(1, cloud.size() / PageOptions().max_points);
+    Points some;
+    for (size_t i = 0; i < cloud.size(); i += step) some.push_back(cloud[i]);
+    const Points bones = stick_figure(seen.joints);
+    while (std::ssize(capture_.frames) < number) {
+      const bool any = capture_.frames.size() > 0;
+      put(any ? Points(capture_.frames.back()) : some, any ? Points(joints_.frames.back()) : bones,
+          0.0);
+    }
+    put(std::move(some), bones, seen.uncertainty ? confidence(*seen.uncertainty) : 0.0);
+    sure_ = sure_ || seen.uncertainty;
   }
-  source.rewind();
-  check_source(first, c.source.path, {c.source.scale, c.source.up});
-}
+  void write(const std::string& path, const Assessment& found, const std::string& source,
+             double fps) const {
+    PageOptions page;
+    page.fps = fps;
+    page.title = source;
+    std::string figures;
+    for (const auto& row : rows_of(found))
+      figures += (figures.empty() ? "" : "; ") + row[0] + ": " + row[1];
+    page.notes.push_back(figures);
+    for (const std::string& place : places_of(found)) page.notes.push_back(place);
+    Clip joints = joints_;
+    if (!sure_) joints.confidence.clear();
+    write_page(path, {capture_, joints}, page);
+  }
+
+ private:
+  void put(Points cloud, Points bones, double sure) {
+    capture_.frames.push_back(std::move(cloud));
+    joints_.frames.push_back(std::move(bones));
+    joints_.confidence.push_back(sure);
+  }
+
+  Clip capture_{"capture", {}, {}}, joints_{"joints found", {}, {}};
+  bool sure_ = false;  // whether the network states how far joints may be off
+};
 
 int run_assess(const AssessCommand& c, const Common& common) {
+  if (!c.out.empty() && !c.out.ends_with(".html"))
+    throw InputError(c.out, "names no page", "end --out in .html");
+  if (!c.out.empty()) check_output(c.out, {c.source.path, c.weights});
   if (c.options.samples < 1 || c.options.samples > 256)
     throw InputError("", "--samples is out of range", "give a number from 1 to 256");
   const std::string weights = c.weights.empty() ? standard_weights() : c.weights;
@@ -112,13 +159,19 @@ int run_assess(const AssessCommand& c, const Common& common) {
   if (!c.source.sequence && source.sequences() > 1)
     throw InputError(c.source.path, "holds " + std::to_string(source.sequences()) + " sequences",
                      "choose one with --sequence N, from 0");
-  check_first_frames(source, c);
+  if (!c.force) check_first_frames(source);
   AssessOptions options = c.options;
   options.seed = common.seed;
+  AssessPage page;
+  if (!c.out.empty())
+    options.show = [&page](int64_t i, const Points& p, const SeenJoints& seen) {
+      page.add(i, p, seen);
+    };
   SlowWork slow;
   slow.on("looking at " + std::to_string(source.frames()) + " frames");
   const Assessment found = assess(source, models, weights_path(weights), options);
   slow.on("");
+  if (!c.out.empty()) page.write(c.out, found, c.source.path, source.fps());
   for (const std::string& remark : source.remarks()) log_warning(remark);
   if (found.left_out > 0)
     log_warning(std::to_string(found.left_out) + " frames are left out; the first: " + found.why);
@@ -135,6 +188,7 @@ void add_assess(Program& program) {
                   "restage assess scans.h5 --sequence 2 --weights runs/finetune-1 --json\n"
                   "restage assess mm/ --scale mm --source-up z --fps 60\n"
                   "restage assess hero.glb --clip Walk --samples 1\n"
+                  "restage assess scans/ --out page.html\n"
                   "restage assess toy/ --force",
                   run_assess);
   app.add_option("SOURCE", c.source.path,
@@ -151,6 +205,7 @@ void add_assess(Program& program) {
   app.add_option("--sequence", c.source.sequence, "which sequence of an HDF5 source, from 0");
   app.add_option("--samples", c.options.samples,
                  "views of a cloud to average: choices of its points, turned and mirrored");
+  app.add_option("--out", c.out, "page.html that plays the capture beside the joints found");
   app.add_flag("--force", c.force, "take what the doctor would refuse");
 }
 

@@ -13,6 +13,7 @@ void add_commands(Program& program) {
   add_retarget(program);
   add_stream(program);
   add_skeleton(program);
+  add_adapt(program);
   add_assess(program);
   add_data(program);
   add_eval(program);

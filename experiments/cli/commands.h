@@ -6,6 +6,7 @@
 
 namespace restage::cli {
 
+void add_adapt(Program& program);
 void add_assess(Program& program);
 void add_compare(Program& program);
 void add_completion(Program& program);

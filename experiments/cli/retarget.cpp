@@ -60,17 +60,7 @@ auto with_target(const RetargetCommand& c, const TargetMesh& target, const Work&
 /// The doctor's words on what would make the result nonsense.
 void check_inputs(const RetargetCommand& c, Source& source, const TargetMesh& target) {
   check_mesh(c, target);
-  if (c.options.force) return;
-  std::vector<Mesh> first;
-  for (int i = 0; i < kSourceFrames; ++i) {
-    auto cloud = source.next();
-    if (!cloud) break;
-    // What is of no use is told apart later, frame by frame.
-    if (cloud->fault || cloud->frame.points.size() < kLeastDistinctPoints) continue;
-    first.push_back({std::move(cloud->frame.points), std::move(cloud->frame.faces)});
-  }
-  source.rewind();
-  check_source(first, c.source.path, {c.source.scale, c.source.up});
+  if (!c.options.force) check_first_frames(source);
 }
 
 /// Why a frame cannot be used; nothing if it can, for all that is known before a system sees it.

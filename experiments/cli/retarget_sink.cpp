@@ -70,20 +70,26 @@ Sink own_sink(const SinkOptions& options, const std::string& clip, const std::st
           }};
 }
 
+/// A sink whose file has no bones for fingers: says so at the end if the source moved some.
+Sink without_fingers(Sink sink) {
+  const auto fingers = std::make_shared<bool>(false);
+  return {[sink, fingers](const RetargetedFrame& f) {
+            *fingers = *fingers || f.fingers;
+            sink.push(f);
+          },
+          [sink, fingers](const Frames& filled) {
+            sink.commit(filled);
+            if (*fingers) log_warning("the source's fingers are not in the file: it has 22 bones");
+          }};
+}
+
 /// The motion alone, which every VRM character plays.
 Sink vrma_sink(const SinkOptions& options, const Shown& shown, const std::string& clip) {
   const auto writer = std::make_shared<VrmaWriter>(
       options.out, rig_of(shown, options.out).rest,
       options.clip_name.empty() ? clip : options.clip_name, options.rate());
-  const auto fingers = std::make_shared<bool>(false);
-  return {[writer, fingers](const RetargetedFrame& f) {
-            *fingers = *fingers || f.fingers;
-            writer->push(f.pose);
-          },
-          [writer, fingers](const Frames&) {
-            writer->commit();
-            if (*fingers) log_warning("the source's fingers are not in the file: it has 22 bones");
-          }};
+  return without_fingers({[writer](const RetargetedFrame& f) { writer->push(f.pose); },
+                          [writer](const Frames&) { writer->commit(); }});
 }
 
 /// The target has no bones that we know: a skeleton and a skin of our own.
@@ -113,10 +119,11 @@ Sink glb_sink(const SinkOptions& options, const Shown& shown) {
                  "exact)",
                  1e3 * surface.mean, 1e3 * surface.max));
   };
-  return {[writer](const RetargetedFrame& f) {
-            writer->push(f.pose, f.confidence, f.vertices.empty() ? nullptr : &f.vertices);
-          },
-          commit};
+  return without_fingers({[writer](const RetargetedFrame& f) {
+                            writer->push(f.pose, f.confidence,
+                                         f.vertices.empty() ? nullptr : &f.vertices);
+                          },
+                          commit});
 }
 
 /// What a character's own bones are called; of joints without a bone: nothing. BVH ends names at
@@ -144,8 +151,8 @@ Sink bvh_sink(const SinkOptions& options, const Shown& shown,
   if (own) how.names = bone_names(*own);
   if (!options.skeleton.empty()) how.names = rig_convention(options.skeleton, rest, 0).names;
   const auto writer = std::make_shared<BvhWriter>(options.out, rest, how);
-  return {[writer](const RetargetedFrame& f) { writer->push(f.pose); },
-          [writer](const Frames&) { writer->commit(); }};
+  return without_fingers({[writer](const RetargetedFrame& f) { writer->push(f.pose); },
+                          [writer](const Frames&) { writer->commit(); }});
 }
 
 Sink hdf5_sink(const SinkOptions& options, const Shown& shown,

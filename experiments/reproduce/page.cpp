@@ -358,7 +358,7 @@ const char* const kRule =
     "are "
     "judged, never figures: other data and other budgets than the paper's. Ours: mean ± sample "
     "deviation over n seeds\n[95 % interval: bootstrap over sequences and seeds]; with three seeds "
-    "such an interval holds the truth in some 75 of 100 cases\n(docs/experiments.md).\n\n";
+    "such an interval holds the truth in some 75 of 100 cases\n(docs/metrics.md).\n\n";
 
 /// Of what is beside the page; made if it is not there.
 std::string files_folder(const std::string& folder, const PageOptions& options) {

@@ -13,8 +13,9 @@
 //   difference of two samples: the same of x[k, s] - y[k, s] over the pairs (trial, sequence) that
 //              both have. What both share, a hard sequence or a lucky seed, cancels.
 // Few trials cannot show how far seeds scatter: with three, and nothing but the seeds to make a
-// difference, such an interval holds the truth in some 75 of 100 cases (docs/experiments.md has the
-// simulation). Each set of sequences is a sample of its own; sets are never mixed.
+// difference, such an interval holds the truth in some 75 of 100 cases
+// (docs/notes/experiments_log.md has the simulation). Each set of sequences is a sample of its own;
+// sets are never mixed.
 //
 // All draws are functions of the seed and the two counts, so equal input gives equal bits.
 #pragma once

@@ -376,6 +376,8 @@ std::string page_html(const std::vector<Clip>& clips, const PageOptions& options
   }
   const bool any_errors = std::any_of(clips.begin(), clips.end(),
                                       [](const Clip& clip) { return !clip.errors.empty(); });
+  std::string notes;
+  for (const std::string& note : options.notes) notes += "<p>" + escape_html(note) + "</p>\n";
   if (options.live) meta["live"] = true;
   meta["width"] = width;
   meta["height"] = height;
@@ -386,6 +388,7 @@ std::string page_html(const std::vector<Clip>& clips, const PageOptions& options
                     {"DESCRIPTION", description},
                     {"PANELS", panels},
                     {"NOTE", note_of(plan, any_errors)},
+                    {"NOTES", notes},
                     {"ERRORS", any_errors ? kErrorsBox : ""},
                     {"META", script_json(meta.dump(-1, ' ', true, Json::error_handler_t::replace))},
                     {"DATA", data},

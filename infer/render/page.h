@@ -9,6 +9,7 @@ namespace restage {
 struct PageOptions {
   double fps = kFps;  ///< of the clips
   std::string title = "restage";
+  std::vector<std::string> notes = {};  ///< lines of text at the foot
   /// Size below which the page stays, about. If the clips are too large, frames are left out first
   /// (at least every fourth frame stays; the page interpolates surfaces between frames), then
   /// surfaces get fewer vertices, then more frames are left out. The foot of the page says what was

@@ -25,38 +25,70 @@ constexpr int64_t kEnds = std::ssize(kLeaves), kGates = 2 * kJoints + kEnds + 1;
 constexpr int64_t kPathAt = 4 * kJoints + 6 * kEnds;
 constexpr int64_t kFooting = 16, kFootingHidden = 32;
 constexpr double kTrend = -2;  // log odds of an untrained trend's gain: 12 %
+constexpr double kBack = -2;   // and of a later frame's
+
+/// What a filter makes of x, and what it had expected of each frame; both [n, t, m].
+struct Filtered {
+  Var y, expected;
+};
 
 /// Holt's filter with gains that change, over x, g, h [n, t, m]:
 ///   v_t = h_t (x_t - x_(t-1)) + (1 - h_t) v_(t-1),  y_t = g_t x_t + (1 - g_t) (y_(t-1) + v_t);
 /// before the first frame y is x and v none. A steady movement is followed without delay. `state`,
 /// three tensors [n, m], is read and replaced: x, v and y of the last frame.
-Var filtered(const Var& x, const Var& g, const Var& h, Var* state) {
+Filtered filtered(const Var& x, const Var& g, const Var& h, Var* state) {
   const int64_t n = x.size(0), t = x.size(1), m = x.size(2);
   const auto frame = [&](const Var& of, int64_t i) {
     return reshape(slice(of, 1, i, i + 1), {n, m});
   };
   const auto rest = [](const Var& gain) { return add_scalar(neg(gain), 1); };
+  const auto before = [&](const Var& first, const Var& of) {
+    const Var one = reshape(first, {n, 1, m});
+    return t == 1 ? one : concat({one, slice(of, 1, 0, t - 1)}, 1);
+  };
   if (!state[0].value.defined()) {
     state[0] = state[2] = frame(x, 0);
     state[1] = Var(Tensor::zeros({n, m}, x.dtype(), x.value.device()));
   }
-  const Var first = reshape(state[0], {n, 1, m});
-  const Var before = t == 1 ? first : concat({first, slice(x, 1, 0, t - 1)}, 1);
-  const Var v = recurrence(rest(h), h * (x - before), state[1]);
+  const Var v = recurrence(rest(h), h * (x - before(state[0], x)), state[1]);
   const Var y = recurrence(rest(g), g * x + rest(g) * v, state[2]);
+  const Filtered out{y, before(state[2], y) + v};
   state[0] = frame(x, t - 1), state[1] = frame(v, t - 1), state[2] = frame(y, t - 1);
-  return y;
+  return out;
 }
 
-/// x [n, t, m] delayed by `frames` frames; before the first frame x stood still. `state`, the last
-/// `frames` frames, is read and replaced.
-Var delayed(const Var& x, int64_t frames, Var* state) {
+/// x [n, t, m] after the `frames` frames before it, [n, frames + t, m]; before the first frame x
+/// stood still. `state`, the last `frames` frames, is read and replaced.
+Var with_earlier(const Var& x, int64_t frames, Var* state) {
   if (frames == 0) return x;
   const int64_t n = x.size(0), t = x.size(1), m = x.size(2);
   if (!state->value.defined()) *state = expand(slice(x, 1, 0, 1), {n, frames, m});
   const Var all = concat({*state, x}, 1);
   *state = slice(all, 1, t, t + frames);
-  return slice(all, 1, 0, t);
+  return all;
+}
+
+/// x delayed by `frames` frames.
+Var delayed(const Var& x, int64_t frames, Var* state) {
+  const int64_t t = x.size(1);
+  return slice(with_earlier(x, frames, state), 1, 0, t);
+}
+
+/// Frames of `frames` frames ago, which know those since (the smoother of Rauch, Tung and Striebel
+/// with learned gains c):  s_t = y_t + c_t (s_(t+1) - p_(t+1)),  p what the filter expected, and s
+/// of the newest frame y.
+Var smoothed(const Filtered& f, const Var& c, int64_t frames, Var* state) {
+  const int64_t m = f.y.size(2);
+  const Var all = with_earlier(concat({f.y, f.expected, c}, 2), frames, state);
+  const auto part = [&](int64_t which, int64_t from, int64_t to) {
+    return slice(slice(all, 2, which * m, (which + 1) * m), 1, from, to);
+  };
+  Var s = part(0, 0, all.size(1));
+  for (int64_t left = all.size(1) - 1; left >= f.y.size(1); --left) {
+    const Var surprise = slice(s, 1, 1, left + 1) - part(1, 1, left + 1);
+    s = part(0, 0, left) + part(2, 0, left) * surprise;
+  }
+  return s;
 }
 
 /// Repeats the gates of 22 joints, 22 twists, the leaves and the path [n, t, 22 + 22 + 5 + 1] for
@@ -139,6 +171,7 @@ Hybrid::Hybrid(const HybridConfig& c, const Init& init)
     footing.emplace(kFooting, kFootingHidden, 1, 0.0, init.sub("footing"));
     contact.emplace(kFootingHidden, std::ssize(kFeet), init.sub("contact"));
   }
+  if (c.latency > 0 && c.smoothing) back.emplace(c.hidden, kGates, init.sub("back")).start_small();
   for (Linear* head : {&gate, &trend, &correction, &twist, &leaves, &path}) head->start_small();
   const auto constant = [&](int64_t n, double v) { return Tensor::full({n}, v, init.type); };
   units.joints = {constant(3 * kJoints, 0), constant(3 * kJoints, 1)};
@@ -164,12 +197,32 @@ Var Hybrid::seen(const MotionInput& in, const SurfaceTurns& surface, const Var& 
   return concat({out, log(scale(uncertainty, 1 / kUsualUncertainty))}, 2);
 }
 
+/// What is seen of each frame, calmed by filters and `latency` frames old; then, as old, its
+/// uncertainty.
+Var Hybrid::calmed(Context& ctx, const Var& now, const Var& decoded, MotionState* state) const {
+  const auto gains = [&](const Linear& head, double start) {
+    return for_each_number(sigmoid(add_scalar(head(ctx, decoded), start)));
+  };
+  constexpr int64_t kSeen = kPathAt + 3;
+  const auto seen = [](const Var& x) { return slice(x, 2, 0, kSeen); };
+  const auto sure = [](const Var& x) { return slice(x, 2, kSeen, kSeen + kJoints); };
+  const Var g = gains(gate, kTrusting), h = gains(trend, kTrend);
+  if (!back) {
+    const Var then = delayed(now, config.latency, &(*state)[5]);
+    return concat({filtered(seen(then), g, h, &(*state)[2]).y, sure(then)}, 2);
+  }
+  const Filtered f = filtered(seen(now), g, h, &(*state)[2]);
+  return concat({smoothed(f, gains(*back, kBack), config.latency, &(*state)[5]),
+                 delayed(sure(now), config.latency, &(*state)[8])},
+                2);
+}
+
 MotionOutput Hybrid::forward(Context& ctx, const MotionInput& in, MotionState* state) const {
   const ModuleScope scope_of_this(scope);
   const int64_t n = in.joints.size(0), t = in.joints.size(1), w = 3 * kJoints;
   const SurfaceTurns surface = surface_turns(in);
   const Var b = in_units(reshape(in.rest, {n, 1, w}), units.rest);
-  state->resize(8);
+  state->resize(9);
   const Var uncertainty = config.uncertainty && in.uncertainty.defined()
                               ? Var(in.uncertainty)
                               : Var(Tensor::full({n, t, kJoints}, kUsualUncertainty,
@@ -177,18 +230,13 @@ MotionOutput Hybrid::forward(Context& ctx, const MotionInput& in, MotionState* s
   const Var code = enc(ctx, seen(in, surface, uncertainty), &(*state)[0]);
   const Var decoded = dec(ctx, concat({code, expand(b, {n, t, w})}, 2), &(*state)[1]);
 
-  const auto gains = [&](const Linear& head, double start) {
-    return for_each_number(sigmoid(add_scalar(head(ctx, decoded), start)));
-  };
   const Var ends = reshape(matrix_to_sixd(Var(surface.leaves)), {n, t, 6 * kEnds});
   const Var now =
-      delayed(concat({reshape(in.joints, {n, t, w}), reshape(Var(surface.twist), {n, t, kJoints}),
-                      ends, in.trans, uncertainty},
-                     2),
-              config.latency, &(*state)[5]);
-  const Var believed = slice(now, 2, kPathAt + 3, kPathAt + 3 + kJoints);
-  const Var calm = filtered(slice(now, 2, 0, kPathAt + 3), gains(gate, kTrusting),
-                            gains(trend, kTrend), &(*state)[2]);
+      concat({reshape(in.joints, {n, t, w}), reshape(Var(surface.twist), {n, t, kJoints}), ends,
+              in.trans, uncertainty},
+             2);
+  const Var calm = calmed(ctx, now, decoded, state);
+  const Var believed = slice(calm, 2, kPathAt + 3, kPathAt + 3 + kJoints);
   const Var off = scale(believed, 1 / kUsualUncertainty);
   const double turning = config.turn_reach * (config.orientation ? 1 : kBlind);
   const Var moved = slice(calm, 2, 0, w) +
@@ -225,6 +273,7 @@ void Hybrid::visit(Fields& f) {
   f("twist", twist);
   f("leaves", leaves);
   f("path", path);
+  if (back) f("back", *back);
   if (footing) f("footing", *footing);
   if (contact) f("contact", *contact);
   f("joint_mean", units.joints.mean);

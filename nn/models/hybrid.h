@@ -25,7 +25,7 @@ struct HybridConfig {
   int64_t latency = 0;
   double dropout = 0;
   double reach = 2, turn_reach = 0.15;
-  bool orientation = true, uncertainty = true, contact = false;
+  bool orientation = true, uncertainty = true, contact = false, smoothing = false;
 };
 
 template <class V>
@@ -33,6 +33,8 @@ void visit(V& v, HybridConfig& c) {
   v("hidden", c.hidden, "size of the hidden states", between(1, kMostWidth));
   v("dropout", c.dropout, "between the layers", below(0, 1));
   v("latency", c.latency, "frames that it looks ahead: so much later it answers", between(0, 60));
+  v("smoothing", c.smoothing, "the filters, too, know the frames that it looks ahead",
+    added("false"));
   v("reach", c.reach,
     "farthest that a coordinate of a joint is corrected, in units of its uncertainty", at_least(0));
   v("turn_reach", c.turn_reach,
@@ -45,8 +47,9 @@ void visit(V& v, HybridConfig& c) {
 }
 
 /// The state is {encoder, decoder}, both [layers, n, hidden], the three states of the filter, [n,
-/// 121], and the last `latency` frames of what is filtered; with `contact` also the state of
-/// `footing` and the joints of the last frame.
+/// 121], the last `latency` frames of what is filtered, or of what comes of it where they are
+/// smoothed; with `contact` also the state of `footing` and the joints of the last frame; where
+/// they are smoothed the last `latency` uncertainties.
 struct Hybrid final : MotionModel {
   using Config = HybridConfig;
   Hybrid(const HybridConfig& c, const Init& init);
@@ -60,12 +63,14 @@ struct Hybrid final : MotionModel {
   GruLayer enc, dec;
   /// Before training the answers of all of these are near zero.
   Linear gate, trend, correction, twist, leaves, path;
+  std::optional<Linear> back;       ///< how much later frames change earlier ones
   std::optional<GruLayer> footing;  ///< reads how the feet move in the world; with config.contact
   std::optional<Linear> contact;
   MotionStatistics units;  ///< all but `sixd`
 
  private:
   Var seen(const MotionInput& in, const SurfaceTurns& surface, const Var& uncertainty) const;
+  Var calmed(Context& ctx, const Var& now, const Var& decoded, MotionState* state) const;
 };
 
 }  // namespace restage

@@ -207,8 +207,12 @@ const TrainedModel* Bundle::find(const std::string& role) const {
 
 const TrainedModel& Bundle::need(const std::string& role, const std::string& where) const {
   if (const TrainedModel* found = find(role)) return *found;
-  throw InputError(where, "holds no model for " + place_of(role),
-                   "give weights that have one, or train that stage too");
+  std::string held;
+  for (const auto& entry : by_role_) held += (held.empty() ? "" : ", ") + entry.first;
+  throw InputError(
+      where,
+      "holds no model for " + place_of(role) + (held.empty() ? "" : " (it holds " + held + ")"),
+      "give weights that have one, or train that stage too");
 }
 
 void Bundle::add(const Bundle& other) {

@@ -7,7 +7,7 @@ import json as _json
 import os as _os
 
 from . import _core, metrics, ops
-from ._core import (Adam, Frame, Gradients, InputError, Model, NonFiniteError, Op, Parameter, Report, ShapeError, Tape,
+from ._core import (Adam, Frame, Gradients, InputError, Model, Muon, NonFiniteError, Op, Parameter, Report, ShapeError, Tape,
                     Tensor, Var, WorkError, gradcheck, load_model, load_safetensors, model, models, save_safetensors,
                     set_threads, threads)
 from ._files import (Clip, ClosedForm, Mesh, closed_form, load_cloud, load_clouds, load_mesh, load_motion,
@@ -50,7 +50,7 @@ def train(config, *overrides, on_step=None, **options):
     return told.get("run")
 
 
-__all__ = ["Adam", "Clip", "ClosedForm", "Extractor", "Frame", "Gradients", "InputError", "JOINTS", "Mesh", "Model",
+__all__ = ["Adam", "Clip", "ClosedForm", "Extractor", "Frame", "Gradients", "InputError", "JOINTS", "Mesh", "Model", "Muon",
            "NonFiniteError", "Op", "PARENTS", "Parameter", "Report", "Result", "ShapeError", "System", "Tape", "Tensor",
            "Var", "WorkError", "closed_form", "command", "doctor", "gradcheck", "load_cloud", "load_clouds", "load_mesh",
            "load_model", "load_motion", "load_safetensors", "metrics", "model", "models", "ops", "retarget",

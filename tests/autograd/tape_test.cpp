@@ -412,5 +412,32 @@ TEST(ChangedInPlace, WhatNobodyKeptMayChange) {
   EXPECT_EQ(tape.backward(loss).find(1)->to_vector<double>(), (std::vector<double>{2, 2}));
 }
 
+TEST(InnerGradients, AreThoseThatWereAskedFor) {
+  Tape tape;
+  const Var x = tape.leaf(values({1, 2, 3}), 1), y = square(x), z = exp(x);
+  tape.keep_gradient(y);
+  const Gradients g = tape.backward(sum_all(y * z));
+  ASSERT_NE(g.find(y), nullptr);
+  EXPECT_EQ(g.find(y)->to_vector<double>(), z.value.to_vector<double>());
+  EXPECT_EQ(g.find(z), nullptr);
+  EXPECT_EQ(g.size(), 1u);
+  EXPECT_EQ(g.find(Var(values({1}))), nullptr);
+  expect_error<Error>([&] { tape.keep_gradient(Var(values({1}))); }, {"constant"});
+  expect_error<Error>([&] { tape.keep_gradient(y); }, {"consumed"});
+  const Var again = tape.leaf(values({4}), 1);  // nothing is kept for a second pass
+  EXPECT_EQ(tape.backward(sum_all(square(again))).find(again), nullptr);
+}
+
+TEST(Backward, TakesAGradientOfAnyShape) {
+  Tape tape;
+  const Var y = square(tape.leaf(values({1, 2, 3}), 1));
+  expect_error<Error>([&] { tape.backward(y); }, {"not one number"});
+  expect_error<ShapeError>([&] { tape.backward(y, values({1, 2})); }, {"its gradient"});
+  expect_error<ShapeError>([&] { tape.backward(y, Tensor::full({3}, 1, DType::f32)); },
+                           {"its gradient"});
+  EXPECT_EQ(tape.backward(y, values({10, 100, 1000})).find(1)->to_vector<double>(),
+            (std::vector<double>{20, 400, 6000}));
+}
+
 }  // namespace
 }  // namespace restage

@@ -1,10 +1,13 @@
 """restage assess: what a capture's joints show without a truth."""
+import json
 import os
+import re
 import unittest
 
 from support import ROOT, CliTest
 
 WEIGHTS = os.path.join(ROOT, "experiments", "weights", "lite.safetensors")
+STANDARD = os.path.join(ROOT, "experiments", "weights", "standard.safetensors")
 KEYS = {"frames", "bone_length_sd_mm", "swaps", "jitter_mm", "surface_mm", "confidence", "floor_mm"}
 
 
@@ -21,6 +24,24 @@ class Assess(CliTest):
         self.assertLessEqual(found["swaps"], 0.5)
         self.assertEqual(self.json(*call, "--threads", "1"), found)
         self.assertIn("bone lengths", self.done(*call))
+
+    def test_a_page_of_the_capture(self):
+        self.person(frames=12)
+        os.makedirs(self.path("walk/frames"))
+        self.done("retarget", "--source", "walk/source.h5", "--target", "walk/target.ply", "--weights", WEIGHTS, "--out", "walk/frames/")
+        frames = sorted(os.listdir(self.path("walk/frames")))
+        with open(self.path(os.path.join("walk/frames", frames[4])), "w") as f:
+            f.write("ply\n")  # damaged
+        result = self.restage("assess", "walk/frames/", "--weights", STANDARD, "--out", "page.html", "--json")
+        self.assertEqual(result.code, 0, result.err)
+        found, page = json.loads(result.out), self.bytes("page.html").decode()
+        self.assertEqual((found["frames"], found["left_out"]), (11, 1))
+        meta = json.loads(re.search(r'<script id="meta" type="application/json">(.*?)</script>', page)[1])
+        self.assertEqual([(clip["label"], len(clip["counts"])) for clip in meta["clips"]], [("capture", 12), ("joints found", 12)])
+        self.assertEqual(meta["clips"][1]["confidence"][4], 0)
+        for said in ("bone lengths, standard deviation: %.4g mm" % found["bone_length_sd_mm"], "bones that vary most", "frames that shake most"):
+            self.assertIn(said, page)
+        self.bad_input(["assess", "walk/frames/", "--weights", WEIGHTS, "--out", "page.png"], "page.png", ".html")
 
     def test_bad_input(self):
         self.write("empty/readme.txt", "nothing")

@@ -51,6 +51,25 @@ class RealCharacters(CliTest):
             self.check(name + ".glb", name + ".glb", "--truth", truth, "--frames", "60", "--pa", ".02", "--mpjpe", ".03")
         self.check("mixa_t.glb", "mixa_t.glb", "--same", self.path("mixa_a.glb"))
 
+    def test_fingers_that_a_file_cannot_hold_are_named(self):
+        target = os.path.join(CHARACTERS, "mixa_t.glb")
+        self.done("retarget", "--source", os.path.join(CHARACTERS, "source_dance.glb"), "--target", target, "--out", "hands.glb")
+        content = self.bytes("hands.glb")
+        length, = struct.unpack("<I", content[12:16])
+        document = json.loads(content[20:20 + length])
+        animation = document["animations"][-1]
+        channel = next(c for c in animation["channels"] if c["target"]["path"] == "rotation")
+        finger = next(i for i, node in enumerate(document["nodes"]) if node["name"].endswith("LeftHandIndex1"))
+        animation["channels"].append({"sampler": channel["sampler"], "target": {"node": finger, "path": "rotation"}})
+        text = json.dumps(document).encode()
+        text += b" " * (-len(text) % 4)
+        with open(self.path("hands.glb"), "wb") as f:
+            f.write(content[:8] + struct.pack("<II", len(content) - length + len(text), len(text)) + content[16:20] + text + content[20 + length:])
+        call = ["retarget", "--source", "hands.glb", "--target", target]
+        for out, said in (("o.bvh", True), ("o.vrma", True), ("o.glb", False)):
+            result = self.restage(*call, "--out", out)
+            self.assertEqual((result.code, "fingers are not in the file" in result.err), (0, said), result.err)
+
     def test_a_file_that_was_saved_in_a_pose_or_mirrored(self):
         """As Blender exports it: nodes hold a pose, vertices lie in the world; and an armature of scale -0.01 above the same skin."""
         source = ["--source", os.path.join(CHARACTERS, "source_dance.glb")]

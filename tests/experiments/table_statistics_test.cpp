@@ -174,7 +174,8 @@ double coverage(size_t seeds, size_t sequences, double of_seed, double of_sequen
   return held / static_cast<double>(kSets);
 }
 
-// The figures of docs/experiments.md. Fixed seeds: nothing flickers; 300 sets put 95 % within 2.5.
+// The figures of docs/notes/experiments_log.md. Fixed seeds: nothing flickers; 300 sets put 95 %
+// within 2.5.
 TEST(TableStatistics, IntervalsHoldTheTruth) {
   for (const auto& [seeds, sequences, of_seed] : {std::tuple<size_t, size_t, double>{3, 20, 0.3},
                                                   {5, 20, 0.3},

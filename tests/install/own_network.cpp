@@ -5,7 +5,9 @@
 #include <cmath>
 #include <cstdio>
 
+#include "autograd/base/parallel.h"
 #include "autograd/gradcheck/gradcheck.h"
+#include "autograd/kernels/kernel.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
 #include "autograd/ops/reduce.h"
@@ -55,31 +57,45 @@ struct Shift : TransferModel {
   Linear in, out;
 };
 
-/// An op of one's own, number by number: x^2 / (1 + x^2), the loss of Geman and McClure, in which
-/// far-off points count little. On the CPU.
+/// A kernel of one's own, number by number: x^2 / (1 + x^2), the loss of Geman and McClure, in
+/// which far-off points count little; with `gy`, the gradient for x.
+struct GemanMcClureArgs {
+  const Tensor& x;
+  const Tensor* gy;
+  Tensor& out;
+};
+
+template <class T>
+void run_geman_mcclure(const GemanMcClureArgs& a) {
+  const T *x = a.x.data<T>(), *gy = a.gy ? a.gy->data<T>() : nullptr;
+  T* out = a.out.data<T>();
+  parallel_for(a.x.numel(), 1 << 14, [&](int64_t from, int64_t to) {
+    for (int64_t i = from; i < to; ++i) {
+      const T one = 1 + x[i] * x[i];
+      out[i] = gy ? gy[i] * 2 * x[i] / (one * one) : x[i] * x[i] / one;
+    }
+  });
+}
+
+void geman_mcclure_on_cpu(const GemanMcClureArgs& a) {
+  a.x.dtype() == DType::f64 ? run_geman_mcclure<double>(a) : run_geman_mcclure<float>(a);
+}
+
+/// The op of this kernel.
 struct GemanMcClure {
   static constexpr const char* name = "geman_mcclure";
   static constexpr const char* letters = "x[...]";
   void check(Inputs x) const { require_floats(name, letters, x); }
   Tensor forward(Inputs x, Saved& saved) const {
+    Tensor y = empty_like(x[0]);
+    launch(GemanMcClureArgs{x[0], nullptr, y});
     saved.keep({x[0]});
-    return each(x[0], x[0], [](double a, double) { return a * a / (1 + a * a); });
+    return y;
   }
   Grads backward(const Saved& saved, const Tensor& gy, Needs) const {
-    const auto slope = [](double a, double g) { return g * 2 * a / ((1 + a * a) * (1 + a * a)); };
-    return {each(saved[0], gy, slope)};
-  }
-
- private:
-  template <class F>
-  static Tensor each(const Tensor& a, const Tensor& b, F f) {
-    Tensor out = Tensor::empty(a.shape(), a.dtype());
-    const auto fill = [&]<class T>(T* to) {
-      for (int64_t i = 0; i < a.numel(); ++i)
-        to[i] = static_cast<T>(f(a.data<T>()[i], b.data<T>()[i]));
-    };
-    a.dtype() == DType::f64 ? fill(out.data<double>()) : fill(out.data<float>());
-    return out;
+    Tensor gx = empty_like(gy);
+    launch(GemanMcClureArgs{saved[0], &gy, gx});
+    return {gx};
   }
 };
 
@@ -144,6 +160,7 @@ class ShiftStage final : public Stage {
 };
 
 bool checks_an_op() {
+  backend(Device{}).add<GemanMcClureArgs, geman_mcclure_on_cpu>();
   gradcheck::register_op(op_samples());
   const gradcheck::Report report = gradcheck::check(gradcheck::all_samples().back());
   std::printf("%s", report.text().c_str());

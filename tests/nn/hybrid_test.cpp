@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "autograd/base/rng.h"
 #include "autograd/ops/elementwise.h"
 #include "autograd/ops/layout.h"
@@ -53,11 +55,12 @@ struct Input {
   }
 };
 
-std::shared_ptr<MotionModel> hybrid(int64_t latency = 0) {
+std::shared_ptr<MotionModel> hybrid(int64_t latency = 0, bool smoothing = false) {
   return make_model_as<MotionModel>(
       "smrm/hybrid",
       model_config("smrm/hybrid",
-                   {"hidden=16", "contact=true", "latency=" + std::to_string(latency)}),
+                   {"hidden=16", "contact=true", "latency=" + std::to_string(latency),
+                    std::string("smoothing=") + (smoothing ? "true" : "false")}),
       Init{RngKey{2, 0}, DType::f64});
 }
 
@@ -206,9 +209,65 @@ TEST(Hybrid, WithLatencyItAnswersTheFrameSoManyBefore) {
   }
 }
 
+/// A network whose answers are what its filters make: nothing is corrected, and all gains are
+/// given.
+std::shared_ptr<Hybrid> only_filters(int64_t latency, double gate, double back) {
+  const auto net = std::dynamic_pointer_cast<Hybrid>(hybrid(latency, true));
+  for (Linear* head : {&net->gate, &net->trend, &net->correction, &net->twist, &net->leaves,
+                       &net->path, net->back ? &*net->back : nullptr}) {
+    if (head == nullptr) continue;
+    head->weight.value = Tensor::zeros(head->weight.value.shape(), DType::f64);
+    head->bias.value = Tensor::zeros(head->bias.value.shape(), DType::f64);
+  }
+  const auto fill = [](Linear& head, double log_odds) {
+    head.bias.value = Tensor::full(head.bias.value.shape(), log_odds, DType::f64);
+  };
+  fill(net->gate, std::log(gate / (1 - gate)) - 4);  // 4 and -2: where untrained gains begin
+  fill(net->trend, -100);
+  if (net->back) fill(*net->back, std::log(back / (1 - back)) + 2);
+  return net;
+}
+
+TEST(Hybrid, FiltersKnowTheFramesThatItLooksAhead) {
+  Input in;
+  for (int64_t i = 0; i < in.trans.numel(); ++i)
+    in.trans.data<double>()[i] = 1 + std::sin(0.9 * static_cast<double>(i * i));
+  Context ctx;
+  constexpr double kGate = 0.3, kBack = 0.6;
+  constexpr int64_t kLate = 2;
+  MotionState at_once, later, parts;
+  const auto net = only_filters(kLate, kGate, kBack);
+  const Tensor path = in.all().trans.value;
+  const MotionOutput out = net->forward(ctx, in.all(), &later);
+  const Tensor scale =
+      only_filters(0, 0.999999, kBack)->forward(ctx, in.all(), &at_once).trans.value;
+  for (int64_t c = 0; c < 3; ++c) {
+    std::vector<double> x, y, expected, s;
+    for (int64_t t = 0; t < kFrames; ++t) {
+      x.push_back(path.item(3 * t + c));
+      expected.push_back(t == 0 ? x[0] : y.back());
+      y.push_back(kGate * x.back() + (1 - kGate) * expected.back());
+    }
+    for (int64_t t = 0; t + kLate < kFrames; ++t) {
+      double value = y[static_cast<size_t>(t + kLate)];
+      for (auto k = static_cast<size_t>(t + kLate); k-- > static_cast<size_t>(t);)
+        value = y[k] + kBack * (value - expected[k + 1]);
+      // The path is also scaled to B's legs, by those that the filter shows: about as unfiltered.
+      const double longer = scale.item(3 * t + c) / path.item(3 * t + c);
+      EXPECT_NEAR(out.trans.value.item(3 * (t + kLate) + c), value * longer, 0.02) << t;
+    }
+  }
+  for (int64_t t = 0; t < kFrames; ++t) {  // frame by frame it is the same
+    const MotionOutput one = net->forward(ctx, in.frame(t), &parts);
+    const Tensor whole = slice(out.joints, 1, t, t + 1).value;
+    for (int64_t i = 0; i < whole.numel(); ++i)
+      EXPECT_NEAR(one.joints.value.item(i), whole.item(i), 1e-12) << t;
+  }
+}
+
 TEST(Hybrid, EveryParameterGetsAGradient) {
   const Input in;
-  const auto net = hybrid();
+  const auto net = hybrid(2, true);
   Tape tape;
   Context ctx;
   ctx.tape = &tape;

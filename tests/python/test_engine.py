@@ -2,6 +2,9 @@
 import copy
 import gc
 import inspect
+import os
+import pathlib
+import subprocess
 import threading
 
 import numpy as np
@@ -242,26 +245,73 @@ def test_gradcheck_of_ops():
 
 # ---- models and training ----
 
-def train_mlp(steps=60, threads=0):
-    restage.set_threads(threads)
+def small_start():
     start = np.random.default_rng(5)
     x = start.normal(size=(256, 8)).astype(np.float32)
-    target = np.sin(x.sum(1, keepdims=True)).astype(np.float32)
-    sizes = [(32, 8), (32, 32), (1, 32)]
-    layers = [(restage.Parameter(start.normal(size=s, scale=s[1] ** -0.5), dtype="float32"),
-               restage.Parameter(np.zeros(s[0]), dtype="float32")) for s in sizes]
-    adam = restage.Adam([p for layer in layers for p in layer], rate=1e-2)
+    numbers = {"x": x, "target": np.sin(x.sum(1, keepdims=True)).astype(np.float32)}
+    for k, (rows, columns) in enumerate([(32, 8), (32, 32), (1, 32)]):
+        numbers["w%d" % k] = start.normal(size=(rows, columns), scale=columns ** -0.5).astype(np.float32)
+        numbers["b%d" % k] = np.zeros(rows, np.float32)
+    return numbers
+
+
+def train_mlp(steps=60, threads=0, optimiser=None):
+    restage.set_threads(threads)
+    start = small_start()
+    layers = [(restage.Parameter(start["w%d" % k]), restage.Parameter(start["b%d" % k])) for k in range(3)]
+    adam = (optimiser or restage.Adam)([p for layer in layers for p in layer], rate=1e-2)
     losses = []
     for _ in range(steps):
         tape = restage.Tape()
-        h = x
+        h = start["x"]
         for k, (w, b) in enumerate(layers):
             h = ops.linear(h, tape.leaf(w), tape.leaf(b), "relu" if k < 2 else "none")
-        loss = ops.mse(h, target)
+        loss = ops.mse(h, start["target"])
         adam.step(loss.backward())
         losses.append(loss.item())
     restage.set_threads(0)
     return losses, [p.numpy().copy() for layer in layers for p in layer]
+
+
+def test_the_same_model_in_cpp_gives_the_same_bits(tmp_path):
+    """tests/python/small_model.cpp is train_mlp() in C++."""
+    restage.save_safetensors(tmp_path / "start.safetensors", small_start())
+    program = os.environ.get("RESTAGE_SMALL_MODEL") or str(pathlib.Path(restage.__file__).resolve().parents[2] / "tests/small_model")
+    told = subprocess.run([program, tmp_path / "start.safetensors"], capture_output=True, text=True, check=True).stdout
+    assert [float(line) for line in told.split()] == train_mlp()[0]
+
+
+def test_muon():
+    losses, weights = train_mlp(optimiser=restage.Muon)
+    again, same = train_mlp(threads=1, optimiser=restage.Muon)
+    assert losses[-1] < 0.2 * losses[0] and losses != train_mlp()[0]
+    assert losses == again and all(np.array_equal(a, b) for a, b in zip(weights, same))
+    p = restage.Parameter(np.ones((32, 32), np.float32))
+    muon, tape = restage.Muon([p], rate=0.1), restage.Tape()
+    muon.step(ops.sum_all(ops.square(tape.leaf(p))).backward())
+    state = muon.state_dict()
+    assert any(name.startswith("muon.") for name in state)
+    other = restage.Muon([p])
+    other.load_state_dict(state)
+    assert all(np.array_equal(state[k].numpy(), v.numpy()) for k, v in other.state_dict().items())
+    for options in ({"momentum": 1}, {"step": 0}, {"rate": -1}):
+        with pytest.raises(restage.InputError):
+            restage.Muon([p], **options)
+
+
+def test_gradients_of_values_between():
+    tape = restage.Tape()
+    x = tape.leaf(np.array([1.0, 2.0, 3.0]))
+    y = ops.square(x).keep_gradient()
+    z = ops.exp(x)
+    grads = ops.sum_all(y * z).backward()
+    assert np.array_equal(grads[y].numpy(), z.numpy()) and grads[z] is None
+    assert np.allclose(grads[x].numpy(), z.numpy() * (2 * x.numpy() + y.numpy()))
+    assert len(grads) == 1
+    with pytest.raises(restage.InputError):
+        x.detach().keep_gradient()
+    with pytest.raises((restage.InputError, restage.WorkError)):
+        y.keep_gradient()  # its tape was consumed
 
 
 def test_a_small_model_learns():
