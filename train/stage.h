@@ -116,9 +116,9 @@ class Stage {
     return net.get();
   }
   /// Notes a setting of a network that is known later than the network.
-  void set(const std::string& role, const std::string& setting, std::string value) {
+  void set(const std::string& role, const std::string& setting, const std::string& value) {
     for (Network& n : networks_)
-      if (n.role == role) n.model.settings[setting] = std::move(value);
+      if (n.role == role) n.model.settings[setting] = value;
   }
   template <class M>
   M* add_network(const ModelChoice& choice, const RngKey& key, Settings settings = {}) {
