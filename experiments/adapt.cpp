@@ -9,6 +9,7 @@
 #include "autograd/ops/layout.h"
 #include "autograd/ops/reduce.h"
 #include "datasets/doctor/examine.h"
+#include "nn/geometry/box.h"
 #include "nn/geometry/steady_bones.h"
 #include "nn/losses/measure.h"
 #include "train/optim/optimiser.h"
@@ -18,15 +19,17 @@ namespace restage {
 namespace teaching {
 namespace {
 
-constexpr size_t kMostPoints = 8192;                  // of a cloud that is kept
-constexpr size_t kFewestFrames = 24;                  // that teach, and
-constexpr size_t kFewestHeldOut = 10;                 // that judge
-constexpr size_t kReach = 3;                          // frames before and after that smooth one
+constexpr size_t kMostPoints = 8192;   // of a cloud that is kept
+constexpr int64_t kFewestFrames = 24;  // that teach, and
+constexpr size_t kFewestHeldOut = 10;  // that judge
+constexpr double kReach = 0.1;         // seconds before and after that smooth a frame
+constexpr float kFarthest = 20;        // metres: nobody's cloud is so large
 constexpr double kTurns = 0.05, kUncertainty = 0.01;  // weights of the losses beside the joints'
 constexpr double kLeastGain = 0.02, kMostLoss = 1.05;
 
 struct Cloud {
-  Frame frame;  ///< no points: it could not be read
+  Frame frame;  ///< without points if it has a fault
+  std::optional<InputError> fault;
   SeenJoints taught;
   bool usable = false;
 };
@@ -65,8 +68,14 @@ Sequence read(Source& source, const AdaptOptions& options, const RngKey& key) {
   while (auto cloud = source.next()) {
     Cloud& kept = out.clouds.emplace_back();
     kept.frame = std::move(cloud->frame);
+    kept.fault = cloud->fault;
     kept.frame.faces.clear();
     Points& points = kept.frame.points;
+    if (!points.empty() && !(box_of(points).sizes().maxCoeff() < kFarthest)) {
+      kept.fault = InputError(kept.frame.source, "holds points more than 20 m apart",
+                              "mend it with 'restage doctor --fix'");
+      points.clear();
+    }
     for (size_t i = 0; i < std::min(points.size(), kMostPoints); ++i)
       std::swap(points[i], points[i + rng.below(points.size() - i)]);
     points.resize(std::min(points.size(), kMostPoints));
@@ -84,22 +93,24 @@ void look(SkeletonModel& model, Sequence& sequence, double fps, const AdaptOptio
   for (size_t i = 0; i < sequence.taught; ++i) {
     Cloud& cloud = sequence.clouds[i];
     try {
+      if (cloud.fault) throw *cloud.fault;
       check_frame(cloud.frame.points, cloud.frame.source);
       cloud.taught = extract(cloud.frame.points, cloud.frame.source, key.fold(i),
                              fps > kRemembering ? before : nullptr);
       cloud.usable = !cloud.taught.uncertainty ||
                      confidence(*cloud.taught.uncertainty) >= options.min_confidence;
       before = &cloud.taught;
-    } catch (const InputError&) {
+    } catch (const InputError& fault) {
+      cloud.fault = fault;
       before = nullptr;
     }
   }
 }
 
 /// A parabola through the usable frames around `at`, by weighted least squares, at that frame.
-Vec3 smooth(const Sequence& s, size_t at, size_t joint) {
+Vec3 smooth(const Sequence& s, size_t at, size_t reach, size_t joint) {
   Mat3 a = Mat3::Zero(), b = Mat3::Zero();
-  const size_t from = at > kReach ? at - kReach : 0, to = std::min(s.taught, at + kReach + 1);
+  const size_t from = at > reach ? at - reach : 0, to = std::min(s.taught, at + reach + 1);
   size_t seen = 0;
   for (size_t i = from; i < to; ++i) {
     const SeenJoints& x = s.clouds[i].taught;
@@ -116,10 +127,11 @@ Vec3 smooth(const Sequence& s, size_t at, size_t joint) {
 }
 
 /// Takes from the joints what cannot be true of a person: trembling, and bones that change.
-void correct(Sequence& s) {
+void correct(Sequence& s, double fps) {
+  const auto reach = static_cast<size_t>(std::lround(kReach * fps));
   std::vector<Joints> calm(s.taught);
   for (size_t i = 0; i < s.taught; ++i)
-    for (size_t j = 0; s.clouds[i].usable && j < kJoints; ++j) calm[i][j] = smooth(s, i, j);
+    for (size_t j = 0; s.clouds[i].usable && j < kJoints; ++j) calm[i][j] = smooth(s, i, reach, j);
   SteadyBones bones;
   for (const bool known : {false, true})  // the second time with the lengths of the whole sequence
     for (size_t i = 0; i < s.taught; ++i) {
@@ -240,27 +252,41 @@ void teach(SkeletonModel& model, const std::vector<Sequence>& sequences,
   }
 }
 
+/// Whether assess() can use the frame.
+bool fit(const Cloud& cloud) {
+  try {
+    check_frame(cloud.frame.points, cloud.frame.source);
+    return !cloud.fault && cloud.frame.points.size() >= kLeastDistinctPoints;
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
 AdaptFigures judge(const std::vector<Sequence>& sequences, const Bundle& weights,
                    const std::string& name, uint64_t seed) {
   AdaptFigures out;
-  double count = 0;
+  double count = 0, sure = 0;
+  bool says = false;
   for (const Sequence& s : sequences) {
     const auto held = std::span(s.clouds).subspan(s.taught);
     if (held.size() < kFewestHeldOut) continue;
+    if (std::none_of(held.begin(), held.end(), [](const Cloud& c) { return fit(c); })) continue;
     Source source(s.record, std::make_unique<KeptFrames>(held));
     const Assessment found = assess(source, weights, name, {.seed = seed, .samples = 1});
     if (!found.jitter || !found.bone_length_sd || !found.surface) continue;
     out.bone_length_sd += *found.bone_length_sd, out.jitter += *found.jitter;
     out.surface += *found.surface, out.swaps += found.swaps;
-    out.confidence += found.confidence.value_or(0);
+    says = says || found.confidence;
+    sure += found.confidence.value_or(0);
     ++count;
   }
   if (count == 0)
-    throw InputError(sequences.front().record.path,
-                     "has too few frames in which a person is found to judge what was learned",
-                     "give longer sequences");
-  for (double* x : {&out.bone_length_sd, &out.jitter, &out.surface, &out.swaps, &out.confidence})
-    *x /= count;
+    throw InputError(
+        sequences.front().record.path,
+        "has too few frames with a person in its held-out part to judge what was learned",
+        "give longer sequences");
+  for (double* x : {&out.bone_length_sd, &out.jitter, &out.surface, &out.swaps}) *x /= count;
+  if (says) out.confidence = sure / count;
   return out;
 }
 
@@ -277,25 +303,33 @@ void compare(Adapted* out) {
       out->gain >= kLeastGain && worst <= kMostLoss && out->after.swaps <= out->before.swaps;
 }
 
+void count(const Cloud& cloud, Adapted* out) {
+  if (cloud.usable) {
+    ++out->taught;
+  } else if (out->left_out++ == 0) {
+    out->why =
+        cloud.fault ? cloud.fault->what() : cloud.frame.source + ": the extractor is not sure";
+  }
+}
+
 Adapted run(std::vector<std::unique_ptr<Source>>& sources, Bundle& weights,
             const std::string& weights_name, const AdaptOptions& options) {
   auto& model = weights.need_as<SkeletonModel>("skeleton", weights_name);
   const RngKey key = RngKey{options.seed, 0}.fold("adapt");
   std::vector<Sequence> sequences;
   Adapted out;
-  size_t usable = 0;
   for (size_t i = 0; i < sources.size(); ++i) {
     Sequence& s = sequences.emplace_back(read(*sources[i], options, key.fold("points").fold(i)));
     look(model, s, sources[i]->fps(), options, key.fold("look").fold(i));
-    correct(s);
-    out.taught += static_cast<int64_t>(s.taught);
+    correct(s, sources[i]->fps());
     out.held_out += std::ssize(s.clouds) - static_cast<int64_t>(s.taught);
-    for (size_t k = 0; k < s.taught; ++k) usable += s.clouds[k].usable ? 1 : 0;
+    for (size_t k = 0; k < s.taught; ++k) count(s.clouds[k], &out);
   }
-  if (usable < kFewestFrames)
+  if (out.taught < kFewestFrames)
     throw InputError(sources.front()->record().path,
-                     "has " + std::to_string(usable) +
-                         " frames in which a person is surely found, too few to learn from",
+                     "has " + std::to_string(out.taught) +
+                         " frames in which a person is surely found, too few to learn from" +
+                         (out.why.empty() ? "" : " (the first without: " + out.why + ")"),
                      "give at least " + std::to_string(kFewestFrames) +
                          ", better a minute; or a lower --min-confidence");
   out.before = judge(sequences, weights, weights_name, options.seed);

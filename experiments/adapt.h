@@ -22,11 +22,16 @@ struct AdaptOptions {
 
 /// Means over the held-out parts of the sequences; lengths are metres.
 struct AdaptFigures {
-  double bone_length_sd = 0, jitter = 0, surface = 0, swaps = 0, confidence = 0;
+  double bone_length_sd = 0, jitter = 0, surface = 0, swaps = 0;
+  std::optional<double> confidence;  ///< if the network states how sure it is
 };
 
 struct Adapted {
-  int64_t taught = 0, held_out = 0;  ///< frames
+  int64_t taught = 0, held_out = 0;  ///< frames of which something was learned; that judged
+  /// Frames of the first parts of which nothing was: not one person's, or not surely; and why the
+  /// first is.
+  int64_t left_out = 0;
+  std::string why;
   AdaptFigures before, after;
   /// How much smaller the first three figures are, as the geometric mean of their ratios: 0.1 is a
   /// tenth.

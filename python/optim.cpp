@@ -1,4 +1,6 @@
 // restage.Adam and restage.Muon.
+#include <cmath>
+
 #include "python/model.h"
 #include "train/optim/adam.h"
 #include "train/optim/muon.h"
@@ -19,6 +21,9 @@ std::vector<std::pair<std::string, PyParameter>> named(const py::object& paramet
   const auto add = [&out](const std::string& name, const py::handle& p) {
     if (!py::isinstance<Parameter>(p))
       throw ShapeError("optimiser: '" + name + "' is no Parameter");
+    for (const auto& [other, known] : out)
+      if (known == p.cast<PyParameter>())
+        throw ShapeError("optimiser: '" + name + "' is the same Parameter as '" + other + "'");
     out.emplace_back(name, p.cast<PyParameter>());
   };
   if (py::isinstance<py::dict>(parameters)) {
@@ -37,13 +42,14 @@ class PyOptimiser {
   PyOptimiser(const py::object& parameters, double rate, const AdamConfig& adam,
               const std::optional<MuonConfig>& muon)
       : kept_(named(parameters)), rate_(rate) {
-    in_range("rate", rate, rate >= 0);
+    check_rate(rate);
     in_range("beta1", adam.beta1, adam.beta1 >= 0 && adam.beta1 < 1);
     in_range("beta2", adam.beta2, adam.beta2 >= 0 && adam.beta2 < 1);
-    in_range("eps", adam.eps, adam.eps > 0);
-    in_range("weight_decay", adam.weight_decay, adam.weight_decay >= 0);
+    in_range("eps", adam.eps, adam.eps > 0 && std::isfinite(adam.eps));
+    in_range("weight_decay", adam.weight_decay,
+             adam.weight_decay >= 0 && std::isfinite(adam.weight_decay));
     if (muon) in_range("momentum", muon->momentum, muon->momentum >= 0 && muon->momentum < 1);
-    if (muon) in_range("step", muon->step, muon->step > 0);
+    if (muon) in_range("step", muon->step, muon->step > 0 && std::isfinite(muon->step));
     std::vector<NamedParameter> matrices, rest;
     for (const auto& [name, p] : kept_)
       (muon && Muon::takes(*p) ? matrices : rest).push_back({name, p.get()});
@@ -52,33 +58,58 @@ class PyOptimiser {
   }
 
   void step(const Gradients& gradients, const std::optional<double>& rate, double scale) {
+    if (rate) check_rate(*rate);
+    in_range("scale", scale, std::isfinite(scale));
     const py::gil_scoped_release released;
     const std::lock_guard<std::recursive_mutex> lock(recording());
     if (muon_) muon_->step(gradients, rate.value_or(rate_), scale);
     adam_->step(gradients, rate.value_or(rate_), scale);
   }
   py::dict state() const {
-    TensorFile file;
-    if (muon_) muon_->save("muon.", file);
-    adam_->save(prefix(), file);
     py::dict out;
-    for (const auto& [name, tensor] : file.tensors) out[py::str(name)] = py::cast(tensor.clone());
+    for (const auto& [name, tensor] : own().tensors) out[py::str(name)] = py::cast(tensor.clone());
     return out;
   }
   void load(const py::dict& state) {
     TensorFile file;
     file.tensors = tensors_of(state);
+    check(file);  // all of it first: nothing is half loaded
     if (muon_) muon_->load("muon.", file, "state");
     adam_->load(prefix(), file, "state");
   }
 
   double rate() const { return rate_; }
   void set_rate(double rate) {
-    in_range("rate", rate, rate >= 0);
+    check_rate(rate);
     rate_ = rate;
   }
 
  private:
+  static void check_rate(double rate) { in_range("rate", rate, rate >= 0 && std::isfinite(rate)); }
+  TensorFile own() const {
+    TensorFile file;
+    if (muon_) muon_->save("muon.", file);
+    adam_->save(prefix(), file);
+    return file;
+  }
+  /// InputError unless the state has the names, shapes and dtypes of this optimiser's, and numbers.
+  void check(const TensorFile& state) const {
+    const TensorFile mine = own();
+    const auto refuse = [](const std::string& what) {
+      throw InputError("state", what, "give what state_dict() of such an optimiser gave");
+    };
+    for (const auto& [name, tensor] : state.tensors)
+      if (mine.find(name) == nullptr) refuse("'" + name + "' belongs to no parameter");
+    for (const auto& [name, tensor] : mine.tensors) {
+      const Tensor* given = state.find(name);
+      if (given == nullptr) refuse("'" + name + "' is missing");
+      if (!(given->shape() == tensor.shape()) || given->dtype() != tensor.dtype())
+        refuse("'" + name + "' is of another size or dtype");
+      for (int64_t i = 0; i < given->numel(); ++i)
+        if (!std::isfinite(given->item(i)) || (name.ends_with(".steps") && given->item(i) < 0))
+          refuse("'" + name + "' holds no number that it can hold");
+    }
+  }
   const char* prefix() const { return muon_ ? "adam." : ""; }
 
   std::vector<std::pair<std::string, PyParameter>> kept_;

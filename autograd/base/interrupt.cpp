@@ -51,6 +51,7 @@ void handle_signals() {
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
   signal(SIGPIPE, SIG_IGN);
+  signal(SIGXFSZ, SIG_IGN);  // a file that may not grow: writing fails, and is cleaned up after
 }
 
 // A signal that an earlier scope answered does not stop this one.

@@ -45,7 +45,7 @@ Json json_of(const AdaptFigures& f) {
           {"jitter_mm", 1e3 * f.jitter},
           {"surface_mm", 1e3 * f.surface},
           {"swaps", f.swaps},
-          {"confidence", f.confidence}};
+          {"confidence", f.confidence ? Json(*f.confidence) : Json(nullptr)}};
 }
 
 std::string table_of(const Adapted& a) {
@@ -53,14 +53,16 @@ std::string table_of(const Adapted& a) {
     return std::vector<std::string>{what, format(how, before), format(how, after)};
   };
   const AdaptFigures &b = a.before, &c = a.after;
-  return markdown_table(
-      {{"held-out frames", "before", "after"},
-       row("bone lengths, standard deviation", 1e3 * b.bone_length_sd, 1e3 * c.bone_length_sd,
-           "%.4g mm"),
-       row("jitter", 1e3 * b.jitter, 1e3 * c.jitter, "%.4g mm"),
-       row("surface from the person's own body", 1e3 * b.surface, 1e3 * c.surface, "%.4g mm"),
-       row("legs or arms changed sides", 100 * b.swaps, 100 * c.swaps, "%.3g %% of frames"),
-       row("confidence", b.confidence, c.confidence, "%.3g")});
+  std::vector<std::vector<std::string>> rows = {
+      {"held-out frames", "before", "after"},
+      row("bone lengths, standard deviation", 1e3 * b.bone_length_sd, 1e3 * c.bone_length_sd,
+          "%.4g mm"),
+      row("jitter", 1e3 * b.jitter, 1e3 * c.jitter, "%.4g mm"),
+      row("surface from the person's own body", 1e3 * b.surface, 1e3 * c.surface, "%.4g mm"),
+      row("legs or arms changed sides", 100 * b.swaps, 100 * c.swaps, "%.3g %% of frames")};
+  if (b.confidence && c.confidence)
+    rows.push_back(row("confidence", *b.confidence, *c.confidence, "%.3g"));
+  return markdown_table(rows);
 }
 
 int run_adapt(const AdaptCommand& c, const Common& common) {
@@ -93,12 +95,16 @@ int run_adapt(const AdaptCommand& c, const Common& common) {
         1e3 * done.before.bone_length_sd, 1e3 * done.after.bone_length_sd, 1e3 * done.before.jitter,
         1e3 * done.after.jitter, 1e3 * done.before.surface, 1e3 * done.after.surface));
   save_bundle(c.out, models);
-  const Json document = {{"out", c.out},
-                         {"frames", {{"taught", done.taught}, {"held_out", done.held_out}}},
-                         {"before", json_of(done.before)},
-                         {"after", json_of(done.after)},
-                         {"gain", done.gain},
-                         {"seed", common.seed}};
+  if (done.left_out > 0)
+    log_warning(std::to_string(done.left_out) + " frames teach nothing; the first: " + done.why);
+  const Json document = {
+      {"out", c.out},
+      {"frames",
+       {{"taught", done.taught}, {"held_out", done.held_out}, {"left_out", done.left_out}}},
+      {"before", json_of(done.before)},
+      {"after", json_of(done.after)},
+      {"gain", done.gain},
+      {"seed", common.seed}};
   print(common.json, document,
         table_of(done) + format("gain %.1f %%\n", 100 * done.gain) + "wrote " + c.out + "\n");
   return 0;

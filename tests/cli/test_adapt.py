@@ -1,4 +1,5 @@
 """restage adapt: an extractor learns from captures, and nothing is written unless held-out frames gain."""
+import json
 import os
 import unittest
 
@@ -25,8 +26,27 @@ class Adapt(CliTest):
         before, after = done["before"], done["after"]
         self.assertGreater(done["gain"], 0.02)
         self.assertLess(after["jitter_mm"], before["jitter_mm"])
-        self.assertEqual(done["frames"], {"taught": 67, "held_out": 23})
+        self.assertEqual(done["frames"], {"taught": 67, "held_out": 23, "left_out": 0})
         self.done("retarget", "--source", "walk/source.h5", "--target", "walk/target.ply", "--weights", "own.safetensors", "--out", "r.h5")
+
+    def test_frames_that_teach_nothing(self):
+        self.person(frames=60)
+        self.done("retarget", "--source", "walk/source.h5", "--target", "walk/target.ply", "--weights", WEIGHTS, "--out", "frames/")
+        names = sorted(os.listdir(self.path("frames")))
+        for name in names[40:]:  # the whole held-out part, and a little more
+            with open(self.path("frames/" + name), "w") as f:
+                f.write("ply\n")
+        call = ["adapt", "--weights", WEIGHTS, "--steps", "80", "--batch", "8", "--views", "4", "--json", "--out", "w.safetensors"]
+        result = self.restage(*call, "--source", "frames/", "--source", "walk/source.h5")
+        self.assertEqual(result.code, 0, result.err)
+        self.assertEqual(json.loads(result.out)["frames"], {"taught": 85, "held_out": 30, "left_out": 5})
+        self.assertIn("5 frames teach nothing", result.err)
+        self.assertIn(names[40], result.err)
+        self.assertIsNone(json.loads(result.out)["before"]["confidence"])  # lite does not say how sure it is
+        self.bad_input([*call, "--source", "frames/"], "held-out")
+        for frame in range(4):
+            self.ply("far/f%d.ply" % frame, [(0.1 * k, 0.05 * k, 0) for k in range(90)] + [(1e30, 0, 0)])
+        self.bad_input([*call, "--source", "far/", "--force"], "far/f0.ply", "20 m apart")
 
     def test_bad_input(self):
         self.person(frames=12)

@@ -294,9 +294,28 @@ def test_muon():
     other = restage.Muon([p])
     other.load_state_dict(state)
     assert all(np.array_equal(state[k].numpy(), v.numpy()) for k, v in other.state_dict().items())
-    for options in ({"momentum": 1}, {"step": 0}, {"rate": -1}):
+    for options in ({"momentum": 1}, {"step": 0}, {"rate": -1}, {"rate": float("inf")}, {"step": float("inf")}):
         with pytest.raises(restage.InputError):
             restage.Muon([p], **options)
+    with pytest.raises(restage.InputError, match="same Parameter"):
+        restage.Muon([p, p])
+    q = restage.Parameter(np.ones((32, 32)))  # float64 beside float32
+    both, tape = restage.Muon([p, q], rate=0.1), restage.Tape()
+    before = both.state_dict()
+    grads = (ops.sum_all(ops.square(tape.leaf(p)))).backward()
+    for rate in (float("nan"), -1.0):
+        with pytest.raises(restage.InputError, match="rate"):
+            both.step(grads, rate=rate)
+    both.step(grads)
+    both.step(ops.sum_all(ops.square(restage.Tape().leaf(q))).backward())
+    assert (q.numpy() < 1).all()
+    after = both.state_dict()
+    for wrong in ({k: v for k, v in before.items() if k != next(reversed(before))}, {**before, "more": before[next(iter(before))]},
+                  {k: np.full(v.shape, np.nan, v.dtype) for k, v in before.items()},
+                  {k: v.numpy().astype(np.int32) for k, v in before.items()}):
+        with pytest.raises(restage.InputError):
+            both.load_state_dict(wrong)
+        assert all(np.array_equal(after[k].numpy(), v.numpy()) for k, v in both.state_dict().items())
 
 
 def test_gradients_of_values_between():

@@ -64,12 +64,12 @@ bool Muon::takes(const Parameter& p) {
 Muon::Muon(const std::vector<NamedParameter>& matrices, const MuonConfig& config)
     : config_(config) {
   for (const NamedParameter& p : matrices) {
-    const Shape& shape = p.parameter->value.shape();
-    const auto like = std::find_if(groups_.begin(), groups_.end(),
-                                   [&](const auto& group) { return group[0].m.shape() == shape; });
-    auto& group = like != groups_.end() ? *like : groups_.emplace_back();
     const Tensor& t = p.parameter->value;
-    group.push_back({p, Tensor::zeros(shape, t.dtype(), t.device())});
+    const auto like = std::find_if(groups_.begin(), groups_.end(), [&](const auto& group) {
+      return group[0].m.shape() == t.shape() && group[0].m.dtype() == t.dtype();
+    });
+    auto& group = like != groups_.end() ? *like : groups_.emplace_back();
+    group.push_back({p, Tensor::zeros(t.shape(), t.dtype(), t.device())});
   }
 }
 
