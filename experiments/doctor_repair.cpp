@@ -108,13 +108,14 @@ class Mender {
  public:
   Mender(const std::string& out, const Diagnosis& d) : out_(out), d_(d) {}
   Mesh operator()(const Mesh& mesh) {
-    Mesh mended = restage::mended(mesh, d_);
+    Mesh mended = restage::mended(mesh, d_, &person_);
     if (mended.vertices.empty())
       throw InputError(out_, "a frame would be empty", "leave it out of the input");
     points_ += mesh.vertices.size() - mended.vertices.size();
     faces_ += mesh.faces.size() - mended.faces.size();
     return mended;
   }
+  void restart() { person_.reset(); }  ///< the next frame is another sequence's
   void tell(std::vector<std::string>& remarks) const {
     if (points_ + faces_ > 0)
       remarks.push_back("left out: " + std::to_string(points_) + " points" +
@@ -125,6 +126,7 @@ class Mender {
   const std::string& out_;
   const Diagnosis& d_;
   size_t points_ = 0, faces_ = 0;
+  std::optional<Point> person_;  // where they were in the frame before
 };
 
 void mend_frames(const Subject& subject, const Diagnosis& d, Mender& mend, Sink& sink,
@@ -140,6 +142,7 @@ void mend_frames(const Subject& subject, const Diagnosis& d, Mender& mend, Sink&
       sink.end_sequence();
       sequence = frame->sequence;
       previous.reset();
+      mend.restart();
     }
     if (i % d.keep_every != 0) continue;
     Mesh mesh = mend({frame->points, frame->faces});

@@ -62,7 +62,9 @@ Diagnosis examine_frames(FrameSource& source, const ExamineOptions& options = {}
 
 /// A frame without stray points and what is not the person, without repeated points (of a cloud),
 /// and in our frame. Of a surface only whole pieces are left out; the order of the rest stays.
-Mesh mended(const Mesh& mesh, const Diagnosis& diagnosis);
+/// `person`: where the person was in the frame before, in the data's units and axes (nothing: this
+/// is the first), which is then who is kept; where they are now is left there.
+Mesh mended(const Mesh& mesh, const Diagnosis& diagnosis, std::optional<Point>* person = nullptr);
 
 /// That the reader left points out because a coordinate is NaN or infinite, as retargeting does
 /// with those of a source; it refuses those of a target. `where` is added to the sentence.

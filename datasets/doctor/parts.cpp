@@ -69,8 +69,21 @@ struct Neighbourhood {
   }
 };
 
+/// Puts the person's piece in front of pieces that are ordered by size.
+void follow(const Points& points, const Point& before, std::vector<std::vector<size_t>>& pieces) {
+  const auto away = [&](const std::vector<size_t>& piece) {
+    Point middle = Point::Zero();
+    for (const size_t i : piece) middle += points[i] / static_cast<float>(piece.size());
+    return (middle - before).norm();
+  };
+  size_t best = 0;
+  for (size_t k = 1; k < pieces.size() && 2 * pieces[k].size() >= pieces[0].size(); ++k)
+    if (away(pieces[k]) < away(pieces[best])) best = k;
+  std::swap(pieces[0], pieces[best]);
+}
+
 /// The same for the points that are judged.
-Parts judge(const Points& points) {
+Parts judge(const Points& points, const std::optional<Point>& before) {
   Parts out;
   out.part.assign(points.size(), Part::person);
   const Neighbourhood all{points};
@@ -95,6 +108,7 @@ Parts judge(const Points& points) {
   std::stable_sort(ordered.begin(), ordered.end(),
                    [](const auto& a, const auto& b) { return a.size() > b.size(); });
   if (ordered.empty()) return out;
+  if (before) follow(points, *before, ordered);
 
   // What lies near the person, or near what does, is of the person.
   Points person, all_pieces;
@@ -158,12 +172,12 @@ std::vector<size_t> evenly_spread(const Points& points) {
 }
 
 /// Of points without a floor and walls.
-Parts find_pieces(const Points& points) {
+Parts find_pieces(const Points& points, const std::optional<Point>& before) {
   if (points.empty()) return {};
   const std::vector<size_t> judged = evenly_spread(points);
   Points some;
   for (const size_t i : judged) some.push_back(points[i]);
-  Parts out = judge(some);
+  Parts out = judge(some, before);
   out.judged = judged;
   if (judged.size() < points.size()) out.part = parts_at(points, some, out);
   out.stray = static_cast<size_t>(std::count(out.part.begin(), out.part.end(), Part::stray));
@@ -191,14 +205,14 @@ std::vector<Part> parts_at(const Points& others, const Points& points, const Par
   return out;
 }
 
-Parts find_parts(const Points& points) {
+Parts find_parts(const Points& points, const std::optional<Point>& before) {
   const Planes planes = find_planes(points);
-  if (!planes.any()) return find_pieces(points);
+  if (!planes.any()) return find_pieces(points, before);
   std::vector<size_t> number;
   Points rest;
   for (size_t i = 0; i < points.size(); ++i)
     if (!planes.on[i]) number.push_back(i), rest.push_back(points[i]);
-  Parts out = find_pieces(rest);
+  Parts out = find_pieces(rest, before);
   std::vector<Part> part(points.size(), Part::other);
   for (size_t i = 0; i < rest.size(); ++i) part[number[i]] = out.part[i];
   for (size_t& i : out.judged) i = number[i];

@@ -1,6 +1,7 @@
 // Which points of a cloud are the person, which stray points, which somebody or something else.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "nn/geometry/body.h"
@@ -25,8 +26,9 @@ struct Parts {
 
 /// The person, beside floors and walls (planes.h), is the largest piece and what lies within about
 /// 0.16 m of it. Works in any unit. No point may be there twice: distances between neighbours say
-/// what is usual.
-Parts find_parts(const Points& points);
+/// what is usual. `before`: the middle of the person in the frame before; of pieces that are half
+/// as large as the largest or more, the one nearest to it is then the person.
+Parts find_parts(const Points& points, const std::optional<Point>& before = std::nullopt);
 
 /// What other points are: what the nearest of `points` is, which are judged in `parts`, or stray.
 std::vector<Part> parts_at(const Points& others, const Points& points, const Parts& parts);

@@ -4,9 +4,9 @@
 namespace restage {
 namespace {
 
-std::vector<bool> points_to_keep(const Points& points) {
+std::vector<bool> points_to_keep(const Points& points, const std::optional<Point>& before) {
   const std::vector<size_t> once = distinct(points);
-  const Parts parts = find_parts(without_repeats(points));
+  const Parts parts = find_parts(without_repeats(points), before);
   std::vector<bool> keep(points.size());
   for (size_t k = 0; k < once.size(); ++k) keep[once[k]] = parts.part[k] == Part::person;
   return keep;
@@ -14,7 +14,7 @@ std::vector<bool> points_to_keep(const Points& points) {
 
 /// Vertices of the pieces of a surface most of which is the person: a piece is what triangles and
 /// equal vertices (seams) hold together, and is kept or left out as a whole.
-std::vector<bool> vertices_to_keep(const Mesh& mesh) {
+std::vector<bool> vertices_to_keep(const Mesh& mesh, const std::optional<Point>& before) {
   Pieces pieces(mesh.vertices.size());
   for (const Triangle& f : mesh.faces)
     for (const size_t k : {1, 2}) pieces.join(f[0], f[k]);
@@ -22,7 +22,7 @@ std::vector<bool> vertices_to_keep(const Mesh& mesh) {
   for (size_t i = 0; i < first.size(); ++i) pieces.join(first[i], i);
 
   const ShapePoints shape = located_shape_points(mesh);
-  const Parts parts = find_parts(shape.points);
+  const Parts parts = find_parts(shape.points, before);
   std::vector<int> votes(mesh.vertices.size());
   std::vector<bool> asked(mesh.vertices.size());
   for (size_t i = 0; i < shape.points.size(); ++i) {
@@ -49,10 +49,17 @@ std::vector<bool> vertices_to_keep(const Mesh& mesh) {
 
 }  // namespace
 
-Mesh mended(const Mesh& mesh, const Diagnosis& diagnosis) {
+Mesh mended(const Mesh& mesh, const Diagnosis& diagnosis, std::optional<Point>* person) {
+  const std::optional<Point> before = person != nullptr ? *person : std::nullopt;
   Mesh out = mesh;
-  keep_points(mesh.faces.empty() ? points_to_keep(mesh.vertices) : vertices_to_keep(mesh),
-              out.vertices, out.faces);
+  keep_points(
+      mesh.faces.empty() ? points_to_keep(mesh.vertices, before) : vertices_to_keep(mesh, before),
+      out.vertices, out.faces);
+  if (person != nullptr && !out.vertices.empty()) {
+    Point middle = Point::Zero();
+    for (const Point& p : out.vertices) middle += p / static_cast<float>(out.vertices.size());
+    *person = middle;
+  }
   if (diagnosis.transform)
     for (Point& p : out.vertices) p = (*diagnosis.transform)(p);
   return out;

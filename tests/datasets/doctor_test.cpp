@@ -5,6 +5,7 @@
 #include "autograd/base/error.h"
 #include "datasets/doctor/orientation_model.h"
 #include "datasets/doctor/planes.h"
+#include "nn/geometry/box.h"
 #include "tests/support/doctor_people.h"
 
 namespace restage {
@@ -105,6 +106,31 @@ TEST(Doctor, SomebodyElseIsToldFromThePerson) {
   EXPECT_TRUE(notes(with_crowd, "others", "second person"));
   EXPECT_FALSE(with_crowd.usable());
   EXPECT_TRUE(examine_surface(mended(cloud(crowd), with_crowd)).usable());
+}
+
+TEST(Doctor, OfTwoPeopleTheOneOfTheFrameBeforeIsKept) {
+  const Points first = scan(somebody());
+  Points second;
+  for (const Point& p : scan(builtin_body(0, "test", 1), nullptr, 0, 2))
+    second.push_back(p + Point(0.3f, 0, 1.5f));
+  const auto together = [&](double of_first, double of_second) {
+    Points out;
+    Rng rng(RngKey{8, 0});
+    for (const Point& p : first)
+      if (rng.uniform() < of_first) out.push_back(p);
+    for (const Point& p : second)
+      if (rng.uniform() < of_second) out.push_back(p);
+    return out;
+  };
+  const auto kept = [&](const Points& points, std::optional<Point>* person) {
+    const Mesh mesh = mended(cloud(points), examine_surface(cloud(points)), person);
+    return box_of(mesh.vertices).center().z() < 0.75f ? 1 : 2;
+  };
+  std::optional<Point> person;
+  EXPECT_EQ(kept(together(1, 0.7), &person), 1);
+  EXPECT_EQ(kept(together(0.7, 1), nullptr), 2) << "the larger one, where nobody was before";
+  EXPECT_EQ(kept(together(0.7, 1), &person), 1);
+  EXPECT_EQ(kept(together(0.3, 1), &person), 2) << "not somebody of whom little is left";
 }
 
 TEST(Doctor, HolesAreFound) {
