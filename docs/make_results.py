@@ -138,18 +138,16 @@ def said(row, other, kind, metric, less, more):
     middle, low, high, fewer, size = difference(row, other, kind, metric)
     verdict = less if high < 0 else more if low > 0 else "cannot be told"
     middle, low, high = (number(v, metric, "+") for v in (middle, low, high))
-    return [f"{middle} [{low}, {high}]", f"{fewer} of {size}", verdict]
+    return [f"{middle} [{low}, {high}]", f"{fewer}/{size}", verdict]
 
 
 # ---- the rows ------------------------------------------------------------------------------------
 
 shipped, seeds = trials("shipped"), trials("standard_seeds")
 benchmark, kinds = trials("benchmark"), trials("kinds_of_cloud")
-switches = trials("ours_switches", "results/[0-9a-f]*.json")
 
 standard = Row("**standard**", shipped["standard"] + seeds["standard"])
-no_motion = Row("standard, no motion network", shipped["no motion network"] + seeds["no motion network"])
-fitted = Row("standard, fitted to each cloud (earlier weights)", shipped["refined"])
+no_motion = Row("no motion network", shipped["no motion network"] + seeds["no motion network"])
 lite = Row("lite (earlier program)", benchmark["Restage lite"])
 register = Row("register, then repose", benchmark["register then repose"])
 closed_form = Row("closed form", shipped["standard"], "closed_form")
@@ -159,7 +157,7 @@ rest_pose = Row("rest pose", shipped["standard"], "rest_pose")
 
 SETS = {"test": "more motions", "naked": "naked", "clothed": "clothed", "scans:-rig": "eight cameras",
         "scans:-depth": "one camera"}
-TOLD = {standard: "clouds", no_motion: "clouds", fitted: "clouds", lite: "clouds",
+TOLD = {standard: "clouds", no_motion: "clouds", lite: "clouds",
         register: "clouds, target's true joints", closed_form: "true joints of both",
         unchanged: "true joints of the source", rest_pose: "true joints of both"}
 KINDS = {"naked": "whole", "clothed": "whole, clothed, hair", "scans:six_cameras": "six cameras",
@@ -199,15 +197,6 @@ def by_set(metrics, rows, told=False):
     return table(head, [[row.label, *([TOLD[row]] if told else []), *cells(row, SETS, metrics)] for row in rows])
 
 
-def spread():
-    def one(kind, metric):
-        each = standard.each(kind, metric)
-        return ", ".join(number(v, metric) for v in each) + f" (± {number(deviation(each), metric)})"
-    metrics = {"pa_mpjpe": "PA-MPJPE", "mpjpe": "MPJPE", "acc": "Acc", "pa_mpvd": "PA-MPVD"}
-    rows = [[SETS[k], *(one(k, m) for m in metrics)] for k in SETS]
-    return table(["standard: seeds 1, 2, 3", *metrics.values()], rows)
-
-
 def real():
     rows = []
     for kind in SETS:
@@ -221,12 +210,21 @@ def real():
 
 def kinds_table():
     one, metrics = kinds["standard"], ("pa_mpjpe", "mpjpe", "pa_mpvd", "acc")
-    rows = [Row("**standard**", one), Row("the same, bones held (`retarget` does it)", kinds["standard, bones held"]),
-            Row("standard, no motion network", kinds["no motion network"]),
-            Row("lite (points drawn at random)", kinds["lite"]), Row("closed form", one, "closed_form"),
-            Row("source unchanged (copying)", one, "source_unchanged")]
+    rows = [Row("**standard**", one), Row("bones held, as `retarget` does", kinds["standard, bones held"]),
+            Row("no motion network", kinds["no motion network"]),
+            Row("lite", kinds["lite"])]
     head = ["", *(f"{KINDS[k]} ({count(rows[0], k)})" for k in KINDS)]
     return table(head, [[r.label, *cells(r, KINDS, metrics)] for r in rows])
+
+
+def same_for_all():
+    """References see true joints, not clouds."""
+    said = []
+    for words, reference in {"closed form": "closed_form", "copying": "source_unchanged"}.items():
+        figures = set(cells(Row("", kinds["standard"], reference), KINDS, ("pa_mpjpe", "mpjpe", "acc")))
+        assert len(figures) == 1, figures
+        said.append(f"{words} {figures.pop()}")
+    return "; ".join(said)
 
 
 def sure():
@@ -235,7 +233,7 @@ def sure():
     curves = {words: first[name]["risk_coverage"] for name, words in parts.items()}
     shares = [f"{100 * point['coverage']:.0f} %" for point in curves["naked"]]
     rows = [[words, *(number(point["pa_mpjpe"], "pa_mpjpe") for point in curve)] for words, curve in curves.items()]
-    return table(["share of the frames, surest first", *shares], rows)
+    return table(["surest frames", *shares], rows)
 
 
 def joints():
@@ -248,53 +246,29 @@ def joints():
     return textwrap.fill("**By joint** (standard, naked, seed 1, PA-MPJPE, mean of both sides): " + errors, 119)
 
 
-def switch_rows():
-    labels = {
-        "standard": "the standard settings",
-        "closed form": "no network (closed form)",
-        "the papers' network": "the papers' network, same input",
-        "squares": "squares for distances",
-        "with the cycle": "with the papers' cycle",
-        "with the discriminator": "with cycle and discriminator",
-        "simulated noise": "true joints with noise as input",
-        "nobody else's body": "nobody else's body as a target",
-        "no acceleration": "no loss on accelerations",
-        "twice the acceleration": "twice the loss on accelerations",
-        "no smoothness": "no loss on frame differences",
-        "no rotations": "no loss on rotations",
-        "without the extractor's rotations": "not shown the extractor's rotations",
-        "without its uncertainty": "not shown its uncertainty",
-        "heading of every frame": "heading of every frame",
-        "two frames late": "answers two frames late",
-        "five frames late": "answers five frames late",
-        "Adam": "Adam for Muon",
-    }
-    assert set(labels) == set(switches), set(labels) ^ set(switches)
-    three = ["naked", "clothed", "scans"]
-    rows = [[label, *cells(Row("", switches[case]), three, ("pa_mpjpe", "acc"))] for case, label in labels.items()]
-    return table(["PA-MPJPE / Acc", *three], rows)
-
-
 # ---- the page ------------------------------------------------------------------------------------
 
 TEMPLATE = """# Results
 
 <!-- Written by docs/make_results.py from the JSON files under experiments. Edit the script, not this page. -->
 
-How far answers are from the truth, on people and motions that no training saw. [Metrics](metrics.md) explains every
-name. [Benchmark](benchmark.md) says what the sets and the rows are. Lengths are in mm, Acc in mm per frame², foot slide
-in mm per frame. Less is better everywhere. Older figures and single trials are in the [log](notes/results_log.md).
+Errors on people and motions that no training saw: names in [metrics](metrics.md), sets and rows in
+[benchmark](benchmark.md). Lengths are in mm, Acc in mm per frame², foot slide in mm per frame. Less is better. In
+brackets: sequences. Older figures: [log](notes/results_log.md).
 
 ## At a glance
 
-Standard weights, mean of {seed_count} seeds ± deviation: PA-MPJPE, PA-MPVD, MPJPE. "Copying" hands on the source's true
-skeleton.
+Standard weights, mean of {seed_count} seeds ± sample deviation. Joints: PA-MPJPE and MPJPE (not aligned). Surface:
+PA-MPVD. "Copying" hands on the source's true skeleton.
 
 {glance}
 
+Seeds share the extractor's first look and the skinning. So the true spread is larger
+([each seed](notes/results_log.md#seeds-calm-and-fitting-as-the-page-had-them)).
+
 ## The benchmark's sets
 
-Means of the seeds ({seed_count} of standard, {lite_count} of lite, one of the others). In brackets: sequences.
+Means of the seeds: {seed_count} of standard (also without a motion network), {lite_count} of lite, one of the others.
 
 **Joints: PA-MPJPE / MPJPE**
 
@@ -304,72 +278,61 @@ Means of the seeds ({seed_count} of standard, {lite_count} of lite, one of the o
 
 {surface_table}
 
-**Calm: Acc / PA-Acc / foot slide**
+**Calm: Acc / foot slide**
 
 {calm_table}
 
 * A rule makes the truth. The closed form follows nearly the same rule with true joints: it is near the best possible.
 * Copying looks good in PA-MPJPE, because alignment removes place, turn and size. MPJPE shows the difference.
-* "Lite" and "fitted" are of earlier programs, which drew points at random. "Register" has one frame a second.
+* "Lite" is of an earlier program, which drew points at random. "Register" has one frame a second.
 
 {joints}.
 
 ## Is a difference real?
 
-Paired over seeds and sequences, with [95 % intervals](metrics.md#when-is-a-difference-real). "Less in": sequences.
-"Nearer" and "farther" mean that the interval excludes zero, "cannot be told" that it contains zero. With few seeds and
-sequences an interval is less sure than 95 %. The weights are those of the whole schedule; after a quarter of it, the
-gain of the motion network [cannot be told](reproduction/ours.md).
+Paired over seeds and sequences, with [95 % intervals](metrics.md#when-is-a-difference-real), which are less sure where
+seeds and sequences are few. "Less in": in how many sequences. "Cannot be told": the interval contains zero. After a
+quarter of the training, the motion network's gain in PA-MPJPE [cannot be told](reproduction/ours.md).
 
 {real}
 
-## Seeds
-
-Seeds decide the extractor's second look, the motion network and the order of examples. All three share the extractor's
-first look and the skinning. So the true spread is larger. In brackets: sample deviation.
-
-{spread}
-
 ## Four kinds of cloud: PA-MPJPE / MPJPE / PA-MPVD / Acc
 
-Four people, who are in no other data of ours, do five motions. Each is seen in four ways
+Four people, who are in no other data of ours, do five motions, each seen in four ways
 (`configs/data/kinds_of_cloud.yaml`). One seed. Errors before the benchmark's cameras are larger: people and motions
-are others, and in one of each four sequences somebody else's arm is in view.
+are others, and one of its four sequences for each kind of camera has somebody else's arm in view.
 
 {kinds_table}
 
+In every column, PA-MPJPE / MPJPE / Acc: {same_for_all}.
+
 ## Sure frames are better
 
-PA-MPJPE of the frames that the extractor is surest of (standard, seed 1). Here all frames count alike.
+PA-MPJPE of the frames that the extractor is surest of (standard, seed 1). All frames count alike.
 
 {sure}
 
-## Switches of our motion network
+## Elsewhere
 
-One setting changes at a time: a quarter of the steps, three seeds, one extractor, weights and program of commit
-28ac42b. [reproduction/ours.md](reproduction/ours.md) has an interval and a verdict for each switch.
-
-{switches}
-
-## Not here
-
+* Switches of the motion network, one at a time: [claims](reproduction/ours.md). Answers fitted to each cloud:
+  [log](notes/results_log.md#seeds-calm-and-fitting-as-the-page-had-them).
+* NPT, H4D, TST, LART, 3D-CoreNet: [systems](systems.md). Speed: [performance](performance.md). The papers' tables:
+  [reproduction](reproduction.md). Fine-tuning: [log](notes/results_log.md#11-a-training-day).
 * Without a committed result: lite and `refine` of today on the benchmark, the papers' network on more motions.
-* On other pages: NPT, H4D, TST, LART and 3D-CoreNet ([systems](systems.md)), speed ([performance](performance.md)), the
-  papers' tables ([reproduction](reproduction.md)), fine-tuning ([log](notes/results_log.md#11-a-training-day)).
 
-`restage sweep table experiments/shipped` shows these results with intervals. `sweep.yaml` there says how to run them.
+`restage sweep table experiments/shipped` shows intervals. `sweep.yaml` there says how to run the sweep.
 """
 
 
 def page():
-    with_surface = [standard, no_motion, fitted, lite, register, rest_pose]
-    moving = [standard, no_motion, fitted, lite, closed_form, unchanged]
+    with_surface = [standard, no_motion, lite, register, rest_pose]
+    moving = [standard, no_motion, lite, closed_form, unchanged]
     return TEMPLATE.format(
         seed_count=len(standard.trials), lite_count=len(lite.trials), glance=glance(),
         joint_table=by_set(("pa_mpjpe", "mpjpe"), list(TOLD), True),
         surface_table=by_set(("pa_mpvd", "mpvd", "medl"), with_surface),
-        calm_table=by_set(("acc", "pa_acc", "foot_slide_mm"), moving), joints=joints(), real=real(), spread=spread(),
-        kinds_table=kinds_table(), sure=sure(), switches=switch_rows())
+        calm_table=by_set(("acc", "foot_slide_mm"), moving), joints=joints(), real=real(),
+        kinds_table=kinds_table(), same_for_all=same_for_all(), sure=sure())
 
 
 def check_page(wanted):
