@@ -32,7 +32,7 @@ MAY_USE = {
     "nn/layers": ENGINE + ["nn"],
     "nn/models": ENGINE + ["nn", "nn/config", "nn/geometry", "nn/layers"],
     "nn/losses": ENGINE + ["nn", "nn/geometry", "nn/layers", "nn/models"],
-    "nn/weights": [BASE, TENSOR, "nn", "nn/config", "nn/models"],
+    "nn/weights": [BASE, TENSOR, "nn", "nn/config", "nn/geometry", "nn/models"],
     "datasets/*": ENGINE + NN + ["datasets/*"],
     "infer/*": ENGINE + NN + ["infer/*"],
     "train/artifacts": ENGINE + NN + ["train", "datasets/*"],

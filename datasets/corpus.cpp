@@ -90,6 +90,13 @@ Corpus file_corpus(const std::string& source, const std::string& split) {
   return out;
 }
 
+JointDefinition definition_of(const std::vector<Body>& bodies, const std::string& source) {
+  std::vector<NamedDefinition> all;
+  for (const Body& body : bodies)
+    all.push_back({body.definition, source + ": body '" + body.id + "'"});
+  return common_definition(all);
+}
+
 /// FNV-1a over 64-bit words.
 class Hash {
  public:
@@ -148,6 +155,7 @@ Corpus load_corpus(const CorpusSource& source, const std::string& split) {
   const std::string where = builtin ? "built-in data" : source.source;
   check_not_empty(out, where, split);
   check_subjects(out, where);
+  out.joints = definition_of(out.bodies, where);
   return out;
 }
 
@@ -160,6 +168,7 @@ Corpus subset(const Corpus& corpus, const std::string& split) {
     if (motion.split == split) out.motions.push_back(motion);
   out.description = corpus.description;
   out.license = corpus.license;
+  out.joints = corpus.joints;
   check_not_empty(out, "data", split);
   return out;
 }

@@ -13,6 +13,7 @@ struct Corpus {
   std::vector<Body> bodies;
   std::vector<Motion> motions;
   std::string description, license;  ///< where it comes from, what may be done with it
+  JointDefinition joints = {};       ///< of all bodies; empty: their file does not say
 };
 
 struct SplitCounts {
@@ -31,8 +32,8 @@ struct CorpusSource {
 
 /// All of it, or one split ("train", "validation", "test"; else InputError). A body belongs to one
 /// split, and a motion to the split of its subject, so splits never share either. InputError if
-/// there is no body or no motion, if what is loaded has a subject in two splits, or if the file is
-/// missing or damaged; all of a folder.
+/// there is no body or no motion, if what is loaded has a subject in two splits or bodies of two
+/// definitions of joints, or if the file is missing or damaged; all of a folder.
 Corpus load_corpus(const CorpusSource& source, const std::string& split = "");
 /// The bodies and the motions of one split. InputError if either is missing.
 Corpus subset(const Corpus& corpus, const std::string& split);

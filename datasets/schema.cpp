@@ -145,6 +145,10 @@ void ScanWriter::append(const Points& cloud, const Joints& joints) {
   append(cloud);
 }
 
+void ScanWriter::set_definition(const JointDefinition& definition) {
+  if (!definition.empty()) file_.set_text("/", kJointDefinition, definition);
+}
+
 void ScanWriter::set_foreign_frame() {
   file_.set_text("/", "units", "unknown");
   file_.set_text("/", "up", "unknown");

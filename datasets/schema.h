@@ -19,6 +19,9 @@ namespace restage {
 
 inline constexpr int64_t kSchemaVersion = 1;
 
+/// The attribute that names the JointDefinition of a body, or of all /joints of a file.
+inline constexpr const char* kJointDefinition = "joint_definition";
+
 /// Where data comes from and what may be done with it; goes into the file's attributes.
 struct FileInfo {
   std::string license = "unknown";
@@ -83,6 +86,8 @@ class ScanWriter {
   /// Says that units and axes of the points are not the project's.
   void set_foreign_frame();
   void end_sequence();  ///< the next cloud starts another sequence; the last one ends by itself
+  /// Which joints append() is given; empty: not said.
+  void set_definition(const JointDefinition& definition);
   /// Takes back what was appended since the last end_sequence().
   void drop_sequence();
   h5::File& file() { return file_; }  ///< for data sets beside those of a scan file
@@ -106,6 +111,7 @@ struct Prediction {
   std::vector<Triangle> faces;           ///< empty if absent
   std::vector<double> confidence;        ///< F, 0 to 1; empty if absent
   std::vector<double> radius;            ///< F x 22, metres (see PredictionWriter); empty if absent
+  JointDefinition definition;            ///< of the joints; empty: the file does not say
   double fps = kFps;                     ///< written, not read
 };
 
@@ -175,6 +181,8 @@ class PredictionWriter {
   void append_rotations(const Rotations& global);
   /// Joints alone, each with the radius about it that should hold the true one nine times in ten.
   void append_joints(const Joints& joints, const std::array<double, kJoints>& radius);
+  /// Which joints append() is given; empty: not said.
+  void set_definition(const JointDefinition& definition);
   /// How the source's scans relate to the world: world = A p + b, rows of [A | b]. Written as
   /// /source_to_world [3,4].
   void set_source_to_world(const Eigen::Matrix<double, 3, 4>& transform);
@@ -207,6 +215,8 @@ struct Inspection {
   std::map<std::string, std::map<std::string, int64_t>> splits;
   std::map<std::string, int64_t> subjects, actions;
   std::vector<double> heights;
+  /// The definitions of joints, and how many bodies have each; of other files the file's, 1.
+  std::map<std::string, int64_t> joints;
 };
 
 /// What a file holds, without reading more values than the bodies' vertices.

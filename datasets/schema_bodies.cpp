@@ -99,6 +99,7 @@ Body read_body(const h5::File& file, const std::string& id, SharedShapes& shared
     body.rest.faces = read_faces(file, "/topologies/" + *topology, vertices);
   }
   body.joints = read_joints(file, group + "/joints");
+  body.definition = text_or_nothing(file, group, kJointDefinition);
   read_weights(file, group + "/weights", body);
   if (const std::optional<std::string> name = file.text(group, "blend_shapes")) {
     auto& shapes = shared[*name];
@@ -146,6 +147,7 @@ void DatasetWriter::add(const Body& body) {
       group + "/weights", {body.weights.rows(), kJoints},
       std::span<const float>(body.weights.data(), static_cast<size_t>(body.weights.size())));
   file_.set_text(group, "split", body.split);
+  if (!body.definition.empty()) file_.set_text(group, kJointDefinition, body.definition);
   ++bodies_;
   add_blend_shapes(body, group);
   if (body.rest.faces.empty()) return;

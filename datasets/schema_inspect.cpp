@@ -50,6 +50,7 @@ void count_dataset(const h5::File& file, Inspection& out) {
       out.counts["vertices"] += vertices.rows();
       out.heights.push_back(height_of(vertices));
       count_member(file, "/bodies/" + id, "bodies", out);
+      if (const auto joints = file.text("/bodies/" + id, kJointDefinition)) ++out.joints[*joints];
     }
     std::sort(out.heights.begin(), out.heights.end());
   }
@@ -139,6 +140,7 @@ Inspection inspect(const std::string& path) {
     count_frames(file, out.counts);
   else
     count_dataset(file, out);
+  if (const auto joints = file.text("/", kJointDefinition)) out.joints[*joints] = 1;
   out.fps = read_fps(file);
   out.transform = file.text("/", "transform").value_or("");
   if (out.counts.contains("frames"))

@@ -100,6 +100,7 @@ Prediction PredictionReader::read_small() const {
     out.faces = read_faces(file_, "/faces", vertices_ ? vertex_count_ : int64_t{1} << 31);
   out.confidence = confidence_in(file_, frames_);
   out.radius = radius_in(file_, frames_);
+  out.definition = file_.text("/", kJointDefinition).value_or("");
   return out;
 }
 
@@ -130,6 +131,7 @@ void write_prediction(const std::string& path, const Prediction& prediction, con
   write_sequence_offset(file, prediction.sequence_offset, prediction.frames);
   if (!prediction.faces.empty()) write_faces(file, "/faces", prediction.faces);
   file.set_number("/", "fps", prediction.fps);
+  if (!prediction.definition.empty()) file.set_text("/", kJointDefinition, prediction.definition);
   file.commit();
 }
 
@@ -169,6 +171,10 @@ void PredictionWriter::append_joints(const Joints& joints,
                                      const std::array<double, kJoints>& radius) {
   append(joints, {});
   radius_.insert(radius_.end(), radius.begin(), radius.end());
+}
+
+void PredictionWriter::set_definition(const JointDefinition& definition) {
+  if (!definition.empty()) file_.set_text("/", kJointDefinition, definition);
 }
 
 void PredictionWriter::set_source_to_world(const Eigen::Matrix<double, 3, 4>& transform) {

@@ -155,6 +155,10 @@ void judge(const Bundle& weights, const std::string& folder, bool scans,
            const BenchmarkOptions& how, SystemScores* scores) {
   PredictionFile truth(in(folder, "truth.h5")), source(in(folder, "source.h5")),
       rest(in(folder, "rest.h5"));
+  common_definition(
+      {{truth.data.definition, truth.path},
+       {joint_definition(weights.only(system_type(how.system).roles), "weights"), "the system"}},
+      "judge the weights on data with the joints that they were trained on");
   const std::optional<WorldMap> to_world = source_to_world(truth.path);
   if (scans && !to_world)
     throw InputError(truth.path, "does not say where its scans are", "build the benchmark again");

@@ -225,6 +225,9 @@ EvaluationOptions evaluation_options(const TrainConfig& config, const Corpus& te
 SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weights_name,
                                  const Corpus& corpus, const EvaluationOptions& options) {
   const SystemType& type = system_type(options.system);
+  common_definition({{corpus.joints, "the data"},
+                     {joint_definition(weights.only(type.roles), weights_name), weights_name}},
+                    "judge the weights on data with the joints that they were trained on");
   SystemEvaluation out;
   for (const Condition& condition : conditions_of(type, weights)) {
     const std::string missing = lacking(condition, weights);

@@ -46,6 +46,17 @@ class PyExtractor {
   std::optional<JointExtractor> extract_;
 };
 
+/// Frames of joints [.., 22, 3].
+py::array convert_joints(const py::array_t<double, py::array::c_style | py::array::forcecast>& in,
+                         const std::string& from, const std::string& to) {
+  const py::ssize_t n = in.ndim();
+  if (n < 2 || in.shape(n - 2) != kJoints || in.shape(n - 1) != 3)
+    throw InputError("joints", "are not skeletons", "give an array [..., 22, 3], metres");
+  std::vector<double> values(in.data(), in.data() + in.size());
+  JointConversion(from, to, "joints").convert(values);
+  return array_of<double>(std::move(values), {in.shape(), in.shape() + n});
+}
+
 }  // namespace
 
 void add_skeleton(py::module_& m) {
@@ -60,6 +71,9 @@ device: "cpu", or "cuda" where it is built in.)")
            "points [n, 3], metres, y up -> joints float64 [22, 3], in the cloud's own frame, and "
            "the radius about each that should hold the true one nine times in ten, float64 [22] "
            "in metres, or None.");
+  m.def("convert_joints", &convert_joints, py::arg("joints"), py::arg("source"), py::arg("target"),
+        "Joints [..., 22, 3] of one definition as those of another, float64. Of \"makehuman\" (the "
+        "shipped weights) and \"smpl\" (docs/joints.md).");
 }
 
 }  // namespace restage::python

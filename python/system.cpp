@@ -6,7 +6,7 @@
 
 #include "datasets/doctor/examine.h"
 #include "experiments/cli/retarget.h"
-#include "experiments/cli/scale_option.h"
+#include "experiments/cli/source_options.h"
 #include "experiments/source.h"
 #include "python/arrays.h"
 

@@ -122,6 +122,7 @@ Body builtin_body(uint64_t seed, const std::string& split, int index, bool one_m
   for (const Vec3& v : mesh.vertices) body.rest.vertices.push_back(place(v).cast<float>());
   body.rest.faces = std::move(mesh.faces);
   body.joints = shape_joints(shape);
+  body.definition = "builtin";
   for (Vec3& j : body.joints) j = place(j);
   return body;
 }

@@ -68,6 +68,7 @@ Body to_body(const SkinnedSurface& surface, const Joints& joints, double floor) 
   for (const Vec3& x : surface.vertices)
     out.rest.vertices.push_back(((x - down) / 10).cast<float>());
   for (int j = 0; j < kJoints; ++j) out.joints[j] = (joints[j] - down) / 10;
+  out.definition = "makehuman";
   for (const int half : {1, 2})
     for (const auto& quad : surface.quads) {
       const Triangle t = {quad[0], quad[half], quad[half + 1]};

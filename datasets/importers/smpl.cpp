@@ -195,6 +195,7 @@ Body SmplModel::body(const Betas& betas) const {
   Body out;
   for (const Vec3& x : vertices) out.rest.vertices.push_back((x - Vec3(0, floor, 0)).cast<float>());
   out.joints = joints(betas);
+  out.definition = "smpl";
   for (Vec3& x : out.joints) x.y() -= floor;
   out.rest.faces = faces_;
   out.weights = weights_;

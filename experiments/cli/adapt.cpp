@@ -5,7 +5,7 @@
 #include "autograd/base/output_check.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
-#include "experiments/cli/scale_option.h"
+#include "experiments/cli/source_options.h"
 #include "experiments/cli/standard_weights.h"
 #include "experiments/slow_work.h"
 
@@ -134,13 +134,7 @@ void add_adapt(Program& program) {
   app.add_option("--out", c.out,
                  "weights file with the adapted extractor; all else as in --weights")
       .required();
-  add_scale(app, c.how.scale, "the sources' units in metres");
-  app.add_option("--source-up", c.how.up,
-                 "the sources' axis that points up: x, -x, y, -y, z or -z");
-  app.add_option("--fps", c.how.fps,
-                 "frames per second of the sources (default: the files', else 30)");
-  app.add_option("--clip", c.how.clip, "animation of a glTF source");
-  app.add_option("--sequence", c.how.sequence, "which sequence of an HDF5 source, from 0");
+  add_source_options(app, c.how);
   app.add_option("--views", c.options.views, "of each cloud that the teacher looks at");
   app.add_option("--min-confidence", c.options.min_confidence,
                  "a frame of which the extractor is less sure teaches nothing, 0 to 1");

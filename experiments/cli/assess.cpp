@@ -9,7 +9,7 @@
 #include "experiments/assess.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
-#include "experiments/cli/scale_option.h"
+#include "experiments/cli/source_options.h"
 #include "experiments/cli/standard_weights.h"
 #include "experiments/slow_work.h"
 #include "infer/render/page.h"
@@ -196,13 +196,7 @@ void add_assess(Program& program) {
       .required();
   app.add_option("--weights", c.weights,
                  "weights file, run or artifact (default: the standard ones)");
-  add_scale(app, c.source.scale, "the source's units in metres");
-  app.add_option("--source-up", c.source.up,
-                 "the source's axis that points up: x, -x, y, -y, z or -z");
-  app.add_option("--fps", c.source.fps,
-                 "frames per second of the source (default: the file's, else 30)");
-  app.add_option("--clip", c.source.clip, "animation of a glTF source");
-  app.add_option("--sequence", c.source.sequence, "which sequence of an HDF5 source, from 0");
+  add_source_options(app, c.source);
   app.add_option("--samples", c.options.samples,
                  "views of a cloud to average: choices of its points, turned and mirrored");
   app.add_option("--out", c.out, "page.html that plays the capture beside the joints found");

@@ -7,7 +7,7 @@
 #include "experiments/cli/commands.h"
 #include "experiments/cli/import_text.h"
 #include "experiments/cli/output.h"
-#include "experiments/cli/scale_option.h"
+#include "experiments/cli/source_options.h"
 
 namespace restage::cli {
 namespace {

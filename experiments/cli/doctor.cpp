@@ -23,7 +23,7 @@
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/doctor_report.h"
-#include "experiments/cli/scale_option.h"
+#include "experiments/cli/source_options.h"
 #include "experiments/doctor_repair.h"
 #include "nn/config/config.h"
 #include "nn/weights/safetensors.h"

@@ -21,7 +21,7 @@ namespace restage::cli {
 namespace {
 
 struct EvalOptions {
-  std::string run, pred, truth, source, rest, mended, out, device;
+  std::string run, pred, truth, source, rest, mended, out, device, joints;
   int64_t every = 1;
   bool variants = false, per_joint = false;
   std::optional<double> anchor;
@@ -43,6 +43,28 @@ void check_pair(const File& pred, const File& truth) {
   if (!joints && !vertices && truth.data.frames > 0)
     throw InputError(pred.path, "has nothing in common with " + truth.path,
                      "store /joints or /vertices in both");
+}
+
+/// All files come to hold the same joints: those of --joints, into which a file that says what it
+/// holds is converted, else those that all files hold.
+void settle_joints(const std::string& asked, const std::vector<File*>& files) {
+  std::vector<NamedDefinition> said;
+  std::string silent;
+  for (File* file : files) {
+    if (file->data.joints.empty()) continue;
+    JointDefinition& has = file->data.definition;
+    if (has.empty()) silent = file->path;
+    if (!asked.empty() && !has.empty()) {
+      JointConversion(has, asked, file->path).convert(file->data.joints);
+      has = asked;
+    }
+    said.push_back({has, file->path});
+  }
+  JointDefinition all =
+      common_definition(said, "add --joints smpl or --joints makehuman to compare the same joints");
+  if (all.empty()) all = asked;
+  if (!all.empty() && !silent.empty())
+    log_info(silent + " does not say which joints it holds: taken as '" + all + "'");
 }
 
 /// Where sequences begin and end: a file without that information is taken to agree.
@@ -231,8 +253,8 @@ void check_way(const EvalOptions& o) {
       {run && !o.source.empty(), "--source"}, {run && !o.rest.empty(), "--rest"},
       {run && !o.mended.empty(), "--mended"}, {run && o.every != 1, "--every"},
       {run && o.variants, "--variants"},      {run && o.per_joint, "--per-joint"},
-      {!run && !o.out.empty(), "--out"},      {!run && o.anchor, "--anchor"},
-      {!run && !o.device.empty(), "--device"}};
+      {run && !o.joints.empty(), "--joints"}, {!run && !o.out.empty(), "--out"},
+      {!run && o.anchor, "--anchor"},         {!run && !o.device.empty(), "--device"}};
   for (const auto& [given, name] : others)
     if (given)
       throw InputError(
@@ -266,6 +288,10 @@ int run_eval(const EvalOptions& options, const Common& common) {
     source.emplace(options.source);
     rest.emplace(options.rest);
   }
+  std::vector<File*> files{&pred, &truth};
+  for (auto* file : {&source, &rest})
+    if (*file) files.push_back(&**file);
+  settle_joints(options.joints, files);
   const std::optional<WorldMap> mended = into_world(options, pred, source, rest);
   if (options.every > 1) {
     truth.thin(options.every);
@@ -320,7 +346,8 @@ void add_eval(Program& program) {
       "restage eval run=runs/demo-1 --anchor 0\n"
       "restage eval run=runs/demo-1 --device cuda\n"
       "restage eval --pred result.h5 --truth truth.h5 --every 3 --variants --per-joint\n"
-      "restage eval --pred r.h5 --truth t.h5 --source a.h5 --rest b.h5 --mended mended.h5",
+      "restage eval --pred r.h5 --truth t.h5 --source a.h5 --rest b.h5 --mended mended.h5\n"
+      "restage eval --pred ours.h5 --truth amass.h5 --joints smpl",
       run_eval);
   app.add_option("RUN", options.run, "run=RUN_DIR: the trained system on its held-out data");
   app.add_option("--out", options.out,
@@ -337,6 +364,9 @@ void add_eval(Program& program) {
   app.add_option("--source", options.source, "joints of the source, for the references");
   app.add_option("--rest", options.rest,
                  "rest joints of the target (one row, or one a sequence), for the references");
+  app.add_option("--joints", options.joints,
+                 "compare joints of this definition: smpl or makehuman; files of another are "
+                 "converted");
   app.add_option("--every", options.every,
                  "the prediction holds only every so many frames of the truth's sequences");
   app.add_option("--mended", options.mended,

@@ -14,7 +14,7 @@
 #include "datasets/readers/hdf5_frames.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
-#include "experiments/cli/scale_option.h"
+#include "experiments/cli/source_options.h"
 #include "experiments/clips.h"
 #include "infer/render/page.h"
 #include "infer/render/sheet.h"

@@ -19,7 +19,7 @@
 #include "experiments/cli/retarget.h"
 #include "experiments/cli/retarget_gaps.h"
 #include "experiments/cli/retarget_words.h"
-#include "experiments/cli/scale_option.h"
+#include "experiments/cli/source_options.h"
 #include "experiments/cli/standard_weights.h"
 #include "experiments/source.h"
 #include "infer/frame_rate.h"
@@ -107,10 +107,11 @@ struct Outcome {
 /// All frames of the source through the system and into the sink, which is not committed.
 class Run {
  public:
-  Run(const RetargetCommand& c, Source& source, System& system,
+  Run(const RetargetCommand& c, SinkOptions to, Source& source, System& system,
       std::shared_ptr<const GltfOwnRig> own, Gaps& gaps, Profile& profile,
       const RetargetCaller& caller, bool from_memory)
       : c_(c),
+        to_(std::move(to)),
         caller_(caller),
         source_(source),
         system_(system),
@@ -181,10 +182,11 @@ class Run {
     if (caller_.sink) return caller_.sink(shown);
     std::optional<SourceRecord> source;
     if (!from_memory_) source = source_.record();  // there is no file to be found again
-    return make_sink(c_.to, shown, source, clip_name(source_.record()), c_.target, own_);
+    return make_sink(to_, shown, source, clip_name(source_.record()), c_.target, own_);
   }
 
   const RetargetCommand& c_;
+  const SinkOptions to_;
   const RetargetCaller& caller_;
   Source& source_;
   System& system_;
@@ -267,10 +269,11 @@ Retargeted retarget(const RetargetCommand& c, const Common& common, RetargetCall
   TargetMesh target = read_target(c.target, c.bones);
   check_kept(c, target);
   check_inputs(c, source, target);
+  const SinkOptions to = sink_options(c, input.weights, target);
   const auto system = system_for(c, std::move(input), target);
   Gaps gaps(source.frames(), source.fps() / static_cast<double>(c.to.every), c.options.force);
   Profile profile({"read", "extract", "motion", "deformation", "write", "frame"});
-  Run run(c, source, *system, target.own, gaps, profile, caller, from_memory);
+  Run run(c, to, source, *system, target.own, gaps, profile, caller, from_memory);
   // Scripts get one line if the source turns out to be bad later on; people need not wait.
   const bool on_terminal = isatty(STDERR_FILENO) != 0;
   if (on_terminal) say_target(target);
@@ -357,6 +360,17 @@ SystemInput load_input(const RetargetCommand& c, const Common& common) {
   return input;
 }
 
+SinkOptions sink_options(const RetargetCommand& c, const Bundle& weights,
+                         const TargetMesh& target) {
+  SinkOptions out = c.to;
+  std::vector<NamedDefinition> said{{joint_definition(weights, c.weights), "the weights"}};
+  if (!c.rest.empty()) said.push_back({read_prediction(c.rest).definition, c.rest});
+  out.definition = common_definition(said);
+  if (target.own) out.definition.clear();  // a rig has its joints where its maker wants them
+  if (!out.joints.empty()) JointConversion(out.definition, out.joints, c.target);
+  return out;
+}
+
 std::unique_ptr<System> system_for(const RetargetCommand& c, SystemInput input,
                                    TargetMesh& target) {
   if (!c.rest.empty()) input.rest = rest_joints(c.rest);
@@ -398,6 +412,7 @@ void add_retarget(Program& program) {
       "restage retarget --source s.h5 --target a.ply --weights w --out r.h5 --anchor 0 "
       "--no-foot-lock\n"
       "restage retarget --source s.h5 --target a.ply --out r.h5 --no-steady-bones --no-keep-limbs\n"
+      "restage retarget --source s.h5 --target a.ply --out r.h5 --joints smpl\n"
       "restage retarget --source scans.h5 --target hero.ply --system register --rest rest.h5 "
       "--out r.h5",
       run_retarget);
@@ -424,20 +439,15 @@ void add_retarget_options(CommandOptions app, RetargetCommand& c, bool files) {
                  "of the animation that a rigged target's file gets (default: the source's name)");
   app.add_option("--out-fps", c.to.fps, "frames per second of an animation, such as 24 or 60")
       .show_default();
+  app.add_option("--joints", c.to.joints,
+                 "for X.h5: convert /joints to this definition, smpl or makehuman (default: the "
+                 "weights' own)");
   app.add_option("--skeleton", c.to.skeleton,
                  "names and axes of the bones that a target without a rig gets: restage, smpl, "
                  "mixamo, vrm, unreal");
   app.add_flag("--animation-only", c.to.animation_only,
                "of a rigged target only nodes and the animation, without meshes");
-  app.add_option("--clip", c.source.clip,
-                 "animation of a glTF source (default: the first), or motion of a file of motions");
-  app.add_option("--sequence", c.source.sequence, "which sequence of an HDF5 source, from 0");
-  app.add_option("--fps", c.source.fps,
-                 "frames per second of the source (default: the file's, else 30)");
-  app.add_option("--source-up", c.source.up,
-                 "the source's axis that points up: x, -x, y, -y, z or -z")
-      .show_default();
-  add_scale(app, c.source.scale, "the source's units in metres");
+  add_source_options(app, c.source);
   app.add_option("--format", c.to.format,
                  "of a folder's frames: ply or obj (default: the target's own, else ply)");
   add_system_options(app, c);

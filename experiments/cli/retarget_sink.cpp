@@ -164,8 +164,12 @@ Sink hdf5_sink(const SinkOptions& options, const Shown& shown,
   const auto writer = std::make_shared<PredictionWriter>(options.out, std::ssize(target.vertices),
                                                          target.faces, FileInfo{}, options.rate());
   if (source) writer->set_source(*source);
-  return {[writer](const RetargetedFrame& f) {
-            writer->append(f.joints.value(), f.vertices, f.confidence);
+  const bool other = !options.joints.empty();
+  const JointDefinition& to = other ? options.joints : options.definition;
+  const JointConversion convert(other ? options.definition : to, to, options.out);
+  writer->set_definition(to);
+  return {[writer, convert](const RetargetedFrame& f) {
+            writer->append(convert(f.joints.value()), f.vertices, f.confidence);
             writer->append_rotations(to_global(f.pose.local));
           },
           [writer](const Frames& filled) {
@@ -261,6 +265,9 @@ void check_sink(const SinkOptions& options) {
   if (!options.clip_name.empty() && (!is_animation(out) || out.ends_with(".bvh")))
     throw InputError(out, "holds no animation that could be named",
                      "leave --clip-name out, or end --out in .glb");
+  if (!options.joints.empty() && !out.ends_with(".h5"))
+    throw InputError(out, "holds a skeleton, which --joints cannot change",
+                     "leave --joints out, or end --out in .h5");
   if (!options.skeleton.empty() && !out.ends_with(".glb") && !out.ends_with(".bvh"))
     throw InputError(out, "has no bones that --skeleton could name",
                      "end --out in .glb or .bvh (a .vrma always has VRM's)");

@@ -16,6 +16,9 @@ namespace restage::cli {
 struct SinkOptions {
   std::string out, format, clip_name;  ///< empty format: the target's own, else PLY
   bool animation_only = false;
+  /// Which joints the system gives (empty: not known), and which ones a file is to hold (empty:
+  /// those).
+  JointDefinition definition, joints;
   std::string skeleton;  ///< of a target without a rig, one of rig_conventions(); empty: restage
   int64_t every = 1;     ///< of the source's frames, one is taken
   double fps = kFps;     ///< of an animation

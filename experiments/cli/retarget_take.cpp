@@ -85,11 +85,14 @@ Retargeted run_take(const RetargetCommand& c, const Common& common, const Retarg
   check_words(c);
   TargetMesh target = read_target(c.target, c.bones);
   check_kept(c, target);
-  std::unique_ptr<System> system;  // poses a target that has no rig of its own
+  SystemInput input;
   if (!target.own) {
     if (!c.options.force) check_target(target.mesh, c.target, target.known());
-    system = system_for(c, load_input(c, common), target);
+    input = load_input(c, common);
   }
+  const SinkOptions to = sink_options(c, input.weights, target);
+  std::unique_ptr<System> system;  // poses a target that has no rig of its own
+  if (!target.own) system = system_for(c, std::move(input), target);
   SkinWeights weights;
   if (target.own) weights = target.own->weights();
   const Joints& rest = target.own ? target.own->rest() : *system->target_joints();
@@ -102,7 +105,7 @@ Retargeted run_take(const RetargetCommand& c, const Common& common, const Retarg
   std::optional<SourceRecord> source;
   if (is_gltf_name(c.source.path)) source = c.source;
   const Sink sink = caller.sink ? caller.sink(shown)
-                                : make_sink(c.to, shown, source, take.name, c.target, target.own);
+                                : make_sink(to, shown, source, take.name, c.target, target.own);
   say_take(take);
   say_target(target);
   for (const auto& [given, option] : {std::pair(!c.weights.empty(), "--weights"),

@@ -17,7 +17,7 @@ namespace restage::cli {
 namespace {
 
 struct SkeletonOptions {
-  std::string weights, input, out, device = "cpu";
+  std::string weights, input, out, device = "cpu", joints;
   int samples = 1;
 };
 
@@ -67,11 +67,18 @@ int run_skeleton(const SkeletonOptions& options, const Common& common) {
   const Bundle models = load_bundle(options.weights);
   auto& model = models.need_as<SkeletonModel>("skeleton", weights_path(options.weights));
   move_module(model, device_of(options.device));
+  JointDefinition definition = joint_definition(models.only({"skeleton"}), options.weights);
+  std::optional<JointConversion> convert;
+  if (!options.joints.empty()) {
+    convert.emplace(definition, options.joints, options.weights);
+    definition = options.joints;
+  }
   const auto frames = open_frames(options.input, {"", common.max_memory});
   std::unique_ptr<PredictionWriter> writer;
   if (!options.out.empty())
     writer = std::make_unique<PredictionWriter>(options.out, 0, std::vector<Triangle>{}, FileInfo{},
                                                 frames->fps());
+  if (writer) writer->set_definition(definition);
   Json list = Json::array();
   std::string text;
   // The same points give the same joints wherever they stand, so every frame has the same key.
@@ -81,7 +88,8 @@ int run_skeleton(const SkeletonOptions& options, const Common& common) {
   while (const auto frame = frames->next()) {
     if (frame->fault) throw *frame->fault;
     left_out += frame->left_out;
-    const SeenJoints seen = extract(frame->points, frame->source, key);
+    SeenJoints seen = extract(frame->points, frame->source, key);
+    if (convert) seen.joints = (*convert)(seen.joints);
     const auto radius = radius_of(seen);
     if (writer) write(seen.joints, radius, writer.get());
     if (common.json) {
@@ -97,7 +105,9 @@ int run_skeleton(const SkeletonOptions& options, const Common& common) {
     log_info(options.input + ": left out " + std::to_string(left_out) +
              (left_out == 1 ? " point" : " points") + " whose coordinates are NaN or infinite");
   if (common.json) {
-    print_json({{"frames", list}, {"seed", common.seed}});
+    Json document = {{"frames", list}, {"seed", common.seed}};
+    if (!definition.empty()) document["joints"] = definition;
+    print_json(document);
   } else {
     const std::string seed = "seed " + std::to_string(common.seed);
     print(writer ? "wrote " + options.out + " (" + seed + ")\n" : text + seed + "\n");
@@ -113,12 +123,15 @@ void add_skeleton(Program& program) {
                   "restage skeleton --weights w.safetensors --input scan.ply --json\n"
                   "restage skeleton --weights w.safetensors --input scans/ --out joints.h5\n"
                   "restage skeleton --weights w.safetensors --input scan.ply --samples 8\n"
+                  "restage skeleton --weights w.safetensors --input scan.ply --joints smpl\n"
                   "restage skeleton --weights w.safetensors --input scans/ --device cuda",
                   run_skeleton);
   app.add_option("--weights", options.weights, "weights file or run directory").required();
   app.add_option("--input", options.input, "cloud, folder of clouds, or HDF5 file of scans")
       .required();
   app.add_option("--out", options.out, "HDF5 file for the joints");
+  app.add_option("--joints", options.joints,
+                 "convert to joints of this definition: smpl or makehuman (default: the weights')");
   app.add_option("--device", options.device,
                  "where the network runs: cpu, or cuda in a program built for it");
   app.add_option("--samples", options.samples,

@@ -1,4 +1,4 @@
-#include "experiments/cli/scale_option.h"
+#include "experiments/cli/source_options.h"
 
 #include <charconv>
 #include <map>
@@ -29,6 +29,17 @@ double metres_per_unit(const std::string& text) {
                      "--scale '" + text.substr(0, 40) + "' is neither a number nor a known unit",
                      "give metres per unit, such as 0.001, or mm, cm, m, in or ft");
   return value;
+}
+
+void add_source_options(CommandOptions app, SourceRecord& how) {
+  app.add_option("--clip", how.clip,
+                 "animation of a glTF source (default: the first), or motion of a file of motions");
+  app.add_option("--sequence", how.sequence, "which sequence of an HDF5 source, from 0");
+  app.add_option("--fps", how.fps,
+                 "frames per second of the source (default: the file's, else 30)");
+  app.add_option("--source-up", how.up, "the source's axis that points up: x, -x, y, -y, z or -z")
+      .show_default();
+  add_scale(app, how.scale, "the source's units in metres");
 }
 
 }  // namespace restage::cli

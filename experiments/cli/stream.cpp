@@ -15,7 +15,7 @@
 #include "experiments/cli/output.h"
 #include "experiments/cli/retarget.h"
 #include "experiments/cli/retarget_words.h"
-#include "experiments/cli/scale_option.h"
+#include "experiments/cli/source_options.h"
 #include "experiments/source.h"
 #include "infer/live/folder_input.h"
 #include "infer/live/latency.h"

@@ -25,6 +25,27 @@
 namespace restage::cli {
 namespace {
 
+Json value_of(const ConfigNode& node) {
+  if (node.kind == ConfigNode::Kind::null) return nullptr;
+  if (node.kind == ConfigNode::Kind::scalar) {
+    const Json value = node.quoted ? Json(node.text) : Json::parse(node.text, nullptr, false);
+    return value.is_discarded() ? Json(node.text) : value;
+  }
+  Json out = Json::array();
+  for (const ConfigNode& child : node.children) out.push_back(value_of(child));
+  return out;
+}
+
+/// All keys by their full names: {"motion.optimiser.steps": 100, ...}.
+void add_keys(const ConfigNode& section, const std::string& prefix, Json* keys) {
+  for (const ConfigNode& child : section.children) {
+    if (child.kind == ConfigNode::Kind::map)
+      add_keys(child, prefix + child.key + ".", keys);
+    else
+      (*keys)[prefix + child.key] = value_of(child);
+  }
+}
+
 namespace fs = std::filesystem;
 
 /// CONFIG.yaml and key=value, in any order; resume=RUN stands alone.
@@ -211,7 +232,9 @@ int train_with(Team& team, const TrainArguments& arguments, const Common& common
   TrainConfig config = configured(request);
   if (arguments.fast_dev_run) config = shortened(request, config);
   if (arguments.print_config) {
-    print(common.json, {{"config", resolved_yaml(config)}}, resolved_yaml(config));
+    Json keys = Json::object();
+    add_keys(write_config(config), "", &keys);
+    print(common.json, {{"config", resolved_yaml(config)}, {"keys", keys}}, resolved_yaml(config));
     return 0;
   }
   TrainingData data(config.data);

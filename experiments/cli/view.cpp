@@ -17,7 +17,7 @@
 #include "autograd/base/output_check.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
-#include "experiments/cli/scale_option.h"
+#include "experiments/cli/source_options.h"
 #include "experiments/slow_work.h"
 #include "experiments/view.h"
 #include "infer/render/animation.h"

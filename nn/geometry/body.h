@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "nn/geometry/joint_definition.h"
 #include "nn/geometry/skeleton.h"
 
 namespace restage {
@@ -41,6 +42,7 @@ struct Body {
   Mesh rest;
   Joints joints;  ///< rest joints, same frame as `rest`
   SkinWeights weights;
+  JointDefinition definition = {};                      ///< which points of the body `joints` are
   std::shared_ptr<const PoseBlendShapes> blend_shapes;  ///< null: pose_surface() has its own rule
 };
 

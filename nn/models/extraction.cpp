@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "autograd/base/log.h"
+#include "nn/geometry/strays.h"
+
 namespace restage {
 namespace {
 
@@ -29,7 +32,13 @@ void JointExtractor::arrange(const Points& cloud, const std::string& source) {
   for (const Point& p : cloud)
     if (!p.allFinite())
       throw UnusableCloud(source, "holds a coordinate that is not finite", "remove such points");
-  points_.arrange(cloud);
+  const size_t strays = leave_out_strays(cloud, &kept_);
+  if (strays > 0 && !told_of_strays_)
+    log_warning(source + ": left out " + std::to_string(strays) +
+                (strays == 1 ? " point" : " points") +
+                " more than 5 m from the others (this is said once)");
+  told_of_strays_ = told_of_strays_ || strays > 0;
+  points_.arrange(strays > 0 ? kept_ : cloud);
   if (points_.size() < kLeastDistinctPoints)
     throw UnusableCloud(
         source, "holds " + std::to_string(points_.size()) + " distinct points, too few for a body",

@@ -30,7 +30,9 @@ class JointExtractor {
   /// choices of points begin.
   /// `before`: the answer to the frame before, in the same frame; null where there was none. It is
   /// forgotten where the cloud is more than a metre from it.
-  /// UnusableCloud naming `source`: fewer than 64 distinct points, values that are not finite.
+  /// A few points that lie far from all others are left out (nn/geometry/strays.h); a warning says
+  /// so once. UnusableCloud naming `source`: fewer than 64 distinct points, values that are not
+  /// finite.
   SeenJoints operator()(const Points& cloud, const std::string& source, const RngKey& key,
                         const SeenJoints* before = nullptr);
 
@@ -45,7 +47,8 @@ class JointExtractor {
   double around_;
   bool keep_limbs_;
   EvenPoints points_;
-  Points chosen_;
+  Points chosen_, kept_;
+  bool told_of_strays_ = false;
   std::vector<Vec3> centres_;
   std::vector<View> views_;
   std::vector<double> values_;  // room for one coordinate of each view

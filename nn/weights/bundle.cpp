@@ -226,6 +226,14 @@ Bundle Bundle::only(const std::vector<std::string>& roles) const {
   return out;
 }
 
+JointDefinition joint_definition(const Bundle& bundle, const std::string& where) {
+  std::vector<NamedDefinition> all;
+  for (const auto& [role, model] : bundle)
+    if (const auto said = model.settings.find(kJointsSetting); said != model.settings.end())
+      all.push_back({said->second, where + " (" + role + ")"});
+  return common_definition(all);
+}
+
 namespace {
 
 /// A bundle's file, with the sizes of each model as `sizes` gives them.
@@ -247,7 +255,12 @@ TensorFile file_of(const Bundle& bundle, const std::function<ConfigNode(const An
 TensorFile to_file(const Bundle& bundle) { return file_of(bundle, write_config<AnyConfig>); }
 
 std::string identity_bytes(const Bundle& bundle) {
-  return safetensors_bytes(file_of(bundle, write_identity<AnyConfig>));
+  Bundle plain;
+  for (auto [role, model] : bundle) {
+    model.settings.erase(kJointsSetting);
+    plain.put(role, std::move(model));
+  }
+  return safetensors_bytes(file_of(plain, write_identity<AnyConfig>));
 }
 
 void save_bundle(const std::string& path, const Bundle& bundle) {

@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "nn/geometry/joint_definition.h"
 #include "nn/models/registry.h"
 #include "nn/weights/safetensors.h"
 
@@ -73,6 +74,12 @@ class Bundle {
   std::map<std::string, TrainedModel> by_role_;
 };
 
+/// The setting that names the joints a network was trained with.
+inline constexpr const char* kJointsSetting = "joints";
+/// The definition of joints that all networks of a bundle share (common_definition()); empty: the
+/// weights do not say. InputError naming `where`: two networks have different ones.
+JointDefinition joint_definition(const Bundle& bundle, const std::string& where);
+
 /// Takes the networks of some roles to a device, for everybody who shares the networks.
 void move_networks(const Bundle& bundle, const std::vector<std::string>& roles, Device device);
 
@@ -81,7 +88,7 @@ std::string prefix_of(const std::string& role);
 
 TensorFile to_file(const Bundle& bundle);
 /// What identifies the networks of a bundle: the bytes of its file, with sizes as write_identity()
-/// gives them.
+/// gives them and without kJointsSetting: the numbers already depend on the joints.
 std::string identity_bytes(const Bundle& bundle);
 void save_bundle(const std::string& path, const Bundle& bundle);
 

@@ -8,6 +8,7 @@
 #include <functional>
 #include <limits>
 
+#include "datasets/corpus.h"
 #include "datasets/merge.h"
 #include "tests/support/files.h"
 #include "tests/support/tiny_body.h"
@@ -74,6 +75,21 @@ TEST_F(Schema, BodiesAndMotionsKeepEveryBitAndTheirOrder) {
             (std::map<std::string, int64_t>{
                 {"bodies", 4}, {"vertices", 4 * 168}, {"motions", 2}, {"frames", 15}}));
   EXPECT_TRUE(verify(path).empty());
+}
+
+TEST_F(Schema, BodiesSayWhichJointsTheyHave) {
+  Body ours = tiny_body("a", "train"), theirs = tiny_body("b", "train");
+  ours.definition = "makehuman";
+  theirs.definition = "smpl";
+  const Motion motion = tiny_motion("m", "s", "train", 3);
+  write_dataset(dir / "ours.h5", {ours, tiny_body("silent", "train")}, {motion}, kInfo);
+  write_bodies(dir / "theirs.h5", {theirs}, kInfo);
+  write_dataset(dir / "both.h5", {ours, theirs}, {motion}, kInfo);
+  EXPECT_EQ(read_bodies(dir / "both.h5")[1].definition, "smpl");
+  EXPECT_EQ(inspect(dir / "ours.h5").joints, (std::map<std::string, int64_t>{{"makehuman", 1}}));
+  EXPECT_EQ(load_corpus({.source = dir / "ours.h5"}).joints, "makehuman");
+  EXPECT_THROW(load_corpus({.source = dir / "both.h5"}), InputError);
+  EXPECT_THROW(merge_data({dir / "ours.h5", dir / "theirs.h5"}, dir / "all.h5", {}), InputError);
 }
 
 TEST_F(Schema, RefusesBadIdsAndMissingGroups) {

@@ -44,6 +44,18 @@ TEST(InferExtraction, RepeatsOfPointsDoNotMatterToTheLastBit) {
   }
 }
 
+TEST(InferExtraction, PointsFarFromThePersonAreLeftOut) {
+  const auto model = small("skeleton/patch_transformer");
+  const Points points = cloud(400);
+  const Joints alone = extract_joints(*model, points, "c", RngKey{3, 0}, 2);
+  Points some = points;
+  some.insert(some.begin() + 5, {{4000, 0, 0}, {0, -7, 0}, {1e30f, 1e30f, 0}});
+  EXPECT_EQ(extract_joints(*model, some, "c", RngKey{3, 0}, 2), alone);
+  some.push_back({0, 0, 5.5f});
+  some.push_back({0, 0, 6});  // five of 405: no mistakes of a sensor, and half a room
+  EXPECT_NE(extract_joints(*model, some, "c", RngKey{3, 0}, 2), alone);
+}
+
 TEST(InferExtraction, OrderOfPointsDoesNotMatterToTheLastBit) {
   for (const std::string name :
        {"skeleton/point_transformer", "skeleton/pointnet", "skeleton/patch_transformer"}) {

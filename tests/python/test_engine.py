@@ -439,6 +439,19 @@ def test_stubs_name_everything():
         assert set(module.__all__) <= named, set(module.__all__) - named
 
 
+def test_config(tmp_path):
+    config = restage.Config("demo", "seed=3", {"motion.optimiser.steps": 7, "stages": ["skeleton"], "data.source": "d.h5"})
+    assert (config["seed"], config["motion.optimiser.steps"], config["stages"], config["data.source"]) == (3, 7, ["skeleton"], "d.h5")
+    assert config["skeleton.from"] is None and len(config) == len(list(config)) > 100
+    other = config.replaced("seed=4", name="mine")
+    assert (other["seed"], other["name"], other["motion.optimiser.steps"], config["seed"]) == (4, "mine", 7, 3)
+    other.save(tmp_path / "c.yaml")
+    assert dict(restage.Config(tmp_path / "c.yaml")) == dict(other)
+    for bad in ("seed=x", {"motion.optimizer.steps": 1}):
+        with pytest.raises(restage.InputError):
+            restage.Config("demo", bad)
+
+
 def test_train(tmp_path):
     config = tmp_path / "c.yaml"
     config.write_text("stages: [deformation]\nrun_root: %s\nname: t\ndata: {bodies: {train: 1, validation: 1, test: 1}, motions: {train: 1, "
@@ -447,6 +460,15 @@ def test_train(tmp_path):
     run = restage.train(config, on_step=lambda stage, done, figures: seen.append((stage, done)))
     assert seen == [("deformation", k) for k in (1, 2, 3, 4)]
     assert (tmp_path / run / "weights.safetensors").exists()
+
+    assert isinstance(run, restage.Run) and run.stages == ["deformation"] and run.weights.endswith("weights.safetensors")
+    curves = run.curves("deformation")
+    assert curves["step"].dtype == np.int64 and np.isfinite(curves["loss"]).any()
+    assert run.config["deformation.optimiser.steps"] == 4
+    with pytest.raises(restage.InputError, match="motion"):
+        run.curves("motion")
+    with pytest.raises(restage.InputError):
+        restage.Run(tmp_path / "none").curves("motion")
 
     class Enough(Exception):
         pass

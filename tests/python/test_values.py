@@ -47,6 +47,19 @@ def test_metrics_that_cannot_be():
             metrics.mpjpe(bad, joints)
 
 
+def test_convert_joints():
+    joints = np.random.default_rng(0).normal(size=(2, 3, 22, 3))
+    there = restage.convert_joints(joints, "makehuman", "smpl")
+    assert there.shape == joints.shape and there.dtype == np.float64
+    assert np.array_equal(there[1, 2], restage.convert_joints(joints[1, 2], "makehuman", "smpl"))
+    assert np.allclose(restage.convert_joints(joints + [1, 2, 3], "makehuman", "smpl"), there + [1, 2, 3])
+    assert 0.1 < np.linalg.norm(there - joints, axis=-1)[..., restage.JOINTS.index("spine2")].min()
+    for bad in (lambda: restage.convert_joints(joints[..., :21, :], "makehuman", "smpl"),
+                lambda: restage.convert_joints(joints, "makehuman", "cmu")):
+        with pytest.raises(restage.InputError):
+            bad()
+
+
 def test_closed_form(walk):
     rest = np.asarray(restage.System(walk / "target.ply", LITE).rest_joints)
     still = restage.closed_form(np.repeat(rest[None], 3, 0), rest)

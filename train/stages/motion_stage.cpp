@@ -172,7 +172,7 @@ MotionStage::MotionStage(const Config& config, const StageInput& in)
     : Stage("motion", config.optimiser, in.device),
       config_(config),
       model_(add_network<MotionModel>(config.model, RngKey{in.seed, 0}.fold("motion.init"),
-                                      settings_of(config))),
+                                      with_joints(settings_of(config), in))),
       discriminator_(add_network<Discriminator>(
           "discriminator", "smrm/discriminator", model_type("smrm/discriminator").training,
           RngKey{in.seed, 0}.fold("discriminator.init"), {}, false)),

@@ -77,7 +77,8 @@ CloudConfig held_out(CloudConfig c, const SkeletonModel& model) {
 SkeletonStage::SkeletonStage(const Config& config, const StageInput& in)
     : Stage("skeleton", config.optimiser, in.device),
       config_(config),
-      model_(add_network<SkeletonModel>(config.model, RngKey{in.seed, 0}.fold("skeleton.init"))),
+      model_(add_network<SkeletonModel>(config.model, RngKey{in.seed, 0}.fold("skeleton.init"),
+                                        with_joints({}, in))),
       optimiser_(add_optimiser("optimiser", {"skeleton"}, config.optimiser)),
       sampler_(in.train, training_clouds(config, *model_),
                sampler_seed(in.seed, "skeleton.clouds")),

@@ -32,4 +32,14 @@ struct StageInput {
   Device device = {};  ///< where the stage's networks live and are trained
 };
 
+/// Settings with the joints that data and given networks have in common (common_definition()).
+inline Settings with_joints(Settings settings, const StageInput& in) {
+  const JointDefinition joints =
+      common_definition({{in.train.joints, "data"},
+                         {in.validation.joints, "data of validation"},
+                         {joint_definition(in.given, "given weights"), "given weights"}});
+  if (!joints.empty()) settings[kJointsSetting] = joints;
+  return settings;
+}
+
 }  // namespace restage
