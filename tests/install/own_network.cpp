@@ -159,6 +159,17 @@ class ShiftStage final : public Stage {
   TransferSampler sampler_;
 };
 
+/// Notes the first and the last loss, and how often the stage was validated.
+struct Watch final : TrainObserver {
+  void on_step(const Stage&, int64_t done, const NamedValues& figures) override {
+    last = figures[0].second;
+    if (done == 1) first = last;
+  }
+  void on_validation(Stage&, int64_t, const NamedValues&) override { ++validations; }
+  double first = 0, last = 0;
+  int validations = 0;
+};
+
 bool checks_an_op() {
   backend(Device{}).add<GemanMcClureArgs, geman_mcclure_on_cpu>();
   gradcheck::register_op(op_samples());
@@ -180,7 +191,8 @@ bool trains_and_answers() {
                                                        in.options);
                    }});
   TrainConfig config;
-  read_config(parse_yaml("stages: [shift]\n"
+  read_config(parse_yaml("name: mine\n"
+                         "stages: [shift]\n"
                          "data: {bodies: {train: 2, validation: 1, test: 1},"
                          " motions: {train: 2, validation: 1, test: 1}}\n"
                          "shift: {sizes: {width: 16}, optimiser: {steps: 60, batch: 4,"
@@ -188,15 +200,13 @@ bool trains_and_answers() {
                          "mine.yaml"),
               config);
   const TrainingData data(config.data);
-  Bundle weights;
-  const auto stage = make_stage(config, "shift", data, &weights);
-  double first = 0, last = 0;
-  for (int64_t i = 0; i < stage->steps(); ++i) {
-    last = stage->step(i)[0].second;
-    if (i == 0) first = last;
-  }
-  std::printf("loss of my network: %.4f, then %.4f\n", first, last);
-  weights.add(stage->result());
+  RunDir run = RunDir::create("runs", config.name, resolved_yaml(config), "{}", config.stages);
+  Watch watch;
+  const auto make = [&](const std::string& name, Bundle* so_far) {
+    return make_stage(config, name, data, so_far);
+  };
+  const Bundle weights = train(run, config.stages, config.loop, make, {.observers = {&watch}});
+  std::printf("loss of my network: %.4f, then %.4f\n", watch.first, watch.last);
   const Body& body = data.train.bodies[0];
   SystemInput input;
   input.weights = weights;
@@ -205,7 +215,7 @@ bool trains_and_answers() {
   input.target_name = body.id;
   const auto system = make_system(system_type("mine"), std::move(input));
   const auto frames = system->push(body.rest.vertices, "a cloud");
-  return last < 0.8 * first && frames.size() == 1 &&
+  return watch.last < 0.8 * watch.first && watch.validations > 0 && frames.size() == 1 &&
          frames[0].vertices.size() == body.rest.vertices.size();
 }
 
