@@ -32,7 +32,6 @@ class Plan {
     check_output(out, files);
     std::vector<std::string> licenses, provenances;
     for (const std::string& file : files) look_at(file, licenses, provenances);
-    common_definition(definitions_);
     refuse(body_clashes_, "bodies");
     refuse(motion_clashes_, "motions");
     info.license = joined_texts(licenses);
@@ -61,7 +60,6 @@ class Plan {
     for (const std::string& name : has.bodies) {
       note(path, name, bodies_, body_clashes_);
       checked_split(file, "/bodies/" + name);
-      definitions_.push_back({file.text("/bodies/" + name, kJointDefinition).value_or(""), path});
     }
     for (const std::string& name : has.motions) {
       note(path, name, motions_, motion_clashes_);
@@ -110,7 +108,6 @@ class Plan {
   bool prefix_;
   std::map<std::string, std::string> bodies_, motions_;  // id to file
   std::map<std::string, std::string> splits_;            // subject to split
-  std::vector<NamedDefinition> definitions_;             // of the bodies
   std::vector<std::string> body_clashes_, motion_clashes_;
 };
 

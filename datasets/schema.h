@@ -34,7 +34,8 @@ struct FileInfo {
 /// The three that bodies and motions may be in: "train", "validation", "test".
 bool is_split(const std::string& name);
 
-/// Equal face lists are stored once. InputError if two have the same id or an id has a '/'.
+/// Equal face lists are stored once. InputError if two have the same id, an id has a '/', or bodies
+/// have two definitions of joints.
 void write_dataset(const std::string& path, const std::vector<Body>& bodies,
                    const std::vector<Motion>& motions, const FileInfo& info);
 void write_bodies(const std::string& path, const std::vector<Body>& bodies, const FileInfo& info);
@@ -59,6 +60,7 @@ class DatasetWriter {
   h5::File file_;
   std::vector<std::vector<Triangle>> topologies_;
   std::vector<std::shared_ptr<const PoseBlendShapes>> blend_shapes_;
+  NamedDefinition definition_;  ///< of the first body that says it
   int64_t bodies_ = 0, motions_ = 0;
 };
 
@@ -216,7 +218,7 @@ struct Inspection {
   std::map<std::string, int64_t> subjects, actions;
   std::vector<double> heights;
   /// The definitions of joints, and how many bodies have each; of other files the file's, 1.
-  std::map<std::string, int64_t> joints;
+  std::map<std::string, int64_t> definitions;
 };
 
 /// What a file holds, without reading more values than the bodies' vertices.

@@ -99,7 +99,7 @@ Body read_body(const h5::File& file, const std::string& id, SharedShapes& shared
     body.rest.faces = read_faces(file, "/topologies/" + *topology, vertices);
   }
   body.joints = read_joints(file, group + "/joints");
-  body.definition = text_or_nothing(file, group, kJointDefinition);
+  body.definition = read_definition(file, group);
   read_weights(file, group + "/weights", body);
   if (const std::optional<std::string> name = file.text(group, "blend_shapes")) {
     auto& shapes = shared[*name];
@@ -140,6 +140,12 @@ DatasetWriter::DatasetWriter(const std::string& path, const FileInfo& info)
 
 void DatasetWriter::add(const Body& body) {
   check_id(file_.path(), file_, "/bodies/", body.id);
+  if (!body.definition.empty()) {
+    const std::string where = file_.path() + ": body '" + body.id + "'";
+    if (body.definition != definition_.definition)
+      common_definition({definition_, {body.definition, where}});
+    if (definition_.definition.empty()) definition_ = {body.definition, where};
+  }
   const std::string group = "/bodies/" + body.id;
   write_points(file_, group + "/vertices", body.rest.vertices);
   write_joints(file_, group + "/joints", body.joints);

@@ -71,6 +71,8 @@ Points read_points(const h5::File& file, const std::string& name);  ///< [N,3] f
 void write_points(h5::File& file, const std::string& name, const Points& points);
 /// The file's frame rate; the project's if it says none. InputError if it is not positive.
 double read_fps(const h5::File& file);
+/// kJointDefinition of an object ("/": the file); empty: it does not say. InputError: no name.
+JointDefinition read_definition(const h5::File& file, const std::string& object);
 
 /// Blend shapes of a file by name: large, and read once for all bodies that share them.
 using SharedShapes = std::map<std::string, std::shared_ptr<const PoseBlendShapes>>;

@@ -50,7 +50,8 @@ void count_dataset(const h5::File& file, Inspection& out) {
       out.counts["vertices"] += vertices.rows();
       out.heights.push_back(height_of(vertices));
       count_member(file, "/bodies/" + id, "bodies", out);
-      if (const auto joints = file.text("/bodies/" + id, kJointDefinition)) ++out.joints[*joints];
+      if (const JointDefinition name = read_definition(file, "/bodies/" + id); !name.empty())
+        ++out.definitions[name];
     }
     std::sort(out.heights.begin(), out.heights.end());
   }
@@ -121,6 +122,11 @@ void verify_scans(const h5::File& file) {
 
 }  // namespace
 
+JointDefinition read_definition(const h5::File& file, const std::string& object) {
+  return checked_definition(file.text(object, kJointDefinition).value_or(""),
+                            object == "/" ? file.path() : file.path() + ":" + object);
+}
+
 double read_fps(const h5::File& file) {
   const double fps = file.number("/", "fps").value_or(kFps);
   if (!(fps > 0 && fps < 1e6))
@@ -140,7 +146,8 @@ Inspection inspect(const std::string& path) {
     count_frames(file, out.counts);
   else
     count_dataset(file, out);
-  if (const auto joints = file.text("/", kJointDefinition)) out.joints[*joints] = 1;
+  if (const JointDefinition name = read_definition(file, "/"); !name.empty())
+    out.definitions[name] = 1;
   out.fps = read_fps(file);
   out.transform = file.text("/", "transform").value_or("");
   if (out.counts.contains("frames"))

@@ -100,7 +100,7 @@ Prediction PredictionReader::read_small() const {
     out.faces = read_faces(file_, "/faces", vertices_ ? vertex_count_ : int64_t{1} << 31);
   out.confidence = confidence_in(file_, frames_);
   out.radius = radius_in(file_, frames_);
-  out.definition = file_.text("/", kJointDefinition).value_or("");
+  out.definition = read_definition(file_, "/");
   return out;
 }
 

@@ -5,6 +5,7 @@
 #include "datasets/doctor/examine.h"
 #include "datasets/importers/axis.h"
 #include "datasets/readers/gltf.h"
+#include "nn/geometry/strays.h"
 #include "nn/models/extraction.h"
 
 namespace restage {
@@ -72,6 +73,12 @@ std::optional<SourceCloud> Source::next() {
   if (!out.fault && out.frame.points.empty())
     out.fault = InputError(out.frame.source, "holds no points", "leave the frame out");
   to_ours_(out.frame.points);
+  if (out.frame.faces.empty()) {
+    Points kept;
+    const size_t strays = leave_out_strays(out.frame.points, &kept);
+    if (strays > 0) out.frame.points = std::move(kept);
+    out.frame.left_out += strays;
+  }
   return out;
 }
 

@@ -37,7 +37,8 @@ class Source {
   Source(const SourceRecord& how, std::unique_ptr<FrameSource> frames);
 
   /// The next frame; nothing at the end. A frame that is damaged, or empty, does not end the
-  /// sequence: it comes with its fault. Points that are not finite are left out (Frame::left_out).
+  /// sequence: it comes with its fault. Points that are not finite, or far from
+  /// all others (nn/geometry/strays.h), are left out (Frame::left_out).
   std::optional<SourceCloud> next();
   void skip(int64_t frames);
   void rewind();

@@ -132,8 +132,10 @@ void Retargeter::prepare(const std::string& weights_name) {
     throw InputError("", "the least confidence is out of range", "give --min-confidence 0 to 1");
   if (auto* skeleton = models_.find_as<SkeletonModel>("skeleton"))
     extractor_.emplace(*skeleton, options_.samples, kAllAround, options_.keep_limbs);
-  const TrainedModel& motion = models_.need("motion", weights_name);
-  auto& network = models_.need_as<MotionModel>("motion", weights_name);
+  const std::string role =
+      options_.late && models_.find(kLateMotion) != nullptr ? kLateMotion : "motion";
+  const TrainedModel& motion = models_.need(role, weights_name);
+  auto& network = models_.need_as<MotionModel>(role, weights_name);
   motion_ = &network;
   motion_device_ = device_of(network);
   asked_.resize(static_cast<size_t>(motion_->latency()) + 1);

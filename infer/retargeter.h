@@ -35,6 +35,9 @@ struct RetargetOptions {
   bool foot_lock = true;
   /// Legs and arms that cross keep their names (keep_limbs(), nn/models/views.h).
   bool keep_limbs = true;
+  /// Use the motion network that looks ahead, if the weights hold one (kLateMotion): calmer and
+  /// nearer, but every frame comes MotionModel::latency() frames later.
+  bool late = false;
   /// Hold the source's bones at the mean of their lengths so far (nn/geometry/steady_bones.h).
   bool steady_bones = true;
 };

@@ -27,11 +27,13 @@ std::unique_ptr<System> make_copy(SystemInput in) {
   const AnyConfig sizes = model_config(model);
   in.weights.put("motion",
                  {model, sizes, make_model(model, sizes, Init{RngKey{}, DType::f32}), {}});
+  in.weights.erase(kLateMotion);
   return make_retargeter(std::move(in));
 }
 
 std::unique_ptr<System> make_refinement(SystemInput in) {
   const std::string where = in.target_name;
+  in.options.late = false;  // each cloud is fitted in its own frame
   return std::make_unique<Refinement>(make_retargeter(std::move(in)), where);
 }
 

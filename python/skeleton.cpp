@@ -22,6 +22,7 @@ class PyExtractor {
     models_ = load_bundle(file);
     auto& model = models_.need_as<SkeletonModel>("skeleton", weights_path(file));
     move_module(model, device_of(device));
+    definition_ = joint_definition(models_.only({"skeleton"}), file);
     extract_.emplace(model, samples);
   }
 
@@ -39,9 +40,12 @@ class PyExtractor {
     return py::make_tuple(array_of(seen.joints), array_of<double>(std::move(flat), {kJoints}));
   }
 
+  const JointDefinition& definition() const { return definition_; }
+
  private:
   std::mutex mutex_;
   Bundle models_;
+  JointDefinition definition_;
   const RngKey key_;
   std::optional<JointExtractor> extract_;
 };
@@ -67,6 +71,9 @@ device: "cpu", or "cuda" where it is built in.)")
       .def(py::init<const py::object&, int, uint64_t, const std::string&>(),
            py::arg("weights") = py::none(), py::arg("samples") = 1, py::arg("seed") = 0,
            py::arg("device") = "cpu")
+      .def_property_readonly(
+          "joint_definition", &PyExtractor::definition,
+          "Which joints they are: \"makehuman\", \"smpl\" ...; \"\": the weights do not say.")
       .def("__call__", &PyExtractor::operator(), py::arg("points"), py::arg("name") = "cloud",
            "points [n, 3], metres, y up -> joints float64 [22, 3], in the cloud's own frame, and "
            "the radius about each that should hold the true one nine times in ten, float64 [22] "

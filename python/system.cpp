@@ -100,6 +100,7 @@ class PySystem {
     cli::add_target_options(app, c_);
     cli::add_weights_options(app, c_);
     cli::add_system_options(app, c_);
+    app.add_flag("--late", c_.options.late, "use the weights' network that looks ahead");
     app.add_option("--fps", c_.source.fps, "frames per second of the clouds");
     app.add_option("--source-up", c_.source.up, "the clouds' axis that points up");
     cli::add_scale(app, c_.source.scale, "the clouds' units in metres");

@@ -129,6 +129,7 @@ void write_scan_sequence(const ScanScene& scene, bool known_frame, const FileInf
   const std::vector<DepthCamera> cameras = cameras_of(scene.scanner, path_of(performance));
 
   ScanWriter scans(folder + "/source.h5", info);
+  scans.set_definition(performance.source().definition);
   if (!known_frame) scans.set_foreign_frame();
   in_batches<Points>(
       performance.frames(),

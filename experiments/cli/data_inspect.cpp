@@ -66,8 +66,8 @@ std::string inspection_text(const Inspection& found) {
     text += row("heights", rounded(found.heights.front(), 2) + " to " +
                                rounded(found.heights.back(), 2) + " m, median " +
                                rounded(found.heights[found.heights.size() / 2], 2) + " m");
-  for (const auto& [name, bodies] : found.joints)
-    text += row("joints", name + (bodies > 1 ? ", " + std::to_string(bodies) + " bodies" : ""));
+  for (const auto& [name, bodies] : found.definitions)
+    text += row("joints of", name + (bodies > 1 ? ", " + std::to_string(bodies) + " bodies" : ""));
   if (!found.subjects.empty()) text += row("subjects", listed(found.subjects));
   if (!found.actions.empty()) text += row("actions", listed(found.actions));
   text += row("units", found.units) + row("license", found.license) +
@@ -80,7 +80,7 @@ Json inspection_json(const Inspection& found) {
   Json out = {{"kind", found.kind},       {"counts", found.counts},         {"units", found.units},
               {"license", found.license}, {"provenance", found.provenance}, {"fps", found.fps},
               {"seconds", found.seconds}};
-  if (!found.joints.empty()) out["joints"] = found.joints;
+  if (!found.definitions.empty()) out["joint_definition"] = found.definitions;
   if (found.kind == "scans" || found.kind == "prediction") {
     if (Json transform = Json::parse(found.transform, nullptr, false); transform.is_object())
       out["transform"] = std::move(transform);

@@ -48,23 +48,29 @@ void check_pair(const File& pred, const File& truth) {
 /// All files come to hold the same joints: those of --joints, into which a file that says what it
 /// holds is converted, else those that all files hold.
 void settle_joints(const std::string& asked, const std::vector<File*>& files) {
+  if (!asked.empty() && asked != "smpl" && asked != "makehuman")
+    throw InputError("", "--joints '" + asked.substr(0, 40) + "' is unknown",
+                     "give smpl or makehuman");
   std::vector<NamedDefinition> said;
   std::string silent;
+  bool convertible = true;
   for (File* file : files) {
     if (file->data.joints.empty()) continue;
     JointDefinition& has = file->data.definition;
-    if (has.empty()) silent = file->path;
+    convertible = convertible && (has.empty() || has == "smpl" || has == "makehuman");
+    if (has.empty()) silent += (silent.empty() ? "" : ", ") + file->path;
     if (!asked.empty() && !has.empty()) {
       JointConversion(has, asked, file->path).convert(file->data.joints);
       has = asked;
     }
     said.push_back({has, file->path});
   }
-  JointDefinition all =
-      common_definition(said, "add --joints smpl or --joints makehuman to compare the same joints");
+  JointDefinition all = common_definition(
+      said, convertible ? "add --joints smpl or --joints makehuman to compare the same joints"
+                        : "give files of the same joints (docs/joints.md)");
   if (all.empty()) all = asked;
   if (!all.empty() && !silent.empty())
-    log_info(silent + " does not say which joints it holds: taken as '" + all + "'");
+    log_warning("not said which joints they are, taken as '" + all + "': " + silent);
 }
 
 /// Where sequences begin and end: a file without that information is taken to agree.

@@ -179,7 +179,7 @@ class Run {
 
   Sink new_sink() const {
     const Shown shown{system_.target(), system_.rig()};
-    if (caller_.sink) return caller_.sink(shown);
+    if (caller_.sink) return in_joints(to_, caller_.sink(shown));
     std::optional<SourceRecord> source;
     if (!from_memory_) source = source_.record();  // there is no file to be found again
     return make_sink(to_, shown, source, clip_name(source_.record()), c_.target, own_);
@@ -207,7 +207,8 @@ void log_outcome(const Outcome& done, const Source& source, const Gaps& gaps) {
   for (const std::string& line : gaps.lines(done.filled)) log_warning(line);
   if (done.points_left_out > 0)
     log_warning(std::to_string(done.points_left_out) +
-                " points of the source are NaN or infinite and were left out");
+                " points of the source are NaN or infinite, or more than 5 m from all others, and "
+                "were left out");
 }
 
 Retargeted told(const RetargetCommand& c, const Common& common, const Source& source,
@@ -247,6 +248,16 @@ std::string help_of_systems() {
   return out;
 }
 
+/// The joints that the system gives: those of its networks and of --rest. InputError if they have
+/// two.
+JointDefinition joints_given(const RetargetCommand& c, const SystemInput& input) {
+  std::vector<NamedDefinition> said{
+      {joint_definition(input.weights.only(system_type(c.system).roles), input.weights_name),
+       input.weights_name}};
+  if (!c.rest.empty()) said.push_back({PredictionReader(c.rest).read_small().definition, c.rest});
+  return common_definition(said);
+}
+
 }  // namespace
 
 Retargeted retarget(const RetargetCommand& c, const Common& common, RetargetCaller caller) {
@@ -269,7 +280,7 @@ Retargeted retarget(const RetargetCommand& c, const Common& common, RetargetCall
   TargetMesh target = read_target(c.target, c.bones);
   check_kept(c, target);
   check_inputs(c, source, target);
-  const SinkOptions to = sink_options(c, input.weights, target);
+  const SinkOptions to = sink_options(c, input, target);
   const auto system = system_for(c, std::move(input), target);
   Gaps gaps(source.frames(), source.fps() / static_cast<double>(c.to.every), c.options.force);
   Profile profile({"read", "extract", "motion", "deformation", "write", "frame"});
@@ -356,24 +367,29 @@ SystemInput load_input(const RetargetCommand& c, const Common& common) {
   std::vector<std::string> needed = type.roles;
   if (!type.surface.empty()) needed.push_back(type.surface.front());
   for (const std::string& role : needed) input.weights.need(role, input.weights_name);
-  move_networks(input.weights, type.roles, device_of(c.device));
+  std::vector<std::string> moved = type.roles;
+  moved.push_back(kLateMotion);
+  move_networks(input.weights, moved, device_of(c.device));
   return input;
 }
 
-SinkOptions sink_options(const RetargetCommand& c, const Bundle& weights,
+SinkOptions sink_options(const RetargetCommand& c, const SystemInput& input,
                          const TargetMesh& target) {
   SinkOptions out = c.to;
-  std::vector<NamedDefinition> said{{joint_definition(weights, c.weights), "the weights"}};
-  if (!c.rest.empty()) said.push_back({read_prediction(c.rest).definition, c.rest});
-  out.definition = common_definition(said);
-  if (target.own) out.definition.clear();  // a rig has its joints where its maker wants them
-  if (!out.joints.empty()) JointConversion(out.definition, out.joints, c.target);
+  // A rig has its joints where its maker wants them.
+  if (!target.own) out.definition = joints_given(c, input);
+  if (!out.joints.empty())
+    JointConversion(out.definition, out.joints,
+                    target.own       ? c.target
+                    : c.rest.empty() ? input.weights_name
+                                     : c.rest);
   return out;
 }
 
 std::unique_ptr<System> system_for(const RetargetCommand& c, SystemInput input,
                                    TargetMesh& target) {
   if (!c.rest.empty()) input.rest = rest_joints(c.rest);
+  joints_given(c, input);
   if (target.own && !c.rest.empty())
     throw InputError(c.target, "has a rig that says where its joints are", "leave --rest out");
   input.own = target.own;
@@ -411,7 +427,8 @@ void add_retarget(Program& program) {
       "restage retarget --source s.h5 --target a.ply --weights w --out r.h5 --device cuda\n"
       "restage retarget --source s.h5 --target a.ply --weights w --out r.h5 --anchor 0 "
       "--no-foot-lock\n"
-      "restage retarget --source s.h5 --target a.ply --out r.h5 --no-steady-bones --no-keep-limbs\n"
+      "restage retarget --source s.h5 --target a.ply --out r.h5 --no-steady-bones --no-keep-limbs "
+      "--online\n"
       "restage retarget --source s.h5 --target a.ply --out r.h5 --joints smpl\n"
       "restage retarget --source scans.h5 --target hero.ply --system register --rest rest.h5 "
       "--out r.h5",
@@ -451,6 +468,11 @@ void add_retarget_options(CommandOptions app, RetargetCommand& c, bool files) {
   app.add_option("--format", c.to.format,
                  "of a folder's frames: ply or obj (default: the target's own, else ply)");
   add_system_options(app, c);
+  c.options.late = true;
+  app.add_flag(
+      "!--online", c.options.late,
+      "every frame is answered at once, as in 'restage stream'; else weights that can look "
+      "two frames ahead do so");
   app.add_flag("--force", c.options.force,
                "accept a target that is no T-pose, what else the doctor calls wrong, and gaps of "
                "over a third of a second");

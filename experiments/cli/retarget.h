@@ -61,7 +61,8 @@ std::unique_ptr<System> system_for(const RetargetCommand& c, SystemInput input, 
 /// Where frames go, and which joints the target's are: its rig's, those of --rest, else those of
 /// the weights. InputError: they cannot be converted to --joints, or --rest holds others than the
 /// weights.
-SinkOptions sink_options(const RetargetCommand& c, const Bundle& weights, const TargetMesh& target);
+SinkOptions sink_options(const RetargetCommand& c, const SystemInput& input,
+                         const TargetMesh& target);
 /// InputError for a character whose rig is not recognised where its own file is to come out, unless
 /// a skeleton of ours is asked for.
 void check_kept(const RetargetCommand& c, const TargetMesh& target);

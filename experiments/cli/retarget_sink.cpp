@@ -164,12 +164,9 @@ Sink hdf5_sink(const SinkOptions& options, const Shown& shown,
   const auto writer = std::make_shared<PredictionWriter>(options.out, std::ssize(target.vertices),
                                                          target.faces, FileInfo{}, options.rate());
   if (source) writer->set_source(*source);
-  const bool other = !options.joints.empty();
-  const JointDefinition& to = other ? options.joints : options.definition;
-  const JointConversion convert(other ? options.definition : to, to, options.out);
-  writer->set_definition(to);
-  return {[writer, convert](const RetargetedFrame& f) {
-            writer->append(convert(f.joints.value()), f.vertices, f.confidence);
+  writer->set_definition(options.joints.empty() ? options.definition : options.joints);
+  return {[writer](const RetargetedFrame& f) {
+            writer->append(f.joints.value(), f.vertices, f.confidence);
             writer->append_rotations(to_global(f.pose.local));
           },
           [writer](const Frames& filled) {
@@ -266,7 +263,7 @@ void check_sink(const SinkOptions& options) {
     throw InputError(out, "holds no animation that could be named",
                      "leave --clip-name out, or end --out in .glb");
   if (!options.joints.empty() && !out.ends_with(".h5"))
-    throw InputError(out, "holds a skeleton, which --joints cannot change",
+    throw InputError(out, "has no /joints that could be converted",
                      "leave --joints out, or end --out in .h5");
   if (!options.skeleton.empty() && !out.ends_with(".glb") && !out.ends_with(".bvh"))
     throw InputError(out, "has no bones that --skeleton could name",
@@ -281,6 +278,17 @@ std::string clip_name(const SourceRecord& source) {
   return text::is_utf8(stem) && !stem.empty() && stem != "." && stem != ".." ? stem : "retargeted";
 }
 
+Sink in_joints(const SinkOptions& options, Sink sink) {
+  if (options.joints.empty()) return sink;
+  const JointConversion convert(options.definition, options.joints, options.out);
+  const auto push = [convert, to = sink.push](const RetargetedFrame& f) {
+    RetargetedFrame other = f;
+    if (f.joints) other.joints = convert(*f.joints);
+    to(other);
+  };
+  return {push, sink.commit};
+}
+
 Sink make_sink(const SinkOptions& options, const Shown& shown,
                const std::optional<SourceRecord>& source, const std::string& clip,
                const std::string& target, const std::shared_ptr<const GltfOwnRig>& own) {
@@ -293,7 +301,7 @@ Sink make_sink(const SinkOptions& options, const Shown& shown,
     return timed(own ? own_sink(options, clip, target, own) : glb_sink(options, shown));
   if (is_vrma(options.out)) return timed(vrma_sink(options, shown, clip));
   if (options.out.ends_with(".bvh")) return timed(bvh_sink(options, shown, own));
-  if (options.out.ends_with(".h5")) return hdf5_sink(options, shown, source);
+  if (options.out.ends_with(".h5")) return in_joints(options, hdf5_sink(options, shown, source));
   return folder_sink(options, shown, target);
 }
 

@@ -48,6 +48,9 @@ Sink make_sink(const SinkOptions& options, const Shown& shown,
                const std::optional<SourceRecord>& source, const std::string& clip,
                const std::string& target, const std::shared_ptr<const GltfOwnRig>& own);
 
+/// The same with its joints converted to SinkOptions::joints, if those are asked for.
+Sink in_joints(const SinkOptions& options, Sink sink);
+
 /// What the motion of a source of clouds is called: its clip's name, else its file's.
 std::string clip_name(const SourceRecord& source);
 

@@ -28,6 +28,7 @@ void check_words(const RetargetCommand& c) {
   if (c.options.min_confidence != usual.min_confidence) refuse("--min-confidence");
   if (!c.options.foot_lock) refuse("--no-foot-lock");
   if (!c.options.steady_bones) refuse("--no-steady-bones");
+  if (!c.options.late) refuse("--online");
   if (!c.options.keep_limbs) refuse("--no-keep-limbs");
   if (c.profile) refuse("--profile");
   if (!c.body_model.empty() && !text::ends_in(c.source.path, {".npz"}))
@@ -90,7 +91,7 @@ Retargeted run_take(const RetargetCommand& c, const Common& common, const Retarg
     if (!c.options.force) check_target(target.mesh, c.target, target.known());
     input = load_input(c, common);
   }
-  const SinkOptions to = sink_options(c, input.weights, target);
+  const SinkOptions to = sink_options(c, input, target);
   std::unique_ptr<System> system;  // poses a target that has no rig of its own
   if (!target.own) system = system_for(c, std::move(input), target);
   SkinWeights weights;
@@ -104,7 +105,7 @@ Retargeted run_take(const RetargetCommand& c, const Common& common, const Retarg
                     target.own ? &*rig : system->rig()};
   std::optional<SourceRecord> source;
   if (is_gltf_name(c.source.path)) source = c.source;
-  const Sink sink = caller.sink ? caller.sink(shown)
+  const Sink sink = caller.sink ? in_joints(to, caller.sink(shown))
                                 : make_sink(to, shown, source, take.name, c.target, target.own);
   say_take(take);
   say_target(target);

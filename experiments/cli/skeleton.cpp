@@ -106,7 +106,7 @@ int run_skeleton(const SkeletonOptions& options, const Common& common) {
              (left_out == 1 ? " point" : " points") + " whose coordinates are NaN or infinite");
   if (common.json) {
     Json document = {{"frames", list}, {"seed", common.seed}};
-    if (!definition.empty()) document["joints"] = definition;
+    if (!definition.empty()) document["joint_definition"] = definition;
     print_json(document);
   } else {
     const std::string seed = "seed " + std::to_string(common.seed);

@@ -49,7 +49,7 @@ int run_show(const std::string& path, const Common& common) {
 // ---- import and export -------------------------------------------------------------------------
 
 struct Transfer {
-  std::string from, model, map, out, with;
+  std::string from, model, map, out, with, role;
   std::vector<std::string> sizes;
 };
 
@@ -76,7 +76,8 @@ int run_weights_import(const Transfer& t, const Common& common) {
   Bundle models;
   if (!t.with.empty()) models = load_bundle(t.with);
   try {
-    models.put(model_type(t.model).role, import_model(t.model, t.sizes, state, t.from));
+    models.put(t.role.empty() ? model_type(t.model).role : t.role,
+               import_model(t.model, t.sizes, state, t.from));
   } catch (const StateError& e) {
     print_misfits(e, common);
     throw;
@@ -101,6 +102,8 @@ void add_import(Program& program, CommandOptions group) {
       "restage weights import --from s.safetensors --model smrm/rot6d --size hidden=256 --out "
       "w.safetensors\n"
       "restage weights import --from smrm.safetensors --map names.yaml --model smrm/rot6d "
+      "--with w.safetensors --out all.safetensors\n"
+      "restage weights import --from late.safetensors --model smrm/hybrid --role motion.late "
       "--with w.safetensors --out all.safetensors",
       run_weights_import);
   app.add_option("--from", t.from, "state dict (safetensors; docs/convert_pytorch.py makes one)")
@@ -109,6 +112,10 @@ void add_import(Program& program, CommandOptions group) {
   app.add_option("--map", t.map, "YAML lines \"foreign name: our name\", * for any text");
   app.add_option("--size", t.sizes, "a size unlike the paper's, such as hidden=256")
       .one_at_a_time();
+  app.add_option(
+      "--role", t.role,
+      "what it is for, where the model may be several things: motion, or motion.late for "
+      "one that looks ahead, which 'restage retarget' then prefers");
   app.add_option("--with", t.with, "weights file whose other models are kept");
   app.add_option("--out", t.out, "weights file to write").required();
 }

@@ -1,5 +1,7 @@
 #include "nn/geometry/joint_definition.h"
 
+#include <algorithm>
+
 #include "autograd/base/error.h"
 #include "autograd/base/log.h"
 
@@ -45,19 +47,34 @@ void JointConversion::convert(std::span<double> frames) const {
   }
 }
 
+JointDefinition checked_definition(const std::string& name, const std::string& where) {
+  const auto plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+           c == '-' || c == '.';
+  };
+  if (name.size() > 40 || !std::all_of(name.begin(), name.end(), plain))
+    throw InputError(where, "has a joint_definition that is no name",
+                     "use at most 40 letters, digits, '_', '-' and '.'");
+  return name;
+}
+
 JointDefinition common_definition(const std::vector<NamedDefinition>& all,
                                   const std::string& mend) {
-  const NamedDefinition* first = nullptr;
+  const NamedDefinition *first = nullptr, *builtin = nullptr;
   for (const NamedDefinition& one : all) {
     if (one.definition.empty()) continue;
-    if (first == nullptr) first = &one;
-    if (one.definition == first->definition) continue;
-    const std::string wrong = "has joints of '" + one.definition + "', but " + first->where +
-                              " has those of '" + first->definition + "'";
-    if (one.definition != "builtin" && first->definition != "builtin")
-      throw InputError(one.where, wrong, mend);
-    log_warning(one.where + " " + wrong + ": a part of the errors is that difference");
+    const NamedDefinition*& same = one.definition == "builtin" ? builtin : first;
+    if (same == nullptr) same = &one;
+    if (one.definition != same->definition)
+      throw InputError(one.where,
+                       "has joints of '" + one.definition + "', but " + same->where +
+                           " has those of '" + same->definition + "'",
+                       mend);
   }
+  if (first != nullptr && builtin != nullptr)
+    log_warning(builtin->where + " has joints of 'builtin', but " + first->where +
+                " has those of '" + first->definition + "': they differ by some centimetres");
+  if (first == nullptr) first = builtin;
   return first == nullptr ? "" : first->definition;
 }
 

@@ -18,6 +18,9 @@ namespace restage {
 /// nobody has said, as of a character's own rig.
 using JointDefinition = std::string;
 
+/// A name as a file gives it. InputError naming `where` if it is none.
+JointDefinition checked_definition(const std::string& name, const std::string& where);
+
 /// A joint as the weighted sum of others; the weights sum to 1.
 struct JointRow {
   int joint;

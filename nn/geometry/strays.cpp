@@ -7,7 +7,7 @@
 namespace restage {
 
 size_t leave_out_strays(const Points& cloud, Points* kept) {
-  if (cloud.empty() || box_of(cloud).sizes().maxCoeff() <= kStray) return 0;
+  if (cloud.empty() || box_of(cloud).sizes().maxCoeff() <= kStrayDistance) return 0;
   Point middle;
   std::vector<float> along(cloud.size());
   for (int axis = 0; axis < 3; ++axis) {
@@ -17,10 +17,12 @@ size_t leave_out_strays(const Points& cloud, Points* kept) {
     std::nth_element(along.begin(), half, along.end());
     middle[axis] = *half;
   }
-  const auto near = [&](const Point& p) { return (p - middle).cwiseAbs().maxCoeff() <= kStray; };
+  const auto near = [&](const Point& p) {
+    return (p - middle).cwiseAbs().maxCoeff() <= kStrayDistance;
+  };
   const auto strays =
       cloud.size() - static_cast<size_t>(std::count_if(cloud.begin(), cloud.end(), near));
-  if (strays == 0 || 100 * strays > cloud.size()) return 0;
+  if (strays > std::max<size_t>(1, cloud.size() / 100) || strays == 0) return 0;
   kept->clear();
   std::copy_if(cloud.begin(), cloud.end(), std::back_inserter(*kept), near);
   return strays;

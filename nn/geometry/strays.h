@@ -6,11 +6,11 @@
 namespace restage {
 
 /// How far, metres, a point may be from the middle (the median) of its cloud along an axis.
-inline constexpr float kStray = 5;
+inline constexpr float kStrayDistance = 5;
 
-/// The points of a cloud (finite, metres) that are not strays, if at most one in a hundred is one.
-/// More are no mistakes of a sensor: then, and where there are none, `kept` is left alone. Returns
-/// how many strays were left out.
+/// The points of a cloud (finite, metres) that are not strays, if at most one in a hundred is one,
+/// or a single one. More are no mistakes of a sensor: then, and where there are none, `kept` is
+/// left alone. Returns how many strays were left out.
 size_t leave_out_strays(const Points& cloud, Points* kept);
 
 }  // namespace restage

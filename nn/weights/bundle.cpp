@@ -161,7 +161,7 @@ TrainedModel model_of(const std::string& place, const Json& entry, const TensorF
     throw InputError(where, "does not name its model for " + name_in_quotes(place), kGiveWeights);
   TrainedModel out;
   out.model = entry["model"].get<std::string>();
-  if (!known_model(out.model) || model_type(out.model).role != role_of(place))
+  if (!known_model(out.model) || !may_fill(model_type(out.model).role, role_of(place)))
     throw InputError(where,
                      "names " + name_in_quotes(out.model) + ", which is no model for " + place,
                      kGiveWeights);
@@ -194,7 +194,7 @@ std::string TrainedModel::setting(const std::string& name,
 
 void Bundle::put(const std::string& role, TrainedModel model) {
   const ModelType& type = model_type(model.model);
-  if (type.role != role)
+  if (!may_fill(type.role, role))
     throw InputError("", "'" + model.model + "' cannot be used as " + role,
                      "it is a model for " + type.role);
   by_role_.insert_or_assign(role, std::move(model));

@@ -5,6 +5,9 @@
 //   role                 what fills it (interface)                       prefix in a file
 //   skeleton             clouds -> joints (nn/models/skeleton.h)         skeleton.
 //   motion               joints of A -> motion of B (nn/models/motion.h) smrm.
+//   motion.late          the same, looking some frames ahead: may be     motion.late.
+//                        absent; for sources that need not be answered
+//                        at once
 //   deformation.weights  skinning (nn/models/deformation.h)              deformation.weights.
 //   deformation.offsets  OffsetNet, may be absent                        deformation.offsets.
 //   codes                windows of clouds -> codes, and their meaning   codes.
@@ -23,6 +26,12 @@
 
 namespace restage {
 
+inline constexpr const char* kLateMotion = "motion.late";
+/// Whether a model that the registry knows for `role` may fill `place` in a bundle.
+inline bool may_fill(const std::string& role, const std::string& place) {
+  return role == place || (role == "motion" && place == kLateMotion);
+}
+
 /// What must be known to use a network besides its sizes, such as the meaning of its translation.
 using Settings = std::map<std::string, std::string>;
 
@@ -39,7 +48,7 @@ struct TrainedModel {
 
 class Bundle {
  public:
-  /// InputError if the registry gives the model another role, or does not know it.
+  /// InputError unless the model may_fill() the role, or if the registry does not know it.
   void put(const std::string& role, TrainedModel model);
   void erase(const std::string& role) { by_role_.erase(role); }
   /// Null if there is none.
@@ -75,7 +84,7 @@ class Bundle {
 };
 
 /// The setting that names the joints a network was trained with.
-inline constexpr const char* kJointsSetting = "joints";
+inline constexpr const char* kJointsSetting = "joint_definition";
 /// The definition of joints that all networks of a bundle share (common_definition()); empty: the
 /// weights do not say. InputError naming `where`: two networks have different ones.
 JointDefinition joint_definition(const Bundle& bundle, const std::string& where);

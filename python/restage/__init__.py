@@ -13,7 +13,7 @@ from ._core import (Adam, Frame, Gradients, InputError, Model, Muon, NonFiniteEr
 from ._files import (Clip, ClosedForm, Mesh, closed_form, load_cloud, load_clouds, load_mesh, load_motion,
                      sweep_results)
 from ._retarget import Extractor, Result, System, retarget, skeleton
-from ._run import Config, Run
+from ._run import Config, Run, _words
 
 JOINTS = ("pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle", "right_ankle",
           "spine3", "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head", "left_shoulder",
@@ -43,17 +43,18 @@ __version__ = command("--version")["version"]
 def train(config, *overrides, on_step=None, **options):
     """Trains the stages of a configuration, as `restage train CONFIG.yaml key=value ...`; returns its Run.
 
-    config: a Config, a YAML file, or "resume=RUN". overrides: "key=value" words. on_step(stage, done, figures) is called
+    config: a Config, a YAML file, or "resume=RUN". overrides: words "key=value" or dicts. on_step(stage, done, figures) is called
     after every step; Ctrl-C, or an exception of its own, ends the training after a checkpoint. options: seed,
     overfit_batches, fast_dev_run, tensorboard, csv, verbose.
     """
     words = config.words() if isinstance(config, Config) else [config]
-    told = _json.loads(_core.train(on_step, options, *words, *overrides))
+    told = _json.loads(_core.train(on_step, options, *words, *_words(overrides)))
     return Run(told["run"]) if told.get("run") else None
 
 
-__all__ = ["Adam", "Clip", "ClosedForm", "Config", "Extractor", "Frame", "Gradients", "InputError", "JOINTS", "Mesh", "Model", "Muon",
-           "NonFiniteError", "Op", "PARENTS", "Parameter", "Report", "Result", "Run", "ShapeError", "System", "Tape", "Tensor",
-           "Var", "WorkError", "closed_form", "command", "convert_joints", "doctor", "gradcheck", "load_cloud", "load_clouds", "load_mesh",
-           "load_model", "load_motion", "load_safetensors", "metrics", "model", "models", "ops", "retarget",
-           "save_safetensors", "set_threads", "skeleton", "sweep_results", "threads", "train"]
+__all__ = ["Adam", "Clip", "ClosedForm", "Config", "Extractor", "Frame", "Gradients", "InputError", "JOINTS", "Mesh",
+           "Model", "Muon", "NonFiniteError", "Op", "PARENTS", "Parameter", "Report", "Result", "Run", "ShapeError",
+           "System", "Tape", "Tensor", "Var", "WorkError", "closed_form", "command", "convert_joints", "doctor",
+           "gradcheck", "load_cloud", "load_clouds", "load_mesh", "load_model", "load_motion", "load_safetensors",
+           "metrics", "model", "models", "ops", "retarget", "save_safetensors", "set_threads", "skeleton",
+           "sweep_results", "threads", "train"]

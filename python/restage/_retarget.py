@@ -44,7 +44,8 @@ class System(_core.System):
     """Clouds in, frames out, as they come; memory does not grow.
 
     target, weights and options are those of retarget(), as far as they are of use: bones, system, rest, device,
-    samples, anchor, min_confidence, foot_lock, steady_bones, fps, source_up, scale, force, seed.
+    samples, anchor, min_confidence, foot_lock, steady_bones, fps, source_up, scale, force, seed. late=True uses the network that
+    looks two frames ahead, as retarget() does (online=True there: as here).
     """
 
     def __init__(self, target, weights=None, **options):
@@ -55,23 +56,28 @@ class Extractor(_core.Extractor):
     __doc__ = _core.Extractor.__doc__
 
 
-def skeleton(points, weights=None, samples=1, seed=0, device="cpu"):
+def skeleton(points, weights=None, samples=1, seed=0, device="cpu", joints=None):
     """The 22 joints of a cloud [n, 3], metres, y up: float64 [22, 3], in the cloud's own frame.
 
     Of a sequence of clouds, or of a file or folder of them, float64 [F, 22, 3]. Extractor keeps the network in
-    memory between calls and gives the radius of each joint, too.
+    memory between calls and gives the radius of each joint, too. joints="smpl" converts (docs/joints.md).
     """
-    extract = Extractor(weights, samples, seed, device)
+    extractor = Extractor(weights, samples, seed, device)
+
+    def extract(cloud, name="cloud"):
+        found = extractor(cloud, name)[0]
+        return _core.convert_joints(found, extractor.joint_definition, joints) if joints else found
+
     if isinstance(points, (str, bytes, os.PathLike)):
         clouds = _core.load_clouds(points, None, 1.0, "y")
         for k, cloud in enumerate(clouds):
             if cloud is None:
                 raise _core.InputError(f"restage: {os.fsdecode(points)}: frame {k} cannot be read; mend it or leave it out")
     elif np.ndim(points) == 2 if isinstance(points, np.ndarray) else _is_cloud(points):
-        return extract(points)[0]
+        return extract(points)
     else:
         clouds = list(points)
-    joints = [extract(cloud, f"clouds:{k}")[0] for k, cloud in enumerate(clouds)]
+    joints = [extract(cloud, f"clouds:{k}") for k, cloud in enumerate(clouds)]
     return np.stack(joints) if joints else np.zeros((0, 22, 3))
 
 

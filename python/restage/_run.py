@@ -12,8 +12,22 @@ def _command(name, *words, **options):
     return json.loads(_core.run(name, *words, "--json", *_core.words_of(options)))
 
 
-def _word(key, value):
-    return f"{key}={value if isinstance(value, str) else json.dumps(value)}"
+def _words(overrides):
+    """The words "key=value" of words and dicts."""
+    out = []
+    for part in overrides:
+        if isinstance(part, collections.abc.Mapping):
+            out += [f"{key}={json.dumps(value, default=_plain)}" for key, value in part.items()]
+        elif isinstance(part, str) and not part.startswith("-"):
+            out.append(part)
+        else:
+            raise _core.InputError(f"restage: {part!r} is no override; give 'key=value' or a dict")
+    return out
+
+
+def _plain(value):
+    """Paths and NumPy's numbers and arrays."""
+    return value.tolist() if isinstance(value, (np.generic, np.ndarray)) else os.fspath(value)
 
 
 class Config(collections.abc.Mapping):
@@ -26,9 +40,7 @@ class Config(collections.abc.Mapping):
 
     def __init__(self, config, *overrides):
         self._config = os.fspath(config)
-        self._overrides = []
-        for part in overrides:
-            self._overrides += [part] if isinstance(part, str) else [_word(k, v) for k, v in part.items()]
+        self._overrides = _words(overrides)
         told = _command("train", self._config, *self._overrides, print_config=True)
         self._text, self._keys = told["config"], told["keys"]
 

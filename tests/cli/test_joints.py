@@ -7,6 +7,39 @@ STANDARD = os.path.join(ROOT, "experiments", "weights", "standard.safetensors")
 F = 4
 
 
+class LookAhead(CliTest):
+    """Standard weights hold two motion networks; retarget takes the one that looks ahead."""
+
+    def test_retarget_looks_ahead_unless_told_otherwise(self):
+        self.person()
+        make = ["retarget", "--source", "walk/source.h5", "--target", "walk/target.ply"]
+        late, online = (self.json(*make, "--out", name, *more) for name, more in (("late.h5", []), ("online.h5", ["--online"])))
+        self.assertEqual((late["frames"], online["frames"]), (12, 12))
+        apart = self.json("eval", "--pred", "late.h5", "--truth", "online.h5")["mean"]["mpjpe"]
+        self.assertGreater(apart, 1e-4)
+        self.assertLess(apart, 0.05)
+        # The same network alone, as the file's only one.
+        self.done("weights", "export", "--from", STANDARD, "--model", "motion.late", "--out", "m.safetensors")
+        self.done("weights", "import", "--from", "m.safetensors", "--model", "smrm/hybrid", "--with", STANDARD, "--out", "one.safetensors")
+        self.done(*make, "--weights", "one.safetensors", "--online", "--out", "one.h5")
+        self.assertEqual(self.json("eval", "--pred", "one.h5", "--truth", "late.h5")["mean"]["mpjpe"], 0)
+        self.done("weights", "import", "--from", "m.safetensors", "--model", "smrm/hybrid", "--role", "motion.late", "--with", STANDARD,
+                  "--out", "both.safetensors")
+        self.done(*make, "--weights", "both.safetensors", "--out", "both.h5")
+        self.assertEqual(self.json("eval", "--pred", "both.h5", "--truth", "late.h5")["mean"]["mpjpe"], 0)
+        for role in ("skeleton", "late", "motion.later"):
+            self.bad_input(["weights", "import", "--from", "m.safetensors", "--model", "smrm/hybrid", "--role", role, "--out", "w.safetensors"],
+                           role)
+
+    def test_systems_that_answer_at_once(self):
+        self.person()
+        make = ["retarget", "--source", "walk/source.h5", "--target", "walk/target.ply"]
+        for system in ("copy", "refine"):
+            self.done(*make, "--system", system, "--out", "a.h5")
+            self.done(*make, "--system", system, "--online", "--out", "b.h5")
+            self.assertEqual(self.json("eval", "--pred", "a.h5", "--truth", "b.h5")["mean"]["mpjpe"], 0, system)
+
+
 class Joints(CliTest):
     def setUp(self):
         super().setUp()
@@ -18,10 +51,10 @@ class Joints(CliTest):
 
     def test_files_say_what_they_hold(self):
         self.person()
-        self.assertEqual(self.json("data", "inspect", "data.h5")["joints"], {"builtin": 2})
+        self.assertEqual(self.json("data", "inspect", "data.h5")["joint_definition"], {"builtin": 2})
         self.assertIn("builtin", self.done("data", "inspect", "walk/truth.h5"))
         self.done("skeleton", "--weights", STANDARD, "--input", "walk/source.h5", "--out", "own.h5")
-        self.assertEqual(self.json("data", "inspect", "own.h5")["joints"], {"makehuman": 1})
+        self.assertEqual(self.json("data", "inspect", "own.h5")["joint_definition"], {"makehuman": 1})
         result = self.restage("eval", "--pred", "own.h5", "--truth", "walk/truth.h5", "--json")
         self.assertEqual(result.code, 0, result.err)
         self.assertIn("'makehuman'", result.err)
@@ -34,11 +67,11 @@ class Joints(CliTest):
         self.assertEqual(self.json(*call, "--joints", "makehuman")["frames"][0]["joints"], own)
         hips = [abs(j[1][0] - j[2][0]) for j in (own, smpl)]
         self.assertLess(hips[1], 0.8 * hips[0])
-        self.assertEqual(self.json(*call, "--joints", "smpl")["joints"], "smpl")
+        self.assertEqual(self.json(*call, "--joints", "smpl")["joint_definition"], "smpl")
         make = ["retarget", "--source", "walk/source.h5", "--target", "walk/target.ply"]
         self.done(*make, "--out", "own.h5")
         self.done(*make, "--out", "smpl.h5", "--joints", "smpl")
-        self.assertEqual(self.json("data", "inspect", "smpl.h5")["joints"], {"smpl": 1})
+        self.assertEqual(self.json("data", "inspect", "smpl.h5")["joint_definition"], {"smpl": 1})
         # eval makes the same of the other file.
         same = self.json("eval", "--pred", "own.h5", "--truth", "smpl.h5", "--joints", "smpl")["mean"]
         self.assertLess(same["mpjpe"], 1e-6)
@@ -51,16 +84,19 @@ class Joints(CliTest):
         self.labelled("own.h5", "makehuman")
         without = self.restage("eval", "--pred", "plain.h5", "--truth", "own.h5", "--json")
         self.assertEqual(without.code, 0)
-        self.assertIn("plain.h5 does not say which joints it holds: taken as 'makehuman'", without.err)
+        self.assertIn("taken as 'makehuman': plain.h5", without.err)
         asked = self.json("eval", "--pred", "plain.h5", "--truth", "own.h5", "--joints", "smpl")
         self.assertGreater(asked["mean"]["mpjpe"], 0.01)
         self.labelled("mine.h5", "mine")
         self.bad_input(["eval", "--pred", "mine.h5", "--truth", "own.h5"], "mine")
         self.bad_input(["eval", "--pred", "mine.h5", "--truth", "own.h5", "--joints", "smpl"], "mine.h5", "mine")
+        self.bad_input(["eval", "--pred", "plain.h5", "--truth", "plain.h5", "--joints", "cmu"], "cmu", "smpl")
+        self.labelled("odd.h5", "two words")
+        self.bad_input(["eval", "--pred", "odd.h5", "--truth", "own.h5"], "odd.h5", "joint_definition")
 
     def test_bodies_of_two_definitions_are_not_merged(self):
         self.person()
         self.done("data", "build", "--bodies", 1, 0, 1, "--motions", 1, 0, 0, "--seed", 3, "--out", "more.h5")
         self.done("data", "merge", "data.h5", "more.h5", "--prefix", "--out", "all.h5")
-        self.assertEqual(self.json("data", "inspect", "all.h5")["joints"], {"builtin": 4})
+        self.assertEqual(self.json("data", "inspect", "all.h5")["joint_definition"], {"builtin": 4})
 

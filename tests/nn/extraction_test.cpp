@@ -51,6 +51,10 @@ TEST(InferExtraction, PointsFarFromThePersonAreLeftOut) {
   Points some = points;
   some.insert(some.begin() + 5, {{4000, 0, 0}, {0, -7, 0}, {1e30f, 1e30f, 0}});
   EXPECT_EQ(extract_joints(*model, some, "c", RngKey{3, 0}, 2), alone);
+  Points few = cloud(80);
+  const Joints of_few = extract_joints(*model, few, "c", RngKey{3, 0}, 2);
+  few.push_back({50, 0, 0});
+  EXPECT_EQ(extract_joints(*model, few, "c", RngKey{3, 0}, 2), of_few);
   some.push_back({0, 0, 5.5f});
   some.push_back({0, 0, 6});  // five of 405: no mistakes of a sensor, and half a room
   EXPECT_NE(extract_joints(*model, some, "c", RngKey{3, 0}, 2), alone);

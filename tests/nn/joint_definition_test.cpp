@@ -96,6 +96,9 @@ TEST(JointDefinition, RefusesWhatItCannotConvert) {
 TEST(JointDefinition, TellsTwoFromOne) {
   EXPECT_EQ(common_definition({{"", "a"}, {"smpl", "b"}, {"smpl", "c"}}), "smpl");
   EXPECT_EQ(common_definition({{"", "a"}}), "");
+  EXPECT_EQ(common_definition({{"builtin", "a"}, {"smpl", "b"}, {"builtin", "c"}}), "smpl");
+  EXPECT_THROW(common_definition({{"builtin", "a"}, {"smpl", "b"}, {"makehuman", "c"}}),
+               InputError);
   try {
     common_definition({{"smpl", "a.h5"}, {"", "b.h5"}, {"makehuman", "c.h5"}}, "choose");
     FAIL();

@@ -447,7 +447,9 @@ def test_config(tmp_path):
     assert (other["seed"], other["name"], other["motion.optimiser.steps"], config["seed"]) == (4, "mine", 7, 3)
     other.save(tmp_path / "c.yaml")
     assert dict(restage.Config(tmp_path / "c.yaml")) == dict(other)
-    for bad in ("seed=x", {"motion.optimizer.steps": 1}):
+    odd = restage.Config("demo", {"data.source": "a #b: [x].h5", "name": "null", "seed": np.int64(5)})
+    assert (odd["data.source"], odd["name"], odd["seed"]) == ("a #b: [x].h5", "null", 5)
+    for bad in ("seed=x", "--fast-dev-run", {"motion.optimizer.steps": 1}):
         with pytest.raises(restage.InputError):
             restage.Config("demo", bad)
 

@@ -129,3 +129,24 @@ def test_skeleton(walk, source, program, tmp_path):
 
 def test_standard_weights(walk, source):
     assert restage.skeleton(restage.load_clouds(source)[0]).shape == (22, 3)
+
+
+def test_the_network_that_looks_ahead(walk):
+    clouds = restage.load_clouds(walk / "source.h5")[:8]
+    for late in (True, False):
+        result = restage.retarget(clouds, walk / "target.ply", online=not late)
+        system = restage.System(walk / "target.ply", late=late)
+        frames = [system.push_all(cloud) for cloud in clouds]
+        assert [len(f) for f in frames] == [0 if late and k < 2 else 1 for k in range(8)]
+        frames = sum(frames, []) + system.finish()
+        assert np.array_equal(np.stack([f.vertices for f in frames]), result.vertices)
+        assert np.array_equal(np.stack([f.joints for f in frames]), result.joints)
+
+
+def test_joints_of_another_definition(walk):
+    clouds = restage.load_clouds(walk / "source.h5")[:3]
+    own, smpl = (restage.retarget(clouds, walk / "target.ply", **more).joints for more in ({}, {"joints": "smpl"}))
+    assert np.allclose(restage.convert_joints(own, "makehuman", "smpl"), smpl, atol=1e-6)
+    found = restage.skeleton(clouds)
+    assert np.allclose(restage.convert_joints(found, "makehuman", "smpl"), restage.skeleton(clouds, joints="smpl"))
+    assert restage.Extractor().joint_definition == "makehuman"

@@ -27,6 +27,8 @@ std::unique_ptr<Stage> make_stage(const TrainConfig& config, const std::string& 
   const StageSection& section = config.section(name);
   if (section.from) {
     so_far->add(networks_of(type, *section.from));
+    common_definition({{data.train.joints, "the data"},
+                       {joint_definition(*so_far, *section.from), *section.from}});
     return nullptr;
   }
   check_order(config, type, section.config);
