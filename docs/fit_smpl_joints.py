@@ -178,10 +178,6 @@ def mirrored_all(joints):
     return joints[:, MIRROR] * [-1, 1, 1]
 
 
-def constant(name):
-    return "k" + "".join(part.capitalize() for part in name.split("_"))
-
-
 def main():
     people, rng = People(sys.argv[1]), np.random.default_rng(1)
     train, test = people.poses("train", 6000, rng), people.poses("test", 2000, rng)
@@ -192,7 +188,7 @@ def main():
         print("// " + title)
         for j, name in enumerate(NAMES):
             if not name.startswith("right"):
-                print("    {%s, {%s}}," % (constant(name), ", ".join("{%s, %.3f}" % (constant(NAMES[c]), m[j, c]) for c in np.nonzero(m[j])[0])))
+                print("    {%s},  // %s" % (", ".join("%g" % round(w, 3) for w in m[j]), name))
         print("\n| joint | T-pose, mm (left, up, forward) | before, mm | converted, mm | noise |\n|---|---|---:|---:|---:|")
         for j, name in enumerate(NAMES):
             if not name.startswith("right"):

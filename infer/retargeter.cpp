@@ -234,6 +234,7 @@ std::span<const RetargetedFrame> Retargeter::finish() {
     if (frames_.size() == count) frames_.emplace_back();
     count += step(last, false, &frames_[count]);
   }
+  restart();
   return {frames_.data(), count};
 }
 

@@ -63,7 +63,8 @@ class System {
   virtual void miss() = 0;
   /// Tells the system that the source has ended, and returns the frames that push() has not
   /// returned yet: the frames of a gap at the end, and the last frames of a system that answers
-  /// late. No frames if every frame of the source was missed.
+  /// late. No frames if every frame of the source was missed. A push() after it begins a new
+  /// sequence, as after restart().
   virtual std::span<const RetargetedFrame> finish() = 0;
   /// Forgets the motion so far; the next push() begins a new sequence.
   virtual void restart() = 0;

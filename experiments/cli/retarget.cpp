@@ -207,8 +207,8 @@ void log_outcome(const Outcome& done, const Source& source, const Gaps& gaps) {
   for (const std::string& line : gaps.lines(done.filled)) log_warning(line);
   if (done.points_left_out > 0)
     log_warning(std::to_string(done.points_left_out) +
-                " points of the source are NaN or infinite, or more than 5 m from all others, and "
-                "were left out");
+                " points of the source are NaN or infinite, or more than 5 m from the middle "
+                "of the others, and were left out");
 }
 
 Retargeted told(const RetargetCommand& c, const Common& common, const Source& source,
@@ -252,7 +252,8 @@ std::string help_of_systems() {
 /// two.
 JointDefinition joints_given(const RetargetCommand& c, const SystemInput& input) {
   std::vector<NamedDefinition> said{
-      {joint_definition(input.weights.only(system_type(c.system).roles), input.weights_name),
+      {joint_definition(input.weights.only(with_late(system_type(c.system).roles)),
+                        input.weights_name),
        input.weights_name}};
   if (!c.rest.empty()) said.push_back({PredictionReader(c.rest).read_small().definition, c.rest});
   return common_definition(said);
@@ -367,9 +368,7 @@ SystemInput load_input(const RetargetCommand& c, const Common& common) {
   std::vector<std::string> needed = type.roles;
   if (!type.surface.empty()) needed.push_back(type.surface.front());
   for (const std::string& role : needed) input.weights.need(role, input.weights_name);
-  std::vector<std::string> moved = type.roles;
-  moved.push_back(kLateMotion);
-  move_networks(input.weights, moved, device_of(c.device));
+  move_networks(input.weights, with_late(type.roles), device_of(c.device));
   return input;
 }
 

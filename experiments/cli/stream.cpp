@@ -362,8 +362,7 @@ void add_stream(Program& program) {
       "restage stream --target hero.vrm --in tcp://127.0.0.1:9000 --vmc 127.0.0.1:39539\n"
       "restage stream --target hero.vrm --in captured/ --vmc 127.0.0.1:39539 --ws 8080\n"
       "camera | restage stream --target hero.glb --in - --vmc 127.0.0.1:39539 --seconds 60 --json\n"
-      "restage stream --target odd.glb --bones names.yaml --weights runs/demo-1 --late --in "
-      "captured/ "
+      "restage stream --target odd.glb --bones names.yaml --weights runs/demo-1 --in captured/ "
       "--source-up z --scale mm --vmc 39539\n"
       "restage stream --target hero.ply --in tcp://0.0.0.0:9000 --vmc 192.168.0.7:39539 --ws "
       "0.0.0.0:8080 --samples 1 --min-confidence 0.5\n"
@@ -389,8 +388,6 @@ void add_stream(Program& program) {
       .show_default();
   add_scale(app, c.how.source.scale, "the clouds' units in metres");
   add_system_options(app, c.how);
-  app.add_flag("--late", c.how.options.late,
-               "use the weights' network that looks ahead: calmer, but two frames later");
   app.add_flag("--force", c.how.options.force,
                "accept a target that is no T-pose, and clouds that are of no person's size");
 }

@@ -4,6 +4,7 @@
 #include "autograd/base/output_check.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
+#include "nn/models/motion.h"
 #include "nn/weights/bundle.h"
 #include "nn/weights/state.h"
 
@@ -65,6 +66,13 @@ int report(const Transfer& t, const TensorFile& written, const Common& common) {
   return 0;
 }
 
+/// What is to be asked for late answers has to look ahead.
+void check_ahead(const Transfer& t, const TrainedModel& model) {
+  const auto* motion = dynamic_cast<const MotionModel*>(model.net.get());
+  if (t.role == kLateMotion && motion != nullptr && motion->latency() == 0)
+    throw InputError(t.from, "does not look ahead", "leave --role out");
+}
+
 /// A file may be extended in place: --with and --out may be the same.
 int run_weights_import(const Transfer& t, const Common& common) {
   check_output(t.out, {t.from, t.map});
@@ -76,8 +84,9 @@ int run_weights_import(const Transfer& t, const Common& common) {
   Bundle models;
   if (!t.with.empty()) models = load_bundle(t.with);
   try {
-    models.put(t.role.empty() ? model_type(t.model).role : t.role,
-               import_model(t.model, t.sizes, state, t.from));
+    TrainedModel model = import_model(t.model, t.sizes, state, t.from);
+    check_ahead(t, model);
+    models.put(t.role.empty() ? model_type(t.model).role : t.role, std::move(model));
   } catch (const StateError& e) {
     print_misfits(e, common);
     throw;
@@ -126,7 +135,8 @@ void add_export(Program& program, CommandOptions group) {
                   "restage weights export --from w.safetensors --model smrm --out smrm.safetensors",
                   run_weights_export);
   app.add_option("--from", t.from, "weights file").required();
-  app.add_option("--model", t.model, "its name (smrm/rot6d), role (motion) or prefix (smrm)")
+  app.add_option("--model", t.model,
+                 "its name (smrm/rot6d), role (motion, motion.late) or prefix (smrm)")
       .required();
   app.add_option("--out", t.out, "state dict to write (safetensors)").required();
 }

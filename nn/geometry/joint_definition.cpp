@@ -21,12 +21,13 @@ JointConversion::JointConversion(const JointDefinition& from, const JointDefinit
         (from.empty() ? "does not say which joints it holds" : "holds joints of '" + from + "'") +
             ", which cannot be turned into joints of '" + to + "'",
         "conversions exist between makehuman and smpl (docs/joints.md)");
-  for (const auto& [joint, of] : there ? makehuman_to_smpl() : smpl_to_makehuman())
-    for (const auto& [other, weight] : of) {
-      const auto side = static_cast<size_t>(joint), at = static_cast<size_t>(other);
-      rows_(joint, other) = weight;
-      rows_(kMirror[side], kMirror[at]) = weight;
-    }
+  const JointTable& table = there ? kMakehumanToSmpl : kSmplToMakehuman;
+  for (size_t row = 0; row < table.size(); ++row) {
+    const auto joint = static_cast<size_t>(kMiddleAndLeft[row]);
+    for (size_t k = 0; k < kJoints; ++k)
+      rows_(kMiddleAndLeft[row], static_cast<int>(k)) = rows_(kMirror[joint], kMirror[k]) =
+          table[row][k];
+  }
 }
 
 Joints JointConversion::operator()(const Joints& joints) const {

@@ -4,9 +4,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "nn/geometry/skeleton.h"
@@ -21,13 +21,13 @@ using JointDefinition = std::string;
 /// A name as a file gives it. InputError naming `where` if it is none.
 JointDefinition checked_definition(const std::string& name, const std::string& where);
 
-/// A joint as the weighted sum of others; the weights sum to 1.
-struct JointRow {
-  int joint;
-  std::vector<std::pair<int, double>> of;
-};
-const std::vector<JointRow>& makehuman_to_smpl();
-const std::vector<JointRow>& smpl_to_makehuman();
+/// The joints in the middle and on the left. Those on the right are their mirror images.
+inline constexpr std::array<int, 14> kMiddleAndLeft = {
+    kPelvis,   kLeftHip, kSpine1,     kLeftKnee, kSpine2,       kLeftAnkle, kSpine3,
+    kLeftFoot, kNeck,    kLeftCollar, kHead,     kLeftShoulder, kLeftElbow, kLeftWrist};
+/// Each of them as a weighted sum of all joints; the weights of a row sum to 1.
+using JointTable = std::array<std::array<double, kJoints>, kMiddleAndLeft.size()>;
+extern const JointTable kMakehumanToSmpl, kSmplToMakehuman;
 
 /// Takes joints of one definition to another: each new joint is a fixed weighted sum of the old
 /// ones, so turning, moving and resizing a person commute with it. Of makehuman and smpl the sums

@@ -36,7 +36,7 @@ void JointExtractor::arrange(const Points& cloud, const std::string& source) {
   if (strays > 0 && !told_of_strays_)
     log_warning(source + ": left out " + std::to_string(strays) +
                 (strays == 1 ? " point" : " points") +
-                " more than 5 m from the others (this is said once)");
+                " more than 5 m from the middle of the others (this is said once)");
   told_of_strays_ = told_of_strays_ || strays > 0;
   points_.arrange(strays > 0 ? kept_ : cloud);
   if (points_.size() < kLeastDistinctPoints)

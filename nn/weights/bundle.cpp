@@ -173,6 +173,12 @@ TrainedModel model_of(const std::string& place, const Json& entry, const TensorF
 
 }  // namespace
 
+std::vector<std::string> with_late(std::vector<std::string> roles) {
+  if (std::find(roles.begin(), roles.end(), "motion") != roles.end())
+    roles.emplace_back(kLateMotion);
+  return roles;
+}
+
 void move_networks(const Bundle& bundle, const std::vector<std::string>& roles, Device device) {
   for (const std::string& role : roles)
     if (const TrainedModel* model = bundle.find(role)) move_module(*model->net, device);
@@ -230,7 +236,7 @@ JointDefinition joint_definition(const Bundle& bundle, const std::string& where)
   std::vector<NamedDefinition> all;
   for (const auto& [role, model] : bundle)
     if (const auto said = model.settings.find(kJointsSetting); said != model.settings.end())
-      all.push_back({said->second, where + " (" + role + ")"});
+      all.push_back({checked_definition(said->second, where), where + " (" + role + ")"});
   return common_definition(all);
 }
 
@@ -319,18 +325,23 @@ TrainedModel import_model(const std::string& name, const std::vector<std::string
 }
 
 TensorFile export_model(const Bundle& bundle, const std::string& which, const std::string& where) {
+  const TrainedModel* found = nullptr;
   for (const auto& [role, model] : bundle) {
     if (model.model != which && role != which && place_of(role) != which) continue;
-    TensorFile out = to_file(*model.net, "");
-    const Json json = {{"format", 1},
-                       {"model", model.model},
-                       {"sizes", to_json(model.config)},
-                       {"settings", model.settings}};
-    out.metadata[kKey] = json.dump();
-    return out;
+    if (found != nullptr)
+      throw InputError(where, "holds two models " + name_in_quotes(which), "name the role");
+    found = &model;
   }
-  throw InputError(where, "holds no model " + name_in_quotes(which),
-                   "see 'restage weights show' for what it holds");
+  if (found == nullptr)
+    throw InputError(where, "holds no model " + name_in_quotes(which),
+                     "see 'restage weights show' for what it holds");
+  TensorFile out = to_file(*found->net, "");
+  const Json json = {{"format", 1},
+                     {"model", found->model},
+                     {"sizes", to_json(found->config)},
+                     {"settings", found->settings}};
+  out.metadata[kKey] = json.dump();
+  return out;
 }
 
 }  // namespace restage

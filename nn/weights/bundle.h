@@ -89,6 +89,9 @@ inline constexpr const char* kJointsSetting = "joint_definition";
 /// weights do not say. InputError naming `where`: two networks have different ones.
 JointDefinition joint_definition(const Bundle& bundle, const std::string& where);
 
+/// Roles, and kLateMotion where "motion" is one of them.
+std::vector<std::string> with_late(std::vector<std::string> roles);
+
 /// Takes the networks of some roles to a device, for everybody who shares the networks.
 void move_networks(const Bundle& bundle, const std::vector<std::string>& roles, Device device);
 
@@ -116,7 +119,7 @@ TrainedModel import_model(const std::string& name, const std::vector<std::string
                           const TensorFile& state, const std::string& where);
 /// One model as a plain state dict; its name, sizes and settings in the metadata. `which` names the
 /// model by its name in the registry, its role or its prefix without the dot ("smrm"). InputError
-/// if the bundle, which was read from `where`, has no such model.
+/// if the bundle, which was read from `where`, has no such model, or two.
 TensorFile export_model(const Bundle& bundle, const std::string& which, const std::string& where);
 
 }  // namespace restage

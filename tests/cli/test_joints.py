@@ -1,5 +1,7 @@
 """Definitions of joints: what files say, what is converted, what is refused (docs/joints.md)."""
+import json
 import os
+import struct
 
 from support import ROOT, CliTest, numbers
 
@@ -30,6 +32,42 @@ class LookAhead(CliTest):
         for role in ("skeleton", "late", "motion.later"):
             self.bad_input(["weights", "import", "--from", "m.safetensors", "--model", "smrm/hybrid", "--role", role, "--out", "w.safetensors"],
                            role)
+
+        self.bad_input(["weights", "export", "--from", STANDARD, "--model", "smrm/hybrid", "--out", "w.safetensors"], "two models")
+        self.done("weights", "export", "--from", STANDARD, "--model", "motion", "--out", "now.safetensors")
+        self.bad_input(["weights", "import", "--from", "now.safetensors", "--model", "smrm/hybrid", "--role", "motion.late",
+                        "--out", "w.safetensors"], "now.safetensors", "look ahead")
+
+    def test_networks_of_two_definitions_are_refused(self):
+        self.person()
+        make = ["retarget", "--source", "walk/source.h5", "--target", "walk/target.ply", "--weights", "w.safetensors", "--out", "r.h5"]
+        for place in ("smrm", "motion.late", "skeleton"):
+            for name in ("smpl", "two words"):
+                self.relabelled("w.safetensors", place, name)
+                self.bad_input(make, "w.safetensors", "joint")
+        self.relabelled("w.safetensors", "motion.late", "smpl")
+        self.done(*make, "--system", "copy")  # asks no motion network
+
+    def relabelled(self, name, place, definition):
+        """The standard weights, of which one network says that it knows other joints."""
+        with open(STANDARD, "rb") as file:
+            content = file.read()
+        size = struct.unpack("<Q", content[:8])[0]
+        header = json.loads(content[8:8 + size])
+        models = json.loads(header["__metadata__"]["restage"])
+        models["models"][place]["settings"]["joint_definition"] = definition
+        header["__metadata__"]["restage"] = json.dumps(models)
+        text = json.dumps(header).encode()
+        text += b" " * (-len(text) % 8)
+        self.write(name, struct.pack("<Q", len(text)) + text + content[8 + size:])
+
+    def test_a_run_keeps_the_network_that_looks_ahead(self):
+        self.person()
+        self.write("c.yaml", "name: t\nrun_root: runs\nstages: [skeleton, motion]\ndata: {source: data.h5}\n"
+                             "skeleton: {from: %s}\nmotion: {from: %s}\n" % (STANDARD, STANDARD))
+        self.done("data", "build", "--bodies", 1, 1, 1, "--motions", 1, 1, 1, "--out", "data.h5")
+        run = self.json("train", "c.yaml")["run"]
+        self.assertIn("motion.late", self.done("weights", "show", run + "/weights.safetensors"))
 
     def test_systems_that_answer_at_once(self):
         self.person()

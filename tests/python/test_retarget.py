@@ -141,6 +141,9 @@ def test_the_network_that_looks_ahead(walk):
         frames = sum(frames, []) + system.finish()
         assert np.array_equal(np.stack([f.vertices for f in frames]), result.vertices)
         assert np.array_equal(np.stack([f.joints for f in frames]), result.joints)
+        assert system.finish() == []
+        again = [f for cloud in clouds for f in system.push_all(cloud)] + system.finish()  # a new sequence
+        assert np.array_equal(np.stack([f.vertices for f in again]), result.vertices)
 
 
 def test_joints_of_another_definition(walk):

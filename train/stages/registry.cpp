@@ -63,7 +63,7 @@ const StageType& stage_type(const std::string& name) {
 }
 
 Bundle networks_of(const StageType& stage, const std::string& path) {
-  const Bundle out = load_bundle(path).only(stage.roles);
+  const Bundle out = load_bundle(path).only(with_late(stage.roles));
   out.need(stage.roles.front(), path);
   return out;
 }

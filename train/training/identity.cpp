@@ -47,7 +47,9 @@ std::string Identities::weights(const std::string& path) {
 
 std::string Identities::networks(const std::string& stage, const std::string& path) {
   std::string& known = seen_[stage + " of " + path];
-  if (known.empty()) known = sha256(identity_bytes(networks_of(stage_type(stage), path)));
+  if (known.empty())
+    known =
+        sha256(identity_bytes(networks_of(stage_type(stage), path).only(stage_type(stage).roles)));
   return known;
 }
 
