@@ -212,8 +212,9 @@ void H4dSystem::answer(size_t from, size_t to) {
   for (const Seen& seen : window_) frames.emplace_back(seen.features);
   Var features = frames[0];
   for (size_t i = 1; i < frames.size(); ++i) features = concat({features, frames[i]}, 1);
-  const Var motion = model_->motion(ctx, features);
-  const Tensor poses = h4d_poses(Var(window_.front().pose), motion, basis_).value.cpu();
+  H4d::Codes codes{{}, Var(window_.front().pose), {}, {}};
+  model_->read_motion(ctx, features, &codes);
+  const Tensor poses = model_->poses(ctx, codes, basis_).value.cpu();
   source_.take(shapes_ / static_cast<double>(clouds_));
   for (size_t k = from; k < to; ++k)
     show(place(poses.data<float>() + k * 3 * kJoints, window_[k].middle), window_[k].missed);

@@ -81,7 +81,7 @@ std::vector<SystemType>& table() {
        .own_skin = false,
        .make = make_transfer},
       {.name = "h4d",
-       .help = "codes of shape, pose and motion of windows of clouds (H4D's first stage)",
+       .help = "codes of shape, pose and motion of windows of clouds (H4D)",
        .roles = {"codes"},
        .make = make_h4d},
   };

@@ -19,6 +19,12 @@ Var with_maximum(const Var& x) {
   return concat({x, expand(reshape(max(x, 1), {n, 1, c}), x.shape())}, 2);
 }
 
+/// The last step of x [n, t, c], [n, c].
+Var last(const Var& x) {
+  const int64_t n = x.size(0), t = x.size(1);
+  return reshape(slice(x, 1, t - 1, t), {n, x.size(2)});
+}
+
 }  // namespace
 
 ResBlockFc::ResBlockFc(int64_t in, int64_t out, const Init& init)
@@ -103,21 +109,39 @@ H4d::H4d(const H4dConfig& c, const Init& init)
       pose_encoder(c.pose, c.hidden, init.sub("pose_encoder")),
       point_encoder(c.features, c.hidden, init.sub("point_encoder")),
       motion_encoder(c.features, c.recurrent, c.motion, init.sub("motion_encoder")),
-      space(c, init.sub("space")) {}
+      space(c, init.sub("space")) {
+  if (c.aux == 0) return;
+  aux_encoder.emplace(c.features, c.recurrent, c.aux, init.sub("aux_encoder"));
+  aux_decoder.emplace(c.motion + c.aux + c.pose, c.recurrent, c.pose, init.sub("aux_decoder"));
+  for (Parameter* p : {&aux_decoder->linear.weight, &aux_decoder->linear.bias})
+    p->value = Tensor::zeros(p->value.shape(), init.type);
+}
 
 H4d::Codes H4d::codes(Context& ctx, const Var& window) const {
   const ModuleScope path(scope);
   const int64_t n = window.size(0), t = window.size(1), v = window.size(2);
   const Var first = reshape(slice(window, 1, 0, 1), {n, v, 3});
   const Var frames = point_encoder(ctx, reshape(window, {n * t, v, 3}));
-  const Var moved = motion(ctx, reshape(frames, {n, t, frames.size(1)}));
-  return {id_encoder(ctx, first), pose_encoder(ctx, first), moved};
+  Codes out{id_encoder(ctx, first), pose_encoder(ctx, first), {}, {}};
+  read_motion(ctx, reshape(frames, {n, t, frames.size(1)}), &out);
+  return out;
 }
 
-Var H4d::motion(Context& ctx, const Var& features) const {
-  const int64_t n = features.size(0), t = features.size(1);
-  const Var steps = motion_encoder(ctx, features);
-  return reshape(slice(steps, 1, t - 1, t), {n, steps.size(2)});
+void H4d::read_motion(Context& ctx, const Var& features, Codes* codes) const {
+  codes->motion = last(motion_encoder(ctx, features));
+  if (aux_encoder) codes->aux = last((*aux_encoder)(ctx, features));
+}
+
+Var H4d::poses(Context& ctx, const Codes& codes, const MotionBasis& basis) const {
+  const ModuleScope path(scope);
+  const Var poses = h4d_poses(codes.pose, codes.motion, basis);
+  if (!codes.aux.value.defined()) return poses;
+  const int64_t n = poses.size(0), t = poses.size(1);
+  const auto each_frame = [&](const Var& code) {
+    return expand(reshape(code, {n, 1, code.size(1)}), {n, t, code.size(1)});
+  };
+  return poses +
+         (*aux_decoder)(ctx, concat({each_frame(codes.motion), each_frame(codes.aux), poses}, 2));
 }
 
 void H4d::visit(Fields& f) {
@@ -125,6 +149,10 @@ void H4d::visit(Fields& f) {
   f("pose_encoder", pose_encoder);
   f("point_encoder", point_encoder);
   f("motion_encoder", motion_encoder);
+  if (aux_encoder) {
+    f("aux_encoder", *aux_encoder);
+    f("aux_decoder", *aux_decoder);
+  }
   if (space.defined()) f("space", space);
 }
 

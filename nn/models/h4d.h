@@ -1,9 +1,11 @@
-// `codes/h4d`, the only model of the role `codes`: H4D's first stage (Jiang et al., CVPR 2022).
-// Codes of shape, first pose and motion from a window of clouds, and what the codes mean.
+// `codes/h4d`, the only model of the role `codes`: H4D (Jiang et al., CVPR 2022). Codes of shape,
+// first pose and motion from a window of clouds, and what the codes mean. With `aux` in the sizes
+// also its second stage's auxiliary code, which corrects the poses; without clothes.
 #pragma once
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "nn/config/rules.h"
@@ -17,7 +19,7 @@ namespace restage {
 struct H4dConfig {
   int64_t shape = 10, pose = 72, motion = 90, root = 4, frames = 30;
   int64_t hidden = 128, features = 128, recurrent = 512;
-  int64_t vertices = 0, faces = 0;
+  int64_t aux = 0, vertices = 0, faces = 0;
 };
 
 template <class V>
@@ -31,6 +33,8 @@ void visit(V& v, H4dConfig& c) {
   v("hidden", c.hidden, "channels inside the point networks", between(1, kMostWidth));
   v("features", c.features, "numbers of a frame", between(1, kMostWidth));
   v("recurrent", c.recurrent, "units of the GRU", between(1, kMostWidth));
+  v("aux", c.aux, "numbers of the second stage's auxiliary code; 0: the first stage only",
+    added("0", between(0, kMostWidth)));
   v("vertices", c.vertices, "of the body kept with the weights; a training sets it",
     between(0, 1e6));
   v("faces", c.faces, "of that body; a training sets it", between(0, 4e6));
@@ -109,25 +113,30 @@ struct H4dSpace : Module {
   Tensor root, root_mean, joints, joint_mean;
 };
 
-/// The first stage's networks.
+/// The networks of the first stage and, with `aux` in the sizes, those of the second one that see
+/// to poses. The correction starts at 0, as a GRU's output layer of zeros.
 struct H4d : Module {
   using Config = H4dConfig;
   struct Codes {
     Var shape;   ///< [n, shape]
     Var pose;    ///< [n, pose]: axis-angle of the joints in frame 0, radians
     Var motion;  ///< [n, motion]
+    Var aux;     ///< [n, aux]; undefined in a network without the second stage
   };
   H4d(const H4dConfig& c, const Init& init);
   /// Clouds of a window [n, t, v, 3].
   Codes codes(Context& ctx, const Var& window) const;
-  /// The motion of frames whose point_encoder gave `features` [n, t, c].
-  Var motion(Context& ctx, const Var& features) const;
+  /// Sets motion and auxiliary code of frames whose point_encoder gave `features` [n, t, c].
+  void read_motion(Context& ctx, const Var& features, Codes* codes) const;
+  /// Poses of all frames [n, t, pose], corrected if there is an auxiliary code.
+  Var poses(Context& ctx, const Codes& codes, const MotionBasis& basis) const;
   void visit(Fields& f) override;
   const char* kind() const override { return "H4D"; }
   H4dConfig config;
   ResPointNet id_encoder, pose_encoder;
   PlainPointNet point_encoder;
   TemporalEncoder motion_encoder;
+  std::optional<TemporalEncoder> aux_encoder, aux_decoder;
   H4dSpace space;
 };
 

@@ -39,7 +39,7 @@ ModelType npt_pool() {
 /// H4D's own sizes are for SMPL's 24 joints. Trainings start with those of our skeleton.
 ModelType h4d() {
   ModelType out = model_of<H4d>("codes/h4d", "codes",
-                                "H4D's first stage (Jiang et al. 2022): codes of a window");
+                                "H4D without clothes (Jiang et al. 2022): codes of a window");
   H4dConfig config;
   config.pose = 3 * kJoints;
   out.training = AnyConfig(config);

@@ -65,10 +65,54 @@ TEST(LinearBodyPoses, HaveTheGradientsOfFiniteDifferences) {
                    [](gradcheck::Args x) { return h4d_poses(x[0], x[1], small_basis()); });
 }
 
+H4dConfig two_stages() {
+  return {.shape = 2,
+          .pose = 9,
+          .motion = 5,
+          .root = 2,
+          .frames = 3,
+          .hidden = 4,
+          .features = 3,
+          .recurrent = 4,
+          .aux = 2};
+}
+
+TEST(H4dSecondStage, HasTheProgramsNumberOfParameters) {
+  const auto parameters = [](int64_t aux) {
+    H4d net({.aux = aux}, Init{RngKey{1, 0}});
+    return count_parameters(net);
+  };
+  EXPECT_EQ(parameters(0), 3558828);
+  EXPECT_EQ(parameters(128) - parameters(0), 2627712 + 2847816);
+}
+
+TEST(H4dSecondStage, BeginsAsTheFirstAndCorrectsEveryFrame) {
+  H4d net(two_stages(), Init{RngKey{1, 0}, DType::f64});
+  Context ctx;
+  const H4d::Codes codes = net.codes(ctx, Var(random({2, 3, 7, 3}, 14)));
+  const Tensor plain = h4d_poses(codes.pose, codes.motion, small_basis()).value;
+  expect_near(net.poses(ctx, codes, small_basis()).value, plain, 0, "at the start");
+  net.aux_decoder->linear.bias.value = random({9}, 15);
+  const Tensor moved = net.poses(ctx, codes, small_basis()).value;
+  for (int64_t i = 0; i < moved.numel(); ++i)
+    EXPECT_NEAR(moved.item(i) - plain.item(i), net.aux_decoder->linear.bias.value.item(i % 9),
+                1e-12);
+}
+
+TEST(H4dSecondStage, HasTheGradientsOfFiniteDifferences) {
+  H4d net(two_stages(), Init{RngKey{1, 0}, DType::f64});
+  net.aux_decoder->linear.weight.value = random({9, 4}, 16);
+  expect_gradients({random({2, 9}, 17), random({2, 5}, 18), random({2, 2}, 19)},
+                   [&](gradcheck::Args x) {
+                     Context ctx;
+                     return net.poses(ctx, {{}, x[0], x[1], x[2]}, small_basis());
+                   });
+}
+
 AnyConfig with_body() {
   return model_config(
       "codes/h4d", {"shape=2", "pose=9", "motion=5", "root=2", "frames=3", "hidden=4", "features=3",
-                    "recurrent=4", "vertices=5", "faces=2"});
+                    "recurrent=4", "vertices=5", "faces=2", "aux=2"});
 }
 
 Bundle made_with(const LinearBody& body) {

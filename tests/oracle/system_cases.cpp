@@ -155,7 +155,7 @@ void h4d(Case& c) {
           c.init());
   c.load(net);
   const H4d::Codes codes = net.codes(c.ctx(), c.in("points"));
-  const Var poses = h4d_poses(codes.pose, codes.motion,
+  const Var poses = net.poses(c.ctx(), codes,
                               {c.constant("rot_pc"), c.constant("rot_mean"), c.constant("joint_pc"),
                                c.constant("joint_mean")});
   // Its joints are a regressor's of the vertices, ours move along directions of their own.

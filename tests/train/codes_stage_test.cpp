@@ -83,6 +83,23 @@ TEST(CodesStage, StepsMayShareExamples) {
   EXPECT_NE(cloud(1), cloud(2));
 }
 
+TEST(CodesStage, TheSecondStageBeginsLater) {
+  TrainConfig c = tiny_codes(4);
+  codes(c).model.sizes.as<H4dConfig>().aux = 4;
+  codes(c).aux_from = 2;
+  const auto stage = tiny_stage("codes", c);
+  const auto correction = [&] {
+    const Tensor& w = stage->result().need_as<H4d>("codes", "").aux_decoder->linear.weight.value;
+    double sum = 0;
+    for (int64_t i = 0; i < w.numel(); ++i) sum += std::abs(w.item(i));
+    return sum;
+  };
+  for (int64_t i = 0; i < 2; ++i) stage->step(i);
+  EXPECT_EQ(correction(), 0);
+  for (int64_t i = 2; i < 4; ++i) stage->step(i);
+  EXPECT_GT(correction(), 0);
+}
+
 TEST(CodesStage, RefusesWhatItCannotTrainOn) {
   TrainConfig c = tiny_codes(1);
   const auto refused = [&](const TrainingData& data) {

@@ -123,18 +123,20 @@ CodeWindowBatch CodesStage::batch(int64_t step, const MicroBatch& part) const {
   return sampler_.batch(part.from(drawn(step) / config_.steps_per_batch * n, n), part.count(n));
 }
 
-CodesStage::Made CodesStage::make(Context& ctx, const CodeWindowBatch& there, bool rest) const {
-  const H4d::Codes codes = model_->codes(ctx, Var(there.clouds));
-  const Var poses = h4d_poses(codes.pose, codes.motion, meaning_->basis);
+CodesStage::Made CodesStage::make(Context& ctx, const CodeWindowBatch& there, bool rest,
+                                  bool corrected) const {
+  H4d::Codes codes = model_->codes(ctx, Var(there.clouds));
+  if (!corrected) codes.aux = {};
+  const Var poses = model_->poses(ctx, codes, meaning_->basis);
   Made out{pose_body(meaning_->body, codes.shape, poses), codes.shape, {}};
   if (rest) out.rest = model_->id_encoder(ctx, Var(there.rest));
   return out;
 }
 
 Var CodesStage::loss(Context& ctx, const CodeWindowBatch& there, const Tensor& shapes,
-                     Tensor* made) const {
+                     bool corrected, Tensor* made) const {
   const CodesLossConfig& l = config_.loss;
-  const Made answer = make(ctx, there, l.rest_shape > 0);
+  const Made answer = make(ctx, there, l.rest_shape > 0, corrected);
   *made = answer.vertices.value;
   Var total = scale(mean_all(abs(answer.vertices - Var(there.truth))), l.vertices) +
               scale(length_of_difference(answer.shape, shapes), l.shape);
@@ -146,6 +148,7 @@ Var CodesStage::loss(Context& ctx, const CodeWindowBatch& there, const Tensor& s
 NamedValues CodesStage::step(int64_t step) {
   const OptimiserConfig& o = config_.optimiser;
   const Meaning& m = meaning();
+  const bool corrected = step >= config_.aux_from;
   const Differentiated d = parts(*optimiser_, [&](const MicroBatch& part) {
     const CodeWindowBatch windows =
         ahead_.take(may_draw_ahead(), step, part, [this](auto... of) { return batch(of...); });
@@ -154,7 +157,7 @@ NamedValues CodesStage::step(int64_t step) {
     Tensor made;
     Differentiated out =
         differentiate(part.key(key_.fold(static_cast<uint64_t>(step))),
-                      [&](Context& ctx) { return loss(ctx, there, shapes, &made); });
+                      [&](Context& ctx) { return loss(ctx, there, shapes, corrected, &made); });
     out.values = {mean_distance(made.cpu(), windows.truth)};
     return out;
   });
@@ -171,7 +174,7 @@ NamedValues CodesStage::validate() {
   const int64_t n = config_.validation_windows;
   for (int64_t i = 0; i < n; ++i) {
     const CodeWindowBatch windows = validation_sampler_.batch(i, 1);
-    const Made made = make(ctx, moved(windows, device()), true);
+    const Made made = make(ctx, moved(windows, device()), true, true);
     distance += mean_distance(made.vertices.value.cpu(), windows.truth) / static_cast<double>(n);
     const Points& vertices =
         validation_.bodies[static_cast<size_t>(windows.body.data<int32_t>()[0])].rest.vertices;
@@ -189,7 +192,7 @@ std::vector<Shown> CodesStage::show() {
   const int64_t n = std::min<int64_t>(8, config_.validation_windows);
   const CodeWindowBatch windows = validation_sampler_.batch(0, n);
   Context ctx;
-  const Tensor made = make(ctx, moved(windows, device()), false).vertices.value.cpu();
+  const Tensor made = make(ctx, moved(windows, device()), false, true).vertices.value.cpu();
   Shown source{"cloud", {}}, answered{"body of its codes", {}}, truth{"true body", {}};
   const int64_t t = made.size(1), last = t - 1;
   for (int64_t i = 0; i < n; ++i) {

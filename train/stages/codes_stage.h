@@ -1,5 +1,5 @@
-// Training of H4D's first stage: codes of a window of clouds, learnt through the body that is made
-// of them (spec 9.3).
+// Training of H4D: codes of a window of clouds, learnt through the body that is made of them
+// (spec 9.3). A network with an auxiliary code begins with the first stage alone.
 #pragma once
 
 #include "datasets/sampling/code_windows.h"
@@ -36,7 +36,8 @@ struct CodesStageConfig {
   OptimiserConfig optimiser;
   CodeWindowConfig windows;
   CodesLossConfig loss;
-  int64_t vertices = 0, basis_windows = 1000, steps_per_batch = 1, validation_windows = 60;
+  int64_t vertices = 0, basis_windows = 1000, steps_per_batch = 1, aux_from = 0;
+  int64_t validation_windows = 60;
 };
 
 template <class V>
@@ -50,6 +51,8 @@ void visit(V& v, CodesStageConfig& c) {
     between(2, 1e6));
   v("steps_per_batch", c.steps_per_batch, "optimiser steps in a row on the same examples",
     between(1, 1000));
+  v("aux_from", c.aux_from, "first step of the second stage, in a network with sizes.aux",
+    added("0", at_least(0)));
   v("validation_windows", c.validation_windows, "held-out windows per validation", between(1, 1e6));
 }
 
@@ -77,8 +80,10 @@ class CodesStage final : public Stage {
   H4d* make_network(const Config& config, const StageInput& input);
   const Meaning& meaning();
   CodeWindowBatch batch(int64_t step, const MicroBatch& part = {}) const;
-  Made make(Context& ctx, const CodeWindowBatch& there, bool rest) const;
-  Var loss(Context& ctx, const CodeWindowBatch& there, const Tensor& shapes, Tensor* made) const;
+  /// `corrected`: by the auxiliary code, if the network has one.
+  Made make(Context& ctx, const CodeWindowBatch& there, bool rest, bool corrected) const;
+  Var loss(Context& ctx, const CodeWindowBatch& there, const Tensor& shapes, bool corrected,
+           Tensor* made) const;
   void load_more(const TensorFile&, const std::string&) override { meaning_.reset(); }
 
   Config config_;
