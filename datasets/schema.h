@@ -113,13 +113,14 @@ struct Prediction {
   std::vector<Triangle> faces;           ///< empty if absent
   std::vector<double> confidence;        ///< F, 0 to 1; empty if absent
   std::vector<double> radius;            ///< F x 22, metres (see PredictionWriter); empty if absent
+  std::vector<double> rotations;         ///< F x 22 x 4, as PredictionWriter; empty if absent
   JointDefinition definition;            ///< of the joints; empty: the file does not say
   double fps = kFps;                     ///< written, not read
 };
 
 /// /joints [F,22,3] and /vertices [F,V,3] (float32 or float64, either may be absent),
-/// /sequence_offset [S+1], /faces [T,3], /confidence [F] and /radius [F,22] (all optional).
-/// /rotations [F,22,4] (PredictionWriter::append_rotations()) is left where it is.
+/// /sequence_offset [S+1], /faces [T,3], /confidence [F], /radius [F,22] and /rotations [F,22,4]
+/// (all optional).
 Prediction read_prediction(const std::string& path);
 
 /// The same some frames at a time, as surfaces are large. Opening it checks shapes and offsets.
@@ -134,9 +135,7 @@ class PredictionReader {
   /// Frames [first, first + count), count x 22 x 3 and count x V x 3.
   void read_joints(int64_t first, int64_t count, std::vector<double>& out) const;
   void read_vertices(int64_t first, int64_t count, std::vector<double>& out) const;
-  /// F x 22 x 4 unit quaternions w x y z, global, from the T-pose; none if the file has none.
-  std::vector<double> read_rotations() const;
-  /// The rest of the file: some hundred bytes a frame.
+  /// The rest of the file: a kilobyte or two a frame.
   Prediction read_small() const;
   /// Looks at every value; InputError as read_prediction().
   void check() const;

@@ -100,17 +100,13 @@ Prediction PredictionReader::read_small() const {
     out.faces = read_faces(file_, "/faces", vertices_ ? vertex_count_ : int64_t{1} << 31);
   out.confidence = confidence_in(file_, frames_);
   out.radius = radius_in(file_, frames_);
+  out.rotations = rotations_in(file_, frames_);
   out.definition = read_definition(file_, "/");
   return out;
 }
 
-std::vector<double> PredictionReader::read_rotations() const {
-  return rotations_in(file_, frames_);
-}
-
 void PredictionReader::check() const {
   read_small();
-  read_rotations();
   if (vertices_) check_all_finite<double>(*vertices_);
 }
 
@@ -128,6 +124,8 @@ void write_prediction(const std::string& path, const Prediction& prediction, con
   if (!prediction.vertices.empty())
     file.write<double>("/vertices", {prediction.frames, prediction.vertex_count, 3},
                        prediction.vertices);
+  if (!prediction.rotations.empty())
+    file.write<double>("/rotations", {prediction.frames, kJoints, 4}, prediction.rotations);
   write_sequence_offset(file, prediction.sequence_offset, prediction.frames);
   if (!prediction.faces.empty()) write_faces(file, "/faces", prediction.faces);
   file.set_number("/", "fps", prediction.fps);
@@ -159,11 +157,8 @@ void PredictionWriter::append(const Joints& joints, const Points& vertices,
 void PredictionWriter::append_rotations(const Rotations& global) {
   if (!rotations_) rotations_ = file_.create_appendable<float>("/rotations", {kJoints, 4});
   std::vector<float> row;
-  for (const Mat3& turn : global) {
-    Quat q = Quat(turn).normalized();
-    if (q.w() < 0) q.coeffs() = -q.coeffs();
-    for (const double x : {q.w(), q.x(), q.y(), q.z()}) row.push_back(static_cast<float>(x));
-  }
+  for (const auto& q : quaternions(global))
+    for (const double x : q) row.push_back(static_cast<float>(x));
   rotations_->append<float>(row);
 }
 

@@ -134,18 +134,19 @@ def difference(row, other, kind, metric):
     return mean(per_sequence), quantile(0.025), quantile(0.975), sum(v < 0 for v in per_sequence), size
 
 
-def said(row, other, kind, metric, less, more):
+def said(row, other, kind, metric):
+    """The difference, bold if its interval does not contain zero, and in how many sequences row is less."""
     middle, low, high, fewer, size = difference(row, other, kind, metric)
-    verdict = less if high < 0 else more if low > 0 else "cannot be told"
+    clear = "**" if high < 0 or low > 0 else ""
     middle, low, high = (number(v, metric, "+") for v in (middle, low, high))
-    return [f"{middle} [{low}, {high}]", f"{fewer}/{size}", verdict]
+    return [f"{clear}{middle}{clear} [{low}, {high}]", f"{fewer}/{size}"]
 
 
 # ---- the rows ------------------------------------------------------------------------------------
 
 shipped, seeds = trials("shipped"), trials("standard_seeds")
 benchmark, kinds = trials("benchmark"), trials("kinds_of_cloud")
-late_trials, quarter = trials("standard_late")["two frames late"], trials("standard_late/quarter")
+late_trials = trials("standard_late")["two frames late"]
 late_kinds = trials("standard_late/kinds")
 
 standard = Row("**standard**", shipped["standard"] + seeds["standard"])
@@ -157,13 +158,13 @@ unchanged = Row("source unchanged", shipped["standard"], "source_unchanged")
 copied_by_each = Row("", standard.trials, "source_unchanged")
 rest_pose = Row("rest pose", shipped["standard"], "rest_pose")
 
-late = Row("two frames late", late_trials)
+late = Row("**standard, two frames late**", late_trials)
 at_once = Row("at once", shipped["standard"])
 late_shipped = Row("two frames late", late_trials[:1])  # of the same seed as at_once
 
 SETS = {"test": "more motions", "naked": "naked", "clothed": "clothed", "scans:-rig": "eight cameras",
         "scans:-depth": "one camera"}
-TOLD = {standard: "clouds", no_motion: "clouds", lite: "clouds",
+TOLD = {standard: "clouds", late: "clouds", no_motion: "clouds", lite: "clouds",
         register: "clouds, target's true joints", closed_form: "true joints of both",
         unchanged: "true joints of the source", rest_pose: "true joints of both"}
 KINDS = {"naked": "whole", "clothed": "whole, clothed, hair", "scans:six_cameras": "six cameras",
@@ -205,13 +206,10 @@ def by_set(metrics, rows, told=False):
 
 
 def real():
-    rows = []
-    for kind in SETS:
-        rows.append([SETS[kind], *said(standard, copied_by_each, kind, "pa_mpjpe", "nearer", "farther"),
-                     *said(standard, no_motion, kind, "pa_mpjpe", "nearer", "farther"),
-                     said(standard, no_motion, kind, "acc", "", "")[0]])
-    head = ["", "PA-MPJPE, standard - source unchanged", "less in", "standard is",
-            "PA-MPJPE, with - without motion network", "less in", "with it", "Acc, with - without motion network"]
+    rows = [[SETS[kind], *said(standard, copied_by_each, kind, "pa_mpjpe"), *said(standard, no_motion, kind, "pa_mpjpe"),
+             said(standard, no_motion, kind, "acc")[0]] for kind in SETS]
+    head = ["", "PA-MPJPE, standard - source unchanged", "less in", "PA-MPJPE, with - without motion network", "less in",
+            "Acc, with - without motion network"]
     return table(head, rows)
 
 
@@ -235,21 +233,9 @@ def same_for_all():
     return "; ".join(said)
 
 
-def late_table():
-    head = ["PA-MPJPE / MPJPE / PA-MPVD / Acc", *(f"{SETS[k]} ({count(standard, k)})" for k in SETS)]
-    return table(head, [[r.label, *cells(r, SETS, ("pa_mpjpe", "mpjpe", "pa_mpvd", "acc"))] for r in (at_once, late)])
-
-
 def late_differences():
-    rows = [[SETS[k], *said(late_shipped, at_once, k, "pa_mpjpe", "nearer", "farther"), *said(late_shipped, at_once, k, "acc", "calmer", "less calm")]
-            for k in SETS]
-    return table(["", "PA-MPJPE, two frames late - at once", "less in", "it is", "Acc", "less in", "it is"], rows)
-
-
-def how_late():
-    three = {"naked": "naked", "clothed": "clothed", "scans": "scans"}
-    rows = [[case, str(len(found)), *cells(Row("", found), three, ("pa_mpjpe", "acc"))] for case, found in sorted(quarter.items())]
-    return table(["PA-MPJPE / Acc", "seeds", *three.values()], rows)
+    rows = [[SETS[k], *said(late_shipped, at_once, k, "pa_mpjpe"), *said(late_shipped, at_once, k, "acc")] for k in SETS]
+    return table(["two frames late - at once", "PA-MPJPE", "less in", "Acc", "less in"], rows)
 
 
 def sure():
@@ -291,13 +277,13 @@ PA-MPVD. "Source unchanged" hands on the source's true skeleton.
 * Seeds share the extractor's first look and the skinning. So the true spread is larger
   ([each seed](notes/results_log.md#seeds-calm-and-fitting-as-the-page-had-them)). Seed 1 is shipped.
 * **The tables are of sweeps, which do not [hold bones](real_scans.md#one-person-is-one-skeleton) and do not [keep the
-  names of limbs](real_scans.md#limbs-that-cross-keep-their-names).** `retarget` does both. What holding bones changes
-  shows the row "at once, bones held" [below](#four-kinds-of-cloud-pa-mpjpe--mpjpe--pa-mpvd--acc).
+  names of limbs](real_scans.md#limbs-that-cross-keep-their-names).** `retarget` does both. What held bones
+  change is [below](#four-kinds-of-cloud-pa-mpjpe--mpjpe--pa-mpvd--acc).
 
 ## The benchmark's sets
 
-Means of the seeds: {seed_count} of standard (also without a motion network), {lite_count} of lite, one of the others.
-"Is told": what the system knows of source and target.
+Means of the seeds: {seed_count} of standard (also without a motion network), {late_count} of [two frames
+late](#two-frames-late), {lite_count} of lite, one of the others. "Is told": what the system knows of source and target.
 
 **Joints: PA-MPJPE / MPJPE**
 
@@ -312,18 +298,18 @@ Means of the seeds: {seed_count} of standard (also without a motion network), {l
 {calm_table}
 
 * A rule makes the truth. The closed form follows nearly the same rule with true joints: it is near the best possible.
-* "Source unchanged" looks good in PA-MPJPE, because alignment removes place, turn and size. MPJPE shows the difference.
-* "Lite" is of an earlier program, which drew points at random and did not measure foot slide. "Register" has one frame
-  a second, so its row has no Acc and no foot slide.
+* Alignment removes place, turn and size, so "source unchanged" looks good in PA-MPJPE. MPJPE shows the difference.
+* "Lite" is of an earlier program ([surface and calm](notes/results_log.md#rows-and-tables-that-the-page-had)).
 
 {joints}.
 
 ## Is a difference real?
 
 Differences are paired over seeds and sequences, with [95 % intervals](metrics.md#when-is-a-difference-real), which err
-more often where seeds or sequences are few. "Less in": in how many sequences. "Cannot be told": the interval contains
-zero. The table is of the full training. In [another, of a quarter of the steps](reproduction/ours.md),
-the motion network's gain in PA-MPJPE cannot be told.
+more often where seeds or sequences are few. Bold: the interval does not contain zero. A negative difference is better.
+"Less in": in how many sequences.
+
+In [a training of a quarter of the steps](reproduction/ours.md) the motion network's gain in PA-MPJPE cannot be told.
 
 {real}
 
@@ -331,8 +317,7 @@ the motion network's gain in PA-MPJPE cannot be told.
 
 Four people, who are in no other data of ours, do five motions, each seen in four ways
 (`configs/data/kinds_of_cloud.yaml`). One seed. In clouds of cameras, errors are smaller here than in the
-benchmark, which has other people and motions, and for each kind of camera one sequence of four with somebody else's arm
-in view.
+benchmark, which has other people and motions, and somebody else's arm in one of four sequences.
 
 {kinds_table}
 
@@ -341,20 +326,14 @@ The references see true joints, the same in all columns. PA-MPJPE / MPJPE / Acc:
 
 ## Two frames late
 
-The weights hold two motion networks. One answers each frame at once: `stream` and Python's `System` use it, and it is
-"standard" in the tables above. The other answers two frames (67 ms) later, and its filters know those frames:
-`retarget` uses it, unless `--online` is given. Extractor and skinning are the same. Means of {late_count} seeds of the
-late network, one of the other:
-
-{late_table}
-
-Differences of seed 1 with 95 % intervals:
+The weights hold two motion networks over one extractor and one skinning. "Standard" answers each frame at once:
+`stream` and, by default, Python's `System` use it. The other answers two frames (67 ms) later, and its filters know
+those frames: `retarget` uses it, unless `--online` is given. All its seeds have the extractor of seed 1, so the fair
+comparison is seed 1's, with 95 % intervals:
 
 {late_differences}
 
-Five frames are no better than two (a quarter of the training, `experiments/standard_late/quarter`):
-
-{how_late}
+Five frames are [no better than two](notes/results_log.md#rows-and-tables-that-the-page-had).
 
 ## Sure frames are better
 
@@ -375,15 +354,15 @@ count alike, in the tables above all sequences, so 100 % differs a little.
 
 
 def page():
-    with_surface = [standard, no_motion, lite, register, rest_pose]
-    moving = [standard, no_motion, lite, closed_form, unchanged]
+    with_surface = [standard, late, no_motion, register]
+    moving = [standard, late, no_motion, closed_form, unchanged]
     return TEMPLATE.format(
         seed_count=len(standard.trials), lite_count=len(lite.trials), glance=glance(),
         joint_table=by_set(("pa_mpjpe", "mpjpe"), list(TOLD), True),
         surface_table=by_set(("pa_mpvd", "mpvd", "medl"), with_surface),
         calm_table=by_set(("acc", "foot_slide_mm"), moving), joints=joints(), real=real(),
-        late_count=len(late_trials), late_table=late_table(), late_differences=late_differences(), how_late=how_late(),
-        kinds_table=kinds_table(), same_for_all=same_for_all(), sure=sure())
+        late_count=len(late_trials), late_differences=late_differences(), kinds_table=kinds_table(),
+        same_for_all=same_for_all(), sure=sure())
 
 
 def check_page(wanted):

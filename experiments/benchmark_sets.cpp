@@ -82,6 +82,8 @@ Prediction retargeted(const Bundle& weights, const std::string& folder, const st
     for (const RetargetedFrame& f : made) {
       if (f.joints) keep(*f.joints, &out.joints);
       keep(f.vertices, &out.vertices);
+      for (const auto& q : quaternions(to_global(f.pose.local)))
+        if (f.joints) out.rotations.insert(out.rotations.end(), q.begin(), q.end());
       if (f.confidence) out.confidence.push_back(*f.confidence);
       ++out.frames;
     }
@@ -115,6 +117,7 @@ Prediction retargeted_scans(const Bundle& weights, const std::string& folder,
   const WorldMap map = mended_to_world(mended, to_world);
   map.carry(out.joints, true, stretched);
   map.carry(out.vertices, true, stretched);
+  map.turn(out.rotations);
   return out;
 }
 
@@ -126,7 +129,8 @@ metrics::Values score(const PredictionFile& pred, const PredictionFile& truth,
                          std::to_string(truth.data.frames),
                      "build the benchmark again");
   const auto metrics = metrics_of_every(how.every, how.metrics);
-  const auto views = cut(truth.data.sequence_offset, pred.joints(), pred.vertices(), truth);
+  const auto views =
+      cut(truth.data.sequence_offset, pred.joints(), pred.vertices(), pred.data.rotations, truth);
   return metrics::evaluate(views, metrics).sequences[0];
 }
 

@@ -25,11 +25,15 @@ struct Buffer {
 
 struct Predicted {
   Buffer joints, vertices;
+  std::vector<double> rotations;
+  void turn(const Rotations& global) {
+    for (const auto& q : quaternions(global)) rotations.insert(rotations.end(), q.begin(), q.end());
+  }
 };
 
 /// What all rows of the table are measured against and made from, for one sequence.
 struct Sequence {
-  Buffer joints, vertices;     // truth
+  Predicted truth;
   std::vector<Joints> source;  // A's joints as this condition knows them
   std::optional<Joints> source_rest;
 };
@@ -38,9 +42,10 @@ struct Sequence {
 void add(const Predicted& p, const Sequence& s, const EvaluationOptions& how,
          metrics::Evaluation* into) {
   const metrics::SequenceView view{
-      p.joints.track(), p.joints.frames > 0 ? s.joints.track() : metrics::Track{},
-      p.vertices.track(), p.vertices.frames > 0 ? s.vertices.track() : metrics::Track{},
-      s.joints.frames};
+      p.joints.track(),      p.joints.frames > 0 ? s.truth.joints.track() : metrics::Track{},
+      p.vertices.track(),    p.vertices.frames > 0 ? s.truth.vertices.track() : metrics::Track{},
+      s.truth.joints.frames, p.rotations,
+      s.truth.rotations};
   const auto metrics = metrics_of_every(how.every, how.metrics);
   into->sequences.push_back(metrics::evaluate({&view, 1}, metrics).sequences[0]);
 }
@@ -53,7 +58,9 @@ void add_references(const Sequence& s, const System& system, const EvaluationOpt
   const auto poses = closed_form(s.source, target, s.source_rest);
   const auto carried = rest_pose_joints(s.source, target);
   for (size_t f = 0; f < s.source.size(); ++f) {
-    closed.joints.push(forward_kinematics(target, poses[f]).joints);
+    const PosedSkeleton posed = forward_kinematics(target, poses[f]);
+    closed.joints.push(posed.joints);
+    closed.turn(posed.global);
     rest.joints.push(carried[f]);
     unchanged.joints.push(s.source[f]);
     if (system.rig() == nullptr) continue;
@@ -72,8 +79,9 @@ void add_references(const Sequence& s, const System& system, const EvaluationOpt
 Sequence truth_of(const Performance& performance, int64_t every) {
   Sequence s;
   for (size_t i = 0; i < performance.frames(); i += static_cast<size_t>(every)) {
-    s.joints.push(performance.joints_b(i));
-    s.vertices.push(performance.vertices_b(i));
+    s.truth.joints.push(performance.joints_b(i));
+    s.truth.vertices.push(performance.vertices_b(i));
+    s.truth.turn(performance.rotations_b(i));
   }
   return s;
 }
@@ -85,7 +93,10 @@ void judge_retargeting(const Performance& performance, System& system, const Pus
   Predicted model;
   const auto keep = [&](std::span<const RetargetedFrame> frames) {
     for (const RetargetedFrame& f : frames) {
-      if (f.joints) model.joints.push(*f.joints);
+      if (f.joints) {
+        model.joints.push(*f.joints);
+        model.turn(to_global(f.pose.local));
+      }
       if (!f.vertices.empty()) model.vertices.push(f.vertices);
     }
   };
@@ -96,8 +107,8 @@ void judge_retargeting(const Performance& performance, System& system, const Pus
   keep(system.finish());
   add(model, s, how, &scores->model);
   if (model.joints.frames > 0)
-    scores->joint_errors.push_back(joint_errors(model.joints.track(), s.joints.track()));
-  scores->frames.push_back(s.joints.frames);
+    scores->joint_errors.push_back(joint_errors(model.joints.track(), s.truth.joints.track()));
+  scores->frames.push_back(s.truth.joints.frames);
   if (how.every == 1 && system.target_joints() != nullptr && !s.source.empty())
     add_references(s, system, how, scores);
 }
@@ -117,7 +128,7 @@ void judge_surface(const Performance& performance, const Surface& surface,
   if (scores->references.empty()) scores->references = {{"rest_pose", {}}};
   add(model, s, how, &scores->model);
   add(rest, s, how, &scores->references[0].second);
-  scores->frames.push_back(s.joints.frames);
+  scores->frames.push_back(s.truth.joints.frames);
 }
 
 /// The extractor alone: of the source's clouds, or of the target's T-pose.
@@ -129,7 +140,7 @@ void judge_extraction(const Performance& performance, SkeletonModel& model, bool
   Sequence s;
   const auto judge = [&](const Points& cloud, const Joints& truth, const std::string& name) {
     found.joints.push(extract(cloud, name, key).joints);
-    s.joints.push(truth);
+    s.truth.joints.push(truth);
   };
   if (rest) {
     judge(performance.target().rest.vertices, performance.target().joints, "the T-pose");
@@ -138,8 +149,8 @@ void judge_extraction(const Performance& performance, SkeletonModel& model, bool
       judge(performance.cloud(i), performance.joints_a(i), "frame " + std::to_string(i));
   }
   add(found, s, how, &scores->model);
-  scores->joint_errors.push_back(joint_errors(found.joints.track(), s.joints.track()));
-  scores->frames.push_back(s.joints.frames);
+  scores->joint_errors.push_back(joint_errors(found.joints.track(), s.truth.joints.track()));
+  scores->frames.push_back(s.truth.joints.frames);
 }
 
 /// What a condition needs, and what is not there of it.

@@ -23,12 +23,17 @@ void append(const std::vector<Joints>& frames, std::vector<double>* values) {
 
 /// Frames of the references, as if they had been predicted.
 struct Made {
-  std::vector<double> rest_pose, closed_form;
+  std::vector<double> rest_pose, closed_form, rotations;  // rotations: the closed form's
 };
 
 void make(const std::vector<Joints>& source, const Joints& target, Made* out) {
   append(rest_pose_joints(source, target), &out->rest_pose);
-  append(closed_form_joints(source, target), &out->closed_form);
+  for (const Pose& pose : closed_form(source, target)) {
+    const PosedSkeleton posed = forward_kinematics(target, pose);
+    append({posed.joints}, &out->closed_form);
+    for (const auto& q : quaternions(posed.global))
+      out->rotations.insert(out->rotations.end(), q.begin(), q.end());
+  }
 }
 
 /// The target's rest surface, carried as its pelvis is, frame by frame.
@@ -124,7 +129,7 @@ void PredictionFile::thin(int64_t step) {
       kept.push_back(f);
     offset.push_back(std::ssize(kept));
   }
-  for (std::vector<double>* values : {&data.joints, &data.vertices}) {
+  for (std::vector<double>* values : {&data.joints, &data.vertices, &data.rotations}) {
     const auto row = static_cast<std::ptrdiff_t>(values->size()) / data.frames;
     for (size_t k = 0; k < kept.size(); ++k)
       std::copy_n(values->begin() + kept[k] * row, row,
@@ -144,6 +149,7 @@ void PredictionFile::thin(int64_t step) {
 void PredictionFile::carry(const WorldMap& map, bool rigid, double stretched) {
   map.carry(data.joints, rigid, stretched);
   map.carry(data.vertices, rigid, stretched);
+  map.turn(data.rotations);
   move_ = [before = move_, map, rigid, stretched](std::span<double> points) {
     if (before) before(points);
     map.carry(points, rigid, stretched);
@@ -160,13 +166,19 @@ void check_same_frames(const PredictionFile& file, const PredictionFile& truth) 
 }
 
 std::vector<SequenceView> cut(const std::vector<int64_t>& offset, const Track& joints,
-                              const Surfaces& vertices, const PredictionFile& truth) {
+                              const Surfaces& vertices, std::span<const double> rotations,
+                              const PredictionFile& truth) {
   std::vector<SequenceView> views;
   const Surfaces true_vertices = truth.vertices();
   for (size_t s = 0; s + 1 < offset.size(); ++s) {
     const int64_t begin = offset[s], end = offset[s + 1];
+    const auto turns = [&](std::span<const double> all) {
+      const auto row = static_cast<size_t>(4 * kJoints), first = static_cast<size_t>(begin);
+      return all.empty() ? all : all.subspan(row * first, row * static_cast<size_t>(end - begin));
+    };
     views.push_back({joints.slice(begin, end), truth.joints().slice(begin, end),
-                     vertices.slice(begin, end), true_vertices.slice(begin, end), end - begin});
+                     vertices.slice(begin, end), true_vertices.slice(begin, end), end - begin,
+                     turns(rotations), turns(truth.data.rotations)});
   }
   return views;
 }
@@ -194,8 +206,9 @@ References references(const PredictionFile& source, const PredictionFile& rest,
     carried->add_sequence(row, target[0]);
   }
   carried->set_path(made.rest_pose);
-  const auto score = [&](const Track& joints, const Surfaces& vertices) {
-    return metrics::evaluate(cut(offset, joints, vertices, truth), metrics);
+  const auto score = [&](const Track& joints, const Surfaces& vertices,
+                         std::span<const double> rotations = {}) {
+    return metrics::evaluate(cut(offset, joints, vertices, rotations, truth), metrics);
   };
   const int64_t frames = source.data.frames;
   Surfaces surfaces;
@@ -207,7 +220,7 @@ References references(const PredictionFile& source, const PredictionFile& rest,
                 }};
   return {{"rest_pose", score({made.rest_pose.data(), frames, kJoints}, surfaces)},
           {"source_unchanged", score(source.joints(), {})},
-          {"closed_form", score({made.closed_form.data(), frames, kJoints}, {})}};
+          {"closed_form", score({made.closed_form.data(), frames, kJoints}, {}, made.rotations)}};
 }
 
 std::vector<metrics::Metric> metrics_of_every(int64_t step,

@@ -35,7 +35,7 @@ struct PredictionFile {
   int64_t sequences() const { return std::ssize(data.sequence_offset) - 1; }
   /// Keeps every `step`-th frame of each sequence, from its first.
   void thin(int64_t step);
-  /// Moves joints and vertices (WorldMap::carry()).
+  /// Moves joints and vertices (WorldMap::carry()), and turns rotations.
   void carry(const WorldMap& map, bool rigid, double stretched = 1);
 
  private:
@@ -48,10 +48,11 @@ struct PredictionFile {
 /// InputError unless both have as many frames.
 void check_same_frames(const PredictionFile& file, const PredictionFile& truth);
 
-/// The sequences that `offset` cuts both into.
+/// The sequences that `offset` cuts both into. `rotations` (as Prediction has them) may be empty.
 std::vector<metrics::SequenceView> cut(const std::vector<int64_t>& offset,
                                        const metrics::Track& joints,
                                        const metrics::Surfaces& vertices,
+                                       std::span<const double> rotations,
                                        const PredictionFile& truth);
 
 /// What the references achieve on every sequence (nn/geometry/closed_form.h). `source`: its true

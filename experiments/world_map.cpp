@@ -17,6 +17,15 @@ void WorldMap::carry(std::span<double> points, bool rigid, double stretched) con
   }
 }
 
+void WorldMap::turn(std::span<double> quaternions) const {
+  const Quat by = Quat(rotation).normalized();
+  for (size_t i = 0; i + 3 < quaternions.size(); i += 4) {
+    double* q = &quaternions[i];
+    const Quat turned = by * Quat(q[0], q[1], q[2], q[3]);
+    std::copy_n(std::array{turned.w(), turned.x(), turned.y(), turned.z()}.begin(), 4, q);
+  }
+}
+
 double WorldMap::tilt() const {
   return std::acos(std::clamp(rotation(1, 1), -1.0, 1.0)) * 180 / std::numbers::pi;
 }

@@ -16,6 +16,8 @@ struct WorldMap {
   double scale = 1;
   /// To [x, y, z] after [x, y, z]; without `scale` if `rigid`, the shift `stretched`.
   void carry(std::span<double> points, bool rigid, double stretched = 1) const;
+  /// Turns world rotations, w x y z after w x y z.
+  void turn(std::span<double> quaternions) const;
   double tilt() const;  ///< by how much up is off, degrees
 };
 

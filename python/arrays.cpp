@@ -87,11 +87,8 @@ py::array array_of(std::vector<Triangle> faces) {
 }
 
 void append_rotations(const Rotations& global, std::vector<float>& out) {
-  for (const Mat3& turn : global) {
-    Quat q = Quat(turn).normalized();
-    if (q.w() < 0) q.coeffs() = -q.coeffs();
-    for (const double x : {q.w(), q.x(), q.y(), q.z()}) out.push_back(static_cast<float>(x));
-  }
+  for (const auto& q : quaternions(global))
+    for (const double x : q) out.push_back(static_cast<float>(x));
 }
 
 void append_joints(const Joints& joints, std::vector<float>& out) {

@@ -19,10 +19,13 @@ const Metric& metric_of(const std::string& name) {
   throw InputError("", "there is no metric '" + name + "'", "see restage.metrics.names");
 }
 
-Track track_of(const Numbers& a, const std::string& what) {
+/// Of points; of quaternions only the numbers of frames and joints mean something.
+Track track_of(const Numbers& a, const std::string& what, bool rotations = false) {
   const bool one = a.ndim() == 2;
-  if ((!one && a.ndim() != 3) || a.shape(a.ndim() - 1) != 3)
-    throw InputError(what, "has the shape " + shape_text(a), "give [frames, points, 3], metres");
+  if ((!one && a.ndim() != 3) || a.shape(a.ndim() - 1) != (rotations ? 4 : 3))
+    throw InputError(what, "has the shape " + shape_text(a),
+                     rotations ? "give quaternions w x y z, [frames, 22, 4]"
+                               : "give [frames, points, 3], metres");
   return {a.data(), one ? 1 : a.shape(0), one ? a.shape(0) : a.shape(1)};
 }
 
@@ -30,7 +33,8 @@ py::object measure(const std::string& name, const py::object& pred, const py::ob
                    const py::object& joints) {
   const Metric& metric = metric_of(name);
   const Numbers p = numbers<double>(pred, "pred"), t = numbers<double>(truth, "truth");
-  const Track tp = track_of(p, "pred"), tt = track_of(t, "truth");
+  const bool rotations = metric.of_rotations != nullptr;
+  const Track tp = track_of(p, "pred", rotations), tt = track_of(t, "truth", rotations);
   if (tp.frames != tt.frames || tp.points != tt.points)
     throw InputError("pred", "has the shape " + shape_text(p) + ", and truth " + shape_text(t),
                      "give as many frames and points of both");
@@ -38,6 +42,9 @@ py::object measure(const std::string& name, const py::object& pred, const py::ob
   view.frames = tp.frames;
   if (metric.of_joints != nullptr)
     view.pred_joints = tp, view.true_joints = tt;
+  else if (rotations)
+    view.pred_rotations = {p.data(), static_cast<size_t>(p.size())},
+    view.true_rotations = {t.data(), static_cast<size_t>(t.size())};
   else
     view.pred_vertices = tp, view.true_vertices = tt;
   Numbers j;
@@ -59,7 +66,10 @@ py::list all_metrics() {
   py::list out;
   for (const auto& table : {metrics::table(), metrics::variants()})
     for (const Metric& m : table)
-      out.append(py::make_tuple(m.name, m.title, m.unit, m.help, m.of_joints != nullptr));
+      out.append(py::make_tuple(m.name, m.title, m.unit, m.help,
+                                m.of_joints      ? "joints"
+                                : m.of_rotations ? "rotations"
+                                                 : "vertices"));
   return out;
 }
 

@@ -205,7 +205,8 @@ class Builder {
             std::find(p.motions.begin(), p.motions.end(), motion) == p.motions.end())
           continue;
         write_sequence(Performance(cast_, sequence(p.source, p.target, m), ScanConfig{}, r_.seed),
-                       info_, made(folder + "/" + set, motion + "-" + p.source + "-" + p.target));
+                       info_, made(folder + "/" + set, motion + "-" + p.source + "-" + p.target),
+                       r_.rotations);
       }
   }
 
@@ -234,7 +235,8 @@ class Builder {
 
   void write_all_scans(const std::string& folder) const {
     for (const ScanRecipe& s : r_.scans)
-      write_scan_sequence(scene(s), s.known_frame, info_, made(folder + "/scans", name_of(s)));
+      write_scan_sequence(scene(s), s.known_frame, r_.rotations, info_,
+                          made(folder + "/scans", name_of(s)));
   }
 
   const BenchmarkRecipe& r_;

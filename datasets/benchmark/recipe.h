@@ -66,6 +66,7 @@ struct BenchmarkRecipe {
   uint64_t seed = 0;
   double floor_window = 1;  ///< seconds within which a foot is taken to touch the floor; 0: floors
                             ///< are left as the clips have them
+  bool rotations = false;   ///< truths hold world rotations; protocol 1 of the open benchmark: no
   SplitRecipe train, validation, test;
   std::vector<CharacterRecipe> characters;
   std::vector<MotionRecipe> motions;

@@ -120,8 +120,8 @@ size_t points_in_first_frame(const ScanScene& scene) {
   return seen(scene, cameras, 0).size();
 }
 
-void write_scan_sequence(const ScanScene& scene, bool known_frame, const FileInfo& info,
-                         const std::string& folder) {
+void write_scan_sequence(const ScanScene& scene, bool known_frame, bool rotations,
+                         const FileInfo& info, const std::string& folder) {
   const Performance& performance = scene.performance;
   SourceToWorld frame = SourceToWorld::Identity();
   if (!known_frame) frame = draw_frame(scene.key.fold("frame"));
@@ -147,7 +147,7 @@ void write_scan_sequence(const ScanScene& scene, bool known_frame, const FileInf
         scans.append(cloud, joints);
       });
   scans.commit();
-  write_truth(performance, info, folder, &frame);
+  write_truth(performance, info, folder, &frame, rotations);
 }
 
 }  // namespace restage

@@ -28,7 +28,7 @@ size_t points_in_first_frame(const ScanScene& scene);
 
 /// Writes source.h5 (clouds, and A's joints, in the scanner's frame, which is the world if
 /// `known_frame`) and what write_truth() writes. WorkError for a frame of fewer than kLeastPoints.
-void write_scan_sequence(const ScanScene& scene, bool known_frame, const FileInfo& info,
-                         const std::string& folder);
+void write_scan_sequence(const ScanScene& scene, bool known_frame, bool rotations,
+                         const FileInfo& info, const std::string& folder);
 
 }  // namespace restage

@@ -13,11 +13,10 @@ namespace restage {
 ///   source.h5   A's clouds frame by frame, and A's true joints
 ///   target.ply  B's T-pose
 ///   rest.h5     its joints and vertices, one frame (`restage eval --rest`)
-///   truth.h5    joints and vertices of B performing the motion
+///   truth.h5    joints, vertices and, if asked for, world rotations of B performing the motion
 /// Frames are made on all threads, a few at a time: memory does not depend on their number.
-/// `rotations`: truth.h5 holds B's global rotations, too.
 void write_sequence(const Performance& performance, const FileInfo& info, const std::string& folder,
-                    bool rotations = false);
+                    bool rotations = true);
 
 /// The source's own vertices, frame by frame, as FOLDER/source_mesh.h5: for networks that need
 /// correspondence.
@@ -30,6 +29,6 @@ std::vector<std::string> sequence_files(const std::string& folder);
 /// The last three of them. `source_to_world` (may be null): where the source's scans were put.
 void write_truth(const Performance& performance, const FileInfo& info, const std::string& folder,
                  const Eigen::Matrix<double, 3, 4>* source_to_world = nullptr,
-                 bool rotations = false);
+                 bool rotations = true);
 
 }  // namespace restage

@@ -49,7 +49,7 @@ int run_perform(const PerformOptions& o, const Common& common) {
   std::filesystem::create_directories(o.out, failed);
   if (failed) throw InputError(o.out, "cannot be made a folder", "give a place you can write to");
   write_sequence(Performance(corpus, s, ScanConfig{}, common.seed),
-                 {corpus.license, corpus.description}, o.out, true);
+                 {corpus.license, corpus.description}, o.out);
   print(common.json, {{"out", o.out}, {"frames", s.frames}, {"seed", common.seed}},
         "wrote " + o.out + "/{source.h5,target.ply,rest.h5,truth.h5}: " + std::to_string(s.frames) +
             " frames (seed " + std::to_string(common.seed) + ")\n");

@@ -98,13 +98,6 @@ metrics::Value claim_held(const File& pred, const File& truth) {
 
 using Turns = std::optional<metrics::RotationError>;
 
-/// Of files that both hold rotations of the same frames, in one frame of axes.
-Turns rotation_error_of(const EvalOptions& o) {
-  if (o.every > 1 || !o.mended.empty() || std::filesystem::is_directory(o.pred)) return {};
-  const PredictionReader pred(o.pred), truth(o.truth);
-  return metrics::rotation_error(pred.read_rotations(), truth.read_rotations());
-}
-
 void print_per_joint(const std::vector<double>& errors, const Turns& turns) {
   std::vector<std::vector<std::string>> rows{{"joint", "PA-MPJPE [m]"}};
   if (turns) rows[0].push_back("rotation [deg]");
@@ -311,13 +304,13 @@ int run_eval(const EvalOptions& options, const Common& common) {
   report.metrics = chosen;
   for (size_t s = 0; s + 1 < offset.size(); ++s) report.frames.push_back(offset[s + 1] - offset[s]);
   if (source) report.references = references(*source, *rest, truth, offset, report.metrics);
-  report.model =
-      metrics::evaluate(cut(offset, pred.joints(), pred.vertices(), truth), report.metrics);
+  report.model = metrics::evaluate(
+      cut(offset, pred.joints(), pred.vertices(), pred.data.rotations, truth), report.metrics);
 
   for (const std::string& remark : pred.remarks) log_warning(remark);
   const metrics::Value within = claim_held(pred, truth);
   const auto by_joint = options.per_joint ? errors_by_joint(pred, truth) : std::vector<double>();
-  const Turns turns = rotation_error_of(options);
+  const Turns turns = metrics::rotation_error(pred.data.rotations, truth.data.rotations);
   if (common.json) {
     Json document = to_json(report);
     if (turns) add_to(&document, *turns, options.per_joint);

@@ -30,6 +30,16 @@ Rotations to_global(const Rotations& local) {
   return out;
 }
 
+std::array<std::array<double, 4>, kJoints> quaternions(const Rotations& rotations) {
+  std::array<std::array<double, 4>, kJoints> out;
+  for (size_t j = 0; j < kJoints; ++j) {
+    Quat q = Quat(rotations[j]).normalized();
+    if (q.w() < 0) q.coeffs() = -q.coeffs();
+    out[j] = {q.w(), q.x(), q.y(), q.z()};
+  }
+  return out;
+}
+
 double leg_length(const Joints& x) {
   const auto side = [&](int hip, int knee, int ankle) {
     return (x[hip] - x[knee]).norm() + (x[knee] - x[ankle]).norm();

@@ -60,6 +60,8 @@ PosedSkeleton forward_kinematics(const Joints& rest, const Pose& pose);
 /// Global to local rotations and back.
 Rotations to_local(const Rotations& global);
 Rotations to_global(const Rotations& local);
+/// As files hold them: unit quaternions w x y z, w not negative.
+std::array<std::array<double, 4>, kJoints> quaternions(const Rotations& rotations);
 /// Hip-knee plus knee-ankle, mean of both sides (spec 3.3), metres.
 double leg_length(const Joints& joints);
 /// Angle about y by which a posed body faces away from +z (spec 3.3: across = left minus right

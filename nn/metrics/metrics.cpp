@@ -234,7 +234,8 @@ Value side_swaps(const Track& pred, const Track& truth) {
 
 std::optional<RotationError> rotation_error(std::span<const double> pred,
                                             std::span<const double> truth) {
-  if (pred.empty() || pred.size() != truth.size()) return std::nullopt;
+  if (pred.empty() || pred.size() != truth.size() || pred.size() % (4 * kJoints) != 0)
+    return std::nullopt;
   RotationError out;
   const double share = 4.0 * kJoints / static_cast<double>(pred.size());  // of a frame
   for (size_t i = 0; i < pred.size(); i += 4) {
@@ -283,6 +284,15 @@ Value swaps(const SequenceView& s) { return side_swaps(s.pred_joints, s.true_joi
 Value foot_slide(const SequenceView& s) { return foot_slide_mm(s.pred_joints, s.true_joints); }
 Value peak_speed(const SequenceView& s) { return peak_speed_ratio(s.pred_joints, s.true_joints); }
 
+Value rotation(const SequenceView& s) {
+  const auto error = rotation_error(s.pred_rotations, s.true_rotations);
+  return error ? finite(error->mean) : std::nullopt;
+}
+Value rotation_over_90(const SequenceView& s) {
+  const auto error = rotation_error(s.pred_rotations, s.true_rotations);
+  return error ? finite(error->over_90) : std::nullopt;
+}
+
 using Meter = std::unique_ptr<SurfaceMeter>;
 template <Mode mode, bool scale = true>
 Meter vertex_distance(const SequenceView&) {
@@ -325,6 +335,10 @@ constexpr Metric kAll[] = {
      floor_penetration},
     {"peak_speed", "peak speed", "of the truth's", "99th percentile of each joint's speed",
      peak_speed},
+    {"rotation_deg", "rotation", "degrees", "mean angle between true and found world rotations",
+     nullptr, nullptr, rotation},
+    {"rotation_over_90", "rotations over 90°", "of joints", "rotations more than 90 degrees off",
+     nullptr, nullptr, rotation_over_90},
     // variants: kRecorded of them are above
     {"mpjpe_root", "MPJPE, root", "m", "pelvis moved onto its true place in every frame",
      joint_distance<Mode::root>},
@@ -346,7 +360,7 @@ constexpr Metric kAll[] = {
      nullptr, edge_lengths<NeighbourFrame::first>},
 };
 
-constexpr size_t kPapers = 9, kRecorded = 14;
+constexpr size_t kPapers = 9, kRecorded = 16;
 static_assert(std::string_view(kAll[kPapers].name) == "leaf_pa_mpvd" &&
               std::string_view(kAll[kRecorded].name) == "mpjpe_root");
 
@@ -371,6 +385,7 @@ Values values_of(const SequenceView& s, std::span<const Metric> metrics) {
   for (size_t m = 0; m < metrics.size(); ++m) {
     if (meters[m]) out[m] = meters[m]->value();
     if (metrics[m].of_joints) out[m] = metrics[m].of_joints(s);
+    if (metrics[m].of_rotations) out[m] = metrics[m].of_rotations(s);
   }
   return out;
 }

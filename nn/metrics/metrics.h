@@ -1,9 +1,9 @@
 // Metrics of retargeting (spec of the method, section 8) on plain float64 values, metres, no tape.
 // A metric that cannot be computed (no vertices, too few frames or points, a collapsed prediction
 // that Procrustes cannot scale, values that are not finite) is std::nullopt, never 0.
-// To add one of joints: write a function of a SequenceView and give it a line in table()
-// (metrics.cpp). One of surfaces is a SurfaceMeter (surfaces.h): surfaces may be too large to be
-// held, so they come some frames at a time.
+// To add one of joints or rotations: write a function of a SequenceView and give it a line in
+// table() (metrics.cpp). One of surfaces is a SurfaceMeter (surfaces.h): surfaces may be too large
+// to be held, so they come some frames at a time.
 #pragma once
 
 #include <Eigen/Core>
@@ -64,6 +64,8 @@ struct SequenceView {
   Track pred_joints, true_joints;
   Surfaces pred_vertices, true_vertices;
   int64_t frames = 0;
+  /// Of the world, from the T-pose: frames x 22 unit quaternions w x y z. Empty if absent.
+  std::span<const double> pred_rotations = {}, true_rotations = {};
 };
 
 // ---- the definitions; each takes two tracks of equal shape -------------------------------------
@@ -156,7 +158,7 @@ std::vector<RiskAtCoverage> risk_coverage(std::span<const double> confidence,
 
 class SurfaceMeter;
 
-/// Either of joints or of surfaces; one that is neither has no value.
+/// Of joints, of surfaces or of rotations; one that is none of these has no value.
 struct Metric {
   const char* name;   ///< key in JSON
   const char* title;  ///< heading in tables
@@ -165,14 +167,15 @@ struct Metric {
   Value (*of_joints)(const SequenceView&) = nullptr;
   /// For one sequence, of whose view it may take the joints.
   std::unique_ptr<SurfaceMeter> (*of_surfaces)(const SequenceView&) = nullptr;
+  Value (*of_rotations)(const SequenceView&) = nullptr;
   Value compute(const SequenceView& sequence) const;
 };
 
 /// The papers' metrics: those of `restage eval`, in the order of its tables.
 std::span<const Metric> table();
-/// Those that the result of a trial holds: the papers', then leaves, sides, contact and speed.
+/// Those that the result of a trial holds: the papers', then leaves, sides, contact, speed, turns.
 std::span<const Metric> recorded();
-/// All that are not in table(), for `--variants`: leaves, sides, contact and speed, then further
+/// All that are not in table(), for `--variants`: those of recorded(), then further
 /// alignments (rigid, one map per sequence, root).
 std::span<const Metric> variants();
 

@@ -32,6 +32,7 @@ using BenchmarkManifest = FileTest;
 
 BenchmarkRecipe small_recipe() {
   BenchmarkRecipe r;
+  r.rotations = true;
   r.train = {{"b000", "b001"}, {"13_11"}};
   r.validation = {{"b120"}, {"08_01"}};
   r.test = {{"b140"}, {"02_03", "06_14"}};
@@ -302,7 +303,11 @@ TEST_F(BenchmarkBuild, SameBytesForAnyNumberOfThreadsAndVerified) {
   EXPECT_EQ(names_in(dir.path()), (Names{"one", "two"}));
   BenchmarkRecipe other = small_recipe();
   other.seed = 1;
+  other.rotations = false;
   const std::string three = build("three", 2, other);
+  const char* truth = "/scans/walking-dressed-skinny-depth/truth.h5";
+  EXPECT_TRUE(read_prediction(three + truth).rotations.empty());
+  EXPECT_FALSE(read_prediction(one + truth).rotations.empty());
   EXPECT_NE(read_manifest(three).files.at("scans/walking-dressed-skinny-depth/source.h5").sha256,
             manifest.files.at("scans/walking-dressed-skinny-depth/source.h5").sha256);
 }
@@ -340,6 +345,9 @@ TEST_F(BenchmarkBuild, HoldsWhatTheRecipeSays) {
     const auto parent = static_cast<size_t>(kParents[j]);
     EXPECT_NEAR((joint(truth, 7, j) - joint(truth, 7, parent)).norm(),
                 (joint(rest, 0, j) - joint(rest, 0, parent)).norm(), 1e-5);
+    const double* q = &truth.rotations[(7 * kJoints + parent) * 4];
+    const Vec3 bone = Quat(q[0], q[1], q[2], q[3]) * (joint(rest, 0, j) - joint(rest, 0, parent));
+    EXPECT_LT((joint(truth, 7, j) - joint(truth, 7, parent) - bone).norm(), 1e-5);
   }
 }
 

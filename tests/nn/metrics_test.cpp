@@ -55,8 +55,10 @@ TEST(Metrics, AgreeWithTheOracle) {
     for (const auto metrics : {table(), variants()})
       for (const Metric& metric : metrics) {
         if (!c["values"].contains(metric.name)) {  // below, and in tests/nn/contact_test.cpp
-          EXPECT_HAS("leaf_pa_mpvd side_swaps foot_slide_mm peak_speed floor_penetration_mm",
-                     metric.name);
+          EXPECT_HAS(
+              "leaf_pa_mpvd side_swaps foot_slide_mm peak_speed floor_penetration_mm "
+              "rotation_deg rotation_over_90",
+              metric.name);
           continue;
         }
         const Value got = metric.compute(view);

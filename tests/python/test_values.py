@@ -37,7 +37,9 @@ def test_metrics_that_cannot_be():
     assert metrics.pa_mpjpe(np.zeros((2, 22, 3)), joints) is None
     assert metrics.mpjpe(np.zeros((0, 22, 3)), np.zeros((0, 22, 3))) is None
     for name in metrics.names:
-        for shape in ((3, 1, 3), (1, 5, 3), (3, 22, 3), (0, 0, 3), (4, 0, 3), (0, 7, 3), (3, 8, 3)):
+        width = 4 if name.startswith("rotation") else 3
+        for points in ((3, 1), (1, 5), (3, 22), (0, 0), (4, 0), (0, 7), (3, 8)):
+            shape = (*points, width)
             value = getattr(metrics, name)(np.full(shape, np.nan), np.zeros(shape))
             assert value is None or np.isfinite(value)
             value = getattr(metrics, name)(rng.normal(size=shape), rng.normal(size=shape), joints=rng.normal(size=(shape[0], 22, 3)))
@@ -45,6 +47,17 @@ def test_metrics_that_cannot_be():
     for bad in (np.zeros((2, 21, 3)), np.zeros(3), "x", None, np.zeros((2, 22, 2))):
         with pytest.raises(restage.InputError):
             metrics.mpjpe(bad, joints)
+    with pytest.raises(restage.InputError, match="quaternions"):
+        metrics.rotation_deg(joints, joints)
+
+
+def test_metrics_of_rotations():
+    truth = np.tile([1.0, 0, 0, 0], (4, 22, 1))
+    pred = truth.copy()
+    pred[0, :11] = [0, 1, 0, 0]  # half of a frame's joints turned by 180 degrees
+    assert metrics.rotation_deg(pred, truth) == pytest.approx(180 / 8)
+    assert metrics.rotation_over_90(pred, truth) == pytest.approx(1 / 8)
+    assert metrics.all(pred_rotations=pred, true_rotations=truth)["rotation_deg"] == pytest.approx(180 / 8)
 
 
 def test_convert_joints():
