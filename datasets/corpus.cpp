@@ -10,6 +10,8 @@
 #include "autograd/base/format.h"
 #include "datasets/builtin/bodies.h"
 #include "datasets/builtin/motions.h"
+#include "datasets/readers/file_sums.h"
+#include "datasets/readers/sha256.h"
 #include "datasets/schema.h"
 
 namespace restage {
@@ -98,25 +100,21 @@ JointDefinition definition_of(const std::vector<Body>& bodies, const std::string
 }
 
 /// FNV-1a over 64-bit words.
-class Hash {
+class Words {
  public:
-  void add(const void* data, size_t bytes) {
+  void bytes(const void* data, size_t count) {
     const char* p = static_cast<const char*>(data);
-    word(bytes);
-    for (; bytes >= 8; p += 8, bytes -= 8) {
+    word(count);
+    for (; count >= 8; p += 8, count -= 8) {
       uint64_t w = 0;
       std::memcpy(&w, p, 8);
       word(w);
     }
-    if (bytes > 0) {
+    if (count > 0) {
       uint64_t w = 0;
-      std::memcpy(&w, p, bytes);
+      std::memcpy(&w, p, count);
       word(w);
     }
-  }
-  void add(const std::string& s) { add(s.data(), s.size()); }
-  void add(const Joints& joints) {
-    for (const Vec3& x : joints) add(x.data(), sizeof(double) * 3);
   }
   uint64_t value() const { return value_; }
 
@@ -128,22 +126,44 @@ class Hash {
   uint64_t value_ = 0xcbf29ce484222325ull;
 };
 
-void add(Hash& hash, const Body& body) {
-  hash.add(body.id);
-  hash.add(body.split);
-  hash.add(body.joints);
-  hash.add(body.rest.vertices.data(), body.rest.vertices.size() * sizeof(Point));
-  hash.add(body.rest.faces.data(), body.rest.faces.size() * sizeof(Triangle));
-  hash.add(body.weights.data(), static_cast<size_t>(body.weights.size()) * sizeof(float));
+/// SHA-256 of each piece's length and bytes.
+struct Sha {
+  void bytes(const void* data, size_t count) {
+    const uint64_t length = count;
+    sum.add({reinterpret_cast<const char*>(&length), sizeof length});
+    sum.add({static_cast<const char*>(data), count});
+  }
+  Sha256 sum;
+};
+
+template <class Sum>
+void add(Sum& sum, const std::string& text) {
+  sum.bytes(text.data(), text.size());
 }
 
-void add(Hash& hash, const Motion& motion) {
-  hash.add(motion.id);
-  hash.add(motion.split);
-  hash.add(motion.rest);
-  for (const auto& frame : motion.global)
-    for (const Eigen::Quaternionf& q : frame) hash.add(q.coeffs().data(), sizeof(float) * 4);
-  hash.add(motion.hips.data(), motion.hips.size() * sizeof(Point));
+template <class Sum>
+void add(Sum& sum, const Joints& joints) {
+  for (const Vec3& x : joints) sum.bytes(x.data(), sizeof(double) * 3);
+}
+
+template <class Sum>
+void add(Sum& sum, const Corpus& corpus) {
+  for (const Body& body : corpus.bodies) {
+    add(sum, body.id);
+    add(sum, body.split);
+    add(sum, body.joints);
+    sum.bytes(body.rest.vertices.data(), body.rest.vertices.size() * sizeof(Point));
+    sum.bytes(body.rest.faces.data(), body.rest.faces.size() * sizeof(Triangle));
+    sum.bytes(body.weights.data(), static_cast<size_t>(body.weights.size()) * sizeof(float));
+  }
+  for (const Motion& motion : corpus.motions) {
+    add(sum, motion.id);
+    add(sum, motion.split);
+    add(sum, motion.rest);
+    for (const auto& frame : motion.global)
+      for (const Eigen::Quaternionf& q : frame) sum.bytes(q.coeffs().data(), sizeof(float) * 4);
+    sum.bytes(motion.hips.data(), motion.hips.size() * sizeof(Point));
+  }
 }
 
 }  // namespace
@@ -198,10 +218,17 @@ std::vector<std::string> remarks(const CorpusSource& source, const Corpus& train
 }
 
 std::string checksum(const Corpus& corpus) {
-  Hash hash;
-  for (const Body& body : corpus.bodies) add(hash, body);
-  for (const Motion& motion : corpus.motions) add(hash, motion);
-  return format("%016llx", static_cast<unsigned long long>(hash.value()));
+  Words words;
+  add(words, corpus);
+  return format("%016llx", static_cast<unsigned long long>(words.value()));
+}
+
+std::string content_of_file(const std::string& path) {
+  return kept_sum(path, "content of ", [&] {
+    Sha sha;
+    add(sha, file_corpus(path, ""));
+    return sha.sum.hex();
+  });
 }
 
 }  // namespace restage

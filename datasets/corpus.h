@@ -45,5 +45,8 @@ std::vector<std::string> remarks(const CorpusSource& source, const Corpus& train
 
 /// 16 hexadecimal digits that change with any number, id or split: provenance of a run.
 std::string checksum(const Corpus& corpus);
+/// 64 digits that change with any number, id or split of a data set file, and with nothing else of
+/// it, such as its licence or a new attribute. That of a large file is kept (readers/file_sums.h).
+std::string content_of_file(const std::string& path);
 
 }  // namespace restage

@@ -81,13 +81,14 @@ class Row:
 # ---- how figures are written ---------------------------------------------------------------------
 
 IN_MILLIMETRES = {"mpjpe", "pa_mpjpe", "mpvd", "pa_mpvd", "leaf_pa_mpvd", "acc", "pa_acc"}
-DIGITS = {"medl": 2, "peak_speed": 2}
+IN_PERCENT = {"rotation_over_90", "side_swaps"}
+DIGITS = {"medl": 2, "peak_speed": 2, "rotation_over_90": 2}
 
 
 def number(value, metric, sign=""):
     if value is None:
         return "-"
-    scale = 1e3 if metric in IN_MILLIMETRES else 1
+    scale = 1e3 if metric in IN_MILLIMETRES else 100 if metric in IN_PERCENT else 1
     return f"{value * scale:{sign}.{DIGITS.get(metric, 1)}f}"
 
 
@@ -223,6 +224,20 @@ def kinds_table():
     return table(head, [[r.label, *cells(r, KINDS, metrics)] for r in rows])
 
 
+def rotations():
+    late, at_once = late_kinds["standard, two frames late"], late_kinds["standard, at once"]
+    rows = [Row("as `retarget` does", late), Row("at once", at_once), Row("closed form of true joints", late, "closed_form")]
+    words = []
+    for kind in KINDS:
+        found = {m: late[0].sequences(kind, m, None) for m in ("rotation_deg", "rotation_over_90", "side_swaps")}
+        assert not any(found["side_swaps"].values()), "the page says that no sides are exchanged"
+        worst = {m: max(found[m], key=found[m].get) for m in ("rotation_deg", "rotation_over_90")}
+        words.append(" / ".join(number(found[m][worst[m]], m) for m in worst))
+    head = ["", *KINDS.values()]
+    return table(head, [*([r.label, *cells(r, KINDS, ("rotation_deg", "rotation_over_90"))] for r in rows),
+                        ["worst sequence of `retarget`", *words]])
+
+
 def same_for_all():
     """References see true joints, not clouds."""
     said = []
@@ -324,6 +339,11 @@ benchmark, which has other people and motions, and somebody else's arm in one of
 The references see true joints, the same in all columns. PA-MPJPE / MPJPE / Acc:
 {same_for_all}.
 
+**Rotations of the joints: mean error in degrees / share of more than 90 degrees in %.** In none of the 80 sequences do
+legs or arms change sides.
+
+{rotations}
+
 ## Two frames late
 
 The weights hold two motion networks over one extractor and one skinning. "Standard" answers each frame at once:
@@ -361,7 +381,7 @@ def page():
         joint_table=by_set(("pa_mpjpe", "mpjpe"), list(TOLD), True),
         surface_table=by_set(("pa_mpvd", "mpvd", "medl"), with_surface),
         calm_table=by_set(("acc", "foot_slide_mm"), moving), joints=joints(), real=real(),
-        late_count=len(late_trials), late_differences=late_differences(), kinds_table=kinds_table(),
+        late_count=len(late_trials), late_differences=late_differences(), kinds_table=kinds_table(), rotations=rotations(),
         same_for_all=same_for_all(), sure=sure())
 
 

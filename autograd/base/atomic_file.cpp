@@ -65,6 +65,12 @@ void throw_unwritable(const std::string& target, int code) {
   throw_refused(target, "written", code);
 }
 
+void make_folder(const std::string& path) {
+  std::error_code error;
+  std::filesystem::create_directories(path, error);
+  if (error) throw_refused(path, "made", error.value());
+}
+
 int write_all(int fd, std::string_view content) {
   while (!content.empty()) {
     const ssize_t written = ::write(fd, content.data(), content.size());

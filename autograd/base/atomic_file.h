@@ -31,6 +31,8 @@ class AtomicFile {
 /// "used", or whatever `done` says.
 [[noreturn]] void throw_refused(const std::string& place, const std::string& done, int code);
 [[noreturn]] void throw_unwritable(const std::string& target, int code);
+/// Makes a folder and those above it, if they are not there. Errors as throw_refused().
+void make_folder(const std::string& path);
 /// Writes all of `content` to an open file, with as many calls as it takes. Returns 0 or the
 /// system's error number.
 int write_all(int fd, std::string_view content);

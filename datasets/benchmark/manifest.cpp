@@ -93,6 +93,15 @@ void check_file(const std::string& folder, const std::string& name, const Manife
 
 }  // namespace
 
+std::string content_of(const Manifest& manifest) {
+  Json json = {{"protocol", manifest.protocol},
+               {"seed", manifest.seed},
+               {"inputs", to_json(manifest.inputs)}};
+  const auto recipe = manifest.files.find("recipe.yaml");
+  json["files"] = to_json(recipe == manifest.files.end() ? manifest.files : std::map{*recipe});
+  return sha256(json.dump());
+}
+
 ManifestFile describe_file(const std::string& path) {
   std::error_code failed;
   const uint64_t bytes = fs::file_size(path, failed);

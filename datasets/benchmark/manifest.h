@@ -26,6 +26,11 @@ ManifestFile describe_file(const std::string& path);
 /// All regular files below `folder` but the manifest itself.
 std::map<std::string, ManifestFile> describe_files(const std::string& folder);
 
+/// SHA-256 of what a benchmark is made from: protocol, seed, inputs and recipe (without a recipe,
+/// its files). What is built from the same has the same, whatever else a later build writes into
+/// files.
+std::string content_of(const Manifest& manifest);
+
 /// Writes folder/manifest.json; equal content gives equal bytes.
 void write_manifest(const std::string& folder, const Manifest& manifest);
 /// InputError: missing, damaged, or with names that lead out of the folder.

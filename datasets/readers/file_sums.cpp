@@ -117,16 +117,22 @@ void keep(const std::string& cache, Entry fresh) {
 }  // namespace
 
 std::string kept_sha256(const std::string& path) {
+  return kept_sum(path, "", [&] { return sha256_of_file(path); });
+}
+
+std::string kept_sum(const std::string& path, const std::string& kind,
+                     const std::function<std::string()>& compute) {
   const Stamp before(path);
-  const std::string cache = cache_file(), place = fs::absolute(path).lexically_normal().string();
+  const std::string cache = cache_file(),
+                    place = kind + fs::absolute(path).lexically_normal().string();
   if (before.size < kWorthKeeping || cache.empty() || place.find('\n') != std::string::npos)
-    return sha256_of_file(path);
+    return compute();
   for (const Entry& entry : kept(cache))
     if (entry.path == place && entry.stamp == before.text()) return entry.sum;
   using Clock = std::chrono::system_clock;
   const auto now =
       std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now().time_since_epoch());
-  const std::string sum = sha256_of_file(path);
+  const std::string sum = compute();
   if (before.surely_before(now.count()) && Stamp(path) == before)
     keep(cache, {sum, before.text(), place});
   return sum;

@@ -1,6 +1,7 @@
 // Checksums of large files, kept from command to command.
 #pragma once
 
+#include <functional>
 #include <string>
 
 namespace restage {
@@ -12,5 +13,9 @@ namespace restage {
 /// the same time. What is damaged in the cache is not used, and a cache that cannot be read or
 /// written does no harm. ReadError if the file cannot be read.
 std::string kept_sha256(const std::string& path);
+/// The same of another sum (64 hexadecimal digits) that follows from the file's bytes; `kind` tells
+/// such sums apart.
+std::string kept_sum(const std::string& path, const std::string& kind,
+                     const std::function<std::string()>& compute);
 
 }  // namespace restage

@@ -86,7 +86,7 @@ template <class V>
 void visit(V& v, BenchmarkRecipe& c) {
   v("protocol", c.protocol, "name and version");
   v("seed", c.seed, "of everything random");
-  v("rotations", c.rotations, "truths hold world rotations");
+  v("rotations", c.rotations, "truths hold world rotations", added("false"));
   v("floor_window", c.floor_window, "seconds within which a foot touches the floor; 0: as recorded",
     between(0, 10));
   v("train", c.train, "train.h5");

@@ -4,6 +4,7 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <cstdint>
+#include <map>
 #include <optional>
 
 namespace restage::cli {
@@ -36,6 +37,22 @@ Option& Option::show_default() {
 Option& Option::one_of(std::vector<std::string> words) {
   option_->check(CLI::IsMember(std::move(words)));
   return *this;
+}
+
+namespace {
+std::map<const CLI::Option*, std::vector<std::string>>& all_suggestions() {
+  static std::map<const CLI::Option*, std::vector<std::string>> all;
+  return all;
+}
+}  // namespace
+
+Option& Option::suggest(std::vector<std::string> words) {
+  all_suggestions()[option_] = std::move(words);
+  return *this;
+}
+
+const std::vector<std::string>& suggestions(const CLI::Option* option) {
+  return all_suggestions()[option];
 }
 
 Option& Option::check(std::function<std::string(const std::string&)> fault) {

@@ -30,6 +30,8 @@ class Option {
   /// The help page shows the variable's value of now as the default.
   Option& show_default();
   Option& one_of(std::vector<std::string> words);
+  /// Words that shells offer beside files for an option without a name.
+  Option& suggest(std::vector<std::string> words);
   /// `fault` says what is wrong with a value in words that follow the option's name, or nothing.
   Option& check(std::function<std::string(const std::string&)> fault);
   /// The heading under which the help page lists the option.
@@ -38,6 +40,9 @@ class Option {
  private:
   CLI::Option* option_;
 };
+
+/// What suggest() was given, else nothing.
+const std::vector<std::string>& suggestions(const CLI::Option* option);
 
 /// The arguments of a command or of a group of commands; refers to what Program owns.
 class CommandOptions {

@@ -80,31 +80,38 @@ std::string script_of(const std::string& shell, const CommandTree& program) {
 
 std::string bash_completion(const CommandTree& program) {
   // Names may hold spaces.
-  const std::string files = "mapfile -t COMPREPLY < <(compgen -f -- \"$current\")";
+  const auto with_files = [](const std::string& words) {
+    return "mapfile -t COMPREPLY < <(" + words + "compgen -f -- \"$current\")";
+  };
   return "# restage completion bash > /usr/share/bash-completion/completions/restage\n"
          "_restage() {\n"
          "  local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]}\n"
          "  local before=(\"${COMP_WORDS[@]:1:COMP_CWORD - 1}\")\n" +
          find_path(program) +
-         for_each_path(program,
-                       [&](const CommandTree& command) {
-                         std::vector<std::string> commands, options;
-                         for (const auto& sub : command.commands) commands.push_back(sub.name);
-                         for (const auto& option : command.options) options.push_back(option.name);
-                         std::string out = for_each_value(
-                             command,
-                             [](const std::string& words) {
-                               return "COMPREPLY=($(compgen -W '" + words + "' -- \"$current\"))";
-                             },
-                             files);
-                         out += "      if [[ $current == -* ]]; then COMPREPLY=($(compgen -W '" +
-                                joined(options) + "' -- \"$current\"))\n";
-                         out += commands.empty()
-                                    ? "      else " + files + "; fi\n"
-                                    : "      else COMPREPLY=($(compgen -W '" + joined(commands) +
-                                          "' -- \"$current\")); fi\n";
-                         return out;
-                       }) +
+         for_each_path(
+             program,
+             [&](const CommandTree& command) {
+               std::vector<std::string> commands, options;
+               for (const auto& sub : command.commands) commands.push_back(sub.name);
+               for (const auto& option : command.options) options.push_back(option.name);
+               std::string out = for_each_value(
+                   command,
+                   [](const std::string& words) {
+                     return "COMPREPLY=($(compgen -W '" + words + "' -- \"$current\"))";
+                   },
+                   with_files(""));
+               out += "      if [[ $current == -* ]]; then COMPREPLY=($(compgen -W '" +
+                      joined(options) + "' -- \"$current\"))\n";
+               const std::string known = joined(command.words);
+               out += commands.empty() && !known.empty()
+                          ? "      else " +
+                                with_files("compgen -W '" + known + "' -- \"$current\"; ") +
+                                "; fi\n"
+                      : commands.empty() ? "      else " + with_files("") + "; fi\n"
+                                         : "      else COMPREPLY=($(compgen -W '" +
+                                               joined(commands) + "' -- \"$current\")); fi\n";
+               return out;
+             }) +
          "}\n"
          "complete -o filenames -F _restage restage\n";
 }
@@ -119,7 +126,7 @@ std::string zsh_completion(const CommandTree& program) {
   return "#compdef restage\n"
          "_restage() {\n"
          "  local previous=${words[CURRENT - 1]}\n"
-         "  local -a before commands options\n"
+         "  local -a before commands options known\n"
          "  before=(\"${(@)words[2,CURRENT - 1]}\")\n" +
          find_path(program) +
          for_each_path(program,
@@ -133,11 +140,11 @@ std::string zsh_completion(const CommandTree& program) {
                          out += " )\n      options=(";
                          for (const auto& option : command.options)
                            out += described(option.name, option.help);
-                         return out + " )\n";
+                         return out + " )\n      known=(" + joined(command.words) + ")\n";
                        }) +
          "  if [[ ${words[CURRENT]} == -* ]]; then _describe option options\n"
          "  elif (( $#commands )); then _describe command commands\n"
-         "  else _files; fi\n"
+         "  else compadd -a known; _files; fi\n"
          "}\n"
          "_restage \"$@\"\n";
 }
@@ -160,6 +167,9 @@ std::string fish_completion(const CommandTree& program) {
              shell_word(at + "; and not __restage_at " + (words.empty() ? "" : words + " ") +
                         sub.name) +
              " -a " + sub.name + " -d " + shell_word(sub.help) + "\n";
+    if (!command.words.empty())
+      out += "complete -c restage -n " + shell_word(at) + " -a " +
+             shell_word(joined(command.words)) + "\n";
     for (const auto& option : command.options) {
       out += "complete -c restage -n " + shell_word(at) + " -l " + option.name.substr(2) + " -d " +
              shell_word(option.help);

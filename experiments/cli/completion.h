@@ -16,6 +16,7 @@ struct CommandTree {
   std::string name, help;
   std::vector<Option> options;
   std::vector<CommandTree> commands;
+  std::vector<std::string> words;  ///< that may stand where files may
 };
 
 /// A script for bash, zsh or fish.

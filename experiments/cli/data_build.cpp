@@ -11,7 +11,7 @@
 #include "experiments/cli/benchmark_config.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
-#include "experiments/cli/shipped_config.h"
+#include "experiments/shipped_config.h"
 #include "nn/config/config.h"
 
 namespace restage::cli {
@@ -113,8 +113,8 @@ int build_recipe(const BuildOptions& options, const Common& common) {
   const BuildRequest request = read_request(options, common);
   BenchmarkRecipe recipe;
   load_config(config_file(request.recipe), request.overrides, recipe);
-  const BenchmarkSummary done =
-      build_benchmark(recipe, resolved_yaml(recipe), request.recipe, request.data, request.out);
+  const BenchmarkSummary done = build_benchmark(recipe, config_to_yaml(write_identity(recipe)),
+                                                request.recipe, request.data, request.out);
   print(common.json,
         {{"out", request.out},
          {"data", request.data},

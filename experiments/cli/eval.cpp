@@ -266,6 +266,8 @@ int run_eval(const EvalOptions& options, const Common& common) {
     if (!options.run.starts_with("run="))
       throw InputError("", "'" + options.run + "' is not understood",
                        "use 'run=RUN_DIR', or --pred and --truth");
+    if (options.run == "run=")
+      throw InputError("", "run= names no run directory", "write run=RUN_DIR");
     if (!options.pred.empty() || !options.truth.empty())
       throw InputError("", "run= and --pred do not go together", "give one of them");
     check_way(options);

@@ -112,12 +112,16 @@ std::vector<std::string> choices_of(const std::string& type) {
 }
 
 CommandTree described(const CLI::App& command) {
-  CommandTree out{command.get_name(), command.get_description(), {}, {}};
-  for (const CLI::Option* option : command.get_options())
+  CommandTree out{command.get_name(), command.get_description(), {}, {}, {}};
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->get_positional())
+      for (const auto& words : {choices_of(option->get_type_name()), suggestions(option)})
+        out.words.insert(out.words.end(), words.begin(), words.end());
     for (const std::string& name : option->get_lnames())
       out.options.push_back({"--" + name, option->get_description(),
                              option->get_items_expected_max() > 0,
                              choices_of(option->get_type_name())});
+  }
   for (const CLI::App* sub : command.get_subcommands([](const CLI::App*) { return true; }))
     if (!sub->get_group().empty()) out.commands.push_back(described(*sub));
   return out;

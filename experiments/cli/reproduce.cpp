@@ -120,7 +120,9 @@ void add_reproduce(Program& program) {
       "restage reproduce rekik2024 --budget lite --out runs/page --no-run --from experiments\n"
       "restage reproduce marsot2023 --budget paper --out runs/marsot2023 data.source=amass.h5",
       run_reproduce);
-  app.add_option("PAPER", o.paper, "rekik2024, marsot2023 or chen2023").required();
+  app.add_option("PAPER", o.paper, "rekik2024, marsot2023 or chen2023")
+      .required()
+      .suggest({"rekik2024", "marsot2023", "chen2023", "ours"});
   app.add_option("WORDS", o.words, "key=value for all of its sweeps, as in 'sweep run'");
   app.add_option("--table", o.table, "only this one, such as 4 (all)");
   app.add_option("--budget", o.budget,

@@ -1,11 +1,15 @@
 // restage sweep plan, run, status, stop: many trainings from one file.
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <map>
 #include <thread>
 
+#include "autograd/base/atomic_file.h"
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 #include "autograd/base/parallel.h"
@@ -183,6 +187,8 @@ int run_run(const RunOptions& options, const Common& common) {
   if (const int code = sweep::plan_in_a_process(options.out, words, common.quiet); code != 0)
     return code;
   SweepDir dir = sweep::read_sweep_dir(options.out);
+  make_folder(dir.store);  // now, and not after the first training
+  if (::access(dir.store.c_str(), W_OK) != 0) throw_unwritable(dir.store, errno);
   const int each = std::max(1, threads() / options.jobs);
   const sweep::PoolOutcome outcome = sweep::run_pool(dir, {options.jobs, each});
   const Json status = status_json(dir);

@@ -13,10 +13,10 @@
 #include "autograd/kernels/matmul_precision.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
-#include "experiments/cli/shipped_config.h"
 #include "experiments/cli/train.h"
 #include "experiments/observers/loggers.h"
 #include "experiments/scratch.h"
+#include "experiments/shipped_config.h"
 #include "nn/config/config.h"
 #include "train/run_provenance.h"
 #include "train/stages/motion_stage.h"
@@ -98,10 +98,17 @@ Request read_request(const TrainArguments& arguments, const Common& common) {
 
 TrainConfig configured(const Request& request) {
   TrainConfig config;
-  if (request.resume.empty())
+  if (request.resume.empty()) {
+    if (load_config_tree(request.config).find("protocol") != nullptr)
+      throw InputError(request.config, "is the recipe of a data set, not a training",
+                       "make the data with 'restage data build', and give data.source=FOLDER");
     load_config(request.config, request.overrides, config);
-  else
+  } else {
     read_config(of_this_version(load_config_tree(run_config_path(request.resume))), config);
+  }
+  if (config.data.one_mesh && config.data.source != "builtin")
+    log_warning("data.one_mesh is for built-in data; those of " + config.data.source +
+                " are taken as they are");
   if (config.stages.empty())
     throw InputError(request.config, "names no stages, so there is nothing to train",
                      "use it in a sweep, or name stages");
@@ -299,6 +306,7 @@ void add_train(Program& program) {
 
 void add_train_options(CommandOptions app, TrainArguments& a) {
   app.add_option("ARGUMENTS", a.words, "CONFIG.yaml and key=value overrides, or resume=RUN_DIR")
+      .suggest(shipped_configs())
       .required();
   app.add_flag("--print-config", a.print_config, "print the resolved configuration and end");
   app.add_flag("--dry-run", a.dry_run,

@@ -25,9 +25,7 @@ std::vector<Clip> clips_of(std::vector<Shown> all) {
 
 void TensorBoardLog::on_begin(const Stage& stage, int64_t done) {
   const std::string folder = folder_ + "/" + stage.name();
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) throw WorkError(folder + ": could not be made (" + error.message() + ")");
+  make_folder(folder);
   file_.emplace(folder, done);
 }
 

@@ -22,12 +22,6 @@ bool is_file(const std::string& path) {
   return fs::is_regular_file(path, ignored);
 }
 
-void make_folder(const std::string& path) {
-  std::error_code code;
-  fs::create_directories(path, code);
-  if (code) throw WorkError(path + " could not be made (" + code.message() + ")");
-}
-
 std::string kept(const Evidence& evidence, const std::string& name) {
   return evidence.folder + "/results/" + name + ".json";
 }

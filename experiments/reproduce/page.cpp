@@ -363,9 +363,7 @@ const char* const kRule =
 /// Of what is beside the page; made if it is not there.
 std::string files_folder(const std::string& folder, const PageOptions& options) {
   const std::string files = folder + "/" + options.paper;
-  std::error_code code;
-  fs::create_directories(files, code);
-  if (code) throw WorkError(files + " could not be made (" + code.message() + ")");
+  make_folder(files);
   return files;
 }
 

@@ -127,16 +127,6 @@ Lease planning(const std::string& dir) {
   }
 }
 
-void make_folder(const std::string& path) {
-  std::error_code error;
-  fs::create_directories(path, error);
-  if (!error) return;
-  if (error == std::errc::no_space_on_device)
-    throw WorkError(path + ": could not be made (" + error.message() + "); free some space");
-  throw InputError(path, "cannot be made (" + error.message() + ")",
-                   "choose a folder that you can write to");
-}
-
 }  // namespace
 
 const TrialEntry& SweepDir::trial(const std::string& id) const {

@@ -8,6 +8,7 @@
 
 #include "autograd/base/atomic_file.h"
 #include "autograd/base/nearest.h"
+#include "experiments/shipped_config.h"
 #include "experiments/sweep/sweep_words.h"
 #include "nn/config/config_reader.h"
 
@@ -219,9 +220,12 @@ class SweepReader {
     out_.base_place = base->place;
     out_.base = (fs::path(out_.path).parent_path() / base->text).lexically_normal().string();
     std::error_code ignored;
-    if (!fs::is_regular_file(out_.base, ignored))
+    if (fs::is_regular_file(out_.base, ignored)) return;
+    out_.base = shipped_config(base->text);
+    if (out_.base.empty())
       fail(base->place, "the base " + in_quotes(base->text) + " is no file",
-           "give a path relative to the sweep file");
+           "give a path relative to the sweep file, or the name of a configuration that comes with "
+           "the program");
   }
 
   void read_axes() {
@@ -333,10 +337,8 @@ void add_argument(SweepFile& file, const SweepWord& word) {
     return;
   }
   if (word.key == "base") {
-    std::error_code ignored;
-    if (word.values.size() != 1 || !fs::is_regular_file(word.values[0].text, ignored))
-      fail(place, "is no file", "write base=CONFIG.yaml, seen from the working directory");
-    file.base = word.values[0].text;
+    if (word.values.size() != 1) fail(place, "is no file", "write base=CONFIG.yaml");
+    file.base = config_file(word.values[0].text);
     file.base_place = place;
     return;
   }

@@ -10,7 +10,6 @@
 #include "autograd/base/log.h"
 #include "autograd/kernels/matmul_precision.h"
 #include "datasets/benchmark/manifest.h"
-#include "datasets/readers/sha256.h"
 #include "experiments/benchmark_sets.h"
 #include "experiments/evaluation.h"
 #include "experiments/slow_work.h"
@@ -167,7 +166,7 @@ TrialPlanner::TrialPlanner(Evaluate evaluate, std::string store)
                      in_quotes(folder) + " is no benchmark (no manifest.json in it)",
                      "build it with 'restage data build configs/data/open_benchmark.yaml'");
   for (const std::string& set : memory_->evaluate.sets) check_benchmark_set(set);
-  memory_->more["benchmark"] = sha256_of_file(folder + "/" + kManifestName);
+  memory_->more["benchmark"] = content_of(read_manifest(folder));
   for (const std::string& set : memory_->evaluate.sets) memory_->more["sets"] += set + " ";
 }
 

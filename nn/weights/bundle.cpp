@@ -83,8 +83,11 @@ Settings settings_of(const Json& json, const std::string& where) {
   return out;
 }
 
-Json object_at(const Json& json, const char* key) {
-  return json.contains(key) && json[key].is_object() ? json[key] : Json::object();
+Json object_at(const Json& json, const char* key, const std::string& where) {
+  if (!json.contains(key)) return Json::object();
+  if (!json[key].is_object())
+    throw InputError(where, "has " + name_in_quotes(key) + " that are no section", kGiveWeights);
+  return json[key];
 }
 
 // ---- metadata ----------------------------------------------------------------------------------
@@ -110,7 +113,7 @@ void add_older_settings(const Json& metadata, const std::string& where, Bundle* 
       {"remove_heading", "motion"},
       {"steady_heading", "motion"},
       {"keep_root_rotation", "deformation.offsets"}};
-  for (const auto& [name, value] : settings_of(object_at(metadata, "extra"), where)) {
+  for (const auto& [name, value] : settings_of(object_at(metadata, "extra", where), where)) {
     const auto role = roles.find(name);
     if (role == roles.end())
       throw InputError(where, "has a setting " + name_in_quotes(name) + " of no model",
@@ -165,8 +168,8 @@ TrainedModel model_of(const std::string& place, const Json& entry, const TensorF
     throw InputError(where,
                      "names " + name_in_quotes(out.model) + ", which is no model for " + place,
                      kGiveWeights);
-  out.config = sizes_of(model_type(out.model), object_at(entry, "sizes"), where);
-  out.settings = settings_of(object_at(entry, "settings"), where);
+  out.config = sizes_of(model_type(out.model), object_at(entry, "sizes", where), where);
+  out.settings = settings_of(object_at(entry, "settings", where), where);
   out.net = filled(out.model, out.config, file, place + ".", where);
   return out;
 }
@@ -315,8 +318,8 @@ TrainedModel import_model(const std::string& name, const std::vector<std::string
   const auto text = state.metadata.find(kKey);
   const Json json =
       text == state.metadata.end() ? Json() : Json::parse(text->second, nullptr, false);
-  out.config = sizes_of(type, object_at(json, "sizes"), where);
-  out.settings = settings_of(object_at(json, "settings"), where);
+  out.config = sizes_of(type, object_at(json, "sizes", where), where);
+  out.settings = settings_of(object_at(json, "settings", where), where);
   ConfigNode tree = write_config(out.config);  // what the file says, then what the caller says
   for (const std::string& size : sizes) apply_override(tree, size);
   read_config(tree, out.config);

@@ -48,6 +48,8 @@ class Usage(CliTest):
         self.assertEqual(self.completed("data", "im"), ["import"])
         self.assertEqual(self.completed("reproduce", "rekik2024", "--budget", "l"), ["lite"])
         self.assertIn("--target", self.completed("retarget", "--source", "scans/", "--ta"))
+        self.assertEqual(self.completed("train", "standard/f"), ["standard/finetune"])
+        self.assertEqual(self.completed("reproduce", "rek"), ["rekik2024"])
         self.write("scan.ply", "")
         self.assertEqual(self.completed("doctor", "sca"), ["scan.ply"])
         self.write("a scan.ply", "")

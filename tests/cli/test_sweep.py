@@ -122,6 +122,9 @@ class Plans(Sweep):
         self.assertAlmostEqual(found["free"]["pa_mpjpe"], found["a"]["pa_mpjpe"], 6)
         self.assertNotEqual(found["free"]["mpjpe"], found["a"]["mpjpe"])
         self.write("small/manifest.json", "{}")
+        self.bad_input(["sweep", "plan", "sweep.yaml", "evaluate.benchmark=small", "evaluate.sets=[naked]"], "small/manifest.json")
+        self.write("small/manifest.json", json.dumps({"restage_benchmark": 1, "protocol": "p", "seed": 0, "license": "",
+                                                      "provenance": "", "inputs": {}, "files": {}}))
         self.bad_input(["sweep", "plan", "sweep.yaml", "evaluate.benchmark=small", "evaluate.sets=[naked]"], "benchmark's scans are as they are")
 
     def test_another_base_may_come_from_the_command_line(self):
@@ -130,7 +133,9 @@ class Plans(Sweep):
         self.write("same.yaml", BASE)
         self.assertEqual([t["id"] for t in self.plan("base=same.yaml")["trials"]], first)
         self.assertFalse(set(first) & {t["id"] for t in self.plan("base=other.yaml")["trials"]})
-        self.bad_input(["sweep", "plan", "sweep.yaml", "base=none.yaml"], "none.yaml", "is no file")
+        self.bad_input(["sweep", "plan", "sweep.yaml", "base=none.yaml"], "none.yaml", "does not exist")
+        self.write("by_name.yaml", "base: standard/finetune\ngrid: {data.seed: [1, 2]}\n")
+        self.assertEqual(len(self.json("sweep", "plan", "by_name.yaml", "data.source=builtin")["trials"]), 2)
 
     def test_out_is_ready_for_any_engine(self):
         self.write("sweep.yaml", SWEEP)

@@ -96,6 +96,15 @@ TEST_F(SamplingCorpus, FilesComeBackAsTheyWereWritten) {
   EXPECT_EQ(validation.license, "Apache-2.0");
   EXPECT_EQ(checksum(load_corpus({path}, "test")), checksum(subset(load_corpus({path}), "test")));
 
+  // Licence, provenance and the definition of the joints change no number.
+  std::vector<Body> said = all.bodies;
+  for (Body& body : said) body.definition = "smpl";
+  write_dataset(dir / "said.h5", said, all.motions, {"CC0", "other words"});
+  EXPECT_EQ(content_of_file(dir / "said.h5"), content_of_file(path));
+  said.back().joints[3].x() += 1e-6;
+  write_dataset(dir / "said.h5", said, all.motions, {"CC0", "other words"});
+  EXPECT_NE(content_of_file(dir / "said.h5"), content_of_file(path));
+
   // A subject in two splits.
   std::vector<Motion> mixed = all.motions;
   mixed.back().subject = mixed.front().subject;

@@ -29,14 +29,6 @@ std::string path_aside(const std::string& dir, const std::string& name, const ch
   return (fs::path(dir) / ("." + name + suffix)).string();
 }
 
-void made_once_detail::make_folder(const std::string& dir) {
-  std::error_code error;
-  fs::create_directories(dir, error);
-  if (error)
-    throw InputError(dir, "cannot be made (" + error.message() + ")",
-                     "give store= a folder that you can write to");
-}
-
 bool made_once_detail::has_leftovers(const std::string& dir, const std::string& name) {
   return !leftovers(dir, name).empty();
 }

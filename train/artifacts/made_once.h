@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "autograd/base/atomic_file.h"
 #include "autograd/base/error.h"
 #include "autograd/base/interrupt.h"
 #include "train/lease.h"
@@ -17,7 +18,6 @@ namespace restage {
 std::string path_aside(const std::string& dir, const std::string& name, const char* suffix);
 
 namespace made_once_detail {
-void make_folder(const std::string& dir);
 /// Whether there are leftovers of processes that were killed while they made `name`.
 bool has_leftovers(const std::string& dir, const std::string& name);
 void remove_leftovers(const std::string& dir, const std::string& name);
