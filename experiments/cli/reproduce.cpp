@@ -57,20 +57,18 @@ std::vector<std::string> words_of(const ReproduceOptions& o, const Common& commo
 }
 
 /// All sweeps are planned before one runs, so that bad input is told at once.
-int plan(const ReproduceOptions& o, const Common& common, const std::vector<Evidence>& all) {
+void plan(const ReproduceOptions& o, const Common& common, const std::vector<Evidence>& all) {
   for (const Evidence& one : all) {
     if (!one.runs()) continue;
     if (o.no_run) {
       if (!take_plan(one, o.budget)) continue;
     } else {
-      const int code = sweep::plan_in_a_process(one.dir, words_of(o, common, one), common.quiet);
-      if (code != 0) return code;
+      sweep::plan_in_a_process(one.dir, words_of(o, common, one), common.quiet);
     }
     if (const int taken = take_results(one); taken > 0)
       log_info(one.name + ": " + std::to_string(taken) + " results are there already, in " +
                one.folder + "/results");
   }
-  return 0;
 }
 
 /// Whether all trials are done.
@@ -95,7 +93,7 @@ int run_reproduce(ReproduceOptions o, const Common& common) {
   o.from = here_or_shipped(o.from);
   const std::vector<Evidence> all = reproduce::find_evidence(o.from, o.paper, o.table, o.out);
   const StopScope stop;
-  if (const int code = plan(o, common, all); code != 0) return code;
+  plan(o, common, all);
   const bool done = o.no_run || run_trials(o, all);
   reproduce::PageOptions options{o.paper, o.budget, common.command_line, common.seed};
   options.command[0] = "restage";

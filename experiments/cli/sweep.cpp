@@ -184,8 +184,7 @@ int run_run(const RunOptions& options, const Common& common) {
   const StopScope stop;
   std::vector<std::string> words = options.arguments;
   if (common.seed_given) words.push_back("seed=" + std::to_string(common.seed));
-  if (const int code = sweep::plan_in_a_process(options.out, words, common.quiet); code != 0)
-    return code;
+  sweep::plan_in_a_process(options.out, words, common.quiet);
   SweepDir dir = sweep::read_sweep_dir(options.out);
   make_folder(dir.store);  // now, and not after the first training
   if (::access(dir.store.c_str(), W_OK) != 0) throw_unwritable(dir.store, errno);

@@ -25,13 +25,14 @@ struct PoolOutcome {
 PoolOutcome run_pool(const SweepDir& dir, const PoolOptions& options);
 
 /// Starts this program again with these arguments. `output`: standard output and error go there
-/// (appended); "": the former nowhere, the latter where ours goes. Returns the process. WorkError.
-int spawn_self(const std::vector<std::string>& arguments, const std::string& output,
-               bool own_group);
+/// (appended); "": the former nowhere, the latter to `errors` (a descriptor; -1: where ours goes).
+/// Returns the process. WorkError.
+int spawn_self(const std::vector<std::string>& arguments, const std::string& output, bool own_group,
+               int errors = -1);
 
 /// `restage sweep plan ARGUMENTS --out DIR` in a process of its own: planning reads data and builds
-/// models, and takes that memory with it. Returns its exit code; what is wrong it has said.
-int plan_in_a_process(const std::string& dir, const std::vector<std::string>& arguments,
-                      bool quiet);
+/// models, and takes that memory with it. Throws what ended it.
+void plan_in_a_process(const std::string& dir, const std::vector<std::string>& arguments,
+                       bool quiet);
 
 }  // namespace restage::sweep

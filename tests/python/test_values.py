@@ -166,6 +166,8 @@ def test_sweep_results(program, tmp_path):
     sweep.write_text(SWEEP.replace("npt/smoke.yaml", str(ROOT / "configs/npt/smoke.yaml")))
     with pytest.raises(restage.InputError, match="no finished trial"):
         restage.sweep_results(tmp_path)
+    with pytest.raises(restage.InputError, match="unknown key 'nonsense'"):
+        restage.command("sweep", "run", sweep, "nonsense=1", out=tmp_path / "bad")
     restage.command("sweep", "run", sweep, out=tmp_path / "out", jobs=2)
     found = restage.sweep_results(tmp_path / "out")
     assert sorted(found["case"]) == ["longer", "longer", "plain", "plain"] and set(found["seed"]) == {1, 2}
