@@ -88,7 +88,7 @@ Sequence read(Source& source, const AdaptOptions& options, const RngKey& key) {
 void look(SkeletonModel& model, Sequence& sequence, double fps, const AdaptOptions& options,
           const RngKey& key) {
   constexpr double kRemembering = 8;  // frames a second, as retargeting
-  JointExtractor extract(model, options.views);
+  JointExtractor extract(model, options.views, kAllAround, false, true);
   const SeenJoints* before = nullptr;
   for (size_t i = 0; i < sequence.taught; ++i) {
     Cloud& cloud = sequence.clouds[i];

@@ -118,7 +118,7 @@ void judge(const Seen& seen, double fps, Assessment* out) {
 Assessment assess(Source& source, const Bundle& weights, const std::string& weights_name,
                   const AssessOptions& options) {
   auto& model = weights.need_as<SkeletonModel>("skeleton", weights_name);
-  JointExtractor extract(model, options.samples);
+  JointExtractor extract(model, options.samples, kAllAround, false, true);
   const RngKey key = RngKey{options.seed, 0}.fold("assess");
   Rng rng(key.fold("points"));
   Assessment out;

@@ -69,6 +69,7 @@ Prediction retargeted(const Bundle& weights, const std::string& folder, const st
   input.options.anchor = how.anchor;
   input.options.steady_bones = how.steady_bones;
   input.options.keep_limbs = how.keep_limbs;
+  input.options.any_size = how.any_size;
   input.options.force = how.force;
   if (type.needs_rest)
     input.rest = joints_of(PredictionFile(in(folder, "rest.h5")).joints().slice(0, 1))[0];

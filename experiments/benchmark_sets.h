@@ -16,8 +16,8 @@ struct BenchmarkOptions {
   int64_t every = 1;  ///< frame of a sequence; above 1 there are no references
   uint64_t seed = 0;
   double anchor = RetargetOptions{}.anchor;
-  bool steady_bones = false, keep_limbs = false;  ///< see EvaluationConfig
-  bool force = false;                             ///< 'restage retarget --force'
+  bool steady_bones = false, keep_limbs = false, any_size = false;  ///< see EvaluationConfig
+  bool force = false;                                               ///< 'restage retarget --force'
   std::span<const metrics::Metric> metrics = metrics::table();
 };
 

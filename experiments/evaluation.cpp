@@ -226,6 +226,7 @@ EvaluationOptions evaluation_options(const TrainConfig& config, const Corpus& te
   out.anchor = config.evaluation.anchor;
   out.steady_bones = config.evaluation.steady_bones;
   out.keep_limbs = config.evaluation.keep_limbs;
+  out.any_size = config.evaluation.any_size;
   out.scans = config.evaluation.scans;
   out.clouds = config.section("skeleton").config.as<SkeletonStageConfig>().clouds;
   out.sequences = evaluation_sequences(test, static_cast<size_t>(config.evaluation.sequences),
@@ -256,6 +257,7 @@ SystemEvaluation evaluate_system(const Bundle& weights, const std::string& weigh
   how.anchor = options.anchor;
   how.steady_bones = options.steady_bones;
   how.keep_limbs = options.keep_limbs;
+  how.any_size = options.any_size;
   for (const EvalSequence& sequence : options.sequences) {
     const Performance performance(corpus, sequence, options.scans, options.seed);
     Sequence truth = truth_of(performance, options.every);

@@ -50,7 +50,7 @@ struct EvaluationOptions {
   std::string system = "chain";  ///< others are judged from clouds only
   int64_t every = 1;             ///< frame of the sequences
   double anchor = RetargetOptions{}.anchor;
-  bool steady_bones = false, keep_limbs = false;  ///< see EvaluationConfig
+  bool steady_bones = false, keep_limbs = false, any_size = false;  ///< see EvaluationConfig
   std::vector<EvalSequence> sequences;
   ScanConfig scans;
   CloudConfig clouds;  ///< of the extractor's own figures

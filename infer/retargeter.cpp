@@ -110,7 +110,7 @@ Retargeter::Retargeter(const Bundle& weights, const std::string& weights_name, M
   auto& skeleton = models_.need_as<SkeletonModel>("skeleton", weights_name);
   const RngKey key = RngKey{options.seed, 0}.fold("target");
   rest_ = extract_joints(skeleton, surface_points(target_, kTargetPoints, key.fold("surface")),
-                         where, key, kTargetSamples, kRestPoses);
+                         where, key, kTargetSamples, kRestPoses, options.any_size);
   if (const std::string off = off_tpose(rest_); !off.empty() && !options.force)
     throw InputError(where, off, "give the target in T-pose facing +z, y up, or add --force");
   prepare(weights_name);
@@ -131,7 +131,8 @@ void Retargeter::prepare(const std::string& weights_name) {
   if (!(options_.min_confidence >= 0 && options_.min_confidence <= 1))
     throw InputError("", "the least confidence is out of range", "give --min-confidence 0 to 1");
   if (auto* skeleton = models_.find_as<SkeletonModel>("skeleton"))
-    extractor_.emplace(*skeleton, options_.samples, kAllAround, options_.keep_limbs);
+    extractor_.emplace(*skeleton, options_.samples, kAllAround, options_.keep_limbs,
+                       options_.any_size);
   const std::string role =
       options_.late && models_.find(kLateMotion) != nullptr ? kLateMotion : "motion";
   const TrainedModel& motion = models_.need(role, weights_name);

@@ -35,6 +35,8 @@ struct RetargetOptions {
   bool foot_lock = true;
   /// Legs and arms that cross keep their names (keep_limbs(), nn/models/views.h).
   bool keep_limbs = true;
+  /// People of any size are seen in an adult's (nn/models/extraction.h), targets too.
+  bool any_size = true;
   /// Use the motion network that looks ahead, if the weights hold one (kLateMotion): calmer and
   /// nearer, but every frame comes MotionModel::latency() frames later.
   bool late = false;

@@ -23,7 +23,7 @@ class PyExtractor {
     auto& model = models_.need_as<SkeletonModel>("skeleton", weights_path(file));
     move_module(model, device_of(device));
     definition_ = joint_definition(models_.only({"skeleton"}), file);
-    extract_.emplace(model, samples);
+    extract_.emplace(model, samples, kAllAround, false, true);
   }
 
   py::tuple operator()(const py::object& points, const std::string& name) {

@@ -83,7 +83,7 @@ int run_skeleton(const SkeletonOptions& options, const Common& common) {
   std::string text;
   // The same points give the same joints wherever they stand, so every frame has the same key.
   const RngKey key = RngKey{common.seed, 0}.fold("skeleton");
-  JointExtractor extract(model, options.samples);
+  JointExtractor extract(model, options.samples, kAllAround, false, true);
   size_t left_out = 0;
   while (const auto frame = frames->next()) {
     if (frame->fault) throw *frame->fault;

@@ -89,6 +89,7 @@ BenchmarkOptions benchmark_options(const TrainConfig& config) {
   how.anchor = config.evaluation.anchor;
   how.steady_bones = config.evaluation.steady_bones;
   how.keep_limbs = config.evaluation.keep_limbs;
+  how.any_size = config.evaluation.any_size;
   return how;
 }
 

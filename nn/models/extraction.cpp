@@ -13,13 +13,36 @@ constexpr double kLost = 1;  // metres: nobody moves so far from one frame to th
 
 bool mirrored(size_t view) { return view % 2 == 1; }
 
+/// From the ankles to the head along the bones, whatever the pose.
+double tallness(const Joints& joints) {
+  double out = leg_length(joints);
+  for (int j = kHead; j != 0; j = kParents[static_cast<size_t>(j)])
+    out += (joints[static_cast<size_t>(j)] -
+            joints[static_cast<size_t>(kParents[static_cast<size_t>(j)])])
+               .norm();
+  return out;
+}
+
+/// 1 for adults, 1.48 to 2.1 m tall. Others are brought near the nearer end of that, by a power of
+/// 1.1, so that the scale seldom changes from frame to frame.
+double scale_for(const Joints& joints) {
+  constexpr double kSmall = 1.3, kLarge = 1.84, kInside = 1.14, kStep = 1.1;  // tallness, metres
+  const double tall = std::max(tallness(joints), 1e-3);
+  if (!std::isfinite(tall) || (tall >= kSmall && tall <= kLarge)) return 1;
+  const double wanted = tall < kSmall ? kSmall * kInside : kLarge / kInside;
+  const double steps = std::round(std::log(wanted / tall) / std::log(kStep));
+  return std::pow(kStep, std::clamp(steps, -10.0, 10.0));
+}
+
 }  // namespace
 
-JointExtractor::JointExtractor(SkeletonModel& model, int samples, double around, bool keep_limbs)
+JointExtractor::JointExtractor(SkeletonModel& model, int samples, double around, bool keep_limbs,
+                               bool any_size)
     : model_(model),
       device_(device_of(model)),
       around_(around),
       keep_limbs_(keep_limbs),
+      any_size_(any_size),
       centres_(static_cast<size_t>(samples)),
       views_(static_cast<size_t>(samples)) {}
 
@@ -47,7 +70,22 @@ void JointExtractor::arrange(const Points& cloud, const std::string& source) {
 
 SeenJoints JointExtractor::operator()(const Points& cloud, const std::string& source,
                                       const RngKey& key, const SeenJoints* before) {
+  constexpr int kMostLooks = 3;  // who is very small looks larger than life at first
   arrange(cloud, source);
+  scale_ = any_size_ && before != nullptr ? scale_for(before->joints) : 1;
+  SeenJoints out = look(source, key, before);
+  for (int looks = 1; any_size_ && before == nullptr && looks < kMostLooks; ++looks) {
+    const double scale = scale_for(out.joints);
+    if (scale == scale_) break;
+    scale_ = scale;
+    out = look(source, key, before);
+  }
+  return out;
+}
+
+/// The answer to the arranged points in the scale of now.
+SeenJoints JointExtractor::look(const std::string& source, const RngKey& key,
+                                const SeenJoints* before) {
   const auto n = static_cast<size_t>(model_.points());
   const size_t views = centres_.size();
   Tensor batch = Tensor::empty({static_cast<int64_t>(views), static_cast<int64_t>(n), 3});
@@ -64,7 +102,7 @@ SeenJoints JointExtractor::operator()(const Points& cloud, const std::string& so
     float* row = batch.data<float>() + s * n * 3;
     for (size_t i = 0; i < n; ++i) {
       Eigen::Map<Point> to(row + 3 * i);
-      to = turn * (chosen_[i].cast<double>() - centre).cast<float>();
+      to = turn * (scale_ * (chosen_[i].cast<double>() - centre)).cast<float>();
       to.x() *= side;
     }
   }
@@ -97,9 +135,10 @@ Tensor JointExtractor::past(const SeenJoints& before) const {
     const Mat3 turn = turn_about_y(heading(s));
     for (size_t j = 0; j < kJoints; ++j, to += 4) {
       const size_t from = mirrored(s) ? static_cast<size_t>(kMirror[j]) : j;
-      Eigen::Map<Point>{to} = (turn * (before.joints[from] - centres_[s])).cast<float>();
+      Eigen::Map<Point>{to} = (scale_ * (turn * (before.joints[from] - centres_[s]))).cast<float>();
       if (mirrored(s)) to[0] = -to[0];
-      to[3] = static_cast<float>(before.uncertainty ? trust_of((*before.uncertainty)[from]) : 1.0);
+      to[3] = static_cast<float>(before.uncertainty ? trust_of(scale_ * (*before.uncertainty)[from])
+                                                    : 1.0);
     }
   }
   return out;
@@ -115,7 +154,7 @@ void JointExtractor::read(const SkeletonAnswer& answer) {
     for (size_t j = 0; j < kJoints; ++j) {
       const size_t row = s * kJoints + (mirrored(s) ? static_cast<size_t>(kMirror[j]) : j);
       const float* x = joints.data<float>() + row * 3;
-      view.joints[j] = back * Vec3(mirrored(s) ? -x[0] : x[0], x[1], x[2]) + centres_[s];
+      view.joints[j] = back * Vec3(mirrored(s) ? -x[0] : x[0], x[1], x[2]) / scale_ + centres_[s];
       view.turns[j].setZero();
       if (turns.defined()) {
         View::Columns own =
@@ -128,14 +167,16 @@ void JointExtractor::read(const SkeletonAnswer& answer) {
         view.turns[j] = back * own;
       }
       view.log_uncertainty[j] =
-          uncertainty.defined() ? static_cast<double>(uncertainty.data<float>()[row]) : 0;
+          uncertainty.defined()
+              ? static_cast<double>(uncertainty.data<float>()[row]) - std::log(scale_)
+              : 0;
     }
   }
 }
 
 Joints extract_joints(SkeletonModel& model, const Points& cloud, const std::string& source,
-                      const RngKey& key, int samples, double around) {
-  return JointExtractor(model, samples, around)(cloud, source, key).joints;
+                      const RngKey& key, int samples, double around, bool any_size) {
+  return JointExtractor(model, samples, around, false, any_size)(cloud, source, key).joints;
 }
 
 Points surface_points(const Mesh& mesh, size_t n, const RngKey& key) {

@@ -23,8 +23,10 @@ class JointExtractor {
   /// turned about y by another part of `around`; every second view is mirrored. An extractor errs
   /// differently on each view; the answers are combined() (docs/method.md, "Views").
   /// `keep_limbs`: see keep_limbs().
+  /// `any_size`: a person who is smaller or larger than the adults of trainings is shown in an
+  /// adult's size: the frame before says how tall somebody is, or a first answer.
   explicit JointExtractor(SkeletonModel& model, int samples = 1, double around = kAllAround,
-                          bool keep_limbs = false);
+                          bool keep_limbs = false, bool any_size = false);
   /// Metres, in the cloud's frame. Points are sorted first and exact repeats left out, so neither
   /// their order in a file nor pixels without depth matter to the last bit. `key` says where the
   /// choices of points begin.
@@ -38,6 +40,7 @@ class JointExtractor {
 
  private:
   void arrange(const Points& cloud, const std::string& source);
+  SeenJoints look(const std::string& source, const RngKey& key, const SeenJoints* before);
   double heading(size_t view) const;
   Tensor past(const SeenJoints& before) const;
   void read(const SkeletonAnswer& answer);
@@ -45,7 +48,8 @@ class JointExtractor {
   SkeletonModel& model_;
   Device device_;  // the model's
   double around_;
-  bool keep_limbs_;
+  bool keep_limbs_, any_size_;
+  double scale_ = 1;  // from metres to what the model is shown
   EvenPoints points_;
   Points chosen_, kept_;
   bool told_of_strays_ = false;
@@ -56,7 +60,8 @@ class JointExtractor {
 
 /// The joints of one cloud.
 Joints extract_joints(SkeletonModel& model, const Points& cloud, const std::string& source,
-                      const RngKey& key, int samples = 1, double around = kAllAround);
+                      const RngKey& key, int samples = 1, double around = kAllAround,
+                      bool any_size = false);
 
 /// `n` points of a surface, uniform by area; of a mesh without faces, its vertices as they are.
 Points surface_points(const Mesh& mesh, size_t n, const RngKey& key);

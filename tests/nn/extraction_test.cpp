@@ -193,6 +193,79 @@ TEST(InferExtraction, ViewsAgreeOnRotations) {
   }
 }
 
+/// Knows adults: whoever it sees has their joints, in the cloud's height. In clouds of another size
+/// the joints are wrong, and too far apart.
+struct KnowsAdults final : SkeletonModel {
+  static constexpr float kHeight = 1.6f;  // of the cloud
+  KnowsAdults() {
+    joints = tiny_body("b", "test").joints;
+    double tall = leg_length(joints);
+    for (size_t j = kHead; j != 0; j = static_cast<size_t>(kParents[j]))
+      tall += (joints[j] - joints[static_cast<size_t>(kParents[j])]).norm();
+    for (Vec3& joint : joints) joint *= 1.5 / tall;
+  }
+  SkeletonOutput forward(Context&, const SkeletonInput& in) override {
+    ++looks;
+    const int64_t n = in.cloud.size(0);
+    Tensor out = Tensor::zeros({n, kJoints, 3});
+    for (int64_t i = 0; i < n; ++i) {
+      const float* x = in.cloud.value.data<float>() + i * 64 * 3;
+      float low = x[1], high = x[1];
+      for (int64_t k = 0; k < 64; ++k)
+        low = std::min(low, x[3 * k + 1]), high = std::max(high, x[3 * k + 1]);
+      const float size = (high - low) / kHeight;
+      const float wrong = size < 0.85f || size > 1.25f ? 1.08f : 1.0f;
+      for (int64_t j = 0; j < kJoints; ++j)
+        for (int c = 0; c < 3; ++c)
+          out.data<float>()[3 * (i * kJoints + j) + c] =
+              wrong * size * static_cast<float>(joints[static_cast<size_t>(j)][c]);
+    }
+    SkeletonOutput answer;
+    answer.joints = Var(out);
+    answer.uncertainty = Var(Tensor::full({n, kJoints}, -3));
+    return answer;
+  }
+  int64_t points() const override { return 64; }
+  void visit(Fields&) override {}
+  const char* kind() const override { return "KnowsAdults"; }
+  Joints joints;
+  int looks = 0;
+};
+
+TEST(InferExtraction, PeopleOfAnySizeAreShownAsAdults) {
+  KnowsAdults model;
+  Points adult = cloud(64);
+  float low = 0, high = 0;
+  for (const Point& p : adult) low = std::min(low, p.y()), high = std::max(high, p.y());
+  for (Point& p : adult) p *= KnowsAdults::kHeight / (high - low);
+  const RngKey key{9, 0};
+  const SeenJoints usual = JointExtractor(model, 1)(adult, "c", key);
+  for (const double size : {0.4, 0.5, 0.7, 1.0, 1.5, 2.0}) {
+    Points points = adult;
+    for (Point& p : points) p *= static_cast<float>(size);
+    JointExtractor any(model, 1, kAllAround, false, true);
+    model.looks = 0;
+    const SeenJoints first = any(points, "c", key);
+    if (size == 1) {
+      EXPECT_EQ(model.looks, 1);
+    }
+    model.looks = 0;
+    const SeenJoints next = any(points, "c", key, &first);
+    EXPECT_EQ(model.looks, 1) << "the frame before says how tall somebody is";
+    for (const SeenJoints* seen : {&first, &next})
+      for (size_t j = 0; j < kJoints; ++j) {
+        EXPECT_LT((seen->joints[j] - size * usual.joints[j]).norm(), 0.015 * size) << size << " " << j;
+        EXPECT_NEAR((*seen->uncertainty)[j], size * std::exp(-3.0), 0.3 * size * std::exp(-3.0));
+      }
+    if (size != 1) {
+      EXPECT_GT(
+          (JointExtractor(model, 1)(points, "c", key).joints[kHead] - size * usual.joints[kHead])
+              .norm(),
+          0.01 * size);
+    }
+  }
+}
+
 TEST(InferExtraction, MirroredViewsChangeSides) {
   // Whatever the view shows, left is where x is positive in it.
   struct Sides final : SkeletonModel {

@@ -34,9 +34,10 @@ void visit(V& v, CorpusSource& c) {
 
 struct EvaluationConfig {
   int64_t sequences = 12, frames = 90, every = 1;
-  std::string system = "chain";                   ///< infer/systems.h
-  double anchor = 0.25;                           ///< of RetargetOptions
-  bool steady_bones = false, keep_limbs = false;  ///< of RetargetOptions, where true is usual
+  std::string system = "chain";  ///< infer/systems.h
+  double anchor = 0.25;          ///< of RetargetOptions
+  /// Of RetargetOptions, where true is usual.
+  bool steady_bones = false, keep_limbs = false, any_size = false;
   ScanConfig scans;
 };
 
@@ -59,6 +60,8 @@ void visit(V& v, EvaluationConfig& c) {
     "the source's bones are held at their mean length so far, as 'restage retarget' does",
     added("false"));
   v("keep_limbs", c.keep_limbs, "limbs that cross keep their names, as 'restage retarget' does",
+    added("false"));
+  v("any_size", c.any_size, "people of any size are seen in an adult's, as 'restage retarget' does",
     added("false"));
   v("scans", c.scans, "held-out sequences as they are seen");
   v("every", c.every, "a sweep's trial is measured on every so many frames", positive());
