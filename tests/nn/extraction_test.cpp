@@ -254,7 +254,8 @@ TEST(InferExtraction, PeopleOfAnySizeAreShownAsAdults) {
     EXPECT_EQ(model.looks, 1) << "the frame before says how tall somebody is";
     for (const SeenJoints* seen : {&first, &next})
       for (size_t j = 0; j < kJoints; ++j) {
-        EXPECT_LT((seen->joints[j] - size * usual.joints[j]).norm(), 0.015 * size) << size << " " << j;
+        EXPECT_LT((seen->joints[j] - size * usual.joints[j]).norm(), 0.015 * size)
+            << size << " " << j;
         EXPECT_NEAR((*seen->uncertainty)[j], size * std::exp(-3.0), 0.3 * size * std::exp(-3.0));
       }
     if (size != 1) {
