@@ -17,7 +17,7 @@ std::vector<std::string> shipped_configs() {
   std::error_code error;
   for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end;
        it.increment(error))
-    if (it->path().extension() == ".yaml")
+    if (it->path().extension() == ".yaml" && it->path().parent_path().filename() != "data")
       out.push_back(it->path().lexically_relative(folder).replace_extension().string());
   std::sort(out.begin(), out.end());
   return out;

@@ -6,7 +6,7 @@
 
 namespace restage {
 
-/// Their names: "demo", "standard/finetune", ...
+/// The names of those of trainings: "demo", "standard/finetune", ...
 std::vector<std::string> shipped_configs();
 /// The file of that name ("standard/finetune" is configs/standard/finetune.yaml, wherever the
 /// program was started); empty if there is none.

@@ -1,6 +1,7 @@
 // restage reproduce: the experiments of a paper, run and judged.
 #include <algorithm>
 
+#include "autograd/base/atomic_file.h"
 #include "autograd/base/interrupt.h"
 #include "autograd/base/log.h"
 #include "autograd/base/parallel.h"
@@ -94,6 +95,7 @@ int run_reproduce(ReproduceOptions o, const Common& common) {
   const std::vector<Evidence> all = reproduce::find_evidence(o.from, o.paper, o.table, o.out);
   const StopScope stop;
   plan(o, common, all);
+  make_folder(o.page);  // now, and not after the first training
   const bool done = o.no_run || run_trials(o, all);
   reproduce::PageOptions options{o.paper, o.budget, common.command_line, common.seed};
   options.command[0] = "restage";

@@ -337,7 +337,8 @@ void add_argument(SweepFile& file, const SweepWord& word) {
     return;
   }
   if (word.key == "base") {
-    if (word.values.size() != 1) fail(place, "is no file", "write base=CONFIG.yaml");
+    if (word.values.size() != 1 || word.values[0].text.empty())
+      fail(place, "is no file", "write base=CONFIG.yaml");
     file.base = config_file(word.values[0].text);
     file.base_place = place;
     return;

@@ -31,7 +31,7 @@ double scale_for(const Joints& joints) {
   if (!std::isfinite(tall) || (tall >= kSmall && tall <= kLarge)) return 1;
   const double wanted = tall < kSmall ? kSmall * kInside : kLarge / kInside;
   const double steps = std::round(std::log(wanted / tall) / std::log(kStep));
-  return std::pow(kStep, std::clamp(steps, -10.0, 10.0));
+  return std::pow(kStep, std::clamp(steps, -16.0, 16.0));
 }
 
 }  // namespace
@@ -70,7 +70,7 @@ void JointExtractor::arrange(const Points& cloud, const std::string& source) {
 
 SeenJoints JointExtractor::operator()(const Points& cloud, const std::string& source,
                                       const RngKey& key, const SeenJoints* before) {
-  constexpr int kMostLooks = 3;  // who is very small looks larger than life at first
+  constexpr int kMostLooks = 5;  // who is very small looks larger than life at first
   arrange(cloud, source);
   scale_ = any_size_ && before != nullptr ? scale_for(before->joints) : 1;
   SeenJoints out = look(source, key, before);

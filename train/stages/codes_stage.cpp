@@ -55,6 +55,15 @@ Tensor shapes_of(const Corpus& corpus, const LinearBody& body) {
   return Tensor::from<float>({std::ssize(corpus.bodies), body.directions.size(2)}, all);
 }
 
+/// Warns where a second stage is wanted, but none is trained.
+void check_second_stage(const CodesStageConfig& c) {
+  const bool built = c.model.sizes.as<H4dConfig>().aux > 0;
+  if (built && c.aux_from >= c.optimiser.steps)
+    log_warning("codes.aux_from is not before the last step: the second stage is not trained");
+  if (!built && c.aux_from > 0)
+    log_warning("codes.aux_from says nothing without codes.sizes.aux: there is no second stage");
+}
+
 Var length_of_difference(const Var& shape, const Tensor& truth) {
   return mean_all(smooth_length(shape - Var(truth), kNoLength));
 }
@@ -76,6 +85,7 @@ CodesStage::CodesStage(const Config& config, const StageInput& in)
 /// The network, with the body and the basis of the training's data. It is as large as the data ask
 /// for: three numbers of pose for each joint, and no more directions than there are.
 H4d* CodesStage::make_network(const Config& config, const StageInput& in) {
+  check_second_stage(config);
   AnyConfig sizes = config.model.sizes;
   auto& c = sizes.as<H4dConfig>();
   if (c.pose != 3 * kJoints)
