@@ -75,9 +75,13 @@ std::vector<T> read_members(const std::string& path, const std::string& group,
   std::vector<T> out;
   const std::vector<std::string> ids = file.children(group);
   if (ids.empty()) throw InputError(path + ":" + group, "is empty", "give a file that holds some");
-  for (const std::string& id : ids)
-    if (split.empty() || text_or_nothing(file, group + "/" + id, "split") == split)
-      out.push_back(read(file, id));
+  for (const std::string& id : ids) {
+    const std::string own = text_or_nothing(file, group + "/" + id, "split");
+    if (!split.empty() && !own.empty() && !is_split(own))  // else nobody would miss it
+      throw InputError(path + ":" + group + "/" + id, "has the split '" + own + "'",
+                       "use train, validation or test");
+    if (split.empty() || own == split) out.push_back(read(file, id));
+  }
   return out;
 }
 

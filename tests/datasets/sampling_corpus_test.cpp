@@ -16,6 +16,7 @@
 #include "datasets/sampling/windows.h"
 #include "datasets/schema.h"
 #include "tests/datasets/sampling_support.h"
+#include "tests/support/errors.h"
 #include "tests/support/files.h"
 #include "tests/support/use_set.h"
 
@@ -95,6 +96,12 @@ TEST_F(SamplingCorpus, FilesComeBackAsTheyWereWritten) {
   EXPECT_EQ(validation.description, "boxes");
   EXPECT_EQ(validation.license, "Apache-2.0");
   EXPECT_EQ(checksum(load_corpus({path}, "test")), checksum(subset(load_corpus({path}), "test")));
+
+  // What is of no known split is not left out without a word.
+  std::vector<Motion> lost = all.motions;
+  lost.back().split = "trian";
+  write_dataset(dir / "lost.h5", all.bodies, lost, {"Apache-2.0", "boxes"});
+  EXPECT_HAS(test::refusal_of([&] { load_corpus({dir / "lost.h5"}, "train"); }), "'trian'");
 
   // Licence, provenance and the definition of the joints change no number.
   std::vector<Body> said = all.bodies;
