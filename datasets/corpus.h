@@ -43,10 +43,10 @@ Corpus subset(const Corpus& corpus, const std::string& split);
 /// the built-in source. `train`: what would be trained on.
 std::vector<std::string> remarks(const CorpusSource& source, const Corpus& train);
 
-/// 16 hexadecimal digits that change with any number, id or split: provenance of a run.
+/// 64 hexadecimal digits that change with any number, id, subject or split, and with nothing else,
+/// such as a licence or which joints the joints are.
 std::string checksum(const Corpus& corpus);
-/// 64 digits that change with any number, id or split of a data set file, and with nothing else of
-/// it, such as its licence or a new attribute. That of a large file is kept (readers/file_sums.h).
+/// The same of all that a data set file holds; that of a large file is kept (readers/file_sums.h).
 std::string content_of_file(const std::string& path);
 
 }  // namespace restage

@@ -292,8 +292,8 @@ PA-MPVD. "Source unchanged" hands on the source's true skeleton.
 * Seeds share the extractor's first look and the skinning. So the true spread is larger
   ([each seed](notes/results_log.md#seeds-calm-and-fitting-as-the-page-had-them)). Seed 1 is shipped.
 * **The tables are of sweeps, which do not [hold bones](real_scans.md#one-person-is-one-skeleton) and do not [keep the
-  names of limbs](real_scans.md#limbs-that-cross-keep-their-names).** `retarget` does both. What held bones
-  change is [below](#four-kinds-of-cloud-pa-mpjpe--mpjpe--pa-mpvd--acc).
+  names of limbs](real_scans.md#limbs-that-cross-keep-their-names).** `retarget` does both. The
+  effect of held bones is [below](#four-kinds-of-cloud-pa-mpjpe--mpjpe--pa-mpvd--acc).
 
 ## The benchmark's sets
 
@@ -339,8 +339,8 @@ benchmark, which has other people and motions, and somebody else's arm in one of
 The references see true joints, the same in all columns. PA-MPJPE / MPJPE / Acc:
 {same_for_all}.
 
-**Rotations of the joints: mean error in degrees / share of more than 90 degrees in %.** In none of the 80 sequences do
-legs or arms change sides.
+**Rotations of the joints: mean error in degrees / share of more than 90 degrees in %.** In none of these
+sequences do legs or arms change sides.
 
 {rotations}
 

@@ -80,38 +80,27 @@ std::string script_of(const std::string& shell, const CommandTree& program) {
 
 std::string bash_completion(const CommandTree& program) {
   // Names may hold spaces.
-  const auto with_files = [](const std::string& words) {
-    return "mapfile -t COMPREPLY < <(" + words + "compgen -f -- \"$current\")";
+  const auto files_and = [](const std::vector<std::string>& words) {
+    const std::string known =
+        words.empty() ? "" : "compgen -W '" + joined(words) + "' -- \"$current\"; ";
+    return "mapfile -t COMPREPLY < <(" + known + "compgen -f -- \"$current\")";
+  };
+  const auto only = [](const std::string& words) {
+    return "COMPREPLY=($(compgen -W '" + words + "' -- \"$current\"))";
+  };
+  const auto rest = [&](const CommandTree& command) {
+    std::vector<std::string> commands, options;
+    for (const auto& sub : command.commands) commands.push_back(sub.name);
+    for (const auto& option : command.options) options.push_back(option.name);
+    return for_each_value(command, only, files_and({})) + "      if [[ $current == -* ]]; then " +
+           only(joined(options)) + "\n      else " +
+           (commands.empty() ? files_and(command.words) : only(joined(commands))) + "; fi\n";
   };
   return "# restage completion bash > /usr/share/bash-completion/completions/restage\n"
          "_restage() {\n"
          "  local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD - 1]}\n"
          "  local before=(\"${COMP_WORDS[@]:1:COMP_CWORD - 1}\")\n" +
-         find_path(program) +
-         for_each_path(
-             program,
-             [&](const CommandTree& command) {
-               std::vector<std::string> commands, options;
-               for (const auto& sub : command.commands) commands.push_back(sub.name);
-               for (const auto& option : command.options) options.push_back(option.name);
-               std::string out = for_each_value(
-                   command,
-                   [](const std::string& words) {
-                     return "COMPREPLY=($(compgen -W '" + words + "' -- \"$current\"))";
-                   },
-                   with_files(""));
-               out += "      if [[ $current == -* ]]; then COMPREPLY=($(compgen -W '" +
-                      joined(options) + "' -- \"$current\"))\n";
-               const std::string known = joined(command.words);
-               out += commands.empty() && !known.empty()
-                          ? "      else " +
-                                with_files("compgen -W '" + known + "' -- \"$current\"; ") +
-                                "; fi\n"
-                      : commands.empty() ? "      else " + with_files("") + "; fi\n"
-                                         : "      else COMPREPLY=($(compgen -W '" +
-                                               joined(commands) + "' -- \"$current\")); fi\n";
-               return out;
-             }) +
+         find_path(program) + for_each_path(program, rest) +
          "}\n"
          "complete -o filenames -F _restage restage\n";
 }

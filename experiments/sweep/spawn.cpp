@@ -56,6 +56,7 @@ std::string pass_on(int from) {
       line.clear();
     }
   }
+  write_all(STDERR_FILENO, line);  // of a program that died in the middle of it
   return last;
 }
 

@@ -109,14 +109,6 @@ std::vector<Pose> closed_form(const std::vector<Joints>& source, const Joints& t
   return poses;
 }
 
-std::vector<Joints> closed_form_joints(const std::vector<Joints>& source,
-                                       const Joints& target_rest) {
-  std::vector<Joints> joints;
-  for (const Pose& pose : closed_form(source, target_rest))
-    joints.push_back(forward_kinematics(target_rest, pose).joints);
-  return joints;
-}
-
 std::vector<Joints> rest_pose_joints(const std::vector<Joints>& source, const Joints& target_rest) {
   std::vector<Joints> joints;
   for (const Vec3& pelvis : pelvis_path(source, target_rest)) {

@@ -35,9 +35,6 @@ double trajectory_scale(const Joints& source, const Joints& target_rest);
 std::vector<Pose> closed_form(const std::vector<Joints>& source, const Joints& target_rest,
                               const std::optional<Joints>& source_rest = std::nullopt);
 
-/// B's joints performing `closed_form`.
-std::vector<Joints> closed_form_joints(const std::vector<Joints>& source,
-                                       const Joints& target_rest);
 /// B in its rest pose, carried along the path that closed_form() gives its pelvis.
 std::vector<Joints> rest_pose_joints(const std::vector<Joints>& source, const Joints& target_rest);
 // The third reference, "source skeleton unchanged", is `source` itself.

@@ -114,7 +114,7 @@ struct H4dSpace : Module {
 };
 
 /// The networks of the first stage and, with `aux` in the sizes, those of the second one that see
-/// to poses. The correction starts at 0, as a GRU's output layer of zeros.
+/// to poses. The last layer of the correction starts at zeros.
 struct H4d : Module {
   using Config = H4dConfig;
   struct Codes {

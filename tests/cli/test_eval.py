@@ -104,10 +104,10 @@ class Eval(CliTest):
         self.assertAlmostEqual(result["mended"]["tilt_degrees"], 0)
         self.assertAlmostEqual(result["references"]["source_unchanged"]["mpjpe"], 0, places=9)
         half = 0.5 ** 0.5  # rotations come into the world, too
-        self.h5("truth.h5", joints=([F, 22, 3], self.joints), rotations=([F, 22, 4], [1, 0, 0, 0] * (22 * F)),
+        self.h5("truth.h5", joints=([F, 22, 3], self.joints), rotations=([F, 22, 4], [0.5] * (88 * F)),
                 source_to_world=([3, 4], [0, 0, 0.01, 1, 0.01, 0, 0, 2, 0, 0.01, 0, 3]))
         self.h5("pred.h5", joints=([F, 22, 3], [0.1 * x for x in flat(mended)]),
-                rotations=([F, 22, 4], [half, 0, -half, 0] * (22 * F)))
+                rotations=([F, 22, 4], [half, 0, 0, half] * (22 * F)))
         self.assertAlmostEqual(self.eval("pred.h5", "truth.h5", "--mended", "mended.h5", *files)["rotation_deg"], 0, places=5)
         bad = lambda *words: self.bad_input(["eval", "--pred", "pred.h5", "--truth", "truth.h5", "--mended", "mended.h5", *files], *words)
         self.bad_input(["eval", "--pred", "pred.h5", "--truth", "truth.h5", "--mended", "mended.h5"], "--source")

@@ -5,6 +5,7 @@
 #include "autograd/base/rng.h"
 #include "nn/models/motion.h"
 #include "nn/models/registry.h"
+#include "tests/support/closed_form_joints.h"
 #include "tests/support/tiny_body.h"
 
 namespace restage {

@@ -12,6 +12,7 @@
 #include "nn/geometry/closed_form.h"
 #include "nn/models/bone_field.h"
 #include "nn/models/registry.h"
+#include "tests/support/closed_form_joints.h"
 #include "tests/support/tiny_body.h"
 
 namespace restage {

@@ -18,8 +18,8 @@ namespace restage {
 /// its own life (datasets/readers/file_sums.h).
 class Identities {
  public:
-  /// The identity of bodies and motions: the numbers, ids and splits of a data set file or of those
-  /// of a benchmark, or the keys of the built-in source. InputError if a file cannot be read.
+  /// The identity of bodies and motions: the checksum() of a data set file or of those of a
+  /// benchmark, or the keys of the built-in source. InputError if a file cannot be read.
   std::string data(const CorpusSource& source);
   /// The identity of a weights file, run or artifact: the checksum of its bytes.
   std::string weights(const std::string& path);
