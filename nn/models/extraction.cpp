@@ -23,10 +23,11 @@ double tallness(const Joints& joints) {
   return out;
 }
 
-/// 1 for adults, 1.48 to 2.1 m tall. Others are brought near the nearer end of that, by a power of
-/// 1.1, so that the scale seldom changes from frame to frame.
+/// 1 for people as tall as those of trainings, 1.37 to 2.1 m. Others are brought inside that range,
+/// by a power of 1.1, so that the scale seldom changes from frame to frame.
 double scale_for(const Joints& joints) {
-  constexpr double kSmall = 1.3, kLarge = 1.84, kInside = 1.14, kStep = 1.1;  // tallness, metres
+  // Tallness, metres: MakeHuman's adults have 1.26 to 1.78, and trainings scale them by up to 5 %.
+  constexpr double kSmall = 1.2, kLarge = 1.84, kInside = 1.14, kStep = 1.1;
   const double tall = std::max(tallness(joints), 1e-3);
   if (!std::isfinite(tall) || (tall >= kSmall && tall <= kLarge)) return 1;
   const double wanted = tall < kSmall ? kSmall * kInside : kLarge / kInside;

@@ -214,7 +214,7 @@ struct KnowsAdults final : SkeletonModel {
       for (int64_t k = 0; k < 64; ++k)
         low = std::min(low, x[3 * k + 1]), high = std::max(high, x[3 * k + 1]);
       const float size = (high - low) / kHeight;
-      const float wrong = size < 0.85f || size > 1.25f ? 1.08f : 1.0f;
+      const float wrong = size < 0.8f || size > 1.25f ? 1.08f : 1.0f;
       for (int64_t j = 0; j < kJoints; ++j)
         for (int c = 0; c < 3; ++c)
           out.data<float>()[3 * (i * kJoints + j) + c] =
