@@ -158,10 +158,12 @@ class DeformationOnline : public Item {
   Frames frames_{4};
 };
 
-/// The papers take one choice of a cloud's points.
+/// The papers take one choice of a cloud's points. Joints of untrained weights have no size that a
+/// look at a cloud could follow.
 RetargetOptions one_choice() {
   RetargetOptions out;
   out.samples = 1;
+  out.any_size = false;
   return out;
 }
 
