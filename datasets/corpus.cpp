@@ -91,6 +91,25 @@ Corpus file_corpus(const std::string& source, const std::string& split) {
   return out;
 }
 
+/// Leaves motions of `subject` alone in the split of training.
+void keep_subject(Corpus& corpus, const std::string& subject, const std::string& where) {
+  std::set<std::string> others;
+  bool there = false;
+  std::erase_if(corpus.motions, [&](const Motion& motion) {
+    if (motion.split != "train") return false;
+    const bool kept = motion.subject == subject;
+    there = there || kept;
+    if (!kept && !motion.subject.empty()) others.insert(motion.subject);
+    return !kept;
+  });
+  if (there) return;
+  std::string names;
+  for (const std::string& other : others) names += (names.empty() ? "'" : ", '") + other + "'";
+  throw InputError(where, "no motion to train on is of subject '" + subject + "'",
+                   names.empty() ? "leave data.subject out: no motion names a subject"
+                                 : "set data.subject to one of " + names);
+}
+
 JointDefinition definition_of(const std::vector<Body>& bodies, const std::string& source) {
   std::vector<NamedDefinition> all;
   for (const Body& body : bodies)
@@ -153,6 +172,8 @@ Corpus load_corpus(const CorpusSource& source, const std::string& split) {
   const std::string where = builtin ? "built-in data" : source.source;
   check_not_empty(out, where, split);
   check_subjects(out, where);
+  if (!source.subject.empty() && split != "validation" && split != "test")
+    keep_subject(out, source.subject, where);
   out.joints = definition_of(out.bodies, where);
   return out;
 }
@@ -177,7 +198,7 @@ std::vector<std::string> remarks(const CorpusSource& source, const Corpus& train
   if (source.source == "builtin") return out;
   std::set<std::string> people;
   for (const Motion& motion : train.motions) people.insert(motion.subject);
-  if (people.size() == 1 && !people.begin()->empty())
+  if (people.size() == 1 && !people.begin()->empty() && source.subject.empty())
     out.push_back("all motions to train on are of one subject ('" + *people.begin() +
                   "'): what is learned may hold for nobody else");
   if (train.bodies.size() < kFewBodies)

@@ -27,13 +27,15 @@ struct CorpusSource {
   uint64_t seed = 0;  ///< of the built-in source; seed and counts leave files alone
   SplitCounts bodies{24, 6, 6};
   SplitCounts motions{120, 20, 20};
-  bool one_mesh = false;  ///< built-in bodies have the same faces; their vertices correspond
+  bool one_mesh = false;     ///< built-in bodies have the same faces; their vertices correspond
+  std::string subject = {};  ///< split "train" has this person's motions only; empty: all
 };
 
 /// All of it, or one split ("train", "validation", "test"; else InputError). A body belongs to one
 /// split, and a motion to the split of its subject, so splits never share either. InputError if
-/// there is no body or no motion, if what is loaded has a subject in two splits or bodies of two
-/// definitions of joints, or if the file is missing or damaged; all of a folder.
+/// there is no body or no motion, none of the subject asked for, if what is loaded has a subject in
+/// two splits or bodies of two definitions of joints, or if the file is missing or damaged; all of
+/// a folder.
 Corpus load_corpus(const CorpusSource& source, const std::string& split = "");
 /// The bodies and the motions of one split. InputError if either is missing.
 Corpus subset(const Corpus& corpus, const std::string& split);

@@ -22,9 +22,10 @@ std::vector<Layer> layers_of(Module& model) {
     if (e.parameter == nullptr) continue;
     if (out.empty() || out.back().name != e.module) out.push_back({e.module, e.kind});
     Layer& layer = out.back();
-    const bool recurrent = layer.kind == "GRU";  // three gates of weights, one state
+    // A recurrent layer has the weights of its gates below one another, and one state.
+    const int64_t gates = layer.kind == "GRU" ? 3 : layer.kind == "LSTM" ? 4 : 1;
     const Shape& shape = e.value->shape();
-    if (layer.parameters == 0) layer.width = recurrent ? shape[0] / 3 : shape[0];
+    if (layer.parameters == 0) layer.width = shape[0] / gates;
     layer.parameters += shape.numel();
   }
   return out;

@@ -101,7 +101,7 @@ struct Outcome {
   Frames filled;  ///< RetargetedFrame::filled
   int64_t frames = 0, held = 0;
   size_t points_left_out = 0;
-  Json confidence = Json::array();
+  std::vector<double> confidence;
 };
 
 /// All frames of the source through the system and into the sink, which is not committed.
@@ -202,13 +202,15 @@ class Run {
 
 /// What is said when all is done; bad input, which may come late in a source, is answered with one
 /// line.
-void log_outcome(const Outcome& done, const Source& source, const Gaps& gaps) {
+void log_outcome(const std::string& name, const Outcome& done, const Source& source,
+                 const Gaps& gaps) {
   for (const std::string& line : source.remarks()) log_warning(line);
   for (const std::string& line : gaps.lines(done.filled)) log_warning(line);
   if (done.points_left_out > 0)
     log_warning(std::to_string(done.points_left_out) +
                 " points of the source are NaN or infinite, or more than 5 m from the middle "
                 "of the others, and were left out");
+  warn_if_unsure(name, done.confidence);
 }
 
 Retargeted told(const RetargetCommand& c, const Common& common, const Source& source,
@@ -295,7 +297,7 @@ Retargeted retarget(const RetargetCommand& c, const Common& common, RetargetCall
   if (!no_skeleton.empty())
     log_warning(c.source.path +
                 ": its surface is looked at; its skeleton cannot be taken: " + no_skeleton);
-  log_outcome(done, source, gaps);
+  log_outcome(c.source.path, done, source, gaps);
   if (c.profile) log_profile(profile);
   return told(c, common, source, done, gaps, profile);
 }

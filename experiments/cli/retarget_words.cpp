@@ -66,4 +66,15 @@ void say_take(const SkeletonTake& take) {
   say(line, take.report);
 }
 
+void warn_if_unsure(const std::string& source, std::vector<double> confidence) {
+  constexpr double kUnsure = 0.4;
+  if (confidence.empty()) return;
+  const auto middle = confidence.begin() + std::ssize(confidence) / 2;
+  std::nth_element(confidence.begin(), middle, confidence.end());
+  if (*middle < kUnsure)
+    log_warning(source + format(": the networks are unsure of most frames (median confidence "
+                                "%.2f); do they show one whole person, y up, in metres?",
+                                *middle));
+}
+
 }  // namespace restage::cli

@@ -1,6 +1,8 @@
 // What `restage retarget` says it has recognised.
 #pragma once
 
+#include <vector>
+
 #include "datasets/importers/gltf_character.h"
 #include "datasets/importers/skeleton_take.h"
 
@@ -12,5 +14,8 @@ namespace restage::cli {
 void say_target(const TargetMesh& target);
 /// The same of a source's skeleton.
 void say_take(const SkeletonTake& take);
+/// A warning if the networks are unsure of most frames: `confidence` of every frame that has one.
+/// Balls, boxes and furniture are told from people so; an arm or a head alone mostly is not.
+void warn_if_unsure(const std::string& source, std::vector<double> confidence);
 
 }  // namespace restage::cli

@@ -10,6 +10,7 @@
 #include "datasets/schema.h"
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
+#include "experiments/cli/retarget_words.h"
 #include "nn/models/extraction.h"
 #include "nn/weights/bundle.h"
 
@@ -85,10 +86,12 @@ int run_skeleton(const SkeletonOptions& options, const Common& common) {
   const RngKey key = RngKey{common.seed, 0}.fold("skeleton");
   JointExtractor extract(model, options.samples, kAllAround, false, true);
   size_t left_out = 0;
+  std::vector<double> sure;
   while (const auto frame = frames->next()) {
     if (frame->fault) throw *frame->fault;
     left_out += frame->left_out;
     SeenJoints seen = extract(frame->points, frame->source, key);
+    if (seen.uncertainty) sure.push_back(confidence(*seen.uncertainty));
     if (convert) seen.joints = (*convert)(seen.joints);
     const auto radius = radius_of(seen);
     if (writer) write(seen.joints, radius, writer.get());
@@ -104,6 +107,7 @@ int run_skeleton(const SkeletonOptions& options, const Common& common) {
   if (left_out > 0)
     log_info(options.input + ": left out " + std::to_string(left_out) +
              (left_out == 1 ? " point" : " points") + " whose coordinates are NaN or infinite");
+  warn_if_unsure(options.input, std::move(sure));
   if (common.json) {
     Json document = {{"frames", list}, {"seed", common.seed}};
     if (!definition.empty()) document["joint_definition"] = definition;

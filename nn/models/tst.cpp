@@ -87,10 +87,14 @@ TstDiscriminator::TstDiscriminator(const TstDiscriminatorConfig& c, const Init& 
       fc2(c.widths[0], c.widths[1], init.sub("fc2")),
       fc3(c.widths[1], 1, init.sub("fc3")) {}
 
-Var TstDiscriminator::operator()(Context& ctx, const Var& vertices) const {
+Var TstDiscriminator::logits(Context& ctx, const Var& vertices) const {
   const ModuleScope path(scope);
   const Var x = reshape(vertices, {vertices.size(0), 3 * vertices.size(1)});
-  return sigmoid(fc3(ctx, fc2(ctx, fc1(ctx, x, Activation::relu), Activation::relu)));
+  return fc3(ctx, fc2(ctx, fc1(ctx, x, Activation::relu), Activation::relu));
+}
+
+Var TstDiscriminator::operator()(Context& ctx, const Var& vertices) const {
+  return sigmoid(logits(ctx, vertices));
 }
 
 void TstDiscriminator::visit(Fields& f) {

@@ -70,6 +70,8 @@ struct TstDiscriminator : Module {
   using Config = TstDiscriminatorConfig;
   TstDiscriminator(const TstDiscriminatorConfig& c, const Init& init);
   Var operator()(Context& ctx, const Var& vertices) const;
+  /// The same before the sigmoid, for losses that must not overflow.
+  Var logits(Context& ctx, const Var& vertices) const;
   void visit(Fields& f) override;
   const char* kind() const override { return "TSTDiscriminator"; }
   TstDiscriminatorConfig config;

@@ -86,6 +86,29 @@ TEST_F(SamplingCorpus, BuiltinIsTheSameForEverySplitAloneAndTogether) {
   EXPECT_NE(checksum(subset(all, "train")), checksum(subset(all, "validation")));
 }
 
+TEST_F(SamplingCorpus, OfOneSubjectOnlyTheTrainingIsLess) {
+  Corpus all = tiny_corpus();
+  std::string one;
+  for (size_t i = 0; i < all.motions.size(); ++i) {
+    Motion& motion = all.motions[i];
+    motion.subject = motion.split + std::to_string(i);
+    if (motion.split == "train" && one.empty()) one = motion.subject;
+  }
+  const std::string path = dir / "people.h5";
+  write_dataset(path, all.bodies, all.motions, {"Apache-2.0", "boxes"});
+  CorpusSource source{path}, alone{path};
+  alone.subject = one;
+  ASSERT_GT(load_corpus(source, "train").motions.size(), 1u);
+  const Corpus train = load_corpus(alone, "train");
+  ASSERT_EQ(train.motions.size(), 1u);
+  EXPECT_EQ(train.motions[0].subject, one);
+  EXPECT_EQ(train.bodies.size(), load_corpus(source, "train").bodies.size());
+  EXPECT_EQ(checksum(load_corpus(alone, "test")), checksum(load_corpus(source, "test")));
+  EXPECT_EQ(checksum(subset(load_corpus(alone), "train")), checksum(train));
+  alone.subject = "nobody";
+  EXPECT_HAS(test::refusal_of([&] { load_corpus(alone, "train"); }), "'" + one + "'");
+}
+
 TEST_F(SamplingCorpus, FilesComeBackAsTheyWereWritten) {
   const Corpus all = tiny_corpus();
   const std::string path = dir / "boxes.h5";

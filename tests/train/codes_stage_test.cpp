@@ -12,13 +12,6 @@ namespace {
 
 using namespace testing;
 
-double figure_of(const NamedValues& values, const std::string& name) {
-  for (const auto& [key, value] : values)
-    if (key == name) return value;
-  ADD_FAILURE() << "no " << name;
-  return 0;
-}
-
 TEST(CodesStage, LearnsTheBodiesAndTheirPoses) {
   const auto stage = tiny_stage("codes", tiny_codes(120));
   const NamedValues before = stage->validate();

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "datasets/schema.h"
 #include "nn/config/config.h"
 #include "nn/weights/bundle.h"
 #include "tests/support/files.h"
@@ -76,6 +77,15 @@ TEST(Identity, WhatChangesResultsChangesIt) {
   TrainConfig steps = over(path);
   ++motion(steps).optimiser.steps;
   EXPECT_NE(ids_of(steps).motion, first.motion);
+
+  const Corpus all = load_corpus(same.data);
+  write_dataset(dir / "data.h5", all.bodies, all.motions, {"Apache-2.0", "built in"});
+  TrainConfig file = same;
+  file.data = {dir / "data.h5"};
+  TrainConfig alone = file;
+  alone.data.subject = all.motions[0].subject;
+  EXPECT_NE(ids_of(alone).motion, ids_of(file).motion);
+  EXPECT_NE(ids_of(alone).trial, ids_of(file).trial);
 }
 
 /// Ids of the stages and of the trial that a configuration asks for.

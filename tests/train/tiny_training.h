@@ -1,6 +1,8 @@
 // A training of all three stages that takes a moment: for tests of the stages and of the loop.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include "tests/support/tiny_body.h"
 #include "train/stages/deformation_stage.h"
 #include "train/stages/motion_stage.h"
@@ -84,6 +86,13 @@ inline const TrainingData& tiny_data() {
 inline std::unique_ptr<Stage> tiny_stage(const std::string& name, const TrainConfig& config,
                                          Bundle so_far = {}) {
   return make_stage(config, name, tiny_data(), &so_far);
+}
+
+inline double figure_of(const NamedValues& values, const std::string& name) {
+  for (const auto& [key, value] : values)
+    if (key == name) return value;
+  ADD_FAILURE() << "no " << name;
+  return 0;
 }
 
 /// All that a stage carries from step to step.

@@ -71,6 +71,18 @@ TransferStage::TransferStage(const Config& config, const StageInput& in)
   if (config.loss.metric > 0 && model_->frames() < 2)
     throw InputError("", "loss.metric needs windows of two frames at least",
                      "set sizes.frames: 3, or loss.metric: 0");
+  if (config.loss.adversarial > 0) {
+    if (!model_->corresponding())
+      throw InputError("", "loss.adversarial needs vertices in correspondence",
+                       "choose model: transfer/tst, or set loss.adversarial: 0");
+    const TstDiscriminatorConfig sizes{.vertices = sampler_.vertices()};
+    discriminator_ = add_network<TstDiscriminator>(
+        "discriminator", "transfer/tst_discriminator", AnyConfig(sizes),
+        RngKey{in.seed, 0}.fold("transfer.discriminator"), {}, false);
+    if (config.loss.train_discriminator)
+      discriminator_optimiser_ =
+          add_optimiser("discriminator_optimiser", {"discriminator"}, config.optimiser);
+  }
   if (config.pairs.vertices > 0) {
     set("transfer", "vertices", std::to_string(sampler_.vertices()));
     if (model_->corresponding()) {
@@ -133,7 +145,29 @@ Var TransferStage::loss(Context& ctx, const TransferBatch& pairs, int64_t step, 
     total = total + scale(mse(some(frames), some(truth)), l.distances);
   }
   if (l.metric > 0 && step >= l.metric_from) total = total + scale(metric(ctx, pairs), l.metric);
+  if (discriminator_ != nullptr) {
+    const Frozen judge(ctx);
+    const Var real = bce_with_logits(discriminator_->logits(ctx, frames), 1);
+    total = total + scale(real, l.adversarial);
+  }
   return total;
+}
+
+double TransferStage::update_discriminator(int64_t step, double rate) {
+  const RngKey key = key_.fold("discriminator").fold(static_cast<uint64_t>(step));
+  const Differentiated d = parts(*discriminator_optimiser_, [&](const MicroBatch& part) {
+    const TransferBatch pairs = moved(batch(step, part), device());
+    Context plain;  // the other network gets no gradient from this
+    const Var made = model_->forward(plain, {pairs.pose, pairs.identity}).detach();
+    return differentiate(part.key(key), [&](Context& ctx) {
+      const auto judged = [&](const Var& x, double label) {
+        return bce_with_logits(discriminator_->logits(ctx, frames_of(x)), label);
+      };
+      return judged(Var(pairs.truth), 1) + judged(made, 0);
+    });
+  });
+  discriminator_optimiser_->step(d.gradients, rate);
+  return d.loss;
 }
 
 NamedValues TransferStage::step(int64_t step) {
@@ -152,7 +186,10 @@ NamedValues TransferStage::step(int64_t step) {
   });
   const double rate = learning_rate(o.schedule, step, o.steps);
   optimiser_->step(d.gradients, rate);
-  return {{"loss", d.loss}, {"distance_mm", 1e3 * d.values[0]}, {"rate", rate}};
+  NamedValues out = {{"loss", d.loss}, {"distance_mm", 1e3 * d.values[0]}, {"rate", rate}};
+  if (discriminator_optimiser_ != nullptr)
+    out.emplace_back("discriminator", update_discriminator(step, rate));
+  return out;
 }
 
 NamedValues TransferStage::validate() {

@@ -3,6 +3,7 @@
 
 #include "datasets/sampling/transfers.h"
 #include "nn/models/transfer.h"
+#include "nn/models/tst.h"
 #include "train/ahead.h"
 #include "train/stage.h"
 #include "train/stages/stage_input.h"
@@ -32,7 +33,8 @@ inline EnumNames<EdgeReference> config_names(EdgeReference) {
 }
 
 struct TransferLossConfig {
-  double reconstruction = 1, edge = 0.0005, distances = 0, metric = 0;
+  double reconstruction = 1, edge = 0.0005, distances = 0, metric = 0, adversarial = 0;
+  bool train_discriminator = true;
   EdgeReference edge_reference = EdgeReference::identity;
   int64_t metric_from = 0, metric_points = 1024;
 };
@@ -51,6 +53,10 @@ void visit(V& v, TransferLossConfig& c) {
   v("metric_from", c.metric_from, "first step with the metric loss", at_least(0));
   v("metric_points", c.metric_points, "points whose distances to each other count",
     between(2, kMostPoints));
+  v("adversarial", c.adversarial, "weight of TST's discriminator's judgement; 0: none",
+    added("0", at_least(0)));
+  v("train_discriminator", c.train_discriminator,
+    "false: the discriminator stays random, as in TST's program", added("true"));
 }
 
 struct TransferStageConfig {
@@ -84,10 +90,14 @@ class TransferStage final : public Stage {
   TransferBatch batch(int64_t step, const MicroBatch& part = {}) const;
   Var loss(Context& ctx, const TransferBatch& pairs, int64_t step, Tensor* posed);
   Var metric(Context& ctx, const TransferBatch& pairs);
+  /// The discriminator learns to tell true frames from the network's.
+  double update_discriminator(int64_t step, double rate);
 
   Config config_;
   TransferModel* model_;
   Optimiser* optimiser_;
+  TstDiscriminator* discriminator_ = nullptr;     ///< null without an adversarial loss
+  Optimiser* discriminator_optimiser_ = nullptr;  ///< null if the discriminator is not trained
   TransferSampler sampler_, validation_sampler_;
   RngKey key_;
   Ahead<TransferBatch> ahead_;

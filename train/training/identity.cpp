@@ -26,6 +26,11 @@ Json keys_of(const C& config) {
 
 std::string Identities::data(const CorpusSource& source) {
   if (source.source == "builtin") return keys_of(source).dump();
+  if (!source.subject.empty()) {
+    CorpusSource all = source;
+    all.subject.clear();
+    return Json{{"of", data(all)}, {"subject", source.subject}}.dump();
+  }
   std::string& known = seen_["data " + source.source];
   if (!known.empty()) return known;
   namespace fs = std::filesystem;

@@ -30,6 +30,7 @@ void visit(V& v, CorpusSource& c) {
   v("one_mesh", c.one_mesh,
     "built-in bodies have one mesh, for networks that need vertices in correspondence",
     added("false"));
+  v("subject", c.subject, "train on motions of this person alone; empty: of all", added("\"\""));
 }
 
 struct EvaluationConfig {
