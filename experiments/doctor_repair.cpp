@@ -134,6 +134,7 @@ void mend_frames(const Subject& subject, const Diagnosis& d, Mender& mend, Sink&
   if (subject.mesh) return sink.push(mend(*subject.mesh), 0);
   subject.frames->rewind();
   int64_t empty = 0, leading = 0;  // frames without points: written, left out in front
+  int64_t odd = 0, odd_now = 0;    // frames that are of another size than people: all, in a row
   std::optional<Mesh> previous;
   int64_t sequence = 0, row = -1, row_before = -1;  // of the source, where empty frames count too
   for (int64_t i = 0; const auto frame = subject.frames->next(); ++i) {
@@ -146,6 +147,11 @@ void mend_frames(const Subject& subject, const Diagnosis& d, Mender& mend, Sink&
     }
     if (i % d.keep_every != 0) continue;
     Mesh mesh = mend({frame->points, frame->faces});
+    odd_now = previous && !may_be_a_person(mesh.vertices) ? odd_now + 1 : 0;
+    if (odd_now > 0 && static_cast<double>(odd_now) <= rate(d)) {  // for a second at most
+      mesh = *previous;
+      ++odd;
+    }
     // A gap of up to a second: the nearest frame in time stands in. In a longer one frames that
     // show nothing stay, so that those behind it keep their time; in front they are left out.
     const auto gap = d.gap.find(i);
@@ -162,6 +168,9 @@ void mend_frames(const Subject& subject, const Diagnosis& d, Mender& mend, Sink&
   }
   if (empty > 0)
     remarks.push_back(cat("in gaps of over a second ", empty, " frames without points stay"));
+  if (odd > 0)
+    remarks.push_back(cat("in ", odd, odd == 1 ? " frame that is" : " frames that are",
+                          " of another size than people the frame before stands in"));
   if (leading > 0)
     remarks.push_back(cat("left out: ", leading, " frames without points before the first"));
 }

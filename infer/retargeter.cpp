@@ -181,11 +181,29 @@ std::span<const RetargetedFrame> Retargeter::push(const Points& cloud, const std
     const bool remembers =
         received_ && options_.fps / static_cast<double>(missed_ + 1) > kRemembering;
     seen = (*extractor_)(cloud, source, key, remembers ? &*received_ : nullptr);
+    if (!options_.force) check_not_lost(seen, source);
     if (options_.steady_bones) seen.joints = bones_(seen.joints, seen.uncertainty);
   }
   const auto out = push_joints(seen);
   times_.extract = seconds;
   return out;
+}
+
+/// A frame in which nobody can be made out, soon after one in which everything was clear, is a
+/// fault of the source (another unit, another axis up, another thing). B would be thrown about for
+/// it, and the memory of it would spoil the frames after it. If it lasts, it is taken.
+void Retargeter::check_not_lost(const SeenJoints& seen, const std::string& source) const {
+  constexpr double kClear = 0.5, kLost = 0.25, kPatience = 0.34;  // seconds
+  if (!received_ || !received_->uncertainty || !seen.uncertainty) return;
+  if (static_cast<double>(missed_) / options_.fps > kPatience) return;
+  const double sure = confidence(*seen.uncertainty);
+  if (sure < kLost && confidence(*received_->uncertainty) >= kClear)
+    throw UnusableCloud(source,
+                        format("shows nobody who can be made out (confidence %.2f), unlike the "
+                               "frames before",
+                               sure),
+                        "give all frames in one unit and with one axis up, leave this one out, or "
+                        "--force to take it as it is");
 }
 
 void Retargeter::miss() {

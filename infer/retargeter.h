@@ -19,7 +19,7 @@ namespace restage {
 
 struct RetargetOptions {
   double fps = kFps;   ///< frames per second of the source; the result always has kFps
-  bool force = false;  ///< accept a target that does not look like a T-pose
+  bool force = false;  ///< accept a target that does not look like a T-pose, and lost frames
   uint64_t seed = 0;   ///< of the random choice of points
   int samples = 4;     ///< how many views of a cloud are averaged (nn/models/extraction.h)
   /// B's path is a sum of velocities, whose errors add up. So B's pelvis is drawn to the place that
@@ -88,6 +88,7 @@ class Retargeter final : public System {
 
  private:
   void prepare(const std::string& weights_name);
+  void check_not_lost(const SeenJoints& seen, const std::string& source) const;
   size_t advance(const SeenJoints& seen, bool ended);
   /// Answers one moment of the grid. False: the network has not answered yet, `out` is not set.
   bool step(const SeenJoints& seen, bool filled, RetargetedFrame* out);

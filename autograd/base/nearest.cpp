@@ -31,6 +31,12 @@ size_t edit_distance(const std::string& a, const std::string& b) {
   return d[a.size()][b.size()];
 }
 
+/// How many letters are the same before the first that is not.
+size_t begins_alike(const std::string& a, const std::string& b) {
+  return static_cast<size_t>(std::mismatch(a.begin(), a.end(), b.begin(), b.end()).first -
+                             a.begin());
+}
+
 }  // namespace
 
 std::string nearest(const std::string& word, const std::vector<std::string>& candidates) {
@@ -41,7 +47,10 @@ std::string nearest(const std::string& word, const std::vector<std::string>& can
   for (const auto& candidate : candidates) {
     if (candidate.size() > kLongest) continue;
     const size_t distance = edit_distance(word, candidate);
-    if (distance < least && distance < candidate.size()) {
+    const bool nearer =
+        distance < least || (distance == least && !best.empty() &&
+                             begins_alike(word, candidate) > begins_alike(word, best));
+    if (nearer && distance < candidate.size()) {
       least = distance;
       best = candidate;
     }

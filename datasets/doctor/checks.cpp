@@ -59,7 +59,8 @@ void check_source(const std::vector<Mesh>& first_frames, const std::string& wher
   Given frames(first_frames);
   const Diagnosis d = examine_frames(frames);
   for (const Finding& f : d.findings) {
-    if (f.weight != Weight::wrong || f.topic == "points") continue;
+    // Frames of too few points or of another size are told apart one by one (check_frame()).
+    if (f.weight != Weight::wrong || f.topic == "points" || f.topic == "sizes") continue;
     if (f.topic == "path") refuse(where, f, f.fix);
     if (f.topic == "units") refuse(where, f, scale_advice(d.size, given.scale));
     if (f.topic == "up" && f.sure < kNobody) refuse(where, f, "give scans of one whole person");
@@ -79,27 +80,30 @@ void check_target(const Mesh& target, const std::string& where, ExamineOptions o
   for (const Finding& f : d.findings) {
     if (f.weight != Weight::wrong) continue;
     const bool nobody = f.topic == "up" && f.sure < kNobody;
+    if (f.topic == "points") throw InputError(where, f.what, f.fix);  // force makes no points
     Finding said = f;
     if (f.topic == "pose") said.what += ": " + f.evidence;
     refuse(where, said,
-           nobody ? "give one whole person in T-pose"
-           : f.topic == "pose" || f.topic == "points" || f.topic == "path"
-               ? f.fix
-               : "restage doctor --target --fix OUT mends it");
+           nobody                                   ? "give one whole person in T-pose"
+           : f.topic == "pose" || f.topic == "path" ? f.fix
+                                                    : "restage doctor --target --fix OUT mends it");
   }
 }
 
-void check_frame(const Points& frame, const std::string& where) {
+bool may_be_a_person(const Points& frame) {
   const double size = normalised(frame).size;
   constexpr double kRoom = 2;  // stray points, or half of somebody
-  if (frame.size() < kEnoughPoints || is_person_sized(size * kRoom) ||
-      is_person_sized(size / kRoom))
-    return;
-  throw InputError(
-      where,
-      "is of another size than the frames before: half of its points lie within " + number(size) +
-          " m of the middle",
-      "give all frames in one unit, leave this one out, or --force to take it as it is");
+  return frame.size() < kEnoughPoints || is_person_sized(size * kRoom) ||
+         is_person_sized(size / kRoom);
+}
+
+void check_frame(const Points& frame, const std::string& where) {
+  if (may_be_a_person(frame)) return;
+  throw InputError(where,
+                   "is of another size than people: half of its points lie within " +
+                       number(normalised(frame).size) + " m of the middle",
+                   "give all frames in metres (--scale), leave this one out, or --force to take it "
+                   "as it is");
 }
 
 }  // namespace restage

@@ -103,7 +103,8 @@ inline constexpr int kSourceFrames = 8;  ///< that are enough for check_source()
 void check_source(const std::vector<Mesh>& first_frames, const std::string& where,
                   const SourceFrame& given = {});
 void check_target(const Mesh& target, const std::string& where, ExamineOptions options = {});
-/// The same for any later frame, cheaply: whether it is of a person's size.
+/// The same for any later frame, cheaply: whether it is of a person's size, in metres.
+bool may_be_a_person(const Points& frame);
 void check_frame(const Points& frame, const std::string& where);
 
 }  // namespace restage

@@ -188,7 +188,7 @@ class Sequence {
     const size_t turn = at[0];
     const bool lasts = jumps(size_of(0, turn), size_of(turn, frames_.size()));
     d_.say({"sizes", lasts ? Weight::wrong : Weight::note,
-            "the size changes " + number(std::max(factor, 1 / factor)) + " times before " +
+            "the size changes by a factor of " + number(std::max(factor, 1 / factor)) + " before " +
                 (at.size() == 1 ? "frame " : "frames ") + frame_list(at),
             1, "median distance of the points from their middle",
             lasts ? "bring all frames into one unit" : "look at these frames"});

@@ -11,6 +11,7 @@
 #include "experiments/cli/commands.h"
 #include "experiments/cli/output.h"
 #include "experiments/cli/retarget_words.h"
+#include "experiments/cli/standard_weights.h"
 #include "nn/models/extraction.h"
 #include "nn/weights/bundle.h"
 
@@ -61,7 +62,9 @@ std::vector<std::string> inputs_of(const SkeletonOptions& options) {
   return out;
 }
 
-int run_skeleton(const SkeletonOptions& options, const Common& common) {
+int run_skeleton(const SkeletonOptions& given, const Common& common) {
+  SkeletonOptions options = given;
+  if (options.weights.empty()) options.weights = standard_weights();
   if (options.samples < 1 || options.samples > 256)
     throw InputError("", "--samples is out of range", "give a number from 1 to 256");
   check_output(options.out, inputs_of(options));
@@ -124,13 +127,14 @@ int run_skeleton(const SkeletonOptions& options, const Common& common) {
 void add_skeleton(Program& program) {
   auto [app, options] =
       program.add("skeleton", "the 22 joints of clouds",
-                  "restage skeleton --weights w.safetensors --input scan.ply --json\n"
+                  "restage skeleton --input scan.ply --json\n"
                   "restage skeleton --weights w.safetensors --input scans/ --out joints.h5\n"
                   "restage skeleton --weights w.safetensors --input scan.ply --samples 8\n"
                   "restage skeleton --weights w.safetensors --input scan.ply --joints smpl\n"
                   "restage skeleton --weights w.safetensors --input scans/ --device cuda",
                   run_skeleton);
-  app.add_option("--weights", options.weights, "weights file or run directory").required();
+  app.add_option("--weights", options.weights,
+                 "weights file or run directory (default: the standard weights)");
   app.add_option("--input", options.input, "cloud, folder of clouds, or HDF5 file of scans")
       .required();
   app.add_option("--out", options.out, "HDF5 file for the joints");

@@ -225,6 +225,7 @@ Value side_swaps(const Track& pred, const Track& truth) {
           gained +=
               (pred.at(t, j) - truth.at(t, j)).norm() - (pred.at(t, other) - truth.at(t, j)).norm();
       }
+      if (!std::isfinite(gained)) return std::nullopt;
       here |= gained > kClearlySwapped * 2 * static_cast<double>(limb.size());
     }
     swapped += here ? 1 : 0;

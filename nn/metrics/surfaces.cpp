@@ -141,22 +141,25 @@ class Floor final : public SurfaceMeter {
  public:
   void add(const Track& pred, const Track& truth) override {
     for (int64_t f = 0; f < truth.frames; ++f) {
-      floor_ = std::min(floor_, lowest_point(truth, f));
+      floor_ = lower(floor_, lowest_point(truth, f));
       lowest_.push_back(lowest_point(pred, f));
     }
   }
   Value value() const override {
     std::vector<double> depths;
-    for (const double low : lowest_) depths.push_back(1e3 * std::max(0.0, floor_ - low));
+    for (const double low : lowest_)
+      depths.push_back(low > floor_ ? 0 : 1e3 * (floor_ - low));
     return percentile(std::move(depths), 0.95);
   }
 
  private:
   static double lowest_point(const Track& track, int64_t frame) {
     double out = std::numeric_limits<double>::infinity();
-    for (int64_t i = 0; i < track.points; ++i) out = std::min(out, track.at(frame, i).y());
+    for (int64_t i = 0; i < track.points; ++i) out = lower(out, track.at(frame, i).y());
     return out;
   }
+  /// What is not a number stays so.
+  static double lower(double a, double b) { return b < a || std::isnan(b) ? b : a; }
   double floor_ = std::numeric_limits<double>::infinity();
   std::vector<double> lowest_;  // of every predicted frame
 };
@@ -258,7 +261,8 @@ Value leaf_vertex_distance(const Track& pred, const Track& truth, const Track& j
 }
 
 Value percentile(std::vector<double> values, double share) {
-  if (values.empty()) return std::nullopt;
+  const auto finite_one = [](double value) { return std::isfinite(value); };
+  if (values.empty() || !std::all_of(values.begin(), values.end(), finite_one)) return std::nullopt;
   const auto k = static_cast<ptrdiff_t>(share * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), values.begin() + k, values.end());
   return finite(values[static_cast<size_t>(k)]);

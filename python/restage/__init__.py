@@ -41,15 +41,17 @@ __version__ = command("--version")["version"]
 
 
 def train(config, *overrides, on_step=None, **options):
-    """Trains the stages of a configuration, as `restage train CONFIG.yaml key=value ...`; returns its Run.
+    """Trains the stages of a configuration, as `restage train CONFIG.yaml key=value ...`; returns its Run, or the forecast of dry_run=True as a dict.
 
     config: a Config, a YAML file, or "resume=RUN". overrides: words "key=value" or dicts. on_step(stage, done, figures) is called
     after every step; Ctrl-C, or an exception of its own, ends the training after a checkpoint. options: seed,
     overfit_batches, fast_dev_run, tensorboard, csv, verbose.
     """
+    if on_step is not None and not callable(on_step):
+        raise InputError("restage: on_step is no function; give one of (stage, done, figures)")
     words = config.words() if isinstance(config, Config) else [config]
     told = _json.loads(_core.train(on_step, options, *words, *_words(overrides)))
-    return Run(told["run"]) if told.get("run") else None
+    return Run(told["run"]) if told.get("run") else told
 
 
 __all__ = ["Adam", "Clip", "ClosedForm", "Config", "Extractor", "Frame", "Gradients", "InputError", "JOINTS", "Mesh",

@@ -219,7 +219,7 @@ class DoctorsWords(Retarget):
             self.ply("late/f%d.ply" % i, [(100 * x, 100 * y, 100 * z) for x, y, z in frame] if i >= 8 else frame)
         self.bad_input(call("ground"), "a floor", "doctor", "--force")
         # Two frames of ten are a gap, which is too long where there are three frames a second.
-        self.bad_input(call("late") + ["--fps", "3"], "f8.ply", "another size", "--force")
+        self.bad_input(call("late") + ["--fps", "3"], "f8.ply", "another size than people", "--force")
         self.assertNotIn("out.h5", os.listdir(self.folder))
 
     def test_target(self):

@@ -5,10 +5,11 @@ import shutil
 import struct
 import tempfile
 
-from support import CliTest, points
+from support import ROOT, CliTest, points
 from tiny_run import TPOSES, weights
 
 FRAMES = 24
+STANDARD = os.path.join(ROOT, "experiments", "weights", "standard.safetensors")
 NAN = float("nan")
 
 
@@ -66,6 +67,31 @@ class Gaps(CliTest):
         missing, _, why = self.filled("bad", force=True)
         self.assertEqual(missing, [3, 6, 9, 12, 18])
         self.assertIn("1 distinct points", why[4])
+
+    def test_a_frame_in_which_nobody_can_be_made_out(self):
+        """One frame of the right size that lies, or is twice as large: without this it throws the target about."""
+        self.w = STANDARD
+        lying = [(x, -z, y) for x, y, z in self.frames[9]]
+        large = [(2.5 * x, 2.5 * y, 2.5 * z) for x, y, z in self.frames[9]]
+        self.done(*self.call("good.h5"))
+        for name, frame in (("lying", lying), ("large", large)):
+            missing, filled, why = self.filled(self.source(name, {9: frame}))
+            self.assertEqual((missing, filled), ([9], [9]), name)
+            self.assertIn("nobody who can be made out", why[0])
+            told = self.json("eval", "--pred", "out.h5", "--truth", "good.h5")
+            self.assertLess(told["mean"]["mpjpe"], 0.004, name)
+            self.assertEqual(self.filled(name, force=True)[:2], ([], []), name)
+        # What lasts is no slip of one frame.
+        missing, _, _ = self.filled(self.source("lies", {f: [(x, -z, y) for x, y, z in self.frames[f]] for f in range(4, FRAMES)}))
+        self.assertEqual(missing, list(range(4, 4 + len(missing))))
+        self.assertIn(len(missing), range(1, 12))  # a third of a second
+
+    def test_one_frame_in_millimetres_among_the_first(self):
+        self.source("mixed", {6: [(1000 * x, 1000 * y, 1000 * z) for x, y, z in self.frames[6]]})
+        self.assertEqual(self.filled("mixed")[:2], ([6], [6]))
+        told = self.done("doctor", "mixed", "--fix", "mended.h5")
+        self.assertIn("the frame before stands in", told)
+        self.assertEqual(self.filled("mended.h5")[:2], ([], []))
 
     def test_it_is_said(self):
         self.source("bad", {7: self.frames[0][:10], 8: None})

@@ -148,7 +148,6 @@ class BadClouds(Skeleton):
         self.ply("a.ply", self.cloud)
         self.bad("a.ply", "--samples", more=["--samples", "0"])
         self.bad("a.ply", "nowhere", more=["--out", "nowhere/j.h5"])
-        self.bad_input(["skeleton", "--input", "a.ply"], "--weights")
         self.bad_input(["skeleton", "--weights", self.w], "--input")
 
     def test_full_disk(self):

@@ -91,6 +91,20 @@ TEST(Metrics, SidesAreSwappedWhereLeftIsNearerToRight) {
   EXPECT_FALSE(side_swaps({pred.data(), 4, 11}, {truth.data(), 4, 11}));
 }
 
+TEST(Metrics, OfWhatIsNoNumberNothingIsSaid) {
+  std::vector<double> truth(3 * 3 * kJoints);
+  for (size_t i = 0; i < truth.size(); ++i) truth[i] = 0.01 * static_cast<double>(i * i % 97);
+  std::vector<double> pred = truth;
+  pred[40] = std::nan("");
+  const Track p{pred.data(), 3, kJoints}, t{truth.data(), 3, kJoints};
+  EXPECT_EQ(side_swaps(t, t), 0.0);
+  EXPECT_FALSE(side_swaps(p, t));
+  EXPECT_EQ(floor_penetration_mm(t, t), 0.0);
+  EXPECT_FALSE(floor_penetration_mm(p, t));
+  EXPECT_EQ(peak_speed_ratio(t, t), 1.0);
+  EXPECT_FALSE(peak_speed_ratio(p, t));
+}
+
 TEST(Metrics, LeavesAreTheVerticesAroundHeadHandsAndFeet) {
   std::vector<double> joints;  // on a line, so that what is nearest is plain
   for (int j = 0; j < kJoints; ++j) joints.insert(joints.end(), {1.0 * j, 0, 0});

@@ -229,6 +229,12 @@ def test_own_ops_that_fail():
     with pytest.raises(KeyError):
         restage.gradcheck(angry, f32(3))
 
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        restage.gradcheck(restage.Op("f", lambda v: v, stopped), f32(3))
+
 
 def test_gradcheck_of_ops():
     assert restage.gradcheck(lambda x, w: ops.linear(x, w, activation="relu"), rng.normal(size=(3, 4)), rng.normal(size=(2, 4)))

@@ -142,10 +142,13 @@ def test_a_skeleton_as_source(bvh, walk, program, tmp_path):
             assert np.array_equal(getattr(result, name), f[name][:]), name
 
 
-def test_doctor(walk, program):
+def test_doctor(walk, program, tmp_path):
     told = program.json("doctor", walk / "target.ply")
     ours = restage.doctor(walk / "target.ply")
     assert ours == told and ours["usable"]
+    clouds = restage.load_clouds(walk / "source.h5")
+    np.save(tmp_path / "wide.npy", np.stack([100 * c[:200] for c in clouds[:5]]))
+    assert restage.doctor(tmp_path / "wide.npy")["usable"] is False
     assert json.dumps(restage.command("info", "skeleton/pointnet")["parameters"]) == "1620811"
 
 

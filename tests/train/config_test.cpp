@@ -199,6 +199,7 @@ TEST_F(ConfigFiles, ChoicesAndUnknownKeysSuggestTheNearest) {
   EXPECT_EQ(nearest("batch_size", {"batch", "steps"}), "");
   EXPECT_EQ(nearest("batch-siez", {"batch", "batch_size"}), "batch_size");
   EXPECT_EQ(nearest("x", {"y"}), "");
+  EXPECT_EQ(nearest("--sorce", {"--force", "--source"}), "--source");
 }
 
 TEST_F(ConfigFiles, BrokenYaml) {
