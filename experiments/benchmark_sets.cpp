@@ -71,6 +71,7 @@ Prediction retargeted(const Bundle& weights, const std::string& folder, const st
   input.options.keep_limbs = how.keep_limbs;
   input.options.any_size = how.any_size;
   input.options.force = how.force;
+  input.options.lost_seconds = 0;  // every frame of a table counts
   if (type.needs_rest)
     input.rest = joints_of(PredictionFile(in(folder, "rest.h5")).joints().slice(0, 1))[0];
   const auto system = type.make(std::move(input));

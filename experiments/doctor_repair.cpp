@@ -147,24 +147,26 @@ void mend_frames(const Subject& subject, const Diagnosis& d, Mender& mend, Sink&
     }
     if (i % d.keep_every != 0) continue;
     Mesh mesh = mend({frame->points, frame->faces});
-    odd_now = previous && !may_be_a_person(mesh.vertices) ? odd_now + 1 : 0;
-    if (odd_now > 0 && static_cast<double>(odd_now) <= rate(d)) {  // for a second at most
-      mesh = *previous;
-      ++odd;
-    }
+    const bool odd_one =
+        previous && may_be_a_person(previous->vertices) && !may_be_a_person(mesh.vertices);
+    odd_now = odd_one ? odd_now + 1 : 0;
+    const bool stood_in = odd_now > 0 && static_cast<double>(odd_now) <= rate(d);  // a second
+    if (stood_in) mesh = *previous;
+    odd += stood_in;
+    const int64_t from = stood_in ? row_before : row;
     // A gap of up to a second: the nearest frame in time stands in. In a longer one frames that
     // show nothing stay, so that those behind it keep their time; in front they are left out.
     const auto gap = d.gap.find(i);
     const int64_t missing = gap == d.gap.end() ? 0 : gap->second;
     const int64_t filled = d.is_filled(missing) ? missing / d.keep_every : 0;
     for (int64_t k = 0; k < filled; ++k)
-      previous && 2 * k < filled ? sink.push(*previous, row_before) : sink.push(mesh, row);
+      previous && 2 * k < filled ? sink.push(*previous, row_before) : sink.push(mesh, from);
     const int64_t kept = d.is_filled(missing) ? 0 : frame->missing / d.keep_every;
     for (int64_t k = 0; previous && k < kept; ++k) sink.push({}, row - frame->missing + k);
     (previous ? empty : leading) += kept;
-    sink.push(mesh, row);
+    sink.push(mesh, from);
     previous = std::move(mesh);
-    row_before = row;
+    row_before = from;
   }
   if (empty > 0)
     remarks.push_back(cat("in gaps of over a second ", empty, " frames without points stay"));
@@ -209,6 +211,9 @@ void write_mended_prediction(const Subject& subject, const std::string& out, con
 
 /// Refuses what cannot be done, before anything is written.
 void check(const Subject& subject, const std::string& out, RepairKind kind, const Diagnosis& d) {
+  for (const Finding& f : d.findings)
+    if (!d.transform && f.topic == "sizes")
+      throw InputError(subject.path, "cannot be repaired: " + f.what, f.fix);
   if (!d.transform)
     throw InputError(subject.path, "cannot be repaired: its up axis or its units cannot be told",
                      "say them with --up and --scale");

@@ -191,11 +191,11 @@ std::span<const RetargetedFrame> Retargeter::push(const Points& cloud, const std
 
 /// A frame in which nobody can be made out, soon after one in which everything was clear, is a
 /// fault of the source (another unit, another axis up, another thing). B would be thrown about for
-/// it, and the memory of it would spoil the frames after it. If it lasts, it is taken.
+/// it, and the memory of it would spoil the frames after it (RetargetOptions::lost_seconds).
 void Retargeter::check_not_lost(const SeenJoints& seen, const std::string& source) const {
-  constexpr double kClear = 0.5, kLost = 0.25, kPatience = 0.34;  // seconds
+  constexpr double kClear = 0.5, kLost = 0.25;  // docs/notes/real_scans_log.md
   if (!received_ || !received_->uncertainty || !seen.uncertainty) return;
-  if (static_cast<double>(missed_) / options_.fps > kPatience) return;
+  if (static_cast<double>(missed_ + 1) / options_.fps > options_.lost_seconds + 1e-9) return;
   const double sure = confidence(*seen.uncertainty);
   if (sure < kLost && confidence(*received_->uncertainty) >= kClear)
     throw UnusableCloud(source,

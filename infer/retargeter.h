@@ -19,9 +19,12 @@ namespace restage {
 
 struct RetargetOptions {
   double fps = kFps;   ///< frames per second of the source; the result always has kFps
-  bool force = false;  ///< accept a target that does not look like a T-pose, and lost frames
-  uint64_t seed = 0;   ///< of the random choice of points
-  int samples = 4;     ///< how many views of a cloud are averaged (nn/models/extraction.h)
+  bool force = false;  ///< accept a target that does not look like a T-pose
+  /// A frame in which nobody can be made out, soon after one in which all was clear, is an
+  /// UnusableCloud: in so many seconds after the clear one. What lasts longer is taken. 0: all are.
+  double lost_seconds = 1.0 / 3;
+  uint64_t seed = 0;  ///< of the random choice of points
+  int samples = 4;    ///< how many views of a cloud are averaged (nn/models/extraction.h)
   /// B's path is a sum of velocities, whose errors add up. So B's pelvis is drawn to the place that
   /// A's path, scaled by the length of the legs, would give; `anchor` is the time constant in
   /// seconds. 0: B's pelvis is not drawn, as in the papers (docs/method.md, "Drift").

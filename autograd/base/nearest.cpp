@@ -6,15 +6,16 @@
 namespace restage {
 namespace {
 
+bool same(char x, char y) {
+  const auto plain = [](char c) {
+    return c == '-' ? '_' : std::tolower(static_cast<unsigned char>(c));
+  };
+  return plain(x) == plain(y);
+}
+
 /// Edit distance in which swapping neighbours is one edit. Upper and lower case, and '-' and '_',
 /// count as equal.
 size_t edit_distance(const std::string& a, const std::string& b) {
-  const auto same = [](char x, char y) {
-    const auto plain = [](char c) {
-      return c == '-' ? '_' : std::tolower(static_cast<unsigned char>(c));
-    };
-    return plain(x) == plain(y);
-  };
   std::vector<std::vector<size_t>> d(a.size() + 1, std::vector<size_t>(b.size() + 1));
   for (size_t i = 0; i <= a.size(); ++i) {
     for (size_t j = 0; j <= b.size(); ++j) {
@@ -33,7 +34,7 @@ size_t edit_distance(const std::string& a, const std::string& b) {
 
 /// How many letters are the same before the first that is not.
 size_t begins_alike(const std::string& a, const std::string& b) {
-  return static_cast<size_t>(std::mismatch(a.begin(), a.end(), b.begin(), b.end()).first -
+  return static_cast<size_t>(std::mismatch(a.begin(), a.end(), b.begin(), b.end(), same).first -
                              a.begin());
 }
 

@@ -328,7 +328,7 @@ Report check_sample(const OpSamples& op, const Sample& sample) {
         check_error(op, sample, f);
         break;
     }
-  } catch (const Error& error) {  // of the function; a bad_alloc or a Ctrl-C is nobody's finding
+  } catch (const Error& error) {  // other exceptions are the caller's
     f.fail(std::string("unexpected error: ") + error.what());
   }
   return std::move(f.report);

@@ -1,5 +1,7 @@
 // What `restage retarget` asks before it starts.
 
+#include <algorithm>
+
 #include "datasets/doctor/examine_detail.h"
 #include "datasets/doctor/orientation_model.h"
 #include "datasets/doctor/words.h"
@@ -58,9 +60,12 @@ void check_source(const std::vector<Mesh>& first_frames, const std::string& wher
   if (first_frames.empty()) return;
   Given frames(first_frames);
   const Diagnosis d = examine_frames(frames);
+  const bool some_odd = !std::all_of(first_frames.begin(), first_frames.end(),
+                                     [](const Mesh& m) { return may_be_a_person(m.vertices); });
   for (const Finding& f : d.findings) {
-    // Frames of too few points or of another size are told apart one by one (check_frame()).
-    if (f.weight != Weight::wrong || f.topic == "points" || f.topic == "sizes") continue;
+    // Frames of too few points or of no person's size are told apart one by one (check_frame()).
+    if (f.weight != Weight::wrong || f.topic == "points" || (f.topic == "sizes" && some_odd))
+      continue;
     if (f.topic == "path") refuse(where, f, f.fix);
     if (f.topic == "units") refuse(where, f, scale_advice(d.size, given.scale));
     if (f.topic == "up" && f.sure < kNobody) refuse(where, f, "give scans of one whole person");

@@ -191,7 +191,8 @@ class Sequence {
             "the size changes by a factor of " + number(std::max(factor, 1 / factor)) + " before " +
                 (at.size() == 1 ? "frame " : "frames ") + frame_list(at),
             1, "median distance of the points from their middle",
-            lasts ? "bring all frames into one unit" : "look at these frames"});
+            lasts ? "bring all frames into one unit, or leave the odd ones out"
+                  : "look at these frames"});
     return !lasts;
   }
 

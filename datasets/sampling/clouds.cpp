@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -11,6 +12,7 @@
 #include "datasets/sampling/dress.h"
 #include "datasets/sampling/intruder.h"
 #include "datasets/sampling/memory.h"
+#include "datasets/sampling/things.h"
 
 namespace restage {
 namespace {
@@ -32,6 +34,8 @@ CloudConfig checked(const CloudConfig& c) {
   check_setting("cloud", c.bend >= 0 && c.bend <= 90, "bend", "0 to 90 degrees");
   check_setting("cloud", c.intruder >= 0 && c.intruder <= 1, "intruder", "0 to 1");
   check_setting("cloud", c.remembered >= 0 && c.remembered <= 1, "remembered", "0 to 1");
+  for (const double share : {c.things, c.cut_floor, c.smoothed})
+    check_setting("cloud", share >= 0 && share <= 1, "things, cut_floor, smoothed", "0 to 1");
   check_setting("cloud", c.min_fraction > 0 && c.min_fraction <= 1, "min_fraction", "above 0 to 1");
   return c;
 }
@@ -45,6 +49,46 @@ std::vector<size_t> repeat_some(const RngKey& key, size_t distinct, size_t n) {
   while (order.size() < n) order.push_back(rng.below(distinct));
   for (size_t i = n; i > 1; --i) std::swap(order[i - 1], order[rng.below(i)]);
   return order;
+}
+
+/// As many of the points as `share` of those that are seen take the place of some of these.
+void replace_some(double share, Points from, Rng& rng, Points& points, std::vector<size_t>& which) {
+  const size_t n =
+      std::min(from.size(), static_cast<size_t>(share * static_cast<double>(points.size())));
+  for (size_t k = 0; k < n; ++k) {
+    std::swap(from[k], from[k + rng.below(from.size() - k)]);
+    const size_t i = rng.below(points.size());
+    points[i] = from[k];
+    which[i] = kNobody;
+  }
+}
+
+/// The half of a surface's points that somebody sees who stands in the direction `side`.
+void keep_half(double side, Points& points) {
+  const Point middle = centroid(points);
+  const Point towards(static_cast<float>(std::cos(side)), 0, static_cast<float>(std::sin(side)));
+  std::erase_if(points, [&](const Point& p) { return (p - middle).dot(towards) < 0; });
+}
+
+float lowest(const Points& points) {
+  float out = std::numeric_limits<float>::max();
+  for (const Point& p : points) out = std::min(out, p.y());
+  return out;
+}
+
+/// Cuts what lies below a height, as whoever removes a floor from scans does.
+void cut_below(float above, Points& points, std::vector<size_t>& which) {
+  constexpr std::ptrdiff_t kLeast = 64;  // fewer: somebody lies
+  const auto stays = [&](const Point& p) { return p.y() >= above; };
+  if (std::count_if(points.begin(), points.end(), stays) < kLeast) return;
+  size_t kept = 0;
+  for (size_t i = 0; i < points.size(); ++i) {
+    if (!stays(points[i])) continue;
+    points[kept] = points[i];
+    which[kept++] = which[i];
+  }
+  points.resize(kept);
+  which.resize(kept);
 }
 
 /// The same, its frames earlier, but not before the first.
@@ -77,6 +121,12 @@ CloudSampler::CloudSampler(const Corpus& corpus, const CloudConfig& config, uint
       own_(corpus),
       surfaces_(surface_samplers(corpus.bodies)) {
   if (surfaces_.empty()) throw InputError("", "no bodies to draw clouds from", "add bodies");
+  if (config_.smoothed == 0) return;
+  smoothings_.resize(corpus.bodies.size());
+  parallel_for(std::ssize(smoothings_), 1, [&](int64_t from, int64_t to) {
+    for (int64_t i = from; i < to; ++i)
+      smoothings_[static_cast<size_t>(i)] = smoothing(corpus_.bodies[static_cast<size_t>(i)].rest);
+  });
 }
 
 CloudSubject CloudSampler::subject(int64_t index) const {
@@ -107,6 +157,10 @@ CloudSubject CloudSampler::subject(int64_t index) const {
     out.bend_key = key_.fold(static_cast<uint64_t>(index)).fold("bend");
   }
   if (!out.rest) out.body = own_.or_own(out.body, out.at.motion, rng);
+  Rng capture(key_.fold(static_cast<uint64_t>(index)).fold("capture"));
+  out.thing = capture.uniform() < config_.things && !out.rest;
+  out.cut_floor = capture.uniform() < config_.cut_floor && !out.rest;
+  out.smoothed = capture.uniform() < config_.smoothed ? capture.uniform(0.2, 1.0) : 0;
   return out;
 }
 
@@ -145,6 +199,19 @@ CloudSampler::Drawn CloudSampler::draw(const CloudSubject& subject, const Surfac
     out.turns = skeleton.global;
   }
   out.points = samples.on(picked);
+  if (subject.smoothed > 0) {
+    const Points& whole = smoothings_.at(subject.body);
+    Points some;
+    for (const int32_t v : samples.vertices) some.push_back(whole[static_cast<size_t>(v)]);
+    some = samples.on(some);
+    std::array<float, kJoints> weights;
+    for (size_t i = 0; i < out.points.size(); ++i) {
+      samples.skin_weights(body, i, false, weights.data());
+      Mat3 turn = Mat3::Zero();
+      for (size_t j = 0; j < kJoints; ++j) turn += double{weights[j]} * out.turns[j];
+      out.points[i] += (subject.smoothed * turn * some[i].cast<double>()).cast<float>();
+    }
+  }
   if (subject.dressed || subject.sensor != Sensor::none)
     out.normals = surface.normals(samples, picked);
   if (subject.dressed) {
@@ -180,6 +247,12 @@ CloudSampler::Seen CloudSampler::see(const CloudSubject& subject, size_t n, cons
     out.points = sensed(subject.sensor, out.points, drawn.normals, n, scene.fold("cameras"),
                         key.fold("sensor"), &out.which);
   if (subject.intruder) intrude(scene.fold("intruder"), key.fold("intruder"), &out);
+  const float floor = lowest(out.points);
+  if (subject.thing)
+    put_thing(scene.fold("thing"), key.fold("thing"), subject.sensor != Sensor::none, &out);
+  if (subject.cut_floor)
+    cut_below(floor + static_cast<float>(Rng(scene.fold("floor")).uniform(0.01, 0.08)), out.points,
+              out.which);
   add_noise(key.fold("noise"), config_.noise, out.points);
   return out;
 }
@@ -200,17 +273,20 @@ void CloudSampler::intrude(const RngKey& scene, const RngKey& key, Seen* seen) c
     if (hangs_on(intruder.joint, weights) >= 0.5f) limb.push_back(rest[i]);
   }
   put_intruder(intruder, centroid(seen->points).cast<double>(), limb);
-  const Point middle = centroid(limb);
-  const Point towards(static_cast<float>(std::cos(side)), 0, static_cast<float>(std::sin(side)));
-  std::erase_if(limb, [&](const Point& p) { return (p - middle).dot(towards) < 0; });
-  const size_t n =
-      std::min(limb.size(), static_cast<size_t>(share * static_cast<double>(seen->points.size())));
-  for (size_t k = 0; k < n; ++k) {
-    std::swap(limb[k], limb[k + rng.below(limb.size() - k)]);
-    const size_t i = rng.below(seen->points.size());
-    seen->points[i] = limb[k];
-    seen->which[i] = kNobody;
-  }
+  keep_half(side, limb);
+  replace_some(share, std::move(limb), rng, seen->points, seen->which);
+}
+
+/// `cameras`: only one side of the thing is seen.
+void CloudSampler::put_thing(const RngKey& scene, const RngKey& key, bool cameras,
+                             Seen* seen) const {
+  Rng scene_rng(scene), rng(key);
+  const Thing thing = draw_thing(scene_rng);
+  const double share = scene_rng.uniform(0.02, 0.15), side = scene_rng.uniform(-M_PI, M_PI);
+  Points points =
+      thing_points(thing, seen->joints, lowest(seen->points), 2 * seen->points.size(), rng);
+  if (cameras) keep_half(side, points);
+  replace_some(share, std::move(points), rng, seen->points, seen->which);
 }
 
 Points CloudSampler::cloud(const CloudSubject& subject, size_t n, const RngKey& scene,

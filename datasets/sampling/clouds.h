@@ -27,6 +27,9 @@ struct CloudConfig {
   double one_camera = 0;      ///< part that one depth camera sees (sensors.h)
   double camera_ring = 0;     ///< part that three to seven cameras around see
   double intruder = 0;        ///< part of what cameras see with somebody else's limb beside it
+  double things = 0;          ///< part with a thing in the hand or beside the foot (things.h)
+  double cut_floor = 0;       ///< part whose lowest 1 to 8 cm were cut away with the floor
+  double smoothed = 0;        ///< part whose surface a coarse volume has smoothed
   double remembered = 0;      ///< part with a memory of the frame before (CloudBatch::past)
   bool skin_weights = false;  ///< also fill CloudBatch::weights
   bool rotations = false;     ///< also fill CloudBatch::turns
@@ -69,6 +72,8 @@ struct CloudSubject {
   Sensor sensor = Sensor::none;
   bool dressed = false;
   bool intruder = false;
+  bool thing = false, cut_floor = false;
+  double smoothed = 0;  ///< 0 to 1, of smoothing()
   enum class Memory { none, drawn, asked } memory = Memory::none;
   size_t step_back = 1;  ///< how many frames ago the remembered one is
 };
@@ -111,6 +116,7 @@ class CloudSampler {
   };
   Seen see(const CloudSubject& subject, size_t n, const RngKey& scene, const RngKey& key) const;
   void intrude(const RngKey& scene, const RngKey& key, Seen* seen) const;
+  void put_thing(const RngKey& scene, const RngKey& key, bool cameras, Seen* seen) const;
   /// One row of a batch.
   struct Row {
     CloudSubject subject;
@@ -127,6 +133,7 @@ class CloudSampler {
   FrameIndex frames_;
   OwnBodies own_;
   std::vector<SurfaceSampler> surfaces_;
+  std::vector<Points> smoothings_;  ///< of each body; empty where nothing is smoothed
 };
 
 }  // namespace restage

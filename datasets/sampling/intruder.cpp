@@ -10,12 +10,12 @@ namespace {
 
 constexpr std::array<int, 8> kLimbs = {16, 17, 18, 19, 1, 2, 4, 5};  // arms, forearms, legs, shins
 
+}  // namespace
+
 Mat3 any_rotation(Rng& rng) {
   const double a = rng.normal(), b = rng.normal(), c = rng.normal(), d = rng.normal();
   return Quat(a, b, c, d).normalized().toRotationMatrix();
 }
-
-}  // namespace
 
 float hangs_on(int joint, std::span<const float, kJoints> weights) {
   std::array<bool, kJoints> hangs{};

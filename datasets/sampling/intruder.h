@@ -9,6 +9,9 @@
 
 namespace restage {
 
+/// Uniformly random.
+Mat3 any_rotation(Rng& rng);
+
 /// How much of a point's skin weights is of what hangs on a joint.
 float hangs_on(int joint, std::span<const float, kJoints> weights);
 /// What hangs on one joint of a body, as in its rest pose.

@@ -101,7 +101,7 @@ struct Outcome {
   Frames filled;  ///< RetargetedFrame::filled
   int64_t frames = 0, held = 0;
   size_t points_left_out = 0;
-  std::vector<double> confidence;
+  std::vector<double> confidence, sure;  ///< of all frames; of those that a cloud is behind
 };
 
 /// All frames of the source through the system and into the sink, which is not committed.
@@ -173,6 +173,7 @@ class Run {
       ++out_.frames;
       if (!f.confidence) continue;
       out_.confidence.push_back(std::round(*f.confidence * 1e3) / 1e3);
+      if (!f.filled) out_.sure.push_back(*f.confidence);
       out_.held += *f.confidence < c_.options.min_confidence;
     }
   }
@@ -210,7 +211,7 @@ void log_outcome(const std::string& name, const Outcome& done, const Source& sou
     log_warning(std::to_string(done.points_left_out) +
                 " points of the source are NaN or infinite, or more than 5 m from the middle "
                 "of the others, and were left out");
-  warn_if_unsure(name, done.confidence);
+  warn_if_unsure(name, done.sure);
 }
 
 Retargeted told(const RetargetCommand& c, const Common& common, const Source& source,
@@ -280,6 +281,8 @@ Retargeted retarget(const RetargetCommand& c, const Common& common, RetargetCall
     throw InputError(c.source.path, "holds " + std::to_string(source.sequences()) + " sequences",
                      "choose one with --sequence N, from 0");
   input.options.fps = source.fps();
+  // As long as a gap may be that is filled (Gaps), in frames that are pushed.
+  input.options.lost_seconds /= static_cast<double>(c.to.every);
   TargetMesh target = read_target(c.target, c.bones);
   check_kept(c, target);
   check_inputs(c, source, target);

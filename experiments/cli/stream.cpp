@@ -389,7 +389,7 @@ void add_stream(Program& program) {
   add_scale(app, c.how.source.scale, "the clouds' units in metres");
   add_system_options(app, c.how);
   app.add_flag("--force", c.how.options.force,
-               "accept a target that is no T-pose, and clouds that are of no person's size");
+               "accept a target that is no T-pose, and clouds in which nobody can be made out");
 }
 
 }  // namespace restage::cli

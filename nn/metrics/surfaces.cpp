@@ -147,8 +147,7 @@ class Floor final : public SurfaceMeter {
   }
   Value value() const override {
     std::vector<double> depths;
-    for (const double low : lowest_)
-      depths.push_back(low > floor_ ? 0 : 1e3 * (floor_ - low));
+    for (const double low : lowest_) depths.push_back(low > floor_ ? 0 : 1e3 * (floor_ - low));
     return percentile(std::move(depths), 0.95);
   }
 

@@ -12,8 +12,8 @@
 
 namespace restage {
 
-/// A cloud in which nobody can be found, whatever the clouds around it hold: too few points, values
-/// that are not finite, or points so far away that no joints can be computed.
+/// A cloud in which nobody can be found: too few points, values that are not finite, points so far
+/// away that no joints can be computed, or nobody whom the network can make out.
 class UnusableCloud : public InputError {
  public:
   using InputError::InputError;

@@ -14,6 +14,7 @@
 #include "datasets/sampling/dress.h"
 #include "datasets/sampling/evaluation.h"
 #include "datasets/sampling/intruder.h"
+#include "datasets/sampling/things.h"
 #include "datasets/sampling/tracks.h"
 #include "datasets/sampling/windows.h"
 #include "tests/datasets/sampling_support.h"
@@ -208,6 +209,119 @@ TEST(SamplingSensors, IntrudersAreNobodysPoints) {
   for (int64_t k = 0; k < without.weights.numel() / kJoints; ++k) {
     const float* w = without.weights.data<float>() + k * kJoints;
     EXPECT_NEAR(std::accumulate(w, w + kJoints, 0.0f), 1, 1e-4);
+  }
+}
+
+/// How many points of row i are of the person: those that a joint moves.
+int own_points(const CloudBatch& batch, int64_t i) {
+  int own = 0;
+  const int64_t n = batch.points.size(1);
+  for (int64_t p = 0; p < n; ++p) {
+    const float* w = batch.weights.data<float>() + (i * n + p) * kJoints;
+    own += std::accumulate(w, w + kJoints, 0.0f) > 0.5f;
+  }
+  return own;
+}
+
+Vec3 world(const CloudBatch& batch, int64_t i, int64_t p) {
+  return at(batch.points, i, p) + at(batch.centres, i, 0);
+}
+
+double lowest_of(const CloudBatch& batch, int64_t i) {
+  double out = 1e9;
+  for (int64_t p = 0; p < batch.points.size(1); ++p) out = std::min(out, world(batch, i, p).y());
+  return out;
+}
+
+TEST(SamplingSensors, ThingsAreNobodysPointsAndNear) {
+  for (const double cameras : {0.0, 1.0}) {
+    CloudConfig config{.points = 400, .noise = 0, .tpose_share = 0.2};
+    config.camera_ring = cameras;
+    config.things = 1;
+    config.skin_weights = true;
+    const CloudSampler sampler(training_corpus(), config, 1);
+    const CloudBatch batch = sampler.batch(0, 40);
+    EXPECT_TRUE(same_bits(batch.points, sampler.batch(0, 40).points));
+    for (int64_t i = 0; i < 40; ++i) {
+      const int own = own_points(batch, i);
+      if (sampler.subject(i).rest) {
+        EXPECT_EQ(own, 400);
+        continue;
+      }
+      EXPECT_LT(own, 400);
+      EXPECT_GT(own, 400 * 0.8);
+      double most = 0;
+      for (int p = 0; p < 400; ++p) {
+        double nearest = 1e9;
+        for (int j = 0; j < kJoints; ++j)
+          nearest = std::min(nearest, (at(batch.points, i, p) - at(batch.joints, i, j)).norm());
+        most = std::max(most, nearest);
+      }
+      EXPECT_LT(most, 1.3) << i;  // the far end of the longest stick
+    }
+  }
+}
+
+TEST(SamplingSensors, ThingsTouchTheirHandOrStandOnTheFloor) {
+  const Joints joints = training_corpus().bodies[0].joints;
+  Rng rng(RngKey{1, 0});
+  int held = 0;
+  for (int i = 0; i < 200; ++i) {
+    const Thing thing = draw_thing(rng);
+    const Points points = thing_points(thing, joints, -0.1, 300, rng);
+    ASSERT_EQ(points.size(), 300u);
+    held += thing.held;
+    double nearest = 1e9, low = 1e9;
+    const auto side = static_cast<size_t>(thing.left ? 0 : 1);
+    const Vec3 joint = joints[(thing.held ? 20 : 10) + side];
+    for (const Point& p : points) {
+      Vec3 off = p.cast<double>() - joint;
+      if (!thing.held) off.y() = 0;
+      nearest = std::min(nearest, off.norm());
+      low = std::min(low, double{p.y()});
+    }
+    EXPECT_LT(nearest, thing.held ? 0.19 : 0.35) << i;
+    if (!thing.held) {
+      EXPECT_NEAR(low, -0.1, 0.05) << i;
+    }
+  }
+  EXPECT_GT(held, 60);
+  EXPECT_LT(held, 140);
+}
+
+TEST(SamplingSensors, TheFloorIsCutWithTheSoles) {
+  CloudConfig config{.points = 400, .noise = 0, .tpose_share = 0};
+  const CloudSampler whole(training_corpus(), config, 1);
+  config.cut_floor = 1;
+  const CloudSampler cut(training_corpus(), config, 1);
+  const CloudBatch a = whole.batch(0, 30), b = cut.batch(0, 30);
+  for (int64_t i = 0; i < 30; ++i) {
+    const double gone = lowest_of(b, i) - lowest_of(a, i);
+    EXPECT_GE(gone, 0.0099) << i;
+    EXPECT_LT(gone, 0.4) << i;  // bodies of boxes have few points low down
+  }
+}
+
+TEST(SamplingSensors, SmoothingTakesCornersAway) {
+  const Body& body = training_corpus().bodies[0];
+  const Points moved = smoothing(body.rest);
+  ASSERT_EQ(moved.size(), body.rest.vertices.size());
+  double most = 0;
+  for (const Body& each : training_corpus().bodies)
+    for (const Point& p : smoothing(each.rest)) most = std::max(most, double{p.norm()});
+  EXPECT_GT(most, 0.001);
+  EXPECT_LT(most, 0.5);
+  CloudConfig config{.points = 400, .noise = 0, .tpose_share = 0.5};
+  const CloudSampler plain(training_corpus(), config, 1);
+  config.smoothed = 1;
+  const CloudSampler smooth(training_corpus(), config, 1);
+  const CloudBatch a = plain.batch(0, 20), b = smooth.batch(0, 20);
+  for (int64_t i = 0; i < 20; ++i) {
+    double change = 0;
+    for (int p = 0; p < 400; ++p)
+      change = std::max(change, (world(a, i, p) - world(b, i, p)).norm());
+    EXPECT_GT(change, 0.001) << i;
+    EXPECT_LE(change, most + 1e-4) << i;
   }
 }
 

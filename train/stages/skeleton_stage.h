@@ -26,6 +26,12 @@ void visit(V& v, CloudConfig& c) {
   v("intruder", c.intruder, "part of what cameras see with somebody else's limb beside it",
     between(0, 1));
   v("bend", c.bend, "every joint but the pelvis turned by about this, degrees", between(0, 90));
+  v("things", c.things, "part with a thing in the hand or beside the foot",
+    added("0", between(0, 1)));
+  v("cut_floor", c.cut_floor, "part whose lowest centimetres were cut away with the floor",
+    added("0", between(0, 1)));
+  v("smoothed", c.smoothed, "part whose surface a coarse volume has smoothed",
+    added("0", between(0, 1)));
   v("remembered", c.remembered, "part with a memory of the frame before", between(0, 1));
   v("frame_step", c.frame_step, "only every so many frames of a motion (30: one a second)",
     between(1, 100000));
