@@ -76,6 +76,12 @@ class Config(collections.abc.Mapping):
 class Run(str):
     """A training's folder. It is the path itself, so that everything that takes a path takes a Run."""
 
+    def __new__(cls, path):
+        path = os.fspath(path)
+        if not os.path.exists(os.path.join(path, "config.yaml")):
+            raise _core.InputError(f"restage: {path}: is no folder of a training; give one that 'restage train' made")
+        return super().__new__(cls, path)
+
     @property
     def config(self):
         """The configuration that was trained."""
