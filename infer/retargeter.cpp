@@ -112,7 +112,8 @@ Retargeter::Retargeter(const Bundle& weights, const std::string& weights_name, M
   rest_ = extract_joints(skeleton, surface_points(target_, kTargetPoints, key.fold("surface")),
                          where, key, kTargetSamples, kRestPoses, options.any_size);
   if (const std::string off = off_tpose(rest_); !off.empty() && !options.force)
-    throw InputError(where, off, "give the target in T-pose facing +z, y up, or add --force");
+    throw InputError(where, off + ", as these weights see it",
+                     "give the target in T-pose facing +z, y up, or add --force");
   prepare(weights_name);
 }
 

@@ -92,6 +92,7 @@ Json parse_json(std::string_view text, uint64_t payload, const std::string& path
     left -= cost;
     return true;
   };
+  if (text.empty()) broken(path, "is empty");
   try {
     Json root = Json::parse(text.begin(), text.end(), keep);
     if (!root.is_object()) broken(path, "is no glTF file");

@@ -144,6 +144,9 @@ Report examine_sequence(const Options& options) {
   Report out("frames");
   auto source = without_empty_frames(
       open_frames(options.path, {.clip = "", .max_memory = options.max_memory}));
+  if (!source->next())
+    throw InputError(options.path, "holds no frame with points", "give at least one cloud");
+  source->rewind();
   Diagnosis d = examine_frames(*source, examine_options(options));
   out.facts["frames"] = d.frames;
   out.facts["fps"] = d.fps;

@@ -13,6 +13,7 @@
 #include "autograd/base/output_check.h"
 #include "autograd/base/rng.h"
 #include "autograd/base/thread_groups.h"
+#include "tests/support/errors.h"
 #include "tests/support/files.h"
 #include "tests/support/lacking.h"
 #include "tests/support/use_set.h"
@@ -112,6 +113,26 @@ TEST_F(AtomicFiles, OutputsMustNotLieOverInputs) {
   for (const std::string& out :
        {dir / "new", dir / "folder/in/new", dir / "folder/other", std::string()})
     EXPECT_NO_THROW(check_output(out, {x, dir / "folder"})) << out;
+}
+
+TEST_F(AtomicFiles, AFolderThatIsClosedIsSaidBeforeAnyWork) {
+  const std::string closed = dir / "closed";
+  fs::create_directory(closed);
+  fs::permissions(closed, fs::perms(0555));
+  fs::permissions(dir.path(), fs::perms(0755));
+  const bool root = geteuid() == 0;  // to whom no folder is closed
+  if (root) {
+    EXPECT_NO_THROW(check_output(closed + "/new", {}));
+    ASSERT_EQ(seteuid(65534), 0);
+  }
+  const std::string said = test::refusal_of([&] { check_output(closed + "/new", {}); });
+  const std::string of_a_folder = test::refusal_of([&] { check_output(closed + "/new/", {}); });
+  if (root) {
+    ASSERT_EQ(seteuid(0), 0);
+  }
+  EXPECT_HAS(said, "closed/new");
+  EXPECT_HAS(of_a_folder, "closed/new");
+  fs::permissions(closed, fs::perms::owner_all);
 }
 
 TEST_F(AtomicFiles, ReadingHasLimits) {
