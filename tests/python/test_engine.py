@@ -203,6 +203,26 @@ def test_an_own_op():
     assert np.allclose(ops.sum_all(swish(x)).backward()[x].numpy(), sigmoid(x.numpy()) * (1 + x.numpy() * (1 - sigmoid(x.numpy()))), atol=1e-6)
 
 
+def test_state_of_another_library():
+    """What PyTorch gives: tensors that become arrays, under names of its own."""
+
+    class Tensor:
+        def __init__(self, values):
+            self.values = values
+
+        def __array__(self, dtype=None):
+            return self.values if dtype is None else self.values.astype(dtype)
+
+    state = restage.model("deformation/weights", seed=1).state_dict()
+    theirs = {"module." + name: Tensor(value.numpy() + 1) for name, value in state.items()}
+    ours = restage.model("deformation/weights", seed=2)
+    with pytest.raises(restage.InputError, match="unexpected"):
+        ours.load_state_dict(theirs)
+    ours.load_state_dict({name.removeprefix("module."): value for name, value in theirs.items()})
+    for name, value in ours.state_dict().items():
+        assert np.array_equal(value.numpy(), state[name].numpy() + 1), name
+
+
 def test_own_ops_that_fail():
     def angry(*_):
         raise KeyError("mine")
