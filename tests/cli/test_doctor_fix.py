@@ -206,6 +206,11 @@ class DoctorFix(CliTest):
         for rate in (0, -1, "nan", 1e9):
             self.bad_input(["doctor", "sixty", "--fps", rate], "--fps")
         self.bad_input(["doctor", "walk/target.ply", "--fps", 60], "target.ply", "no sequence", "--fps")
+        header = "{'descr': '<f4', 'fortran_order': False, 'shape': (0, 3), }"
+        self.write("none.npy", b"\x93NUMPY\x01\x00\x76\x00" + header.ljust(117).encode() + b"\n")
+        self.bad_input(["doctor", "none.npy"], "none.npy: holds no frame with points")
+        self.write("none.glb", b"")
+        self.bad_input(["doctor", "none.glb"], "none.glb: is empty")
 
     def test_people_are_turned_by_the_angle_found(self):
         turn = math.radians(35)

@@ -149,6 +149,9 @@ class BadClouds(Skeleton):
         self.bad("a.ply", "--samples", more=["--samples", "0"])
         self.bad("a.ply", "nowhere", more=["--out", "nowhere/j.h5"])
         self.bad_input(["skeleton", "--weights", self.w], "--input")
+        told = self.restage("skeleton", "--input", "a.ply")  # the standard weights, which see nobody there
+        self.assertEqual(told.code, 0)
+        self.assertIn("a.ply: the networks are unsure of most frames", told.err)
 
     def test_full_disk(self):
         for i in range(40):

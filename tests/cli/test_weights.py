@@ -35,6 +35,11 @@ class Info(CliTest):
             self.assertTrue(all(m["parameters"] > 0 and set(m) == {"name", "kind", "output", "parameters"} for m in found["modules"]))
             self.assertIn(str(count), self.done("info", model))
 
+    def test_a_recurrent_layer_gives_its_state(self):
+        for model, layer, width in (("transfer/tst", "lstm", 256), ("smrm/rot6d", "enc", 512)):
+            found = {m["name"]: m["output"] for m in self.json("info", model)["modules"]}
+            self.assertEqual(found[layer], "[..., %d]" % width)
+
     def test_unknown_model(self):
         self.bad_input(["info", "smrm/rot6"], "smrm/rot6d")
         self.bad_input(["info", "nope"], "restage info --help")

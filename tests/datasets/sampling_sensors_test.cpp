@@ -233,6 +233,14 @@ double lowest_of(const CloudBatch& batch, int64_t i) {
   return out;
 }
 
+/// The largest of `of_point(p)` over the points of a row.
+template <class F>
+double most_of(const CloudBatch& batch, const F& of_point) {
+  double out = 0;
+  for (int64_t p = 0; p < batch.points.size(1); ++p) out = std::max(out, of_point(p));
+  return out;
+}
+
 TEST(SamplingSensors, ThingsAreNobodysPointsAndNear) {
   for (const double cameras : {0.0, 1.0}) {
     CloudConfig config{.points = 400, .noise = 0, .tpose_share = 0.2};
@@ -250,13 +258,12 @@ TEST(SamplingSensors, ThingsAreNobodysPointsAndNear) {
       }
       EXPECT_LT(own, 400);
       EXPECT_GT(own, 400 * 0.8);
-      double most = 0;
-      for (int p = 0; p < 400; ++p) {
+      const double most = most_of(batch, [&](int64_t p) {
         double nearest = 1e9;
         for (int j = 0; j < kJoints; ++j)
           nearest = std::min(nearest, (at(batch.points, i, p) - at(batch.joints, i, j)).norm());
-        most = std::max(most, nearest);
-      }
+        return nearest;
+      });
       EXPECT_LT(most, 1.3) << i;  // the far end of the longest stick
     }
   }
@@ -317,9 +324,8 @@ TEST(SamplingSensors, SmoothingTakesCornersAway) {
   const CloudSampler smooth(training_corpus(), config, 1);
   const CloudBatch a = plain.batch(0, 20), b = smooth.batch(0, 20);
   for (int64_t i = 0; i < 20; ++i) {
-    double change = 0;
-    for (int p = 0; p < 400; ++p)
-      change = std::max(change, (world(a, i, p) - world(b, i, p)).norm());
+    const double change =
+        most_of(a, [&](int64_t p) { return (world(a, i, p) - world(b, i, p)).norm(); });
     EXPECT_GT(change, 0.001) << i;
     EXPECT_LE(change, most + 1e-4) << i;
   }

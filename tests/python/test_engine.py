@@ -495,8 +495,10 @@ def test_train(tmp_path):
     assert run.config["deformation.optimiser.steps"] == 4
     with pytest.raises(restage.InputError, match="motion"):
         run.curves("motion")
-    with pytest.raises(restage.InputError):
-        restage.Run(tmp_path / "none").curves("motion")
+    with pytest.raises(restage.InputError, match="no folder of a training"):
+        restage.Run(tmp_path / "none")
+    with pytest.raises(restage.InputError, match="on_step"):
+        restage.train("demo", on_step=3)
 
     class Enough(Exception):
         pass
