@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/errors.h"
-#include "tests/support/use_set.h"
 #include "tests/train/tiny_codes.h"
 
 namespace restage {
@@ -28,27 +27,10 @@ TEST(CodesStage, LearnsTheBodiesAndTheirPoses) {
 }
 
 TEST(CodesStage, GivesTheSameBitsWithAnyNumberOfThreads) {
-  std::string first;
-  for (const int n : {1, 3}) {
-    const UseThreads use(n);
-    const auto stage = tiny_stage("codes", tiny_codes(6));
-    for (int64_t i = 0; i < 6; ++i) stage->step(i);
-    stage->validate();
-    if (first.empty()) first = result_bytes(*stage);
-    EXPECT_TRUE(result_bytes(*stage) == first) << n << " threads";
-  }
+  expect_the_same_bits("codes", tiny_codes(6));
 }
 
-TEST(CodesStage, StateGoesThroughAFile) {
-  const auto straight = tiny_stage("codes", tiny_codes(6));
-  for (int64_t i = 0; i < 3; ++i) straight->step(i);
-  const std::string half = result_bytes(*straight);
-  for (int64_t i = 3; i < 6; ++i) straight->step(i);
-  const auto resumed = tiny_stage("codes", tiny_codes(6));
-  resumed->load(parse_safetensors(half, "half"), "half");
-  for (int64_t i = 3; i < 6; ++i) resumed->step(i);
-  EXPECT_TRUE(result_bytes(*resumed) == result_bytes(*straight));
-}
+TEST(CodesStage, StateGoesThroughAFile) { expect_to_resume("codes", tiny_codes(6)); }
 
 TEST(CodesStage, IsAsLargeAsTheDataAskFor) {
   const auto stage = tiny_stage("codes", tiny_codes(1));

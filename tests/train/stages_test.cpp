@@ -67,17 +67,7 @@ TEST(TrainStages, FiveStepsGiveTheSameBitsOnAllVectorSets) {
 }
 
 TEST(TrainStages, TwentyStepsWithOneTwoAndThreeThreadsGiveTheSameBits) {
-  for (const std::string name : kStageNames) {
-    std::string first;
-    for (const int n : {1, 2, 3}) {
-      const testing::UseThreads use(n);
-      const auto stage = tiny_stage(name, wide(20));
-      for (int64_t i = 0; i < 20; ++i) stage->step(i);
-      stage->validate();  // must leave no trace
-      if (n == 1) first = result_bytes(*stage);
-      EXPECT_TRUE(result_bytes(*stage) == first) << name << " with " << n << " threads";
-    }
-  }
+  for (const std::string name : kStageNames) expect_the_same_bits(name, wide(20));
 }
 
 TEST(TrainStages, AnotherSeedGivesOtherBits) {
@@ -100,18 +90,7 @@ TEST(TrainStages, AnotherSeedGivesOtherBits) {
 }
 
 TEST(TrainStages, StateGoesThroughAFile) {
-  for (const std::string name : kStageNames) {
-    const auto straight = tiny_stage(name, tiny_training(8));
-    for (int64_t i = 0; i < 4; ++i) straight->step(i);
-    const std::string half = result_bytes(*straight);
-    for (int64_t i = 4; i < 8; ++i) straight->step(i);
-
-    const auto resumed = tiny_stage(name, tiny_training(8));
-    resumed->load(parse_safetensors(half, "half"), "half");
-    EXPECT_TRUE(result_bytes(*resumed) == half) << name;
-    for (int64_t i = 4; i < 8; ++i) resumed->step(i);
-    EXPECT_TRUE(result_bytes(*resumed) == result_bytes(*straight)) << name;
-  }
+  for (const std::string name : kStageNames) expect_to_resume(name, tiny_training(8));
 }
 
 TEST(TrainStages, ReadingHasNoState) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/tiny_body.h"
+#include "tests/support/use_set.h"
 #include "train/stages/deformation_stage.h"
 #include "train/stages/motion_stage.h"
 #include "train/stages/skeleton_stage.h"
@@ -100,6 +101,32 @@ inline std::string result_bytes(const Stage& stage) {
   TensorFile file;
   stage.save(file);
   return safetensors_bytes(file);
+}
+
+/// All steps of a stage, with one thread and with several.
+inline void expect_the_same_bits(const std::string& name, const TrainConfig& config) {
+  std::string first;
+  for (const int n : {1, 2, 3}) {
+    const UseThreads use(n);
+    const auto stage = tiny_stage(name, config);
+    for (int64_t i = 0; i < stage->steps(); ++i) stage->step(i);
+    stage->validate();  // must leave no trace
+    if (n == 1) first = result_bytes(*stage);
+    EXPECT_TRUE(result_bytes(*stage) == first) << name << " with " << n << " threads";
+  }
+}
+
+/// A training that went through a file half way has the bits of one that did not.
+inline void expect_to_resume(const std::string& name, const TrainConfig& config) {
+  const auto straight = tiny_stage(name, config), resumed = tiny_stage(name, config);
+  const int64_t all = straight->steps(), half = all / 2;
+  for (int64_t i = 0; i < half; ++i) straight->step(i);
+  const std::string bytes = result_bytes(*straight);
+  for (int64_t i = half; i < all; ++i) straight->step(i);
+  resumed->load(parse_safetensors(bytes, "half"), "half");
+  EXPECT_TRUE(result_bytes(*resumed) == bytes) << name;
+  for (int64_t i = half; i < all; ++i) resumed->step(i);
+  EXPECT_TRUE(result_bytes(*resumed) == result_bytes(*straight)) << name;
 }
 
 inline OptimiserConfig optimiser_of(const Stage& stage) {
